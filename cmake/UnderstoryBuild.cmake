@@ -1,0 +1,79 @@
+# Compiler settings and the three functions by which every folder declares what it builds.
+include(GNUInstallDirs)
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/bin")
+
+find_program(CCACHE_PROGRAM ccache)
+if(CCACHE_PROGRAM)
+  # Relative paths in the cache key: another checkout of the same source hits the same cache.
+  set(CMAKE_CXX_COMPILER_LAUNCHER "${CMAKE_COMMAND}" -E env
+      "CCACHE_BASEDIR=${CMAKE_SOURCE_DIR}" CCACHE_NOHASHDIR=1 "${CCACHE_PROGRAM}")
+endif()
+
+add_library(understory_flags INTERFACE)
+target_compile_options(understory_flags INTERFACE -Wall -Wextra -Wpedantic
+                       $<$<BOOL:${UNDERSTORY_WERROR}>:-Werror>
+                       $<$<BOOL:${UNDERSTORY_NATIVE}>:-march=native>)
+if(UNDERSTORY_SANITIZE)
+  add_compile_options(-fsanitize=${UNDERSTORY_SANITIZE} -fno-sanitize-recover=all
+                      -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${UNDERSTORY_SANITIZE})
+endif()
+install(TARGETS understory_flags EXPORT understory)
+
+# understory_library(NAME PUBLIC targets... PRIVATE targets...)
+# Builds understory::NAME from every .cpp beside the calling CMakeLists.txt.
+function(understory_library name)
+  cmake_parse_arguments(ARG "" "" "PUBLIC;PRIVATE" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp")
+  list(FILTER sources EXCLUDE REGEX "/main\\.cpp$")
+  if(sources)
+    add_library(understory_${name} STATIC ${sources})
+    set(scope PUBLIC)
+    target_link_libraries(understory_${name} PRIVATE ${ARG_PRIVATE} understory_flags)
+  else()
+    add_library(understory_${name} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  add_library(understory::${name} ALIAS understory_${name})
+  set_target_properties(understory_${name} PROPERTIES EXPORT_NAME ${name})
+  target_include_directories(understory_${name} ${scope}
+    $<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/understory>)
+  target_link_libraries(understory_${name} ${scope} ${ARG_PUBLIC})
+  install(TARGETS understory_${name} EXPORT understory ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  file(RELATIVE_PATH here "${CMAKE_SOURCE_DIR}" "${CMAKE_CURRENT_SOURCE_DIR}")
+  install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/" DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/understory/${here}
+          FILES_MATCHING PATTERN "*.hpp")
+endfunction()
+
+# understory_service(NAME PUBLIC targets...): the library of a service and, from its main.cpp,
+# the executable understory-NAME.
+function(understory_service name)
+  cmake_parse_arguments(ARG "" "" "PUBLIC;PRIVATE" ${ARGN})
+  understory_library(${name} ${ARGN})
+  if(EXISTS "${CMAKE_CURRENT_SOURCE_DIR}/main.cpp")
+    string(REPLACE "_" "-" dashed ${name})
+    add_executable(understory-${dashed} main.cpp)
+    target_link_libraries(understory-${dashed} PRIVATE understory::${name} understory_flags)
+    install(TARGETS understory-${dashed})
+  endif()
+endfunction()
+
+# understory_test(NAME targets...): one Catch2 executable from every .cpp in tests/NAME.
+function(understory_test name)
+  file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_SOURCE_DIR}/tests/${name}/*.cpp")
+  if(NOT sources)
+    return()
+  endif()
+  add_executable(test_${name} ${sources})
+  target_link_libraries(test_${name} PRIVATE understory_test_main ${ARGN} understory_flags)
+  target_include_directories(test_${name} PRIVATE "${CMAKE_SOURCE_DIR}")
+  set_target_properties(test_${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/tests")
+  add_test(NAME ${name} COMMAND test_${name})
+  set_tests_properties(${name} PROPERTIES TIMEOUT 300)
+endfunction()

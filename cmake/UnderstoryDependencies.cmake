@@ -1,0 +1,28 @@
+# Everything comes from Debian's packages (deploy/setup installs them); nothing is downloaded here.
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(CGAL REQUIRED)
+find_package(fmt REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(tomlplusplus REQUIRED)
+find_package(nanoflann REQUIRED)
+find_package(Threads REQUIRED)
+find_package(Catch2 REQUIRED)
+find_package(benchmark QUIET)
+
+# liblcm's own pkg-config file asks for glib's headers, which its users do not need.
+find_path(LCM_INCLUDE_DIR lcm/lcm.h REQUIRED)
+find_library(LCM_LIBRARY lcm REQUIRED)
+find_program(LCM_GEN lcm-gen REQUIRED)
+add_library(understory_lcm INTERFACE)
+target_include_directories(understory_lcm INTERFACE "${LCM_INCLUDE_DIR}")
+target_link_libraries(understory_lcm INTERFACE "${LCM_LIBRARY}")
+
+find_path(SUITESPARSE_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
+find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
+add_library(understory_cholmod INTERFACE)
+target_include_directories(understory_cholmod SYSTEM INTERFACE "${SUITESPARSE_INCLUDE_DIR}")
+target_link_libraries(understory_cholmod INTERFACE "${CHOLMOD_LIBRARY}")
+
+install(TARGETS understory_lcm understory_cholmod EXPORT understory)

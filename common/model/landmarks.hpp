@@ -1,0 +1,46 @@
+// What the landmark extractor (or the simulator) says about one sweep.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <numbers>
+#include <vector>
+
+namespace understory {
+
+/// Microseconds since the epoch of the recording: the time of the measurement.
+using Utime = std::int64_t;
+
+enum class LandmarkKind : std::uint8_t { kTrunk = 0, kCorner = 1 };
+
+/// One landmark as seen from the vehicle.
+struct Detection {
+  /// Centre (trunk, at breast height) or edge (corner) in `vehicle_level` [m].
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
+  /// Covariance of the position [m^2], frame `vehicle_level`.
+  Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();
+  /// Radius of a trunk [m]; 0 where unknown or a corner.
+  double radius_m = 0.0;
+  LandmarkKind kind = LandmarkKind::kTrunk;
+};
+
+/// What the sensor could have seen: a sector of a disc around the vehicle.
+struct FieldOfView {
+  double max_range_m = 0.0;
+  /// Middle of the sector [rad], 0 = straight ahead, left positive.
+  double bearing_rad = 0.0;
+  /// Whole width of the sector [rad]; 2 pi = all around.
+  double width_rad = 2.0 * std::numbers::pi;
+
+  bool contains(const Eigen::Vector2d& position_in_vehicle_m) const;
+};
+
+/// Channel LANDMARKS: all detections of one sweep, frame `vehicle_level` at `utime`.
+struct LandmarkScan {
+  Utime utime = 0;
+  std::uint64_t sequence = 0;
+  FieldOfView field_of_view;
+  std::vector<Detection> detections;
+};
+
+}  // namespace understory

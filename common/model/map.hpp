@@ -1,0 +1,72 @@
+// What the mapper knows and says.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/geometry/se2.hpp"
+#include "common/model/landmarks.hpp"
+
+namespace understory {
+
+/// 64 bit: map id (upper 16), counter (lower 48). Permanent, never used again. 0 = none.
+using LandmarkId = std::uint64_t;
+
+struct MapLandmark {
+  LandmarkId id = 0;
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `map`.
+  Eigen::Matrix2d covariance_m2 =
+      Eigen::Matrix2d::Zero();  ///< Marginal, frame `map`; zero where not computed.
+  double radius_m = 0.0;
+  std::uint32_t times_seen = 0;  ///< Scans in which it was detected.
+  LandmarkKind kind = LandmarkKind::kTrunk;
+};
+
+/// A keyframe's base pose in the map.
+struct KeyframePose {
+  std::uint64_t keyframe_sequence = 0;
+  Utime utime = 0;
+  SE2 map_T_vehicle;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Zero where not computed.
+};
+
+/// What became of a keyframe.
+enum class MapUpdateStatus : std::uint8_t {
+  kFirstMap = 0,  ///< It started the map.
+  kUpdated = 1,   ///< Localised and fused.
+  kNotSure =
+      2,  ///< No pose could be told apart from chance or from a runner-up; nothing was changed.
+  kRolledBack = 3,  ///< Fused, found inconsistent (chi^2), taken back exactly.
+  kRejected = 4,    ///< Malformed, empty, or out of order.
+};
+
+/// One detection of a keyframe in the map.
+struct Association {
+  std::uint32_t keyframe_landmark = 0;  ///< Index in Keyframe::landmarks.
+  LandmarkId landmark_id = 0;
+};
+
+/// Channels SLAM_UPDATE and SLAM_POSE, for one keyframe.
+struct MapUpdate {
+  std::uint64_t keyframe_sequence = 0;
+  Utime utime = 0;
+  MapUpdateStatus status = MapUpdateStatus::kRejected;
+  SE2 map_T_vehicle;                                     ///< Of the keyframe's base.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Of map_T_vehicle.
+  SE2 map_T_latest_vehicle;                              ///< Of the keyframe's last member.
+  std::vector<Association> associations;
+  std::vector<LandmarkId> added;
+  std::vector<LandmarkId> removed;
+  std::vector<std::pair<LandmarkId, LandmarkId>> merged;  ///< old -> new.
+  // Diagnostics.
+  bool used_prior = false;       ///< Localised by gating around the predicted pose, not by search.
+  std::uint32_t candidates = 0;  ///< Hypotheses tried by the search.
+  std::uint32_t inliers = 0;
+  double chi2 = 0.0;  ///< Of the innovation, over `degrees_of_freedom`.
+  std::uint32_t degrees_of_freedom = 0;
+  double log10_false_alarm = 0.0;  ///< Of the accepted pose (search only).
+  std::string reason;              ///< Why not, where not.
+};
+
+}  // namespace understory

@@ -1,0 +1,41 @@
+// The global map: localises keyframes in it, grows it, keeps it consistent (GeoSLAM §4.3,
+// algorithms 3-5).
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/model/keyframe.hpp"
+#include "common/model/map.hpp"
+#include "common/model/odometry.hpp"
+#include "services/geoslam_mapper/parameters.hpp"
+
+namespace understory {
+
+/// A method of mapping. Two exist: `source` as the thesis describes it, `ours`.
+class MapperMethod {
+ public:
+  virtual ~MapperMethod() = default;
+  /// Localises the keyframe and fuses it; the map is unchanged unless the status says otherwise.
+  virtual MapUpdate add(const Keyframe& keyframe) = 0;
+  /// Motion without landmarks; a factor between keyframes when the configuration says so.
+  virtual void add(const Odometry& odometry) = 0;
+  /// A map to start from (thesis §4.3.1), frame `map`; before the first keyframe.
+  virtual void start_with(std::span<const MapLandmark> landmarks) = 0;
+
+  /// Every keyframe's pose as now estimated, in order of time (folded ones reconstructed).
+  virtual std::vector<KeyframePose> trajectory() const = 0;
+  /// Every landmark of the map as now estimated, in order of id.
+  virtual std::vector<MapLandmark> landmarks() const = 0;
+
+  /// The whole state, for a restart; load() takes what save() of the same method gave.
+  virtual std::string save() const = 0;
+  virtual void load(const std::string& state) = 0;
+};
+
+/// The method that `parameters.method` names.
+std::unique_ptr<MapperMethod> make_mapper(const MapperParameters& parameters);
+
+}  // namespace understory

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+
+namespace understory {
+
+/// The source's own method (GeoSLAM Table 5.2). Symbols of the thesis in brackets.
+struct SourceKeyframerParameters {
+  double descriptor_step = 0.05;            ///< [s] of the perimeter.
+  double max_descriptor_distance = 9.0;     ///< [tau]
+  int max_side_difference = 3;              ///< [Delta_N]
+  double min_triangle_match_ratio = 0.5;    ///< [eta]
+  int min_associations = 7;                 ///< [gamma]
+  double max_association_distance_m = 1.0;  ///< [lambda]
+  double cluster_tolerance_m = 1.0;         ///< [sigma]
+  int observations_per_keyframe = 8;        ///< [n]
+  int stale_after_observations = 3;         ///< [f]
+};
+
+/// Ours: joint estimate of member poses and local landmarks.
+struct JointKeyframerParameters {
+  int observations_per_keyframe = 8;
+};
+
+struct KeyframerParameters {
+  std::string method = "joint";  ///< "joint" (ours) or "source".
+  SourceKeyframerParameters source;
+  JointKeyframerParameters joint;
+};
+
+}  // namespace understory
