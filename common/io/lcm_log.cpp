@@ -1,0 +1,155 @@
+#include "common/io/lcm_log.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "common/io/file_window.hpp"
+#include "common/io/lcm_log_format.hpp"
+
+namespace understory {
+
+using lcm_log::Header;
+using lcm_log::kHeaderBytes;
+using lcm_log::kMagicBytes;
+
+class LcmLogReader::Impl {
+ public:
+  explicit Impl(const std::filesystem::path& path) : file_(path) {}
+
+  std::optional<LogEvent> next() {
+    while (position_ < file_.size()) {
+      const auto header = header_at(position_);
+      if (header && trustworthy(*header)) return take(*header);
+      skip_to(confirmed_from(position_ + 1));
+    }
+    close_place();
+    return std::nullopt;
+  }
+
+  const LogDamage& damage() const { return damage_; }
+  std::uint64_t position() const { return position_; }
+  std::uint64_t size() const { return file_.size(); }
+
+ private:
+  /// The header of an event that fits into the file and whose channel is a name.
+  std::optional<Header> header_at(std::uint64_t offset) {
+    const auto bytes = file_.peek(offset, kHeaderBytes + lcm_log::kMaxChannelBytes);
+    if (bytes.size() < kHeaderBytes) return std::nullopt;
+    const auto header = lcm_log::decode(bytes.first<kHeaderBytes>());
+    if (!header || header->event_bytes() > file_.size() - offset) return std::nullopt;
+    if (bytes.size() < kHeaderBytes + header->channel_bytes) return std::nullopt;
+    if (!lcm_log::plausible_channel(bytes.subspan(kHeaderBytes, header->channel_bytes))) {
+      return std::nullopt;
+    }
+    return header;
+  }
+
+  /// Whether another event starts where this one ends: the magic number, or as much of it as a
+  /// file that was cut there (or ends there) still holds.
+  bool followed_by_event(std::uint64_t offset, const Header& header) {
+    const std::uint64_t end = offset + header.event_bytes();
+    std::array<std::uint8_t, 4> next{};
+    const auto left = static_cast<std::size_t>(std::min<std::uint64_t>(4, file_.size() - end));
+    return file_.read(end, std::span(next).first(left)) &&
+           std::equal(next.begin(), next.begin() + left, kMagicBytes.begin());
+  }
+
+  /// When no event follows, either this header's lengths are damaged or the next header is. It is
+  /// the next one if something stands there that was a header: the number that follows this one's,
+  /// or lengths that lead to the next event beyond doubt.
+  bool trustworthy(const Header& header) {
+    const std::uint64_t end = position_ + header.event_bytes();
+    if (followed_by_event(position_, header)) return true;
+    const std::uint64_t resumes = confirmed_from(position_ + 1);
+    std::array<std::uint8_t, kHeaderBytes> bytes{};
+    if (resumes < end || !file_.read(end, bytes)) return false;
+    const Header next = lcm_log::decode_fields(bytes);
+    return (header.number < INT64_MAX && next.number == header.number + 1) ||
+           end + next.event_bytes() == resumes;
+  }
+
+  /// Where the first event at or behind `offset` starts that is followed by another one or by the
+  /// end of the file; the size of the file when there is none. The answer is kept, so that the
+  /// whole file is searched once at most.
+  std::uint64_t confirmed_from(std::uint64_t offset) {
+    if (offset <= confirmed_) return confirmed_;
+    std::uint64_t at = offset;
+    while ((at = find_magic(at)) < file_.size()) {
+      const auto header = header_at(at);
+      if (header && followed_by_event(at, *header)) break;
+      ++at;
+    }
+    return confirmed_ = std::min(at, file_.size());
+  }
+
+  /// Where the magic number next stands, at or behind `offset`; the size of the file when nowhere.
+  std::uint64_t find_magic(std::uint64_t offset) {
+    constexpr std::size_t kStep = 4096;
+    while (offset < file_.size()) {
+      const auto bytes = file_.peek(offset, kStep);
+      const auto hit =
+          std::search(bytes.begin(), bytes.end(), kMagicBytes.begin(), kMagicBytes.end());
+      if (hit != bytes.end()) return offset + static_cast<std::uint64_t>(hit - bytes.begin());
+      if (bytes.size() < kStep) return file_.size();
+      offset += kStep - (kMagicBytes.size() - 1);
+    }
+    return file_.size();
+  }
+
+  void skip_to(std::uint64_t offset) {
+    if (!in_place_) {
+      in_place_ = true;
+      ++damage_.places;
+      damage_.last_offset = position_;
+      damage_.last_bytes = 0;
+    }
+    damage_.bytes += offset - position_;
+    damage_.last_bytes += offset - position_;
+    position_ = offset;
+  }
+
+  void close_place() { in_place_ = false; }
+
+  std::optional<LogEvent> take(const Header& header) {
+    LogEvent event;
+    event.number = header.number;
+    event.utime = header.utime;
+    event.channel.resize(header.channel_bytes);
+    event.data.resize(header.data_bytes);
+    const auto channel = file_.peek(position_ + kHeaderBytes, header.channel_bytes);
+    std::copy(channel.begin(), channel.end(), event.channel.begin());
+    if (!file_.read(position_ + kHeaderBytes + header.channel_bytes, event.data)) {
+      skip_to(file_.size());  // The file has shrunk since it was opened.
+      return std::nullopt;
+    }
+    // Only a gap across damage is a loss: a log that was cut or filtered has gaps by intent. Two
+    // billion is more than any damage can hide.
+    if (in_place_ && event.number > next_number_ && event.number - next_number_ < (1LL << 31)) {
+      damage_.events_lost += static_cast<std::uint64_t>(event.number - next_number_);
+    }
+    close_place();
+    next_number_ = event.number < INT64_MAX ? event.number + 1 : event.number;
+    position_ += header.event_bytes();
+    return event;
+  }
+
+  FileWindow file_;
+  std::uint64_t position_ = 0;
+  std::uint64_t confirmed_ = 0;
+  std::int64_t next_number_ = 0;
+  bool in_place_ = false;
+  LogDamage damage_;
+};
+
+LcmLogReader::LcmLogReader(const std::filesystem::path& path)
+    : impl_(std::make_unique<Impl>(path)) {}
+LcmLogReader::~LcmLogReader() = default;
+LcmLogReader::LcmLogReader(LcmLogReader&&) noexcept = default;
+LcmLogReader& LcmLogReader::operator=(LcmLogReader&&) noexcept = default;
+
+std::optional<LogEvent> LcmLogReader::next() { return impl_->next(); }
+const LogDamage& LcmLogReader::damage() const { return impl_->damage(); }
+std::uint64_t LcmLogReader::position_bytes() const { return impl_->position(); }
+std::uint64_t LcmLogReader::size_bytes() const { return impl_->size(); }
+
+}  // namespace understory

@@ -1,0 +1,34 @@
+// The header of an event in an LCM log: encoding, decoding, and what is plausible.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+namespace understory::lcm_log {
+
+constexpr std::array<std::uint8_t, 4> kMagicBytes{0xED, 0xA1, 0xDA, 0x01};
+constexpr std::size_t kHeaderBytes = 28;
+constexpr std::size_t kMaxChannelBytes = 63;
+
+struct Header {
+  std::int64_t number = 0;
+  std::int64_t utime = 0;
+  std::uint32_t channel_bytes = 0;
+  std::uint32_t data_bytes = 0;
+
+  std::uint64_t event_bytes() const {
+    return kHeaderBytes + std::uint64_t{channel_bytes} + data_bytes;
+  }
+};
+
+std::array<std::uint8_t, kHeaderBytes> encode(const Header& header);
+/// The fields as they stand, whatever they say.
+Header decode_fields(std::span<const std::uint8_t, kHeaderBytes> bytes);
+/// None when the bytes cannot start an event: wrong magic, or lengths that LCM never writes.
+std::optional<Header> decode(std::span<const std::uint8_t, kHeaderBytes> bytes);
+/// Whether LCM could have such a channel name: printable ASCII.
+bool plausible_channel(std::span<const std::uint8_t> name);
+
+}  // namespace understory::lcm_log
