@@ -1,0 +1,91 @@
+// A simulated drive: a forest, a path in it, what the robot sees on the way, and the truth.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "common/geometry/se2.hpp"
+#include "common/model/landmarks.hpp"
+#include "sim/forest.hpp"
+#include "sim/path.hpp"
+#include "sim/point_grid.hpp"
+
+namespace understory::sim {
+
+struct SensorParameters {
+  double range_m = 40.0;
+  double detection_probability = 0.9;  ///< [kappa] Of every landmark in range, independently.
+  double position_sigma_m = 0.2;       ///< [epsilon] Per axis.
+  /// Least variance that a detection states [m^2]: a noise-free one must not be infinitely sure.
+  double variance_floor_m2 = 1e-8;
+};
+
+/// One scan with the truth that a mapper must not see.
+struct SimulatedScan {
+  LandmarkScan scan;
+  SE2 world_T_vehicle;
+  std::vector<std::uint32_t> trunks;  ///< Index of the trunk behind each detection.
+};
+
+/// All trunks in range of the pose, each detected by chance, its position noisy; the noise comes
+/// before the test of the range (as in the source's code). In random order.
+SimulatedScan observe(const Forest& forest, const PointGrid& grid, const SE2& world_T_vehicle,
+                      const SensorParameters& sensor, std::mt19937_64& random);
+
+struct StartPoseParameters {
+  double clearance_m = 0.3;  ///< No trunk nearer than this to the path.
+  double margin_m = 40.0;    ///< Of forest around the whole path.
+  int tries = 20000;
+};
+/// A start pose in the central half of the forest, heading uniform, from which the path
+/// (vehicle poses in the frame of the first) keeps clear of all trunks and inside the forest.
+/// None if no try succeeded.
+std::optional<SE2> draw_start_pose(const Forest& forest, const PointGrid& grid,
+                                   const std::vector<SE2>& path,
+                                   const StartPoseParameters& parameters, std::mt19937_64& random);
+
+struct DriveParameters {
+  ForestParameters forest;
+  PathParameters path;
+  SensorParameters sensor;
+  StartPoseParameters start;
+  double speed_mps = 1.0;  ///< Gives the stamps: interval / speed between scans.
+  /// Trunks too near to the path are felled instead of another start being drawn: a long path
+  /// always meets some. The forest then also grows to hold the path.
+  bool clear_the_way = false;
+};
+
+/// Scans are made when asked for, each from a stream of its own: a drive of any length costs no
+/// memory, and scan k is the same whichever were asked for before.
+class Drive {
+ public:
+  /// A forest, a path and a start pose from `seed`. Throws std::runtime_error where the path fits
+  /// nowhere.
+  Drive(const DriveParameters& parameters, std::uint64_t seed);
+  /// The same in a given forest (`parameters.forest` is not used).
+  Drive(const DriveParameters& parameters, Forest forest, std::uint64_t seed);
+
+  std::size_t size() const { return world_T_vehicle_.size(); }
+  SimulatedScan scan(std::size_t k) const;
+  Utime utime(std::size_t k) const;
+
+  const Forest& forest() const { return forest_; }
+  const PointGrid& grid() const { return *grid_; }
+  const std::vector<SE2>& world_T_vehicle() const { return world_T_vehicle_; }
+  const DriveParameters& parameters() const { return parameters_; }
+
+ private:
+  void place_path();
+  void fell_trunks_on(const std::vector<SE2>& path);
+
+  DriveParameters parameters_;
+  std::uint64_t seed_ = 0;
+  Forest forest_;
+  std::unique_ptr<PointGrid> grid_;
+  std::vector<SE2> world_T_vehicle_;
+};
+
+}  // namespace understory::sim
