@@ -25,4 +25,11 @@ add_library(understory_cholmod INTERFACE)
 target_include_directories(understory_cholmod SYSTEM INTERFACE "${SUITESPARSE_INCLUDE_DIR}")
 target_link_libraries(understory_cholmod INTERFACE "${CHOLMOD_LIBRARY}")
 
-install(TARGETS understory_lcm understory_cholmod EXPORT understory)
+# libzip's own CMake files ask for its command-line tools, which its users do not need.
+find_path(ZIP_INCLUDE_DIR zip.h REQUIRED)
+find_library(ZIP_LIBRARY zip REQUIRED)
+add_library(understory_zip INTERFACE)
+target_include_directories(understory_zip INTERFACE "${ZIP_INCLUDE_DIR}")
+target_link_libraries(understory_zip INTERFACE "${ZIP_LIBRARY}")
+
+install(TARGETS understory_lcm understory_cholmod understory_zip EXPORT understory)

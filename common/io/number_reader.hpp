@@ -1,0 +1,39 @@
+// Numbers separated by white space, commas or semicolons, with errors that say where.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace understory {
+
+/// Walks a text number by number; line breaks are white space like any other.
+class NumberReader {
+ public:
+  /// `source` names the text in error messages. The text must outlive the reader.
+  NumberReader(std::string_view text, std::string source)
+      : text_(text), source_(std::move(source)) {}
+
+  /// The next finite number, or none at the end of the text. Throws DataError on anything else.
+  std::optional<double> next();
+  /// The next number, called `what` in the error when it is missing or no finite number.
+  double require(std::string_view what);
+  /// Passes over the rest of the present line (a heading, say).
+  void skip_line();
+
+  std::uint64_t tokens() const { return tokens_; }  ///< Given so far.
+  /// "file, line 3, token 17", of the number given last.
+  std::string where() const;
+
+ private:
+  std::string_view next_token();
+
+  std::string_view text_;
+  std::string source_;
+  std::size_t at_ = 0;
+  std::uint64_t line_ = 1;
+  std::uint64_t tokens_ = 0;
+};
+
+}  // namespace understory

@@ -1,0 +1,31 @@
+// A recording that comes as several files: in a folder, or in a zip archive as downloaded.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace understory {
+
+/// Gives the files of a recording by name, wherever they lie.
+class RecordingFolder {
+ public:
+  /// A folder or a zip archive. Throws DataError when it is neither.
+  explicit RecordingFolder(std::filesystem::path path);
+
+  /// The whole content of the file of this name (case and leading folders do not matter). Throws
+  /// DataError when it is missing, damaged, or larger than `kMaxFileBytes`.
+  std::string read(std::string_view name) const;
+  /// What to call the file in messages: "archive.zip:LASER.txt", "folder/LASER.txt".
+  std::string describe(std::string_view name) const;
+
+  /// A bound on what is unpacked into memory: archives may claim anything.
+  static constexpr std::uint64_t kMaxFileBytes = 1ULL << 30U;
+
+ private:
+  std::filesystem::path path_;
+  bool is_archive_ = false;
+};
+
+}  // namespace understory

@@ -1,0 +1,48 @@
+// The Victoria Park recording (J. Guivant, J. Nieto, E. Nebot, ACFR, University of Sydney): a car
+// with a laser that sweeps a plane, an encoder on a rear wheel, a steering sensor and GPS, driven
+// among trees.
+//
+// Read as it is downloaded: victoria_park_ascii.zip, or a folder with its LASER.txt, DRS.txt and
+// GPS.txt. Times become microseconds from the recording's first GPS fix.
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "common/geometry/se2.hpp"
+#include "common/model/gnss.hpp"
+#include "common/model/planar_scan.hpp"
+#include "common/model/wheels.hpp"
+
+namespace understory {
+
+struct VictoriaPark {
+  std::vector<PlanarScan> scans;    ///< 7230, every 0.214 s; frame `sensor` (the laser).
+  std::vector<WheelSample> wheels;  ///< 61763, every 0.025 s; encoder on the rear left wheel.
+  std::vector<GnssFix> gnss;        ///< 948 fixes left after the authors removed bad ones.
+};
+
+namespace victoria_park {
+
+constexpr std::size_t kBeams = 361;      ///< 0.5 degrees apart, from the right to the left.
+constexpr double kMaxRange_m = 80.0;     ///< Readings beyond mean that nothing came back.
+constexpr double kWheelbase_m = 2.83;    ///< [L]
+constexpr double kEncoderLeft_m = 0.76;  ///< [H] Of the encoder's wheel, left of the middle.
+constexpr double kLaserAhead_m = 3.78;   ///< [L + a] Of the rear axle.
+constexpr double kLaserLeft_m = 0.5;     ///< [b] Of the middle of the car.
+
+/// Where the laser is. Frame `vehicle` of this recording: the middle of the rear axle, x forward.
+inline SE2 vehicle_T_sensor() { return {kLaserAhead_m, kLaserLeft_m, 0.0}; }
+
+/// Each parser takes the text of its file; `source` names it in errors. Throws DataError.
+std::vector<PlanarScan> parse_laser(std::string_view text, std::string_view source);
+std::vector<WheelSample> parse_wheels(std::string_view text, std::string_view source);
+std::vector<GnssFix> parse_gnss(std::string_view text, std::string_view source);
+
+}  // namespace victoria_park
+
+/// Reads the whole set from a folder or zip archive. Throws DataError.
+VictoriaPark read_victoria_park(const std::filesystem::path& path);
+
+}  // namespace understory

@@ -1,0 +1,102 @@
+#include "services/landmark_extractor/landmark_extractor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "services/landmark_extractor/segments.hpp"
+#include "services/landmark_extractor/trunk_fit.hpp"
+
+namespace understory {
+namespace {
+
+/// How much a trunk's height above the sensor's plane is unknown [m]: a planar laser has no say.
+constexpr double kHeightSigma_m = 0.5;
+
+bool well_formed(const PlanarScan& scan) {
+  const double width = scan.bearing_step_rad *
+                       static_cast<double>(scan.ranges_m.empty() ? 0 : scan.ranges_m.size() - 1);
+  return scan.ranges_m.size() > 1 && std::isfinite(scan.first_bearing_rad) &&
+         scan.bearing_step_rad > 0.0 && width < 2.0 * std::numbers::pi + 1e-6 &&
+         scan.max_range_m > 0.0;
+}
+
+FieldOfView field_of_view(const PlanarScan& scan, const PlanarTrunkParameters& parameters) {
+  FieldOfView view;
+  view.max_range_m = std::min(scan.max_range_m, parameters.max_range_m);
+  view.width_rad = scan.bearing_step_rad * static_cast<double>(scan.ranges_m.size() - 1);
+  view.bearing_rad = wrap_angle(scan.first_bearing_rad + 0.5 * view.width_rad +
+                                parameters.vehicle_T_sensor.theta());
+  return view;
+}
+
+/// Whether the borders let the object be one that stands alone; at most one side may be hidden.
+bool stands_alone(const Segment& segment) {
+  const auto seen = [](Border border) { return border == Border::kClear; };
+  const auto hidden = [](Border border) { return border == Border::kOccluded; };
+  return (seen(segment.left) && (seen(segment.right) || hidden(segment.right))) ||
+         (seen(segment.right) && hidden(segment.left));
+}
+
+Detection to_detection(const TrunkFit& fit, const PlanarTrunkParameters& parameters) {
+  const SE2& vehicle_T_sensor = parameters.vehicle_T_sensor;
+  const Eigen::Matrix2d rotation = vehicle_T_sensor.rotation();
+  Detection detection;
+  detection.position_m.head<2>() = vehicle_T_sensor * fit.centre();
+  detection.covariance_m2.topLeftCorner<2, 2>() =
+      rotation * fit.centre_covariance() * rotation.transpose() +
+      parameters.shape_sigma_m * parameters.shape_sigma_m * Eigen::Matrix2d::Identity();
+  detection.covariance_m2(2, 2) = kHeightSigma_m * kHeightSigma_m;
+  detection.radius_m = fit.radius_m;
+  detection.kind = LandmarkKind::kTrunk;
+  return detection;
+}
+
+std::optional<Detection> to_trunk(const PlanarScan& scan, const Segment& segment,
+                                  const PlanarTrunkParameters& parameters,
+                                  ExtractorCounters& counters) {
+  if (segment.size() < static_cast<std::size_t>(std::max(1, parameters.min_points))) {
+    ++counters.too_few_points;
+    return std::nullopt;
+  }
+  if (!stands_alone(segment)) {
+    ++counters.not_alone;
+    return std::nullopt;
+  }
+  const auto fit = fit_trunk(scan, segment, parameters);
+  if (!fit || fit->radius_m < parameters.min_radius_m || fit->radius_m > parameters.max_radius_m ||
+      fit->mean_square_residual > parameters.max_mean_square_residual) {
+    ++counters.not_round;
+    return std::nullopt;
+  }
+  if (fit->range_m < parameters.min_range_m || fit->range_m > parameters.max_range_m) {
+    ++counters.out_of_range;
+    return std::nullopt;
+  }
+  return to_detection(*fit, parameters);
+}
+
+}  // namespace
+
+LandmarkScan LandmarkExtractor::extract(const PlanarScan& scan) {
+  LandmarkScan result;
+  result.utime = scan.utime;
+  result.sequence = scan.sequence;
+  ++counters_.scans;
+  if (!well_formed(scan)) {
+    ++counters_.scans_malformed;
+    return result;
+  }
+  result.field_of_view = field_of_view(scan, parameters_.planar);
+  for (const Segment& segment : split(scan, parameters_.planar)) {
+    ++counters_.objects;
+    if (auto trunk = to_trunk(scan, segment, parameters_.planar, counters_)) {
+      result.detections.push_back(*trunk);
+    }
+  }
+  counters_.landmarks += result.detections.size();
+  return result;
+}
+
+}  // namespace understory

@@ -1,0 +1,30 @@
+#pragma once
+
+#include "common/geometry/se2.hpp"
+
+namespace understory {
+
+/// Trunks from lasers that sweep one plane. Noise figures: SICK LMS 2xx at 0.5 degrees.
+struct PlanarTrunkParameters {
+  SE2 vehicle_T_sensor;           ///< Where the laser is in frame `vehicle`.
+  double min_range_m = 1.5;       ///< What is nearer is the car itself.
+  double max_range_m = 60.0;      ///< Trunks farther than this are not reported.
+  double range_sigma_m = 0.03;    ///< Of one beam.
+  double beam_width_rad = 0.004;  ///< By how much a beam's footprint widens a trunk on each side.
+  double shape_sigma_m = 0.03;    ///< Trunks are no exact cylinders and do not stand upright.
+  double min_radius_m = 0.02;
+  double max_radius_m = 0.8;
+  double prior_radius_m = 0.15;  ///< What a trunk's radius is before it is measured.
+  double prior_radius_sigma_m = 0.15;
+  double break_distance_m = 0.35;  ///< Neighbouring returns farther apart are two objects...
+  double break_per_range = 0.01;   ///< ... plus this much per metre of range.
+  double clearance_m = 1.0;        ///< What stands beside a trunk must be so much farther away.
+  int min_points = 2;
+  double max_mean_square_residual = 6.0;  ///< Of the ranges from the fitted circle, in sigma^2.
+};
+
+struct LandmarkExtractorParameters {
+  PlanarTrunkParameters planar;
+};
+
+}  // namespace understory
