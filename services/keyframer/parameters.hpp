@@ -20,6 +20,14 @@ struct SourceKeyframerParameters {
 /// Ours: joint estimate of member poses and local landmarks.
 struct JointKeyframerParameters {
   int observations_per_keyframe = 8;
+  double gate_sigmas = 4.0;        ///< Association gate.
+  double motion_sigma_m = 0.3;     ///< Of the step between two scans, where no odometry tells it.
+  double motion_sigma_rad = 0.04;  ///< Likewise.
+  double max_turn_rad = 0.5;       ///< Largest unpredicted turn between two scans that is searched.
+  double min_matched_ratio =
+      0.5;  ///< Of the detections (or of the landmarks, if fewer): below, a scan is lost.
+  int min_matched = 4;    ///< Fewest matches without odometry.
+  int min_sightings = 2;  ///< A landmark seen less often does not pass.
 };
 
 struct KeyframerParameters {

@@ -1,0 +1,156 @@
+#include "common/geometry/registration.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "common/geometry/point_bins.hpp"
+
+namespace understory {
+namespace {
+
+using Points = std::span<const UncertainPoint>;
+
+struct Candidate {
+  double mahalanobis2;
+  std::uint32_t reference;
+  std::uint32_t observed;
+};
+
+/// Variance [m^2] that the pose's uncertainty adds to a point at `position` of the moving frame: an
+/// isotropic bound.
+double pose_variance(const Eigen::Matrix3d& covariance, const Eigen::Vector2d& position) {
+  return std::max(covariance(0, 0), covariance(1, 1)) + position.squaredNorm() * covariance(2, 2);
+}
+
+class Registrar {
+ public:
+  Registrar(Points reference, Points observed, const SE2WithCovariance& guess,
+            const RegistrationParameters& parameters)
+      : reference_(reference), observed_(observed), guess_(guess), parameters_(parameters) {
+    std::vector<Eigen::Vector2d> positions;
+    positions.reserve(reference.size());
+    for (const UncertainPoint& point : reference) positions.push_back(point.position_m);
+    bins_ = PointBins(positions, 4.0);
+    information_ = guess.covariance.llt().solve(Eigen::Matrix3d::Identity());
+    for (const UncertainPoint& point : reference) {
+      max_reference_variance_ = std::max(max_reference_variance_, point.variance_m2);
+    }
+  }
+
+  Registration run() {
+    Registration result{guess_.mean, guess_.covariance, {}};
+    std::vector<PointPair> previous;
+    for (int round = 0; round < parameters_.max_rounds; ++round) {
+      previous = result.pairs;
+      result.pairs = pairs_at(result);
+      std::erase_if(result.pairs, [](const PointPair& pair) { return pair.ambiguous; });
+      if (result.pairs.empty()) break;
+      refine(result);
+      if (same(previous, result.pairs)) break;
+    }
+    result.pairs = pairs_at(result);
+    return result;
+  }
+
+ private:
+  static bool same(const std::vector<PointPair>& a, const std::vector<PointPair>& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                      [](const PointPair& p, const PointPair& q) {
+                        return p.reference == q.reference && p.observed == q.observed;
+                      });
+  }
+
+  void collect_candidates(const Registration& at) {
+    candidates_.clear();
+    const double k2 = parameters_.gate_sigmas * parameters_.gate_sigmas;
+    const double floor2 = parameters_.gate_floor_m * parameters_.gate_floor_m / k2;
+    const Eigen::Matrix2d rotation = at.reference_T_observed.rotation();
+    for (std::uint32_t i = 0; i < observed_.size(); ++i) {
+      const Eigen::Vector2d& z = observed_[i].position_m;
+      const double base = observed_[i].variance_m2 + pose_variance(at.covariance, z) + floor2;
+      const double reach = parameters_.gate_sigmas * std::sqrt(base + max_reference_variance_);
+      if (parameters_.gate_sigmas * std::sqrt(base) > parameters_.max_gate_m) continue;
+      const Eigen::Vector2d p = rotation * z + at.reference_T_observed.translation();
+      bins_.for_each_within(p, reach, [&](std::uint32_t r, double d2) {
+        const double m2 = d2 / (base + reference_[r].variance_m2);
+        if (m2 <= k2) candidates_.push_back({m2, r, i});
+      });
+    }
+  }
+
+  /// One to one, nearest (Mahalanobis) first; a pair is ambiguous when either end had another
+  /// candidate.
+  std::vector<PointPair> pairs_at(const Registration& at) {
+    collect_candidates(at);
+    std::sort(candidates_.begin(), candidates_.end(), [](const Candidate& a, const Candidate& b) {
+      if (a.mahalanobis2 != b.mahalanobis2) return a.mahalanobis2 < b.mahalanobis2;
+      return a.observed != b.observed ? a.observed < b.observed : a.reference < b.reference;
+    });
+    reference_count_.assign(reference_.size(), 0);
+    observed_count_.assign(observed_.size(), 0);
+    for (const Candidate& c : candidates_) {
+      ++reference_count_[c.reference];
+      ++observed_count_[c.observed];
+    }
+    reference_used_.assign(reference_.size(), false);
+    observed_used_.assign(observed_.size(), false);
+    std::vector<PointPair> pairs;
+    for (const Candidate& c : candidates_) {
+      if (reference_used_[c.reference] || observed_used_[c.observed]) continue;
+      reference_used_[c.reference] = observed_used_[c.observed] = true;
+      pairs.push_back({c.reference, c.observed,
+                       reference_count_[c.reference] > 1 || observed_count_[c.observed] > 1});
+    }
+    std::sort(pairs.begin(), pairs.end(),
+              [](const PointPair& a, const PointPair& b) { return a.observed < b.observed; });
+    return pairs;
+  }
+
+  /// Two Gauss-Newton steps on the pairs and the guess.
+  void refine(Registration& result) const {
+    for (int step = 0; step < 2; ++step) {
+      const SE2& pose = result.reference_T_observed;
+      const Eigen::Vector3d off = (guess_.mean.inverse() * pose).Log();
+      Eigen::Matrix3d hessian = information_;
+      Eigen::Vector3d gradient = information_ * off;
+      const Eigen::Matrix2d to_observed = pose.rotation().transpose();
+      for (const PointPair& pair : result.pairs) {
+        const UncertainPoint& a = reference_[pair.reference];
+        const UncertainPoint& b = observed_[pair.observed];
+        const double weight = 1.0 / (a.variance_m2 + b.variance_m2 + 1e-12);
+        const Eigen::Vector2d error =
+            b.position_m - to_observed * (a.position_m - pose.translation());
+        Eigen::Matrix<double, 2, 3> jacobian;
+        jacobian << Eigen::Matrix2d::Identity(), turned_left(b.position_m);
+        hessian.noalias() += weight * jacobian.transpose() * jacobian;
+        gradient.noalias() += weight * jacobian.transpose() * error;
+      }
+      const Eigen::LLT<Eigen::Matrix3d> llt(hessian);
+      result.reference_T_observed = pose * SE2::Exp(-llt.solve(gradient));
+      result.covariance = llt.solve(Eigen::Matrix3d::Identity());
+    }
+  }
+
+  Points reference_;
+  Points observed_;
+  SE2WithCovariance guess_;
+  RegistrationParameters parameters_;
+  PointBins bins_;
+  Eigen::Matrix3d information_;
+  double max_reference_variance_ = 0.0;
+  std::vector<Candidate> candidates_;
+  std::vector<std::uint32_t> reference_count_, observed_count_;
+  std::vector<bool> reference_used_, observed_used_;
+};
+
+}  // namespace
+
+Registration register_points(Points reference, Points observed, const SE2WithCovariance& guess,
+                             const RegistrationParameters& parameters) {
+  if (reference.empty() || observed.empty()) return {guess.mean, guess.covariance, {}};
+  return Registrar(reference, observed, guess, parameters).run();
+}
+
+}  // namespace understory

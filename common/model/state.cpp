@@ -1,0 +1,74 @@
+#include "common/model/state.hpp"
+
+#include <stdexcept>
+
+namespace understory {
+
+std::string to_state(const Json& json) {
+  const std::vector<std::uint8_t> bytes = Json::to_cbor(json);
+  return {bytes.begin(), bytes.end()};
+}
+
+Json from_state(const std::string& state) {
+  Json json = Json::from_cbor(state.begin(), state.end(), true, false);
+  if (json.is_discarded()) throw std::invalid_argument("state: not a valid CBOR document");
+  return json;
+}
+
+void to_json(Json& json, const SE2& pose) { json = {pose.x(), pose.y(), pose.theta()}; }
+void from_json(const Json& json, SE2& pose) {
+  pose = SE2(json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>());
+}
+
+void to_json(Json& json, const SE2WithCovariance& pose) {
+  json = {pose.mean, matrix_to_json<3, 3>(pose.covariance)};
+}
+void from_json(const Json& json, SE2WithCovariance& pose) {
+  pose.mean = json.at(0).get<SE2>();
+  pose.covariance = matrix_from_json<3, 3>(json.at(1));
+}
+
+void to_json(Json& json, const Detection& d) {
+  json = {matrix_to_json<3, 1>(d.position_m), matrix_to_json<3, 3>(d.covariance_m2), d.radius_m,
+          static_cast<int>(d.kind)};
+}
+void from_json(const Json& json, Detection& d) {
+  d.position_m = matrix_from_json<3, 1>(json.at(0));
+  d.covariance_m2 = matrix_from_json<3, 3>(json.at(1));
+  d.radius_m = json.at(2).get<double>();
+  d.kind = static_cast<LandmarkKind>(json.at(3).get<int>());
+}
+
+void to_json(Json& json, const FieldOfView& view) {
+  json = {view.max_range_m, view.bearing_rad, view.width_rad};
+}
+void from_json(const Json& json, FieldOfView& view) {
+  view = {json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>()};
+}
+
+void to_json(Json& json, const LandmarkScan& scan) {
+  json = {{"utime", scan.utime},
+          {"sequence", scan.sequence},
+          {"view", scan.field_of_view},
+          {"detections", scan.detections}};
+}
+void from_json(const Json& json, LandmarkScan& scan) {
+  scan.utime = json.at("utime").get<Utime>();
+  scan.sequence = json.at("sequence").get<std::uint64_t>();
+  scan.field_of_view = json.at("view").get<FieldOfView>();
+  scan.detections = json.at("detections").get<std::vector<Detection>>();
+}
+
+void to_json(Json& json, const Odometry& odometry) {
+  json = {odometry.from_utime, odometry.utime, odometry.sequence, odometry.from_T_to,
+          matrix_to_json<3, 3>(odometry.covariance)};
+}
+void from_json(const Json& json, Odometry& odometry) {
+  odometry.from_utime = json.at(0).get<Utime>();
+  odometry.utime = json.at(1).get<Utime>();
+  odometry.sequence = json.at(2).get<std::uint64_t>();
+  odometry.from_T_to = json.at(3).get<SE2>();
+  odometry.covariance = matrix_from_json<3, 3>(json.at(4));
+}
+
+}  // namespace understory

@@ -1,0 +1,205 @@
+#include "services/keyframer/block_adjustment.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+using Matrix23 = Eigen::Matrix<double, 2, 3>;
+constexpr int kMaxIterations = 8;
+constexpr double kConverged = 1e-9;
+
+/// d(centre point)/d(left perturbation of the member's pose).
+Matrix23 point_jacobian(const Eigen::Vector2d& point) {
+  Matrix23 jacobian;
+  jacobian << Eigen::Matrix2d::Identity(), turned_left(point);
+  return jacobian;
+}
+
+/// Poses are perturbed on the left here (in `centre`), which makes a point's Jacobian depend on the
+/// point alone.
+class BlockAdjuster {
+ public:
+  explicit BlockAdjuster(const BlockProblem& problem)
+      : problem_(problem),
+        members_(problem.local_T_member.size()),
+        landmarks_(problem.landmarks.size()) {
+    const SE2 centre_T_local = problem.local_T_member[members_ / 2].inverse();
+    for (const SE2& pose : problem.local_T_member) poses_.push_back(centre_T_local * pose);
+    for (const Eigen::Vector2d& point : problem.landmarks)
+      points_.push_back(centre_T_local * point);
+  }
+
+  BlockEstimate run() {
+    BlockEstimate estimate;
+    for (int i = 0; i < kMaxIterations && !estimate.converged; ++i) {
+      linearise();
+      estimate.converged = step() < kConverged;
+    }
+    linearise();
+    finish(estimate);
+    return estimate;
+  }
+
+ private:
+  Eigen::Index dimension() const { return static_cast<Eigen::Index>(3 * members_); }
+
+  void linearise() {
+    reduced_ = Eigen::MatrixXd::Zero(dimension(), dimension());
+    gradient_ = Eigen::VectorXd::Zero(dimension());
+    landmark_hessian_.assign(landmarks_, Eigen::Matrix2d::Zero());
+    landmark_gradient_.assign(landmarks_, Eigen::Vector2d::Zero());
+    coupling_.assign(landmarks_, {});
+    chi2_.clear();
+    for (const BlockObservation& z : problem_.observations) add(z);
+    for (std::size_t k = 0; k + 1 < members_ && k < problem_.motion.size(); ++k) {
+      if (problem_.motion[k]) add_motion(k, *problem_.motion[k]);
+    }
+    for (std::size_t i = 0; i < landmarks_; ++i) eliminate(i);
+  }
+
+  void add(const BlockObservation& z) {
+    const SE2& pose = poses_[z.member];
+    const Eigen::Vector2d point = pose * z.position_m;
+    const Eigen::Matrix2d rotation = pose.rotation();
+    const Eigen::Matrix2d weight = rotation * z.covariance_m2.inverse() * rotation.transpose();
+    const Eigen::Vector2d error = point - points_[z.landmark];
+    const Matrix23 jacobian = point_jacobian(point);
+    const Eigen::Matrix<double, 3, 2> weighted = jacobian.transpose() * weight;
+    const Eigen::Index at = 3 * static_cast<Eigen::Index>(z.member);
+    reduced_.block<3, 3>(at, at) += weighted * jacobian;
+    gradient_.segment<3>(at) += weighted * error;
+    landmark_hessian_[z.landmark] += weight;
+    landmark_gradient_[z.landmark] -= weight * error;
+    coupling_[z.landmark].push_back({at, -weighted});
+    chi2_.push_back(error.dot(weight * error));
+  }
+
+  void add_motion(std::size_t k, const SE2WithCovariance& motion) {
+    // Error Log(Z^-1 A^-1 B) with both poses perturbed on the left: dB = Ad(B^-1), dA = -Ad(B^-1),
+    // times Jr^-1.
+    const Eigen::Vector3d error =
+        (motion.mean.inverse() * poses_[k].inverse() * poses_[k + 1]).Log();
+    const Eigen::Matrix3d jacobian =
+        inverse_right_jacobian(error) * poses_[k + 1].inverse().Adjoint();
+    const Eigen::Matrix3d information = motion.covariance.inverse();
+    const Eigen::Matrix3d hessian = jacobian.transpose() * information * jacobian;
+    const Eigen::Vector3d gradient = jacobian.transpose() * information * error;
+    const Eigen::Index a = 3 * static_cast<Eigen::Index>(k);
+    const Eigen::Index b = a + 3;
+    reduced_.block<3, 3>(a, a) += hessian;
+    reduced_.block<3, 3>(b, b) += hessian;
+    reduced_.block<3, 3>(a, b) -= hessian;
+    reduced_.block<3, 3>(b, a) -= hessian;
+    gradient_.segment<3>(b) += gradient;
+    gradient_.segment<3>(a) -= gradient;
+  }
+
+  void eliminate(std::size_t i) {
+    if (coupling_[i].empty()) return;
+    const Eigen::Matrix2d inverse = landmark_hessian_[i].inverse();
+    for (const Coupling& a : coupling_[i]) {
+      const Eigen::Matrix<double, 3, 2> scaled = a.block * inverse;
+      gradient_.segment<3>(a.at) -= scaled * landmark_gradient_[i];
+      for (const Coupling& b : coupling_[i]) {
+        reduced_.block<3, 3>(a.at, b.at) -= scaled * b.block.transpose();
+      }
+    }
+  }
+
+  /// With sum(delta) = 0 imposed: adding C^T C does not change the solution, since the gauge
+  /// directions carry no error.
+  Eigen::LDLT<Eigen::MatrixXd> factorised() const {
+    Eigen::MatrixXd fixed = reduced_;
+    const double scale = reduced_.diagonal().mean() / static_cast<double>(members_);
+    for (std::size_t a = 0; a < members_; ++a) {
+      for (std::size_t b = 0; b < members_; ++b) {
+        fixed.block<3, 3>(3 * static_cast<Eigen::Index>(a), 3 * static_cast<Eigen::Index>(b)) +=
+            scale * Eigen::Matrix3d::Identity();
+      }
+    }
+    return fixed.ldlt();
+  }
+
+  double step() {
+    const Eigen::VectorXd delta = -factorised().solve(gradient_);
+    for (std::size_t i = 0; i < landmarks_; ++i) {
+      Eigen::Vector2d right = -landmark_gradient_[i];
+      for (const Coupling& c : coupling_[i]) {
+        right -= c.block.transpose() * delta.segment<3>(c.at);
+      }
+      if (!coupling_[i].empty()) points_[i] += landmark_hessian_[i].inverse() * right;
+    }
+    for (std::size_t k = 0; k < members_; ++k) {
+      const Eigen::Vector3d xi = delta.segment<3>(3 * static_cast<Eigen::Index>(k));
+      poses_[k] = SE2::Exp(xi) * poses_[k];
+    }
+    return delta.cwiseAbs().maxCoeff();
+  }
+
+  void finish(BlockEstimate& estimate) const {
+    // The gauge term adds 1/(scale n^2) along the common motion; the projection takes it out again.
+    const Eigen::MatrixXd raw =
+        factorised().solve(Eigen::MatrixXd::Identity(dimension(), dimension()));
+    Eigen::MatrixXd projection = Eigen::MatrixXd::Identity(dimension(), dimension());
+    for (std::size_t a = 0; a < members_; ++a) {
+      for (std::size_t b = 0; b < members_; ++b) {
+        projection.block<3, 3>(3 * static_cast<Eigen::Index>(a),
+                               3 * static_cast<Eigen::Index>(b)) -=
+            Eigen::Matrix3d::Identity() / static_cast<double>(members_);
+      }
+    }
+    const Eigen::MatrixXd covariance = projection * raw * projection.transpose();
+    for (std::size_t k = 0; k < members_; ++k) {
+      const Eigen::Index at = 3 * static_cast<Eigen::Index>(k);
+      const Eigen::Matrix3d to_right = poses_[k].inverse().Adjoint();
+      estimate.centre_T_member.push_back(
+          {poses_[k], to_right * covariance.block<3, 3>(at, at) * to_right.transpose()});
+    }
+    estimate.landmarks = points_;
+    estimate.chi2 = chi2_;
+    for (std::size_t i = 0; i < landmarks_; ++i) {
+      estimate.landmark_covariance.push_back(landmark_covariance(i, covariance));
+    }
+  }
+
+  Eigen::Matrix2d landmark_covariance(std::size_t i, const Eigen::MatrixXd& pose_covariance) const {
+    if (coupling_[i].empty()) return Eigen::Matrix2d::Constant(std::nan(""));
+    const Eigen::Matrix2d own = landmark_hessian_[i].inverse();
+    Eigen::Matrix2d shared = Eigen::Matrix2d::Zero();
+    for (const Coupling& a : coupling_[i]) {
+      for (const Coupling& b : coupling_[i]) {
+        shared += a.block.transpose() * pose_covariance.block<3, 3>(a.at, b.at) * b.block;
+      }
+    }
+    return own + own * shared * own;
+  }
+
+  struct Coupling {
+    Eigen::Index at;                    ///< First parameter of the member's pose.
+    Eigen::Matrix<double, 3, 2> block;  ///< d2/(d pose d landmark).
+  };
+
+  const BlockProblem& problem_;
+  std::size_t members_;
+  std::size_t landmarks_;
+  std::vector<SE2> poses_;
+  std::vector<Eigen::Vector2d> points_;
+  Eigen::MatrixXd reduced_;
+  Eigen::VectorXd gradient_;
+  std::vector<Eigen::Matrix2d> landmark_hessian_;
+  std::vector<Eigen::Vector2d> landmark_gradient_;
+  std::vector<std::vector<Coupling>> coupling_;
+  std::vector<double> chi2_;
+};
+
+}  // namespace
+
+BlockEstimate adjust_block(const BlockProblem& problem) {
+  if (problem.local_T_member.empty()) return {};
+  return BlockAdjuster(problem).run();
+}
+
+}  // namespace understory

@@ -1,0 +1,45 @@
+// Our keyframes: scans are tracked one by one, then their poses and landmarks are estimated
+// together.
+#pragma once
+
+#include "common/model/odometry_buffer.hpp"
+#include "services/keyframer/block_adjustment.hpp"
+#include "services/keyframer/keyframer.hpp"
+#include "services/keyframer/scan_tracker.hpp"
+
+namespace understory {
+
+class JointKeyframer final : public KeyframerMethod {
+ public:
+  explicit JointKeyframer(const JointKeyframerParameters& parameters);
+
+  std::optional<Keyframe> add(const LandmarkScan& scan) override;
+  void add(const Odometry& odometry) override;
+  const KeyframerCounters& counters() const override { return counters_; }
+  std::string save() const override;
+  void load(const std::string& state) override;
+
+ private:
+  struct Member {
+    LandmarkScan scan;
+    TrackedScan tracked;
+    std::optional<SE2WithCovariance> motion;  ///< Since the member before.
+  };
+
+  std::optional<Keyframe> finish();
+  std::optional<Keyframe> lost(const LandmarkScan& scan);
+  BlockProblem problem(std::vector<std::uint32_t>& tracks) const;
+  Keyframe keyframe(const BlockProblem& problem, const BlockEstimate& estimate,
+                    const std::vector<std::uint32_t>& tracks);
+
+  JointKeyframerParameters parameters_;
+  ScanTracker tracker_;
+  OdometryBuffer odometry_;
+  std::vector<Member> members_;
+  Utime last_utime_ = 0;
+  std::uint64_t next_sequence_ = 0;
+  std::optional<SE2> local_T_previous_base_;
+  KeyframerCounters counters_;
+};
+
+}  // namespace understory

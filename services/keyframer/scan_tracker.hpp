@@ -1,0 +1,83 @@
+// Follows landmarks from scan to scan in a frame that drifts slowly: which detection is which
+// landmark.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "common/geometry/registration.hpp"
+#include "common/model/landmarks.hpp"
+#include "services/keyframer/parameters.hpp"
+
+namespace understory {
+
+/// A landmark of the rolling local map.
+struct Track {
+  std::uint32_t id = 0;
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `local`.
+  double detection_variance_m2 = 0.0;                    ///< Mean over its detections.
+  double radius_m = 0.0;
+  std::uint32_t sightings = 0;
+  std::uint64_t seen = 0;     ///< Bit k: detected k scans ago.
+  std::uint64_t in_view = 0;  ///< Bit k: in the field of view k scans ago.
+  LandmarkKind kind = LandmarkKind::kTrunk;
+};
+
+/// A scan with its place in `local` and the track of each detection.
+struct TrackedScan {
+  bool tracked = false;
+  SE2 local_T_vehicle;
+  std::vector<std::uint32_t> tracks;  ///< Per detection; the scan's own new tracks included.
+};
+
+/// Registers each scan to a rolling map of the last ones. Works without odometry, and through turns
+/// between scans that no motion model foresees: when the predicted pose does not fit, headings
+/// around it are tried.
+class ScanTracker {
+ public:
+  explicit ScanTracker(const JointKeyframerParameters& parameters) : parameters_(parameters) {}
+
+  /// `motion`: of the vehicle since the last scan, where odometry knows it. An untracked scan
+  /// changes nothing.
+  TrackedScan add(const LandmarkScan& scan, const std::optional<SE2WithCovariance>& motion);
+  /// Forgets everything and starts `local` at this scan.
+  TrackedScan restart(const LandmarkScan& scan);
+  bool empty() const { return tracks_.empty() && !started_; }
+  /// The track that `id` was merged into, or itself.
+  std::uint32_t resolved(std::uint32_t id) const;
+  /// Null where it was dropped.
+  const Track* find(std::uint32_t id) const;
+
+  struct State {
+    std::vector<Track> tracks;
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> merged;
+    std::uint32_t next_id = 1;
+    bool started = false;
+    SE2 local_T_vehicle;
+    SE2 last_motion;
+  };
+  State state() const;
+  void set_state(const State& state);
+
+ private:
+  std::optional<Registration> locate(const LandmarkScan& scan,
+                                     const std::optional<SE2WithCovariance>& motion) const;
+  bool fits(const Registration& registration, const LandmarkScan& scan) const;
+  TrackedScan fuse(const LandmarkScan& scan, const Registration& registration);
+  void update_visibility(const LandmarkScan& scan);
+  void merge_doubles();
+  void drop_distant(const LandmarkScan& scan);
+
+  JointKeyframerParameters parameters_;
+  std::vector<Track> tracks_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> merged_;  ///< (old, new), recent ones.
+  std::uint32_t next_id_ = 1;
+  bool started_ = false;
+  SE2 local_T_vehicle_;
+  SE2 last_motion_;
+};
+
+/// Isotropic variance [m^2] in the plane of a detection.
+double plane_variance(const Detection& detection);
+
+}  // namespace understory
