@@ -1,0 +1,20 @@
+#include "deploy/cli/failure.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+namespace understory {
+
+void fail(const std::string& what) {
+  fmt::print(stderr, "understory: {}\n", what);
+  throw CLI::RuntimeError(1);
+}
+
+void wrong_usage(const std::string& what) {
+  fmt::print(stderr, "understory: {}\n", what);
+  throw CLI::RuntimeError(2);
+}
+
+}  // namespace understory

@@ -1,0 +1,195 @@
+// `understory launch`: starts the processes, restarts one that dies, stops them cleanly.
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <memory>
+
+#include "deploy/cli/commands.hpp"
+#include "deploy/cli/failure.hpp"
+#include "deploy/cli/health_listener.hpp"
+#include "deploy/cli/launch_report.hpp"
+#include "deploy/cli/paths.hpp"
+#include "deploy/launch/launch_config.hpp"
+#include "deploy/launch/registry.hpp"
+#include "deploy/launch/supervisor.hpp"
+
+namespace understory {
+namespace {
+
+using launch::Clock;
+
+struct Options {
+  std::filesystem::path config = default_config_directory();
+  std::filesystem::path state = default_state_directory();
+  std::filesystem::path report;
+  std::string lcm_url;
+  std::vector<std::string> only;
+  bool fresh = false;
+  bool quiet = false;
+};
+
+/// SIGTERM, SIGINT and SIGHUP as a descriptor, so that they are handled between two steps.
+class StopSignals {
+ public:
+  StopSignals() {
+    sigset_t signals;
+    sigemptyset(&signals);
+    for (const int number : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&signals, number);
+    ::sigprocmask(SIG_BLOCK, &signals, nullptr);
+    descriptor_ = ::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK);
+  }
+  ~StopSignals() { ::close(descriptor_); }
+  StopSignals(const StopSignals&) = delete;
+  StopSignals& operator=(const StopSignals&) = delete;
+
+  int descriptor() const { return descriptor_; }
+  bool received() const {
+    signalfd_siginfo info{};
+    return ::read(descriptor_, &info, sizeof info) == static_cast<ssize_t>(sizeof info);
+  }
+
+ private:
+  int descriptor_ = -1;
+};
+
+bool selected(const Options& options, const std::string& name) {
+  return options.only.empty() ||
+         std::find(options.only.begin(), options.only.end(), name) != options.only.end();
+}
+
+std::vector<launch::ProcessSpec> process_specs(const Options& options) {
+  std::vector<launch::ProcessSpec> specs;
+  for (const auto& entry : launch::read_launch_config(options.config).processes) {
+    if (!selected(options, entry.name)) continue;
+    launch::ProcessSpec spec;
+    spec.name = entry.name;
+    spec.command.executable = find_executable(entry.executable);
+    if (!entry.config.empty()) {
+      spec.command.arguments.insert(spec.command.arguments.end(),
+                                    {"--config", entry.config.string()});
+    }
+    if (entry.keeps_state) {
+      spec.command.arguments.insert(spec.command.arguments.end(),
+                                    {"--state-dir", (options.state / entry.name).string()});
+    }
+    spec.command.arguments.insert(spec.command.arguments.end(), entry.arguments.begin(),
+                                  entry.arguments.end());
+    if (!options.lcm_url.empty()) {
+      spec.command.environment.push_back("LCM_DEFAULT_URL=" + options.lcm_url);
+    }
+    specs.push_back(std::move(spec));
+  }
+  return specs;
+}
+
+/// A directory for each process's state; only under the lock, since others may be using them.
+void prepare_state(const Options& options, const std::vector<launch::ProcessSpec>& specs) {
+  for (const auto& spec : specs) {
+    if (options.fresh) std::filesystem::remove_all(options.state / spec.name);
+    std::filesystem::create_directories(options.state / spec.name);
+  }
+}
+
+/// Sleeps until a process ends, a signal or a message comes, or something is due.
+void wait(const launch::Supervisor& supervisor, const StopSignals& signals,
+          const HealthListener* health) {
+  std::vector<pollfd> polled{{signals.descriptor(), POLLIN, 0}};
+  if (health != nullptr) polled.push_back({health->descriptor(), POLLIN, 0});
+  for (const int descriptor : supervisor.descriptors()) polled.push_back({descriptor, POLLIN, 0});
+  const auto now = Clock::now();
+  const auto left =
+      std::chrono::ceil<std::chrono::milliseconds>(supervisor.wake_up(now) - now).count();
+  ::poll(polled.data(), polled.size(), static_cast<int>(std::clamp<long>(left, 0, 1000)));
+}
+
+/// Heartbeats tell a hang from work; without a bus deaths are still seen.
+std::unique_ptr<HealthListener> listen(const Options& options, launch::Supervisor& supervisor,
+                                       LaunchReport& report) {
+  try {
+    return std::make_unique<HealthListener>(options.lcm_url, [&](const health_t& message) {
+      supervisor.heartbeat(message.process, static_cast<pid_t>(message.pid), Clock::now());
+    });
+  } catch (const std::runtime_error& error) {
+    report.say("launch", fmt::format("{}; hangs will not be noticed", error.what()));
+    return nullptr;
+  }
+}
+
+void run(launch::Supervisor& supervisor, launch::Registry& registry, const StopSignals& signals,
+         HealthListener* health, LaunchReport& report) {
+  std::vector<pid_t> noted;
+  while (!supervisor.stopped()) {
+    const auto now = Clock::now();
+    if (signals.received() && !supervisor.stopping()) {
+      report.say("launch", "stopping");
+      supervisor.stop(now);
+    }
+    if (!supervisor.refused().empty()) supervisor.stop(now);
+    supervisor.step(now);
+    std::vector<pid_t> pids;
+    for (const auto& process : supervisor.status()) pids.push_back(process.pid);
+    if (pids != noted) {
+      registry.write(supervisor.status());
+      noted = std::move(pids);
+    }
+    if (supervisor.stopped()) break;
+    wait(supervisor, signals, health);
+    while (health != nullptr && health->handle(std::chrono::milliseconds(0))) {
+    }
+  }
+}
+
+void launch_processes(const Options& options) {
+  std::vector<launch::ProcessSpec> specs;
+  try {
+    specs = process_specs(options);
+  } catch (const launch::ConfigError& error) {
+    wrong_usage(error.what());
+  }
+  if (specs.empty()) wrong_usage("launch: --only names none of the processes in launch.toml");
+
+  const StopSignals signals;
+  launch::Registry registry(options.state);
+  prepare_state(options, specs);
+  LaunchReport report(options.quiet);
+  launch::Supervisor supervisor(
+      std::move(specs), {},
+      [&](const std::string& process, const std::string& text) { report.say(process, text); });
+  const auto health = listen(options, supervisor, report);
+  supervisor.start(registry.read(), Clock::now());
+  run(supervisor, registry, signals, health.get(), report);
+
+  if (!options.report.empty()) report.write(options.report, supervisor.status());
+  if (!supervisor.refused().empty()) {
+    wrong_usage(fmt::format("launch: {}: refused to start", supervisor.refused().front()));
+  }
+  for (const auto& process : supervisor.status()) {
+    if (process.state != launch::ProcessState::kGivenUp) continue;
+    fail(fmt::format("launch: {}: given up: {}", process.name, process.last_ending));
+  }
+}
+
+}  // namespace
+
+void add_launch_command(CLI::App& parent) {
+  auto* command = parent.add_subcommand(
+      "launch", "Starts the processes, restarts one that dies, stops them cleanly");
+  auto options = std::make_shared<Options>();
+  command->add_option("--config", options->config, "Directory with launch.toml and one file each")
+      ->capture_default_str();
+  command->add_option("--state-dir", options->state, "Where the processes keep their state")
+      ->capture_default_str();
+  command->add_option("--lcm-url", options->lcm_url, "Bus, e.g. udpm://239.255.76.67:7667?ttl=0");
+  command->add_option("--report", options->report, "Write what happened to this JSON file");
+  command->add_option("--only", options->only, "Only these processes")->delimiter(',');
+  command->add_flag("--fresh", options->fresh, "Forget the state of earlier runs first");
+  command->add_flag("--quiet", options->quiet, "Say nothing but errors");
+  command->callback([options] { launch_processes(*options); });
+}
+
+}  // namespace understory

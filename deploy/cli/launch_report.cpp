@@ -1,0 +1,61 @@
+#include "deploy/cli/launch_report.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+namespace understory {
+namespace {
+
+std::string time_of_day() {
+  const auto now = std::chrono::system_clock::now();
+  const auto since_epoch = now.time_since_epoch();
+  const auto part =
+      std::chrono::duration_cast<std::chrono::milliseconds>(since_epoch).count() % 1000;
+  return fmt::format("{:%H:%M:%S}.{:03}", fmt::localtime(std::chrono::system_clock::to_time_t(now)),
+                     part);
+}
+
+}  // namespace
+
+void LaunchReport::say(const std::string& process, const std::string& text) {
+  const auto time = time_of_day();
+  if (!quiet_) {
+    fmt::print("{} {}: {}\n", time, process, text);
+    std::fflush(stdout);
+  }
+  if (events_.size() < kMaxEvents) events_.push_back({time, process, text});
+}
+
+void LaunchReport::write(const std::filesystem::path& file,
+                         const std::vector<launch::ProcessStatus>& processes) const {
+  nlohmann::ordered_json report;
+  report["processes"] = nlohmann::ordered_json::array();
+  for (const auto& process : processes) {
+    report["processes"].push_back({{"name", process.name},
+                                   {"state", launch::to_string(process.state)},
+                                   {"pid", process.pid},
+                                   {"restarts", process.restarts},
+                                   {"last_ending", process.last_ending}});
+  }
+  report["events"] = nlohmann::ordered_json::array();
+  for (const auto& event : events_) {
+    report["events"].push_back(
+        {{"time", event.time}, {"process", event.process}, {"text", event.text}});
+  }
+  const std::filesystem::path temporary = file.string() + ".part";
+  std::ofstream out(temporary);
+  out << report.dump(2) << '\n';
+  out.close();
+  std::error_code error;
+  if (out) std::filesystem::rename(temporary, file, error);
+  if (!out || error) throw std::runtime_error(fmt::format("{}: cannot write", file.string()));
+}
+
+}  // namespace understory

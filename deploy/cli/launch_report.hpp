@@ -1,0 +1,34 @@
+// What happened during a launch: on the terminal as it happens, and as JSON for scripts.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "deploy/launch/supervisor.hpp"
+
+namespace understory {
+
+class LaunchReport {
+ public:
+  explicit LaunchReport(bool quiet) : quiet_(quiet) {}
+  /// One thing that happened: printed with the time of day, kept for the report.
+  void say(const std::string& process, const std::string& text);
+  /// {"processes": [{name, state, restarts, last_ending}], "events": [{time, process, text}]}.
+  /// Throws std::runtime_error naming the file.
+  void write(const std::filesystem::path& file,
+             const std::vector<launch::ProcessStatus>& processes) const;
+
+ private:
+  struct Event {
+    std::string time;
+    std::string process;
+    std::string text;
+  };
+  static constexpr std::size_t kMaxEvents = 10'000;
+
+  bool quiet_;
+  std::vector<Event> events_;
+};
+
+}  // namespace understory

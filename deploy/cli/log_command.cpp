@@ -1,0 +1,228 @@
+// `understory log info|check|repair|cut`: recorded logs.
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <regex>
+
+#include "common/io/lcm_log.hpp"
+#include "deploy/cli/commands.hpp"
+#include "deploy/cli/failure.hpp"
+#include "deploy/cli/log_statistics.hpp"
+#include "deploy/cli/progress.hpp"
+
+namespace understory {
+namespace {
+
+struct LogContents {
+  LogStatistics statistics;
+  LogDamage damage;
+};
+
+/// Reads a log from end to end with progress; `visit` sees every event.
+template <class Visit>
+LogContents walk(const std::string& file, const Visit& visit) {
+  LogContents contents;
+  LcmLogReader reader(file);
+  Progress progress("reading " + file, static_cast<double>(reader.size_bytes()));
+  std::uint64_t places = 0;
+  while (auto event = reader.next()) {
+    if (reader.damage().places != places) {
+      places = reader.damage().places;
+      contents.damage = reader.damage();
+    }
+    contents.statistics.add(*event);
+    visit(*event, reader.damage());
+    progress.update(static_cast<double>(reader.position_bytes()));
+  }
+  contents.damage = reader.damage();
+  return contents;
+}
+
+void ignore(const LogEvent& /*event*/, const LogDamage& /*damage*/) {}
+
+nlohmann::ordered_json to_json(const std::string& file, const LogContents& contents) {
+  nlohmann::ordered_json json{{"file", file},
+                              {"events", contents.statistics.events()},
+                              {"duration_s", contents.statistics.duration_s()},
+                              {"first_utime", contents.statistics.first_utime()},
+                              {"damaged_places", contents.damage.places},
+                              {"damaged_bytes", contents.damage.bytes},
+                              {"events_lost", contents.damage.events_lost}};
+  for (const auto& [name, channel] : contents.statistics.channels()) {
+    json["channels"].push_back({{"channel", name},
+                                {"type", channel.type},
+                                {"events", channel.events},
+                                {"rate_hz", channel.rate_hz()},
+                                {"bytes", channel.bytes},
+                                {"lost", channel.lost},
+                                {"malformed", channel.malformed}});
+  }
+  return json;
+}
+
+void print_info(const std::string& file, const LogContents& contents) {
+  const auto& statistics = contents.statistics;
+  fmt::print("{}: {} events in {:.1f} s", file, statistics.events(), statistics.duration_s());
+  if (statistics.events() > 0) {
+    fmt::print(", received from {:%Y-%m-%d %H:%M:%S} UTC",
+               fmt::gmtime(static_cast<std::time_t>(statistics.first_utime() / 1'000'000)));
+  }
+  fmt::print("\n{:<32} {:<20} {:>9} {:>9} {:>12} {:>7}\n", "channel", "type", "events", "Hz",
+             "bytes", "lost");
+  for (const auto& [name, channel] : statistics.channels()) {
+    fmt::print("{:<32} {:<20} {:>9} {:>9.2f} {:>12} {:>7}\n", name, channel.type, channel.events,
+               channel.rate_hz(), channel.bytes, channel.lost);
+  }
+  if (contents.damage.places > 0) {
+    fmt::print("damaged: {} bytes in {} places (understory log check says more)\n",
+               contents.damage.bytes, contents.damage.places);
+  }
+}
+
+void info(const std::string& file, bool json) {
+  const auto contents = walk(file, ignore);
+  if (json) {
+    fmt::print("{}\n", to_json(file, contents).dump(2));
+  } else {
+    print_info(file, contents);
+  }
+}
+
+/// One line for everything that is wrong with one channel; gives how many lines.
+std::size_t print_channel_findings(const std::string& name, const ChannelStatistics& channel) {
+  std::size_t findings = 0;
+  const auto finding = [&](std::uint64_t count, std::string_view what) {
+    if (count == 0) return;
+    fmt::print("{}: {} {}\n", name, count, what);
+    ++findings;
+  };
+  finding(channel.malformed, "malformed messages, the last one " + channel.last_malformed);
+  finding(channel.lost, "messages missing by their sequence numbers");
+  finding(channel.restarts, "times the sequence starts again (its process was restarted)");
+  finding(channel.stamps_back, "stamps that go back");
+  return findings;
+}
+
+void check(const std::string& file) {
+  std::size_t findings = 0;
+  const auto place = [&](const LogDamage& damage) {
+    fmt::print("byte {}: {} bytes are no event\n", damage.last_offset, damage.last_bytes);
+    ++findings;
+  };
+  std::uint64_t places = 0;
+  const auto contents = walk(file, [&](const LogEvent&, const LogDamage& damage) {
+    if (damage.places != places) place(damage);
+    places = damage.places;
+  });
+  if (contents.damage.places != places) place(contents.damage);
+  const auto& statistics = contents.statistics;
+  const auto finding = [&](std::uint64_t count, std::string_view what) {
+    if (count == 0) return;
+    fmt::print("{} {}\n", count, what);
+    ++findings;
+  };
+  finding(statistics.missing_numbers(), "event numbers are missing");
+  finding(statistics.clock_back(), "times the receive time goes back");
+  finding(statistics.clock_forward(), "times the receive time jumps by more than ten seconds");
+  for (const auto& [name, channel] : statistics.channels()) {
+    findings += print_channel_findings(name, channel);
+  }
+  if (findings > 0) fail(fmt::format("{}: {} findings", file, findings));
+  fmt::print("{}: {} events on {} channels, nothing wrong\n", file, statistics.events(),
+             statistics.channels().size());
+}
+
+void repair(const std::string& file, const std::string& out) {
+  LcmLogWriter writer(out);
+  const auto contents = walk(file, [&](const LogEvent& event, const LogDamage&) {
+    writer.write(event.utime, event.channel, event.data);
+  });
+  if (contents.statistics.events() == 0 && contents.damage.bytes > 0) {
+    fail(fmt::format("{}: no event in it that can be saved", file));
+  }
+  writer.commit();
+  fmt::print("{}: {} events kept, {} bytes left out in {} places -> {}\n", file,
+             contents.statistics.events(), contents.damage.bytes, contents.damage.places, out);
+}
+
+struct Cut {
+  double from_s = 0.0;
+  double to_s = std::numeric_limits<double>::infinity();
+  std::string channels = ".*";
+};
+
+void cut(const std::string& file, const std::string& out, const Cut& wanted) {
+  std::regex channels;
+  try {
+    channels = std::regex(wanted.channels);
+  } catch (const std::regex_error&) {
+    wrong_usage(fmt::format("--channels {}: not a regular expression", wanted.channels));
+  }
+  if (!(wanted.from_s <= wanted.to_s)) wrong_usage("--from lies behind --to");
+  LcmLogWriter writer(out);
+  std::optional<std::int64_t> start;
+  walk(file, [&](const LogEvent& event, const LogDamage&) {
+    if (!start) start = event.utime;
+    const double time_s = 1e-6 * (static_cast<double>(event.utime) - static_cast<double>(*start));
+    if (time_s < wanted.from_s || time_s > wanted.to_s) return;
+    if (std::regex_match(event.channel, channels)) {
+      writer.write(event.utime, event.channel, event.data);
+    }
+  });
+  if (writer.events() == 0) fail(fmt::format("{}: nothing in it lies in the cut", file));
+  writer.commit();
+  fmt::print("{} events -> {}\n", writer.events(), out);
+}
+
+struct Options {
+  std::string file;
+  std::string out;
+  bool json = false;
+  Cut cut;
+};
+
+/// What every part of the command does about a file that cannot be read or written.
+template <class Work>
+auto guarded(std::shared_ptr<Options> options, Work work) {
+  return [options = std::move(options), work = std::move(work)] {
+    try {
+      work(*options);
+    } catch (const LogError& error) {
+      fail(error.what());
+    }
+  };
+}
+
+}  // namespace
+
+void add_log_command(CLI::App& parent) {
+  auto* log = parent.add_subcommand("log", "Recorded logs: gaps, damage, clock jumps");
+  log->require_subcommand(1);
+  auto options = std::make_shared<Options>();
+  const auto add = [&](const char* name, const char* description) {
+    auto* command = log->add_subcommand(name, description);
+    command->add_option("file", options->file, "An LCM log")->required();
+    return command;
+  };
+  auto* info_command = add("info", "What is in it");
+  info_command->add_flag("--json", options->json, "As JSON");
+  info_command->callback(guarded(options, [](const Options& o) { info(o.file, o.json); }));
+
+  add("check", "What is wrong with it; exit status 1 when something is")
+      ->callback(guarded(options, [](const Options& o) { check(o.file); }));
+
+  auto* repair_command = add("repair", "Writes what can be read as a log without damage");
+  repair_command->add_option("--out", options->out, "The new log")->required();
+  repair_command->callback(guarded(options, [](const Options& o) { repair(o.file, o.out); }));
+
+  auto* cut_command = add("cut", "A part of it, by receive time and channel");
+  cut_command->add_option("--out", options->out, "The new log")->required();
+  cut_command->add_option("--from", options->cut.from_s, "[s] from the first event");
+  cut_command->add_option("--to", options->cut.to_s, "[s] from the first event");
+  cut_command->add_option("--channels", options->cut.channels, "Regular expression");
+  cut_command->callback(guarded(options, [](const Options& o) { cut(o.file, o.out, o.cut); }));
+}
+
+}  // namespace understory

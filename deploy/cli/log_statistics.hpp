@@ -1,0 +1,61 @@
+// What a recorded log holds, and what is wrong with it.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "common/io/lcm_log.hpp"
+
+namespace understory {
+
+struct ChannelStatistics {
+  std::string type;  ///< Wire type; "?" = none of ours, "mixed" = several.
+  std::uint64_t events = 0;
+  std::uint64_t bytes = 0;  ///< Of the payloads.
+  std::int64_t first_utime = 0;
+  std::int64_t last_utime = 0;
+  std::uint64_t malformed = 0;    ///< Of our types: bytes that are no whole message.
+  std::string last_malformed;     ///< Why, in words.
+  std::uint64_t lost = 0;         ///< Missing sequence numbers, between the first and the last.
+  std::uint64_t restarts = 0;     ///< Times the sequence went back.
+  std::uint64_t stamps_back = 0;  ///< Times the message's own stamp went back without a restart.
+
+  double rate_hz() const;
+};
+
+class LogStatistics {
+ public:
+  void add(const LogEvent& event);
+
+  const std::map<std::string, ChannelStatistics>& channels() const { return channels_; }
+  std::uint64_t events() const { return events_; }
+  std::int64_t first_utime() const { return first_utime_; }  ///< Receive times [us].
+  std::int64_t last_utime() const { return last_utime_; }
+  double duration_s() const { return 1e-6 * static_cast<double>(last_utime_ - first_utime_); }
+  std::uint64_t missing_numbers() const { return missing_numbers_; }
+  std::uint64_t clock_back() const { return clock_back_; }        ///< Receive time went back.
+  std::uint64_t clock_forward() const { return clock_forward_; }  ///< By more than ten seconds.
+  double longest_silence_s() const { return 1e-6 * static_cast<double>(longest_silence_us_); }
+
+ private:
+  struct LastHeader {
+    std::int64_t utime = 0;
+    std::int64_t sequence = 0;
+  };
+  void check_payload(const LogEvent& event, ChannelStatistics& channel);
+
+  std::map<std::string, ChannelStatistics> channels_;
+  std::map<std::string, LastHeader> last_headers_;
+  std::uint64_t events_ = 0;
+  std::int64_t first_utime_ = 0;
+  std::int64_t last_utime_ = 0;
+  std::int64_t last_number_ = -1;
+  std::uint64_t missing_numbers_ = 0;
+  std::uint64_t clock_back_ = 0;
+  std::uint64_t clock_forward_ = 0;
+  std::int64_t longest_silence_us_ = 0;
+};
+
+}  // namespace understory

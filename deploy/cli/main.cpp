@@ -1,0 +1,39 @@
+// `understory`: the front door. Exit status: 0 done, 1 the work failed, 2 wrong usage.
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+
+#include "deploy/cli/commands.hpp"
+
+namespace {
+
+int run(int argc, char** argv) {
+  CLI::App app{"Localisation and mapping among landmarks that all look alike.", "understory"};
+  app.require_subcommand(1);
+  app.set_version_flag("--version", UNDERSTORY_VERSION);
+  understory::add_launch_command(app);
+  understory::add_doctor_command(app);
+  understory::add_log_command(app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::RuntimeError& error) {
+    return error.get_exit_code();
+  } catch (const CLI::ParseError& error) {
+    const bool asked_for_help = error.get_exit_code() == 0;
+    app.exit(error);
+    return asked_for_help ? 0 : 2;
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "understory: {}\n", error.what());
+    return 1;
+  }
+}

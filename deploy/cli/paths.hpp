@@ -1,0 +1,18 @@
+// Where the command finds its programs, its configuration and a place for state.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace understory {
+
+/// The directory of this executable: its processes lie beside it, built or installed.
+std::filesystem::path executable_directory();
+/// `name` beside this executable if it is there; else `name` as it stands, for PATH.
+std::string find_executable(const std::string& name);
+/// UNDERSTORY_CONFIG, else the installed configuration, else that of the source tree.
+std::filesystem::path default_config_directory();
+/// UNDERSTORY_STATE, else the user's state directory (XDG), else one below the home directory.
+std::filesystem::path default_state_directory();
+
+}  // namespace understory

@@ -1,0 +1,32 @@
+// launch.toml: which processes a machine runs.
+#pragma once
+
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace understory::launch {
+
+struct ProcessEntry {
+  std::string name;                    ///< As in its HEALTH messages.
+  std::string executable;              ///< Beside the understory command, in PATH, or a path.
+  std::filesystem::path config;        ///< Beside launch.toml unless absolute; empty = none.
+  std::vector<std::string> arguments;  ///< Further ones, as they stand.
+  bool keeps_state = true;             ///< Whether it is given --state-dir.
+};
+
+struct LaunchConfig {
+  std::vector<ProcessEntry> processes;  ///< In the order of the file: the order of starting.
+};
+
+/// what() is one line: file, line, key, what is wrong and what is allowed.
+class ConfigError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Reads DIR/launch.toml. Throws ConfigError.
+LaunchConfig read_launch_config(const std::filesystem::path& directory);
+
+}  // namespace understory::launch

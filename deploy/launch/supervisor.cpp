@@ -1,0 +1,227 @@
+#include "deploy/launch/supervisor.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <csignal>
+#include <system_error>
+
+namespace understory::launch {
+namespace {
+
+constexpr int kWrongUsage = 2;  // Exit status of a process that refuses its configuration.
+
+double seconds(Clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
+
+}  // namespace
+
+const char* to_string(ProcessState state) {
+  switch (state) {
+    case ProcessState::kWaiting:
+      return "waiting";
+    case ProcessState::kRunning:
+      return "running";
+    case ProcessState::kDegraded:
+      return "degraded";
+    case ProcessState::kFinished:
+      return "finished";
+    case ProcessState::kGivenUp:
+      return "given up";
+  }
+  return "?";
+}
+
+Supervisor::Supervisor(std::vector<ProcessSpec> specs, const SupervisorParameters& parameters,
+                       Say say)
+    : parameters_(parameters), say_(std::move(say)) {
+  for (auto& spec : specs) {
+    Entry entry;
+    entry.spec = std::move(spec);
+    entry.policy = RestartPolicy(parameters.restart);
+    entries_.push_back(std::move(entry));
+  }
+}
+
+void Supervisor::start(const std::vector<ProcessStatus>& known, Clock::time_point now) {
+  for (auto& entry : entries_) {
+    for (const auto& process : known) {
+      if (process.name != entry.spec.name) continue;
+      entry.child = ChildProcess::adopt(process.pid, process.start_ticks);
+    }
+    if (!entry.child) {
+      launch(entry, now);
+      continue;
+    }
+    entry.state = ProcessState::kRunning;
+    entry.started = now;
+    ++entry.starts;
+    say_(entry.spec.name, fmt::format("adopted (pid {})", entry.child->pid()));
+  }
+}
+
+void Supervisor::launch(Entry& entry, Clock::time_point now) {
+  entry.start_due.reset();
+  entry.last_heartbeat.reset();
+  entry.stopped_since.reset();
+  entry.started = now;
+  ++entry.starts;
+  try {
+    entry.child = ChildProcess::start(entry.spec.command);
+  } catch (const std::system_error& error) {
+    // Neither the program nor the permission to run it comes back by trying again.
+    entry.state = ProcessState::kGivenUp;
+    entry.last_ending = fmt::format("cannot be started: {}", error.what());
+    say_(entry.spec.name, entry.last_ending);
+    if (entry.starts == 1) refused_.push_back(entry.spec.name);
+    return;
+  }
+  entry.state = ProcessState::kRunning;
+  if (entry.starts == 1) {
+    say_(entry.spec.name, fmt::format("started (pid {})", entry.child->pid()));
+  } else {
+    say_(entry.spec.name,
+         fmt::format("started again (pid {}) {:.0f} ms after it ended; restart {}",
+                     entry.child->pid(), 1e3 * seconds(now - entry.died), entry.starts - 1));
+  }
+}
+
+void Supervisor::heartbeat(const std::string& name, pid_t pid, Clock::time_point now) {
+  for (auto& entry : entries_) {
+    if (entry.spec.name != name || !entry.child || entry.child->pid() != pid) continue;
+    entry.last_heartbeat = now;
+  }
+}
+
+void Supervisor::step(Clock::time_point now) {
+  for (auto& entry : entries_) {
+    if (entry.child) {
+      if (const auto ending = entry.child->ended()) bury(entry, *ending, now);
+    }
+    if (entry.child && !stopping()) watch(entry, now);
+    if (entry.start_due && now >= *entry.start_due) launch(entry, now);
+  }
+  if (!stopping() || killed_ || now - *stop_time_ < parameters_.stop_timeout) return;
+  killed_ = true;
+  for (auto& entry : entries_) {
+    if (!entry.child) continue;
+    say_(entry.spec.name,
+         fmt::format("does not end within {} ms: killed", parameters_.stop_timeout.count()));
+    entry.child->signal(SIGKILL);
+  }
+}
+
+void Supervisor::bury(Entry& entry, const Ending& ending, Clock::time_point now) {
+  entry.child.reset();
+  entry.died = now;
+  const bool wanted = stopping() || (ending.known && ending.signal == 0 && ending.exit_code == 0);
+  if (wanted) {
+    entry.state = ProcessState::kFinished;
+    const bool clean = ending.known && ending.signal == 0 && ending.exit_code == 0;
+    say_(entry.spec.name, clean ? "ended" : ending.text());
+    return;
+  }
+  entry.last_ending = ending.text();
+  say_(entry.spec.name,
+       fmt::format("{} after {:.1f} s", ending.text(), seconds(now - entry.started)));
+  if (ending.known && ending.signal == 0 && ending.exit_code == kWrongUsage) {
+    entry.state = ProcessState::kGivenUp;
+    if (entry.starts == 1) refused_.push_back(entry.spec.name);
+    say_(entry.spec.name, "refuses its configuration: not started again");
+    return;
+  }
+  schedule_restart(entry, now);
+}
+
+void Supervisor::schedule_restart(Entry& entry, Clock::time_point now) {
+  const auto backoff = entry.policy.died(now);
+  if (backoff) {
+    entry.state = ProcessState::kWaiting;
+    entry.start_due = now + *backoff;
+    return;
+  }
+  entry.state = ProcessState::kGivenUp;
+  say_(entry.spec.name, fmt::format("given up: {} deaths in {:.0f} s, the last time {}",
+                                    entry.policy.deaths_in_window(),
+                                    seconds(parameters_.restart.window), entry.last_ending));
+}
+
+void Supervisor::watch(Entry& entry, Clock::time_point now) {
+  if (!entry.child->is_stopped()) {
+    entry.stopped_since.reset();
+  } else if (!entry.stopped_since) {
+    entry.stopped_since = now;
+  }
+  const auto stopped_for = entry.stopped_since ? now - *entry.stopped_since : Clock::duration(0);
+  const auto silent_for = entry.last_heartbeat ? now - *entry.last_heartbeat : Clock::duration(0);
+  if (stopped_for >= parameters_.stopped_restart || silent_for >= parameters_.silent_restart) {
+    say_(entry.spec.name,
+         entry.stopped_since
+             ? fmt::format("hangs: stopped for {:.1f} s; killed", seconds(stopped_for))
+             : fmt::format("hangs: no HEALTH for {:.1f} s; killed", seconds(silent_for)));
+    entry.last_heartbeat.reset();
+    entry.stopped_since.reset();
+    entry.child->signal(SIGKILL);
+    return;
+  }
+  const bool degraded =
+      stopped_for >= parameters_.stopped_degraded || silent_for >= parameters_.silent_degraded;
+  if (degraded && entry.state == ProcessState::kRunning) {
+    say_(entry.spec.name, "DEGRADED: it does not answer");
+  } else if (!degraded && entry.state == ProcessState::kDegraded) {
+    say_(entry.spec.name, "answers again");
+  }
+  entry.state = degraded ? ProcessState::kDegraded : ProcessState::kRunning;
+}
+
+void Supervisor::stop(Clock::time_point now) {
+  if (stopping()) return;
+  stop_time_ = now;
+  for (auto& entry : entries_) {
+    entry.start_due.reset();
+    if (!entry.child) continue;
+    // A stopped process takes no SIGTERM before it goes on.
+    entry.child->signal(SIGTERM);
+    entry.child->signal(SIGCONT);
+  }
+}
+
+bool Supervisor::stopped() const {
+  return std::none_of(entries_.begin(), entries_.end(),
+                      [](const Entry& entry) { return entry.child || entry.start_due; });
+}
+
+std::vector<int> Supervisor::descriptors() const {
+  std::vector<int> result;
+  for (const auto& entry : entries_) {
+    if (entry.child) result.push_back(entry.child->descriptor());
+  }
+  return result;
+}
+
+Clock::time_point Supervisor::wake_up(Clock::time_point now) const {
+  Clock::time_point next = now + milliseconds(100);  // Hangs show in no descriptor.
+  for (const auto& entry : entries_) {
+    if (entry.start_due) next = std::min(next, *entry.start_due);
+  }
+  if (stopping() && !killed_) next = std::min(next, *stop_time_ + parameters_.stop_timeout);
+  return next;
+}
+
+std::vector<ProcessStatus> Supervisor::status() const {
+  std::vector<ProcessStatus> result;
+  for (const auto& entry : entries_) {
+    ProcessStatus status;
+    status.name = entry.spec.name;
+    status.state = entry.state;
+    if (entry.child) {
+      status.pid = entry.child->pid();
+      status.start_ticks = entry.child->start_ticks();
+    }
+    status.restarts = entry.starts > 0 ? entry.starts - 1 : 0;
+    status.last_ending = entry.last_ending;
+    result.push_back(std::move(status));
+  }
+  return result;
+}
+
+}  // namespace understory::launch

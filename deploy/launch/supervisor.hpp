@@ -1,0 +1,99 @@
+// Starts processes, notices when one dies or hangs, starts it again, stops all cleanly.
+//
+// It has no loop and no clock of its own: the caller polls the descriptors, says what time it is
+// and calls step(). So the same object runs in `understory launch` and in tests.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "deploy/launch/child_process.hpp"
+#include "deploy/launch/restart_policy.hpp"
+
+namespace understory::launch {
+
+struct ProcessSpec {
+  std::string name;  ///< As in its HEALTH messages.
+  Command command;
+};
+
+/// A process that is stopped (SIGSTOP) is seen in /proc within a tenth of a second, hence the short
+/// times. Any other hang shows only as missing HEALTH, which comes once a second: three missed are
+/// DEGRADED, five a hang. Fewer would restart healthy processes on a busy computer.
+struct SupervisorParameters {
+  RestartPolicyParameters restart;
+  milliseconds stopped_degraded{300};
+  milliseconds stopped_restart{1000};
+  milliseconds silent_degraded{3000};
+  milliseconds silent_restart{5000};
+  milliseconds stop_timeout{900};  ///< From SIGTERM to SIGKILL.
+};
+
+enum class ProcessState { kWaiting, kRunning, kDegraded, kFinished, kGivenUp };
+const char* to_string(ProcessState state);
+
+struct ProcessStatus {
+  std::string name;
+  ProcessState state = ProcessState::kWaiting;
+  pid_t pid = -1;
+  std::uint64_t start_ticks = 0;
+  std::uint64_t restarts = 0;
+  std::string last_ending;  ///< Empty before the first death.
+};
+
+class Supervisor {
+ public:
+  /// `say` is called with one line for everything that happens: (process, text).
+  using Say = std::function<void(const std::string&, const std::string&)>;
+  Supervisor(std::vector<ProcessSpec> specs, const SupervisorParameters& parameters, Say say);
+
+  /// Takes over those of `known` that still run, starts the others.
+  void start(const std::vector<ProcessStatus>& known, Clock::time_point now);
+  /// A HEALTH message of a process; one of another pid than ours is not counted.
+  void heartbeat(const std::string& name, pid_t pid, Clock::time_point now);
+  /// Notices deaths and hangs, starts what is due. Cheap; to be called whenever a descriptor is
+  /// ready and at the latest at wake_up().
+  void step(Clock::time_point now);
+  /// Asks every process to end; step() goes on until stopped().
+  void stop(Clock::time_point now);
+
+  bool stopping() const { return stop_time_.has_value(); }
+  bool stopped() const;  ///< No process runs and none will be started.
+  std::vector<int> descriptors() const;
+  Clock::time_point wake_up(Clock::time_point now) const;
+  std::vector<ProcessStatus> status() const;
+  /// Processes that were refused at their first start (exit status 2: wrong configuration).
+  const std::vector<std::string>& refused() const { return refused_; }
+
+ private:
+  struct Entry {
+    ProcessSpec spec;
+    RestartPolicy policy;
+    ProcessState state = ProcessState::kWaiting;
+    std::optional<ChildProcess> child;
+    std::optional<Clock::time_point> start_due;
+    Clock::time_point started;
+    Clock::time_point died;
+    std::optional<Clock::time_point> last_heartbeat;
+    std::optional<Clock::time_point> stopped_since;
+    std::uint64_t starts = 0;
+    std::string last_ending;
+  };
+
+  void launch(Entry& entry, Clock::time_point now);
+  void bury(Entry& entry, const Ending& ending, Clock::time_point now);
+  void schedule_restart(Entry& entry, Clock::time_point now);
+  void watch(Entry& entry, Clock::time_point now);
+
+  std::vector<Entry> entries_;
+  SupervisorParameters parameters_;
+  Say say_;
+  std::optional<Clock::time_point> stop_time_;
+  bool killed_ = false;
+  std::vector<std::string> refused_;
+};
+
+}  // namespace understory::launch
