@@ -1,0 +1,111 @@
+#include <algorithm>
+
+#include "tests/catch.hpp"
+#include "tests/cli/run_command.hpp"
+
+using namespace understory;
+using namespace understory::test;
+using Catch::Matchers::Contains;
+
+namespace {
+
+struct Fixture {
+  TemporaryDirectory directory;
+  std::mt19937_64 random{3};
+  std::vector<LogEvent> events = random_events(30, random);
+  std::string whole = (directory / "whole.lcm").string();
+  std::string damaged = (directory / "damaged.lcm").string();
+  std::string out = (directory / "out.lcm").string();
+
+  Fixture() {
+    write_log(whole, events);
+    auto bytes = read_bytes(whole);
+    bytes[offsets(events)[10]] ^= 0xFFU;
+    write_bytes(damaged, bytes);
+  }
+  Outcome run(const std::string& arguments) { return understory_command(directory, arguments); }
+};
+
+}  // namespace
+
+TEST_CASE_METHOD(Fixture, "wrong usage ends with 2 and says how it goes", "[cli]") {
+  for (const char* arguments : {"", "log", "log info", "nonsense", "log info a b", "log cut ",
+                                "log repair x", "launch --nonsense"}) {
+    const auto outcome = run(arguments);
+    CAPTURE(arguments, outcome.error);
+    CHECK(outcome.status == 2);
+    CHECK_FALSE(outcome.error.empty());
+  }
+  CHECK(run("log cut " + whole + " --out " + out + " --channels '('").status == 2);
+  CHECK(run("log cut " + whole + " --out " + out + " --from 2 --to 1").status == 2);
+  CHECK(run("--help").status == 0);
+  CHECK(run("--version").status == 0);
+}
+
+TEST_CASE_METHOD(Fixture, "a file that cannot be read ends with 1 and one line that names it",
+                 "[cli]") {
+  for (const char* command :
+       {"log info", "log check", "log repair --out o.lcm", "log cut --out o.lcm"}) {
+    const auto outcome = run(std::string(command) + " " + (directory / "none.lcm").string());
+    CAPTURE(command, outcome.error);
+    CHECK(outcome.status == 1);
+    CHECK(lines(outcome.error) == 1);
+    CHECK_THAT(outcome.error, Contains("none.lcm"));
+  }
+}
+
+TEST_CASE_METHOD(Fixture, "log info tells what is in a log", "[cli]") {
+  const auto text = run("log info " + whole);
+  CHECK(text.status == 0);
+  CHECK_THAT(text.out, Contains("30 events in 2.9 s") && Contains("LANDMARKS"));
+  const auto json = run("log info --json " + damaged);
+  CHECK(json.status == 0);
+  CHECK_THAT(json.out, Contains("\"events\": 29") && Contains("\"damaged_places\": 1"));
+}
+
+TEST_CASE_METHOD(Fixture, "log check finds damage and nothing where there is none", "[cli]") {
+  // Random payloads are of no type of ours: nothing can be wrong with them.
+  CHECK(run("log check " + whole).status == 0);
+  const auto outcome = run("log check " + damaged);
+  CHECK(outcome.status == 1);
+  CHECK_THAT(outcome.out, Contains("byte " + std::to_string(offsets(events)[10])));
+  CHECK_THAT(outcome.error, Contains("damaged.lcm"));
+}
+
+TEST_CASE_METHOD(Fixture, "log repair gives a log with nothing wrong", "[cli]") {
+  CHECK(run("log repair " + damaged + " --out " + out).status == 0);
+  CHECK(run("log check " + out).status == 0);
+  LcmLogReader reader(out);
+  CHECK(read_log(reader).size() == events.size() - 1);
+}
+
+TEST_CASE_METHOD(Fixture, "log repair saves nothing from a file that is no log", "[cli]") {
+  write_bytes(damaged, Bytes(1000, 'x'));
+  CHECK(run("log repair " + damaged + " --out " + out).status == 1);
+  CHECK_FALSE(std::filesystem::exists(out));
+}
+
+TEST_CASE_METHOD(Fixture, "log cut takes time and channels", "[cli]") {
+  CHECK(
+      run("log cut " + whole + " --from 0.95 --to 2.05 --channels 'LAND.*' --out " + out).status ==
+      0);
+  LcmLogReader reader(out);
+  const auto kept = read_log(reader);
+  const auto expected = std::count_if(events.begin(), events.end(), [&](const LogEvent& e) {
+    const auto time = e.utime - events[0].utime;
+    return e.channel == "LANDMARKS" && time >= 950'000 && time <= 2'050'000;
+  });
+  CHECK(kept.size() == static_cast<std::size_t>(expected));
+  CHECK(
+      run("log cut " + whole + " --channels NONE --out " + (directory / "n.lcm").string()).status ==
+      1);
+  CHECK_FALSE(std::filesystem::exists(directory / "n.lcm"));
+}
+
+TEST_CASE_METHOD(Fixture, "a full disk ends with 1", "[cli]") {
+  events[0].data.assign(1'000'000, 1);
+  write_log(whole, events);
+  const auto outcome = run("log repair " + whole + " --out /dev/full");
+  CHECK(outcome.status == 1);
+  CHECK_THAT(outcome.error, Contains("/dev/full"));
+}
