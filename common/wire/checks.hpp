@@ -1,0 +1,58 @@
+// The checks that conversions share; the first one that fails is kept.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "common/geometry/se2.hpp"
+#include "common/wire/result.hpp"
+#include "understory/pose2_t.hpp"
+
+namespace understory {
+
+/// A matrix as the wire types hold it: double name[N][N], row by row.
+template <int N>
+using SquareArray = double[N][N];
+
+/// Collects what is wrong with one message. Fields may be checked in any order; what comes after
+/// the first failure is not looked at.
+class Checks {
+ public:
+  /// Names where the following fields are, e.g. detections[3]; empty = the message itself.
+  void in(std::string_view array, std::size_t index) {
+    array_ = array;
+    index_ = index;
+  }
+  void in_message() { array_ = {}; }
+
+  void range(std::string_view field, double value, double lowest, double highest);
+  void consistent(bool holds, std::string_view what);
+  void pose(std::string_view field, const pose2_t& pose);
+  /// Symmetric within rounding and positive semidefinite; gives the exactly symmetric one.
+  template <int N>
+  Eigen::Matrix<double, N, N> covariance(std::string_view field, const SquareArray<N>& rows) {
+    const Eigen::Matrix<double, N, N> matrix =
+        Eigen::Map<const Eigen::Matrix<double, N, N, Eigen::RowMajor>>(&rows[0][0]);
+    check_covariance(field, matrix);
+    return 0.5 * (matrix + matrix.transpose());
+  }
+
+  const std::optional<Refusal>& refusal() const { return refusal_; }
+
+ private:
+  void check_covariance(std::string_view field, const Eigen::Matrix2d& matrix);
+  void check_covariance(std::string_view field, const Eigen::Matrix3d& matrix);
+  void refuse(Reason reason, std::string_view field, std::string_view what);
+
+  std::string_view array_;
+  std::size_t index_ = 0;
+  std::optional<Refusal> refusal_;
+};
+
+/// Whether a 2 x 2 or 3 x 3 covariance is positive semidefinite within rounding, whatever the
+/// scales of its coordinates.
+bool is_positive_semidefinite(const Eigen::Matrix3d& symmetric);
+
+}  // namespace understory

@@ -1,0 +1,97 @@
+#include "common/wire/convert.hpp"
+#include "common/wire/convert_shared.hpp"
+
+namespace understory {
+namespace {
+
+KeyframeMember member(const keyframe_member_t& wire, Checks& checks) {
+  checks.range("utime", static_cast<double>(wire.utime), 0.0, 9.1e15);
+  checks.range("seq", static_cast<double>(wire.seq), 0.0, 9.3e18);
+  checks.pose("centre_T_vehicle", wire.centre_T_vehicle);
+  KeyframeMember result;
+  result.utime = wire.utime;
+  result.sequence = static_cast<std::uint64_t>(wire.seq);
+  result.centre_T_vehicle = from_wire(wire.centre_T_vehicle);
+  result.covariance = checks.covariance("covariance", wire.covariance);
+  return result;
+}
+
+KeyframeLandmark landmark(const keyframe_landmark_t& wire, Checks& checks) {
+  check_landmark(wire, checks);
+  checks.range("times_seen", wire.times_seen, 0, std::numeric_limits<std::uint16_t>::max());
+  KeyframeLandmark result;
+  result.position_m = Eigen::Map<const Eigen::Vector2d>(wire.position_m);
+  result.covariance_m2 = checks.covariance("covariance_m2", wire.covariance_m2);
+  result.radius_m = wire.radius_m;
+  result.times_seen = static_cast<std::uint16_t>(wire.times_seen);
+  result.kind = static_cast<LandmarkKind>(wire.kind);
+  return result;
+}
+
+/// Members are in order of time and the keyframe carries the first one's stamp.
+void check_order(const keyframe_t& wire, Checks& checks) {
+  checks.in_message();
+  checks.consistent(!wire.members.empty(), "num_members >= 1");
+  if (wire.members.empty()) return;
+  checks.consistent(wire.members.front().utime == wire.utime, "utime = members[0].utime");
+  for (std::size_t i = 1; i < wire.members.size(); ++i) {
+    checks.consistent(wire.members[i - 1].utime < wire.members[i].utime,
+                      "members in order of time");
+  }
+}
+
+}  // namespace
+
+Result<Keyframe> from_wire(const keyframe_t& wire) {
+  Checks checks;
+  check_order(wire, checks);
+  Keyframe keyframe;
+  keyframe.utime = wire.utime;
+  keyframe.sequence = static_cast<std::uint64_t>(wire.seq);
+  keyframe.field_of_view = field_of_view(wire, checks);
+  if (wire.has_previous != 0) {
+    checks.pose("previous_T_base", wire.previous_T_base);
+    keyframe.previous_T_base = from_wire(wire.previous_T_base);
+  }
+  keyframe.members.reserve(wire.members.size());
+  for (std::size_t i = 0; i < wire.members.size(); ++i) {
+    checks.in("members", i);
+    keyframe.members.push_back(member(wire.members[i], checks));
+  }
+  keyframe.landmarks.reserve(wire.landmarks.size());
+  for (std::size_t i = 0; i < wire.landmarks.size(); ++i) {
+    checks.in("landmarks", i);
+    keyframe.landmarks.push_back(landmark(wire.landmarks[i], checks));
+  }
+  if (checks.refusal()) return *checks.refusal();
+  return keyframe;
+}
+
+keyframe_t to_wire(const Keyframe& keyframe) {
+  keyframe_t wire{};
+  wire.utime = keyframe.utime;
+  wire.seq = static_cast<std::int64_t>(keyframe.sequence);
+  copy_field_of_view(keyframe.field_of_view, wire);
+  wire.has_previous = keyframe.previous_T_base.has_value() ? 1 : 0;
+  wire.previous_T_base = to_wire(keyframe.previous_T_base.value_or(SE2()));
+  wire.num_members = static_cast<std::int32_t>(keyframe.members.size());
+  for (const KeyframeMember& member : keyframe.members) {
+    keyframe_member_t& out = wire.members.emplace_back();
+    out.utime = member.utime;
+    out.seq = static_cast<std::int64_t>(member.sequence);
+    out.centre_T_vehicle = to_wire(member.centre_T_vehicle);
+    copy_matrix(member.covariance, out.covariance);
+  }
+  wire.num_landmarks = static_cast<std::int32_t>(keyframe.landmarks.size());
+  for (const KeyframeLandmark& landmark : keyframe.landmarks) {
+    keyframe_landmark_t& out = wire.landmarks.emplace_back();
+    copy_vector(landmark.position_m, out.position_m);
+    copy_matrix(landmark.covariance_m2, out.covariance_m2);
+    out.radius_m = landmark.radius_m;
+    out.times_seen = landmark.times_seen;
+    out.kind = static_cast<std::int8_t>(landmark.kind);
+  }
+  return wire;
+}
+
+}  // namespace understory

@@ -1,0 +1,252 @@
+#include "common/wire/convert.hpp"
+#include "common/wire/convert_shared.hpp"
+
+namespace understory {
+namespace {
+
+LandmarkId landmark_id(std::int64_t wire, Checks& checks) {
+  checks.consistent(wire != 0, "landmark id is not 0");
+  return static_cast<LandmarkId>(wire);
+}
+
+MapLandmark landmark(const map_landmark_t& wire, Checks& checks) {
+  check_landmark(wire, checks);
+  checks.range("times_seen", wire.times_seen, 0, std::numeric_limits<std::int32_t>::max());
+  MapLandmark result;
+  result.id = landmark_id(wire.id, checks);
+  result.position_m = Eigen::Map<const Eigen::Vector2d>(wire.position_m);
+  result.covariance_m2 = checks.covariance("covariance_m2", wire.covariance_m2);
+  result.radius_m = wire.radius_m;
+  result.times_seen = static_cast<std::uint32_t>(wire.times_seen);
+  result.kind = static_cast<LandmarkKind>(wire.kind);
+  return result;
+}
+
+map_landmark_t to_wire(const MapLandmark& landmark) {
+  map_landmark_t wire{};
+  wire.id = static_cast<std::int64_t>(landmark.id);
+  copy_vector(landmark.position_m, wire.position_m);
+  copy_matrix(landmark.covariance_m2, wire.covariance_m2);
+  wire.radius_m = landmark.radius_m;
+  wire.times_seen = static_cast<std::int32_t>(landmark.times_seen);
+  wire.kind = static_cast<std::int8_t>(landmark.kind);
+  return wire;
+}
+
+std::vector<MapLandmark> landmarks(std::string_view field, const std::vector<map_landmark_t>& wire,
+                                   Checks& checks) {
+  std::vector<MapLandmark> result;
+  result.reserve(wire.size());
+  for (std::size_t i = 0; i < wire.size(); ++i) {
+    checks.in(field, i);
+    result.push_back(landmark(wire[i], checks));
+  }
+  return result;
+}
+
+std::vector<map_landmark_t> to_wire(const std::vector<MapLandmark>& landmarks) {
+  std::vector<map_landmark_t> wire;
+  wire.reserve(landmarks.size());
+  for (const MapLandmark& landmark : landmarks) wire.push_back(to_wire(landmark));
+  return wire;
+}
+
+std::vector<LandmarkId> ids(std::string_view field, const std::vector<std::int64_t>& wire,
+                            Checks& checks) {
+  std::vector<LandmarkId> result;
+  result.reserve(wire.size());
+  for (std::size_t i = 0; i < wire.size(); ++i) {
+    checks.in(field, i);
+    result.push_back(landmark_id(wire[i], checks));
+  }
+  return result;
+}
+
+using Merges = std::vector<std::pair<LandmarkId, LandmarkId>>;
+
+Merges merges(const std::vector<merge_t>& wire, Checks& checks) {
+  Merges result;
+  result.reserve(wire.size());
+  for (std::size_t i = 0; i < wire.size(); ++i) {
+    checks.in("merged", i);
+    result.emplace_back(landmark_id(wire[i].old_id, checks), landmark_id(wire[i].new_id, checks));
+  }
+  return result;
+}
+
+std::vector<merge_t> to_wire(const Merges& merges) {
+  std::vector<merge_t> wire;
+  wire.reserve(merges.size());
+  for (const auto& [old_id, new_id] : merges) {
+    merge_t& out = wire.emplace_back();
+    out.old_id = static_cast<std::int64_t>(old_id);
+    out.new_id = static_cast<std::int64_t>(new_id);
+  }
+  return wire;
+}
+
+template <class Wire>
+void copy_counts(Wire& wire) {
+  wire.num_added = static_cast<std::int32_t>(wire.added.size());
+  wire.num_removed = static_cast<std::int32_t>(wire.removed.size());
+  wire.num_merged = static_cast<std::int32_t>(wire.merged.size());
+}
+
+std::vector<Association> associations(const slam_update_t& wire, Checks& checks) {
+  std::vector<Association> result;
+  result.reserve(wire.associations.size());
+  for (std::size_t i = 0; i < wire.associations.size(); ++i) {
+    checks.in("associations", i);
+    const association_t& one = wire.associations[i];
+    checks.range("keyframe_landmark", one.keyframe_landmark, 0, 1e9);
+    result.push_back(
+        {static_cast<std::uint32_t>(one.keyframe_landmark), landmark_id(one.landmark_id, checks)});
+  }
+  return result;
+}
+
+void copy_diagnostics(const slam_update_t& wire, MapUpdate& update, Checks& checks) {
+  constexpr double kMost = std::numeric_limits<std::int32_t>::max();
+  checks.in_message();
+  checks.range("candidates", wire.candidates, 0, kMost);
+  checks.range("inliers", wire.inliers, 0, kMost);
+  checks.range("degrees_of_freedom", wire.degrees_of_freedom, 0, kMost);
+  checks.range("chi2", wire.chi2, 0.0, std::numeric_limits<double>::max());
+  update.used_prior = wire.used_prior != 0;
+  update.candidates = static_cast<std::uint32_t>(wire.candidates);
+  update.inliers = static_cast<std::uint32_t>(wire.inliers);
+  update.chi2 = wire.chi2;
+  update.degrees_of_freedom = static_cast<std::uint32_t>(wire.degrees_of_freedom);
+  update.log10_false_alarm = wire.log10_false_alarm;
+  update.reason = wire.reason;
+}
+
+}  // namespace
+
+Result<MapUpdate> from_wire(const slam_update_t& wire) {
+  Checks checks;
+  checks.range("keyframe_seq", static_cast<double>(wire.keyframe_seq), 0.0, 9.3e18);
+  checks.range("status", wire.status, slam_update_t::FIRST_MAP, slam_update_t::REJECTED);
+  checks.pose("map_T_vehicle", wire.map_T_vehicle);
+  checks.pose("map_T_latest_vehicle", wire.map_T_latest_vehicle);
+  MapUpdate update;
+  update.keyframe_sequence = static_cast<std::uint64_t>(wire.keyframe_seq);
+  update.utime = wire.utime;
+  update.status = static_cast<MapUpdateStatus>(wire.status);
+  update.map_T_vehicle = from_wire(wire.map_T_vehicle);
+  update.covariance = checks.covariance("covariance", wire.covariance);
+  update.map_T_latest_vehicle = from_wire(wire.map_T_latest_vehicle);
+  update.associations = associations(wire, checks);
+  update.added = ids("added", wire.added, checks);
+  update.removed = ids("removed", wire.removed, checks);
+  update.merged = merges(wire.merged, checks);
+  copy_diagnostics(wire, update, checks);
+  if (checks.refusal()) return *checks.refusal();
+  return update;
+}
+
+slam_update_t to_wire(const MapUpdate& update) {
+  slam_update_t wire{};
+  wire.utime = update.utime;
+  wire.seq = static_cast<std::int64_t>(update.keyframe_sequence);
+  wire.keyframe_seq = wire.seq;
+  wire.status = static_cast<std::int8_t>(update.status);
+  wire.map_T_vehicle = to_wire(update.map_T_vehicle);
+  copy_matrix(update.covariance, wire.covariance);
+  wire.map_T_latest_vehicle = to_wire(update.map_T_latest_vehicle);
+  wire.num_associations = static_cast<std::int32_t>(update.associations.size());
+  for (const Association& one : update.associations) {
+    association_t& out = wire.associations.emplace_back();
+    out.keyframe_landmark = static_cast<std::int32_t>(one.keyframe_landmark);
+    out.landmark_id = static_cast<std::int64_t>(one.landmark_id);
+  }
+  wire.added.assign(update.added.begin(), update.added.end());
+  wire.removed.assign(update.removed.begin(), update.removed.end());
+  wire.merged = to_wire(update.merged);
+  copy_counts(wire);
+  wire.used_prior = update.used_prior ? 1 : 0;
+  wire.candidates = static_cast<std::int32_t>(update.candidates);
+  wire.inliers = static_cast<std::int32_t>(update.inliers);
+  wire.chi2 = update.chi2;
+  wire.degrees_of_freedom = static_cast<std::int32_t>(update.degrees_of_freedom);
+  wire.log10_false_alarm = update.log10_false_alarm;
+  wire.reason = update.reason;
+  return wire;
+}
+
+Result<WholeMap> from_wire(const map_t& wire) {
+  Checks checks;
+  checks.range("version", static_cast<double>(wire.version), 0.0, 9.3e18);
+  WholeMap map;
+  map.utime = wire.utime;
+  map.sequence = static_cast<std::uint64_t>(wire.seq);
+  map.version = static_cast<std::uint64_t>(wire.version);
+  map.complete = wire.complete != 0;
+  map.landmarks = landmarks("landmarks", wire.landmarks, checks);
+  map.keyframes.reserve(wire.keyframes.size());
+  for (std::size_t i = 0; i < wire.keyframes.size(); ++i) {
+    const keyframe_pose_t& one = wire.keyframes[i];
+    checks.in("keyframes", i);
+    checks.range("keyframe_seq", static_cast<double>(one.keyframe_seq), 0.0, 9.3e18);
+    checks.pose("map_T_vehicle", one.map_T_vehicle);
+    map.keyframes.push_back({static_cast<std::uint64_t>(one.keyframe_seq), one.utime,
+                             from_wire(one.map_T_vehicle),
+                             checks.covariance("covariance", one.covariance)});
+  }
+  if (checks.refusal()) return *checks.refusal();
+  return map;
+}
+
+map_t to_wire(const WholeMap& map) {
+  map_t wire{};
+  wire.utime = map.utime;
+  wire.seq = static_cast<std::int64_t>(map.sequence);
+  wire.version = static_cast<std::int64_t>(map.version);
+  wire.complete = map.complete ? 1 : 0;
+  wire.landmarks = to_wire(map.landmarks);
+  wire.num_landmarks = static_cast<std::int32_t>(wire.landmarks.size());
+  wire.keyframes.reserve(map.keyframes.size());
+  for (const KeyframePose& pose : map.keyframes) {
+    keyframe_pose_t& out = wire.keyframes.emplace_back();
+    out.utime = pose.utime;
+    out.keyframe_seq = static_cast<std::int64_t>(pose.keyframe_sequence);
+    out.map_T_vehicle = to_wire(pose.map_T_vehicle);
+    copy_matrix(pose.covariance, out.covariance);
+  }
+  wire.num_keyframes = static_cast<std::int32_t>(wire.keyframes.size());
+  return wire;
+}
+
+Result<MapDelta> from_wire(const map_delta_t& wire) {
+  Checks checks;
+  checks.consistent(wire.base_version >= 0 && wire.base_version < wire.version,
+                    "base_version < version");
+  MapDelta delta;
+  delta.utime = wire.utime;
+  delta.sequence = static_cast<std::uint64_t>(wire.seq);
+  delta.base_version = static_cast<std::uint64_t>(wire.base_version);
+  delta.version = static_cast<std::uint64_t>(wire.version);
+  delta.added = landmarks("added", wire.added, checks);
+  delta.moved = landmarks("moved", wire.moved, checks);
+  delta.removed = ids("removed", wire.removed, checks);
+  delta.merged = merges(wire.merged, checks);
+  if (checks.refusal()) return *checks.refusal();
+  return delta;
+}
+
+map_delta_t to_wire(const MapDelta& delta) {
+  map_delta_t wire{};
+  wire.utime = delta.utime;
+  wire.seq = static_cast<std::int64_t>(delta.sequence);
+  wire.base_version = static_cast<std::int64_t>(delta.base_version);
+  wire.version = static_cast<std::int64_t>(delta.version);
+  wire.added = to_wire(delta.added);
+  wire.moved = to_wire(delta.moved);
+  wire.removed.assign(delta.removed.begin(), delta.removed.end());
+  wire.merged = to_wire(delta.merged);
+  copy_counts(wire);
+  wire.num_moved = static_cast<std::int32_t>(wire.moved.size());
+  return wire;
+}
+
+}  // namespace understory

@@ -1,0 +1,57 @@
+// Pieces that several conversions need.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <numbers>
+
+#include "common/model/landmarks.hpp"
+#include "common/wire/checks.hpp"
+#include "understory/pose2_t.hpp"
+
+namespace understory {
+
+inline constexpr double kFarthestPositionM = 1e7;
+inline constexpr double kLargestRadiusM = 100.0;
+inline constexpr double kLongestRangeM = 1e6;
+
+template <int N>
+void copy_matrix(const Eigen::Matrix<double, N, N>& matrix, SquareArray<N>& rows) {
+  for (int row = 0; row < N; ++row) {
+    for (int column = 0; column < N; ++column) rows[row][column] = matrix(row, column);
+  }
+}
+
+template <class Vector>
+void copy_vector(const Vector& vector, double* out) {
+  for (Eigen::Index i = 0; i < vector.size(); ++i) out[i] = vector[i];
+}
+
+/// Position, radius and kind, which every landmark type has.
+template <class Wire>
+void check_landmark(const Wire& wire, Checks& checks) {
+  for (const double coordinate : wire.position_m) {
+    checks.range("position_m", coordinate, -kFarthestPositionM, kFarthestPositionM);
+  }
+  checks.range("radius_m", wire.radius_m, 0.0, kLargestRadiusM);
+  checks.range("kind", wire.kind, 0, 1);
+}
+
+/// The three fields of a message that describe the field of view.
+template <class Wire>
+FieldOfView field_of_view(const Wire& wire, Checks& checks) {
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  checks.range("max_range_m", wire.max_range_m, 0.0, kLongestRangeM);
+  checks.range("bearing_rad", wire.bearing_rad, -kTurn, kTurn);
+  checks.range("width_rad", wire.width_rad, 0.0, kTurn + 1e-9);
+  return {wire.max_range_m, wire.bearing_rad, wire.width_rad};
+}
+
+template <class Wire>
+void copy_field_of_view(const FieldOfView& from, Wire& wire) {
+  wire.max_range_m = from.max_range_m;
+  wire.bearing_rad = from.bearing_rad;
+  wire.width_rad = from.width_rad;
+}
+
+}  // namespace understory

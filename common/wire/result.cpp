@@ -1,0 +1,51 @@
+#include "common/wire/result.hpp"
+
+namespace understory {
+
+std::string_view to_string(Reason reason) {
+  switch (reason) {
+    case Reason::kTooShort:
+      return "too_short";
+    case Reason::kTooLong:
+      return "too_long";
+    case Reason::kWrongType:
+      return "wrong_type";
+    case Reason::kBadCount:
+      return "bad_count";
+    case Reason::kBadString:
+      return "bad_string";
+    case Reason::kNotFinite:
+      return "not_finite";
+    case Reason::kOutOfRange:
+      return "out_of_range";
+    case Reason::kNotSymmetric:
+      return "not_symmetric";
+    case Reason::kNotPositive:
+      return "not_positive";
+    case Reason::kInconsistent:
+      return "inconsistent";
+    case Reason::kDuplicate:
+      return "duplicate";
+    case Reason::kLate:
+      return "late";
+    case Reason::kClockJump:
+      return "clock_jump";
+    case Reason::kQueueFull:
+      return "queue_full";
+    case Reason::kNotSent:
+      return "not_sent";
+    case Reason::kStageFailed:
+      return "stage_failed";
+    case Reason::kSnapshotDamaged:
+      return "snapshot_damaged";
+    case Reason::kJournalDamaged:
+      return "journal_damaged";
+    case Reason::kStateNotKept:
+      return "state_not_kept";
+    case Reason::kReceiveBufferSmall:
+      return "receive_buffer_small";
+  }
+  return "unknown";
+}
+
+}  // namespace understory

@@ -1,0 +1,65 @@
+// What comes back where data may be wrong.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+
+namespace understory {
+
+/// Why a message or a value was not taken. The names (`to_string`) are what HEALTH and LOG show.
+enum class Reason : std::uint8_t {
+  kTooShort,            ///< Ends before its type does.
+  kTooLong,             ///< Bytes are left over.
+  kWrongType,           ///< The fingerprint is another type's (or another version's).
+  kBadCount,            ///< A count is negative or promises more than there is.
+  kBadString,           ///< A length below one, no terminator, or a zero inside.
+  kNotFinite,           ///< NaN or infinite.
+  kOutOfRange,          ///< A value that its quantity cannot have.
+  kNotSymmetric,        ///< Of a covariance.
+  kNotPositive,         ///< A covariance that is not positive semidefinite.
+  kInconsistent,        ///< Fields that contradict each other.
+  kDuplicate,           ///< Already had.
+  kLate,                ///< Came after a later one.
+  kClockJump,           ///< A stamp far from the others'.
+  kQueueFull,           ///< Shed: more came than could be handled.
+  kNotSent,             ///< The bus refused it.
+  kStageFailed,         ///< The stage threw.
+  kSnapshotDamaged,     ///< The saved state cannot be read.
+  kJournalDamaged,      ///< The journal is cut or damaged.
+  kStateNotKept,        ///< The state directory cannot be written.
+  kReceiveBufferSmall,  ///< The kernel grants less socket buffer than asked for.
+};
+
+/// Name of the reason, lower_snake.
+std::string_view to_string(Reason reason);
+
+/// A refusal: the reason and, in words, where and what.
+struct Refusal {
+  Reason reason = Reason::kInconsistent;
+  std::string detail;
+};
+
+/// A value, or why there is none.
+template <class T>
+class [[nodiscard]] Result {
+ public:
+  Result(T value) : content_(std::move(value)) {}            // NOLINT(google-explicit-constructor)
+  Result(Refusal refusal) : content_(std::move(refusal)) {}  // NOLINT(google-explicit-constructor)
+
+  explicit operator bool() const { return content_.index() == 0; }
+  T& value() { return std::get<0>(content_); }
+  const T& value() const { return std::get<0>(content_); }
+  const Refusal& refusal() const { return std::get<1>(content_); }
+  T* operator->() { return &value(); }
+  const T* operator->() const { return &value(); }
+  T& operator*() { return value(); }
+  const T& operator*() const { return value(); }
+
+ private:
+  std::variant<T, Refusal> content_;
+};
+
+}  // namespace understory

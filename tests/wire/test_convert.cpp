@@ -1,0 +1,205 @@
+// Values -> wire -> values is the identity, and what comes in is checked.
+#include <Eigen/Eigenvalues>
+#include <numbers>
+#include <random>
+
+#include "common/wire/checks.hpp"
+#include "tests/catch.hpp"
+#include "tests/wire/all_types.hpp"
+
+using namespace understory;
+
+namespace {
+
+class Maker {
+ public:
+  explicit Maker(std::uint64_t seed) : random_(seed) {}
+  double real(double scale) {
+    return std::uniform_real_distribution<double>(-scale, scale)(random_);
+  }
+  std::size_t count() { return random_() % 6; }
+  template <int N>
+  Eigen::Matrix<double, N, N> covariance() {
+    Eigen::Matrix<double, N, N> root;
+    for (int i = 0; i < N * N; ++i) root(i) = real(0.3);
+    const Eigen::Matrix<double, N, N> product = root * root.transpose();
+    return 0.5 * (product + product.transpose());
+  }
+  SE2 pose() { return {real(100.0), real(100.0), real(3.0)}; }
+  LandmarkKind kind() { return static_cast<LandmarkKind>(random_() % 2); }
+
+  LandmarkScan scan() {
+    LandmarkScan scan{1000, 7, {40.0, real(1.0), 3.0}, {}};
+    for (std::size_t i = count(); i > 0; --i) {
+      scan.detections.push_back(
+          {{real(40.0), real(40.0), real(2.0)}, covariance<3>(), real(0.1) + 0.2, kind()});
+    }
+    return scan;
+  }
+  Keyframe keyframe() {
+    Keyframe keyframe{1000, 3, {40.0, 0.0, 2.0 * std::numbers::pi}, {}, {}, std::nullopt};
+    if (count() > 2) keyframe.previous_T_base = pose();
+    for (std::size_t i = 0; i <= count(); ++i) {
+      keyframe.members.push_back(
+          {static_cast<Utime>(1000 + 100 * i), 50 + i, pose(), covariance<3>()});
+    }
+    for (std::size_t i = count(); i > 0; --i) {
+      keyframe.landmarks.push_back(
+          {{real(40.0), real(40.0)}, covariance<2>(), 0.2, static_cast<std::uint16_t>(i), kind()});
+    }
+    return keyframe;
+  }
+  MapLandmark landmark() {
+    return {random_() | 1U, {real(400.0), real(400.0)}, covariance<2>(), 0.2, 9, kind()};
+  }
+  std::vector<MapLandmark> landmarks() {
+    std::vector<MapLandmark> result(count());
+    for (MapLandmark& one : result) one = landmark();
+    return result;
+  }
+
+ private:
+  std::mt19937_64 random_;
+};
+
+/// Sent and received again; the same value encodes to the same bytes.
+template <class T>
+void check_round_trip(const T& value) {
+  const Bytes bytes = encode_message(value);
+  const auto back = decode_message<T>(bytes);
+  INFO((back ? "" : back.refusal().detail));
+  REQUIRE(back);
+  CHECK(encode_message(*back) == bytes);
+}
+
+Reason reason_of(const landmarks_t& scan) {
+  const auto result = from_wire(scan);
+  REQUIRE_FALSE(result);
+  return result.refusal().reason;
+}
+
+landmarks_t scan_with_one() {
+  landmarks_t scan{};
+  scan.max_range_m = 40.0;
+  scan.width_rad = 1.0;
+  scan.num_detections = 1;
+  scan.detections.push_back(detection_t{});
+  for (int i = 0; i < 3; ++i) scan.detections[0].covariance_m2[i][i] = 0.01;
+  return scan;
+}
+
+}  // namespace
+
+TEST_CASE("values survive the wire") {
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    Maker make(seed);
+    check_round_trip(make.scan());
+    check_round_trip(make.keyframe());
+    check_round_trip(Odometry{5, 10, 2, make.pose(), make.covariance<3>()});
+    check_round_trip(SlamPose{10, 2, MapUpdateStatus::kUpdated, 4, 0, make.pose(),
+                              make.covariance<3>(), 3, make.pose(), make.pose(), 1, make.pose()});
+    check_round_trip(SlamPose{10, 2, std::nullopt, std::nullopt, 0, make.pose(),
+                              make.covariance<3>(), 3, make.pose(), make.pose(), 1, make.pose()});
+    check_round_trip(
+        WholeMap{10, 1, 5, true, make.landmarks(), {{1, 10, make.pose(), make.covariance<3>()}}});
+    check_round_trip(MapDelta{10, 1, 4, 5, make.landmarks(), make.landmarks(), {8, 9}, {{6, 7}}});
+    MapUpdate update;
+    update.keyframe_sequence = 12;
+    update.utime = 99;
+    update.status = MapUpdateStatus::kNotSure;
+    update.map_T_vehicle = make.pose();
+    update.covariance = make.covariance<3>();
+    update.associations = {{0, 5}, {2, 6}};
+    update.added = {7};
+    update.merged = {{5, 6}};
+    update.reason = "a runner-up";
+    check_round_trip(update);
+  }
+}
+
+TEST_CASE("sensor values survive the wire") {
+  PlanarScan scan{100, 5, -1.5, 0.01, 80.0, {1.0F, 0.0F, 90.0F, 80.5F}};
+  const auto back = decode_message<PlanarScan>(encode_message(scan));
+  REQUIRE(back);
+  CHECK(back->ranges_m == std::vector<float>{1.0F, 0.0F, 0.0F, 0.0F});
+  CHECK(back->bearing(1) == Approx(scan.bearing(1)));
+  check_round_trip(WheelSample{3, 4, 1.5, -0.2});
+  check_round_trip(GnssFix{3, 4, {10.0, -20.0}});
+  gnss_t none = to_wire(GnssFix{3, 4, {10.0, -20.0}});
+  none.valid = 0;
+  CHECK_FALSE(from_wire(none));
+}
+
+TEST_CASE("values are carried field by field") {
+  Maker make(5);
+  LandmarkScan scan = make.scan();
+  while (scan.detections.empty()) scan = make.scan();
+  const auto back = decode_message<LandmarkScan>(encode_message(scan));
+  REQUIRE(back);
+  CHECK(back->sequence == scan.sequence);
+  CHECK(back->field_of_view.bearing_rad == scan.field_of_view.bearing_rad);
+  CHECK(back->detections[0].position_m == scan.detections[0].position_m);
+  CHECK(back->detections[0].covariance_m2 == scan.detections[0].covariance_m2);
+  CHECK(back->detections[0].kind == scan.detections[0].kind);
+}
+
+TEST_CASE("a scan is refused for each thing that cannot be") {
+  CHECK(from_wire(scan_with_one()));
+  auto scan = scan_with_one();
+  scan.detections[0].kind = 2;
+  CHECK(reason_of(scan) == Reason::kOutOfRange);
+  scan = scan_with_one();
+  scan.detections[0].position_m[1] = 1e9;
+  CHECK(reason_of(scan) == Reason::kOutOfRange);
+  scan = scan_with_one();
+  scan.detections[0].radius_m = -0.1;
+  CHECK(reason_of(scan) == Reason::kOutOfRange);
+  scan = scan_with_one();
+  scan.max_range_m = -1.0;
+  CHECK(reason_of(scan) == Reason::kOutOfRange);
+  scan = scan_with_one();
+  scan.detections[0].covariance_m2[0][1] = 0.005;
+  CHECK(reason_of(scan) == Reason::kNotSymmetric);
+  scan = scan_with_one();
+  scan.detections[0].covariance_m2[0][0] = -0.01;
+  CHECK(reason_of(scan) == Reason::kNotPositive);
+  scan = scan_with_one();
+  scan.detections[0].covariance_m2[0][1] = scan.detections[0].covariance_m2[1][0] = 0.011;
+  CHECK(reason_of(scan) == Reason::kNotPositive);
+}
+
+TEST_CASE("a keyframe without members, or with members out of order, is refused") {
+  Maker make(1);
+  Keyframe keyframe = make.keyframe();
+  keyframe.members.resize(1);
+  keyframe_t wire = to_wire(keyframe);
+  REQUIRE(from_wire(wire));
+  wire.members.push_back(wire.members[0]);
+  wire.num_members = 2;
+  CHECK(from_wire(wire).refusal().reason == Reason::kInconsistent);
+  wire.members.clear();
+  wire.num_members = 0;
+  CHECK(from_wire(wire).refusal().reason == Reason::kInconsistent);
+}
+
+TEST_CASE("positive semidefinite agrees with the eigenvalues, whatever the scales") {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  int positive = 0;
+  for (int i = 0; i < 2000; ++i) {
+    Eigen::Matrix3d matrix;
+    for (int k = 0; k < 9; ++k) matrix(k) = normal(random);
+    matrix = (0.5 * (matrix + matrix.transpose())).eval();
+    matrix += 2.0 * std::abs(normal(random)) * Eigen::Matrix3d::Identity();
+    const Eigen::Vector3d eigenvalues =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(matrix).eigenvalues();
+    if (eigenvalues.cwiseAbs().minCoeff() < 1e-3) continue;
+    const bool expected = eigenvalues.minCoeff() > 0.0;
+    positive += expected ? 1 : 0;
+    const Eigen::Vector3d scale(1e-3, 1.0, 1e3);
+    CHECK(is_positive_semidefinite(matrix) == expected);
+    CHECK(is_positive_semidefinite(scale.asDiagonal() * matrix * scale.asDiagonal()) == expected);
+  }
+  CHECK(positive > 200);
+  CHECK(is_positive_semidefinite(Eigen::Matrix3d::Zero()));
+}

@@ -1,0 +1,61 @@
+// The fingerprint of every wire type. A change here makes recorded logs unreadable: give the new
+// version a new name instead, and pin that too.
+#include <cstdint>
+#include <string>
+
+#include "common/wire/layout.hpp"
+#include "tests/catch.hpp"
+
+namespace {
+
+struct Pin {
+  const char* type;
+  std::uint64_t fingerprint;
+};
+
+constexpr Pin kPins[] = {
+    {"association_t", 0x4f1fb864e9129458ULL},
+    {"channel_health_t", 0x3b1e2e0a8ed6bf50ULL},
+    {"config_t", 0xd7cb12688925d455ULL},
+    {"detection_t", 0x502cfad55038b95aULL},
+    {"gnss_t", 0xe295fd5ac46ee81cULL},
+    {"ground_truth_t", 0x81e9a5473725f184ULL},
+    {"health_t", 0xb8f9eafd7c1dc8b5ULL},
+    {"imu_t", 0x5b7491d9119496ddULL},
+    {"keyframe_landmark_t", 0x84f56a9d3a79d47dULL},
+    {"keyframe_member_t", 0xaf8e0b7b9db1894bULL},
+    {"keyframe_pose_t", 0xa5fa9d53288f243fULL},
+    {"keyframe_t", 0x56ea011c243abf63ULL},
+    {"landmarks_t", 0xf745a910e75513e5ULL},
+    {"lidar_scan_t", 0x2f0525fc9599a15bULL},
+    {"log_t", 0xca8d03aba370c85aULL},
+    {"map_delta_t", 0x7d698f741ca18eb2ULL},
+    {"map_landmark_t", 0x8af5ad310d5fd80eULL},
+    {"map_request_t", 0x0a15ba7836cb1eb9ULL},
+    {"map_t", 0x5717412839733911ULL},
+    {"merge_t", 0x3afd1fb9bfcec6a7ULL},
+    {"odometry_t", 0x5b5e1ca90be60bcbULL},
+    {"pose2_t", 0xe923820e98208b26ULL},
+    {"raw_pose_t", 0xaafec8b646136dd7ULL},
+    {"reason_count_t", 0xcc9becbf2c78c790ULL},
+    {"slam_pose_t", 0x0d82fef5d885f004ULL},
+    {"slam_update_t", 0xef389e966858b506ULL},
+    {"truth_landmark_t", 0x72d0574c8bff17aeULL},
+    {"truth_landmarks_t", 0x76fd9441e3de1147ULL},
+    {"wheels_t", 0xa9d9fa96c53d6adfULL},
+};
+
+}  // namespace
+
+TEST_CASE("no wire type has changed") {
+  for (const Pin& pin : kPins) {
+    INFO(pin.type);
+    const understory::WireType* type = understory::find_wire_type(std::string_view(pin.type));
+    REQUIRE(type != nullptr);
+    CHECK(static_cast<std::uint64_t>(type->fingerprint()) == pin.fingerprint);
+  }
+}
+
+TEST_CASE("every wire type is pinned") {
+  CHECK(understory::wire_types().size() == std::size(kPins));
+}
