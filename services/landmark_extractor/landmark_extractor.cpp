@@ -53,14 +53,22 @@ Detection to_detection(const TrunkFit& fit, const PlanarTrunkParameters& paramet
   return detection;
 }
 
-std::optional<Detection> to_trunk(const PlanarScan& scan, const Segment& segment,
-                                  const PlanarTrunkParameters& parameters,
+bool apart_from_others(const PlanarScan& scan, const std::vector<Segment>& segments,
+                       std::size_t index, const PlanarTrunkParameters& parameters) {
+  return stands_alone(segments[index]) &&
+         !continues_a_line(scan, segments[index], parameters.line_tolerance_m) &&
+         nearest_object(scan, segments, index, parameters.separation_m) > parameters.separation_m;
+}
+
+std::optional<Detection> to_trunk(const PlanarScan& scan, const std::vector<Segment>& segments,
+                                  std::size_t index, const PlanarTrunkParameters& parameters,
                                   ExtractorCounters& counters) {
+  const Segment& segment = segments[index];
   if (segment.size() < static_cast<std::size_t>(std::max(1, parameters.min_points))) {
     ++counters.too_few_points;
     return std::nullopt;
   }
-  if (!stands_alone(segment)) {
+  if (!apart_from_others(scan, segments, index, parameters)) {
     ++counters.not_alone;
     return std::nullopt;
   }
@@ -89,9 +97,10 @@ LandmarkScan LandmarkExtractor::extract(const PlanarScan& scan) {
     return result;
   }
   result.field_of_view = field_of_view(scan, parameters_.planar);
-  for (const Segment& segment : split(scan, parameters_.planar)) {
-    ++counters_.objects;
-    if (auto trunk = to_trunk(scan, segment, parameters_.planar, counters_)) {
+  const std::vector<Segment> segments = split(scan, parameters_.planar);
+  counters_.objects += segments.size();
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    if (const auto trunk = to_trunk(scan, segments, i, parameters_.planar, counters_)) {
       result.detections.push_back(*trunk);
     }
   }

@@ -8,7 +8,7 @@ namespace understory {
 struct PlanarTrunkParameters {
   SE2 vehicle_T_sensor;           ///< Where the laser is in frame `vehicle`.
   double min_range_m = 1.5;       ///< What is nearer is the car itself.
-  double max_range_m = 60.0;      ///< Trunks farther than this are not reported.
+  double max_range_m = 40.0;      ///< Trunks farther than this are not reported.
   double range_sigma_m = 0.03;    ///< Of one beam.
   double beam_width_rad = 0.004;  ///< By how much a beam's footprint widens a trunk on each side.
   double shape_sigma_m = 0.03;    ///< Trunks are no exact cylinders and do not stand upright.
@@ -19,7 +19,9 @@ struct PlanarTrunkParameters {
   double break_distance_m = 0.35;  ///< Neighbouring returns farther apart are two objects...
   double break_per_range = 0.01;   ///< ... plus this much per metre of range.
   double clearance_m = 1.0;        ///< What stands beside a trunk must be so much farther away.
-  int min_points = 2;
+  double separation_m = 2.0;       ///< A trunk's distance to any other object; bushes have less.
+  double line_tolerance_m = 0.25;  ///< What is so near the line between its neighbours is a wall.
+  int min_points = 1;
   double max_mean_square_residual = 6.0;  ///< Of the ranges from the fitted circle, in sigma^2.
 };
 

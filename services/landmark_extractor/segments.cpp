@@ -1,6 +1,9 @@
 #include "services/landmark_extractor/segments.hpp"
 
+#include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 namespace understory {
@@ -37,6 +40,24 @@ void find_borders(const PlanarScan& scan, const PlanarTrunkParameters& parameter
   }
 }
 
+Eigen::Vector2d point(const PlanarScan& scan, std::size_t beam) {
+  const double bearing = scan.bearing(beam);
+  return scan.ranges_m[beam] * Eigen::Vector2d(std::cos(bearing), std::sin(bearing));
+}
+
+double distance(const PlanarScan& scan, const Segment& a, const Segment& b) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = a.first; i <= a.last; ++i) {
+    for (std::size_t j = b.first; j <= b.last; ++j) least = std::min(least, distance(scan, i, j));
+  }
+  return least;
+}
+
+/// Whether the bearing between two beams is so wide that nothing at `range` is within `radius`.
+bool too_wide(const PlanarScan& scan, std::size_t a, std::size_t b, double range, double radius) {
+  return range * std::sin(std::min(1.5, scan.bearing(b) - scan.bearing(a))) > radius;
+}
+
 }  // namespace
 
 std::vector<Segment> split(const PlanarScan& scan, const PlanarTrunkParameters& parameters) {
@@ -59,6 +80,38 @@ std::vector<Segment> split(const PlanarScan& scan, const PlanarTrunkParameters& 
   }
   close();
   return segments;
+}
+
+bool continues_a_line(const PlanarScan& scan, const Segment& segment, double tolerance_m) {
+  if (segment.first == 0 || segment.last + 1 >= scan.ranges_m.size()) return false;
+  const std::size_t before = segment.first - 1;
+  const std::size_t after = segment.last + 1;
+  if (!scan.is_return(before) || !scan.is_return(after)) return false;
+  const Eigen::Vector2d start = point(scan, before);
+  const Eigen::Vector2d along = (point(scan, after) - start).normalized();
+  for (std::size_t beam = segment.first; beam <= segment.last; ++beam) {
+    const Eigen::Vector2d offset = point(scan, beam) - start;
+    if (std::abs(along.x() * offset.y() - along.y() * offset.x()) > tolerance_m) return false;
+  }
+  return true;
+}
+
+double nearest_object(const PlanarScan& scan, const std::vector<Segment>& segments,
+                      std::size_t index, double radius_m) {
+  const Segment& own = segments[index];
+  const double range =
+      *std::min_element(scan.ranges_m.begin() + static_cast<std::ptrdiff_t>(own.first),
+                        scan.ranges_m.begin() + static_cast<std::ptrdiff_t>(own.last) + 1);
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = index; i-- > 0;) {
+    if (too_wide(scan, segments[i].last, own.first, range, radius_m)) break;
+    least = std::min(least, distance(scan, segments[i], own));
+  }
+  for (std::size_t i = index + 1; i < segments.size(); ++i) {
+    if (too_wide(scan, own.last, segments[i].first, range, radius_m)) break;
+    least = std::min(least, distance(scan, own, segments[i]));
+  }
+  return least <= radius_m ? least : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace understory

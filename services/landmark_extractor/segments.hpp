@@ -30,4 +30,14 @@ struct Segment {
 /// All segments in order of bearing.
 std::vector<Segment> split(const PlanarScan& scan, const PlanarTrunkParameters& parameters);
 
+/// Whether the object lies on the straight line between the returns of the beams beside it. So does
+/// every piece of a wall or fence that is seen at a grazing angle and falls apart into single
+/// beams.
+bool continues_a_line(const PlanarScan& scan, const Segment& segment, double tolerance_m);
+
+/// Distance from segments[index] to the nearest other object [m], over their returns; infinity
+/// where nothing else is within `radius_m`.
+double nearest_object(const PlanarScan& scan, const std::vector<Segment>& segments,
+                      std::size_t index, double radius_m);
+
 }  // namespace understory
