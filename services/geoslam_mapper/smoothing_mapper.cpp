@@ -1,0 +1,178 @@
+#include "services/geoslam_mapper/smoothing_mapper.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+/// Keeps an exactly known pose invertible: a micrometre, a microradian.
+const Eigen::Matrix3d kTiny = 1e-12 * Eigen::Matrix3d::Identity();
+
+bool finite(const Keyframe& keyframe) {
+  const auto good = [](const KeyframeLandmark& l) {
+    return l.position_m.allFinite() && l.covariance_m2.allFinite() &&
+           l.covariance_m2.determinant() > 0.0 && l.covariance_m2.trace() > 0.0;
+  };
+  const auto good_member = [](const KeyframeMember& m) {
+    return m.centre_T_vehicle.coordinates().allFinite() && m.covariance.allFinite();
+  };
+  return std::all_of(keyframe.landmarks.begin(), keyframe.landmarks.end(), good) &&
+         std::all_of(keyframe.members.begin(), keyframe.members.end(), good_member);
+}
+
+}  // namespace
+
+SmoothingMapper::SmoothingMapper(const SmoothingMapperParameters& parameters)
+    : parameters_(parameters) {}
+
+std::unique_ptr<MapperMethod> make_smoothing_mapper(const SmoothingMapperParameters& parameters) {
+  return std::make_unique<SmoothingMapper>(parameters);
+}
+
+void SmoothingMapper::add(const Odometry& odometry) {
+  if (parameters_.use_odometry) odometry_.add(odometry);
+}
+
+void SmoothingMapper::start_with(std::span<const MapLandmark> landmarks) {
+  const double sigma2 = parameters_.given_map_sigma_m * parameters_.given_map_sigma_m;
+  for (const MapLandmark& given : landmarks) {
+    StoredLandmark landmark;
+    landmark.position_m = given.position_m;
+    const bool stated = given.covariance_m2.determinant() > 0.0;
+    landmark.prior_covariance =
+        stated ? given.covariance_m2 : Eigen::Matrix2d(sigma2 * Eigen::Matrix2d::Identity());
+    landmark.information = 2.0 / landmark.prior_covariance.trace();
+    landmark.radius_m = given.radius_m;
+    landmark.times_seen = given.times_seen;
+    landmark.kind = given.kind;
+    if (given.id != 0) {
+      landmark.id = given.id;
+      store_.restore(landmark);
+      store_.set_next_id(std::max(store_.next_id(), given.id + 1));
+    } else {
+      store_.insert(landmark);
+    }
+  }
+  map_was_given_ = map_was_given_ || !landmarks.empty();
+}
+
+std::string SmoothingMapper::malformed(const Keyframe& keyframe) const {
+  if (keyframe.members.empty()) return "keyframe without members";
+  if (keyframe.utime <= last_utime_ && last_utime_ != 0)
+    return "keyframe not later than the last one";
+  if (!finite(keyframe))
+    return "keyframe with a value that is not finite or a covariance that is not positive";
+  return {};
+}
+
+/// One keyframe, from arrival to answer.
+MapUpdate SmoothingMapper::add(const Keyframe& keyframe) {
+  MapUpdate update;
+  update.keyframe_sequence = keyframe.sequence;
+  update.utime = keyframe.utime;
+  update.reason = malformed(keyframe);
+  if (!update.reason.empty()) return update;
+  last_utime_ = keyframe.utime;
+
+  if (store_.empty() && nodes_.empty()) {
+    start_map(keyframe, update);
+    return update;
+  }
+  const std::optional<Prediction> prediction = predict(keyframe);
+  std::optional<Placement> placement;
+  if (prediction) placement = track(keyframe, *prediction);
+  if (!placement) placement = search(keyframe, update);
+  if (!placement) {
+    update.status = MapUpdateStatus::kNotSure;
+    if (prediction)
+      map_T_last_base_ = compound(prediction->map_T_centre,
+                                  {keyframe.centre_T_base(), keyframe.members.front().covariance});
+    return update;
+  }
+  update.used_prior = placement->by_prediction;
+  update.inliers = static_cast<std::uint32_t>(placement->associations.size());
+  if (!fuse(keyframe, *placement, update)) {
+    update.status = MapUpdateStatus::kRolledBack;
+    return update;
+  }
+  update.status = MapUpdateStatus::kUpdated;
+  return update;
+}
+
+/// The first keyframe's base is the origin of the map: x_0 is fixed, its centre is known as well as
+/// the keyframe tells.
+void SmoothingMapper::start_map(const Keyframe& keyframe, MapUpdate& update) {
+  if (keyframe.landmarks.size() < 3 && !parameters_.use_odometry) {
+    update.status = MapUpdateStatus::kNotSure;
+    update.reason = "too few landmarks to start a map";
+    return;
+  }
+  const SE2WithCovariance centre_T_base{keyframe.centre_T_base(),
+                                        keyframe.members.front().covariance};
+  const SE2WithCovariance base_T_centre = inverse(centre_T_base);
+  const NodeIndex node = add_node(base_T_centre.mean);
+  smoother_.graph().pose_priors.push_back(
+      {nodes_[node].centre, base_T_centre.mean, (base_T_centre.covariance + kTiny).inverse()});
+  bases_.push_back({node, keyframe.sequence, keyframe.utime, centre_T_base, true});
+  ++keyframes_;
+  discover(keyframe, node, update);
+  const SmootherUpdate solved = smoother_.update();
+  if (!solved.ok) update.reason = solved.error;
+  finish(keyframe, update);
+  update.status = MapUpdateStatus::kFirstMap;
+}
+
+SE2WithCovariance SmoothingMapper::base_pose(const Base& base) const {
+  if (base.is_origin) return {};
+  const PoseId centre = nodes_[base.node].centre;
+  return compound({smoother_.graph()[centre], Eigen::Matrix3d::Zero()}, base.centre_T_base);
+}
+
+/// What every accepted keyframe leaves behind. Its base is bases_.back().
+void SmoothingMapper::finish(const Keyframe& keyframe, MapUpdate& update) {
+  const Base& base = bases_.back();
+  const PoseId centre = nodes_[base.node].centre;
+  SE2WithCovariance map_T_centre{smoother_.graph()[centre], Eigen::Matrix3d::Zero()};
+  const auto marginal = smoother_.joint_marginal({&centre, 1}, {});
+  if (marginal) map_T_centre.covariance = *marginal;
+  const SE2WithCovariance map_T_base =
+      base.is_origin ? SE2WithCovariance{} : compound(map_T_centre, base.centre_T_base);
+  update.map_T_vehicle = map_T_base.mean;
+  update.covariance = map_T_base.covariance;
+  const KeyframeMember& last = keyframe.members.back();
+  // A folded keyframe's members are given in its own centre; the base ties that to the node's.
+  const SE2 node_T_keyframe = base.centre_T_base.mean * keyframe.centre_T_base().inverse();
+  const SE2WithCovariance centre_T_last{node_T_keyframe * last.centre_T_vehicle, last.covariance};
+  update.map_T_latest_vehicle = map_T_centre.mean * centre_T_last.mean;
+  last_member_ = LastMember{base.node, last.utime, centre_T_last};
+  map_T_last_base_ = map_T_base;
+  odometry_.forget_before(last.utime);
+}
+
+std::vector<KeyframePose> SmoothingMapper::trajectory() const {
+  std::vector<KeyframePose> result;
+  result.reserve(bases_.size());
+  for (const Base& base : bases_) {
+    result.push_back({base.sequence, base.utime, base_pose(base).mean, Eigen::Matrix3d::Zero()});
+  }
+  return result;
+}
+
+std::vector<MapLandmark> SmoothingMapper::landmarks() const {
+  std::vector<MapLandmark> result;
+  result.reserve(store_.all().size());
+  for (const auto& [id, landmark] : store_.all()) {
+    MapLandmark out;
+    out.id = id;
+    out.position_m = landmark.point ? smoother_.graph()[*landmark.point] : landmark.position_m;
+    out.radius_m = landmark.radius_m;
+    out.times_seen = landmark.times_seen;
+    out.kind = landmark.kind;
+    result.push_back(out);
+  }
+  return result;
+}
+
+}  // namespace understory

@@ -1,0 +1,111 @@
+// Our mapper: gated association around a prediction, search where that fails, all keyframes and
+// landmarks in one graph.
+#pragma once
+
+#include "common/factor_graph/smoother.hpp"
+#include "common/model/odometry_buffer.hpp"
+#include "services/geoslam_mapper/geoslam_mapper.hpp"
+#include "services/geoslam_mapper/landmark_store.hpp"
+
+namespace understory {
+
+class SmoothingMapper final : public MapperMethod {
+ public:
+  explicit SmoothingMapper(const SmoothingMapperParameters& parameters);
+
+  MapUpdate add(const Keyframe& keyframe) override;
+  void add(const Odometry& odometry) override;
+  void start_with(std::span<const MapLandmark> landmarks) override;
+  std::vector<KeyframePose> trajectory() const override;
+  std::vector<MapLandmark> landmarks() const override;
+  std::string save() const override;
+  void load(const std::string& state) override;
+
+ private:
+  /// A place in the graph: the centre of one keyframe, or of several that were folded together.
+  struct Node {
+    PoseId centre{};
+    std::map<LandmarkId, std::uint32_t>
+        observations;  ///< Index of each landmark's factor in the graph.
+  };
+  /// A keyframe's base, rigidly tied to a node (a leaf of the graph: nothing else measures it).
+  struct Base {
+    NodeIndex node = 0;
+    std::uint64_t sequence = 0;
+    Utime utime = 0;
+    SE2WithCovariance centre_T_base;  ///< `centre` of the node.
+    bool is_origin = false;           ///< The gauge: known exactly.
+  };
+  /// Where a keyframe is, and which of its landmarks are which.
+  struct Placement {
+    SE2WithCovariance map_T_centre;
+    std::vector<Association> associations;
+    bool by_prediction = false;
+  };
+  struct Prediction {
+    SE2WithCovariance map_T_centre;
+    bool from_odometry = false;
+  };
+
+  // smoothing_mapper.cpp: the story of one keyframe.
+  std::string malformed(const Keyframe& keyframe) const;
+  void start_map(const Keyframe& keyframe, MapUpdate& update);
+  void finish(const Keyframe& keyframe, MapUpdate& update);
+  SE2WithCovariance base_pose(const Base& base) const;
+
+  // smoothing_mapper_place.cpp: where is it?
+  std::optional<Prediction> predict(const Keyframe& keyframe) const;
+  std::optional<Placement> track(const Keyframe& keyframe, const Prediction& prediction) const;
+  std::optional<Placement> search(const Keyframe& keyframe, MapUpdate& update) const;
+  Placement associate(const Keyframe& keyframe, const SE2WithCovariance& guess) const;
+  std::vector<LandmarkId> landmarks_in_view(const Keyframe& keyframe,
+                                            const SE2WithCovariance& guess) const;
+  std::vector<double> relative_variances(const std::vector<LandmarkId>& ids) const;
+  std::size_t matchable(const Keyframe& keyframe, const Placement& placement) const;
+
+  // smoothing_mapper_fuse.cpp: what does it add?
+  bool fuse(const Keyframe& keyframe, const Placement& placement, MapUpdate& update);
+  NodeIndex add_node(const SE2& map_T_centre);
+  std::optional<NodeIndex> foldable(const Keyframe& keyframe, const Placement& placement) const;
+  Keyframe in_frame_of(NodeIndex node, const Keyframe& keyframe, const Placement& placement) const;
+  void observe(NodeIndex node, const KeyframeLandmark& seen, LandmarkId id);
+  void put_into_graph(StoredLandmark& landmark);
+  std::optional<SE2WithCovariance> motion_since_last(Utime utime) const;
+  void add_motion(const Keyframe& keyframe, NodeIndex node);
+  bool solve(NodeIndex node, MapUpdate& update);
+  void count_sightings(const Keyframe& keyframe, NodeIndex node, const MapUpdate& update);
+
+  // smoothing_mapper_discover.cpp: new landmarks, and two that are one.
+  void discover(const Keyframe& keyframe, NodeIndex node, MapUpdate& update);
+  Candidate* matching_candidate(const Eigen::Vector2d& position, const KeyframeLandmark& seen);
+  void promote(const Candidate& candidate, MapUpdate& update);
+  void forget_stale_candidates();
+  void merge_doubles(MapUpdate& update);
+  void take_over(LandmarkId old_id, LandmarkId new_id);
+  void adopt_estimates();
+
+  SmoothingMapperParameters parameters_;
+  Smoother smoother_;
+  LandmarkStore store_;
+  std::vector<Candidate> candidates_;
+  std::vector<Node> nodes_;
+  std::vector<Base> bases_;
+  OdometryBuffer odometry_;
+  bool map_was_given_ = false;
+  std::uint32_t keyframes_ = 0;  ///< Accepted.
+  /// The last accepted keyframe's last member: odometry goes on from here. Frame: the node's
+  /// centre.
+  struct LastMember {
+    NodeIndex node = 0;
+    Utime utime = 0;
+    SE2WithCovariance centre_T_vehicle;
+  };
+  std::optional<LastMember> last_member_;
+  /// The last keyframe's base, accepted or not: where it is, or is thought to be.
+  std::optional<SE2WithCovariance> map_T_last_base_;
+  Utime last_utime_ = 0;
+};
+
+std::unique_ptr<MapperMethod> make_smoothing_mapper(const SmoothingMapperParameters& parameters);
+
+}  // namespace understory

@@ -1,0 +1,148 @@
+// New landmarks (in the place of algorithm 5), and pairs of landmarks that turn out to be one.
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "services/geoslam_mapper/smoothing_mapper.hpp"
+
+namespace understory {
+namespace {
+
+/// Two landmarks further apart than this are never one [m].
+constexpr double kMaxMergeDistance_m = 2.0;
+
+bool share_a_node(const StoredLandmark& a, const StoredLandmark& b) {
+  std::vector<NodeIndex> common;
+  std::set_intersection(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(),
+                        std::back_inserter(common));
+  return !common.empty();
+}
+
+}  // namespace
+
+/// Every landmark of the keyframe that was not recognised becomes a candidate, or a further
+/// sighting of one. A candidate with enough sightings enters the map with all of them: nothing that
+/// was measured is lost.
+void SmoothingMapper::discover(const Keyframe& keyframe, NodeIndex node, MapUpdate& update) {
+  std::vector<bool> known(keyframe.landmarks.size(), false);
+  for (const Association& pair : update.associations) known[pair.keyframe_landmark] = true;
+  const SE2 map_T_centre = smoother_.graph()[nodes_[node].centre];
+  for (Candidate& candidate : candidates_) {
+    const Candidate::Sighting& latest = candidate.sightings.back();
+    candidate.position_m =
+        smoother_.graph()[nodes_[latest.node].centre] * latest.landmark.position_m;
+  }
+  for (std::size_t i = 0; i < keyframe.landmarks.size(); ++i) {
+    if (known[i]) continue;
+    const KeyframeLandmark& seen = keyframe.landmarks[i];
+    const Eigen::Vector2d position = map_T_centre * seen.position_m;
+    Candidate* candidate = matching_candidate(position, seen);
+    if (candidate == nullptr) {
+      candidates_.push_back({position, {}, 0, keyframes_, seen.kind});
+      candidate = &candidates_.back();
+    }
+    if (!candidate->sightings.empty() && candidate->sightings.back().node == node) continue;
+    candidate->sightings.push_back({node, seen});
+    candidate->times_seen += seen.times_seen;
+    candidate->position_m = position;
+    if (candidate->times_seen < static_cast<std::uint32_t>(parameters_.min_sightings)) continue;
+    promote(*candidate, update);
+    update.associations.push_back({static_cast<std::uint32_t>(i), update.added.back()});
+    candidates_.erase(candidates_.begin() + (candidate - candidates_.data()));
+  }
+  forget_stale_candidates();
+}
+
+Candidate* SmoothingMapper::matching_candidate(const Eigen::Vector2d& position,
+                                               const KeyframeLandmark& seen) {
+  const double sigma = std::sqrt(0.5 * seen.covariance_m2.trace());
+  double best = parameters_.gate_sigmas * std::sqrt(2.0) * sigma + 0.1;
+  Candidate* result = nullptr;
+  for (Candidate& candidate : candidates_) {
+    const double distance = (candidate.position_m - position).norm();
+    if (candidate.kind != seen.kind || distance >= best) continue;
+    best = distance;
+    result = &candidate;
+  }
+  return result;
+}
+
+void SmoothingMapper::promote(const Candidate& candidate, MapUpdate& update) {
+  StoredLandmark landmark;
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (const Candidate::Sighting& sighting : candidate.sightings) {
+    const double weight = 2.0 / sighting.landmark.covariance_m2.trace();
+    sum +=
+        weight * (smoother_.graph()[nodes_[sighting.node].centre] * sighting.landmark.position_m);
+    landmark.information += weight;
+    landmark.radius_m +=
+        sighting.landmark.radius_m / static_cast<double>(candidate.sightings.size());
+    landmark.nodes.push_back(sighting.node);
+  }
+  landmark.position_m = sum / landmark.information;
+  landmark.times_seen = candidate.times_seen;
+  landmark.last_keyframe = keyframes_;
+  landmark.kind = candidate.kind;
+  std::sort(landmark.nodes.begin(), landmark.nodes.end());
+  landmark.point = smoother_.graph().add_point(landmark.position_m);
+  const LandmarkId id = store_.insert(landmark);
+  for (const Candidate::Sighting& sighting : candidate.sightings)
+    observe(sighting.node, sighting.landmark, id);
+  update.added.push_back(id);
+}
+
+void SmoothingMapper::forget_stale_candidates() {
+  std::erase_if(candidates_, [&](const Candidate& candidate) {
+    return candidate.first_keyframe + static_cast<std::uint32_t>(parameters_.candidate_keyframes) <
+           keyframes_;
+  });
+}
+
+/// Two landmarks within each other's noise that no place ever saw side by side are one: the younger
+/// is taken over by the older.
+void SmoothingMapper::merge_doubles(MapUpdate& update) {
+  std::vector<LandmarkId> touched = update.added;
+  for (const Association& pair : update.associations) touched.push_back(pair.landmark_id);
+  std::sort(touched.begin(), touched.end());
+  touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
+  for (const LandmarkId id : touched) {
+    if (!store_.all().contains(id)) continue;
+    const StoredLandmark& landmark = store_.at(id);
+    std::vector<LandmarkId> near = store_.index().near({landmark.position_m, kMaxMergeDistance_m});
+    for (const LandmarkId other_id : near) {
+      if (other_id == id || !store_.all().contains(other_id)) continue;
+      const StoredLandmark& other = store_.at(other_id);
+      const double sigma = std::sqrt(landmark.local_variance() + other.local_variance());
+      const double gate = std::min(kMaxMergeDistance_m, parameters_.gate_sigmas * sigma + 0.1);
+      if (!landmark.point || !other.point || landmark.kind != other.kind) continue;
+      if ((landmark.position_m - other.position_m).norm() > gate || share_a_node(landmark, other))
+        continue;
+      const auto [keep, drop] = std::minmax(id, other_id);
+      take_over(drop, keep);
+      update.merged.emplace_back(drop, keep);
+      break;
+    }
+  }
+}
+
+void SmoothingMapper::take_over(LandmarkId old_id, LandmarkId new_id) {
+  StoredLandmark& old_one = store_.at(old_id);
+  StoredLandmark& new_one = store_.at(new_id);
+  for (const NodeIndex node : old_one.nodes) {
+    auto handle = nodes_[node].observations.extract(old_id);
+    if (handle.empty()) continue;
+    smoother_.graph().observations[handle.mapped()].point = *new_one.point;
+    handle.key() = new_id;
+    nodes_[node].observations.insert(std::move(handle));
+  }
+  std::vector<NodeIndex> nodes;
+  std::merge(old_one.nodes.begin(), old_one.nodes.end(), new_one.nodes.begin(), new_one.nodes.end(),
+             std::back_inserter(nodes));
+  new_one.nodes = std::move(nodes);
+  new_one.information += old_one.information;
+  new_one.times_seen += old_one.times_seen;
+  new_one.last_keyframe = std::max(new_one.last_keyframe, old_one.last_keyframe);
+  store_.remove(old_id);
+}
+
+}  // namespace understory

@@ -1,0 +1,203 @@
+// What does a keyframe add to the graph?
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "services/geoslam_mapper/smoothing_mapper.hpp"
+
+namespace understory {
+namespace {
+
+/// Degrees of freedom below which a ratio of chi^2 says nothing.
+constexpr std::uint32_t kMinDegreesOfFreedom = 8;
+
+}  // namespace
+
+NodeIndex SmoothingMapper::add_node(const SE2& map_T_centre) {
+  nodes_.push_back({smoother_.graph().add_pose(map_T_centre), {}});
+  return static_cast<NodeIndex>(nodes_.size() - 1);
+}
+
+/// A landmark of a given map enters the graph with its prior when it is first observed (thesis
+/// §4.3.1).
+void SmoothingMapper::put_into_graph(StoredLandmark& landmark) {
+  if (landmark.point) return;
+  landmark.point = smoother_.graph().add_point(landmark.position_m);
+  smoother_.graph().point_priors.push_back(
+      {*landmark.point, landmark.position_m, landmark.prior_covariance.inverse()});
+}
+
+/// A second sighting from the same node is averaged into the first by information.
+void SmoothingMapper::observe(NodeIndex node, const KeyframeLandmark& seen, LandmarkId id) {
+  const Eigen::Matrix2d information = seen.covariance_m2.inverse();
+  std::vector<PointObservation>& observations = smoother_.graph().observations;
+  const auto [entry, fresh] =
+      nodes_[node].observations.try_emplace(id, static_cast<std::uint32_t>(observations.size()));
+  if (fresh) {
+    observations.push_back(
+        {nodes_[node].centre, *store_.at(id).point, seen.position_m, information});
+    return;
+  }
+  PointObservation& factor = observations[entry->second];
+  const Eigen::Matrix2d sum = factor.information + information;
+  factor.position =
+      sum.inverse() * (factor.information * factor.position + information * seen.position_m);
+  factor.information = sum;
+}
+
+void SmoothingMapper::add_motion(const Keyframe& keyframe, NodeIndex node) {
+  const auto motion = motion_since_last(keyframe.utime);
+  if (!motion || last_member_->node == node) return;
+  const SE2WithCovariance centre_T_base{keyframe.centre_T_base(),
+                                        keyframe.members.front().covariance};
+  const SE2WithCovariance last_T_centre =
+      compound(compound(last_member_->centre_T_vehicle, *motion), inverse(centre_T_base));
+  const Eigen::Matrix3d covariance = last_T_centre.covariance + 1e-12 * Eigen::Matrix3d::Identity();
+  smoother_.graph().relative_poses.push_back({nodes_[last_member_->node].centre,
+                                              nodes_[node].centre, last_T_centre.mean,
+                                              covariance.inverse()});
+}
+
+/// The last node, when the keyframe stands where it stood: nothing new is seen from there.
+std::optional<NodeIndex> SmoothingMapper::foldable(const Keyframe& keyframe,
+                                                   const Placement& placement) const {
+  const SE2 map_T_base = placement.map_T_centre.mean * keyframe.centre_T_base();
+  std::optional<NodeIndex> best;
+  double best_distance = parameters_.fold_distance_m;
+  for (const Base& base : bases_) {
+    const SE2 between = base_pose(base).mean.inverse() * map_T_base;
+    const double distance = between.translation().norm();
+    if (distance > best_distance || std::abs(between.theta()) > parameters_.fold_angle_rad)
+      continue;
+    best = base.node;
+    best_distance = distance;
+  }
+  return best;
+}
+
+/// The keyframe as the node's centre would have seen it: what both saw ties the two frames
+/// together.
+Keyframe SmoothingMapper::in_frame_of(NodeIndex node, const Keyframe& keyframe,
+                                      const Placement& placement) const {
+  const SE2 node_T_keyframe =
+      smoother_.graph()[nodes_[node].centre].inverse() * placement.map_T_centre.mean;
+  const Eigen::Matrix2d rotation = node_T_keyframe.rotation();
+  Keyframe result = keyframe;
+  for (KeyframeLandmark& seen : result.landmarks) {
+    seen.position_m = node_T_keyframe * seen.position_m;
+    seen.covariance_m2 = rotation * seen.covariance_m2 * rotation.transpose();
+  }
+  for (KeyframeMember& member : result.members)
+    member.centre_T_vehicle = node_T_keyframe * member.centre_T_vehicle;
+  return result;
+}
+
+/// Adds the keyframe to the graph and solves it; where the result is inconsistent, everything is
+/// taken back and false returned.
+bool SmoothingMapper::fuse(const Keyframe& arrived, const Placement& placement, MapUpdate& update) {
+  smoother_.checkpoint();
+  const std::vector<Node>::size_type nodes_before = nodes_.size();
+  const std::optional<NodeIndex> fold = foldable(arrived, placement);
+  const Keyframe keyframe = fold ? in_frame_of(*fold, arrived, placement) : arrived;
+  const NodeIndex node = fold ? *fold : add_node(placement.map_T_centre.mean);
+  const Node node_before = nodes_[node];
+  std::vector<LandmarkId> entered;
+  for (const Association& pair : placement.associations) {
+    StoredLandmark& landmark = store_.at(pair.landmark_id);
+    if (!landmark.point) entered.push_back(landmark.id);
+    put_into_graph(landmark);
+    observe(node, keyframe.landmarks[pair.keyframe_landmark], pair.landmark_id);
+  }
+  add_motion(keyframe, node);
+  update.associations = placement.associations;
+  if (!solve(node, update)) {
+    smoother_.rollback();
+    for (const LandmarkId id : entered) store_.at(id).point.reset();
+    if (nodes_.size() > nodes_before) {
+      nodes_.pop_back();
+    } else {
+      nodes_[node] = node_before;
+    }
+    update.associations.clear();
+    return false;
+  }
+  ++keyframes_;
+  bases_.push_back({node,
+                    keyframe.sequence,
+                    keyframe.utime,
+                    {keyframe.centre_T_base(), keyframe.members.front().covariance},
+                    false});
+  count_sightings(keyframe, node, update);
+  adopt_estimates();
+  discover(keyframe, node, update);
+  merge_doubles(update);
+  finish(arrived, update);
+  return true;
+}
+
+/// Solves, takes out single associations that do not fit, and judges what is left.
+bool SmoothingMapper::solve(NodeIndex node, MapUpdate& update) {
+  SmootherUpdate solved = smoother_.update();
+  if (!solved.ok) {
+    update.reason = solved.error;
+    return false;
+  }
+  Graph& graph = smoother_.graph();
+  std::set<LandmarkId> outliers;
+  update.chi2 = 0.0;
+  update.degrees_of_freedom = 0;
+  for (const Association& pair : update.associations) {
+    const double error =
+        chi2(graph, graph.observations[nodes_[node].observations.at(pair.landmark_id)]);
+    if (error > parameters_.outlier_chi2) {
+      outliers.insert(pair.landmark_id);
+    } else {
+      update.chi2 += error;
+      update.degrees_of_freedom += 2;
+    }
+  }
+  if (update.degrees_of_freedom >= kMinDegreesOfFreedom &&
+      update.chi2 > parameters_.max_chi2_ratio * update.degrees_of_freedom) {
+    update.reason = "innovation too large for its covariance";
+    return false;
+  }
+  if (2 * outliers.size() > update.associations.size()) {
+    update.reason = "most associations do not fit";
+    return false;
+  }
+  if (outliers.empty()) return true;
+  // Taken out by giving them no weight: indices of the other factors stay what they are.
+  for (const LandmarkId id : outliers) {
+    const std::uint32_t factor = nodes_[node].observations.at(id);
+    graph.observations[factor].information.setZero();
+    nodes_[node].observations.erase(id);
+  }
+  std::erase_if(update.associations,
+                [&](const Association& pair) { return outliers.contains(pair.landmark_id); });
+  solved = smoother_.update();
+  update.reason = solved.error;
+  return solved.ok;
+}
+
+void SmoothingMapper::count_sightings(const Keyframe& keyframe, NodeIndex node,
+                                      const MapUpdate& update) {
+  for (const Association& pair : update.associations) {
+    const KeyframeLandmark& seen = keyframe.landmarks[pair.keyframe_landmark];
+    StoredLandmark& landmark = store_.at(pair.landmark_id);
+    landmark.times_seen += seen.times_seen;
+    landmark.last_keyframe = keyframes_;
+    landmark.information += 2.0 / seen.covariance_m2.trace();
+    landmark.radius_m +=
+        (seen.radius_m - landmark.radius_m) / static_cast<double>(landmark.nodes.size() + 1);
+    if (landmark.nodes.empty() || landmark.nodes.back() != node) landmark.nodes.push_back(node);
+  }
+}
+
+void SmoothingMapper::adopt_estimates() {
+  for (auto& [id, landmark] : store_.all()) {
+    if (landmark.point) store_.move(id, smoother_.graph()[*landmark.point]);
+  }
+}
+
+}  // namespace understory

@@ -1,0 +1,166 @@
+// Where is this keyframe? By prediction and gating, else by search in the whole map.
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "common/geometry/registration.hpp"
+#include "services/geoslam_mapper/smoothing_mapper.hpp"
+
+namespace understory {
+namespace {
+
+/// Beyond the field of view, so that a landmark at its edge is found whatever the pose's error.
+constexpr double kViewMargin_m = 5.0;
+/// Landmarks whose exact covariance relative to the vehicle is computed at most.
+constexpr std::size_t kMaxExact = 80;
+
+double plane_variance(const KeyframeLandmark& landmark) {
+  return 0.5 * landmark.covariance_m2.trace();
+}
+
+}  // namespace
+
+std::optional<SE2WithCovariance> SmoothingMapper::motion_since_last(Utime utime) const {
+  if (!parameters_.use_odometry || !last_member_) return std::nullopt;
+  return odometry_.between(last_member_->utime, utime);
+}
+
+std::optional<SmoothingMapper::Prediction> SmoothingMapper::predict(
+    const Keyframe& keyframe) const {
+  const SE2WithCovariance base_T_centre =
+      inverse(SE2WithCovariance{keyframe.centre_T_base(), keyframe.members.front().covariance});
+  if (const auto motion = motion_since_last(keyframe.utime)) {
+    const SE2WithCovariance map_T_centre{smoother_.graph()[nodes_[last_member_->node].centre],
+                                         Eigen::Matrix3d::Zero()};
+    const SE2WithCovariance map_T_base =
+        compound(compound(map_T_centre, last_member_->centre_T_vehicle), *motion);
+    return Prediction{compound(map_T_base, base_T_centre), true};
+  }
+  if (!map_T_last_base_ || !keyframe.previous_T_base) return std::nullopt;
+  const double t = parameters_.predicted_sigma_m * parameters_.predicted_sigma_m;
+  const double r = parameters_.predicted_sigma_rad * parameters_.predicted_sigma_rad;
+  const SE2WithCovariance motion{*keyframe.previous_T_base, Eigen::Vector3d(t, t, r).asDiagonal()};
+  return Prediction{
+      compound({map_T_last_base_->mean * motion.mean, motion.covariance}, base_T_centre), false};
+}
+
+std::vector<LandmarkId> SmoothingMapper::landmarks_in_view(const Keyframe& keyframe,
+                                                           const SE2WithCovariance& guess) const {
+  double reach = 0.0;
+  for (const KeyframeLandmark& landmark : keyframe.landmarks) {
+    reach = std::max(reach, landmark.position_m.norm());
+  }
+  const double spread = std::sqrt(guess.covariance.topLeftCorner<2, 2>().trace());
+  return store_.index().near({guess.mean.translation(), reach + kViewMargin_m + 3.0 * spread});
+}
+
+/// Variance [m^2] of each landmark's position relative to the vehicle. What was seen lately shares
+/// the vehicle's error; for the others (a loop is closing) the graph is asked.
+std::vector<double> SmoothingMapper::relative_variances(const std::vector<LandmarkId>& ids) const {
+  std::vector<double> variances;
+  std::vector<std::size_t> old;
+  std::vector<PointId> points;
+  for (const LandmarkId id : ids) {
+    const StoredLandmark& landmark = store_.at(id);
+    variances.push_back(landmark.local_variance());
+    const bool recent =
+        landmark.last_keyframe + static_cast<std::uint32_t>(parameters_.recent_keyframes) >=
+        keyframes_;
+    if (recent || !landmark.point || points.size() >= kMaxExact) continue;
+    old.push_back(variances.size() - 1);
+    points.push_back(*landmark.point);
+  }
+  if (old.empty() || !last_member_) return variances;
+  const PoseId centre = nodes_[last_member_->node].centre;
+  const auto joint = smoother_.joint_marginal({&centre, 1}, points);
+  if (!joint) return variances;
+  const Graph& graph = smoother_.graph();
+  for (std::size_t i = 0; i < old.size(); ++i) {
+    // d(landmark in the vehicle's frame) / d(pose, landmark)
+    PointObservation seen{centre, points[i], Eigen::Vector2d::Zero(), Eigen::Matrix2d::Identity()};
+    const ObservationJacobian j = linearise(graph, seen);
+    const auto at = 3 + 2 * static_cast<Eigen::Index>(i);
+    const Eigen::Matrix2d cross = j.pose * joint->block<3, 2>(0, at) * j.point.transpose();
+    const Eigen::Matrix2d covariance = j.pose * joint->topLeftCorner<3, 3>() * j.pose.transpose() +
+                                       j.point * joint->block<2, 2>(at, at) * j.point.transpose() +
+                                       cross + cross.transpose();
+    variances[old[i]] = std::max(variances[old[i]], 0.5 * covariance.trace());
+  }
+  return variances;
+}
+
+SmoothingMapper::Placement SmoothingMapper::associate(const Keyframe& keyframe,
+                                                      const SE2WithCovariance& guess) const {
+  const std::vector<LandmarkId> ids = landmarks_in_view(keyframe, guess);
+  const std::vector<double> variances = relative_variances(ids);
+  std::vector<UncertainPoint> reference;
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    reference.push_back({store_.at(ids[i]).position_m, variances[i]});
+  std::vector<UncertainPoint> observed;
+  for (const KeyframeLandmark& seen : keyframe.landmarks)
+    observed.push_back({seen.position_m, plane_variance(seen)});
+  RegistrationParameters gating;
+  gating.gate_sigmas = parameters_.gate_sigmas;
+  gating.gate_floor_m = parameters_.gate_floor_m;
+  const SE2WithCovariance broad{guess.mean, guess.covariance + 1e-8 * Eigen::Matrix3d::Identity()};
+  const Registration found = register_points(reference, observed, broad, gating);
+  Placement placement{{found.reference_T_observed, found.covariance}, {}, true};
+  for (const PointPair& pair : found.pairs) {
+    if (keyframe.landmarks[pair.observed].kind != store_.at(ids[pair.reference]).kind) continue;
+    placement.associations.push_back({pair.observed, ids[pair.reference]});
+  }
+  return placement;
+}
+
+/// How many of the keyframe's landmarks could be in the map: not more than the map has in the field
+/// of view.
+std::size_t SmoothingMapper::matchable(const Keyframe& keyframe, const Placement& placement) const {
+  std::size_t in_view = 0;
+  const SE2 vehicle_T_map = (placement.map_T_centre.mean * keyframe.centre_T_base()).inverse();
+  const double range = keyframe.field_of_view.max_range_m;
+  store_.index().for_each_within(placement.map_T_centre.mean.translation(), range + kViewMargin_m,
+                                 [&](LandmarkId, const Eigen::Vector2d& position, double) {
+                                   if (keyframe.field_of_view.contains(vehicle_T_map * position))
+                                     ++in_view;
+                                 });
+  return std::min(in_view, keyframe.landmarks.size());
+}
+
+std::optional<SmoothingMapper::Placement> SmoothingMapper::track(
+    const Keyframe& keyframe, const Prediction& prediction) const {
+  Placement placement = associate(keyframe, prediction.map_T_centre);
+  const std::size_t possible = matchable(keyframe, placement);
+  const std::size_t matched = placement.associations.size();
+  const bool enough =
+      static_cast<double>(matched) >= parameters_.min_matched_ratio * static_cast<double>(possible);
+  if (prediction.from_odometry) {
+    if (enough || possible < static_cast<std::size_t>(parameters_.min_matched)) return placement;
+    return std::nullopt;
+  }
+  if (enough && matched >= static_cast<std::size_t>(parameters_.min_matched)) return placement;
+  return std::nullopt;
+}
+
+std::optional<SmoothingMapper::Placement> SmoothingMapper::search(const Keyframe& keyframe,
+                                                                  MapUpdate& update) const {
+  std::vector<ObservedPoint> points;
+  for (const KeyframeLandmark& seen : keyframe.landmarks) {
+    points.push_back({seen.position_m, std::sqrt(plane_variance(seen))});
+  }
+  const Localisation found = store_.index().localise(points);
+  update.candidates = found.hypotheses;
+  update.log10_false_alarm = found.log10_false_alarm;
+  if (!found.found()) {
+    update.reason = describe(found.outcome);
+    return std::nullopt;
+  }
+  Placement placement = associate(keyframe, {found.map_T_sensor, found.covariance});
+  placement.by_prediction = false;
+  if (placement.associations.size() < static_cast<std::size_t>(parameters_.min_matched)) {
+    update.reason = "the place found does not hold on closer look";
+    return std::nullopt;
+  }
+  return placement;
+}
+
+}  // namespace understory
