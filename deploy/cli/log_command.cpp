@@ -9,6 +9,7 @@
 #include "common/io/lcm_log.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/interrupt.hpp"
 #include "deploy/cli/log_statistics.hpp"
 #include "deploy/cli/progress.hpp"
 
@@ -26,12 +27,9 @@ LogContents walk(const std::string& file, const Visit& visit) {
   LogContents contents;
   LcmLogReader reader(file);
   Progress progress("reading " + file, static_cast<double>(reader.size_bytes()));
-  std::uint64_t places = 0;
+  catch_interrupts();
   while (auto event = reader.next()) {
-    if (reader.damage().places != places) {
-      places = reader.damage().places;
-      contents.damage = reader.damage();
-    }
+    throw_if_interrupted();
     contents.statistics.add(*event);
     visit(*event, reader.damage());
     progress.update(static_cast<double>(reader.position_bytes()));
@@ -191,6 +189,8 @@ auto guarded(std::shared_ptr<Options> options, Work work) {
       work(*options);
     } catch (const LogError& error) {
       fail(error.what());
+    } catch (const Interrupted& error) {
+      fail(options->file + ": " + error.what());
     }
   };
 }

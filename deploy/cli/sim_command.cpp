@@ -1,0 +1,191 @@
+// `understory sim`: a simulated drive with ground truth, onto the bus or into a log.
+#include <fmt/format.h>
+
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <set>
+#include <thread>
+
+#include "common/io/lcm_log.hpp"
+#include "common/wire/convert.hpp"
+#include "deploy/cli/commands.hpp"
+#include "deploy/cli/failure.hpp"
+#include "deploy/cli/interrupt.hpp"
+#include "deploy/cli/live_publisher.hpp"
+#include "deploy/cli/progress.hpp"
+#include "sim/drive.hpp"
+#include "understory/ground_truth_t.hpp"
+#include "understory/truth_landmarks_t.hpp"
+
+namespace understory {
+namespace {
+
+struct Options {
+  std::string world;
+  std::string out;
+  std::string lcm_url;
+  std::string path = "circle";
+  sim::DriveParameters drive;
+  std::uint64_t seed = 1;
+  double rate = 1.0;
+};
+
+using Publish = std::function<void(const std::string& channel, Utime utime, const Bytes& bytes)>;
+
+std::string read_file(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) fail(fmt::format("{}: cannot be read", path));
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+sim::Drive make_drive(Options& options) {
+  const auto path = sim::path_kind(options.path);
+  if (!path) wrong_usage(fmt::format("--path {}: no such path", options.path));
+  options.drive.path.kind = *path;
+  if (const auto kind = sim::forest_kind(options.world)) {
+    options.drive.forest = sim::forest_parameters(*kind);
+    return {options.drive, options.seed};
+  }
+  auto stems = sim::parse_stem_map(read_file(options.world));
+  if (!stems.error.empty()) fail(fmt::format("{}: {}", options.world, stems.error));
+  return {options.drive, std::move(stems.forest), options.seed};
+}
+
+/// The trunks that come into range on the way: no map can hold others, and a whole square
+/// kilometre would be a message of half a megabyte.
+truth_landmarks_t truth_landmarks(const sim::Drive& drive) {
+  std::set<std::uint32_t> in_range;
+  for (const auto& pose : drive.world_T_vehicle()) {
+    const auto near = drive.grid().within(pose.translation(), drive.parameters().sensor.range_m);
+    in_range.insert(near.begin(), near.end());
+  }
+  truth_landmarks_t message{};
+  message.utime = drive.utime(0);
+  for (const auto trunk : in_range) {
+    truth_landmark_t landmark{};
+    landmark.id = trunk;
+    landmark.position_m[0] = drive.forest().trunks_m[trunk].x();
+    landmark.position_m[1] = drive.forest().trunks_m[trunk].y();
+    landmark.radius_m = drive.forest().radii_m[trunk];
+    message.landmarks.push_back(landmark);
+  }
+  message.num_landmarks = static_cast<std::int32_t>(message.landmarks.size());
+  return message;
+}
+
+/// Scan k with its truth.
+void publish_scan(const sim::Drive& drive, std::size_t k, const Publish& publish) {
+  const auto simulated = drive.scan(k);
+  ground_truth_t truth{};
+  truth.utime = simulated.scan.utime;
+  truth.seq = static_cast<std::int64_t>(k);
+  truth.world_T_vehicle = to_wire(simulated.world_T_vehicle);
+  publish("GROUND_TRUTH", truth.utime, encode_message(truth));
+  publish("LANDMARKS", simulated.scan.utime, encode_message(simulated.scan));
+}
+
+void write_log(const sim::Drive& drive, const std::string& file) {
+  LcmLogWriter writer(file);
+  const Publish publish = [&](const std::string& channel, Utime utime, const Bytes& bytes) {
+    writer.write(utime, channel, bytes);
+  };
+  Progress progress("simulating", static_cast<double>(drive.size()));
+  publish("TRUTH_LANDMARKS", drive.utime(0), encode_message(truth_landmarks(drive)));
+  for (std::size_t k = 0; k < drive.size(); ++k) {
+    throw_if_interrupted();
+    publish_scan(drive, k, publish);
+    progress.update(static_cast<double>(k + 1));
+  }
+  writer.commit();
+}
+
+void drive_live(const sim::Drive& drive, const Options& options) {
+  LivePublisher bus(options.lcm_url);
+  const Publish publish = [&](const std::string& channel, Utime /*utime*/, const Bytes& bytes) {
+    bus.publish(channel, bytes);
+  };
+  Progress progress("driving", static_cast<double>(drive.size()), Progress::Without::kLines);
+  publish("TRUTH_LANDMARKS", drive.utime(0), encode_message(truth_landmarks(drive)));
+  const auto start = std::chrono::steady_clock::now();
+  for (std::size_t k = 0; k < drive.size(); ++k) {
+    const double elapsed_us = static_cast<double>(drive.utime(k) - drive.utime(0)) / options.rate;
+    std::this_thread::sleep_until(start +
+                                  std::chrono::microseconds(static_cast<std::int64_t>(elapsed_us)));
+    throw_if_interrupted();
+    publish_scan(drive, k, publish);
+    progress.update(static_cast<double>(k + 1));
+  }
+}
+
+void simulate(Options& options) {
+  catch_interrupts();
+  const auto drive = [&] {
+    try {
+      return make_drive(options);
+    } catch (const std::runtime_error& error) {
+      if (dynamic_cast<const CLI::Error*>(&error) != nullptr) throw;
+      fail(fmt::format("sim {} --path {}: {}", options.world, options.path, error.what()));
+    }
+  }();
+  try {
+    if (options.out.empty()) {
+      drive_live(drive, options);
+    } else {
+      write_log(drive, options.out);
+    }
+  } catch (const Interrupted& error) {
+    fail(fmt::format("sim: {}", error.what()));
+  }
+  const double last_s = 1e-6 * static_cast<double>(drive.utime(drive.size() - 1) - drive.utime(0));
+  fmt::print("{} scans in {:.1f} s of driving{}{}\n", drive.size(), last_s,
+             options.out.empty() ? "" : " -> ", options.out);
+}
+
+}  // namespace
+
+void add_sim_command(CLI::App& parent) {
+  auto* command = parent.add_subcommand(
+      "sim", "A simulated drive with ground truth, onto the bus or into a log");
+  auto options = std::make_shared<Options>();
+  command
+      ->add_option("world", options->world,
+                   "dense, intermediate, sparse, or a CSV file with x_m,y_m[,dbh_m]")
+      ->required();
+  command->add_option("--out", options->out, "Write this log instead of sending");
+  command->add_option("--lcm-url", options->lcm_url, "Bus, e.g. udpm://239.255.76.67:7667?ttl=0");
+  command
+      ->add_option("--path", options->path,
+                   "circle, line, figure-eight, square, triangle, double-circle, meander, standing")
+      ->capture_default_str();
+  auto& drive = options->drive;
+  command->add_option("--length", drive.path.length_m, "Of the path [m]")
+      ->check(CLI::Range(1.0, 1e6))
+      ->capture_default_str();
+  command->add_option("--interval", drive.path.interval, "Between scans [m, or rad when turning]")
+      ->check(CLI::Range(1e-3, 100.0))
+      ->capture_default_str();
+  command->add_option("--speed", drive.speed_mps, "Of the vehicle [m/s]")
+      ->check(CLI::Range(1e-3, 100.0))
+      ->capture_default_str();
+  command->add_option("--sensor-range", drive.sensor.range_m, "[m]")
+      ->check(CLI::Range(1.0, 1e3))
+      ->capture_default_str();
+  command
+      ->add_option("--detection", drive.sensor.detection_probability,
+                   "Probability that a landmark in range is seen")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command->add_option("--noise", drive.sensor.position_sigma_m, "Sigma of a position per axis [m]")
+      ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str();
+  command->add_option("--seed", options->seed, "Of forest, start and noise")->capture_default_str();
+  command->add_option("--rate", options->rate, "Live: times faster than the clock")
+      ->check(CLI::Range(1e-3, 1e3))
+      ->capture_default_str();
+  command->callback([options] { simulate(*options); });
+}
+
+}  // namespace understory
