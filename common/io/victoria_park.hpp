@@ -32,8 +32,10 @@ constexpr double kEncoderLeft_m = 0.76;  ///< [H] Of the encoder's wheel, left o
 constexpr double kLaserAhead_m = 3.78;   ///< [L + a] Of the rear axle.
 constexpr double kLaserLeft_m = 0.5;     ///< [b] Of the middle of the car.
 
-/// Where the laser is. Frame `vehicle` of this recording: the middle of the rear axle, x forward.
-inline SE2 vehicle_T_sensor() { return {kLaserAhead_m, kLaserLeft_m, 0.0}; }
+/// Frame `vehicle` of this recording: the laser, x forward, seen from the middle of the rear axle.
+/// The field of view of a scan is a sector around the vehicle, so the vehicle is where the laser
+/// is.
+inline SE2 axle_T_vehicle() { return {kLaserAhead_m, kLaserLeft_m, 0.0}; }
 
 /// Each parser takes the text of its file; `source` names it in errors. Throws DataError.
 std::vector<PlanarScan> parse_laser(std::string_view text, std::string_view source);

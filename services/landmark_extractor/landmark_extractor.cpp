@@ -60,6 +60,13 @@ bool apart_from_others(const PlanarScan& scan, const std::vector<Segment>& segme
          nearest_object(scan, segments, index, parameters.separation_m) > parameters.separation_m;
 }
 
+/// A single beam leaves a radius of nothing possible: thin is what is thin beyond doubt.
+bool trunk_sized(const TrunkFit& fit, const PlanarTrunkParameters& parameters) {
+  const double sigma = std::sqrt(fit.covariance(2, 2));
+  return fit.radius_m + 2.0 * sigma >= parameters.min_radius_m &&
+         fit.radius_m <= parameters.max_radius_m;
+}
+
 std::optional<Detection> to_trunk(const PlanarScan& scan, const std::vector<Segment>& segments,
                                   std::size_t index, const PlanarTrunkParameters& parameters,
                                   ExtractorCounters& counters) {
@@ -73,7 +80,7 @@ std::optional<Detection> to_trunk(const PlanarScan& scan, const std::vector<Segm
     return std::nullopt;
   }
   const auto fit = fit_trunk(scan, segment, parameters);
-  if (!fit || fit->radius_m < parameters.min_radius_m || fit->radius_m > parameters.max_radius_m ||
+  if (!fit || !trunk_sized(*fit, parameters) ||
       fit->mean_square_residual > parameters.max_mean_square_residual) {
     ++counters.not_round;
     return std::nullopt;

@@ -10,7 +10,7 @@ struct PlanarTrunkParameters {
   double min_range_m = 1.5;       ///< What is nearer is the car itself.
   double max_range_m = 40.0;      ///< Trunks farther than this are not reported.
   double range_sigma_m = 0.03;    ///< Of one beam.
-  double beam_width_rad = 0.004;  ///< By how much a beam's footprint widens a trunk on each side.
+  double beam_width_rad = 0.001;  ///< By how much a beam's footprint widens a trunk on each side.
   double shape_sigma_m = 0.03;    ///< Trunks are no exact cylinders and do not stand upright.
   double min_radius_m = 0.02;
   double max_radius_m = 0.8;
