@@ -1,0 +1,96 @@
+// Landmarks -> triangles -> polygons -> descriptors -> index, kept true in place.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/hierarchy/descriptor_index.hpp"
+#include "common/hierarchy/polygon.hpp"
+#include "common/hierarchy/triangulation.hpp"
+
+namespace understory {
+
+struct HierarchyParameters {
+  double descriptor_step = 0.05;         ///< [s] part of the perimeter; 1/30 ... 1/4.
+  double max_descriptor_distance = 2.0;  ///< [tau] the index is fastest for radii up to this.
+};
+
+struct LandmarkPosition {
+  std::uint64_t id = 0;
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
+};
+
+/// The geometric hierarchy of a set of landmarks (GeoSLAM §3.2). A change costs what it touches: a
+/// handful of triangles and the polygons that they belong to (thesis §7.1 asks for this). The
+/// hierarchy depends on the set of landmarks alone, not on its history; only the numbering of
+/// slots, triangles and polygons does.
+class GeometricHierarchy {
+ public:
+  explicit GeometricHierarchy(const HierarchyParameters& parameters = {});
+  /// From many landmarks at once, each polygon made once. Of several with one id the first is
+  /// taken, of several at one place any one; they and those not finite are counted in `refused`, if
+  /// given.
+  explicit GeometricHierarchy(std::span<const LandmarkPosition> landmarks,
+                              const HierarchyParameters& parameters = {},
+                              std::size_t* refused = nullptr);
+
+  ChangeStatus insert(std::uint64_t id, const Eigen::Vector2d& position_m);
+  ChangeStatus remove(std::uint64_t id);
+  ChangeStatus move(std::uint64_t id, const Eigen::Vector2d& position_m);
+  /// Many moves, after which each polygon is made once (the graph has moved the map). Returns one
+  /// status per landmark.
+  std::vector<ChangeStatus> move(std::span<const LandmarkPosition> landmarks);
+
+  const Triangulation& triangulation() const { return triangulation_; }
+  /// By index; those with !exists() are free.
+  std::span<const Polygon> polygons() const { return polygons_; }
+  std::size_t polygon_count() const { return polygons_.size() - free_polygons_.size(); }
+  /// The polygon that a triangle belongs to.
+  std::uint32_t polygon_of(std::uint32_t triangle) const { return polygon_of_[triangle]; }
+  /// Keys are polygon indices.
+  const DescriptorIndex& index() const { return index_; }
+  const HierarchyParameters& parameters() const { return parameters_; }
+
+ private:
+  void note(const TriangulationChange& change);
+  void dissolve(std::uint32_t polygon);
+  void set_loose(std::uint32_t triangle);
+  void remake_polygons();
+  void absorb_neighbours(std::uint32_t triangle);
+  void make_polygon(std::uint32_t first_triangle);
+  void recount_hull_edges();
+
+  HierarchyParameters parameters_;
+  int samples_;
+  Triangulation triangulation_;
+  std::vector<Polygon> polygons_;
+  std::vector<std::uint32_t> free_polygons_;
+  std::vector<std::uint32_t> polygon_of_;  // by triangle
+  DescriptorIndex index_;
+  // Work lists of the change at hand; kept for their memory.
+  std::vector<std::uint32_t> loose_;  // triangles without a polygon, each once
+  std::vector<char> is_loose_;        // by triangle
+  std::vector<std::uint32_t> rim_;
+  TriangulationChange change_;
+  std::vector<Eigen::Vector2d> corners_;
+};
+
+/// An edge of the triangulation, for plots.
+struct HierarchyEdge {
+  std::uint64_t from_id = 0;  ///< from_id < to_id.
+  std::uint64_t to_id = 0;
+  Eigen::Vector2d from_m = Eigen::Vector2d::Zero();
+  Eigen::Vector2d to_m = Eigen::Vector2d::Zero();
+  bool in_polygon_boundary = true;  ///< False: dropped, it lies inside a polygon.
+  bool on_hull = false;
+};
+
+/// Every edge once, in order of ids.
+std::vector<HierarchyEdge> edges(const GeometricHierarchy& hierarchy);
+
+/// Landmark ids along each polygon's boundary, each as Polygon::boundary has it, in lexicographic
+/// order: equal for equal sets of landmarks.
+std::vector<std::vector<std::uint64_t>> polygon_ids(const GeometricHierarchy& hierarchy);
+
+}  // namespace understory

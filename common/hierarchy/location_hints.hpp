@@ -1,0 +1,65 @@
+// Somewhere to start walking from: for a place, a landmark that is probably close by.
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <unordered_map>
+
+namespace understory {
+
+/// Remembers one landmark slot per square cell. An answer is only a hint: it may be stale (the
+/// reader checks that the slot is in use) and decides nothing but the length of a walk.
+class LocationHints {
+ public:
+  void remember(const Eigen::Vector2d& position_m, std::uint32_t slot) {
+    cells_[key(cell(position_m.x()), cell(position_m.y()))] = slot;
+  }
+  /// Takes `slot` out where it is the one remembered for this place; `replacement` takes over.
+  void forget(const Eigen::Vector2d& position_m, std::uint32_t slot,
+              std::optional<std::uint32_t> replacement) {
+    const auto found = cells_.find(key(cell(position_m.x()), cell(position_m.y())));
+    if (found == cells_.end() || found->second != slot) {
+      return;
+    }
+    if (replacement) {
+      found->second = *replacement;
+    } else {
+      cells_.erase(found);
+    }
+  }
+  /// From the place's own cell or one of the eight around it.
+  std::optional<std::uint32_t> near(const Eigen::Vector2d& position_m) const {
+    const std::int64_t x = cell(position_m.x());
+    const std::int64_t y = cell(position_m.y());
+    if (const auto own = cells_.find(key(x, y)); own != cells_.end()) {
+      return own->second;
+    }
+    for (std::int64_t dx = -1; dx <= 1; ++dx) {
+      for (std::int64_t dy = -1; dy <= 1; ++dy) {
+        if (const auto found = cells_.find(key(x + dx, y + dy)); found != cells_.end()) {
+          return found->second;
+        }
+      }
+    }
+    return std::nullopt;
+  }
+
+ private:
+  /// A few tree spacings: most cells of a forest hold a landmark, and the walk from it is short.
+  static constexpr double kCellSize = 16.0;  // [m]
+
+  static std::int64_t cell(double coordinate_m) {
+    constexpr double kLimit = 1e9;  // keeps the conversion defined for any finite coordinate
+    return static_cast<std::int64_t>(
+        std::floor(std::fmin(std::fmax(coordinate_m / kCellSize, -kLimit), kLimit)));
+  }
+  static std::uint64_t key(std::int64_t x, std::int64_t y) {
+    return (static_cast<std::uint64_t>(x) << 32U) ^ (static_cast<std::uint64_t>(y) & 0xffffffffU);
+  }
+
+  std::unordered_map<std::uint64_t, std::uint32_t> cells_;
+};
+
+}  // namespace understory

@@ -1,0 +1,110 @@
+#include "common/hierarchy/polygon.hpp"
+
+#include <algorithm>
+#include <tuple>
+
+namespace understory {
+namespace {
+
+/// Squared length, then ids: a strict order of all edges in which both sides of an edge are equal.
+auto edge_rank(const Triangulation& triangulation, const Triangle& triangle, int edge) {
+  const std::uint32_t a = triangle.vertices[(edge + 1) % 3];
+  const std::uint32_t b = triangle.vertices[(edge + 2) % 3];
+  const std::uint64_t id_a = triangulation.id(a);
+  const std::uint64_t id_b = triangulation.id(b);
+  return std::tuple((triangulation.position(a) - triangulation.position(b)).squaredNorm(),
+                    std::max(id_a, id_b), std::min(id_a, id_b));
+}
+
+int index_in(const Triangle& triangle, std::uint32_t vertex) {
+  return triangle.vertices[0] == vertex ? 0 : (triangle.vertices[1] == vertex ? 1 : 2);
+}
+
+/// Turns the walk so that its sequence of ids is the smallest possible.
+void start_at_smallest(const Triangulation& triangulation, std::vector<std::uint32_t>& walk) {
+  const std::size_t size = walk.size();
+  const auto id = [&](std::size_t start, std::size_t i) {
+    return triangulation.id(walk[(start + i) % size]);
+  };
+  std::size_t best = 0;
+  for (std::size_t start = 1; start < size; ++start) {
+    std::size_t i = 0;
+    while (i < size && id(start, i) == id(best, i)) {
+      ++i;
+    }
+    if (i < size && id(start, i) < id(best, i)) {
+      best = start;
+    }
+  }
+  std::rotate(walk.begin(), walk.begin() + static_cast<std::ptrdiff_t>(best), walk.end());
+}
+
+}  // namespace
+
+int longest_edge(const Triangulation& triangulation, const Triangle& triangle) {
+  int best = 0;
+  for (int edge = 1; edge < 3; ++edge) {
+    if (edge_rank(triangulation, triangle, edge) > edge_rank(triangulation, triangle, best)) {
+      best = edge;
+    }
+  }
+  return best;
+}
+
+bool is_dropped(const Triangulation& triangulation, std::uint32_t index, int edge) {
+  const Triangle& triangle = triangulation.triangles()[index];
+  const std::uint32_t across = triangle.neighbours[edge];
+  if (across == kNone) {
+    return false;
+  }
+  if (longest_edge(triangulation, triangle) == edge) {
+    return true;
+  }
+  const Triangle& neighbour = triangulation.triangles()[across];
+  return neighbour.neighbours[longest_edge(triangulation, neighbour)] == index;
+}
+
+std::vector<std::uint32_t> boundary_of(const Triangulation& triangulation,
+                                       const std::vector<std::uint32_t>& triangles) {
+  // Some edge that is not dropped exists: a tree of n triangles has 3n - 2(n - 1) > 0 of them.
+  std::uint32_t index = triangles.front();
+  int edge = 0;
+  for (const std::uint32_t candidate : triangles) {
+    for (int i = 0; i < 3; ++i) {
+      if (!is_dropped(triangulation, candidate, i)) {
+        index = candidate;
+        edge = i;
+      }
+    }
+  }
+  // Walk: note the start of each boundary edge, then turn about its end to the next one.
+  std::vector<std::uint32_t> walk;
+  const std::size_t length = triangles.size() + 2;
+  walk.reserve(length);
+  while (walk.size() < length) {
+    const Triangle* triangle = &triangulation.triangles()[index];
+    walk.push_back(triangle->vertices[(edge + 1) % 3]);
+    const std::uint32_t end = triangle->vertices[(edge + 2) % 3];
+    edge = (index_in(*triangle, end) + 2) % 3;
+    while (is_dropped(triangulation, index, edge)) {
+      const std::uint32_t across = triangle->neighbours[edge];
+      triangle = &triangulation.triangles()[across];
+      index = across;
+      edge = (index_in(*triangle, end) + 2) % 3;
+    }
+  }
+  start_at_smallest(triangulation, walk);
+  return walk;
+}
+
+std::uint32_t count_hull_edges(const Triangulation& triangulation,
+                               const std::vector<std::uint32_t>& triangles) {
+  std::uint32_t count = 0;
+  for (const std::uint32_t index : triangles) {
+    const auto& neighbours = triangulation.triangles()[index].neighbours;
+    count += static_cast<std::uint32_t>(std::count(neighbours.begin(), neighbours.end(), kNone));
+  }
+  return count;
+}
+
+}  // namespace understory

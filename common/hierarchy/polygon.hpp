@@ -1,0 +1,46 @@
+// Urquhart polygons: what is left of a triangulation without the longest edge of each triangle.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/hierarchy/descriptor.hpp"
+#include "common/hierarchy/triangulation.hpp"
+
+namespace understory {
+
+/// A connected set of triangles across longest edges (GeoSLAM algorithm 1, components merged as in
+/// its published code). The dual of such a set is a tree (lengths never fall along the way and only
+/// two triangles can share their longest edge), so its boundary is one closed walk of triangles + 2
+/// edges; it may pass a landmark, or both sides of an edge, twice.
+struct Polygon {
+  /// Landmark slots along the boundary, counter-clockwise, from the one that makes the sequence of
+  /// ids smallest. Empty where the polygon does not exist.
+  std::vector<std::uint32_t> boundary;
+  std::vector<std::uint32_t> triangles;
+  Descriptor descriptor{};
+  /// Edges on the convex hull. They are where the view ends, not where the forest does.
+  std::uint32_t hull_edges = 0;
+
+  bool exists() const { return !boundary.empty(); }
+  bool touches_hull() const { return hull_edges > 0; }
+};
+
+/// Index (0, 1, 2) of the longest edge of a triangle; of equally long ones the one with the larger
+/// landmark ids, so that neighbours agree.
+int longest_edge(const Triangulation& triangulation, const Triangle& triangle);
+
+/// Whether edge `edge` of triangle `index` lies inside a polygon: it is the longest of a triangle
+/// on one of its two sides and not on the hull.
+bool is_dropped(const Triangulation& triangulation, std::uint32_t index, int edge);
+
+/// Boundary of a connected set of triangles, as Polygon::boundary wants it. Precondition: the set
+/// is complete, i.e. closed under is_dropped.
+std::vector<std::uint32_t> boundary_of(const Triangulation& triangulation,
+                                       const std::vector<std::uint32_t>& triangles);
+
+/// Number of edges of these triangles that lie on the hull.
+std::uint32_t count_hull_edges(const Triangulation& triangulation,
+                               const std::vector<std::uint32_t>& triangles);
+
+}  // namespace understory

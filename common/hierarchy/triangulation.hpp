@@ -1,0 +1,102 @@
+// Delaunay triangulation of landmarks that changes in place.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+namespace understory {
+
+/// What became of a change to a landmark. Everything but kDone leaves the structure as it was.
+enum class ChangeStatus : std::uint8_t {
+  kDone = 0,
+  kIdInUse = 1,     ///< Insertion of an id that is already there.
+  kUnknownId = 2,   ///< Removal or move of an id that is not there.
+  kCoincident = 3,  ///< Another landmark is at exactly this place.
+  kNotFinite = 4,   ///< A coordinate is infinite or not a number.
+};
+
+/// "None": no triangle across this edge (hull), no polygon, no landmark.
+inline constexpr std::uint32_t kNone = 0xffffffffU;
+
+/// A Delaunay triangle, counter-clockwise. Edge i lies opposite vertex i.
+struct Triangle {
+  std::array<std::uint32_t, 3> vertices{kNone, kNone, kNone};    ///< Landmark slots.
+  std::array<std::uint32_t, 3> neighbours{kNone, kNone, kNone};  ///< Across edge i; kNone = hull.
+};
+
+/// The triangles that one change touched, for whoever keeps something per triangle.
+struct TriangulationChange {
+  std::vector<std::uint32_t> removed;  ///< No longer there; their indices may come again in `made`.
+  std::vector<std::uint32_t> made;     ///< New, or of another shape since a vertex moved.
+  std::vector<std::uint32_t> rim;      ///< Unchanged, but with another neighbour across an edge.
+
+  void clear();
+  /// Puts an earlier change before this one. Indices that did not survive the later one are for the
+  /// caller to drop.
+  void prepend(const TriangulationChange& earlier);
+};
+
+/// Delaunay triangulation with insertion, removal and motion of single landmarks, each in time that
+/// does not grow with the map. The result depends on the set of landmarks alone and not on how it
+/// came about: cocircular points are told apart by symbolic perturbation in the lexicographic order
+/// of their coordinates (Devillers & Teillaud 2011). Coordinates are metres in any one frame.
+///
+/// Landmarks and triangles are kept in flat arrays; their indices ("slots") are used again after a
+/// removal, ids never are.
+class Triangulation {
+ public:
+  Triangulation();
+  ~Triangulation();
+  Triangulation(Triangulation&&) noexcept;
+  Triangulation& operator=(Triangulation&&) noexcept;
+  Triangulation(const Triangulation&) = delete;
+  Triangulation& operator=(const Triangulation&) = delete;
+
+  /// Each replaces `change` by what it touched.
+  ChangeStatus insert(std::uint64_t id, const Eigen::Vector2d& position_m,
+                      TriangulationChange& change);
+  ChangeStatus remove(std::uint64_t id, TriangulationChange& change);
+  ChangeStatus move(std::uint64_t id, const Eigen::Vector2d& position_m,
+                    TriangulationChange& change);
+
+  std::size_t landmark_count() const { return slot_of_id_.size(); }
+  std::size_t triangle_count() const { return triangles_.size() - free_triangles_.size(); }
+  /// All triangles by index; a free one has vertices of kNone.
+  std::span<const Triangle> triangles() const { return triangles_; }
+  bool is_triangle(std::uint32_t index) const { return triangles_[index].vertices[0] != kNone; }
+
+  std::optional<std::uint32_t> slot(std::uint64_t id) const;
+  std::uint64_t id(std::uint32_t slot) const { return ids_[slot]; }
+  const Eigen::Vector2d& position(std::uint32_t slot) const { return positions_[slot]; }
+  /// One past the largest slot in use.
+  std::size_t slot_count() const { return ids_.size(); }
+  bool is_landmark(std::uint32_t slot) const;
+  /// The slot of the landmark nearest to a place (ties: whichever is found first); none if empty.
+  std::optional<std::uint32_t> nearest(const Eigen::Vector2d& position_m) const;
+
+ private:
+  struct Impl;
+  friend struct Impl;
+
+  std::uint32_t allocate_slot(std::uint64_t id, const Eigen::Vector2d& position_m);
+  void release_slot(std::uint32_t slot);
+
+  std::unique_ptr<Impl> impl_;
+  std::vector<Triangle> triangles_;
+  std::vector<std::uint32_t> free_triangles_;
+  std::vector<std::uint64_t> ids_;
+  std::vector<Eigen::Vector2d> positions_;
+  std::vector<std::uint32_t> free_slots_;
+  std::unordered_map<std::uint64_t, std::uint32_t> slot_of_id_;
+};
+
+/// Order along a space-filling curve in which many insertions are fast.
+std::vector<std::uint32_t> insertion_order(std::span<const Eigen::Vector2d> positions_m);
+
+}  // namespace understory
