@@ -124,7 +124,14 @@ class BlockAdjuster {
   }
 
   double step() {
-    const Eigen::VectorXd delta = -factorised().solve(gradient_);
+    Eigen::VectorXd delta = -factorised().solve(gradient_);
+    // Weights turn with their members, which the linearisation leaves out: where they are not
+    // isotropic, a trace of common motion remains and would never settle.
+    Eigen::Vector3d common = Eigen::Vector3d::Zero();
+    for (std::size_t k = 0; k < members_; ++k) {
+      common += delta.segment<3>(3 * static_cast<Eigen::Index>(k));
+    }
+    delta -= (common / static_cast<double>(members_)).replicate(dimension() / 3, 1);
     for (std::size_t i = 0; i < landmarks_; ++i) {
       Eigen::Vector2d right = -landmark_gradient_[i];
       for (const Coupling& c : coupling_[i]) {
