@@ -125,6 +125,14 @@ std::vector<HierarchyMatches::Match> HierarchyMatches::match_triangles(const Pol
   return matches;
 }
 
+std::vector<std::pair<std::uint32_t, std::uint32_t>> HierarchyMatches::polygons() const {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+  for (const PolygonMatch& match : matches_) {
+    pairs.emplace_back(match.polygon.local, match.polygon.other);
+  }
+  return pairs;
+}
+
 std::vector<PointMatch> HierarchyMatches::points(double max_descriptor_distance) const {
   std::vector<PointMatch> pairs;
   // The source's filter of duplicates orders each pair, although the two numbers count different

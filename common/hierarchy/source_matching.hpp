@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "common/hierarchy/source_hierarchy.hpp"
@@ -30,6 +31,8 @@ class HierarchyMatches {
 
   /// Landmark pairs with threshold `max_descriptor_distance` [tau] <= the constructor's.
   std::vector<PointMatch> points(double max_descriptor_distance) const;
+  /// Numbers of the matched polygons, in both hierarchies.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> polygons() const;
 
  private:
   struct Match {

@@ -107,7 +107,8 @@ NormalEquations assemble(const Graph& graph) {
   return equations;
 }
 
-/// Takes the landmarks out of the poses' equations (Schur complement).
+/// Takes the landmarks out of the poses' equations (Schur complement). Only blocks on and below the
+/// diagonal are kept up: the factorisation reads no others.
 void eliminate_landmarks(NormalEquations& equations) {
   for (std::size_t l = 0; l < equations.couplings.size(); ++l) {
     const auto& blocks = equations.couplings[l];
@@ -116,6 +117,9 @@ void eliminate_landmarks(NormalEquations& equations) {
       const Eigen::Matrix<double, 3, 2> scaled = a / equations.landmark_weights[l];
       equations.pose_gradient.segment<3>(i) -= scaled * equations.landmark_gradients[l];
       for (const auto& [second, b] : blocks) {
+        if (second > first) {
+          break;
+        }
         const Eigen::Index j = 3 * static_cast<Eigen::Index>(second);
         equations.poses.block<3, 3>(i, j) -= scaled * b.transpose();
       }
