@@ -1,0 +1,42 @@
+// Messages that wait for their handlers: bounded per subscription, handed out in order of arrival.
+#pragma once
+
+#include <deque>
+#include <string>
+#include <vector>
+
+#include "common/bus/bus.hpp"
+
+namespace understory {
+
+class DispatchQueue {
+ public:
+  void subscribe(std::string_view channel, std::size_t queue_size, Bus::Handler handler);
+  /// For every subscription of the channel; the oldest makes room.
+  void push(std::string_view channel, std::span<const std::uint8_t> bytes,
+            std::int64_t received_us);
+  /// Calls one handler; false = nothing waits.
+  bool handle_one();
+  bool empty() const { return waiting_ == 0; }
+  std::uint64_t dropped(std::string_view channel) const;
+
+ private:
+  struct Waiting {
+    std::uint64_t ticket = 0;  // counts arrivals over all subscriptions
+    std::int64_t received_us = 0;
+    std::vector<std::uint8_t> bytes;
+  };
+  struct Subscription {
+    std::string channel;
+    std::size_t queue_size = 0;
+    Bus::Handler handler;
+    std::deque<Waiting> queue;
+    std::uint64_t dropped = 0;
+  };
+
+  std::deque<Subscription> subscriptions_;  // a deque: handlers may subscribe while one runs
+  std::uint64_t next_ticket_ = 0;
+  std::size_t waiting_ = 0;
+};
+
+}  // namespace understory

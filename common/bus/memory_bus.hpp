@@ -1,0 +1,34 @@
+// A bus within one process: for tests and for replay. Deterministic: no clock, no thread.
+#pragma once
+
+#include "common/bus/bus.hpp"
+#include "common/bus/dispatch_queue.hpp"
+
+namespace understory {
+
+class MemoryBus : public Bus {
+ public:
+  /// Whether subscriptions' queues are as long as they ask for, or lose nothing.
+  enum class Queues : std::uint8_t { kBounded, kUnlimited };
+
+  /// `tap` sees every message as it is published, before anybody handles it.
+  explicit MemoryBus(Queues queues = Queues::kBounded, Handler tap = {})
+      : queues_(queues), tap_(std::move(tap)) {}
+
+  std::optional<Refusal> publish(std::string_view channel,
+                                 std::span<const std::uint8_t> bytes) override;
+  void subscribe(std::string_view channel, std::size_t queue_size, Handler handler) override;
+  /// Never waits: what will come can only come from this process.
+  bool handle_one(int timeout_ms) override;
+  std::uint64_t dropped(std::string_view channel) const override;
+
+  /// Hands out until nothing waits.
+  void drain();
+
+ private:
+  Queues queues_;
+  Handler tap_;
+  DispatchQueue queue_;
+};
+
+}  // namespace understory

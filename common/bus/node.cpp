@@ -1,0 +1,228 @@
+#include "common/bus/node.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <stdexcept>
+
+#include "understory/config_t.hpp"
+#include "understory/log_t.hpp"
+
+namespace understory {
+
+Node::Node(Bus& bus, NodeOptions options, Clock clock)
+    : bus_(bus),
+      options_(std::move(options)),
+      computer_clock_(std::move(clock)),
+      clock_(options_.largest_clock_jump_us),
+      monitor_(options_.process, options_.version, computer_clock_) {}
+
+void Node::add_input(const std::string& channel, Take take, SubscribeOptions options) {
+  const auto& suffixed = options_.suffixed_inputs;
+  const bool has_suffix = std::find(suffixed.begin(), suffixed.end(), channel) != suffixed.end();
+  auto input = std::make_unique<Input>();
+  input->channel = channel + (has_suffix ? options_.channel_suffix : "");
+  input->options = options;
+  input->take = std::move(take);
+  if (takes(input->channel)) throw std::logic_error(channel + " is subscribed twice");
+  input->health = monitor_.add_channel(input->channel, false);
+  inputs_.push_back(std::move(input));
+}
+
+std::size_t Node::add_output(const std::string& channel) {
+  const std::string name = channel + options_.channel_suffix;
+  if (const auto refusal = check_publishable(name, 0)) throw std::logic_error(refusal->detail);
+  outputs_.push_back({name, 0, monitor_.add_channel(name, true)});
+  return outputs_.size() - 1;
+}
+
+void Node::every(Utime period_us, std::function<void(Utime)> handler) {
+  if (period_us <= 0) throw std::logic_error("a tick needs a period");
+  timers_.push_back({period_us, -1, std::move(handler)});
+}
+
+void Node::connect() {
+  for (const auto& input : inputs_) {
+    bus_.subscribe(input->channel, input->options.queue_size,
+                   [this, raw = input.get()](const BusMessage& message) { handle(*raw, message); });
+  }
+  monitor_.ready();
+}
+
+bool Node::feed(const BusMessage& message) {
+  for (const auto& input : inputs_) {
+    if (input->channel != message.channel) continue;
+    handle(*input, message);
+    return true;
+  }
+  return false;
+}
+
+void Node::handle(Input& input, const BusMessage& message) {
+  std::optional<Refusal> refusal;
+  try {
+    refusal = input.take(message.bytes, [&] { return admit(input, message); });
+  } catch (const std::exception& error) {
+    report(Reason::kStageFailed, error.what(), input.channel);
+  }
+  if (refusal) report(refusal->reason, refusal->detail, input.channel);
+  if (message.received_us != 0) {
+    monitor_.count_latency(computer_clock_.wall_us() - message.received_us);
+  }
+  if (!is_recovering_) snapshot_when_due();
+}
+
+bool Node::admit(Input& input, const BusMessage& message) {
+  const MessageHeader header = *header_of(message.bytes);
+  if (input.options.sequenced) {
+    if (!admit_time(input, header.utime)) return false;
+    const Arrival arrival = input.sequence.take(header.sequence, header.utime);
+    monitor_.set_sequence(input.health, input.sequence.counts());
+    if (arrival == Arrival::kDuplicate) {
+      report(Reason::kDuplicate, "seq " + std::to_string(header.sequence), input.channel);
+      return false;
+    }
+    if (arrival == Arrival::kLate) {
+      report(Reason::kLate, "seq " + std::to_string(header.sequence), input.channel);
+      return false;
+    }
+    fire_timers(clock_.now());
+  }
+  monitor_.count_message(input.health, header.utime);
+  if (store_ != nullptr && !is_recovering_ && input.options.journaled) {
+    ++events_since_snapshot_;
+    if (!store_->needs_snapshot()) {
+      if (const auto refusal = store_->append(input.channel, message.bytes)) {
+        report(refusal->reason, refusal->detail);
+      }
+    }
+  }
+  return true;
+}
+
+bool Node::admit_time(Input& input, Utime utime) {
+  const MessageClock::Verdict verdict = clock_.take(utime);
+  if (is_recovering_ && verdict == MessageClock::Verdict::kQuarantined) {
+    // Only messages that had been believed are in the journal: this one was a jump's last proof.
+    clock_.resume(utime);
+    return start_at_jump();
+  }
+  switch (verdict) {
+    case MessageClock::Verdict::kFine:
+      return true;
+    case MessageClock::Verdict::kQuarantined:
+      report(Reason::kClockJump,
+             "utime " + std::to_string(utime) + " while it is " + std::to_string(clock_.now()),
+             input.channel);
+      return false;
+    case MessageClock::Verdict::kJumped:
+      log(Level::kWarning, to_string(Reason::kClockJump),
+          "time goes on at " + std::to_string(utime), input.channel);
+      return start_at_jump();
+  }
+  return true;
+}
+
+bool Node::start_at_jump() {
+  // Numbers from before the jump say nothing about what comes now.
+  for (const auto& one : inputs_) one->sequence.resume(-1, -1);
+  for (Timer& timer : timers_) timer.due = -1;
+  return true;
+}
+
+void Node::fire_timers(Utime now) {
+  for (std::size_t i = 0; i < timers_.size(); ++i) {
+    if (timers_[i].due < 0) timers_[i].due = now + timers_[i].period;
+    while (timers_[i].due <= now) {
+      const Utime due = timers_[i].due;
+      timers_[i].due += timers_[i].period;
+      timers_[i].handler(due);
+    }
+  }
+}
+
+void Node::send(Output& output, Utime utime, const Bytes& bytes, const WireType& type) {
+  if (is_recovering_) return;
+  // The same walk as on the way in: nothing that is not finite is ever published.
+  std::optional<Refusal> refusal = check_bytes(bytes, type);
+  if (refusal) refusal = Refusal{Reason::kNotSent, refusal->detail};
+  if (!refusal) refusal = bus_.publish(output.channel, bytes);
+  if (refusal) return report(refusal->reason, refusal->detail, output.channel);
+  monitor_.count_message(output.health, utime);
+}
+
+void Node::report(Reason reason, std::string_view text, std::string_view channel) {
+  monitor_.count_reason(channel, reason, text);
+  const std::uint64_t count = ++logged_[{std::string(to_string(reason)), std::string(channel)}];
+  // The 1st, 2nd, 4th, 8th ... of a kind: a flood of bad input must not become a flood of LOG.
+  if (!std::has_single_bit(count)) return;
+  std::string line(text);
+  if (count > 1) line += " (" + std::to_string(count) + " so far)";
+  const bool is_note = severity(reason) == Severity::kNote;
+  send_log(is_note ? Level::kInfo : Level::kWarning, to_string(reason), line, channel);
+}
+
+void Node::log(Level level, std::string_view code, std::string_view text,
+               std::string_view channel) {
+  send_log(level, code, text, channel);
+}
+
+void Node::send_log(Level level, std::string_view code, std::string_view text,
+                    std::string_view channel) {
+  if (is_recovering_) return;
+  log_t message{};
+  message.utime = std::max<Utime>(now(), 0);
+  message.seq = log_sequence_++;
+  message.process = options_.process;
+  message.level = static_cast<std::int8_t>(level);
+  message.channel = channel;
+  message.code = code;
+  message.text = text;
+  bus_.publish("LOG", encode_bytes(message));
+}
+
+void Node::publish_config(const std::string& toml) {
+  config_t message{};
+  message.utime = std::max<Utime>(now(), 0);
+  message.seq = config_sequence_++;
+  message.process = options_.process;
+  message.version = options_.version;
+  message.toml = toml;
+  bus_.publish("CONFIG", encode_bytes(message));
+}
+
+health_t Node::health() {
+  for (const auto& input : inputs_) {
+    monitor_.set_dropped(input->health, bus_.dropped(input->channel));
+  }
+  health_t report = monitor_.report(now());
+  const ReceiveBuffer buffer = bus_.receive_buffer();
+  report.receive_buffer_bytes = buffer.granted_bytes;
+  report.receive_buffer_wanted_bytes = buffer.wanted_bytes;
+  report.snapshot_utime = snapshot_utime_;
+  if (store_ != nullptr) report.journal_bytes = static_cast<std::int64_t>(store_->journal_bytes());
+  return report;
+}
+
+void Node::publish_health() {
+  if (options_.publishes_health) bus_.publish("HEALTH", encode_bytes(health()));
+}
+
+bool Node::takes(std::string_view channel) const {
+  return std::any_of(inputs_.begin(), inputs_.end(),
+                     [&](const auto& input) { return input->channel == channel; });
+}
+
+std::vector<std::string> Node::outputs() const {
+  std::vector<std::string> names;
+  for (const Output& output : outputs_) names.push_back(output.channel);
+  return names;
+}
+
+const SequenceCounts& Node::sequence_counts(std::string_view channel) const {
+  for (const auto& input : inputs_) {
+    if (input->channel == channel) return input->sequence.counts();
+  }
+  throw std::logic_error(std::string(channel) + " is no input");
+}
+
+}  // namespace understory

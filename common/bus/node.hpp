@@ -1,0 +1,209 @@
+// A service's place on the bus: typed messages in and out, ticks, state, health.
+//
+// What an adapter says when it is bound:
+//   node.subscribe<LandmarkScan>("LANDMARKS", [this](const LandmarkScan& scan) { ... });
+//   keyframes_ = node.advertise<Keyframe>("KEYFRAME");
+//   node.every(1'000'000, [this](Utime now) { ... });
+// and later keyframes_.publish(keyframe). Everything between bytes and values happens here: the
+// guard, counting, time, the journal, the stamp `seq`.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "common/bus/bus.hpp"
+#include "common/bus/clock.hpp"
+#include "common/bus/health_monitor.hpp"
+#include "common/bus/message_clock.hpp"
+#include "common/bus/sequence_tracker.hpp"
+#include "common/bus/state_store.hpp"
+#include "common/wire/convert.hpp"
+
+namespace understory {
+
+class Node;
+
+struct SubscribeOptions {
+  std::size_t queue_size = 30;  ///< Messages that may wait; the oldest makes room.
+  bool sequenced = true;  ///< One sender counts: duplicates and late comers are dropped. False
+                          ///< for requests, which anybody may send.
+  bool journaled = true;  ///< Part of the state: fed again after a restart.
+};
+
+/// The way out to one channel; copies share it. Stamps `seq`, counting from 0.
+template <class T>
+class Publisher {
+ public:
+  Publisher() = default;
+  void publish(const T& value) const;
+
+ private:
+  friend class Node;
+  Publisher(Node* node, std::size_t output) : node_(node), output_(output) {}
+  Node* node_ = nullptr;
+  std::size_t output_ = 0;
+};
+
+struct NodeOptions {
+  std::string process;
+  std::string version;
+  std::string channel_suffix;                ///< Of every output, e.g. _ALT.
+  std::vector<std::string> suffixed_inputs;  ///< Inputs that carry the suffix too.
+  std::int64_t largest_clock_jump_us = 10000000;
+  Utime snapshot_every_us = 30000000;  ///< Message time.
+  int snapshot_every_events = 1000;
+  bool publishes_health = true;  ///< HEALTH; LOG and CONFIG are always published.
+};
+
+class Node {
+ public:
+  enum class Level : std::uint8_t { kDebug, kInfo, kWarning, kError };
+
+  Node(Bus& bus, NodeOptions options, Clock clock);
+  Node(const Node&) = delete;
+  Node& operator=(const Node&) = delete;
+
+  // For adapters.
+
+  /// `handler` takes a T: a value of common/model or a wire type. It may throw: counted, reported,
+  /// the message is done with.
+  template <class T, class F>
+  void subscribe(const std::string& channel, F handler, SubscribeOptions options = {});
+  template <class T>
+  Publisher<T> advertise(const std::string& channel);
+  /// Called with the time that is due, in message time: before the message that moves time past it.
+  void every(Utime period_us, std::function<void(Utime)> handler);
+  /// Newest stamp among the inputs; -1 before the first.
+  Utime now() const { return clock_.now(); }
+  /// Something a person should read: LOG.
+  void log(Level level, std::string_view code, std::string_view text,
+           std::string_view channel = "");
+  /// Something is wrong: counted for HEALTH, and LOG at a limited rate.
+  void report(Reason reason, std::string_view text, std::string_view channel = "");
+
+  // For the drivers.
+
+  /// `save` and `load` of the stage.
+  void keep_state(std::function<std::string()> save, std::function<void(const std::string&)> load);
+  /// Loads the snapshot and feeds the journal, publishing nothing. False: the state could not be
+  /// loaded; the stage may be half loaded and must be made anew.
+  bool recover(StateStore& store);
+  /// From now on inputs are written to the store before they are handled.
+  void journal_to(StateStore* store) { store_ = store; }
+  void save_snapshot();
+  /// Subscribes on the bus: from now on messages come.
+  void connect();
+  /// Handles one message as if it came from the bus; false = no input has this channel.
+  bool feed(const BusMessage& message);
+
+  bool takes(std::string_view channel) const;
+  std::vector<std::string> outputs() const;
+  /// The message for HEALTH, as of now.
+  health_t health();
+  void publish_health();
+  void publish_config(const std::string& toml);
+  HealthMonitor& monitor() { return monitor_; }
+  const NodeOptions& options() const { return options_; }
+  const SequenceCounts& sequence_counts(std::string_view channel) const;
+
+  /// Sends an encoded message whose `seq` is stamped; for Publisher.
+  template <class Wire>
+  void publish_wire(std::size_t output, Wire message);
+
+ private:
+  /// Takes the message's header to `admit`; calls the handler where that agrees.
+  using Admit = std::function<bool()>;
+  using Take = std::function<std::optional<Refusal>(std::span<const std::uint8_t>, const Admit&)>;
+  struct Input {
+    std::string channel;
+    SubscribeOptions options;
+    Take take;
+    SequenceTracker sequence;
+    std::size_t health = 0;
+  };
+  struct Output {
+    std::string channel;
+    std::int64_t next_sequence = 0;
+    std::size_t health = 0;
+  };
+  struct Timer {
+    Utime period = 0;
+    Utime due = -1;
+    std::function<void(Utime)> handler;
+  };
+
+  void add_input(const std::string& channel, Take take, SubscribeOptions options);
+  std::size_t add_output(const std::string& channel);
+  void handle(Input& input, const BusMessage& message);
+  bool admit(Input& input, const BusMessage& message);
+  bool admit_time(Input& input, Utime utime);
+  bool start_at_jump();
+  void fire_timers(Utime now);
+  void snapshot_when_due();
+  void send(Output& output, Utime utime, const Bytes& bytes, const WireType& type);
+  void send_log(Level level, std::string_view code, std::string_view text,
+                std::string_view channel);
+  std::string save_state() const;
+  void load_state(const std::string& state);
+
+  Bus& bus_;
+  NodeOptions options_;
+  Clock computer_clock_;
+  MessageClock clock_;
+  HealthMonitor monitor_;
+  std::vector<std::unique_ptr<Input>> inputs_;
+  std::vector<Output> outputs_;
+  std::vector<Timer> timers_;
+  std::function<std::string()> save_;
+  std::function<void(const std::string&)> load_;
+  StateStore* store_ = nullptr;
+  bool is_recovering_ = false;
+  Utime snapshot_utime_ = -1;
+  Utime snapshot_tried_ = -1;
+  Utime snapshot_base_ = -1;  // what the snapshot's period counts from
+  int events_since_snapshot_ = 0;
+  std::int64_t log_sequence_ = 0;
+  std::int64_t config_sequence_ = 0;
+  std::map<std::pair<std::string, std::string>, std::uint64_t> logged_;  // code, channel -> count
+};
+
+template <class T, class F>
+void Node::subscribe(const std::string& channel, F handler, SubscribeOptions options) {
+  add_input(
+      channel,
+      [handler = std::move(handler)](std::span<const std::uint8_t> bytes,
+                                     const Admit& admit) -> std::optional<Refusal> {
+        const Result<T> value = decode_message<T>(bytes);
+        if (!value) return value.refusal();
+        if (admit()) handler(*value);
+        return std::nullopt;
+      },
+      options);
+}
+
+template <class T>
+Publisher<T> Node::advertise(const std::string& channel) {
+  return Publisher<T>(this, add_output(channel));
+}
+
+template <class Wire>
+void Node::publish_wire(std::size_t output, Wire message) {
+  message.seq = outputs_[output].next_sequence++;
+  send(outputs_[output], message.utime, encode_bytes(message), wire_type_of<Wire>());
+}
+
+template <class T>
+void Publisher<T>::publish(const T& value) const {
+  if constexpr (std::is_same_v<T, typename WireOf<T>::type>) {
+    node_->publish_wire(output_, value);
+  } else {
+    node_->publish_wire(output_, to_wire(value));
+  }
+}
+
+}  // namespace understory

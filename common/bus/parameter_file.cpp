@@ -1,0 +1,187 @@
+// Loading and checking: everything that can be wrong is found before anything is set.
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <numeric>
+#include <sstream>
+
+#include "common/bus/parameter_table.hpp"
+
+namespace understory {
+namespace {
+
+/// Levenshtein's distance.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+std::string nearest_key(const std::string& key, const std::vector<ParameterTable::Entry>& entries) {
+  std::string nearest;
+  std::size_t least = std::numeric_limits<std::size_t>::max();
+  for (const ParameterTable::Entry& entry : entries) {
+    const std::size_t distance = edit_distance(key, entry.key);
+    if (distance < least) nearest = entry.key;
+    least = std::min(least, distance);
+  }
+  return nearest;
+}
+
+std::string shown(const toml::node& node) {
+  std::ostringstream text;
+  if (node.is_string()) {
+    text << '"' << node.as_string()->get() << '"';
+  } else if (const auto* number = node.as_floating_point()) {
+    text << fmt::format("{}", number->get());
+  } else if (node.is_integer()) {
+    text << node.as_integer()->get();
+  } else if (node.is_boolean()) {
+    text << (node.as_boolean()->get() ? "true" : "false");
+  } else {
+    text << "a " << node.type();
+  }
+  return text.str();
+}
+
+/// A value that passed every check; set when the whole file has.
+struct Setting {
+  const ParameterTable::Entry* entry = nullptr;
+  std::variant<double, int, bool, std::string> value;
+};
+
+class Loader {
+ public:
+  Loader(const std::vector<ParameterTable::Entry>& entries, std::string name)
+      : entries_(entries), name_(std::move(name)) {}
+
+  void walk(const toml::table& table, const std::string& prefix) {
+    for (const auto& [key, node] : table) {
+      const std::string path = prefix + std::string(key.str());
+      const ParameterTable::Entry* entry = find(path);
+      if (entry != nullptr) {
+        take(*entry, node);
+      } else if (const toml::table* inner = node.as_table(); inner != nullptr && is_table(path)) {
+        walk(*inner, path + ".");
+      } else {
+        problem(node, path, "unknown key; the nearest valid one is " + nearest_key(path, entries_));
+      }
+    }
+  }
+
+  void finish() {
+    if (!problems_.empty()) throw ConfigurationError(problems_);
+    for (const Setting& setting : settings_) set(setting);
+  }
+
+ private:
+  const ParameterTable::Entry* find(const std::string& path) const {
+    const auto found = std::find_if(entries_.begin(), entries_.end(),
+                                    [&](const auto& entry) { return entry.key == path; });
+    return found == entries_.end() ? nullptr : &*found;
+  }
+  bool is_table(const std::string& path) const {
+    return std::any_of(entries_.begin(), entries_.end(),
+                       [&](const auto& entry) { return entry.key.rfind(path + ".", 0) == 0; });
+  }
+
+  void problem(const toml::node& node, const std::string& key, const std::string& what) {
+    problems_.push_back(fmt::format("{}:{}: {}: {}", name_, node.source().begin.line, key, what));
+  }
+  void refuse(const ParameterTable::Entry& entry, const toml::node& node, std::string_view what) {
+    problem(node, entry.key, fmt::format("{} {}; allowed: {}", shown(node), what, allowed(entry)));
+  }
+
+  void take(const ParameterTable::Entry& entry, const toml::node& node) {
+    std::visit([&](const auto& target) { take(entry, target, node); }, entry.target);
+  }
+  void take(const ParameterTable::Entry& entry, const ParameterTable::Number& target,
+            const toml::node& node) {
+    if (!node.is_number()) return refuse(entry, node, "is not a number");
+    const double value = *node.value<double>();
+    if (!std::isfinite(value)) return refuse(entry, node, "is not finite");
+    if (value < target.range.lowest) return refuse(entry, node, "is too small");
+    if (value > target.range.highest) return refuse(entry, node, "is too large");
+    settings_.push_back({&entry, value});
+  }
+  void take(const ParameterTable::Entry& entry, const ParameterTable::Integer& target,
+            const toml::node& node) {
+    if (!node.is_integer()) return refuse(entry, node, "is not a whole number");
+    const std::int64_t value = node.as_integer()->get();
+    if (value < target.range.lowest) return refuse(entry, node, "is too small");
+    if (value > target.range.highest) return refuse(entry, node, "is too large");
+    settings_.push_back({&entry, static_cast<int>(value)});
+  }
+  void take(const ParameterTable::Entry& entry, const ParameterTable::Boolean& /*target*/,
+            const toml::node& node) {
+    if (!node.is_boolean()) return refuse(entry, node, "is neither true nor false");
+    settings_.push_back({&entry, node.as_boolean()->get()});
+  }
+  void take(const ParameterTable::Entry& entry, const ParameterTable::Text& target,
+            const toml::node& node) {
+    if (!node.is_string()) return refuse(entry, node, "is not text");
+    const std::string& value = node.as_string()->get();
+    const auto& choices = target.choices;
+    if (!choices.empty() && std::find(choices.begin(), choices.end(), value) == choices.end()) {
+      return refuse(entry, node, "is not known");
+    }
+    settings_.push_back({&entry, value});
+  }
+
+  static void set(const Setting& setting) {
+    std::visit(
+        [&](const auto& target) {
+          using Value = std::remove_pointer_t<decltype(target.value)>;
+          *target.value = std::get<Value>(setting.value);
+        },
+        setting.entry->target);
+  }
+
+  const std::vector<ParameterTable::Entry>& entries_;
+  std::string name_;
+  std::vector<std::string> problems_;
+  std::vector<Setting> settings_;
+};
+
+}  // namespace
+
+void ParameterTable::load(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  if (!stream || !(text << stream.rdbuf())) {
+    // An empty file is a valid configuration, yet leaves the stream without a character.
+    std::error_code error;
+    const bool is_empty = std::filesystem::is_regular_file(file, error) &&
+                          std::filesystem::file_size(file, error) == 0;
+    if (!is_empty) throw ConfigurationError({file.string() + ": cannot be read"});
+  }
+  load_text(text.str(), file.string());
+}
+
+void ParameterTable::load_text(std::string_view toml, const std::string& name) {
+  toml::table table;
+  try {
+    table = toml::parse(toml, name);
+  } catch (const toml::parse_error& error) {
+    throw ConfigurationError(
+        {fmt::format("{}:{}: {}", name, error.source().begin.line, error.description())});
+  }
+  Loader loader(entries_, name);
+  loader.walk(table, "");
+  loader.finish();
+}
+
+}  // namespace understory

@@ -1,0 +1,151 @@
+#include "common/bus/parameter_table.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+namespace understory {
+namespace {
+
+template <class... F>
+struct Overloaded : F... {
+  using F::operator()...;
+};
+template <class... F>
+Overloaded(F...) -> Overloaded<F...>;
+
+std::string joined(const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += (text.empty() ? "" : "\n") + line;
+  return text;
+}
+
+/// A floating point number that TOML reads as one.
+std::string number_as_toml(double value) {
+  std::string text = fmt::format("{}", value);
+  if (text.find_first_of(".en") == std::string::npos) text += ".0";
+  return text;
+}
+
+std::string toml_text(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result.push_back('\\');
+    result.push_back(c);
+  }
+  return result + "\"";
+}
+
+std::string with_unit(std::string text, const std::string& unit) {
+  return unit.empty() ? text : text + " " + unit;
+}
+
+std::string default_as_toml(const ParameterTable::Entry& entry) {
+  return std::visit(
+      Overloaded{[](const ParameterTable::Number& n) { return number_as_toml(n.fallback); },
+                 [](const ParameterTable::Integer& n) { return std::to_string(n.fallback); },
+                 [](const ParameterTable::Boolean& b) {
+                   return std::string(b.fallback ? "true" : "false");
+                 },
+                 [](const ParameterTable::Text& t) { return toml_text(t.fallback); }},
+      entry.target);
+}
+
+}  // namespace
+
+ConfigurationError::ConfigurationError(std::vector<std::string> problems)
+    : std::runtime_error(joined(problems)), problems_(std::move(problems)) {}
+
+std::string value_as_toml(const ParameterTable::Entry& entry) {
+  return std::visit(
+      Overloaded{
+          [](const ParameterTable::Number& n) { return number_as_toml(*n.value); },
+          [](const ParameterTable::Integer& n) { return std::to_string(*n.value); },
+          [](const ParameterTable::Boolean& b) { return std::string(*b.value ? "true" : "false"); },
+          [](const ParameterTable::Text& t) { return toml_text(*t.value); }},
+      entry.target);
+}
+
+std::string allowed(const ParameterTable::Entry& entry) {
+  return std::visit(
+      Overloaded{
+          [&](const ParameterTable::Number& n) {
+            return with_unit(fmt::format("{} .. {}", n.range.lowest, n.range.highest), entry.unit);
+          },
+          [&](const ParameterTable::Integer& n) {
+            return with_unit(fmt::format("{} .. {}", n.range.lowest, n.range.highest), entry.unit);
+          },
+          [](const ParameterTable::Boolean&) { return std::string("true or false"); },
+          [](const ParameterTable::Text& t) {
+            if (t.choices.empty()) return std::string("any text");
+            std::string text = "one of";
+            for (std::size_t i = 0; i < t.choices.size(); ++i) {
+              text += (i == 0 ? " " : ", ") + toml_text(t.choices[i]);
+            }
+            return text;
+          }},
+      entry.target);
+}
+
+void ParameterTable::check_is_new(const std::string& key) const {
+  for (const Entry& entry : entries_) {
+    if (entry.key == key) throw std::logic_error("parameter " + key + " is described twice");
+  }
+}
+
+void ParameterTable::add(std::string key, double& value, Range<double> range, std::string unit,
+                         std::string doc) {
+  check_is_new(key);
+  if (!(value >= range.lowest && value <= range.highest)) {
+    throw std::logic_error("default of " + key + " is outside its own range");
+  }
+  entries_.push_back(
+      {std::move(key), std::move(unit), std::move(doc), Number{&value, value, range}});
+}
+
+void ParameterTable::add(std::string key, int& value, Range<int> range, std::string unit,
+                         std::string doc) {
+  check_is_new(key);
+  if (value < range.lowest || value > range.highest) {
+    throw std::logic_error("default of " + key + " is outside its own range");
+  }
+  entries_.push_back(
+      {std::move(key), std::move(unit), std::move(doc), Integer{&value, value, range}});
+}
+
+void ParameterTable::add(std::string key, bool& value, std::string doc) {
+  check_is_new(key);
+  entries_.push_back({std::move(key), "", std::move(doc), Boolean{&value, value}});
+}
+
+void ParameterTable::add(std::string key, std::string& value, std::vector<std::string> choices,
+                         std::string doc) {
+  check_is_new(key);
+  entries_.push_back({std::move(key), "", std::move(doc), Text{&value, value, std::move(choices)}});
+}
+
+std::string ParameterTable::to_toml() const {
+  std::string text;
+  std::string table;
+  for (const Entry& entry : entries_) {
+    const std::size_t dot = entry.key.rfind('.');
+    const std::string parent = dot == std::string::npos ? "" : entry.key.substr(0, dot);
+    if (parent != table) text += fmt::format("\n[{}]\n", parent);
+    table = parent;
+    text +=
+        fmt::format("# {} Allowed: {}.\n{} = {}\n", entry.doc, allowed(entry),
+                    entry.key.substr(dot == std::string::npos ? 0 : dot + 1), value_as_toml(entry));
+  }
+  return text;
+}
+
+std::string ParameterTable::help() const {
+  std::string text;
+  for (const Entry& entry : entries_) {
+    text += fmt::format("  {} = {}\n      {} Allowed: {}.\n", entry.key, default_as_toml(entry),
+                        entry.doc, allowed(entry));
+  }
+  return text;
+}
+
+}  // namespace understory

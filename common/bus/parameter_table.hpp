@@ -1,0 +1,90 @@
+// Parameters described once: loading, checking, --help and the printed configuration file all come
+// from the same list.
+#pragma once
+
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+namespace understory {
+
+/// What is wrong with a configuration, one line each: file:line: key: what, and what is allowed.
+class ConfigurationError : public std::runtime_error {
+ public:
+  explicit ConfigurationError(std::vector<std::string> problems);
+  const std::vector<std::string>& problems() const { return problems_; }
+
+ private:
+  std::vector<std::string> problems_;
+};
+
+/// Lowest and highest value allowed, both included.
+template <class T>
+struct Range {
+  T lowest;
+  T highest;
+};
+
+/// A list of parameters, each bound to a variable that holds its default when it is added. Keys are
+/// dotted paths of TOML tables, e.g. source.descriptor_step.
+class ParameterTable {
+ public:
+  struct Number {
+    double* value;
+    double fallback;
+    Range<double> range;
+  };
+  struct Integer {
+    int* value;
+    int fallback;
+    Range<int> range;
+  };
+  struct Boolean {
+    bool* value;
+    bool fallback;
+  };
+  struct Text {
+    std::string* value;
+    std::string fallback;
+    std::vector<std::string> choices;  ///< Empty = anything.
+  };
+  struct Entry {
+    std::string key;
+    std::string unit;
+    std::string doc;
+    std::variant<Number, Integer, Boolean, Text> target;
+  };
+
+  void add(std::string key, double& value, Range<double> range, std::string unit, std::string doc);
+  void add(std::string key, int& value, Range<int> range, std::string unit, std::string doc);
+  void add(std::string key, bool& value, std::string doc);
+  void add(std::string key, std::string& value, std::vector<std::string> choices, std::string doc);
+
+  const std::vector<Entry>& entries() const { return entries_; }
+
+  /// Sets what the file states; the rest keeps its default. Throws ConfigurationError with all that
+  /// is wrong; then nothing has been set.
+  void load(const std::filesystem::path& file);
+  /// The same from text; `name` stands for the file in messages.
+  void load_text(std::string_view toml, const std::string& name);
+
+  /// A configuration file with the values in force, each with its unit, range and meaning.
+  std::string to_toml() const;
+  /// The same for a terminal, one line per parameter, with defaults.
+  std::string help() const;
+
+ private:
+  void check_is_new(const std::string& key) const;
+
+  std::vector<Entry> entries_;
+};
+
+/// "0.5", "true", "\"ours\"": the value as TOML, shortest form that reads back the same.
+std::string value_as_toml(const ParameterTable::Entry& entry);
+/// "0 .. 10 m", "one of \"a\", \"b\"", "true or false".
+std::string allowed(const ParameterTable::Entry& entry);
+
+}  // namespace understory

@@ -1,0 +1,139 @@
+#include "common/bus/replay.hpp"
+
+#include <fstream>
+#include <optional>
+#include <set>
+
+#include "common/bus/memory_bus.hpp"
+#include "common/io/lcm_log.hpp"
+#include "understory/config_t.hpp"
+#include "understory/log_t.hpp"
+
+namespace understory {
+namespace {
+
+std::string read_if_there(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+class Replay {
+ public:
+  explicit Replay(const ReplayOptions& options)
+      : options_(options),
+        reader_(options.log),
+        bus_(MemoryBus::Queues::kUnlimited,
+             [this](const BusMessage& message) { record_derived(message); }) {
+    if (!options.out.empty()) writer_.emplace(options.out);
+    for (const Service& service : options.services) host(service);
+  }
+
+  ReplayReport run() {
+    bool has_begun = false;
+    while (auto event = reader_.next()) {
+      ++report_.events;
+      log_utime_ = event->utime;
+      if (!has_begun) begin();
+      has_begun = true;
+      take(*event);
+      if (options_.progress && report_.events % 256 == 0 && options_.progress(part_done())) {
+        report_.was_stopped = true;
+        return report_;
+      }
+    }
+    if (has_begun) finish();
+    if (writer_) writer_->commit();
+    report_.damaged_places = reader_.damage().places;
+    report_.damaged_bytes = reader_.damage().bytes;
+    for (const auto& hosted : hosted_) report_.health.push_back(hosted->node().health());
+    if (options_.progress) options_.progress(1.0);
+    return report_;
+  }
+
+ private:
+  void host(const Service& service) {
+    const std::filesystem::path file = options_.config_dir / (service.name + ".toml");
+    const bool has_file = !options_.config_dir.empty() && std::filesystem::exists(file);
+    hosted_.push_back(std::make_unique<HostedService>(
+        service, bus_, no_clock(), has_file ? read_if_there(file) : "", file.string(),
+        [&](RuntimeParameters& runtime) {
+          if (!options_.channel_suffix.empty()) runtime.channel_suffix = options_.channel_suffix;
+        }));
+    Node& node = hosted_.back()->node();
+    names_.insert(node.options().process);
+    for (const std::string& channel : node.outputs()) outputs_.insert(channel);
+  }
+
+  /// Messages that say the configuration come first, with the log's first stamp.
+  void begin() {
+    for (const auto& hosted : hosted_) hosted->node().connect();
+    for (const auto& hosted : hosted_) hosted->node().publish_config(hosted->table().to_toml());
+    bus_.drain();
+  }
+
+  /// What services still have to say, with the log's last stamp.
+  void finish() {
+    for (const auto& hosted : hosted_) {
+      hosted->adapter().finish();
+      bus_.drain();
+    }
+  }
+
+  void take(const LogEvent& event) {
+    if (is_own_output(event)) {
+      ++report_.left_out;
+      return;
+    }
+    if (writer_ && options_.keeps_inputs) writer_->write(event.utime, event.channel, event.data);
+    bool is_taken = false;
+    for (const auto& hosted : hosted_) is_taken |= hosted->node().takes(event.channel);
+    if (!is_taken) return;
+    ++report_.fed;
+    is_feeding_ = true;
+    bus_.publish(event.channel, event.data);
+    is_feeding_ = false;
+    bus_.drain();
+  }
+
+  /// A recorded output of a hosted service, or what it said about itself.
+  bool is_own_output(const LogEvent& event) const {
+    if (outputs_.contains(event.channel)) return true;
+    if (event.channel == "HEALTH") return is_from_hosted<health_t>(event);
+    if (event.channel == "LOG") return is_from_hosted<log_t>(event);
+    if (event.channel == "CONFIG") return is_from_hosted<config_t>(event);
+    return false;
+  }
+  template <class Message>
+  bool is_from_hosted(const LogEvent& event) const {
+    const auto message = decode_bytes<Message>(event.data);
+    return message && names_.contains(message->process);
+  }
+
+  void record_derived(const BusMessage& message) {
+    if (is_feeding_) return;
+    ++report_.derived;
+    if (writer_) writer_->write(log_utime_, message.channel, message.bytes);
+  }
+
+  double part_done() const {
+    const auto size = static_cast<double>(std::max<std::uint64_t>(reader_.size_bytes(), 1));
+    return static_cast<double>(reader_.position_bytes()) / size;
+  }
+
+  const ReplayOptions& options_;
+  LcmLogReader reader_;
+  std::optional<LcmLogWriter> writer_;
+  MemoryBus bus_;
+  std::vector<std::unique_ptr<HostedService>> hosted_;
+  std::set<std::string, std::less<>> outputs_;
+  std::set<std::string, std::less<>> names_;
+  std::int64_t log_utime_ = 0;
+  bool is_feeding_ = false;
+  ReplayReport report_;
+};
+
+}  // namespace
+
+ReplayReport replay(const ReplayOptions& options) { return Replay(options).run(); }
+
+}  // namespace understory

@@ -1,0 +1,202 @@
+#include <poll.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <csignal>
+#include <iostream>
+
+#include "common/bus/live_bus.hpp"
+#include "common/bus/service.hpp"
+
+namespace understory {
+namespace {
+
+constexpr int kDone = 0;
+constexpr int kFailed = 1;
+constexpr int kWrongUsage = 2;
+constexpr std::int64_t kHealthPeriodUs = 1000000;
+/// A message that changes the state of health is announced at most this often.
+constexpr std::int64_t kHealthChangeUs = 100000;
+
+struct Options {
+  std::string config;
+  std::string lcm_url;
+  std::string state_dir;
+  std::string channel_suffix;
+  bool prints_config = false;
+};
+
+/// SIGTERM and SIGINT as something to poll. Blocked before any thread exists, so that liblcm's
+/// threads inherit it; no handler, no global.
+class StopSignal {
+ public:
+  StopSignal() {
+    sigset_t signals;
+    sigemptyset(&signals);
+    sigaddset(&signals, SIGTERM);
+    sigaddset(&signals, SIGINT);
+    pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+    file_ = ::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK);
+  }
+  ~StopSignal() { ::close(file_); }
+  StopSignal(const StopSignal&) = delete;
+  StopSignal& operator=(const StopSignal&) = delete;
+
+  int file_descriptor() const { return file_; }
+  bool has_come() {
+    signalfd_siginfo info{};
+    if (::read(file_, &info, sizeof(info)) == sizeof(info)) came_ = true;
+    return came_;
+  }
+
+ private:
+  int file_ = -1;
+  bool came_ = false;
+};
+
+/// Says how the process is, once a second and when that changes.
+class HealthTeller {
+ public:
+  HealthTeller(Node& node, const Clock& clock) : node_(node), clock_(clock) {}
+  void tell_when_due() {
+    const std::int64_t now = clock_.monotonic_us();
+    const bool has_changed = node_.monitor().state() != told_;
+    if (now - told_us_ < (has_changed ? kHealthChangeUs : kHealthPeriodUs)) return;
+    tell();
+  }
+  void tell() {
+    told_us_ = clock_.monotonic_us();
+    told_ = node_.monitor().state();
+    node_.publish_health();
+  }
+  int milliseconds_left() const {
+    const std::int64_t left = told_us_ + kHealthPeriodUs - clock_.monotonic_us();
+    return static_cast<int>(std::clamp<std::int64_t>(left / 1000 + 1, 1, 1000));
+  }
+
+ private:
+  Node& node_;
+  const Clock& clock_;
+  std::int64_t told_us_ = -kHealthPeriodUs;
+  std::int8_t told_ = -1;
+};
+
+void run_until_stopped(HostedService& hosted, Bus& bus, StopSignal& stop, const Clock& clock) {
+  Node& node = hosted.node();
+  HealthTeller health(node, clock);
+  while (!stop.has_come()) {
+    health.tell_when_due();
+    if (bus.handle_one(0)) continue;
+    pollfd files[] = {{bus.file_descriptor(), POLLIN, 0}, {stop.file_descriptor(), POLLIN, 0}};
+    ::poll(files, 2, health.milliseconds_left());
+  }
+  node.save_snapshot();
+  hosted.adapter().finish();
+  node.monitor().stop();
+  health.tell();
+}
+
+std::unique_ptr<HostedService> make_hosted(const Service& service, Bus& bus, const Clock& clock,
+                                           const std::string& toml, const Options& options) {
+  return std::make_unique<HostedService>(service, bus, clock, toml, options.config,
+                                         [&](RuntimeParameters& runtime) {
+                                           if (!options.channel_suffix.empty())
+                                             runtime.channel_suffix = options.channel_suffix;
+                                         });
+}
+
+std::string read_config(const std::string& file) {
+  if (file.empty()) return {};
+  // Loading into an empty table would call every key unknown; here only reading can fail.
+  std::ifstream stream(file, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(stream), {}};
+  if (!stream.good() && !stream.eof()) throw ConfigurationError({file + ": cannot be read"});
+  return text;
+}
+
+/// The parameters, loaded and checked without a bus.
+RuntimeParameters check_config(const Service& service, const std::string& toml,
+                               const std::string& name, std::string* printed) {
+  RuntimeParameters runtime;
+  ParameterTable table;
+  const std::unique_ptr<Adapter> adapter = service.make();
+  describe(runtime, table);
+  adapter->describe(table);
+  table.load_text(toml, name);
+  *printed = table.to_toml();
+  return runtime;
+}
+
+int serve(const Service& service, const Options& options) {
+  const std::string toml = read_config(options.config);
+  std::string printed;
+  const RuntimeParameters runtime = check_config(service, toml, options.config, &printed);
+  if (options.prints_config) {
+    std::cout << "# " << service.name << ": " << service.summary << "\n" << printed;
+    return kDone;
+  }
+  StopSignal stop;
+  const Clock clock = system_clock();
+  LiveBus bus(options.lcm_url.empty() ? runtime.lcm_url : options.lcm_url);
+  auto hosted = make_hosted(service, bus, clock, toml, options);
+  std::unique_ptr<StateStore> store;
+  if (!options.state_dir.empty()) {
+    store = std::make_unique<StateStore>(options.state_dir, service.name);
+    if (!hosted->node().recover(*store)) {
+      store->start_over();
+      hosted = make_hosted(service, bus, clock, toml, options);
+      hosted->node().report(Reason::kSnapshotDamaged, "the state cannot be used; starting fresh");
+    }
+    hosted->node().journal_to(store.get());
+  }
+  Node& node = hosted->node();
+  const ReceiveBuffer buffer = bus.receive_buffer();
+  if (buffer.granted_bytes < buffer.wanted_bytes) {
+    node.report(Reason::kReceiveBufferSmall, std::to_string(buffer.granted_bytes) + " of " +
+                                                 std::to_string(buffer.wanted_bytes) +
+                                                 " bytes granted: raise net.core.rmem_max");
+  }
+  node.connect();
+  node.publish_config(hosted->table().to_toml());
+  run_until_stopped(*hosted, bus, stop, clock);
+  return kDone;
+}
+
+std::string parameters_help(const Service& service) {
+  RuntimeParameters runtime;
+  ParameterTable table;
+  const std::unique_ptr<Adapter> adapter = service.make();
+  describe(runtime, table);
+  adapter->describe(table);
+  return "Parameters of the configuration file:\n" + table.help();
+}
+
+}  // namespace
+
+int run_service(const Service& service, int argc, char** argv) {
+  CLI::App app(service.name + ": " + service.summary, "understory-" + service.name);
+  Options options;
+  app.add_option("--config", options.config, "Configuration file (TOML)");
+  app.add_option("--lcm-url", options.lcm_url, "Bus; default LCM_DEFAULT_URL or LCM's own");
+  app.add_option("--state-dir", options.state_dir, "Keep the state here, to go on after a restart");
+  app.add_option("--channel-suffix", options.channel_suffix, "Appended to every output channel");
+  app.add_flag("--print-config", options.prints_config, "Print the configuration file in force");
+  app.set_version_flag("--version", program_version());
+  try {
+    app.footer(parameters_help(service));
+    app.parse(argc, argv);
+    return serve(service, options);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kWrongUsage;
+  } catch (const ConfigurationError& error) {
+    std::cerr << error.what() << '\n';
+    return kWrongUsage;
+  } catch (const std::exception& error) {
+    std::cerr << service.name << ": " << error.what() << '\n';
+    return kFailed;
+  }
+}
+
+}  // namespace understory

@@ -1,0 +1,78 @@
+// A service as the drivers see it: something that describes its parameters, binds itself to
+// channels, and can save itself.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "common/bus/node.hpp"
+#include "common/bus/parameter_table.hpp"
+
+namespace understory {
+
+/// Between a stage and its channels: decodes nothing, computes nothing, only passes on.
+class Adapter {
+ public:
+  virtual ~Adapter() = default;
+  /// Lists the parameters, bound to the adapter's own structs.
+  virtual void describe(ParameterTable& table) = 0;
+  /// The parameters are loaded: makes the stage, subscribes and advertises.
+  virtual void bind(Node& node) = 0;
+  /// The last call: the drive is over, or the process is asked to stop. May publish.
+  virtual void finish() {}
+  /// The stage's state; load() takes what save() gave, and throws where it cannot.
+  virtual std::string save() const { return {}; }
+  virtual void load(const std::string& /*state*/) {}
+};
+
+struct Service {
+  std::string name;     ///< As in the executable's name and in HEALTH, e.g. keyframer.
+  std::string summary;  ///< One line: what it takes and gives.
+  std::function<std::unique_ptr<Adapter>()> make;
+};
+
+/// Parameters that every process has (table `runtime` of its file).
+struct RuntimeParameters {
+  std::string lcm_url;          ///< Empty = LCM_DEFAULT_URL, or LCM's default group.
+  std::string channel_suffix;   ///< Of every output.
+  std::string suffixed_inputs;  ///< Comma-separated inputs that carry the suffix too.
+  double snapshot_every_s = 30.0;
+  int snapshot_every_events = 1000;
+  double largest_clock_jump_s = 10.0;
+};
+void describe(RuntimeParameters& parameters, ParameterTable& table);
+
+/// The version that HEALTH and CONFIG show.
+std::string program_version();
+
+/// The options that follow from the parameters.
+NodeOptions node_options(const std::string& process, const RuntimeParameters& parameters);
+
+/// One running instance: parameters, adapter and node together.
+class HostedService {
+ public:
+  /// `toml` and its name, as ParameterTable::load_text takes them; throws ConfigurationError.
+  /// `adjust` sees the runtime parameters after loading and may change them.
+  HostedService(const Service& service, Bus& bus, const Clock& clock, const std::string& toml,
+                const std::string& toml_name,
+                const std::function<void(RuntimeParameters&)>& adjust = {});
+
+  Node& node() { return *node_; }
+  Adapter& adapter() { return *adapter_; }
+  const ParameterTable& table() const { return table_; }
+  const RuntimeParameters& runtime() const { return runtime_; }
+
+ private:
+  RuntimeParameters runtime_;
+  std::unique_ptr<Adapter> adapter_;
+  ParameterTable table_;
+  std::unique_ptr<Node> node_;
+};
+
+/// All of a process: reads the command line (--config, --lcm-url, --state-dir, --channel-suffix,
+/// --print-config, --help, --version), runs until SIGTERM or SIGINT, saves the state. Returns the
+/// exit status: 0 done, 1 failed, 2 wrong usage or configuration. To be called from main().
+int run_service(const Service& service, int argc, char** argv);
+
+}  // namespace understory

@@ -1,0 +1,35 @@
+// The bytes of snapshots and journals.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/bus/state_store.hpp"
+
+namespace understory {
+
+/// FNV-1a, 64 bit: tells damage, not malice.
+std::uint64_t checksum(std::string_view bytes);
+
+/// magic, version, generation, length, checksum, state.
+std::string encode_snapshot(std::uint64_t generation, std::string_view state);
+struct Snapshot {
+  std::uint64_t generation = 0;
+  std::string state;
+};
+Result<Snapshot> decode_snapshot(std::string_view bytes);
+
+/// length, checksum, channel length, channel, data.
+std::string encode_event(std::string_view channel, std::span<const std::uint8_t> bytes);
+struct JournalContent {
+  std::vector<JournalEvent> events;
+  std::uint64_t valid_bytes = 0;  ///< What follows is torn or damaged.
+  bool is_torn = false;           ///< The last event is not whole: a process was killed writing it.
+  bool is_damaged = false;        ///< An event is there, but not as it was written.
+};
+JournalContent decode_journal(std::string_view bytes);
+
+}  // namespace understory

@@ -1,0 +1,196 @@
+#include "common/bus/state_store.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+#include <system_error>
+
+#include "common/bus/state_format.hpp"
+
+namespace understory {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A recovery that died this often is not tried again with the journal, then not with the snapshot.
+constexpr int kAttemptsWithJournal = 2;
+constexpr int kAttemptsWithSnapshot = 4;
+
+std::optional<std::string> read_file(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) return std::nullopt;
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+Refusal not_kept(const fs::path& file) {
+  return {Reason::kStateNotKept, file.string() + ": " + std::system_category().message(errno)};
+}
+
+bool write_all(int file, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(file, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+/// Whole or not at all: the name points to the old content until the new one is on the device.
+std::optional<Refusal> replace_file(const fs::path& file, std::string_view bytes) {
+  const fs::path temporary = file.string() + ".new";
+  const int out = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (out < 0) return not_kept(temporary);
+  const bool is_whole = write_all(out, bytes) && ::fdatasync(out) == 0;
+  std::optional<Refusal> refusal;
+  if (!is_whole) refusal = not_kept(temporary);
+  ::close(out);
+  if (!refusal && ::rename(temporary.c_str(), file.c_str()) != 0) refusal = not_kept(file);
+  if (refusal) ::unlink(temporary.c_str());
+  return refusal;
+}
+
+}  // namespace
+
+StateStore::StateStore(fs::path directory, std::string name)
+    : directory_(std::move(directory)), name_(std::move(name)) {}
+
+StateStore::~StateStore() {
+  if (journal_ >= 0) ::close(journal_);
+}
+
+fs::path StateStore::path(const std::string& suffix) const { return directory_ / (name_ + suffix); }
+
+fs::path StateStore::journal_path(std::uint64_t generation) const {
+  return path(".journal." + std::to_string(generation));
+}
+
+void StateStore::put_aside(const fs::path& file) {
+  std::error_code ignored;
+  if (fs::exists(file, ignored)) fs::rename(file, file.string() + ".damaged", ignored);
+}
+
+void StateStore::refuse_what_killed_before(Recovered& recovered) {
+  const int attempts = std::atoi(read_file(path(".recovering")).value_or("0").c_str());
+  if (attempts >= kAttemptsWithSnapshot) {
+    put_aside(path(".snapshot"));
+    recovered.problems.push_back(
+        {Reason::kSnapshotDamaged, path(".snapshot").string() + ": recovery with it died " +
+                                       std::to_string(attempts) + " times, put aside"});
+  }
+  if (attempts >= kAttemptsWithJournal) {
+    std::error_code ignored;
+    for (const auto& entry : fs::directory_iterator(directory_, ignored)) {
+      const std::string file = entry.path().filename().string();
+      if (file.starts_with(name_ + ".journal.") && !file.ends_with(".damaged")) {
+        put_aside(entry.path());
+      }
+    }
+    recovered.problems.push_back(
+        {Reason::kJournalDamaged, directory_.string() + ": recovery with the journal died " +
+                                      std::to_string(attempts) + " times, put aside"});
+  }
+  replace_file(path(".recovering"), std::to_string(attempts + 1));
+}
+
+StateStore::Recovered StateStore::open() {
+  Recovered recovered;
+  std::error_code error;
+  fs::create_directories(directory_, error);
+  refuse_what_killed_before(recovered);
+  bool snapshot_is_lost = false;
+  if (const auto bytes = read_file(path(".snapshot"))) {
+    auto snapshot = decode_snapshot(*bytes);
+    if (snapshot) {
+      generation_ = snapshot->generation;
+      recovered.snapshot = std::move(snapshot->state);
+    } else {
+      snapshot_is_lost = true;
+      recovered.problems.push_back(
+          {snapshot.refusal().reason,
+           path(".snapshot").string() + ": " + snapshot.refusal().detail + "; starting fresh"});
+      put_aside(path(".snapshot"));
+    }
+  }
+  std::uint64_t valid_bytes = 0;
+  const auto journal = read_file(journal_path(generation_));
+  // Events that followed a lost snapshot mean nothing without it; only journal 0 starts at nothing.
+  if (journal && !snapshot_is_lost) {
+    JournalContent content = decode_journal(*journal);
+    valid_bytes = content.valid_bytes;
+    recovered.events = std::move(content.events);
+    if (content.is_damaged) {
+      recovered.problems.push_back(
+          {Reason::kJournalDamaged, journal_path(generation_).string() + ": damaged behind byte " +
+                                        std::to_string(valid_bytes) + "; going on with the " +
+                                        std::to_string(recovered.events.size()) +
+                                        " events before"});
+    }
+  }
+  remove_other_journals();
+  if (auto refusal = open_journal(valid_bytes)) recovered.problems.push_back(*refusal);
+  return recovered;
+}
+
+std::optional<Refusal> StateStore::open_journal(std::uint64_t valid_bytes) {
+  if (journal_ >= 0) ::close(journal_);
+  const fs::path file = journal_path(generation_);
+  journal_ = ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  journal_bytes_ = valid_bytes;
+  journal_broken_ = journal_ < 0 || ::ftruncate(journal_, static_cast<off_t>(valid_bytes)) != 0;
+  if (journal_broken_) return not_kept(file);
+  return std::nullopt;
+}
+
+void StateStore::remove_other_journals() {
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(directory_, ignored)) {
+    const std::string file = entry.path().filename().string();
+    const bool is_journal = file.starts_with(name_ + ".journal.") && !file.ends_with(".damaged");
+    if (is_journal && entry.path() != journal_path(generation_)) fs::remove(entry.path(), ignored);
+  }
+}
+
+void StateStore::end_recovery() { ::unlink(path(".recovering").c_str()); }
+
+void StateStore::start_over() {
+  put_aside(path(".snapshot"));
+  put_aside(journal_path(generation_));
+  generation_ = 0;
+  remove_other_journals();
+  open_journal(0);
+}
+
+std::optional<Refusal> StateStore::append(std::string_view channel,
+                                          std::span<const std::uint8_t> bytes) {
+  if (journal_broken_) {
+    return Refusal{Reason::kStateNotKept, directory_.string() + ": the journal has a hole"};
+  }
+  const std::string event = encode_event(channel, bytes);
+  if (!write_all(journal_, event)) {
+    const Refusal refusal = not_kept(journal_path(generation_));
+    journal_broken_ = true;
+    return refusal;
+  }
+  journal_bytes_ += event.size();
+  return std::nullopt;
+}
+
+std::optional<Refusal> StateStore::save(std::string_view state) {
+  if (auto refusal = replace_file(path(".snapshot"), encode_snapshot(generation_ + 1, state))) {
+    return refusal;
+  }
+  const fs::path old = journal_path(generation_);
+  ++generation_;
+  auto refusal = open_journal(0);
+  ::unlink(old.c_str());
+  return refusal;
+}
+
+}  // namespace understory

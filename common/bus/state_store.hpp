@@ -1,0 +1,71 @@
+// A service's state on disk: a snapshot and the input events since. Together they survive SIGKILL
+// at any moment.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/wire/result.hpp"
+
+namespace understory {
+
+struct JournalEvent {
+  std::string channel;
+  std::vector<std::uint8_t> bytes;
+};
+
+/// Files NAME.snapshot and NAME.journal.G in one directory, G counting snapshots.
+///
+/// A snapshot is written whole or not at all (temporary file, flushed, renamed), with a checksum.
+/// An event is one write(), so what a killed process leaves behind is whole events and at most one
+/// torn one at the end.
+class StateStore {
+ public:
+  StateStore(std::filesystem::path directory, std::string name);
+  ~StateStore();
+  StateStore(const StateStore&) = delete;
+  StateStore& operator=(const StateStore&) = delete;
+
+  struct Recovered {
+    std::optional<std::string> snapshot;
+    std::vector<JournalEvent> events;  ///< Since the snapshot, in order.
+    std::vector<Refusal> problems;     ///< What was damaged and is lost.
+  };
+  /// Reads what is there and starts to journal behind it. When earlier recoveries died on the way
+  /// (begin_recovery without end_recovery), the journal is put aside, later the snapshot too.
+  Recovered open();
+  void end_recovery();
+
+  /// Puts everything aside and starts empty.
+  void start_over();
+
+  std::optional<Refusal> append(std::string_view channel, std::span<const std::uint8_t> bytes);
+  /// Takes the place of the snapshot before and of its journal.
+  std::optional<Refusal> save(std::string_view state);
+
+  /// After a failed append the journal has a hole: only a snapshot makes the state whole again.
+  bool needs_snapshot() const { return journal_broken_; }
+  std::uint64_t journal_bytes() const { return journal_bytes_; }
+
+ private:
+  std::filesystem::path path(const std::string& suffix) const;
+  std::filesystem::path journal_path(std::uint64_t generation) const;
+  void put_aside(const std::filesystem::path& file);
+  void refuse_what_killed_before(Recovered& recovered);
+  std::optional<Refusal> open_journal(std::uint64_t valid_bytes);
+  void remove_other_journals();
+
+  std::filesystem::path directory_;
+  std::string name_;
+  std::uint64_t generation_ = 0;
+  int journal_ = -1;
+  std::uint64_t journal_bytes_ = 0;
+  bool journal_broken_ = false;
+};
+
+}  // namespace understory
