@@ -117,8 +117,8 @@ MapCompleteness map_completeness(std::span<const Eigen::Vector2d> landmarks_m,
   }
   MapCompleteness result;
   result.landmarks = landmarks_m.size();
-  result.without_trunk = static_cast<std::size_t>(
-      std::count(landmark_taken.begin(), landmark_taken.end(), false));
+  result.without_trunk =
+      static_cast<std::size_t>(std::count(landmark_taken.begin(), landmark_taken.end(), false));
   for (std::size_t trunk = 0; trunk < times_seen_of_trunk.size(); ++trunk) {
     if (times_seen_of_trunk[trunk] < min_times_seen) continue;
     ++result.well_seen;

@@ -21,8 +21,8 @@ struct MapState {
   std::vector<Eigen::Vector2d> landmarks_m;
 };
 
-/// The truth of a drive in the frame of the map: that of the vehicle at scan `base`, the base of the
-/// first accepted keyframe. Nothing is aligned.
+/// The truth of a drive in the frame of the map: that of the vehicle at scan `base`, the base of
+/// the first accepted keyframe. Nothing is aligned.
 class MapTruth {
  public:
   MapTruth(const sim::Drive& drive, std::size_t base);

@@ -11,7 +11,7 @@
 namespace understory::eval {
 namespace {
 
-constexpr double kRelineariseHeading = 1e-3;  // [rad]
+constexpr double kRelineariseHeading = 4e-3;  // [rad]
 
 /// The poses' block of one scan, with e_i = R z_i + t - l_i, unknowns (t, theta).
 struct PoseBlock {

@@ -17,8 +17,8 @@ namespace understory::eval {
 /// For given landmarks the best pose of each scan follows in closed form, so the cost is a function
 /// of the landmarks alone (variable projection). Its gradient is exact at every step; its
 /// Gauss-Newton Hessian, the Schur complement of the poses' 3 x 3 blocks, changes so little from
-/// state to state that a scan's part of it is made again only when its heading has moved. So a state
-/// costs one dense Cholesky of 2 x landmarks and a few passes over the detections.
+/// state to state that a scan's part of it is made again only when its heading has moved. So a
+/// state costs one dense Cholesky of 2 x landmarks and a few passes over the detections.
 class BatchOracle {
  public:
   /// Adds a scan: detection i at positions_m[i] (vehicle frame) of trunk trunks[i].
@@ -31,7 +31,7 @@ class BatchOracle {
     bool converged = false;
   };
   /// Iterates until no landmark moves by more than `tolerance_m`.
-  Solution solve(double tolerance_m = 1e-6, int max_iterations = 50);
+  Solution solve(double tolerance_m = 1e-5, int max_iterations = 50);
 
   std::size_t scans() const { return scans_.size(); }
   const SE2& first_T_vehicle(std::size_t scan) const { return scans_[scan].pose; }

@@ -1,0 +1,17 @@
+#include "eval/command.hpp"
+
+#include "eval/experiments.hpp"
+
+namespace understory::eval {
+
+void add_eval_command(CLI::App& parent) {
+  CLI::App& eval =
+      *parent.add_subcommand("eval", "Experiments: tables beside the source's, JSON, plots");
+  eval.require_subcommand(1);
+  add_paths_experiment(eval);
+  add_density_experiment(eval);
+  add_noise_experiment(eval);
+  add_efficiency_experiment(eval);
+}
+
+}  // namespace understory::eval

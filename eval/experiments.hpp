@@ -1,0 +1,26 @@
+// The experiments of simulated drives, each added to `understory eval` by a function of its own.
+#pragma once
+
+#include <CLI/App.hpp>
+#include <functional>
+
+#include "eval/campaign.hpp"
+
+namespace understory::eval {
+
+/// --runs, --seed, --jobs, --json, --method, --no-plots.
+void add_campaign_options(CLI::App& command, CampaignOptions& options);
+
+/// Runs `work` and turns what it throws into one line on stderr and exit status 1.
+void run_guarded(const std::string& experiment, const std::function<void()>& work);
+
+/// Five paths and the double circle, intermediate forest (GeoSLAM §5.1).
+void add_paths_experiment(CLI::App& eval);
+/// Circles in three forests (GeoSLAM §5.2).
+void add_density_experiment(CLI::App& eval);
+/// Circles, five position noises times five detection rates, at two intervals (GeoSLAM §5.3).
+void add_noise_experiment(CLI::App& eval);
+/// Time per component along the run (GeoSLAM §5.5), over a long drive, and standing still.
+void add_efficiency_experiment(CLI::App& eval);
+
+}  // namespace understory::eval

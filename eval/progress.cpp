@@ -1,0 +1,54 @@
+#include "eval/progress.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+
+namespace understory::eval {
+namespace {
+
+constexpr std::size_t kWidth = 30;
+constexpr std::chrono::milliseconds kRedraw{200};
+
+std::string duration(double seconds) {
+  const auto whole = static_cast<long>(seconds + 0.5);
+  if (whole < 60) return fmt::format("{} s", whole);
+  if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+  return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+}
+
+}  // namespace
+
+Progress::Progress(std::string_view what, std::size_t total)
+    : what_(what),
+      total_(std::max<std::size_t>(1, total)),
+      terminal_(isatty(STDERR_FILENO) == 1),
+      start_(std::chrono::steady_clock::now()) {}
+
+Progress::~Progress() {
+  if (terminal_) fmt::print(stderr, "\r\033[K");
+}
+
+void Progress::advance(std::size_t steps) {
+  done_ = std::min(total_, done_ + steps);
+  const auto now = std::chrono::steady_clock::now();
+  const std::size_t tenths = 10 * done_ / total_;
+  if (terminal_ ? now - drawn_ < kRedraw : tenths == tenths_shown_) return;
+  tenths_shown_ = tenths;
+  drawn_ = now;
+  draw();
+}
+
+void Progress::draw() {
+  const double elapsed = std::chrono::duration<double>(drawn_ - start_).count();
+  const double left = elapsed * static_cast<double>(total_ - done_) / static_cast<double>(done_);
+  const std::size_t filled = kWidth * done_ / total_;
+  fmt::print(stderr, "{}[{}{}] {}/{} {}, {} left{}", terminal_ ? "\r\033[K" : "",
+             std::string(filled, '#'), std::string(kWidth - filled, '.'), done_, total_, what_,
+             duration(left), terminal_ ? "" : "\n");
+  std::fflush(stderr);
+}
+
+}  // namespace understory::eval
