@@ -10,5 +10,6 @@ void add_doctor_command(CLI::App& parent);
 void add_launch_command(CLI::App& parent);
 void add_log_command(CLI::App& parent);
 void add_sim_command(CLI::App& parent);
+void add_status_command(CLI::App& parent);
 
 }  // namespace understory

@@ -2,10 +2,11 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
-#include <memory>
 #include <string>
 
+#include "common/bus/live_bus.hpp"
 #include "understory/health_t.hpp"
 
 namespace understory {
@@ -13,23 +14,17 @@ namespace understory {
 class HealthListener {
  public:
   using Handler = std::function<void(const health_t&)>;
-  /// Throws std::runtime_error naming the URL when the bus cannot be opened. An empty URL is LCM's
-  /// own default.
+  /// Throws BusError naming the URL when the bus cannot be joined.
   HealthListener(const std::string& lcm_url, Handler handler);
-  ~HealthListener();
-  HealthListener(const HealthListener&) = delete;
-  HealthListener& operator=(const HealthListener&) = delete;
 
-  /// Readable when a message waits; none is lost meanwhile but by a full buffer.
-  int descriptor() const;
+  int descriptor() const { return bus_.file_descriptor(); }  ///< Readable when a message waits.
   /// Waits up to `timeout` for one message and hands it over; false when none came.
   bool handle(std::chrono::milliseconds timeout);
-  /// Messages that were not of the type.
-  std::uint64_t refused() const;
+  std::uint64_t refused() const { return refused_; }  ///< Messages that were not of the type.
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  LiveBus bus_;
+  std::uint64_t refused_ = 0;
 };
 
 }  // namespace understory

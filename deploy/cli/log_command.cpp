@@ -1,4 +1,4 @@
-// `understory log info|check|repair|cut`: recorded logs.
+// `understory log info|check|accuracy|repair|cut`: recorded logs.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
@@ -10,6 +10,7 @@
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/interrupt.hpp"
+#include "deploy/cli/log_commands.hpp"
 #include "deploy/cli/log_statistics.hpp"
 #include "deploy/cli/progress.hpp"
 
@@ -212,6 +213,12 @@ void add_log_command(CLI::App& parent) {
 
   add("check", "What is wrong with it; exit status 1 when something is")
       ->callback(guarded(options, [](const Options& o) { check(o.file); }));
+
+  auto* accuracy_command =
+      add("accuracy", "How well the run in it agrees with the ground truth in it");
+  accuracy_command->add_option("--json", options->out, "Also write it to this file, with series");
+  accuracy_command->callback(
+      guarded(options, [](const Options& o) { log_accuracy(o.file, o.out); }));
 
   auto* repair_command = add("repair", "Writes what can be read as a log without damage");
   repair_command->add_option("--out", options->out, "The new log")->required();

@@ -14,6 +14,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", UNDERSTORY_VERSION);
   understory::add_launch_command(app);
   understory::add_sim_command(app);
+  understory::add_status_command(app);
   understory::add_doctor_command(app);
   understory::add_log_command(app);
   try {

@@ -9,12 +9,12 @@
 #include <set>
 #include <thread>
 
+#include "common/bus/live_bus.hpp"
 #include "common/io/lcm_log.hpp"
 #include "common/wire/convert.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/interrupt.hpp"
-#include "deploy/cli/live_publisher.hpp"
 #include "deploy/cli/progress.hpp"
 #include "sim/drive.hpp"
 #include "understory/ground_truth_t.hpp"
@@ -103,9 +103,10 @@ void write_log(const sim::Drive& drive, const std::string& file) {
 }
 
 void drive_live(const sim::Drive& drive, const Options& options) {
-  LivePublisher bus(options.lcm_url);
+  LiveBus bus(options.lcm_url);
   const Publish publish = [&](const std::string& channel, Utime /*utime*/, const Bytes& bytes) {
-    bus.publish(channel, bytes);
+    const auto refusal = bus.publish(channel, bytes);
+    if (refusal) fail(fmt::format("channel {}: {}", channel, refusal->detail));
   };
   Progress progress("driving", static_cast<double>(drive.size()), Progress::Without::kLines);
   publish("TRUTH_LANDMARKS", drive.utime(0), encode_message(truth_landmarks(drive)));

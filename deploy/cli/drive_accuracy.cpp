@@ -1,0 +1,119 @@
+#include "deploy/cli/drive_accuracy.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/wire/convert.hpp"
+#include "sim/point_grid.hpp"
+#include "understory/ground_truth_t.hpp"
+
+namespace understory {
+namespace {
+
+constexpr double kTileM = 5.0;
+
+}  // namespace
+
+double ComparedPose::position_error_m() const {
+  return (world_T_vehicle.translation() - true_world_T_vehicle.translation()).norm();
+}
+
+double ComparedPose::heading_error_rad() const {
+  return std::abs(wrap_angle(world_T_vehicle.theta() - true_world_T_vehicle.theta()));
+}
+
+void DriveAccuracyCollector::add(const LogEvent& event) {
+  if (event.channel == "GROUND_TRUTH") {
+    const auto truth = decode_message<ground_truth_t>(event.data);
+    if (truth) truth_.insert_or_assign(truth->utime, from_wire(truth->world_T_vehicle));
+  } else if (event.channel == "TRUTH_LANDMARKS") {
+    const auto landmarks = decode_message<truth_landmarks_t>(event.data);
+    if (landmarks) true_landmarks_ = *landmarks;
+  } else if (event.channel == "LANDMARKS") {
+    add_landmarks_event(event);
+  } else if (event.channel == "SLAM_POSE") {
+    const auto pose = decode_message<SlamPose>(event.data);
+    if (pose && pose->is_localised()) poses_.push_back(*pose);
+  } else if (event.channel == "SLAM_UPDATE") {
+    const auto update = decode_message<MapUpdate>(event.data);
+    if (!update) return;
+    ++counted_.updates[update->status];
+    if (!first_update_ && update->status == MapUpdateStatus::kFirstMap) first_update_ = *update;
+  } else if (event.channel == "MAP") {
+    const auto map = decode_message<WholeMap>(event.data);
+    if (map && map->complete) map_ = *map;
+  } else if (event.channel == "HEALTH") {
+    const auto health = decode_message<health_t>(event.data);
+    if (health) counted_.last_health.insert_or_assign(health->process, *health);
+  }
+}
+
+void DriveAccuracyCollector::add_landmarks_event(const LogEvent& event) {
+  const auto header = header_of(event.data);
+  if (!header) return;
+  ++counted_.scans;
+  if (last_scan_ && header->sequence > *last_scan_ + 1) {
+    counted_.log_lost += static_cast<std::uint64_t>(header->sequence - *last_scan_ - 1);
+  }
+  last_scan_ = header->sequence;
+}
+
+std::optional<ComparedPose> DriveAccuracyCollector::compare(Utime utime, const SE2& map_T_vehicle,
+                                                            const SE2& world_T_map) const {
+  const auto truth = truth_.find(utime);
+  if (truth == truth_.end()) return std::nullopt;
+  return ComparedPose{utime, world_T_map * map_T_vehicle, truth->second};
+}
+
+std::optional<DriveAccuracy> DriveAccuracyCollector::finish() const {
+  if (!first_update_) return std::nullopt;
+  const auto base = truth_.find(first_update_->utime);
+  if (base == truth_.end()) return std::nullopt;
+  const SE2 world_T_map = base->second * first_update_->map_T_vehicle.inverse();
+
+  DriveAccuracy accuracy = counted_;
+  for (const auto& pose : poses_) {
+    const auto compared = compare(pose.utime, pose.map_T_vehicle(), world_T_map);
+    if (compared) accuracy.live.push_back(*compared);
+  }
+  for (const auto& landmark : true_landmarks_.landmarks) {
+    accuracy.true_landmarks_m.emplace_back(landmark.position_m[0], landmark.position_m[1]);
+  }
+  if (!map_) return accuracy;
+  for (const auto& keyframe : map_->keyframes) {
+    const auto compared = compare(keyframe.utime, keyframe.map_T_vehicle, world_T_map);
+    if (compared) accuracy.keyframes.push_back(*compared);
+  }
+  const sim::PointGrid grid(accuracy.true_landmarks_m, kTileM);
+  for (const auto& landmark : map_->landmarks) {
+    accuracy.landmarks_m.push_back(world_T_map * landmark.position_m);
+    const auto nearest = grid.nearest(accuracy.landmarks_m.back());
+    if (nearest) accuracy.landmark_errors_m.push_back(nearest->distance_m);
+  }
+  return accuracy;
+}
+
+double mean(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
+}
+
+double maximum(const std::vector<double>& values) {
+  return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
+}
+
+double rms(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value * value;
+  return values.empty() ? 0.0 : std::sqrt(sum / static_cast<double>(values.size()));
+}
+
+std::vector<double> position_errors_m(const std::vector<ComparedPose>& poses) {
+  std::vector<double> errors;
+  errors.reserve(poses.size());
+  for (const auto& pose : poses) errors.push_back(pose.position_error_m());
+  return errors;
+}
+
+}  // namespace understory

@@ -1,0 +1,67 @@
+// How well a recorded run agrees with the ground truth recorded beside it.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/io/lcm_log.hpp"
+#include "common/model/map.hpp"
+#include "common/model/slam_output.hpp"
+#include "understory/health_t.hpp"
+#include "understory/truth_landmarks_t.hpp"
+
+namespace understory {
+
+/// A pose estimate beside the truth of the same instant, frame world.
+struct ComparedPose {
+  Utime utime = 0;
+  SE2 world_T_vehicle;
+  SE2 true_world_T_vehicle;
+
+  double position_error_m() const;
+  double heading_error_rad() const;
+};
+
+struct DriveAccuracy {
+  std::vector<ComparedPose> live;       ///< Every pose of SLAM_POSE that claims to mean something.
+  std::vector<ComparedPose> keyframes;  ///< Of the last MAP.
+  std::vector<Eigen::Vector2d> landmarks_m;       ///< Of the last MAP, frame world.
+  std::vector<Eigen::Vector2d> true_landmarks_m;  ///< Frame world.
+  std::vector<double> landmark_errors_m;          ///< To the nearest true one.
+  std::uint64_t scans = 0;                        ///< Of LANDMARKS in the log.
+  std::map<MapUpdateStatus, std::uint64_t> updates;
+  std::map<std::string, health_t> last_health;  ///< By process.
+  std::uint64_t log_lost = 0;                   ///< LANDMARKS missing in the log itself.
+};
+
+/// Collects a log's events. The map's frame is tied to the world at the base of the first keyframe:
+/// nothing is aligned, so an error in the first heading counts.
+class DriveAccuracyCollector {
+ public:
+  void add(const LogEvent& event);
+  /// None when the log has no ground truth or no first map.
+  std::optional<DriveAccuracy> finish() const;
+
+ private:
+  void add_landmarks_event(const LogEvent& event);
+  std::optional<ComparedPose> compare(Utime utime, const SE2& map_T_vehicle,
+                                      const SE2& world_T_map) const;
+
+  std::map<Utime, SE2> truth_;
+  std::vector<SlamPose> poses_;
+  std::optional<MapUpdate> first_update_;
+  std::optional<WholeMap> map_;
+  truth_landmarks_t true_landmarks_{};
+  std::optional<std::int64_t> last_scan_;
+  DriveAccuracy counted_;
+};
+
+double mean(const std::vector<double>& values);     ///< 0 of none.
+double maximum(const std::vector<double>& values);  ///< 0 of none.
+double rms(const std::vector<double>& values);      ///< 0 of none.
+std::vector<double> position_errors_m(const std::vector<ComparedPose>& poses);
+
+}  // namespace understory

@@ -1,0 +1,76 @@
+// `understory status`: a live table of HEALTH.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "deploy/cli/commands.hpp"
+#include "deploy/cli/failure.hpp"
+#include "deploy/cli/health_listener.hpp"
+#include "deploy/cli/interrupt.hpp"
+#include "deploy/cli/status_table.hpp"
+
+namespace understory {
+namespace {
+
+using Clock = StatusTable::Clock;
+
+struct Options {
+  std::string lcm_url;
+  bool once = false;
+  bool json = false;
+};
+
+void listen_until(HealthListener& listener, Clock::time_point end) {
+  while (Clock::now() < end) {
+    throw_if_interrupted();
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now());
+    listener.handle(std::max(std::chrono::milliseconds(1), left));
+  }
+}
+
+void print(const StatusTable& table, bool json) {
+  const auto now = Clock::now();
+  fmt::print("{}", json ? table.json(now).dump(2) + "\n" : table.text(now));
+  std::fflush(stdout);
+}
+
+void status(const Options& options) {
+  catch_interrupts();
+  StatusTable table;
+  HealthListener listener(options.lcm_url,
+                          [&](const health_t& health) { table.add(health, Clock::now()); });
+  if (options.once) {
+    // HEALTH comes once a second: everybody who answers has spoken by then.
+    listen_until(listener, Clock::now() + std::chrono::milliseconds(1500));
+    print(table, options.json);
+    if (table.empty()) fail("status: no process is heard on HEALTH");
+    return;
+  }
+  const bool terminal = ::isatty(STDOUT_FILENO) == 1;
+  try {
+    while (true) {
+      listen_until(listener, Clock::now() + std::chrono::seconds(1));
+      if (terminal) fmt::print("\033[H\033[2J");
+      print(table, options.json);
+    }
+  } catch (const Interrupted&) {
+    return;  // Ctrl-C is how this command ends.
+  }
+}
+
+}  // namespace
+
+void add_status_command(CLI::App& parent) {
+  auto* command = parent.add_subcommand("status", "A live table of the processes' health");
+  auto options = std::make_shared<Options>();
+  command->add_option("--lcm-url", options->lcm_url, "Bus, e.g. udpm://239.255.76.67:7667?ttl=0");
+  command->add_flag("--once", options->once, "Listen for 1.5 s, print, end");
+  command->add_flag("--json", options->json, "As JSON");
+  command->callback([options] { status(*options); });
+}
+
+}  // namespace understory

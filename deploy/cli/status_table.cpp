@@ -1,0 +1,110 @@
+#include "deploy/cli/status_table.hpp"
+
+#include <fmt/format.h>
+
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+namespace understory {
+namespace {
+
+const char* state_name(std::int8_t state) {
+  switch (state) {
+    case health_t::STATE_STARTING:
+      return "STARTING";
+    case health_t::STATE_OK:
+      return "OK";
+    case health_t::STATE_DEGRADED:
+      return "DEGRADED";
+    case health_t::STATE_ERROR:
+      return "ERROR";
+    case health_t::STATE_STOPPING:
+      return "STOPPING";
+    default:
+      return "?";
+  }
+}
+
+double mebibytes(std::int64_t bytes) { return static_cast<double>(bytes) / (1024.0 * 1024.0); }
+
+std::string channel_line(const channel_health_t& channel) {
+  return fmt::format("  {} {:<24} {:>9} {:>8.1f} {:>7} {:>6} {:>6} {:>9} {:>7}\n",
+                     channel.output ? "->" : "<-", channel.channel, channel.messages,
+                     channel.rate_hz, channel.lost, channel.duplicates, channel.late,
+                     channel.malformed, channel.dropped);
+}
+
+nlohmann::ordered_json channel_json(const channel_health_t& channel) {
+  return {{"channel", channel.channel},
+          {"output", channel.output != 0},
+          {"messages", channel.messages},
+          {"rate_hz", channel.rate_hz},
+          {"gaps", channel.gaps},
+          {"lost", channel.lost},
+          {"duplicates", channel.duplicates},
+          {"late", channel.late},
+          {"restarts", channel.restarts},
+          {"malformed", channel.malformed},
+          {"dropped", channel.dropped}};
+}
+
+}  // namespace
+
+void StatusTable::add(const health_t& health, Clock::time_point now) {
+  latest_.insert_or_assign(health.process, Entry{health, now});
+}
+
+std::string StatusTable::text(Clock::time_point now) const {
+  std::string result;
+  for (const auto& [name, entry] : latest_) {
+    const auto& health = entry.health;
+    fmt::format_to(std::back_inserter(result),
+                   "{} {} pid {} up {:.0f} s, {} handled, latency p50 {:.1f} p99 {:.1f} ms, "
+                   "{:.0f} MiB\n",
+                   name, entry.silent(now) ? "SILENT" : state_name(health.state), health.pid,
+                   health.uptime_s, health.handled,
+                   1e-3 * static_cast<double>(health.latency_p50_us),
+                   1e-3 * static_cast<double>(health.latency_p99_us), mebibytes(health.rss_bytes));
+    if (!health.last_error.empty()) {
+      fmt::format_to(std::back_inserter(result), "  last error {}: {}\n", health.last_error_code,
+                     health.last_error);
+    }
+    result += fmt::format("     {:<24} {:>9} {:>8} {:>7} {:>6} {:>6} {:>9} {:>7}\n", "channel",
+                          "messages", "Hz", "lost", "twice", "late", "malformed", "dropped");
+    for (const auto& channel : health.channels) result += channel_line(channel);
+  }
+  return result.empty() ? "no process is heard\n" : result;
+}
+
+nlohmann::ordered_json StatusTable::json(Clock::time_point now) const {
+  nlohmann::ordered_json processes = nlohmann::ordered_json::array();
+  for (const auto& [name, entry] : latest_) {
+    const auto& health = entry.health;
+    nlohmann::ordered_json process{
+        {"process", name},
+        {"state", entry.silent(now) ? "SILENT" : state_name(health.state)},
+        {"pid", health.pid},
+        {"version", health.version},
+        {"uptime_s", health.uptime_s},
+        {"handled", health.handled},
+        {"message_utime", health.message_utime},
+        {"latency_p50_us", health.latency_p50_us},
+        {"latency_p99_us", health.latency_p99_us},
+        {"latency_max_us", health.latency_max_us},
+        {"rss_bytes", health.rss_bytes},
+        {"last_error_code", health.last_error_code},
+        {"last_error", health.last_error},
+        {"channels", nlohmann::ordered_json::array()},
+        {"reasons", nlohmann::ordered_json::array()}};
+    for (const auto& channel : health.channels)
+      process["channels"].push_back(channel_json(channel));
+    for (const auto& reason : health.reasons) {
+      process["reasons"].push_back(
+          {{"channel", reason.channel}, {"reason", reason.reason}, {"count", reason.count}});
+    }
+    processes.push_back(std::move(process));
+  }
+  return {{"processes", std::move(processes)}};
+}
+
+}  // namespace understory
