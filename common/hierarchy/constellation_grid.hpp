@@ -42,9 +42,17 @@ class PointGrid {
     const std::uint32_t x_end = cell_of(x + radius_m);
     const std::uint32_t y_begin = cell_of(y - radius_m);
     const std::uint32_t y_end = cell_of(y + radius_m);
+    std::uint64_t key = ~std::uint64_t{0};
+    std::uint32_t tile = IndexTable::kNone;
     for (std::uint32_t cx = cell_of(x - radius_m); cx <= x_end; ++cx) {
       for (std::uint32_t cy = y_begin; cy <= y_end; ++cy) {
-        for (Slot slot = head(cx, cy); slot != kNoSlot; slot = points_[slot].next) {
+        if (tile_key(cx, cy) != key) {  // cells of one tile share its look-up
+          key = tile_key(cx, cy);
+          tile = directory_.find(key);
+        }
+        if (tile == IndexTable::kNone) continue;
+        Slot slot = tiles_[tile].heads[index_in_tile(cx, cy)];
+        for (; slot != kNoSlot; slot = points_[slot].next) {
           const double dx = points_[slot].x - x;
           const double dy = points_[slot].y - y;
           const double d = dx * dx + dy * dy;

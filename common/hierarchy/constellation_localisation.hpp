@@ -45,8 +45,8 @@ struct LocaliseParameters {
   /// ... and if the best different pose is so many decades more likely to be chance.
   double min_log10_margin = 6.0;
   /// Triangles of the accepted pose that are looked up again for the runner-up.
-  int runner_up_probes = 6;
-  /// Gives up ("not sure") after so many hypotheses.
+  int runner_up_probes = 3;
+  /// Gives up ("not sure") after work worth so many hypotheses that fail their test at once.
   std::uint32_t max_hypotheses = 30000;
 };
 

@@ -13,6 +13,10 @@ namespace {
 
 /// Points looked at before a hypothesis is worth a refit on all.
 constexpr std::size_t kTestPoints = 16;
+/// Points whose triangles are tried first; as many again and again until all have been.
+constexpr std::size_t kFirstPoints = 12;
+/// What a refit on all points costs, in hypotheses that fail their test.
+constexpr std::uint32_t kFitCost = 50;
 /// Wald's thresholds on the log likelihood ratio.
 constexpr double kReject = -3.0;
 constexpr double kAccept = 9.0;
@@ -49,13 +53,17 @@ class Search {
  public:
   Search(const ConstellationMap& map, const PreparedObservation& observation,
          const LocaliseParameters& parameters, const std::optional<Disc>& where)
-      : map_(map), observation_(observation), parameters_(parameters), where_(where) {}
+      : map_(map),
+        observation_(observation),
+        parameters_(parameters),
+        where_(where),
+        source_(observation, parameters.neighbours) {}
 
   Localisation run();
 
  private:
-  void order_triangles();
-  bool search(double side_sigmas);
+  std::span<const Triangle> more_triangles();
+  bool search(std::span<const Triangle> triangles, double side_sigmas);
   void look_for_runner_up(double side_sigmas);
   Query make_query(const Triangle& triangle) const;
   void add_tests(Query& query) const;
@@ -69,28 +77,36 @@ class Search {
   double false_alarm(const FittedPose& pose) const {
     return pose.log10_tail + std::log10(std::max<double>(hypotheses_, 1.0));
   }
-  bool spent() const { return hypotheses_ >= parameters_.max_hypotheses; }
+  bool spent() const { return hypotheses_ + kFitCost * fits_ >= parameters_.max_hypotheses; }
+  double margin() const { return (runner_up_ ? runner_up_->log10_tail : 0.0) - best_->log10_tail; }
+  bool ambiguous() const { return margin() < parameters_.min_log10_margin; }
   Localisation result() const;
 
   const ConstellationMap& map_;
   const PreparedObservation& observation_;
   const LocaliseParameters& parameters_;
   const std::optional<Disc>& where_;
-  std::vector<Triangle> triangles_;  // the most telling first
+  TriangleSource source_;
+  std::vector<Triangle> triangles_;  // taken from the source, in the order of trying
+  std::size_t points_taken_ = 0;
   std::optional<FittedPose> best_;
   std::optional<FittedPose> runner_up_;  // at a different pose
   std::uint32_t hypotheses_ = 0;
+  std::uint32_t fits_ = 0;
 };
 
-void Search::order_triangles() {
-  const std::vector<Triangle> triangles = triangles_of(observation_, parameters_.neighbours);
-  std::vector<std::uint64_t> order(triangles.size());
-  for (std::size_t i = 0; i < triangles.size(); ++i) {
-    order[i] = (std::uint64_t{map_.triangle_index().crowd(triangles[i])} << 32) | i;
+/// The triangles of some more points, the most telling of them first.
+std::span<const Triangle> Search::more_triangles() {
+  const std::size_t known = triangles_.size();
+  const std::vector<Triangle> fresh = source_.take(std::max(kFirstPoints, points_taken_));
+  points_taken_ += std::max(kFirstPoints, points_taken_);
+  std::vector<std::uint64_t> order(fresh.size());
+  for (std::size_t i = 0; i < fresh.size(); ++i) {
+    order[i] = (std::uint64_t{map_.triangle_index().crowd(fresh[i])} << 32) | i;
   }
   std::sort(order.begin(), order.end());
-  triangles_.reserve(triangles.size());
-  for (const std::uint64_t key : order) triangles_.push_back(triangles[key & 0xFFFFFFFFU]);
+  for (const std::uint64_t key : order) triangles_.push_back(fresh[key & 0xFFFFFFFFU]);
+  return std::span(triangles_).subspan(known);
 }
 
 std::array<float, 3> Search::tolerance(const Triangle& triangle, double side_sigmas) const {
@@ -194,6 +210,7 @@ std::optional<FittedPose> Search::try_hypothesis(const Query& query,
   for (std::size_t k = 0; k < tested; ++k) {
     if (hit[k] != kNoSlot) pairs.push_back({query.tests[k].point, hit[k], 0.0});
   }
+  ++fits_;
   return fit_pose(observation_, map_.grid(), std::move(pairs), parameters_);
 }
 
@@ -213,8 +230,8 @@ void Search::consider(FittedPose pose) {
 }
 
 /// True as soon as a pose is found that chance does not explain.
-bool Search::search(double side_sigmas) {
-  for (const Triangle& triangle : triangles_) {
+bool Search::search(std::span<const Triangle> triangles, double side_sigmas) {
+  for (const Triangle& triangle : triangles) {
     Query query = make_query(triangle);
     map_.triangle_index().for_each_similar(triangle, tolerance(triangle, side_sigmas),
                                            [&](const TriangleIndex::Entry& entry) {
@@ -229,22 +246,25 @@ bool Search::search(double side_sigmas) {
   return false;
 }
 
-/// A scene that repeats elsewhere shows in the triangles of the accepted pose: they are looked up
-/// to the end.
+/// A scene that repeats elsewhere shows in the triangles of the accepted pose, of which the search
+/// has looked at one only up to the accepted hypothesis. Those that find their own landmarks again
+/// would find a copy of them too: so many are looked up to the end.
 void Search::look_for_runner_up(double side_sigmas) {
   std::vector<Slot> explained(observation_.points.size(), kNoSlot);
   for (const Pair& pair : best_->pairs) explained[pair.point] = pair.slot;
   int probes = parameters_.runner_up_probes;
   for (const Triangle& triangle : triangles_) {
-    if (probes == 0) break;
+    if (probes <= 0 || spent() || ambiguous()) break;
     const std::array<Slot, 3> own{explained[triangle.vertex[0]], explained[triangle.vertex[1]],
                                   explained[triangle.vertex[2]]};
     if (own[0] == kNoSlot || own[1] == kNoSlot || own[2] == kNoSlot) continue;
-    --probes;
     Query query = make_query(triangle);
     map_.triangle_index().for_each_similar(triangle, tolerance(triangle, side_sigmas),
                                            [&](const TriangleIndex::Entry& entry) {
-                                             if (entry.vertex == own) return true;
+                                             if (entry.vertex == own) {
+                                               --probes;
+                                               return true;
+                                             }
                                              if (query.tests.empty()) add_tests(query);
                                              if (auto pose = try_hypothesis(query, entry.vertex))
                                                consider(std::move(*pose));
@@ -269,14 +289,13 @@ Localisation Search::result() const {
         {observation_.observed[pair.point], map_.id_of(pair.slot), std::sqrt(pair.squared_m2)});
   }
   result.log10_false_alarm = false_alarm(*best_);
-  result.log10_margin = -best_->log10_tail;
+  result.log10_margin = margin();
   if (runner_up_) {
     result.runner_up_inliers = static_cast<std::uint32_t>(runner_up_->pairs.size());
-    result.log10_margin += runner_up_->log10_tail;
   }
   if (!accepted()) {
     result.outcome = spent() ? LocaliseOutcome::kGaveUp : LocaliseOutcome::kLikelyChance;
-  } else if (result.log10_margin < parameters_.min_log10_margin) {
+  } else if (ambiguous()) {
     result.outcome = LocaliseOutcome::kAmbiguous;
   } else {
     result.outcome = LocaliseOutcome::kFound;
@@ -285,12 +304,12 @@ Localisation Search::result() const {
 }
 
 Localisation Search::run() {
-  order_triangles();
   double side_sigmas = parameters_.narrow_side_sigmas;
-  bool found = search(side_sigmas);
+  bool found = false;
+  while (!found && !spent() && !source_.exhausted()) found = search(more_triangles(), side_sigmas);
   if (!found && !spent()) {
     side_sigmas = parameters_.wide_side_sigmas;
-    found = search(side_sigmas);
+    found = search(triangles_, side_sigmas);
   }
   if (found) look_for_runner_up(side_sigmas);
   return result();

@@ -4,69 +4,10 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 namespace understory::constellation {
 namespace {
-
-constexpr int kMaxNeighbours = 8;
-
-struct NearestIndices {
-  std::array<std::uint32_t, kMaxNeighbours> index{};
-  int count = 0;
-  bool has(std::uint32_t wanted) const {
-    return std::find(index.begin(), index.begin() + count, wanted) != index.begin() + count;
-  }
-};
-
-/// Points sorted by x: neighbours of one are sought to both sides, until x alone is too far.
-std::vector<NearestIndices> nearest_indices(const std::vector<PreparedPoint>& points, int wanted) {
-  struct ByX {
-    double x;
-    double y;
-    std::uint32_t index;
-  };
-  std::vector<ByX> order(points.size());
-  for (std::uint32_t i = 0; i < points.size(); ++i) {
-    order[i] = {points[i].position.x(), points[i].position.y(), i};
-  }
-  std::sort(order.begin(), order.end(), [](const ByX& a, const ByX& b) {
-    return a.x < b.x || (a.x == b.x && a.index < b.index);
-  });
-  std::vector<NearestIndices> nearest(points.size());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    std::array<double, kMaxNeighbours> squared{};
-    NearestIndices& list = nearest[order[i].index];
-    // True while the walk may go on.
-    const auto consider = [&](const ByX& other) {
-      const double dx = other.x - order[i].x;
-      const double dy = other.y - order[i].y;
-      const double d = dx * dx + dy * dy;
-      if (list.count == wanted) {
-        const double farthest = squared[static_cast<std::size_t>(wanted) - 1];
-        if (dx * dx > farthest) return false;
-        if (d >= farthest) return true;
-      }
-      auto k = static_cast<std::size_t>(list.count < wanted ? list.count++ : wanted - 1);
-      for (; k > 0 && d < squared[k - 1]; --k) {
-        squared[k] = squared[k - 1];
-        list.index[k] = list.index[k - 1];
-      }
-      squared[k] = d;
-      list.index[k] = other.index;
-      return true;
-    };
-    // Both ways in turn, so that the list is short of far points early.
-    std::size_t down = i;
-    std::size_t up = i + 1;
-    bool go_down = down > 0;
-    bool go_up = up < order.size();
-    while (go_down || go_up) {
-      if (go_down) go_down = consider(order[--down]) && down > 0;
-      if (go_up) go_up = consider(order[up++]) && up < order.size();
-    }
-  }
-  return nearest;
-}
 
 bool flat(const Triangle& triangle, const std::vector<PreparedPoint>& points) {
   const PreparedPoint& a = points[triangle.vertex[0]];
@@ -108,26 +49,88 @@ PreparedObservation prepare(std::span<const ObservedPoint> points,
   return prepared;
 }
 
-std::vector<Triangle> triangles_of(const PreparedObservation& observation, int neighbours) {
-  const int wanted = std::clamp(neighbours, 2, kMaxNeighbours);
-  const auto nearest = nearest_indices(observation.points, wanted);
-  const auto corner = [&](std::uint32_t index) {
-    return Corner{index, index, observation.points[index].position};
+bool TriangleSource::Neighbours::has(std::uint32_t wanted) const {
+  for (int i = 0; i < count; ++i) {
+    if (point[static_cast<std::size_t>(i)] == wanted) return true;
+  }
+  return false;
+}
+
+TriangleSource::TriangleSource(const PreparedObservation& observation, int neighbours)
+    : observation_(observation), wanted_(std::clamp(neighbours, 2, kMaxNeighbours)) {
+  const std::size_t n = observation.points.size();
+  by_x_.resize(n);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    by_x_[i] = {observation.points[i].position.x(), observation.points[i].position.y(), i};
+  }
+  std::sort(by_x_.begin(), by_x_.end(), [](const ByX& a, const ByX& b) {
+    return a.x < b.x || (a.x == b.x && (a.y < b.y || (a.y == b.y && a.point < b.point)));
+  });
+  // Strides of the golden ratio spread the first few points evenly, whatever the order given.
+  auto stride = static_cast<std::size_t>(0.618 * static_cast<double>(n)) | 1U;
+  while (std::gcd(stride, n) != 1) ++stride;
+  order_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) order_[i] = static_cast<std::uint32_t>((i * stride) % n);
+  neighbours_.resize(n);
+}
+
+/// Points sorted by x: neighbours are sought to both sides, until x alone is too far.
+TriangleSource::Neighbours TriangleSource::nearest(std::size_t place) const {
+  Neighbours list;
+  std::array<double, kMaxNeighbours> squared{};
+  const ByX& own = by_x_[place];
+  // True while the walk may go on.
+  const auto consider = [&](const ByX& other) {
+    const double dx = other.x - own.x;
+    const double dy = other.y - own.y;
+    const double d = dx * dx + dy * dy;
+    if (list.count == wanted_) {
+      const double farthest = squared[static_cast<std::size_t>(wanted_) - 1];
+      if (dx * dx > farthest) return false;
+      if (d >= farthest) return true;
+    }
+    auto k = static_cast<std::size_t>(list.count < wanted_ ? list.count++ : wanted_ - 1);
+    for (; k > 0 && d < squared[k - 1]; --k) {
+      squared[k] = squared[k - 1];
+      list.point[k] = list.point[k - 1];
+    }
+    squared[k] = d;
+    list.point[k] = other.point;
+    return true;
+  };
+  // Both ways in turn, so that far points leave the list early.
+  std::size_t down = place;
+  std::size_t up = place + 1;
+  bool go_down = down > 0;
+  bool go_up = up < by_x_.size();
+  while (go_down || go_up) {
+    if (go_down) go_down = consider(by_x_[--down]) && down > 0;
+    if (go_up) go_up = consider(by_x_[up++]) && up < by_x_.size();
+  }
+  return list;
+}
+
+std::vector<Triangle> TriangleSource::take(std::size_t count) {
+  const auto corner = [&](std::uint32_t point) {
+    return Corner{point, point, observation_.points[point].position};
   };
   std::vector<Triangle> triangles;
-  triangles.reserve(nearest.size() * static_cast<std::size_t>(wanted * (wanted - 1) / 2));
-  for (std::uint32_t a = 0; a < nearest.size(); ++a) {
-    for (int i = 0; i < nearest[a].count; ++i) {
-      for (int j = i + 1; j < nearest[a].count; ++j) {
-        const std::uint32_t b = nearest[a].index[static_cast<std::size_t>(i)];
-        const std::uint32_t c = nearest[a].index[static_cast<std::size_t>(j)];
-        // The lowest of the corners that hold the triangle names it.
-        if (b < a && nearest[b].has(a) && nearest[b].has(c)) continue;
-        if (c < a && nearest[c].has(a) && nearest[c].has(b)) continue;
+  triangles.reserve(count * static_cast<std::size_t>(wanted_ * (wanted_ - 1) / 2));
+  for (; count > 0 && !exhausted(); --count, ++next_) {
+    const std::uint32_t a = by_x_[order_[next_]].point;
+    const Neighbours list = nearest(order_[next_]);
+    for (int i = 0; i < list.count; ++i) {
+      for (int j = i + 1; j < list.count; ++j) {
+        const std::uint32_t b = list.point[static_cast<std::size_t>(i)];
+        const std::uint32_t c = list.point[static_cast<std::size_t>(j)];
+        // Given out before, on another corner's turn?
+        if (neighbours_[b].has(a) && neighbours_[b].has(c)) continue;
+        if (neighbours_[c].has(a) && neighbours_[c].has(b)) continue;
         const Triangle triangle = canonical_triangle(corner(a), corner(b), corner(c));
-        if (!flat(triangle, observation.points)) triangles.push_back(triangle);
+        if (!flat(triangle, observation_.points)) triangles.push_back(triangle);
       }
     }
+    neighbours_[a] = list;
   }
   return triangles;
 }
