@@ -12,14 +12,33 @@ namespace {
 
 constexpr LandmarkId kReservedId = ~LandmarkId{0};
 
-bool has_corner(const std::array<constellation::Slot, 3>& triangle, constellation::Slot slot) {
-  return triangle[0] == slot || triangle[1] == slot || triangle[2] == slot;
+using SlotTriple = std::array<constellation::Slot, 3>;
+
+SlotTriple ascending(constellation::Slot a, constellation::Slot b, constellation::Slot c) {
+  if (a > b) std::swap(a, b);
+  if (b > c) std::swap(b, c);
+  if (a > b) std::swap(a, b);
+  return {a, b, c};
 }
 
-template <class T>
-void sort_unique(std::vector<T>& values) {
-  std::sort(values.begin(), values.end());
-  values.erase(std::unique(values.begin(), values.end()), values.end());
+/// The library's comparison of arrays goes byte by byte.
+bool before(const SlotTriple& a, const SlotTriple& b) {
+  const std::uint64_t first = (std::uint64_t{a[0]} << 32) | a[1];
+  const std::uint64_t second = (std::uint64_t{b[0]} << 32) | b[1];
+  return first != second ? first < second : a[2] < b[2];
+}
+
+void sort_unique(std::vector<SlotTriple>& triangles) {
+  std::sort(triangles.begin(), triangles.end(), before);
+  const auto same = [](const SlotTriple& a, const SlotTriple& b) {
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+  };
+  triangles.erase(std::unique(triangles.begin(), triangles.end(), same), triangles.end());
+}
+
+void sort_unique(std::vector<constellation::Slot>& slots) {
+  std::sort(slots.begin(), slots.end());
+  slots.erase(std::unique(slots.begin(), slots.end()), slots.end());
 }
 
 }  // namespace
@@ -98,36 +117,79 @@ template <class Change>
 void ConstellationMap::update(Slot changed, std::vector<Slot>& anchors, Change&& change,
                               Slot gone) {
   std::sort(anchors.begin(), anchors.end());
-  std::vector<SlotTriple> before;
-  collect_triangles(anchors, before);
+  std::vector<Neighbours> lists_before;
+  lists_before.reserve(anchors.size());
+  for (const Slot anchor : anchors) lists_before.push_back(neighbours_[anchor]);
+
   // Sides that end at the changed landmark have to be computed before it changes.
-  for (const SlotTriple& triangle : before) {
-    if (has_corner(triangle, changed)) triangles_.remove(canonical(triangle));
-  }
+  const std::vector<SlotTriple> old_ends = triangles_at(changed, anchors);
+  for (const SlotTriple& triangle : old_ends) triangles_.remove(canonical(triangle));
   change();
   for (const Slot anchor : anchors) {
     neighbours_[anchor] = anchor == gone ? Neighbours{} : nearest_neighbours(anchor);
   }
-  std::vector<SlotTriple> after;
-  collect_triangles(anchors, after);
-
-  const auto held = [&](const SlotTriple& triangle, bool by_unchanged_only) {
-    return std::any_of(triangle.begin(), triangle.end(), [&](Slot anchor) {
-      if (by_unchanged_only && std::binary_search(anchors.begin(), anchors.end(), anchor)) {
-        return false;
-      }
-      return holds(anchor, triangle);
-    });
-  };
-  for (const SlotTriple& triangle : before) {
-    if (has_corner(triangle, changed)) continue;
-    if (!held(triangle, false)) triangles_.remove(canonical(triangle));
+  for (const SlotTriple& triangle : triangles_at(changed, anchors)) {
+    triangles_.add(canonical(triangle));
   }
-  for (const SlotTriple& triangle : after) {
-    const bool is_new =
-        has_corner(triangle, changed) ||
-        (!std::binary_search(before.begin(), before.end(), triangle) && !held(triangle, true));
-    if (is_new) triangles_.add(canonical(triangle));
+
+  // Of the others only those count that an anchor holds no longer, or newly.
+  std::vector<SlotTriple> lost;
+  std::vector<SlotTriple> gained;
+  for (std::size_t i = 0; i < anchors.size(); ++i) {
+    if (anchors[i] == changed) continue;
+    collect_difference(anchors[i], lists_before[i], neighbours_[anchors[i]], changed, lost);
+    collect_difference(anchors[i], neighbours_[anchors[i]], lists_before[i], changed, gained);
+  }
+  sort_unique(lost);
+  sort_unique(gained);
+  const auto held_before = [&](Slot corner, const SlotTriple& triangle) {
+    const auto it = std::lower_bound(anchors.begin(), anchors.end(), corner);
+    const bool rewired = it != anchors.end() && *it == corner;
+    return holds(corner,
+                 rewired ? lists_before[static_cast<std::size_t>(it - anchors.begin())]
+                         : neighbours_[corner],
+                 triangle);
+  };
+  for (const SlotTriple& triangle : lost) {
+    const bool held = std::any_of(triangle.begin(), triangle.end(), [&](Slot corner) {
+      return holds(corner, neighbours_[corner], triangle);
+    });
+    if (!held) triangles_.remove(canonical(triangle));
+  }
+  for (const SlotTriple& triangle : gained) {
+    const bool held = std::any_of(triangle.begin(), triangle.end(),
+                                  [&](Slot corner) { return held_before(corner, triangle); });
+    if (!held) triangles_.add(canonical(triangle));
+  }
+}
+
+std::vector<ConstellationMap::SlotTriple> ConstellationMap::triangles_at(
+    Slot corner, const std::vector<Slot>& anchors) const {
+  std::vector<SlotTriple> triangles;
+  triangles.reserve(64);
+  for (const Slot anchor : anchors) {
+    const Neighbours& list = neighbours_[anchor];
+    if (anchor != corner && !list.has(corner)) continue;
+    for (std::uint32_t i = 0; i < list.count; ++i) {
+      for (std::uint32_t j = i + 1; j < list.count; ++j) {
+        if (anchor != corner && list.slot[i] != corner && list.slot[j] != corner) continue;
+        triangles.push_back(ascending(anchor, list.slot[i], list.slot[j]));
+      }
+    }
+  }
+  sort_unique(triangles);
+  return triangles;
+}
+
+void ConstellationMap::collect_difference(Slot anchor, const Neighbours& in, const Neighbours& out,
+                                          Slot except, std::vector<SlotTriple>& triangles) {
+  std::array<bool, kNeighbours> common{};
+  for (std::uint32_t i = 0; i < in.count; ++i) common[i] = out.has(in.slot[i]);
+  for (std::uint32_t i = 0; i < in.count; ++i) {
+    for (std::uint32_t j = i + 1; j < in.count; ++j) {
+      if ((common[i] && common[j]) || in.slot[i] == except || in.slot[j] == except) continue;
+      triangles.push_back(ascending(anchor, in.slot[i], in.slot[j]));
+    }
   }
 }
 
@@ -181,23 +243,7 @@ ConstellationMap::Neighbours ConstellationMap::nearest_neighbours(Slot slot) con
   return result;
 }
 
-void ConstellationMap::collect_triangles(const std::vector<Slot>& anchors,
-                                         std::vector<SlotTriple>& triangles) const {
-  for (const Slot anchor : anchors) {
-    const Neighbours& list = neighbours_[anchor];
-    for (std::uint32_t i = 0; i < list.count; ++i) {
-      for (std::uint32_t j = i + 1; j < list.count; ++j) {
-        SlotTriple triangle{anchor, list.slot[i], list.slot[j]};
-        std::sort(triangle.begin(), triangle.end());
-        triangles.push_back(triangle);
-      }
-    }
-  }
-  sort_unique(triangles);
-}
-
-bool ConstellationMap::holds(Slot anchor, const SlotTriple& triangle) const {
-  const Neighbours& list = neighbours_[anchor];
+bool ConstellationMap::holds(Slot anchor, const Neighbours& list, const SlotTriple& triangle) {
   return std::all_of(triangle.begin(), triangle.end(),
                      [&](Slot corner) { return corner == anchor || list.has(corner); });
 }

@@ -99,10 +99,12 @@ class ConstellationMap {
   /// Landmarks whose neighbours a landmark `slot` at `position` is, or would be.
   void collect_anchors(Slot slot, const Eigen::Vector2d& position,
                        std::vector<Slot>& anchors) const;
-  /// Triangles that the anchors' neighbourhoods hold: ascending slots, sorted, each once.
-  void collect_triangles(const std::vector<Slot>& anchors,
-                         std::vector<SlotTriple>& triangles) const;
-  bool holds(Slot anchor, const SlotTriple& triangle) const;
+  /// Triangles with that corner that the anchors' neighbourhoods hold: sorted, each once.
+  std::vector<SlotTriple> triangles_at(Slot corner, const std::vector<Slot>& anchors) const;
+  /// Triangles that `anchor` holds with the neighbours `in` and not with `out`, without `except`.
+  static void collect_difference(Slot anchor, const Neighbours& in, const Neighbours& out,
+                                 Slot except, std::vector<SlotTriple>& triangles);
+  static bool holds(Slot anchor, const Neighbours& list, const SlotTriple& triangle);
   constellation::Triangle canonical(const SlotTriple& triangle) const;
   /// Brings neighbourhoods and triangles up to date around `changed` while `change` is made; `gone`
   /// is `changed` if it is no longer there afterwards.
