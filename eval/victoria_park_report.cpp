@@ -11,12 +11,11 @@
 namespace understory::eval {
 namespace {
 
-/// Way travelled up to each pose [m].
-std::vector<double> lengths(const std::vector<StampedPose>& path) {
+/// Way of `point` (frame `vehicle`) up to each pose [m].
+std::vector<double> lengths(const std::vector<StampedPose>& path, const Eigen::Vector2d& point) {
   std::vector<double> sums{0.0};
   for (std::size_t i = 1; i < path.size(); ++i) {
-    sums.push_back(sums.back() +
-                   (path[i].pose.translation() - path[i - 1].pose.translation()).norm());
+    sums.push_back(sums.back() + (path[i].pose * point - path[i - 1].pose * point).norm());
   }
   return sums;
 }
@@ -71,7 +70,7 @@ nlohmann::json row_json(const TrajectoryRow& row) {
                          {"path_median_m", row.errors.to_path_median_m},
                          {"path_p90_m", row.errors.to_path_p90_m}};
   if (row.trees) {
-    json["trees"] = row.trees->trees.size();
+    json["trees"] = row.trees->well_seen;
     json["trees_found"] = row.trees->found;
     json["trees_doubled"] = row.trees->doubled;
     json["landmarks_elsewhere"] = row.trees->landmarks_elsewhere;
@@ -138,8 +137,10 @@ std::vector<StampedPose> read_batch_solution(const std::filesystem::path& file,
     const double y = reader.require("y [m]");
     poses.push_back({0, SE2(x, y, reader.require("the heading [rad]"))});
   }
-  const std::vector<double> way = lengths(poses);
-  const std::vector<double> reckoned_way = lengths(dead_reckoned);
+  // Its poses are those of the rear axle.
+  const Eigen::Vector2d axle = victoria_park::axle_T_vehicle().inverse().translation();
+  const std::vector<double> way = lengths(poses, {0.0, 0.0});
+  const std::vector<double> reckoned_way = lengths(dead_reckoned, axle);
   const double scale = way.back() > 0.0 ? reckoned_way.back() / way.back() : 1.0;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const auto at = std::ranges::lower_bound(reckoned_way, way[i] * scale);
@@ -172,7 +173,7 @@ void print(const VictoriaParkReport& report) {
     fmt::print(
         "; of {} curated trees {} found, {} doubled; {} landmarks elsewhere;\n"
         "observations of a tree spread by {:.2f} m (median), its landmark is {:.2f} m off",
-        trees->trees.size(), trees->found, trees->doubled, trees->landmarks_elsewhere,
+        trees->well_seen, trees->found, trees->doubled, trees->landmarks_elsewhere,
         trees->median_spread_m, trees->median_distance_m);
   }
   const std::vector<double> times = scan_times_ms(run);

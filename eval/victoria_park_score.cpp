@@ -131,8 +131,7 @@ namespace {
 
 /// Places each tree by the mean of its observations.
 std::vector<CuratedTree> place_trees(std::span<const StampedPose> trajectory,
-                                     std::span<const CuratedObservation> observations,
-                                     std::size_t min_observations) {
+                                     std::span<const CuratedObservation> observations) {
   std::map<int, std::vector<Eigen::Vector2d>> placed;
   for (const CuratedObservation& observation : observations) {
     const auto pose = pose_at(trajectory, observation.utime);
@@ -140,7 +139,6 @@ std::vector<CuratedTree> place_trees(std::span<const StampedPose> trajectory,
   }
   std::vector<CuratedTree> trees;
   for (const auto& [id, points] : placed) {
-    if (points.size() < min_observations) continue;
     CuratedTree tree;
     tree.id = id;
     tree.observations = points.size();
@@ -182,7 +180,7 @@ TreeScore against_trees(std::span<const StampedPose> trajectory,
                         std::span<const MapLandmark> landmarks, double radius_m,
                         std::size_t min_observations) {
   TreeScore score;
-  score.trees = place_trees(trajectory, observations, min_observations);
+  score.trees = place_trees(trajectory, observations);
   const std::vector<Pair> pairs = near_pairs(score.trees, landmarks, radius_m);
   std::vector<bool> taken(landmarks.size(), false);
   std::vector<double> distances;
@@ -199,13 +197,16 @@ TreeScore against_trees(std::span<const StampedPose> trajectory,
     taken[pair.landmark] = true;
     ++score.trees[pair.tree].doubles;
   }
-  score.found = distances.size();
-  score.doubled = static_cast<std::size_t>(
-      std::ranges::count_if(score.trees, [](const auto& tree) { return tree.doubles > 0; }));
+  std::vector<double> spreads;
+  for (const CuratedTree& tree : score.trees) {
+    if (tree.observations < min_observations) continue;
+    ++score.well_seen;
+    if (tree.landmark != 0) ++score.found;
+    if (tree.doubles > 0) ++score.doubled;
+    spreads.push_back(tree.spread_m);
+  }
   score.landmarks_elsewhere =
       static_cast<std::size_t>(std::count(taken.begin(), taken.end(), false));
-  std::vector<double> spreads;
-  for (const CuratedTree& tree : score.trees) spreads.push_back(tree.spread_m);
   score.median_spread_m = quantile(spreads, 0.5);
   score.median_distance_m = quantile(distances, 0.5);
   return score;

@@ -65,7 +65,8 @@ struct CuratedTree {
 };
 
 struct TreeScore {
-  std::vector<CuratedTree> trees;  ///< Observed at least `min_observations` times.
+  std::vector<CuratedTree> trees;
+  std::size_t well_seen = 0;  ///< Trees observed at least `min_observations` times; of these:
   std::size_t found = 0;
   std::size_t doubled = 0;
   std::size_t landmarks_elsewhere = 0;  ///< Landmarks that stand for no curated tree.

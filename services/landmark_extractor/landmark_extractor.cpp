@@ -46,7 +46,8 @@ Detection to_detection(const TrunkFit& fit, const PlanarTrunkParameters& paramet
   detection.position_m.head<2>() = vehicle_T_sensor * fit.centre();
   detection.covariance_m2.topLeftCorner<2, 2>() =
       rotation * fit.centre_covariance() * rotation.transpose() +
-      parameters.shape_sigma_m * parameters.shape_sigma_m * Eigen::Matrix2d::Identity();
+      parameters.shape_correlation_scans * parameters.shape_sigma_m * parameters.shape_sigma_m *
+          Eigen::Matrix2d::Identity();
   detection.covariance_m2(2, 2) = kHeightSigma_m * kHeightSigma_m;
   detection.radius_m = fit.radius_m;
   detection.kind = LandmarkKind::kTrunk;

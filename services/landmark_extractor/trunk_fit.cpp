@@ -47,7 +47,7 @@ RangeTerm beam_on_circle(const Eigen::Vector3d& x, double bearing,
   const double per_bearing = d * s - square(d) * s * c / q;
   term.jacobian = {c + d * s * s / q, per_bearing, -radius / q};
   // A footprint of some width on a slanting surface smears the range.
-  term.sigma = std::sqrt(square(parameters.range_sigma_m) + square(parameters.shape_sigma_m) +
+  term.sigma = std::sqrt(square(parameters.range_sigma_m) + square(parameters.roundness_sigma_m) +
                          square(per_bearing * parameters.beam_width_rad));
   return term;
 }
@@ -60,7 +60,7 @@ void add_edge(const Eigen::Vector3d& x, double side, double last_bearing, double
   const double predicted = x[1] + side * std::asin(std::min(1.0, x[2] / x[0]));
   const Eigen::Vector3d jacobian(-side * x[2] / (x[0] * tangent), 1.0, side / tangent);
   const double sigma = std::sqrt(square(step) / 12.0 + square(0.5 * parameters.beam_width_rad) +
-                                 square(parameters.shape_sigma_m / x[0]));
+                                 square(parameters.roundness_sigma_m / x[0]));
   normal.add(jacobian, seen - predicted, sigma);
 }
 
