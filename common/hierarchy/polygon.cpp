@@ -1,20 +1,9 @@
 #include "common/hierarchy/polygon.hpp"
 
 #include <algorithm>
-#include <tuple>
 
 namespace understory {
 namespace {
-
-/// Squared length, then ids: a strict order of all edges in which both sides of an edge are equal.
-auto edge_rank(const Triangulation& triangulation, const Triangle& triangle, int edge) {
-  const std::uint32_t a = triangle.vertices[(edge + 1) % 3];
-  const std::uint32_t b = triangle.vertices[(edge + 2) % 3];
-  const std::uint64_t id_a = triangulation.id(a);
-  const std::uint64_t id_b = triangulation.id(b);
-  return std::tuple((triangulation.position(a) - triangulation.position(b)).squaredNorm(),
-                    std::max(id_a, id_b), std::min(id_a, id_b));
-}
 
 int index_in(const Triangle& triangle, std::uint32_t vertex) {
   return triangle.vertices[0] == vertex ? 0 : (triangle.vertices[1] == vertex ? 1 : 2);
@@ -41,27 +30,17 @@ void start_at_smallest(const Triangulation& triangulation, std::vector<std::uint
 
 }  // namespace
 
-int longest_edge(const Triangulation& triangulation, const Triangle& triangle) {
-  int best = 0;
-  for (int edge = 1; edge < 3; ++edge) {
-    if (edge_rank(triangulation, triangle, edge) > edge_rank(triangulation, triangle, best)) {
-      best = edge;
-    }
-  }
-  return best;
-}
-
 bool is_dropped(const Triangulation& triangulation, std::uint32_t index, int edge) {
   const Triangle& triangle = triangulation.triangles()[index];
   const std::uint32_t across = triangle.neighbours[edge];
   if (across == kNone) {
     return false;
   }
-  if (longest_edge(triangulation, triangle) == edge) {
+  if (triangle.longest_edge == static_cast<std::uint32_t>(edge)) {
     return true;
   }
   const Triangle& neighbour = triangulation.triangles()[across];
-  return neighbour.neighbours[longest_edge(triangulation, neighbour)] == index;
+  return neighbour.neighbours[neighbour.longest_edge] == index;
 }
 
 std::vector<std::uint32_t> boundary_of(const Triangulation& triangulation,

@@ -26,10 +26,6 @@ struct Polygon {
   bool touches_hull() const { return hull_edges > 0; }
 };
 
-/// Index (0, 1, 2) of the longest edge of a triangle; of equally long ones the one with the larger
-/// landmark ids, so that neighbours agree.
-int longest_edge(const Triangulation& triangulation, const Triangle& triangle);
-
 /// Whether edge `edge` of triangle `index` lies inside a polygon: it is the longest of a triangle
 /// on one of its two sides and not on the hull.
 bool is_dropped(const Triangulation& triangulation, std::uint32_t index, int edge);

@@ -6,6 +6,7 @@
 #include <CGAL/Triangulation_vertex_base_with_info_2.h>
 
 #include <algorithm>
+#include <tuple>
 
 #include "common/hierarchy/location_hints.hpp"
 
@@ -120,6 +121,7 @@ struct Triangulation::Impl {
     for (const Face& face : faces) {
       if (face->info().triangle != kNone) {
         refresh(face);
+        self->find_longest_edge(self->triangles_[face->info().triangle]);
       }
     }
     for (const Face& face : rim) {
@@ -288,6 +290,22 @@ struct Triangulation::Impl {
   }
 };
 
+void Triangulation::find_longest_edge(Triangle& triangle) const {
+  // Squared length, then ids: a strict order of all edges.
+  const auto rank = [&](std::uint32_t edge) {
+    const std::uint32_t a = triangle.vertices[(edge + 1) % 3];
+    const std::uint32_t b = triangle.vertices[(edge + 2) % 3];
+    return std::tuple((positions_[a] - positions_[b]).squaredNorm(), std::max(ids_[a], ids_[b]),
+                      std::min(ids_[a], ids_[b]));
+  };
+  triangle.longest_edge = 0;
+  for (std::uint32_t edge = 1; edge < 3; ++edge) {
+    if (rank(edge) > rank(triangle.longest_edge)) {
+      triangle.longest_edge = edge;
+    }
+  }
+}
+
 Triangulation::Triangulation() : impl_(std::make_unique<Impl>(this)) {}
 Triangulation::~Triangulation() = default;
 
@@ -397,6 +415,7 @@ ChangeStatus Triangulation::move(std::uint64_t id, const Eigen::Vector2d& positi
   if (impl_->move_in_place(vertex, point)) {
     positions_[*found] = position_m;
     for (const Face& face : impl_->scratch_faces) {
+      find_longest_edge(triangles_[face->info().triangle]);
       change.made.push_back(face->info().triangle);
     }
     change.removed = change.made;

@@ -26,6 +26,9 @@ inline constexpr std::uint32_t kNone = 0xffffffffU;
 
 /// A Delaunay triangle, counter-clockwise. Edge i lies opposite vertex i.
 struct Triangle {
+  /// The longest edge; of equally long ones the one with the larger landmark ids, so that both
+  /// sides of an edge rank it alike.
+  std::uint32_t longest_edge = 0;
   std::array<std::uint32_t, 3> vertices{kNone, kNone, kNone};    ///< Landmark slots.
   std::array<std::uint32_t, 3> neighbours{kNone, kNone, kNone};  ///< Across edge i; kNone = hull.
 };
@@ -86,6 +89,7 @@ class Triangulation {
 
   std::uint32_t allocate_slot(std::uint64_t id, const Eigen::Vector2d& position_m);
   void release_slot(std::uint32_t slot);
+  void find_longest_edge(Triangle& triangle) const;
 
   std::unique_ptr<Impl> impl_;
   std::vector<Triangle> triangles_;

@@ -91,11 +91,16 @@ TEST_CASE("A descriptor does not depend on pose, start, direction or handedness"
 
 TEST_CASE("A descriptor is the limit of finer and finer sampling", "[hierarchy]") {
   std::mt19937_64 random(22);
-  for (int trial = 0; trial < 50; ++trial) {
-    const Walk walk = random_polygon(random);
-    for (const int samples : {10, 20, 30}) {
-      REQUIRE(distance(describe(walk, samples), sampled(walk, samples, 4000)) < 0.1F);
+  for (const int samples : {4, 10, 20, 30}) {
+    std::vector<float> errors;
+    for (int trial = 0; trial < 50; ++trial) {
+      const Walk walk = random_polygon(random);
+      errors.push_back(distance(describe(walk, samples), sampled(walk, samples, 4000)));
     }
+    std::sort(errors.begin(), errors.end());
+    REQUIRE(errors[25] < 0.01F);
+    // An edge close by the centroid puts a kink into the distance.
+    REQUIRE(errors.back() < 0.4F);
   }
 }
 
