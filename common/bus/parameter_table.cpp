@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 namespace understory {
@@ -125,16 +126,21 @@ void ParameterTable::add(std::string key, std::string& value, std::vector<std::s
 }
 
 std::string ParameterTable::to_toml() const {
-  std::string text;
-  std::string table;
+  // Keys without a table stand first: behind a table's head they would belong to it.
+  std::vector<std::pair<std::string, std::string>> tables{{"", ""}};
   for (const Entry& entry : entries_) {
     const std::size_t dot = entry.key.rfind('.');
-    const std::string parent = dot == std::string::npos ? "" : entry.key.substr(0, dot);
-    if (parent != table) text += fmt::format("\n[{}]\n", parent);
-    table = parent;
-    text +=
-        fmt::format("# {} Allowed: {}.\n{} = {}\n", entry.doc, allowed(entry),
-                    entry.key.substr(dot == std::string::npos ? 0 : dot + 1), value_as_toml(entry));
+    const bool has_table = dot != std::string::npos;
+    const std::string table = has_table ? entry.key.substr(0, dot) : "";
+    auto found = std::find_if(tables.begin(), tables.end(),
+                              [&](const auto& one) { return one.first == table; });
+    if (found == tables.end()) found = tables.insert(tables.end(), {table, ""});
+    found->second += fmt::format("# {} Allowed: {}.\n{} = {}\n", entry.doc, allowed(entry),
+                                 entry.key.substr(has_table ? dot + 1 : 0), value_as_toml(entry));
+  }
+  std::string text = tables.front().second;
+  for (std::size_t i = 1; i < tables.size(); ++i) {
+    text += fmt::format("\n[{}]\n{}", tables[i].first, tables[i].second);
   }
   return text;
 }

@@ -1,0 +1,22 @@
+// The mapper's place on the bus.
+#pragma once
+
+#include <string>
+
+#include "common/bus/service.hpp"
+
+namespace understory {
+
+struct MapperChannels {
+  std::string keyframe = "KEYFRAME";
+  std::string odometry = "ODOMETRY";
+  std::string map_request = "MAP_REQUEST";
+  std::string slam_pose = "SLAM_POSE";
+  std::string slam_update = "SLAM_UPDATE";
+  std::string map = "MAP";
+  std::string map_delta = "MAP_DELTA";
+};
+
+Service geoslam_mapper_service(const MapperChannels& channels = {});
+
+}  // namespace understory

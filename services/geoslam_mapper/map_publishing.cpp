@@ -1,0 +1,175 @@
+#include "services/geoslam_mapper/map_publishing.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <limits>
+#include <map>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+
+namespace understory {
+namespace {
+
+constexpr int kExactDigits = std::numeric_limits<double>::max_digits10;
+
+bool is_localised(const MapUpdate& update) {
+  return update.status == MapUpdateStatus::kFirstMap || update.status == MapUpdateStatus::kUpdated;
+}
+
+void write(std::ostream& out, const SE2& pose) {
+  out << std::setprecision(kExactDigits) << pose.x() << ' ' << pose.y() << ' ' << pose.theta()
+      << ' ';
+}
+
+SE2 read_pose(std::istream& in) {
+  double x = 0.0;
+  double y = 0.0;
+  double theta = 0.0;
+  in >> x >> y >> theta;
+  return {x, y, theta};
+}
+
+void require_whole(const std::istream& in) {
+  if (!in) throw std::runtime_error("the saved state of the mapper's outputs is not whole");
+}
+
+}  // namespace
+
+MapDelta map_difference(const std::vector<MapLandmark>& before,
+                        const std::vector<MapLandmark>& after, const MapUpdate& update,
+                        double moved_m) {
+  MapDelta delta;
+  delta.utime = update.utime;
+  delta.merged = update.merged;
+  std::set<LandmarkId> merged;
+  for (const auto& [old_id, new_id] : update.merged) merged.insert(old_id);
+  auto old = before.begin();
+  const auto gone = [&](const MapLandmark& landmark) {
+    if (!merged.contains(landmark.id)) delta.removed.push_back(landmark.id);
+  };
+  for (const MapLandmark& landmark : after) {
+    while (old != before.end() && old->id < landmark.id) gone(*old++);
+    if (old == before.end() || old->id != landmark.id) {
+      delta.added.push_back(landmark);
+      continue;
+    }
+    const bool has_moved = (old->position_m - landmark.position_m).norm() > moved_m;
+    if (has_moved) delta.moved.push_back(landmark);
+    ++old;
+  }
+  while (old != before.end()) gone(*old++);
+  return delta;
+}
+
+std::vector<MapLandmark> with_delta(std::vector<MapLandmark> landmarks, const MapDelta& delta) {
+  std::map<LandmarkId, MapLandmark> by_id;
+  for (MapLandmark& landmark : landmarks) by_id.insert_or_assign(landmark.id, landmark);
+  for (const MapLandmark& landmark : delta.added) by_id.insert_or_assign(landmark.id, landmark);
+  for (const MapLandmark& landmark : delta.moved) by_id.insert_or_assign(landmark.id, landmark);
+  for (const LandmarkId id : delta.removed) by_id.erase(id);
+  for (const auto& [old_id, new_id] : delta.merged) by_id.erase(old_id);
+  landmarks.clear();
+  for (auto& [id, landmark] : by_id) landmarks.push_back(landmark);
+  return landmarks;
+}
+
+void OdometryFrame::add(const Odometry& motion) {
+  const SE2 last = poses_.empty() ? SE2() : poses_.back().odom_T_vehicle;
+  if (poses_.empty()) poses_.push_back({motion.from_utime, last});
+  poses_.push_back({motion.utime, last * motion.from_T_to});
+  if (poses_.size() > kKept) poses_.pop_front();
+}
+
+SE2 OdometryFrame::odom_T_vehicle(Utime utime) const {
+  const auto behind = std::upper_bound(poses_.begin(), poses_.end(), utime,
+                                       [](Utime t, const Pose& pose) { return t < pose.utime; });
+  if (behind == poses_.begin()) return poses_.empty() ? SE2() : poses_.front().odom_T_vehicle;
+  return std::prev(behind)->odom_T_vehicle;
+}
+
+std::string OdometryFrame::save() const {
+  std::ostringstream out;
+  out << poses_.size() << ' ';
+  for (const Pose& pose : poses_) {
+    out << pose.utime << ' ';
+    write(out, pose.odom_T_vehicle);
+  }
+  return out.str();
+}
+
+void OdometryFrame::load(const std::string& state) {
+  std::istringstream in(state);
+  std::size_t size = 0;
+  in >> size;
+  if (size > kKept) in.setstate(std::ios::failbit);
+  require_whole(in);
+  poses_.clear();
+  for (std::size_t i = 0; i < size; ++i) {
+    Utime utime = 0;
+    in >> utime;
+    poses_.push_back({utime, read_pose(in)});
+  }
+  require_whole(in);
+}
+
+std::vector<SlamPose> poses_of(const Keyframe& keyframe, const MapUpdate& update) {
+  SlamPose pose;
+  pose.status = update.status;
+  pose.keyframe_sequence = keyframe.sequence;
+  pose.utime = keyframe.members.back().utime;
+  if (!is_localised(update)) return {pose};
+  std::vector<SlamPose> poses;
+  const SE2 base_T_centre = keyframe.centre_T_base().inverse();
+  for (const KeyframeMember& member : keyframe.members) {
+    const SE2 base_T_vehicle = base_T_centre * member.centre_T_vehicle;
+    const bool is_base = &member == &keyframe.members.front();
+    const Eigen::Matrix3d own = is_base ? Eigen::Matrix3d::Zero() : member.covariance;
+    const SE2WithCovariance map_T_vehicle =
+        compound({update.map_T_vehicle, update.covariance}, {base_T_vehicle, own});
+    pose.utime = member.utime;
+    pose.submap_T_vehicle = map_T_vehicle.mean;
+    pose.covariance = map_T_vehicle.covariance;
+    poses.push_back(pose);
+  }
+  poses.back().submap_T_vehicle = update.map_T_latest_vehicle;
+  return poses;
+}
+
+void JumpWatch::add(const Keyframe& keyframe, const MapUpdate& update) {
+  if (predicted_ && keyframe.previous_T_base) {
+    predicted_ = *predicted_ * *keyframe.previous_T_base;
+  } else {
+    predicted_.reset();
+  }
+  if (!is_localised(update)) return;
+  if (predicted_) {
+    const SE2 jump = predicted_->inverse() * update.map_T_vehicle;
+    if (jump.translation().norm() > distance_m_ || std::abs(jump.theta()) > angle_rad_) {
+      ++count_;
+      delta_ = jump;
+    }
+  }
+  predicted_ = update.map_T_vehicle;
+}
+
+std::string JumpWatch::save() const {
+  std::ostringstream out;
+  out << predicted_.has_value() << ' ' << count_ << ' ';
+  write(out, predicted_.value_or(SE2()));
+  write(out, delta_);
+  return out.str();
+}
+
+void JumpWatch::load(const std::string& state) {
+  std::istringstream in(state);
+  bool has_prediction = false;
+  in >> has_prediction >> count_;
+  predicted_ = read_pose(in);
+  if (!has_prediction) predicted_.reset();
+  delta_ = read_pose(in);
+  require_whole(in);
+}
+
+}  // namespace understory

@@ -1,0 +1,18 @@
+// The keyframer's place on the bus.
+#pragma once
+
+#include <string>
+
+#include "common/bus/service.hpp"
+
+namespace understory {
+
+struct KeyframerChannels {
+  std::string landmarks = "LANDMARKS";
+  std::string odometry = "ODOMETRY";
+  std::string keyframe = "KEYFRAME";
+};
+
+Service keyframer_service(const KeyframerChannels& channels = {});
+
+}  // namespace understory

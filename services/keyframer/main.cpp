@@ -1,0 +1,11 @@
+// The keyframer as a process: every channel that it touches, besides HEALTH, LOG and CONFIG.
+#include "services/keyframer/adapter.hpp"
+
+int main(int argc, char** argv) {
+  return understory::run_service(understory::keyframer_service({
+                                     .landmarks = "LANDMARKS",  // in: detections of one sweep
+                                     .odometry = "ODOMETRY",    // in: motion, where there is any
+                                     .keyframe = "KEYFRAME",    // out: local landmarks of n sweeps
+                                 }),
+                                 argc, argv);
+}
