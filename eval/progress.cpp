@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::size_t kWidth = 30;
 constexpr std::chrono::milliseconds kRedraw{200};
+constexpr std::chrono::seconds kLine{5};  // without a terminal
 
 std::string duration(double seconds) {
   const auto whole = static_cast<long>(seconds + 0.5);
@@ -25,7 +26,8 @@ Progress::Progress(std::string_view what, std::size_t total)
     : what_(what),
       total_(std::max<std::size_t>(1, total)),
       terminal_(isatty(STDERR_FILENO) == 1),
-      start_(std::chrono::steady_clock::now()) {}
+      start_(std::chrono::steady_clock::now()),
+      drawn_(start_) {}
 
 Progress::~Progress() {
   if (terminal_) fmt::print(stderr, "\r\033[K");
@@ -34,9 +36,7 @@ Progress::~Progress() {
 void Progress::advance(std::size_t steps) {
   done_ = std::min(total_, done_ + steps);
   const auto now = std::chrono::steady_clock::now();
-  const std::size_t tenths = 10 * done_ / total_;
-  if (terminal_ ? now - drawn_ < kRedraw : tenths == tenths_shown_) return;
-  tenths_shown_ = tenths;
+  if (now - drawn_ < (terminal_ ? std::chrono::milliseconds(kRedraw) : kLine)) return;
   drawn_ = now;
   draw();
 }

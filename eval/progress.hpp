@@ -8,7 +8,8 @@
 
 namespace understory::eval {
 
-/// A bar on stderr that is redrawn in place; without a terminal, a line at every tenth.
+/// A bar on stderr that is redrawn in place; without a terminal, a line every few
+/// seconds.
 class Progress {
  public:
   Progress(std::string_view what, std::size_t total);
@@ -24,7 +25,6 @@ class Progress {
   std::string what_;
   std::size_t total_;
   std::size_t done_ = 0;
-  std::size_t tenths_shown_ = 0;
   bool terminal_;
   std::chrono::steady_clock::time_point start_;
   std::chrono::steady_clock::time_point drawn_;

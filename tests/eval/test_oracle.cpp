@@ -1,0 +1,206 @@
+#include <Eigen/Dense>
+#include <cmath>
+#include <random>
+
+#include "eval/oracle.hpp"
+#include "eval/run.hpp"
+#include "eval/summary.hpp"
+#include "tests/catch.hpp"
+#include "tests/eval/small_drive.hpp"
+
+using namespace understory;
+using namespace understory::eval;
+
+namespace {
+
+struct Sighting {
+  std::size_t scan;
+  std::uint32_t trunk;
+  Eigen::Vector2d position_m;
+};
+
+std::vector<Sighting> sightings_of(const RecordedDrive& recorded) {
+  std::vector<Sighting> all;
+  for (std::size_t k = 0; k < recorded.scans.size(); ++k) {
+    for (std::size_t i = 0; i < recorded.scans[k].trunks.size(); ++i) {
+      all.push_back({k, recorded.scans[k].trunks[i],
+                     recorded.scans[k].scan.detections[i].position_m.head<2>()});
+    }
+  }
+  return all;
+}
+
+void feed(BatchOracle& oracle, const RecordedDrive& recorded) {
+  for (const sim::SimulatedScan& scan : recorded.scans) {
+    std::vector<Eigen::Vector2d> positions;
+    for (const Detection& d : scan.scan.detections) positions.emplace_back(d.position_m.head<2>());
+    oracle.add(positions, scan.trunks);
+  }
+}
+
+/// All unknowns in one vector, residuals in the vehicle's frame, Jacobian by central differences,
+/// Gauss-Newton by QR: nothing in common with the oracle's own way.
+class DenseBatch {
+ public:
+  DenseBatch(const BatchOracle& start, std::vector<Sighting> sightings)
+      : oracle_(start), sightings_(std::move(sightings)) {
+    poses_ = static_cast<Eigen::Index>(start.scans()) - 1;
+    x_ = Eigen::VectorXd::Zero(3 * poses_ +
+                               2 * static_cast<Eigen::Index>(start.landmarks_m().size()));
+    for (Eigen::Index k = 0; k < poses_; ++k) {
+      x_.segment<3>(3 * k) = start.first_T_vehicle(static_cast<std::size_t>(k + 1)).coordinates();
+    }
+    for (std::size_t i = 0; i < start.landmarks_m().size(); ++i) {
+      x_.segment<2>(3 * poses_ + 2 * static_cast<Eigen::Index>(i)) = start.landmarks_m()[i];
+    }
+  }
+
+  void perturb(std::mt19937_64& random, double sigma) {
+    std::normal_distribution<double> normal(0.0, sigma);
+    for (double& value : x_) value += normal(random);
+  }
+
+  void solve() {
+    for (int i = 0; i < 20; ++i) {
+      const Eigen::MatrixXd jacobian = numerical_jacobian();
+      const Eigen::VectorXd step = jacobian.householderQr().solve(-residuals(x_));
+      x_ += step;
+      information_ = jacobian.transpose() * jacobian;
+      if (step.cwiseAbs().maxCoeff() < 1e-10) return;
+    }
+  }
+
+  SE2 pose(std::size_t scan) const {
+    if (scan == 0) return {};
+    const auto at = 3 * (static_cast<Eigen::Index>(scan) - 1);
+    return {x_(at), x_(at + 1), x_(at + 2)};
+  }
+  Eigen::Vector2d landmark(int i) const { return x_.segment<2>(3 * poses_ + 2 * i); }
+  /// Of (x, y, theta) in the map, unit noise.
+  Eigen::Matrix3d covariance(std::size_t scan) const {
+    const auto at = 3 * (static_cast<Eigen::Index>(scan) - 1);
+    return Eigen::MatrixXd(information_.inverse()).block<3, 3>(at, at);
+  }
+
+ private:
+  Eigen::VectorXd residuals(const Eigen::VectorXd& x) const {
+    Eigen::VectorXd all(2 * static_cast<Eigen::Index>(sightings_.size()));
+    Eigen::Index row = 0;
+    for (const Sighting& sighting : sightings_) {
+      const auto at = 3 * (static_cast<Eigen::Index>(sighting.scan) - 1);
+      const SE2 pose = sighting.scan == 0 ? SE2() : SE2(x(at), x(at + 1), x(at + 2));
+      const Eigen::Vector2d landmark =
+          x.segment<2>(3 * poses_ + 2 * oracle_.landmark_of(sighting.trunk));
+      all.segment<2>(row) = pose.inverse() * landmark - sighting.position_m;
+      row += 2;
+    }
+    return all;
+  }
+
+  Eigen::MatrixXd numerical_jacobian() const {
+    Eigen::MatrixXd jacobian(2 * static_cast<Eigen::Index>(sightings_.size()), x_.size());
+    const double h = 1e-5;
+    for (Eigen::Index c = 0; c < x_.size(); ++c) {
+      Eigen::VectorXd plus = x_;
+      Eigen::VectorXd minus = x_;
+      plus(c) += h;
+      minus(c) -= h;
+      jacobian.col(c) = (residuals(plus) - residuals(minus)) / (2.0 * h);
+    }
+    return jacobian;
+  }
+
+  const BatchOracle& oracle_;
+  std::vector<Sighting> sightings_;
+  Eigen::Index poses_ = 0;
+  Eigen::VectorXd x_;
+  Eigen::MatrixXd information_;
+};
+
+}  // namespace
+
+TEST_CASE("The oracle finds the minimum that a dense solver finds, with its covariance",
+          "[oracle]") {
+  const double sigma = GENERATE(0.05, 0.4);
+  sim::DriveParameters parameters = small_drive_parameters(3.0);
+  parameters.sensor.position_sigma_m = sigma;
+  parameters.sensor.detection_probability = 0.8;
+  const RecordedDrive recorded(parameters, 5);
+  BatchOracle oracle;
+  feed(oracle, recorded);
+  CHECK(oracle.solve(1e-9).converged);
+
+  DenseBatch dense(oracle, sightings_of(recorded));
+  std::mt19937_64 random(1);
+  dense.perturb(random, 0.02);
+  dense.solve();
+  for (std::size_t scan = 0; scan < oracle.scans(); ++scan) {
+    REQUIRE((dense.pose(scan).inverse() * oracle.first_T_vehicle(scan)).Log().norm() < 1e-6);
+  }
+  for (int i = 0; i < static_cast<int>(oracle.landmarks_m().size()); ++i) {
+    REQUIRE((dense.landmark(i) - oracle.landmarks_m()[i]).norm() < 1e-6);
+  }
+  const std::size_t last = oracle.scans() - 1;
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  turn.topLeftCorner<2, 2>() = dense.pose(last).rotation().transpose();
+  const Eigen::Matrix3d expected = sigma * sigma * turn * dense.covariance(last) * turn.transpose();
+  // The dense Jacobian keeps the term that Gauss-Newton in the map's frame leaves to the residual.
+  CHECK((oracle.covariance(last, sigma) - expected).norm() < 0.03 * expected.norm());
+}
+
+TEST_CASE("Solved at every step or once at the end, the estimate is the same", "[oracle]") {
+  const RecordedDrive recorded(small_drive_parameters(12.8), 6);
+  const std::atomic<bool> stop{false};
+  BatchOracle once;
+  feed(once, recorded);
+  once.solve(1e-9);
+  const RunResult stepwise = run_oracle(recorded, stop);
+  REQUIRE(recorded.scans.size() == 8 * stepwise.trace.states.size());
+  for (const PoseEstimate& pose : stepwise.trace.final_map.poses) {
+    REQUIRE((pose.map_T_vehicle.inverse() * once.first_T_vehicle(pose.scan)).Log().norm() < 1e-4);
+  }
+}
+
+TEST_CASE("Without noise the oracle is exact", "[oracle]") {
+  sim::DriveParameters parameters = small_drive_parameters(12.0);
+  parameters.sensor.position_sigma_m = 0.0;
+  const std::atomic<bool> stop{false};
+  const RunResult result = run_oracle(RecordedDrive(parameters, 7), stop);
+  CHECK(result.score.errors.rpe_m() < 1e-9);
+  CHECK(result.score.errors.lpe_m() < 1e-9);
+}
+
+TEST_CASE("The oracle's covariance tells the truth: NEES", "[oracle]") {
+  sim::DriveParameters parameters = small_drive_parameters(6.4);
+  parameters.forest.side_m = 150.0;
+  const std::atomic<bool> stop{false};
+  double sum = 0.0;
+  const int runs = 200;
+  for (int run = 0; run < runs; ++run) {
+    const RunResult result = run_oracle(RecordedDrive(parameters, 100 + run), stop);
+    sum += result.score.nees.back().second;
+  }
+  const auto [low, high] = chi2_band_95(3.0 * runs);
+  CHECK(sum > low);
+  CHECK(sum < high);
+}
+
+TEST_CASE("Marks tell the oracle which poses and trunks to give", "[oracle]") {
+  const RecordedDrive recorded(small_drive_parameters(12.0), 6);
+  const std::atomic<bool> stop{false};
+  const std::vector<StateMark> marks{{16, {8}, recorded.scans[8].trunks},
+                                     {32, {8, 20}, {recorded.scans[8].trunks[0]}}};
+  const RunResult result = run_oracle(recorded, marks, stop);
+  CHECK(result.score.errors.poses == 3);
+  CHECK(result.score.errors.landmarks == recorded.scans[8].trunks.size() + 1);
+  CHECK(result.trace.final_map.poses[0].map_T_vehicle.Log().norm() < 1e-12);
+  CHECK(result.trace.final_map.poses[1].scan == 20);
+  CHECK(result.score.errors.rpe_m() < 0.3);
+}
+
+TEST_CASE("A scan that shares no trunk with the rest is refused", "[oracle]") {
+  BatchOracle oracle;
+  const std::vector<Eigen::Vector2d> positions{{1, 2}, {3, 4}};
+  oracle.add(positions, std::vector<std::uint32_t>{1, 2});
+  CHECK_THROWS_AS(oracle.add(positions, std::vector<std::uint32_t>{2, 3}), std::invalid_argument);
+}
