@@ -23,7 +23,8 @@ find_path(SUITESPARSE_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
 find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
 add_library(understory_cholmod INTERFACE)
 target_include_directories(understory_cholmod SYSTEM INTERFACE "${SUITESPARSE_INCLUDE_DIR}")
-target_link_libraries(understory_cholmod INTERFACE "${CHOLMOD_LIBRARY}")
+# gomp: to keep CHOLMOD to one thread.
+target_link_libraries(understory_cholmod INTERFACE "${CHOLMOD_LIBRARY}" gomp)
 
 # libzip's own CMake files ask for its command-line tools, which its users do not need.
 find_path(ZIP_INCLUDE_DIR zip.h REQUIRED)

@@ -27,14 +27,6 @@ std::vector<std::uint32_t> trunks_ever_in_range(const sim::Drive& drive) {
   return indices;
 }
 
-std::vector<Eigen::Vector2d> selected(const std::vector<Eigen::Vector2d>& points,
-                                      std::span<const std::uint32_t> indices) {
-  std::vector<Eigen::Vector2d> result;
-  result.reserve(indices.size());
-  for (const std::uint32_t i : indices) result.push_back(points[i]);
-  return result;
-}
-
 double ratio(double sum, std::size_t count) {
   return count == 0 ? 0.0 : sum / static_cast<double>(count);
 }
@@ -46,12 +38,17 @@ MapTruth::MapTruth(const sim::Drive& drive, std::size_t base)
       world_T_vehicle_(drive.world_T_vehicle()),
       trunks_m_(drive.forest().trunks_m),
       in_range_(trunks_ever_in_range(drive)),
-      grid_(selected(trunks_m_, in_range_), kTile) {}
+      grid_(trunks_m_, kTile) {}
 
 sim::PointGrid::Neighbour MapTruth::nearest_trunk(const Eigen::Vector2d& point_in_map_m) const {
   const auto nearest = grid_.nearest(map_T_world_.inverse() * point_in_map_m);
   if (!nearest) return {0, INFINITY};
-  return {in_range_[nearest->index], nearest->distance_m};
+  return *nearest;
+}
+
+std::vector<std::uint32_t> MapTruth::trunks_within(const Eigen::Vector2d& point_in_map_m,
+                                                   double radius_m) const {
+  return grid_.within(map_T_world_.inverse() * point_in_map_m, radius_m);
 }
 
 ErrorSums& ErrorSums::operator+=(const ErrorSums& other) {
@@ -101,10 +98,9 @@ MapCompleteness map_completeness(std::span<const Eigen::Vector2d> landmarks_m,
                                  const MapTruth& truth,
                                  std::span<const std::uint32_t> times_seen_of_trunk,
                                  std::uint32_t min_times_seen) {
-  const sim::PointGrid grid(landmarks_m, kTile);
   std::vector<std::tuple<double, std::uint32_t, std::uint32_t>> pairs;
-  for (const std::uint32_t trunk : truth.trunks_in_range()) {
-    for (const std::uint32_t landmark : grid.within(truth.trunk_m(trunk), kPairing)) {
+  for (std::uint32_t landmark = 0; landmark < landmarks_m.size(); ++landmark) {
+    for (const std::uint32_t trunk : truth.trunks_within(landmarks_m[landmark], kPairing)) {
       pairs.emplace_back((landmarks_m[landmark] - truth.trunk_m(trunk)).norm(), trunk, landmark);
     }
   }

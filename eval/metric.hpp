@@ -28,8 +28,11 @@ class MapTruth {
   MapTruth(const sim::Drive& drive, std::size_t base);
 
   SE2 map_T_vehicle(std::size_t scan) const { return map_T_world_ * world_T_vehicle_[scan]; }
-  /// The true trunk nearest to a point of the map, of those that were ever in range.
+  /// The true trunk nearest to a point of the map. Of all trunks: one that stands just out of range
+  /// is seen when noise brings it in, and is no false landmark.
   sim::PointGrid::Neighbour nearest_trunk(const Eigen::Vector2d& point_in_map_m) const;
+  std::vector<std::uint32_t> trunks_within(const Eigen::Vector2d& point_in_map_m,
+                                           double radius_m) const;
   Eigen::Vector2d trunk_m(std::uint32_t trunk) const { return map_T_world_ * trunks_m_[trunk]; }
   /// Trunks that were ever in range, ascending.
   std::span<const std::uint32_t> trunks_in_range() const { return in_range_; }
@@ -39,7 +42,7 @@ class MapTruth {
   std::vector<SE2> world_T_vehicle_;
   std::vector<Eigen::Vector2d> trunks_m_;
   std::vector<std::uint32_t> in_range_;
-  sim::PointGrid grid_;  ///< Of in_range_, frame world.
+  sim::PointGrid grid_;  ///< Of all trunks, frame world.
 };
 
 /// Sums of errors over poses or landmarks, over states.

@@ -1,6 +1,7 @@
 #include "common/factor_graph/sparse_cholesky.hpp"
 
 #include <cholmod.h>
+#include <omp.h>
 
 #include <stdexcept>
 #include <utility>
@@ -14,6 +15,9 @@ struct SparseCholesky::Impl {
   std::vector<int> rows;
 
   Impl() {
+    // CHOLMOD asks for four OpenMP threads whatever the computer has; results must not depend on them, and other processes need
+    // the cores.
+    omp_set_max_active_levels(0);
     cholmod_start(&common);
     common.print = 0;
     common.nmethods = 1;

@@ -13,7 +13,7 @@ namespace {
 using Points = std::span<const UncertainPoint>;
 
 struct Candidate {
-  double mahalanobis2;
+  double rank;  ///< Minus twice the log likelihood, up to a constant.
   std::uint32_t reference;
   std::uint32_t observed;
 };
@@ -75,17 +75,19 @@ class Registrar {
       const Eigen::Vector2d p = rotation * z + at.reference_T_observed.translation();
       bins_.for_each_within(p, reach, [&](std::uint32_t r, double d2) {
         const double m2 = d2 / (base + reference_[r].variance_m2);
-        if (m2 <= k2) candidates_.push_back({m2, r, i});
+        if (m2 > k2) return;
+        const double spread = 2.0 * std::log(base + reference_[r].variance_m2);
+        candidates_.push_back({m2 + spread + reference_[r].reluctance, r, i});
       });
     }
   }
 
-  /// One to one, nearest (Mahalanobis) first; a pair is ambiguous when either end had another
+  /// One to one, likeliest first; a pair is ambiguous when either end had another
   /// candidate.
   std::vector<PointPair> pairs_at(const Registration& at) {
     collect_candidates(at);
     std::sort(candidates_.begin(), candidates_.end(), [](const Candidate& a, const Candidate& b) {
-      if (a.mahalanobis2 != b.mahalanobis2) return a.mahalanobis2 < b.mahalanobis2;
+      if (a.rank != b.rank) return a.rank < b.rank;
       return a.observed != b.observed ? a.observed < b.observed : a.reference < b.reference;
     });
     reference_count_.assign(reference_.size(), 0);

@@ -13,6 +13,9 @@ namespace understory {
 struct UncertainPoint {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
   double variance_m2 = 0.0;
+  /// Added to the squared Mahalanobis distance when candidates inside a gate are ranked: doubtful
+  /// points come second.
+  double reluctance = 0.0;
 };
 
 struct PointPair {

@@ -40,6 +40,7 @@ struct Candidate {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `map`.
   std::vector<Sighting> sightings;
   std::uint32_t times_seen = 0;
+  std::uint32_t times_in_view = 0;  ///< Scans that should have seen it, since it was first seen.
   std::uint32_t first_keyframe = 0;
   LandmarkKind kind = LandmarkKind::kTrunk;
 };

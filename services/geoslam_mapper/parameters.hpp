@@ -28,19 +28,25 @@ struct SourceMapperParameters {
 
 /// Ours.
 struct SmoothingMapperParameters {
-  bool use_odometry = false;        ///< ODOMETRY between keyframes as a factor.
-  bool localisation_only = false;   ///< Never change the map that was given.
-  double gate_sigmas = 4.0;         ///< Association gate.
-  double gate_floor_m = 0.03;       ///< Added to it.
-  double predicted_sigma_m = 0.25;  ///< Of a predicted pose that no odometry made.
+  bool use_odometry = false;           ///< ODOMETRY between keyframes as a factor.
+  bool localisation_only = false;      ///< Never change the map that was given.
+  double gate_sigmas = 4.0;            ///< Association gate.
+  double gate_floor_m = 0.03;          ///< Added to it.
+  double predicted_sigma_m = 0.25;     ///< Of a predicted pose that no odometry made.
   double predicted_sigma_rad = 0.015;  ///< Likewise.
-  double min_matched_ratio = 0.4;   ///< Of what can be matched: below, a predicted pose is not believed.
-  int min_matched = 4;              ///< Fewest matches of a pose that odometry does not support.
-  int recent_keyframes = 20;        ///< Landmarks seen within so many keyframes: their error is shared with the pose.
+  double min_matched_ratio =
+      0.4;              ///< Of what can be matched: below, a predicted pose is not believed.
+  int min_matched = 4;  ///< Fewest matches of a pose that odometry does not support.
+  int recent_keyframes =
+      20;  ///< Landmarks seen within so many keyframes: their error is shared with the pose.
   int min_sightings = 3;            ///< A landmark enters the map when it was detected so often.
-  int candidate_keyframes = 12;     ///< A candidate seen too seldom is forgotten after so many keyframes.
-  double outlier_chi2 = 24.0;       ///< Of one association after the update (2 degrees of freedom): it is taken out.
-  double max_chi2_ratio = 3.0;      ///< Of all of them over their degrees of freedom: the update is rolled back.
+  double min_sighting_ratio = 0.5;  ///< ... and in this share of the scans that had it in view.
+  int candidate_keyframes =
+      12;  ///< A candidate seen too seldom is forgotten after so many keyframes.
+  double outlier_chi2 =
+      24.0;  ///< Of one association after the update (2 degrees of freedom): it is taken out.
+  double max_chi2_ratio =
+      3.0;  ///< Of all of them over their degrees of freedom: the update is rolled back.
   double fold_distance_m = 0.05;    ///< A keyframe this near to an earlier one ...
   double fold_angle_rad = 0.02;     ///< ... and so similarly turned is folded into it.
   double given_map_sigma_m = 0.05;  ///< Of the landmarks of a given map that states no covariance.

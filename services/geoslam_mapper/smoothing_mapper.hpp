@@ -79,6 +79,7 @@ class SmoothingMapper final : public MapperMethod {
   void discover(const Keyframe& keyframe, NodeIndex node, MapUpdate& update);
   Candidate* matching_candidate(const Eigen::Vector2d& position, const KeyframeLandmark& seen);
   void promote(const Candidate& candidate, MapUpdate& update);
+  bool believable(const Candidate& candidate) const;
   void forget_stale_candidates();
   void merge_doubles(MapUpdate& update);
   void take_over(LandmarkId old_id, LandmarkId new_id);

@@ -18,6 +18,15 @@ bool share_a_node(const StoredLandmark& a, const StoredLandmark& b) {
   return !common.empty();
 }
 
+std::uint32_t members_in_view(const Keyframe& keyframe, const Eigen::Vector2d& position_in_centre) {
+  std::uint32_t count = 0;
+  for (const KeyframeMember& member : keyframe.members) {
+    if (keyframe.field_of_view.contains(member.centre_T_vehicle.inverse() * position_in_centre))
+      ++count;
+  }
+  return count;
+}
+
 }  // namespace
 
 /// Every landmark of the keyframe that was not recognised becomes a candidate, or a further
@@ -27,10 +36,12 @@ void SmoothingMapper::discover(const Keyframe& keyframe, NodeIndex node, MapUpda
   std::vector<bool> known(keyframe.landmarks.size(), false);
   for (const Association& pair : update.associations) known[pair.keyframe_landmark] = true;
   const SE2 map_T_centre = smoother_.graph()[nodes_[node].centre];
+  const SE2 centre_T_map = map_T_centre.inverse();
   for (Candidate& candidate : candidates_) {
     const Candidate::Sighting& latest = candidate.sightings.back();
     candidate.position_m =
         smoother_.graph()[nodes_[latest.node].centre] * latest.landmark.position_m;
+    candidate.times_in_view += members_in_view(keyframe, centre_T_map * candidate.position_m);
   }
   for (std::size_t i = 0; i < keyframe.landmarks.size(); ++i) {
     if (known[i]) continue;
@@ -38,19 +49,27 @@ void SmoothingMapper::discover(const Keyframe& keyframe, NodeIndex node, MapUpda
     const Eigen::Vector2d position = map_T_centre * seen.position_m;
     Candidate* candidate = matching_candidate(position, seen);
     if (candidate == nullptr) {
-      candidates_.push_back({position, {}, 0, keyframes_, seen.kind});
+      candidates_.push_back(
+          {position, {}, 0, members_in_view(keyframe, seen.position_m), keyframes_, seen.kind});
       candidate = &candidates_.back();
     }
     if (!candidate->sightings.empty() && candidate->sightings.back().node == node) continue;
     candidate->sightings.push_back({node, seen});
     candidate->times_seen += seen.times_seen;
     candidate->position_m = position;
-    if (candidate->times_seen < static_cast<std::uint32_t>(parameters_.min_sightings)) continue;
+    if (!believable(*candidate)) continue;
     promote(*candidate, update);
     update.associations.push_back({static_cast<std::uint32_t>(i), update.added.back()});
     candidates_.erase(candidates_.begin() + (candidate - candidates_.data()));
   }
   forget_stale_candidates();
+}
+
+/// Seen often enough, and in a fair share of the scans that should have seen it: what noise brings
+/// into range now and then, or clutter makes, is not.
+bool SmoothingMapper::believable(const Candidate& candidate) const {
+  return candidate.times_seen >= static_cast<std::uint32_t>(parameters_.min_sightings) &&
+         candidate.times_seen >= parameters_.min_sighting_ratio * candidate.times_in_view;
 }
 
 Candidate* SmoothingMapper::matching_candidate(const Eigen::Vector2d& position,

@@ -56,7 +56,11 @@ Json to_value(const Candidate& c) {
   Json sightings = Json::array();
   for (const Candidate::Sighting& s : c.sightings)
     sightings.push_back({s.node, to_value(s.landmark)});
-  return {matrix_to_json<2, 1>(c.position_m), sightings, c.times_seen, c.first_keyframe,
+  return {matrix_to_json<2, 1>(c.position_m),
+          sightings,
+          c.times_seen,
+          c.times_in_view,
+          c.first_keyframe,
           static_cast<int>(c.kind)};
 }
 
@@ -66,8 +70,9 @@ Candidate candidate_from(const Json& json) {
   for (const Json& s : json.at(1))
     c.sightings.push_back({s.at(0).get<NodeIndex>(), keyframe_landmark_from(s.at(1))});
   json.at(2).get_to(c.times_seen);
-  json.at(3).get_to(c.first_keyframe);
-  c.kind = static_cast<LandmarkKind>(json.at(4).get<int>());
+  json.at(3).get_to(c.times_in_view);
+  json.at(4).get_to(c.first_keyframe);
+  c.kind = static_cast<LandmarkKind>(json.at(5).get<int>());
   return c;
 }
 

@@ -74,8 +74,10 @@ BlockProblem JointKeyframer::problem(std::vector<std::uint32_t>& tracks) const {
       const std::uint32_t id = tracker_.resolved(member.tracked.tracks[i]);
       const Track* track = tracker_.find(id);
       if (track == nullptr ||
-          track->sightings < static_cast<std::uint32_t>(parameters_.min_sightings))
+          track->sightings < static_cast<std::uint32_t>(parameters_.min_sightings) ||
+          tracker_.doubtful(*track)) {
         continue;
+      }
       if (std::find(used.begin(), used.end(), id) != used.end()) continue;
       used.push_back(id);
       const auto [entry, fresh] = index.try_emplace(id, static_cast<std::uint32_t>(tracks.size()));

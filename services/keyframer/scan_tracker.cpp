@@ -9,6 +9,10 @@ namespace {
 
 /// A track's mean forgets after so many sightings, so that slow drift of `local` does not smear it.
 constexpr double kMaxWeight = 24.0;
+/// A track seen less often may be an outlier of its neighbour: it takes a detection only if that is
+/// e^4 times likelier.
+constexpr std::uint32_t kConfirmed = 4;
+constexpr double kReluctance = 8.0;
 constexpr std::size_t kMaxMergeMemory = 4096;
 constexpr double kMaxMergeDistance2 = 4.0;  // m^2
 
@@ -26,7 +30,8 @@ std::vector<UncertainPoint> reference_points(std::span<const Track> tracks) {
   points.reserve(tracks.size());
   for (const Track& track : tracks) {
     const double weight = std::min<double>(track.sightings, kMaxWeight);
-    points.push_back({track.position_m, track.detection_variance_m2 / weight});
+    points.push_back({track.position_m, track.detection_variance_m2 / weight,
+                      track.sightings < kConfirmed ? kReluctance : 0.0});
   }
   return points;
 }
@@ -151,34 +156,50 @@ void ScanTracker::update_visibility(const LandmarkScan& scan) {
   }
 }
 
+bool ScanTracker::within_noise(const Track& a, const Track& b) const {
+  const double variance = std::max(a.detection_variance_m2, b.detection_variance_m2);
+  const double gate2 = parameters_.gate_sigmas * parameters_.gate_sigmas * variance;
+  return (a.position_m - b.position_m).squaredNorm() <= std::min(gate2, kMaxMergeDistance2);
+}
+
+bool ScanTracker::doubtful(const Track& track) const {
+  for (const Track& older : tracks_) {
+    if (older.id >= track.id) break;
+    if (within_noise(older, track) && (older.seen & track.seen) == 0) return true;
+  }
+  return false;
+}
+
 /// Two tracks that lie within the noise of each other and, over six scans or more that had both in
 /// view, were never detected together are one landmark: two trunks with detection probability 0.8
 /// do that once in 500 times.
 void ScanTracker::merge_doubles() {
   for (std::size_t young = 1; young < tracks_.size(); ++young) {
-    Track& b = tracks_[young];
+    const Track& b = tracks_[young];
     if (b.sightings < 2 || std::popcount(b.in_view) < 6) continue;
     for (std::size_t old = 0; old < young; ++old) {
       Track& a = tracks_[old];
-      const double variance = std::max(a.detection_variance_m2, b.detection_variance_m2);
-      const double gate2 = parameters_.gate_sigmas * parameters_.gate_sigmas * variance;
-      if ((a.position_m - b.position_m).squaredNorm() > std::min(gate2, kMaxMergeDistance2))
-        continue;
+      if (!within_noise(a, b)) continue;
       if ((a.seen & b.seen) != 0 || std::popcount(a.in_view & b.in_view) < 6) continue;
-      const double na = std::min<double>(a.sightings, kMaxWeight);
-      const double nb = std::min<double>(b.sightings, kMaxWeight);
-      a.position_m = (na * a.position_m + nb * b.position_m) / (na + nb);
-      a.sightings += b.sightings;
-      a.seen |= b.seen;
-      a.in_view |= b.in_view;
-      merged_.emplace_back(b.id, a.id);
+      absorb(a, b);
       tracks_.erase(tracks_.begin() + static_cast<std::ptrdiff_t>(young));
       --young;
       break;
     }
   }
-  if (merged_.size() > kMaxMergeMemory)
+  if (merged_.size() > kMaxMergeMemory) {
     merged_.erase(merged_.begin(), merged_.begin() + kMaxMergeMemory / 2);
+  }
+}
+
+void ScanTracker::absorb(Track& a, const Track& b) {
+  const double na = std::min<double>(a.sightings, kMaxWeight);
+  const double nb = std::min<double>(b.sightings, kMaxWeight);
+  a.position_m = (na * a.position_m + nb * b.position_m) / (na + nb);
+  a.sightings += b.sightings;
+  a.seen |= b.seen;
+  a.in_view |= b.in_view;
+  merged_.emplace_back(b.id, a.id);
 }
 
 void ScanTracker::drop_distant(const LandmarkScan& scan) {

@@ -48,6 +48,10 @@ class ScanTracker {
   /// Null where it was dropped.
   const Track* find(std::uint32_t id) const;
 
+  /// Lies within the noise of an older track and was never detected beside it: perhaps the same
+  /// landmark.
+  bool doubtful(const Track& track) const;
+
   struct State {
     std::vector<Track> tracks;
     std::vector<std::pair<std::uint32_t, std::uint32_t>> merged;
@@ -65,7 +69,9 @@ class ScanTracker {
   bool fits(const Registration& registration, const LandmarkScan& scan) const;
   TrackedScan fuse(const LandmarkScan& scan, const Registration& registration);
   void update_visibility(const LandmarkScan& scan);
+  bool within_noise(const Track& a, const Track& b) const;
   void merge_doubles();
+  void absorb(Track& a, const Track& b);
   void drop_distant(const LandmarkScan& scan);
 
   JointKeyframerParameters parameters_;
