@@ -1,0 +1,135 @@
+// Sequence numbers, percentiles, time.
+#include <algorithm>
+#include <random>
+#include <set>
+
+#include "common/bus/health_monitor.hpp"
+#include "common/bus/latency_histogram.hpp"
+#include "common/bus/message_clock.hpp"
+#include "common/bus/sequence_tracker.hpp"
+#include "tests/catch.hpp"
+
+using namespace understory;
+
+TEST_CASE("losses, duplicates and late comers are counted exactly under random faults") {
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    std::mt19937_64 random(seed);
+    // Some of 0..1999 are lost, some come twice, some come up to 20 places late.
+    std::vector<std::pair<double, std::int64_t>> arrivals;
+    std::set<std::int64_t> distinct;
+    std::uint64_t duplicates = 0;
+    for (std::int64_t i = 0; i < 2000; ++i) {
+      const auto chance = random() % 100;
+      if (i > 0 && i < 1999 && chance < 10) continue;
+      distinct.insert(i);
+      const bool is_late = i > 0 && i < 1999 && chance < 20;
+      arrivals.emplace_back(static_cast<double>(i) + (is_late ? 1.5 + random() % 20 : 0.0), i);
+      if (chance > 90) {
+        arrivals.emplace_back(arrivals.back().first + 0.25, i);
+        ++duplicates;
+      }
+    }
+    std::stable_sort(arrivals.begin(), arrivals.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::uint64_t late = 0;
+    std::int64_t newest = -1;
+    std::set<std::int64_t> had;
+    SequenceTracker tracker;
+    for (const auto& [when, sequence] : arrivals) {
+      const bool is_duplicate = !had.insert(sequence).second;
+      if (!is_duplicate && sequence < newest) ++late;
+      newest = std::max(newest, sequence);
+      const Arrival arrival = tracker.take(sequence, 1000 + sequence);
+      CHECK((arrival == Arrival::kDuplicate) == is_duplicate);
+    }
+    CHECK(tracker.counts().messages == arrivals.size());
+    CHECK(tracker.counts().duplicates == duplicates);
+    CHECK(tracker.counts().late == late);
+    CHECK(tracker.counts().lost == 2000 - distinct.size());
+    CHECK(tracker.counts().restarts == 0);
+  }
+}
+
+TEST_CASE("a sender that counts from the start again is no late comer") {
+  SequenceTracker tracker;
+  for (int i = 0; i < 10; ++i) tracker.take(i, 100 + i);
+  CHECK(tracker.take(0, 200) == Arrival::kFirst);
+  CHECK(tracker.take(1, 201) == Arrival::kNext);
+  CHECK(tracker.counts().restarts == 1);
+  CHECK(tracker.counts().lost == 0);
+}
+
+TEST_CASE("a hostile sequence number does not poison what follows") {
+  SequenceTracker tracker;
+  tracker.take(5, 100);
+  tracker.take(std::int64_t{1} << 62U, 101);
+  CHECK(tracker.take(6, 102) == Arrival::kFirst);
+  CHECK(tracker.take(7, 103) == Arrival::kNext);
+  CHECK(tracker.counts().lost == 0);
+}
+
+TEST_CASE("percentiles agree with sorting, within a sixteenth") {
+  std::mt19937_64 random(4);
+  std::lognormal_distribution<double> spread(6.0, 2.0);
+  LatencyHistogram histogram;
+  std::vector<std::int64_t> values;
+  for (int i = 0; i < 20000; ++i) {
+    values.push_back(static_cast<std::int64_t>(spread(random)));
+    histogram.add(values.back());
+  }
+  std::sort(values.begin(), values.end());
+  for (const double q : {0.01, 0.5, 0.9, 0.99, 1.0}) {
+    const auto rank = static_cast<std::size_t>(std::ceil(q * 20000.0)) - 1;
+    const double exact = static_cast<double>(values[rank]);
+    const auto estimate = static_cast<double>(histogram.quantile(q));
+    CHECK(estimate >= exact);
+    CHECK(estimate <= exact * (1.0 + 1.0 / 16.0) + 1.0);
+  }
+  CHECK(histogram.max() == values.back());
+  CHECK(LatencyHistogram().quantile(0.5) == 0);
+}
+
+TEST_CASE("one wrong stamp is not believed, three that agree are") {
+  MessageClock clock(10000000);
+  const std::int64_t start = 1000000000;
+  CHECK(clock.take(start) == MessageClock::Verdict::kFine);
+  CHECK(clock.take(start * 100) == MessageClock::Verdict::kQuarantined);
+  CHECK(clock.take(start + 100) == MessageClock::Verdict::kFine);
+  CHECK(clock.now() == start + 100);
+  CHECK(clock.take(5) == MessageClock::Verdict::kQuarantined);
+  CHECK(clock.take(6) == MessageClock::Verdict::kQuarantined);
+  CHECK(clock.take(7) == MessageClock::Verdict::kJumped);
+  CHECK(clock.now() == 7);
+}
+
+TEST_CASE("health follows from fresh reasons and recovers") {
+  std::int64_t now = 0;
+  HealthMonitor monitor("toy", "1", {[&] { return now + 5; }, [&] { return now; }});
+  const std::size_t channel = monitor.add_channel("IN", false);
+  CHECK(monitor.state() == health_t::STATE_STARTING);
+  monitor.ready();
+  CHECK(monitor.state() == health_t::STATE_OK);
+  monitor.count_reason("IN", Reason::kDuplicate, "twice");
+  CHECK(monitor.state() == health_t::STATE_OK);
+  monitor.count_reason("IN", Reason::kNotFinite, "x");
+  CHECK(monitor.state() == health_t::STATE_DEGRADED);
+  monitor.count_reason("", Reason::kStageFailed, "y");
+  CHECK(monitor.state() == health_t::STATE_ERROR);
+  now = HealthMonitor::kFreshUs;
+  CHECK(monitor.state() == health_t::STATE_OK);
+  for (int i = 0; i < 30; ++i) monitor.count_message(channel, 100 + i);
+  for (int i = 1; i <= 100; ++i) monitor.count_latency(i);
+  const health_t report = monitor.report(129);
+  CHECK(report.channels.at(0).messages == 30);
+  CHECK(report.channels.at(0).rate_hz == Approx(30.0 / 3.0));
+  CHECK(report.channels.at(0).malformed == 1);
+  CHECK(report.handled == 30);
+  CHECK(report.latency_p50_us >= 50);
+  CHECK(report.latency_p50_us <= 54);
+  CHECK(report.latency_max_us == 100);
+  CHECK(report.last_error_code == "stage_failed");
+  CHECK(report.rss_bytes > 0);
+  REQUIRE(report.reasons.size() == 3);
+  CHECK(report.reasons[1].reason == "duplicate");
+  CHECK(report.reasons[1].count == 1);
+}

@@ -1,0 +1,141 @@
+// The way from bytes to a stage and back, with faults.
+#include <limits>
+
+#include "common/bus/faulty_bus.hpp"
+#include "common/bus/memory_bus.hpp"
+#include "tests/bus/toy_service.hpp"
+#include "tests/catch.hpp"
+
+using namespace understory;
+using namespace understory::test;
+
+namespace {
+
+/// A toy on a bus, with everything that it says.
+struct Bench {
+  explicit Bench(const std::string& toml = "")
+      : bus(MemoryBus::Queues::kUnlimited),
+        hosted(toy_service(), bus, no_clock(), toml, "test.toml") {
+    bus.subscribe("RAW_POSE", 0, [this](const BusMessage& message) {
+      const auto pose = decode_message<raw_pose_t>(message.bytes);
+      REQUIRE(pose);
+      poses.push_back(*pose);
+    });
+    hosted.node().connect();
+  }
+  void send(const Odometry& motion) {
+    bus.publish("ODOMETRY", encode_message(motion));
+    bus.drain();
+  }
+  std::int64_t count(Reason reason) { return hosted.node().monitor().count_of("ODOMETRY", reason); }
+
+  MemoryBus bus;
+  HostedService hosted;
+  std::vector<raw_pose_t> poses;
+};
+
+}  // namespace
+
+TEST_CASE("values pass through, outputs are numbered from 0, ticks follow message time") {
+  Bench bench("[toy]\ngain = 2\nevery = 5\n");
+  for (int i = 0; i < 25; ++i) bench.send(toy_input(i));
+  REQUIRE(bench.poses.size() == 5);
+  for (std::size_t k = 0; k < 5; ++k) CHECK(bench.poses[k].seq == static_cast<std::int64_t>(k));
+  CHECK(bench.poses.back().odom_T_vehicle.x == 2.0 * 25.0 * 26.0 / 2.0);
+  CHECK(bench.poses.back().odom_T_vehicle.y == 2.0);  // 2.4 s since the first stamp
+}
+
+TEST_CASE("bad messages are refused by rule, counted, and change nothing") {
+  Bench bench;
+  Bench clean;
+  for (int i = 0; i < 10; ++i) {
+    clean.send(toy_input(i));
+    bench.send(toy_input(i));
+    Odometry bad = toy_input(i);
+    bad.from_T_to = SE2(1e300, 0.0, 0.0);
+    bench.send(bad);
+    bad.from_T_to = SE2(std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0);
+    bench.send(bad);
+    bad = toy_input(i);
+    bad.covariance(0, 0) = -1.0;
+    bench.send(bad);
+    bench.bus.publish("ODOMETRY", std::vector<std::uint8_t>{1, 2, 3});
+    bench.send(toy_input(i));
+  }
+  CHECK(bench.count(Reason::kOutOfRange) == 10);
+  CHECK(bench.count(Reason::kNotFinite) == 10);
+  CHECK(bench.count(Reason::kNotPositive) == 10);
+  CHECK(bench.count(Reason::kTooShort) == 10);
+  CHECK(bench.count(Reason::kDuplicate) == 10);
+  REQUIRE(bench.poses.size() == clean.poses.size());
+  CHECK(encode_bytes(bench.poses.back()) == encode_bytes(clean.poses.back()));
+}
+
+TEST_CASE("a stage that throws is reported and goes on") {
+  Bench bench("[toy]\nmode = \"throwing\"\n");
+  for (int i = 0; i < 30; ++i) bench.send(toy_input(i));
+  CHECK(bench.count(Reason::kStageFailed) == 3);
+  CHECK(bench.poses.size() == 27);
+}
+
+TEST_CASE("nothing that is not finite is published") {
+  MemoryBus bus;
+  int seen = 0;
+  bus.subscribe("OUT", 10, [&](const BusMessage&) { ++seen; });
+  NodeOptions options;
+  options.process = "test";
+  Node node(bus, options, no_clock());
+  const auto out = node.advertise<raw_pose_t>("OUT");
+  raw_pose_t pose{};
+  out.publish(pose);
+  pose.odom_T_vehicle.x = std::numeric_limits<double>::infinity();
+  out.publish(pose);
+  bus.drain();
+  CHECK(seen == 1);
+  CHECK(node.monitor().count_of("OUT", Reason::kNotSent) == 1);
+}
+
+TEST_CASE("under loss, repetition, disorder and damage every message is accounted for") {
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    Bench bench;
+    FaultyBus faulty(bench.bus,
+                     {.drop = 0.05,
+                      .duplicate = 0.05,
+                      .delay = 0.05,
+                      .delay_messages = 3,
+                      .reorder = 0.05,
+                      .truncate = 0.05,
+                      .flood = 0.01,
+                      .channels = {}},
+                     seed);
+    const int sent = 1000;
+    for (int i = 0; i < sent; ++i) {
+      // The ends pass unharmed: a loss behind the last message cannot be seen.
+      Bus& way = i == 0 || i == sent - 1 ? static_cast<Bus&>(bench.bus) : faulty;
+      if (i == sent - 1) faulty.flush();
+      way.publish("ODOMETRY", encode_message(toy_input(i)));
+      bench.bus.drain();
+    }
+    const FaultCounts& faults = faulty.counts();
+    const SequenceCounts& counts = bench.hosted.node().sequence_counts("ODOMETRY");
+    CHECK(counts.lost == faults.dropped + faults.truncated);
+    CHECK(counts.duplicates == faults.duplicated);
+    const auto health = bench.hosted.node().health();
+    CHECK(health.channels.at(0).malformed ==
+          static_cast<std::int64_t>(faults.truncated + faults.flood_packets));
+    CHECK(bench.poses.size() == sent - counts.lost - counts.late);
+    for (std::size_t k = 1; k < bench.poses.size(); ++k) {
+      CHECK(bench.poses[k - 1].utime < bench.poses[k].utime);
+    }
+  }
+}
+
+TEST_CASE("a suffix renames outputs, and inputs where asked") {
+  MemoryBus bus;
+  HostedService hosted(toy_service(), bus, no_clock(),
+                       "[runtime]\nchannel_suffix = \"_ALT\"\nsuffixed_inputs = \"ODOMETRY\"\n",
+                       "test.toml");
+  CHECK(hosted.node().outputs() == std::vector<std::string>{"RAW_POSE_ALT"});
+  CHECK(hosted.node().takes("ODOMETRY_ALT"));
+  CHECK_FALSE(hosted.node().takes("ODOMETRY"));
+}

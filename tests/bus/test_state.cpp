@@ -1,0 +1,185 @@
+// State over restarts: snapshot and journal, cut and damaged everywhere.
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+#include "common/bus/memory_bus.hpp"
+#include "common/bus/state_format.hpp"
+#include "tests/bus/toy_service.hpp"
+#include "tests/catch.hpp"
+
+using namespace understory;
+using namespace understory::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A directory of this test's own, gone afterwards.
+class Scratch {
+ public:
+  Scratch()
+      : path_(fs::temp_directory_path() / ("understory-state-" + std::to_string(::getpid()))) {
+    fs::remove_all(path_);
+    fs::create_directories(path_);
+  }
+  ~Scratch() { fs::remove_all(path_); }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+std::string read(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+void write(const fs::path& file, const std::string& bytes) {
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
+/// One life of the toy: recovers, takes inputs [from, to), is killed (nothing is saved at the end).
+struct Life {
+  explicit Life(const fs::path& directory, const std::string& toml = "")
+      : hosted(toy_service(), bus, no_clock(), toml, "toy.toml"), store(directory, "toy") {
+    bus.subscribe("RAW_POSE", 0, [this](const BusMessage& message) {
+      poses.push_back(*decode_message<raw_pose_t>(message.bytes));
+    });
+    is_recovered = hosted.node().recover(store);
+    hosted.node().journal_to(&store);
+    hosted.node().connect();
+    bus.drain();
+  }
+  void run(int from, int to) {
+    for (int i = from; i < to; ++i) {
+      bus.publish("ODOMETRY", encode_message(toy_input(i)));
+      bus.drain();
+    }
+  }
+  MemoryBus bus{MemoryBus::Queues::kUnlimited};
+  HostedService hosted;
+  StateStore store;
+  bool is_recovered = false;
+  std::vector<raw_pose_t> poses;
+};
+
+std::vector<raw_pose_t> uninterrupted(int to) {
+  const Scratch scratch;
+  Life life(scratch.path());
+  life.run(0, to);
+  return life.poses;
+}
+
+}  // namespace
+
+TEST_CASE("a killed service goes on as if nothing had happened, whenever it is killed") {
+  const auto expected = uninterrupted(60);
+  const std::string toml =
+      GENERATE(as<std::string>(), "", "[runtime]\nsnapshot_every_events = 7\n",
+               "[runtime]\nsnapshot_every_s = 0.5\n", "[runtime]\nsnapshot_every_events = 1\n");
+  for (int killed = 1; killed < 60; killed += 4) {
+    const Scratch scratch;
+    Life(scratch.path(), toml).run(0, killed);
+    Life second(scratch.path(), toml);
+    CHECK(second.is_recovered);
+    CHECK(second.poses.empty());  // what was said before is not said again
+    second.run(killed, 60);
+    REQUIRE(second.poses.size() == static_cast<std::size_t>(60 - killed));
+    for (std::size_t i = 0; i < second.poses.size(); ++i) {
+      CHECK(encode_bytes(second.poses[i]) ==
+            encode_bytes(expected[static_cast<std::size_t>(killed) + i]));
+    }
+  }
+}
+
+TEST_CASE("a journal cut at every byte gives every whole event before the cut") {
+  const auto expected = uninterrupted(9);
+  const Scratch scratch;
+  Life(scratch.path()).run(0, 8);
+  const fs::path file = scratch.path() / "toy.journal.0";
+  const std::string journal = read(file);
+  std::size_t one = journal.size() / 8;
+  REQUIRE(one * 8 == journal.size());
+  for (std::size_t size = 0; size <= journal.size(); ++size) {
+    write(file, journal.substr(0, size));
+    Life life(scratch.path());
+    CHECK(life.is_recovered);
+    const auto whole = static_cast<int>(size / one);
+    life.run(whole, whole + 1);
+    REQUIRE(life.poses.size() == 1);
+    CHECK(life.poses[0].odom_T_vehicle.x ==
+          expected[static_cast<std::size_t>(whole)].odom_T_vehicle.x);
+  }
+}
+
+TEST_CASE("a damaged byte anywhere in journal or snapshot is told, never believed") {
+  const Scratch scratch;
+  Life(scratch.path(), "[runtime]\nsnapshot_every_events = 5\n").run(0, 8);
+  const fs::path snapshot_file = scratch.path() / "toy.snapshot";
+  const fs::path journal_file = scratch.path() / "toy.journal.1";
+  const std::string snapshot = read(snapshot_file);
+  const std::string journal = read(journal_file);
+  REQUIRE(journal.size() > 0);
+  std::mt19937_64 random(1);
+  for (const bool in_snapshot : {true, false}) {
+    const std::string& whole = in_snapshot ? snapshot : journal;
+    for (std::size_t at = 0; at < whole.size(); at += in_snapshot ? 1 : 3) {
+      std::string damaged = whole;
+      damaged[at] = static_cast<char>(damaged[at] ^ static_cast<char>(1 + random() % 255));
+      write(snapshot_file, in_snapshot ? damaged : snapshot);
+      write(journal_file, in_snapshot ? journal : damaged);
+      StateStore store(scratch.path(), "toy");
+      const auto recovered = store.open();
+      store.end_recovery();
+      if (in_snapshot) {
+        CHECK_FALSE(recovered.snapshot);
+        CHECK(recovered.events.empty());
+        REQUIRE(recovered.problems.size() == 1);
+        CHECK(recovered.problems[0].reason == Reason::kSnapshotDamaged);
+      } else {
+        REQUIRE(recovered.snapshot);
+        CHECK(recovered.events.size() < 3);
+        for (std::size_t i = 0; i < recovered.events.size(); ++i) {
+          CHECK(recovered.events[i].bytes == encode_message(toy_input(5 + static_cast<int>(i))));
+        }
+      }
+      for (const auto& entry : fs::directory_iterator(scratch.path())) fs::remove(entry.path());
+    }
+  }
+}
+
+TEST_CASE("a state that the stage cannot load is refused and reported") {
+  const Scratch scratch;
+  StateStore(scratch.path(), "toy").open();
+  StateStore store(scratch.path(), "toy");
+  store.open();
+  REQUIRE_FALSE(store.save("node 1 5 0 0 1\n-1\nstage\nrubbish"));
+  Life life(scratch.path());
+  CHECK_FALSE(life.is_recovered);
+  CHECK(life.hosted.node().monitor().count_of("", Reason::kSnapshotDamaged) == 1);
+}
+
+TEST_CASE("a recovery that keeps dying is not tried for ever") {
+  const Scratch scratch;
+  Life(scratch.path(), "[runtime]\nsnapshot_every_events = 5\n").run(0, 8);
+  std::vector<std::size_t> events;
+  std::vector<bool> has_snapshot;
+  for (int death = 0; death < 5; ++death) {
+    StateStore store(scratch.path(), "toy");
+    const auto recovered = store.open();  // and dies before end_recovery
+    events.push_back(recovered.events.size());
+    has_snapshot.push_back(recovered.snapshot.has_value());
+  }
+  CHECK(events == std::vector<std::size_t>{3, 3, 0, 0, 0});
+  CHECK(has_snapshot == std::vector<bool>{true, true, true, true, false});
+}
+
+TEST_CASE("a directory that cannot be written is told, and the service runs on") {
+  Life life("/proc/no-such-directory");
+  life.run(0, 5);
+  CHECK(life.poses.size() == 5);
+  CHECK(life.hosted.node().monitor().count_of("", Reason::kStateNotKept) > 0);
+}
