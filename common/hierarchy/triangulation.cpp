@@ -5,9 +5,6 @@
 #include <CGAL/Triangulation_face_base_with_info_2.h>
 #include <CGAL/Triangulation_vertex_base_with_info_2.h>
 
-#include <algorithm>
-#include <tuple>
-
 #include "common/hierarchy/location_hints.hpp"
 
 namespace understory {
@@ -31,18 +28,6 @@ using Vertex = Delaunay::Vertex_handle;
 Point to_cgal(const Eigen::Vector2d& p) { return {p.x(), p.y()}; }
 
 }  // namespace
-
-void TriangulationChange::clear() {
-  removed.clear();
-  made.clear();
-  rim.clear();
-}
-
-void TriangulationChange::prepend(const TriangulationChange& earlier) {
-  removed.insert(removed.begin(), earlier.removed.begin(), earlier.removed.end());
-  made.insert(made.begin(), earlier.made.begin(), earlier.made.end());
-  rim.insert(rim.begin(), earlier.rim.begin(), earlier.rim.end());
-}
 
 /// The CGAL side. Its faces carry the index of their Triangle; only the faces around a change are
 /// looked at.
@@ -290,35 +275,10 @@ struct Triangulation::Impl {
   }
 };
 
-void Triangulation::find_longest_edge(Triangle& triangle) const {
-  // Squared length, then ids: a strict order of all edges.
-  const auto rank = [&](std::uint32_t edge) {
-    const std::uint32_t a = triangle.vertices[(edge + 1) % 3];
-    const std::uint32_t b = triangle.vertices[(edge + 2) % 3];
-    return std::tuple((positions_[a] - positions_[b]).squaredNorm(), std::max(ids_[a], ids_[b]),
-                      std::min(ids_[a], ids_[b]));
-  };
-  triangle.longest_edge = 0;
-  for (std::uint32_t edge = 1; edge < 3; ++edge) {
-    if (rank(edge) > rank(triangle.longest_edge)) {
-      triangle.longest_edge = edge;
-    }
-  }
-}
-
 Triangulation::Triangulation() : impl_(std::make_unique<Impl>(this)) {}
 Triangulation::~Triangulation() = default;
 
-Triangulation::Triangulation(Triangulation&& other) noexcept
-    : impl_(std::move(other.impl_)),
-      triangles_(std::move(other.triangles_)),
-      free_triangles_(std::move(other.free_triangles_)),
-      ids_(std::move(other.ids_)),
-      positions_(std::move(other.positions_)),
-      free_slots_(std::move(other.free_slots_)),
-      slot_of_id_(std::move(other.slot_of_id_)) {
-  impl_->self = this;
-}
+Triangulation::Triangulation(Triangulation&& other) noexcept { *this = std::move(other); }
 
 Triangulation& Triangulation::operator=(Triangulation&& other) noexcept {
   impl_ = std::move(other.impl_);
@@ -330,11 +290,6 @@ Triangulation& Triangulation::operator=(Triangulation&& other) noexcept {
   slot_of_id_ = std::move(other.slot_of_id_);
   impl_->self = this;
   return *this;
-}
-
-std::optional<std::uint32_t> Triangulation::slot(std::uint64_t id) const {
-  const auto found = slot_of_id_.find(id);
-  return found == slot_of_id_.end() ? std::nullopt : std::optional(found->second);
 }
 
 bool Triangulation::is_landmark(std::uint32_t slot) const {
@@ -427,12 +382,7 @@ ChangeStatus Triangulation::move(std::uint64_t id, const Eigen::Vector2d& positi
   TriangulationChange removal;
   remove(id, removal);
   insert(id, position_m, change);
-  change.prepend(removal);
-  const auto is_gone = [this](std::uint32_t triangle) { return !is_triangle(triangle); };
-  std::erase_if(change.made, is_gone);
-  std::sort(change.made.begin(), change.made.end());
-  change.made.erase(std::unique(change.made.begin(), change.made.end()), change.made.end());
-  std::erase_if(change.rim, is_gone);
+  change.prepend(removal, triangles_);
   return ChangeStatus::kDone;
 }
 

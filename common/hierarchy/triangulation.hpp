@@ -40,9 +40,9 @@ struct TriangulationChange {
   std::vector<std::uint32_t> rim;      ///< Unchanged, but with another neighbour across an edge.
 
   void clear();
-  /// Puts an earlier change before this one. Indices that did not survive the later one are for the
-  /// caller to drop.
-  void prepend(const TriangulationChange& earlier);
+  /// Puts an earlier change before this one; `triangles` is what is there after both. Triangles
+  /// made by the first and gone with the second are in `removed` only.
+  void prepend(const TriangulationChange& earlier, std::span<const Triangle> triangles);
 };
 
 /// Delaunay triangulation with insertion, removal and motion of single landmarks, each in time that
