@@ -83,7 +83,6 @@ MapUpdate SourceMapper::add(const Keyframe& keyframe) {
   } else {
     const std::vector<Eigen::Vector2d> local = positions_of(keyframe);
     const std::vector<source::PointMatch> matches = match(local);
-    update.candidates = static_cast<std::uint32_t>(matches.size());
     update.status = MapUpdateStatus::kNotSure;
     if (matches.size() < static_cast<std::size_t>(parameters_.min_associations)) {
       update.reason = "too few associations of polygons";
@@ -207,6 +206,7 @@ bool SourceMapper::fuse(const Keyframe& keyframe, const source::PoseEstimate& es
   const std::size_t first_edge = state_.map.graph.landmark_edges.size();
   const bool has_new = extend(keyframe, estimate, update);
   const auto step = source::gauss_newton_step(state_.map.graph);
+  update.candidates = estimate.attempts;
   update.inliers = static_cast<std::uint32_t>(estimate.associations.size());
   update.degrees_of_freedom = 2 * update.inliers;
   update.chi2 = step ? source::newest_pose_error(state_.map.graph, *step, first_edge) : 0.0;
