@@ -1,6 +1,7 @@
 #include "eval/command.hpp"
 
 #include "eval/experiments.hpp"
+#include "eval/large_map.hpp"
 
 namespace understory::eval {
 
@@ -12,6 +13,8 @@ void add_eval_command(CLI::App& parent) {
   add_density_experiment(eval);
   add_noise_experiment(eval);
   add_efficiency_experiment(eval);
+  add_large_map_experiment(eval);
+  add_victoria_park_experiment(eval);
 }
 
 }  // namespace understory::eval

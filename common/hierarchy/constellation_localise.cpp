@@ -18,7 +18,7 @@ constexpr std::size_t kFirstPoints = 12;
 /// What a refit on all points costs, in hypotheses that fail their test.
 constexpr std::uint32_t kFitCost = 50;
 /// Wald's thresholds on the log likelihood ratio.
-constexpr double kReject = -3.0;
+constexpr double kReject = -1.9;
 constexpr double kAccept = 9.0;
 constexpr double kAcceptAtEnd = 2.5;
 
