@@ -92,8 +92,9 @@ void run_until_stopped(HostedService& hosted, Bus& bus, StopSignal& stop, const 
     pollfd files[] = {{bus.file_descriptor(), POLLIN, 0}, {stop.file_descriptor(), POLLIN, 0}};
     ::poll(files, 2, health.milliseconds_left());
   }
-  node.save_snapshot();
+  // The last words are numbered too: the state is saved behind them.
   hosted.adapter().finish();
+  node.save_snapshot();
   node.monitor().stop();
   health.tell();
 }

@@ -52,7 +52,8 @@ class MapperAdapter : public Adapter {
   void bind(Node& node) override {
     stage_ = make_mapper(parameters_);
     jumps_ = JumpWatch(output_.reset_distance_m, output_.reset_angle_rad);
-    node.subscribe<Keyframe>(channels_.keyframe, [this](const Keyframe& one) { add(one); });
+    node.subscribe<Keyframe>(channels_.keyframe, [this](const Keyframe& one) { add(one); },
+                             {.queue_size = 200});
     node.subscribe<Odometry>(channels_.odometry,
                              [this](const Odometry& motion) {
                                stage_->add(motion);
