@@ -22,5 +22,7 @@ void add_density_experiment(CLI::App& eval);
 void add_noise_experiment(CLI::App& eval);
 /// Time per component along the run (GeoSLAM §5.5), over a long drive, and standing still.
 void add_efficiency_experiment(CLI::App& eval);
+/// The recorded Victoria Park drive.
+void add_victoria_park_experiment(CLI::App& eval);
 
 }  // namespace understory::eval

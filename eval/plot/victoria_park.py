@@ -13,6 +13,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
+
 def to_world(pose, points):
     x, y, theta = pose
     c, s = math.cos(theta), math.sin(theta)

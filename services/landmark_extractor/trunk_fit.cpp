@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kIterations = 8;
 /// Beams that graze the trunk more than this (part of the radius) say little of its range.
-constexpr double kMaxGraze = 0.95;
+constexpr double kMaxGraze = 0.9;
 
 double square(double value) { return value * value; }
 
@@ -39,8 +39,9 @@ RangeTerm beam_on_circle(const Eigen::Vector3d& x, double bearing,
   const double d = x[0];
   const double radius = x[2];
   const double c = std::cos(bearing - x[1]);
-  const double s =
-      std::clamp(std::sin(bearing - x[1]), -kMaxGraze * radius / d, kMaxGraze * radius / d);
+  const double sine = std::sin(bearing - x[1]);
+  const double limit = kMaxGraze * radius / d;
+  const double s = std::clamp(sine, -limit, limit);
   const double q = std::sqrt(square(radius) - square(d * s));
   RangeTerm term;
   term.predicted = d * c - q;
@@ -49,6 +50,8 @@ RangeTerm beam_on_circle(const Eigen::Vector3d& x, double bearing,
   // A footprint of some width on a slanting surface smears the range.
   term.sigma = std::sqrt(square(parameters.range_sigma_m) + square(parameters.roundness_sigma_m) +
                          square(per_bearing * parameters.beam_width_rad));
+  // Nearer to the edge the range falls off so steeply that only the edge itself says something.
+  if (std::abs(sine) > limit) term.sigma = std::hypot(term.sigma, radius);
   return term;
 }
 
@@ -95,12 +98,16 @@ Eigen::Vector3d start(const PlanarScan& scan, const Segment& segment,
   return {nearest + radius, bearing, radius};
 }
 
-double mean_square_residual(const Eigen::Vector3d& x, const PlanarScan& scan,
-                            const Segment& segment, const PlanarTrunkParameters& parameters) {
+/// Against what the fit leaves uncertain, too: edges are uniform within a step, not Gaussian, and a
+/// beam near one feels that.
+double mean_square_residual(const Eigen::Vector3d& x, const Eigen::Matrix3d& covariance,
+                            const PlanarScan& scan, const Segment& segment,
+                            const PlanarTrunkParameters& parameters) {
   double sum = 0.0;
   for (std::size_t beam = segment.first; beam <= segment.last; ++beam) {
     const RangeTerm term = beam_on_circle(x, scan.bearing(beam), parameters);
-    sum += square((scan.ranges_m[beam] - term.predicted) / term.sigma);
+    const double variance = square(term.sigma) + term.jacobian.dot(covariance * term.jacobian);
+    sum += square(scan.ranges_m[beam] - term.predicted) / variance;
   }
   return sum / static_cast<double>(segment.size());
 }
@@ -134,7 +141,7 @@ std::optional<TrunkFit> fit_trunk(const PlanarScan& scan, const Segment& segment
   fit.bearing_rad = x[1];
   fit.radius_m = x[2];
   fit.covariance = linearise(x, scan, segment, parameters).information.inverse();
-  fit.mean_square_residual = mean_square_residual(x, scan, segment, parameters);
+  fit.mean_square_residual = mean_square_residual(x, fit.covariance, scan, segment, parameters);
   return fit;
 }
 

@@ -1,0 +1,118 @@
+// `understory import`: a recording made elsewhere into an LCM log.
+#include <fmt/format.h>
+
+#include <limits>
+#include <memory>
+#include <string>
+
+#include "common/io/data_error.hpp"
+#include "common/io/lcm_log.hpp"
+#include "common/io/victoria_park.hpp"
+#include "common/wire/convert.hpp"
+#include "deploy/cli/commands.hpp"
+#include "deploy/cli/failure.hpp"
+#include "deploy/cli/interrupt.hpp"
+#include "deploy/cli/progress.hpp"
+#include "services/lidar_imu_input/wheel_odometry.hpp"
+
+namespace understory {
+namespace {
+
+struct Options {
+  std::string path;
+  std::string out;
+};
+
+/// The recording as messages in order of time. Of one stamp: wheels, odometry, GNSS, laser, so that
+/// whoever takes a sweep has the motion up to it.
+class Importer {
+ public:
+  Importer(const VictoriaPark& recording, LcmLogWriter& writer)
+      : recording_(recording), writer_(writer), odometry_(parameters()) {}
+
+  void run() {
+    Progress progress("importing", static_cast<double>(recording_.scans.size()));
+    for (const PlanarScan& scan : recording_.scans) {
+      throw_if_interrupted();
+      write_until(scan.utime);
+      if (const auto motion = odometry_.advance_to(scan.utime)) write("ODOMETRY", *motion);
+      write("LIDAR_SCAN", scan);
+      progress.update(static_cast<double>(scan.sequence + 1));
+    }
+    write_until(std::numeric_limits<Utime>::max());
+  }
+
+ private:
+  static WheelOdometryParameters parameters() {
+    WheelOdometryParameters parameters;
+    parameters.car = {victoria_park::kWheelbase_m, victoria_park::kEncoderLeft_m,
+                      victoria_park::axle_T_vehicle()};
+    return parameters;
+  }
+
+  template <class Message>
+  void write(const std::string& channel, const Message& message) {
+    writer_.write(message.utime, channel, encode_message(message));
+  }
+
+  /// Wheels and fixes up to a stamp, the earlier ones first.
+  void write_until(Utime stamp) {
+    const auto& wheels = recording_.wheels;
+    const auto& fixes = recording_.gnss;
+    const auto due = [&](const auto& list, std::size_t at) {
+      return at < list.size() && list[at].utime <= stamp;
+    };
+    while (due(wheels, wheel_) || due(fixes, fix_)) {
+      const bool wheel_first =
+          due(wheels, wheel_) && (!due(fixes, fix_) || wheels[wheel_].utime <= fixes[fix_].utime);
+      if (wheel_first) {
+        odometry_.add(wheels[wheel_]);
+        write("WHEELS", wheels[wheel_++]);
+      } else {
+        write("GNSS", fixes[fix_++]);
+      }
+    }
+  }
+
+  const VictoriaPark& recording_;
+  LcmLogWriter& writer_;
+  WheelOdometry odometry_;
+  std::size_t wheel_ = 0;
+  std::size_t fix_ = 0;
+};
+
+void import_victoria_park(const Options& options) {
+  catch_interrupts();
+  try {
+    const VictoriaPark recording = read_victoria_park(options.path);
+    LcmLogWriter writer(options.out);
+    Importer(recording, writer).run();
+    writer.commit();
+    fmt::print("{} sweeps, {} wheel samples, {} fixes -> {}\n", recording.scans.size(),
+               recording.wheels.size(), recording.gnss.size(), options.out);
+  } catch (const DataError& error) {
+    fail(error.what());
+  } catch (const LogError& error) {
+    fail(error.what());
+  } catch (const Interrupted& error) {
+    fail(fmt::format("import: {}", error.what()));
+  }
+}
+
+}  // namespace
+
+void add_import_command(CLI::App& parent) {
+  auto* command = parent.add_subcommand("import", "A recording made elsewhere into an LCM log");
+  command->require_subcommand(1);
+  auto* victoria = command->add_subcommand(
+      "victoria-park", "The Victoria Park set: laser, wheels and GPS of a car among trees");
+  auto options = std::make_shared<Options>();
+  victoria
+      ->add_option("path", options->path,
+                   "victoria_park_ascii.zip, or a folder with LASER.txt, DRS.txt and GPS.txt")
+      ->required();
+  victoria->add_option("--out", options->out, "The log to write")->required();
+  victoria->callback([options] { import_victoria_park(*options); });
+}
+
+}  // namespace understory

@@ -1,0 +1,17 @@
+// The landmark extractor's place on the bus.
+#pragma once
+
+#include <string>
+
+#include "common/bus/service.hpp"
+
+namespace understory {
+
+struct LandmarkExtractorChannels {
+  std::string lidar_scan = "LIDAR_SCAN";
+  std::string landmarks = "LANDMARKS";
+};
+
+Service landmark_extractor_service(const LandmarkExtractorChannels& channels = {});
+
+}  // namespace understory
