@@ -47,7 +47,7 @@ struct LocaliseParameters {
   /// Triangles of the accepted pose that are looked up again for the runner-up.
   int runner_up_probes = 3;
   /// Gives up ("not sure") after work worth so many hypotheses that fail their test at once.
-  std::uint32_t max_hypotheses = 12000;
+  std::uint32_t max_hypotheses = 15000;
 };
 
 enum class LocaliseOutcome : std::uint8_t {

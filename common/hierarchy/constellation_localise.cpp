@@ -211,7 +211,9 @@ std::optional<FittedPose> Search::try_hypothesis(const Query& query,
     if (hit[k] != kNoSlot) pairs.push_back({query.tests[k].point, hit[k], 0.0});
   }
   ++fits_;
-  return fit_pose(observation_, map_.grid(), std::move(pairs), parameters_);
+  FittedPose pose = fit_pose(observation_, map_.grid(), std::move(pairs), parameters_);
+  if (pose.pairs.size() < 3) return std::nullopt;
+  return pose;
 }
 
 void Search::consider(FittedPose pose) {

@@ -124,11 +124,13 @@ FittedPose fit_pose(const PreparedObservation& observation, const PointGrid& gri
     fitted.map_T_sensor = align(observation, grid, pairs, motion);
     std::vector<Pair> next = gather(observation, grid, fitted.map_T_sensor, motion, parameters);
     const bool settled = equal(pairs, next);
-    if (next.size() < 3) break;
+    // Only pairs of this round count: earlier ones were gathered with looser gates than the chance
+    // below is computed for.
     pairs = std::move(next);
-    if (settled) break;
+    if (settled || pairs.size() < 3) break;
   }
   fitted.pairs = std::move(pairs);
+  if (fitted.pairs.size() < 3) return fitted;
   fitted.mean_chance = mean_chance(observation, grid, fitted.map_T_sensor, motion, parameters);
   fitted.log10_tail = log10_binomial_tail_bound(
       static_cast<double>(fitted.pairs.size()) - kGiven,

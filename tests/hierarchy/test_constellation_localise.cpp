@@ -164,6 +164,27 @@ TEST_CASE("Scenes that are not in the map are not found", "[constellation]") {
   }
 }
 
+TEST_CASE("Doubled landmarks of another scene are not found", "[constellation]") {
+  // A bad keyframe holds landmarks twice, next to each other: small triangles that fit anywhere.
+  std::mt19937_64 random(9);
+  const Points scene = random_scene(random, 200.0, 0.042, 0.5);
+  const Points other = random_scene(random, 200.0, 0.042, 0.5);
+  const ConstellationMap map = map_of(scene);
+  std::normal_distribution<double> apart(0.0, 0.3);
+  for (int i = 0; i < 100; ++i) {
+    View view;
+    view.sigma_m = 0.05;
+    Observation observation = observe(other, random_pose(random, 40, 160), view, random);
+    const std::size_t n = observation.points.size();
+    for (std::size_t k = 0; k < n; ++k) {
+      ObservedPoint twin = observation.points[k];
+      twin.position_m += Eigen::Vector2d(apart(random), apart(random));
+      observation.points.push_back(twin);
+    }
+    REQUIRE_FALSE(map.localise(observation.points).found());
+  }
+}
+
 TEST_CASE("A scene that stands in the map twice is ambiguous", "[constellation]") {
   std::mt19937_64 random(4);
   const Points scene = random_scene(random, 120.0, 0.0138, 2.0);
