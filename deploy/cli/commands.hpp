@@ -7,8 +7,11 @@
 namespace understory {
 
 void add_doctor_command(CLI::App& parent);
+void add_export_command(CLI::App& parent);
+void add_import_command(CLI::App& parent);
 void add_launch_command(CLI::App& parent);
 void add_log_command(CLI::App& parent);
+void add_replay_command(CLI::App& parent);
 void add_sim_command(CLI::App& parent);
 void add_status_command(CLI::App& parent);
 

@@ -6,9 +6,9 @@
 #include <chrono>
 #include <cstdio>
 #include <ctime>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
+
+#include "deploy/cli/text_file.hpp"
 
 namespace understory {
 namespace {
@@ -49,13 +49,7 @@ void LaunchReport::write(const std::filesystem::path& file,
     report["events"].push_back(
         {{"time", event.time}, {"process", event.process}, {"text", event.text}});
   }
-  const std::filesystem::path temporary = file.string() + ".part";
-  std::ofstream out(temporary);
-  out << report.dump(2) << '\n';
-  out.close();
-  std::error_code error;
-  if (out) std::filesystem::rename(temporary, file, error);
-  if (!out || error) throw std::runtime_error(fmt::format("{}: cannot write", file.string()));
+  write_text_file(file, report.dump(2) + "\n");
 }
 
 }  // namespace understory

@@ -1,7 +1,6 @@
 // `understory log accuracy`: a recorded run against the ground truth recorded beside it.
 #include <fmt/format.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "deploy/cli/drive_accuracy.hpp"
@@ -9,6 +8,7 @@
 #include "deploy/cli/interrupt.hpp"
 #include "deploy/cli/log_commands.hpp"
 #include "deploy/cli/progress.hpp"
+#include "deploy/cli/text_file.hpp"
 
 namespace understory {
 namespace {
@@ -102,13 +102,7 @@ void write_series(const std::string& file, nlohmann::ordered_json json,
   json["map_keyframes"] = poses_json(accuracy.keyframes);
   json["map_landmarks_m"] = points_json(accuracy.landmarks_m);
   json["true_landmarks_m"] = points_json(accuracy.true_landmarks_m);
-  const std::filesystem::path part = file + ".part";
-  std::ofstream out(part);
-  out << json.dump() << '\n';
-  out.close();
-  std::error_code error;
-  if (out) std::filesystem::rename(part, file, error);
-  if (!out || error) fail(fmt::format("{}: cannot write", file));
+  write_text_file(file, json.dump() + "\n");
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <exception>
 
 #include "deploy/cli/commands.hpp"
+#include "eval/command.hpp"
 
 namespace {
 
@@ -15,7 +16,11 @@ int run(int argc, char** argv) {
   understory::add_launch_command(app);
   understory::add_sim_command(app);
   understory::add_status_command(app);
+  understory::add_replay_command(app);
+  understory::eval::add_eval_command(app);
   understory::add_doctor_command(app);
+  understory::add_import_command(app);
+  understory::add_export_command(app);
   understory::add_log_command(app);
   try {
     app.parse(argc, argv);

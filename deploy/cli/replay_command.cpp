@@ -1,0 +1,116 @@
+// `understory replay`: chosen stages in one process, a log in, a log out, the same bytes every
+// time.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+
+#include "common/bus/replay.hpp"
+#include "common/io/lcm_log.hpp"
+#include "deploy/cli/commands.hpp"
+#include "deploy/cli/failure.hpp"
+#include "deploy/cli/interrupt.hpp"
+#include "deploy/cli/paths.hpp"
+#include "deploy/cli/progress.hpp"
+#include "deploy/cli/services.hpp"
+
+namespace understory {
+namespace {
+
+struct Options {
+  std::string log;
+  std::string out;
+  std::vector<std::string> stages{"keyframer", "geoslam_mapper"};
+  std::filesystem::path config = default_config_directory();
+  std::string channel_suffix;
+  bool outputs_only = false;
+};
+
+/// The services named, in the order in which data runs through them.
+std::vector<Service> chosen_services(const std::vector<std::string>& names) {
+  std::vector<Service> chosen;
+  std::string known;
+  for (const auto& name : names) {
+    const auto services = all_services();
+    const auto found = std::find_if(services.begin(), services.end(),
+                                    [&](const Service& service) { return service.name == name; });
+    if (found != services.end()) continue;
+    for (const auto& service : services) known += " " + service.name;
+    wrong_usage(fmt::format("--stages {}: no such stage; there are:{}", name, known));
+  }
+  for (const auto& service : all_services()) {
+    if (std::find(names.begin(), names.end(), service.name) != names.end()) {
+      chosen.push_back(service);
+    }
+  }
+  return chosen;
+}
+
+bool interrupted() {
+  try {
+    throw_if_interrupted();
+  } catch (const Interrupted&) {
+    return true;
+  }
+  return false;
+}
+
+void print(const ReplayReport& report, const Options& options) {
+  fmt::print("{} events read, {} fed to {} stages, {} messages derived -> {}\n", report.events,
+             report.fed, report.health.size(), report.derived, options.out);
+  if (report.damaged_places > 0) {
+    fmt::print("the log is damaged: {} bytes skipped in {} places\n", report.damaged_bytes,
+               report.damaged_places);
+  }
+  for (const auto& health : report.health) {
+    for (const auto& reason : health.reasons) {
+      fmt::print("{}: {} {} {}\n", health.process, reason.channel, reason.reason, reason.count);
+    }
+  }
+}
+
+void run(const Options& options) {
+  catch_interrupts();
+  ReplayOptions replay_options;
+  replay_options.log = options.log;
+  replay_options.out = options.out;
+  replay_options.services = chosen_services(options.stages);
+  replay_options.config_dir = options.config;
+  replay_options.channel_suffix = options.channel_suffix;
+  replay_options.keeps_inputs = !options.outputs_only;
+  Progress progress("replaying " + options.log, 1.0);
+  replay_options.progress = [&](double part) {
+    progress.update(part);
+    return interrupted();
+  };
+  try {
+    const auto report = replay(replay_options);
+    if (report.was_stopped) fail(options.log + ": interrupted");
+    print(report, options);
+  } catch (const ConfigurationError& error) {
+    wrong_usage(error.what());
+  } catch (const LogError& error) {
+    fail(error.what());
+  }
+}
+
+}  // namespace
+
+void add_replay_command(CLI::App& parent) {
+  auto* command = parent.add_subcommand(
+      "replay", "Runs stages over a log in one process: the same bytes out every time");
+  auto options = std::make_shared<Options>();
+  command->add_option("log", options->log, "An LCM log")->required();
+  command->add_option("--out", options->out, "The new log")->required();
+  command->add_option("--stages", options->stages, "Which stages")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--config", options->config, "Directory with NAME.toml for each stage")
+      ->capture_default_str();
+  command->add_option("--channel-suffix", options->channel_suffix, "Of every output, e.g. _ALT");
+  command->add_flag("--outputs-only", options->outputs_only, "Leave the log's own events out");
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace understory

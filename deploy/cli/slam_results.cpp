@@ -1,0 +1,133 @@
+#include "deploy/cli/slam_results.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <iterator>
+
+#include "common/wire/convert.hpp"
+#include "understory/ground_truth_t.hpp"
+
+namespace understory {
+namespace {
+
+void append_edge(std::string& out, const Keyframe& keyframe, std::size_t index,
+                 std::uint64_t landmark_vertex) {
+  const auto& landmark = keyframe.landmarks.at(index);
+  const SE2 base_T_centre = keyframe.centre_T_base().inverse();
+  const Eigen::Vector2d in_base = base_T_centre * landmark.position_m;
+  // d(in_base)/d(xi) for a right perturbation of centre_T_base.
+  Eigen::Matrix<double, 2, 3> jacobian;
+  jacobian << -1.0, 0.0, in_base.y(), 0.0, -1.0, -in_base.x();
+  const Eigen::Matrix2d rotation = base_T_centre.rotation();
+  const Eigen::Matrix2d covariance =
+      rotation * landmark.covariance_m2 * rotation.transpose() +
+      jacobian * keyframe.members.front().covariance * jacobian.transpose();
+  const double determinant = covariance.determinant();
+  if (!(determinant > 0.0)) return;
+  const Eigen::Matrix2d information = covariance.inverse();
+  fmt::format_to(std::back_inserter(out), "EDGE_SE2_XY {} {} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g}\n",
+                 keyframe.sequence, landmark_vertex, in_base.x(), in_base.y(), information(0, 0),
+                 information(0, 1), information(1, 1));
+}
+
+}  // namespace
+
+void SlamResults::add(const LogEvent& event) {
+  if (event.channel == "SLAM_POSE") {
+    const auto pose = decode_message<SlamPose>(event.data);
+    if (pose && pose->is_localised()) poses.push_back(*pose);
+  } else if (event.channel == "MAP") {
+    const auto whole = decode_message<WholeMap>(event.data);
+    if (whole && whole->complete) map = *whole;
+  } else if (event.channel == "KEYFRAME") {
+    const auto keyframe = decode_message<Keyframe>(event.data);
+    if (keyframe) keyframes.insert_or_assign(keyframe->sequence, *keyframe);
+  } else if (event.channel == "SLAM_UPDATE") {
+    const auto update = decode_message<MapUpdate>(event.data);
+    const bool fused = update && (update->status == MapUpdateStatus::kFirstMap ||
+                                  update->status == MapUpdateStatus::kUpdated);
+    if (fused) updates.push_back(*update);
+  } else if (event.channel == "GROUND_TRUTH") {
+    const auto one = decode_message<ground_truth_t>(event.data);
+    if (one) truth.emplace_back(one->utime, from_wire(one->world_T_vehicle));
+  }
+}
+
+std::string to_tum(const std::vector<std::pair<Utime, SE2>>& poses) {
+  std::string out;
+  for (const auto& [utime, pose] : poses) {
+    fmt::format_to(std::back_inserter(out), "{:.6f} {:.9g} {:.9g} 0 0 0 {:.9g} {:.9g}\n",
+                   1e-6 * static_cast<double>(utime), pose.x(), pose.y(),
+                   std::sin(0.5 * pose.theta()), std::cos(0.5 * pose.theta()));
+  }
+  return out;
+}
+
+std::vector<std::pair<Utime, SE2>> live_trajectory(const SlamResults& results) {
+  std::vector<std::pair<Utime, SE2>> trajectory;
+  for (const auto& pose : results.poses) trajectory.emplace_back(pose.utime, pose.map_T_vehicle());
+  return trajectory;
+}
+
+std::vector<std::pair<Utime, SE2>> keyframe_trajectory(const WholeMap& map) {
+  std::vector<std::pair<Utime, SE2>> trajectory;
+  for (const auto& pose : map.keyframes) trajectory.emplace_back(pose.utime, pose.map_T_vehicle);
+  return trajectory;
+}
+
+std::string landmarks_csv(const WholeMap& map) {
+  std::string out = "id,x_m,y_m,cov_xx_m2,cov_xy_m2,cov_yy_m2,radius_m,times_seen\n";
+  for (const auto& one : map.landmarks) {
+    fmt::format_to(std::back_inserter(out), "{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{}\n",
+                   one.id, one.position_m.x(), one.position_m.y(), one.covariance_m2(0, 0),
+                   one.covariance_m2(0, 1), one.covariance_m2(1, 1), one.radius_m, one.times_seen);
+  }
+  return out;
+}
+
+std::string keyframes_csv(const WholeMap& map) {
+  std::string out = "keyframe,utime_us,x_m,y_m,theta_rad\n";
+  for (const auto& one : map.keyframes) {
+    fmt::format_to(std::back_inserter(out), "{},{},{:.9g},{:.9g},{:.9g}\n", one.keyframe_sequence,
+                   one.utime, one.map_T_vehicle.x(), one.map_T_vehicle.y(),
+                   one.map_T_vehicle.theta());
+  }
+  return out;
+}
+
+std::string to_g2o(const SlamResults& results) {
+  std::string out;
+  if (!results.map) return out;
+  std::uint64_t next = 0;
+  for (const auto& one : results.map->keyframes) {
+    fmt::format_to(std::back_inserter(out), "VERTEX_SE2 {} {:.9g} {:.9g} {:.9g}\n",
+                   one.keyframe_sequence, one.map_T_vehicle.x(), one.map_T_vehicle.y(),
+                   one.map_T_vehicle.theta());
+    next = std::max(next, one.keyframe_sequence + 1);
+  }
+  if (!results.map->keyframes.empty()) {
+    fmt::format_to(std::back_inserter(out), "FIX {}\n",
+                   results.map->keyframes.front().keyframe_sequence);
+  }
+  std::map<LandmarkId, std::uint64_t> vertices;
+  for (const auto& one : results.map->landmarks) {
+    vertices[one.id] = next;
+    fmt::format_to(std::back_inserter(out), "VERTEX_XY {} {:.9g} {:.9g}\n", next++,
+                   one.position_m.x(), one.position_m.y());
+  }
+  for (const auto& update : results.updates) {
+    const auto keyframe = results.keyframes.find(update.keyframe_sequence);
+    if (keyframe == results.keyframes.end()) continue;
+    for (const auto& association : update.associations) {
+      const auto vertex = vertices.find(association.landmark_id);
+      if (vertex == vertices.end()) continue;
+      if (association.keyframe_landmark >= keyframe->second.landmarks.size()) continue;
+      append_edge(out, keyframe->second, association.keyframe_landmark, vertex->second);
+    }
+  }
+  return out;
+}
+
+}  // namespace understory
