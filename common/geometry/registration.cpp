@@ -155,4 +155,22 @@ Registration register_points(Points reference, Points observed, const SE2WithCov
   return Registrar(reference, observed, guess, parameters).run();
 }
 
+Registration register_step(Points reference, Points observed, const SE2& last, const SE2& last_step,
+                           const StepModel& model, const RegistrationParameters& parameters,
+                           const std::function<bool(const Registration&)>& fits) {
+  const double t2 = model.sigma_m * model.sigma_m;
+  const double r2 = model.sigma_rad * model.sigma_rad;
+  const Eigen::Matrix3d covariance = Eigen::Vector3d(t2, t2, r2).asDiagonal();
+  Registration best =
+      register_points(reference, observed, {last * last_step, covariance}, parameters);
+  if (fits(best)) return best;
+  const int steps = static_cast<int>(std::ceil(model.max_turn_rad / model.sigma_rad));
+  for (int step = -steps; step <= steps; ++step) {
+    const SE2 turned = last * SE2(0.0, 0.0, step * model.sigma_rad);
+    Registration tried = register_points(reference, observed, {turned, covariance}, parameters);
+    if (tried.pairs.size() > best.pairs.size()) best = std::move(tried);
+  }
+  return best;
+}
+
 }  // namespace understory

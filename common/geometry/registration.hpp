@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -49,5 +50,21 @@ Registration register_points(std::span<const UncertainPoint> reference,
                              std::span<const UncertainPoint> observed,
                              const SE2WithCovariance& guess,
                              const RegistrationParameters& parameters = {});
+
+/// What is known of the step between two observations when nothing measures it.
+struct StepModel {
+  double sigma_m = 0.3;
+  double sigma_rad = 0.04;
+  double max_turn_rad = 0.5;  ///< Largest turn that is searched.
+};
+
+/// Registers an observation made one step after `last` (pose in `reference`). First the last step
+/// is taken to repeat; where the result does not `fit`, turns on the spot are tried from -max_turn
+/// to max_turn, and the one with the most pairs is returned, fitting or not.
+Registration register_step(std::span<const UncertainPoint> reference,
+                           std::span<const UncertainPoint> observed, const SE2& last,
+                           const SE2& last_step, const StepModel& model,
+                           const RegistrationParameters& parameters,
+                           const std::function<bool(const Registration&)>& fits);
 
 }  // namespace understory

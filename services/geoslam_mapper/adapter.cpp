@@ -54,6 +54,10 @@ class MapperAdapter : public Adapter {
     jumps_ = JumpWatch(output_.reset_distance_m, output_.reset_angle_rad);
     node.subscribe<Keyframe>(channels_.keyframe, [this](const Keyframe& one) { add(one); },
                              {.queue_size = 200});
+    // Not in the journal: a scan leaves nothing in the map, and the next one finds its place again.
+    node.subscribe<LandmarkScan>(channels_.landmarks,
+                                 [this](const LandmarkScan& scan) { locate(scan); },
+                                 {.journaled = false});
     node.subscribe<Odometry>(channels_.odometry,
                              [this](const Odometry& motion) {
                                stage_->add(motion);
@@ -111,16 +115,31 @@ class MapperAdapter : public Adapter {
     publish_delta(update);
   }
 
+  /// The pose of a scan at once, in the map as it is; its keyframe comes later.
+  void locate(const LandmarkScan& scan) {
+    const std::optional<SE2WithCovariance> found = stage_->locate(scan);
+    if (!found || scan.utime <= newest_pose_utime_) return;
+    SlamPose pose;
+    pose.utime = scan.utime;
+    pose.submap_T_vehicle = found->mean;
+    pose.covariance = found->covariance;
+    publish(pose);
+  }
+
   void publish_poses(const Keyframe& keyframe, const MapUpdate& update) {
     for (SlamPose& pose : poses_of(keyframe, update)) {
       // Keyframes may share scans; the stamp always grows.
       if (pose.utime <= newest_pose_utime_) continue;
-      newest_pose_utime_ = pose.utime;
-      pose.map_T_odom = pose.map_T_vehicle() * odometry_.odom_T_vehicle(pose.utime).inverse();
-      pose.reset_counter = jumps_.count();
-      pose.reset_delta = jumps_.delta();
-      poses_.publish(pose);
+      publish(pose);
     }
+  }
+
+  void publish(SlamPose& pose) {
+    newest_pose_utime_ = pose.utime;
+    pose.map_T_odom = pose.map_T_vehicle() * odometry_.odom_T_vehicle(pose.utime).inverse();
+    pose.reset_counter = jumps_.count();
+    pose.reset_delta = jumps_.delta();
+    poses_.publish(pose);
   }
 
   void publish_delta(const MapUpdate& update) {
@@ -176,8 +195,9 @@ class MapperAdapter : public Adapter {
 
 Service geoslam_mapper_service(const MapperChannels& channels) {
   return {"geoslam_mapper",
-          channels.keyframe + ", " + channels.odometry + " -> " + channels.slam_pose + ", " +
-              channels.slam_update + ", " + channels.map + ", " + channels.map_delta,
+          channels.keyframe + ", " + channels.landmarks + ", " + channels.odometry + " -> " +
+              channels.slam_pose + ", " + channels.slam_update + ", " + channels.map + ", " +
+              channels.map_delta,
           [channels] { return std::make_unique<MapperAdapter>(channels); }};
 }
 

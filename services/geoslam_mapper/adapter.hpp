@@ -9,6 +9,7 @@ namespace understory {
 
 struct MapperChannels {
   std::string keyframe = "KEYFRAME";
+  std::string landmarks = "LANDMARKS";
   std::string odometry = "ODOMETRY";
   std::string map_request = "MAP_REQUEST";
   std::string slam_pose = "SLAM_POSE";

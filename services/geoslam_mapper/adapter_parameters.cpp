@@ -54,8 +54,8 @@ void describe_evidence(SmoothingMapperParameters& p, ParameterTable& table) {
             "Fewest matches of a pose that odometry does not support.");
   table.add("ours.outlier_chi2", p.outlier_chi2, {1.0, 1e6}, "",
             "Of one association after the update (2 degrees of freedom): it is taken out.");
-  table.add("ours.max_chi2_ratio", p.max_chi2_ratio, {1.0, 1e6}, "",
-            "Of all associations over their degrees of freedom: the update is rolled back.");
+  table.add("ours.max_innovation_sigmas", p.max_innovation_sigmas, {1.0, 1e6}, "sigma",
+            "chi^2 of all associations as a normal deviate: beyond, the update is rolled back.");
 }
 
 void describe_growth(SmoothingMapperParameters& p, ParameterTable& table) {
@@ -65,6 +65,8 @@ void describe_growth(SmoothingMapperParameters& p, ParameterTable& table) {
             "Landmarks seen within so many share their error with the pose.");
   table.add("ours.min_sightings", p.min_sightings, {1, 1000}, "",
             "A landmark enters the map when it was detected so often.");
+  table.add("ours.min_sighting_ratio", p.min_sighting_ratio, {0.0, 1.0}, "",
+            "... and in this share of the scans that had it in view.");
   table.add("ours.candidate_keyframes", p.candidate_keyframes, {1, 100000}, "keyframes",
             "A candidate seen too seldom is forgotten after so many.");
   table.add("ours.fold_distance_m", p.fold_distance_m, {0.0, 100.0}, "m",

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -20,6 +21,11 @@ class MapperMethod {
   virtual ~MapperMethod() = default;
   /// Localises the keyframe and fuses it; the map is unchanged unless the status says otherwise.
   virtual MapUpdate add(const Keyframe& keyframe) = 0;
+  /// Where the vehicle is at a scan, between keyframes: the map is not changed. None where the
+  /// method does not offer it, or the scan does not fit the map well enough to be sure.
+  virtual std::optional<SE2WithCovariance> locate(const LandmarkScan& /*scan*/) {
+    return std::nullopt;
+  }
   /// Motion without landmarks; a factor between keyframes when the configuration says so.
   virtual void add(const Odometry& odometry) = 0;
   /// A map to start from (thesis §4.3.1), frame `map`; before the first keyframe.

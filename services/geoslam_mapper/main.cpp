@@ -5,9 +5,10 @@ int main(int argc, char** argv) {
   return understory::run_service(
       understory::geoslam_mapper_service({
           .keyframe = "KEYFRAME",        // in: local landmarks of n sweeps
+          .landmarks = "LANDMARKS",      // in: every sweep, located at once
           .odometry = "ODOMETRY",        // in: motion, where there is any
           .map_request = "MAP_REQUEST",  // in: asks for MAP now
-          .slam_pose = "SLAM_POSE",      // out: the vehicle's pose at each sweep of a keyframe
+          .slam_pose = "SLAM_POSE",      // out: the vehicle's pose at each sweep
           .slam_update = "SLAM_UPDATE",  // out: what became of each keyframe
           .map = "MAP",                  // out: the whole map, on change and on request
           .map_delta = "MAP_DELTA",      // out: what changed, per keyframe

@@ -28,28 +28,37 @@ struct SourceMapperParameters {
 
 /// Ours.
 struct SmoothingMapperParameters {
-  bool use_odometry = false;           ///< ODOMETRY between keyframes as a factor.
-  bool localisation_only = false;      ///< Never change the map that was given.
-  double gate_sigmas = 4.0;            ///< Association gate.
-  double gate_floor_m = 0.03;          ///< Added to it.
-  double predicted_sigma_m = 0.25;     ///< Of a predicted pose that no odometry made.
-  double predicted_sigma_rad = 0.015;  ///< Likewise.
-  double min_matched_ratio =
-      0.4;              ///< Of what can be matched: below, a predicted pose is not believed.
-  int min_matched = 4;  ///< Fewest matches of a pose that odometry does not support.
-  int recent_keyframes =
-      20;  ///< Landmarks seen within so many keyframes: their error is shared with the pose.
-  int min_sightings = 3;            ///< A landmark enters the map when it was detected so often.
-  double min_sighting_ratio = 0.5;  ///< ... and in this share of the scans that had it in view.
-  int candidate_keyframes =
-      12;  ///< A candidate seen too seldom is forgotten after so many keyframes.
-  double outlier_chi2 =
-      24.0;  ///< Of one association after the update (2 degrees of freedom): it is taken out.
-  double max_chi2_ratio =
-      3.0;  ///< Of all of them over their degrees of freedom: the update is rolled back.
-  double fold_distance_m = 0.05;    ///< A keyframe this near to an earlier one ...
-  double fold_angle_rad = 0.02;     ///< ... and so similarly turned is folded into it.
-  double given_map_sigma_m = 0.05;  ///< Of the landmarks of a given map that states no covariance.
+  /// ODOMETRY between keyframes as a factor.
+  bool use_odometry = false;
+  /// Never change the map that was given.
+  bool localisation_only = false;
+  /// Half width of the association gate, in standard deviations, and what is added to it.
+  double gate_sigmas = 4.0;
+  double gate_floor_m = 0.03;
+  /// Of a predicted pose that no odometry made.
+  double predicted_sigma_m = 0.25;
+  double predicted_sigma_rad = 0.015;
+  /// Matches over what can be matched: below, a predicted pose is not believed.
+  double min_matched_ratio = 0.4;
+  /// Fewest matches of a pose that odometry does not support.
+  int min_matched = 4;
+  /// Landmarks seen within so many keyframes share their error with the pose.
+  int recent_keyframes = 20;
+  /// A landmark enters the map when it was detected so often, in this share of the scans that had
+  /// it in view.
+  int min_sightings = 3;
+  double min_sighting_ratio = 0.5;
+  /// A candidate seen too seldom is forgotten after so many keyframes.
+  int candidate_keyframes = 12;
+  /// chi^2 (2 degrees of freedom) of one association after the update: beyond, it is taken out.
+  double outlier_chi2 = 24.0;
+  /// chi^2 of all associations as a normal deviate: beyond, the update is rolled back.
+  double max_innovation_sigmas = 6.0;
+  /// A keyframe this near to an earlier one, and so similarly turned, is folded into it.
+  double fold_distance_m = 0.05;
+  double fold_angle_rad = 0.02;
+  /// Of the landmarks of a given map that states no covariance.
+  double given_map_sigma_m = 0.05;
 };
 
 struct MapperParameters {

@@ -60,8 +60,7 @@ void SmoothingMapper::start_with(std::span<const MapLandmark> landmarks) {
 
 std::string SmoothingMapper::malformed(const Keyframe& keyframe) const {
   if (keyframe.members.empty()) return "keyframe without members";
-  if (keyframe.utime <= last_utime_ && last_utime_ != 0)
-    return "keyframe not later than the last one";
+  if (last_utime_ && keyframe.utime <= *last_utime_) return "keyframe not later than the last one";
   if (!finite(keyframe))
     return "keyframe with a value that is not finite or a covariance that is not positive";
   return {};
@@ -77,6 +76,11 @@ MapUpdate SmoothingMapper::add(const Keyframe& keyframe) {
   last_utime_ = keyframe.utime;
 
   if (store_.empty() && nodes_.empty()) {
+    if (parameters_.localisation_only) {
+      update.status = MapUpdateStatus::kNotSure;
+      update.reason = "localisation only, but no map was given";
+      return update;
+    }
     start_map(keyframe, update);
     return update;
   }
@@ -93,12 +97,32 @@ MapUpdate SmoothingMapper::add(const Keyframe& keyframe) {
   }
   update.used_prior = placement->by_prediction;
   update.inliers = static_cast<std::uint32_t>(placement->associations.size());
+  if (parameters_.localisation_only) {
+    report(keyframe, *placement, update);
+    return update;
+  }
   if (!fuse(keyframe, *placement, update)) {
     update.status = MapUpdateStatus::kRolledBack;
     return update;
   }
   update.status = MapUpdateStatus::kUpdated;
   return update;
+}
+
+/// Localisation only: the pose is kept, the map stays as it was given. The node has no factor, so
+/// nothing moves it.
+void SmoothingMapper::report(const Keyframe& keyframe, const Placement& placement,
+                             MapUpdate& update) {
+  const SE2WithCovariance centre_T_base{keyframe.centre_T_base(),
+                                        keyframe.members.front().covariance};
+  const NodeIndex node = add_node(placement.map_T_centre.mean);
+  bases_.push_back({node, keyframe.sequence, keyframe.utime, centre_T_base, false});
+  ++keyframes_;
+  update.associations = placement.associations;
+  finish(keyframe, update);
+  map_T_last_base_ = compound(placement.map_T_centre, centre_T_base);
+  update.covariance = map_T_last_base_->covariance;
+  update.status = MapUpdateStatus::kUpdated;
 }
 
 /// The first keyframe's base is the origin of the map: x_0 is fixed, its centre is known as well as
@@ -149,6 +173,11 @@ void SmoothingMapper::finish(const Keyframe& keyframe, MapUpdate& update) {
   last_member_ = LastMember{base.node, last.utime, centre_T_last};
   map_T_last_base_ = map_T_base;
   odometry_.forget_before(last.utime);
+  // The newest scan's place is now known better than it was when it came.
+  if (!located_ || located_->utime <= last.utime) {
+    located_ =
+        LocatedScan{last.utime, update.map_T_latest_vehicle, located_ ? located_->step : SE2()};
+  }
 }
 
 std::vector<KeyframePose> SmoothingMapper::trajectory() const {

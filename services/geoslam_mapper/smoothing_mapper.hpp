@@ -14,6 +14,7 @@ class SmoothingMapper final : public MapperMethod {
   explicit SmoothingMapper(const SmoothingMapperParameters& parameters);
 
   MapUpdate add(const Keyframe& keyframe) override;
+  std::optional<SE2WithCovariance> locate(const LandmarkScan& scan) override;
   void add(const Odometry& odometry) override;
   void start_with(std::span<const MapLandmark> landmarks) override;
   std::vector<KeyframePose> trajectory() const override;
@@ -50,6 +51,7 @@ class SmoothingMapper final : public MapperMethod {
   // smoothing_mapper.cpp: the story of one keyframe.
   std::string malformed(const Keyframe& keyframe) const;
   void start_map(const Keyframe& keyframe, MapUpdate& update);
+  void report(const Keyframe& keyframe, const Placement& placement, MapUpdate& update);
   void finish(const Keyframe& keyframe, MapUpdate& update);
   SE2WithCovariance base_pose(const Base& base) const;
 
@@ -62,6 +64,9 @@ class SmoothingMapper final : public MapperMethod {
                                             const SE2WithCovariance& guess) const;
   std::vector<double> relative_variances(const std::vector<LandmarkId>& ids) const;
   std::size_t matchable(const Keyframe& keyframe, const Placement& placement) const;
+
+  // smoothing_mapper_locate.cpp: where is a single scan, between keyframes?
+  std::optional<SE2WithCovariance> step_from_last_scan(const LandmarkScan& scan) const;
 
   // smoothing_mapper_fuse.cpp: what does it add?
   bool fuse(const Keyframe& keyframe, const Placement& placement, MapUpdate& update);
@@ -104,7 +109,14 @@ class SmoothingMapper final : public MapperMethod {
   std::optional<LastMember> last_member_;
   /// The last keyframe's base, accepted or not: where it is, or is thought to be.
   std::optional<SE2WithCovariance> map_T_last_base_;
-  Utime last_utime_ = 0;
+  std::optional<Utime> last_utime_;
+  /// The last scan that was located between keyframes.
+  struct LocatedScan {
+    Utime utime = 0;
+    SE2 map_T_vehicle;
+    SE2 step;  ///< From the scan before.
+  };
+  std::optional<LocatedScan> located_;
 };
 
 std::unique_ptr<MapperMethod> make_smoothing_mapper(const SmoothingMapperParameters& parameters);

@@ -9,8 +9,11 @@
 namespace understory {
 namespace {
 
-/// Degrees of freedom below which a ratio of chi^2 says nothing.
-constexpr std::uint32_t kMinDegreesOfFreedom = 8;
+/// chi^2 as a standard normal deviate (Wilson & Hilferty 1931).
+double chi2_deviate(double chi2, double degrees_of_freedom) {
+  const double spread = 2.0 / (9.0 * degrees_of_freedom);
+  return (std::cbrt(chi2 / degrees_of_freedom) - (1.0 - spread)) / std::sqrt(spread);
+}
 
 }  // namespace
 
@@ -157,8 +160,8 @@ bool SmoothingMapper::solve(NodeIndex node, MapUpdate& update) {
       update.degrees_of_freedom += 2;
     }
   }
-  if (update.degrees_of_freedom >= kMinDegreesOfFreedom &&
-      update.chi2 > parameters_.max_chi2_ratio * update.degrees_of_freedom) {
+  if (update.degrees_of_freedom > 0 &&
+      chi2_deviate(update.chi2, update.degrees_of_freedom) > parameters_.max_innovation_sigmas) {
     update.reason = "innovation too large for its covariance";
     return false;
   }

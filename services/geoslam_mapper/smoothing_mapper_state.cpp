@@ -144,6 +144,8 @@ std::string SmoothingMapper::save() const {
   Json last_member = nullptr;
   if (last_member_)
     last_member = {last_member_->node, last_member_->utime, last_member_->centre_T_vehicle};
+  Json located = nullptr;
+  if (located_) located = {located_->utime, located_->map_T_vehicle, located_->step};
   return to_state({{"version", kStateVersion},
                    {"graph", to_value(smoother_.graph())},
                    {"landmarks", landmarks},
@@ -156,7 +158,8 @@ std::string SmoothingMapper::save() const {
                    {"keyframes", keyframes_},
                    {"last_member", last_member},
                    {"last_base", optional_to_json(map_T_last_base_)},
-                   {"last_utime", last_utime_}});
+                   {"last_utime", optional_to_json(last_utime_)},
+                   {"located", located}});
 }
 
 void SmoothingMapper::load(const std::string& state) {
@@ -190,7 +193,12 @@ void SmoothingMapper::load(const std::string& state) {
                                      last.at(2).get<SE2WithCovariance>()};
   }
   loaded.map_T_last_base_ = optional_from_json<SE2WithCovariance>(json.at("last_base"));
-  json.at("last_utime").get_to(loaded.last_utime_);
+  loaded.last_utime_ = optional_from_json<Utime>(json.at("last_utime"));
+  const Json& located = json.at("located");
+  if (!located.is_null()) {
+    loaded.located_ =
+        LocatedScan{located.at(0).get<Utime>(), located.at(1).get<SE2>(), located.at(2).get<SE2>()};
+  }
   if (!loaded.nodes_.empty()) loaded.smoother_.update();
   *this = std::move(loaded);
 }

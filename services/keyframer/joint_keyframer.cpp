@@ -25,13 +25,13 @@ void JointKeyframer::add(const Odometry& odometry) { odometry_.add(odometry); }
 
 std::optional<Keyframe> JointKeyframer::add(const LandmarkScan& scan) {
   ++counters_.scans;
-  if (last_utime_ != 0 && scan.utime <= last_utime_) {
+  if (last_utime_ && scan.utime <= *last_utime_) {
     counters_.last_reason = "scan not later than the last one";
     ++counters_.scans_unmatched;
     return std::nullopt;
   }
   std::optional<SE2WithCovariance> motion;
-  if (last_utime_ != 0) motion = odometry_.between(last_utime_, scan.utime);
+  if (last_utime_) motion = odometry_.between(*last_utime_, scan.utime);
   TrackedScan tracked = tracker_.add(scan, motion);
   if (!tracked.tracked) return lost(scan);
   last_utime_ = scan.utime;

@@ -36,7 +36,7 @@ class JointKeyframer final : public KeyframerMethod {
   ScanTracker tracker_;
   OdometryBuffer odometry_;
   std::vector<Member> members_;
-  Utime last_utime_ = 0;
+  std::optional<Utime> last_utime_;
   std::uint64_t next_sequence_ = 0;
   std::optional<SE2> local_T_previous_base_;
   KeyframerCounters counters_;

@@ -66,7 +66,7 @@ std::string JointKeyframer::save() const {
                    {"tracker", tracker_to_json(tracker_.state())},
                    {"members", members},
                    {"odometry", odometry},
-                   {"last_utime", last_utime_},
+                   {"last_utime", optional_to_json(last_utime_)},
                    {"next_sequence", next_sequence_},
                    {"previous_base", optional_to_json(local_T_previous_base_)},
                    {"counters",
@@ -91,7 +91,7 @@ void JointKeyframer::load(const std::string& state) {
     loaded.members_.push_back(std::move(loaded_member));
   }
   for (const Json& piece : json.at("odometry")) loaded.odometry_.add(piece.get<Odometry>());
-  loaded.last_utime_ = json.at("last_utime").get<Utime>();
+  loaded.last_utime_ = optional_from_json<Utime>(json.at("last_utime"));
   loaded.next_sequence_ = json.at("next_sequence").get<std::uint64_t>();
   loaded.local_T_previous_base_ = optional_from_json<SE2>(json.at("previous_base"));
   const Json& counters = json.at("counters");

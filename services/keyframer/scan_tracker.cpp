@@ -88,25 +88,13 @@ std::optional<Registration> ScanTracker::locate(
                                   motion->covariance + 1e-8 * Eigen::Matrix3d::Identity()};
     return register_points(reference, observed, guess, registration);
   }
-  const double t = parameters_.motion_sigma_m;
-  const double r = parameters_.motion_sigma_rad;
-  const Eigen::Matrix3d covariance = Eigen::Vector3d(t * t, t * t, r * r).asDiagonal();
-  const SE2 predicted = local_T_vehicle_ * last_motion_;
-  const Registration first =
-      register_points(reference, observed, {predicted, covariance}, registration);
-  if (fits(first, scan)) return first;
-
-  // Turns that the last motion does not foretell: headings around standing still, nearest first;
-  // the best one wins.
-  Registration best = first;
-  const int steps = static_cast<int>(std::ceil(parameters_.max_turn_rad / r));
-  for (int step = -steps; step <= steps; ++step) {
-    const SE2 turned = local_T_vehicle_ * SE2(0.0, 0.0, step * r);
-    Registration tried = register_points(reference, observed, {turned, covariance}, registration);
-    if (tried.pairs.size() > best.pairs.size()) best = std::move(tried);
-  }
-  if (fits(best, scan)) return best;
-  return std::nullopt;
+  const StepModel step{parameters_.motion_sigma_m, parameters_.motion_sigma_rad,
+                       parameters_.max_turn_rad};
+  Registration found =
+      register_step(reference, observed, local_T_vehicle_, last_motion_, step, registration,
+                    [&](const Registration& tried) { return fits(tried, scan); });
+  if (!fits(found, scan)) return std::nullopt;
+  return found;
 }
 
 TrackedScan ScanTracker::fuse(const LandmarkScan& scan, const Registration& registration) {

@@ -1,0 +1,56 @@
+// Poses between keyframes: each scan is registered to the map as it is, which it does not change.
+#include <algorithm>
+
+#include "common/geometry/registration.hpp"
+#include "services/geoslam_mapper/smoothing_mapper.hpp"
+
+namespace understory {
+namespace {
+
+constexpr double kReachMargin_m = 5.0;
+
+}  // namespace
+
+std::optional<SE2WithCovariance> SmoothingMapper::step_from_last_scan(
+    const LandmarkScan& scan) const {
+  if (!parameters_.use_odometry) return std::nullopt;
+  return odometry_.between(located_->utime, scan.utime);
+}
+
+std::optional<SE2WithCovariance> SmoothingMapper::locate(const LandmarkScan& scan) {
+  if (!located_ || scan.utime <= located_->utime) return std::nullopt;
+  const double reach = scan.field_of_view.max_range_m + kReachMargin_m;
+  std::vector<UncertainPoint> reference;
+  for (const LandmarkId id : store_.index().near({located_->map_T_vehicle.translation(), reach})) {
+    const StoredLandmark& landmark = store_.at(id);
+    reference.push_back({landmark.position_m, landmark.local_variance()});
+  }
+  std::vector<UncertainPoint> observed;
+  for (const Detection& detection : scan.detections) {
+    observed.push_back({detection.position_m.head<2>(),
+                        0.5 * detection.covariance_m2.topLeftCorner<2, 2>().trace()});
+  }
+  const auto fits = [&](const Registration& found) {
+    const double possible = static_cast<double>(std::min(reference.size(), observed.size()));
+    return found.pairs.size() >= static_cast<std::size_t>(parameters_.min_matched) &&
+           static_cast<double>(found.pairs.size()) >= parameters_.min_matched_ratio * possible;
+  };
+  RegistrationParameters gating;
+  gating.gate_sigmas = parameters_.gate_sigmas;
+  gating.gate_floor_m = parameters_.gate_floor_m;
+  const auto step = step_from_last_scan(scan);
+  const Registration found =
+      step ? register_points(reference, observed,
+                             {located_->map_T_vehicle * step->mean,
+                              step->covariance + 1e-6 * Eigen::Matrix3d::Identity()},
+                             gating)
+           : register_step(reference, observed, located_->map_T_vehicle, located_->step,
+                           StepModel{}, gating, fits);
+  if (!fits(found)) return std::nullopt;
+  const SE2 last = located_->map_T_vehicle;
+  located_ = LocatedScan{scan.utime, found.reference_T_observed,
+                         last.inverse() * found.reference_T_observed};
+  return SE2WithCovariance{found.reference_T_observed, found.covariance};
+}
+
+}  // namespace understory

@@ -1,0 +1,241 @@
+#include "services/geoslam_mapper/smoothing_mapper.hpp"
+
+#include <Eigen/Cholesky>
+#include <random>
+
+#include "services/keyframer/joint_keyframer.hpp"
+#include "sim/drive.hpp"
+#include "tests/catch.hpp"
+
+using namespace understory;
+
+namespace {
+
+sim::Drive drive(sim::PathKind path, double length_m, std::uint64_t seed, double sigma_m = 0.2) {
+  sim::DriveParameters parameters;
+  parameters.forest = sim::forest_parameters(sim::ForestKind::kIntermediate);
+  parameters.forest.side_m = 400.0;
+  parameters.path.kind = path;
+  parameters.path.length_m = length_m;
+  parameters.sensor.position_sigma_m = sigma_m;
+  return {parameters, seed};
+}
+
+std::vector<Keyframe> keyframes(const sim::Drive& drive) {
+  JointKeyframer keyframer({});
+  std::vector<Keyframe> result;
+  for (std::size_t k = 0; k < drive.size(); ++k) {
+    if (auto keyframe = keyframer.add(drive.scan(k).scan)) result.push_back(std::move(*keyframe));
+  }
+  return result;
+}
+
+std::vector<MapLandmark> true_map(const sim::Drive& drive) {
+  std::vector<MapLandmark> map;
+  for (const Eigen::Vector2d& trunk : drive.forest().trunks_m) {
+    MapLandmark landmark;
+    landmark.position_m = trunk;
+    landmark.covariance_m2 = 1e-4 * Eigen::Matrix2d::Identity();
+    map.push_back(landmark);
+  }
+  return map;
+}
+
+bool same_map(const MapperMethod& a, const std::vector<MapLandmark>& landmarks,
+              const std::vector<KeyframePose>& poses) {
+  const std::vector<MapLandmark> now = a.landmarks();
+  const std::vector<KeyframePose> trajectory = a.trajectory();
+  if (now.size() != landmarks.size() || trajectory.size() != poses.size()) return false;
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    if (now[i].id != landmarks[i].id || now[i].position_m != landmarks[i].position_m) return false;
+  }
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (trajectory[i].map_T_vehicle.coordinates() != poses[i].map_T_vehicle.coordinates())
+      return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+TEST_CASE("A drive round a circle gives a map of trunks, each once", "[mapper]") {
+  const sim::Drive simulated = drive(sim::PathKind::kCircle, 100.0, 11);
+  const SE2 world_T_map = simulated.world_T_vehicle().front();
+  SmoothingMapper mapper({});
+  for (const Keyframe& keyframe : keyframes(simulated)) {
+    const MapUpdate update = mapper.add(keyframe);
+    const bool accepted =
+        update.status == MapUpdateStatus::kFirstMap || update.status == MapUpdateStatus::kUpdated;
+    REQUIRE(accepted);
+    const SE2 truth = world_T_map.inverse() * simulated.world_T_vehicle()[8 * keyframe.sequence];
+    REQUIRE((update.map_T_vehicle.translation() - truth.translation()).norm() < 0.5);
+    Eigen::LLT<Eigen::Matrix3d> llt(update.covariance + 1e-15 * Eigen::Matrix3d::Identity());
+    REQUIRE(llt.info() == Eigen::Success);
+  }
+  std::vector<std::uint32_t> taken;
+  for (const MapLandmark& landmark : mapper.landmarks()) {
+    const auto nearest = simulated.grid().nearest(world_T_map * landmark.position_m);
+    REQUIRE(nearest->distance_m < 1.0);
+    taken.push_back(nearest->index);
+  }
+  std::sort(taken.begin(), taken.end());
+  const auto doubled = std::unique(taken.begin(), taken.end());
+  REQUIRE(std::distance(doubled, taken.end()) <= 1);
+}
+
+TEST_CASE("Keyframes of another forest are not sure, and leave the map as it was", "[mapper]") {
+  const sim::Drive here = drive(sim::PathKind::kLine, 30.0, 12);
+  const sim::Drive there = drive(sim::PathKind::kLine, 30.0, 912);
+  SmoothingMapper mapper({});
+  Utime last = 0;
+  for (const Keyframe& keyframe : keyframes(here)) {
+    mapper.add(keyframe);
+    last = keyframe.utime;
+  }
+  const std::vector<MapLandmark> landmarks = mapper.landmarks();
+  const std::vector<KeyframePose> poses = mapper.trajectory();
+  for (Keyframe keyframe : keyframes(there)) {
+    keyframe.utime += last + 1;
+    const MapUpdate update = mapper.add(keyframe);
+    REQUIRE(update.status == MapUpdateStatus::kNotSure);
+    REQUIRE_FALSE(update.reason.empty());
+    REQUIRE(same_map(mapper, landmarks, poses));
+  }
+}
+
+TEST_CASE("A keyframe that contradicts the map is taken back exactly", "[mapper]") {
+  const sim::Drive simulated = drive(sim::PathKind::kLine, 40.0, 13);
+  SmoothingMapperParameters parameters;
+  parameters.outlier_chi2 = 1e9;
+  SmoothingMapper mapper(parameters);
+  std::vector<Keyframe> made = keyframes(simulated);
+  Keyframe bent = made.back();
+  made.pop_back();
+  for (const Keyframe& keyframe : made) mapper.add(keyframe);
+  const std::vector<MapLandmark> landmarks = mapper.landmarks();
+  const std::vector<KeyframePose> poses = mapper.trajectory();
+  // Everything is found, nothing fits.
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  for (KeyframeLandmark& landmark : bent.landmarks) {
+    landmark.position_m += 0.22 * Eigen::Vector2d(normal(random), normal(random));
+  }
+  const MapUpdate update = mapper.add(bent);
+  REQUIRE(update.status == MapUpdateStatus::kRolledBack);
+  REQUIRE(same_map(mapper, landmarks, poses));
+  // And the drive goes on.
+  Keyframe good = keyframes(simulated).back();
+  good.utime += 1;
+  REQUIRE(mapper.add(good).status == MapUpdateStatus::kUpdated);
+}
+
+TEST_CASE("In a given map every keyframe finds its place, and the map is not bent", "[mapper]") {
+  const sim::Drive simulated = drive(sim::PathKind::kCircle, 60.0, 14);
+  SmoothingMapper mapper({});
+  mapper.start_with(true_map(simulated));
+  const std::vector<MapLandmark> given = mapper.landmarks();
+  for (Keyframe keyframe : keyframes(simulated)) {
+    keyframe.previous_T_base.reset();  // No prior: each is searched in the whole map.
+    const MapUpdate update = mapper.add(keyframe);
+    REQUIRE(update.status == MapUpdateStatus::kUpdated);
+    REQUIRE_FALSE(update.used_prior);
+    const SE2 truth = simulated.world_T_vehicle()[8 * keyframe.sequence];
+    REQUIRE((update.map_T_vehicle.translation() - truth.translation()).norm() < 0.2);
+  }
+  const std::vector<MapLandmark> now = mapper.landmarks();
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    REQUIRE((now[i].position_m - given[i].position_m).norm() < 0.05);
+  }
+}
+
+TEST_CASE("Localisation only leaves the given map alone", "[mapper]") {
+  const sim::Drive simulated = drive(sim::PathKind::kSquare, 60.0, 19);
+  SmoothingMapperParameters parameters;
+  parameters.localisation_only = true;
+  SmoothingMapper mapper(parameters);
+  const std::vector<Keyframe> made = keyframes(simulated);
+  REQUIRE(mapper.add(made.front()).status == MapUpdateStatus::kNotSure);
+  mapper.start_with(true_map(simulated));
+  const std::vector<MapLandmark> given = mapper.landmarks();
+  for (std::size_t i = 1; i < made.size(); ++i) {
+    const MapUpdate update = mapper.add(made[i]);
+    REQUIRE(update.status == MapUpdateStatus::kUpdated);
+    REQUIRE(update.used_prior == (i > 1));
+    const SE2 truth = simulated.world_T_vehicle()[8 * made[i].sequence];
+    const Eigen::Vector3d error = (update.map_T_vehicle.inverse() * truth).Log();
+    REQUIRE(error.head<2>().norm() < 0.2);
+    REQUIRE(error.dot(update.covariance.ldlt().solve(error)) < 40.0);
+  }
+  REQUIRE(mapper.trajectory().size() == made.size() - 1);
+  const std::vector<MapLandmark> now = mapper.landmarks();
+  REQUIRE(now.size() == given.size());
+  for (std::size_t i = 0; i < given.size(); ++i) REQUIRE(now[i].position_m == given[i].position_m);
+}
+
+TEST_CASE("Standing still does not grow the graph", "[mapper]") {
+  const sim::Drive simulated = drive(sim::PathKind::kStanding, 100.0, 15);
+  SmoothingMapper mapper({});
+  std::size_t after_ten = 0;
+  std::size_t count = 0;
+  for (const Keyframe& keyframe : keyframes(simulated)) {
+    mapper.add(keyframe);
+    if (++count == 10) after_ten = mapper.save().size();
+  }
+  REQUIRE(count > 50);
+  REQUIRE(mapper.trajectory().size() == count);
+  // What grows is one pose per keyframe in the trajectory; the map and its factors do not.
+  REQUIRE(mapper.save().size() < after_ten + (count - 10) * 400);
+}
+
+TEST_CASE("Scans between keyframes are located, and the map is not changed by it", "[mapper]") {
+  const sim::Drive simulated = drive(sim::PathKind::kSquare, 60.0, 16);
+  const SE2 map_T_world = simulated.world_T_vehicle().front().inverse();
+  JointKeyframer keyframer({});
+  SmoothingMapper mapper({});
+  std::size_t located = 0;
+  for (std::size_t k = 0; k < simulated.size(); ++k) {
+    const LandmarkScan scan = simulated.scan(k).scan;
+    const std::size_t before = mapper.landmarks().size();
+    if (const auto pose = mapper.locate(scan)) {
+      ++located;
+      const SE2 truth = map_T_world * simulated.world_T_vehicle()[k];
+      REQUIRE((pose->mean.translation() - truth.translation()).norm() < 0.5);
+    }
+    REQUIRE(mapper.landmarks().size() == before);
+    if (const auto keyframe = keyframer.add(scan)) mapper.add(*keyframe);
+  }
+  REQUIRE(located >= simulated.size() - 12);
+}
+
+TEST_CASE("A loaded mapper goes on where the saved one was", "[mapper]") {
+  const sim::Drive simulated = drive(sim::PathKind::kCircle, 40.0, 17);
+  SmoothingMapper whole({});
+  SmoothingMapper first({});
+  SmoothingMapper second({});
+  std::size_t count = 0;
+  for (const Keyframe& keyframe : keyframes(simulated)) {
+    const MapUpdate expected = whole.add(keyframe);
+    if (count == 9) second.load(first.save());
+    const MapUpdate actual = count < 9 ? first.add(keyframe) : second.add(keyframe);
+    ++count;
+    REQUIRE(actual.status == expected.status);
+    REQUIRE((actual.map_T_vehicle.inverse() * expected.map_T_vehicle).Log().norm() < 1e-3);
+    REQUIRE(actual.added == expected.added);
+  }
+  REQUIRE(count > 12);
+  REQUIRE_THROWS(second.load("not a state"));
+}
+
+TEST_CASE("Malformed keyframes are refused with a reason", "[mapper]") {
+  const sim::Drive simulated = drive(sim::PathKind::kLine, 6.0, 18);
+  std::vector<Keyframe> made = keyframes(simulated);
+  SmoothingMapper mapper({});
+  Keyframe empty;
+  REQUIRE(mapper.add(empty).status == MapUpdateStatus::kRejected);
+  Keyframe broken = made.front();
+  broken.landmarks.front().position_m.x() = std::nan("");
+  REQUIRE(mapper.add(broken).status == MapUpdateStatus::kRejected);
+  REQUIRE(mapper.add(made[0]).status == MapUpdateStatus::kFirstMap);
+  REQUIRE(mapper.add(made[0]).status == MapUpdateStatus::kRejected);
+  REQUIRE(mapper.landmarks().size() > 20);
+}

@@ -1,0 +1,161 @@
+#include "services/keyframer/joint_keyframer.hpp"
+
+#include <random>
+
+#include "sim/drive.hpp"
+#include "tests/catch.hpp"
+
+using namespace understory;
+
+namespace {
+
+sim::Drive drive(sim::PathKind path, double length_m, double detection, double sigma_m,
+                 std::uint64_t seed) {
+  sim::DriveParameters parameters;
+  parameters.forest = sim::forest_parameters(sim::ForestKind::kIntermediate);
+  parameters.forest.side_m = 400.0;
+  parameters.path.kind = path;
+  parameters.path.length_m = length_m;
+  parameters.sensor.detection_probability = detection;
+  parameters.sensor.position_sigma_m = sigma_m;
+  return {parameters, seed};
+}
+
+std::vector<Keyframe> keyframes(const sim::Drive& drive, JointKeyframer& keyframer) {
+  std::vector<Keyframe> result;
+  for (std::size_t k = 0; k < drive.size(); ++k) {
+    if (auto keyframe = keyframer.add(drive.scan(k).scan)) result.push_back(std::move(*keyframe));
+  }
+  return result;
+}
+
+double nearest_trunk_m(const sim::Drive& drive, const Eigen::Vector2d& point) {
+  return drive.grid().nearest(point)->distance_m;
+}
+
+}  // namespace
+
+TEST_CASE("Every eight scans give a keyframe, at corners too", "[keyframer]") {
+  const auto path =
+      GENERATE(sim::PathKind::kCircle, sim::PathKind::kSquare, sim::PathKind::kTriangle);
+  const sim::Drive simulated = drive(path, 80.0, 0.85, 0.2, 3);
+  JointKeyframer keyframer({});
+  const std::vector<Keyframe> made = keyframes(simulated, keyframer);
+  REQUIRE(made.size() == simulated.size() / 8);
+  REQUIRE(keyframer.counters().scans_unmatched == 0);
+  for (std::size_t i = 1; i < made.size(); ++i) {
+    REQUIRE(made[i].sequence == made[i - 1].sequence + 1);
+    REQUIRE(made[i].previous_T_base);
+    const SE2 truth =
+        simulated.world_T_vehicle()[8 * (i - 1)].inverse() * simulated.world_T_vehicle()[8 * i];
+    REQUIRE((truth.inverse() * *made[i].previous_T_base).Log().norm() < 0.3);
+  }
+}
+
+TEST_CASE("Landmarks of a keyframe are trunks, each once, and as uncertain as stated",
+          "[keyframer]") {
+  const sim::Drive simulated = drive(sim::PathKind::kCircle, 60.0, 0.8, 0.3, 4);
+  JointKeyframer keyframer({});
+  double chi2 = 0.0;
+  std::size_t count = 0;
+  for (const Keyframe& keyframe : keyframes(simulated, keyframer)) {
+    const SE2 world_T_base = simulated.world_T_vehicle()[8 * keyframe.sequence];
+    const SE2WithCovariance base_T_centre =
+        inverse(SE2WithCovariance{keyframe.centre_T_base(), keyframe.members.front().covariance});
+    for (const KeyframeLandmark& landmark : keyframe.landmarks) {
+      REQUIRE(landmark.times_seen >= 1);
+      const double error =
+          nearest_trunk_m(simulated, world_T_base * (base_T_centre.mean * landmark.position_m));
+      if (error > 1.5) continue;  // Not its own trunk: counted as missing below.
+      const double variance = 0.5 * landmark.covariance_m2.trace() +
+                              base_T_centre.covariance(0, 0) +
+                              landmark.position_m.squaredNorm() * base_T_centre.covariance(2, 2);
+      chi2 += error * error / (2.0 * variance);
+      ++count;
+    }
+  }
+  REQUIRE(count > 1500);
+  REQUIRE(chi2 / static_cast<double>(count) < 1.4);
+  REQUIRE(chi2 / static_cast<double>(count) > 0.6);
+}
+
+TEST_CASE("What is seen once does not pass", "[keyframer]") {
+  const sim::Drive simulated = drive(sim::PathKind::kLine, 10.0, 0.95, 0.05, 5);
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> where(-35.0, 35.0);
+  JointKeyframer keyframer({});
+  std::size_t landmarks = 0;
+  std::size_t clutter_passed = 0;
+  std::size_t clutter_made = 0;
+  for (std::size_t k = 0; k < simulated.size(); ++k) {
+    LandmarkScan scan = simulated.scan(k).scan;
+    for (int i = 0; i < 5; ++i) {
+      Detection clutter = scan.detections.front();
+      clutter.position_m = {where(random), where(random), 0.0};
+      scan.detections.push_back(clutter);
+      ++clutter_made;
+    }
+    const auto keyframe = keyframer.add(scan);
+    if (!keyframe) continue;
+    const SE2 world_T_centre =
+        simulated.world_T_vehicle()[k - 7] * keyframe->centre_T_base().inverse();
+    for (const KeyframeLandmark& landmark : keyframe->landmarks) {
+      if (nearest_trunk_m(simulated, world_T_centre * landmark.position_m) > 0.6) ++clutter_passed;
+      ++landmarks;
+    }
+  }
+  REQUIRE(landmarks > 100);
+  REQUIRE(clutter_made > 200);
+  // Two false detections of different scans fall into one gate by chance now and then.
+  REQUIRE(clutter_passed <= 4);
+}
+
+TEST_CASE("A vehicle that was carried away starts anew", "[keyframer]") {
+  const sim::Drive here = drive(sim::PathKind::kLine, 10.0, 0.9, 0.1, 6);
+  const sim::Drive there = drive(sim::PathKind::kLine, 10.0, 0.9, 0.1, 77);
+  JointKeyframer keyframer({});
+  const std::size_t first = keyframes(here, keyframer).size();
+  REQUIRE(first > 3);
+  Utime offset = here.utime(here.size() - 1) + 200000;
+  std::vector<Keyframe> later;
+  for (std::size_t k = 0; k < there.size(); ++k) {
+    LandmarkScan scan = there.scan(k).scan;
+    scan.utime = offset + there.utime(k);
+    if (auto keyframe = keyframer.add(scan)) later.push_back(*keyframe);
+  }
+  REQUIRE(keyframer.counters().scans_unmatched == 1);
+  REQUIRE(later.size() >= there.size() / 8);
+  // No motion is claimed across the gap.
+  const auto unlinked = std::count_if(later.begin(), later.end(),
+                                      [](const Keyframe& k) { return !k.previous_T_base; });
+  REQUIRE(unlinked == 1);
+}
+
+TEST_CASE("A scan that is not later than the last one is refused and counted", "[keyframer]") {
+  const sim::Drive simulated = drive(sim::PathKind::kLine, 4.0, 0.9, 0.1, 7);
+  JointKeyframer keyframer({});
+  keyframer.add(simulated.scan(1).scan);
+  REQUIRE_FALSE(keyframer.add(simulated.scan(0).scan));
+  REQUIRE(keyframer.counters().scans_unmatched == 1);
+  REQUIRE_FALSE(keyframer.counters().last_reason.empty());
+}
+
+TEST_CASE("A loaded state goes on exactly where the saved one was", "[keyframer]") {
+  const sim::Drive simulated = drive(sim::PathKind::kCircle, 12.0, 0.85, 0.2, 8);
+  JointKeyframer whole({});
+  JointKeyframer first({});
+  JointKeyframer second({});
+  for (std::size_t k = 0; k < simulated.size(); ++k) {
+    const LandmarkScan scan = simulated.scan(k).scan;
+    if (k == 29) second.load(first.save());
+    const auto expected = whole.add(scan);
+    const auto actual = k < 29 ? first.add(scan) : second.add(scan);
+    REQUIRE(expected.has_value() == actual.has_value());
+    if (!expected) continue;
+    REQUIRE(expected->landmarks.size() == actual->landmarks.size());
+    for (std::size_t i = 0; i < expected->landmarks.size(); ++i) {
+      REQUIRE(expected->landmarks[i].position_m == actual->landmarks[i].position_m);
+    }
+  }
+  REQUIRE_THROWS(second.load("not a state"));
+}
