@@ -18,8 +18,12 @@ namespace {
 /// A scan record as LASER.txt has it: the time, then 361 ranges, tabs, no line break.
 std::string scan_record(const std::string& time, double range, std::size_t beams = 361) {
   std::string text = time;
-  for (std::size_t i = 0; i < beams; ++i) text += "\t" + std::to_string(range);
-  return text + "\t";
+  for (std::size_t i = 0; i < beams; ++i) {
+    text += '\t';
+    text += std::to_string(range);
+  }
+  text += '\t';
+  return text;
 }
 
 std::string error_of(const std::function<void()>& work) {
