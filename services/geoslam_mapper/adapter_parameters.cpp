@@ -69,6 +69,8 @@ void describe_growth(SmoothingMapperParameters& p, ParameterTable& table) {
             "... and in this share of the scans that had it in view.");
   table.add("ours.candidate_keyframes", p.candidate_keyframes, {1, 100000}, "keyframes",
             "A candidate seen too seldom is forgotten after so many.");
+  table.add("ours.merge_distance_m", p.merge_distance_m, {0.0, 100.0}, "m",
+            "Two landmarks this near that were never seen from one place are one.");
   table.add("ours.fold_distance_m", p.fold_distance_m, {0.0, 100.0}, "m",
             "A keyframe this near to an earlier one and similarly turned is folded into it.");
   table.add("ours.fold_angle_rad", p.fold_angle_rad, {0.0, 3.2}, "rad", "How similarly turned.");

@@ -50,6 +50,8 @@ struct SmoothingMapperParameters {
   double min_sighting_ratio = 0.5;
   /// A candidate seen too seldom is forgotten after so many keyframes.
   int candidate_keyframes = 12;
+  /// Two landmarks this near to each other that were never seen from one place are one.
+  double merge_distance_m = 1.0;
   /// chi^2 (2 degrees of freedom) of one association after the update: beyond, it is taken out.
   double outlier_chi2 = 24.0;
   /// chi^2 of all associations as a normal deviate: beyond, the update is rolled back.

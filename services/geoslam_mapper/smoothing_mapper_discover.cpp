@@ -8,9 +8,6 @@
 namespace understory {
 namespace {
 
-/// Two landmarks further apart than this are never one [m].
-constexpr double kMaxMergeDistance_m = 2.0;
-
 bool share_a_node(const StoredLandmark& a, const StoredLandmark& b) {
   std::vector<NodeIndex> common;
   std::set_intersection(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(),
@@ -117,8 +114,9 @@ void SmoothingMapper::forget_stale_candidates() {
   });
 }
 
-/// Two landmarks within each other's noise that no place ever saw side by side are one: the younger
-/// is taken over by the older.
+/// Two landmarks near each other that no place ever saw side by side are one. The one seen less
+/// often is taken over; its detections count on where they agree, within the noise, with the
+/// other's place.
 void SmoothingMapper::merge_doubles(MapUpdate& update) {
   std::vector<LandmarkId> touched = update.added;
   for (const Association& pair : update.associations) touched.push_back(pair.landmark_id);
@@ -127,16 +125,18 @@ void SmoothingMapper::merge_doubles(MapUpdate& update) {
   for (const LandmarkId id : touched) {
     if (!store_.all().contains(id)) continue;
     const StoredLandmark& landmark = store_.at(id);
-    std::vector<LandmarkId> near = store_.index().near({landmark.position_m, kMaxMergeDistance_m});
-    for (const LandmarkId other_id : near) {
-      if (other_id == id || !store_.all().contains(other_id)) continue;
+    for (const LandmarkId other_id :
+         store_.index().near({landmark.position_m, parameters_.merge_distance_m})) {
+      if (other_id == id) continue;
       const StoredLandmark& other = store_.at(other_id);
-      const double sigma = std::sqrt(landmark.local_variance() + other.local_variance());
-      const double gate = std::min(kMaxMergeDistance_m, parameters_.gate_sigmas * sigma + 0.1);
-      if (!landmark.point || !other.point || landmark.kind != other.kind) continue;
-      if ((landmark.position_m - other.position_m).norm() > gate || share_a_node(landmark, other))
+      if (!landmark.point || !other.point || landmark.kind != other.kind ||
+          share_a_node(landmark, other)) {
         continue;
-      const auto [keep, drop] = std::minmax(id, other_id);
+      }
+      const bool keep_first =
+          std::pair(landmark.times_seen, other_id) > std::pair(other.times_seen, id);
+      const LandmarkId keep = keep_first ? id : other_id;
+      const LandmarkId drop = keep_first ? other_id : id;
       take_over(drop, keep);
       update.merged.emplace_back(drop, keep);
       break;
@@ -147,10 +147,16 @@ void SmoothingMapper::merge_doubles(MapUpdate& update) {
 void SmoothingMapper::take_over(LandmarkId old_id, LandmarkId new_id) {
   StoredLandmark& old_one = store_.at(old_id);
   StoredLandmark& new_one = store_.at(new_id);
+  const double sigma = std::sqrt(old_one.local_variance() + new_one.local_variance());
+  const bool agree = (old_one.position_m - new_one.position_m).norm() <=
+                     parameters_.gate_sigmas * sigma + parameters_.gate_floor_m;
   for (const NodeIndex node : old_one.nodes) {
     auto handle = nodes_[node].observations.extract(old_id);
     if (handle.empty()) continue;
-    smoother_.graph().observations[handle.mapped()].point = *new_one.point;
+    PointObservation& factor = smoother_.graph().observations[handle.mapped()];
+    factor.point =
+        *new_one.point;  // Also of a factor without weight: no variable may be left without any.
+    if (!agree) factor.information.setZero();
     handle.key() = new_id;
     nodes_[node].observations.insert(std::move(handle));
   }
@@ -158,7 +164,7 @@ void SmoothingMapper::take_over(LandmarkId old_id, LandmarkId new_id) {
   std::merge(old_one.nodes.begin(), old_one.nodes.end(), new_one.nodes.begin(), new_one.nodes.end(),
              std::back_inserter(nodes));
   new_one.nodes = std::move(nodes);
-  new_one.information += old_one.information;
+  if (agree) new_one.information += old_one.information;
   new_one.times_seen += old_one.times_seen;
   new_one.last_keyframe = std::max(new_one.last_keyframe, old_one.last_keyframe);
   store_.remove(old_id);
