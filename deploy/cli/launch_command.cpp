@@ -137,7 +137,7 @@ void run(launch::Supervisor& supervisor, launch::Registry& registry, const StopS
       registry.write(supervisor.status());
       noted = std::move(pids);
     }
-    if (supervisor.stopped()) break;
+    if (supervisor.stopped()) break;  // The note is empty by now: the next launch begins anew.
     wait(supervisor, signals, health);
     while (health != nullptr && health->handle(std::chrono::milliseconds(0))) {
     }

@@ -34,7 +34,8 @@ std::vector<ProcessStatus> Registry::read() const {
   std::vector<ProcessStatus> processes;
   std::ifstream file(note_);
   ProcessStatus process;
-  while (file >> process.name >> process.pid >> process.start_ticks) processes.push_back(process);
+  while (file >> process.name >> process.pid >> process.start_ticks >> process.restarts)
+    processes.push_back(process);
   return processes;
 }
 
@@ -44,7 +45,8 @@ void Registry::write(const std::vector<ProcessStatus>& processes) const {
     std::ofstream file(temporary);
     for (const auto& process : processes) {
       if (process.pid <= 0) continue;
-      file << process.name << ' ' << process.pid << ' ' << process.start_ticks << '\n';
+      file << process.name << ' ' << process.pid << ' ' << process.start_ticks << ' '
+           << process.restarts << '\n';
     }
     if (!file) return;
   }

@@ -44,9 +44,13 @@ Supervisor::Supervisor(std::vector<ProcessSpec> specs, const SupervisorParameter
 
 void Supervisor::start(const std::vector<ProcessStatus>& known, Clock::time_point now) {
   for (auto& entry : entries_) {
-    for (const auto& process : known) {
-      if (process.name != entry.spec.name) continue;
-      entry.child = ChildProcess::adopt(process.pid, process.start_ticks);
+    const auto before = std::find_if(known.begin(), known.end(), [&](const auto& process) {
+      return process.name == entry.spec.name;
+    });
+    if (before != known.end()) {
+      entry.starts = before->restarts + 1;
+      entry.died = now;
+      entry.child = ChildProcess::adopt(before->pid, before->start_ticks);
     }
     if (!entry.child) {
       launch(entry, now);
@@ -54,7 +58,6 @@ void Supervisor::start(const std::vector<ProcessStatus>& known, Clock::time_poin
     }
     entry.state = ProcessState::kRunning;
     entry.started = now;
-    ++entry.starts;
     say_(entry.spec.name, fmt::format("adopted (pid {})", entry.child->pid()));
   }
 }
@@ -80,7 +83,7 @@ void Supervisor::launch(Entry& entry, Clock::time_point now) {
     say_(entry.spec.name, fmt::format("started (pid {})", entry.child->pid()));
   } else {
     say_(entry.spec.name,
-         fmt::format("started again (pid {}) {:.0f} ms after it ended; restart {}",
+         fmt::format("started again (pid {}) {:.0f} ms after its end was noticed; restart {}",
                      entry.child->pid(), 1e3 * seconds(now - entry.died), entry.starts - 1));
   }
 }

@@ -50,7 +50,7 @@ class Supervisor {
   using Say = std::function<void(const std::string&, const std::string&)>;
   Supervisor(std::vector<ProcessSpec> specs, const SupervisorParameters& parameters, Say say);
 
-  /// Takes over those of `known` that still run, starts the others.
+  /// Takes over those of `known` that still run, starts the others; restarts go on being counted.
   void start(const std::vector<ProcessStatus>& known, Clock::time_point now);
   /// A HEALTH message of a process; one of another pid than ours is not counted.
   void heartbeat(const std::string& name, pid_t pid, Clock::time_point now);

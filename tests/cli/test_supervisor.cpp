@@ -138,6 +138,7 @@ TEST_CASE("the next supervisor adopts what still runs", "[launch]") {
   Bench second({shell("a", "exec sleep 1000")});
   second.supervisor.start(registry.read(), Clock::now());
   CHECK(second.status().pid == pid);
+  CHECK(second.status().restarts == 0);
 
   // The same number with another start time is somebody else's process.
   auto known = registry.read();
@@ -145,6 +146,7 @@ TEST_CASE("the next supervisor adopts what still runs", "[launch]") {
   Bench third({shell("a", "exec sleep 1000")});
   third.supervisor.start(known, Clock::now());
   CHECK(third.status().pid != pid);
+  CHECK(third.status().restarts == 1);
 }
 
 TEST_CASE("launch.toml is refused with file, line and key", "[launch]") {
