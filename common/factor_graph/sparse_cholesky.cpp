@@ -15,8 +15,8 @@ struct SparseCholesky::Impl {
   std::vector<int> rows;
 
   Impl() {
-    // CHOLMOD asks for four OpenMP threads whatever the computer has; results must not depend on them, and other processes need
-    // the cores.
+    // CHOLMOD asks for four OpenMP threads whatever the computer has; results must not depend on
+    // them, and other processes need the cores.
     omp_set_max_active_levels(0);
     cholmod_start(&common);
     common.print = 0;
