@@ -151,10 +151,10 @@ TEST_CASE("Scenes that are not in the map are not found", "[constellation]") {
   const Points other = random_scene(random, 500.0, 0.0138, 2.0);
   const ConstellationMap map = map_of(scene);
   for (const double sigma_m : {0.05, 0.2}) {
-    for (int i = 0; i < 500; ++i) {
+    for (int i = 0; i < 120; ++i) {
       View view;
       view.sigma_m = sigma_m;
-      view.range_m = 15.0 + 0.05 * i;
+      view.range_m = 15.0 + 25.0 / 120.0 * i;
       const SE2 pose = random_pose(random, 50, 450);
       REQUIRE_FALSE(map.localise(observe(other, pose, view, random).points).found());
       Observation mirrored = observe(scene, pose, view, random);
