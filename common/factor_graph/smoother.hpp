@@ -11,8 +11,10 @@ namespace understory {
 
 struct SmootherParameters {
   int max_iterations = 8;
-  double converged_m = 1e-3;    ///< Largest change of a position in the last step.
-  double converged_rad = 1e-4;  ///< Likewise of a heading.
+  /// A step that moved nothing further than this is the last: Gauss-Newton squares the error, so
+  /// some micrometres are left.
+  double converged_m = 1e-2;
+  double converged_rad = 1e-3;  ///< Likewise for headings.
 };
 
 struct SmootherUpdate {
