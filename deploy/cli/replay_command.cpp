@@ -14,6 +14,7 @@
 #include "deploy/cli/paths.hpp"
 #include "deploy/cli/progress.hpp"
 #include "deploy/cli/services.hpp"
+#include "deploy/launch/launch_config.hpp"
 
 namespace understory {
 namespace {
@@ -21,11 +22,26 @@ namespace {
 struct Options {
   std::string log;
   std::string out;
-  std::vector<std::string> stages{"keyframer", "geoslam_mapper"};
+  std::vector<std::string> stages;
   std::filesystem::path config = default_config_directory();
   std::string channel_suffix;
   bool outputs_only = false;
 };
+
+/// The processes that the configuration launches, so that one directory says the same live and
+/// here; both mapping stages where it has no launch.toml.
+std::vector<std::string> stages_of(const std::filesystem::path& config) {
+  if (!std::filesystem::exists(config / "launch.toml")) return {"keyframer", "geoslam_mapper"};
+  std::vector<std::string> names;
+  try {
+    for (auto& process : launch::read_launch_config(config).processes) {
+      names.push_back(std::move(process.name));
+    }
+  } catch (const launch::ConfigError& error) {
+    wrong_usage(error.what());
+  }
+  return names;
+}
 
 /// The services named, in the order in which data runs through them.
 std::vector<Service> chosen_services(const std::vector<std::string>& names) {
@@ -75,7 +91,8 @@ void run(const Options& options) {
   ReplayOptions replay_options;
   replay_options.log = options.log;
   replay_options.out = options.out;
-  replay_options.services = chosen_services(options.stages);
+  replay_options.services =
+      chosen_services(options.stages.empty() ? stages_of(options.config) : options.stages);
   replay_options.config_dir = options.config;
   replay_options.channel_suffix = options.channel_suffix;
   replay_options.keeps_inputs = !options.outputs_only;
@@ -103,9 +120,10 @@ void add_replay_command(CLI::App& parent) {
   auto options = std::make_shared<Options>();
   command->add_option("log", options->log, "An LCM log")->required();
   command->add_option("--out", options->out, "The new log")->required();
-  command->add_option("--stages", options->stages, "Which stages")
-      ->delimiter(',')
-      ->capture_default_str();
+  command
+      ->add_option("--stages", options->stages,
+                   "Which stages; default: the processes of the configuration's launch.toml")
+      ->delimiter(',');
   command->add_option("--config", options->config, "Directory with NAME.toml for each stage")
       ->capture_default_str();
   command->add_option("--channel-suffix", options->channel_suffix, "Of every output, e.g. _ALT");

@@ -34,7 +34,7 @@ class LandmarkExtractorAdapter : public Adapter {
 }  // namespace
 
 Service landmark_extractor_service(const LandmarkExtractorChannels& channels) {
-  return {"landmark-extractor", channels.lidar_scan + " -> " + channels.landmarks,
+  return {"landmark_extractor", channels.lidar_scan + " -> " + channels.landmarks,
           [channels] { return std::make_unique<LandmarkExtractorAdapter>(channels); }};
 }
 
