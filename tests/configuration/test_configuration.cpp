@@ -1,0 +1,120 @@
+// Wrong configuration, generated for every parameter of every real service; and the files that come
+// with the project.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "deploy/cli/services.hpp"
+#include "deploy/launch/launch_config.hpp"
+#include "tests/bus/wrong_values.hpp"
+#include "tests/catch.hpp"
+
+using namespace understory;
+using namespace understory::test;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// All parameters of a service, as its process has them.
+struct Described {
+  RuntimeParameters runtime;
+  std::unique_ptr<Adapter> adapter;
+  ParameterTable table;
+  explicit Described(const Service& service) : adapter(service.make()) {
+    describe(runtime, table);
+    adapter->describe(table);
+  }
+};
+
+std::string problem_of(const Service& service, const std::string& key, const std::string& value) {
+  Described described(service);
+  try {
+    described.table.load_text("\n" + key + " = " + value + "\n", "toy.toml");
+  } catch (const ConfigurationError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+/// The values that are just allowed.
+std::vector<std::string> bounds(const ParameterTable::Entry& entry) {
+  if (const auto* number = std::get_if<ParameterTable::Number>(&entry.target)) {
+    return {fmt::format("{:.17e}", number->range.lowest),
+            fmt::format("{:.17e}", number->range.highest)};
+  }
+  if (const auto* integer = std::get_if<ParameterTable::Integer>(&entry.target)) {
+    return {std::to_string(integer->range.lowest), std::to_string(integer->range.highest)};
+  }
+  if (std::holds_alternative<ParameterTable::Boolean>(entry.target)) return {"true", "false"};
+  std::vector<std::string> choices;
+  for (const std::string& choice : std::get<ParameterTable::Text>(entry.target).choices) {
+    choices.push_back('"' + choice + '"');
+  }
+  return choices;
+}
+
+Service service_of(const std::string& name) {
+  const auto services = all_services();
+  const auto found = std::ranges::find(services, name, &Service::name);
+  REQUIRE(found != services.end());
+  return *found;
+}
+
+}  // namespace
+
+TEST_CASE("every service refuses every wrong value of every parameter", "[configuration]") {
+  for (const Service& service : all_services()) {
+    const Described described(service);
+    CAPTURE(service.name);
+    CHECK(described.table.entries().size() > 10);
+    for (const ParameterTable::Entry& entry : described.table.entries()) {
+      check_every_wrong_value(entry, [&](const std::string& key, const std::string& value) {
+        return problem_of(service, key, value);
+      });
+    }
+  }
+}
+
+TEST_CASE("the bounds of every parameter are allowed, and so is its default", "[configuration]") {
+  for (const Service& service : all_services()) {
+    Described described(service);
+    CAPTURE(service.name);
+    for (const ParameterTable::Entry& entry : described.table.entries()) {
+      for (const std::string& value : bounds(entry)) {
+        CAPTURE(entry.key, value);
+        CHECK(problem_of(service, entry.key, value).empty());
+      }
+    }
+    const std::string printed = described.table.to_toml();
+    CHECK_NOTHROW(described.table.load_text(printed, "printed.toml"));
+    CHECK(described.table.to_toml() == printed);
+  }
+}
+
+TEST_CASE("the configurations that come with the project start services that there are",
+          "[configuration]") {
+  std::size_t directories = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(UNDERSTORY_SOURCE_CONFIG)) {
+    if (entry.path().filename() != "launch.toml") continue;
+    ++directories;
+    for (const auto& process : launch::read_launch_config(entry.path().parent_path()).processes) {
+      CAPTURE(entry.path(), process.name);
+      Described described(service_of(process.name));
+      CHECK_NOTHROW(described.table.load(process.config));
+      std::string dashed = process.name;
+      std::ranges::replace(dashed, '_', '-');
+      CHECK(process.executable == "understory-" + dashed);
+    }
+  }
+  CHECK(directories >= 2);
+}
+
+TEST_CASE("the recorded car's mapper uses odometry", "[configuration]") {
+  Described described(service_of("geoslam_mapper"));
+  described.table.load(fs::path(UNDERSTORY_SOURCE_CONFIG) / "victoria_park/geoslam_mapper.toml");
+  const auto& entries = described.table.entries();
+  const auto use = std::ranges::find(entries, "ours.use_odometry", &ParameterTable::Entry::key);
+  REQUIRE(use != entries.end());
+  CHECK(value_as_toml(*use) == "true");
+}
