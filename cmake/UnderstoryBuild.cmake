@@ -44,6 +44,8 @@ function(understory_library name)
   set_target_properties(understory_${name} PROPERTIES EXPORT_NAME ${name})
   target_include_directories(understory_${name} ${scope}
     $<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/understory>)
+  # Programs that link an installed library compile its headers: the standard travels with it.
+  target_compile_features(understory_${name} ${scope} cxx_std_20)
   target_link_libraries(understory_${name} ${scope} ${ARG_PUBLIC})
   install(TARGETS understory_${name} EXPORT understory ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   file(RELATIVE_PATH here "${CMAKE_SOURCE_DIR}" "${CMAKE_CURRENT_SOURCE_DIR}")
