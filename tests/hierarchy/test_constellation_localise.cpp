@@ -171,7 +171,7 @@ TEST_CASE("Doubled landmarks of another scene are not found", "[constellation]")
   const Points other = random_scene(random, 200.0, 0.042, 0.5);
   const ConstellationMap map = map_of(scene);
   std::normal_distribution<double> apart(0.0, 0.3);
-  for (int i = 0; i < 100; ++i) {
+  for (int i = 0; i < 40; ++i) {
     View view;
     view.sigma_m = 0.05;
     Observation observation = observe(other, random_pose(random, 40, 160), view, random);
