@@ -134,13 +134,14 @@ double thread_s() {
 struct Score {
   std::size_t keyframes = 0;
   std::size_t landmarks = 0;
-  int within_0_10m = 0;
+  int within_0_10m = 0;       ///< The keyframe as a whole.
+  int base_within_0_10m = 0;  ///< The pose of its first scan alone.
   int within_0_5m = 0;
   int wrong = 0;
   int unsure = 0;
   std::vector<double> ms;
-  std::vector<double> error_m;           ///< Of the base.
-  std::vector<double> keyframe_error_m;  ///< Of the mean of the members.
+  std::vector<double> error_m;       ///< Of the keyframe: the mean of its scans' positions.
+  std::vector<double> base_error_m;  ///< Of its first scan's position.
   std::map<std::string, int> reasons;
   double bytes_per_landmark = 0.0;
 };
@@ -173,11 +174,13 @@ void ask(const PlaceFinder& finder, const PlaceQuestion& question, Score& score)
     ++score.reasons[answer.reason];
     return;
   }
-  const double error =
+  const double error = keyframe_error_m(question, *answer.map_T_base);
+  const double base_error =
       (answer.map_T_base->translation() - question.world_T_member[0].translation()).norm();
-  score.keyframe_error_m.push_back(keyframe_error_m(question, *answer.map_T_base));
   score.error_m.push_back(error);
+  score.base_error_m.push_back(base_error);
   score.within_0_10m += error <= 0.1 ? 1 : 0;
+  score.base_within_0_10m += base_error <= 0.1 ? 1 : 0;
   score.within_0_5m += error <= 0.5 ? 1 : 0;
   score.wrong += error > kWrong_m ? 1 : 0;
 }
@@ -225,11 +228,9 @@ nlohmann::json row_of(const Setting& setting, const std::string& method, const S
                      {"unsure_reasons", score.reasons},
                      {"error_p50_cm", 100.0 * quantile(score.error_m, 0.5)},
                      {"error_max_cm", 100.0 * quantile(score.error_m, 1.0)},
-                     {"keyframe_within_0_10m",
-                      std::count_if(score.keyframe_error_m.begin(), score.keyframe_error_m.end(),
-                                    [](double error) { return error <= 0.1; })},
-                     {"keyframe_error_p50_cm", 100.0 * quantile(score.keyframe_error_m, 0.5)},
-                     {"keyframe_error_max_cm", 100.0 * quantile(score.keyframe_error_m, 1.0)},
+                     {"base_within_0_10m", score.base_within_0_10m},
+                     {"base_error_p50_cm", 100.0 * quantile(score.base_error_m, 0.5)},
+                     {"base_error_max_cm", 100.0 * quantile(score.base_error_m, 1.0)},
                      {"ms_p50", quantile(score.ms, 0.5)},
                      {"ms_p99", quantile(score.ms, 0.99)},
                      {"ms_max", quantile(score.ms, 1.0)},
@@ -240,18 +241,23 @@ nlohmann::json row_of(const Setting& setting, const std::string& method, const S
 }
 
 void print_rows(const nlohmann::json& rows, double yardstick_ms) {
-  fmt::print("{:<27} {:<7} {:>9} {:>9} {:>7} {:>6} {:>6} {:>7} {:>8} {:>8} {:>8} {:>8}\n",
-             "setting", "method", "keyframes", "<= 0.1 m", "<= .5 m", "wrong", "unsure", "p50 cm",
-             "p50 ms", "p99 ms", "max ms", "/Delaun.");
+  fmt::print("{:<27} {:<7} {:>9} {:>9} {:>7} {:>7} {:>6} {:>6} {:>7} {:>8} {:>8} {:>8} {:>8}\n",
+             "setting", "method", "keyframes", "<= 0.1 m", "(base)", "<= .5 m", "wrong", "unsure",
+             "p50 cm", "p50 ms", "p99 ms", "max ms", "/Delaun.");
   for (const nlohmann::json& row : rows) {
     fmt::print(
-        "{:<27} {:<7} {:>9} {:>9} {:>7} {:>6} {:>6} {:>7.2f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.4f}\n",
+        "{:<27} {:<7} {:>9} {:>9} {:>7} {:>7} {:>6} {:>6} {:>7.2f} {:>8.3f} {:>8.3f} {:>8.3f} "
+        "{:>8.4f}\n",
         row["setting"].get<std::string>(), row["method"].get<std::string>(),
-        row["keyframes"].get<int>(), row["within_0_10m"].get<int>(), row["within_0_5m"].get<int>(),
-        row["wrong"].get<int>(), row["unsure"].get<int>(), row["error_p50_cm"].get<double>(),
-        row["ms_p50"].get<double>(), row["ms_p99"].get<double>(), row["ms_max"].get<double>(),
-        row["ratio"].get<double>());
+        row["keyframes"].get<int>(), row["within_0_10m"].get<int>(),
+        row["base_within_0_10m"].get<int>(), row["within_0_5m"].get<int>(), row["wrong"].get<int>(),
+        row["unsure"].get<int>(), row["error_p50_cm"].get<double>(), row["ms_p50"].get<double>(),
+        row["ms_p99"].get<double>(), row["ms_max"].get<double>(), row["ratio"].get<double>());
   }
+  fmt::print(
+      "<= 0.1 m: the keyframe (mean of its scans' positions); (base): its first scan alone, whose "
+      "own "
+      "noise\nleaves 2.6 cm per axis whatever the method, so one in some thousand lies beyond\n");
   fmt::print("source's table: 1244 of 1250 within 0.5 m, 4 more within 1 m, 129 + 179 ms\n");
   fmt::print("yardstick: CGAL Delaunay of 13,770 points in {:.2f} ms\n", yardstick_ms);
 }
