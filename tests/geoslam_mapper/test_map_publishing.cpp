@@ -1,0 +1,252 @@
+// What the mapper tells beside the stage: differences of maps, odometry's frame, poses, jumps.
+#include <Eigen/LU>
+#include <numbers>
+#include <random>
+#include <set>
+
+#include "services/geoslam_mapper/map_publishing.hpp"
+#include "tests/catch.hpp"
+
+using namespace understory;
+
+namespace {
+
+SE2 random_pose(std::mt19937_64& random, double spread_m = 5.0) {
+  std::uniform_real_distribution<double> coordinate(-spread_m, spread_m);
+  std::uniform_real_distribution<double> angle(-std::numbers::pi, std::numbers::pi);
+  const double x = coordinate(random);
+  const double y = coordinate(random);
+  return {x, y, angle(random)};
+}
+
+double difference(const SE2& a, const SE2& b) { return (a.inverse() * b).Log().norm(); }
+
+MapLandmark landmark(LandmarkId id, std::mt19937_64& random) {
+  MapLandmark one;
+  one.id = id;
+  one.position_m = random_pose(random).translation();
+  one.times_seen = static_cast<std::uint32_t>(random() % 100);
+  return one;
+}
+
+/// A map and what became of it: some stay, move a little or far, go, are merged, or come.
+struct ChangedMap {
+  std::vector<MapLandmark> before;
+  std::vector<MapLandmark> after;
+  MapUpdate update;
+
+  explicit ChangedMap(std::mt19937_64& random, double moved_m) {
+    for (LandmarkId id = 1; id <= 60; ++id) {
+      const auto fate = random() % 6;
+      MapLandmark one = landmark(id, random);
+      if (fate != 0) before.push_back(one);
+      if (fate == 1) continue;
+      if (fate == 2 && !after.empty()) {
+        update.merged.emplace_back(id, after.back().id);
+        continue;
+      }
+      if (fate == 3) one.position_m.x() += 0.5 * moved_m;
+      if (fate == 4) one.position_m.y() -= 3.0 * moved_m;
+      after.push_back(one);
+    }
+  }
+};
+
+std::set<LandmarkId> ids_of(const std::vector<MapLandmark>& landmarks) {
+  std::set<LandmarkId> ids;
+  for (const auto& one : landmarks) ids.insert(one.id);
+  return ids;
+}
+
+/// A keyframe of `size` scans, 0.1 s apart, with random member poses.
+Keyframe random_keyframe(std::mt19937_64& random, std::size_t size) {
+  Keyframe keyframe;
+  keyframe.sequence = 7;
+  keyframe.utime = 1000000;
+  for (std::size_t i = 0; i < size; ++i) {
+    KeyframeMember member;
+    member.utime = keyframe.utime + 100000 * static_cast<Utime>(i);
+    member.centre_T_vehicle = random_pose(random);
+    member.covariance = 0.01 * Eigen::Matrix3d::Identity();
+    keyframe.members.push_back(member);
+  }
+  return keyframe;
+}
+
+MapUpdate updated_at(const SE2& pose) {
+  MapUpdate update;
+  update.status = MapUpdateStatus::kUpdated;
+  update.map_T_vehicle = pose;
+  update.covariance = 0.04 * Eigen::Matrix3d::Identity();
+  update.map_T_latest_vehicle = pose;
+  return update;
+}
+
+}  // namespace
+
+TEST_CASE("a holder of every difference has the map", "[map_publishing]") {
+  constexpr double kMoved = 0.01;
+  std::mt19937_64 random(1);
+  for (int run = 0; run < 200; ++run) {
+    const ChangedMap map(random, kMoved);
+    const MapDelta delta = map_difference(map.before, map.after, map.update, kMoved);
+    const auto held = with_delta(map.before, delta);
+    REQUIRE(held.size() == map.after.size());
+    for (std::size_t i = 0; i < held.size(); ++i) {
+      CHECK(held[i].id == map.after[i].id);
+      CHECK((held[i].position_m - map.after[i].position_m).norm() <= kMoved);
+    }
+  }
+}
+
+TEST_CASE("a difference says no more than what changed", "[map_publishing]") {
+  constexpr double kMoved = 0.01;
+  std::mt19937_64 random(2);
+  for (int run = 0; run < 200; ++run) {
+    const ChangedMap map(random, kMoved);
+    const MapDelta delta = map_difference(map.before, map.after, map.update, kMoved);
+    const auto before = ids_of(map.before);
+    const auto after = ids_of(map.after);
+    for (const auto& one : delta.added) CHECK_FALSE(before.contains(one.id));
+    for (const auto& one : delta.moved) CHECK(before.contains(one.id));
+    for (const LandmarkId id : delta.removed) {
+      CHECK(before.contains(id));
+      CHECK_FALSE(after.contains(id));
+      for (const auto& [old_id, new_id] : delta.merged) CHECK(old_id != id);
+    }
+    const auto nothing = map_difference(map.after, map.after, {}, kMoved);
+    CHECK(nothing.added.empty());
+    CHECK(nothing.moved.empty());
+    CHECK(nothing.removed.empty());
+  }
+}
+
+TEST_CASE("small steps add up until they are told", "[map_publishing]") {
+  std::mt19937_64 random(3);
+  std::vector<MapLandmark> map{landmark(1, random)};
+  std::vector<MapLandmark> held = map;
+  int told = 0;
+  for (int step = 0; step < 100; ++step) {
+    map[0].position_m.x() += 0.004;
+    const MapDelta delta = map_difference(held, map, {}, 0.01);
+    told += static_cast<int>(delta.moved.size());
+    held = with_delta(held, delta);
+    CHECK((held[0].position_m - map[0].position_m).norm() <= 0.01);
+  }
+  CHECK(told == 33);  // At every third step of 4 mm.
+}
+
+TEST_CASE("the odometry frame is the sum of the motions", "[map_publishing]") {
+  std::mt19937_64 random(4);
+  OdometryFrame frame;
+  CHECK(difference(frame.odom_T_vehicle(5), SE2()) == 0.0);
+  std::vector<SE2> poses{SE2()};
+  for (int i = 0; i < 300; ++i) {
+    Odometry motion;
+    motion.from_utime = 1000 + 100 * static_cast<Utime>(i);
+    motion.utime = motion.from_utime + 100;
+    motion.from_T_to = random_pose(random, 0.5);
+    frame.add(motion);
+    poses.push_back(poses.back() * motion.from_T_to);
+  }
+  OdometryFrame loaded;
+  loaded.load(frame.save());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Utime utime = 1000 + 100 * static_cast<Utime>(i);
+    CHECK(difference(frame.odom_T_vehicle(utime), poses[i]) < 1e-9);
+    CHECK(difference(frame.odom_T_vehicle(utime + 99), poses[i]) < 1e-9);
+    CHECK(difference(loaded.odom_T_vehicle(utime), frame.odom_T_vehicle(utime)) == 0.0);
+  }
+  CHECK(difference(frame.odom_T_vehicle(0), poses.front()) < 1e-9);
+  CHECK(loaded.save() == frame.save());
+}
+
+TEST_CASE("states that are not whole are refused", "[map_publishing]") {
+  OdometryFrame frame;
+  frame.add(Odometry{});
+  const std::string state = frame.save();
+  OdometryFrame other;
+  CHECK_THROWS(other.load(""));
+  CHECK_THROWS(other.load("1000000000 1 2 3"));
+  CHECK_THROWS(other.load(state.substr(0, state.find(' ') + 2)));
+  JumpWatch watch;
+  CHECK_THROWS(watch.load(""));
+  CHECK_THROWS(watch.load("1 2 3"));
+}
+
+TEST_CASE("every scan of a keyframe has its pose, known no better than the keyframe's",
+          "[map_publishing]") {
+  std::mt19937_64 random(5);
+  for (int run = 0; run < 50; ++run) {
+    const Keyframe keyframe = random_keyframe(random, 8);
+    MapUpdate update = updated_at(random_pose(random));
+    update.map_T_latest_vehicle = random_pose(random);
+    const auto poses = poses_of(keyframe, update);
+    REQUIRE(poses.size() == keyframe.members.size());
+    // The map's frame seen from the keyframe's centre, by the base alone.
+    const SE2 map_T_centre = update.map_T_vehicle * keyframe.centre_T_base().inverse();
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      CHECK(poses[i].utime == keyframe.members[i].utime);
+      CHECK(poses[i].keyframe_sequence == keyframe.sequence);
+      const SE2 expected = i + 1 == poses.size()
+                               ? update.map_T_latest_vehicle
+                               : map_T_centre * keyframe.members[i].centre_T_vehicle;
+      CHECK(difference(poses[i].map_T_vehicle(), expected) < 1e-9);
+      CHECK(poses[i].covariance.determinant() >= update.covariance.determinant() * (1.0 - 1e-9));
+    }
+    CHECK((poses.front().covariance - update.covariance).norm() < 1e-12);
+  }
+}
+
+TEST_CASE("a keyframe without a place gives one pose that says so", "[map_publishing]") {
+  std::mt19937_64 random(6);
+  const Keyframe keyframe = random_keyframe(random, 8);
+  for (const auto status : {MapUpdateStatus::kNotSure, MapUpdateStatus::kRolledBack}) {
+    MapUpdate update;
+    update.status = status;
+    const auto poses = poses_of(keyframe, update);
+    REQUIRE(poses.size() == 1);
+    CHECK(poses[0].utime == keyframe.members.back().utime);
+    CHECK(poses[0].status == status);
+    CHECK_FALSE(poses[0].is_localised());
+  }
+}
+
+TEST_CASE("a jump against what was tracked is counted, a tracked motion is none",
+          "[map_publishing]") {
+  std::mt19937_64 random(7);
+  JumpWatch watch(0.5, 0.05);
+  SE2 pose;
+  const auto step = [&](const SE2& tracked, const SE2& jump, MapUpdateStatus status) {
+    Keyframe keyframe = random_keyframe(random, 2);
+    keyframe.previous_T_base = tracked;
+    pose = pose * tracked * jump;
+    MapUpdate update = updated_at(pose);
+    update.status = status;
+    watch.add(keyframe, update);
+  };
+  step(SE2(), SE2(), MapUpdateStatus::kFirstMap);
+  for (int i = 0; i < 20; ++i)
+    step(random_pose(random), {0.1, 0.1, 0.01}, MapUpdateStatus::kUpdated);
+  CHECK(watch.count() == 0);
+  step(random_pose(random), {0.6, 0.0, 0.0}, MapUpdateStatus::kUpdated);
+  CHECK(watch.count() == 1);
+  CHECK(difference(watch.delta(), {0.6, 0.0, 0.0}) < 1e-9);
+  // Through a keyframe without a place the prediction goes on.
+  step(random_pose(random), SE2(), MapUpdateStatus::kNotSure);
+  JumpWatch loaded(0.5, 0.05);
+  loaded.load(watch.save());
+  CHECK(loaded.save() == watch.save());
+  step(random_pose(random), {0.0, 0.0, -0.06}, MapUpdateStatus::kUpdated);
+  CHECK(watch.count() == 2);
+  CHECK(watch.delta().theta() == Approx(-0.06));
+}
+
+TEST_CASE("where tracking broke off there is nothing to jump from", "[map_publishing]") {
+  std::mt19937_64 random(8);
+  JumpWatch watch;
+  for (int i = 0; i < 10; ++i) {
+    watch.add(random_keyframe(random, 2), updated_at(random_pose(random, 100.0)));
+  }
+  CHECK(watch.count() == 0);
+}

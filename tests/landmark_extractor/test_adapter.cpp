@@ -1,0 +1,105 @@
+// The extractor as a service on a bus: sweeps in, landmarks out, bad sweeps counted.
+#include "common/bus/memory_bus.hpp"
+#include "services/landmark_extractor/adapter.hpp"
+#include "services/landmark_extractor/landmark_extractor.hpp"
+#include "tests/catch.hpp"
+#include "tests/landmark_extractor/simulated_sweep.hpp"
+
+using namespace understory;
+using namespace understory::test;
+
+namespace {
+
+/// The service on a bus, with everything that it says.
+struct Bench {
+  explicit Bench(const std::string& toml = "", const LandmarkExtractorChannels& channels = {})
+      : bus(MemoryBus::Queues::kUnlimited),
+        hosted(landmark_extractor_service(channels), bus, no_clock(), toml, "test.toml") {
+    bus.subscribe(channels.landmarks, 0, [this](const BusMessage& message) {
+      const auto scan = decode_message<LandmarkScan>(message.bytes);
+      REQUIRE(scan);
+      landmarks.push_back(*scan);
+    });
+    hosted.node().connect();
+  }
+  void send(const PlanarScan& scan) { send(encode_message(scan)); }
+  void send(const std::vector<std::uint8_t>& bytes, const std::string& channel = "LIDAR_SCAN") {
+    bus.publish(channel, bytes);
+    bus.drain();
+  }
+  std::int64_t count(Reason reason) {
+    return hosted.node().monitor().count_of("LIDAR_SCAN", reason);
+  }
+
+  MemoryBus bus;
+  HostedService hosted;
+  std::vector<LandmarkScan> landmarks;
+};
+
+/// The k-th sweep of a laser among ten trunks.
+PlanarScan numbered_sweep(std::uint64_t k, std::mt19937_64& random) {
+  std::uniform_real_distribution<double> ranges(3.0, 25.0);
+  std::vector<Circle> trunks;
+  for (int i = 0; i < 10; ++i) trunks.push_back(circle_at(ranges(random), -1.35 + 0.3 * i, 0.15));
+  PlanarScan scan = sweep(trunks, {}, 0.02, random);
+  scan.utime = 1000000 + 200000 * static_cast<Utime>(k);
+  scan.sequence = k;
+  return scan;
+}
+
+}  // namespace
+
+TEST_CASE("on the bus the extractor says what the stage says", "[extractor]") {
+  std::mt19937_64 random(1);
+  Bench bench;
+  LandmarkExtractor stage;
+  for (std::uint64_t k = 0; k < 20; ++k) {
+    const PlanarScan scan = numbered_sweep(k, random);
+    const LandmarkScan expected = stage.extract(scan);
+    CHECK(expected.detections.size() >= 5);
+    bench.send(scan);
+    REQUIRE(bench.landmarks.size() == k + 1);
+    const LandmarkScan& told = bench.landmarks.back();
+    CHECK(told.utime == scan.utime);
+    CHECK(told.sequence == k);
+    // The wire's covariances are symmetric to the last bit.
+    const auto on_wire = decode_message<LandmarkScan>(encode_message(expected));
+    REQUIRE(on_wire);
+    const bool is_the_same = encode_message(told) == encode_message(*on_wire);
+    CHECK(is_the_same);
+  }
+}
+
+TEST_CASE("sweeps that cannot be are counted and give nothing", "[extractor]") {
+  std::mt19937_64 random(2);
+  Bench bench;
+  for (std::uint64_t k = 0; k < 10; ++k) {
+    const PlanarScan scan = numbered_sweep(k, random);
+    PlanarScan bad = scan;
+    bad.bearing_step_rad = std::numeric_limits<double>::quiet_NaN();
+    bench.send(bad);
+    std::vector<std::uint8_t> cut = encode_message(scan);
+    cut.resize(cut.size() / 2);
+    bench.send(cut);
+    bench.send(scan);
+    bench.send(scan);
+  }
+  CHECK(bench.landmarks.size() == 10);
+  CHECK(bench.count(Reason::kNotFinite) == 10);
+  CHECK(bench.count(Reason::kBadCount) == 10);
+  CHECK(bench.count(Reason::kDuplicate) == 10);
+}
+
+TEST_CASE("the extractor's parameters and channels are those it was given", "[extractor]") {
+  std::mt19937_64 random(3);
+  const PlanarScan scan = numbered_sweep(0, random);
+  Bench near("[planar]\nmax_range_m = 5\n", {.lidar_scan = "FRONT", .landmarks = "FRONT_MARKS"});
+  near.send(scan);
+  CHECK(near.landmarks.empty());
+  near.send(encode_message(scan), "FRONT");
+  REQUIRE(near.landmarks.size() == 1);
+  CHECK(near.landmarks[0].field_of_view.max_range_m == 5.0);
+  for (const auto& detection : near.landmarks[0].detections) {
+    CHECK(detection.position_m.norm() < 5.0);
+  }
+}
