@@ -1,0 +1,199 @@
+// A recorded drive through the command: import, replay, export.
+#include <cstdlib>
+#include <map>
+
+#include "common/wire/convert.hpp"
+#include "eval/victoria_park.hpp"
+#include "tests/catch.hpp"
+#include "tests/cli/recorded_drive.hpp"
+#include "tests/cli/run_command.hpp"
+
+using namespace understory;
+using namespace understory::test;
+using Catch::Matchers::Contains;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Fixture {
+  TemporaryDirectory directory;
+  std::string log = (directory / "drive.lcm").string();
+
+  Outcome run(const std::string& arguments) { return understory_command(directory, arguments); }
+  void import(const std::string& recording) {
+    const auto outcome = run("import victoria-park " + recording + " --out " + log);
+    CAPTURE(outcome.error);
+    REQUIRE(outcome.status == 0);
+  }
+  Bytes replayed(const std::string& name) {
+    const auto outcome =
+        run("replay " + log + " --config " UNDERSTORY_SOURCE_CONFIG "/victoria_park --out " +
+            (directory / name).string());
+    CAPTURE(outcome.error);
+    REQUIRE(outcome.status == 0);
+    return read_bytes(directory / name);
+  }
+};
+
+template <class T>
+std::vector<T> messages(const std::vector<LogEvent>& events, const std::string& channel) {
+  std::vector<T> found;
+  for (const auto& event : events) {
+    if (event.channel != channel) continue;
+    auto message = decode_message<T>(event.data);
+    REQUIRE(message);
+    found.push_back(std::move(*message));
+  }
+  return found;
+}
+
+std::vector<LogEvent> events_of(const fs::path& log) {
+  LcmLogReader reader(log);
+  return read_log(reader);
+}
+
+template <class T>
+std::vector<Bytes> encoded(const std::vector<T>& values) {
+  std::vector<Bytes> all;
+  for (const T& value : values) all.push_back(encode_message(value));
+  return all;
+}
+
+/// What an importer must have written: exactly the recording, and its odometry.
+void check_holds(const std::vector<LogEvent>& events, const VictoriaPark& recording) {
+  const auto scans = messages<PlanarScan>(events, "LIDAR_SCAN");
+  const bool same_scans = encoded(scans) == encoded(recording.scans);
+  const bool same_wheels =
+      encoded(messages<WheelSample>(events, "WHEELS")) == encoded(recording.wheels);
+  const bool same_fixes = encoded(messages<GnssFix>(events, "GNSS")) == encoded(recording.gnss);
+  CHECK(same_scans);
+  CHECK(same_wheels);
+  CHECK(same_fixes);
+  const auto motions = messages<Odometry>(events, "ODOMETRY");
+  const auto expected = eval::victoria_park_odometry(recording);
+  REQUIRE(motions.size() == expected.size());
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    CHECK(motions[i].utime == expected[i].utime);
+    CHECK(motions[i].from_utime == expected[i].from_utime);
+    CHECK((motions[i].from_T_to.inverse() * expected[i].from_T_to).Log().norm() < 1e-12);
+  }
+}
+
+/// Whoever takes a sweep has the motion up to it, and time never goes back.
+void check_order(const std::vector<LogEvent>& events) {
+  Utime newest = 0;
+  Utime newest_motion = -1;
+  std::size_t sweeps_without_motion = 0;
+  for (const auto& event : events) {
+    CHECK(event.utime >= newest);
+    newest = event.utime;
+    if (event.channel == "ODOMETRY") newest_motion = event.utime;
+    if (event.channel == "LIDAR_SCAN" && newest_motion != event.utime) ++sweeps_without_motion;
+  }
+  CHECK(sweeps_without_motion <= 2);  // The first ones, before the wheels say anything.
+}
+
+}  // namespace
+
+TEST_CASE_METHOD(Fixture, "an imported recording is all in the log, in order", "[cli][recording]") {
+  const RecordedDrive drive;
+  import(drive.path());
+  const auto events = events_of(log);
+  CHECK(events.size() ==
+        2 * RecordedDrive::kScans - 1 + RecordedDrive::kWheelSamples + RecordedDrive::kFixes);
+  check_holds(events, read_victoria_park(drive.path()));
+  check_order(events);
+}
+
+TEST_CASE_METHOD(Fixture, "odometry of exact wheels is the motion", "[cli][recording]") {
+  const RecordedDrive drive;
+  import(drive.path());
+  SE2 reckoned;
+  for (const auto& motion : messages<Odometry>(events_of(log), "ODOMETRY")) {
+    reckoned = reckoned * motion.from_T_to;
+    const SE2 truth = RecordedDrive::pose(1e-6 * static_cast<double>(motion.utime));
+    CHECK((reckoned.inverse() * truth).Log().norm() < 1e-3);
+  }
+}
+
+TEST_CASE_METHOD(Fixture, "replay of a recording maps the trunks, the same bytes every time",
+                 "[cli][recording]") {
+  const RecordedDrive drive;
+  import(drive.path());
+  const Bytes first = replayed("first.lcm");
+  const bool is_the_same = replayed("second.lcm") == first;
+  CHECK(is_the_same);
+
+  const auto events = events_of(directory / "first.lcm");
+  const auto poses = messages<SlamPose>(events, "SLAM_POSE");
+  const auto maps = messages<WholeMap>(events, "MAP");
+  CHECK(poses.size() >= RecordedDrive::kScans - 16);
+  for (const auto& pose : poses) {
+    const SE2 truth = RecordedDrive::pose(1e-6 * static_cast<double>(pose.utime));
+    CHECK(pose.is_localised());
+    CHECK((pose.map_T_vehicle().translation() - truth.translation()).norm() < 0.3);
+  }
+  REQUIRE_FALSE(maps.empty());
+  CHECK(maps.back().landmarks.size() > 50);
+  for (const auto& one : maps.back().landmarks) CHECK(drive.to_trunk_m(one.position_m) < 0.3);
+}
+
+TEST_CASE_METHOD(Fixture, "the processes and the experiment make one map", "[cli][recording]") {
+  const RecordedDrive drive;
+  import(drive.path());
+  replayed("out.lcm");
+  const auto maps = messages<WholeMap>(events_of(directory / "out.lcm"), "MAP");
+  const auto experiment = eval::drive_victoria_park(read_victoria_park(drive.path()),
+                                                    eval::victoria_park_defaults(), [] {});
+  REQUIRE_FALSE(maps.empty());
+  REQUIRE(maps.back().landmarks.size() == experiment.landmarks.size());
+  for (std::size_t i = 0; i < experiment.landmarks.size(); ++i) {
+    CHECK(maps.back().landmarks[i].id == experiment.landmarks[i].id);
+    const auto apart = maps.back().landmarks[i].position_m - experiment.landmarks[i].position_m;
+    CHECK(apart.norm() < 1e-6);
+  }
+}
+
+TEST_CASE_METHOD(Fixture, "what was mapped is exported", "[cli][recording]") {
+  const RecordedDrive drive;
+  import(drive.path());
+  replayed("out.lcm");
+  const auto outcome = run("export " + (directory / "out.lcm").string() + " --out " +
+                           (directory / "export").string());
+  CHECK(outcome.status == 0);
+  const auto events = events_of(directory / "out.lcm");
+  const auto map = messages<WholeMap>(events, "MAP").back();
+  CHECK(lines(read_text(directory / "export/landmarks.csv")) == map.landmarks.size() + 1);
+  CHECK(lines(read_text(directory / "export/keyframes.tum")) == map.keyframes.size());
+  CHECK(lines(read_text(directory / "export/live.tum")) ==
+        messages<SlamPose>(events, "SLAM_POSE").size());
+  CHECK_THAT(read_text(directory / "export/graph.g2o"),
+             Contains("VERTEX_XY") && Contains("EDGE_SE2_XY"));
+}
+
+TEST_CASE_METHOD(Fixture, "a recording that is not whole is named, and no log is left behind",
+                 "[cli][recording]") {
+  const RecordedDrive drive;
+  fs::remove(fs::path(drive.path()) / "DRS.txt");
+  const auto outcome = run("import victoria-park " + drive.path() + " --out " + log);
+  CHECK(outcome.status == 1);
+  CHECK(lines(outcome.error) == 1);
+  CHECK_THAT(outcome.error, Contains("DRS.txt"));
+  CHECK_FALSE(fs::exists(log));
+}
+
+TEST_CASE_METHOD(Fixture, "the Victoria Park set is imported as it is downloaded",
+                 "[cli][recording]") {
+  const char* const root = std::getenv("UNDERSTORY_DATA");
+  const fs::path archive = fs::path(root != nullptr ? root : UNDERSTORY_DEFAULT_DATA) /
+                           "victoria_park_raw" / "victoria_park_ascii.zip";
+  if (!fs::exists(archive)) {
+    WARN("skipped: no " << archive);
+    return;
+  }
+  import(archive.string());
+  const auto events = events_of(log);
+  CHECK(events.size() == 7230 + 7228 + 61'763 + 948);
+  check_holds(events, read_victoria_park(archive));
+  check_order(events);
+}
