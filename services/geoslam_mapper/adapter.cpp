@@ -58,12 +58,13 @@ class MapperAdapter : public Adapter {
     node.subscribe<LandmarkScan>(channels_.landmarks,
                                  [this](const LandmarkScan& scan) { locate(scan); },
                                  {.journaled = false});
+    // Small, and each one that is shed breaks the chain of motion: a long queue.
     node.subscribe<Odometry>(channels_.odometry,
                              [this](const Odometry& motion) {
                                stage_->add(motion);
                                odometry_.add(motion);
                              },
-                             {.queue_size = 200});
+                             {.queue_size = 2000});
     node.subscribe<map_request_t>(channels_.map_request,
                                   [this](const map_request_t& request) { answer(request); },
                                   {.queue_size = 4, .sequenced = false, .journaled = false});

@@ -16,12 +16,16 @@ class KeyframerAdapter : public Adapter {
 
   void bind(Node& node) override {
     stage_ = make_keyframer(parameters_);
-    node.subscribe<LandmarkScan>(channels_.landmarks, [this](const LandmarkScan& scan) {
-      if (const auto keyframe = stage_->add(scan)) keyframes_.publish(*keyframe);
-    });
+    node.subscribe<LandmarkScan>(channels_.landmarks,
+                                 [this](const LandmarkScan& scan) {
+                                   if (const auto keyframe = stage_->add(scan))
+                                     keyframes_.publish(*keyframe);
+                                 },
+                                 {.queue_size = 200});
+    // Small, and each one that is shed breaks the chain of motion: a long queue.
     node.subscribe<Odometry>(channels_.odometry,
                              [this](const Odometry& motion) { stage_->add(motion); },
-                             {.queue_size = 200});
+                             {.queue_size = 2000});
     keyframes_ = node.advertise<Keyframe>(channels_.keyframe);
   }
 

@@ -18,9 +18,10 @@ class LandmarkExtractorAdapter : public Adapter {
 
   void bind(Node& node) override {
     stage_.emplace(parameters_);
-    node.subscribe<PlanarScan>(channels_.lidar_scan, [this](const PlanarScan& scan) {
-      landmarks_.publish(stage_->extract(scan));
-    });
+    node.subscribe<PlanarScan>(
+        channels_.lidar_scan,
+        [this](const PlanarScan& scan) { landmarks_.publish(stage_->extract(scan)); },
+        {.queue_size = 200});
     landmarks_ = node.advertise<LandmarkScan>(channels_.landmarks);
   }
 
