@@ -55,6 +55,7 @@ std::vector<LogEvent> events_of(const fs::path& log) {
 template <class T>
 std::vector<Bytes> encoded(const std::vector<T>& values) {
   std::vector<Bytes> all;
+  all.reserve(values.size());
   for (const T& value : values) all.push_back(encode_message(value));
   return all;
 }
