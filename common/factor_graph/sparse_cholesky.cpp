@@ -3,6 +3,7 @@
 #include <cholmod.h>
 #include <omp.h>
 
+#include <mutex>
 #include <stdexcept>
 #include <utility>
 
@@ -34,6 +35,13 @@ struct SparseCholesky::Impl {
 
 namespace {
 
+/// Debian's single-threaded OpenBLAS keeps its scratch memory without locks: two factorisations at
+/// a time give wrong numbers. Only experiments run several in one process.
+std::mutex& blas_mutex() {
+  static std::mutex mutex;
+  return mutex;
+}
+
 /// A view for CHOLMOD; it does not write through it.
 cholmod_sparse view(const SymmetricSparse& matrix) {
   cholmod_sparse sparse{};
@@ -59,6 +67,7 @@ SparseCholesky::SparseCholesky(SparseCholesky&&) noexcept = default;
 SparseCholesky& SparseCholesky::operator=(SparseCholesky&&) noexcept = default;
 
 int SparseCholesky::factorise(const SymmetricSparse& matrix) {
+  const std::lock_guard lock(blas_mutex());
   cholmod_sparse sparse = view(matrix);
   Impl& impl = *impl_;
   if (impl.factor == nullptr || impl.starts != matrix.column_starts || impl.rows != matrix.rows) {
@@ -77,6 +86,7 @@ int SparseCholesky::factorise(const SymmetricSparse& matrix) {
 }
 
 Eigen::MatrixXd SparseCholesky::solve(const Eigen::MatrixXd& right) const {
+  const std::lock_guard lock(blas_mutex());
   cholmod_dense dense{};
   dense.nrow = static_cast<std::size_t>(right.rows());
   dense.ncol = static_cast<std::size_t>(right.cols());
