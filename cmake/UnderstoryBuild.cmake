@@ -20,8 +20,9 @@ target_compile_options(understory_flags INTERFACE -Wall -Wextra -Wpedantic
                        $<$<BOOL:${UNDERSTORY_WERROR}>:-Werror>
                        $<$<BOOL:${UNDERSTORY_NATIVE}>:-march=native>)
 if(UNDERSTORY_SANITIZE)
+  # Instrumented code makes GCC 12 suspect empty optionals of being read.
   add_compile_options(-fsanitize=${UNDERSTORY_SANITIZE} -fno-sanitize-recover=all
-                      -fno-omit-frame-pointer)
+                      -fno-omit-frame-pointer -Wno-maybe-uninitialized)
   add_link_options(-fsanitize=${UNDERSTORY_SANITIZE})
 endif()
 install(TARGETS understory_flags EXPORT understory)
