@@ -97,7 +97,7 @@ Eigen::MatrixXd SparseCholesky::solve(const Eigen::MatrixXd& right) const {
   dense.dtype = CHOLMOD_DOUBLE;
   cholmod_dense* solution = cholmod_solve(CHOLMOD_A, impl_->factor, &dense, &impl_->common);
   if (solution == nullptr) throw std::runtime_error("CHOLMOD: solve failed");
-  const Eigen::MatrixXd result = Eigen::Map<const Eigen::MatrixXd>(
+  Eigen::MatrixXd result = Eigen::Map<const Eigen::MatrixXd>(
       static_cast<const double*>(solution->x), right.rows(), right.cols());
   cholmod_free_dense(&solution, &impl_->common);
   return result;
