@@ -62,7 +62,8 @@ void SmoothingMapper::add_motion(const Keyframe& keyframe, NodeIndex node) {
                                               covariance.inverse()});
 }
 
-/// The last node, when the keyframe stands where it stood: nothing new is seen from there.
+/// The node of the nearest earlier keyframe, when this one stands where that stood: nothing new is
+/// seen from there.
 std::optional<NodeIndex> SmoothingMapper::foldable(const Keyframe& keyframe,
                                                    const Placement& placement) const {
   const SE2 map_T_base = placement.map_T_centre.mean * keyframe.centre_T_base();
