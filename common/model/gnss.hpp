@@ -3,16 +3,20 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 
 #include "common/model/landmarks.hpp"
 
 namespace understory {
 
-/// Channel GNSS: a reference for evaluation, never used for mapping.
+/// Channel GNSS (and RAW_GNSS): a reference for evaluation, never used for mapping.
 struct GnssFix {
   Utime utime = 0;
   std::uint64_t sequence = 0;
   Eigen::Vector2d east_north_m = Eigen::Vector2d::Zero();  ///< From the recording's origin.
+  double sigma_m = 0.0;                                    ///< Per axis; 0 = unknown.
+  std::optional<Eigen::Vector2d> velocity_mps;             ///< East, north.
+  double velocity_sigma_mps = 0.0;                         ///< Per axis; 0 = unknown.
 };
 
 }  // namespace understory

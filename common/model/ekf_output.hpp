@@ -1,0 +1,65 @@
+// What the filter and the dead reckoning say.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "common/geometry/se2.hpp"
+#include "common/model/landmarks.hpp"
+#include "common/model/odometry.hpp"
+#include "common/model/tracked.hpp"
+
+namespace understory {
+
+/// Channel RAW_POSE: dead reckoning. Drifts, never jumps.
+struct RawPose {
+  Utime utime = 0;
+  std::uint64_t sequence = 0;
+  SE2 odom_T_vehicle;  ///< Identity at the start.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  bool is_reference = false;  ///< GNSS aided: for evaluation, never for mapping.
+};
+
+/// Channel EKF_POSE.
+struct EkfPose {
+  Utime utime = 0;
+  std::uint64_t sequence = 0;
+  SE2 ekf_map_T_vehicle;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();    ///< Right perturbation.
+  Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Frame `vehicle_level`.
+  Eigen::Matrix2d velocity_covariance = Eigen::Matrix2d::Zero();
+  InertialBias bias = InertialBias::Zero();
+  Eigen::Matrix3d bias_covariance = Eigen::Matrix3d::Zero();
+  std::uint32_t landmarks_used = 0;     ///< In the latest update.
+  std::uint32_t landmarks_refused = 0;  ///< By the chi^2 tests, in the latest update.
+  std::uint64_t reset_counter = 0;      ///< Counts restarts of the filter: the pose jumped.
+};
+
+struct EkfLandmark {
+  TrackId track_id = 0;
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `ekf_map`.
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
+  double radius_m = 0.0;
+  LandmarkKind kind = LandmarkKind::kTrunk;
+  std::uint32_t times_seen = 0;
+};
+
+/// Channel EKF_MAP: the landmarks of the active state.
+struct EkfMap {
+  Utime utime = 0;
+  std::uint64_t sequence = 0;
+  std::vector<EkfLandmark> landmarks;  ///< In order of track id.
+};
+
+/// Channel VELOCITY_CORRECTION: what the filter knows about velocity and biases at utime.
+struct VelocityCorrection {
+  Utime utime = 0;
+  std::uint64_t sequence = 0;
+  Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Frame `vehicle_level`.
+  InertialBias bias = InertialBias::Zero();
+  /// Of (velocity, bias).
+  Eigen::Matrix<double, 5, 5> covariance = Eigen::Matrix<double, 5, 5>::Zero();
+};
+
+}  // namespace understory

@@ -1,0 +1,50 @@
+#include "common/model/point_sweep.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace understory {
+
+std::vector<PointSweep> split_sweep(PointSweep sweep, std::size_t max_points) {
+  if (max_points == 0) throw std::invalid_argument("split_sweep: max_points must be positive");
+  const std::size_t count =
+      std::max<std::size_t>(1, (sweep.points.size() + max_points - 1) / max_points);
+  if (count > 65535) throw std::invalid_argument("split_sweep: too many parts");
+  const std::vector<SweepPoint> points = std::exchange(sweep.points, {});
+  std::vector<PointSweep> parts(count, sweep);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t begin = i * max_points;
+    const std::size_t end = std::min(points.size(), begin + max_points);
+    parts[i].part = static_cast<std::uint16_t>(i);
+    parts[i].parts = static_cast<std::uint16_t>(count);
+    parts[i].points.assign(points.begin() + static_cast<std::ptrdiff_t>(begin),
+                           points.begin() + static_cast<std::ptrdiff_t>(end));
+  }
+  return parts;
+}
+
+std::optional<PointSweep> SweepAssembler::add(PointSweep part) {
+  const bool continues = pending_ && pending_->turn == part.turn && pending_->utime == part.utime &&
+                         pending_->parts == part.parts && part.part == next_part_;
+  if (!continues) {
+    if (pending_) ++incomplete_;
+    pending_.reset();
+    if (part.part != 0) {
+      // Counted once for a turn whose beginning was lost: at its last part.
+      if (part.part + 1 == part.parts) ++incomplete_;
+      return std::nullopt;
+    }
+    pending_ = std::move(part);
+  } else {
+    pending_->points.insert(pending_->points.end(), part.points.begin(), part.points.end());
+  }
+  next_part_ = static_cast<std::uint16_t>(pending_->part + (continues ? next_part_ + 1 : 1));
+  if (next_part_ < pending_->parts) return std::nullopt;
+  std::optional<PointSweep> whole = std::exchange(pending_, std::nullopt);
+  whole->part = 0;
+  whole->parts = 1;
+  return whole;
+}
+
+}  // namespace understory

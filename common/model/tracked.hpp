@@ -1,0 +1,28 @@
+// Landmarks that were seen again, scan after scan.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/model/landmarks.hpp"
+
+namespace understory {
+
+/// Never used again by another track; 0 = none.
+using TrackId = std::uint64_t;
+
+struct TrackedLandmark {
+  TrackId track_id = 0;
+  std::uint32_t detection = 0;  ///< Index in the LANDMARKS message of the same utime.
+  Detection observed;
+};
+
+/// Channel TRACKED_LANDMARKS: the consistent ones among the detections of one sweep.
+struct TrackedScan {
+  Utime utime = 0;
+  std::uint64_t sequence = 0;
+  FieldOfView field_of_view;
+  std::vector<TrackedLandmark> landmarks;
+};
+
+}  // namespace understory
