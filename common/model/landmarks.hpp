@@ -15,13 +15,16 @@ enum class LandmarkKind : std::uint8_t { kTrunk = 0, kCorner = 1 };
 
 /// One landmark as seen from the vehicle.
 struct Detection {
-  /// Centre (trunk, at breast height) or edge (corner) in `vehicle_level` [m].
+  /// Centre (trunk) or edge (corner), each 1.3 m above the ground, in `vehicle_level` [m].
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
   /// Covariance of the position [m^2], frame `vehicle_level`.
   Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();
   /// Radius of a trunk [m]; 0 where unknown or a corner.
   double radius_m = 0.0;
   LandmarkKind kind = LandmarkKind::kTrunk;
+  /// Of a corner: direction of the bisector, pointing out of the house, frame `vehicle_level`.
+  double bearing_rad = 0.0;
+  double bearing_sigma_rad = 0.0;  ///< Standard deviation of it; 0 = none (a trunk).
 };
 
 /// What the sensor could have seen: a sector of a disc around the vehicle.
