@@ -32,7 +32,7 @@ std::optional<Keyframe> JointKeyframer::add(const LandmarkScan& scan) {
   }
   std::optional<SE2WithCovariance> motion;
   if (last_utime_) motion = odometry_.between(*last_utime_, scan.utime);
-  TrackedScan tracked = tracker_.add(scan, motion);
+  FollowedScan tracked = tracker_.add(scan, motion);
   if (!tracked.tracked) return lost(scan);
   last_utime_ = scan.utime;
   odometry_.forget_before(scan.utime);

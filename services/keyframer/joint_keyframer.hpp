@@ -22,7 +22,7 @@ class JointKeyframer final : public KeyframerMethod {
  private:
   struct Member {
     LandmarkScan scan;
-    TrackedScan tracked;
+    FollowedScan tracked;
     std::optional<SE2WithCovariance> motion;  ///< Since the member before.
   };
 

@@ -42,7 +42,7 @@ double plane_variance(const Detection& detection) {
   return 0.5 * detection.covariance_m2.topLeftCorner<2, 2>().trace();
 }
 
-TrackedScan ScanTracker::restart(const LandmarkScan& scan) {
+FollowedScan ScanTracker::restart(const LandmarkScan& scan) {
   tracks_.clear();
   merged_.clear();
   started_ = true;
@@ -51,8 +51,8 @@ TrackedScan ScanTracker::restart(const LandmarkScan& scan) {
   return fuse(scan, Registration{SE2(), Eigen::Matrix3d::Zero(), {}});
 }
 
-TrackedScan ScanTracker::add(const LandmarkScan& scan,
-                             const std::optional<SE2WithCovariance>& motion) {
+FollowedScan ScanTracker::add(const LandmarkScan& scan,
+                              const std::optional<SE2WithCovariance>& motion) {
   if (!started_) return restart(scan);
   const std::optional<Registration> registration = locate(scan, motion);
   if (!registration) return {};
@@ -97,8 +97,8 @@ std::optional<Registration> ScanTracker::locate(
   return found;
 }
 
-TrackedScan ScanTracker::fuse(const LandmarkScan& scan, const Registration& registration) {
-  TrackedScan result{true, local_T_vehicle_, {}};
+FollowedScan ScanTracker::fuse(const LandmarkScan& scan, const Registration& registration) {
+  FollowedScan result{true, local_T_vehicle_, {}};
   result.tracks.assign(scan.detections.size(), 0);
   update_visibility(scan);
   for (const PointPair& pair : registration.pairs) {

@@ -24,7 +24,7 @@ struct Track {
 };
 
 /// A scan with its place in `local` and the track of each detection.
-struct TrackedScan {
+struct FollowedScan {
   bool tracked = false;
   SE2 local_T_vehicle;
   std::vector<std::uint32_t> tracks;  ///< Per detection; the scan's own new tracks included.
@@ -39,9 +39,9 @@ class ScanTracker {
 
   /// `motion`: of the vehicle since the last scan, where odometry knows it. An untracked scan
   /// changes nothing.
-  TrackedScan add(const LandmarkScan& scan, const std::optional<SE2WithCovariance>& motion);
+  FollowedScan add(const LandmarkScan& scan, const std::optional<SE2WithCovariance>& motion);
   /// Forgets everything and starts `local` at this scan.
-  TrackedScan restart(const LandmarkScan& scan);
+  FollowedScan restart(const LandmarkScan& scan);
   bool empty() const { return tracks_.empty() && !started_; }
   /// The track that `id` was merged into, or itself.
   std::uint32_t resolved(std::uint32_t id) const;
@@ -67,7 +67,7 @@ class ScanTracker {
   std::optional<Registration> locate(const LandmarkScan& scan,
                                      const std::optional<SE2WithCovariance>& motion) const;
   bool fits(const Registration& registration, const LandmarkScan& scan) const;
-  TrackedScan fuse(const LandmarkScan& scan, const Registration& registration);
+  FollowedScan fuse(const LandmarkScan& scan, const Registration& registration);
   void update_visibility(const LandmarkScan& scan);
   bool within_noise(const Track& a, const Track& b) const;
   void merge_doubles();
