@@ -28,23 +28,28 @@ std::optional<PointSweep> SweepAssembler::add(PointSweep part) {
   const bool continues = pending_ && pending_->turn == part.turn && pending_->utime == part.utime &&
                          pending_->parts == part.parts && part.part == next_part_;
   if (!continues) {
-    if (pending_) ++incomplete_;
+    if (pending_) count_incomplete(pending_->turn);
     pending_.reset();
     if (part.part != 0) {
-      // Counted once for a turn whose beginning was lost: at its last part.
-      if (part.part + 1 == part.parts) ++incomplete_;
+      if (lost_turn_ != part.turn) count_incomplete(part.turn);
       return std::nullopt;
     }
     pending_ = std::move(part);
+    next_part_ = 1;
   } else {
     pending_->points.insert(pending_->points.end(), part.points.begin(), part.points.end());
+    ++next_part_;
   }
-  next_part_ = static_cast<std::uint16_t>(pending_->part + (continues ? next_part_ + 1 : 1));
   if (next_part_ < pending_->parts) return std::nullopt;
   std::optional<PointSweep> whole = std::exchange(pending_, std::nullopt);
   whole->part = 0;
   whole->parts = 1;
   return whole;
+}
+
+void SweepAssembler::count_incomplete(std::uint64_t turn) {
+  ++incomplete_;
+  lost_turn_ = turn;
 }
 
 }  // namespace understory

@@ -64,7 +64,10 @@ class SweepAssembler {
   std::uint64_t incomplete_turns() const { return incomplete_; }
 
  private:
+  void count_incomplete(std::uint64_t turn);
+
   std::optional<PointSweep> pending_;
+  std::optional<std::uint64_t> lost_turn_;  ///< Counted already.
   std::uint16_t next_part_ = 0;
   std::uint64_t incomplete_ = 0;
 };

@@ -29,14 +29,20 @@ void from_json(const Json& json, SE2WithCovariance& pose) {
 }
 
 void to_json(Json& json, const Detection& d) {
-  json = {matrix_to_json<3, 1>(d.position_m), matrix_to_json<3, 3>(d.covariance_m2), d.radius_m,
-          static_cast<int>(d.kind)};
+  json = {matrix_to_json<3, 1>(d.position_m),
+          matrix_to_json<3, 3>(d.covariance_m2),
+          d.radius_m,
+          static_cast<int>(d.kind),
+          d.bearing_rad,
+          d.bearing_sigma_rad};
 }
 void from_json(const Json& json, Detection& d) {
   d.position_m = matrix_from_json<3, 1>(json.at(0));
   d.covariance_m2 = matrix_from_json<3, 3>(json.at(1));
   d.radius_m = json.at(2).get<double>();
   d.kind = static_cast<LandmarkKind>(json.at(3).get<int>());
+  d.bearing_rad = json.at(4).get<double>();
+  d.bearing_sigma_rad = json.at(5).get<double>();
 }
 
 void to_json(Json& json, const FieldOfView& view) {
@@ -59,9 +65,34 @@ void from_json(const Json& json, LandmarkScan& scan) {
   scan.detections = json.at("detections").get<std::vector<Detection>>();
 }
 
+void to_json(Json& json, const Preintegration& p) {
+  json = {p.seconds,
+          p.yaw_rad,
+          matrix_to_json<2, 1>(p.velocity_mps),
+          matrix_to_json<2, 1>(p.position_m),
+          matrix_to_json<5, 5>(p.covariance),
+          matrix_to_json<5, 3>(p.bias_jacobian),
+          matrix_to_json<3, 1>(p.bias)};
+}
+void from_json(const Json& json, Preintegration& p) {
+  p.seconds = json.at(0).get<double>();
+  p.yaw_rad = json.at(1).get<double>();
+  p.velocity_mps = matrix_from_json<2, 1>(json.at(2));
+  p.position_m = matrix_from_json<2, 1>(json.at(3));
+  p.covariance = matrix_from_json<5, 5>(json.at(4));
+  p.bias_jacobian = matrix_from_json<5, 3>(json.at(5));
+  p.bias = matrix_from_json<3, 1>(json.at(6));
+}
+
 void to_json(Json& json, const Odometry& odometry) {
-  json = {odometry.from_utime, odometry.utime, odometry.sequence, odometry.from_T_to,
-          matrix_to_json<3, 3>(odometry.covariance)};
+  json = {odometry.from_utime,
+          odometry.utime,
+          odometry.sequence,
+          odometry.from_T_to,
+          matrix_to_json<3, 3>(odometry.covariance),
+          optional_to_json(odometry.inertial),
+          odometry.has_wheels,
+          odometry.is_standing};
 }
 void from_json(const Json& json, Odometry& odometry) {
   odometry.from_utime = json.at(0).get<Utime>();
@@ -69,6 +100,9 @@ void from_json(const Json& json, Odometry& odometry) {
   odometry.sequence = json.at(2).get<std::uint64_t>();
   odometry.from_T_to = json.at(3).get<SE2>();
   odometry.covariance = matrix_from_json<3, 3>(json.at(4));
+  odometry.inertial = optional_from_json<Preintegration>(json.at(5));
+  odometry.has_wheels = json.at(6).get<bool>();
+  odometry.is_standing = json.at(7).get<bool>();
 }
 
 }  // namespace understory

@@ -43,6 +43,8 @@ void to_json(Json& json, const FieldOfView& view);
 void from_json(const Json& json, FieldOfView& view);
 void to_json(Json& json, const LandmarkScan& scan);
 void from_json(const Json& json, LandmarkScan& scan);
+void to_json(Json& json, const Preintegration& p);
+void from_json(const Json& json, Preintegration& p);
 void to_json(Json& json, const Odometry& odometry);
 void from_json(const Json& json, Odometry& odometry);
 

@@ -44,6 +44,7 @@ class Checks {
  private:
   void check_covariance(std::string_view field, const Eigen::Matrix2d& matrix);
   void check_covariance(std::string_view field, const Eigen::Matrix3d& matrix);
+  void check_covariance(std::string_view field, const Eigen::Matrix<double, 5, 5>& matrix);
   void refuse(Reason reason, std::string_view field, std::string_view what);
 
   std::string_view array_;
@@ -51,8 +52,9 @@ class Checks {
   std::optional<Refusal> refusal_;
 };
 
-/// Whether a 2 x 2 or 3 x 3 covariance is positive semidefinite within rounding, whatever the
-/// scales of its coordinates.
+/// Whether a covariance (2 x 2 padded to 3 x 3, 3 x 3, or 5 x 5) is positive semidefinite within
+/// rounding, whatever the scales of its coordinates.
 bool is_positive_semidefinite(const Eigen::Matrix3d& symmetric);
+bool is_positive_semidefinite_5(const Eigen::Matrix<double, 5, 5>& symmetric);
 
 }  // namespace understory

@@ -7,6 +7,7 @@ namespace understory {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
+constexpr double kFastestMps = 1000.0;
 
 Detection detection(const detection_t& wire, Checks& checks) {
   check_landmark(wire, checks);
@@ -15,7 +16,53 @@ Detection detection(const detection_t& wire, Checks& checks) {
   result.covariance_m2 = checks.covariance("covariance_m2", wire.covariance_m2);
   result.radius_m = wire.radius_m;
   result.kind = static_cast<LandmarkKind>(wire.kind);
+  checks.range("bearing_rad", wire.bearing_rad, -kTurn, kTurn);
+  checks.range("bearing_sigma_rad", wire.bearing_sigma_rad, 0.0, kTurn);
+  result.bearing_rad = wire.bearing_rad;
+  result.bearing_sigma_rad = wire.bearing_sigma_rad;
   return result;
+}
+
+detection_t to_wire(const Detection& detection) {
+  detection_t out{};
+  copy_vector(detection.position_m, out.position_m);
+  copy_matrix(detection.covariance_m2, out.covariance_m2);
+  out.radius_m = detection.radius_m;
+  out.kind = static_cast<std::int8_t>(detection.kind);
+  out.bearing_rad = detection.bearing_rad;
+  out.bearing_sigma_rad = detection.bearing_sigma_rad;
+  return out;
+}
+
+Preintegration preintegration(const preintegration_t& wire, Checks& checks) {
+  checks.range("seconds", wire.seconds, 0.0, 1e5);
+  checks.range("yaw_rad", wire.yaw_rad, -1e5, 1e5);
+  Preintegration result;
+  result.seconds = wire.seconds;
+  result.yaw_rad = wire.yaw_rad;
+  result.velocity_mps = Eigen::Map<const Eigen::Vector2d>(wire.velocity_m_s);
+  result.position_m = Eigen::Map<const Eigen::Vector2d>(wire.position_m);
+  checks.range("velocity_m_s", result.velocity_mps.cwiseAbs().maxCoeff(), 0.0, 1e6);
+  checks.range("position_m", result.position_m.cwiseAbs().maxCoeff(), 0.0, kFarthestPositionM);
+  result.covariance = checks.covariance("covariance", wire.covariance);
+  result.bias_jacobian =
+      Eigen::Map<const Eigen::Matrix<double, 5, 3, Eigen::RowMajor>>(&wire.bias_jacobian[0][0]);
+  result.bias = Eigen::Map<const Eigen::Vector3d>(wire.bias);
+  return result;
+}
+
+preintegration_t to_wire(const Preintegration& value) {
+  preintegration_t wire{};
+  wire.seconds = value.seconds;
+  wire.yaw_rad = value.yaw_rad;
+  copy_vector(value.velocity_mps, wire.velocity_m_s);
+  copy_vector(value.position_m, wire.position_m);
+  copy_matrix(value.covariance, wire.covariance);
+  for (int row = 0; row < 5; ++row) {
+    copy_vector(value.bias_jacobian.row(row), wire.bias_jacobian[row]);
+  }
+  copy_vector(value.bias, wire.bias);
+  return wire;
 }
 
 }  // namespace
@@ -53,11 +100,7 @@ landmarks_t to_wire(const LandmarkScan& scan) {
   wire.num_detections = static_cast<std::int32_t>(scan.detections.size());
   wire.detections.reserve(scan.detections.size());
   for (const Detection& detection : scan.detections) {
-    detection_t& out = wire.detections.emplace_back();
-    copy_vector(detection.position_m, out.position_m);
-    copy_matrix(detection.covariance_m2, out.covariance_m2);
-    out.radius_m = detection.radius_m;
-    out.kind = static_cast<std::int8_t>(detection.kind);
+    wire.detections.push_back(to_wire(detection));
   }
   return wire;
 }
@@ -72,6 +115,10 @@ Result<Odometry> from_wire(const odometry_t& wire) {
   odometry.sequence = static_cast<std::uint64_t>(wire.seq);
   odometry.from_T_to = from_wire(wire.from_T_to);
   odometry.covariance = checks.covariance("covariance", wire.covariance);
+  odometry.has_wheels = wire.has_wheels != 0;
+  odometry.is_standing = wire.is_standing != 0;
+  checks.range("num_inertial", wire.num_inertial, 0, 1);
+  if (wire.num_inertial == 1) odometry.inertial = preintegration(wire.inertial[0], checks);
   if (checks.refusal()) return *checks.refusal();
   return odometry;
 }
@@ -83,6 +130,10 @@ odometry_t to_wire(const Odometry& odometry) {
   wire.from_utime = odometry.from_utime;
   wire.from_T_to = to_wire(odometry.from_T_to);
   copy_matrix(odometry.covariance, wire.covariance);
+  wire.has_wheels = odometry.has_wheels ? 1 : 0;
+  wire.is_standing = odometry.is_standing ? 1 : 0;
+  if (odometry.inertial) wire.inertial.push_back(to_wire(*odometry.inertial));
+  wire.num_inertial = static_cast<std::int32_t>(wire.inertial.size());
   return wire;
 }
 
@@ -147,17 +198,85 @@ wheels_t to_wire(const WheelSample& sample) {
   return wire;
 }
 
+Result<ImuSample> from_wire(const imu_t& wire) {
+  Checks checks;
+  for (int i = 0; i < 3; ++i) {
+    checks.range("angular_rate_rad_s", wire.angular_rate_rad_s[i], -1000.0, 1000.0);
+    checks.range("specific_force_m_s2", wire.specific_force_m_s2[i], -1e5, 1e5);
+  }
+  if (checks.refusal()) return *checks.refusal();
+  ImuSample sample;
+  sample.utime = wire.utime;
+  sample.sequence = static_cast<std::uint64_t>(wire.seq);
+  sample.angular_rate_rad_s = Eigen::Map<const Eigen::Vector3d>(wire.angular_rate_rad_s);
+  sample.specific_force_mps2 = Eigen::Map<const Eigen::Vector3d>(wire.specific_force_m_s2);
+  return sample;
+}
+
+imu_t to_wire(const ImuSample& sample) {
+  imu_t wire{};
+  wire.utime = sample.utime;
+  wire.seq = static_cast<std::int64_t>(sample.sequence);
+  copy_vector(sample.angular_rate_rad_s, wire.angular_rate_rad_s);
+  copy_vector(sample.specific_force_mps2, wire.specific_force_m_s2);
+  return wire;
+}
+
+Result<TrackedScan> from_wire(const tracked_landmarks_t& wire) {
+  Checks checks;
+  TrackedScan scan;
+  scan.utime = wire.utime;
+  scan.sequence = static_cast<std::uint64_t>(wire.seq);
+  scan.field_of_view = field_of_view(wire, checks);
+  scan.landmarks.reserve(wire.landmarks.size());
+  for (std::size_t i = 0; i < wire.landmarks.size(); ++i) {
+    const tracked_landmark_t& from = wire.landmarks[i];
+    checks.in("landmarks", i);
+    checks.range("track_id", static_cast<double>(from.track_id), 1.0, 9.3e18);
+    checks.range("detection", from.detection, 0, std::numeric_limits<std::int32_t>::max());
+    scan.landmarks.push_back({static_cast<TrackId>(from.track_id),
+                              static_cast<std::uint32_t>(from.detection),
+                              detection(from.observed, checks)});
+  }
+  if (checks.refusal()) return *checks.refusal();
+  return scan;
+}
+
+tracked_landmarks_t to_wire(const TrackedScan& scan) {
+  tracked_landmarks_t wire{};
+  wire.utime = scan.utime;
+  wire.seq = static_cast<std::int64_t>(scan.sequence);
+  copy_field_of_view(scan.field_of_view, wire);
+  wire.num_landmarks = static_cast<std::int32_t>(scan.landmarks.size());
+  wire.landmarks.reserve(scan.landmarks.size());
+  for (const TrackedLandmark& landmark : scan.landmarks) {
+    tracked_landmark_t& out = wire.landmarks.emplace_back();
+    out.track_id = static_cast<std::int64_t>(landmark.track_id);
+    out.detection = static_cast<std::int32_t>(landmark.detection);
+    out.observed = to_wire(landmark.observed);
+  }
+  return wire;
+}
+
 Result<GnssFix> from_wire(const gnss_t& wire) {
   if (wire.valid == 0) return Refusal{Reason::kInconsistent, "the receiver has no fix"};
   Checks checks;
   checks.range("east_m", wire.east_m, -kFarthestPositionM, kFarthestPositionM);
   checks.range("north_m", wire.north_m, -kFarthestPositionM, kFarthestPositionM);
   checks.range("sigma_m", wire.sigma_m, 0.0, kFarthestPositionM);
+  checks.range("east_velocity_m_s", wire.east_velocity_m_s, -kFastestMps, kFastestMps);
+  checks.range("north_velocity_m_s", wire.north_velocity_m_s, -kFastestMps, kFastestMps);
+  checks.range("velocity_sigma_m_s", wire.velocity_sigma_m_s, 0.0, kFastestMps);
   if (checks.refusal()) return *checks.refusal();
   GnssFix fix;
   fix.utime = wire.utime;
   fix.sequence = static_cast<std::uint64_t>(wire.seq);
   fix.east_north_m = {wire.east_m, wire.north_m};
+  fix.sigma_m = wire.sigma_m;
+  if (wire.has_velocity != 0) {
+    fix.velocity_mps = {wire.east_velocity_m_s, wire.north_velocity_m_s};
+    fix.velocity_sigma_mps = wire.velocity_sigma_m_s;
+  }
   return fix;
 }
 
@@ -168,6 +287,13 @@ gnss_t to_wire(const GnssFix& fix) {
   wire.valid = 1;
   wire.east_m = fix.east_north_m.x();
   wire.north_m = fix.east_north_m.y();
+  wire.sigma_m = fix.sigma_m;
+  if (fix.velocity_mps) {
+    wire.has_velocity = 1;
+    wire.east_velocity_m_s = fix.velocity_mps->x();
+    wire.north_velocity_m_s = fix.velocity_mps->y();
+    wire.velocity_sigma_m_s = fix.velocity_sigma_mps;
+  }
   return wire;
 }
 

@@ -42,6 +42,18 @@ std::string_view to_string(Reason reason) {
       return "journal_damaged";
     case Reason::kStateNotKept:
       return "state_not_kept";
+    case Reason::kSensorSilent:
+      return "sensor_silent";
+    case Reason::kSensorFrozen:
+      return "sensor_frozen";
+    case Reason::kSaturated:
+      return "saturated";
+    case Reason::kNoPointTimes:
+      return "no_point_times";
+    case Reason::kPartsMissing:
+      return "parts_missing";
+    case Reason::kNotCalibrated:
+      return "not_calibrated";
     case Reason::kReceiveBufferSmall:
       return "receive_buffer_small";
   }

@@ -30,6 +30,12 @@ enum class Reason : std::uint8_t {
   kSnapshotDamaged,     ///< The saved state cannot be read.
   kJournalDamaged,      ///< The journal is cut or damaged.
   kStateNotKept,        ///< The state directory cannot be written.
+  kSensorSilent,        ///< Nothing came from a sensor that should speak.
+  kSensorFrozen,        ///< A sensor says the same again and again.
+  kSaturated,           ///< At the end of the sensor's range.
+  kNoPointTimes,        ///< A sweep whose points have no times: not de-skewed.
+  kPartsMissing,        ///< A sweep of which parts were lost.
+  kNotCalibrated,       ///< The vehicle moved before it had stood still long enough.
   kReceiveBufferSmall,  ///< The kernel grants less socket buffer than asked for.
 };
 

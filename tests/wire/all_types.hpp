@@ -7,23 +7,24 @@
 #include "understory/config_t.hpp"
 #include "understory/ground_truth_t.hpp"
 #include "understory/health_t.hpp"
-#include "understory/imu_t.hpp"
 #include "understory/log_t.hpp"
 #include "understory/map_request_t.hpp"
-#include "understory/raw_pose_t.hpp"
 #include "understory/truth_landmarks_t.hpp"
 
 namespace understory::test {
 
 using AllTypes =
-    std::tuple<association_t, channel_health_t, config_t, detection_t, gnss_t, ground_truth_t,
-               health_t, imu_t, keyframe_landmark_t, keyframe_member_t, keyframe_pose_t, keyframe_t,
-               landmarks_t, lidar_scan_t, log_t, map_delta_t, map_landmark_t, map_request_t, map_t,
-               merge_t, odometry_t, pose2_t, raw_pose_t, reason_count_t, slam_pose_t, slam_update_t,
-               truth_landmark_t, truth_landmarks_t, wheels_t>;
+    std::tuple<association_t, channel_health_t, config_t, detection_t, ekf_landmark_t, ekf_map_t,
+               ekf_pose_t, gnss_t, ground_truth_t, health_t, imu_t, keyframe_landmark_t,
+               keyframe_member_t, keyframe_pose_t, keyframe_t, landmarks_t, lidar_scan_t,
+               lidar_sweep_t, log_t, map_delta_t, map_landmark_t, map_request_t, map_t, merge_t,
+               odometry_t, pose2_t, preintegration_t, raw_pose_t, reason_count_t, slam_pose_t,
+               slam_update_t, tracked_landmark_t, tracked_landmarks_t, truth_landmark_t,
+               truth_landmarks_t, velocity_correction_t, wheels_t>;
 
 using AllValues = std::tuple<LandmarkScan, Odometry, Keyframe, MapUpdate, SlamPose, WholeMap,
-                             MapDelta, PlanarScan, WheelSample, GnssFix>;
+                             MapDelta, PlanarScan, WheelSample, GnssFix, ImuSample, PointSweep,
+                             TrackedScan, RawPose, EkfPose, EkfMap, VelocityCorrection>;
 
 /// Calls `f` with a null pointer to each type of the tuple.
 template <class Tuple, class F>

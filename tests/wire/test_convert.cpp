@@ -31,10 +31,53 @@ class Maker {
   LandmarkScan scan() {
     LandmarkScan scan{1000, 7, {40.0, real(1.0), 3.0}, {}};
     for (std::size_t i = count(); i > 0; --i) {
-      scan.detections.push_back(
-          {{real(40.0), real(40.0), real(2.0)}, covariance<3>(), real(0.1) + 0.2, kind()});
+      scan.detections.push_back({{real(40.0), real(40.0), real(2.0)},
+                                 covariance<3>(),
+                                 real(0.1) + 0.2,
+                                 kind(),
+                                 real(3.0),
+                                 0.02});
     }
     return scan;
+  }
+  template <int N>
+  Eigen::Matrix<double, N, 1> vector(double scale) {
+    Eigen::Matrix<double, N, 1> result;
+    for (int i = 0; i < N; ++i) result[i] = real(scale);
+    return result;
+  }
+  Odometry odometry() {
+    Odometry odometry{5, 10, 2, pose(), covariance<3>(), std::nullopt, count() > 2, count() > 2};
+    if (count() < 3) return odometry;
+    Preintegration inertial{0.1, real(1.0), vector<2>(3.0), vector<2>(1.0), covariance<5>()};
+    for (int i = 0; i < 15; ++i) inertial.bias_jacobian(i) = real(1.0);
+    inertial.bias = vector<3>(0.1);
+    odometry.inertial = inertial;
+    return odometry;
+  }
+  PointSweep sweep(double farthest_m) {
+    PointSweep sweep;
+    sweep.utime = 1000;
+    sweep.turn = 7;
+    sweep.part = static_cast<std::uint16_t>(count());
+    sweep.parts = 8;
+    sweep.is_deskewed = count() > 2;
+    sweep.rings = 32;
+    sweep.max_range_m = 100.0;
+    sweep.sensor_position_m = vector<3>(2.0);
+    if (count() > 2) {
+      Attitude attitude;
+      attitude.level_Q_vehicle = Eigen::AngleAxisd(0.1, vector<3>(1.0).normalized());
+      attitude.covariance_rad2 = covariance<2>();
+      sweep.attitude = attitude;
+    }
+    for (int i = 0; i < 40; ++i) {
+      const Eigen::Vector3f p = vector<3>(farthest_m).cast<float>();
+      sweep.points.push_back({p.x(), p.y(), p.z(), static_cast<float>(real(0.1)),
+                              static_cast<std::uint16_t>(random_() % 32),
+                              static_cast<std::uint8_t>(random_() % 256)});
+    }
+    return sweep;
   }
   Keyframe keyframe() {
     Keyframe keyframe{1000, 3, {40.0, 0.0, 2.0 * std::numbers::pi}, {}, {}, std::nullopt};
@@ -95,7 +138,7 @@ TEST_CASE("values survive the wire") {
     Maker make(seed);
     check_round_trip(make.scan());
     check_round_trip(make.keyframe());
-    check_round_trip(Odometry{5, 10, 2, make.pose(), make.covariance<3>()});
+    check_round_trip(make.odometry());
     check_round_trip(SlamPose{10, 2, MapUpdateStatus::kUpdated, 4, 0, make.pose(),
                               make.covariance<3>(), 3, make.pose(), make.pose(), 1, make.pose()});
     check_round_trip(SlamPose{10, 2, std::nullopt, std::nullopt, 0, make.pose(),
@@ -124,10 +167,97 @@ TEST_CASE("sensor values survive the wire") {
   CHECK(back->ranges_m == std::vector<float>{1.0F, 0.0F, 0.0F, 0.0F});
   CHECK(back->bearing(1) == Approx(scan.bearing(1)));
   check_round_trip(WheelSample{3, 4, 1.5, -0.2});
-  check_round_trip(GnssFix{3, 4, {10.0, -20.0}});
-  gnss_t none = to_wire(GnssFix{3, 4, {10.0, -20.0}});
+  check_round_trip(GnssFix{3, 4, {10.0, -20.0}, 0.0, std::nullopt, 0.0});
+  check_round_trip(GnssFix{3, 4, {10.0, -20.0}, 2.0, Eigen::Vector2d(1.0, 2.0), 0.1});
+  gnss_t none = to_wire(GnssFix{3, 4, {10.0, -20.0}, 0.0, std::nullopt, 0.0});
   none.valid = 0;
   CHECK_FALSE(from_wire(none));
+}
+
+TEST_CASE("the front end's values survive the wire") {
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    Maker make(seed);
+    check_round_trip(ImuSample{3, 4, make.vector<3>(1.0), make.vector<3>(10.0)});
+    check_round_trip(RawPose{3, 4, make.pose(), make.covariance<3>(), seed % 2 == 0});
+    check_round_trip(EkfPose{3, 4, make.pose(), make.covariance<3>(), make.vector<2>(5.0),
+                             make.covariance<2>(), make.vector<3>(0.1), make.covariance<3>(), 7, 1,
+                             2});
+    check_round_trip(
+        VelocityCorrection{3, 4, make.vector<2>(5.0), make.vector<3>(0.1), make.covariance<5>()});
+    EkfMap map{3, 4, {}};
+    TrackedScan tracked{3, 4, {40.0, 0.1, 2.0}, {}};
+    for (std::size_t i = make.count(); i > 0; --i) {
+      map.landmarks.push_back({i, make.vector<2>(50.0), make.covariance<2>(), 0.2, make.kind(), 9});
+    }
+    std::uint32_t index = 0;
+    for (const Detection& detection : make.scan().detections) {
+      tracked.landmarks.push_back({100 + index, index, detection});
+      ++index;
+    }
+    check_round_trip(map);
+    check_round_trip(tracked);
+    for (const double farthest_m : {0.5, 30.0, 32.768, 120.0}) {
+      check_round_trip(make.sweep(farthest_m));
+    }
+  }
+}
+
+TEST_CASE("a sweep's points keep their places to half a step") {
+  Maker make(3);
+  const PointSweep sweep = make.sweep(120.0);
+  const auto back = decode_message<PointSweep>(encode_message(sweep));
+  REQUIRE(back);
+  REQUIRE(back->points.size() == sweep.points.size());
+  for (std::size_t i = 0; i < sweep.points.size(); ++i) {
+    CHECK((back->points[i].position() - sweep.points[i].position()).cwiseAbs().maxCoeff() <=
+          2.1e-3F);
+    CHECK(std::abs(back->points[i].time_s - sweep.points[i].time_s) <= 2.1e-6F);
+    CHECK(back->points[i].ring == sweep.points[i].ring);
+    CHECK(back->points[i].intensity == sweep.points[i].intensity);
+  }
+  PointSweep broken = sweep;
+  broken.points[7].y_m = std::numeric_limits<float>::quiet_NaN();
+  CHECK_THROWS_AS(to_wire(broken), std::invalid_argument);
+  broken.points[7].y_m = std::numeric_limits<float>::infinity();
+  CHECK_THROWS_AS(to_wire(broken), std::invalid_argument);
+}
+
+TEST_CASE("a sweep that cannot be is refused") {
+  Maker make(3);
+  lidar_sweep_t wire = to_wire(make.sweep(30.0));
+  REQUIRE(from_wire(wire));
+  wire.ring[3] = 32;
+  CHECK_FALSE(from_wire(wire));
+  wire.ring[3] = 31;
+  wire.part = wire.parts;
+  CHECK_FALSE(from_wire(wire));
+}
+
+TEST_CASE("a sweep in parts is put together again, and one with a hole is dropped") {
+  Maker make(8);
+  PointSweep whole = make.sweep(30.0);
+  whole.part = 0;
+  whole.parts = 1;
+  SweepAssembler assembler;
+  for (std::size_t size = 1; size <= 45; ++size) {
+    const std::vector<PointSweep> parts = split_sweep(whole, size);
+    REQUIRE(parts.size() == (whole.points.size() + size - 1) / size);
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      const auto result = assembler.add(parts[i]);
+      REQUIRE(result.has_value() == (i + 1 == parts.size()));
+      if (result) CHECK(encode_message(*result) == encode_message(whole));
+    }
+  }
+  CHECK(assembler.incomplete_turns() == 0);
+  const std::vector<PointSweep> parts = split_sweep(whole, 10);
+  for (std::size_t lost = 0; lost < parts.size(); ++lost) {
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      if (i != lost) CHECK_FALSE(assembler.add(parts[i]));
+    }
+    for (std::size_t i = 0; i + 1 < parts.size(); ++i) CHECK_FALSE(assembler.add(parts[i]));
+    CHECK(assembler.add(parts.back()));
+  }
+  CHECK(assembler.incomplete_turns() == parts.size());
 }
 
 TEST_CASE("values are carried field by field") {

@@ -82,7 +82,11 @@ void fuzz(std::size_t packets, std::mt19937_64& random, Tally& tally) {
     damage(bytes, lengths, random);
     allocated_bytes = 0;
     const auto message = decode_message<T>(bytes);
-    if (allocated_bytes > 4 * bytes.size() + kFixed) ++tally.beyond_memory;
+    if (allocated_bytes > 4 * bytes.size() + kFixed) {
+      ++tally.beyond_memory;
+      WARN("beyond memory: " << type.layout->name << ": " << allocated_bytes << " for "
+                             << bytes.size());
+    }
     ++tally.packets;
     ++(message ? tally.accepted : tally.refused);
     if (!message && message.refusal().detail.empty()) FAIL("a refusal without words");

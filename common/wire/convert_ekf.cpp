@@ -1,0 +1,149 @@
+#include <limits>
+
+#include "common/wire/convert.hpp"
+#include "common/wire/convert_shared.hpp"
+
+namespace understory {
+namespace {
+
+constexpr double kFastestMps = 1000.0;
+constexpr double kLargestBias = 100.0;
+
+template <std::size_t N>
+void check_all(std::string_view field, const double (&values)[N], double limit, Checks& checks) {
+  for (const double value : values) checks.range(field, value, -limit, limit);
+}
+
+}  // namespace
+
+Result<RawPose> from_wire(const raw_pose_t& wire) {
+  Checks checks;
+  checks.pose("odom_T_vehicle", wire.odom_T_vehicle);
+  RawPose pose;
+  pose.utime = wire.utime;
+  pose.sequence = static_cast<std::uint64_t>(wire.seq);
+  pose.odom_T_vehicle = from_wire(wire.odom_T_vehicle);
+  pose.covariance = checks.covariance("covariance", wire.covariance);
+  pose.is_reference = wire.is_reference != 0;
+  if (checks.refusal()) return *checks.refusal();
+  return pose;
+}
+
+raw_pose_t to_wire(const RawPose& pose) {
+  raw_pose_t wire{};
+  wire.utime = pose.utime;
+  wire.seq = static_cast<std::int64_t>(pose.sequence);
+  wire.odom_T_vehicle = to_wire(pose.odom_T_vehicle);
+  copy_matrix(pose.covariance, wire.covariance);
+  wire.is_reference = pose.is_reference ? 1 : 0;
+  return wire;
+}
+
+Result<EkfPose> from_wire(const ekf_pose_t& wire) {
+  Checks checks;
+  checks.pose("ekf_map_T_vehicle", wire.ekf_map_T_vehicle);
+  check_all("velocity_m_s", wire.velocity_m_s, kFastestMps, checks);
+  check_all("bias", wire.bias, kLargestBias, checks);
+  checks.range("landmarks_used", wire.landmarks_used, 0, std::numeric_limits<std::int32_t>::max());
+  checks.range("landmarks_refused", wire.landmarks_refused, 0,
+               std::numeric_limits<std::int32_t>::max());
+  checks.range("reset_counter", static_cast<double>(wire.reset_counter), 0.0, 9.3e18);
+  EkfPose pose;
+  pose.utime = wire.utime;
+  pose.sequence = static_cast<std::uint64_t>(wire.seq);
+  pose.ekf_map_T_vehicle = from_wire(wire.ekf_map_T_vehicle);
+  pose.covariance = checks.covariance("covariance", wire.covariance);
+  pose.velocity_mps = Eigen::Map<const Eigen::Vector2d>(wire.velocity_m_s);
+  pose.velocity_covariance = checks.covariance("velocity_covariance", wire.velocity_covariance);
+  pose.bias = Eigen::Map<const Eigen::Vector3d>(wire.bias);
+  pose.bias_covariance = checks.covariance("bias_covariance", wire.bias_covariance);
+  pose.landmarks_used = static_cast<std::uint32_t>(wire.landmarks_used);
+  pose.landmarks_refused = static_cast<std::uint32_t>(wire.landmarks_refused);
+  pose.reset_counter = static_cast<std::uint64_t>(wire.reset_counter);
+  if (checks.refusal()) return *checks.refusal();
+  return pose;
+}
+
+ekf_pose_t to_wire(const EkfPose& pose) {
+  ekf_pose_t wire{};
+  wire.utime = pose.utime;
+  wire.seq = static_cast<std::int64_t>(pose.sequence);
+  wire.ekf_map_T_vehicle = to_wire(pose.ekf_map_T_vehicle);
+  copy_matrix(pose.covariance, wire.covariance);
+  copy_vector(pose.velocity_mps, wire.velocity_m_s);
+  copy_matrix(pose.velocity_covariance, wire.velocity_covariance);
+  copy_vector(pose.bias, wire.bias);
+  copy_matrix(pose.bias_covariance, wire.bias_covariance);
+  wire.landmarks_used = static_cast<std::int32_t>(pose.landmarks_used);
+  wire.landmarks_refused = static_cast<std::int32_t>(pose.landmarks_refused);
+  wire.reset_counter = static_cast<std::int64_t>(pose.reset_counter);
+  return wire;
+}
+
+Result<EkfMap> from_wire(const ekf_map_t& wire) {
+  Checks checks;
+  EkfMap map;
+  map.utime = wire.utime;
+  map.sequence = static_cast<std::uint64_t>(wire.seq);
+  map.landmarks.reserve(wire.landmarks.size());
+  for (std::size_t i = 0; i < wire.landmarks.size(); ++i) {
+    const ekf_landmark_t& from = wire.landmarks[i];
+    checks.in("landmarks", i);
+    check_landmark(from, checks);
+    checks.range("track_id", static_cast<double>(from.track_id), 1.0, 9.3e18);
+    checks.range("times_seen", from.times_seen, 0, std::numeric_limits<std::int32_t>::max());
+    EkfLandmark& landmark = map.landmarks.emplace_back();
+    landmark.track_id = static_cast<TrackId>(from.track_id);
+    landmark.position_m = Eigen::Map<const Eigen::Vector2d>(from.position_m);
+    landmark.covariance_m2 = checks.covariance("covariance_m2", from.covariance_m2);
+    landmark.radius_m = from.radius_m;
+    landmark.kind = static_cast<LandmarkKind>(from.kind);
+    landmark.times_seen = static_cast<std::uint32_t>(from.times_seen);
+  }
+  if (checks.refusal()) return *checks.refusal();
+  return map;
+}
+
+ekf_map_t to_wire(const EkfMap& map) {
+  ekf_map_t wire{};
+  wire.utime = map.utime;
+  wire.seq = static_cast<std::int64_t>(map.sequence);
+  wire.num_landmarks = static_cast<std::int32_t>(map.landmarks.size());
+  wire.landmarks.reserve(map.landmarks.size());
+  for (const EkfLandmark& landmark : map.landmarks) {
+    ekf_landmark_t& out = wire.landmarks.emplace_back();
+    out.track_id = static_cast<std::int64_t>(landmark.track_id);
+    copy_vector(landmark.position_m, out.position_m);
+    copy_matrix(landmark.covariance_m2, out.covariance_m2);
+    out.radius_m = landmark.radius_m;
+    out.kind = static_cast<std::int8_t>(landmark.kind);
+    out.times_seen = static_cast<std::int32_t>(landmark.times_seen);
+  }
+  return wire;
+}
+
+Result<VelocityCorrection> from_wire(const velocity_correction_t& wire) {
+  Checks checks;
+  check_all("velocity_m_s", wire.velocity_m_s, kFastestMps, checks);
+  check_all("bias", wire.bias, kLargestBias, checks);
+  VelocityCorrection correction;
+  correction.utime = wire.utime;
+  correction.sequence = static_cast<std::uint64_t>(wire.seq);
+  correction.velocity_mps = Eigen::Map<const Eigen::Vector2d>(wire.velocity_m_s);
+  correction.bias = Eigen::Map<const Eigen::Vector3d>(wire.bias);
+  correction.covariance = checks.covariance("covariance", wire.covariance);
+  if (checks.refusal()) return *checks.refusal();
+  return correction;
+}
+
+velocity_correction_t to_wire(const VelocityCorrection& correction) {
+  velocity_correction_t wire{};
+  wire.utime = correction.utime;
+  wire.seq = static_cast<std::int64_t>(correction.sequence);
+  copy_vector(correction.velocity_mps, wire.velocity_m_s);
+  copy_vector(correction.bias, wire.bias);
+  copy_matrix(correction.covariance, wire.covariance);
+  return wire;
+}
+
+}  // namespace understory
