@@ -40,7 +40,7 @@ struct Odometry {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   /// Where there is an IMU. `from_T_to` is then made of the same samples (and of the wheels, where
   /// there are any): whoever uses the preintegration takes from `from_T_to` only what wheels said.
-  std::optional<Preintegration> inertial;
+  std::optional<Preintegration> inertial = {};
   /// Wheels stood behind `from_T_to`; without them its translation rests on dead-reckoned velocity.
   bool has_wheels = false;
   bool is_standing = false;  ///< The vehicle was found to stand still during the interval.
