@@ -6,6 +6,7 @@
 #include "common/model/landmarks.hpp"
 #include "common/model/planar_scan.hpp"
 #include "services/landmark_extractor/parameters.hpp"
+#include "services/landmark_extractor/sweep_extractor.hpp"
 
 namespace understory {
 
@@ -24,16 +25,20 @@ struct ExtractorCounters {
 class LandmarkExtractor {
  public:
   explicit LandmarkExtractor(const LandmarkExtractorParameters& parameters = {})
-      : parameters_(parameters) {}
+      : parameters_(parameters), sweeps_(parameters) {}
 
   /// Trunks of a one-plane laser: objects that stand alone, are round, and have a trunk's size.
   /// A malformed scan gives none. Invariant: detections are in order of bearing.
   LandmarkScan extract(const PlanarScan& scan);
+  /// Trunks and corners of a laser that scans in space.
+  LandmarkScan extract(const PointSweep& sweep) { return sweeps_.extract(sweep); }
   const ExtractorCounters& counters() const { return counters_; }
+  const SweepCounters& sweep_counters() const { return sweeps_.counters(); }
 
  private:
   LandmarkExtractorParameters parameters_;
   ExtractorCounters counters_;
+  SweepExtractor sweeps_;
 };
 
 }  // namespace understory

@@ -30,8 +30,59 @@ struct PlanarTrunkParameters {
   double max_mean_square_residual = 6.0;  ///< Of the ranges from the fitted circle, in sigma^2.
 };
 
+/// What both kinds of landmark need of a sweep in space. Noise figures: Velodyne, 16 to 64 beams.
+struct SweepParameters {
+  double min_range_m = 1.0;       ///< What is nearer is the vehicle itself.
+  double max_range_m = 30.0;      ///< Landmarks farther than this are not reported.
+  double range_sigma_m = 0.02;    ///< Of one beam.
+  double beam_width_rad = 0.0;    ///< By how much a beam's footprint widens an object on each side.
+  double min_height_m = 0.3;      ///< Above ground: what is lower is ground, grass, stones.
+  double max_height_m = 5.0;      ///< Above ground: what is higher is canopy.
+  double break_distance_m = 0.3;  ///< Neighbouring returns farther apart are two objects...
+  double break_per_range = 0.01;  ///< ... plus this much per metre of range.
+  double clearance_m = 0.4;       ///< What stands beside an object's edge is so much farther away.
+  double standing_height_m = 2.2;  ///< What ends below this is a person, a bush, a car, a stump.
+  double breast_height_m = 1.3;    ///< Above ground: where a landmark's position is given.
+  double level_sigma_rad = 0.01;   ///< Of roll and of pitch where the sweep does not say them.
+};
+
+/// Trunks from lasers that scan in space.
+struct SweepTrunkParameters {
+  double min_radius_m = 0.04;
+  double max_radius_m = 0.8;
+  double prior_radius_m = 0.15;  ///< What a trunk's radius is before it is measured.
+  double prior_radius_sigma_m = 0.15;
+  double prior_lean_sigma_rad = 0.06;  ///< Of a trunk's axis from the vertical.
+  double prior_taper = -0.01;          ///< Change of radius per metre of height.
+  double prior_taper_sigma = 0.01;
+  double roundness_sigma_m = 0.01;        ///< Of the bark from a circle.
+  double shape_sigma_m = 0.004;           ///< What more points do not average out.
+  double max_lean_rad = 0.35;             ///< More than that is a branch.
+  double max_sigma_m = 0.12;              ///< Trunks whose centre is known worse are not reported.
+  double max_mean_square_residual = 3.0;  ///< Of ranges and edges from the axis, in sigma^2.
+  double gather_radius_m = 0.3;           ///< How far apart the slices of one trunk may seem.
+  int min_points = 5;
+  int min_rings = 2;
+};
+
+/// Corners of houses from lasers that scan in space.
+struct CornerParameters {
+  double line_tolerance_m = 0.06;         ///< What is so near a line is on it.
+  double min_length_m = 0.6;              ///< Of a wall, as far as it is seen.
+  double min_extent_m = 0.8;              ///< In height, of the returns on a wall.
+  double max_gap_m = 0.3;                 ///< From the end of a wall's returns to the corner...
+  double max_gap_per_range = 0.02;        ///< ... plus this much per metre of range.
+  double max_skew_rad = 0.2;              ///< Of the angle between the walls from a right one.
+  double flatness_sigma_m = 0.01;         ///< Of a wall; more points do not average it out.
+  double straightness_sigma_rad = 0.005;  ///< The same for its direction.
+  int min_rings = 3;
+};
+
 struct LandmarkExtractorParameters {
   PlanarTrunkParameters planar;
+  SweepParameters sweep;
+  SweepTrunkParameters trunk;
+  CornerParameters corner;
 };
 
 }  // namespace understory

@@ -1,0 +1,284 @@
+#include "services/landmark_extractor/column_fit.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+/// More evidence than this costs time and adds nothing beyond the shape's own uncertainty.
+constexpr std::size_t kMaxRuns = 16;
+constexpr std::size_t kHitsPerRun = 12;
+constexpr int kIterations = 8;
+/// Beams that graze the stem more than this (part of the radius) say little of its range.
+constexpr double kMaxGraze = 0.9;
+/// Residuals beyond this many sigma weigh as those at it (Huber).
+constexpr double kHuber = 2.0;
+/// A run disagrees whose residuals are so large in root mean square [sigma]...
+constexpr double kMaxRunResidual = 2.5;
+
+double square(double value) { return value * value; }
+
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+Eigen::Vector2d unit(double azimuth) { return {std::cos(azimuth), std::sin(azimuth)}; }
+
+/// One residual with its derivative by (x, y, radius) at its own height.
+struct Term {
+  double residual = 0.0;
+  Eigen::Vector3d jacobian = Eigen::Vector3d::Zero();
+  double sigma = 1.0;
+
+  double normalised() const { return residual / sigma; }
+};
+
+/// Where a beam meets a circle.
+Term hit_term(const Eigen::Vector3d& circle, const Eigen::Vector2d& origin,
+              const Eigen::Vector2d& direction, double range, const SweepParameters& sweep,
+              double roundness) {
+  const Eigen::Vector2d to_centre = circle.head<2>() - origin;
+  const double along = direction.dot(to_centre);
+  const double miss = cross(direction, to_centre);
+  const double radius = std::max(circle[2], 1e-3);
+  const double limit = kMaxGraze * radius;
+  const double m = std::clamp(miss, -limit, limit);
+  const double q = std::sqrt(square(radius) - square(m));
+  Term term;
+  term.residual = range - (along - q);
+  const Eigen::Vector2d normal(-direction.y(), direction.x());
+  term.jacobian.head<2>() = direction + (m / q) * normal;
+  term.jacobian[2] = -radius / q;
+  // A footprint of some width on a slanting surface smears the range.
+  term.sigma = std::sqrt(square(sweep.range_sigma_m) + square(roundness) +
+                         square(m / q * along * sweep.beam_width_rad));
+  // Nearer to the edge the range falls off so steeply that only the edge itself says something.
+  if (std::abs(miss) > limit) term.sigma = std::hypot(term.sigma, radius);
+  return term;
+}
+
+/// How far the line of sight passes from the circle on its own side.
+Term edge_term(const Eigen::Vector3d& circle, const Eigen::Vector2d& origin,
+               const Eigen::Vector2d& direction, double side, double sigma) {
+  Term term;
+  term.residual = -(cross(direction, circle.head<2>() - origin) + side * circle[2]);
+  term.jacobian = {-direction.y(), direction.x(), side};
+  term.sigma = sigma;
+  return term;
+}
+
+Eigen::Vector3d circle_at(const Vector6d& state, double above) {
+  return state.head<3>() + above * state.tail<3>();
+}
+
+void add(const Term& term, double above, Matrix6d& information, Vector6d& gradient) {
+  const double size = std::abs(term.normalised());
+  const double weight = (size > kHuber ? kHuber / size : 1.0) / square(term.sigma);
+  Vector6d jacobian;
+  jacobian << term.jacobian, above * term.jacobian;
+  information.noalias() += weight * jacobian * jacobian.transpose();
+  gradient.noalias() += weight * term.residual * jacobian;
+}
+
+}  // namespace
+
+std::optional<StemFit> StemFitter::fit(const RingCloud& cloud, const std::vector<Run>& runs,
+                                       const Column& column) {
+  agreeing_ = column.runs;
+  StemFit fit;
+  Vector6d state = Vector6d::Zero();
+  for (int round = 0; round < 3; ++round) {
+    choose_runs();
+    take_evidence(cloud, runs);
+    if (round == 0) state = start(cloud, runs);
+    if (!settle(state)) return std::nullopt;
+    if (!drop_disagreeing(state)) break;
+    if (agreeing_.empty()) return std::nullopt;
+  }
+  describe(state, runs, fit);
+  return fit;
+}
+
+/// At most kMaxRuns of the agreeing runs, spread over the height.
+void StemFitter::choose_runs() {
+  used_.clear();
+  const std::size_t count = std::min(agreeing_.size(), kMaxRuns);
+  for (std::size_t k = 0; k < count; ++k) {
+    used_.push_back(agreeing_[k * agreeing_.size() / count]);
+  }
+}
+
+void StemFitter::take_evidence(const RingCloud& cloud, const std::vector<Run>& runs) {
+  hits_.clear();
+  edges_.clear();
+  for (const std::uint32_t index : used_) {
+    const Run& run = runs[index];
+    const std::size_t count = std::min(run.size(), kHitsPerRun);
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t i = run.first + (2 * k + 1) * run.size() / (2 * count);
+      const RingPoint& point = cloud.points()[i];
+      const Eigen::Vector2d direction = unit(point.azimuth_rad);
+      const double range = point.range_m;
+      hits_.push_back({point.position() - range * direction, direction, range, point.z_m, index});
+    }
+    if (run.left == Border::kClear) add_edge(cloud, run, index, 1.0);
+    if (run.right == Border::kClear) add_edge(cloud, run, index, -1.0);
+  }
+  share_edges();
+}
+
+/// The edge lies somewhere between the run's last beam and the next.
+void StemFitter::add_edge(const RingCloud& cloud, const Run& run, std::uint32_t index,
+                          double side) {
+  const RingPoint& last = cloud.points()[side > 0.0 ? run.last : run.first];
+  const double step = cloud.step_rad(run.ring);
+  const double azimuth = last.azimuth_rad + side * (0.5 * step - sweep_.beam_width_rad);
+  const double range = last.range_m;
+  const double variance =
+      square(range) * (square(step) / 12.0 + square(0.5 * sweep_.beam_width_rad)) +
+      square(trunk_.roundness_sigma_m);
+  edges_.push_back({last.origin(), unit(azimuth), last.z_m, side, std::sqrt(variance), index});
+}
+
+/// Rings that fire at the same azimuths miss an upright edge by the same part of a step: together
+/// they say no more than one does.
+void StemFitter::share_edges() {
+  std::vector<double> shares(edges_.size(), 0.0);
+  for (std::size_t i = 0; i < edges_.size(); ++i) {
+    for (const Edge& other : edges_) {
+      if (other.side != edges_[i].side) continue;
+      const double apart = std::abs(cross(edges_[i].direction, other.direction));
+      const double range_sigma = edges_[i].sigma_m;
+      const double distance = apart * hits_.front().range_m;
+      if (distance < range_sigma) shares[i] += 1.0;
+    }
+  }
+  for (std::size_t i = 0; i < edges_.size(); ++i) {
+    edges_[i].sigma_m *= std::sqrt(std::max(1.0, shares[i]));
+  }
+}
+
+/// From the longest run: its width gives the radius.
+Vector6d StemFitter::start(const RingCloud& cloud, const std::vector<Run>& runs) const {
+  const auto longest = std::max_element(
+      used_.begin(), used_.end(),
+      [&](std::uint32_t a, std::uint32_t b) { return runs[a].size() < runs[b].size(); });
+  const Run& run = runs[*longest];
+  const double radius =
+      std::clamp(0.5 * static_cast<double>(run.width_m), trunk_.min_radius_m, trunk_.max_radius_m);
+  const RingPoint& middle = cloud.points()[(run.first + run.last) / 2];
+  const Eigen::Vector2d direction = unit(middle.azimuth_rad);
+  Vector6d state = Vector6d::Zero();
+  state.head<2>() = middle.origin() + (run.nearest_m + radius) * direction;
+  state[2] = radius;
+  state[5] = trunk_.prior_taper;
+  return state;
+}
+
+void StemFitter::linearise(const Vector6d& state, Matrix6d& information, Vector6d& gradient) {
+  information.setZero();
+  gradient.setZero();
+  for (const Hit& hit : hits_) {
+    const double above = hit.z_m - reference_z_m_;
+    add(hit_term(circle_at(state, above), hit.origin_m, hit.direction, hit.range_m, sweep_,
+                 trunk_.roundness_sigma_m),
+        above, information, gradient);
+  }
+  for (const Edge& edge : edges_) {
+    const double above = edge.z_m - reference_z_m_;
+    add(edge_term(circle_at(state, above), edge.origin_m, edge.direction, edge.side, edge.sigma_m),
+        above, information, gradient);
+  }
+  const auto prior = [&](int at, double mean, double sigma) {
+    information(at, at) += 1.0 / square(sigma);
+    gradient[at] += (mean - state[at]) / square(sigma);
+  };
+  prior(2, trunk_.prior_radius_m, trunk_.prior_radius_sigma_m);
+  prior(3, 0.0, trunk_.prior_lean_sigma_rad);
+  prior(4, 0.0, trunk_.prior_lean_sigma_rad);
+  prior(5, trunk_.prior_taper, trunk_.prior_taper_sigma);
+}
+
+bool StemFitter::settle(Vector6d& state) {
+  double z = 0.0;
+  for (const Hit& hit : hits_) z += hit.z_m;
+  const double reference = z / static_cast<double>(hits_.size());
+  state.head<3>() += (reference - reference_z_m_) * state.tail<3>();
+  reference_z_m_ = reference;
+  Matrix6d information;
+  Vector6d gradient;
+  for (int i = 0; i < kIterations; ++i) {
+    linearise(state, information, gradient);
+    const Vector6d change = information.ldlt().solve(gradient);
+    state += change;
+    state[2] = std::clamp(state[2], 0.5 * trunk_.min_radius_m, 2.0 * trunk_.max_radius_m);
+    if (!state.allFinite()) return false;
+    if (change.head<3>().squaredNorm() < 1e-8) break;
+  }
+  const Hit& any = hits_.front();
+  return (state.head<2>() - any.origin_m).dot(any.direction) > 1.1 * state[2];
+}
+
+/// Whether runs were dropped.
+bool StemFitter::drop_disagreeing(const Vector6d& state) {
+  std::vector<std::uint32_t> bad;
+  for (const std::uint32_t index : used_) {
+    double sum = 0.0;
+    double count = 0.0;
+    for (const Hit& hit : hits_) {
+      if (hit.run != index) continue;
+      const Term term = hit_term(circle_at(state, hit.z_m - reference_z_m_), hit.origin_m,
+                                 hit.direction, hit.range_m, sweep_, trunk_.roundness_sigma_m);
+      sum += square(term.normalised());
+      count += 1.0;
+    }
+    bool fits = sum <= square(kMaxRunResidual) * count;
+    for (const Edge& edge : edges_) {
+      if (edge.run != index) continue;
+      const Term term = edge_term(circle_at(state, edge.z_m - reference_z_m_), edge.origin_m,
+                                  edge.direction, edge.side, edge.sigma_m);
+      fits = fits && std::abs(term.normalised()) < 4.0;
+    }
+    if (!fits) bad.push_back(index);
+  }
+  if (bad.empty()) return false;
+  std::erase_if(agreeing_, [&](std::uint32_t index) {
+    return std::find(bad.begin(), bad.end(), index) != bad.end();
+  });
+  return true;
+}
+
+void StemFitter::describe(const Vector6d& state, const std::vector<Run>& runs, StemFit& fit) {
+  fit.state = state;
+  fit.reference_z_m = reference_z_m_;
+  Matrix6d information;
+  Vector6d gradient;
+  linearise(state, information, gradient);
+  fit.covariance = information.inverse();
+  double sum = 0.0;
+  for (const Hit& hit : hits_) {
+    sum += square(hit_term(circle_at(state, hit.z_m - reference_z_m_), hit.origin_m, hit.direction,
+                           hit.range_m, sweep_, trunk_.roundness_sigma_m)
+                      .normalised());
+  }
+  for (const Edge& edge : edges_) {
+    sum += square(edge_term(circle_at(state, edge.z_m - reference_z_m_), edge.origin_m,
+                            edge.direction, edge.side, edge.sigma_m)
+                      .normalised());
+    (edge.side > 0.0 ? fit.sees_left : fit.sees_right) = true;
+  }
+  fit.mean_square_residual = sum / static_cast<double>(hits_.size() + edges_.size());
+  fit.low_z_m = runs[agreeing_.front()].z_m;
+  fit.high_z_m = runs[agreeing_.back()].z_m;
+  std::uint16_t ring = 0xffff;
+  for (const std::uint32_t index : agreeing_) {
+    fit.points += runs[index].size();
+    if (runs[index].ring != ring) ++fit.rings;
+    ring = runs[index].ring;
+  }
+}
+
+}  // namespace understory

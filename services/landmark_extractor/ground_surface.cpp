@@ -1,0 +1,193 @@
+#include "services/landmark_extractor/ground_surface.hpp"
+
+#include <array>
+#include <limits>
+
+namespace understory {
+namespace {
+
+constexpr float kNone = std::numeric_limits<float>::infinity();
+/// Weight of a second difference between nodes against one cell: ground bends by 0.3 m over a
+/// node's distance where cells lie within 0.1 m.
+constexpr float kSmoothness = 0.1F;
+/// Keeps the matrix regular where there are no points at all.
+constexpr float kFlatness = 1e-3F;
+/// Scales [m] at which cells above the surface lose their weight, iteration by iteration.
+constexpr std::array<float, 4> kScales_m{1.0F, 0.5F, 0.25F, 0.2F};
+/// Returns so near the surface are ground.
+constexpr float kOnGround_m = 0.25F;
+/// Roughness: how far the ground at one place is from the returns around it.
+constexpr double kRoughness_m = 0.05;
+/// How much the surface's own height is unknown per metre from the nearest ground returns.
+constexpr double kUnknownSlope = 0.05;
+
+/// Cells above the surface are hardly ground; cells far below are ghosts.
+float weight(float above_m, float scale_m) {
+  const float e = above_m > 0.0F ? above_m / scale_m : above_m / (3.0F * scale_m);
+  const float w = 1.0F / (1.0F + e * e);
+  return w * w;
+}
+
+}  // namespace
+
+std::size_t GroundSurface::cell(float x, float y) const {
+  const auto limit = static_cast<float>(cells_per_side_ - 1);
+  const auto i = static_cast<std::size_t>(std::clamp((x - corner_x_) / kCell_m, 0.0F, limit));
+  const auto j = static_cast<std::size_t>(std::clamp((y - corner_y_) / kCell_m, 0.0F, limit));
+  return j * cells_per_side_ + i;
+}
+
+void GroundSurface::fit(std::span<RingPoint> points, const Eigen::Vector2f& centre_m,
+                        float reach_m) {
+  const auto spans = static_cast<std::size_t>(std::ceil(2.0F * reach_m / kNodeSpacing_m)) + 1;
+  nodes_per_side_ = spans + 1;
+  cells_per_side_ = spans * static_cast<std::size_t>(kNodeSpacing_m / kCell_m);
+  node_limit_ = static_cast<float>(spans) - 1e-3F;
+  corner_x_ = centre_m.x() - 0.5F * static_cast<float>(spans) * kNodeSpacing_m;
+  corner_y_ = centre_m.y() - 0.5F * static_cast<float>(spans) * kNodeSpacing_m;
+  band_ = 2 * nodes_per_side_ + 1;
+  nodes_.assign(nodes_per_side_ * nodes_per_side_, 0.0F);
+  collect_lowest(points);
+  add_smoothness();
+  for (std::size_t k = 0; k <= kScales_m.size(); ++k) {
+    add_cells(k == 0 ? 1.0F : kScales_m[k - 1], k > 0);
+    solve();
+  }
+  residuals_.assign(lowest_.size(), {});
+  for (RingPoint& point : points) {
+    point.height_m = point.z_m - height(point.x_m, point.y_m);
+    if (std::abs(point.height_m) < kOnGround_m) {
+      Residual& residual = residuals_[cell(point.x_m, point.y_m)];
+      residual.count += 1.0F;
+      residual.sum += point.height_m;
+    }
+  }
+}
+
+void GroundSurface::collect_lowest(std::span<const RingPoint> points) {
+  lowest_.assign(cells_per_side_ * cells_per_side_, kNone);
+  for (const RingPoint& point : points) {
+    float& lowest = lowest_[cell(point.x_m, point.y_m)];
+    lowest = std::min(lowest, point.z_m);
+  }
+}
+
+void GroundSurface::add_smoothness() {
+  const std::size_t n = nodes_per_side_;
+  smoothness_.assign(n * n * band_, 0.0F);
+  const auto add = [&](std::span<const std::size_t> at, std::span<const float> factors, float w) {
+    for (std::size_t a = 0; a < at.size(); ++a) {
+      for (std::size_t b = 0; b < at.size(); ++b) {
+        if (at[b] <= at[a]) {
+          smoothness_[at[a] * band_ + (at[a] - at[b])] += w * factors[a] * factors[b];
+        }
+      }
+    }
+  };
+  constexpr std::array<float, 3> kSecond{1.0F, -2.0F, 1.0F};
+  constexpr std::array<float, 4> kTwist{1.0F, -1.0F, -1.0F, 1.0F};
+  for (std::size_t j = 0; j < n; ++j) {
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::size_t k = j * n + i;
+      smoothness_[k * band_] += kFlatness * kSmoothness;
+      if (i + 2 < n) add(std::array{k, k + 1, k + 2}, kSecond, kSmoothness);
+      if (j + 2 < n) add(std::array{k, k + n, k + 2 * n}, kSecond, kSmoothness);
+      if (i + 1 < n && j + 1 < n) {
+        add(std::array{k, k + 1, k + n, k + n + 1}, kTwist, 2.0F * kSmoothness);
+      }
+    }
+  }
+}
+
+void GroundSurface::add_cells(float scale_m, bool weigh) {
+  matrix_ = smoothness_;
+  right_.assign(nodes_.size(), 0.0F);
+  for (std::size_t j = 0; j < cells_per_side_; ++j) {
+    for (std::size_t i = 0; i < cells_per_side_; ++i) {
+      const float z = lowest_[j * cells_per_side_ + i];
+      if (z == kNone) continue;
+      const float u = (static_cast<float>(i) + 0.5F) * kCell_m / kNodeSpacing_m;
+      const float v = (static_cast<float>(j) + 0.5F) * kCell_m / kNodeSpacing_m;
+      const auto node_i = static_cast<std::size_t>(u);
+      const auto node_j = static_cast<std::size_t>(v);
+      const float a = u - static_cast<float>(node_i);
+      const float b = v - static_cast<float>(node_j);
+      const std::size_t k = node_j * nodes_per_side_ + node_i;
+      const std::array<std::size_t, 4> at{k, k + 1, k + nodes_per_side_, k + nodes_per_side_ + 1};
+      const std::array<float, 4> share{(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b};
+      float surface = 0.0F;
+      for (std::size_t c = 0; c < 4; ++c) surface += share[c] * nodes_[at[c]];
+      const float w = weigh ? weight(z - surface, scale_m) : 1.0F;
+      for (std::size_t c = 0; c < 4; ++c) {
+        right_[at[c]] += w * share[c] * z;
+        for (std::size_t d = 0; d <= c; ++d) {
+          matrix_[at[c] * band_ + (at[c] - at[d])] += w * share[c] * share[d];
+        }
+      }
+    }
+  }
+}
+
+/// Cholesky factor of a banded matrix in place, then both substitutions.
+void GroundSurface::solve() {
+  const std::size_t n = nodes_.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    float* row = &matrix_[i * band_];
+    const std::size_t first = i >= band_ ? i - band_ + 1 : 0;
+    for (std::size_t j = first; j <= i; ++j) {
+      const float* other = &matrix_[j * band_];
+      const std::size_t from = std::max(first, j >= band_ ? j - band_ + 1 : 0);
+      float sum = row[i - j];
+      for (std::size_t k = from; k < j; ++k) sum -= row[i - k] * other[j - k];
+      row[i - j] = j < i ? sum / other[0] : std::sqrt(std::max(sum, 1e-9F));
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    float sum = right_[i];
+    for (std::size_t k = i >= band_ ? i - band_ + 1 : 0; k < i; ++k) {
+      sum -= matrix_[i * band_ + (i - k)] * nodes_[k];
+    }
+    nodes_[i] = sum / matrix_[i * band_];
+  }
+  for (std::size_t i = n; i-- > 0;) {
+    float sum = nodes_[i];
+    for (std::size_t k = i + 1; k < std::min(n, i + band_); ++k) {
+      sum -= matrix_[k * band_ + (k - i)] * nodes_[k];
+    }
+    nodes_[i] = sum / matrix_[i * band_];
+  }
+}
+
+GroundHeight GroundSurface::below(const Eigen::Vector2d& place_m) const {
+  const auto x = static_cast<float>(place_m.x());
+  const auto y = static_cast<float>(place_m.y());
+  GroundHeight ground{height(x, y), 0.0};
+  const std::size_t middle = cell(x, y);
+  const auto row = static_cast<std::ptrdiff_t>(middle / cells_per_side_);
+  const auto column = static_cast<std::ptrdiff_t>(middle % cells_per_side_);
+  const auto side = static_cast<std::ptrdiff_t>(cells_per_side_);
+  // Ring of cells by ring of cells outwards until one has seen the ground.
+  for (std::ptrdiff_t reach = 1; reach <= 8; ++reach) {
+    double sum = 0.0;
+    double cells = 0.0;
+    for (std::ptrdiff_t j = std::max<std::ptrdiff_t>(0, row - reach);
+         j <= std::min(side - 1, row + reach); ++j) {
+      for (std::ptrdiff_t i = std::max<std::ptrdiff_t>(0, column - reach);
+           i <= std::min(side - 1, column + reach); ++i) {
+        const Residual& residual = residuals_[static_cast<std::size_t>(j * side + i)];
+        if (residual.count < 1.0F) continue;
+        sum += residual.sum / residual.count;
+        cells += 1.0;
+      }
+    }
+    if (cells >= 2.0) {
+      ground.height_m += sum / cells;
+      ground.sigma_m = std::hypot(kRoughness_m, kUnknownSlope * static_cast<double>(reach));
+      return ground;
+    }
+  }
+  ground.sigma_m = std::hypot(kRoughness_m, kUnknownSlope * 10.0);
+  return ground;
+}
+
+}  // namespace understory

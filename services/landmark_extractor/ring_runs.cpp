@@ -1,0 +1,123 @@
+#include "services/landmark_extractor/ring_runs.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace understory {
+namespace {
+
+/// So many beams without a return in the middle of an object are drop-outs.
+constexpr float kDropOuts = 3.5F;
+/// The next beam gave a return: it is not farther than this many steps away.
+constexpr float kNextBeam = 1.6F;
+
+class RunFinder {
+ public:
+  RunFinder(const RingCloud& cloud, const SweepParameters& parameters, std::size_t ring)
+      : points_(cloud.points()),
+        begin_(cloud.ring_begin(ring)),
+        end_(cloud.ring_end(ring)),
+        ring_(ring),
+        step_(cloud.step_rad(ring)),
+        lowest_(static_cast<float>(parameters.min_height_m)),
+        highest_(static_cast<float>(parameters.max_height_m)),
+        break_distance_(static_cast<float>(parameters.break_distance_m)),
+        break_per_range_(static_cast<float>(parameters.break_per_range)),
+        clearance_(static_cast<float>(parameters.clearance_m)) {}
+
+  void find(std::vector<Run>& runs) const {
+    for (std::size_t i = begin_; i < end_;) {
+      if (!is_object(points_[i])) {
+        ++i;
+        continue;
+      }
+      std::size_t last = i;
+      while (last + 1 < end_ && is_object(points_[last + 1]) && joined(last, last + 1)) ++last;
+      runs.push_back(describe(i, last));
+      i = last + 1;
+    }
+  }
+
+ private:
+  bool is_object(const RingPoint& point) const {
+    return point.height_m > lowest_ && point.height_m < highest_;
+  }
+
+  bool joined(std::size_t a, std::size_t b) const {
+    const RingPoint& p = points_[a];
+    const RingPoint& q = points_[b];
+    const float limit = break_distance_ + break_per_range_ * std::min(p.range_m, q.range_m);
+    const float dx = p.x_m - q.x_m;
+    const float dy = p.y_m - q.y_m;
+    return dx * dx + dy * dy <= limit * limit && q.azimuth_rad - p.azimuth_rad <= kDropOuts * step_;
+  }
+
+  /// What lies beside the point `edge`: `beyond` is its neighbour in the ring.
+  Border border(std::size_t edge, std::size_t beyond) const {
+    float gap = std::abs(points_[edge].azimuth_rad - points_[beyond].azimuth_rad);
+    if (gap > std::numbers::pi_v<float>) gap = std::abs(gap - 2.0F * std::numbers::pi_v<float>);
+    const float behind = points_[beyond].range_m - points_[edge].range_m;
+    if (gap > kDropOuts * step_) return Border::kClear;
+    if (behind < -clearance_) return Border::kOccluded;
+    if (gap > kNextBeam * step_ || behind > clearance_) return Border::kClear;
+    // Ground that rises beside an object hides nothing of it.
+    return points_[beyond].height_m <= lowest_ ? Border::kClear : Border::kCrowded;
+  }
+
+  Run describe(std::size_t first, std::size_t last) const {
+    Run run;
+    run.first = static_cast<std::uint32_t>(first);
+    run.last = static_cast<std::uint32_t>(last);
+    run.ring = static_cast<std::uint16_t>(ring_);
+    run.right = border(first, first > begin_ ? first - 1 : end_ - 1);
+    run.left = border(last, last + 1 < end_ ? last + 1 : begin_);
+    float nearest = points_[first].range_m;
+    float z = 0.0F;
+    float height = 0.0F;
+    for (std::size_t i = first; i <= last; ++i) {
+      nearest = std::min(nearest, points_[i].range_m);
+      z += points_[i].z_m;
+      height += points_[i].height_m;
+    }
+    const auto count = static_cast<float>(run.size());
+    run.nearest_m = nearest;
+    run.z_m = z / count;
+    run.height_m = height / count;
+    run.width_m = nearest * (points_[last].azimuth_rad - points_[first].azimuth_rad + step_);
+    place(run);
+    return run;
+  }
+
+  void place(Run& run) const {
+    const RingPoint& middle = points_[(run.first + run.last) / 2];
+    const float azimuth = 0.5F * (points_[run.first].azimuth_rad + points_[run.last].azimuth_rad);
+    const float behind = run.nearest_m + 0.5F * run.width_m;
+    // Relative to a point of the run: the sensor moved during the turn.
+    const float from = middle.range_m;
+    run.x_m = middle.x_m + behind * std::cos(azimuth) - from * std::cos(middle.azimuth_rad);
+    run.y_m = middle.y_m + behind * std::sin(azimuth) - from * std::sin(middle.azimuth_rad);
+  }
+
+  std::span<const RingPoint> points_;
+  std::size_t begin_;
+  std::size_t end_;
+  std::size_t ring_;
+  float step_;
+  float lowest_;
+  float highest_;
+  float break_distance_;
+  float break_per_range_;
+  float clearance_;
+};
+
+}  // namespace
+
+void find_runs(const RingCloud& cloud, const SweepParameters& parameters, std::vector<Run>& runs) {
+  runs.clear();
+  for (std::size_t ring = 0; ring < cloud.rings(); ++ring) {
+    if (cloud.step_rad(ring) > 0.0F) RunFinder(cloud, parameters, ring).find(runs);
+  }
+}
+
+}  // namespace understory

@@ -1,0 +1,39 @@
+// Cuts each ring into objects: runs of beams whose returns are neighbours in space.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "services/landmark_extractor/parameters.hpp"
+#include "services/landmark_extractor/ring_cloud.hpp"
+#include "services/landmark_extractor/segments.hpp"
+
+namespace understory {
+
+/// Points first..last (both included) of the cloud, all of one ring and above the ground.
+struct Run {
+  std::uint32_t first = 0;
+  std::uint32_t last = 0;
+  std::uint16_t ring = 0;
+  Border right = Border::kUnknown;  ///< Before `first`.
+  Border left = Border::kUnknown;   ///< After `last`.
+  float width_m = 0.0F;             ///< As seen from the sensor, with half a beam on each side.
+  float nearest_m = 0.0F;           ///< Least range.
+  float z_m = 0.0F;                 ///< Mean.
+  float height_m = 0.0F;            ///< Above ground, mean.
+  /// Where the centre would be were it round.
+  float x_m = 0.0F;
+  float y_m = 0.0F;
+
+  std::size_t size() const { return last - first + 1; }
+  /// Its own edge is seen on at least one side, and nothing touches it on the other.
+  bool stands_alone() const {
+    return (right == Border::kClear && left != Border::kCrowded) ||
+           (left == Border::kClear && right != Border::kCrowded);
+  }
+};
+
+/// All runs in order of ring and azimuth; `runs` keeps its memory.
+void find_runs(const RingCloud& cloud, const SweepParameters& parameters, std::vector<Run>& runs);
+
+}  // namespace understory

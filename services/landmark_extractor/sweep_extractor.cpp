@@ -1,0 +1,58 @@
+#include "services/landmark_extractor/sweep_extractor.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+/// More beams than any sensor has.
+constexpr std::uint16_t kMaxRings = 1024;
+/// What stands behind a landmark is looked at this far beyond the range of landmarks [m].
+constexpr double kMargin_m = 2.0;
+
+bool well_formed(const PointSweep& sweep) {
+  const bool has_frame = sweep.is_deskewed && sweep.sensor_position_m.allFinite() &&
+                         sweep.rings > 0 && sweep.rings <= kMaxRings;
+  if (!has_frame || !sweep.attitude) return has_frame;
+  const double norm = sweep.attitude->level_Q_vehicle.norm();
+  return std::abs(norm - 1.0) < 1e-3 && sweep.attitude->covariance_rad2.allFinite();
+}
+
+void sort_by_bearing(std::vector<Detection>& detections) {
+  const auto bearing = [](const Detection& detection) {
+    return std::atan2(detection.position_m.y(), detection.position_m.x());
+  };
+  std::stable_sort(detections.begin(), detections.end(),
+                   [&](const Detection& a, const Detection& b) {
+                     return a.kind != b.kind ? a.kind < b.kind : bearing(a) < bearing(b);
+                   });
+}
+
+}  // namespace
+
+LandmarkScan SweepExtractor::extract(const PointSweep& sweep) {
+  LandmarkScan result;
+  result.utime = sweep.utime;
+  result.sequence = sweep.sequence;
+  ++counters_.sweeps;
+  if (!well_formed(sweep)) {
+    ++counters_.malformed;
+    return result;
+  }
+  result.field_of_view.max_range_m = sweep_.max_range_m;
+  Eigen::Matrix2d level_covariance =
+      sweep_.level_sigma_rad * sweep_.level_sigma_rad * Eigen::Matrix2d::Identity();
+  if (sweep.attitude) level_covariance = sweep.attitude->covariance_rad2;
+  if (!sweep.attitude) ++counters_.without_attitude;
+  const double reach = sweep_.max_range_m + kMargin_m;
+  cloud_.fill(sweep, sweep_.min_range_m, reach, counters_.points);
+  ground_.fit(cloud_.points(), cloud_.sensor_m().head<2>(), static_cast<float>(reach));
+  find_runs(cloud_, sweep_, runs_);
+  trunks_.find(cloud_, runs_, ground_, level_covariance, result.detections);
+  counters_.trunks = trunks_.counters();
+  sort_by_bearing(result.detections);
+  return result;
+}
+
+}  // namespace understory

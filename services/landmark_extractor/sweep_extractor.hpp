@@ -1,0 +1,44 @@
+// Finds the landmarks in one turn of a laser that scans in space.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/model/landmarks.hpp"
+#include "common/model/point_sweep.hpp"
+#include "services/landmark_extractor/ground_surface.hpp"
+#include "services/landmark_extractor/parameters.hpp"
+#include "services/landmark_extractor/ring_runs.hpp"
+#include "services/landmark_extractor/sweep_trunks.hpp"
+
+namespace understory {
+
+/// What came in and what became of it; counted for HEALTH.
+struct SweepCounters {
+  std::uint64_t sweeps = 0;
+  std::uint64_t malformed = 0;         ///< No rings, not de-skewed, numbers that are none.
+  std::uint64_t without_attitude = 0;  ///< Taken as level.
+  PointCounters points;
+  TrunkCounters trunks;
+};
+
+/// Keeps its working memory from sweep to sweep.
+class SweepExtractor {
+ public:
+  explicit SweepExtractor(const LandmarkExtractorParameters& parameters)
+      : sweep_(parameters.sweep), trunks_(parameters.sweep, parameters.trunk) {}
+
+  /// A malformed sweep gives no detections. Invariant: trunks first, each kind in order of bearing.
+  LandmarkScan extract(const PointSweep& sweep);
+  const SweepCounters& counters() const { return counters_; }
+
+ private:
+  SweepParameters sweep_;
+  RingCloud cloud_;
+  GroundSurface ground_;
+  std::vector<Run> runs_;
+  SweepTrunks trunks_;
+  SweepCounters counters_;
+};
+
+}  // namespace understory

@@ -1,0 +1,105 @@
+#include "services/landmark_extractor/trunk_columns.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+constexpr float kCell_m = 0.5F;
+constexpr int kRounds = 3;
+
+Eigen::Vector2f mean_centre(const std::vector<Run>& runs, const std::vector<std::uint32_t>& at) {
+  Eigen::Vector2f sum = Eigen::Vector2f::Zero();
+  float weight = 0.0F;
+  for (const std::uint32_t i : at) {
+    const auto w = static_cast<float>(runs[i].size());
+    sum += w * Eigen::Vector2f(runs[i].x_m, runs[i].y_m);
+    weight += w;
+  }
+  return sum / weight;
+}
+
+bool may_be_a_slice(const Run& run, const SweepTrunkParameters& parameters) {
+  return run.stands_alone() && run.width_m < 2.2 * parameters.max_radius_m;
+}
+
+}  // namespace
+
+std::size_t ColumnFinder::cell(float coordinate, float corner) const {
+  return static_cast<std::size_t>(
+      std::clamp((coordinate - corner) / kCell_m, 0.0F, static_cast<float>(side_ - 1)));
+}
+
+void ColumnFinder::fill_grid(const std::vector<Run>& runs, const SweepTrunkParameters& parameters) {
+  heads_.assign(side_ * side_, -1);
+  next_.assign(runs.size(), -1);
+  order_.clear();
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (!may_be_a_slice(runs[i], parameters)) continue;
+    order_.push_back(static_cast<std::uint32_t>(i));
+    std::int32_t& head =
+        heads_[cell(runs[i].y_m, corner_y_) * side_ + cell(runs[i].x_m, corner_x_)];
+    next_[i] = head;
+    head = static_cast<std::int32_t>(i);
+  }
+  std::stable_sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return runs[a].size() > runs[b].size();
+  });
+}
+
+void ColumnFinder::gather(const std::vector<Run>& runs, const Eigen::Vector2f& axis, float radius) {
+  gathered_.clear();
+  const std::size_t last_i = cell(axis.x() + radius, corner_x_);
+  const std::size_t last_j = cell(axis.y() + radius, corner_y_);
+  for (std::size_t j = cell(axis.y() - radius, corner_y_); j <= last_j; ++j) {
+    for (std::size_t i = cell(axis.x() - radius, corner_x_); i <= last_i; ++i) {
+      for (std::int32_t k = heads_[j * side_ + i]; k >= 0; k = next_[static_cast<std::size_t>(k)]) {
+        const auto index = static_cast<std::size_t>(k);
+        const Eigen::Vector2f offset = Eigen::Vector2f(runs[index].x_m, runs[index].y_m) - axis;
+        if (!taken_[index] && offset.squaredNorm() <= radius * radius) {
+          gathered_.push_back(static_cast<std::uint32_t>(k));
+        }
+      }
+    }
+  }
+}
+
+const std::vector<Column>& ColumnFinder::find(const std::vector<Run>& runs,
+                                              const SweepTrunkParameters& parameters,
+                                              const Eigen::Vector2f& centre_m, float reach_m) {
+  corner_x_ = centre_m.x() - reach_m;
+  corner_y_ = centre_m.y() - reach_m;
+  side_ = static_cast<std::size_t>(std::ceil(2.0F * reach_m / kCell_m)) + 1;
+  taken_.assign(runs.size(), false);
+  columns_.clear();
+  fill_grid(runs, parameters);
+  for (const std::uint32_t seed : order_) {
+    if (taken_[seed]) continue;
+    Eigen::Vector2f axis(runs[seed].x_m, runs[seed].y_m);
+    // Half hidden slices of a thick trunk seem farther apart than whole slices of a thin one.
+    const float radius =
+        static_cast<float>(parameters.gather_radius_m) + 0.25F * runs[seed].width_m;
+    for (int round = 0; round < kRounds; ++round) {
+      gather(runs, axis, radius);
+      if (gathered_.empty()) break;
+      axis = mean_centre(runs, gathered_);
+    }
+    taken_[seed] = true;
+    if (gathered_.empty()) continue;
+    Column column;
+    column.centre_m = axis.cast<double>();
+    for (const std::uint32_t i : gathered_) {
+      taken_[i] = true;
+      column.points += runs[i].size();
+    }
+    column.runs = gathered_;
+    std::sort(column.runs.begin(), column.runs.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return runs[a].z_m < runs[b].z_m || (runs[a].z_m == runs[b].z_m && a < b);
+    });
+    columns_.push_back(std::move(column));
+  }
+  return columns_;
+}
+
+}  // namespace understory

@@ -1,0 +1,44 @@
+// Gathers runs of several rings that stand one above the other.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "services/landmark_extractor/parameters.hpp"
+#include "services/landmark_extractor/ring_runs.hpp"
+
+namespace understory {
+
+/// Runs that may be slices of one trunk: indices, in order of height.
+struct Column {
+  std::vector<std::uint32_t> runs;
+  Eigen::Vector2d centre_m = Eigen::Vector2d::Zero();  ///< Mean of the runs' centres.
+  std::size_t points = 0;
+};
+
+/// Keeps its memory from sweep to sweep.
+class ColumnFinder {
+ public:
+  /// Greedy: the run with most points first; each takes the free runs around its vertical, once
+  /// more around their mean. Runs wider than a trunk or with neighbours that touch them stay out.
+  const std::vector<Column>& find(const std::vector<Run>& runs,
+                                  const SweepTrunkParameters& parameters,
+                                  const Eigen::Vector2f& centre_m, float reach_m);
+
+ private:
+  void fill_grid(const std::vector<Run>& runs, const SweepTrunkParameters& parameters);
+  std::size_t cell(float coordinate, float corner) const;
+  void gather(const std::vector<Run>& runs, const Eigen::Vector2f& axis, float radius);
+
+  float corner_x_ = 0.0F;
+  float corner_y_ = 0.0F;
+  std::size_t side_ = 0;
+  std::vector<std::int32_t> heads_;  ///< First run per cell, -1 = none.
+  std::vector<std::int32_t> next_;   ///< Next run in the same cell.
+  std::vector<std::uint32_t> order_;
+  std::vector<bool> taken_;
+  std::vector<std::uint32_t> gathered_;
+  std::vector<Column> columns_;
+};
+
+}  // namespace understory
