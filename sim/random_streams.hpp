@@ -7,7 +7,13 @@
 
 namespace understory::sim {
 
-enum class Stream : std::uint64_t { kForest = 1, kStartPose = 2, kObservation = 3, kOther = 4 };
+enum class Stream : std::uint64_t {
+  kForest = 1,
+  kStartPose = 2,
+  kObservation = 3,
+  kOther = 4,
+  kScenery = 5
+};
 
 /// The generator of `stream` number `index` of simulation `seed` (mixed by splitmix64).
 inline std::mt19937_64 random_stream(std::uint64_t seed, Stream stream, std::uint64_t index = 0) {

@@ -1,0 +1,45 @@
+// A forest to drive through with real sensors: trunks with shape, what hangs on them, undergrowth.
+#pragma once
+
+#include <Eigen/Core>
+#include <random>
+#include <span>
+
+#include "sim/forest.hpp"
+#include "sim/ground.hpp"
+#include "sim/world.hpp"
+
+namespace understory::sim {
+
+struct ForestWorldParameters {
+  GroundParameters ground{.slope = {0.03, -0.02}, .relief_m = 0.5, .roughness_m = 0.025};
+  double radius_median_m = 0.14;   ///< At breast height, where the forest knows none.
+  double radius_log_sigma = 0.45;  ///< Of the logarithm.
+  double least_radius_m = 0.05;
+  double greatest_radius_m = 0.5;
+  double taper = 0.008;          ///< Mean loss of radius per metre.
+  double lean_sigma_rad = 0.03;  ///< Per axis.
+  double crown_base_m = 4.0;     ///< Mean height where the leaves begin; +- 30 %.
+  double crown_density_per_m = 0.5;
+  double branches_per_trunk = 2.0;  ///< Dead ones below the crown.
+  double bushes_per_hectare = 80.0;
+  double bush_density_per_m = 2.5;
+  int people = 0;            ///< Who walk about along the way.
+  double clearance_m = 2.0;  ///< Nothing grows nearer than this to the way.
+};
+
+/// The forest's trunks (but those on the way, `way_m`: points a metre or so apart) with crowns and
+/// branches, bushes and people between them. Trunk i of World::trunks() is the i-th that was kept.
+World make_forest_world(const Forest& forest, const ForestWorldParameters& parameters,
+                        std::span<const Eigen::Vector2d> way_m, std::mt19937_64& random);
+
+/// A trunk with crown and branches; `crown_base_m` above the ground. (For streets and fields too.)
+void plant_tree(World& world, const Eigen::Vector2d& at_m, double radius_m, double crown_base_m,
+                const ForestWorldParameters& parameters, std::mt19937_64& random);
+/// A bush, low and round, that stands on the ground.
+void plant_bush(World& world, const Eigen::Vector2d& at_m, double density_per_m,
+                std::mt19937_64& random);
+/// Radius at breast height of a random trunk.
+double draw_radius_m(const ForestWorldParameters& parameters, std::mt19937_64& random);
+
+}  // namespace understory::sim

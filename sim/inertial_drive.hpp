@@ -1,0 +1,105 @@
+// A smooth drive through trunks with inertial and wheel odometry, scan by scan: what the front
+// end's filters take, without sweeps.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "common/model/landmarks.hpp"
+#include "common/model/odometry.hpp"
+#include "sim/forest.hpp"
+#include "sim/point_grid.hpp"
+
+namespace understory::sim {
+
+/// Trunks that several drives share.
+struct TrunkField {
+  Forest forest;
+  std::unique_ptr<PointGrid> grid;
+};
+TrunkField make_trunk_field(const ForestParameters& parameters, std::uint64_t seed);
+
+enum class OdometryKind {
+  kInertial,           ///< IMU only.
+  kWheels,             ///< Wheels only.
+  kInertialAndWheels,  ///< Both in one piece.
+  kNone
+};
+
+struct InertialDriveParameters {
+  double standing_s = 10.0;  ///< At the start.
+  double speed_mps = 5.0;
+  double speed_swing = 0.2;        ///< Speed goes up and down by this share of it.
+  double acceleration_mps2 = 1.5;  ///< At most, while starting.
+  double loop_length_m = 1200.0;   ///< The path goes round and round, to the left.
+  double wiggle_curvature = 0.03;  ///< [1/m] Of the bends on it.
+  double wiggle_length_m = 60.0;   ///< From bend to bend of the same side.
+  double scan_interval_s = 0.1;
+  int samples_per_scan = 10;  ///< Of the IMU.
+  OdometryKind odometry = OdometryKind::kInertial;
+  double gyro_noise = 2e-4;                ///< [rad/s/sqrt(Hz)]
+  double accelerometer_noise = 5e-3;       ///< [m/s^2/sqrt(Hz)] The level's noise included.
+  double gyro_bias_sigma = 2e-3;           ///< [rad/s]
+  double accelerometer_bias_sigma = 0.05;  ///< [m/s^2]
+  double gyro_walk = 1e-5;                 ///< [rad/s/sqrt(s)]
+  double accelerometer_walk = 1e-3;        ///< [m/s^2/sqrt(s)]
+  double wheel_sigma_m = 0.01;             ///< Per axis of a piece's translation.
+  double wheel_sigma_rad = 0.002;          ///< Of a piece's turn, without an IMU.
+  double dead_reckoning_sigma_mps =
+      0.3;  ///< Of `from_T_to` where nothing but the IMU is behind it.
+  double range_m = 40.0;
+  double detection_probability = 0.9;
+  double position_sigma_m = 0.1;  ///< Per axis.
+  double clutter_share = 0.0;     ///< False detections, as a share of the true ones expected.
+};
+
+/// Everything between two scans, and the scan.
+struct DriveStep {
+  std::vector<Odometry> odometry;  ///< Ends at the scan.
+  LandmarkScan scan;
+  std::vector<std::int64_t> trunks;  ///< Behind each detection; -1 = clutter.
+  SE2 world_T_vehicle;
+  Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Frame world.
+  InertialBias bias = InertialBias::Zero();
+  double driven_m = 0.0;
+};
+
+/// Made step by step, so a drive of any length costs no memory. The IMU's truth is integrated as
+/// `Preintegration` integrates its samples: the odometry carries noise and biases and no other
+/// error.
+class InertialDrive {
+ public:
+  /// `world` must outlive the drive.
+  InertialDrive(const InertialDriveParameters& parameters, const TrunkField& world,
+                std::uint64_t seed);
+  /// The first call gives the scan at time zero, without odometry.
+  DriveStep next();
+
+ private:
+  struct Tick {
+    double yaw_rad = 0.0;
+    Eigen::Vector2d acceleration_mps2 = Eigen::Vector2d::Zero();  ///< Mid-turn body frame.
+  };
+  Tick advance(double dt);
+  Odometry drive_piece();
+  void observe(DriveStep& step);
+  double normal() { return normal_(random_); }
+
+  InertialDriveParameters parameters_;
+  const TrunkField& world_;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+  std::uint64_t scans_ = 0;
+  double time_s_ = 0.0;
+  double speed_mps_ = 0.0;
+  double driven_m_ = 0.0;
+  double phase_ = 0.0;
+  double theta_ = 0.0;
+  Eigen::Vector2d position_ = Eigen::Vector2d::Zero();
+  Eigen::Vector2d velocity_ = Eigen::Vector2d::Zero();
+  InertialBias bias_ = InertialBias::Zero();
+};
+
+}  // namespace understory::sim

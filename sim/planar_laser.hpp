@@ -1,0 +1,50 @@
+// A laser scanner that sees one plane.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <numbers>
+#include <vector>
+
+#include "common/model/planar_scan.hpp"
+#include "sim/ray_caster.hpp"
+#include "sim/vehicle_motion.hpp"
+
+namespace understory::sim {
+
+/// As the SICK LMS of Victoria Park, if a little faster. The turn of its mirror takes 13 ms, in
+/// which the car moves by centimetres: a scan is taken at once.
+struct PlanarLaserParameters {
+  int beams = 361;
+  double first_bearing_rad = -0.5 * std::numbers::pi;
+  double bearing_step_rad = std::numbers::pi / 360.0;
+  double rate_hz = 10.0;
+  double range_sigma_m = 0.02;
+  double max_range_m = 80.0;
+  double drop_out = 0.005;
+  Eigen::Isometry3d vehicle_T_sensor = Eigen::Isometry3d(Eigen::Translation3d(3.6, 0.0, 0.8));
+};
+
+struct SimulatedPlanarScan {
+  PlanarScan scan;                ///< Beams without a return have max_range_m.
+  std::vector<ObjectId> objects;  ///< Per beam; the ground's where there is no return.
+  std::vector<std::uint8_t> is_return;
+};
+
+class PlanarLaser {
+ public:
+  /// `world` must outlive the sensor and stay as it is.
+  PlanarLaser(const World& world, const PlanarLaserParameters& parameters, std::uint64_t seed);
+
+  double time_s(std::uint64_t k) const { return static_cast<double>(k) / parameters_.rate_hz; }
+  /// Scan number k, at time_s(k) of the drive.
+  SimulatedPlanarScan scan(const VehicleMotion& motion, std::uint64_t k, Utime utime_of_start = 0);
+
+ private:
+  const World& world_;
+  PlanarLaserParameters parameters_;
+  std::uint64_t seed_;
+  RayCaster caster_;
+};
+
+}  // namespace understory::sim

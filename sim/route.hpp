@@ -1,0 +1,41 @@
+// A smooth way through the plane.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "common/geometry/se2.hpp"
+#include "sim/uniform_spline.hpp"
+
+namespace understory::sim {
+
+/// A curve by its length, smooth enough to be driven: curvature and its change are continuous.
+class Route {
+ public:
+  /// Through `way_points_m`, corners rounded over about 3 * `rounding_m` (the radius of a right
+  /// angle is then about that) and measurement noise smoothed away. Straight beyond its ends.
+  /// Throws std::runtime_error where the points do not give a way of at least 1 m.
+  static Route through(std::span<const Eigen::Vector2d> way_points_m, double rounding_m);
+
+  double length_m() const { return length_m_; }
+  struct Place {
+    Eigen::Vector2d position_m;
+    double heading_rad;
+    double curvature;  ///< Left positive [1/m].
+  };
+  /// `along_m` is clamped to the route.
+  Place at(double along_m) const;
+  SE2 pose(double along_m) const;
+  /// Places every `spacing_m`, the end included.
+  std::vector<Eigen::Vector2d> places(double spacing_m) const;
+  /// The route moved by `world_T_route`.
+  Route moved(const SE2& world_T_route) const;
+
+ private:
+  UniformSpline<2> curve_;
+  double start_ = 0.0;  ///< Parameter where the route begins: control points extend beyond.
+  double length_m_ = 0.0;
+};
+
+}  // namespace understory::sim

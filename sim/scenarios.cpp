@@ -1,0 +1,58 @@
+#include "sim/scenarios.hpp"
+
+#include <algorithm>
+#include <memory>
+
+#include "sim/random_streams.hpp"
+
+namespace understory::sim {
+namespace {
+
+constexpr double kRounding = 4.0;
+
+std::vector<Eigen::Vector2d> way_points(const ForestScenarioParameters& parameters) {
+  PathParameters path;
+  path.kind = parameters.path;
+  path.length_m = parameters.length_m;
+  path.interval = 0.5;
+  const std::vector<SE2> poses = make_path(path);
+  std::vector<Eigen::Vector2d> points;
+  for (int lap = 0; lap < parameters.laps; ++lap) {
+    for (const SE2& pose : poses) points.push_back(pose.translation());
+  }
+  if (parameters.laps > 1) points.push_back(poses.front().translation());
+  return points;
+}
+
+Scenario in_forest(const ForestScenarioParameters& parameters, const Forest& forest,
+                   const Route& route, std::uint64_t seed) {
+  std::mt19937_64 random = random_stream(seed, Stream::kScenery);
+  const std::vector<Eigen::Vector2d> way = route.places(0.5);
+  return {std::make_shared<const World>(make_forest_world(forest, parameters.world, way, random)),
+          route};
+}
+
+}  // namespace
+
+Scenario forest_scenario(const ForestScenarioParameters& parameters, std::uint64_t seed) {
+  const Route route = Route::through(way_points(parameters), kRounding);
+  Eigen::Vector2d low = route.at(0.0).position_m;
+  Eigen::Vector2d high = low;
+  for (const Eigen::Vector2d& p : route.places(1.0)) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  ForestParameters forest = parameters.forest;
+  forest.side_m = (high - low).maxCoeff() + 2.0 * parameters.margin_m;
+  std::mt19937_64 random = random_stream(seed, Stream::kForest);
+  const Eigen::Vector2d shift = Eigen::Vector2d::Constant(0.5 * forest.side_m) - 0.5 * (low + high);
+  return in_forest(parameters, make_forest(forest, random), route.moved({shift, 0.0}), seed);
+}
+
+Scenario forest_scenario(const ForestScenarioParameters& parameters, const Forest& forest,
+                         const SE2& world_T_start, std::uint64_t seed) {
+  const Route route = Route::through(way_points(parameters), kRounding);
+  return in_forest(parameters, forest, route.moved(world_T_start), seed);
+}
+
+}  // namespace understory::sim

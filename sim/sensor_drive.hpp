@@ -1,0 +1,91 @@
+// A drive with all its sensors, reading by reading.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <variant>
+
+#include "sim/motion_sensors.hpp"
+#include "sim/planar_laser.hpp"
+#include "sim/route.hpp"
+#include "sim/spinning_lidar.hpp"
+#include "sim/vehicle_motion.hpp"
+#include "sim/world.hpp"
+
+namespace understory::sim {
+
+/// What the vehicle carries; none = not there.
+struct SensorSuite {
+  std::optional<ImuParameters> imu = ImuParameters{};
+  std::optional<WheelParameters> wheels = WheelParameters{};
+  std::optional<GnssParameters> gnss = GnssParameters{};
+  std::optional<LidarParameters> lidar = LidarParameters{};
+  std::optional<PlanarLaserParameters> planar_laser;
+  double truth_rate_hz = 50.0;
+};
+
+struct TruePose {
+  Utime utime = 0;
+  std::uint64_t sequence = 0;
+  VehicleState state;
+};
+
+using SensorReading =
+    std::variant<TruePose, ImuSample, WheelSample, GnssFix, SimulatedPlanarScan, SimulatedSweep>;
+
+/// A world and a way through it.
+struct Scenario {
+  std::shared_ptr<const World> world;
+  Route route;
+};
+
+/// Readings are made when asked for, in order of the time at which each is complete (a sweep when
+/// its turn ends): a drive of any length costs no memory for them. Same arguments, same readings.
+class SensorDrive {
+ public:
+  SensorDrive(Scenario scenario, const VehicleParameters& vehicle, const SpeedParameters& speed,
+              SensorSuite suite, std::uint64_t seed, Utime utime_of_start = 0);
+  SensorDrive(Scenario scenario, const SpeedParameters& speed, SensorSuite suite,
+              std::uint64_t seed)
+      : SensorDrive(std::move(scenario), VehicleParameters{}, speed, std::move(suite), seed) {}
+
+  /// The next reading; none at the end of the drive.
+  std::optional<SensorReading> next();
+
+  const World& world() const { return *scenario_.world; }
+  const Route& route() const { return scenario_.route; }
+  const VehicleMotion& motion() const { return motion_; }
+  const SensorSuite& suite() const { return suite_; }
+  /// State of the vehicle at the time of a reading.
+  VehicleState state_at(Utime utime) const {
+    return motion_.at(1e-6 * static_cast<double>(utime - utime_of_start_));
+  }
+  /// Any turn of the lidar (which there must be), the same whether or not next() gave it.
+  SimulatedSweep sweep(std::uint64_t turn) { return lidar_->sweep(motion_, turn, utime_of_start_); }
+  std::uint64_t sweep_count() const;
+
+ private:
+  enum class Source { kTruth, kImu, kWheels, kGnss, kPlanarLaser, kLidar };
+  struct Due {
+    double time_s;
+    Source source;
+  };
+  Due next_due() const;
+  std::optional<SensorReading> read(Source source);
+
+  Scenario scenario_;
+  SensorSuite suite_;
+  Utime utime_of_start_;
+  VehicleMotion motion_;
+  std::optional<SimulatedImu> imu_;
+  std::optional<SimulatedWheels> wheels_;
+  std::optional<SimulatedGnss> gnss_;
+  std::unique_ptr<PlanarLaser> planar_laser_;
+  std::unique_ptr<SpinningLidar> lidar_;
+  std::uint64_t truths_ = 0;
+  std::uint64_t scans_ = 0;
+  std::uint64_t turns_ = 0;
+};
+
+}  // namespace understory::sim

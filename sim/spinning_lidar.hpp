@@ -1,0 +1,79 @@
+// A laser scanner that turns: many beams, one above the other, all around.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <functional>
+#include <numbers>
+#include <vector>
+
+#include "common/model/point_sweep.hpp"
+#include "sim/ray_caster.hpp"
+#include "sim/vehicle_motion.hpp"
+#include "sim/world.hpp"
+
+namespace understory::sim {
+
+enum class LidarModel { kVlp16, kVlp32, kHdl32, kHdl64 };
+/// Elevations of the beams, ascending [rad], from the makers' manuals.
+std::vector<double> beam_elevations_rad(LidarModel model);
+
+struct LidarParameters {
+  std::vector<double> elevations_rad = beam_elevations_rad(LidarModel::kVlp32);  ///< Ascending.
+  int columns = 1800;  ///< Firings per turn; all beams of a column fire at once.
+  double turns_per_s = 10.0;
+  bool clockwise = true;                        ///< Seen from above, as Velodyne's turn.
+  double first_bearing_rad = std::numbers::pi;  ///< Frame `sensor`; where a turn begins.
+  double range_sigma_m = 0.02;
+  double min_range_m = 0.8;
+  double max_range_m = 100.0;
+  double drop_out = 0.02;  ///< Share of returns lost by chance.
+  /// Greatest range at which half of the returns from a white, perpendicular surface come back;
+  /// dark and slanted ones are lost earlier (with the square root of what they reflect). 0 = no
+  /// loss.
+  double white_range_m = 220.0;
+  Eigen::Isometry3d vehicle_T_sensor = Eigen::Isometry3d(Eigen::Translation3d(1.2, 0.0, 1.9));
+
+  double turn_s() const { return 1.0 / turns_per_s; }
+};
+
+/// A turn as the sensor gives it, and what nobody but the simulator knows.
+struct SimulatedSweep {
+  PointSweep raw;                       ///< Frame `sensor`, skewed; utime of the first point.
+  std::vector<ObjectId> objects;        ///< What each point lies on.
+  std::vector<Eigen::Vector3f> true_m;  ///< Each point in `world`, without noise of range.
+};
+
+/// Pose of the vehicle in `world` at a time [s].
+using PoseAt = std::function<Eigen::Isometry3d(double time_s)>;
+
+class SpinningLidar {
+ public:
+  /// `world` must outlive the sensor and stay as it is.
+  SpinningLidar(const World& world, LidarParameters parameters, std::uint64_t seed);
+
+  /// Turn number `turn`, which begins at turn * turn_s() of the drive. Depends on nothing that was
+  /// asked before. `utime_of_start` is the utime of time 0.
+  SimulatedSweep sweep(const VehicleMotion& motion, std::uint64_t turn, Utime utime_of_start = 0);
+  SimulatedSweep sweep(const PoseAt& world_T_vehicle, std::uint64_t turn, Utime utime_of_start = 0);
+  /// As seen by a vehicle that stands at `world_T_vehicle`.
+  SimulatedSweep sweep_standing(const Eigen::Isometry3d& world_T_vehicle, std::uint64_t turn = 0);
+
+  const LidarParameters& parameters() const { return parameters_; }
+
+ private:
+  void add_column(int column, double time_s, const Eigen::Isometry3d& world_T_vehicle,
+                  std::uint64_t turn, SimulatedSweep& sweep);
+  bool is_lost(const RayHit& hit, double reflectivity, std::uint64_t luck) const;
+
+  const World& world_;
+  LidarParameters parameters_;
+  std::uint64_t seed_;
+  RayCaster caster_;
+  std::vector<Eigen::Vector2d> beams_;  ///< Cosine and sine of each elevation.
+  std::vector<Eigen::Vector3d> directions_;
+  std::vector<RayHit> hits_;
+};
+
+}  // namespace understory::sim

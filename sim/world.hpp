@@ -1,0 +1,116 @@
+// A simulated world in three dimensions: ground, and what stands on it.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sim/ground.hpp"
+#include "sim/shapes.hpp"
+
+namespace understory::sim {
+
+enum class ObjectClass : std::uint8_t {
+  kGround,
+  kTrunk,
+  kPole,    ///< Lamp post, traffic sign, fence post: round and upright as a trunk is.
+  kBranch,  ///< Dead branch on a trunk.
+  kCrown,
+  kBush,
+  kWall,  ///< Of a house; two of them meet in a corner.
+  kCar,
+  kPerson,
+};
+
+/// Index of an object in its world; the ground has none of its own.
+using ObjectId = std::uint32_t;
+inline constexpr ObjectId kGroundObject = 0xffffffffU;
+
+/// A place on a trunk (or pole) that a mapper should find.
+struct TrueTrunk {
+  ObjectId object = 0;
+  Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();  ///< Of the stem, 1.3 m above the ground.
+  double radius_m = 0.0;                               ///< There.
+};
+/// An upright edge of a house, where two walls meet.
+struct TrueCorner {
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
+  double ground_m = 0.0;
+  /// Direction of the bisector, out of the house, in `world`.
+  double bisector_rad = 0.0;
+  /// Between the walls, through the air: 3/2 pi at the outer corner of a square house.
+  double angle_rad = 0.0;
+  ObjectId wall_before = 0;  ///< Ends at the corner.
+  ObjectId wall_after = 0;   ///< Begins there.
+};
+
+/// Somebody who walks to and fro.
+struct Walker {
+  Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();  ///< Of the way, on the ground.
+  Eigen::Vector2d reach_m = Eigen::Vector2d::Zero();   ///< From the middle to the end; 0 = stands.
+  double speed_mps = 1.2;                              ///< Mean; turns gently at the ends.
+  double phase_rad = 0.0;
+  double radius_m = 0.22;
+  double height_m = 1.75;
+
+  Stem at(double time_s) const;
+};
+
+/// Everything in frame `world` (x east, y north, z up). Objects are added once and then fixed.
+class World {
+ public:
+  explicit World(Ground ground = {}) : ground_(std::move(ground)) {}
+
+  ObjectId add(ObjectClass kind, const Stem& stem);
+  ObjectId add(ObjectClass kind, const Foliage& foliage);
+  ObjectId add(ObjectClass kind, const Wall& wall);
+  ObjectId add(ObjectClass kind, const Box& box);
+  ObjectId add(const Walker& walker);
+  /// A trunk or pole whose centre 1.3 m above the ground at `breast_m` has radius `radius_m`;
+  /// rooted below the ground. `lean` is the horizontal part of its axis.
+  ObjectId add_trunk(ObjectClass kind, const Eigen::Vector2d& breast_m, double radius_m,
+                     double height_m, double taper = 0.0,
+                     const Eigen::Vector2d& lean = Eigen::Vector2d::Zero());
+  /// Walls around `footprint_m` (counter-clockwise), from below the ground to `height_m` above
+  /// the highest ground at a corner.
+  void add_house(std::span<const Eigen::Vector2d> footprint_m, double height_m);
+
+  const Ground& ground() const { return ground_; }
+  std::size_t object_count() const { return objects_.size(); }
+  ObjectClass kind(ObjectId object) const;
+  const Bounds& bounds(ObjectId object) const { return objects_[object].bounds; }
+  bool moves(ObjectId object) const { return objects_[object].shape == Shape::kWalker; }
+
+  std::span<const TrueTrunk> trunks() const { return trunks_; }
+  std::span<const TrueCorner> corners() const { return corners_; }
+
+  /// Where the ray meets the object at `time_s`. `luck` decides how far the ray gets through
+  /// foliage.
+  std::optional<SurfaceHit> meet_object(const Ray& ray, ObjectId object, double time_s,
+                                        std::uint64_t luck) const;
+
+ private:
+  enum class Shape : std::uint8_t { kStem, kFoliage, kWall, kBox, kWalker };
+  struct Object {
+    Bounds bounds;
+    ObjectClass kind = ObjectClass::kTrunk;
+    Shape shape = Shape::kStem;
+    std::uint32_t index = 0;  ///< Among the objects of its shape.
+  };
+  ObjectId add_object(ObjectClass kind, Shape shape, std::size_t index, const Bounds& bounds);
+
+  Ground ground_;
+  std::vector<Object> objects_;
+  std::vector<Stem> stems_;
+  std::vector<Foliage> foliages_;
+  std::vector<Wall> walls_;
+  std::vector<Box> boxes_;
+  std::vector<Walker> walkers_;
+  std::vector<TrueTrunk> trunks_;
+  std::vector<TrueCorner> corners_;
+};
+
+}  // namespace understory::sim
