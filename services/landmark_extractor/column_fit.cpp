@@ -3,14 +3,15 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace understory {
 namespace {
 
 /// More evidence than this costs time and adds nothing beyond the shape's own uncertainty.
-constexpr std::size_t kMaxRuns = 16;
-constexpr std::size_t kHitsPerRun = 12;
+constexpr std::size_t kMaxRuns = 12;
+constexpr std::size_t kHitsPerRun = 8;
 constexpr int kIterations = 8;
 /// Beams that graze the stem more than this (part of the radius) say little of its range.
 constexpr double kMaxGraze = 0.9;
@@ -74,14 +75,24 @@ Eigen::Vector3d circle_at(const Vector6d& state, double above) {
   return state.head<3>() + above * state.tail<3>();
 }
 
-void add(const Term& term, double above, Matrix6d& information, Vector6d& gradient) {
-  const double size = std::abs(term.normalised());
-  const double weight = (size > kHuber ? kHuber / size : 1.0) / square(term.sigma);
-  Vector6d jacobian;
-  jacobian << term.jacobian, above * term.jacobian;
-  information.noalias() += weight * jacobian * jacobian.transpose();
-  gradient.noalias() += weight * term.residual * jacobian;
-}
+/// Sums over residuals of the circle at their heights: information and gradient of the stem follow.
+struct Sums {
+  std::array<Eigen::Matrix3d, 3> information{Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero(),
+                                             Eigen::Matrix3d::Zero()};  ///< Times 1, h, h^2.
+  std::array<Eigen::Vector3d, 2> gradient{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+
+  void add(const Term& term, double above) {
+    const double size = std::abs(term.normalised());
+    const double weight = (size > kHuber ? kHuber / size : 1.0) / square(term.sigma);
+    const Eigen::Matrix3d outer = weight * term.jacobian * term.jacobian.transpose();
+    information[0] += outer;
+    information[1] += above * outer;
+    information[2] += square(above) * outer;
+    const Eigen::Vector3d pull = weight * term.residual * term.jacobian;
+    gradient[0] += pull;
+    gradient[1] += above * pull;
+  }
+};
 
 }  // namespace
 
@@ -179,19 +190,21 @@ Vector6d StemFitter::start(const RingCloud& cloud, const std::vector<Run>& runs)
 }
 
 void StemFitter::linearise(const Vector6d& state, Matrix6d& information, Vector6d& gradient) {
-  information.setZero();
-  gradient.setZero();
+  Sums sums;
   for (const Hit& hit : hits_) {
     const double above = hit.z_m - reference_z_m_;
-    add(hit_term(circle_at(state, above), hit.origin_m, hit.direction, hit.range_m, sweep_,
-                 trunk_.roundness_sigma_m),
-        above, information, gradient);
+    sums.add(hit_term(circle_at(state, above), hit.origin_m, hit.direction, hit.range_m, sweep_,
+                      trunk_.roundness_sigma_m),
+             above);
   }
   for (const Edge& edge : edges_) {
     const double above = edge.z_m - reference_z_m_;
-    add(edge_term(circle_at(state, above), edge.origin_m, edge.direction, edge.side, edge.sigma_m),
-        above, information, gradient);
+    sums.add(
+        edge_term(circle_at(state, above), edge.origin_m, edge.direction, edge.side, edge.sigma_m),
+        above);
   }
+  information << sums.information[0], sums.information[1], sums.information[1], sums.information[2];
+  gradient << sums.gradient[0], sums.gradient[1];
   const auto prior = [&](int at, double mean, double sigma) {
     information(at, at) += 1.0 / square(sigma);
     gradient[at] += (mean - state[at]) / square(sigma);

@@ -13,7 +13,7 @@ constexpr float kSmoothness = 0.1F;
 /// Keeps the matrix regular where there are no points at all.
 constexpr float kFlatness = 1e-3F;
 /// Scales [m] at which cells above the surface lose their weight, iteration by iteration.
-constexpr std::array<float, 4> kScales_m{1.0F, 0.5F, 0.25F, 0.2F};
+constexpr std::array<float, 3> kScales_m{1.0F, 0.4F, 0.2F};
 /// Returns so near the surface are ground.
 constexpr float kOnGround_m = 0.25F;
 /// Roughness: how far the ground at one place is from the returns around it.
@@ -31,10 +31,10 @@ float weight(float above_m, float scale_m) {
 }  // namespace
 
 std::size_t GroundSurface::cell(float x, float y) const {
-  const auto limit = static_cast<float>(cells_per_side_ - 1);
-  const auto i = static_cast<std::size_t>(std::clamp((x - corner_x_) / kCell_m, 0.0F, limit));
-  const auto j = static_cast<std::size_t>(std::clamp((y - corner_y_) / kCell_m, 0.0F, limit));
-  return j * cells_per_side_ + i;
+  const int limit = static_cast<int>(cells_per_side_) - 1;
+  const int i = std::clamp(static_cast<int>((x - corner_x_) / kCell_m), 0, limit);
+  const int j = std::clamp(static_cast<int>((y - corner_y_) / kCell_m), 0, limit);
+  return static_cast<std::size_t>(j * (limit + 1) + i);
 }
 
 void GroundSurface::fit(std::span<RingPoint> points, const Eigen::Vector2f& centre_m,
@@ -79,7 +79,7 @@ void GroundSurface::add_smoothness() {
     for (std::size_t a = 0; a < at.size(); ++a) {
       for (std::size_t b = 0; b < at.size(); ++b) {
         if (at[b] <= at[a]) {
-          smoothness_[at[a] * band_ + (at[a] - at[b])] += w * factors[a] * factors[b];
+          smoothness_[at[b] * band_ + (at[a] - at[b])] += w * factors[a] * factors[b];
         }
       }
     }
@@ -121,40 +121,38 @@ void GroundSurface::add_cells(float scale_m, bool weigh) {
       for (std::size_t c = 0; c < 4; ++c) {
         right_[at[c]] += w * share[c] * z;
         for (std::size_t d = 0; d <= c; ++d) {
-          matrix_[at[c] * band_ + (at[c] - at[d])] += w * share[c] * share[d];
+          matrix_[at[d] * band_ + (at[c] - at[d])] += w * share[c] * share[d];
         }
       }
     }
   }
 }
 
-/// Cholesky factor of a banded matrix in place, then both substitutions.
+/// Cholesky factor of a banded matrix in place (column by column, each updates those after it),
+/// then both substitutions.
 void GroundSurface::solve() {
   const std::size_t n = nodes_.size();
-  for (std::size_t i = 0; i < n; ++i) {
-    float* row = &matrix_[i * band_];
-    const std::size_t first = i >= band_ ? i - band_ + 1 : 0;
-    for (std::size_t j = first; j <= i; ++j) {
-      const float* other = &matrix_[j * band_];
-      const std::size_t from = std::max(first, j >= band_ ? j - band_ + 1 : 0);
-      float sum = row[i - j];
-      for (std::size_t k = from; k < j; ++k) sum -= row[i - k] * other[j - k];
-      row[i - j] = j < i ? sum / other[0] : std::sqrt(std::max(sum, 1e-9F));
+  for (std::size_t j = 0; j < n; ++j) {
+    float* column = &matrix_[j * band_];
+    const std::size_t reach = std::min(band_, n - j);
+    const float scale = 1.0F / std::sqrt(std::max(column[0], 1e-9F));
+    for (std::size_t k = 0; k < reach; ++k) column[k] *= scale;
+    for (std::size_t k = 1; k < reach; ++k) {
+      float* other = &matrix_[(j + k) * band_];
+      const float factor = column[k];
+      for (std::size_t t = 0; t < reach - k; ++t) other[t] -= factor * column[k + t];
     }
   }
-  for (std::size_t i = 0; i < n; ++i) {
-    float sum = right_[i];
-    for (std::size_t k = i >= band_ ? i - band_ + 1 : 0; k < i; ++k) {
-      sum -= matrix_[i * band_ + (i - k)] * nodes_[k];
-    }
-    nodes_[i] = sum / matrix_[i * band_];
+  nodes_ = right_;
+  for (std::size_t j = 0; j < n; ++j) {
+    const float* column = &matrix_[j * band_];
+    nodes_[j] /= column[0];
+    for (std::size_t k = 1; k < std::min(band_, n - j); ++k) nodes_[j + k] -= column[k] * nodes_[j];
   }
-  for (std::size_t i = n; i-- > 0;) {
-    float sum = nodes_[i];
-    for (std::size_t k = i + 1; k < std::min(n, i + band_); ++k) {
-      sum -= matrix_[k * band_ + (k - i)] * nodes_[k];
-    }
-    nodes_[i] = sum / matrix_[i * band_];
+  for (std::size_t j = n; j-- > 0;) {
+    const float* column = &matrix_[j * band_];
+    for (std::size_t k = 1; k < std::min(band_, n - j); ++k) nodes_[j] -= column[k] * nodes_[j + k];
+    nodes_[j] /= column[0];
   }
 }
 

@@ -27,11 +27,12 @@ class GroundSurface {
   float height(float x, float y) const {
     const float u = std::clamp((x - corner_x_) / kNodeSpacing_m, 0.0F, node_limit_);
     const float v = std::clamp((y - corner_y_) / kNodeSpacing_m, 0.0F, node_limit_);
-    const auto i = static_cast<std::size_t>(u);
-    const auto j = static_cast<std::size_t>(v);
+    const int i = static_cast<int>(u);
+    const int j = static_cast<int>(v);
     const float a = u - static_cast<float>(i);
     const float b = v - static_cast<float>(j);
-    const float* low = &nodes_[j * nodes_per_side_ + i];
+    const float* low =
+        &nodes_[static_cast<std::size_t>(j) * nodes_per_side_ + static_cast<std::size_t>(i)];
     const float* high = low + nodes_per_side_;
     return (1.0F - b) * ((1.0F - a) * low[0] + a * low[1]) +
            b * ((1.0F - a) * high[0] + a * high[1]);
@@ -64,7 +65,7 @@ class GroundSurface {
   std::vector<float> nodes_;
   std::vector<float> lowest_;  ///< Per cell; infinity = no return.
   std::vector<Residual> residuals_;
-  std::vector<float> smoothness_;  ///< Lower band of the normal matrix, row by row.
+  std::vector<float> smoothness_;  ///< Lower band of the normal matrix, by columns.
   std::vector<float> matrix_;
   std::vector<float> right_;
 };

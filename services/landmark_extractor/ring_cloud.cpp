@@ -11,6 +11,8 @@ constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kTurn = 2.0F * kPi;
 /// Where one return is so much nearer or farther than its neighbour, a ring may be cut.
 constexpr float kCut_m = 1.0F;
+/// Above or below the vehicle: nothing on the ground is so far up [m].
+constexpr float kHighest_m = 1000.0F;
 
 /// atan2 to 1e-5 rad without a branch on the data (polynomial of least maximum error).
 float fast_atan2(float y, float x) {
@@ -28,7 +30,11 @@ float fast_atan2(float y, float x) {
   return y < 0.0F ? -angle : angle;
 }
 
-float wrapped(float angle) { return angle - kTurn * std::floor(angle / kTurn + 0.5F); }
+/// Of a difference between two angles in (-pi, pi].
+float wrapped(float angle) {
+  if (angle > kPi) return angle - kTurn;
+  return angle < -kPi ? angle + kTurn : angle;
+}
 
 }  // namespace
 
@@ -40,65 +46,88 @@ Eigen::Vector2d RingPoint::origin() const {
 
 void RingCloud::fill(const PointSweep& sweep, double min_range_m, double max_range_m,
                      PointCounters& counters) {
+  reserve_rings(sweep, counters);
+  scatter(sweep, min_range_m, max_range_m, counters);
+  begins_.assign(sweep.rings + std::size_t{1}, 0);
+  for (std::size_t ring = 0; ring < sweep.rings; ++ring) {
+    begins_[ring + 1] = begins_[ring] + (next_[ring] - slots_[ring]);
+  }
+  points_.resize(begins_.back());
+  steps_.assign(sweep.rings, 0.0F);
+  for (std::size_t ring = 0; ring < sweep.rings; ++ring) {
+    order_ring(ring);
+    measure_step(ring);
+  }
+}
+
+void RingCloud::reserve_rings(const PointSweep& sweep, PointCounters& counters) {
+  slots_.assign(sweep.rings + std::size_t{1}, 0);
+  for (const SweepPoint& point : sweep.points) {
+    if (point.ring < sweep.rings) {
+      ++slots_[point.ring + std::size_t{1}];
+    } else {
+      ++counters.bad_ring;
+    }
+  }
+  for (std::size_t ring = 0; ring < sweep.rings; ++ring) slots_[ring + 1] += slots_[ring];
+  next_.assign(slots_.begin(), slots_.end() - 1);
+  scattered_.resize(slots_.back());
+}
+
+void RingCloud::scatter(const PointSweep& sweep, double min_range_m, double max_range_m,
+                        PointCounters& counters) {
   const Eigen::Matrix3f level_R_vehicle =
       sweep.attitude
           ? Eigen::Matrix3f(sweep.attitude->level_Q_vehicle.toRotationMatrix().cast<float>())
           : Eigen::Matrix3f(Eigen::Matrix3f::Identity());
   sensor_ = level_R_vehicle * sweep.sensor_position_m.cast<float>();
-  steps_.assign(sweep.rings, 0.0F);
-  begins_.assign(sweep.rings + std::size_t{1}, 0);
-  kept_.clear();
-  kept_rings_.clear();
   const auto nearest2 = static_cast<float>(min_range_m * min_range_m);
   const auto farthest2 = static_cast<float>(max_range_m * max_range_m);
   for (const SweepPoint& point : sweep.points) {
+    if (point.ring >= sweep.rings) continue;
     const Eigen::Vector3f p = level_R_vehicle * point.position();
     const float x = p.x() - sensor_.x();
     const float y = p.y() - sensor_.y();
     const float range2 = x * x + y * y;
-    if (!(range2 >= nearest2 && range2 <= farthest2) || !std::isfinite(p.z())) {
+    // A coordinate that is no number makes all of p none.
+    if (!(range2 >= nearest2 && range2 <= farthest2 && std::abs(p.z()) < kHighest_m)) {
       if (!p.allFinite()) ++counters.not_finite;
       continue;
     }
-    if (point.ring >= sweep.rings) {
-      ++counters.bad_ring;
-      continue;
-    }
-    kept_.push_back({p.x(), p.y(), p.z(), fast_atan2(y, x), std::sqrt(range2), 0.0F});
-    kept_rings_.push_back(point.ring);
-    ++begins_[point.ring + std::size_t{1}];
+    scattered_[next_[point.ring]++] = {p.x(), p.y(), p.z(), fast_atan2(y, x), std::sqrt(range2),
+                                       0.0F};
   }
-  sort_into_rings(sweep);
 }
 
-void RingCloud::sort_into_rings(const PointSweep& sweep) {
-  for (std::size_t ring = 0; ring < sweep.rings; ++ring) begins_[ring + 1] += begins_[ring];
-  points_.resize(kept_.size());
-  std::vector<std::size_t>& next = begins_;  // Shifted by one ring while it is used as a cursor.
-  for (std::size_t i = 0; i < kept_.size(); ++i) points_[next[kept_rings_[i]]++] = kept_[i];
-  for (std::size_t ring = sweep.rings; ring > 0; --ring) begins_[ring] = begins_[ring - 1];
-  begins_[0] = 0;
-  for (std::size_t ring = 0; ring < sweep.rings; ++ring) order_ring(ring);
-}
-
+/// Copies a ring so that its azimuth grows and no object lies on both of its ends.
 void RingCloud::order_ring(std::size_t ring) {
-  const auto first = points_.begin() + static_cast<std::ptrdiff_t>(begins_[ring]);
-  const auto last = points_.begin() + static_cast<std::ptrdiff_t>(begins_[ring + 1]);
-  if (last - first < 3) return;
+  const RingPoint* from = scattered_.data() + slots_[ring];
+  const std::size_t count = next_[ring] - slots_[ring];
   std::ptrdiff_t leftward = 0;
-  for (auto it = first + 1; it < last; it += 7) {
-    leftward += wrapped(it->azimuth_rad - (it - 1)->azimuth_rad) > 0.0F ? 1 : -1;
+  for (std::size_t i = 1; i < count; i += 7) {
+    leftward += wrapped(from[i].azimuth_rad - from[i - 1].azimuth_rad) > 0.0F ? 1 : -1;
   }
-  if (leftward < 0) std::reverse(first, last);
-  // No object should lie on both ends of the array: it begins where the range jumps.
-  const auto cut = std::adjacent_find(first, last, [](const RingPoint& a, const RingPoint& b) {
-    return std::abs(a.range_m - b.range_m) > kCut_m;
-  });
-  if (cut != last) std::rotate(first, cut + 1, last);
-  for (auto it = first + 1; it < last; ++it) {
-    it->azimuth_rad = (it - 1)->azimuth_rad + wrapped(it->azimuth_rad - (it - 1)->azimuth_rad);
+  std::size_t cut = 0;
+  for (std::size_t i = 1; i < count && cut == 0; ++i) {
+    if (std::abs(from[i].range_m - from[i - 1].range_m) > kCut_m) cut = i;
   }
-  measure_step(ring);
+  RingPoint* to = points_.data() + begins_[ring];
+  const auto copy = [&](std::size_t k, std::size_t i) {
+    to[k] = from[i];
+    if (k == 0) return;
+    const float previous = to[k - 1].azimuth_rad;
+    float change = from[i].azimuth_rad - previous;
+    while (change < -kPi) change += kTurn;
+    to[k].azimuth_rad = previous + wrapped(change);
+  };
+  std::size_t k = 0;
+  if (leftward >= 0) {
+    for (std::size_t i = cut; i < count; ++i) copy(k++, i);
+    for (std::size_t i = 0; i < cut; ++i) copy(k++, i);
+  } else {
+    for (std::size_t i = cut; i-- > 0;) copy(k++, i);
+    for (std::size_t i = count; i-- > cut;) copy(k++, i);
+  }
 }
 
 void RingCloud::measure_step(std::size_t ring) {
@@ -118,8 +147,10 @@ std::size_t RingCloud::first_at(std::size_t ring, float azimuth_rad) const {
   const std::size_t end = begins_[ring + 1];
   if (begin == end) return end;
   const float start = points_[begin].azimuth_rad;
-  const float beyond = azimuth_rad - start;
-  const float azimuth = start + (beyond - kTurn * std::floor(beyond / kTurn));
+  float beyond = azimuth_rad - start;
+  while (beyond < 0.0F) beyond += kTurn;
+  while (beyond >= kTurn) beyond -= kTurn;
+  const float azimuth = start + beyond;
   const auto it = std::lower_bound(
       points_.begin() + static_cast<std::ptrdiff_t>(begin),
       points_.begin() + static_cast<std::ptrdiff_t>(end), azimuth,

@@ -57,12 +57,15 @@ class RingCloud {
   std::size_t first_at(std::size_t ring, float azimuth_rad) const;
 
  private:
-  void sort_into_rings(const PointSweep& sweep);
+  void reserve_rings(const PointSweep& sweep, PointCounters& counters);
+  void scatter(const PointSweep& sweep, double min_range_m, double max_range_m,
+               PointCounters& counters);
   void order_ring(std::size_t ring);
   void measure_step(std::size_t ring);
 
-  std::vector<RingPoint> kept_;  ///< In the sweep's order.
-  std::vector<std::uint16_t> kept_rings_;
+  std::vector<RingPoint> scattered_;  ///< Ring by ring as they came, with gaps between rings.
+  std::vector<std::size_t> slots_;    ///< Where each ring begins there.
+  std::vector<std::size_t> next_;     ///< Where each ring ends there.
   std::vector<RingPoint> points_;
   std::vector<std::size_t> begins_;
   std::vector<float> steps_;
