@@ -1,0 +1,138 @@
+#include "services/lidar_imu_input/attitude_filter.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+constexpr double kStartTilt_rad = 0.1;  // one metre per second squared, mistaken for gravity
+constexpr double kStartSpeed_mps = 10.0;
+constexpr double kBridgeTilt = 0.03;  // rad per square root of a second
+constexpr double kBridgeSpeed = 2.0;  // m/s per square root of a second
+
+double square(double value) { return value * value; }
+
+Eigen::Matrix3d cross(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  return m;
+}
+
+Eigen::Quaterniond rotation_of(const Eigen::Vector3d& vector) {
+  const double angle = vector.norm();
+  if (angle < 1e-12) return Eigen::Quaterniond::Identity();
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, vector / angle));
+}
+
+}  // namespace
+
+RollPitchYaw roll_pitch_yaw(const Eigen::Quaterniond& rotation) {
+  const Eigen::Matrix3d m = rotation.toRotationMatrix();
+  return {std::atan2(m(2, 1), m(2, 2)), std::asin(std::clamp(-m(2, 0), -1.0, 1.0)),
+          std::atan2(m(1, 0), m(0, 0))};
+}
+
+AttitudeFilter::AttitudeFilter(const ImuParameters& imu, const Eigen::Vector3d& force)
+    : imu_(imu),
+      world_Q_vehicle_(Eigen::Quaterniond::FromTwoVectors(
+          force.norm() > 0.1 * kGravity_mps2 ? force : Eigen::Vector3d::UnitZ(),
+          Eigen::Vector3d::UnitZ())) {
+  covariance_.block<3, 3>(0, 0).diagonal().setConstant(square(kStartTilt_rad));
+  covariance_(2, 2) = 1e-12;  // yaw is nobody's business here
+  covariance_.block<3, 3>(3, 3).diagonal() << square(kStartSpeed_mps), 1.0, 0.25;
+  covariance_.block<3, 3>(6, 6).diagonal().setConstant(square(imu.gyro_bias_sigma));
+  covariance_.block<3, 3>(9, 9).diagonal().setConstant(square(imu.force_bias_sigma));
+}
+
+void AttitudeFilter::propagate(const Eigen::Vector3d& rate, const Eigen::Vector3d& force,
+                               double seconds, bool saturated) {
+  const Eigen::Vector3d w = rate - gyro_bias_;
+  const Eigen::Vector3d gravity =
+      world_Q_vehicle_.conjugate() * Eigen::Vector3d(0.0, 0.0, -kGravity_mps2);
+
+  Covariance step = Covariance::Identity();
+  step.block<3, 3>(0, 0) -= cross(w) * seconds;
+  step.block<3, 3>(0, 6) = -Eigen::Matrix3d::Identity() * seconds;
+  step.block<3, 3>(3, 0) = cross(gravity) * seconds;
+  step.block<3, 3>(3, 3) -= cross(w) * seconds;
+  step.block<3, 3>(3, 6) = -cross(velocity_) * seconds;
+  step.block<3, 3>(3, 9) = -Eigen::Matrix3d::Identity() * seconds;
+
+  const double gyro_noise = saturated ? imu_.saturation_gyro_noise : imu_.gyro_noise;
+  const double force_noise = saturated ? imu_.saturation_force_noise : imu_.force_noise;
+  const Eigen::Matrix3d lever = cross(velocity_);
+  // A scale error of the gyro acts like noise of its power over a turn of about a second.
+  const Eigen::Vector3d scale = imu_.gyro_scale_sigma * w;
+  const Eigen::Matrix3d rate_power =
+      (Eigen::Vector3d::Constant(square(gyro_noise)) + scale.cwiseAbs2()).asDiagonal();
+  covariance_ = step * covariance_ * step.transpose();
+  covariance_.block<3, 3>(0, 0) += rate_power * seconds;
+  covariance_.block<3, 3>(3, 3) += lever * rate_power * lever.transpose() * seconds;
+  covariance_.block<3, 3>(3, 0) += lever * rate_power * seconds;
+  covariance_.block<3, 3>(0, 3) = covariance_.block<3, 3>(3, 0).transpose();
+  covariance_.block<3, 3>(3, 3).diagonal().array() += square(force_noise) * seconds;
+  covariance_.block<3, 3>(6, 6).diagonal().array() += square(imu_.gyro_bias_walk) * seconds;
+  covariance_.block<3, 3>(9, 9).diagonal().array() += square(imu_.force_bias_walk) * seconds;
+
+  // Velocity with the attitude at the middle of the step.
+  const Eigen::Quaterniond half = rotation_of(0.5 * seconds * w);
+  const Eigen::Vector3d middle_gravity = half.conjugate() * gravity;
+  const Eigen::Vector3d acceleration = force - force_bias_ + middle_gravity;
+  velocity_ = half.conjugate() * (half.conjugate() * velocity_ + acceleration * seconds);
+  world_Q_vehicle_ = (world_Q_vehicle_ * rotation_of(seconds * w)).normalized();
+}
+
+void AttitudeFilter::bridge(double seconds) {
+  covariance_.block<2, 2>(0, 0).diagonal().array() += square(kBridgeTilt) * seconds;
+  covariance_.block<3, 3>(3, 3).diagonal().array() += square(kBridgeSpeed) * seconds;
+}
+
+void AttitudeFilter::update(const Row& row, double residual, double variance) {
+  const Eigen::Matrix<double, 12, 1> spread = covariance_ * row.transpose();
+  const double total = row.dot(spread) + variance;
+  const Eigen::Matrix<double, 12, 1> gain = spread / total;
+  const Eigen::Matrix<double, 12, 1> error = gain * residual;
+  covariance_ -= gain * spread.transpose();
+  covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();
+  world_Q_vehicle_ = (world_Q_vehicle_ * rotation_of(error.head<3>())).normalized();
+  velocity_ += error.segment<3>(3);
+  gyro_bias_ += error.segment<3>(6);
+  force_bias_ += error.segment<3>(9);
+}
+
+void AttitudeFilter::add_velocity(const Eigen::Vector3d& direction, const Eigen::Vector3d& at,
+                                  double residual_mps, double sigma_mps) {
+  Row row = Row::Zero();
+  row.segment<3>(3) = direction.transpose();
+  // d(w x at) / d(gyro bias) = [at]x
+  row.segment<3>(6) = direction.transpose() * cross(at);
+  update(row, residual_mps, square(sigma_mps));
+}
+
+void AttitudeFilter::add_standstill(const Eigen::Vector3d& rate, double seconds,
+                                    double velocity_sigma_mps) {
+  for (int axis = 0; axis < 3; ++axis) {
+    Row row = Row::Zero();
+    row(3 + axis) = 1.0;
+    update(row, -velocity_(axis), square(velocity_sigma_mps));
+    row.setZero();
+    row(6 + axis) = 1.0;
+    update(row, rate(axis) - gyro_bias_(axis), square(imu_.gyro_noise) / seconds);
+  }
+}
+
+Eigen::Quaterniond AttitudeFilter::level_Q_vehicle() const {
+  const RollPitchYaw angles = roll_pitch_yaw(world_Q_vehicle_);
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angles.pitch_rad, Eigen::Vector3d::UnitY()) *
+                            Eigen::AngleAxisd(angles.roll_rad, Eigen::Vector3d::UnitX()));
+}
+
+Eigen::Matrix2d AttitudeFilter::tilt_covariance() const {
+  // Errors about the level axes x and y; roll and pitch to first order.
+  const Eigen::Matrix3d level = level_Q_vehicle().toRotationMatrix();
+  const Eigen::Matrix3d turned = level * covariance_.block<3, 3>(0, 0) * level.transpose();
+  return turned.topLeftCorner<2, 2>();
+}
+
+}  // namespace understory

@@ -1,0 +1,70 @@
+// Roll and pitch of a moving vehicle from its IMU, helped by what the wheels and standing still
+// say.
+//
+// Gravity is only seen through the accelerometer, which also feels the vehicle's acceleration. So
+// the filter carries the velocity along, in the frame of the vehicle u:
+//   du/dt = f - b_a - (w - b_g) x u + R^T g
+// Where wheels (or standing still) tell u, what remains of f is gravity: acceleration and
+// centripetal force are compensated to the degree that u is known. No landmark enters.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "services/lidar_imu_input/parameters.hpp"
+
+namespace understory {
+
+constexpr double kGravity_mps2 = 9.81;
+
+/// Roll, pitch and yaw of a rotation Rz(yaw) Ry(pitch) Rx(roll).
+struct RollPitchYaw {
+  double roll_rad = 0.0;
+  double pitch_rad = 0.0;
+  double yaw_rad = 0.0;
+};
+RollPitchYaw roll_pitch_yaw(const Eigen::Quaterniond& rotation);
+
+/// Error state filter; errors: attitude (right perturbation), velocity, gyro and force bias.
+class AttitudeFilter {
+ public:
+  using Covariance = Eigen::Matrix<double, 12, 12>;
+
+  /// Starts from one sample: tilt from the force, velocity unknown.
+  AttitudeFilter(const ImuParameters& imu, const Eigen::Vector3d& specific_force_mps2);
+
+  /// Rate and force (vehicle frame, at the vehicle's origin) over `seconds`.
+  void propagate(const Eigen::Vector3d& rate, const Eigen::Vector3d& force, double seconds,
+                 bool saturated);
+  /// Time passes that no sample covers.
+  void bridge(double seconds);
+
+  /// Difference between a measured and the predicted value of `direction . (u + w x at)`.
+  void add_velocity(const Eigen::Vector3d& direction, const Eigen::Vector3d& at,
+                    double residual_mps, double sigma_mps);
+  /// Velocity zero, and rate zero: the gyro shows its bias.
+  void add_standstill(const Eigen::Vector3d& rate, double seconds, double velocity_sigma_mps);
+
+  /// Vehicle to level: Ry(pitch) Rx(roll).
+  Eigen::Quaterniond level_Q_vehicle() const;
+  /// Of (roll, pitch) [rad^2].
+  Eigen::Matrix2d tilt_covariance() const;
+  const Eigen::Vector3d& velocity() const { return velocity_; }  ///< Frame vehicle.
+  Eigen::Matrix3d velocity_covariance() const { return covariance_.block<3, 3>(3, 3); }
+  const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }
+  const Eigen::Vector3d& force_bias() const { return force_bias_; }
+  Eigen::Matrix3d gyro_bias_covariance() const { return covariance_.block<3, 3>(6, 6); }
+
+ private:
+  using Row = Eigen::Matrix<double, 1, 12>;
+  void update(const Row& row, double residual, double variance);
+
+  ImuParameters imu_;
+  Eigen::Quaterniond world_Q_vehicle_;
+  Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d gyro_bias_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d force_bias_ = Eigen::Vector3d::Zero();
+  Covariance covariance_ = Covariance::Zero();
+};
+
+}  // namespace understory

@@ -1,0 +1,106 @@
+// What is wrong with a sensor's stamps and samples, before anybody believes them.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/model/imu.hpp"
+#include "services/lidar_imu_input/parameters.hpp"
+
+namespace understory {
+
+enum class InputFaultKind : std::uint8_t {
+  kNotFinite,      ///< NaN or infinite: dropped.
+  kLate,           ///< Not after its predecessor: dropped.
+  kClockJump,      ///< The sensor's clock jumped: quarantined, then followed.
+  kSilent,         ///< Nothing came for too long.
+  kFrozen,         ///< The very same again and again.
+  kSaturated,      ///< At the end of its range: used, with more noise.
+  kNoPointTimes,   ///< A sweep whose points have no times.
+  kNoMotion,       ///< A sweep that could not wait for motion any longer: not de-skewed.
+  kNotCalibrated,  ///< The vehicle moved before it had stood still long enough.
+};
+
+struct InputFault {
+  InputFaultKind kind = InputFaultKind::kLate;
+  std::string channel;
+  std::string text;
+};
+
+enum class Sensor : std::uint8_t { kImu, kWheels, kGnss, kSweep, kScan };
+constexpr std::size_t kSensors = 5;
+/// RAW_IMU and so on.
+std::string channel_of(Sensor sensor);
+
+/// One sensor's clock. A jump (back, or ahead of all others) is not believed until some samples
+/// agree with each other; from then on their stamps are moved so that time goes on.
+class SensorClock {
+ public:
+  enum class Verdict : std::uint8_t { kFine, kLate, kJumped, kQuarantined, kFollowed };
+  struct Answer {
+    Verdict verdict = Verdict::kFine;
+    Utime utime = 0;  ///< Of the sample, on the stage's time; for kFine and kFollowed.
+  };
+
+  explicit SensorClock(const FaultParameters& parameters) : parameters_(parameters) {}
+  /// `others`: the newest stamp of the other sensors, if there is any.
+  Answer take(Utime raw, std::optional<Utime> others);
+  std::optional<Utime> last() const { return last_; }
+  Utime offset_us() const { return offset_; }
+
+ private:
+  Answer quarantine(Utime raw);
+  bool is_plausible(Utime utime, std::optional<Utime> others) const;
+
+  FaultParameters parameters_;
+  std::optional<Utime> last_;
+  double period_us_ = 0.0;
+  Utime offset_ = 0;
+  std::optional<Utime> first_candidate_;
+  Utime candidate_ = 0;
+  int agreeing_ = 0;
+};
+
+/// All sensors' clocks, silence, and frozen or saturated samples. Faults are said once per episode
+/// (saturation and refusals: each time; whoever reports limits the rate).
+class InputGuard {
+ public:
+  InputGuard(const FaultParameters& parameters, const ImuParameters& imu);
+
+  /// The stamp to use, or none where the sample is to be dropped.
+  std::optional<Utime> admit(Sensor sensor, Utime raw, std::vector<InputFault>& faults);
+  /// Whether the sample is the same for too long: not to be used.
+  bool is_frozen(const ImuSample& sample, std::vector<InputFault>& faults);
+  bool is_saturated(const ImuSample& sample, std::vector<InputFault>& faults) const;
+  /// Looks for sensors that have gone silent by `now()`.
+  void find_silent(std::vector<InputFault>& faults);
+
+  /// Newest stamp of all sensors.
+  std::optional<Utime> now() const;
+  std::optional<Utime> last(Sensor sensor) const { return state(sensor).clock.last(); }
+  /// It has spoken, and not gone silent.
+  bool is_live(Sensor sensor) const;
+  bool has_spoken(Sensor sensor) const { return state(sensor).clock.last().has_value(); }
+
+ private:
+  struct State {
+    SensorClock clock;
+    bool is_silent = false;
+  };
+  const State& state(Sensor sensor) const { return states_[static_cast<std::size_t>(sensor)]; }
+  State& state(Sensor sensor) { return states_[static_cast<std::size_t>(sensor)]; }
+  double silent_s(Sensor sensor) const;
+  std::optional<Utime> newest_but(Sensor sensor) const;
+
+  FaultParameters parameters_;
+  ImuParameters imu_;
+  std::vector<State> states_;
+  std::optional<ImuSample> same_since_;
+  bool is_frozen_ = false;
+};
+
+}  // namespace understory

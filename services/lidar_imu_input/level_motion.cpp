@@ -1,0 +1,168 @@
+#include "services/lidar_imu_input/level_motion.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+double square(double value) { return value * value; }
+double seconds_between(Utime from, Utime to) { return static_cast<double>(to - from) * 1e-6; }
+Eigen::Matrix2d rotation_of(double angle) { return Eigen::Rotation2Dd(angle).toRotationMatrix(); }
+
+/// Adds one step of constant rate and force to a preintegration.
+void step(Preintegration& sum, const LevelSample& a, const LevelSample& b,
+          const ImuParameters& imu) {
+  const double dt = seconds_between(a.utime, b.utime);
+  const double rate = 0.5 * (a.yaw_rate_rad_s + b.yaw_rate_rad_s) - sum.bias(0);
+  // Both ends' forces, turned to the middle of the step.
+  const Eigen::Matrix2d back = rotation_of(-0.5 * rate * dt);
+  const Eigen::Vector2d force_bias = sum.bias.tail<2>();
+  const Eigen::Vector2d force =
+      0.5 * (back * (a.force_mps2 - force_bias) + back.transpose() * (b.force_mps2 - force_bias));
+  const Eigen::Matrix2d middle = rotation_of(sum.yaw_rad + 0.5 * rate * dt);
+  const Eigen::Vector2d acceleration = middle * force;
+  const Eigen::Vector2d turned = turned_left(acceleration);
+
+  Eigen::Matrix<double, 5, 5> forward = Eigen::Matrix<double, 5, 5>::Identity();
+  forward.block<2, 1>(1, 0) = turned * dt;
+  forward.block<2, 1>(3, 0) = 0.5 * turned * dt * dt;
+  forward.block<2, 2>(3, 1) = Eigen::Matrix2d::Identity() * dt;
+
+  // Of the step's mean rate and force (the force turns by half of the step's own turn).
+  Eigen::Matrix<double, 5, 3> input = Eigen::Matrix<double, 5, 3>::Zero();
+  input(0, 0) = dt;
+  input.block<2, 1>(1, 0) = 0.5 * turned * dt * dt;
+  input.block<2, 1>(3, 0) = 0.25 * turned * dt * dt * dt;
+  input.block<2, 2>(1, 1) = middle * dt;
+  input.block<2, 2>(3, 1) = 0.5 * middle * dt * dt;
+
+  const bool saturated = a.is_saturated || b.is_saturated;
+  const double gyro = square(saturated ? imu.saturation_gyro_noise : imu.gyro_noise) +
+                      square(imu.gyro_scale_sigma * rate);
+  const double accelerometer =
+      square(saturated ? imu.saturation_force_noise : imu.force_noise) + square(imu.level_noise);
+  const Eigen::Vector3d power(gyro, accelerometer, accelerometer);
+  sum.covariance = forward * sum.covariance * forward.transpose() +
+                   input * (power / dt).asDiagonal() * input.transpose();
+  sum.bias_jacobian = forward * sum.bias_jacobian - input;
+
+  sum.position_m += sum.velocity_mps * dt + 0.5 * acceleration * dt * dt;
+  sum.velocity_mps += acceleration * dt;
+  sum.yaw_rad += rate * dt;
+  sum.seconds += dt;
+}
+
+double speed_at(const std::deque<SpeedSample>& speeds, Utime utime) {
+  auto after = std::ranges::lower_bound(speeds, utime, {}, &SpeedSample::utime);
+  if (after == speeds.end()) return speeds.back().speed_mps;
+  if (after == speeds.begin() || after->utime == utime) return after->speed_mps;
+  const auto before = std::prev(after);
+  const double share =
+      seconds_between(before->utime, utime) / seconds_between(before->utime, after->utime);
+  return before->speed_mps + share * (after->speed_mps - before->speed_mps);
+}
+
+bool covers(const std::deque<SpeedSample>& speeds, Utime from, Utime to, double max_gap_s) {
+  if (speeds.empty() || speeds.front().utime > from) return false;
+  Utime reached = speeds.front().utime;
+  for (const SpeedSample& sample : speeds) {
+    if (sample.utime > from && seconds_between(std::max(reached, from), sample.utime) > max_gap_s)
+      return reached >= to;
+    reached = sample.utime;
+    if (reached >= to) return true;
+  }
+  return seconds_between(reached, to) <= max_gap_s;
+}
+
+}  // namespace
+
+LevelSample interpolate(const LevelSample& before, const LevelSample& after, Utime utime) {
+  if (after.utime == before.utime) return after;
+  const double share =
+      seconds_between(before.utime, utime) / seconds_between(before.utime, after.utime);
+  const auto mix = [share](const auto& a, const auto& b) { return a + share * (b - a); };
+  LevelSample sample;
+  sample.utime = utime;
+  sample.yaw_rate_rad_s = mix(before.yaw_rate_rad_s, after.yaw_rate_rad_s);
+  sample.force_mps2 = before.force_mps2 + share * (after.force_mps2 - before.force_mps2);
+  sample.pitch_cosine = mix(before.pitch_cosine, after.pitch_cosine);
+  sample.is_saturated = before.is_saturated || after.is_saturated;
+  return sample;
+}
+
+void LevelSamples::forget_before(Utime utime) {
+  while (samples_.size() > 1 && samples_[1].utime <= utime) samples_.pop_front();
+}
+
+std::optional<std::deque<LevelSample>> LevelSamples::between(Utime from, Utime to) const {
+  if (samples_.empty() || samples_.front().utime > from || samples_.back().utime < to || to <= from)
+    return std::nullopt;
+  std::deque<LevelSample> result;
+  auto next = std::ranges::upper_bound(samples_, from, {}, &LevelSample::utime);
+  const auto gap = [this](const LevelSample& a, const LevelSample& b) {
+    return seconds_between(a.utime, b.utime) > max_gap_s_;
+  };
+  for (auto before = std::prev(next);; before = next++) {
+    if (gap(*before, *next)) return std::nullopt;
+    if (result.empty()) result.push_back(interpolate(*before, *next, from));
+    if (next->utime >= to) {
+      result.push_back(interpolate(*before, *next, to));
+      return result;
+    }
+    result.push_back(*next);
+  }
+}
+
+Preintegration preintegrate(const std::deque<LevelSample>& samples, const ImuParameters& imu,
+                            const InertialBias& bias) {
+  Preintegration sum;
+  sum.bias = bias;
+  for (std::size_t i = 0; i + 1 < samples.size(); ++i) step(sum, samples[i], samples[i + 1], imu);
+  return sum;
+}
+
+std::optional<SE2WithCovariance> drive(const std::deque<LevelSample>& samples,
+                                       const std::deque<SpeedSample>& speeds,
+                                       const LidarImuInputParameters& parameters,
+                                       const YawRateBias& bias) {
+  const Utime from = samples.front().utime;
+  const Utime to = samples.back().utime;
+  if (!covers(speeds, from, to, parameters.wheels.max_gap_s)) return std::nullopt;
+  const WheelNoise& noise = parameters.wheels.noise;
+  SE2WithCovariance motion;
+  for (std::size_t i = 0; i + 1 < samples.size(); ++i) {
+    const LevelSample& a = samples[i];
+    const LevelSample& b = samples[i + 1];
+    const double dt = seconds_between(a.utime, b.utime);
+    const double rate = 0.5 * (a.yaw_rate_rad_s + b.yaw_rate_rad_s) - bias.bias_rad_s;
+    const double speed = 0.5 * (speed_at(speeds, a.utime) + speed_at(speeds, b.utime)) * 0.5 *
+                         (a.pitch_cosine + b.pitch_cosine);
+    // Errors that last for a time tau and act for dt << tau have the power tau * dt.
+    const double power = dt * noise.correlation_time_s;
+    const bool saturated = a.is_saturated || b.is_saturated;
+    const double gyro =
+        saturated ? parameters.imu.saturation_gyro_noise : parameters.imu.gyro_noise;
+    SE2WithCovariance piece{SE2::Exp({speed * dt, 0.0, rate * dt}), Eigen::Matrix3d::Zero()};
+    const double stand = square(noise.standstill_sigma_m) * dt;
+    piece.covariance(0, 0) = square(speed * noise.speed_scale_sigma) * power + stand;
+    piece.covariance(1, 1) = square(speed * noise.side_slip_sigma) * power + stand;
+    piece.covariance(2, 2) =
+        square(gyro) * dt +
+        (square(bias.sigma_rad_s) + square(rate * parameters.imu.gyro_scale_sigma)) * power;
+    motion = compound(motion, piece);
+  }
+  // Each end of the interval is off by the stamps' jitter; the gyro's yaw is not the wheels'.
+  Eigen::Vector3d twist = motion.mean.Log() / seconds_between(from, to);
+  twist.z() = 0.0;
+  motion.covariance += 2.0 * square(noise.stamp_sigma_s) * twist * twist.transpose();
+
+  const SE2& axle_T_vehicle = parameters.wheels.car.axle_T_vehicle;
+  const SE2 vehicle_T_axle = axle_T_vehicle.inverse();
+  const Eigen::Matrix3d adjoint = vehicle_T_axle.Adjoint();
+  return SE2WithCovariance{vehicle_T_axle * motion.mean * axle_T_vehicle,
+                           adjoint * motion.covariance * adjoint.transpose()};
+}
+
+}  // namespace understory

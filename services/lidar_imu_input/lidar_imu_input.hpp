@@ -1,0 +1,88 @@
+// The input stage: raw sensors in, one consistent stream of motion and sweeps out.
+//
+// A piece of ODOMETRY ends exactly at the stamp of each published sweep or scan and is published
+// before it; in between, pieces end at most `max_piece_s` apart. So a sweep waits until the IMU and
+// the wheels have reached its end, but no longer than `max_wait_s` of the sensors' own time.
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <variant>
+#include <vector>
+
+#include "common/model/ekf_output.hpp"
+#include "common/model/gnss.hpp"
+#include "common/model/imu.hpp"
+#include "common/model/odometry.hpp"
+#include "common/model/planar_scan.hpp"
+#include "common/model/point_sweep.hpp"
+#include "common/model/wheels.hpp"
+#include "services/lidar_imu_input/input_guard.hpp"
+#include "services/lidar_imu_input/motion_estimator.hpp"
+
+namespace understory {
+
+/// What the stage gives, in the order of publishing. Frames: vehicle, vehicle_level; see the types.
+using InputResult = std::variant<ImuSample, WheelSample, GnssFix, Odometry, RawPose, PointSweep,
+                                 PlanarScan, InputFault>;
+using InputResults = std::vector<InputResult>;
+
+struct InputCounters {
+  std::uint64_t sweeps = 0;
+  std::uint64_t sweeps_not_deskewed = 0;
+  std::uint64_t sweeps_carried = 0;  ///< Came late: stamped with the end of the latest piece.
+  std::uint64_t sweeps_dropped = 0;  ///< Too late even for that.
+  std::uint64_t points_dropped = 0;  ///< Not finite.
+  std::uint64_t pieces_missing = 0;  ///< Intervals without any motion sensor.
+  std::uint64_t corrections_late = 0;
+  std::uint64_t samples_saturated = 0;
+};
+
+class LidarImuInput {
+ public:
+  explicit LidarImuInput(const LidarImuInputParameters& parameters = {});
+
+  InputResults add(const ImuSample& sample);    ///< RAW_IMU, frame sensor.
+  InputResults add(const WheelSample& sample);  ///< RAW_WHEELS.
+  InputResults add(const GnssFix& fix);         ///< RAW_GNSS.
+  InputResults add(const PointSweep& sweep);    ///< RAW_SWEEP, a whole turn, frame sensor.
+  InputResults add(const PlanarScan& scan);     ///< RAW_SCAN.
+  InputResults add(const VelocityCorrection& correction);
+  /// The drive is over: what still waits goes out.
+  InputResults finish();
+
+  const InputCounters& counters() const { return counters_; }
+  const MotionEstimator& motion() const { return motion_; }
+  bool is_calibrated() const { return motion_.is_calibrated(); }
+
+ private:
+  struct Waiting {
+    Utime end = 0;
+    std::variant<PointSweep, PlanarScan> item;
+  };
+
+  void wait(Utime end, std::variant<PointSweep, PlanarScan> item, InputResults& out);
+  void settle(InputResults& out, bool everything);
+  bool is_reached(Utime utime) const;
+  void end_piece(Utime utime, InputResults& out);
+  void release(Waiting waiting, InputResults& out);
+  void release_sweep(const PointSweep& raw, Utime stamp, InputResults& out);
+  void report(std::vector<InputFault>& faults, InputResults& out);
+  void publish_raw_pose(bool at_once, InputResults& out);
+  void check_calibration(InputResults& out);
+  bool is_repeated(const PointSweep& sweep);
+
+  LidarImuInputParameters parameters_;
+  InputGuard guard_;
+  MotionEstimator motion_;
+  InputCounters counters_;
+  std::deque<Waiting> waiting_;     ///< In order of their ends.
+  std::optional<Utime> piece_end_;  ///< Of the latest piece.
+  std::optional<Utime> sweep_stamp_;
+  std::optional<Utime> scan_stamp_;
+  std::optional<Utime> raw_pose_utime_;
+  std::vector<SweepPoint> first_points_;  ///< Of the latest sweep, to notice a frozen laser.
+  bool calibration_told_ = false;
+};
+
+}  // namespace understory

@@ -1,0 +1,257 @@
+#include "services/lidar_imu_input/motion_estimator.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+constexpr double kBoundPeriod_s = 10.0;
+constexpr double kSpeedsKept_s = 5.0;
+
+double square(double value) { return value * value; }
+double seconds_between(Utime from, Utime to) { return static_cast<double>(to - from) * 1e-6; }
+Eigen::Vector3d flat(const Eigen::Vector2d& v) { return {v.x(), v.y(), 0.0}; }
+
+}  // namespace
+
+MotionEstimator::MotionEstimator(const LidarImuInputParameters& parameters)
+    : parameters_(parameters),
+      reckoning_(parameters.imu),
+      standstill_(parameters.standstill),
+      wheel_only_(parameters.wheels),
+      levels_(parameters.imu.max_gap_s),
+      standing_bias_sigma_(parameters.imu.gyro_bias_sigma) {
+  const SE2 vehicle_T_axle = parameters.wheels.car.axle_T_vehicle.inverse();
+  axle_position_m_ = flat(vehicle_T_axle.translation());
+  axle_forward_ = flat(vehicle_T_axle.rotation().col(0));
+  axle_left_ = flat(vehicle_T_axle.rotation().col(1));
+}
+
+ImuSample MotionEstimator::to_vehicle(const ImuSample& sensor_sample) {
+  const Eigen::Quaterniond turn = parameters_.imu.mount.rotation();
+  ImuSample sample = sensor_sample;
+  sample.angular_rate_rad_s = turn * sensor_sample.angular_rate_rad_s;
+  sample.specific_force_mps2 = turn * sensor_sample.specific_force_mps2;
+  // Differences of the rate telescope in the integral: their noise does not add up.
+  const Eigen::Vector3d lever = parameters_.imu.mount.position_m();
+  const Eigen::Vector3d& rate = sample.angular_rate_rad_s;
+  Eigen::Vector3d lever_force = rate.cross(rate.cross(lever));
+  if (raw_) {
+    const double seconds = seconds_between(raw_->utime, sample.utime);
+    if (seconds > 0.0 && seconds <= parameters_.imu.max_gap_s)
+      lever_force += (rate - raw_->angular_rate_rad_s).cross(lever) / seconds;
+  }
+  raw_ = sample;
+  sample.specific_force_mps2 -= lever_force;
+  return sample;
+}
+
+void MotionEstimator::begin(Utime utime) { wheel_only_.advance_to(utime); }
+
+void MotionEstimator::start(const ImuSample& sample) {
+  attitude_.emplace(parameters_.imu, sample.specific_force_mps2);
+  latest_level_ = level(sample, false);
+  levels_.add(*latest_level_);
+  moved_utime_ = sample.utime;
+}
+
+void MotionEstimator::add_imu(const ImuSample& sample, bool is_saturated) {
+  if (!attitude_) {
+    start(sample);
+  } else {
+    const double seconds = seconds_between(latest_->utime, sample.utime);
+    if (seconds > parameters_.imu.max_gap_s) {
+      bridge_gap(sample);
+    } else {
+      propagate(sample, is_saturated, seconds);
+    }
+  }
+  latest_ = sample;
+  pose_utime_ = std::max(sample.utime, pose_utime_.value_or(sample.utime));
+  use_correction(sample.utime);
+  remember(sample);
+}
+
+void MotionEstimator::propagate(const ImuSample& sample, bool is_saturated, double seconds) {
+  attitude_->propagate(0.5 * (latest_->angular_rate_rad_s + sample.angular_rate_rad_s),
+                       0.5 * (latest_->specific_force_mps2 + sample.specific_force_mps2), seconds,
+                       is_saturated);
+  standing_bias_sigma_ =
+      std::sqrt(square(standing_bias_sigma_) + square(parameters_.imu.gyro_bias_walk) * seconds);
+  const bool bias_known = standing_bias_sigma_ < 0.1 * parameters_.standstill.gyro_mean_rad_s;
+  standstill_.add(sample, bias_known ? std::optional(attitude_->gyro_bias()) : std::nullopt);
+  if (standstill_.is_standing()) {
+    use_standstill(sample, seconds);
+  } else {
+    moved_utime_ = sample.utime;
+  }
+  const LevelSample levelled = level(sample, is_saturated);
+  reckoning_.propagate(*latest_level_, levelled);
+  const double rise = (attitude_->level_Q_vehicle() * attitude_->velocity()).z();
+  height_m_ += rise * seconds;
+  levels_.add(levelled);
+  latest_level_ = levelled;
+  if (!standstill_.is_standing()) use_constraints(sample);
+}
+
+void MotionEstimator::bridge_gap(const ImuSample& sample) {
+  const double seconds = seconds_between(latest_->utime, sample.utime);
+  attitude_->bridge(seconds);
+  standstill_.reset();
+  moved_utime_ = sample.utime;
+  // What the wheels have not told goes on as it was.
+  const double open = std::max(0.0, seconds_between(*pose_utime_, sample.utime));
+  const Eigen::Vector2d& v = reckoning_.velocity();
+  const double rate = latest_level_->yaw_rate_rad_s - standing_bias_;
+  SE2WithCovariance motion{SE2::Exp({v.x() * open, v.y() * open, rate * open}),
+                           Eigen::Matrix3d::Zero()};
+  motion.covariance.diagonal() << square(open), square(open), square(0.2 * open);
+  reckoning_.bridge(motion);
+  latest_level_ = level(sample, false);
+  levels_.add(*latest_level_);
+}
+
+void MotionEstimator::use_standstill(const ImuSample& sample, double seconds) {
+  const double sigma = parameters_.standstill.velocity_sigma_mps;
+  attitude_->add_standstill(sample.angular_rate_rad_s, seconds, sigma);
+  // The bias of the heading's rate: what the filter has learned while standing, nothing else.
+  const Eigen::Vector3d down = attitude_->level_Q_vehicle().conjugate() * Eigen::Vector3d::UnitZ();
+  standing_bias_ = down.dot(attitude_->gyro_bias());
+  standing_bias_sigma_ = std::sqrt(down.dot(attitude_->gyro_bias_covariance() * down));
+  reckoning_.set_gyro_bias(standing_bias_, standing_bias_sigma_);
+  reckoning_.add_standstill(sigma);
+}
+
+void MotionEstimator::use_constraints(const ImuSample& sample) {
+  const ConstraintParameters& p = parameters_.constraint;
+  if (seconds_between(constrained_utime_, sample.utime) < p.period_s) return;
+  constrained_utime_ = sample.utime;
+  const Eigen::Vector3d rate = sample.angular_rate_rad_s - attitude_->gyro_bias();
+  const Eigen::Vector3d axle = attitude_->velocity() + rate.cross(axle_position_m_);
+  const double speed = std::abs(axle.dot(axle_forward_));
+  if (p.nonholonomic) {
+    const double side = std::hypot(p.side_slip_mps, p.side_slip_scale * speed);
+    const double vertical = std::hypot(p.vertical_mps, p.vertical_scale * speed);
+    attitude_->add_velocity(axle_left_, axle_position_m_, -axle.dot(axle_left_), side);
+    attitude_->add_velocity(Eigen::Vector3d::UnitZ(), axle_position_m_, -axle.z(), vertical);
+    const Eigen::Vector2d at = axle_position_m_.head<2>();
+    const Eigen::Vector2d left = axle_left_.head<2>();
+    const double yaw_rate = latest_level_->yaw_rate_rad_s - reckoning_.bias()(0);
+    const double slip = left.dot(reckoning_.velocity() + yaw_rate * turned_left(at));
+    reckoning_.add_velocity(left, at, -slip, side);
+  }
+  if (!wheels_are_fresh(sample.utime) &&
+      seconds_between(bounded_utime_, sample.utime) > kBoundPeriod_s) {
+    bounded_utime_ = sample.utime;
+    for (const Eigen::Vector3d& direction : {axle_forward_, axle_left_})
+      attitude_->add_velocity(direction, Eigen::Vector3d::Zero(),
+                              -direction.dot(attitude_->velocity()), p.typical_speed_mps);
+  }
+}
+
+bool MotionEstimator::wheels_are_fresh(Utime now) const {
+  return !speeds_.empty() &&
+         seconds_between(speeds_.back().utime, now) < parameters_.wheels.max_gap_s;
+}
+
+void MotionEstimator::add_wheels(const WheelSample& sample) {
+  wheel_only_.add(sample);
+  standstill_.add_wheel_speed(sample.utime, sample.speed_mps);
+  const CarGeometry& car = parameters_.wheels.car;
+  const auto then = history_.at(sample.utime);
+  // A wheel left of the middle is slower in a left turn.
+  const double speed = then ? sample.speed_mps + then->rate_rad_s.z() * car.encoder_left_m
+                            : axle_speed(car, sample.speed_mps, sample.steering_rad);
+  speeds_.push_back({sample.utime, speed});
+  while (seconds_between(speeds_.front().utime, sample.utime) > kSpeedsKept_s) speeds_.pop_front();
+  if (!attitude_ || !then || standstill_.is_standing()) return;
+
+  const double sigma = parameters_.constraint.wheel_sigma_mps;
+  const Eigen::Vector3d axle = then->velocity_mps + then->rate_rad_s.cross(axle_position_m_);
+  attitude_->add_velocity(axle_forward_, axle_position_m_, speed - axle.dot(axle_forward_), sigma);
+  const Eigen::Vector2d at = axle_position_m_.head<2>();
+  const Eigen::Vector2d forward = axle_forward_.head<2>();
+  const double thought =
+      forward.dot(then->level_velocity_mps + then->rate_rad_s.z() * turned_left(at));
+  const double slope = latest_level_ ? latest_level_->pitch_cosine : 1.0;
+  const double scaled = std::hypot(sigma, parameters_.wheels.noise.speed_scale_sigma * speed);
+  reckoning_.add_velocity(forward, at, speed * slope - thought, scaled);
+}
+
+void MotionEstimator::add_gnss(const GnssFix& fix) {
+  if (!parameters_.gnss_aided) return;
+  const auto then = history_.at(fix.utime);
+  if (!then) return;
+  const auto reference = reference_.add(fix, then->heading_rad);
+  if (!reference) return;
+  const Eigen::Vector2d level =
+      SE2(0.0, 0.0, then->heading_rad).rotation().transpose() * reference->odom_velocity_mps;
+  for (int axis = 0; axis < 2; ++axis)
+    reckoning_.add_velocity(Eigen::Vector2d::Unit(axis), Eigen::Vector2d::Zero(),
+                            level(axis) - then->level_velocity_mps(axis), reference->sigma_mps);
+  if (reference->heading_rad)
+    reckoning_.add_heading(wrap_angle(*reference->heading_rad - then->heading_rad),
+                           reference->heading_sigma_rad);
+}
+
+bool MotionEstimator::add_correction(const VelocityCorrection& correction) {
+  const auto delay = static_cast<Utime>(parameters_.output.correction_delay_s * 1e6);
+  corrections_.push_back(correction);
+  return !latest_ || latest_->utime < correction.utime + delay;
+}
+
+void MotionEstimator::use_correction(Utime now) {
+  const auto delay = static_cast<Utime>(parameters_.output.correction_delay_s * 1e6);
+  while (!corrections_.empty() && corrections_.front().utime + delay <= now) {
+    const VelocityCorrection correction = corrections_.front();
+    corrections_.pop_front();
+    if (parameters_.gnss_aided) continue;
+    const auto then = history_.at(correction.utime);
+    if (then) reckoning_.correct(correction, then->level_velocity_mps, then->heading_rad);
+  }
+}
+
+LevelSample MotionEstimator::level(const ImuSample& sample, bool is_saturated) const {
+  const Eigen::Quaterniond level_Q_vehicle = attitude_->level_Q_vehicle();
+  const RollPitchYaw angles = roll_pitch_yaw(level_Q_vehicle);
+  const Eigen::Vector3d& bias = attitude_->gyro_bias();
+  const Eigen::Vector3d& rate = sample.angular_rate_rad_s;
+  LevelSample result;
+  result.utime = sample.utime;
+  // Rate of the heading; the bias about z stays in, for `InertialBias`.
+  result.yaw_rate_rad_s =
+      (std::sin(angles.roll_rad) * (rate.y() - bias.y()) + std::cos(angles.roll_rad) * rate.z()) /
+      std::cos(angles.pitch_rad);
+  result.force_mps2 = (level_Q_vehicle * sample.specific_force_mps2).head<2>();
+  result.pitch_cosine = std::cos(angles.pitch_rad);
+  result.is_saturated = is_saturated;
+  return result;
+}
+
+void MotionEstimator::remember(const ImuSample& sample) {
+  if (!history_.empty() && history_.newest().utime >= sample.utime) return;
+  MotionState state;
+  state.utime = sample.utime;
+  state.heading_rad = reckoning_.pose().theta();
+  state.odom_Q_vehicle =
+      Eigen::Quaterniond(Eigen::AngleAxisd(state.heading_rad, Eigen::Vector3d::UnitZ())) *
+      attitude_->level_Q_vehicle();
+  state.position_m << reckoning_.pose().translation(), height_m_;
+  state.velocity_mps = attitude_->velocity();
+  state.level_velocity_mps = reckoning_.velocity();
+  state.rate_rad_s = sample.angular_rate_rad_s - attitude_->gyro_bias();
+  state.tilt_covariance = attitude_->tilt_covariance();
+  history_.add(state);
+}
+
+RawPose MotionEstimator::raw_pose() const {
+  RawPose pose;
+  pose.utime = pose_utime_.value_or(0);
+  pose.odom_T_vehicle = reckoning_.pose();
+  pose.covariance = reckoning_.pose_covariance();
+  pose.is_reference = parameters_.gnss_aided;
+  return pose;
+}
+
+}  // namespace understory

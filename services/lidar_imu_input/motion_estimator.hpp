@@ -1,0 +1,94 @@
+// Everything that is known about the vehicle's motion without looking at a landmark, and the dead
+// reckoning that the filter may correct.
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "common/model/ekf_output.hpp"
+#include "common/model/gnss.hpp"
+#include "common/model/imu.hpp"
+#include "common/model/odometry.hpp"
+#include "services/lidar_imu_input/attitude_filter.hpp"
+#include "services/lidar_imu_input/dead_reckoning.hpp"
+#include "services/lidar_imu_input/level_motion.hpp"
+#include "services/lidar_imu_input/motion_history.hpp"
+#include "services/lidar_imu_input/standstill.hpp"
+#include "services/lidar_imu_input/velocity_reference.hpp"
+#include "services/lidar_imu_input/wheel_odometry.hpp"
+
+namespace understory {
+
+class MotionEstimator {
+ public:
+  explicit MotionEstimator(const LidarImuInputParameters& parameters);
+
+  /// The sample in frame vehicle, as if measured at its origin; stamps must advance.
+  ImuSample to_vehicle(const ImuSample& sensor_sample);
+  void add_imu(const ImuSample& vehicle_sample, bool is_saturated);
+  void add_wheels(const WheelSample& sample);
+  void add_gnss(const GnssFix& fix);
+  /// False: it came too late to take effect in time; it does so at the next sample.
+  bool add_correction(const VelocityCorrection& correction);
+
+  /// Where the first interval starts.
+  void begin(Utime utime);
+  /// Motion between two stamps up to which samples have come; intervals in order. None where
+  /// samples are missing.
+  std::optional<Odometry> piece(Utime from, Utime to);
+
+  const MotionHistory& history() const { return history_; }
+  RawPose raw_pose() const;
+  std::optional<Utime> pose_utime() const { return pose_utime_; }
+  bool is_standing() const { return standstill_.is_standing(); }
+  bool is_calibrated() const { return standstill_.is_calibrated(); }
+  bool has_attitude() const { return attitude_.has_value(); }
+  const std::optional<AttitudeFilter>& attitude() const { return attitude_; }
+
+ private:
+  void start(const ImuSample& sample);
+  void propagate(const ImuSample& sample, bool is_saturated, double seconds);
+  void use_standstill(const ImuSample& sample, double seconds);
+  void use_constraints(const ImuSample& sample);
+  void use_correction(Utime now);
+  void bridge_gap(const ImuSample& sample);
+  LevelSample level(const ImuSample& sample, bool is_saturated) const;
+  void remember(const ImuSample& sample);
+  std::optional<Odometry> inertial_piece(Utime from, Utime to);
+  std::optional<Odometry> wheel_piece(Utime from, Utime to);
+  SE2WithCovariance dead_reckoned(const std::deque<LevelSample>& samples,
+                                  const Preintegration& inertial) const;
+  YawRateBias yaw_rate_bias() const { return {standing_bias_, standing_bias_sigma_}; }
+  bool wheels_are_fresh(Utime now) const;
+  double axle_speed_now(const WheelSample& sample) const;
+
+  LidarImuInputParameters parameters_;
+  Eigen::Vector3d axle_position_m_;  ///< In frame vehicle.
+  Eigen::Vector3d axle_forward_;
+  Eigen::Vector3d axle_left_;
+
+  std::optional<AttitudeFilter> attitude_;
+  DeadReckoning reckoning_;
+  StandstillDetector standstill_;
+  WheelOdometry wheel_only_;
+  VelocityReference reference_;
+  LevelSamples levels_;
+  std::deque<SpeedSample> speeds_;
+  MotionHistory history_;
+  std::deque<VelocityCorrection> corrections_;
+
+  std::optional<ImuSample> raw_;     ///< Latest, frame vehicle, lever not taken out.
+  std::optional<ImuSample> latest_;  ///< Latest, frame vehicle.
+  std::optional<LevelSample> latest_level_;
+  std::optional<Utime> pose_utime_;  ///< What the dead reckoning stands at.
+  double height_m_ = 0.0;
+  double standing_bias_ = 0.0;  ///< Of the yaw rate, from standing still only.
+  double standing_bias_sigma_ = 0.0;
+  Utime moved_utime_ = 0;  ///< When the vehicle was last found not to stand.
+  Utime constrained_utime_ = 0;
+  Utime bounded_utime_ = 0;
+  std::uint64_t sequence_ = 0;
+};
+
+}  // namespace understory

@@ -1,0 +1,58 @@
+#include "services/lidar_imu_input/motion_history.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+double seconds_between(Utime from, Utime to) { return static_cast<double>(to - from) * 1e-6; }
+
+MotionState moved_on(const MotionState& state, Utime utime) {
+  MotionState moved = state;
+  const double seconds = seconds_between(state.utime, utime);
+  const Eigen::Vector3d turn = state.rate_rad_s * seconds;
+  moved.utime = utime;
+  moved.position_m += state.odom_Q_vehicle * (state.velocity_mps * seconds);
+  if (turn.norm() > 1e-12) {
+    moved.odom_Q_vehicle = state.odom_Q_vehicle *
+                           Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized()));
+  }
+  moved.heading_rad += turn.z();
+  return moved;
+}
+
+}  // namespace
+
+void MotionHistory::add(const MotionState& state) {
+  states_.push_back(state);
+  while (seconds_between(states_.front().utime, state.utime) > kKept_s) states_.pop_front();
+}
+
+std::optional<MotionState> MotionHistory::at(Utime utime) const {
+  if (states_.empty()) return std::nullopt;
+  const auto after = std::ranges::lower_bound(states_, utime, {}, &MotionState::utime);
+  if (after == states_.end() || after == states_.begin()) {
+    const MotionState& nearest = after == states_.end() ? states_.back() : states_.front();
+    if (std::abs(seconds_between(nearest.utime, utime)) > kMostExtrapolation_s) return std::nullopt;
+    return moved_on(nearest, utime);
+  }
+  const MotionState& a = *std::prev(after);
+  const MotionState& b = *after;
+  const double share = seconds_between(a.utime, utime) / seconds_between(a.utime, b.utime);
+  const auto mix = [share](const auto& from, const auto& to) {
+    return (from + share * (to - from)).eval();
+  };
+  MotionState state = a;
+  state.utime = utime;
+  state.odom_Q_vehicle = a.odom_Q_vehicle.slerp(share, b.odom_Q_vehicle);
+  state.position_m = mix(a.position_m, b.position_m);
+  state.velocity_mps = mix(a.velocity_mps, b.velocity_mps);
+  state.level_velocity_mps = mix(a.level_velocity_mps, b.level_velocity_mps);
+  state.rate_rad_s = mix(a.rate_rad_s, b.rate_rad_s);
+  state.heading_rad =
+      a.heading_rad + share * std::remainder(b.heading_rad - a.heading_rad, 2.0 * M_PI);
+  return state;
+}
+
+}  // namespace understory

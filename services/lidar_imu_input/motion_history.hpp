@@ -1,0 +1,41 @@
+// Where the vehicle was lately, for points and messages that are older than now.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <deque>
+#include <optional>
+
+#include "common/model/landmarks.hpp"
+
+namespace understory {
+
+struct MotionState {
+  Utime utime = 0;
+  Eigen::Quaterniond odom_Q_vehicle = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();    ///< In `odom`; z drifts.
+  Eigen::Vector3d velocity_mps = Eigen::Vector3d::Zero();  ///< Frame vehicle, free of landmarks.
+  Eigen::Vector2d level_velocity_mps = Eigen::Vector2d::Zero();  ///< Of the dead reckoning.
+  Eigen::Vector3d rate_rad_s = Eigen::Vector3d::Zero();          ///< Frame vehicle, bias taken out.
+  double heading_rad = 0.0;
+  Eigen::Matrix2d tilt_covariance = Eigen::Matrix2d::Zero();
+};
+
+/// The last seconds, in order of time.
+class MotionHistory {
+ public:
+  void add(const MotionState& state);
+  bool empty() const { return states_.empty(); }
+  const MotionState& newest() const { return states_.back(); }
+  const MotionState& oldest() const { return states_.front(); }
+  /// Between two states in proportion to time; at the ends the nearest state, moved on at its
+  /// velocity and rate for no longer than `kMostExtrapolation_s`. None while empty or farther off.
+  std::optional<MotionState> at(Utime utime) const;
+
+  static constexpr double kMostExtrapolation_s = 0.5;
+  static constexpr double kKept_s = 4.0;
+
+ private:
+  std::deque<MotionState> states_;
+};
+
+}  // namespace understory

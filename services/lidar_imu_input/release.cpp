@@ -1,0 +1,124 @@
+// The part of LidarImuInput that decides when pieces of odometry end and sweeps go out.
+#include <algorithm>
+#include <cmath>
+
+#include "services/lidar_imu_input/deskew.hpp"
+#include "services/lidar_imu_input/lidar_imu_input.hpp"
+
+namespace understory {
+namespace {
+
+constexpr std::size_t kMostWaiting = 20;
+/// A sweep may be carried so far ahead of its own end.
+constexpr Utime kLongestCarry_us = 250'000;
+
+Utime microseconds(double seconds) { return static_cast<Utime>(std::llround(seconds * 1e6)); }
+
+}  // namespace
+
+void LidarImuInput::wait(Utime end, std::variant<PointSweep, PlanarScan> item, InputResults& out) {
+  if (waiting_.size() >= kMostWaiting) {
+    ++counters_.sweeps_dropped;
+    waiting_.pop_front();
+  }
+  const bool is_sweep = std::holds_alternative<PointSweep>(item);
+  // A piece that has ended is not taken back: what comes behind its end is carried to it.
+  if (piece_end_ && end < *piece_end_) {
+    const std::optional<Utime>& last = is_sweep ? sweep_stamp_ : scan_stamp_;
+    const bool too_late = *piece_end_ - end > kLongestCarry_us || (last && *last >= *piece_end_);
+    if (too_late || !is_sweep) {
+      ++counters_.sweeps_dropped;
+      out.emplace_back(InputFault{InputFaultKind::kLate,
+                                  channel_of(is_sweep ? Sensor::kSweep : Sensor::kScan),
+                                  "came after the motion of its time was given away"});
+      return;
+    }
+    ++counters_.sweeps_carried;
+    end = *piece_end_;
+  }
+  const auto place = std::ranges::upper_bound(waiting_, end, {}, &Waiting::end);
+  waiting_.insert(place, Waiting{end, std::move(item)});
+}
+
+bool LidarImuInput::is_reached(Utime utime) const {
+  const auto now = guard_.now();
+  if (!now) return false;
+  if (*now - utime > microseconds(parameters_.output.max_wait_s)) return true;
+  const auto reached = [&](Sensor sensor) {
+    return !guard_.is_live(sensor) || *guard_.last(sensor) >= utime;
+  };
+  return reached(Sensor::kImu) && reached(Sensor::kWheels);
+}
+
+void LidarImuInput::settle(InputResults& out, bool everything) {
+  std::vector<InputFault> faults;
+  guard_.find_silent(faults);
+  report(faults, out);
+  const Utime longest = microseconds(parameters_.output.max_piece_s);
+  const Utime lag = microseconds(parameters_.output.lag_s);
+  while (true) {
+    const auto now = guard_.now();
+    const bool has_item = !waiting_.empty();
+    const bool moves = guard_.has_spoken(Sensor::kImu) || guard_.has_spoken(Sensor::kWheels);
+    const bool regular = now && moves && piece_end_ && *now >= *piece_end_ + longest + lag &&
+                         (!has_item || waiting_.front().end > *piece_end_ + longest);
+    if (regular) {
+      if (!everything && !is_reached(*piece_end_ + longest)) return;
+      end_piece(*piece_end_ + longest, out);
+    } else if (has_item) {
+      if (!everything && !is_reached(waiting_.front().end)) return;
+      Waiting next = std::move(waiting_.front());
+      waiting_.pop_front();
+      end_piece(next.end, out);
+      release(std::move(next), out);
+    } else {
+      if (now && moves && !piece_end_) end_piece(*now, out);
+      return;
+    }
+  }
+}
+
+void LidarImuInput::end_piece(Utime utime, InputResults& out) {
+  if (!piece_end_) {
+    motion_.begin(utime);
+    piece_end_ = utime;
+    return;
+  }
+  if (utime <= *piece_end_) return;
+  if (auto piece = motion_.piece(*piece_end_, utime)) {
+    out.emplace_back(*std::move(piece));
+    publish_raw_pose(true, out);
+  } else {
+    ++counters_.pieces_missing;
+  }
+  piece_end_ = utime;
+}
+
+void LidarImuInput::release(Waiting waiting, InputResults& out) {
+  if (auto* scan = std::get_if<PlanarScan>(&waiting.item)) {
+    scan_stamp_ = waiting.end;
+    out.emplace_back(std::move(*scan));
+    return;
+  }
+  release_sweep(std::get<PointSweep>(waiting.item), waiting.end, out);
+}
+
+void LidarImuInput::release_sweep(const PointSweep& raw, Utime stamp, InputResults& out) {
+  if (sweep_stamp_ && stamp <= *sweep_stamp_) {
+    ++counters_.sweeps_dropped;
+    return;
+  }
+  sweep_stamp_ = stamp;
+  DeskewedSweep result = deskew(raw, stamp, motion_.history(), parameters_.lidar.mount);
+  if (!motion_.has_attitude()) result.sweep.attitude.reset();
+  ++counters_.sweeps;
+  if (!result.had_motion) {
+    ++counters_.sweeps_not_deskewed;
+    if (raw.has_times)
+      out.emplace_back(InputFault{InputFaultKind::kNoMotion, channel_of(Sensor::kSweep),
+                                  "no motion is known for the turn: not de-skewed"});
+  }
+  out.emplace_back(std::move(result.sweep));
+}
+
+}  // namespace understory

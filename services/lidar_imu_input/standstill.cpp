@@ -1,0 +1,90 @@
+#include "services/lidar_imu_input/standstill.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+constexpr int kFloorWindows = 200;  // windows that tell how quiet the IMU is at rest
+constexpr std::size_t kFewestSamples = 5;
+
+struct Spread {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  double sigma = 0.0;  ///< Of the worst axis.
+};
+
+template <class Get>
+Spread spread_of(const std::deque<ImuSample>& window, const Get& get) {
+  Spread spread;
+  for (const ImuSample& sample : window) spread.mean += get(sample);
+  spread.mean /= static_cast<double>(window.size());
+  Eigen::Vector3d squares = Eigen::Vector3d::Zero();
+  for (const ImuSample& sample : window) squares += (get(sample) - spread.mean).cwiseAbs2();
+  spread.sigma = std::sqrt(squares.maxCoeff() / static_cast<double>(window.size()));
+  return spread;
+}
+
+}  // namespace
+
+void StandstillDetector::add_wheel_speed(Utime utime, double speed_mps) {
+  if (std::abs(speed_mps) <= parameters_.wheel_speed_mps) return;
+  wheels_turned_ = utime;
+  has_turned_ = true;
+  is_standing_ = false;
+}
+
+bool StandstillDetector::wheels_turn(Utime now) const {
+  return has_turned_ && static_cast<double>(now - wheels_turned_) * 1e-6 < parameters_.window_s;
+}
+
+bool StandstillDetector::is_quiet(const std::optional<Eigen::Vector3d>& gyro_bias) {
+  const Spread gyro = spread_of(
+      window_, [](const ImuSample& s) -> const auto& { return s.angular_rate_rad_s; });
+  const Spread force = spread_of(
+      window_, [](const ImuSample& s) -> const auto& { return s.specific_force_mps2; });
+  const bool floor_known = floor_windows_ >= kFloorWindows;
+  const double most_gyro = floor_known ? std::min(parameters_.gyro_sigma_rad_s,
+                                                  parameters_.floor_factor * gyro_floor_ + 1e-4)
+                                       : parameters_.gyro_sigma_rad_s;
+  const double most_force = floor_known ? std::min(parameters_.force_sigma_mps2,
+                                                   parameters_.floor_factor * force_floor_ + 1e-3)
+                                        : parameters_.force_sigma_mps2;
+  const Eigen::Vector3d turning = gyro.mean - gyro_bias.value_or(Eigen::Vector3d::Zero());
+  // A known bias leaves little room: a slow, smooth curve is no standstill.
+  const double most_turning =
+      gyro_bias ? 0.1 * parameters_.gyro_mean_rad_s : parameters_.gyro_mean_rad_s;
+  const bool quiet = gyro.sigma <= most_gyro && force.sigma <= most_force &&
+                     turning.cwiseAbs().maxCoeff() <= most_turning;
+  if (quiet && !floor_known) {
+    ++floor_windows_;
+    gyro_floor_ += (gyro.sigma - gyro_floor_) / floor_windows_;
+    force_floor_ += (force.sigma - force_floor_) / floor_windows_;
+  }
+  return quiet;
+}
+
+void StandstillDetector::add(const ImuSample& sample,
+                             const std::optional<Eigen::Vector3d>& gyro_bias) {
+  window_.push_back(sample);
+  const auto length = [this] {
+    return static_cast<double>(window_.back().utime - window_.front().utime) * 1e-6;
+  };
+  while (window_.size() > 2 && length() > parameters_.window_s) window_.pop_front();
+  const bool full = window_.size() >= kFewestSamples && length() > 0.8 * parameters_.window_s;
+  const bool stands = full && !wheels_turn(sample.utime) && is_quiet(gyro_bias);
+  if (stands && !is_standing_) since_ = window_.front().utime;
+  is_standing_ = stands;
+  if (stands) longest_s_ = std::max(longest_s_, standing_s());
+}
+
+double StandstillDetector::standing_s() const {
+  return is_standing_ ? static_cast<double>(window_.back().utime - since_) * 1e-6 : 0.0;
+}
+
+void StandstillDetector::reset() {
+  window_.clear();
+  is_standing_ = false;
+}
+
+}  // namespace understory

@@ -1,0 +1,47 @@
+// Whether the vehicle stands still: found, not assumed.
+#pragma once
+
+#include <deque>
+#include <optional>
+
+#include "common/model/imu.hpp"
+#include "services/lidar_imu_input/parameters.hpp"
+
+namespace understory {
+
+/// Looks at a short window of IMU samples (and at the wheels, where there are any). While the
+/// vehicle stands for the first time, learns how quiet this IMU is on this vehicle at rest, and
+/// asks for that later.
+class StandstillDetector {
+ public:
+  explicit StandstillDetector(const StandstillParameters& parameters) : parameters_(parameters) {}
+
+  /// Samples in frame vehicle. `gyro_bias`: what is known of it; none before it is known.
+  void add(const ImuSample& sample, const std::optional<Eigen::Vector3d>& gyro_bias);
+  void add_wheel_speed(Utime utime, double speed_mps);
+  void reset();  ///< After a gap.
+
+  bool is_standing() const { return is_standing_; }
+  /// For how long without a break, up to the latest sample [s].
+  double standing_s() const;
+  /// Seconds in the longest stand so far.
+  double longest_s() const { return longest_s_; }
+  bool is_calibrated() const { return longest_s_ >= parameters_.calibration_s; }
+
+ private:
+  bool is_quiet(const std::optional<Eigen::Vector3d>& gyro_bias);
+  bool wheels_turn(Utime now) const;
+
+  StandstillParameters parameters_;
+  std::deque<ImuSample> window_;
+  bool is_standing_ = false;
+  Utime since_ = 0;
+  double longest_s_ = 0.0;
+  Utime wheels_turned_ = 0;
+  bool has_turned_ = false;
+  double gyro_floor_ = 0.0;  ///< Mean spread at rest; 0 = not known yet.
+  double force_floor_ = 0.0;
+  int floor_windows_ = 0;
+};
+
+}  // namespace understory

@@ -1,0 +1,55 @@
+#include "services/lidar_imu_input/velocity_reference.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace understory {
+namespace {
+
+constexpr double kFastEnough_mps = 2.0;
+constexpr double kLongestStep_s = 3.0;
+constexpr double kUnknownSigma_m = 2.0;
+constexpr double kUnknownSigma_mps = 0.2;
+constexpr double kCourseSigma_rad = 0.03;  // of the course against the heading: side slip
+
+/// East, north and sigma.
+std::optional<std::pair<Eigen::Vector2d, double>> velocity_of(
+    const GnssFix& fix, const std::optional<GnssFix>& previous) {
+  if (fix.velocity_mps) {
+    const double sigma = fix.velocity_sigma_mps > 0.0 ? fix.velocity_sigma_mps : kUnknownSigma_mps;
+    return std::pair{*fix.velocity_mps, sigma};
+  }
+  if (!previous) return std::nullopt;
+  const double seconds = static_cast<double>(fix.utime - previous->utime) * 1e-6;
+  if (seconds <= 0.0 || seconds > kLongestStep_s) return std::nullopt;
+  const double sigma = fix.sigma_m > 0.0 ? fix.sigma_m : kUnknownSigma_m;
+  const Eigen::Vector2d moved = fix.east_north_m - previous->east_north_m;
+  return std::pair{Eigen::Vector2d(moved / seconds), std::sqrt(2.0) * sigma / seconds};
+}
+
+}  // namespace
+
+std::optional<ReferenceVelocity> VelocityReference::add(const GnssFix& fix, double heading_rad) {
+  const auto velocity = velocity_of(fix, previous_);
+  previous_ = fix;
+  if (!velocity) return std::nullopt;
+  const auto& [east_north, sigma] = *velocity;
+  const double speed = east_north.norm();
+  const bool fast = speed > std::max(kFastEnough_mps, 4.0 * sigma);
+  const double course = std::atan2(east_north.y(), east_north.x());
+  if (!east_to_odom_rad_) {
+    if (!fast) return std::nullopt;
+    east_to_odom_rad_ = heading_rad - course;
+  }
+  ReferenceVelocity reference;
+  reference.odom_velocity_mps = Eigen::Rotation2Dd(*east_to_odom_rad_) * east_north;
+  reference.sigma_mps = sigma;
+  if (fast) {
+    reference.heading_rad = course + *east_to_odom_rad_;
+    reference.heading_sigma_rad = std::hypot(sigma / speed, kCourseSigma_rad);
+  }
+  return reference;
+}
+
+}  // namespace understory

@@ -1,0 +1,29 @@
+// Velocity from GNSS in the frame `odom`: only for a reference.
+#pragma once
+
+#include <optional>
+
+#include "common/model/gnss.hpp"
+
+namespace understory {
+
+/// What a fix says about the vehicle, given that it moves where it points.
+struct ReferenceVelocity {
+  Eigen::Vector2d odom_velocity_mps = Eigen::Vector2d::Zero();
+  double sigma_mps = 0.0;
+  std::optional<double> heading_rad;  ///< In odom; none while too slow to tell.
+  double heading_sigma_rad = 0.0;
+};
+
+class VelocityReference {
+ public:
+  /// `heading_rad`: of the vehicle in odom at the fix. None before the first velocity that is fast
+  /// enough to tell how odom lies to east and north. Fixes without velocity are differenced.
+  std::optional<ReferenceVelocity> add(const GnssFix& fix, double heading_rad);
+
+ private:
+  std::optional<GnssFix> previous_;
+  std::optional<double> east_to_odom_rad_;
+};
+
+}  // namespace understory
