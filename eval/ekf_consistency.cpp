@@ -1,0 +1,132 @@
+#include "eval/ekf_consistency.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "services/associator/associator.hpp"
+#include "services/ekf/chi_squared.hpp"
+#include "services/ekf/ekf.hpp"
+
+namespace understory::eval {
+namespace {
+
+double percentile(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return values[static_cast<std::size_t>(at)];
+}
+
+/// The scan with its true identities; false detections get a fresh one each.
+TrackedScan true_tracks(const sim::DriveStep& step, TrackId& next_false) {
+  TrackedScan tracked{step.scan.utime, step.scan.sequence, step.scan.field_of_view, {}};
+  for (std::uint32_t i = 0; i < step.scan.detections.size(); ++i) {
+    const std::int64_t trunk = step.trunks[i];
+    const TrackId id = trunk >= 0 ? static_cast<TrackId>(trunk) + 1 : next_false++;
+    tracked.landmarks.push_back({id, i, step.scan.detections[i]});
+  }
+  return tracked;
+}
+
+double pose_nees(const EkfPose& pose, const SE2& truth) {
+  const Eigen::Vector3d error = (pose.ekf_map_T_vehicle.inverse() * truth).Log();
+  // Before anything moves the pose is exact, and so is its covariance: a floor for both.
+  const Eigen::Matrix3d covariance = pose.covariance + 1e-14 * Eigen::Matrix3d::Identity();
+  return error.dot(covariance.llt().solve(error));
+}
+
+double velocity_nees(const VelocityCorrection& correction, const sim::DriveStep& step,
+                     bool has_bias) {
+  const Eigen::Vector2d truth = step.world_T_vehicle.rotation().transpose() * step.velocity_mps;
+  Eigen::Matrix<double, 5, 1> error;
+  error << truth - correction.velocity_mps, step.bias - correction.bias;
+  if (!has_bias) error.tail<3>().setZero();
+  return error.dot(correction.covariance.llt().solve(error));
+}
+
+}  // namespace
+
+EkfDriveResult run_ekf_drive(const EkfDriveOptions& options, const sim::TrunkField& world,
+                             std::uint64_t seed) {
+  sim::InertialDrive drive(options.drive, world, seed);
+  Ekf filter(options.filter);
+  Associator associator(options.associator);
+  EkfDriveResult result;
+  TrackId next_false = TrackId{1} << 32;
+  const auto scans = static_cast<std::size_t>(options.duration_s / options.drive.scan_interval_s);
+  const bool has_bias = options.drive.odometry != sim::OdometryKind::kWheels &&
+                        options.drive.odometry != sim::OdometryKind::kNone;
+  SE2 start;
+  double active = 0.0;
+  for (std::size_t k = 0; k < scans; ++k) {
+    const sim::DriveStep step = drive.next();
+    if (k == 0) start = step.world_T_vehicle;
+    for (const Odometry& piece : step.odometry) {
+      filter.add(piece);
+      associator.add(piece);
+    }
+    const TrackedScan tracked =
+        options.use_associator ? *associator.add(step.scan) : true_tracks(step, next_false);
+    const auto before = std::chrono::steady_clock::now();
+    const EkfOutput output = filter.add(tracked);
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - before;
+    associator.add(*output.pose);
+    result.update_s.push_back(taken.count());
+    const SE2 truth = start.inverse() * step.world_T_vehicle;
+    result.nees.push_back(pose_nees(*output.pose, truth));
+    result.velocity_nees.push_back(velocity_nees(*output.correction, step, has_bias));
+    active += static_cast<double>(filter.state().landmarks().size());
+    const Eigen::Vector3d error = (truth.inverse() * output.pose->ekf_map_T_vehicle).coordinates();
+    result.final_error_m = error.head<2>().norm();
+    result.final_error_rad = std::abs(error.z());
+    result.driven_m = step.driven_m;
+  }
+  result.restarts = filter.counters().restarts;
+  result.landmarks_refused = filter.counters().landmarks_refused;
+  result.landmarks_used = filter.counters().landmarks_used;
+  result.mean_active_landmarks = active / static_cast<double>(std::max<std::size_t>(1, scans));
+  return result;
+}
+
+EkfConsistency summarise(const std::vector<EkfDriveResult>& runs) {
+  EkfConsistency out;
+  out.runs = static_cast<int>(runs.size());
+  if (runs.empty()) return out;
+  const auto count = static_cast<double>(runs.size());
+  const int degrees = 3 * out.runs;
+  out.band_low = ekf::chi_squared_quantile(0.025, degrees) / count;
+  out.band_high = ekf::chi_squared_quantile(0.975, degrees) / count;
+  out.mean_nees.assign(runs.front().nees.size(), 0.0);
+  std::vector<double> times;
+  double squared = 0.0, used = 0.0, refused = 0.0, velocity = 0.0;
+  for (const EkfDriveResult& run : runs) {
+    for (std::size_t k = 0; k < out.mean_nees.size(); ++k) {
+      out.mean_nees[k] += run.nees[k] / count;
+      velocity += run.velocity_nees[k];
+    }
+    times.insert(times.end(), run.update_s.begin(), run.update_s.end());
+    const double share = run.final_error_m / std::max(1.0, run.driven_m);
+    squared += share * share;
+    out.driven_m += run.driven_m / count;
+    out.mean_active_landmarks += run.mean_active_landmarks / count;
+    out.restarts += run.restarts;
+    used += static_cast<double>(run.landmarks_used);
+    refused += static_cast<double>(run.landmarks_refused);
+  }
+  const auto scans = static_cast<double>(out.mean_nees.size());
+  for (const double nees : out.mean_nees) {
+    out.overall_nees += nees / scans;
+    if (nees >= out.band_low && nees <= out.band_high) out.share_in_band += 1.0 / scans;
+  }
+  out.final_nees = out.mean_nees.back();
+  out.overall_velocity_nees = velocity / (scans * count);
+  out.drift_percent = 100.0 * std::sqrt(squared / count);
+  out.update_p50_s = percentile(times, 0.5);
+  out.update_p99_s = percentile(times, 0.99);
+  out.refused_share = refused / std::max(1.0, used + refused);
+  return out;
+}
+
+}  // namespace understory::eval

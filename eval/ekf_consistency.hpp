@@ -1,0 +1,58 @@
+// Is the filter as good as it says? Simulated drives, errors against the filter's own covariance.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "services/associator/parameters.hpp"
+#include "services/ekf/parameters.hpp"
+#include "sim/inertial_drive.hpp"
+
+namespace understory::eval {
+
+struct EkfDriveOptions {
+  sim::InertialDriveParameters drive;
+  EkfParameters filter;
+  AssociatorParameters associator;
+  /// Track ids from the associator; else the true ones.
+  bool use_associator = true;
+  double duration_s = 60.0;  ///< Standing at the start included.
+};
+
+/// One drive.
+struct EkfDriveResult {
+  std::vector<double> nees;           ///< Of the pose (3 degrees of freedom), per scan.
+  std::vector<double> velocity_nees;  ///< Of velocity and biases (5), per scan.
+  double final_error_m = 0.0;
+  double final_error_rad = 0.0;
+  double driven_m = 0.0;
+  std::vector<double> update_s;  ///< Time of each scan's update.
+  std::uint64_t restarts = 0;
+  std::uint64_t landmarks_refused = 0;
+  std::uint64_t landmarks_used = 0;
+  double mean_active_landmarks = 0.0;
+};
+EkfDriveResult run_ekf_drive(const EkfDriveOptions& options, const sim::TrunkField& world,
+                             std::uint64_t seed);
+
+/// Many drives.
+struct EkfConsistency {
+  int runs = 0;
+  std::vector<double> mean_nees;  ///< Per scan, over the runs; 3 is exact.
+  double band_low = 0.0;          ///< 95 % band of such a mean.
+  double band_high = 0.0;
+  double share_in_band = 0.0;          ///< Of the scans.
+  double overall_nees = 0.0;           ///< Mean over scans and runs.
+  double final_nees = 0.0;             ///< At the last scan.
+  double overall_velocity_nees = 0.0;  ///< 5 is exact.
+  double drift_percent = 0.0;          ///< RMS error at the end, of the distance driven.
+  double driven_m = 0.0;               ///< Mean.
+  double update_p50_s = 0.0;
+  double update_p99_s = 0.0;
+  double mean_active_landmarks = 0.0;
+  double refused_share = 0.0;  ///< Of the landmarks offered.
+  std::uint64_t restarts = 0;
+};
+EkfConsistency summarise(const std::vector<EkfDriveResult>& runs);
+
+}  // namespace understory::eval

@@ -1,0 +1,110 @@
+#include "services/associator/track_list.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <memory>
+
+namespace understory::associator {
+namespace {
+
+/// A track's mean forgets after so many sightings, so that slow drift of `local` does not smear it.
+constexpr double kMaxWeight = 24.0;
+/// The edge of the field of view is not sharp [m].
+constexpr double kEdge_m = 1.0;
+
+}  // namespace
+
+double Track::variance_m2() const {
+  return detection_variance_m2 / std::min<double>(std::max(1u, sightings), kMaxWeight);
+}
+
+std::vector<TrackId> TrackList::update(std::span<const Seen> seen, std::span<const Match> matches,
+                                       const SE2& local_T_vehicle, const FieldOfView& view) {
+  const SE2 vehicle_T_local = local_T_vehicle.inverse();
+  const std::size_t known = tracks_.size();
+  const auto matched = std::make_unique<bool[]>(known);
+  std::vector<bool> used(seen.size(), false);
+  for (const Match& match : matches) {
+    matched[match.track] = true;
+    used[match.seen] = true;
+  }
+  FieldOfView inner = view;
+  inner.max_range_m -= kEdge_m;
+  for (std::size_t i = 0; i < known; ++i) {
+    Track& track = tracks_[i];
+    if (!matched[i] && !inner.contains(vehicle_T_local * track.position_m)) continue;
+    track.history <<= 1;
+    ++track.age;
+    track.missed = matched[i] ? 0 : track.missed + 1;
+  }
+  std::vector<TrackId> published(seen.size(), 0);
+  for (const Match& match : matches) {
+    Track& track = tracks_[match.track];
+    take(track, seen[match.seen], match, local_T_vehicle);
+    if (match.ambiguous) continue;
+    const bool counts = track.id != 0 || !stands_in(track, {matched.get(), known});
+    if (counts) track.history |= 1u;
+    confirm(track);
+    if (counts) published[match.seen] = track.id;
+  }
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (used[i]) continue;
+    Track& track = tracks_.emplace_back();
+    track.position_m = local_T_vehicle * seen[i].position_m;
+    track.detection_variance_m2 = seen[i].variance_m2();
+    track.radius_m = seen[i].radius_m;
+    track.kind = seen[i].kind;
+    track.sightings = track.age = 1;
+    track.history = 1;
+    confirm(track);
+    published[i] = track.id;
+  }
+  drop(local_T_vehicle, view);
+  return published;
+}
+
+void TrackList::take(Track& track, const Seen& seen, const Match& match,
+                     const SE2& local_T_vehicle) {
+  if (match.ambiguous) return;  // Whose position it is cannot be told.
+  ++track.sightings;
+  const double weight = std::min<double>(track.sightings, kMaxWeight);
+  track.position_m += (local_T_vehicle * seen.position_m - track.position_m) / weight;
+  track.detection_variance_m2 += (seen.variance_m2() - track.detection_variance_m2) / weight;
+  track.radius_m += (seen.radius_m - track.radius_m) / weight;
+}
+
+/// A young track within the noise of a consistent one that was not matched itself: the detection
+/// is likely the other's, an outlier.
+bool TrackList::stands_in(const Track& track, std::span<const bool> matched) const {
+  for (std::size_t i = 0; i < matched.size(); ++i) {
+    const Track& other = tracks_[i];
+    if (matched[i] || other.id == 0 || other.kind != track.kind) continue;
+    const double gate2 = 2.0 * parameters_.gate_sigmas * parameters_.gate_sigmas *
+                         (other.detection_variance_m2 + track.detection_variance_m2);
+    if ((other.position_m - track.position_m).squaredNorm() < gate2) return true;
+  }
+  return false;
+}
+
+void TrackList::confirm(Track& track) {
+  if (track.id != 0) return;
+  const auto window = static_cast<unsigned>(std::clamp(parameters_.confirm_window, 1, 63));
+  const std::uint64_t recent = track.history & ((std::uint64_t{1} << window) - 1);
+  if (std::popcount(recent) >= parameters_.confirm_matches) track.id = next_id_++;
+}
+
+void TrackList::drop(const SE2& local_T_vehicle, const FieldOfView& view) {
+  const double range = parameters_.keep_range_factor * view.max_range_m;
+  const auto window = static_cast<unsigned>(std::clamp(parameters_.confirm_window, 1, 63));
+  const std::uint64_t mask = (std::uint64_t{1} << window) - 1;
+  std::erase_if(tracks_, [&](const Track& track) {
+    if ((track.position_m - local_T_vehicle.translation()).norm() > range) return true;
+    if (track.id != 0) return track.missed > static_cast<std::uint32_t>(parameters_.max_missed);
+    // Too often missed to become consistent.
+    const int possible = static_cast<int>(std::min(track.age, window));
+    return possible - std::popcount(track.history & mask) >
+           parameters_.confirm_window - parameters_.confirm_matches;
+  });
+}
+
+}  // namespace understory::associator

@@ -1,0 +1,83 @@
+// The landmarks that are followed at the moment, in a frame that drifts slowly.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/geometry/registration.hpp"
+#include "common/model/landmarks.hpp"
+#include "common/model/tracked.hpp"
+#include "services/associator/parameters.hpp"
+
+namespace understory::associator {
+
+/// A usable detection.
+struct Seen {
+  std::uint32_t detection = 0;                           ///< Index in the scan.
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `vehicle_level`.
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
+  double radius_m = 0.0;
+  LandmarkKind kind = LandmarkKind::kTrunk;
+
+  double variance_m2() const { return 0.5 * covariance_m2.trace(); }
+};
+
+struct Track {
+  TrackId id = 0;                                        ///< 0 = not consistent yet.
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `local`.
+  double detection_variance_m2 = 0.0;                    ///< Mean over its detections.
+  double radius_m = 0.0;
+  std::uint32_t sightings = 0;
+  std::uint64_t history = 0;  ///< Bit k: matched k scans ago, counting scans that should show it.
+  std::uint32_t age = 0;      ///< Such scans since it began.
+  std::uint32_t missed = 0;   ///< Such scans in a row without it.
+  LandmarkKind kind = LandmarkKind::kTrunk;
+
+  /// Of the position.
+  double variance_m2() const;
+};
+
+/// Pair of a seen detection and a track.
+struct Match {
+  std::uint32_t seen = 0;
+  std::uint32_t track = 0;
+  bool ambiguous = false;  ///< Another pairing explains the scan nearly as well.
+};
+
+/// One-to-one pairs inside the gate at the pose `local_T_vehicle`, likeliest first, then improved
+/// by swaps; kinds never mix.
+std::vector<Match> match(std::span<const Track> tracks, std::span<const Seen> seen,
+                         const SE2WithCovariance& local_T_vehicle,
+                         const AssociatorParameters& parameters);
+
+class TrackList {
+ public:
+  explicit TrackList(const AssociatorParameters& parameters) : parameters_(parameters) {}
+
+  const std::vector<Track>& tracks() const { return tracks_; }
+  void clear() { tracks_.clear(); }
+
+  /// Takes a scan's matches at the pose; unmatched detections begin tracks, tracks that should have
+  /// been seen and were not end. Gives the track id of each seen detection, 0 = none to publish.
+  std::vector<TrackId> update(std::span<const Seen> seen, std::span<const Match> matches,
+                              const SE2& local_T_vehicle, const FieldOfView& view);
+
+  TrackId next_id() const { return next_id_; }
+  void set(const std::vector<Track>& tracks, TrackId next_id) {
+    tracks_ = tracks;
+    next_id_ = next_id;
+  }
+
+ private:
+  void take(Track& track, const Seen& seen, const Match& match, const SE2& local_T_vehicle);
+  bool stands_in(const Track& track, std::span<const bool> matched) const;
+  void confirm(Track& track);
+  void drop(const SE2& local_T_vehicle, const FieldOfView& view);
+
+  AssociatorParameters parameters_;
+  std::vector<Track> tracks_;
+  TrackId next_id_ = 1;
+};
+
+}  // namespace understory::associator

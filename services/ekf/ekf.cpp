@@ -1,0 +1,238 @@
+#include "services/ekf/ekf.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "services/ekf/chi_squared.hpp"
+#include "services/ekf/prediction.hpp"
+
+namespace understory {
+namespace {
+
+/// Stamps of one instant may miss each other by rounding.
+constexpr Utime kTolerance_us = 1000;
+constexpr double kStartVariance = 1e-12;
+
+ekf::ErrorForm error_form(const std::string& name) {
+  if (name == "right_invariant") return ekf::ErrorForm::kRightInvariant;
+  if (name == "first_estimate") return ekf::ErrorForm::kFirstEstimate;
+  if (name == "plain") return ekf::ErrorForm::kPlain;
+  throw std::invalid_argument("error_form: no form is named " + name);
+}
+
+double seconds(Utime duration) { return 1e-6 * static_cast<double>(duration); }
+Utime microseconds(double duration_s) { return static_cast<Utime>(1e6 * duration_s); }
+
+bool is_usable(const Odometry& piece) {
+  bool usable = piece.utime > piece.from_utime && piece.from_T_to.coordinates().allFinite() &&
+                piece.covariance.allFinite() && piece.covariance.diagonal().minCoeff() >= 0.0;
+  if (piece.inertial) {
+    const Preintegration& p = *piece.inertial;
+    usable = usable && std::isfinite(p.yaw_rad) && p.velocity_mps.allFinite() &&
+             p.position_m.allFinite() && p.covariance.allFinite() &&
+             p.covariance.diagonal().minCoeff() >= 0.0 && p.bias_jacobian.allFinite() &&
+             p.bias.allFinite();
+  }
+  return usable;
+}
+
+}  // namespace
+
+Ekf::Ekf(const EkfParameters& parameters)
+    : parameters_(parameters),
+      state_(error_form(parameters.error_form), parameters.map.max_landmarks),
+      room_(ekf::kVehicle + 2 * parameters.map.max_landmarks),
+      joint_(parameters.map.max_landmarks),
+      landmark_gate_(ekf::chi_squared_quantile(parameters.gate.landmark_probability, 2)) {
+  const int capacity = ekf::kVehicle + 2 * parameters.map.max_landmarks;
+  backup_ = Eigen::MatrixXd::Zero(capacity, capacity);
+  set_gates_.push_back(0.0);
+  for (int k = 1; k <= parameters.map.max_landmarks; ++k) {
+    set_gates_.push_back(ekf::chi_squared_quantile(parameters.gate.set_probability, 2 * k));
+  }
+}
+
+void Ekf::set_prior() {
+  const EkfPriorParameters& prior = parameters_.prior;
+  state_.clear_landmarks();
+  aliases_.clear();
+  auto covariance = state_.covariance();
+  covariance.setZero();
+  covariance.diagonal()
+      .segment<2>(ekf::kVelocity)
+      .setConstant(prior.velocity_sigma_mps * prior.velocity_sigma_mps);
+  const double gyro = prior.gyro_bias_sigma * prior.gyro_bias_sigma;
+  const double force = prior.accelerometer_bias_sigma * prior.accelerometer_bias_sigma;
+  covariance.diagonal().segment<3>(ekf::kBias) << gyro, force, force;
+}
+
+void Ekf::start(Utime utime) {
+  started_ = true;
+  utime_ = utime;
+  set_prior();
+  state_.set_pose_covariance(kStartVariance * Eigen::Matrix3d::Identity());
+  last_sound_ = pose();
+  pose_sequence_ = 0;
+}
+
+void Ekf::restart(Utime utime, const std::string& reason) {
+  ++counters_.restarts;
+  ++reset_counter_;
+  counters_.last_reason = reason;
+  refused_scans_ = 0;
+  utime_ = utime;
+  set_prior();
+  const EkfPose& last = last_sound_;
+  state_.anchor_m.setZero();
+  state_.position = last.ekf_map_T_vehicle.translation();
+  state_.heading = last.ekf_map_T_vehicle.theta();
+  state_.velocity.setZero();
+  state_.bias = last.bias;
+  state_.first_position = state_.position;
+  state_.first_velocity = state_.velocity;
+  const EkfRestartParameters& grow = parameters_.restart;
+  const Eigen::Vector3d sigma(grow.sigma_m, grow.sigma_m, grow.sigma_rad);
+  const Eigen::Matrix3d added = sigma.cwiseAbs2().asDiagonal();
+  state_.set_pose_covariance(last.covariance + added);
+  state_.follow_with_anchor();
+}
+
+EkfOutput Ekf::add(const Odometry& piece) {
+  ++counters_.odometry;
+  if (!is_usable(piece)) {
+    ++counters_.odometry_refused;
+    counters_.last_reason = "odometry is not finite";
+    return {};
+  }
+  if (!started_) start(piece.from_utime);
+  const Utime newest = waiting_.empty() ? utime_ : waiting_.back().utime;
+  if (piece.utime < newest - microseconds(parameters_.restart.clock_jump_s)) {
+    waiting_.clear();
+    last_scan_.reset();
+    restart(piece.from_utime, "the clock jumped back");
+  } else if (piece.from_utime < newest - kTolerance_us) {
+    ++counters_.odometry_refused;
+    counters_.last_reason = "odometry is late or overlaps";
+    return {};
+  }
+  waiting_.push_back(piece);
+  const Utime overdue = piece.utime - microseconds(parameters_.max_scan_delay_s);
+  if (waiting_.front().utime > overdue) return {};
+  advance(overdue);
+  used_ = refused_ = 0;
+  EkfOutput output;
+  output.pose = pose();
+  if (waiting_.empty() ? piece.is_standing : waiting_.front().is_standing) {
+    output.correction = outputs().correction;
+  }
+  return output;
+}
+
+/// Uses the odometry that ends by `utime`.
+void Ekf::advance(Utime utime) {
+  while (!waiting_.empty() && waiting_.front().utime <= utime + kTolerance_us) {
+    use(waiting_.front());
+    waiting_.pop_front();
+  }
+}
+
+void Ekf::use(const Odometry& piece) {
+  if (piece.utime <= utime_ + kTolerance_us) {
+    ++counters_.odometry_refused;
+    counters_.last_reason = "odometry came after the scan at its end";
+    return;
+  }
+  if (piece.from_utime < utime_ - kTolerance_us) {
+    // The piece began before a scan that came without it: what is left of it is unknown.
+    ++counters_.odometry_refused;
+    counters_.last_reason = "odometry overlaps a scan";
+    bridge(piece.utime);
+    return;
+  }
+  if (piece.from_utime > utime_ + kTolerance_us) bridge(piece.from_utime);
+  const EkfMotionParameters& motion = parameters_.motion;
+  if (piece.inertial) {
+    ekf::MeasuredMotion measured;
+    if (piece.is_standing) {
+      measured.covariance_m2 =
+          motion.standing_sigma_m * motion.standing_sigma_m * Eigen::Matrix2d::Identity();
+      measured.turn_sigma_rad = motion.standing_sigma_rad;
+    } else if (piece.has_wheels) {
+      const Eigen::Matrix2d turn = piece.from_T_to.rotation();
+      measured.position_m = piece.from_T_to.translation();
+      measured.covariance_m2 = turn * piece.covariance.topLeftCorner<2, 2>() * turn.transpose();
+    }
+    if (piece.is_standing || piece.has_wheels) {
+      ekf::predict(state_, *piece.inertial, measured, motion, room_);
+    } else {
+      ekf::predict(state_, ekf::transition_by(state_, *piece.inertial), motion, room_);
+    }
+  } else {
+    const SE2WithCovariance moved{piece.from_T_to, piece.covariance};
+    const double duration = seconds(piece.utime - piece.from_utime);
+    ekf::predict(state_, ekf::transition_by(state_, moved, duration, motion), motion, room_);
+  }
+  if (piece.is_standing) {
+    ekf::measure_standing(state_, motion.standing_sigma_mps, room_);
+  } else if (motion.sideways_sigma_mps > 0.0) {
+    ekf::measure_no_slide(state_, motion.sideways_sigma_mps, room_);
+  }
+  utime_ = piece.utime;
+  state_.follow_with_anchor();
+  if (!state_.is_sound()) restart(utime_, "the state was not finite after a prediction");
+}
+
+/// Nothing tells the motion until `utime`.
+void Ekf::bridge(Utime utime) {
+  ++counters_.gaps;
+  const double duration = seconds(utime - utime_);
+  if (duration > parameters_.restart.max_gap_s) return restart(utime, "too long a gap");
+  ekf::predict(state_, ekf::transition_over_gap(state_, duration, parameters_.motion),
+               parameters_.motion, room_);
+  utime_ = utime;
+}
+
+EkfPose Ekf::pose() {
+  EkfPose out;
+  out.utime = utime_;
+  out.sequence = pose_sequence_++;
+  out.ekf_map_T_vehicle = state_.pose();
+  out.covariance = state_.pose_covariance();
+  const Eigen::Matrix<double, 5, 5> motion = state_.velocity_covariance();
+  out.velocity_mps = ekf::rotation_of(state_.heading).transpose() * state_.velocity;
+  out.velocity_covariance = motion.topLeftCorner<2, 2>();
+  out.bias = state_.bias;
+  out.bias_covariance = motion.bottomRightCorner<3, 3>();
+  out.landmarks_used = used_;
+  out.landmarks_refused = refused_;
+  out.reset_counter = reset_counter_;
+  last_sound_ = out;
+  return out;
+}
+
+EkfOutput Ekf::outputs() {
+  EkfOutput out;
+  out.pose = pose();
+  EkfMap& map = out.map.emplace();
+  map.utime = utime_;
+  map.sequence = map_sequence_++;
+  const auto& landmarks = state_.landmarks();
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    const ekf::MapLandmark& landmark = landmarks[i];
+    map.landmarks.push_back({landmark.id, landmark.position + state_.anchor_m,
+                             state_.landmark_covariance(i), landmark.radius_m, landmark.kind,
+                             landmark.times_seen});
+  }
+  std::sort(map.landmarks.begin(), map.landmarks.end(),
+            [](const EkfLandmark& a, const EkfLandmark& b) { return a.track_id < b.track_id; });
+  VelocityCorrection& correction = out.correction.emplace();
+  correction.utime = utime_;
+  correction.sequence = out.pose->sequence;
+  correction.velocity_mps = out.pose->velocity_mps;
+  correction.bias = state_.bias;
+  correction.covariance = state_.velocity_covariance();
+  return out;
+}
+
+}  // namespace understory

@@ -1,0 +1,281 @@
+// The filter and one scan's landmarks.
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "services/ekf/ekf.hpp"
+
+namespace understory {
+namespace {
+
+/// Sightings that one search for joint compatibility takes.
+constexpr std::size_t kMaxSearched = 24;
+constexpr int kMaxRounds = 4;
+
+bool is_usable(const Detection& detection) {
+  if (!detection.position_m.allFinite() || !detection.covariance_m2.allFinite()) return false;
+  const Eigen::Matrix2d covariance = detection.covariance_m2.topLeftCorner<2, 2>();
+  return covariance.llt().info() == Eigen::Success;
+}
+
+}  // namespace
+
+EkfOutput Ekf::add(const TrackedScan& scan) {
+  ++counters_.scans;
+  const auto jump = static_cast<Utime>(1e6 * parameters_.restart.clock_jump_s);
+  if (!started_) start(scan.utime);
+  if (last_scan_ && scan.utime < *last_scan_ - jump) {
+    waiting_.clear();
+    restart(scan.utime, "the clock jumped back");
+  } else if ((last_scan_ && scan.utime <= *last_scan_) || scan.utime < utime_ - 1000) {
+    ++counters_.scans_refused;
+    counters_.last_reason = "scan is late or came twice";
+    return {};
+  }
+  last_scan_ = scan.utime;
+  advance(scan.utime);
+  if (scan.utime > utime_ + 1000) bridge(scan.utime);
+  ++scan_count_;
+  used_ = refused_ = 0;
+  read(scan);
+  update_known();
+  for (const ekf::Pairing& pairing : pairings_) see(scan, pairing);
+  rejoin_lost(scan);
+  if (!state_.is_sound()) {
+    restart(utime_, "the state was not finite after an update");
+  } else {
+    add_new(scan);
+    count_missed(scan.field_of_view);
+    remove_distant(scan.field_of_view);
+    check_lost();
+  }
+  counters_.landmarks_used += used_;
+  counters_.landmarks_refused += refused_;
+  return outputs();
+}
+
+void Ekf::read(const TrackedScan& scan) {
+  sightings_.clear();
+  source_.clear();
+  for (std::uint32_t i = 0; i < scan.landmarks.size(); ++i) {
+    const Detection& seen = scan.landmarks[i].observed;
+    if (scan.landmarks[i].track_id == 0 || !is_usable(seen)) {
+      ++counters_.landmarks_unusable;
+      continue;
+    }
+    sightings_.push_back({seen.position_m.head<2>(), seen.covariance_m2.topLeftCorner<2, 2>()});
+    source_.push_back(i);
+  }
+  settled_.assign(sightings_.size(), false);
+  tracks_.clear();
+  for (const std::uint32_t i : source_) tracks_.push_back(scan.landmarks[i].track_id);
+}
+
+std::optional<std::uint32_t> Ekf::landmark_of(TrackId track) const {
+  const auto alias = std::lower_bound(aliases_.begin(), aliases_.end(), track,
+                                      [](const Alias& a, TrackId key) { return a.track < key; });
+  if (alias == aliases_.end() || alias->track != track) return std::nullopt;
+  const auto& landmarks = state_.landmarks();
+  for (std::uint32_t i = 0; i < landmarks.size(); ++i) {
+    if (landmarks[i].id == alias->landmark) return i;
+  }
+  return std::nullopt;
+}
+
+/// Landmarks whose track goes on: each through its own gate, then all through the set's.
+void Ekf::update_known() {
+  pairings_.clear();
+  std::vector<bool> taken(state_.landmarks().size(), false);
+  for (std::uint32_t k = 0; k < sightings_.size(); ++k) {
+    const auto landmark = landmark_of(tracks_[k]);
+    if (!landmark) continue;
+    settled_[k] = true;
+    const bool refused = taken[*landmark] ||
+                         ekf::squared_distance(state_, *landmark, sightings_[k]) > landmark_gate_;
+    if (refused) {
+      ++refused_;
+      ++state_.landmark(*landmark).refused;
+      continue;
+    }
+    taken[*landmark] = true;
+    pairings_.push_back({k, *landmark});
+  }
+  update_checked(pairings_);
+}
+
+/// Updates by as many pairings as are compatible together: the worst go until the rest are.
+void Ekf::update_checked(std::vector<ekf::Pairing>& pairings) {
+  if (pairings.empty()) return;
+  const int n = state_.size();
+  backup_.topLeftCorner(n, n) = state_.covariance();
+  const auto worse = [&](const ekf::Pairing& a, const ekf::Pairing& b) {
+    return ekf::squared_distance(state_, a.landmark, sightings_[a.sighting]) <
+           ekf::squared_distance(state_, b.landmark, sightings_[b.sighting]);
+  };
+  while (!pairings.empty()) {
+    const double distance = joint_.apply(state_, sightings_, pairings, room_);
+    if (distance >= 0.0 && distance <= set_gates_[pairings.size()]) {
+      joint_.finish(state_, room_);
+      break;
+    }
+    state_.covariance() = backup_.topLeftCorner(n, n);
+    // A twentieth at a time, so that a scan at odds with the map ends soon.
+    const std::size_t drop = 1 + pairings.size() / 20;
+    for (std::size_t k = 0; k < drop && !pairings.empty(); ++k) {
+      const auto worst = std::max_element(pairings.begin(), pairings.end(), worse);
+      ++state_.landmark(worst->landmark).refused;
+      ++refused_;
+      pairings.erase(worst);
+    }
+  }
+  used_ += static_cast<std::uint32_t>(pairings.size());
+}
+
+void Ekf::see(const TrackedScan& scan, const ekf::Pairing& pairing) {
+  settled_[pairing.sighting] = true;
+  ekf::MapLandmark& landmark = state_.landmark(pairing.landmark);
+  const Detection& seen = scan.landmarks[source_[pairing.sighting]].observed;
+  ++landmark.times_seen;
+  landmark.missed = 0;
+  landmark.refused = 0;
+  landmark.last_scan = scan_count_;
+  if (std::isfinite(seen.radius_m)) {
+    landmark.radius_m += (seen.radius_m - landmark.radius_m) / landmark.times_seen;
+  }
+}
+
+/// Tracks that the filter does not know may be landmarks whose track was lost. Each round makes the
+/// pose surer, so that more fall into place.
+void Ekf::rejoin_lost(const TrackedScan& scan) {
+  for (int round = 0; round < kMaxRounds; ++round) {
+    if (!rejoin_round(scan)) break;
+  }
+}
+
+bool Ekf::rejoin_round(const TrackedScan& scan) {
+  std::vector<ekf::Candidates> candidates;
+  const auto& landmarks = state_.landmarks();
+  const auto pause = static_cast<std::uint64_t>(parameters_.gate.rejoin_after_scans);
+  for (std::uint32_t k = 0; k < sightings_.size(); ++k) {
+    if (settled_[k]) continue;
+    const LandmarkKind kind = scan.landmarks[source_[k]].observed.kind;
+    std::vector<std::pair<double, std::uint32_t>> near;
+    for (std::uint32_t i = 0; i < landmarks.size(); ++i) {
+      if (landmarks[i].kind != kind || landmarks[i].last_scan + pause >= scan_count_) continue;
+      const double distance = ekf::squared_distance(state_, i, sightings_[k]);
+      if (distance <= landmark_gate_) near.emplace_back(distance, i);
+    }
+    if (near.empty()) continue;
+    std::sort(near.begin(), near.end());
+    ekf::Candidates& added = candidates.emplace_back();
+    added.sighting = k;
+    for (const auto& [distance, i] : near) added.landmarks.push_back(i);
+  }
+  if (candidates.empty()) return false;
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const ekf::Candidates& a, const ekf::Candidates& b) {
+                     return a.landmarks.size() < b.landmarks.size();
+                   });
+  if (candidates.size() > kMaxSearched) candidates.resize(kMaxSearched);
+  std::vector<ekf::Pairing> found = ekf::joint_compatibility(
+      state_, sightings_, candidates,
+      {parameters_.gate.rejoin_probability, parameters_.gate.rejoin_max_nodes});
+  update_checked(found);
+  for (const ekf::Pairing& pairing : found) {
+    const TrackId track = tracks_[pairing.sighting];
+    const auto at = std::lower_bound(aliases_.begin(), aliases_.end(), track,
+                                     [](const Alias& a, TrackId key) { return a.track < key; });
+    aliases_.insert(at, {track, landmarks[pairing.landmark].id});
+    see(scan, pairing);
+    ++counters_.rejoined;
+  }
+  return !found.empty();
+}
+
+bool Ekf::near_old(const Eigen::Vector2d& position) const {
+  const double limit = parameters_.map.min_separation_m * parameters_.map.min_separation_m;
+  const auto& landmarks = state_.landmarks();
+  return std::any_of(landmarks.begin(), landmarks.end(), [&](const ekf::MapLandmark& landmark) {
+    return (landmark.position - position).squaredNorm() < limit;
+  });
+}
+
+void Ekf::add_new(const TrackedScan& scan) {
+  const Eigen::Matrix2d rotation = ekf::rotation_of(state_.heading);
+  for (std::size_t k = 0; k < sightings_.size(); ++k) {
+    if (settled_[k] || landmark_of(tracks_[k])) continue;
+    const Eigen::Vector2d position = state_.position + rotation * sightings_[k].position_m;
+    if (near_old(position) || !make_room(scan.field_of_view)) {
+      ++counters_.landmarks_too_near;
+      continue;
+    }
+    const Detection& seen = scan.landmarks[source_[k]].observed;
+    ekf::MapLandmark landmark;
+    landmark.id = tracks_[k];
+    landmark.radius_m = std::isfinite(seen.radius_m) ? seen.radius_m : 0.0;
+    landmark.kind = seen.kind;
+    landmark.times_seen = 1;
+    landmark.last_scan = scan_count_;
+    state_.add_landmark(landmark, sightings_[k].position_m, sightings_[k].covariance_m2);
+    const auto at = std::lower_bound(aliases_.begin(), aliases_.end(), landmark.id,
+                                     [](const Alias& a, TrackId key) { return a.track < key; });
+    if (at != aliases_.end() && at->track == landmark.id) {
+      at->landmark = landmark.id;
+    } else {
+      aliases_.insert(at, {landmark.id, landmark.id});
+    }
+  }
+}
+
+/// True if a landmark may be added: a full state gives up the one that is out of sight for longest.
+bool Ekf::make_room(const FieldOfView& view) {
+  const auto& landmarks = state_.landmarks();
+  if (static_cast<int>(landmarks.size()) < state_.max_landmarks()) return true;
+  std::optional<std::size_t> oldest;
+  const Eigen::Matrix2d back = ekf::rotation_of(state_.heading).transpose();
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    if (view.contains(back * (landmarks[i].position - state_.position))) continue;
+    if (!oldest || landmarks[i].last_scan < landmarks[*oldest].last_scan) oldest = i;
+  }
+  if (oldest) remove(*oldest);
+  return oldest.has_value();
+}
+
+void Ekf::count_missed(const FieldOfView& view) {
+  const Eigen::Matrix2d back = ekf::rotation_of(state_.heading).transpose();
+  for (std::size_t i = 0; i < state_.landmarks().size(); ++i) {
+    ekf::MapLandmark& landmark = state_.landmark(i);
+    if (landmark.last_scan == scan_count_) continue;
+    if (view.contains(back * (landmark.position - state_.position))) ++landmark.missed;
+  }
+}
+
+void Ekf::remove_distant(const FieldOfView& view) {
+  const double range = parameters_.map.keep_range_factor * view.max_range_m;
+  for (std::size_t i = state_.landmarks().size(); i-- > 0;) {
+    const ekf::MapLandmark& landmark = state_.landmarks()[i];
+    const bool distant = (landmark.position - state_.position).norm() > range;
+    const bool gone = landmark.missed > static_cast<std::uint32_t>(parameters_.map.max_missed);
+    const bool wrong = landmark.refused >= static_cast<std::uint32_t>(parameters_.map.max_refused);
+    if (distant || gone || wrong) remove(i);
+  }
+}
+
+void Ekf::remove(std::size_t landmark) {
+  const TrackId id = state_.landmarks()[landmark].id;
+  state_.remove_landmark(landmark);
+  std::erase_if(aliases_, [&](const Alias& alias) { return alias.landmark == id; });
+  ++counters_.removed;
+}
+
+/// Scan after scan at odds with the map: the estimate is wrong by more than it says.
+void Ekf::check_lost() {
+  const bool at_odds = refused_ >= 4 && refused_ > 2 * used_;
+  refused_scans_ = at_odds ? refused_scans_ + 1 : 0;
+  if (refused_scans_ >= parameters_.restart.after_refused_scans) {
+    restart(utime_, "most landmarks were refused, scan after scan");
+  }
+}
+
+}  // namespace understory

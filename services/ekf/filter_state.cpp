@@ -1,0 +1,154 @@
+#include "services/ekf/filter_state.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace understory::ekf {
+namespace {
+
+constexpr double kAnchorReach_m = 150.0;
+
+/// V with Exp(rho, t) = (V rho, t): the translation part of the exponential map.
+Eigen::Matrix2d translation_map(double angle) {
+  const SE2 x = SE2::Exp({1.0, 0.0, angle});
+  return (Eigen::Matrix2d() << x.x(), -x.y(), x.y(), x.x()).finished();
+}
+
+}  // namespace
+
+Eigen::Matrix2d quarter_turn() { return (Eigen::Matrix2d() << 0.0, -1.0, 1.0, 0.0).finished(); }
+Eigen::Matrix2d rotation_of(double heading) { return SE2(0.0, 0.0, heading).rotation(); }
+
+FilterState::FilterState(ErrorForm form, int max_landmarks)
+    : form_(form), max_landmarks_(max_landmarks) {
+  landmarks_.reserve(static_cast<std::size_t>(max_landmarks));
+  const Eigen::Index capacity = kVehicle + 2 * max_landmarks;
+  covariance_ = Eigen::MatrixXd::Zero(capacity, capacity);
+}
+
+Eigen::Vector2d FilterState::lever(const Eigen::Vector2d& x) const {
+  if (form_ == ErrorForm::kRightInvariant) return turned_left(x);
+  return Eigen::Vector2d::Zero();
+}
+
+void FilterState::retract(const Eigen::Ref<const Eigen::VectorXd>& delta) {
+  const double turn = delta(kHeading);
+  const bool invariant = form_ == ErrorForm::kRightInvariant;
+  const Eigen::Matrix2d whole = invariant ? rotation_of(turn) : Eigen::Matrix2d::Identity();
+  const Eigen::Matrix2d part = invariant ? translation_map(turn) : Eigen::Matrix2d::Identity();
+  const auto move = [&](Eigen::Vector2d& x, int at) {
+    x = whole * x + part * delta.segment<2>(at);
+  };
+  heading = wrap_angle(heading + turn);
+  move(position, kPosition);
+  move(velocity, kVelocity);
+  bias += delta.segment<3>(kBias);
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) move(landmarks_[i].position, row(i));
+}
+
+void FilterState::add_landmark(const MapLandmark& landmark, const Eigen::Vector2d& in_vehicle,
+                               const Eigen::Matrix2d& variance) {
+  const int n = size();
+  const Eigen::Matrix2d rotation = rotation_of(heading);
+  const Eigen::Vector2d offset = rotation * in_vehicle;
+  landmarks_.push_back(landmark);
+  MapLandmark& added = landmarks_.back();
+  added.position = position + offset;
+  added.first_position = added.position;
+  // Its error is the position's, plus the heading's on the way (zero if right invariant), plus
+  // noise.
+  const Eigen::Vector2d by_heading = turned_left(offset) + lever(position) - lever(added.position);
+  for (int i = 0; i < n; ++i) {
+    for (int k = 0; k < 2; ++k) {
+      covariance_(n + k, i) =
+          covariance(kPosition + k, i) + by_heading(k) * covariance(kHeading, i);
+    }
+  }
+  const Eigen::Matrix2d noise = rotation * variance * rotation.transpose();
+  for (int c = 0; c < 2; ++c) {
+    for (int r = c; r < 2; ++r) {
+      covariance_(n + r, n + c) = covariance_(n + r, kPosition + c) +
+                                  by_heading(c) * covariance_(n + r, kHeading) + noise(r, c);
+    }
+  }
+}
+
+void FilterState::remove_landmark(std::size_t i) {
+  const int n = size();
+  const int at = row(i);
+  for (int c = 0; c < at; ++c) {
+    for (int r = at + 2; r < n; ++r) covariance_(r - 2, c) = covariance_(r, c);
+  }
+  for (int c = at + 2; c < n; ++c) {
+    for (int r = c; r < n; ++r) covariance_(r - 2, c - 2) = covariance_(r, c);
+  }
+  landmarks_.erase(landmarks_.begin() + static_cast<std::ptrdiff_t>(i));
+}
+
+Eigen::Matrix3d FilterState::pose_covariance() const {
+  Eigen::Matrix3d to_right = Eigen::Matrix3d::Zero();
+  const Eigen::Matrix2d back = rotation_of(heading).transpose();
+  to_right.block<2, 1>(0, 0) = back * lever(position);
+  to_right.block<2, 2>(0, 1) = back;
+  to_right(2, 0) = 1.0;
+  return to_right * covariance_block<3, 3>(0, 0) * to_right.transpose();
+}
+
+void FilterState::set_pose_covariance(const Eigen::Matrix3d& covariance) {
+  Eigen::Matrix3d from_right = Eigen::Matrix3d::Zero();
+  from_right(0, 2) = 1.0;
+  from_right.block<2, 2>(1, 0) = rotation_of(heading);
+  from_right.block<2, 1>(1, 2) = -lever(position);
+  covariance_.leftCols(3).topRows(size()).setZero();
+  covariance_.topLeftCorner<3, 3>() = from_right * covariance * from_right.transpose();
+}
+
+Eigen::Matrix<double, 5, 5> FilterState::velocity_covariance() const {
+  Eigen::Matrix<double, 5, kVehicle> to_vehicle = Eigen::Matrix<double, 5, kVehicle>::Zero();
+  const Eigen::Matrix2d back = rotation_of(heading).transpose();
+  to_vehicle.block<2, 1>(0, kHeading) = back * (lever(velocity) - turned_left(velocity));
+  to_vehicle.block<2, 2>(0, kVelocity) = back;
+  to_vehicle.block<3, 3>(2, kBias).setIdentity();
+  return to_vehicle * covariance_block<kVehicle, kVehicle>(0, 0) * to_vehicle.transpose();
+}
+
+Eigen::Matrix2d FilterState::landmark_covariance(std::size_t i) const {
+  const Eigen::Vector2d arm = lever(landmarks_[i].position);
+  const Eigen::Vector2d shared = covariance_block<2, 1>(row(i), kHeading);
+  return covariance_block<2, 2>(row(i), row(i)) + arm * shared.transpose() +
+         shared * arm.transpose() + covariance_(0, 0) * arm * arm.transpose();
+}
+
+void FilterState::follow_with_anchor() {
+  if (position.norm() < kAnchorReach_m) return;
+  // With x = y + d, the error d_x - t S x becomes d_y - t S y by adding t S d.
+  const Eigen::Vector2d shift = position;
+  const Eigen::Vector2d arm = lever(shift);
+  const int n = size();
+  Eigen::VectorXd moved = Eigen::VectorXd::Zero(n);
+  moved.segment<2>(kPosition) = arm;
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) moved.segment<2>(row(i)) = arm;
+  Eigen::VectorXd heading_column(n);
+  copy_column(kHeading, heading_column);
+  const double variance = heading_column(0);
+  heading_column += 0.5 * variance * moved;
+  covariance().selfadjointView<Eigen::Lower>().rankUpdate(moved, heading_column);
+  position -= shift;
+  first_position -= shift;
+  anchor_m += shift;
+  for (MapLandmark& landmark : landmarks_) {
+    landmark.position -= shift;
+    landmark.first_position -= shift;
+  }
+}
+
+bool FilterState::is_sound() const {
+  const int n = size();
+  bool sound =
+      std::isfinite(heading) && position.allFinite() && velocity.allFinite() && bias.allFinite();
+  for (int i = 0; i < n; ++i) sound = sound && covariance_(i, i) >= 0.0;
+  for (int i = 0; i < n; ++i) sound = sound && std::isfinite(covariance_(n - 1, i));
+  return sound;
+}
+
+}  // namespace understory::ekf

@@ -1,0 +1,115 @@
+#include "services/ekf/joint_compatibility.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <limits>
+
+#include "services/ekf/chi_squared.hpp"
+
+namespace understory::ekf {
+namespace {
+
+/// Depth-first search. The joint covariance's Cholesky factor grows and shrinks by one pairing at a
+/// time.
+class Search {
+ public:
+  Search(const FilterState& state, std::span<const Sighting> sightings,
+         std::span<const Candidates> candidates, const CompatibilityGates& gates)
+      : state_(state), sightings_(sightings), candidates_(candidates), nodes_(gates.max_nodes) {
+    const auto rows = static_cast<Eigen::Index>(2 * candidates.size());
+    factor_ = Eigen::MatrixXd::Zero(rows, rows);
+    whitened_ = Eigen::VectorXd::Zero(rows);
+    for (int k = 1; k <= static_cast<int>(candidates.size()); ++k) {
+      limits_.push_back(chi_squared_quantile(gates.probability, 2 * k));
+    }
+  }
+
+  std::vector<Pairing> run() {
+    visit(0, 0.0);
+    return best_;
+  }
+
+ private:
+  void visit(std::size_t level, double distance) {
+    if (level == candidates_.size()) {
+      const bool larger = chosen_.size() > best_.size();
+      const bool nearer = chosen_.size() == best_.size() && distance < best_distance_;
+      if (larger || nearer) {
+        best_ = chosen_;
+        best_distance_ = distance;
+      }
+      return;
+    }
+    if (nodes_-- <= 0) return visit(candidates_.size(), distance);
+    for (const std::uint32_t landmark : candidates_[level].landmarks) {
+      if (taken(landmark)) continue;
+      const Pairing pairing{candidates_[level].sighting, landmark};
+      const double more = extend(pairing);
+      if (more < 0.0 || distance + more > limits_[chosen_.size()]) continue;
+      chosen_.push_back(pairing);
+      visit(level + 1, distance + more);
+      chosen_.pop_back();
+    }
+    // Without this sighting, if that can still be as good as the best.
+    if (chosen_.size() + (candidates_.size() - level - 1) >= best_.size()) {
+      visit(level + 1, distance);
+    }
+  }
+
+  bool taken(std::uint32_t landmark) const {
+    return std::any_of(chosen_.begin(), chosen_.end(),
+                       [&](const Pairing& p) { return p.landmark == landmark; });
+  }
+
+  /// Adds two rows to the factor; gives what they add to the squared distance, negative if the
+  /// covariance is not positive definite.
+  double extend(const Pairing& pairing) {
+    const auto at = static_cast<Eigen::Index>(2 * chosen_.size());
+    const Sighting& seen = sightings_[pairing.sighting];
+    const Eigen::Matrix2d rotation = rotation_of(state_.heading);
+    for (std::size_t k = 0; k < chosen_.size(); ++k) {
+      factor_.block<2, 2>(at, static_cast<Eigen::Index>(2 * k)) =
+          innovation_covariance(state_, pairing.landmark, chosen_[k].landmark);
+    }
+    auto row = factor_.block(at, 0, 2, at);
+    if (at > 0) {
+      factor_.topLeftCorner(at, at)
+          .triangularView<Eigen::Lower>()
+          .transpose()
+          .solveInPlace<Eigen::OnTheRight>(row);
+    }
+    const Eigen::Matrix2d own = innovation_covariance(state_, pairing.landmark, pairing.landmark) +
+                                rotation * seen.covariance_m2 * rotation.transpose() -
+                                row * row.transpose();
+    const Eigen::LLT<Eigen::Matrix2d> llt(own);
+    if (llt.info() != Eigen::Success) return -1.0;
+    factor_.block<2, 2>(at, at) = llt.matrixL();
+    const Eigen::Vector2d error =
+        innovation(state_, pairing.landmark, seen) - row * whitened_.head(at);
+    whitened_.segment<2>(at) = llt.matrixL().solve(error);
+    return whitened_.segment<2>(at).squaredNorm();
+  }
+
+  const FilterState& state_;
+  std::span<const Sighting> sightings_;
+  std::span<const Candidates> candidates_;
+  int nodes_;
+  std::vector<double> limits_;
+  Eigen::MatrixXd factor_;
+  Eigen::VectorXd whitened_;
+  std::vector<Pairing> chosen_;
+  std::vector<Pairing> best_;
+  double best_distance_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace
+
+std::vector<Pairing> joint_compatibility(const FilterState& state,
+                                         std::span<const Sighting> sightings,
+                                         std::span<const Candidates> candidates,
+                                         const CompatibilityGates& gates) {
+  if (candidates.empty()) return {};
+  return Search(state, sightings, candidates, gates).run();
+}
+
+}  // namespace understory::ekf

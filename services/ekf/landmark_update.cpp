@@ -1,0 +1,101 @@
+#include "services/ekf/landmark_update.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+
+namespace understory::ekf {
+
+Eigen::Vector2d heading_row(const FilterState& state, std::size_t i) {
+  if (state.form() == ErrorForm::kRightInvariant) return Eigen::Vector2d::Zero();
+  const MapLandmark& landmark = state.landmarks()[i];
+  if (state.form() == ErrorForm::kFirstEstimate) {
+    return -turned_left(landmark.first_position - state.first_position);
+  }
+  return -turned_left(landmark.position - state.position);
+}
+
+Eigen::Vector2d innovation(const FilterState& state, std::size_t i, const Sighting& seen) {
+  return rotation_of(state.heading) * seen.position_m -
+         (state.landmarks()[i].position - state.position);
+}
+
+Eigen::Matrix2d innovation_covariance(const FilterState& state, std::size_t a, std::size_t b) {
+  const int ra = FilterState::row(a);
+  const int rb = FilterState::row(b);
+  Eigen::Matrix2d sum =
+      state.covariance_block<2, 2>(ra, rb) + state.covariance_block<2, 2>(kPosition, kPosition) -
+      state.covariance_block<2, 2>(ra, kPosition) - state.covariance_block<2, 2>(kPosition, rb);
+  if (state.form() == ErrorForm::kRightInvariant) return sum;
+  const Eigen::Vector2d ha = heading_row(state, a);
+  const Eigen::Vector2d hb = heading_row(state, b);
+  const Eigen::Vector2d a_heading = state.covariance_block<2, 1>(ra, kHeading) -
+                                    state.covariance_block<2, 1>(kPosition, kHeading);
+  const Eigen::Vector2d b_heading = state.covariance_block<2, 1>(rb, kHeading) -
+                                    state.covariance_block<2, 1>(kPosition, kHeading);
+  sum += a_heading * hb.transpose() + ha * b_heading.transpose() +
+         state.covariance(0, 0) * ha * hb.transpose();
+  return sum;
+}
+
+double squared_distance(const FilterState& state, std::size_t i, const Sighting& seen) {
+  const Eigen::Matrix2d rotation = rotation_of(state.heading);
+  const Eigen::Vector2d error = innovation(state, i, seen);
+  const Eigen::Matrix2d spread =
+      innovation_covariance(state, i, i) + rotation * seen.covariance_m2 * rotation.transpose();
+  return error.dot(spread.inverse() * error);
+}
+
+JointUpdate::JointUpdate(int max_landmarks) : vehicle_(kVehicle + 2 * max_landmarks, 3) {}
+
+double JointUpdate::apply(FilterState& state, std::span<const Sighting> sightings,
+                          std::span<const Pairing> pairings, LowRank& room) {
+  room.start(state.size());
+  constexpr std::size_t kStep = kMaxRows / 2;
+  double distance = 0.0;
+  for (std::size_t at = 0; at < pairings.size(); at += kStep) {
+    const std::size_t count = std::min(kStep, pairings.size() - at);
+    const double step = apply_some(state, sightings, pairings.subspan(at, count), room);
+    if (step < 0.0) return -1.0;
+    distance += step;
+  }
+  return distance;
+}
+
+double JointUpdate::apply_some(FilterState& state, std::span<const Sighting> sightings,
+                               std::span<const Pairing> pairings, LowRank& room) {
+  const int n = state.size();
+  const int rows = 2 * static_cast<int>(pairings.size());
+  const bool invariant = state.form() == ErrorForm::kRightInvariant;
+  const Eigen::Matrix2d rotation = rotation_of(state.heading);
+  auto cross = room.cross(n, rows);
+  for (int k = 0; k < 3; ++k) state.copy_column(k, vehicle_.col(k).head(n));
+  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxRows, 1> error(rows);
+  for (int k = 0; k < rows; k += 2) {
+    const Pairing& pairing = pairings[static_cast<std::size_t>(k / 2)];
+    const int at = FilterState::row(pairing.landmark);
+    const Eigen::Vector2d heading = heading_row(state, pairing.landmark);
+    auto delta = room.delta(n);
+    error.segment<2>(k) =
+        innovation(state, pairing.landmark, sightings[pairing.sighting]) -
+        (delta.segment<2>(at) - delta.segment<2>(kPosition) + heading * delta(kHeading));
+    for (int r = 0; r < 2; ++r) {
+      state.copy_column(at + r, cross.col(k + r));
+      cross.col(k + r) -= vehicle_.col(kPosition + r).head(n);
+      if (!invariant) cross.col(k + r) += heading(r) * vehicle_.col(kHeading).head(n);
+    }
+  }
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxRows, kMaxRows> spread(rows, rows);
+  for (int k = 0; k < rows; k += 2) {
+    const Pairing& pairing = pairings[static_cast<std::size_t>(k / 2)];
+    const int at = FilterState::row(pairing.landmark);
+    spread.middleRows<2>(k) = cross.middleRows<2>(at) - cross.middleRows<2>(kPosition);
+    if (!invariant) {
+      spread.middleRows<2>(k) += heading_row(state, pairing.landmark) * cross.row(kHeading);
+    }
+    spread.block<2, 2>(k, k) +=
+        rotation * sightings[pairing.sighting].covariance_m2 * rotation.transpose();
+  }
+  return room.apply(state, error, spread);
+}
+
+}  // namespace understory::ekf

@@ -1,0 +1,274 @@
+#include "services/ekf/prediction.hpp"
+
+#include <cmath>
+
+namespace understory::ekf {
+namespace {
+
+/// A change that the turned vehicle made in the map's axes, as it depends on the heading at its
+/// start; with first-estimate Jacobians from first estimates.
+struct Change {
+  Eigen::Vector2d position;
+  Eigen::Vector2d velocity;
+};
+
+Change change(const FilterState& state, const Transition& t, const Eigen::Vector2d& position,
+              const Eigen::Vector2d& velocity) {
+  if (state.form() != ErrorForm::kFirstEstimate) return {position, velocity};
+  return {t.position - state.first_position - state.first_velocity * t.seconds,
+          t.velocity - state.first_velocity};
+}
+
+/// Fills `error` and `noise_input` for a start of heading `rotation` and preintegrated Jacobians.
+void linearise(const FilterState& state, const Preintegration& inertial, Transition& t) {
+  const Eigen::Matrix2d rotation = rotation_of(state.heading);
+  const Change turned =
+      change(state, t, rotation * inertial.position_m, rotation * inertial.velocity_mps);
+  const Eigen::Vector2d p = state.lever(t.position);
+  const Eigen::Vector2d v = state.lever(t.velocity);
+  t.yaw_by_bias = inertial.bias_jacobian.row(0);
+  t.error.block<1, 3>(kHeading, kBias) = t.yaw_by_bias;
+  t.error.block<2, 1>(kPosition, kHeading) = state.lever(state.position) +
+                                             t.seconds * state.lever(state.velocity) +
+                                             turned_left(turned.position) - p;
+  t.error.block<2, 2>(kPosition, kVelocity) = t.seconds * Eigen::Matrix2d::Identity();
+  t.error.block<2, 3>(kPosition, kBias) =
+      rotation * inertial.bias_jacobian.bottomRows<2>() - p * t.yaw_by_bias;
+  t.error.block<2, 1>(kVelocity, kHeading) =
+      state.lever(state.velocity) + turned_left(turned.velocity) - v;
+  t.error.block<2, 3>(kVelocity, kBias) =
+      rotation * inertial.bias_jacobian.middleRows<2>(1) - v * t.yaw_by_bias;
+  t.noise_input(kHeading, 0) = 1.0;
+  t.noise_input.block<2, 1>(kPosition, 0) = -p;
+  t.noise_input.block<2, 2>(kPosition, 3) = rotation;
+  t.noise_input.block<2, 1>(kVelocity, 0) = -v;
+  t.noise_input.block<2, 2>(kVelocity, 1) = rotation;
+  t.noise = inertial.covariance;
+}
+
+/// Preintegrated change at the filter's own bias.
+Preintegration at_bias(const Preintegration& inertial, const InertialBias& bias) {
+  Preintegration moved = inertial;
+  const Eigen::Matrix<double, 5, 1> shift = inertial.bias_jacobian * (bias - inertial.bias);
+  moved.yaw_rad += shift(0);
+  moved.velocity_mps += shift.segment<2>(1);
+  moved.position_m += shift.tail<2>();
+  moved.bias = bias;
+  return moved;
+}
+
+/// What turning by noise does to the landmarks: -lever, stacked.
+template <typename Arms>
+void landmark_arms(const FilterState& state, Arms&& arms) {
+  for (std::size_t i = 0; i < state.landmarks().size(); ++i) {
+    arms.template segment<2>(2 * static_cast<Eigen::Index>(i)) =
+        -state.lever(state.landmarks()[i].position);
+  }
+}
+
+/// What turning does to right invariant landmarks: their block and what they share with the
+/// vehicle, before the vehicle's own error moves on.
+void turn_landmarks(FilterState& state, const Transition& t, const Matrix8& vehicle,
+                    LowRank& room) {
+  const int count = state.size() - kVehicle;
+  auto shared = state.covariance().bottomLeftCorner(count, kVehicle);
+  auto arms = room.first(count);
+  auto mixed = room.second(count);
+  landmark_arms(state, arms);
+  const double turn =
+      (t.yaw_by_bias * vehicle.block<3, 3>(kBias, kBias)).dot(t.yaw_by_bias) + t.noise(0, 0);
+  mixed.noalias() = shared.middleCols<3>(kBias) * t.yaw_by_bias.transpose();
+  mixed += 0.5 * turn * arms;
+  auto block = state.covariance().bottomRightCorner(count, count);
+  block.selfadjointView<Eigen::Lower>().rankUpdate(arms, mixed);
+  shared.noalias() += arms * (t.yaw_by_bias * vehicle.middleRows<3>(kBias));
+}
+
+/// Passes the covariance through the transition: O(size^2) where right invariant, else O(size).
+void pass_covariance(FilterState& state, const Transition& t, const EkfMotionParameters& parameters,
+                     LowRank& room) {
+  const int count = state.size() - kVehicle;
+  const bool turns = state.form() == ErrorForm::kRightInvariant;
+  const Matrix8 vehicle = state.covariance_block<kVehicle, kVehicle>(0, 0);
+  if (turns) turn_landmarks(state, t, vehicle, room);
+  auto shared = state.covariance().bottomLeftCorner(count, kVehicle);
+  const Matrix8 passed_on = t.error.transpose();
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Matrix<double, 1, kVehicle> row = shared.row(i);
+    shared.row(i).noalias() = row * passed_on;
+  }
+  if (turns) shared.noalias() += room.first(count) * (t.noise.row(0) * t.noise_input.transpose());
+  auto own = state.covariance().topLeftCorner<kVehicle, kVehicle>();
+  own = t.error * vehicle * passed_on + t.noise_input * t.noise * t.noise_input.transpose();
+  const double gyro = parameters.gyro_walk * parameters.gyro_walk * t.seconds;
+  const double force = parameters.accelerometer_walk * parameters.accelerometer_walk * t.seconds;
+  own.diagonal().segment<3>(kBias) += Eigen::Vector3d(gyro, force, force);
+}
+
+void move_estimate(FilterState& state, const Transition& t) {
+  state.heading = wrap_angle(t.heading);
+  state.position = t.position;
+  state.velocity = t.velocity;
+  state.first_position = t.position;
+  state.first_velocity = t.velocity;
+}
+
+}  // namespace
+
+Transition transition_by(const FilterState& state, const Preintegration& given) {
+  const Preintegration inertial = at_bias(given, state.bias);
+  const Eigen::Matrix2d rotation = rotation_of(state.heading);
+  Transition t;
+  t.seconds = inertial.seconds;
+  t.heading = state.heading + inertial.yaw_rad;
+  t.position = state.position + state.velocity * t.seconds + rotation * inertial.position_m;
+  t.velocity = state.velocity + rotation * inertial.velocity_mps;
+  linearise(state, inertial, t);
+  return t;
+}
+
+Transition transition_over_gap(const FilterState& state, double seconds,
+                               const EkfMotionParameters& parameters) {
+  Preintegration nothing;
+  nothing.seconds = seconds;
+  nothing.bias = state.bias;
+  const double q = parameters.gap_acceleration * parameters.gap_acceleration;
+  const double turn = parameters.gap_yaw_rate * seconds;
+  nothing.covariance(0, 0) = turn * turn;
+  for (int k = 1; k <= 2; ++k) {
+    nothing.covariance(k, k) = q * seconds;
+    nothing.covariance(k, k + 2) = nothing.covariance(k + 2, k) = 0.5 * q * seconds * seconds;
+    nothing.covariance(k + 2, k + 2) = q * seconds * seconds * seconds / 3.0;
+  }
+  return transition_by(state, nothing);
+}
+
+Transition transition_by(const FilterState& state, const SE2WithCovariance& motion, double seconds,
+                         const EkfMotionParameters& parameters) {
+  const SE2 next = SE2(state.position, state.heading) * motion.mean;
+  const Eigen::Matrix2d rotation = next.rotation();
+  Transition t;
+  t.seconds = seconds;
+  t.heading = next.theta();
+  t.position = next.translation();
+  t.velocity = rotation * motion.mean.Log().head<2>() / seconds;
+  const Eigen::Vector2d p = state.lever(t.position);
+  // The new velocity is fixed to the vehicle: it turns with the new heading.
+  const Eigen::Vector2d v = turned_left(t.velocity) - state.lever(t.velocity);
+  const Eigen::Vector2d way =
+      t.position -
+      (state.form() == ErrorForm::kFirstEstimate ? state.first_position : state.position);
+  t.error.block<2, 1>(kPosition, kHeading) = state.lever(state.position) + turned_left(way) - p;
+  t.error.block<2, 8>(kVelocity, 0).setZero();
+  t.error.block<2, 1>(kVelocity, kHeading) = v;
+  t.noise_input(kHeading, 0) = 1.0;
+  t.noise_input.block<2, 1>(kPosition, 0) = -p;
+  t.noise_input.block<2, 2>(kPosition, 3) = rotation;
+  t.noise_input.block<2, 1>(kVelocity, 0) = v;
+  t.noise_input.block<2, 2>(kVelocity, 1) = rotation;
+  const Eigen::Matrix2d way_noise = motion.covariance.topLeftCorner<2, 2>();
+  const double change_mps = parameters.wheel_acceleration * seconds;
+  t.noise(0, 0) = motion.covariance(2, 2);
+  t.noise.block<2, 2>(3, 3) = way_noise;
+  t.noise.block<2, 2>(1, 3) = way_noise / seconds;
+  t.noise.block<2, 2>(3, 1) = way_noise / seconds;
+  t.noise.block<2, 2>(1, 1) =
+      way_noise / (seconds * seconds) + change_mps * change_mps * Eigen::Matrix2d::Identity();
+  t.noise.block<2, 1>(3, 0) = motion.covariance.block<2, 1>(0, 2);
+  t.noise.block<2, 1>(1, 0) = motion.covariance.block<2, 1>(0, 2) / seconds;
+  t.noise.row(0).tail<4>() = t.noise.col(0).tail<4>().transpose();
+  return t;
+}
+
+void predict(FilterState& state, const Transition& transition,
+             const EkfMotionParameters& parameters, LowRank& room) {
+  pass_covariance(state, transition, parameters, room);
+  move_estimate(state, transition);
+}
+
+void predict(FilterState& state, const Preintegration& inertial, const MeasuredMotion& measured,
+             const EkfMotionParameters& parameters, LowRank& room) {
+  const Transition t = transition_by(state, inertial);
+  const Preintegration own = at_bias(inertial, state.bias);
+  const Eigen::Matrix2d back = rotation_of(state.heading).transpose();
+  // Measured: (way in the axes of the start, turn).
+  Eigen::Matrix<double, 3, kVehicle> rows = Eigen::Matrix<double, 3, kVehicle>::Zero();
+  rows.block<2, 1>(0, kHeading) =
+      t.seconds * back * (state.lever(state.velocity) - turned_left(state.velocity));
+  rows.block<2, 2>(0, kVelocity) = t.seconds * back;
+  rows.block<2, 3>(0, kBias) = own.bias_jacobian.bottomRows<2>();
+  rows.block<1, 3>(2, kBias) = own.bias_jacobian.row(0);
+  Eigen::Matrix<double, 5, 3> pick = Eigen::Matrix<double, 5, 3>::Zero();
+  pick(3, 0) = pick(4, 1) = pick(0, 2) = 1.0;
+  Eigen::Vector3d innovation;
+  innovation << measured.position_m - back * state.velocity * t.seconds - own.position_m,
+      -own.yaw_rad;
+  const int count = state.size() - kVehicle;
+  const int rows_used = measured.turn_sigma_rad ? 3 : 2;
+  const Eigen::Matrix<double, kVehicle, 3> before =
+      state.covariance_block<kVehicle, kVehicle>(0, 0) * rows.transpose();
+  Eigen::Matrix3d spread = rows * before + pick.transpose() * t.noise * pick;
+  spread.topLeftCorner<2, 2>() += measured.covariance_m2;
+  if (measured.turn_sigma_rad) spread(2, 2) += *measured.turn_sigma_rad * *measured.turn_sigma_rad;
+
+  auto cross = room.cross(state.size(), 3);
+  const Eigen::Matrix<double, 5, 3> noise = t.noise * pick;
+  cross.topRows<kVehicle>() = t.error * before + t.noise_input * noise;
+  const Eigen::RowVector3d turning = t.yaw_by_bias * before.middleRows<3>(kBias) + noise.row(0);
+  for (int i = 0; i < count; i += 2) {
+    const Eigen::Vector2d arm =
+        -state.lever(state.landmarks()[static_cast<std::size_t>(i / 2)].position);
+    cross.middleRows<2>(kVehicle + i) =
+        state.covariance().block<2, kVehicle>(kVehicle + i, 0) * rows.transpose() + arm * turning;
+  }
+  predict(state, t, parameters, room);
+  room.start(state.size());
+  if (rows_used == 3) {
+    room.apply(state, innovation, spread);
+  } else {
+    const Eigen::Vector2d way = innovation.head<2>();
+    const Eigen::Matrix2d way_spread = spread.topLeftCorner<2, 2>();
+    room.apply(state, way, way_spread);
+  }
+  state.retract(room.delta(state.size()));
+}
+
+namespace {
+
+/// Measures the velocity's component along each row of `axes` (unit vectors in the map) as zero.
+template <int Rows>
+void measure_velocity(FilterState& state, const Eigen::Matrix<double, Rows, 2>& axes,
+                      double sigma_mps, LowRank& room) {
+  const int n = state.size();
+  const Eigen::Vector2d by_heading = state.lever(state.velocity) - turned_left(state.velocity);
+  Eigen::Matrix<double, kVehicle, Rows> rows = Eigen::Matrix<double, kVehicle, Rows>::Zero();
+  rows.row(kHeading) = (axes * by_heading).transpose();
+  rows.template middleRows<2>(kVelocity) = axes.transpose();
+  const Eigen::Matrix<double, kVehicle, Rows> vehicle =
+      state.covariance_block<kVehicle, kVehicle>(0, 0) * rows;
+  auto cross = room.cross(n, Rows);
+  cross.template topRows<kVehicle>() = vehicle;
+  if (n > kVehicle) {
+    cross.bottomRows(n - kVehicle).noalias() =
+        state.covariance().bottomLeftCorner(n - kVehicle, kVehicle) * rows;
+  }
+  Eigen::Matrix<double, Rows, Rows> spread = rows.transpose() * vehicle;
+  spread.diagonal().array() += sigma_mps * sigma_mps;
+  const Eigen::Matrix<double, Rows, 1> innovation = -axes * state.velocity;
+  room.start(n);
+  room.apply(state, innovation, spread);
+  state.retract(room.delta(n));
+}
+
+}  // namespace
+
+void measure_standing(FilterState& state, double sigma_mps, LowRank& room) {
+  measure_velocity<2>(state, Eigen::Matrix2d::Identity(), sigma_mps, room);
+}
+
+void measure_no_slide(FilterState& state, double sigma_mps, LowRank& room) {
+  const Eigen::RowVector2d across = rotation_of(state.heading).col(1).transpose();
+  measure_velocity<1>(state, across, sigma_mps, room);
+}
+
+}  // namespace understory::ekf
