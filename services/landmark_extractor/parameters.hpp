@@ -67,14 +67,13 @@ struct SweepTrunkParameters {
 
 /// Corners of houses from lasers that scan in space.
 struct CornerParameters {
-  double line_tolerance_m = 0.06;         ///< What is so near a line is on it.
-  double min_length_m = 0.6;              ///< Of a wall, as far as it is seen.
-  double min_extent_m = 0.8;              ///< In height, of the returns on a wall.
-  double max_gap_m = 0.3;                 ///< From the end of a wall's returns to the corner...
-  double max_gap_per_range = 0.02;        ///< ... plus this much per metre of range.
-  double max_skew_rad = 0.2;              ///< Of the angle between the walls from a right one.
-  double flatness_sigma_m = 0.01;         ///< Of a wall; more points do not average it out.
-  double straightness_sigma_rad = 0.005;  ///< The same for its direction.
+  double line_tolerance_m = 0.06;   ///< What is so near a line is on it.
+  double min_length_m = 0.6;        ///< Of a wall, as far as it is seen.
+  double min_extent_m = 0.8;        ///< In height, of the returns on a wall.
+  double max_gap_m = 0.3;           ///< From the end of a wall's returns to the corner...
+  double max_gap_per_range = 0.02;  ///< ... plus this much per metre of range.
+  double max_skew_rad = 0.2;        ///< Of the angle between the walls from a right one.
+  double flatness_sigma_m = 0.01;   ///< Of a wall; more points do not average it out.
   int min_rings = 3;
 };
 

@@ -50,7 +50,9 @@ LandmarkScan SweepExtractor::extract(const PointSweep& sweep) {
   ground_.fit(cloud_.points(), cloud_.sensor_m().head<2>(), static_cast<float>(reach));
   find_runs(cloud_, sweep_, runs_);
   trunks_.find(cloud_, runs_, ground_, level_covariance, result.detections);
+  corners_.find(cloud_, runs_, ground_, level_covariance, result.detections);
   counters_.trunks = trunks_.counters();
+  counters_.corners = corners_.counters();
   sort_by_bearing(result.detections);
   return result;
 }

@@ -9,6 +9,7 @@
 #include "services/landmark_extractor/ground_surface.hpp"
 #include "services/landmark_extractor/parameters.hpp"
 #include "services/landmark_extractor/ring_runs.hpp"
+#include "services/landmark_extractor/sweep_corners.hpp"
 #include "services/landmark_extractor/sweep_trunks.hpp"
 
 namespace understory {
@@ -20,13 +21,16 @@ struct SweepCounters {
   std::uint64_t without_attitude = 0;  ///< Taken as level.
   PointCounters points;
   TrunkCounters trunks;
+  CornerCounters corners;
 };
 
 /// Keeps its working memory from sweep to sweep.
 class SweepExtractor {
  public:
   explicit SweepExtractor(const LandmarkExtractorParameters& parameters)
-      : sweep_(parameters.sweep), trunks_(parameters.sweep, parameters.trunk) {}
+      : sweep_(parameters.sweep),
+        trunks_(parameters.sweep, parameters.trunk),
+        corners_(parameters.sweep, parameters.corner) {}
 
   /// A malformed sweep gives no detections. Invariant: trunks first, each kind in order of bearing.
   LandmarkScan extract(const PointSweep& sweep);
@@ -38,6 +42,7 @@ class SweepExtractor {
   GroundSurface ground_;
   std::vector<Run> runs_;
   SweepTrunks trunks_;
+  SweepCorners corners_;
   SweepCounters counters_;
 };
 

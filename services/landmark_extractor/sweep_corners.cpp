@@ -1,0 +1,142 @@
+#include "services/landmark_extractor/sweep_corners.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "services/landmark_extractor/level.hpp"
+
+namespace understory {
+namespace {
+
+/// A wall is looked at this far from its corner to see whether it ends below a person's height [m].
+constexpr double kAside_m = 0.4;
+
+double square(double value) { return value * value; }
+
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+/// Away from `place` into the wall.
+Eigen::Vector2d along(const WallLine& wall, const Eigen::Vector2d& place) {
+  const double at = wall.direction.dot(place - wall.centroid_m);
+  return at < 0.5 * (wall.from_m + wall.to_m) ? wall.direction : Eigen::Vector2d(-wall.direction);
+}
+
+}  // namespace
+
+void SweepCorners::find(const RingCloud& cloud, const std::vector<Run>& runs,
+                        const GroundSurface& ground, const Eigen::Matrix2d& level_covariance_rad2,
+                        std::vector<Detection>& detections) {
+  found_ = walls_.find(cloud, runs);
+  counters_.walls += found_.size();
+  for (std::size_t i = 0; i < found_.size(); ++i) {
+    for (std::size_t j = i + 1; j < found_.size(); ++j) {
+      if (const auto corner = judge(cloud, found_[i], found_[j], ground, level_covariance_rad2)) {
+        detections.push_back(*corner);
+        ++counters_.corners;
+      }
+    }
+  }
+}
+
+/// Where the lines meet, if both walls are seen up to there.
+std::optional<SweepCorners::Meeting> SweepCorners::meet(const WallLine& a, const WallLine& b,
+                                                        const Eigen::Vector2d& sensor) const {
+  const double sine = cross(a.direction, b.direction);
+  if (std::abs(sine) < 0.3) return std::nullopt;
+  Meeting meeting;
+  const Eigen::Vector2d between = b.centroid_m - a.centroid_m;
+  meeting.reach_a_m = cross(between, b.direction) / sine;
+  meeting.reach_b_m = cross(between, a.direction) / sine;
+  meeting.place_m = a.centroid_m + meeting.reach_a_m * a.direction;
+  const double gap =
+      corner_.max_gap_m + corner_.max_gap_per_range * (meeting.place_m - sensor).norm();
+  const auto at_end = [&](const WallLine& wall, double reach) {
+    return std::abs(reach - wall.from_m) < gap || std::abs(reach - wall.to_m) < gap;
+  };
+  if (!at_end(a, meeting.reach_a_m) || !at_end(b, meeting.reach_b_m)) return std::nullopt;
+  const double overlap = std::min(a.high_z_m, b.high_z_m) - std::max(a.low_z_m, b.low_z_m);
+  if (overlap < 0.5 * corner_.min_extent_m) return std::nullopt;
+  meeting.along_a = along(a, meeting.place_m);
+  meeting.along_b = along(b, meeting.place_m);
+  return meeting;
+}
+
+std::optional<Detection> SweepCorners::judge(const RingCloud& cloud, const WallLine& a,
+                                             const WallLine& b, const GroundSurface& ground,
+                                             const Eigen::Matrix2d& level_covariance_rad2) {
+  const Eigen::Vector2d sensor = cloud.sensor_m().head<2>().cast<double>();
+  const auto meeting = meet(a, b, sensor);
+  if (!meeting || (meeting->place_m - sensor).norm() > sweep_.max_range_m) return std::nullopt;
+  ++counters_.pairs;
+  if (std::abs(std::asin(std::clamp(meeting->along_a.dot(meeting->along_b), -1.0, 1.0))) >
+      corner_.max_skew_rad) {
+    ++counters_.skew;
+    return std::nullopt;
+  }
+  // Both faces are seen from in front of the corner or from within it.
+  const Eigen::Vector2d to_sensor = sensor - meeting->place_m;
+  const bool inside_a = meeting->along_a.dot(to_sensor) > 0.0;
+  const bool inside_b = meeting->along_b.dot(to_sensor) > 0.0;
+  if (inside_a != inside_b) {
+    ++counters_.hidden;
+    return std::nullopt;
+  }
+  const GroundHeight below = ground.below(meeting->place_m);
+  if (!stands(cloud, a, meeting->place_m, meeting->along_a, below.height_m) ||
+      !stands(cloud, b, meeting->place_m, meeting->along_b, below.height_m)) {
+    ++counters_.low;
+    return std::nullopt;
+  }
+  Detection corner;
+  corner.kind = LandmarkKind::kCorner;
+  corner.position_m << meeting->place_m, below.height_m + sweep_.breast_height_m;
+  // Each wall fixes the place across itself; unevenness counts at the corner, not at the centroid.
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+  const auto add = [&](const WallLine& wall, double reach) {
+    const double variance = square(wall.offset_sigma_m) + square(reach * wall.direction_sigma_rad);
+    information += wall.normal() * wall.normal().transpose() / variance;
+  };
+  add(a, meeting->reach_a_m);
+  add(b, meeting->reach_b_m);
+  corner.covariance_m2 = from_level_error(corner.position_m, level_covariance_rad2);
+  corner.covariance_m2.topLeftCorner<2, 2>() += information.inverse();
+  corner.covariance_m2(2, 2) += square(below.sigma_m);
+  const Eigen::Vector2d inward = meeting->along_a + meeting->along_b;
+  const Eigen::Vector2d open = inside_a ? inward : Eigen::Vector2d(-inward);
+  corner.bearing_rad = std::atan2(open.y(), open.x());
+  corner.bearing_sigma_rad = 0.5 * std::hypot(a.direction_sigma_rad, b.direction_sigma_rad);
+  return corner;
+}
+
+/// Whether no beam passes over the wall, near its corner, below a person's height.
+bool SweepCorners::stands(const RingCloud& cloud, const WallLine& wall,
+                          const Eigen::Vector2d& corner, const Eigen::Vector2d& along,
+                          double ground_z) const {
+  const Eigen::Vector2d sensor = cloud.sensor_m().head<2>().cast<double>();
+  const double aside = std::min(kAside_m, 0.5 * wall.length());
+  const Eigen::Vector2d place = corner + aside * along;
+  const double distance = (place - sensor).norm();
+  const auto azimuth =
+      static_cast<float>(std::atan2(place.y() - sensor.y(), place.x() - sensor.x()));
+  int over = 0;
+  for (std::size_t ring = 0; ring < cloud.rings(); ++ring) {
+    if (cloud.step_rad(ring) <= 0.0F) continue;
+    const std::size_t i = std::min(cloud.first_at(ring, azimuth), cloud.ring_end(ring) - 1);
+    const RingPoint& point = cloud.points()[i];
+    const double slope = (point.z_m - cloud.sensor_m().z()) / point.range_m;
+    const double z = cloud.sensor_m().z() + slope * distance;
+    const bool is_above = z > wall.high_z_m + 0.02 && z < ground_z + sweep_.standing_height_m;
+    if (!is_above) continue;
+    float off = std::abs(point.azimuth_rad - azimuth);
+    off = std::min(off, std::abs(off - 2.0F * std::numbers::pi_v<float>));
+    const bool is_there = off < 3.0F * cloud.step_rad(ring);
+    if (is_there && point.range_m > distance + sweep_.clearance_m) ++over;
+  }
+  return over == 0;
+}
+
+}  // namespace understory
