@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 namespace understory::sim {
 namespace {
@@ -13,24 +15,24 @@ constexpr double kCell = 0.5;
 constexpr int kCells = 512;     // a power of two: indices wrap by masking
 constexpr int kBlockCells = 8;  // 4 m
 constexpr int kBlocks = kCells / kBlockCells;
-constexpr double kBlock = kCell * kBlockCells;
-constexpr double kLeastStep = 0.1;
+constexpr double kLeastStep = 0.25;  ///< [m]
 
-int cell_of(double x_m) { return static_cast<int>(std::floor(x_m / kCell)); }
 std::size_t node(int column, int row) {
   return static_cast<std::size_t>(row & (kCells - 1)) * kCells + (column & (kCells - 1));
 }
 
-/// Distance along the ray to where it leaves the block of `position` in one axis.
-double to_block_border(double position, double direction) {
-  if (direction == 0.0) return std::numeric_limits<double>::infinity();
-  const double low = std::floor(position / kBlock) * kBlock;
-  return ((direction > 0.0 ? low + kBlock : low) - position) / direction;
+/// Metres along the ray to where it leaves the block of `position` (in cells, positive).
+double to_border(double position, double per_metre, double inverse) {
+  if (per_metre == 0.0) return std::numeric_limits<double>::infinity();
+  const int low = static_cast<int>(position) & ~(kBlockCells - 1);
+  return ((per_metre > 0.0 ? low + kBlockCells : low) - position) * inverse;
 }
 
 }  // namespace
 
 Ground::Ground() { fill_table(); }
+
+Ground::Ground(std::vector<Wave> waves) : waves_(std::move(waves)) { fill_table(); }
 
 Ground::Ground(const GroundParameters& parameters, std::mt19937_64& random)
     : slope_(parameters.slope) {
@@ -45,7 +47,6 @@ void Ground::add_waves(int count, double min_length_m, double max_length_m, doub
   std::uniform_real_distribution<double> angle(0.0, 2.0 * std::numbers::pi);
   std::uniform_real_distribution<double> log_length(std::log(min_length_m), std::log(max_length_m));
   const std::size_t first = waves_.size();
-  double power = 0.0;
   for (int i = 0; i < count; ++i) {
     const double length_m = std::exp(log_length(random));
     const double direction = angle(random);
@@ -53,20 +54,28 @@ void Ground::add_waves(int count, double min_length_m, double max_length_m, doub
     const Eigen::Vector2d turns(std::round(kTile / length_m * std::cos(direction)),
                                 std::round(kTile / length_m * std::sin(direction)));
     waves_.push_back({2.0 * std::numbers::pi / kTile * turns, angle(random), length_m});
-    power += 0.5 * length_m * length_m;
   }
-  for (std::size_t i = first; i < waves_.size(); ++i) {
-    waves_[i].amplitude_m *= sigma_m / std::sqrt(power);
-  }
+  // Waves of one length and direction add up or cancel: the sum is measured.
+  const Ground waves_alone(
+      std::vector<Wave>(waves_.begin() + static_cast<std::ptrdiff_t>(first), waves_.end()));
+  double squares = 0.0;
+  for (const float height_m : waves_alone.table_) squares += height_m * height_m;
+  const double scale =
+      sigma_m / std::sqrt(squares / static_cast<double>(waves_alone.table_.size()));
+  for (std::size_t i = first; i < waves_.size(); ++i) waves_[i].amplitude_m *= scale;
 }
 
 void Ground::fill_table() {
   table_.assign(static_cast<std::size_t>(kCells) * kCells, 0.0F);
-  if (!waves_.empty()) {
+  for (const Wave& wave : waves_) {
+    // Along a row the wave turns by the same angle from node to node: no sine for each.
+    const std::complex<double> turn = std::polar(1.0, kCell * wave.wave_vector.x());
     for (int row = 0; row < kCells; ++row) {
+      const double start = kCell * row * wave.wave_vector.y() + wave.phase_rad;
+      std::complex<double> here = std::polar(wave.amplitude_m, start);
       for (int column = 0; column < kCells; ++column) {
-        const Eigen::Vector2d at_m(column * kCell, row * kCell);
-        table_[node(column, row)] = static_cast<float>(height(at_m) - slope_.dot(at_m));
+        table_[node(column, row)] += static_cast<float>(here.imag());
+        here *= turn;
       }
     }
   }
@@ -117,64 +126,105 @@ Eigen::Vector3d Ground::normal(const Eigen::Vector2d& at_m) const {
   return Eigen::Vector3d(-g.x(), -g.y(), 1.0).normalized();
 }
 
-double Ground::table_height(double x_m, double y_m) const {
-  const double u = x_m / kCell;
-  const double v = y_m / kCell;
-  const double column = std::floor(u);
-  const double row = std::floor(v);
-  const double a = u - column;
-  const double b = v - row;
-  const int c = static_cast<int>(column);
-  const int r = static_cast<int>(row);
-  const double low = table_[node(c, r)] + a * (table_[node(c + 1, r)] - table_[node(c, r)]);
-  const double high =
-      table_[node(c, r + 1)] + a * (table_[node(c + 1, r + 1)] - table_[node(c, r + 1)]);
-  return low + b * (high - low);
-}
+/// A ray over the table: everything in cells, heights above the plane.
+struct Ground::Track {
+  // Far from zero, so that positions are positive and truncation rounds down.
+  static constexpr double kShift = 4096.0 * kCells;
+  double u0, v0, z0;     ///< Start.
+  double du, dv, climb;  ///< Per metre of the ray.
 
-const Ground::Block& Ground::block_at(double x_m, double y_m) const {
-  const int column = (cell_of(x_m) & (kCells - 1)) / kBlockCells;
-  const int row = (cell_of(y_m) & (kCells - 1)) / kBlockCells;
+  Track(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction,
+        const Eigen::Vector2d& slope)
+      : u0(origin_m.x() / kCell + kShift),
+        v0(origin_m.y() / kCell + kShift),
+        z0(origin_m.z() - slope.dot(origin_m.head<2>())),
+        du(direction.x() / kCell),
+        dv(direction.y() / kCell),
+        climb(direction.z() - slope.dot(direction.head<2>())) {}
+  double u(double t) const { return u0 + du * t; }
+  double v(double t) const { return v0 + dv * t; }
+  double z(double t) const { return z0 + climb * t; }
+};
+
+/// The corners of the cell at (u, v), and the place in it.
+struct Ground::Cell {
+  double a, b;  ///< In [0, 1).
+  double low_left, low_right, high_left, high_right;
+
+  Cell(const std::vector<float>& table, double u, double v) {
+    const int column = static_cast<int>(u);
+    const int row = static_cast<int>(v);
+    a = u - column;
+    b = v - row;
+    const std::size_t low = node(0, row);
+    const std::size_t high = node(0, row + 1);
+    const std::size_t left = node(column, 0);
+    const std::size_t right = node(column + 1, 0);
+    low_left = table[low + left];
+    low_right = table[low + right];
+    high_left = table[high + left];
+    high_right = table[high + right];
+  }
+  double height() const {
+    const double low = low_left + a * (low_right - low_left);
+    return low + b * (high_left + a * (high_right - high_left) - low);
+  }
+  Eigen::Vector2d gradient() const {
+    return {((1.0 - b) * (low_right - low_left) + b * (high_right - high_left)) / kCell,
+            ((1.0 - a) * (high_left - low_left) + a * (high_right - low_right)) / kCell};
+  }
+};
+
+const Ground::Block& Ground::block_at(double u, double v) const {
+  const int column = (static_cast<int>(u) & (kCells - 1)) / kBlockCells;
+  const int row = (static_cast<int>(v) & (kCells - 1)) / kBlockCells;
   return blocks_[static_cast<std::size_t>(row) * kBlocks + column];
 }
 
-double Ground::cast(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction,
-                    double max_m) const {
-  // Heights from here on are above the plane; the ray stays straight.
-  const double z0 = origin_m.z() - slope_.dot(origin_m.head<2>());
-  const double climb = direction.z() - slope_.dot(direction.head<2>());
+GroundHit Ground::hit_at(const Track& track, double t, const Eigen::Vector3d& direction) const {
+  const Eigen::Vector2d gradient = slope_ + Cell(table_, track.u(t), track.v(t)).gradient();
+  const double against = direction.head<2>().dot(gradient) - direction.z();
+  return {t, std::abs(against) / std::sqrt(1.0 + gradient.squaredNorm())};
+}
+
+std::optional<GroundHit> Ground::cast(const Eigen::Vector3d& origin_m,
+                                      const Eigen::Vector3d& direction, double max_m) const {
+  const Track track(origin_m, direction, slope_);
   const double level_speed = direction.head<2>().norm();
+  const double u_inverse = 1.0 / track.du;  // infinite where the ray does not move along u
+  const double v_inverse = 1.0 / track.dv;
   double t = 0.0;
-  double clearance = z0 - table_height(origin_m.x(), origin_m.y());
-  if (clearance <= 0.0) return 0.0;
+  double clearance = track.z0 - Cell(table_, track.u0, track.v0).height();
+  if (clearance <= 0.0) return hit_at(track, 0.0, direction);
   while (t < max_m) {
-    if (climb >= 0.0 && z0 + climb * t > highest_m_) return max_m;
-    const double x = origin_m.x() + t * direction.x();
-    const double y = origin_m.y() + t * direction.y();
+    const double z = track.z(t);
+    if (track.climb >= 0.0 && z > highest_m_) return std::nullopt;
+    const double u = track.u(t);
+    const double v = track.v(t);
     // A hair beyond the border, to be in the next block.
     const double border =
-        t + 1e-6 + std::min(to_block_border(x, direction.x()), to_block_border(y, direction.y()));
-    const Block& block = block_at(x, y);
-    if (z0 + climb * t > block.max_m && z0 + climb * std::min(border, max_m) > block.max_m) {
+        t + 1e-6 + std::min(to_border(u, track.du, u_inverse), to_border(v, track.dv, v_inverse));
+    const Block& block = block_at(u, v);
+    if (std::min(z, z + track.climb * (border - t)) > block.max_m) {
       t = border;
       clearance = -1.0;  // not known
       continue;
     }
-    if (clearance < 0.0) clearance = std::max(0.0, z0 + climb * t - table_height(x, y));
-    const double closing = block.slope * level_speed - climb;
+    if (clearance < 0.0) clearance = std::max(0.0, z - Cell(table_, u, v).height());
+    const double closing = block.slope * level_speed - track.climb;
     const double step = closing > 0.0 ? std::max(clearance / closing, kLeastStep) : border - t;
     const double next = std::min(border, t + step);
-    const double after =
-        z0 + climb * next -
-        table_height(origin_m.x() + next * direction.x(), origin_m.y() + next * direction.y());
+    const double after = track.z(next) - Cell(table_, track.u(next), track.v(next)).height();
     if (after <= 0.0) {
       // Straight between the two: the cells are larger than the least step.
-      return std::min(max_m, t + (next - t) * clearance / (clearance - after));
+      const double crossing = t + (next - t) * clearance / (clearance - after);
+      if (crossing >= max_m) return std::nullopt;
+      return hit_at(track, crossing, direction);
     }
     t = next;
     clearance = after;
   }
-  return max_m;
+  return std::nullopt;
 }
 
 }  // namespace understory::sim

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -11,6 +12,11 @@ struct GroundParameters {
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();  ///< Rise per metre along x and y.
   double relief_m = 0.0;     ///< Standard deviation of hills with wavelengths of 25-130 m.
   double roughness_m = 0.0;  ///< Standard deviation of bumps with wavelengths of 2.5-8 m.
+};
+
+struct GroundHit {
+  double range_m = 0.0;
+  double cosine = 1.0;  ///< Of the angle between the ray and the ground's normal.
 };
 
 /// A plane with waves on it, which repeat every 256 m. Smooth: all derivatives exist.
@@ -25,11 +31,11 @@ class Ground {
   Eigen::Vector2d gradient(const Eigen::Vector2d& at_m) const;
   Eigen::Vector3d normal(const Eigen::Vector2d& at_m) const;
 
-  /// Distance along the ray (unit direction) to the ground if less than `max_m`, else `max_m`. Made
-  /// from a table with cells of 0.5 m, within 5 mm of `height`; a bump that the ray grazes for less
-  /// than 0.1 m may be missed. 0 where the ray starts below the ground.
-  double cast(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction,
-              double max_m) const;
+  /// Where the ray (unit direction) meets the ground within `max_m`. Made from a table with cells
+  /// of 0.5 m, within 5 mm of `height`; a bump that the ray grazes for less than 0.25 m may be
+  /// missed. At 0 where the ray starts below the ground.
+  std::optional<GroundHit> cast(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction,
+                                double max_m) const;
 
  private:
   struct Wave {
@@ -41,12 +47,15 @@ class Ground {
     float max_m = 0.0F;  ///< Highest of the table in the block.
     float slope = 0.0F;  ///< Bound of the table's gradient in the block.
   };
+  explicit Ground(std::vector<Wave> waves);
   void add_waves(int count, double min_length_m, double max_length_m, double sigma_m,
                  std::mt19937_64& random);
   void fill_table();
   void fill_blocks();
-  double table_height(double x_m, double y_m) const;
-  const Block& block_at(double x_m, double y_m) const;
+  struct Track;
+  struct Cell;
+  const Block& block_at(double u, double v) const;
+  GroundHit hit_at(const Track& track, double t, const Eigen::Vector3d& direction) const;
 
   Eigen::Vector2d slope_ = Eigen::Vector2d::Zero();
   std::vector<Wave> waves_;

@@ -159,13 +159,13 @@ RayHit RayCaster::cast_one(const Ray& ray, double time_s, double max_m, std::uin
     const auto met = world_.meet_object(ray, c.object, time_s, luck);
     if (met && met->range_m < hit.range_m) hit = {met->range_m, met->cosine, c.object, true};
   }
-  const double ground_m = world_.ground().cast(ray.origin_m, ray.direction, hit.range_m);
-  if (ground_m < hit.range_m) {
-    const Eigen::Vector3d at = ray.origin_m + ground_m * ray.direction;
-    const double cosine = std::abs(ray.direction.dot(world_.ground().normal(at.head<2>())));
-    hit = {ground_m, cosine, kGroundObject, true};
-  }
+  const auto ground = world_.ground().cast(ray.origin_m, ray.direction, hit.range_m);
+  if (ground) hit = {ground->range_m, ground->cosine, kGroundObject, true};
   return hit;
+}
+
+std::uint64_t RayCaster::luck_of_ray(std::uint64_t luck, std::size_t index) {
+  return mixed(luck + index);
 }
 
 void RayCaster::cast(const Eigen::Vector3d& origin_m, std::span<const Eigen::Vector3d> directions,
@@ -176,7 +176,7 @@ void RayCaster::cast(const Eigen::Vector3d& origin_m, std::span<const Eigen::Vec
   if (sector_of(origin_m, directions, max_m, sector)) {
     gather(sector, origin_m.z());
     for (std::size_t i = 0; i < directions.size(); ++i) {
-      hits[i] = cast_one({origin_m, directions[i]}, time_s, max_m, mixed(luck + i));
+      hits[i] = cast_one({origin_m, directions[i]}, time_s, max_m, luck_of_ray(luck, i));
     }
     return;
   }
@@ -187,7 +187,7 @@ void RayCaster::cast(const Eigen::Vector3d& origin_m, std::span<const Eigen::Vec
       sector.right = sector.left = 0.0;
     }
     gather(sector, origin_m.z());
-    hits[i] = cast_one({origin_m, directions[i]}, time_s, max_m, mixed(luck + i));
+    hits[i] = cast_one({origin_m, directions[i]}, time_s, max_m, luck_of_ray(luck, i));
   }
 }
 

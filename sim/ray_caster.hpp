@@ -29,6 +29,8 @@ class RayCaster {
   /// decides what foliage lets through. hits.size() == directions.size().
   void cast(const Eigen::Vector3d& origin_m, std::span<const Eigen::Vector3d> directions,
             double time_s, double max_m, std::uint64_t luck, std::span<RayHit> hits);
+  /// The luck of ray `index` of a fan, as World::meet_object takes it.
+  static std::uint64_t luck_of_ray(std::uint64_t luck, std::size_t index);
 
  private:
   /// A sector of the plan that holds all rays of a fan.

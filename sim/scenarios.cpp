@@ -8,7 +8,7 @@
 namespace understory::sim {
 namespace {
 
-constexpr double kRounding = 4.0;
+constexpr double kRounding = 6.0;  ///< A car turns no tighter.
 
 std::vector<Eigen::Vector2d> way_points(const ForestScenarioParameters& parameters) {
   PathParameters path;
