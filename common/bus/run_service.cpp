@@ -7,8 +7,8 @@
 #include <csignal>
 #include <iostream>
 
-#include "common/bus/live_bus.hpp"
 #include "common/bus/service.hpp"
+#include "common/bus/split_bus.hpp"
 
 namespace understory {
 namespace {
@@ -140,7 +140,9 @@ int serve(const Service& service, const Options& options) {
   }
   StopSignal stop;
   const Clock clock = system_clock();
-  LiveBus bus(options.lcm_url.empty() ? runtime.lcm_url : options.lcm_url);
+  const std::unique_ptr<Bus> live =
+      make_live_bus(options.lcm_url.empty() ? runtime.lcm_url : options.lcm_url);
+  Bus& bus = *live;
   auto hosted = make_hosted(service, bus, clock, toml, options);
   std::unique_ptr<StateStore> store;
   if (!options.state_dir.empty()) {

@@ -7,6 +7,7 @@
 #include "common/bus/faulty_bus.hpp"
 #include "common/bus/live_bus.hpp"
 #include "common/bus/memory_bus.hpp"
+#include "common/bus/split_bus.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
@@ -22,6 +23,7 @@ std::string private_url() {
 
 std::unique_ptr<Bus> make_bus(const std::string& kind) {
   if (kind == "live") return std::make_unique<LiveBus>(private_url());
+  if (kind == "split") return make_live_bus(private_url());
   return std::make_unique<MemoryBus>();
 }
 
@@ -35,7 +37,7 @@ void handle(Bus& bus, const std::function<bool()>& is_done) {
 }  // namespace
 
 TEST_CASE("messages arrive whole, in order, on their channel only") {
-  const auto kind = GENERATE(as<std::string>(), "memory", "live");
+  const auto kind = GENERATE(as<std::string>(), "memory", "live", "split");
   INFO(kind);
   const auto bus = make_bus(kind);
   std::vector<std::pair<std::string, Bytes>> got;
@@ -56,21 +58,21 @@ TEST_CASE("messages arrive whole, in order, on their channel only") {
 }
 
 TEST_CASE("a full queue drops the oldest, and counts") {
-  const auto kind = GENERATE(as<std::string>(), "memory", "live");
+  const auto kind = GENERATE(as<std::string>(), "memory", "live", "split");
   INFO(kind);
   const auto bus = make_bus(kind);
   std::vector<int> got;
   bus->subscribe("COUNT", 5, [&](const BusMessage& message) { got.push_back(message.bytes[0]); });
   for (std::uint8_t i = 0; i < 20; ++i) bus->publish("COUNT", Bytes{i});
   // The live bus takes in what the socket's thread has received; wait until all of it is there.
-  if (kind == "live") ::usleep(200000);
+  if (kind != "memory") ::usleep(200000);
   handle(*bus, [&] { return got.size() == 5; });
   CHECK(got == std::vector<int>{15, 16, 17, 18, 19});
   CHECK(bus->dropped("COUNT") == 15);
 }
 
 TEST_CASE("handlers may publish, and what they throw comes out of handle_one") {
-  const auto kind = GENERATE(as<std::string>(), "memory", "live");
+  const auto kind = GENERATE(as<std::string>(), "memory", "live", "split");
   INFO(kind);
   const auto bus = make_bus(kind);
   int answers = 0;
@@ -89,11 +91,39 @@ TEST_CASE("handlers may publish, and what they throw comes out of handle_one") {
 }
 
 TEST_CASE("what cannot be sent is refused") {
-  const auto kind = GENERATE(as<std::string>(), "memory", "live");
+  const auto kind = GENERATE(as<std::string>(), "memory", "live", "split");
   const auto bus = make_bus(kind);
   CHECK(bus->publish("", Bytes{1})->reason == Reason::kNotSent);
   CHECK(bus->publish(std::string(64, 'A'), Bytes{1})->reason == Reason::kNotSent);
   CHECK_FALSE(bus->publish(std::string(63, 'A'), Bytes{1}));
+}
+
+TEST_CASE("sweeps travel in a group of their own, paced, and only to who wants them") {
+  CHECK(bulk_lcm_url("udpm://239.255.76.67:7667?ttl=0") == "udpm://239.255.76.68:7668?ttl=0");
+  CHECK(bulk_lcm_url("memq://") == "memq://");
+  CHECK(is_bulk_channel("LIDAR_SWEEP_ALT"));
+  CHECK_FALSE(is_bulk_channel("LIDAR_SCAN"));
+  const auto sender = make_live_bus(private_url());
+  const auto receiver = make_live_bus(private_url());
+  LiveBus bystander(private_url());
+  int sweeps = 0;
+  int others = 0;
+  int overheard = 0;
+  receiver->subscribe("LIDAR_SWEEP", 0, [&](const BusMessage& message) {
+    if (message.bytes.size() == 50000) ++sweeps;
+  });
+  receiver->subscribe("OTHER", 0, [&](const BusMessage&) { ++others; });
+  bystander.subscribe("LIDAR_SWEEP", 0, [&](const BusMessage&) { ++overheard; });
+  for (int i = 0; i < 60; ++i) {
+    CHECK_FALSE(sender->publish("LIDAR_SWEEP", Bytes(50000, 3)));
+    if (i % 10 == 0) CHECK_FALSE(sender->publish("OTHER", Bytes(5, 3)));
+  }
+  handle(*receiver, [&] { return sweeps == 60 && others == 6; });
+  CHECK(sweeps == 60);
+  CHECK(others == 6);
+  while (bystander.handle_one(0)) {
+  }
+  CHECK(overheard == 0);
 }
 
 TEST_CASE("the URL is completed so that nothing is lost or leaves by accident") {
