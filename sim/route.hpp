@@ -14,8 +14,9 @@ namespace understory::sim {
 class Route {
  public:
   /// Through `way_points_m`, corners rounded over about 3 * `rounding_m` (the least radius
-  /// in a right angle is then about `rounding_m`) and measurement noise smoothed away. Straight
-  /// beyond its ends. Throws std::runtime_error where the points do not give a way of at least 1 m.
+  /// in a right angle is then about half of `rounding_m`) and measurement noise smoothed away.
+  /// Straight beyond its ends. Throws std::runtime_error where the points do not give a way of at
+  /// least 1 m.
   static Route through(std::span<const Eigen::Vector2d> way_points_m, double rounding_m);
 
   double length_m() const { return length_m_; }

@@ -8,7 +8,7 @@
 namespace understory::sim {
 namespace {
 
-constexpr double kRounding = 6.0;  ///< A car turns no tighter.
+constexpr double kRounding = 11.0;  ///< A car turns no tighter than 5 m.
 
 std::vector<Eigen::Vector2d> way_points(const ForestScenarioParameters& parameters) {
   PathParameters path;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,5 +27,24 @@ Scenario forest_scenario(const ForestScenarioParameters& parameters, std::uint64
 /// The same in a given forest, where the path's start is at `world_T_start`.
 Scenario forest_scenario(const ForestScenarioParameters& parameters, const Forest& forest,
                          const SE2& world_T_start, std::uint64_t seed);
+
+/// Once or more around a residential block, about 700 m a lap, closed (thesis on submaps, 3.1 and
+/// 5.1.1: *Urban*). One lap drives the first `overlap_m` a second time.
+Scenario urban_scenario(int laps, std::uint64_t seed, double overlap_m = 60.0);
+/// From the streets of the town out to the fields (*Urban to Countryside*, *City to country*);
+/// `length_m` of several km.
+Scenario urban_to_countryside_scenario(double length_m, std::uint64_t seed);
+/// Country roads: woods, avenues, fields, a village now and then (*Countryside*).
+Scenario countryside_scenario(double length_m, std::uint64_t seed);
+
+struct ScenarioResult {
+  std::optional<Scenario> scenario;
+  std::string error;  ///< Empty if good; else what is wrong with the texts.
+};
+/// A real map of poles and trunks (CSV x_m,y_m[,dbh_m]) and the real way of a car among them (CSV
+/// frame,x_m,y_m,yaw_rad; frames without number are fine). Poles on the way are left out; thick
+/// ones and half of those of unknown thickness are trees. Bushes, parked cars and people are added.
+ScenarioResult pole_map_scenario(std::string_view poles_csv, std::string_view trajectory_csv,
+                                 std::uint64_t seed);
 
 }  // namespace understory::sim

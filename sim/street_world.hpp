@@ -1,0 +1,55 @@
+// Streets, gardens and fields along a way: houses, cars, poles, trees, bushes, people.
+#pragma once
+
+#include <Eigen/Core>
+#include <random>
+#include <span>
+#include <vector>
+
+#include "sim/forest_world.hpp"
+#include "sim/route.hpp"
+#include "sim/world.hpp"
+
+namespace understory::sim {
+
+/// What stands beside a stretch of the way; numbers are means per 100 m of it, both sides together.
+struct Roadside {
+  double houses = 0.0;
+  double cars = 0.0;   ///< Parked.
+  double poles = 0.0;  ///< Lamps and signs, near the way.
+  double trees = 0.0;  ///< In gardens and along the way.
+  double bushes = 0.0;
+  double people = 0.0;
+  double wood_trees = 0.0;  ///< In a wood that lies a little off the way, on one side.
+};
+Roadside town_roadside();
+Roadside avenue_roadside();   ///< Trees and delineators along a country road.
+Roadside field_roadside();    ///< Next to nothing.
+Roadside wood_roadside();     ///< A wood on one side.
+Roadside village_roadside();  ///< A few houses and their gardens.
+
+struct Stretch {
+  double length_m = 100.0;
+  Roadside roadside;
+};
+
+/// Frame `world`; the way is the middle of the lane that is driven.
+struct StreetWorldParameters {
+  GroundParameters ground{.slope = {0.004, -0.006}, .relief_m = 0.15, .roughness_m = 0.006};
+  ForestWorldParameters plants;   ///< Shapes of trees.
+  double house_distance_m = 9.0;  ///< Least, from the way to a house.
+  double clearance_m = 2.2;       ///< Nothing stands nearer than this to the way.
+};
+
+/// A world along `route`; the last stretch goes on to its end. No house stands where the way
+/// passes elsewhere, nor in another house.
+World make_street_world(const Route& route, std::span<const Stretch> stretches,
+                        const StreetWorldParameters& parameters, std::mt19937_64& random);
+
+/// The given poles, those of unknown radius half of them trees (as are those thicker than 0.12 m),
+/// with parked cars, bushes and people along `route`. Poles nearer to the way than the clearance
+/// are left out.
+World make_pole_world(const Route& route, const Forest& poles,
+                      const StreetWorldParameters& parameters, std::mt19937_64& random);
+
+}  // namespace understory::sim
