@@ -130,7 +130,9 @@ class Matcher {
     const std::uint32_t own = partner_[i];
     const double now = cost(i, own);
     for (const Candidate& c : by_seen_[i]) {
-      if (c.track == own || tracks_[c.track].sightings < kYoung) continue;
+      // One sighting beside an older track is more likely an outlier or a false detection.
+      const bool counts = tracks_[c.track].sightings >= 2 || tracks_[own].sightings < kYoung;
+      if (c.track == own || !counts) continue;
       const std::uint32_t j = owner_[c.track];
       const double other =
           j == kFree ? c.cost - now : c.cost + cost(j, own) - now - cost(j, c.track);

@@ -22,7 +22,7 @@ Eigen::Matrix2d rotation_of(double heading) { return SE2(0.0, 0.0, heading).rota
 FilterState::FilterState(ErrorForm form, int max_landmarks)
     : form_(form), max_landmarks_(max_landmarks) {
   landmarks_.reserve(static_cast<std::size_t>(max_landmarks));
-  const Eigen::Index capacity = kVehicle + 2 * max_landmarks;
+  const Eigen::Index capacity = padded(kVehicle + 2 * max_landmarks);
   covariance_ = Eigen::MatrixXd::Zero(capacity, capacity);
 }
 

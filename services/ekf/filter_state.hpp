@@ -9,6 +9,7 @@
 #include "common/model/landmarks.hpp"
 #include "common/model/odometry.hpp"
 #include "common/model/tracked.hpp"
+#include "services/ekf/subtract_product.hpp"
 
 namespace understory::ekf {
 
@@ -43,8 +44,8 @@ struct MapLandmark {
   std::uint64_t last_scan = 0;  ///< Number of the scan that saw it last.
 };
 
-/// A 2-vector of the state from the anchor: a place in the map to which all positions are
-/// relative, so that the covariance of right invariant errors stays well conditioned far out.
+/// Positions count from the anchor, a place in the map that follows the vehicle, so that the
+/// covariance of right invariant errors stays well conditioned far out.
 class FilterState {
  public:
   FilterState(ErrorForm form, int max_landmarks);
@@ -81,6 +82,8 @@ class FilterState {
     }
     return block;
   }
+  /// The whole covariance, padded as the kernel needs it.
+  Panel covariance_panel() { return {covariance_.data(), covariance_.outerStride()}; }
   /// Column `j` of the whole covariance.
   template <typename Column>
   void copy_column(int j, Column&& out) const {

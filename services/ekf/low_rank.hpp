@@ -13,8 +13,7 @@ inline constexpr int kMaxRows = 32;
 /// Room for low-rank steps, made once.
 class LowRank {
  public:
-  explicit LowRank(int max_size)
-      : cross_(max_size, kMaxRows), delta_(max_size), first_(max_size), second_(max_size) {}
+  explicit LowRank(int max_size);
 
   /// Covariance of the state's error with the innovation, to be filled by the caller: size x rows.
   auto cross(int size, int rows) { return cross_.topLeftCorner(size, rows); }
@@ -40,6 +39,7 @@ class LowRank {
                     Eigen::Index stride, int rows);
 
   Eigen::MatrixXd cross_;
+  Eigen::MatrixXd gain_;
   Eigen::VectorXd delta_;
   Eigen::VectorXd first_;
   Eigen::VectorXd second_;

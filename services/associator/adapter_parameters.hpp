@@ -1,0 +1,11 @@
+// The associator's parameters as a list: units, ranges, meanings.
+#pragma once
+
+#include "common/bus/parameter_table.hpp"
+#include "services/associator/parameters.hpp"
+
+namespace understory {
+
+void describe(AssociatorParameters& parameters, ParameterTable& table);
+
+}  // namespace understory

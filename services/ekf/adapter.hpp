@@ -1,0 +1,20 @@
+// The filter's place on the bus.
+#pragma once
+
+#include <string>
+
+#include "common/bus/service.hpp"
+
+namespace understory {
+
+struct EkfChannels {
+  std::string odometry = "ODOMETRY";
+  std::string tracked_landmarks = "TRACKED_LANDMARKS";
+  std::string pose = "EKF_POSE";
+  std::string map = "EKF_MAP";
+  std::string velocity_correction = "VELOCITY_CORRECTION";
+};
+
+Service ekf_service(const EkfChannels& channels = {});
+
+}  // namespace understory

@@ -1,0 +1,88 @@
+#include "services/ekf/adapter_parameters.hpp"
+
+namespace understory {
+namespace {
+
+void describe(EkfPriorParameters& p, ParameterTable& table) {
+  table.add("prior.velocity_sigma_mps", p.velocity_sigma_mps, {0.001, 100.0}, "m/s",
+            "Of the velocity at the start, per axis.");
+  table.add("prior.gyro_bias_sigma", p.gyro_bias_sigma, {1e-7, 1.0}, "rad/s",
+            "Of the gyro's bias at the start.");
+  table.add("prior.accelerometer_bias_sigma", p.accelerometer_bias_sigma, {1e-6, 10.0}, "m/s^2",
+            "Of the accelerometer's bias at the start, the level's error included.");
+}
+
+void describe(EkfMotionParameters& p, ParameterTable& table) {
+  table.add("motion.gyro_walk", p.gyro_walk, {0.0, 0.1}, "rad/s/sqrt(s)",
+            "Random walk of the gyro's bias.");
+  table.add("motion.accelerometer_walk", p.accelerometer_walk, {0.0, 1.0}, "m/s^2/sqrt(s)",
+            "Random walk of the accelerometer's bias.");
+  table.add("motion.standing_sigma_mps", p.standing_sigma_mps, {1e-5, 1.0}, "m/s",
+            "Of the velocity while the vehicle is found to stand.");
+  table.add("motion.standing_sigma_m", p.standing_sigma_m, {1e-6, 1.0}, "m",
+            "Of the way made while it stands, per piece of odometry and axis.");
+  table.add("motion.standing_sigma_rad", p.standing_sigma_rad, {1e-7, 0.1}, "rad",
+            "Of the turn made while it stands, per piece of odometry.");
+  table.add("motion.sideways_sigma_mps", p.sideways_sigma_mps, {0.0, 100.0}, "m/s",
+            "Of the velocity across the vehicle, per piece; 0 = it may slide freely.");
+  table.add("motion.gap_acceleration", p.gap_acceleration, {0.01, 100.0}, "m/s^2/sqrt(Hz)",
+            "White acceleration where no odometry tells the motion.");
+  table.add("motion.gap_yaw_rate", p.gap_yaw_rate, {0.001, 10.0}, "rad/s",
+            "Yaw rate where no odometry tells the motion.");
+  table.add("motion.wheel_acceleration", p.wheel_acceleration, {0.01, 100.0}, "m/s^2",
+            "Speed may change so much within a piece of wheel odometry.");
+}
+
+void describe(EkfMapParameters& p, ParameterTable& table) {
+  table.add("map.max_landmarks", p.max_landmarks, {1, 1000}, "", "Of the active state.");
+  table.add("map.min_separation_m", p.min_separation_m, {0.0, 10.0}, "m",
+            "A new landmark nearer to an old one is refused.");
+  table.add("map.keep_range_factor", p.keep_range_factor, {1.0, 10.0}, "of the range",
+            "Landmarks farther than this leave the active state.");
+  table.add("map.max_missed", p.max_missed, {1, 1000000}, "scans",
+            "In a row, that should have shown a landmark and did not: it leaves.");
+  table.add("map.max_refused", p.max_refused, {1, 1000000}, "scans",
+            "In a row, in which its gate refused a landmark: it leaves.");
+}
+
+void describe(EkfGateParameters& p, ParameterTable& table) {
+  table.add("gate.landmark_probability", p.landmark_probability, {0.5, 0.999999}, "",
+            "chi^2 gate of each landmark.");
+  table.add("gate.set_probability", p.set_probability, {0.5, 0.999999}, "",
+            "chi^2 gate of a scan's landmarks together.");
+  table.add("gate.rejoin_probability", p.rejoin_probability, {0.5, 0.999999}, "",
+            "Joint compatibility of new tracks with landmarks whose track was lost.");
+  table.add("gate.rejoin_after_scans", p.rejoin_after_scans, {1, 10000}, "scans",
+            "Only landmarks not seen for so long take a new track.");
+  table.add("gate.rejoin_max_nodes", p.rejoin_max_nodes, {1, 1000000}, "",
+            "Of the search for the largest compatible set.");
+}
+
+void describe(EkfRestartParameters& p, ParameterTable& table) {
+  table.add("restart.after_refused_scans", p.after_refused_scans, {1, 100000}, "scans",
+            "In a row, of which most landmarks were refused.");
+  table.add("restart.sigma_m", p.sigma_m, {0.0, 1000.0}, "m",
+            "Added to the position's uncertainty at a restart.");
+  table.add("restart.sigma_rad", p.sigma_rad, {0.0, 3.2}, "rad",
+            "Added to the heading's uncertainty at a restart.");
+  table.add("restart.max_gap_s", p.max_gap_s, {0.1, 1000.0}, "s",
+            "Without odometry and scans, after which the way is lost.");
+  table.add("restart.clock_jump_s", p.clock_jump_s, {0.1, 1e6}, "s",
+            "A stamp so far back starts the clock anew.");
+}
+
+}  // namespace
+
+void describe(EkfParameters& parameters, ParameterTable& table) {
+  table.add("error_form", parameters.error_form, {"right_invariant", "first_estimate", "plain"},
+            "How errors are measured; plain grows sure of a heading that nothing tells.");
+  table.add("max_scan_delay_s", parameters.max_scan_delay_s, {0.0, 10.0}, "s",
+            "Odometry waits so long at most for the scan that belongs before it.");
+  describe(parameters.prior, table);
+  describe(parameters.motion, table);
+  describe(parameters.map, table);
+  describe(parameters.gate, table);
+  describe(parameters.restart, table);
+}
+
+}  // namespace understory

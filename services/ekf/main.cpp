@@ -1,0 +1,14 @@
+// The filter as a process: every channel that it touches, besides HEALTH, LOG and CONFIG.
+#include "services/ekf/adapter.hpp"
+
+int main(int argc, char** argv) {
+  return understory::run_service(
+      understory::ekf_service({
+          .odometry = "ODOMETRY",                        // in: motion without landmarks
+          .tracked_landmarks = "TRACKED_LANDMARKS",      // in: consistent landmarks of a sweep
+          .pose = "EKF_POSE",                            // out: pose, velocity, biases
+          .map = "EKF_MAP",                              // out: landmarks of the active state
+          .velocity_correction = "VELOCITY_CORRECTION",  // out: what the input should know
+      }),
+      argc, argv);
+}
