@@ -8,11 +8,13 @@
 namespace understory {
 namespace {
 
-bool share_a_node(const StoredLandmark& a, const StoredLandmark& b) {
+/// Whether places saw the two side by side. Two that really stand so near to each other are seen
+/// together from almost everywhere; one that a bad scan doubled is so now and then.
+bool are_seen_together(const StoredLandmark& a, const StoredLandmark& b) {
   std::vector<NodeIndex> common;
   std::set_intersection(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(),
                         std::back_inserter(common));
-  return !common.empty();
+  return 4 * common.size() > std::min(a.nodes.size(), b.nodes.size());
 }
 
 std::uint32_t members_in_view(const Keyframe& keyframe, const Eigen::Vector2d& position_in_centre) {
@@ -114,7 +116,7 @@ void SmoothingMapper::forget_stale_candidates() {
   });
 }
 
-/// Two landmarks near each other that no place ever saw side by side are one. The one seen less
+/// Two landmarks near each other that places do not see side by side are one. The one seen less
 /// often is taken over; its detections count on where they agree, within the noise, with the
 /// other's place.
 void SmoothingMapper::merge_doubles(MapUpdate& update) {
@@ -130,7 +132,7 @@ void SmoothingMapper::merge_doubles(MapUpdate& update) {
       if (other_id == id) continue;
       const StoredLandmark& other = store_.at(other_id);
       if (!landmark.point || !other.point || landmark.kind != other.kind ||
-          share_a_node(landmark, other)) {
+          are_seen_together(landmark, other)) {
         continue;
       }
       const bool keep_first =
@@ -156,13 +158,15 @@ void SmoothingMapper::take_over(LandmarkId old_id, LandmarkId new_id) {
     PointObservation& factor = smoother_.graph().observations[handle.mapped()];
     factor.point =
         *new_one.point;  // Also of a factor without weight: no variable may be left without any.
-    if (!agree) factor.information.setZero();
+    // A place that saw both keeps what it says of the one that stays.
+    const bool has_both = nodes_[node].observations.contains(new_id);
+    if (!agree || has_both) factor.information.setZero();
     handle.key() = new_id;
     nodes_[node].observations.insert(std::move(handle));
   }
   std::vector<NodeIndex> nodes;
-  std::merge(old_one.nodes.begin(), old_one.nodes.end(), new_one.nodes.begin(), new_one.nodes.end(),
-             std::back_inserter(nodes));
+  std::set_union(old_one.nodes.begin(), old_one.nodes.end(), new_one.nodes.begin(),
+                 new_one.nodes.end(), std::back_inserter(nodes));
   new_one.nodes = std::move(nodes);
   if (agree) new_one.information += old_one.information;
   new_one.times_seen += old_one.times_seen;

@@ -239,3 +239,48 @@ TEST_CASE("Malformed keyframes are refused with a reason", "[mapper]") {
   REQUIRE(mapper.add(made[0]).status == MapUpdateStatus::kRejected);
   REQUIRE(mapper.landmarks().size() > 20);
 }
+
+TEST_CASE("A trunk that bad scans moved and doubled is one landmark in the end", "[mapper]") {
+  const sim::Drive simulated = drive(sim::PathKind::kLine, 40.0, 13, 0.05);
+  std::vector<Keyframe> made = keyframes(simulated);
+  REQUIRE(made.size() > 20);
+  const SE2 centre_T_world =
+      made[0].centre_T_base() * simulated.world_T_vehicle().front().inverse();
+  // A trunk beside the way, far from any other.
+  std::optional<Eigen::Vector2d> trunk;
+  for (const Eigen::Vector2d& one : simulated.forest().trunks_m) {
+    const Eigen::Vector2d seen = centre_T_world * one;
+    const auto others = simulated.grid().within(one, 4.0);
+    if (others.size() == 1 && (seen - Eigen::Vector2d(20.0, 0.0)).norm() < 15.0) trunk = seen;
+  }
+  REQUIRE(trunk);
+  SmoothingMapper mapper({});
+  std::size_t doubled = 0;
+  for (std::size_t k = 0; k < made.size(); ++k) {
+    const double driven = 1.6 * static_cast<double>(k);
+    Keyframe& keyframe = made[k];
+    for (std::size_t i = 0; k >= 8 && k < 18 && i < keyframe.landmarks.size(); ++i) {
+      const Eigen::Vector2d from_start =
+          keyframe.landmarks[i].position_m + Eigen::Vector2d(driven, 0.0);
+      if ((from_start - *trunk).norm() > 1.0) continue;
+      KeyframeLandmark moved = keyframe.landmarks[i];
+      moved.position_m.y() += 0.8;
+      if (k == 14) {
+        keyframe.landmarks.push_back(moved);
+        ++doubled;
+      } else {
+        keyframe.landmarks[i] = moved;
+      }
+      break;
+    }
+    mapper.add(keyframe);
+  }
+  REQUIRE(doubled == 1);
+  std::size_t near = 0;
+  const SE2 map_T_centre =
+      mapper.trajectory().front().map_T_vehicle * made[0].centre_T_base().inverse();
+  for (const MapLandmark& landmark : mapper.landmarks()) {
+    if ((landmark.position_m - map_T_centre * *trunk).norm() < 1.5) ++near;
+  }
+  CHECK(near == 1);
+}
