@@ -11,6 +11,9 @@ constexpr double kStartSpeed_mps = 10.0;
 constexpr double kBridgeTilt = 0.03;  // rad per square root of a second
 constexpr double kBridgeSpeed = 2.0;  // m/s per square root of a second
 
+constexpr double kWheelScaleSigma = 0.02;
+constexpr double kWheelScaleWalk = 2e-4;  // per square root of a second
+
 double square(double value) { return value * value; }
 
 Eigen::Matrix3d cross(const Eigen::Vector3d& v) {
@@ -43,6 +46,7 @@ AttitudeFilter::AttitudeFilter(const ImuParameters& imu, const Eigen::Vector3d& 
   covariance_.block<3, 3>(3, 3).diagonal() << square(kStartSpeed_mps), 1.0, 0.25;
   covariance_.block<3, 3>(6, 6).diagonal().setConstant(square(imu.gyro_bias_sigma));
   covariance_.block<3, 3>(9, 9).diagonal().setConstant(square(imu.force_bias_sigma));
+  covariance_(12, 12) = square(kWheelScaleSigma);
 }
 
 void AttitudeFilter::propagate(const Eigen::Vector3d& rate, const Eigen::Vector3d& force,
@@ -75,6 +79,8 @@ void AttitudeFilter::propagate(const Eigen::Vector3d& rate, const Eigen::Vector3
   covariance_.block<3, 3>(6, 6).diagonal().array() += square(imu_.gyro_bias_walk) * seconds;
   covariance_.block<3, 3>(9, 9).diagonal().array() += square(imu_.force_bias_walk) * seconds;
 
+  covariance_(12, 12) += square(kWheelScaleWalk) * seconds;
+
   // Velocity with the attitude at the middle of the step.
   const Eigen::Quaterniond half = rotation_of(0.5 * seconds * w);
   const Eigen::Vector3d middle_gravity = half.conjugate() * gravity;
@@ -89,16 +95,17 @@ void AttitudeFilter::bridge(double seconds) {
 }
 
 void AttitudeFilter::update(const Row& row, double residual, double variance) {
-  const Eigen::Matrix<double, 12, 1> spread = covariance_ * row.transpose();
+  const Eigen::Matrix<double, 13, 1> spread = covariance_ * row.transpose();
   const double total = row.dot(spread) + variance;
-  const Eigen::Matrix<double, 12, 1> gain = spread / total;
-  const Eigen::Matrix<double, 12, 1> error = gain * residual;
+  const Eigen::Matrix<double, 13, 1> gain = spread / total;
+  const Eigen::Matrix<double, 13, 1> error = gain * residual;
   covariance_ -= gain * spread.transpose();
   covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();
   world_Q_vehicle_ = (world_Q_vehicle_ * rotation_of(error.head<3>())).normalized();
   velocity_ += error.segment<3>(3);
   gyro_bias_ += error.segment<3>(6);
   force_bias_ += error.segment<3>(9);
+  wheel_scale_ += error(12);
 }
 
 void AttitudeFilter::add_velocity(const Eigen::Vector3d& direction, const Eigen::Vector3d& at,
@@ -108,6 +115,15 @@ void AttitudeFilter::add_velocity(const Eigen::Vector3d& direction, const Eigen:
   // d(w x at) / d(gyro bias) = [at]x
   row.segment<3>(6) = direction.transpose() * cross(at);
   update(row, residual_mps, square(sigma_mps));
+}
+
+void AttitudeFilter::add_wheel_speed(const Eigen::Vector3d& forward, const Eigen::Vector3d& at,
+                                     double thought_mps, double measured_mps, double sigma_mps) {
+  Row row = Row::Zero();
+  row.segment<3>(3) = wheel_scale_ * forward.transpose();
+  row.segment<3>(6) = wheel_scale_ * forward.transpose() * cross(at);
+  row(12) = thought_mps;
+  update(row, measured_mps - wheel_scale_ * thought_mps, square(sigma_mps));
 }
 
 void AttitudeFilter::add_standstill(const Eigen::Vector3d& rate, double seconds,

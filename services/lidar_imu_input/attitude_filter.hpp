@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cmath>
 
 #include "services/lidar_imu_input/parameters.hpp"
 
@@ -25,10 +26,11 @@ struct RollPitchYaw {
 };
 RollPitchYaw roll_pitch_yaw(const Eigen::Quaterniond& rotation);
 
-/// Error state filter; errors: attitude (right perturbation), velocity, gyro and force bias.
+/// Error state filter; errors: attitude (right perturbation), velocity, gyro and force bias, scale
+/// of the wheels' speed (which would pass for tilt whenever the vehicle accelerates or turns).
 class AttitudeFilter {
  public:
-  using Covariance = Eigen::Matrix<double, 12, 12>;
+  using Covariance = Eigen::Matrix<double, 13, 13>;
 
   /// Starts from one sample: tilt from the force, velocity unknown.
   AttitudeFilter(const ImuParameters& imu, const Eigen::Vector3d& specific_force_mps2);
@@ -42,6 +44,9 @@ class AttitudeFilter {
   /// Difference between a measured and the predicted value of `direction . (u + w x at)`.
   void add_velocity(const Eigen::Vector3d& direction, const Eigen::Vector3d& at,
                     double residual_mps, double sigma_mps);
+  /// Speed along `forward` at `at`: what the wheels measured, and what was thought then.
+  void add_wheel_speed(const Eigen::Vector3d& forward, const Eigen::Vector3d& at,
+                       double thought_mps, double measured_mps, double sigma_mps);
   /// Velocity zero, and rate zero: the gyro shows its bias.
   void add_standstill(const Eigen::Vector3d& rate, double seconds, double velocity_sigma_mps);
 
@@ -53,10 +58,12 @@ class AttitudeFilter {
   Eigen::Matrix3d velocity_covariance() const { return covariance_.block<3, 3>(3, 3); }
   const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }
   const Eigen::Vector3d& force_bias() const { return force_bias_; }
+  double wheel_scale() const { return wheel_scale_; }
+  double wheel_scale_sigma() const { return std::sqrt(covariance_(12, 12)); }
   Eigen::Matrix3d gyro_bias_covariance() const { return covariance_.block<3, 3>(6, 6); }
 
  private:
-  using Row = Eigen::Matrix<double, 1, 12>;
+  using Row = Eigen::Matrix<double, 1, 13>;
   void update(const Row& row, double residual, double variance);
 
   ImuParameters imu_;
@@ -64,6 +71,7 @@ class AttitudeFilter {
   Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d gyro_bias_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d force_bias_ = Eigen::Vector3d::Zero();
+  double wheel_scale_ = 1.0;  ///< Measured over true.
   Covariance covariance_ = Covariance::Zero();
 };
 

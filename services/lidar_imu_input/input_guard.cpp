@@ -41,7 +41,9 @@ bool SensorClock::is_plausible(Utime utime, std::optional<Utime> others) const {
 
 SensorClock::Answer SensorClock::take(Utime raw, std::optional<Utime> others) {
   const Utime utime = raw + offset_;
-  if (last_ && !is_plausible(utime, others)) return quarantine(raw);
+  // Once in quarantine, only a stamp that goes on behind the last good one ends it early.
+  const bool suspected = first_candidate_ && utime <= last_.value_or(utime);
+  if (last_ && (suspected || !is_plausible(utime, others))) return quarantine(raw);
   first_candidate_.reset();
   if (last_ && utime <= *last_) return {Verdict::kLate, utime};
   if (last_) {

@@ -146,7 +146,7 @@ std::optional<SE2WithCovariance> drive(const std::deque<LevelSample>& samples,
         saturated ? parameters.imu.saturation_gyro_noise : parameters.imu.gyro_noise;
     SE2WithCovariance piece{SE2::Exp({speed * dt, 0.0, rate * dt}), Eigen::Matrix3d::Zero()};
     const double stand = square(noise.standstill_sigma_m) * dt;
-    piece.covariance(0, 0) = square(speed * noise.speed_scale_sigma) * power + stand;
+    piece.covariance(0, 0) = square(speed * speeds.back().scale_sigma) * power + stand;
     piece.covariance(1, 1) = square(speed * noise.side_slip_sigma) * power + stand;
     piece.covariance(2, 2) =
         square(gyro) * dt +

@@ -23,6 +23,7 @@ struct LevelSample {
 struct SpeedSample {
   Utime utime = 0;
   double speed_mps = 0.0;
+  double scale_sigma = 0.0;  ///< Of the speed, relative.
 };
 
 /// The sample at `utime`, between its two neighbours in proportion to time.

@@ -7,7 +7,9 @@ namespace understory {
 namespace {
 
 constexpr double kBoundPeriod_s = 10.0;
+constexpr double kBiasKnown_s = 3.0;  // of standing
 constexpr double kSpeedsKept_s = 5.0;
+constexpr double kLeastScaleSigma = 0.003;
 
 double square(double value) { return value * value; }
 double seconds_between(Utime from, Utime to) { return static_cast<double>(to - from) * 1e-6; }
@@ -79,7 +81,8 @@ void MotionEstimator::propagate(const ImuSample& sample, bool is_saturated, doub
                        is_saturated);
   standing_bias_sigma_ =
       std::sqrt(square(standing_bias_sigma_) + square(parameters_.imu.gyro_bias_walk) * seconds);
-  const bool bias_known = standing_bias_sigma_ < 0.1 * parameters_.standstill.gyro_mean_rad_s;
+  const bool bias_known = standstill_.longest_s() > kBiasKnown_s &&
+                          standing_bias_sigma_ < 0.02 * parameters_.standstill.gyro_mean_rad_s;
   standstill_.add(sample, bias_known ? std::optional(attitude_->gyro_bias()) : std::nullopt);
   if (standstill_.is_standing()) {
     use_standstill(sample, seconds);
@@ -163,20 +166,28 @@ void MotionEstimator::add_wheels(const WheelSample& sample) {
   // A wheel left of the middle is slower in a left turn.
   const double speed = then ? sample.speed_mps + then->rate_rad_s.z() * car.encoder_left_m
                             : axle_speed(car, sample.speed_mps, sample.steering_rad);
-  speeds_.push_back({sample.utime, speed});
+  // The scale that IMU and wheels together tell; never less certain than what is said of it.
+  const double known = parameters_.wheels.noise.speed_scale_sigma;
+  if (attitude_) {
+    const double sigma = std::max(kLeastScaleSigma, 1.5 * attitude_->wheel_scale_sigma());
+    speeds_.push_back({sample.utime, speed / attitude_->wheel_scale(), std::min(known, sigma)});
+  } else {
+    speeds_.push_back({sample.utime, speed, known});
+  }
   while (seconds_between(speeds_.front().utime, sample.utime) > kSpeedsKept_s) speeds_.pop_front();
   if (!attitude_ || !then || standstill_.is_standing()) return;
 
   const double sigma = parameters_.constraint.wheel_sigma_mps;
   const Eigen::Vector3d axle = then->velocity_mps + then->rate_rad_s.cross(axle_position_m_);
-  attitude_->add_velocity(axle_forward_, axle_position_m_, speed - axle.dot(axle_forward_), sigma);
+  attitude_->add_wheel_speed(axle_forward_, axle_position_m_, axle.dot(axle_forward_), speed,
+                             sigma);
   const Eigen::Vector2d at = axle_position_m_.head<2>();
   const Eigen::Vector2d forward = axle_forward_.head<2>();
   const double thought =
       forward.dot(then->level_velocity_mps + then->rate_rad_s.z() * turned_left(at));
   const double slope = latest_level_ ? latest_level_->pitch_cosine : 1.0;
-  const double scaled = std::hypot(sigma, parameters_.wheels.noise.speed_scale_sigma * speed);
-  reckoning_.add_velocity(forward, at, speed * slope - thought, scaled);
+  const double scaled = std::hypot(sigma, speeds_.back().scale_sigma * speed);
+  reckoning_.add_velocity(forward, at, speeds_.back().speed_mps * slope - thought, scaled);
 }
 
 void MotionEstimator::add_gnss(const GnssFix& fix) {

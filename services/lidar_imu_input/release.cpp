@@ -60,8 +60,11 @@ void LidarImuInput::settle(InputResults& out, bool everything) {
     const auto now = guard_.now();
     const bool has_item = !waiting_.empty();
     const bool moves = guard_.has_spoken(Sensor::kImu) || guard_.has_spoken(Sensor::kWheels);
-    const bool regular = now && moves && piece_end_ && *now >= *piece_end_ + longest + lag &&
-                         (!has_item || waiting_.front().end > *piece_end_ + longest);
+    // A piece ends without a sweep where none can come any more for its time, or the next is far.
+    const bool near =
+        has_item && piece_end_ && 2 * (waiting_.front().end - *piece_end_) <= 3 * longest;
+    const bool regular =
+        now && moves && piece_end_ && !near && (has_item || *now >= *piece_end_ + longest + lag);
     if (regular) {
       if (!everything && !is_reached(*piece_end_ + longest)) return;
       end_piece(*piece_end_ + longest, out);

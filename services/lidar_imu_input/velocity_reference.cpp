@@ -38,17 +38,23 @@ std::optional<ReferenceVelocity> VelocityReference::add(const GnssFix& fix, doub
   const double speed = east_north.norm();
   const bool fast = speed > std::max(kFastEnough_mps, 4.0 * sigma);
   const double course = std::atan2(east_north.y(), east_north.x());
-  if (!east_to_odom_rad_) {
-    if (!fast) return std::nullopt;
-    east_to_odom_rad_ = heading_rad - course;
-  }
+  if (!east_to_odom_rad_ && !fast) return std::nullopt;
   ReferenceVelocity reference;
+  if (fast) {
+    const double variance = std::pow(std::hypot(sigma / speed, kCourseSigma_rad), 2);
+    if (!east_to_odom_rad_) {
+      east_to_odom_rad_ = heading_rad - course;
+      east_to_odom_variance_ = variance;
+    }
+    const double off = std::remainder(heading_rad - course - *east_to_odom_rad_, 2.0 * M_PI);
+    const double gain = east_to_odom_variance_ / (east_to_odom_variance_ + variance);
+    *east_to_odom_rad_ += gain * off;
+    east_to_odom_variance_ *= 1.0 - gain;
+    reference.heading_rad = course + *east_to_odom_rad_;
+    reference.heading_sigma_rad = std::sqrt(variance + east_to_odom_variance_);
+  }
   reference.odom_velocity_mps = Eigen::Rotation2Dd(*east_to_odom_rad_) * east_north;
   reference.sigma_mps = sigma;
-  if (fast) {
-    reference.heading_rad = course + *east_to_odom_rad_;
-    reference.heading_sigma_rad = std::hypot(sigma / speed, kCourseSigma_rad);
-  }
   return reference;
 }
 

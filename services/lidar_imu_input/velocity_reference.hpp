@@ -23,7 +23,8 @@ class VelocityReference {
 
  private:
   std::optional<GnssFix> previous_;
-  std::optional<double> east_to_odom_rad_;
+  std::optional<double> east_to_odom_rad_;  ///< How odom lies; grows more certain fix by fix.
+  double east_to_odom_variance_ = 0.0;
 };
 
 }  // namespace understory
