@@ -11,24 +11,10 @@ constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kTurn = 2.0F * kPi;
 /// Where one return is so much nearer or farther than its neighbour, a ring may be cut.
 constexpr float kCut_m = 1.0F;
+/// A ring has the slope of a return that is not farther away, whatever the sensor's tilt.
+constexpr float kKnownSlope_rad = 0.1F;
 /// Above or below the vehicle: nothing on the ground is so far up [m].
 constexpr float kHighest_m = 1000.0F;
-
-/// atan2 to 1e-5 rad without a branch on the data (polynomial of least maximum error).
-float fast_atan2(float y, float x) {
-  const float ax = std::abs(x);
-  const float ay = std::abs(y);
-  const float large = std::max(std::max(ax, ay), 1e-20F);
-  const float q = std::min(ax, ay) / large;
-  const float s = q * q;
-  float angle =
-      q * (0.99997726F +
-           s * (-0.33262347F +
-                s * (0.19354346F + s * (-0.11643287F + s * (0.05265332F - s * 0.01172120F)))));
-  angle = ay > ax ? 0.5F * kPi - angle : angle;
-  angle = x < 0.0F ? kPi - angle : angle;
-  return y < 0.0F ? -angle : angle;
-}
 
 /// Of a difference between two angles in (-pi, pi].
 float wrapped(float angle) {
@@ -80,14 +66,22 @@ void RingCloud::scatter(const PointSweep& sweep, double min_range_m, double max_
       sweep.attitude
           ? Eigen::Matrix3f(sweep.attitude->level_Q_vehicle.toRotationMatrix().cast<float>())
           : Eigen::Matrix3f(Eigen::Matrix3f::Identity());
+  level_R_vehicle_ = level_R_vehicle;
   sensor_ = level_R_vehicle * sweep.sensor_position_m.cast<float>();
+  counts_.clear();
+  for (std::size_t ring = 0; ring < sweep.rings; ++ring) {
+    counts_.push_back(slots_[ring + 1] - slots_[ring]);
+  }
+  spin_ = fit_spin(sweep, max_range_m, counts_);
+  const Eigen::Vector3f velocity =
+      level_R_vehicle * Eigen::Vector3f(spin_.velocity_mps.x(), spin_.velocity_mps.y(), 0.0F);
   const auto nearest2 = static_cast<float>(min_range_m * min_range_m);
   const auto farthest2 = static_cast<float>(max_range_m * max_range_m);
   for (const SweepPoint& point : sweep.points) {
     if (point.ring >= sweep.rings) continue;
     const Eigen::Vector3f p = level_R_vehicle * point.position();
-    const float x = p.x() - sensor_.x();
-    const float y = p.y() - sensor_.y();
+    const float x = p.x() - sensor_.x() - velocity.x() * point.time_s;
+    const float y = p.y() - sensor_.y() - velocity.y() * point.time_s;
     const float range2 = x * x + y * y;
     // A coordinate that is no number makes all of p none.
     if (!(range2 >= nearest2 && range2 <= farthest2 && std::abs(p.z()) < kHighest_m)) {
@@ -156,6 +150,18 @@ std::size_t RingCloud::first_at(std::size_t ring, float azimuth_rad) const {
       points_.begin() + static_cast<std::ptrdiff_t>(end), azimuth,
       [](const RingPoint& point, float value) { return point.azimuth_rad < value; });
   return static_cast<std::size_t>(it - points_.begin());
+}
+
+float RingCloud::slope(std::size_t ring, float azimuth_rad) const {
+  const RingPoint* near = &points_[std::min(first_at(ring, azimuth_rad), begins_[ring + 1] - 1)];
+  if (std::abs(std::remainder(near->azimuth_rad - azimuth_rad, kTurn)) < kKnownSlope_rad) {
+    return (near->z_m - sensor_.z()) / near->range_m;
+  }
+  const Eigen::Vector3f level(std::cos(azimuth_rad), std::sin(azimuth_rad), 0.0F);
+  Eigen::Vector3f beam = level_R_vehicle_.transpose() * level;
+  beam.z() = spin_.slopes[ring] * std::hypot(beam.x(), beam.y());
+  beam = level_R_vehicle_ * beam;
+  return beam.z() / std::hypot(beam.x(), beam.y());
 }
 
 }  // namespace understory

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/model/point_sweep.hpp"
+#include "services/landmark_extractor/spin_fit.hpp"
 
 namespace understory {
 
@@ -16,7 +17,7 @@ struct RingPoint {
   float y_m = 0.0F;
   float z_m = 0.0F;
   float azimuth_rad = 0.0F;  ///< Of the beam, left positive; goes on beyond pi within a ring.
-  float range_m = 0.0F;      ///< Horizontal distance from where the sensor was.
+  float range_m = 0.0F;      ///< Horizontal distance from where the sensor was at that time.
   float height_m = 0.0F;     ///< Above ground.
 
   Eigen::Vector2d position() const { return {x_m, y_m}; }
@@ -52,6 +53,11 @@ class RingCloud {
   float step_rad(std::size_t ring) const { return steps_[ring]; }
   /// Of the sensor at utime, frame `vehicle_level`.
   const Eigen::Vector3f& sensor_m() const { return sensor_; }
+  /// Of the sensor during the turn, as its points tell; frame `vehicle`, in the plan.
+  const Eigen::Vector2f& velocity_mps() const { return spin_.velocity_mps; }
+  /// Rise of a ring's beams per metre of range where they look into the direction. Precondition:
+  /// the ring has points.
+  float slope(std::size_t ring, float azimuth_rad) const;
   /// The first point of the ring at or beyond the azimuth (any turn), as an index into points();
   /// ring_end(ring) where there is none.
   std::size_t first_at(std::size_t ring, float azimuth_rad) const;
@@ -70,6 +76,9 @@ class RingCloud {
   std::vector<std::size_t> begins_;
   std::vector<float> steps_;
   std::vector<float> differences_;
+  std::vector<std::size_t> counts_;
+  Spin spin_;
+  Eigen::Matrix3f level_R_vehicle_ = Eigen::Matrix3f::Identity();
   Eigen::Vector3f sensor_ = Eigen::Vector3f::Zero();
 };
 

@@ -9,6 +9,7 @@
 #include "services/landmark_extractor/column_fit.hpp"
 #include "services/landmark_extractor/ground_surface.hpp"
 #include "services/landmark_extractor/level.hpp"
+#include "services/landmark_extractor/stem_probe.hpp"
 #include "services/landmark_extractor/trunk_columns.hpp"
 
 namespace understory {
@@ -28,15 +29,6 @@ struct TrunkCounters {
   std::uint64_t trunks = 0;
 };
 
-/// What the beams that should meet a stem met, counted in rings.
-struct StemProbe {
-  int on = 0;               ///< The stem.
-  int beside = 0;           ///< Something else at about the distance of the stem.
-  int through = 0;          ///< Nothing: they went on to something behind.
-  bool open_above = false;  ///< Beams pass where the stem should go on upwards.
-  bool open_below = false;  ///< The same downwards.
-};
-
 class SweepTrunks {
  public:
   SweepTrunks(const SweepParameters& sweep, const SweepTrunkParameters& trunk)
@@ -52,7 +44,6 @@ class SweepTrunks {
                                  const Column& column, const GroundSurface& ground,
                                  const Eigen::Matrix2d& level_covariance_rad2);
   bool plausible(const StemFit& fit, double breast_z);
-  StemProbe probe(const RingCloud& cloud, const StemFit& fit, double ground_z) const;
   bool stands(const StemProbe& probe);
 
   SweepParameters sweep_;
