@@ -17,8 +17,14 @@ constexpr int kIterations = 8;
 constexpr double kMaxGraze = 0.9;
 /// Residuals beyond this many sigma weigh as those at it (Huber).
 constexpr double kHuber = 2.0;
-/// A run disagrees whose residuals are so large in root mean square [sigma]...
+/// A run disagrees whose ranges are so far off in root mean square, or an edge of it [sigma].
 constexpr double kMaxRunResidual = 2.5;
+constexpr double kMaxEdgeResidual = 3.5;
+constexpr std::size_t kChecksPerRun = 4;
+constexpr int kRounds = 4;
+/// Runs of one stem seem so far apart, and so much more per metre of height.
+constexpr float kConsensus_m = 0.06F;
+constexpr float kConsensusLean = 0.06F;
 
 double square(double value) { return value * value; }
 
@@ -98,19 +104,45 @@ struct Sums {
 
 std::optional<StemFit> StemFitter::fit(const RingCloud& cloud, const std::vector<Run>& runs,
                                        const Column& column) {
-  agreeing_ = column.runs;
+  start_with_consensus(runs, column);
   StemFit fit;
   Vector6d state = Vector6d::Zero();
-  for (int round = 0; round < 3; ++round) {
+  for (int round = 0; round < kRounds; ++round) {
     choose_runs();
     take_evidence(cloud, runs);
     if (round == 0) state = start(cloud, runs);
     if (!settle(state)) return std::nullopt;
-    if (!drop_disagreeing(state)) break;
+    if (!sort_out(cloud, runs, column, state)) break;
     if (agreeing_.empty()) return std::nullopt;
   }
   describe(state, runs, fit);
   return fit;
+}
+
+/// The largest group of runs with nearly the same centre, counted in points.
+void StemFitter::start_with_consensus(const std::vector<Run>& runs, const Column& column) {
+  const std::size_t count = std::min(column.runs.size(), kMaxRuns);
+  const auto near = [&](const Run& a, const Run& b) {
+    const float apart = std::hypot(a.x_m - b.x_m, a.y_m - b.y_m);
+    return apart < kConsensus_m + kConsensusLean * std::abs(a.z_m - b.z_m);
+  };
+  std::size_t most = 0;
+  std::uint32_t best = column.runs.front();
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::uint32_t candidate = column.runs[k * column.runs.size() / count];
+    std::size_t points = 0;
+    for (const std::uint32_t i : column.runs) {
+      if (near(runs[candidate], runs[i])) points += runs[i].size();
+    }
+    if (points > most) {
+      most = points;
+      best = candidate;
+    }
+  }
+  agreeing_.clear();
+  for (const std::uint32_t i : column.runs) {
+    if (near(runs[best], runs[i])) agreeing_.push_back(i);
+  }
 }
 
 /// At most kMaxRuns of the agreeing runs, spread over the height.
@@ -135,23 +167,22 @@ void StemFitter::take_evidence(const RingCloud& cloud, const std::vector<Run>& r
       const double range = point.range_m;
       hits_.push_back({point.position() - range * direction, direction, range, point.z_m, index});
     }
-    if (run.left == Border::kClear) add_edge(cloud, run, index, 1.0);
-    if (run.right == Border::kClear) add_edge(cloud, run, index, -1.0);
+    if (run.left == Border::kClear) edges_.push_back(edge_of(cloud, run, index, 1.0));
+    if (run.right == Border::kClear) edges_.push_back(edge_of(cloud, run, index, -1.0));
   }
   share_edges();
 }
 
 /// The edge lies somewhere between the run's last beam and the next.
-void StemFitter::add_edge(const RingCloud& cloud, const Run& run, std::uint32_t index,
-                          double side) {
+StemFitter::Edge StemFitter::edge_of(const RingCloud& cloud, const Run& run, std::uint32_t index,
+                                     double side) const {
   const RingPoint& last = cloud.points()[side > 0.0 ? run.last : run.first];
   const double step = cloud.step_rad(run.ring);
   const double azimuth = last.azimuth_rad + side * (0.5 * step - sweep_.beam_width_rad);
-  const double range = last.range_m;
   const double variance =
-      square(range) * (square(step) / 12.0 + square(0.5 * sweep_.beam_width_rad)) +
+      square(last.range_m) * (square(step) / 12.0 + square(0.5 * sweep_.beam_width_rad)) +
       square(trunk_.roundness_sigma_m);
-  edges_.push_back({last.origin(), unit(azimuth), last.z_m, side, std::sqrt(variance), index});
+  return {last.origin(), unit(azimuth), last.z_m, side, std::sqrt(variance), index};
 }
 
 /// Rings that fire at the same azimuths miss an upright edge by the same part of a step: together
@@ -235,33 +266,37 @@ bool StemFitter::settle(Vector6d& state) {
   return (state.head<2>() - any.origin_m).dot(any.direction) > 1.1 * state[2];
 }
 
-/// Whether runs were dropped.
-bool StemFitter::drop_disagreeing(const Vector6d& state) {
-  std::vector<std::uint32_t> bad;
-  for (const std::uint32_t index : used_) {
-    double sum = 0.0;
-    double count = 0.0;
-    for (const Hit& hit : hits_) {
-      if (hit.run != index) continue;
-      const Term term = hit_term(circle_at(state, hit.z_m - reference_z_m_), hit.origin_m,
-                                 hit.direction, hit.range_m, sweep_, trunk_.roundness_sigma_m);
-      sum += square(term.normalised());
-      count += 1.0;
-    }
-    bool fits = sum <= square(kMaxRunResidual) * count;
-    for (const Edge& edge : edges_) {
-      if (edge.run != index) continue;
-      const Term term = edge_term(circle_at(state, edge.z_m - reference_z_m_), edge.origin_m,
-                                  edge.direction, edge.side, edge.sigma_m);
-      fits = fits && std::abs(term.normalised()) < 4.0;
-    }
-    if (!fits) bad.push_back(index);
+bool StemFitter::sort_out(const RingCloud& cloud, const std::vector<Run>& runs,
+                          const Column& column, const Vector6d& state) {
+  std::vector<std::uint32_t> agreeing;
+  for (const std::uint32_t index : column.runs) {
+    if (agrees(cloud, runs[index], state)) agreeing.push_back(index);
   }
-  if (bad.empty()) return false;
-  std::erase_if(agreeing_, [&](std::uint32_t index) {
-    return std::find(bad.begin(), bad.end(), index) != bad.end();
-  });
-  return true;
+  const bool is_new = agreeing != agreeing_;
+  agreeing_ = std::move(agreeing);
+  return is_new;
+}
+
+/// A few of its ranges, and its edges, are where the stem has them.
+bool StemFitter::agrees(const RingCloud& cloud, const Run& run, const Vector6d& state) const {
+  const std::size_t count = std::min(run.size(), kChecksPerRun);
+  double sum = 0.0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const RingPoint& point = cloud.points()[run.first + (2 * k + 1) * run.size() / (2 * count)];
+    const Term term =
+        hit_term(circle_at(state, point.z_m - reference_z_m_), point.origin(),
+                 unit(point.azimuth_rad), point.range_m, sweep_, trunk_.roundness_sigma_m);
+    sum += square(term.normalised());
+  }
+  if (sum > square(kMaxRunResidual) * static_cast<double>(count)) return false;
+  const auto edge_agrees = [&](double side) {
+    const Edge edge = edge_of(cloud, run, 0, side);
+    const Term term = edge_term(circle_at(state, edge.z_m - reference_z_m_), edge.origin_m,
+                                edge.direction, side, edge.sigma_m);
+    return std::abs(term.normalised()) < kMaxEdgeResidual;
+  };
+  return (run.left != Border::kClear || edge_agrees(1.0)) &&
+         (run.right != Border::kClear || edge_agrees(-1.0));
 }
 
 void StemFitter::describe(const Vector6d& state, const std::vector<Run>& runs, StemFit& fit) {

@@ -65,14 +65,18 @@ class StemFitter {
     std::uint32_t run;
   };
 
+  void start_with_consensus(const std::vector<Run>& runs, const Column& column);
   void choose_runs();
   void take_evidence(const RingCloud& cloud, const std::vector<Run>& runs);
-  void add_edge(const RingCloud& cloud, const Run& run, std::uint32_t index, double side);
   void share_edges();
   Vector6d start(const RingCloud& cloud, const std::vector<Run>& runs) const;
   bool settle(Vector6d& state);
   void linearise(const Vector6d& state, Matrix6d& information, Vector6d& gradient);
-  bool drop_disagreeing(const Vector6d& state);
+  /// Whether the runs that agree are others than before.
+  bool sort_out(const RingCloud& cloud, const std::vector<Run>& runs, const Column& column,
+                const Vector6d& state);
+  bool agrees(const RingCloud& cloud, const Run& run, const Vector6d& state) const;
+  Edge edge_of(const RingCloud& cloud, const Run& run, std::uint32_t index, double side) const;
   void describe(const Vector6d& state, const std::vector<Run>& runs, StemFit& fit);
 
   SweepParameters sweep_;

@@ -58,9 +58,11 @@ struct SweepTrunkParameters {
   double roundness_sigma_m = 0.01;        ///< Of the bark from a circle.
   double shape_sigma_m = 0.004;           ///< What more points do not average out.
   double max_lean_rad = 0.35;             ///< More than that is a branch.
-  double max_sigma_m = 0.12;              ///< Trunks whose centre is known worse are not reported.
+  double max_sigma_m = 0.08;              ///< Trunks whose centre is known worse are not reported.
   double max_mean_square_residual = 3.0;  ///< Of ranges and edges from the axis, in sigma^2.
   double gather_radius_m = 0.3;           ///< How far apart the slices of one trunk may seem.
+  double leaf_radius_m = 0.6;             ///< Of the returns so near a trunk...
+  double min_share = 0.4;                 ///< ... at least this part must be on it.
   int min_points = 5;
   int min_rings = 2;
 };

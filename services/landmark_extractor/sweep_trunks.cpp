@@ -71,6 +71,12 @@ std::optional<Detection> SweepTrunks::judge(const RingCloud& cloud, const std::v
   const GroundHeight below = ground.below(fit->state.head<2>());
   if (!plausible(*fit, below.height_m + sweep_.breast_height_m)) return std::nullopt;
   if (!stands(probe_stem(cloud, *fit, below.height_m, sweep_))) return std::nullopt;
+  const Eigen::Vector2f centre = fit->state.head<2>().cast<float>();
+  const auto around = columns_.points_near(runs, centre, static_cast<float>(trunk_.leaf_radius_m));
+  if (static_cast<double>(fit->points) < trunk_.min_share * static_cast<double>(around)) {
+    ++counters_.in_leaves;
+    return std::nullopt;
+  }
   const Detection detection = to_detection(*fit, below, sweep_.breast_height_m,
                                            level_covariance_rad2, trunk_.shape_sigma_m);
   if (largest_sigma(detection.covariance_m2.topLeftCorner<2, 2>()) > trunk_.max_sigma_m) {

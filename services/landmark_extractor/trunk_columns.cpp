@@ -48,21 +48,34 @@ void ColumnFinder::fill_grid(const std::vector<Run>& runs, const SweepTrunkParam
   });
 }
 
-void ColumnFinder::gather(const std::vector<Run>& runs, const Eigen::Vector2f& axis, float radius) {
-  gathered_.clear();
+template <class Visit>
+void ColumnFinder::visit_near(const std::vector<Run>& runs, const Eigen::Vector2f& axis,
+                              float radius, Visit visit) const {
   const std::size_t last_i = cell(axis.x() + radius, corner_x_);
   const std::size_t last_j = cell(axis.y() + radius, corner_y_);
   for (std::size_t j = cell(axis.y() - radius, corner_y_); j <= last_j; ++j) {
     for (std::size_t i = cell(axis.x() - radius, corner_x_); i <= last_i; ++i) {
       for (std::int32_t k = heads_[j * side_ + i]; k >= 0; k = next_[static_cast<std::size_t>(k)]) {
-        const auto index = static_cast<std::size_t>(k);
+        const auto index = static_cast<std::uint32_t>(k);
         const Eigen::Vector2f offset = Eigen::Vector2f(runs[index].x_m, runs[index].y_m) - axis;
-        if (!taken_[index] && offset.squaredNorm() <= radius * radius) {
-          gathered_.push_back(static_cast<std::uint32_t>(k));
-        }
+        if (offset.squaredNorm() <= radius * radius) visit(index);
       }
     }
   }
+}
+
+void ColumnFinder::gather(const std::vector<Run>& runs, const Eigen::Vector2f& axis, float radius) {
+  gathered_.clear();
+  visit_near(runs, axis, radius, [&](std::uint32_t index) {
+    if (!taken_[index]) gathered_.push_back(index);
+  });
+}
+
+std::size_t ColumnFinder::points_near(const std::vector<Run>& runs, const Eigen::Vector2f& centre_m,
+                                      float radius_m) const {
+  std::size_t points = 0;
+  visit_near(runs, centre_m, radius_m, [&](std::uint32_t index) { points += runs[index].size(); });
+  return points;
 }
 
 const std::vector<Column>& ColumnFinder::find(const std::vector<Run>& runs,

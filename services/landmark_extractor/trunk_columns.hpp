@@ -25,7 +25,15 @@ class ColumnFinder {
                                   const SweepTrunkParameters& parameters,
                                   const Eigen::Vector2f& centre_m, float reach_m);
 
+  /// Points on runs whose centres are within the radius, whatever column they are in; of the runs
+  /// of the last find().
+  std::size_t points_near(const std::vector<Run>& runs, const Eigen::Vector2f& centre_m,
+                          float radius_m) const;
+
  private:
+  template <class Visit>
+  void visit_near(const std::vector<Run>& runs, const Eigen::Vector2f& axis, float radius,
+                  Visit visit) const;
   void fill_grid(const std::vector<Run>& runs, const SweepTrunkParameters& parameters);
   std::size_t cell(float coordinate, float corner) const;
   void gather(const std::vector<Run>& runs, const Eigen::Vector2f& axis, float radius);
