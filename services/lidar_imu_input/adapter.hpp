@@ -1,0 +1,28 @@
+// The input stage's place on the bus.
+#pragma once
+
+#include <string>
+
+#include "common/bus/service.hpp"
+
+namespace understory {
+
+struct LidarImuInputChannels {
+  std::string raw_imu = "RAW_IMU";
+  std::string raw_wheels = "RAW_WHEELS";
+  std::string raw_gnss = "RAW_GNSS";
+  std::string raw_sweep = "RAW_SWEEP";
+  std::string raw_scan = "RAW_SCAN";
+  std::string velocity_correction = "VELOCITY_CORRECTION";
+  std::string imu = "IMU";
+  std::string wheels = "WHEELS";
+  std::string gnss = "GNSS";
+  std::string odometry = "ODOMETRY";
+  std::string raw_pose = "RAW_POSE";
+  std::string lidar_sweep = "LIDAR_SWEEP";
+  std::string lidar_scan = "LIDAR_SCAN";
+};
+
+Service lidar_imu_input_service(const LidarImuInputChannels& channels = {});
+
+}  // namespace understory

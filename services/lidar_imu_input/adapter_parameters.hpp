@@ -1,0 +1,19 @@
+// The input stage's parameters as a list: units, ranges, meanings.
+#pragma once
+
+#include "common/bus/parameter_table.hpp"
+#include "services/lidar_imu_input/parameters.hpp"
+
+namespace understory {
+
+/// Where the wheels are: scalars of `CarGeometry::axle_T_vehicle`, put together after loading.
+struct AxlePlace {
+  double x_m = 0.0;
+  double y_m = 0.0;
+  double yaw_rad = 0.0;
+};
+
+void describe(LidarImuInputParameters& parameters, AxlePlace& axle_T_vehicle,
+              ParameterTable& table);
+
+}  // namespace understory
