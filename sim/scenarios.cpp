@@ -8,7 +8,19 @@
 namespace understory::sim {
 namespace {
 
-constexpr double kRounding = 11.0;  ///< A car turns no tighter than 5 m.
+/// Turns on the spot become curves that a car can drive; others only lose their jumps of curvature.
+double rounding_m(PathKind kind) {
+  switch (kind) {
+    case PathKind::kSquare:
+    case PathKind::kTriangle:
+      return 11.0;
+    case PathKind::kFigureEight:
+    case PathKind::kMeander:
+      return 5.0;
+    default:
+      return 1.0;
+  }
+}
 
 std::vector<Eigen::Vector2d> way_points(const ForestScenarioParameters& parameters) {
   PathParameters path;
@@ -35,7 +47,7 @@ Scenario in_forest(const ForestScenarioParameters& parameters, const Forest& for
 }  // namespace
 
 Scenario forest_scenario(const ForestScenarioParameters& parameters, std::uint64_t seed) {
-  const Route route = Route::through(way_points(parameters), kRounding);
+  const Route route = Route::through(way_points(parameters), rounding_m(parameters.path));
   Eigen::Vector2d low = route.at(0.0).position_m;
   Eigen::Vector2d high = low;
   for (const Eigen::Vector2d& p : route.places(1.0)) {
@@ -51,7 +63,7 @@ Scenario forest_scenario(const ForestScenarioParameters& parameters, std::uint64
 
 Scenario forest_scenario(const ForestScenarioParameters& parameters, const Forest& forest,
                          const SE2& world_T_start, std::uint64_t seed) {
-  const Route route = Route::through(way_points(parameters), kRounding);
+  const Route route = Route::through(way_points(parameters), rounding_m(parameters.path));
   return in_forest(parameters, forest, route.moved(world_T_start), seed);
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "common/wire/convert.hpp"
 #include "sim/point_grid.hpp"
@@ -10,6 +11,8 @@
 namespace understory {
 namespace {
 
+/// Between two true poses the motion is taken to be even if they are no further apart [us].
+constexpr Utime kLongestGap = 200'000;
 constexpr double kTileM = 5.0;
 
 }  // namespace
@@ -58,18 +61,30 @@ void DriveAccuracyCollector::add_landmarks_event(const LogEvent& event) {
   last_scan_ = header->sequence;
 }
 
+std::optional<SE2> DriveAccuracyCollector::truth_at(Utime utime) const {
+  const auto after = truth_.lower_bound(utime);
+  if (after == truth_.end()) return std::nullopt;
+  if (after->first == utime) return after->second;
+  if (after == truth_.begin()) return std::nullopt;
+  const auto before = std::prev(after);
+  if (after->first - before->first > kLongestGap) return std::nullopt;
+  const double share = static_cast<double>(utime - before->first) /
+                       static_cast<double>(after->first - before->first);
+  return before->second * SE2::Exp(share * (before->second.inverse() * after->second).Log());
+}
+
 std::optional<ComparedPose> DriveAccuracyCollector::compare(Utime utime, const SE2& map_T_vehicle,
                                                             const SE2& world_T_map) const {
-  const auto truth = truth_.find(utime);
-  if (truth == truth_.end()) return std::nullopt;
-  return ComparedPose{utime, world_T_map * map_T_vehicle, truth->second};
+  const auto truth = truth_at(utime);
+  if (!truth) return std::nullopt;
+  return ComparedPose{utime, world_T_map * map_T_vehicle, *truth};
 }
 
 std::optional<DriveAccuracy> DriveAccuracyCollector::finish() const {
   if (!first_update_) return std::nullopt;
-  const auto base = truth_.find(first_update_->utime);
-  if (base == truth_.end()) return std::nullopt;
-  const SE2 world_T_map = base->second * first_update_->map_T_vehicle.inverse();
+  const auto base = truth_at(first_update_->utime);
+  if (!base) return std::nullopt;
+  const SE2 world_T_map = *base * first_update_->map_T_vehicle.inverse();
 
   DriveAccuracy accuracy = counted_;
   for (const auto& pose : poses_) {

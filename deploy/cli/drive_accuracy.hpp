@@ -47,6 +47,8 @@ class DriveAccuracyCollector {
 
  private:
   void add_landmarks_event(const LogEvent& event);
+  /// The true pose at `utime`, interpolated where it was recorded at other instants.
+  std::optional<SE2> truth_at(Utime utime) const;
   std::optional<ComparedPose> compare(Utime utime, const SE2& map_T_vehicle,
                                       const SE2& world_T_map) const;
 

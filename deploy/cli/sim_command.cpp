@@ -9,13 +9,14 @@
 #include <set>
 #include <thread>
 
-#include "common/bus/live_bus.hpp"
+#include "common/bus/split_bus.hpp"
 #include "common/io/lcm_log.hpp"
 #include "common/wire/convert.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/interrupt.hpp"
 #include "deploy/cli/progress.hpp"
+#include "deploy/cli/sensor_simulation.hpp"
 #include "sim/drive.hpp"
 #include "understory/ground_truth_t.hpp"
 #include "understory/truth_landmarks_t.hpp"
@@ -31,9 +32,8 @@ struct Options {
   sim::DriveParameters drive;
   std::uint64_t seed = 1;
   double rate = 1.0;
+  SensorSimulationOptions sensors;
 };
-
-using Publish = std::function<void(const std::string& channel, Utime utime, const Bytes& bytes)>;
 
 std::string read_file(const std::string& path) {
   std::ifstream file(path);
@@ -102,12 +102,16 @@ void write_log(const sim::Drive& drive, const std::string& file) {
   writer.commit();
 }
 
-void drive_live(const sim::Drive& drive, const Options& options) {
-  LiveBus bus(options.lcm_url);
-  const Publish publish = [&](const std::string& channel, Utime /*utime*/, const Bytes& bytes) {
+Publish publish_on(Bus& bus) {
+  return [&bus](const std::string& channel, Utime /*utime*/, const Bytes& bytes) {
     const auto refusal = bus.publish(channel, bytes);
     if (refusal) fail(fmt::format("channel {}: {}", channel, refusal->detail));
   };
+}
+
+void drive_live(const sim::Drive& drive, const Options& options) {
+  const auto bus = make_live_bus(options.lcm_url);
+  const Publish publish = publish_on(*bus);
   Progress progress("driving", static_cast<double>(drive.size()), Progress::Without::kLines);
   publish("TRUTH_LANDMARKS", drive.utime(0), encode_message(truth_landmarks(drive)));
   const auto start = std::chrono::steady_clock::now();
@@ -121,8 +125,69 @@ void drive_live(const sim::Drive& drive, const Options& options) {
   }
 }
 
+/// Everything in the order in which real sensors would give it.
+void send_readings(sim::SensorDrive& drive, const Publish& publish, Progress& progress,
+                   const std::function<void(Utime)>& wait_until) {
+  const truth_landmarks_t landmarks = true_landmarks_on_way(drive);
+  publish("TRUTH_LANDMARKS", landmarks.utime, encode_message(landmarks));
+  SensorPublisher publisher(publish);
+  while (const auto reading = drive.next()) {
+    throw_if_interrupted();
+    const Utime complete = complete_at(*reading, drive);
+    wait_until(complete);
+    publisher.publish(*reading);
+    progress.update(1e-6 * static_cast<double>(complete));
+  }
+}
+
+void write_sensor_log(sim::SensorDrive& drive, const std::string& file) {
+  LcmLogWriter writer(file);
+  Progress progress("simulating", drive.motion().duration_s());
+  // A log's events are in the order of their stamps: those of sweeps begin before they are sent.
+  Utime now = 0;
+  send_readings(
+      drive,
+      [&](const std::string& channel, Utime /*utime*/, const Bytes& bytes) {
+        writer.write(now, channel, bytes);
+      },
+      progress, [&](Utime complete) { now = complete; });
+  writer.commit();
+}
+
+void send_sensors_live(sim::SensorDrive& drive, const Options& options) {
+  const auto bus = make_live_bus(options.lcm_url);
+  Progress progress("driving", drive.motion().duration_s(), Progress::Without::kLines);
+  const auto start = std::chrono::steady_clock::now();
+  send_readings(drive, publish_on(*bus), progress, [&](Utime complete) {
+    const auto elapsed_us = static_cast<std::int64_t>(static_cast<double>(complete) / options.rate);
+    std::this_thread::sleep_until(start + std::chrono::microseconds(elapsed_us));
+  });
+}
+
+void simulate_sensors(Options& options) {
+  options.sensors.world = options.world;
+  options.sensors.path = options.path;
+  options.sensors.seed = options.seed;
+  sim::SensorDrive drive = make_sensor_drive(options.sensors);
+  try {
+    if (options.out.empty()) {
+      send_sensors_live(drive, options);
+    } else {
+      write_sensor_log(drive, options.out);
+    }
+  } catch (const Interrupted& error) {
+    fail(fmt::format("sim: {}", error.what()));
+  }
+  fmt::print("{:.1f} m driven in {:.1f} s{}{}\n", drive.motion().driven_m(),
+             drive.motion().duration_s(), options.out.empty() ? "" : " -> ", options.out);
+}
+
 void simulate(Options& options) {
   catch_interrupts();
+  if (is_sensor_world(options.world)) {
+    simulate_sensors(options);
+    return;
+  }
   const auto drive = [&] {
     try {
       return make_drive(options);
@@ -145,6 +210,62 @@ void simulate(Options& options) {
              options.out.empty() ? "" : " -> ", options.out);
 }
 
+void add_landmark_options(CLI::App& command, Options& options) {
+  auto& drive = options.drive;
+  command.add_option("--length", drive.path.length_m, "Of the path [m]")
+      ->check(CLI::Range(1.0, 1e6))
+      ->capture_default_str();
+  command.add_option("--interval", drive.path.interval, "Between scans [m, or rad when turning]")
+      ->check(CLI::Range(1e-3, 100.0))
+      ->capture_default_str();
+  command.add_option("--speed", drive.speed_mps, "Of the vehicle [m/s]")
+      ->check(CLI::Range(1e-3, 100.0))
+      ->capture_default_str();
+  command.add_option("--sensor-range", drive.sensor.range_m, "[m]")
+      ->check(CLI::Range(1.0, 1e3))
+      ->capture_default_str();
+  command
+      .add_option("--detection", drive.sensor.detection_probability,
+                  "Probability that a landmark in range is seen")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command.add_option("--noise", drive.sensor.position_sigma_m, "Sigma of a position per axis [m]")
+      ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str();
+}
+
+void add_sensor_options(CLI::App& command, Options& options) {
+  auto& sensors = options.sensors;
+  const std::string group = "With sensors";
+  command.add_option("--forest", sensors.forest, "forest3d: dense, intermediate, sparse")
+      ->group(group)
+      ->capture_default_str();
+  command.add_option("--way", sensors.length_m, "Of the way [m]; `urban` has its own")
+      ->group(group)
+      ->check(CLI::Range(20.0, 2e5))
+      ->capture_default_str();
+  command.add_option("--laps", sensors.laps, "forest3d, urban: rounds of the way")
+      ->group(group)
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command.add_option("--cruise", sensors.speed_mps, "Speed on straights [m/s]")
+      ->group(group)
+      ->check(CLI::Range(0.5, 30.0))
+      ->capture_default_str();
+  command.add_option("--standstill", sensors.standstill_s, "At the start [s]")
+      ->group(group)
+      ->check(CLI::Range(0.0, 3600.0))
+      ->capture_default_str();
+  command.add_option("--lidar", sensors.lidar, "vlp16, vlp32, hdl32, hdl64, none")
+      ->group(group)
+      ->capture_default_str();
+  command.add_flag("--planar-laser", sensors.planar_laser, "A one-plane laser as well")
+      ->group(group);
+  command.add_option("--gnss-until", sensors.gnss_outage_from_s, "No GNSS after this time [s]")
+      ->group(group)
+      ->check(CLI::Range(0.0, 1e6));
+}
+
 }  // namespace
 
 void add_sim_command(CLI::App& parent) {
@@ -153,7 +274,9 @@ void add_sim_command(CLI::App& parent) {
   auto options = std::make_shared<Options>();
   command
       ->add_option("world", options->world,
-                   "dense, intermediate, sparse, or a CSV file with x_m,y_m[,dbh_m]")
+                   "Ideal landmarks: dense, intermediate, sparse, or a CSV file with "
+                   "x_m,y_m[,dbh_m]. Sensors: forest3d, urban, urban-countryside, countryside, "
+                   "poles:POLES.csv,TRAJECTORY.csv")
       ->required();
   command->add_option("--out", options->out, "Write this log instead of sending");
   command->add_option("--lcm-url", options->lcm_url, "Bus, e.g. udpm://239.255.76.67:7667?ttl=0");
@@ -161,28 +284,9 @@ void add_sim_command(CLI::App& parent) {
       ->add_option("--path", options->path,
                    "circle, line, figure-eight, square, triangle, double-circle, meander, standing")
       ->capture_default_str();
-  auto& drive = options->drive;
-  command->add_option("--length", drive.path.length_m, "Of the path [m]")
-      ->check(CLI::Range(1.0, 1e6))
-      ->capture_default_str();
-  command->add_option("--interval", drive.path.interval, "Between scans [m, or rad when turning]")
-      ->check(CLI::Range(1e-3, 100.0))
-      ->capture_default_str();
-  command->add_option("--speed", drive.speed_mps, "Of the vehicle [m/s]")
-      ->check(CLI::Range(1e-3, 100.0))
-      ->capture_default_str();
-  command->add_option("--sensor-range", drive.sensor.range_m, "[m]")
-      ->check(CLI::Range(1.0, 1e3))
-      ->capture_default_str();
-  command
-      ->add_option("--detection", drive.sensor.detection_probability,
-                   "Probability that a landmark in range is seen")
-      ->check(CLI::Range(0.0, 1.0))
-      ->capture_default_str();
-  command->add_option("--noise", drive.sensor.position_sigma_m, "Sigma of a position per axis [m]")
-      ->check(CLI::Range(0.0, 10.0))
-      ->capture_default_str();
-  command->add_option("--seed", options->seed, "Of forest, start and noise")->capture_default_str();
+  add_landmark_options(*command, *options);
+  add_sensor_options(*command, *options);
+  command->add_option("--seed", options->seed, "Of world, start and noise")->capture_default_str();
   command->add_option("--rate", options->rate, "Live: times faster than the clock")
       ->check(CLI::Range(1e-3, 1e3))
       ->capture_default_str();

@@ -1,0 +1,170 @@
+#include "deploy/cli/sensor_simulation.hpp"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <iterator>
+#include <utility>
+
+#include "deploy/cli/failure.hpp"
+#include "sim/point_grid.hpp"
+#include "understory/ground_truth_t.hpp"
+
+namespace understory {
+namespace {
+
+constexpr std::string_view kPoles = "poles:";
+/// Of 10 bytes each: a message stays below the 64 KiB of one datagram.
+constexpr std::size_t kPointsPerMessage = 5900;
+constexpr double kLandmarkReach = 40.0;
+
+std::string read_file(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) fail(fmt::format("{}: cannot be read", path));
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+sim::Scenario forest_scenario(const SensorSimulationOptions& options) {
+  sim::ForestScenarioParameters parameters;
+  const auto kind = sim::forest_kind(options.forest);
+  if (!kind) wrong_usage(fmt::format("--forest {}: no such forest", options.forest));
+  const auto path = sim::path_kind(options.path);
+  if (!path) wrong_usage(fmt::format("--path {}: no such path", options.path));
+  parameters.forest = sim::forest_parameters(*kind);
+  parameters.path = *path;
+  parameters.length_m = options.length_m;
+  parameters.laps = options.laps;
+  return sim::forest_scenario(parameters, options.seed);
+}
+
+sim::Scenario pole_scenario(const SensorSimulationOptions& options) {
+  const std::string files = options.world.substr(kPoles.size());
+  const auto comma = files.find(',');
+  if (comma == std::string::npos) {
+    wrong_usage(fmt::format("{}: poles:POLES.csv,TRAJECTORY.csv is wanted", options.world));
+  }
+  auto result = sim::pole_map_scenario(read_file(files.substr(0, comma)),
+                                       read_file(files.substr(comma + 1)), options.seed);
+  if (!result.scenario) fail(fmt::format("{}: {}", files, result.error));
+  return std::move(*result.scenario);
+}
+
+sim::Scenario scenario_of(const SensorSimulationOptions& options) {
+  if (options.world == "forest3d") return forest_scenario(options);
+  if (options.world == "urban") return sim::urban_scenario(options.laps, options.seed);
+  if (options.world == "urban-countryside") {
+    return sim::urban_to_countryside_scenario(options.length_m, options.seed);
+  }
+  if (options.world == "countryside") {
+    return sim::countryside_scenario(options.length_m, options.seed);
+  }
+  return pole_scenario(options);
+}
+
+std::optional<sim::LidarParameters> lidar_of(const std::string& name) {
+  if (name == "none") return std::nullopt;
+  sim::LidarParameters lidar;
+  const auto use = [&](sim::LidarModel model, int columns) {
+    lidar.elevations_rad = sim::beam_elevations_rad(model);
+    lidar.columns = columns;
+    return lidar;
+  };
+  if (name == "vlp16") return use(sim::LidarModel::kVlp16, 1800);
+  if (name == "vlp32") return use(sim::LidarModel::kVlp32, 1800);
+  if (name == "hdl32") return use(sim::LidarModel::kHdl32, 2160);
+  if (name == "hdl64") return use(sim::LidarModel::kHdl64, 2048);
+  wrong_usage(fmt::format("--lidar {}: no such model", name));
+}
+
+truth_landmark_t truth_landmark(std::size_t id, const Eigen::Vector2d& position_m, double radius_m,
+                                LandmarkKind kind) {
+  truth_landmark_t landmark{};
+  landmark.id = static_cast<std::int64_t>(id);
+  landmark.position_m[0] = position_m.x();
+  landmark.position_m[1] = position_m.y();
+  landmark.radius_m = radius_m;
+  landmark.kind = static_cast<std::int8_t>(kind);
+  return landmark;
+}
+
+}  // namespace
+
+bool is_sensor_world(std::string_view world) {
+  return world == "forest3d" || world == "urban" || world == "urban-countryside" ||
+         world == "countryside" || world.starts_with(kPoles);
+}
+
+sim::SensorDrive make_sensor_drive(const SensorSimulationOptions& options) {
+  sim::SensorSuite suite;
+  suite.lidar = lidar_of(options.lidar);
+  if (options.planar_laser) suite.planar_laser = sim::PlanarLaserParameters{};
+  if (options.gnss_outage_from_s) suite.gnss->outages = {{*options.gnss_outage_from_s, 1e9}};
+  sim::SpeedParameters speed;
+  speed.cruise_mps = options.speed_mps;
+  speed.standstill_s = options.standstill_s;
+  return {scenario_of(options), speed, std::move(suite), options.seed};
+}
+
+void SensorPublisher::publish(const sim::SensorReading& reading) {
+  const auto send = [&](const std::string& channel, const auto& message) {
+    publish_(channel, message.utime, encode_message(message));
+  };
+  if (const auto* pose = std::get_if<sim::TruePose>(&reading)) {
+    ground_truth_t truth{};
+    truth.utime = pose->utime;
+    truth.seq = static_cast<std::int64_t>(pose->sequence);
+    truth.world_T_vehicle = to_wire(pose->state.world_T_level());
+    send("GROUND_TRUTH", truth);
+  } else if (const auto* imu = std::get_if<ImuSample>(&reading)) {
+    send("RAW_IMU", *imu);
+  } else if (const auto* wheels = std::get_if<WheelSample>(&reading)) {
+    send("RAW_WHEELS", *wheels);
+  } else if (const auto* fix = std::get_if<GnssFix>(&reading)) {
+    send("RAW_GNSS", *fix);
+  } else if (const auto* scan = std::get_if<sim::SimulatedPlanarScan>(&reading)) {
+    send("RAW_SCAN", scan->scan);
+  } else if (const auto* sweep = std::get_if<sim::SimulatedSweep>(&reading)) {
+    for (PointSweep& part : split_sweep(sweep->raw, kPointsPerMessage)) {
+      part.sequence = sweep_parts_++;
+      send("RAW_SWEEP", part);
+    }
+  }
+}
+
+Utime complete_at(const sim::SensorReading& reading, const sim::SensorDrive& drive) {
+  return std::visit(
+      [&](const auto& value) -> Utime {
+        using Value = std::decay_t<decltype(value)>;
+        if constexpr (std::is_same_v<Value, sim::SimulatedSweep>) {
+          const double turn_s = drive.suite().lidar->turn_s();
+          return static_cast<Utime>(1e6 * turn_s * static_cast<double>(value.raw.turn + 1));
+        } else if constexpr (std::is_same_v<Value, sim::SimulatedPlanarScan>) {
+          return value.scan.utime;
+        } else {
+          return value.utime;
+        }
+      },
+      reading);
+}
+
+truth_landmarks_t true_landmarks_on_way(const sim::SensorDrive& drive) {
+  const sim::PointGrid way(drive.route().places(1.0), 20.0);
+  truth_landmarks_t message{};
+  const auto trunks = drive.world().trunks();
+  for (std::size_t i = 0; i < trunks.size(); ++i) {
+    const Eigen::Vector2d position = trunks[i].centre_m.head<2>();
+    if (!way.any_within(position, kLandmarkReach)) continue;
+    message.landmarks.push_back(
+        truth_landmark(i, position, trunks[i].radius_m, LandmarkKind::kTrunk));
+  }
+  const auto corners = drive.world().corners();
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    if (!way.any_within(corners[i].position_m, kLandmarkReach)) continue;
+    message.landmarks.push_back(
+        truth_landmark(trunks.size() + i, corners[i].position_m, 0.0, LandmarkKind::kCorner));
+  }
+  message.num_landmarks = static_cast<std::int32_t>(message.landmarks.size());
+  return message;
+}
+
+}  // namespace understory

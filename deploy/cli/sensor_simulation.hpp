@@ -1,0 +1,56 @@
+// Simulated drives with real sensors, as messages.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "common/wire/convert.hpp"
+#include "sim/scenarios.hpp"
+#include "understory/truth_landmarks_t.hpp"
+
+namespace understory {
+
+struct SensorSimulationOptions {
+  std::string world;  ///< See is_sensor_world.
+  std::string forest = "intermediate";
+  std::string path = "circle";
+  double length_m = 1000.0;  ///< Forest and country; the block has its own.
+  int laps = 1;              ///< Forest and block.
+  std::string lidar = "vlp32";
+  bool planar_laser = false;
+  double speed_mps = 5.0;
+  double standstill_s = 22.0;
+  std::optional<double> gnss_outage_from_s;  ///< Until the end of the drive.
+  std::uint64_t seed = 1;
+};
+
+/// forest3d, urban, urban-countryside, countryside, poles:POLES.csv,TRAJECTORY.csv
+bool is_sensor_world(std::string_view world);
+
+/// Fails (see failure.hpp) where a name is unknown or a file cannot be read.
+sim::SensorDrive make_sensor_drive(const SensorSimulationOptions& options);
+
+using Publish = std::function<void(const std::string& channel, Utime utime, const Bytes& bytes)>;
+
+/// Readings to messages: RAW_SWEEP (in parts), RAW_SCAN, RAW_IMU, RAW_WHEELS, RAW_GNSS,
+/// GROUND_TRUTH.
+class SensorPublisher {
+ public:
+  explicit SensorPublisher(Publish publish) : publish_(std::move(publish)) {}
+  void publish(const sim::SensorReading& reading);
+
+ private:
+  Publish publish_;
+  std::uint64_t sweep_parts_ = 0;
+};
+
+/// When a reading is complete and can be sent.
+Utime complete_at(const sim::SensorReading& reading, const sim::SensorDrive& drive);
+
+/// Trunks, poles and corners within 40 m of the way: what a map can hold. Ids count trunks first.
+truth_landmarks_t true_landmarks_on_way(const sim::SensorDrive& drive);
+
+}  // namespace understory
