@@ -1,13 +1,48 @@
 #include "services/landmark_extractor/adapter.hpp"
 
+#include <fmt/format.h>
+
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "services/landmark_extractor/adapter_parameters.hpp"
 #include "services/landmark_extractor/landmark_extractor.hpp"
 
 namespace understory {
 namespace {
+
+constexpr Utime kSummaryPeriod_us = 10000000;
+
+/// "trunks 12 (too_few_points 3, ...), corners ..."; empty when there was no sweep.
+std::string summary(const SweepCounters& now, const SweepCounters& before) {
+  if (now.sweeps == before.sweeps) return "";
+  std::string text;
+  const auto say = [&](std::string_view name, std::uint64_t count) {
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", name, count);
+  };
+  const TrunkCounters& t = now.trunks;
+  const TrunkCounters& t0 = before.trunks;
+  const CornerCounters& c = now.corners;
+  const CornerCounters& c0 = before.corners;
+  say("sweeps", now.sweeps - before.sweeps);
+  say("trunks", t.trunks - t0.trunks);
+  say("columns of returns that are none: too few points", t.too_few_points - t0.too_few_points);
+  say("no fit", t.no_fit - t0.no_fit);
+  say("wrong radius", t.wrong_radius - t0.wrong_radius);
+  say("leaning", t.leaning - t0.leaning);
+  say("not round", t.not_round - t0.not_round);
+  say("uncertain", t.uncertain - t0.uncertain);
+  say("not standing", t.not_standing - t0.not_standing);
+  say("in leaves", t.in_leaves - t0.in_leaves);
+  say("out of range", t.out_of_range - t0.out_of_range);
+  say("corners", c.corners - c0.corners);
+  say("walls", c.walls - c0.walls);
+  say("meetings of walls that are none: skew", c.skew - c0.skew);
+  say("low", c.low - c0.low);
+  say("hidden", c.hidden - c0.hidden);
+  return text;
+}
 
 class LandmarkExtractorAdapter : public Adapter {
  public:
@@ -17,25 +52,75 @@ class LandmarkExtractorAdapter : public Adapter {
   void describe(ParameterTable& table) override { understory::describe(parameters_, table); }
 
   void bind(Node& node) override {
+    node_ = &node;
     stage_.emplace(parameters_);
     node.subscribe<PlanarScan>(
         channels_.lidar_scan,
         [this](const PlanarScan& scan) { landmarks_.publish(stage_->extract(scan)); },
         {.queue_size = 200});
+    // The stage remembers nothing: a sweep that was under way at a restart is lost.
+    node.subscribe<PointSweep>(channels_.lidar_sweep,
+                               [this](const PointSweep& part) { add_part(part); },
+                               {.queue_size = 1000, .journaled = false});
     landmarks_ = node.advertise<LandmarkScan>(channels_.landmarks);
+    node.every(kSummaryPeriod_us, [this](Utime /*now*/) { say_summary(); });
   }
 
  private:
+  void add_part(const PointSweep& part) {
+    const auto sweep = assembler_.add(part);
+    if (assembler_.incomplete_turns() > incomplete_) {
+      incomplete_ = assembler_.incomplete_turns();
+      node_->report(Reason::kPartsMissing, "a turn of which parts are missing is left out",
+                    channels_.lidar_sweep);
+    }
+    if (!sweep) return;
+    const SweepCounters before = stage_->sweep_counters();
+    const LandmarkScan landmarks = stage_->extract(*sweep);
+    say_what_is_wrong(before, stage_->sweep_counters());
+    if (stage_->sweep_counters().malformed == before.malformed) landmarks_.publish(landmarks);
+  }
+
+  void say_what_is_wrong(const SweepCounters& before, const SweepCounters& now) {
+    const auto say = [&](Reason reason, std::string_view text) {
+      node_->report(reason, text, channels_.lidar_sweep);
+    };
+    if (now.malformed > before.malformed) {
+      say(Reason::kInconsistent, "a sweep without rings or not in frame vehicle is left out");
+    }
+    if (now.without_attitude > before.without_attitude) {
+      say(Reason::kNotCalibrated, "a sweep without attitude is taken as level");
+    }
+    if (now.points.not_finite > before.points.not_finite) {
+      say(Reason::kNotFinite, "points that are no numbers are left out");
+    }
+    if (now.points.bad_ring > before.points.bad_ring) {
+      say(Reason::kOutOfRange, "points of rings that the sensor does not have are left out");
+    }
+  }
+
+  /// What became of the objects since the last time, with why.
+  void say_summary() {
+    const std::string all = summary(stage_->sweep_counters(), told_);
+    if (!all.empty()) node_->log(Node::Level::kInfo, "landmarks", all, channels_.lidar_sweep);
+    told_ = stage_->sweep_counters();
+  }
+
   LandmarkExtractorChannels channels_;
   LandmarkExtractorParameters parameters_;
+  Node* node_ = nullptr;
   std::optional<LandmarkExtractor> stage_;
+  SweepAssembler assembler_;
+  std::uint64_t incomplete_ = 0;
+  SweepCounters told_;
   Publisher<LandmarkScan> landmarks_;
 };
 
 }  // namespace
 
 Service landmark_extractor_service(const LandmarkExtractorChannels& channels) {
-  return {"landmark_extractor", channels.lidar_scan + " -> " + channels.landmarks,
+  return {"landmark_extractor",
+          channels.lidar_scan + ", " + channels.lidar_sweep + " -> " + channels.landmarks,
           [channels] { return std::make_unique<LandmarkExtractorAdapter>(channels); }};
 }
 

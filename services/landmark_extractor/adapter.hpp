@@ -9,6 +9,7 @@ namespace understory {
 
 struct LandmarkExtractorChannels {
   std::string lidar_scan = "LIDAR_SCAN";
+  std::string lidar_sweep = "LIDAR_SWEEP";
   std::string landmarks = "LANDMARKS";
 };
 

@@ -44,12 +44,96 @@ void describe_selection(PlanarTrunkParameters& p, ParameterTable& table) {
             "Of the ranges from the fitted circle.");
 }
 
+void describe_sweep(SweepParameters& p, ParameterTable& table) {
+  table.add("sweep.min_range_m", p.min_range_m, {0.0, 100.0}, "m",
+            "What is nearer is the vehicle itself.");
+  table.add("sweep.max_range_m", p.max_range_m, {1.0, 100.0}, "m",
+            "Landmarks farther than this are not reported.");
+  table.add("sweep.range_sigma_m", p.range_sigma_m, {1e-4, 1.0}, "m", "Noise of one beam.");
+  table.add("sweep.beam_width_rad", p.beam_width_rad, {0.0, 0.1}, "rad",
+            "By how much a beam's footprint widens an object on each side.");
+  table.add("sweep.min_height_m", p.min_height_m, {0.05, 10.0}, "m",
+            "Above ground: what is lower is ground, grass, stones.");
+  table.add("sweep.max_height_m", p.max_height_m, {1.0, 100.0}, "m",
+            "Above ground: what is higher is canopy.");
+  table.add("sweep.break_distance_m", p.break_distance_m, {0.01, 10.0}, "m",
+            "Neighbouring returns farther apart are two objects.");
+  table.add("sweep.break_per_range", p.break_per_range, {0.0, 1.0}, "m per m",
+            "Added to that for each metre of range.");
+  table.add("sweep.clearance_m", p.clearance_m, {0.0, 100.0}, "m",
+            "What stands beside an object's edge is so much farther away.");
+  table.add("sweep.standing_height_m", p.standing_height_m, {0.5, 20.0}, "m",
+            "What ends below this is a person, a bush, a car, a stump.");
+  table.add("sweep.breast_height_m", p.breast_height_m, {0.0, 5.0}, "m",
+            "Above ground: where a landmark's position is given.");
+  table.add("sweep.level_sigma_rad", p.level_sigma_rad, {1e-5, 1.0}, "rad",
+            "Of roll and of pitch where the sweep does not say them.");
+}
+
+void describe_trunk_shape(SweepTrunkParameters& p, ParameterTable& table) {
+  table.add("trunk.min_radius_m", p.min_radius_m, {0.001, 10.0}, "m", "Of a trunk.");
+  table.add("trunk.max_radius_m", p.max_radius_m, {0.01, 10.0}, "m", "Of a trunk.");
+  table.add("trunk.prior_radius_m", p.prior_radius_m, {0.001, 10.0}, "m",
+            "What a trunk's radius is before it is measured.");
+  table.add("trunk.prior_radius_sigma_m", p.prior_radius_sigma_m, {0.001, 10.0}, "m",
+            "Standard deviation of that.");
+  table.add("trunk.prior_lean_sigma_rad", p.prior_lean_sigma_rad, {1e-4, 1.0}, "rad",
+            "Of a trunk's axis from the vertical.");
+  table.add("trunk.prior_taper", p.prior_taper, {-0.2, 0.2}, "m per m",
+            "Change of radius per metre of height.");
+  table.add("trunk.prior_taper_sigma", p.prior_taper_sigma, {1e-4, 0.2}, "m per m",
+            "Standard deviation of that.");
+  table.add("trunk.roundness_sigma_m", p.roundness_sigma_m, {0.0, 1.0}, "m",
+            "Of the bark from a circle.");
+  table.add("trunk.shape_sigma_m", p.shape_sigma_m, {0.0, 1.0}, "m",
+            "What more points do not average out.");
+  table.add("trunk.max_lean_rad", p.max_lean_rad, {0.01, 1.5}, "rad",
+            "More than that is a branch.");
+}
+
+void describe_trunk_selection(SweepTrunkParameters& p, ParameterTable& table) {
+  table.add("trunk.max_sigma_m", p.max_sigma_m, {0.001, 10.0}, "m",
+            "Trunks whose centre is known worse are not reported.");
+  table.add("trunk.max_mean_square_residual", p.max_mean_square_residual, {0.1, 1e6}, "sigma^2",
+            "Of ranges and edges from the stem.");
+  table.add("trunk.gather_radius_m", p.gather_radius_m, {0.01, 10.0}, "m",
+            "How far apart the slices of one trunk may seem.");
+  table.add("trunk.leaf_radius_m", p.leaf_radius_m, {0.01, 10.0}, "m",
+            "Of the returns so near a trunk ...");
+  table.add("trunk.min_share", p.min_share, {0.0, 1.0}, "",
+            "... at least this part must be on it.");
+  table.add("trunk.min_points", p.min_points, {1, 1000}, "", "Fewest returns on a trunk.");
+  table.add("trunk.min_rings", p.min_rings, {1, 100}, "", "Fewest rings that see it.");
+}
+
+void describe_corner(CornerParameters& p, ParameterTable& table) {
+  table.add("corner.line_tolerance_m", p.line_tolerance_m, {0.001, 1.0}, "m",
+            "What is so near a line is on it.");
+  table.add("corner.min_length_m", p.min_length_m, {0.05, 100.0}, "m",
+            "Of a wall, as far as it is seen.");
+  table.add("corner.min_extent_m", p.min_extent_m, {0.0, 10.0}, "m",
+            "In height, of the returns on a wall.");
+  table.add("corner.max_gap_m", p.max_gap_m, {0.0, 10.0}, "m",
+            "From the end of a wall's returns to the corner.");
+  table.add("corner.max_gap_per_range", p.max_gap_per_range, {0.0, 1.0}, "m per m",
+            "Added to that for each metre of range.");
+  table.add("corner.max_skew_rad", p.max_skew_rad, {0.0, 1.5}, "rad",
+            "Of the angle between the walls from a right one.");
+  table.add("corner.flatness_sigma_m", p.flatness_sigma_m, {1e-4, 1.0}, "m",
+            "Of a wall; more points do not average it out.");
+  table.add("corner.min_rings", p.min_rings, {1, 100}, "", "Fewest rings that see a wall.");
+}
+
 }  // namespace
 
 void describe(LandmarkExtractorParameters& parameters, ParameterTable& table) {
   describe_sensor(parameters.planar, table);
   describe_shape(parameters.planar, table);
   describe_selection(parameters.planar, table);
+  describe_sweep(parameters.sweep, table);
+  describe_trunk_shape(parameters.trunk, table);
+  describe_trunk_selection(parameters.trunk, table);
+  describe_corner(parameters.corner, table);
 }
 
 }  // namespace understory

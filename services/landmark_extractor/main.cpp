@@ -2,9 +2,11 @@
 #include "services/landmark_extractor/adapter.hpp"
 
 int main(int argc, char** argv) {
-  return understory::run_service(understory::landmark_extractor_service({
-                                     .lidar_scan = "LIDAR_SCAN",  // in: sweeps of a planar laser
-                                     .landmarks = "LANDMARKS",    // out: the trunks of each sweep
-                                 }),
-                                 argc, argv);
+  return understory::run_service(
+      understory::landmark_extractor_service({
+          .lidar_scan = "LIDAR_SCAN",    // in: sweeps of a planar laser
+          .lidar_sweep = "LIDAR_SWEEP",  // in: turns in space, in parts
+          .landmarks = "LANDMARKS",      // out: trunks and corners of each sweep
+      }),
+      argc, argv);
 }
