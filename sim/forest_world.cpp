@@ -18,8 +18,8 @@ double normal(std::mt19937_64& random, double sigma) {
   return sigma > 0.0 ? std::normal_distribution<double>(0.0, sigma)(random) : 0.0;
 }
 
-void add_branches(World& world, const Stem& trunk, const Eigen::Vector2d& at_m, double up_to_m,
-                  double mean_count, std::mt19937_64& random) {
+void add_branches(World& world, const Stem& trunk, double up_to_m, double mean_count,
+                  std::mt19937_64& random) {
   if (mean_count <= 0.0 || up_to_m < 1.2) return;
   const int count = std::poisson_distribution<int>(mean_count)(random);
   for (int i = 0; i < count; ++i) {
@@ -34,7 +34,6 @@ void add_branches(World& world, const Stem& trunk, const Eigen::Vector2d& at_m, 
     branch.taper = 0.8 * branch.base_radius_m / branch.length_m;
     world.add(ObjectClass::kBranch, branch);
   }
-  (void)at_m;
 }
 
 void add_people(World& world, std::span<const Eigen::Vector2d> way_m, int count,
@@ -85,7 +84,7 @@ void plant_tree(World& world, const Eigen::Vector2d& at_m, double radius_m, doub
   trunk.base_m << at_m - 1.8 * lean, ground_m - 0.5;
   trunk.axis = Eigen::Vector3d(lean.x(), lean.y(), 1.0).normalized();
   trunk.base_radius_m = radius_m;
-  add_branches(world, trunk, at_m, crown_base_m, parameters.branches_per_trunk, random);
+  add_branches(world, trunk, crown_base_m, parameters.branches_per_trunk, random);
 }
 
 void plant_bush(World& world, const Eigen::Vector2d& at_m, double density_per_m,
@@ -101,7 +100,7 @@ void plant_bush(World& world, const Eigen::Vector2d& at_m, double density_per_m,
 World make_forest_world(const Forest& forest, const ForestWorldParameters& parameters,
                         std::span<const Eigen::Vector2d> way_m, std::mt19937_64& random) {
   World world(Ground(parameters.ground, random));
-  const PointGrid way(way_m, 10.0);
+  const PointGrid way(way_m, 20.0);
   for (std::size_t i = 0; i < forest.trunks_m.size(); ++i) {
     const double known_m = forest.radii_m[i];
     const double radius_m = known_m > 0.0 ? known_m : draw_radius_m(parameters, random);

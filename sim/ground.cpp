@@ -35,7 +35,7 @@ Ground::Ground() { fill_table(); }
 Ground::Ground(std::vector<Wave> waves) : waves_(std::move(waves)) { fill_table(); }
 
 Ground::Ground(const GroundParameters& parameters, std::mt19937_64& random)
-    : slope_(parameters.slope) {
+    : slope_(parameters.slope), cover_m_(parameters.cover_m) {
   add_waves(16, 25.0, 130.0, parameters.relief_m, random);
   add_waves(32, 2.5, 8.0, parameters.roughness_m, random);
   fill_table();
@@ -184,7 +184,7 @@ const Ground::Block& Ground::block_at(double u, double v) const {
 GroundHit Ground::hit_at(const Track& track, double t, const Eigen::Vector3d& direction) const {
   const Eigen::Vector2d gradient = slope_ + Cell(table_, track.u(t), track.v(t)).gradient();
   const double against = direction.head<2>().dot(gradient) - direction.z();
-  return {t, std::abs(against) / std::sqrt(1.0 + gradient.squaredNorm())};
+  return {t, std::abs(against) / std::sqrt(1.0 + gradient.squaredNorm()), against};
 }
 
 std::optional<GroundHit> Ground::cast(const Eigen::Vector3d& origin_m,

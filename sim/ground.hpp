@@ -12,11 +12,13 @@ struct GroundParameters {
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();  ///< Rise per metre along x and y.
   double relief_m = 0.0;     ///< Standard deviation of hills with wavelengths of 25-130 m.
   double roughness_m = 0.0;  ///< Standard deviation of bumps with wavelengths of 2.5-8 m.
+  double cover_m = 0.0;      ///< Mean height at which grass or leaves stop a ray.
 };
 
 struct GroundHit {
   double range_m = 0.0;
-  double cosine = 1.0;  ///< Of the angle between the ray and the ground's normal.
+  double cosine = 1.0;       ///< Of the angle between the ray and the ground's normal.
+  double closing_m_m = 1.0;  ///< Height above the ground that the ray loses there per metre.
 };
 
 /// A plane with waves on it, which repeat every 256 m. Smooth: all derivatives exist.
@@ -30,6 +32,7 @@ class Ground {
   double height(const Eigen::Vector2d& at_m) const;
   Eigen::Vector2d gradient(const Eigen::Vector2d& at_m) const;
   Eigen::Vector3d normal(const Eigen::Vector2d& at_m) const;
+  double cover_m() const { return cover_m_; }
 
   /// Where the ray (unit direction) meets the ground within `max_m`. Made from a table with cells
   /// of 0.5 m, within 5 mm of `height`; a bump that the ray grazes for less than 0.25 m may be
@@ -58,6 +61,7 @@ class Ground {
   GroundHit hit_at(const Track& track, double t, const Eigen::Vector3d& direction) const;
 
   Eigen::Vector2d slope_ = Eigen::Vector2d::Zero();
+  double cover_m_ = 0.0;
   std::vector<Wave> waves_;
   std::vector<float> table_;  ///< Heights above the plane at the corners of cells, row by row.
   std::vector<Block> blocks_;

@@ -20,6 +20,14 @@ RayCaster::RayCaster(const World& world, double tile_m) : world_(world), tile_m_
   fill_grid();
 }
 
+/// Larger tiles where a long way would need too many of them.
+void RayCaster::choose_tile(const Eigen::Vector2d& size_m) {
+  constexpr double kMostTiles = 16e6;
+  tile_m_ = std::max(tile_m_, std::sqrt(size_m.x() * size_m.y() / kMostTiles));
+  columns_ = static_cast<int>(std::floor(size_m.x() / tile_m_)) + 1;
+  rows_ = static_cast<int>(std::floor(size_m.y() / tile_m_)) + 1;
+}
+
 void RayCaster::fill_grid() {
   Eigen::Vector2d high_m = Eigen::Vector2d::Zero();
   bool is_first = true;
@@ -35,8 +43,7 @@ void RayCaster::fill_grid() {
     high_m = is_first ? high : high_m.cwiseMax(high).eval();
     is_first = false;
   }
-  columns_ = static_cast<int>(std::floor((high_m.x() - low_m_.x()) / tile_m_)) + 1;
-  rows_ = static_cast<int>(std::floor((high_m.y() - low_m_.y()) / tile_m_)) + 1;
+  choose_tile(high_m - low_m_);
   const auto for_each_tile = [&](auto visit) {
     for (ObjectId i = 0; i < world_.object_count(); ++i) {
       if (world_.moves(i)) continue;
@@ -159,7 +166,7 @@ RayHit RayCaster::cast_one(const Ray& ray, double time_s, double max_m, std::uin
     const auto met = world_.meet_object(ray, c.object, time_s, luck);
     if (met && met->range_m < hit.range_m) hit = {met->range_m, met->cosine, c.object, true};
   }
-  const auto ground = world_.ground().cast(ray.origin_m, ray.direction, hit.range_m);
+  const auto ground = world_.meet_ground(ray, hit.range_m, luck);
   if (ground) hit = {ground->range_m, ground->cosine, kGroundObject, true};
   return hit;
 }

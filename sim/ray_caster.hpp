@@ -51,6 +51,7 @@ class RayCaster {
     ObjectId object = 0;
   };
 
+  void choose_tile(const Eigen::Vector2d& size_m);
   void fill_grid();
   bool sector_of(const Eigen::Vector3d& origin_m, std::span<const Eigen::Vector3d> directions,
                  double max_m, Sector& sector) const;

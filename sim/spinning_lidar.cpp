@@ -35,7 +35,7 @@ std::vector<double> hdl64_elevations() {
 }
 
 /// Keys of the independent uses of chance of one ray.
-enum Use : std::uint64_t { kFoliage = 1, kNoise = 2, kDropOut = 3, kWeak = 4 };
+enum Use : std::uint64_t { kFoliage = 1, kNoise = 2, kDropOut = 3, kWeak = 4, kWidth = 5 };
 
 }  // namespace
 
@@ -75,6 +75,21 @@ bool SpinningLidar::is_lost(const RayHit& hit, double reflectivity, std::uint64_
   return uniform_of(mixed(luck, kWeak)) < weakness / (1.0 + weakness);
 }
 
+/// Somewhere in each beam's width; `ahead` and `up` are axes of the sensor.
+void SpinningLidar::point_beams(const Eigen::Vector3d& ahead, const Eigen::Vector3d& up,
+                                std::uint64_t luck) {
+  const Eigen::Vector3d aside = up.cross(ahead);
+  const double width = 2.0 * parameters_.beam_half_width_rad;
+  for (std::size_t i = 0; i < beams_.size(); ++i) {
+    const std::uint64_t hash = mixed(luck + i);
+    const double turn = width * (uniform_of(hash) - 0.5);
+    const double lift = width * (uniform_of(hash << 32) - 0.5);
+    const Eigen::Vector3d direction = (beams_[i].x() - lift * beams_[i].y()) * ahead +
+                                      (beams_[i].y() + lift * beams_[i].x()) * up + turn * aside;
+    directions_[i] = direction / std::sqrt(1.0 + turn * turn + lift * lift);
+  }
+}
+
 void SpinningLidar::add_column(int column, double time_s, const Eigen::Isometry3d& world_T_vehicle,
                                std::uint64_t turn, SimulatedSweep& sweep) {
   const double turned = 2.0 * pi * column / parameters_.columns;
@@ -83,11 +98,9 @@ void SpinningLidar::add_column(int column, double time_s, const Eigen::Isometry3
   const Eigen::Isometry3d world_T_sensor = world_T_vehicle * parameters_.vehicle_T_sensor;
   const Eigen::Vector3d level = world_T_sensor.linear().leftCols<2>() * ahead;
   const Eigen::Vector3d up = world_T_sensor.linear().col(2);
-  for (std::size_t i = 0; i < beams_.size(); ++i) {
-    directions_[i] = beams_[i].x() * level + beams_[i].y() * up;
-  }
   const std::uint64_t column_luck =
       mixed(mixed(seed_, turn), static_cast<std::uint64_t>(column)) & ~std::uint64_t{0xffff};
+  point_beams(level, up, mixed(column_luck, kWidth));
   const Eigen::Vector3d origin = world_T_sensor.translation();
   caster_.cast(origin, directions_, time_s, parameters_.max_range_m, mixed(column_luck, kFoliage),
                hits_);

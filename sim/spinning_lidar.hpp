@@ -26,6 +26,9 @@ struct LidarParameters {
   bool clockwise = true;                        ///< Seen from above, as Velodyne's turn.
   double first_bearing_rad = std::numbers::pi;  ///< Frame `sensor`; where a turn begins.
   double range_sigma_m = 0.02;
+  /// A beam is as wide as this to each side: what it meets anywhere in that is told as if it lay in
+  /// its middle.
+  double beam_half_width_rad = 0.5e-3;
   double min_range_m = 0.8;
   double max_range_m = 100.0;
   double drop_out = 0.02;  ///< Share of returns lost by chance.
@@ -42,7 +45,7 @@ struct LidarParameters {
 struct SimulatedSweep {
   PointSweep raw;                       ///< Frame `sensor`, skewed; utime of the first point.
   std::vector<ObjectId> objects;        ///< What each point lies on.
-  std::vector<Eigen::Vector3f> true_m;  ///< Each point in `world`, without noise of range.
+  std::vector<Eigen::Vector3f> true_m;  ///< What was hit, frame `world`, without noise.
 };
 
 /// Pose of the vehicle in `world` at a time [s].
@@ -65,6 +68,7 @@ class SpinningLidar {
  private:
   void add_column(int column, double time_s, const Eigen::Isometry3d& world_T_vehicle,
                   std::uint64_t turn, SimulatedSweep& sweep);
+  void point_beams(const Eigen::Vector3d& ahead, const Eigen::Vector3d& up, std::uint64_t luck);
   bool is_lost(const RayHit& hit, double reflectivity, std::uint64_t luck) const;
 
   const World& world_;

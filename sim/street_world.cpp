@@ -20,7 +20,7 @@ class Builder {
         parameters_(parameters),
         random_(random),
         world_(Ground(parameters.ground, random)),
-        way_(route.places(0.5), 10.0) {}
+        way_(route.places(0.5), 20.0) {}
 
   void build(double from_m, double to_m, const Roadside& roadside) {
     const double wood_side = uniform(0.0, 1.0) < 0.5 ? 1.0 : -1.0;

@@ -35,7 +35,8 @@ struct Stretch {
 
 /// Frame `world`; the way is the middle of the lane that is driven.
 struct StreetWorldParameters {
-  GroundParameters ground{.slope = {0.004, -0.006}, .relief_m = 0.15, .roughness_m = 0.006};
+  GroundParameters ground{
+      .slope = {0.004, -0.006}, .relief_m = 0.15, .roughness_m = 0.006, .cover_m = 0.005};
   ForestWorldParameters plants;   ///< Shapes of trees.
   double house_distance_m = 9.0;  ///< Least, from the way to a house.
   double clearance_m = 2.2;       ///< Nothing stands nearer than this to the way.

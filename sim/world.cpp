@@ -133,4 +133,17 @@ std::optional<SurfaceHit> World::meet_object(const Ray& ray, ObjectId object, do
   return std::nullopt;
 }
 
+std::optional<SurfaceHit> World::meet_ground(const Ray& ray, double max_m,
+                                             std::uint64_t luck) const {
+  const auto hit = ground_.cast(ray.origin_m, ray.direction, max_m);
+  if (!hit) return std::nullopt;
+  SurfaceHit met{hit->range_m, hit->cosine};
+  if (ground_.cover_m() > 0.0 && hit->closing_m_m > 0.0) {
+    // A ray that grazes is stopped long before; by no more than a metre: grass is not a wall.
+    const double height_m = ground_.cover_m() * exponential_of(mixed(luck, kGroundObject));
+    met.range_m = std::max(0.0, met.range_m - std::min(1.0, height_m / hit->closing_m_m));
+  }
+  return met;
+}
+
 }  // namespace understory::sim

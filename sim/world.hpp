@@ -91,6 +91,8 @@ class World {
   /// foliage.
   std::optional<SurfaceHit> meet_object(const Ray& ray, ObjectId object, double time_s,
                                         std::uint64_t luck) const;
+  /// Where the ray meets the ground, or what covers it, within `max_m`.
+  std::optional<SurfaceHit> meet_ground(const Ray& ray, double max_m, std::uint64_t luck) const;
 
  private:
   enum class Shape : std::uint8_t { kStem, kFoliage, kWall, kBox, kWalker };

@@ -64,6 +64,7 @@ World two_trunks() {
 LidarParameters exact_lidar() {
   LidarParameters lidar;
   lidar.range_sigma_m = 0.0;
+  lidar.beam_half_width_rad = 0.0;
   lidar.drop_out = 0.0;
   lidar.white_range_m = 0.0;
   return lidar;
@@ -122,6 +123,7 @@ TEST_CASE("Points of a trunk lie on its surface, and one trunk hides another", "
 TEST_CASE("A raw sweep is skewed by exactly the motion of the vehicle", "[lidar]") {
   SensorSuite suite = coarse_suite();
   suite.lidar->range_sigma_m = 0.0;
+  suite.lidar->beam_half_width_rad = 0.0;
   suite.lidar->vehicle_T_sensor =
       Eigen::Translation3d(1.0, 0.2, 1.7) *
       Eigen::AngleAxisd(0.2, Eigen::Vector3d(0.3, -0.5, 1).normalized());
@@ -147,6 +149,28 @@ TEST_CASE("A raw sweep is skewed by exactly the motion of the vehicle", "[lidar]
   CHECK(sweep.raw.points.front().time_s < 2e-6F);
   CHECK(sweep.raw.points.back().time_s < 0.1F);
   CHECK(sweep.raw.utime >= 6'000'000);
+}
+
+TEST_CASE("Beams are as wide as asked for", "[lidar]") {
+  const World world = two_trunks();
+  LidarParameters wide = exact_lidar();
+  wide.beam_half_width_rad = 2e-3;
+  const SimulatedSweep sweep =
+      SpinningLidar(world, wide, 1).sweep_standing(Eigen::Isometry3d::Identity());
+  double greatest = 0.0;
+  double squares = 0.0;
+  for (std::size_t i = 0; i < sweep.raw.points.size(); ++i) {
+    const Eigen::Vector3d told = sweep.raw.points[i].position().cast<double>().normalized();
+    const Eigen::Vector3d hit =
+        (sweep.true_m[i].cast<double>() - wide.vehicle_T_sensor.translation()).normalized();
+    greatest = std::max(greatest, (told - hit).norm());
+    squares += (told - hit).squaredNorm();
+  }
+  CHECK(greatest < 2e-3 * std::sqrt(2.0) + 1e-6);
+  // Uniform in a square.
+  const double expected = 2e-3 * std::sqrt(2.0 / 3.0);
+  CHECK(std::sqrt(squares / static_cast<double>(sweep.raw.points.size())) ==
+        Approx(expected).epsilon(0.02));
 }
 
 TEST_CASE("Noise of range and share of lost returns are as asked for", "[lidar]") {

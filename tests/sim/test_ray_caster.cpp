@@ -18,7 +18,7 @@ double uniform(Random& random, double low, double high) {
 }
 
 GroundParameters rough_ground() {
-  return {.slope = {0.05, -0.04}, .relief_m = 0.6, .roughness_m = 0.03};
+  return {.slope = {0.05, -0.04}, .relief_m = 0.6, .roughness_m = 0.03, .cover_m = 0.02};
 }
 
 /// Some of everything, far enough from the origin that it is in the open.
@@ -61,7 +61,7 @@ RayHit cast_at_all(const World& world, const Ray& ray, double time_s, double max
     const auto met = world.meet_object(ray, i, time_s, luck);
     if (met && met->range_m < hit.range_m) hit = {met->range_m, met->cosine, i, true};
   }
-  const auto ground = world.ground().cast(ray.origin_m, ray.direction, hit.range_m);
+  const auto ground = world.meet_ground(ray, hit.range_m, luck);
   if (ground) hit = {ground->range_m, ground->cosine, kGroundObject, true};
   return hit;
 }
@@ -209,6 +209,22 @@ TEST_CASE("Surface hits lie on the surface, and nothing of it is nearer", "[shap
     }
   }
   CHECK(stems > 200);
+}
+
+TEST_CASE("What covers the ground stops rays at the height that was asked for", "[ground]") {
+  Random random(7);
+  const World world(Ground(GroundParameters{.cover_m = 0.05}, random));
+  double sum = 0.0;
+  const int n = 5000;
+  for (int i = 0; i < n; ++i) {
+    const Ray ray{{0.0, 0.0, 2.0}, direction_of(uniform(random, -pi, pi), -0.6)};
+    const auto hit = world.meet_ground(ray, 100.0, random());
+    REQUIRE(hit.has_value());
+    const double height_m = 2.0 + hit->range_m * ray.direction.z();
+    CHECK(height_m >= 0.0);
+    sum += height_m;
+  }
+  CHECK(sum / n == Approx(0.05).epsilon(0.05));
 }
 
 TEST_CASE("Foliage lets rays through as often as its density says", "[shapes]") {
