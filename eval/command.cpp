@@ -15,6 +15,8 @@ void add_eval_command(CLI::App& parent) {
   add_efficiency_experiment(eval);
   add_large_map_experiment(eval);
   add_victoria_park_experiment(eval);
+  add_frontend_experiment(eval);
+  add_landmarks_vs_error_experiment(eval);
 }
 
 }  // namespace understory::eval

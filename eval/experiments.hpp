@@ -24,5 +24,9 @@ void add_noise_experiment(CLI::App& eval);
 void add_efficiency_experiment(CLI::App& eval);
 /// The recorded Victoria Park drive.
 void add_victoria_park_experiment(CLI::App& eval);
+/// From raw sensors to a pose, part by part and as a whole (specs/frontend.md).
+void add_frontend_experiment(CLI::App& eval);
+/// Change of the error against the number of landmarks (thesis on submaps, chapter 4).
+void add_landmarks_vs_error_experiment(CLI::App& eval);
 
 }  // namespace understory::eval

@@ -1,0 +1,178 @@
+#include "eval/chain_drive.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/geometry/alignment.hpp"
+#include "services/associator/adapter.hpp"
+#include "services/ekf/adapter.hpp"
+#include "services/geoslam_mapper/adapter.hpp"
+#include "services/keyframer/adapter.hpp"
+#include "services/landmark_extractor/adapter.hpp"
+#include "services/lidar_imu_input/adapter.hpp"
+
+namespace understory::eval {
+namespace {
+
+/// What fits into one packet of the bus: 10 bytes a point.
+constexpr std::size_t kPointsPerPart = 5500;
+
+template <class... F>
+struct Overloaded : F... {
+  using F::operator()...;
+};
+template <class... F>
+Overloaded(F...) -> Overloaded<F...>;
+
+/// Listens to everything that the chain says.
+void watch(SensorChain& chain, ChainRun& run) {
+  chain.watch<RawPose>("RAW_POSE", [&run](const RawPose& pose) {
+    run.dead_reckoned.push_back({pose.utime, pose.odom_T_vehicle});
+  });
+  chain.watch<LandmarkScan>("LANDMARKS", [&run](const LandmarkScan& scan) {
+    run.detections.push_back(scan.detections.size());
+  });
+  chain.watch<EkfPose>("EKF_POSE", [&run](const EkfPose& pose) { run.ekf.push_back(pose); });
+  chain.watch<SlamPose>("SLAM_POSE", [&run](const SlamPose& pose) {
+    if (pose.is_localised()) {
+      run.slam.push_back(pose);
+    } else {
+      ++run.slam_unsure;
+    }
+  });
+  chain.watch<MapUpdate>("SLAM_UPDATE",
+                         [&run](const MapUpdate& update) { run.updates.push_back(update); });
+  chain.watch<WholeMap>("MAP", [&run](const WholeMap& map) {
+    if (!map.complete) return;
+    run.landmarks = map.landmarks;
+    run.keyframes = map.keyframes;
+  });
+}
+
+Utime utime_of(const sim::SensorReading& reading) {
+  return std::visit(Overloaded{[](const sim::SimulatedSweep& sweep) { return sweep.raw.utime; },
+                               [](const sim::SimulatedPlanarScan& scan) { return scan.scan.utime; },
+                               [](const auto& value) { return value.utime; }},
+                    reading);
+}
+
+}  // namespace
+
+std::vector<Service> front_end_services() {
+  return {lidar_imu_input_service(), landmark_extractor_service(),
+          associator_service(),      ekf_service(),
+          keyframer_service(),       geoslam_mapper_service()};
+}
+
+std::vector<RawMessage> raw_messages(const sim::SensorReading& reading,
+                                     std::uint64_t& sweep_parts) {
+  const auto one = [](const char* channel, const auto& value) {
+    return std::vector<RawMessage>{{value.utime, channel, encode_message(value)}};
+  };
+  return std::visit(
+      Overloaded{[](const sim::TruePose&) { return std::vector<RawMessage>(); },
+                 [&](const ImuSample& sample) { return one("RAW_IMU", sample); },
+                 [&](const WheelSample& sample) { return one("RAW_WHEELS", sample); },
+                 [&](const GnssFix& fix) { return one("RAW_GNSS", fix); },
+                 [&](const sim::SimulatedPlanarScan& scan) { return one("RAW_SCAN", scan.scan); },
+                 [&](const sim::SimulatedSweep& sweep) {
+                   std::vector<RawMessage> messages;
+                   for (PointSweep& part : split_sweep(sweep.raw, kPointsPerPart)) {
+                     part.sequence = sweep_parts++;
+                     messages.push_back({part.utime, "RAW_SWEEP", encode_message(part)});
+                   }
+                   return messages;
+                 }},
+      reading);
+}
+
+ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options) {
+  ChainRun run;
+  SensorChain chain(front_end_services(), options.config_dir, options.toml_instead);
+  watch(chain, run);
+  const double duration_s = std::min(options.end_s, drive.motion().duration_s());
+  std::uint64_t sweep_parts = 0;
+  std::optional<Utime> begin;
+  while (const auto reading = drive.next()) {
+    const Utime utime = utime_of(*reading);
+    begin = begin.value_or(utime);
+    run.simulated_s = 1e-6 * static_cast<double>(utime - *begin);
+    if (run.simulated_s > options.end_s) break;
+    if (const auto* truth = std::get_if<sim::TruePose>(&*reading)) {
+      run.truth.push_back({truth->utime, truth->state.world_T_level()});
+    }
+    if (std::holds_alternative<sim::SimulatedSweep>(*reading)) {
+      ++run.sweeps;
+      if (options.progress) options.progress(run.simulated_s / duration_s);
+    }
+    for (RawMessage& message : raw_messages(*reading, sweep_parts)) {
+      if (!options.meddle) {
+        chain.feed(message);
+        continue;
+      }
+      for (const RawMessage& changed : options.meddle(std::move(message))) chain.feed(changed);
+    }
+  }
+  chain.finish();
+  for (const std::string& service : chain.services()) {
+    run.times[service] = chain.time_of(service);
+    run.health[service] = chain.health_of(service);
+  }
+  return run;
+}
+
+TrajectoryError trajectory_error(std::span<const StampedPose> estimate,
+                                 std::span<const StampedPose> truth) {
+  TrajectoryError error;
+  std::vector<Eigen::Vector2d> estimated;
+  std::vector<Eigen::Vector2d> real;
+  std::optional<SE2> truth_T_estimate;
+  for (const StampedPose& pose : estimate) {
+    const auto true_pose = pose_at(truth, pose.utime);
+    if (!true_pose) continue;
+    if (!truth_T_estimate) truth_T_estimate = *true_pose * pose.pose.inverse();
+    if (!real.empty()) error.driven_m += (true_pose->translation() - real.back()).norm();
+    estimated.push_back(pose.pose.translation());
+    real.push_back(true_pose->translation());
+  }
+  error.poses = real.size();
+  if (real.size() < 2) return error;
+  error.end_m = (*truth_T_estimate * estimated.back() - real.back()).norm();
+  const SE2 aligned = align_rigid(real, estimated);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < real.size(); ++i) {
+    const double squared = (aligned * estimated[i] - real[i]).squaredNorm();
+    sum += squared;
+    error.largest_m = std::max(error.largest_m, std::sqrt(squared));
+  }
+  error.ate_rms_m = std::sqrt(sum / static_cast<double>(real.size()));
+  return error;
+}
+
+std::size_t wrong_updates(const ChainRun& run, double limit_m) {
+  std::optional<SE2> world_T_map;
+  std::size_t wrong = 0;
+  for (const MapUpdate& update : run.updates) {
+    if (!localised(update)) continue;
+    const auto true_pose = pose_at(run.truth, update.utime);
+    if (!true_pose) continue;
+    if (!world_T_map) world_T_map = *true_pose * update.map_T_vehicle.inverse();
+    const SE2 estimated = *world_T_map * update.map_T_vehicle;
+    if ((estimated.translation() - true_pose->translation()).norm() > limit_m) ++wrong;
+  }
+  return wrong;
+}
+
+std::vector<StampedPose> poses_of(std::span<const EkfPose> poses) {
+  std::vector<StampedPose> result;
+  for (const EkfPose& pose : poses) result.push_back({pose.utime, pose.ekf_map_T_vehicle});
+  return result;
+}
+
+std::vector<StampedPose> poses_of(std::span<const SlamPose> poses) {
+  std::vector<StampedPose> result;
+  for (const SlamPose& pose : poses) result.push_back({pose.utime, pose.map_T_vehicle()});
+  return result;
+}
+
+}  // namespace understory::eval

@@ -1,0 +1,74 @@
+// The whole chain, from raw sensors to SLAM_POSE, on a simulated drive, against the truth.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/model/ekf_output.hpp"
+#include "common/model/map.hpp"
+#include "common/model/slam_output.hpp"
+#include "eval/sensor_chain.hpp"
+#include "eval/victoria_park_score.hpp"
+#include "sim/sensor_drive.hpp"
+
+namespace understory::eval {
+
+/// What the chain said, and what was true.
+struct ChainRun {
+  std::vector<StampedPose> truth;  ///< `world`, at the truth's own rate.
+  std::vector<StampedPose> dead_reckoned;
+  std::vector<EkfPose> ekf;
+  std::vector<SlamPose> slam;     ///< Those that are localised.
+  std::uint64_t slam_unsure = 0;  ///< SLAM_POSE without a pose that means something.
+  std::vector<MapUpdate> updates;
+  std::vector<KeyframePose> keyframes;  ///< As estimated at the end.
+  std::vector<MapLandmark> landmarks;   ///< Of the last map.
+  std::vector<std::size_t> detections;  ///< Of each sweep.
+  std::uint64_t sweeps = 0;
+  double simulated_s = 0.0;
+  std::map<std::string, ServiceTime> times;
+  std::map<std::string, health_t> health;
+};
+
+/// A reading on its way to the chain: may be changed, dropped (empty) or repeated.
+using Meddle = std::function<std::vector<RawMessage>(RawMessage)>;
+
+struct ChainOptions {
+  std::filesystem::path config_dir;
+  std::map<std::string, std::string> toml_instead;
+  double end_s = 1e9;  ///< Of the drive.
+  Meddle meddle;       ///< Faults; empty = none.
+  std::function<void(double done)> progress;
+};
+
+/// One message a reading; sweeps in parts. Truth gives none.
+std::vector<RawMessage> raw_messages(const sim::SensorReading& reading, std::uint64_t& sweep_parts);
+
+/// The services from raw sensors to the map.
+std::vector<Service> front_end_services();
+
+/// Drives once through.
+ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options);
+
+/// Errors after one rigid alignment (SE(2), over all given poses).
+struct TrajectoryError {
+  std::size_t poses = 0;
+  double ate_rms_m = 0.0;
+  double largest_m = 0.0;
+  double end_m = 0.0;  ///< With the first pose held instead: error at the end of the drive.
+  double driven_m = 0.0;
+};
+TrajectoryError trajectory_error(std::span<const StampedPose> estimate,
+                                 std::span<const StampedPose> truth);
+
+/// Updates that were accepted more than `limit_m` from the truth, in the gauge of the first one.
+std::size_t wrong_updates(const ChainRun& run, double limit_m = 1.0);
+
+std::vector<StampedPose> poses_of(std::span<const EkfPose> poses);
+std::vector<StampedPose> poses_of(std::span<const SlamPose> poses);
+
+}  // namespace understory::eval

@@ -1,0 +1,67 @@
+// The whole chain on simulated drives: accuracy, time, and what faults do to it.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <set>
+
+#include "eval/chain_drive.hpp"
+#include "eval/frontend.hpp"
+
+namespace understory::eval {
+namespace {
+
+double quantile_ms(std::vector<float> values, double part) {
+  if (values.empty()) return 0.0;
+  const auto index = static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + index, values.end());
+  return values[static_cast<std::size_t>(index)];
+}
+
+std::size_t accepted(const ChainRun& run) {
+  return static_cast<std::size_t>(
+      std::count_if(run.updates.begin(), run.updates.end(),
+                    [](const MapUpdate& update) { return localised(update); }));
+}
+
+/// Seconds of the drive over seconds of processor.
+double real_time_factor(const ChainRun& run) {
+  double busy_s = 0.0;
+  for (const auto& [service, time] : run.times) busy_s += time.total_s;
+  return run.simulated_s / std::max(busy_s, 1e-9);
+}
+
+void add_time_rows(const ChainRun& run, FrontendRows& rows) {
+  rows.at_least("real-time factor of the chain (one core)", real_time_factor(run), "x", 10.0);
+  for (const auto& [service, time] : run.times) {
+    rows.state(service + ": share of the drive's time", 100.0 * time.total_s / run.simulated_s,
+               "%");
+    rows.state(service + ": message p99", quantile_ms(time.calls_ms, 0.99), "ms");
+  }
+}
+
+}  // namespace
+
+void add_chain_rows(const ChainRun& run, std::optional<double> ate_target_m, FrontendRows& rows) {
+  const TrajectoryError slam = trajectory_error(poses_of(run.slam), run.truth);
+  const TrajectoryError ekf = trajectory_error(poses_of(run.ekf), run.truth);
+  const TrajectoryError reckoned = trajectory_error(run.dead_reckoned, run.truth);
+  rows.state("driven", ekf.driven_m, "m");
+  if (ate_target_m) {
+    rows.at_most("SLAM_POSE ATE", slam.ate_rms_m, "m", *ate_target_m);
+  } else {
+    rows.state("SLAM_POSE ATE", slam.ate_rms_m, "m");
+  }
+  rows.state("SLAM_POSE largest error", slam.largest_m, "m");
+  rows.state("EKF_POSE ATE", ekf.ate_rms_m, "m");
+  rows.at_most("EKF_POSE drift", 100.0 * ekf.end_m / std::max(ekf.driven_m, 1.0), "%", 0.5);
+  rows.state("RAW_POSE ATE", reckoned.ate_rms_m, "m");
+  rows.at_most("wrong updates", static_cast<double>(wrong_updates(run)), "", 0.0);
+  rows.state("keyframes accepted", static_cast<double>(accepted(run)), "");
+  rows.state("keyframes offered", static_cast<double>(run.updates.size()), "");
+  rows.state("SLAM_POSE share of sweeps",
+             100.0 * static_cast<double>(run.slam.size()) / static_cast<double>(run.sweeps), "%");
+  add_time_rows(run, rows);
+}
+
+}  // namespace understory::eval

@@ -1,0 +1,149 @@
+// `understory eval frontend`.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdlib>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "eval/experiments.hpp"
+#include "eval/frontend.hpp"
+#include "eval/interrupt.hpp"
+#include "eval/parallel.hpp"
+#include "eval/results.hpp"
+#include "sim/scenarios.hpp"
+
+namespace understory::eval {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ChainDrive {
+  std::string name;
+  std::function<sim::Scenario()> scenario;
+  std::optional<double> ate_target_m;
+  bool has_gnss = true;
+};
+
+std::vector<ChainDrive> chain_drives(const FrontendOptions& options) {
+  const std::uint64_t seed = options.seed;
+  return {
+      {fmt::format("forest, {:.0f} m circle", options.drive_m),
+       [=, length = options.drive_m] {
+         sim::ForestScenarioParameters forest;
+         forest.length_m = length;
+         return sim::forest_scenario(forest, seed);
+       },
+       0.10},
+      {"urban block, closed, no GNSS", [=] { return sim::urban_scenario(1, seed); }, std::nullopt,
+       false},
+      {"urban to countryside, 2 km",
+       [=] { return sim::urban_to_countryside_scenario(2000.0, seed); }, std::nullopt},
+      {"countryside, 2 km", [=] { return sim::countryside_scenario(2000.0, seed); }, std::nullopt},
+  };
+}
+
+nlohmann::json trace_of(const ChainRun& run) {
+  const auto points = [](const std::vector<StampedPose>& poses, std::size_t stride) {
+    nlohmann::json out = nlohmann::json::array();
+    for (std::size_t i = 0; i < poses.size(); i += stride) {
+      out.push_back({1e-6 * static_cast<double>(poses[i].utime), poses[i].pose.x(),
+                     poses[i].pose.y(), poses[i].pose.theta()});
+    }
+    return out;
+  };
+  nlohmann::json landmarks = nlohmann::json::array();
+  for (const MapLandmark& landmark : run.landmarks) {
+    landmarks.push_back({landmark.position_m.x(), landmark.position_m.y(), landmark.radius_m,
+                         static_cast<int>(landmark.kind)});
+  }
+  nlohmann::json counts = nlohmann::json::array();
+  for (const EkfPose& pose : run.ekf) {
+    counts.push_back({1e-6 * static_cast<double>(pose.utime), pose.landmarks_used});
+  }
+  return {{"truth", points(run.truth, 5)},
+          {"raw", points(run.dead_reckoned, 10)},
+          {"ekf", points(poses_of(run.ekf), 1)},
+          {"slam", points(poses_of(run.slam), 1)},
+          {"landmarks", landmarks},
+          {"landmarks_used", counts}};
+}
+
+void add_drive_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
+                    FrontendRows& rows, nlohmann::json& traces) {
+  std::vector<ChainDrive> drives = chain_drives(options);
+  std::erase_if(drives, [&](const ChainDrive& drive) {
+    return !options.sections.empty() &&
+           std::ranges::none_of(options.sections, [&](const std::string& section) {
+             return section == "chain" || drive.name.starts_with(section);
+           });
+  });
+  std::vector<ChainRun> runs(drives.size());
+  run_in_parallel(drives.size(), options.jobs, "chain", stop, [&](std::size_t i) {
+    sim::SensorSuite suite;
+    if (!drives[i].has_gnss) suite.gnss.reset();
+    sim::SensorDrive drive(drives[i].scenario(), sim::SpeedParameters{}, suite, options.seed);
+    ChainOptions chain;
+    chain.config_dir = options.config_dir;
+    chain.progress = [&](double) {
+      if (stop) throw std::runtime_error("interrupted");
+    };
+    runs[i] = drive_chain(drive, chain);
+  });
+  for (std::size_t i = 0; i < drives.size(); ++i) {
+    rows.in("whole chain, simulated " + drives[i].name + ", 32 beams");
+    add_chain_rows(runs[i], drives[i].ate_target_m, rows);
+    traces[drives[i].name] = trace_of(runs[i]);
+  }
+}
+
+bool wants(const FrontendOptions& options, const std::string& section) {
+  return options.sections.empty() ||
+         std::ranges::find(options.sections, section) != options.sections.end();
+}
+
+void run(const FrontendOptions& options) {
+  const auto& stop = stop_on_interrupt();
+  FrontendRows rows;
+  nlohmann::json traces = nlohmann::json::object();
+  if (wants(options, "extraction")) add_extraction_rows(options, stop, rows);
+  if (wants(options, "tracking")) add_tracking_rows(options, stop, rows);
+  if (wants(options, "filter")) add_filter_rows(options, stop, rows);
+  add_drive_rows(options, stop, rows, traces);
+  if (wants(options, "faults")) add_fault_rows(options, stop, rows);
+  std::cout << to_table(rows.rows());
+  if (options.json.empty()) return;
+  const nlohmann::json config = {
+      {"seed", options.seed}, {"runs", options.runs}, {"drive_m", options.drive_m}};
+  write_json(options.json, result_document("frontend", config, to_json(rows.rows())));
+  write_json(traces_file(options.json), traces);
+  if (options.plots && !traces.empty()) {
+    plot("frontend.py", {options.json, traces_file(options.json).string()});
+  }
+}
+
+}  // namespace
+
+void add_frontend_experiment(CLI::App& eval) {
+  auto* command = eval.add_subcommand(
+      "frontend", "From raw sensors to a pose: extraction, tracks, filter, whole chain, faults");
+  auto options = std::make_shared<FrontendOptions>();
+  options->config_dir = "deploy/config/lidar";
+  command->add_option("--runs", options->runs, "Runs of the filter; others follow from it")
+      ->check(CLI::Range(1, 100000));
+  command->add_option("--seed", options->seed, "Seed of everything");
+  command->add_option("--jobs", options->jobs, "Drives side by side")->check(CLI::Range(1, 256));
+  command->add_option("--drive-m", options->drive_m, "Length of the forest drive [m]")
+      ->check(CLI::Range(50.0, 100000.0));
+  command->add_option("--config", options->config_dir, "Configuration of the chain's services");
+  command->add_option("--json", options->json, "Results; traces and plots go beside it");
+  command->add_option("--only", options->sections,
+                      "extraction, tracking, filter, chain, faults, or the beginning of a chain "
+                      "drive's name (forest, urban, country)");
+  command->add_flag("!--no-plots", options->plots, "No plots");
+  command->callback([options] { run_guarded("frontend", [options] { run(*options); }); });
+}
+
+}  // namespace understory::eval

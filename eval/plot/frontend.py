@@ -1,0 +1,98 @@
+"""Plots of eval frontend: python3 frontend.py RESULTS.json TRACES.json
+
+RESULTS.NAME.png for each drive of the whole chain: the map and the trajectories over the truth
+(aligned by their first pose), and the error along the drive.
+"""
+import bisect
+import json
+import math
+import pathlib
+import re
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402
+
+KINDS = {"raw": ("dead reckoning", "0.6"), "ekf": ("EKF_POSE", "tab:orange"),
+         "slam": ("SLAM_POSE", "tab:blue")}
+
+
+def pose_at(truth, times, time):
+    i = bisect.bisect_left(times, time)
+    if i == 0 or i >= len(times):
+        return None
+    a, b = truth[i - 1], truth[i]
+    part = (time - a[0]) / (b[0] - a[0]) if b[0] > a[0] else 0.0
+    turn = math.remainder(b[3] - a[3], 2 * math.pi)
+    return [time, a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2]), a[3] + part * turn]
+
+
+def gauge(poses, truth, times):
+    """(angle, x, y) that takes the first estimated pose onto the truth."""
+    for pose in poses:
+        real = pose_at(truth, times, pose[0])
+        if real:
+            angle = real[3] - pose[3]
+            c, s = math.cos(angle), math.sin(angle)
+            return angle, real[1] - c * pose[1] + s * pose[2], real[2] - s * pose[1] - c * pose[2]
+    return 0.0, 0.0, 0.0
+
+
+def moved(motion, x, y):
+    angle, tx, ty = motion
+    c, s = math.cos(angle), math.sin(angle)
+    return c * x - s * y + tx, s * x + c * y + ty
+
+
+def draw(name, trace, file):
+    truth = trace["truth"]
+    times = [t[0] for t in truth]
+    figure, (plan, errors) = plt.subplots(1, 2, figsize=(15, 7))
+    plan.plot([t[1] for t in truth], [t[2] for t in truth], "-", color="k", linewidth=2.5,
+              alpha=0.35, label="truth")
+    for key, (label, colour) in KINDS.items():
+        poses = trace[key]
+        if not poses:
+            continue
+        motion = gauge(poses, truth, times)
+        places = [moved(motion, p[1], p[2]) for p in poses]
+        plan.plot([p[0] for p in places], [p[1] for p in places], "-", color=colour, linewidth=1,
+                  label=label)
+        along, off = [], []
+        for pose, place in zip(poses, places):
+            real = pose_at(truth, times, pose[0])
+            if real:
+                along.append(pose[0])
+                off.append(max(1e-4, math.hypot(place[0] - real[1], place[1] - real[2])))
+        errors.plot(along, off, "-", color=colour, linewidth=1, label=label)
+        if key == "slam":
+            for kind, marker in ((0, "."), (1, "s")):
+                spots = [moved(motion, l[0], l[1]) for l in trace["landmarks"] if l[3] == kind]
+                plan.plot([p[0] for p in spots], [p[1] for p in spots], marker, color="tab:green",
+                          markersize=3, label="trunks" if kind == 0 else "corners")
+    plan.set_aspect("equal")
+    plan.set_xlabel("x [m]")
+    plan.set_ylabel("y [m]")
+    plan.set_title(name)
+    plan.legend(fontsize="small")
+    errors.set_yscale("log")
+    errors.set_xlabel("time [s]")
+    errors.set_ylabel("position error in the gauge of the first pose [m]")
+    errors.grid(alpha=0.3)
+    errors.legend(fontsize="small")
+    figure.tight_layout()
+    figure.savefig(file, dpi=100)
+    plt.close(figure)
+
+
+def main():
+    results_file, traces_file = map(pathlib.Path, sys.argv[1:3])
+    for name, trace in json.loads(traces_file.read_text()).items():
+        slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
+        draw(name, trace, f"{results_file.with_suffix('')}.{slug}.png")
+
+
+if __name__ == "__main__":
+    main()

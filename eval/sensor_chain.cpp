@@ -1,0 +1,106 @@
+#include "eval/sensor_chain.hpp"
+
+#include <ctime>
+#include <fstream>
+#include <stdexcept>
+
+namespace understory::eval {
+namespace {
+
+std::string read_if_there(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// Processor time of this thread: what else the computer does is left out.
+double processor_s() {
+  timespec now{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+}  // namespace
+
+/// The shared bus, with a stopwatch around one service's handlers.
+class SensorChain::TimedBus : public Bus {
+ public:
+  explicit TimedBus(Bus& bus) : bus_(bus) {}
+
+  std::optional<Refusal> publish(std::string_view channel,
+                                 std::span<const std::uint8_t> bytes) override {
+    return bus_.publish(channel, bytes);
+  }
+  void subscribe(std::string_view channel, std::size_t queue_size, Handler handler) override {
+    bus_.subscribe(
+        channel, queue_size, [this, handler = std::move(handler)](const BusMessage& message) {
+          const auto start = std::chrono::steady_clock::now();
+          handler(message);
+          const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+          time.total_s += took.count();
+          time.calls_ms.push_back(static_cast<float>(took.count() * 1e3));
+        });
+  }
+  bool handle_one(int timeout_ms) override { return bus_.handle_one(timeout_ms); }
+  std::uint64_t dropped(std::string_view channel) const override { return bus_.dropped(channel); }
+
+  ServiceTime time;
+
+ private:
+  Bus& bus_;
+};
+
+SensorChain::SensorChain(const std::vector<Service>& services,
+                         const std::filesystem::path& config_dir,
+                         const std::map<std::string, std::string>& toml_instead)
+    : bus_(MemoryBus::Queues::kUnlimited) {
+  for (const Service& service : services) {
+    const std::filesystem::path file = config_dir / (service.name + ".toml");
+    const auto instead = toml_instead.find(service.name);
+    const std::string toml = instead != toml_instead.end() ? instead->second : read_if_there(file);
+    auto bus = std::make_unique<TimedBus>(bus_);
+    auto hosted = std::make_unique<HostedService>(service, *bus, no_clock(), toml, file.string());
+    hosted_.push_back({service.name, std::move(bus), std::move(hosted)});
+  }
+}
+
+SensorChain::~SensorChain() = default;
+
+void SensorChain::begin() {
+  has_begun_ = true;
+  for (const Hosted& hosted : hosted_) hosted.service->node().connect();
+}
+
+void SensorChain::feed(std::string_view channel, std::span<const std::uint8_t> bytes) {
+  if (!has_begun_) begin();
+  bus_.publish(channel, bytes);
+  bus_.drain();
+}
+
+void SensorChain::finish() {
+  for (const Hosted& hosted : hosted_) {
+    hosted.service->adapter().finish();
+    bus_.drain();
+  }
+}
+
+const ServiceTime& SensorChain::time_of(std::string_view service) const {
+  for (const Hosted& hosted : hosted_) {
+    if (hosted.name == service) return hosted.bus->time;
+  }
+  throw std::out_of_range("no service " + std::string(service) + " in the chain");
+}
+
+std::vector<std::string> SensorChain::services() const {
+  std::vector<std::string> names;
+  for (const Hosted& hosted : hosted_) names.push_back(hosted.name);
+  return names;
+}
+
+health_t SensorChain::health_of(std::string_view service) {
+  for (const Hosted& hosted : hosted_) {
+    if (hosted.name == service) return hosted.service->node().health();
+  }
+  throw std::out_of_range("no service " + std::string(service) + " in the chain");
+}
+
+}  // namespace understory::eval
