@@ -10,8 +10,8 @@ namespace understory {
 namespace {
 
 /// More evidence than this costs time and adds nothing beyond the shape's own uncertainty.
-constexpr std::size_t kMaxRuns = 12;
-constexpr std::size_t kHitsPerRun = 8;
+constexpr std::size_t kMaxRuns = 10;
+constexpr std::size_t kHitsPerRun = 7;
 constexpr int kIterations = 8;
 /// Beams that graze the stem more than this (part of the radius) say little of its range.
 constexpr double kMaxGraze = 0.9;
@@ -32,8 +32,6 @@ double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
-Eigen::Vector2d unit(double azimuth) { return {std::cos(azimuth), std::sin(azimuth)}; }
-
 /// One residual with its derivative by (x, y, radius) at its own height.
 struct Term {
   double residual = 0.0;
@@ -44,10 +42,10 @@ struct Term {
 };
 
 /// Where a beam meets a circle.
-Term hit_term(const Eigen::Vector3d& circle, const Eigen::Vector2d& origin,
-              const Eigen::Vector2d& direction, double range, const SweepParameters& sweep,
-              double roundness) {
-  const Eigen::Vector2d to_centre = circle.head<2>() - origin;
+Term hit_term(const Eigen::Vector3d& circle, const Sight& sight, double range,
+              const SweepParameters& sweep, double roundness) {
+  const Eigen::Vector2d& direction = sight.direction;
+  const Eigen::Vector2d to_centre = circle.head<2>() - sight.origin_m;
   const double along = direction.dot(to_centre);
   const double miss = cross(direction, to_centre);
   const double radius = std::max(circle[2], 1e-3);
@@ -68,11 +66,10 @@ Term hit_term(const Eigen::Vector3d& circle, const Eigen::Vector2d& origin,
 }
 
 /// How far the line of sight passes from the circle on its own side.
-Term edge_term(const Eigen::Vector3d& circle, const Eigen::Vector2d& origin,
-               const Eigen::Vector2d& direction, double side, double sigma) {
+Term edge_term(const Eigen::Vector3d& circle, const Sight& sight, double side, double sigma) {
   Term term;
-  term.residual = -(cross(direction, circle.head<2>() - origin) + side * circle[2]);
-  term.jacobian = {-direction.y(), direction.x(), side};
+  term.residual = -(cross(sight.direction, circle.head<2>() - sight.origin_m) + side * circle[2]);
+  term.jacobian = {-sight.direction.y(), sight.direction.x(), side};
   term.sigma = sigma;
   return term;
 }
@@ -163,9 +160,7 @@ void StemFitter::take_evidence(const RingCloud& cloud, const std::vector<Run>& r
     for (std::size_t k = 0; k < count; ++k) {
       const std::size_t i = run.first + (2 * k + 1) * run.size() / (2 * count);
       const RingPoint& point = cloud.points()[i];
-      const Eigen::Vector2d direction = unit(point.azimuth_rad);
-      const double range = point.range_m;
-      hits_.push_back({point.position() - range * direction, direction, range, point.z_m, index});
+      hits_.push_back({cloud.sight(point), point.range_m, point.z_m, index});
     }
     if (run.left == Border::kClear) edges_.push_back(edge_of(cloud, run, index, 1.0));
     if (run.right == Border::kClear) edges_.push_back(edge_of(cloud, run, index, -1.0));
@@ -178,11 +173,14 @@ StemFitter::Edge StemFitter::edge_of(const RingCloud& cloud, const Run& run, std
                                      double side) const {
   const RingPoint& last = cloud.points()[side > 0.0 ? run.last : run.first];
   const double step = cloud.step_rad(run.ring);
-  const double azimuth = last.azimuth_rad + side * (0.5 * step - sweep_.beam_width_rad);
+  const double beyond = side * (0.5 * step - sweep_.beam_width_rad);
+  Sight sight = cloud.sight(last);
+  sight.direction += beyond * Eigen::Vector2d(-sight.direction.y(), sight.direction.x());
+  sight.direction.normalize();
   const double variance =
       square(last.range_m) * (square(step) / 12.0 + square(0.5 * sweep_.beam_width_rad)) +
       square(trunk_.roundness_sigma_m);
-  return {last.origin(), unit(azimuth), last.z_m, side, std::sqrt(variance), index};
+  return {sight, last.z_m, side, std::sqrt(variance), index};
 }
 
 /// Rings that fire at the same azimuths miss an upright edge by the same part of a step: together
@@ -192,7 +190,7 @@ void StemFitter::share_edges() {
   for (std::size_t i = 0; i < edges_.size(); ++i) {
     for (const Edge& other : edges_) {
       if (other.side != edges_[i].side) continue;
-      const double apart = std::abs(cross(edges_[i].direction, other.direction));
+      const double apart = std::abs(cross(edges_[i].sight.direction, other.sight.direction));
       const double range_sigma = edges_[i].sigma_m;
       const double distance = apart * hits_.front().range_m;
       if (distance < range_sigma) shares[i] += 1.0;
@@ -212,9 +210,9 @@ Vector6d StemFitter::start(const RingCloud& cloud, const std::vector<Run>& runs)
   const double radius =
       std::clamp(0.5 * static_cast<double>(run.width_m), trunk_.min_radius_m, trunk_.max_radius_m);
   const RingPoint& middle = cloud.points()[(run.first + run.last) / 2];
-  const Eigen::Vector2d direction = unit(middle.azimuth_rad);
+  const Sight sight = cloud.sight(middle);
   Vector6d state = Vector6d::Zero();
-  state.head<2>() = middle.origin() + (run.nearest_m + radius) * direction;
+  state.head<2>() = sight.origin_m + (run.nearest_m + radius) * sight.direction;
   state[2] = radius;
   state[5] = trunk_.prior_taper;
   return state;
@@ -224,15 +222,13 @@ void StemFitter::linearise(const Vector6d& state, Matrix6d& information, Vector6
   Sums sums;
   for (const Hit& hit : hits_) {
     const double above = hit.z_m - reference_z_m_;
-    sums.add(hit_term(circle_at(state, above), hit.origin_m, hit.direction, hit.range_m, sweep_,
-                      trunk_.roundness_sigma_m),
-             above);
+    sums.add(
+        hit_term(circle_at(state, above), hit.sight, hit.range_m, sweep_, trunk_.roundness_sigma_m),
+        above);
   }
   for (const Edge& edge : edges_) {
     const double above = edge.z_m - reference_z_m_;
-    sums.add(
-        edge_term(circle_at(state, above), edge.origin_m, edge.direction, edge.side, edge.sigma_m),
-        above);
+    sums.add(edge_term(circle_at(state, above), edge.sight, edge.side, edge.sigma_m), above);
   }
   information << sums.information[0], sums.information[1], sums.information[1], sums.information[2];
   gradient << sums.gradient[0], sums.gradient[1];
@@ -263,7 +259,7 @@ bool StemFitter::settle(Vector6d& state) {
     if (change.head<3>().squaredNorm() < 1e-8) break;
   }
   const Hit& any = hits_.front();
-  return (state.head<2>() - any.origin_m).dot(any.direction) > 1.1 * state[2];
+  return (state.head<2>() - any.sight.origin_m).dot(any.sight.direction) > 1.1 * state[2];
 }
 
 bool StemFitter::sort_out(const RingCloud& cloud, const std::vector<Run>& runs,
@@ -283,16 +279,15 @@ bool StemFitter::agrees(const RingCloud& cloud, const Run& run, const Vector6d& 
   double sum = 0.0;
   for (std::size_t k = 0; k < count; ++k) {
     const RingPoint& point = cloud.points()[run.first + (2 * k + 1) * run.size() / (2 * count)];
-    const Term term =
-        hit_term(circle_at(state, point.z_m - reference_z_m_), point.origin(),
-                 unit(point.azimuth_rad), point.range_m, sweep_, trunk_.roundness_sigma_m);
+    const Term term = hit_term(circle_at(state, point.z_m - reference_z_m_), cloud.sight(point),
+                               point.range_m, sweep_, trunk_.roundness_sigma_m);
     sum += square(term.normalised());
   }
   if (sum > square(kMaxRunResidual) * static_cast<double>(count)) return false;
   const auto edge_agrees = [&](double side) {
     const Edge edge = edge_of(cloud, run, 0, side);
-    const Term term = edge_term(circle_at(state, edge.z_m - reference_z_m_), edge.origin_m,
-                                edge.direction, side, edge.sigma_m);
+    const Term term =
+        edge_term(circle_at(state, edge.z_m - reference_z_m_), edge.sight, side, edge.sigma_m);
     return std::abs(term.normalised()) < kMaxEdgeResidual;
   };
   return (run.left != Border::kClear || edge_agrees(1.0)) &&
@@ -308,14 +303,14 @@ void StemFitter::describe(const Vector6d& state, const std::vector<Run>& runs, S
   fit.covariance = information.inverse();
   double sum = 0.0;
   for (const Hit& hit : hits_) {
-    sum += square(hit_term(circle_at(state, hit.z_m - reference_z_m_), hit.origin_m, hit.direction,
-                           hit.range_m, sweep_, trunk_.roundness_sigma_m)
+    sum += square(hit_term(circle_at(state, hit.z_m - reference_z_m_), hit.sight, hit.range_m,
+                           sweep_, trunk_.roundness_sigma_m)
                       .normalised());
   }
   for (const Edge& edge : edges_) {
-    sum += square(edge_term(circle_at(state, edge.z_m - reference_z_m_), edge.origin_m,
-                            edge.direction, edge.side, edge.sigma_m)
-                      .normalised());
+    sum += square(
+        edge_term(circle_at(state, edge.z_m - reference_z_m_), edge.sight, edge.side, edge.sigma_m)
+            .normalised());
     (edge.side > 0.0 ? fit.sees_left : fit.sees_right) = true;
   }
   fit.mean_square_residual = sum / static_cast<double>(hits_.size() + edges_.size());

@@ -49,16 +49,14 @@ class StemFitter {
  private:
   /// A beam that hit the stem.
   struct Hit {
-    Eigen::Vector2d origin_m;
-    Eigen::Vector2d direction;
+    Sight sight;
     double range_m;
     double z_m;
     std::uint32_t run;
   };
   /// A line of sight that just passes by: side +1 = left.
   struct Edge {
-    Eigen::Vector2d origin_m;
-    Eigen::Vector2d direction;
+    Sight sight;
     double z_m;
     double side;
     double sigma_m;

@@ -24,12 +24,6 @@ float wrapped(float angle) {
 
 }  // namespace
 
-Eigen::Vector2d RingPoint::origin() const {
-  const double azimuth = azimuth_rad;
-  return position() -
-         static_cast<double>(range_m) * Eigen::Vector2d(std::cos(azimuth), std::sin(azimuth));
-}
-
 void RingCloud::fill(const PointSweep& sweep, double min_range_m, double max_range_m,
                      PointCounters& counters) {
   reserve_rings(sweep, counters);
@@ -73,8 +67,9 @@ void RingCloud::scatter(const PointSweep& sweep, double min_range_m, double max_
     counts_.push_back(slots_[ring + 1] - slots_[ring]);
   }
   spin_ = fit_spin(sweep, max_range_m, counts_);
-  const Eigen::Vector3f velocity =
+  level_velocity_ =
       level_R_vehicle * Eigen::Vector3f(spin_.velocity_mps.x(), spin_.velocity_mps.y(), 0.0F);
+  const Eigen::Vector3f velocity = level_velocity_;
   const auto nearest2 = static_cast<float>(min_range_m * min_range_m);
   const auto farthest2 = static_cast<float>(max_range_m * max_range_m);
   for (const SweepPoint& point : sweep.points) {
@@ -88,8 +83,8 @@ void RingCloud::scatter(const PointSweep& sweep, double min_range_m, double max_
       if (!p.allFinite()) ++counters.not_finite;
       continue;
     }
-    scattered_[next_[point.ring]++] = {p.x(), p.y(), p.z(), fast_atan2(y, x), std::sqrt(range2),
-                                       0.0F};
+    scattered_[next_[point.ring]++] = {
+        p.x(), p.y(), p.z(), fast_atan2(y, x), std::sqrt(range2), 0.0F, point.time_s};
   }
 }
 
@@ -157,6 +152,10 @@ float RingCloud::slope(std::size_t ring, float azimuth_rad) const {
   if (std::abs(std::remainder(near->azimuth_rad - azimuth_rad, kTurn)) < kKnownSlope_rad) {
     return (near->z_m - sensor_.z()) / near->range_m;
   }
+  return rough_slope(ring, azimuth_rad);
+}
+
+float RingCloud::rough_slope(std::size_t ring, float azimuth_rad) const {
   const Eigen::Vector3f level(std::cos(azimuth_rad), std::sin(azimuth_rad), 0.0F);
   Eigen::Vector3f beam = level_R_vehicle_.transpose() * level;
   beam.z() = spin_.slopes[ring] * std::hypot(beam.x(), beam.y());

@@ -19,10 +19,15 @@ struct RingPoint {
   float azimuth_rad = 0.0F;  ///< Of the beam, left positive; goes on beyond pi within a ring.
   float range_m = 0.0F;      ///< Horizontal distance from where the sensor was at that time.
   float height_m = 0.0F;     ///< Above ground.
+  float time_s = 0.0F;       ///< From the sweep's utime.
 
   Eigen::Vector2d position() const { return {x_m, y_m}; }
-  /// Where the sensor was, seen from above.
-  Eigen::Vector2d origin() const;
+};
+
+/// A line of sight, seen from above.
+struct Sight {
+  Eigen::Vector2d origin_m = Eigen::Vector2d::Zero();
+  Eigen::Vector2d direction = Eigen::Vector2d::UnitX();  ///< Unit.
 };
 
 /// What was wrong with the points of a sweep.
@@ -55,6 +60,14 @@ class RingCloud {
   const Eigen::Vector3f& sensor_m() const { return sensor_; }
   /// Of the sensor during the turn, as its points tell; frame `vehicle`, in the plan.
   const Eigen::Vector2f& velocity_mps() const { return spin_.velocity_mps; }
+  /// Where the sensor was when it measured the point, and whereto it looked.
+  Sight sight(const RingPoint& point) const {
+    const Eigen::Vector2d origin =
+        (sensor_.head<2>() + point.time_s * level_velocity_.head<2>()).cast<double>();
+    return {origin, (point.position() - origin) / static_cast<double>(point.range_m)};
+  }
+  /// The same as slope() without a look at the points: good to a few centimetres in height.
+  float rough_slope(std::size_t ring, float azimuth_rad) const;
   /// Rise of a ring's beams per metre of range where they look into the direction. Precondition:
   /// the ring has points.
   float slope(std::size_t ring, float azimuth_rad) const;
@@ -80,6 +93,7 @@ class RingCloud {
   Spin spin_;
   Eigen::Matrix3f level_R_vehicle_ = Eigen::Matrix3f::Identity();
   Eigen::Vector3f sensor_ = Eigen::Vector3f::Zero();
+  Eigen::Vector3f level_velocity_ = Eigen::Vector3f::Zero();
 };
 
 }  // namespace understory

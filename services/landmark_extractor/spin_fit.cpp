@@ -14,6 +14,8 @@ constexpr float kTurn = 2.0F * kPi;
 /// So many points tell the motion well enough.
 constexpr std::size_t kSample = 3000;
 constexpr int kRounds = 3;
+/// So many neighbours tell the rate of the spin well enough to begin with.
+constexpr std::size_t kRates = 300;
 /// Beams turn evenly to this [rad]; a motor that does not says nothing of the motion.
 constexpr double kEvenness = 0.01;
 /// A vehicle is not faster [m/s].
@@ -47,6 +49,7 @@ float spin_rate(const PointSweep& sweep, std::uint16_t ring) {
       if (std::isfinite(change)) rates.push_back(change / (point.time_s - previous->time_s));
     }
     previous = &point;
+    if (rates.size() >= kRates) break;
   }
   if (rates.empty()) return 0.0F;
   const auto middle = rates.begin() + static_cast<std::ptrdiff_t>(rates.size() / 2);
@@ -142,21 +145,6 @@ class SpinFit {
 };
 
 }  // namespace
-
-float fast_atan2(float y, float x) {
-  const float ax = std::abs(x);
-  const float ay = std::abs(y);
-  const float large = std::max(std::max(ax, ay), 1e-20F);
-  const float q = std::min(ax, ay) / large;
-  const float s = q * q;
-  float angle =
-      q * (0.99997726F +
-           s * (-0.33262347F +
-                s * (0.19354346F + s * (-0.11643287F + s * (0.05265332F - s * 0.01172120F)))));
-  angle = ay > ax ? 0.5F * kPi - angle : angle;
-  angle = x < 0.0F ? kPi - angle : angle;
-  return y < 0.0F ? -angle : angle;
-}
 
 Spin fit_spin(const PointSweep& sweep, double max_range_m,
               std::span<const std::size_t> points_per_ring) {

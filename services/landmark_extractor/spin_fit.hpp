@@ -2,7 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <span>
 #include <vector>
 
@@ -24,7 +27,21 @@ struct Spin {
 Spin fit_spin(const PointSweep& sweep, double max_range_m,
               std::span<const std::size_t> points_per_ring);
 
-/// atan2 to 1e-5 rad.
-float fast_atan2(float y, float x);
+/// atan2 to 1e-5 rad without a branch on the data (polynomial of least maximum error).
+inline float fast_atan2(float y, float x) {
+  constexpr float kPi = std::numbers::pi_v<float>;
+  const float ax = std::abs(x);
+  const float ay = std::abs(y);
+  const float large = std::max(std::max(ax, ay), 1e-20F);
+  const float q = std::min(ax, ay) / large;
+  const float s = q * q;
+  float angle =
+      q * (0.99997726F +
+           s * (-0.33262347F +
+                s * (0.19354346F + s * (-0.11643287F + s * (0.05265332F - s * 0.01172120F)))));
+  angle = ay > ax ? 0.5F * kPi - angle : angle;
+  angle = x < 0.0F ? kPi - angle : angle;
+  return y < 0.0F ? -angle : angle;
+}
 
 }  // namespace understory

@@ -14,6 +14,8 @@ constexpr double kCore = 0.6;
 constexpr double kOnStem_m = 0.12;
 /// From here upwards a trunk must be seen where nothing hides it.
 constexpr double kFoot_m = 0.5;
+/// Rings that pass so far above or below are not looked at [m].
+constexpr double kMargin_m = 0.5;
 /// So many beams do not all drop out.
 constexpr double kSureBeams = 2.0;
 
@@ -44,7 +46,7 @@ class Look {
     const Eigen::Vector2d sensor = cloud.sensor_m().head<2>().cast<double>();
     Eigen::Vector2d offset = fit.state.head<2>() - sensor;
     // The sensor was elsewhere when its beams passed there: their azimuth says when.
-    origin_ = at(cloud.first_at(ring, azimuth_of(offset))).origin();
+    origin_ = cloud.sight(at(cloud.first_at(ring, azimuth_of(offset)))).origin_m;
     offset = fit.state.head<2>() - origin_;
     z_m_ = cloud.sensor_m().z() + cloud.slope(ring, azimuth_of(offset)) * offset.norm();
   }
@@ -104,8 +106,15 @@ StemProbe probe_stem(const RingCloud& cloud, const StemFit& fit, double ground_z
   double highest_on = -lowest_on;
   double lowest_through = lowest_on;
   double highest_through = highest_on;
+  const Eigen::Vector2d offset = fit.state.head<2>() - cloud.sensor_m().head<2>().cast<double>();
+  const float azimuth = azimuth_of(offset);
+  const double lowest = std::min(ground_z + kFoot_m, fit.low_z_m) - kMargin_m;
+  const double highest =
+      std::max(ground_z + parameters.standing_height_m, fit.high_z_m) + kMargin_m;
   for (std::size_t ring = 0; ring < cloud.rings(); ++ring) {
     if (cloud.step_rad(ring) <= 0.0F) continue;
+    const double about = cloud.sensor_m().z() + cloud.rough_slope(ring, azimuth) * offset.norm();
+    if (about < lowest || about > highest) continue;
     const Look look(cloud, ring, fit, parameters.clearance_m);
     const double z = look.z_m();
     const bool in_zone = z > ground_z + kFoot_m && z < ground_z + parameters.standing_height_m;
