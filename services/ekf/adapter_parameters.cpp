@@ -54,6 +54,8 @@ void describe(EkfGateParameters& p, ParameterTable& table) {
             "Joint compatibility of new tracks with landmarks whose track was lost.");
   table.add("gate.rejoin_after_scans", p.rejoin_after_scans, {1, 10000}, "scans",
             "Only landmarks not seen for so long take a new track.");
+  table.add("gate.rejoin_max_gate_m", p.rejoin_max_gate_m, {0.1, 100.0}, "m",
+            "Nor such whose place is less certain than this.");
   table.add("gate.rejoin_max_nodes", p.rejoin_max_nodes, {1, 1000000}, "",
             "Of the search for the largest compatible set.");
 }

@@ -4,6 +4,7 @@
 
 #include <deque>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -66,6 +67,13 @@ class Ekf {
     TrackId landmark = 0;
   };
 
+  /// Unknown tracks that may be lost landmarks, those with the fewest choices first.
+  struct RejoinSearch {
+    std::vector<ekf::Candidates> candidates;
+    double widest_gate_m = 0.0;
+    double turn_variance = 0.0;  ///< [rad^2] Of the vehicle against the lost landmarks, at most.
+  };
+
   // ekf.cpp: time and motion.
   void start(Utime utime);
   void restart(Utime utime, const std::string& reason);
@@ -79,9 +87,11 @@ class Ekf {
   // ekf_scan.cpp: landmarks.
   void read(const TrackedScan& scan);
   void update_known();
-  void update_checked(std::vector<ekf::Pairing>& pairings);
+  void update_checked(std::vector<ekf::Pairing>& pairings,
+                      std::span<const ekf::Sighting> sightings);
   void rejoin_lost(const TrackedScan& scan);
   bool rejoin_round(const TrackedScan& scan);
+  RejoinSearch rejoin_candidates(const TrackedScan& scan) const;
   void add_new(const TrackedScan& scan);
   void count_missed(const FieldOfView& view);
   void remove_distant(const FieldOfView& view);

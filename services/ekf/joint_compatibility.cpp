@@ -32,15 +32,14 @@ class Search {
  private:
   void visit(std::size_t level, double distance) {
     if (level == candidates_.size()) {
-      const bool larger = chosen_.size() > best_.size();
-      const bool nearer = chosen_.size() == best_.size() && distance < best_distance_;
-      if (larger || nearer) {
+      if (may_improve(chosen_.size(), distance)) {
         best_ = chosen_;
         best_distance_ = distance;
       }
       return;
     }
     if (nodes_-- <= 0) return visit(candidates_.size(), distance);
+    if (!may_improve(chosen_.size() + (candidates_.size() - level), distance)) return;
     for (const std::uint32_t landmark : candidates_[level].landmarks) {
       if (taken(landmark)) continue;
       const Pairing pairing{candidates_[level].sighting, landmark};
@@ -50,10 +49,14 @@ class Search {
       visit(level + 1, distance + more);
       chosen_.pop_back();
     }
-    // Without this sighting, if that can still be as good as the best.
-    if (chosen_.size() + (candidates_.size() - level - 1) >= best_.size()) {
+    // Without this sighting, if that can still be better than the best.
+    if (may_improve(chosen_.size() + (candidates_.size() - level - 1), distance)) {
       visit(level + 1, distance);
     }
+  }
+
+  bool may_improve(std::size_t size, double distance) const {
+    return size > best_.size() || (size == best_.size() && distance < best_distance_);
   }
 
   bool taken(std::uint32_t landmark) const {

@@ -38,8 +38,10 @@ struct EkfGateParameters {
   double landmark_probability = 0.999;  ///< chi^2 gate of each landmark.
   double set_probability = 0.999;       ///< chi^2 gate of all of them together.
   double rejoin_probability = 0.99;  ///< Joint compatibility with landmarks whose track was lost.
-  int rejoin_after_scans = 3;   ///< Only landmarks not seen for so many scans take a new track.
-  int rejoin_max_nodes = 2000;  ///< Of the search for the largest compatible set.
+  int rejoin_after_scans = 3;  ///< Only landmarks not seen for so many scans take a new track.
+  /// Nor such whose place is less certain than this: a gate so wide takes anything.
+  double rejoin_max_gate_m = 20.0;
+  int rejoin_max_nodes = 20000;  ///< Of the search for the largest compatible set.
 };
 
 struct EkfRestartParameters {

@@ -1,0 +1,198 @@
+// The filter's motion against numerical differences and against textbook formulas on full matrices.
+#include "services/ekf/prediction.hpp"
+
+#include "tests/catch.hpp"
+#include "tests/ekf/filter_fixture.hpp"
+
+using namespace understory;
+using namespace understory::test;
+using namespace understory::ekf;
+
+namespace {
+
+Preintegration random_motion(std::mt19937_64& random) {
+  Preintegration p;
+  p.seconds = 0.4;
+  p.yaw_rad = 0.3 * normal(random);
+  p.velocity_mps = Eigen::Vector2d(normal(random), normal(random));
+  p.position_m = 0.2 * Eigen::Vector2d(normal(random), normal(random));
+  for (int k = 0; k < 15; ++k) p.bias_jacobian.data()[k] = 0.3 * normal(random);
+  p.bias_jacobian(0, 1) = p.bias_jacobian(0, 2) = 0.0;
+  Eigen::Matrix<double, 5, 5> root;
+  for (int k = 0; k < 25; ++k) root.data()[k] = 0.05 * normal(random);
+  p.covariance = root * root.transpose();
+  p.bias = 0.05 * Eigen::Vector3d(normal(random), normal(random), normal(random));
+  return p;
+}
+
+void move(FilterState& state, const Transition& t) {
+  state.heading = wrap_angle(t.heading);
+  state.position = t.position;
+  state.velocity = t.velocity;
+}
+
+/// The transition of the whole state with its landmarks' rows.
+Eigen::MatrixXd whole_error(const FilterState& state, const Transition& t) {
+  const int n = state.size();
+  Eigen::MatrixXd error = Eigen::MatrixXd::Identity(n, n);
+  error.topLeftCorner<kVehicle, kVehicle>() = t.error;
+  for (std::size_t i = 0; i < state.landmarks().size(); ++i) {
+    error.block<2, 3>(FilterState::row(i), kBias) =
+        -state.lever(state.landmarks()[i].position) * t.yaw_by_bias;
+  }
+  return error;
+}
+
+Eigen::MatrixXd whole_input(const FilterState& state, const Transition& t) {
+  Eigen::MatrixXd input = Eigen::MatrixXd::Zero(state.size(), 5);
+  input.topRows<kVehicle>() = t.noise_input;
+  for (std::size_t i = 0; i < state.landmarks().size(); ++i) {
+    input.block<2, 1>(FilterState::row(i), 0) = -state.lever(state.landmarks()[i].position);
+  }
+  return input;
+}
+
+Eigen::MatrixXd walk(const FilterState& state, const EkfMotionParameters& p, double seconds) {
+  Eigen::MatrixXd noise = Eigen::MatrixXd::Zero(state.size(), state.size());
+  noise(kBias, kBias) = p.gyro_walk * p.gyro_walk * seconds;
+  noise(kBias + 1, kBias + 1) = noise(kBias + 2, kBias + 2) =
+      p.accelerometer_walk * p.accelerometer_walk * seconds;
+  return noise;
+}
+
+}  // namespace
+
+TEST_CASE("Errors pass on as the numerical Jacobian says", "[ekf][prediction]") {
+  std::mt19937_64 random(11);
+  for (const ErrorForm form : kForms) {
+    for (int trial = 0; trial < 10; ++trial) {
+      const FilterState state = random_state(form, 2, random);
+      const Preintegration motion = random_motion(random);
+      const SE2WithCovariance wheels{SE2(0.5, 0.1, 0.2), Eigen::Matrix3d::Identity()};
+      const auto transition = [&](const FilterState& from) {
+        return trial % 2 == 0 ? transition_by(from, motion)
+                              : transition_by(from, wheels, 0.4, EkfMotionParameters{});
+      };
+      const Transition t = transition(state);
+      FilterState next = state;
+      move(next, t);
+      const Eigen::MatrixXd error = whole_error(state, t);
+      for (int k = 0; k < state.size(); ++k) {
+        const double h = 1e-6;
+        FilterState plus = state, minus = state;
+        plus.retract(h * Eigen::VectorXd::Unit(state.size(), k));
+        minus.retract(-h * Eigen::VectorXd::Unit(state.size(), k));
+        move(plus, transition(plus));
+        move(minus, transition(minus));
+        const Eigen::VectorXd column = (difference(next, plus) - difference(next, minus)) / (2 * h);
+        CAPTURE(static_cast<int>(form), trial, k);
+        REQUIRE((column - error.col(k)).norm() < 1e-6);
+      }
+    }
+  }
+}
+
+TEST_CASE("The block-wise prediction is the full one", "[ekf][prediction]") {
+  std::mt19937_64 random(12);
+  const EkfMotionParameters parameters;
+  for (const ErrorForm form : kForms) {
+    FilterState state = random_state(form, 7, random);
+    LowRank room(state.size());
+    const Transition t = transition_by(state, random_motion(random));
+    const Eigen::MatrixXd error = whole_error(state, t);
+    const Eigen::MatrixXd input = whole_input(state, t);
+    const Eigen::MatrixXd expected = error * full_covariance(state) * error.transpose() +
+                                     input * t.noise * input.transpose() +
+                                     walk(state, parameters, t.seconds);
+    predict(state, t, parameters, room);
+    REQUIRE((full_covariance(state) - expected).norm() < 1e-12 * expected.norm());
+  }
+}
+
+TEST_CASE("Motion measured over the samples' own interval shares their noise",
+          "[ekf][prediction]") {
+  std::mt19937_64 random(13);
+  EkfMotionParameters parameters;
+  parameters.gyro_walk = parameters.accelerometer_walk = 0.0;
+  for (const ErrorForm form : kForms) {
+    for (const bool stands : {false, true}) {
+      FilterState state = random_state(form, 3, random);
+      const int n = state.size();
+      LowRank room(n);
+      Preintegration motion = random_motion(random);
+      motion.bias = state.bias;
+      const Transition t = transition_by(state, motion);
+      MeasuredMotion measured;
+      measured.position_m << 0.3, -0.2;
+      measured.covariance_m2 << 0.02, 0.005, 0.005, 0.03;
+      if (stands) measured.turn_sigma_rad = 0.01;
+      // Oracle: state and noise as one vector, measured first, passed on then.
+      Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(n + 5, n + 5);
+      joint.topLeftCorner(n, n) = full_covariance(state);
+      joint.bottomRightCorner(5, 5) = t.noise;
+      const auto measure = [&](const FilterState& at) {
+        Eigen::Vector3d z;
+        const Eigen::Matrix<double, 5, 1> shift = motion.bias_jacobian * (at.bias - motion.bias);
+        z << rotation_of(at.heading).transpose() * at.velocity * motion.seconds +
+                 motion.position_m + shift.tail<2>(),
+            motion.yaw_rad + shift(0);
+        return z;
+      };
+      Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(3, n + 5);
+      for (int k = 0; k < n; ++k) {
+        FilterState plus = state, minus = state;
+        plus.retract(1e-6 * Eigen::VectorXd::Unit(n, k));
+        minus.retract(-1e-6 * Eigen::VectorXd::Unit(n, k));
+        rows.col(k) = (measure(plus) - measure(minus)) / 2e-6;
+      }
+      rows(0, n + 3) = rows(1, n + 4) = rows(2, n) = 1.0;
+      Eigen::Matrix3d noise = Eigen::Matrix3d::Zero();
+      noise.topLeftCorner<2, 2>() = measured.covariance_m2;
+      noise(2, 2) = stands ? 1e-4 : 1e12;
+      Eigen::Vector3d z;
+      z << measured.position_m, 0.0;
+      const Eigen::MatrixXd gain =
+          joint * rows.transpose() * (rows * joint * rows.transpose() + noise).inverse();
+      Eigen::MatrixXd pass(n, n + 5);
+      pass << whole_error(state, t), whole_input(state, t);
+      const Eigen::MatrixXd expected = pass * (joint - gain * rows * joint) * pass.transpose();
+      const Eigen::VectorXd delta = pass * gain * (z - measure(state));
+      FilterState oracle = state;
+      move(oracle, t);
+      oracle.retract(delta);
+      predict(state, motion, measured, parameters, room);
+      REQUIRE((full_covariance(state) - expected).norm() < 1e-6 * expected.norm());
+      REQUIRE(difference(oracle, state).norm() < 1e-5 * (1.0 + delta.norm()));
+    }
+  }
+}
+
+TEST_CASE("Standing still tells the velocity and no more than that", "[ekf][prediction]") {
+  std::mt19937_64 random(14);
+  for (const ErrorForm form : kForms) {
+    FilterState state = random_state(form, 3, random);
+    state.velocity = 0.01 * Eigen::Vector2d(1.0, -2.0);
+    LowRank room(state.size());
+    measure_standing(state, 1e-4, room);
+    REQUIRE(state.velocity.norm() < 1e-3);
+    const Eigen::Matrix2d left = state.velocity_covariance().topLeftCorner<2, 2>();
+    // Other forms measure at the old velocity what they tell at the new one.
+    REQUIRE(left.trace() < (form == ErrorForm::kRightInvariant ? 2.1e-8 : 1e-3));
+    REQUIRE(state.covariance(kPosition, kPosition) > 1e-4);
+  }
+}
+
+TEST_CASE("Uncertainty grows over a gap", "[ekf][prediction]") {
+  std::mt19937_64 random(15);
+  const EkfMotionParameters parameters;
+  FilterState state = random_state(ErrorForm::kRightInvariant, 2, random);
+  state.covariance() = 0.01 * Eigen::MatrixXd::Identity(state.size(), state.size());
+  LowRank room(state.size());
+  double last = state.pose_covariance().trace();
+  for (int k = 0; k < 5; ++k) {
+    predict(state, transition_over_gap(state, 1.0, parameters), parameters, room);
+    const double now = state.pose_covariance().trace();
+    REQUIRE(now > last);
+    last = now;
+  }
+}
