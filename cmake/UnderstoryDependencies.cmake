@@ -21,10 +21,11 @@ target_link_libraries(understory_lcm INTERFACE "${LCM_LIBRARY}")
 
 find_path(SUITESPARSE_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
 find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
+find_library(CCOLAMD_LIBRARY ccolamd REQUIRED)
 add_library(understory_cholmod INTERFACE)
 target_include_directories(understory_cholmod SYSTEM INTERFACE "${SUITESPARSE_INCLUDE_DIR}")
 # gomp: to keep CHOLMOD to one thread.
-target_link_libraries(understory_cholmod INTERFACE "${CHOLMOD_LIBRARY}" gomp)
+target_link_libraries(understory_cholmod INTERFACE "${CHOLMOD_LIBRARY}" "${CCOLAMD_LIBRARY}" gomp)
 
 # libzip's own CMake files ask for its command-line tools, which its users do not need.
 find_path(ZIP_INCLUDE_DIR zip.h REQUIRED)
@@ -33,4 +34,10 @@ add_library(understory_zip INTERFACE)
 target_include_directories(understory_zip INTERFACE "${ZIP_INCLUDE_DIR}")
 target_link_libraries(understory_zip INTERFACE "${ZIP_LIBRARY}")
 
-install(TARGETS understory_lcm understory_cholmod understory_zip EXPORT understory)
+find_path(PCAP_INCLUDE_DIR pcap/pcap.h REQUIRED)
+find_library(PCAP_LIBRARY pcap REQUIRED)
+add_library(understory_pcap INTERFACE)
+target_include_directories(understory_pcap INTERFACE "${PCAP_INCLUDE_DIR}")
+target_link_libraries(understory_pcap INTERFACE "${PCAP_LIBRARY}")
+
+install(TARGETS understory_lcm understory_cholmod understory_zip understory_pcap EXPORT understory)

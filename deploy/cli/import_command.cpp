@@ -11,6 +11,7 @@
 #include "common/wire/convert.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/import_sensors.hpp"
 #include "deploy/cli/interrupt.hpp"
 #include "deploy/cli/progress.hpp"
 #include "services/lidar_imu_input/wheel_odometry.hpp"
@@ -21,22 +22,25 @@ namespace {
 struct Options {
   std::string path;
   std::string out;
+  bool raw = false;
 };
 
 /// The recording as messages in order of time. Of one stamp: wheels, odometry, GNSS, laser, so that
 /// whoever takes a sweep has the motion up to it.
 class Importer {
  public:
-  Importer(const VictoriaPark& recording, LcmLogWriter& writer)
-      : recording_(recording), writer_(writer), odometry_(parameters()) {}
+  /// `raw`: what the sensors gave, for lidar_imu_input; else what it makes of that.
+  Importer(const VictoriaPark& recording, LcmLogWriter& writer, bool raw)
+      : recording_(recording), writer_(writer), odometry_(parameters()), raw_(raw) {}
 
   void run() {
     Progress progress("importing", static_cast<double>(recording_.scans.size()));
     for (const PlanarScan& scan : recording_.scans) {
       throw_if_interrupted();
       write_until(scan.utime);
-      if (const auto motion = odometry_.advance_to(scan.utime)) write("ODOMETRY", *motion);
-      write("LIDAR_SCAN", scan);
+      const auto motion = odometry_.advance_to(scan.utime);
+      if (motion && !raw_) write("ODOMETRY", *motion);
+      write(raw_ ? "RAW_SCAN" : "LIDAR_SCAN", scan);
       progress.update(static_cast<double>(scan.sequence + 1));
     }
     write_until(std::numeric_limits<Utime>::max());
@@ -67,9 +71,9 @@ class Importer {
           due(wheels, wheel_) && (!due(fixes, fix_) || wheels[wheel_].utime <= fixes[fix_].utime);
       if (wheel_first) {
         odometry_.add(wheels[wheel_]);
-        write("WHEELS", wheels[wheel_++]);
+        write(raw_ ? "RAW_WHEELS" : "WHEELS", wheels[wheel_++]);
       } else {
-        write("GNSS", fixes[fix_++]);
+        write(raw_ ? "RAW_GNSS" : "GNSS", fixes[fix_++]);
       }
     }
   }
@@ -77,6 +81,7 @@ class Importer {
   const VictoriaPark& recording_;
   LcmLogWriter& writer_;
   WheelOdometry odometry_;
+  bool raw_;
   std::size_t wheel_ = 0;
   std::size_t fix_ = 0;
 };
@@ -86,7 +91,7 @@ void import_victoria_park(const Options& options) {
   try {
     const VictoriaPark recording = read_victoria_park(options.path);
     LcmLogWriter writer(options.out);
-    Importer(recording, writer).run();
+    Importer(recording, writer, options.raw).run();
     writer.commit();
     fmt::print("{} sweeps, {} wheel samples, {} fixes -> {}\n", recording.scans.size(),
                recording.wheels.size(), recording.gnss.size(), options.out);
@@ -112,7 +117,10 @@ void add_import_command(CLI::App& parent) {
                    "victoria_park_ascii.zip, or a folder with LASER.txt, DRS.txt and GPS.txt")
       ->required();
   victoria->add_option("--out", options->out, "The log to write")->required();
+  victoria->add_flag("--raw", options->raw,
+                     "RAW_SCAN, RAW_WHEELS, RAW_GNSS: what lidar_imu_input takes");
   victoria->callback([options] { import_victoria_park(*options); });
+  add_sensor_imports(*command);
 }
 
 }  // namespace understory

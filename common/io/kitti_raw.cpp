@@ -1,0 +1,200 @@
+#include "common/io/kitti_raw.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <numbers>
+
+#include "common/io/data_error.hpp"
+#include "common/io/number_reader.hpp"
+#include "common/io/recording_folder.hpp"
+
+namespace understory {
+namespace fs = std::filesystem;
+namespace kitti {
+namespace {
+
+constexpr std::size_t kPointBytes = 16;
+
+int digits(std::string_view line, std::size_t at, std::size_t count, const std::string& where) {
+  int value = 0;
+  const char* begin = line.data() + at;
+  const bool fits = at + count <= line.size();
+  const auto result =
+      fits ? std::from_chars(begin, begin + count, value) : std::from_chars_result{begin, {}};
+  if (!fits || result.ptr != begin + count)
+    throw DataError(fmt::format("{}: '{}' is no time stamp", where, line.substr(0, 40)));
+  return value;
+}
+
+}  // namespace
+
+std::vector<Utime> parse_timestamps(std::string_view text, std::string_view source) {
+  std::vector<Utime> stamps;
+  std::size_t number = 0;
+  while (!text.empty()) {
+    const std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(text.size(), line.size() + 1));
+    ++number;
+    if (line.find_first_not_of(" \r\t") == std::string_view::npos) continue;
+    const std::string where = fmt::format("{}, line {}", source, number);
+    const std::chrono::year_month_day day{
+        std::chrono::year(digits(line, 0, 4, where)),
+        std::chrono::month(static_cast<unsigned>(digits(line, 5, 2, where))),
+        std::chrono::day(static_cast<unsigned>(digits(line, 8, 2, where)))};
+    const int hour = digits(line, 11, 2, where);
+    const int minute = digits(line, 14, 2, where);
+    const int second = digits(line, 17, 2, where);
+    const int micros = digits(line, 20, 6, where);
+    if (!day.ok() || hour > 23 || minute > 59 || second > 60)
+      throw DataError(fmt::format("{}: '{}' is no time stamp", where, line.substr(0, 40)));
+    const auto days = std::chrono::sys_days(day).time_since_epoch().count();
+    const Utime seconds = static_cast<Utime>(days) * 86400 + hour * 3600 + minute * 60 + second;
+    stamps.push_back(seconds * 1'000'000 + micros);
+  }
+  return stamps;
+}
+
+PointSweep parse_points(std::string_view bytes, double turn_s, std::string_view source) {
+  if (bytes.size() % kPointBytes != 0)
+    throw DataError(
+        fmt::format("{}: {} bytes are no whole points of {}", source, bytes.size(), kPointBytes));
+  PointSweep sweep;
+  sweep.rings = kRings;
+  sweep.max_range_m = kMaxRange_m;
+  sweep.points.reserve(bytes.size() / kPointBytes);
+  int beam = 0;  // from the top
+  float last = 0.0F;
+  for (std::size_t at = 0; at < bytes.size(); at += kPointBytes) {
+    std::array<float, 4> v{};
+    std::memcpy(v.data(), bytes.data() + at, kPointBytes);
+    SweepPoint point;
+    point.x_m = v[0];
+    point.y_m = v[1];
+    point.z_m = v[2];
+    point.intensity = static_cast<std::uint8_t>(std::clamp(v[3] * 255.0F, 0.0F, 255.0F));
+    const float azimuth = std::atan2(v[1], v[0]);
+    const float around = azimuth < 0.0F ? azimuth + 2.0F * std::numbers::pi_v<float> : azimuth;
+    if (around < last - std::numbers::pi_v<float>) ++beam;
+    last = around;
+    point.ring = static_cast<std::uint16_t>(std::max(0, kRings - 1 - beam));
+    // From behind the car, clockwise.
+    point.time_s = static_cast<float>(turn_s) * 0.5F * (1.0F - azimuth / std::numbers::pi_v<float>);
+    if (std::isfinite(point.time_s)) sweep.points.push_back(point);
+  }
+  std::ranges::stable_sort(sweep.points, [](const SweepPoint& a, const SweepPoint& b) {
+    return a.time_s != b.time_s ? a.time_s < b.time_s : a.ring < b.ring;
+  });
+  return sweep;
+}
+
+Eigen::Isometry3d parse_transform(std::string_view text, std::string_view source) {
+  const auto values = [&](std::string_view key, double* out, std::size_t count) {
+    const std::size_t at = text.find(key);
+    if (at == std::string_view::npos) throw DataError(fmt::format("{}: no line {}", source, key));
+    const std::string_view rest = text.substr(at + key.size());
+    NumberReader reader(rest.substr(0, rest.find('\n')), std::string(source));
+    for (std::size_t i = 0; i < count; ++i) out[i] = reader.require(key);
+  };
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> rotation;
+  Eigen::Vector3d translation;
+  values("\nR:", rotation.data(), 9);
+  values("\nT:", translation.data(), 3);
+  if ((rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm() > 1e-3)
+    throw DataError(fmt::format("{}: R is no rotation", source));
+  Eigen::Isometry3d transform = Eigen::Isometry3d::Identity();
+  transform.linear() = Eigen::Quaterniond(Eigen::Matrix3d(rotation)).normalized().matrix();
+  transform.translation() = translation;
+  return transform;
+}
+
+}  // namespace kitti
+
+namespace {
+
+/// The files of a folder in order of their names.
+std::vector<fs::path> files_of(const fs::path& folder, std::string_view extension) {
+  std::vector<fs::path> files;
+  std::error_code failed;
+  for (const auto& entry : fs::directory_iterator(folder, failed)) {
+    const fs::path& path = entry.path();
+    const std::string stem = path.stem().string();
+    const bool numbered =
+        !stem.empty() && stem.find_first_not_of("0123456789") == std::string::npos;
+    if (numbered && path.extension() == extension) files.push_back(path);
+  }
+  if (failed) throw DataError(fmt::format("{}: {}", folder.string(), failed.message()));
+  std::ranges::sort(files);
+  return files;
+}
+
+std::vector<Utime> stamps_of(const RecordingFolder& folder, std::string_view name) {
+  return kitti::parse_timestamps(folder.read(name), folder.describe(name));
+}
+
+/// The stamp of each file: its name is the line's number. Drives may be cut, their stamps whole.
+std::vector<Utime> pick_stamps(const std::vector<fs::path>& files, const std::vector<Utime>& stamps,
+                               const fs::path& folder) {
+  if (files.empty()) throw DataError(fmt::format("{}: no numbered files", folder.string()));
+  std::vector<Utime> picked;
+  for (const fs::path& file : files) {
+    const std::string stem = file.stem().string();
+    std::size_t index = stamps.size();
+    std::from_chars(stem.data(), stem.data() + stem.size(), index);
+    if (index >= stamps.size())
+      throw DataError(fmt::format("{}: no time stamp, there are {}", file.string(), stamps.size()));
+    picked.push_back(stamps[index]);
+  }
+  return picked;
+}
+
+std::string read_whole(const fs::path& path) {
+  return RecordingFolder(path.parent_path()).read(path.filename().string());
+}
+
+}  // namespace
+
+KittiRaw::KittiRaw(fs::path folder) : folder_(std::move(folder)) {
+  const fs::path laser = folder_ / "velodyne_points";
+  const RecordingFolder stamps(laser);
+  files_ = files_of(laser / "data", ".bin");
+  starts_ = pick_stamps(files_, stamps_of(stamps, "timestamps_start.txt"), laser);
+  ends_ = pick_stamps(files_, stamps_of(stamps, "timestamps_end.txt"), laser);
+
+  // The published sets keep the records in oxts/data, reduced ones in oxts itself.
+  const fs::path oxts = folder_ / "oxts";
+  std::error_code failed;
+  const fs::path data = fs::is_directory(oxts / "data", failed) ? oxts / "data" : oxts;
+  if (fs::is_directory(oxts, failed)) {
+    const std::vector<fs::path> records = files_of(data, ".txt");
+    const std::vector<Utime> times =
+        pick_stamps(records, stamps_of(RecordingFolder(oxts), "timestamps.txt"), oxts);
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      oxts_.push_back(parse_oxts(read_whole(records[i]), records[i].string()));
+      oxts_.back().utime = times[i];
+    }
+  }
+  for (const fs::path& place : {folder_, folder_ / ".."}) {
+    const fs::path file = place / "calib_imu_to_velo.txt";
+    if (!fs::exists(file, failed)) continue;
+    imu_T_velo_ = kitti::parse_transform(read_whole(file), file.string()).inverse();
+    break;
+  }
+}
+
+PointSweep KittiRaw::read_sweep(std::size_t index) const {
+  const double turn_s = static_cast<double>(ends_.at(index) - starts_.at(index)) * 1e-6;
+  if (turn_s <= 0.0 || turn_s > 1.0)
+    throw DataError(fmt::format("{}: turn {} lasts {} s", folder_.string(), index, turn_s));
+  PointSweep sweep = kitti::parse_points(read_whole(files_[index]), turn_s, files_[index].string());
+  sweep.utime = starts_[index];
+  sweep.turn = index;
+  sweep.sequence = index;
+  return sweep;
+}
+
+}  // namespace understory

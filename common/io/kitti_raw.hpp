@@ -1,0 +1,77 @@
+// A drive of the KITTI raw data: Velodyne HDL-64E sweeps and OXTS records with their time stamps.
+//
+// The .bin files hold x, y, z, reflectance alone, beam by beam from the top, each from azimuth 0 to
+// the left. The beam is got back from where the azimuth wraps, the time of a point from its
+// azimuth: the laser turns clockwise and starts behind the car. Sweeps are not corrected for the
+// car's motion ("sync" and "extract" alike).
+#pragma once
+
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "common/io/oxts.hpp"
+#include "common/model/point_sweep.hpp"
+
+namespace understory {
+
+class KittiRaw {
+ public:
+  /// The folder of one drive (with velodyne_points/, oxts/); the calibration beside them or one
+  /// folder up, where there is any. Throws DataError.
+  explicit KittiRaw(std::filesystem::path folder);
+
+  std::size_t sweeps() const { return starts_.size(); }
+  /// Frame sensor, skewed, with rings (0 = lowest) and times. Throws DataError.
+  PointSweep read_sweep(std::size_t index) const;
+  const std::vector<OxtsRecord>& oxts() const { return oxts_; }
+  /// Where the laser sits on the OXTS unit; none without calibration.
+  const std::optional<Eigen::Isometry3d>& imu_T_velo() const { return imu_T_velo_; }
+
+ private:
+  std::filesystem::path folder_;
+  std::vector<Utime> starts_;
+  std::vector<Utime> ends_;
+  std::vector<std::filesystem::path> files_;
+  std::vector<OxtsRecord> oxts_;
+  std::optional<Eigen::Isometry3d> imu_T_velo_;
+};
+
+namespace kitti {
+
+constexpr double kMaxRange_m = 120.0;
+constexpr std::uint16_t kRings = 64;
+
+/// "2011-09-26 13:02:44.335092332" per line (UTC). Throws DataError.
+std::vector<Utime> parse_timestamps(std::string_view text, std::string_view source);
+/// Bytes of a .bin file to points with rings and times within `turn_s`.
+PointSweep parse_points(std::string_view bytes, double turn_s, std::string_view source);
+/// "R: ... T: ..." of calib_imu_to_velo.txt: velo_T_imu.
+Eigen::Isometry3d parse_transform(std::string_view text, std::string_view source);
+
+}  // namespace kitti
+
+/// Drive 0005 reduced to 16 of its 64 beams: sweeps.bin with poses beside it.
+struct ReducedKittiPose {
+  Utime utime = 0;
+  SE2 world_T_sensor;
+};
+class ReducedKitti {
+ public:
+  /// A folder with sweeps.bin and poses_icp.csv or poses_oxts.csv (`poses`: "icp", "oxts").
+  ReducedKitti(const std::filesystem::path& folder, std::string_view poses);
+  std::size_t sweeps() const { return offsets_.size(); }
+  /// Frame sensor; times from the azimuth, turns of 0.1 s of which the middle is the pose's time.
+  PointSweep read_sweep(std::size_t index) const;
+  const std::vector<ReducedKittiPose>& poses() const { return poses_; }
+
+ private:
+  std::string bytes_;
+  std::string source_;
+  std::vector<std::size_t> offsets_;
+  std::vector<ReducedKittiPose> poses_;
+};
+
+}  // namespace understory

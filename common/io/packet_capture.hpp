@@ -1,0 +1,44 @@
+// Captured network traffic (pcap, pcapng): the UDP payloads in it. Files only; read with libpcap.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/model/landmarks.hpp"
+
+namespace understory {
+
+struct CapturedPacket {
+  Utime utime = 0;         ///< When it was captured [us since the epoch].
+  std::uint16_t port = 0;  ///< UDP, destination.
+  std::vector<std::uint8_t> payload;
+};
+
+struct CaptureCounts {
+  std::uint64_t frames = 0;
+  std::uint64_t not_udp = 0;  ///< Other protocols, fragments, cut off: passed over.
+};
+
+/// Ethernet (with VLAN tags) or raw IPv4 below; IPv4, UDP.
+class PacketCapture {
+ public:
+  /// Throws DataError.
+  explicit PacketCapture(const std::filesystem::path& path);
+  ~PacketCapture();
+  PacketCapture(PacketCapture&&) noexcept;
+  PacketCapture& operator=(PacketCapture&&) noexcept;
+
+  /// The next UDP payload; none at the end. A file that ends in the middle of a frame ends there.
+  std::optional<CapturedPacket> next();
+  const CaptureCounts& counts() const;
+  bool is_cut_off() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace understory

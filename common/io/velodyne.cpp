@@ -1,0 +1,204 @@
+#include "common/io/velodyne.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace understory {
+namespace {
+
+constexpr std::size_t kBlocks = 12;
+constexpr std::size_t kBlockBytes = 100;
+constexpr std::size_t kTimeAt = 1200;
+constexpr std::size_t kProductAt = 1205;
+constexpr int kTurn = 36000;  // hundredths of a degree
+constexpr double kHour_us = 3.6e9;
+constexpr std::size_t kMostPoints = 2'000'000;  // of a turn: more is no turn
+constexpr int kLargestStep = 600;               // of the azimuth from packet to packet
+
+std::uint16_t word(std::span<const std::uint8_t> packet, std::size_t at) {
+  return static_cast<std::uint16_t>(packet[at] | (packet[at + 1] << 8U));
+}
+
+std::uint32_t long_word(std::span<const std::uint8_t> packet, std::size_t at) {
+  return word(packet, at) | (static_cast<std::uint32_t>(word(packet, at + 2)) << 16U);
+}
+
+/// How the firings of a model lie in a packet.
+struct Layout {
+  std::size_t beams = 16;
+  std::size_t blocks_per_firing = 1;
+  std::size_t firings_per_block = 1;
+  double firing_us = 55.296;  ///< From one firing of all beams to the next.
+  double beam_us = 2.304;     ///< From one shot to the next.
+  std::size_t beams_per_shot = 1;
+  std::uint8_t product = 0;
+};
+
+Layout layout_of(VelodyneModel model) {
+  switch (model) {
+    case VelodyneModel::kVlp16:
+      return {16, 1, 2, 55.296, 2.304, 1, 0x22};
+    case VelodyneModel::kVlp32c:
+      return {32, 1, 1, 55.296, 2.304, 2, 0x28};
+    case VelodyneModel::kHdl32e:
+      return {32, 1, 1, 46.080, 1.152, 1, 0x21};
+    case VelodyneModel::kHdl64e:
+      break;
+  }
+  return {64, 2, 1, 48.0, 1.5, 1, 0};
+}
+
+bool is_other_product(const Layout& layout, std::uint8_t product) {
+  const bool known = product == 0x21 || product == 0x22 || product == 0x28;
+  return layout.product != 0 && known && product != layout.product;
+}
+
+int azimuth_between(int from, int to) { return (to - from + kTurn) % kTurn; }
+
+}  // namespace
+
+/// The blocks of a packet, checked.
+struct VelodyneDecoder::Block {
+  std::array<int, kBlocks> azimuth{};
+  bool is_dual = false;
+  double packet_us = 0.0;
+};
+
+VelodyneDecoder::VelodyneDecoder(VelodyneCalibration calibration, double max_range_m)
+    : calibration_(std::move(calibration)), max_range_m_(max_range_m) {
+  if (max_range_m_ <= 0.0)
+    max_range_m_ = calibration_.model == VelodyneModel::kVlp32c ? 200.0 : 120.0;
+  order_.resize(calibration_.beams.size());
+  for (std::size_t beam = 0; beam < order_.size(); ++beam) order_[calibration_.rings[beam]] = beam;
+  for (std::size_t i = 0; i < sine_.size(); ++i) {
+    const double angle = static_cast<double>(i) * std::numbers::pi / 18000.0;
+    sine_[i] = static_cast<float>(std::sin(angle));
+    cosine_[i] = static_cast<float>(std::cos(angle));
+  }
+}
+
+std::optional<PointSweep> VelodyneDecoder::take_turn() {
+  PointSweep turn = std::exchange(turn_, {});
+  const bool whole = std::exchange(turn_started_, true);
+  if (turn.points.empty()) return std::nullopt;
+  turn.rings = static_cast<std::uint16_t>(calibration_.beams.size());
+  turn.max_range_m = max_range_m_;
+  turn.turn = turns_;
+  turn.sequence = turns_++;
+  // What came before the first passage of azimuth zero is a part of a turn.
+  if (!whole) return std::nullopt;
+  ++counts_.turns;
+  return turn;
+}
+
+std::optional<PointSweep> VelodyneDecoder::finish() {
+  if (last_azimuth_ < kTurn - kLargestStep) turn_started_ = false;  // not to its end
+  return take_turn();
+}
+
+std::optional<PointSweep> VelodyneDecoder::add(std::span<const std::uint8_t> packet,
+                                               Utime received) {
+  const Layout layout = layout_of(calibration_.model);
+  ++counts_.packets;
+  Block block;
+  bool good = packet.size() == kVelodyneDataBytes && !is_other_product(layout, packet[kProductAt]);
+  for (std::size_t b = 0; good && b < kBlocks; ++b) {
+    const std::uint16_t flag = word(packet, b * kBlockBytes);
+    block.azimuth[b] = word(packet, b * kBlockBytes + 2);
+    const bool lower = layout.blocks_per_firing == 2 && b % 2 == 1;
+    good = block.azimuth[b] < kTurn && flag == (lower ? 0xDDFF : 0xEEFF);
+  }
+  if (!good) {
+    ++counts_.refused;
+    return std::nullopt;
+  }
+  const double past_hour = static_cast<double>(long_word(packet, kTimeAt));
+  const double hours = std::round((static_cast<double>(received) - past_hour) / kHour_us);
+  block.packet_us = hours * kHour_us + past_hour;
+  block.is_dual = block.azimuth[layout.blocks_per_firing] == block.azimuth[0];
+
+  if (last_azimuth_ >= 0 && azimuth_between(last_azimuth_, block.azimuth[0]) > kLargestStep)
+    ++counts_.lost_azimuth;
+  // The turn ends at the first block behind azimuth zero; the rest of the packet is of the next.
+  std::optional<PointSweep> turn;
+  if ((last_azimuth_ > block.azimuth[0] && last_azimuth_ - block.azimuth[0] > kTurn / 2) ||
+      turn_.points.size() > kMostPoints)
+    turn = take_turn();
+  add_block(packet, block);
+  if (!pending_.points.empty()) {
+    if (!turn) turn = take_turn();
+    turn_ = std::exchange(pending_, {});
+  }
+  last_azimuth_ = block.azimuth[kBlocks - 1];
+  return turn;
+}
+
+void VelodyneDecoder::add_block(std::span<const std::uint8_t> packet, const Block& block) {
+  const Layout layout = layout_of(calibration_.model);
+  const std::size_t returns = block.is_dual ? 2 : 1;
+  const std::size_t stride = layout.blocks_per_firing * returns;  // blocks from firing to firing
+  PointSweep* turn = &turn_;
+  for (std::size_t b = 0; b + stride <= kBlocks; b += stride) {
+    const double block_us =
+        static_cast<double>(b / stride * layout.firings_per_block) * layout.firing_us;
+    if (b + stride < kBlocks) {
+      const double span_us = static_cast<double>(layout.firings_per_block) * layout.firing_us;
+      const int step = azimuth_between(block.azimuth[b], block.azimuth[b + stride]);
+      if (step < kLargestStep) azimuth_rate_ = step / span_us;
+    }
+    if (b > 0 && block.azimuth[b - stride] - block.azimuth[b] > kTurn / 2) turn = &pending_;
+    for (std::size_t f = 0; f < layout.firings_per_block; ++f) {
+      const double firing_us = static_cast<double>(f) * layout.firing_us;
+      for (const std::size_t beam : order_) {
+        const double shot_us =
+            firing_us + static_cast<double>(beam % 32 / layout.beams_per_shot) * layout.beam_us;
+        const double azimuth = block.azimuth[b] + azimuth_rate_ * shot_us;
+        const std::size_t channel =
+            layout.firings_per_block * layout.beams > 32 ? beam % 32 : f * layout.beams + beam;
+        std::uint16_t first = 0;
+        for (std::size_t r = 0; r < returns; ++r) {
+          const std::size_t at =
+              (b + r * layout.blocks_per_firing + beam / 32) * kBlockBytes + 4 + 3 * channel;
+          const std::uint16_t distance = word(packet, at);
+          if (distance == 0 || (r == 1 && distance == first)) continue;
+          first = distance;
+          add_point(*turn, {beam, azimuth, distance, packet[at + 2],
+                            block.packet_us + block_us + shot_us});
+        }
+      }
+    }
+  }
+}
+
+void VelodyneDecoder::add_point(PointSweep& turn, const Reading& reading) {
+  const VelodyneBeam& beam = calibration_.beams[reading.beam];
+  const double range = reading.distance * calibration_.distance_step_m + beam.distance_correction_m;
+  if (range <= 0.0 || range >= max_range_m_) return;
+  const double hundredths =
+      reading.azimuth + beam.azimuth_rad * static_cast<double>(kTurn) / (2.0 * std::numbers::pi);
+  const auto index = static_cast<std::size_t>(
+      (static_cast<long>(std::lround(hundredths)) % kTurn + kTurn) % kTurn);
+  const double flat =
+      range * std::cos(beam.elevation_rad) - beam.vertical_offset_m * std::sin(beam.elevation_rad);
+  if (turn.points.empty()) {
+    turn.utime = static_cast<Utime>(std::floor(reading.utime));
+    turn.points.reserve(calibration_.beams.size() * 2000);
+  }
+  SweepPoint point;
+  const auto forward = static_cast<float>(flat);
+  const auto side = static_cast<float>(beam.horizontal_offset_m);
+  // Clockwise from the x axis; a positive horizontal offset is to the left.
+  point.x_m = forward * cosine_[index] + side * sine_[index];
+  point.y_m = -forward * sine_[index] + side * cosine_[index];
+  point.z_m = static_cast<float>(range * std::sin(beam.elevation_rad) +
+                                 beam.vertical_offset_m * std::cos(beam.elevation_rad));
+  point.time_s =
+      static_cast<float>(std::max(0.0, (reading.utime - static_cast<double>(turn.utime)) * 1e-6));
+  point.ring = calibration_.rings[reading.beam];
+  point.intensity = reading.intensity;
+  turn.points.push_back(point);
+}
+
+}  // namespace understory

@@ -1,0 +1,117 @@
+// Packets of Velodyne lasers: VLP-16, VLP-32C, HDL-32E, HDL-64E.
+//
+// A data packet has 1206 bytes: 12 blocks of (flag, azimuth, 32 x (distance, reflectivity)), a time
+// (microseconds past the hour) and two factory bytes (return mode, product). Azimuths are given
+// once a block; in between they are interpolated, and each firing gets its own time, from the
+// firing sequences of the manuals (VLP-16: 63-9243; VLP-32C: 63-9325; HDL-32E: 63-9113; HDL-64E:
+// 63-HDL64ES3). Why a decoder of our own: PCL's grabbers need vtk and pcap at build time, give no
+// time per point, know neither dual returns of the HDL-64 nor position packets, and own a thread.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/model/point_sweep.hpp"
+
+namespace understory {
+
+enum class VelodyneModel : std::uint8_t { kVlp16, kVlp32c, kHdl32e, kHdl64e };
+/// "vlp16", "vlp32c", "hdl32e", "hdl64e".
+std::optional<VelodyneModel> velodyne_model(std::string_view name);
+std::string_view to_string(VelodyneModel model);
+
+constexpr std::size_t kVelodyneDataBytes = 1206;
+constexpr std::size_t kVelodynePositionBytes = 512;
+constexpr std::uint16_t kVelodyneDataPort = 2368;
+constexpr std::uint16_t kVelodynePositionPort = 8308;
+
+/// One beam: where it looks and what its readings are off by.
+struct VelodyneBeam {
+  double elevation_rad = 0.0;
+  double azimuth_rad = 0.0;  ///< Added to the block's azimuth; clockwise positive.
+  double distance_correction_m = 0.0;
+  double vertical_offset_m = 0.0;
+  double horizontal_offset_m = 0.0;
+};
+
+struct VelodyneCalibration {
+  VelodyneModel model = VelodyneModel::kVlp16;
+  std::vector<VelodyneBeam> beams;   ///< In order of the laser's own numbers.
+  std::vector<std::uint16_t> rings;  ///< Of each beam, 0 = lowest elevation.
+  double distance_step_m = 0.002;    ///< Of one count.
+};
+
+/// Built in for VLP-16, VLP-32C and HDL-32E. Throws DataError for the HDL-64E: each one comes with
+/// its own file.
+VelodyneCalibration velodyne_calibration(VelodyneModel model);
+/// The HDL-64E's own file: the XML (boost archive) that Velodyne ships, or its YAML form
+/// (`lasers:` with rot_correction and so on). Throws DataError.
+VelodyneCalibration parse_hdl64_calibration(std::string_view text, std::string_view source);
+
+struct VelodyneCounts {
+  std::uint64_t packets = 0;
+  std::uint64_t refused = 0;  ///< Wrong size, flag, azimuth or product.
+  std::uint64_t turns = 0;
+  std::uint64_t lost_azimuth = 0;  ///< Gaps in the azimuth: packets are missing.
+};
+
+/// Data packets in, whole turns out, in frame sensor (x forward = azimuth 0, y left, z up).
+/// Dual returns give both points, unless they are the same.
+class VelodyneDecoder {
+ public:
+  explicit VelodyneDecoder(VelodyneCalibration calibration, double max_range_m = 0.0);
+
+  /// `received`: when the packet came [us]; the packet's own time is laid onto it (the hour that is
+  /// nearest). The turn that this packet completes, if any.
+  std::optional<PointSweep> add(std::span<const std::uint8_t> packet, Utime received);
+  /// The turn under way, where it lacks no more than the last packet.
+  std::optional<PointSweep> finish();
+  const VelodyneCounts& counts() const { return counts_; }
+
+ private:
+  struct Block;
+  struct Reading {
+    std::size_t beam;
+    double azimuth;  ///< Of the firing [0.01 degrees].
+    std::uint16_t distance;
+    std::uint8_t intensity;
+    double utime;
+  };
+  std::optional<PointSweep> take_turn();
+  void add_block(std::span<const std::uint8_t> packet, const Block& block);
+  void add_point(PointSweep& turn, const Reading& reading);
+
+  VelodyneCalibration calibration_;
+  double max_range_m_;
+  VelodyneCounts counts_;
+  std::array<float, 36000> sine_{};
+  std::array<float, 36000> cosine_{};
+  std::vector<std::size_t> order_;  ///< Beams in order of their rings.
+  PointSweep turn_;
+  PointSweep pending_;         ///< The begin of the next turn, in the packet that ends this one.
+  bool turn_started_ = false;  ///< The turn under way began at azimuth 0.
+  int last_azimuth_ = -1;
+  double azimuth_rate_ = 0.2;  ///< Hundredths of a degree per microsecond.
+  std::uint64_t turns_ = 0;
+};
+
+/// The NMEA sentence of a position packet: where and when, by GNSS.
+struct VelodynePosition {
+  std::uint32_t past_hour_us = 0;
+  bool is_valid = false;
+  double latitude_deg = 0.0;
+  double longitude_deg = 0.0;
+  double speed_mps = 0.0;
+  double course_rad = 0.0;  ///< From north, clockwise.
+  std::int64_t day_us = 0;  ///< Time of day, UTC [us].
+};
+std::optional<VelodynePosition> parse_velodyne_position(std::span<const std::uint8_t> packet);
+/// $GPRMC with a right checksum.
+std::optional<VelodynePosition> parse_gprmc(std::string_view sentence);
+
+}  // namespace understory

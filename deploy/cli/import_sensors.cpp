@@ -1,0 +1,267 @@
+#include "deploy/cli/import_sensors.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "common/io/data_error.hpp"
+#include "common/io/kitti_raw.hpp"
+#include "common/io/packet_capture.hpp"
+#include "common/io/point_cloud_file.hpp"
+#include "common/io/recording_folder.hpp"
+#include "common/io/sensor_tables.hpp"
+#include "common/io/velodyne.hpp"
+#include "deploy/cli/failure.hpp"
+#include "deploy/cli/interrupt.hpp"
+#include "deploy/cli/progress.hpp"
+#include "deploy/cli/recording_log.hpp"
+#include "understory/ground_truth_t.hpp"
+
+namespace understory {
+namespace {
+
+struct Options {
+  std::string path;
+  std::string out;
+  bool wheels = false;
+  std::string poses = "icp";
+  std::string model = "vlp16";
+  std::string calibration;
+  std::string imu, gnss, wheel_table;
+};
+
+/// Runs an import; what is wrong with the data or the log ends the command in one line.
+void guarded(const std::function<void()>& import) {
+  catch_interrupts();
+  try {
+    import();
+  } catch (const DataError& error) {
+    fail(error.what());
+  } catch (const LogError& error) {
+    fail(error.what());
+  } catch (const Interrupted& error) {
+    fail(fmt::format("import: {}", error.what()));
+  }
+}
+
+std::string read_file(const std::string& path) {
+  const std::filesystem::path file(path);
+  const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+  return RecordingFolder(folder).read(file.filename().string());
+}
+
+ground_truth_t truth(Utime utime, const SE2& pose) {
+  ground_truth_t message{};
+  message.utime = utime;
+  message.world_T_vehicle = to_wire(pose);
+  return message;
+}
+
+void add_oxts(const KittiRaw& drive, bool wheels, RecordingLog& log) {
+  if (drive.oxts().empty()) return;
+  const LocalPlane plane(drive.oxts().front().latitude_deg, drive.oxts().front().longitude_deg);
+  for (const OxtsRecord& record : drive.oxts()) {
+    ImuSample imu;
+    imu.utime = record.utime;
+    imu.angular_rate_rad_s = record.angular_rate_rad_s;
+    imu.specific_force_mps2 = record.specific_force_mps2;
+    log.add("RAW_IMU", imu);
+    if (wheels)
+      log.add("RAW_WHEELS", WheelSample{record.utime, 0, record.forward_velocity_mps, 0.0});
+    GnssFix fix;
+    fix.utime = record.utime;
+    fix.east_north_m = plane.east_north_m(record.latitude_deg, record.longitude_deg);
+    fix.sigma_m = record.position_sigma_m;
+    fix.velocity_mps = record.east_north_velocity_mps;
+    fix.velocity_sigma_mps = record.velocity_sigma_mps;
+    log.add("RAW_GNSS", fix);
+    log.add("GROUND_TRUTH",
+            truth(record.utime, SE2(fix.east_north_m, record.roll_pitch_yaw_rad.z())));
+  }
+}
+
+/// Where the laser sits, for the configuration of lidar_imu_input.
+void print_mount(const Eigen::Isometry3d& imu_T_velo) {
+  const Eigen::Matrix3d m = imu_T_velo.linear();
+  fmt::print(
+      "laser on the OXTS unit: x {:.4f} y {:.4f} z {:.4f} m, roll {:.5f} pitch {:.5f} yaw {:.5f} "
+      "rad\n",
+      imu_T_velo.translation().x(), imu_T_velo.translation().y(), imu_T_velo.translation().z(),
+      std::atan2(m(2, 1), m(2, 2)), -std::asin(m(2, 0)), std::atan2(m(1, 0), m(0, 0)));
+}
+
+template <class Drive>
+void add_sweeps(const Drive& drive, RecordingLog& log) {
+  Progress progress("importing", static_cast<double>(drive.sweeps()));
+  for (std::size_t i = 0; i < drive.sweeps(); ++i) {
+    throw_if_interrupted();
+    log.add_sweep("RAW_SWEEP", drive.read_sweep(i));
+    progress.update(static_cast<double>(i + 1));
+  }
+}
+
+void import_kitti(const Options& options) {
+  const KittiRaw drive(options.path);
+  RecordingLog log(options.out);
+  add_oxts(drive, options.wheels, log);
+  add_sweeps(drive, log);
+  log.commit();
+  if (drive.imu_T_velo()) print_mount(*drive.imu_T_velo());
+  fmt::print("{} sweeps, {} OXTS records -> {}\n", drive.sweeps(), drive.oxts().size(),
+             options.out);
+}
+
+void import_kitti_reduced(const Options& options) {
+  const ReducedKitti drive(options.path, options.poses);
+  RecordingLog log(options.out);
+  for (const ReducedKittiPose& pose : drive.poses())
+    log.add("GROUND_TRUTH", truth(pose.utime, pose.world_T_sensor));
+  add_sweeps(drive, log);
+  log.commit();
+  fmt::print("{} sweeps with poses ({}) -> {}\n", drive.sweeps(), options.poses, options.out);
+}
+
+VelodyneCalibration calibration_of(const Options& options) {
+  const auto model = velodyne_model(options.model);
+  if (!model) fail(fmt::format("--model {}: vlp16, vlp32c, hdl32e or hdl64e", options.model));
+  if (options.calibration.empty()) return velodyne_calibration(*model);
+  return parse_hdl64_calibration(read_file(options.calibration), options.calibration);
+}
+
+/// A position packet as a fix; the packet's own time within the hour of its capture.
+void add_position(const CapturedPacket& packet, std::optional<LocalPlane>& plane,
+                  std::optional<Utime>& last, RecordingLog& log) {
+  const auto position = parse_velodyne_position(packet.payload);
+  if (!position || !position->is_valid) return;
+  if (!plane) plane.emplace(position->latitude_deg, position->longitude_deg);
+  GnssFix fix;
+  fix.utime = packet.utime;
+  // The same sentence comes in many packets: the receiver gives one a second.
+  if (last && *last == position->day_us) return;
+  last = position->day_us;
+  fix.east_north_m = plane->east_north_m(position->latitude_deg, position->longitude_deg);
+  fix.velocity_mps = position->speed_mps * Eigen::Vector2d(std::sin(position->course_rad),
+                                                           std::cos(position->course_rad));
+  log.add("RAW_GNSS", fix);
+}
+
+void import_pcap(const Options& options) {
+  PacketCapture capture(options.path);
+  VelodyneDecoder decoder(calibration_of(options));
+  RecordingLog log(options.out);
+  std::optional<LocalPlane> plane;
+  std::optional<Utime> last_fix;
+  while (const auto packet = capture.next()) {
+    throw_if_interrupted();
+    if (packet->port == kVelodynePositionPort) add_position(*packet, plane, last_fix, log);
+    if (packet->port != kVelodyneDataPort) continue;
+    if (const auto turn = decoder.add(packet->payload, packet->utime))
+      log.add_sweep("RAW_SWEEP", *turn);
+  }
+  if (const auto turn = decoder.finish()) log.add_sweep("RAW_SWEEP", *turn);
+  const VelodyneCounts& counts = decoder.counts();
+  if (counts.turns == 0)
+    fail(fmt::format("{}: {} {} packets, {} refused: not one whole turn", options.path,
+                     counts.packets, options.model, counts.refused));
+  log.commit();
+  fmt::print("{} turns of {} packets ({} refused, {} gaps), {} fixes{} -> {}\n", counts.turns,
+             counts.packets, counts.refused, counts.lost_azimuth, log.count("RAW_GNSS"),
+             capture.is_cut_off() ? ", the file is cut off" : "", options.out);
+}
+
+void add_tables(const Options& options, RecordingLog& log) {
+  if (!options.imu.empty()) {
+    for (const ImuSample& sample : parse_imu_table(read_file(options.imu), options.imu))
+      log.add("RAW_IMU", sample);
+  }
+  if (!options.wheel_table.empty()) {
+    for (const WheelSample& sample :
+         parse_wheel_table(read_file(options.wheel_table), options.wheel_table))
+      log.add("RAW_WHEELS", sample);
+  }
+  if (!options.gnss.empty()) {
+    for (const GnssFix& fix : parse_gnss_table(read_file(options.gnss), options.gnss))
+      log.add("RAW_GNSS", fix);
+  }
+}
+
+void report_tables(const RecordingLog& log, std::size_t sweeps, const std::string& out) {
+  fmt::print("{} sweeps, {} IMU samples, {} wheel samples, {} fixes -> {}\n", sweeps,
+             log.count("RAW_IMU"), log.count("RAW_WHEELS"), log.count("RAW_GNSS"), out);
+}
+
+void import_pcd(const Options& options) {
+  const std::vector<PcdFile> files = find_pcd_sequence(options.path);
+  RecordingLog log(options.out);
+  add_tables(options, log);
+  Progress progress("importing", static_cast<double>(files.size()));
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    throw_if_interrupted();
+    PointSweep sweep = parse_pcd(read_file(files[i].path.string()), files[i].path.string());
+    sweep.utime = files[i].utime;
+    sweep.turn = i;
+    log.add_sweep("RAW_SWEEP", sweep);
+    progress.update(static_cast<double>(i + 1));
+  }
+  log.commit();
+  report_tables(log, files.size(), options.out);
+}
+
+void import_csv(const Options& options) {
+  if (options.imu.empty() && options.gnss.empty() && options.wheel_table.empty())
+    fail("import csv: none of --imu, --gnss, --wheels is given");
+  RecordingLog log(options.out);
+  add_tables(options, log);
+  log.commit();
+  report_tables(log, 0, options.out);
+}
+
+CLI::App* add_format(CLI::App& import, const std::string& name, const std::string& what,
+                     const std::string& path, const std::shared_ptr<Options>& options,
+                     void (*run)(const Options&)) {
+  CLI::App* command = import.add_subcommand(name, what);
+  if (!path.empty()) command->add_option("path", options->path, path)->required();
+  command->add_option("--out", options->out, "The log to write")->required();
+  command->callback([options, run] { guarded([&] { run(*options); }); });
+  return command;
+}
+
+void add_table_options(CLI::App& command, const std::shared_ptr<Options>& options) {
+  command.add_option("--imu", options->imu, "CSV: t_s,gx,gy,gz,ax,ay,az (rad/s, m/s^2)");
+  command.add_option("--gnss", options->gnss,
+                     "CSV: t_s, latitude_deg,longitude_deg or east_m,north_m, sigma_m, "
+                     "ve_mps,vn_mps,velocity_sigma_mps");
+  command.add_option("--wheels", options->wheel_table, "CSV: t_s,speed_mps,steering_rad");
+}
+
+}  // namespace
+
+void add_sensor_imports(CLI::App& import) {
+  const auto options = std::make_shared<Options>();
+  add_format(import, "kitti", "A drive of the KITTI raw data: Velodyne sweeps and OXTS records",
+             "Folder of the drive (with velodyne_points and oxts)", options, import_kitti)
+      ->add_flag("--speed-as-wheels", options->wheels,
+                 "Write the OXTS forward velocity as RAW_WHEELS (it has seen GNSS)");
+  add_format(import, "kitti-reduced", "KITTI drive 0005 with 16 of 64 beams, and its poses",
+             "Folder with sweeps.bin and poses_*.csv", options, import_kitti_reduced)
+      ->add_option("--poses", options->poses, "icp (default) or oxts")
+      ->check(CLI::IsMember({"icp", "oxts"}));
+  CLI::App* pcap = add_format(import, "pcap", "Captured packets of a Velodyne laser",
+                              "A pcap or pcapng file", options, import_pcap);
+  pcap->add_option("--model", options->model, "vlp16 (default), vlp32c, hdl32e or hdl64e");
+  pcap->add_option("--calibration", options->calibration, "The HDL-64E's own XML or YAML file");
+  CLI::App* pcd =
+      add_format(import, "pcd", "A sequence of PCD files, each one turn",
+                 "Folder; times from timestamps.txt or from the names", options, import_pcd);
+  add_table_options(*pcd, options);
+  CLI::App* csv =
+      add_format(import, "csv", "Tables of IMU, GNSS and wheels", "", options, import_csv);
+  add_table_options(*csv, options);
+}
+
+}  // namespace understory

@@ -1,0 +1,11 @@
+// `understory import` for recordings with a laser that scans in space, and for tables.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace understory {
+
+/// Adds kitti, kitti-reduced, pcap, pcd and csv.
+void add_sensor_imports(CLI::App& import);
+
+}  // namespace understory

@@ -1,0 +1,79 @@
+// A recording on its way into a log: small messages are kept and come out in order of time between
+// the sweeps, which are too large to keep.
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/io/lcm_log.hpp"
+#include "common/model/point_sweep.hpp"
+#include "common/wire/convert.hpp"
+
+namespace understory {
+
+class RecordingLog {
+ public:
+  explicit RecordingLog(const std::string& file) : writer_(file) {}
+
+  /// To be written when the log reaches its stamp; those of one stamp in the order of adding.
+  template <class Message>
+  void add(const std::string& channel, Message message) {
+    set_sequence(message, counts_[channel]++);
+    small_.emplace(message.utime, Event{channel, encode_message(message)});
+  }
+  /// Writes what is due before the turn ends, then its parts.
+  void add_sweep(const std::string& channel, const PointSweep& sweep) {
+    float last = 0.0F;
+    for (const SweepPoint& point : sweep.points) last = std::max(last, point.time_s);
+    const Utime end = sweep.utime + static_cast<Utime>(1e6F * last);
+    write_until(end);
+    for (PointSweep& part : split_sweep(sweep, kPointsPerPart)) {
+      part.sequence = counts_[channel]++;
+      writer_.write(std::max(end, latest_), channel, encode_message(part));
+    }
+    latest_ = std::max(end, latest_);
+  }
+  /// Writes the rest; the log takes its name.
+  void commit() {
+    while (!small_.empty()) write_first();
+    writer_.commit();
+  }
+  std::uint64_t count(const std::string& channel) const {
+    const auto found = counts_.find(channel);
+    return found == counts_.end() ? 0 : found->second;
+  }
+
+ private:
+  static constexpr std::size_t kPointsPerPart = 4000;
+  struct Event {
+    std::string channel;
+    Bytes bytes;
+  };
+
+  template <class Message>
+  static void set_sequence(Message& message, std::uint64_t sequence) {
+    if constexpr (requires { message.seq; }) {
+      message.seq = static_cast<std::int64_t>(sequence);
+    } else {
+      message.sequence = sequence;
+    }
+  }
+  void write_until(Utime utime) {
+    while (!small_.empty() && small_.begin()->first <= utime) write_first();
+  }
+  void write_first() {
+    const auto first = small_.begin();
+    latest_ = std::max(latest_, first->first);
+    writer_.write(latest_, first->second.channel, first->second.bytes);
+    small_.erase(first);
+  }
+
+  LcmLogWriter writer_;
+  std::multimap<Utime, Event> small_;
+  std::map<std::string, std::uint64_t> counts_;
+  Utime latest_ = 0;
+};
+
+}  // namespace understory

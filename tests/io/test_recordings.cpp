@@ -1,0 +1,302 @@
+// KITTI drives, PCD files, packet captures and tables.
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <random>
+
+#include <unistd.h>
+
+#include "common/io/data_error.hpp"
+#include "common/io/kitti_raw.hpp"
+#include "common/io/packet_capture.hpp"
+#include "common/io/point_cloud_file.hpp"
+#include "common/io/sensor_tables.hpp"
+#include "tests/catch.hpp"
+
+using namespace understory;
+namespace fs = std::filesystem;
+
+namespace {
+
+fs::path data() {
+  const char* set = std::getenv("UNDERSTORY_DATA");
+  return set != nullptr ? set : UNDERSTORY_DEFAULT_DATA;
+}
+
+class Folder {
+ public:
+  Folder() : path_(fs::temp_directory_path() / ("understory_io_" + std::to_string(::getpid()))) {
+    fs::create_directories(path_);
+  }
+  ~Folder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  fs::path write(const std::string& name, const std::string& content) const {
+    fs::create_directories((path_ / name).parent_path());
+    std::ofstream(path_ / name, std::ios::binary) << content;
+    return path_ / name;
+  }
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+template <class T>
+void append(std::string& bytes, const T& value) {
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+struct TestPoint {
+  float x, y, z, intensity;
+  std::uint16_t ring;
+  double time;
+};
+
+std::vector<TestPoint> test_points() {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<float> place(-40.0F, 40.0F);
+  std::vector<TestPoint> points;
+  for (int i = 0; i < 500; ++i)
+    points.push_back({place(random), place(random), place(random), static_cast<float>(i % 256),
+                      static_cast<std::uint16_t>(i % 16), 1e6 + 1e-4 * i});
+  return points;
+}
+
+const std::string kPcdHeader =
+    "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z intensity ring timestamp\nSIZE 4 4 4 4 2 8\n"
+    "TYPE F F F F U F\nCOUNT 1 1 1 1 1 1\nWIDTH 500\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\n"
+    "POINTS 500\nDATA ";
+
+std::string pcd(const std::string& kind) {
+  std::string text = kPcdHeader + kind + "\n";
+  const auto points = test_points();
+  if (kind == "ascii") {
+    for (const TestPoint& p : points) {
+      char line[200];
+      std::snprintf(line, sizeof line, "%.9g %.9g %.9g %g %d %.6f\n", p.x, p.y, p.z, p.intensity,
+                    p.ring, p.time);
+      text += line;
+    }
+    return text;
+  }
+  std::string body;
+  if (kind == "binary") {
+    for (const TestPoint& p : points) {
+      for (const float v : {p.x, p.y, p.z, p.intensity}) append(body, v);
+      append(body, p.ring);
+      append(body, p.time);
+    }
+    return text + body;
+  }
+  for (const TestPoint& p : points) append(body, p.x);
+  for (const TestPoint& p : points) append(body, p.y);
+  for (const TestPoint& p : points) append(body, p.z);
+  for (const TestPoint& p : points) append(body, p.intensity);
+  for (const TestPoint& p : points) append(body, p.ring);
+  for (const TestPoint& p : points) append(body, p.time);
+  // LZF with literals, and one back reference where bytes repeat.
+  std::string packed;
+  std::size_t at = 0;
+  while (at < body.size()) {
+    if (at >= 32 && at + 8 <= body.size() && body.compare(at, 8, body, at - 32, 8) == 0) {
+      packed.push_back(static_cast<char>(6U << 5U));
+      packed.push_back(31);
+      at += 8;
+      continue;
+    }
+    const std::size_t count = std::min<std::size_t>(4, body.size() - at);
+    packed.push_back(static_cast<char>(count - 1));
+    packed += body.substr(at, count);
+    at += count;
+  }
+  append(text, static_cast<std::uint32_t>(packed.size()));
+  append(text, static_cast<std::uint32_t>(body.size()));
+  return text + packed;
+}
+
+bool parses(const std::function<void()>& work) {
+  try {
+    work();
+    return true;
+  } catch (const DataError&) {
+    return false;
+  }
+}
+
+}  // namespace
+
+TEST_CASE("PCD files of every kind hold the same points", "[pcd]") {
+  const auto points = test_points();
+  for (const std::string kind : {"ascii", "binary", "binary_compressed"}) {
+    CAPTURE(kind);
+    const PointSweep sweep = parse_pcd(pcd(kind), "cloud.pcd");
+    REQUIRE(sweep.points.size() == points.size());
+    CHECK(sweep.has_times);
+    CHECK(sweep.rings == 16);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      CHECK(sweep.points[i].x_m == Approx(points[i].x));
+      CHECK(sweep.points[i].z_m == Approx(points[i].z));
+      CHECK(sweep.points[i].ring == points[i].ring);
+      CHECK(sweep.points[i].intensity == static_cast<std::uint8_t>(points[i].intensity));
+      CHECK(sweep.points[i].time_s == Approx(1e-4 * static_cast<double>(i)).margin(1e-6));
+    }
+  }
+}
+
+TEST_CASE("a PCD file that is cut or damaged is refused or read, never worse", "[pcd]") {
+  std::mt19937_64 random(2);
+  for (const std::string kind : {"ascii", "binary", "binary_compressed"}) {
+    const std::string good = pcd(kind);
+    for (std::size_t size = 0; size + 40 < good.size(); size += 97)
+      CHECK_FALSE(parses([&] { parse_pcd(std::string_view(good).substr(0, size), "cut.pcd"); }));
+    for (int i = 0; i < 2000; ++i) {
+      std::string damaged = good;
+      for (int k = 0; k < 3; ++k) damaged[random() % damaged.size()] = static_cast<char>(random());
+      parses([&] { parse_pcd(damaged, "damaged.pcd"); });
+    }
+  }
+  CHECK_FALSE(parses([] {
+    parse_pcd("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nPOINTS 99999999999\nDATA ascii\n",
+              "huge.pcd");
+  }));
+}
+
+TEST_CASE("a sequence of PCD files has its times from the names or from a table", "[pcd]") {
+  const Folder folder;
+  folder.write("a/1317042164.5.pcd", pcd("binary"));
+  folder.write("a/1317042164.4.pcd", pcd("binary"));
+  const auto named = find_pcd_sequence(folder.path() / "a");
+  REQUIRE(named.size() == 2);
+  CHECK(named[0].utime == 1'317'042'164'400'000);
+  folder.write("b/x.pcd", pcd("binary"));
+  CHECK_THROWS_AS(find_pcd_sequence(folder.path() / "b"), DataError);
+  folder.write("b/timestamps.txt", "12.25\n");
+  CHECK(find_pcd_sequence(folder.path() / "b")[0].utime == 12'250'000);
+  CHECK_THROWS_AS(find_pcd_sequence(folder.path() / "none"), DataError);
+}
+
+TEST_CASE("a KITTI drive is read with rings and times", "[kitti][recorded]") {
+  const fs::path folder = data() / "kitti_raw_drive0002";
+  if (!fs::exists(folder)) {
+    WARN("no recording at " << folder);
+    return;
+  }
+  const KittiRaw drive(folder);
+  REQUIRE(drive.sweeps() == 10);
+  REQUIRE(drive.oxts().size() == 10);
+  REQUIRE(drive.imu_T_velo());
+  CHECK(drive.imu_T_velo()->translation().z() == Approx(0.80).margin(0.02));
+  CHECK(drive.oxts()[0].forward_velocity_mps == Approx(8.62).margin(0.01));
+  // The records' own track agrees with their speed.
+  const LocalPlane plane(drive.oxts()[0].latitude_deg, drive.oxts()[0].longitude_deg);
+  const auto& last = drive.oxts().back();
+  CHECK(plane.east_north_m(last.latitude_deg, last.longitude_deg).norm() ==
+        Approx(8.19).margin(0.05));
+  for (std::size_t i = 0; i < drive.sweeps(); ++i) {
+    const PointSweep sweep = drive.read_sweep(i);
+    CHECK(sweep.points.size() > 115'000);
+    std::map<int, std::pair<double, int>> elevation;
+    for (const SweepPoint& p : sweep.points) {
+      auto& [sum, count] = elevation[p.ring];
+      sum += std::atan2(p.z_m, std::hypot(p.x_m, p.y_m));
+      ++count;
+    }
+    CHECK(elevation.size() == 64);
+    double below = -1.0;
+    for (const auto& [ring, sums] : elevation) {
+      const double mean = sums.first / sums.second;
+      CHECK(mean > below - 0.003);
+      below = mean;
+    }
+    CHECK(sweep.points.front().time_s >= 0.0F);
+    CHECK(sweep.points.back().time_s == Approx(0.1032).margin(0.001));
+    if (i > 0) CHECK(sweep.utime > drive.read_sweep(i - 1).utime);
+  }
+}
+
+TEST_CASE("the reduced KITTI drive is read with its poses", "[kitti][recorded]") {
+  const fs::path folder = data() / "kitti_raw_drive0005_16ring";
+  if (!fs::exists(folder)) {
+    WARN("no recording at " << folder);
+    return;
+  }
+  const ReducedKitti drive(folder, "icp");
+  REQUIRE(drive.sweeps() == 154);
+  CHECK(drive.poses().size() == 154);
+  std::size_t points = 0;
+  for (std::size_t i = 0; i < drive.sweeps(); ++i) {
+    const PointSweep sweep = drive.read_sweep(i);
+    points += sweep.points.size();
+    for (const SweepPoint& p : sweep.points) REQUIRE(p.ring < 16);
+  }
+  CHECK(points == 4'677'499);
+  CHECK_THROWS_AS(ReducedKitti(folder, "gps"), DataError);
+}
+
+TEST_CASE("KITTI's texts are checked", "[kitti]") {
+  CHECK(kitti::parse_timestamps("2011-09-26 13:02:44.335092332\n", "t") ==
+        std::vector<Utime>{1'317'042'164'335'092});
+  for (const char* bad : {"2011-13-26 13:02:44.335092332", "x", "2011-09-26 13:02:44",
+                          "2011-09-26 25:02:44.335092332"})
+    CHECK_THROWS_AS(kitti::parse_timestamps(bad, "t"), DataError);
+  CHECK_THROWS_AS(kitti::parse_points("123", 0.1, "p"), DataError);
+  CHECK_THROWS_AS(parse_oxts("49.0 8.4 116", "o"), DataError);
+  CHECK_THROWS_AS(kitti::parse_transform("a\nR: 1 0 0 0 1 0 0 0 2\nT: 0 0 0\n", "c"), DataError);
+  CHECK_THROWS_AS(KittiRaw("/nowhere"), DataError);
+}
+
+TEST_CASE("tables of sensors are read by the names of their columns", "[csv]") {
+  const auto imu = parse_imu_table("t_s,ax,ay,az,gx,gy,gz\n1.5,0,0,9.8,0.1,0.2,0.3\n", "imu.csv");
+  REQUIRE(imu.size() == 1);
+  CHECK(imu[0].utime == 1'500'000);
+  CHECK(imu[0].angular_rate_rad_s == Eigen::Vector3d(0.1, 0.2, 0.3));
+  const auto fixes = parse_gnss_table(
+      "t_ns;latitude_deg;longitude_deg;sigma_m\n1000;49.0;8.0;0.5\n2000;49.001;8.0;0.5\n", "g.csv");
+  REQUIRE(fixes.size() == 2);
+  CHECK(fixes[1].east_north_m.y() == Approx(111.2).margin(0.2));
+  CHECK(parse_wheel_table("t_us speed_mps\n5 2.5\n", "w.csv")[0].speed_mps == 2.5);
+  CHECK_THROWS_AS(parse_imu_table("t_s,ax\n1,2\n", "imu.csv"), DataError);
+  CHECK_THROWS_AS(parse_wheel_table("t_s,speed_mps\n2,1\n1,1\n", "w.csv"), DataError);
+  CHECK_THROWS_AS(parse_wheel_table("t_s,speed_mps\n2,nan\n", "w.csv"), DataError);
+  CHECK_THROWS_AS(parse_wheel_table("", "w.csv"), DataError);
+}
+
+TEST_CASE("captures that are cut or damaged end, and give whole packets", "[pcap]") {
+  const fs::path file = data() / "lidar_packets" / "velodyne_vlp16_gps.pcap";
+  if (!fs::exists(file)) {
+    WARN("no recording at " << file);
+    return;
+  }
+  std::string bytes(fs::file_size(file), '\0');
+  std::ifstream(file, std::ios::binary)
+      .read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  const Folder folder;
+  std::mt19937_64 random(3);
+  const auto read = [&](const std::string& content) -> std::size_t {
+    const fs::path copy = folder.write("copy.pcap", content);
+    std::size_t count = 0;
+    try {
+      PacketCapture capture(copy);
+      while (const auto packet = capture.next()) {
+        CHECK(packet->payload.size() <= 65535);
+        ++count;
+      }
+    } catch (const DataError&) {
+      return 0;
+    }
+    return count;
+  };
+  CHECK(read(bytes) == 350);
+  CHECK(read("") == 0);
+  for (int i = 0; i < 40; ++i) CHECK(read(bytes.substr(0, random() % 60'000)) < 60);
+  for (int i = 0; i < 40; ++i) {
+    std::string damaged = bytes.substr(0, 40'000);
+    for (int k = 0; k < 10; ++k) damaged[random() % damaged.size()] = static_cast<char>(random());
+    read(damaged);
+  }
+}
