@@ -5,6 +5,11 @@
 namespace understory {
 namespace {
 
+/// Translation and rotation apart, as pose graphs are usually given.
+Eigen::Vector3d split_error(const SE2& measured, const SE2& actual) {
+  return (measured.inverse() * actual).coordinates();
+}
+
 template <typename Factors>
 double sum_chi2(const Graph& graph, const Factors& factors) {
   double sum = 0.0;
@@ -25,13 +30,12 @@ PointId Graph::add_point(const Eigen::Vector2d& initial) {
 }
 
 double chi2(const Graph& graph, const PosePrior& factor) {
-  const Eigen::Vector3d e = (factor.mean.inverse() * graph[factor.pose]).Log();
+  const Eigen::Vector3d e = split_error(factor.mean, graph[factor.pose]);
   return e.dot(factor.information * e);
 }
 
 double chi2(const Graph& graph, const RelativePose& factor) {
-  const Eigen::Vector3d e =
-      (factor.a_T_b.inverse() * graph[factor.a].inverse() * graph[factor.b]).Log();
+  const Eigen::Vector3d e = split_error(factor.a_T_b, graph[factor.a].inverse() * graph[factor.b]);
   return e.dot(factor.information * e);
 }
 
@@ -53,11 +57,16 @@ double chi2(const Graph& graph) {
 }
 
 ObservationJacobian linearise(const Graph& graph, const PointObservation& factor) {
-  const SE2& pose = graph[factor.pose];
+  ObservationJacobian result = linearise(graph[factor.pose], graph[factor.point]);
+  result.residual -= factor.position;
+  return result;
+}
+
+ObservationJacobian linearise(const SE2& pose, const Eigen::Vector2d& point) {
   const Eigen::Matrix2d to_pose = pose.rotation().transpose();
-  const Eigen::Vector2d seen = to_pose * (graph[factor.point] - pose.translation());
+  const Eigen::Vector2d seen = to_pose * (point - pose.translation());
   ObservationJacobian result;
-  result.residual = seen - factor.position;
+  result.residual = seen;
   result.pose << -Eigen::Matrix2d::Identity(), -turned_left(seen);
   result.point = to_pose;
   return result;
@@ -65,9 +74,11 @@ ObservationJacobian linearise(const Graph& graph, const PointObservation& factor
 
 RelativePoseJacobian linearise(const Graph& graph, const RelativePose& factor) {
   const SE2 b_T_a = graph[factor.b].inverse() * graph[factor.a];
+  const SE2 error = factor.a_T_b.inverse() * b_T_a.inverse();
   RelativePoseJacobian result;
-  result.residual = (factor.a_T_b.inverse() * b_T_a.inverse()).Log();
-  result.b = inverse_right_jacobian(result.residual);
+  result.residual = error.coordinates();
+  result.b.setIdentity();
+  result.b.topLeftCorner<2, 2>() = error.rotation();
   result.a = -result.b * b_T_a.Adjoint();
   return result;
 }

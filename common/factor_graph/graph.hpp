@@ -15,14 +15,15 @@ enum class PointId : std::uint32_t {};
 constexpr std::uint32_t index(PoseId id) { return static_cast<std::uint32_t>(id); }
 constexpr std::uint32_t index(PointId id) { return static_cast<std::uint32_t>(id); }
 
-/// Measured pose: Log(mean^-1 * pose) ~ N(0, information^-1).
+/// Measured pose: (x, y, theta) of mean^-1 * pose ~ N(0, information^-1).
 struct PosePrior {
   PoseId pose{};
   SE2 mean;
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
 };
 
-/// Measured motion between two poses: Log(a_T_b^-1 * pose_a^-1 * pose_b) ~ N(0, information^-1).
+/// Measured motion between two poses: (x, y, theta) of a_T_b^-1 * pose_a^-1 * pose_b ~ N(0,
+/// information^-1).
 struct RelativePose {
   PoseId a{};
   PoseId b{};
@@ -77,8 +78,10 @@ struct ObservationJacobian {
   Eigen::Matrix2d point;
 };
 ObservationJacobian linearise(const Graph& graph, const PointObservation& factor);
+/// Of pose^-1 * point.
+ObservationJacobian linearise(const SE2& pose, const Eigen::Vector2d& point);
 
-/// Residual Log(a_T_b^-1 * pose_a^-1 * pose_b) with its Jacobians; 3 x 3 each, right perturbations.
+/// Residual of a relative pose with its Jacobians; 3 x 3 each, right perturbations.
 struct RelativePoseJacobian {
   Eigen::Vector3d residual;
   Eigen::Matrix3d a;

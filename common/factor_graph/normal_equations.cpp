@@ -140,8 +140,10 @@ void NormalEquations::linearise(const Graph& graph) {
   gradient_ = Eigen::VectorXd::Zero(hessian_.size);
   chi2_ = 0.0;
   for (const PosePrior& f : graph.pose_priors) {
-    const Eigen::Vector3d e = (f.mean.inverse() * graph[f.pose]).Log();
-    const Eigen::Matrix3d jacobian = inverse_right_jacobian(e);
+    const SE2 error = f.mean.inverse() * graph[f.pose];
+    const Eigen::Vector3d e = error.coordinates();
+    Eigen::Matrix3d jacobian = Eigen::Matrix3d::Identity();
+    jacobian.topLeftCorner<2, 2>() = error.rotation();
     const Eigen::Matrix3d weighted = jacobian.transpose() * f.information;
     add_diagonal(column(f.pose), weighted * jacobian);
     gradient_.segment<3>(column(f.pose)) += weighted * e;

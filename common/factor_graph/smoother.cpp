@@ -1,152 +1,216 @@
 #include "common/factor_graph/smoother.hpp"
 
-#include <algorithm>
-#include <cmath>
-
-#include "common/factor_graph/normal_equations.hpp"
+#include "common/factor_graph/incremental_smoother.hpp"
 
 namespace understory {
 namespace {
 
-constexpr double kFirstDamping = 1e-6;
-constexpr double kMaxDamping = 1e6;
-/// chi^2 may rise by rounding at the optimum.
-constexpr double kRoundingRise = 1e-9;
+constexpr FactorId kNoFactor{kNone};
 
-std::string undetermined(const Graph& graph, const NormalEquations& equations, int column) {
-  for (std::uint32_t i = 0; i < graph.poses.size(); ++i) {
-    const int first = equations.column(PoseId(i));
-    if (first >= 0 && column >= first && column < first + 3) {
-      return "pose " + std::to_string(i) + " is not determined by the measurements";
-    }
-  }
-  for (std::uint32_t i = 0; i < graph.points.size(); ++i) {
-    const int first = equations.column(PointId(i));
-    if (first >= 0 && column >= first && column < first + 2) {
-      return "point " + std::to_string(i) + " is not determined by the measurements";
-    }
-  }
-  return "column " + std::to_string(column) + " is not determined by the measurements";
-}
-
-struct StepSize {
-  double position_m = 0.0;
-  double heading_rad = 0.0;
-};
-
-StepSize retract(Graph& graph, const NormalEquations& equations, const Eigen::VectorXd& delta) {
-  StepSize size;
-  for (std::uint32_t i = 0; i < graph.poses.size(); ++i) {
-    const int column = equations.column(PoseId(i));
-    if (column < 0) continue;
-    const Eigen::Vector3d xi = delta.segment<3>(column);
-    graph.poses[i] = graph.poses[i] * SE2::Exp(xi);
-    size.position_m = std::max(size.position_m, xi.head<2>().cwiseAbs().maxCoeff());
-    size.heading_rad = std::max(size.heading_rad, std::abs(xi.z()));
-  }
-  for (std::uint32_t i = 0; i < graph.points.size(); ++i) {
-    const int column = equations.column(PointId(i));
-    if (column < 0) continue;
-    graph.points[i] += delta.segment<2>(column);
-    size.position_m = std::max(size.position_m, delta.segment<2>(column).cwiseAbs().maxCoeff());
-  }
-  return size;
+IncrementalParameters incremental(const SmootherParameters& parameters) {
+  IncrementalParameters result;
+  result.least_move = parameters.least_move;
+  result.relinearise_above = parameters.relinearise_above;
+  result.iterate_above = parameters.iterate_above;
+  result.max_iterations = parameters.max_iterations;
+  return result;
 }
 
 }  // namespace
 
-struct Smoother::Solver {
-  std::unique_ptr<NormalEquations> equations;
-  SparseCholesky cholesky;
-  bool factorised = false;  ///< The factor belongs to `equations` as they are.
-};
+struct Smoother::State {
+  struct Observation {
+    PointObservation measured;
+    FactorId factor = kNoFactor;
+  };
+  struct Change {
+    std::size_t at = 0;
+    Observation before;
+  };
+  struct Counts {
+    std::size_t poses = 0, points = 0, observations = 0, pose_priors = 0, relative_poses = 0,
+                point_priors = 0;
+  };
 
-struct Smoother::Checkpoint {
-  Graph graph;
+  explicit State(const SmootherParameters& parameters) : smoother(incremental(parameters)) {}
+
+  Counts counts() const {
+    return {poses.size(),       points.size(),         observations.size(),
+            pose_priors.size(), relative_poses.size(), point_priors.size()};
+  }
+  VariableId name(PoseId id) const { return poses[index(id)]; }
+  VariableId name(PointId id) const { return points[index(id)]; }
+  FactorId give(const PointObservation& factor) {
+    if (factor.information.isZero(0.0)) return kNoFactor;
+    return smoother.add(understory::observation(name(factor.pose), name(factor.point),
+                                                factor.position, factor.information));
+  }
+
+  std::uint32_t take_role(VariableId name, std::size_t at) {
+    const auto slot = static_cast<std::size_t>(index(name));
+    if (roles.size() <= slot) roles.resize(slot + 1);
+    roles[slot] = {static_cast<std::uint32_t>(at), false};
+    return roles[slot].index;
+  }
+  void collect_moved() {
+    for (const int v : smoother.moved()) {
+      Role& role = roles[static_cast<std::size_t>(v)];
+      if (role.is_moved) continue;
+      role.is_moved = true;
+      if (smoother.graph().type(VariableId(v)) == VariableType::kPose2) {
+        moved_poses.push_back(PoseId(role.index));
+      } else {
+        moved_points.push_back(PointId(role.index));
+      }
+    }
+  }
+  void forget_moved() {
+    for (const PoseId id : moved_poses) roles[slot(name(id))].is_moved = false;
+    for (const PointId id : moved_points) roles[slot(name(id))].is_moved = false;
+    moved_poses.clear();
+    moved_points.clear();
+  }
+  static std::size_t slot(VariableId id) { return static_cast<std::size_t>(index(id)); }
+
+  IncrementalSmoother smoother;
+  std::vector<VariableId> poses;
+  std::vector<VariableId> points;
+  struct Role {
+    std::uint32_t index = 0;  ///< Among the poses, or among the points.
+    bool is_moved = false;
+  };
+  std::vector<Role> roles;  ///< Per variable.
+  std::vector<Observation> observations;
+  std::vector<PosePrior> pose_priors;
+  std::vector<RelativePose> relative_poses;
+  std::vector<PointPrior> point_priors;
+  Counts saved;
+  std::vector<Change> changes;  ///< Of observations, since the checkpoint.
+  std::vector<PoseId> moved_poses;
+  std::vector<PointId> moved_points;
 };
 
 Smoother::Smoother(const SmootherParameters& parameters)
-    : parameters_(parameters), solver_(std::make_unique<Solver>()) {}
+    : state_(std::make_unique<State>(parameters)) {}
 Smoother::~Smoother() = default;
 Smoother::Smoother(Smoother&&) noexcept = default;
 Smoother& Smoother::operator=(Smoother&&) noexcept = default;
 
-void Smoother::checkpoint() { checkpoint_ = std::make_unique<Checkpoint>(Checkpoint{graph_}); }
+PoseId Smoother::add_pose(const SE2& initial) {
+  const VariableId name = state_->smoother.add_variable(initial);
+  state_->poses.push_back(name);
+  return PoseId(state_->take_role(name, state_->poses.size() - 1));
+}
+
+PointId Smoother::add_point(const Eigen::Vector2d& initial) {
+  const VariableId name = state_->smoother.add_variable(initial);
+  state_->points.push_back(name);
+  return PointId(state_->take_role(name, state_->points.size() - 1));
+}
+
+void Smoother::add(const PosePrior& factor) {
+  state_->smoother.add(prior(state_->name(factor.pose), factor.mean, factor.information));
+  state_->pose_priors.push_back(factor);
+}
+
+void Smoother::add(const RelativePose& factor) {
+  state_->smoother.add(
+      relative(state_->name(factor.a), state_->name(factor.b), factor.a_T_b, factor.information));
+  state_->relative_poses.push_back(factor);
+}
+
+void Smoother::add(const PointPrior& factor) {
+  state_->smoother.add(prior(state_->name(factor.point), factor.mean, factor.information));
+  state_->point_priors.push_back(factor);
+}
+
+ObservationId Smoother::add(const PointObservation& factor) {
+  state_->observations.push_back({factor, state_->give(factor)});
+  return ObservationId(static_cast<std::uint32_t>(state_->observations.size() - 1));
+}
+
+void Smoother::set(ObservationId id, const PointObservation& factor) {
+  State::Observation& observation = state_->observations[index(id)];
+  state_->changes.push_back({index(id), observation});
+  if (observation.factor != kNoFactor) state_->smoother.remove(observation.factor);
+  observation = {factor, state_->give(factor)};
+}
+
+SE2 Smoother::pose(PoseId id) const { return state_->smoother.pose2(state_->name(id)); }
+Eigen::Vector2d Smoother::point(PointId id) const {
+  return state_->smoother.point2(state_->name(id));
+}
+const PointObservation& Smoother::observation(ObservationId id) const {
+  return state_->observations[index(id)].measured;
+}
+
+double Smoother::chi2(ObservationId id) const {
+  const FactorId factor = state_->observations[index(id)].factor;
+  return factor == kNoFactor ? 0.0 : state_->smoother.graph().chi2(factor);
+}
+
+const std::vector<PointId>& Smoother::moved_points() const { return state_->moved_points; }
+const std::vector<PoseId>& Smoother::moved_poses() const { return state_->moved_poses; }
+
+Graph Smoother::graph() const {
+  Graph graph;
+  for (const VariableId name : state_->poses) graph.poses.push_back(state_->smoother.pose2(name));
+  for (const VariableId name : state_->points) {
+    graph.points.push_back(state_->smoother.point2(name));
+  }
+  graph.pose_priors = state_->pose_priors;
+  graph.relative_poses = state_->relative_poses;
+  graph.point_priors = state_->point_priors;
+  for (const State::Observation& one : state_->observations) {
+    graph.observations.push_back(one.measured);
+  }
+  return graph;
+}
+
+void Smoother::start_from(const Graph& graph) {
+  for (const SE2& pose : graph.poses) add_pose(pose);
+  for (const Eigen::Vector2d& point : graph.points) add_point(point);
+  for (const PosePrior& factor : graph.pose_priors) add(factor);
+  for (const RelativePose& factor : graph.relative_poses) add(factor);
+  for (const PointPrior& factor : graph.point_priors) add(factor);
+  for (const PointObservation& factor : graph.observations) add(factor);
+}
+
+void Smoother::checkpoint() {
+  state_->smoother.checkpoint();
+  state_->forget_moved();
+  state_->saved = state_->counts();
+  state_->changes.clear();
+}
 
 void Smoother::rollback() {
-  if (checkpoint_) graph_ = checkpoint_->graph;
-  solver_->factorised = false;
+  State& state = *state_;
+  state.forget_moved();
+  state.smoother.rollback();
+  for (std::size_t i = state.changes.size(); i-- > 0;) {
+    state.observations[state.changes[i].at] = state.changes[i].before;
+  }
+  state.changes.clear();
+  state.poses.resize(state.saved.poses);
+  state.points.resize(state.saved.points);
+  state.observations.resize(state.saved.observations);
+  state.pose_priors.resize(state.saved.pose_priors);
+  state.relative_poses.resize(state.saved.relative_poses);
+  state.point_priors.resize(state.saved.point_priors);
 }
 
 SmootherUpdate Smoother::update() {
-  SmootherUpdate result;
-  Solver& solver = *solver_;
-  solver.factorised = false;
-  solver.equations = std::make_unique<NormalEquations>(graph_);
-  NormalEquations& equations = *solver.equations;
-  const std::vector<SE2> first_poses = graph_.poses;
-  const std::vector<Eigen::Vector2d> first_points = graph_.points;
-  equations.linearise(graph_);
-  double damping = 0.0;
-  while (result.iterations < parameters_.max_iterations && !result.converged) {
-    ++result.iterations;
-    const int bad = damping == 0.0 ? solver.cholesky.factorise(equations.hessian())
-                                   : solver.cholesky.factorise(equations.damped(damping));
-    if (bad >= 0) {
-      graph_.poses = first_poses;
-      graph_.points = first_points;
-      result.error = undetermined(graph_, equations, bad);
-      return result;
-    }
-    solver.factorised = damping == 0.0;
-    const Eigen::VectorXd delta = -solver.cholesky.solve(equations.gradient());
-    const std::vector<SE2> poses = graph_.poses;
-    const std::vector<Eigen::Vector2d> points = graph_.points;
-    const StepSize size = retract(graph_, equations, delta);
-    const double after = chi2(graph_);
-    if (!std::isfinite(after) || after > equations.chi2() * (1.0 + kRoundingRise) + kRoundingRise) {
-      graph_.poses = poses;
-      graph_.points = points;
-      damping = damping == 0.0 ? kFirstDamping : 100.0 * damping;
-      if (damping > kMaxDamping) break;
-      continue;
-    }
-    result.converged =
-        size.position_m < parameters_.converged_m && size.heading_rad < parameters_.converged_rad;
-    damping = 0.0;
-    if (!result.converged && result.iterations < parameters_.max_iterations) {
-      equations.linearise(graph_);
-      solver.factorised = false;
-    }
-  }
-  result.chi2 = chi2(graph_);
-  result.ok = true;
-  return result;
+  const IncrementalUpdate update = state_->smoother.update();
+  state_->collect_moved();
+  return {update.ok, update.error};
 }
 
 std::optional<Eigen::MatrixXd> Smoother::joint_marginal(std::span<const PoseId> poses,
                                                         std::span<const PointId> points) const {
-  if (!solver_->factorised) return std::nullopt;
-  const NormalEquations& equations = *solver_->equations;
-  std::vector<int> columns;
-  for (const PoseId pose : poses) {
-    const int first = equations.column(pose);
-    if (first < 0) return std::nullopt;
-    for (int k = 0; k < 3; ++k) columns.push_back(first + k);
-  }
-  for (const PointId point : points) {
-    const int first = equations.column(point);
-    if (first < 0) return std::nullopt;
-    for (int k = 0; k < 2; ++k) columns.push_back(first + k);
-  }
-  const auto count = static_cast<Eigen::Index>(columns.size());
-  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(equations.size(), count);
-  for (Eigen::Index k = 0; k < count; ++k) right(columns[static_cast<std::size_t>(k)], k) = 1.0;
-  const Eigen::MatrixXd solution = solver_->cholesky.solve(right);
-  Eigen::MatrixXd result(count, count);
-  for (Eigen::Index r = 0; r < count; ++r)
-    result.row(r) = solution.row(columns[static_cast<std::size_t>(r)]);
-  return 0.5 * (result + result.transpose());
+  std::vector<VariableId> names;
+  for (const PoseId id : poses) names.push_back(state_->name(id));
+  for (const PointId id : points) names.push_back(state_->name(id));
+  return state_->smoother.joint_covariance(names);
 }
 
 }  // namespace understory

@@ -1,35 +1,37 @@
-// The least-squares solution of a graph, kept up to date as the graph grows.
+// The smoother of the mapper: poses and points of the plane.
 #pragma once
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "common/factor_graph/graph.hpp"
 
 namespace understory {
 
 struct SmootherParameters {
+  /// What moves by less of its own conditional standard deviation stays where it is [sigmas].
+  double least_move = 1e-3;
+  /// A measurement is linearised again beyond this [sigmas].
+  double relinearise_above = 1e-2;
+  /// An update goes on while one is this far from its linearisation [sigmas].
+  double iterate_above = 0.1;
   int max_iterations = 8;
-  /// A step that moved nothing further than this is the last: Gauss-Newton squares the error, so
-  /// some micrometres are left.
-  double converged_m = 1e-2;
-  double converged_rad = 1e-3;  ///< Likewise for headings.
 };
 
 struct SmootherUpdate {
   bool ok = false;
-  bool converged = false;
-  int iterations = 0;
-  double chi2 = 0.0;
-  std::string error;  ///< Names the variable that the measurements leave undetermined.
+  std::string error;  ///< Names the variables that the measurements leave undetermined.
 };
 
-/// Smoother on CHOLMOD: every update solves the whole graph by Gauss-Newton with step control, from
-/// the last estimate.
-///
-/// Cost of an update: one sparse factorisation per iteration. The interface is that of an
-/// incremental smoother: add, update, ask for values and marginals, take the last update back.
+/// Index of a PointObservation in the order in which they were added.
+enum class ObservationId : std::uint32_t {};
+constexpr std::uint32_t index(ObservationId id) { return static_cast<std::uint32_t>(id); }
+
+/// Keeps a graph and its least-squares solution; the incremental smoother does the work. An update
+/// and a rollback cost what changed.
 class Smoother {
  public:
   explicit Smoother(const SmootherParameters& parameters = {});
@@ -37,32 +39,42 @@ class Smoother {
   Smoother(Smoother&&) noexcept;
   Smoother& operator=(Smoother&&) noexcept;
 
-  /// Variables and factors may be appended freely between updates; values are estimates after
-  /// update().
-  Graph& graph() { return graph_; }
-  const Graph& graph() const { return graph_; }
+  PoseId add_pose(const SE2& initial);
+  PointId add_point(const Eigen::Vector2d& initial);
+  void add(const PosePrior& factor);
+  void add(const RelativePose& factor);
+  void add(const PointPrior& factor);
+  ObservationId add(const PointObservation& factor);
+  /// Replaces a measurement; one whose information is zero no longer counts.
+  void set(ObservationId id, const PointObservation& factor);
 
-  /// Remembers the graph as it is; rollback() restores exactly that.
+  SE2 pose(PoseId id) const;
+  Eigen::Vector2d point(PointId id) const;
+  const PointObservation& observation(ObservationId id) const;
+  double chi2(ObservationId id) const;
+  /// What updates moved since the checkpoint, each once.
+  const std::vector<PointId>& moved_points() const;
+  const std::vector<PoseId>& moved_poses() const;
+
+  /// Everything that was given, at the present estimates; and from there. O(graph).
+  Graph graph() const;
+  void start_from(const Graph& graph);
+
+  /// Remembers the state as it is; rollback() restores exactly that.
   void checkpoint();
   void rollback();
 
-  /// Variables without any factor are left alone. On an error the values are those before the call.
+  /// Variables without any factor are left alone.
   SmootherUpdate update();
 
-  /// Joint covariance of poses (3 each, right perturbation), then points (2 each), at the last
-  /// update's linearisation; none when there was no successful update since the graph changed
-  /// shape, or a variable has no factor.
+  /// Joint covariance of poses (3 each, right perturbation), then points (2 each); none where a
+  /// variable has no factor or is not determined.
   std::optional<Eigen::MatrixXd> joint_marginal(std::span<const PoseId> poses,
                                                 std::span<const PointId> points) const;
 
  private:
-  struct Solver;
-  struct Checkpoint;
-
-  SmootherParameters parameters_;
-  Graph graph_;
-  std::unique_ptr<Solver> solver_;
-  std::unique_ptr<Checkpoint> checkpoint_;
+  struct State;
+  std::unique_ptr<State> state_;
 };
 
 }  // namespace understory

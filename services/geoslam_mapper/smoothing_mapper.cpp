@@ -116,7 +116,7 @@ void SmoothingMapper::report(const Keyframe& keyframe, const Placement& placemen
   const SE2WithCovariance centre_T_base{keyframe.centre_T_base(),
                                         keyframe.members.front().covariance};
   const NodeIndex node = add_node(placement.map_T_centre.mean);
-  bases_.push_back({node, keyframe.sequence, keyframe.utime, centre_T_base, false});
+  add_base({node, keyframe.sequence, keyframe.utime, centre_T_base, false});
   ++keyframes_;
   update.associations = placement.associations;
   finish(keyframe, update);
@@ -137,13 +137,14 @@ void SmoothingMapper::start_map(const Keyframe& keyframe, MapUpdate& update) {
                                         keyframe.members.front().covariance};
   const SE2WithCovariance base_T_centre = inverse(centre_T_base);
   const NodeIndex node = add_node(base_T_centre.mean);
-  smoother_.graph().pose_priors.push_back(
-      {nodes_[node].centre, base_T_centre.mean, (base_T_centre.covariance + kTiny).inverse()});
-  bases_.push_back({node, keyframe.sequence, keyframe.utime, centre_T_base, true});
+  smoother_.add(PosePrior{nodes_[node].centre, base_T_centre.mean,
+                          (base_T_centre.covariance + kTiny).inverse()});
+  add_base({node, keyframe.sequence, keyframe.utime, centre_T_base, true});
   ++keyframes_;
   discover(keyframe, node, update);
   const SmootherUpdate solved = smoother_.update();
   if (!solved.ok) update.reason = solved.error;
+  adopt_estimates();
   finish(keyframe, update);
   update.status = MapUpdateStatus::kFirstMap;
 }
@@ -151,14 +152,14 @@ void SmoothingMapper::start_map(const Keyframe& keyframe, MapUpdate& update) {
 SE2WithCovariance SmoothingMapper::base_pose(const Base& base) const {
   if (base.is_origin) return {};
   const PoseId centre = nodes_[base.node].centre;
-  return compound({smoother_.graph()[centre], Eigen::Matrix3d::Zero()}, base.centre_T_base);
+  return compound({smoother_.pose(centre), Eigen::Matrix3d::Zero()}, base.centre_T_base);
 }
 
 /// What every accepted keyframe leaves behind. Its base is bases_.back().
 void SmoothingMapper::finish(const Keyframe& keyframe, MapUpdate& update) {
   const Base& base = bases_.back();
   const PoseId centre = nodes_[base.node].centre;
-  SE2WithCovariance map_T_centre{smoother_.graph()[centre], Eigen::Matrix3d::Zero()};
+  SE2WithCovariance map_T_centre{smoother_.pose(centre), Eigen::Matrix3d::Zero()};
   const auto marginal = smoother_.joint_marginal({&centre, 1}, {});
   if (marginal) map_T_centre.covariance = *marginal;
   const SE2WithCovariance map_T_base =
@@ -195,7 +196,7 @@ std::vector<MapLandmark> SmoothingMapper::landmarks() const {
   for (const auto& [id, landmark] : store_.all()) {
     MapLandmark out;
     out.id = id;
-    out.position_m = landmark.point ? smoother_.graph()[*landmark.point] : landmark.position_m;
+    out.position_m = landmark.point ? smoother_.point(*landmark.point) : landmark.position_m;
     out.radius_m = landmark.radius_m;
     out.times_seen = landmark.times_seen;
     out.kind = landmark.kind;

@@ -6,6 +6,7 @@
 #include "common/model/odometry_buffer.hpp"
 #include "services/geoslam_mapper/geoslam_mapper.hpp"
 #include "services/geoslam_mapper/landmark_store.hpp"
+#include "services/geoslam_mapper/place_grid.hpp"
 
 namespace understory {
 
@@ -26,8 +27,7 @@ class SmoothingMapper final : public MapperMethod {
   /// A place in the graph: the centre of one keyframe, or of several that were folded together.
   struct Node {
     PoseId centre{};
-    std::map<LandmarkId, std::uint32_t>
-        observations;  ///< Index of each landmark's factor in the graph.
+    std::map<LandmarkId, ObservationId> observations;  ///< Each landmark's factor in the graph.
   };
   /// A keyframe's base, rigidly tied to a node (a leaf of the graph: nothing else measures it).
   struct Base {
@@ -75,6 +75,8 @@ class SmoothingMapper final : public MapperMethod {
   Keyframe in_frame_of(NodeIndex node, const Keyframe& keyframe, const Placement& placement) const;
   void observe(NodeIndex node, const KeyframeLandmark& seen, LandmarkId id);
   void put_into_graph(StoredLandmark& landmark);
+  PointId add_point(const StoredLandmark& landmark);
+  void add_base(const Base& base);
   std::optional<SE2WithCovariance> motion_since_last(Utime utime) const;
   void add_motion(const Keyframe& keyframe, NodeIndex node);
   bool solve(NodeIndex node, MapUpdate& update);
@@ -96,6 +98,12 @@ class SmoothingMapper final : public MapperMethod {
   std::vector<Candidate> candidates_;
   std::vector<Node> nodes_;
   std::vector<Base> bases_;
+  /// Bases that stand apart from the others of their node, and where; each node's.
+  std::vector<std::uint32_t> standings_;
+  std::vector<std::vector<std::uint32_t>> standings_of_node_;
+  PlaceGrid places_;
+  /// Per point of the graph: its landmark; 0 where that was taken over by another.
+  std::vector<LandmarkId> landmark_of_point_;
   OdometryBuffer odometry_;
   bool map_was_given_ = false;
   std::uint32_t keyframes_ = 0;  ///< Accepted.

@@ -34,12 +34,11 @@ std::uint32_t members_in_view(const Keyframe& keyframe, const Eigen::Vector2d& p
 void SmoothingMapper::discover(const Keyframe& keyframe, NodeIndex node, MapUpdate& update) {
   std::vector<bool> known(keyframe.landmarks.size(), false);
   for (const Association& pair : update.associations) known[pair.keyframe_landmark] = true;
-  const SE2 map_T_centre = smoother_.graph()[nodes_[node].centre];
+  const SE2 map_T_centre = smoother_.pose(nodes_[node].centre);
   const SE2 centre_T_map = map_T_centre.inverse();
   for (Candidate& candidate : candidates_) {
     const Candidate::Sighting& latest = candidate.sightings.back();
-    candidate.position_m =
-        smoother_.graph()[nodes_[latest.node].centre] * latest.landmark.position_m;
+    candidate.position_m = smoother_.pose(nodes_[latest.node].centre) * latest.landmark.position_m;
     candidate.times_in_view += members_in_view(keyframe, centre_T_map * candidate.position_m);
   }
   for (std::size_t i = 0; i < keyframe.landmarks.size(); ++i) {
@@ -90,8 +89,7 @@ void SmoothingMapper::promote(const Candidate& candidate, MapUpdate& update) {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   for (const Candidate::Sighting& sighting : candidate.sightings) {
     const double weight = 2.0 / sighting.landmark.covariance_m2.trace();
-    sum +=
-        weight * (smoother_.graph()[nodes_[sighting.node].centre] * sighting.landmark.position_m);
+    sum += weight * (smoother_.pose(nodes_[sighting.node].centre) * sighting.landmark.position_m);
     landmark.information += weight;
     landmark.radius_m +=
         sighting.landmark.radius_m / static_cast<double>(candidate.sightings.size());
@@ -102,8 +100,9 @@ void SmoothingMapper::promote(const Candidate& candidate, MapUpdate& update) {
   landmark.last_keyframe = keyframes_;
   landmark.kind = candidate.kind;
   std::sort(landmark.nodes.begin(), landmark.nodes.end());
-  landmark.point = smoother_.graph().add_point(landmark.position_m);
+  landmark.point = add_point(landmark);
   const LandmarkId id = store_.insert(landmark);
+  landmark_of_point_.back() = id;
   for (const Candidate::Sighting& sighting : candidate.sightings)
     observe(sighting.node, sighting.landmark, id);
   update.added.push_back(id);
@@ -155,12 +154,12 @@ void SmoothingMapper::take_over(LandmarkId old_id, LandmarkId new_id) {
   for (const NodeIndex node : old_one.nodes) {
     auto handle = nodes_[node].observations.extract(old_id);
     if (handle.empty()) continue;
-    PointObservation& factor = smoother_.graph().observations[handle.mapped()];
-    factor.point =
-        *new_one.point;  // Also of a factor without weight: no variable may be left without any.
+    PointObservation factor = smoother_.observation(handle.mapped());
+    factor.point = *new_one.point;
     // A place that saw both keeps what it says of the one that stays.
     const bool has_both = nodes_[node].observations.contains(new_id);
     if (!agree || has_both) factor.information.setZero();
+    smoother_.set(handle.mapped(), factor);
     handle.key() = new_id;
     nodes_[node].observations.insert(std::move(handle));
   }
@@ -168,6 +167,7 @@ void SmoothingMapper::take_over(LandmarkId old_id, LandmarkId new_id) {
   std::set_union(old_one.nodes.begin(), old_one.nodes.end(), new_one.nodes.begin(),
                  new_one.nodes.end(), std::back_inserter(nodes));
   new_one.nodes = std::move(nodes);
+  landmark_of_point_[index(*old_one.point)] = 0;
   if (agree) new_one.information += old_one.information;
   new_one.times_seen += old_one.times_seen;
   new_one.last_keyframe = std::max(new_one.last_keyframe, old_one.last_keyframe);

@@ -18,7 +18,7 @@ double chi2_deviate(double chi2, double degrees_of_freedom) {
 }  // namespace
 
 NodeIndex SmoothingMapper::add_node(const SE2& map_T_centre) {
-  nodes_.push_back({smoother_.graph().add_pose(map_T_centre), {}});
+  nodes_.push_back({smoother_.add_pose(map_T_centre), {}});
   return static_cast<NodeIndex>(nodes_.size() - 1);
 }
 
@@ -26,27 +26,49 @@ NodeIndex SmoothingMapper::add_node(const SE2& map_T_centre) {
 /// §4.3.1).
 void SmoothingMapper::put_into_graph(StoredLandmark& landmark) {
   if (landmark.point) return;
-  landmark.point = smoother_.graph().add_point(landmark.position_m);
-  smoother_.graph().point_priors.push_back(
-      {*landmark.point, landmark.position_m, landmark.prior_covariance.inverse()});
+  landmark.point = add_point(landmark);
+  smoother_.add(
+      PointPrior{*landmark.point, landmark.position_m, landmark.prior_covariance.inverse()});
+}
+
+PointId SmoothingMapper::add_point(const StoredLandmark& landmark) {
+  landmark_of_point_.push_back(landmark.id);
+  return smoother_.add_point(landmark.position_m);
+}
+
+void SmoothingMapper::add_base(const Base& base) {
+  bases_.push_back(base);
+  standings_of_node_.resize(nodes_.size());
+  std::vector<std::uint32_t>& standings = standings_of_node_[base.node];
+  const double apart_m = 0.25 * parameters_.fold_distance_m;
+  for (const std::uint32_t other : standings) {
+    const SE2 between =
+        bases_[standings_[other]].centre_T_base.mean.inverse() * base.centre_T_base.mean;
+    if (between.translation().norm() < apart_m &&
+        std::abs(between.theta()) < 0.25 * parameters_.fold_angle_rad) {
+      return;
+    }
+  }
+  standings.push_back(static_cast<std::uint32_t>(standings_.size()));
+  standings_.push_back(static_cast<std::uint32_t>(bases_.size() - 1));
+  places_.put(standings.back(), base_pose(base).mean.translation());
 }
 
 /// A second sighting from the same node is averaged into the first by information.
 void SmoothingMapper::observe(NodeIndex node, const KeyframeLandmark& seen, LandmarkId id) {
   const Eigen::Matrix2d information = seen.covariance_m2.inverse();
-  std::vector<PointObservation>& observations = smoother_.graph().observations;
-  const auto [entry, fresh] =
-      nodes_[node].observations.try_emplace(id, static_cast<std::uint32_t>(observations.size()));
+  const auto [entry, fresh] = nodes_[node].observations.try_emplace(id);
   if (fresh) {
-    observations.push_back(
-        {nodes_[node].centre, *store_.at(id).point, seen.position_m, information});
+    entry->second = smoother_.add(
+        PointObservation{nodes_[node].centre, *store_.at(id).point, seen.position_m, information});
     return;
   }
-  PointObservation& factor = observations[entry->second];
+  PointObservation factor = smoother_.observation(entry->second);
   const Eigen::Matrix2d sum = factor.information + information;
   factor.position =
       sum.inverse() * (factor.information * factor.position + information * seen.position_m);
   factor.information = sum;
+  smoother_.set(entry->second, factor);
 }
 
 void SmoothingMapper::add_motion(const Keyframe& keyframe, NodeIndex node) {
@@ -57,9 +79,8 @@ void SmoothingMapper::add_motion(const Keyframe& keyframe, NodeIndex node) {
   const SE2WithCovariance last_T_centre =
       compound(compound(last_member_->centre_T_vehicle, *motion), inverse(centre_T_base));
   const Eigen::Matrix3d covariance = last_T_centre.covariance + 1e-12 * Eigen::Matrix3d::Identity();
-  smoother_.graph().relative_poses.push_back({nodes_[last_member_->node].centre,
-                                              nodes_[node].centre, last_T_centre.mean,
-                                              covariance.inverse()});
+  smoother_.add(RelativePose{nodes_[last_member_->node].centre, nodes_[node].centre,
+                             last_T_centre.mean, covariance.inverse()});
 }
 
 /// The node of the nearest earlier keyframe, when this one stands where that stood: nothing new is
@@ -69,14 +90,16 @@ std::optional<NodeIndex> SmoothingMapper::foldable(const Keyframe& keyframe,
   const SE2 map_T_base = placement.map_T_centre.mean * keyframe.centre_T_base();
   std::optional<NodeIndex> best;
   double best_distance = parameters_.fold_distance_m;
-  for (const Base& base : bases_) {
+  places_.for_each_near(map_T_base.translation(), best_distance, [&](std::uint32_t standing) {
+    const Base& base = bases_[standings_[standing]];
     const SE2 between = base_pose(base).mean.inverse() * map_T_base;
     const double distance = between.translation().norm();
-    if (distance > best_distance || std::abs(between.theta()) > parameters_.fold_angle_rad)
-      continue;
+    const bool is_nearer =
+        distance < best_distance || (distance == best_distance && best < base.node);
+    if (!is_nearer || std::abs(between.theta()) > parameters_.fold_angle_rad) return;
     best = base.node;
     best_distance = distance;
-  }
+  });
   return best;
 }
 
@@ -85,7 +108,7 @@ std::optional<NodeIndex> SmoothingMapper::foldable(const Keyframe& keyframe,
 Keyframe SmoothingMapper::in_frame_of(NodeIndex node, const Keyframe& keyframe,
                                       const Placement& placement) const {
   const SE2 node_T_keyframe =
-      smoother_.graph()[nodes_[node].centre].inverse() * placement.map_T_centre.mean;
+      smoother_.pose(nodes_[node].centre).inverse() * placement.map_T_centre.mean;
   const Eigen::Matrix2d rotation = node_T_keyframe.rotation();
   Keyframe result = keyframe;
   for (KeyframeLandmark& seen : result.landmarks) {
@@ -118,6 +141,7 @@ bool SmoothingMapper::fuse(const Keyframe& arrived, const Placement& placement, 
   if (!solve(node, update)) {
     smoother_.rollback();
     for (const LandmarkId id : entered) store_.at(id).point.reset();
+    landmark_of_point_.resize(landmark_of_point_.size() - entered.size());
     if (nodes_.size() > nodes_before) {
       nodes_.pop_back();
     } else {
@@ -127,11 +151,11 @@ bool SmoothingMapper::fuse(const Keyframe& arrived, const Placement& placement, 
     return false;
   }
   ++keyframes_;
-  bases_.push_back({node,
-                    keyframe.sequence,
-                    keyframe.utime,
-                    {keyframe.centre_T_base(), keyframe.members.front().covariance},
-                    false});
+  add_base({node,
+            keyframe.sequence,
+            keyframe.utime,
+            {keyframe.centre_T_base(), keyframe.members.front().covariance},
+            false});
   count_sightings(keyframe, node, update);
   adopt_estimates();
   discover(keyframe, node, update);
@@ -147,13 +171,11 @@ bool SmoothingMapper::solve(NodeIndex node, MapUpdate& update) {
     update.reason = solved.error;
     return false;
   }
-  Graph& graph = smoother_.graph();
   std::set<LandmarkId> outliers;
   update.chi2 = 0.0;
   update.degrees_of_freedom = 0;
   for (const Association& pair : update.associations) {
-    const double error =
-        chi2(graph, graph.observations[nodes_[node].observations.at(pair.landmark_id)]);
+    const double error = smoother_.chi2(nodes_[node].observations.at(pair.landmark_id));
     if (error > parameters_.outlier_chi2) {
       outliers.insert(pair.landmark_id);
     } else {
@@ -171,10 +193,11 @@ bool SmoothingMapper::solve(NodeIndex node, MapUpdate& update) {
     return false;
   }
   if (outliers.empty()) return true;
-  // Taken out by giving them no weight: indices of the other factors stay what they are.
   for (const LandmarkId id : outliers) {
-    const std::uint32_t factor = nodes_[node].observations.at(id);
-    graph.observations[factor].information.setZero();
+    const ObservationId factor = nodes_[node].observations.at(id);
+    PointObservation nothing = smoother_.observation(factor);
+    nothing.information.setZero();
+    smoother_.set(factor, nothing);
     nodes_[node].observations.erase(id);
   }
   std::erase_if(update.associations,
@@ -198,9 +221,19 @@ void SmoothingMapper::count_sightings(const Keyframe& keyframe, NodeIndex node,
   }
 }
 
+/// What the last keyframe's updates moved; the rest is where it was.
 void SmoothingMapper::adopt_estimates() {
-  for (auto& [id, landmark] : store_.all()) {
-    if (landmark.point) store_.move(id, smoother_.graph()[*landmark.point]);
+  for (const PointId point : smoother_.moved_points()) {
+    const LandmarkId id = landmark_of_point_[index(point)];
+    if (id != 0) store_.move(id, smoother_.point(point));
+  }
+  for (const PoseId pose : smoother_.moved_poses()) {
+    // A node's number is that of its pose.
+    const NodeIndex node = index(pose);
+    if (node >= standings_of_node_.size()) continue;
+    for (const std::uint32_t standing : standings_of_node_[node]) {
+      places_.put(standing, base_pose(bases_[standings_[standing]]).mean.translation());
+    }
   }
 }
 

@@ -30,7 +30,7 @@ std::optional<SmoothingMapper::Prediction> SmoothingMapper::predict(
   const SE2WithCovariance base_T_centre =
       inverse(SE2WithCovariance{keyframe.centre_T_base(), keyframe.members.front().covariance});
   if (const auto motion = motion_since_last(keyframe.utime)) {
-    const SE2WithCovariance map_T_centre{smoother_.graph()[nodes_[last_member_->node].centre],
+    const SE2WithCovariance map_T_centre{smoother_.pose(nodes_[last_member_->node].centre),
                                          Eigen::Matrix3d::Zero()};
     const SE2WithCovariance map_T_base =
         compound(compound(map_T_centre, last_member_->centre_T_vehicle), *motion);
@@ -74,11 +74,10 @@ std::vector<double> SmoothingMapper::relative_variances(const std::vector<Landma
   const PoseId centre = nodes_[last_member_->node].centre;
   const auto joint = smoother_.joint_marginal({&centre, 1}, points);
   if (!joint) return variances;
-  const Graph& graph = smoother_.graph();
+  const SE2 map_T_centre = smoother_.pose(centre);
   for (std::size_t i = 0; i < old.size(); ++i) {
     // d(landmark in the vehicle's frame) / d(pose, landmark)
-    PointObservation seen{centre, points[i], Eigen::Vector2d::Zero(), Eigen::Matrix2d::Identity()};
-    const ObservationJacobian j = linearise(graph, seen);
+    const ObservationJacobian j = linearise(map_T_centre, smoother_.point(points[i]));
     const auto at = 3 + 2 * static_cast<Eigen::Index>(i);
     const Eigen::Matrix2d cross = j.pose * joint->block<3, 2>(0, at) * j.point.transpose();
     const Eigen::Matrix2d covariance = j.pose * joint->topLeftCorner<3, 3>() * j.pose.transpose() +

@@ -135,7 +135,7 @@ std::string SmoothingMapper::save() const {
   for (const Candidate& candidate : candidates_) candidates.push_back(to_value(candidate));
   for (const Node& node : nodes_) {
     Json seen = Json::array();
-    for (const auto& [id, factor] : node.observations) seen.push_back({id, factor});
+    for (const auto& [id, factor] : node.observations) seen.push_back({id, index(factor)});
     nodes.push_back({index(node.centre), seen});
   }
   for (const Base& base : bases_)
@@ -167,22 +167,28 @@ void SmoothingMapper::load(const std::string& state) {
   if (json.at("version").get<int>() != kStateVersion)
     throw std::invalid_argument("mapper: state of another version");
   SmoothingMapper loaded(parameters_);
-  loaded.smoother_.graph() = graph_from(json.at("graph"));
-  for (const Json& landmark : json.at("landmarks"))
-    loaded.store_.restore(stored_landmark_from(landmark));
+  const Graph graph = graph_from(json.at("graph"));
+  loaded.smoother_.start_from(graph);
+  loaded.landmark_of_point_.assign(graph.points.size(), 0);
+  for (const Json& landmark : json.at("landmarks")) {
+    const StoredLandmark one = stored_landmark_from(landmark);
+    loaded.store_.restore(one);
+    if (one.point) loaded.landmark_of_point_.at(index(*one.point)) = one.id;
+  }
   loaded.store_.set_next_id(json.at("next_id").get<LandmarkId>());
   for (const Json& candidate : json.at("candidates"))
     loaded.candidates_.push_back(candidate_from(candidate));
   for (const Json& node : json.at("nodes")) {
     Node out{pose_id(node.at(0)), {}};
     for (const Json& seen : node.at(1))
-      out.observations[seen.at(0).get<LandmarkId>()] = seen.at(1).get<std::uint32_t>();
+      out.observations[seen.at(0).get<LandmarkId>()] =
+          ObservationId(seen.at(1).get<std::uint32_t>());
     loaded.nodes_.push_back(std::move(out));
   }
   for (const Json& base : json.at("bases")) {
-    loaded.bases_.push_back({base.at(0).get<NodeIndex>(), base.at(1).get<std::uint64_t>(),
-                             base.at(2).get<Utime>(), base.at(3).get<SE2WithCovariance>(),
-                             base.at(4).get<bool>()});
+    loaded.add_base({base.at(0).get<NodeIndex>(), base.at(1).get<std::uint64_t>(),
+                     base.at(2).get<Utime>(), base.at(3).get<SE2WithCovariance>(),
+                     base.at(4).get<bool>()});
   }
   for (const Json& piece : json.at("odometry")) loaded.odometry_.add(piece.get<Odometry>());
   json.at("map_was_given").get_to(loaded.map_was_given_);

@@ -1,0 +1,170 @@
+// The factorised graph: a tree of cliques, each a dense front (the Bayes tree of iSAM2, Kaess et
+// al. 2012, as a supernodal multifrontal Cholesky factorisation).
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/factor_graph/clique_plan.hpp"
+#include "common/factor_graph/factor_graph.hpp"
+#include "common/factor_graph/front_kernel.hpp"
+
+namespace understory {
+
+/// Variables that are eliminated together. `front` is size x size, column-major, lower triangle:
+/// the columns of L of the frontal variables, then the Schur complement on the separator; the last
+/// row is the right-hand side.
+struct CliqueRecord {
+  int parent = kNone;
+  int first_child = kNone;
+  int next_sibling = kNone;
+  int previous_sibling = kNone;
+  int first_factor = kNone;  ///< Those that are assembled here.
+  int frontal_count = 0;     ///< Variables.
+  int row_count = 0;         ///< Variables, frontal ones first, then the separator.
+  int pivots = 0;            ///< Scalars of the frontal variables.
+  int size = 0;              ///< Scalars of all, and the right-hand side.
+  int left_out = 0;          ///< Pivots without information.
+  int* rows = nullptr;
+  double* front = nullptr;
+  std::uint64_t front_epoch = 0;
+};
+
+struct TreeStatistics {
+  long eliminated_variables = 0;  ///< Structure and numbers made anew.
+  long refreshed_cliques = 0;     ///< Numbers only.
+  double flops = 0.0;
+};
+
+class CliqueTree {
+ public:
+  explicit CliqueTree(FactorGraph& graph);
+
+  /// The variable's clique and all above it will be built anew.
+  void mark_structure(int variable);
+  /// The factor's clique and all above it will be computed anew.
+  void mark_numbers(int factor);
+  void mark_everything();
+  bool is_marked() const { return !structural_.empty() || !dirty_.empty(); }
+  /// Takes a factor out of its clique, which is marked.
+  void detach(int factor);
+
+  /// Brings the marked part up to date. `fresh`: factors that no clique holds yet. `last`:
+  /// variables to be eliminated as late as possible.
+  TreeStatistics eliminate(std::span<const int> fresh, std::span<const int> last);
+
+  /// Back-substitution from the cliques that eliminate() made, on as long as something changes by
+  /// more than `threshold` of its own (conditional) standard deviation. Moves the variables;
+  /// changed() tells which and steps() where from.
+  void solve(double threshold);
+  /// The same for the whole tree.
+  void solve_everything(double threshold);
+  const std::vector<int>& changed() const { return changed_; }
+  const std::vector<Delta>& changed_from() const { return changed_from_; }
+
+  /// Joint covariance of variables in the order given; in their charts. None where one is not in
+  /// the tree or the measurements leave one undetermined.
+  std::optional<Eigen::MatrixXd> joint_covariance(std::span<const int> variables);
+
+  /// Variables that the measurements leave undetermined.
+  std::vector<int> undetermined() const;
+  int undetermined_cliques() const { return cliques_[kRoot].left_out; }
+  /// Of one factorisation of the whole as it stands.
+  double total_flops() const { return total_flops_; }
+
+  void commit();
+  void rollback();
+  std::size_t bytes() const { return pool_.bytes() + rows_.bytes(); }
+  const CliqueRecord& clique(int id) const { return cliques_[id]; }
+  int capacity() const { return cliques_.size(); }
+
+  static constexpr int kRoot = 0;  ///< Of all trees; empty.
+
+ private:
+  struct Marks {
+    std::vector<int> structural;
+    std::vector<int> dirty;
+    double total_flops = 0.0;
+  };
+  enum Mark : char { kClean = 0, kDirty = 1, kStructural = 2 };
+
+  // clique_tree.cpp
+  void mark_structure_from(int clique);
+  void mark_numbers_from(int clique);
+  void clear_marks();
+  void free_blocks(const CliqueRecord& clique);
+  void link_child(int parent, int child);
+  void unlink_from_root(int child);
+  void count_left_out(int change);
+
+  // clique_tree_build.cpp
+  void collect(std::span<const int> fresh);
+  void collect_variable(int variable);
+  void take_apart(int clique);
+  void build(const CliquePlan& plan);
+  int build_clique(const CliquePlan& plan, int planned);
+  double remove_structure();
+
+  // clique_tree_eliminate.cpp
+  void order_dirty();
+  void factorise(int clique);
+  void place_rows(const CliqueRecord& clique);
+  void add_factors(const CliqueRecord& clique);
+  void add_children(const CliqueRecord& clique);
+  void add_schur(const CliqueRecord& child, double* front, int size);
+
+  // clique_tree_solve.cpp
+  void solve_clique(int clique, double threshold);
+  void solve_below(int clique, double threshold);
+  bool has_changed_row(const CliqueRecord& clique, int from) const;
+  void push_children(int clique);
+
+  // clique_tree_covariance.cpp
+  void collect_paths(std::span<const int> variables);
+  void forward(const CliqueRecord& clique);
+  void backward(const CliqueRecord& clique);
+
+  FactorGraph& graph_;
+  FrontKernel kernel_;
+  JournaledTable<CliqueRecord> cliques_;
+  BlockPool<double> pool_;
+  BlockPool<int> rows_;
+  double total_flops_ = 0.0;
+
+  std::vector<char> mark_;  ///< Per clique.
+  std::vector<int> structural_;
+  std::vector<int> dirty_;
+  Marks saved_marks_;
+  bool solve_everything_ = false;
+
+  // Scratch of one update.
+  CliquePlanner planner_;
+  std::vector<int> affected_;  ///< Variables whose elimination is planned anew.
+  std::vector<int> affected_at_;
+  std::vector<int> element_factors_;
+  std::vector<int> orphans_;
+  std::vector<int> made_;     ///< Cliques computed by the last eliminate(), children first.
+  std::vector<int> pending_;  ///< Per clique: dirty children not yet computed.
+  std::vector<int> offset_;   ///< Per variable: first row in the front at work.
+  std::vector<double> least_;
+  std::vector<int> left_out_;
+  struct Run {
+    int from, to, length;
+  };
+  std::vector<Run> runs_;
+  std::vector<int> targets_;
+  std::vector<double> step_;
+  std::vector<int> stack_;
+  std::vector<int> changed_;
+  std::vector<Delta> changed_from_;
+  std::vector<std::uint64_t> changed_at_;  ///< Per variable: number of the solve that moved it.
+  std::uint64_t solve_count_ = 0;
+  std::vector<int> path_;
+  std::vector<char> on_path_;
+  Eigen::MatrixXd right_;  ///< Rows of the paths' variables.
+  Eigen::MatrixXd work_;
+};
+
+}  // namespace understory

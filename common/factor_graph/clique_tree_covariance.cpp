@@ -1,0 +1,124 @@
+// Covariances, along the paths from the variables' cliques to the root.
+#include <algorithm>
+
+#include "common/factor_graph/clique_tree.hpp"
+
+namespace understory {
+namespace {
+
+using ConstFront =
+    Eigen::Map<const Eigen::MatrixXd, Eigen::Unaligned, Eigen::OuterStride<Eigen::Dynamic>>;
+
+ConstFront front_of(const CliqueRecord& clique) {
+  return {clique.front, clique.size, clique.size, Eigen::OuterStride<Eigen::Dynamic>(clique.size)};
+}
+
+}  // namespace
+
+/// Lists the cliques on the paths, children first, and gives their frontal variables rows.
+void CliqueTree::collect_paths(std::span<const int> variables) {
+  on_path_.resize(static_cast<std::size_t>(cliques_.size()), 0);
+  pending_.resize(static_cast<std::size_t>(cliques_.size()), 0);
+  path_.clear();
+  stack_.clear();
+  for (const int v : variables) {
+    for (int c = graph_.variable(v).clique; c != kRoot; c = cliques_[c].parent) {
+      char& on_path = on_path_[static_cast<std::size_t>(c)];
+      const bool known = on_path != 0;
+      on_path = 1;
+      if (!known) stack_.push_back(c);
+      if (known) break;
+    }
+  }
+  for (const int c : stack_) {
+    const int parent = cliques_[c].parent;
+    if (parent != kRoot) ++pending_[static_cast<std::size_t>(parent)];
+  }
+  for (const int c : stack_) {
+    if (pending_[static_cast<std::size_t>(c)] == 0) path_.push_back(c);
+  }
+  for (std::size_t i = 0; i < path_.size(); ++i) {
+    const int parent = cliques_[path_[i]].parent;
+    if (parent != kRoot && --pending_[static_cast<std::size_t>(parent)] == 0) {
+      path_.push_back(parent);
+    }
+  }
+  for (const int c : path_) on_path_[static_cast<std::size_t>(c)] = 0;
+}
+
+/// right := L^-1 right for the clique's columns.
+void CliqueTree::forward(const CliqueRecord& clique) {
+  const ConstFront front = front_of(clique);
+  const Eigen::Index f = clique.pivots;
+  const Eigen::Index s = clique.size - 1 - f;
+  const Eigen::Index first = offset_[static_cast<std::size_t>(clique.rows[0])];
+  auto own = right_.middleRows(first, f);
+  front.topLeftCorner(f, f).triangularView<Eigen::Lower>().solveInPlace(own);
+  if (s == 0) return;
+  work_.noalias() = front.block(f, 0, s, f) * own;
+  Eigen::Index row = 0;
+  for (int i = clique.frontal_count; i < clique.row_count; ++i) {
+    const int size = dimension(graph_.variable(clique.rows[i]).type);
+    right_.middleRows(offset_[static_cast<std::size_t>(clique.rows[i])], size) -=
+        work_.middleRows(row, size);
+    row += size;
+  }
+}
+
+/// right := L^-T right for the clique's columns.
+void CliqueTree::backward(const CliqueRecord& clique) {
+  const ConstFront front = front_of(clique);
+  const Eigen::Index f = clique.pivots;
+  const Eigen::Index s = clique.size - 1 - f;
+  auto own = right_.middleRows(offset_[static_cast<std::size_t>(clique.rows[0])], f);
+  if (s > 0) {
+    work_.resize(s, right_.cols());
+    Eigen::Index row = 0;
+    for (int i = clique.frontal_count; i < clique.row_count; ++i) {
+      const int size = dimension(graph_.variable(clique.rows[i]).type);
+      work_.middleRows(row, size) =
+          right_.middleRows(offset_[static_cast<std::size_t>(clique.rows[i])], size);
+      row += size;
+    }
+    own.noalias() -= front.block(f, 0, s, f).transpose() * work_;
+  }
+  front.topLeftCorner(f, f).transpose().triangularView<Eigen::Upper>().solveInPlace(own);
+}
+
+std::optional<Eigen::MatrixXd> CliqueTree::joint_covariance(std::span<const int> variables) {
+  Eigen::Index columns = 0;
+  for (const int v : variables) {
+    if (graph_.variable(v).clique == kNone) return std::nullopt;
+    columns += dimension(graph_.variable(v).type);
+  }
+  collect_paths(variables);
+  offset_.resize(static_cast<std::size_t>(graph_.variable_capacity()));
+  int rows = 0;
+  for (const int c : path_) {
+    const CliqueRecord& clique = cliques_[c];
+    if (clique.left_out > 0) return std::nullopt;
+    for (int i = 0; i < clique.frontal_count; ++i) {
+      offset_[static_cast<std::size_t>(clique.rows[i])] = rows;
+      rows += dimension(graph_.variable(clique.rows[i]).type);
+    }
+  }
+  right_.setZero(rows, columns);
+  Eigen::Index column = 0;
+  for (const int v : variables) {
+    const int size = dimension(graph_.variable(v).type);
+    const int row = offset_[static_cast<std::size_t>(v)];
+    for (int k = 0; k < size; ++k) right_(row + k, column++) = 1.0;
+  }
+  for (const int c : path_) forward(cliques_[c]);
+  for (std::size_t i = path_.size(); i-- > 0;) backward(cliques_[path_[i]]);
+  Eigen::MatrixXd result(columns, columns);
+  Eigen::Index to = 0;
+  for (const int v : variables) {
+    const int size = dimension(graph_.variable(v).type);
+    result.middleRows(to, size) = right_.middleRows(offset_[static_cast<std::size_t>(v)], size);
+    to += size;
+  }
+  return Eigen::MatrixXd(0.5 * (result + result.transpose()));
+}
+
+}  // namespace understory

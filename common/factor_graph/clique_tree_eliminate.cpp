@@ -1,0 +1,183 @@
+// The numbers of the tree.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "common/factor_graph/clique_tree.hpp"
+
+namespace understory {
+namespace {
+
+/// A pivot below this part of the information that went into it is rounding.
+constexpr double kLeastPivot = 1e-13;
+
+}  // namespace
+
+/// Lists the cliques whose numbers alone change, children first.
+void CliqueTree::order_dirty() {
+  made_.clear();
+  pending_.resize(static_cast<std::size_t>(cliques_.size()), 0);
+  const auto is_dirty = [&](int c) { return mark_[static_cast<std::size_t>(c)] == kDirty; };
+  for (const int c : dirty_) {
+    const int parent = cliques_[c].parent;
+    if (is_dirty(c) && is_dirty(parent)) ++pending_[static_cast<std::size_t>(parent)];
+  }
+  for (const int c : dirty_) {
+    if (is_dirty(c) && pending_[static_cast<std::size_t>(c)] == 0) made_.push_back(c);
+  }
+  for (std::size_t i = 0; i < made_.size(); ++i) {
+    const int parent = cliques_[made_[i]].parent;
+    if (is_dirty(parent) && --pending_[static_cast<std::size_t>(parent)] == 0) {
+      made_.push_back(parent);
+    }
+  }
+}
+
+void CliqueTree::place_rows(const CliqueRecord& clique) {
+  offset_.resize(static_cast<std::size_t>(graph_.variable_capacity()));
+  least_.resize(static_cast<std::size_t>(clique.pivots));
+  int row = 0;
+  for (int i = 0; i < clique.row_count; ++i) {
+    const VariableRecord& variable = graph_.variable(clique.rows[i]);
+    offset_[static_cast<std::size_t>(clique.rows[i])] = row;
+    const int size = dimension(variable.type);
+    if (i < clique.frontal_count) {
+      const int translations = variable.type == VariableType::kPose2 ? 2 : 3;
+      for (int k = 0; k < size; ++k) {
+        least_[static_cast<std::size_t>(row + k)] =
+            kLeastPivot * variable.scale[k < translations ? 0 : 1];
+      }
+    }
+    row += size;
+  }
+}
+
+namespace {
+
+template <int rows>
+double dot(const double* a, const double* b) {
+  double sum = 0.0;
+  for (int i = 0; i < rows; ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+/// [J | b]' [J | b] into the front.
+template <int rows>
+void add_products(const double* j, int columns, const int* targets, double* front, int size) {
+  for (int a = 0; a < columns; ++a) {
+    for (int b = 0; b <= a; ++b) {
+      const int low = std::max(targets[a], targets[b]);
+      const int high = std::min(targets[a], targets[b]);
+      front[static_cast<std::ptrdiff_t>(high) * size + low] +=
+          dot<rows>(j + a * rows, j + b * rows);
+    }
+  }
+}
+
+void add_products_any(const double* j, int rows, int columns, const int* targets, double* front,
+                      int size) {
+  for (int a = 0; a < columns; ++a) {
+    for (int b = 0; b <= a; ++b) {
+      double sum = 0.0;
+      for (int i = 0; i < rows; ++i) sum += j[a * rows + i] * j[b * rows + i];
+      const int low = std::max(targets[a], targets[b]);
+      const int high = std::min(targets[a], targets[b]);
+      front[static_cast<std::ptrdiff_t>(high) * size + low] += sum;
+    }
+  }
+}
+
+}  // namespace
+
+void CliqueTree::add_factors(const CliqueRecord& clique) {
+  for (int f = clique.first_factor; f != kNone; f = graph_.factor(f).next) {
+    const FactorRecord& factor = graph_.factor(f);
+    targets_.clear();
+    for (const int v : graph_.variables_of(f)) {
+      const int first = offset_[static_cast<std::size_t>(v)];
+      const int size = dimension(graph_.variable(v).type);
+      for (int k = 0; k < size; ++k) targets_.push_back(first + k);
+    }
+    targets_.push_back(clique.size - 1);
+    const int columns = factor.columns + 1;
+    switch (factor.rows) {
+      case 2:
+        add_products<2>(factor.linear, columns, targets_.data(), clique.front, clique.size);
+        break;
+      case 3:
+        add_products<3>(factor.linear, columns, targets_.data(), clique.front, clique.size);
+        break;
+      case 6:
+        add_products<6>(factor.linear, columns, targets_.data(), clique.front, clique.size);
+        break;
+      default:
+        add_products_any(factor.linear, factor.rows, columns, targets_.data(), clique.front,
+                         clique.size);
+    }
+  }
+}
+
+/// A child's Schur complement, in runs of rows that stay side by side.
+void CliqueTree::add_schur(const CliqueRecord& child, double* front, int size) {
+  runs_.clear();
+  int row = 0;
+  for (int i = child.frontal_count; i <= child.row_count; ++i) {
+    const bool is_right = i == child.row_count;
+    const int to = is_right ? size - 1 : offset_[static_cast<std::size_t>(child.rows[i])];
+    const int length = is_right ? 1 : dimension(graph_.variable(child.rows[i]).type);
+    if (!runs_.empty() && runs_.back().to + runs_.back().length == to) {
+      runs_.back().length += length;
+    } else {
+      runs_.push_back({row, to, length});
+    }
+    row += length;
+  }
+  const double* schur = child.front + static_cast<std::ptrdiff_t>(child.pivots) * (child.size + 1);
+  for (std::size_t a = 0; a < runs_.size(); ++a) {
+    const Run column = runs_[a];
+    for (int c = 0; c < column.length; ++c) {
+      const double* from = schur + static_cast<std::ptrdiff_t>(column.from + c) * child.size;
+      double* to = front + static_cast<std::ptrdiff_t>(column.to + c) * size;
+      for (int r = c; r < column.length; ++r) to[column.to + r] += from[column.from + r];
+      for (std::size_t b = a + 1; b < runs_.size(); ++b) {
+        const Run rows = runs_[b];
+        if (rows.to > column.to) {
+          for (int r = 0; r < rows.length; ++r) to[rows.to + r] += from[rows.from + r];
+        } else {
+          // The parent has these in another order: the upper triangle's other half.
+          for (int r = 0; r < rows.length; ++r) {
+            front[static_cast<std::ptrdiff_t>(rows.to + r) * size + column.to + c] +=
+                from[rows.from + r];
+          }
+        }
+      }
+    }
+  }
+}
+
+void CliqueTree::add_children(const CliqueRecord& clique) {
+  for (int c = clique.first_child; c != kNone; c = cliques_[c].next_sibling) {
+    add_schur(cliques_[c], clique.front, clique.size);
+  }
+}
+
+void CliqueTree::factorise(int id) {
+  CliqueRecord& clique = cliques_.edit(id);
+  const auto numbers =
+      static_cast<std::size_t>(clique.size) * static_cast<std::size_t>(clique.size);
+  if (clique.front == nullptr || clique.front_epoch != cliques_.epoch()) {
+    clique.front = pool_.take(numbers);
+    clique.front_epoch = cliques_.epoch();
+  }
+  std::memset(clique.front, 0, numbers * sizeof(double));
+  place_rows(clique);
+  add_factors(clique);
+  add_children(clique);
+  left_out_.resize(static_cast<std::size_t>(clique.pivots));
+  const int left_out =
+      kernel_(clique.front, clique.size, clique.pivots, least_.data(), left_out_.data());
+  count_left_out((left_out > 0 ? 1 : 0) - (clique.left_out > 0 ? 1 : 0));
+  cliques_.edit(id).left_out = left_out;
+}
+
+}  // namespace understory

@@ -1,0 +1,19 @@
+#include "common/factor_graph/front_kernel.hpp"
+
+#include "common/factor_graph/front_kernel_impl.hpp"
+
+namespace understory {
+
+FrontKernel front_kernel_portable() { return &partial_cholesky<2>; }
+
+FrontKernel front_kernel() {
+#if defined(__x86_64__)
+  if (front_kernel_avx2() != nullptr && __builtin_cpu_supports("avx2") &&
+      __builtin_cpu_supports("fma")) {
+    return front_kernel_avx2();
+  }
+#endif
+  return front_kernel_portable();
+}
+
+}  // namespace understory

@@ -1,0 +1,20 @@
+// Dense elimination of the leading variables of one front.
+#pragma once
+
+namespace understory {
+
+/// Partial Cholesky factorisation in place. `front`: symmetric, size x size, column-major, lower
+/// triangle. The first `pivots` columns become those of L; the rest becomes the Schur complement.
+/// A pivot that is not above least[column] is left out: its column becomes that of the identity.
+/// The last row and column (the right-hand side) is never a pivot. Returns how many were left out;
+/// their numbers go to `left_out`.
+using FrontKernel = int (*)(double* front, int size, int pivots, const double* least,
+                            int* left_out);
+
+/// The fastest one that this processor can run.
+FrontKernel front_kernel();
+
+FrontKernel front_kernel_portable();
+FrontKernel front_kernel_avx2();  ///< Null where the compiler does not know it.
+
+}  // namespace understory

@@ -1,0 +1,265 @@
+#include "common/factor_graph/incremental_smoother.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace understory {
+namespace {
+
+/// A pose3's chart is left before its rotation gets far from the base [rad].
+constexpr double kFarTurn = 0.6;
+/// A step may add so much to the loss: that is the linearisations' age, and mended by the next.
+constexpr double kToleratedRise = 1.0;
+constexpr int kMaxHalvings = 8;
+
+}  // namespace
+
+std::string name_of(const FactorGraph& graph, VariableId id) {
+  const VariableType type = graph.type(id);
+  const bool is_pose = type == VariableType::kPose2 || type == VariableType::kPose3;
+  return (is_pose ? "pose " : "point ") + std::to_string(index(id));
+}
+
+IncrementalSmoother::IncrementalSmoother(const IncrementalParameters& parameters)
+    : parameters_(parameters), tree_(graph_) {}
+
+void IncrementalSmoother::begin_change() {
+  if (updated_ && !has_checkpoint_) commit();
+}
+
+void IncrementalSmoother::commit() {
+  graph_.commit();
+  tree_.commit();
+  saved_pending_ = pending_;
+  updated_ = false;
+}
+
+void IncrementalSmoother::checkpoint() {
+  commit();
+  has_checkpoint_ = true;
+}
+
+void IncrementalSmoother::rollback() {
+  tree_.rollback();
+  graph_.rollback();
+  pending_ = saved_pending_;
+  has_checkpoint_ = false;
+  updated_ = false;
+  moved_.clear();
+}
+
+FactorId IncrementalSmoother::keep(FactorId id) {
+  pending_.fresh.push_back(index(id));
+  return id;
+}
+
+void IncrementalSmoother::remove(FactorId id) {
+  begin_change();
+  if (!graph_.contains(id)) throw std::invalid_argument("smoother: no such factor");
+  if (graph_.factor(index(id)).clique == kNone) {
+    std::erase(pending_.fresh, index(id));
+  } else {
+    // What it tied together may fall apart: all that it touches is ordered anew.
+    for (const int v : graph_.variables_of(index(id))) tree_.mark_structure(v);
+    tree_.detach(index(id));
+  }
+  if (graph_.factor(index(id)).is_pending) std::erase(pending_.stale, index(id));
+  graph_.remove(id);
+}
+
+void IncrementalSmoother::remove(VariableId id) {
+  begin_change();
+  if (!graph_.contains(id)) throw std::invalid_argument("smoother: no such variable");
+  while (graph_.variable(index(id)).first_incidence != kNone) {
+    remove(FactorId(graph_.incidence(graph_.variable(index(id)).first_incidence).factor));
+  }
+  tree_.mark_structure(index(id));
+  std::erase(pending_.rebase, index(id));
+  pending_.doomed.push_back(index(id));
+}
+
+/// Linearises what is due; returns how many.
+long IncrementalSmoother::relinearise() {
+  for (const int v : pending_.rebase) {
+    graph_.rebase(v);
+    for (int i = graph_.variable(v).first_incidence; i != kNone; i = graph_.incidence(i).next) {
+      FactorRecord& factor = graph_.edit_factor(graph_.incidence(i).factor);
+      if (factor.is_pending) continue;
+      factor.is_pending = true;
+      pending_.stale.push_back(graph_.incidence(i).factor);
+    }
+  }
+  pending_.rebase.clear();
+  for (const int f : pending_.stale) {
+    graph_.edit_factor(f).is_pending = false;
+    graph_.linearise(f);
+    tree_.mark_numbers(f);
+  }
+  const auto count = static_cast<long>(pending_.stale.size());
+  pending_.stale.clear();
+  return count;
+}
+
+/// Compares the factors of the variables that moved with their linearisations; those that are off
+/// become stale. Sums up what the step did to the loss. Returns the largest deviation.
+double IncrementalSmoother::judge() {
+  ++count_;
+  judged_.clear();
+  judged_at_.resize(static_cast<std::size_t>(graph_.factor_capacity()), 0);
+  cost_change_ = 0.0;
+  double largest = 0.0;
+  for (const int v : tree_.changed()) {
+    for (int i = graph_.variable(v).first_incidence; i != kNone; i = graph_.incidence(i).next) {
+      const int f = graph_.incidence(i).factor;
+      if (judged_at_[static_cast<std::size_t>(f)] == count_) continue;
+      judged_at_[static_cast<std::size_t>(f)] = count_;
+      const double before = graph_.factor(f).cost;
+      const double deviation = graph_.deviation(f);
+      cost_change_ += graph_.factor(f).cost - before;
+      largest = std::max(largest, deviation);
+      if (deviation > parameters_.relinearise_above || !std::isfinite(deviation)) {
+        judged_.push_back(f);
+      }
+    }
+  }
+  return largest;
+}
+
+void IncrementalSmoother::shorten_step(double part) {
+  const std::vector<int>& changed = tree_.changed();
+  for (std::size_t i = 0; i < changed.size(); ++i) {
+    const VariableRecord& variable = graph_.variable(changed[i]);
+    const Delta& from = tree_.changed_from()[i];
+    Delta to{};
+    for (std::size_t k = 0; k < to.size(); ++k) {
+      to[k] = from[k] + part * (variable.delta[k] - from[k]);
+    }
+    graph_.move(changed[i], to.data());
+  }
+}
+
+/// Takes the step back by halves while it makes the loss larger.
+bool IncrementalSmoother::accept_step() {
+  for (int i = 0; i < kMaxHalvings; ++i) {
+    const double rise = cost_change_;
+    if (rise <= kToleratedRise) return true;
+    shorten_step(0.5);
+    pending_.solve_everything = true;
+    // The costs are of the longer step; the change counts from there.
+    judge();
+    cost_change_ += rise;
+  }
+  return false;
+}
+
+void IncrementalSmoother::iterate(IncrementalUpdate& update) {
+  ++update.iterations;
+  update.relinearised_factors += relinearise();
+  last_.clear();
+  for (const int f : pending_.fresh) {
+    for (const int v : graph_.variables_of(f)) last_.push_back(v);
+  }
+  const TreeStatistics statistics = tree_.eliminate(pending_.fresh, last_);
+  pending_.fresh.clear();
+  update.eliminated_variables += statistics.eliminated_variables;
+  update.refreshed_cliques += statistics.refreshed_cliques;
+  update.flops += statistics.flops;
+  if (pending_.solve_everything) {
+    pending_.solve_everything = false;
+    tree_.solve_everything(parameters_.least_move);
+  } else {
+    tree_.solve(parameters_.least_move);
+  }
+  update.deviation = judge();
+  accept_step();
+  for (const int f : judged_) {
+    FactorRecord& factor = graph_.edit_factor(f);
+    if (factor.is_pending) continue;
+    factor.is_pending = true;
+    pending_.stale.push_back(f);
+  }
+  for (const int v : tree_.changed()) {
+    if (moved_at_[static_cast<std::size_t>(v)] != 1) moved_.push_back(v);
+    moved_at_[static_cast<std::size_t>(v)] = 1;
+    const VariableRecord& variable = graph_.variable(v);
+    if (variable.type == VariableType::kPose3 &&
+        Eigen::Map<const Eigen::Vector3d>(variable.delta.data() + 3).norm() > kFarTurn) {
+      pending_.rebase.push_back(v);
+    }
+  }
+}
+
+IncrementalUpdate IncrementalSmoother::run() {
+  IncrementalUpdate update;
+  moved_.clear();
+  moved_at_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);
+  do {
+    iterate(update);
+  } while (update.iterations < parameters_.max_iterations &&
+           (update.deviation > parameters_.iterate_above || pending_.solve_everything));
+  update.moved_variables = static_cast<long>(moved_.size());
+  for (const int v : moved_) moved_at_[static_cast<std::size_t>(v)] = 0;
+  finish(update);
+  return update;
+}
+
+IncrementalUpdate IncrementalSmoother::update() {
+  begin_change();
+  return run();
+}
+
+IncrementalUpdate IncrementalSmoother::update_everything() {
+  begin_change();
+  tree_.mark_everything();
+  for (int v = 0; v < graph_.variable_capacity(); ++v) {
+    if (graph_.variable(v).in_use) pending_.rebase.push_back(v);
+  }
+  pending_.solve_everything = true;
+  return run();
+}
+
+void IncrementalSmoother::finish(IncrementalUpdate& update) {
+  for (const int v : pending_.doomed) graph_.remove(VariableId(v));
+  pending_.doomed.clear();
+  updated_ = true;
+  if (tree_.undetermined_cliques() == 0) return;
+  update.ok = false;
+  for (const int v : tree_.undetermined()) {
+    update.undetermined.push_back(VariableId(v));
+    if (!update.error.empty()) update.error += ", ";
+    update.error += name_of(graph_, VariableId(v));
+  }
+  update.error += update.undetermined.size() == 1 ? " is" : " are";
+  update.error += " not determined by the measurements";
+}
+
+std::optional<Eigen::MatrixXd> IncrementalSmoother::joint_covariance(
+    std::span<const VariableId> ids) {
+  std::vector<int> variables;
+  for (const VariableId id : ids) {
+    if (!graph_.contains(id)) return std::nullopt;
+    variables.push_back(index(id));
+  }
+  std::optional<Eigen::MatrixXd> covariance = tree_.joint_covariance(variables);
+  if (!covariance) return covariance;
+  Eigen::Index at = 0;
+  const auto turn = [&](Eigen::Index first, const Eigen::MatrixXd& by) {
+    covariance->middleRows(first, by.rows()) = by * covariance->middleRows(first, by.rows());
+    covariance->middleCols(first, by.rows()) =
+        covariance->middleCols(first, by.rows()) * by.transpose();
+  };
+  for (const int v : variables) {
+    const VariableRecord& variable = graph_.variable(v);
+    if (variable.type == VariableType::kPose2) {
+      turn(at, pose2_of(variable.value).rotation().transpose());
+    } else if (variable.type == VariableType::kPose3) {
+      turn(at, pose3_of(variable.value).rotation.conjugate().toRotationMatrix());
+      turn(at + 3, right_jacobian(Eigen::Map<const Eigen::Vector3d>(variable.delta.data() + 3)));
+    }
+    at += dimension(variable.type);
+  }
+  return covariance;
+}
+
+}  // namespace understory

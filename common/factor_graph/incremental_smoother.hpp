@@ -1,0 +1,129 @@
+// The least-squares solution of a factor graph, kept up to date at the cost of what changed.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/factor_graph/clique_tree.hpp"
+#include "common/factor_graph/factor_graph.hpp"
+
+namespace understory {
+
+struct IncrementalParameters {
+  /// A variable that would move by less of its conditional standard deviation stays [sigmas].
+  double least_move = 1e-2;
+  /// A factor whose residual is further than this from what its linearisation says is linearised
+  /// again with the next update [sigmas].
+  double relinearise_above = 0.05;
+  /// An update goes on (up to max_iterations) while a factor is this far from its linearisation.
+  double iterate_above = 1.0;
+  int max_iterations = 5;
+};
+
+/// What an update found. Never throws for what was measured; see `undetermined`.
+struct IncrementalUpdate {
+  bool ok = true;
+  std::vector<VariableId> undetermined;  ///< By the measurements; left where they are.
+  std::string error;                     ///< Names them.
+  int iterations = 0;
+  long eliminated_variables = 0;
+  long refreshed_cliques = 0;
+  long relinearised_factors = 0;
+  long moved_variables = 0;
+  double flops = 0.0;
+  double deviation = 0.0;  ///< Largest one left [sigmas].
+};
+
+/// Incremental smoother. Variables and factors are added and removed at any time; update() brings
+/// the estimates up to date.
+///
+/// Undo: rollback() takes everything back that happened since checkpoint(), or, where there was
+/// none, since before the changes that the last update() took in: estimates, factors, structure and
+/// numbers are exactly those of then. It costs what had changed.
+class IncrementalSmoother {
+ public:
+  explicit IncrementalSmoother(const IncrementalParameters& parameters = {});
+  IncrementalSmoother(IncrementalSmoother&&) = delete;
+  ~IncrementalSmoother() = default;
+
+  template <typename Initial>
+  VariableId add_variable(const Initial& initial) {
+    begin_change();
+    return graph_.add(initial);
+  }
+  FactorId add(const Factor& factor) { return begin_change(), keep(graph_.add(factor)); }
+  FactorId add(const CondensedFactor& factor) { return begin_change(), keep(graph_.add(factor)); }
+  FactorId add(std::shared_ptr<const UserFactor> factor, std::span<const VariableId> variables) {
+    return begin_change(), keep(graph_.add(std::move(factor), variables));
+  }
+  void remove(FactorId id);
+  /// With all its factors.
+  void remove(VariableId id);
+  /// Takes variables out and leaves what they tell about their neighbours, linearised here.
+  /// False (and nothing is changed) where the variables' own factors do not determine them.
+  bool marginalise(std::span<const VariableId> ids);
+
+  IncrementalUpdate update();
+  /// Orders and factorises everything anew, linearised at the estimates, and iterates.
+  IncrementalUpdate update_everything();
+
+  void checkpoint();
+  void rollback();
+
+  const FactorGraph& graph() const { return graph_; }
+  SE2 pose2(VariableId id) const { return pose2_of(graph_.value(id)); }
+  Pose3 pose3(VariableId id) const { return pose3_of(graph_.value(id)); }
+  Eigen::Vector2d point2(VariableId id) const { return point2_of(graph_.value(id)); }
+  Eigen::Vector3d point3(VariableId id) const { return point3_of(graph_.value(id)); }
+  /// Variables that the last update moved.
+  std::span<const int> moved() const { return moved_; }
+
+  /// Joint covariance in the order given: poses perturbed on the right, in their own frames. None
+  /// where one has no factor or is not determined. Costs what the paths to the root cost.
+  std::optional<Eigen::MatrixXd> joint_covariance(std::span<const VariableId> ids);
+
+  const CliqueTree& tree() const { return tree_; }
+  std::size_t bytes() const { return graph_.bytes() + tree_.bytes(); }
+
+ private:
+  struct Pending {
+    std::vector<int> fresh;   ///< Factors that the tree does not hold yet.
+    std::vector<int> stale;   ///< Factors to be linearised again.
+    std::vector<int> rebase;  ///< Variables far from their charts' bases.
+    std::vector<int> doomed;  ///< Variables to be removed.
+    bool solve_everything = false;
+  };
+
+  void begin_change();
+  void commit();
+  FactorId keep(FactorId id);
+  long relinearise();
+  void iterate(IncrementalUpdate& update);
+  double judge();
+  bool accept_step();
+  void shorten_step(double part);
+  void finish(IncrementalUpdate& update);
+  IncrementalUpdate run();
+
+  IncrementalParameters parameters_;
+  FactorGraph graph_;
+  CliqueTree tree_;
+  Pending pending_;
+  Pending saved_pending_;
+  bool has_checkpoint_ = false;
+  bool updated_ = false;
+
+  std::vector<int> last_;
+  std::vector<int> moved_;
+  std::vector<std::uint64_t> moved_at_;
+  std::vector<std::uint64_t> judged_at_;
+  std::vector<int> judged_;
+  std::uint64_t count_ = 0;
+  double cost_change_ = 0.0;
+};
+
+/// "pose 3", "point 7": for messages.
+std::string name_of(const FactorGraph& graph, VariableId id);
+
+}  // namespace understory

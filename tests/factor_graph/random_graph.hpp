@@ -1,0 +1,70 @@
+// Random graphs of the plane for the smoothers' tests.
+#pragma once
+
+#include <Eigen/Dense>
+#include <random>
+
+#include "common/factor_graph/graph.hpp"
+
+namespace understory {
+
+inline Eigen::Vector3d random_tangent(std::mt19937_64& random, double translation, double angle) {
+  std::normal_distribution<double> normal;
+  const double x = translation * normal(random);
+  const double y = translation * normal(random);
+  return {x, y, angle * normal(random)};
+}
+
+/// A drive among points: every pose sees every point near by and is tied to the one before; values
+/// are off by `error`.
+inline Graph random_graph(std::mt19937_64& random, int poses, int points, double error) {
+  std::uniform_real_distribution<double> where(-15.0, 15.0);
+  std::vector<Eigen::Vector2d> true_points;
+  Graph graph;
+  for (int i = 0; i < points; ++i) {
+    const double x = where(random);
+    true_points.emplace_back(x, where(random));
+    graph.add_point(true_points.back() + random_tangent(random, error, 0).head<2>());
+  }
+  SE2 truth;
+  SE2 before;
+  std::normal_distribution<double> normal;
+  for (int k = 0; k < poses; ++k) {
+    const PoseId pose =
+        graph.add_pose(truth * SE2::Exp(random_tangent(random, error, 0.2 * error)));
+    if (k == 0) graph.pose_priors.push_back({pose, truth, 1e6 * Eigen::Matrix3d::Identity()});
+    if (k > 0) {
+      const SE2 motion = before.inverse() * truth * SE2::Exp(random_tangent(random, 0.1, 0.05));
+      graph.relative_poses.push_back({PoseId(static_cast<std::uint32_t>(k - 1)), pose, motion,
+                                      Eigen::Vector3d(100.0, 100.0, 400.0).asDiagonal()});
+    }
+    for (int i = 0; i < points; ++i) {
+      const Eigen::Vector2d seen = truth.inverse() * true_points[static_cast<std::size_t>(i)];
+      if (seen.norm() > 14.0) continue;
+      Eigen::Matrix2d information;
+      information << 25.0, 5.0, 5.0, 16.0;
+      const double x = normal(random);
+      const double y = normal(random);
+      graph.observations.push_back({pose, PointId(static_cast<std::uint32_t>(i)),
+                                    seen + 0.2 * Eigen::Vector2d(x, y), information});
+    }
+    before = truth;
+    truth = truth * SE2::Exp(Eigen::Vector3d(1.0, 0.1, 0.25));
+  }
+  return graph;
+}
+
+/// The greatest distance between two graphs' estimates [m, rad].
+inline double difference(const Graph& a, const Graph& b) {
+  double largest = 0.0;
+  for (std::size_t i = 0; i < a.poses.size(); ++i) {
+    const SE2 between = a.poses[i].inverse() * b.poses[i];
+    largest = std::max(largest, between.coordinates().cwiseAbs().maxCoeff());
+  }
+  for (std::size_t i = 0; i < a.points.size(); ++i) {
+    largest = std::max(largest, (a.points[i] - b.points[i]).norm());
+  }
+  return largest;
+}
+
+}  // namespace understory
