@@ -1,0 +1,44 @@
+// Time of one scan in the filter: prediction, gates, joint update, outputs.
+#include "services/ekf/ekf.hpp"
+
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+
+using namespace understory;
+
+namespace {
+
+/// `count` landmarks on a grid around a vehicle that goes straight on, all seen in every scan.
+void one_scan(benchmark::State& state) {
+  const int count = static_cast<int>(state.range(0));
+  EkfParameters parameters;
+  parameters.map.max_landmarks = 200;
+  Ekf filter(parameters);
+  const int side = static_cast<int>(std::ceil(std::sqrt(count)));
+  TrackedScan scan;
+  scan.field_of_view.max_range_m = 60.0;
+  for (int i = 0; i < count; ++i) {
+    Detection seen;
+    seen.position_m << 5.0 * (i % side - side / 2), 5.0 * (i / side - side / 2), 0.0;
+    seen.covariance_m2 = 0.01 * Eigen::Matrix3d::Identity();
+    scan.landmarks.push_back({static_cast<TrackId>(i + 1), static_cast<std::uint32_t>(i), seen});
+  }
+  Odometry piece;
+  piece.covariance = 1e-6 * Eigen::Matrix3d::Identity();
+  piece.inertial.emplace();
+  piece.inertial->seconds = 0.1;
+  piece.inertial->covariance = 1e-6 * Eigen::Matrix<double, 5, 5>::Identity();
+  for (auto _ : state) {
+    filter.add(piece);
+    benchmark::DoNotOptimize(filter.add(scan));
+    piece.from_utime = scan.utime;
+    piece.utime = scan.utime += 100000;
+  }
+  state.counters["used"] = static_cast<double>(filter.counters().landmarks_used) /
+                           static_cast<double>(filter.counters().scans);
+}
+
+}  // namespace
+
+BENCHMARK(one_scan)->Arg(20)->Arg(50)->Arg(75)->Arg(100)->Arg(150)->Unit(benchmark::kMicrosecond);
