@@ -31,14 +31,14 @@ class SensorChain::TimedBus : public Bus {
     return bus_.publish(channel, bytes);
   }
   void subscribe(std::string_view channel, std::size_t queue_size, Handler handler) override {
-    bus_.subscribe(
-        channel, queue_size, [this, handler = std::move(handler)](const BusMessage& message) {
-          const auto start = std::chrono::steady_clock::now();
-          handler(message);
-          const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-          time.total_s += took.count();
-          time.calls_ms.push_back(static_cast<float>(took.count() * 1e3));
-        });
+    bus_.subscribe(channel, queue_size,
+                   [this, handler = std::move(handler)](const BusMessage& message) {
+                     const double start_s = processor_s();
+                     handler(message);
+                     const double took_s = processor_s() - start_s;
+                     time.total_s += took_s;
+                     time.calls_ms.push_back(static_cast<float>(took_s * 1e3));
+                   });
   }
   bool handle_one(int timeout_ms) override { return bus_.handle_one(timeout_ms); }
   std::uint64_t dropped(std::string_view channel) const override { return bus_.dropped(channel); }
