@@ -37,7 +37,7 @@ struct SweepParameters {
   double range_sigma_m = 0.02;    ///< Of one beam.
   double beam_width_rad = 0.0;    ///< By how much a beam's footprint widens an object on each side.
   double min_height_m = 0.3;      ///< Above ground: what is lower is ground, grass, stones.
-  double max_height_m = 5.0;      ///< Above ground: what is higher is canopy.
+  double max_height_m = 4.0;      ///< Above ground: what is higher is canopy.
   double break_distance_m = 0.3;  ///< Neighbouring returns farther apart are two objects...
   double break_per_range = 0.01;  ///< ... plus this much per metre of range.
   double clearance_m = 0.4;       ///< What stands beside an object's edge is so much farther away.
@@ -75,7 +75,7 @@ struct CornerParameters {
   double max_gap_m = 0.3;           ///< From the end of a wall's returns to the corner...
   double max_gap_per_range = 0.02;  ///< ... plus this much per metre of range.
   double max_skew_rad = 0.2;        ///< Of the angle between the walls from a right one.
-  double flatness_sigma_m = 0.01;   ///< Of a wall; more points do not average it out.
+  double flatness_sigma_m = 0.006;   ///< Of a wall; more points do not average it out.
   int min_rings = 3;
 };
 

@@ -71,9 +71,7 @@ std::optional<Detection> SweepTrunks::judge(const RingCloud& cloud, const std::v
   const GroundHeight below = ground.below(fit->state.head<2>());
   if (!plausible(*fit, below.height_m + sweep_.breast_height_m)) return std::nullopt;
   if (!stands(probe_stem(cloud, *fit, below.height_m, sweep_))) return std::nullopt;
-  const Eigen::Vector2f centre = fit->state.head<2>().cast<float>();
-  const auto around = columns_.points_near(runs, centre, static_cast<float>(trunk_.leaf_radius_m));
-  if (static_cast<double>(fit->points) < trunk_.min_share * static_cast<double>(around)) {
+  if (is_in_leaves(runs, *fit)) {
     ++counters_.in_leaves;
     return std::nullopt;
   }
@@ -90,6 +88,18 @@ std::optional<Detection> SweepTrunks::judge(const RingCloud& cloud, const std::v
     return std::nullopt;
   }
   return detection;
+}
+
+/// Below a crown: whether more returns are beside the stem than a trunk has.
+bool SweepTrunks::is_in_leaves(const std::vector<Run>& runs, const StemFit& fit) const {
+  const auto highest = static_cast<float>(sweep_.standing_height_m);
+  std::size_t on = 0;
+  for (const std::uint32_t i : fitter_.agreeing()) {
+    if (runs[i].height_m <= highest) on += runs[i].size();
+  }
+  const std::size_t around = columns_.points_near(
+      runs, fit.state.head<2>().cast<float>(), static_cast<float>(trunk_.leaf_radius_m), highest);
+  return static_cast<double>(on) < trunk_.min_share * static_cast<double>(around);
 }
 
 bool SweepTrunks::plausible(const StemFit& fit, double breast_z) {

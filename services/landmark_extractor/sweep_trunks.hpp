@@ -44,6 +44,7 @@ class SweepTrunks {
                                  const Column& column, const GroundSurface& ground,
                                  const Eigen::Matrix2d& level_covariance_rad2);
   bool plausible(const StemFit& fit, double breast_z);
+  bool is_in_leaves(const std::vector<Run>& runs, const StemFit& fit) const;
   bool stands(const StemProbe& probe);
 
   SweepParameters sweep_;

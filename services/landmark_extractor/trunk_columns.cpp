@@ -72,9 +72,11 @@ void ColumnFinder::gather(const std::vector<Run>& runs, const Eigen::Vector2f& a
 }
 
 std::size_t ColumnFinder::points_near(const std::vector<Run>& runs, const Eigen::Vector2f& centre_m,
-                                      float radius_m) const {
+                                      float radius_m, float highest_m) const {
   std::size_t points = 0;
-  visit_near(runs, centre_m, radius_m, [&](std::uint32_t index) { points += runs[index].size(); });
+  visit_near(runs, centre_m, radius_m, [&](std::uint32_t index) {
+    if (runs[index].height_m <= highest_m) points += runs[index].size();
+  });
   return points;
 }
 

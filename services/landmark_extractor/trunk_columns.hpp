@@ -25,10 +25,10 @@ class ColumnFinder {
                                   const SweepTrunkParameters& parameters,
                                   const Eigen::Vector2f& centre_m, float reach_m);
 
-  /// Points on runs whose centres are within the radius, whatever column they are in; of the runs
-  /// of the last find().
+  /// Points on runs up to `highest_m` above ground whose centres are within the radius, whatever
+  /// column they are in; of the runs of the last find().
   std::size_t points_near(const std::vector<Run>& runs, const Eigen::Vector2f& centre_m,
-                          float radius_m) const;
+                          float radius_m, float highest_m) const;
 
  private:
   template <class Visit>
