@@ -8,7 +8,7 @@ namespace understory::sim {
 
 PlanarLaser::PlanarLaser(const World& world, const PlanarLaserParameters& parameters,
                          std::uint64_t seed)
-    : world_(world), parameters_(parameters), seed_(mixed(seed, 0x91a2)), caster_(world) {}
+    : parameters_(parameters), seed_(mixed(seed, 0x91a2)), caster_(world) {}
 
 SimulatedPlanarScan PlanarLaser::scan(const VehicleMotion& motion, std::uint64_t k,
                                       Utime utime_of_start) {

@@ -41,7 +41,6 @@ class PlanarLaser {
   SimulatedPlanarScan scan(const VehicleMotion& motion, std::uint64_t k, Utime utime_of_start = 0);
 
  private:
-  const World& world_;
   PlanarLaserParameters parameters_;
   std::uint64_t seed_;
   RayCaster caster_;

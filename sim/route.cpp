@@ -46,7 +46,7 @@ Points extended(const Points& points, int count) {
 Points box_smoothed(const Points& points, int half) {
   Points result;
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  const auto width = static_cast<std::size_t>(2 * half + 1);
+  const std::size_t width = 2 * static_cast<std::size_t>(half) + 1;
   for (std::size_t i = 0; i < points.size(); ++i) {
     sum += points[i];
     if (i + 1 >= width) {

@@ -13,8 +13,8 @@ namespace {
 using std::numbers::pi;
 
 std::vector<double> evenly(double first_deg, double step_deg, int count) {
-  std::vector<double> result;
-  for (int i = 0; i < count; ++i) result.push_back((first_deg + i * step_deg) * pi / 180.0);
+  std::vector<double> result(static_cast<std::size_t>(count), first_deg);
+  for (int i = 0; i < count; ++i) result[i] = (first_deg + i * step_deg) * pi / 180.0;
   return result;
 }
 
