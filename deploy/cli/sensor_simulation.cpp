@@ -43,8 +43,9 @@ sim::Scenario pole_scenario(const SensorSimulationOptions& options) {
   if (comma == std::string::npos) {
     wrong_usage(fmt::format("{}: poles:POLES.csv,TRAJECTORY.csv is wanted", options.world));
   }
-  auto result = sim::pole_map_scenario(read_file(files.substr(0, comma)),
-                                       read_file(files.substr(comma + 1)), options.seed);
+  const std::string poles = read_file(files.substr(0, comma));
+  const std::string trajectory = read_file(files.substr(comma + 1));
+  auto result = sim::pole_map_scenario(poles, trajectory, options.seed);
   if (!result.scenario) fail(fmt::format("{}: {}", files, result.error));
   return std::move(*result.scenario);
 }

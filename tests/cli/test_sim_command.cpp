@@ -1,0 +1,83 @@
+#include <map>
+
+#include "common/wire/convert.hpp"
+#include "tests/catch.hpp"
+#include "tests/cli/run_command.hpp"
+#include "understory/ground_truth_t.hpp"
+#include "understory/truth_landmarks_t.hpp"
+
+using namespace understory;
+using namespace understory::test;
+using Catch::Matchers::Contains;
+
+TEST_CASE("sim with sensors writes every raw channel, sweeps in parts that fit together", "[cli]") {
+  const TemporaryDirectory directory;
+  const auto log = directory / "drive.lcm";
+  const auto outcome = understory_command(
+      directory,
+      "sim countryside --way 20 --standstill 1 --lidar vlp16 --planar-laser --out " + log.string());
+  CAPTURE(outcome.error);
+  REQUIRE(outcome.status == 0);
+  CHECK_THAT(outcome.out, Contains("m driven in"));
+
+  std::map<std::string, int> events;
+  SweepAssembler assembler;
+  int sweeps = 0;
+  std::int64_t last_received = 0;
+  Utime last_truth = -1;
+  LcmLogReader reader(log);
+  while (const auto event = reader.next()) {
+    ++events[event->channel];
+    CHECK(event->utime >= last_received);
+    last_received = event->utime;
+    if (event->channel == "RAW_SWEEP") {
+      CHECK(event->data.size() < 65000);
+      auto part = decode_message<PointSweep>(event->data);
+      REQUIRE(part);
+      if (const auto sweep = assembler.add(std::move(*part))) {
+        ++sweeps;
+        CHECK(sweep->rings == 16);
+        CHECK(sweep->points.size() > 5000);
+        CHECK(sweep->utime <= event->utime);
+      }
+    } else if (event->channel == "RAW_IMU") {
+      CHECK(decode_message<ImuSample>(event->data));
+    } else if (event->channel == "GROUND_TRUTH") {
+      const auto truth = decode_message<ground_truth_t>(event->data);
+      REQUIRE(truth);
+      CHECK(truth->utime > last_truth);
+      last_truth = truth->utime;
+    } else if (event->channel == "TRUTH_LANDMARKS") {
+      const auto landmarks = decode_message<truth_landmarks_t>(event->data);
+      REQUIRE(landmarks);
+      CHECK(landmarks->num_landmarks > 0);
+    }
+  }
+  const double seconds = 1e-6 * static_cast<double>(last_received);
+  CHECK(seconds > 5.0);
+  CHECK(assembler.incomplete_turns() == 0);
+  CHECK(sweeps == Approx(10.0 * seconds).margin(1.0));
+  CHECK(events["RAW_IMU"] == Approx(200.0 * seconds).margin(2.0));
+  CHECK(events["RAW_WHEELS"] == Approx(100.0 * seconds).margin(2.0));
+  CHECK(events["RAW_SCAN"] == Approx(10.0 * seconds).margin(2.0));
+  CHECK(events["RAW_GNSS"] == Approx(2.0 * seconds).margin(2.0));
+  CHECK(events["GROUND_TRUTH"] == Approx(50.0 * seconds).margin(2.0));
+  CHECK(events["TRUTH_LANDMARKS"] == 1);
+}
+
+TEST_CASE("sim names what it does not know", "[cli]") {
+  const TemporaryDirectory directory;
+  const auto run = [&](const std::string& arguments) {
+    return understory_command(directory,
+                              "sim " + arguments + " --out " + (directory / "never.lcm").string());
+  };
+  const auto lidar = run("urban --lidar vlp17");
+  CHECK(lidar.status == 2);
+  CHECK_THAT(lidar.error, Contains("vlp17"));
+  CHECK(run("forest3d --forest jungle").status == 2);
+  CHECK(run("poles:a.csv").status == 2);
+  const auto missing = run("poles:" + (directory / "none.csv").string() + ",b.csv");
+  CHECK(missing.status == 1);
+  CHECK_THAT(missing.error, Contains("none.csv"));
+  CHECK_FALSE(std::filesystem::exists(directory / "never.lcm"));
+}
