@@ -19,7 +19,7 @@ constexpr float kOnGround_m = 0.25F;
 /// Roughness: how far the ground at one place is from the returns around it.
 constexpr double kRoughness_m = 0.05;
 /// How much the surface's own height is unknown per metre from the nearest ground returns.
-constexpr double kUnknownSlope = 0.08;
+constexpr double kUnknownSlope = 0.12;
 
 /// Cells above the surface are hardly ground; cells far below are ghosts.
 float weight(float above_m, float scale_m) {

@@ -12,11 +12,28 @@ namespace {
 
 /// A wall is looked at this far from its corner to see whether it ends below a person's height [m].
 constexpr double kAside_m = 0.4;
+/// Rings this much above its highest return should have met it, were it higher [m].
+constexpr double kAbove_m = 0.02;
+/// So many beams on either side do not all drop out.
+constexpr float kBeamsAside = 2.5F;
 
 double square(double value) { return value * value; }
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
+}
+
+/// Whether the ring's beams about an azimuth go on beyond the range, or to nowhere.
+bool passes(const RingCloud& cloud, std::size_t ring, float azimuth, double range) {
+  const float half = kBeamsAside * cloud.step_rad(ring);
+  const std::size_t end = cloud.ring_end(ring);
+  for (std::size_t i = cloud.first_at(ring, azimuth - half); i < end; ++i) {
+    const RingPoint& point = cloud.points()[i];
+    const float off = std::remainder(point.azimuth_rad - azimuth, 2.0F * std::numbers::pi_v<float>);
+    if (std::abs(off) > half) break;
+    if (point.range_m <= range) return false;
+  }
+  return true;
 }
 
 /// Away from `place` into the wall.
@@ -122,21 +139,13 @@ bool SweepCorners::stands(const RingCloud& cloud, const WallLine& wall,
   const double distance = (place - sensor).norm();
   const auto azimuth =
       static_cast<float>(std::atan2(place.y() - sensor.y(), place.x() - sensor.x()));
-  int over = 0;
   for (std::size_t ring = 0; ring < cloud.rings(); ++ring) {
     if (cloud.step_rad(ring) <= 0.0F) continue;
-    const std::size_t i = std::min(cloud.first_at(ring, azimuth), cloud.ring_end(ring) - 1);
-    const RingPoint& point = cloud.points()[i];
-    const double slope = (point.z_m - cloud.sensor_m().z()) / point.range_m;
-    const double z = cloud.sensor_m().z() + slope * distance;
-    const bool is_above = z > wall.high_z_m + 0.02 && z < ground_z + sweep_.standing_height_m;
-    if (!is_above) continue;
-    float off = std::abs(point.azimuth_rad - azimuth);
-    off = std::min(off, std::abs(off - 2.0F * std::numbers::pi_v<float>));
-    const bool is_there = off < 3.0F * cloud.step_rad(ring);
-    if (is_there && point.range_m > distance + sweep_.clearance_m) ++over;
+    const double z = cloud.sensor_m().z() + cloud.slope(ring, azimuth) * distance;
+    const bool is_above = z > wall.high_z_m + kAbove_m && z < ground_z + sweep_.standing_height_m;
+    if (is_above && passes(cloud, ring, azimuth, distance + sweep_.clearance_m)) return false;
   }
-  return over == 0;
+  return true;
 }
 
 }  // namespace understory

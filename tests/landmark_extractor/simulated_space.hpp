@@ -52,7 +52,8 @@ struct Spinner {
 };
 
 inline Spinner spinner_of(int rings) {
-  if (rings == 16) return {.rings = 16, .columns = 1800, .lowest_rad = -0.262, .highest_rad = 0.262};
+  if (rings == 16)
+    return {.rings = 16, .columns = 1800, .lowest_rad = -0.262, .highest_rad = 0.262};
   if (rings == 64) return {.rings = 64, .columns = 2048, .lowest_rad = -0.43, .highest_rad = 0.035};
   return {.rings = rings, .columns = 2048};
 }
@@ -101,8 +102,9 @@ inline double hit_ground(const Space& space, const Eigen::Vector3d& o, const Eig
 }
 
 /// The turn of a standing vehicle with the given attitude; points in frame `vehicle`.
-inline PointSweep sweep(const Space& space, const Spinner& spinner, std::mt19937_64& random,
-                        const Eigen::Quaterniond& level_Q_vehicle = Eigen::Quaterniond::Identity()) {
+inline PointSweep sweep(
+    const Space& space, const Spinner& spinner, std::mt19937_64& random,
+    const Eigen::Quaterniond& level_Q_vehicle = Eigen::Quaterniond::Identity()) {
   PointSweep result;
   result.is_deskewed = true;
   result.rings = static_cast<std::uint16_t>(spinner.rings);

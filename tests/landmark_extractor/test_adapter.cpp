@@ -3,6 +3,7 @@
 #include "services/landmark_extractor/adapter.hpp"
 #include "services/landmark_extractor/landmark_extractor.hpp"
 #include "tests/catch.hpp"
+#include "tests/landmark_extractor/simulated_space.hpp"
 #include "tests/landmark_extractor/simulated_sweep.hpp"
 
 using namespace understory;
@@ -102,4 +103,35 @@ TEST_CASE("the extractor's parameters and channels are those it was given", "[ex
   for (const auto& detection : near.landmarks[0].detections) {
     CHECK(detection.position_m.norm() < 5.0);
   }
+}
+
+TEST_CASE("turns in parts become one scan; lost parts and bad sweeps are counted", "[extractor]") {
+  std::mt19937_64 random(4);
+  Bench bench;
+  Space space;
+  space.stems = {{{6.0, 2.0}, 0.2}, {{-4.0, 5.0}, 0.15}, {{1.0, -9.0}, 0.1}};
+  const auto count = [&](Reason reason) {
+    return bench.hosted.node().monitor().count_of("LIDAR_SWEEP", reason);
+  };
+  std::uint64_t sequence = 0;
+  for (std::uint64_t turn = 0; turn < 6; ++turn) {
+    PointSweep whole = sweep(space, spinner_of(16), random);
+    whole.utime = 1000000 + 100000 * static_cast<Utime>(turn);
+    whole.turn = turn;
+    if (turn == 4) whole.is_deskewed = false;
+    if (turn == 5) whole.attitude.reset();
+    std::vector<PointSweep> parts = split_sweep(whole, 4000);
+    REQUIRE(parts.size() > 2);
+    for (PointSweep& part : parts) {
+      part.sequence = sequence++;
+      if (turn == 2 && part.part == 1) continue;  // Lost on the way.
+      bench.send(encode_message(part), "LIDAR_SWEEP");
+    }
+  }
+  // The turn with a lost part and the one that is not in frame vehicle are missing.
+  REQUIRE(bench.landmarks.size() == 4);
+  for (const LandmarkScan& scan : bench.landmarks) CHECK(scan.detections.size() == 3);
+  CHECK(count(Reason::kPartsMissing) >= 1);
+  CHECK(count(Reason::kInconsistent) == 1);
+  CHECK(count(Reason::kNotCalibrated) == 1);
 }
