@@ -54,6 +54,18 @@ void step(Preintegration& sum, const LevelSample& a, const LevelSample& b,
   sum.seconds += dt;
 }
 
+/// The IMU's place is taken out with the rate at both ends: their noise, times the lever, is noise
+/// of the velocity there; that of the start moves the end's position.
+void add_lever_noise(Preintegration& sum, const ImuParameters& imu) {
+  const double at_end = square(imu.gyro_noise) / kLeverBaseline_s *
+                        (square(imu.mount.x_m) + square(imu.mount.y_m) + square(imu.mount.z_m));
+  const Eigen::Matrix2d one = at_end * Eigen::Matrix2d::Identity();
+  sum.covariance.block<2, 2>(1, 1) += 2.0 * one;
+  sum.covariance.block<2, 2>(1, 3) += sum.seconds * one;
+  sum.covariance.block<2, 2>(3, 1) += sum.seconds * one;
+  sum.covariance.block<2, 2>(3, 3) += square(sum.seconds) * one;
+}
+
 double speed_at(const std::deque<SpeedSample>& speeds, Utime utime) {
   auto after = std::ranges::lower_bound(speeds, utime, {}, &SpeedSample::utime);
   if (after == speeds.end()) return speeds.back().speed_mps;
@@ -120,6 +132,7 @@ Preintegration preintegrate(const std::deque<LevelSample>& samples, const ImuPar
   Preintegration sum;
   sum.bias = bias;
   for (std::size_t i = 0; i + 1 < samples.size(); ++i) step(sum, samples[i], samples[i + 1], imu);
+  add_lever_noise(sum, imu);
   return sum;
 }
 

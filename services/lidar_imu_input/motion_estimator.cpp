@@ -35,16 +35,18 @@ ImuSample MotionEstimator::to_vehicle(const ImuSample& sensor_sample) {
   ImuSample sample = sensor_sample;
   sample.angular_rate_rad_s = turn * sensor_sample.angular_rate_rad_s;
   sample.specific_force_mps2 = turn * sensor_sample.specific_force_mps2;
-  // Differences of the rate telescope in the integral: their noise does not add up.
+  // Differences of the rate telescope in the integral: their noise does not add up. Over some
+  // samples they are less noisy still.
   const Eigen::Vector3d lever = parameters_.imu.mount.position_m();
   const Eigen::Vector3d& rate = sample.angular_rate_rad_s;
   Eigen::Vector3d lever_force = rate.cross(rate.cross(lever));
-  if (raw_) {
-    const double seconds = seconds_between(raw_->utime, sample.utime);
-    if (seconds > 0.0 && seconds <= parameters_.imu.max_gap_s)
-      lever_force += (rate - raw_->angular_rate_rad_s).cross(lever) / seconds;
-  }
-  raw_ = sample;
+  if (!raw_.empty() && seconds_between(raw_.back().utime, sample.utime) > parameters_.imu.max_gap_s)
+    raw_.clear();
+  raw_.push_back(sample);
+  while (raw_.size() > 2 && seconds_between(raw_[1].utime, sample.utime) >= kLeverBaseline_s)
+    raw_.pop_front();
+  const double seconds = seconds_between(raw_.front().utime, sample.utime);
+  if (seconds > 0.0) lever_force += (rate - raw_.front().angular_rate_rad_s).cross(lever) / seconds;
   sample.specific_force_mps2 -= lever_force;
   return sample;
 }
@@ -83,7 +85,7 @@ void MotionEstimator::propagate(const ImuSample& sample, bool is_saturated, doub
       std::sqrt(square(standing_bias_sigma_) + square(parameters_.imu.gyro_bias_walk) * seconds);
   const bool bias_known = standstill_.longest_s() > kBiasKnown_s &&
                           standing_bias_sigma_ < 0.02 * parameters_.standstill.gyro_mean_rad_s;
-  standstill_.add(sample, bias_known ? std::optional(attitude_->gyro_bias()) : std::nullopt);
+  standstill_.add(raw_.back(), bias_known ? std::optional(attitude_->gyro_bias()) : std::nullopt);
   if (standstill_.is_standing()) {
     use_standstill(sample, seconds);
   } else {

@@ -78,7 +78,7 @@ class MotionEstimator {
   MotionHistory history_;
   std::deque<VelocityCorrection> corrections_;
 
-  std::optional<ImuSample> raw_;     ///< Latest, frame vehicle, lever not taken out.
+  std::deque<ImuSample> raw_;        ///< Latest, frame vehicle, lever not taken out.
   std::optional<ImuSample> latest_;  ///< Latest, frame vehicle.
   std::optional<LevelSample> latest_level_;
   std::optional<Utime> pose_utime_;  ///< What the dead reckoning stands at.

@@ -38,6 +38,10 @@ struct ImuParameters {
   double max_gap_s = 0.15;               ///< Samples farther apart are not joined.
 };
 
+/// Over so long the rate is differenced to take out what the IMU feels of turning about the
+/// vehicle's origin.
+constexpr double kLeverBaseline_s = 0.02;
+
 /// When the vehicle counts as standing, and the calibration that this allows.
 struct StandstillParameters {
   double window_s = 0.5;
