@@ -13,6 +13,8 @@ namespace {
 constexpr std::size_t kMaxRuns = 10;
 constexpr std::size_t kHitsPerRun = 7;
 constexpr int kIterations = 8;
+/// The next step of the estimate would be smaller by far than this one's square.
+constexpr double kSettled_m2 = 4e-7;
 /// Beams that graze the stem more than this (part of the radius) say little of its range.
 constexpr double kMaxGraze = 0.9;
 /// Residuals beyond this many sigma weigh as those at it (Huber).
@@ -256,7 +258,7 @@ bool StemFitter::settle(Vector6d& state) {
     state += change;
     state[2] = std::clamp(state[2], 0.5 * trunk_.min_radius_m, 2.0 * trunk_.max_radius_m);
     if (!state.allFinite()) return false;
-    if (change.head<3>().squaredNorm() < 1e-8) break;
+    if (change.head<3>().squaredNorm() < kSettled_m2) break;
   }
   const Hit& any = hits_.front();
   return (state.head<2>() - any.sight.origin_m).dot(any.sight.direction) > 1.1 * state[2];

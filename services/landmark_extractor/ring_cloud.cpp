@@ -1,6 +1,7 @@
 #include "services/landmark_extractor/ring_cloud.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -21,6 +22,38 @@ float wrapped(float angle) {
   if (angle > kPi) return angle - kTurn;
   return angle < -kPi ? angle + kTurn : angle;
 }
+
+constexpr std::size_t kBlock = 256;
+
+/// Some points, coordinate by coordinate.
+struct Block {
+  std::array<float, kBlock> x{};
+  std::array<float, kBlock> y{};
+  std::array<float, kBlock> z{};
+  std::array<float, kBlock> range2{};
+  std::array<float, kBlock> range{};
+  std::array<float, kBlock> azimuth{};
+
+  void place(std::span<const SweepPoint> points, const Eigen::Matrix3f& rotation,
+             const Eigen::Vector3f& sensor, const Eigen::Vector3f& velocity) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const SweepPoint& p = points[i];
+      x[i] = rotation(0, 0) * p.x_m + rotation(0, 1) * p.y_m + rotation(0, 2) * p.z_m;
+      y[i] = rotation(1, 0) * p.x_m + rotation(1, 1) * p.y_m + rotation(1, 2) * p.z_m;
+      z[i] = rotation(2, 0) * p.x_m + rotation(2, 1) * p.y_m + rotation(2, 2) * p.z_m;
+      // For a moment: where the sensor was.
+      range[i] = sensor.x() + velocity.x() * p.time_s;
+      azimuth[i] = sensor.y() + velocity.y() * p.time_s;
+    }
+    for (std::size_t i = 0; i < kBlock; ++i) {
+      const float dx = x[i] - range[i];
+      const float dy = y[i] - azimuth[i];
+      range2[i] = dx * dx + dy * dy;
+      range[i] = std::sqrt(range2[i]);
+      azimuth[i] = fast_atan2(dy, dx);
+    }
+  }
+};
 
 }  // namespace
 
@@ -69,22 +102,26 @@ void RingCloud::scatter(const PointSweep& sweep, double min_range_m, double max_
   spin_ = fit_spin(sweep, max_range_m, counts_);
   level_velocity_ =
       level_R_vehicle * Eigen::Vector3f(spin_.velocity_mps.x(), spin_.velocity_mps.y(), 0.0F);
-  const Eigen::Vector3f velocity = level_velocity_;
+  // In blocks, so that the compiler computes several points at once.
   const auto nearest2 = static_cast<float>(min_range_m * min_range_m);
   const auto farthest2 = static_cast<float>(max_range_m * max_range_m);
-  for (const SweepPoint& point : sweep.points) {
-    if (point.ring >= sweep.rings) continue;
-    const Eigen::Vector3f p = level_R_vehicle * point.position();
-    const float x = p.x() - sensor_.x() - velocity.x() * point.time_s;
-    const float y = p.y() - sensor_.y() - velocity.y() * point.time_s;
-    const float range2 = x * x + y * y;
-    // A coordinate that is no number makes all of p none.
-    if (!(range2 >= nearest2 && range2 <= farthest2 && std::abs(p.z()) < kHighest_m)) {
-      if (!p.allFinite()) ++counters.not_finite;
-      continue;
+  Block block;
+  for (std::size_t first = 0; first < sweep.points.size(); first += kBlock) {
+    const std::size_t count = std::min(kBlock, sweep.points.size() - first);
+    const std::span points(sweep.points.data() + first, count);
+    block.place(points, level_R_vehicle, sensor_, level_velocity_);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint16_t ring = points[i].ring;
+      if (ring >= sweep.rings) continue;
+      const float range2 = block.range2[i];
+      // A coordinate that is no number makes all of them none.
+      if (!(range2 >= nearest2 && range2 <= farthest2 && std::abs(block.z[i]) < kHighest_m)) {
+        if (!points[i].position().allFinite()) ++counters.not_finite;
+        continue;
+      }
+      scattered_[next_[ring]++] = {block.x[i],     block.y[i], block.z[i],      block.azimuth[i],
+                                   block.range[i], 0.0F,       points[i].time_s};
     }
-    scattered_[next_[point.ring]++] = {
-        p.x(), p.y(), p.z(), fast_atan2(y, x), std::sqrt(range2), 0.0F, point.time_s};
   }
 }
 

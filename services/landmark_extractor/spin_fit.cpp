@@ -68,7 +68,7 @@ class SpinFit {
       const SweepPoint& point = sweep.points[i];
       if (point.ring >= sweep.rings) continue;
       const Eigen::Vector3f p = point.position() - sweep.sensor_position_m.cast<float>();
-      const float range = std::hypot(p.x(), p.y());
+      const float range = std::sqrt(p.x() * p.x() + p.y() * p.y());
       if (!(range > 1.0F && range < static_cast<float>(max_range_m)) || !p.allFinite()) continue;
       samples_.push_back({p.x(), p.y(), point.time_s, point.ring});
       slope_sums_[point.ring].first += p.z() / range;
