@@ -141,8 +141,8 @@ void VelodyneDecoder::add_block(std::span<const std::uint8_t> packet, const Bloc
   const std::size_t stride = layout.blocks_per_firing * returns;  // blocks from firing to firing
   PointSweep* turn = &turn_;
   for (std::size_t b = 0; b + stride <= kBlocks; b += stride) {
-    const double block_us =
-        static_cast<double>(b / stride * layout.firings_per_block) * layout.firing_us;
+    const std::size_t firing = b / stride * layout.firings_per_block;
+    const double block_us = static_cast<double>(firing) * layout.firing_us;
     if (b + stride < kBlocks) {
       const double span_us = static_cast<double>(layout.firings_per_block) * layout.firing_us;
       const int step = azimuth_between(block.azimuth[b], block.azimuth[b + stride]);
@@ -152,8 +152,8 @@ void VelodyneDecoder::add_block(std::span<const std::uint8_t> packet, const Bloc
     for (std::size_t f = 0; f < layout.firings_per_block; ++f) {
       const double firing_us = static_cast<double>(f) * layout.firing_us;
       for (const std::size_t beam : order_) {
-        const double shot_us =
-            firing_us + static_cast<double>(beam % 32 / layout.beams_per_shot) * layout.beam_us;
+        const std::size_t shot = beam % 32 / layout.beams_per_shot;
+        const double shot_us = firing_us + static_cast<double>(shot) * layout.beam_us;
         const double azimuth = block.azimuth[b] + azimuth_rate_ * shot_us;
         const std::size_t channel =
             layout.firings_per_block * layout.beams > 32 ? beam % 32 : f * layout.beams + beam;

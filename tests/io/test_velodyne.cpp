@@ -99,7 +99,7 @@ TEST_CASE("a turn of the VLP-16 is where its beams look", "[velodyne]") {
     double azimuth = -std::atan2(p.y_m, p.x_m) / kDegree;
     if (azimuth < -0.5) azimuth += 360.0;
     const double expected = azimuth / 0.4 * 110.592e-6;
-    CHECK(std::abs(p.time_s - expected) < 4e-5);
+    CHECK(std::abs(std::remainder(p.time_s - expected, 900 * 110.592e-6)) < 4e-5);
     CHECK(p.time_s >= last - 4e-5F);
     last = std::max(last, p.time_s);
   }
