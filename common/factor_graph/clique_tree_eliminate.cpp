@@ -44,8 +44,8 @@ void CliqueTree::place_rows(const CliqueRecord& clique) {
     if (i < clique.frontal_count) {
       const int translations = variable.type == VariableType::kPose2 ? 2 : 3;
       for (int k = 0; k < size; ++k) {
-        least_[static_cast<std::size_t>(row + k)] =
-            kLeastPivot * variable.scale[k < translations ? 0 : 1];
+        const double scale = variable.scale[k < translations ? 0 : 1];
+        least_[static_cast<std::size_t>(row + k)] = kLeastPivot * scale * scale;
       }
     }
     row += size;
@@ -175,7 +175,7 @@ void CliqueTree::factorise(int id) {
   add_children(clique);
   left_out_.resize(static_cast<std::size_t>(clique.pivots));
   const int left_out =
-      kernel_(clique.front, clique.size, clique.pivots, least_.data(), left_out_.data());
+      kernel_.factorise(clique.front, clique.size, clique.pivots, least_.data(), left_out_.data());
   count_left_out((left_out > 0 ? 1 : 0) - (clique.left_out > 0 ? 1 : 0));
   cliques_.edit(id).left_out = left_out;
 }

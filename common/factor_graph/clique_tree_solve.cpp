@@ -16,13 +16,7 @@ void CliqueTree::solve_clique(int id, double threshold) {
     std::copy_n(variable.delta.begin(), size, step_.begin() + row);
     row += size;
   }
-  const int last = clique.size - 1;
-  for (int c = clique.pivots; c-- > 0;) {
-    const double* column = clique.front + static_cast<std::ptrdiff_t>(c) * clique.size;
-    double sum = column[last];
-    for (int r = c + 1; r < last; ++r) sum -= column[r] * step_[static_cast<std::size_t>(r)];
-    step_[static_cast<std::size_t>(c)] = sum / column[c];
-  }
+  kernel_.back_substitute(clique.front, clique.size, clique.pivots, step_.data());
   int first = 0;
   for (int i = 0; i < clique.frontal_count; ++i) {
     const int name = clique.rows[i];

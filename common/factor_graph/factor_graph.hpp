@@ -23,9 +23,13 @@ struct VariableRecord {
   Value base{};                 ///< `delta` counts from here.
   Value value{};                ///< The estimate: base moved by delta.
   Delta delta{};
-  /// Largest information that one factor gives: of the translation [1/m^2], of the rotation
-  /// [1/rad^2]. What a pivot is measured against.
+  /// Root of the largest information that one factor gives: of the translation [1/m], of the
+  /// rotation [1/rad]. What pivots and moves are measured against.
   std::array<double, 2> scale{};
+  /// For the smoother: `delta` when its factors were last compared with their linearisations, and
+  /// how far the one of them that had turned furthest had turned [rad].
+  Delta judged{};
+  double turned = 0.0;
 };
 
 struct IncidenceRecord {
@@ -54,7 +58,13 @@ struct FactorRecord {
   int user = kNone;
   int clique = kNone;  ///< Where it is assembled; for the smoother.
   int next = kNone;    ///< Next one there.
-  double cost = 0.0;   ///< Loss at the estimate when it was last evaluated.
+};
+
+/// How far a factor is from its linearisation.
+struct Deviation {
+  double residual = 0.0;  ///< Of the residual, and of its derivative times the residual [sigmas].
+  double turned = 0.0;    ///< Its frame since then [rad].
+  double loss = 0.0;      ///< What the linearisation leaves out of it.
 };
 
 /// Graph of variables and factors, with the way back to the last commit().
@@ -106,8 +116,10 @@ class FactorGraph {
   /// Linearises at the estimate. `linear` then is [J (rows x columns, column-major) | b (rows) |
   /// four numbers to judge its age by], whitened and weighted: cost = |J delta - b|^2.
   void linearise(int factor);
-  /// How far the factor is from its linearisation at the present estimate [sigmas]; keeps its cost.
-  double deviation(int factor);
+  Deviation deviation(int factor) const;
+  /// Bound on what the deviation of a factor of this variable grew by, from its moves since the
+  /// factors were last looked at [sigmas].
+  double unjudged_deviation(int variable) const;
   /// Moves the variable in its chart.
   void move(int variable, const double* delta);
   /// Makes the estimate the base of the chart. Its factors must be linearised again.

@@ -159,7 +159,7 @@ void FactorGraph::keep_scales(const FactorRecord& factor, std::span<const int> v
     const int translations = type == VariableType::kPose2 ? 2 : 3;
     std::array<double, 2> scale = variables_[name].scale;
     for (int i = 0; i < size; ++i, column += factor.rows) {
-      const double information = Map<const Eigen::VectorXd>(column, factor.rows).squaredNorm();
+      const double information = Map<const Eigen::VectorXd>(column, factor.rows).norm();
       double& most = scale[i < translations ? 0 : 1];
       most = std::max(most, information);
     }
@@ -183,7 +183,6 @@ void FactorGraph::linearise(int id) {
   double root_weight = 1.0;
   Map<Eigen::VectorXd> e(b, rows);
   const LossValue loss = evaluate(record.loss, e.squaredNorm());
-  record.cost = loss.cost;
   Map<Eigen::MatrixXd> jacobian(j, rows, columns);
   if (record.loss.kernel != RobustKernel::kNone) {
     root_weight = std::sqrt(loss.weight);
@@ -207,34 +206,62 @@ void FactorGraph::linearise(int id) {
   keep_scales(record, variables);
 }
 
-double FactorGraph::deviation(int id) {
-  FactorRecord& record = factors_.edit(id);
+Deviation FactorGraph::deviation(int id) const {
+  const FactorRecord& record = factors_[id];
   const int rows = record.rows;
   scratch_.resize(static_cast<std::size_t>(2 * rows));
   const std::span<const int> variables = variables_of(id);
   whitened(record, variables, scratch_.data(), nullptr);
-  Map<Eigen::VectorXd> e(scratch_.data(), rows);
-  const double squared = e.squaredNorm();
-  const LossValue loss = evaluate(record.loss, squared);
-  record.cost = loss.cost;
   const double* j = record.linear;
   const double* b = j + static_cast<std::ptrdiff_t>(rows) * record.columns;
   const double* age = b + rows;
-  Map<Eigen::VectorXd> off(scratch_.data() + rows, rows);
-  off = age[0] * e + Map<const Eigen::VectorXd>(b, rows);
+  double* off = scratch_.data() + rows;
+  double squared = 0.0;
+  for (int i = 0; i < rows; ++i) {
+    off[i] = -b[i];
+    squared += scratch_[static_cast<std::size_t>(i)] * scratch_[static_cast<std::size_t>(i)];
+  }
   for (const int name : variables) {
     const VariableRecord& variable = variables_[name];
     const int size = dimension(variable.type);
-    for (int i = 0; i < size; ++i, j += rows) {
-      off -= variable.delta[static_cast<std::size_t>(i)] * Map<const Eigen::VectorXd>(j, rows);
+    for (int k = 0; k < size; ++k, j += rows) {
+      const double delta = variable.delta[static_cast<std::size_t>(k)];
+      for (int i = 0; i < rows; ++i) off[i] += delta * j[i];
     }
+  }
+  double predicted = 0.0;
+  double off2 = 0.0;
+  for (int i = 0; i < rows; ++i) {
+    predicted += off[i] * off[i];
+    const double d = age[0] * scratch_[static_cast<std::size_t>(i)] - off[i];
+    off2 += d * d;
+  }
+  double reweighted = 0.0;
+  if (record.loss.kernel != RobustKernel::kNone) {
+    reweighted = std::sqrt(evaluate(record.loss, squared).weight) - age[0];
   }
   const Eigen::Vector3d turn(age[1], age[2], age[3]);
   const double turned = (turn_of(variables_[variables[0]]) - turn).norm();
-  const double reweighted = std::abs(std::sqrt(loss.weight) - age[0]);
   const double weight2 = age[0] * age[0];
-  return std::sqrt(off.squaredNorm() +
-                   squared * (turned * turned * weight2 + reweighted * reweighted));
+  return {std::sqrt(off2 + squared * (turned * turned * weight2 + reweighted * reweighted)), turned,
+          squared * weight2 - predicted};
+}
+
+double FactorGraph::unjudged_deviation(int id) const {
+  const VariableRecord& variable = variables_[id];
+  Delta d;
+  for (std::size_t i = 0; i < d.size(); ++i) d[i] = variable.delta[i] - variable.judged[i];
+  double moved = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+  double turned = 0.0;
+  if (variable.type == VariableType::kPose2) {
+    moved = std::sqrt(d[0] * d[0] + d[1] * d[1]);
+    turned = std::abs(d[2]);
+  } else if (variable.type == VariableType::kPose3) {
+    turned = std::sqrt(d[3] * d[3] + d[4] * d[4] + d[5] * d[5]);
+  }
+  // Second order in the moves; and the derivative turns the residual, of some sigmas.
+  return variable.scale[1] * turned * (0.5 * turned + variable.turned) +
+         variable.scale[0] * moved * (turned + variable.turned) + 2.0 * turned;
 }
 
 void FactorGraph::move(int id, const double* delta) {
@@ -246,13 +273,13 @@ void FactorGraph::move(int id, const double* delta) {
 void FactorGraph::rebase(int id) {
   VariableRecord& record = variables_.edit(id);
   record.base = record.value;
-  record.delta = Delta{};
+  record.delta = record.judged = Delta{};
 }
 
 void FactorGraph::set_value(int id, const Value& value) {
   VariableRecord& record = variables_.edit(id);
   record.base = record.value = value;
-  record.delta = Delta{};
+  record.delta = record.judged = Delta{};
 }
 
 }  // namespace understory

@@ -4,11 +4,11 @@
 
 namespace understory {
 
-FrontKernel front_kernel_portable() { return &partial_cholesky<2>; }
+FrontKernel front_kernel_portable() { return {&partial_cholesky<2>, &solve_pivots<2>}; }
 
 FrontKernel front_kernel() {
 #if defined(__x86_64__)
-  if (front_kernel_avx2() != nullptr && __builtin_cpu_supports("avx2") &&
+  if (front_kernel_avx2().factorise != nullptr && __builtin_cpu_supports("avx2") &&
       __builtin_cpu_supports("fma")) {
     return front_kernel_avx2();
   }

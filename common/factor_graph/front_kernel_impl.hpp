@@ -121,5 +121,24 @@ int partial_cholesky(double* front, int size, int pivots, const double* least, i
   return bad;
 }
 
+template <int width>
+void solve_pivots(const double* front, int size, int pivots, double* step) {
+  using Vector = typename VectorOf<width>::type;
+  const long last = size - 1;
+  for (long c = pivots; c-- > 0;) {
+    const double* column = front + c * size;
+    Vector sums = {};
+    long r = c + 1;
+    for (; r + width <= last; r += width) {
+      sums +=
+          *reinterpret_cast<const Vector*>(column + r) * *reinterpret_cast<const Vector*>(step + r);
+    }
+    double sum = column[last];
+    for (int v = 0; v < width; ++v) sum -= sums[v];
+    for (; r < last; ++r) sum -= column[r] * step[r];
+    step[c] = sum / column[c];
+  }
+}
+
 }  // namespace
 }  // namespace understory

@@ -12,6 +12,9 @@ constexpr double kFarTurn = 0.6;
 /// A step may add so much to the loss: that is the linearisations' age, and mended by the next.
 constexpr double kToleratedRise = 1.0;
 constexpr int kMaxHalvings = 8;
+/// Part of the limit to deviations, that may grow unseen.
+constexpr double kNegligible = 0.2;
+constexpr double kLeastUnitSigma = 1e-4;
 
 }  // namespace
 
@@ -23,6 +26,9 @@ std::string name_of(const FactorGraph& graph, VariableId id) {
 
 IncrementalSmoother::IncrementalSmoother(const IncrementalParameters& parameters)
     : parameters_(parameters), tree_(graph_) {}
+
+/// Where residuals are far below what the information claims, so are the limits.
+double IncrementalSmoother::strictness() const { return std::min(1.0, 10.0 * pending_.unit_sigma); }
 
 void IncrementalSmoother::begin_change() {
   if (updated_ && !has_checkpoint_) commit();
@@ -101,29 +107,50 @@ long IncrementalSmoother::relinearise() {
   return count;
 }
 
-/// Compares the factors of the variables that moved with their linearisations; those that are off
-/// become stale. Sums up what the step did to the loss. Returns the largest deviation.
-double IncrementalSmoother::judge() {
+/// Compares the factors of the variables that moved with their linearisations, where the moves are
+/// such that it can matter; those that are off become stale. Sums up what the linearisations leave
+/// out of the loss. Returns the largest deviation.
+double IncrementalSmoother::judge(double unless_below) {
   ++count_;
   judged_.clear();
+  off_.clear();
   judged_at_.resize(static_cast<std::size_t>(graph_.factor_capacity()), 0);
-  cost_change_ = 0.0;
+  left_out_loss_ = 0.0;
   double largest = 0.0;
   for (const int v : tree_.changed()) {
+    if (graph_.unjudged_deviation(v) < unless_below) continue;
+    double turned = 0.0;
     for (int i = graph_.variable(v).first_incidence; i != kNone; i = graph_.incidence(i).next) {
       const int f = graph_.incidence(i).factor;
       if (judged_at_[static_cast<std::size_t>(f)] == count_) continue;
       judged_at_[static_cast<std::size_t>(f)] = count_;
-      const double before = graph_.factor(f).cost;
-      const double deviation = graph_.deviation(f);
-      cost_change_ += graph_.factor(f).cost - before;
-      largest = std::max(largest, deviation);
-      if (deviation > parameters_.relinearise_above || !std::isfinite(deviation)) {
-        judged_.push_back(f);
-      }
+      judged_.push_back(f);
+      const Deviation deviation = graph_.deviation(f);
+      turned = std::max(turned, deviation.turned);
+      left_out_loss_ += deviation.loss;
+      largest = std::max(largest, deviation.residual);
+      if (deviation.residual > parameters_.relinearise_above * strictness()) off_.push_back(f);
     }
+    VariableRecord& variable = graph_.edit_variable(v);
+    variable.judged = variable.delta;
+    variable.turned = turned;
   }
   return largest;
+}
+
+/// What the step did to the loss of the judged factors.
+double IncrementalSmoother::loss_change() {
+  double change = 0.0;
+  for (const int f : judged_) change += graph_.chi2(FactorId(f));
+  const std::vector<int>& changed = tree_.changed();
+  reached_.clear();
+  for (std::size_t i = 0; i < changed.size(); ++i) {
+    reached_.push_back(graph_.variable(changed[i]).delta);
+    graph_.move(changed[i], tree_.changed_from()[i].data());
+  }
+  for (const int f : judged_) change -= graph_.chi2(FactorId(f));
+  for (std::size_t i = 0; i < changed.size(); ++i) graph_.move(changed[i], reached_[i].data());
+  return change;
 }
 
 void IncrementalSmoother::shorten_step(double part) {
@@ -140,45 +167,36 @@ void IncrementalSmoother::shorten_step(double part) {
 }
 
 /// Takes the step back by halves while it makes the loss larger.
-bool IncrementalSmoother::accept_step() {
-  for (int i = 0; i < kMaxHalvings; ++i) {
-    const double rise = cost_change_;
-    if (rise <= kToleratedRise) return true;
+void IncrementalSmoother::accept_step(IncrementalUpdate& update) {
+  if (left_out_loss_ <= kToleratedRise) return;
+  for (int i = 0; i < kMaxHalvings && loss_change() > kToleratedRise; ++i) {
     shorten_step(0.5);
     pending_.solve_everything = true;
-    // The costs are of the longer step; the change counts from there.
-    judge();
-    cost_change_ += rise;
+    update.deviation = judge(0.0);
   }
-  return false;
 }
 
-void IncrementalSmoother::iterate(IncrementalUpdate& update) {
-  ++update.iterations;
-  update.relinearised_factors += relinearise();
-  last_.clear();
-  for (const int f : pending_.fresh) {
-    for (const int v : graph_.variables_of(f)) last_.push_back(v);
+/// Every factor whose linearisation is noticeably old becomes stale.
+void IncrementalSmoother::look_at_all() {
+  double chi2 = 0.0;
+  double rows = 1.0;
+  for (int f = 0; f < graph_.factor_capacity(); ++f) {
+    if (!graph_.factor(f).in_use) continue;
+    chi2 += graph_.chi2(FactorId(f));
+    rows += graph_.factor(f).rows;
   }
-  const TreeStatistics statistics = tree_.eliminate(pending_.fresh, last_);
-  pending_.fresh.clear();
-  update.eliminated_variables += statistics.eliminated_variables;
-  update.refreshed_cliques += statistics.refreshed_cliques;
-  update.flops += statistics.flops;
-  if (pending_.solve_everything) {
-    pending_.solve_everything = false;
-    tree_.solve_everything(parameters_.least_move);
-  } else {
-    tree_.solve(parameters_.least_move);
-  }
-  update.deviation = judge();
-  accept_step();
-  for (const int f : judged_) {
-    FactorRecord& factor = graph_.edit_factor(f);
-    if (factor.is_pending) continue;
-    factor.is_pending = true;
+  pending_.unit_sigma = std::clamp(std::sqrt(chi2 / rows), kLeastUnitSigma, 1.0);
+  const double limit = parameters_.thorough_relinearise_above * pending_.unit_sigma;
+  for (int f = 0; f < graph_.factor_capacity(); ++f) {
+    const FactorRecord& factor = graph_.factor(f);
+    if (!factor.in_use || factor.clique == kNone || factor.is_pending) continue;
+    if (graph_.deviation(f).residual <= limit) continue;
+    graph_.edit_factor(f).is_pending = true;
     pending_.stale.push_back(f);
   }
+}
+
+void IncrementalSmoother::collect_moved() {
   for (const int v : tree_.changed()) {
     if (moved_at_[static_cast<std::size_t>(v)] != 1) moved_.push_back(v);
     moved_at_[static_cast<std::size_t>(v)] = 1;
@@ -190,12 +208,44 @@ void IncrementalSmoother::iterate(IncrementalUpdate& update) {
   }
 }
 
-IncrementalUpdate IncrementalSmoother::run() {
+void IncrementalSmoother::iterate(IncrementalUpdate& update, bool thorough) {
+  ++update.iterations;
+  update.relinearised_factors += relinearise();
+  last_.clear();
+  for (const int f : pending_.fresh) {
+    for (const int v : graph_.variables_of(f)) last_.push_back(v);
+  }
+  const TreeStatistics statistics = tree_.eliminate(pending_.fresh, last_);
+  pending_.fresh.clear();
+  update.eliminated_variables += statistics.eliminated_variables;
+  update.refreshed_cliques += statistics.refreshed_cliques;
+  update.flops += statistics.flops;
+  if (pending_.solve_everything || thorough) {
+    pending_.solve_everything = false;
+    tree_.solve_everything(thorough ? parameters_.thorough_move * pending_.unit_sigma
+                                    : parameters_.least_move * strictness());
+  } else {
+    tree_.solve(parameters_.least_move * strictness());
+  }
+  update.deviation = judge(kNegligible * parameters_.relinearise_above * strictness());
+  accept_step(update);
+  for (const int f : off_) {
+    FactorRecord& factor = graph_.edit_factor(f);
+    if (factor.is_pending) continue;
+    factor.is_pending = true;
+    pending_.stale.push_back(f);
+  }
+  collect_moved();
+}
+
+IncrementalUpdate IncrementalSmoother::run(bool thorough) {
   IncrementalUpdate update;
   moved_.clear();
   moved_at_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);
+  pending_.since_thorough = thorough ? 0 : pending_.since_thorough + 1;
+  if (thorough) look_at_all();
   do {
-    iterate(update);
+    iterate(update, thorough);
   } while (update.iterations < parameters_.max_iterations &&
            (update.deviation > parameters_.iterate_above || pending_.solve_everything));
   update.moved_variables = static_cast<long>(moved_.size());
@@ -206,7 +256,13 @@ IncrementalUpdate IncrementalSmoother::run() {
 
 IncrementalUpdate IncrementalSmoother::update() {
   begin_change();
-  return run();
+  return run(parameters_.thorough_every > 0 &&
+             pending_.since_thorough + 1 >= parameters_.thorough_every);
+}
+
+IncrementalUpdate IncrementalSmoother::update_thoroughly() {
+  begin_change();
+  return run(true);
 }
 
 IncrementalUpdate IncrementalSmoother::update_everything() {
@@ -215,8 +271,7 @@ IncrementalUpdate IncrementalSmoother::update_everything() {
   for (int v = 0; v < graph_.variable_capacity(); ++v) {
     if (graph_.variable(v).in_use) pending_.rebase.push_back(v);
   }
-  pending_.solve_everything = true;
-  return run();
+  return run(true);
 }
 
 void IncrementalSmoother::finish(IncrementalUpdate& update) {

@@ -12,13 +12,18 @@ namespace understory {
 
 struct IncrementalParameters {
   /// A variable that would move by less of its conditional standard deviation stays [sigmas].
-  double least_move = 1e-2;
+  double least_move = 3e-2;
   /// A factor whose residual is further than this from what its linearisation says is linearised
   /// again with the next update [sigmas].
-  double relinearise_above = 0.05;
+  double relinearise_above = 0.1;
   /// An update goes on (up to max_iterations) while a factor is this far from its linearisation.
   double iterate_above = 1.0;
   int max_iterations = 5;
+  /// Every so many updates, one looks at all variables and factors, with limits in parts of the
+  /// residuals' own root mean square: what is below the usual ones adds up. 0: never.
+  int thorough_every = 200;
+  double thorough_move = 0.01;
+  double thorough_relinearise_above = 0.05;
 };
 
 /// What an update found. Never throws for what was measured; see `undetermined`.
@@ -65,6 +70,8 @@ class IncrementalSmoother {
   bool marginalise(std::span<const VariableId> ids);
 
   IncrementalUpdate update();
+  /// update() with the limits of the thorough ones.
+  IncrementalUpdate update_thoroughly();
   /// Orders and factorises everything anew, linearised at the estimates, and iterates.
   IncrementalUpdate update_everything();
 
@@ -93,18 +100,24 @@ class IncrementalSmoother {
     std::vector<int> rebase;  ///< Variables far from their charts' bases.
     std::vector<int> doomed;  ///< Variables to be removed.
     bool solve_everything = false;
+    int since_thorough = 0;   ///< Updates.
+    double unit_sigma = 1.0;  ///< Root mean square of the residuals [sigmas], when last seen.
   };
 
   void begin_change();
   void commit();
   FactorId keep(FactorId id);
   long relinearise();
-  void iterate(IncrementalUpdate& update);
-  double judge();
-  bool accept_step();
+  void iterate(IncrementalUpdate& update, bool thorough);
+  double judge(double unless_below);
+  double loss_change();
+  void accept_step(IncrementalUpdate& update);
   void shorten_step(double part);
   void finish(IncrementalUpdate& update);
-  IncrementalUpdate run();
+  void look_at_all();
+  double strictness() const;
+  void collect_moved();
+  IncrementalUpdate run(bool thorough);
 
   IncrementalParameters parameters_;
   FactorGraph graph_;
@@ -119,8 +132,10 @@ class IncrementalSmoother {
   std::vector<std::uint64_t> moved_at_;
   std::vector<std::uint64_t> judged_at_;
   std::vector<int> judged_;
+  std::vector<int> off_;
+  std::vector<Delta> reached_;
   std::uint64_t count_ = 0;
-  double cost_change_ = 0.0;
+  double left_out_loss_ = 0.0;
 };
 
 /// "pose 3", "point 7": for messages.

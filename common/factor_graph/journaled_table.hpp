@@ -70,7 +70,9 @@ class JournaledTable {
       record = saved.record;
     }
     for (std::size_t i = added_.size(); i-- > 0;) {
-      on_added((*this)[added_[i]]);
+      T& record = records_[static_cast<std::size_t>(added_[i])];
+      on_added(record);
+      record = T{};
       free_.push_back(added_[i]);
     }
     while (!free_.empty() && free_.back() == size() - 1) {

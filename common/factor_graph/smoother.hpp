@@ -13,9 +13,9 @@ namespace understory {
 
 struct SmootherParameters {
   /// What moves by less of its own conditional standard deviation stays where it is [sigmas].
-  double least_move = 1e-3;
+  double least_move = 1e-2;
   /// A measurement is linearised again beyond this [sigmas].
-  double relinearise_above = 1e-2;
+  double relinearise_above = 3e-2;
   /// An update goes on while one is this far from its linearisation [sigmas].
   double iterate_above = 0.1;
   int max_iterations = 8;
