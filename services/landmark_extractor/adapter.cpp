@@ -36,6 +36,7 @@ std::string summary(const SweepCounters& now, const SweepCounters& before) {
   say("not standing", t.not_standing - t0.not_standing);
   say("in leaves", t.in_leaves - t0.in_leaves);
   say("out of range", t.out_of_range - t0.out_of_range);
+  say("on a wall", now.on_wall - before.on_wall);
   say("corners", c.corners - c0.corners);
   say("walls", c.walls - c0.walls);
   say("meetings of walls that are none: skew", c.skew - c0.skew);

@@ -11,12 +11,25 @@ constexpr std::uint16_t kMaxRings = 1024;
 /// What stands behind a landmark is looked at this far beyond the range of landmarks [m].
 constexpr double kMargin_m = 2.0;
 
+/// Walls at least this long swallow trunks so near their plane and so near their ends [m].
+constexpr double kWall_m = 1.5;
+constexpr double kOnWall_m = 0.25;
+constexpr double kWallEnd_m = 0.5;
+
 bool well_formed(const PointSweep& sweep) {
   const bool has_frame = sweep.is_deskewed && sweep.sensor_position_m.allFinite() &&
                          sweep.rings > 0 && sweep.rings <= kMaxRings;
   if (!has_frame || !sweep.attitude) return has_frame;
   const double norm = sweep.attitude->level_Q_vehicle.norm();
   return std::abs(norm - 1.0) < 1e-3 && sweep.attitude->covariance_rad2.allFinite();
+}
+
+/// A piece of a wall between two windows or two cars looks like a trunk.
+bool is_on(const WallLine& wall, const Detection& trunk) {
+  const Eigen::Vector2d offset = trunk.position_m.head<2>() - wall.centroid_m;
+  const double along = wall.direction.dot(offset);
+  return wall.length() > kWall_m && std::abs(wall.normal().dot(offset)) < kOnWall_m &&
+         along > wall.from_m - kWallEnd_m && along < wall.to_m + kWallEnd_m;
 }
 
 void sort_by_bearing(std::vector<Detection>& detections) {
@@ -50,7 +63,17 @@ LandmarkScan SweepExtractor::extract(const PointSweep& sweep) {
   ground_.fit(cloud_.points(), cloud_.sensor_m().head<2>(), static_cast<float>(reach));
   find_runs(cloud_, sweep_, runs_);
   trunks_.find(cloud_, runs_, ground_, level_covariance, result.detections);
+  const std::size_t trunks = result.detections.size();
   corners_.find(cloud_, runs_, ground_, level_covariance, result.detections);
+  std::erase_if(result.detections, [&](const Detection& detection) {
+    return detection.kind == LandmarkKind::kTrunk &&
+           std::any_of(corners_.walls().begin(), corners_.walls().end(),
+                       [&](const WallLine& wall) { return is_on(wall, detection); });
+  });
+  const auto left = static_cast<std::size_t>(
+      std::count_if(result.detections.begin(), result.detections.end(),
+                    [](const Detection& d) { return d.kind == LandmarkKind::kTrunk; }));
+  counters_.on_wall += trunks - left;
   counters_.trunks = trunks_.counters();
   counters_.corners = corners_.counters();
   sort_by_bearing(result.detections);

@@ -20,6 +20,7 @@ struct SweepCounters {
   std::uint64_t malformed = 0;         ///< No rings, not de-skewed, numbers that are none.
   std::uint64_t without_attitude = 0;  ///< Taken as level.
   PointCounters points;
+  std::uint64_t on_wall = 0;  ///< Trunks that were pieces of a wall.
   TrunkCounters trunks;
   CornerCounters corners;
 };
