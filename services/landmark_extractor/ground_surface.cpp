@@ -34,7 +34,7 @@ std::size_t GroundSurface::cell(float x, float y) const {
   const int limit = static_cast<int>(cells_per_side_) - 1;
   const int i = std::clamp(static_cast<int>((x - corner_x_) / kCell_m), 0, limit);
   const int j = std::clamp(static_cast<int>((y - corner_y_) / kCell_m), 0, limit);
-  return static_cast<std::size_t>(j * (limit + 1) + i);
+  return static_cast<std::size_t>(j) * cells_per_side_ + static_cast<std::size_t>(i);
 }
 
 void GroundSurface::fit(std::span<RingPoint> points, const Eigen::Vector2f& centre_m,
