@@ -24,8 +24,16 @@ struct Overloaded : F... {
 template <class... F>
 Overloaded(F...) -> Overloaded<F...>;
 
-/// Listens to everything that the chain says.
-void watch(SensorChain& chain, ChainRun& run) {
+Utime utime_of(const sim::SensorReading& reading) {
+  return std::visit(Overloaded{[](const sim::SimulatedSweep& sweep) { return sweep.raw.utime; },
+                               [](const sim::SimulatedPlanarScan& scan) { return scan.scan.utime; },
+                               [](const auto& value) { return value.utime; }},
+                    reading);
+}
+
+}  // namespace
+
+void watch_chain(SensorChain& chain, ChainRun& run) {
   chain.watch<RawPose>("RAW_POSE", [&run](const RawPose& pose) {
     run.dead_reckoned.push_back({pose.utime, pose.odom_T_vehicle});
   });
@@ -49,14 +57,13 @@ void watch(SensorChain& chain, ChainRun& run) {
   });
 }
 
-Utime utime_of(const sim::SensorReading& reading) {
-  return std::visit(Overloaded{[](const sim::SimulatedSweep& sweep) { return sweep.raw.utime; },
-                               [](const sim::SimulatedPlanarScan& scan) { return scan.scan.utime; },
-                               [](const auto& value) { return value.utime; }},
-                    reading);
+void finish_chain(SensorChain& chain, ChainRun& run) {
+  chain.finish();
+  for (const std::string& service : chain.services()) {
+    run.times[service] = chain.time_of(service);
+    run.health[service] = chain.health_of(service);
+  }
 }
-
-}  // namespace
 
 std::vector<Service> front_end_services() {
   return {lidar_imu_input_service(), landmark_extractor_service(),
@@ -89,7 +96,7 @@ std::vector<RawMessage> raw_messages(const sim::SensorReading& reading,
 ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options) {
   ChainRun run;
   SensorChain chain(front_end_services(), options.config_dir, options.toml_instead);
-  watch(chain, run);
+  watch_chain(chain, run);
   const double duration_s = std::min(options.end_s, drive.motion().duration_s());
   std::uint64_t sweep_parts = 0;
   std::optional<Utime> begin;
@@ -113,11 +120,7 @@ ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options) {
       for (const RawMessage& changed : options.meddle(std::move(message))) chain.feed(changed);
     }
   }
-  chain.finish();
-  for (const std::string& service : chain.services()) {
-    run.times[service] = chain.time_of(service);
-    run.health[service] = chain.health_of(service);
-  }
+  finish_chain(chain, run);
   return run;
 }
 

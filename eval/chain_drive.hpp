@@ -48,6 +48,11 @@ struct ChainOptions {
 /// One message a reading; sweeps in parts. Truth gives none.
 std::vector<RawMessage> raw_messages(const sim::SensorReading& reading, std::uint64_t& sweep_parts);
 
+/// Listens to everything that the chain says; to be called before the first message is fed.
+void watch_chain(SensorChain& chain, ChainRun& run);
+/// The services' last words, times and health.
+void finish_chain(SensorChain& chain, ChainRun& run);
+
 /// The services from raw sensors to the map.
 std::vector<Service> front_end_services();
 

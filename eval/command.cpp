@@ -14,8 +14,10 @@ void add_eval_command(CLI::App& parent) {
   add_noise_experiment(eval);
   add_efficiency_experiment(eval);
   add_large_map_experiment(eval);
+  add_backend_experiment(eval);
   add_victoria_park_experiment(eval);
   add_frontend_experiment(eval);
+  add_recording_experiment(eval);
   add_landmarks_vs_error_experiment(eval);
 }
 

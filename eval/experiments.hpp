@@ -22,10 +22,14 @@ void add_density_experiment(CLI::App& eval);
 void add_noise_experiment(CLI::App& eval);
 /// Time per component along the run (GeoSLAM §5.5), over a long drive, and standing still.
 void add_efficiency_experiment(CLI::App& eval);
+/// Standard pose and landmark graphs through the smoother.
+void add_backend_experiment(CLI::App& eval);
 /// The recorded Victoria Park drive.
 void add_victoria_park_experiment(CLI::App& eval);
 /// From raw sensors to a pose, part by part and as a whole (specs/frontend.md).
 void add_frontend_experiment(CLI::App& eval);
+/// A recorded drive through the whole chain.
+void add_recording_experiment(CLI::App& eval);
 /// Change of the error against the number of landmarks (thesis on submaps, chapter 4).
 void add_landmarks_vs_error_experiment(CLI::App& eval);
 

@@ -36,6 +36,10 @@ void add_extraction_rows(const FrontendOptions& options, const std::atomic<bool>
                          FrontendRows& rows);
 /// Accuracy and time of one drive of the whole chain.
 void add_chain_rows(const ChainRun& run, std::optional<double> ate_target_m, FrontendRows& rows);
+/// Where the chain's time goes.
+void add_time_rows(const ChainRun& run, FrontendRows& rows);
+/// Trajectories and map, for the plots.
+nlohmann::json trace_of(const ChainRun& run);
 /// What faults of the sensors do: what HEALTH says, and how far the pose is off afterwards.
 void add_fault_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
                     FrontendRows& rows);

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <numeric>
-#include <set>
 
 #include "eval/chain_drive.hpp"
 #include "eval/frontend.hpp"
@@ -31,6 +31,8 @@ double real_time_factor(const ChainRun& run) {
   return run.simulated_s / std::max(busy_s, 1e-9);
 }
 
+}  // namespace
+
 void add_time_rows(const ChainRun& run, FrontendRows& rows) {
   rows.at_least("real-time factor of the chain (one core)", real_time_factor(run), "x", 10.0);
   for (const auto& [service, time] : run.times) {
@@ -39,8 +41,6 @@ void add_time_rows(const ChainRun& run, FrontendRows& rows) {
     rows.state(service + ": message p99", quantile_ms(time.calls_ms, 0.99), "ms");
   }
 }
-
-}  // namespace
 
 void add_chain_rows(const ChainRun& run, std::optional<double> ate_target_m, FrontendRows& rows) {
   const TrajectoryError slam = trajectory_error(poses_of(run.slam), run.truth);
@@ -62,6 +62,32 @@ void add_chain_rows(const ChainRun& run, std::optional<double> ate_target_m, Fro
   rows.state("SLAM_POSE share of sweeps",
              100.0 * static_cast<double>(run.slam.size()) / static_cast<double>(run.sweeps), "%");
   add_time_rows(run, rows);
+}
+
+nlohmann::json trace_of(const ChainRun& run) {
+  const auto points = [](const std::vector<StampedPose>& poses, std::size_t stride) {
+    nlohmann::json out = nlohmann::json::array();
+    for (std::size_t i = 0; i < poses.size(); i += stride) {
+      out.push_back({1e-6 * static_cast<double>(poses[i].utime), poses[i].pose.x(),
+                     poses[i].pose.y(), poses[i].pose.theta()});
+    }
+    return out;
+  };
+  nlohmann::json landmarks = nlohmann::json::array();
+  for (const MapLandmark& landmark : run.landmarks) {
+    landmarks.push_back({landmark.position_m.x(), landmark.position_m.y(), landmark.radius_m,
+                         static_cast<int>(landmark.kind)});
+  }
+  nlohmann::json counts = nlohmann::json::array();
+  for (const EkfPose& pose : run.ekf) {
+    counts.push_back({1e-6 * static_cast<double>(pose.utime), pose.landmarks_used});
+  }
+  return {{"truth", points(run.truth, 5)},
+          {"raw", points(run.dead_reckoned, 10)},
+          {"ekf", points(poses_of(run.ekf), 1)},
+          {"slam", points(poses_of(run.slam), 1)},
+          {"landmarks", landmarks},
+          {"landmarks_used", counts}};
 }
 
 }  // namespace understory::eval

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdlib>
+#include <fstream>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -45,35 +46,32 @@ std::vector<ChainDrive> chain_drives(const FrontendOptions& options) {
   };
 }
 
-nlohmann::json trace_of(const ChainRun& run) {
-  const auto points = [](const std::vector<StampedPose>& poses, std::size_t stride) {
-    nlohmann::json out = nlohmann::json::array();
-    for (std::size_t i = 0; i < poses.size(); i += stride) {
-      out.push_back({1e-6 * static_cast<double>(poses[i].utime), poses[i].pose.x(),
-                     poses[i].pose.y(), poses[i].pose.theta()});
-    }
-    return out;
-  };
-  nlohmann::json landmarks = nlohmann::json::array();
-  for (const MapLandmark& landmark : run.landmarks) {
-    landmarks.push_back({landmark.position_m.x(), landmark.position_m.y(), landmark.radius_m,
-                         static_cast<int>(landmark.kind)});
+std::string text_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// Real maps of poles with the real ways of a car through them, where the recordings are there.
+void add_pole_drives(const FrontendOptions& options, std::vector<ChainDrive>& drives) {
+  for (const char* sequence : {"00", "02"}) {
+    const fs::path folder = options.data / "pole_maps";
+    const fs::path poles = folder / fmt::format("seq{}_poles.csv", sequence);
+    const fs::path way = folder / fmt::format("seq{}_traj.csv", sequence);
+    if (!fs::exists(poles) || !fs::exists(way)) continue;
+    drives.push_back({fmt::format("poles of KITTI {}", sequence),
+                      [=, seed = options.seed] {
+                        auto result = sim::pole_map_scenario(text_of(poles), text_of(way), seed);
+                        if (!result.scenario) throw std::runtime_error(result.error);
+                        return *result.scenario;
+                      },
+                      std::nullopt});
   }
-  nlohmann::json counts = nlohmann::json::array();
-  for (const EkfPose& pose : run.ekf) {
-    counts.push_back({1e-6 * static_cast<double>(pose.utime), pose.landmarks_used});
-  }
-  return {{"truth", points(run.truth, 5)},
-          {"raw", points(run.dead_reckoned, 10)},
-          {"ekf", points(poses_of(run.ekf), 1)},
-          {"slam", points(poses_of(run.slam), 1)},
-          {"landmarks", landmarks},
-          {"landmarks_used", counts}};
 }
 
 void add_drive_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
                     FrontendRows& rows, nlohmann::json& traces) {
   std::vector<ChainDrive> drives = chain_drives(options);
+  add_pole_drives(options, drives);
   std::erase_if(drives, [&](const ChainDrive& drive) {
     return !options.sections.empty() &&
            std::ranges::none_of(options.sections, [&](const std::string& section) {
@@ -138,10 +136,13 @@ void add_frontend_experiment(CLI::App& eval) {
   command->add_option("--drive-m", options->drive_m, "Length of the forest drive [m]")
       ->check(CLI::Range(50.0, 100000.0));
   command->add_option("--config", options->config_dir, "Configuration of the chain's services");
+  const char* const data = std::getenv("UNDERSTORY_DATA");  // NOLINT(concurrency-mt-unsafe)
+  options->data = data != nullptr ? data : "../shared/data";
+  command->add_option("--data", options->data, "Folder with pole_maps; default $UNDERSTORY_DATA");
   command->add_option("--json", options->json, "Results; traces and plots go beside it");
   command->add_option("--only", options->sections,
                       "extraction, tracking, filter, chain, faults, or the beginning of a chain "
-                      "drive's name (forest, urban, country)");
+                      "drive's name (forest, urban, country, poles)");
   command->add_flag("!--no-plots", options->plots, "No plots");
   command->callback([options] { run_guarded("frontend", [options] { run(*options); }); });
 }

@@ -14,8 +14,8 @@
 namespace understory::eval {
 namespace {
 
-constexpr Utime kFaultBegins = 45'000'000;
-constexpr Utime kFaultEnds = 50'000'000;
+constexpr Utime kFaultBegins = 35'000'000;
+constexpr Utime kFaultEnds = 40'000'000;
 constexpr Utime kClockJump = 1'000'000;
 
 bool is_faulty(Utime utime) { return utime >= kFaultBegins && utime < kFaultEnds; }
@@ -125,12 +125,14 @@ double error_after(const ChainRun& run, Utime from, Utime behind) {
   return count > 0 ? largest : std::numeric_limits<double>::quiet_NaN();
 }
 
+/// Few beams, so that the table can be made by a test.
 sim::SensorDrive fault_drive(std::uint64_t seed) {
   sim::ForestScenarioParameters forest;
-  forest.length_m = 300.0;
-  sim::SpeedParameters speed;
+  forest.length_m = 150.0;
   sim::SensorSuite suite;
-  return {sim::forest_scenario(forest, seed), speed, suite, seed};
+  suite.lidar->elevations_rad = sim::beam_elevations_rad(sim::LidarModel::kVlp16);
+  suite.lidar->columns = 1200;
+  return {sim::forest_scenario(forest, seed), sim::SpeedParameters{}, suite, seed};
 }
 
 }  // namespace

@@ -87,11 +87,75 @@ def draw(name, trace, file):
     plt.close(figure)
 
 
+def fit(fixes, poses):
+    """The rigid motion that takes the poses at the fixes' times best onto the fixes."""
+    times = [p[0] for p in poses]
+    pairs = [(f, pose_at(poses, times, f[0])) for f in fixes]
+    pairs = [(f, p) for f, p in pairs if p]
+    n = max(1, len(pairs))
+    fx, fy = sum(f[1] for f, _ in pairs) / n, sum(f[2] for f, _ in pairs) / n
+    px, py = sum(p[1] for _, p in pairs) / n, sum(p[2] for _, p in pairs) / n
+    dot = sum((p[1] - px) * (f[1] - fx) + (p[2] - py) * (f[2] - fy) for f, p in pairs)
+    cross = sum((p[1] - px) * (f[2] - fy) - (p[2] - py) * (f[1] - fx) for f, p in pairs)
+    angle = math.atan2(cross, dot)
+    c, s = math.cos(angle), math.sin(angle)
+    return angle, fx - c * px + s * py, fy - s * px - c * py
+
+
+def draw_fixes(name, trace, file):
+    figure, plan = plt.subplots(figsize=(10, 10))
+    fixes = trace["fixes"]
+    plan.plot([f[1] for f in fixes], [f[2] for f in fixes], ".", color="k", markersize=2,
+              label="GNSS fixes")
+    for key, (label, colour) in KINDS.items():
+        if len(trace[key]) < 2:
+            continue
+        motion = fit(fixes, trace[key])
+        places = [moved(motion, p[1], p[2]) for p in trace[key]]
+        plan.plot([p[0] for p in places], [p[1] for p in places], "-", color=colour, linewidth=1,
+                  label=label)
+        if key == "slam":
+            spots = [moved(motion, l[0], l[1]) for l in trace["landmarks"]]
+            plan.plot([p[0] for p in spots], [p[1] for p in spots], ".", color="tab:green",
+                      markersize=4, label="landmarks")
+    plan.set_aspect("equal")
+    plan.set_title(name)
+    plan.legend(fontsize="small")
+    figure.tight_layout()
+    figure.savefig(file, dpi=100)
+    plt.close(figure)
+
+
+def draw_sweep(name, picture, file):
+    """The sweep from above (points well above the ground darker) with the landmarks found in it."""
+    figure, plan = plt.subplots(figsize=(10, 10))
+    points = [p for p in picture["points"] if abs(p[0]) < 50 and abs(p[1]) < 50]
+    plan.scatter([p[0] for p in points], [p[1] for p in points], s=0.4, c=[p[2] for p in points],
+                 cmap="viridis", vmin=-1, vmax=4)
+    for x, y, radius, kind in picture["detections"]:
+        if kind == 0:
+            plan.add_patch(plt.Circle((x, y), max(radius, 0.5), fill=False, color="tab:red"))
+        else:
+            plan.plot(x, y, "s", color="tab:red", fillstyle="none", markersize=10)
+    plan.set_xlim(-50, 50)
+    plan.set_ylim(-50, 50)
+    plan.set_aspect("equal")
+    plan.set_title(f"{name}: a sweep and its landmarks (circle: trunk, square: corner)")
+    figure.tight_layout()
+    figure.savefig(file, dpi=90)
+    plt.close(figure)
+
+
 def main():
     results_file, traces_file = map(pathlib.Path, sys.argv[1:3])
     for name, trace in json.loads(traces_file.read_text()).items():
         slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
-        draw(name, trace, f"{results_file.with_suffix('')}.{slug}.png")
+        if trace["truth"]:
+            draw(name, trace, f"{results_file.with_suffix('')}.{slug}.png")
+        elif trace.get("fixes"):
+            draw_fixes(name, trace, f"{results_file.with_suffix('')}.{slug}.png")
+        for i, picture in enumerate(trace.get("pictures", [])[:3]):
+            draw_sweep(name, picture, f"{results_file.with_suffix('')}.{slug}.sweep{i}.png")
 
 
 if __name__ == "__main__":

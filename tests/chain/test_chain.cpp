@@ -1,0 +1,66 @@
+// The whole chain on small simulated drives: accuracy, determinism, and what faults do to it.
+#include <iostream>
+
+#include "eval/frontend.hpp"
+#include "sim/scenarios.hpp"
+#include "tests/catch.hpp"
+
+using namespace understory;
+using namespace understory::eval;
+
+namespace {
+
+sim::SensorDrive small_drive(std::uint64_t seed) {
+  sim::ForestScenarioParameters forest;
+  forest.length_m = 60.0;
+  sim::SensorSuite suite;
+  suite.lidar->elevations_rad = sim::beam_elevations_rad(sim::LidarModel::kVlp16);
+  suite.lidar->columns = 1200;
+  return {sim::forest_scenario(forest, seed), sim::SpeedParameters{}, suite, seed};
+}
+
+ChainRun drive_once(std::uint64_t seed) {
+  sim::SensorDrive drive = small_drive(seed);
+  ChainOptions options;
+  options.config_dir = UNDERSTORY_SOURCE_CONFIG "/lidar";
+  return drive_chain(drive, options);
+}
+
+bool mentions(const FrontendRow& row, const std::string& text) {
+  return row.setting.find(text) != std::string::npos;
+}
+
+}  // namespace
+
+TEST_CASE("raw sensors become a pose, the same every time") {
+  const ChainRun run = drive_once(5);
+  REQUIRE(run.slam.size() > 200);
+  CHECK(trajectory_error(poses_of(run.slam), run.truth).ate_rms_m < 0.1);
+  CHECK(trajectory_error(poses_of(run.ekf), run.truth).ate_rms_m < 0.1);
+  CHECK(wrong_updates(run) == 0);
+  CHECK(run.landmarks.size() > 20);
+  const ChainRun again = drive_once(5);
+  REQUIRE(again.slam.size() == run.slam.size());
+  for (std::size_t i = 0; i < run.slam.size(); ++i) {
+    REQUIRE(again.slam[i].map_T_vehicle().coordinates() ==
+            run.slam[i].map_T_vehicle().coordinates());
+  }
+}
+
+TEST_CASE("faults of the sensors are named, and the pose comes back") {
+  FrontendOptions options;
+  options.config_dir = UNDERSTORY_SOURCE_CONFIG "/lidar";
+  options.jobs = 2;
+  const std::atomic<bool> stop = false;
+  FrontendRows rows;
+  add_fault_rows(options, stop, rows);
+  std::cout << to_table(rows.rows());
+  for (const FrontendRow& row : rows.rows()) {
+    INFO(row.setting << ": " << row.what << " " << row.value);
+    CHECK(row.pass().value_or(true));
+    if (mentions(row, "silent for")) CHECK(mentions(row, "sensor_silent"));
+    if (mentions(row, "1 s back")) CHECK(mentions(row, "clock_jump"));
+    if (mentions(row, "NaN")) CHECK(mentions(row, "not_finite"));
+    if (mentions(row, "saturated")) CHECK(mentions(row, "/saturated"));
+  }
+}
