@@ -9,12 +9,14 @@ namespace {
 
 /// A pose3's chart is left before its rotation gets far from the base [rad].
 constexpr double kFarTurn = 0.6;
-/// A step may add so much to the loss: that is the linearisations' age, and mended by the next.
-constexpr double kToleratedRise = 1.0;
+/// A step may add this part to the loss, or that of one measurement: that is the linearisations'
+/// age, and mended by the next.
+constexpr double kToleratedPart = 0.02;
 constexpr int kMaxHalvings = 8;
 /// Part of the limit to deviations, that may grow unseen.
 constexpr double kNegligible = 0.2;
-constexpr double kLeastUnitSigma = 1e-4;
+constexpr double kLeastUnit = 1e-4;
+constexpr double kLeastUsualUnit = 0.05;
 
 }  // namespace
 
@@ -25,10 +27,12 @@ std::string name_of(const FactorGraph& graph, VariableId id) {
 }
 
 IncrementalSmoother::IncrementalSmoother(const IncrementalParameters& parameters)
-    : parameters_(parameters), tree_(graph_) {}
+    : parameters_(parameters), tree_(graph_) {
+  pending_.unit = saved_pending_.unit = parameters.first_unit;
+}
 
-/// Where residuals are far below what the information claims, so are the limits.
-double IncrementalSmoother::strictness() const { return std::min(1.0, 10.0 * pending_.unit_sigma); }
+/// Single updates need not follow the thorough ones all the way down.
+double IncrementalSmoother::usual_unit() const { return std::max(kLeastUsualUnit, pending_.unit); }
 
 void IncrementalSmoother::begin_change() {
   if (updated_ && !has_checkpoint_) commit();
@@ -129,7 +133,7 @@ double IncrementalSmoother::judge(double unless_below) {
       turned = std::max(turned, deviation.turned);
       left_out_loss_ += deviation.loss;
       largest = std::max(largest, deviation.residual);
-      if (deviation.residual > parameters_.relinearise_above * strictness()) off_.push_back(f);
+      if (deviation.residual > parameters_.relinearise_above * usual_unit()) off_.push_back(f);
     }
     VariableRecord& variable = graph_.edit_variable(v);
     variable.judged = variable.delta;
@@ -168,8 +172,9 @@ void IncrementalSmoother::shorten_step(double part) {
 
 /// Takes the step back by halves while it makes the loss larger.
 void IncrementalSmoother::accept_step(IncrementalUpdate& update) {
-  if (left_out_loss_ <= kToleratedRise) return;
-  for (int i = 0; i < kMaxHalvings && loss_change() > kToleratedRise; ++i) {
+  const double tolerated = std::max(pending_.unit * pending_.unit, kToleratedPart * pending_.chi2);
+  if (left_out_loss_ <= tolerated) return;
+  for (int i = 0; i < kMaxHalvings && loss_change() > tolerated; ++i) {
     shorten_step(0.5);
     pending_.solve_everything = true;
     update.deviation = judge(0.0);
@@ -185,8 +190,9 @@ void IncrementalSmoother::look_at_all() {
     chi2 += graph_.chi2(FactorId(f));
     rows += graph_.factor(f).rows;
   }
-  pending_.unit_sigma = std::clamp(std::sqrt(chi2 / rows), kLeastUnitSigma, 1.0);
-  const double limit = parameters_.thorough_relinearise_above * pending_.unit_sigma;
+  pending_.chi2 = chi2;
+  pending_.unit = std::clamp(std::sqrt(chi2 / rows), kLeastUnit, 1.0);
+  const double limit = parameters_.thorough_relinearise_above * pending_.unit;
   for (int f = 0; f < graph_.factor_capacity(); ++f) {
     const FactorRecord& factor = graph_.factor(f);
     if (!factor.in_use || factor.clique == kNone || factor.is_pending) continue;
@@ -222,12 +228,12 @@ void IncrementalSmoother::iterate(IncrementalUpdate& update, bool thorough) {
   update.flops += statistics.flops;
   if (pending_.solve_everything || thorough) {
     pending_.solve_everything = false;
-    tree_.solve_everything(thorough ? parameters_.thorough_move * pending_.unit_sigma
-                                    : parameters_.least_move * strictness());
+    tree_.solve_everything(thorough ? parameters_.thorough_move * pending_.unit
+                                    : parameters_.least_move * usual_unit());
   } else {
-    tree_.solve(parameters_.least_move * strictness());
+    tree_.solve(parameters_.least_move * usual_unit());
   }
-  update.deviation = judge(kNegligible * parameters_.relinearise_above * strictness());
+  update.deviation = judge(kNegligible * parameters_.relinearise_above * usual_unit());
   accept_step(update);
   for (const int f : off_) {
     FactorRecord& factor = graph_.edit_factor(f);
@@ -263,6 +269,14 @@ IncrementalUpdate IncrementalSmoother::update() {
 IncrementalUpdate IncrementalSmoother::update_thoroughly() {
   begin_change();
   return run(true);
+}
+
+IncrementalUpdate IncrementalSmoother::settle(int max_updates) {
+  IncrementalUpdate update = update_thoroughly();
+  for (int i = 1; i < max_updates && update.relinearised_factors > 0; ++i) {
+    update = update_thoroughly();
+  }
+  return update;
 }
 
 IncrementalUpdate IncrementalSmoother::update_everything() {

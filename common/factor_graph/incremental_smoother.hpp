@@ -10,20 +10,24 @@
 
 namespace understory {
 
+/// Limits are in parts of the residuals' own root mean square (`unit`), which the thorough updates
+/// measure: information that is stated a thousand times too small needs no less precision.
 struct IncrementalParameters {
-  /// A variable that would move by less of its conditional standard deviation stays [sigmas].
-  double least_move = 3e-2;
+  /// A variable that would move by less of its conditional standard deviation stays.
+  double least_move = 0.2;
   /// A factor whose residual is further than this from what its linearisation says is linearised
-  /// again with the next update [sigmas].
-  double relinearise_above = 0.1;
-  /// An update goes on (up to max_iterations) while a factor is this far from its linearisation.
+  /// again with the next update.
+  double relinearise_above = 0.5;
+  /// An update goes on (up to max_iterations) while a factor is this far from its linearisation
+  /// [sigmas].
   double iterate_above = 1.0;
   int max_iterations = 5;
-  /// Every so many updates, one looks at all variables and factors, with limits in parts of the
-  /// residuals' own root mean square: what is below the usual ones adds up. 0: never.
+  /// Every so many updates, one looks at all variables and factors, with limits of its own: what is
+  /// below the usual ones adds up. 0: never.
   int thorough_every = 200;
   double thorough_move = 0.01;
   double thorough_relinearise_above = 0.05;
+  double first_unit = 0.1;  ///< Until it is measured [sigmas].
 };
 
 /// What an update found. Never throws for what was measured; see `undetermined`.
@@ -72,6 +76,8 @@ class IncrementalSmoother {
   IncrementalUpdate update();
   /// update() with the limits of the thorough ones.
   IncrementalUpdate update_thoroughly();
+  /// Thorough updates until nothing has to be linearised again.
+  IncrementalUpdate settle(int max_updates = 10);
   /// Orders and factorises everything anew, linearised at the estimates, and iterates.
   IncrementalUpdate update_everything();
 
@@ -100,8 +106,9 @@ class IncrementalSmoother {
     std::vector<int> rebase;  ///< Variables far from their charts' bases.
     std::vector<int> doomed;  ///< Variables to be removed.
     bool solve_everything = false;
-    int since_thorough = 0;   ///< Updates.
-    double unit_sigma = 1.0;  ///< Root mean square of the residuals [sigmas], when last seen.
+    int since_thorough = 0;  ///< Updates.
+    double chi2 = 0.0;       ///< When it was last summed up.
+    double unit = 1.0;       ///< See IncrementalParameters [sigmas].
   };
 
   void begin_change();
@@ -115,7 +122,7 @@ class IncrementalSmoother {
   void shorten_step(double part);
   void finish(IncrementalUpdate& update);
   void look_at_all();
-  double strictness() const;
+  double usual_unit() const;
   void collect_moved();
   IncrementalUpdate run(bool thorough);
 

@@ -13,7 +13,9 @@ IncrementalParameters incremental(const SmootherParameters& parameters) {
   result.relinearise_above = parameters.relinearise_above;
   result.iterate_above = parameters.iterate_above;
   result.max_iterations = parameters.max_iterations;
-  result.thorough_every = 0;  // Costs what the map is large; the mapper's noise is as it says.
+  // The mapper's noise is as it says, and its cost must not follow the map.
+  result.first_unit = 1.0;
+  result.thorough_every = 0;
   return result;
 }
 

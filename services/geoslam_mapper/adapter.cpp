@@ -144,7 +144,10 @@ class MapperAdapter : public Adapter {
   }
 
   void publish_delta(const MapUpdate& update) {
-    MapDelta delta = map_difference(known_.landmarks, stage_->landmarks(), update, output_.moved_m);
+    const auto changed = stage_->take_changed_landmarks();
+    MapDelta delta =
+        changed ? map_change(known_.landmarks, *changed, update, output_.moved_m)
+                : map_difference(known_.landmarks, stage_->landmarks(), update, output_.moved_m);
     known_.utime = std::max(known_.utime, update.utime);
     const bool changes = !delta.added.empty() || !delta.moved.empty() || !delta.removed.empty() ||
                          !delta.merged.empty();

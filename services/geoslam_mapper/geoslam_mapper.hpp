@@ -35,6 +35,9 @@ class MapperMethod {
   virtual std::vector<KeyframePose> trajectory() const = 0;
   /// Every landmark of the map as now estimated, in order of id.
   virtual std::vector<MapLandmark> landmarks() const = 0;
+  /// Those of them that are new or have moved since the last call, in order of id: costs what
+  /// changed. None where the method keeps no account.
+  virtual std::optional<std::vector<MapLandmark>> take_changed_landmarks() { return std::nullopt; }
 
   /// The whole state, for a restart; load() takes what save() of the same method gave.
   virtual std::string save() const = 0;

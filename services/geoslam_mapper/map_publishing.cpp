@@ -63,15 +63,51 @@ MapDelta map_difference(const std::vector<MapLandmark>& before,
   return delta;
 }
 
+namespace {
+
+auto place_of(std::vector<MapLandmark>& landmarks, LandmarkId id) {
+  return std::lower_bound(
+      landmarks.begin(), landmarks.end(), id,
+      [](const MapLandmark& one, LandmarkId wanted) { return one.id < wanted; });
+}
+
+}  // namespace
+
+MapDelta map_change(const std::vector<MapLandmark>& before, const std::vector<MapLandmark>& changed,
+                    const MapUpdate& update, double moved_m) {
+  MapDelta delta;
+  delta.utime = update.utime;
+  delta.merged = update.merged;
+  for (const MapLandmark& landmark : changed) {
+    const auto old =
+        std::lower_bound(before.begin(), before.end(), landmark.id,
+                         [](const MapLandmark& one, LandmarkId wanted) { return one.id < wanted; });
+    if (old == before.end() || old->id != landmark.id) {
+      delta.added.push_back(landmark);
+    } else if ((old->position_m - landmark.position_m).norm() > moved_m) {
+      delta.moved.push_back(landmark);
+    }
+  }
+  return delta;
+}
+
 std::vector<MapLandmark> with_delta(std::vector<MapLandmark> landmarks, const MapDelta& delta) {
-  std::map<LandmarkId, MapLandmark> by_id;
-  for (MapLandmark& landmark : landmarks) by_id.insert_or_assign(landmark.id, landmark);
-  for (const MapLandmark& landmark : delta.added) by_id.insert_or_assign(landmark.id, landmark);
-  for (const MapLandmark& landmark : delta.moved) by_id.insert_or_assign(landmark.id, landmark);
-  for (const LandmarkId id : delta.removed) by_id.erase(id);
-  for (const auto& [old_id, new_id] : delta.merged) by_id.erase(old_id);
-  landmarks.clear();
-  for (auto& [id, landmark] : by_id) landmarks.push_back(landmark);
+  const auto put = [&](const MapLandmark& landmark) {
+    const auto place = place_of(landmarks, landmark.id);
+    if (place != landmarks.end() && place->id == landmark.id) {
+      *place = landmark;
+    } else {
+      landmarks.insert(place, landmark);
+    }
+  };
+  const auto drop = [&](LandmarkId id) {
+    const auto place = place_of(landmarks, id);
+    if (place != landmarks.end() && place->id == id) landmarks.erase(place);
+  };
+  for (const MapLandmark& landmark : delta.added) put(landmark);
+  for (const MapLandmark& landmark : delta.moved) put(landmark);
+  for (const LandmarkId id : delta.removed) drop(id);
+  for (const auto& [old_id, new_id] : delta.merged) drop(old_id);
   return landmarks;
 }
 

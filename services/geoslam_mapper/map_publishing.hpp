@@ -19,6 +19,11 @@ MapDelta map_difference(const std::vector<MapLandmark>& before,
                         const std::vector<MapLandmark>& after, const MapUpdate& update,
                         double moved_m);
 
+/// The same from those landmarks alone that are new or have moved; what is gone was merged. All in
+/// order of id.
+MapDelta map_change(const std::vector<MapLandmark>& before, const std::vector<MapLandmark>& changed,
+                    const MapUpdate& update, double moved_m);
+
 /// `landmarks` as a holder has them after `delta`: in order of id.
 std::vector<MapLandmark> with_delta(std::vector<MapLandmark> landmarks, const MapDelta& delta);
 

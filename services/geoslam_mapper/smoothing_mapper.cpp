@@ -51,8 +51,9 @@ void SmoothingMapper::start_with(std::span<const MapLandmark> landmarks) {
       landmark.id = given.id;
       store_.restore(landmark);
       store_.set_next_id(std::max(store_.next_id(), given.id + 1));
+      changed_.push_back(given.id);
     } else {
-      store_.insert(landmark);
+      changed_.push_back(store_.insert(landmark));
     }
   }
   map_was_given_ = map_was_given_ || !landmarks.empty();
@@ -190,18 +191,32 @@ std::vector<KeyframePose> SmoothingMapper::trajectory() const {
   return result;
 }
 
+MapLandmark SmoothingMapper::as_told(const StoredLandmark& landmark) const {
+  MapLandmark out;
+  out.id = landmark.id;
+  out.position_m = landmark.point ? smoother_.point(*landmark.point) : landmark.position_m;
+  out.radius_m = landmark.radius_m;
+  out.times_seen = landmark.times_seen;
+  out.kind = landmark.kind;
+  return out;
+}
+
 std::vector<MapLandmark> SmoothingMapper::landmarks() const {
   std::vector<MapLandmark> result;
   result.reserve(store_.all().size());
-  for (const auto& [id, landmark] : store_.all()) {
-    MapLandmark out;
-    out.id = id;
-    out.position_m = landmark.point ? smoother_.point(*landmark.point) : landmark.position_m;
-    out.radius_m = landmark.radius_m;
-    out.times_seen = landmark.times_seen;
-    out.kind = landmark.kind;
-    result.push_back(out);
+  for (const auto& [id, landmark] : store_.all()) result.push_back(as_told(landmark));
+  return result;
+}
+
+std::optional<std::vector<MapLandmark>> SmoothingMapper::take_changed_landmarks() {
+  std::sort(changed_.begin(), changed_.end());
+  changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
+  std::vector<MapLandmark> result;
+  for (const LandmarkId id : changed_) {
+    const auto found = store_.all().find(id);
+    if (found != store_.all().end()) result.push_back(as_told(found->second));
   }
+  changed_.clear();
   return result;
 }
 

@@ -20,6 +20,7 @@ class SmoothingMapper final : public MapperMethod {
   void start_with(std::span<const MapLandmark> landmarks) override;
   std::vector<KeyframePose> trajectory() const override;
   std::vector<MapLandmark> landmarks() const override;
+  std::optional<std::vector<MapLandmark>> take_changed_landmarks() override;
   std::string save() const override;
   void load(const std::string& state) override;
 
@@ -54,6 +55,7 @@ class SmoothingMapper final : public MapperMethod {
   void report(const Keyframe& keyframe, const Placement& placement, MapUpdate& update);
   void finish(const Keyframe& keyframe, MapUpdate& update);
   SE2WithCovariance base_pose(const Base& base) const;
+  MapLandmark as_told(const StoredLandmark& landmark) const;
 
   // smoothing_mapper_place.cpp: where is it?
   std::optional<Prediction> predict(const Keyframe& keyframe) const;
@@ -95,6 +97,7 @@ class SmoothingMapper final : public MapperMethod {
   SmoothingMapperParameters parameters_;
   Smoother smoother_;
   LandmarkStore store_;
+  std::vector<LandmarkId> changed_;  ///< New or moved since they were asked for.
   std::vector<Candidate> candidates_;
   std::vector<Node> nodes_;
   std::vector<Base> bases_;

@@ -106,6 +106,7 @@ void SmoothingMapper::promote(const Candidate& candidate, MapUpdate& update) {
   for (const Candidate::Sighting& sighting : candidate.sightings)
     observe(sighting.node, sighting.landmark, id);
   update.added.push_back(id);
+  changed_.push_back(id);
 }
 
 void SmoothingMapper::forget_stale_candidates() {

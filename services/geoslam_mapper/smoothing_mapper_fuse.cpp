@@ -225,7 +225,9 @@ void SmoothingMapper::count_sightings(const Keyframe& keyframe, NodeIndex node,
 void SmoothingMapper::adopt_estimates() {
   for (const PointId point : smoother_.moved_points()) {
     const LandmarkId id = landmark_of_point_[index(point)];
-    if (id != 0) store_.move(id, smoother_.point(point));
+    if (id == 0) continue;
+    store_.move(id, smoother_.point(point));
+    changed_.push_back(id);
   }
   for (const PoseId pose : smoother_.moved_poses()) {
     // A node's number is that of its pose.

@@ -206,6 +206,7 @@ void SmoothingMapper::load(const std::string& state) {
         LocatedScan{located.at(0).get<Utime>(), located.at(1).get<SE2>(), located.at(2).get<SE2>()};
   }
   if (!loaded.nodes_.empty()) loaded.smoother_.update();
+  for (const auto& [id, landmark] : loaded.store_.all()) loaded.changed_.push_back(id);
   *this = std::move(loaded);
 }
 

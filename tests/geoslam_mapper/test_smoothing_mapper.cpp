@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <random>
 
+#include "services/geoslam_mapper/map_publishing.hpp"
 #include "services/keyframer/joint_keyframer.hpp"
 #include "sim/drive.hpp"
 #include "tests/catch.hpp"
@@ -170,6 +171,25 @@ TEST_CASE("Localisation only leaves the given map alone", "[mapper]") {
   const std::vector<MapLandmark> now = mapper.landmarks();
   REQUIRE(now.size() == given.size());
   for (std::size_t i = 0; i < given.size(); ++i) REQUIRE(now[i].position_m == given[i].position_m);
+}
+
+TEST_CASE("Who follows the changed landmarks has the map", "[mapper]") {
+  const sim::Drive simulated = drive(sim::PathKind::kCircle, 100.0, 21);
+  SmoothingMapper mapper({});
+  std::vector<MapLandmark> held;
+  for (const Keyframe& keyframe : keyframes(simulated)) {
+    const MapUpdate update = mapper.add(keyframe);
+    const auto changed = mapper.take_changed_landmarks();
+    REQUIRE(changed);
+    held = with_delta(held, map_change(held, *changed, update, 0.0));
+    const std::vector<MapLandmark> map = mapper.landmarks();
+    REQUIRE(held.size() == map.size());
+    for (std::size_t i = 0; i < map.size(); ++i) {
+      REQUIRE(held[i].id == map[i].id);
+      REQUIRE(held[i].position_m == map[i].position_m);
+    }
+  }
+  REQUIRE(held.size() > 20);
 }
 
 TEST_CASE("Standing still does not grow the graph", "[mapper]") {
