@@ -19,7 +19,7 @@ enum class InputFaultKind : std::uint8_t {
   kClockJump,      ///< The sensor's clock jumped: quarantined, then followed.
   kSilent,         ///< Nothing came for too long.
   kFrozen,         ///< The very same again and again.
-  kSaturated,      ///< At the end of its range: used, with more noise.
+  kSaturated,      ///< At the end of its range: left out.
   kNoPointTimes,   ///< A sweep whose points have no times.
   kNoMotion,       ///< A sweep that could not wait for motion any longer: not de-skewed.
   kNotCalibrated,  ///< The vehicle moved before it had stood still long enough.

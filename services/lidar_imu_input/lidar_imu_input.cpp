@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "services/lidar_imu_input/deskew.hpp"
 
@@ -50,12 +51,16 @@ InputResults LidarImuInput::add(const ImuSample& raw) {
   const bool saturated = guard_.is_saturated(raw, faults);
   const auto utime = frozen ? std::nullopt : guard_.admit(Sensor::kImu, raw.utime, faults);
   report(faults, out);
-  if (utime) {
-    if (saturated) ++counters_.samples_saturated;
+  if (utime && saturated) {
+    // It tells a bound, not a motion. Over a bump the samples beside it are joined, with more
+    // noise; where it lasts the wheels go on alone, as without an IMU.
+    ++counters_.samples_saturated;
+    was_saturated_ = true;
+  } else if (utime) {
     ImuSample sample = raw;
     sample.utime = *utime;
     sample = motion_.to_vehicle(sample);
-    motion_.add_imu(sample, saturated);
+    motion_.add_imu(sample, std::exchange(was_saturated_, false));
     out.emplace_back(sample);
     publish_raw_pose(false, out);
     check_calibration(out);

@@ -83,6 +83,7 @@ class LidarImuInput {
   std::optional<Utime> raw_pose_utime_;
   std::vector<SweepPoint> first_points_;  ///< Of the latest sweep, to notice a frozen laser.
   bool calibration_told_ = false;
+  bool was_saturated_ = false;  ///< The latest sample of the IMU; it was left out.
 };
 
 }  // namespace understory
