@@ -45,8 +45,9 @@ GraphFormat guess_format(std::string_view text);
 /// the quaternion; the factors have it of the rotation vector.
 std::variant<GraphFile, GraphFileError> read_graph(std::string_view text, GraphFormat format);
 
-/// g2o text of a graph: its relative poses, observations of points and, as fixed vertices, nothing
-/// else: `skipped` counts the factors that the format has no word for. Numbers are exact.
+/// g2o text of a graph at its estimates: relative poses and Cartesian observations of points, and
+/// all variables; `skipped` counts the factors that the format has no word for. Losses are not
+/// told.
 std::string write_g2o(const FactorGraph& graph, int* skipped = nullptr);
 
 }  // namespace understory

@@ -11,7 +11,8 @@ namespace {
 constexpr double kFarTurn = 0.6;
 /// A step may add this part to the loss, or that of one measurement: that is the linearisations'
 /// age, and mended by the next.
-constexpr double kToleratedPart = 0.02;
+constexpr double kToleratedPart = 0.1;
+constexpr double kToleratedRounding = 1e-3;  ///< The same of thorough updates, which start fresh.
 constexpr int kMaxHalvings = 8;
 /// Part of the limit to deviations, that may grow unseen.
 constexpr double kNegligible = 0.2;
@@ -171,8 +172,9 @@ void IncrementalSmoother::shorten_step(double part) {
 }
 
 /// Takes the step back by halves while it makes the loss larger.
-void IncrementalSmoother::accept_step(IncrementalUpdate& update) {
-  const double tolerated = std::max(pending_.unit * pending_.unit, kToleratedPart * pending_.chi2);
+void IncrementalSmoother::accept_step(IncrementalUpdate& update, bool thorough) {
+  const double part = thorough ? kToleratedRounding : kToleratedPart;
+  const double tolerated = std::max(part * pending_.unit * pending_.unit, part * pending_.chi2);
   if (left_out_loss_ <= tolerated) return;
   for (int i = 0; i < kMaxHalvings && loss_change() > tolerated; ++i) {
     shorten_step(0.5);
@@ -234,7 +236,7 @@ void IncrementalSmoother::iterate(IncrementalUpdate& update, bool thorough) {
     tree_.solve(parameters_.least_move * usual_unit());
   }
   update.deviation = judge(kNegligible * parameters_.relinearise_above * usual_unit());
-  accept_step(update);
+  accept_step(update, thorough);
   for (const int f : off_) {
     FactorRecord& factor = graph_.edit_factor(f);
     if (factor.is_pending) continue;
@@ -253,7 +255,7 @@ IncrementalUpdate IncrementalSmoother::run(bool thorough) {
   do {
     iterate(update, thorough);
   } while (update.iterations < parameters_.max_iterations &&
-           (update.deviation > parameters_.iterate_above || pending_.solve_everything));
+           update.deviation > parameters_.iterate_above);
   update.moved_variables = static_cast<long>(moved_.size());
   for (const int v : moved_) moved_at_[static_cast<std::size_t>(v)] = 0;
   finish(update);
@@ -273,7 +275,10 @@ IncrementalUpdate IncrementalSmoother::update_thoroughly() {
 
 IncrementalUpdate IncrementalSmoother::settle(int max_updates) {
   IncrementalUpdate update = update_thoroughly();
-  for (int i = 1; i < max_updates && update.relinearised_factors > 0; ++i) {
+  const auto is_settled = [&] {
+    return update.relinearised_factors == 0 && !pending_.solve_everything && pending_.stale.empty();
+  };
+  for (int i = 1; i < max_updates && !is_settled(); ++i) {
     update = update_thoroughly();
   }
   return update;

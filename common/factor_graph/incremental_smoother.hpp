@@ -77,7 +77,7 @@ class IncrementalSmoother {
   /// update() with the limits of the thorough ones.
   IncrementalUpdate update_thoroughly();
   /// Thorough updates until nothing has to be linearised again.
-  IncrementalUpdate settle(int max_updates = 10);
+  IncrementalUpdate settle(int max_updates = 20);
   /// Orders and factorises everything anew, linearised at the estimates, and iterates.
   IncrementalUpdate update_everything();
 
@@ -118,7 +118,7 @@ class IncrementalSmoother {
   void iterate(IncrementalUpdate& update, bool thorough);
   double judge(double unless_below);
   double loss_change();
-  void accept_step(IncrementalUpdate& update);
+  void accept_step(IncrementalUpdate& update, bool thorough);
   void shorten_step(double part);
   void finish(IncrementalUpdate& update);
   void look_at_all();

@@ -1,0 +1,115 @@
+// A graph as g2o text.
+#include <charconv>
+
+#include "common/factor_graph/factor_graph.hpp"
+#include "common/factor_graph/graph_file.hpp"
+
+namespace understory {
+namespace {
+
+/// Words and numbers; the shortest digits that read back as the same number.
+class Text {
+ public:
+  void word(std::string_view text) { out_ += text; }
+  void number(double value) {
+    char digits[32];
+    const auto end = std::to_chars(digits, digits + sizeof(digits), value).ptr;
+    out_ += ' ';
+    out_.append(digits, end);
+  }
+  void integer(int value) { out_ += ' ' + std::to_string(value); }
+  void upper_triangle(const Eigen::MatrixXd& m) {
+    for (Eigen::Index r = 0; r < m.rows(); ++r) {
+      for (Eigen::Index c = r; c < m.cols(); ++c) number(m(r, c));
+    }
+  }
+  void end() { out_ += '\n'; }
+  std::string take() { return std::move(out_); }
+
+ private:
+  std::string out_;
+};
+
+void write_vertex(const FactorGraph& graph, int v, Text& out) {
+  const Value& value = graph.value(VariableId(v));
+  const VariableType type = graph.type(VariableId(v));
+  std::size_t numbers = static_cast<std::size_t>(dimension(type));
+  switch (type) {
+    case VariableType::kPose2:
+      out.word("VERTEX_SE2");
+      break;
+    case VariableType::kPoint2:
+      out.word("VERTEX_XY");
+      break;
+    case VariableType::kPose3:
+      out.word("VERTEX_SE3:QUAT");
+      numbers = 7;
+      break;
+    case VariableType::kPoint3:
+      out.word("VERTEX_TRACKXYZ");
+      break;
+  }
+  out.integer(v);
+  for (std::size_t i = 0; i < numbers; ++i) out.number(value[i]);
+  out.end();
+}
+
+/// False where g2o has no word for it.
+bool write_edge(const FactorGraph& graph, int f, Text& out) {
+  const FactorKind kind = graph.kind(FactorId(f));
+  std::size_t numbers = 0;
+  switch (kind) {
+    case FactorKind::kRelativePose2:
+      out.word("EDGE_SE2");
+      numbers = 3;
+      break;
+    case FactorKind::kPoint2:
+      out.word("EDGE_SE2_XY");
+      numbers = 2;
+      break;
+    case FactorKind::kRelativePose3:
+      out.word("EDGE_SE3:QUAT");
+      numbers = 7;
+      break;
+    case FactorKind::kPoint3:
+      out.word("EDGE_SE3_TRACKXYZ");
+      numbers = 3;
+      break;
+    default:
+      return false;
+  }
+  for (const int v : graph.variables_of(f)) out.integer(v);
+  if (kind == FactorKind::kPoint3) out.integer(0);
+  const auto measurement = graph.measurement(FactorId(f));
+  for (std::size_t i = 0; i < numbers; ++i) out.number(measurement[i]);
+  Eigen::MatrixXd information = graph.information(FactorId(f));
+  if (kind == FactorKind::kRelativePose3) {
+    // Of the quaternion's vector part, half the rotation vector.
+    information.bottomRows(3) *= 2.0;
+    information.rightCols(3) *= 2.0;
+  }
+  out.upper_triangle(information);
+  out.end();
+  return true;
+}
+
+}  // namespace
+
+std::string write_g2o(const FactorGraph& graph, int* skipped) {
+  Text out;
+  int left_out = 0;
+  bool has_sensor = false;
+  for (int v = 0; v < graph.variable_capacity(); ++v) {
+    if (!graph.contains(VariableId(v))) continue;
+    write_vertex(graph, v, out);
+    has_sensor = has_sensor || graph.type(VariableId(v)) == VariableType::kPoint3;
+  }
+  if (has_sensor) out.word("PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n");
+  for (int f = 0; f < graph.factor_capacity(); ++f) {
+    if (graph.contains(FactorId(f)) && !write_edge(graph, f, out)) ++left_out;
+  }
+  if (skipped != nullptr) *skipped = left_out;
+  return out.take();
+}
+
+}  // namespace understory

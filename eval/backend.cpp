@@ -1,0 +1,206 @@
+#include "eval/backend.hpp"
+
+#include <fmt/format.h>
+#include <time.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+#include "common/factor_graph/batch.hpp"
+#include "common/factor_graph/graph_file.hpp"
+#include "common/factor_graph/incremental_smoother.hpp"
+
+namespace understory::eval {
+namespace {
+
+/// The first pose is held fast by a prior that no other factor comes near.
+constexpr double kFixed = 1e8;
+
+double processor_s() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+double resident_mb() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.rfind("VmRSS:", 0) == 0) return std::stod(line.substr(6)) / 1024.0;
+  }
+  return 0.0;
+}
+
+GraphFile read(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw std::runtime_error(fmt::format("{}: cannot be opened", file.string()));
+  const std::string text((std::istreambuf_iterator<char>(in)), {});
+  auto graph = read_graph(text, guess_format(text));
+  if (const auto* error = std::get_if<GraphFileError>(&graph)) {
+    throw std::runtime_error(
+        fmt::format("{}, line {}: {}", file.string(), error->line, error->what));
+  }
+  return std::move(std::get<GraphFile>(graph));
+}
+
+bool is_pose(VariableType type) {
+  return type == VariableType::kPose2 || type == VariableType::kPose3;
+}
+
+/// Hands out a file's factors pose by pose.
+class Feeder {
+ public:
+  explicit Feeder(const GraphFile& file)
+      : file_(file), times_(file.vertices.size(), -1), names_(file.vertices.size()) {
+    int poses = 0;
+    for (std::size_t v = 0; v < file.vertices.size(); ++v) {
+      if (is_pose(file.vertices[v].type)) times_[v] = poses++;
+    }
+    factors_at_.resize(static_cast<std::size_t>(poses));
+    for (std::size_t f = 0; f < file.factors.size(); ++f) {
+      factors_at_[static_cast<std::size_t>(last_time(file.factors[f]))].push_back(f);
+    }
+    for (int k = 0; k < poses; ++k) sort_by_age(k);
+  }
+
+  std::size_t poses() const { return factors_at_.size(); }
+
+  /// Adds pose k: placed by the motion from the pose before it, where there is one.
+  void feed(std::size_t k, IncrementalSmoother& smoother) {
+    for (const std::size_t f : factors_at_[k]) {
+      Factor factor = file_.factors[f];
+      const auto a = vertex(factor, 0);
+      const auto b = vertex(factor, 1);
+      if (!names_[a] && !names_[b]) start(a, smoother);
+      if (!names_[b]) names_[b] = placed(factor, *names_[a], smoother);
+      if (!names_[a]) names_[a] = placed_backwards(factor, *names_[b], smoother);
+      factor.variables = {*names_[a], *names_[b]};
+      smoother.add(factor);
+    }
+  }
+
+ private:
+  static std::size_t vertex(const Factor& factor, std::size_t i) {
+    return static_cast<std::size_t>(index(factor.variables[i]));
+  }
+  int last_time(const Factor& factor) const {
+    return std::max({times_[vertex(factor, 0)], times_[vertex(factor, 1)], 0});
+  }
+  /// Motions from recent poses first.
+  void sort_by_age(int k) {
+    const auto age = [&](std::size_t f) {
+      const int other =
+          std::min(times_[vertex(file_.factors[f], 0)], times_[vertex(file_.factors[f], 1)]);
+      return other < 0 ? 1 << 30 : k - other;
+    };
+    auto& factors = factors_at_[static_cast<std::size_t>(k)];
+    std::stable_sort(factors.begin(), factors.end(),
+                     [&](std::size_t x, std::size_t y) { return age(x) < age(y); });
+  }
+
+  void start(std::size_t v, IncrementalSmoother& smoother) {
+    if (file_.vertices[v].type == VariableType::kPose2) {
+      names_[v] = smoother.add_variable(SE2());
+      smoother.add(prior(*names_[v], SE2(), kFixed * Eigen::Matrix3d::Identity()));
+    } else {
+      names_[v] = smoother.add_variable(Pose3());
+      const Eigen::Matrix<double, 6, 6> information =
+          kFixed * Eigen::Matrix<double, 6, 6>::Identity();
+      smoother.add(prior(*names_[v], Pose3(), information));
+    }
+  }
+
+  static VariableId placed(const Factor& factor, VariableId a, IncrementalSmoother& smoother) {
+    const auto& z = factor.measurement;
+    switch (factor.kind) {
+      case FactorKind::kRelativePose2:
+        return smoother.add_variable(smoother.pose2(a) * SE2(z[0], z[1], z[2]));
+      case FactorKind::kRelativePose3:
+        return smoother.add_variable(smoother.pose3(a) * pose3_of(z));
+      case FactorKind::kPoint2:
+        return smoother.add_variable(
+            Eigen::Vector2d(smoother.pose2(a) * Eigen::Vector2d(z[0], z[1])));
+      default:
+        return smoother.add_variable(
+            Eigen::Vector3d(smoother.pose3(a) * Eigen::Vector3d(z[0], z[1], z[2])));
+    }
+  }
+  static VariableId placed_backwards(const Factor& factor, VariableId b,
+                                     IncrementalSmoother& smoother) {
+    const auto& z = factor.measurement;
+    if (factor.kind == FactorKind::kRelativePose2) {
+      return smoother.add_variable(smoother.pose2(b) * SE2(z[0], z[1], z[2]).inverse());
+    }
+    if (factor.kind == FactorKind::kRelativePose3) {
+      return smoother.add_variable(smoother.pose3(b) * pose3_of(z).inverse());
+    }
+    throw std::runtime_error("a pose that only landmarks tie to the others");
+  }
+
+  const GraphFile& file_;
+  std::vector<int> times_;  ///< Of each pose; -1 of points.
+  std::vector<std::optional<VariableId>> names_;
+  std::vector<std::vector<std::size_t>> factors_at_;
+};
+
+/// The same graph at the same estimates, solved whole.
+void solve_whole(const FactorGraph& from, BackendRun& run) {
+  FactorGraph graph;
+  std::vector<VariableId> names;
+  for (int v = 0; v < from.variable_capacity(); ++v) {
+    names.push_back(graph.add(from.type(VariableId(v)), from.value(VariableId(v))));
+  }
+  for (int f = 0; f < from.factor_capacity(); ++f) {
+    Factor factor;
+    factor.kind = from.kind(FactorId(f));
+    const auto variables = from.variables_of(f);
+    factor.variable_count = static_cast<int>(variables.size());
+    for (std::size_t i = 0; i < variables.size(); ++i) {
+      factor.variables[i] = names[static_cast<std::size_t>(variables[i])];
+    }
+    const auto measurement = from.measurement(FactorId(f));
+    std::copy(measurement.begin(), measurement.end(), factor.measurement.begin());
+    factor.information = from.information(FactorId(f));
+    graph.add(factor);
+  }
+  const double begin = processor_s();
+  BatchParameters parameters;
+  parameters.relative_decrease = 1e-10;
+  const BatchReport report = optimise(graph, parameters);
+  run.batch_s = processor_s() - begin;
+  run.chi2_batch = report.chi2;
+  if (!report.ok) run.error = "batch: " + report.error;
+}
+
+}  // namespace
+
+BackendRun run_backend(const std::filesystem::path& file) {
+  const GraphFile graph = read(file);
+  BackendRun run;
+  run.dataset = file.stem().string();
+  run.factors = graph.factors.size();
+  Feeder feeder(graph);
+  run.poses = feeder.poses();
+  run.points = graph.vertices.size() - run.poses;
+  const auto smoother = std::make_unique<IncrementalSmoother>();
+  for (std::size_t k = 0; k < feeder.poses(); ++k) {
+    const double begin = processor_s();
+    feeder.feed(k, *smoother);
+    const IncrementalUpdate update = smoother->update();
+    run.update_ms.push_back(1e3 * (processor_s() - begin));
+    if (!update.ok && run.error.empty()) run.error = update.error;
+  }
+  const double begin = processor_s();
+  smoother->settle();
+  run.settle_ms = 1e3 * (processor_s() - begin);
+  run.chi2_final = smoother->graph().chi2();
+  run.rss_mb = resident_mb();
+  run.smoother_mb = static_cast<double>(smoother->bytes()) / 1048576.0;
+  solve_whole(smoother->graph(), run);
+  return run;
+}
+
+}  // namespace understory::eval

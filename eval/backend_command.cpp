@@ -1,0 +1,132 @@
+// eval backend: the smoother on standard graphs, beside the field's reference.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "eval/backend.hpp"
+#include "eval/experiments.hpp"
+#include "eval/interrupt.hpp"
+#include "eval/results.hpp"
+
+namespace understory::eval {
+namespace {
+
+/// GTSAM's ISAM2 (0ffe6c93, Release, one thread), one pose per update, fast setting; measured once
+/// on one core of an AMD EPYC that was busy with other work. Its chi^2 counts by other conventions.
+struct Reference {
+  const char* dataset;
+  double total_s, ms_p50, ms_p99, ms_max;
+};
+constexpr Reference kReferences[] = {
+    {"g2o_intel", 0.84, 0.08, 3.0, 6.8},
+    {"g2o_manhattanOlson3500", 3.09, 0.14, 8.1, 50.0},
+    {"isam_manhattanOlson3500", 3.09, 0.14, 8.1, 50.0},
+    {"victoriaPark_isam", 17.4, 0.38, 30.0, 133.0},
+    {"isam_cityTrees10000", 17.1, 0.42, 15.3, 37.0},
+    {"sesync_city10000", 67.6, 3.2, 29.0, 107.0},
+    {"parking-garage", 2.43, 0.37, 21.0, 61.0},
+    {"sphere2500", 34.3, 12.4, 36.0, 46.0},
+    {"torus3D", 109.0, 15.4, 111.0, 277.0},
+};
+
+struct BackendOptions {
+  std::vector<std::string> files;
+  std::string json;
+  bool plots = true;
+};
+
+double quantile(std::vector<double> values, double q) {
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1) + 0.5)];
+}
+
+nlohmann::json row_of(const BackendRun& run) {
+  double total_ms = run.settle_ms;
+  for (const double ms : run.update_ms) total_ms += ms;
+  nlohmann::json row{{"dataset", run.dataset},
+                     {"method", "ours"},
+                     {"poses", run.poses},
+                     {"points", run.points},
+                     {"factors", run.factors},
+                     {"total_s", 1e-3 * total_ms},
+                     {"settle_s", 1e-3 * run.settle_ms},
+                     {"ms_p50", quantile(run.update_ms, 0.5)},
+                     {"ms_p99", quantile(run.update_ms, 0.99)},
+                     {"ms_max", quantile(run.update_ms, 1.0)},
+                     {"chi2_final", run.chi2_final},
+                     {"chi2_batch", run.chi2_batch},
+                     {"batch_s", run.batch_s},
+                     {"rss_mb", run.rss_mb},
+                     {"smoother_mb", run.smoother_mb},
+                     {"error", run.error}};
+  for (const Reference& reference : kReferences) {
+    if (run.dataset != reference.dataset) continue;
+    row["reference"] = {{"total_s", reference.total_s},
+                        {"settle_s", 1e-3 * run.settle_ms},
+                     {"ms_p50", reference.ms_p50},
+                        {"ms_p99", reference.ms_p99},
+                        {"ms_max", reference.ms_max}};
+  }
+  return row;
+}
+
+void print_heading() {
+  fmt::print("{:<26}{:>7}{:>8} |{:>9}{:>8}{:>9}{:>9} |{:>9}{:>8}{:>8} |{:>13}{:>13}{:>10}{:>8}\n",
+             "data", "poses", "factors", "total s", "p50 ms", "p99 ms", "max ms", "ISAM2 s",
+             "p99 ms", "max ms", "chi2", "chi2 batch", "excess", "RSS MB");
+}
+
+void print_row(const nlohmann::json& row) {
+  const auto number = [](const nlohmann::json& from, const char* key) {
+    return from.contains(key) ? fmt::format("{:.2f}", from[key].get<double>()) : std::string("-");
+  };
+  const nlohmann::json reference = row.value("reference", nlohmann::json::object());
+  const double final = row["chi2_final"].get<double>();
+  const double batch = row["chi2_batch"].get<double>();
+  fmt::print(
+      "{:<26}{:>7}{:>8} |{:>9.2f}{:>8.3f}{:>9.2f}{:>9.2f} |{:>9}{:>8}{:>8} |{:>13.5f}{:>13.5f}"
+      "{:>9.4f}%{:>8.0f} {}\n",
+      row["dataset"].get<std::string>(), row["poses"].get<int>(), row["factors"].get<int>(),
+      row["total_s"].get<double>(), row["ms_p50"].get<double>(), row["ms_p99"].get<double>(),
+      row["ms_max"].get<double>(), number(reference, "total_s"), number(reference, "ms_p99"),
+      number(reference, "ms_max"), final, batch, 100.0 * (final / batch - 1.0),
+      row["rss_mb"].get<double>(), row["error"].get<std::string>());
+}
+
+void run_experiment(const BackendOptions& options) {
+  const std::atomic<bool>& stop = stop_on_interrupt();
+  nlohmann::json rows = nlohmann::json::array();
+  nlohmann::json traces = nlohmann::json::array();
+  print_heading();
+  for (const std::string& file : options.files) {
+    if (stop) throw Interrupted{};
+    const BackendRun run = run_backend(file);
+    rows.push_back(row_of(run));
+    print_row(rows.back());
+    traces.push_back({{"dataset", run.dataset}, {"update_ms", run.update_ms}});
+  }
+  if (options.json.empty()) return;
+  const std::filesystem::path out = options.json;
+  write_json(traces_file(out), traces);
+  write_json(out, result_document("backend", {{"files", options.files}}, rows));
+  if (options.plots) plot("backend.py", {out, traces_file(out).string()});
+}
+
+}  // namespace
+
+void add_backend_experiment(CLI::App& eval) {
+  CLI::App& command = *eval.add_subcommand(
+      "backend", "The smoother on standard graphs, one pose per update (g2o, TORO, iSAM text)");
+  const auto options = std::make_shared<BackendOptions>();
+  command.add_option("--data", options->files, "Graph files")->required()->check(CLI::ExistingFile);
+  command.add_option("--json", options->json, "Result file; times per update and plot beside it");
+  command.add_flag("!--no-plots", options->plots, "Write JSON only");
+  command.callback([options] { run_guarded("backend", [&] { run_experiment(*options); }); });
+}
+
+}  // namespace understory::eval
