@@ -6,13 +6,25 @@
 
 namespace understory {
 
-std::vector<PointSweep> split_sweep(PointSweep sweep, std::size_t max_points) {
+namespace {
+
+/// A turn is not thought to be larger before it is there [points]: a header may claim anything.
+constexpr std::size_t kLargestReserve = std::size_t{1} << 20;
+
+PointSweep without_points(const PointSweep& sweep) {
+  return {sweep.utime,       sweep.sequence,          sweep.turn,        sweep.part,
+          sweep.parts,       sweep.has_times,         sweep.is_deskewed, sweep.rings,
+          sweep.max_range_m, sweep.sensor_position_m, sweep.attitude,    {}};
+}
+
+}  // namespace
+
+std::vector<PointSweep> split_sweep(const PointSweep& sweep, std::size_t max_points) {
   if (max_points == 0) throw std::invalid_argument("split_sweep: max_points must be positive");
-  const std::size_t count =
-      std::max<std::size_t>(1, (sweep.points.size() + max_points - 1) / max_points);
+  const std::vector<SweepPoint>& points = sweep.points;
+  const std::size_t count = std::max<std::size_t>(1, (points.size() + max_points - 1) / max_points);
   if (count > 65535) throw std::invalid_argument("split_sweep: too many parts");
-  const std::vector<SweepPoint> points = std::exchange(sweep.points, {});
-  std::vector<PointSweep> parts(count, sweep);
+  std::vector<PointSweep> parts(count, without_points(sweep));
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t begin = i * max_points;
     const std::size_t end = std::min(points.size(), begin + max_points);
@@ -34,6 +46,8 @@ std::optional<PointSweep> SweepAssembler::add(PointSweep part) {
       if (lost_turn_ != part.turn) count_incomplete(part.turn);
       return std::nullopt;
     }
+    const std::size_t expected = part.points.size() * part.parts;
+    if (part.parts > 1) part.points.reserve(std::min(expected, kLargestReserve));
     pending_ = std::move(part);
     next_part_ = 1;
   } else {

@@ -54,7 +54,7 @@ struct PointSweep {
 };
 
 /// The sweep in parts of at most `max_points` points, which share the header.
-std::vector<PointSweep> split_sweep(PointSweep sweep, std::size_t max_points);
+std::vector<PointSweep> split_sweep(const PointSweep& sweep, std::size_t max_points);
 
 /// Puts parts together again. A turn of which a part is missing is dropped and counted.
 class SweepAssembler {
