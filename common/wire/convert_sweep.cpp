@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <stdexcept>
 
 #include "common/wire/convert.hpp"
@@ -21,8 +23,47 @@ double step_for(double largest, double finest) {
   return step;
 }
 
+/// To the nearest, halves to even, as the sum with a number whose last bit counts ones: without a
+/// call per coordinate. Precondition: fits into 16 bits.
 std::int16_t rounded(float value, double inverse_step) {
-  return static_cast<std::int16_t>(std::lrint(static_cast<double>(value) * inverse_step));
+  constexpr double kOnes = 0x1.8p52;
+  const double sum = static_cast<double>(value) * inverse_step + kOnes;
+  return static_cast<std::int16_t>(std::bit_cast<std::int64_t>(sum));
+}
+
+/// Sizes of floats as integers: in the same order, infinity after all numbers, NaN after infinity.
+std::uint32_t size_bits(float value) { return std::bit_cast<std::uint32_t>(value) & 0x7fffffffU; }
+
+/// Fills the points in, with steps that hold the largest. Throws where one is not finite.
+void write_points(const std::vector<SweepPoint>& points, lidar_sweep_t& wire) {
+  std::uint32_t farthest = 0;
+  std::uint32_t longest = 0;
+  for (const SweepPoint& p : points) {
+    farthest = std::max({farthest, size_bits(p.x_m), size_bits(p.y_m), size_bits(p.z_m)});
+    longest = std::max(longest, size_bits(p.time_s));
+  }
+  const auto farthest_m = std::bit_cast<float>(farthest);
+  const auto longest_s = std::bit_cast<float>(longest);
+  if (!std::isfinite(farthest_m) || !std::isfinite(longest_s)) {
+    throw std::invalid_argument("to_wire(PointSweep): a point is not finite");
+  }
+  wire.resolution_m = step_for(farthest_m, kFinestResolutionM);
+  wire.time_step_s = step_for(longest_s, kFinestTimeStepS);
+  const double per_metre = 1.0 / wire.resolution_m;
+  const double per_second = 1.0 / wire.time_step_s;
+  const std::size_t count = points.size();
+  wire.num_points = static_cast<std::int32_t>(count);
+  for (auto* numbers : {&wire.x, &wire.y, &wire.z, &wire.time}) numbers->resize(count);
+  for (auto* numbers : {&wire.ring, &wire.intensity}) numbers->resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const SweepPoint& p = points[i];
+    wire.x[i] = rounded(p.x_m, per_metre);
+    wire.y[i] = rounded(p.y_m, per_metre);
+    wire.z[i] = rounded(p.z_m, per_metre);
+    wire.time[i] = rounded(p.time_s, per_second);
+    wire.ring[i] = static_cast<std::uint8_t>(p.ring);
+    wire.intensity[i] = p.intensity;
+  }
 }
 
 Attitude attitude(const lidar_sweep_t& wire, Checks& checks) {
@@ -105,37 +146,7 @@ lidar_sweep_t to_wire(const PointSweep& sweep) {
   const Eigen::Quaterniond& q = attitude.level_Q_vehicle;
   copy_vector(Eigen::Vector4d(q.w(), q.x(), q.y(), q.z()), wire.level_Q_vehicle);
   copy_matrix(attitude.covariance_rad2, wire.attitude_covariance_rad2);
-
-  float farthest = 0.0F;
-  float longest = 0.0F;
-  for (const SweepPoint& p : sweep.points) {
-    // A NaN must win, which std::max does not promise: the sum carries it.
-    const float size = std::max({std::abs(p.x_m), std::abs(p.y_m), std::abs(p.z_m)}) +
-                       0.0F * (p.x_m + p.y_m + p.z_m);
-    if (!(size <= farthest)) farthest = size;
-    if (!(std::abs(p.time_s) <= longest)) longest = std::abs(p.time_s);
-    if (std::isnan(farthest) || std::isnan(longest)) break;
-  }
-  if (!std::isfinite(farthest) || !std::isfinite(longest)) {
-    throw std::invalid_argument("to_wire(PointSweep): a point is not finite");
-  }
-  wire.resolution_m = step_for(farthest, kFinestResolutionM);
-  wire.time_step_s = step_for(longest, kFinestTimeStepS);
-  const double per_metre = 1.0 / wire.resolution_m;
-  const double per_second = 1.0 / wire.time_step_s;
-  const std::size_t count = sweep.points.size();
-  wire.num_points = static_cast<std::int32_t>(count);
-  for (auto* numbers : {&wire.x, &wire.y, &wire.z, &wire.time}) numbers->resize(count);
-  for (auto* numbers : {&wire.ring, &wire.intensity}) numbers->resize(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const SweepPoint& p = sweep.points[i];
-    wire.x[i] = rounded(p.x_m, per_metre);
-    wire.y[i] = rounded(p.y_m, per_metre);
-    wire.z[i] = rounded(p.z_m, per_metre);
-    wire.time[i] = rounded(p.time_s, per_second);
-    wire.ring[i] = static_cast<std::uint8_t>(p.ring);
-    wire.intensity[i] = p.intensity;
-  }
+  write_points(sweep.points, wire);
   return wire;
 }
 
