@@ -1,5 +1,6 @@
 #include "services/keyframer/joint_keyframer.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <map>
 
@@ -14,6 +15,19 @@ std::vector<std::uint32_t> sightings(const BlockProblem& problem) {
   std::vector<std::uint32_t> count(problem.landmarks.size(), 0);
   for (const BlockObservation& z : problem.observations) ++count[z.landmark];
   return count;
+}
+
+/// Scans that few landmarks tie together leave motions open; what the solver then gives for their
+/// covariance is rounding, and may be anything.
+bool are_covariances(const BlockEstimate& estimate) {
+  return std::ranges::all_of(estimate.centre_T_member, [](const SE2WithCovariance& member) {
+    const Eigen::Matrix3d symmetric = 0.5 * (member.covariance + member.covariance.transpose());
+    if (!symmetric.allFinite()) return false;
+    const Eigen::Vector3d eigenvalues =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(symmetric, Eigen::EigenvaluesOnly)
+            .eigenvalues();
+    return eigenvalues.minCoeff() >= -1e-9 * eigenvalues.maxCoeff();
+  });
 }
 
 }  // namespace
@@ -109,11 +123,17 @@ std::optional<Keyframe> JointKeyframer::finish() {
   }
   const bool has_motion = std::any_of(members_.begin(), members_.end(),
                                       [](const Member& m) { return m.motion.has_value(); });
-  const bool usable = estimate.converged && (has_motion || tracks.size() >= 3);
-  if (!usable) {
+  std::string reason;
+  if (!estimate.converged) {
+    reason = "joint estimate did not converge";
+  } else if (!has_motion && tracks.size() < 3) {
+    reason = "fewer than three landmarks";
+  } else if (!are_covariances(estimate)) {
+    reason = "the scans have too little in common";
+  }
+  if (!reason.empty()) {
     ++counters_.keyframes_withheld;
-    counters_.last_reason =
-        estimate.converged ? "fewer than three landmarks" : "joint estimate did not converge";
+    counters_.last_reason = reason;
     members_.clear();
     return std::nullopt;
   }
