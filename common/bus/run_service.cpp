@@ -7,6 +7,7 @@
 #include <csignal>
 #include <iostream>
 
+#include "common/bus/process_memory.hpp"
 #include "common/bus/service.hpp"
 #include "common/bus/split_bus.hpp"
 
@@ -179,6 +180,7 @@ std::string parameters_help(const Service& service) {
 }  // namespace
 
 int run_service(const Service& service, int argc, char** argv) {
+  keep_freed_memory();
   CLI::App app(service.name + ": " + service.summary, "understory-" + service.name);
   Options options;
   app.add_option("--config", options.config, "Configuration file (TOML)");

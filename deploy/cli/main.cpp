@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <exception>
 
+#include "common/bus/process_memory.hpp"
 #include "deploy/cli/commands.hpp"
 #include "eval/command.hpp"
 
@@ -37,6 +38,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  understory::keep_freed_memory();
   try {
     return run(argc, argv);
   } catch (const std::exception& error) {

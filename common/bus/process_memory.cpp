@@ -1,0 +1,13 @@
+#include "common/bus/process_memory.hpp"
+
+#include <malloc.h>
+
+namespace understory {
+
+void keep_freed_memory() {
+  constexpr int kBytes = 64 << 20;
+  ::mallopt(M_MMAP_THRESHOLD, kBytes);
+  ::mallopt(M_TRIM_THRESHOLD, 2 * kBytes);
+}
+
+}  // namespace understory
