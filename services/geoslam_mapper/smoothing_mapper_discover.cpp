@@ -14,7 +14,7 @@ bool are_seen_together(const StoredLandmark& a, const StoredLandmark& b) {
   std::vector<NodeIndex> common;
   std::set_intersection(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(),
                         std::back_inserter(common));
-  return 4 * common.size() > std::min(a.nodes.size(), b.nodes.size());
+  return common.size() > 1 || 4 * common.size() > std::min(a.nodes.size(), b.nodes.size());
 }
 
 std::uint32_t members_in_view(const Keyframe& keyframe, const Eigen::Vector2d& position_in_centre) {
