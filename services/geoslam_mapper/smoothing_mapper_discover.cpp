@@ -9,7 +9,7 @@ namespace understory {
 namespace {
 
 /// Whether places saw the two side by side. Two that really stand so near to each other are seen
-/// together from almost everywhere; one that a bad scan doubled is so now and then.
+/// together from almost everywhere; one that a bad scan doubled is so once.
 bool are_seen_together(const StoredLandmark& a, const StoredLandmark& b) {
   std::vector<NodeIndex> common;
   std::set_intersection(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(),

@@ -30,9 +30,9 @@ void describe_imu(ImuParameters& p, ParameterTable& table) {
   table.add("imu.force_range_mps2", p.force_range_mps2, {10.0, 10000.0}, "m/s^2",
             "A force this large is saturated.");
   table.add("imu.saturation_gyro_noise", p.saturation_gyro_noise, {0.0, 100.0}, "rad/s/sqrt(Hz)",
-            "Noise while saturated.");
+            "Noise across saturated samples that were left out.");
   table.add("imu.saturation_force_noise", p.saturation_force_noise, {0.0, 1000.0}, "m/s^2/sqrt(Hz)",
-            "Noise while saturated.");
+            "Noise across saturated samples that were left out.");
   table.add("imu.max_gap_s", p.max_gap_s, {0.001, 10.0}, "s",
             "Samples farther apart are not joined.");
 }

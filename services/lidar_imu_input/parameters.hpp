@@ -33,8 +33,8 @@ struct ImuParameters {
   double level_noise = 5e-3;             ///< Of gravity taken out, from the level [m/s^2/sqrt(Hz)].
   double gyro_range_rad_s = 8.0;         ///< A rate this large is saturated.
   double force_range_mps2 = 78.0;        ///< A force this large is saturated.
-  double saturation_gyro_noise = 2.0;    ///< Noise while saturated [rad/s/sqrt(Hz)].
-  double saturation_force_noise = 20.0;  ///< Noise while saturated [m/s^2/sqrt(Hz)].
+  double saturation_gyro_noise = 2.0;    ///< Across left-out samples.
+  double saturation_force_noise = 20.0;  ///< Likewise.
   double max_gap_s = 0.15;               ///< Samples farther apart are not joined.
 };
 
