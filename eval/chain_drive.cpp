@@ -153,15 +153,18 @@ TrajectoryError trajectory_error(std::span<const StampedPose> estimate,
 }
 
 std::size_t wrong_updates(const ChainRun& run, double limit_m) {
-  std::optional<SE2> world_T_map;
-  std::size_t wrong = 0;
+  std::vector<Eigen::Vector2d> estimated;
+  std::vector<Eigen::Vector2d> real;
   for (const MapUpdate& update : run.updates) {
-    if (!localised(update)) continue;
     const auto true_pose = pose_at(run.truth, update.utime);
-    if (!true_pose) continue;
-    if (!world_T_map) world_T_map = *true_pose * update.map_T_vehicle.inverse();
-    const SE2 estimated = *world_T_map * update.map_T_vehicle;
-    if ((estimated.translation() - true_pose->translation()).norm() > limit_m) ++wrong;
+    if (!localised(update) || !true_pose) continue;
+    estimated.push_back(update.map_T_vehicle.translation());
+    real.push_back(true_pose->translation());
+  }
+  const SE2 world_T_map = align_rigid(real, estimated);
+  std::size_t wrong = 0;
+  for (std::size_t i = 0; i < real.size(); ++i) {
+    if ((world_T_map * estimated[i] - real[i]).norm() > limit_m) ++wrong;
   }
   return wrong;
 }

@@ -70,7 +70,8 @@ struct TrajectoryError {
 TrajectoryError trajectory_error(std::span<const StampedPose> estimate,
                                  std::span<const StampedPose> truth);
 
-/// Updates that were accepted more than `limit_m` from the truth, in the gauge of the first one.
+/// Updates that were accepted more than `limit_m` from the truth, after one rigid alignment: the
+/// heading of a single first scan (3 mrad) would be 6 m at the end of a road.
 std::size_t wrong_updates(const ChainRun& run, double limit_m = 1.0);
 
 std::vector<StampedPose> poses_of(std::span<const EkfPose> poses);

@@ -15,12 +15,25 @@ SE2WithCovariance part(const Odometry& piece, Utime from, Utime to) {
   return {SE2::Exp(fraction * piece.from_T_to.Log()), fraction * piece.covariance};
 }
 
+/// The piece as it would be had its samples been integrated at `bias`: its turn alone, spread
+/// evenly over the way. The accelerometer's bias moves it by less than a millimetre between two
+/// scans.
+Odometry at_bias(const Odometry& piece, const InertialBias& bias) {
+  Odometry moved = piece;
+  if (!piece.inertial || piece.is_standing) return moved;
+  const double gyro = bias.x() - piece.inertial->bias.x();
+  Eigen::Vector3d twist = piece.from_T_to.Log();
+  twist.z() += piece.inertial->bias_jacobian(0, 0) * gyro;
+  moved.from_T_to = SE2::Exp(twist);
+  return moved;
+}
+
 }  // namespace
 
 bool OdometryBuffer::add(const Odometry& piece) {
   if (piece.utime <= piece.from_utime) return false;
   if (!pieces_.empty() && piece.from_utime < pieces_.back().utime - kGapTolerance_us) return false;
-  pieces_.push_back(piece);
+  pieces_.push_back(bias_ ? at_bias(piece, *bias_) : piece);
   if (pieces_.size() > max_pieces_) pieces_.pop_front();
   return true;
 }

@@ -105,4 +105,14 @@ void from_json(const Json& json, Odometry& odometry) {
   odometry.is_standing = json.at(7).get<bool>();
 }
 
+void to_json(Json& json, const OdometryBuffer& buffer) {
+  Json pieces = Json::array();
+  for (const Odometry& piece : buffer.pieces()) pieces.push_back(piece);
+  json = {pieces, buffer.bias() ? matrix_to_json<3, 1>(*buffer.bias()) : Json(nullptr)};
+}
+void from_json(const Json& json, OdometryBuffer& buffer) {
+  for (const Json& piece : json.at(0)) buffer.restore(piece.get<Odometry>());
+  if (!json.at(1).is_null()) buffer.set_bias(matrix_from_json<3, 1>(json.at(1)));
+}
+
 }  // namespace understory

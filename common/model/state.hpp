@@ -10,6 +10,7 @@
 #include "common/model/keyframe.hpp"
 #include "common/model/map.hpp"
 #include "common/model/odometry.hpp"
+#include "common/model/odometry_buffer.hpp"
 
 namespace understory {
 
@@ -47,6 +48,9 @@ void to_json(Json& json, const Preintegration& p);
 void from_json(const Json& json, Preintegration& p);
 void to_json(Json& json, const Odometry& odometry);
 void from_json(const Json& json, Odometry& odometry);
+void to_json(Json& json, const OdometryBuffer& buffer);
+/// Into an empty buffer.
+void from_json(const Json& json, OdometryBuffer& buffer);
 
 template <typename T>
 Json optional_to_json(const std::optional<T>& value) {

@@ -65,6 +65,9 @@ class MapperAdapter : public Adapter {
                                odometry_.add(motion);
                              },
                              {.queue_size = 2000});
+    // Of the filter's words only the bias: its pose was made from the same detections.
+    node.subscribe<EkfPose>(channels_.ekf_pose,
+                            [this](const EkfPose& pose) { stage_->set_bias(pose.bias); });
     node.subscribe<map_request_t>(channels_.map_request,
                                   [this](const map_request_t& request) { answer(request); },
                                   {.queue_size = 4, .sequenced = false, .journaled = false});
@@ -199,9 +202,9 @@ class MapperAdapter : public Adapter {
 
 Service geoslam_mapper_service(const MapperChannels& channels) {
   return {"geoslam_mapper",
-          channels.keyframe + ", " + channels.landmarks + ", " + channels.odometry + " -> " +
-              channels.slam_pose + ", " + channels.slam_update + ", " + channels.map + ", " +
-              channels.map_delta,
+          channels.keyframe + ", " + channels.landmarks + ", " + channels.odometry + ", " +
+              channels.ekf_pose + " -> " + channels.slam_pose + ", " + channels.slam_update + ", " +
+              channels.map + ", " + channels.map_delta,
           [channels] { return std::make_unique<MapperAdapter>(channels); }};
 }
 

@@ -11,6 +11,7 @@ struct MapperChannels {
   std::string keyframe = "KEYFRAME";
   std::string landmarks = "LANDMARKS";
   std::string odometry = "ODOMETRY";
+  std::string ekf_pose = "EKF_POSE";
   std::string map_request = "MAP_REQUEST";
   std::string slam_pose = "SLAM_POSE";
   std::string slam_update = "SLAM_UPDATE";

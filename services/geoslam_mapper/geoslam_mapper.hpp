@@ -28,6 +28,8 @@ class MapperMethod {
   }
   /// Motion without landmarks; a factor between keyframes when the configuration says so.
   virtual void add(const Odometry& odometry) = 0;
+  /// The inertial bias as the filter knows it: odometry that comes later is turned by it.
+  virtual void set_bias(const InertialBias& /*bias*/) {}
   /// A map to start from (thesis §4.3.1), frame `map`; before the first keyframe.
   virtual void start_with(std::span<const MapLandmark> landmarks) = 0;
 

@@ -26,6 +26,7 @@ struct StoredLandmark {
   std::uint32_t last_keyframe = 0;  ///< Count of keyframes when it was last seen.
   std::vector<NodeIndex> nodes;     ///< That saw it, ascending.
   LandmarkKind kind = LandmarkKind::kTrunk;
+  bool is_late = false;  ///< Its place in the index is older than its position.
 
   /// Variance [m^2] of the position relative to the keyframes that saw it.
   double local_variance() const { return 1.0 / information; }
@@ -52,21 +53,28 @@ class LandmarkStore {
   LandmarkId insert(StoredLandmark landmark);  ///< Gives it the next id.
   void restore(const StoredLandmark& landmark);
   void remove(LandmarkId id);
-  /// Moves it; the index follows once the landmark has moved by more than a centimetre.
+  /// Moves it; the index follows at once where the landmark is a `kStaleness_m` away from its place
+  /// there, otherwise when catch_up() is called.
   void move(LandmarkId id, const Eigen::Vector2d& position_m);
 
   StoredLandmark& at(LandmarkId id) { return landmarks_.at(id); }
   const StoredLandmark& at(LandmarkId id) const { return landmarks_.at(id); }
   const std::map<LandmarkId, StoredLandmark>& all() const { return landmarks_; }
   std::map<LandmarkId, StoredLandmark>& all() { return landmarks_; }
+  /// Index over all landmarks; places in it may be `kStaleness_m` old.
   const ConstellationMap& index() const { return index_; }
+  /// Brings the index to within a centimetre: before a search by descriptors. O(what moved).
+  void catch_up();
   bool empty() const { return landmarks_.empty(); }
   LandmarkId next_id() const { return next_id_; }
   void set_next_id(LandmarkId id) { next_id_ = id; }
 
+  static constexpr double kStaleness_m = 0.25;
+
  private:
   std::map<LandmarkId, StoredLandmark> landmarks_;
   ConstellationMap index_;
+  std::vector<LandmarkId> late_;                      ///< Those with is_late.
   LandmarkId next_id_ = (LandmarkId{1} << 48U) | 1U;  ///< Map 1, landmark 1.
 };
 

@@ -88,7 +88,10 @@ MapUpdate SmoothingMapper::add(const Keyframe& keyframe) {
   const std::optional<Prediction> prediction = predict(keyframe);
   std::optional<Placement> placement;
   if (prediction) placement = track(keyframe, *prediction);
-  if (!placement) placement = search(keyframe, update);
+  if (!placement) {
+    store_.catch_up();
+    placement = search(keyframe, update);
+  }
   if (!placement) {
     update.status = MapUpdateStatus::kNotSure;
     if (prediction)

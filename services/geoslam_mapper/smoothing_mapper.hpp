@@ -17,6 +17,7 @@ class SmoothingMapper final : public MapperMethod {
   MapUpdate add(const Keyframe& keyframe) override;
   std::optional<SE2WithCovariance> locate(const LandmarkScan& scan) override;
   void add(const Odometry& odometry) override;
+  void set_bias(const InertialBias& bias) override { odometry_.set_bias(bias); }
   void start_with(std::span<const MapLandmark> landmarks) override;
   std::vector<KeyframePose> trajectory() const override;
   std::vector<MapLandmark> landmarks() const override;

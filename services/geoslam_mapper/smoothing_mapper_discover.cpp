@@ -128,11 +128,13 @@ void SmoothingMapper::merge_doubles(MapUpdate& update) {
     if (!store_.all().contains(id)) continue;
     const StoredLandmark& landmark = store_.at(id);
     for (const LandmarkId other_id :
-         store_.index().near({landmark.position_m, parameters_.merge_distance_m})) {
+         store_.index().near({landmark.position_m,
+                              parameters_.merge_distance_m + 2.0 * LandmarkStore::kStaleness_m})) {
       if (other_id == id) continue;
       const StoredLandmark& other = store_.at(other_id);
-      if (!landmark.point || !other.point || landmark.kind != other.kind ||
-          are_seen_together(landmark, other)) {
+      const double distance = (other.position_m - landmark.position_m).norm();
+      if (distance > parameters_.merge_distance_m || !landmark.point || !other.point ||
+          landmark.kind != other.kind || are_seen_together(landmark, other)) {
         continue;
       }
       const bool keep_first =

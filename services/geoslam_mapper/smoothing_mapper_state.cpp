@@ -7,7 +7,7 @@
 namespace understory {
 namespace {
 
-constexpr int kStateVersion = 1;
+constexpr int kStateVersion = 2;
 
 Json to_value(const KeyframeLandmark& l) {
   return {matrix_to_json<2, 1>(l.position_m), matrix_to_json<2, 2>(l.covariance_m2), l.radius_m,
@@ -130,7 +130,7 @@ Graph graph_from(const Json& json) {
 
 std::string SmoothingMapper::save() const {
   Json landmarks = Json::array(), candidates = Json::array(), nodes = Json::array(),
-       bases = Json::array(), odometry = Json::array();
+       bases = Json::array();
   for (const auto& [id, landmark] : store_.all()) landmarks.push_back(to_value(landmark));
   for (const Candidate& candidate : candidates_) candidates.push_back(to_value(candidate));
   for (const Node& node : nodes_) {
@@ -140,7 +140,6 @@ std::string SmoothingMapper::save() const {
   }
   for (const Base& base : bases_)
     bases.push_back({base.node, base.sequence, base.utime, base.centre_T_base, base.is_origin});
-  for (const Odometry& piece : odometry_.pieces()) odometry.push_back(piece);
   Json last_member = nullptr;
   if (last_member_)
     last_member = {last_member_->node, last_member_->utime, last_member_->centre_T_vehicle};
@@ -153,7 +152,7 @@ std::string SmoothingMapper::save() const {
                    {"candidates", candidates},
                    {"nodes", nodes},
                    {"bases", bases},
-                   {"odometry", odometry},
+                   {"odometry", odometry_},
                    {"map_was_given", map_was_given_},
                    {"keyframes", keyframes_},
                    {"last_member", last_member},
@@ -190,7 +189,7 @@ void SmoothingMapper::load(const std::string& state) {
                      base.at(2).get<Utime>(), base.at(3).get<SE2WithCovariance>(),
                      base.at(4).get<bool>()});
   }
-  for (const Json& piece : json.at("odometry")) loaded.odometry_.add(piece.get<Odometry>());
+  json.at("odometry").get_to(loaded.odometry_);
   json.at("map_was_given").get_to(loaded.map_was_given_);
   json.at("keyframes").get_to(loaded.keyframes_);
   const Json& last = json.at("last_member");

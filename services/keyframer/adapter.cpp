@@ -26,6 +26,9 @@ class KeyframerAdapter : public Adapter {
     node.subscribe<Odometry>(channels_.odometry,
                              [this](const Odometry& motion) { stage_->add(motion); },
                              {.queue_size = 2000});
+    // Of the filter's words only the bias: its pose was made from the same detections.
+    node.subscribe<EkfPose>(channels_.ekf_pose,
+                            [this](const EkfPose& pose) { stage_->set_bias(pose.bias); });
     keyframes_ = node.advertise<Keyframe>(channels_.keyframe);
   }
 
@@ -42,7 +45,9 @@ class KeyframerAdapter : public Adapter {
 }  // namespace
 
 Service keyframer_service(const KeyframerChannels& channels) {
-  return {"keyframer", channels.landmarks + ", " + channels.odometry + " -> " + channels.keyframe,
+  return {"keyframer",
+          channels.landmarks + ", " + channels.odometry + ", " + channels.ekf_pose + " -> " +
+              channels.keyframe,
           [channels] { return std::make_unique<KeyframerAdapter>(channels); }};
 }
 

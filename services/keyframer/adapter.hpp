@@ -10,6 +10,7 @@ namespace understory {
 struct KeyframerChannels {
   std::string landmarks = "LANDMARKS";
   std::string odometry = "ODOMETRY";
+  std::string ekf_pose = "EKF_POSE";
   std::string keyframe = "KEYFRAME";
 };
 

@@ -5,7 +5,7 @@
 namespace understory {
 namespace {
 
-constexpr int kStateVersion = 1;
+constexpr int kStateVersion = 2;
 
 Json to_json_value(const Track& t) {
   return {t.id,
@@ -60,12 +60,10 @@ std::string JointKeyframer::save() const {
                        {"tracks", member.tracked.tracks},
                        {"motion", optional_to_json(member.motion)}});
   }
-  Json odometry = Json::array();
-  for (const Odometry& piece : odometry_.pieces()) odometry.push_back(piece);
   return to_state({{"version", kStateVersion},
                    {"tracker", tracker_to_json(tracker_.state())},
                    {"members", members},
-                   {"odometry", odometry},
+                   {"odometry", odometry_},
                    {"last_utime", optional_to_json(last_utime_)},
                    {"next_sequence", next_sequence_},
                    {"previous_base", optional_to_json(local_T_previous_base_)},
@@ -90,7 +88,7 @@ void JointKeyframer::load(const std::string& state) {
     loaded_member.motion = optional_from_json<SE2WithCovariance>(member.at("motion"));
     loaded.members_.push_back(std::move(loaded_member));
   }
-  for (const Json& piece : json.at("odometry")) loaded.odometry_.add(piece.get<Odometry>());
+  json.at("odometry").get_to(loaded.odometry_);
   loaded.last_utime_ = optional_from_json<Utime>(json.at("last_utime"));
   loaded.next_sequence_ = json.at("next_sequence").get<std::uint64_t>();
   loaded.local_T_previous_base_ = optional_from_json<SE2>(json.at("previous_base"));

@@ -30,6 +30,8 @@ class KeyframerMethod {
   /// Motion without landmarks, where there is any; used as a prediction and to bridge scans that
   /// see nothing.
   virtual void add(const Odometry& odometry) = 0;
+  /// The inertial bias as the filter knows it: odometry that comes later is turned by it.
+  virtual void set_bias(const InertialBias& /*bias*/) {}
   virtual const KeyframerCounters& counters() const = 0;
   /// The whole state, for a restart; load() takes what save() of the same method gave.
   virtual std::string save() const = 0;

@@ -2,10 +2,12 @@
 #include "services/keyframer/adapter.hpp"
 
 int main(int argc, char** argv) {
-  return understory::run_service(understory::keyframer_service({
-                                     .landmarks = "LANDMARKS",  // in: detections of one sweep
-                                     .odometry = "ODOMETRY",    // in: motion, where there is any
-                                     .keyframe = "KEYFRAME",    // out: local landmarks of n sweeps
-                                 }),
-                                 argc, argv);
+  return understory::run_service(
+      understory::keyframer_service({
+          .landmarks = "LANDMARKS",  // in: detections of one sweep
+          .odometry = "ODOMETRY",    // in: motion, where there is any
+          .ekf_pose = "EKF_POSE",    // in: the bias of the gyro, where a filter runs
+          .keyframe = "KEYFRAME",    // out: local landmarks of n sweeps
+      }),
+      argc, argv);
 }

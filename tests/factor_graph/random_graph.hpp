@@ -54,6 +54,43 @@ inline Graph random_graph(std::mt19937_64& random, int poses, int points, double
   return graph;
 }
 
+/// A road with posts on both sides that never comes back: each pose sees those of its surroundings
+/// alone, exact odometry ties it to the next. Values are dead reckoned.
+inline Graph random_road(std::mt19937_64& random, std::uint32_t poses) {
+  constexpr double kStep_m = 4.0;
+  constexpr double kSigma_m = 0.01;
+  const Eigen::Vector3d step_sigma(3e-3, 3e-3, 2e-4);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> along(-0.5, 0.5);
+  Graph graph;
+  std::vector<Eigen::Vector2d> true_points;
+  SE2 truth;
+  SE2 reckoned;
+  for (std::uint32_t k = 0; k < poses; ++k) {
+    const PoseId pose = graph.add_pose(reckoned);
+    if (k == 0) graph.pose_priors.push_back({pose, truth, 1e8 * Eigen::Matrix3d::Identity()});
+    const double side = k % 2 == 0 ? 8.0 : -8.0;
+    true_points.push_back(truth * Eigen::Vector2d(4.0 * kStep_m + along(random), side));
+    graph.add_point(reckoned * truth.inverse() * true_points.back());
+    for (std::size_t i = k < 9 ? 0 : k - 9; i < true_points.size(); ++i) {
+      const double x = kSigma_m * normal(random);
+      const double y = kSigma_m * normal(random);
+      graph.observations.push_back({pose, PointId(static_cast<std::uint32_t>(i)),
+                                    truth.inverse() * true_points[i] + Eigen::Vector2d(x, y),
+                                    Eigen::Matrix2d::Identity() / (kSigma_m * kSigma_m)});
+    }
+    const SE2 step(kStep_m, 0.0, 0.05 * std::sin(0.02 * k));
+    Eigen::Vector3d error;
+    for (int c = 0; c < 3; ++c) error(c) = step_sigma(c) * normal(random);
+    truth = truth * step;
+    reckoned = reckoned * step * SE2::Exp(error);
+    if (k + 1 == poses) break;
+    graph.relative_poses.push_back({pose, PoseId(k + 1), step * SE2::Exp(error),
+                                    step_sigma.cwiseAbs2().cwiseInverse().asDiagonal()});
+  }
+  return graph;
+}
+
 /// The greatest distance between two graphs' estimates [m, rad].
 inline double difference(const Graph& a, const Graph& b) {
   double largest = 0.0;

@@ -90,6 +90,27 @@ TEST_CASE("With its usual thresholds the smoother stays within its tolerance", "
   }
 }
 
+TEST_CASE("Along a road that never comes back the smoother stays with the batch solution",
+          "[smoother]") {
+  std::mt19937_64 random(17);
+  Smoother smoother;
+  Feeder feeder(random_road(random, 300), smoother);
+  while (!feeder.done()) {
+    feeder.feed();
+    REQUIRE(smoother.update().ok);
+    if (feeder.next_ % 60 != 0) continue;
+    const auto newest = static_cast<PoseId>(feeder.next_ - 1);
+    const Graph exact_graph = solved_whole(smoother.graph());
+    const auto covariance = smoother.joint_marginal({&newest, 1}, {});
+    REQUIRE(covariance);
+    const Eigen::Vector3d off =
+        (exact_graph[newest].inverse() * smoother.pose(newest)).coordinates();
+    INFO("pose " << index(newest) << ": " << off.transpose());
+    // A fiftieth of what the measurements leave open.
+    REQUIRE(off.dot(covariance->inverse() * off) < 0.02 * 0.02);
+  }
+}
+
 TEST_CASE("Any sequence of adding, changing and taking back equals the batch solution",
           "[smoother]") {
   std::mt19937_64 random(13);
