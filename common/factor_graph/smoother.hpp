@@ -12,13 +12,12 @@
 namespace understory {
 
 struct SmootherParameters {
-  /// What moves by less of its own conditional standard deviation stays where it is [sigmas].
-  double least_move = 1e-4;
-  /// A measurement is linearised again beyond this [sigmas]. It goes with the square of the turn
-  /// since then: 1e-5 is 1e-4 rad at 25 m with 1 cm. So fine because linearisations of different age
-  /// pin the map's heading to what it was: at 3e-2 a 2 km road was 8 m off the batch solution, and
-  /// solving it exactly costs half as much again.
-  double relinearise_above = 1e-5;
+  /// What moves by less of its own conditional standard deviation stays where it is [sigmas]. At
+  /// 1e-2 one keyframe of twenty was refused on roads.
+  double least_move = 1e-3;
+  /// A measurement is linearised again beyond this [sigmas]. Linearisations of different age leave
+  /// torques that turn all that hangs on them: the prior that holds the map must hold it firmly.
+  double relinearise_above = 1e-2;
   /// An update goes on while one is this far from its linearisation [sigmas].
   double iterate_above = 0.1;
   int max_iterations = 8;

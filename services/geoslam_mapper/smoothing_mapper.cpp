@@ -129,8 +129,9 @@ void SmoothingMapper::report(const Keyframe& keyframe, const Placement& placemen
   update.status = MapUpdateStatus::kUpdated;
 }
 
-/// The first keyframe's base is the origin of the map: x_0 is fixed, its centre is known as well as
-/// the keyframe tells.
+/// The first keyframe's base is the origin of the map; where its centre is seen from there is where
+/// it stays. How uncertain that is comes in where covariances are told (finish()): as a prior in
+/// the graph it would hold the map by 3 mrad, and all that linearisations leave would turn it.
 void SmoothingMapper::start_map(const Keyframe& keyframe, MapUpdate& update) {
   if (keyframe.landmarks.size() < 3 && !parameters_.use_odometry) {
     update.status = MapUpdateStatus::kNotSure;
@@ -141,8 +142,7 @@ void SmoothingMapper::start_map(const Keyframe& keyframe, MapUpdate& update) {
                                         keyframe.members.front().covariance};
   const SE2WithCovariance base_T_centre = inverse(centre_T_base);
   const NodeIndex node = add_node(base_T_centre.mean);
-  smoother_.add(PosePrior{nodes_[node].centre, base_T_centre.mean,
-                          (base_T_centre.covariance + kTiny).inverse()});
+  smoother_.add(PosePrior{nodes_[node].centre, base_T_centre.mean, kTiny.inverse()});
   add_base({node, keyframe.sequence, keyframe.utime, centre_T_base, true});
   ++keyframes_;
   discover(keyframe, node, update);
@@ -166,6 +166,11 @@ void SmoothingMapper::finish(const Keyframe& keyframe, MapUpdate& update) {
   SE2WithCovariance map_T_centre{smoother_.pose(centre), Eigen::Matrix3d::Zero()};
   const auto marginal = smoother_.joint_marginal({&centre, 1}, {});
   if (marginal) map_T_centre.covariance = *marginal;
+  if (bases_.front().is_origin) {
+    const SE2WithCovariance origin_T_first = inverse(bases_.front().centre_T_base);
+    map_T_centre = compound(origin_T_first, {origin_T_first.mean.inverse() * map_T_centre.mean,
+                                             map_T_centre.covariance});
+  }
   const SE2WithCovariance map_T_base =
       base.is_origin ? SE2WithCovariance{} : compound(map_T_centre, base.centre_T_base);
   update.map_T_vehicle = map_T_base.mean;

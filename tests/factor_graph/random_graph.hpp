@@ -68,7 +68,7 @@ inline Graph random_road(std::mt19937_64& random, std::uint32_t poses) {
   SE2 reckoned;
   for (std::uint32_t k = 0; k < poses; ++k) {
     const PoseId pose = graph.add_pose(reckoned);
-    if (k == 0) graph.pose_priors.push_back({pose, truth, 1e8 * Eigen::Matrix3d::Identity()});
+    if (k == 0) graph.pose_priors.push_back({pose, truth, 1e12 * Eigen::Matrix3d::Identity()});
     const double side = k % 2 == 0 ? 8.0 : -8.0;
     true_points.push_back(truth * Eigen::Vector2d(4.0 * kStep_m + along(random), side));
     graph.add_point(reckoned * truth.inverse() * true_points.back());
