@@ -7,6 +7,7 @@
 #include <csignal>
 #include <iostream>
 
+#include "common/bus/device.hpp"
 #include "common/bus/process_memory.hpp"
 #include "common/bus/service.hpp"
 #include "common/bus/split_bus.hpp"
@@ -87,11 +88,18 @@ class HealthTeller {
 void run_until_stopped(HostedService& hosted, Bus& bus, StopSignal& stop, const Clock& clock) {
   Node& node = hosted.node();
   HealthTeller health(node, clock);
+  auto* const device = dynamic_cast<Device*>(&hosted.adapter());
+  std::vector<pollfd> files = {{bus.file_descriptor(), POLLIN, 0},
+                               {stop.file_descriptor(), POLLIN, 0}};
+  if (device != nullptr) {
+    for (const int file : device->file_descriptors()) files.push_back({file, POLLIN, 0});
+  }
   while (!stop.has_come()) {
+    if (device != nullptr) device->attend(clock.monotonic_us());
     health.tell_when_due();
     if (bus.handle_one(0)) continue;
-    pollfd files[] = {{bus.file_descriptor(), POLLIN, 0}, {stop.file_descriptor(), POLLIN, 0}};
-    ::poll(files, 2, health.milliseconds_left());
+    const int wait_ms = device != nullptr ? device->wait_ms() : health.milliseconds_left();
+    ::poll(files.data(), files.size(), std::min(wait_ms, health.milliseconds_left()));
   }
   // The last words are numbered too: the state is saved behind them.
   hosted.adapter().finish();
@@ -162,6 +170,7 @@ int serve(const Service& service, const Options& options) {
                                                  std::to_string(buffer.wanted_bytes) +
                                                  " bytes granted: raise net.core.rmem_max");
   }
+  if (auto* const device = dynamic_cast<Device*>(&hosted->adapter())) device->open();
   node.connect();
   node.publish_config(hosted->table().to_toml());
   run_until_stopped(*hosted, bus, stop, clock);

@@ -12,6 +12,8 @@ constexpr std::size_t kBlocks = 12;
 constexpr std::size_t kBlockBytes = 100;
 constexpr std::size_t kTimeAt = 1200;
 constexpr std::size_t kProductAt = 1205;
+constexpr std::uint16_t kUpperFlag = 0xEEFF;
+constexpr std::uint16_t kLowerFlag = 0xDDFF;
 constexpr int kTurn = 36000;  // hundredths of a degree
 constexpr double kHour_us = 3.6e9;
 constexpr std::size_t kMostPoints = 2'000'000;  // of a turn: more is no turn
@@ -51,13 +53,35 @@ Layout layout_of(VelodyneModel model) {
 }
 
 bool is_other_product(const Layout& layout, std::uint8_t product) {
+  if (layout.product == 0 || product == layout.product) return false;
   const bool known = product == 0x21 || product == 0x22 || product == 0x28;
-  return layout.product != 0 && known && product != layout.product;
+  // Puck Hi-Res and Alpha Prime look elsewhere. Old HDL-32E have other things in this byte.
+  const bool foreign = product == 0x24 || product == 0x63 || product == 0xA1;
+  return known || (foreign && layout.product != 0x21);
 }
 
 int azimuth_between(int from, int to) { return (to - from + kTurn) % kTurn; }
 
 }  // namespace
+
+std::optional<VelodynePacketFault> check_velodyne_packet(std::span<const std::uint8_t> packet,
+                                                         VelodyneModel model) {
+  const Layout layout = layout_of(model);
+  if (packet.size() != kVelodyneDataBytes) return VelodynePacketFault::kWrongSize;
+  if (is_other_product(layout, packet[kProductAt])) return VelodynePacketFault::kOtherModel;
+  for (std::size_t b = 0; b < kBlocks; ++b) {
+    const std::uint16_t flag = word(packet, b * kBlockBytes);
+    if (flag != kUpperFlag && flag != kLowerFlag) return VelodynePacketFault::kDamaged;
+    if (word(packet, b * kBlockBytes + 2) >= kTurn) return VelodynePacketFault::kDamaged;
+    const bool lower = layout.blocks_per_firing == 2 && b % 2 == 1;
+    if (flag != (lower ? kLowerFlag : kUpperFlag)) return VelodynePacketFault::kOtherModel;
+  }
+  return std::nullopt;
+}
+
+std::uint32_t velodyne_packet_time_us(std::span<const std::uint8_t> packet) {
+  return long_word(packet, kTimeAt);
+}
 
 /// The blocks of a packet, checked.
 struct VelodyneDecoder::Block {
@@ -102,19 +126,13 @@ std::optional<PointSweep> VelodyneDecoder::add(std::span<const std::uint8_t> pac
                                                Utime received) {
   const Layout layout = layout_of(calibration_.model);
   ++counts_.packets;
-  Block block;
-  bool good = packet.size() == kVelodyneDataBytes && !is_other_product(layout, packet[kProductAt]);
-  for (std::size_t b = 0; good && b < kBlocks; ++b) {
-    const std::uint16_t flag = word(packet, b * kBlockBytes);
-    block.azimuth[b] = word(packet, b * kBlockBytes + 2);
-    const bool lower = layout.blocks_per_firing == 2 && b % 2 == 1;
-    good = block.azimuth[b] < kTurn && flag == (lower ? 0xDDFF : 0xEEFF);
-  }
-  if (!good) {
+  if (check_velodyne_packet(packet, calibration_.model)) {
     ++counts_.refused;
     return std::nullopt;
   }
-  const double past_hour = static_cast<double>(long_word(packet, kTimeAt));
+  Block block;
+  for (std::size_t b = 0; b < kBlocks; ++b) block.azimuth[b] = word(packet, b * kBlockBytes + 2);
+  const double past_hour = static_cast<double>(velodyne_packet_time_us(packet));
   const double hours = std::round((static_cast<double>(received) - past_hour) / kHour_us);
   block.packet_us = hours * kHour_us + past_hour;
   block.is_dual = block.azimuth[layout.blocks_per_firing] == block.azimuth[0];

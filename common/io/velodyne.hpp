@@ -53,6 +53,18 @@ VelodyneCalibration velodyne_calibration(VelodyneModel model);
 /// (`lasers:` with rot_correction and so on). Throws DataError.
 VelodyneCalibration parse_hdl64_calibration(std::string_view text, std::string_view source);
 
+enum class VelodynePacketFault : std::uint8_t {
+  kWrongSize,
+  kOtherModel,  ///< Another model's product code or flags.
+  kDamaged,     ///< Flags or azimuths that no packet has.
+};
+/// Why this is no data packet of the model; none = it is one.
+std::optional<VelodynePacketFault> check_velodyne_packet(std::span<const std::uint8_t> packet,
+                                                         VelodyneModel model);
+/// When the packet was sent [us past the hour, by the sensor's clock]. Precondition: its size is
+/// right.
+std::uint32_t velodyne_packet_time_us(std::span<const std::uint8_t> packet);
+
 struct VelodyneCounts {
   std::uint64_t packets = 0;
   std::uint64_t refused = 0;  ///< Wrong size, flag, azimuth or product.

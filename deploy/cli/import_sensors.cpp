@@ -16,6 +16,7 @@
 #include "common/io/recording_folder.hpp"
 #include "common/io/sensor_tables.hpp"
 #include "common/io/velodyne.hpp"
+#include "common/io/velodyne_fixes.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/interrupt.hpp"
 #include "deploy/cli/progress.hpp"
@@ -133,32 +134,18 @@ VelodyneCalibration calibration_of(const Options& options) {
   return parse_hdl64_calibration(read_file(options.calibration), options.calibration);
 }
 
-/// A position packet as a fix; the packet's own time within the hour of its capture.
-void add_position(const CapturedPacket& packet, std::optional<LocalPlane>& plane,
-                  std::optional<Utime>& last, RecordingLog& log) {
-  const auto position = parse_velodyne_position(packet.payload);
-  if (!position || !position->is_valid) return;
-  if (!plane) plane.emplace(position->latitude_deg, position->longitude_deg);
-  GnssFix fix;
-  fix.utime = packet.utime;
-  // The same sentence comes in many packets: the receiver gives one a second.
-  if (last && *last == position->day_us) return;
-  last = position->day_us;
-  fix.east_north_m = plane->east_north_m(position->latitude_deg, position->longitude_deg);
-  fix.velocity_mps = position->speed_mps * Eigen::Vector2d(std::sin(position->course_rad),
-                                                           std::cos(position->course_rad));
-  log.add("RAW_GNSS", fix);
-}
-
 void import_pcap(const Options& options) {
   PacketCapture capture(options.path);
   VelodyneDecoder decoder(calibration_of(options));
   RecordingLog log(options.out);
-  std::optional<LocalPlane> plane;
-  std::optional<Utime> last_fix;
+  VelodyneFixes fixes;
   while (const auto packet = capture.next()) {
     throw_if_interrupted();
-    if (packet->port == kVelodynePositionPort) add_position(*packet, plane, last_fix, log);
+    if (packet->port == kVelodynePositionPort) {
+      const auto position = parse_velodyne_position(packet->payload);
+      const auto fix = position ? fixes.add(*position, packet->utime) : std::nullopt;
+      if (fix) log.add("RAW_GNSS", *fix);
+    }
     if (packet->port != kVelodyneDataPort) continue;
     if (const auto turn = decoder.add(packet->payload, packet->utime))
       log.add_sweep("RAW_SWEEP", *turn);

@@ -28,14 +28,19 @@ struct Options {
   bool outputs_only = false;
 };
 
+bool reads_a_sensor(const std::string& name) {
+  const auto services = sensor_services();
+  return std::ranges::find(services, name, &Service::name) != services.end();
+}
+
 /// The processes that the configuration launches, so that one directory says the same live and
-/// here; both mapping stages where it has no launch.toml.
+/// here, but for those that read a sensor; both mapping stages where it has no launch.toml.
 std::vector<std::string> stages_of(const std::filesystem::path& config) {
   if (!std::filesystem::exists(config / "launch.toml")) return {"keyframer", "geoslam_mapper"};
   std::vector<std::string> names;
   try {
     for (auto& process : launch::read_launch_config(config).processes) {
-      names.push_back(std::move(process.name));
+      if (!reads_a_sensor(process.name)) names.push_back(std::move(process.name));
     }
   } catch (const launch::ConfigError& error) {
     wrong_usage(error.what());

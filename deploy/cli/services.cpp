@@ -6,6 +6,7 @@
 #include "services/keyframer/adapter.hpp"
 #include "services/landmark_extractor/adapter.hpp"
 #include "services/lidar_imu_input/adapter.hpp"
+#include "services/velodyne_driver/adapter.hpp"
 
 namespace understory {
 
@@ -14,5 +15,7 @@ std::vector<Service> all_services() {
           associator_service(),      ekf_service(),
           keyframer_service(),       geoslam_mapper_service()};
 }
+
+std::vector<Service> sensor_services() { return {velodyne_driver_service()}; }
 
 }  // namespace understory

@@ -9,5 +9,8 @@ namespace understory {
 
 /// In the order in which data runs through them.
 std::vector<Service> all_services();
+/// Those that read a sensor themselves: they run as processes only, in a replay the log stands for
+/// them.
+std::vector<Service> sensor_services();
 
 }  // namespace understory

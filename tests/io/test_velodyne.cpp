@@ -9,8 +9,10 @@
 #include "common/io/packet_capture.hpp"
 #include "common/io/velodyne.hpp"
 #include "tests/catch.hpp"
+#include "tests/io/velodyne_packets.hpp"
 
 using namespace understory;
+using namespace understory::test;
 namespace fs = std::filesystem;
 
 namespace {
@@ -22,44 +24,6 @@ fs::path data() {
   return set != nullptr ? set : UNDERSTORY_DEFAULT_DATA;
 }
 
-using Packet = std::vector<std::uint8_t>;
-
-struct PacketMaker {
-  bool dual = false;
-  bool hdl64 = false;
-  std::uint8_t product = 0x22;
-  int azimuth = 0;
-  int azimuth_step = 40;  ///< From block to block (pair of blocks).
-  std::uint16_t distance = 5000;
-  double time_us = 1000.0;
-  double packet_us = 1327.104;
-
-  Packet next() {
-    Packet packet(kVelodyneDataBytes, 0);
-    const auto put = [&](std::size_t at, std::uint32_t value, int bytes) {
-      for (int i = 0; i < bytes; ++i)
-        packet[at + static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(value >> (8 * i));
-    };
-    const int shared = (dual ? 2 : 1) * (hdl64 ? 2 : 1);
-    for (int b = 0; b < 12; ++b) {
-      const auto at = static_cast<std::size_t>(b) * 100;
-      put(at, hdl64 && b % 2 == 1 ? 0xDDFF : 0xEEFF, 2);
-      put(at + 2, static_cast<std::uint32_t>((azimuth + b / shared * azimuth_step) % 36000), 2);
-      const bool second = dual && (b / (hdl64 ? 2 : 1)) % 2 == 1;
-      for (std::size_t c = 0; c < 32; ++c) {
-        put(at + 4 + 3 * c, distance + (second ? 500U : 0U), 2);
-        packet[at + 6 + 3 * c] = static_cast<std::uint8_t>(c);
-      }
-    }
-    put(1200, static_cast<std::uint32_t>(time_us), 4);
-    packet[1204] = dual ? 0x39 : 0x37;
-    packet[1205] = product;
-    azimuth = (azimuth + 12 / shared * azimuth_step) % 36000;
-    time_us += packet_us;
-    return packet;
-  }
-};
-
 std::vector<PointSweep> turns_of(VelodyneDecoder& decoder, PacketMaker maker, int packets) {
   std::vector<PointSweep> turns;
   for (int i = 0; i < packets; ++i) {
@@ -67,15 +31,6 @@ std::vector<PointSweep> turns_of(VelodyneDecoder& decoder, PacketMaker maker, in
     if (auto turn = decoder.add(maker.next(), received)) turns.push_back(*std::move(turn));
   }
   return turns;
-}
-
-std::string hdl64_yaml() {
-  std::string text = "lasers:\n";
-  for (int i = 0; i < 64; ++i)
-    text += "- {dist_correction: 1.2, laser_id: " + std::to_string(i) +
-            ", rot_correction: 0.01, vert_correction: " + std::to_string(0.05 - 0.007 * i) +
-            ", horiz_offset_correction: 0.026, vert_offset_correction: 0.2}\n";
-  return text;
 }
 
 }  // namespace

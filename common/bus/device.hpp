@@ -1,0 +1,26 @@
+// A device beside the bus (a sensor's socket, a serial line) that a process reads itself.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace understory {
+
+/// An adapter that is a Device too is opened and attended by run_service, in the one thread that
+/// also handles the bus: no lock, no queue between threads. Replay and experiments host adapters
+/// without opening them.
+class Device {
+ public:
+  virtual ~Device() = default;
+  /// Before the process connects to the bus. Throws where the device cannot be had; what() says
+  /// which.
+  virtual void open() = 0;
+  /// Each is readable when there is something to take in; they stay the same after open().
+  virtual std::vector<int> file_descriptors() const = 0;
+  /// Takes in what has come and publishes. Short: it holds up everything else of the process.
+  virtual void attend(std::int64_t monotonic_us) = 0;
+  /// The longest wait until the next attend() where nothing comes [ms].
+  virtual int wait_ms() const = 0;
+};
+
+}  // namespace understory

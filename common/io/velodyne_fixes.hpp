@@ -1,0 +1,28 @@
+// Fixes of the GNSS receiver at a Velodyne laser, from its position packets.
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "common/io/oxts.hpp"
+#include "common/io/velodyne.hpp"
+#include "common/model/gnss.hpp"
+
+namespace understory {
+
+/// Position packets in, fixes out: live and from captures alike.
+class VelodyneFixes {
+ public:
+  /// From where metres east and north count; none = the first fix.
+  explicit VelodyneFixes(std::optional<LocalPlane> plane = {}) : plane_(plane) {}
+
+  /// `received`: when the packet came [us]; the fix's stamp. None where the sentence says that it
+  /// is not valid, or was had: the receiver gives one a second, the sensor repeats it.
+  std::optional<GnssFix> add(const VelodynePosition& position, Utime received);
+
+ private:
+  std::optional<LocalPlane> plane_;
+  std::optional<std::int64_t> last_day_us_;
+};
+
+}  // namespace understory

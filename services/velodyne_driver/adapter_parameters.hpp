@@ -1,0 +1,11 @@
+// The Velodyne driver's parameters as a list: units, ranges, meanings.
+#pragma once
+
+#include "common/bus/parameter_table.hpp"
+#include "services/velodyne_driver/parameters.hpp"
+
+namespace understory {
+
+void describe(VelodyneDriverParameters& parameters, ParameterTable& table);
+
+}  // namespace understory

@@ -1,0 +1,45 @@
+// What the Velodyne driver can be told.
+#pragma once
+
+#include <string>
+
+#include "common/io/velodyne.hpp"
+
+namespace understory {
+
+struct VelodyneNetworkParameters {
+  /// 0.0.0.0 = every address of this computer; another hears no broadcasts, which is how the
+  /// sensors send as they come.
+  std::string bind_address = "0.0.0.0";
+  std::string sensor_address;  ///< Packets of others are refused; empty = whoever spoke first.
+  int data_port = kVelodyneDataPort;          ///< 0 = any free one; LOG says which.
+  int position_port = kVelodynePositionPort;  ///< 0 = any free one.
+  int receive_buffer_bytes = 4194304;         ///< Asked of the kernel.
+};
+
+struct VelodyneSensorParameters {
+  std::string model = "vlp16";
+  std::string calibration_file;  ///< The HDL-64E's own XML or YAML.
+  double max_range_m = 0.0;      ///< 0 = the model's.
+  double silence_s = 1.0;        ///< Without a good packet for so long the sensor is silent.
+};
+
+struct VelodyneTimeParameters {
+  std::string source = "sensor";  ///< "sensor" or "received"; see velodyne_driver.hpp.
+  double tolerance_s = 0.5;       ///< A sensor's clock farther from the computer's is reported.
+};
+
+struct VelodyneGnssParameters {
+  bool has_origin = false;  ///< Else metres count from the first fix since the start.
+  double origin_latitude_deg = 0.0;
+  double origin_longitude_deg = 0.0;
+};
+
+struct VelodyneDriverParameters {
+  VelodyneNetworkParameters network;
+  VelodyneSensorParameters sensor;
+  VelodyneTimeParameters time;
+  VelodyneGnssParameters gnss;
+};
+
+}  // namespace understory

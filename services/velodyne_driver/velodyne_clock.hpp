@@ -1,0 +1,51 @@
+// The sensor's clock: from microseconds past some hour to stamps that go on.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+#include "common/model/landmarks.hpp"
+
+namespace understory {
+
+/// The first packet's time is laid onto the hour that brings it nearest to when it came; from then
+/// on it is counted on, so that a sensor half an hour off never changes the hour in between.
+class VelodyneClock {
+ public:
+  enum class Step : std::uint8_t {
+    kNext,
+    kGap,   ///< More time has passed than between two packets.
+    kLate,  ///< Before the last one by less than kLargestDisorder_us; the clock stays.
+    kJump,  ///< The sensor's clock was set, or the sensor started again.
+  };
+  struct Reading {
+    Step step = Step::kNext;
+    Utime utime = 0;  ///< By the sensor's clock.
+  };
+  /// `received` by the computer's clock.
+  Reading take(std::uint32_t past_hour_us, Utime received);
+  /// How far the computer's clock is ahead of the sensor's: the least (the least delayed packet) of
+  /// the last ten to twenty seconds [us]; none before the first packet.
+  std::optional<Utime> offset_us() const;
+
+  static constexpr Utime kLargestGap_us = 50000;
+  static constexpr Utime kLargestDisorder_us = 20000;
+
+ private:
+  void lay(std::uint32_t past_hour_us, Utime received);
+  void measure(Utime received);
+  void forget_offset() { offset_ = offset_before_ = kNone; }
+
+  static constexpr Utime kNone = std::numeric_limits<Utime>::max();
+  bool has_started_ = false;
+  Utime utime_ = 0;
+  std::uint32_t past_hour_us_ = 0;
+  Utime received_ = 0;
+  Utime offset_ = kNone;         ///< Least of this period.
+  Utime offset_before_ = kNone;  ///< Least of the one before.
+  Utime period_ = 0;
+};
+
+}  // namespace understory

@@ -1,0 +1,153 @@
+// The driver as its process has it, with a socket on loopback, and a sensor that sends to it.
+#pragma once
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <map>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/bus/device.hpp"
+#include "common/bus/memory_bus.hpp"
+#include "common/bus/service.hpp"
+#include "services/velodyne_driver/adapter.hpp"
+#include "tests/catch.hpp"
+#include "understory/log_t.hpp"
+
+namespace understory::test {
+
+using Message = std::vector<std::uint8_t>;
+
+/// Sends from an address of the loopback network.
+class Sender {
+ public:
+  explicit Sender(const std::string& address = "127.0.0.1")
+      : file_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_in name = loopback(0);
+    REQUIRE(::inet_pton(AF_INET, address.c_str(), &name.sin_addr) == 1);
+    REQUIRE(::bind(file_, reinterpret_cast<const sockaddr*>(&name), sizeof(name)) == 0);
+  }
+  ~Sender() { ::close(file_); }
+  Sender(const Sender&) = delete;
+  Sender& operator=(const Sender&) = delete;
+
+  void send(int port, std::span<const std::uint8_t> bytes) {
+    const sockaddr_in name = loopback(port);
+    const auto sent = ::sendto(file_, bytes.data(), bytes.size(), 0,
+                               reinterpret_cast<const sockaddr*>(&name), sizeof(name));
+    REQUIRE(sent == static_cast<ssize_t>(bytes.size()));
+  }
+
+ private:
+  static sockaddr_in loopback(int port) {
+    sockaddr_in name{};
+    name.sin_family = AF_INET;
+    name.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    name.sin_port = htons(static_cast<std::uint16_t>(port));
+    return name;
+  }
+  int file_;
+};
+
+class LiveDriver {
+ public:
+  explicit LiveDriver(const std::string& toml = "")
+      : hosted_(velodyne_driver_service(), bus_, clock(),
+                "[network]\nbind_address = \"127.0.0.1\"\n"
+                "data_port = 0\nposition_port = 0\n" +
+                    toml,
+                "test.toml"),
+        device_(dynamic_cast<Device&>(hosted_.adapter())) {
+    device_.open();
+    hosted_.node().connect();
+    for (const log_t& line : log) {
+      if (line.code == "listens")
+        REQUIRE(std::sscanf(line.text.c_str(), "127.0.0.1: data port %d, position port %d",
+                            &data_port, &position_port) == 2);
+    }
+    REQUIRE(data_port > 0);
+    REQUIRE(position_port > 0);
+  }
+
+  /// Lets it work until nothing waits any more.
+  void settle() {
+    std::vector<pollfd> files;
+    for (const int file : device_.file_descriptors()) files.push_back({file, POLLIN, 0});
+    do {
+      device_.attend(now_us);
+    } while (device_.wait_ms() == 0 || ::poll(files.data(), files.size(), 20) > 0);
+  }
+  void send(std::span<const std::uint8_t> packet) {
+    sensor_.send(data_port, packet);
+    if (++sent_ % 20 == 0) settle();
+  }
+  void finish() {
+    settle();
+    hosted_.adapter().finish();
+  }
+  std::int64_t count(const std::string& channel, Reason reason) {
+    return hosted_.node().monitor().count_of(channel, reason);
+  }
+  std::int8_t state() { return hosted_.node().monitor().state(); }
+
+  int data_port = 0;
+  int position_port = 0;
+  std::int64_t now_us = 1'000'000'000;  ///< Monotonic.
+  std::map<std::string, std::vector<Message>> published;
+  std::vector<log_t> log;
+
+ private:
+  Clock clock() {
+    return {[this] { return now_us; }, [this] { return now_us; }};
+  }
+  void keep(const BusMessage& message) {
+    if (message.channel == "LOG") {
+      log.push_back(decode_message<log_t>(message.bytes).value());
+    } else {
+      published[std::string(message.channel)].emplace_back(message.bytes.begin(),
+                                                           message.bytes.end());
+    }
+  }
+
+  MemoryBus bus_{MemoryBus::Queues::kBounded, [this](const BusMessage& m) { keep(m); }};
+  HostedService hosted_;
+  Device& device_;
+  Sender sensor_;
+  int sent_ = 0;
+};
+
+/// What the import of a capture would have written: decoder and parts, without driver.
+class OfflineDriver {
+ public:
+  explicit OfflineDriver(VelodyneCalibration calibration) : decoder_(std::move(calibration)) {}
+
+  void add(std::span<const std::uint8_t> packet, Utime received) {
+    if (const auto turn = decoder_.add(packet, received)) write(*turn);
+  }
+  void finish() {
+    if (const auto turn = decoder_.finish()) write(*turn);
+  }
+  std::vector<Message> parts;
+
+ private:
+  void write(const PointSweep& turn) {
+    for (PointSweep& part : split_sweep(turn, 4000)) {
+      part.sequence = parts.size();
+      parts.push_back(encode_message(part));
+    }
+  }
+  VelodyneDecoder decoder_;
+};
+
+inline PointSweep sweep_of(const Message& message) {
+  return decode_message<PointSweep>(message).value();
+}
+
+}  // namespace understory::test
