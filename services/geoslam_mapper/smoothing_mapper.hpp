@@ -3,6 +3,7 @@
 #pragma once
 
 #include "common/factor_graph/smoother.hpp"
+#include "common/geometry/registration.hpp"
 #include "common/model/odometry_buffer.hpp"
 #include "services/geoslam_mapper/geoslam_mapper.hpp"
 #include "services/geoslam_mapper/landmark_store.hpp"
@@ -70,6 +71,7 @@ class SmoothingMapper final : public MapperMethod {
 
   // smoothing_mapper_locate.cpp: where is a single scan, between keyframes?
   std::optional<SE2WithCovariance> step_from_last_scan(const LandmarkScan& scan) const;
+  SE2WithCovariance in_map(const Registration& found) const;
 
   // smoothing_mapper_fuse.cpp: what does it add?
   bool fuse(const Keyframe& keyframe, const Placement& placement, MapUpdate& update);

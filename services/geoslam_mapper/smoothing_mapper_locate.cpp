@@ -50,7 +50,15 @@ std::optional<SE2WithCovariance> SmoothingMapper::locate(const LandmarkScan& sca
   const SE2 last = located_->map_T_vehicle;
   located_ = LocatedScan{scan.utime, found.reference_T_observed,
                          last.inverse() * found.reference_T_observed};
-  return SE2WithCovariance{found.reference_T_observed, found.covariance};
+  return in_map(found);
+}
+
+/// The registration tells the pose among the landmarks near by, which share the error of the last
+/// keyframe: the covariance is that of both.
+SE2WithCovariance SmoothingMapper::in_map(const Registration& found) const {
+  if (!map_T_last_base_) return {found.reference_T_observed, found.covariance};
+  return compound(*map_T_last_base_, {map_T_last_base_->mean.inverse() * found.reference_T_observed,
+                                      found.covariance});
 }
 
 }  // namespace understory

@@ -1,6 +1,7 @@
 #include "services/geoslam_mapper/smoothing_mapper.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <random>
 
 #include "services/geoslam_mapper/map_publishing.hpp"
@@ -225,6 +226,32 @@ TEST_CASE("Scans between keyframes are located, and the map is not changed by it
     if (const auto keyframe = keyframer.add(scan)) mapper.add(*keyframe);
   }
   REQUIRE(located >= simulated.size() - 12);
+}
+
+TEST_CASE("The covariance of a located scan is that of its pose in the map", "[mapper]") {
+  double nees = 0.0;
+  int count = 0;
+  for (std::uint64_t seed = 40; seed < 52; ++seed) {
+    const sim::Drive simulated = drive(sim::PathKind::kLine, 120.0, seed);
+    const SE2 map_T_world = simulated.world_T_vehicle().front().inverse();
+    JointKeyframer keyframer({});
+    SmoothingMapper mapper({});
+    for (std::size_t k = 0; k < simulated.size(); ++k) {
+      const LandmarkScan scan = simulated.scan(k).scan;
+      const auto pose = mapper.locate(scan);
+      if (pose && k % 20 == 0) {
+        const SE2 error = (map_T_world * simulated.world_T_vehicle()[k]).inverse() * pose->mean;
+        nees += error.coordinates().dot(pose->covariance.inverse() * error.coordinates());
+        ++count;
+      }
+      if (const auto keyframe = keyframer.add(scan)) mapper.add(*keyframe);
+    }
+  }
+  REQUIRE(count > 200);
+  // 3 is exact; the runs' first scans, which are common to all of a run, leave it wide.
+  INFO("mean NEES " << nees / count);
+  REQUIRE(nees / count > 1.2);
+  REQUIRE(nees / count < 5.0);
 }
 
 TEST_CASE("A loaded mapper goes on where the saved one was", "[mapper]") {
