@@ -38,9 +38,10 @@ double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 struct Term {
   double residual = 0.0;
   Eigen::Vector3d jacobian = Eigen::Vector3d::Zero();
-  double sigma = 1.0;
+  double variance = 1.0;
 
-  double normalised() const { return residual / sigma; }
+  /// In standard deviations.
+  double squared() const { return residual * residual / variance; }
 };
 
 /// Where a beam meets a circle.
@@ -53,17 +54,18 @@ Term hit_term(const Eigen::Vector3d& circle, const Sight& sight, double range,
   const double radius = std::max(circle[2], 1e-3);
   const double limit = kMaxGraze * radius;
   const double m = std::clamp(miss, -limit, limit);
-  const double q = std::sqrt(square(radius) - square(m));
+  const double inverse_q = 1.0 / std::sqrt(square(radius) - square(m));
+  const double tangent = m * inverse_q;
   Term term;
-  term.residual = range - (along - q);
-  const Eigen::Vector2d normal(-direction.y(), direction.x());
-  term.jacobian.head<2>() = direction + (m / q) * normal;
-  term.jacobian[2] = -radius / q;
+  // The half chord is (radius^2 - m^2) / q.
+  term.residual = range - along + (square(radius) - square(m)) * inverse_q;
+  term.jacobian = {direction.x() - tangent * direction.y(), direction.y() + tangent * direction.x(),
+                   -radius * inverse_q};
   // A footprint of some width on a slanting surface smears the range.
-  term.sigma = std::sqrt(square(sweep.range_sigma_m) + square(roundness) +
-                         square(m / q * along * sweep.beam_width_rad));
+  term.variance = square(sweep.range_sigma_m) + square(roundness) +
+                  square(tangent * along * sweep.beam_width_rad);
   // Nearer to the edge the range falls off so steeply that only the edge itself says something.
-  if (std::abs(miss) > limit) term.sigma = std::hypot(term.sigma, radius);
+  if (std::abs(miss) > limit) term.variance += square(radius);
   return term;
 }
 
@@ -72,7 +74,7 @@ Term edge_term(const Eigen::Vector3d& circle, const Sight& sight, double side, d
   Term term;
   term.residual = -(cross(sight.direction, circle.head<2>() - sight.origin_m) + side * circle[2]);
   term.jacobian = {-sight.direction.y(), sight.direction.x(), side};
-  term.sigma = sigma;
+  term.variance = square(sigma);
   return term;
 }
 
@@ -81,22 +83,60 @@ Eigen::Vector3d circle_at(const Vector6d& state, double above) {
 }
 
 /// Sums over residuals of the circle at their heights: information and gradient of the stem follow.
-struct Sums {
-  std::array<Eigen::Matrix3d, 3> information{Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero(),
-                                             Eigen::Matrix3d::Zero()};  ///< Times 1, h, h^2.
-  std::array<Eigen::Vector3d, 2> gradient{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
-
+class Sums {
+ public:
   void add(const Term& term, double above) {
-    const double size = std::abs(term.normalised());
-    const double weight = (size > kHuber ? kHuber / size : 1.0) / square(term.sigma);
-    const Eigen::Matrix3d outer = weight * term.jacobian * term.jacobian.transpose();
-    information[0] += outer;
-    information[1] += above * outer;
-    information[2] += square(above) * outer;
-    const Eigen::Vector3d pull = weight * term.residual * term.jacobian;
-    gradient[0] += pull;
-    gradient[1] += above * pull;
+    double weight = 1.0 / term.variance;
+    const double squared = square(term.residual) * weight;
+    if (squared > square(kHuber)) weight *= kHuber / std::sqrt(squared);
+    const double x = term.jacobian[0];
+    const double y = term.jacobian[1];
+    const double r = term.jacobian[2];
+    const double wx = weight * x;
+    const double wy = weight * y;
+    const double wr = weight * r;
+    const std::array<double, kTerms> terms{wx * x,
+                                           wx * y,
+                                           wx * r,
+                                           wy * y,
+                                           wy * r,
+                                           wr * r,
+                                           wx * term.residual,
+                                           wy * term.residual,
+                                           wr * term.residual};
+    for (std::size_t i = 0; i < kTerms; ++i) {
+      sums_[0][i] += terms[i];
+      sums_[1][i] += above * terms[i];
+      sums_[2][i] += above * above * terms[i];
+    }
   }
+
+  Matrix6d information() const {
+    Matrix6d result;
+    result << block(0), block(1), block(1), block(2);
+    return result;
+  }
+  Vector6d gradient() const {
+    Vector6d result;
+    for (int i = 0; i < 3; ++i) {
+      result[i] = sums_[0][6 + static_cast<std::size_t>(i)];
+      result[i + 3] = sums_[1][6 + static_cast<std::size_t>(i)];
+    }
+    return result;
+  }
+
+ private:
+  /// The upper triangle of the information, row by row, then the gradient.
+  static constexpr std::size_t kTerms = 9;
+
+  Eigen::Matrix3d block(std::size_t power) const {
+    const std::array<double, kTerms>& s = sums_[power];
+    Eigen::Matrix3d result;
+    result << s[0], s[1], s[2], s[1], s[3], s[4], s[2], s[4], s[5];
+    return result;
+  }
+
+  std::array<std::array<double, kTerms>, 3> sums_{};  ///< Times 1, h, h^2.
 };
 
 }  // namespace
@@ -122,8 +162,10 @@ std::optional<StemFit> StemFitter::fit(const RingCloud& cloud, const std::vector
 void StemFitter::start_with_consensus(const std::vector<Run>& runs, const Column& column) {
   const std::size_t count = std::min(column.runs.size(), kMaxRuns);
   const auto near = [&](const Run& a, const Run& b) {
-    const float apart = std::hypot(a.x_m - b.x_m, a.y_m - b.y_m);
-    return apart < kConsensus_m + kConsensusLean * std::abs(a.z_m - b.z_m);
+    const float x = a.x_m - b.x_m;
+    const float y = a.y_m - b.y_m;
+    const float limit = kConsensus_m + kConsensusLean * std::abs(a.z_m - b.z_m);
+    return x * x + y * y < limit * limit;
   };
   std::size_t most = 0;
   std::uint32_t best = column.runs.front();
@@ -188,18 +230,18 @@ StemFitter::Edge StemFitter::edge_of(const RingCloud& cloud, const Run& run, std
 /// Rings that fire at the same azimuths miss an upright edge by the same part of a step: together
 /// they say no more than one does.
 void StemFitter::share_edges() {
-  std::vector<double> shares(edges_.size(), 0.0);
+  shares_.assign(edges_.size(), 0.0);
   for (std::size_t i = 0; i < edges_.size(); ++i) {
     for (const Edge& other : edges_) {
       if (other.side != edges_[i].side) continue;
       const double apart = std::abs(cross(edges_[i].sight.direction, other.sight.direction));
       const double range_sigma = edges_[i].sigma_m;
       const double distance = apart * hits_.front().range_m;
-      if (distance < range_sigma) shares[i] += 1.0;
+      if (distance < range_sigma) shares_[i] += 1.0;
     }
   }
   for (std::size_t i = 0; i < edges_.size(); ++i) {
-    edges_[i].sigma_m *= std::sqrt(std::max(1.0, shares[i]));
+    edges_[i].sigma_m *= std::sqrt(std::max(1.0, shares_[i]));
   }
 }
 
@@ -232,8 +274,8 @@ void StemFitter::linearise(const Vector6d& state, Matrix6d& information, Vector6
     const double above = edge.z_m - reference_z_m_;
     sums.add(edge_term(circle_at(state, above), edge.sight, edge.side, edge.sigma_m), above);
   }
-  information << sums.information[0], sums.information[1], sums.information[1], sums.information[2];
-  gradient << sums.gradient[0], sums.gradient[1];
+  information = sums.information();
+  gradient = sums.gradient();
   const auto prior = [&](int at, double mean, double sigma) {
     information(at, at) += 1.0 / square(sigma);
     gradient[at] += (mean - state[at]) / square(sigma);
@@ -266,12 +308,12 @@ bool StemFitter::settle(Vector6d& state) {
 
 bool StemFitter::sort_out(const RingCloud& cloud, const std::vector<Run>& runs,
                           const Column& column, const Vector6d& state) {
-  std::vector<std::uint32_t> agreeing;
+  still_agreeing_.clear();
   for (const std::uint32_t index : column.runs) {
-    if (agrees(cloud, runs[index], state)) agreeing.push_back(index);
+    if (agrees(cloud, runs[index], state)) still_agreeing_.push_back(index);
   }
-  const bool is_new = agreeing != agreeing_;
-  agreeing_ = std::move(agreeing);
+  const bool is_new = still_agreeing_ != agreeing_;
+  std::swap(agreeing_, still_agreeing_);
   return is_new;
 }
 
@@ -283,14 +325,14 @@ bool StemFitter::agrees(const RingCloud& cloud, const Run& run, const Vector6d& 
     const RingPoint& point = cloud.points()[run.first + (2 * k + 1) * run.size() / (2 * count)];
     const Term term = hit_term(circle_at(state, point.z_m - reference_z_m_), cloud.sight(point),
                                point.range_m, sweep_, trunk_.roundness_sigma_m);
-    sum += square(term.normalised());
+    sum += term.squared();
   }
   if (sum > square(kMaxRunResidual) * static_cast<double>(count)) return false;
   const auto edge_agrees = [&](double side) {
     const Edge edge = edge_of(cloud, run, 0, side);
     const Term term =
         edge_term(circle_at(state, edge.z_m - reference_z_m_), edge.sight, side, edge.sigma_m);
-    return std::abs(term.normalised()) < kMaxEdgeResidual;
+    return term.squared() < square(kMaxEdgeResidual);
   };
   return (run.left != Border::kClear || edge_agrees(1.0)) &&
          (run.right != Border::kClear || edge_agrees(-1.0));
@@ -305,14 +347,14 @@ void StemFitter::describe(const Vector6d& state, const std::vector<Run>& runs, S
   fit.covariance = information.inverse();
   double sum = 0.0;
   for (const Hit& hit : hits_) {
-    sum += square(hit_term(circle_at(state, hit.z_m - reference_z_m_), hit.sight, hit.range_m,
-                           sweep_, trunk_.roundness_sigma_m)
-                      .normalised());
+    sum += hit_term(circle_at(state, hit.z_m - reference_z_m_), hit.sight, hit.range_m, sweep_,
+                    trunk_.roundness_sigma_m)
+               .squared();
   }
   for (const Edge& edge : edges_) {
-    sum += square(
+    sum +=
         edge_term(circle_at(state, edge.z_m - reference_z_m_), edge.sight, edge.side, edge.sigma_m)
-            .normalised());
+            .squared();
     (edge.side > 0.0 ? fit.sees_left : fit.sees_right) = true;
   }
   fit.mean_square_residual = sum / static_cast<double>(hits_.size() + edges_.size());

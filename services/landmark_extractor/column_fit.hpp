@@ -84,6 +84,8 @@ class StemFitter {
   std::vector<std::uint32_t> used_;  ///< Of those, the ones that give evidence.
   std::vector<Hit> hits_;
   std::vector<Edge> edges_;
+  std::vector<double> shares_;
+  std::vector<std::uint32_t> still_agreeing_;
 };
 
 }  // namespace understory

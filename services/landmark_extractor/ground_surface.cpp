@@ -1,12 +1,10 @@
 #include "services/landmark_extractor/ground_surface.hpp"
 
 #include <array>
-#include <limits>
 
 namespace understory {
 namespace {
 
-constexpr float kNone = std::numeric_limits<float>::infinity();
 /// Weight of a second difference between nodes against one cell: ground bends by 0.3 m over a
 /// node's distance where cells lie within 0.1 m.
 constexpr float kSmoothness = 0.1F;
@@ -28,48 +26,89 @@ float weight(float above_m, float scale_m) {
   return w * w;
 }
 
-}  // namespace
-
-std::size_t GroundSurface::cell(float x, float y) const {
-  const int limit = static_cast<int>(cells_per_side_) - 1;
-  const int i = std::clamp(static_cast<int>((x - corner_x_) / kCell_m), 0, limit);
-  const int j = std::clamp(static_cast<int>((y - corner_y_) / kCell_m), 0, limit);
-  return static_cast<std::size_t>(j) * cells_per_side_ + static_cast<std::size_t>(i);
-}
-
-void GroundSurface::fit(std::span<RingPoint> points, const Eigen::Vector2f& centre_m,
-                        float reach_m) {
-  const auto spans = static_cast<std::size_t>(std::ceil(2.0F * reach_m / kNodeSpacing_m)) + 1;
-  nodes_per_side_ = spans + 1;
-  cells_per_side_ = spans * static_cast<std::size_t>(kNodeSpacing_m / kCell_m);
-  node_limit_ = static_cast<float>(spans) - 1e-3F;
-  corner_x_ = centre_m.x() - 0.5F * static_cast<float>(spans) * kNodeSpacing_m;
-  corner_y_ = centre_m.y() - 0.5F * static_cast<float>(spans) * kNodeSpacing_m;
-  band_ = 2 * nodes_per_side_ + 1;
-  nodes_.assign(nodes_per_side_ * nodes_per_side_, 0.0F);
-  collect_lowest(points);
-  add_smoothness();
-  for (std::size_t k = 0; k <= kScales_m.size(); ++k) {
-    add_cells(k == 0 ? 1.0F : kScales_m[k - 1], k > 0);
-    solve();
-  }
-  residuals_.assign(lowest_.size(), {});
-  for (RingPoint& point : points) {
-    point.height_m = point.z_m - height(point.x_m, point.y_m);
-    if (std::abs(point.height_m) < kOnGround_m) {
-      Residual& residual = residuals_[cell(point.x_m, point.y_m)];
-      residual.count += 1.0F;
-      residual.sum += point.height_m;
+/// Cholesky factor of a banded matrix in place: column by column, each updates those after it.
+[[gnu::always_inline]] inline void factorise_columns(float* matrix, std::size_t n,
+                                                     std::size_t band) {
+  for (std::size_t j = 0; j < n; ++j) {
+    float* column = matrix + j * band;
+    const std::size_t reach = std::min(band, n - j);
+    const float scale = 1.0F / std::sqrt(std::max(column[0], 1e-9F));
+    for (std::size_t k = 0; k < reach; ++k) column[k] *= scale;
+    for (std::size_t k = 1; k < reach; ++k) {
+      float* __restrict__ other = matrix + (j + k) * band;
+      const float* __restrict__ from = column + k;
+      const float factor = column[k];
+      for (std::size_t t = 0; t < reach - k; ++t) other[t] -= factor * from[t];
     }
   }
 }
 
-void GroundSurface::collect_lowest(std::span<const RingPoint> points) {
-  lowest_.assign(cells_per_side_ * cells_per_side_, kNone);
-  for (const RingPoint& point : points) {
-    float& lowest = lowest_[cell(point.x_m, point.y_m)];
-    lowest = std::min(lowest, point.z_m);
+#if defined(__x86_64__)
+// Without fused multiplication: the same numbers on every machine.
+[[gnu::target("avx2")]] void factorise_with_avx2(float* matrix, std::size_t n, std::size_t band) {
+  factorise_columns(matrix, n, band);
+}
+#endif
+
+void factorise(float* matrix, std::size_t n, std::size_t band) {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2")) return factorise_with_avx2(matrix, n, band);
+#endif
+  factorise_columns(matrix, n, band);
+}
+
+}  // namespace
+
+void GroundSurface::fit(const LowestCells& cells) {
+  const bool is_same_size = nodes_per_side_ == cells.spans + 1;
+  nodes_per_side_ = cells.spans + 1;
+  cells_per_side_ = cells.side;
+  node_limit_ = static_cast<float>(cells.spans) - 1e-3F;
+  corner_x_ = cells.corner_x_m;
+  corner_y_ = cells.corner_y_m;
+  band_ = 2 * nodes_per_side_ + 1;
+  nodes_.assign(nodes_per_side_ * nodes_per_side_, 0.0F);
+  if (!is_same_size) add_smoothness();
+  for (std::size_t k = 0; k <= kScales_m.size(); ++k) {
+    add_cells(cells, k == 0 ? 1.0F : kScales_m[k - 1], k > 0);
+    solve();
   }
+  make_patches();
+  residuals_.assign(cells.lowest_m.size(), {});
+}
+
+void GroundSurface::make_patches() {
+  const std::size_t n = nodes_per_side_;
+  patches_.resize(n * n);
+  for (std::size_t k = 0; k + n + 1 < n * n; ++k) {
+    const float across_x = nodes_[k + 1] - nodes_[k];
+    patches_[k] = {nodes_[k], across_x, nodes_[k + n] - nodes_[k],
+                   nodes_[k + n + 1] - nodes_[k + n] - across_x};
+  }
+}
+
+void GroundSurface::measure(std::span<RingPoint> points) {
+  // Neighbours in a ring share their cell: their sum is kept at hand.
+  std::size_t cell_at_hand = 0;
+  Residual at_hand;
+  const auto put_away = [&] {
+    residuals_[cell_at_hand].count += at_hand.count;
+    residuals_[cell_at_hand].sum += at_hand.sum;
+  };
+  for (RingPoint& point : points) {
+    const Place place = locate(point.x_m, point.y_m);
+    point.height_m = point.z_m - height(place);
+    if (std::abs(point.height_m) >= kOnGround_m) continue;
+    const std::size_t here = cell(place);
+    if (here != cell_at_hand) {
+      put_away();
+      at_hand = {};
+      cell_at_hand = here;
+    }
+    at_hand.count += 1.0F;
+    at_hand.sum += point.height_m;
+  }
+  put_away();
 }
 
 void GroundSurface::add_smoothness() {
@@ -99,13 +138,13 @@ void GroundSurface::add_smoothness() {
   }
 }
 
-void GroundSurface::add_cells(float scale_m, bool weigh) {
+void GroundSurface::add_cells(const LowestCells& cells, float scale_m, bool weigh) {
   matrix_ = smoothness_;
   right_.assign(nodes_.size(), 0.0F);
   for (std::size_t j = 0; j < cells_per_side_; ++j) {
     for (std::size_t i = 0; i < cells_per_side_; ++i) {
-      const float z = lowest_[j * cells_per_side_ + i];
-      if (z == kNone) continue;
+      const float z = cells.lowest_m[j * cells_per_side_ + i];
+      if (z == LowestCells::kNone) continue;
       const float u = (static_cast<float>(i) + 0.5F) * kCell_m / kNodeSpacing_m;
       const float v = (static_cast<float>(j) + 0.5F) * kCell_m / kNodeSpacing_m;
       const auto node_i = static_cast<std::size_t>(u);
@@ -128,21 +167,10 @@ void GroundSurface::add_cells(float scale_m, bool weigh) {
   }
 }
 
-/// Cholesky factor of a banded matrix in place (column by column, each updates those after it),
-/// then both substitutions.
+/// Both substitutions follow the factor.
 void GroundSurface::solve() {
   const std::size_t n = nodes_.size();
-  for (std::size_t j = 0; j < n; ++j) {
-    float* column = &matrix_[j * band_];
-    const std::size_t reach = std::min(band_, n - j);
-    const float scale = 1.0F / std::sqrt(std::max(column[0], 1e-9F));
-    for (std::size_t k = 0; k < reach; ++k) column[k] *= scale;
-    for (std::size_t k = 1; k < reach; ++k) {
-      float* other = &matrix_[(j + k) * band_];
-      const float factor = column[k];
-      for (std::size_t t = 0; t < reach - k; ++t) other[t] -= factor * column[k + t];
-    }
-  }
+  factorise(matrix_.data(), n, band_);
   nodes_ = right_;
   for (std::size_t j = 0; j < n; ++j) {
     const float* column = &matrix_[j * band_];
@@ -160,7 +188,7 @@ GroundHeight GroundSurface::below(const Eigen::Vector2d& place_m) const {
   const auto x = static_cast<float>(place_m.x());
   const auto y = static_cast<float>(place_m.y());
   GroundHeight ground{height(x, y), 0.0};
-  const std::size_t middle = cell(x, y);
+  const std::size_t middle = cell(locate(x, y));
   const auto row = static_cast<std::ptrdiff_t>(middle / cells_per_side_);
   const auto column = static_cast<std::ptrdiff_t>(middle % cells_per_side_);
   const auto side = static_cast<std::ptrdiff_t>(cells_per_side_);

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "services/landmark_extractor/lowest_cells.hpp"
 #include "services/landmark_extractor/ring_cloud.hpp"
 
 namespace understory {
@@ -20,29 +21,22 @@ struct GroundHeight {
 /// of small cells. Returns above it are trunks and bushes and lose their weight step by step.
 class GroundSurface {
  public:
-  /// Fits the surface to the points around `centre_m` and writes every point's height_m.
-  void fit(std::span<RingPoint> points, const Eigen::Vector2f& centre_m, float reach_m);
+  /// Fits the surface to the lowest returns. Forgets what was measured.
+  void fit(const LowestCells& cells);
+  /// Writes the points' height_m, and keeps those on the ground for below().
+  void measure(std::span<RingPoint> points);
 
   /// Of the surface [m].
   float height(float x, float y) const {
-    const float u = std::clamp((x - corner_x_) / kNodeSpacing_m, 0.0F, node_limit_);
-    const float v = std::clamp((y - corner_y_) / kNodeSpacing_m, 0.0F, node_limit_);
-    const int i = static_cast<int>(u);
-    const int j = static_cast<int>(v);
-    const float a = u - static_cast<float>(i);
-    const float b = v - static_cast<float>(j);
-    const float* low =
-        &nodes_[static_cast<std::size_t>(j) * nodes_per_side_ + static_cast<std::size_t>(i)];
-    const float* high = low + nodes_per_side_;
-    return (1.0F - b) * ((1.0F - a) * low[0] + a * low[1]) +
-           b * ((1.0F - a) * high[0] + a * high[1]);
+    const Place place = locate(x, y);
+    return height(place);
   }
   /// The surface, moved to the ground returns near by; sigma grows where there are none.
   GroundHeight below(const Eigen::Vector2d& place_m) const;
 
  private:
-  static constexpr float kNodeSpacing_m = 4.0F;
-  static constexpr float kCell_m = 1.0F;
+  static constexpr float kNodeSpacing_m = LowestCells::kNodeSpacing_m;
+  static constexpr float kCell_m = LowestCells::kCell_m;
 
   /// Returns on the ground in one cell: number and sum of their heights above the surface.
   struct Residual {
@@ -50,11 +44,46 @@ class GroundSurface {
     float sum = 0.0F;
   };
 
-  void collect_lowest(std::span<const RingPoint> points);
+  /// The surface between four nodes, from the one at its low corner.
+  struct Patch {
+    float constant = 0.0F;
+    float along_x = 0.0F;
+    float along_y = 0.0F;
+    float twist = 0.0F;
+  };
+
+  /// A place in node distances from the corner, within the square.
+  struct Place {
+    float u = 0.0F;
+    float v = 0.0F;
+
+    int node_i() const { return static_cast<int>(u); }
+    int node_j() const { return static_cast<int>(v); }
+  };
+
+  Place locate(float x, float y) const {
+    return {std::min(std::max((x - corner_x_) * (1.0F / kNodeSpacing_m), 0.0F), node_limit_),
+            std::min(std::max((y - corner_y_) * (1.0F / kNodeSpacing_m), 0.0F), node_limit_)};
+  }
+  float height(const Place& place) const {
+    const int i = place.node_i();
+    const int j = place.node_j();
+    const float a = place.u - static_cast<float>(i);
+    const float b = place.v - static_cast<float>(j);
+    const Patch& patch =
+        patches_[static_cast<std::size_t>(j * static_cast<int>(nodes_per_side_) + i)];
+    return patch.constant + a * patch.along_x + b * (patch.along_y + a * patch.twist);
+  }
+  std::size_t cell(const Place& place) const {
+    constexpr float kCells = kNodeSpacing_m / kCell_m;
+    return static_cast<std::size_t>(static_cast<int>(place.v * kCells) *
+                                        static_cast<int>(cells_per_side_) +
+                                    static_cast<int>(place.u * kCells));
+  }
+  void make_patches();
   void add_smoothness();
-  void add_cells(float scale_m, bool weigh);
+  void add_cells(const LowestCells& cells, float scale_m, bool weigh);
   void solve();
-  std::size_t cell(float x, float y) const;
 
   float corner_x_ = 0.0F;
   float corner_y_ = 0.0F;
@@ -63,7 +92,7 @@ class GroundSurface {
   std::size_t cells_per_side_ = 0;
   std::size_t band_ = 0;
   std::vector<float> nodes_;
-  std::vector<float> lowest_;  ///< Per cell; infinity = no return.
+  std::vector<Patch> patches_;  ///< Per node; those of the last row and column are not used.
   std::vector<Residual> residuals_;
   std::vector<float> smoothness_;  ///< Lower band of the normal matrix, by columns.
   std::vector<float> matrix_;

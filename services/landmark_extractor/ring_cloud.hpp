@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/model/point_sweep.hpp"
+#include "services/landmark_extractor/lowest_cells.hpp"
 #include "services/landmark_extractor/spin_fit.hpp"
 
 namespace understory {
@@ -45,15 +46,19 @@ class RingCloud {
             PointCounters& counters);
 
   std::size_t rings() const { return steps_.size(); }
-  std::size_t size() const { return points_.size(); }
-  std::span<RingPoint> points() { return points_; }
+  /// Of all rings, by index; between the rings are gaps, which mean nothing.
   std::span<const RingPoint> points() const { return points_; }
   std::size_t ring_begin(std::size_t ring) const { return begins_[ring]; }
-  std::size_t ring_end(std::size_t ring) const { return begins_[ring + 1]; }
+  std::size_t ring_end(std::size_t ring) const { return ends_[ring]; }
   /// Points of one ring; azimuth grows.
   std::span<const RingPoint> ring(std::size_t ring) const {
-    return std::span(points_).subspan(begins_[ring], begins_[ring + 1] - begins_[ring]);
+    return {points_.data() + begins_[ring], ends_[ring] - begins_[ring]};
   }
+  std::span<RingPoint> ring(std::size_t ring) {
+    return {points_.data() + begins_[ring], ends_[ring] - begins_[ring]};
+  }
+  /// Of all its points.
+  const LowestCells& lowest() const { return lowest_; }
   /// Azimuth from beam to beam [rad]; 0 for a ring with too few points to tell.
   float step_rad(std::size_t ring) const { return steps_[ring]; }
   /// Of the sensor at utime, frame `vehicle_level`.
@@ -67,7 +72,7 @@ class RingCloud {
     return {origin, (point.position() - origin) / static_cast<double>(point.range_m)};
   }
   /// The same as slope() without a look at the points: good to a few centimetres in height.
-  float rough_slope(std::size_t ring, float azimuth_rad) const;
+  float rough_slope(std::size_t ring, const Eigen::Vector2f& towards) const;
   /// Rise of a ring's beams per metre of range where they look into the direction. Precondition:
   /// the ring has points.
   float slope(std::size_t ring, float azimuth_rad) const;
@@ -76,20 +81,30 @@ class RingCloud {
   std::size_t first_at(std::size_t ring, float azimuth_rad) const;
 
  private:
-  void reserve_rings(const PointSweep& sweep, PointCounters& counters);
-  void scatter(const PointSweep& sweep, double min_range_m, double max_range_m,
+  /// One ring while its points come in.
+  struct Filling {
+    RingPoint* next = nullptr;  ///< Where the next point goes.
+    std::size_t count = 0;
+    float azimuth_rad = 0.0F;  ///< Of the last point; NaN = none yet.
+    float turned_rad = 0.0F;   ///< Whole turns since the ring's first point.
+  };
+
+  void reserve_slots(std::size_t rings, std::size_t points_per_ring);
+  /// False when a ring has more points than its slot takes.
+  bool scatter(const PointSweep& sweep, double min_range_m, double max_range_m,
                PointCounters& counters);
-  void order_ring(std::size_t ring);
+  void cut_ring(std::size_t ring);
   void measure_step(std::size_t ring);
 
-  std::vector<RingPoint> scattered_;  ///< Ring by ring as they came, with gaps between rings.
-  std::vector<std::size_t> slots_;    ///< Where each ring begins there.
-  std::vector<std::size_t> next_;     ///< Where each ring ends there.
-  std::vector<RingPoint> points_;
+  SpinFitter spin_fitter_;
+  std::vector<RingPoint> points_;  ///< A slot per ring, twice as long as the ring at least.
+  std::size_t slot_ = 0;           ///< Points from slot to slot.
+  std::vector<Filling> filling_;
+  LowestCells lowest_;
   std::vector<std::size_t> begins_;
+  std::vector<std::size_t> ends_;
   std::vector<float> steps_;
   std::vector<float> differences_;
-  std::vector<std::size_t> counts_;
   Spin spin_;
   Eigen::Matrix3f level_R_vehicle_ = Eigen::Matrix3f::Identity();
   Eigen::Vector3f sensor_ = Eigen::Vector3f::Zero();

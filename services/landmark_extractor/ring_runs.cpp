@@ -113,11 +113,9 @@ class RunFinder {
 
 }  // namespace
 
-void find_runs(const RingCloud& cloud, const SweepParameters& parameters, std::vector<Run>& runs) {
-  runs.clear();
-  for (std::size_t ring = 0; ring < cloud.rings(); ++ring) {
-    if (cloud.step_rad(ring) > 0.0F) RunFinder(cloud, parameters, ring).find(runs);
-  }
+void find_runs(const RingCloud& cloud, const SweepParameters& parameters, std::size_t ring,
+               std::vector<Run>& runs) {
+  if (cloud.step_rad(ring) > 0.0F) RunFinder(cloud, parameters, ring).find(runs);
 }
 
 }  // namespace understory

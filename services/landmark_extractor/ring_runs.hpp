@@ -33,7 +33,8 @@ struct Run {
   }
 };
 
-/// All runs in order of ring and azimuth; `runs` keeps its memory.
-void find_runs(const RingCloud& cloud, const SweepParameters& parameters, std::vector<Run>& runs);
+/// Adds the runs of one ring in order of azimuth. Precondition: its points know their height.
+void find_runs(const RingCloud& cloud, const SweepParameters& parameters, std::size_t ring,
+               std::vector<Run>& runs);
 
 }  // namespace understory

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
-#include <span>
 #include <vector>
 
 #include "common/model/point_sweep.hpp"
@@ -17,15 +16,45 @@ namespace understory {
 struct Spin {
   /// Of the sensor in the plan; zero where the times are unknown or do not fit.
   Eigen::Vector2f velocity_mps = Eigen::Vector2f::Zero();
+  bool is_leftward = true;
   std::vector<float> slopes;  ///< Per ring: rise of its beams per metre of range; NaN = no points.
 };
 
 /// A sensor turns evenly: the azimuth of its beams grows linearly with time, each ring from an
 /// offset of its own. A de-skewed point at time t was seen from `velocity * t` away, which turns
 /// its azimuth by parallax; the velocity is what leaves beams that turn evenly (least squares on a
-/// part of the points). `points_per_ring` counts the points of each ring.
-Spin fit_spin(const PointSweep& sweep, double max_range_m,
-              std::span<const std::size_t> points_per_ring);
+/// part of the points). Keeps its memory from sweep to sweep.
+class SpinFitter {
+ public:
+  void fit(const PointSweep& sweep, double max_range_m, Spin& spin);
+
+ private:
+  /// One point as its beam is seen from where the sensor is at utime.
+  struct Sample {
+    float x;
+    float y;
+    float time_s;
+    std::uint16_t ring;
+  };
+  struct Means {
+    double count = 0.0;
+    Eigen::Vector4d sum = Eigen::Vector4d::Zero();  ///< Of (t, d azimuth / d velocity, residual).
+    float offset = 0.0F;                            ///< Of the first residual.
+    float slope_sum = 0.0F;
+    float slopes = 0.0F;
+  };
+
+  void take_samples(const PointSweep& sweep, double max_range_m);
+  float look_at_neighbours(const PointSweep& sweep, std::uint16_t ring, Spin& spin);
+  void improve();
+
+  std::vector<Sample> samples_;
+  std::vector<Means> means_;  ///< Per ring.
+  std::vector<float> rates_;
+  double rate_ = 0.0;  ///< [rad/s]
+  Eigen::Vector2d velocity_ = Eigen::Vector2d::Zero();
+  double residual_rms_ = 0.0;
+};
 
 /// atan2 to 1e-5 rad without a branch on the data (polynomial of least maximum error).
 inline float fast_atan2(float y, float x) {

@@ -107,13 +107,14 @@ StemProbe probe_stem(const RingCloud& cloud, const StemFit& fit, double ground_z
   double lowest_through = lowest_on;
   double highest_through = highest_on;
   const Eigen::Vector2d offset = fit.state.head<2>() - cloud.sensor_m().head<2>().cast<double>();
-  const float azimuth = azimuth_of(offset);
+  const double distance = offset.norm();
+  const Eigen::Vector2f towards = (offset / distance).cast<float>();
   const double lowest = std::min(ground_z + kFoot_m, fit.low_z_m) - kMargin_m;
   const double highest =
       std::max(ground_z + parameters.standing_height_m, fit.high_z_m) + kMargin_m;
   for (std::size_t ring = 0; ring < cloud.rings(); ++ring) {
     if (cloud.step_rad(ring) <= 0.0F) continue;
-    const double about = cloud.sensor_m().z() + cloud.rough_slope(ring, azimuth) * offset.norm();
+    const double about = cloud.sensor_m().z() + cloud.rough_slope(ring, towards) * distance;
     if (about < lowest || about > highest) continue;
     const Look look(cloud, ring, fit, parameters.clearance_m);
     const double z = look.z_m();

@@ -60,8 +60,12 @@ LandmarkScan SweepExtractor::extract(const PointSweep& sweep) {
   if (!sweep.attitude) ++counters_.without_attitude;
   const double reach = sweep_.max_range_m + kMargin_m;
   cloud_.fill(sweep, sweep_.min_range_m, reach, counters_.points);
-  ground_.fit(cloud_.points(), cloud_.sensor_m().head<2>(), static_cast<float>(reach));
-  find_runs(cloud_, sweep_, runs_);
+  ground_.fit(cloud_.lowest());
+  runs_.clear();
+  for (std::size_t ring = 0; ring < cloud_.rings(); ++ring) {
+    ground_.measure(cloud_.ring(ring));
+    find_runs(cloud_, sweep_, ring, runs_);
+  }
   trunks_.find(cloud_, runs_, ground_, level_covariance, result.detections);
   const std::size_t trunks = result.detections.size();
   corners_.find(cloud_, runs_, ground_, level_covariance, result.detections);

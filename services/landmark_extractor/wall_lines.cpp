@@ -85,11 +85,12 @@ void WallFinder::add_piece(const RingCloud& cloud, const Run& run, std::size_t f
   LinePiece piece;
   piece.from_m = cloud.points()[first].position();
   piece.to_m = cloud.points()[last].position();
-  const double length = (piece.to_m - piece.from_m).norm();
-  if (length < 0.5 * corner_.min_length_m) return;
+  piece.length_m = (piece.to_m - piece.from_m).norm();
+  if (piece.length_m < 0.5 * corner_.min_length_m) return;
+  piece.direction = (piece.to_m - piece.from_m) / piece.length_m;
   // A piece along the beams is a row of edges, not a wall.
   const Eigen::Vector2d beam = piece.from_m - cloud.sensor_m().head<2>().cast<double>();
-  if (std::abs(cross(beam.normalized(), piece.direction())) < 0.05) return;
+  if (std::abs(cross(beam.normalized(), piece.direction)) < 0.05) return;
   double z = 0.0;
   double height = 0.0;
   // The points where pieces meet belong to neither for sure.
@@ -107,14 +108,14 @@ void WallFinder::add_piece(const RingCloud& cloud, const Run& run, std::size_t f
 }
 
 bool WallFinder::same_wall(const LinePiece& a, const LinePiece& b) const {
-  const Eigen::Vector2d direction = a.direction();
-  if (std::abs(cross(direction, b.direction())) > kSameDirection ||
-      direction.dot(b.direction()) < 0.0) {
+  const Eigen::Vector2d& direction = a.direction;
+  if (std::abs(cross(direction, b.direction)) > kSameDirection ||
+      direction.dot(b.direction) < 0.0) {
     return false;
   }
   const Eigen::Vector2d middle = 0.5 * (b.from_m + b.to_m) - a.from_m;
-  const double length = (a.to_m - a.from_m).norm();
-  const double half = 0.5 * (b.to_m - b.from_m).norm();
+  const double length = a.length_m;
+  const double half = 0.5 * b.length_m;
   const double along = direction.dot(middle);
   const double lever = std::max(length, 2.0 * half);
   const double across = std::abs(cross(direction, middle));
@@ -173,7 +174,7 @@ void WallFinder::add_wall(const std::vector<std::uint32_t>& members) {
       sums.square / sums.count - wall.centroid_m * wall.centroid_m.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(scatter);
   wall.direction = axes.eigenvectors().col(1);
-  if (wall.direction.dot(pieces_[members[0]].direction()) < 0.0) wall.direction *= -1.0;
+  if (wall.direction.dot(pieces_[members[0]].direction) < 0.0) wall.direction *= -1.0;
   const double across2 =
       std::max(axes.eigenvalues()[0], sweep_.range_sigma_m * sweep_.range_sigma_m / 4.0);
   if (std::sqrt(across2) > corner_.line_tolerance_m) return;

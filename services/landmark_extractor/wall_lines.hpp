@@ -31,8 +31,8 @@ struct LinePiece {
   /// Last point of the cloud at either end.
   std::uint32_t first = 0;
   std::uint32_t last = 0;
-
-  Eigen::Vector2d direction() const { return (to_m - from_m).normalized(); }
+  Eigen::Vector2d direction = Eigen::Vector2d::UnitX();  ///< Unit, from end to end.
+  double length_m = 0.0;
 };
 
 /// A vertical plane, as far as it is seen.
