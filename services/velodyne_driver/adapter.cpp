@@ -165,7 +165,7 @@ class VelodyneDriverAdapter : public Adapter, public Device {
     const VelodyneDriverOutput output =
         stage_->add_position(datagram.bytes, datagram.size, datagram.received);
     report(output.faults, channels_.raw_gnss);
-    if (output.fix) fixes_.publish(*output.fix);
+    if (output.fix && parameters_.gnss.is_published) fixes_.publish(*output.fix);
   }
 
   void report(const std::vector<Refusal>& faults, const std::string& channel) {

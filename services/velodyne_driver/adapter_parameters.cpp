@@ -35,6 +35,8 @@ void describe(VelodyneDriverParameters& p, ParameterTable& table) {
             "Stamps: the sensor's clock within the computer's hour, or when packets came.");
   table.add("time.tolerance_s", p.time.tolerance_s, {1e-4, 3600.0}, "s",
             "With source \"sensor\": a clock farther from the computer's is reported.");
+  table.add("gnss.is_published", p.gnss.is_published,
+            "False: another receiver on the vehicle gives RAW_GNSS, which has one sender.");
   table.add("gnss.has_origin", p.gnss.has_origin,
             "RAW_GNSS counts from the origin given here; false: from the first fix.");
   table.add("gnss.origin_latitude_deg", p.gnss.origin_latitude_deg, {-89.0, 89.0}, "deg", "North.");

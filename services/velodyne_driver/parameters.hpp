@@ -30,7 +30,8 @@ struct VelodyneTimeParameters {
 };
 
 struct VelodyneGnssParameters {
-  bool has_origin = false;  ///< Else metres count from the first fix since the start.
+  bool is_published = true;  ///< False: another receiver gives RAW_GNSS.
+  bool has_origin = false;   ///< Else metres count from the first fix since the start.
   double origin_latitude_deg = 0.0;
   double origin_longitude_deg = 0.0;
 };

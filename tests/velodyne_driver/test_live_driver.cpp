@@ -36,6 +36,7 @@ std::vector<Laser> lasers() {
 
 std::vector<Packet> packets_of(PacketMaker maker, int count) {
   std::vector<Packet> packets;
+  packets.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) packets.push_back(maker.next());
   return packets;
 }
