@@ -59,7 +59,8 @@ class LandmarkExtractorAdapter : public Adapter {
         channels_.lidar_scan,
         [this](const PlanarScan& scan) { landmarks_.publish(stage_->extract(scan)); },
         {.queue_size = 200});
-    // The stage remembers nothing: a sweep that was under way at a restart is lost.
+    // Each sweep is judged by itself: there is no state to save but counters, which begin anew. A
+    // sweep that was under way at a restart is lost, and counted when its next part comes.
     node.subscribe<PointSweep>(channels_.lidar_sweep,
                                [this](const PointSweep& part) { add_part(part); },
                                {.queue_size = 1000, .journaled = false});

@@ -66,6 +66,8 @@ class LidarImuInputAdapter : public Adapter {
   }
 
   void finish() override { publish(stage_->finish()); }
+  std::string save() const override { return stage_->save(); }
+  void load(const std::string& state) override { stage_->load(state); }
 
  private:
   template <class T>

@@ -62,6 +62,13 @@ class AttitudeFilter {
   double wheel_scale_sigma() const { return std::sqrt(covariance_(12, 12)); }
   Eigen::Matrix3d gyro_bias_covariance() const { return covariance_.block<3, 3>(6, 6); }
 
+  /// For saving and loading: what changes while it runs.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.world_Q_vehicle_, self.velocity_, self.gyro_bias_, self.force_bias_, self.wheel_scale_,
+      self.covariance_);
+  }
+
  private:
   using Row = Eigen::Matrix<double, 1, 13>;
   void update(const Row& row, double residual, double variance);

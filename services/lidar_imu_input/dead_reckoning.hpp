@@ -45,6 +45,12 @@ class DeadReckoning {
 
   void set_pose(const SE2& pose) { pose_ = pose; }
 
+  /// For saving and loading: what changes while it runs.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.pose_, self.velocity_, self.bias_, self.covariance_);
+  }
+
  private:
   using Row = Eigen::Matrix<double, 1, 8>;
   void update(const Row& row, double residual, double variance, bool moves_heading);

@@ -43,10 +43,12 @@ SensorClock::Answer SensorClock::take(Utime raw, std::optional<Utime> others) {
   const Utime utime = raw + offset_;
   // Once in quarantine, only a stamp that goes on behind the last good one ends it early.
   const bool suspected = first_candidate_ && utime <= last_.value_or(utime);
-  if (last_ && (suspected || !is_plausible(utime, others))) return quarantine(raw);
+  const bool resumes = is_resumed_ && last_ && utime > *last_;
+  if (resumes) is_resumed_ = false;
+  if (last_ && !resumes && (suspected || !is_plausible(utime, others))) return quarantine(raw);
   first_candidate_.reset();
   if (last_ && utime <= *last_) return {Verdict::kLate, utime};
-  if (last_) {
+  if (last_ && !(resumes && seconds_between(*last_, utime) > parameters_.clock_jump_s)) {
     const auto step = static_cast<double>(utime - *last_);
     period_us_ = period_us_ == 0.0 ? step : period_us_ + 0.1 * (step - period_us_);
   }

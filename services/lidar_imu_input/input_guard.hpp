@@ -51,6 +51,15 @@ class SensorClock {
   Answer take(Utime raw, std::optional<Utime> others);
   std::optional<Utime> last() const { return last_; }
   Utime offset_us() const { return offset_; }
+  /// The service was away: the next stamp may be far ahead of the last one.
+  void resume() { is_resumed_ = true; }
+
+  /// For saving and loading: what changes while it runs.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.last_, self.period_us_, self.offset_, self.first_candidate_, self.candidate_,
+      self.agreeing_);
+  }
 
  private:
   Answer quarantine(Utime raw);
@@ -63,6 +72,7 @@ class SensorClock {
   std::optional<Utime> first_candidate_;
   Utime candidate_ = 0;
   int agreeing_ = 0;
+  bool is_resumed_ = false;
 };
 
 /// All sensors' clocks, silence, and frozen or saturated samples. Faults are said once per episode
@@ -85,6 +95,21 @@ class InputGuard {
   /// It has spoken, and not gone silent.
   bool is_live(Sensor sensor) const;
   bool has_spoken(Sensor sensor) const { return state(sensor).clock.last().has_value(); }
+  /// What a sensor's stamp is on the stage's time, as far as is known.
+  Utime on_stage_time(Sensor sensor, Utime raw) const {
+    return raw + state(sensor).clock.offset_us();
+  }
+
+  /// The service was away: no sensor's silence meanwhile is a jump of its clock.
+  void resume() {
+    for (State& state : states_) state.clock.resume();
+  }
+  /// For saving and loading: what changes while it runs.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    for (auto& state : self.states_) a(state.clock, state.is_silent);
+    a(self.same_since_, self.is_frozen_);
+  }
 
  private:
   struct State {

@@ -17,6 +17,11 @@ struct LevelSample {
   Eigen::Vector2d force_mps2 = Eigen::Vector2d::Zero();  ///< Along level x and y.
   double pitch_cosine = 1.0;
   bool is_saturated = false;
+
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.utime, self.yaw_rate_rad_s, self.force_mps2, self.pitch_cosine, self.is_saturated);
+  }
 };
 
 /// Speed of the axle's middle along the vehicle's x axis.
@@ -24,6 +29,11 @@ struct SpeedSample {
   Utime utime = 0;
   double speed_mps = 0.0;
   double scale_sigma = 0.0;  ///< Of the speed, relative.
+
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.utime, self.speed_mps, self.scale_sigma);
+  }
 };
 
 /// The sample at `utime`, between its two neighbours in proportion to time.
@@ -39,6 +49,12 @@ class LevelSamples {
   void forget_before(Utime utime);
   /// Samples at `from`, all in between, and at `to`; none where a gap or an end is in between.
   std::optional<std::deque<LevelSample>> between(Utime from, Utime to) const;
+
+  /// For saving and loading: what changes while it runs.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.samples_);
+  }
 
  private:
   double max_gap_s_;

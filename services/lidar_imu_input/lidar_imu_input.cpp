@@ -46,6 +46,7 @@ void LidarImuInput::report(std::vector<InputFault>& faults, InputResults& out) {
 InputResults LidarImuInput::add(const ImuSample& raw) {
   InputResults out;
   if (!is_finite(raw)) return {not_finite(Sensor::kImu)};
+  check_pause(Sensor::kImu, raw.utime, out);
   std::vector<InputFault> faults;
   const bool frozen = guard_.is_frozen(raw, faults);
   const bool saturated = guard_.is_saturated(raw, faults);
@@ -72,6 +73,7 @@ InputResults LidarImuInput::add(const ImuSample& raw) {
 InputResults LidarImuInput::add(const WheelSample& raw) {
   InputResults out;
   if (!is_finite(raw)) return {not_finite(Sensor::kWheels)};
+  check_pause(Sensor::kWheels, raw.utime, out);
   std::vector<InputFault> faults;
   const auto utime = guard_.admit(Sensor::kWheels, raw.utime, faults);
   report(faults, out);
@@ -88,6 +90,7 @@ InputResults LidarImuInput::add(const WheelSample& raw) {
 InputResults LidarImuInput::add(const GnssFix& raw) {
   InputResults out;
   if (!is_finite(raw)) return {not_finite(Sensor::kGnss)};
+  check_pause(Sensor::kGnss, raw.utime, out);
   std::vector<InputFault> faults;
   const auto utime = guard_.admit(Sensor::kGnss, raw.utime, faults);
   report(faults, out);
@@ -133,6 +136,7 @@ InputResults LidarImuInput::add(const PointSweep& raw) {
                                 way == "none" ? "points without times: not de-skewed"
                                               : "points without times: taken from the azimuth"});
   }
+  check_pause(Sensor::kSweep, sweep.utime, out);
   std::vector<InputFault> faults;
   const auto utime = guard_.admit(Sensor::kSweep, sweep.utime, faults);
   report(faults, out);
@@ -147,6 +151,7 @@ InputResults LidarImuInput::add(const PointSweep& raw) {
 
 InputResults LidarImuInput::add(const PlanarScan& raw) {
   InputResults out;
+  check_pause(Sensor::kScan, raw.utime, out);
   std::vector<InputFault> faults;
   const auto utime = guard_.admit(Sensor::kScan, raw.utime, faults);
   report(faults, out);

@@ -7,6 +7,7 @@
 
 #include <deque>
 #include <optional>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -31,11 +32,17 @@ struct InputCounters {
   std::uint64_t sweeps = 0;
   std::uint64_t sweeps_not_deskewed = 0;
   std::uint64_t sweeps_carried = 0;  ///< Came late: stamped with the end of the latest piece.
-  std::uint64_t sweeps_dropped = 0;  ///< Too late even for that.
+  std::uint64_t sweeps_dropped = 0;  ///< Too late even for that, or waiting at a restart.
   std::uint64_t points_dropped = 0;  ///< Not finite.
   std::uint64_t pieces_missing = 0;  ///< Intervals without any motion sensor.
   std::uint64_t corrections_late = 0;
   std::uint64_t samples_saturated = 0;
+
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.sweeps, self.sweeps_not_deskewed, self.sweeps_carried, self.sweeps_dropped,
+      self.points_dropped, self.pieces_missing, self.corrections_late, self.samples_saturated);
+  }
 };
 
 class LidarImuInput {
@@ -51,17 +58,27 @@ class LidarImuInput {
   /// The drive is over: what still waits goes out.
   InputResults finish();
 
+  /// Everything but the points of sweeps that wait: bulk is no state. load() throws
+  /// std::invalid_argument for what save() did not give. Afterwards sensors may have been silent
+  /// for the while that the service was away; after more than `kLongestPause_s` the stage starts
+  /// anew.
+  std::string save() const;
+  void load(const std::string& state);
+  static constexpr double kLongestPause_s = 600.0;
+
   const InputCounters& counters() const { return counters_; }
   const MotionEstimator& motion() const { return motion_; }
   bool is_calibrated() const { return motion_.is_calibrated(); }
 
  private:
+  /// A sweep whose points were lost at a restart: its piece of odometry still ends there.
+  struct LostSweep {};
   struct Waiting {
     Utime end = 0;
-    std::variant<PointSweep, PlanarScan> item;
+    std::variant<LostSweep, PointSweep, PlanarScan> item;
   };
 
-  void wait(Utime end, std::variant<PointSweep, PlanarScan> item, InputResults& out);
+  void wait(Utime end, std::variant<LostSweep, PointSweep, PlanarScan> item, InputResults& out);
   void settle(InputResults& out, bool everything);
   bool is_reached(Utime utime) const;
   void end_piece(Utime utime, InputResults& out);
@@ -71,6 +88,7 @@ class LidarImuInput {
   void publish_raw_pose(bool at_once, InputResults& out);
   void check_calibration(InputResults& out);
   bool is_repeated(const PointSweep& sweep);
+  void check_pause(Sensor sensor, Utime raw, InputResults& out);
 
   LidarImuInputParameters parameters_;
   InputGuard guard_;
@@ -83,7 +101,8 @@ class LidarImuInput {
   std::optional<Utime> raw_pose_utime_;
   std::vector<SweepPoint> first_points_;  ///< Of the latest sweep, to notice a frozen laser.
   bool calibration_told_ = false;
-  bool was_saturated_ = false;  ///< The latest sample of the IMU; it was left out.
+  std::optional<Utime> resumed_from_;  ///< After loading, until a sensor speaks.
+  bool was_saturated_ = false;         ///< The latest sample of the IMU; it was left out.
 };
 
 }  // namespace understory

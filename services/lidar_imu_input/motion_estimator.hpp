@@ -4,6 +4,7 @@
 
 #include <deque>
 #include <optional>
+#include <type_traits>
 #include <vector>
 
 #include "common/model/ekf_output.hpp"
@@ -45,6 +46,27 @@ class MotionEstimator {
   bool is_calibrated() const { return standstill_.is_calibrated(); }
   bool has_attitude() const { return attitude_.has_value(); }
   const std::optional<AttitudeFilter>& attitude() const { return attitude_; }
+  /// With an attitude come the samples that it stands at.
+  bool is_whole() const {
+    return !attitude_ || (latest_ && latest_level_ && !raw_.empty() && !history_.empty());
+  }
+
+  /// For saving and loading: what changes while it runs.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    bool has_attitude = self.attitude_.has_value();
+    a(has_attitude);
+    if constexpr (!std::is_const_v<Self>) {
+      self.attitude_.reset();
+      const Eigen::Vector3d any_force(0.0, 0.0, kGravity_mps2);
+      if (has_attitude) self.attitude_.emplace(self.parameters_.imu, any_force);
+    }
+    if (has_attitude) a(*self.attitude_);
+    a(self.reckoning_, self.standstill_, self.wheel_only_, self.reference_, self.levels_,
+      self.speeds_, self.history_, self.corrections_, self.raw_, self.latest_, self.latest_level_,
+      self.pose_utime_, self.height_m_, self.standing_bias_, self.standing_bias_sigma_,
+      self.moved_utime_, self.constrained_utime_, self.bounded_utime_, self.sequence_);
+  }
 
  private:
   void start(const ImuSample& sample);

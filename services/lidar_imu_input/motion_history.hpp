@@ -18,6 +18,12 @@ struct MotionState {
   Eigen::Vector3d rate_rad_s = Eigen::Vector3d::Zero();          ///< Frame vehicle, bias taken out.
   double heading_rad = 0.0;
   Eigen::Matrix2d tilt_covariance = Eigen::Matrix2d::Zero();
+
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.utime, self.odom_Q_vehicle, self.position_m, self.velocity_mps, self.level_velocity_mps,
+      self.rate_rad_s, self.heading_rad, self.tilt_covariance);
+  }
 };
 
 /// The last seconds, in order of time.
@@ -30,6 +36,12 @@ class MotionHistory {
   /// Between two states in proportion to time; at the ends the nearest state, moved on at its
   /// velocity and rate for no longer than `kMostExtrapolation_s`. None while empty or farther off.
   std::optional<MotionState> at(Utime utime) const;
+
+  /// For saving and loading: what changes while it runs.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.states_);
+  }
 
   static constexpr double kMostExtrapolation_s = 0.5;
   static constexpr double kKept_s = 4.0;

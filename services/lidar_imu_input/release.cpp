@@ -16,7 +16,8 @@ Utime microseconds(double seconds) { return static_cast<Utime>(std::llround(seco
 
 }  // namespace
 
-void LidarImuInput::wait(Utime end, std::variant<PointSweep, PlanarScan> item, InputResults& out) {
+void LidarImuInput::wait(Utime end, std::variant<LostSweep, PointSweep, PlanarScan> item,
+                         InputResults& out) {
   if (waiting_.size() >= kMostWaiting) {
     ++counters_.sweeps_dropped;
     waiting_.pop_front();
@@ -98,6 +99,10 @@ void LidarImuInput::end_piece(Utime utime, InputResults& out) {
 }
 
 void LidarImuInput::release(Waiting waiting, InputResults& out) {
+  if (std::holds_alternative<LostSweep>(waiting.item)) {
+    ++counters_.sweeps_dropped;
+    return;
+  }
   if (auto* scan = std::get_if<PlanarScan>(&waiting.item)) {
     scan_stamp_ = waiting.end;
     out.emplace_back(std::move(*scan));

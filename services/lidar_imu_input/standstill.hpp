@@ -28,6 +28,13 @@ class StandstillDetector {
   double longest_s() const { return longest_s_; }
   bool is_calibrated() const { return longest_s_ >= parameters_.calibration_s; }
 
+  /// For saving and loading: what changes while it runs.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.window_, self.is_standing_, self.since_, self.longest_s_, self.wheels_turned_,
+      self.has_turned_, self.gyro_floor_, self.force_floor_, self.floor_windows_);
+  }
+
  private:
   bool is_quiet(const std::optional<Eigen::Vector3d>& gyro_bias);
   bool wheels_turn(Utime now) const;

@@ -21,6 +21,12 @@ class VelocityReference {
   /// enough to tell how odom lies to east and north. Fixes without velocity are differenced.
   std::optional<ReferenceVelocity> add(const GnssFix& fix, double heading_rad);
 
+  /// For saving and loading: what changes while it runs.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.previous_, self.east_to_odom_rad_, self.east_to_odom_variance_);
+  }
+
  private:
   std::optional<GnssFix> previous_;
   std::optional<double> east_to_odom_rad_;  ///< How odom lies; grows more certain fix by fix.

@@ -60,6 +60,12 @@ class WheelOdometry {
   std::uint64_t samples_out_of_order() const { return out_of_order_; }
   std::uint64_t intervals_without_samples() const { return without_samples_; }
 
+  /// For saving and loading: what changes while it runs.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.samples_, self.last_stamp_, self.sequence_, self.out_of_order_, self.without_samples_);
+  }
+
  private:
   std::optional<SE2WithCovariance> integrate(Utime from, Utime to);
   SE2WithCovariance step(const WheelSample& sample, double seconds) const;
