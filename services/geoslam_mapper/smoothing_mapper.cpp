@@ -185,8 +185,8 @@ void SmoothingMapper::finish(const Keyframe& keyframe, MapUpdate& update) {
   odometry_.forget_before(last.utime);
   // The newest scan's place is now known better than it was when it came.
   if (!located_ || located_->utime <= last.utime) {
-    located_ =
-        LocatedScan{last.utime, update.map_T_latest_vehicle, located_ ? located_->step : SE2()};
+    located_ = LocatedScan{last.utime, update.map_T_latest_vehicle,
+                           located_ ? located_->step : SE2(), last.covariance};
   }
 }
 

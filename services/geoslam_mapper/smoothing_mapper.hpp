@@ -128,7 +128,8 @@ class SmoothingMapper final : public MapperMethod {
   struct LocatedScan {
     Utime utime = 0;
     SE2 map_T_vehicle;
-    SE2 step;  ///< From the scan before.
+    SE2 step;                                              ///< From the scan before.
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Among the landmarks near by.
   };
   std::optional<LocatedScan> located_;
 };

@@ -8,6 +8,7 @@ namespace understory {
 namespace {
 
 constexpr double kReachMargin_m = 5.0;
+constexpr double kLeastVariance = 1e-6;  ///< A millimetre, a milliradian.
 
 }  // namespace
 
@@ -40,16 +41,18 @@ std::optional<SE2WithCovariance> SmoothingMapper::locate(const LandmarkScan& sca
   gating.gate_floor_m = parameters_.gate_floor_m;
   const auto step = step_from_last_scan(scan);
   const Registration found =
-      step ? register_points(reference, observed,
-                             {located_->map_T_vehicle * step->mean,
-                              step->covariance + 1e-6 * Eigen::Matrix3d::Identity()},
-                             gating)
+      step ? register_points(
+                 reference, observed,
+                 compound({located_->map_T_vehicle,
+                           located_->covariance + kLeastVariance * Eigen::Matrix3d::Identity()},
+                          *step),
+                 gating)
            : register_step(reference, observed, located_->map_T_vehicle, located_->step,
                            StepModel{}, gating, fits);
   if (!fits(found)) return std::nullopt;
   const SE2 last = located_->map_T_vehicle;
   located_ = LocatedScan{scan.utime, found.reference_T_observed,
-                         last.inverse() * found.reference_T_observed};
+                         last.inverse() * found.reference_T_observed, found.covariance};
   return in_map(found);
 }
 

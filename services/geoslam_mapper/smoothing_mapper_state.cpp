@@ -144,7 +144,10 @@ std::string SmoothingMapper::save() const {
   if (last_member_)
     last_member = {last_member_->node, last_member_->utime, last_member_->centre_T_vehicle};
   Json located = nullptr;
-  if (located_) located = {located_->utime, located_->map_T_vehicle, located_->step};
+  if (located_) {
+    located = {located_->utime, located_->map_T_vehicle, located_->step,
+               matrix_to_json<3, 3>(located_->covariance)};
+  }
   return to_state({{"version", kStateVersion},
                    {"graph", to_value(smoother_.graph())},
                    {"landmarks", landmarks},
@@ -201,8 +204,8 @@ void SmoothingMapper::load(const std::string& state) {
   loaded.last_utime_ = optional_from_json<Utime>(json.at("last_utime"));
   const Json& located = json.at("located");
   if (!located.is_null()) {
-    loaded.located_ =
-        LocatedScan{located.at(0).get<Utime>(), located.at(1).get<SE2>(), located.at(2).get<SE2>()};
+    loaded.located_ = LocatedScan{located.at(0).get<Utime>(), located.at(1).get<SE2>(),
+                                  located.at(2).get<SE2>(), matrix_from_json<3, 3>(located.at(3))};
   }
   if (!loaded.nodes_.empty()) loaded.smoother_.update();
   for (const auto& [id, landmark] : loaded.store_.all()) loaded.changed_.push_back(id);
