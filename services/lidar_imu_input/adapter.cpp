@@ -73,7 +73,7 @@ class LidarImuInputAdapter : public Adapter {
   template <class T>
   void take(const std::string& channel, std::size_t queue_size) {
     node_->subscribe<T>(channel, [this](const T& value) { publish(stage_->add(value)); },
-                        {.queue_size = queue_size, .journaled = false});
+                        {.queue_size = queue_size});
   }
 
   void add_part(const PointSweep& part) {
