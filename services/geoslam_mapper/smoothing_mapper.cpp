@@ -120,7 +120,7 @@ void SmoothingMapper::report(const Keyframe& keyframe, const Placement& placemen
   const SE2WithCovariance centre_T_base{keyframe.centre_T_base(),
                                         keyframe.members.front().covariance};
   const NodeIndex node = add_node(placement.map_T_centre.mean);
-  add_base({node, keyframe.sequence, keyframe.utime, centre_T_base, false});
+  add_base({node, keyframe.sequence, keyframe.utime, centre_T_base, middle_of(keyframe), false});
   ++keyframes_;
   update.associations = placement.associations;
   finish(keyframe, update);
@@ -143,7 +143,7 @@ void SmoothingMapper::start_map(const Keyframe& keyframe, MapUpdate& update) {
   const SE2WithCovariance base_T_centre = inverse(centre_T_base);
   const NodeIndex node = add_node(base_T_centre.mean);
   smoother_.add(PosePrior{nodes_[node].centre, base_T_centre.mean, kTiny.inverse()});
-  add_base({node, keyframe.sequence, keyframe.utime, centre_T_base, true});
+  add_base({node, keyframe.sequence, keyframe.utime, centre_T_base, middle_of(keyframe), true});
   ++keyframes_;
   discover(keyframe, node, update);
   const SmootherUpdate solved = smoother_.update();
@@ -157,6 +157,19 @@ SE2WithCovariance SmoothingMapper::base_pose(const Base& base) const {
   if (base.is_origin) return {};
   const PoseId centre = nodes_[base.node].centre;
   return compound({smoother_.pose(centre), Eigen::Matrix3d::Zero()}, base.centre_T_base);
+}
+
+SE2 SmoothingMapper::middle_pose(const Base& base) const {
+  return smoother_.pose(nodes_[base.node].centre) * base.centre_T_middle;
+}
+
+SE2 middle_of(const Keyframe& keyframe) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  const SE2 base_T_centre = keyframe.centre_T_base().inverse();
+  for (const KeyframeMember& member : keyframe.members)
+    sum += (base_T_centre * member.centre_T_vehicle).coordinates();
+  sum /= static_cast<double>(keyframe.members.size());
+  return keyframe.centre_T_base() * SE2(sum.x(), sum.y(), sum.z());
 }
 
 /// What every accepted keyframe leaves behind. Its base is bases_.back().

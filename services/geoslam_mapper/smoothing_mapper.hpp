@@ -38,7 +38,9 @@ class SmoothingMapper final : public MapperMethod {
     std::uint64_t sequence = 0;
     Utime utime = 0;
     SE2WithCovariance centre_T_base;  ///< `centre` of the node.
-    bool is_origin = false;           ///< The gauge: known exactly.
+    /// Mean of the keyframe's members: where it stood, three times as exactly as the base tells.
+    SE2 centre_T_middle;
+    bool is_origin = false;  ///< The gauge: known exactly.
   };
   /// Where a keyframe is, and which of its landmarks are which.
   struct Placement {
@@ -57,6 +59,7 @@ class SmoothingMapper final : public MapperMethod {
   void report(const Keyframe& keyframe, const Placement& placement, MapUpdate& update);
   void finish(const Keyframe& keyframe, MapUpdate& update);
   SE2WithCovariance base_pose(const Base& base) const;
+  SE2 middle_pose(const Base& base) const;
   MapLandmark as_told(const StoredLandmark& landmark) const;
 
   // smoothing_mapper_place.cpp: where is it?
@@ -133,6 +136,9 @@ class SmoothingMapper final : public MapperMethod {
   };
   std::optional<LocatedScan> located_;
 };
+
+/// Mean of the members' poses.
+SE2 middle_of(const Keyframe& keyframe);
 
 std::unique_ptr<MapperMethod> make_smoothing_mapper(const SmoothingMapperParameters& parameters);
 

@@ -42,8 +42,7 @@ void SmoothingMapper::add_base(const Base& base) {
   std::vector<std::uint32_t>& standings = standings_of_node_[base.node];
   const double apart_m = 0.25 * parameters_.fold_distance_m;
   for (const std::uint32_t other : standings) {
-    const SE2 between =
-        bases_[standings_[other]].centre_T_base.mean.inverse() * base.centre_T_base.mean;
+    const SE2 between = bases_[standings_[other]].centre_T_middle.inverse() * base.centre_T_middle;
     if (between.translation().norm() < apart_m &&
         std::abs(between.theta()) < 0.25 * parameters_.fold_angle_rad) {
       return;
@@ -51,7 +50,7 @@ void SmoothingMapper::add_base(const Base& base) {
   }
   standings.push_back(static_cast<std::uint32_t>(standings_.size()));
   standings_.push_back(static_cast<std::uint32_t>(bases_.size() - 1));
-  places_.put(standings.back(), base_pose(base).mean.translation());
+  places_.put(standings.back(), middle_pose(base).translation());
 }
 
 /// A second sighting from the same node is averaged into the first by information.
@@ -87,12 +86,12 @@ void SmoothingMapper::add_motion(const Keyframe& keyframe, NodeIndex node) {
 /// seen from there.
 std::optional<NodeIndex> SmoothingMapper::foldable(const Keyframe& keyframe,
                                                    const Placement& placement) const {
-  const SE2 map_T_base = placement.map_T_centre.mean * keyframe.centre_T_base();
+  const SE2 map_T_middle = placement.map_T_centre.mean * middle_of(keyframe);
   std::optional<NodeIndex> best;
   double best_distance = parameters_.fold_distance_m;
-  places_.for_each_near(map_T_base.translation(), best_distance, [&](std::uint32_t standing) {
+  places_.for_each_near(map_T_middle.translation(), best_distance, [&](std::uint32_t standing) {
     const Base& base = bases_[standings_[standing]];
-    const SE2 between = base_pose(base).mean.inverse() * map_T_base;
+    const SE2 between = middle_pose(base).inverse() * map_T_middle;
     const double distance = between.translation().norm();
     const bool is_nearer =
         distance < best_distance || (distance == best_distance && best < base.node);
@@ -155,6 +154,7 @@ bool SmoothingMapper::fuse(const Keyframe& arrived, const Placement& placement, 
             keyframe.sequence,
             keyframe.utime,
             {keyframe.centre_T_base(), keyframe.members.front().covariance},
+            middle_of(keyframe),
             false});
   count_sightings(keyframe, node, update);
   adopt_estimates();
@@ -234,7 +234,7 @@ void SmoothingMapper::adopt_estimates() {
     const NodeIndex node = index(pose);
     if (node >= standings_of_node_.size()) continue;
     for (const std::uint32_t standing : standings_of_node_[node]) {
-      places_.put(standing, base_pose(bases_[standings_[standing]]).mean.translation());
+      places_.put(standing, middle_pose(bases_[standings_[standing]]).translation());
     }
   }
 }

@@ -139,7 +139,8 @@ std::string SmoothingMapper::save() const {
     nodes.push_back({index(node.centre), seen});
   }
   for (const Base& base : bases_)
-    bases.push_back({base.node, base.sequence, base.utime, base.centre_T_base, base.is_origin});
+    bases.push_back({base.node, base.sequence, base.utime, base.centre_T_base, base.is_origin,
+                     base.centre_T_middle});
   Json last_member = nullptr;
   if (last_member_)
     last_member = {last_member_->node, last_member_->utime, last_member_->centre_T_vehicle};
@@ -190,7 +191,7 @@ void SmoothingMapper::load(const std::string& state) {
   for (const Json& base : json.at("bases")) {
     loaded.add_base({base.at(0).get<NodeIndex>(), base.at(1).get<std::uint64_t>(),
                      base.at(2).get<Utime>(), base.at(3).get<SE2WithCovariance>(),
-                     base.at(4).get<bool>()});
+                     base.at(5).get<SE2>(), base.at(4).get<bool>()});
   }
   json.at("odometry").get_to(loaded.odometry_);
   json.at("map_was_given").get_to(loaded.map_was_given_);
