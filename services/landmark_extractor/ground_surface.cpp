@@ -63,9 +63,8 @@ void GroundSurface::fit(const LowestCells& cells) {
   const bool is_same_size = nodes_per_side_ == cells.spans + 1;
   nodes_per_side_ = cells.spans + 1;
   cells_per_side_ = cells.side;
-  node_limit_ = static_cast<float>(cells.spans) - 1e-3F;
-  corner_x_ = cells.corner_x_m;
-  corner_y_ = cells.corner_y_m;
+  grid_ = {cells.corner_x_m, cells.corner_y_m, static_cast<float>(cells.spans) - 1e-3F,
+           static_cast<int>(nodes_per_side_), static_cast<int>(cells_per_side_)};
   band_ = 2 * nodes_per_side_ + 1;
   nodes_.assign(nodes_per_side_ * nodes_per_side_, 0.0F);
   if (!is_same_size) add_smoothness();
@@ -88,25 +87,30 @@ void GroundSurface::make_patches() {
 }
 
 void GroundSurface::measure(std::span<RingPoint> points) {
+  // Copies, which no write to a point can change.
+  const Grid grid = grid_;
+  const Patch* patches = patches_.data();
+  Residual* residuals = residuals_.data();
   // Neighbours in a ring share their cell: their sum is kept at hand.
-  std::size_t cell_at_hand = 0;
+  int cell_at_hand = 0;
   Residual at_hand;
   const auto put_away = [&] {
-    residuals_[cell_at_hand].count += at_hand.count;
-    residuals_[cell_at_hand].sum += at_hand.sum;
+    residuals[cell_at_hand].count += at_hand.count;
+    residuals[cell_at_hand].sum += at_hand.sum;
   };
   for (RingPoint& point : points) {
-    const Place place = locate(point.x_m, point.y_m);
-    point.height_m = point.z_m - height(place);
-    if (std::abs(point.height_m) >= kOnGround_m) continue;
-    const std::size_t here = cell(place);
+    const Place place = grid.locate(point.x_m, point.y_m);
+    const float above = point.z_m - height(patches, grid, place);
+    point.height_m = above;
+    if (std::abs(above) >= kOnGround_m) continue;
+    const int here = grid.cell(place);
     if (here != cell_at_hand) {
       put_away();
       at_hand = {};
       cell_at_hand = here;
     }
     at_hand.count += 1.0F;
-    at_hand.sum += point.height_m;
+    at_hand.sum += above;
   }
   put_away();
 }
@@ -172,15 +176,26 @@ void GroundSurface::solve() {
   const std::size_t n = nodes_.size();
   factorise(matrix_.data(), n, band_);
   nodes_ = right_;
+  float* __restrict__ nodes = nodes_.data();
+  const float* __restrict__ matrix = matrix_.data();
   for (std::size_t j = 0; j < n; ++j) {
-    const float* column = &matrix_[j * band_];
-    nodes_[j] /= column[0];
-    for (std::size_t k = 1; k < std::min(band_, n - j); ++k) nodes_[j + k] -= column[k] * nodes_[j];
+    const float* column = matrix + j * band_;
+    const std::size_t reach = std::min(band_, n - j);
+    const float node = nodes[j] / column[0];
+    nodes[j] = node;
+    for (std::size_t k = 1; k < reach; ++k) nodes[j + k] -= column[k] * node;
   }
   for (std::size_t j = n; j-- > 0;) {
-    const float* column = &matrix_[j * band_];
-    for (std::size_t k = 1; k < std::min(band_, n - j); ++k) nodes_[j] -= column[k] * nodes_[j + k];
-    nodes_[j] /= column[0];
+    const float* column = matrix + j * band_;
+    const std::size_t reach = std::min(band_, n - j);
+    // Several sums side by side: one would wait for itself.
+    std::array<float, 4> sums{};
+    std::size_t k = 1;
+    for (; k + sums.size() <= reach; k += sums.size()) {
+      for (std::size_t s = 0; s < sums.size(); ++s) sums[s] += column[k + s] * nodes[j + k + s];
+    }
+    for (; k < reach; ++k) sums[0] += column[k] * nodes[j + k];
+    nodes[j] = (nodes[j] - ((sums[0] + sums[1]) + (sums[2] + sums[3]))) / column[0];
   }
 }
 
@@ -188,7 +203,7 @@ GroundHeight GroundSurface::below(const Eigen::Vector2d& place_m) const {
   const auto x = static_cast<float>(place_m.x());
   const auto y = static_cast<float>(place_m.y());
   GroundHeight ground{height(x, y), 0.0};
-  const std::size_t middle = cell(locate(x, y));
+  const auto middle = static_cast<std::size_t>(grid_.cell(grid_.locate(x, y)));
   const auto row = static_cast<std::ptrdiff_t>(middle / cells_per_side_);
   const auto column = static_cast<std::ptrdiff_t>(middle % cells_per_side_);
   const auto side = static_cast<std::ptrdiff_t>(cells_per_side_);

@@ -28,8 +28,7 @@ class GroundSurface {
 
   /// Of the surface [m].
   float height(float x, float y) const {
-    const Place place = locate(x, y);
-    return height(place);
+    return height(patches_.data(), grid_, grid_.locate(x, y));
   }
   /// The surface, moved to the ground returns near by; sigma grows where there are none.
   GroundHeight below(const Eigen::Vector2d& place_m) const;
@@ -56,38 +55,44 @@ class GroundSurface {
   struct Place {
     float u = 0.0F;
     float v = 0.0F;
+  };
+  /// Where nodes and cells are.
+  struct Grid {
+    float corner_x = 0.0F;
+    float corner_y = 0.0F;
+    float node_limit = 0.0F;
+    int nodes_per_side = 0;
+    int cells_per_side = 0;
 
-    int node_i() const { return static_cast<int>(u); }
-    int node_j() const { return static_cast<int>(v); }
+    Place locate(float x, float y) const {
+      return {within((x - corner_x) * (1.0F / kNodeSpacing_m)),
+              within((y - corner_y) * (1.0F / kNodeSpacing_m))};
+    }
+    float within(float value) const {
+      const float positive = value > 0.0F ? value : 0.0F;
+      return positive < node_limit ? positive : node_limit;
+    }
+    int cell(const Place& place) const {
+      constexpr float kCells = kNodeSpacing_m / kCell_m;
+      return static_cast<int>(place.v * kCells) * cells_per_side +
+             static_cast<int>(place.u * kCells);
+    }
   };
 
-  Place locate(float x, float y) const {
-    return {std::min(std::max((x - corner_x_) * (1.0F / kNodeSpacing_m), 0.0F), node_limit_),
-            std::min(std::max((y - corner_y_) * (1.0F / kNodeSpacing_m), 0.0F), node_limit_)};
-  }
-  float height(const Place& place) const {
-    const int i = place.node_i();
-    const int j = place.node_j();
+  static float height(const Patch* patches, const Grid& grid, const Place& place) {
+    const int i = static_cast<int>(place.u);
+    const int j = static_cast<int>(place.v);
     const float a = place.u - static_cast<float>(i);
     const float b = place.v - static_cast<float>(j);
-    const Patch& patch =
-        patches_[static_cast<std::size_t>(j * static_cast<int>(nodes_per_side_) + i)];
+    const Patch& patch = patches[j * grid.nodes_per_side + i];
     return patch.constant + a * patch.along_x + b * (patch.along_y + a * patch.twist);
-  }
-  std::size_t cell(const Place& place) const {
-    constexpr float kCells = kNodeSpacing_m / kCell_m;
-    return static_cast<std::size_t>(static_cast<int>(place.v * kCells) *
-                                        static_cast<int>(cells_per_side_) +
-                                    static_cast<int>(place.u * kCells));
   }
   void make_patches();
   void add_smoothness();
   void add_cells(const LowestCells& cells, float scale_m, bool weigh);
   void solve();
 
-  float corner_x_ = 0.0F;
-  float corner_y_ = 0.0F;
-  float node_limit_ = 0.0F;
+  Grid grid_;
   std::size_t nodes_per_side_ = 0;
   std::size_t cells_per_side_ = 0;
   std::size_t band_ = 0;

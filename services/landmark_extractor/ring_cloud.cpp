@@ -50,19 +50,25 @@ struct Placing {
 
 [[gnu::always_inline]] inline void place_all(std::span<const SweepPoint> points,
                                              const Placing& placing, Block& block) {
-  const Eigen::Matrix3f& rotation = placing.rotation;
+  // Coordinate by coordinate first; range holds the time for a moment.
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const SweepPoint& p = points[i];
-    block.x[i] = rotation(0, 0) * p.x_m + rotation(0, 1) * p.y_m + rotation(0, 2) * p.z_m;
-    block.y[i] = rotation(1, 0) * p.x_m + rotation(1, 1) * p.y_m + rotation(1, 2) * p.z_m;
-    block.z[i] = rotation(2, 0) * p.x_m + rotation(2, 1) * p.y_m + rotation(2, 2) * p.z_m;
-    // For a moment: where the sensor was.
-    block.range[i] = placing.sensor.x() + placing.velocity.x() * p.time_s;
-    block.azimuth[i] = placing.sensor.y() + placing.velocity.y() * p.time_s;
+    block.x[i] = points[i].x_m;
+    block.y[i] = points[i].y_m;
+    block.z[i] = points[i].z_m;
+    block.range[i] = points[i].time_s;
   }
+  // A copy, which no write to the block can change.
+  const Placing by = placing;
+  const Eigen::Matrix3f& turn = by.rotation;
   for (std::size_t i = 0; i < kBlock; ++i) {
-    const float dx = block.x[i] - block.range[i];
-    const float dy = block.y[i] - block.azimuth[i];
+    const float x = turn(0, 0) * block.x[i] + turn(0, 1) * block.y[i] + turn(0, 2) * block.z[i];
+    const float y = turn(1, 0) * block.x[i] + turn(1, 1) * block.y[i] + turn(1, 2) * block.z[i];
+    const float z = turn(2, 0) * block.x[i] + turn(2, 1) * block.y[i] + turn(2, 2) * block.z[i];
+    const float dx = x - (by.sensor.x() + by.velocity.x() * block.range[i]);
+    const float dy = y - (by.sensor.y() + by.velocity.y() * block.range[i]);
+    block.x[i] = x;
+    block.y[i] = y;
+    block.z[i] = z;
     block.range2[i] = dx * dx + dy * dy;
     block.range[i] = std::sqrt(block.range2[i]);
     block.azimuth[i] = fast_atan2(dy, dx);
@@ -70,11 +76,11 @@ struct Placing {
   static_assert(LowestCells::kCell_m == 1.0F);
   for (std::size_t i = 0; i < kBlock; ++i) {
     // A number that is none becomes cell 0.
-    const float u = std::min(std::max(0.0F, block.x[i] - placing.corner_x_m), placing.last_cell);
-    const float v = std::min(std::max(0.0F, block.y[i] - placing.corner_y_m), placing.last_cell);
+    const float u = std::min(std::max(0.0F, block.x[i] - by.corner_x_m), by.last_cell);
+    const float v = std::min(std::max(0.0F, block.y[i] - by.corner_y_m), by.last_cell);
     const auto row = static_cast<float>(static_cast<int>(v));
     block.cell[i] = static_cast<std::uint32_t>(
-        static_cast<int>(row * placing.cells_per_side + static_cast<float>(static_cast<int>(u))));
+        static_cast<int>(row * by.cells_per_side + static_cast<float>(static_cast<int>(u))));
   }
 }
 
@@ -116,10 +122,11 @@ void RingCloud::fill(const PointSweep& sweep, double min_range_m, double max_ran
   counters.not_finite += of_this.not_finite;
   counters.bad_ring += of_this.bad_ring;
   steps_.assign(sweep.rings, 0.0F);
-  for (std::size_t ring = 0; ring < sweep.rings; ++ring) {
-    cut_ring(ring);
-    measure_step(ring);
-  }
+}
+
+void RingCloud::order(std::size_t ring) {
+  cut_ring(ring);
+  measure_step(ring);
 }
 
 void RingCloud::reserve_slots(std::size_t rings, std::size_t points_per_ring) {
@@ -243,11 +250,28 @@ std::size_t RingCloud::first_at(std::size_t ring, float azimuth_rad) const {
   while (beyond < 0.0F) beyond += kTurn;
   while (beyond >= kTurn) beyond -= kTurn;
   const float azimuth = start + beyond;
-  const auto it = std::lower_bound(
-      points_.begin() + static_cast<std::ptrdiff_t>(begin),
-      points_.begin() + static_cast<std::ptrdiff_t>(end), azimuth,
-      [](const RingPoint& point, float value) { return point.azimuth_rad < value; });
-  return static_cast<std::size_t>(it - points_.begin());
+  // Beams without a return make it come sooner than even steps would.
+  const auto guess = steps_[ring] > 0.0F ? static_cast<std::size_t>(beyond / steps_[ring]) : 0;
+  std::size_t high = std::min(end, begin + guess + 1);
+  std::size_t low = high;
+  const auto is_before = [&](std::size_t i) { return points_[i].azimuth_rad < azimuth; };
+  if (high < end && is_before(high)) {
+    high = end;
+  } else {
+    for (std::size_t width = 1; low > begin && !is_before(low - 1); width *= 2) {
+      high = low - 1;
+      low -= std::min(low - begin, width);
+    }
+  }
+  while (low < high) {
+    const std::size_t middle = low + (high - low) / 2;
+    if (is_before(middle)) {
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  return low;
 }
 
 float RingCloud::slope(std::size_t ring, float azimuth_rad) const {

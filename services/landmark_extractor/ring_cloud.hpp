@@ -45,6 +45,10 @@ class RingCloud {
   void fill(const PointSweep& sweep, double min_range_m, double max_range_m,
             PointCounters& counters);
 
+  /// Puts one ring in order: once for each ring after fill(), before its points are asked for. On
+  /// its own so that what follows finds the ring still at hand.
+  void order(std::size_t ring);
+
   std::size_t rings() const { return steps_.size(); }
   /// Of all rings, by index; between the rings are gaps, which mean nothing.
   std::span<const RingPoint> points() const { return points_; }

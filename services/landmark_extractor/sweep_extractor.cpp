@@ -63,6 +63,7 @@ LandmarkScan SweepExtractor::extract(const PointSweep& sweep) {
   ground_.fit(cloud_.lowest());
   runs_.clear();
   for (std::size_t ring = 0; ring < cloud_.rings(); ++ring) {
+    cloud_.order(ring);
     ground_.measure(cloud_.ring(ring));
     find_runs(cloud_, sweep_, ring, runs_);
   }

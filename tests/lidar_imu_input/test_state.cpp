@@ -65,6 +65,7 @@ std::vector<Event> events_of(const DriveWith& with) {
   std::mt19937_64 random(4);
   std::uniform_real_distribution<double> place(-30.0, 30.0);
   std::vector<Eigen::Vector3d> world;
+  world.reserve(80);
   for (int i = 0; i < 80; ++i) world.emplace_back(place(random), place(random), 1.0);
   std::vector<Event> events;
   for (Utime t = 0; t < 40'000'000; t += 5'000) {
