@@ -77,13 +77,13 @@ class LidarImuInputAdapter : public Adapter {
   }
 
   void add_part(const PointSweep& part) {
-    const auto sweep = assembler_.add(part);
+    auto sweep = assembler_.add(part);
     if (assembler_.incomplete_turns() > incomplete_) {
       incomplete_ = assembler_.incomplete_turns();
       node_->report(Reason::kPartsMissing, "a turn of which parts are missing is left out",
                     channels_.raw_sweep);
     }
-    if (sweep) publish(stage_->add(*sweep));
+    if (sweep) publish(stage_->add(*std::move(sweep)));
   }
 
   void publish(const InputResults& results) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "services/lidar_imu_input/attitude_filter.hpp"
@@ -75,13 +76,9 @@ void times_from_azimuth(PointSweep& sweep, double turn_s, bool clockwise) {
   sweep.has_times = true;
 }
 
-DeskewedSweep deskew(const PointSweep& raw, Utime utime, const MotionHistory& history,
+DeskewedSweep deskew(PointSweep raw, Utime utime, const MotionHistory& history,
                      const SensorMount& mount) {
   DeskewedSweep result;
-  PointSweep& sweep = result.sweep;
-  sweep = raw;
-  sweep.utime = utime;
-  sweep.is_deskewed = true;
   const auto known = history.at(utime);
   const MotionState target = known.value_or(MotionState{});
   result.had_motion = known && raw.has_times && history.at(raw.utime);
@@ -92,6 +89,11 @@ DeskewedSweep deskew(const PointSweep& raw, Utime utime, const MotionHistory& hi
   const std::vector<Motion> table =
       motions(raw, target, result.had_motion ? history : still, mount, steps);
   const auto shift_s = static_cast<float>(static_cast<double>(utime - raw.utime) * 1e-6);
+  // In place: a turn of many beams is megabytes.
+  PointSweep& sweep = result.sweep;
+  sweep = std::move(raw);
+  sweep.utime = utime;
+  sweep.is_deskewed = true;
   for (SweepPoint& point : sweep.points) {
     const float at = std::clamp(point.time_s / kStep_s, 0.0F, static_cast<float>(steps) - 1.001F);
     const auto step = static_cast<std::size_t>(at);
@@ -103,7 +105,7 @@ DeskewedSweep deskew(const PointSweep& raw, Utime utime, const MotionHistory& hi
     point.x_m = moved.x();
     point.y_m = moved.y();
     point.z_m = moved.z();
-    if (raw.has_times) point.time_s = std::min(0.0F, point.time_s - shift_s);
+    if (sweep.has_times) point.time_s = std::min(0.0F, point.time_s - shift_s);
   }
   sweep.sensor_position_m = mount.position_m();
   if (known) {

@@ -24,7 +24,7 @@ struct DeskewedSweep {
   PointSweep sweep;
   bool had_motion = false;
 };
-DeskewedSweep deskew(const PointSweep& raw, Utime utime, const MotionHistory& history,
+DeskewedSweep deskew(PointSweep raw, Utime utime, const MotionHistory& history,
                      const SensorMount& mount);
 
 }  // namespace understory

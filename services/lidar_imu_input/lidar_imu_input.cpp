@@ -117,15 +117,14 @@ bool LidarImuInput::is_repeated(const PointSweep& sweep) {
   return repeated;
 }
 
-InputResults LidarImuInput::add(const PointSweep& raw) {
+InputResults LidarImuInput::add(PointSweep sweep) {
   InputResults out;
-  PointSweep sweep = raw;
+  const std::size_t came = sweep.points.size();
   const std::size_t bad = remove_bad_points(sweep, parameters_.lidar.min_range_m);
   counters_.points_dropped += bad;
   if (bad > 0)
-    out.emplace_back(
-        InputFault{InputFaultKind::kNotFinite, channel_of(Sensor::kSweep),
-                   fmt::format("{} of {} points are no points", bad, raw.points.size())});
+    out.emplace_back(InputFault{InputFaultKind::kNotFinite, channel_of(Sensor::kSweep),
+                                fmt::format("{} of {} points are no points", bad, came)});
   if (is_repeated(sweep))
     out.emplace_back(InputFault{InputFaultKind::kFrozen, channel_of(Sensor::kSweep),
                                 "the same points as in the turn before"});

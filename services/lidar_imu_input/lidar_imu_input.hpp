@@ -52,7 +52,7 @@ class LidarImuInput {
   InputResults add(const ImuSample& sample);    ///< RAW_IMU, frame sensor.
   InputResults add(const WheelSample& sample);  ///< RAW_WHEELS.
   InputResults add(const GnssFix& fix);         ///< RAW_GNSS.
-  InputResults add(const PointSweep& sweep);    ///< RAW_SWEEP, a whole turn, frame sensor.
+  InputResults add(PointSweep sweep);           ///< RAW_SWEEP, a whole turn, frame sensor.
   InputResults add(const PlanarScan& scan);     ///< RAW_SCAN.
   InputResults add(const VelocityCorrection& correction);
   /// The drive is over: what still waits goes out.
@@ -83,7 +83,7 @@ class LidarImuInput {
   bool is_reached(Utime utime) const;
   void end_piece(Utime utime, InputResults& out);
   void release(Waiting waiting, InputResults& out);
-  void release_sweep(const PointSweep& raw, Utime stamp, InputResults& out);
+  void release_sweep(PointSweep raw, Utime stamp, InputResults& out);
   void report(std::vector<InputFault>& faults, InputResults& out);
   void publish_raw_pose(bool at_once, InputResults& out);
   void check_calibration(InputResults& out);

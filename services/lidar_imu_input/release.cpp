@@ -1,6 +1,7 @@
 // The part of LidarImuInput that decides when pieces of odometry end and sweeps go out.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "services/lidar_imu_input/deskew.hpp"
 #include "services/lidar_imu_input/lidar_imu_input.hpp"
@@ -108,21 +109,22 @@ void LidarImuInput::release(Waiting waiting, InputResults& out) {
     out.emplace_back(std::move(*scan));
     return;
   }
-  release_sweep(std::get<PointSweep>(waiting.item), waiting.end, out);
+  release_sweep(std::get<PointSweep>(std::move(waiting.item)), waiting.end, out);
 }
 
-void LidarImuInput::release_sweep(const PointSweep& raw, Utime stamp, InputResults& out) {
+void LidarImuInput::release_sweep(PointSweep raw, Utime stamp, InputResults& out) {
   if (sweep_stamp_ && stamp <= *sweep_stamp_) {
     ++counters_.sweeps_dropped;
     return;
   }
   sweep_stamp_ = stamp;
-  DeskewedSweep result = deskew(raw, stamp, motion_.history(), parameters_.lidar.mount);
+  const bool has_times = raw.has_times;
+  DeskewedSweep result = deskew(std::move(raw), stamp, motion_.history(), parameters_.lidar.mount);
   if (!motion_.has_attitude()) result.sweep.attitude.reset();
   ++counters_.sweeps;
   if (!result.had_motion) {
     ++counters_.sweeps_not_deskewed;
-    if (raw.has_times)
+    if (has_times)
       out.emplace_back(InputFault{InputFaultKind::kNoMotion, channel_of(Sensor::kSweep),
                                   "no motion is known for the turn: not de-skewed"});
   }
