@@ -53,6 +53,9 @@ SensorChain::SensorChain(const std::vector<Service>& services,
                          const std::filesystem::path& config_dir,
                          const std::map<std::string, std::string>& toml_instead)
     : bus_(MemoryBus::Queues::kUnlimited) {
+  // Defaults instead of a configuration that is not found would be wrong in silence.
+  if (!config_dir.empty() && !std::filesystem::is_directory(config_dir))
+    throw ConfigurationError({"no such configuration folder: " + config_dir.string()});
   for (const Service& service : services) {
     const std::filesystem::path file = config_dir / (service.name + ".toml");
     const auto instead = toml_instead.find(service.name);

@@ -32,7 +32,8 @@ struct ServiceTime {
 class SensorChain {
  public:
   /// NAME.toml of each service is read from `config_dir` where it exists, unless
-  /// `toml_instead` has its text. Throws ConfigurationError.
+  /// `toml_instead` has its text. Throws ConfigurationError, also where that folder is not there;
+  /// an empty one stands for the defaults.
   SensorChain(const std::vector<Service>& services, const std::filesystem::path& config_dir,
               const std::map<std::string, std::string>& toml_instead = {});
   ~SensorChain();

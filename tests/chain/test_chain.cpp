@@ -47,6 +47,13 @@ TEST_CASE("raw sensors become a pose, the same every time") {
   }
 }
 
+TEST_CASE("a configuration that is not there is an error, not the defaults") {
+  sim::SensorDrive drive = small_drive(5);
+  ChainOptions options;
+  options.config_dir = UNDERSTORY_SOURCE_CONFIG "/no-such-vehicle";
+  REQUIRE_THROWS_AS(drive_chain(drive, options), ConfigurationError);
+}
+
 TEST_CASE("faults of the sensors are named, and the pose comes back") {
   FrontendOptions options;
   options.config_dir = UNDERSTORY_SOURCE_CONFIG "/lidar";
