@@ -42,6 +42,8 @@ void describe_source(SourceMapperParameters& p, ParameterTable& table) {
 }
 
 void describe_evidence(SmoothingMapperParameters& p, ParameterTable& table) {
+  table.add("ours.relinearise_above", p.relinearise_above, {1e-6, 1.0}, "sigma",
+            "A measurement is linearised again beyond this: 1e-4 on long open roads.");
   table.add("ours.gate_sigmas", p.gate_sigmas, {0.1, 100.0}, "sigma", "Association gate.");
   table.add("ours.gate_floor_m", p.gate_floor_m, {0.0, 10.0}, "m", "Added to the gate.");
   table.add("ours.predicted_sigma_m", p.predicted_sigma_m, {1e-4, 100.0}, "m",

@@ -10,6 +10,13 @@ namespace {
 /// Keeps an exactly known pose invertible: a micrometre, a microradian.
 const Eigen::Matrix3d kTiny = 1e-12 * Eigen::Matrix3d::Identity();
 
+SmootherParameters limits(const SmoothingMapperParameters& parameters) {
+  SmootherParameters result;
+  result.relinearise_above = parameters.relinearise_above;
+  result.least_move = std::clamp(0.1 * parameters.relinearise_above, 1e-4, 1e-3);
+  return result;
+}
+
 bool finite(const Keyframe& keyframe) {
   const auto good = [](const KeyframeLandmark& l) {
     return l.position_m.allFinite() && l.covariance_m2.allFinite() &&
@@ -25,7 +32,7 @@ bool finite(const Keyframe& keyframe) {
 }  // namespace
 
 SmoothingMapper::SmoothingMapper(const SmoothingMapperParameters& parameters)
-    : parameters_(parameters) {}
+    : parameters_(parameters), smoother_(limits(parameters)) {}
 
 std::unique_ptr<MapperMethod> make_smoothing_mapper(const SmoothingMapperParameters& parameters) {
   return std::make_unique<SmoothingMapper>(parameters);
