@@ -5,12 +5,10 @@
 #include <optional>
 #include <vector>
 
+#include "services/landmark_extractor/stem_terms.hpp"
 #include "services/landmark_extractor/trunk_columns.hpp"
 
 namespace understory {
-
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 /// A stem whose axis passes through (x, y) at height `reference_z_m` in frame `vehicle_level`.
 struct StemFit {
@@ -39,7 +37,11 @@ struct StemFit {
 class StemFitter {
  public:
   StemFitter(const SweepParameters& sweep, const SweepTrunkParameters& trunk)
-      : sweep_(sweep), trunk_(trunk) {}
+      : sweep_(sweep),
+        trunk_(trunk),
+        noise_{static_cast<float>(sweep.range_sigma_m * sweep.range_sigma_m +
+                                  trunk.roundness_sigma_m * trunk.roundness_sigma_m),
+               static_cast<float>(sweep.beam_width_rad)} {}
 
   std::optional<StemFit> fit(const RingCloud& cloud, const std::vector<Run>& runs,
                              const Column& column);
@@ -47,45 +49,52 @@ class StemFitter {
   const std::vector<std::uint32_t>& agreeing() const { return agreeing_; }
 
  private:
-  /// A beam that hit the stem.
-  struct Hit {
-    Sight sight;
-    double range_m;
-    double z_m;
-    std::uint32_t run;
-  };
-  /// A line of sight that just passes by: side +1 = left.
-  struct Edge {
-    Sight sight;
-    double z_m;
-    double side;
-    double sigma_m;
-    std::uint32_t run;
-  };
-
-  void start_with_consensus(const std::vector<Run>& runs, const Column& column);
-  void choose_runs();
-  void take_evidence(const RingCloud& cloud, const std::vector<Run>& runs);
+  /// The anchor of all that follows is the column's centre.
+  void take_evidence(const RingCloud& cloud, const std::vector<Run>& runs, const Column& column);
+  void add_hits(const RingCloud& cloud, const Run& run, HitLanes& hits) const;
+  void add_edge(const RingCloud& cloud, const Run& run, float side, EdgeLanes& edges,
+                std::size_t lane) const;
+  void start_with_consensus();
+  void use_agreeing();
   void share_edges();
-  Vector6d start(const RingCloud& cloud, const std::vector<Run>& runs) const;
-  bool settle(Vector6d& state);
-  void linearise(const Vector6d& state, Matrix6d& information, Vector6d& gradient);
+  Vector6d start() const;
+  bool settle(Vector6d& state, double settled_m2);
+  void linearise(const Vector6d& state, Matrix6d& information, Vector6d& gradient,
+                 double& squares) const;
   /// Whether the runs that agree are others than before.
-  bool sort_out(const RingCloud& cloud, const std::vector<Run>& runs, const Column& column,
-                const Vector6d& state);
-  bool agrees(const RingCloud& cloud, const Run& run, const Vector6d& state) const;
-  Edge edge_of(const RingCloud& cloud, const Run& run, std::uint32_t index, double side) const;
-  void describe(const Vector6d& state, const std::vector<Run>& runs, StemFit& fit);
+  bool sort_out(const Vector6d& state);
+  bool has_enough() const;
+  void describe(const Vector6d& state, StemFit& fit);
+
+  /// What is asked of a run again and again.
+  struct RunSummary {
+    std::uint32_t index = 0;
+    float x_m = 0.0F;  ///< Of the centre.
+    float y_m = 0.0F;
+    float z_m = 0.0F;
+    float width_m = 0.0F;
+    float nearest_m = 0.0F;
+    float points = 0.0F;
+    std::uint16_t ring = 0;
+    std::uint16_t middle = 0;  ///< Lane of the hit in the middle.
+  };
 
   SweepParameters sweep_;
   SweepTrunkParameters trunk_;
+  BeamNoise noise_;
   double reference_z_m_ = 0.0;
-  std::vector<std::uint32_t> agreeing_;
-  std::vector<std::uint32_t> used_;  ///< Of those, the ones that give evidence.
-  std::vector<Hit> hits_;
-  std::vector<Edge> edges_;
-  std::vector<double> shares_;
-  std::vector<std::uint32_t> still_agreeing_;
+  Eigen::Vector2d anchor_m_ = Eigen::Vector2d::Zero();
+  std::vector<RunSummary> summaries_;       ///< Of the column's runs.
+  std::vector<HitLanes> hits_;              ///< A group for each run.
+  std::vector<EdgeLanes> edges_;            ///< Of the k-th run: lanes 2 k (left), 2 k + 1 (right).
+  std::vector<std::uint32_t> agreeing_at_;  ///< Places in these.
+  std::vector<std::uint32_t> still_agreeing_at_;
+  std::vector<std::uint32_t> agreeing_;     ///< Runs.
+  std::vector<const HitLanes*> used_hits_;  ///< Of the agreeing runs that give evidence.
+  std::vector<EdgeLanes> used_edges_;
+  std::size_t used_edge_count_ = 0;
+  std::vector<float> hit_means_;
+  std::vector<Lanes> edge_squares_;
 };
 
 }  // namespace understory

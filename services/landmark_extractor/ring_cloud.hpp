@@ -7,23 +7,11 @@
 #include <vector>
 
 #include "common/model/point_sweep.hpp"
-#include "services/landmark_extractor/lowest_cells.hpp"
+#include "services/landmark_extractor/ground_surface.hpp"
+#include "services/landmark_extractor/point_blocks.hpp"
 #include "services/landmark_extractor/spin_fit.hpp"
 
 namespace understory {
-
-/// A return in `vehicle_level`, with the beam that brought it.
-struct RingPoint {
-  float x_m = 0.0F;
-  float y_m = 0.0F;
-  float z_m = 0.0F;
-  float azimuth_rad = 0.0F;  ///< Of the beam, left positive; goes on beyond pi within a ring.
-  float range_m = 0.0F;      ///< Horizontal distance from where the sensor was at that time.
-  float height_m = 0.0F;     ///< Above ground.
-  float time_s = 0.0F;       ///< From the sweep's utime.
-
-  Eigen::Vector2d position() const { return {x_m, y_m}; }
-};
 
 /// A line of sight, seen from above.
 struct Sight {
@@ -40,39 +28,32 @@ struct PointCounters {
 /// Keeps its memory from sweep to sweep.
 class RingCloud {
  public:
+  /// Learns the sensor's attitude and motion. Precondition: 1 <= sweep.rings, attitude finite.
+  const Levelling& look_at(const PointSweep& sweep, double min_range_m, double max_range_m);
   /// Takes the points whose horizontal distance to the sensor is within the limits.
-  /// Precondition: 1 <= sweep.rings, attitude finite.
-  void fill(const PointSweep& sweep, double min_range_m, double max_range_m,
-            PointCounters& counters);
+  /// Precondition: look_at() the same sweep.
+  void fill(const PointSweep& sweep, const GroundSurface& ground, PointCounters& counters);
 
   /// Puts one ring in order: once for each ring after fill(), before its points are asked for. On
-  /// its own so that what follows finds the ring still at hand.
-  void order(std::size_t ring);
+  /// its own so that what follows finds the ring still at hand. What is lower than `lowest_m`
+  /// above ground is no object.
+  void order(std::size_t ring, float lowest_m);
 
   std::size_t rings() const { return steps_.size(); }
   /// Of all rings, by index; between the rings are gaps, which mean nothing.
   std::span<const RingPoint> points() const { return points_; }
   std::size_t ring_begin(std::size_t ring) const { return begins_[ring]; }
   std::size_t ring_end(std::size_t ring) const { return ends_[ring]; }
-  /// Points of one ring; azimuth grows.
-  std::span<const RingPoint> ring(std::size_t ring) const {
-    return {points_.data() + begins_[ring], ends_[ring] - begins_[ring]};
-  }
-  std::span<RingPoint> ring(std::size_t ring) {
-    return {points_.data() + begins_[ring], ends_[ring] - begins_[ring]};
-  }
-  /// Of all its points.
-  const LowestCells& lowest() const { return lowest_; }
   /// Azimuth from beam to beam [rad]; 0 for a ring with too few points to tell.
   float step_rad(std::size_t ring) const { return steps_[ring]; }
   /// Of the sensor at utime, frame `vehicle_level`.
-  const Eigen::Vector3f& sensor_m() const { return sensor_; }
+  const Eigen::Vector3f& sensor_m() const { return levelling_.sensor_m; }
   /// Of the sensor during the turn, as its points tell; frame `vehicle`, in the plan.
   const Eigen::Vector2f& velocity_mps() const { return spin_.velocity_mps; }
   /// Where the sensor was when it measured the point, and whereto it looked.
   Sight sight(const RingPoint& point) const {
     const Eigen::Vector2d origin =
-        (sensor_.head<2>() + point.time_s * level_velocity_.head<2>()).cast<double>();
+        (sensor_m().head<2>() + point.time_s * levelling_.velocity_mps.head<2>()).cast<double>();
     return {origin, (point.position() - origin) / static_cast<double>(point.range_m)};
   }
   /// The same as slope() without a look at the points: good to a few centimetres in height.
@@ -88,31 +69,28 @@ class RingCloud {
   /// One ring while its points come in.
   struct Filling {
     RingPoint* next = nullptr;  ///< Where the next point goes.
-    std::size_t count = 0;
-    float azimuth_rad = 0.0F;  ///< Of the last point; NaN = none yet.
-    float turned_rad = 0.0F;   ///< Whole turns since the ring's first point.
+    RingPoint* full = nullptr;  ///< Where there is no more place.
+    float azimuth_rad = 0.0F;   ///< Of the last point; NaN = none yet.
+    float turned_rad = 0.0F;    ///< Whole turns since the ring's first point.
   };
 
   void reserve_slots(std::size_t rings, std::size_t points_per_ring);
   /// False when a ring has more points than its slot takes.
-  bool scatter(const PointSweep& sweep, double min_range_m, double max_range_m,
-               PointCounters& counters);
-  void cut_ring(std::size_t ring);
+  bool scatter(const PointSweep& sweep, const GroundSurface& ground, PointCounters& counters);
+  void cut_ring(std::size_t ring, float lowest_m);
   void measure_step(std::size_t ring);
 
   SpinFitter spin_fitter_;
+  Levelling levelling_;
+  PointBlock block_;
   std::vector<RingPoint> points_;  ///< A slot per ring, twice as long as the ring at least.
   std::size_t slot_ = 0;           ///< Points from slot to slot.
   std::vector<Filling> filling_;
-  LowestCells lowest_;
   std::vector<std::size_t> begins_;
   std::vector<std::size_t> ends_;
   std::vector<float> steps_;
   std::vector<float> differences_;
   Spin spin_;
-  Eigen::Matrix3f level_R_vehicle_ = Eigen::Matrix3f::Identity();
-  Eigen::Vector3f sensor_ = Eigen::Vector3f::Zero();
-  Eigen::Vector3f level_velocity_ = Eigen::Vector3f::Zero();
 };
 
 }  // namespace understory

@@ -59,12 +59,13 @@ LandmarkScan SweepExtractor::extract(const PointSweep& sweep) {
   if (sweep.attitude) level_covariance = sweep.attitude->covariance_rad2;
   if (!sweep.attitude) ++counters_.without_attitude;
   const double reach = sweep_.max_range_m + kMargin_m;
-  cloud_.fill(sweep, sweep_.min_range_m, reach, counters_.points);
-  ground_.fit(cloud_.lowest());
+  const auto lowest = static_cast<float>(sweep_.min_height_m);
+  sample_.take(sweep, cloud_.look_at(sweep, sweep_.min_range_m, reach));
+  ground_.fit(sample_);
+  cloud_.fill(sweep, ground_, counters_.points);
   runs_.clear();
   for (std::size_t ring = 0; ring < cloud_.rings(); ++ring) {
-    cloud_.order(ring);
-    ground_.measure(cloud_.ring(ring));
+    cloud_.order(ring, lowest);
     find_runs(cloud_, sweep_, ring, runs_);
   }
   trunks_.find(cloud_, runs_, ground_, level_covariance, result.detections);

@@ -39,6 +39,7 @@ class SweepExtractor {
 
  private:
   SweepParameters sweep_;
+  GroundSample sample_;
   RingCloud cloud_;
   GroundSurface ground_;
   std::vector<Run> runs_;

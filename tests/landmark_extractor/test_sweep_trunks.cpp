@@ -160,8 +160,7 @@ TEST_CASE("the way of the sensor during a turn is taken out of its lines of sigh
     CHECK((detection.position_m.head<2>() - stem->breast).norm() < 0.08);
   }
   RingCloud cloud;
-  PointCounters counters;
-  cloud.fill(moving, 1.0, 30.0, counters);
+  cloud.look_at(moving, 1.0, 30.0);
   CHECK(cloud.velocity_mps().x() == Approx(10.0).margin(0.5));
   CHECK(cloud.velocity_mps().y() == Approx(1.0).margin(0.5));
 }

@@ -1,0 +1,35 @@
+// Returns that tell where the ground is: enough of a turn's points, levelled.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "services/landmark_extractor/point_blocks.hpp"
+
+namespace understory {
+
+/// Every so manieth column of a turn that has many. Keeps its memory from sweep to sweep.
+class GroundSample {
+ public:
+  /// The grid covers levelling.max_range_m around the sensor.
+  void take(const PointSweep& sweep, const Levelling& levelling);
+
+  const GroundGrid& grid() const { return grid_; }
+  /// Frame `vehicle_level`; their number is a whole number of registers. Those in the cell
+  /// nowhere() do not count.
+  std::span<const float> x() const { return x_; }
+  std::span<const float> y() const { return y_; }
+  std::span<const float> z() const { return z_; }
+  std::span<const std::int32_t> cell() const { return cell_; }
+
+ private:
+  GroundGrid grid_;
+  PointBlock block_;
+  std::vector<float> x_;
+  std::vector<float> y_;
+  std::vector<float> z_;
+  std::vector<std::int32_t> cell_;
+};
+
+}  // namespace understory
