@@ -19,6 +19,18 @@ double percentile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(at)];
 }
 
+/// 95 % of the means over so many runs lie in it.
+struct Band {
+  double low = 0.0;
+  double high = 0.0;
+};
+Band band_of_mean(std::size_t runs) {
+  const auto degrees = static_cast<int>(3 * runs);
+  const auto count = static_cast<double>(runs);
+  return {ekf::chi_squared_quantile(0.025, degrees) / count,
+          ekf::chi_squared_quantile(0.975, degrees) / count};
+}
+
 /// Time that this thread has computed: other work on the machine does not count.
 double thread_time_s() {
   timespec now{};
@@ -37,11 +49,15 @@ TrackedScan true_tracks(const sim::DriveStep& step, TrackId& next_false) {
   return tracked;
 }
 
-double pose_nees(const EkfPose& pose, const SE2& truth) {
+void add_pose_nees(const EkfPose& pose, const SE2& truth, EkfDriveResult& result) {
   const Eigen::Vector3d error = (pose.ekf_map_T_vehicle.inverse() * truth).Log();
-  // Before anything moves the pose is exact, and so is its covariance: a floor for both.
+  // The first pose is the map's origin: exact, and so is its covariance.
   const Eigen::Matrix3d covariance = pose.covariance + 1e-14 * Eigen::Matrix3d::Identity();
-  return error.dot(covariance.llt().solve(error));
+  const Eigen::Vector2d place = error.head<2>();
+  const Eigen::Matrix2d place_covariance = covariance.topLeftCorner<2, 2>();
+  result.nees.push_back(error.dot(covariance.llt().solve(error)));
+  result.position_nees.push_back(place.dot(place_covariance.llt().solve(place)));
+  result.heading_nees.push_back(error.z() * error.z() / covariance(2, 2));
 }
 
 double velocity_nees(const VelocityCorrection& correction, const sim::DriveStep& step,
@@ -82,9 +98,9 @@ EkfDriveResult run_ekf_drive(const EkfDriveOptions& options, const sim::TrunkFie
     associator.add(*output.pose);
     result.update_s.push_back(taken);
     const SE2 truth = start.inverse() * step.world_T_vehicle;
-    result.nees.push_back(pose_nees(*output.pose, truth));
+    add_pose_nees(*output.pose, truth, result);
     result.velocity_nees.push_back(velocity_nees(*output.correction, step, has_bias));
-    active += static_cast<double>(filter.state().landmarks().size());
+    active += static_cast<double>(output.map->landmarks.size());
     const Eigen::Vector3d error = (truth.inverse() * output.pose->ekf_map_T_vehicle).coordinates();
     result.final_error_m = error.head<2>().norm();
     result.final_error_rad = std::abs(error.z());
@@ -102,16 +118,19 @@ EkfConsistency summarise(const std::vector<EkfDriveResult>& runs) {
   out.runs = static_cast<int>(runs.size());
   if (runs.empty()) return out;
   const auto count = static_cast<double>(runs.size());
-  const int degrees = 3 * out.runs;
-  out.band_low = ekf::chi_squared_quantile(0.025, degrees) / count;
-  out.band_high = ekf::chi_squared_quantile(0.975, degrees) / count;
+  const Band band = band_of_mean(runs.size());
+  out.band_low = band.low;
+  out.band_high = band.high;
   out.mean_nees.assign(runs.front().nees.size(), 0.0);
   std::vector<double> times;
-  double squared = 0.0, used = 0.0, refused = 0.0, velocity = 0.0;
+  double squared = 0.0, used = 0.0, refused = 0.0;
+  double velocity = 0.0, heading = 0.0, position = 0.0;
   for (const EkfDriveResult& run : runs) {
     for (std::size_t k = 0; k < out.mean_nees.size(); ++k) {
       out.mean_nees[k] += run.nees[k] / count;
       velocity += run.velocity_nees[k];
+      heading += run.heading_nees[k];
+      position += run.position_nees[k];
     }
     times.insert(times.end(), run.update_s.begin(), run.update_s.end());
     const double share = run.final_error_m / std::max(1.0, run.driven_m);
@@ -123,10 +142,9 @@ EkfConsistency summarise(const std::vector<EkfDriveResult>& runs) {
     refused += static_cast<double>(run.landmarks_refused);
   }
   const auto scans = static_cast<double>(out.mean_nees.size());
-  for (const double nees : out.mean_nees) {
-    out.overall_nees += nees / scans;
-    if (nees >= out.band_low && nees <= out.band_high) out.share_in_band += 1.0 / scans;
-  }
+  for (const double nees : out.mean_nees) out.overall_nees += nees / scans;
+  out.heading_nees = heading / (scans * count);
+  out.position_nees = position / (scans * count);
   out.final_nees = out.mean_nees.back();
   out.overall_velocity_nees = velocity / (scans * count);
   out.drift_percent = 100.0 * std::sqrt(squared / count);
@@ -134,6 +152,30 @@ EkfConsistency summarise(const std::vector<EkfDriveResult>& runs) {
   out.update_p99_s = percentile(times, 0.99);
   out.refused_share = refused / std::max(1.0, used + refused);
   return out;
+}
+
+double share_in_band(std::span<const EkfDriveResult> runs, ScanRange scans, std::size_t group) {
+  group = std::clamp<std::size_t>(group, 1, std::max<std::size_t>(1, runs.size()));
+  const Band band = band_of_mean(group);
+  std::size_t inside = 0;
+  std::size_t all = 0;
+  for (std::size_t at = 0; at + group <= runs.size(); at += group) {
+    for (std::size_t k = scans.first; k < scans.last; ++k) {
+      const double mean = mean_nees(runs.subspan(at, group), {k, k + 1});
+      inside += static_cast<std::size_t>(mean >= band.low && mean <= band.high);
+      ++all;
+    }
+  }
+  return static_cast<double>(inside) / static_cast<double>(std::max<std::size_t>(1, all));
+}
+
+double mean_nees(std::span<const EkfDriveResult> runs, ScanRange scans) {
+  double sum = 0.0;
+  for (const EkfDriveResult& run : runs) {
+    for (std::size_t k = scans.first; k < scans.last; ++k) sum += run.nees[k];
+  }
+  const std::size_t count = runs.size() * (scans.last - scans.first);
+  return sum / static_cast<double>(std::max<std::size_t>(1, count));
 }
 
 }  // namespace understory::eval

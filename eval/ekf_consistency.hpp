@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "services/associator/parameters.hpp"
@@ -22,6 +23,8 @@ struct EkfDriveOptions {
 /// One drive.
 struct EkfDriveResult {
   std::vector<double> nees;           ///< Of the pose (3 degrees of freedom), per scan.
+  std::vector<double> heading_nees;   ///< Of the heading alone (1).
+  std::vector<double> position_nees;  ///< Of the position alone (2).
   std::vector<double> velocity_nees;  ///< Of velocity and biases (5), per scan.
   double final_error_m = 0.0;
   double final_error_rad = 0.0;
@@ -41,8 +44,9 @@ struct EkfConsistency {
   std::vector<double> mean_nees;  ///< Per scan, over the runs; 3 is exact.
   double band_low = 0.0;          ///< 95 % band of such a mean.
   double band_high = 0.0;
-  double share_in_band = 0.0;          ///< Of the scans.
   double overall_nees = 0.0;           ///< Mean over scans and runs.
+  double heading_nees = 0.0;           ///< Likewise; 1 is exact.
+  double position_nees = 0.0;          ///< Likewise; 2 is exact.
   double final_nees = 0.0;             ///< At the last scan.
   double overall_velocity_nees = 0.0;  ///< 5 is exact.
   double drift_percent = 0.0;          ///< RMS error at the end, of the distance driven.
@@ -54,5 +58,17 @@ struct EkfConsistency {
   std::uint64_t restarts = 0;
 };
 EkfConsistency summarise(const std::vector<EkfDriveResult>& runs);
+
+/// Scans from `first` to before `last`.
+struct ScanRange {
+  std::size_t first = 0;
+  std::size_t last = 0;
+};
+
+/// Share of (group of runs, scan) whose mean NEES lies in the 95 % band of such a mean. One group
+/// of all runs shows the least bias; but errors last for many scans, so that its share may be far
+/// from 95 % by chance. Many groups have the share of a consistent filter close to 95 %.
+double share_in_band(std::span<const EkfDriveResult> runs, ScanRange scans, std::size_t group);
+double mean_nees(std::span<const EkfDriveResult> runs, ScanRange scans);
 
 }  // namespace understory::eval

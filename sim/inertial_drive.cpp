@@ -63,6 +63,65 @@ InertialDrive::InertialDrive(const InertialDriveParameters& parameters, const Tr
   position_ = middle + radius * Eigen::Vector2d(std::sin(theta_), -std::cos(theta_));
   bias_ << parameters_.gyro_bias_sigma * normal(), parameters_.accelerometer_bias_sigma * normal(),
       parameters_.accelerometer_bias_sigma * normal();
+  parked_ = SE2(position_, theta_);
+  if (sways()) {
+    const SE2 first = sway_place();
+    position_ = first.translation();
+    theta_ = first.theta();
+    velocity_ = sway_velocity();
+  }
+}
+
+/// Whether the body sways until the next scan.
+bool InertialDrive::sways() const {
+  const InertialDriveParameters& p = parameters_;
+  const bool stands = time_s_ + p.scan_interval_s < p.standing_s + 1e-6;
+  return stands && (p.sway_sigma_m > 0.0 || p.sway_sigma_rad > 0.0 || p.sway_sigma_mps > 0.0);
+}
+
+SE2 InertialDrive::sway_place() {
+  const double x = parameters_.sway_sigma_m * normal();
+  const double y = parameters_.sway_sigma_m * normal();
+  return parked_ * SE2(x, y, parameters_.sway_sigma_rad * normal());
+}
+
+Eigen::Vector2d InertialDrive::sway_velocity() {
+  const double x = parameters_.sway_sigma_mps * normal();
+  return {x, parameters_.sway_sigma_mps * normal()};
+}
+
+/// Pushes by which the body is at a place and a velocity of its sway when the next scan comes.
+void InertialDrive::begin_sway() {
+  const SE2 next = sway_place();
+  const Eigen::Vector2d velocity = sway_velocity();
+  const double half = 0.5 * parameters_.scan_interval_s;
+  // With pushes a, b over the halves: velocity + (a + b) half, and way + (1.5 a + 0.5 b) half^2.
+  const Eigen::Vector2d sum = (velocity - velocity_) / half;
+  const Eigen::Vector2d way = next.translation() - position_ - 2.0 * half * velocity_;
+  sway_push_.col(0) = way / (half * half) - 0.5 * sum;
+  sway_push_.col(1) = sum - sway_push_.col(0);
+  sway_rate_ = wrap_angle(next.theta() - theta_) / parameters_.scan_interval_s;
+}
+
+InertialDrive::Tick InertialDrive::sway(double dt, bool first_half) {
+  time_s_ += dt;
+  const Tick tick =
+      turn_and_push(dt, sway_rate_ * dt, velocity_ + sway_push_.col(first_half ? 0 : 1) * dt);
+  walk_bias(dt);
+  return tick;
+}
+
+/// One sample's motion, after which the vehicle has turned and has this velocity.
+InertialDrive::Tick InertialDrive::turn_and_push(double dt, double yaw_rad,
+                                                 const Eigen::Vector2d& velocity_mps) {
+  Tick tick;
+  tick.yaw_rad = yaw_rad;
+  const double mid = theta_ + 0.5 * yaw_rad;
+  theta_ += yaw_rad;
+  tick.acceleration_mps2 = rotation(-mid) * (velocity_mps - velocity_) / dt;
+  position_ += 0.5 * (velocity_mps + velocity_) * dt;
+  velocity_ = velocity_mps;
+  return tick;
 }
 
 InertialDrive::Tick InertialDrive::advance(double dt) {
@@ -78,29 +137,30 @@ InertialDrive::Tick InertialDrive::advance(double dt) {
   const double curvature = kTwoPi / parameters_.loop_length_m +
                            parameters_.wiggle_curvature *
                                std::sin(phase_ + kTwoPi * driven_m_ / parameters_.wiggle_length_m);
-  Tick tick;
-  tick.yaw_rad = length * curvature;
-  const double mid = theta_ + 0.5 * tick.yaw_rad;
-  theta_ += tick.yaw_rad;
-  const Eigen::Vector2d velocity = speed_mps_ * Eigen::Vector2d(std::cos(theta_), std::sin(theta_));
-  tick.acceleration_mps2 = rotation(-mid) * (velocity - velocity_) / dt;
-  position_ += 0.5 * (velocity + velocity_) * dt;
-  velocity_ = velocity;
+  const double heading = theta_ + length * curvature;
+  const Tick tick = turn_and_push(
+      dt, length * curvature, speed_mps_ * Eigen::Vector2d(std::cos(heading), std::sin(heading)));
   driven_m_ += length;
+  walk_bias(dt);
+  return tick;
+}
+
+void InertialDrive::walk_bias(double dt) {
   bias_.x() += parameters_.gyro_walk * std::sqrt(dt) * normal();
   bias_.y() += parameters_.accelerometer_walk * std::sqrt(dt) * normal();
   bias_.z() += parameters_.accelerometer_walk * std::sqrt(dt) * normal();
-  return tick;
 }
 
 Odometry InertialDrive::drive_piece() {
   const InertialDriveParameters& p = parameters_;
   const double dt = p.scan_interval_s / p.samples_per_scan;
   const SE2 before(position_, theta_);
+  const bool swaying = sways();
+  if (swaying) begin_sway();
   Preintegration inertial;
   for (int k = 0; k < p.samples_per_scan; ++k) {
     const InertialBias bias = bias_;
-    const Tick tick = advance(dt);
+    const Tick tick = swaying ? sway(dt, 2 * k < p.samples_per_scan) : advance(dt);
     const double rate = tick.yaw_rad / dt + bias.x() + p.gyro_noise / std::sqrt(dt) * normal();
     Eigen::Vector2d force = tick.acceleration_mps2 + bias.tail<2>();
     force.x() += p.accelerometer_noise / std::sqrt(dt) * normal();

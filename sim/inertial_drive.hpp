@@ -30,6 +30,10 @@ enum class OdometryKind {
 
 struct InertialDriveParameters {
   double standing_s = 10.0;  ///< At the start.
+  /// Sway of the standing body about its place (engine, wind), drawn anew for each scan; 0 = none.
+  double sway_sigma_m = 0.0;  ///< Per axis.
+  double sway_sigma_rad = 0.0;
+  double sway_sigma_mps = 0.0;  ///< Per axis.
   double speed_mps = 5.0;
   double speed_swing = 0.2;        ///< Speed goes up and down by this share of it.
   double acceleration_mps2 = 1.5;  ///< At most, while starting.
@@ -83,6 +87,13 @@ class InertialDrive {
     Eigen::Vector2d acceleration_mps2 = Eigen::Vector2d::Zero();  ///< Mid-turn body frame.
   };
   Tick advance(double dt);
+  Tick turn_and_push(double dt, double yaw_rad, const Eigen::Vector2d& velocity_mps);
+  void walk_bias(double dt);
+  bool sways() const;
+  SE2 sway_place();
+  Eigen::Vector2d sway_velocity();
+  void begin_sway();
+  Tick sway(double dt, bool first_half);
   Odometry drive_piece();
   void observe(DriveStep& step);
   double normal() { return normal_(random_); }
@@ -99,6 +110,10 @@ class InertialDrive {
   double theta_ = 0.0;
   Eigen::Vector2d position_ = Eigen::Vector2d::Zero();
   Eigen::Vector2d velocity_ = Eigen::Vector2d::Zero();
+  SE2 parked_;              ///< What the sway goes round.
+  double sway_rate_ = 0.0;  ///< [rad/s] Until the next scan.
+  /// [m/s^2] In its first and its second half.
+  Eigen::Matrix2d sway_push_ = Eigen::Matrix2d::Zero();
   InertialBias bias_ = InertialBias::Zero();
 };
 

@@ -20,9 +20,9 @@ void describe(EkfMotionParameters& p, ParameterTable& table) {
   table.add("motion.standing_sigma_mps", p.standing_sigma_mps, {1e-5, 1.0}, "m/s",
             "Of the velocity while the vehicle is found to stand.");
   table.add("motion.standing_sigma_m", p.standing_sigma_m, {1e-6, 1.0}, "m",
-            "Of the way made while it stands, per piece of odometry and axis.");
+            "Of the body's sway about the place where it is parked, per axis.");
   table.add("motion.standing_sigma_rad", p.standing_sigma_rad, {1e-7, 0.1}, "rad",
-            "Of the turn made while it stands, per piece of odometry.");
+            "Of the body's turning about its heading where it is parked.");
   table.add("motion.sideways_sigma_mps", p.sideways_sigma_mps, {0.0, 100.0}, "m/s",
             "Of the velocity across the vehicle, per piece; 0 = it may slide freely.");
   table.add("motion.gap_acceleration", p.gap_acceleration, {0.01, 100.0}, "m/s^2/sqrt(Hz)",

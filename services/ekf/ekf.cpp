@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "services/ekf/chi_squared.hpp"
+#include "services/ekf/ground_marks.hpp"
 #include "services/ekf/prediction.hpp"
 
 namespace understory {
@@ -13,6 +14,8 @@ namespace {
 /// Stamps of one instant may miss each other by rounding.
 constexpr Utime kTolerance_us = 1000;
 constexpr double kStartVariance = 1e-12;
+/// Of a piece's sway: a vehicle may stand for hours, in which chance must not pass for motion.
+constexpr double kStandingProbability = 1.0 - 1e-6;
 
 ekf::ErrorForm error_form(const std::string& name) {
   if (name == "right_invariant") return ekf::ErrorForm::kRightInvariant;
@@ -23,6 +26,10 @@ ekf::ErrorForm error_form(const std::string& name) {
 
 double seconds(Utime duration) { return 1e-6 * static_cast<double>(duration); }
 Utime microseconds(double duration_s) { return static_cast<Utime>(1e6 * duration_s); }
+
+ekf::Sway sway(const EkfMotionParameters& motion) {
+  return {motion.standing_sigma_m, motion.standing_sigma_rad};
+}
 
 bool is_usable(const Odometry& piece) {
   bool usable = piece.utime > piece.from_utime && piece.from_T_to.coordinates().allFinite() &&
@@ -41,11 +48,13 @@ bool is_usable(const Odometry& piece) {
 
 Ekf::Ekf(const EkfParameters& parameters)
     : parameters_(parameters),
-      state_(error_form(parameters.error_form), parameters.map.max_landmarks),
-      room_(ekf::kVehicle + 2 * parameters.map.max_landmarks),
-      joint_(parameters.map.max_landmarks),
-      landmark_gate_(ekf::chi_squared_quantile(parameters.gate.landmark_probability, 2)) {
-  const int capacity = ekf::kVehicle + 2 * parameters.map.max_landmarks;
+      state_(error_form(parameters.error_form), parameters.map.max_landmarks + ekf::kGroundMarks),
+      room_(ekf::kVehicle + 2 * state_.max_landmarks()),
+      joint_(state_.max_landmarks()),
+      landmark_gate_(ekf::chi_squared_quantile(parameters.gate.landmark_probability, 2)),
+      standing_gate_(ekf::chi_squared_quantile(kStandingProbability, 2 * ekf::kGroundMarks)),
+      creeping_gate_(ekf::chi_squared_quantile(kStandingProbability, 3)) {
+  const int capacity = ekf::kVehicle + 2 * state_.max_landmarks();
   backup_ = Eigen::MatrixXd::Zero(capacity, capacity);
   set_gates_.push_back(0.0);
   for (int k = 1; k <= parameters.map.max_landmarks; ++k) {
@@ -81,6 +90,7 @@ void Ekf::restart(Utime utime, const std::string& reason) {
   ++reset_counter_;
   counters_.last_reason = reason;
   refused_scans_ = 0;
+  doubts_standing_ = false;
   utime_ = utime;
   set_prior();
   const EkfPose& last = last_sound_;
@@ -152,29 +162,14 @@ void Ekf::use(const Odometry& piece) {
   }
   if (piece.from_utime > utime_ + kTolerance_us) bridge(piece.from_utime);
   const EkfMotionParameters& motion = parameters_.motion;
-  if (piece.inertial) {
-    ekf::MeasuredMotion measured;
-    if (piece.is_standing) {
-      measured.covariance_m2 =
-          motion.standing_sigma_m * motion.standing_sigma_m * Eigen::Matrix2d::Identity();
-      measured.turn_sigma_rad = motion.standing_sigma_rad;
-    } else if (piece.has_wheels) {
-      const Eigen::Matrix2d turn = piece.from_T_to.rotation();
-      measured.position_m = piece.from_T_to.translation();
-      measured.covariance_m2 = turn * piece.covariance.topLeftCorner<2, 2>() * turn.transpose();
-    }
-    if (piece.is_standing || piece.has_wheels) {
-      ekf::predict(state_, *piece.inertial, measured, motion, room_);
-    } else {
-      ekf::predict(state_, ekf::transition_by(state_, *piece.inertial), motion, room_);
-    }
-  } else {
-    const SE2WithCovariance moved{piece.from_T_to, piece.covariance};
-    const double duration = seconds(piece.utime - piece.from_utime);
-    ekf::predict(state_, ekf::transition_by(state_, moved, duration, motion), motion, room_);
-  }
-  if (piece.is_standing) {
-    ekf::measure_standing(state_, motion.standing_sigma_mps, room_);
+  doubts_standing_ = doubts_standing_ && piece.is_standing;
+  const bool stands = piece.is_standing && !doubts_standing_;
+  const bool has_marks = ekf::has_ground_marks(state_);
+  if (stands && !has_marks) ekf::add_ground_marks(state_, sway(motion));
+  if (!stands && has_marks) ekf::remove_ground_marks(state_);
+  predict(piece, stands);
+  if (stands) {
+    stand();
   } else if (motion.sideways_sigma_mps > 0.0) {
     ekf::measure_no_slide(state_, motion.sideways_sigma_mps, room_);
   }
@@ -183,9 +178,37 @@ void Ekf::use(const Odometry& piece) {
   if (!state_.is_sound()) restart(utime_, "the state was not finite after a prediction");
 }
 
+void Ekf::predict(const Odometry& piece, bool stands) {
+  const EkfMotionParameters& motion = parameters_.motion;
+  if (!piece.inertial) {
+    const SE2WithCovariance moved{piece.from_T_to, piece.covariance};
+    const double duration = seconds(piece.utime - piece.from_utime);
+    ekf::predict(state_, ekf::transition_by(state_, moved, duration, motion), motion, room_);
+  } else if (piece.has_wheels && !stands) {
+    const Eigen::Matrix2d turn = piece.from_T_to.rotation();
+    const ekf::MeasuredMotion measured{
+        piece.from_T_to.translation(),
+        turn * piece.covariance.topLeftCorner<2, 2>() * turn.transpose()};
+    ekf::predict(state_, *piece.inertial, measured, motion, room_);
+  } else {
+    ekf::predict(state_, ekf::transition_by(state_, *piece.inertial), motion, room_);
+  }
+}
+
+/// The vehicle is where it was parked, and its velocity is that of its sway.
+void Ekf::stand() {
+  const EkfMotionParameters& motion = parameters_.motion;
+  ekf::measure_standing(state_, motion.standing_sigma_mps, room_);
+  if (ekf::measure_ground_marks(state_, sway(motion), standing_gate_, joint_, room_)) return;
+  ++counters_.crept;
+  ekf::remove_ground_marks(state_);
+  ekf::add_ground_marks(state_, sway(motion));
+}
+
 /// Nothing tells the motion until `utime`.
 void Ekf::bridge(Utime utime) {
   ++counters_.gaps;
+  ekf::remove_ground_marks(state_);  // It may have been driven on and parked again.
   const double duration = seconds(utime - utime_);
   if (duration > parameters_.restart.max_gap_s) return restart(utime, "too long a gap");
   ekf::predict(state_, ekf::transition_over_gap(state_, duration, parameters_.motion),
@@ -220,6 +243,7 @@ EkfOutput Ekf::outputs() {
   const auto& landmarks = state_.landmarks();
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     const ekf::MapLandmark& landmark = landmarks[i];
+    if (landmark.is_ground_mark()) continue;
     map.landmarks.push_back({landmark.id, landmark.position + state_.anchor_m,
                              state_.landmark_covariance(i), landmark.radius_m, landmark.kind,
                              landmark.times_seen});

@@ -32,6 +32,7 @@ struct EkfCounters {
   std::uint64_t landmarks_too_near = 0;  ///< New ones, to an old one; or the state was full.
   std::uint64_t rejoined = 0;            ///< Lost landmarks that a new track was found to be.
   std::uint64_t removed = 0;             ///< Landmarks that left the active state.
+  std::uint64_t crept = 0;               ///< Times that it moved while it was said to stand.
   std::uint64_t restarts = 0;
   std::string last_reason;
 };
@@ -80,12 +81,15 @@ class Ekf {
   void set_prior();
   void advance(Utime utime);
   void use(const Odometry& piece);
+  void predict(const Odometry& piece, bool stands);
+  void stand();
   void bridge(Utime utime);
   EkfPose pose();
   EkfOutput outputs();
 
   // ekf_scan.cpp: landmarks.
   void read(const TrackedScan& scan);
+  void check_standing();
   void update_known();
   void update_checked(std::vector<ekf::Pairing>& pairings,
                       std::span<const ekf::Sighting> sightings);
@@ -108,6 +112,8 @@ class Ekf {
   ekf::JointUpdate joint_;
   Eigen::MatrixXd backup_;
   double landmark_gate_ = 0.0;
+  double standing_gate_ = 0.0;
+  double creeping_gate_ = 0.0;
   std::vector<double> set_gates_;  ///< By number of landmarks.
 
   bool started_ = false;
@@ -119,6 +125,7 @@ class Ekf {
   std::uint64_t map_sequence_ = 0;
   std::uint64_t reset_counter_ = 0;
   int refused_scans_ = 0;
+  bool doubts_standing_ = false;  ///< It crept: not believed until it is said to move.
   std::uint32_t used_ = 0;
   std::uint32_t refused_ = 0;
   std::vector<Alias> aliases_;  ///< In order of track.

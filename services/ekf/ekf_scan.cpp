@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "services/ekf/ekf.hpp"
+#include "services/ekf/ground_marks.hpp"
+#include "services/ekf/prediction.hpp"
 
 namespace understory {
 namespace {
@@ -12,6 +14,8 @@ namespace {
 /// Sightings that one search for joint compatibility takes.
 constexpr std::size_t kMaxSearched = 24;
 constexpr int kMaxRounds = 4;
+/// Motion that nothing told, where creeping is found [s].
+constexpr double kUnnoticed_s = 0.1;
 
 bool is_usable(const Detection& detection) {
   if (!detection.position_m.allFinite() || !detection.covariance_m2.allFinite()) return false;
@@ -39,6 +43,7 @@ EkfOutput Ekf::add(const TrackedScan& scan) {
   ++scan_count_;
   used_ = refused_ = 0;
   read(scan);
+  check_standing();
   update_known();
   for (const ekf::Pairing& pairing : pairings_) see(scan, pairing);
   rejoin_lost(scan);
@@ -81,6 +86,33 @@ std::optional<std::uint32_t> Ekf::landmark_of(TrackId track) const {
     if (landmarks[i].id == alias->landmark) return i;
   }
   return std::nullopt;
+}
+
+/// All landmarks displaced alike, or most of them at odds with the map: the vehicle creeps, though
+/// it is said to stand.
+void Ekf::check_standing() {
+  if (!ekf::has_ground_marks(state_)) return;
+  std::size_t known = 0;
+  std::size_t near = 0;
+  std::vector<ekf::Pairing> pairings;
+  for (std::uint32_t k = 0; k < sightings_.size(); ++k) {
+    const auto landmark = landmark_of(tracks_[k]);
+    if (!landmark) continue;
+    ++known;
+    if (ekf::squared_distance(state_, *landmark, sightings_[k]) > landmark_gate_) continue;
+    ++near;
+    if (pairings.size() < ekf::kMaxRows / 2) pairings.push_back({k, *landmark});
+  }
+  const bool at_odds = known >= 4 && 2 * near < known;
+  if (!at_odds &&
+      (pairings.size() < 2 || ekf::common_motion(state_, sightings_, pairings) <= creeping_gate_)) {
+    return;
+  }
+  ++counters_.crept;
+  doubts_standing_ = true;
+  ekf::remove_ground_marks(state_);
+  ekf::predict(state_, ekf::transition_over_gap(state_, kUnnoticed_s, parameters_.motion),
+               parameters_.motion, room_);
 }
 
 /// Landmarks whose track goes on: each through its own gate, then all through the set's.
@@ -195,7 +227,7 @@ Ekf::RejoinSearch Ekf::rejoin_candidates(const TrackedScan& scan) const {
   const auto pause = static_cast<std::uint64_t>(parameters_.gate.rejoin_after_scans);
   const Eigen::Matrix2d back = ekf::rotation_of(state_.heading).transpose();
   for (std::uint32_t i = 0; i < landmarks.size(); ++i) {
-    if (landmarks[i].last_scan + pause >= scan_count_) continue;
+    if (landmarks[i].is_ground_mark() || landmarks[i].last_scan + pause >= scan_count_) continue;
     const Eigen::Matrix2d spread = ekf::innovation_covariance(state_, i, i);
     const double gate = std::sqrt(landmark_gate_ * spread.trace());
     FieldOfView view = scan.field_of_view;
@@ -237,7 +269,7 @@ bool Ekf::near_old(const Eigen::Vector2d& position) const {
   const double limit = parameters_.map.min_separation_m * parameters_.map.min_separation_m;
   const auto& landmarks = state_.landmarks();
   return std::any_of(landmarks.begin(), landmarks.end(), [&](const ekf::MapLandmark& landmark) {
-    return (landmark.position - position).squaredNorm() < limit;
+    return !landmark.is_ground_mark() && (landmark.position - position).squaredNorm() < limit;
   });
 }
 
@@ -271,10 +303,12 @@ void Ekf::add_new(const TrackedScan& scan) {
 /// True if a landmark may be added: a full state gives up the one that is out of sight for longest.
 bool Ekf::make_room(const FieldOfView& view) {
   const auto& landmarks = state_.landmarks();
-  if (static_cast<int>(landmarks.size()) < state_.max_landmarks()) return true;
+  const int marks = ekf::has_ground_marks(state_) ? ekf::kGroundMarks : 0;
+  if (static_cast<int>(landmarks.size()) - marks < parameters_.map.max_landmarks) return true;
   std::optional<std::size_t> oldest;
   const Eigen::Matrix2d back = ekf::rotation_of(state_.heading).transpose();
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    if (landmarks[i].is_ground_mark()) continue;
     if (view.contains(back * (landmarks[i].position - state_.position))) continue;
     if (!oldest || landmarks[i].last_scan < landmarks[*oldest].last_scan) oldest = i;
   }
@@ -286,7 +320,7 @@ void Ekf::count_missed(const FieldOfView& view) {
   const Eigen::Matrix2d back = ekf::rotation_of(state_.heading).transpose();
   for (std::size_t i = 0; i < state_.landmarks().size(); ++i) {
     ekf::MapLandmark& landmark = state_.landmark(i);
-    if (landmark.last_scan == scan_count_) continue;
+    if (landmark.is_ground_mark() || landmark.last_scan == scan_count_) continue;
     if (view.contains(back * (landmark.position - state_.position))) ++landmark.missed;
   }
 }
@@ -295,6 +329,7 @@ void Ekf::remove_distant(const FieldOfView& view) {
   const double range = parameters_.map.keep_range_factor * view.max_range_m;
   for (std::size_t i = state_.landmarks().size(); i-- > 0;) {
     const ekf::MapLandmark& landmark = state_.landmarks()[i];
+    if (landmark.is_ground_mark()) continue;
     const bool distant = (landmark.position - state_.position).norm() > range;
     const bool gone = landmark.missed > static_cast<std::uint32_t>(parameters_.map.max_missed);
     const bool wrong = landmark.refused >= static_cast<std::uint32_t>(parameters_.map.max_refused);

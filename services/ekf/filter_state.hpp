@@ -33,7 +33,8 @@ inline constexpr int kVehicle = 8;
 using Matrix8 = Eigen::Matrix<double, kVehicle, kVehicle>;
 
 struct MapLandmark {
-  TrackId id = 0;                                            ///< Of the track that it began with.
+  TrackId id =
+      0;  ///< Of the track that it began with; 0 = a mark on the ground (ground_marks.hpp).
   Eigen::Vector2d position = Eigen::Vector2d::Zero();        ///< From the anchor [m].
   Eigen::Vector2d first_position = Eigen::Vector2d::Zero();  ///< When it was added.
   double radius_m = 0.0;
@@ -42,6 +43,8 @@ struct MapLandmark {
   std::uint32_t missed = 0;     ///< Scans in a row that should have shown it.
   std::uint32_t refused = 0;    ///< Scans in a row in which its gate refused it.
   std::uint64_t last_scan = 0;  ///< Number of the scan that saw it last.
+
+  bool is_ground_mark() const { return id == 0; }
 };
 
 /// Positions count from the anchor, a place in the map that follows the vehicle, so that the

@@ -16,8 +16,9 @@ struct EkfMotionParameters {
   double gyro_walk = 1e-5;           ///< [rad/s/sqrt(s)] Random walk of the bias.
   double accelerometer_walk = 1e-3;  ///< [m/s^2/sqrt(s)]
   double standing_sigma_mps = 0.01;  ///< Of the velocity while the vehicle is found to stand.
-  double standing_sigma_m = 2e-4;    ///< Of the way made meanwhile, per piece and axis.
-  double standing_sigma_rad = 3e-5;  ///< Of the turn made meanwhile, per piece.
+  /// The body's sway about the place where it is parked (engine, wind): it does not add up.
+  double standing_sigma_m = 2e-4;  ///< Per axis.
+  double standing_sigma_rad = 3e-5;
   /// Of the velocity across the vehicle, per piece; 0 = it may slide freely.
   double sideways_sigma_mps = 0.0;
   double gap_acceleration = 2.0;  ///< [m/s^2/sqrt(Hz)] Where no odometry tells the motion.

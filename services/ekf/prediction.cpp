@@ -191,30 +191,24 @@ void predict(FilterState& state, const Preintegration& inertial, const MeasuredM
   const Transition t = transition_by(state, inertial);
   const Preintegration own = at_bias(inertial, state.bias);
   const Eigen::Matrix2d back = rotation_of(state.heading).transpose();
-  // Measured: (way in the axes of the start, turn).
-  Eigen::Matrix<double, 3, kVehicle> rows = Eigen::Matrix<double, 3, kVehicle>::Zero();
-  rows.block<2, 1>(0, kHeading) =
+  // Measured: the way in the axes of the start.
+  Eigen::Matrix<double, 2, kVehicle> rows = Eigen::Matrix<double, 2, kVehicle>::Zero();
+  rows.col(kHeading) =
       t.seconds * back * (state.lever(state.velocity) - turned_left(state.velocity));
   rows.block<2, 2>(0, kVelocity) = t.seconds * back;
   rows.block<2, 3>(0, kBias) = own.bias_jacobian.bottomRows<2>();
-  rows.block<1, 3>(2, kBias) = own.bias_jacobian.row(0);
-  Eigen::Matrix<double, 5, 3> pick = Eigen::Matrix<double, 5, 3>::Zero();
-  pick(3, 0) = pick(4, 1) = pick(0, 2) = 1.0;
-  Eigen::Vector3d innovation;
-  innovation << measured.position_m - back * state.velocity * t.seconds - own.position_m,
-      -own.yaw_rad;
+  const Eigen::Vector2d innovation =
+      measured.position_m - back * state.velocity * t.seconds - own.position_m;
   const int count = state.size() - kVehicle;
-  const int rows_used = measured.turn_sigma_rad ? 3 : 2;
-  const Eigen::Matrix<double, kVehicle, 3> before =
+  const Eigen::Matrix<double, kVehicle, 2> before =
       state.covariance_block<kVehicle, kVehicle>(0, 0) * rows.transpose();
-  Eigen::Matrix3d spread = rows * before + pick.transpose() * t.noise * pick;
-  spread.topLeftCorner<2, 2>() += measured.covariance_m2;
-  if (measured.turn_sigma_rad) spread(2, 2) += *measured.turn_sigma_rad * *measured.turn_sigma_rad;
+  const Eigen::Matrix2d spread =
+      rows * before + t.noise.bottomRightCorner<2, 2>() + measured.covariance_m2;
 
-  auto cross = room.cross(state.size(), 3);
-  const Eigen::Matrix<double, 5, 3> noise = t.noise * pick;
+  auto cross = room.cross(state.size(), 2);
+  const Eigen::Matrix<double, 5, 2> noise = t.noise.rightCols<2>();
   cross.topRows<kVehicle>() = t.error * before + t.noise_input * noise;
-  const Eigen::RowVector3d turning = t.yaw_by_bias * before.middleRows<3>(kBias) + noise.row(0);
+  const Eigen::RowVector2d turning = t.yaw_by_bias * before.middleRows<3>(kBias) + noise.row(0);
   for (int i = 0; i < count; i += 2) {
     const Eigen::Vector2d arm =
         -state.lever(state.landmarks()[static_cast<std::size_t>(i / 2)].position);
@@ -223,13 +217,7 @@ void predict(FilterState& state, const Preintegration& inertial, const MeasuredM
   }
   predict(state, t, parameters, room);
   room.start(state.size());
-  if (rows_used == 3) {
-    room.apply(state, innovation, spread);
-  } else {
-    const Eigen::Vector2d way = innovation.head<2>();
-    const Eigen::Matrix2d way_spread = spread.topLeftCorner<2, 2>();
-    room.apply(state, way, way_spread);
-  }
+  room.apply(state, innovation, spread);
   state.retract(room.delta(state.size()));
 }
 

@@ -1,8 +1,6 @@
 // How the filter's state moves from one stamp to the next.
 #pragma once
 
-#include <optional>
-
 #include "common/model/odometry.hpp"
 #include "services/ekf/filter_state.hpp"
 #include "services/ekf/low_rank.hpp"
@@ -36,12 +34,10 @@ Transition transition_by(const FilterState& state, const SE2WithCovariance& moti
 Transition transition_over_gap(const FilterState& state, double seconds,
                                const EkfMotionParameters& parameters);
 
-/// What else is known of the motion during a transition by IMU: way made, seen from its start [m],
-/// and turn [rad], if standing still tells it.
+/// What else is known of the motion during a transition by IMU: way made, seen from its start [m].
 struct MeasuredMotion {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
-  std::optional<double> turn_sigma_rad;  ///< Set: it did not turn.
 };
 
 /// Predicts the state. `measured` is weighed against the same interval's IMU samples, their common

@@ -1,0 +1,89 @@
+#include "services/ekf/ground_marks.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+
+namespace understory::ekf {
+namespace {
+
+/// The marks as the parked vehicle sees them. Their noise and their distance are such that both
+/// together tell the position with variance sigma_m^2 per axis and the heading with sigma_rad^2.
+std::array<Sighting, kGroundMarks> sightings(const Sway& sway) {
+  const double reach = sway.sigma_m / sway.sigma_rad;
+  const Eigen::Matrix2d noise = 2.0 * sway.sigma_m * sway.sigma_m * Eigen::Matrix2d::Identity();
+  return {Sighting{{reach, 0.0}, noise}, Sighting{{-reach, 0.0}, noise}};
+}
+
+bool is_mark(const MapLandmark& landmark) { return landmark.is_ground_mark(); }
+
+}  // namespace
+
+bool has_ground_marks(const FilterState& state) {
+  return std::any_of(state.landmarks().begin(), state.landmarks().end(), is_mark);
+}
+
+void add_ground_marks(FilterState& state, const Sway& sway) {
+  for (const Sighting& seen : sightings(sway)) {
+    state.add_landmark(MapLandmark{}, seen.position_m, seen.covariance_m2);
+  }
+}
+
+void remove_ground_marks(FilterState& state) {
+  for (std::size_t i = state.landmarks().size(); i-- > 0;) {
+    if (is_mark(state.landmarks()[i])) state.remove_landmark(i);
+  }
+}
+
+bool measure_ground_marks(FilterState& state, const Sway& sway, double gate, JointUpdate& joint,
+                          LowRank& room) {
+  const auto seen = sightings(sway);
+  const auto& landmarks = state.landmarks();
+  std::array<Pairing, kGroundMarks> pairings;
+  std::uint32_t found = 0;
+  for (std::uint32_t i = 0; i < landmarks.size() && found < kGroundMarks; ++i) {
+    if (is_mark(landmarks[i])) pairings[found] = {found, i}, ++found;
+  }
+  const Eigen::Matrix2d rotation = rotation_of(state.heading);
+  Eigen::Vector4d error;
+  Eigen::Matrix4d spread;
+  for (std::uint32_t a = 0; a < kGroundMarks; ++a) {
+    error.segment<2>(2 * a) = innovation(state, pairings[a].landmark, seen[a]);
+    for (std::uint32_t b = 0; b < kGroundMarks; ++b) {
+      spread.block<2, 2>(2 * a, 2 * b) =
+          innovation_covariance(state, pairings[a].landmark, pairings[b].landmark);
+    }
+    spread.block<2, 2>(2 * a, 2 * a) += rotation * seen[a].covariance_m2 * rotation.transpose();
+  }
+  if (!(error.dot(spread.llt().solve(error)) <= gate)) return false;
+  if (joint.apply(state, seen, pairings, room) < 0.0) return false;
+  joint.finish(state, room);
+  return true;
+}
+
+double common_motion(const FilterState& state, std::span<const Sighting> sightings,
+                     std::span<const Pairing> pairings) {
+  const int rows = 2 * static_cast<int>(pairings.size());
+  const Eigen::Matrix2d rotation = rotation_of(state.heading);
+  Eigen::VectorXd error(rows);
+  Eigen::MatrixXd spread(rows, rows);
+  Eigen::MatrixX3d motion(rows, 3);
+  for (int a = 0; a < rows; a += 2) {
+    const Pairing& pairing = pairings[static_cast<std::size_t>(a / 2)];
+    const Sighting& seen = sightings[pairing.sighting];
+    error.segment<2>(a) = innovation(state, pairing.landmark, seen);
+    motion.block<2, 2>(a, 0).setIdentity();
+    motion.block<2, 1>(a, 2) = turned_left(rotation * seen.position_m);
+    for (int b = 0; b <= a; b += 2) {
+      spread.block<2, 2>(a, b) = innovation_covariance(
+          state, pairing.landmark, pairings[static_cast<std::size_t>(b / 2)].landmark);
+    }
+    spread.block<2, 2>(a, a) += rotation * seen.covariance_m2 * rotation.transpose();
+  }
+  const Eigen::LLT<Eigen::MatrixXd> factor(spread);
+  const Eigen::MatrixX3d weighted = factor.solve(motion);
+  const Eigen::Vector3d told = weighted.transpose() * error;
+  return told.dot((motion.transpose() * weighted).eval().llt().solve(told));
+}
+
+}  // namespace understory::ekf
