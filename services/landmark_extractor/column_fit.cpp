@@ -32,8 +32,10 @@ float square(float value) { return value * value; }
 
 std::optional<StemFit> StemFitter::fit(const RingCloud& cloud, const std::vector<Run>& runs,
                                        const Column& column) {
-  take_evidence(cloud, runs, column);
+  summarise(runs, column);
   start_with_consensus();
+  if (!has_enough()) return std::nullopt;
+  take_evidence(cloud, runs);
   Vector6d state = Vector6d::Zero();
   for (int round = 0; round < kRounds; ++round) {
     if (!has_enough()) return std::nullopt;
@@ -48,25 +50,30 @@ std::optional<StemFit> StemFitter::fit(const RingCloud& cloud, const std::vector
   return fit;
 }
 
-void StemFitter::take_evidence(const RingCloud& cloud, const std::vector<Run>& runs,
-                               const Column& column) {
+void StemFitter::summarise(const std::vector<Run>& runs, const Column& column) {
   anchor_m_ = column.centre_m;
-  const std::size_t count = column.runs.size();
   summaries_.clear();
+  for (const std::uint32_t index : column.runs) {
+    const Run& run = runs[index];
+    const std::size_t hits = std::min(run.size(), kHitsPerRun);
+    summaries_.push_back({index, run.x_m, run.y_m, run.z_m, run.width_m, run.nearest_m,
+                          static_cast<float>(run.size()), run.ring,
+                          static_cast<std::uint16_t>(hits / 2)});
+  }
+}
+
+void StemFitter::take_evidence(const RingCloud& cloud, const std::vector<Run>& runs) {
+  const std::size_t count = summaries_.size();
   hits_.assign(count, {});
   edges_.assign((2 * count + kLanes - 1) / kLanes, {});
   for (EdgeLanes& group : edges_) group.variance.fill(1.0F);
   for (std::size_t k = 0; k < count; ++k) {
-    const Run& run = runs[column.runs[k]];
+    const Run& run = runs[summaries_[k].index];
     add_hits(cloud, run, hits_[k]);
     EdgeLanes& edges = edges_[2 * k / kLanes];
     const std::size_t lane = 2 * k % kLanes;
     if (run.left == Border::kClear) add_edge(cloud, run, 1.0F, edges, lane);
     if (run.right == Border::kClear) add_edge(cloud, run, -1.0F, edges, lane + 1);
-    const std::size_t hits = std::min(run.size(), kHitsPerRun);
-    summaries_.push_back({column.runs[k], run.x_m, run.y_m, run.z_m, run.width_m, run.nearest_m,
-                          static_cast<float>(run.size()), run.ring,
-                          static_cast<std::uint16_t>(hits / 2)});
   }
 }
 

@@ -50,7 +50,8 @@ class StemFitter {
 
  private:
   /// The anchor of all that follows is the column's centre.
-  void take_evidence(const RingCloud& cloud, const std::vector<Run>& runs, const Column& column);
+  void summarise(const std::vector<Run>& runs, const Column& column);
+  void take_evidence(const RingCloud& cloud, const std::vector<Run>& runs);
   void add_hits(const RingCloud& cloud, const Run& run, HitLanes& hits) const;
   void add_edge(const RingCloud& cloud, const Run& run, float side, EdgeLanes& edges,
                 std::size_t lane) const;

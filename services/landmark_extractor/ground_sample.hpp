@@ -18,14 +18,18 @@ class GroundSample {
   const GroundGrid& grid() const { return grid_; }
   /// Frame `vehicle_level`; their number is a whole number of registers. Those in the cell
   /// nowhere() do not count.
-  std::span<const float> x() const { return x_; }
-  std::span<const float> y() const { return y_; }
-  std::span<const float> z() const { return z_; }
-  std::span<const std::int32_t> cell() const { return cell_; }
+  std::span<const float> x() const { return {x_.data(), size_}; }
+  std::span<const float> y() const { return {y_.data(), size_}; }
+  std::span<const float> z() const { return {z_.data(), size_}; }
+  std::span<const std::int32_t> cell() const { return {cell_.data(), size_}; }
 
  private:
+  void reserve(std::size_t size);
+  void pad(std::size_t size);
+
   GroundGrid grid_;
   PointBlock block_;
+  std::size_t size_ = 0;
   std::vector<float> x_;
   std::vector<float> y_;
   std::vector<float> z_;

@@ -47,6 +47,9 @@ typedef float Four __attribute__((vector_size(16)));
                 offsetof(SweepPoint, z_m) == 8 && offsetof(SweepPoint, time_s) == 12);
   std::size_t i = 0;
   for (; i + 4 <= points.size(); i += 4) {
+    // What comes after this block, while there is something else to do.
+    __builtin_prefetch(points.data() + i + kSize);
+    __builtin_prefetch(points.data() + i + kSize + 2);
     std::array<Four, 4> rows{load(&points[i]), load(&points[i + 1]), load(&points[i + 2]),
                              load(&points[i + 3])};
     transpose(rows);

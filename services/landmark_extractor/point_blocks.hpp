@@ -11,16 +11,17 @@
 
 namespace understory {
 
-/// A return in `vehicle_level`, with the beam that brought it. As long as one vector register.
+/// A return in `vehicle_level`, with the beam that brought it. As long as one vector register, and
+/// without initial values, so that memory for many costs nothing before they come.
 struct alignas(32) RingPoint {
-  float x_m = 0.0F;
-  float y_m = 0.0F;
-  float z_m = 0.0F;
-  float azimuth_rad = 0.0F;  ///< Of the beam, left positive; goes on beyond pi within a ring.
-  float range_m = 0.0F;      ///< Horizontal distance from where the sensor was at that time.
-  float height_m = 0.0F;     ///< Above ground.
-  float time_s = 0.0F;       ///< From the sweep's utime.
-  float is_in_range = 0.0F;  ///< 1, or 0 where a coordinate is too near, too far or no number.
+  float x_m;
+  float y_m;
+  float z_m;
+  float azimuth_rad;  ///< Of the beam, left positive; goes on beyond pi within a ring.
+  float range_m;      ///< Horizontal distance from where the sensor was at that time.
+  float height_m;     ///< Above ground.
+  float time_s;       ///< From the sweep's utime.
+  float is_in_range;  ///< 1, or 0 where a coordinate is too near, too far or no number.
 
   Eigen::Vector2d position() const { return {x_m, y_m}; }
 };

@@ -16,8 +16,10 @@ constexpr float kCut_m = 1.0F;
 constexpr float kKnownSlope_rad = 0.1F;
 
 /// So many steps from beam to beam tell their median; so many of them lie together.
-constexpr std::size_t kSteps = 64;
+constexpr std::size_t kSteps = 40;
 constexpr std::size_t kTogether = 4;
+/// So many points tell the slope of a ring.
+constexpr std::size_t kSlopes = 16;
 /// So many points ahead memory is asked for.
 constexpr std::ptrdiff_t kAhead = 4;
 
@@ -50,11 +52,13 @@ void RingCloud::fill(const PointSweep& sweep, const GroundSurface& ground,
   counters.not_finite += of_this.not_finite;
   counters.bad_ring += of_this.bad_ring;
   steps_.assign(sweep.rings, 0.0F);
+  slopes_.assign(sweep.rings, std::numeric_limits<float>::quiet_NaN());
 }
 
 void RingCloud::order(std::size_t ring, float lowest_m) {
   cut_ring(ring, lowest_m);
   measure_step(ring);
+  measure_slope(ring);
 }
 
 void RingCloud::reserve_slots(std::size_t rings, std::size_t points_per_ring) {
@@ -64,9 +68,10 @@ void RingCloud::reserve_slots(std::size_t rings, std::size_t points_per_ring) {
     constexpr std::size_t kUnit = 2;
     slot_ = (3 * points_per_ring / kUnit | 1U) * kUnit;
   }
-  if (points_.size() < rings * slot_) {
-    points_.clear();
-    points_.resize(rings * slot_);
+  if (capacity_ < rings * slot_) {
+    points_.reset();
+    capacity_ = rings * slot_;
+    points_ = std::make_unique_for_overwrite<RingPoint[]>(capacity_);
   }
   filling_.resize(rings);
   begins_.resize(rings);
@@ -74,7 +79,7 @@ void RingCloud::reserve_slots(std::size_t rings, std::size_t points_per_ring) {
   const auto most = static_cast<std::ptrdiff_t>(slot_ / 2);
   for (std::size_t ring = 0; ring < rings; ++ring) {
     // A ring that turns to the right fills its slot from behind: azimuth grows either way.
-    RingPoint* first = points_.data() + ring * slot_ + (spin_.is_leftward ? 0 : slot_ - 1);
+    RingPoint* first = points_.get() + ring * slot_ + (spin_.is_leftward ? 0 : slot_ - 1);
     filling_[ring] = {first, spin_.is_leftward ? first + most : first - most,
                       std::numeric_limits<float>::quiet_NaN(), 0.0F};
   }
@@ -82,21 +87,24 @@ void RingCloud::reserve_slots(std::size_t rings, std::size_t points_per_ring) {
 
 bool RingCloud::scatter(const PointSweep& sweep, const GroundSurface& ground,
                         PointCounters& counters) {
+  // Copies, which no write to a point can change.
   const std::ptrdiff_t forward = spin_.is_leftward ? 1 : -1;
+  const std::uint16_t rings = sweep.rings;
   Filling* const filling = filling_.data();
+  PointBlock& block = block_;
   for (std::size_t first = 0; first < sweep.points.size(); first += PointBlock::kSize) {
     const std::size_t count = std::min(PointBlock::kSize, sweep.points.size() - first);
-    const std::span points(sweep.points.data() + first, count);
-    place_block(points, levelling_, ground.grid(), ground.patches(), block_);
+    const SweepPoint* const points = sweep.points.data() + first;
+    place_block({points, count}, levelling_, ground.grid(), ground.patches(), block);
     for (std::size_t i = 0; i < count; ++i) {
+      const RingPoint point = block.points[i];
       const std::uint16_t ring = points[i].ring;
-      if (ring >= sweep.rings) {
-        ++counters.bad_ring;
-        continue;
-      }
-      const RingPoint& point = block_.points[i];
-      if (point.is_in_range == 0.0F) {
-        if (!points[i].position().allFinite()) ++counters.not_finite;
+      if (point.is_in_range == 0.0F || ring >= rings) {
+        if (ring >= rings) {
+          ++counters.bad_ring;
+        } else if (!points[i].position().allFinite()) {
+          ++counters.not_finite;
+        }
         continue;
       }
       Filling& here = filling[ring];
@@ -122,7 +130,7 @@ bool RingCloud::scatter(const PointSweep& sweep, const GroundSurface& ground,
 
 /// Moves the ring's first points behind its last so that no object lies on both of its ends.
 void RingCloud::cut_ring(std::size_t ring, float lowest_m) {
-  const RingPoint* const slot = points_.data() + ring * slot_;
+  const RingPoint* const slot = points_.get() + ring * slot_;
   const RingPoint* const next = filling_[ring].next;
   const auto count =
       static_cast<std::size_t>(spin_.is_leftward ? next - slot : slot + slot_ - 1 - next);
@@ -174,6 +182,23 @@ void RingCloud::measure_step(std::size_t ring) {
   steps_[ring] = *middle;
 }
 
+/// The mean of some of its points.
+void RingCloud::measure_slope(std::size_t ring) {
+  const Eigen::Matrix3f vehicle_R_level = levelling_.level_R_vehicle.transpose();
+  const std::size_t stride = (ends_[ring] - begins_[ring]) / kSlopes + 1;
+  float sum = 0.0F;
+  float count = 0.0F;
+  for (std::size_t i = begins_[ring]; i < ends_[ring]; i += stride) {
+    const RingPoint& point = points_[i];
+    const Eigen::Vector3f beam =
+        vehicle_R_level * (Eigen::Vector3f(point.x_m, point.y_m, point.z_m) - levelling_.sensor_m -
+                           point.time_s * levelling_.velocity_mps);
+    sum += beam.z() / beam.head<2>().norm();
+    count += 1.0F;
+  }
+  if (count > 0.0F) slopes_[ring] = sum / count;
+}
+
 std::size_t RingCloud::first_at(std::size_t ring, float azimuth_rad) const {
   const std::size_t begin = begins_[ring];
   const std::size_t end = ends_[ring];
@@ -207,19 +232,11 @@ std::size_t RingCloud::first_at(std::size_t ring, float azimuth_rad) const {
   return low;
 }
 
-float RingCloud::slope(std::size_t ring, float azimuth_rad) const {
-  const RingPoint* near = &points_[std::min(first_at(ring, azimuth_rad), ends_[ring] - 1)];
-  if (std::abs(std::remainder(near->azimuth_rad - azimuth_rad, kTurn)) < kKnownSlope_rad) {
-    return (near->z_m - sensor_m().z()) / near->range_m;
+float RingCloud::slope(std::size_t ring, const RingPoint& near, float azimuth_rad) const {
+  if (std::abs(wrap_turn(near.azimuth_rad - azimuth_rad)) < kKnownSlope_rad) {
+    return (near.z_m - sensor_m().z()) / near.range_m;
   }
-  return rough_slope(ring, {std::cos(azimuth_rad), std::sin(azimuth_rad)});
-}
-
-float RingCloud::rough_slope(std::size_t ring, const Eigen::Vector2f& towards) const {
-  Eigen::Vector3f beam = levelling_.level_R_vehicle.transpose().leftCols<2>() * towards;
-  beam.z() = spin_.slopes[ring] * beam.head<2>().norm();
-  beam = levelling_.level_R_vehicle * beam;
-  return beam.z() / beam.head<2>().norm();
+  return rough_slopes({std::cos(azimuth_rad), std::sin(azimuth_rad)})(ring);
 }
 
 }  // namespace understory

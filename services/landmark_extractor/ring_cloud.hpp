@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -25,6 +26,28 @@ struct PointCounters {
   std::uint64_t bad_ring = 0;  ///< A ring that the sensor does not have.
 };
 
+/// Rise of every ring's beams per metre of range in one direction.
+class RoughSlopes {
+ public:
+  /// `slopes`: of the rings, frame `vehicle`; `towards`: unit, frame `vehicle_level`.
+  RoughSlopes(const Eigen::Matrix3f& level_R_vehicle, const std::vector<float>& slopes,
+              const Eigen::Vector2f& towards)
+      : slopes_(slopes) {
+    const Eigen::Vector3f beam = level_R_vehicle.transpose().leftCols<2>() * towards;
+    ahead_ = level_R_vehicle.leftCols<2>() * beam.head<2>();
+    up_ = level_R_vehicle.col(2) * beam.head<2>().norm();
+  }
+  float operator()(std::size_t ring) const {
+    const Eigen::Vector3f beam = ahead_ + slopes_[ring] * up_;
+    return beam.z() / beam.head<2>().norm();
+  }
+
+ private:
+  std::span<const float> slopes_;
+  Eigen::Vector3f ahead_;
+  Eigen::Vector3f up_;
+};
+
 /// Keeps its memory from sweep to sweep.
 class RingCloud {
  public:
@@ -41,13 +64,15 @@ class RingCloud {
 
   std::size_t rings() const { return steps_.size(); }
   /// Of all rings, by index; between the rings are gaps, which mean nothing.
-  std::span<const RingPoint> points() const { return points_; }
+  std::span<const RingPoint> points() const { return {points_.get(), capacity_}; }
   std::size_t ring_begin(std::size_t ring) const { return begins_[ring]; }
   std::size_t ring_end(std::size_t ring) const { return ends_[ring]; }
   /// Azimuth from beam to beam [rad]; 0 for a ring with too few points to tell.
   float step_rad(std::size_t ring) const { return steps_[ring]; }
   /// Of the sensor at utime, frame `vehicle_level`.
   const Eigen::Vector3f& sensor_m() const { return levelling_.sensor_m; }
+  /// Of the sensor during the turn, frame `vehicle_level`.
+  const Eigen::Vector3f& level_velocity_mps() const { return levelling_.velocity_mps; }
   /// Of the sensor during the turn, as its points tell; frame `vehicle`, in the plan.
   const Eigen::Vector2f& velocity_mps() const { return spin_.velocity_mps; }
   /// Where the sensor was when it measured the point, and whereto it looked.
@@ -56,11 +81,18 @@ class RingCloud {
         (sensor_m().head<2>() + point.time_s * levelling_.velocity_mps.head<2>()).cast<double>();
     return {origin, (point.position() - origin) / static_cast<double>(point.range_m)};
   }
-  /// The same as slope() without a look at the points: good to a few centimetres in height.
-  float rough_slope(std::size_t ring, const Eigen::Vector2f& towards) const;
+  /// What slope() is without a look at the points: good to a few centimetres in height.
+  RoughSlopes rough_slopes(const Eigen::Vector2f& towards) const {
+    return {levelling_.level_R_vehicle, slopes_, towards};
+  }
   /// Rise of a ring's beams per metre of range where they look into the direction. Precondition:
   /// the ring has points.
-  float slope(std::size_t ring, float azimuth_rad) const;
+  float slope(std::size_t ring, float azimuth_rad) const {
+    return slope(ring, points_[std::min(first_at(ring, azimuth_rad), ends_[ring] - 1)],
+                 azimuth_rad);
+  }
+  /// The same where a point of the ring in that direction is known.
+  float slope(std::size_t ring, const RingPoint& near, float azimuth_rad) const;
   /// The first point of the ring at or beyond the azimuth (any turn), as an index into points();
   /// ring_end(ring) where there is none.
   std::size_t first_at(std::size_t ring, float azimuth_rad) const;
@@ -79,16 +111,19 @@ class RingCloud {
   bool scatter(const PointSweep& sweep, const GroundSurface& ground, PointCounters& counters);
   void cut_ring(std::size_t ring, float lowest_m);
   void measure_step(std::size_t ring);
+  void measure_slope(std::size_t ring);
 
   SpinFitter spin_fitter_;
   Levelling levelling_;
   PointBlock block_;
-  std::vector<RingPoint> points_;  ///< A slot per ring, twice as long as the ring at least.
-  std::size_t slot_ = 0;           ///< Points from slot to slot.
+  std::unique_ptr<RingPoint[]> points_;  ///< A slot per ring, twice as long as it at least.
+  std::size_t capacity_ = 0;
+  std::size_t slot_ = 0;  ///< Points from slot to slot.
   std::vector<Filling> filling_;
   std::vector<std::size_t> begins_;
   std::vector<std::size_t> ends_;
   std::vector<float> steps_;
+  std::vector<float> slopes_;  ///< Rise per metre of range, frame `vehicle`; NaN = no points.
   std::vector<float> differences_;
   Spin spin_;
 };

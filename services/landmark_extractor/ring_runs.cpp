@@ -16,6 +16,8 @@ class RunFinder {
  public:
   RunFinder(const RingCloud& cloud, const SweepParameters& parameters, std::size_t ring)
       : points_(cloud.points()),
+        sensor_(cloud.sensor_m()),
+        velocity_(cloud.level_velocity_mps()),
         begin_(cloud.ring_begin(ring)),
         end_(cloud.ring_end(ring)),
         ring_(ring),
@@ -34,7 +36,7 @@ class RunFinder {
       }
       std::size_t last = i;
       while (last + 1 < end_ && is_object(points_[last + 1]) && joined(last, last + 1)) ++last;
-      runs.push_back(describe(i, last));
+      add(i, last, runs);
       i = last + 1;
     }
   }
@@ -65,13 +67,22 @@ class RunFinder {
     return points_[beyond].height_m <= lowest_ ? Border::kClear : Border::kCrowded;
   }
 
-  Run describe(std::size_t first, std::size_t last) const {
+  /// Runs that are neither a trunk's slice nor a piece of a wall are of no use.
+  void add(std::size_t first, std::size_t last, std::vector<Run>& runs) const {
     Run run;
     run.first = static_cast<std::uint32_t>(first);
     run.last = static_cast<std::uint32_t>(last);
     run.ring = static_cast<std::uint16_t>(ring_);
     run.right = border(first, first > begin_ ? first - 1 : end_ - 1);
     run.left = border(last, last + 1 < end_ ? last + 1 : begin_);
+    if (!run.stands_alone() && run.size() < kLeastOfWall) return;
+    describe(run);
+    runs.push_back(run);
+  }
+
+  void describe(Run& run) const {
+    const std::size_t first = run.first;
+    const std::size_t last = run.last;
     float nearest = points_[first].range_m;
     float z = 0.0F;
     float height = 0.0F;
@@ -86,20 +97,26 @@ class RunFinder {
     run.height_m = height / count;
     run.width_m = nearest * (points_[last].azimuth_rad - points_[first].azimuth_rad + step_);
     place(run);
-    return run;
   }
 
   void place(Run& run) const {
     const RingPoint& middle = points_[(run.first + run.last) / 2];
-    const float azimuth = 0.5F * (points_[run.first].azimuth_rad + points_[run.last].azimuth_rad);
     const float behind = run.nearest_m + 0.5F * run.width_m;
     // Relative to a point of the run: the sensor moved during the turn.
-    const float from = middle.range_m;
-    run.x_m = middle.x_m + behind * std::cos(azimuth) - from * std::cos(middle.azimuth_rad);
-    run.y_m = middle.y_m + behind * std::sin(azimuth) - from * std::sin(middle.azimuth_rad);
+    const Eigen::Vector2f origin = sensor_.head<2>() + middle.time_s * velocity_.head<2>();
+    const Eigen::Vector2f beam =
+        (Eigen::Vector2f(middle.x_m, middle.y_m) - origin) / middle.range_m;
+    // By a few steps at most, as far as it is a trunk's.
+    const float turn = 0.5F * (points_[run.first].azimuth_rad + points_[run.last].azimuth_rad) -
+                       middle.azimuth_rad;
+    const float cosine = 1.0F - 0.5F * turn * turn;
+    run.x_m = origin.x() + behind * (cosine * beam.x() - turn * beam.y());
+    run.y_m = origin.y() + behind * (cosine * beam.y() + turn * beam.x());
   }
 
   std::span<const RingPoint> points_;
+  Eigen::Vector3f sensor_;
+  Eigen::Vector3f velocity_;
   std::size_t begin_;
   std::size_t end_;
   std::size_t ring_;

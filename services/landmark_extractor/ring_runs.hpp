@@ -10,6 +10,9 @@
 
 namespace understory {
 
+/// Fewest points of a straight piece of a wall.
+inline constexpr std::size_t kLeastOfWall = 5;
+
 /// Points first..last (both included) of the cloud, all of one ring and above the ground.
 struct Run {
   std::uint32_t first = 0;
@@ -33,7 +36,8 @@ struct Run {
   }
 };
 
-/// Adds the runs of one ring in order of azimuth. Precondition: its points know their height.
+/// Adds the runs of one ring that may be of a trunk or a wall, in order of azimuth. Precondition:
+/// its points know their height.
 void find_runs(const RingCloud& cloud, const SweepParameters& parameters, std::size_t ring,
                std::vector<Run>& runs);
 

@@ -11,8 +11,12 @@ namespace {
 
 constexpr float kTurn = 2.0F * std::numbers::pi_v<float>;
 /// So many points tell the motion well enough.
-constexpr std::size_t kSample = 3000;
+constexpr std::size_t kSample = 2000;
+constexpr std::size_t kTogether = 4;
 constexpr int kRounds = 3;
+/// What one more round would change is less than the square of this in parts of the range.
+constexpr double kSettledRate = 0.01;
+constexpr double kSettledSpeed_mps = 0.3;
 /// So many neighbours tell the rate of the spin well enough to begin with.
 constexpr std::size_t kRates = 300;
 /// Beams turn evenly to this [rad]; a motor that does not says nothing of the motion.
@@ -33,10 +37,9 @@ float SpinFitter::look_at_neighbours(const PointSweep& sweep, std::uint16_t ring
   for (const SweepPoint& point : sweep.points) {
     if (point.ring != ring) continue;
     if (previous != nullptr) {
-      const float change = std::remainder(fast_atan2(point.y_m - cy, point.x_m - cx) -
-                                              fast_atan2(previous->y_m - cy, previous->x_m - cx),
-                                          kTurn);
-      if (std::isfinite(change)) {
+      const float change = fast_atan2(point.y_m - cy, point.x_m - cx) -
+                           fast_atan2(previous->y_m - cy, previous->x_m - cx);
+      if (std::abs(change) < 0.5F * kTurn) {
         ++seen;
         leftward += change > 0.0F ? 1 : -1;
         const float time = point.time_s - previous->time_s;
@@ -54,41 +57,50 @@ float SpinFitter::look_at_neighbours(const PointSweep& sweep, std::uint16_t ring
 }
 
 void SpinFitter::take_samples(const PointSweep& sweep, double max_range_m) {
-  const std::size_t stride = std::max<std::size_t>(1, sweep.points.size() / kSample);
-  // Prime to the number of rings, so that every ring gets its share.
-  const std::size_t step = stride + (stride % 2 == 0 ? 1 : 0);
+  // Some neighbours at a time, which memory brings together.
+  const std::size_t stride = kTogether * std::max<std::size_t>(1, sweep.points.size() / kSample);
   samples_.clear();
   means_.assign(sweep.rings, {});
   const Eigen::Vector3f sensor = sweep.sensor_position_m.cast<float>();
-  for (std::size_t i = 0; i < sweep.points.size(); i += step) {
-    const SweepPoint& point = sweep.points[i];
-    if (point.ring >= sweep.rings) continue;
+  const auto take = [&](const SweepPoint& point) {
+    if (point.ring >= sweep.rings) return;
     const Eigen::Vector3f p = point.position() - sensor;
     const float range = std::sqrt(p.x() * p.x() + p.y() * p.y());
-    if (!(range > 1.0F && range < static_cast<float>(max_range_m)) || !p.allFinite()) continue;
+    if (!(range > 1.0F && range < static_cast<float>(max_range_m)) || !p.allFinite()) return;
     samples_.push_back({p.x(), p.y(), point.time_s, point.ring});
-    means_[point.ring].slope_sum += p.z() / range;
-    means_[point.ring].slopes += 1.0F;
+    ++means_[point.ring].samples;
+  };
+  std::size_t shift = 0;
+  for (std::size_t first = 0; first < sweep.points.size(); first += stride + shift) {
+    const std::size_t end = std::min(first + kTogether, sweep.points.size());
+    for (std::size_t i = first; i < end; ++i) take(sweep.points[i]);
+    // By turns longer and shorter, so that every ring gets its share.
+    shift = (shift + kTogether + 1) % (3 * kTogether);
   }
 }
 
-void SpinFitter::improve() {
+bool SpinFitter::improve() {
   for (Means& mean : means_) {
     mean.count = 0.0;
     mean.sum.setZero();
   }
-  Eigen::Matrix4d sums = Eigen::Matrix4d::Zero();
-  for (const Sample& sample : samples_) {
-    const float x = sample.x - static_cast<float>(velocity_.x()) * sample.time_s;
-    const float y = sample.y - static_cast<float>(velocity_.y()) * sample.time_s;
-    const float range2 = x * x + y * y;
-    const float turned = fast_atan2(y, x) - static_cast<float>(rate_) * sample.time_s;
-    Means& mean = means_[sample.ring];
-    if (mean.count == 0.0) mean.offset = turned;
-    const float residual = std::remainder(turned - mean.offset, kTurn);
+  rows_.resize(samples_.size());
+  const Eigen::Vector2f velocity = velocity_.cast<float>();
+  const auto rate = static_cast<float>(rate_);
+  for (std::size_t i = 0; i < samples_.size(); ++i) {
+    const Sample& sample = samples_[i];
+    const float x = sample.x - velocity.x() * sample.time_s;
+    const float y = sample.y - velocity.y() * sample.time_s;
     // d azimuth / d velocity = time * (y, -x) / range^2.
-    const float lever = sample.time_s / range2;
-    const Eigen::Vector4d row(sample.time_s, lever * y, -lever * x, residual);
+    const float lever = sample.time_s / (x * x + y * y);
+    rows_[i] = {sample.time_s, lever * y, -lever * x, fast_atan2(y, x) - rate * sample.time_s};
+  }
+  Eigen::Matrix4d sums = Eigen::Matrix4d::Zero();
+  for (std::size_t i = 0; i < samples_.size(); ++i) {
+    Means& mean = means_[samples_[i].ring];
+    if (mean.count == 0.0) mean.offset = rows_[i].turned;
+    const Eigen::Vector4d row(rows_[i].time_s, rows_[i].by_x, rows_[i].by_y,
+                              wrap_turn(rows_[i].turned - mean.offset));
     mean.count += 1.0;
     mean.sum += row;
     sums += row * row.transpose();
@@ -112,30 +124,28 @@ void SpinFitter::improve() {
   residual_rms_ = std::sqrt(std::max(0.0, sums(3, 3) + change.dot(gradient)) / count);
   if (!change.allFinite()) {
     residual_rms_ = std::numeric_limits<double>::infinity();
-    return;
+    return false;
   }
   rate_ += change[0];
   velocity_ += change.tail<2>();
+  return std::abs(change[0]) > kSettledRate || change.tail<2>().norm() > kSettledSpeed_mps;
 }
 
 void SpinFitter::fit(const PointSweep& sweep, double max_range_m, Spin& spin) {
   take_samples(sweep, max_range_m);
   spin.velocity_mps.setZero();
   spin.is_leftward = true;
-  spin.slopes.clear();
   std::size_t fullest = 0;
   for (std::size_t ring = 0; ring < means_.size(); ++ring) {
-    const Means& mean = means_[ring];
-    spin.slopes.push_back(mean.slopes > 0.0F ? mean.slope_sum / mean.slopes
-                                             : std::numeric_limits<float>::quiet_NaN());
-    if (mean.slopes > means_[fullest].slopes) fullest = ring;
+    if (means_[ring].samples > means_[fullest].samples) fullest = ring;
   }
   if (samples_.empty()) return;
   rate_ = look_at_neighbours(sweep, static_cast<std::uint16_t>(fullest), spin);
   if (!sweep.has_times || rate_ == 0.0) return;
   velocity_.setZero();
   residual_rms_ = std::numeric_limits<double>::infinity();
-  for (int round = 0; round < kRounds; ++round) improve();
+  for (int round = 0; round < kRounds && improve(); ++round) {
+  }
   if (residual_rms_ < kEvenness) spin.velocity_mps = velocity_.cast<float>();
 }
 

@@ -17,7 +17,6 @@ struct Spin {
   /// Of the sensor in the plan; zero where the times are unknown or do not fit.
   Eigen::Vector2f velocity_mps = Eigen::Vector2f::Zero();
   bool is_leftward = true;
-  std::vector<float> slopes;  ///< Per ring: rise of its beams per metre of range; NaN = no points.
 };
 
 /// A sensor turns evenly: the azimuth of its beams grows linearly with time, each ring from an
@@ -36,25 +35,41 @@ class SpinFitter {
     float time_s;
     std::uint16_t ring;
   };
+  /// What one sample says: time, d azimuth / d velocity, azimuth without the spin.
+  struct Row {
+    float time_s;
+    float by_x;
+    float by_y;
+    float turned;
+  };
   struct Means {
     double count = 0.0;
     Eigen::Vector4d sum = Eigen::Vector4d::Zero();  ///< Of (t, d azimuth / d velocity, residual).
     float offset = 0.0F;                            ///< Of the first residual.
-    float slope_sum = 0.0F;
-    float slopes = 0.0F;
+    std::size_t samples = 0;
   };
 
   void take_samples(const PointSweep& sweep, double max_range_m);
   float look_at_neighbours(const PointSweep& sweep, std::uint16_t ring, Spin& spin);
-  void improve();
+  /// Whether there is more to improve.
+  bool improve();
 
   std::vector<Sample> samples_;
+  std::vector<Row> rows_;
   std::vector<Means> means_;  ///< Per ring.
   std::vector<float> rates_;
   double rate_ = 0.0;  ///< [rad/s]
   Eigen::Vector2d velocity_ = Eigen::Vector2d::Zero();
   double residual_rms_ = 0.0;
 };
+
+/// The same angle between -pi and pi, for few turns.
+inline float wrap_turn(float angle_rad) {
+  constexpr float kTurn = 2.0F * std::numbers::pi_v<float>;
+  const float turns = angle_rad * (1.0F / kTurn);
+  return angle_rad -
+         kTurn * static_cast<float>(static_cast<int>(turns + (turns < 0 ? -0.5F : 0.5F)));
+}
 
 /// atan2 to 1e-5 rad without a branch on the data (polynomial of least maximum error).
 inline float fast_atan2(float y, float x) {

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
+
+#include "services/landmark_extractor/spin_fit.hpp"
 
 namespace understory {
 namespace {
@@ -31,12 +32,10 @@ double largest_axis_sigma(const StemFit& fit, double z) {
 }
 
 float azimuth_of(const Eigen::Vector2d& offset) {
-  return static_cast<float>(std::atan2(offset.y(), offset.x()));
+  return fast_atan2(static_cast<float>(offset.y()), static_cast<float>(offset.x()));
 }
 
-float apart(float a, float b) {
-  return std::abs(std::remainder(a - b, 2.0F * std::numbers::pi_v<float>));
-}
+float apart(float a, float b) { return std::abs(wrap_turn(a - b)); }
 
 /// One ring's look at a stem.
 class Look {
@@ -44,11 +43,13 @@ class Look {
   Look(const RingCloud& cloud, std::size_t ring, const StemFit& fit, double clearance)
       : cloud_(cloud), ring_(ring), fit_(fit), clearance_(clearance) {
     const Eigen::Vector2d sensor = cloud.sensor_m().head<2>().cast<double>();
-    Eigen::Vector2d offset = fit.state.head<2>() - sensor;
     // The sensor was elsewhere when its beams passed there: their azimuth says when.
-    origin_ = cloud.sight(at(cloud.first_at(ring, azimuth_of(offset)))).origin_m;
+    Eigen::Vector2d offset = fit.state.head<2>() - sensor;
+    index_ = cloud.first_at(ring, azimuth_of(offset));
+    const RingPoint& near = at(index_);
+    origin_ = cloud.sight(near).origin_m;
     offset = fit.state.head<2>() - origin_;
-    z_m_ = cloud.sensor_m().z() + cloud.slope(ring, azimuth_of(offset)) * offset.norm();
+    z_m_ = cloud.sensor_m().z() + cloud.slope(ring, near, azimuth_of(offset)) * offset.norm();
   }
 
   /// Height of the ring where it passes the stem.
@@ -62,7 +63,7 @@ class Look {
     if (core <= 0.0 || distance <= radius) return Met::kUnknown;
     const float azimuth = azimuth_of(offset);
     const auto half = static_cast<float>(core / distance);
-    const std::size_t first = cloud_.first_at(ring_, azimuth - half);
+    const std::size_t first = first_beyond(azimuth - half);
     const std::size_t count = cloud_.ring_end(ring_) - cloud_.ring_begin(ring_);
     Met result = Met::kUnknown;
     std::size_t seen = 0;
@@ -82,6 +83,24 @@ class Look {
   }
 
  private:
+  /// From where the stem is in the ring, the few points back or forth to an azimuth near by.
+  std::size_t first_beyond(float azimuth) const {
+    const std::size_t begin = cloud_.ring_begin(ring_);
+    const std::size_t end = cloud_.ring_end(ring_);
+    const auto beyond = [&](std::size_t i) {
+      return wrap_turn(at(i).azimuth_rad - azimuth) >= 0.0F;
+    };
+    std::size_t i = index_ < end ? index_ : begin;
+    for (std::size_t steps = end - begin; steps > 0; --steps) {
+      if (!beyond(i)) break;
+      i = i > begin ? i - 1 : end - 1;
+    }
+    for (std::size_t steps = end - begin; steps > 0 && !beyond(i); --steps) {
+      i = i + 1 < end ? i + 1 : begin;
+    }
+    return i;
+  }
+
   /// A point of the ring; counts on at its beginning beyond its end.
   const RingPoint& at(std::size_t index) const {
     const std::size_t end = cloud_.ring_end(ring_);
@@ -94,6 +113,7 @@ class Look {
   const StemFit& fit_;
   double clearance_;
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();
+  std::size_t index_ = 0;  ///< Of the point at the stem.
   double z_m_ = 0.0;
 };
 
@@ -108,13 +128,13 @@ StemProbe probe_stem(const RingCloud& cloud, const StemFit& fit, double ground_z
   double highest_through = highest_on;
   const Eigen::Vector2d offset = fit.state.head<2>() - cloud.sensor_m().head<2>().cast<double>();
   const double distance = offset.norm();
-  const Eigen::Vector2f towards = (offset / distance).cast<float>();
+  const RoughSlopes slopes = cloud.rough_slopes((offset / distance).cast<float>());
   const double lowest = std::min(ground_z + kFoot_m, fit.low_z_m) - kMargin_m;
   const double highest =
       std::max(ground_z + parameters.standing_height_m, fit.high_z_m) + kMargin_m;
   for (std::size_t ring = 0; ring < cloud.rings(); ++ring) {
     if (cloud.step_rad(ring) <= 0.0F) continue;
-    const double about = cloud.sensor_m().z() + cloud.rough_slope(ring, towards) * distance;
+    const double about = cloud.sensor_m().z() + slopes(ring) * distance;
     if (about < lowest || about > highest) continue;
     const Look look(cloud, ring, fit, parameters.clearance_m);
     const double z = look.z_m();

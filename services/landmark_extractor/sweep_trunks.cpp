@@ -70,7 +70,6 @@ std::optional<Detection> SweepTrunks::judge(const RingCloud& cloud, const std::v
   }
   const GroundHeight below = ground.below(fit->state.head<2>());
   if (!plausible(*fit, below.height_m + sweep_.breast_height_m)) return std::nullopt;
-  if (!stands(probe_stem(cloud, *fit, below.height_m, sweep_))) return std::nullopt;
   if (is_in_leaves(runs, *fit)) {
     ++counters_.in_leaves;
     return std::nullopt;
@@ -87,6 +86,8 @@ std::optional<Detection> SweepTrunks::judge(const RingCloud& cloud, const std::v
     ++counters_.out_of_range;
     return std::nullopt;
   }
+  // What costs most comes last.
+  if (!stands(probe_stem(cloud, *fit, below.height_m, sweep_))) return std::nullopt;
   return detection;
 }
 

@@ -8,6 +8,8 @@ namespace {
 
 constexpr float kCell_m = 0.5F;
 constexpr int kRounds = 3;
+/// No run has more.
+constexpr std::uint32_t kMostPoints = 0xffffffffU;
 
 Eigen::Vector2f mean_centre(const std::vector<Run>& runs, const std::vector<std::uint32_t>& at) {
   Eigen::Vector2f sum = Eigen::Vector2f::Zero();
@@ -37,15 +39,13 @@ void ColumnFinder::fill_grid(const std::vector<Run>& runs, const SweepTrunkParam
   order_.clear();
   for (std::size_t i = 0; i < runs.size(); ++i) {
     if (!may_be_a_slice(runs[i], parameters)) continue;
-    order_.push_back(static_cast<std::uint32_t>(i));
+    order_.push_back((std::uint64_t{kMostPoints} - runs[i].size()) << 32U | i);
     std::int32_t& head =
         heads_[cell(runs[i].y_m, corner_y_) * side_ + cell(runs[i].x_m, corner_x_)];
     next_[i] = head;
     head = static_cast<std::int32_t>(i);
   }
-  std::stable_sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return runs[a].size() > runs[b].size();
-  });
+  std::sort(order_.begin(), order_.end());
 }
 
 template <class Visit>
@@ -67,7 +67,7 @@ void ColumnFinder::visit_near(const std::vector<Run>& runs, const Eigen::Vector2
 void ColumnFinder::gather(const std::vector<Run>& runs, const Eigen::Vector2f& axis, float radius) {
   gathered_.clear();
   visit_near(runs, axis, radius, [&](std::uint32_t index) {
-    if (!taken_[index]) gathered_.push_back(index);
+    if (taken_[index] == 0) gathered_.push_back(index);
   });
 }
 
@@ -86,11 +86,15 @@ const std::vector<Column>& ColumnFinder::find(const std::vector<Run>& runs,
   corner_x_ = centre_m.x() - reach_m;
   corner_y_ = centre_m.y() - reach_m;
   side_ = static_cast<std::size_t>(std::ceil(2.0F * reach_m / kCell_m)) + 1;
-  taken_.assign(runs.size(), false);
+  taken_.assign(runs.size(), 0);
   columns_.clear();
   fill_grid(runs, parameters);
-  for (const std::uint32_t seed : order_) {
-    if (taken_[seed]) continue;
+  // Each run is in one column at most: what points into it stays true.
+  members_.clear();
+  members_.reserve(order_.size());
+  for (const std::uint64_t entry : order_) {
+    const auto seed = static_cast<std::uint32_t>(entry);
+    if (taken_[seed] != 0) continue;
     Eigen::Vector2f axis(runs[seed].x_m, runs[seed].y_m);
     // Half hidden slices of a thick trunk seem farther apart than whole slices of a thin one.
     const float radius =
@@ -100,19 +104,20 @@ const std::vector<Column>& ColumnFinder::find(const std::vector<Run>& runs,
       if (gathered_.empty()) break;
       axis = mean_centre(runs, gathered_);
     }
-    taken_[seed] = true;
+    taken_[seed] = 1;
     if (gathered_.empty()) continue;
     Column column;
     column.centre_m = axis.cast<double>();
     for (const std::uint32_t i : gathered_) {
-      taken_[i] = true;
+      taken_[i] = 1;
       column.points += runs[i].size();
     }
-    column.runs = gathered_;
-    std::sort(column.runs.begin(), column.runs.end(), [&](std::uint32_t a, std::uint32_t b) {
+    std::sort(gathered_.begin(), gathered_.end(), [&](std::uint32_t a, std::uint32_t b) {
       return runs[a].z_m < runs[b].z_m || (runs[a].z_m == runs[b].z_m && a < b);
     });
-    columns_.push_back(std::move(column));
+    column.runs = {members_.data() + members_.size(), gathered_.size()};
+    members_.insert(members_.end(), gathered_.begin(), gathered_.end());
+    columns_.push_back(column);
   }
   return columns_;
 }

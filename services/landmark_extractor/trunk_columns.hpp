@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "services/landmark_extractor/parameters.hpp"
@@ -9,9 +10,9 @@
 
 namespace understory {
 
-/// Runs that may be slices of one trunk: indices, in order of height.
+/// Runs that may be slices of one trunk.
 struct Column {
-  std::vector<std::uint32_t> runs;
+  std::span<const std::uint32_t> runs;                 ///< Indices, in order of height.
   Eigen::Vector2d centre_m = Eigen::Vector2d::Zero();  ///< Mean of the runs' centres.
   std::size_t points = 0;
 };
@@ -41,11 +42,12 @@ class ColumnFinder {
   float corner_x_ = 0.0F;
   float corner_y_ = 0.0F;
   std::size_t side_ = 0;
-  std::vector<std::int32_t> heads_;  ///< First run per cell, -1 = none.
-  std::vector<std::int32_t> next_;   ///< Next run in the same cell.
-  std::vector<std::uint32_t> order_;
-  std::vector<bool> taken_;
+  std::vector<std::int32_t> heads_;   ///< First run per cell, -1 = none.
+  std::vector<std::int32_t> next_;    ///< Next run in the same cell.
+  std::vector<std::uint64_t> order_;  ///< Runs with most points first.
+  std::vector<std::uint8_t> taken_;
   std::vector<std::uint32_t> gathered_;
+  std::vector<std::uint32_t> members_;  ///< Of all columns, one after the other.
   std::vector<Column> columns_;
 };
 

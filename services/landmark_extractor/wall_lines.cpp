@@ -9,8 +9,6 @@
 namespace understory {
 namespace {
 
-/// Fewest points of a straight piece.
-constexpr std::size_t kMinPoints = 5;
 /// Pieces of one wall have directions that differ by less than this [rad]...
 constexpr double kSameDirection = 0.1;
 /// ... and are found this many rings apart at most: windows and shutters interrupt a wall.
@@ -41,7 +39,7 @@ const std::vector<WallLine>& WallFinder::find(const RingCloud& cloud,
   walls_.clear();
   ring_begins_.assign(cloud.rings() + 1, 0);
   for (const Run& run : runs) {
-    if (run.size() >= kMinPoints && run.width_m > 0.5 * corner_.min_length_m) {
+    if (run.size() >= kLeastOfWall && run.width_m > 0.5 * corner_.min_length_m) {
       split(cloud, run, run.first, run.last);
     }
     ring_begins_[run.ring + std::size_t{1}] = pieces_.size();
@@ -56,7 +54,7 @@ const std::vector<WallLine>& WallFinder::find(const RingCloud& cloud,
 /// Douglas and Peucker: cuts at the point that is farthest from the chord.
 void WallFinder::split(const RingCloud& cloud, const Run& run, std::size_t first,
                        std::size_t last) {
-  if (last - first + 1 < kMinPoints) return;
+  if (last - first + 1 < kLeastOfWall) return;
   const Eigen::Vector2f from(cloud.points()[first].x_m, cloud.points()[first].y_m);
   const Eigen::Vector2f to(cloud.points()[last].x_m, cloud.points()[last].y_m);
   const Eigen::Vector2f along = (to - from).normalized();
