@@ -70,10 +70,7 @@ void CliqueTree::free_blocks(const CliqueRecord& clique) {
   if (clique.rows != nullptr) {
     rows_.give_back(clique.rows, static_cast<std::size_t>(clique.row_count));
   }
-  if (clique.front != nullptr) {
-    const auto size = static_cast<std::size_t>(clique.size);
-    pool_.give_back(clique.front, size * size);
-  }
+  if (clique.panel != nullptr) pool_.give_back(clique.panel, clique.numbers());
 }
 
 void CliqueTree::link_child(int parent, int child) {
@@ -108,14 +105,14 @@ std::vector<int> CliqueTree::undetermined() const {
   if (undetermined_cliques() == 0) return variables;
   for (int c = 1; c < cliques_.size(); ++c) {
     const CliqueRecord& clique = cliques_[c];
-    if (clique.front == nullptr || clique.left_out == 0 || clique.parent == kNone) continue;
+    if (clique.panel == nullptr || clique.left_out == 0 || clique.parent == kNone) continue;
     int column = 0;
     for (int i = 0; i < clique.frontal_count; ++i) {
       const int name = clique.rows[i];
       const int size = dimension(graph_.variable(name).type);
       bool is_left_out = false;
       for (int k = 0; k < size; ++k, ++column) {
-        const double* l = clique.front + static_cast<std::ptrdiff_t>(column) * clique.size;
+        const double* l = clique.panel + static_cast<std::ptrdiff_t>(column) * clique.size;
         // A column of the identity: no measurement gives exactly that.
         const bool identity = l[column] == 1.0 && std::all_of(l + column + 1, l + clique.size,
                                                               [](double x) { return x == 0.0; });
@@ -130,9 +127,8 @@ std::vector<int> CliqueTree::undetermined() const {
 void CliqueTree::commit() {
   cliques_.commit([&](const CliqueRecord& gone) { free_blocks(gone); },
                   [&](const CliqueRecord& before, const CliqueRecord& now) {
-                    if (before.front != nullptr && before.front != now.front) {
-                      const auto size = static_cast<std::size_t>(before.size);
-                      pool_.give_back(before.front, size * size);
+                    if (before.panel != nullptr && before.panel != now.panel) {
+                      pool_.give_back(before.panel, before.numbers());
                     }
                   });
   saved_marks_.structural.assign(structural_.begin(), structural_.end());
@@ -144,10 +140,7 @@ void CliqueTree::rollback() {
   clear_marks();
   cliques_.rollback(
       [&](const CliqueRecord& now, const CliqueRecord& before) {
-        if (now.front != before.front) {
-          const auto size = static_cast<std::size_t>(now.size);
-          pool_.give_back(now.front, size * size);
-        }
+        if (now.panel != before.panel) pool_.give_back(now.panel, now.numbers());
       },
       [&](const CliqueRecord& gone) { free_blocks(gone); });
   mark_.resize(static_cast<std::size_t>(cliques_.size()));

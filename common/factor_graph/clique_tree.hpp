@@ -13,9 +13,9 @@
 
 namespace understory {
 
-/// Variables that are eliminated together. `front` is size x size, column-major, lower triangle:
-/// the columns of L of the frontal variables, then the Schur complement on the separator; the last
-/// row is the right-hand side.
+/// Variables that are eliminated together. `panel` is size x pivots, column-major: the columns of L
+/// of the frontal variables; its last row is the right-hand side. Behind it, where it is kept, the
+/// lower triangle of the Schur complement on the separator, column by column.
 struct CliqueRecord {
   int parent = kNone;
   int first_child = kNone;
@@ -27,9 +27,18 @@ struct CliqueRecord {
   int pivots = 0;            ///< Scalars of the frontal variables.
   int size = 0;              ///< Scalars of all, and the right-hand side.
   int left_out = 0;          ///< Pivots without information.
+  bool keeps_schur = true;
   int* rows = nullptr;
-  double* front = nullptr;
-  std::uint64_t front_epoch = 0;
+  double* panel = nullptr;
+  std::uint64_t panel_epoch = 0;
+
+  std::size_t panel_numbers() const {
+    return static_cast<std::size_t>(size) * static_cast<std::size_t>(pivots);
+  }
+  std::size_t numbers() const {
+    const auto rest = static_cast<std::size_t>(size - pivots);
+    return panel_numbers() + (keeps_schur ? rest * (rest + 1) / 2 : 0);
+  }
 };
 
 struct TreeStatistics {
@@ -63,6 +72,8 @@ class CliqueTree {
   void solve_everything(double threshold);
   const std::vector<int>& changed() const { return changed_; }
   const std::vector<Delta>& changed_from() const { return changed_from_; }
+  /// What the last solve takes off the sum of squares of the linearised factors.
+  double promised_decrease() const { return promised_decrease_; }
 
   /// Joint covariance of variables in the order given; in their charts. None where one is not in
   /// the tree or the measurements leave one undetermined.
@@ -88,6 +99,13 @@ class CliqueTree {
     std::vector<int> dirty;
     double total_flops = 0.0;
   };
+  /// One front at work: size x size, lower triangle.
+  struct Workspace {
+    std::vector<double> numbers;
+    double* front = nullptr;
+    std::vector<int> offset;  ///< Per variable: first row.
+    std::vector<double> least;
+  };
   enum Mark : char { kClean = 0, kDirty = 1, kStructural = 2 };
 
   // clique_tree.cpp
@@ -110,10 +128,13 @@ class CliqueTree {
   // clique_tree_eliminate.cpp
   void order_dirty();
   void factorise(int clique);
-  void place_rows(const CliqueRecord& clique);
-  void add_factors(const CliqueRecord& clique);
-  void add_children(const CliqueRecord& clique);
-  void add_schur(const CliqueRecord& child, double* front, int size);
+  int compute(const CliqueRecord& clique, Workspace& at);
+  void assemble(const CliqueRecord& clique, Workspace& at);
+  void place_rows(const CliqueRecord& clique, Workspace& at) const;
+  void add_factors(const CliqueRecord& clique, Workspace& at);
+  void add_child(const CliqueRecord& child, Workspace& at, int size);
+  template <typename ColumnOf>
+  void add_schur(const CliqueRecord& child, const ColumnOf& column_of, Workspace& at, int size);
 
   // clique_tree_solve.cpp
   void solve_clique(int clique, double threshold);
@@ -147,8 +168,9 @@ class CliqueTree {
   std::vector<int> orphans_;
   std::vector<int> made_;     ///< Cliques computed by the last eliminate(), children first.
   std::vector<int> pending_;  ///< Per clique: dirty children not yet computed.
-  std::vector<int> offset_;   ///< Per variable: first row in the front at work.
-  std::vector<double> least_;
+  std::vector<int> offset_;   ///< Per variable: first row.
+  Workspace work_space_;
+  Workspace leaf_space_;  ///< Of a child that is computed for its parent's sake.
   std::vector<int> left_out_;
   struct Run {
     int from, to, length;
@@ -161,6 +183,7 @@ class CliqueTree {
   std::vector<Delta> changed_from_;
   std::vector<std::uint64_t> changed_at_;  ///< Per variable: number of the solve that moved it.
   std::uint64_t solve_count_ = 0;
+  double promised_decrease_ = 0.0;
   std::vector<int> path_;
   std::vector<char> on_path_;
   Eigen::MatrixXd right_;  ///< Rows of the paths' variables.

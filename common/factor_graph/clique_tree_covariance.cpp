@@ -6,11 +6,8 @@
 namespace understory {
 namespace {
 
-using ConstFront =
-    Eigen::Map<const Eigen::MatrixXd, Eigen::Unaligned, Eigen::OuterStride<Eigen::Dynamic>>;
-
-ConstFront front_of(const CliqueRecord& clique) {
-  return {clique.front, clique.size, clique.size, Eigen::OuterStride<Eigen::Dynamic>(clique.size)};
+Eigen::Map<const Eigen::MatrixXd> panel_of(const CliqueRecord& clique) {
+  return {clique.panel, clique.size, clique.pivots};
 }
 
 }  // namespace
@@ -48,14 +45,14 @@ void CliqueTree::collect_paths(std::span<const int> variables) {
 
 /// right := L^-1 right for the clique's columns.
 void CliqueTree::forward(const CliqueRecord& clique) {
-  const ConstFront front = front_of(clique);
+  const Eigen::Map<const Eigen::MatrixXd> panel = panel_of(clique);
   const Eigen::Index f = clique.pivots;
   const Eigen::Index s = clique.size - 1 - f;
   const Eigen::Index first = offset_[static_cast<std::size_t>(clique.rows[0])];
   auto own = right_.middleRows(first, f);
-  front.topLeftCorner(f, f).triangularView<Eigen::Lower>().solveInPlace(own);
+  panel.topLeftCorner(f, f).triangularView<Eigen::Lower>().solveInPlace(own);
   if (s == 0) return;
-  work_.noalias() = front.block(f, 0, s, f) * own;
+  work_.noalias() = panel.block(f, 0, s, f) * own;
   Eigen::Index row = 0;
   for (int i = clique.frontal_count; i < clique.row_count; ++i) {
     const int size = dimension(graph_.variable(clique.rows[i]).type);
@@ -67,7 +64,7 @@ void CliqueTree::forward(const CliqueRecord& clique) {
 
 /// right := L^-T right for the clique's columns.
 void CliqueTree::backward(const CliqueRecord& clique) {
-  const ConstFront front = front_of(clique);
+  const Eigen::Map<const Eigen::MatrixXd> panel = panel_of(clique);
   const Eigen::Index f = clique.pivots;
   const Eigen::Index s = clique.size - 1 - f;
   auto own = right_.middleRows(offset_[static_cast<std::size_t>(clique.rows[0])], f);
@@ -80,9 +77,9 @@ void CliqueTree::backward(const CliqueRecord& clique) {
           right_.middleRows(offset_[static_cast<std::size_t>(clique.rows[i])], size);
       row += size;
     }
-    own.noalias() -= front.block(f, 0, s, f).transpose() * work_;
+    own.noalias() -= panel.block(f, 0, s, f).transpose() * work_;
   }
-  front.topLeftCorner(f, f).transpose().triangularView<Eigen::Upper>().solveInPlace(own);
+  panel.topLeftCorner(f, f).transpose().triangularView<Eigen::Upper>().solveInPlace(own);
 }
 
 std::optional<Eigen::MatrixXd> CliqueTree::joint_covariance(std::span<const int> variables) {

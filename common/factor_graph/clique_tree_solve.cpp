@@ -16,15 +16,16 @@ void CliqueTree::solve_clique(int id, double threshold) {
     std::copy_n(variable.delta.begin(), size, step_.begin() + row);
     row += size;
   }
-  kernel_.back_substitute(clique.front, clique.size, clique.pivots, step_.data());
+  kernel_.back_substitute(clique.panel, clique.size, clique.pivots, step_.data());
   int first = 0;
   for (int i = 0; i < clique.frontal_count; ++i) {
     const int name = clique.rows[i];
     const VariableRecord& variable = graph_.variable(name);
     const int size = dimension(variable.type);
     double largest = 0.0;
+    double squared = 0.0;
     for (int c = 0; c < size; ++c) {
-      const double* column = clique.front + static_cast<std::ptrdiff_t>(first + c) * clique.size;
+      const double* column = clique.panel + static_cast<std::ptrdiff_t>(first + c) * clique.size;
       double whitened = 0.0;
       for (int r = c; r < size; ++r) {
         const auto at = static_cast<std::size_t>(r);
@@ -32,8 +33,10 @@ void CliqueTree::solve_clique(int id, double threshold) {
             column[first + r] * (step_[static_cast<std::size_t>(first + r)] - variable.delta[at]);
       }
       largest = std::max(largest, std::abs(whitened));
+      squared += whitened * whitened;
     }
     if (largest > threshold) {
+      promised_decrease_ += squared;
       changed_.push_back(name);
       changed_from_.push_back(variable.delta);
       changed_at_[static_cast<std::size_t>(name)] = solve_count_;
@@ -73,6 +76,7 @@ void CliqueTree::solve_below(int id, double threshold) {
 
 void CliqueTree::solve(double threshold) {
   ++solve_count_;
+  promised_decrease_ = 0.0;
   changed_.clear();
   changed_from_.clear();
   changed_at_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);

@@ -208,34 +208,33 @@ void FactorGraph::linearise(int id) {
 
 Deviation FactorGraph::deviation(int id) const {
   const FactorRecord& record = factors_[id];
-  const int rows = record.rows;
-  scratch_.resize(static_cast<std::size_t>(2 * rows));
   const std::span<const int> variables = variables_of(id);
-  whitened(record, variables, scratch_.data(), nullptr);
-  const double* j = record.linear;
-  const double* b = j + static_cast<std::ptrdiff_t>(rows) * record.columns;
-  const double* age = b + rows;
-  double* off = scratch_.data() + rows;
-  double squared = 0.0;
-  for (int i = 0; i < rows; ++i) {
-    off[i] = -b[i];
-    squared += scratch_[static_cast<std::size_t>(i)] * scratch_[static_cast<std::size_t>(i)];
-  }
+  scratch_.resize(static_cast<std::size_t>(2 * record.rows + record.columns));
+  double* residual = scratch_.data();
+  whitened(record, variables, residual, nullptr);
+  double* moves = residual + 2 * record.rows;
+  double* next = moves;
   for (const int name : variables) {
     const VariableRecord& variable = variables_[name];
-    const int size = dimension(variable.type);
-    for (int k = 0; k < size; ++k, j += rows) {
-      const double delta = variable.delta[static_cast<std::size_t>(k)];
-      for (int i = 0; i < rows; ++i) off[i] += delta * j[i];
-    }
+    next = std::copy_n(variable.delta.data(), dimension(variable.type), next);
   }
+  const double* age =
+      record.linear + static_cast<std::ptrdiff_t>(record.rows) * (record.columns + 1);
+  double squared = 0.0;
   double predicted = 0.0;
   double off2 = 0.0;
-  for (int i = 0; i < rows; ++i) {
-    predicted += off[i] * off[i];
-    const double d = age[0] * scratch_[static_cast<std::size_t>(i)] - off[i];
-    off2 += d * d;
-  }
+  with_sizes(record.rows, record.columns, [&]<int rows, int columns>() {
+    const Map<const Matrix<double, rows, 1>> e(residual, record.rows);
+    const Map<const Matrix<double, rows, columns>> j(record.linear, record.rows, record.columns);
+    const Map<const Matrix<double, rows, 1>> b(j.data() + j.size(), record.rows);
+    const Map<const Matrix<double, columns, 1>> delta(moves, record.columns);
+    Map<Matrix<double, rows, 1>> linear(residual + record.rows, record.rows);
+    linear.noalias() = j * delta;
+    linear -= b;
+    squared = e.squaredNorm();
+    predicted = linear.squaredNorm();
+    off2 = (age[0] * e - linear).squaredNorm();
+  });
   double reweighted = 0.0;
   if (record.loss.kernel != RobustKernel::kNone) {
     reweighted = std::sqrt(evaluate(record.loss, squared).weight) - age[0];

@@ -21,6 +21,7 @@ struct FrontKernel {
 FrontKernel front_kernel();
 
 FrontKernel front_kernel_portable();
-FrontKernel front_kernel_avx2();  ///< Empty where the compiler does not know it.
+FrontKernel front_kernel_avx2();    ///< Empty where the compiler does not know it.
+FrontKernel front_kernel_avx512();  ///< The same.
 
 }  // namespace understory

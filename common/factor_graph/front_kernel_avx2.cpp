@@ -5,7 +5,7 @@
 namespace understory {
 
 #if defined(__AVX2__) && defined(__FMA__)
-FrontKernel front_kernel_avx2() { return {&partial_cholesky<4>, &solve_pivots<4>}; }
+FrontKernel front_kernel_avx2() { return {&partial_cholesky<4, 4>, &solve_pivots<4>}; }
 #else
 FrontKernel front_kernel_avx2() { return {}; }
 #endif

@@ -63,20 +63,21 @@ inline void update_columns(double* front, long ld, long j, long depth) {
     update_tile<width, 1, columns>(front, ld, i, j, depth);
     i += width;
   }
+  if constexpr (width > 4) {
+    if (i + width / 2 <= ld) {
+      update_tile<width / 2, 1, columns>(front, ld, i, j, depth);
+      i += width / 2;
+    }
+  }
   for (; i < ld; ++i) update_row<columns>(front, ld, i, j, depth);
 }
 
-template <int width>
+template <int width, int most>
 inline void update_some(double* front, long ld, long j, long count, long depth) {
-  if (count == 4) {
-    update_columns<width, 4>(front, ld, j, depth);
-  } else if (count == 3) {
-    update_columns<width, 3>(front, ld, j, depth);
-  } else if (count == 2) {
-    update_columns<width, 2>(front, ld, j, depth);
-  } else {
-    update_columns<width, 1>(front, ld, j, depth);
+  if constexpr (most > 1) {
+    if (count < most) return update_some<width, most - 1>(front, ld, j, count, depth);
   }
+  update_columns<width, most>(front, ld, j, depth);
 }
 
 /// Columns j .. j + count of L, from what the columns before left of them.
@@ -105,18 +106,19 @@ inline int factorise_columns(double* front, long ld, long j, long count, const d
   return bad;
 }
 
-template <int width>
+/// `panel`: columns at once; as many as the accumulators of a tile leave room for.
+template <int width, int panel>
 int partial_cholesky(double* front, int size, int pivots, const double* least, int* left_out) {
-  constexpr long kColumns = 4;
+  constexpr long kColumns = panel;
   const long ld = size;
   int bad = 0;
   for (long j = 0; j < pivots; j += kColumns) {
     const long count = pivots - j < kColumns ? pivots - j : kColumns;
-    if (j > 0) update_some<width>(front, ld, j, count, j);
+    if (j > 0) update_some<width, panel>(front, ld, j, count, j);
     bad += factorise_columns(front, ld, j, count, least, left_out + bad);
   }
   for (long j = pivots; j < ld; j += kColumns) {
-    update_some<width>(front, ld, j, ld - j < kColumns ? ld - j : kColumns, pivots);
+    update_some<width, panel>(front, ld, j, ld - j < kColumns ? ld - j : kColumns, pivots);
   }
   return bad;
 }

@@ -14,10 +14,15 @@ constexpr double kFarTurn = 0.6;
 constexpr double kToleratedPart = 0.1;
 constexpr double kToleratedRounding = 1e-3;  ///< The same of thorough updates, which start fresh.
 constexpr int kMaxHalvings = 8;
+/// A second step of an update is looked at where the linearisations leave out this part of the
+/// loss; it must keep the other part of what it promised.
+constexpr double kNoticedPart = 0.01;
+constexpr double kLeastGain = 0.1;
 /// Part of the limit to deviations, that may grow unseen.
 constexpr double kNegligible = 0.2;
+constexpr double kSettledPart = 0.2;  ///< Of the thorough updates' limit.
 constexpr double kLeastUnit = 1e-4;
-constexpr double kLeastUsualUnit = 0.05;
+constexpr double kLeastUsualUnit = 0.02;
 
 }  // namespace
 
@@ -171,20 +176,33 @@ void IncrementalSmoother::shorten_step(double part) {
   }
 }
 
-/// Takes the step back by halves while it makes the loss larger.
+/// Takes the step back by halves while it makes the loss larger, or does far less for it than it
+/// promised: in space whole steps can swing about the minimum for ever.
 void IncrementalSmoother::accept_step(IncrementalUpdate& update, bool thorough) {
   const double part = thorough ? kToleratedRounding : kToleratedPart;
   const double tolerated = std::max(part * pending_.unit * pending_.unit, part * pending_.chi2);
-  if (left_out_loss_ <= tolerated) return;
-  for (int i = 0; i < kMaxHalvings && loss_change() > tolerated; ++i) {
+  const bool again = update.iterations > 1;
+  const double noticed = again ? std::min(tolerated, kNoticedPart * pending_.chi2) : tolerated;
+  const auto is_bad = [&](double step) {
+    if (left_out_loss_ <= noticed) return false;
+    // Of a quadratic loss, a step of that length.
+    const double promised = step * (2.0 - step) * tree_.promised_decrease();
+    const double change = loss_change();
+    return change > tolerated || (again && change > -kLeastGain * promised);
+  };
+  double step = 1.0;
+  // The promise is about all factors that the step touches.
+  if (again && left_out_loss_ > noticed) update.deviation = judge(0.0);
+  for (int i = 0; i < kMaxHalvings && is_bad(step); ++i) {
     shorten_step(0.5);
+    step *= 0.5;
     pending_.solve_everything = true;
     update.deviation = judge(0.0);
   }
 }
 
 /// Every factor whose linearisation is noticeably old becomes stale.
-void IncrementalSmoother::look_at_all() {
+void IncrementalSmoother::look_at_all(double relinearise_above) {
   double chi2 = 0.0;
   double rows = 1.0;
   for (int f = 0; f < graph_.factor_capacity(); ++f) {
@@ -194,7 +212,7 @@ void IncrementalSmoother::look_at_all() {
   }
   pending_.chi2 = chi2;
   pending_.unit = std::clamp(std::sqrt(chi2 / rows), kLeastUnit, 1.0);
-  const double limit = parameters_.thorough_relinearise_above * pending_.unit;
+  const double limit = relinearise_above * pending_.unit;
   for (int f = 0; f < graph_.factor_capacity(); ++f) {
     const FactorRecord& factor = graph_.factor(f);
     if (!factor.in_use || factor.clique == kNone || factor.is_pending) continue;
@@ -251,7 +269,7 @@ IncrementalUpdate IncrementalSmoother::run(bool thorough) {
   moved_.clear();
   moved_at_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);
   pending_.since_thorough = thorough ? 0 : pending_.since_thorough + 1;
-  if (thorough) look_at_all();
+  if (thorough) look_at_all(parameters_.thorough_relinearise_above);
   do {
     iterate(update, thorough);
   } while (update.iterations < parameters_.max_iterations &&
@@ -274,12 +292,17 @@ IncrementalUpdate IncrementalSmoother::update_thoroughly() {
 }
 
 IncrementalUpdate IncrementalSmoother::settle(int max_updates) {
-  IncrementalUpdate update = update_thoroughly();
+  const auto one = [&] {
+    begin_change();
+    look_at_all(kSettledPart * parameters_.thorough_relinearise_above);
+    return run(true);
+  };
+  IncrementalUpdate update = one();
   const auto is_settled = [&] {
     return update.relinearised_factors == 0 && !pending_.solve_everything && pending_.stale.empty();
   };
   for (int i = 1; i < max_updates && !is_settled(); ++i) {
-    update = update_thoroughly();
+    update = one();
   }
   return update;
 }

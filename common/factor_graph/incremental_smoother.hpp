@@ -121,7 +121,7 @@ class IncrementalSmoother {
   void accept_step(IncrementalUpdate& update, bool thorough);
   void shorten_step(double part);
   void finish(IncrementalUpdate& update);
-  void look_at_all();
+  void look_at_all(double relinearise_above);
   double usual_unit() const;
   void collect_moved();
   IncrementalUpdate run(bool thorough);

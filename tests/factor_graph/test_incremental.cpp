@@ -149,6 +149,57 @@ TEST_CASE("In space the smoother ends where the batch solution is", "[incrementa
   }
 }
 
+TEST_CASE("On a torus of noisy poses the steps do not swing for ever", "[incremental]") {
+  Random random(5);
+  constexpr int kAround = 12;
+  constexpr int kPoses = 3 * kAround * kAround;
+  std::vector<Pose3> truth;
+  for (int k = 0; k < kPoses; ++k) {
+    const double a = 2.0 * M_PI * k / kAround;
+    const double b = 2.0 * M_PI * k / (kAround * kAround);
+    const Eigen::Vector3d t((8.0 + 3.0 * std::cos(a)) * std::cos(b),
+                            (8.0 + 3.0 * std::cos(a)) * std::sin(b), 3.0 * std::sin(a));
+    const Eigen::Vector3d turn(0.0, 0.0, b);
+    truth.emplace_back(Pose3{t, exp_rotation(turn) * exp_rotation(Eigen::Vector3d(0.0, -a, 0.0))});
+  }
+  const Matrix6 information =
+      (Eigen::Matrix<double, 6, 1>() << 100, 100, 100, 25, 25, 25).finished().asDiagonal();
+  const auto measured = [&](int i, int j) {
+    const Pose3 between =
+        truth[static_cast<std::size_t>(i)].inverse() * truth[static_cast<std::size_t>(j)];
+    return between * random.pose3(0.2, 0.5);
+  };
+  IncrementalSmoother smoother;
+  std::vector<VariableId> names;
+  long relinearised = 0;
+  for (int k = 0; k < kPoses; ++k) {
+    if (k == 0) {
+      names.push_back(smoother.add_variable(truth[0]));
+      smoother.add(prior(names[0], truth[0], Matrix6(1e8 * Matrix6::Identity())));
+    } else {
+      const Pose3 step = measured(k - 1, k);
+      names.push_back(smoother.add_variable(smoother.pose3(names.back()) * step));
+      smoother.add(
+          relative(names[static_cast<std::size_t>(k - 1)], names.back(), step, information));
+    }
+    for (const int back : {kAround, kAround * kAround}) {
+      if (k < back) continue;
+      const int other = k - back;
+      smoother.add(relative(names[static_cast<std::size_t>(other)], names.back(),
+                            measured(other, k), information));
+    }
+    const IncrementalUpdate update = smoother.update();
+    REQUIRE(update.ok);
+    relinearised += update.relinearised_factors;
+  }
+  CHECK(relinearised < 250L * kPoses);
+  const IncrementalUpdate last = smoother.settle();
+  CHECK(last.relinearised_factors == 0);
+  Copy copy(smoother.graph());
+  REQUIRE(optimise(copy.graph, BatchParameters{}).ok);
+  CHECK(smoother.graph().chi2() < 1.001 * copy.graph.chi2());
+}
+
 TEST_CASE("Any sequence of adding, removing and undoing equals the batch solution of what remains",
           "[incremental]") {
   Random random(2);
