@@ -120,7 +120,7 @@ void describe_corner(CornerParameters& p, ParameterTable& table) {
   table.add("corner.max_skew_rad", p.max_skew_rad, {0.0, 1.5}, "rad",
             "Of the angle between the walls from a right one.");
   table.add("corner.flatness_sigma_m", p.flatness_sigma_m, {1e-4, 1.0}, "m",
-            "Of a wall; more points do not average it out.");
+            "Of a wall, besides the unevenness that its points show.");
   table.add("corner.min_rings", p.min_rings, {1, 100}, "", "Fewest rings that see a wall.");
 }
 

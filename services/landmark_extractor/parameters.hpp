@@ -75,7 +75,7 @@ struct CornerParameters {
   double max_gap_m = 0.3;           ///< From the end of a wall's returns to the corner...
   double max_gap_per_range = 0.02;  ///< ... plus this much per metre of range.
   double max_skew_rad = 0.2;        ///< Of the angle between the walls from a right one.
-  double flatness_sigma_m = 0.006;  ///< Of a wall; more points do not average it out.
+  double flatness_sigma_m = 0.0005;  ///< Of a wall, besides the unevenness that its points show.
   int min_rings = 3;
 };
 

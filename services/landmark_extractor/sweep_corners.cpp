@@ -5,8 +5,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "services/landmark_extractor/level.hpp"
-
 namespace understory {
 namespace {
 
@@ -21,6 +19,23 @@ double square(double value) { return value * value; }
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
+}
+
+/// An error of roll and pitch moves each wall by its own height, and the corner with them; its
+/// height goes with the ground.
+Eigen::Matrix3d from_level_error(const Eigen::Vector3d& place, const WallLine& a, const WallLine& b,
+                                 const Eigen::Matrix2d& level_covariance_rad2) {
+  Eigen::Matrix2d normals;
+  normals << a.normal().transpose(), b.normal().transpose();
+  // In the plan (roll, pitch) moves what is at height z by z (pitch, -roll).
+  const auto across = [](const WallLine& wall) {
+    return Eigen::RowVector2d(wall.z_m * -wall.normal().y(), wall.z_m * wall.normal().x());
+  };
+  Eigen::Matrix2d offsets;
+  offsets << across(a), across(b);
+  Eigen::Matrix<double, 3, 2> jacobian;
+  jacobian << normals.inverse() * offsets, place.y(), -place.x();
+  return jacobian * level_covariance_rad2 * jacobian.transpose();
 }
 
 /// Whether the ring's beams about an azimuth go on beyond the range, or to nowhere.
@@ -119,7 +134,7 @@ std::optional<Detection> SweepCorners::judge(const RingCloud& cloud, const WallL
   };
   add(a, meeting->reach_a_m);
   add(b, meeting->reach_b_m);
-  corner.covariance_m2 = from_level_error(corner.position_m, level_covariance_rad2);
+  corner.covariance_m2 = from_level_error(corner.position_m, a, b, level_covariance_rad2);
   corner.covariance_m2.topLeftCorner<2, 2>() += information.inverse();
   corner.covariance_m2(2, 2) += square(below.sigma_m);
   const Eigen::Vector2d inward = meeting->along_a + meeting->along_b;

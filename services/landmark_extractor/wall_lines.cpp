@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -13,6 +14,15 @@ namespace {
 constexpr double kSameDirection = 0.1;
 /// ... and are found this many rings apart at most: windows and shutters interrupt a wall.
 constexpr std::size_t kRingReach = 4;
+
+/// A wall's unevenness is looked for in so many stretches of it.
+constexpr std::size_t kStretches = 8;
+/// Points scatter across a wall at least by this part of their range's noise.
+constexpr double kLeastAcross = 0.1;
+/// So many neighbours on a piece are looked at together.
+constexpr std::size_t kPartPoints = 8;
+
+double square(double value) { return value * value; }
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
@@ -36,6 +46,7 @@ LineSums& LineSums::operator+=(const LineSums& other) {
 const std::vector<WallLine>& WallFinder::find(const RingCloud& cloud,
                                               const std::vector<Run>& runs) {
   pieces_.clear();
+  parts_.clear();
   walls_.clear();
   ring_begins_.assign(cloud.rings() + 1, 0);
   for (const Run& run : runs) {
@@ -92,11 +103,16 @@ void WallFinder::add_piece(const RingCloud& cloud, const Run& run, std::size_t f
   double z = 0.0;
   double height = 0.0;
   // The points where pieces meet belong to neither for sure.
+  piece.first_part = static_cast<std::uint32_t>(parts_.size());
   for (std::size_t i = first + 1; i < last; ++i) {
+    if ((i - first - 1) % kPartPoints == 0) parts_.emplace_back();
+    parts_.back().count += 1.0;
+    parts_.back().sum += cloud.points()[i].position();
     piece.sums.add(cloud.points()[i].position());
     z += cloud.points()[i].z_m;
     height += cloud.points()[i].height_m;
   }
+  piece.parts = static_cast<std::uint32_t>(parts_.size()) - piece.first_part;
   piece.ring = run.ring;
   piece.z_m = z / piece.sums.count;
   piece.height_m = height / piece.sums.count;
@@ -150,7 +166,36 @@ void WallFinder::join() {
   }
 }
 
-/// Total least squares; what the points' number would average out of a wall's own unevenness stays.
+/// How far stretches of the wall are from its line beyond what the noise of their points explains,
+/// in root mean square: neighbouring rings see the same bumps.
+double WallFinder::unevenness(const std::vector<std::uint32_t>& members, const WallLine& wall,
+                              double variance_m2) const {
+  std::array<double, kStretches> counts{};
+  std::array<double, kStretches> offsets{};
+  const Eigen::Vector2d normal = wall.normal();
+  for (const std::uint32_t i : members) {
+    for (std::uint32_t k = 0; k < pieces_[i].parts; ++k) {
+      const PiecePart& part = parts_[pieces_[i].first_part + k];
+      const Eigen::Vector2d offset = part.sum / part.count - wall.centroid_m;
+      const double along = (wall.direction.dot(offset) - wall.from_m) / wall.length();
+      const auto stretch = static_cast<std::size_t>(
+          std::clamp(along * kStretches, 0.0, static_cast<double>(kStretches) - 1.0));
+      counts[stretch] += part.count;
+      offsets[stretch] += part.count * normal.dot(offset);
+    }
+  }
+  double excess = 0.0;
+  double stretches = 0.0;
+  for (std::size_t k = 0; k < kStretches; ++k) {
+    if (counts[k] < static_cast<double>(kPartPoints)) continue;
+    excess += square(offsets[k] / counts[k]) - variance_m2 / counts[k];
+    stretches += 1.0;
+  }
+  // The line took two of them.
+  return stretches > 3.0 ? std::sqrt(std::max(0.0, excess / (stretches - 2.0))) : 0.0;
+}
+
+/// Total least squares.
 void WallFinder::add_wall(const std::vector<std::uint32_t>& members) {
   LineSums sums;
   WallLine wall;
@@ -160,6 +205,7 @@ void WallFinder::add_wall(const std::vector<std::uint32_t>& members) {
   for (const std::uint32_t i : members) {
     const LinePiece& piece = pieces_[i];
     sums += piece.sums;
+    wall.z_m += piece.sums.count * piece.z_m;
     wall.low_z_m = std::min(wall.low_z_m, piece.z_m);
     wall.high_z_m = std::max(wall.high_z_m, piece.z_m);
     wall.high_height_m = std::max(wall.high_height_m, piece.height_m);
@@ -168,13 +214,14 @@ void WallFinder::add_wall(const std::vector<std::uint32_t>& members) {
   }
   if (wall.rings < corner_.min_rings || wall.high_z_m - wall.low_z_m < corner_.min_extent_m) return;
   wall.centroid_m = sums.sum / sums.count;
+  wall.z_m /= sums.count;
   const Eigen::Matrix2d scatter =
       sums.square / sums.count - wall.centroid_m * wall.centroid_m.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(scatter);
   wall.direction = axes.eigenvectors().col(1);
   if (wall.direction.dot(pieces_[members[0]].direction) < 0.0) wall.direction *= -1.0;
   const double across2 =
-      std::max(axes.eigenvalues()[0], sweep_.range_sigma_m * sweep_.range_sigma_m / 4.0);
+      std::max(axes.eigenvalues()[0], square(kLeastAcross * sweep_.range_sigma_m));
   if (std::sqrt(across2) > corner_.line_tolerance_m) return;
   wall.from_m = std::numeric_limits<double>::infinity();
   wall.to_m = -wall.from_m;
@@ -183,9 +230,12 @@ void WallFinder::add_wall(const std::vector<std::uint32_t>& members) {
     wall.to_m = std::max(wall.to_m, wall.direction.dot(pieces_[i].to_m - wall.centroid_m));
   }
   if (wall.length() < corner_.min_length_m) return;
-  wall.offset_sigma_m = std::hypot(std::sqrt(across2 / sums.count), corner_.flatness_sigma_m);
-  wall.direction_sigma_rad = std::hypot(std::sqrt(across2 / (sums.count * axes.eigenvalues()[1])),
-                                        corner_.flatness_sigma_m / wall.length());
+  // Noise averages out over points; unevenness, over stretches of the wall.
+  wall.unevenness_m = std::hypot(unevenness(members, wall, across2), corner_.flatness_sigma_m);
+  const double of_offset = across2 / sums.count + square(wall.unevenness_m) / kStretches;
+  wall.offset_sigma_m = std::sqrt(of_offset);
+  const double length2 = axes.eigenvalues()[1];
+  wall.direction_sigma_rad = std::sqrt(of_offset / length2);
   walls_.push_back(wall);
 }
 

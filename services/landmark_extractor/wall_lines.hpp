@@ -25,6 +25,8 @@ struct LinePiece {
   Eigen::Vector2d from_m = Eigen::Vector2d::Zero();  ///< Right end as seen from the sensor.
   Eigen::Vector2d to_m = Eigen::Vector2d::Zero();
   LineSums sums;
+  std::uint32_t first_part = 0;  ///< Sums of some neighbours each.
+  std::uint32_t parts = 0;
   std::uint16_t ring = 0;
   double z_m = 0.0;
   double height_m = 0.0;  ///< Above ground.
@@ -41,6 +43,8 @@ struct WallLine {
   Eigen::Vector2d direction = Eigen::Vector2d::UnitX();  ///< Unit; to the left for the sensor.
   double from_m = 0.0;  ///< Extent along `direction`, from the centroid.
   double to_m = 0.0;
+  double z_m = 0.0;             ///< Mean height of its points.
+  double unevenness_m = 0.0;    ///< Of the wall beyond the noise of its points, as they show it.
   double offset_sigma_m = 0.0;  ///< Of the centroid, across.
   double direction_sigma_rad = 0.0;
   double low_z_m = 0.0;
@@ -67,10 +71,19 @@ class WallFinder {
   bool same_wall(const LinePiece& a, const LinePiece& b) const;
   std::uint32_t root(std::uint32_t piece);
   void add_wall(const std::vector<std::uint32_t>& members);
+  double unevenness(const std::vector<std::uint32_t>& members, const WallLine& wall,
+                    double variance_m2) const;
+
+  /// Some neighbours on a piece.
+  struct PiecePart {
+    double count = 0.0;
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  };
 
   SweepParameters sweep_;
   CornerParameters corner_;
   std::vector<LinePiece> pieces_;
+  std::vector<PiecePart> parts_;
   std::vector<std::size_t> ring_begins_;  ///< Among the pieces.
   std::vector<std::uint32_t> parents_;
   std::vector<std::vector<std::uint32_t>> members_;

@@ -21,11 +21,14 @@ struct Stem {
   double bottom = 0.0;
 };
 
-/// An upright rectangle from the ground to `top`.
+/// An upright rectangle from the ground to `top`, with waves along it.
 struct Facade {
   Eigen::Vector2d from{0.0, 0.0};
   Eigen::Vector2d to{0.0, 0.0};
   double top = 5.0;
+  double wave = 0.0;  ///< Amplitude, across.
+  double wave_length = 1.0;
+  double phase = 0.0;
 };
 
 struct Space {
@@ -89,9 +92,13 @@ inline double hit(const Facade& wall, const Space& space, const Eigen::Vector3d&
   const double t = (start.x() * along.y() - start.y() * along.x()) / det;
   const double part = (start.x() * d.y() - start.y() * d.x()) / det;
   const double z = o.z() + t * d.z();
+  // Waves are so low that the beam meets them about where it would meet the plane.
+  const double turns = part * along.norm() / wall.wave_length;
+  const double across = wall.wave * std::sin(2.0 * std::numbers::pi * turns + wall.phase);
+  const double before = across * along.norm() / det;
   return t > 0.0 && part >= 0.0 && part <= 1.0 &&
                  z < space.ground(wall.from + part * along) + wall.top
-             ? t
+             ? t + before
              : kMiss;
 }
 
