@@ -105,7 +105,7 @@ void InertialDrive::begin_sway() {
 
 InertialDrive::Tick InertialDrive::sway(double dt, bool first_half) {
   time_s_ += dt;
-  const Tick tick =
+  Tick tick =
       turn_and_push(dt, sway_rate_ * dt, velocity_ + sway_push_.col(first_half ? 0 : 1) * dt);
   walk_bias(dt);
   return tick;
@@ -138,8 +138,8 @@ InertialDrive::Tick InertialDrive::advance(double dt) {
                            parameters_.wiggle_curvature *
                                std::sin(phase_ + kTwoPi * driven_m_ / parameters_.wiggle_length_m);
   const double heading = theta_ + length * curvature;
-  const Tick tick = turn_and_push(
-      dt, length * curvature, speed_mps_ * Eigen::Vector2d(std::cos(heading), std::sin(heading)));
+  Tick tick = turn_and_push(dt, length * curvature,
+                            speed_mps_ * Eigen::Vector2d(std::cos(heading), std::sin(heading)));
   driven_m_ += length;
   walk_bias(dt);
   return tick;

@@ -1,5 +1,6 @@
 #include "services/ekf/ekf.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -16,6 +17,8 @@ constexpr Utime kTolerance_us = 1000;
 constexpr double kStartVariance = 1e-12;
 /// Of a piece's sway: a vehicle may stand for hours, in which chance must not pass for motion.
 constexpr double kStandingProbability = 1.0 - 1e-6;
+/// Standing that is doubted is believed after all when it is told for so long.
+constexpr double kInsistence_s = 10.0;
 
 ekf::ErrorForm error_form(const std::string& name) {
   if (name == "right_invariant") return ekf::ErrorForm::kRightInvariant;
@@ -52,8 +55,9 @@ Ekf::Ekf(const EkfParameters& parameters)
       room_(ekf::kVehicle + 2 * state_.max_landmarks()),
       joint_(state_.max_landmarks()),
       landmark_gate_(ekf::chi_squared_quantile(parameters.gate.landmark_probability, 2)),
-      standing_gate_(ekf::chi_squared_quantile(kStandingProbability, 2 * ekf::kGroundMarks)),
-      creeping_gate_(ekf::chi_squared_quantile(kStandingProbability, 3)) {
+      parked_gate_(ekf::chi_squared_quantile(kStandingProbability, 2 * ekf::kGroundMarks)),
+      creeping_gate_(ekf::chi_squared_quantile(kStandingProbability, 3)),
+      still_gate_(ekf::chi_squared_quantile(kStandingProbability, 2)) {
   const int capacity = ekf::kVehicle + 2 * state_.max_landmarks();
   backup_ = Eigen::MatrixXd::Zero(capacity, capacity);
   set_gates_.push_back(0.0);
@@ -90,7 +94,7 @@ void Ekf::restart(Utime utime, const std::string& reason) {
   ++reset_counter_;
   counters_.last_reason = reason;
   refused_scans_ = 0;
-  doubts_standing_ = false;
+  doubted_.reset();
   utime_ = utime;
   set_prior();
   const EkfPose& last = last_sound_;
@@ -162,8 +166,7 @@ void Ekf::use(const Odometry& piece) {
   }
   if (piece.from_utime > utime_ + kTolerance_us) bridge(piece.from_utime);
   const EkfMotionParameters& motion = parameters_.motion;
-  doubts_standing_ = doubts_standing_ && piece.is_standing;
-  const bool stands = piece.is_standing && !doubts_standing_;
+  const bool stands = believes_standing(piece);
   const bool has_marks = ekf::has_ground_marks(state_);
   if (stands && !has_marks) ekf::add_ground_marks(state_, sway(motion));
   if (!stands && has_marks) ekf::remove_ground_marks(state_);
@@ -195,12 +198,40 @@ void Ekf::predict(const Odometry& piece, bool stands) {
   }
 }
 
+/// Standing is told by quiet samples alone, where there are no wheels: a smooth road is quiet too.
+/// So it is not believed against the filter's own velocity, nor, once found wrong, before it is
+/// said to move; but after a while in which no landmark spoke for moving, the filter must be wrong.
+bool Ekf::believes_standing(const Odometry& piece) {
+  if (!piece.is_standing) doubted_.reset();
+  if (!piece.is_standing) return false;
+  if (doubted_) {
+    if (piece.utime - *doubted_ < microseconds(kInsistence_s)) return false;
+    doubted_.reset();
+    const double unknown = parameters_.prior.velocity_sigma_mps;
+    state_.covariance().diagonal().segment<2>(ekf::kVelocity).array() += unknown * unknown;
+    return true;
+  }
+  const double sigma = parameters_.motion.standing_sigma_mps;
+  Eigen::Matrix2d spread = state_.velocity_covariance().topLeftCorner<2, 2>();
+  spread.diagonal().array() += sigma * sigma;
+  const Eigen::Vector2d velocity = ekf::rotation_of(state_.heading).transpose() * state_.velocity;
+  if (velocity.dot(spread.inverse() * velocity) <= still_gate_) return true;
+  doubt_standing();
+  return false;
+}
+
+void Ekf::doubt_standing() {
+  ++counters_.crept;
+  doubted_ = utime_;
+  ekf::remove_ground_marks(state_);
+}
+
 /// The vehicle is where it was parked, and its velocity is that of its sway.
 void Ekf::stand() {
   const EkfMotionParameters& motion = parameters_.motion;
   ekf::measure_standing(state_, motion.standing_sigma_mps, room_);
-  if (ekf::measure_ground_marks(state_, sway(motion), standing_gate_, joint_, room_)) return;
-  ++counters_.crept;
+  if (ekf::measure_ground_marks(state_, sway(motion), parked_gate_, joint_, room_)) return;
+  // A door was slammed, say.
   ekf::remove_ground_marks(state_);
   ekf::add_ground_marks(state_, sway(motion));
 }

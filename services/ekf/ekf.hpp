@@ -82,7 +82,9 @@ class Ekf {
   void advance(Utime utime);
   void use(const Odometry& piece);
   void predict(const Odometry& piece, bool stands);
+  bool believes_standing(const Odometry& piece);
   void stand();
+  void doubt_standing();
   void bridge(Utime utime);
   EkfPose pose();
   EkfOutput outputs();
@@ -112,8 +114,9 @@ class Ekf {
   ekf::JointUpdate joint_;
   Eigen::MatrixXd backup_;
   double landmark_gate_ = 0.0;
-  double standing_gate_ = 0.0;
-  double creeping_gate_ = 0.0;
+  double parked_gate_ = 0.0;       ///< Of the marks on the ground, 4 degrees of freedom.
+  double creeping_gate_ = 0.0;     ///< 3.
+  double still_gate_ = 0.0;        ///< Of the velocity, 2.
   std::vector<double> set_gates_;  ///< By number of landmarks.
 
   bool started_ = false;
@@ -125,7 +128,8 @@ class Ekf {
   std::uint64_t map_sequence_ = 0;
   std::uint64_t reset_counter_ = 0;
   int refused_scans_ = 0;
-  bool doubts_standing_ = false;  ///< It crept: not believed until it is said to move.
+  /// Set: it moves though it is said to stand; when that was last found.
+  std::optional<Utime> doubted_;
   std::uint32_t used_ = 0;
   std::uint32_t refused_ = 0;
   std::vector<Alias> aliases_;  ///< In order of track.

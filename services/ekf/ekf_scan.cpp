@@ -14,6 +14,8 @@ namespace {
 /// Sightings that one search for joint compatibility takes.
 constexpr std::size_t kMaxSearched = 24;
 constexpr int kMaxRounds = 4;
+/// That tell a vehicle's motion.
+constexpr std::uint32_t kFewLandmarks = 3;
 /// Motion that nothing told, where creeping is found [s].
 constexpr double kUnnoticed_s = 0.1;
 
@@ -55,6 +57,7 @@ EkfOutput Ekf::add(const TrackedScan& scan) {
     remove_distant(scan.field_of_view);
     check_lost();
   }
+  if (doubted_ && used_ >= kFewLandmarks) doubted_ = utime_;
   counters_.landmarks_used += used_;
   counters_.landmarks_refused += refused_;
   return outputs();
@@ -108,9 +111,7 @@ void Ekf::check_standing() {
       (pairings.size() < 2 || ekf::common_motion(state_, sightings_, pairings) <= creeping_gate_)) {
     return;
   }
-  ++counters_.crept;
-  doubts_standing_ = true;
-  ekf::remove_ground_marks(state_);
+  doubt_standing();
   ekf::predict(state_, ekf::transition_over_gap(state_, kUnnoticed_s, parameters_.motion),
                parameters_.motion, room_);
 }

@@ -124,7 +124,7 @@ std::string Ekf::save() const {
                    {"map_sequence", map_sequence_},
                    {"reset_counter", reset_counter_},
                    {"refused_scans", refused_scans_},
-                   {"doubts_standing", doubts_standing_},
+                   {"doubted", optional_to_json(doubted_)},
                    {"last_pose", last_sound_.ekf_map_T_vehicle},
                    {"last_covariance", matrix_to_json<3, 3>(last_sound_.covariance)},
                    {"last_bias", matrix_to_json<3, 1>(last_sound_.bias)}});
@@ -151,7 +151,8 @@ void Ekf::load(const std::string& state) {
   map_sequence_ = json.at("map_sequence").get<std::uint64_t>();
   reset_counter_ = json.at("reset_counter").get<std::uint64_t>();
   refused_scans_ = json.at("refused_scans").get<int>();
-  doubts_standing_ = json.value("doubts_standing", false);
+  doubted_ =
+      json.contains("doubted") ? optional_from_json<Utime>(json.at("doubted")) : std::nullopt;
   last_sound_ = EkfPose{};
   last_sound_.ekf_map_T_vehicle = json.at("last_pose").get<SE2>();
   last_sound_.covariance = matrix_from_json<3, 3>(json.at("last_covariance"));

@@ -78,4 +78,31 @@ inline DriveEnd drive_through(const sim::InertialDriveParameters& parameters,
   return end;
 }
 
+/// A filter after some seconds of driving, with the drive to go on with.
+struct Driven {
+  sim::InertialDrive drive;
+  Ekf filter;
+  SE2 start;
+  sim::DriveStep step;
+
+  Driven(double seconds, const sim::InertialDriveParameters& parameters,
+         const EkfParameters& filter_parameters = {}, std::uint64_t seed = 7)
+      : drive(parameters, trunks(), seed), filter(filter_parameters) {
+    step = drive.next();
+    start = step.world_T_vehicle;
+    filter.add(true_tracks(step));
+    for (int k = 0; k < static_cast<int>(10 * seconds); ++k) go();
+  }
+  /// `said_to_stand`: as a detector of standing may say wrongly.
+  EkfOutput go(TrackId offset = 1, bool said_to_stand = false) {
+    step = drive.next();
+    for (Odometry piece : step.odometry) {
+      piece.is_standing = piece.is_standing || said_to_stand;
+      filter.add(piece);
+    }
+    return filter.add(true_tracks(step, offset));
+  }
+  SE2 truth() const { return start.inverse() * step.world_T_vehicle; }
+};
+
 }  // namespace understory::test

@@ -13,29 +13,6 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// A filter after some seconds of driving, with the drive to go on with.
-struct Driven {
-  sim::InertialDrive drive;
-  Ekf filter;
-  SE2 start;
-  sim::DriveStep step;
-
-  Driven(double seconds, const sim::InertialDriveParameters& parameters,
-         const EkfParameters& filter_parameters = {}, std::uint64_t seed = 7)
-      : drive(parameters, trunks(), seed), filter(filter_parameters) {
-    step = drive.next();
-    start = step.world_T_vehicle;
-    filter.add(true_tracks(step));
-    for (int k = 0; k < static_cast<int>(10 * seconds); ++k) go();
-  }
-  EkfOutput go(TrackId offset = 1) {
-    step = drive.next();
-    for (const Odometry& piece : step.odometry) filter.add(piece);
-    return filter.add(true_tracks(step, offset));
-  }
-  SE2 truth() const { return start.inverse() * step.world_T_vehicle; }
-};
-
 double position_sigma(const EkfPose& pose) { return std::sqrt(pose.covariance(0, 0)); }
 
 }  // namespace

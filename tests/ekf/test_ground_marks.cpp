@@ -206,3 +206,27 @@ TEST_CASE("A full state stands too", "[ekf][standing]") {
   }
   REQUIRE(filter.counters().restarts == 0);
 }
+
+TEST_CASE("Standing is not believed against the filter's own velocity, but in the end",
+          "[ekf][standing]") {
+  Driven run(20.0, short_drive());
+  const double speed = run.step.velocity_mps.norm();
+  REQUIRE(speed > 3.0);
+  // The detector takes a smooth road for standing.
+  EkfPose pose;
+  for (int k = 0; k < 150; ++k) pose = *run.go(1, true).pose;
+  CAPTURE(pose.velocity_mps.transpose(), nees(pose, run.truth()));
+  REQUIRE(pose.velocity_mps.norm() > 3.0);
+  REQUIRE(nees(pose, run.truth()) < 16.0);
+  REQUIRE(pose.reset_counter == 0);
+  REQUIRE(run.filter.counters().crept == 1);
+  // No landmark speaks for moving any more, and the detector insists.
+  Utime utime = run.filter.utime();
+  for (int k = 0; k < 110; ++k, utime += 100000) {
+    run.filter.add(still_piece(utime, utime + 100000));
+    TrackedScan scan;
+    scan.utime = utime + 100000;
+    pose = *run.filter.add(scan).pose;
+  }
+  REQUIRE(pose.velocity_mps.norm() < 0.01);
+}
