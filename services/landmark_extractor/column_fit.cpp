@@ -21,6 +21,8 @@ constexpr double kNearlySettled_m2 = 1e-5;
 constexpr float kMaxRunResidual = 2.5F;
 constexpr float kMaxEdgeResidual = 3.5F;
 constexpr int kRounds = 4;
+/// Points scatter across a plane at least so much, however it is looked at.
+constexpr double kLeastAcross_m = 0.003;
 /// Runs of one stem seem so far apart, and so much more per metre of height.
 constexpr float kConsensus_m = 0.06F;
 constexpr float kConsensusLean = 0.06F;
@@ -180,7 +182,7 @@ void StemFitter::use_agreeing() {
   };
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t k = agreeing_at_[i * agreeing_at_.size() / count];
-    used_hits_.push_back(&hits_[k]);
+    used_hits_.push_back(hits_[k]);
     use(edges_[2 * k / kLanes], 2 * k % kLanes);
     use(edges_[2 * k / kLanes], 2 * k % kLanes + 1);
   }
@@ -191,7 +193,7 @@ void StemFitter::use_agreeing() {
 /// they say no more than one does.
 void StemFitter::share_edges() {
   std::array<float, 2 * kMaxRuns> shares{};
-  const float range2 = square(used_hits_.front()->range[0]);
+  const float range2 = square(used_hits_.front().range[0]);
   const auto lane_of = [](std::size_t i) { return i % kLanes; };
   for (std::size_t i = 0; i < used_edge_count_; ++i) {
     const EdgeLanes& a = used_edges_[i / kLanes];
@@ -229,15 +231,19 @@ Vector6d StemFitter::start() const {
   return state;
 }
 
-void StemFitter::linearise(const Vector6d& state, Matrix6d& information, Vector6d& gradient,
-                           double& squares) const {
+StemState StemFitter::stem_of(const Vector6d& state) const {
   StemState stem;
   for (int i = 0; i < 6; ++i) {
     stem.values[static_cast<std::size_t>(i)] = static_cast<float>(state[i]);
   }
   stem.reference_z_m = static_cast<float>(reference_z_m_);
+  return stem;
+}
+
+void StemFitter::linearise(const Vector6d& state, Matrix6d& information, Vector6d& gradient,
+                           double& squares) const {
   StemSums sums;
-  add_terms(used_hits_, used_edges_, stem, noise_, sums);
+  add_terms(used_hits_, used_edges_, stem_of(state), noise_, sums);
   sums.normal_equations(information, gradient);
   squares = sums.sum_of_squares();
   const auto prior = [&](int at, double mean, double sigma) {
@@ -253,10 +259,10 @@ void StemFitter::linearise(const Vector6d& state, Matrix6d& information, Vector6
 bool StemFitter::settle(Vector6d& state, double settled_m2) {
   double z = 0.0;
   double count = 0.0;
-  for (const HitLanes* group : used_hits_) {
+  for (const HitLanes& group : used_hits_) {
     for (std::size_t l = 0; l < kLanes; ++l) {
-      z += group->counts[l] * group->z[l];
-      count += group->counts[l];
+      z += group.counts[l] * group.z[l];
+      count += group.counts[l];
     }
   }
   const double reference = z / count;
@@ -274,21 +280,16 @@ bool StemFitter::settle(Vector6d& state, double settled_m2) {
     if (!state.allFinite()) return false;
     if (change.head<3>().squaredNorm() < settled_m2) break;
   }
-  const HitLanes& any = *used_hits_.front();
+  const HitLanes& any = used_hits_.front();
   return (state[0] - any.origin_x[0]) * any.along_x[0] +
              (state[1] - any.origin_y[0]) * any.along_y[0] >
          1.1 * state[2];
 }
 
 bool StemFitter::sort_out(const Vector6d& state) {
-  StemState stem;
-  for (int i = 0; i < 6; ++i) {
-    stem.values[static_cast<std::size_t>(i)] = static_cast<float>(state[i]);
-  }
-  stem.reference_z_m = static_cast<float>(reference_z_m_);
   hit_means_.resize(hits_.size());
   edge_squares_.resize(edges_.size());
-  square_terms(hits_, edges_, stem, noise_, hit_means_, edge_squares_);
+  square_terms(hits_, edges_, stem_of(state), noise_, hit_means_, edge_squares_);
   still_agreeing_at_.clear();
   for (std::uint32_t k = 0; k < summaries_.size(); ++k) {
     const Lanes& squares = edge_squares_[2 * k / kLanes];
@@ -313,8 +314,8 @@ void StemFitter::describe(const Vector6d& state, StemFit& fit) {
   fit.state.head<2>() += anchor_m_;
   fit.reference_z_m = reference_z_m_;
   double terms = static_cast<double>(used_edge_count_);
-  for (const HitLanes* group : used_hits_) {
-    for (const float counts : group->counts) terms += counts;
+  for (const HitLanes& group : used_hits_) {
+    for (const float counts : group.counts) terms += counts;
   }
   fit.mean_square_residual = squares / terms;
   for (const EdgeLanes& group : used_edges_) {
@@ -323,6 +324,7 @@ void StemFitter::describe(const Vector6d& state, StemFit& fit) {
       if (side < 0.0F) fit.sees_right = true;
     }
   }
+  compare_with_plane(state, fit);
   fit.low_z_m = summaries_[agreeing_at_.front()].z_m;
   fit.high_z_m = summaries_[agreeing_at_.back()].z_m;
   agreeing_.clear();
@@ -334,6 +336,50 @@ void StemFitter::describe(const Vector6d& state, StemFit& fit) {
     if (run.ring != ring) ++fit.rings;
     ring = run.ring;
   }
+}
+
+/// A strip of a wall looks like a thick stem of which little is seen.
+void StemFitter::compare_with_plane(const Vector6d& state, StemFit& fit) {
+  const auto visit = [&](const auto& see) {
+    for (const HitLanes& group : used_hits_) {
+      for (std::size_t l = 0; l < kLanes && group.counts[l] > 0.0F; ++l) {
+        const Eigen::Vector2d along(group.along_x[l], group.along_y[l]);
+        see(Eigen::Vector2d(group.origin_x[l], group.origin_y[l]) + group.range[l] * along, along);
+      }
+    }
+  };
+  double count = 0.0;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d square_sum = Eigen::Matrix2d::Zero();
+  visit([&](const Eigen::Vector2d& point, const Eigen::Vector2d& /*along*/) {
+    count += 1.0;
+    mean += point;
+    square_sum += point * point.transpose();
+  });
+  mean /= count;
+  const Eigen::Matrix2d scatter = square_sum / count - mean * mean.transpose();
+  const double angle = 0.5 * std::atan2(2.0 * scatter(0, 1), scatter(0, 0) - scatter(1, 1));
+  const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
+  const Eigen::Vector2d normal(-direction.y(), direction.x());
+  double least = 0.0;
+  double most = 0.0;
+  double flat = 0.0;
+  visit([&](const Eigen::Vector2d& point, const Eigen::Vector2d& along) {
+    const double place = direction.dot(point - mean);
+    least = std::min(least, place);
+    most = std::max(most, place);
+    flat += square(normal.dot(point - mean)) /
+            (square(sweep_.range_sigma_m * normal.dot(along)) + square(trunk_.roundness_sigma_m) +
+             square(kLeastAcross_m));
+  });
+  hit_means_.resize(used_hits_.size());
+  square_terms(used_hits_, {}, stem_of(state), noise_, hit_means_, {});
+  double round = 0.0;
+  for (std::size_t k = 0; k < used_hits_.size(); ++k) {
+    for (const float counts : used_hits_[k].counts) round += counts * hit_means_[k];
+  }
+  fit.width_m = most - least;
+  fit.flat_excess = flat - round;
 }
 
 }  // namespace understory

@@ -19,6 +19,9 @@ struct StemFit {
   double mean_square_residual = 0.0;  ///< Of ranges and edges, in their standard deviations.
   double low_z_m = 0.0;               ///< Lowest and highest run that agrees.
   double high_z_m = 0.0;
+  /// Of the hits, as seen from above; and how much worse an upright plane explains them (chi^2).
+  double width_m = 0.0;
+  double flat_excess = 0.0;
   std::size_t points = 0;  ///< On runs that agree.
   std::size_t rings = 0;
   bool sees_left = false;  ///< An edge on that side.
@@ -64,8 +67,10 @@ class StemFitter {
                  double& squares) const;
   /// Whether the runs that agree are others than before.
   bool sort_out(const Vector6d& state);
+  StemState stem_of(const Vector6d& state) const;
   bool has_enough() const;
   void describe(const Vector6d& state, StemFit& fit);
+  void compare_with_plane(const Vector6d& state, StemFit& fit);
 
   /// What is asked of a run again and again.
   struct RunSummary {
@@ -90,8 +95,8 @@ class StemFitter {
   std::vector<EdgeLanes> edges_;            ///< Of the k-th run: lanes 2 k (left), 2 k + 1 (right).
   std::vector<std::uint32_t> agreeing_at_;  ///< Places in these.
   std::vector<std::uint32_t> still_agreeing_at_;
-  std::vector<std::uint32_t> agreeing_;     ///< Runs.
-  std::vector<const HitLanes*> used_hits_;  ///< Of the agreeing runs that give evidence.
+  std::vector<std::uint32_t> agreeing_;  ///< Runs.
+  std::vector<HitLanes> used_hits_;      ///< Of the agreeing runs that give evidence.
   std::vector<EdgeLanes> used_edges_;
   std::size_t used_edge_count_ = 0;
   std::vector<float> hit_means_;

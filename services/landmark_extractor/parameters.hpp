@@ -48,7 +48,7 @@ struct SweepParameters {
 
 /// Trunks from lasers that scan in space.
 struct SweepTrunkParameters {
-  double min_radius_m = 0.04;
+  double min_radius_m = 0.03;  ///< Posts of street signs are pipes of 60 mm.
   double max_radius_m = 0.8;
   double prior_radius_m = 0.15;  ///< What a trunk's radius is before it is measured.
   double prior_radius_sigma_m = 0.15;
@@ -69,12 +69,12 @@ struct SweepTrunkParameters {
 
 /// Corners of houses from lasers that scan in space.
 struct CornerParameters {
-  double line_tolerance_m = 0.06;   ///< What is so near a line is on it.
-  double min_length_m = 0.6;        ///< Of a wall, as far as it is seen.
-  double min_extent_m = 0.8;        ///< In height, of the returns on a wall.
-  double max_gap_m = 0.3;           ///< From the end of a wall's returns to the corner...
-  double max_gap_per_range = 0.02;  ///< ... plus this much per metre of range.
-  double max_skew_rad = 0.2;        ///< Of the angle between the walls from a right one.
+  double line_tolerance_m = 0.06;    ///< What is so near a line is on it.
+  double min_length_m = 0.6;         ///< Of a wall, as far as it is seen.
+  double min_extent_m = 0.8;         ///< In height, of the returns on a wall.
+  double max_gap_m = 0.3;            ///< From the end of a wall's returns to the corner...
+  double max_gap_per_range = 0.02;   ///< ... plus this much per metre of range.
+  double max_skew_rad = 0.2;         ///< Of the angle between the walls from a right one.
   double flatness_sigma_m = 0.0005;  ///< Of a wall, besides the unevenness that its points show.
   int min_rings = 3;
 };

@@ -81,6 +81,15 @@ class RingCloud {
         (sensor_m().head<2>() + point.time_s * levelling_.velocity_mps.head<2>()).cast<double>();
     return {origin, (point.position() - origin) / static_cast<double>(point.range_m)};
   }
+  /// Where the sensor was when it looked into the direction, as a point tells that it measured in
+  /// about that turn: the sensor turns evenly.
+  Eigen::Vector2d origin_towards(float azimuth_rad, const RingPoint& point) const {
+    float time = point.time_s;
+    if (spin_.rate_radps != 0.0F) {
+      time += wrap_turn(azimuth_rad - point.azimuth_rad) / spin_.rate_radps;
+    }
+    return (sensor_m().head<2>() + time * levelling_.velocity_mps.head<2>()).cast<double>();
+  }
   /// What slope() is without a look at the points: good to a few centimetres in height.
   RoughSlopes rough_slopes(const Eigen::Vector2f& towards) const {
     return {levelling_.level_R_vehicle, slopes_, towards};

@@ -134,6 +134,7 @@ bool SpinFitter::improve() {
 void SpinFitter::fit(const PointSweep& sweep, double max_range_m, Spin& spin) {
   take_samples(sweep, max_range_m);
   spin.velocity_mps.setZero();
+  spin.rate_radps = 0.0F;
   spin.is_leftward = true;
   std::size_t fullest = 0;
   for (std::size_t ring = 0; ring < means_.size(); ++ring) {
@@ -146,7 +147,9 @@ void SpinFitter::fit(const PointSweep& sweep, double max_range_m, Spin& spin) {
   residual_rms_ = std::numeric_limits<double>::infinity();
   for (int round = 0; round < kRounds && improve(); ++round) {
   }
-  if (residual_rms_ < kEvenness) spin.velocity_mps = velocity_.cast<float>();
+  if (residual_rms_ >= kEvenness) return;
+  spin.velocity_mps = velocity_.cast<float>();
+  spin.rate_radps = static_cast<float>(rate_);
 }
 
 }  // namespace understory

@@ -16,6 +16,7 @@ namespace understory {
 struct Spin {
   /// Of the sensor in the plan; zero where the times are unknown or do not fit.
   Eigen::Vector2f velocity_mps = Eigen::Vector2f::Zero();
+  float rate_radps = 0.0F;  ///< Left positive; 0 = unknown.
   bool is_leftward = true;
 };
 

@@ -15,6 +15,8 @@ constexpr double kCore = 0.6;
 constexpr double kOnStem_m = 0.12;
 /// From here upwards a trunk must be seen where nothing hides it.
 constexpr double kFoot_m = 0.5;
+/// Hardly anybody is taller [m].
+constexpr double kPerson_m = 1.95;
 /// Rings that pass so far above or below are not looked at [m].
 constexpr double kMargin_m = 0.5;
 /// So many beams do not all drop out.
@@ -47,8 +49,10 @@ class Look {
     Eigen::Vector2d offset = fit.state.head<2>() - sensor;
     index_ = cloud.first_at(ring, azimuth_of(offset));
     const RingPoint& near = at(index_);
-    origin_ = cloud.sight(near).origin_m;
-    offset = fit.state.head<2>() - origin_;
+    for (int round = 0; round < 2; ++round) {
+      origin_ = cloud.origin_towards(azimuth_of(offset), near);
+      offset = fit.state.head<2>() - origin_;
+    }
     z_m_ = cloud.sensor_m().z() + cloud.slope(ring, near, azimuth_of(offset)) * offset.norm();
   }
 
@@ -117,6 +121,27 @@ class Look {
   double z_m_ = 0.0;
 };
 
+/// Where the beams are so far apart that none passes between a person's height and that of what
+/// stands: whether the next one above passes through.
+bool ends_below_next_ring(const RingCloud& cloud, const StemFit& fit, double ground_z,
+                          const SweepParameters& parameters) {
+  double lowest = ground_z + parameters.max_height_m;
+  bool is_open = false;
+  const Eigen::Vector2d offset = fit.state.head<2>() - cloud.sensor_m().head<2>().cast<double>();
+  const double distance = offset.norm();
+  const RoughSlopes slopes = cloud.rough_slopes((offset / distance).cast<float>());
+  for (std::size_t ring = 0; ring < cloud.rings(); ++ring) {
+    if (cloud.step_rad(ring) <= 0.0F) continue;
+    const double about = cloud.sensor_m().z() + slopes(ring) * distance;
+    if (about < ground_z + parameters.standing_height_m - kMargin_m || about > lowest) continue;
+    const Look look(cloud, ring, fit, parameters.clearance_m);
+    if (look.z_m() < ground_z + parameters.standing_height_m || look.z_m() >= lowest) continue;
+    lowest = look.z_m();
+    is_open = look.met() == Met::kThrough;
+  }
+  return is_open;
+}
+
 }  // namespace
 
 StemProbe probe_stem(const RingCloud& cloud, const StemFit& fit, double ground_z,
@@ -159,7 +184,9 @@ StemProbe probe_stem(const RingCloud& cloud, const StemFit& fit, double ground_z
         break;
     }
   }
-  result.open_above = highest_through > highest_on;
+  result.open_above =
+      highest_through > highest_on ||
+      (highest_on < ground_z + kPerson_m && ends_below_next_ring(cloud, fit, ground_z, parameters));
   result.open_below = lowest_through < lowest_on;
   return result;
 }

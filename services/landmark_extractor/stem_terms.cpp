@@ -98,12 +98,12 @@ struct Terms {
   }
 }
 
-[[gnu::always_inline]] inline void add_all(std::span<const HitLanes* const> hits,
+[[gnu::always_inline]] inline void add_all(std::span<const HitLanes> hits,
                                            std::span<const EdgeLanes> edges, const StemState& stem,
                                            const BeamNoise& noise, StemSums& sums) {
   Terms terms;
-  for (const HitLanes* group : hits) {
-    take_hits(*group, stem, noise, terms);
+  for (const HitLanes& group : hits) {
+    take_hits(group, stem, noise, terms);
     add(terms, sums);
   }
   for (const EdgeLanes& group : edges) {
@@ -138,7 +138,7 @@ struct Terms {
 
 #if defined(__x86_64__)
 // Without fused multiplication: the same numbers on every machine.
-[[gnu::target("avx2")]] void add_with_avx2(std::span<const HitLanes* const> hits,
+[[gnu::target("avx2")]] void add_with_avx2(std::span<const HitLanes> hits,
                                            std::span<const EdgeLanes> edges, const StemState& stem,
                                            const BeamNoise& noise, StemSums& sums) {
   add_all(hits, edges, stem, noise, sums);
@@ -182,7 +182,7 @@ void StemSums::normal_equations(Matrix6d& information, Vector6d& gradient) const
 
 double StemSums::sum_of_squares() const { return sum_of(squared); }
 
-void add_terms(std::span<const HitLanes* const> hits, std::span<const EdgeLanes> edges,
+void add_terms(std::span<const HitLanes> hits, std::span<const EdgeLanes> edges,
                const StemState& stem, const BeamNoise& noise, StemSums& sums) {
 #if defined(__x86_64__)
   if (__builtin_cpu_supports("avx2")) return add_with_avx2(hits, edges, stem, noise, sums);

@@ -61,7 +61,7 @@ struct StemSums {
 };
 
 /// Adds what hits and edges say; residuals beyond two standard deviations weigh less (Huber).
-void add_terms(std::span<const HitLanes* const> hits, std::span<const EdgeLanes> edges,
+void add_terms(std::span<const HitLanes> hits, std::span<const EdgeLanes> edges,
                const StemState& stem, const BeamNoise& noise, StemSums& sums);
 
 /// Mean squared residual of each group of hits, and the squared ones of the edges, in their

@@ -62,15 +62,36 @@ Eigen::Vector2d along(const WallLine& wall, const Eigen::Vector2d& place) {
 void SweepCorners::find(const RingCloud& cloud, const std::vector<Run>& runs,
                         const GroundSurface& ground, const Eigen::Matrix2d& level_covariance_rad2,
                         std::vector<Detection>& detections) {
+  const std::size_t first = detections.size();
   found_ = walls_.find(cloud, runs);
   counters_.walls += found_.size();
   for (std::size_t i = 0; i < found_.size(); ++i) {
     for (std::size_t j = i + 1; j < found_.size(); ++j) {
       if (const auto corner = judge(cloud, found_[i], found_[j], ground, level_covariance_rad2)) {
-        detections.push_back(*corner);
-        ++counters_.corners;
+        add(*corner, first, detections);
       }
     }
+  }
+  counters_.corners += detections.size() - first;
+}
+
+/// Windows and doors make several walls of one: the edge of a house is told once, by those that
+/// know it best.
+void SweepCorners::add(const Detection& corner, std::size_t first,
+                       std::vector<Detection>& detections) const {
+  const auto is_same = [&](const Detection& other) {
+    const double turned =
+        std::remainder(corner.bearing_rad - other.bearing_rad, 2.0 * std::numbers::pi);
+    return (corner.position_m - other.position_m).head<2>().norm() < corner_.max_gap_m &&
+           std::abs(turned) < corner_.max_skew_rad;
+  };
+  const auto same = std::find_if(detections.begin() + static_cast<std::ptrdiff_t>(first),
+                                 detections.end(), is_same);
+  if (same == detections.end()) {
+    detections.push_back(corner);
+  } else if (corner.covariance_m2.topLeftCorner<2, 2>().trace() <
+             same->covariance_m2.topLeftCorner<2, 2>().trace()) {
+    *same = corner;
   }
 }
 

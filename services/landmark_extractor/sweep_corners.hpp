@@ -47,6 +47,7 @@ class SweepCorners {
   std::optional<Detection> judge(const RingCloud& cloud, const WallLine& a, const WallLine& b,
                                  const GroundSurface& ground,
                                  const Eigen::Matrix2d& level_covariance_rad2);
+  void add(const Detection& corner, std::size_t first, std::vector<Detection>& detections) const;
   bool stands(const RingCloud& cloud, const WallLine& wall, const Eigen::Vector2d& corner,
               const Eigen::Vector2d& along, double ground_z) const;
 

@@ -7,6 +7,9 @@
 namespace understory {
 namespace {
 
+/// What is so wide must not be explained better by an upright plane.
+constexpr double kFlatWidth_m = 0.2;
+
 /// The centre at breast height with its covariance.
 Detection to_detection(const StemFit& fit, const GroundHeight& ground, double breast_height,
                        const Eigen::Matrix2d& level_covariance_rad2, double shape_sigma) {
@@ -107,7 +110,7 @@ bool SweepTrunks::plausible(const StemFit& fit, double breast_z) {
   const double radius = fit.radius_at(breast_z);
   const double radius_sigma = std::sqrt(fit.covariance(2, 2));
   // Thin is what is thin beyond doubt.
-  if (radius + radius_sigma < trunk_.min_radius_m || radius > trunk_.max_radius_m) {
+  if (radius + 2.0 * radius_sigma < trunk_.min_radius_m || radius > trunk_.max_radius_m) {
     ++counters_.wrong_radius;
     return false;
   }
@@ -115,7 +118,8 @@ bool SweepTrunks::plausible(const StemFit& fit, double breast_z) {
     ++counters_.leaning;
     return false;
   }
-  if (fit.mean_square_residual > trunk_.max_mean_square_residual) {
+  const bool is_flat = fit.width_m > kFlatWidth_m && fit.flat_excess < 0.0;
+  if (is_flat || fit.mean_square_residual > trunk_.max_mean_square_residual) {
     ++counters_.not_round;
     return false;
   }

@@ -175,6 +175,27 @@ TEST_CASE("a corner's place and bisector are found, with honest covariances", "[
   }
 }
 
+TEST_CASE("an edge of a house is told once, whatever interrupts its walls", "[extractor]") {
+  std::mt19937_64 random(5);
+  LandmarkExtractor extractor;
+  for (int run = 0; run < 10; ++run) {
+    Space space;
+    // Above and below windows the wall stands back a little; doors interrupt it.
+    for (const Facade& wall : house({9.0, 3.0}, 3.4, 6.0).facades) {
+      const Eigen::Vector2d along = wall.to - wall.from;
+      space.facades.push_back({wall.from, wall.from + 0.35 * along, 6.0});
+      space.facades.push_back({wall.from + 0.45 * along, wall.from + 0.6 * along, 6.0});
+      space.facades.push_back({wall.from + 0.75 * along, wall.to, 6.0});
+    }
+    const LandmarkScan scan = extractor.extract(sweep(space, spinner_of(64), random));
+    std::size_t at_edge = 0;
+    for (const Detection& seen : scan.detections) {
+      if ((seen.position_m.head<2>() - Eigen::Vector2d(9.0, 3.0)).norm() < 0.3) ++at_edge;
+    }
+    CHECK(at_edge == 1);
+  }
+}
+
 TEST_CASE("an inner corner points to who sees it", "[extractor]") {
   std::mt19937_64 random(3);
   LandmarkExtractor extractor;

@@ -1,6 +1,7 @@
 // Trunks in sweeps of lasers that scan in space: found, with true covariances; nothing else.
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <random>
 
@@ -185,6 +186,70 @@ TEST_CASE("people, posts, hanging branches and bushes are no trunks", "[extracto
     CHECK(extractor.extract(sweep(space, spinner_of(rings), random)).detections.empty());
   }
   CHECK(extractor.sweep_counters().trunks.not_standing >= 4);
+}
+
+TEST_CASE("far people are told from trunks by the next beam above them", "[extractor]") {
+  std::mt19937_64 random(13);
+  std::uniform_real_distribution<double> ranges(12.0, 24.0);
+  LandmarkExtractor extractor(exact_stems());
+  for (const int rings : {16, 32}) {
+    std::size_t found = 0;
+    for (int run = 0; run < 10; ++run) {
+      // Houses all around, for the beams that pass above.
+      Space people;
+      const std::array<Eigen::Vector2d, 4> yard{
+          Eigen::Vector2d{28.0, 0.0}, {0.0, 28.0}, {-28.0, 0.0}, {0.0, -28.0}};
+      for (std::size_t k = 0; k < 4; ++k) {
+        const Eigen::Vector2d side = 0.5 * (yard[(k + 1) % 4] - yard[(k + 3) % 4]);
+        people.facades.push_back({yard[k] - side, yard[k] + side, 15.0});
+      }
+      Space trunks = people;
+      for (int k = 0; k < 5; ++k) {
+        const double bearing = 1.2 * k;
+        const Eigen::Vector2d at =
+            ranges(random) * Eigen::Vector2d(std::cos(bearing), std::sin(bearing));
+        people.stems.push_back({at, 0.22, {0.0, 0.0}, 0.0, 1.75});
+        trunks.stems.push_back({at, 0.22});
+      }
+      const auto count = [&](const Space& space) {
+        const LandmarkScan scan = extractor.extract(sweep(space, spinner_of(rings), random));
+        return static_cast<std::size_t>(
+            std::count_if(scan.detections.begin(), scan.detections.end(), [](const Detection& d) {
+              return d.kind == LandmarkKind::kTrunk && d.position_m.head<2>().norm() < 26.0;
+            }));
+      };
+      CHECK(count(people) == 0);
+      found += count(trunks);
+    }
+    CHECK(found >= 48);
+  }
+}
+
+TEST_CASE("strips of walls are no trunks, posts of signs are", "[extractor]") {
+  std::mt19937_64 random(14);
+  std::uniform_real_distribution<double> turns(-0.5, 0.5);
+  LandmarkExtractor extractor(exact_stems());
+  for (const int rings : {16, 32, 64}) {
+    std::size_t strips = 0;
+    std::size_t posts = 0;
+    for (int run = 0; run < 10; ++run) {
+      Space space;
+      Space signs;
+      for (int k = 0; k < 5; ++k) {
+        const double bearing = 1.2 * k;
+        const Eigen::Vector2d middle =
+            (6.0 + 3.0 * k) * Eigen::Vector2d(std::cos(bearing), std::sin(bearing));
+        const double across = bearing + 1.57 + turns(random);
+        const Eigen::Vector2d half = 0.3 * Eigen::Vector2d(std::cos(across), std::sin(across));
+        space.facades.push_back({middle - half, middle + half, 6.0});
+        signs.stems.push_back({0.6 * middle, 0.03, {0.0, 0.0}, 0.0, 2.8});
+      }
+      strips += extractor.extract(sweep(space, spinner_of(rings), random)).detections.size();
+      posts += extractor.extract(sweep(signs, spinner_of(rings), random)).detections.size();
+    }
+    CHECK(strips <= 2);
+    CHECK(posts >= 35);
+  }
 }
 
 TEST_CASE("sweeps that cannot be give nothing, and bad points are left out", "[extractor]") {
