@@ -36,15 +36,31 @@ std::span<const int> CliquePlanner::element(int number) const {
   return {entries_.data() + begin, static_cast<std::size_t>(end - begin)};
 }
 
-/// Few variables: as they came, those of the last group behind.
+void CliquePlanner::find_neighbours() {
+  for (int e = 0; e < element_count(); ++e) {
+    const std::span<const int> tied = element(e);
+    const bool is_near = std::any_of(tied.begin(), tied.end(), [&](int v) {
+      return group_[static_cast<std::size_t>(v)] == kLast;
+    });
+    if (!is_near) continue;
+    for (const int v : tied) {
+      int& group = group_[static_cast<std::size_t>(v)];
+      group = std::max<int>(group, kNeighbours);
+    }
+  }
+}
+
+/// Few variables: as they came, those of the later groups behind.
 void CliquePlanner::order_few() {
   order_.resize(dimensions_.size());
   std::iota(order_.begin(), order_.end(), 0);
-  std::stable_partition(order_.begin(), order_.end(),
-                        [&](int v) { return group_[static_cast<std::size_t>(v)] == 0; });
+  std::stable_sort(order_.begin(), order_.end(), [&](int v, int w) {
+    return group_[static_cast<std::size_t>(v)] < group_[static_cast<std::size_t>(w)];
+  });
 }
 
 void CliquePlanner::order() {
+  find_neighbours();
   if (size() <= 3) return order_few();
   const auto count = dimensions_.size();
   column_starts_.assign(count + 1, 0);

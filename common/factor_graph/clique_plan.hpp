@@ -28,9 +28,10 @@ class CliquePlanner {
   void clear(std::span<const int> dimensions);
   void begin_element() { element_starts_.push_back(static_cast<int>(entries_.size())); }
   void add_to_element(int variable) { entries_.push_back(variable); }
-  void set_last(int variable) { group_[static_cast<std::size_t>(variable)] = 1; }
+  void set_last(int variable) { group_[static_cast<std::size_t>(variable)] = kLast; }
 
-  /// Orders by constrained COLAMD (those of set_last() after all others), finds what each variable
+  /// Orders by constrained COLAMD (those of set_last() after all others, their neighbours just
+  /// before: the next update will most likely touch these), finds what each variable
   /// is tied to when its turn comes, and merges cliques where that saves time.
   const CliquePlan& plan();
 
@@ -48,6 +49,8 @@ class CliquePlanner {
   int size() const { return static_cast<int>(dimensions_.size()); }
   int element_count() const { return static_cast<int>(element_starts_.size()); }
   std::span<const int> element(int number) const;
+  enum Group { kOthers = 0, kNeighbours = 1, kLast = 2 };
+  void find_neighbours();
   void order();
   void order_few();
   void sort_elements();

@@ -133,6 +133,10 @@ void CliqueTree::commit() {
                   });
   saved_marks_.structural.assign(structural_.begin(), structural_.end());
   saved_marks_.dirty.assign(dirty_.begin(), dirty_.end());
+  saved_marks_.waiting.clear();
+  for (const int c : waiting_) {
+    if (is_waiting_[static_cast<std::size_t>(c)] != 0) saved_marks_.waiting.push_back(c);
+  }
   saved_marks_.total_flops = total_flops_;
 }
 
@@ -149,6 +153,8 @@ void CliqueTree::rollback() {
   // In the order of marking: what was dirty first may have become structural.
   for (const int c : dirty_) mark_[static_cast<std::size_t>(c)] = kDirty;
   for (const int c : structural_) mark_[static_cast<std::size_t>(c)] = kStructural;
+  forget_waiting();
+  for (const int c : saved_marks_.waiting) queue(c);
   total_flops_ = saved_marks_.total_flops;
 }
 

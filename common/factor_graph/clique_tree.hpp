@@ -64,11 +64,18 @@ class CliqueTree {
   /// variables to be eliminated as late as possible.
   TreeStatistics eliminate(std::span<const int> fresh, std::span<const int> last);
 
-  /// Back-substitution from the cliques that eliminate() made, on as long as something changes by
-  /// more than `threshold` of its own (conditional) standard deviation. Moves the variables;
-  /// changed() tells which and steps() where from.
-  void solve(double threshold);
-  /// The same for the whole tree.
+  /// Parts of a variable's own (conditional) standard deviation.
+  struct MoveLimits {
+    double finest = 0.0;   ///< What changes by less stays.
+    double at_once = 0.0;  ///< What lies below changes that are all smaller waits for its turn.
+    int turns = 0;         ///< Cliques that waited and have their turn, in one solve.
+  };
+  /// Back-substitution from the cliques that eliminate() made, on as long as something changes.
+  /// Moves the variables; changed() tells which and changed_from() where from. The far end of a
+  /// large map follows the hair's breadths of every update a little later: so an update's cost
+  /// does not follow the map.
+  void solve(const MoveLimits& limits);
+  /// The whole tree; nothing waits.
   void solve_everything(double threshold);
   const std::vector<int>& changed() const { return changed_; }
   const std::vector<Delta>& changed_from() const { return changed_from_; }
@@ -97,6 +104,7 @@ class CliqueTree {
   struct Marks {
     std::vector<int> structural;
     std::vector<int> dirty;
+    std::vector<int> waiting;
     double total_flops = 0.0;
   };
   /// One front at work: size x size, lower triangle.
@@ -137,10 +145,13 @@ class CliqueTree {
   void add_schur(const CliqueRecord& child, const ColumnOf& column_of, Workspace& at, int size);
 
   // clique_tree_solve.cpp
-  void solve_clique(int clique, double threshold);
-  void solve_below(int clique, double threshold);
-  bool has_changed_row(const CliqueRecord& clique, int from) const;
-  void push_children(int clique);
+  void solve_clique(int clique, double finest);
+  void solve_from(int clique, const MoveLimits& limits);
+  void queue(int clique);
+  void forget_waiting();
+  void take_turns(const MoveLimits& limits);
+  double change_of_rows(const CliqueRecord& clique, int from) const;
+  void push_children(int clique, double at_once);
 
   // clique_tree_covariance.cpp
   void collect_paths(std::span<const int> variables);
@@ -157,6 +168,8 @@ class CliqueTree {
   std::vector<char> mark_;  ///< Per clique.
   std::vector<int> structural_;
   std::vector<int> dirty_;
+  std::vector<int> waiting_;      ///< Cliques that changes stopped at, first come first served.
+  std::vector<char> is_waiting_;  ///< Per clique; not of those that have left the tree.
   Marks saved_marks_;
   bool solve_everything_ = false;
 
@@ -182,6 +195,7 @@ class CliqueTree {
   std::vector<int> changed_;
   std::vector<Delta> changed_from_;
   std::vector<std::uint64_t> changed_at_;  ///< Per variable: number of the solve that moved it.
+  std::vector<double> change_size_;        ///< And how far [own conditional deviations].
   std::uint64_t solve_count_ = 0;
   double promised_decrease_ = 0.0;
   std::vector<int> path_;

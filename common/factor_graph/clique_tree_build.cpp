@@ -45,6 +45,9 @@ double CliqueTree::remove_structure() {
   double flops = 0.0;
   for (const int c : structural_) {
     flops += flops_of(cliques_[c]);
+    if (static_cast<std::size_t>(c) < is_waiting_.size()) {
+      is_waiting_[static_cast<std::size_t>(c)] = 0;
+    }
     if (cliques_[c].parent == kRoot) unlink_from_root(c);
     count_left_out(cliques_[c].left_out > 0 ? -1 : 0);
     cliques_.edit(c).parent = kNone;

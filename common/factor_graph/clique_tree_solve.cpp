@@ -6,7 +6,7 @@
 
 namespace understory {
 
-void CliqueTree::solve_clique(int id, double threshold) {
+void CliqueTree::solve_clique(int id, double finest) {
   const CliqueRecord& clique = cliques_[id];
   step_.resize(static_cast<std::size_t>(clique.size));
   int row = clique.pivots;
@@ -35,67 +35,108 @@ void CliqueTree::solve_clique(int id, double threshold) {
       largest = std::max(largest, std::abs(whitened));
       squared += whitened * whitened;
     }
-    if (largest > threshold) {
+    if (largest > finest) {
       promised_decrease_ += squared;
-      changed_.push_back(name);
-      changed_from_.push_back(variable.delta);
-      changed_at_[static_cast<std::size_t>(name)] = solve_count_;
+      std::uint64_t& changed_at = changed_at_[static_cast<std::size_t>(name)];
+      if (changed_at != solve_count_) {
+        changed_at = solve_count_;
+        changed_.push_back(name);
+        changed_from_.push_back(variable.delta);
+        change_size_[static_cast<std::size_t>(name)] = 0.0;
+      }
+      double& change_size = change_size_[static_cast<std::size_t>(name)];
+      change_size = std::max(change_size, largest);
       graph_.move(name, step_.data() + first);
     }
     first += size;
   }
 }
 
-bool CliqueTree::has_changed_row(const CliqueRecord& clique, int from) const {
-  for (int i = from; i < clique.row_count; ++i) {
-    if (changed_at_[static_cast<std::size_t>(clique.rows[i])] == solve_count_) return true;
-  }
-  return false;
+void CliqueTree::queue(int clique) {
+  is_waiting_.resize(mark_.size(), 0);
+  char& is_waiting = is_waiting_[static_cast<std::size_t>(clique)];
+  if (is_waiting == 0) waiting_.push_back(clique);
+  is_waiting = 1;
 }
 
-void CliqueTree::push_children(int id) {
+void CliqueTree::forget_waiting() {
+  for (const int c : waiting_) is_waiting_[static_cast<std::size_t>(c)] = 0;
+  waiting_.clear();
+}
+
+/// Largest change in this solve of the clique's rows from `from` on [own conditional deviations].
+double CliqueTree::change_of_rows(const CliqueRecord& clique, int from) const {
+  double largest = 0.0;
+  for (int i = from; i < clique.row_count; ++i) {
+    const auto name = static_cast<std::size_t>(clique.rows[i]);
+    if (changed_at_[name] == solve_count_) largest = std::max(largest, change_size_[name]);
+  }
+  return largest;
+}
+
+/// Children whose separator moved much have their turn now, those where it moved a little later.
+void CliqueTree::push_children(int id, double at_once) {
+  const bool any = solve_everything_ || change_of_rows(cliques_[id], 0) > 0.0;
+  if (!any) return;
   for (int c = cliques_[id].first_child; c != kNone; c = cliques_[c].next_sibling) {
     // Those of made_ have their turn anyway.
-    if (pending_[static_cast<std::size_t>(c)] == 0 &&
-        (solve_everything_ || has_changed_row(cliques_[c], cliques_[c].frontal_count))) {
+    if (pending_[static_cast<std::size_t>(c)] != 0) continue;
+    const double change = change_of_rows(cliques_[c], cliques_[c].frontal_count);
+    if (solve_everything_ || change > at_once) {
       stack_.push_back(c);
+    } else if (change > 0.0) {
+      queue(c);
     }
   }
 }
 
-void CliqueTree::solve_below(int id, double threshold) {
-  stack_.clear();
-  if (solve_everything_ || has_changed_row(cliques_[id], 0)) push_children(id);
+void CliqueTree::solve_from(int id, const MoveLimits& limits) {
+  stack_.assign(1, id);
   while (!stack_.empty()) {
     const int c = stack_.back();
     stack_.pop_back();
-    solve_clique(c, threshold);
-    if (solve_everything_ || has_changed_row(cliques_[c], 0)) push_children(c);
+    solve_clique(c, limits.finest);
+    push_children(c, limits.at_once);
   }
 }
 
-void CliqueTree::solve(double threshold) {
+/// The first of the queue.
+void CliqueTree::take_turns(const MoveLimits& limits) {
+  const auto count = std::min(waiting_.size(), static_cast<std::size_t>(limits.turns));
+  for (std::size_t i = 0; i < count; ++i) {
+    const int c = waiting_[i];
+    char& is_waiting = is_waiting_[static_cast<std::size_t>(c)];
+    if (is_waiting == 0) continue;
+    is_waiting = 0;
+    solve_from(c, limits);
+  }
+  waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(count));
+}
+
+void CliqueTree::solve(const MoveLimits& limits) {
   ++solve_count_;
   promised_decrease_ = 0.0;
   changed_.clear();
   changed_from_.clear();
   changed_at_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);
+  change_size_.resize(static_cast<std::size_t>(graph_.variable_capacity()));
   pending_.resize(static_cast<std::size_t>(cliques_.size()), 0);
   for (const int c : made_) pending_[static_cast<std::size_t>(c)] = 1;
   for (std::size_t i = made_.size(); i-- > 0;) {
-    solve_clique(made_[i], threshold);
-    solve_below(made_[i], threshold);
+    solve_from(made_[i], limits);
   }
   for (const int c : made_) pending_[static_cast<std::size_t>(c)] = 0;
+  take_turns(limits);
 }
 
 void CliqueTree::solve_everything(double threshold) {
+  forget_waiting();
   made_.clear();
   for (int c = cliques_[kRoot].first_child; c != kNone; c = cliques_[c].next_sibling) {
     made_.push_back(c);
   }
   solve_everything_ = true;
-  solve(threshold);
+  solve({threshold, threshold, 0});
   solve_everything_ = false;
 }
 

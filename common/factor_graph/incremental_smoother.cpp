@@ -251,7 +251,8 @@ void IncrementalSmoother::iterate(IncrementalUpdate& update, bool thorough) {
     tree_.solve_everything(thorough ? parameters_.thorough_move * pending_.unit
                                     : parameters_.least_move * usual_unit());
   } else {
-    tree_.solve(parameters_.least_move * usual_unit());
+    const double finest = parameters_.least_move * usual_unit();
+    tree_.solve({finest, parameters_.wait_below * finest, parameters_.turns});
   }
   update.deviation = judge(kNegligible * parameters_.relinearise_above * usual_unit());
   accept_step(update, thorough);

@@ -15,6 +15,10 @@ namespace understory {
 struct IncrementalParameters {
   /// A variable that would move by less of its conditional standard deviation stays.
   double least_move = 0.2;
+  /// What lies below changes that are all smaller than so many times least_move waits for its turn;
+  /// so many cliques have theirs in an update. 1: nothing waits.
+  double wait_below = 1.0;
+  int turns = 100;
   /// A factor whose residual is further than this from what its linearisation says is linearised
   /// again with the next update.
   double relinearise_above = 0.5;

@@ -16,6 +16,8 @@ IncrementalParameters incremental(const SmootherParameters& parameters) {
   // The mapper's noise is as it says, and its cost must not follow the map.
   result.first_unit = 1.0;
   result.thorough_every = 0;
+  result.wait_below = parameters.wait_below;
+  result.turns = parameters.turns;
   return result;
 }
 

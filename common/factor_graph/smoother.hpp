@@ -15,6 +15,10 @@ struct SmootherParameters {
   /// What moves by less of its own conditional standard deviation stays where it is [sigmas]. At
   /// 1e-2 one keyframe of twenty was refused on roads.
   double least_move = 1e-3;
+  /// Far from where an update took place, changes of less than so many times that wait for their
+  /// turn, which so many cliques have in an update: its cost does not follow the map.
+  double wait_below = 100.0;
+  int turns = 100;
   /// A measurement is linearised again beyond this [sigmas]. Linearisations of different age leave
   /// torques that turn all that hangs on them: the prior that holds the map must hold it firmly,
   /// and at 1e-2 the end of a 5 km road swung by 2 m from update to update.

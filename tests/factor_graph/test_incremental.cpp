@@ -149,6 +149,37 @@ TEST_CASE("In space the smoother ends where the batch solution is", "[incrementa
   }
 }
 
+TEST_CASE("What waits for its turn arrives where the batch solution is", "[incremental]") {
+  Random random(8);
+  IncrementalParameters parameters = exact();
+  parameters.least_move = 1e-7;
+  parameters.wait_below = 1e6;  // a tenth of a deviation
+  parameters.turns = 2;
+  IncrementalSmoother smoother(parameters);
+  std::vector<VariableId> poses;
+  long moved = 0;
+  for (int k = 0; k < 120; ++k) {
+    grow(smoother, poses, random);
+    const IncrementalUpdate update = smoother.update();
+    REQUIRE(update.ok);
+    moved += update.moved_variables;
+    if (k % 10 == 0) {
+      // Taken back and done again: the queue is part of the state.
+      smoother.rollback();
+      poses.pop_back();
+      grow(smoother, poses, random);
+      REQUIRE(smoother.update().ok);
+    }
+  }
+  CHECK(moved < 120L * 60);
+  double before = 1.0;
+  for (int i = 0; i < 400 && before > 0.0; ++i) {
+    before = static_cast<double>(smoother.update().moved_variables);
+  }
+  CHECK(before == 0.0);
+  CHECK(distance_to_batch(smoother.graph()) < 1e-6);
+}
+
 TEST_CASE("On a torus of noisy poses the steps do not swing for ever", "[incremental]") {
   Random random(5);
   constexpr int kAround = 12;
