@@ -125,9 +125,10 @@ void CliquePlanner::draft(int position) {
   }
   for (int c = children_[at]; c != kNone; c = drafts_[static_cast<std::size_t>(c)].next) {
     const Draft& child = drafts_[static_cast<std::size_t>(c)];
-    for (int i = 0; i < child.separator_count; ++i) {
-      tie(separators_[static_cast<std::size_t>(child.first_separator + i)]);
-    }
+    // By number: tie() makes the list longer.
+    const auto first = static_cast<std::size_t>(child.first_separator);
+    const auto count = static_cast<std::size_t>(child.separator_count);
+    for (std::size_t i = first; i < first + count; ++i) tie(separators_[i]);
   }
   draft.separator_count = static_cast<int>(separators_.size()) - draft.first_separator;
   next_frontal_[at] = kNone;
