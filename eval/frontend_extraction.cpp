@@ -59,6 +59,8 @@ void add_extraction_rows(const FrontendOptions& options, const std::atomic<bool>
     rows.at_least(fmt::format("{}: recall", what), kind.recall(), "", is_urban ? 0.85 : 0.9);
     rows.at_most(fmt::format("{}: error in the plan, RMS to 20 m", what), 100.0 * kind.rms_m, "cm",
                  is_urban ? 5.0 : 3.0);
+    rows.state(fmt::format("{}: mean error along the ray", what), 1e3 * kind.bias_along_m, "mm");
+    rows.state(fmt::format("{}: mean error across it", what), 1e3 * kind.bias_across_m, "mm");
     if (is_urban) {
       rows.at_most("corners: bisector, RMS", 180.0 / std::numbers::pi * kind.bearing_rms_rad, "deg",
                    2.0);

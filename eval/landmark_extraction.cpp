@@ -70,6 +70,9 @@ struct Tally {
     score.nees_space += error.dot(detection.covariance_m2.inverse() * error);
     if (truth.position_m.head<2>().norm() <= error_range_m) {
       square_m2 += error.head<2>().squaredNorm();
+      const Eigen::Vector2d ray = truth.position_m.head<2>().normalized();
+      score.bias_along_m += ray.dot(error.head<2>());
+      score.bias_across_m += ray.x() * error.y() - ray.y() * error.x();
       ++near;
     }
     if (truth.bisector_rad) {
@@ -87,7 +90,10 @@ struct Tally {
     score.nees_space /= matched;
     score.nees_bearing /= matched;
     score.bearing_rms_rad = std::sqrt(square_rad2 / matched);
-    score.rms_m = std::sqrt(square_m2 / std::max<double>(1.0, static_cast<double>(near)));
+    const double counted = std::max<double>(1.0, static_cast<double>(near));
+    score.rms_m = std::sqrt(square_m2 / counted);
+    score.bias_along_m /= counted;
+    score.bias_across_m /= counted;
     return score;
   }
 };

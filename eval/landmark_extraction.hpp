@@ -31,6 +31,8 @@ struct KindScore {
   std::uint64_t detections = 0;
   std::uint64_t right = 0;       ///< Detections of a true landmark, the first for each.
   double rms_m = 0.0;            ///< In the plan, within the range for errors.
+  double bias_along_m = 0.0;     ///< Mean error along the ray, away from the vehicle, and to its
+  double bias_across_m = 0.0;    ///< left; within the same range. It does not average out.
   double nees_plan = 0.0;        ///< Mean, all matched; 2 is right.
   double nees_space = 0.0;       ///< With the height; 3 is right.
   double bearing_rms_rad = 0.0;  ///< Corners: of the bisector.
