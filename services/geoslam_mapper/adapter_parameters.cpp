@@ -50,6 +50,9 @@ void describe_evidence(SmoothingMapperParameters& p, ParameterTable& table) {
             "Of a predicted pose that no odometry made.");
   table.add("ours.predicted_sigma_rad", p.predicted_sigma_rad, {1e-5, 3.2}, "rad",
             "Of the heading of a predicted pose that no odometry made.");
+  table.add("ours.filter_disagreement_m", p.filter_disagreement_m, {0.0, 100.0}, "m",
+            "a keyframe with at most two landmarks that moves so much otherwise than the filter "
+            "is not believed; 0: the filter is not asked");
   table.add("ours.min_matched_ratio", p.min_matched_ratio, {0.0, 1.0}, "",
             "Of what can be matched: below, a predicted pose is not believed.");
   table.add("ours.min_matched", p.min_matched, {1, 1000}, "",

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "common/model/ekf_output.hpp"
 #include "common/model/keyframe.hpp"
 #include "common/model/map.hpp"
 #include "common/model/odometry.hpp"
@@ -28,8 +29,9 @@ class MapperMethod {
   }
   /// Motion without landmarks; a factor between keyframes when the configuration says so.
   virtual void add(const Odometry& odometry) = 0;
-  /// The inertial bias as the filter knows it: odometry that comes later is turned by it.
-  virtual void set_bias(const InertialBias& /*bias*/) {}
+  /// What the filter says: odometry that comes later is turned by its bias, and a keyframe with few
+  /// landmarks that moves otherwise is not believed.
+  virtual void add(const EkfPose& /*pose*/) {}
   /// A map to start from (thesis §4.3.1), frame `map`; before the first keyframe.
   virtual void start_with(std::span<const MapLandmark> landmarks) = 0;
 

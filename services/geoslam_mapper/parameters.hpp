@@ -46,6 +46,10 @@ struct SmoothingMapperParameters {
   double min_matched_ratio = 0.4;
   /// Fewest matches of a pose that odometry does not support.
   int min_matched = 4;
+  /// A keyframe with at most two landmarks that moves so much otherwise than the filter says is not
+  /// believed: what is taken for a trunk there may be somebody who walks. 0: the filter is not
+  /// asked.
+  double filter_disagreement_m = 0.2;
   /// Landmarks seen within so many keyframes share their error with the pose.
   int recent_keyframes = 20;
   /// A landmark enters the map when it was detected so often, in this share of the scans that had

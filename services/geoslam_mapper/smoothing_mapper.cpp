@@ -99,6 +99,10 @@ MapUpdate SmoothingMapper::add(const Keyframe& keyframe) {
     store_.catch_up();
     placement = search(keyframe, update);
   }
+  if (placement && contradicts_filter(keyframe, *placement)) {
+    placement.reset();
+    update.reason = "few landmarks, and they move otherwise than the filter";
+  }
   if (!placement) {
     update.status = MapUpdateStatus::kNotSure;
     if (prediction)

@@ -5,6 +5,7 @@
 #include "common/factor_graph/smoother.hpp"
 #include "common/geometry/registration.hpp"
 #include "common/model/odometry_buffer.hpp"
+#include "services/geoslam_mapper/filter_track.hpp"
 #include "services/geoslam_mapper/geoslam_mapper.hpp"
 #include "services/geoslam_mapper/landmark_store.hpp"
 #include "services/geoslam_mapper/place_grid.hpp"
@@ -18,7 +19,10 @@ class SmoothingMapper final : public MapperMethod {
   MapUpdate add(const Keyframe& keyframe) override;
   std::optional<SE2WithCovariance> locate(const LandmarkScan& scan) override;
   void add(const Odometry& odometry) override;
-  void set_bias(const InertialBias& bias) override { odometry_.set_bias(bias); }
+  void add(const EkfPose& pose) override {
+    odometry_.set_bias(pose.bias);
+    filter_.add(pose);
+  }
   void start_with(std::span<const MapLandmark> landmarks) override;
   std::vector<KeyframePose> trajectory() const override;
   std::vector<MapLandmark> landmarks() const override;
@@ -71,6 +75,7 @@ class SmoothingMapper final : public MapperMethod {
                                             const SE2WithCovariance& guess) const;
   std::vector<double> relative_variances(const std::vector<LandmarkId>& ids) const;
   std::size_t matchable(const Keyframe& keyframe, const Placement& placement) const;
+  bool contradicts_filter(const Keyframe& keyframe, const Placement& placement) const;
 
   // smoothing_mapper_locate.cpp: where is a single scan, between keyframes?
   std::optional<SE2WithCovariance> step_from_last_scan(const LandmarkScan& scan) const;
@@ -114,6 +119,7 @@ class SmoothingMapper final : public MapperMethod {
   /// Per point of the graph: its landmark; 0 where that was taken over by another.
   std::vector<LandmarkId> landmark_of_point_;
   OdometryBuffer odometry_;
+  FilterTrack filter_;
   bool map_was_given_ = false;
   std::uint32_t keyframes_ = 0;  ///< Accepted.
   /// The last accepted keyframe's last member: odometry goes on from here. Frame: the node's

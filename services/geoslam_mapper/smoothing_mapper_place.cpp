@@ -13,6 +13,10 @@ namespace {
 constexpr double kViewMargin_m = 5.0;
 /// Landmarks whose exact covariance relative to the vehicle is computed at most.
 constexpr std::size_t kMaxExact = 80;
+/// So many landmarks cannot contradict the filter.
+constexpr std::size_t kFewLandmarks = 2;
+/// Over longer times the filter drifts, too.
+constexpr Utime kFilterGate_us = 3'000'000;
 
 double plane_variance(const KeyframeLandmark& landmark) {
   return 0.5 * landmark.covariance_m2.trace();
@@ -160,6 +164,26 @@ std::optional<SmoothingMapper::Placement> SmoothingMapper::search(const Keyframe
     return std::nullopt;
   }
   return placement;
+}
+
+/// Somebody who walks, taken for the only trunk in view, would take the map along.
+bool SmoothingMapper::contradicts_filter(const Keyframe& keyframe,
+                                         const Placement& placement) const {
+  const double limit = parameters_.filter_disagreement_m;
+  if (limit <= 0.0 || placement.associations.size() > kFewLandmarks) return false;
+  const auto differs = [&](Utime from, Utime to, const SE2& motion) {
+    const std::optional<SE2> told = filter_.between(from, to);
+    return told && (told->inverse() * motion).translation().norm() > limit;
+  };
+  const KeyframeMember& first = keyframe.members.front();
+  const KeyframeMember& last = keyframe.members.back();
+  if (differs(first.utime, last.utime, first.centre_T_vehicle.inverse() * last.centre_T_vehicle)) {
+    return true;
+  }
+  if (bases_.empty() || bases_.back().utime + kFilterGate_us < keyframe.utime) return false;
+  const SE2 map_T_base = placement.map_T_centre.mean * keyframe.centre_T_base();
+  return differs(bases_.back().utime, keyframe.utime,
+                 base_pose(bases_.back()).mean.inverse() * map_T_base);
 }
 
 }  // namespace understory
