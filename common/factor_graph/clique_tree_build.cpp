@@ -78,8 +78,9 @@ int CliqueTree::build_clique(const CliquePlan& plan, int planned) {
   clique.rows = rows_.take(static_cast<std::size_t>(from.row_count));
   clique.size = 1;
   for (int i = 0; i < from.row_count; ++i) {
-    const int name = affected_[static_cast<std::size_t>(
-        plan.rows[static_cast<std::size_t>(from.first_row + i)])];
+    const int planned_row = from.first_row + i;
+    const int planned_name = plan.rows[static_cast<std::size_t>(planned_row)];
+    const int name = affected_[static_cast<std::size_t>(planned_name)];
     clique.rows[i] = name;
     const int size = dimension(graph_.variable(name).type);
     clique.size += size;

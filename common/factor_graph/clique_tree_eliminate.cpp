@@ -52,9 +52,10 @@ void CliqueTree::place_rows(const CliqueRecord& clique, Workspace& at) const {
     const int size = dimension(variable.type);
     if (i < clique.frontal_count) {
       const int translations = variable.type == VariableType::kPose2 ? 2 : 3;
+      double* least = at.least.data() + row;
       for (int k = 0; k < size; ++k) {
         const double scale = variable.scale[k < translations ? 0 : 1];
-        at.least[static_cast<std::size_t>(row + k)] = kLeastPivot * scale * scale;
+        least[k] = kLeastPivot * scale * scale;
       }
     }
     row += size;

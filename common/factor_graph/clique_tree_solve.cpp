@@ -24,13 +24,12 @@ void CliqueTree::solve_clique(int id, double finest) {
     const int size = dimension(variable.type);
     double largest = 0.0;
     double squared = 0.0;
+    const double* to = step_.data() + first;
     for (int c = 0; c < size; ++c) {
       const double* column = clique.panel + static_cast<std::ptrdiff_t>(first + c) * clique.size;
       double whitened = 0.0;
       for (int r = c; r < size; ++r) {
-        const auto at = static_cast<std::size_t>(r);
-        whitened +=
-            column[first + r] * (step_[static_cast<std::size_t>(first + r)] - variable.delta[at]);
+        whitened += column[first + r] * (to[r] - variable.delta[static_cast<std::size_t>(r)]);
       }
       largest = std::max(largest, std::abs(whitened));
       squared += whitened * whitened;
@@ -46,7 +45,7 @@ void CliqueTree::solve_clique(int id, double finest) {
       }
       double& change_size = change_size_[static_cast<std::size_t>(name)];
       change_size = std::max(change_size, largest);
-      graph_.move(name, step_.data() + first);
+      graph_.move(name, to);
     }
     first += size;
   }

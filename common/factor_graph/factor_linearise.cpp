@@ -209,7 +209,8 @@ void FactorGraph::linearise(int id) {
 Deviation FactorGraph::deviation(int id) const {
   const FactorRecord& record = factors_[id];
   const std::span<const int> variables = variables_of(id);
-  scratch_.resize(static_cast<std::size_t>(2 * record.rows + record.columns));
+  const int numbers = 2 * record.rows + record.columns;
+  scratch_.resize(static_cast<std::size_t>(numbers));
   double* residual = scratch_.data();
   whitened(record, variables, residual, nullptr);
   double* moves = residual + 2 * record.rows;
