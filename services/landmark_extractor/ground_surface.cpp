@@ -38,8 +38,10 @@ struct PatchSums {
 /// Part of each of a patch's nodes in the surface at the middle of one of its cells.
 constexpr std::array<float, 4> share_of(int plane) {
   constexpr auto kCells = static_cast<float>(GroundGrid::kCellsPerSpan);
-  const float a = (static_cast<float>(plane % GroundGrid::kCellsPerSpan) + 0.5F) / kCells;
-  const float b = (static_cast<float>(plane / GroundGrid::kCellsPerSpan) + 0.5F) / kCells;
+  const int column = plane % GroundGrid::kCellsPerSpan;
+  const int row = plane / GroundGrid::kCellsPerSpan;
+  const float a = (static_cast<float>(column) + 0.5F) / kCells;
+  const float b = (static_cast<float>(row) + 0.5F) / kCells;
   return {(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b};
 }
 
@@ -227,7 +229,8 @@ float GroundSurface::height(float x, float y) const {
   const int j = static_cast<int>(v);
   const float a = u - static_cast<float>(i);
   const float b = v - static_cast<float>(j);
-  const GroundPatch& patch = patches_[static_cast<std::size_t>(j * grid_.nodes_per_side + i)];
+  const int node = j * grid_.nodes_per_side + i;
+  const GroundPatch& patch = patches_[static_cast<std::size_t>(node)];
   return patch.constant + a * patch.along_x + b * (patch.along_y + a * patch.twist);
 }
 
