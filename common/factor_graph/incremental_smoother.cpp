@@ -270,7 +270,6 @@ IncrementalUpdate IncrementalSmoother::run(bool thorough) {
   moved_.clear();
   moved_at_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);
   pending_.since_thorough = thorough ? 0 : pending_.since_thorough + 1;
-  if (thorough) look_at_all(parameters_.thorough_relinearise_above);
   do {
     iterate(update, thorough);
   } while (update.iterations < parameters_.max_iterations &&
@@ -281,29 +280,32 @@ IncrementalUpdate IncrementalSmoother::run(bool thorough) {
   return update;
 }
 
-IncrementalUpdate IncrementalSmoother::update() {
+IncrementalUpdate IncrementalSmoother::run_thoroughly(double relinearise_above) {
   begin_change();
-  return run(parameters_.thorough_every > 0 &&
-             pending_.since_thorough + 1 >= parameters_.thorough_every);
-}
-
-IncrementalUpdate IncrementalSmoother::update_thoroughly() {
-  begin_change();
+  look_at_all(relinearise_above);
   return run(true);
 }
 
+IncrementalUpdate IncrementalSmoother::update() {
+  if (parameters_.thorough_every > 0 && pending_.since_thorough + 1 >= parameters_.thorough_every) {
+    return update_thoroughly();
+  }
+  begin_change();
+  return run(false);
+}
+
+IncrementalUpdate IncrementalSmoother::update_thoroughly() {
+  return run_thoroughly(parameters_.thorough_relinearise_above);
+}
+
 IncrementalUpdate IncrementalSmoother::settle(int max_updates) {
-  const auto one = [&] {
-    begin_change();
-    look_at_all(kSettledPart * parameters_.thorough_relinearise_above);
-    return run(true);
-  };
-  IncrementalUpdate update = one();
+  const double limit = kSettledPart * parameters_.thorough_relinearise_above;
+  IncrementalUpdate update = run_thoroughly(limit);
   const auto is_settled = [&] {
     return update.relinearised_factors == 0 && !pending_.solve_everything && pending_.stale.empty();
   };
   for (int i = 1; i < max_updates && !is_settled(); ++i) {
-    update = one();
+    update = run_thoroughly(limit);
   }
   return update;
 }
@@ -314,7 +316,7 @@ IncrementalUpdate IncrementalSmoother::update_everything() {
   for (int v = 0; v < graph_.variable_capacity(); ++v) {
     if (graph_.variable(v).in_use) pending_.rebase.push_back(v);
   }
-  return run(true);
+  return update_thoroughly();
 }
 
 void IncrementalSmoother::finish(IncrementalUpdate& update) {

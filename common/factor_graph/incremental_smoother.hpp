@@ -129,6 +129,7 @@ class IncrementalSmoother {
   double usual_unit() const;
   void collect_moved();
   IncrementalUpdate run(bool thorough);
+  IncrementalUpdate run_thoroughly(double relinearise_above);
 
   IncrementalParameters parameters_;
   FactorGraph graph_;
