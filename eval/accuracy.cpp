@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -75,7 +76,9 @@ std::vector<Cell> noise_cells(const NoiseOptions& options) {
 }
 
 void run_accuracy(const std::string& experiment, const std::vector<Cell>& cells,
-                  const CampaignOptions& options) {
+                  CampaignOptions options) {
+  const auto lidar = std::find(options.methods.begin(), options.methods.end(), kLidarMethod);
+  if (lidar != options.methods.end()) options.methods.insert(lidar + 1, kLidarFilter);
   const std::vector<CellResult> results = run_campaign(cells, options, stop_on_interrupt());
   const std::vector<Summary> rows = summarise(results, options.methods);
   fmt::print("eval {}: {} runs per cell, seed {}; the source's published figures on the right\n{}",
@@ -96,7 +99,7 @@ void add_paths_experiment(CLI::App& eval) {
   CLI::App& command = *eval.add_subcommand("paths", "Accuracy on the source's five paths");
   const auto options = std::make_shared<CampaignOptions>();
   const auto paths = std::make_shared<std::vector<std::string>>();
-  add_campaign_options(command, *options);
+  add_campaign_options_with_lidar(command, *options);
   command.add_option("--path", *paths, "Only these paths")
       ->delimiter(',')
       ->check(
@@ -109,7 +112,7 @@ void add_paths_experiment(CLI::App& eval) {
 void add_density_experiment(CLI::App& eval) {
   CLI::App& command = *eval.add_subcommand("density", "Accuracy in three forests");
   const auto options = std::make_shared<CampaignOptions>();
-  add_campaign_options(command, *options);
+  add_campaign_options_with_lidar(command, *options);
   command.callback([options] {
     run_guarded("density", [&] { run_accuracy("density", density_cells(), *options); });
   });

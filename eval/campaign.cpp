@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "eval/lidar_run.hpp"
 #include "eval/parallel.hpp"
 
 namespace understory::eval {
@@ -20,7 +21,14 @@ std::map<std::string, RunResult> run_all_methods(const Cell& cell, const Campaig
   const RecordedDrive recorded(cell.drive(), run_seed(options.seed, run));
   std::map<std::string, RunResult> results;
   for (const std::string& method : options.methods) {
-    if (method == "oracle") continue;
+    if (method == "oracle" || method == kLidarFilter) continue;
+    if (method == kLidarMethod) {
+      LidarResult lidar =
+          run_lidar(recorded.drive, options.chain_config, run_seed(options.seed, run), stop);
+      results[method] = std::move(lidar.slam);
+      results[kLidarFilter] = std::move(lidar.ekf);
+      continue;
+    }
     results[method] = run_slam(recorded, make_stages(method), stop);
   }
   if (wanted(options, "oracle")) {

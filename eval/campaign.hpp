@@ -21,6 +21,7 @@ struct CampaignOptions {
   int jobs = 1;
   std::string json;  ///< Where the results go; the plots go beside it. Empty = only the screen.
   std::vector<std::string> methods{"source", "ours", "oracle"};
+  std::string chain_config = "deploy/config/lidar";  ///< Folder; for the method "lidar" alone.
   bool plots = true;
 };
 
@@ -47,6 +48,11 @@ struct CellResult {
 /// std::runtime_error with the name of the run when a method throws.
 std::vector<CellResult> run_campaign(const std::vector<Cell>& cells, const CampaignOptions& options,
                                      const std::atomic<bool>& stop);
+
+/// The whole chain from simulated sensors instead of ideal detections, and its filter alone: two
+/// rows of one run.
+inline constexpr const char* kLidarMethod = "lidar";
+inline constexpr const char* kLidarFilter = "lidar-ekf";
 
 /// Seed of a run: the same for every cell and every method.
 inline std::uint64_t run_seed(std::uint64_t seed, int run) {

@@ -10,9 +10,21 @@
 #include "services/keyframer/adapter.hpp"
 #include "services/landmark_extractor/adapter.hpp"
 #include "services/lidar_imu_input/adapter.hpp"
+#include "understory/map_request_t.hpp"
 
 namespace understory::eval {
 namespace {
+
+/// Asks for the whole map as often as there were updates since the last call.
+void keep_states(SensorChain& chain, ChainRun& run) {
+  if (run.states.size() == run.updates.size()) return;
+  map_request_t request{};
+  request.utime = run.updates.back().utime;
+  request.seq = static_cast<std::int64_t>(run.states.size());
+  request.everything = 1;
+  chain.feed("MAP_REQUEST", encode_message(request));
+  run.states.resize(run.updates.size(), {run.keyframes, run.landmarks});
+}
 
 /// What fits into one packet of the bus: 10 bytes a point.
 constexpr std::size_t kPointsPerPart = 5500;
@@ -111,6 +123,7 @@ ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options) {
     if (std::holds_alternative<sim::SimulatedSweep>(*reading)) {
       ++run.sweeps;
       if (options.progress) options.progress(run.simulated_s / duration_s);
+      if (options.on_sweep) options.on_sweep(std::get<sim::SimulatedSweep>(*reading));
     }
     for (RawMessage& message : raw_messages(*reading, sweep_parts)) {
       if (!options.meddle) {
@@ -119,6 +132,7 @@ ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options) {
       }
       for (const RawMessage& changed : options.meddle(std::move(message))) chain.feed(changed);
     }
+    if (options.keep_states) keep_states(chain, run);
   }
   finish_chain(chain, run);
   return run;

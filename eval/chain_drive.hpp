@@ -17,6 +17,12 @@
 
 namespace understory::eval {
 
+/// The map right after an update.
+struct MapAfterUpdate {
+  std::vector<KeyframePose> keyframes;
+  std::vector<MapLandmark> landmarks;
+};
+
 /// What the chain said, and what was true.
 struct ChainRun {
   std::vector<StampedPose> truth;  ///< `world`, at the truth's own rate.
@@ -25,6 +31,7 @@ struct ChainRun {
   std::vector<SlamPose> slam;     ///< Those that are localised.
   std::uint64_t slam_unsure = 0;  ///< SLAM_POSE without a pose that means something.
   std::vector<MapUpdate> updates;
+  std::vector<MapAfterUpdate> states;   ///< One for each update, where they were asked for.
   std::vector<KeyframePose> keyframes;  ///< As estimated at the end.
   std::vector<MapLandmark> landmarks;   ///< Of the last map.
   std::vector<std::size_t> detections;  ///< Of each sweep.
@@ -43,6 +50,9 @@ struct ChainOptions {
   double end_s = 1e9;  ///< Of the drive.
   Meddle meddle;       ///< Faults; empty = none.
   std::function<void(double done)> progress;
+  /// Every sweep before it goes to the chain, with the truth in it.
+  std::function<void(const sim::SimulatedSweep&)> on_sweep;
+  bool keep_states = false;  ///< Asks for the whole map after each update.
 };
 
 /// One message a reading; sweeps in parts. Truth gives none.

@@ -2,13 +2,16 @@
 #include "eval/experiments.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
 namespace understory::eval {
+namespace {
 
-void add_campaign_options(CLI::App& command, CampaignOptions& options) {
+void add_options(CLI::App& command, CampaignOptions& options,
+                 const std::vector<std::string>& methods) {
   command.add_option("--runs", options.runs, "Runs per cell")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
@@ -17,11 +20,27 @@ void add_campaign_options(CLI::App& command, CampaignOptions& options) {
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   command.add_option("--json", options.json, "Result file; traces and plots go beside it");
-  command.add_option("--method", options.methods, "Methods to compare: source, ours, oracle")
+  command
+      .add_option("--method", options.methods,
+                  fmt::format("Methods to compare: {}", fmt::join(methods, ", ")))
       ->delimiter(',')
-      ->check(CLI::IsMember({"source", "ours", "oracle"}))
+      ->check(CLI::IsMember(methods))
       ->capture_default_str();
   command.add_flag("!--no-plots", options.plots, "Write JSON only");
+}
+
+}  // namespace
+
+void add_campaign_options(CLI::App& command, CampaignOptions& options) {
+  add_options(command, options, {"source", "ours", "oracle"});
+}
+
+void add_campaign_options_with_lidar(CLI::App& command, CampaignOptions& options) {
+  add_options(command, options, {"source", "ours", "oracle", kLidarMethod});
+  command
+      .add_option("--config", options.chain_config,
+                  "Configuration of the services, for the method lidar")
+      ->capture_default_str();
 }
 
 void run_guarded(const std::string& experiment, const std::function<void()>& work) {

@@ -10,6 +10,8 @@ namespace understory::eval {
 
 /// --runs, --seed, --jobs, --json, --method, --no-plots.
 void add_campaign_options(CLI::App& command, CampaignOptions& options);
+/// The same with the method "lidar", and --config for it.
+void add_campaign_options_with_lidar(CLI::App& command, CampaignOptions& options);
 
 /// Runs `work` and turns what it throws into one line on stderr and exit status 1.
 void run_guarded(const std::string& experiment, const std::function<void()>& work);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 #include "common/geometry/alignment.hpp"
 
@@ -34,10 +35,15 @@ double ratio(double sum, std::size_t count) {
 }  // namespace
 
 MapTruth::MapTruth(const sim::Drive& drive, std::size_t base)
-    : map_T_world_(drive.world_T_vehicle()[base].inverse()),
-      world_T_vehicle_(drive.world_T_vehicle()),
-      trunks_m_(drive.forest().trunks_m),
-      in_range_(trunks_ever_in_range(drive)),
+    : MapTruth(drive.world_T_vehicle(), base, drive.forest().trunks_m,
+               trunks_ever_in_range(drive)) {}
+
+MapTruth::MapTruth(std::vector<SE2> world_T_vehicle, std::size_t base,
+                   std::vector<Eigen::Vector2d> trunks_m, std::vector<std::uint32_t> in_range)
+    : map_T_world_(world_T_vehicle[base].inverse()),
+      world_T_vehicle_(std::move(world_T_vehicle)),
+      trunks_m_(std::move(trunks_m)),
+      in_range_(std::move(in_range)),
       grid_(trunks_m_, kTile) {}
 
 sim::PointGrid::Neighbour MapTruth::nearest_trunk(const Eigen::Vector2d& point_in_map_m) const {

@@ -26,6 +26,9 @@ struct MapState {
 class MapTruth {
  public:
   MapTruth(const sim::Drive& drive, std::size_t base);
+  /// Poses of any vehicle among any trunks; `in_range` (ascending) are those that it could see.
+  MapTruth(std::vector<SE2> world_T_vehicle, std::size_t base,
+           std::vector<Eigen::Vector2d> trunks_m, std::vector<std::uint32_t> in_range);
 
   SE2 map_T_vehicle(std::size_t scan) const { return map_T_world_ * world_T_vehicle_[scan]; }
   /// The true trunk nearest to a point of the map. Of all trunks: one that stands just out of range

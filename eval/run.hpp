@@ -64,6 +64,9 @@ struct RunTrace {
   std::vector<StateError> states;
   MapState final_map;
   std::optional<Snapshot> snapshot;
+  /// In the frame of the map, where the run had a way and trunks of its own; else the drive's.
+  std::vector<SE2> true_path;
+  std::vector<Eigen::Vector2d> true_trunks_m;
 };
 
 struct RunResult {

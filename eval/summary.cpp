@@ -43,6 +43,8 @@ Summary summary_of(const Cell& cell, const std::string& method,
   Summary summary;
   summary.cell = cell;
   summary.method = method;
+  summary.has_ideal_scans = method != kLidarMethod && method != kLidarFilter;
+  summary.has_map = method != kLidarFilter;
   summary.runs = static_cast<int>(runs.size());
   std::vector<double> roe_deg;
   std::vector<double> ate_cm;
@@ -110,6 +112,7 @@ std::vector<Summary> summarise(const std::vector<CellResult>& cells,
                                      [](const Summary& row) { return row.method == "oracle"; });
     if (oracle == rows.end()) continue;
     for (std::size_t i = first; i < rows.size(); ++i) {
+      if (!rows[i].has_ideal_scans) continue;
       rows[i].ratio = ratio(rows[i].rpe_cm.mean, oracle->rpe_cm.mean);
       rows[i].ratio_lpe = ratio(rows[i].lpe_cm.mean, oracle->lpe_cm.mean);
     }
@@ -147,6 +150,14 @@ nlohmann::json to_json(const Summary& row) {
   json["ratio"] = or_null(row.ratio);
   json["ratio_lpe"] = or_null(row.ratio_lpe);
   json["nees"] = or_null(row.nees);
+  if (!row.has_ideal_scans) json["sigma_cm"] = json["detection_pct"] = nullptr;
+  if (!row.has_map) {
+    for (const char* key :
+         {"lpe_cm", "lpe_cm_sd", "lpe_cm_runs", "map_recall_pct", "false_landmarks_pct",
+          "landmarks_in_range", "updates", "updates_possible"}) {
+      json[key] = nullptr;
+    }
+  }
   json["nees_in_band_pct"] = row.nees > 0.0 ? nlohmann::json(row.nees_in_band_pct) : nullptr;
   if (row.cell.published) {
     json["published_rpe_cm"] = row.cell.published->rpe_cm;
@@ -158,7 +169,7 @@ nlohmann::json to_json(const Summary& row) {
 
 std::string to_table(const std::vector<Summary>& rows) {
   std::string table = fmt::format(
-      "{:<14} {:<12} {:>5} {:>4} {:>4}  {:<7} {:>8} {:>6} {:>8} {:>6} {:>6} {:>11} {:>5} {:>7} "
+      "{:<14} {:<12} {:>5} {:>4} {:>4}  {:<9} {:>8} {:>6} {:>8} {:>6} {:>6} {:>11} {:>5} {:>7} "
       "{:>6} {:>7} {:>5} | {:>7} {:>7} {:>6}\n",
       "path", "forest", "noise", "det", "step", "method", "RPE cm", "+-sd", "LPE cm", "ratio",
       "r.LPE", "updates", "wrong", "recall", "false", "ATE cm", "NEES", "RPE", "LPE", "upd.");
@@ -166,15 +177,22 @@ std::string to_table(const std::vector<Summary>& rows) {
     const auto number = [](double value, const char* format) {
       return value > 0.0 ? fmt::format(fmt::runtime(format), value) : std::string("-");
     };
+    const auto if_any = [](bool any, double value, const char* format) {
+      return any ? fmt::format(fmt::runtime(format), value) : std::string("-");
+    };
     table += fmt::format(
-        "{:<14} {:<12} {:>3.0f}cm {:>3.0f}% {:>2.0f}cm  {:<7} {:>8.2f} {:>6.2f} {:>8.2f} {:>6} "
-        "{:>6} "
-        "{:>7.1f}/{:<3} {:>5} {:>6.1f}% {:>5.2f}% {:>7.2f} {:>5} |",
-        sim::to_string(row.cell.path), sim::to_string(row.cell.forest), 100.0 * row.cell.sigma_m,
-        100.0 * row.cell.detection, 100.0 * row.cell.interval_m, row.method, row.rpe_cm.mean,
-        row.rpe_cm.standard_deviation, row.lpe_cm.mean, number(row.ratio, "{:.3f}"),
-        number(row.ratio_lpe, "{:.3f}"), row.updates, row.updates_possible, row.wrong_updates,
-        row.map_recall_pct, row.false_landmarks_pct, row.ate_cm.mean, number(row.nees, "{:.2f}"));
+        "{:<14} {:<12} {:>5} {:>4} {:>2.0f}cm  {:<9} {:>8.2f} {:>6.2f} {:>8} {:>6} {:>6} "
+        "{:>11} {:>5} {:>7} {:>6} {:>7.2f} {:>5} |",
+        sim::to_string(row.cell.path), sim::to_string(row.cell.forest),
+        if_any(row.has_ideal_scans, 100.0 * row.cell.sigma_m, "{:.0f}cm"),
+        if_any(row.has_ideal_scans, 100.0 * row.cell.detection, "{:.0f}%"),
+        100.0 * row.cell.interval_m, row.method, row.rpe_cm.mean, row.rpe_cm.standard_deviation,
+        if_any(row.has_map, row.lpe_cm.mean, "{:.2f}"), number(row.ratio, "{:.3f}"),
+        number(row.ratio_lpe, "{:.3f}"),
+        row.has_map ? fmt::format("{:>7.1f}/{:<3}", row.updates, row.updates_possible) : "-",
+        row.wrong_updates, if_any(row.has_map, row.map_recall_pct, "{:.1f}%"),
+        if_any(row.has_map, row.false_landmarks_pct, "{:.2f}%"), row.ate_cm.mean,
+        number(row.nees, "{:.2f}"));
     if (row.cell.published) {
       table += fmt::format(" {:>7.2f} {:>7.2f} {:>6}", row.cell.published->rpe_cm,
                            row.cell.published->lpe_cm,

@@ -19,6 +19,8 @@ Statistics statistics_of(const std::vector<double>& values);
 struct Summary {
   Cell cell;
   std::string method;
+  bool has_ideal_scans = true;  ///< Else the cell's noise and the oracle mean nothing.
+  bool has_map = true;          ///< Else poses alone.
   int runs = 0;
   Statistics rpe_cm;
   Statistics lpe_cm;

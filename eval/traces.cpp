@@ -115,6 +115,11 @@ json trace_json(const RunTrace& trace, double interval_m) {
   for (const PoseEstimate& estimate : trace.final_map.poses) {
     result["poses"].push_back(pose(estimate.map_T_vehicle));
   }
+  if (!trace.true_path.empty()) {
+    result["true_path"] = json::array();
+    for (const SE2& place : trace.true_path) result["true_path"].push_back(pose(place));
+    result["true_trunks"] = points(trace.true_trunks_m);
+  }
   if (trace.snapshot) result["snapshot"] = snapshot_json(*trace.snapshot);
   return result;
 }
@@ -129,6 +134,7 @@ json traces_of(const std::vector<CellResult>& cells, const CampaignOptions& opti
     std::size_t base = 0;
     for (const auto& [method, runs] : cell.runs) {
       methods[method] = trace_json(runs.front().trace, cell.cell.interval_m);
+      if (!runs.front().trace.true_path.empty()) continue;
       const auto& poses = runs.front().trace.final_map.poses;
       if (!poses.empty()) base = poses.front().scan;
     }

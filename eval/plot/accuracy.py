@@ -13,7 +13,8 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
-COLOURS = {"source": "tab:red", "ours": "tab:blue", "oracle": "tab:green"}
+COLOURS = {"source": "tab:red", "ours": "tab:blue", "oracle": "tab:green",
+           "lidar": "tab:purple", "lidar-ekf": "tab:orange"}
 
 
 def columns(points):
@@ -21,11 +22,14 @@ def columns(points):
 
 
 def plot_map(trace, file):
-    methods = trace["methods"]
+    # A filter has poses alone.
+    methods = {name: run for name, run in trace["methods"].items() if run["landmarks"]}
+    if not methods:
+        return
     figure, axes = plt.subplots(1, len(methods), figsize=(7 * len(methods), 7), squeeze=False)
     for axis, (method, run) in zip(axes[0], methods.items()):
-        axis.plot(*columns(trace["true_trunks"]), "o", color="0.75", markersize=5, label="trunks")
-        axis.plot(*columns(trace["true_path"]), "-", color="black", linewidth=1, label="true path")
+        axis.plot(*columns(run.get("true_trunks", trace["true_trunks"])), "o", color="0.75", markersize=5, label="trunks")
+        axis.plot(*columns(run.get("true_path", trace["true_path"])), "-", color="black", linewidth=1, label="true path")
         axis.plot(*columns(run["landmarks"]), "x", color=COLOURS[method], markersize=4, label="map")
         axis.plot(*columns(run["poses"]), ".-", color=COLOURS[method], linewidth=1, markersize=3,
                   label="keyframes")
@@ -45,6 +49,8 @@ def plot_along(trace, file):
              "newest_pose_cm": "newest pose"}
     for axis, (key, name) in zip(axes, names.items()):
         for method, run in trace["methods"].items():
+            if key == "lpe_cm" and not run["landmarks"]:
+                continue
             axis.plot(run["travelled_m"], run[key], color=COLOURS[method], label=method)
         axis.set_ylabel(f"{name} [cm]")
         axis.set_ylim(bottom=0)
