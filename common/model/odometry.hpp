@@ -13,6 +13,19 @@ namespace understory {
 /// accelerometer along x and y [m/s^2] (the level's own error included).
 using InertialBias = Eigen::Vector3d;
 
+/// Error of (roll, pitch) [rad], about the axes of `vehicle_level`, that all sweeps levelled with
+/// one estimate of the attitude share. It lasts: while the vehicle stands it is the accelerometer's
+/// bias; what the vehicle's motion then tells takes it away.
+struct LevelError {
+  /// At the end of the interval.
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+  /// Error at the end = memory * error at the start + something new of covariance `added`.
+  Eigen::Matrix2d memory = Eigen::Matrix2d::Identity();
+  Eigen::Matrix2d added = Eigen::Matrix2d::Zero();
+  /// Of the vehicle's pitch: on a slope a wrong roll is a wrong heading too, by this times as much.
+  double pitch_tangent = 0.0;
+};
+
 /// IMU samples between two stamps, integrated in frame `vehicle_level` of the first stamp, gravity
 /// taken out (preintegration, Lupton & Sukkarieh 2012; Forster et al. 2017, in the plane). With
 /// start pose (R, p) and velocity v (both in the map) over `seconds`:
@@ -27,6 +40,7 @@ struct Preintegration {
   /// d(yaw, velocity, position) / d(bias) at `bias`, which was subtracted from the samples.
   Eigen::Matrix<double, 5, 3> bias_jacobian = Eigen::Matrix<double, 5, 3>::Zero();
   InertialBias bias = InertialBias::Zero();
+  LevelError level;
 };
 
 /// Channel ODOMETRY: motion of the vehicle between two stamps, from wheels, from preintegrated IMU

@@ -72,7 +72,11 @@ void to_json(Json& json, const Preintegration& p) {
           matrix_to_json<2, 1>(p.position_m),
           matrix_to_json<5, 5>(p.covariance),
           matrix_to_json<5, 3>(p.bias_jacobian),
-          matrix_to_json<3, 1>(p.bias)};
+          matrix_to_json<3, 1>(p.bias),
+          matrix_to_json<2, 2>(p.level.covariance),
+          matrix_to_json<2, 2>(p.level.memory),
+          matrix_to_json<2, 2>(p.level.added),
+          p.level.pitch_tangent};
 }
 void from_json(const Json& json, Preintegration& p) {
   p.seconds = json.at(0).get<double>();
@@ -82,6 +86,10 @@ void from_json(const Json& json, Preintegration& p) {
   p.covariance = matrix_from_json<5, 5>(json.at(4));
   p.bias_jacobian = matrix_from_json<5, 3>(json.at(5));
   p.bias = matrix_from_json<3, 1>(json.at(6));
+  p.level.covariance = matrix_from_json<2, 2>(json.at(7));
+  p.level.memory = matrix_from_json<2, 2>(json.at(8));
+  p.level.added = matrix_from_json<2, 2>(json.at(9));
+  p.level.pitch_tangent = json.at(10).get<double>();
 }
 
 void to_json(Json& json, const Odometry& odometry) {

@@ -28,6 +28,7 @@
 #include "understory/lidar_sweep_t.hpp"
 #include "understory/map_delta_t.hpp"
 #include "understory/map_t.hpp"
+#include "understory/odometry2_t.hpp"
 #include "understory/odometry_t.hpp"
 #include "understory/raw_pose_t.hpp"
 #include "understory/slam_pose_t.hpp"
@@ -40,6 +41,7 @@ namespace understory {
 
 Result<LandmarkScan> from_wire(const landmarks_t& wire);
 Result<Odometry> from_wire(const odometry_t& wire);
+Result<Odometry> from_wire(const odometry2_t& wire);
 Result<Keyframe> from_wire(const keyframe_t& wire);
 Result<MapUpdate> from_wire(const slam_update_t& wire);
 Result<SlamPose> from_wire(const slam_pose_t& wire);
@@ -59,7 +61,7 @@ Result<VelocityCorrection> from_wire(const velocity_correction_t& wire);
 Result<GnssFix> from_wire(const gnss_t& wire);
 
 landmarks_t to_wire(const LandmarkScan& scan);
-odometry_t to_wire(const Odometry& odometry);
+odometry2_t to_wire(const Odometry& odometry);
 keyframe_t to_wire(const Keyframe& keyframe);
 slam_update_t to_wire(const MapUpdate& update);  ///< `seq` is the keyframe's.
 slam_pose_t to_wire(const SlamPose& pose);
@@ -92,7 +94,7 @@ struct WireOf<LandmarkScan> {
 };
 template <>
 struct WireOf<Odometry> {
-  using type = odometry_t;
+  using type = odometry2_t;
 };
 template <>
 struct WireOf<Keyframe> {
@@ -166,6 +168,16 @@ Result<T> decode_message(std::span<const std::uint8_t> bytes) {
     if (!wire) return wire.refusal();
     return from_wire(*wire);
   }
+}
+
+/// Logs may have the version of before, which says nothing of the level's error.
+template <>
+inline Result<Odometry> decode_message<Odometry>(std::span<const std::uint8_t> bytes) {
+  const Result<odometry2_t> wire = decode_bytes<odometry2_t>(bytes);
+  if (wire) return from_wire(*wire);
+  const Result<odometry_t> old = decode_bytes<odometry_t>(bytes);
+  if (old) return from_wire(*old);
+  return wire.refusal();
 }
 
 /// A value (or a wire type) to bytes.

@@ -65,6 +65,47 @@ preintegration_t to_wire(const Preintegration& value) {
   return wire;
 }
 
+LevelError level_error(const level_error_t& wire, Checks& checks) {
+  checks.in("level", 0);
+  LevelError result;
+  result.covariance = checks.covariance("covariance", wire.covariance);
+  result.added = checks.covariance("added", wire.added);
+  result.memory =
+      Eigen::Map<const Eigen::Matrix<double, 2, 2, Eigen::RowMajor>>(&wire.memory[0][0]);
+  checks.range("memory", result.memory.cwiseAbs().maxCoeff(), 0.0, 1e3);
+  checks.range("pitch_tangent", wire.pitch_tangent, -1e3, 1e3);
+  result.pitch_tangent = wire.pitch_tangent;
+  checks.in_message();
+  return result;
+}
+
+level_error_t to_wire(const LevelError& value) {
+  level_error_t wire{};
+  copy_matrix(value.covariance, wire.covariance);
+  copy_matrix(value.memory, wire.memory);
+  copy_matrix(value.added, wire.added);
+  wire.pitch_tangent = value.pitch_tangent;
+  return wire;
+}
+
+/// What both versions have.
+template <class Wire>
+Odometry odometry(const Wire& wire, Checks& checks) {
+  checks.consistent(wire.from_utime >= 0 && wire.from_utime <= wire.utime, "from_utime <= utime");
+  checks.pose("from_T_to", wire.from_T_to);
+  Odometry odometry;
+  odometry.from_utime = wire.from_utime;
+  odometry.utime = wire.utime;
+  odometry.sequence = static_cast<std::uint64_t>(wire.seq);
+  odometry.from_T_to = from_wire(wire.from_T_to);
+  odometry.covariance = checks.covariance("covariance", wire.covariance);
+  odometry.has_wheels = wire.has_wheels != 0;
+  odometry.is_standing = wire.is_standing != 0;
+  checks.range("num_inertial", wire.num_inertial, 0, 1);
+  if (wire.num_inertial == 1) odometry.inertial = preintegration(wire.inertial[0], checks);
+  return odometry;
+}
+
 }  // namespace
 
 pose2_t to_wire(const SE2& pose) {
@@ -107,24 +148,23 @@ landmarks_t to_wire(const LandmarkScan& scan) {
 
 Result<Odometry> from_wire(const odometry_t& wire) {
   Checks checks;
-  checks.consistent(wire.from_utime >= 0 && wire.from_utime <= wire.utime, "from_utime <= utime");
-  checks.pose("from_T_to", wire.from_T_to);
-  Odometry odometry;
-  odometry.from_utime = wire.from_utime;
-  odometry.utime = wire.utime;
-  odometry.sequence = static_cast<std::uint64_t>(wire.seq);
-  odometry.from_T_to = from_wire(wire.from_T_to);
-  odometry.covariance = checks.covariance("covariance", wire.covariance);
-  odometry.has_wheels = wire.has_wheels != 0;
-  odometry.is_standing = wire.is_standing != 0;
-  checks.range("num_inertial", wire.num_inertial, 0, 1);
-  if (wire.num_inertial == 1) odometry.inertial = preintegration(wire.inertial[0], checks);
+  Odometry value = odometry(wire, checks);
   if (checks.refusal()) return *checks.refusal();
-  return odometry;
+  return value;
 }
 
-odometry_t to_wire(const Odometry& odometry) {
-  odometry_t wire{};
+Result<Odometry> from_wire(const odometry2_t& wire) {
+  Checks checks;
+  Odometry value = odometry(wire, checks);
+  checks.consistent(wire.num_level == wire.num_inertial, "num_level = num_inertial");
+  if (checks.refusal()) return *checks.refusal();
+  if (value.inertial) value.inertial->level = level_error(wire.level[0], checks);
+  if (checks.refusal()) return *checks.refusal();
+  return value;
+}
+
+odometry2_t to_wire(const Odometry& odometry) {
+  odometry2_t wire{};
   wire.utime = odometry.utime;
   wire.seq = static_cast<std::int64_t>(odometry.sequence);
   wire.from_utime = odometry.from_utime;
@@ -134,6 +174,8 @@ odometry_t to_wire(const Odometry& odometry) {
   wire.is_standing = odometry.is_standing ? 1 : 0;
   if (odometry.inertial) wire.inertial.push_back(to_wire(*odometry.inertial));
   wire.num_inertial = static_cast<std::int32_t>(wire.inertial.size());
+  if (odometry.inertial) wire.level.push_back(to_wire(odometry.inertial->level));
+  wire.num_level = wire.num_inertial;
   return wire;
 }
 

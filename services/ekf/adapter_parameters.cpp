@@ -45,6 +45,13 @@ void describe(EkfMapParameters& p, ParameterTable& table) {
             "In a row, in which its gate refused a landmark: it leaves.");
 }
 
+void describe(EkfSightingParameters& p, ParameterTable& table) {
+  table.add("sighting.lasting_share", p.lasting_share, {0.0, 0.9}, "",
+            "Of a sighting's variance, the same from scan to scan; 0 = all noise is new.");
+  table.add("sighting.lasting_m", p.lasting_m, {0.01, 1000.0}, "m",
+            "Such errors fade over so much way.");
+}
+
 void describe(EkfGateParameters& p, ParameterTable& table) {
   table.add("gate.landmark_probability", p.landmark_probability, {0.5, 0.999999}, "",
             "chi^2 gate of each landmark.");
@@ -83,6 +90,7 @@ void describe(EkfParameters& parameters, ParameterTable& table) {
   describe(parameters.prior, table);
   describe(parameters.motion, table);
   describe(parameters.map, table);
+  describe(parameters.sighting, table);
   describe(parameters.gate, table);
   describe(parameters.restart, table);
 }

@@ -42,7 +42,8 @@ bool is_usable(const Odometry& piece) {
     usable = usable && std::isfinite(p.yaw_rad) && p.velocity_mps.allFinite() &&
              p.position_m.allFinite() && p.covariance.allFinite() &&
              p.covariance.diagonal().minCoeff() >= 0.0 && p.bias_jacobian.allFinite() &&
-             p.bias.allFinite();
+             p.bias.allFinite() && p.level.covariance.allFinite() && p.level.memory.allFinite() &&
+             p.level.added.allFinite() && std::isfinite(p.level.pitch_tangent);
   }
   return usable;
 }
@@ -70,6 +71,7 @@ void Ekf::set_prior() {
   const EkfPriorParameters& prior = parameters_.prior;
   state_.clear_landmarks();
   aliases_.clear();
+  level_covariance_.reset();
   auto covariance = state_.covariance();
   covariance.setZero();
   covariance.diagonal()
@@ -103,6 +105,7 @@ void Ekf::restart(Utime utime, const std::string& reason) {
   state_.heading = last.ekf_map_T_vehicle.theta();
   state_.velocity.setZero();
   state_.bias = last.bias;
+  state_.level.setZero();
   state_.first_position = state_.position;
   state_.first_velocity = state_.velocity;
   const EkfRestartParameters& grow = parameters_.restart;
@@ -169,13 +172,14 @@ void Ekf::use(const Odometry& piece) {
   const bool stands = believes_standing(piece);
   const bool has_marks = ekf::has_ground_marks(state_);
   if (stands && !has_marks) ekf::add_ground_marks(state_, sway(motion));
-  if (!stands && has_marks) ekf::remove_ground_marks(state_);
+  if (!stands && has_marks) leave_place();
   predict(piece, stands);
   if (stands) {
     stand();
   } else if (motion.sideways_sigma_mps > 0.0) {
     ekf::measure_no_slide(state_, motion.sideways_sigma_mps, room_);
   }
+  if (!stands) way_m_ += piece.from_T_to.translation().norm();
   utime_ = piece.utime;
   state_.follow_with_anchor();
   if (!state_.is_sound()) restart(utime_, "the state was not finite after a prediction");
@@ -183,6 +187,10 @@ void Ekf::use(const Odometry& piece) {
 
 void Ekf::predict(const Odometry& piece, bool stands) {
   const EkfMotionParameters& motion = parameters_.motion;
+  if (piece.inertial) {
+    if (!level_covariance_) ekf::know_level(state_, piece.inertial->level);
+    level_covariance_ = piece.inertial->level.covariance;
+  }
   if (!piece.inertial) {
     const SE2WithCovariance moved{piece.from_T_to, piece.covariance};
     const double duration = seconds(piece.utime - piece.from_utime);
@@ -223,7 +231,18 @@ bool Ekf::believes_standing(const Odometry& piece) {
 void Ekf::doubt_standing() {
   ++counters_.crept;
   doubted_ = utime_;
+  leave_place();
+}
+
+/// While it stood, landmarks were where they seemed to be from there; from elsewhere they will seem
+/// to be somewhere else.
+void Ekf::leave_place() {
   ekf::remove_ground_marks(state_);
+  for (std::size_t i = 0; i < state_.landmarks().size(); ++i) {
+    const ekf::MapLandmark& landmark = state_.landmarks()[i];
+    if (landmark.seen_at_m < way_m_) continue;
+    state_.loosen_landmark(i, parameters_.sighting.lasting_share * landmark.seen_variance_m2);
+  }
 }
 
 /// The vehicle is where it was parked, and its velocity is that of its sway.
@@ -242,6 +261,7 @@ void Ekf::bridge(Utime utime) {
   ekf::remove_ground_marks(state_);  // It may have been driven on and parked again.
   const double duration = seconds(utime - utime_);
   if (duration > parameters_.restart.max_gap_s) return restart(utime, "too long a gap");
+  way_m_ += state_.velocity.norm() * duration;
   ekf::predict(state_, ekf::transition_over_gap(state_, duration, parameters_.motion),
                parameters_.motion, room_);
   utime_ = utime;

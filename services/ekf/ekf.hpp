@@ -85,12 +85,14 @@ class Ekf {
   bool believes_standing(const Odometry& piece);
   void stand();
   void doubt_standing();
+  void leave_place();
   void bridge(Utime utime);
   EkfPose pose();
   EkfOutput outputs();
 
   // ekf_scan.cpp: landmarks.
   void read(const TrackedScan& scan);
+  ekf::Sighting sighting(const Detection& seen) const;
   void check_standing();
   void update_known();
   void update_checked(std::vector<ekf::Pairing>& pairings,
@@ -103,6 +105,7 @@ class Ekf {
   void remove_distant(const FieldOfView& view);
   bool make_room(const FieldOfView& view);
   void remove(std::size_t landmark);
+  void weaken(const ekf::Pairing& pairing);
   void see(const TrackedScan& scan, const ekf::Pairing& pairing);
   std::optional<std::uint32_t> landmark_of(TrackId track) const;
   void check_lost();
@@ -130,6 +133,9 @@ class Ekf {
   int refused_scans_ = 0;
   /// Set: it moves though it is said to stand; when that was last found.
   std::optional<Utime> doubted_;
+  double way_m_ = 0.0;  ///< Driven so far.
+  /// Covariance of the level's error as the latest odometry has it: what detections have in theirs.
+  std::optional<Eigen::Matrix2d> level_covariance_;
   std::uint32_t used_ = 0;
   std::uint32_t refused_ = 0;
   std::vector<Alias> aliases_;  ///< In order of track.

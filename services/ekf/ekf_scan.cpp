@@ -1,5 +1,6 @@
 // The filter and one scan's landmarks.
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -18,6 +19,10 @@ constexpr int kMaxRounds = 4;
 constexpr std::uint32_t kFewLandmarks = 3;
 /// Motion that nothing told, where creeping is found [s].
 constexpr double kUnnoticed_s = 0.1;
+/// Of the height's variance that the level makes: less was made without it.
+constexpr double kLevelled = 0.5;
+/// Of a sighting's covariance, when the level's part is out.
+constexpr double kLeastOwnShare = 0.05;
 
 bool is_usable(const Detection& detection) {
   if (!detection.position_m.allFinite() || !detection.covariance_m2.allFinite()) return false;
@@ -72,12 +77,33 @@ void Ekf::read(const TrackedScan& scan) {
       ++counters_.landmarks_unusable;
       continue;
     }
-    sightings_.push_back({seen.position_m.head<2>(), seen.covariance_m2.topLeftCorner<2, 2>()});
+    sightings_.push_back(sighting(seen));
     source_.push_back(i);
   }
   settled_.assign(sightings_.size(), false);
   tracks_.clear();
   for (const std::uint32_t i : source_) tracks_.push_back(scan.landmarks[i].track_id);
+}
+
+/// A levelled detection's covariance has the level's error in it, which is not its own: the state
+/// has it. (One whose height is surer than that was not levelled.)
+ekf::Sighting Ekf::sighting(const Detection& seen) const {
+  const Eigen::Matrix2d whole = seen.covariance_m2.topLeftCorner<2, 2>();
+  ekf::Sighting result{seen.position_m.head<2>(), whole};
+  if (!level_covariance_) return result;
+  const Eigen::Vector2d up(seen.position_m.y(), -seen.position_m.x());
+  if (seen.covariance_m2(2, 2) < kLevelled * up.dot(*level_covariance_ * up)) return result;
+  result.height_m = seen.position_m.z();
+  const Eigen::Matrix2d arm = result.height_m * ekf::level_displacement();
+  // As far as there is something left.
+  const Eigen::LLT<Eigen::Matrix2d> factor(whole);
+  const Eigen::Matrix2d root = factor.matrixL().solve(arm);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> share(root * *level_covariance_ *
+                                                             root.transpose());
+  const Eigen::Matrix2d turn = factor.matrixL() * share.eigenvectors();
+  const Eigen::Vector2d left = (1.0 - share.eigenvalues().array()).cwiseMax(kLeastOwnShare);
+  result.covariance_m2 = turn * left.asDiagonal() * turn.transpose();
+  return result;
 }
 
 std::optional<std::uint32_t> Ekf::landmark_of(TrackId track) const {
@@ -134,6 +160,7 @@ void Ekf::update_known() {
     taken[*landmark] = true;
     pairings_.push_back({k, *landmark});
   }
+  for (const ekf::Pairing& pairing : pairings_) weaken(pairing);
   update_checked(pairings_, sightings_);
 }
 
@@ -164,6 +191,24 @@ void Ekf::update_checked(std::vector<ekf::Pairing>& pairings,
     }
   }
   used_ += static_cast<std::uint32_t>(pairings.size());
+}
+
+/// A part of the error is the same as in the sightings before. It is counted as white noise of the
+/// power that it has over many scans: with a correlation r from scan to scan, (1 + r) / (1 - r)
+/// times its variance. While the vehicle stands, the landmark is where it seems to be
+/// (leave_place()).
+void Ekf::weaken(const ekf::Pairing& pairing) {
+  ekf::MapLandmark& landmark = state_.landmark(pairing.landmark);
+  ekf::Sighting& seen = sightings_[pairing.sighting];
+  const double moved = way_m_ - landmark.seen_at_m;
+  landmark.seen_at_m = way_m_;
+  landmark.seen_variance_m2 = 0.5 * seen.covariance_m2.trace();
+  if (ekf::has_ground_marks(state_)) {
+    landmark.views = 1.0;
+    return;
+  }
+  landmark.views = 1.0 + landmark.views * std::exp(-moved / parameters_.sighting.lasting_m);
+  seen.covariance_m2 *= 1.0 + 2.0 * parameters_.sighting.lasting_share * (landmark.views - 1.0);
 }
 
 void Ekf::see(const TrackedScan& scan, const ekf::Pairing& pairing) {
@@ -278,7 +323,10 @@ void Ekf::add_new(const TrackedScan& scan) {
   const Eigen::Matrix2d rotation = ekf::rotation_of(state_.heading);
   for (std::size_t k = 0; k < sightings_.size(); ++k) {
     if (settled_[k] || landmark_of(tracks_[k])) continue;
-    const Eigen::Vector2d position = state_.position + rotation * sightings_[k].position_m;
+    const Eigen::Vector2d displaced =
+        sightings_[k].height_m * ekf::level_displacement() * state_.level;
+    const Eigen::Vector2d position =
+        state_.position + rotation * (sightings_[k].position_m - displaced);
     if (near_old(position) || !make_room(scan.field_of_view)) {
       ++counters_.landmarks_too_near;
       continue;
@@ -289,8 +337,12 @@ void Ekf::add_new(const TrackedScan& scan) {
     landmark.radius_m = std::isfinite(seen.radius_m) ? seen.radius_m : 0.0;
     landmark.kind = seen.kind;
     landmark.times_seen = 1;
+    landmark.views = 1.0;
+    landmark.seen_at_m = way_m_;
+    landmark.seen_variance_m2 = 0.5 * sightings_[k].covariance_m2.trace();
     landmark.last_scan = scan_count_;
-    state_.add_landmark(landmark, sightings_[k].position_m, sightings_[k].covariance_m2);
+    state_.add_landmark(landmark, sightings_[k].position_m, sightings_[k].covariance_m2,
+                        sightings_[k].height_m);
     const auto at = std::lower_bound(aliases_.begin(), aliases_.end(), landmark.id,
                                      [](const Alias& a, TrackId key) { return a.track < key; });
     if (at != aliases_.end() && at->track == landmark.id) {

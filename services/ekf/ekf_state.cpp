@@ -8,7 +8,7 @@
 namespace understory {
 namespace {
 
-constexpr int kStateVersion = 1;
+constexpr int kStateVersion = 2;
 
 Json vector_json(const Eigen::Vector2d& v) { return matrix_to_json<2, 1>(v); }
 Eigen::Vector2d vector_from(const Json& json) { return matrix_from_json<2, 1>(json); }
@@ -22,7 +22,10 @@ Json landmark_json(const ekf::MapLandmark& l) {
           l.times_seen,
           l.missed,
           l.refused,
-          l.last_scan};
+          l.last_scan,
+          l.views,
+          l.seen_at_m,
+          l.seen_variance_m2};
 }
 
 ekf::MapLandmark landmark_from(const Json& json) {
@@ -36,6 +39,9 @@ ekf::MapLandmark landmark_from(const Json& json) {
   l.missed = json.at(6).get<std::uint32_t>();
   l.refused = json.at(7).get<std::uint32_t>();
   l.last_scan = json.at(8).get<std::uint64_t>();
+  l.views = json.at(9).get<double>();
+  l.seen_at_m = json.at(10).get<double>();
+  l.seen_variance_m2 = json.at(11).get<double>();
   return l;
 }
 
@@ -80,6 +86,7 @@ Json filter_json(const ekf::FilterState& state) {
           {"position", vector_json(state.position)},
           {"velocity", vector_json(state.velocity)},
           {"bias", matrix_to_json<3, 1>(state.bias)},
+          {"level", vector_json(state.level)},
           {"anchor", vector_json(state.anchor_m)},
           {"first_position", vector_json(state.first_position)},
           {"first_velocity", vector_json(state.first_velocity)},
@@ -92,6 +99,7 @@ void load_filter(const Json& json, ekf::FilterState& state) {
   state.position = vector_from(json.at("position"));
   state.velocity = vector_from(json.at("velocity"));
   state.bias = matrix_from_json<3, 1>(json.at("bias"));
+  state.level = vector_from(json.at("level"));
   state.anchor_m = vector_from(json.at("anchor"));
   state.first_position = vector_from(json.at("first_position"));
   state.first_velocity = vector_from(json.at("first_velocity"));
@@ -125,6 +133,9 @@ std::string Ekf::save() const {
                    {"reset_counter", reset_counter_},
                    {"refused_scans", refused_scans_},
                    {"doubted", optional_to_json(doubted_)},
+                   {"way_m", way_m_},
+                   {"level_covariance",
+                    level_covariance_ ? matrix_to_json<2, 2>(*level_covariance_) : Json(nullptr)},
                    {"last_pose", last_sound_.ekf_map_T_vehicle},
                    {"last_covariance", matrix_to_json<3, 3>(last_sound_.covariance)},
                    {"last_bias", matrix_to_json<3, 1>(last_sound_.bias)}});
@@ -153,6 +164,10 @@ void Ekf::load(const std::string& state) {
   refused_scans_ = json.at("refused_scans").get<int>();
   doubted_ =
       json.contains("doubted") ? optional_from_json<Utime>(json.at("doubted")) : std::nullopt;
+  way_m_ = json.at("way_m").get<double>();
+  const Json& level = json.at("level_covariance");
+  level_covariance_.reset();
+  if (!level.is_null()) level_covariance_ = matrix_from_json<2, 2>(level);
   last_sound_ = EkfPose{};
   last_sound_.ekf_map_T_vehicle = json.at("last_pose").get<SE2>();
   last_sound_.covariance = matrix_from_json<3, 3>(json.at("last_covariance"));

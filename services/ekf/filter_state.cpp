@@ -17,6 +17,7 @@ Eigen::Matrix2d translation_map(double angle) {
 }  // namespace
 
 Eigen::Matrix2d quarter_turn() { return (Eigen::Matrix2d() << 0.0, -1.0, 1.0, 0.0).finished(); }
+Eigen::Matrix2d level_displacement() { return -quarter_turn(); }
 Eigen::Matrix2d rotation_of(double heading) { return SE2(0.0, 0.0, heading).rotation(); }
 
 FilterState::FilterState(ErrorForm form, int max_landmarks)
@@ -43,34 +44,43 @@ void FilterState::retract(const Eigen::Ref<const Eigen::VectorXd>& delta) {
   move(position, kPosition);
   move(velocity, kVelocity);
   bias += delta.segment<3>(kBias);
+  level += delta.segment<2>(kLevel);
   for (std::size_t i = 0; i < landmarks_.size(); ++i) move(landmarks_[i].position, row(i));
 }
 
 void FilterState::add_landmark(const MapLandmark& landmark, const Eigen::Vector2d& in_vehicle,
-                               const Eigen::Matrix2d& variance) {
+                               const Eigen::Matrix2d& variance, double height_m) {
   const int n = size();
   const Eigen::Matrix2d rotation = rotation_of(heading);
-  const Eigen::Vector2d offset = rotation * in_vehicle;
+  const Eigen::Matrix2d by_level = height_m * rotation * level_displacement();
+  const Eigen::Vector2d offset = rotation * in_vehicle - by_level * level;
   landmarks_.push_back(landmark);
   MapLandmark& added = landmarks_.back();
   added.position = position + offset;
   added.first_position = added.position;
-  // Its error is the position's, plus the heading's on the way (zero if right invariant), plus
-  // noise.
+  // Its error is the position's, plus the heading's on the way (zero if right invariant), less the
+  // level's, plus noise.
   const Eigen::Vector2d by_heading = turned_left(offset) + lever(position) - lever(added.position);
   for (int i = 0; i < n; ++i) {
     for (int k = 0; k < 2; ++k) {
       covariance_(n + k, i) =
-          covariance(kPosition + k, i) + by_heading(k) * covariance(kHeading, i);
+          covariance(kPosition + k, i) + by_heading(k) * covariance(kHeading, i) -
+          by_level(k, 0) * covariance(kLevel, i) - by_level(k, 1) * covariance(kLevel + 1, i);
     }
   }
   const Eigen::Matrix2d noise = rotation * variance * rotation.transpose();
   for (int c = 0; c < 2; ++c) {
     for (int r = c; r < 2; ++r) {
       covariance_(n + r, n + c) = covariance_(n + r, kPosition + c) +
-                                  by_heading(c) * covariance_(n + r, kHeading) + noise(r, c);
+                                  by_heading(c) * covariance_(n + r, kHeading) -
+                                  by_level(c, 0) * covariance_(n + r, kLevel) -
+                                  by_level(c, 1) * covariance_(n + r, kLevel + 1) + noise(r, c);
     }
   }
+}
+
+void FilterState::loosen_landmark(std::size_t i, double variance_m2) {
+  covariance().diagonal().segment<2>(row(i)).array() += variance_m2;
 }
 
 void FilterState::remove_landmark(std::size_t i) {
@@ -144,8 +154,8 @@ void FilterState::follow_with_anchor() {
 
 bool FilterState::is_sound() const {
   const int n = size();
-  bool sound =
-      std::isfinite(heading) && position.allFinite() && velocity.allFinite() && bias.allFinite();
+  bool sound = std::isfinite(heading) && position.allFinite() && velocity.allFinite() &&
+               bias.allFinite() && level.allFinite();
   for (int i = 0; i < n; ++i) sound = sound && covariance_(i, i) >= 0.0;
   for (int i = 0; i < n; ++i) sound = sound && std::isfinite(covariance_(n - 1, i));
   return sound;

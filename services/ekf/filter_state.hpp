@@ -23,14 +23,16 @@ namespace understory::ekf {
 ///    estimates.
 enum class ErrorForm : std::uint8_t { kRightInvariant, kFirstEstimate, kPlain };
 
-/// Order of the state: heading, position, velocity (both in the axes of the map), bias, landmarks.
+/// Order of the state: heading, position, velocity (both in the axes of the map), bias, error of
+/// the level (roll, pitch, in the axes of the vehicle), landmarks.
 inline constexpr int kHeading = 0;
 inline constexpr int kPosition = 1;
 inline constexpr int kVelocity = 3;
 inline constexpr int kBias = 5;
-inline constexpr int kVehicle = 8;
+inline constexpr int kLevel = 8;
+inline constexpr int kVehicle = 10;
 
-using Matrix8 = Eigen::Matrix<double, kVehicle, kVehicle>;
+using VehicleMatrix = Eigen::Matrix<double, kVehicle, kVehicle>;
 
 struct MapLandmark {
   TrackId id =
@@ -40,9 +42,12 @@ struct MapLandmark {
   double radius_m = 0.0;
   LandmarkKind kind = LandmarkKind::kTrunk;
   std::uint32_t times_seen = 0;
-  std::uint32_t missed = 0;     ///< Scans in a row that should have shown it.
-  std::uint32_t refused = 0;    ///< Scans in a row in which its gate refused it.
-  std::uint64_t last_scan = 0;  ///< Number of the scan that saw it last.
+  std::uint32_t missed = 0;       ///< Scans in a row that should have shown it.
+  std::uint32_t refused = 0;      ///< Scans in a row in which its gate refused it.
+  std::uint64_t last_scan = 0;    ///< Number of the scan that saw it last.
+  double views = 0.0;             ///< Sightings of it from about the same place, the last included.
+  double seen_at_m = 0.0;         ///< Way at the last of them.
+  double seen_variance_m2 = 0.0;  ///< Of the last of them, per axis.
 
   bool is_ground_mark() const { return id == 0; }
 };
@@ -62,6 +67,8 @@ class FilterState {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
   Eigen::Vector2d velocity = Eigen::Vector2d::Zero();
   InertialBias bias = InertialBias::Zero();
+  /// By how much the attitude that levels sweeps is off [rad] (LevelError).
+  Eigen::Vector2d level = Eigen::Vector2d::Zero();
   Eigen::Vector2d anchor_m = Eigen::Vector2d::Zero();  ///< In `ekf_map`.
   /// Position and velocity as predicted, before any measurement: for first-estimate Jacobians.
   Eigen::Vector2d first_position = Eigen::Vector2d::Zero();
@@ -98,10 +105,12 @@ class FilterState {
   /// Moves the estimate by an error `delta` of the form in use (size() numbers).
   void retract(const Eigen::Ref<const Eigen::VectorXd>& delta);
 
-  /// Adds a landmark seen at `in_vehicle` with noise `variance` (axes of the vehicle).
-  /// Precondition: fewer than max_landmarks().
+  /// Adds a landmark seen at `in_vehicle` with noise `variance` (axes of the vehicle), `height_m`
+  /// above the vehicle's origin. Precondition: fewer than max_landmarks().
   void add_landmark(const MapLandmark& landmark, const Eigen::Vector2d& in_vehicle,
-                    const Eigen::Matrix2d& variance);
+                    const Eigen::Matrix2d& variance, double height_m = 0.0);
+  /// Makes a landmark less certain, alone.
+  void loosen_landmark(std::size_t i, double variance_m2);
   /// Takes a landmark out: the others keep what they know (marginalisation).
   void remove_landmark(std::size_t i);
   void clear_landmarks() { landmarks_.clear(); }
@@ -132,6 +141,8 @@ class FilterState {
 
 /// Turns by 90 degrees to the left.
 Eigen::Matrix2d quarter_turn();
+/// How a level off by (roll, pitch) displaces what is 1 m above the vehicle's origin.
+Eigen::Matrix2d level_displacement();
 Eigen::Matrix2d rotation_of(double heading);
 
 }  // namespace understory::ekf

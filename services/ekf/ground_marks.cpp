@@ -75,8 +75,10 @@ double common_motion(const FilterState& state, std::span<const Sighting> sightin
     motion.block<2, 2>(a, 0).setIdentity();
     motion.block<2, 1>(a, 2) = turned_left(rotation * seen.position_m);
     for (int b = 0; b <= a; b += 2) {
-      spread.block<2, 2>(a, b) = innovation_covariance(
-          state, pairing.landmark, pairings[static_cast<std::size_t>(b / 2)].landmark);
+      const Pairing& other = pairings[static_cast<std::size_t>(b / 2)];
+      spread.block<2, 2>(a, b) =
+          innovation_covariance(state, pairing.landmark, other.landmark, seen.height_m,
+                                sightings[other.sighting].height_m);
     }
     spread.block<2, 2>(a, a) += rotation * seen.covariance_m2 * rotation.transpose();
   }

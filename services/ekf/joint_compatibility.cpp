@@ -72,7 +72,8 @@ class Search {
     const Eigen::Matrix2d rotation = rotation_of(state_.heading);
     for (std::size_t k = 0; k < chosen_.size(); ++k) {
       factor_.block<2, 2>(at, static_cast<Eigen::Index>(2 * k)) =
-          innovation_covariance(state_, pairing.landmark, chosen_[k].landmark);
+          innovation_covariance(state_, pairing.landmark, chosen_[k].landmark, seen.height_m,
+                                sightings_[chosen_[k].sighting].height_m);
     }
     auto row = factor_.block(at, 0, 2, at);
     if (at > 0) {
@@ -81,7 +82,8 @@ class Search {
           .transpose()
           .solveInPlace<Eigen::OnTheRight>(row);
     }
-    const Eigen::Matrix2d own = innovation_covariance(state_, pairing.landmark, pairing.landmark) +
+    const Eigen::Matrix2d own = innovation_covariance(state_, pairing.landmark, pairing.landmark,
+                                                      seen.height_m, seen.height_m) +
                                 rotation * seen.covariance_m2 * rotation.transpose() -
                                 row * row.transpose();
     const Eigen::LLT<Eigen::Matrix2d> llt(own);

@@ -14,17 +14,23 @@ namespace understory::ekf {
 struct Sighting {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
+  /// Above the vehicle's origin, as the level displaces it; 0 = no level took part.
+  double height_m = 0.0;
 };
 
 /// The innovation of a sighting of landmark i, in the axes of the map, depends on the errors of the
 /// landmark and of the position as +1 and -1, and on the heading's as this (zero if right
 /// invariant).
 Eigen::Vector2d heading_row(const FilterState& state, std::size_t landmark);
+/// On the level's error as this.
+Eigen::Matrix2d level_rows(const FilterState& state, double height_m);
 /// Innovation of a sighting: where it lies less where the landmark is expected [m], axes of the
 /// map.
 Eigen::Vector2d innovation(const FilterState& state, std::size_t landmark, const Sighting& seen);
-/// Covariance of the innovations of landmarks a and b that the state's uncertainty makes.
-Eigen::Matrix2d innovation_covariance(const FilterState& state, std::size_t a, std::size_t b);
+/// Covariance of the innovations of landmarks a and b that the state's uncertainty makes; seen at
+/// these heights.
+Eigen::Matrix2d innovation_covariance(const FilterState& state, std::size_t a, std::size_t b,
+                                      double height_a_m = 0.0, double height_b_m = 0.0);
 /// Squared Mahalanobis distance of one sighting.
 double squared_distance(const FilterState& state, std::size_t landmark, const Sighting& seen);
 
@@ -50,7 +56,7 @@ class JointUpdate {
   double apply_some(FilterState& state, std::span<const Sighting> sightings,
                     std::span<const Pairing> pairings, LowRank& room);
 
-  Eigen::MatrixXd vehicle_;  ///< Covariance of the state with (heading, position).
+  Eigen::MatrixXd vehicle_;  ///< Covariance of the state with (heading, position, level).
 };
 
 }  // namespace understory::ekf

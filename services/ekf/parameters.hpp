@@ -35,6 +35,13 @@ struct EkfMapParameters {
   int max_refused = 5;             ///< Scans in a row in which its gate refused it: it leaves.
 };
 
+/// What errors of sightings have in common from scan to scan: how a trunk is no circle, where the
+/// beams meet it. It cannot be averaged out from one place.
+struct EkfSightingParameters {
+  double lasting_share = 0.3;  ///< Of a sighting's variance; 0 = all noise is new in every scan.
+  double lasting_m = 4.0;      ///< It fades over so much way.
+};
+
 struct EkfGateParameters {
   double landmark_probability = 0.999;  ///< chi^2 gate of each landmark.
   double set_probability = 0.999;       ///< chi^2 gate of all of them together.
@@ -61,6 +68,7 @@ struct EkfParameters {
   EkfPriorParameters prior;
   EkfMotionParameters motion;
   EkfMapParameters map;
+  EkfSightingParameters sighting;
   EkfGateParameters gate;
   EkfRestartParameters restart;
 };

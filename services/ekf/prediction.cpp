@@ -19,6 +19,22 @@ Change change(const FilterState& state, const Transition& t, const Eigen::Vector
           t.velocity - state.first_velocity};
 }
 
+constexpr double kGravity = 9.81;  // [m/s^2], as common/model/imu.hpp has it
+
+/// What a level that is off by (roll, pitch) makes of gravity [m/s^2].
+Eigen::Matrix2d gravity_by_level() { return kGravity * level_displacement(); }
+
+/// The level's error goes on, and with it the part that it has in the accelerometer's bias.
+void pass_level(const FilterState& state, const LevelError& level, Transition& t) {
+  const Eigen::Matrix2d change = level.memory - Eigen::Matrix2d::Identity();
+  t.level = level.memory * state.level;
+  t.bias = state.bias;
+  t.bias.tail<2>() += gravity_by_level() * change * state.level;
+  t.error.block<2, 2>(kLevel, kLevel) = level.memory;
+  t.error.block<2, 2>(kBias + 1, kLevel) = gravity_by_level() * change;
+  t.level_added = level.added;
+}
+
 /// Fills `error` and `noise_input` for a start of heading `rotation` and preintegrated Jacobians.
 void linearise(const FilterState& state, const Preintegration& inertial, Transition& t) {
   const Eigen::Matrix2d rotation = rotation_of(state.heading);
@@ -68,7 +84,7 @@ void landmark_arms(const FilterState& state, Arms&& arms) {
 
 /// What turning does to right invariant landmarks: their block and what they share with the
 /// vehicle, before the vehicle's own error moves on.
-void turn_landmarks(FilterState& state, const Transition& t, const Matrix8& vehicle,
+void turn_landmarks(FilterState& state, const Transition& t, const VehicleMatrix& vehicle,
                     LowRank& room) {
   const int count = state.size() - kVehicle;
   auto shared = state.covariance().bottomLeftCorner(count, kVehicle);
@@ -89,10 +105,10 @@ void pass_covariance(FilterState& state, const Transition& t, const EkfMotionPar
                      LowRank& room) {
   const int count = state.size() - kVehicle;
   const bool turns = state.form() == ErrorForm::kRightInvariant;
-  const Matrix8 vehicle = state.covariance_block<kVehicle, kVehicle>(0, 0);
+  const VehicleMatrix vehicle = state.covariance_block<kVehicle, kVehicle>(0, 0);
   if (turns) turn_landmarks(state, t, vehicle, room);
   auto shared = state.covariance().bottomLeftCorner(count, kVehicle);
-  const Matrix8 passed_on = t.error.transpose();
+  const VehicleMatrix passed_on = t.error.transpose();
   for (int i = 0; i < count; ++i) {
     const Eigen::Matrix<double, 1, kVehicle> row = shared.row(i);
     shared.row(i).noalias() = row * passed_on;
@@ -100,6 +116,9 @@ void pass_covariance(FilterState& state, const Transition& t, const EkfMotionPar
   if (turns) shared.noalias() += room.first(count) * (t.noise.row(0) * t.noise_input.transpose());
   auto own = state.covariance().topLeftCorner<kVehicle, kVehicle>();
   own = t.error * vehicle * passed_on + t.noise_input * t.noise * t.noise_input.transpose();
+  Eigen::Matrix<double, 4, 2> level_input;
+  level_input << gravity_by_level(), Eigen::Matrix2d::Identity();
+  own.bottomRightCorner<4, 4>() += level_input * t.level_added * level_input.transpose();
   const double gyro = parameters.gyro_walk * parameters.gyro_walk * t.seconds;
   const double force = parameters.accelerometer_walk * parameters.accelerometer_walk * t.seconds;
   own.diagonal().segment<3>(kBias) += Eigen::Vector3d(gyro, force, force);
@@ -109,6 +128,8 @@ void move_estimate(FilterState& state, const Transition& t) {
   state.heading = wrap_angle(t.heading);
   state.position = t.position;
   state.velocity = t.velocity;
+  state.bias = t.bias;
+  state.level = t.level;
   state.first_position = t.position;
   state.first_velocity = t.velocity;
 }
@@ -124,6 +145,7 @@ Transition transition_by(const FilterState& state, const Preintegration& given) 
   t.position = state.position + state.velocity * t.seconds + rotation * inertial.position_m;
   t.velocity = state.velocity + rotation * inertial.velocity_mps;
   linearise(state, inertial, t);
+  pass_level(state, given.level, t);
   return t;
 }
 
@@ -152,6 +174,8 @@ Transition transition_by(const FilterState& state, const SE2WithCovariance& moti
   t.heading = next.theta();
   t.position = next.translation();
   t.velocity = rotation * motion.mean.Log().head<2>() / seconds;
+  t.bias = state.bias;
+  t.level = state.level;
   const Eigen::Vector2d p = state.lever(t.position);
   // The new velocity is fixed to the vehicle: it turns with the new heading.
   const Eigen::Vector2d v = turned_left(t.velocity) - state.lever(t.velocity);
@@ -159,7 +183,7 @@ Transition transition_by(const FilterState& state, const SE2WithCovariance& moti
       t.position -
       (state.form() == ErrorForm::kFirstEstimate ? state.first_position : state.position);
   t.error.block<2, 1>(kPosition, kHeading) = state.lever(state.position) + turned_left(way) - p;
-  t.error.block<2, 8>(kVelocity, 0).setZero();
+  t.error.middleRows<2>(kVelocity).setZero();
   t.error.block<2, 1>(kVelocity, kHeading) = v;
   t.noise_input(kHeading, 0) = 1.0;
   t.noise_input.block<2, 1>(kPosition, 0) = -p;
@@ -178,6 +202,20 @@ Transition transition_by(const FilterState& state, const SE2WithCovariance& moti
   t.noise.block<2, 1>(1, 0) = motion.covariance.block<2, 1>(0, 2) / seconds;
   t.noise.row(0).tail<4>() = t.noise.col(0).tail<4>().transpose();
   return t;
+}
+
+void know_level(FilterState& state, const LevelError& level) {
+  Eigen::Matrix<double, kVehicle, 2> by_level = Eigen::Matrix<double, kVehicle, 2>::Zero();
+  // Of the heading, and of what right invariant errors have of it.
+  by_level(kHeading, 0) = level.pitch_tangent;
+  by_level.block<2, 1>(kPosition, 0) = -level.pitch_tangent * state.lever(state.position);
+  by_level.block<2, 1>(kVelocity, 0) = -level.pitch_tangent * state.lever(state.velocity);
+  by_level.middleRows<2>(kBias + 1) = gravity_by_level();
+  by_level.middleRows<2>(kLevel).setIdentity();
+  auto own = state.covariance().topLeftCorner<kVehicle, kVehicle>();
+  own += (by_level * level.covariance * by_level.transpose())
+             .triangularView<Eigen::Lower>()
+             .toDenseMatrix();
 }
 
 void predict(FilterState& state, const Transition& transition,

@@ -9,7 +9,7 @@
 namespace understory::ekf {
 
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
-using Matrix85 = Eigen::Matrix<double, kVehicle, 5>;
+using VehicleInput = Eigen::Matrix<double, kVehicle, 5>;
 
 /// The vehicle's next state, and how errors pass on: with bias error b and noise n (yaw, velocity,
 /// position) the vehicle's error becomes `error` e + `noise_input` n; each landmark's error loses
@@ -18,10 +18,13 @@ struct Transition {
   double heading = 0.0;
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
   Eigen::Vector2d velocity = Eigen::Vector2d::Zero();
-  Matrix8 error = Matrix8::Identity();
-  Matrix85 noise_input = Matrix85::Zero();
+  InertialBias bias = InertialBias::Zero();
+  Eigen::Vector2d level = Eigen::Vector2d::Zero();
+  VehicleMatrix error = VehicleMatrix::Identity();
+  VehicleInput noise_input = VehicleInput::Zero();
   Matrix5 noise = Matrix5::Zero();
   Eigen::RowVector3d yaw_by_bias = Eigen::RowVector3d::Zero();
+  Eigen::Matrix2d level_added = Eigen::Matrix2d::Zero();  ///< What is new in the level's error.
   double seconds = 0.0;
 };
 
@@ -39,6 +42,10 @@ struct MeasuredMotion {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
 };
+
+/// The level's error begins as this. It is a part of the accelerometer's bias, which has the
+/// level's error in it, and, on a slope, of the heading.
+void know_level(FilterState& state, const LevelError& level);
 
 /// Predicts the state. `measured` is weighed against the same interval's IMU samples, their common
 /// noise respected.

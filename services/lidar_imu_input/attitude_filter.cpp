@@ -1,5 +1,7 @@
 #include "services/lidar_imu_input/attitude_filter.hpp"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -47,6 +49,7 @@ AttitudeFilter::AttitudeFilter(const ImuParameters& imu, const Eigen::Vector3d& 
   covariance_.block<3, 3>(6, 6).diagonal().setConstant(square(imu.gyro_bias_sigma));
   covariance_.block<3, 3>(9, 9).diagonal().setConstant(square(imu.force_bias_sigma));
   covariance_(12, 12) = square(kWheelScaleSigma);
+  mark_level();
 }
 
 void AttitudeFilter::propagate(const Eigen::Vector3d& rate, const Eigen::Vector3d& force,
@@ -71,6 +74,7 @@ void AttitudeFilter::propagate(const Eigen::Vector3d& rate, const Eigen::Vector3
   const Eigen::Matrix3d rate_power =
       (Eigen::Vector3d::Constant(square(gyro_noise)) + scale.cwiseAbs2()).asDiagonal();
   covariance_ = step * covariance_ * step.transpose();
+  with_mark_ = step * with_mark_;
   covariance_.block<3, 3>(0, 0) += rate_power * seconds;
   covariance_.block<3, 3>(3, 3) += lever * rate_power * lever.transpose() * seconds;
   covariance_.block<3, 3>(3, 0) += lever * rate_power * seconds;
@@ -100,7 +104,9 @@ void AttitudeFilter::update(const Row& row, double residual, double variance) {
   const Eigen::Matrix<double, 13, 1> gain = spread / total;
   const Eigen::Matrix<double, 13, 1> error = gain * residual;
   covariance_ -= gain * spread.transpose();
+  with_mark_ -= gain * (row * with_mark_).eval();
   covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();
+  twist_rad_ += pitch_tangent() * level_of_attitude().row(0).dot(error.head<3>());
   world_Q_vehicle_ = (world_Q_vehicle_ * rotation_of(error.head<3>())).normalized();
   velocity_ += error.segment<3>(3);
   gyro_bias_ += error.segment<3>(6);
@@ -145,10 +151,37 @@ Eigen::Quaterniond AttitudeFilter::level_Q_vehicle() const {
 }
 
 Eigen::Matrix2d AttitudeFilter::tilt_covariance() const {
+  const Eigen::Matrix<double, 2, 3> level = level_of_attitude();
+  return level * covariance_.block<3, 3>(0, 0) * level.transpose();
+}
+
+Eigen::Matrix<double, 2, 3> AttitudeFilter::level_of_attitude() const {
   // Errors about the level axes x and y; roll and pitch to first order.
-  const Eigen::Matrix3d level = level_Q_vehicle().toRotationMatrix();
-  const Eigen::Matrix3d turned = level * covariance_.block<3, 3>(0, 0) * level.transpose();
-  return turned.topLeftCorner<2, 2>();
+  return level_Q_vehicle().toRotationMatrix().topRows<2>();
+}
+
+double AttitudeFilter::pitch_tangent() const {
+  return std::tan(roll_pitch_yaw(world_Q_vehicle_).pitch_rad);
+}
+
+void AttitudeFilter::mark_level() {
+  with_mark_ = covariance_.leftCols<3>() * level_of_attitude().transpose();
+  marked_ = tilt_covariance();
+  twist_rad_ = 0.0;
+}
+
+LevelError AttitudeFilter::level_since_mark() const {
+  const Eigen::Matrix2d shared = level_of_attitude() * with_mark_.topRows<3>();
+  LevelError level;
+  level.covariance = tilt_covariance();
+  level.pitch_tangent = pitch_tangent();
+  level.memory = marked_.ldlt().solve(shared.transpose()).transpose();
+  // What is new cannot be less than nothing but for rounding.
+  const Eigen::Matrix2d added = level.covariance - level.memory * shared.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> parts(0.5 * (added + added.transpose()));
+  level.added = parts.eigenvectors() * parts.eigenvalues().cwiseMax(0.0).asDiagonal() *
+                parts.eigenvectors().transpose();
+  return level;
 }
 
 }  // namespace understory

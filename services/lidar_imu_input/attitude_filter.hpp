@@ -12,6 +12,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "common/model/odometry.hpp"
 #include "services/lidar_imu_input/parameters.hpp"
 
 namespace understory {
@@ -54,6 +55,12 @@ class AttitudeFilter {
   Eigen::Quaterniond level_Q_vehicle() const;
   /// Of (roll, pitch) [rad^2].
   Eigen::Matrix2d tilt_covariance() const;
+  /// Of the error of (roll, pitch): how it goes on from the last mark_level().
+  LevelError level_since_mark() const;
+  void mark_level();
+  /// By how much corrections of roll and pitch have turned the heading of the level since the last
+  /// mark: on a slope they do. What is levelled by it turns alike.
+  double twist_since_mark_rad() const { return twist_rad_; }
   const Eigen::Vector3d& velocity() const { return velocity_; }  ///< Frame vehicle.
   Eigen::Matrix3d velocity_covariance() const { return covariance_.block<3, 3>(3, 3); }
   const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }
@@ -66,12 +73,15 @@ class AttitudeFilter {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.world_Q_vehicle_, self.velocity_, self.gyro_bias_, self.force_bias_, self.wheel_scale_,
-      self.covariance_);
+      self.covariance_, self.with_mark_, self.marked_, self.twist_rad_);
   }
 
  private:
   using Row = Eigen::Matrix<double, 1, 13>;
   void update(const Row& row, double residual, double variance);
+  /// (Roll, pitch) of an error of the attitude.
+  Eigen::Matrix<double, 2, 3> level_of_attitude() const;
+  double pitch_tangent() const;
 
   ImuParameters imu_;
   Eigen::Quaterniond world_Q_vehicle_;
@@ -80,6 +90,10 @@ class AttitudeFilter {
   Eigen::Vector3d force_bias_ = Eigen::Vector3d::Zero();
   double wheel_scale_ = 1.0;  ///< Measured over true.
   Covariance covariance_ = Covariance::Zero();
+  /// Covariance of the error with the level's error at the last mark, and that one's own.
+  Eigen::Matrix<double, 13, 2> with_mark_ = Eigen::Matrix<double, 13, 2>::Zero();
+  Eigen::Matrix2d marked_ = Eigen::Matrix2d::Zero();
+  double twist_rad_ = 0.0;
 };
 
 }  // namespace understory

@@ -1,5 +1,6 @@
 #include "services/lidar_imu_input/motion_estimator.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -10,6 +11,9 @@ constexpr double kBoundPeriod_s = 10.0;
 constexpr double kBiasKnown_s = 3.0;  // of standing
 constexpr double kSpeedsKept_s = 5.0;
 constexpr double kLeastScaleSigma = 0.003;
+constexpr double kStillSigmas = 4.0;    // from zero, that a standing vehicle's velocity may seem
+constexpr double kCorrected_s = 2.0;    // for so long the filter's corrections count
+constexpr double kInsistence_s = 10.0;  // then a velocity that nothing corrects is thought wrong
 
 double square(double value) { return value * value; }
 double seconds_between(Utime from, Utime to) { return static_cast<double>(to - from) * 1e-6; }
@@ -85,7 +89,8 @@ void MotionEstimator::propagate(const ImuSample& sample, bool is_saturated, doub
       std::sqrt(square(standing_bias_sigma_) + square(parameters_.imu.gyro_bias_walk) * seconds);
   const bool bias_known = standstill_.longest_s() > kBiasKnown_s &&
                           standing_bias_sigma_ < 0.02 * parameters_.standstill.gyro_mean_rad_s;
-  standstill_.add(raw_.back(), bias_known ? std::optional(attitude_->gyro_bias()) : std::nullopt);
+  standstill_.add(raw_.back(), bias_known ? std::optional(attitude_->gyro_bias()) : std::nullopt,
+                  velocity_allows_standing(sample.utime));
   if (standstill_.is_standing()) {
     use_standstill(sample, seconds);
   } else {
@@ -155,6 +160,23 @@ void MotionEstimator::use_constraints(const ImuSample& sample) {
   }
 }
 
+/// Without wheels standing is told by quiet samples alone, and a smooth road is quiet too: there
+/// the velocity that the filter corrects by its landmarks must agree.
+bool MotionEstimator::velocity_allows_standing(Utime now) {
+  const double slow = parameters_.standstill.wheel_speed_mps;
+  const Eigen::Matrix2d spread =
+      reckoning_.velocity_covariance() + square(slow) * Eigen::Matrix2d::Identity();
+  const Eigen::Vector2d& velocity = reckoning_.velocity();
+  const bool agrees = velocity.dot(spread.inverse() * velocity) <= square(kStillSigmas);
+  if (agrees || wheels_are_fresh(now)) {
+    denied_since_.reset();
+    return true;
+  }
+  denied_since_ = denied_since_.value_or(now);
+  return seconds_between(corrected_utime_, now) > kCorrected_s &&
+         seconds_between(*denied_since_, now) > kInsistence_s;
+}
+
 bool MotionEstimator::wheels_are_fresh(Utime now) const {
   return !speeds_.empty() &&
          seconds_between(speeds_.back().utime, now) < parameters_.wheels.max_gap_s;
@@ -221,7 +243,9 @@ void MotionEstimator::use_correction(Utime now) {
     corrections_.pop_front();
     if (parameters_.gnss_aided) continue;
     const auto then = history_.at(correction.utime);
-    if (then) reckoning_.correct(correction, then->level_velocity_mps, then->heading_rad);
+    if (!then) continue;
+    reckoning_.correct(correction, then->level_velocity_mps, then->heading_rad);
+    corrected_utime_ = now;
   }
 }
 

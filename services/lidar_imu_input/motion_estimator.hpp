@@ -65,7 +65,8 @@ class MotionEstimator {
     a(self.reckoning_, self.standstill_, self.wheel_only_, self.reference_, self.levels_,
       self.speeds_, self.history_, self.corrections_, self.raw_, self.latest_, self.latest_level_,
       self.pose_utime_, self.height_m_, self.standing_bias_, self.standing_bias_sigma_,
-      self.moved_utime_, self.constrained_utime_, self.bounded_utime_, self.sequence_);
+      self.moved_utime_, self.constrained_utime_, self.bounded_utime_, self.corrected_utime_,
+      self.denied_since_, self.sequence_);
   }
 
  private:
@@ -83,6 +84,7 @@ class MotionEstimator {
                                   const Preintegration& inertial) const;
   YawRateBias yaw_rate_bias() const { return {standing_bias_, standing_bias_sigma_}; }
   bool wheels_are_fresh(Utime now) const;
+  bool velocity_allows_standing(Utime now);
   double axle_speed_now(const WheelSample& sample) const;
 
   LidarImuInputParameters parameters_;
@@ -110,6 +112,8 @@ class MotionEstimator {
   Utime moved_utime_ = 0;  ///< When the vehicle was last found not to stand.
   Utime constrained_utime_ = 0;
   Utime bounded_utime_ = 0;
+  Utime corrected_utime_ = 0;               ///< When a correction last took effect.
+  std::optional<Utime> denied_since_ = {};  ///< Since when the velocity has denied standing.
   std::uint64_t sequence_ = 0;
 };
 

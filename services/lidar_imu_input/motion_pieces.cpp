@@ -44,7 +44,11 @@ std::optional<Odometry> MotionEstimator::inertial_piece(Utime from, Utime to) {
   Odometry odometry;
   const InertialBias bias(standing_bias_, 0.0, 0.0);
   odometry.inertial = preintegrate(*samples, parameters_.imu, bias);
+  odometry.inertial->level = attitude_->level_since_mark();
   odometry.is_standing = moved_utime_ <= from;
+  const double twist = odometry.is_standing ? 0.0 : attitude_->twist_since_mark_rad();
+  odometry.inertial->yaw_rad += twist;
+  attitude_->mark_level();
   SE2WithCovariance motion;
   if (const auto driven = drive(*samples, speeds_, parameters_, yaw_rate_bias())) {
     motion = *driven;
@@ -57,7 +61,7 @@ std::optional<Odometry> MotionEstimator::inertial_piece(Utime from, Utime to) {
   } else {
     motion = dead_reckoned(*samples, *odometry.inertial);
   }
-  odometry.from_T_to = motion.mean;
+  odometry.from_T_to = motion.mean * SE2(0.0, 0.0, twist);
   odometry.covariance = motion.covariance;
   return odometry;
 }

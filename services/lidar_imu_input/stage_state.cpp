@@ -8,7 +8,7 @@
 namespace understory {
 namespace {
 
-constexpr std::uint32_t kStateVersion = 1;
+constexpr std::uint32_t kStateVersion = 2;
 constexpr std::string_view kStateName = "lidar_imu_input";
 
 }  // namespace

@@ -65,14 +65,14 @@ bool StandstillDetector::is_quiet(const std::optional<Eigen::Vector3d>& gyro_bia
 }
 
 void StandstillDetector::add(const ImuSample& sample,
-                             const std::optional<Eigen::Vector3d>& gyro_bias) {
+                             const std::optional<Eigen::Vector3d>& gyro_bias, bool may_stand) {
   window_.push_back(sample);
   const auto length = [this] {
     return static_cast<double>(window_.back().utime - window_.front().utime) * 1e-6;
   };
   while (window_.size() > 2 && length() > parameters_.window_s) window_.pop_front();
   const bool full = window_.size() >= kFewestSamples && length() > 0.8 * parameters_.window_s;
-  const bool stands = full && !wheels_turn(sample.utime) && is_quiet(gyro_bias);
+  const bool stands = full && may_stand && !wheels_turn(sample.utime) && is_quiet(gyro_bias);
   if (stands && !is_standing_) since_ = window_.front().utime;
   is_standing_ = stands;
   if (stands) longest_s_ = std::max(longest_s_, standing_s());

@@ -17,7 +17,9 @@ class StandstillDetector {
   explicit StandstillDetector(const StandstillParameters& parameters) : parameters_(parameters) {}
 
   /// Samples in frame vehicle. `gyro_bias`: what is known of it; none before it is known.
-  void add(const ImuSample& sample, const std::optional<Eigen::Vector3d>& gyro_bias);
+  /// `may_stand`: false where the velocity is known well enough to say no.
+  void add(const ImuSample& sample, const std::optional<Eigen::Vector3d>& gyro_bias,
+           bool may_stand = true);
   void add_wheel_speed(Utime utime, double speed_mps);
   void reset();  ///< After a gap.
 

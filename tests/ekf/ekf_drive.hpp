@@ -28,6 +28,13 @@ inline sim::InertialDriveParameters short_drive() {
   return drive;
 }
 
+/// A filter for detections whose noise is all new in every scan.
+inline EkfParameters white_noise() {
+  EkfParameters parameters;
+  parameters.sighting.lasting_share = 0.0;
+  return parameters;
+}
+
 /// The scan under its true identities (`offset` makes other ids of the same landmarks).
 inline TrackedScan true_tracks(const sim::DriveStep& step, TrackId offset = 1) {
   TrackedScan tracked{step.scan.utime, step.scan.sequence, step.scan.field_of_view, {}};

@@ -24,6 +24,7 @@ inline FilterState random_state(ErrorForm form, int landmarks, std::mt19937_64& 
   state.position = 20.0 * Eigen::Vector2d(normal(random), normal(random));
   state.velocity = 3.0 * Eigen::Vector2d(normal(random), normal(random));
   state.bias = 0.1 * Eigen::Vector3d(normal(random), normal(random), normal(random));
+  state.level = 0.02 * Eigen::Vector2d(normal(random), normal(random));
   state.first_position = state.position;
   state.first_velocity = state.velocity;
   for (int i = 0; i < landmarks; ++i) {
@@ -56,6 +57,7 @@ inline Eigen::VectorXd difference(const FilterState& from, const FilterState& to
   delta.segment<2>(ekf::kPosition) = of(from.position, to.position);
   delta.segment<2>(ekf::kVelocity) = of(from.velocity, to.velocity);
   delta.segment<3>(ekf::kBias) = to.bias - from.bias;
+  delta.segment<2>(ekf::kLevel) = to.level - from.level;
   for (std::size_t i = 0; i < from.landmarks().size(); ++i) {
     delta.segment<2>(FilterState::row(i)) =
         of(from.landmarks()[i].position, to.landmarks()[i].position);

@@ -32,7 +32,7 @@ TEST_CASE("NEES and drift with an IMU, with wheels, with both", "[ekf][consisten
                               sim::OdometryKind::kInertialAndWheels}) {
     sim::InertialDriveParameters drive = short_drive();
     drive.odometry = odometry;
-    const Mean mean = over_runs(drive, {}, 20, 25.0);
+    const Mean mean = over_runs(drive, white_noise(), 20, 25.0);
     CAPTURE(static_cast<int>(odometry), mean.nees, mean.drift);
     // 95 % band of a 20-run mean: 2.0 .. 4.2 if scans were one; the mean over a drive lies closer.
     REQUIRE(mean.nees > 1.9);
@@ -48,7 +48,7 @@ TEST_CASE("Right invariant errors stay consistent where plain ones do not", "[ek
   drive.position_sigma_m = 0.5;
   drive.range_m = 15.0;
   drive.loop_length_m = 100.0;
-  EkfParameters filter;
+  EkfParameters filter = white_noise();
   const Mean invariant = over_runs(drive, filter, 10, 100.0);
   filter.error_form = "first_estimate";
   const Mean first = over_runs(drive, filter, 10, 100.0);

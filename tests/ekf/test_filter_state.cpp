@@ -78,13 +78,13 @@ TEST_CASE("A new landmark's covariance follows from where it was seen", "[ekf][s
     Eigen::Matrix2d noise;
     noise << 0.04, 0.01, 0.01, 0.09;
     FilterState added = state;
-    added.add_landmark({}, seen, noise);
+    added.add_landmark({}, seen, noise, 1.5);
     // The Jacobian of the whole new state with respect to the old one, by differences.
     Eigen::MatrixXd jacobian(n + 2, n);
     for (int k = 0; k < n; ++k) {
       FilterState moved = state;
       moved.retract(1e-6 * Eigen::VectorXd::Unit(n, k));
-      moved.add_landmark({}, seen, noise);
+      moved.add_landmark({}, seen, noise, 1.5);
       jacobian.col(k) = difference(added, moved) / 1e-6;
     }
     Eigen::MatrixXd expected = jacobian * full_covariance(state) * jacobian.transpose();

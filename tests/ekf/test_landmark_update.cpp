@@ -13,7 +13,8 @@ using namespace understory::ekf;
 
 namespace {
 
-Eigen::MatrixXd measurement_rows(const FilterState& state, const std::vector<Pairing>& pairings) {
+Eigen::MatrixXd measurement_rows(const FilterState& state, const std::vector<Pairing>& pairings,
+                                 const std::vector<Sighting>& sightings) {
   Eigen::MatrixXd rows =
       Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(pairings.size()), state.size());
   for (std::size_t k = 0; k < pairings.size(); ++k) {
@@ -21,6 +22,7 @@ Eigen::MatrixXd measurement_rows(const FilterState& state, const std::vector<Pai
     rows.block<2, 1>(at, kHeading) = heading_row(state, pairings[k].landmark);
     rows.block<2, 2>(at, kPosition) = -Eigen::Matrix2d::Identity();
     rows.block<2, 2>(at, FilterState::row(pairings[k].landmark)).setIdentity();
+    rows.block<2, 2>(at, kLevel) = level_rows(state, sightings[pairings[k].sighting].height_m);
   }
   return rows;
 }
@@ -30,8 +32,10 @@ std::vector<Sighting> sightings_near(const FilterState& state, double sigma,
   std::vector<Sighting> sightings;
   for (const MapLandmark& landmark : state.landmarks()) {
     Sighting seen;
+    seen.height_m = 2.0 * normal(random);
     seen.position_m =
         rotation_of(state.heading).transpose() * (landmark.position - state.position) +
+        seen.height_m * level_displacement() * state.level +
         sigma * Eigen::Vector2d(normal(random), normal(random));
     seen.covariance_m2 << 0.02, 0.004, 0.004, 0.01;
     sightings.push_back(seen);
@@ -42,7 +46,7 @@ std::vector<Sighting> sightings_near(const FilterState& state, double sigma,
 /// Joint squared distance of pairings, on full matrices.
 double joint_distance(const FilterState& state, const std::vector<Sighting>& sightings,
                       const std::vector<Pairing>& pairings) {
-  const Eigen::MatrixXd rows = measurement_rows(state, pairings);
+  const Eigen::MatrixXd rows = measurement_rows(state, pairings, sightings);
   Eigen::MatrixXd spread = rows * full_covariance(state) * rows.transpose();
   Eigen::VectorXd error(rows.rows());
   const Eigen::Matrix2d rotation = rotation_of(state.heading);
@@ -62,7 +66,7 @@ TEST_CASE("Innovations depend on the error as their rows say", "[ekf][update]") 
   for (const ErrorForm form : kForms) {
     const FilterState state = random_state(form, 3, random);
     const Sighting seen = sightings_near(state, 0.0, random)[1];
-    const Eigen::MatrixXd rows = measurement_rows(state, {{0, 1}});
+    const Eigen::MatrixXd rows = measurement_rows(state, {{0, 1}}, {seen});
     for (int k = 0; k < state.size(); ++k) {
       const double h = 1e-6;
       FilterState plus = state, minus = state;
@@ -70,8 +74,10 @@ TEST_CASE("Innovations depend on the error as their rows say", "[ekf][update]") 
       minus.retract(-h * Eigen::VectorXd::Unit(state.size(), k));
       // The innovation falls by what the prediction gains, seen in the axes of the estimate.
       const auto predicted = [&](const FilterState& at) {
-        return Eigen::Vector2d(rotation_of(state.heading) * rotation_of(at.heading).transpose() *
-                               (at.landmarks()[1].position - at.position));
+        return Eigen::Vector2d(
+            rotation_of(state.heading) *
+            (rotation_of(at.heading).transpose() * (at.landmarks()[1].position - at.position) +
+             seen.height_m * level_displacement() * at.level));
       };
       const Eigen::Vector2d column = (predicted(plus) - predicted(minus)) / (2 * h);
       CAPTURE(static_cast<int>(form), k);
@@ -90,7 +96,7 @@ TEST_CASE("Steps of a few landmarks give what one full update gives", "[ekf][upd
       std::vector<Pairing> pairings;
       for (std::uint32_t k = 0; k < sightings.size(); ++k) pairings.push_back({k, k});
       const Eigen::MatrixXd before = full_covariance(state);
-      const Eigen::MatrixXd rows = measurement_rows(state, pairings);
+      const Eigen::MatrixXd rows = measurement_rows(state, pairings, sightings);
       Eigen::MatrixXd spread = rows * before * rows.transpose();
       Eigen::VectorXd error(rows.rows());
       const Eigen::Matrix2d rotation = rotation_of(state.heading);

@@ -22,6 +22,10 @@ Preintegration random_motion(std::mt19937_64& random) {
   for (int k = 0; k < 25; ++k) root.data()[k] = 0.05 * normal(random);
   p.covariance = root * root.transpose();
   p.bias = 0.05 * Eigen::Vector3d(normal(random), normal(random), normal(random));
+  Eigen::Matrix2d small;
+  for (int k = 0; k < 4; ++k) small.data()[k] = 0.01 * normal(random);
+  p.level = {small * small.transpose(), Eigen::Matrix2d::Identity() + 20.0 * small,
+             0.5 * small * small.transpose(), 0.1};
   return p;
 }
 
@@ -29,6 +33,8 @@ void move(FilterState& state, const Transition& t) {
   state.heading = wrap_angle(t.heading);
   state.position = t.position;
   state.velocity = t.velocity;
+  state.bias = t.bias;
+  state.level = t.level;
 }
 
 /// The transition of the whole state with its landmarks' rows.
@@ -52,11 +58,16 @@ Eigen::MatrixXd whole_input(const FilterState& state, const Transition& t) {
   return input;
 }
 
-Eigen::MatrixXd walk(const FilterState& state, const EkfMotionParameters& p, double seconds) {
+/// Of the biases' walk, and of what is new in the level.
+Eigen::MatrixXd walk(const FilterState& state, const EkfMotionParameters& p, const Transition& t) {
+  const double seconds = t.seconds;
   Eigen::MatrixXd noise = Eigen::MatrixXd::Zero(state.size(), state.size());
   noise(kBias, kBias) = p.gyro_walk * p.gyro_walk * seconds;
   noise(kBias + 1, kBias + 1) = noise(kBias + 2, kBias + 2) =
       p.accelerometer_walk * p.accelerometer_walk * seconds;
+  Eigen::Matrix<double, 4, 2> level;
+  level << 9.81 * level_displacement(), Eigen::Matrix2d::Identity();
+  noise.block<4, 4>(kBias + 1, kBias + 1) += level * t.level_added * level.transpose();
   return noise;
 }
 
@@ -103,7 +114,7 @@ TEST_CASE("The block-wise prediction is the full one", "[ekf][prediction]") {
     const Eigen::MatrixXd input = whole_input(state, t);
     const Eigen::MatrixXd expected = error * full_covariance(state) * error.transpose() +
                                      input * t.noise * input.transpose() +
-                                     walk(state, parameters, t.seconds);
+                                     walk(state, parameters, t);
     predict(state, t, parameters, room);
     REQUIRE((full_covariance(state) - expected).norm() < 1e-12 * expected.norm());
   }
@@ -147,7 +158,8 @@ TEST_CASE("Motion measured over the samples' own interval shares their noise",
           (rows * joint * rows.transpose() + measured.covariance_m2).inverse();
       Eigen::MatrixXd pass(n, n + 5);
       pass << whole_error(state, t), whole_input(state, t);
-      const Eigen::MatrixXd expected = pass * (joint - gain * rows * joint) * pass.transpose();
+      const Eigen::MatrixXd expected =
+          pass * (joint - gain * rows * joint) * pass.transpose() + walk(state, parameters, t);
       const Eigen::VectorXd delta = pass * gain * (measured.position_m - measure(state));
       FilterState oracle = state;
       move(oracle, t);

@@ -1,0 +1,125 @@
+// Errors that scans have in common: of the level, and of how a trunk looks from one place.
+#include <cmath>
+
+#include "tests/catch.hpp"
+#include "tests/ekf/ekf_drive.hpp"
+#include "tests/ekf/filter_fixture.hpp"
+
+using namespace understory;
+using namespace understory::test;
+
+namespace {
+
+constexpr double kHeight_m = 1.5;
+constexpr double kGravity = 9.81;
+
+/// A level that is off by the accelerometer's bias until the drive tells it: roll and pitch each
+/// with a standard deviation of 6 mrad that falls to 1 mrad within some seconds.
+class WrongLevel {
+ public:
+  explicit WrongLevel(std::uint64_t seed) : random_(seed) {
+    error_ = kStart * Eigen::Vector2d(normal(random_), normal(random_));
+    first_error_ = error_;
+  }
+
+  /// What the wrong level makes of a piece, and what is said of it.
+  void spoil(Odometry& piece) {
+    Preintegration& inertial = *piece.inertial;
+    // While standing the accelerometer's bias hides what the level does.
+    const Eigen::Vector2d force = kGravity * ekf::level_displacement() * (error_ - first_error_);
+    inertial.velocity_mps += force * inertial.seconds;
+    inertial.position_m += 0.5 * force * inertial.seconds * inertial.seconds;
+    const double before = variance_;
+    if (!piece.is_standing) {
+      variance_ = std::max(kEnd * kEnd, variance_ * std::exp(-inertial.seconds / 2.0));
+    }
+    const double memory = variance_ / before;
+    const double added = variance_ - memory * memory * before;
+    const Eigen::Matrix2d one = Eigen::Matrix2d::Identity();
+    inertial.level = {variance_ * one, memory * one, added * one};
+    error_ = memory * error_ + std::sqrt(added) * Eigen::Vector2d(normal(random_), normal(random_));
+  }
+  void spoil(TrackedScan& scan) const {
+    for (TrackedLandmark& landmark : scan.landmarks) {
+      Detection& seen = landmark.observed;
+      seen.position_m.z() = kHeight_m;
+      seen.position_m.head<2>() += kHeight_m * ekf::level_displacement() * error_;
+      const double share = kHeight_m * kHeight_m * variance_;
+      seen.covariance_m2.topLeftCorner<2, 2>() += share * Eigen::Matrix2d::Identity();
+      seen.covariance_m2(2, 2) = 1.0;
+    }
+  }
+
+ private:
+  static constexpr double kStart = 6e-3;
+  static constexpr double kEnd = 1e-3;
+
+  std::mt19937_64 random_;
+  Eigen::Vector2d error_;
+  Eigen::Vector2d first_error_;
+  double variance_ = kStart * kStart;
+};
+
+double mean_nees_with_wrong_level(std::uint64_t seed, bool is_told) {
+  sim::InertialDriveParameters parameters = short_drive();
+  parameters.standing_s = 5.0;
+  parameters.odometry = sim::OdometryKind::kInertialAndWheels;
+  parameters.position_sigma_m = 0.02;
+  parameters.range_m = 40.0;
+  sim::InertialDrive drive(parameters, trunks(), seed);
+  Ekf filter(white_noise());
+  WrongLevel level(seed);
+  SE2 start;
+  double sum = 0.0;
+  int count = 0;
+  for (int k = 0; k < 200; ++k) {
+    const sim::DriveStep step = drive.next();
+    if (k == 0) start = step.world_T_vehicle;
+    for (Odometry piece : step.odometry) {
+      level.spoil(piece);
+      if (!is_told) piece.inertial->level = LevelError{};
+      filter.add(piece);
+    }
+    TrackedScan scan = true_tracks(step);
+    level.spoil(scan);
+    const EkfOutput output = filter.add(scan);
+    if (k < 60) continue;
+    sum += nees(*output.pose, start.inverse() * step.world_T_vehicle);
+    ++count;
+  }
+  return sum / count;
+}
+
+}  // namespace
+
+TEST_CASE("A level that is found to be wrong on the way leaves the filter consistent",
+          "[ekf][level]") {
+  double told = 0.0;
+  double untold = 0.0;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    told += mean_nees_with_wrong_level(seed, true) / 12.0;
+    untold += mean_nees_with_wrong_level(seed, false) / 12.0;
+  }
+  CAPTURE(told, untold);
+  CHECK(told < 4.0);
+  CHECK(told > 1.5);
+  CHECK(untold > 2.0 * told);
+}
+
+TEST_CASE("What was seen from one place is less sure once that is left", "[ekf][standing]") {
+  sim::InertialDriveParameters parameters = short_drive();
+  parameters.standing_s = 10.0;
+  EkfParameters honest;
+  honest.sighting.lasting_share = 0.2;
+  Driven driven(0.0, parameters, honest);
+  EkfOutput output;
+  for (int k = 0; k < 104; ++k) output = driven.go();
+  const double noise = parameters.position_sigma_m * parameters.position_sigma_m;
+  std::size_t long_seen = 0;
+  for (const EkfLandmark& landmark : output.map->landmarks) {
+    if (landmark.times_seen < 50) continue;
+    ++long_seen;
+    CHECK(landmark.covariance_m2.trace() > 0.5 * 2.0 * 0.2 * noise);
+  }
+  CHECK(long_seen > 3);
+}
