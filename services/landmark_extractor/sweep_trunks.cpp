@@ -9,6 +9,11 @@ namespace {
 
 /// What is so wide must not be explained better by an upright plane.
 constexpr double kFlatWidth_m = 0.2;
+/// What is seen nowhere above this is a stone, a stump, a tuft of grass: nothing says that it
+/// stands.
+constexpr double kStump_m = 0.6;
+/// Returns so near the fitted surface are on it [sigma].
+constexpr double kOnBark = 2.0;
 
 /// The centre at breast height with its covariance.
 Detection to_detection(const StemFit& fit, const GroundHeight& ground, double breast_height,
@@ -73,7 +78,11 @@ std::optional<Detection> SweepTrunks::judge(const RingCloud& cloud, const std::v
   }
   const GroundHeight below = ground.below(fit->state.head<2>());
   if (!plausible(*fit, below.height_m + sweep_.breast_height_m)) return std::nullopt;
-  if (is_in_leaves(runs, *fit)) {
+  if (fit->high_z_m < below.height_m + kStump_m) {
+    ++counters_.not_standing;
+    return std::nullopt;
+  }
+  if (is_in_leaves(cloud, runs, *fit)) {
     ++counters_.in_leaves;
     return std::nullopt;
   }
@@ -94,15 +103,25 @@ std::optional<Detection> SweepTrunks::judge(const RingCloud& cloud, const std::v
   return detection;
 }
 
-/// Below a crown: whether more returns are beside the stem than a trunk has.
-bool SweepTrunks::is_in_leaves(const std::vector<Run>& runs, const StemFit& fit) const {
-  const auto highest = static_cast<float>(sweep_.standing_height_m);
+/// Below a crown: whether more returns are beside the stem than a trunk has. A run that goes on
+/// along a branch has returns of both.
+bool SweepTrunks::is_in_leaves(const RingCloud& cloud, const std::vector<Run>& runs,
+                               const StemFit& fit) {
+  columns_.runs_near(runs, fit.state.head<2>().cast<float>(),
+                     static_cast<float>(trunk_.leaf_radius_m),
+                     static_cast<float>(sweep_.standing_height_m), near_);
+  const double bark = kOnBark * std::hypot(sweep_.range_sigma_m, trunk_.roundness_sigma_m);
   std::size_t on = 0;
-  for (const std::uint32_t i : fitter_.agreeing()) {
-    if (runs[i].height_m <= highest) on += runs[i].size();
+  std::size_t around = 0;
+  for (const std::uint32_t i : near_) {
+    around += runs[i].size();
+    for (std::uint32_t k = runs[i].first; k <= runs[i].last; ++k) {
+      const RingPoint& point = cloud.points()[k];
+      const Eigen::Vector2d place(point.x_m, point.y_m);
+      const double from_axis = (place - fit.centre_at(point.z_m)).norm();
+      if (std::abs(from_axis - fit.radius_at(point.z_m)) < bark) ++on;
+    }
   }
-  const std::size_t around = columns_.points_near(
-      runs, fit.state.head<2>().cast<float>(), static_cast<float>(trunk_.leaf_radius_m), highest);
   return static_cast<double>(on) < trunk_.min_share * static_cast<double>(around);
 }
 

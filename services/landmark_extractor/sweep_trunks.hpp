@@ -44,7 +44,7 @@ class SweepTrunks {
                                  const Column& column, const GroundSurface& ground,
                                  const Eigen::Matrix2d& level_covariance_rad2);
   bool plausible(const StemFit& fit, double breast_z);
-  bool is_in_leaves(const std::vector<Run>& runs, const StemFit& fit) const;
+  bool is_in_leaves(const RingCloud& cloud, const std::vector<Run>& runs, const StemFit& fit);
   bool stands(const StemProbe& probe);
 
   SweepParameters sweep_;
@@ -52,6 +52,7 @@ class SweepTrunks {
   ColumnFinder columns_;
   StemFitter fitter_;
   TrunkCounters counters_;
+  std::vector<std::uint32_t> near_;
 };
 
 }  // namespace understory

@@ -71,13 +71,13 @@ void ColumnFinder::gather(const std::vector<Run>& runs, const Eigen::Vector2f& a
   });
 }
 
-std::size_t ColumnFinder::points_near(const std::vector<Run>& runs, const Eigen::Vector2f& centre_m,
-                                      float radius_m, float highest_m) const {
-  std::size_t points = 0;
+void ColumnFinder::runs_near(const std::vector<Run>& runs, const Eigen::Vector2f& centre_m,
+                             float radius_m, float highest_m,
+                             std::vector<std::uint32_t>& near) const {
+  near.clear();
   visit_near(runs, centre_m, radius_m, [&](std::uint32_t index) {
-    if (runs[index].height_m <= highest_m) points += runs[index].size();
+    if (runs[index].height_m <= highest_m) near.push_back(index);
   });
-  return points;
 }
 
 const std::vector<Column>& ColumnFinder::find(const std::vector<Run>& runs,

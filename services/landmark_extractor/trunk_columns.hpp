@@ -26,10 +26,10 @@ class ColumnFinder {
                                   const SweepTrunkParameters& parameters,
                                   const Eigen::Vector2f& centre_m, float reach_m);
 
-  /// Points on runs up to `highest_m` above ground whose centres are within the radius, whatever
-  /// column they are in; of the runs of the last find().
-  std::size_t points_near(const std::vector<Run>& runs, const Eigen::Vector2f& centre_m,
-                          float radius_m, float highest_m) const;
+  /// Runs up to `highest_m` above ground whose centres are within the radius, whatever column they
+  /// are in; of the runs of the last find().
+  void runs_near(const std::vector<Run>& runs, const Eigen::Vector2f& centre_m, float radius_m,
+                 float highest_m, std::vector<std::uint32_t>& near) const;
 
  private:
   template <class Visit>

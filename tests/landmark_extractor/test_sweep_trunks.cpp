@@ -188,6 +188,62 @@ TEST_CASE("people, posts, hanging branches and bushes are no trunks", "[extracto
   CHECK(extractor.sweep_counters().trunks.not_standing >= 4);
 }
 
+TEST_CASE("trunks with branches at the height of many beams are found in their place",
+          "[extractor]") {
+  std::mt19937_64 random(12);
+  std::uniform_real_distribution<double> heights(0.8, 2.0);
+  std::uniform_real_distribution<double> bearings(-3.14, 3.14);
+  LandmarkExtractor extractor(exact_stems());
+  const auto place = [](int k) -> Eigen::Vector2d {
+    return (3.0 + k) * Eigen::Vector2d(std::cos(k), std::sin(k));
+  };
+  for (const int rings : {32, 64}) {
+    std::size_t found = 0;
+    for (int run = 0; run < 10; ++run) {
+      Space space;
+      for (int k = 0; k < 6; ++k) {
+        space.stems.push_back({place(k), 0.13});
+        for (int branch = 0; branch < 20; ++branch) {  // Each rises by 36 cm on 36 cm.
+          const double bottom = heights(random);
+          const double bearing = bearings(random);
+          const Eigen::Vector2d lean(std::cos(bearing), std::sin(bearing));
+          space.stems.push_back(
+              {place(k) + lean * (1.3 - bottom), 0.03, lean, 0.0, bottom + 0.36, bottom});
+        }
+      }
+      const LandmarkScan scan = extractor.extract(sweep(space, spinner_of(rings), random));
+      for (int k = 0; k < 6; ++k) {
+        const bool is_found = std::ranges::any_of(scan.detections, [&](const Detection& d) {
+          return (d.position_m.head<2>() - place(k)).norm() < 0.06;
+        });
+        found += is_found ? 1 : 0;
+      }
+    }
+    CHECK(found >= 50);
+  }
+}
+
+TEST_CASE("what is seen near the ground alone is a tuft", "[extractor]") {
+  std::mt19937_64 random(12);
+  LandmarkExtractor extractor(exact_stems());
+  for (const int rings : {16, 32, 64}) {
+    std::size_t detections = 0;
+    for (int run = 0; run < 10; ++run) {
+      Space space;
+      for (int k = 0; k < 6; ++k) {
+        const Eigen::Vector2d at =
+            (5.0 + 2.0 * k + 0.1 * run) * Eigen::Vector2d(std::cos(k), std::sin(k));
+        for (int stalk = 0; stalk < 6; ++stalk) {
+          const Eigen::Vector2d aside(std::cos(stalk), std::sin(stalk));
+          space.stems.push_back({at + 0.04 * aside, 0.012, {0.0, 0.0}, 0.0, 0.55});
+        }
+      }
+      detections += extractor.extract(sweep(space, spinner_of(rings), random)).detections.size();
+    }
+    CHECK(detections == 0);
+  }
+}
+
 TEST_CASE("far people are told from trunks by the next beam above them", "[extractor]") {
   std::mt19937_64 random(13);
   std::uniform_real_distribution<double> ranges(12.0, 24.0);
