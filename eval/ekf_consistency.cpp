@@ -49,17 +49,6 @@ TrackedScan true_tracks(const sim::DriveStep& step, TrackId& next_false) {
   return tracked;
 }
 
-void add_pose_nees(const EkfPose& pose, const SE2& truth, EkfDriveResult& result) {
-  const Eigen::Vector3d error = (pose.ekf_map_T_vehicle.inverse() * truth).Log();
-  // The first pose is the map's origin: exact, and so is its covariance.
-  const Eigen::Matrix3d covariance = pose.covariance + 1e-14 * Eigen::Matrix3d::Identity();
-  const Eigen::Vector2d place = error.head<2>();
-  const Eigen::Matrix2d place_covariance = covariance.topLeftCorner<2, 2>();
-  result.nees.push_back(error.dot(covariance.llt().solve(error)));
-  result.position_nees.push_back(place.dot(place_covariance.llt().solve(place)));
-  result.heading_nees.push_back(error.z() * error.z() / covariance(2, 2));
-}
-
 double velocity_nees(const VelocityCorrection& correction, const sim::DriveStep& step,
                      bool has_bias) {
   const Eigen::Vector2d truth = step.world_T_vehicle.rotation().transpose() * step.velocity_mps;
@@ -70,6 +59,19 @@ double velocity_nees(const VelocityCorrection& correction, const sim::DriveStep&
 }
 
 }  // namespace
+
+void add_pose_nees(const EkfPose& pose, const SE2& truth, EkfDriveResult& result) {
+  const Eigen::Vector3d error = (pose.ekf_map_T_vehicle.inverse() * truth).Log();
+  // The first pose is the map's origin: exact, and so is its covariance.
+  const Eigen::Matrix3d covariance = pose.covariance + 1e-14 * Eigen::Matrix3d::Identity();
+  const Eigen::Vector2d place = error.head<2>();
+  const Eigen::Matrix2d place_covariance = covariance.topLeftCorner<2, 2>();
+  result.nees.push_back(error.dot(covariance.llt().solve(error)));
+  result.position_nees.push_back(place.dot(place_covariance.llt().solve(place)));
+  result.heading_nees.push_back(error.z() * error.z() / covariance(2, 2));
+  result.error_m2.push_back(place.squaredNorm());
+  result.claimed_m2.push_back(place_covariance.trace());
+}
 
 EkfDriveResult run_ekf_drive(const EkfDriveOptions& options, const sim::TrunkField& world,
                              std::uint64_t seed) {

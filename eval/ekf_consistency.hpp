@@ -5,15 +5,23 @@
 #include <span>
 #include <vector>
 
+#include "common/model/ekf_output.hpp"
 #include "services/associator/parameters.hpp"
 #include "services/ekf/parameters.hpp"
 #include "sim/inertial_drive.hpp"
 
 namespace understory::eval {
 
+/// For simulated detections: all their noise is new in every scan.
+inline EkfParameters white_noise_filter() {
+  EkfParameters parameters;
+  parameters.sighting.lasting_share = 0.0;
+  return parameters;
+}
+
 struct EkfDriveOptions {
   sim::InertialDriveParameters drive;
-  EkfParameters filter;
+  EkfParameters filter = white_noise_filter();
   AssociatorParameters associator;
   /// Track ids from the associator; else the true ones.
   bool use_associator = true;
@@ -26,6 +34,8 @@ struct EkfDriveResult {
   std::vector<double> heading_nees;   ///< Of the heading alone (1).
   std::vector<double> position_nees;  ///< Of the position alone (2).
   std::vector<double> velocity_nees;  ///< Of velocity and biases (5), per scan.
+  std::vector<double> error_m2;       ///< Squared error of the position, per scan.
+  std::vector<double> claimed_m2;     ///< What the filter says of it.
   double final_error_m = 0.0;
   double final_error_rad = 0.0;
   double driven_m = 0.0;
@@ -37,6 +47,9 @@ struct EkfDriveResult {
 };
 EkfDriveResult run_ekf_drive(const EkfDriveOptions& options, const sim::TrunkField& world,
                              std::uint64_t seed);
+
+/// Appends a pose's figures; `truth` is the pose in the filter's map.
+void add_pose_nees(const EkfPose& pose, const SE2& truth, EkfDriveResult& result);
 
 /// Many drives.
 struct EkfConsistency {

@@ -5,6 +5,7 @@
 
 #include "eval/ekf_consistency.hpp"
 #include "eval/frontend.hpp"
+#include "eval/lidar_consistency.hpp"
 #include "eval/parallel.hpp"
 #include "eval/run.hpp"
 #include "eval/tracking.hpp"
@@ -162,6 +163,7 @@ void add_filter_rows(const FrontendOptions& options, const std::atomic<bool>& st
     rows.state("landmarks refused", 100.0 * summary.refused_share, "%");
   }
   add_form_rows(options, stop, world, rows);
+  add_lidar_filter_rows(options, stop, rows);
 }
 
 }  // namespace understory::eval
