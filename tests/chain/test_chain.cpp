@@ -10,12 +10,13 @@ using namespace understory::eval;
 
 namespace {
 
-sim::SensorDrive small_drive(std::uint64_t seed) {
+sim::SensorDrive small_drive(std::uint64_t seed, bool has_wheels = true) {
   sim::ForestScenarioParameters forest;
   forest.length_m = 60.0;
   sim::SensorSuite suite;
   suite.lidar->elevations_rad = sim::beam_elevations_rad(sim::LidarModel::kVlp16);
   suite.lidar->columns = 1200;
+  if (!has_wheels) suite.wheels.reset();
   return {sim::forest_scenario(forest, seed), sim::SpeedParameters{}, suite, seed};
 }
 
@@ -45,6 +46,19 @@ TEST_CASE("raw sensors become a pose, the same every time") {
     REQUIRE(again.slam[i].map_T_vehicle().coordinates() ==
             run.slam[i].map_T_vehicle().coordinates());
   }
+}
+
+TEST_CASE("without wheels smooth driving does not pass for standing") {
+  sim::SensorDrive drive = small_drive(6, false);
+  ChainOptions options;
+  options.config_dir = UNDERSTORY_SOURCE_CONFIG "/lidar";
+  const ChainRun run = drive_chain(drive, options);
+  REQUIRE(run.ekf.size() > 300);
+  const TrajectoryError ekf = trajectory_error(poses_of(run.ekf), run.truth);
+  CAPTURE(ekf.ate_rms_m, ekf.largest_m, ekf.driven_m);
+  CHECK(ekf.driven_m > 50.0);
+  CHECK(ekf.ate_rms_m < 0.1);
+  CHECK(run.ekf.back().reset_counter == 0);
 }
 
 TEST_CASE("a configuration that is not there is an error, not the defaults") {
