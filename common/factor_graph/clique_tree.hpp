@@ -79,8 +79,6 @@ class CliqueTree {
   void solve_everything(double threshold);
   const std::vector<int>& changed() const { return changed_; }
   const std::vector<Delta>& changed_from() const { return changed_from_; }
-  /// What the last solve takes off the sum of squares of the linearised factors.
-  double promised_decrease() const { return promised_decrease_; }
 
   /// Joint covariance of variables in the order given; in their charts. None where one is not in
   /// the tree or the measurements leave one undetermined.
@@ -197,7 +195,6 @@ class CliqueTree {
   std::vector<std::uint64_t> changed_at_;  ///< Per variable: number of the solve that moved it.
   std::vector<double> change_size_;        ///< And how far [own conditional deviations].
   std::uint64_t solve_count_ = 0;
-  double promised_decrease_ = 0.0;
   std::vector<int> path_;
   std::vector<char> on_path_;
   Eigen::MatrixXd right_;  ///< Rows of the paths' variables.

@@ -23,7 +23,6 @@ void CliqueTree::solve_clique(int id, double finest) {
     const VariableRecord& variable = graph_.variable(name);
     const int size = dimension(variable.type);
     double largest = 0.0;
-    double squared = 0.0;
     const double* to = step_.data() + first;
     for (int c = 0; c < size; ++c) {
       const double* column = clique.panel + static_cast<std::ptrdiff_t>(first + c) * clique.size;
@@ -32,10 +31,8 @@ void CliqueTree::solve_clique(int id, double finest) {
         whitened += column[first + r] * (to[r] - variable.delta[static_cast<std::size_t>(r)]);
       }
       largest = std::max(largest, std::abs(whitened));
-      squared += whitened * whitened;
     }
     if (largest > finest) {
-      promised_decrease_ += squared;
       std::uint64_t& changed_at = changed_at_[static_cast<std::size_t>(name)];
       if (changed_at != solve_count_) {
         changed_at = solve_count_;
@@ -114,7 +111,6 @@ void CliqueTree::take_turns(const MoveLimits& limits) {
 
 void CliqueTree::solve(const MoveLimits& limits) {
   ++solve_count_;
-  promised_decrease_ = 0.0;
   changed_.clear();
   changed_from_.clear();
   changed_at_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);

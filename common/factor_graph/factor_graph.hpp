@@ -117,6 +117,8 @@ class FactorGraph {
   /// four numbers to judge its age by], whitened and weighted: cost = |J delta - b|^2.
   void linearise(int factor);
   Deviation deviation(int factor) const;
+  /// |J delta - b|^2: the loss as the linearisation has it, up to a constant.
+  double linearised_chi2(int factor) const;
   /// Bound on what the deviation of a factor of this variable grew by, from its moves since the
   /// factors were last looked at [sigmas].
   double unjudged_deviation(int variable) const;
@@ -145,6 +147,7 @@ class FactorGraph {
   void store_data(int factor, std::span<const double> measurement,
                   const Eigen::Ref<const Eigen::MatrixXd>& information);
   std::span<const int> incidences_of(int factor) const;
+  void copy_moves(std::span<const int> variables, double* to) const;
   void free_blocks(const FactorRecord& factor);
   /// Residual (and Jacobian) before the loss, whitened, in the charts.
   void whitened(const FactorRecord& factor, std::span<const int> variables, double* residual,

@@ -206,6 +206,27 @@ void FactorGraph::linearise(int id) {
   keep_scales(record, variables);
 }
 
+void FactorGraph::copy_moves(std::span<const int> variables, double* to) const {
+  for (const int name : variables) {
+    const VariableRecord& variable = variables_[name];
+    to = std::copy_n(variable.delta.data(), dimension(variable.type), to);
+  }
+}
+
+double FactorGraph::linearised_chi2(int id) const {
+  const FactorRecord& record = factors_[id];
+  scratch_.resize(static_cast<std::size_t>(record.columns));
+  copy_moves(variables_of(id), scratch_.data());
+  double squared = 0.0;
+  with_sizes(record.rows, record.columns, [&]<int rows, int columns>() {
+    const Map<const Matrix<double, rows, columns>> j(record.linear, record.rows, record.columns);
+    const Map<const Matrix<double, rows, 1>> b(j.data() + j.size(), record.rows);
+    const Map<const Matrix<double, columns, 1>> delta(scratch_.data(), record.columns);
+    squared = (j * delta - b).squaredNorm();
+  });
+  return squared;
+}
+
 Deviation FactorGraph::deviation(int id) const {
   const FactorRecord& record = factors_[id];
   const std::span<const int> variables = variables_of(id);
@@ -214,11 +235,7 @@ Deviation FactorGraph::deviation(int id) const {
   double* residual = scratch_.data();
   whitened(record, variables, residual, nullptr);
   double* moves = residual + 2 * record.rows;
-  double* next = moves;
-  for (const int name : variables) {
-    const VariableRecord& variable = variables_[name];
-    next = std::copy_n(variable.delta.data(), dimension(variable.type), next);
-  }
+  copy_moves(variables, moves);
   const double* age =
       record.linear + static_cast<std::ptrdiff_t>(record.rows) * (record.columns + 1);
   double squared = 0.0;

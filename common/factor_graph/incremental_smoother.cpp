@@ -9,20 +9,25 @@ namespace {
 
 /// A pose3's chart is left before its rotation gets far from the base [rad].
 constexpr double kFarTurn = 0.6;
-/// A step may add this part to the loss, or that of one measurement: that is the linearisations'
-/// age, and mended by the next.
-constexpr double kToleratedPart = 0.1;
-constexpr double kToleratedRounding = 1e-3;  ///< The same of thorough updates, which start fresh.
-constexpr int kMaxHalvings = 8;
-/// A second step of an update is looked at where the linearisations leave out this part of the
-/// loss; it must keep the other part of what it promised.
-constexpr double kNoticedPart = 0.01;
+/// What the linearisations leave out is looked at from this part of the loss on; a step must keep
+/// the other part of what they promised.
+constexpr double kNoticedPart = 5e-2;
+constexpr double kNoticedRounding = 1e-3;  ///< The same of thorough updates, which start fresh.
 constexpr double kLeastGain = 0.1;
+constexpr int kMaxHalvings = 8;
 /// Part of the limit to deviations, that may grow unseen.
 constexpr double kNegligible = 0.2;
+/// Residuals of more rows than these are as large as those of so many.
+constexpr int kMostRows = 6;
+constexpr double kPlanarRows = 3.0;
 constexpr double kSettledPart = 0.2;  ///< Of the thorough updates' limit.
 constexpr double kLeastUnit = 1e-4;
 constexpr double kLeastUsualUnit = 0.02;
+
+/// Limits are stated for relative poses in the plane; a residual in space is larger by its rows.
+double part_of_rows(const FactorRecord& factor) {
+  return std::sqrt(std::clamp<double>(factor.rows, kPlanarRows, kMostRows) / kPlanarRows);
+}
 
 }  // namespace
 
@@ -120,7 +125,7 @@ long IncrementalSmoother::relinearise() {
 /// Compares the factors of the variables that moved with their linearisations, where the moves are
 /// such that it can matter; those that are off become stale. Sums up what the linearisations leave
 /// out of the loss. Returns the largest deviation.
-double IncrementalSmoother::judge(double unless_below) {
+double IncrementalSmoother::judge(double unless_below, double limit) {
   ++count_;
   judged_.clear();
   off_.clear();
@@ -139,7 +144,7 @@ double IncrementalSmoother::judge(double unless_below) {
       turned = std::max(turned, deviation.turned);
       left_out_loss_ += deviation.loss;
       largest = std::max(largest, deviation.residual);
-      if (deviation.residual > parameters_.relinearise_above * usual_unit()) off_.push_back(f);
+      if (deviation.residual > limit * part_of_rows(graph_.factor(f))) off_.push_back(f);
     }
     VariableRecord& variable = graph_.edit_variable(v);
     variable.judged = variable.delta;
@@ -148,57 +153,64 @@ double IncrementalSmoother::judge(double unless_below) {
   return largest;
 }
 
-/// What the step did to the loss of the judged factors.
-double IncrementalSmoother::loss_change() {
-  double change = 0.0;
-  for (const int f : judged_) change += graph_.chi2(FactorId(f));
-  const std::vector<int>& changed = tree_.changed();
+/// What the step did to the judged factors.
+IncrementalSmoother::StepEffect IncrementalSmoother::effect_of_step() {
+  StepEffect effect;
+  for (const int f : judged_) {
+    effect.loss += graph_.chi2(FactorId(f));
+    effect.linearised += graph_.linearised_chi2(f);
+  }
   reached_.clear();
-  for (std::size_t i = 0; i < changed.size(); ++i) {
-    reached_.push_back(graph_.variable(changed[i]).delta);
-    graph_.move(changed[i], tree_.changed_from()[i].data());
+  for (const int v : tree_.changed()) reached_.push_back(graph_.variable(v).delta);
+  move_changed(tree_.changed_from());
+  for (const int f : judged_) {
+    effect.loss -= graph_.chi2(FactorId(f));
+    effect.linearised -= graph_.linearised_chi2(f);
   }
-  for (const int f : judged_) change -= graph_.chi2(FactorId(f));
-  for (std::size_t i = 0; i < changed.size(); ++i) graph_.move(changed[i], reached_[i].data());
-  return change;
+  move_changed(reached_);
+  return effect;
 }
 
-void IncrementalSmoother::shorten_step(double part) {
+void IncrementalSmoother::move_changed(const std::vector<Delta>& to) {
   const std::vector<int>& changed = tree_.changed();
-  for (std::size_t i = 0; i < changed.size(); ++i) {
-    const VariableRecord& variable = graph_.variable(changed[i]);
-    const Delta& from = tree_.changed_from()[i];
-    Delta to{};
-    for (std::size_t k = 0; k < to.size(); ++k) {
-      to[k] = from[k] + part * (variable.delta[k] - from[k]);
-    }
-    graph_.move(changed[i], to.data());
-  }
+  for (std::size_t i = 0; i < changed.size(); ++i) graph_.move(changed[i], to[i].data());
 }
 
-/// Takes the step back by halves while it makes the loss larger, or does far less for it than it
-/// promised: in space whole steps can swing about the minimum for ever.
-void IncrementalSmoother::accept_step(IncrementalUpdate& update, bool thorough) {
-  const double part = thorough ? kToleratedRounding : kToleratedPart;
-  const double tolerated = std::max(part * pending_.unit * pending_.unit, part * pending_.chi2);
-  const bool again = update.iterations > 1;
-  const double noticed = again ? std::min(tolerated, kNoticedPart * pending_.chi2) : tolerated;
-  const auto is_bad = [&](double step) {
-    if (left_out_loss_ <= noticed) return false;
-    // Of a quadratic loss, a step of that length.
-    const double promised = step * (2.0 - step) * tree_.promised_decrease();
-    const double change = loss_change();
-    return change > tolerated || (again && change > -kLeastGain * promised);
-  };
-  double step = 1.0;
-  // The promise is about all factors that the step touches.
-  if (again && left_out_loss_ > noticed) update.deviation = judge(0.0);
-  for (int i = 0; i < kMaxHalvings && is_bad(step); ++i) {
-    shorten_step(0.5);
-    step *= 0.5;
-    pending_.solve_everything = true;
-    update.deviation = judge(0.0);
+void IncrementalSmoother::halve_step() {
+  for (std::size_t i = 0; i < reached_.size(); ++i) {
+    const Delta& from = tree_.changed_from()[i];
+    for (std::size_t k = 0; k < from.size(); ++k) reached_[i][k] = 0.5 * (from[k] + reached_[i][k]);
   }
+  move_changed(reached_);
+}
+
+/// Whether the step does far less for the loss than the linearisations promise.
+bool IncrementalSmoother::is_bad_step(bool thorough, bool is_repeated) {
+  const double part = thorough ? kNoticedRounding : kNoticedPart;
+  const double noticed = part * std::max(pending_.unit * pending_.unit, pending_.chi2);
+  if (left_out_loss_ <= noticed) return false;
+  const StepEffect effect = effect_of_step();
+  if (effect.loss > noticed) return true;
+  return is_repeated && effect.loss - effect.linearised > noticed &&
+         effect.loss > kLeastGain * effect.linearised;
+}
+
+/// False where the step is taken back. Linearisations of different ages that do not fit together
+/// push large graphs to and fro without end: then those that are noticeably old are to be made
+/// anew, where the step began. Where there are none it is halved.
+bool IncrementalSmoother::accept_step(IncrementalUpdate& update, bool thorough) {
+  const double limit = parameters_.relinearise_above * usual_unit();
+  for (int i = 0; i < kMaxHalvings && is_bad_step(thorough, update.iterations > 1); ++i) {
+    pending_.solve_everything = true;
+    if (i == 0) {
+      move_changed(tree_.changed_from());
+      judge(0.0, kNegligible * limit);
+      if (!off_.empty()) return false;
+    }
+    halve_step();
+    update.deviation = judge(0.0, limit);
+  }
+  return true;
 }
 
 /// Every factor whose linearisation is noticeably old becomes stale.
@@ -216,7 +228,7 @@ void IncrementalSmoother::look_at_all(double relinearise_above) {
   for (int f = 0; f < graph_.factor_capacity(); ++f) {
     const FactorRecord& factor = graph_.factor(f);
     if (!factor.in_use || factor.clique == kNone || factor.is_pending) continue;
-    if (graph_.deviation(f).residual <= limit) continue;
+    if (graph_.deviation(f).residual <= limit * part_of_rows(factor)) continue;
     graph_.edit_factor(f).is_pending = true;
     pending_.stale.push_back(f);
   }
@@ -234,7 +246,7 @@ void IncrementalSmoother::collect_moved() {
   }
 }
 
-void IncrementalSmoother::iterate(IncrementalUpdate& update, bool thorough) {
+bool IncrementalSmoother::iterate(IncrementalUpdate& update, bool thorough) {
   ++update.iterations;
   update.relinearised_factors += relinearise();
   last_.clear();
@@ -254,8 +266,9 @@ void IncrementalSmoother::iterate(IncrementalUpdate& update, bool thorough) {
     const double finest = parameters_.least_move * usual_unit();
     tree_.solve({finest, parameters_.wait_below * finest, parameters_.turns});
   }
-  update.deviation = judge(kNegligible * parameters_.relinearise_above * usual_unit());
-  accept_step(update, thorough);
+  const double limit = parameters_.relinearise_above * usual_unit();
+  update.deviation = judge(kNegligible * limit, limit);
+  const bool accepted = accept_step(update, thorough);
   for (const int f : off_) {
     FactorRecord& factor = graph_.edit_factor(f);
     if (factor.is_pending) continue;
@@ -263,6 +276,7 @@ void IncrementalSmoother::iterate(IncrementalUpdate& update, bool thorough) {
     pending_.stale.push_back(f);
   }
   collect_moved();
+  return accepted;
 }
 
 IncrementalUpdate IncrementalSmoother::run(bool thorough) {
@@ -270,10 +284,11 @@ IncrementalUpdate IncrementalSmoother::run(bool thorough) {
   moved_.clear();
   moved_at_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);
   pending_.since_thorough = thorough ? 0 : pending_.since_thorough + 1;
+  bool accepted = true;
   do {
-    iterate(update, thorough);
+    accepted = iterate(update, thorough);
   } while (update.iterations < parameters_.max_iterations &&
-           update.deviation > parameters_.iterate_above);
+           (!accepted || update.deviation > parameters_.iterate_above));
   update.moved_variables = static_cast<long>(moved_.size());
   for (const int v : moved_) moved_at_[static_cast<std::size_t>(v)] = 0;
   finish(update);

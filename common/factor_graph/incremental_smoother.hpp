@@ -20,7 +20,8 @@ struct IncrementalParameters {
   double wait_below = 1.0;
   int turns = 100;
   /// A factor whose residual is further than this from what its linearisation says is linearised
-  /// again with the next update.
+  /// again with the next update. Of a relative pose in the plane; in space by the root of its rows
+  /// more.
   double relinearise_above = 0.5;
   /// An update goes on (up to max_iterations) while a factor is this far from its linearisation
   /// [sigmas].
@@ -119,11 +120,17 @@ class IncrementalSmoother {
   void commit();
   FactorId keep(FactorId id);
   long relinearise();
-  void iterate(IncrementalUpdate& update, bool thorough);
-  double judge(double unless_below);
-  double loss_change();
-  void accept_step(IncrementalUpdate& update, bool thorough);
-  void shorten_step(double part);
+  bool iterate(IncrementalUpdate& update, bool thorough);
+  double judge(double unless_below, double limit);
+  struct StepEffect {
+    double loss = 0.0;        ///< Change of the judged factors' sum of losses.
+    double linearised = 0.0;  ///< The same as the linearisations have it.
+  };
+  StepEffect effect_of_step();
+  bool is_bad_step(bool thorough, bool is_repeated);
+  bool accept_step(IncrementalUpdate& update, bool thorough);
+  void move_changed(const std::vector<Delta>& to);
+  void halve_step();
   void finish(IncrementalUpdate& update);
   void look_at_all(double relinearise_above);
   double usual_unit() const;
