@@ -34,6 +34,9 @@ void add_filter_rows(const FrontendOptions& options, const std::atomic<bool>& st
 /// Trunks and corners in simulated sweeps: precision, recall, error, covariance, time.
 void add_extraction_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
                          FrontendRows& rows);
+/// Trunks in registered clouds of real forest plots, where the data are there; for the plots too.
+void add_forest_plot_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
+                          FrontendRows& rows, nlohmann::json& traces);
 /// Accuracy and time of one drive of the whole chain.
 void add_chain_rows(const ChainRun& run, std::optional<double> ate_target_m, FrontendRows& rows);
 /// Where the chain's time goes.

@@ -107,6 +107,8 @@ void run(const FrontendOptions& options) {
   FrontendRows rows;
   nlohmann::json traces = nlohmann::json::object();
   if (wants(options, "extraction")) add_extraction_rows(options, stop, rows);
+  nlohmann::json plots = nlohmann::json::object();
+  if (wants(options, "forest-plots")) add_forest_plot_rows(options, stop, rows, plots);
   if (wants(options, "tracking")) add_tracking_rows(options, stop, rows);
   if (wants(options, "filter")) add_filter_rows(options, stop, rows);
   add_drive_rows(options, stop, rows, traces);
@@ -117,6 +119,13 @@ void run(const FrontendOptions& options) {
       {"seed", options.seed}, {"runs", options.runs}, {"drive_m", options.drive_m}};
   write_json(options.json, result_document("frontend", config, to_json(rows.rows())));
   write_json(traces_file(options.json), traces);
+  if (!plots.empty()) {
+    // The clouds are not ours: their picture is kept, they are not.
+    fs::path file = options.json;
+    file.replace_extension(".plots.json");
+    write_json(file, plots);
+    if (options.plots) plot("forest_plots.py", {options.json, file.string()});
+  }
   if (options.plots && !traces.empty()) {
     plot("frontend.py", {options.json, traces_file(options.json).string()});
   }
@@ -140,9 +149,10 @@ void add_frontend_experiment(CLI::App& eval) {
   options->data = data != nullptr ? data : "../shared/data";
   command->add_option("--data", options->data, "Folder with pole_maps; default $UNDERSTORY_DATA");
   command->add_option("--json", options->json, "Results; traces and plots go beside it");
-  command->add_option("--only", options->sections,
-                      "extraction, tracking, filter, chain, faults, or the beginning of a chain "
-                      "drive's name (forest, urban, country, poles)");
+  command->add_option(
+      "--only", options->sections,
+      "extraction, forest-plots, tracking, filter, chain, faults, or the beginning of a chain "
+      "drive's name (forest, urban, country, poles)");
   command->add_flag("!--no-plots", options->plots, "No plots");
   command->callback([options] { run_guarded("frontend", [options] { run(*options); }); });
 }

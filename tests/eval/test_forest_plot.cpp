@@ -1,0 +1,93 @@
+// Sweeps made out of clouds, on stems whose places are known; and real plots, where the data are
+// there.
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <numbers>
+
+#include "eval/forest_plot_score.hpp"
+#include "tests/catch.hpp"
+
+using namespace understory;
+using namespace understory::eval;
+
+namespace {
+
+/// Round stems of 0.15 m, 600 points per m^2 as real clouds have, on ground that rises.
+ForestPlot round_stems(const std::vector<Eigen::Vector2d>& places) {
+  ForestPlot plot;
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> part(0.0, 1.0);
+  std::normal_distribution<double> bark(0.0, 0.005);
+  for (const Eigen::Vector2d& place : places) {
+    plot.stems.push_back({place, 0.15});
+    for (int i = 0; i < 1600; ++i) {
+      const double angle = 2.0 * std::numbers::pi * part(random);
+      const double height = 0.2 + 2.8 * part(random);
+      const Eigen::Vector2d at =
+          place + (0.15 + bark(random)) * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+      plot.points.push_back({{at.x(), at.y(), 0.05 * at.x() + height}, height});
+    }
+  }
+  return plot;
+}
+
+std::filesystem::path plots_folder() {
+  const char* const root = std::getenv("UNDERSTORY_DATA");
+  return std::filesystem::path(root != nullptr ? root : "../shared/data") / "forest_3d_scans";
+}
+
+}  // namespace
+
+TEST_CASE("A sweep out of a cloud lies on its near surfaces", "[forest_plot]") {
+  const ForestPlot plot = round_stems({{4.0, 0.0}, {8.0, 0.0}, {0.0, 6.0}, {-5.0, -2.0}});
+  const PlotScanner scanner(plot, {});
+  std::mt19937_64 random(1);
+  const PlotSweep result = scanner.sweep({0.0, 0.0}, random);
+  std::vector<int> returns(plot.stems.size(), 0);
+  int behind = 0;
+  for (const SweepPoint& point : result.sweep.points) {
+    const Eigen::Vector2d at = point.position().head<2>().cast<double>();
+    for (std::size_t i = 0; i < plot.stems.size(); ++i) {
+      const Eigen::Vector2d& stem = plot.stems[i].position_m;
+      const double off = (at - stem).norm();
+      if (off > 0.25 || point.z_m < 0.5F) continue;
+      ++returns[i];
+      CHECK(std::abs(off - 0.15) < 0.09);  // noise of 2 cm along the ray
+      if (at.dot(stem.normalized()) > stem.norm() + 0.05) ++behind;
+    }
+  }
+  CHECK(behind < 10);
+  CHECK(returns[0] > 100);
+  CHECK(returns[1] == 0);  // hidden
+  CHECK(returns[2] > 100);
+  CHECK(returns[3] > 100);
+  CHECK(result.stems[0].returns > 0.9 * result.stems[0].beams);
+  CHECK(result.stems[1].beams == 0);
+}
+
+TEST_CASE("Round stems of a cloud are found in their place", "[forest_plot]") {
+  const ForestPlot plot =
+      round_stems({{0.0, 0.0}, {6.0, 1.0}, {1.0, 7.0}, {7.0, 8.0}, {3.0, 12.0}, {9.0, 13.0}});
+  const PlotScore score = score_plot(plot, {}, {});
+  CHECK(score.should > 50);
+  CHECK(score.recall() > 0.9);
+  CHECK(score.precision() > 0.97);
+  CHECK(score.difference_m < 0.03);
+}
+
+TEST_CASE("Stems of a real plot are found", "[forest_plot]") {
+  if (!std::filesystem::is_directory(plots_folder())) {
+    WARN("no " << plots_folder() << ": nothing to look at");
+    return;
+  }
+  PlotScoreOptions options;
+  options.grid_m = 3.0;
+  options.clearance_m = 0.4;
+  for (const char* name : {"TLS_Clip", "pine_plot"}) {
+    const PlotScore score = score_plot(read_forest_plot(plots_folder(), name), {}, options);
+    CHECK(score.should > 20);
+    CHECK(score.recall() > 0.5);
+    CHECK(score.precision() > 0.7);
+  }
+}
