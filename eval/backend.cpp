@@ -13,6 +13,7 @@
 #include "common/factor_graph/batch.hpp"
 #include "common/factor_graph/graph_file.hpp"
 #include "common/factor_graph/incremental_smoother.hpp"
+#include "eval/machine.hpp"
 
 namespace understory::eval {
 namespace {
@@ -24,14 +25,6 @@ double processor_s() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-double resident_mb() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.rfind("VmRSS:", 0) == 0) return std::stod(line.substr(6)) / 1024.0;
-  }
-  return 0.0;
 }
 
 GraphFile read(const std::filesystem::path& file) {

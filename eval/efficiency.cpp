@@ -3,13 +3,13 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "eval/experiments.hpp"
 #include "eval/interrupt.hpp"
+#include "eval/machine.hpp"
 #include "eval/progress.hpp"
 #include "eval/results.hpp"
 #include "eval/slam_session.hpp"
@@ -45,14 +45,6 @@ struct Timing {
   std::size_t landmarks = 0;
   double rss_mb = 0.0;  ///< Of the whole process, at the end.
 };
-
-double resident_mb() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.rfind("VmRSS:", 0) == 0) return std::stod(line.substr(6)) / 1024.0;
-  }
-  return 0.0;
-}
 
 std::vector<Scenario> scenarios(const EfficiencyOptions& options) {
   const auto& methods = options.campaign.methods;
