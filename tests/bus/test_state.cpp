@@ -1,6 +1,4 @@
 // State over restarts: snapshot and journal, cut and damaged everywhere.
-#include <unistd.h>
-
 #include <filesystem>
 #include <fstream>
 #include <random>
@@ -9,29 +7,13 @@
 #include "common/bus/state_format.hpp"
 #include "tests/bus/toy_service.hpp"
 #include "tests/catch.hpp"
+#include "tests/scratch.hpp"
 
 using namespace understory;
 using namespace understory::test;
 namespace fs = std::filesystem;
 
 namespace {
-
-/// A directory of this test's own, gone afterwards.
-class Scratch {
- public:
-  Scratch()
-      : path_(fs::temp_directory_path() / ("understory-state-" + std::to_string(::getpid()))) {
-    fs::remove_all(path_);
-    fs::create_directories(path_);
-  }
-  ~Scratch() { fs::remove_all(path_); }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 std::string read(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
@@ -67,7 +49,7 @@ struct Life {
 };
 
 std::vector<raw_pose_t> uninterrupted(int to) {
-  const Scratch scratch;
+  const Scratch scratch("state");
   Life life(scratch.path());
   life.run(0, to);
   return life.poses;
@@ -81,7 +63,7 @@ TEST_CASE("a killed service goes on as if nothing had happened, whenever it is k
       GENERATE(as<std::string>(), "", "[runtime]\nsnapshot_every_events = 7\n",
                "[runtime]\nsnapshot_every_s = 0.5\n", "[runtime]\nsnapshot_every_events = 1\n");
   for (int killed = 1; killed < 60; killed += 4) {
-    const Scratch scratch;
+    const Scratch scratch("state");
     Life(scratch.path(), toml).run(0, killed);
     Life second(scratch.path(), toml);
     CHECK(second.is_recovered);
@@ -97,7 +79,7 @@ TEST_CASE("a killed service goes on as if nothing had happened, whenever it is k
 
 TEST_CASE("a journal cut at every byte gives every whole event before the cut") {
   const auto expected = uninterrupted(9);
-  const Scratch scratch;
+  const Scratch scratch("state");
   Life(scratch.path()).run(0, 8);
   const fs::path file = scratch.path() / "toy.journal.0";
   const std::string journal = read(file);
@@ -116,7 +98,7 @@ TEST_CASE("a journal cut at every byte gives every whole event before the cut") 
 }
 
 TEST_CASE("a damaged byte anywhere in journal or snapshot is told, never believed") {
-  const Scratch scratch;
+  const Scratch scratch("state");
   Life(scratch.path(), "[runtime]\nsnapshot_every_events = 5\n").run(0, 8);
   const fs::path snapshot_file = scratch.path() / "toy.snapshot";
   const fs::path journal_file = scratch.path() / "toy.journal.1";
@@ -152,7 +134,7 @@ TEST_CASE("a damaged byte anywhere in journal or snapshot is told, never believe
 }
 
 TEST_CASE("a state that the stage cannot load is refused and reported") {
-  const Scratch scratch;
+  const Scratch scratch("state");
   StateStore(scratch.path(), "toy").open();
   StateStore store(scratch.path(), "toy");
   store.open();
@@ -163,7 +145,7 @@ TEST_CASE("a state that the stage cannot load is refused and reported") {
 }
 
 TEST_CASE("a recovery that keeps dying is not tried for ever") {
-  const Scratch scratch;
+  const Scratch scratch("state");
   Life(scratch.path(), "[runtime]\nsnapshot_every_events = 5\n").run(0, 8);
   std::vector<std::size_t> events;
   std::vector<bool> has_snapshot;

@@ -1,6 +1,4 @@
 // The input stage as a process that is killed in the middle of a drive and started again.
-#include <unistd.h>
-
 #include <filesystem>
 #include <random>
 #include <string>
@@ -11,28 +9,13 @@
 #include "services/lidar_imu_input/adapter.hpp"
 #include "tests/catch.hpp"
 #include "tests/lidar_imu_input/simulated_vehicle.hpp"
+#include "tests/scratch.hpp"
 
 using namespace understory;
 using namespace understory::test;
 namespace fs = std::filesystem;
 
 namespace {
-
-class Scratch {
- public:
-  Scratch()
-      : path_(fs::temp_directory_path() / ("understory-input-" + std::to_string(::getpid()))) {
-    fs::remove_all(path_);
-    fs::create_directories(path_);
-  }
-  ~Scratch() { fs::remove_all(path_); }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 constexpr Utime kStep_us = 10'000;
 
@@ -79,7 +62,7 @@ struct Life {
 }  // namespace
 
 TEST_CASE("killed in the middle of a drive, the input goes on where it was", "[state]") {
-  const Scratch scratch;
+  const Scratch scratch("input");
   const fs::path uncut_directory = scratch.path() / "uncut";
   const fs::path cut_directory = scratch.path() / "cut";
   fs::create_directories(uncut_directory);
