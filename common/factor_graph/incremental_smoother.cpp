@@ -11,7 +11,7 @@ namespace {
 constexpr double kFarTurn = 0.6;
 /// What the linearisations leave out is looked at from this part of the loss on; a step must keep
 /// the other part of what they promised.
-constexpr double kNoticedPart = 5e-2;
+constexpr double kNoticedPart = 0.1;
 constexpr double kNoticedRounding = 1e-3;  ///< The same of thorough updates, which start fresh.
 constexpr double kLeastGain = 0.1;
 constexpr int kMaxHalvings = 8;
