@@ -127,6 +127,10 @@ int FactorGraph::link(FactorKind kind, std::span<const VariableId> variables) {
   return id;
 }
 
+void FactorGraph::mark_curved(int factor) {
+  for (const int name : variables_of(factor)) variables_.edit(name).is_curved = true;
+}
+
 void FactorGraph::store_data(int factor, std::span<const double> measurement,
                              const Eigen::Ref<const Eigen::MatrixXd>& information) {
   FactorRecord& record = factors_.edit(factor);
@@ -151,6 +155,9 @@ FactorId FactorGraph::add(const Factor& factor) {
   const int id =
       link(factor.kind, {factor.variables.data(), static_cast<std::size_t>(factor.variable_count)});
   factors_.edit(id).loss = factor.loss;
+  if (factor.kind == FactorKind::kRangeBearing2 || factor.loss.kernel != RobustKernel::kNone) {
+    mark_curved(id);
+  }
   store_data(id, factor.measurement, information);
   linearise(id);
   return FactorId(id);
@@ -172,6 +179,7 @@ FactorId FactorGraph::add(const CondensedFactor& factor) {
   root_of(factor.information);
   const int id = link(FactorKind::kCondensed2, factor.variables);
   factors_.edit(id).loss = factor.loss;
+  if (factor.loss.kernel != RobustKernel::kNone) mark_curved(id);
   store_data(id, {factor.measurement.data(), static_cast<std::size_t>(rows)}, factor.information);
   linearise(id);
   return FactorId(id);
@@ -181,6 +189,7 @@ FactorId FactorGraph::add(std::shared_ptr<const UserFactor> factor,
                           std::span<const VariableId> variables) {
   require(factor != nullptr && factor->residual_dimension() > 0, "a user's factor without rows");
   const int id = link(FactorKind::kUser, variables);
+  mark_curved(id);
   FactorRecord& record = factors_.edit(id);
   record.rows = factor->residual_dimension();
   if (free_users_.empty()) {

@@ -30,6 +30,9 @@ struct VariableRecord {
   /// how far the one of them that had turned furthest had turned [rad].
   Delta judged{};
   double turned = 0.0;
+  /// A factor of its bends otherwise than rigid motions do (a bearing, a robust loss, a user's):
+  /// any move can matter.
+  bool is_curved = false;
 };
 
 struct IncidenceRecord {
@@ -120,7 +123,7 @@ class FactorGraph {
   /// |J delta - b|^2: the loss as the linearisation has it, up to a constant.
   double linearised_chi2(int factor) const;
   /// Bound on what the deviation of a factor of this variable grew by, from its moves since the
-  /// factors were last looked at [sigmas].
+  /// factors were last looked at [sigmas]. Infinite where there is none.
   double unjudged_deviation(int variable) const;
   /// Moves the variable in its chart.
   void move(int variable, const double* delta);
@@ -143,6 +146,7 @@ class FactorGraph {
 
  private:
   int link(FactorKind kind, std::span<const VariableId> variables);
+  void mark_curved(int factor);
   void check_types(FactorKind kind, std::span<const VariableId> variables) const;
   void store_data(int factor, std::span<const double> measurement,
                   const Eigen::Ref<const Eigen::MatrixXd>& information);

@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "common/factor_graph/factor_graph.hpp"
 
@@ -266,6 +267,7 @@ Deviation FactorGraph::deviation(int id) const {
 
 double FactorGraph::unjudged_deviation(int id) const {
   const VariableRecord& variable = variables_[id];
+  if (variable.is_curved) return std::numeric_limits<double>::infinity();
   Delta d;
   for (std::size_t i = 0; i < d.size(); ++i) d[i] = variable.delta[i] - variable.judged[i];
   double moved = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
