@@ -13,7 +13,7 @@
 #include "common/factor_graph/batch.hpp"
 #include "common/factor_graph/graph_file.hpp"
 #include "common/factor_graph/incremental_smoother.hpp"
-#include "eval/machine.hpp"
+#include "eval/memory.hpp"
 
 namespace understory::eval {
 namespace {
@@ -143,6 +143,7 @@ class Feeder {
 void solve_whole(const FactorGraph& from, BackendRun& run) {
   FactorGraph graph;
   std::vector<VariableId> names;
+  names.reserve(static_cast<std::size_t>(from.variable_capacity()));
   for (int v = 0; v < from.variable_capacity(); ++v) {
     names.push_back(graph.add(from.type(VariableId(v)), from.value(VariableId(v))));
   }

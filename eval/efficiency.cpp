@@ -3,13 +3,14 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "eval/experiments.hpp"
 #include "eval/interrupt.hpp"
-#include "eval/machine.hpp"
+#include "eval/memory.hpp"
 #include "eval/progress.hpp"
 #include "eval/results.hpp"
 #include "eval/slam_session.hpp"
@@ -103,7 +104,7 @@ Timing time_drive(const Scenario& scenario, const std::string& method, std::uint
 double quantile(std::vector<double> values, double q) {
   if (values.empty()) return 0.0;
   std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1) + 0.5)];
+  return values[static_cast<std::size_t>(std::lround(q * static_cast<double>(values.size() - 1)))];
 }
 
 /// One row per component, and one for the whole; `first` and `last` are medians of a tenth of the

@@ -19,14 +19,6 @@ Machine this_machine() {
   return machine;
 }
 
-double resident_mb() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.rfind("VmRSS:", 0) == 0) return std::stod(line.substr(6)) / 1024.0;
-  }
-  return 0.0;
-}
-
 std::string version() { return UNDERSTORY_GIT_DESCRIBE; }
 
 }  // namespace understory::eval

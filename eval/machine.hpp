@@ -11,9 +11,6 @@ struct Machine {
 };
 Machine this_machine();
 
-/// Memory of this process that is in use now [MB].
-double resident_mb();
-
 /// `git describe` of the source at the time of the build; the release's number outside a checkout.
 std::string version();
 
