@@ -85,6 +85,7 @@ class Reader {
     if (word.empty() || word.front() == '#') return std::nullopt;
     const bool known = read_vertex(word, line) || read_edge(word, line);
     if (known && !line.is_whole()) return "a number is missing or is none";
+    if (ties_to_itself()) return "an edge from a vertex to itself";
     return std::move(error_);
   }
 
@@ -106,6 +107,16 @@ class Reader {
 
  private:
   using Key = std::pair<bool, std::int64_t>;
+
+  /// Of the last edge.
+  bool ties_to_itself() const {
+    if (result_.factors.empty() || result_.factors.back().variable_count < 2) return false;
+    const auto key_of = [&](int i) {
+      const VariableId id = result_.factors.back().variables[static_cast<std::size_t>(i)];
+      return keys_[static_cast<std::size_t>(index(id))];
+    };
+    return key_of(0) == key_of(1);
+  }
 
   bool read_vertex(std::string_view word, Line& line) {
     using enum VariableType;

@@ -53,7 +53,8 @@ TEST_CASE("A malformed line is named", "[graph_file]") {
   for (const std::string line :
        {"EDGE_SE2 0 1 1 0 0 11 12 13 22 23", "EDGE_SE2 0 1 1 0 x 1 0 0 1 0 1",
         "EDGE_SE2 0 1 1 0 nan 1 0 0 1 0 1", "VERTEX_SE2 0 0 0 0",
-        "EDGE_SE2 0.5 1 1 0 0 1 0 0 1 0 1", "EDGE_SE2_XY 0 1 1 1 1 0 1"}) {
+        "EDGE_SE2 0.5 1 1 0 0 1 0 0 1 0 1", "EDGE_SE2_XY 0 1 1 1 1 0 1",
+        "EDGE_SE2 1 1 1 0 0 1 0 0 1 0 1"}) {
     const std::string text = "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\n" + line + "\n";
     const auto result = read_graph(text, GraphFormat::kG2o);
     REQUIRE(std::holds_alternative<GraphFileError>(result));
