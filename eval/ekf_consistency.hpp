@@ -12,10 +12,11 @@
 
 namespace understory::eval {
 
-/// For simulated detections: all their noise is new in every scan.
+/// For simulated detections: all their noise is new in every scan, and distances are right.
 inline EkfParameters white_noise_filter() {
   EkfParameters parameters;
   parameters.sighting.lasting_share = 0.0;
+  parameters.sighting.scale_sigma = 0.0;
   return parameters;
 }
 

@@ -10,6 +10,9 @@ void describe(EkfPriorParameters& p, ParameterTable& table) {
             "Of the gyro's bias at the start.");
   table.add("prior.accelerometer_bias_sigma", p.accelerometer_bias_sigma, {1e-6, 10.0}, "m/s^2",
             "Of the accelerometer's bias at the start, the level's error included.");
+  table.add("prior.wait_s", p.wait_s, {0.0, 60.0}, "s",
+            "With an IMU the map begins where the vehicle is found to stand, or to move by its "
+            "wheels, but after so long at the latest.");
 }
 
 void describe(EkfMotionParameters& p, ParameterTable& table) {
@@ -50,6 +53,8 @@ void describe(EkfSightingParameters& p, ParameterTable& table) {
             "Of a sighting's variance, the same from scan to scan; 0 = all noise is new.");
   table.add("sighting.lasting_m", p.lasting_m, {0.01, 1000.0}, "m",
             "Such errors fade over so much way.");
+  table.add("sighting.scale_sigma", p.scale_sigma, {0.0, 0.1}, "",
+            "Of distances, the same for all landmarks and for ever.");
 }
 
 void describe(EkfGateParameters& p, ParameterTable& table) {

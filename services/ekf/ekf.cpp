@@ -19,6 +19,8 @@ constexpr double kStartVariance = 1e-12;
 constexpr double kStandingProbability = 1.0 - 1e-6;
 /// Standing that is doubted is believed after all when it is told for so long.
 constexpr double kInsistence_s = 10.0;
+/// Squared way of a piece, of its variance: so far nothing goes that stands.
+constexpr double kMoves = 50.0;
 
 ekf::ErrorForm error_form(const std::string& name) {
   if (name == "right_invariant") return ekf::ErrorForm::kRightInvariant;
@@ -82,8 +84,19 @@ void Ekf::set_prior() {
   covariance.diagonal().segment<3>(ekf::kBias) << gyro, force, force;
 }
 
+/// Until it is found to stand, which takes half a second, a vehicle may move at any speed, and turn
+/// as the gyro's bias likes. A map that began before that would be off by as much for ever.
+bool Ekf::may_begin(const Odometry& piece) {
+  if (!heard_ || piece.utime < *heard_) heard_ = piece.from_utime;
+  if (!piece.inertial || piece.is_standing) return true;
+  if (piece.utime - *heard_ > microseconds(parameters_.prior.wait_s)) return true;
+  const double spread = piece.covariance.topLeftCorner<2, 2>().trace();
+  return piece.has_wheels && piece.from_T_to.translation().squaredNorm() > kMoves * spread;
+}
+
 void Ekf::start(Utime utime) {
   started_ = true;
+  heard_.reset();
   utime_ = utime;
   set_prior();
   state_.set_pose_covariance(kStartVariance * Eigen::Matrix3d::Identity());
@@ -122,6 +135,7 @@ EkfOutput Ekf::add(const Odometry& piece) {
     counters_.last_reason = "odometry is not finite";
     return {};
   }
+  if (!started_ && !may_begin(piece)) return {};
   if (!started_) start(piece.from_utime);
   const Utime newest = waiting_.empty() ? utime_ : waiting_.back().utime;
   if (piece.utime < newest - microseconds(parameters_.restart.clock_jump_s)) {
@@ -267,6 +281,8 @@ void Ekf::bridge(Utime utime) {
   utime_ = utime;
 }
 
+/// A scale that sightings have in common makes the whole map, with the vehicle in it, larger or
+/// smaller about its origin. No sighting tells that, so the state does without it.
 EkfPose Ekf::pose() {
   EkfPose out;
   out.utime = utime_;
@@ -282,6 +298,9 @@ EkfPose Ekf::pose() {
   out.landmarks_refused = refused_;
   out.reset_counter = reset_counter_;
   last_sound_ = out;
+  const Eigen::Vector2d off =
+      out.ekf_map_T_vehicle.inverse().translation() * parameters_.sighting.scale_sigma;
+  out.covariance.topLeftCorner<2, 2>() += off * off.transpose();
   return out;
 }
 
@@ -295,9 +314,11 @@ EkfOutput Ekf::outputs() {
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     const ekf::MapLandmark& landmark = landmarks[i];
     if (landmark.is_ground_mark()) continue;
-    map.landmarks.push_back({landmark.id, landmark.position + state_.anchor_m,
-                             state_.landmark_covariance(i), landmark.radius_m, landmark.kind,
-                             landmark.times_seen});
+    const Eigen::Vector2d position = landmark.position + state_.anchor_m;
+    const Eigen::Vector2d off = position * parameters_.sighting.scale_sigma;
+    map.landmarks.push_back({landmark.id, position,
+                             state_.landmark_covariance(i) + off * off.transpose(),
+                             landmark.radius_m, landmark.kind, landmark.times_seen});
   }
   std::sort(map.landmarks.begin(), map.landmarks.end(),
             [](const EkfLandmark& a, const EkfLandmark& b) { return a.track_id < b.track_id; });

@@ -51,7 +51,8 @@ class Ekf {
   /// Motion waits for the scan at its end; without one it is used after `max_scan_delay_s`, and a
   /// pose is given then.
   EkfOutput add(const Odometry& piece);
-  /// Pose, map and velocity correction at the scan's stamp; nothing from a late or repeated scan.
+  /// Pose, map and velocity correction at the scan's stamp; nothing from a late or repeated scan,
+  /// nor before the map begins (EkfPriorParameters::wait_s).
   EkfOutput add(const TrackedScan& scan);
 
   const EkfCounters& counters() const { return counters_; }
@@ -76,6 +77,7 @@ class Ekf {
   };
 
   // ekf.cpp: time and motion.
+  bool may_begin(const Odometry& piece);
   void start(Utime utime);
   void restart(Utime utime, const std::string& reason);
   void set_prior();
@@ -93,6 +95,7 @@ class Ekf {
   // ekf_scan.cpp: landmarks.
   void read(const TrackedScan& scan);
   ekf::Sighting sighting(const Detection& seen) const;
+  void steady_heights();
   void check_standing();
   void update_known();
   void update_checked(std::vector<ekf::Pairing>& pairings,
@@ -123,6 +126,7 @@ class Ekf {
   std::vector<double> set_gates_;  ///< By number of landmarks.
 
   bool started_ = false;
+  std::optional<Utime> heard_;  ///< Start of the first odometry, while it is not started.
   Utime utime_ = 0;
   std::optional<Utime> last_scan_;
   std::deque<Odometry> waiting_;

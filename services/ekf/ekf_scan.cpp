@@ -12,9 +12,6 @@
 namespace understory {
 namespace {
 
-/// Sightings that one search for joint compatibility takes.
-constexpr std::size_t kMaxSearched = 24;
-constexpr int kMaxRounds = 4;
 /// That tell a vehicle's motion.
 constexpr std::uint32_t kFewLandmarks = 3;
 /// Motion that nothing told, where creeping is found [s].
@@ -23,6 +20,8 @@ constexpr double kUnnoticed_s = 0.1;
 constexpr double kLevelled = 0.5;
 /// Of a sighting's covariance, when the level's part is out.
 constexpr double kLeastOwnShare = 0.05;
+/// Of what a scan says of the vehicle's rise: it has noise too, and a slope is gentle.
+constexpr double kRiseGain = 0.2;
 
 bool is_usable(const Detection& detection) {
   if (!detection.position_m.allFinite() || !detection.covariance_m2.allFinite()) return false;
@@ -35,6 +34,7 @@ bool is_usable(const Detection& detection) {
 EkfOutput Ekf::add(const TrackedScan& scan) {
   ++counters_.scans;
   const auto jump = static_cast<Utime>(1e6 * parameters_.restart.clock_jump_s);
+  if (heard_) return {};  // Its landmarks will be seen again.
   if (!started_) start(scan.utime);
   if (last_scan_ && scan.utime < *last_scan_ - jump) {
     waiting_.clear();
@@ -83,6 +83,35 @@ void Ekf::read(const TrackedScan& scan) {
   settled_.assign(sightings_.size(), false);
   tracks_.clear();
   for (const std::uint32_t i : source_) tracks_.push_back(scan.landmarks[i].track_id);
+  steady_heights();
+}
+
+/// The level displaces a sighting by its height. Where a trunk leans, the height's own noise
+/// displaces it too, and would pass for a level that is off by the lean. So a landmark keeps the
+/// height that it was first seen at, but for what the vehicle rises and sinks among them all.
+void Ekf::steady_heights() {
+  std::vector<ekf::Pairing> levelled;
+  std::vector<double> changes;
+  for (std::uint32_t k = 0; k < sightings_.size(); ++k) {
+    const auto landmark = landmark_of(tracks_[k]);
+    if (!landmark || sightings_[k].height_m == 0.0) continue;
+    if (state_.landmarks()[*landmark].height_m == 0.0) continue;
+    levelled.push_back({k, *landmark});
+    changes.push_back(sightings_[k].height_m - state_.landmarks()[*landmark].height_m);
+  }
+  double rise = 0.0;
+  if (!changes.empty() && !ekf::has_ground_marks(state_)) {
+    const auto middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
+    std::nth_element(changes.begin(), middle, changes.end());
+    rise = kRiseGain * *middle;
+  }
+  for (std::size_t i = 0; i < state_.landmarks().size(); ++i) {
+    ekf::MapLandmark& landmark = state_.landmark(i);
+    if (landmark.height_m != 0.0) landmark.height_m += rise;
+  }
+  for (const ekf::Pairing& pairing : levelled) {
+    sightings_[pairing.sighting].height_m = state_.landmarks()[pairing.landmark].height_m;
+  }
 }
 
 /// A levelled detection's covariance has the level's error in it, which is not its own: the state
@@ -224,93 +253,6 @@ void Ekf::see(const TrackedScan& scan, const ekf::Pairing& pairing) {
   }
 }
 
-/// Tracks that the filter does not know may be landmarks whose track was lost. Each round makes the
-/// pose surer, so that more fall into place.
-void Ekf::rejoin_lost(const TrackedScan& scan) {
-  for (int round = 0; round < kMaxRounds; ++round) {
-    if (!rejoin_round(scan)) break;
-  }
-}
-
-bool Ekf::rejoin_round(const TrackedScan& scan) {
-  const RejoinSearch search = rejoin_candidates(scan);
-  if (search.candidates.empty()) return false;
-  // What a straight line makes of an uncertain turn is noise too.
-  std::vector<ekf::Sighting> loose = sightings_;
-  for (ekf::Sighting& seen : loose) {
-    const double bend = 0.5 * seen.position_m.norm() * search.turn_variance;
-    seen.covariance_m2 += bend * bend * Eigen::Matrix2d::Identity();
-  }
-  std::vector<ekf::Pairing> found = ekf::joint_compatibility(
-      state_, loose, search.candidates,
-      {parameters_.gate.rejoin_probability, parameters_.gate.rejoin_max_nodes});
-  // Where the gates are wide, a few agree by chance.
-  const bool wide = search.widest_gate_m > 2.0 * parameters_.map.min_separation_m;
-  const std::size_t least = std::max<std::size_t>(3, (search.candidates.size() + 1) / 2);
-  if (wide && found.size() < least) return false;
-  update_checked(found, loose);
-  for (const ekf::Pairing& pairing : found) {
-    const TrackId track = tracks_[pairing.sighting];
-    const auto at = std::lower_bound(aliases_.begin(), aliases_.end(), track,
-                                     [](const Alias& a, TrackId key) { return a.track < key; });
-    aliases_.insert(at, {track, state_.landmarks()[pairing.landmark].id});
-    see(scan, pairing);
-    ++counters_.rejoined;
-  }
-  return !found.empty();
-}
-
-/// Landmarks that were not seen for a while though the scan could show them, and the unknown tracks
-/// that may be them.
-Ekf::RejoinSearch Ekf::rejoin_candidates(const TrackedScan& scan) const {
-  struct Lost {
-    std::uint32_t landmark;
-    double gate_m;
-  };
-  std::vector<Lost> lost;
-  RejoinSearch search;
-  const auto& landmarks = state_.landmarks();
-  const auto pause = static_cast<std::uint64_t>(parameters_.gate.rejoin_after_scans);
-  const Eigen::Matrix2d back = ekf::rotation_of(state_.heading).transpose();
-  for (std::uint32_t i = 0; i < landmarks.size(); ++i) {
-    if (landmarks[i].is_ground_mark() || landmarks[i].last_scan + pause >= scan_count_) continue;
-    const Eigen::Matrix2d spread = ekf::innovation_covariance(state_, i, i);
-    const double gate = std::sqrt(landmark_gate_ * spread.trace());
-    FieldOfView view = scan.field_of_view;
-    view.max_range_m += gate;
-    const bool in_view = view.contains(back * (landmarks[i].position - state_.position));
-    if (!in_view || gate > parameters_.gate.rejoin_max_gate_m) continue;
-    lost.push_back({i, gate});
-    const Eigen::Vector2d across = turned_left(landmarks[i].position - state_.position);
-    const double range2 = std::max(1.0, across.squaredNorm());
-    search.turn_variance =
-        std::max(search.turn_variance, across.dot(spread * across) / (range2 * range2));
-  }
-  for (std::uint32_t k = 0; k < sightings_.size(); ++k) {
-    if (settled_[k]) continue;
-    const LandmarkKind kind = scan.landmarks[source_[k]].observed.kind;
-    std::vector<std::pair<double, std::uint32_t>> near;
-    for (const Lost& one : lost) {
-      if (landmarks[one.landmark].kind != kind) continue;
-      const double distance = ekf::squared_distance(state_, one.landmark, sightings_[k]);
-      if (distance > landmark_gate_) continue;
-      near.emplace_back(distance, one.landmark);
-      search.widest_gate_m = std::max(search.widest_gate_m, one.gate_m);
-    }
-    if (near.empty()) continue;
-    std::sort(near.begin(), near.end());
-    ekf::Candidates& added = search.candidates.emplace_back();
-    added.sighting = k;
-    for (const auto& [distance, i] : near) added.landmarks.push_back(i);
-  }
-  std::stable_sort(search.candidates.begin(), search.candidates.end(),
-                   [](const ekf::Candidates& a, const ekf::Candidates& b) {
-                     return a.landmarks.size() < b.landmarks.size();
-                   });
-  if (search.candidates.size() > kMaxSearched) search.candidates.resize(kMaxSearched);
-  return search;
-}
-
 bool Ekf::near_old(const Eigen::Vector2d& position) const {
   const double limit = parameters_.map.min_separation_m * parameters_.map.min_separation_m;
   const auto& landmarks = state_.landmarks();
@@ -341,6 +283,7 @@ void Ekf::add_new(const TrackedScan& scan) {
     landmark.seen_at_m = way_m_;
     landmark.seen_variance_m2 = 0.5 * sightings_[k].covariance_m2.trace();
     landmark.last_scan = scan_count_;
+    landmark.height_m = sightings_[k].height_m;
     state_.add_landmark(landmark, sightings_[k].position_m, sightings_[k].covariance_m2,
                         sightings_[k].height_m);
     const auto at = std::lower_bound(aliases_.begin(), aliases_.end(), landmark.id,

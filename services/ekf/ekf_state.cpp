@@ -8,7 +8,7 @@
 namespace understory {
 namespace {
 
-constexpr int kStateVersion = 2;
+constexpr int kStateVersion = 3;
 
 Json vector_json(const Eigen::Vector2d& v) { return matrix_to_json<2, 1>(v); }
 Eigen::Vector2d vector_from(const Json& json) { return matrix_from_json<2, 1>(json); }
@@ -25,7 +25,8 @@ Json landmark_json(const ekf::MapLandmark& l) {
           l.last_scan,
           l.views,
           l.seen_at_m,
-          l.seen_variance_m2};
+          l.seen_variance_m2,
+          l.height_m};
 }
 
 ekf::MapLandmark landmark_from(const Json& json) {
@@ -42,6 +43,7 @@ ekf::MapLandmark landmark_from(const Json& json) {
   l.views = json.at(9).get<double>();
   l.seen_at_m = json.at(10).get<double>();
   l.seen_variance_m2 = json.at(11).get<double>();
+  l.height_m = json.at(12).get<double>();
   return l;
 }
 
@@ -123,6 +125,7 @@ std::string Ekf::save() const {
                    {"form", parameters_.error_form},
                    {"filter", filter_json(state_)},
                    {"started", started_},
+                   {"heard", optional_to_json(heard_)},
                    {"utime", utime_},
                    {"last_scan", optional_to_json(last_scan_)},
                    {"waiting", waiting},
@@ -149,6 +152,7 @@ void Ekf::load(const std::string& state) {
   }
   load_filter(json.at("filter"), state_);
   started_ = json.at("started").get<bool>();
+  heard_ = optional_from_json<Utime>(json.at("heard"));
   utime_ = json.at("utime").get<Utime>();
   last_scan_ = optional_from_json<Utime>(json.at("last_scan"));
   waiting_.clear();

@@ -48,6 +48,7 @@ struct MapLandmark {
   double views = 0.0;             ///< Sightings of it from about the same place, the last included.
   double seen_at_m = 0.0;         ///< Way at the last of them.
   double seen_variance_m2 = 0.0;  ///< Of the last of them, per axis.
+  double height_m = 0.0;          ///< Above the vehicle's origin; 0 = no level took part.
 
   bool is_ground_mark() const { return id == 0; }
 };

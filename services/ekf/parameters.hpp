@@ -10,6 +10,9 @@ struct EkfPriorParameters {
   double velocity_sigma_mps = 5.0;         ///< Per axis, where the vehicle is not known to stand.
   double gyro_bias_sigma = 0.005;          ///< [rad/s]
   double accelerometer_bias_sigma = 0.15;  ///< [m/s^2] The level's error included.
+  /// With an IMU the map begins where the vehicle is found to stand, or to move by its wheels, but
+  /// after so long at the latest.
+  double wait_s = 1.0;
 };
 
 struct EkfMotionParameters {
@@ -38,8 +41,11 @@ struct EkfMapParameters {
 /// What errors of sightings have in common from scan to scan: how a trunk is no circle, where the
 /// beams meet it. It cannot be averaged out from one place.
 struct EkfSightingParameters {
-  double lasting_share = 0.3;  ///< Of a sighting's variance; 0 = all noise is new in every scan.
-  double lasting_m = 4.0;      ///< It fades over so much way.
+  double lasting_share = 0.05;  ///< Of a sighting's variance; 0 = all noise is new in every scan.
+  double lasting_m = 20.0;      ///< It fades over so much way.
+  /// Of distances, the same for all landmarks and for ever: a laser's scale, trunks that look the
+  /// nearer the farther they are. All that is built on sightings is too large or small by it.
+  double scale_sigma = 1e-4;
 };
 
 struct EkfGateParameters {

@@ -28,10 +28,11 @@ inline sim::InertialDriveParameters short_drive() {
   return drive;
 }
 
-/// A filter for detections whose noise is all new in every scan.
+/// A filter for detections whose noise is all new in every scan, and whose distances are right.
 inline EkfParameters white_noise() {
   EkfParameters parameters;
   parameters.sighting.lasting_share = 0.0;
+  parameters.sighting.scale_sigma = 0.0;
   return parameters;
 }
 

@@ -123,3 +123,90 @@ TEST_CASE("What was seen from one place is less sure once that is left", "[ekf][
   }
   CHECK(long_seen > 3);
 }
+
+namespace {
+
+/// Twenty seconds of standing before trunks that lean, whose heights are told with much noise: as
+/// it is told, the place on a trunk moves. The level is right, but nobody knows. Squared
+/// Mahalanobis distance of what the filter makes of it.
+double level_nees_before_leaning_trunks(std::uint64_t seed) {
+  constexpr int kTrunks = 12;
+  constexpr double kLevel = 5e-3;
+  constexpr double kLean = 0.05;
+  constexpr double kHeightNoise = 0.15;
+  constexpr double kNoise = 0.01;
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<Eigen::Vector3d> trunks;
+  std::vector<Eigen::Vector2d> leans;
+  for (int i = 0; i < kTrunks; ++i) {
+    const double bearing = 2.0 * M_PI * i / kTrunks;
+    trunks.emplace_back(12.0 * std::cos(bearing), 12.0 * std::sin(bearing), kHeight_m);
+    leans.emplace_back(kLean * normal(random), kLean * normal(random));
+  }
+  Ekf filter(white_noise());
+  for (int k = 0; k < 200; ++k) {
+    Odometry piece;
+    piece.from_utime = Utime{100000} * k;
+    piece.utime = piece.from_utime + 100000;
+    piece.covariance = 1e-6 * Eigen::Matrix3d::Identity();
+    piece.is_standing = true;
+    Preintegration& inertial = piece.inertial.emplace();
+    inertial.seconds = 0.1;
+    inertial.covariance = 1e-8 * Eigen::Matrix<double, 5, 5>::Identity();
+    const double memory = 0.9996;
+    inertial.level.covariance = kLevel * kLevel * Eigen::Matrix2d::Identity();
+    inertial.level.memory = memory * Eigen::Matrix2d::Identity();
+    inertial.level.added = (1.0 - memory * memory) * inertial.level.covariance;
+    filter.add(piece);
+    TrackedScan scan;
+    scan.utime = piece.utime;
+    scan.field_of_view.max_range_m = 30.0;
+    for (std::uint32_t i = 0; i < kTrunks; ++i) {
+      const double up = kHeightNoise * normal(random);
+      Detection seen;
+      seen.position_m = trunks[i] + Eigen::Vector3d(0.0, 0.0, up);
+      seen.position_m.head<2>() +=
+          up * leans[i] + kNoise * Eigen::Vector2d(normal(random), normal(random));
+      const double own = kNoise * kNoise + std::pow(kLean * kHeightNoise, 2);
+      seen.covariance_m2.setIdentity();
+      seen.covariance_m2.topLeftCorner<2, 2>() *= own + std::pow(kHeight_m * kLevel, 2);
+      scan.landmarks.push_back({i + 1, i, seen});
+    }
+    filter.add(scan);
+  }
+  const Eigen::Matrix2d spread = filter.state().covariance_block<2, 2>(ekf::kLevel, ekf::kLevel);
+  const Eigen::Vector2d& level = filter.state().level;
+  return level.dot(spread.llt().solve(level));
+}
+
+}  // namespace
+
+TEST_CASE("Leaning trunks of uncertain height do not pass for a wrong level", "[ekf][level]") {
+  double mean = 0.0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    mean += level_nees_before_leaning_trunks(seed) / 20.0;
+  }
+  CHECK(mean < 3.5);
+}
+
+TEST_CASE("A scale that all distances have in common makes the pose less sure far out", "[ekf]") {
+  const auto drive = [](double scale) {
+    EkfParameters parameters = white_noise();
+    parameters.sighting.scale_sigma = scale;
+    Driven driven(20.0, short_drive(), parameters);
+    return driven.go();
+  };
+  const EkfOutput without = drive(0.0);
+  const EkfOutput with = drive(0.01);
+  const SE2& pose = with.pose->ekf_map_T_vehicle;
+  REQUIRE(pose.translation().norm() > 20.0);
+  const Eigen::Vector2d off = 0.01 * (pose.rotation().transpose() * pose.translation());
+  Eigen::Matrix3d expected = without.pose->covariance;
+  expected.topLeftCorner<2, 2>() += off * off.transpose();
+  CHECK((with.pose->covariance - expected).norm() < 1e-12);
+  const EkfLandmark& landmark = with.map->landmarks.front();
+  const Eigen::Matrix2d more =
+      landmark.covariance_m2 - without.map->landmarks.front().covariance_m2;
+  CHECK((more - 1e-4 * landmark.position_m * landmark.position_m.transpose()).norm() < 1e-12);
+}

@@ -1,0 +1,97 @@
+// Where the map begins.
+#include <cmath>
+
+#include "tests/catch.hpp"
+#include "tests/ekf/ekf_drive.hpp"
+
+using namespace understory;
+using namespace understory::test;
+
+namespace {
+
+/// A tenth of a second by IMU, without motion.
+Odometry piece_at(int k, bool stands) {
+  Odometry piece;
+  piece.from_utime = Utime{100000} * k;
+  piece.utime = piece.from_utime + 100000;
+  piece.covariance = 1e-4 * Eigen::Matrix3d::Identity();
+  piece.is_standing = stands;
+  Preintegration& inertial = piece.inertial.emplace();
+  inertial.seconds = 0.1;
+  inertial.covariance = 1e-8 * Eigen::Matrix<double, 5, 5>::Identity();
+  inertial.bias_jacobian(0, 0) = -0.1;
+  for (int axis = 1; axis <= 2; ++axis) {
+    inertial.bias_jacobian(axis, axis) = -0.1;
+    inertial.bias_jacobian(axis + 2, axis) = -0.005;
+  }
+  return piece;
+}
+
+TrackedScan scan_after(const Odometry& piece) {
+  TrackedScan scan;
+  scan.utime = piece.utime;
+  scan.field_of_view.max_range_m = 30.0;
+  Detection seen;
+  seen.position_m << 8.0, 3.0, 1.0;
+  seen.covariance_m2 = 1e-4 * Eigen::Matrix3d::Identity();
+  scan.landmarks.push_back({1, 0, seen});
+  return scan;
+}
+
+/// Pieces until standing is found after half a second; the last pose.
+EkfPose found_standing(const EkfParameters& parameters) {
+  Ekf filter(parameters);
+  EkfOutput output;
+  for (int k = 0; k < 10; ++k) {
+    const Odometry piece = piece_at(k, k >= 5);
+    filter.add(piece);
+    output = filter.add(scan_after(piece));
+    if (parameters.prior.wait_s > 0.0) REQUIRE(output.pose.has_value() == (k >= 5));
+  }
+  return *output.pose;
+}
+
+}  // namespace
+
+TEST_CASE("The map begins where the vehicle is found to stand", "[ekf][begin]") {
+  const EkfPose waited = found_standing(EkfParameters{});
+  EkfParameters hasty;
+  hasty.prior.wait_s = 0.0;
+  const EkfPose at_once = found_standing(hasty);
+  for (int axis = 0; axis < 3; ++axis) {
+    CAPTURE(axis, waited.covariance(axis, axis), at_once.covariance(axis, axis));
+    CHECK(waited.covariance(axis, axis) < 1e-6);
+    CHECK(at_once.covariance(axis, axis) > 4.0 * waited.covariance(axis, axis));
+  }
+}
+
+TEST_CASE("What moves by its wheels begins at once, what stands by them waits", "[ekf][begin]") {
+  for (const bool moves : {true, false}) {
+    Ekf filter(EkfParameters{});
+    Odometry piece = piece_at(0, false);
+    piece.has_wheels = true;
+    piece.from_T_to = SE2(moves ? 0.5 : 0.0, 0.0, 0.0);
+    filter.add(piece);
+    CHECK(filter.add(scan_after(piece)).pose.has_value() == moves);
+  }
+}
+
+TEST_CASE("What moves without wheels begins after a while, over a restart too", "[ekf][begin]") {
+  const EkfParameters parameters;
+  Ekf filter(parameters);
+  int begun = 0;
+  for (int k = 1; k <= 20 && begun == 0; ++k) {
+    const Odometry piece = piece_at(k - 1, false);
+    filter.add(piece);
+    if (filter.add(scan_after(piece)).pose) begun = k;
+    Ekf other(parameters);
+    other.load(filter.save());
+    filter = other;
+  }
+  CHECK(begun == 1 + static_cast<int>(std::lround(10.0 * parameters.prior.wait_s)));
+}
+
+TEST_CASE("Scans alone begin at once", "[ekf][begin]") {
+  Ekf filter(EkfParameters{});
+  CHECK(filter.add(scan_after(piece_at(0, false))).pose.has_value());
+}
