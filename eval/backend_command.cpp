@@ -10,6 +10,7 @@
 #include "eval/backend.hpp"
 #include "eval/experiments.hpp"
 #include "eval/interrupt.hpp"
+#include "eval/quantile.hpp"
 #include "eval/results.hpp"
 
 namespace understory::eval {
@@ -37,12 +38,6 @@ struct BackendOptions {
   std::string json;
   bool plots = true;
 };
-
-double quantile(std::vector<double> values, double q) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1) + 0.5)];
-}
 
 nlohmann::json row_of(const BackendRun& run) {
   double total_ms = run.settle_ms;

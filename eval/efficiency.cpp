@@ -12,6 +12,7 @@
 #include "eval/interrupt.hpp"
 #include "eval/memory.hpp"
 #include "eval/progress.hpp"
+#include "eval/quantile.hpp"
 #include "eval/results.hpp"
 #include "eval/slam_session.hpp"
 #include "eval/yardstick.hpp"
@@ -99,12 +100,6 @@ Timing time_drive(const Scenario& scenario, const std::string& method, std::uint
   timing.landmarks = session.mapper().landmarks().size();
   timing.rss_mb = resident_mb();
   return timing;
-}
-
-double quantile(std::vector<double> values, double q) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(std::lround(q * static_cast<double>(values.size() - 1)))];
 }
 
 /// One row per component, and one for the whole; `first` and `last` are medians of a tenth of the

@@ -17,6 +17,7 @@
 #include "eval/interrupt.hpp"
 #include "eval/large_map_methods.hpp"
 #include "eval/parallel.hpp"
+#include "eval/quantile.hpp"
 #include "eval/results.hpp"
 #include "eval/slam_session.hpp"
 #include "eval/yardstick.hpp"
@@ -145,12 +146,6 @@ struct Score {
   std::map<std::string, int> reasons;
   double bytes_per_landmark = 0.0;
 };
-
-double quantile(std::vector<double> values, double q) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(std::lround(q * static_cast<double>(values.size() - 1)))];
-}
 
 /// Of the mean of all members' positions. The base alone is one scan's worth of information (at 20
 /// cm noise 2.6 cm per axis), whatever the method; the keyframe as a whole is eight scans' worth.

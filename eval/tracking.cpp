@@ -5,6 +5,7 @@
 #include <map>
 #include <vector>
 
+#include "eval/quantile.hpp"
 #include "services/associator/associator.hpp"
 
 namespace understory::eval {
@@ -40,12 +41,6 @@ double thread_time_s() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-double percentile(std::vector<double>& values, double share) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
 void count_purity(const std::map<TrackId, std::map<std::int64_t, std::uint64_t>>& seen,
@@ -100,8 +95,8 @@ TrackingResult run_tracking(const TrackingOptions& options, const sim::TrunkFiel
   result.published_share = static_cast<double>(result.published) /
                            static_cast<double>(std::max<std::uint64_t>(1, possible));
   result.scans_lost = associator.counters().scans_lost;
-  result.scan_p50_s = percentile(times, 0.5);
-  result.scan_p99_s = percentile(times, 0.99);
+  result.scan_p50_s = quantile(times, 0.5);
+  result.scan_p99_s = quantile(times, 0.99);
   return result;
 }
 

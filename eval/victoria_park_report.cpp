@@ -7,6 +7,7 @@
 
 #include "common/io/number_reader.hpp"
 #include "common/io/recording_folder.hpp"
+#include "eval/quantile.hpp"
 
 namespace understory::eval {
 namespace {

@@ -11,6 +11,7 @@
 #include "common/geometry/alignment.hpp"
 #include "common/io/number_reader.hpp"
 #include "common/io/recording_folder.hpp"
+#include "eval/quantile.hpp"
 
 namespace understory::eval {
 namespace {
@@ -37,14 +38,6 @@ double distance_to_path(std::span<const StampedPose> path, const Eigen::Vector2d
 }
 
 }  // namespace
-
-double quantile(std::vector<double> values, double part) {
-  if (values.empty()) return 0.0;
-  const auto index = static_cast<std::size_t>(part * static_cast<double>(values.size() - 1) + 0.5);
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(index),
-                   values.end());
-  return values[index];
-}
 
 bool localised(const MapUpdate& update) {
   return update.status == MapUpdateStatus::kFirstMap || update.status == MapUpdateStatus::kUpdated;

@@ -80,7 +80,4 @@ TreeScore against_trees(std::span<const StampedPose> trajectory,
                         std::span<const MapLandmark> landmarks, double radius_m = 1.0,
                         std::size_t min_observations = 20);
 
-/// The value below which this part of the values lies; 0 of none.
-double quantile(std::vector<double> values, double part);
-
 }  // namespace understory::eval

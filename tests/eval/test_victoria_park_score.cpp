@@ -4,6 +4,7 @@
 #include <numbers>
 #include <random>
 
+#include "eval/quantile.hpp"
 #include "eval/victoria_park_score.hpp"
 #include "tests/catch.hpp"
 #include "tests/io/log_fixture.hpp"
