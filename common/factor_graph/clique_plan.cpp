@@ -10,13 +10,15 @@ namespace understory {
 namespace {
 
 constexpr int kNone = -1;
+/// From so much work on a dissection, which takes a millisecond, may pay [flops]; and if the work
+/// is so many times what the largest element alone costs in any order.
+constexpr double kMuchWork = 5e6;
+constexpr double kRoomForLess = 2.0;
 
 /// Time of one front [us], fitted to the kernel: overhead, moving its numbers, eliminating.
 double front_cost(double pivots, double separator) {
   const double size = pivots + separator + 1.0;
-  const double rest = separator + 1.0;
-  const double flops = pivots * (pivots * pivots / 3.0 + pivots * rest + rest * rest);
-  return 0.25 + 0.0006 * size * size + 0.00015 * flops;
+  return 0.25 + 0.0006 * size * size + 0.00015 * elimination_flops(pivots, separator + 1.0);
 }
 
 }  // namespace
@@ -26,14 +28,6 @@ void CliquePlanner::clear(std::span<const int> dimensions) {
   group_.assign(dimensions.size(), 0);
   element_starts_.clear();
   entries_.clear();
-}
-
-std::span<const int> CliquePlanner::element(int number) const {
-  const auto at = static_cast<std::size_t>(number);
-  const int begin = element_starts_[at];
-  const int end =
-      number + 1 < element_count() ? element_starts_[at + 1] : static_cast<int>(entries_.size());
-  return {entries_.data() + begin, static_cast<std::size_t>(end - begin)};
 }
 
 void CliquePlanner::find_neighbours() {
@@ -84,6 +78,43 @@ void CliquePlanner::order() {
     throw std::logic_error("CCOLAMD refused a graph");
   }
   order_.assign(column_starts_.begin(), column_starts_.end() - 1);
+}
+
+/// Of eliminating the largest element.
+double CliquePlanner::least_flops() const {
+  double largest = 0.0;
+  for (int e = 0; e < element_count(); ++e) {
+    double rows = 0.0;
+    for (const int v : element(e)) rows += dimensions_[static_cast<std::size_t>(v)];
+    largest = std::max(largest, rows);
+  }
+  return elimination_flops(largest, 0.0);
+}
+
+double CliquePlanner::flops() const {
+  double sum = 0.0;
+  for (const Draft& draft : drafts_) {
+    if (draft.alive) sum += elimination_flops(draft.pivots, draft.separator_size + 1.0);
+  }
+  return sum;
+}
+
+/// False where there is none.
+bool CliquePlanner::order_by_dissection() {
+  std::vector<int> number_of(dimensions_.size(), kNone);
+  std::vector<int> divided;
+  for (int v = 0; v < size(); ++v) {
+    if (group_[static_cast<std::size_t>(v)] == kLast) continue;
+    number_of[static_cast<std::size_t>(v)] = static_cast<int>(divided.size());
+    divided.push_back(v);
+  }
+  const std::vector<int> order = dissect(elements(), number_of, static_cast<int>(divided.size()));
+  if (order.empty()) return false;
+  // Those that come last already are.
+  for (std::size_t p = 0; p < order.size(); ++p) {
+    order_[p] = divided[static_cast<std::size_t>(order[p])];
+  }
+  return true;
 }
 
 /// Hands every element to the first of its variables.
@@ -178,8 +209,7 @@ void CliquePlanner::write() {
   }
 }
 
-const CliquePlan& CliquePlanner::plan() {
-  order();
+void CliquePlanner::draft_all() {
   sort_elements();
   const auto count = dimensions_.size();
   drafts_.resize(count);
@@ -196,6 +226,20 @@ const CliquePlan& CliquePlanner::plan() {
     const int parent = *std::min_element(begin, begin + done.separator_count);
     done.next = children_[static_cast<std::size_t>(parent)];
     children_[static_cast<std::size_t>(parent)] = p;
+  }
+}
+
+const CliquePlan& CliquePlanner::plan() {
+  order();
+  draft_all();
+  const double work = flops();
+  if (work > kMuchWork && work > kRoomForLess * least_flops()) {
+    const std::vector<int> before = order_;
+    if (order_by_dissection()) draft_all();
+    if (flops() > work) {
+      order_ = before;
+      draft_all();
+    }
   }
   write();
   return plan_;

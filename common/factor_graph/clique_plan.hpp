@@ -4,7 +4,14 @@
 #include <span>
 #include <vector>
 
+#include "common/factor_graph/dissection.hpp"
+
 namespace understory {
+
+/// Of eliminating so many pivots from a front with so many rows more.
+constexpr double elimination_flops(double pivots, double rest) {
+  return pivots * (pivots * pivots / 3.0 + pivots * rest + rest * rest);
+}
 
 /// Cliques in the order of elimination, children before parents; variables by their numbers in the
 /// planner's input.
@@ -32,7 +39,9 @@ class CliquePlanner {
 
   /// Orders by constrained COLAMD (those of set_last() after all others, their neighbours just
   /// before: the next update will most likely touch these), finds what each variable
-  /// is tied to when its turn comes, and merges cliques where that saves time.
+  /// is tied to when its turn comes, and merges cliques where that saves time. Where that costs
+  /// much it asks for a nested dissection, too (of all but those of set_last()), and takes what is
+  /// less.
   const CliquePlan& plan();
 
  private:
@@ -48,11 +57,16 @@ class CliquePlanner {
   };
   int size() const { return static_cast<int>(dimensions_.size()); }
   int element_count() const { return static_cast<int>(element_starts_.size()); }
-  std::span<const int> element(int number) const;
+  ElementLists elements() const { return {element_starts_, entries_}; }
+  std::span<const int> element(int number) const { return elements()[number]; }
   enum Group { kOthers = 0, kNeighbours = 1, kLast = 2 };
   void find_neighbours();
   void order();
   void order_few();
+  double least_flops() const;
+  double flops() const;
+  bool order_by_dissection();
+  void draft_all();
   void sort_elements();
   void draft(int position);
   void merge_children(int position, int first_child);

@@ -7,9 +7,7 @@ namespace understory {
 namespace {
 
 double flops_of(const CliqueRecord& clique) {
-  const double f = clique.pivots;
-  const double rest = clique.size - clique.pivots;
-  return f * (f * f / 3.0 + f * rest + rest * rest);
+  return elimination_flops(clique.pivots, clique.size - clique.pivots);
 }
 
 }  // namespace
