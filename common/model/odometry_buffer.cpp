@@ -1,12 +1,59 @@
 #include "common/model/odometry_buffer.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 
 namespace understory {
 namespace {
 
 /// Pieces from one source may miss each other by rounding of their stamps.
 constexpr Utime kGapTolerance_us = 1000;
+
+/// Errors of the filter's velocity last for about so long, those of its bias for so long [s]: both
+/// have the power tau * dt when pieces are compounded.
+constexpr double kVelocityLasts_s = 0.5;
+constexpr double kBiasLasts_s = 5.0;
+
+bool begins_at(const Odometry& piece, Utime utime) {
+  return std::abs(piece.from_utime - utime) <= kGapTolerance_us;
+}
+
+Preintegration moved_to(const Preintegration& inertial, const InertialBias& bias) {
+  Preintegration moved = inertial;
+  const Eigen::Matrix<double, 5, 1> shift = inertial.bias_jacobian * (bias - inertial.bias);
+  moved.yaw_rad += shift(0);
+  moved.velocity_mps += shift.segment<2>(1);
+  moved.position_m += shift.tail<2>();
+  return moved;
+}
+
+/// The piece's way, started at the given velocity.
+SE2WithCovariance way_from(const KnownVelocity& start, const Preintegration& inertial) {
+  const double dt = inertial.seconds;
+  SE2WithCovariance motion;
+  motion.mean = SE2(start.velocity_mps * dt + inertial.position_m, inertial.yaw_rad);
+  Eigen::Matrix<double, 3, 5> of_noise = Eigen::Matrix<double, 3, 5>::Zero();
+  const Eigen::Matrix2d back = motion.mean.rotation().transpose();
+  of_noise.topRightCorner<2, 2>() = back;
+  of_noise(2, 0) = 1.0;
+  motion.covariance = of_noise * inertial.covariance * of_noise.transpose();
+  motion.covariance.topLeftCorner<2, 2>() +=
+      dt * std::max(dt, kVelocityLasts_s) * back * start.covariance * back.transpose();
+  motion.covariance(2, 2) += dt * std::max(dt, kBiasLasts_s) * start.gyro_bias_variance;
+  return motion;
+}
+
+/// The velocity at the piece's end.
+KnownVelocity carried_over(const KnownVelocity& start, const Odometry& piece,
+                           const Preintegration& inertial) {
+  const Eigen::Matrix2d back = SE2(0.0, 0.0, inertial.yaw_rad).rotation().transpose();
+  KnownVelocity end = start;
+  end.utime = piece.utime;
+  end.velocity_mps = back * (start.velocity_mps + inertial.velocity_mps);
+  end.covariance =
+      back * (start.covariance + inertial.covariance.block<2, 2>(1, 1)) * back.transpose();
+  return end;
+}
 
 SE2WithCovariance part(const Odometry& piece, Utime from, Utime to) {
   const double fraction =
@@ -34,8 +81,41 @@ bool OdometryBuffer::add(const Odometry& piece) {
   if (piece.utime <= piece.from_utime) return false;
   if (!pieces_.empty() && piece.from_utime < pieces_.back().utime - kGapTolerance_us) return false;
   pieces_.push_back(bias_ ? at_bias(piece, *bias_) : piece);
+  if (velocity_) start_at_velocity(pieces_.back());
   if (pieces_.size() > max_pieces_) pieces_.pop_front();
   return true;
+}
+
+void OdometryBuffer::start_at_velocity(Odometry& piece) {
+  if (!piece.inertial || !bias_ || !begins_at(piece, velocity_->utime)) {
+    velocity_.reset();
+    return;
+  }
+  const Preintegration inertial = moved_to(*piece.inertial, *bias_);
+  if (!piece.is_standing) {
+    const SE2WithCovariance motion = way_from(*velocity_, inertial);
+    const auto spread = [](const Eigen::Matrix3d& c) { return c(0, 0) + c(1, 1); };
+    if (spread(motion.covariance) < spread(piece.covariance)) {
+      piece.from_T_to = motion.mean;
+      piece.covariance = motion.covariance;
+    }
+  }
+  velocity_ = carried_over(*velocity_, piece, inertial);
+}
+
+void OdometryBuffer::know(const EkfPose& pose) {
+  bias_ = pose.bias;
+  KnownVelocity known{pose.utime, pose.velocity_mps, pose.velocity_covariance,
+                      pose.bias_covariance(0, 0)};
+  // The filter may speak of a time before the latest pieces: it is carried over them.
+  auto piece = std::find_if(pieces_.begin(), pieces_.end(), [&](const Odometry& one) {
+    return one.utime > known.utime + kGapTolerance_us;
+  });
+  for (; piece != pieces_.end(); ++piece) {
+    if (!piece->inertial || !begins_at(*piece, known.utime)) return;
+    known = carried_over(known, *piece, moved_to(*piece->inertial, *bias_));
+  }
+  velocity_ = known;
 }
 
 std::optional<SE2WithCovariance> OdometryBuffer::between(Utime from, Utime to) const {

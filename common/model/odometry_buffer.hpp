@@ -4,9 +4,18 @@
 #include <deque>
 #include <optional>
 
+#include "common/model/ekf_output.hpp"
 #include "common/model/odometry.hpp"
 
 namespace understory {
+
+/// How fast the vehicle is, from a filter that sees landmarks.
+struct KnownVelocity {
+  Utime utime = 0;
+  Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Frame `vehicle_level` at utime.
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+  double gyro_bias_variance = 0.0;  ///< [(rad/s)^2]
+};
 
 /// Keeps consecutive pieces of odometry. Bounded: old pieces are forgotten.
 class OdometryBuffer {
@@ -19,6 +28,13 @@ class OdometryBuffer {
   /// an IMU that are added later turn by as much as their own bias differed from it.
   void set_bias(const InertialBias& bias) { bias_ = bias; }
   const std::optional<InertialBias>& bias() const { return bias_; }
+  /// The filter's bias and velocity. What wheels do not know (their radius, slip) lasts for
+  /// seconds; counted as noise of the same power it makes the way from scan to scan thirty times as
+  /// uncertain as it is. A filter has learned it: pieces with an IMU start at its velocity, where
+  /// that is surer.
+  void know(const EkfPose& pose);
+  const std::optional<KnownVelocity>& velocity() const { return velocity_; }
+  void restore(const KnownVelocity& velocity) { velocity_ = velocity; }
   /// Motion of the vehicle from `from` to `to`, or none where a gap or the end of the buffer is in
   /// between. Inside a piece the motion is taken at constant twist and its covariance in proportion
   /// to time.
@@ -29,9 +45,12 @@ class OdometryBuffer {
   void restore(const Odometry& piece) { pieces_.push_back(piece); }
 
  private:
+  void start_at_velocity(Odometry& piece);
+
   std::size_t max_pieces_;
   std::deque<Odometry> pieces_;
   std::optional<InertialBias> bias_;
+  std::optional<KnownVelocity> velocity_;  ///< At the end of the last piece that continued it.
 };
 
 }  // namespace understory

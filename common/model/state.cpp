@@ -116,11 +116,19 @@ void from_json(const Json& json, Odometry& odometry) {
 void to_json(Json& json, const OdometryBuffer& buffer) {
   Json pieces = Json::array();
   for (const Odometry& piece : buffer.pieces()) pieces.push_back(piece);
-  json = {pieces, buffer.bias() ? matrix_to_json<3, 1>(*buffer.bias()) : Json(nullptr)};
+  json = {pieces, buffer.bias() ? matrix_to_json<3, 1>(*buffer.bias()) : Json(nullptr), nullptr};
+  if (const auto& known = buffer.velocity()) {
+    json[2] = {known->utime, matrix_to_json<2, 1>(known->velocity_mps),
+               matrix_to_json<2, 2>(known->covariance), known->gyro_bias_variance};
+  }
 }
 void from_json(const Json& json, OdometryBuffer& buffer) {
   for (const Json& piece : json.at(0)) buffer.restore(piece.get<Odometry>());
   if (!json.at(1).is_null()) buffer.set_bias(matrix_from_json<3, 1>(json.at(1)));
+  if (json.size() < 3 || json.at(2).is_null()) return;
+  const Json& known = json.at(2);
+  buffer.restore(KnownVelocity{known.at(0).get<Utime>(), matrix_from_json<2, 1>(known.at(1)),
+                               matrix_from_json<2, 2>(known.at(2)), known.at(3).get<double>()});
 }
 
 }  // namespace understory

@@ -28,6 +28,9 @@ void describe(AssociatorParameters& p, ParameterTable& table) {
             "Tracks farther than this end.");
   table.add("min_likelihood_ratio", p.min_likelihood_ratio, {1.0, 1e9}, "",
             "A match is published if it is so many times likelier than any other pairing.");
+  table.add("walking_mps", p.walking_mps, {0.0, 100.0}, "m/s",
+            "What moves against the wheels is no landmark; where few that stand are in view, a "
+            "track is published once this speed would have been noticed. 0: nothing is checked.");
 }
 
 }  // namespace understory

@@ -17,6 +17,8 @@ using associator::Track;
 /// Odometry's own uncertainty is never trusted below this [m^2, rad^2].
 constexpr double kMotionFloor = 1e-8;
 constexpr double kMaxPoseAge_s = 1.0;
+/// By it sightings are compared.
+constexpr Utime kOdometryKept_us = 2'000'000;
 /// A stamp so far back starts the clock anew.
 constexpr Utime kClockJump_us = 10'000'000;
 /// Acceleration [m/s^2] that a constant velocity may have missed.
@@ -39,7 +41,7 @@ std::vector<Seen> usable(const LandmarkScan& scan) {
 std::vector<UncertainPoint> points_of(const std::vector<Track>& tracks, LandmarkKind kind) {
   std::vector<UncertainPoint> points;
   for (const Track& track : tracks) {
-    if (track.kind != kind) continue;
+    if (track.kind != kind || track.steadiness == associator::Steadiness::kMoves) continue;
     points.push_back({track.position_m, track.variance_m2(), track.sightings < 4 ? 8.0 : 0.0});
   }
   return points;
@@ -134,11 +136,17 @@ std::optional<SE2WithCovariance> Associator::motion_to(Utime utime) const {
   return motion;
 }
 
+std::optional<SE2WithCovariance> Associator::motion_by_wheels(Utime from, Utime to) const {
+  if (odometry_.pieces().empty() || !odometry_.pieces().back().has_wheels) return std::nullopt;
+  return odometry_.between(from, to);
+}
+
 bool Associator::fits(const Registration& registration, std::size_t seen,
                       const FieldOfView& view) const {
   const SE2 vehicle_T_local = registration.reference_T_observed.inverse();
   std::size_t visible = 0, known = 0;
   for (const Track& track : tracks_.tracks()) {
+    if (track.steadiness == associator::Steadiness::kMoves) continue;
     if (!view.contains(vehicle_T_local * track.position_m)) continue;
     ++known;
     if (track.sightings >= 2) ++visible;
@@ -244,9 +252,13 @@ TrackedScan Associator::publish(const LandmarkScan& scan, const std::vector<Seen
   }
   local_T_vehicle_ = local_T_vehicle;
   last_scan_ = scan.utime;
-  odometry_.forget_before(scan.utime);
+  odometry_.forget_before(scan.utime - kOdometryKept_us);
   const TrackId before = tracks_.next_id();
-  const auto ids = tracks_.update(seen, matches, local_T_vehicle, scan.field_of_view);
+  if (parameters_.walking_mps > 0.0) {
+    tracks_.check_steadiness(seen, matches, scan.utime,
+                             [&](Utime from) { return motion_by_wheels(from, scan.utime); });
+  }
+  const auto ids = tracks_.update(seen, matches, local_T_vehicle, scan.field_of_view, scan.utime);
   counters_.tracks_confirmed += tracks_.next_id() - before;
   for (const associator::Match& match : matches) counters_.ambiguous += match.ambiguous ? 1 : 0;
   TrackedScan out{scan.utime, next_sequence_++, scan.field_of_view, {}};

@@ -52,6 +52,7 @@ class Associator {
 
  private:
   std::optional<SE2WithCovariance> motion_to(Utime utime) const;
+  std::optional<SE2WithCovariance> motion_by_wheels(Utime from, Utime to) const;
   std::optional<SE2WithCovariance> motion_by_filter(Utime utime) const;
   Registration locate(const std::vector<associator::Seen>& seen, const FieldOfView& view,
                       Utime utime);

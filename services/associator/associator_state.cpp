@@ -7,7 +7,7 @@
 namespace understory {
 namespace {
 
-constexpr int kStateVersion = 1;
+constexpr int kStateVersion = 2;
 
 Json track_json(const associator::Track& t) {
   return {t.id,
@@ -18,7 +18,12 @@ Json track_json(const associator::Track& t) {
           t.history,
           t.age,
           t.missed,
-          static_cast<int>(t.kind)};
+          static_cast<int>(t.kind),
+          static_cast<int>(t.steadiness),
+          t.times_off,
+          t.begin.utime,
+          matrix_to_json<2, 1>(t.begin.position_m),
+          matrix_to_json<2, 2>(t.begin.covariance_m2)};
 }
 
 associator::Track track_from(const Json& json) {
@@ -32,6 +37,11 @@ associator::Track track_from(const Json& json) {
   t.age = json.at(6).get<std::uint32_t>();
   t.missed = json.at(7).get<std::uint32_t>();
   t.kind = static_cast<LandmarkKind>(json.at(8).get<int>());
+  t.steadiness = static_cast<associator::Steadiness>(json.at(9).get<int>());
+  t.times_off = json.at(10).get<std::uint32_t>();
+  t.begin.utime = json.at(11).get<Utime>();
+  t.begin.position_m = matrix_from_json<2, 1>(json.at(12));
+  t.begin.covariance_m2 = matrix_from_json<2, 2>(json.at(13));
   return t;
 }
 

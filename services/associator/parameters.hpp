@@ -25,6 +25,9 @@ struct AssociatorParameters {
   /// A detection that another track explains nearly as well is not published: its likelihood must
   /// be so many times the other's.
   double min_likelihood_ratio = 1000.0;
+  /// What moves against the wheels is no landmark; where few that stand are in view, a track is
+  /// published once somebody who walks like this would have been noticed. 0: nothing is checked.
+  double walking_mps = 0.8;
 };
 
 }  // namespace understory

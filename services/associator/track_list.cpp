@@ -4,6 +4,8 @@
 #include <bit>
 #include <memory>
 
+#include "services/associator/motion_check.hpp"
+
 namespace understory::associator {
 namespace {
 
@@ -11,6 +13,8 @@ namespace {
 constexpr double kMaxWeight = 24.0;
 /// The edge of the field of view is not sharp [m].
 constexpr double kEdge_m = 1.0;
+/// So many that stand tell the vehicle's motion whatever others do.
+constexpr std::size_t kEnough = 3;
 
 }  // namespace
 
@@ -19,7 +23,8 @@ double Track::variance_m2() const {
 }
 
 std::vector<TrackId> TrackList::update(std::span<const Seen> seen, std::span<const Match> matches,
-                                       const SE2& local_T_vehicle, const FieldOfView& view) {
+                                       const SE2& local_T_vehicle, const FieldOfView& view,
+                                       Utime utime) {
   const SE2 vehicle_T_local = local_T_vehicle.inverse();
   const std::size_t known = tracks_.size();
   const auto matched = std::make_unique<bool[]>(known);
@@ -45,7 +50,7 @@ std::vector<TrackId> TrackList::update(std::span<const Seen> seen, std::span<con
     const bool counts = track.id != 0 || !stands_in(track, {matched.get(), known});
     if (counts) track.history |= 1u;
     confirm(track);
-    if (counts) published[match.seen] = track.id;
+    if (counts && is_steady(track)) published[match.seen] = track.id;
   }
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (used[i]) continue;
@@ -56,11 +61,40 @@ std::vector<TrackId> TrackList::update(std::span<const Seen> seen, std::span<con
     track.kind = seen[i].kind;
     track.sightings = track.age = 1;
     track.history = 1;
+    track.begin = {utime, seen[i].position_m, seen[i].covariance_m2};
     confirm(track);
-    published[i] = track.id;
+    if (is_steady(track)) published[i] = track.id;
   }
   drop(local_T_vehicle, view);
   return published;
+}
+
+void TrackList::check_steadiness(
+    std::span<const Seen> seen, std::span<const Match> matches, Utime utime,
+    const std::function<std::optional<SE2WithCovariance>(Utime)>& motion_since) {
+  std::size_t standing = 0;
+  bool is_known = false;
+  for (const Match& match : matches) {
+    Track& track = tracks_[match.track];
+    const Seen& now = seen[match.seen];
+    if (const auto motion = motion_since(track.begin.utime); motion && !match.ambiguous) {
+      const double way_s = 1e-6 * static_cast<double>(utime - track.begin.utime);
+      is_known = true;
+      check_motion(track, now, {way_s, *motion}, parameters_);
+      if (way_s > kCompared_s) track.begin = {utime, now.position_m, now.covariance_m2};
+    } else if (!motion) {
+      track.begin = {utime, now.position_m, now.covariance_m2};
+    }
+    if (track.steadiness == Steadiness::kStands) ++standing;
+  }
+  needs_proof_ = is_known && standing < kEnough;
+}
+
+/// Where hardly anything stands in view, the vehicle's motion would be told by one that walks.
+bool TrackList::is_steady(const Track& track) const {
+  if (parameters_.walking_mps <= 0.0) return true;
+  return track.steadiness == Steadiness::kStands ||
+         (track.steadiness == Steadiness::kUnknown && !needs_proof_);
 }
 
 void TrackList::take(Track& track, const Seen& seen, const Match& match,

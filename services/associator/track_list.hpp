@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -23,6 +25,16 @@ struct Seen {
   double variance_m2() const { return 0.5 * covariance_m2.trace(); }
 };
 
+/// Whether the track stands, by what wheels say of the vehicle.
+enum class Steadiness : std::uint8_t { kUnknown = 0, kStands = 1, kMoves = 2 };
+
+/// A sighting to compare later ones with.
+struct Beginning {
+  Utime utime = 0;
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `vehicle_level` at utime.
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
+};
+
 struct Track {
   TrackId id = 0;                                        ///< 0 = not consistent yet.
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `local`.
@@ -33,6 +45,9 @@ struct Track {
   std::uint32_t age = 0;      ///< Such scans since it began.
   std::uint32_t missed = 0;   ///< Such scans in a row without it.
   LandmarkKind kind = LandmarkKind::kTrunk;
+  Steadiness steadiness = Steadiness::kUnknown;
+  std::uint32_t times_off = 0;  ///< Sightings in a row that say that it moves.
+  Beginning begin;
 
   /// Of the position.
   double variance_m2() const;
@@ -61,7 +76,12 @@ class TrackList {
   /// Takes a scan's matches at the pose; unmatched detections begin tracks, tracks that should have
   /// been seen and were not end. Gives the track id of each seen detection, 0 = none to publish.
   std::vector<TrackId> update(std::span<const Seen> seen, std::span<const Match> matches,
-                              const SE2& local_T_vehicle, const FieldOfView& view);
+                              const SE2& local_T_vehicle, const FieldOfView& view, Utime utime);
+
+  /// Looks whether tracks stand that the scan matches; to be called before update().
+  /// `motion_since` gives the vehicle's motion by wheels from a time until now, where it is known.
+  void check_steadiness(std::span<const Seen> seen, std::span<const Match> matches, Utime utime,
+                        const std::function<std::optional<SE2WithCovariance>(Utime)>& motion_since);
 
   TrackId next_id() const { return next_id_; }
   void set(const std::vector<Track>& tracks, TrackId next_id) {
@@ -71,6 +91,7 @@ class TrackList {
 
  private:
   void take(Track& track, const Seen& seen, const Match& match, const SE2& local_T_vehicle);
+  bool is_steady(const Track& track) const;
   bool stands_in(const Track& track, std::span<const bool> matched) const;
   void confirm(Track& track);
   void drop(const SE2& local_T_vehicle, const FieldOfView& view);
@@ -78,6 +99,7 @@ class TrackList {
   AssociatorParameters parameters_;
   std::vector<Track> tracks_;
   TrackId next_id_ = 1;
+  bool needs_proof_ = false;  ///< Too few that stand are in the scan to do without.
 };
 
 }  // namespace understory::associator

@@ -20,7 +20,7 @@ class SmoothingMapper final : public MapperMethod {
   std::optional<SE2WithCovariance> locate(const LandmarkScan& scan) override;
   void add(const Odometry& odometry) override;
   void add(const EkfPose& pose) override {
-    odometry_.set_bias(pose.bias);
+    odometry_.know(pose);
     filter_.add(pose);
   }
   void start_with(std::span<const MapLandmark> landmarks) override;

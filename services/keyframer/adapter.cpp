@@ -26,9 +26,8 @@ class KeyframerAdapter : public Adapter {
     node.subscribe<Odometry>(channels_.odometry,
                              [this](const Odometry& motion) { stage_->add(motion); },
                              {.queue_size = 2000});
-    // Of the filter's words only the bias: its pose was made from the same detections.
-    node.subscribe<EkfPose>(channels_.ekf_pose,
-                            [this](const EkfPose& pose) { stage_->set_bias(pose.bias); });
+    // Of the filter's words the bias and the velocity: its pose was made from the same detections.
+    node.subscribe<EkfPose>(channels_.ekf_pose, [this](const EkfPose& pose) { stage_->add(pose); });
     keyframes_ = node.advertise<Keyframe>(channels_.keyframe);
   }
 

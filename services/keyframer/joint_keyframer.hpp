@@ -15,7 +15,7 @@ class JointKeyframer final : public KeyframerMethod {
 
   std::optional<Keyframe> add(const LandmarkScan& scan) override;
   void add(const Odometry& odometry) override;
-  void set_bias(const InertialBias& bias) override { odometry_.set_bias(bias); }
+  void add(const EkfPose& pose) override { odometry_.know(pose); }
   const KeyframerCounters& counters() const override { return counters_; }
   std::string save() const override;
   void load(const std::string& state) override;

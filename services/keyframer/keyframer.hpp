@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/model/ekf_output.hpp"
 #include "common/model/keyframe.hpp"
 #include "common/model/odometry.hpp"
 #include "services/keyframer/parameters.hpp"
@@ -30,8 +31,9 @@ class KeyframerMethod {
   /// Motion without landmarks, where there is any; used as a prediction and to bridge scans that
   /// see nothing.
   virtual void add(const Odometry& odometry) = 0;
-  /// The inertial bias as the filter knows it: odometry that comes later is turned by it.
-  virtual void set_bias(const InertialBias& /*bias*/) {}
+  /// The inertial bias and the velocity as the filter knows them: odometry that comes later starts
+  /// from there.
+  virtual void add(const EkfPose& /*pose*/) {}
   virtual const KeyframerCounters& counters() const = 0;
   /// The whole state, for a restart; load() takes what save() of the same method gave.
   virtual std::string save() const = 0;

@@ -6,7 +6,7 @@ int main(int argc, char** argv) {
       understory::keyframer_service({
           .landmarks = "LANDMARKS",  // in: detections of one sweep
           .odometry = "ODOMETRY",    // in: motion, where there is any
-          .ekf_pose = "EKF_POSE",    // in: the bias of the gyro, where a filter runs
+          .ekf_pose = "EKF_POSE",    // in: bias and velocity, where a filter runs
           .keyframe = "KEYFRAME",    // out: local landmarks of n sweeps
       }),
       argc, argv);

@@ -53,9 +53,70 @@ TEST_CASE("A standing vehicle does not turn, whatever the bias", "[odometry]") {
   REQUIRE(buffer.between(0, kPiece_us)->mean.coordinates().norm() == 0.0);
 }
 
+namespace {
+
+/// The filter at the end of piece k-1: surer of the speed than wheels, which are 2 % off.
+EkfPose filter_at(int k, double speed_mps, double sigma_mps) {
+  EkfPose pose;
+  pose.utime = k * kPiece_us;
+  pose.velocity_mps << speed_mps, 0.0;
+  pose.velocity_covariance = sigma_mps * sigma_mps * Eigen::Matrix2d::Identity();
+  pose.bias << kBias, 0.0, 0.0;
+  return pose;
+}
+
+Odometry wheel_piece(int k) {
+  Odometry odometry = piece(k);
+  odometry.from_T_to = SE2::Exp({1.02, 0.0, kBias * 0.1});
+  odometry.covariance = 1e-3 * Eigen::Matrix3d::Identity();
+  odometry.inertial->covariance = 1e-8 * Eigen::Matrix<double, 5, 5>::Identity();
+  return odometry;
+}
+
+}  // namespace
+
+TEST_CASE("Pieces start at the filter's velocity where that is surer", "[odometry]") {
+  for (const bool is_sure : {true, false}) {
+    OdometryBuffer buffer;
+    buffer.know(filter_at(0, 10.0, is_sure ? 0.02 : 2.0));
+    for (int k = 0; k < 5; ++k) REQUIRE(buffer.add(wheel_piece(k)));
+    const auto motion = buffer.between(0, 5 * kPiece_us);
+    REQUIRE(motion);
+    REQUIRE(std::abs(motion->mean.x() - (is_sure ? 5.0 : 5.1)) < 1e-6);
+    REQUIRE(std::abs(motion->mean.theta()) < 1e-9);
+    // 0.02 m/s, for 0.5 s each time: five times 0.02^2 * 0.1 * 0.5, and the IMU's own.
+    if (is_sure) REQUIRE(std::abs(motion->covariance(0, 0) - 1e-4) < 2e-6);
+  }
+}
+
+TEST_CASE("The filter's word counts the same, late or in time", "[odometry]") {
+  OdometryBuffer late;
+  OdometryBuffer in_time;
+  for (int k = 0; k < 3; ++k) {
+    REQUIRE(in_time.add(wheel_piece(k)));
+    REQUIRE(late.add(wheel_piece(k)));
+    if (k == 0) in_time.know(filter_at(1, 10.0, 0.02));
+  }
+  late.know(filter_at(1, 10.0, 0.02));
+  for (OdometryBuffer* one : {&late, &in_time}) REQUIRE(one->add(wheel_piece(3)));
+  const auto a = in_time.between(3 * kPiece_us, 4 * kPiece_us);
+  const auto b = late.between(3 * kPiece_us, 4 * kPiece_us);
+  REQUIRE(a->mean.x() < 1.001);
+  REQUIRE((a->mean.coordinates() - b->mean.coordinates()).norm() < 1e-12);
+  REQUIRE((a->covariance - b->covariance).norm() < 1e-15);
+}
+
+TEST_CASE("After a gap the filter's velocity is not known", "[odometry]") {
+  OdometryBuffer buffer;
+  buffer.know(filter_at(0, 10.0, 0.02));
+  REQUIRE(buffer.add(wheel_piece(3)));
+  REQUIRE(std::abs(buffer.between(3 * kPiece_us, 4 * kPiece_us)->mean.x() - 1.02) < 1e-6);
+  REQUIRE(!buffer.velocity());
+}
+
 TEST_CASE("A restored buffer tells the same motion and goes on with the same bias", "[odometry]") {
   OdometryBuffer buffer;
-  buffer.set_bias({kBias, 0.0, 0.0});
+  buffer.know(filter_at(0, 10.0, 1e-4));
   for (int k = 0; k < 5; ++k) REQUIRE(buffer.add(piece(k)));
   OdometryBuffer restored;
   Json(buffer).get_to(restored);

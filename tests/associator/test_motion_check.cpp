@@ -1,0 +1,88 @@
+// Who walks is no landmark; what stands is one, however alone.
+#include <cmath>
+#include <random>
+
+#include "services/associator/associator.hpp"
+#include "tests/catch.hpp"
+
+using namespace understory;
+
+namespace {
+
+constexpr double kSpeed_mps = 8.0;
+constexpr double kSigma_m = 0.03;
+constexpr double kPeriod_s = 0.1;
+
+struct Thing {
+  Eigen::Vector2d position_m;
+  Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();
+};
+
+/// Drives straight on past the things. Gives how many of the scans published each.
+std::vector<int> times_published(const std::vector<Thing>& things, double walking_mps,
+                                 std::uint64_t seed, int scans = 25) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  AssociatorParameters parameters;
+  parameters.walking_mps = walking_mps;
+  Associator associator(parameters);
+  std::vector<int> published(things.size(), 0);
+  const auto stamp = [](int k) { return 1'000'000 + static_cast<Utime>(k) * 100'000; };
+  for (int k = 0; k < scans; ++k) {
+    if (k > 0) {
+      Odometry piece;
+      piece.from_utime = stamp(k - 1);
+      piece.utime = stamp(k);
+      piece.from_T_to = SE2(kSpeed_mps * kPeriod_s + 1e-3 * normal(random), 0.0, 0.0);
+      // As wheels claim it that count what lasts as noise.
+      piece.covariance = Eigen::Vector3d(1.4e-3, 1.2e-3, 2e-7).asDiagonal();
+      piece.has_wheels = true;
+      associator.add(piece);
+    }
+    LandmarkScan scan;
+    scan.utime = stamp(k);
+    scan.field_of_view.max_range_m = 60.0;
+    const double time_s = kPeriod_s * k;
+    for (const Thing& thing : things) {
+      Detection& seen = scan.detections.emplace_back();
+      seen.position_m.head<2>() = thing.position_m + time_s * thing.velocity_mps +
+                                  kSigma_m * Eigen::Vector2d(normal(random), normal(random));
+      seen.position_m.x() -= kSpeed_mps * time_s;
+      seen.covariance_m2 = kSigma_m * kSigma_m * Eigen::Matrix3d::Identity();
+    }
+    const TrackedScan tracked = *associator.add(scan);
+    for (const TrackedLandmark& landmark : tracked.landmarks) ++published[landmark.detection];
+  }
+  return published;
+}
+
+}  // namespace
+
+TEST_CASE("Somebody who walks, alone in view, is not published", "[associator][motion]") {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<double> angle(-3.14, 3.14);
+    const double way = angle(random);
+    const Thing walker{{25.0, 6.0}, 1.3 * Eigen::Vector2d(std::cos(way), std::sin(way))};
+    REQUIRE(times_published({walker}, 0.8, seed).front() == 0);
+  }
+  // Without the check it would be.
+  const Thing walker{{25.0, 6.0}, {1.3, 0.0}};
+  REQUIRE(times_published({walker}, 0.0, 1).front() > 0);
+}
+
+TEST_CASE("What stands is published, however alone", "[associator][motion]") {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    REQUIRE(times_published({{{25.0, 6.0}}}, 0.8, seed).front() >= 17);
+  }
+}
+
+TEST_CASE("Somebody who walks among trunks is left out, and they are not", "[associator][motion]") {
+  std::vector<Thing> things{{{25.0, 3.0}, {0.0, 1.3}}};
+  for (int k = 0; k < 6; ++k) things.push_back({{6.0 * k, k % 2 == 0 ? -9.0 : 12.0}});
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const std::vector<int> published = times_published(things, 0.8, seed);
+    REQUIRE(published.front() <= 4);
+    for (std::size_t k = 1; k < things.size(); ++k) REQUIRE(published[k] >= 17);
+  }
+}
