@@ -65,7 +65,8 @@ class MapperAdapter : public Adapter {
                                odometry_.add(motion);
                              },
                              {.queue_size = 2000});
-    // Bias and velocity, and the motion to gate by; no measurement: it was made from the same detections.
+    // Bias and velocity, and the motion to gate by; no measurement: it was made from the same
+    // detections.
     node.subscribe<EkfPose>(channels_.ekf_pose, [this](const EkfPose& pose) { stage_->add(pose); });
     node.subscribe<map_request_t>(channels_.map_request,
                                   [this](const map_request_t& request) { answer(request); },
