@@ -50,6 +50,23 @@ bool is_usable(const Odometry& piece) {
   return usable;
 }
 
+/// Of the vehicle's pose (right perturbation), whose heading is the state's less `pitch_tangent`
+/// times the roll's error.
+Eigen::Matrix3d pose_covariance(const ekf::FilterState& state, double pitch_tangent) {
+  const Eigen::Matrix2d back = ekf::rotation_of(state.heading).transpose();
+  Eigen::Matrix<double, 3, 4> pose_by_state = Eigen::Matrix<double, 3, 4>::Zero();
+  pose_by_state.block<2, 1>(0, 0) = back * state.lever(state.position);
+  pose_by_state.block<2, 2>(0, 1) = back;
+  pose_by_state(2, 0) = 1.0;
+  pose_by_state(2, 3) = -pitch_tangent;
+  Eigen::Matrix4d covariance;
+  covariance.topLeftCorner<3, 3>() = state.covariance_block<3, 3>(0, 0);
+  covariance.topRightCorner<3, 1>() = state.covariance_block<3, 1>(0, ekf::kLevel);
+  covariance.bottomLeftCorner<1, 3>() = covariance.topRightCorner<3, 1>().transpose();
+  covariance(3, 3) = state.covariance(ekf::kLevel, ekf::kLevel);
+  return pose_by_state * covariance * pose_by_state.transpose();
+}
+
 }  // namespace
 
 Ekf::Ekf(const EkfParameters& parameters)
@@ -74,6 +91,7 @@ void Ekf::set_prior() {
   state_.clear_landmarks();
   aliases_.clear();
   level_covariance_.reset();
+  pitch_tangent_ = 0.0;
   auto covariance = state_.covariance();
   covariance.setZero();
   covariance.diagonal()
@@ -204,6 +222,7 @@ void Ekf::predict(const Odometry& piece, bool stands) {
   if (piece.inertial) {
     if (!level_covariance_) ekf::know_level(state_, piece.inertial->level);
     level_covariance_ = piece.inertial->level.covariance;
+    pitch_tangent_ = piece.inertial->level.pitch_tangent;
   }
   if (!piece.inertial) {
     const SE2WithCovariance moved{piece.from_T_to, piece.covariance};
@@ -281,14 +300,18 @@ void Ekf::bridge(Utime utime) {
   utime_ = utime;
 }
 
+/// The state's heading is that of the frame that sweeps and odometry are levelled to. A wrong roll
+/// turns it by as much times the pitch's tangent: up and down with every slope, not the vehicle.
 /// A scale that sightings have in common makes the whole map, with the vehicle in it, larger or
 /// smaller about its origin. No sighting tells that, so the state does without it.
 EkfPose Ekf::pose() {
   EkfPose out;
   out.utime = utime_;
   out.sequence = pose_sequence_++;
-  out.ekf_map_T_vehicle = state_.pose();
-  out.covariance = state_.pose_covariance();
+  const SE2 pose = state_.pose();
+  const double turned = pitch_tangent_ * state_.level.x();
+  out.ekf_map_T_vehicle = SE2(pose.x(), pose.y(), wrap_angle(pose.theta() - turned));
+  out.covariance = pose_covariance(state_, pitch_tangent_);
   const Eigen::Matrix<double, 5, 5> motion = state_.velocity_covariance();
   out.velocity_mps = ekf::rotation_of(state_.heading).transpose() * state_.velocity;
   out.velocity_covariance = motion.topLeftCorner<2, 2>();

@@ -140,6 +140,7 @@ class Ekf {
   double way_m_ = 0.0;  ///< Driven so far.
   /// Covariance of the level's error as the latest odometry has it: what detections have in theirs.
   std::optional<Eigen::Matrix2d> level_covariance_;
+  double pitch_tangent_ = 0.0;  ///< Of the vehicle, as the latest odometry has it.
   std::uint32_t used_ = 0;
   std::uint32_t refused_ = 0;
   std::vector<Alias> aliases_;  ///< In order of track.

@@ -8,7 +8,7 @@
 namespace understory {
 namespace {
 
-constexpr int kStateVersion = 3;
+constexpr int kStateVersion = 4;
 
 Json vector_json(const Eigen::Vector2d& v) { return matrix_to_json<2, 1>(v); }
 Eigen::Vector2d vector_from(const Json& json) { return matrix_from_json<2, 1>(json); }
@@ -139,6 +139,7 @@ std::string Ekf::save() const {
                    {"way_m", way_m_},
                    {"level_covariance",
                     level_covariance_ ? matrix_to_json<2, 2>(*level_covariance_) : Json(nullptr)},
+                   {"pitch_tangent", pitch_tangent_},
                    {"last_pose", last_sound_.ekf_map_T_vehicle},
                    {"last_covariance", matrix_to_json<3, 3>(last_sound_.covariance)},
                    {"last_bias", matrix_to_json<3, 1>(last_sound_.bias)}});
@@ -172,6 +173,7 @@ void Ekf::load(const std::string& state) {
   const Json& level = json.at("level_covariance");
   level_covariance_.reset();
   if (!level.is_null()) level_covariance_ = matrix_from_json<2, 2>(level);
+  pitch_tangent_ = json.at("pitch_tangent").get<double>();
   last_sound_ = EkfPose{};
   last_sound_.ekf_map_T_vehicle = json.at("last_pose").get<SE2>();
   last_sound_.covariance = matrix_from_json<3, 3>(json.at("last_covariance"));

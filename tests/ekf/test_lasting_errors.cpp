@@ -210,3 +210,56 @@ TEST_CASE("A scale that all distances have in common makes the pose less sure fa
       landmark.covariance_m2 - without.map->landmarks.front().covariance_m2;
   CHECK((more - 1e-4 * landmark.position_m * landmark.position_m.transpose()).norm() < 1e-12);
 }
+
+namespace {
+
+constexpr double kRoll = 5e-3;
+
+/// A tenth of a second by IMU, without motion.
+Odometry level_piece(int k, double yaw_rad, double pitch_tangent) {
+  Odometry piece;
+  piece.from_utime = Utime{100000} * k;
+  piece.utime = piece.from_utime + 100000;
+  piece.is_standing = k == 0;
+  Preintegration& inertial = piece.inertial.emplace();
+  inertial.seconds = 0.1;
+  inertial.yaw_rad = yaw_rad;
+  inertial.covariance = 1e-14 * Eigen::Matrix<double, 5, 5>::Identity();
+  inertial.level.covariance = kRoll * kRoll * Eigen::Matrix2d::Identity();
+  inertial.level.pitch_tangent = pitch_tangent;
+  return piece;
+}
+
+EkfPose pose_after(Ekf& filter, const Odometry& piece) {
+  filter.add(piece);
+  TrackedScan scan;
+  scan.utime = piece.utime;
+  scan.field_of_view.max_range_m = 30.0;
+  return *filter.add(scan).pose;
+}
+
+}  // namespace
+
+TEST_CASE("A wrong roll turns what is levelled, not the vehicle", "[ekf][level]") {
+  EkfParameters parameters = white_noise();
+  parameters.prior.gyro_bias_sigma = 1e-6;
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  const int count = 300;
+  for (const double first_tangent : {0.0, 0.2}) {
+    const double last_tangent = 0.2 - first_tangent;
+    double mean = 0.0;
+    for (int run = 0; run < count; ++run) {
+      Ekf filter(parameters);
+      const EkfPose first = pose_after(filter, level_piece(0, 0.0, first_tangent));
+      REQUIRE(std::sqrt(first.covariance(2, 2)) < 0.1 * 0.2 * kRoll);
+      const double turned = (last_tangent - first_tangent) * kRoll * normal(random);
+      const EkfPose last = pose_after(filter, level_piece(1, turned, last_tangent));
+      const double heading = last.ekf_map_T_vehicle.theta();
+      mean += heading * heading / last.covariance(2, 2) / count;
+    }
+    CAPTURE(first_tangent, mean);
+    CHECK(mean > 0.75);
+    CHECK(mean < 1.3);
+  }
+}
