@@ -154,7 +154,6 @@ class CliqueTree {
   // clique_tree_covariance.cpp
   void collect_paths(std::span<const int> variables);
   void forward(const CliqueRecord& clique);
-  void backward(const CliqueRecord& clique);
 
   FactorGraph& graph_;
   FrontKernel kernel_;

@@ -62,26 +62,6 @@ void CliqueTree::forward(const CliqueRecord& clique) {
   }
 }
 
-/// right := L^-T right for the clique's columns.
-void CliqueTree::backward(const CliqueRecord& clique) {
-  const Eigen::Map<const Eigen::MatrixXd> panel = panel_of(clique);
-  const Eigen::Index f = clique.pivots;
-  const Eigen::Index s = clique.size - 1 - f;
-  auto own = right_.middleRows(offset_[static_cast<std::size_t>(clique.rows[0])], f);
-  if (s > 0) {
-    work_.resize(s, right_.cols());
-    Eigen::Index row = 0;
-    for (int i = clique.frontal_count; i < clique.row_count; ++i) {
-      const int size = dimension(graph_.variable(clique.rows[i]).type);
-      work_.middleRows(row, size) =
-          right_.middleRows(offset_[static_cast<std::size_t>(clique.rows[i])], size);
-      row += size;
-    }
-    own.noalias() -= panel.block(f, 0, s, f).transpose() * work_;
-  }
-  panel.topLeftCorner(f, f).transpose().triangularView<Eigen::Upper>().solveInPlace(own);
-}
-
 std::optional<Eigen::MatrixXd> CliqueTree::joint_covariance(std::span<const int> variables) {
   Eigen::Index columns = 0;
   for (const int v : variables) {
@@ -107,15 +87,10 @@ std::optional<Eigen::MatrixXd> CliqueTree::joint_covariance(std::span<const int>
     for (int k = 0; k < size; ++k) right_(row + k, column++) = 1.0;
   }
   for (const int c : path_) forward(cliques_[c]);
-  for (std::size_t i = path_.size(); i-- > 0;) backward(cliques_[path_[i]]);
-  Eigen::MatrixXd result(columns, columns);
-  Eigen::Index to = 0;
-  for (const int v : variables) {
-    const int size = dimension(graph_.variable(v).type);
-    result.middleRows(to, size) = right_.middleRows(offset_[static_cast<std::size_t>(v)], size);
-    to += size;
-  }
-  return Eigen::MatrixXd(0.5 * (result + result.transpose()));
+  // E' (L L')^-1 E = W' W with W = L^-1 E: half the work, and symmetric as it comes.
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(columns, columns);
+  result.selfadjointView<Eigen::Lower>().rankUpdate(right_.transpose());
+  return Eigen::MatrixXd(result.selfadjointView<Eigen::Lower>());
 }
 
 }  // namespace understory

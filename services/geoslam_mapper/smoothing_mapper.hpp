@@ -73,6 +73,7 @@ class SmoothingMapper final : public MapperMethod {
   Placement associate(const Keyframe& keyframe, const SE2WithCovariance& guess) const;
   std::vector<LandmarkId> landmarks_in_view(const Keyframe& keyframe,
                                             const SE2WithCovariance& guess) const;
+  std::vector<double> exact_variances(std::span<const PointId> points) const;
   std::vector<double> relative_variances(const std::vector<LandmarkId>& ids) const;
   std::size_t matchable(const Keyframe& keyframe, const Placement& placement) const;
   bool contradicts_filter(const Keyframe& keyframe, const Placement& placement) const;

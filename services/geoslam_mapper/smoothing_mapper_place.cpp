@@ -1,6 +1,8 @@
 // Where is this keyframe? By prediction and gating, else by search in the whole map.
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <span>
 #include <unordered_map>
 
 #include "common/geometry/registration.hpp"
@@ -11,8 +13,9 @@ namespace {
 
 /// Beyond the field of view, so that a landmark at its edge is found whatever the pose's error.
 constexpr double kViewMargin_m = 5.0;
-/// Landmarks whose exact covariance relative to the vehicle is computed at most.
-constexpr std::size_t kMaxExact = 80;
+/// Landmarks whose exact covariance relative to the vehicle is computed at most. It varies slowly
+/// over a part of the map that was seen at one time: the others take their nearest one's.
+constexpr std::size_t kMaxExact = 8;
 /// So many landmarks cannot contradict the filter.
 constexpr std::size_t kFewLandmarks = 2;
 /// Over longer times the filter drifts, too.
@@ -20,6 +23,24 @@ constexpr Utime kFilterGate_us = 3'000'000;
 
 double plane_variance(const KeyframeLandmark& landmark) {
   return 0.5 * landmark.covariance_m2.trace();
+}
+
+double squared_distance(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return (a - b).squaredNorm();
+}
+
+/// Up to `most` of the points, each the one furthest from those before it.
+std::vector<std::size_t> spread(std::span<const Eigen::Vector2d> points, std::size_t most) {
+  std::vector<std::size_t> chosen;
+  std::vector<double> nearest(points.size(), std::numeric_limits<double>::infinity());
+  while (chosen.size() < std::min(most, points.size())) {
+    const auto furthest = std::max_element(nearest.begin(), nearest.end());
+    chosen.push_back(static_cast<std::size_t>(furthest - nearest.begin()));
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      nearest[i] = std::min(nearest[i], squared_distance(points[i], points[chosen.back()]));
+    }
+  }
+  return chosen;
 }
 
 }  // namespace
@@ -58,28 +79,15 @@ std::vector<LandmarkId> SmoothingMapper::landmarks_in_view(const Keyframe& keyfr
   return store_.index().near({guess.mean.translation(), reach + kViewMargin_m + 3.0 * spread});
 }
 
-/// Variance [m^2] of each landmark's position relative to the vehicle. What was seen lately shares
-/// the vehicle's error; for the others (a loop is closing) the graph is asked.
-std::vector<double> SmoothingMapper::relative_variances(const std::vector<LandmarkId>& ids) const {
+/// Variance [m^2] of points relative to the vehicle, as the graph has it. Empty where it cannot
+/// say.
+std::vector<double> SmoothingMapper::exact_variances(std::span<const PointId> points) const {
   std::vector<double> variances;
-  std::vector<std::size_t> old;
-  std::vector<PointId> points;
-  for (const LandmarkId id : ids) {
-    const StoredLandmark& landmark = store_.at(id);
-    variances.push_back(landmark.local_variance());
-    const bool recent =
-        landmark.last_keyframe + static_cast<std::uint32_t>(parameters_.recent_keyframes) >=
-        keyframes_;
-    if (recent || !landmark.point || points.size() >= kMaxExact) continue;
-    old.push_back(variances.size() - 1);
-    points.push_back(*landmark.point);
-  }
-  if (old.empty() || !last_member_) return variances;
   const PoseId centre = nodes_[last_member_->node].centre;
   const auto joint = smoother_.joint_marginal({&centre, 1}, points);
   if (!joint) return variances;
   const SE2 map_T_centre = smoother_.pose(centre);
-  for (std::size_t i = 0; i < old.size(); ++i) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
     // d(landmark in the vehicle's frame) / d(pose, landmark)
     const ObservationJacobian j = linearise(map_T_centre, smoother_.point(points[i]));
     const auto at = 3 + 2 * static_cast<Eigen::Index>(i);
@@ -87,7 +95,44 @@ std::vector<double> SmoothingMapper::relative_variances(const std::vector<Landma
     const Eigen::Matrix2d covariance = j.pose * joint->topLeftCorner<3, 3>() * j.pose.transpose() +
                                        j.point * joint->block<2, 2>(at, at) * j.point.transpose() +
                                        cross + cross.transpose();
-    variances[old[i]] = std::max(variances[old[i]], 0.5 * covariance.trace());
+    variances.push_back(0.5 * covariance.trace());
+  }
+  return variances;
+}
+
+/// Variance [m^2] of each landmark's position relative to the vehicle. What was seen lately shares
+/// the vehicle's error; for the others (a loop is closing) the graph is asked.
+std::vector<double> SmoothingMapper::relative_variances(const std::vector<LandmarkId>& ids) const {
+  std::vector<double> variances;
+  std::vector<std::size_t> old;
+  std::vector<PointId> points;
+  std::vector<Eigen::Vector2d> positions;
+  for (const LandmarkId id : ids) {
+    const StoredLandmark& landmark = store_.at(id);
+    variances.push_back(landmark.local_variance());
+    const bool recent =
+        landmark.last_keyframe + static_cast<std::uint32_t>(parameters_.recent_keyframes) >=
+        keyframes_;
+    if (recent || !landmark.point) continue;
+    old.push_back(variances.size() - 1);
+    points.push_back(*landmark.point);
+    positions.push_back(landmark.position_m);
+  }
+  if (old.empty() || !last_member_) return variances;
+  const std::vector<std::size_t> asked = spread(positions, kMaxExact);
+  std::vector<PointId> asked_points;
+  for (const std::size_t i : asked) asked_points.push_back(points[i]);
+  const std::vector<double> exact = exact_variances(asked_points);
+  if (exact.empty()) return variances;
+  for (std::size_t i = 0; i < old.size(); ++i) {
+    std::size_t nearest = 0;
+    for (std::size_t k = 1; k < asked.size(); ++k) {
+      if (squared_distance(positions[i], positions[asked[k]]) <
+          squared_distance(positions[i], positions[asked[nearest]])) {
+        nearest = k;
+      }
+    }
+    variances[old[i]] = std::max(variances[old[i]], exact[nearest]);
   }
   return variances;
 }
