@@ -121,6 +121,7 @@ std::vector<double> SmoothingMapper::relative_variances(const std::vector<Landma
   if (old.empty() || !last_member_) return variances;
   const std::vector<std::size_t> asked = spread(positions, kMaxExact);
   std::vector<PointId> asked_points;
+  asked_points.reserve(asked.size());
   for (const std::size_t i : asked) asked_points.push_back(points[i]);
   const std::vector<double> exact = exact_variances(asked_points);
   if (exact.empty()) return variances;
