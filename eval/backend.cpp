@@ -172,9 +172,12 @@ void solve_whole(const FactorGraph& from, BackendRun& run) {
 }  // namespace
 
 BackendRun run_backend(const std::filesystem::path& file) {
-  const GraphFile graph = read(file);
+  return run_backend(read(file), file.stem().string());
+}
+
+BackendRun run_backend(const GraphFile& graph, const std::string& dataset) {
   BackendRun run;
-  run.dataset = file.stem().string();
+  run.dataset = dataset;
   run.factors = graph.factors.size();
   Feeder feeder(graph);
   run.poses = feeder.poses();

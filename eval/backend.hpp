@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "common/factor_graph/graph_file.hpp"
+
 namespace understory::eval {
 
 /// One graph, fed as a robot would: a pose, then all that ties it to earlier ones.
@@ -23,5 +25,6 @@ struct BackendRun {
 
 /// Throws std::runtime_error where the file cannot be read.
 BackendRun run_backend(const std::filesystem::path& file);
+BackendRun run_backend(const GraphFile& graph, const std::string& dataset);
 
 }  // namespace understory::eval

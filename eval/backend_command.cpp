@@ -5,9 +5,13 @@
 #include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "eval/backend.hpp"
+#include "eval/backend_world.hpp"
 #include "eval/experiments.hpp"
 #include "eval/interrupt.hpp"
 #include "eval/quantile.hpp"
@@ -35,6 +39,8 @@ constexpr Reference kReferences[] = {
 
 struct BackendOptions {
   std::vector<std::string> files;
+  int world_poses = 0;
+  std::uint64_t seed = 1;
   std::string json;
   bool plots = true;
 };
@@ -92,17 +98,35 @@ void print_row(const nlohmann::json& row) {
       row["rss_mb"].get<double>(), row["error"].get<std::string>());
 }
 
+/// Two street grids: with odometry that drifts, and with odometry far better than the closures.
+std::vector<std::pair<std::string, WorldParameters>> worlds(int poses) {
+  if (poses == 0) return {};
+  WorldParameters drifting;
+  drifting.poses = poses;
+  WorldParameters precise = drifting;
+  precise.motion_m = precise.motion_rad = 0.002;
+  precise.closure_m = precise.closure_rad = 0.1;
+  return {{fmt::format("streets-{}-drifting", poses), drifting},
+          {fmt::format("streets-{}-precise", poses), precise}};
+}
+
 void run_experiment(const BackendOptions& options) {
   const std::atomic<bool>& stop = stop_on_interrupt();
   nlohmann::json rows = nlohmann::json::array();
   nlohmann::json traces = nlohmann::json::array();
-  print_heading();
-  for (const std::string& file : options.files) {
-    if (stop) throw Interrupted{};
-    const BackendRun run = run_backend(file);
+  const auto keep = [&](const BackendRun& run) {
     rows.push_back(row_of(run));
     print_row(rows.back());
     traces.push_back({{"dataset", run.dataset}, {"update_ms", run.update_ms}});
+    if (stop) throw Interrupted{};
+  };
+  if (options.files.empty() && options.world_poses == 0) {
+    throw std::invalid_argument("backend: neither --data nor --streets is given");
+  }
+  print_heading();
+  for (const std::string& file : options.files) keep(run_backend(file));
+  for (const auto& [name, parameters] : worlds(options.world_poses)) {
+    keep(run_backend(make_world(parameters, options.seed), name));
   }
   if (options.json.empty()) return;
   const std::filesystem::path out = options.json;
@@ -111,7 +135,10 @@ void run_experiment(const BackendOptions& options) {
   for (const std::string& file : options.files) {
     names.push_back(std::filesystem::path(file).filename().string());
   }
-  write_json(out, result_document("backend", {{"files", names}}, rows));
+  write_json(
+      out, result_document(
+               "backend",
+               {{"files", names}, {"streets", options.world_poses}, {"seed", options.seed}}, rows));
   if (options.plots) plot("backend.py", {out, traces_file(out).string()});
 }
 
@@ -121,7 +148,12 @@ void add_backend_experiment(CLI::App& eval) {
   CLI::App& command = *eval.add_subcommand(
       "backend", "The smoother on standard graphs, one pose per update (g2o, TORO, iSAM text)");
   const auto options = std::make_shared<BackendOptions>();
-  command.add_option("--data", options->files, "Graph files")->required()->check(CLI::ExistingFile);
+  command.add_option("--data", options->files, "Graph files")->check(CLI::ExistingFile);
+  command
+      .add_option("--streets", options->world_poses,
+                  "Simulated street grids of so many poses besides")
+      ->check(CLI::Range(2, 1'000'000));
+  command.add_option("--seed", options->seed, "Of the simulated ones")->capture_default_str();
   command.add_option("--json", options->json, "Result file; times per update and plot beside it");
   command.add_flag("!--no-plots", options->plots, "Write JSON only");
   command.callback([options] { run_guarded("backend", [&] { run_experiment(*options); }); });
