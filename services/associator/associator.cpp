@@ -137,7 +137,10 @@ std::optional<SE2WithCovariance> Associator::motion_to(Utime utime) const {
 }
 
 std::optional<SE2WithCovariance> Associator::motion_by_wheels(Utime from, Utime to) const {
-  if (odometry_.pieces().empty() || !odometry_.pieces().back().has_wheels) return std::nullopt;
+  if (odometry_.pieces().empty()) return std::nullopt;
+  // The heading by steering alone is too poor.
+  const Odometry& latest = odometry_.pieces().back();
+  if (!latest.has_wheels || !latest.inertial) return std::nullopt;
   return odometry_.between(from, to);
 }
 

@@ -37,6 +37,7 @@ std::vector<int> times_published(const std::vector<Thing>& things, double walkin
       // As wheels claim it that count what lasts as noise.
       piece.covariance = Eigen::Vector3d(1.4e-3, 1.2e-3, 2e-7).asDiagonal();
       piece.has_wheels = true;
+      piece.inertial.emplace();
       associator.add(piece);
     }
     LandmarkScan scan;
