@@ -15,6 +15,7 @@ struct BackendRun {
   std::size_t poses = 0, points = 0, factors = 0;
   std::vector<double> update_ms;  ///< Processor time, estimate included.
   double settle_ms = 0.0;         ///< After the last pose, until nothing is stale.
+  double whole_ms = 0.0;          ///< One fresh ordering, linearisation and factorisation of all.
   double chi2_final = 0.0;
   double chi2_batch = 0.0;  ///< Levenberg-Marquardt (CHOLMOD) from the final estimates.
   double batch_s = 0.0;
