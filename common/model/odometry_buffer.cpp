@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "common/model/preintegration.hpp"
+
 namespace understory {
 namespace {
 
@@ -16,15 +18,6 @@ constexpr double kBiasLasts_s = 5.0;
 
 bool begins_at(const Odometry& piece, Utime utime) {
   return std::abs(piece.from_utime - utime) <= kGapTolerance_us;
-}
-
-Preintegration moved_to(const Preintegration& inertial, const InertialBias& bias) {
-  Preintegration moved = inertial;
-  const Eigen::Matrix<double, 5, 1> shift = inertial.bias_jacobian * (bias - inertial.bias);
-  moved.yaw_rad += shift(0);
-  moved.velocity_mps += shift.segment<2>(1);
-  moved.position_m += shift.tail<2>();
-  return moved;
 }
 
 /// The piece's way, started at the given velocity.
@@ -91,7 +84,7 @@ void OdometryBuffer::start_at_velocity(Odometry& piece) {
     velocity_.reset();
     return;
   }
-  const Preintegration inertial = moved_to(*piece.inertial, *bias_);
+  const Preintegration inertial = at_bias(*piece.inertial, *bias_);
   if (!piece.is_standing) {
     const SE2WithCovariance motion = way_from(*velocity_, inertial);
     const auto spread = [](const Eigen::Matrix3d& c) { return c(0, 0) + c(1, 1); };
@@ -113,7 +106,7 @@ void OdometryBuffer::know(const EkfPose& pose) {
   });
   for (; piece != pieces_.end(); ++piece) {
     if (!piece->inertial || !begins_at(*piece, known.utime)) return;
-    known = carried_over(known, *piece, moved_to(*piece->inertial, *bias_));
+    known = carried_over(known, *piece, at_bias(*piece->inertial, *bias_));
   }
   velocity_ = known;
 }

@@ -9,8 +9,8 @@ namespace understory::associator {
 constexpr double kCompared_s = 1.5;
 
 /// What a track's sighting is compared with: the one that it began with, or one a while ago. The
-/// vehicle's own motion between the two is by wheels alone: a pose refined by the tracks would
-/// follow somebody who is the only one in view.
+/// vehicle's own motion between the two is by wheels and IMU alone: a pose refined by the tracks
+/// would follow somebody who is the only one in view.
 struct MotionCheck {
   double seconds = 0.0;  ///< Between the two sightings.
   SE2WithCovariance then_T_now;

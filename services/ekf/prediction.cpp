@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "common/model/preintegration.hpp"
+
 namespace understory::ekf {
 namespace {
 
@@ -60,17 +62,6 @@ void linearise(const FilterState& state, const Preintegration& inertial, Transit
   t.noise_input.block<2, 1>(kVelocity, 0) = -v;
   t.noise_input.block<2, 2>(kVelocity, 1) = rotation;
   t.noise = inertial.covariance;
-}
-
-/// Preintegrated change at the filter's own bias.
-Preintegration at_bias(const Preintegration& inertial, const InertialBias& bias) {
-  Preintegration moved = inertial;
-  const Eigen::Matrix<double, 5, 1> shift = inertial.bias_jacobian * (bias - inertial.bias);
-  moved.yaw_rad += shift(0);
-  moved.velocity_mps += shift.segment<2>(1);
-  moved.position_m += shift.tail<2>();
-  moved.bias = bias;
-  return moved;
 }
 
 /// What turning by noise does to the landmarks: -lever, stacked.
