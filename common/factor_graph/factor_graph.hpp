@@ -65,9 +65,11 @@ struct FactorRecord {
 
 /// How far a factor is from its linearisation.
 struct Deviation {
-  double residual = 0.0;  ///< Of the residual, and of its derivative times the residual [sigmas].
-  double turned = 0.0;    ///< Its frame since then [rad].
-  double loss = 0.0;      ///< What the linearisation leaves out of it.
+  double residual = 0.0;    ///< Of the residual, and of its derivative times the residual [sigmas].
+  double turned = 0.0;      ///< Its frame since then [rad].
+  double loss = 0.0;        ///< Of the factor, and
+  double linearised = 0.0;  ///< as the linearisation has it, up to a constant.
+  double left_out = 0.0;    ///< By the linearisation, of what the residual's square grew to.
 };
 
 /// Graph of variables and factors, with the way back to the last commit().
@@ -120,8 +122,6 @@ class FactorGraph {
   /// four numbers to judge its age by], whitened and weighted: cost = |J delta - b|^2.
   void linearise(int factor);
   Deviation deviation(int factor) const;
-  /// |J delta - b|^2: the loss as the linearisation has it, up to a constant.
-  double linearised_chi2(int factor) const;
   /// Bound on what the deviation of a factor of this variable grew by, from its moves since the
   /// factors were last looked at [sigmas]. Infinite where there is none.
   double unjudged_deviation(int variable) const;

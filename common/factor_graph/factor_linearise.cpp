@@ -214,20 +214,6 @@ void FactorGraph::copy_moves(std::span<const int> variables, double* to) const {
   }
 }
 
-double FactorGraph::linearised_chi2(int id) const {
-  const FactorRecord& record = factors_[id];
-  scratch_.resize(static_cast<std::size_t>(record.columns));
-  copy_moves(variables_of(id), scratch_.data());
-  double squared = 0.0;
-  with_sizes(record.rows, record.columns, [&]<int rows, int columns>() {
-    const Map<const Matrix<double, rows, columns>> j(record.linear, record.rows, record.columns);
-    const Map<const Matrix<double, rows, 1>> b(j.data() + j.size(), record.rows);
-    const Map<const Matrix<double, columns, 1>> delta(scratch_.data(), record.columns);
-    squared = (j * delta - b).squaredNorm();
-  });
-  return squared;
-}
-
 Deviation FactorGraph::deviation(int id) const {
   const FactorRecord& record = factors_[id];
   const std::span<const int> variables = variables_of(id);
@@ -255,14 +241,17 @@ Deviation FactorGraph::deviation(int id) const {
     off2 = (age[0] * e - linear).squaredNorm();
   });
   double reweighted = 0.0;
+  double loss = squared;
   if (record.loss.kernel != RobustKernel::kNone) {
-    reweighted = std::sqrt(evaluate(record.loss, squared).weight) - age[0];
+    const LossValue value = evaluate(record.loss, squared);
+    reweighted = std::sqrt(value.weight) - age[0];
+    loss = value.cost;
   }
   const Eigen::Vector3d turn(age[1], age[2], age[3]);
   const double turned = (turn_of(variables_[variables[0]]) - turn).norm();
   const double weight2 = age[0] * age[0];
   return {std::sqrt(off2 + squared * (turned * turned * weight2 + reweighted * reweighted)), turned,
-          squared * weight2 - predicted};
+          loss, predicted, squared * weight2 - predicted};
 }
 
 double FactorGraph::unjudged_deviation(int id) const {

@@ -9,25 +9,15 @@ namespace {
 
 /// A pose3's chart is left before its rotation gets far from the base [rad].
 constexpr double kFarTurn = 0.6;
-/// What the linearisations leave out is looked at from this part of the loss on; a step must keep
-/// the other part of what they promised.
-constexpr double kNoticedPart = 0.1;
-constexpr double kNoticedRounding = 1e-3;  ///< The same of thorough updates, which start fresh.
-constexpr double kLeastGain = 0.1;
-constexpr int kMaxHalvings = 8;
-/// Part of the limit to deviations, that may grow unseen.
-constexpr double kNegligible = 0.2;
-/// Residuals of more rows than these are as large as those of so many.
-constexpr int kMostRows = 6;
-constexpr double kPlanarRows = 3.0;
+/// Updates that share the work of a thorough one.
+constexpr int kSweepParts = 4;
+/// An update that has done more than this part of one factorisation's work leaves further
+/// iterations to the next one.
+constexpr double kMostWork = 0.3;
+constexpr double kLittleWork = 2e5;   ///< Is no reason to [flops].
 constexpr double kSettledPart = 0.2;  ///< Of the thorough updates' limit.
 constexpr double kLeastUnit = 1e-4;
 constexpr double kLeastUsualUnit = 0.02;
-
-/// Limits are stated for relative poses in the plane; a residual in space is larger by its rows.
-double part_of_rows(const FactorRecord& factor) {
-  return std::sqrt(std::clamp<double>(factor.rows, kPlanarRows, kMostRows) / kPlanarRows);
-}
 
 }  // namespace
 
@@ -105,10 +95,7 @@ long IncrementalSmoother::relinearise() {
   for (const int v : pending_.rebase) {
     graph_.rebase(v);
     for (int i = graph_.variable(v).first_incidence; i != kNone; i = graph_.incidence(i).next) {
-      FactorRecord& factor = graph_.edit_factor(graph_.incidence(i).factor);
-      if (factor.is_pending) continue;
-      factor.is_pending = true;
-      pending_.stale.push_back(graph_.incidence(i).factor);
+      make_stale(graph_.incidence(i).factor);
     }
   }
   pending_.rebase.clear();
@@ -122,99 +109,7 @@ long IncrementalSmoother::relinearise() {
   return count;
 }
 
-/// Compares the factors of the variables that moved with their linearisations, where the moves are
-/// such that it can matter; those that are off become stale. Sums up what the linearisations leave
-/// out of the loss. Returns the largest deviation.
-double IncrementalSmoother::judge(double unless_below, double limit) {
-  ++count_;
-  judged_.clear();
-  off_.clear();
-  judged_at_.resize(static_cast<std::size_t>(graph_.factor_capacity()), 0);
-  left_out_loss_ = 0.0;
-  double largest = 0.0;
-  for (const int v : tree_.changed()) {
-    if (graph_.unjudged_deviation(v) < unless_below) continue;
-    double turned = 0.0;
-    for (int i = graph_.variable(v).first_incidence; i != kNone; i = graph_.incidence(i).next) {
-      const int f = graph_.incidence(i).factor;
-      if (judged_at_[static_cast<std::size_t>(f)] == count_) continue;
-      judged_at_[static_cast<std::size_t>(f)] = count_;
-      judged_.push_back(f);
-      const Deviation deviation = graph_.deviation(f);
-      turned = std::max(turned, deviation.turned);
-      left_out_loss_ += deviation.loss;
-      largest = std::max(largest, deviation.residual);
-      if (deviation.residual > limit * part_of_rows(graph_.factor(f))) off_.push_back(f);
-    }
-    VariableRecord& variable = graph_.edit_variable(v);
-    variable.judged = variable.delta;
-    variable.turned = turned;
-  }
-  return largest;
-}
-
-/// What the step did to the judged factors.
-IncrementalSmoother::StepEffect IncrementalSmoother::effect_of_step() {
-  StepEffect effect;
-  for (const int f : judged_) {
-    effect.loss += graph_.chi2(FactorId(f));
-    effect.linearised += graph_.linearised_chi2(f);
-  }
-  reached_.clear();
-  for (const int v : tree_.changed()) reached_.push_back(graph_.variable(v).delta);
-  move_changed(tree_.changed_from());
-  for (const int f : judged_) {
-    effect.loss -= graph_.chi2(FactorId(f));
-    effect.linearised -= graph_.linearised_chi2(f);
-  }
-  move_changed(reached_);
-  return effect;
-}
-
-void IncrementalSmoother::move_changed(const std::vector<Delta>& to) {
-  const std::vector<int>& changed = tree_.changed();
-  for (std::size_t i = 0; i < changed.size(); ++i) graph_.move(changed[i], to[i].data());
-}
-
-void IncrementalSmoother::halve_step() {
-  for (std::size_t i = 0; i < reached_.size(); ++i) {
-    const Delta& from = tree_.changed_from()[i];
-    for (std::size_t k = 0; k < from.size(); ++k) reached_[i][k] = 0.5 * (from[k] + reached_[i][k]);
-  }
-  move_changed(reached_);
-}
-
-/// Whether the step does far less for the loss than the linearisations promise.
-bool IncrementalSmoother::is_bad_step(bool thorough, bool is_repeated) {
-  const double part = thorough ? kNoticedRounding : kNoticedPart;
-  const double noticed = part * std::max(pending_.unit * pending_.unit, pending_.chi2);
-  if (left_out_loss_ <= noticed) return false;
-  const StepEffect effect = effect_of_step();
-  if (effect.loss > noticed) return true;
-  return is_repeated && effect.loss - effect.linearised > noticed &&
-         effect.loss > kLeastGain * effect.linearised;
-}
-
-/// False where the step is taken back. Linearisations of different ages that do not fit together
-/// push large graphs to and fro without end: then those that are noticeably old are to be made
-/// anew, where the step began. Where there are none it is halved.
-bool IncrementalSmoother::accept_step(IncrementalUpdate& update, bool thorough) {
-  const double limit = parameters_.relinearise_above * usual_unit();
-  for (int i = 0; i < kMaxHalvings && is_bad_step(thorough, update.iterations > 1); ++i) {
-    pending_.solve_everything = true;
-    if (i == 0) {
-      move_changed(tree_.changed_from());
-      judge(0.0, kNegligible * limit);
-      if (!off_.empty()) return false;
-    }
-    halve_step();
-    update.deviation = judge(0.0, limit);
-  }
-  return true;
-}
-
-/// Every factor whose linearisation is noticeably old becomes stale.
-void IncrementalSmoother::look_at_all(double relinearise_above) {
+void IncrementalSmoother::measure_unit() {
   double chi2 = 0.0;
   double rows = 1.0;
   for (int f = 0; f < graph_.factor_capacity(); ++f) {
@@ -224,13 +119,58 @@ void IncrementalSmoother::look_at_all(double relinearise_above) {
   }
   pending_.chi2 = chi2;
   pending_.unit = std::clamp(std::sqrt(chi2 / rows), kLeastUnit, 1.0);
+}
+
+/// Factors whose linearisations are noticeably old, neighbours in the tree side by side.
+std::vector<int> IncrementalSmoother::noticeably_old(double relinearise_above) const {
   const double limit = relinearise_above * pending_.unit;
-  for (int f = 0; f < graph_.factor_capacity(); ++f) {
-    const FactorRecord& factor = graph_.factor(f);
-    if (!factor.in_use || factor.clique == kNone || factor.is_pending) continue;
-    if (graph_.deviation(f).residual <= limit * part_of_rows(factor)) continue;
-    graph_.edit_factor(f).is_pending = true;
-    pending_.stale.push_back(f);
+  std::vector<int> old;
+  std::vector<int> stack{CliqueTree::kRoot};
+  while (!stack.empty()) {
+    const CliqueRecord& clique = tree_.clique(stack.back());
+    stack.pop_back();
+    for (int f = clique.first_factor; f != kNone; f = graph_.factor(f).next) {
+      const FactorRecord& factor = graph_.factor(f);
+      if (factor.is_pending) continue;
+      if (graph_.deviation(f).residual > limit * part_of_rows(factor)) old.push_back(f);
+    }
+    for (int c = clique.first_child; c != kNone; c = tree_.clique(c).next_sibling) {
+      stack.push_back(c);
+    }
+  }
+  return old;
+}
+
+void IncrementalSmoother::make_stale(int factor) {
+  FactorRecord& record = graph_.edit_factor(factor);
+  if (record.is_pending) return;
+  record.is_pending = true;
+  pending_.stale.push_back(factor);
+}
+
+bool IncrementalSmoother::has_curved_charts() const {
+  for (int v = 0; v < graph_.variable_capacity(); ++v) {
+    if (graph_.variable(v).in_use && graph_.variable(v).type == VariableType::kPose3) return true;
+  }
+  return false;
+}
+
+void IncrementalSmoother::begin_sweep() {
+  measure_unit();
+  pending_.sweep = noticeably_old(parameters_.thorough_relinearise_above);
+  // In space charts are curved: linearisations of different ages push their neighbours to and fro.
+  const int parts = has_curved_charts() ? 1 : kSweepParts;
+  pending_.sweep_part = 1 + static_cast<int>(pending_.sweep.size()) / parts;
+}
+
+/// In the tree's order: each part refactorises subtrees of its own, and what is above all.
+void IncrementalSmoother::take_part_of_sweep() {
+  for (int i = 0; i < pending_.sweep_part && !pending_.sweep.empty(); ++i) {
+    const int f = pending_.sweep.back();
+    pending_.sweep.pop_back();
+    // It may have been removed, and its name given to another, since.
+    if (f >= graph_.factor_capacity()) continue;
+    if (graph_.factor(f).in_use && graph_.factor(f).clique != kNone) make_stale(f);
   }
 }
 
@@ -269,12 +209,7 @@ bool IncrementalSmoother::iterate(IncrementalUpdate& update, bool thorough) {
   const double limit = parameters_.relinearise_above * usual_unit();
   update.deviation = judge(kNegligible * limit, limit);
   const bool accepted = accept_step(update, thorough);
-  for (const int f : off_) {
-    FactorRecord& factor = graph_.edit_factor(f);
-    if (factor.is_pending) continue;
-    factor.is_pending = true;
-    pending_.stale.push_back(f);
-  }
+  for (const int f : off_) make_stale(f);
   collect_moved();
   return accepted;
 }
@@ -288,6 +223,7 @@ IncrementalUpdate IncrementalSmoother::run(bool thorough) {
   do {
     accepted = iterate(update, thorough);
   } while (update.iterations < parameters_.max_iterations &&
+           update.flops < std::max(kLittleWork, kMostWork * tree_.total_flops()) &&
            (!accepted || update.deviation > parameters_.iterate_above));
   update.moved_variables = static_cast<long>(moved_.size());
   for (const int v : moved_) moved_at_[static_cast<std::size_t>(v)] = 0;
@@ -297,16 +233,23 @@ IncrementalUpdate IncrementalSmoother::run(bool thorough) {
 
 IncrementalUpdate IncrementalSmoother::run_thoroughly(double relinearise_above) {
   begin_change();
-  look_at_all(relinearise_above);
+  measure_unit();
+  pending_.sweep.clear();
+  for (const int f : noticeably_old(relinearise_above)) make_stale(f);
   return run(true);
 }
 
 IncrementalUpdate IncrementalSmoother::update() {
-  if (parameters_.thorough_every > 0 && pending_.since_thorough + 1 >= parameters_.thorough_every) {
-    return update_thoroughly();
-  }
   begin_change();
-  return run(false);
+  const bool is_sweeping = !pending_.sweep.empty();
+  if (is_sweeping) {
+    take_part_of_sweep();
+  } else if (parameters_.thorough_every > 0 &&
+             pending_.since_thorough + 1 >= parameters_.thorough_every) {
+    begin_sweep();
+    if (pending_.sweep.empty()) return run(true);
+  }
+  return run(is_sweeping && pending_.sweep.empty());
 }
 
 IncrementalUpdate IncrementalSmoother::update_thoroughly() {

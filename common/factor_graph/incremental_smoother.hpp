@@ -27,8 +27,8 @@ struct IncrementalParameters {
   /// [sigmas].
   double iterate_above = 1.0;
   int max_iterations = 5;
-  /// Every so many updates, one looks at all variables and factors, with limits of its own: what is
-  /// below the usual ones adds up. 0: never.
+  /// Every so many updates, one looks at all factors, with limits of its own: what is below the
+  /// usual ones adds up. What it finds is made up for over the updates that follow. 0: never.
   int thorough_every = 200;
   double thorough_move = 0.01;
   double thorough_relinearise_above = 0.05;
@@ -109,6 +109,8 @@ class IncrementalSmoother {
     std::vector<int> fresh;   ///< Factors that the tree does not hold yet.
     std::vector<int> stale;   ///< Factors to be linearised again.
     std::vector<int> rebase;  ///< Variables far from their charts' bases.
+    std::vector<int> sweep;   ///< Factors that wait for their part of a thorough update.
+    int sweep_part = 0;       ///< So many of them with each update.
     std::vector<int> doomed;  ///< Variables to be removed.
     bool solve_everything = false;
     int since_thorough = 0;  ///< Updates.
@@ -121,18 +123,32 @@ class IncrementalSmoother {
   FactorId keep(FactorId id);
   long relinearise();
   bool iterate(IncrementalUpdate& update, bool thorough);
-  double judge(double unless_below, double limit);
-  struct StepEffect {
-    double loss = 0.0;        ///< Change of the judged factors' sum of losses.
-    double linearised = 0.0;  ///< The same as the linearisations have it.
+
+  /// Sums over the judged factors.
+  struct Losses {
+    double loss = 0.0;
+    double linearised = 0.0;  ///< As the linearisations have it.
+    double left_out = 0.0;    ///< By them, at the end of the step.
   };
-  StepEffect effect_of_step();
-  bool is_bad_step(bool thorough, bool is_repeated);
-  bool accept_step(IncrementalUpdate& update, bool thorough);
+  /// Part of the limit to deviations, that may grow unseen.
+  static constexpr double kNegligible = 0.2;
+  /// Limits are stated for relative poses in the plane; a residual in space is larger by its rows.
+  static double part_of_rows(const FactorRecord& factor);
+  void judge_factor(int factor, double limit);
+  double judge(double unless_below, double limit);
+  void keep_judgement();
+  Losses go_back(double limit);
   void move_changed(const std::vector<Delta>& to);
-  void halve_step();
+  void go_half_the_way();
+  bool accept_step(IncrementalUpdate& update, bool thorough);
+
   void finish(IncrementalUpdate& update);
-  void look_at_all(double relinearise_above);
+  void measure_unit();
+  std::vector<int> noticeably_old(double relinearise_above) const;
+  void make_stale(int factor);
+  bool has_curved_charts() const;
+  void begin_sweep();
+  void take_part_of_sweep();
   double usual_unit() const;
   void collect_moved();
   IncrementalUpdate run(bool thorough);
@@ -149,12 +165,18 @@ class IncrementalSmoother {
   std::vector<int> last_;
   std::vector<int> moved_;
   std::vector<std::uint64_t> moved_at_;
-  std::vector<std::uint64_t> judged_at_;
-  std::vector<int> judged_;
-  std::vector<int> off_;
+
+  // Of the last step.
+  std::vector<int> judged_variables_;
+  std::vector<int> judged_;               ///< Factors.
+  std::vector<int> off_;                  ///< Of those, what has to be linearised again.
+  std::vector<int> old_;                  ///< And what had to be before the step.
+  std::vector<std::uint64_t> judged_at_;  ///< Per factor: number of the judgement.
+  std::vector<double> factor_turned_;     ///< And how far it had turned then [rad].
+  Losses at_end_;
+  double largest_deviation_ = 0.0;
   std::vector<Delta> reached_;
   std::uint64_t count_ = 0;
-  double left_out_loss_ = 0.0;
 };
 
 /// "pose 3", "point 7": for messages.

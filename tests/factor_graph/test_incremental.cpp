@@ -2,12 +2,13 @@
 #include "common/factor_graph/incremental_smoother.hpp"
 
 #include <Eigen/Dense>
-#include <map>
 #include <memory>
+#include <map>
 #include <random>
 
 #include "common/factor_graph/batch.hpp"
 #include "tests/catch.hpp"
+#include "tests/factor_graph/graph_copy.hpp"
 
 using namespace understory;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -55,34 +56,6 @@ IncrementalParameters exact() {
   return parameters;
 }
 
-/// A graph of its own with the smoother's variables and factors.
-struct Copy {
-  explicit Copy(const FactorGraph& from) {
-    for (int v = 0; v < from.variable_capacity(); ++v) {
-      if (from.contains(VariableId(v))) {
-        names[v] = graph.add(from.type(VariableId(v)), from.value(VariableId(v)));
-      }
-    }
-    for (int f = 0; f < from.factor_capacity(); ++f) {
-      if (!from.contains(FactorId(f))) continue;
-      Factor factor;
-      factor.kind = from.kind(FactorId(f));
-      const auto variables = from.variables_of(f);
-      factor.variable_count = static_cast<int>(variables.size());
-      for (std::size_t i = 0; i < variables.size(); ++i) {
-        factor.variables[i] = names.at(variables[i]);
-      }
-      const auto measurement = from.measurement(FactorId(f));
-      std::copy(measurement.begin(), measurement.end(), factor.measurement.begin());
-      factor.information = from.information(FactorId(f));
-      factor.loss = from.loss(FactorId(f));
-      graph.add(factor);
-    }
-  }
-  FactorGraph graph;
-  std::map<int, VariableId> names;
-};
-
 double distance(const FactorGraph& graph, int v, const FactorGraph& other, VariableId w) {
   const Value& a = graph.value(VariableId(v));
   const Value& b = other.value(w);
@@ -101,7 +74,7 @@ double distance(const FactorGraph& graph, int v, const FactorGraph& other, Varia
 }
 
 double distance_to_batch(const FactorGraph& graph) {
-  Copy copy(graph);
+  GraphCopy copy(graph);
   BatchParameters parameters;
   parameters.relative_decrease = 1e-15;
   REQUIRE(optimise(copy.graph, parameters).ok);
@@ -226,7 +199,7 @@ TEST_CASE("On a torus of noisy poses the steps do not swing for ever", "[increme
   CHECK(relinearised < 250L * kPoses);
   const IncrementalUpdate last = smoother.settle();
   CHECK(last.relinearised_factors == 0);
-  Copy copy(smoother.graph());
+  GraphCopy copy(smoother.graph());
   REQUIRE(optimise(copy.graph, BatchParameters{}).ok);
   CHECK(smoother.graph().chi2() < 1.001 * copy.graph.chi2());
 }
@@ -356,7 +329,7 @@ TEST_CASE("The three batch methods agree, also with the smoother, under a robust
   for (int i = 0; i < 60; ++i) REQUIRE(smoother.update().ok);
   for (const BatchMethod method :
        {BatchMethod::kGaussNewton, BatchMethod::kLevenbergMarquardt, BatchMethod::kDogleg}) {
-    Copy copy(smoother.graph());
+    GraphCopy copy(smoother.graph());
     for (const auto& [v, w] : copy.names) {
       Value value = copy.graph.value(w);
       value[1] += 0.05;
