@@ -19,7 +19,8 @@ struct BackendRun {
   double chi2_final = 0.0;
   double chi2_batch = 0.0;  ///< Levenberg-Marquardt (CHOLMOD) from the final estimates.
   double batch_s = 0.0;
-  double rss_mb = 0.0;  ///< Of the process, at the end of the run.
+  double chi2_dead_reckoning = 0.0;  ///< The same from dead reckoning: often another basin.
+  double rss_mb = 0.0;               ///< Of the process, at the end of the run.
   double smoother_mb = 0.0;
   std::string error;
 };

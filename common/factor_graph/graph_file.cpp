@@ -79,13 +79,16 @@ class Reader {
  public:
   explicit Reader(GraphFormat format) : format_(format) {}
 
-  std::optional<std::string> read(std::string_view text) {
+  std::optional<std::string> read(std::string_view text, int line_number) {
     Line line(text);
     const std::string_view word = line.word();
     if (word.empty() || word.front() == '#') return std::nullopt;
     const bool known = read_vertex(word, line) || read_edge(word, line);
     if (known && !line.is_whole()) return "a number is missing or is none";
-    if (ties_to_itself()) return "an edge from a vertex to itself";
+    if (ties_to_itself()) {
+      result_.factors.pop_back();
+      result_.self_edges.push_back(line_number);
+    }
     return std::move(error_);
   }
 
@@ -261,7 +264,8 @@ std::variant<GraphFile, GraphFileError> read_graph(std::string_view text, GraphF
   Reader reader(format);
   for (int number = 1; !text.empty(); ++number) {
     const auto end = text.find('\n');
-    if (auto error = reader.read(text.substr(0, end))) return GraphFileError{number, *error};
+    if (auto error = reader.read(text.substr(0, end), number))
+      return GraphFileError{number, *error};
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
   }
   return reader.finish();

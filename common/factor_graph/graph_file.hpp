@@ -24,6 +24,8 @@ struct GraphFile {
   std::vector<Vertex> vertices;     ///< In order of their numbers; iSAM's landmarks last.
   std::vector<Factor> factors;      ///< In order of the file.
   std::vector<std::int64_t> fixed;  ///< Numbers of vertices that the file holds fast.
+  /// Lines of edges from a vertex to itself: left out, for they tell nothing about it.
+  std::vector<int> self_edges;
 };
 
 /// What is wrong with a file, and in which line.

@@ -53,13 +53,21 @@ TEST_CASE("A malformed line is named", "[graph_file]") {
   for (const std::string line :
        {"EDGE_SE2 0 1 1 0 0 11 12 13 22 23", "EDGE_SE2 0 1 1 0 x 1 0 0 1 0 1",
         "EDGE_SE2 0 1 1 0 nan 1 0 0 1 0 1", "VERTEX_SE2 0 0 0 0",
-        "EDGE_SE2 0.5 1 1 0 0 1 0 0 1 0 1", "EDGE_SE2_XY 0 1 1 1 1 0 1",
-        "EDGE_SE2 1 1 1 0 0 1 0 0 1 0 1"}) {
+        "EDGE_SE2 0.5 1 1 0 0 1 0 0 1 0 1", "EDGE_SE2_XY 0 1 1 1 1 0 1"}) {
     const std::string text = "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\n" + line + "\n";
     const auto result = read_graph(text, GraphFormat::kG2o);
     REQUIRE(std::holds_alternative<GraphFileError>(result));
     REQUIRE(std::get<GraphFileError>(result).line == 3);
   }
+}
+
+TEST_CASE("An edge from a vertex to itself is left out, and told", "[graph_file]") {
+  const GraphFile graph = require_graph(
+      "VERTEX_SE2 3 0 0 0\nVERTEX_SE2 5 1 0 0\nEDGE_SE2 5 5 0 0 0 1 0 0 1 0 1\n"
+      "EDGE_SE2 3 5 1 0 0 1 0 0 1 0 1\n");
+  REQUIRE(graph.factors.size() == 1);
+  REQUIRE(graph.vertices.size() == 2);
+  REQUIRE(graph.self_edges == std::vector<int>{3});
 }
 
 TEST_CASE("What is written reads back as the same graph", "[graph_file]") {
