@@ -3,7 +3,10 @@
 
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <vector>
 
 using namespace understory;
 
@@ -29,14 +32,21 @@ void one_scan(benchmark::State& state) {
   piece.inertial.emplace();
   piece.inertial->seconds = 0.1;
   piece.inertial->covariance = 1e-6 * Eigen::Matrix<double, 5, 5>::Identity();
+  std::vector<double> us;
   for (auto _ : state) {
+    const auto begin = std::chrono::steady_clock::now();
     filter.add(piece);
     benchmark::DoNotOptimize(filter.add(scan));
+    us.push_back(std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin)
+                     .count());
     piece.from_utime = scan.utime;
     piece.utime = scan.utime += 100000;
   }
   state.counters["used"] = static_cast<double>(filter.counters().landmarks_used) /
                            static_cast<double>(filter.counters().scans);
+  const auto at = us.begin() + static_cast<std::ptrdiff_t>(us.size() * 99 / 100);
+  std::nth_element(us.begin(), at, us.end());
+  state.counters["p99 us"] = *at;
 }
 
 }  // namespace
