@@ -21,8 +21,6 @@ constexpr double kNearlySettled_m2 = 1e-5;
 constexpr float kMaxRunResidual = 2.5F;
 constexpr float kMaxEdgeResidual = 3.5F;
 constexpr int kRounds = 4;
-/// Points scatter across a plane at least so much, however it is looked at.
-constexpr double kLeastAcross_m = 0.003;
 /// Runs of one stem seem so far apart, and so much more per metre of height.
 constexpr float kConsensus_m = 0.06F;
 constexpr float kConsensusLean = 0.06F;
@@ -95,12 +93,15 @@ void StemFitter::add_hits(const RingCloud& cloud, const Run& run, HitLanes& hits
   }
 }
 
-/// The edge lies somewhere between the run's last beam and the next.
+/// The edge lies somewhere between the run's last beam and the next; or, where that gave no return
+/// and may have been lost, between that and the one after it.
 void StemFitter::add_edge(const RingCloud& cloud, const Run& run, float side, EdgeLanes& edges,
                           std::size_t lane) const {
   const RingPoint& last = cloud.points()[side > 0.0F ? run.last : run.first];
   const double step = cloud.step_rad(run.ring);
-  const double beyond = side * (0.5 * step - sweep_.beam_width_rad);
+  const bool is_silent = side > 0.0F ? run.is_left_silent : run.is_right_silent;
+  const double lost = is_silent ? lost_share_ : 0.0;
+  const double beyond = side * ((0.5 + lost) * step - sweep_.beam_width_rad);
   Sight sight = cloud.sight(last);
   sight.direction += beyond * Eigen::Vector2d(-sight.direction.y(), sight.direction.x());
   sight.direction.normalize();
@@ -110,10 +111,10 @@ void StemFitter::add_edge(const RingCloud& cloud, const Run& run, float side, Ed
   edges.along_y[lane] = static_cast<float>(sight.direction.y());
   edges.z[lane] = last.z_m;
   edges.side[lane] = side;
-  edges.variance[lane] =
-      static_cast<float>(square(static_cast<double>(last.range_m)) *
-                             (square(step) / 12.0 + square(0.5 * sweep_.beam_width_rad)) +
-                         square(trunk_.roundness_sigma_m));
+  edges.variance[lane] = static_cast<float>(square(static_cast<double>(last.range_m)) *
+                                                (square(step) * (1.0 / 12.0 + lost * (1.0 - lost)) +
+                                                 square(0.5 * sweep_.beam_width_rad)) +
+                                            square(trunk_.roundness_sigma_m));
   edges.counts[lane] = 1.0F;
 }
 
@@ -190,7 +191,8 @@ void StemFitter::use_agreeing() {
 }
 
 /// Rings that fire at the same azimuths miss an upright edge by the same part of a step: together
-/// they say no more than one does.
+/// they say no more than one does. What they say together counts by their number, so that one ring
+/// that lost a beam at the edge does not say as much as all others.
 void StemFitter::share_edges() {
   std::array<float, 2 * kMaxRuns> shares{};
   const float range2 = square(used_hits_.front().range[0]);
@@ -206,8 +208,19 @@ void StemFitter::share_edges() {
       shares[i] += same ? 1.0F : 0.0F;
     }
   }
+  // Of each side: how many edges, and at how many places.
+  std::array<float, 2> edges{};
+  std::array<float, 2> places{};
+  const auto side_of = [&](std::size_t i) {
+    return used_edges_[i / kLanes].side[lane_of(i)] > 0.0F ? 1U : 0U;
+  };
   for (std::size_t i = 0; i < used_edge_count_; ++i) {
-    used_edges_[i / kLanes].variance[lane_of(i)] *= std::max(1.0F, shares[i]);
+    edges[side_of(i)] += 1.0F;
+    places[side_of(i)] += 1.0F / shares[i];
+  }
+  for (std::size_t i = 0; i < used_edge_count_; ++i) {
+    const auto side = side_of(i);
+    used_edges_[i / kLanes].variance[lane_of(i)] *= edges[side] / places[side];
   }
 }
 
@@ -304,12 +317,23 @@ bool StemFitter::sort_out(const Vector6d& state) {
   return is_new;
 }
 
+Matrix6d StemFitter::unused_information(const Vector6d& state) const {
+  StemSums sums;
+  add_unused(used_hits_, stem_of(state), noise_, sums);
+  Matrix6d unused;
+  Vector6d ignored;
+  sums.normal_equations(unused, ignored);
+  return unused;
+}
+
 void StemFitter::describe(const Vector6d& state, StemFit& fit) {
   Matrix6d information;
   Vector6d gradient;
   double squares = 0.0;
   linearise(state, information, gradient, squares);
-  fit.covariance = information.inverse();
+  // What grazing beams weigh less than their noise is lost, not unknown.
+  const Matrix6d inverse = information.inverse();
+  fit.covariance = inverse * (information - unused_information(state)) * inverse;
   fit.state = state;
   fit.state.head<2>() += anchor_m_;
   fit.reference_z_m = reference_z_m_;
@@ -336,50 +360,6 @@ void StemFitter::describe(const Vector6d& state, StemFit& fit) {
     if (run.ring != ring) ++fit.rings;
     ring = run.ring;
   }
-}
-
-/// A strip of a wall looks like a thick stem of which little is seen.
-void StemFitter::compare_with_plane(const Vector6d& state, StemFit& fit) {
-  const auto visit = [&](const auto& see) {
-    for (const HitLanes& group : used_hits_) {
-      for (std::size_t l = 0; l < kLanes && group.counts[l] > 0.0F; ++l) {
-        const Eigen::Vector2d along(group.along_x[l], group.along_y[l]);
-        see(Eigen::Vector2d(group.origin_x[l], group.origin_y[l]) + group.range[l] * along, along);
-      }
-    }
-  };
-  double count = 0.0;
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  Eigen::Matrix2d square_sum = Eigen::Matrix2d::Zero();
-  visit([&](const Eigen::Vector2d& point, const Eigen::Vector2d& /*along*/) {
-    count += 1.0;
-    mean += point;
-    square_sum += point * point.transpose();
-  });
-  mean /= count;
-  const Eigen::Matrix2d scatter = square_sum / count - mean * mean.transpose();
-  const double angle = 0.5 * std::atan2(2.0 * scatter(0, 1), scatter(0, 0) - scatter(1, 1));
-  const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
-  const Eigen::Vector2d normal(-direction.y(), direction.x());
-  double least = 0.0;
-  double most = 0.0;
-  double flat = 0.0;
-  visit([&](const Eigen::Vector2d& point, const Eigen::Vector2d& along) {
-    const double place = direction.dot(point - mean);
-    least = std::min(least, place);
-    most = std::max(most, place);
-    flat += square(normal.dot(point - mean)) /
-            (square(sweep_.range_sigma_m * normal.dot(along)) + square(trunk_.roundness_sigma_m) +
-             square(kLeastAcross_m));
-  });
-  hit_means_.resize(used_hits_.size());
-  square_terms(used_hits_, {}, stem_of(state), noise_, hit_means_, {});
-  double round = 0.0;
-  for (std::size_t k = 0; k < used_hits_.size(); ++k) {
-    for (const float counts : used_hits_[k].counts) round += counts * hit_means_[k];
-  }
-  fit.width_m = most - least;
-  fit.flat_excess = flat - round;
 }
 
 }  // namespace understory

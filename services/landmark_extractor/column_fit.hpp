@@ -48,6 +48,8 @@ class StemFitter {
 
   std::optional<StemFit> fit(const RingCloud& cloud, const std::vector<Run>& runs,
                              const Column& column);
+  /// How likely a beam without a return beside a run met the stem, too.
+  void expect_lost(double share) { lost_share_ = share; }
   /// The runs of the last fit that agreed with it, in order of height.
   const std::vector<std::uint32_t>& agreeing() const { return agreeing_; }
 
@@ -65,6 +67,8 @@ class StemFitter {
   bool settle(Vector6d& state, double settled_m2);
   void linearise(const Vector6d& state, Matrix6d& information, Vector6d& gradient,
                  double& squares) const;
+  /// What grazing hits know and do not weigh.
+  Matrix6d unused_information(const Vector6d& state) const;
   /// Whether the runs that agree are others than before.
   bool sort_out(const Vector6d& state);
   StemState stem_of(const Vector6d& state) const;
@@ -88,6 +92,7 @@ class StemFitter {
   SweepParameters sweep_;
   SweepTrunkParameters trunk_;
   BeamNoise noise_;
+  double lost_share_ = 0.0;  ///< See expect_lost().
   double reference_z_m_ = 0.0;
   Eigen::Vector2d anchor_m_ = Eigen::Vector2d::Zero();
   std::vector<RunSummary> summaries_;       ///< Of the column's runs.

@@ -56,7 +56,7 @@ struct SweepTrunkParameters {
   double prior_taper = -0.01;          ///< Change of radius per metre of height.
   double prior_taper_sigma = 0.01;
   double roundness_sigma_m = 0.005;       ///< Of the bark from a circle.
-  double shape_sigma_m = 0.003;           ///< What more points do not average out.
+  double shape_sigma_m = 0.0015;          ///< What more points do not average out.
   double max_lean_rad = 0.35;             ///< More than that is a branch.
   double max_sigma_m = 0.08;              ///< Trunks whose centre is known worse are not reported.
   double max_mean_square_residual = 3.0;  ///< Of ranges and edges from the axis, in sigma^2.

@@ -11,6 +11,8 @@ namespace {
 constexpr float kDropOuts = 3.5F;
 /// The next beam gave a return: it is not farther than this many steps away.
 constexpr float kNextBeam = 1.6F;
+/// Neighbouring returns from bark or a wall, not from leaves, differ less in range.
+constexpr float kSmooth_m = 0.06F;
 
 class RunFinder {
  public:
@@ -55,10 +57,14 @@ class RunFinder {
     return dx * dx + dy * dy <= limit * limit && q.azimuth_rad - p.azimuth_rad <= kDropOuts * step_;
   }
 
-  /// What lies beside the point `edge`: `beyond` is its neighbour in the ring.
-  Border border(std::size_t edge, std::size_t beyond) const {
-    float gap = std::abs(points_[edge].azimuth_rad - points_[beyond].azimuth_rad);
-    if (gap > std::numbers::pi_v<float>) gap = std::abs(gap - 2.0F * std::numbers::pi_v<float>);
+  /// Between the azimuths of two points.
+  float gap(std::size_t a, std::size_t b) const {
+    const float gap = std::abs(points_[a].azimuth_rad - points_[b].azimuth_rad);
+    return gap > std::numbers::pi_v<float> ? std::abs(gap - 2.0F * std::numbers::pi_v<float>) : gap;
+  }
+
+  /// What lies beside the point `edge`: `beyond` is its neighbour in the ring, `gap` rad away.
+  Border border(std::size_t edge, std::size_t beyond, float gap) const {
     const float behind = points_[beyond].range_m - points_[edge].range_m;
     if (gap > kDropOuts * step_) return Border::kClear;
     if (behind < -clearance_) return Border::kOccluded;
@@ -73,8 +79,14 @@ class RunFinder {
     run.first = static_cast<std::uint32_t>(first);
     run.last = static_cast<std::uint32_t>(last);
     run.ring = static_cast<std::uint16_t>(ring_);
-    run.right = border(first, first > begin_ ? first - 1 : end_ - 1);
-    run.left = border(last, last + 1 < end_ ? last + 1 : begin_);
+    const std::size_t before = first > begin_ ? first - 1 : end_ - 1;
+    const std::size_t after = last + 1 < end_ ? last + 1 : begin_;
+    const float gap_before = gap(first, before);
+    const float gap_after = gap(last, after);
+    run.right = border(first, before, gap_before);
+    run.left = border(last, after, gap_after);
+    run.is_right_silent = gap_before > kNextBeam * step_;
+    run.is_left_silent = gap_after > kNextBeam * step_;
     if (!run.stands_alone() && run.size() < kLeastOfWall) return;
     describe(run);
     runs.push_back(run);
@@ -95,8 +107,21 @@ class RunFinder {
     run.nearest_m = nearest;
     run.z_m = z / count;
     run.height_m = height / count;
+    count_lost(run);
     run.width_m = nearest * (points_[last].azimuth_rad - points_[first].azimuth_rad + step_);
     place(run);
+  }
+
+  /// Beams between two returns from one smooth surface met it, too.
+  void count_lost(Run& run) const {
+    for (std::size_t i = run.first; i < run.last; ++i) {
+      const RingPoint& point = points_[i];
+      const RingPoint& next = points_[i + 1];
+      if (std::abs(next.range_m - point.range_m) > kSmooth_m) continue;
+      const float steps = std::round((next.azimuth_rad - point.azimuth_rad) / step_);
+      run.met += steps;
+      run.lost += std::max(steps - 1.0F, 0.0F);
+    }
   }
 
   void place(Run& run) const {

@@ -20,10 +20,15 @@ struct Run {
   std::uint16_t ring = 0;
   Border right = Border::kUnknown;  ///< Before `first`.
   Border left = Border::kUnknown;   ///< After `last`.
-  float width_m = 0.0F;             ///< As seen from the sensor, with half a beam on each side.
-  float nearest_m = 0.0F;           ///< Least range.
-  float z_m = 0.0F;                 ///< Mean.
-  float height_m = 0.0F;            ///< Above ground, mean.
+  bool is_right_silent = false;     ///< The next beam on that side gave no return at all.
+  bool is_left_silent = false;
+  /// Beams that met its surface beyond doubt, but its first; and those of them without a return.
+  float met = 0.0F;
+  float lost = 0.0F;
+  float width_m = 0.0F;    ///< As seen from the sensor, with half a beam on each side.
+  float nearest_m = 0.0F;  ///< Least range.
+  float z_m = 0.0F;        ///< Mean.
+  float height_m = 0.0F;   ///< Above ground, mean.
   /// Where the centre would be were it round.
   float x_m = 0.0F;
   float y_m = 0.0F;

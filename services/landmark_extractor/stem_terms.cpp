@@ -6,8 +6,8 @@
 namespace understory {
 namespace {
 
-/// Beams that graze the stem more than this (part of the radius) say little of its range.
-constexpr float kMaxGraze = 0.9F;
+/// Beyond this (part of the radius) the range falls off too steeply for its derivative.
+constexpr float kMaxGraze = 0.98F;
 /// Residuals beyond this many sigma weigh as those at it (Huber).
 constexpr float kHuber = 2.0F;
 
@@ -18,7 +18,8 @@ struct Terms {
   Lanes by_x;
   Lanes by_y;
   Lanes by_radius;
-  Lanes weight;  ///< 1 / variance.
+  Lanes weight;  ///< 1 / variance, less where a beam grazes.
+  Lanes fade;    ///< By how much.
 };
 
 /// Where beams meet the stem.
@@ -39,18 +40,21 @@ struct Terms {
     const float square = radius * radius - m * m;
     const float inverse = 1.0F / std::sqrt(square);
     const float tangent = m * inverse;
-    // A footprint of some width on a slanting surface smears the range. Nearer to the edge the
-    // range falls off so steeply that only the edge itself says something.
+    // A footprint of some width on a slanting surface smears the range.
     const float smear = tangent * along * noise.beam_width_rad;
-    const float variance =
-        noise.range_variance + smear * smear + (std::abs(miss) > limit ? radius * radius : 0.0F);
+    const float variance = noise.range_variance + smear * smear;
+    // Residuals count across the bark. Where the range falls off steeply only the edge itself says
+    // something; and what jumped in and out with the estimate would pull it inwards.
+    const float share = miss / radius;
+    const float fade = std::max(1.0F - share * share, 0.0F);
     terms.above[l] = above;
     // The half chord is square / its root.
     terms.residual[l] = hits.range[l] - along + square * inverse;
     terms.by_x[l] = dx - tangent * dy;
     terms.by_y[l] = dy + tangent * dx;
     terms.by_radius[l] = -radius * inverse;
-    terms.weight[l] = hits.counts[l] / variance;
+    terms.fade[l] = fade * hits.counts[l];
+    terms.weight[l] = terms.fade[l] / variance;
   }
 }
 
@@ -124,9 +128,9 @@ struct Terms {
     float count = 0.0F;
     for (std::size_t l = 0; l < kLanes; ++l) {
       sum += terms.residual[l] * terms.residual[l] * terms.weight[l];
-      count += hits[i].counts[l];
+      count += terms.fade[l];
     }
-    hit_means[i] = sum / count;
+    hit_means[i] = sum / std::max(count, 1e-3F);
   }
   for (std::size_t i = 0; i < edges.size(); ++i) {
     take_edges(edges[i], stem, terms);
@@ -188,6 +192,16 @@ void add_terms(std::span<const HitLanes> hits, std::span<const EdgeLanes> edges,
   if (__builtin_cpu_supports("avx2")) return add_with_avx2(hits, edges, stem, noise, sums);
 #endif
   add_all(hits, edges, stem, noise, sums);
+}
+
+void add_unused(std::span<const HitLanes> hits, const StemState& stem, const BeamNoise& noise,
+                StemSums& sums) {
+  Terms terms;
+  for (const HitLanes& group : hits) {
+    take_hits(group, stem, noise, terms);
+    for (std::size_t l = 0; l < kLanes; ++l) terms.weight[l] *= 1.0F - terms.fade[l];
+    add(terms, sums);
+  }
 }
 
 void square_terms(std::span<const HitLanes> hits, std::span<const EdgeLanes> edges,

@@ -15,6 +15,10 @@ constexpr double kStump_m = 0.6;
 /// Returns so near the fitted surface are on it [sigma].
 constexpr double kOnBark = 2.0;
 
+/// What is seen in so many rings is a stem rather than a bush.
+constexpr std::size_t kTall = 5;
+constexpr double kMostLost = 0.5;
+
 /// The centre at breast height with its covariance.
 Detection to_detection(const StemFit& fit, const GroundHeight& ground, double breast_height,
                        const Eigen::Matrix2d& level_covariance_rad2, double shape_sigma) {
@@ -37,6 +41,31 @@ Detection to_detection(const StemFit& fit, const GroundHeight& ground, double br
   return detection;
 }
 
+/// How likely a beam without a return beside a run met the same object and was lost. Such beams are
+/// seen between the points of runs; at the edges are as many, among those that passed by.
+double share_of_lost(const std::vector<Run>& runs, const std::vector<Column>& columns) {
+  double met = 0.0;
+  double lost = 0.0;
+  double edges = 0.0;
+  double silent = 0.0;
+  const auto look = [&](Border border, bool is_silent) {
+    if (border != Border::kClear) return;
+    edges += 1.0;
+    silent += is_silent ? 1.0 : 0.0;
+  };
+  for (const Column& column : columns) {
+    if (column.runs.size() < kTall) continue;
+    for (const std::uint32_t k : column.runs) {
+      const Run& run = runs[k];
+      look(run.left, run.is_left_silent);
+      look(run.right, run.is_right_silent);
+      met += run.met;
+      lost += run.lost;
+    }
+  }
+  return lost > 0.0 && silent > 0.0 ? std::min(kMostLost, lost / met * edges / silent) : 0.0;
+}
+
 double largest_sigma(const Eigen::Matrix2d& covariance) {
   return std::sqrt(
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance, Eigen::EigenvaluesOnly)
@@ -51,7 +80,9 @@ void SweepTrunks::find(const RingCloud& cloud, const std::vector<Run>& runs,
                        std::vector<Detection>& detections) {
   const Eigen::Vector2f sensor = cloud.sensor_m().head<2>();
   const auto reach = static_cast<float>(sweep_.max_range_m) + 2.0F;
-  for (const Column& column : columns_.find(runs, trunk_, sensor, reach)) {
+  const auto& columns = columns_.find(runs, trunk_, sensor, reach);
+  fitter_.expect_lost(share_of_lost(runs, columns));
+  for (const Column& column : columns) {
     ++counters_.columns;
     if (const auto trunk = judge(cloud, runs, column, ground, level_covariance_rad2)) {
       detections.push_back(*trunk);
