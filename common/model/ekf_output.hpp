@@ -52,6 +52,16 @@ struct EkfMap {
   std::vector<EkfLandmark> landmarks;  ///< In order of track id.
 };
 
+/// Channel EKF_LEVEL: error of the attitude that levels sweeps, about the axes of `vehicle_level`.
+struct EkfLevel {
+  Utime utime = 0;
+  std::uint64_t sequence = 0;
+  Eigen::Vector2d error_rad = Eigen::Vector2d::Zero();   ///< Roll, pitch; as the filter knows it.
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< Of that [rad^2].
+  /// Of the whole error, as detections' covariances have it.
+  Eigen::Matrix2d told_covariance = Eigen::Matrix2d::Zero();
+};
+
 /// Channel VELOCITY_CORRECTION: what the filter knows about velocity and biases at utime.
 struct VelocityCorrection {
   Utime utime = 0;

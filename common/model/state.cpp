@@ -122,6 +122,20 @@ void to_json(Json& json, const OdometryBuffer& buffer) {
                matrix_to_json<2, 2>(known->covariance), known->gyro_bias_variance};
   }
 }
+void to_json(Json& json, const KnownLevel& level) {
+  json = nullptr;
+  if (const auto& known = level.latest()) {
+    json = {known->utime, known->sequence, matrix_to_json<2, 1>(known->error_rad),
+            matrix_to_json<2, 2>(known->covariance), matrix_to_json<2, 2>(known->told_covariance)};
+  }
+}
+void from_json(const Json& json, KnownLevel& level) {
+  level.restore(std::nullopt);
+  if (json.is_null()) return;
+  level.restore(EkfLevel{json.at(0).get<Utime>(), json.at(1).get<std::uint64_t>(),
+                         matrix_from_json<2, 1>(json.at(2)), matrix_from_json<2, 2>(json.at(3)),
+                         matrix_from_json<2, 2>(json.at(4))});
+}
 void from_json(const Json& json, OdometryBuffer& buffer) {
   for (const Json& piece : json.at(0)) buffer.restore(piece.get<Odometry>());
   if (!json.at(1).is_null()) buffer.set_bias(matrix_from_json<3, 1>(json.at(1)));

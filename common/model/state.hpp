@@ -8,6 +8,7 @@
 
 #include "common/geometry/se2.hpp"
 #include "common/model/keyframe.hpp"
+#include "common/model/level.hpp"
 #include "common/model/map.hpp"
 #include "common/model/odometry.hpp"
 #include "common/model/odometry_buffer.hpp"
@@ -48,6 +49,8 @@ void to_json(Json& json, const Preintegration& p);
 void from_json(const Json& json, Preintegration& p);
 void to_json(Json& json, const Odometry& odometry);
 void from_json(const Json& json, Odometry& odometry);
+void to_json(Json& json, const KnownLevel& level);
+void from_json(const Json& json, KnownLevel& level);
 void to_json(Json& json, const OdometryBuffer& buffer);
 /// Into an empty buffer.
 void from_json(const Json& json, OdometryBuffer& buffer);

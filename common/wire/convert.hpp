@@ -18,6 +18,7 @@
 #include "common/model/wheels.hpp"
 #include "common/wire/guard.hpp"
 #include "common/wire/result.hpp"
+#include "understory/ekf_level_t.hpp"
 #include "understory/ekf_map_t.hpp"
 #include "understory/ekf_pose_t.hpp"
 #include "understory/gnss_t.hpp"
@@ -56,6 +57,7 @@ Result<TrackedScan> from_wire(const tracked_landmarks_t& wire);
 Result<RawPose> from_wire(const raw_pose_t& wire);
 Result<EkfPose> from_wire(const ekf_pose_t& wire);
 Result<EkfMap> from_wire(const ekf_map_t& wire);
+Result<EkfLevel> from_wire(const ekf_level_t& wire);
 Result<VelocityCorrection> from_wire(const velocity_correction_t& wire);
 /// Refused where the receiver has no fix.
 Result<GnssFix> from_wire(const gnss_t& wire);
@@ -78,6 +80,7 @@ tracked_landmarks_t to_wire(const TrackedScan& scan);
 raw_pose_t to_wire(const RawPose& pose);
 ekf_pose_t to_wire(const EkfPose& pose);
 ekf_map_t to_wire(const EkfMap& map);
+ekf_level_t to_wire(const EkfLevel& level);
 velocity_correction_t to_wire(const VelocityCorrection& correction);
 
 pose2_t to_wire(const SE2& pose);
@@ -151,6 +154,10 @@ struct WireOf<EkfPose> {
 template <>
 struct WireOf<EkfMap> {
   using type = ekf_map_t;
+};
+template <>
+struct WireOf<EkfLevel> {
+  using type = ekf_level_t;
 };
 template <>
 struct WireOf<VelocityCorrection> {

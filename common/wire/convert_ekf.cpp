@@ -8,6 +8,7 @@ namespace {
 
 constexpr double kFastestMps = 1000.0;
 constexpr double kLargestBias = 100.0;
+constexpr double kLargestLevel_rad = 1.6;
 
 template <std::size_t N>
 void check_all(std::string_view field, const double (&values)[N], double limit, Checks& checks) {
@@ -119,6 +120,29 @@ ekf_map_t to_wire(const EkfMap& map) {
     out.kind = static_cast<std::int8_t>(landmark.kind);
     out.times_seen = static_cast<std::int32_t>(landmark.times_seen);
   }
+  return wire;
+}
+
+Result<EkfLevel> from_wire(const ekf_level_t& wire) {
+  Checks checks;
+  check_all("error_rad", wire.error_rad, kLargestLevel_rad, checks);
+  EkfLevel level;
+  level.utime = wire.utime;
+  level.sequence = static_cast<std::uint64_t>(wire.seq);
+  level.error_rad = Eigen::Map<const Eigen::Vector2d>(wire.error_rad);
+  level.covariance = checks.covariance("covariance", wire.covariance);
+  level.told_covariance = checks.covariance("told_covariance", wire.told_covariance);
+  if (checks.refusal()) return *checks.refusal();
+  return level;
+}
+
+ekf_level_t to_wire(const EkfLevel& level) {
+  ekf_level_t wire{};
+  wire.utime = level.utime;
+  wire.seq = static_cast<std::int64_t>(level.sequence);
+  copy_vector(level.error_rad, wire.error_rad);
+  copy_matrix(level.covariance, wire.covariance);
+  copy_matrix(level.told_covariance, wire.told_covariance);
   return wire;
 }
 

@@ -27,6 +27,7 @@ class EkfAdapter : public Adapter {
                                 {.queue_size = 200});
     poses_ = node.advertise<EkfPose>(channels_.pose);
     maps_ = node.advertise<EkfMap>(channels_.map);
+    levels_ = node.advertise<EkfLevel>(channels_.level);
     corrections_ = node.advertise<VelocityCorrection>(channels_.velocity_correction);
   }
 
@@ -40,6 +41,7 @@ class EkfAdapter : public Adapter {
       restarts_ = counters.restarts;
       node_->log(Node::Level::kWarning, "ekf_restart", counters.last_reason, channels_.pose);
     }
+    if (output.level) levels_.publish(*output.level);
     if (output.pose) poses_.publish(*output.pose);
     if (output.map) maps_.publish(*output.map);
     if (output.correction) corrections_.publish(*output.correction);
@@ -52,6 +54,7 @@ class EkfAdapter : public Adapter {
   std::uint64_t restarts_ = 0;
   Publisher<EkfPose> poses_;
   Publisher<EkfMap> maps_;
+  Publisher<EkfLevel> levels_;
   Publisher<VelocityCorrection> corrections_;
 };
 
@@ -60,7 +63,7 @@ class EkfAdapter : public Adapter {
 Service ekf_service(const EkfChannels& channels) {
   return {"ekf",
           channels.odometry + ", " + channels.tracked_landmarks + " -> " + channels.pose + ", " +
-              channels.map + ", " + channels.velocity_correction,
+              channels.map + ", " + channels.level + ", " + channels.velocity_correction,
           [channels] { return std::make_unique<EkfAdapter>(channels); }};
 }
 

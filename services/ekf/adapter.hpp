@@ -12,6 +12,7 @@ struct EkfChannels {
   std::string tracked_landmarks = "TRACKED_LANDMARKS";
   std::string pose = "EKF_POSE";
   std::string map = "EKF_MAP";
+  std::string level = "EKF_LEVEL";
   std::string velocity_correction = "VELOCITY_CORRECTION";
 };
 

@@ -172,6 +172,7 @@ EkfOutput Ekf::add(const Odometry& piece) {
   used_ = refused_ = 0;
   EkfOutput output;
   output.pose = pose();
+  output.level = level();
   if (waiting_.empty() ? piece.is_standing : waiting_.front().is_standing) {
     output.correction = outputs().correction;
   }
@@ -327,9 +328,17 @@ EkfPose Ekf::pose() {
   return out;
 }
 
+/// Of the latest pose.
+std::optional<EkfLevel> Ekf::level() const {
+  if (!level_covariance_) return std::nullopt;
+  return EkfLevel{utime_, last_sound_.sequence, state_.level,
+                  state_.covariance_block<2, 2>(ekf::kLevel, ekf::kLevel), *level_covariance_};
+}
+
 EkfOutput Ekf::outputs() {
   EkfOutput out;
   out.pose = pose();
+  out.level = level();
   EkfMap& map = out.map.emplace();
   map.utime = utime_;
   map.sequence = map_sequence_++;

@@ -41,6 +41,7 @@ struct EkfOutput {
   std::optional<EkfPose> pose;
   std::optional<EkfMap> map;
   std::optional<VelocityCorrection> correction;
+  std::optional<EkfLevel> level;  ///< With each pose, where sweeps are levelled.
 };
 
 class Ekf {
@@ -90,6 +91,7 @@ class Ekf {
   void leave_place();
   void bridge(Utime utime);
   EkfPose pose();
+  std::optional<EkfLevel> level() const;
   EkfOutput outputs();
 
   // ekf_scan.cpp: landmarks.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/model/level.hpp"
 #include "services/ekf/ekf.hpp"
 #include "services/ekf/ground_marks.hpp"
 #include "services/ekf/prediction.hpp"
@@ -18,8 +19,6 @@ constexpr std::uint32_t kFewLandmarks = 3;
 constexpr double kUnnoticed_s = 0.1;
 /// Of the height's variance that the level makes: less was made without it.
 constexpr double kLevelled = 0.5;
-/// Of a sighting's covariance, when the level's part is out.
-constexpr double kLeastOwnShare = 0.05;
 /// Of what a scan says of the vehicle's rise: it has noise too, and a slope is gentle.
 constexpr double kRiseGain = 0.2;
 
@@ -124,14 +123,7 @@ ekf::Sighting Ekf::sighting(const Detection& seen) const {
   if (seen.covariance_m2(2, 2) < kLevelled * up.dot(*level_covariance_ * up)) return result;
   result.height_m = seen.position_m.z();
   const Eigen::Matrix2d arm = result.height_m * ekf::level_displacement();
-  // As far as there is something left.
-  const Eigen::LLT<Eigen::Matrix2d> factor(whole);
-  const Eigen::Matrix2d root = factor.matrixL().solve(arm);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> share(root * *level_covariance_ *
-                                                             root.transpose());
-  const Eigen::Matrix2d turn = factor.matrixL() * share.eigenvectors();
-  const Eigen::Vector2d left = (1.0 - share.eigenvalues().array()).cwiseMax(kLeastOwnShare);
-  result.covariance_m2 = turn * left.asDiagonal() * turn.transpose();
+  result.covariance_m2 = without_level(whole, arm, *level_covariance_);
   return result;
 }
 

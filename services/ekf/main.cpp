@@ -8,6 +8,7 @@ int main(int argc, char** argv) {
           .tracked_landmarks = "TRACKED_LANDMARKS",      // in: consistent landmarks of a sweep
           .pose = "EKF_POSE",                            // out: pose, velocity, biases
           .map = "EKF_MAP",                              // out: landmarks of the active state
+          .level = "EKF_LEVEL",                          // out: error of the sweeps' level
           .velocity_correction = "VELOCITY_CORRECTION",  // out: what the input should know
       }),
       argc, argv);

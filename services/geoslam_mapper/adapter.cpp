@@ -68,6 +68,8 @@ class MapperAdapter : public Adapter {
     // Bias and velocity, and the motion to gate by; no measurement: it was made from the same
     // detections.
     node.subscribe<EkfPose>(channels_.ekf_pose, [this](const EkfPose& pose) { stage_->add(pose); });
+    node.subscribe<EkfLevel>(channels_.ekf_level,
+                             [this](const EkfLevel& level) { stage_->add(level); });
     node.subscribe<map_request_t>(channels_.map_request,
                                   [this](const map_request_t& request) { answer(request); },
                                   {.queue_size = 4, .sequenced = false, .journaled = false});
@@ -203,8 +205,8 @@ class MapperAdapter : public Adapter {
 Service geoslam_mapper_service(const MapperChannels& channels) {
   return {"geoslam_mapper",
           channels.keyframe + ", " + channels.landmarks + ", " + channels.odometry + ", " +
-              channels.ekf_pose + " -> " + channels.slam_pose + ", " + channels.slam_update + ", " +
-              channels.map + ", " + channels.map_delta,
+              channels.ekf_pose + ", " + channels.ekf_level + " -> " + channels.slam_pose + ", " +
+              channels.slam_update + ", " + channels.map + ", " + channels.map_delta,
           [channels] { return std::make_unique<MapperAdapter>(channels); }};
 }
 

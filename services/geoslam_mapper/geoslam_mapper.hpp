@@ -32,6 +32,8 @@ class MapperMethod {
   /// What the filter says: odometry that comes later is turned by its bias, and a keyframe with few
   /// landmarks that moves otherwise is not believed.
   virtual void add(const EkfPose& /*pose*/) {}
+  /// The error of the level as the filter knows it: scans are located as levelled by it.
+  virtual void add(const EkfLevel& /*level*/) {}
   /// A map to start from (thesis §4.3.1), frame `map`; before the first keyframe.
   virtual void start_with(std::span<const MapLandmark> landmarks) = 0;
 

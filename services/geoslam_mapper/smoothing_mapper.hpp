@@ -4,6 +4,7 @@
 
 #include "common/factor_graph/smoother.hpp"
 #include "common/geometry/registration.hpp"
+#include "common/model/level.hpp"
 #include "common/model/odometry_buffer.hpp"
 #include "services/geoslam_mapper/filter_track.hpp"
 #include "services/geoslam_mapper/geoslam_mapper.hpp"
@@ -23,6 +24,7 @@ class SmoothingMapper final : public MapperMethod {
     odometry_.know(pose);
     filter_.add(pose);
   }
+  void add(const EkfLevel& level) override { level_.know(level); }
   void start_with(std::span<const MapLandmark> landmarks) override;
   std::vector<KeyframePose> trajectory() const override;
   std::vector<MapLandmark> landmarks() const override;
@@ -121,6 +123,7 @@ class SmoothingMapper final : public MapperMethod {
   std::vector<LandmarkId> landmark_of_point_;
   OdometryBuffer odometry_;
   FilterTrack filter_;
+  KnownLevel level_;
   bool map_was_given_ = false;
   std::uint32_t keyframes_ = 0;  ///< Accepted.
   /// The last accepted keyframe's last member: odometry goes on from here. Frame: the node's

@@ -18,8 +18,9 @@ std::optional<SE2WithCovariance> SmoothingMapper::step_from_last_scan(
   return odometry_.between(located_->utime, scan.utime);
 }
 
-std::optional<SE2WithCovariance> SmoothingMapper::locate(const LandmarkScan& scan) {
-  if (!located_ || scan.utime <= located_->utime) return std::nullopt;
+std::optional<SE2WithCovariance> SmoothingMapper::locate(const LandmarkScan& raw) {
+  if (!located_ || raw.utime <= located_->utime) return std::nullopt;
+  const LandmarkScan scan = level_.levelled(raw);
   const double reach = scan.field_of_view.max_range_m + kReachMargin_m;
   std::vector<UncertainPoint> reference;
   for (const LandmarkId id : store_.index().near({located_->map_T_vehicle.translation(), reach})) {

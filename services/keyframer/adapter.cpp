@@ -28,6 +28,8 @@ class KeyframerAdapter : public Adapter {
                              {.queue_size = 2000});
     // Of the filter's words the bias and the velocity: its pose was made from the same detections.
     node.subscribe<EkfPose>(channels_.ekf_pose, [this](const EkfPose& pose) { stage_->add(pose); });
+    node.subscribe<EkfLevel>(channels_.ekf_level,
+                             [this](const EkfLevel& level) { stage_->add(level); });
     keyframes_ = node.advertise<Keyframe>(channels_.keyframe);
   }
 
@@ -45,8 +47,8 @@ class KeyframerAdapter : public Adapter {
 
 Service keyframer_service(const KeyframerChannels& channels) {
   return {"keyframer",
-          channels.landmarks + ", " + channels.odometry + ", " + channels.ekf_pose + " -> " +
-              channels.keyframe,
+          channels.landmarks + ", " + channels.odometry + ", " + channels.ekf_pose + ", " +
+              channels.ekf_level + " -> " + channels.keyframe,
           [channels] { return std::make_unique<KeyframerAdapter>(channels); }};
 }
 

@@ -37,7 +37,8 @@ JointKeyframer::JointKeyframer(const JointKeyframerParameters& parameters)
 
 void JointKeyframer::add(const Odometry& odometry) { odometry_.add(odometry); }
 
-std::optional<Keyframe> JointKeyframer::add(const LandmarkScan& scan) {
+std::optional<Keyframe> JointKeyframer::add(const LandmarkScan& raw) {
+  const LandmarkScan scan = level_.levelled(raw);
   ++counters_.scans;
   if (last_utime_ && scan.utime <= *last_utime_) {
     counters_.last_reason = "scan not later than the last one";

@@ -2,6 +2,7 @@
 // together.
 #pragma once
 
+#include "common/model/level.hpp"
 #include "common/model/odometry_buffer.hpp"
 #include "services/keyframer/block_adjustment.hpp"
 #include "services/keyframer/keyframer.hpp"
@@ -16,6 +17,7 @@ class JointKeyframer final : public KeyframerMethod {
   std::optional<Keyframe> add(const LandmarkScan& scan) override;
   void add(const Odometry& odometry) override;
   void add(const EkfPose& pose) override { odometry_.know(pose); }
+  void add(const EkfLevel& level) override { level_.know(level); }
   const KeyframerCounters& counters() const override { return counters_; }
   std::string save() const override;
   void load(const std::string& state) override;
@@ -40,6 +42,7 @@ class JointKeyframer final : public KeyframerMethod {
   std::optional<Utime> last_utime_;
   std::uint64_t next_sequence_ = 0;
   std::optional<SE2> local_T_previous_base_;
+  KnownLevel level_;
   KeyframerCounters counters_;
 };
 

@@ -5,7 +5,7 @@
 namespace understory {
 namespace {
 
-constexpr int kStateVersion = 2;
+constexpr int kStateVersion = 3;
 
 Json to_json_value(const Track& t) {
   return {t.id,
@@ -67,6 +67,7 @@ std::string JointKeyframer::save() const {
                    {"last_utime", optional_to_json(last_utime_)},
                    {"next_sequence", next_sequence_},
                    {"previous_base", optional_to_json(local_T_previous_base_)},
+                   {"level", level_},
                    {"counters",
                     {counters_.scans, counters_.scans_unmatched, counters_.keyframes,
                      counters_.keyframes_withheld, counters_.last_reason}}});
@@ -92,6 +93,7 @@ void JointKeyframer::load(const std::string& state) {
   loaded.last_utime_ = optional_from_json<Utime>(json.at("last_utime"));
   loaded.next_sequence_ = json.at("next_sequence").get<std::uint64_t>();
   loaded.local_T_previous_base_ = optional_from_json<SE2>(json.at("previous_base"));
+  json.at("level").get_to(loaded.level_);
   const Json& counters = json.at("counters");
   loaded.counters_ = {counters.at(0).get<std::uint64_t>(), counters.at(1).get<std::uint64_t>(),
                       counters.at(2).get<std::uint64_t>(), counters.at(3).get<std::uint64_t>(),

@@ -34,6 +34,8 @@ class KeyframerMethod {
   /// The inertial bias and the velocity as the filter knows them: odometry that comes later starts
   /// from there.
   virtual void add(const EkfPose& /*pose*/) {}
+  /// The error of the level as the filter knows it: scans that come later are levelled by it.
+  virtual void add(const EkfLevel& /*level*/) {}
   virtual const KeyframerCounters& counters() const = 0;
   /// The whole state, for a restart; load() takes what save() of the same method gave.
   virtual std::string save() const = 0;

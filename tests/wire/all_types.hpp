@@ -14,8 +14,8 @@
 namespace understory::test {
 
 using AllTypes =
-    std::tuple<association_t, channel_health_t, config_t, detection_t, ekf_landmark_t, ekf_map_t,
-               ekf_pose_t, gnss_t, ground_truth_t, health_t, imu_t, keyframe_landmark_t,
+    std::tuple<association_t, channel_health_t, config_t, detection_t, ekf_landmark_t, ekf_level_t,
+               ekf_map_t, ekf_pose_t, gnss_t, ground_truth_t, health_t, imu_t, keyframe_landmark_t,
                keyframe_member_t, keyframe_pose_t, keyframe_t, landmarks_t, lidar_scan_t,
                level_error_t, lidar_sweep_t, log_t, map_delta_t, map_landmark_t, map_request_t,
                map_t, merge_t, odometry2_t, odometry_t, pose2_t, preintegration_t, raw_pose_t,
@@ -24,7 +24,7 @@ using AllTypes =
 
 using AllValues = std::tuple<LandmarkScan, Odometry, Keyframe, MapUpdate, SlamPose, WholeMap,
                              MapDelta, PlanarScan, WheelSample, GnssFix, ImuSample, PointSweep,
-                             TrackedScan, RawPose, EkfPose, EkfMap, VelocityCorrection>;
+                             TrackedScan, RawPose, EkfPose, EkfMap, EkfLevel, VelocityCorrection>;
 
 /// Calls `f` with a null pointer to each type of the tuple.
 template <class Tuple, class F>

@@ -224,6 +224,8 @@ TEST_CASE("the front end's values survive the wire") {
                              2});
     check_round_trip(
         VelocityCorrection{3, 4, make.vector<2>(5.0), make.vector<3>(0.1), make.covariance<5>()});
+    check_round_trip(
+        EkfLevel{3, 4, make.vector<2>(0.01), make.covariance<2>(), make.covariance<2>()});
     EkfMap map{3, 4, {}};
     TrackedScan tracked{3, 4, {40.0, 0.1, 2.0}, {}};
     for (std::size_t i = make.count(); i > 0; --i) {

@@ -19,6 +19,7 @@ constexpr Pin kPins[] = {
     {"config_t", 0xd7cb12688925d455ULL},
     {"detection_t", 0x977e0277761b6355ULL},
     {"ekf_landmark_t", 0x7f92258080217ee1ULL},
+    {"ekf_level_t", 0xf2a1444334275349ULL},
     {"ekf_map_t", 0x908130a9cc22dfadULL},
     {"ekf_pose_t", 0x6b017bfb16cf0817ULL},
     {"gnss_t", 0xd96d0af0ca3d759aULL},

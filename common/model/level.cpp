@@ -1,0 +1,45 @@
+#include "common/model/level.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <cstdlib>
+
+namespace understory {
+namespace {
+
+/// The level's error changes over some seconds.
+constexpr Utime kLately_us = 2'000'000;
+/// Of a detection's covariance, when the level's part is out.
+constexpr double kLeastOwnShare = 0.05;
+
+}  // namespace
+
+Eigen::Matrix2d without_level(const Eigen::Matrix2d& covariance_m2, const Eigen::Matrix2d& arm,
+                              const Eigen::Matrix2d& level_covariance_rad2) {
+  const Eigen::LLT<Eigen::Matrix2d> factor(covariance_m2);
+  const Eigen::Matrix2d root = factor.matrixL().solve(arm);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> share(root * level_covariance_rad2 *
+                                                             root.transpose());
+  const Eigen::Matrix2d turn = factor.matrixL() * share.eigenvectors();
+  const Eigen::Vector2d left = (1.0 - share.eigenvalues().array()).cwiseMax(kLeastOwnShare);
+  return turn * left.asDiagonal() * turn.transpose();
+}
+
+LandmarkScan KnownLevel::levelled(LandmarkScan scan) const {
+  if (!level_ || std::abs(scan.utime - level_->utime) > kLately_us) return scan;
+  Eigen::Matrix2d by_height;
+  by_height << 0.0, 1.0, -1.0, 0.0;
+  for (Detection& detection : scan.detections) {
+    if (!detection.position_m.allFinite() || !detection.covariance_m2.allFinite()) continue;
+    const Eigen::Matrix2d arm = detection.position_m.z() * by_height;
+    detection.position_m.head<2>() -= arm * level_->error_rad;
+    const Eigen::Matrix2d whole = detection.covariance_m2.topLeftCorner<2, 2>();
+    if (whole.llt().info() != Eigen::Success) continue;
+    const Eigen::Matrix2d own = without_level(whole, arm, level_->told_covariance);
+    detection.covariance_m2.topLeftCorner<2, 2>() =
+        own + arm * level_->covariance * arm.transpose();
+  }
+  return scan;
+}
+
+}  // namespace understory
