@@ -1,5 +1,6 @@
 #include "eval/chain_drive.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -166,6 +167,32 @@ TrajectoryError trajectory_error(std::span<const StampedPose> estimate,
   return error;
 }
 
+PoseConsistency pose_consistency(std::span<const SlamPose> poses,
+                                 std::span<const StampedPose> truth) {
+  PoseConsistency result;
+  std::optional<SE2> map_T_world;
+  double count = 0.0;
+  for (const SlamPose& pose : poses) {
+    const auto true_pose = pose_at(truth, pose.utime);
+    if (!true_pose) continue;
+    const SE2 map_T_vehicle = pose.map_T_vehicle();
+    if (!map_T_world) {
+      map_T_world = map_T_vehicle * true_pose->inverse();
+      continue;
+    }
+    const Eigen::Vector3d error =
+        (map_T_vehicle.inverse() * *map_T_world * *true_pose).coordinates();
+    // A micrometre, a microradian: the first keyframe's own poses may be exact.
+    const Eigen::Matrix3d covariance = pose.covariance + 1e-12 * Eigen::Matrix3d::Identity();
+    result.mean_nees += error.dot(covariance.inverse() * error);
+    result.end_error_m = error.head<2>().norm();
+    result.end_sigma_m = std::sqrt(covariance.topLeftCorner<2, 2>().trace());
+    count += 1.0;
+  }
+  result.mean_nees /= std::max(count, 1.0);
+  return result;
+}
+
 std::size_t wrong_updates(const ChainRun& run, double limit_m) {
   std::vector<Eigen::Vector2d> estimated;
   std::vector<Eigen::Vector2d> real;
@@ -192,6 +219,12 @@ std::vector<StampedPose> poses_of(std::span<const EkfPose> poses) {
 std::vector<StampedPose> poses_of(std::span<const SlamPose> poses) {
   std::vector<StampedPose> result;
   for (const SlamPose& pose : poses) result.push_back({pose.utime, pose.map_T_vehicle()});
+  return result;
+}
+
+std::vector<StampedPose> poses_of(std::span<const KeyframePose> keyframes) {
+  std::vector<StampedPose> result;
+  for (const KeyframePose& one : keyframes) result.push_back({one.utime, one.map_T_vehicle});
   return result;
 }
 

@@ -80,11 +80,21 @@ struct TrajectoryError {
 TrajectoryError trajectory_error(std::span<const StampedPose> estimate,
                                  std::span<const StampedPose> truth);
 
+/// Errors against what is said of them, with the first pose held: it is the map's frame.
+struct PoseConsistency {
+  double mean_nees = 0.0;  ///< Of the pose; 3 is exact.
+  double end_error_m = 0.0;
+  double end_sigma_m = 0.0;  ///< Root of the trace of the position's covariance.
+};
+PoseConsistency pose_consistency(std::span<const SlamPose> poses,
+                                 std::span<const StampedPose> truth);
+
 /// Updates that were accepted more than `limit_m` from the truth, after one rigid alignment: the
 /// heading of a single first scan (3 mrad) would be 6 m at the end of a road.
 std::size_t wrong_updates(const ChainRun& run, double limit_m = 1.0);
 
 std::vector<StampedPose> poses_of(std::span<const EkfPose> poses);
 std::vector<StampedPose> poses_of(std::span<const SlamPose> poses);
+std::vector<StampedPose> poses_of(std::span<const KeyframePose> keyframes);
 
 }  // namespace understory::eval

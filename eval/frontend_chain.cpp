@@ -53,6 +53,12 @@ void add_chain_rows(const ChainRun& run, std::optional<double> ate_target_m, Fro
     rows.state("SLAM_POSE ATE", slam.ate_rms_m, "m");
   }
   rows.state("SLAM_POSE largest error", slam.largest_m, "m");
+  rows.state("map's keyframes at the end, ATE",
+             trajectory_error(poses_of(run.keyframes), run.truth).ate_rms_m, "m");
+  const PoseConsistency said = pose_consistency(run.slam, run.truth);
+  rows.state("SLAM_POSE, first pose held: mean NEES (3)", said.mean_nees, "");
+  rows.state("SLAM_POSE, first pose held: error at the end", said.end_error_m, "m");
+  rows.state("SLAM_POSE, first pose held: what it says of it", said.end_sigma_m, "m");
   rows.state("EKF_POSE ATE", ekf.ate_rms_m, "m");
   rows.at_most("EKF_POSE drift", 100.0 * ekf.end_m / std::max(ekf.driven_m, 1.0), "%", 0.5);
   rows.state("RAW_POSE ATE", reckoned.ate_rms_m, "m");

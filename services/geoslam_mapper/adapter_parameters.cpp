@@ -55,6 +55,18 @@ void describe_evidence(SmoothingMapperParameters& p, ParameterTable& table) {
             "is not believed; 0: the filter is not asked");
   table.add("ours.min_matched_ratio", p.min_matched_ratio, {0.0, 1.0}, "",
             "Of what can be matched: below, a predicted pose is not believed.");
+  table.add("ours.lasting_share", p.lasting_share, {0.0, 0.9}, "",
+            "Of a sighting's variance: what stays the same over lasting_m; 0 = all is new.");
+  table.add("ours.lasting_m", p.lasting_m, {0.01, 1000.0}, "m",
+            "Way over which what lasts of a sighting's error fades.");
+  table.add("ours.standing_share", p.standing_share, {0.0, 1.0}, "",
+            "Of a sighting's variance: what stays the same while the vehicle stands.");
+  table.add("ours.scale_sigma", p.scale_sigma, {0.0, 0.1}, "",
+            "Of distances, the same for all landmarks and for ever: told in covariances.");
+  table.add("ours.start_heading_sigma_rad", p.start_heading_sigma_rad, {1e-5, 10.0}, "rad",
+            "A map begins with a keyframe whose ends the odometry ties to so much heading...");
+  table.add("ours.start_wait_s", p.start_wait_s, {0.0, 60.0}, "s",
+            "... or, after so long, with any.");
   table.add("ours.min_matched", p.min_matched, {1, 1000}, "",
             "Fewest matches of a pose that odometry does not support.");
   table.add("ours.outlier_chi2", p.outlier_chi2, {1.0, 1e6}, "",

@@ -67,6 +67,18 @@ struct SmoothingMapperParameters {
   /// A keyframe this near to an earlier one, and so similarly turned, is folded into it.
   double fold_distance_m = 0.05;
   double fold_angle_rad = 0.02;
+  /// Of a sighting's variance: what stays the same over so much way (a trunk is no cylinder, and
+  /// looks the same from the same place); 0 = all noise is new in every scan.
+  double lasting_share = 0.0;
+  double lasting_m = 20.0;
+  /// The same while the vehicle stands, where beams meet the same bark again and again.
+  double standing_share = 0.0;
+  /// Of distances, the same for all landmarks and for ever. Told in covariances, not estimated.
+  double scale_sigma = 0.0;
+  /// A map begins with a keyframe whose ends the odometry ties to so much heading (before that the
+  /// gyro's bias is unknown); but after so long with any.
+  double start_heading_sigma_rad = 2e-3;
+  double start_wait_s = 2.0;
   /// Of the landmarks of a given map that states no covariance.
   double given_map_sigma_m = 0.05;
 };

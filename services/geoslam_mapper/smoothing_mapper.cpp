@@ -1,14 +1,19 @@
 #include "services/geoslam_mapper/smoothing_mapper.hpp"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace understory {
 namespace {
 
 /// Keeps an exactly known pose invertible: a micrometre, a microradian.
 const Eigen::Matrix3d kTiny = 1e-12 * Eigen::Matrix3d::Identity();
+
+/// Landmarks are told at breast height; the level displaces them by it.
+constexpr double kLandmarkHeight_m = 1.3;
 
 SmootherParameters limits(const SmoothingMapperParameters& parameters) {
   SmootherParameters result;
@@ -89,7 +94,7 @@ MapUpdate SmoothingMapper::add(const Keyframe& keyframe) {
       update.reason = "localisation only, but no map was given";
       return update;
     }
-    start_map(keyframe, update);
+    if (may_start(keyframe, update)) start_map(keyframe, update);
     return update;
   }
   const std::optional<Prediction> prediction = predict(keyframe);
@@ -130,7 +135,7 @@ void SmoothingMapper::report(const Keyframe& keyframe, const Placement& placemen
                              MapUpdate& update) {
   const SE2WithCovariance centre_T_base{keyframe.centre_T_base(),
                                         keyframe.members.front().covariance};
-  const NodeIndex node = add_node(placement.map_T_centre.mean);
+  const NodeIndex node = add_node(placement.map_T_centre.mean, keyframe);
   add_base({node, keyframe.sequence, keyframe.utime, centre_T_base, middle_of(keyframe), false});
   ++keyframes_;
   update.associations = placement.associations;
@@ -138,6 +143,20 @@ void SmoothingMapper::report(const Keyframe& keyframe, const Placement& placemen
   map_T_last_base_ = compound(placement.map_T_centre, centre_T_base);
   update.covariance = map_T_last_base_->covariance;
   update.status = MapUpdateStatus::kUpdated;
+}
+
+/// Before the gyro's bias is known the first scan's heading is not, and it would be the map's.
+bool SmoothingMapper::may_start(const Keyframe& keyframe, MapUpdate& update) {
+  if (!parameters_.use_odometry) return true;
+  if (!first_offered_) first_offered_ = keyframe.utime;
+  const double waited_s = 1e-6 * static_cast<double>(keyframe.utime - *first_offered_);
+  if (waited_s >= parameters_.start_wait_s) return true;
+  const auto motion = odometry_.between(keyframe.utime, keyframe.members.back().utime);
+  if (!motion || !odometry_.pieces().back().inertial) return true;
+  if (std::sqrt(motion->covariance(2, 2)) <= parameters_.start_heading_sigma_rad) return true;
+  update.status = MapUpdateStatus::kNotSure;
+  update.reason = "the gyro's bias is not known yet";
+  return false;
 }
 
 /// The first keyframe's base is the origin of the map; where its centre is seen from there is where
@@ -152,9 +171,14 @@ void SmoothingMapper::start_map(const Keyframe& keyframe, MapUpdate& update) {
   const SE2WithCovariance centre_T_base{keyframe.centre_T_base(),
                                         keyframe.members.front().covariance};
   const SE2WithCovariance base_T_centre = inverse(centre_T_base);
-  const NodeIndex node = add_node(base_T_centre.mean);
+  const NodeIndex node = add_node(base_T_centre.mean, keyframe);
   smoother_.add(PosePrior{nodes_[node].centre, base_T_centre.mean, kTiny.inverse()});
   add_base({node, keyframe.sequence, keyframe.utime, centre_T_base, middle_of(keyframe), true});
+  if (const auto& level = level_.latest()) {
+    const Eigen::Rotation2D<double> quarter(-0.5 * std::numbers::pi);
+    const Eigen::Matrix2d arm = kLandmarkHeight_m * quarter.toRotationMatrix();
+    start_covariance_m2_ = arm * level->covariance * arm.transpose();
+  }
   ++keyframes_;
   discover(keyframe, node, update);
   const SmootherUpdate solved = smoother_.update();
@@ -183,6 +207,17 @@ SE2 middle_of(const Keyframe& keyframe) {
   return keyframe.centre_T_base() * SE2(sum.x(), sum.y(), sum.z());
 }
 
+/// Covariance (right perturbation) of what the graph cannot know, since all that is seen shares it:
+/// how wrongly the first keyframe was levelled, and the scale of distances.
+Eigen::Matrix3d SmoothingMapper::shared_error(const SE2& map_T_vehicle) const {
+  const Eigen::Matrix2d back = map_T_vehicle.rotation().transpose();
+  const Eigen::Vector2d off = parameters_.scale_sigma * (back * map_T_vehicle.translation());
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  covariance.topLeftCorner<2, 2>() =
+      back * start_covariance_m2_ * back.transpose() + off * off.transpose();
+  return covariance;
+}
+
 /// What every accepted keyframe leaves behind. Its base is bases_.back().
 void SmoothingMapper::finish(const Keyframe& keyframe, MapUpdate& update) {
   const Base& base = bases_.back();
@@ -195,8 +230,9 @@ void SmoothingMapper::finish(const Keyframe& keyframe, MapUpdate& update) {
     map_T_centre = compound(origin_T_first, {origin_T_first.mean.inverse() * map_T_centre.mean,
                                              map_T_centre.covariance});
   }
-  const SE2WithCovariance map_T_base =
+  SE2WithCovariance map_T_base =
       base.is_origin ? SE2WithCovariance{} : compound(map_T_centre, base.centre_T_base);
+  if (!base.is_origin) map_T_base.covariance += shared_error(map_T_base.mean);
   update.map_T_vehicle = map_T_base.mean;
   update.covariance = map_T_base.covariance;
   const KeyframeMember& last = keyframe.members.back();

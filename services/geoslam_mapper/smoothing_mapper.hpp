@@ -37,6 +37,7 @@ class SmoothingMapper final : public MapperMethod {
   struct Node {
     PoseId centre{};
     std::map<LandmarkId, ObservationId> observations;  ///< Each landmark's factor in the graph.
+    bool stands = false;                               ///< The vehicle stood there all the while.
   };
   /// A keyframe's base, rigidly tied to a node (a leaf of the graph: nothing else measures it).
   struct Base {
@@ -61,9 +62,11 @@ class SmoothingMapper final : public MapperMethod {
 
   // smoothing_mapper.cpp: the story of one keyframe.
   std::string malformed(const Keyframe& keyframe) const;
+  bool may_start(const Keyframe& keyframe, MapUpdate& update);
   void start_map(const Keyframe& keyframe, MapUpdate& update);
   void report(const Keyframe& keyframe, const Placement& placement, MapUpdate& update);
   void finish(const Keyframe& keyframe, MapUpdate& update);
+  Eigen::Matrix3d shared_error(const SE2& map_T_vehicle) const;
   SE2WithCovariance base_pose(const Base& base) const;
   SE2 middle_pose(const Base& base) const;
   MapLandmark as_told(const StoredLandmark& landmark) const;
@@ -86,9 +89,10 @@ class SmoothingMapper final : public MapperMethod {
 
   // smoothing_mapper_fuse.cpp: what does it add?
   bool fuse(const Keyframe& keyframe, const Placement& placement, MapUpdate& update);
-  NodeIndex add_node(const SE2& map_T_centre);
+  NodeIndex add_node(const SE2& map_T_centre, const Keyframe& keyframe);
   std::optional<NodeIndex> foldable(const Keyframe& keyframe, const Placement& placement) const;
   Keyframe in_frame_of(NodeIndex node, const Keyframe& keyframe, const Placement& placement) const;
+  double repetition(NodeIndex node, const KeyframeLandmark& seen, LandmarkId id) const;
   void observe(NodeIndex node, const KeyframeLandmark& seen, LandmarkId id);
   void put_into_graph(StoredLandmark& landmark);
   PointId add_point(const StoredLandmark& landmark);
@@ -137,6 +141,9 @@ class SmoothingMapper final : public MapperMethod {
   /// The last keyframe's base, accepted or not: where it is, or is thought to be.
   std::optional<SE2WithCovariance> map_T_last_base_;
   std::optional<Utime> last_utime_;
+  /// Of where the first scan stood against what it saw, which the map shares: frame `map` [m^2].
+  Eigen::Matrix2d start_covariance_m2_ = Eigen::Matrix2d::Zero();
+  std::optional<Utime> first_offered_;  ///< Keyframe, while there is no map.
   /// The last scan that was located between keyframes.
   struct LocatedScan {
     Utime utime = 0;

@@ -15,10 +15,17 @@ double chi2_deviate(double chi2, double degrees_of_freedom) {
   return (std::cbrt(chi2 / degrees_of_freedom) - (1.0 - spread)) / std::sqrt(spread);
 }
 
+/// Less than that of what lasts is left between two places.
+constexpr double kAlike = 0.02;
+
 }  // namespace
 
-NodeIndex SmoothingMapper::add_node(const SE2& map_T_centre) {
-  nodes_.push_back({smoother_.add_pose(map_T_centre), {}});
+NodeIndex SmoothingMapper::add_node(const SE2& map_T_centre, const Keyframe& keyframe) {
+  const SE2 way = keyframe.members.front().centre_T_vehicle.inverse() *
+                  keyframe.members.back().centre_T_vehicle;
+  const bool stands = way.translation().norm() < parameters_.fold_distance_m &&
+                      std::abs(way.theta()) < parameters_.fold_angle_rad;
+  nodes_.push_back({smoother_.add_pose(map_T_centre), {}, stands});
   return static_cast<NodeIndex>(nodes_.size() - 1);
 }
 
@@ -53,15 +60,38 @@ void SmoothingMapper::add_base(const Base& base) {
   places_.put(standings.back(), middle_pose(base).translation());
 }
 
+/// By how much more uncertain sightings are that repeat each other: a share of a sighting's
+/// variance is the same as long as the place it is seen from is. It counts as white noise of the
+/// same power.
+double SmoothingMapper::repetition(NodeIndex node, const KeyframeLandmark& seen,
+                                   LandmarkId id) const {
+  const auto scans = static_cast<double>(seen.times_seen);
+  if (nodes_[node].stands && parameters_.standing_share > 0.0)
+    return std::max(1.0, scans * parameters_.standing_share);
+  if (parameters_.lasting_share == 0.0) return 1.0;
+  const Eigen::Vector2d here = smoother_.pose(nodes_[node].centre).translation();
+  double views = scans;
+  const std::vector<NodeIndex>& before = store_.at(id).nodes;
+  for (auto other = before.rbegin(); other != before.rend(); ++other) {
+    const Eigen::Vector2d there = smoother_.pose(nodes_[*other].centre).translation();
+    const double alike = std::exp(-(here - there).norm() / parameters_.lasting_m);
+    if (alike < kAlike) break;
+    views += scans * alike;
+  }
+  return 1.0 + 2.0 * parameters_.lasting_share * (views - 1.0);
+}
+
 /// A second sighting from the same node is averaged into the first by information.
 void SmoothingMapper::observe(NodeIndex node, const KeyframeLandmark& seen, LandmarkId id) {
-  const Eigen::Matrix2d information = seen.covariance_m2.inverse();
+  const Eigen::Matrix2d information = seen.covariance_m2.inverse() / repetition(node, seen, id);
   const auto [entry, fresh] = nodes_[node].observations.try_emplace(id);
   if (fresh) {
     entry->second = smoother_.add(
         PointObservation{nodes_[node].centre, *store_.at(id).point, seen.position_m, information});
     return;
   }
+  // Who stands sees nothing new.
+  if (nodes_[node].stands && parameters_.standing_share > 0.0) return;
   PointObservation factor = smoother_.observation(entry->second);
   const Eigen::Matrix2d sum = factor.information + information;
   factor.position =
@@ -126,7 +156,7 @@ bool SmoothingMapper::fuse(const Keyframe& arrived, const Placement& placement, 
   const std::vector<Node>::size_type nodes_before = nodes_.size();
   const std::optional<NodeIndex> fold = foldable(arrived, placement);
   const Keyframe keyframe = fold ? in_frame_of(*fold, arrived, placement) : arrived;
-  const NodeIndex node = fold ? *fold : add_node(placement.map_T_centre.mean);
+  const NodeIndex node = fold ? *fold : add_node(placement.map_T_centre.mean, keyframe);
   const Node node_before = nodes_[node];
   std::vector<LandmarkId> entered;
   for (const Association& pair : placement.associations) {

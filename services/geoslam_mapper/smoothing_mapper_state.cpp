@@ -7,7 +7,7 @@
 namespace understory {
 namespace {
 
-constexpr int kStateVersion = 2;
+constexpr int kStateVersion = 3;
 
 Json to_value(const KeyframeLandmark& l) {
   return {matrix_to_json<2, 1>(l.position_m), matrix_to_json<2, 2>(l.covariance_m2), l.radius_m,
@@ -136,7 +136,7 @@ std::string SmoothingMapper::save() const {
   for (const Node& node : nodes_) {
     Json seen = Json::array();
     for (const auto& [id, factor] : node.observations) seen.push_back({id, index(factor)});
-    nodes.push_back({index(node.centre), seen});
+    nodes.push_back({index(node.centre), seen, node.stands});
   }
   for (const Base& base : bases_)
     bases.push_back({base.node, base.sequence, base.utime, base.centre_T_base, base.is_origin,
@@ -162,6 +162,8 @@ std::string SmoothingMapper::save() const {
                    {"last_member", last_member},
                    {"last_base", optional_to_json(map_T_last_base_)},
                    {"last_utime", optional_to_json(last_utime_)},
+                   {"first_offered", optional_to_json(first_offered_)},
+                   {"start_covariance", matrix_to_json<2, 2>(start_covariance_m2_)},
                    {"located", located}});
 }
 
@@ -182,7 +184,7 @@ void SmoothingMapper::load(const std::string& state) {
   for (const Json& candidate : json.at("candidates"))
     loaded.candidates_.push_back(candidate_from(candidate));
   for (const Json& node : json.at("nodes")) {
-    Node out{pose_id(node.at(0)), {}};
+    Node out{pose_id(node.at(0)), {}, node.at(2).get<bool>()};
     for (const Json& seen : node.at(1))
       out.observations[seen.at(0).get<LandmarkId>()] =
           ObservationId(seen.at(1).get<std::uint32_t>());
@@ -203,6 +205,8 @@ void SmoothingMapper::load(const std::string& state) {
   }
   loaded.map_T_last_base_ = optional_from_json<SE2WithCovariance>(json.at("last_base"));
   loaded.last_utime_ = optional_from_json<Utime>(json.at("last_utime"));
+  loaded.first_offered_ = optional_from_json<Utime>(json.at("first_offered"));
+  loaded.start_covariance_m2_ = matrix_from_json<2, 2>(json.at("start_covariance"));
   const Json& located = json.at("located");
   if (!located.is_null()) {
     loaded.located_ = LocatedScan{located.at(0).get<Utime>(), located.at(1).get<SE2>(),
