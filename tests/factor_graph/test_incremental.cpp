@@ -2,8 +2,8 @@
 #include "common/factor_graph/incremental_smoother.hpp"
 
 #include <Eigen/Dense>
-#include <memory>
 #include <map>
+#include <memory>
 #include <random>
 
 #include "common/factor_graph/batch.hpp"
