@@ -23,7 +23,9 @@ void one_scan(benchmark::State& state) {
   scan.field_of_view.max_range_m = 60.0;
   for (int i = 0; i < count; ++i) {
     Detection seen;
-    seen.position_m << 5.0 * (i % side - side / 2), 5.0 * (i / side - side / 2), 0.0;
+    const int column = i % side - side / 2;
+    const int row = i / side - side / 2;
+    seen.position_m << 5.0 * column, 5.0 * row, 0.0;
     seen.covariance_m2 = 0.01 * Eigen::Matrix3d::Identity();
     scan.landmarks.push_back({static_cast<TrackId>(i + 1), static_cast<std::uint32_t>(i), seen});
   }
