@@ -14,6 +14,7 @@ constexpr int kSweepParts = 4;
 /// An update that has done more than this part of one factorisation's work leaves further
 /// iterations to the next one.
 constexpr double kMostWork = 0.3;
+constexpr double kAnyWork = 1e9;      ///< Where the whole is asked for.
 constexpr double kLittleWork = 2e5;   ///< Is no reason to [flops].
 constexpr double kSettledPart = 0.2;  ///< Of the thorough updates' limit.
 constexpr double kLeastUnit = 1e-4;
@@ -214,7 +215,7 @@ bool IncrementalSmoother::iterate(IncrementalUpdate& update, bool thorough) {
   return accepted;
 }
 
-IncrementalUpdate IncrementalSmoother::run(bool thorough) {
+IncrementalUpdate IncrementalSmoother::run(bool thorough, double most_work) {
   IncrementalUpdate update;
   moved_.clear();
   moved_at_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);
@@ -223,7 +224,7 @@ IncrementalUpdate IncrementalSmoother::run(bool thorough) {
   do {
     accepted = iterate(update, thorough);
   } while (update.iterations < parameters_.max_iterations &&
-           update.flops < std::max(kLittleWork, kMostWork * tree_.total_flops()) &&
+           update.flops < std::max(kLittleWork, most_work * tree_.total_flops()) &&
            (!accepted || update.deviation > parameters_.iterate_above));
   update.moved_variables = static_cast<long>(moved_.size());
   for (const int v : moved_) moved_at_[static_cast<std::size_t>(v)] = 0;
@@ -236,7 +237,7 @@ IncrementalUpdate IncrementalSmoother::run_thoroughly(double relinearise_above) 
   measure_unit();
   pending_.sweep.clear();
   for (const int f : noticeably_old(relinearise_above)) make_stale(f);
-  return run(true);
+  return run(true, kAnyWork);
 }
 
 IncrementalUpdate IncrementalSmoother::update() {
@@ -247,9 +248,9 @@ IncrementalUpdate IncrementalSmoother::update() {
   } else if (parameters_.thorough_every > 0 &&
              pending_.since_thorough + 1 >= parameters_.thorough_every) {
     begin_sweep();
-    if (pending_.sweep.empty()) return run(true);
+    if (pending_.sweep.empty()) return run(true, kMostWork);
   }
-  return run(is_sweeping && pending_.sweep.empty());
+  return run(is_sweeping && pending_.sweep.empty(), kMostWork);
 }
 
 IncrementalUpdate IncrementalSmoother::update_thoroughly() {

@@ -78,8 +78,9 @@ class IncrementalSmoother {
   /// False (and nothing is changed) where the variables' own factors do not determine them.
   bool marginalise(std::span<const VariableId> ids);
 
+  /// At most about one factorisation's work: what is left over is done by the next ones.
   IncrementalUpdate update();
-  /// update() with the limits of the thorough ones.
+  /// With the limits of the thorough ones, and to the end.
   IncrementalUpdate update_thoroughly();
   /// Thorough updates until nothing has to be linearised again.
   IncrementalUpdate settle(int max_updates = 20);
@@ -151,7 +152,7 @@ class IncrementalSmoother {
   void take_part_of_sweep();
   double usual_unit() const;
   void collect_moved();
-  IncrementalUpdate run(bool thorough);
+  IncrementalUpdate run(bool thorough, double most_work);
   IncrementalUpdate run_thoroughly(double relinearise_above);
 
   IncrementalParameters parameters_;
