@@ -19,6 +19,8 @@ namespace {
 using std::numbers::pi;
 constexpr double kCore = 0.7;     // of a stem's radius: a beam that passes so near meets it
 constexpr double kBark_m = 0.25;  // the surface of a stem is so near its circle
+constexpr double kOnStem_m = 0.1;
+constexpr int kShown = 6;  // points in a sector of a stem that is shown
 constexpr double kKnee_m = 0.5;
 constexpr double kPerson_m = 2.2;
 constexpr double kNothing = std::numeric_limits<double>::infinity();
@@ -146,6 +148,33 @@ double PlotGround::height_m(const Eigen::Vector2d& place_m) const {
 PlotScanner::PlotScanner(const ForestPlot& plot, Parameters parameters)
     : plot_(plot), parameters_(std::move(parameters)), ground_(plot.points) {
   measure_reach();
+  look_around_stems();
+}
+
+void PlotScanner::look_around_stems() {
+  around_.assign(plot_.stems.size(), {});
+  for (const PlotPoint& point : plot_.points) {
+    if (point.height_m < kKnee_m || point.height_m > kPerson_m) continue;
+    for (std::size_t i = 0; i < plot_.stems.size(); ++i) {
+      const Eigen::Vector2d from_axis = point.position_m.head<2>() - plot_.stems[i].position_m;
+      if (std::abs(from_axis.norm() - plot_.stems[i].radius_m) > kOnStem_m) continue;
+      const double turns = std::atan2(from_axis.y(), from_axis.x()) / (2.0 * pi) + 0.5;
+      ++around_[i][static_cast<std::size_t>(turns * kSectors) % kSectors];
+    }
+  }
+}
+
+/// All sectors that are seen from there, but those at the very edges.
+bool PlotScanner::is_whole(std::size_t stem, const Eigen::Vector2d& station_m) const {
+  const Eigen::Vector2d to_station = station_m - plot_.stems[stem].position_m;
+  const double turns = std::atan2(to_station.y(), to_station.x()) / (2.0 * pi) + 0.5;
+  const int facing = static_cast<int>(turns * kSectors);
+  constexpr int kSide = kSectors / 4 - 1;
+  for (int i = facing - kSide; i <= facing + kSide; ++i) {
+    const auto sector = static_cast<std::size_t>((i + kSectors) % kSectors);
+    if (around_[stem][sector] < kShown) return false;
+  }
+  return true;
 }
 
 /// A little more than the distance to the fourth neighbour.
@@ -210,8 +239,8 @@ std::vector<PlotScanner::Seen> PlotScanner::seen_from(const Eigen::Vector3d& sen
   return seen;
 }
 
-/// The nearest surface that the beam meets; points farther to the side than the beam is wide need
-/// one on the other side.
+/// The nearest surface that the beam meets. It ends at its outermost points; a point all alone is
+/// as wide as a beam.
 double PlotScanner::surface(std::span<const Seen* const> near_beam, double azimuth_rad) const {
   const double own_rad = pi / parameters_.columns;
   for (const Seen* const nearest : near_beam) {  // by range
@@ -219,8 +248,10 @@ double PlotScanner::surface(std::span<const Seen* const> near_beam, double azimu
     const Seen* right = nullptr;
     double left_rad = kNothing;
     double right_rad = kNothing;
+    int points = 0;
     for (const Seen* const other : near_beam) {
       if (std::abs(other->range_m - nearest->range_m) > parameters_.depth_m) continue;
+      ++points;
       const double side = turned(other->azimuth_rad - azimuth_rad);
       if (side >= 0.0 && side < left_rad) {
         left_rad = side;
@@ -234,8 +265,7 @@ double PlotScanner::surface(std::span<const Seen* const> near_beam, double azimu
     if (left != nullptr && right != nullptr) {
       return (right_rad * left->range_m + left_rad * right->range_m) / (left_rad + right_rad);
     }
-    if (left != nullptr && left_rad <= own_rad) return left->range_m;
-    if (right != nullptr && right_rad <= own_rad) return right->range_m;
+    if (points == 1 && std::min(left_rad, right_rad) <= own_rad) return nearest->range_m;
   }
   return kNothing;
 }
@@ -302,6 +332,9 @@ PlotSweep PlotScanner::sweep(const Eigen::Vector2d& station_m, std::mt19937_64& 
   }
   PlotSweep result;
   result.stems.resize(plot_.stems.size());
+  for (std::size_t i = 0; i < result.stems.size(); ++i) {
+    result.stems[i].is_whole = is_whole(i, station_m);
+  }
   PointSweep& sweep = result.sweep;
   sweep.is_deskewed = true;
   sweep.rings = static_cast<std::uint16_t>(ranges.size());

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
@@ -57,6 +58,9 @@ class PlotGround {
 struct StemSight {
   std::uint32_t beams = 0;
   std::uint32_t returns = 0;
+  /// Whether the cloud has points on all of the side that faces the station: elsewhere a surface
+  /// ends where the scan of the plot ended, which is no edge of the stem.
+  bool is_whole = false;
 };
 struct PlotSweep {
   PointSweep sweep;
@@ -65,8 +69,8 @@ struct PlotSweep {
 
 /// Makes sweeps out of a cloud. A beam returns the surface between the points to its left and to
 /// its right, where both are near it and at about the same range; the nearest such surface hides
-/// the others. A point alone returns the beam that meets it. Clouds show some stems from one side
-/// only: what is listed as a stem is opaque, so that nobody sees its far side from within.
+/// the others. A point all alone returns the beam that meets it. Clouds show some stems from one
+/// side only: what is listed as a stem is opaque, so that nobody sees its far side from within.
 class PlotScanner {
  public:
   struct Parameters {
@@ -103,6 +107,8 @@ class PlotScanner {
     std::size_t stem = 0;
   };
   void measure_reach();
+  void look_around_stems();
+  bool is_whole(std::size_t stem, const Eigen::Vector2d& station_m) const;
   Meeting meeting(const Eigen::Vector2d& station_m, double azimuth_rad) const;
   std::vector<Seen> seen_from(const Eigen::Vector3d& sensor_m) const;
   /// Range of each column of a beam; infinite = no return.
@@ -116,6 +122,8 @@ class PlotScanner {
   Parameters parameters_;
   PlotGround ground_;
   std::vector<double> reach_m_;  ///< Of each point.
+  static constexpr int kSectors = 36;
+  std::vector<std::array<int, kSectors>> around_;  ///< Points of each stem by their bearing.
 };
 
 }  // namespace understory::eval

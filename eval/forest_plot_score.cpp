@@ -1,5 +1,6 @@
 #include "eval/forest_plot_score.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -19,7 +20,10 @@ void score_sweep(const ForestPlot& plot, const PlotSweep& sweep, const LandmarkS
       ++score.corners;
       continue;
     }
-    PlotDetection one{detection.position_m.head<2>() + station_m, detection.radius_m, -1};
+    PlotDetection one;
+    one.position_m = detection.position_m.head<2>() + station_m;
+    one.covariance_m2 = detection.covariance_m2.topLeftCorner<2, 2>();
+    one.radius_m = detection.radius_m;
     double nearest_m = options.match_m;
     for (std::size_t i = 0; i < plot.stems.size(); ++i) {
       const double distance = (plot.stems[i].position_m - one.position_m).norm();
@@ -27,7 +31,10 @@ void score_sweep(const ForestPlot& plot, const PlotSweep& sweep, const LandmarkS
       nearest_m = distance;
       one.stem = static_cast<int>(i);
     }
-    if (one.stem >= 0) is_taken[static_cast<std::size_t>(one.stem)] = true;
+    if (one.stem >= 0) {
+      is_taken[static_cast<std::size_t>(one.stem)] = true;
+      one.is_whole = sweep.stems[static_cast<std::size_t>(one.stem)].is_whole;
+    }
     score.detections.push_back(one);
   }
   for (std::size_t i = 0; i < plot.stems.size(); ++i) {
@@ -46,31 +53,38 @@ void score_sweep(const ForestPlot& plot, const PlotSweep& sweep, const LandmarkS
   }
 }
 
-void add_differences(const ForestPlot& plot, PlotScore& score) {
-  std::vector<Eigen::Vector2d> sums(plot.stems.size(), Eigen::Vector2d::Zero());
-  std::vector<double> counts(plot.stems.size(), 0.0);
+/// Of the detections that `counts`.
+template <class Counts>
+PlotErrors errors_of(const ForestPlot& plot, const PlotScore& score, Counts counts) {
+  std::vector<Eigen::Vector2d> means(plot.stems.size(), Eigen::Vector2d::Zero());
+  std::vector<double> numbers(plot.stems.size(), 0.0);
+  PlotErrors errors;
   double square_m2 = 0.0;
-  double radius_m = 0.0;
-  double matched = 0.0;
   for (const PlotDetection& one : score.detections) {
-    if (one.stem < 0) continue;
+    if (one.stem < 0 || !counts(one)) continue;
     const auto i = static_cast<std::size_t>(one.stem);
     square_m2 += (one.position_m - plot.stems[i].position_m).squaredNorm();
-    radius_m += one.radius_m - plot.stems[i].radius_m;
-    sums[i] += one.position_m;
-    counts[i] += 1.0;
-    matched += 1.0;
+    errors.radius_bias_m += one.radius_m - plot.stems[i].radius_m;
+    means[i] += (one.position_m - means[i]) / ++numbers[i];
+    ++errors.detections;
   }
-  if (matched == 0.0) return;
+  if (errors.detections == 0) return errors;
   double spread_m2 = 0.0;
+  double freedom = 0.0;
   for (const PlotDetection& one : score.detections) {
-    if (one.stem < 0) continue;
+    if (one.stem < 0 || !counts(one)) continue;
     const auto i = static_cast<std::size_t>(one.stem);
-    spread_m2 += (one.position_m - sums[i] / counts[i]).squaredNorm();
+    const Eigen::Vector2d off = one.position_m - means[i];
+    spread_m2 += off.squaredNorm();
+    errors.nees += off.dot(one.covariance_m2.inverse() * off);
+    freedom += 1.0 - 1.0 / numbers[i];  // the mean is of the same detections
   }
-  score.difference_m = std::sqrt(square_m2 / matched);
-  score.radius_bias_m = radius_m / matched;
-  score.spread_m = std::sqrt(spread_m2 / matched);
+  const auto number = static_cast<double>(errors.detections);
+  errors.difference_m = std::sqrt(square_m2 / number);
+  errors.radius_bias_m /= number;
+  errors.spread_m = std::sqrt(spread_m2 / number);
+  if (freedom > 0.0) errors.nees /= freedom;
+  return errors;
 }
 
 }  // namespace
@@ -121,7 +135,8 @@ PlotScore score_plot(const ForestPlot& plot, const LandmarkExtractorParameters& 
   }
   score.trunks = extractor.sweep_counters().trunks;
   score.points /= std::max<double>(1.0, static_cast<double>(score.stations_m.size()));
-  add_differences(plot, score);
+  score.all = errors_of(plot, score, [](const PlotDetection&) { return true; });
+  score.whole = errors_of(plot, score, [](const PlotDetection& one) { return one.is_whole; });
   return score;
 }
 

@@ -23,8 +23,21 @@ struct PlotScoreOptions {
 /// A detection in the frame of the plot.
 struct PlotDetection {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< In the plan.
   double radius_m = 0.0;
-  int stem = -1;  ///< Index of the stem that it stands for; -1 = none.
+  int stem = -1;          ///< Index of the stem that it stands for; -1 = none.
+  bool is_whole = false;  ///< Whether the cloud shows all of the side that faces the station.
+};
+
+/// How far detections are from the list of stems, and from each other.
+struct PlotErrors {
+  std::uint64_t detections = 0;
+  double difference_m = 0.0;   ///< RMS in the plan between a detection and its stem.
+  double radius_bias_m = 0.0;  ///< Mean of detected less estimated radii.
+  double spread_m = 0.0;       ///< RMS of the detections of a stem about their own mean.
+  /// Mean of the same, squared and weighed by the detections' covariances; 2 is right. Where the
+  /// list puts the stem has no part in it.
+  double nees = 0.0;
 };
 
 struct PlotScore {
@@ -35,11 +48,10 @@ struct PlotScore {
   std::vector<PlotDetection> detections;  ///< Of all stations.
   std::vector<std::uint32_t> should_of_stem;
   std::vector<std::uint32_t> found_of_stem;
-  std::uint64_t corners = 0;   ///< There are none: each is false.
-  TrunkCounters trunks;        ///< Why columns of returns became none.
-  double difference_m = 0.0;   ///< RMS in the plan between a detection and its stem.
-  double radius_bias_m = 0.0;  ///< Mean of detected less estimated radii.
-  double spread_m = 0.0;       ///< RMS of the detections of a stem about their own mean.
+  std::uint64_t corners = 0;  ///< There are none: each is false.
+  TrunkCounters trunks;       ///< Why columns of returns became none.
+  PlotErrors all;
+  PlotErrors whole;  ///< Of stems on whose near side the cloud has no gap.
 
   double recall() const { return should > 0 ? static_cast<double>(found) / should : 1.0; }
   double precision() const;

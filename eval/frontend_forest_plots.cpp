@@ -42,6 +42,17 @@ nlohmann::json trace_of(const ForestPlot& plot, const PlotScore& score) {
   return {{"points", points}, {"stems", stems}, {"detections", detections}, {"stations", stations}};
 }
 
+void add_errors(const char* of, const PlotErrors& errors, FrontendRows& rows) {
+  const auto state = [&](const char* what, double value, const char* unit) {
+    rows.state(fmt::format("{}: {}", of, what), value, unit);
+  };
+  state("detections", static_cast<double>(errors.detections), "");
+  state("difference of the centres, RMS", 100.0 * errors.difference_m, "cm");
+  state("spread of a stem's centres, RMS", 100.0 * errors.spread_m, "cm");
+  state("NEES about a stem's mean (2)", errors.nees, "");
+  state("radius, mean difference", 100.0 * errors.radius_bias_m, "cm");
+}
+
 void add_rows(const PlotScore& score, FrontendRows& rows) {
   const auto ever = [](const std::vector<std::uint32_t>& counts) {
     return static_cast<double>(std::ranges::count_if(counts, [](auto n) { return n > 0; }));
@@ -50,9 +61,8 @@ void add_rows(const PlotScore& score, FrontendRows& rows) {
   rows.state("stems found of those with 5 returns", score.recall(), "");
   rows.state("detections that are a stem", score.precision(), "");
   rows.state("corners (there are none)", static_cast<double>(score.corners), "");
-  rows.state("difference of the centres, RMS", 100.0 * score.difference_m, "cm");
-  rows.state("spread of a stem's centres, RMS", 100.0 * score.spread_m, "cm");
-  rows.state("radius, mean difference", 100.0 * score.radius_bias_m, "cm");
+  add_errors("near side shown", score.whole, rows);
+  add_errors("all", score.all, rows);
   const auto refused = [&](const char* why, std::uint64_t count) {
     rows.state(fmt::format("refused columns: {}", why), static_cast<double>(count), "");
   };

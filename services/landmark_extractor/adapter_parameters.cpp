@@ -85,8 +85,8 @@ void describe_trunk_shape(SweepTrunkParameters& p, ParameterTable& table) {
             "Standard deviation of that.");
   table.add("trunk.roundness_sigma_m", p.roundness_sigma_m, {0.0, 1.0}, "m",
             "Of the bark from a circle.");
-  table.add("trunk.shape_sigma_m", p.shape_sigma_m, {0.0, 1.0}, "m",
-            "What more points do not average out.");
+  table.add("trunk.out_of_round", p.out_of_round, {0.0, 1.0}, "m per m",
+            "RMS of a stem's low waves from a circle, in parts of its radius.");
   table.add("trunk.max_lean_rad", p.max_lean_rad, {0.01, 1.5}, "rad",
             "More than that is a branch.");
 }

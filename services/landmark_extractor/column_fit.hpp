@@ -67,7 +67,7 @@ class StemFitter {
   bool settle(Vector6d& state, double settled_m2);
   void linearise(const Vector6d& state, Matrix6d& information, Vector6d& gradient,
                  double& squares) const;
-  /// What grazing hits know and do not weigh.
+  /// What grazing hits and edges know and do not weigh.
   Matrix6d unused_information(const Vector6d& state) const;
   /// Whether the runs that agree are others than before.
   bool sort_out(const Vector6d& state);

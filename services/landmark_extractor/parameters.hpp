@@ -55,8 +55,10 @@ struct SweepTrunkParameters {
   double prior_lean_sigma_rad = 0.06;  ///< Of a trunk's axis from the vertical.
   double prior_taper = -0.01;          ///< Change of radius per metre of height.
   double prior_taper_sigma = 0.01;
-  double roundness_sigma_m = 0.005;       ///< Of the bark from a circle.
-  double shape_sigma_m = 0.0015;          ///< What more points do not average out.
+  double roundness_sigma_m = 0.005;  ///< Of the bark from a circle.
+  /// RMS of a stem's low waves (oval, three-cornered) from a circle, in parts of its radius; more
+  /// points do not average it out. Greatest and least diameter of trees differ by 3 to 5 %.
+  double out_of_round = 0.015;
   double max_lean_rad = 0.35;             ///< More than that is a branch.
   double max_sigma_m = 0.08;              ///< Trunks whose centre is known worse are not reported.
   double max_mean_square_residual = 3.0;  ///< Of ranges and edges from the axis, in sigma^2.

@@ -194,12 +194,17 @@ void add_terms(std::span<const HitLanes> hits, std::span<const EdgeLanes> edges,
   add_all(hits, edges, stem, noise, sums);
 }
 
-void add_unused(std::span<const HitLanes> hits, const StemState& stem, const BeamNoise& noise,
-                StemSums& sums) {
+void add_unused(std::span<const HitLanes> hits, std::span<const EdgeLanes> edges,
+                const StemState& stem, const BeamNoise& noise, StemSums& sums) {
   Terms terms;
   for (const HitLanes& group : hits) {
     take_hits(group, stem, noise, terms);
     for (std::size_t l = 0; l < kLanes; ++l) terms.weight[l] *= 1.0F - terms.fade[l];
+    add(terms, sums);
+  }
+  for (const EdgeLanes& group : edges) {
+    take_edges(group, stem, terms);
+    for (std::size_t l = 0; l < kLanes; ++l) terms.weight[l] *= group.surplus[l];
     add(terms, sums);
   }
 }

@@ -34,6 +34,7 @@ struct alignas(32) EdgeLanes {
   Lanes z{};
   Lanes side{};  ///< +1 = left.
   Lanes variance{};
+  Lanes surplus{};  ///< By which part of it the error is smaller, together with the others.
   Lanes counts{};
 };
 
@@ -64,10 +65,10 @@ struct StemSums {
 void add_terms(std::span<const HitLanes> hits, std::span<const EdgeLanes> edges,
                const StemState& stem, const BeamNoise& noise, StemSums& sums);
 
-/// Adds the part of the hits' information that they do not weigh (they weigh less, the more they
-/// graze): with weights t / variance the estimate's spread is that of t^2 / variance.
-void add_unused(std::span<const HitLanes> hits, const StemState& stem, const BeamNoise& noise,
-                StemSums& sums);
+/// Adds the part of the information that hits and edges do not weigh (hits weigh less, the more
+/// they graze): with weights t / variance the estimate's spread is that of t^2 / variance.
+void add_unused(std::span<const HitLanes> hits, std::span<const EdgeLanes> edges,
+                const StemState& stem, const BeamNoise& noise, StemSums& sums);
 
 /// Mean squared residual of each group of hits, and the squared ones of the edges, in their
 /// standard deviations.

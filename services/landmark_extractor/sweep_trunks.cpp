@@ -19,9 +19,17 @@ constexpr double kOnBark = 2.0;
 constexpr std::size_t kTall = 5;
 constexpr double kMostLost = 0.5;
 
-/// The centre at breast height with its covariance.
+/// How far the centre of a stem that is not round is off. An oval that reaches farther towards the
+/// sensor by some length is narrower by as much on either side; so the radius, and where the centre
+/// is behind the front, miss it by twice that. Three-cornered ones shift both edges to one side.
+Eigen::Matrix2d from_shape(const Eigen::Vector2d& from_sensor_m, double wave_m) {
+  const Eigen::Vector2d ray = from_sensor_m.normalized();
+  return wave_m * wave_m * (Eigen::Matrix2d::Identity() + 3.0 * ray * ray.transpose());
+}
+
+/// The centre at breast height with its covariance, but for that of its shape.
 Detection to_detection(const StemFit& fit, const GroundHeight& ground, double breast_height,
-                       const Eigen::Matrix2d& level_covariance_rad2, double shape_sigma) {
+                       const Eigen::Matrix2d& level_covariance_rad2) {
   const double z = ground.height_m + breast_height;
   const double above = z - fit.reference_z_m;
   Eigen::Matrix<double, 2, 6> jacobian = Eigen::Matrix<double, 2, 6>::Zero();
@@ -35,9 +43,7 @@ Detection to_detection(const StemFit& fit, const GroundHeight& ground, double br
   along_axis << fit.state.segment<2>(3), 1.0;
   detection.covariance_m2 = ground.sigma_m * ground.sigma_m * along_axis * along_axis.transpose() +
                             from_level_error(detection.position_m, level_covariance_rad2);
-  detection.covariance_m2.topLeftCorner<2, 2>() +=
-      jacobian * fit.covariance * jacobian.transpose() +
-      shape_sigma * shape_sigma * Eigen::Matrix2d::Identity();
+  detection.covariance_m2.topLeftCorner<2, 2>() += jacobian * fit.covariance * jacobian.transpose();
   return detection;
 }
 
@@ -117,14 +123,16 @@ std::optional<Detection> SweepTrunks::judge(const RingCloud& cloud, const std::v
     ++counters_.in_leaves;
     return std::nullopt;
   }
-  const Detection detection = to_detection(*fit, below, sweep_.breast_height_m,
-                                           level_covariance_rad2, trunk_.shape_sigma_m);
+  Detection detection = to_detection(*fit, below, sweep_.breast_height_m, level_covariance_rad2);
+  const Eigen::Vector2d from_sensor =
+      detection.position_m.head<2>() - cloud.sensor_m().head<2>().cast<double>();
+  detection.covariance_m2.topLeftCorner<2, 2>() +=
+      from_shape(from_sensor, trunk_.out_of_round * detection.radius_m);
   if (largest_sigma(detection.covariance_m2.topLeftCorner<2, 2>()) > trunk_.max_sigma_m) {
     ++counters_.uncertain;
     return std::nullopt;
   }
-  const double range =
-      (detection.position_m.head<2>() - cloud.sensor_m().head<2>().cast<double>()).norm();
+  const double range = from_sensor.norm();
   if (range > sweep_.max_range_m) {
     ++counters_.out_of_range;
     return std::nullopt;

@@ -73,7 +73,21 @@ TEST_CASE("Round stems of a cloud are found in their place", "[forest_plot]") {
   CHECK(score.should > 50);
   CHECK(score.recall() > 0.9);
   CHECK(score.precision() > 0.97);
-  CHECK(score.difference_m < 0.03);
+  CHECK(score.all.difference_m < 0.03);
+  CHECK(score.whole.difference_m < 0.02);
+  CHECK(std::abs(score.whole.radius_bias_m) < 0.006);
+  CHECK(score.whole.nees > 0.7);
+  CHECK(score.whole.nees < 2.6);
+}
+
+TEST_CASE("A stem that a cloud shows from one side only is whole from there", "[forest_plot]") {
+  ForestPlot plot = round_stems({{0.0, 0.0}});
+  std::erase_if(plot.points, [](const PlotPoint& point) { return point.position_m.x() < -0.05; });
+  const PlotScanner scanner(plot, {});
+  std::mt19937_64 random(1);
+  CHECK(scanner.sweep({5.0, 0.0}, random).stems.front().is_whole);
+  CHECK_FALSE(scanner.sweep({0.0, 5.0}, random).stems.front().is_whole);
+  CHECK_FALSE(scanner.sweep({-5.0, 0.0}, random).stems.front().is_whole);
 }
 
 TEST_CASE("Stems of a real plot are found", "[forest_plot]") {

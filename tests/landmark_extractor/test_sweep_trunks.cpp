@@ -18,7 +18,7 @@ namespace {
 LandmarkExtractorParameters exact_stems() {
   LandmarkExtractorParameters parameters;
   parameters.trunk.roundness_sigma_m = 0.0;
-  parameters.trunk.shape_sigma_m = 0.0;
+  parameters.trunk.out_of_round = 0.0;
   return parameters;
 }
 
