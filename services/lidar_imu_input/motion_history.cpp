@@ -22,6 +22,8 @@ MotionState moved_on(const MotionState& state, Utime utime) {
   return moved;
 }
 
+constexpr Utime kBaseline_us = 100'000;
+
 }  // namespace
 
 void MotionHistory::add(const MotionState& state) {
@@ -35,7 +37,7 @@ std::optional<MotionState> MotionHistory::at(Utime utime) const {
   if (after == states_.end() || after == states_.begin()) {
     const MotionState& nearest = after == states_.end() ? states_.back() : states_.front();
     if (std::abs(seconds_between(nearest.utime, utime)) > kMostExtrapolation_s) return std::nullopt;
-    return moved_on(nearest, utime);
+    return after == states_.end() ? moved_on(nearest, utime) : before_first(utime);
   }
   const MotionState& a = *std::prev(after);
   const MotionState& b = *after;
@@ -53,6 +55,26 @@ std::optional<MotionState> MotionHistory::at(Utime utime) const {
   state.heading_rad =
       a.heading_rad + share * std::remainder(b.heading_rad - a.heading_rad, 2.0 * M_PI);
   return state;
+}
+
+/// Of the first state on the way no velocity was known yet, so what came before goes by how the
+/// vehicle moved soon after. What was thought of the velocity stays.
+MotionState MotionHistory::before_first(Utime utime) const {
+  const MotionState& first = states_.front();
+  if (states_.size() < 2) return moved_on(first, utime);
+  auto b = std::ranges::lower_bound(states_, first.utime + kBaseline_us, {}, &MotionState::utime);
+  if (b == states_.end()) --b;
+  const MotionState& a = *std::prev(b);
+  const double seconds = seconds_between(a.utime, b->utime);
+  const Eigen::Quaterniond back = a.odom_Q_vehicle.conjugate();
+  const Eigen::AngleAxisd turn(back * b->odom_Q_vehicle);
+  MotionState moving = first;
+  moving.velocity_mps = back * (b->position_m - a.position_m) / seconds;
+  moving.rate_rad_s = turn.angle() / seconds * turn.axis();
+  MotionState moved = moved_on(moving, utime);
+  moved.velocity_mps = first.velocity_mps;
+  moved.rate_rad_s = first.rate_rad_s;
+  return moved;
 }
 
 }  // namespace understory

@@ -33,8 +33,9 @@ class MotionHistory {
   bool empty() const { return states_.empty(); }
   const MotionState& newest() const { return states_.back(); }
   const MotionState& oldest() const { return states_.front(); }
-  /// Between two states in proportion to time; at the ends the nearest state, moved on at its
-  /// velocity and rate for no longer than `kMostExtrapolation_s`. None while empty or farther off.
+  /// Between two states in proportion to time; after the last one that one, moved on at its
+  /// velocity and rate, before the first that one, moved as between those soon after; for no longer
+  /// than `kMostExtrapolation_s`. None while empty or farther off.
   std::optional<MotionState> at(Utime utime) const;
 
   /// For saving and loading: what changes while it runs.
@@ -47,6 +48,8 @@ class MotionHistory {
   static constexpr double kKept_s = 4.0;
 
  private:
+  MotionState before_first(Utime utime) const;
+
   std::deque<MotionState> states_;
 };
 
