@@ -84,6 +84,27 @@ Factor relative(VariableId a, VariableId b, const SE2& a_T_b, const Eigen::Matri
   return factor;
 }
 
+Factor turning(VariableId a, VariableId b, VariableId bias, const SE2& a_T_b, double seconds,
+               const Eigen::Matrix3d& information) {
+  Factor factor = relative(a, b, a_T_b, information);
+  factor.kind = FactorKind::kTurningPose2;
+  factor.variable_count = 3;
+  factor.variables[2] = bias;
+  factor.measurement[kTurningSeconds] = seconds;
+  return factor;
+}
+
+Factor prior(VariableId scalar, double mean, double information) {
+  Factor factor =
+      unary(FactorKind::kPriorScalar, scalar, Eigen::Matrix<double, 1, 1>::Constant(information));
+  factor.measurement[0] = mean;
+  return factor;
+}
+
+Factor step(VariableId a, VariableId b, double information) {
+  return binary(FactorKind::kStepScalar, a, b, Eigen::Matrix<double, 1, 1>::Constant(information));
+}
+
 Factor relative(VariableId a, VariableId b, const Pose3& a_T_b,
                 const Eigen::Matrix<double, 6, 6>& information) {
   Factor factor = binary(FactorKind::kRelativePose3, a, b, information);
@@ -135,6 +156,7 @@ int residual_dimension(FactorKind kind) {
       return 6;
     case FactorKind::kPriorPose2:
     case FactorKind::kRelativePose2:
+    case FactorKind::kTurningPose2:
     case FactorKind::kPriorPoint3:
     case FactorKind::kPoint3:
     case FactorKind::kPosition3:
@@ -144,6 +166,9 @@ int residual_dimension(FactorKind kind) {
     case FactorKind::kRangeBearing2:
     case FactorKind::kPosition2:
       return 2;
+    case FactorKind::kPriorScalar:
+    case FactorKind::kStepScalar:
+      return 1;
     case FactorKind::kCondensed2:
     case FactorKind::kLinear:
     case FactorKind::kUser:
@@ -158,6 +183,8 @@ std::span<const VariableType> variable_types(FactorKind kind) {
   static constexpr std::array<VariableType, 2> kPoses3{kPose3, kPose3};
   static constexpr std::array<VariableType, 2> kSeen2{kPose2, kPoint2};
   static constexpr std::array<VariableType, 2> kSeen3{kPose3, kPoint3};
+  static constexpr std::array<VariableType, 3> kTurning2{kPose2, kPose2, kScalar};
+  static constexpr std::array<VariableType, 2> kScalars{kScalar, kScalar};
   static constexpr std::array<VariableType, 1> kOnePoint2{kPoint2};
   static constexpr std::array<VariableType, 1> kOnePoint3{kPoint3};
   switch (kind) {
@@ -176,6 +203,12 @@ std::span<const VariableType> variable_types(FactorKind kind) {
       return kPoses2;
     case FactorKind::kRelativePose3:
       return kPoses3;
+    case FactorKind::kTurningPose2:
+      return kTurning2;
+    case FactorKind::kPriorScalar:
+      return {kScalars.data(), 1};
+    case FactorKind::kStepScalar:
+      return kScalars;
     case FactorKind::kPoint2:
     case FactorKind::kRangeBearing2:
       return kSeen2;

@@ -25,9 +25,13 @@ enum class FactorKind : std::uint8_t {
   kRangeBearing2,  ///< |R' (p - t)| - z_0 [m], direction of R' (p - t) - z_1 [rad]
   kPosition2,      ///< t + R * antenna - z: GNSS
   kPosition3,      ///< t + R * antenna - z
-  kCondensed2,     ///< Several poses and points of the plane as seen from the first variable.
-  kLinear,         ///< J (value - base) - b: what a marginalisation leaves.
-  kUser,           ///< See UserFactor.
+  /// As kRelativePose2, of a motion whose turn was measured too large by b * seconds; b: a scalar.
+  kTurningPose2,
+  kPriorScalar,  ///< b - z
+  kStepScalar,   ///< b_b - b_a
+  kCondensed2,   ///< Several poses and points of the plane as seen from the first variable.
+  kLinear,       ///< J (value - base) - b: what a marginalisation leaves.
+  kUser,         ///< See UserFactor.
 };
 
 /// Loss of s = e' * information * e: s, and for large s as below with k the width [sigmas].
@@ -50,15 +54,18 @@ struct LossValue {
 };
 LossValue evaluate(const Loss& loss, double squared_error);
 
-/// A factor of one or two variables.
+/// A factor of up to three variables.
 struct Factor {
   FactorKind kind = FactorKind::kPriorPose2;
   int variable_count = 1;
-  std::array<VariableId, 2> variables{};
+  std::array<VariableId, 3> variables{};
   std::array<double, 7> measurement{};
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6> information;
   Loss loss;
 };
+
+/// Where a kTurningPose2's measurement has its time; before it: that of a kRelativePose2.
+constexpr std::size_t kTurningSeconds = 5;
 
 // Orders of covariances: as the residuals above. Angles in rad, lengths in m.
 Factor prior(VariableId pose, const SE2& mean, const Eigen::Matrix3d& information);
@@ -68,6 +75,13 @@ Factor prior(VariableId point, const Eigen::Vector3d& mean, const Eigen::Matrix3
 Factor relative(VariableId a, VariableId b, const SE2& a_T_b, const Eigen::Matrix3d& information);
 Factor relative(VariableId a, VariableId b, const Pose3& a_T_b,
                 const Eigen::Matrix<double, 6, 6>& information);
+/// A motion that took `seconds`, measured with an instrument whose rate of turn [rad/s] is off by
+/// `bias`: the way turned by half of what the heading did.
+Factor turning(VariableId a, VariableId b, VariableId bias, const SE2& a_T_b, double seconds,
+               const Eigen::Matrix3d& information);
+Factor prior(VariableId scalar, double mean, double information);
+/// Two scalars that differ by chance alone.
+Factor step(VariableId a, VariableId b, double information);
 Factor observation(VariableId pose, VariableId point, const Eigen::Vector2d& position,
                    const Eigen::Matrix2d& information);
 Factor observation(VariableId pose, VariableId point, const Eigen::Vector3d& position,

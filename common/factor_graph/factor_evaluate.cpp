@@ -70,6 +70,24 @@ void relative_pose2(const double* z, const Value& va, const Value& vb, double* e
       0, 0, -1, 0, 0, 1;
 }
 
+/// The measured motion at the true rate: its turn less by b * seconds, its way turned by half of
+/// it.
+void turning_pose2(const double* z, const Value& va, const Value& vb, double bias, double* e,
+                   double* j) {
+  double by_poses[18];
+  relative_pose2(z, va, vb, e, j == nullptr ? nullptr : by_poses);
+  const Plane measured{{z[0], z[1]}, z[2], z[3], z[4]};
+  const double seconds = z[kTurningSeconds];
+  const Vector2d way = 0.5 * seconds * measured.back(turned_left(measured.translation));
+  e[0] += way.x() * bias;
+  e[1] += way.y() * bias;
+  e[2] += seconds * bias;
+  if (j == nullptr) return;
+  Jacobian<3, 7> out(j);
+  out.leftCols<6>() = Jacobian<3, 6>(by_poses);
+  out.col(6) << way, seconds;
+}
+
 void point2(const double* z, const Value& pose, const Value& point, double* e, double* j) {
   const Plane a = plane(pose);
   const Vector2d seen = a.back(point2_of(point) - a.translation);
@@ -209,6 +227,14 @@ void evaluate(FactorKind kind, const double* z, std::span<const Value* const> v,
       return prior_point(z, *v[0], 3, e, j);
     case FactorKind::kRelativePose2:
       return relative_pose2(z, *v[0], *v[1], e, j);
+    case FactorKind::kTurningPose2:
+      return turning_pose2(z, *v[0], *v[1], (*v[2])[0], e, j);
+    case FactorKind::kPriorScalar:
+      return prior_point(z, *v[0], 1, e, j);
+    case FactorKind::kStepScalar:
+      e[0] = (*v[1])[0] - (*v[0])[0];
+      if (j != nullptr) Jacobian<1, 2>(j) << -1.0, 1.0;
+      return;
     case FactorKind::kRelativePose3:
       return relative_pose3(z, *v[0], *v[1], e, j);
     case FactorKind::kPoint2:

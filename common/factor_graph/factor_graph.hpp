@@ -88,6 +88,7 @@ class FactorGraph {
   VariableId add(const Eigen::Vector3d& initial) {
     return add(VariableType::kPoint3, value_of(initial));
   }
+  VariableId add(double initial) { return add(VariableType::kScalar, value_of(initial)); }
   VariableId add(VariableType type, const Value& initial);
 
   /// The information must be symmetric and positive semi-definite, everything finite. Throws

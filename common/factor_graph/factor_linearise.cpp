@@ -20,6 +20,8 @@ void with_sizes(int rows, int columns, F&& f) {
   switch (rows * 32 + columns) {
     case 3 * 32 + 6:
       return f.template operator()<3, 6>();
+    case 3 * 32 + 7:
+      return f.template operator()<3, 7>();
     case 2 * 32 + 5:
       return f.template operator()<2, 5>();
     case 6 * 32 + 12:

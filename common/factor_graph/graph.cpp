@@ -51,9 +51,37 @@ double chi2(const Graph& graph, const PointObservation& factor) {
   return e.dot(factor.information * e);
 }
 
+SE2 at_true_rate(const SE2& measured, double bias, double seconds) {
+  const double turn = bias * seconds;
+  const Eigen::Vector2d& way = measured.translation();
+  return {way - 0.5 * turn * turned_left(way), measured.theta() - turn};
+}
+
+double chi2(const Graph& graph, const TurningPose& factor) {
+  const RelativePose& motion = factor.motion;
+  const double bias = graph[factor.bias];
+  // In the axes of the motion as it was measured, as the smoother's factor has it.
+  Eigen::Vector3d e = split_error(motion.a_T_b, graph[motion.a].inverse() * graph[motion.b]);
+  const SE2 shift = motion.a_T_b.inverse() * at_true_rate(motion.a_T_b, bias, factor.seconds);
+  e -= shift.coordinates();
+  return e.dot(motion.information * e);
+}
+
+double chi2(const Graph& graph, const ScalarPrior& factor) {
+  const double e = graph[factor.scalar] - factor.mean;
+  return e * factor.information * e;
+}
+
+double chi2(const Graph& graph, const ScalarStep& factor) {
+  const double e = graph[factor.b] - graph[factor.a];
+  return e * factor.information * e;
+}
+
 double chi2(const Graph& graph) {
   return sum_chi2(graph, graph.pose_priors) + sum_chi2(graph, graph.relative_poses) +
-         sum_chi2(graph, graph.point_priors) + sum_chi2(graph, graph.observations);
+         sum_chi2(graph, graph.point_priors) + sum_chi2(graph, graph.observations) +
+         sum_chi2(graph, graph.turning_poses) + sum_chi2(graph, graph.scalar_priors) +
+         sum_chi2(graph, graph.scalar_steps);
 }
 
 ObservationJacobian linearise(const Graph& graph, const PointObservation& factor) {

@@ -9,11 +9,13 @@
 
 namespace understory {
 
-/// Index of a pose or of a point; each kind counts for itself.
+/// Index of a pose, of a point or of a scalar; each kind counts for itself.
 enum class PoseId : std::uint32_t {};
 enum class PointId : std::uint32_t {};
 constexpr std::uint32_t index(PoseId id) { return static_cast<std::uint32_t>(id); }
+enum class ScalarId : std::uint32_t {};
 constexpr std::uint32_t index(PointId id) { return static_cast<std::uint32_t>(id); }
+constexpr std::uint32_t index(ScalarId id) { return static_cast<std::uint32_t>(id); }
 
 /// Measured pose: (x, y, theta) of mean^-1 * pose ~ N(0, information^-1).
 struct PosePrior {
@@ -29,6 +31,28 @@ struct RelativePose {
   PoseId b{};
   SE2 a_T_b;
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+};
+
+/// A RelativePose whose turn was measured with an instrument that is off by a scalar [rad/s], over
+/// `seconds` of it.
+struct TurningPose {
+  RelativePose motion;
+  ScalarId bias{};
+  double seconds = 0.0;
+};
+
+/// Measured scalar: scalar - mean ~ N(0, 1 / information).
+struct ScalarPrior {
+  ScalarId scalar{};
+  double mean = 0.0;
+  double information = 0.0;
+};
+
+/// A scalar that drifted: b - a ~ N(0, 1 / information).
+struct ScalarStep {
+  ScalarId a{};
+  ScalarId b{};
+  double information = 0.0;
 };
 
 /// Measured point: point - mean ~ N(0, information^-1).
@@ -55,10 +79,16 @@ struct Graph {
   std::vector<RelativePose> relative_poses;
   std::vector<PointPrior> point_priors;
   std::vector<PointObservation> observations;
+  /// What instruments are off by; BatchSmoother does not take them.
+  std::vector<double> scalars;
+  std::vector<TurningPose> turning_poses;
+  std::vector<ScalarPrior> scalar_priors;
+  std::vector<ScalarStep> scalar_steps;
 
   PoseId add_pose(const SE2& initial);
   PointId add_point(const Eigen::Vector2d& initial);
   const SE2& operator[](PoseId id) const { return poses[index(id)]; }
+  double operator[](ScalarId id) const { return scalars[index(id)]; }
   const Eigen::Vector2d& operator[](PointId id) const { return points[index(id)]; }
 };
 
@@ -66,7 +96,12 @@ struct Graph {
 double chi2(const Graph& graph, const PosePrior& factor);
 double chi2(const Graph& graph, const RelativePose& factor);
 double chi2(const Graph& graph, const PointPrior& factor);
+double chi2(const Graph& graph, const TurningPose& factor);
+double chi2(const Graph& graph, const ScalarPrior& factor);
+double chi2(const Graph& graph, const ScalarStep& factor);
 double chi2(const Graph& graph, const PointObservation& factor);
+/// The motion that was measured, had the instrument been off by `bias`.
+SE2 at_true_rate(const SE2& measured, double bias, double seconds);
 /// Sum over all factors. O(factors).
 double chi2(const Graph& graph);
 

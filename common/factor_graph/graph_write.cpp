@@ -30,7 +30,8 @@ class Text {
   std::string out_;
 };
 
-void write_vertex(const FactorGraph& graph, int v, Text& out) {
+/// False where g2o has no word for it.
+bool write_vertex(const FactorGraph& graph, int v, Text& out) {
   const Value& value = graph.value(VariableId(v));
   const VariableType type = graph.type(VariableId(v));
   std::size_t numbers = static_cast<std::size_t>(dimension(type));
@@ -48,10 +49,13 @@ void write_vertex(const FactorGraph& graph, int v, Text& out) {
     case VariableType::kPoint3:
       out.word("VERTEX_TRACKXYZ");
       break;
+    case VariableType::kScalar:
+      return false;
   }
   out.integer(v);
   for (std::size_t i = 0; i < numbers; ++i) out.number(value[i]);
   out.end();
+  return true;
 }
 
 /// False where g2o has no word for it.
@@ -101,7 +105,7 @@ std::string write_g2o(const FactorGraph& graph, int* skipped) {
   bool has_sensor = false;
   for (int v = 0; v < graph.variable_capacity(); ++v) {
     if (!graph.contains(VariableId(v))) continue;
-    write_vertex(graph, v, out);
+    if (!write_vertex(graph, v, out)) ++left_out;
     has_sensor = has_sensor || graph.type(VariableId(v)) == VariableType::kPoint3;
   }
   if (has_sensor) out.word("PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n");

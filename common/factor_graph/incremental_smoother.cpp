@@ -25,6 +25,7 @@ constexpr double kLeastUsualUnit = 0.02;
 std::string name_of(const FactorGraph& graph, VariableId id) {
   const VariableType type = graph.type(id);
   const bool is_pose = type == VariableType::kPose2 || type == VariableType::kPose3;
+  if (type == VariableType::kScalar) return "scalar " + std::to_string(index(id));
   return (is_pose ? "pose " : "point ") + std::to_string(index(id));
 }
 

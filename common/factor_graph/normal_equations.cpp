@@ -1,6 +1,7 @@
 #include "common/factor_graph/normal_equations.hpp"
 
 #include <algorithm>
+#include <stdexcept>
 
 namespace understory {
 namespace {
@@ -14,6 +15,8 @@ struct BlockEntry {
 }  // namespace
 
 NormalEquations::NormalEquations(const Graph& graph) {
+  if (!graph.scalars.empty())
+    throw std::invalid_argument("normal equations: of poses and points alone");
   number_variables(graph);
   build_pattern(graph);
 }

@@ -34,17 +34,20 @@ struct Smoother::State {
   };
   struct Counts {
     std::size_t poses = 0, points = 0, observations = 0, pose_priors = 0, relative_poses = 0,
-                point_priors = 0;
+                point_priors = 0, scalars = 0, turning_poses = 0, scalar_priors = 0,
+                scalar_steps = 0;
   };
 
   explicit State(const SmootherParameters& parameters) : smoother(incremental(parameters)) {}
 
   Counts counts() const {
-    return {poses.size(),       points.size(),         observations.size(),
-            pose_priors.size(), relative_poses.size(), point_priors.size()};
+    return {poses.size(),          points.size(),       observations.size(), pose_priors.size(),
+            relative_poses.size(), point_priors.size(), scalars.size(),      turning_poses.size(),
+            scalar_priors.size(),  scalar_steps.size()};
   }
   VariableId name(PoseId id) const { return poses[index(id)]; }
   VariableId name(PointId id) const { return points[index(id)]; }
+  VariableId name(ScalarId id) const { return scalars[index(id)]; }
   FactorId give(const PointObservation& factor) {
     if (factor.information.isZero(0.0)) return kNoFactor;
     return smoother.add(understory::observation(name(factor.pose), name(factor.point),
@@ -59,10 +62,12 @@ struct Smoother::State {
   }
   void collect_moved() {
     for (const int v : smoother.moved()) {
+      const VariableType type = smoother.graph().type(VariableId(v));
+      if (type == VariableType::kScalar) continue;
       Role& role = roles[static_cast<std::size_t>(v)];
       if (role.is_moved) continue;
       role.is_moved = true;
-      if (smoother.graph().type(VariableId(v)) == VariableType::kPose2) {
+      if (type == VariableType::kPose2) {
         moved_poses.push_back(PoseId(role.index));
       } else {
         moved_points.push_back(PointId(role.index));
@@ -89,6 +94,10 @@ struct Smoother::State {
   std::vector<PosePrior> pose_priors;
   std::vector<RelativePose> relative_poses;
   std::vector<PointPrior> point_priors;
+  std::vector<VariableId> scalars;
+  std::vector<TurningPose> turning_poses;
+  std::vector<ScalarPrior> scalar_priors;
+  std::vector<ScalarStep> scalar_steps;
   Counts saved;
   std::vector<Change> changes;  ///< Of observations, since the checkpoint.
   std::vector<PoseId> moved_poses;
@@ -113,6 +122,11 @@ PointId Smoother::add_point(const Eigen::Vector2d& initial) {
   return PointId(state_->take_role(name, state_->points.size() - 1));
 }
 
+ScalarId Smoother::add_scalar(double initial) {
+  state_->scalars.push_back(state_->smoother.add_variable(initial));
+  return ScalarId(static_cast<std::uint32_t>(state_->scalars.size() - 1));
+}
+
 void Smoother::add(const PosePrior& factor) {
   state_->smoother.add(prior(state_->name(factor.pose), factor.mean, factor.information));
   state_->pose_priors.push_back(factor);
@@ -127,6 +141,24 @@ void Smoother::add(const RelativePose& factor) {
 void Smoother::add(const PointPrior& factor) {
   state_->smoother.add(prior(state_->name(factor.point), factor.mean, factor.information));
   state_->point_priors.push_back(factor);
+}
+
+void Smoother::add(const TurningPose& factor) {
+  const RelativePose& motion = factor.motion;
+  state_->smoother.add(turning(state_->name(motion.a), state_->name(motion.b),
+                               state_->name(factor.bias), motion.a_T_b, factor.seconds,
+                               motion.information));
+  state_->turning_poses.push_back(factor);
+}
+
+void Smoother::add(const ScalarPrior& factor) {
+  state_->smoother.add(prior(state_->name(factor.scalar), factor.mean, factor.information));
+  state_->scalar_priors.push_back(factor);
+}
+
+void Smoother::add(const ScalarStep& factor) {
+  state_->smoother.add(step(state_->name(factor.a), state_->name(factor.b), factor.information));
+  state_->scalar_steps.push_back(factor);
 }
 
 ObservationId Smoother::add(const PointObservation& factor) {
@@ -144,6 +176,9 @@ void Smoother::set(ObservationId id, const PointObservation& factor) {
 SE2 Smoother::pose(PoseId id) const { return state_->smoother.pose2(state_->name(id)); }
 Eigen::Vector2d Smoother::point(PointId id) const {
   return state_->smoother.point2(state_->name(id));
+}
+double Smoother::scalar(ScalarId id) const {
+  return state_->smoother.graph().value(state_->name(id))[0];
 }
 const PointObservation& Smoother::observation(ObservationId id) const {
   return state_->observations[index(id)].measured;
@@ -166,6 +201,12 @@ Graph Smoother::graph() const {
   graph.pose_priors = state_->pose_priors;
   graph.relative_poses = state_->relative_poses;
   graph.point_priors = state_->point_priors;
+  for (const VariableId name : state_->scalars) {
+    graph.scalars.push_back(state_->smoother.graph().value(name)[0]);
+  }
+  graph.turning_poses = state_->turning_poses;
+  graph.scalar_priors = state_->scalar_priors;
+  graph.scalar_steps = state_->scalar_steps;
   for (const State::Observation& one : state_->observations) {
     graph.observations.push_back(one.measured);
   }
@@ -175,7 +216,11 @@ Graph Smoother::graph() const {
 void Smoother::start_from(const Graph& graph) {
   for (const SE2& pose : graph.poses) add_pose(pose);
   for (const Eigen::Vector2d& point : graph.points) add_point(point);
+  for (const double scalar : graph.scalars) add_scalar(scalar);
   for (const PosePrior& factor : graph.pose_priors) add(factor);
+  for (const TurningPose& factor : graph.turning_poses) add(factor);
+  for (const ScalarPrior& factor : graph.scalar_priors) add(factor);
+  for (const ScalarStep& factor : graph.scalar_steps) add(factor);
   for (const RelativePose& factor : graph.relative_poses) add(factor);
   for (const PointPrior& factor : graph.point_priors) add(factor);
   for (const PointObservation& factor : graph.observations) add(factor);
@@ -202,6 +247,10 @@ void Smoother::rollback() {
   state.pose_priors.resize(state.saved.pose_priors);
   state.relative_poses.resize(state.saved.relative_poses);
   state.point_priors.resize(state.saved.point_priors);
+  state.scalars.resize(state.saved.scalars);
+  state.turning_poses.resize(state.saved.turning_poses);
+  state.scalar_priors.resize(state.saved.scalar_priors);
+  state.scalar_steps.resize(state.saved.scalar_steps);
 }
 
 SmootherUpdate Smoother::update() {

@@ -1,4 +1,4 @@
-// The smoother of the mapper: poses and points of the plane.
+// The smoother of the mapper: poses and points of the plane, and what instruments are off by.
 #pragma once
 
 #include <memory>
@@ -48,15 +48,20 @@ class Smoother {
 
   PoseId add_pose(const SE2& initial);
   PointId add_point(const Eigen::Vector2d& initial);
+  ScalarId add_scalar(double initial);
   void add(const PosePrior& factor);
   void add(const RelativePose& factor);
   void add(const PointPrior& factor);
+  void add(const TurningPose& factor);
+  void add(const ScalarPrior& factor);
+  void add(const ScalarStep& factor);
   ObservationId add(const PointObservation& factor);
   /// Replaces a measurement; one whose information is zero no longer counts.
   void set(ObservationId id, const PointObservation& factor);
 
   SE2 pose(PoseId id) const;
   Eigen::Vector2d point(PointId id) const;
+  double scalar(ScalarId id) const;
   const PointObservation& observation(ObservationId id) const;
   double chi2(ObservationId id) const;
   /// What updates moved since the checkpoint, each once.

@@ -19,6 +19,8 @@ Value value_of(const Eigen::Vector3d& point) {
   return {point.x(), point.y(), point.z(), 0, 0, 0, 0};
 }
 
+Value value_of(double scalar) { return {scalar, 0, 0, 0, 0, 0, 0}; }
+
 SE2 pose2_of(const Value& value) { return {value[0], value[1], value[2]}; }
 
 Pose3 pose3_of(const Value& value) {

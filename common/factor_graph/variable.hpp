@@ -15,11 +15,11 @@ enum class FactorId : std::int32_t {};
 constexpr int index(VariableId id) { return static_cast<int>(id); }
 constexpr int index(FactorId id) { return static_cast<int>(id); }
 
-enum class VariableType : std::uint8_t { kPose2, kPose3, kPoint2, kPoint3 };
+enum class VariableType : std::uint8_t { kPose2, kPose3, kPoint2, kPoint3, kScalar };
 
 /// Degrees of freedom.
 constexpr int dimension(VariableType type) {
-  constexpr std::array<int, 4> dimensions{3, 6, 2, 3};
+  constexpr std::array<int, 5> dimensions{3, 6, 2, 3, 1};
   return dimensions[static_cast<std::size_t>(type)];
 }
 constexpr int kMaxVariableDimension = 6;
@@ -28,6 +28,7 @@ constexpr int kMaxVariableDimension = 6;
 ///   pose2: x, y [m], theta [rad, not wrapped], cos theta, sin theta
 ///   pose3: x, y, z [m], quaternion x, y, z, w (body to world)
 ///   point: x, y (, z) [m]
+///   scalar: itself, in a unit of its own
 using Value = std::array<double, 7>;
 
 /// Where a variable is, in a chart about its `base`: (x, y, theta) of a pose2 and the coordinates
@@ -39,6 +40,7 @@ Value value_of(const SE2& pose);
 Value value_of(const Pose3& pose);
 Value value_of(const Eigen::Vector2d& point);
 Value value_of(const Eigen::Vector3d& point);
+Value value_of(double scalar);
 SE2 pose2_of(const Value& value);
 Pose3 pose3_of(const Value& value);
 inline Eigen::Vector2d point2_of(const Value& value) { return {value[0], value[1]}; }

@@ -11,10 +11,10 @@ namespace {
 /// Pieces from one source may miss each other by rounding of their stamps.
 constexpr Utime kGapTolerance_us = 1000;
 
-/// Errors of the filter's velocity last for about so long, those of its bias for so long [s]: both
-/// have the power tau * dt when pieces are compounded.
+/// Errors of the filter's velocity last for about so long: they have the power tau * dt when pieces
+/// are compounded.
 constexpr double kVelocityLasts_s = 0.5;
-constexpr double kBiasLasts_s = 5.0;
+constexpr std::size_t kMaxPieces = 20000;
 
 bool begins_at(const Odometry& piece, Utime utime) {
   return std::abs(piece.from_utime - utime) <= kGapTolerance_us;
@@ -32,7 +32,6 @@ SE2WithCovariance way_from(const KnownVelocity& start, const Preintegration& ine
   motion.covariance = of_noise * inertial.covariance * of_noise.transpose();
   motion.covariance.topLeftCorner<2, 2>() +=
       dt * std::max(dt, kVelocityLasts_s) * back * start.covariance * back.transpose();
-  motion.covariance(2, 2) += dt * std::max(dt, kBiasLasts_s) * start.gyro_bias_variance;
   return motion;
 }
 
@@ -65,7 +64,16 @@ Odometry at_bias(const Odometry& piece, const InertialBias& bias) {
   Eigen::Vector3d twist = piece.from_T_to.Log();
   twist.z() += piece.inertial->bias_jacobian(0, 0) * gyro;
   moved.from_T_to = SE2::Exp(twist);
+  moved.inertial = at_bias(*piece.inertial, bias);
   return moved;
+}
+
+/// The heading's variance, with what it shares with the way in proportion.
+void set_heading_variance(Eigen::Matrix3d& covariance, double variance) {
+  const double ratio = covariance(2, 2) > 0.0 ? std::sqrt(variance / covariance(2, 2)) : 0.0;
+  covariance.row(2) *= ratio;
+  covariance.col(2) *= ratio;
+  covariance(2, 2) = variance;
 }
 
 }  // namespace
@@ -75,7 +83,7 @@ bool OdometryBuffer::add(const Odometry& piece) {
   if (!pieces_.empty() && piece.from_utime < pieces_.back().utime - kGapTolerance_us) return false;
   pieces_.push_back(bias_ ? at_bias(piece, *bias_) : piece);
   if (velocity_) start_at_velocity(pieces_.back());
-  if (pieces_.size() > max_pieces_) pieces_.pop_front();
+  if (pieces_.size() > kMaxPieces) pieces_.pop_front();
   return true;
 }
 
@@ -91,7 +99,11 @@ void OdometryBuffer::start_at_velocity(Odometry& piece) {
     if (spread(motion.covariance) < spread(piece.covariance)) {
       piece.from_T_to = motion.mean;
       piece.covariance = motion.covariance;
+      piece.covariance(2, 2) += inertial.seconds * std::max(inertial.seconds, bias_lasts_s_) *
+                                velocity_->gyro_bias_variance;
     }
+    if (bias_lasts_s_ == 0.0 && inertial.covariance(0, 0) > 0.0)
+      set_heading_variance(piece.covariance, inertial.covariance(0, 0));
   }
   velocity_ = carried_over(*velocity_, piece, inertial);
 }
@@ -128,6 +140,24 @@ std::optional<SE2WithCovariance> OdometryBuffer::between(Utime from, Utime to) c
     ++piece;
   }
   return motion;
+}
+
+std::optional<GyroTurn> OdometryBuffer::gyro_turn(Utime from, Utime to) const {
+  GyroTurn sum;
+  Utime covered = 0;
+  for (const Odometry& piece : pieces_) {
+    const Utime overlap = std::min(to, piece.utime) - std::max(from, piece.from_utime);
+    if (overlap <= 0) continue;
+    if (!piece.inertial) return std::nullopt;
+    covered += overlap;
+    const double part =
+        static_cast<double>(overlap) / static_cast<double>(piece.utime - piece.from_utime);
+    const double seconds = piece.is_standing ? 0.0 : 1e-6 * static_cast<double>(overlap);
+    sum += {part * piece.from_T_to.theta(), part * piece.covariance(2, 2), seconds,
+            seconds * piece.inertial->bias.x()};
+  }
+  if (covered + kGapTolerance_us < to - from) return std::nullopt;
+  return sum;
 }
 
 void OdometryBuffer::forget_before(Utime utime) {

@@ -17,10 +17,34 @@ struct KnownVelocity {
   double gyro_bias_variance = 0.0;  ///< [(rad/s)^2]
 };
 
+/// The gyro's bias as a filter knows it [rad/s], [(rad/s)^2].
+struct FilterBias {
+  double bias = 0.0;
+  double variance = 0.0;
+};
+
+/// What a gyro said of a time.
+struct GyroTurn {
+  double turn_rad = 0.0;
+  double variance = 0.0;  ///< Of that [rad^2]; of white noise alone, see OdometryBuffer.
+  double seconds = 0.0;   ///< On the move.
+  double bias_rad = 0.0;  ///< What was taken out as the gyro's bias in that time.
+
+  void operator+=(const GyroTurn& other) {
+    turn_rad += other.turn_rad;
+    variance += other.variance;
+    seconds += other.seconds;
+    bias_rad += other.bias_rad;
+  }
+};
+
 /// Keeps consecutive pieces of odometry. Bounded: old pieces are forgotten.
 class OdometryBuffer {
  public:
-  explicit OdometryBuffer(std::size_t max_pieces = 20000) : max_pieces_(max_pieces) {}
+  /// `bias_lasts_s`: for how long what the filter does not know of the gyro's bias stays the same,
+  /// as far as it counts to whoever compounds pieces. 0: they have it as a variable of their own,
+  /// covariances are of what is new in each piece.
+  explicit OdometryBuffer(double bias_lasts_s = 5.0) : bias_lasts_s_(bias_lasts_s) {}
 
   /// Adds a piece; one that overlaps or runs backwards is refused (false).
   bool add(const Odometry& piece);
@@ -34,11 +58,18 @@ class OdometryBuffer {
   /// that is surer.
   void know(const EkfPose& pose);
   const std::optional<KnownVelocity>& velocity() const { return velocity_; }
+  /// None before the filter spoke, and after a gap.
+  std::optional<FilterBias> filter_bias() const {
+    if (!bias_ || !velocity_ || !(velocity_->gyro_bias_variance > 0.0)) return std::nullopt;
+    return FilterBias{bias_->x(), velocity_->gyro_bias_variance};
+  }
   void restore(const KnownVelocity& velocity) { velocity_ = velocity; }
   /// Motion of the vehicle from `from` to `to`, or none where a gap or the end of the buffer is in
   /// between. Inside a piece the motion is taken at constant twist and its covariance in proportion
   /// to time.
   std::optional<SE2WithCovariance> between(Utime from, Utime to) const;
+  /// The same of the turn alone; none also where there was no IMU.
+  std::optional<GyroTurn> gyro_turn(Utime from, Utime to) const;
   void forget_before(Utime utime);
   const std::deque<Odometry>& pieces() const { return pieces_; }
   /// A piece that pieces() gave, into an empty buffer: as it is.
@@ -47,7 +78,7 @@ class OdometryBuffer {
  private:
   void start_at_velocity(Odometry& piece);
 
-  std::size_t max_pieces_;
+  double bias_lasts_s_;
   std::deque<Odometry> pieces_;
   std::optional<InertialBias> bias_;
   std::optional<KnownVelocity> velocity_;  ///< At the end of the last piece that continued it.

@@ -77,6 +77,8 @@ void describe_evidence(SmoothingMapperParameters& p, ParameterTable& table) {
 
 void describe_growth(SmoothingMapperParameters& p, ParameterTable& table) {
   table.add("ours.use_odometry", p.use_odometry, "ODOMETRY between keyframes as a factor.");
+  table.add("ours.gyro_walk", p.gyro_walk, {0.0, 1.0}, "rad/s/sqrt(s)",
+            "Random walk of the gyro's bias in the graph; 0 = the filter's word is taken for it.");
   table.add("ours.localisation_only", p.localisation_only, "Never change the map that was given.");
   table.add("ours.recent_keyframes", p.recent_keyframes, {1, 100000}, "keyframes",
             "Landmarks seen within so many share their error with the pose.");

@@ -30,6 +30,10 @@ struct SourceMapperParameters {
 struct SmoothingMapperParameters {
   /// ODOMETRY between keyframes as a factor.
   bool use_odometry = false;
+  /// Random walk of the gyro's bias, which is a variable of the graph where odometry has an IMU
+  /// [rad/s/sqrt(s)]. What is found out about it later then straightens the way before. 0: the
+  /// filter's word of the moment is taken for it.
+  double gyro_walk = 1e-5;
   /// Never change the map that was given.
   bool localisation_only = false;
   /// A measurement is linearised again beyond this [sigmas]. On long roads that never come back,

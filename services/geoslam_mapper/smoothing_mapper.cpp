@@ -15,6 +15,9 @@ const Eigen::Matrix3d kTiny = 1e-12 * Eigen::Matrix3d::Identity();
 /// Landmarks are told at breast height; the level displaces them by it.
 constexpr double kLandmarkHeight_m = 1.3;
 
+/// Of the gyro's bias, where it is not a variable of the graph: its error has that power [s].
+constexpr double kBiasLasts_s = 5.0;
+
 SmootherParameters limits(const SmoothingMapperParameters& parameters) {
   SmootherParameters result;
   result.relinearise_above = parameters.relinearise_above;
@@ -37,7 +40,10 @@ bool finite(const Keyframe& keyframe) {
 }  // namespace
 
 SmoothingMapper::SmoothingMapper(const SmoothingMapperParameters& parameters)
-    : parameters_(parameters), smoother_(limits(parameters)) {}
+    : parameters_(parameters),
+      smoother_(limits(parameters)),
+      odometry_(parameters.gyro_walk > 0.0 ? 0.0 : kBiasLasts_s),
+      gyro_(parameters.gyro_walk) {}
 
 std::unique_ptr<MapperMethod> make_smoothing_mapper(const SmoothingMapperParameters& parameters) {
   return std::make_unique<SmoothingMapper>(parameters);
@@ -236,11 +242,8 @@ void SmoothingMapper::finish(const Keyframe& keyframe, MapUpdate& update) {
   update.map_T_vehicle = map_T_base.mean;
   update.covariance = map_T_base.covariance;
   const KeyframeMember& last = keyframe.members.back();
-  // A folded keyframe's members are given in its own centre; the base ties that to the node's.
-  const SE2 node_T_keyframe = base.centre_T_base.mean * keyframe.centre_T_base().inverse();
-  const SE2WithCovariance centre_T_last{node_T_keyframe * last.centre_T_vehicle, last.covariance};
-  update.map_T_latest_vehicle = map_T_centre.mean * centre_T_last.mean;
-  last_member_ = LastMember{base.node, last.utime, centre_T_last};
+  last_member_ = last_of(keyframe, base);
+  update.map_T_latest_vehicle = map_T_centre.mean * last_member_->centre_T_vehicle.mean;
   map_T_last_base_ = map_T_base;
   odometry_.forget_before(last.utime);
   // The newest scan's place is now known better than it was when it came.

@@ -8,6 +8,7 @@
 #include "common/model/odometry_buffer.hpp"
 #include "services/geoslam_mapper/filter_track.hpp"
 #include "services/geoslam_mapper/geoslam_mapper.hpp"
+#include "services/geoslam_mapper/gyro_bias.hpp"
 #include "services/geoslam_mapper/landmark_store.hpp"
 #include "services/geoslam_mapper/place_grid.hpp"
 
@@ -55,6 +56,14 @@ class SmoothingMapper final : public MapperMethod {
     std::vector<Association> associations;
     bool by_prediction = false;
   };
+  /// The last accepted keyframe's last member: odometry goes on from here. Frame: the node's
+  /// centre.
+  struct LastMember {
+    NodeIndex node = 0;
+    Utime utime = 0;
+    SE2WithCovariance centre_T_vehicle;
+    std::optional<GyroTurn> turn;  ///< From the centre to here, as the gyro has it.
+  };
   struct Prediction {
     SE2WithCovariance map_T_centre;
     bool from_odometry = false;
@@ -97,10 +106,14 @@ class SmoothingMapper final : public MapperMethod {
   void put_into_graph(StoredLandmark& landmark);
   PointId add_point(const StoredLandmark& landmark);
   void add_base(const Base& base);
-  std::optional<SE2WithCovariance> motion_since_last(Utime utime) const;
-  void add_motion(const Keyframe& keyframe, NodeIndex node);
   bool solve(NodeIndex node, MapUpdate& update);
   void count_sightings(const Keyframe& keyframe, NodeIndex node, const MapUpdate& update);
+
+  // smoothing_mapper_motion.cpp: what does odometry say?
+  std::optional<SE2WithCovariance> motion_since_last(Utime utime) const;
+  void add_motion(const Keyframe& keyframe, NodeIndex node);
+  std::optional<GyroTurn> turn_to_centre(const Keyframe& keyframe) const;
+  LastMember last_of(const Keyframe& keyframe, const Base& base) const;
 
   // smoothing_mapper_discover.cpp: new landmarks, and two that are one.
   void discover(const Keyframe& keyframe, NodeIndex node, MapUpdate& update);
@@ -125,19 +138,13 @@ class SmoothingMapper final : public MapperMethod {
   PlaceGrid places_;
   /// Per point of the graph: its landmark; 0 where that was taken over by another.
   std::vector<LandmarkId> landmark_of_point_;
-  OdometryBuffer odometry_;
+  OdometryBuffer odometry_;  ///< Without the bias, where that is a variable of the graph.
   FilterTrack filter_;
   KnownLevel level_;
   bool map_was_given_ = false;
   std::uint32_t keyframes_ = 0;  ///< Accepted.
-  /// The last accepted keyframe's last member: odometry goes on from here. Frame: the node's
-  /// centre.
-  struct LastMember {
-    NodeIndex node = 0;
-    Utime utime = 0;
-    SE2WithCovariance centre_T_vehicle;
-  };
   std::optional<LastMember> last_member_;
+  GyroBias gyro_;
   /// The last keyframe's base, accepted or not: where it is, or is thought to be.
   std::optional<SE2WithCovariance> map_T_last_base_;
   std::optional<Utime> last_utime_;

@@ -100,18 +100,6 @@ void SmoothingMapper::observe(NodeIndex node, const KeyframeLandmark& seen, Land
   smoother_.set(entry->second, factor);
 }
 
-void SmoothingMapper::add_motion(const Keyframe& keyframe, NodeIndex node) {
-  const auto motion = motion_since_last(keyframe.utime);
-  if (!motion || last_member_->node == node) return;
-  const SE2WithCovariance centre_T_base{keyframe.centre_T_base(),
-                                        keyframe.members.front().covariance};
-  const SE2WithCovariance last_T_centre =
-      compound(compound(last_member_->centre_T_vehicle, *motion), inverse(centre_T_base));
-  const Eigen::Matrix3d covariance = last_T_centre.covariance + 1e-12 * Eigen::Matrix3d::Identity();
-  smoother_.add(RelativePose{nodes_[last_member_->node].centre, nodes_[node].centre,
-                             last_T_centre.mean, covariance.inverse()});
-}
-
 /// The node of the nearest earlier keyframe, when this one stands where that stood: nothing new is
 /// seen from there.
 std::optional<NodeIndex> SmoothingMapper::foldable(const Keyframe& keyframe,
@@ -158,6 +146,7 @@ bool SmoothingMapper::fuse(const Keyframe& arrived, const Placement& placement, 
   const Keyframe keyframe = fold ? in_frame_of(*fold, arrived, placement) : arrived;
   const NodeIndex node = fold ? *fold : add_node(placement.map_T_centre.mean, keyframe);
   const Node node_before = nodes_[node];
+  const GyroBias gyro_before = gyro_;
   std::vector<LandmarkId> entered;
   for (const Association& pair : placement.associations) {
     StoredLandmark& landmark = store_.at(pair.landmark_id);
@@ -169,6 +158,7 @@ bool SmoothingMapper::fuse(const Keyframe& arrived, const Placement& placement, 
   update.associations = placement.associations;
   if (!solve(node, update)) {
     smoother_.rollback();
+    gyro_ = gyro_before;
     for (const LandmarkId id : entered) store_.at(id).point.reset();
     landmark_of_point_.resize(landmark_of_point_.size() - entered.size());
     if (nodes_.size() > nodes_before) {

@@ -45,11 +45,6 @@ std::vector<std::size_t> spread(std::span<const Eigen::Vector2d> points, std::si
 
 }  // namespace
 
-std::optional<SE2WithCovariance> SmoothingMapper::motion_since_last(Utime utime) const {
-  if (!parameters_.use_odometry || !last_member_) return std::nullopt;
-  return odometry_.between(last_member_->utime, utime);
-}
-
 std::optional<SmoothingMapper::Prediction> SmoothingMapper::predict(
     const Keyframe& keyframe) const {
   const SE2WithCovariance base_T_centre =

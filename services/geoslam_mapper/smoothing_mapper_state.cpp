@@ -7,7 +7,7 @@
 namespace understory {
 namespace {
 
-constexpr int kStateVersion = 3;
+constexpr int kStateVersion = 4;
 
 Json to_value(const KeyframeLandmark& l) {
   return {matrix_to_json<2, 1>(l.position_m), matrix_to_json<2, 2>(l.covariance_m2), l.radius_m,
@@ -76,6 +76,17 @@ Candidate candidate_from(const Json& json) {
   return c;
 }
 
+Json to_value(const std::optional<GyroTurn>& t) {
+  if (!t) return nullptr;
+  return {t->turn_rad, t->variance, t->seconds, t->bias_rad};
+}
+
+std::optional<GyroTurn> gyro_turn_from(const Json& json) {
+  if (json.is_null()) return std::nullopt;
+  return GyroTurn{json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>(),
+                  json.at(3).get<double>()};
+}
+
 Json to_value(const Graph& graph) {
   Json points = Json::array(), pose_priors = Json::array(), relative = Json::array(),
        point_priors = Json::array(), seen = Json::array();
@@ -93,13 +104,25 @@ Json to_value(const Graph& graph) {
     seen.push_back({index(f.pose), index(f.point), matrix_to_json<2, 1>(f.position),
                     matrix_to_json<2, 2>(f.information)});
   }
-  return {{"poses", graph.poses},         {"points", points},
+  Json turning = Json::array(), scalar_priors = Json::array(), steps = Json::array();
+  for (const TurningPose& f : graph.turning_poses) {
+    turning.push_back({index(f.motion.a), index(f.motion.b), f.motion.a_T_b,
+                       matrix_to_json<3, 3>(f.motion.information), index(f.bias), f.seconds});
+  }
+  for (const ScalarPrior& f : graph.scalar_priors)
+    scalar_priors.push_back({index(f.scalar), f.mean, f.information});
+  for (const ScalarStep& f : graph.scalar_steps)
+    steps.push_back({index(f.a), index(f.b), f.information});
+  return {{"scalars", graph.scalars},     {"turning", turning},
+          {"scalar_steps", steps},        {"scalar_priors", scalar_priors},
+          {"poses", graph.poses},         {"points", points},
           {"pose_priors", pose_priors},   {"relative", relative},
           {"point_priors", point_priors}, {"observations", seen}};
 }
 
 PoseId pose_id(const Json& json) { return PoseId(json.get<std::uint32_t>()); }
 PointId point_id(const Json& json) { return PointId(json.get<std::uint32_t>()); }
+ScalarId scalar_id(const Json& json) { return ScalarId(json.get<std::uint32_t>()); }
 
 Graph graph_from(const Json& json) {
   Graph graph;
@@ -123,6 +146,19 @@ Graph graph_from(const Json& json) {
                                   matrix_from_json<2, 1>(f.at(2)),
                                   matrix_from_json<2, 2>(f.at(3))});
   }
+  json.at("scalars").get_to(graph.scalars);
+  for (const Json& f : json.at("turning")) {
+    const RelativePose motion{pose_id(f.at(0)), pose_id(f.at(1)), f.at(2).get<SE2>(),
+                              matrix_from_json<3, 3>(f.at(3))};
+    graph.turning_poses.push_back({motion, scalar_id(f.at(4)), f.at(5).get<double>()});
+  }
+  for (const Json& f : json.at("scalar_priors")) {
+    graph.scalar_priors.push_back(
+        {scalar_id(f.at(0)), f.at(1).get<double>(), f.at(2).get<double>()});
+  }
+  for (const Json& f : json.at("scalar_steps")) {
+    graph.scalar_steps.push_back({scalar_id(f.at(0)), scalar_id(f.at(1)), f.at(2).get<double>()});
+  }
   return graph;
 }
 
@@ -143,7 +179,8 @@ std::string SmoothingMapper::save() const {
                      base.centre_T_middle});
   Json last_member = nullptr;
   if (last_member_)
-    last_member = {last_member_->node, last_member_->utime, last_member_->centre_T_vehicle};
+    last_member = {last_member_->node, last_member_->utime, last_member_->centre_T_vehicle,
+                   to_value(last_member_->turn)};
   Json located = nullptr;
   if (located_) {
     located = {located_->utime, located_->map_T_vehicle, located_->step,
@@ -157,6 +194,7 @@ std::string SmoothingMapper::save() const {
                    {"nodes", nodes},
                    {"bases", bases},
                    {"odometry", odometry_},
+                   {"gyro", gyro_.save()},
                    {"map_was_given", map_was_given_},
                    {"keyframes", keyframes_},
                    {"last_member", last_member},
@@ -196,12 +234,14 @@ void SmoothingMapper::load(const std::string& state) {
                      base.at(5).get<SE2>(), base.at(4).get<bool>()});
   }
   json.at("odometry").get_to(loaded.odometry_);
+  loaded.gyro_.load(json.at("gyro"));
   json.at("map_was_given").get_to(loaded.map_was_given_);
   json.at("keyframes").get_to(loaded.keyframes_);
   const Json& last = json.at("last_member");
   if (!last.is_null()) {
-    loaded.last_member_ = LastMember{last.at(0).get<NodeIndex>(), last.at(1).get<Utime>(),
-                                     last.at(2).get<SE2WithCovariance>()};
+    loaded.last_member_ =
+        LastMember{last.at(0).get<NodeIndex>(), last.at(1).get<Utime>(),
+                   last.at(2).get<SE2WithCovariance>(), gyro_turn_from(last.at(3))};
   }
   loaded.map_T_last_base_ = optional_from_json<SE2WithCovariance>(json.at("last_base"));
   loaded.last_utime_ = optional_from_json<Utime>(json.at("last_utime"));

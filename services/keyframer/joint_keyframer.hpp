@@ -37,7 +37,8 @@ class JointKeyframer final : public KeyframerMethod {
 
   JointKeyframerParameters parameters_;
   ScanTracker tracker_;
-  OdometryBuffer odometry_;
+  /// A keyframe takes less than a second: so long its scans share what the bias is off by.
+  OdometryBuffer odometry_{0.8};
   std::vector<Member> members_;
   std::optional<Utime> last_utime_;
   std::uint64_t next_sequence_ = 0;

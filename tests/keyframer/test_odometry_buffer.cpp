@@ -125,3 +125,23 @@ TEST_CASE("A restored buffer tells the same motion and goes on with the same bia
   const SE2 b = restored.between(0, 6 * kPiece_us)->mean;
   REQUIRE(a.coordinates() == b.coordinates());
 }
+
+TEST_CASE("A gyro's turn adds up, with the bias that was taken out", "[odometry]") {
+  OdometryBuffer buffer(0.0);
+  EkfPose filter = filter_at(0, 10.0, 0.02);
+  filter.bias_covariance(0, 0) = 1e-6;
+  buffer.know(filter);
+  for (int k = 0; k < 5; ++k) REQUIRE(buffer.add(wheel_piece(k)));
+  const auto turn = buffer.gyro_turn(kPiece_us / 2, 3 * kPiece_us);
+  REQUIRE(turn);
+  CHECK(std::abs(turn->turn_rad) < 1e-12);
+  CHECK(std::abs(turn->seconds - 0.25) < 1e-12);
+  CHECK(std::abs(turn->bias_rad - 0.25 * kBias) < 1e-12);
+  // White noise alone: what is not known of the bias is a variable of its own.
+  CHECK(std::abs(turn->variance - 2.5e-8) < 1e-12);
+  CHECK(!buffer.gyro_turn(0, 6 * kPiece_us));
+  Odometry blind = wheel_piece(5);
+  blind.inertial.reset();
+  REQUIRE(buffer.add(blind));
+  CHECK(!buffer.gyro_turn(0, 6 * kPiece_us));
+}
