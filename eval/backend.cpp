@@ -14,18 +14,13 @@
 #include "common/factor_graph/graph_file.hpp"
 #include "common/factor_graph/incremental_smoother.hpp"
 #include "eval/memory.hpp"
+#include "eval/thread_clock.hpp"
 
 namespace understory::eval {
 namespace {
 
 /// The first pose is held fast by a prior that no other factor comes near.
 constexpr double kFixed = 1e8;
-
-double processor_s() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 GraphFile read(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -193,24 +188,24 @@ BackendRun run_backend(const GraphFile& graph, const std::string& dataset) {
   run.points = graph.vertices.size() - run.poses;
   const auto smoother = std::make_unique<IncrementalSmoother>();
   for (std::size_t k = 0; k < feeder.poses(); ++k) {
-    const double begin = processor_s();
+    const double begin = thread_time_s();
     feeder.feed(k, *smoother);
     const IncrementalUpdate update = smoother->update();
-    run.update_ms.push_back(1e3 * (processor_s() - begin));
+    run.update_ms.push_back(1e3 * (thread_time_s() - begin));
     if (!update.ok && run.error.empty()) run.error = update.error;
   }
-  const double begin = processor_s();
+  const double begin = thread_time_s();
   smoother->settle();
-  run.settle_ms = 1e3 * (processor_s() - begin);
+  run.settle_ms = 1e3 * (thread_time_s() - begin);
   run.chi2_final = smoother->graph().chi2();
   run.rss_mb = resident_mb();
   run.smoother_mb = static_cast<double>(smoother->bytes()) / 1048576.0;
-  const double before = processor_s();
+  const double before = thread_time_s();
   const int iterations = std::max(1, smoother->update_everything().iterations);
-  run.whole_ms = 1e3 * (processor_s() - before) / iterations;
-  const double start = processor_s();
+  run.whole_ms = 1e3 * (thread_time_s() - before) / iterations;
+  const double start = thread_time_s();
   const BatchReport report = solve_whole(smoother->graph());
-  run.batch_s = processor_s() - start;
+  run.batch_s = thread_time_s() - start;
   run.chi2_batch = report.chi2;
   if (!report.ok) run.error = "batch: " + report.error;
   run.chi2_dead_reckoning = solve_from_dead_reckoning(graph);

@@ -3,8 +3,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 
+#include "eval/thread_clock.hpp"
 #include "services/associator/associator.hpp"
 #include "services/ekf/chi_squared.hpp"
 #include "services/ekf/ekf.hpp"
@@ -29,13 +29,6 @@ Band band_of_mean(std::size_t runs) {
   const auto count = static_cast<double>(runs);
   return {ekf::chi_squared_quantile(0.025, degrees) / count,
           ekf::chi_squared_quantile(0.975, degrees) / count};
-}
-
-/// Time that this thread has computed: other work on the machine does not count.
-double thread_time_s() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 /// The scan with its true identities; false detections get a fresh one each.

@@ -3,11 +3,11 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <numbers>
 #include <optional>
 #include <random>
 
+#include "eval/thread_clock.hpp"
 #include "sim/visible_landmarks.hpp"
 
 namespace understory::eval {
@@ -15,13 +15,6 @@ namespace {
 
 using sim::VisibleCorner;
 using sim::VisibleTrunk;
-
-/// Time that this thread has computed [ms]: other work on the machine does not count.
-double thread_time_ms() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
-}
 
 /// A true landmark, 1.3 m above the ground.
 struct Truth {
@@ -198,9 +191,9 @@ ExtractionScore score_extraction(sim::SensorDrive& drive,
     const double pitch_error = tilt(random);
     const PointSweep input =
         ideal_input(sweep, drive, {roll_error, pitch_error}, options.attitude_sigma_rad);
-    const double before = thread_time_ms();
+    const double before = 1e3 * thread_time_s();
     const LandmarkScan scan = extractor.extract(input);
-    times_ms.push_back(thread_time_ms() - before);
+    times_ms.push_back(1e3 * thread_time_s() - before);
     const sim::VehicleState state = drive.state_at(scan.utime);
     score_kind(scan, LandmarkKind::kTrunk, true_trunks(drive.world(), sweep, state, options),
                options, trunks, score.misses);

@@ -20,6 +20,7 @@
 #include "eval/quantile.hpp"
 #include "eval/results.hpp"
 #include "eval/slam_session.hpp"
+#include "eval/thread_clock.hpp"
 #include "eval/yardstick.hpp"
 #include "sim/drive.hpp"
 
@@ -125,13 +126,6 @@ std::vector<PlaceQuestion> questions_of(const Setting& setting, const std::strin
   return questions;
 }
 
-/// Time of this thread alone [s]: others on the machine do not count.
-double thread_s() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 struct Score {
   std::size_t keyframes = 0;
   std::size_t landmarks = 0;
@@ -160,9 +154,9 @@ double keyframe_error_m(const PlaceQuestion& question, const SE2& map_T_base) {
 }
 
 void ask(const PlaceFinder& finder, const PlaceQuestion& question, Score& score) {
-  const double start = thread_s();
+  const double start = thread_time_s();
   const PlaceAnswer answer = finder.find(question.keyframe);
-  score.ms.push_back(1e3 * (thread_s() - start));
+  score.ms.push_back(1e3 * (thread_time_s() - start));
   ++score.keyframes;
   if (!answer.map_T_base) {
     ++score.unsure;

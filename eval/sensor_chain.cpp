@@ -1,8 +1,9 @@
 #include "eval/sensor_chain.hpp"
 
-#include <ctime>
 #include <fstream>
 #include <stdexcept>
+
+#include "eval/thread_clock.hpp"
 
 namespace understory::eval {
 namespace {
@@ -10,13 +11,6 @@ namespace {
 std::string read_if_there(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-/// Processor time of this thread: what else the computer does is left out.
-double processor_s() {
-  timespec now{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 }  // namespace
@@ -33,9 +27,9 @@ class SensorChain::TimedBus : public Bus {
   void subscribe(std::string_view channel, std::size_t queue_size, Handler handler) override {
     bus_.subscribe(channel, queue_size,
                    [this, handler = std::move(handler)](const BusMessage& message) {
-                     const double start_s = processor_s();
+                     const double start_s = thread_time_s();
                      handler(message);
-                     const double took_s = processor_s() - start_s;
+                     const double took_s = thread_time_s() - start_s;
                      time.total_s += took_s;
                      time.calls_ms.push_back(static_cast<float>(took_s * 1e3));
                    });

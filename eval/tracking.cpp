@@ -1,11 +1,11 @@
 #include "eval/tracking.hpp"
 
 #include <algorithm>
-#include <ctime>
 #include <map>
 #include <vector>
 
 #include "eval/quantile.hpp"
+#include "eval/thread_clock.hpp"
 #include "services/associator/associator.hpp"
 
 namespace understory::eval {
@@ -35,13 +35,6 @@ class SwitchCounter {
   std::map<std::int64_t, TrackId> current_;
   std::uint64_t switches_ = 0;
 };
-
-/// Time that this thread has computed: other work on the machine does not count.
-double thread_time_s() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 void count_purity(const std::map<TrackId, std::map<std::int64_t, std::uint64_t>>& seen,
                   TrackingResult& result) {

@@ -168,6 +168,7 @@ Registration register_step(Points reference, Points observed, const SE2& last, c
   for (int step = -steps; step <= steps; ++step) {
     const SE2 turned = last * SE2(0.0, 0.0, step * model.sigma_rad);
     Registration tried = register_points(reference, observed, {turned, covariance}, parameters);
+    if (tried.pairs.size() < model.min_searched_pairs) continue;
     if (tried.pairs.size() > best.pairs.size()) best = std::move(tried);
   }
   return best;

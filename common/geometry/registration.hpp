@@ -56,11 +56,13 @@ struct StepModel {
   double sigma_m = 0.3;
   double sigma_rad = 0.04;
   double max_turn_rad = 0.5;  ///< Largest turn that is searched.
+  /// A turn that was searched needs so many pairs: among 27 tried, four points fit one by chance.
+  std::size_t min_searched_pairs = 8;
 };
 
 /// Registers an observation made one step after `last` (pose in `reference`). First the last step
 /// is taken to repeat; where the result does not `fit`, turns on the spot are tried from -max_turn
-/// to max_turn, and the one with the most pairs is returned, fitting or not.
+/// to max_turn, and the one with the most pairs, if they are enough, is returned, fitting or not.
 Registration register_step(std::span<const UncertainPoint> reference,
                            std::span<const UncertainPoint> observed, const SE2& last,
                            const SE2& last_step, const StepModel& model,
