@@ -52,6 +52,7 @@ class LidarImuInputAdapter : public Adapter {
     take<GnssFix>(channels_.raw_gnss, 200);
     take<PlanarScan>(channels_.raw_scan, 200);
     take<VelocityCorrection>(channels_.velocity_correction, 200);
+    take<EkfPose>(channels_.ekf_pose, 200);
     // Bulk is no state: a sweep that was under way at a restart is lost.
     node.subscribe<PointSweep>(channels_.raw_sweep,
                                [this](const PointSweep& part) { add_part(part); },
@@ -125,9 +126,9 @@ Service lidar_imu_input_service(const LidarImuInputChannels& channels) {
   return {"lidar_imu_input",
           channels.raw_imu + ", " + channels.raw_wheels + ", " + channels.raw_gnss + ", " +
               channels.raw_sweep + ", " + channels.raw_scan + ", " + channels.velocity_correction +
-              " -> " + channels.imu + ", " + channels.wheels + ", " + channels.gnss + ", " +
-              channels.odometry + ", " + channels.raw_pose + ", " + channels.lidar_sweep + ", " +
-              channels.lidar_scan,
+              ", " + channels.ekf_pose + " -> " + channels.imu + ", " + channels.wheels + ", " +
+              channels.gnss + ", " + channels.odometry + ", " + channels.raw_pose + ", " +
+              channels.lidar_sweep + ", " + channels.lidar_scan,
           [channels] { return std::make_unique<LidarImuInputAdapter>(channels); }};
 }
 

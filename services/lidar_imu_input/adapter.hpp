@@ -14,6 +14,7 @@ struct LidarImuInputChannels {
   std::string raw_sweep = "RAW_SWEEP";
   std::string raw_scan = "RAW_SCAN";
   std::string velocity_correction = "VELOCITY_CORRECTION";
+  std::string ekf_pose = "EKF_POSE";
   std::string imu = "IMU";
   std::string wheels = "WHEELS";
   std::string gnss = "GNSS";

@@ -173,6 +173,11 @@ InputResults LidarImuInput::add(const VelocityCorrection& correction) {
                      "takes effect later than its delay says"}};
 }
 
+InputResults LidarImuInput::add(const EkfPose& pose) {
+  filter_motion_.add(pose);
+  return {};
+}
+
 InputResults LidarImuInput::finish() {
   InputResults out;
   settle(out, true);

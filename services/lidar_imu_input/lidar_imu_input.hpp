@@ -18,6 +18,7 @@
 #include "common/model/planar_scan.hpp"
 #include "common/model/point_sweep.hpp"
 #include "common/model/wheels.hpp"
+#include "services/lidar_imu_input/filter_motion.hpp"
 #include "services/lidar_imu_input/input_guard.hpp"
 #include "services/lidar_imu_input/motion_estimator.hpp"
 
@@ -31,17 +32,19 @@ using InputResults = std::vector<InputResult>;
 struct InputCounters {
   std::uint64_t sweeps = 0;
   std::uint64_t sweeps_not_deskewed = 0;
-  std::uint64_t sweeps_carried = 0;  ///< Came late: stamped with the end of the latest piece.
-  std::uint64_t sweeps_dropped = 0;  ///< Too late even for that, or waiting at a restart.
-  std::uint64_t points_dropped = 0;  ///< Not finite.
-  std::uint64_t pieces_missing = 0;  ///< Intervals without any motion sensor.
+  std::uint64_t sweeps_by_filter = 0;  ///< De-skewed by the filter's motion.
+  std::uint64_t sweeps_carried = 0;    ///< Came late: stamped with the end of the latest piece.
+  std::uint64_t sweeps_dropped = 0;    ///< Too late even for that, or waiting at a restart.
+  std::uint64_t points_dropped = 0;    ///< Not finite.
+  std::uint64_t pieces_missing = 0;    ///< Intervals without any motion sensor.
   std::uint64_t corrections_late = 0;
   std::uint64_t samples_saturated = 0;
 
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.sweeps, self.sweeps_not_deskewed, self.sweeps_carried, self.sweeps_dropped,
-      self.points_dropped, self.pieces_missing, self.corrections_late, self.samples_saturated);
+    a(self.sweeps, self.sweeps_not_deskewed, self.sweeps_by_filter, self.sweeps_carried,
+      self.sweeps_dropped, self.points_dropped, self.pieces_missing, self.corrections_late,
+      self.samples_saturated);
   }
 };
 
@@ -55,6 +58,8 @@ class LidarImuInput {
   InputResults add(PointSweep sweep);           ///< RAW_SWEEP, a whole turn, frame sensor.
   InputResults add(const PlanarScan& scan);     ///< RAW_SCAN.
   InputResults add(const VelocityCorrection& correction);
+  /// Where no sensor tells the motion, sweeps are de-skewed by the filter's.
+  InputResults add(const EkfPose& pose);
   /// The drive is over: what still waits goes out.
   InputResults finish();
 
@@ -93,6 +98,7 @@ class LidarImuInput {
   LidarImuInputParameters parameters_;
   InputGuard guard_;
   MotionEstimator motion_;
+  FilterMotion filter_motion_;
   InputCounters counters_;
   std::deque<Waiting> waiting_;     ///< In order of their ends.
   std::optional<Utime> piece_end_;  ///< Of the latest piece.

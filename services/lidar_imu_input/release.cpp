@@ -119,7 +119,13 @@ void LidarImuInput::release_sweep(PointSweep raw, Utime stamp, InputResults& out
   }
   sweep_stamp_ = stamp;
   const bool has_times = raw.has_times;
-  DeskewedSweep result = deskew(std::move(raw), stamp, motion_.history(), parameters_.lidar.mount);
+  MotionHistory by_filter;
+  if (!motion_.history().at(stamp)) {
+    if (const auto motion = filter_motion_.at(stamp)) by_filter.add(*motion);
+  }
+  const MotionHistory& history = by_filter.empty() ? motion_.history() : by_filter;
+  DeskewedSweep result = deskew(std::move(raw), stamp, history, parameters_.lidar.mount);
+  if (!by_filter.empty() && result.had_motion) ++counters_.sweeps_by_filter;
   if (!motion_.has_attitude()) result.sweep.attitude.reset();
   ++counters_.sweeps;
   if (!result.had_motion) {

@@ -8,7 +8,7 @@
 namespace understory {
 namespace {
 
-constexpr std::uint32_t kStateVersion = 2;
+constexpr std::uint32_t kStateVersion = 3;
 constexpr std::string_view kStateName = "lidar_imu_input";
 
 }  // namespace
@@ -16,8 +16,8 @@ constexpr std::string_view kStateName = "lidar_imu_input";
 std::string LidarImuInput::save() const {
   state::Writer out;
   out(std::vector<char>(kStateName.begin(), kStateName.end()), kStateVersion);
-  out(guard_, motion_, counters_, piece_end_, sweep_stamp_, scan_stamp_, raw_pose_utime_,
-      first_points_, calibration_told_, was_saturated_);
+  out(guard_, motion_, filter_motion_, counters_, piece_end_, sweep_stamp_, scan_stamp_,
+      raw_pose_utime_, first_points_, calibration_told_, was_saturated_);
   out(static_cast<std::uint64_t>(waiting_.size()));
   for (const Waiting& waiting : waiting_) {
     const auto* scan = std::get_if<PlanarScan>(&waiting.item);
@@ -34,8 +34,8 @@ void LidarImuInput::load(const std::string& state) {
   if (std::string_view(name.data(), name.size()) != kStateName || version != kStateVersion) {
     throw std::invalid_argument("state: of another stage or version");
   }
-  in(guard_, motion_, counters_, piece_end_, sweep_stamp_, scan_stamp_, raw_pose_utime_,
-     first_points_, calibration_told_, was_saturated_);
+  in(guard_, motion_, filter_motion_, counters_, piece_end_, sweep_stamp_, scan_stamp_,
+     raw_pose_utime_, first_points_, calibration_told_, was_saturated_);
   std::uint64_t count = 0;
   in(count);
   waiting_.clear();

@@ -1,0 +1,125 @@
+// A laser alone: its sweeps are de-skewed by how the filter moves.
+#include <cmath>
+#include <random>
+
+#include "services/lidar_imu_input/lidar_imu_input.hpp"
+#include "tests/catch.hpp"
+#include "tests/lidar_imu_input/simulated_vehicle.hpp"
+
+using namespace understory;
+using namespace understory::test;
+
+namespace {
+
+constexpr Utime kBegin = 40'000'000;
+constexpr Utime kTurn_us = 100'000;
+
+class LaserAlone {
+ public:
+  LaserAlone() : track_(level_drive(), 50.0), input_(parameters_for_drive()) {
+    std::mt19937_64 random(5);
+    std::uniform_real_distribution<double> place(-40.0, 40.0);
+    for (int i = 0; i < 200; ++i) {
+      const double x = place(random);
+      world_.emplace_back(x, place(random), 0.0);
+    }
+  }
+
+  /// The next turn; RMS of its points' errors in the plan [m], where they are at its stamp.
+  double turn() {
+    const Utime begin = kBegin + count_++ * kTurn_us;
+    const InputResults results = input_.add(
+        sweep_at(track_, begin, parameters_for_drive().lidar.mount.vehicle_T_sensor(), world_));
+    double square_m2 = 0.0;
+    int sweeps = 0;
+    for (const InputResult& result : results) {
+      const auto* sweep = std::get_if<PointSweep>(&result);
+      if (sweep == nullptr) continue;
+      ++sweeps;
+      stamp_ = sweep->utime;
+      const SE2 vehicle_T_world = track_.planar(seconds(sweep->utime)).inverse();
+      REQUIRE(sweep->points.size() == world_.size());
+      for (std::size_t i = 0; i < world_.size(); ++i) {
+        const Eigen::Vector2d is = vehicle_T_world * Eigen::Vector2d(world_[i].head<2>());
+        square_m2 += (sweep->points[i].position().head<2>().cast<double>() - is).squaredNorm();
+      }
+    }
+    REQUIRE(sweeps == 1);
+    return std::sqrt(square_m2 / static_cast<double>(world_.size()));
+  }
+
+  /// The filter's pose of the latest sweep.
+  void filter_speaks(std::uint32_t landmarks, std::uint64_t resets = 0) {
+    EkfPose pose;
+    pose.utime = stamp_;
+    // In a frame of its own.
+    pose.ekf_map_T_vehicle =
+        SE2(3.0, -2.0, 0.7 + static_cast<double>(resets)) * track_.planar(seconds(stamp_));
+    pose.landmarks_used = landmarks;
+    pose.reset_counter = resets;
+    input_.add(pose);
+  }
+
+  LidarImuInput& input() { return input_; }
+
+ private:
+  static Drive level_drive() {
+    Drive drive;
+    drive.tilt_rad = 0.0;
+    drive.rough_rad = 0.0;
+    return drive;
+  }
+
+  Track track_;
+  LidarImuInput input_;
+  std::vector<Eigen::Vector3d> world_;
+  Utime stamp_ = 0;
+  int count_ = 0;
+};
+
+}  // namespace
+
+TEST_CASE("without any sensor of motion sweeps are de-skewed by the filter's", "[stage][deskew]") {
+  LaserAlone laser;
+  double skewed = 0.0;
+  double worst = 0.0;
+  for (int k = 0; k < 30; ++k) {
+    const double error = laser.turn();
+    if (k == 0) skewed = error;
+    if (k > 5) worst = std::max(worst, error);
+    laser.filter_speaks(6);
+  }
+  CHECK(skewed > 0.2);
+  CHECK(worst < 0.2 * skewed);
+  CHECK(laser.input().counters().sweeps_by_filter > 20);
+  CHECK(laser.input().counters().sweeps_not_deskewed < 8);
+}
+
+TEST_CASE("a filter that sees nothing, or began anew, tells no motion", "[stage][deskew]") {
+  LaserAlone laser;
+  for (int k = 0; k < 10; ++k) {
+    laser.turn();
+    laser.filter_speaks(6);
+  }
+  const double known = laser.turn();
+  laser.filter_speaks(6, 1);
+  CHECK(laser.turn() > 5.0 * known);
+  LaserAlone blind;
+  for (int k = 0; k < 10; ++k) {
+    blind.turn();
+    blind.filter_speaks(0);
+  }
+  CHECK(blind.input().counters().sweeps_by_filter == 0);
+}
+
+TEST_CASE("the filter's motion outlives a restart", "[state][deskew]") {
+  LaserAlone laser;
+  for (int k = 0; k < 10; ++k) {
+    laser.turn();
+    laser.filter_speaks(6);
+  }
+  LidarImuInput loaded(parameters_for_drive());
+  loaded.load(laser.input().save());
+  laser.input() = std::move(loaded);
+  CHECK(laser.turn() < 0.05);
+}
