@@ -22,6 +22,8 @@ void describe(AssociatorParameters& p, ParameterTable& table) {
             "[k] A track gets its id once it was matched so often ...");
   table.add("confirm_window", p.confirm_window, {1, 63}, "scans",
             "[n] ... in so many scans that should show it.");
+  table.add("max_misfits", p.max_misfits, {0, 1000}, "scans",
+            "In a row that fit no track and are passed over; then all tracks begin anew.");
   table.add("max_missed", p.max_missed, {1, 100000}, "scans",
             "In a row, that should have shown a track and did not: it ends.");
   table.add("keep_range_factor", p.keep_range_factor, {1.0, 10.0}, "of the range",

@@ -236,11 +236,18 @@ std::optional<TrackedScan> Associator::add(const LandmarkScan& scan) {
     pose = locate(seen, scan.field_of_view, scan.utime);
     if (parameters_.method != "nearest" && !seen.empty() &&
         !fits(pose, seen.size(), scan.field_of_view)) {
-      ++counters_.scans_lost;
       counters_.last_reason = "a scan fitted no track";
+      // Passing traffic, a gust of false detections: the next scan is more likely to fit than all
+      // landmarks are to have gone.
+      if (!tracks_.tracks().empty() && ++misfits_ <= parameters_.max_misfits) {
+        ++counters_.scans_passed_over;
+        return TrackedScan{scan.utime, next_sequence_++, scan.field_of_view, {}};
+      }
+      ++counters_.scans_lost;
       tracks_.clear();
     }
   }
+  misfits_ = 0;
   const auto matches = associator::match(tracks_.tracks(), seen,
                                          {pose.reference_T_observed, pose.covariance}, parameters_);
   return publish(scan, seen, matches, pose.reference_T_observed);

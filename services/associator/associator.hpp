@@ -20,7 +20,8 @@ namespace understory {
 struct AssociatorCounters {
   std::uint64_t scans = 0;
   std::uint64_t scans_refused = 0;         ///< Late or twice.
-  std::uint64_t scans_lost = 0;            ///< Fitted no track: all tracks began anew.
+  std::uint64_t scans_passed_over = 0;     ///< Fitted no track: nothing was made of it.
+  std::uint64_t scans_lost = 0;            ///< Fitted no track once more: all tracks began anew.
   std::uint64_t scans_without_motion = 0;  ///< Nothing but the last motion predicted them.
   std::uint64_t detections = 0;
   std::uint64_t detections_unusable = 0;  ///< Not finite, or no covariance.
@@ -70,6 +71,7 @@ class Associator {
   double last_interval_s_ = 0.1;
   SE2 local_T_vehicle_;
   SE2 last_motion_;
+  int misfits_ = 0;  ///< Scans in a row that fitted no track.
   std::uint64_t next_sequence_ = 0;
   AssociatorCounters counters_;
 };

@@ -7,7 +7,7 @@
 namespace understory {
 namespace {
 
-constexpr int kStateVersion = 2;
+constexpr int kStateVersion = 3;
 
 Json track_json(const associator::Track& t) {
   return {t.id,
@@ -78,6 +78,7 @@ std::string Associator::save() const {
                    {"last_interval_s", last_interval_s_},
                    {"pose", local_T_vehicle_},
                    {"motion", last_motion_},
+                   {"misfits", misfits_},
                    {"next_sequence", next_sequence_}});
 }
 
@@ -96,6 +97,7 @@ void Associator::load(const std::string& state) {
   last_interval_s_ = json.at("last_interval_s").get<double>();
   local_T_vehicle_ = json.at("pose").get<SE2>();
   last_motion_ = json.at("motion").get<SE2>();
+  misfits_ = json.at("misfits").get<int>();
   next_sequence_ = json.at("next_sequence").get<std::uint64_t>();
 }
 

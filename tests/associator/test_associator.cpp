@@ -222,6 +222,27 @@ TEST_CASE("A scan that fits nothing starts all tracks anew", "[associator]") {
   REQUIRE(associator.counters().scans_lost == 1);
 }
 
+TEST_CASE("A single scan that fits nothing is passed over, and the tracks live on",
+          "[associator]") {
+  Associator associator((AssociatorParameters()));
+  std::set<TrackId> before;
+  for (int k = 1; k <= 8; ++k) {
+    for (const auto& landmark : landmarks_of(associator, grid_scan(100000 * k)))
+      before.insert(landmark.track_id);
+  }
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> u(-25.0, 25.0);
+  LandmarkScan elsewhere = grid_scan(900000);
+  for (Detection& detection : elsewhere.detections) detection.position_m << u(random), u(random), 0;
+  CHECK(landmarks_of(associator, elsewhere).empty());
+  std::set<TrackId> after;
+  for (const auto& landmark : landmarks_of(associator, grid_scan(1000000)))
+    after.insert(landmark.track_id);
+  CHECK(after == before);
+  CHECK(associator.counters().scans_passed_over == 1);
+  CHECK(associator.counters().scans_lost == 0);
+}
+
 TEST_CASE("A loaded associator goes on exactly as the saved one", "[associator][state]") {
   sim::InertialDrive drive(fast_drive(), trunks(), 6);
   Associator first((AssociatorParameters()));
