@@ -18,8 +18,8 @@ struct AssociatorParameters {
   double max_turn_rad = 0.5;       ///< Largest unpredicted turn between two scans that is searched.
   double min_matched_ratio = 0.5;  ///< Of what could match: below, a scan is lost.
   int min_matched = 3;             ///< Fewest matches of a scan that fits.
-  int max_misfits =
-      4;  ///< Scans in a row that fit no track and are passed over; then all begins anew.
+  /// Scans in a row that fit no track and are passed over; then all tracks begin anew.
+  int max_misfits = 2;
   int confirm_matches = 4;         ///< [k] A track is consistent once matched so often ...
   int confirm_window = 6;          ///< [n] ... in so many scans.
   int max_missed = 20;             ///< Scans in a row that should have shown it: it is dropped.
