@@ -41,10 +41,12 @@ struct GyroTurn {
 /// Keeps consecutive pieces of odometry. Bounded: old pieces are forgotten.
 class OdometryBuffer {
  public:
+  static constexpr double kBiasLasts_s = 5.0;
+
   /// `bias_lasts_s`: for how long what the filter does not know of the gyro's bias stays the same,
   /// as far as it counts to whoever compounds pieces. 0: they have it as a variable of their own,
   /// covariances are of what is new in each piece.
-  explicit OdometryBuffer(double bias_lasts_s = 5.0) : bias_lasts_s_(bias_lasts_s) {}
+  explicit OdometryBuffer(double bias_lasts_s = kBiasLasts_s) : bias_lasts_s_(bias_lasts_s) {}
 
   /// Adds a piece; one that overlaps or runs backwards is refused (false).
   bool add(const Odometry& piece);

@@ -15,9 +15,6 @@ const Eigen::Matrix3d kTiny = 1e-12 * Eigen::Matrix3d::Identity();
 /// Landmarks are told at breast height; the level displaces them by it.
 constexpr double kLandmarkHeight_m = 1.3;
 
-/// Of the gyro's bias, where it is not a variable of the graph: its error has that power [s].
-constexpr double kBiasLasts_s = 5.0;
-
 SmootherParameters limits(const SmoothingMapperParameters& parameters) {
   SmootherParameters result;
   result.relinearise_above = parameters.relinearise_above;
@@ -42,7 +39,7 @@ bool finite(const Keyframe& keyframe) {
 SmoothingMapper::SmoothingMapper(const SmoothingMapperParameters& parameters)
     : parameters_(parameters),
       smoother_(limits(parameters)),
-      odometry_(parameters.gyro_walk > 0.0 ? 0.0 : kBiasLasts_s),
+      odometry_(parameters.gyro_walk > 0.0 ? 0.0 : OdometryBuffer::kBiasLasts_s),
       gyro_(parameters.gyro_walk) {}
 
 std::unique_ptr<MapperMethod> make_smoothing_mapper(const SmoothingMapperParameters& parameters) {

@@ -201,7 +201,7 @@ TEST_CASE("Late, repeated and broken scans do no harm", "[associator]") {
   REQUIRE(associator.add(grid_scan(900000))->landmarks.size() == 12);
 }
 
-TEST_CASE("A scan that fits nothing starts all tracks anew", "[associator]") {
+TEST_CASE("Scans that fit nothing, one after another, start all tracks anew", "[associator]") {
   Associator associator((AssociatorParameters()));
   TrackId highest = 0;
   for (int k = 1; k <= 8; ++k) {

@@ -4,9 +4,18 @@
 #include <Eigen/Dense>
 #include <random>
 
-#include "common/factor_graph/graph.hpp"
+#include "common/factor_graph/smoother.hpp"
 
 namespace understory {
+
+/// Converges as far as numbers go.
+inline SmootherParameters exact() {
+  SmootherParameters parameters;
+  parameters.least_move = 0.0;
+  parameters.relinearise_above = 0.0;
+  parameters.max_iterations = 1;
+  return parameters;
+}
 
 inline Eigen::Vector3d random_tangent(std::mt19937_64& random, double translation, double angle) {
   std::normal_distribution<double> normal;

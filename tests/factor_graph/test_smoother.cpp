@@ -10,15 +10,6 @@ using namespace understory;
 
 namespace {
 
-/// Converges as far as numbers go.
-SmootherParameters exact() {
-  SmootherParameters parameters;
-  parameters.least_move = 0.0;
-  parameters.relinearise_above = 0.0;
-  parameters.max_iterations = 1;
-  return parameters;
-}
-
 Graph solved_whole(const Graph& graph) {
   BatchSmootherParameters parameters;
   parameters.max_iterations = 50;

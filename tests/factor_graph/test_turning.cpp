@@ -37,14 +37,6 @@ Graph with_gyro(Graph graph, double rate, std::mt19937_64& random) {
   return graph;
 }
 
-SmootherParameters exact() {
-  SmootherParameters parameters;
-  parameters.least_move = 0.0;
-  parameters.relinearise_above = 0.0;
-  parameters.max_iterations = 1;
-  return parameters;
-}
-
 }  // namespace
 
 TEST_CASE("A turning pose's derivative equals the numerical one", "[factor_graph]") {
