@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "common/hierarchy/constellation_map.hpp"
+#include "common/constellation/map.hpp"
 #include "sim/forest.hpp"
 
 using namespace understory;
@@ -13,7 +13,7 @@ namespace {
 
 struct Scene {
   sim::Forest forest;
-  ConstellationMap map;
+  constellation::ConstellationMap map;
 };
 
 /// One square kilometre.
@@ -34,14 +34,14 @@ const Scene& scene(sim::ForestKind kind) {
   return scenes[static_cast<std::size_t>(kind)];
 }
 
-std::vector<ObservedPoint> observe(const sim::Forest& forest, double detection, double sigma_m,
-                                   std::mt19937_64& random) {
+std::vector<constellation::ObservedPoint> observe(const sim::Forest& forest, double detection,
+                                                  double sigma_m, std::mt19937_64& random) {
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   std::normal_distribution<double> noise(0.0, sigma_m);
   const double x = 100.0 + 800.0 * unit(random);
   const double y = 100.0 + 800.0 * unit(random);
-  const SE2 sensor_T_map = SE2(x, y, 6.0 * unit(random)).inverse();
-  std::vector<ObservedPoint> points;
+  const geometry::SE2 sensor_T_map = geometry::SE2(x, y, 6.0 * unit(random)).inverse();
+  std::vector<constellation::ObservedPoint> points;
   for (const Eigen::Vector2d& trunk : forest.trunks_m) {
     const Eigen::Vector2d point = sensor_T_map * trunk;
     if (point.norm() > 40.0 || unit(random) > detection) continue;
@@ -54,7 +54,7 @@ std::vector<ObservedPoint> observe(const sim::Forest& forest, double detection, 
 void BM_Localise(benchmark::State& state) {
   const Scene& in = scene(static_cast<sim::ForestKind>(state.range(0)));
   std::mt19937_64 random(2);
-  std::vector<std::vector<ObservedPoint>> observations(200);
+  std::vector<std::vector<constellation::ObservedPoint>> observations(200);
   for (auto& points : observations) {
     points = observe(in.forest, 0.01 * static_cast<double>(state.range(1)),
                      0.001 * static_cast<double>(state.range(2)), random);
@@ -79,7 +79,7 @@ void BM_NotSure(benchmark::State& state) {
   std::mt19937_64 random(3);
   const sim::Forest other =
       sim::make_forest(sim::forest_parameters(sim::ForestKind::kIntermediate), random);
-  std::vector<std::vector<ObservedPoint>> observations(50);
+  std::vector<std::vector<constellation::ObservedPoint>> observations(50);
   for (auto& points : observations) {
     points = observe(other, 0.9, 0.001 * static_cast<double>(state.range(0)), random);
   }
@@ -92,10 +92,10 @@ BENCHMARK(BM_NotSure)->Arg(80)->Arg(200)->Unit(benchmark::kMicrosecond);
 
 /// A landmark less and one more.
 void BM_RemoveInsert(benchmark::State& state) {
-  ConstellationMap map = scene(sim::ForestKind::kIntermediate).map;
+  constellation::ConstellationMap map = scene(sim::ForestKind::kIntermediate).map;
   std::mt19937_64 random(4);
   for (auto _ : state) {
-    const LandmarkId id = 1 + random() % map.size();
+    const constellation::LandmarkId id = 1 + random() % map.size();
     const Eigen::Vector2d position = *map.position(id);
     map.remove(id);
     map.insert(id, position);
@@ -106,18 +106,18 @@ BENCHMARK(BM_RemoveInsert)->Unit(benchmark::kMicrosecond);
 
 /// A landmark moved by centimetres, as by the graph.
 void BM_Move(benchmark::State& state) {
-  ConstellationMap map = scene(sim::ForestKind::kIntermediate).map;
+  constellation::ConstellationMap map = scene(sim::ForestKind::kIntermediate).map;
   std::mt19937_64 random(5);
   std::normal_distribution<double> step(0.0, 0.02);
   for (auto _ : state) {
-    const LandmarkId id = 1 + random() % map.size();
+    const constellation::LandmarkId id = 1 + random() % map.size();
     map.move(id, *map.position(id) + Eigen::Vector2d(step(random), step(random)));
   }
 }
 BENCHMARK(BM_Move)->Unit(benchmark::kMicrosecond);
 
 void BM_Nearest(benchmark::State& state) {
-  const ConstellationMap& map = scene(sim::ForestKind::kIntermediate).map;
+  const constellation::ConstellationMap& map = scene(sim::ForestKind::kIntermediate).map;
   std::mt19937_64 random(6);
   std::uniform_real_distribution<double> place(0.0, 1000.0);
   for (auto _ : state) {

@@ -15,34 +15,35 @@ namespace {
 /// `count` landmarks on a grid around a vehicle that goes straight on, all seen in every scan.
 void one_scan(benchmark::State& state) {
   const int count = static_cast<int>(state.range(0));
-  EkfParameters parameters;
+  ekf::EkfParameters parameters;
   parameters.map.max_landmarks = 200;
-  Ekf filter(parameters);
+  ekf::Ekf filter(parameters);
   const int side = static_cast<int>(std::ceil(std::sqrt(count)));
-  TrackedScan scan;
+  model::TrackedScan scan;
   scan.field_of_view.max_range_m = 60.0;
   for (int i = 0; i < count; ++i) {
-    Detection seen;
+    model::Detection seen;
     const int column = i % side - side / 2;
     const int row = i / side - side / 2;
     seen.position_m << 5.0 * column, 5.0 * row, 0.0;
     seen.covariance_m2 = 0.01 * Eigen::Matrix3d::Identity();
-    scan.landmarks.push_back({static_cast<TrackId>(i + 1), static_cast<std::uint32_t>(i), seen});
+    scan.landmarks.push_back(
+        {static_cast<model::TrackId>(i + 1), static_cast<std::uint32_t>(i), seen});
   }
-  Odometry piece;
-  piece.covariance = 1e-6 * Eigen::Matrix3d::Identity();
-  piece.inertial.emplace();
-  piece.inertial->seconds = 0.1;
-  piece.inertial->covariance = 1e-6 * Eigen::Matrix<double, 5, 5>::Identity();
+  model::Odometry increment;
+  increment.covariance = 1e-6 * Eigen::Matrix3d::Identity();
+  increment.inertial.emplace();
+  increment.inertial->seconds = 0.1;
+  increment.inertial->covariance = 1e-6 * Eigen::Matrix<double, 5, 5>::Identity();
   std::vector<double> us;
   for (auto _ : state) {
     const auto begin = std::chrono::steady_clock::now();
-    filter.add(piece);
+    filter.add(increment);
     benchmark::DoNotOptimize(filter.add(scan));
     us.push_back(std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin)
                      .count());
-    piece.from_utime = scan.utime;
-    piece.utime = scan.utime += 100000;
+    increment.from_utime = scan.utime;
+    increment.utime = scan.utime += 100000;
   }
   state.counters["used"] = static_cast<double>(filter.counters().landmarks_used) /
                            static_cast<double>(filter.counters().scans);

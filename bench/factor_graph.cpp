@@ -4,7 +4,7 @@
 #include <memory>
 #include <random>
 
-#include "common/factor_graph/incremental_smoother.hpp"
+#include "common/factor_graph/bayes_tree/incremental_smoother.hpp"
 
 using namespace understory;
 
@@ -15,17 +15,19 @@ constexpr double kInformation = 2500.0;
 /// A walk over a grid of streets: revisits are tied to the pose that was there before.
 struct Walk {
   explicit Walk(int poses) {
-    names.push_back(smoother.add_variable(SE2()));
-    smoother.add(prior(names[0], SE2(), Eigen::Matrix3d(1e6 * Eigen::Matrix3d::Identity())));
+    names.push_back(smoother.add_variable(geometry::SE2()));
+    smoother.add(
+        prior(names[0], geometry::SE2(), Eigen::Matrix3d(1e6 * Eigen::Matrix3d::Identity())));
     for (int k = 1; k < poses; ++k) step();
   }
-  SE2 noisy(const SE2& motion) {
-    return motion * SE2(0.02 * normal(random), 0.02 * normal(random), 0.02 * normal(random));
+  geometry::SE2 noisy(const geometry::SE2& motion) {
+    return motion *
+           geometry::SE2(0.02 * normal(random), 0.02 * normal(random), 0.02 * normal(random));
   }
   void step() {
     const int k = static_cast<int>(names.size());
-    const SE2 motion(1.0, 0.0, k % 10 == 0 ? 1.5707963 : 0.0);
-    const VariableId last = names.back();
+    const geometry::SE2 motion(1.0, 0.0, k % 10 == 0 ? 1.5707963 : 0.0);
+    const factor_graph::graph::VariableId last = names.back();
     names.push_back(smoother.add_variable(smoother.pose2(last) * motion));
     smoother.add(relative(last, names.back(), noisy(motion),
                           Eigen::Matrix3d(kInformation * Eigen::Matrix3d::Identity())));
@@ -34,14 +36,14 @@ struct Walk {
   }
   /// The walk is periodic in 40 steps: what was there then is here now.
   void close(std::size_t old) {
-    smoother.add(relative(names[old], names.back(), noisy(SE2()),
+    smoother.add(relative(names[old], names.back(), noisy(geometry::SE2()),
                           Eigen::Matrix3d(kInformation * Eigen::Matrix3d::Identity())));
   }
 
   std::mt19937_64 random{1};
   std::normal_distribution<double> normal;
-  IncrementalSmoother smoother;
-  std::vector<VariableId> names;
+  factor_graph::bayes_tree::IncrementalSmoother smoother;
+  std::vector<factor_graph::graph::VariableId> names;
 };
 
 void one_more_pose(benchmark::State& state) {

@@ -22,7 +22,7 @@ constexpr std::int64_t kLargeMap = 1400000;
 struct Scene {
   explicit Scene(std::int64_t count)
       : random(static_cast<std::uint64_t>(count)),
-        forest(random_forest(static_cast<std::size_t>(count), random)),
+        forest(test::random_forest(static_cast<std::size_t>(count), random)),
         hierarchy(forest) {}
 
   /// A place inside the forest.
@@ -31,15 +31,15 @@ struct Scene {
     std::uniform_real_distribution<double> coordinate(-half, half);
     return {coordinate(random), coordinate(random)};
   }
-  SE2 pose() {
+  geometry::SE2 pose() {
     const Eigen::Vector2d p = 0.9 * place();
     return {p.x(), p.y(), std::uniform_real_distribution<double>(-3.1, 3.1)(random)};
   }
   std::uint64_t any_id() { return 1 + random() % forest.size(); }
 
   std::mt19937_64 random;
-  std::vector<LandmarkPosition> forest;
-  GeometricHierarchy hierarchy;
+  std::vector<hierarchy::LandmarkPosition> forest;
+  hierarchy::GeometricHierarchy hierarchy;
 };
 
 Scene& scene(std::int64_t count) {
@@ -59,13 +59,13 @@ bool too_large(benchmark::State& state) {
 void triangulate_from_scratch(benchmark::State& state) {
   const auto& forest = scene(kThesisMap).forest;
   std::vector<Eigen::Vector2d> positions;
-  for (const LandmarkPosition& landmark : forest) {
+  for (const hierarchy::LandmarkPosition& landmark : forest) {
     positions.push_back(landmark.position_m);
   }
   for (auto _ : state) {
-    Triangulation triangulation;
-    TriangulationChange change;
-    for (const std::uint32_t i : insertion_order(positions)) {
+    hierarchy::Triangulation triangulation;
+    hierarchy::TriangulationChange change;
+    for (const std::uint32_t i : hierarchy::insertion_order(positions)) {
       triangulation.insert(forest[i].id, positions[i], change);
     }
     benchmark::DoNotOptimize(triangulation.triangle_count());
@@ -79,7 +79,7 @@ void build_from_scratch(benchmark::State& state) {
   }
   const auto& forest = scene(state.range(0)).forest;
   for (auto _ : state) {
-    const GeometricHierarchy hierarchy(forest);
+    const hierarchy::GeometricHierarchy hierarchy(forest);
     benchmark::DoNotOptimize(hierarchy.polygon_count());
   }
 }
@@ -109,7 +109,7 @@ void move_a_little(benchmark::State& state) {
   }
   Scene& world = scene(state.range(0));
   for (auto _ : state) {
-    const LandmarkPosition& landmark = world.forest[world.any_id() - 1];
+    const hierarchy::LandmarkPosition& landmark = world.forest[world.any_id() - 1];
     world.hierarchy.move(landmark.id, landmark.position_m + Eigen::Vector2d(0.03, -0.02));
     world.hierarchy.move(landmark.id, landmark.position_m);
   }
@@ -120,9 +120,9 @@ void move_a_little(benchmark::State& state) {
 BENCHMARK(move_a_little)->Arg(kThesisMap)->Arg(kLargeMap)->Unit(benchmark::kMicrosecond);
 
 void describe_polygon(benchmark::State& state) {
-  const GeometricHierarchy& hierarchy = scene(kThesisMap).hierarchy;
+  const hierarchy::GeometricHierarchy& hierarchy = scene(kThesisMap).hierarchy;
   std::vector<Eigen::Vector2d> corners;
-  for (const Polygon& polygon : hierarchy.polygons()) {
+  for (const hierarchy::Polygon& polygon : hierarchy.polygons()) {
     if (polygon.boundary.size() == static_cast<std::size_t>(state.range(0))) {
       for (const std::uint32_t slot : polygon.boundary) {
         corners.push_back(hierarchy.triangulation().position(slot));
@@ -131,7 +131,7 @@ void describe_polygon(benchmark::State& state) {
     }
   }
   for (auto _ : state) {
-    benchmark::DoNotOptimize(describe(corners, 20));
+    benchmark::DoNotOptimize(hierarchy::describe(corners, 20));
   }
 }
 BENCHMARK(describe_polygon)->Arg(4)->Arg(8);
@@ -142,12 +142,13 @@ void query_index(benchmark::State& state) {
     return;
   }
   Scene& world = scene(state.range(0));
-  const GeometricHierarchy view(observe(world.forest, world.pose(), View{}, world.random));
-  std::vector<DescriptorIndex::Hit> hits;
+  const hierarchy::GeometricHierarchy view(
+      observe(world.forest, world.pose(), test::View{}, world.random));
+  std::vector<hierarchy::DescriptorIndex::Hit> hits;
   std::size_t next = 0;
   std::size_t found = 0;
   for (auto _ : state) {
-    const Polygon& polygon = view.polygons()[next++ % view.polygons().size()];
+    const hierarchy::Polygon& polygon = view.polygons()[next++ % view.polygons().size()];
     world.hierarchy.index().within(polygon.descriptor, 2.0F, hits);
     found += hits.size();
   }
@@ -163,12 +164,13 @@ void match_views(benchmark::State& state) {
     return;
   }
   Scene& world = scene(state.range(0));
-  const View view{.noise_m = 0.01 * static_cast<double>(state.range(1)),
-                  .detection = 0.01 * static_cast<double>(state.range(2)),
-                  .clutter = 0.01 * static_cast<double>(state.range(3))};
-  const MatchParameters parameters{.max_descriptor_distance = static_cast<double>(state.range(4))};
+  const test::View view{.noise_m = 0.01 * static_cast<double>(state.range(1)),
+                        .detection = 0.01 * static_cast<double>(state.range(2)),
+                        .clutter = 0.01 * static_cast<double>(state.range(3))};
+  const hierarchy::MatchParameters parameters{.max_descriptor_distance =
+                                                  static_cast<double>(state.range(4))};
   constexpr std::size_t kViews = 100;
-  std::vector<std::vector<LandmarkPosition>> views;
+  std::vector<std::vector<hierarchy::LandmarkPosition>> views;
   std::mt19937_64 random(7);
   world.random.seed(8);
   for (std::size_t i = 0; i < kViews; ++i) {
@@ -179,10 +181,10 @@ void match_views(benchmark::State& state) {
   std::size_t found = 0;
   std::size_t next = 0;
   for (auto _ : state) {
-    const GeometricHierarchy query(views[next++ % kViews]);
+    const hierarchy::GeometricHierarchy query(views[next++ % kViews]);
     const auto pairs = match(query, world.hierarchy, parameters);
     std::size_t right_here = 0;
-    for (const LandmarkMatch& pair : pairs) {
+    for (const hierarchy::LandmarkMatch& pair : pairs) {
       right_here += pair.query_id == pair.map_id ? 1 : 0;
     }
     right += right_here;

@@ -14,7 +14,7 @@ using namespace understory;
 
 namespace {
 
-PointSweep turn_in_a_wood(int rings, int columns) {
+model::PointSweep turn_in_a_wood(int rings, int columns) {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> place(-22.0, 22.0);
   std::uniform_real_distribution<double> radii(0.06, 0.35);
@@ -36,10 +36,10 @@ double processor_ms() {
 }
 
 /// p99_ms is of this thread's own time: other work on the machine does not count.
-void extract_turn(benchmark::State& state) {
-  const PointSweep turn =
+void extract_revolution(benchmark::State& state) {
+  const model::PointSweep turn =
       turn_in_a_wood(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
-  LandmarkExtractor extractor;
+  landmark_extractor::LandmarkExtractor extractor;
   std::vector<double> times_ms;
   std::size_t found = 0;
   for (auto _ : state) {
@@ -52,7 +52,7 @@ void extract_turn(benchmark::State& state) {
   state.counters["points"] = static_cast<double>(turn.points.size());
   state.counters["landmarks"] = static_cast<double>(found);
 }
-BENCHMARK(extract_turn)
+BENCHMARK(extract_revolution)
     ->ArgNames({"rings", "columns"})
     ->Args({16, 1800})
     ->Args({32, 2048})

@@ -10,35 +10,36 @@ namespace {
 
 enum World3d { kForest, kDenseForest, kTown, kCountry };
 
-Scenario scenario_of(int world) {
-  ForestScenarioParameters forest;
+sim::Scenario scenario_of(int world) {
+  sim::ForestScenarioParameters forest;
   forest.length_m = 500.0;
   switch (world) {
     case kDenseForest:
-      forest.forest = forest_parameters(ForestKind::kDense);
+      forest.forest = forest_parameters(sim::ForestKind::kDense);
       [[fallthrough]];
     case kForest:
       return forest_scenario(forest, 1);
     case kTown:
-      return urban_scenario(1, 1);
+      return sim::urban_scenario(1, 1);
     default:
-      return countryside_scenario(2000.0, 1);
+      return sim::countryside_scenario(2000.0, 1);
   }
 }
 
 void sweep(benchmark::State& state) {
-  SensorSuite suite;
+  sim::SensorSuite suite;
   const bool many_beams = state.range(1) == 64;
   suite.lidar->elevations_rad =
-      beam_elevations_rad(many_beams ? LidarModel::kHdl64 : LidarModel::kVlp32);
+      beam_elevations_rad(many_beams ? sim::LidarModel::kHdl64 : sim::LidarModel::kVlp32);
   suite.lidar->columns = many_beams ? 2048 : 1800;
-  SensorDrive drive(scenario_of(static_cast<int>(state.range(0))), SpeedParameters{}, suite, 1);
+  sim::SensorDrive drive(scenario_of(static_cast<int>(state.range(0))), sim::SpeedParameters{},
+                         suite, 1);
   const double rays =
       static_cast<double>(suite.lidar->elevations_rad.size()) * suite.lidar->columns;
   std::uint64_t turn = 250;
   std::size_t points = 0;
   for (auto _ : state) {
-    const SimulatedSweep simulated = drive.sweep(turn);
+    const sim::SimulatedSweep simulated = drive.sweep(turn);
     points += simulated.raw.points.size();
     turn = turn + 37 < drive.sweep_count() ? turn + 37 : 250;
   }
@@ -54,11 +55,11 @@ BENCHMARK(sweep)
 
 /// Everything but sweeps, per second of driving.
 void motion_sensors(benchmark::State& state) {
-  const Scenario scenario = scenario_of(kForest);
-  SensorSuite suite;
+  const sim::Scenario scenario = scenario_of(kForest);
+  sim::SensorSuite suite;
   suite.lidar.reset();
   for (auto _ : state) {
-    SensorDrive drive(scenario, SpeedParameters{}, suite, 1);
+    sim::SensorDrive drive(scenario, sim::SpeedParameters{}, suite, 1);
     while (auto reading = drive.next()) benchmark::DoNotOptimize(reading);
     state.counters["driven_s"] = drive.motion().duration_s();
   }

@@ -28,10 +28,10 @@ endif()
 install(TARGETS understory_flags EXPORT understory)
 
 # understory_library(NAME PUBLIC targets... PRIVATE targets...)
-# Builds understory::NAME from every .cpp beside the calling CMakeLists.txt.
+# Builds understory::NAME from every .cpp beside the calling CMakeLists.txt and in the folders below.
 function(understory_library name)
   cmake_parse_arguments(ARG "" "" "PUBLIC;PRIVATE" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp")
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp")
   list(FILTER sources EXCLUDE REGEX "/main\\.cpp$")
   if(sources)
     add_library(understory_${name} STATIC ${sources})

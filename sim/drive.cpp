@@ -16,9 +16,9 @@ constexpr double kTile = 10.0;
 
 Forest forest_that_holds(const DriveParameters& parameters, std::uint64_t seed) {
   ForestParameters forest = parameters.forest;
-  if (parameters.clear_the_way) {
+  if (parameters.clear_the_path) {
     double reach = 0.0;
-    for (const SE2& pose : make_path(parameters.path)) {
+    for (const geometry::SE2& pose : make_path(parameters.path)) {
       reach = std::max(reach, pose.translation().norm());
     }
     // Worst case: the start is at the edge of the central half and the path goes straight outward.
@@ -34,9 +34,9 @@ bool inside(const Forest& forest, const Eigen::Vector2d& p, double margin_m) {
 }
 
 /// The path, densely enough that a disc around each point covers the way to the next.
-bool fits(const Forest& forest, const PointGrid& grid, const std::vector<SE2>& path,
-          const SE2& start, const StartPoseParameters& parameters) {
-  for (const SE2& pose : path) {
+bool fits(const Forest& forest, const PointGrid& grid, const std::vector<geometry::SE2>& path,
+          const geometry::SE2& start, const StartPoseParameters& parameters) {
+  for (const geometry::SE2& pose : path) {
     const Eigen::Vector2d p = start * pose.translation();
     if (!inside(forest, p, parameters.margin_m)) return false;
     if (grid.any_within(p, parameters.clearance_m)) return false;
@@ -44,7 +44,7 @@ bool fits(const Forest& forest, const PointGrid& grid, const std::vector<SE2>& p
   return true;
 }
 
-SE2 draw_in_central_half(const Forest& forest, std::mt19937_64& random) {
+geometry::SE2 draw_in_central_half(const Forest& forest, std::mt19937_64& random) {
   const Eigen::Vector2d size = forest.high_m - forest.low_m;
   std::uniform_real_distribution<double> along(0.25, 0.75);
   std::uniform_real_distribution<double> heading(-std::numbers::pi, std::numbers::pi);
@@ -55,21 +55,22 @@ SE2 draw_in_central_half(const Forest& forest, std::mt19937_64& random) {
 
 }  // namespace
 
-SimulatedScan observe(const Forest& forest, const PointGrid& grid, const SE2& world_T_vehicle,
-                      const SensorParameters& sensor, std::mt19937_64& random) {
+SimulatedScan observe(const Forest& forest, const PointGrid& grid,
+                      const geometry::SE2& world_T_vehicle, const SensorParameters& sensor,
+                      std::mt19937_64& random) {
   SimulatedScan result;
   result.world_T_vehicle = world_T_vehicle;
   result.scan.field_of_view.max_range_m = sensor.range_m;
   const double variance =
       std::max(sensor.variance_floor_m2, sensor.position_sigma_m * sensor.position_sigma_m);
-  Detection detection;
+  model::Detection detection;
   detection.covariance_m2.topLeftCorner<2, 2>() = variance * Eigen::Matrix2d::Identity();
   std::uniform_real_distribution<double> chance(0.0, 1.0);
   std::normal_distribution<double> noise(0.0, 1.0);
-  const SE2 vehicle_T_world = world_T_vehicle.inverse();
+  const geometry::SE2 vehicle_T_world = world_T_vehicle.inverse();
   // Noise moves some trunks from outside into range: 6 sigma are enough.
   const double reach = sensor.range_m + 6.0 * sensor.position_sigma_m;
-  std::vector<std::pair<Detection, std::uint32_t>> seen;
+  std::vector<std::pair<model::Detection, std::uint32_t>> seen;
   for (const std::uint32_t trunk : grid.within(world_T_vehicle.translation(), reach)) {
     const bool detected = chance(random) < sensor.detection_probability;
     const double dx = noise(random);
@@ -89,11 +90,12 @@ SimulatedScan observe(const Forest& forest, const PointGrid& grid, const SE2& wo
   return result;
 }
 
-std::optional<SE2> draw_start_pose(const Forest& forest, const PointGrid& grid,
-                                   const std::vector<SE2>& path,
-                                   const StartPoseParameters& parameters, std::mt19937_64& random) {
+std::optional<geometry::SE2> draw_start_pose(const Forest& forest, const PointGrid& grid,
+                                             const std::vector<geometry::SE2>& path,
+                                             const StartPoseParameters& parameters,
+                                             std::mt19937_64& random) {
   for (int i = 0; i < parameters.tries; ++i) {
-    const SE2 start = draw_in_central_half(forest, random);
+    const geometry::SE2 start = draw_in_central_half(forest, random);
     if (fits(forest, grid, path, start, parameters)) return start;
   }
   return std::nullopt;
@@ -113,20 +115,20 @@ void Drive::place_path() {
   StartPoseParameters start = parameters_.start;
   // Between two observations the robot is up to half an interval from the nearer one.
   start.clearance_m = std::hypot(start.clearance_m, 0.5 * parameters_.path.interval);
-  if (parameters_.clear_the_way) start.clearance_m = 0.0;
+  if (parameters_.clear_the_path) start.clearance_m = 0.0;
   std::mt19937_64 random = random_stream(seed_, Stream::kStartPose);
   const auto world_T_start = draw_start_pose(forest_, *grid_, world_T_vehicle_, start, random);
   if (!world_T_start) {
     throw std::runtime_error("the path '" + std::string(to_string(parameters_.path.kind)) +
                              "' fits nowhere in this forest");
   }
-  for (SE2& pose : world_T_vehicle_) pose = *world_T_start * pose;
-  if (parameters_.clear_the_way) fell_trunks_on(world_T_vehicle_);
+  for (geometry::SE2& pose : world_T_vehicle_) pose = *world_T_start * pose;
+  if (parameters_.clear_the_path) fell_trunks_on(world_T_vehicle_);
 }
 
-void Drive::fell_trunks_on(const std::vector<SE2>& path) {
+void Drive::fell_trunks_on(const std::vector<geometry::SE2>& path) {
   std::vector<bool> felled(forest_.trunks_m.size(), false);
-  for (const SE2& pose : path) {
+  for (const geometry::SE2& pose : path) {
     for (const std::uint32_t trunk :
          grid_->within(pose.translation(), parameters_.start.clearance_m)) {
       felled[trunk] = true;
@@ -142,9 +144,9 @@ void Drive::fell_trunks_on(const std::vector<SE2>& path) {
   grid_ = std::make_unique<PointGrid>(forest_.trunks_m, kTile);
 }
 
-Utime Drive::utime(std::size_t k) const {
-  return static_cast<Utime>(std::llround(static_cast<double>(k) * 1e6 * parameters_.path.interval /
-                                         parameters_.speed_mps));
+model::Utime Drive::utime(std::size_t k) const {
+  return static_cast<model::Utime>(std::llround(static_cast<double>(k) * 1e6 *
+                                                parameters_.path.interval / parameters_.speed_mps));
 }
 
 SimulatedScan Drive::scan(std::size_t k) const {

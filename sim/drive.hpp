@@ -25,15 +25,16 @@ struct SensorParameters {
 
 /// One scan with the truth that a mapper must not see.
 struct SimulatedScan {
-  LandmarkScan scan;
-  SE2 world_T_vehicle;
+  model::LandmarkScan scan;
+  geometry::SE2 world_T_vehicle;
   std::vector<std::uint32_t> trunks;  ///< Index of the trunk behind each detection.
 };
 
 /// All trunks in range of the pose, each detected by chance, its position noisy; the noise comes
 /// before the test of the range (as in the source's code). In random order.
-SimulatedScan observe(const Forest& forest, const PointGrid& grid, const SE2& world_T_vehicle,
-                      const SensorParameters& sensor, std::mt19937_64& random);
+SimulatedScan observe(const Forest& forest, const PointGrid& grid,
+                      const geometry::SE2& world_T_vehicle, const SensorParameters& sensor,
+                      std::mt19937_64& random);
 
 struct StartPoseParameters {
   double clearance_m = 0.3;  ///< No trunk nearer than this to the path.
@@ -43,9 +44,10 @@ struct StartPoseParameters {
 /// A start pose in the central half of the forest, heading uniform, from which the path
 /// (vehicle poses in the frame of the first) keeps clear of all trunks and inside the forest.
 /// None if no try succeeded.
-std::optional<SE2> draw_start_pose(const Forest& forest, const PointGrid& grid,
-                                   const std::vector<SE2>& path,
-                                   const StartPoseParameters& parameters, std::mt19937_64& random);
+std::optional<geometry::SE2> draw_start_pose(const Forest& forest, const PointGrid& grid,
+                                             const std::vector<geometry::SE2>& path,
+                                             const StartPoseParameters& parameters,
+                                             std::mt19937_64& random);
 
 struct DriveParameters {
   ForestParameters forest;
@@ -55,7 +57,7 @@ struct DriveParameters {
   double speed_mps = 1.0;  ///< Gives the stamps: interval / speed between scans.
   /// Trunks too near to the path are felled instead of another start being drawn: a long path
   /// always meets some. The forest then also grows to hold the path.
-  bool clear_the_way = false;
+  bool clear_the_path = false;
 };
 
 /// Scans are made when asked for, each from a stream of its own: a drive of any length costs no
@@ -70,22 +72,22 @@ class Drive {
 
   std::size_t size() const { return world_T_vehicle_.size(); }
   SimulatedScan scan(std::size_t k) const;
-  Utime utime(std::size_t k) const;
+  model::Utime utime(std::size_t k) const;
 
   const Forest& forest() const { return forest_; }
   const PointGrid& grid() const { return *grid_; }
-  const std::vector<SE2>& world_T_vehicle() const { return world_T_vehicle_; }
+  const std::vector<geometry::SE2>& world_T_vehicle() const { return world_T_vehicle_; }
   const DriveParameters& parameters() const { return parameters_; }
 
  private:
   void place_path();
-  void fell_trunks_on(const std::vector<SE2>& path);
+  void fell_trunks_on(const std::vector<geometry::SE2>& path);
 
   DriveParameters parameters_;
   std::uint64_t seed_ = 0;
   Forest forest_;
   std::unique_ptr<PointGrid> grid_;
-  std::vector<SE2> world_T_vehicle_;
+  std::vector<geometry::SE2> world_T_vehicle_;
 };
 
 }  // namespace understory::sim

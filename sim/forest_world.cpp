@@ -36,15 +36,15 @@ void add_branches(World& world, const Stem& trunk, double up_to_m, double mean_c
   }
 }
 
-void add_people(World& world, std::span<const Eigen::Vector2d> way_m, int count,
+void add_people(World& world, std::span<const Eigen::Vector2d> distance_m, int count,
                 std::mt19937_64& random) {
-  for (int i = 0; i < count && !way_m.empty(); ++i) {
-    const auto place = std::uniform_int_distribution<std::size_t>(0, way_m.size() - 1)(random);
+  for (int i = 0; i < count && !distance_m.empty(); ++i) {
+    const auto place = std::uniform_int_distribution<std::size_t>(0, distance_m.size() - 1)(random);
     const double bearing = uniform(random, -pi, pi);
     const double aside = uniform(random, 3.0, 12.0);
     Walker walker;
     walker.middle_m.head<2>() =
-        way_m[place] + aside * Eigen::Vector2d(std::cos(bearing), std::sin(bearing));
+        distance_m[place] + aside * Eigen::Vector2d(std::cos(bearing), std::sin(bearing));
     walker.middle_m.z() = world.ground().height(walker.middle_m.head<2>());
     const double walk = uniform(random, -pi, pi);
     if (i % 3 != 0) walker.reach_m = 2.0 * Eigen::Vector2d(std::cos(walk), std::sin(walk));
@@ -98,9 +98,9 @@ void plant_bush(World& world, const Eigen::Vector2d& at_m, double density_per_m,
 }
 
 World make_forest_world(const Forest& forest, const ForestWorldParameters& parameters,
-                        std::span<const Eigen::Vector2d> way_m, std::mt19937_64& random) {
+                        std::span<const Eigen::Vector2d> distance_m, std::mt19937_64& random) {
   World world(Ground(parameters.ground, random));
-  const PointGrid way(way_m, 20.0);
+  const PointGrid way(distance_m, 20.0);
   for (std::size_t i = 0; i < forest.trunks_m.size(); ++i) {
     const double known_m = forest.radii_m[i];
     const double radius_m = known_m > 0.0 ? known_m : draw_radius_m(parameters, random);
@@ -116,7 +116,7 @@ World make_forest_world(const Forest& forest, const ForestWorldParameters& param
     if (way.any_within(at_m, parameters.clearance_m + 1.3)) continue;
     plant_bush(world, at_m, parameters.bush_density_per_m, random);
   }
-  add_people(world, way_m, parameters.people, random);
+  add_people(world, distance_m, parameters.people, random);
   return world;
 }
 

@@ -32,7 +32,7 @@ struct ForestWorldParameters {
 /// The forest's trunks (but those on the way, `way_m`: points a metre or so apart) with crowns and
 /// branches, bushes and people between them. Trunk i of World::trunks() is the i-th that was kept.
 World make_forest_world(const Forest& forest, const ForestWorldParameters& parameters,
-                        std::span<const Eigen::Vector2d> way_m, std::mt19937_64& random);
+                        std::span<const Eigen::Vector2d> distance_m, std::mt19937_64& random);
 
 /// A trunk with crown and branches; `crown_base_m` above the ground. (For streets and fields too.)
 void plant_tree(World& world, const Eigen::Vector2d& at_m, double radius_m, double crown_base_m,

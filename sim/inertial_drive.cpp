@@ -11,15 +11,15 @@ namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
-Eigen::Matrix2d rotation(double angle) { return SE2(0.0, 0.0, angle).rotation(); }
+Eigen::Matrix2d rotation(double angle) { return geometry::SE2(0.0, 0.0, angle).rotation(); }
 
 /// Adds one IMU sample: rate and force held over `dt`, the force in the frame at mid-turn.
-void integrate(Preintegration& p, double rate, const Eigen::Vector2d& force, double dt,
+void integrate(model::Preintegration& p, double rate, const Eigen::Vector2d& force, double dt,
                double gyro_noise, double accelerometer_noise) {
   const double turn = rate * dt;
   const Eigen::Matrix2d to_start = rotation(p.yaw_rad + 0.5 * turn);
   const Eigen::Vector2d acceleration = to_start * force;
-  const Eigen::Vector2d sideways = turned_left(acceleration);
+  const Eigen::Vector2d sideways = geometry::perpendicular(acceleration);
   Eigen::Matrix<double, 5, 5> step = Eigen::Matrix<double, 5, 5>::Identity();
   step.block<2, 1>(1, 0) = sideways * dt;
   step.block<2, 1>(3, 0) = 0.5 * sideways * dt * dt;
@@ -63,9 +63,9 @@ InertialDrive::InertialDrive(const InertialDriveParameters& parameters, const Tr
   position_ = middle + radius * Eigen::Vector2d(std::sin(theta_), -std::cos(theta_));
   bias_ << parameters_.gyro_bias_sigma * normal(), parameters_.accelerometer_bias_sigma * normal(),
       parameters_.accelerometer_bias_sigma * normal();
-  parked_ = SE2(position_, theta_);
+  parked_ = geometry::SE2(position_, theta_);
   if (sways()) {
-    const SE2 first = sway_place();
+    const geometry::SE2 first = sway_place();
     position_ = first.translation();
     theta_ = first.theta();
     velocity_ = sway_velocity();
@@ -75,14 +75,15 @@ InertialDrive::InertialDrive(const InertialDriveParameters& parameters, const Tr
 /// Whether the body sways until the next scan.
 bool InertialDrive::sways() const {
   const InertialDriveParameters& p = parameters_;
-  const bool stands = time_s_ + p.scan_interval_s < p.standing_s + 1e-6;
-  return stands && (p.sway_sigma_m > 0.0 || p.sway_sigma_rad > 0.0 || p.sway_sigma_mps > 0.0);
+  const bool is_stationary = time_s_ + p.scan_interval_s < p.standing_s + 1e-6;
+  return is_stationary &&
+         (p.sway_sigma_m > 0.0 || p.sway_sigma_rad > 0.0 || p.sway_sigma_mps > 0.0);
 }
 
-SE2 InertialDrive::sway_place() {
+geometry::SE2 InertialDrive::sway_place() {
   const double x = parameters_.sway_sigma_m * normal();
   const double y = parameters_.sway_sigma_m * normal();
-  return parked_ * SE2(x, y, parameters_.sway_sigma_rad * normal());
+  return parked_ * geometry::SE2(x, y, parameters_.sway_sigma_rad * normal());
 }
 
 Eigen::Vector2d InertialDrive::sway_velocity() {
@@ -92,7 +93,7 @@ Eigen::Vector2d InertialDrive::sway_velocity() {
 
 /// Pushes by which the body is at a place and a velocity of its sway when the next scan comes.
 void InertialDrive::begin_sway() {
-  const SE2 next = sway_place();
+  const geometry::SE2 next = sway_place();
   const Eigen::Vector2d velocity = sway_velocity();
   const double half = 0.5 * parameters_.scan_interval_s;
   // With pushes a, b over the halves: velocity + (a + b) half, and way + (1.5 a + 0.5 b) half^2.
@@ -100,7 +101,7 @@ void InertialDrive::begin_sway() {
   const Eigen::Vector2d way = next.translation() - position_ - 2.0 * half * velocity_;
   sway_push_.col(0) = way / (half * half) - 0.5 * sum;
   sway_push_.col(1) = sum - sway_push_.col(0);
-  sway_rate_ = wrap_angle(next.theta() - theta_) / parameters_.scan_interval_s;
+  sway_rate_ = geometry::wrap_angle(next.theta() - theta_) / parameters_.scan_interval_s;
 }
 
 InertialDrive::Tick InertialDrive::sway(double dt, bool first_half) {
@@ -151,15 +152,15 @@ void InertialDrive::walk_bias(double dt) {
   bias_.z() += parameters_.accelerometer_walk * std::sqrt(dt) * normal();
 }
 
-Odometry InertialDrive::drive_piece() {
+model::Odometry InertialDrive::drive_increment() {
   const InertialDriveParameters& p = parameters_;
   const double dt = p.scan_interval_s / p.samples_per_scan;
-  const SE2 before(position_, theta_);
+  const geometry::SE2 before(position_, theta_);
   const bool swaying = sways();
   if (swaying) begin_sway();
-  Preintegration inertial;
+  model::Preintegration inertial;
   for (int k = 0; k < p.samples_per_scan; ++k) {
-    const InertialBias bias = bias_;
+    const model::InertialBias bias = bias_;
     const Tick tick = swaying ? sway(dt, 2 * k < p.samples_per_scan) : advance(dt);
     const double rate = tick.yaw_rad / dt + bias.x() + p.gyro_noise / std::sqrt(dt) * normal();
     Eigen::Vector2d force = tick.acceleration_mps2 + bias.tail<2>();
@@ -167,34 +168,34 @@ Odometry InertialDrive::drive_piece() {
     force.y() += p.accelerometer_noise / std::sqrt(dt) * normal();
     integrate(inertial, rate, force, dt, p.gyro_noise, p.accelerometer_noise);
   }
-  const SE2 truth = before.inverse() * SE2(position_, theta_);
+  const geometry::SE2 truth = before.inverse() * geometry::SE2(position_, theta_);
   const bool wheels = p.odometry != OdometryKind::kInertial;
   const bool imu = p.odometry != OdometryKind::kWheels;
   const double sigma = wheels ? p.wheel_sigma_m : p.dead_reckoning_sigma_mps * p.scan_interval_s;
   const double turn_sigma =
       imu ? std::sqrt(inertial.covariance(0, 0)) + p.gyro_bias_sigma * p.scan_interval_s
           : p.wheel_sigma_rad;
-  Odometry piece;
-  piece.is_standing = speed_mps_ <= 0.0;
-  piece.has_wheels = wheels;
-  if (imu) piece.inertial = inertial;
-  const double moved = piece.is_standing && wheels ? 0.0 : 1.0;
+  model::Odometry increment;
+  increment.is_stationary = speed_mps_ <= 0.0;
+  increment.has_wheels = wheels;
+  if (imu) increment.inertial = inertial;
+  const double moved = increment.is_stationary && wheels ? 0.0 : 1.0;
   const Eigen::Vector3d error(sigma * moved * normal(), sigma * moved * normal(),
                               imu ? 0.0 : turn_sigma * moved * normal());
-  piece.from_T_to = truth * SE2::Exp(error);
-  if (imu) piece.from_T_to = SE2(piece.from_T_to.translation(), inertial.yaw_rad);
-  piece.covariance =
+  increment.from_T_to = truth * geometry::SE2::Exp(error);
+  if (imu) increment.from_T_to = geometry::SE2(increment.from_T_to.translation(), inertial.yaw_rad);
+  increment.covariance =
       Eigen::Vector3d(sigma * sigma, sigma * sigma, turn_sigma * turn_sigma).asDiagonal();
-  return piece;
+  return increment;
 }
 
 void InertialDrive::observe(DriveStep& step) {
   const InertialDriveParameters& p = parameters_;
-  const SE2 vehicle_T_world = step.world_T_vehicle.inverse();
+  const geometry::SE2 vehicle_T_world = step.world_T_vehicle.inverse();
   std::bernoulli_distribution detected(p.detection_probability);
   const double variance = p.position_sigma_m * p.position_sigma_m;
   const auto add = [&](const Eigen::Vector2d& position, std::int64_t trunk) {
-    Detection detection;
+    model::Detection detection;
     detection.position_m << position, 0.0;
     detection.covariance_m2 = Eigen::Vector3d::Constant(variance).asDiagonal();
     detection.radius_m = 0.15;
@@ -220,16 +221,17 @@ void InertialDrive::observe(DriveStep& step) {
 
 DriveStep InertialDrive::next() {
   DriveStep step;
-  const auto interval_us = static_cast<Utime>(std::llround(1e6 * parameters_.scan_interval_s));
-  const Utime utime = static_cast<Utime>(scans_) * interval_us;
+  const auto interval_us =
+      static_cast<model::Utime>(std::llround(1e6 * parameters_.scan_interval_s));
+  const model::Utime utime = static_cast<model::Utime>(scans_) * interval_us;
   if (scans_ > 0) {
-    Odometry piece = drive_piece();
-    piece.from_utime = utime - interval_us;
-    piece.utime = utime;
-    piece.sequence = scans_ - 1;
-    if (parameters_.odometry != OdometryKind::kNone) step.odometry.push_back(piece);
+    model::Odometry increment = drive_increment();
+    increment.from_utime = utime - interval_us;
+    increment.utime = utime;
+    increment.sequence = scans_ - 1;
+    if (parameters_.odometry != OdometryKind::kNone) step.odometry.push_back(increment);
   }
-  step.world_T_vehicle = SE2(position_, theta_);
+  step.world_T_vehicle = geometry::SE2(position_, theta_);
   step.velocity_mps = velocity_;
   step.bias = bias_;
   step.driven_m = driven_m_;

@@ -61,12 +61,12 @@ struct InertialDriveParameters {
 
 /// Everything between two scans, and the scan.
 struct DriveStep {
-  std::vector<Odometry> odometry;  ///< Ends at the scan.
-  LandmarkScan scan;
+  std::vector<model::Odometry> odometry;  ///< Ends at the scan.
+  model::LandmarkScan scan;
   std::vector<std::int64_t> trunks;  ///< Behind each detection; -1 = clutter.
-  SE2 world_T_vehicle;
+  geometry::SE2 world_T_vehicle;
   Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Frame world.
-  InertialBias bias = InertialBias::Zero();
+  model::InertialBias bias = model::InertialBias::Zero();
   double driven_m = 0.0;
 };
 
@@ -90,11 +90,11 @@ class InertialDrive {
   Tick turn_and_push(double dt, double yaw_rad, const Eigen::Vector2d& velocity_mps);
   void walk_bias(double dt);
   bool sways() const;
-  SE2 sway_place();
+  geometry::SE2 sway_place();
   Eigen::Vector2d sway_velocity();
   void begin_sway();
   Tick sway(double dt, bool first_half);
-  Odometry drive_piece();
+  model::Odometry drive_increment();
   void observe(DriveStep& step);
   double normal() { return normal_(random_); }
 
@@ -110,11 +110,11 @@ class InertialDrive {
   double theta_ = 0.0;
   Eigen::Vector2d position_ = Eigen::Vector2d::Zero();
   Eigen::Vector2d velocity_ = Eigen::Vector2d::Zero();
-  SE2 parked_;              ///< What the sway goes round.
+  geometry::SE2 parked_;    ///< What the sway goes round.
   double sway_rate_ = 0.0;  ///< [rad/s] Until the next scan.
   /// [m/s^2] In its first and its second half.
   Eigen::Matrix2d sway_push_ = Eigen::Matrix2d::Zero();
-  InertialBias bias_ = InertialBias::Zero();
+  model::InertialBias bias_ = model::InertialBias::Zero();
 };
 
 }  // namespace understory::sim

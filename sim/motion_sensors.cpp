@@ -8,8 +8,8 @@
 namespace understory::sim {
 namespace {
 
-Utime utime_at(double time_s, Utime utime_of_start) {
-  return utime_of_start + static_cast<Utime>(std::llround(time_s * 1e6));
+model::Utime utime_at(double time_s, model::Utime utime_of_start) {
+  return utime_of_start + static_cast<model::Utime>(std::llround(time_s * 1e6));
 }
 
 Eigen::Vector3d limited(const Eigen::Vector3d& value, double limit) {
@@ -26,14 +26,15 @@ ImuParameters ImuParameters::perfect() {
   return p;
 }
 
-ImuSample true_imu_sample(const VehicleState& state, const Eigen::Isometry3d& vehicle_T_sensor) {
+model::ImuSample true_imu_sample(const VehicleState& state,
+                                 const Eigen::Isometry3d& vehicle_T_sensor) {
   const Eigen::Vector3d& rate = state.angular_rate_rad_s;
   const Eigen::Vector3d lever = vehicle_T_sensor.translation();
   const Eigen::Vector3d up(0.0, 0.0, kGravity);
   const Eigen::Vector3d force = state.world_Q_vehicle.conjugate() * (state.acceleration_mps2 + up) +
                                 state.angular_acceleration_rad_s2.cross(lever) +
                                 rate.cross(rate.cross(lever));
-  ImuSample sample;
+  model::ImuSample sample;
   sample.angular_rate_rad_s = vehicle_T_sensor.linear().transpose() * rate;
   sample.specific_force_mps2 = vehicle_T_sensor.linear().transpose() * force;
   return sample;
@@ -53,9 +54,9 @@ Eigen::Vector3d SimulatedImu::normal3(double sigma) {
   return sigma * Eigen::Vector3d(x, y, normal_(random_));
 }
 
-ImuSample SimulatedImu::next(const VehicleMotion& motion, Utime utime_of_start) {
+model::ImuSample SimulatedImu::next(const VehicleMotion& motion, model::Utime utime_of_start) {
   const double time_s = next_time_s();
-  ImuSample sample = true_imu_sample(motion.at(time_s), parameters_.vehicle_T_sensor);
+  model::ImuSample sample = true_imu_sample(motion.at(time_s), parameters_.vehicle_T_sensor);
   sample.utime = utime_at(time_s, utime_of_start);
   sample.sequence = count_++;
   const double root_dt = 1.0 / std::sqrt(parameters_.rate_hz);
@@ -78,12 +79,12 @@ SimulatedWheels::SimulatedWheels(const WheelParameters& parameters, std::uint64_
   steering_offset_rad_ = parameters.steering_offset_sigma_rad * normal_(random_);
 }
 
-WheelSample SimulatedWheels::next(const VehicleMotion& motion, Utime utime_of_start) {
+model::WheelSample SimulatedWheels::next(const VehicleMotion& motion, model::Utime utime_of_start) {
   const double time_s = next_time_s();
   const VehicleState state = motion.at(time_s);
   const Eigen::Vector3d velocity = state.world_Q_vehicle.conjugate() * state.velocity_mps;
   const double yaw_rate = state.angular_rate_rad_s.z();
-  WheelSample sample;
+  model::WheelSample sample;
   sample.utime = utime_at(time_s, utime_of_start);
   sample.sequence = count_++;
   const double speed = velocity.x() - yaw_rate * parameters_.encoder_left_m;
@@ -108,7 +109,8 @@ Eigen::Vector2d SimulatedGnss::normal2(double sigma) {
   return sigma * Eigen::Vector2d(x, normal_(random_));
 }
 
-std::optional<GnssFix> SimulatedGnss::next(const VehicleMotion& motion, Utime utime_of_start) {
+std::optional<model::GnssFix> SimulatedGnss::next(const VehicleMotion& motion,
+                                                  model::Utime utime_of_start) {
   const double time_s = next_time_s();
   ++count_;
   const double kept = std::exp(-1.0 / (parameters_.rate_hz * parameters_.drift_time_s));
@@ -125,7 +127,7 @@ std::optional<GnssFix> SimulatedGnss::next(const VehicleMotion& motion, Utime ut
   const Eigen::Vector3d lever = state.world_Q_vehicle * parameters_.antenna_m;
   const Eigen::Vector3d turning =
       state.world_Q_vehicle * state.angular_rate_rad_s.cross(parameters_.antenna_m);
-  GnssFix fix;
+  model::GnssFix fix;
   fix.utime = utime_at(time_s, utime_of_start);
   fix.sequence = fixes_++;
   fix.east_north_m = (state.position_m + lever).head<2>() + drift_m_ + noise;

@@ -35,14 +35,15 @@ struct ImuParameters {
 };
 
 /// What an inertial unit feels, free of error: frame `sensor`, at the sensor's place.
-ImuSample true_imu_sample(const VehicleState& state, const Eigen::Isometry3d& vehicle_T_sensor);
+model::ImuSample true_imu_sample(const VehicleState& state,
+                                 const Eigen::Isometry3d& vehicle_T_sensor);
 
 /// Errors come one after another: samples are made in order.
 class SimulatedImu {
  public:
   SimulatedImu(const ImuParameters& parameters, std::uint64_t seed);
   double next_time_s() const { return static_cast<double>(count_) / parameters_.rate_hz; }
-  ImuSample next(const VehicleMotion& motion, Utime utime_of_start = 0);
+  model::ImuSample next(const VehicleMotion& motion, model::Utime utime_of_start = 0);
 
   const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }  ///< Of the last sample.
   const Eigen::Vector3d& accelerometer_bias() const { return accelerometer_bias_; }
@@ -74,7 +75,7 @@ class SimulatedWheels {
  public:
   SimulatedWheels(const WheelParameters& parameters, std::uint64_t seed);
   double next_time_s() const { return static_cast<double>(count_) / parameters_.rate_hz; }
-  WheelSample next(const VehicleMotion& motion, Utime utime_of_start = 0);
+  model::WheelSample next(const VehicleMotion& motion, model::Utime utime_of_start = 0);
 
  private:
   WheelParameters parameters_;
@@ -104,7 +105,7 @@ class SimulatedGnss {
   SimulatedGnss(const GnssParameters& parameters, std::uint64_t seed);
   double next_time_s() const { return static_cast<double>(count_) / parameters_.rate_hz; }
   /// The fix at next_time_s(); none during an outage.
-  std::optional<GnssFix> next(const VehicleMotion& motion, Utime utime_of_start = 0);
+  std::optional<model::GnssFix> next(const VehicleMotion& motion, model::Utime utime_of_start = 0);
 
  private:
   Eigen::Vector2d normal2(double sigma);

@@ -94,9 +94,9 @@ std::optional<PathKind> path_kind(std::string_view name) {
   return std::nullopt;
 }
 
-std::vector<SE2> make_path(const PathParameters& parameters) {
-  std::vector<SE2> poses;
-  SE2 segment_start;
+std::vector<geometry::SE2> make_path(const PathParameters& parameters) {
+  std::vector<geometry::SE2> poses;
+  geometry::SE2 segment_start;
   double effort_before = 0.0;
   // An observation within rounding of the end of a segment belongs to the next one.
   const double slack = 1e-6 * parameters.interval;
@@ -106,9 +106,9 @@ std::vector<SE2> make_path(const PathParameters& parameters) {
       const double effort = static_cast<double>(poses.size()) * parameters.interval;
       if (effort >= effort_end - slack) break;
       poses.push_back(segment_start *
-                      SE2::Exp(std::max(0.0, effort - effort_before) * segment.twist));
+                      geometry::SE2::Exp(std::max(0.0, effort - effort_before) * segment.twist));
     }
-    segment_start = segment_start * SE2::Exp(segment.effort * segment.twist);
+    segment_start = segment_start * geometry::SE2::Exp(segment.effort * segment.twist);
     effort_before = effort_end;
   }
   return poses;

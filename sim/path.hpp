@@ -34,6 +34,6 @@ std::optional<PathKind> path_kind(std::string_view name);
 /// The poses of the vehicle (x forward) in the frame of the first, at every observation. A step
 /// that reaches a corner spends what is left of it turning, metres as radians, and the other way
 /// round. The path ends where its length is driven, with no last turn and no observation there.
-std::vector<SE2> make_path(const PathParameters& parameters);
+std::vector<geometry::SE2> make_path(const PathParameters& parameters);
 
 }  // namespace understory::sim

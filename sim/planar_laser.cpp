@@ -11,12 +11,12 @@ PlanarLaser::PlanarLaser(const World& world, const PlanarLaserParameters& parame
     : parameters_(parameters), seed_(mixed(seed, 0x91a2)), caster_(world) {}
 
 SimulatedPlanarScan PlanarLaser::scan(const VehicleMotion& motion, std::uint64_t k,
-                                      Utime utime_of_start) {
+                                      model::Utime utime_of_start) {
   const double at_s = time_s(k);
   const Eigen::Isometry3d world_T_sensor =
       motion.at(at_s).world_T_vehicle() * parameters_.vehicle_T_sensor;
   SimulatedPlanarScan result;
-  result.scan.utime = utime_of_start + static_cast<Utime>(std::llround(at_s * 1e6));
+  result.scan.utime = utime_of_start + static_cast<model::Utime>(std::llround(at_s * 1e6));
   result.scan.sequence = k;
   result.scan.first_bearing_rad = parameters_.first_bearing_rad;
   result.scan.bearing_step_rad = parameters_.bearing_step_rad;

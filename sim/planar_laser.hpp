@@ -26,7 +26,7 @@ struct PlanarLaserParameters {
 };
 
 struct SimulatedPlanarScan {
-  PlanarScan scan;                ///< Beams without a return have max_range_m.
+  model::PlanarScan scan;         ///< Beams without a return have max_range_m.
   std::vector<ObjectId> objects;  ///< Per beam; the ground's where there is no return.
   std::vector<std::uint8_t> is_return;
 };
@@ -38,7 +38,8 @@ class PlanarLaser {
 
   double time_s(std::uint64_t k) const { return static_cast<double>(k) / parameters_.rate_hz; }
   /// Scan number k, at time_s(k) of the drive.
-  SimulatedPlanarScan scan(const VehicleMotion& motion, std::uint64_t k, Utime utime_of_start = 0);
+  SimulatedPlanarScan scan(const VehicleMotion& motion, std::uint64_t k,
+                           model::Utime utime_of_start = 0);
 
  private:
   PlanarLaserParameters parameters_;

@@ -59,10 +59,10 @@ Points box_smoothed(const Points& points, int half) {
 
 }  // namespace
 
-Route Route::through(std::span<const Eigen::Vector2d> way_points_m, double rounding_m) {
-  if (way_points_m.size() < 2) throw std::runtime_error("a route needs two points");
+Route Route::through(std::span<const Eigen::Vector2d> waypoints_m, double rounding_m) {
+  if (waypoints_m.size() < 2) throw std::runtime_error("a route needs two points");
   const double fine_m = 0.1;
-  Points points = resampled(way_points_m, fine_m);
+  Points points = resampled(waypoints_m, fine_m);
   if (points.size() < 10) throw std::runtime_error("a route must be 1 m long at least");
   const int half = static_cast<int>(std::lround(0.5 * rounding_m / fine_m));
   points = extended(points, 3 * half);
@@ -84,7 +84,7 @@ Route::Place Route::at(double along_m) const {
           (v.x() * value.second.y() - v.y() * value.second.x()) / (speed * speed * speed)};
 }
 
-SE2 Route::pose(double along_m) const {
+geometry::SE2 Route::pose(double along_m) const {
   const Place place = at(along_m);
   return {place.position_m, place.heading_rad};
 }
@@ -96,7 +96,7 @@ std::vector<Eigen::Vector2d> Route::places(double spacing_m) const {
   return result;
 }
 
-Route Route::moved(const SE2& world_T_route) const {
+Route Route::moved(const geometry::SE2& world_T_route) const {
   Points points = curve_.points();
   for (Eigen::Vector2d& p : points) p = world_T_route * p;
   Route route = *this;

@@ -17,7 +17,7 @@ class Route {
   /// in a right angle is then about half of `rounding_m`) and measurement noise smoothed away.
   /// Straight beyond its ends. Throws std::runtime_error where the points do not give a way of at
   /// least 1 m.
-  static Route through(std::span<const Eigen::Vector2d> way_points_m, double rounding_m);
+  static Route through(std::span<const Eigen::Vector2d> waypoints_m, double rounding_m);
 
   double length_m() const { return length_m_; }
   struct Place {
@@ -27,11 +27,11 @@ class Route {
   };
   /// `along_m` is clamped to the route.
   Place at(double along_m) const;
-  SE2 pose(double along_m) const;
+  geometry::SE2 pose(double along_m) const;
   /// Places every `spacing_m`, the end included.
   std::vector<Eigen::Vector2d> places(double spacing_m) const;
   /// The route moved by `world_T_route`.
-  Route moved(const SE2& world_T_route) const;
+  Route moved(const geometry::SE2& world_T_route) const;
 
  private:
   UniformSpline<2> curve_;

@@ -22,15 +22,15 @@ double rounding_m(PathKind kind) {
   }
 }
 
-std::vector<Eigen::Vector2d> way_points(const ForestScenarioParameters& parameters) {
+std::vector<Eigen::Vector2d> waypoints(const ForestScenarioParameters& parameters) {
   PathParameters path;
   path.kind = parameters.path;
   path.length_m = parameters.length_m;
   path.interval = 0.5;
-  const std::vector<SE2> poses = make_path(path);
+  const std::vector<geometry::SE2> poses = make_path(path);
   std::vector<Eigen::Vector2d> points;
   for (int lap = 0; lap < parameters.laps; ++lap) {
-    for (const SE2& pose : poses) points.push_back(pose.translation());
+    for (const geometry::SE2& pose : poses) points.push_back(pose.translation());
   }
   if (parameters.laps > 1) points.push_back(poses.front().translation());
   return points;
@@ -47,7 +47,7 @@ Scenario in_forest(const ForestScenarioParameters& parameters, const Forest& for
 }  // namespace
 
 Scenario forest_scenario(const ForestScenarioParameters& parameters, std::uint64_t seed) {
-  const Route route = Route::through(way_points(parameters), rounding_m(parameters.path));
+  const Route route = Route::through(waypoints(parameters), rounding_m(parameters.path));
   Eigen::Vector2d low = route.at(0.0).position_m;
   Eigen::Vector2d high = low;
   for (const Eigen::Vector2d& p : route.places(1.0)) {
@@ -62,8 +62,8 @@ Scenario forest_scenario(const ForestScenarioParameters& parameters, std::uint64
 }
 
 Scenario forest_scenario(const ForestScenarioParameters& parameters, const Forest& forest,
-                         const SE2& world_T_start, std::uint64_t seed) {
-  const Route route = Route::through(way_points(parameters), rounding_m(parameters.path));
+                         const geometry::SE2& world_T_start, std::uint64_t seed) {
+  const Route route = Route::through(waypoints(parameters), rounding_m(parameters.path));
   return in_forest(parameters, forest, route.moved(world_T_start), seed);
 }
 

@@ -26,7 +26,7 @@ struct ForestScenarioParameters {
 Scenario forest_scenario(const ForestScenarioParameters& parameters, std::uint64_t seed);
 /// The same in a given forest, where the path's start is at `world_T_start`.
 Scenario forest_scenario(const ForestScenarioParameters& parameters, const Forest& forest,
-                         const SE2& world_T_start, std::uint64_t seed);
+                         const geometry::SE2& world_T_start, std::uint64_t seed);
 
 /// Once or more around a residential block, about 700 m a lap, closed (thesis on submaps, 3.1 and
 /// 5.1.1: *Urban*). One lap drives the first `overlap_m` a second time.

@@ -8,7 +8,7 @@ namespace understory::sim {
 
 SensorDrive::SensorDrive(Scenario scenario, const VehicleParameters& vehicle,
                          const SpeedParameters& speed, SensorSuite suite, std::uint64_t seed,
-                         Utime utime_of_start)
+                         model::Utime utime_of_start)
     : scenario_(std::move(scenario)),
       suite_(std::move(suite)),
       utime_of_start_(utime_of_start),
@@ -27,7 +27,7 @@ SensorDrive::SensorDrive(Scenario scenario, const VehicleParameters& vehicle,
 std::uint64_t SensorDrive::sweep_count() const {
   if (!lidar_) return 0;
   return static_cast<std::uint64_t>(
-      std::floor(motion_.duration_s() * lidar_->parameters().turns_per_s + 1e-9));
+      std::floor(motion_.duration_s() * lidar_->parameters().revolutions_per_s + 1e-9));
 }
 
 /// Among equals the one that is named first: what others rest on comes before them.
@@ -45,7 +45,7 @@ SensorDrive::Due SensorDrive::next_due() const {
   if (gnss_) offer(gnss_->next_time_s(), Source::kGnss);
   if (planar_laser_) offer(planar_laser_->time_s(scans_), Source::kPlanarLaser);
   if (lidar_) {
-    offer(static_cast<double>(turns_ + 1) * lidar_->parameters().turn_s(), Source::kLidar);
+    offer(static_cast<double>(turns_ + 1) * lidar_->parameters().revolution_s(), Source::kLidar);
   }
   return due;
 }
@@ -54,7 +54,8 @@ std::optional<SensorReading> SensorDrive::read(Source source) {
   switch (source) {
     case Source::kTruth: {
       const double time_s = static_cast<double>(truths_) / suite_.truth_rate_hz;
-      const Utime utime = utime_of_start_ + static_cast<Utime>(std::llround(time_s * 1e6));
+      const model::Utime utime =
+          utime_of_start_ + static_cast<model::Utime>(std::llround(time_s * 1e6));
       return TruePose{utime, truths_++, motion_.at(time_s)};
     }
     case Source::kImu:

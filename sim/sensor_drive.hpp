@@ -26,13 +26,13 @@ struct SensorSuite {
 };
 
 struct TruePose {
-  Utime utime = 0;
+  model::Utime utime = 0;
   std::uint64_t sequence = 0;
   VehicleState state;
 };
 
-using SensorReading =
-    std::variant<TruePose, ImuSample, WheelSample, GnssFix, SimulatedPlanarScan, SimulatedSweep>;
+using SensorReading = std::variant<TruePose, model::ImuSample, model::WheelSample, model::GnssFix,
+                                   SimulatedPlanarScan, SimulatedSweep>;
 
 /// A world and a way through it.
 struct Scenario {
@@ -45,7 +45,7 @@ struct Scenario {
 class SensorDrive {
  public:
   SensorDrive(Scenario scenario, const VehicleParameters& vehicle, const SpeedParameters& speed,
-              SensorSuite suite, std::uint64_t seed, Utime utime_of_start = 0);
+              SensorSuite suite, std::uint64_t seed, model::Utime utime_of_start = 0);
   SensorDrive(Scenario scenario, const SpeedParameters& speed, SensorSuite suite,
               std::uint64_t seed)
       : SensorDrive(std::move(scenario), VehicleParameters{}, speed, std::move(suite), seed) {}
@@ -58,7 +58,7 @@ class SensorDrive {
   const VehicleMotion& motion() const { return motion_; }
   const SensorSuite& suite() const { return suite_; }
   /// State of the vehicle at the time of a reading.
-  VehicleState state_at(Utime utime) const {
+  VehicleState state_at(model::Utime utime) const {
     return motion_.at(1e-6 * static_cast<double>(utime - utime_of_start_));
   }
   /// Any turn of the lidar (which there must be), the same whether or not next() gave it.
@@ -76,7 +76,7 @@ class SensorDrive {
 
   Scenario scenario_;
   SensorSuite suite_;
-  Utime utime_of_start_;
+  model::Utime utime_of_start_;
   VehicleMotion motion_;
   std::optional<SimulatedImu> imu_;
   std::optional<SimulatedWheels> wheels_;

@@ -114,11 +114,11 @@ void SpinningLidar::add_column(int column, double time_s, const Eigen::Isometry3
     if (is_lost(effective, reflection.reflectivity, luck)) continue;
     const double range = hit.range_m + parameters_.range_sigma_m * normal_of(mixed(luck, kNoise));
     if (range < parameters_.min_range_m || range > parameters_.max_range_m) continue;
-    SweepPoint point;
+    model::SweepPoint point;
     point.x_m = static_cast<float>(range * beams_[i].x() * ahead.x());
     point.y_m = static_cast<float>(range * beams_[i].x() * ahead.y());
     point.z_m = static_cast<float>(range * beams_[i].y());
-    point.time_s = static_cast<float>(column * parameters_.turn_s() / parameters_.columns);
+    point.time_s = static_cast<float>(column * parameters_.revolution_s() / parameters_.columns);
     point.ring = static_cast<std::uint16_t>(i);
     point.intensity = static_cast<std::uint8_t>(
         std::clamp(255.0 * reflection.reflectivity * (0.5 + 0.5 * reflection.cosine), 1.0, 255.0));
@@ -129,9 +129,9 @@ void SpinningLidar::add_column(int column, double time_s, const Eigen::Isometry3
 }
 
 SimulatedSweep SpinningLidar::sweep(const PoseAt& world_T_vehicle, std::uint64_t turn,
-                                    Utime utime_of_start) {
+                                    model::Utime utime_of_start) {
   SimulatedSweep result;
-  PointSweep& raw = result.raw;
+  model::PointSweep& raw = result.raw;
   raw.sequence = raw.turn = turn;
   raw.rings = static_cast<std::uint16_t>(beams_.size());
   raw.max_range_m = parameters_.max_range_m;
@@ -139,23 +139,23 @@ SimulatedSweep SpinningLidar::sweep(const PoseAt& world_T_vehicle, std::uint64_t
   raw.points.reserve(most);
   result.objects.reserve(most);
   result.true_m.reserve(most);
-  const double start_s = static_cast<double>(turn) * parameters_.turn_s();
+  const double start_s = static_cast<double>(turn) * parameters_.revolution_s();
   for (int column = 0; column < parameters_.columns; ++column) {
-    const double time_s = start_s + column * parameters_.turn_s() / parameters_.columns;
+    const double time_s = start_s + column * parameters_.revolution_s() / parameters_.columns;
     add_column(column, time_s, world_T_vehicle(time_s), turn, result);
   }
   // The stamp is that of the first point; the times count from it.
   const double first_s = raw.points.empty() ? 0.0 : raw.points.front().time_s;
-  raw.utime = utime_of_start + static_cast<Utime>(std::floor((start_s + first_s) * 1e6));
+  raw.utime = utime_of_start + static_cast<model::Utime>(std::floor((start_s + first_s) * 1e6));
   const double stamp_s = 1e-6 * static_cast<double>(raw.utime - utime_of_start) - start_s;
-  for (SweepPoint& point : raw.points) {
+  for (model::SweepPoint& point : raw.points) {
     point.time_s = static_cast<float>(std::max(0.0, point.time_s - stamp_s));
   }
   return result;
 }
 
 SimulatedSweep SpinningLidar::sweep(const VehicleMotion& motion, std::uint64_t turn,
-                                    Utime utime_of_start) {
+                                    model::Utime utime_of_start) {
   return sweep([&](double time_s) { return motion.at(time_s).world_T_vehicle(); }, turn,
                utime_of_start);
 }

@@ -22,7 +22,7 @@ std::vector<double> beam_elevations_rad(LidarModel model);
 struct LidarParameters {
   std::vector<double> elevations_rad = beam_elevations_rad(LidarModel::kVlp32);  ///< Ascending.
   int columns = 1800;  ///< Firings per turn; all beams of a column fire at once.
-  double turns_per_s = 10.0;
+  double revolutions_per_s = 10.0;
   bool clockwise = true;                        ///< Seen from above, as Velodyne's turn.
   double first_bearing_rad = std::numbers::pi;  ///< Frame `sensor`; where a turn begins.
   double range_sigma_m = 0.02;
@@ -38,12 +38,12 @@ struct LidarParameters {
   double white_range_m = 220.0;
   Eigen::Isometry3d vehicle_T_sensor = Eigen::Isometry3d(Eigen::Translation3d(1.2, 0.0, 1.9));
 
-  double turn_s() const { return 1.0 / turns_per_s; }
+  double revolution_s() const { return 1.0 / revolutions_per_s; }
 };
 
 /// A turn as the sensor gives it, and what nobody but the simulator knows.
 struct SimulatedSweep {
-  PointSweep raw;                       ///< Frame `sensor`, skewed; utime of the first point.
+  model::PointSweep raw;                ///< Frame `sensor`, skewed; utime of the first point.
   std::vector<ObjectId> objects;        ///< What each point lies on.
   std::vector<Eigen::Vector3f> true_m;  ///< What was hit, frame `world`, without noise.
 };
@@ -58,8 +58,10 @@ class SpinningLidar {
 
   /// Turn number `turn`, which begins at turn * turn_s() of the drive. Depends on nothing that was
   /// asked before. `utime_of_start` is the utime of time 0.
-  SimulatedSweep sweep(const VehicleMotion& motion, std::uint64_t turn, Utime utime_of_start = 0);
-  SimulatedSweep sweep(const PoseAt& world_T_vehicle, std::uint64_t turn, Utime utime_of_start = 0);
+  SimulatedSweep sweep(const VehicleMotion& motion, std::uint64_t turn,
+                       model::Utime utime_of_start = 0);
+  SimulatedSweep sweep(const PoseAt& world_T_vehicle, std::uint64_t turn,
+                       model::Utime utime_of_start = 0);
   /// As seen by a vehicle that stands at `world_T_vehicle`.
   SimulatedSweep sweep_standing(const Eigen::Isometry3d& world_T_vehicle, std::uint64_t turn = 0);
 

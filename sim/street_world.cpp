@@ -73,8 +73,8 @@ class Builder {
     return place.position_m +
            aside_m * Eigen::Vector2d(-std::sin(place.heading_rad), std::cos(place.heading_rad));
   }
-  bool is_free(const Eigen::Vector2d& at_m, double radius_m, double way_clearance_m) const {
-    if (way_.any_within(at_m, way_clearance_m + radius_m)) return false;
+  bool is_free(const Eigen::Vector2d& at_m, double radius_m, double path_clearance_m) const {
+    if (way_.any_within(at_m, path_clearance_m + radius_m)) return false;
     return std::none_of(houses_.begin(), houses_.end(), [&](const Disc& house) {
       const double least = house.radius_m + radius_m;
       return (house.centre_m - at_m).squaredNorm() < least * least;
@@ -101,7 +101,7 @@ class Builder {
     const Eigen::Vector2d middle = beside(along_m, side() * distance);
     if (!is_free(middle, radius, parameters_.house_distance_m - 4.0)) return;
     houses_.push_back({middle, radius});
-    const SE2 world_T_house(middle, heading + (uniform(0.0, 1.0) < 0.5 ? 0.0 : pi));
+    const geometry::SE2 world_T_house(middle, heading + (uniform(0.0, 1.0) < 0.5 ? 0.0 : pi));
     std::vector<Eigen::Vector2d> corners = footprint(width, depth);
     for (Eigen::Vector2d& corner : corners) corner = world_T_house * corner;
     world_.add_house(corners, uniform(4.5, 8.0));

@@ -127,7 +127,8 @@ class Suspension {
 };
 
 /// (height at the rear axle, roll, pitch) of a plane through what the four wheels stand on.
-Eigen::Vector3d on_wheels(const Ground& ground, const SE2& pose, const VehicleParameters& vehicle) {
+Eigen::Vector3d on_wheels(const Ground& ground, const geometry::SE2& pose,
+                          const VehicleParameters& vehicle) {
   const double half = 0.5 * vehicle.track_m;
   const double rear_left = ground.height(pose * Eigen::Vector2d(0.0, half));
   const double rear_right = ground.height(pose * Eigen::Vector2d(0.0, -half));
@@ -166,7 +167,7 @@ VehicleMotion::VehicleMotion(const Route& route, const Ground& ground,
   };
   for (std::ptrdiff_t k = 0; k < static_cast<std::ptrdiff_t>(along.size()); ++k) {
     const Route::Place place = route.at(distance(k));
-    yaw += wrap_angle(place.heading_rad - yaw);
+    yaw += geometry::wrap_angle(place.heading_rad - yaw);
     const double velocity = (distance(k + 1) - distance(k - 1)) / (2.0 * kStep);
     const double acceleration =
         (distance(k + 1) - 2.0 * distance(k) + distance(k - 1)) / (kStep * kStep);

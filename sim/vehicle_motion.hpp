@@ -53,7 +53,7 @@ struct VehicleState {
 
   Eigen::Isometry3d world_T_vehicle() const;
   /// Heading and place in the plan: `world` from `vehicle_level`.
-  SE2 world_T_level() const { return {position_m.head<2>(), yaw_rad}; }
+  geometry::SE2 world_T_level() const { return {position_m.head<2>(), yaw_rad}; }
 };
 
 /// The motion is simulated once (20 ms steps, 48 bytes each) and then is a smooth curve through

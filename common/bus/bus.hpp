@@ -10,7 +10,7 @@
 
 #include "common/wire/result.hpp"
 
-namespace understory {
+namespace understory::bus {
 
 struct BusMessage {
   std::string_view channel;
@@ -33,8 +33,8 @@ class Bus {
 
   /// Gives a refusal where the message was not sent: a channel name that is empty or longer than 63
   /// bytes, a message over 2^28 bytes, a socket that fails.
-  virtual std::optional<Refusal> publish(std::string_view channel,
-                                         std::span<const std::uint8_t> bytes) = 0;
+  virtual std::optional<wire::Refusal> publish(std::string_view channel,
+                                               std::span<const std::uint8_t> bytes) = 0;
   /// All messages of this channel, by its exact name. At most `queue_size` wait (0 = no limit);
   /// when more come the oldest is dropped and counted.
   virtual void subscribe(std::string_view channel, std::size_t queue_size, Handler handler) = 0;
@@ -51,6 +51,6 @@ inline constexpr std::size_t kLongestChannelName = 63;
 inline constexpr std::size_t kLargestMessage = std::size_t{1} << 28U;
 
 /// Why this could not be sent on any bus; none = it can.
-std::optional<Refusal> check_publishable(std::string_view channel, std::size_t bytes);
+std::optional<wire::Refusal> check_publishable(std::string_view channel, std::size_t bytes);
 
-}  // namespace understory
+}  // namespace understory::bus

@@ -2,7 +2,7 @@
 
 #include <chrono>
 
-namespace understory {
+namespace understory::bus {
 
 Clock system_clock() {
   using std::chrono::duration_cast;
@@ -21,4 +21,4 @@ Clock no_clock() {
   return {[] { return std::int64_t{0}; }, [] { return std::int64_t{0}; }};
 }
 
-}  // namespace understory
+}  // namespace understory::bus

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <functional>
 
-namespace understory {
+namespace understory::bus {
 
 /// Functions, so that tests and replay bring their own.
 struct Clock {
@@ -17,4 +17,4 @@ Clock system_clock();
 /// Stands still at zero: in replay nothing may depend on a clock.
 Clock no_clock();
 
-}  // namespace understory
+}  // namespace understory::bus

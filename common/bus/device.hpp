@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace understory {
+namespace understory::bus {
 
 /// An adapter that is a Device too is opened and attended by run_service, in the one thread that
 /// also handles the bus: no lock, no queue between threads. Replay and experiments host adapters
@@ -23,4 +23,4 @@ class Device {
   virtual int wait_ms() const = 0;
 };
 
-}  // namespace understory
+}  // namespace understory::bus

@@ -2,16 +2,17 @@
 
 #include <utility>
 
-namespace understory {
+namespace understory::bus {
 
-std::optional<Refusal> check_publishable(std::string_view channel, std::size_t bytes) {
+std::optional<wire::Refusal> check_publishable(std::string_view channel, std::size_t bytes) {
   if (channel.empty() || channel.size() > kLongestChannelName) {
-    return Refusal{Reason::kNotSent, "channel name `" + std::string(channel) + "` must have 1 to " +
-                                         std::to_string(kLongestChannelName) + " bytes"};
+    return wire::Refusal{wire::Reason::kNotSent,
+                         "channel name `" + std::string(channel) + "` must have 1 to " +
+                             std::to_string(kLongestChannelName) + " bytes"};
   }
   if (bytes > kLargestMessage) {
-    return Refusal{Reason::kNotSent,
-                   std::to_string(bytes) + " bytes are more than a message holds"};
+    return wire::Refusal{wire::Reason::kNotSent,
+                         std::to_string(bytes) + " bytes are more than a message holds"};
   }
   return std::nullopt;
 }
@@ -60,4 +61,4 @@ std::uint64_t DispatchQueue::dropped(std::string_view channel) const {
   return sum;
 }
 
-}  // namespace understory
+}  // namespace understory::bus

@@ -7,7 +7,7 @@
 
 #include "common/bus/bus.hpp"
 
-namespace understory {
+namespace understory::bus {
 
 class DispatchQueue {
  public:
@@ -39,4 +39,4 @@ class DispatchQueue {
   std::size_t waiting_ = 0;
 };
 
-}  // namespace understory
+}  // namespace understory::bus

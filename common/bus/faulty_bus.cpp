@@ -3,15 +3,15 @@
 #include <algorithm>
 #include <utility>
 
-namespace understory {
+namespace understory::bus {
 
-std::optional<Refusal> FaultyBus::publish(std::string_view channel,
-                                          std::span<const std::uint8_t> bytes) {
+std::optional<wire::Refusal> FaultyBus::publish(std::string_view channel,
+                                                std::span<const std::uint8_t> bytes) {
   if (auto refusal = check_publishable(channel, bytes.size())) return refusal;
   const bool is_target =
       plan_.channels.empty() ||
       std::find(plan_.channels.begin(), plan_.channels.end(), channel) != plan_.channels.end();
-  std::optional<Refusal> refusal;
+  std::optional<wire::Refusal> refusal;
   if (is_target) {
     const double chance = std::uniform_real_distribution<double>(0.0, 1.0)(random_);
     refusal = send_damaged(channel, {bytes.begin(), bytes.end()}, chance);
@@ -22,8 +22,9 @@ std::optional<Refusal> FaultyBus::publish(std::string_view channel,
   return refusal;
 }
 
-std::optional<Refusal> FaultyBus::send_damaged(std::string_view channel,
-                                               std::vector<std::uint8_t> bytes, double chance) {
+std::optional<wire::Refusal> FaultyBus::send_damaged(std::string_view channel,
+                                                     std::vector<std::uint8_t> bytes,
+                                                     double chance) {
   // The faults share 0..1: each takes its slice.
   const auto falls_to = [&chance](double probability) {
     const bool hit = chance >= 0.0 && chance < probability;
@@ -100,4 +101,4 @@ bool FaultyBus::handle_one(int timeout_ms) { return inner_.handle_one(timeout_ms
 
 std::uint64_t FaultyBus::dropped(std::string_view channel) const { return inner_.dropped(channel); }
 
-}  // namespace understory
+}  // namespace understory::bus

@@ -11,7 +11,7 @@
 
 #include "common/bus/bus.hpp"
 
-namespace understory {
+namespace understory::bus {
 
 /// Probabilities per message, 0..1; at most one fault befalls a message.
 struct FaultPlan {
@@ -43,8 +43,8 @@ class FaultyBus : public Bus {
   FaultyBus(Bus& inner, FaultPlan plan, std::uint64_t seed)
       : inner_(inner), plan_(std::move(plan)), random_(seed) {}
 
-  std::optional<Refusal> publish(std::string_view channel,
-                                 std::span<const std::uint8_t> bytes) override;
+  std::optional<wire::Refusal> publish(std::string_view channel,
+                                       std::span<const std::uint8_t> bytes) override;
   void subscribe(std::string_view channel, std::size_t queue_size, Handler handler) override;
   bool handle_one(int timeout_ms) override;
   std::uint64_t dropped(std::string_view channel) const override;
@@ -62,8 +62,8 @@ class FaultyBus : public Bus {
     std::size_t release_after = 0;  // of how many more messages
   };
 
-  std::optional<Refusal> send_damaged(std::string_view channel, std::vector<std::uint8_t> bytes,
-                                      double chance);
+  std::optional<wire::Refusal> send_damaged(std::string_view channel,
+                                            std::vector<std::uint8_t> bytes, double chance);
   void flood(std::string_view channel);
   void release_due();
 
@@ -74,4 +74,4 @@ class FaultyBus : public Bus {
   FaultCounts counts_;
 };
 
-}  // namespace understory
+}  // namespace understory::bus

@@ -5,23 +5,23 @@
 #include <fstream>
 #include <utility>
 
-namespace understory {
+namespace understory::bus {
 namespace {
 
 constexpr std::int64_t kLongAgo = -(std::int64_t{1} << 60U);
 
-bool is_malformed(Reason reason) {
+bool is_malformed(wire::Reason reason) {
   switch (reason) {
-    case Reason::kTooShort:
-    case Reason::kTooLong:
-    case Reason::kWrongType:
-    case Reason::kBadCount:
-    case Reason::kBadString:
-    case Reason::kNotFinite:
-    case Reason::kOutOfRange:
-    case Reason::kNotSymmetric:
-    case Reason::kNotPositive:
-    case Reason::kInconsistent:
+    case wire::Reason::kTooShort:
+    case wire::Reason::kTooLong:
+    case wire::Reason::kWrongType:
+    case wire::Reason::kBadCount:
+    case wire::Reason::kBadString:
+    case wire::Reason::kNotFinite:
+    case wire::Reason::kOutOfRange:
+    case wire::Reason::kNotSymmetric:
+    case wire::Reason::kNotPositive:
+    case wire::Reason::kInconsistent:
       return true;
     default:
       return false;
@@ -30,13 +30,13 @@ bool is_malformed(Reason reason) {
 
 }  // namespace
 
-Severity severity(Reason reason) {
+Severity severity(wire::Reason reason) {
   switch (reason) {
-    case Reason::kDuplicate:
-    case Reason::kLate:
+    case wire::Reason::kDuplicate:
+    case wire::Reason::kLate:
       return Severity::kNote;
-    case Reason::kStageFailed:
-    case Reason::kStateNotKept:
+    case wire::Reason::kStageFailed:
+    case wire::Reason::kStateNotKept:
       return Severity::kError;
     default:
       return Severity::kDegraded;
@@ -68,11 +68,12 @@ void HealthMonitor::count_message(std::size_t channel, std::int64_t utime) {
 
 void HealthMonitor::count_latency(std::int64_t microseconds) { latest_.add(microseconds); }
 
-void HealthMonitor::count_reason(std::string_view channel, Reason reason, std::string_view text) {
+void HealthMonitor::count_reason(std::string_view channel, wire::Reason reason,
+                                 std::string_view text) {
   ++reasons_[{std::string(channel), std::string(to_string(reason))}];
   for (Channel& one : channels_) {
     if (one.name == channel && is_malformed(reason)) ++one.malformed;
-    if (one.name == channel && reason == Reason::kNotSent) ++one.dropped;
+    if (one.name == channel && reason == wire::Reason::kNotSent) ++one.dropped;
   }
   const Severity how_bad = severity(reason);
   if (how_bad == Severity::kNote) return;
@@ -103,7 +104,7 @@ std::int8_t HealthMonitor::state() const {
   return health_t::STATE_OK;
 }
 
-std::int64_t HealthMonitor::count_of(std::string_view channel, Reason reason) const {
+std::int64_t HealthMonitor::count_of(std::string_view channel, wire::Reason reason) const {
   const auto found = reasons_.find({std::string(channel), std::string(to_string(reason))});
   return found == reasons_.end() ? 0 : found->second;
 }
@@ -173,4 +174,4 @@ std::int64_t resident_memory_bytes() {
   return resident_pages * ::sysconf(_SC_PAGESIZE);
 }
 
-}  // namespace understory
+}  // namespace understory::bus

@@ -12,7 +12,7 @@
 #include "common/wire/result.hpp"
 #include "understory/health_t.hpp"
 
-namespace understory {
+namespace understory::bus {
 
 /// How bad a reason is while it is fresh (kFreshUs).
 enum class Severity : std::uint8_t {
@@ -20,7 +20,7 @@ enum class Severity : std::uint8_t {
   kDegraded,  ///< Input or output is missing or wrong.
   kError,     ///< The service does not do what it is for.
 };
-Severity severity(Reason reason);
+Severity severity(wire::Reason reason);
 
 class HealthMonitor {
  public:
@@ -33,7 +33,7 @@ class HealthMonitor {
   std::size_t add_channel(std::string name, bool is_output);
   void count_message(std::size_t channel, std::int64_t utime);
   void count_latency(std::int64_t microseconds);
-  void count_reason(std::string_view channel, Reason reason, std::string_view text);
+  void count_reason(std::string_view channel, wire::Reason reason, std::string_view text);
   void set_sequence(std::size_t channel, const SequenceCounts& counts);
   void set_dropped(std::size_t channel, std::uint64_t dropped);
 
@@ -49,7 +49,7 @@ class HealthMonitor {
   const std::map<std::pair<std::string, std::string>, std::int64_t>& reasons() const {
     return reasons_;
   }
-  std::int64_t count_of(std::string_view channel, Reason reason) const;
+  std::int64_t count_of(std::string_view channel, wire::Reason reason) const;
 
  private:
   struct Channel {
@@ -88,4 +88,4 @@ class HealthMonitor {
 /// Resident memory of this process [bytes]; 0 where it cannot be told.
 std::int64_t resident_memory_bytes();
 
-}  // namespace understory
+}  // namespace understory::bus

@@ -4,7 +4,7 @@
 #include <bit>
 #include <cmath>
 
-namespace understory {
+namespace understory::bus {
 
 std::size_t LatencyHistogram::bucket(std::uint64_t value) {
   if (value < kPerOctave) return static_cast<std::size_t>(value);           // exact
@@ -44,4 +44,4 @@ void LatencyHistogram::merge(const LatencyHistogram& other) {
   max_ = std::max(max_, other.max_);
 }
 
-}  // namespace understory
+}  // namespace understory::bus

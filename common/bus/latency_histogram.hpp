@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-namespace understory {
+namespace understory::bus {
 
 /// Logarithmic buckets, 16 per octave: a percentile is too large by at most 1/16 of its value.
 class LatencyHistogram {
@@ -27,4 +27,4 @@ class LatencyHistogram {
   std::int64_t max_ = 0;
 };
 
-}  // namespace understory
+}  // namespace understory::bus

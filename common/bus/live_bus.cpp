@@ -11,7 +11,7 @@
 
 #include "common/bus/dispatch_queue.hpp"
 
-namespace understory {
+namespace understory::bus {
 namespace {
 
 /// liblcm reads a channel as a regular expression; a name shall be only itself.
@@ -117,13 +117,13 @@ class LiveBus::Impl {
 LiveBus::LiveBus(const std::string& url) : impl_(std::make_unique<Impl>(url)) {}
 LiveBus::~LiveBus() = default;
 
-std::optional<Refusal> LiveBus::publish(std::string_view channel,
-                                        std::span<const std::uint8_t> bytes) {
+std::optional<wire::Refusal> LiveBus::publish(std::string_view channel,
+                                              std::span<const std::uint8_t> bytes) {
   if (auto refusal = check_publishable(channel, bytes.size())) return refusal;
   if (lcm_publish(impl_->lcm_, std::string(channel).c_str(), bytes.data(),
                   static_cast<unsigned>(bytes.size())) != 0) {
-    return Refusal{Reason::kNotSent,
-                   "the socket refused " + std::to_string(bytes.size()) + " bytes"};
+    return wire::Refusal{wire::Reason::kNotSent,
+                         "the socket refused " + std::to_string(bytes.size()) + " bytes"};
   }
   return std::nullopt;
 }
@@ -144,4 +144,4 @@ ReceiveBuffer LiveBus::receive_buffer() const { return impl_->buffer_; }
 
 const std::string& LiveBus::url() const { return impl_->url_; }
 
-}  // namespace understory
+}  // namespace understory::bus

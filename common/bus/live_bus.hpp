@@ -7,7 +7,7 @@
 
 #include "common/bus/bus.hpp"
 
-namespace understory {
+namespace understory::bus {
 
 /// The socket buffer asked for [bytes]: with the 208 KiB that Debian gives unasked, one large
 /// message in two is lost.
@@ -33,8 +33,8 @@ class LiveBus : public Bus {
   explicit LiveBus(const std::string& url);
   ~LiveBus() override;
 
-  std::optional<Refusal> publish(std::string_view channel,
-                                 std::span<const std::uint8_t> bytes) override;
+  std::optional<wire::Refusal> publish(std::string_view channel,
+                                       std::span<const std::uint8_t> bytes) override;
   void subscribe(std::string_view channel, std::size_t queue_size, Handler handler) override;
   bool handle_one(int timeout_ms) override;
   std::uint64_t dropped(std::string_view channel) const override;
@@ -47,4 +47,4 @@ class LiveBus : public Bus {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace understory
+}  // namespace understory::bus

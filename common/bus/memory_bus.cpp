@@ -2,10 +2,10 @@
 
 #include <utility>
 
-namespace understory {
+namespace understory::bus {
 
-std::optional<Refusal> MemoryBus::publish(std::string_view channel,
-                                          std::span<const std::uint8_t> bytes) {
+std::optional<wire::Refusal> MemoryBus::publish(std::string_view channel,
+                                                std::span<const std::uint8_t> bytes) {
   if (auto refusal = check_publishable(channel, bytes.size())) return refusal;
   if (tap_) tap_({channel, bytes, 0});
   queue_.push(channel, bytes, 0);
@@ -25,4 +25,4 @@ void MemoryBus::drain() {
   }
 }
 
-}  // namespace understory
+}  // namespace understory::bus

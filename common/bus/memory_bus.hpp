@@ -4,7 +4,7 @@
 #include "common/bus/bus.hpp"
 #include "common/bus/dispatch_queue.hpp"
 
-namespace understory {
+namespace understory::bus {
 
 class MemoryBus : public Bus {
  public:
@@ -15,8 +15,8 @@ class MemoryBus : public Bus {
   explicit MemoryBus(Queues queues = Queues::kBounded, Handler tap = {})
       : queues_(queues), tap_(std::move(tap)) {}
 
-  std::optional<Refusal> publish(std::string_view channel,
-                                 std::span<const std::uint8_t> bytes) override;
+  std::optional<wire::Refusal> publish(std::string_view channel,
+                                       std::span<const std::uint8_t> bytes) override;
   void subscribe(std::string_view channel, std::size_t queue_size, Handler handler) override;
   /// Never waits: what will come can only come from this process.
   bool handle_one(int timeout_ms) override;
@@ -31,4 +31,4 @@ class MemoryBus : public Bus {
   DispatchQueue queue_;
 };
 
-}  // namespace understory
+}  // namespace understory::bus

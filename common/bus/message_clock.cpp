@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-namespace understory {
+namespace understory::bus {
 
 MessageClock::Verdict MessageClock::take(std::int64_t utime) {
   if (now_ < 0 || std::abs(utime - now_) <= largest_jump_us_) {
@@ -20,4 +20,4 @@ MessageClock::Verdict MessageClock::take(std::int64_t utime) {
   return Verdict::kJumped;
 }
 
-}  // namespace understory
+}  // namespace understory::bus

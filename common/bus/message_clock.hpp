@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-namespace understory {
+namespace understory::bus {
 
 /// Follows the newest stamp. A stamp far from it is not believed until several in a row agree: one
 /// wrong stamp must neither stop the service nor make everything after it look old.
@@ -28,4 +28,4 @@ class MessageClock {
   int agreeing_ = 0;
 };
 
-}  // namespace understory
+}  // namespace understory::bus

@@ -7,7 +7,7 @@
 #include "understory/config_t.hpp"
 #include "understory/log_t.hpp"
 
-namespace understory {
+namespace understory::bus {
 
 Node::Node(Bus& bus, NodeOptions options, Clock clock)
     : bus_(bus),
@@ -35,7 +35,7 @@ std::size_t Node::add_output(const std::string& channel) {
   return outputs_.size() - 1;
 }
 
-void Node::every(Utime period_us, std::function<void(Utime)> handler) {
+void Node::every(model::Utime period_us, std::function<void(model::Utime)> handler) {
   if (period_us <= 0) throw std::logic_error("a tick needs a period");
   timers_.push_back({period_us, -1, std::move(handler)});
 }
@@ -58,11 +58,11 @@ bool Node::feed(const BusMessage& message) {
 }
 
 void Node::handle(Input& input, const BusMessage& message) {
-  std::optional<Refusal> refusal;
+  std::optional<wire::Refusal> refusal;
   try {
     refusal = input.take(message.bytes, [&] { return admit(input, message); });
   } catch (const std::exception& error) {
-    report(Reason::kStageFailed, error.what(), input.channel);
+    report(wire::Reason::kStageFailed, error.what(), input.channel);
   }
   if (refusal) report(refusal->reason, refusal->detail, input.channel);
   if (message.received_us != 0) {
@@ -72,17 +72,17 @@ void Node::handle(Input& input, const BusMessage& message) {
 }
 
 bool Node::admit(Input& input, const BusMessage& message) {
-  const MessageHeader header = *header_of(message.bytes);
+  const wire::MessageHeader header = *wire::header_of(message.bytes);
   if (input.options.sequenced) {
     if (!admit_time(input, header.utime)) return false;
     const Arrival arrival = input.sequence.take(header.sequence, header.utime);
     monitor_.set_sequence(input.health, input.sequence.counts());
     if (arrival == Arrival::kDuplicate) {
-      report(Reason::kDuplicate, "seq " + std::to_string(header.sequence), input.channel);
+      report(wire::Reason::kDuplicate, "seq " + std::to_string(header.sequence), input.channel);
       return false;
     }
     if (arrival == Arrival::kLate) {
-      report(Reason::kLate, "seq " + std::to_string(header.sequence), input.channel);
+      report(wire::Reason::kLate, "seq " + std::to_string(header.sequence), input.channel);
       return false;
     }
     fire_timers(clock_.now());
@@ -99,7 +99,7 @@ bool Node::admit(Input& input, const BusMessage& message) {
   return true;
 }
 
-bool Node::admit_time(Input& input, Utime utime) {
+bool Node::admit_time(Input& input, model::Utime utime) {
   const MessageClock::Verdict verdict = clock_.take(utime);
   if (is_recovering_ && verdict == MessageClock::Verdict::kQuarantined) {
     // Only messages that had been believed are in the journal: this one was a jump's last proof.
@@ -110,12 +110,12 @@ bool Node::admit_time(Input& input, Utime utime) {
     case MessageClock::Verdict::kFine:
       return true;
     case MessageClock::Verdict::kQuarantined:
-      report(Reason::kClockJump,
+      report(wire::Reason::kClockJump,
              "utime " + std::to_string(utime) + " while it is " + std::to_string(clock_.now()),
              input.channel);
       return false;
     case MessageClock::Verdict::kJumped:
-      log(Level::kWarning, to_string(Reason::kClockJump),
+      log(Level::kWarning, to_string(wire::Reason::kClockJump),
           "time goes on at " + std::to_string(utime), input.channel);
       return start_at_jump();
   }
@@ -129,28 +129,29 @@ bool Node::start_at_jump() {
   return true;
 }
 
-void Node::fire_timers(Utime now) {
+void Node::fire_timers(model::Utime now) {
   for (std::size_t i = 0; i < timers_.size(); ++i) {
     if (timers_[i].due < 0) timers_[i].due = now + timers_[i].period;
     while (timers_[i].due <= now) {
-      const Utime due = timers_[i].due;
+      const model::Utime due = timers_[i].due;
       timers_[i].due += timers_[i].period;
       timers_[i].handler(due);
     }
   }
 }
 
-void Node::send(Output& output, Utime utime, const Bytes& bytes, const WireType& type) {
+void Node::send(Output& output, model::Utime utime, const wire::Bytes& bytes,
+                const wire::WireType& type) {
   if (is_recovering_) return;
   // The same walk as on the way in: nothing that is not finite is ever published.
-  std::optional<Refusal> refusal = check_bytes(bytes, type);
-  if (refusal) refusal = Refusal{Reason::kNotSent, refusal->detail};
+  std::optional<wire::Refusal> refusal = check_bytes(bytes, type);
+  if (refusal) refusal = wire::Refusal{wire::Reason::kNotSent, refusal->detail};
   if (!refusal) refusal = bus_.publish(output.channel, bytes);
   if (refusal) return report(refusal->reason, refusal->detail, output.channel);
   monitor_.count_message(output.health, utime);
 }
 
-void Node::report(Reason reason, std::string_view text, std::string_view channel) {
+void Node::report(wire::Reason reason, std::string_view text, std::string_view channel) {
   monitor_.count_reason(channel, reason, text);
   const std::uint64_t count = ++logged_[{std::string(to_string(reason)), std::string(channel)}];
   // The 1st, 2nd, 4th, 8th ... of a kind: a flood of bad input must not become a flood of LOG.
@@ -170,24 +171,24 @@ void Node::send_log(Level level, std::string_view code, std::string_view text,
                     std::string_view channel) {
   if (is_recovering_) return;
   log_t message{};
-  message.utime = std::max<Utime>(now(), 0);
+  message.utime = std::max<model::Utime>(now(), 0);
   message.seq = log_sequence_++;
   message.process = options_.process;
   message.level = static_cast<std::int8_t>(level);
   message.channel = channel;
   message.code = code;
   message.text = text;
-  bus_.publish("LOG", encode_bytes(message));
+  bus_.publish("LOG", wire::encode_bytes(message));
 }
 
 void Node::publish_config(const std::string& toml) {
   config_t message{};
-  message.utime = std::max<Utime>(now(), 0);
+  message.utime = std::max<model::Utime>(now(), 0);
   message.seq = config_sequence_++;
   message.process = options_.process;
   message.version = options_.version;
   message.toml = toml;
-  bus_.publish("CONFIG", encode_bytes(message));
+  bus_.publish("CONFIG", wire::encode_bytes(message));
 }
 
 health_t Node::health() {
@@ -204,7 +205,7 @@ health_t Node::health() {
 }
 
 void Node::publish_health() {
-  if (options_.publishes_health) bus_.publish("HEALTH", encode_bytes(health()));
+  if (options_.publishes_health) bus_.publish("HEALTH", wire::encode_bytes(health()));
 }
 
 bool Node::takes(std::string_view channel) const {
@@ -225,4 +226,4 @@ const SequenceCounts& Node::sequence_counts(std::string_view channel) const {
   throw std::logic_error(std::string(channel) + " is no input");
 }
 
-}  // namespace understory
+}  // namespace understory::bus

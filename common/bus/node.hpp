@@ -24,7 +24,7 @@
 #include "common/bus/state_store.hpp"
 #include "common/wire/convert.hpp"
 
-namespace understory {
+namespace understory::bus {
 
 class Node;
 
@@ -55,7 +55,7 @@ struct NodeOptions {
   std::string channel_suffix;                ///< Of every output, e.g. _ALT.
   std::vector<std::string> suffixed_inputs;  ///< Inputs that carry the suffix too.
   std::int64_t largest_clock_jump_us = 10000000;
-  Utime snapshot_every_us = 30000000;  ///< Message time.
+  model::Utime snapshot_every_us = 30000000;  ///< Message time.
   int snapshot_every_events = 1000;
   bool publishes_health = true;  ///< HEALTH; LOG and CONFIG are always published.
 };
@@ -77,14 +77,14 @@ class Node {
   template <class T>
   Publisher<T> advertise(const std::string& channel);
   /// Called with the time that is due, in message time: before the message that moves time past it.
-  void every(Utime period_us, std::function<void(Utime)> handler);
+  void every(model::Utime period_us, std::function<void(model::Utime)> handler);
   /// Newest stamp among the inputs; -1 before the first.
-  Utime now() const { return clock_.now(); }
+  model::Utime now() const { return clock_.now(); }
   /// Something a person should read: LOG.
   void log(Level level, std::string_view code, std::string_view text,
            std::string_view channel = "");
   /// Something is wrong: counted for HEALTH, and LOG at a limited rate.
-  void report(Reason reason, std::string_view text, std::string_view channel = "");
+  void report(wire::Reason reason, std::string_view text, std::string_view channel = "");
 
   // For the drivers.
 
@@ -118,7 +118,8 @@ class Node {
  private:
   /// Takes the message's header to `admit`; calls the handler where that agrees.
   using Admit = std::function<bool()>;
-  using Take = std::function<std::optional<Refusal>(std::span<const std::uint8_t>, const Admit&)>;
+  using Take =
+      std::function<std::optional<wire::Refusal>(std::span<const std::uint8_t>, const Admit&)>;
   struct Input {
     std::string channel;
     SubscribeOptions options;
@@ -132,20 +133,21 @@ class Node {
     std::size_t health = 0;
   };
   struct Timer {
-    Utime period = 0;
-    Utime due = -1;
-    std::function<void(Utime)> handler;
+    model::Utime period = 0;
+    model::Utime due = -1;
+    std::function<void(model::Utime)> handler;
   };
 
   void add_input(const std::string& channel, Take take, SubscribeOptions options);
   std::size_t add_output(const std::string& channel);
   void handle(Input& input, const BusMessage& message);
   bool admit(Input& input, const BusMessage& message);
-  bool admit_time(Input& input, Utime utime);
+  bool admit_time(Input& input, model::Utime utime);
   bool start_at_jump();
-  void fire_timers(Utime now);
+  void fire_timers(model::Utime now);
   void snapshot_when_due();
-  void send(Output& output, Utime utime, const Bytes& bytes, const WireType& type);
+  void send(Output& output, model::Utime utime, const wire::Bytes& bytes,
+            const wire::WireType& type);
   void send_log(Level level, std::string_view code, std::string_view text,
                 std::string_view channel);
   std::string save_state() const;
@@ -163,9 +165,9 @@ class Node {
   std::function<void(const std::string&)> load_;
   StateStore* store_ = nullptr;
   bool is_recovering_ = false;
-  Utime snapshot_utime_ = -1;
-  Utime snapshot_tried_ = -1;
-  Utime snapshot_base_ = -1;  // what the snapshot's period counts from
+  model::Utime snapshot_utime_ = -1;
+  model::Utime snapshot_tried_ = -1;
+  model::Utime snapshot_base_ = -1;  // what the snapshot's period counts from
   int events_since_snapshot_ = 0;
   std::int64_t log_sequence_ = 0;
   std::int64_t config_sequence_ = 0;
@@ -177,8 +179,8 @@ void Node::subscribe(const std::string& channel, F handler, SubscribeOptions opt
   add_input(
       channel,
       [handler = std::move(handler)](std::span<const std::uint8_t> bytes,
-                                     const Admit& admit) -> std::optional<Refusal> {
-        const Result<T> value = decode_message<T>(bytes);
+                                     const Admit& admit) -> std::optional<wire::Refusal> {
+        const wire::Result<T> value = wire::decode_message<T>(bytes);
         if (!value) return value.refusal();
         if (admit()) handler(*value);
         return std::nullopt;
@@ -194,16 +196,16 @@ Publisher<T> Node::advertise(const std::string& channel) {
 template <class Wire>
 void Node::publish_wire(std::size_t output, Wire message) {
   message.seq = outputs_[output].next_sequence++;
-  send(outputs_[output], message.utime, encode_bytes(message), wire_type_of<Wire>());
+  send(outputs_[output], message.utime, wire::encode_bytes(message), wire::wire_type_of<Wire>());
 }
 
 template <class T>
 void Publisher<T>::publish(const T& value) const {
-  if constexpr (std::is_same_v<T, typename WireOf<T>::type>) {
+  if constexpr (std::is_same_v<T, typename wire::WireOf<T>::type>) {
     node_->publish_wire(output_, value);
   } else {
-    node_->publish_wire(output_, to_wire(value));
+    node_->publish_wire(output_, wire::to_wire(value));
   }
 }
 
-}  // namespace understory
+}  // namespace understory::bus

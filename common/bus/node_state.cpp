@@ -5,7 +5,7 @@
 
 #include "common/bus/node.hpp"
 
-namespace understory {
+namespace understory::bus {
 
 void Node::keep_state(std::function<std::string()> save,
                       std::function<void(const std::string&)> load) {
@@ -32,7 +32,7 @@ void Node::load_state(const std::string& state) {
   std::istringstream in(state);
   std::string word;
   int version = 0;
-  Utime now = -1;
+  model::Utime now = -1;
   std::size_t inputs = 0;
   std::size_t outputs = 0;
   std::size_t timers = 0;
@@ -72,12 +72,12 @@ bool Node::recover(StateStore& store) {
     if (recovered.snapshot) load_state(*recovered.snapshot);
     for (const JournalEvent& event : recovered.events) feed({event.channel, event.bytes, 0});
   } catch (const std::exception& error) {
-    recovered.problems.push_back({Reason::kSnapshotDamaged, error.what()});
+    recovered.problems.push_back({wire::Reason::kSnapshotDamaged, error.what()});
     is_loaded = false;
   }
   is_recovering_ = false;
   store.end_recovery();
-  for (const Refusal& problem : recovered.problems) report(problem.reason, problem.detail);
+  for (const wire::Refusal& problem : recovered.problems) report(problem.reason, problem.detail);
   if (is_loaded && (recovered.snapshot || !recovered.events.empty())) {
     log(Level::kInfo, "recovered",
         "state of utime " + std::to_string(snapshot_utime_) + " and " +
@@ -95,7 +95,7 @@ void Node::save_snapshot() {
       return report(refusal->reason, refusal->detail);
     }
   } catch (const std::exception& error) {
-    return report(Reason::kStateNotKept, error.what());
+    return report(wire::Reason::kStateNotKept, error.what());
   }
   snapshot_utime_ = snapshot_base_ = now();
   events_since_snapshot_ = 0;
@@ -105,7 +105,7 @@ void Node::snapshot_when_due() {
   if (store_ == nullptr || events_since_snapshot_ == 0) return;
   if (snapshot_base_ < 0 || snapshot_base_ > now()) snapshot_base_ = now();
   // After a failure (a full disk, say) it is tried again once a second, not at every event.
-  constexpr Utime kRetryUs = 1000000;
+  constexpr model::Utime kRetryUs = 1000000;
   const bool has_waited = snapshot_tried_ < 0 || now() - snapshot_tried_ >= kRetryUs;
   const bool is_due = events_since_snapshot_ >= options_.snapshot_every_events ||
                       now() - snapshot_base_ >= options_.snapshot_every_us ||
@@ -113,4 +113,4 @@ void Node::snapshot_when_due() {
   if (is_due && has_waited) save_snapshot();
 }
 
-}  // namespace understory
+}  // namespace understory::bus

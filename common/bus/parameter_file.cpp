@@ -11,7 +11,7 @@
 
 #include "common/bus/parameter_table.hpp"
 
-namespace understory {
+namespace understory::bus {
 namespace {
 
 /// Levenshtein's distance.
@@ -65,8 +65,9 @@ struct Setting {
 
 class Loader {
  public:
-  Loader(const std::vector<ParameterTable::Entry>& entries, std::string name)
-      : entries_(entries), name_(std::move(name)) {}
+  Loader(const std::vector<ParameterTable::Entry>& entries,
+         const std::vector<ParameterTable::Renamed>& renamed, std::string name)
+      : entries_(entries), renamed_(renamed), name_(std::move(name)) {}
 
   void walk(const toml::table& table, const std::string& prefix) {
     for (const auto& [key, node] : table) {
@@ -76,6 +77,8 @@ class Loader {
         take(*entry, node);
       } else if (const toml::table* inner = node.as_table(); inner != nullptr && is_table(path)) {
         walk(*inner, path + ".");
+      } else if (const std::string now = new_key(path); !now.empty()) {
+        problem(node, path, "is now called " + now);
       } else {
         problem(node, path, "unknown key; the nearest valid one is " + nearest_key(path, entries_));
       }
@@ -94,8 +97,26 @@ class Loader {
     return found == entries_.end() ? nullptr : &*found;
   }
   bool is_table(const std::string& path) const {
+    const auto is_inside = [&](const std::string& key) { return key.starts_with(path + "."); };
     return std::any_of(entries_.begin(), entries_.end(),
-                       [&](const auto& entry) { return entry.key.rfind(path + ".", 0) == 0; });
+                       [&](const auto& entry) { return is_inside(entry.key); }) ||
+           std::any_of(renamed_.begin(), renamed_.end(),
+                       [&](const auto& old) { return old.key.empty() && is_inside(old.old_name); });
+  }
+
+  /// What a key of an older version is called now; empty where it was never one. The longest rule
+  /// holds: a key that was renamed within a renamed table has a rule of its own.
+  std::string new_key(const std::string& path) const {
+    const ParameterTable::Renamed* best = nullptr;
+    for (const ParameterTable::Renamed& rule : renamed_) {
+      const bool is_whole_table = rule.old_name.ends_with('.');
+      const bool fits = is_whole_table ? path.starts_with(rule.old_name) : path == rule.old_name;
+      if (!rule.key.empty() || !fits) continue;
+      if (best == nullptr || rule.old_name.size() > best->old_name.size()) best = &rule;
+    }
+    if (best == nullptr) return {};
+    if (!best->old_name.ends_with('.')) return best->new_name;
+    return best->new_name + path.substr(best->old_name.size());
   }
 
   void problem(const toml::node& node, const std::string& key, const std::string& what) {
@@ -136,7 +157,12 @@ class Loader {
     const std::string& value = node.as_string()->get();
     const auto& choices = target.choices;
     if (!choices.empty() && std::find(choices.begin(), choices.end(), value) == choices.end()) {
-      return refuse(entry, node, "is not known");
+      const auto rule = std::find_if(renamed_.begin(), renamed_.end(), [&](const auto& old) {
+        return old.key == entry.key && old.old_name == value;
+      });
+      if (rule == renamed_.end()) return refuse(entry, node, "is not known");
+      return problem(node, entry.key,
+                     fmt::format("\"{}\" is now called \"{}\"", value, rule->new_name));
     }
     settings_.push_back({&entry, value});
   }
@@ -151,6 +177,7 @@ class Loader {
   }
 
   const std::vector<ParameterTable::Entry>& entries_;
+  const std::vector<ParameterTable::Renamed>& renamed_;
   std::string name_;
   std::vector<std::string> problems_;
   std::vector<Setting> settings_;
@@ -179,9 +206,9 @@ void ParameterTable::load_text(std::string_view toml, const std::string& name) {
     throw ConfigurationError(
         {fmt::format("{}:{}: {}", name, error.source().begin.line, error.description())});
   }
-  Loader loader(entries_, name);
+  Loader loader(entries_, renamed_, name);
   loader.walk(table, "");
   loader.finish();
 }
 
-}  // namespace understory
+}  // namespace understory::bus

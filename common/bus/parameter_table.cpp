@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace understory {
+namespace understory::bus {
 namespace {
 
 template <class... F>
@@ -88,6 +88,14 @@ std::string allowed(const ParameterTable::Entry& entry) {
       entry.target);
 }
 
+void ParameterTable::renamed(std::string old_key, std::string new_key) {
+  renamed_.push_back({"", std::move(old_key), std::move(new_key)});
+}
+void ParameterTable::renamed_choice(std::string key, std::string old_choice,
+                                    std::string new_choice) {
+  renamed_.push_back({std::move(key), std::move(old_choice), std::move(new_choice)});
+}
+
 void ParameterTable::check_is_new(const std::string& key) const {
   for (const Entry& entry : entries_) {
     if (entry.key == key) throw std::logic_error("parameter " + key + " is described twice");
@@ -154,4 +162,4 @@ std::string ParameterTable::help() const {
   return text;
 }
 
-}  // namespace understory
+}  // namespace understory::bus

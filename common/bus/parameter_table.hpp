@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-namespace understory {
+namespace understory::bus {
 
 /// What is wrong with a configuration, one line each: file:line: key: what, and what is allowed.
 class ConfigurationError : public std::runtime_error {
@@ -58,10 +58,23 @@ class ParameterTable {
     std::variant<Number, Integer, Boolean, Text> target;
   };
 
+  /// What an older version called `new_name`: a key, or a choice of the text parameter `key`.
+  struct Renamed {
+    std::string key;  ///< Empty where the key itself was renamed.
+    std::string old_name;
+    std::string new_name;
+  };
+
   void add(std::string key, double& value, Range<double> range, std::string unit, std::string doc);
   void add(std::string key, int& value, Range<int> range, std::string unit, std::string doc);
   void add(std::string key, bool& value, std::string doc);
   void add(std::string key, std::string& value, std::vector<std::string> choices, std::string doc);
+
+  /// A key of an older version, which is refused with the new one in the message. Both may end in
+  /// "." and then stand for all keys of a TOML table.
+  void renamed(std::string old_key, std::string new_key);
+  /// The same of a choice of a text parameter.
+  void renamed_choice(std::string key, std::string old_choice, std::string new_choice);
 
   const std::vector<Entry>& entries() const { return entries_; }
 
@@ -80,11 +93,12 @@ class ParameterTable {
   void check_is_new(const std::string& key) const;
 
   std::vector<Entry> entries_;
+  std::vector<Renamed> renamed_;
 };
 
-/// "0.5", "true", "\"ours\"": the value as TOML, shortest form that reads back the same.
+/// "0.5", "true", "\"joint\"": the value as TOML, shortest form that reads back the same.
 std::string value_as_toml(const ParameterTable::Entry& entry);
 /// "0 .. 10 m", "one of \"a\", \"b\"", "true or false".
 std::string allowed(const ParameterTable::Entry& entry);
 
-}  // namespace understory
+}  // namespace understory::bus

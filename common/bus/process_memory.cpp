@@ -2,7 +2,7 @@
 
 #include <malloc.h>
 
-namespace understory {
+namespace understory::bus {
 
 void keep_freed_memory() {
   constexpr int kBytes = 64 << 20;
@@ -10,4 +10,4 @@ void keep_freed_memory() {
   ::mallopt(M_TRIM_THRESHOLD, 2 * kBytes);
 }
 
-}  // namespace understory
+}  // namespace understory::bus

@@ -9,7 +9,7 @@
 #include "understory/config_t.hpp"
 #include "understory/log_t.hpp"
 
-namespace understory {
+namespace understory::bus {
 namespace {
 
 std::string read_if_there(const std::filesystem::path& file) {
@@ -79,7 +79,7 @@ class Replay {
     }
   }
 
-  void take(const LogEvent& event) {
+  void take(const io::LogEvent& event) {
     if (is_own_output(event)) {
       ++report_.left_out;
       return;
@@ -96,7 +96,7 @@ class Replay {
   }
 
   /// A recorded output of a hosted service, or what it said about itself.
-  bool is_own_output(const LogEvent& event) const {
+  bool is_own_output(const io::LogEvent& event) const {
     if (outputs_.contains(event.channel)) return true;
     if (event.channel == "HEALTH") return is_from_hosted<health_t>(event);
     if (event.channel == "LOG") return is_from_hosted<log_t>(event);
@@ -104,8 +104,8 @@ class Replay {
     return false;
   }
   template <class Message>
-  bool is_from_hosted(const LogEvent& event) const {
-    const auto message = decode_bytes<Message>(event.data);
+  bool is_from_hosted(const io::LogEvent& event) const {
+    const auto message = wire::decode_bytes<Message>(event.data);
     return message && names_.contains(message->process);
   }
 
@@ -121,8 +121,8 @@ class Replay {
   }
 
   const ReplayOptions& options_;
-  LcmLogReader reader_;
-  std::optional<LcmLogWriter> writer_;
+  io::LcmLogReader reader_;
+  std::optional<io::LcmLogWriter> writer_;
   MemoryBus bus_;
   std::vector<std::unique_ptr<HostedService>> hosted_;
   std::set<std::string, std::less<>> outputs_;
@@ -136,4 +136,4 @@ class Replay {
 
 ReplayReport replay(const ReplayOptions& options) { return Replay(options).run(); }
 
-}  // namespace understory
+}  // namespace understory::bus

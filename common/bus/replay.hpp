@@ -10,7 +10,7 @@
 #include "common/bus/service.hpp"
 #include "understory/health_t.hpp"
 
-namespace understory {
+namespace understory::bus {
 
 struct ReplayOptions {
   std::filesystem::path log;
@@ -41,4 +41,4 @@ struct ReplayReport {
 /// at all. Throws LogError, ConfigurationError.
 ReplayReport replay(const ReplayOptions& options);
 
-}  // namespace understory
+}  // namespace understory::bus

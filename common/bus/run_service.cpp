@@ -12,7 +12,7 @@
 #include "common/bus/service.hpp"
 #include "common/bus/split_bus.hpp"
 
-namespace understory {
+namespace understory::bus {
 namespace {
 
 constexpr int kDone = 0;
@@ -59,35 +59,35 @@ class StopSignal {
 };
 
 /// Says how the process is, once a second and when that changes.
-class HealthTeller {
+class HealthReporter {
  public:
-  HealthTeller(Node& node, const Clock& clock) : node_(node), clock_(clock) {}
-  void tell_when_due() {
+  HealthReporter(Node& node, const Clock& clock) : node_(node), clock_(clock) {}
+  void report_when_due() {
     const std::int64_t now = clock_.monotonic_us();
-    const bool has_changed = node_.monitor().state() != told_;
-    if (now - told_us_ < (has_changed ? kHealthChangeUs : kHealthPeriodUs)) return;
+    const bool has_changed = node_.monitor().state() != reported_;
+    if (now - reported_us_ < (has_changed ? kHealthChangeUs : kHealthPeriodUs)) return;
     tell();
   }
   void tell() {
-    told_us_ = clock_.monotonic_us();
-    told_ = node_.monitor().state();
+    reported_us_ = clock_.monotonic_us();
+    reported_ = node_.monitor().state();
     node_.publish_health();
   }
   int milliseconds_left() const {
-    const std::int64_t left = told_us_ + kHealthPeriodUs - clock_.monotonic_us();
+    const std::int64_t left = reported_us_ + kHealthPeriodUs - clock_.monotonic_us();
     return static_cast<int>(std::clamp<std::int64_t>(left / 1000 + 1, 1, 1000));
   }
 
  private:
   Node& node_;
   const Clock& clock_;
-  std::int64_t told_us_ = -kHealthPeriodUs;
-  std::int8_t told_ = -1;
+  std::int64_t reported_us_ = -kHealthPeriodUs;
+  std::int8_t reported_ = -1;
 };
 
 void run_until_stopped(HostedService& hosted, Bus& bus, StopSignal& stop, const Clock& clock) {
   Node& node = hosted.node();
-  HealthTeller health(node, clock);
+  HealthReporter health(node, clock);
   auto* const device = dynamic_cast<Device*>(&hosted.adapter());
   std::vector<pollfd> files = {{bus.file_descriptor(), POLLIN, 0},
                                {stop.file_descriptor(), POLLIN, 0}};
@@ -96,7 +96,7 @@ void run_until_stopped(HostedService& hosted, Bus& bus, StopSignal& stop, const 
   }
   while (!stop.has_come()) {
     if (device != nullptr) device->attend(clock.monotonic_us());
-    health.tell_when_due();
+    health.report_when_due();
     if (bus.handle_one(0)) continue;
     const int wait_ms = device != nullptr ? device->wait_ms() : health.milliseconds_left();
     ::poll(files.data(), files.size(), std::min(wait_ms, health.milliseconds_left()));
@@ -159,16 +159,17 @@ int serve(const Service& service, const Options& options) {
     if (!hosted->node().recover(*store)) {
       store->start_over();
       hosted = make_hosted(service, bus, clock, toml, options);
-      hosted->node().report(Reason::kSnapshotDamaged, "the state cannot be used; starting fresh");
+      hosted->node().report(wire::Reason::kSnapshotDamaged,
+                            "the state cannot be used; starting fresh");
     }
     hosted->node().journal_to(store.get());
   }
   Node& node = hosted->node();
   const ReceiveBuffer buffer = bus.receive_buffer();
   if (buffer.granted_bytes < buffer.wanted_bytes) {
-    node.report(Reason::kReceiveBufferSmall, std::to_string(buffer.granted_bytes) + " of " +
-                                                 std::to_string(buffer.wanted_bytes) +
-                                                 " bytes granted: raise net.core.rmem_max");
+    node.report(wire::Reason::kReceiveBufferSmall, std::to_string(buffer.granted_bytes) + " of " +
+                                                       std::to_string(buffer.wanted_bytes) +
+                                                       " bytes granted: raise net.core.rmem_max");
   }
   if (auto* const device = dynamic_cast<Device*>(&hosted->adapter())) device->open();
   node.connect();
@@ -213,4 +214,4 @@ int run_service(const Service& service, int argc, char** argv) {
   }
 }
 
-}  // namespace understory
+}  // namespace understory::bus

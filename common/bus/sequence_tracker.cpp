@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace understory {
+namespace understory::bus {
 namespace {
 
 /// No sender loses so many at once; a larger step is another sequence (or a hostile number).
@@ -65,4 +65,4 @@ void SequenceTracker::resume(std::int64_t newest_sequence, std::int64_t newest_u
   had_.set();
 }
 
-}  // namespace understory
+}  // namespace understory::bus

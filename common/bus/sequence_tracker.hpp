@@ -4,7 +4,7 @@
 #include <bitset>
 #include <cstdint>
 
-namespace understory {
+namespace understory::bus {
 
 enum class Arrival : std::uint8_t {
   kFirst,      ///< Of this channel, or of a sender that started again.
@@ -47,4 +47,4 @@ class SequenceTracker {
   SequenceCounts counts_;
 };
 
-}  // namespace understory
+}  // namespace understory::bus

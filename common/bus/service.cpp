@@ -2,7 +2,7 @@
 
 #include <sstream>
 
-namespace understory {
+namespace understory::bus {
 namespace {
 
 std::vector<std::string> split_at_commas(const std::string& text) {
@@ -42,8 +42,8 @@ NodeOptions node_options(const std::string& process, const RuntimeParameters& pa
   options.version = program_version();
   options.channel_suffix = parameters.channel_suffix;
   options.suffixed_inputs = split_at_commas(parameters.suffixed_inputs);
-  options.largest_clock_jump_us = static_cast<Utime>(parameters.largest_clock_jump_s * 1e6);
-  options.snapshot_every_us = static_cast<Utime>(parameters.snapshot_every_s * 1e6);
+  options.largest_clock_jump_us = static_cast<model::Utime>(parameters.largest_clock_jump_s * 1e6);
+  options.snapshot_every_us = static_cast<model::Utime>(parameters.snapshot_every_s * 1e6);
   options.snapshot_every_events = parameters.snapshot_every_events;
   return options;
 }
@@ -62,4 +62,4 @@ HostedService::HostedService(const Service& service, Bus& bus, const Clock& cloc
                     [this](const std::string& state) { adapter_->load(state); });
 }
 
-}  // namespace understory
+}  // namespace understory::bus

@@ -9,7 +9,7 @@
 #include "common/bus/node.hpp"
 #include "common/bus/parameter_table.hpp"
 
-namespace understory {
+namespace understory::bus {
 
 /// Between a stage and its channels: decodes nothing, computes nothing, only passes on.
 class Adapter {
@@ -75,4 +75,4 @@ class HostedService {
 /// exit status: 0 done, 1 failed, 2 wrong usage or configuration. To be called from main().
 int run_service(const Service& service, int argc, char** argv);
 
-}  // namespace understory
+}  // namespace understory::bus

@@ -11,7 +11,7 @@
 
 #include "common/bus/live_bus.hpp"
 
-namespace understory {
+namespace understory::bus {
 namespace {
 
 void watch(int epoll, int file) {
@@ -27,8 +27,8 @@ class PacedBus : public Bus {
   PacedBus(std::unique_ptr<Bus> bus, double bytes_per_s)
       : bus_(std::move(bus)), bytes_per_s_(bytes_per_s) {}
 
-  std::optional<Refusal> publish(std::string_view channel,
-                                 std::span<const std::uint8_t> bytes) override {
+  std::optional<wire::Refusal> publish(std::string_view channel,
+                                       std::span<const std::uint8_t> bytes) override {
     std::this_thread::sleep_until(free_);
     const auto taken =
         std::chrono::duration<double>(static_cast<double>(bytes.size()) / bytes_per_s_);
@@ -87,8 +87,8 @@ Bus& SplitBus::bus_of(std::string_view channel) {
   return is_bulk_channel(channel) ? bulk() : *main_;
 }
 
-std::optional<Refusal> SplitBus::publish(std::string_view channel,
-                                         std::span<const std::uint8_t> bytes) {
+std::optional<wire::Refusal> SplitBus::publish(std::string_view channel,
+                                               std::span<const std::uint8_t> bytes) {
   return bus_of(channel).publish(channel, bytes);
 }
 
@@ -99,9 +99,9 @@ void SplitBus::subscribe(std::string_view channel, std::size_t queue_size, Handl
 bool SplitBus::handle_one(int timeout_ms) {
   if (!bulk_) return main_->handle_one(timeout_ms);
   const auto try_both = [&] {
-    Bus& first = bulk_turn_ ? *bulk_ : *main_;
-    Bus& second = bulk_turn_ ? *main_ : *bulk_;
-    bulk_turn_ = !bulk_turn_;
+    Bus& first = bulk_slot_ ? *bulk_ : *main_;
+    Bus& second = bulk_slot_ ? *main_ : *bulk_;
+    bulk_slot_ = !bulk_slot_;
     return first.handle_one(0) || second.handle_one(0);
   };
   if (try_both()) return true;
@@ -125,4 +125,4 @@ std::unique_ptr<Bus> make_live_bus(const std::string& url, double bulk_bytes_per
       });
 }
 
-}  // namespace understory
+}  // namespace understory::bus

@@ -8,7 +8,7 @@
 
 #include "common/bus/bus.hpp"
 
-namespace understory {
+namespace understory::bus {
 
 /// Whether a channel carries bulk: RAW_SWEEP and LIDAR_SWEEP, with any suffix.
 bool is_bulk_channel(std::string_view channel);
@@ -24,8 +24,8 @@ class SplitBus : public Bus {
   SplitBus(std::unique_ptr<Bus> main, MakeBus make_bulk);
   ~SplitBus() override;
 
-  std::optional<Refusal> publish(std::string_view channel,
-                                 std::span<const std::uint8_t> bytes) override;
+  std::optional<wire::Refusal> publish(std::string_view channel,
+                                       std::span<const std::uint8_t> bytes) override;
   void subscribe(std::string_view channel, std::size_t queue_size, Handler handler) override;
   bool handle_one(int timeout_ms) override;
   std::uint64_t dropped(std::string_view channel) const override;
@@ -40,11 +40,11 @@ class SplitBus : public Bus {
   MakeBus make_bulk_;
   std::unique_ptr<Bus> bulk_;
   int epoll_ = -1;
-  bool bulk_turn_ = false;  ///< Which one is asked first: a flood on one must not starve the other.
+  bool bulk_slot_ = false;  ///< Which one is asked first: a flood on one must not starve the other.
 };
 
 /// Both groups of a live system: LiveBus for `url` and for the bulk beside it, the latter paced at
 /// `bulk_bytes_per_s` so that a burst fits into the receivers' socket buffers. Throws BusError.
 std::unique_ptr<Bus> make_live_bus(const std::string& url, double bulk_bytes_per_s = 60e6);
 
-}  // namespace understory
+}  // namespace understory::bus

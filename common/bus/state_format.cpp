@@ -1,6 +1,6 @@
 #include "common/bus/state_format.hpp"
 
-namespace understory {
+namespace understory::bus {
 namespace {
 
 constexpr std::string_view kSnapshotMagic = "understory-snapshot";
@@ -43,8 +43,10 @@ std::string encode_snapshot(std::uint64_t generation, std::string_view state) {
   return out;
 }
 
-Result<Snapshot> decode_snapshot(std::string_view bytes) {
-  const auto damaged = [](const char* what) { return Refusal{Reason::kSnapshotDamaged, what}; };
+wire::Result<Snapshot> decode_snapshot(std::string_view bytes) {
+  const auto damaged = [](const char* what) {
+    return wire::Refusal{wire::Reason::kSnapshotDamaged, what};
+  };
   if (bytes.size() < kSnapshotMagic.size() + 36) return damaged("too short");
   const std::string_view covered = bytes.substr(0, bytes.size() - 8);
   std::string_view tail = bytes.substr(bytes.size() - 8);
@@ -110,4 +112,4 @@ JournalContent decode_journal(std::string_view bytes) {
   return content;
 }
 
-}  // namespace understory
+}  // namespace understory::bus

@@ -9,7 +9,7 @@
 
 #include "common/bus/state_store.hpp"
 
-namespace understory {
+namespace understory::bus {
 
 /// FNV-1a, 64 bit: tells damage, not malice.
 std::uint64_t checksum(std::string_view bytes);
@@ -20,7 +20,7 @@ struct Snapshot {
   std::uint64_t generation = 0;
   std::string state;
 };
-Result<Snapshot> decode_snapshot(std::string_view bytes);
+wire::Result<Snapshot> decode_snapshot(std::string_view bytes);
 
 /// length, checksum, channel length, channel, data.
 std::string encode_event(std::string_view channel, std::span<const std::uint8_t> bytes);
@@ -32,4 +32,4 @@ struct JournalContent {
 };
 JournalContent decode_journal(std::string_view bytes);
 
-}  // namespace understory
+}  // namespace understory::bus

@@ -11,7 +11,7 @@
 
 #include "common/bus/state_format.hpp"
 
-namespace understory {
+namespace understory::bus {
 namespace {
 
 namespace fs = std::filesystem;
@@ -28,8 +28,9 @@ std::optional<std::string> read_file(const fs::path& file) {
   return text.str();
 }
 
-Refusal not_kept(const fs::path& file) {
-  return {Reason::kStateNotKept, file.string() + ": " + std::system_category().message(errno)};
+wire::Refusal not_kept(const fs::path& file) {
+  return {wire::Reason::kStateNotKept,
+          file.string() + ": " + std::system_category().message(errno)};
 }
 
 bool write_all(int file, std::string_view bytes) {
@@ -43,12 +44,12 @@ bool write_all(int file, std::string_view bytes) {
 }
 
 /// Whole or not at all: the name points to the old content until the new one is on the device.
-std::optional<Refusal> replace_file(const fs::path& file, std::string_view bytes) {
+std::optional<wire::Refusal> replace_file(const fs::path& file, std::string_view bytes) {
   const fs::path temporary = file.string() + ".new";
   const int out = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (out < 0) return not_kept(temporary);
   const bool is_whole = write_all(out, bytes) && ::fdatasync(out) == 0;
-  std::optional<Refusal> refusal;
+  std::optional<wire::Refusal> refusal;
   if (!is_whole) refusal = not_kept(temporary);
   ::close(out);
   if (!refusal && ::rename(temporary.c_str(), file.c_str()) != 0) refusal = not_kept(file);
@@ -81,8 +82,8 @@ void StateStore::refuse_what_killed_before(Recovered& recovered) {
   if (attempts >= kAttemptsWithSnapshot) {
     put_aside(path(".snapshot"));
     recovered.problems.push_back(
-        {Reason::kSnapshotDamaged, path(".snapshot").string() + ": recovery with it died " +
-                                       std::to_string(attempts) + " times, put aside"});
+        {wire::Reason::kSnapshotDamaged, path(".snapshot").string() + ": recovery with it died " +
+                                             std::to_string(attempts) + " times, put aside"});
   }
   if (attempts >= kAttemptsWithJournal) {
     std::error_code ignored;
@@ -93,8 +94,8 @@ void StateStore::refuse_what_killed_before(Recovered& recovered) {
       }
     }
     recovered.problems.push_back(
-        {Reason::kJournalDamaged, directory_.string() + ": recovery with the journal died " +
-                                      std::to_string(attempts) + " times, put aside"});
+        {wire::Reason::kJournalDamaged, directory_.string() + ": recovery with the journal died " +
+                                            std::to_string(attempts) + " times, put aside"});
   }
   replace_file(path(".recovering"), std::to_string(attempts + 1));
 }
@@ -126,8 +127,8 @@ StateStore::Recovered StateStore::open() {
     valid_bytes = content.valid_bytes;
     recovered.events = std::move(content.events);
     if (content.is_damaged) {
-      recovered.problems.push_back(
-          {Reason::kJournalDamaged, journal_path(generation_).string() + ": damaged behind byte " +
+      recovered.problems.push_back({wire::Reason::kJournalDamaged,
+                                    journal_path(generation_).string() + ": damaged behind byte " +
                                         std::to_string(valid_bytes) + "; going on with the " +
                                         std::to_string(recovered.events.size()) +
                                         " events before"});
@@ -138,7 +139,7 @@ StateStore::Recovered StateStore::open() {
   return recovered;
 }
 
-std::optional<Refusal> StateStore::open_journal(std::uint64_t valid_bytes) {
+std::optional<wire::Refusal> StateStore::open_journal(std::uint64_t valid_bytes) {
   if (journal_ >= 0) ::close(journal_);
   const fs::path file = journal_path(generation_);
   journal_ = ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
@@ -167,14 +168,15 @@ void StateStore::start_over() {
   open_journal(0);
 }
 
-std::optional<Refusal> StateStore::append(std::string_view channel,
-                                          std::span<const std::uint8_t> bytes) {
+std::optional<wire::Refusal> StateStore::append(std::string_view channel,
+                                                std::span<const std::uint8_t> bytes) {
   if (journal_broken_) {
-    return Refusal{Reason::kStateNotKept, directory_.string() + ": the journal has a hole"};
+    return wire::Refusal{wire::Reason::kStateNotKept,
+                         directory_.string() + ": the journal has a hole"};
   }
   const std::string event = encode_event(channel, bytes);
   if (!write_all(journal_, event)) {
-    const Refusal refusal = not_kept(journal_path(generation_));
+    const wire::Refusal refusal = not_kept(journal_path(generation_));
     journal_broken_ = true;
     return refusal;
   }
@@ -182,7 +184,7 @@ std::optional<Refusal> StateStore::append(std::string_view channel,
   return std::nullopt;
 }
 
-std::optional<Refusal> StateStore::save(std::string_view state) {
+std::optional<wire::Refusal> StateStore::save(std::string_view state) {
   if (auto refusal = replace_file(path(".snapshot"), encode_snapshot(generation_ + 1, state))) {
     return refusal;
   }
@@ -193,4 +195,4 @@ std::optional<Refusal> StateStore::save(std::string_view state) {
   return refusal;
 }
 
-}  // namespace understory
+}  // namespace understory::bus

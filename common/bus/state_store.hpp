@@ -12,7 +12,7 @@
 
 #include "common/wire/result.hpp"
 
-namespace understory {
+namespace understory::bus {
 
 struct JournalEvent {
   std::string channel;
@@ -33,8 +33,8 @@ class StateStore {
 
   struct Recovered {
     std::optional<std::string> snapshot;
-    std::vector<JournalEvent> events;  ///< Since the snapshot, in order.
-    std::vector<Refusal> problems;     ///< What was damaged and is lost.
+    std::vector<JournalEvent> events;     ///< Since the snapshot, in order.
+    std::vector<wire::Refusal> problems;  ///< What was damaged and is lost.
   };
   /// Reads what is there and starts to journal behind it. When earlier recoveries died on the way
   /// (begin_recovery without end_recovery), the journal is put aside, later the snapshot too.
@@ -44,9 +44,10 @@ class StateStore {
   /// Puts everything aside and starts empty.
   void start_over();
 
-  std::optional<Refusal> append(std::string_view channel, std::span<const std::uint8_t> bytes);
+  std::optional<wire::Refusal> append(std::string_view channel,
+                                      std::span<const std::uint8_t> bytes);
   /// Takes the place of the snapshot before and of its journal.
-  std::optional<Refusal> save(std::string_view state);
+  std::optional<wire::Refusal> save(std::string_view state);
 
   /// After a failed append the journal has a hole: only a snapshot makes the state whole again.
   bool needs_snapshot() const { return journal_broken_; }
@@ -57,7 +58,7 @@ class StateStore {
   std::filesystem::path journal_path(std::uint64_t generation) const;
   void put_aside(const std::filesystem::path& file);
   void refuse_what_killed_before(Recovered& recovered);
-  std::optional<Refusal> open_journal(std::uint64_t valid_bytes);
+  std::optional<wire::Refusal> open_journal(std::uint64_t valid_bytes);
   void remove_other_journals();
 
   std::filesystem::path directory_;
@@ -68,4 +69,4 @@ class StateStore {
   bool journal_broken_ = false;
 };
 
-}  // namespace understory
+}  // namespace understory::bus

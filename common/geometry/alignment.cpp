@@ -3,7 +3,7 @@
 #include <cassert>
 #include <cmath>
 
-namespace understory {
+namespace understory::geometry {
 
 void RigidAlignment2::add(const Eigen::Vector2d& a, const Eigen::Vector2d& b, double weight) {
   weight_ += weight;
@@ -31,4 +31,4 @@ SE2 align_rigid(std::span<const Eigen::Vector2d> a, std::span<const Eigen::Vecto
   return sums.a_T_b();
 }
 
-}  // namespace understory
+}  // namespace understory::geometry

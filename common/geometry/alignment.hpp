@@ -5,7 +5,7 @@
 
 #include "common/geometry/se2.hpp"
 
-namespace understory {
+namespace understory::geometry {
 
 /// Weighted sums over point pairs, from which the best rigid motion follows in closed form (Umeyama
 /// 1991 without scale). Pairs can be added and taken away one by one; each costs a dozen flops.
@@ -30,4 +30,4 @@ class RigidAlignment2 {
 /// == b.size().
 SE2 align_rigid(std::span<const Eigen::Vector2d> a, std::span<const Eigen::Vector2d> b);
 
-}  // namespace understory
+}  // namespace understory::geometry

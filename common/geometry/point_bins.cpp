@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace understory {
+namespace understory::geometry {
 
 PointBins::PointBins(std::span<const Eigen::Vector2d> points, double bin_m) {
   if (points.empty()) return;
@@ -37,4 +37,4 @@ PointBins::PointBins(std::span<const Eigen::Vector2d> points, double bin_m) {
   }
 }
 
-}  // namespace understory
+}  // namespace understory::geometry

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace understory {
+namespace understory::geometry {
 
 /// A counting-sort grid over a fixed set of points. Building costs O(n + bins).
 class PointBins {
@@ -49,4 +49,4 @@ class PointBins {
   std::vector<Eigen::Vector2d> points_;  ///< In order of bins.
 };
 
-}  // namespace understory
+}  // namespace understory::geometry

@@ -7,7 +7,7 @@
 
 #include "common/geometry/point_bins.hpp"
 
-namespace understory {
+namespace understory::geometry {
 namespace {
 
 using Points = std::span<const UncertainPoint>;
@@ -125,7 +125,7 @@ class Registrar {
         const Eigen::Vector2d error =
             b.position_m - to_observed * (a.position_m - pose.translation());
         Eigen::Matrix<double, 2, 3> jacobian;
-        jacobian << Eigen::Matrix2d::Identity(), turned_left(b.position_m);
+        jacobian << Eigen::Matrix2d::Identity(), perpendicular(b.position_m);
         hessian.noalias() += weight * jacobian.transpose() * jacobian;
         gradient.noalias() += weight * jacobian.transpose() * error;
       }
@@ -164,7 +164,7 @@ Registration register_step(Points reference, Points observed, const SE2& last, c
   Registration best =
       register_points(reference, observed, {last * last_step, covariance}, parameters);
   if (fits(best)) return best;
-  const int steps = static_cast<int>(std::ceil(model.max_turn_rad / model.sigma_rad));
+  const int steps = static_cast<int>(std::ceil(model.max_rotation_rad / model.sigma_rad));
   for (int step = -steps; step <= steps; ++step) {
     const SE2 turned = last * SE2(0.0, 0.0, step * model.sigma_rad);
     Registration tried = register_points(reference, observed, {turned, covariance}, parameters);
@@ -174,4 +174,4 @@ Registration register_step(Points reference, Points observed, const SE2& last, c
   return best;
 }
 
-}  // namespace understory
+}  // namespace understory::geometry

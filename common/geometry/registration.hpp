@@ -8,7 +8,7 @@
 
 #include "common/geometry/se2.hpp"
 
-namespace understory {
+namespace understory::geometry {
 
 /// A point with isotropic position variance [m^2].
 struct UncertainPoint {
@@ -55,7 +55,7 @@ Registration register_points(std::span<const UncertainPoint> reference,
 struct StepModel {
   double sigma_m = 0.3;
   double sigma_rad = 0.04;
-  double max_turn_rad = 0.5;  ///< Largest turn that is searched.
+  double max_rotation_rad = 0.5;  ///< Largest turn that is searched.
   /// A turn that was searched needs so many pairs: among 27 tried, four points fit one by chance.
   std::size_t min_searched_pairs = 8;
 };
@@ -69,4 +69,4 @@ Registration register_step(std::span<const UncertainPoint> reference,
                            const RegistrationParameters& parameters,
                            const std::function<bool(const Registration&)>& fits);
 
-}  // namespace understory
+}  // namespace understory::geometry

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace understory {
+namespace understory::geometry {
 namespace {
 
 constexpr double kSmallAngle = 1e-5;
@@ -88,4 +88,4 @@ SE2WithCovariance inverse(const SE2WithCovariance& a_T_b) {
   return {a_T_b.mean.inverse(), adjoint * a_T_b.covariance * adjoint.transpose()};
 }
 
-}  // namespace understory
+}  // namespace understory::geometry

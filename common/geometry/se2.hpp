@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-namespace understory {
+namespace understory::geometry {
 
 /// The angle in (-pi, pi] that is equal to `angle_rad` modulo 2 pi.
 double wrap_angle(double angle_rad);
@@ -63,6 +63,6 @@ SE2WithCovariance compound(const SE2WithCovariance& a_T_b, const SE2WithCovarian
 SE2WithCovariance inverse(const SE2WithCovariance& a_T_b);
 
 /// S with S * p = p turned by +90 degrees: the derivative of a rotation at zero.
-inline Eigen::Vector2d turned_left(const Eigen::Vector2d& p) { return {-p.y(), p.x()}; }
+inline Eigen::Vector2d perpendicular(const Eigen::Vector2d& p) { return {-p.y(), p.x()}; }
 
-}  // namespace understory
+}  // namespace understory::geometry

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
-namespace understory {
+namespace understory::hierarchy {
 namespace {
 
 /// Gauss-Legendre points per panel. Eight lanes are two SSE registers; the loops over them below
@@ -161,4 +161,4 @@ float distance(const Descriptor& a, const Descriptor& b) {
   return std::sqrt(sum);
 }
 
-}  // namespace understory
+}  // namespace understory::hierarchy

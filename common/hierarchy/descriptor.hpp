@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <span>
 
-namespace understory {
+namespace understory::hierarchy {
 
 /// Most distinct bins that a descriptor has: descriptor_step >= 1/30.
 inline constexpr std::size_t kMaxDescriptorBins = 16;
@@ -32,4 +32,4 @@ Descriptor describe(std::span<const Eigen::Vector2d> boundary, int samples);
 /// Euclidean distance, to be compared with tau.
 float distance(const Descriptor& a, const Descriptor& b);
 
-}  // namespace understory
+}  // namespace understory::hierarchy

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace understory {
+namespace understory::hierarchy {
 namespace {
 
 /// Bits per coordinate of a cell in its key; values beyond are clamped into the last cell, which
@@ -102,4 +102,4 @@ void DescriptorIndex::within(const Descriptor& descriptor, float radius,
   });
 }
 
-}  // namespace understory
+}  // namespace understory::hierarchy

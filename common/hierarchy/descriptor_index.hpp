@@ -7,7 +7,7 @@
 
 #include "common/hierarchy/descriptor.hpp"
 
-namespace understory {
+namespace understory::hierarchy {
 
 /// A set of descriptors under keys of the caller's, to which single ones are added and taken away
 /// in constant time. A distance is never less than the difference in any bin; so descriptors are
@@ -51,4 +51,4 @@ class DescriptorIndex {
   std::unordered_map<std::uint64_t, std::vector<Entry>> cells_;
 };
 
-}  // namespace understory
+}  // namespace understory::hierarchy

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <unordered_set>
 
-namespace understory {
+namespace understory::hierarchy {
 
 GeometricHierarchy::GeometricHierarchy(const HierarchyParameters& parameters)
     : parameters_(parameters),
@@ -222,4 +222,4 @@ std::vector<std::vector<std::uint64_t>> polygon_ids(const GeometricHierarchy& hi
   return result;
 }
 
-}  // namespace understory
+}  // namespace understory::hierarchy

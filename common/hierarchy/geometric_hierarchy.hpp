@@ -9,7 +9,7 @@
 #include "common/hierarchy/polygon.hpp"
 #include "common/hierarchy/triangulation.hpp"
 
-namespace understory {
+namespace understory::hierarchy {
 
 struct HierarchyParameters {
   double descriptor_step = 0.05;         ///< [s] part of the perimeter; 1/30 ... 1/4.
@@ -93,4 +93,4 @@ std::vector<HierarchyEdge> edges(const GeometricHierarchy& hierarchy);
 /// order: equal for equal sets of landmarks.
 std::vector<std::vector<std::uint64_t>> polygon_ids(const GeometricHierarchy& hierarchy);
 
-}  // namespace understory
+}  // namespace understory::hierarchy

@@ -6,7 +6,7 @@
 
 #include "common/hierarchy/triangulation.hpp"
 
-namespace understory {
+namespace understory::hierarchy {
 
 std::vector<std::uint32_t> insertion_order(std::span<const Eigen::Vector2d> positions_m) {
   using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
@@ -24,4 +24,4 @@ std::vector<std::uint32_t> insertion_order(std::span<const Eigen::Vector2d> posi
   return {order.begin(), order.end()};
 }
 
-}  // namespace understory
+}  // namespace understory::hierarchy

@@ -7,7 +7,7 @@
 #include <optional>
 #include <unordered_map>
 
-namespace understory {
+namespace understory::hierarchy {
 
 /// Remembers one landmark slot per square cell. An answer is only a hint: it may be stale (the
 /// reader checks that the slot is in use) and decides nothing but the length of a walk.
@@ -62,4 +62,4 @@ class LocationHints {
   std::unordered_map<std::uint64_t, std::uint32_t> cells_;
 };
 
-}  // namespace understory
+}  // namespace understory::hierarchy

@@ -10,7 +10,7 @@
 
 #include "common/geometry/alignment.hpp"
 
-namespace understory {
+namespace understory::hierarchy {
 namespace {
 
 /// Landmark slots: query, map.
@@ -128,9 +128,9 @@ class PolygonAlignment {
       : query_(query), map_(map), max_residual_m_(max_residual_m) {}
 
   /// Drops the worst pair until all agree with one motion; none if fewer than three do.
-  std::optional<SE2> agree(std::vector<SlotPair> pairs) const {
+  std::optional<geometry::SE2> agree(std::vector<SlotPair> pairs) const {
     while (pairs.size() >= 3) {
-      const SE2 map_T_query = align(pairs);
+      const geometry::SE2 map_T_query = align(pairs);
       const auto worst =
           std::max_element(pairs.begin(), pairs.end(), [&](const SlotPair& p, const SlotPair& q) {
             return residual(map_T_query, p) < residual(map_T_query, q);
@@ -144,7 +144,7 @@ class PolygonAlignment {
   }
 
   /// Pairs of landmarks of the two boundaries that coincide, closest first.
-  std::vector<SlotPair> coincident(const SE2& map_T_query, const Polygon& query,
+  std::vector<SlotPair> coincident(const geometry::SE2& map_T_query, const Polygon& query,
                                    const Polygon& map) const {
     std::vector<std::pair<double, SlotPair>> near;
     for (const std::uint32_t q : query.boundary) {
@@ -165,14 +165,14 @@ class PolygonAlignment {
   }
 
  private:
-  SE2 align(const std::vector<SlotPair>& pairs) const {
-    RigidAlignment2 alignment;
+  geometry::SE2 align(const std::vector<SlotPair>& pairs) const {
+    geometry::RigidAlignment2 alignment;
     for (const auto& [q, m] : pairs) {
       alignment.add(map_.position(m), query_.position(q));
     }
     return alignment.a_T_b();
   }
-  double residual(const SE2& map_T_query, const SlotPair& pair) const {
+  double residual(const geometry::SE2& map_T_query, const SlotPair& pair) const {
     return (map_T_query * query_.position(pair.first) - map_.position(pair.second)).norm();
   }
 
@@ -277,4 +277,4 @@ std::vector<LandmarkMatch> match(const GeometricHierarchy& query, const Geometri
   return result;
 }
 
-}  // namespace understory
+}  // namespace understory::hierarchy

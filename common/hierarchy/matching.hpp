@@ -6,7 +6,7 @@
 
 #include "common/hierarchy/geometric_hierarchy.hpp"
 
-namespace understory {
+namespace understory::hierarchy {
 
 struct MatchParameters {
   double max_descriptor_distance = 2.0;   ///< [tau]
@@ -53,4 +53,4 @@ std::vector<LandmarkMatch> match_landmarks(const GeometricHierarchy& query,
 std::vector<LandmarkMatch> match(const GeometricHierarchy& query, const GeometricHierarchy& map,
                                  const MatchParameters& parameters = {});
 
-}  // namespace understory
+}  // namespace understory::hierarchy

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace understory {
+namespace understory::hierarchy {
 namespace {
 
 int index_in(const Triangle& triangle, std::uint32_t vertex) {
@@ -86,4 +86,4 @@ std::uint32_t count_hull_edges(const Triangulation& triangulation,
   return count;
 }
 
-}  // namespace understory
+}  // namespace understory::hierarchy

@@ -7,7 +7,7 @@
 #include "common/hierarchy/descriptor.hpp"
 #include "common/hierarchy/triangulation.hpp"
 
-namespace understory {
+namespace understory::hierarchy {
 
 /// A connected set of triangles across longest edges (GeoSLAM algorithm 1, components merged as in
 /// its published code). The dual of such a set is a tree (lengths never fall along the way and only
@@ -39,4 +39,4 @@ std::vector<std::uint32_t> boundary_of(const Triangulation& triangulation,
 std::uint32_t count_hull_edges(const Triangulation& triangulation,
                                const std::vector<std::uint32_t>& triangles);
 
-}  // namespace understory
+}  // namespace understory::hierarchy

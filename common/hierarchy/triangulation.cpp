@@ -7,7 +7,7 @@
 
 #include "common/hierarchy/location_hints.hpp"
 
-namespace understory {
+namespace understory::hierarchy {
 namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
@@ -392,4 +392,4 @@ std::optional<std::uint32_t> Triangulation::nearest(const Eigen::Vector2d& posit
   return vertex == Vertex() ? std::nullopt : std::optional(vertex->info());
 }
 
-}  // namespace understory
+}  // namespace understory::hierarchy

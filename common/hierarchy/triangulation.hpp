@@ -10,7 +10,7 @@
 #include <unordered_map>
 #include <vector>
 
-namespace understory {
+namespace understory::hierarchy {
 
 /// What became of a change to a landmark. Everything but kDone leaves the structure as it was.
 enum class ChangeStatus : std::uint8_t {
@@ -103,4 +103,4 @@ class Triangulation {
 /// Order along a space-filling curve in which many insertions are fast.
 std::vector<std::uint32_t> insertion_order(std::span<const Eigen::Vector2d> positions_m);
 
-}  // namespace understory
+}  // namespace understory::hierarchy

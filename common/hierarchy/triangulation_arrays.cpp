@@ -4,7 +4,7 @@
 
 #include "common/hierarchy/triangulation.hpp"
 
-namespace understory {
+namespace understory::hierarchy {
 
 void TriangulationChange::clear() {
   removed.clear();
@@ -45,4 +45,4 @@ void Triangulation::find_longest_edge(Triangle& triangle) const {
   }
 }
 
-}  // namespace understory
+}  // namespace understory::hierarchy

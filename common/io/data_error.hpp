@@ -3,7 +3,7 @@
 
 #include <stdexcept>
 
-namespace understory {
+namespace understory::io {
 
 /// Recorded data that cannot be read or is not what it should be; what() names the file, where in
 /// it, and what was expected.
@@ -12,4 +12,4 @@ class DataError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-}  // namespace understory
+}  // namespace understory::io

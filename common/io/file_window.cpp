@@ -11,7 +11,7 @@
 
 #include "common/io/lcm_log.hpp"
 
-namespace understory {
+namespace understory::io {
 
 FileWindow::FileWindow(const std::filesystem::path& path) : path_(path), window_(kWindowBytes) {
   struct stat status {};
@@ -74,4 +74,4 @@ bool FileWindow::read(std::uint64_t offset, std::span<std::uint8_t> out) {
   return read_some(offset, out) == out.size();
 }
 
-}  // namespace understory
+}  // namespace understory::io

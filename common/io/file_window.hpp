@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-namespace understory {
+namespace understory::io {
 
 /// The file keeps the size it had when it was opened; one that shrinks meanwhile reads short.
 class FileWindow {
@@ -39,4 +39,4 @@ class FileWindow {
   std::size_t window_bytes_ = 0;
 };
 
-}  // namespace understory
+}  // namespace understory::io

@@ -13,7 +13,7 @@
 #include "common/io/number_reader.hpp"
 #include "common/io/recording_folder.hpp"
 
-namespace understory {
+namespace understory::io {
 namespace fs = std::filesystem;
 namespace kitti {
 namespace {
@@ -33,8 +33,8 @@ int digits(std::string_view line, std::size_t at, std::size_t count, const std::
 
 }  // namespace
 
-std::vector<Utime> parse_timestamps(std::string_view text, std::string_view source) {
-  std::vector<Utime> stamps;
+std::vector<model::Utime> parse_timestamps(std::string_view text, std::string_view source) {
+  std::vector<model::Utime> stamps;
   std::size_t number = 0;
   while (!text.empty()) {
     const std::string_view line = text.substr(0, text.find('\n'));
@@ -53,26 +53,28 @@ std::vector<Utime> parse_timestamps(std::string_view text, std::string_view sour
     if (!day.ok() || hour > 23 || minute > 59 || second > 60)
       throw DataError(fmt::format("{}: '{}' is no time stamp", where, line.substr(0, 40)));
     const auto days = std::chrono::sys_days(day).time_since_epoch().count();
-    const Utime seconds = static_cast<Utime>(days) * 86400 + hour * 3600 + minute * 60 + second;
+    const model::Utime seconds =
+        static_cast<model::Utime>(days) * 86400 + hour * 3600 + minute * 60 + second;
     stamps.push_back(seconds * 1'000'000 + micros);
   }
   return stamps;
 }
 
-PointSweep parse_points(std::string_view bytes, double turn_s, std::string_view source) {
+model::PointSweep parse_points(std::string_view bytes, double revolution_s,
+                               std::string_view source) {
   if (bytes.size() % kPointBytes != 0)
     throw DataError(
         fmt::format("{}: {} bytes are no whole points of {}", source, bytes.size(), kPointBytes));
-  PointSweep sweep;
-  sweep.rings = kRings;
-  sweep.max_range_m = kMaxRange_m;
+  model::PointSweep sweep;
+  sweep.rings = kitti::kRings;
+  sweep.max_range_m = kitti::kMaxRange_m;
   sweep.points.reserve(bytes.size() / kPointBytes);
   int beam = 0;  // from the top
   float last = 0.0F;
   for (std::size_t at = 0; at < bytes.size(); at += kPointBytes) {
     std::array<float, 4> v{};
     std::memcpy(v.data(), bytes.data() + at, kPointBytes);
-    SweepPoint point;
+    model::SweepPoint point;
     point.x_m = v[0];
     point.y_m = v[1];
     point.z_m = v[2];
@@ -81,14 +83,16 @@ PointSweep parse_points(std::string_view bytes, double turn_s, std::string_view 
     const float around = azimuth < 0.0F ? azimuth + 2.0F * std::numbers::pi_v<float> : azimuth;
     if (around < last - std::numbers::pi_v<float>) ++beam;
     last = around;
-    point.ring = static_cast<std::uint16_t>(std::max(0, kRings - 1 - beam));
+    point.ring = static_cast<std::uint16_t>(std::max(0, kitti::kRings - 1 - beam));
     // From behind the car, clockwise.
-    point.time_s = static_cast<float>(turn_s) * 0.5F * (1.0F - azimuth / std::numbers::pi_v<float>);
+    point.time_s =
+        static_cast<float>(revolution_s) * 0.5F * (1.0F - azimuth / std::numbers::pi_v<float>);
     if (std::isfinite(point.time_s)) sweep.points.push_back(point);
   }
-  std::ranges::stable_sort(sweep.points, [](const SweepPoint& a, const SweepPoint& b) {
-    return a.time_s != b.time_s ? a.time_s < b.time_s : a.ring < b.ring;
-  });
+  std::ranges::stable_sort(sweep.points,
+                           [](const model::SweepPoint& a, const model::SweepPoint& b) {
+                             return a.time_s != b.time_s ? a.time_s < b.time_s : a.ring < b.ring;
+                           });
   return sweep;
 }
 
@@ -132,15 +136,16 @@ std::vector<fs::path> files_of(const fs::path& folder, std::string_view extensio
   return files;
 }
 
-std::vector<Utime> stamps_of(const RecordingFolder& folder, std::string_view name) {
+std::vector<model::Utime> stamps_of(const RecordingFolder& folder, std::string_view name) {
   return kitti::parse_timestamps(folder.read(name), folder.describe(name));
 }
 
 /// The stamp of each file: its name is the line's number. Drives may be cut, their stamps whole.
-std::vector<Utime> pick_stamps(const std::vector<fs::path>& files, const std::vector<Utime>& stamps,
-                               const fs::path& folder) {
+std::vector<model::Utime> pick_stamps(const std::vector<fs::path>& files,
+                                      const std::vector<model::Utime>& stamps,
+                                      const fs::path& folder) {
   if (files.empty()) throw DataError(fmt::format("{}: no numbered files", folder.string()));
-  std::vector<Utime> picked;
+  std::vector<model::Utime> picked;
   for (const fs::path& file : files) {
     const std::string stem = file.stem().string();
     std::size_t index = stamps.size();
@@ -171,7 +176,7 @@ KittiRaw::KittiRaw(fs::path folder) : folder_(std::move(folder)) {
   const fs::path data = fs::is_directory(oxts / "data", failed) ? oxts / "data" : oxts;
   if (fs::is_directory(oxts, failed)) {
     const std::vector<fs::path> records = files_of(data, ".txt");
-    const std::vector<Utime> times =
+    const std::vector<model::Utime> times =
         pick_stamps(records, stamps_of(RecordingFolder(oxts), "timestamps.txt"), oxts);
     for (std::size_t i = 0; i < records.size(); ++i) {
       oxts_.push_back(parse_oxts(read_whole(records[i]), records[i].string()));
@@ -186,15 +191,16 @@ KittiRaw::KittiRaw(fs::path folder) : folder_(std::move(folder)) {
   }
 }
 
-PointSweep KittiRaw::read_sweep(std::size_t index) const {
-  const double turn_s = static_cast<double>(ends_.at(index) - starts_.at(index)) * 1e-6;
-  if (turn_s <= 0.0 || turn_s > 1.0)
-    throw DataError(fmt::format("{}: turn {} lasts {} s", folder_.string(), index, turn_s));
-  PointSweep sweep = kitti::parse_points(read_whole(files_[index]), turn_s, files_[index].string());
+model::PointSweep KittiRaw::read_sweep(std::size_t index) const {
+  const double revolution_s = static_cast<double>(ends_.at(index) - starts_.at(index)) * 1e-6;
+  if (revolution_s <= 0.0 || revolution_s > 1.0)
+    throw DataError(fmt::format("{}: turn {} lasts {} s", folder_.string(), index, revolution_s));
+  model::PointSweep sweep =
+      kitti::parse_points(read_whole(files_[index]), revolution_s, files_[index].string());
   sweep.utime = starts_[index];
   sweep.turn = index;
   sweep.sequence = index;
   return sweep;
 }
 
-}  // namespace understory
+}  // namespace understory::io

@@ -15,7 +15,7 @@
 #include "common/io/oxts.hpp"
 #include "common/model/point_sweep.hpp"
 
-namespace understory {
+namespace understory::io {
 
 class KittiRaw {
  public:
@@ -25,15 +25,15 @@ class KittiRaw {
 
   std::size_t sweeps() const { return starts_.size(); }
   /// Frame sensor, skewed, with rings (0 = lowest) and times. Throws DataError.
-  PointSweep read_sweep(std::size_t index) const;
+  model::PointSweep read_sweep(std::size_t index) const;
   const std::vector<OxtsRecord>& oxts() const { return oxts_; }
   /// Where the laser sits on the OXTS unit; none without calibration.
   const std::optional<Eigen::Isometry3d>& imu_T_velo() const { return imu_T_velo_; }
 
  private:
   std::filesystem::path folder_;
-  std::vector<Utime> starts_;
-  std::vector<Utime> ends_;
+  std::vector<model::Utime> starts_;
+  std::vector<model::Utime> ends_;
   std::vector<std::filesystem::path> files_;
   std::vector<OxtsRecord> oxts_;
   std::optional<Eigen::Isometry3d> imu_T_velo_;
@@ -45,9 +45,10 @@ constexpr double kMaxRange_m = 120.0;
 constexpr std::uint16_t kRings = 64;
 
 /// "2011-09-26 13:02:44.335092332" per line (UTC). Throws DataError.
-std::vector<Utime> parse_timestamps(std::string_view text, std::string_view source);
+std::vector<model::Utime> parse_timestamps(std::string_view text, std::string_view source);
 /// Bytes of a .bin file to points with rings and times within `turn_s`.
-PointSweep parse_points(std::string_view bytes, double turn_s, std::string_view source);
+model::PointSweep parse_points(std::string_view bytes, double revolution_s,
+                               std::string_view source);
 /// "R: ... T: ..." of calib_imu_to_velo.txt: velo_T_imu.
 Eigen::Isometry3d parse_transform(std::string_view text, std::string_view source);
 
@@ -55,8 +56,8 @@ Eigen::Isometry3d parse_transform(std::string_view text, std::string_view source
 
 /// Drive 0005 reduced to 16 of its 64 beams: sweeps.bin with poses beside it.
 struct ReducedKittiPose {
-  Utime utime = 0;
-  SE2 world_T_sensor;
+  model::Utime utime = 0;
+  geometry::SE2 world_T_sensor;
 };
 class ReducedKitti {
  public:
@@ -64,7 +65,7 @@ class ReducedKitti {
   ReducedKitti(const std::filesystem::path& folder, std::string_view poses);
   std::size_t sweeps() const { return offsets_.size(); }
   /// Frame sensor; times from the azimuth, turns of 0.1 s of which the middle is the pose's time.
-  PointSweep read_sweep(std::size_t index) const;
+  model::PointSweep read_sweep(std::size_t index) const;
   const std::vector<ReducedKittiPose>& poses() const { return poses_; }
 
  private:
@@ -74,4 +75,4 @@ class ReducedKitti {
   std::vector<ReducedKittiPose> poses_;
 };
 
-}  // namespace understory
+}  // namespace understory::io

@@ -10,13 +10,13 @@
 #include "common/io/number_reader.hpp"
 #include "common/io/recording_folder.hpp"
 
-namespace understory {
+namespace understory::io {
 namespace {
 
 constexpr std::size_t kHeaderBytes = 8;
 constexpr std::size_t kPointBytes = 8;
 constexpr double kTurn_s = 0.1;
-constexpr Utime kStart_us = 1'000'000;  // the recording has no clock: no stamp is negative
+constexpr model::Utime kStart_us = 1'000'000;  // the recording has no clock: no stamp is negative
 
 std::uint32_t count_at(const std::string& bytes, std::size_t at) {
   std::uint32_t value = 0;
@@ -43,8 +43,8 @@ std::vector<ReducedKittiPose> parse_poses(std::string_view text, const std::stri
     if (t < 0.0 || t > 1e6 || std::abs(turn.norm() - 1.0) > 1e-2)
       throw DataError(fmt::format("{}: no pose with time", reader.where()));
     const Eigen::Vector3d forward = turn.normalized() * Eigen::Vector3d::UnitX();
-    poses.push_back({kStart_us + static_cast<Utime>(std::llround(t * 1e6)),
-                     SE2(v[0], v[1], std::atan2(forward.y(), forward.x()))});
+    poses.push_back({kStart_us + static_cast<model::Utime>(std::llround(t * 1e6)),
+                     geometry::SE2(v[0], v[1], std::atan2(forward.y(), forward.x()))});
   }
   return poses;
 }
@@ -73,18 +73,18 @@ ReducedKitti::ReducedKitti(const std::filesystem::path& path, std::string_view p
         fmt::format("{}: {} sweeps for {} poses", source_, offsets_.size(), poses_.size()));
 }
 
-PointSweep ReducedKitti::read_sweep(std::size_t index) const {
-  PointSweep sweep;
+model::PointSweep ReducedKitti::read_sweep(std::size_t index) const {
+  model::PointSweep sweep;
   sweep.rings = 16;
   sweep.max_range_m = kitti::kMaxRange_m;
   sweep.turn = index;
   sweep.sequence = index;
-  sweep.utime = poses_[index].utime - static_cast<Utime>(0.5 * kTurn_s * 1e6);
+  sweep.utime = poses_[index].utime - static_cast<model::Utime>(0.5 * kTurn_s * 1e6);
   const std::size_t count = count_at(bytes_, offsets_[index] + 4);
   sweep.points.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t at = offsets_[index] + kHeaderBytes + i * kPointBytes;
-    SweepPoint point;
+    model::SweepPoint point;
     point.x_m = metres_at(bytes_, at);
     point.y_m = metres_at(bytes_, at + 2);
     point.z_m = metres_at(bytes_, at + 4);
@@ -96,10 +96,11 @@ PointSweep ReducedKitti::read_sweep(std::size_t index) const {
         static_cast<float>(kTurn_s) * 0.5F * (1.0F - azimuth / std::numbers::pi_v<float>);
     sweep.points.push_back(point);
   }
-  std::ranges::stable_sort(sweep.points, [](const SweepPoint& a, const SweepPoint& b) {
-    return a.time_s != b.time_s ? a.time_s < b.time_s : a.ring < b.ring;
-  });
+  std::ranges::stable_sort(sweep.points,
+                           [](const model::SweepPoint& a, const model::SweepPoint& b) {
+                             return a.time_s != b.time_s ? a.time_s < b.time_s : a.ring < b.ring;
+                           });
   return sweep;
 }
 
-}  // namespace understory
+}  // namespace understory::io

@@ -6,11 +6,7 @@
 #include "common/io/file_window.hpp"
 #include "common/io/lcm_log_format.hpp"
 
-namespace understory {
-
-using lcm_log::Header;
-using lcm_log::kHeaderBytes;
-using lcm_log::kMagicBytes;
+namespace understory::io {
 
 class LcmLogReader::Impl {
  public:
@@ -33,12 +29,12 @@ class LcmLogReader::Impl {
  private:
   /// The header of an event that fits into the file and whose channel is a name.
   std::optional<Header> header_at(std::uint64_t offset) {
-    const auto bytes = file_.peek(offset, kHeaderBytes + lcm_log::kMaxChannelBytes);
+    const auto bytes = file_.peek(offset, kHeaderBytes + kMaxChannelBytes);
     if (bytes.size() < kHeaderBytes) return std::nullopt;
-    const auto header = lcm_log::decode(bytes.first<kHeaderBytes>());
+    const auto header = decode(bytes.first<kHeaderBytes>());
     if (!header || header->event_bytes() > file_.size() - offset) return std::nullopt;
     if (bytes.size() < kHeaderBytes + header->channel_bytes) return std::nullopt;
-    if (!lcm_log::plausible_channel(bytes.subspan(kHeaderBytes, header->channel_bytes))) {
+    if (!plausible_channel(bytes.subspan(kHeaderBytes, header->channel_bytes))) {
       return std::nullopt;
     }
     return header;
@@ -63,7 +59,7 @@ class LcmLogReader::Impl {
     const std::uint64_t resumes = confirmed_from(position_ + 1);
     std::array<std::uint8_t, kHeaderBytes> bytes{};
     if (resumes < end || !file_.read(end, bytes)) return false;
-    const Header next = lcm_log::decode_fields(bytes);
+    const Header next = decode_fields(bytes);
     return (header.number < INT64_MAX && next.number == header.number + 1) ||
            end + next.event_bytes() == resumes;
   }
@@ -152,4 +148,4 @@ const LogDamage& LcmLogReader::damage() const { return impl_->damage(); }
 std::uint64_t LcmLogReader::position_bytes() const { return impl_->position(); }
 std::uint64_t LcmLogReader::size_bytes() const { return impl_->size(); }
 
-}  // namespace understory
+}  // namespace understory::io

@@ -16,7 +16,7 @@
 #include <string_view>
 #include <vector>
 
-namespace understory {
+namespace understory::io {
 
 struct LogEvent {
   std::int64_t number = 0;  ///< Counts from 0 in a log that is whole.
@@ -89,4 +89,4 @@ class LcmLogWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace understory
+}  // namespace understory::io

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-namespace understory::lcm_log {
+namespace understory::io {
 namespace {
 
 std::uint64_t get(std::span<const std::uint8_t> bytes, std::size_t at, std::size_t count) {
@@ -53,4 +53,4 @@ bool plausible_channel(std::span<const std::uint8_t> name) {
   return std::all_of(name.begin(), name.end(), [](std::uint8_t c) { return c > 0x20 && c < 0x7F; });
 }
 
-}  // namespace understory::lcm_log
+}  // namespace understory::io

@@ -6,7 +6,7 @@
 #include <optional>
 #include <span>
 
-namespace understory::lcm_log {
+namespace understory::io {
 
 constexpr std::array<std::uint8_t, 4> kMagicBytes{0xED, 0xA1, 0xDA, 0x01};
 constexpr std::size_t kHeaderBytes = 28;
@@ -31,4 +31,4 @@ std::optional<Header> decode(std::span<const std::uint8_t, kHeaderBytes> bytes);
 /// Whether LCM could have such a channel name: printable ASCII.
 bool plausible_channel(std::span<const std::uint8_t> name);
 
-}  // namespace understory::lcm_log
+}  // namespace understory::io

@@ -11,7 +11,7 @@
 #include "common/io/lcm_log.hpp"
 #include "common/io/lcm_log_format.hpp"
 
-namespace understory {
+namespace understory::io {
 
 class LcmLogWriter::Impl {
  public:
@@ -39,16 +39,16 @@ class LcmLogWriter::Impl {
   void write(std::int64_t number, std::int64_t utime, std::string_view channel,
              std::span<const std::uint8_t> data) {
     if (descriptor_ < 0) throw LogError(fmt::format("{}: already closed", path_.string()));
-    if (channel.empty() || channel.size() > lcm_log::kMaxChannelBytes) {
+    if (channel.empty() || channel.size() > kMaxChannelBytes) {
       throw LogError(fmt::format("{}: channel \"{}\": a channel has 1 to {} bytes", path_.string(),
-                                 channel, lcm_log::kMaxChannelBytes));
+                                 channel, kMaxChannelBytes));
     }
     if (data.size() > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max())) {
       throw LogError(fmt::format("{}: channel \"{}\": {} bytes are more than an event holds",
                                  path_.string(), channel, data.size()));
     }
-    const auto header = lcm_log::encode({number, utime, static_cast<std::uint32_t>(channel.size()),
-                                         static_cast<std::uint32_t>(data.size())});
+    const auto header = encode({number, utime, static_cast<std::uint32_t>(channel.size()),
+                                static_cast<std::uint32_t>(data.size())});
     buffer_.insert(buffer_.end(), header.begin(), header.end());
     buffer_.insert(buffer_.end(), channel.begin(), channel.end());
     buffer_.insert(buffer_.end(), data.begin(), data.end());
@@ -124,4 +124,4 @@ void LcmLogWriter::write(std::int64_t utime, std::string_view channel,
 void LcmLogWriter::commit() { impl_->commit(); }
 std::uint64_t LcmLogWriter::events() const { return impl_->events(); }
 
-}  // namespace understory
+}  // namespace understory::io

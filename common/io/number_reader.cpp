@@ -7,7 +7,7 @@
 
 #include "common/io/data_error.hpp"
 
-namespace understory {
+namespace understory::io {
 namespace {
 
 bool separates(char c) {
@@ -54,4 +54,4 @@ std::string NumberReader::where() const {
   return fmt::format("{}, line {}, token {}", source_, line_, tokens_);
 }
 
-}  // namespace understory
+}  // namespace understory::io

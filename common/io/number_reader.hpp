@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace understory {
+namespace understory::io {
 
 /// Walks a text number by number; line breaks are white space like any other.
 class NumberReader {
@@ -36,4 +36,4 @@ class NumberReader {
   std::uint64_t tokens_ = 0;
 };
 
-}  // namespace understory
+}  // namespace understory::io

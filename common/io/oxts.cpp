@@ -10,7 +10,7 @@
 #include "common/io/data_error.hpp"
 #include "common/io/number_reader.hpp"
 
-namespace understory {
+namespace understory::io {
 namespace {
 
 constexpr std::size_t kValues = 25;  // the rest counts satellites
@@ -53,4 +53,4 @@ Eigen::Vector2d LocalPlane::east_north_m(double latitude_deg, double longitude_d
           (latitude_deg - latitude_deg_) * north_per_deg_m_};
 }
 
-}  // namespace understory
+}  // namespace understory::io

@@ -9,11 +9,11 @@
 #include "common/model/gnss.hpp"
 #include "common/model/imu.hpp"
 
-namespace understory {
+namespace understory::io {
 
 /// One record of 30 values; frame of the unit: x forward, y left, z up.
 struct OxtsRecord {
-  Utime utime = 0;
+  model::Utime utime = 0;
   double latitude_deg = 0.0;
   double longitude_deg = 0.0;
   double altitude_m = 0.0;
@@ -42,4 +42,4 @@ class LocalPlane {
   double east_per_deg_m_;
 };
 
-}  // namespace understory
+}  // namespace understory::io

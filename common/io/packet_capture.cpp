@@ -8,7 +8,7 @@
 
 #include "common/io/data_error.hpp"
 
-namespace understory {
+namespace understory::io {
 namespace {
 
 constexpr std::size_t kEthernetBytes = 14;
@@ -85,7 +85,7 @@ class PacketCapture::Impl {
         ++counts_.not_udp;
         continue;
       }
-      packet->utime = static_cast<Utime>(header->ts.tv_sec) * 1'000'000 + header->ts.tv_usec;
+      packet->utime = static_cast<model::Utime>(header->ts.tv_sec) * 1'000'000 + header->ts.tv_usec;
       return packet;
     }
   }
@@ -113,4 +113,4 @@ std::optional<CapturedPacket> PacketCapture::next() { return impl_->next(); }
 const CaptureCounts& PacketCapture::counts() const { return impl_->counts(); }
 bool PacketCapture::is_cut_off() const { return impl_->is_cut_off(); }
 
-}  // namespace understory
+}  // namespace understory::io

@@ -9,10 +9,10 @@
 
 #include "common/model/landmarks.hpp"
 
-namespace understory {
+namespace understory::io {
 
 struct CapturedPacket {
-  Utime utime = 0;         ///< When it was captured [us since the epoch].
+  model::Utime utime = 0;  ///< When it was captured [us since the epoch].
   std::uint16_t port = 0;  ///< UDP, destination.
   std::vector<std::uint8_t> payload;
 };
@@ -41,4 +41,4 @@ class PacketCapture {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace understory
+}  // namespace understory::io

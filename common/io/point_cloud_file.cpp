@@ -13,7 +13,7 @@
 #include "common/io/number_reader.hpp"
 #include "common/io/recording_folder.hpp"
 
-namespace understory {
+namespace understory::io {
 namespace {
 
 constexpr std::size_t kMostPoints = 20'000'000;
@@ -212,7 +212,7 @@ std::string decompress_lzf(std::string_view compressed, std::size_t size, std::s
   return out;
 }
 
-PointSweep parse_pcd(std::string_view bytes, std::string_view source) {
+model::PointSweep parse_pcd(std::string_view bytes, std::string_view source) {
   const Header header = parse_header(bytes, source);
   const std::vector<Column> columns = columns_of(header, bytes, source);
   const auto column =
@@ -232,10 +232,10 @@ PointSweep parse_pcd(std::string_view bytes, std::string_view source) {
   const double unit = time && header.fields[*time].type != 'F' ? 1e-9 : 1.0;
   const double start = time && header.points > 0 ? *std::ranges::min_element(columns[*time]) : 0.0;
 
-  PointSweep sweep;
+  model::PointSweep sweep;
   sweep.has_times = time.has_value();
   for (std::size_t i = 0; i < header.points; ++i) {
-    SweepPoint point;
+    model::SweepPoint point;
     point.x_m = static_cast<float>(columns[*x][i]);
     point.y_m = static_cast<float>(columns[*y][i]);
     point.z_m = static_cast<float>(columns[*z][i]);
@@ -248,7 +248,7 @@ PointSweep parse_pcd(std::string_view bytes, std::string_view source) {
     sweep.max_range_m = std::max(sweep.max_range_m, static_cast<double>(point.position().norm()));
     sweep.points.push_back(point);
   }
-  std::ranges::stable_sort(sweep.points, {}, &SweepPoint::time_s);
+  std::ranges::stable_sort(sweep.points, {}, &model::SweepPoint::time_s);
   return sweep;
 }
 
@@ -281,10 +281,10 @@ std::vector<PcdFile> find_pcd_sequence(const std::filesystem::path& folder) {
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (!(seconds[i] >= 0.0 && seconds[i] < 9e9))
       throw DataError(fmt::format("{}: {} s is no time", files[i].path.string(), seconds[i]));
-    files[i].utime = static_cast<Utime>(std::llround(seconds[i] * 1e6));
+    files[i].utime = static_cast<model::Utime>(std::llround(seconds[i] * 1e6));
   }
   std::ranges::stable_sort(files, {}, &PcdFile::utime);
   return files;
 }
 
-}  // namespace understory
+}  // namespace understory::io

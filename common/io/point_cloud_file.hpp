@@ -7,22 +7,22 @@
 
 #include "common/model/point_sweep.hpp"
 
-namespace understory {
+namespace understory::io {
 
 /// Fields x, y, z; where there: intensity, ring, and the time of each point as t, time, timestamp
 /// or offset_time (seconds from the first point; integers are nanoseconds; absolute times are made
 /// relative). Points that are not finite are left out. Throws DataError.
-PointSweep parse_pcd(std::string_view bytes, std::string_view source);
+model::PointSweep parse_pcd(std::string_view bytes, std::string_view source);
 
 /// LZF, as PCD uses it; throws DataError where the data is not what it should be.
 std::string decompress_lzf(std::string_view compressed, std::size_t size, std::string_view source);
 
 struct PcdFile {
-  Utime utime = 0;
+  model::Utime utime = 0;
   std::filesystem::path path;
 };
 /// The .pcd files of a folder in order of time: from timestamps.txt (one number of seconds per
 /// file), else from names that are a number of seconds or of nanoseconds. Throws DataError.
 std::vector<PcdFile> find_pcd_sequence(const std::filesystem::path& folder);
 
-}  // namespace understory
+}  // namespace understory::io

@@ -12,7 +12,7 @@
 
 #include "common/io/data_error.hpp"
 
-namespace understory {
+namespace understory::io {
 namespace {
 
 namespace fs = std::filesystem;
@@ -131,4 +131,4 @@ std::string RecordingFolder::describe(std::string_view name) const {
                      : (path_ / std::string(name)).string();
 }
 
-}  // namespace understory
+}  // namespace understory::io

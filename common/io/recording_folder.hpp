@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace understory {
+namespace understory::io {
 
 /// Gives the files of a recording by name, wherever they lie.
 class RecordingFolder {
@@ -28,4 +28,4 @@ class RecordingFolder {
   bool is_archive_ = false;
 };
 
-}  // namespace understory
+}  // namespace understory::io

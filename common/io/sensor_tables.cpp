@@ -12,7 +12,7 @@
 #include "common/io/number_reader.hpp"
 #include "common/io/oxts.hpp"
 
-namespace understory {
+namespace understory::io {
 namespace {
 
 /// Rows of numbers under a heading of names.
@@ -51,17 +51,17 @@ class Table {
     throw DataError(fmt::format("{}: no column {} in the heading", source_, name));
   }
   /// Stamps of all rows; they must advance.
-  std::vector<Utime> stamps() const {
+  std::vector<model::Utime> stamps() const {
     const auto nanos = find("t_ns");
     const auto micros = find("t_us");
     const std::size_t column = nanos ? *nanos : micros ? *micros : require("t_s");
     const double unit = nanos ? 1e-3 : micros ? 1.0 : 1e6;
-    std::vector<Utime> stamps;
+    std::vector<model::Utime> stamps;
     for (std::size_t row = 0; row < rows(); ++row) {
       const double value = at(row, column) * unit;
       if (!(value >= 0.0 && value < 9e15))
         throw DataError(fmt::format("{}, row {}: no time", source_, row + 1));
-      stamps.push_back(static_cast<Utime>(std::llround(value)));
+      stamps.push_back(static_cast<model::Utime>(std::llround(value)));
       if (row > 0 && stamps[row] <= stamps[row - 1])
         throw DataError(fmt::format("{}, row {}: time does not advance", source_, row + 1));
     }
@@ -76,12 +76,12 @@ class Table {
 
 }  // namespace
 
-std::vector<ImuSample> parse_imu_table(std::string_view text, std::string_view source) {
+std::vector<model::ImuSample> parse_imu_table(std::string_view text, std::string_view source) {
   const Table table(text, source);
-  const std::vector<Utime> stamps = table.stamps();
+  const std::vector<model::Utime> stamps = table.stamps();
   const std::size_t g[] = {table.require("gx"), table.require("gy"), table.require("gz")};
   const std::size_t a[] = {table.require("ax"), table.require("ay"), table.require("az")};
-  std::vector<ImuSample> samples(table.rows());
+  std::vector<model::ImuSample> samples(table.rows());
   for (std::size_t row = 0; row < samples.size(); ++row) {
     samples[row].utime = stamps[row];
     samples[row].sequence = row;
@@ -93,9 +93,9 @@ std::vector<ImuSample> parse_imu_table(std::string_view text, std::string_view s
   return samples;
 }
 
-std::vector<GnssFix> parse_gnss_table(std::string_view text, std::string_view source) {
+std::vector<model::GnssFix> parse_gnss_table(std::string_view text, std::string_view source) {
   const Table table(text, source);
-  const std::vector<Utime> stamps = table.stamps();
+  const std::vector<model::Utime> stamps = table.stamps();
   const bool geodetic = table.find("latitude_deg").has_value();
   const std::size_t north = table.require(geodetic ? "latitude_deg" : "north_m");
   const std::size_t east = table.require(geodetic ? "longitude_deg" : "east_m");
@@ -103,11 +103,11 @@ std::vector<GnssFix> parse_gnss_table(std::string_view text, std::string_view so
   const auto east_velocity = table.find("ve_mps");
   const auto north_velocity = table.find("vn_mps");
   const auto velocity_sigma = table.find("velocity_sigma_mps");
-  std::vector<GnssFix> fixes(table.rows());
+  std::vector<model::GnssFix> fixes(table.rows());
   std::optional<LocalPlane> plane;
   if (geodetic && table.rows() > 0) plane.emplace(table.at(0, north), table.at(0, east));
   for (std::size_t row = 0; row < fixes.size(); ++row) {
-    GnssFix& fix = fixes[row];
+    model::GnssFix& fix = fixes[row];
     fix.utime = stamps[row];
     fix.sequence = row;
     fix.east_north_m = plane ? plane->east_north_m(table.at(row, north), table.at(row, east))
@@ -121,16 +121,16 @@ std::vector<GnssFix> parse_gnss_table(std::string_view text, std::string_view so
   return fixes;
 }
 
-std::vector<WheelSample> parse_wheel_table(std::string_view text, std::string_view source) {
+std::vector<model::WheelSample> parse_wheel_table(std::string_view text, std::string_view source) {
   const Table table(text, source);
-  const std::vector<Utime> stamps = table.stamps();
+  const std::vector<model::Utime> stamps = table.stamps();
   const std::size_t speed = table.require("speed_mps");
   const auto steering = table.find("steering_rad");
-  std::vector<WheelSample> samples(table.rows());
+  std::vector<model::WheelSample> samples(table.rows());
   for (std::size_t row = 0; row < samples.size(); ++row)
     samples[row] = {stamps[row], row, table.at(row, speed),
                     steering ? table.at(row, *steering) : 0.0};
   return samples;
 }
 
-}  // namespace understory
+}  // namespace understory::io

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <utility>
 
-namespace understory {
+namespace understory::io {
 namespace {
 
 constexpr std::size_t kBlocks = 12;
@@ -103,9 +103,9 @@ VelodyneDecoder::VelodyneDecoder(VelodyneCalibration calibration, double max_ran
   }
 }
 
-std::optional<PointSweep> VelodyneDecoder::take_turn() {
-  PointSweep turn = std::exchange(turn_, {});
-  const bool whole = std::exchange(turn_started_, true);
+std::optional<model::PointSweep> VelodyneDecoder::take_revolution() {
+  model::PointSweep turn = std::exchange(turn_, {});
+  const bool whole = std::exchange(revolution_started_, true);
   if (turn.points.empty()) return std::nullopt;
   turn.rings = static_cast<std::uint16_t>(calibration_.beams.size());
   turn.max_range_m = max_range_m_;
@@ -117,13 +117,13 @@ std::optional<PointSweep> VelodyneDecoder::take_turn() {
   return turn;
 }
 
-std::optional<PointSweep> VelodyneDecoder::finish() {
-  if (last_azimuth_ < kTurn - kLargestStep) turn_started_ = false;  // not to its end
-  return take_turn();
+std::optional<model::PointSweep> VelodyneDecoder::finish() {
+  if (last_azimuth_ < kTurn - kLargestStep) revolution_started_ = false;  // not to its end
+  return take_revolution();
 }
 
-std::optional<PointSweep> VelodyneDecoder::add(std::span<const std::uint8_t> packet,
-                                               Utime received) {
+std::optional<model::PointSweep> VelodyneDecoder::add(std::span<const std::uint8_t> packet,
+                                                      model::Utime received) {
   const Layout layout = layout_of(calibration_.model);
   ++counts_.packets;
   if (check_velodyne_packet(packet, calibration_.model)) {
@@ -140,13 +140,13 @@ std::optional<PointSweep> VelodyneDecoder::add(std::span<const std::uint8_t> pac
   if (last_azimuth_ >= 0 && azimuth_between(last_azimuth_, block.azimuth[0]) > kLargestStep)
     ++counts_.lost_azimuth;
   // The turn ends at the first block behind azimuth zero; the rest of the packet is of the next.
-  std::optional<PointSweep> turn;
+  std::optional<model::PointSweep> turn;
   if ((last_azimuth_ > block.azimuth[0] && last_azimuth_ - block.azimuth[0] > kTurn / 2) ||
       turn_.points.size() > kMostPoints)
-    turn = take_turn();
+    turn = take_revolution();
   add_block(packet, block);
   if (!pending_.points.empty()) {
-    if (!turn) turn = take_turn();
+    if (!turn) turn = take_revolution();
     turn_ = std::exchange(pending_, {});
   }
   last_azimuth_ = block.azimuth[kBlocks - 1];
@@ -157,7 +157,7 @@ void VelodyneDecoder::add_block(std::span<const std::uint8_t> packet, const Bloc
   const Layout layout = layout_of(calibration_.model);
   const std::size_t returns = block.is_dual ? 2 : 1;
   const std::size_t stride = layout.blocks_per_firing * returns;  // blocks from firing to firing
-  PointSweep* turn = &turn_;
+  model::PointSweep* turn = &turn_;
   for (std::size_t b = 0; b + stride <= kBlocks; b += stride) {
     const std::size_t firing = b / stride * layout.firings_per_block;
     const double block_us = static_cast<double>(firing) * layout.firing_us;
@@ -190,7 +190,7 @@ void VelodyneDecoder::add_block(std::span<const std::uint8_t> packet, const Bloc
   }
 }
 
-void VelodyneDecoder::add_point(PointSweep& turn, const Reading& reading) {
+void VelodyneDecoder::add_point(model::PointSweep& turn, const Reading& reading) {
   const VelodyneBeam& beam = calibration_.beams[reading.beam];
   const double range = reading.distance * calibration_.distance_step_m + beam.distance_correction_m;
   if (range <= 0.0 || range >= max_range_m_) return;
@@ -201,10 +201,10 @@ void VelodyneDecoder::add_point(PointSweep& turn, const Reading& reading) {
   const double flat =
       range * std::cos(beam.elevation_rad) - beam.vertical_offset_m * std::sin(beam.elevation_rad);
   if (turn.points.empty()) {
-    turn.utime = static_cast<Utime>(std::floor(reading.utime));
+    turn.utime = static_cast<model::Utime>(std::floor(reading.utime));
     turn.points.reserve(calibration_.beams.size() * 2000);
   }
-  SweepPoint point;
+  model::SweepPoint point;
   const auto forward = static_cast<float>(flat);
   const auto side = static_cast<float>(beam.horizontal_offset_m);
   // Clockwise from the x axis; a positive horizontal offset is to the left.
@@ -219,4 +219,4 @@ void VelodyneDecoder::add_point(PointSweep& turn, const Reading& reading) {
   turn.points.push_back(point);
 }
 
-}  // namespace understory
+}  // namespace understory::io

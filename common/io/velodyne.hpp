@@ -18,7 +18,7 @@
 
 #include "common/model/point_sweep.hpp"
 
-namespace understory {
+namespace understory::io {
 
 enum class VelodyneModel : std::uint8_t { kVlp16, kVlp32c, kHdl32e, kHdl64e };
 /// "vlp16", "vlp32c", "hdl32e", "hdl64e".
@@ -80,9 +80,9 @@ class VelodyneDecoder {
 
   /// `received`: when the packet came [us]; the packet's own time is laid onto it (the hour that is
   /// nearest). The turn that this packet completes, if any.
-  std::optional<PointSweep> add(std::span<const std::uint8_t> packet, Utime received);
+  std::optional<model::PointSweep> add(std::span<const std::uint8_t> packet, model::Utime received);
   /// The turn under way, where it lacks no more than the last packet.
-  std::optional<PointSweep> finish();
+  std::optional<model::PointSweep> finish();
   const VelodyneCounts& counts() const { return counts_; }
 
  private:
@@ -94,9 +94,9 @@ class VelodyneDecoder {
     std::uint8_t intensity;
     double utime;
   };
-  std::optional<PointSweep> take_turn();
+  std::optional<model::PointSweep> take_revolution();
   void add_block(std::span<const std::uint8_t> packet, const Block& block);
-  void add_point(PointSweep& turn, const Reading& reading);
+  void add_point(model::PointSweep& turn, const Reading& reading);
 
   VelodyneCalibration calibration_;
   double max_range_m_;
@@ -104,9 +104,9 @@ class VelodyneDecoder {
   std::array<float, 36000> sine_{};
   std::array<float, 36000> cosine_{};
   std::vector<std::size_t> order_;  ///< Beams in order of their rings.
-  PointSweep turn_;
-  PointSweep pending_;         ///< The begin of the next turn, in the packet that ends this one.
-  bool turn_started_ = false;  ///< The turn under way began at azimuth 0.
+  model::PointSweep turn_;
+  model::PointSweep pending_;  ///< The begin of the next turn, in the packet that ends this one.
+  bool revolution_started_ = false;  ///< The turn under way began at azimuth 0.
   int last_azimuth_ = -1;
   double azimuth_rate_ = 0.2;  ///< Hundredths of a degree per microsecond.
   std::uint64_t turns_ = 0;
@@ -126,4 +126,4 @@ std::optional<VelodynePosition> parse_velodyne_position(std::span<const std::uin
 /// $GPRMC with a right checksum.
 std::optional<VelodynePosition> parse_gprmc(std::string_view sentence);
 
-}  // namespace understory
+}  // namespace understory::io

@@ -11,7 +11,7 @@
 #include "common/io/data_error.hpp"
 #include "common/io/velodyne.hpp"
 
-namespace understory {
+namespace understory::io {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
@@ -189,4 +189,4 @@ VelodyneCalibration parse_hdl64_calibration(std::string_view text, std::string_v
   return calibration;
 }
 
-}  // namespace understory
+}  // namespace understory::io

@@ -2,13 +2,14 @@
 
 #include <cmath>
 
-namespace understory {
+namespace understory::io {
 
-std::optional<GnssFix> VelodyneFixes::add(const VelodynePosition& position, Utime received) {
+std::optional<model::GnssFix> VelodyneFixes::add(const VelodynePosition& position,
+                                                 model::Utime received) {
   if (!position.is_valid || last_day_us_ == position.day_us) return std::nullopt;
   last_day_us_ = position.day_us;
   if (!plane_) plane_.emplace(position.latitude_deg, position.longitude_deg);
-  GnssFix fix;
+  model::GnssFix fix;
   fix.utime = received;
   fix.east_north_m = plane_->east_north_m(position.latitude_deg, position.longitude_deg);
   fix.velocity_mps = position.speed_mps *
@@ -16,4 +17,4 @@ std::optional<GnssFix> VelodyneFixes::add(const VelodynePosition& position, Utim
   return fix;
 }
 
-}  // namespace understory
+}  // namespace understory::io

@@ -8,7 +8,7 @@
 #include "common/io/velodyne.hpp"
 #include "common/model/gnss.hpp"
 
-namespace understory {
+namespace understory::io {
 
 /// Position packets in, fixes out: live and from captures alike.
 class VelodyneFixes {
@@ -18,11 +18,11 @@ class VelodyneFixes {
 
   /// `received`: when the packet came [us]; the fix's stamp. None where the sentence says that it
   /// is not valid, or was had: the receiver gives one a second, the sensor repeats it.
-  std::optional<GnssFix> add(const VelodynePosition& position, Utime received);
+  std::optional<model::GnssFix> add(const VelodynePosition& position, model::Utime received);
 
  private:
   std::optional<LocalPlane> plane_;
   std::optional<std::int64_t> last_day_us_;
 };
 
-}  // namespace understory
+}  // namespace understory::io

@@ -6,7 +6,7 @@
 
 #include "common/io/velodyne.hpp"
 
-namespace understory {
+namespace understory::io {
 namespace {
 
 constexpr std::size_t kTimeAt = 198;
@@ -88,4 +88,4 @@ std::optional<VelodynePosition> parse_velodyne_position(std::span<const std::uin
   return position;
 }
 
-}  // namespace understory
+}  // namespace understory::io

@@ -11,7 +11,7 @@
 #include "common/io/number_reader.hpp"
 #include "common/io/recording_folder.hpp"
 
-namespace understory {
+namespace understory::io {
 namespace victoria_park {
 namespace {
 
@@ -21,14 +21,14 @@ constexpr double kMaxTime_s = 1e6;
 /// Reads the time stamp that starts a record; none at the end of the file. Time must advance.
 class Stamps {
  public:
-  std::optional<Utime> next(NumberReader& reader) {
+  std::optional<model::Utime> next(NumberReader& reader) {
     const auto seconds = reader.next();
     if (!seconds) return std::nullopt;
     if (*seconds < 0.0 || *seconds > kMaxTime_s) {
       throw DataError(
           fmt::format("{}: {} s is no time of this recording", reader.where(), *seconds));
     }
-    const auto utime = static_cast<Utime>(std::llround(*seconds * 1e6));
+    const auto utime = static_cast<model::Utime>(std::llround(*seconds * 1e6));
     if (utime <= last_) {
       throw DataError(fmt::format(
           "{}: time {} s does not come after {} s (a token too many or too few before?)",
@@ -39,7 +39,7 @@ class Stamps {
   }
 
  private:
-  Utime last_ = -1;
+  model::Utime last_ = -1;
 };
 
 double require_within(NumberReader& reader, std::string_view what, double low, double high) {
@@ -58,19 +58,19 @@ void require_some(const std::vector<Record>& records, std::string_view source) {
 
 }  // namespace
 
-std::vector<PlanarScan> parse_laser(std::string_view text, std::string_view source) {
-  std::vector<PlanarScan> scans;
+std::vector<model::PlanarScan> parse_laser(std::string_view text, std::string_view source) {
+  std::vector<model::PlanarScan> scans;
   NumberReader reader(text, std::string(source));
   Stamps stamps;
   while (const auto utime = stamps.next(reader)) {
-    PlanarScan scan;
+    model::PlanarScan scan;
     scan.utime = *utime;
     scan.sequence = scans.size();
     scan.first_bearing_rad = -0.5 * std::numbers::pi;
     scan.bearing_step_rad = std::numbers::pi / 360.0;
-    scan.max_range_m = kMaxRange_m;
-    scan.ranges_m.reserve(kBeams);
-    for (std::size_t beam = 0; beam < kBeams; ++beam) {
+    scan.max_range_m = victoria_park::kMaxRange_m;
+    scan.ranges_m.reserve(victoria_park::kBeams);
+    for (std::size_t beam = 0; beam < victoria_park::kBeams; ++beam) {
       scan.ranges_m.push_back(static_cast<float>(require_within(reader, "a range [m]", 0.0, 82.0)));
     }
     scans.push_back(std::move(scan));
@@ -79,8 +79,8 @@ std::vector<PlanarScan> parse_laser(std::string_view text, std::string_view sour
   return scans;
 }
 
-std::vector<WheelSample> parse_wheels(std::string_view text, std::string_view source) {
-  std::vector<WheelSample> wheels;
+std::vector<model::WheelSample> parse_wheels(std::string_view text, std::string_view source) {
+  std::vector<model::WheelSample> wheels;
   NumberReader reader(text, std::string(source));
   Stamps stamps;
   while (const auto utime = stamps.next(reader)) {
@@ -92,8 +92,8 @@ std::vector<WheelSample> parse_wheels(std::string_view text, std::string_view so
   return wheels;
 }
 
-std::vector<GnssFix> parse_gnss(std::string_view text, std::string_view source) {
-  std::vector<GnssFix> fixes;
+std::vector<model::GnssFix> parse_gnss(std::string_view text, std::string_view source) {
+  std::vector<model::GnssFix> fixes;
   NumberReader reader(text, std::string(source));
   Stamps stamps;
   while (const auto utime = stamps.next(reader)) {
@@ -118,4 +118,4 @@ VictoriaPark read_victoria_park(const std::filesystem::path& path) {
   return recording;
 }
 
-}  // namespace understory
+}  // namespace understory::io

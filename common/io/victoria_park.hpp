@@ -15,12 +15,13 @@
 #include "common/model/planar_scan.hpp"
 #include "common/model/wheels.hpp"
 
-namespace understory {
+namespace understory::io {
 
 struct VictoriaPark {
-  std::vector<PlanarScan> scans;    ///< 7230, every 0.214 s; frame `sensor` (the laser).
-  std::vector<WheelSample> wheels;  ///< 61763, every 0.025 s; encoder on the rear left wheel.
-  std::vector<GnssFix> gnss;        ///< 948 fixes left after the authors removed bad ones.
+  std::vector<model::PlanarScan> scans;  ///< 7230, every 0.214 s; frame `sensor` (the laser).
+  std::vector<model::WheelSample>
+      wheels;                        ///< 61763, every 0.025 s; encoder on the rear left wheel.
+  std::vector<model::GnssFix> gnss;  ///< 948 fixes left after the authors removed bad ones.
 };
 
 namespace victoria_park {
@@ -35,16 +36,18 @@ constexpr double kLaserLeft_m = 0.5;     ///< [b] Of the middle of the car.
 /// Frame `vehicle` of this recording: the laser, x forward, seen from the middle of the rear axle.
 /// The field of view of a scan is a sector around the vehicle, so the vehicle is where the laser
 /// is.
-inline SE2 axle_T_vehicle() { return {kLaserAhead_m, kLaserLeft_m, 0.0}; }
+inline geometry::SE2 axle_T_vehicle() {
+  return {victoria_park::kLaserAhead_m, victoria_park::kLaserLeft_m, 0.0};
+}
 
 /// Each parser takes the text of its file; `source` names it in errors. Throws DataError.
-std::vector<PlanarScan> parse_laser(std::string_view text, std::string_view source);
-std::vector<WheelSample> parse_wheels(std::string_view text, std::string_view source);
-std::vector<GnssFix> parse_gnss(std::string_view text, std::string_view source);
+std::vector<model::PlanarScan> parse_laser(std::string_view text, std::string_view source);
+std::vector<model::WheelSample> parse_wheels(std::string_view text, std::string_view source);
+std::vector<model::GnssFix> parse_gnss(std::string_view text, std::string_view source);
 
 }  // namespace victoria_park
 
 /// Reads the whole set from a folder or zip archive. Throws DataError.
 VictoriaPark read_victoria_park(const std::filesystem::path& path);
 
-}  // namespace understory
+}  // namespace understory::io

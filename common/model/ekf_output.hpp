@@ -10,13 +10,13 @@
 #include "common/model/odometry.hpp"
 #include "common/model/tracked.hpp"
 
-namespace understory {
+namespace understory::model {
 
 /// Channel RAW_POSE: dead reckoning. Drifts, never jumps.
 struct RawPose {
   Utime utime = 0;
   std::uint64_t sequence = 0;
-  SE2 odom_T_vehicle;  ///< Identity at the start.
+  geometry::SE2 odom_T_vehicle;  ///< Identity at the start.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   bool is_reference = false;  ///< GNSS aided: for evaluation, never for mapping.
 };
@@ -25,7 +25,7 @@ struct RawPose {
 struct EkfPose {
   Utime utime = 0;
   std::uint64_t sequence = 0;
-  SE2 ekf_map_T_vehicle;
+  geometry::SE2 ekf_map_T_vehicle;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();    ///< Right perturbation.
   Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Frame `vehicle_level`.
   Eigen::Matrix2d velocity_covariance = Eigen::Matrix2d::Zero();
@@ -42,7 +42,7 @@ struct EkfLandmark {
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
   double radius_m = 0.0;
   LandmarkKind kind = LandmarkKind::kTrunk;
-  std::uint32_t times_seen = 0;
+  std::uint32_t observation_count = 0;
 };
 
 /// Channel EKF_MAP: the landmarks of the active state.
@@ -59,7 +59,7 @@ struct EkfLevel {
   Eigen::Vector2d error_rad = Eigen::Vector2d::Zero();   ///< Roll, pitch; as the filter knows it.
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< Of that [rad^2].
   /// Of the whole error, as detections' covariances have it.
-  Eigen::Matrix2d told_covariance = Eigen::Matrix2d::Zero();
+  Eigen::Matrix2d reported_covariance = Eigen::Matrix2d::Zero();
 };
 
 /// Channel VELOCITY_CORRECTION: what the filter knows about velocity and biases at utime.
@@ -72,4 +72,4 @@ struct VelocityCorrection {
   Eigen::Matrix<double, 5, 5> covariance = Eigen::Matrix<double, 5, 5>::Zero();
 };
 
-}  // namespace understory
+}  // namespace understory::model

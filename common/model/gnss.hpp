@@ -7,7 +7,7 @@
 
 #include "common/model/landmarks.hpp"
 
-namespace understory {
+namespace understory::model {
 
 /// Channel GNSS (and RAW_GNSS): a reference for evaluation, never used for mapping.
 struct GnssFix {
@@ -19,4 +19,4 @@ struct GnssFix {
   double velocity_sigma_mps = 0.0;                         ///< Per axis; 0 = unknown.
 };
 
-}  // namespace understory
+}  // namespace understory::model

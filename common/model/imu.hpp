@@ -6,7 +6,7 @@
 
 #include "common/model/landmarks.hpp"
 
-namespace understory {
+namespace understory::model {
 
 /// Channel IMU in frame `vehicle` (x forward, y left, z up); channel RAW_IMU in frame `sensor`, as
 /// the unit gives it.
@@ -17,4 +17,4 @@ struct ImuSample {
   Eigen::Vector3d specific_force_mps2 = Eigen::Vector3d::Zero();  ///< At rest (0, 0, +9.81).
 };
 
-}  // namespace understory
+}  // namespace understory::model

@@ -7,7 +7,7 @@
 #include "common/geometry/se2.hpp"
 #include "common/model/landmarks.hpp"
 
-namespace understory {
+namespace understory::model {
 
 /// One landmark of a keyframe, in the frame of the keyframe's `centre`.
 struct KeyframeLandmark {
@@ -15,7 +15,7 @@ struct KeyframeLandmark {
   /// D: what this landmark's own detections leave uncertain, independent between landmarks [m^2].
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
   double radius_m = 0.0;
-  std::uint16_t times_seen = 0;
+  std::uint16_t observation_count = 0;
   LandmarkKind kind = LandmarkKind::kTrunk;
 };
 
@@ -23,7 +23,7 @@ struct KeyframeLandmark {
 struct KeyframeMember {
   Utime utime = 0;
   std::uint64_t sequence = 0;
-  SE2 centre_T_vehicle;
+  geometry::SE2 centre_T_vehicle;
   /// Covariance of `centre_T_vehicle`: what this scan's own detections leave uncertain.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
@@ -42,9 +42,9 @@ struct Keyframe {
   std::vector<KeyframeLandmark> landmarks;
   /// Where the base is, seen from the previous keyframe's base, as the keyframer tracked it. It is
   /// made from the same detections: good for gating and linearisation, never a measurement.
-  std::optional<SE2> previous_T_base;
+  std::optional<geometry::SE2> previous_T_base;
 
-  const SE2& centre_T_base() const { return members.front().centre_T_vehicle; }
+  const geometry::SE2& centre_T_base() const { return members.front().centre_T_vehicle; }
 };
 
-}  // namespace understory
+}  // namespace understory::model

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-namespace understory {
+namespace understory::model {
 
 /// Microseconds since the epoch of the recording: the time of the measurement.
 using Utime = std::int64_t;
@@ -46,4 +46,4 @@ struct LandmarkScan {
   std::vector<Detection> detections;
 };
 
-}  // namespace understory
+}  // namespace understory::model

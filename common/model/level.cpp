@@ -4,7 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <cstdlib>
 
-namespace understory {
+namespace understory::model {
 namespace {
 
 /// The level's error changes over some seconds.
@@ -25,7 +25,7 @@ Eigen::Matrix2d without_level(const Eigen::Matrix2d& covariance_m2, const Eigen:
   return turn * left.asDiagonal() * turn.transpose();
 }
 
-LandmarkScan KnownLevel::levelled(LandmarkScan scan) const {
+LandmarkScan LevelCorrection::levelled(LandmarkScan scan) const {
   if (!level_ || std::abs(scan.utime - level_->utime) > kLately_us) return scan;
   Eigen::Matrix2d by_height;
   by_height << 0.0, 1.0, -1.0, 0.0;
@@ -35,11 +35,11 @@ LandmarkScan KnownLevel::levelled(LandmarkScan scan) const {
     detection.position_m.head<2>() -= arm * level_->error_rad;
     const Eigen::Matrix2d whole = detection.covariance_m2.topLeftCorner<2, 2>();
     if (whole.llt().info() != Eigen::Success) continue;
-    const Eigen::Matrix2d own = without_level(whole, arm, level_->told_covariance);
+    const Eigen::Matrix2d own = without_level(whole, arm, level_->reported_covariance);
     detection.covariance_m2.topLeftCorner<2, 2>() =
         own + arm * level_->covariance * arm.transpose();
   }
   return scan;
 }
 
-}  // namespace understory
+}  // namespace understory::model

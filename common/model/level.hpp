@@ -6,12 +6,12 @@
 #include "common/model/ekf_output.hpp"
 #include "common/model/landmarks.hpp"
 
-namespace understory {
+namespace understory::model {
 
 /// The filter's latest word on the level, for those who take LANDMARKS.
-class KnownLevel {
+class LevelCorrection {
  public:
-  void know(const EkfLevel& level) { level_ = level; }
+  void set(const EkfLevel& level) { level_ = level; }
   /// The scan as it is at the true level: an error of roll and pitch displaces detections by their
   /// height. The covariance that this error had in theirs is replaced by what is left of it. As it
   /// came where the filter said nothing lately.
@@ -28,4 +28,4 @@ class KnownLevel {
 Eigen::Matrix2d without_level(const Eigen::Matrix2d& covariance_m2, const Eigen::Matrix2d& arm,
                               const Eigen::Matrix2d& level_covariance_rad2);
 
-}  // namespace understory
+}  // namespace understory::model

@@ -8,7 +8,7 @@
 #include "common/geometry/se2.hpp"
 #include "common/model/landmarks.hpp"
 
-namespace understory {
+namespace understory::model {
 
 /// 64 bit: map id (upper 16), counter (lower 48). Permanent, never used again. 0 = none.
 using LandmarkId = std::uint64_t;
@@ -19,7 +19,7 @@ struct MapLandmark {
   Eigen::Matrix2d covariance_m2 =
       Eigen::Matrix2d::Zero();  ///< Marginal, frame `map`; zero where not computed.
   double radius_m = 0.0;
-  std::uint32_t times_seen = 0;  ///< Scans in which it was detected.
+  std::uint32_t observation_count = 0;  ///< Scans in which it was detected.
   LandmarkKind kind = LandmarkKind::kTrunk;
 };
 
@@ -27,7 +27,7 @@ struct MapLandmark {
 struct KeyframePose {
   std::uint64_t keyframe_sequence = 0;
   Utime utime = 0;
-  SE2 map_T_vehicle;
+  geometry::SE2 map_T_vehicle;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Zero where not computed.
 };
 
@@ -52,9 +52,9 @@ struct MapUpdate {
   std::uint64_t keyframe_sequence = 0;
   Utime utime = 0;
   MapUpdateStatus status = MapUpdateStatus::kRejected;
-  SE2 map_T_vehicle;                                     ///< Of the keyframe's base.
+  geometry::SE2 map_T_vehicle;                           ///< Of the keyframe's base.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Of map_T_vehicle.
-  SE2 map_T_latest_vehicle;                              ///< Of the keyframe's last member.
+  geometry::SE2 map_T_latest_vehicle;                    ///< Of the keyframe's last member.
   std::vector<Association> associations;
   std::vector<LandmarkId> added;
   std::vector<LandmarkId> removed;
@@ -69,4 +69,4 @@ struct MapUpdate {
   std::string reason;              ///< Why not, where not.
 };
 
-}  // namespace understory
+}  // namespace understory::model

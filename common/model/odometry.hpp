@@ -7,7 +7,7 @@
 #include "common/geometry/se2.hpp"
 #include "common/model/landmarks.hpp"
 
-namespace understory {
+namespace understory::model {
 
 /// Errors of the inertial sensors that last, in `vehicle_level`: gyro about z [rad/s],
 /// accelerometer along x and y [m/s^2] (the level's own error included).
@@ -49,7 +49,7 @@ struct Odometry {
   Utime from_utime = 0;
   Utime utime = 0;  ///< End of the interval.
   std::uint64_t sequence = 0;
-  SE2 from_T_to;
+  geometry::SE2 from_T_to;
   /// Covariance of `from_T_to` (tangent order x, y, theta; right perturbation).
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   /// Where there is an IMU. `from_T_to` is then made of the same samples (and of the wheels, where
@@ -57,7 +57,7 @@ struct Odometry {
   std::optional<Preintegration> inertial = {};
   /// Wheels stood behind `from_T_to`; without them its translation rests on dead-reckoned velocity.
   bool has_wheels = false;
-  bool is_standing = false;  ///< The vehicle was found to stand still during the interval.
+  bool is_stationary = false;  ///< The vehicle was found to stand still during the interval.
 };
 
-}  // namespace understory
+}  // namespace understory::model

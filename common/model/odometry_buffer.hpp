@@ -7,10 +7,10 @@
 #include "common/model/ekf_output.hpp"
 #include "common/model/odometry.hpp"
 
-namespace understory {
+namespace understory::model {
 
 /// How fast the vehicle is, from a filter that sees landmarks.
-struct KnownVelocity {
+struct VelocityEstimate {
   Utime utime = 0;
   Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Frame `vehicle_level` at utime.
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
@@ -24,14 +24,14 @@ struct FilterBias {
 };
 
 /// What a gyro said of a time.
-struct GyroTurn {
-  double turn_rad = 0.0;
+struct GyroRotation {
+  double rotation_rad = 0.0;
   double variance = 0.0;  ///< Of that [rad^2]; of white noise alone, see OdometryBuffer.
   double seconds = 0.0;   ///< On the move.
   double bias_rad = 0.0;  ///< What was taken out as the gyro's bias in that time.
 
-  void operator+=(const GyroTurn& other) {
-    turn_rad += other.turn_rad;
+  void operator+=(const GyroRotation& other) {
+    rotation_rad += other.rotation_rad;
     variance += other.variance;
     seconds += other.seconds;
     bias_rad += other.bias_rad;
@@ -41,15 +41,16 @@ struct GyroTurn {
 /// Keeps consecutive pieces of odometry. Bounded: old pieces are forgotten.
 class OdometryBuffer {
  public:
-  static constexpr double kBiasLasts_s = 5.0;
+  static constexpr double kBiasCorrelation_s = 5.0;
 
   /// `bias_lasts_s`: for how long what the filter does not know of the gyro's bias stays the same,
   /// as far as it counts to whoever compounds pieces. 0: they have it as a variable of their own,
   /// covariances are of what is new in each piece.
-  explicit OdometryBuffer(double bias_lasts_s = kBiasLasts_s) : bias_lasts_s_(bias_lasts_s) {}
+  explicit OdometryBuffer(double bias_correlation_s = kBiasCorrelation_s)
+      : bias_correlation_s_(bias_correlation_s) {}
 
   /// Adds a piece; one that overlaps or runs backwards is refused (false).
-  bool add(const Odometry& piece);
+  bool add(const Odometry& increment);
   /// What is known from now on of the gyro's bias (from a filter that sees landmarks): pieces with
   /// an IMU that are added later turn by as much as their own bias differed from it.
   void set_bias(const InertialBias& bias) { bias_ = bias; }
@@ -58,32 +59,32 @@ class OdometryBuffer {
   /// seconds; counted as noise of the same power it makes the way from scan to scan thirty times as
   /// uncertain as it is. A filter has learned it: pieces with an IMU start at its velocity, where
   /// that is surer.
-  void know(const EkfPose& pose);
-  const std::optional<KnownVelocity>& velocity() const { return velocity_; }
+  void set_filter_pose(const EkfPose& pose);
+  const std::optional<VelocityEstimate>& velocity() const { return velocity_; }
   /// None before the filter spoke, and after a gap.
   std::optional<FilterBias> filter_bias() const {
     if (!bias_ || !velocity_ || !(velocity_->gyro_bias_variance > 0.0)) return std::nullopt;
     return FilterBias{bias_->x(), velocity_->gyro_bias_variance};
   }
-  void restore(const KnownVelocity& velocity) { velocity_ = velocity; }
+  void restore(const VelocityEstimate& velocity) { velocity_ = velocity; }
   /// Motion of the vehicle from `from` to `to`, or none where a gap or the end of the buffer is in
   /// between. Inside a piece the motion is taken at constant twist and its covariance in proportion
   /// to time.
-  std::optional<SE2WithCovariance> between(Utime from, Utime to) const;
+  std::optional<geometry::SE2WithCovariance> between(Utime from, Utime to) const;
   /// The same of the turn alone; none also where there was no IMU.
-  std::optional<GyroTurn> gyro_turn(Utime from, Utime to) const;
+  std::optional<GyroRotation> gyro_rotation(Utime from, Utime to) const;
   void forget_before(Utime utime);
-  const std::deque<Odometry>& pieces() const { return pieces_; }
+  const std::deque<Odometry>& increments() const { return increments_; }
   /// A piece that pieces() gave, into an empty buffer: as it is.
-  void restore(const Odometry& piece) { pieces_.push_back(piece); }
+  void restore(const Odometry& increment) { increments_.push_back(increment); }
 
  private:
-  void start_at_velocity(Odometry& piece);
+  void start_at_velocity(Odometry& increment);
 
-  double bias_lasts_s_;
-  std::deque<Odometry> pieces_;
+  double bias_correlation_s_;
+  std::deque<Odometry> increments_;
   std::optional<InertialBias> bias_;
-  std::optional<KnownVelocity> velocity_;  ///< At the end of the last piece that continued it.
+  std::optional<VelocityEstimate> velocity_;  ///< At the end of the last piece that continued it.
 };
 
-}  // namespace understory
+}  // namespace understory::model

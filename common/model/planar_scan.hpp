@@ -6,7 +6,7 @@
 
 #include "common/model/landmarks.hpp"
 
-namespace understory {
+namespace understory::model {
 
 /// Channel LIDAR_SCAN from a one-plane laser: beam k points at `first_bearing_rad` + k *
 /// `bearing_step_rad` (frame `sensor`: 0 = straight ahead, left positive).
@@ -27,4 +27,4 @@ struct PlanarScan {
   }
 };
 
-}  // namespace understory
+}  // namespace understory::model

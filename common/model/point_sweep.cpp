@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
-namespace understory {
+namespace understory::model {
 
 namespace {
 
@@ -43,7 +43,7 @@ std::optional<PointSweep> SweepAssembler::add(PointSweep part) {
     if (pending_) count_incomplete(pending_->turn);
     pending_.reset();
     if (part.part != 0) {
-      if (lost_turn_ != part.turn) count_incomplete(part.turn);
+      if (lost_revolution_ != part.turn) count_incomplete(part.turn);
       return std::nullopt;
     }
     const std::size_t expected = part.points.size() * part.parts;
@@ -63,7 +63,7 @@ std::optional<PointSweep> SweepAssembler::add(PointSweep part) {
 
 void SweepAssembler::count_incomplete(std::uint64_t turn) {
   ++incomplete_;
-  lost_turn_ = turn;
+  lost_revolution_ = turn;
 }
 
-}  // namespace understory
+}  // namespace understory::model

@@ -9,7 +9,7 @@
 
 #include "common/model/landmarks.hpp"
 
-namespace understory {
+namespace understory::model {
 
 struct SweepPoint {
   float x_m = 0.0F;
@@ -61,15 +61,15 @@ class SweepAssembler {
  public:
   /// The whole turn when its last part comes in, else none. Parts must come in order.
   std::optional<PointSweep> add(PointSweep part);
-  std::uint64_t incomplete_turns() const { return incomplete_; }
+  std::uint64_t incomplete_revolutions() const { return incomplete_; }
 
  private:
   void count_incomplete(std::uint64_t turn);
 
   std::optional<PointSweep> pending_;
-  std::optional<std::uint64_t> lost_turn_;  ///< Counted already.
+  std::optional<std::uint64_t> lost_revolution_;  ///< Counted already.
   std::uint16_t next_part_ = 0;
   std::uint64_t incomplete_ = 0;
 };
 
-}  // namespace understory
+}  // namespace understory::model

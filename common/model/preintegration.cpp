@@ -1,6 +1,6 @@
 #include "common/model/preintegration.hpp"
 
-namespace understory {
+namespace understory::model {
 
 Preintegration at_bias(const Preintegration& inertial, const InertialBias& bias) {
   Preintegration moved = inertial;
@@ -12,4 +12,4 @@ Preintegration at_bias(const Preintegration& inertial, const InertialBias& bias)
   return moved;
 }
 
-}  // namespace understory
+}  // namespace understory::model

@@ -3,9 +3,9 @@
 
 #include "common/model/odometry.hpp"
 
-namespace understory {
+namespace understory::model {
 
 /// To first order in the difference of the biases; the covariance stays.
 Preintegration at_bias(const Preintegration& inertial, const InertialBias& bias);
 
-}  // namespace understory
+}  // namespace understory::model

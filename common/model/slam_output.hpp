@@ -8,7 +8,7 @@
 
 #include "common/model/map.hpp"
 
-namespace understory {
+namespace understory::model {
 
 /// Channel SLAM_POSE, for one observation.
 struct SlamPose {
@@ -18,19 +18,19 @@ struct SlamPose {
   std::optional<MapUpdateStatus> status;
   std::optional<std::uint64_t> keyframe_sequence;  ///< The keyframe that decided the pose.
   std::uint64_t submap_id = 0;
-  SE2 submap_T_vehicle;
+  geometry::SE2 submap_T_vehicle;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Of submap_T_vehicle.
   std::uint64_t correction_version = 0;
-  SE2 map_T_submap;
-  SE2 map_T_odom;
+  geometry::SE2 map_T_submap;
+  geometry::SE2 map_T_odom;
   std::uint64_t reset_counter = 0;
-  SE2 reset_delta;  ///< Latest jump: old_T_new of the vehicle.
+  geometry::SE2 reset_delta;  ///< Latest jump: old_T_new of the vehicle.
 
   /// The pose means something.
   bool is_localised() const {
     return !status || *status == MapUpdateStatus::kFirstMap || *status == MapUpdateStatus::kUpdated;
   }
-  SE2 map_T_vehicle() const { return map_T_submap * submap_T_vehicle; }
+  geometry::SE2 map_T_vehicle() const { return map_T_submap * submap_T_vehicle; }
 };
 
 /// Channel MAP.
@@ -55,4 +55,4 @@ struct MapDelta {
   std::vector<std::pair<LandmarkId, LandmarkId>> merged;  ///< old -> new.
 };
 
-}  // namespace understory
+}  // namespace understory::model

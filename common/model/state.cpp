@@ -2,7 +2,24 @@
 
 #include <stdexcept>
 
-namespace understory {
+namespace understory::geometry {
+
+void to_json(nlohmann::json& json, const SE2& pose) { json = {pose.x(), pose.y(), pose.theta()}; }
+void from_json(const nlohmann::json& json, SE2& pose) {
+  pose = SE2(json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>());
+}
+
+void to_json(nlohmann::json& json, const SE2WithCovariance& pose) {
+  json = {pose.mean, model::matrix_to_json<3, 3>(pose.covariance)};
+}
+void from_json(const nlohmann::json& json, SE2WithCovariance& pose) {
+  pose.mean = json.at(0).get<SE2>();
+  pose.covariance = model::matrix_from_json<3, 3>(json.at(1));
+}
+
+}  // namespace understory::geometry
+
+namespace understory::model {
 
 std::string to_state(const Json& json) {
   const std::vector<std::uint8_t> bytes = Json::to_cbor(json);
@@ -13,19 +30,6 @@ Json from_state(const std::string& state) {
   Json json = Json::from_cbor(state.begin(), state.end(), true, false);
   if (json.is_discarded()) throw std::invalid_argument("state: not a valid CBOR document");
   return json;
-}
-
-void to_json(Json& json, const SE2& pose) { json = {pose.x(), pose.y(), pose.theta()}; }
-void from_json(const Json& json, SE2& pose) {
-  pose = SE2(json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>());
-}
-
-void to_json(Json& json, const SE2WithCovariance& pose) {
-  json = {pose.mean, matrix_to_json<3, 3>(pose.covariance)};
-}
-void from_json(const Json& json, SE2WithCovariance& pose) {
-  pose.mean = json.at(0).get<SE2>();
-  pose.covariance = matrix_from_json<3, 3>(json.at(1));
 }
 
 void to_json(Json& json, const Detection& d) {
@@ -100,36 +104,38 @@ void to_json(Json& json, const Odometry& odometry) {
           matrix_to_json<3, 3>(odometry.covariance),
           optional_to_json(odometry.inertial),
           odometry.has_wheels,
-          odometry.is_standing};
+          odometry.is_stationary};
 }
 void from_json(const Json& json, Odometry& odometry) {
   odometry.from_utime = json.at(0).get<Utime>();
   odometry.utime = json.at(1).get<Utime>();
   odometry.sequence = json.at(2).get<std::uint64_t>();
-  odometry.from_T_to = json.at(3).get<SE2>();
+  odometry.from_T_to = json.at(3).get<geometry::SE2>();
   odometry.covariance = matrix_from_json<3, 3>(json.at(4));
   odometry.inertial = optional_from_json<Preintegration>(json.at(5));
   odometry.has_wheels = json.at(6).get<bool>();
-  odometry.is_standing = json.at(7).get<bool>();
+  odometry.is_stationary = json.at(7).get<bool>();
 }
 
 void to_json(Json& json, const OdometryBuffer& buffer) {
-  Json pieces = Json::array();
-  for (const Odometry& piece : buffer.pieces()) pieces.push_back(piece);
-  json = {pieces, buffer.bias() ? matrix_to_json<3, 1>(*buffer.bias()) : Json(nullptr), nullptr};
+  Json increments = Json::array();
+  for (const Odometry& increment : buffer.increments()) increments.push_back(increment);
+  json = {increments, buffer.bias() ? matrix_to_json<3, 1>(*buffer.bias()) : Json(nullptr),
+          nullptr};
   if (const auto& known = buffer.velocity()) {
     json[2] = {known->utime, matrix_to_json<2, 1>(known->velocity_mps),
                matrix_to_json<2, 2>(known->covariance), known->gyro_bias_variance};
   }
 }
-void to_json(Json& json, const KnownLevel& level) {
+void to_json(Json& json, const LevelCorrection& level) {
   json = nullptr;
   if (const auto& known = level.latest()) {
     json = {known->utime, known->sequence, matrix_to_json<2, 1>(known->error_rad),
-            matrix_to_json<2, 2>(known->covariance), matrix_to_json<2, 2>(known->told_covariance)};
+            matrix_to_json<2, 2>(known->covariance),
+            matrix_to_json<2, 2>(known->reported_covariance)};
   }
 }
-void from_json(const Json& json, KnownLevel& level) {
+void from_json(const Json& json, LevelCorrection& level) {
   level.restore(std::nullopt);
   if (json.is_null()) return;
   level.restore(EkfLevel{json.at(0).get<Utime>(), json.at(1).get<std::uint64_t>(),
@@ -137,12 +143,12 @@ void from_json(const Json& json, KnownLevel& level) {
                          matrix_from_json<2, 2>(json.at(4))});
 }
 void from_json(const Json& json, OdometryBuffer& buffer) {
-  for (const Json& piece : json.at(0)) buffer.restore(piece.get<Odometry>());
+  for (const Json& increment : json.at(0)) buffer.restore(increment.get<Odometry>());
   if (!json.at(1).is_null()) buffer.set_bias(matrix_from_json<3, 1>(json.at(1)));
   if (json.size() < 3 || json.at(2).is_null()) return;
   const Json& known = json.at(2);
-  buffer.restore(KnownVelocity{known.at(0).get<Utime>(), matrix_from_json<2, 1>(known.at(1)),
-                               matrix_from_json<2, 2>(known.at(2)), known.at(3).get<double>()});
+  buffer.restore(VelocityEstimate{known.at(0).get<Utime>(), matrix_from_json<2, 1>(known.at(1)),
+                                  matrix_from_json<2, 2>(known.at(2)), known.at(3).get<double>()});
 }
 
-}  // namespace understory
+}  // namespace understory::model

@@ -13,7 +13,16 @@
 #include "common/model/odometry.hpp"
 #include "common/model/odometry_buffer.hpp"
 
-namespace understory {
+namespace understory::geometry {
+
+void to_json(nlohmann::json& json, const SE2& pose);
+void from_json(const nlohmann::json& json, SE2& pose);
+void to_json(nlohmann::json& json, const SE2WithCovariance& pose);
+void from_json(const nlohmann::json& json, SE2WithCovariance& pose);
+
+}  // namespace understory::geometry
+
+namespace understory::model {
 
 using Json = nlohmann::json;
 
@@ -35,10 +44,6 @@ Eigen::Matrix<double, Rows, Cols> matrix_from_json(const Json& json) {
   return Eigen::Map<const Eigen::Matrix<double, Rows, Cols>>(values.data());
 }
 
-void to_json(Json& json, const SE2& pose);
-void from_json(const Json& json, SE2& pose);
-void to_json(Json& json, const SE2WithCovariance& pose);
-void from_json(const Json& json, SE2WithCovariance& pose);
 void to_json(Json& json, const Detection& detection);
 void from_json(const Json& json, Detection& detection);
 void to_json(Json& json, const FieldOfView& view);
@@ -49,8 +54,8 @@ void to_json(Json& json, const Preintegration& p);
 void from_json(const Json& json, Preintegration& p);
 void to_json(Json& json, const Odometry& odometry);
 void from_json(const Json& json, Odometry& odometry);
-void to_json(Json& json, const KnownLevel& level);
-void from_json(const Json& json, KnownLevel& level);
+void to_json(Json& json, const LevelCorrection& level);
+void from_json(const Json& json, LevelCorrection& level);
 void to_json(Json& json, const OdometryBuffer& buffer);
 /// Into an empty buffer.
 void from_json(const Json& json, OdometryBuffer& buffer);
@@ -65,4 +70,4 @@ std::optional<T> optional_from_json(const Json& json) {
   return json.get<T>();
 }
 
-}  // namespace understory
+}  // namespace understory::model

@@ -6,7 +6,7 @@
 
 #include "common/model/landmarks.hpp"
 
-namespace understory {
+namespace understory::model {
 
 /// Never used again by another track; 0 = none.
 using TrackId = std::uint64_t;
@@ -25,4 +25,4 @@ struct TrackedScan {
   std::vector<TrackedLandmark> landmarks;
 };
 
-}  // namespace understory
+}  // namespace understory::model

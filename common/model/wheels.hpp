@@ -5,7 +5,7 @@
 
 #include "common/model/landmarks.hpp"
 
-namespace understory {
+namespace understory::model {
 
 /// Channel WHEELS: speed at the encoder's wheel and steering of the equivalent bicycle's front
 /// wheel.
@@ -16,4 +16,4 @@ struct WheelSample {
   double steering_rad = 0.0;  ///< Left positive.
 };
 
-}  // namespace understory
+}  // namespace understory::model

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace understory {
+namespace understory::wire {
 namespace {
 
 constexpr double kRounding = 1e-6;         // relative to the geometric mean of the diagonal
@@ -120,4 +120,4 @@ void Checks::refuse(Reason reason, std::string_view field, std::string_view what
   refusal_ = Refusal{reason, std::move(text)};
 }
 
-}  // namespace understory
+}  // namespace understory::wire

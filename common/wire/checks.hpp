@@ -10,7 +10,7 @@
 #include "common/wire/result.hpp"
 #include "understory/pose2_t.hpp"
 
-namespace understory {
+namespace understory::wire {
 
 /// A matrix as the wire types hold it: double name[N][N], row by row.
 template <int N>
@@ -57,4 +57,4 @@ class Checks {
 bool is_positive_semidefinite(const Eigen::Matrix3d& symmetric);
 bool is_positive_semidefinite_5(const Eigen::Matrix<double, 5, 5>& symmetric);
 
-}  // namespace understory
+}  // namespace understory::wire

@@ -38,53 +38,53 @@
 #include "understory/velocity_correction_t.hpp"
 #include "understory/wheels_t.hpp"
 
-namespace understory {
+namespace understory::wire {
 
-Result<LandmarkScan> from_wire(const landmarks_t& wire);
-Result<Odometry> from_wire(const odometry_t& wire);
-Result<Odometry> from_wire(const odometry2_t& wire);
-Result<Keyframe> from_wire(const keyframe_t& wire);
-Result<MapUpdate> from_wire(const slam_update_t& wire);
-Result<SlamPose> from_wire(const slam_pose_t& wire);
-Result<WholeMap> from_wire(const map_t& wire);
-Result<MapDelta> from_wire(const map_delta_t& wire);
+Result<model::LandmarkScan> from_wire(const landmarks_t& wire);
+Result<model::Odometry> from_wire(const odometry_t& wire);
+Result<model::Odometry> from_wire(const odometry2_t& wire);
+Result<model::Keyframe> from_wire(const keyframe_t& wire);
+Result<model::MapUpdate> from_wire(const slam_update_t& wire);
+Result<model::SlamPose> from_wire(const slam_pose_t& wire);
+Result<model::WholeMap> from_wire(const map_t& wire);
+Result<model::MapDelta> from_wire(const map_delta_t& wire);
 /// Where the laser sits and the intensities stay behind.
-Result<PlanarScan> from_wire(const lidar_scan_t& wire);
-Result<WheelSample> from_wire(const wheels_t& wire);
-Result<ImuSample> from_wire(const imu_t& wire);
-Result<PointSweep> from_wire(const lidar_sweep_t& wire);
-Result<TrackedScan> from_wire(const tracked_landmarks_t& wire);
-Result<RawPose> from_wire(const raw_pose_t& wire);
-Result<EkfPose> from_wire(const ekf_pose_t& wire);
-Result<EkfMap> from_wire(const ekf_map_t& wire);
-Result<EkfLevel> from_wire(const ekf_level_t& wire);
-Result<VelocityCorrection> from_wire(const velocity_correction_t& wire);
+Result<model::PlanarScan> from_wire(const lidar_scan_t& wire);
+Result<model::WheelSample> from_wire(const wheels_t& wire);
+Result<model::ImuSample> from_wire(const imu_t& wire);
+Result<model::PointSweep> from_wire(const lidar_sweep_t& wire);
+Result<model::TrackedScan> from_wire(const tracked_landmarks_t& wire);
+Result<model::RawPose> from_wire(const raw_pose_t& wire);
+Result<model::EkfPose> from_wire(const ekf_pose_t& wire);
+Result<model::EkfMap> from_wire(const ekf_map_t& wire);
+Result<model::EkfLevel> from_wire(const ekf_level_t& wire);
+Result<model::VelocityCorrection> from_wire(const velocity_correction_t& wire);
 /// Refused where the receiver has no fix.
-Result<GnssFix> from_wire(const gnss_t& wire);
+Result<model::GnssFix> from_wire(const gnss_t& wire);
 
-landmarks_t to_wire(const LandmarkScan& scan);
-odometry2_t to_wire(const Odometry& odometry);
-keyframe_t to_wire(const Keyframe& keyframe);
-slam_update_t to_wire(const MapUpdate& update);  ///< `seq` is the keyframe's.
-slam_pose_t to_wire(const SlamPose& pose);
-map_t to_wire(const WholeMap& map);
-map_delta_t to_wire(const MapDelta& delta);
-lidar_scan_t to_wire(const PlanarScan& scan);
-wheels_t to_wire(const WheelSample& sample);
-gnss_t to_wire(const GnssFix& fix);
-imu_t to_wire(const ImuSample& sample);
+landmarks_t to_wire(const model::LandmarkScan& scan);
+odometry2_t to_wire(const model::Odometry& odometry);
+keyframe_t to_wire(const model::Keyframe& keyframe);
+slam_update_t to_wire(const model::MapUpdate& update);  ///< `seq` is the keyframe's.
+slam_pose_t to_wire(const model::SlamPose& pose);
+map_t to_wire(const model::WholeMap& map);
+map_delta_t to_wire(const model::MapDelta& delta);
+lidar_scan_t to_wire(const model::PlanarScan& scan);
+wheels_t to_wire(const model::WheelSample& sample);
+gnss_t to_wire(const model::GnssFix& fix);
+imu_t to_wire(const model::ImuSample& sample);
 /// Rounded to {1, 2, 4 ...} mm and us, as fine as 16 bits allow. Throws std::invalid_argument
 /// where a coordinate is not finite.
-lidar_sweep_t to_wire(const PointSweep& sweep);
-tracked_landmarks_t to_wire(const TrackedScan& scan);
-raw_pose_t to_wire(const RawPose& pose);
-ekf_pose_t to_wire(const EkfPose& pose);
-ekf_map_t to_wire(const EkfMap& map);
-ekf_level_t to_wire(const EkfLevel& level);
-velocity_correction_t to_wire(const VelocityCorrection& correction);
+lidar_sweep_t to_wire(const model::PointSweep& sweep);
+tracked_landmarks_t to_wire(const model::TrackedScan& scan);
+raw_pose_t to_wire(const model::RawPose& pose);
+ekf_pose_t to_wire(const model::EkfPose& pose);
+ekf_map_t to_wire(const model::EkfMap& map);
+ekf_level_t to_wire(const model::EkfLevel& level);
+velocity_correction_t to_wire(const model::VelocityCorrection& correction);
 
-pose2_t to_wire(const SE2& pose);
-SE2 from_wire(const pose2_t& pose);
+pose2_t to_wire(const geometry::SE2& pose);
+geometry::SE2 from_wire(const pose2_t& pose);
 
 /// The wire type of a value that stages exchange; a wire type is its own.
 template <class T>
@@ -92,75 +92,75 @@ struct WireOf {
   using type = T;
 };
 template <>
-struct WireOf<LandmarkScan> {
+struct WireOf<model::LandmarkScan> {
   using type = landmarks_t;
 };
 template <>
-struct WireOf<Odometry> {
+struct WireOf<model::Odometry> {
   using type = odometry2_t;
 };
 template <>
-struct WireOf<Keyframe> {
+struct WireOf<model::Keyframe> {
   using type = keyframe_t;
 };
 template <>
-struct WireOf<MapUpdate> {
+struct WireOf<model::MapUpdate> {
   using type = slam_update_t;
 };
 template <>
-struct WireOf<SlamPose> {
+struct WireOf<model::SlamPose> {
   using type = slam_pose_t;
 };
 template <>
-struct WireOf<WholeMap> {
+struct WireOf<model::WholeMap> {
   using type = map_t;
 };
 template <>
-struct WireOf<MapDelta> {
+struct WireOf<model::MapDelta> {
   using type = map_delta_t;
 };
 template <>
-struct WireOf<PlanarScan> {
+struct WireOf<model::PlanarScan> {
   using type = lidar_scan_t;
 };
 template <>
-struct WireOf<WheelSample> {
+struct WireOf<model::WheelSample> {
   using type = wheels_t;
 };
 template <>
-struct WireOf<GnssFix> {
+struct WireOf<model::GnssFix> {
   using type = gnss_t;
 };
 template <>
-struct WireOf<ImuSample> {
+struct WireOf<model::ImuSample> {
   using type = imu_t;
 };
 template <>
-struct WireOf<PointSweep> {
+struct WireOf<model::PointSweep> {
   using type = lidar_sweep_t;
 };
 template <>
-struct WireOf<TrackedScan> {
+struct WireOf<model::TrackedScan> {
   using type = tracked_landmarks_t;
 };
 template <>
-struct WireOf<RawPose> {
+struct WireOf<model::RawPose> {
   using type = raw_pose_t;
 };
 template <>
-struct WireOf<EkfPose> {
+struct WireOf<model::EkfPose> {
   using type = ekf_pose_t;
 };
 template <>
-struct WireOf<EkfMap> {
+struct WireOf<model::EkfMap> {
   using type = ekf_map_t;
 };
 template <>
-struct WireOf<EkfLevel> {
+struct WireOf<model::EkfLevel> {
   using type = ekf_level_t;
 };
 template <>
-struct WireOf<VelocityCorrection> {
+struct WireOf<model::VelocityCorrection> {
   using type = velocity_correction_t;
 };
 
@@ -179,7 +179,8 @@ Result<T> decode_message(std::span<const std::uint8_t> bytes) {
 
 /// Logs may have the version of before, which says nothing of the level's error.
 template <>
-inline Result<Odometry> decode_message<Odometry>(std::span<const std::uint8_t> bytes) {
+inline Result<model::Odometry> decode_message<model::Odometry>(
+    std::span<const std::uint8_t> bytes) {
   const Result<odometry2_t> wire = decode_bytes<odometry2_t>(bytes);
   if (wire) return from_wire(*wire);
   const Result<odometry_t> old = decode_bytes<odometry_t>(bytes);
@@ -197,4 +198,4 @@ Bytes encode_message(const T& value) {
   }
 }
 
-}  // namespace understory
+}  // namespace understory::wire

@@ -3,7 +3,7 @@
 #include "common/wire/convert.hpp"
 #include "common/wire/convert_shared.hpp"
 
-namespace understory {
+namespace understory::wire {
 namespace {
 
 constexpr double kFastestMps = 1000.0;
@@ -17,10 +17,10 @@ void check_all(std::string_view field, const double (&values)[N], double limit, 
 
 }  // namespace
 
-Result<RawPose> from_wire(const raw_pose_t& wire) {
+Result<model::RawPose> from_wire(const raw_pose_t& wire) {
   Checks checks;
   checks.pose("odom_T_vehicle", wire.odom_T_vehicle);
-  RawPose pose;
+  model::RawPose pose;
   pose.utime = wire.utime;
   pose.sequence = static_cast<std::uint64_t>(wire.seq);
   pose.odom_T_vehicle = from_wire(wire.odom_T_vehicle);
@@ -30,7 +30,7 @@ Result<RawPose> from_wire(const raw_pose_t& wire) {
   return pose;
 }
 
-raw_pose_t to_wire(const RawPose& pose) {
+raw_pose_t to_wire(const model::RawPose& pose) {
   raw_pose_t wire{};
   wire.utime = pose.utime;
   wire.seq = static_cast<std::int64_t>(pose.sequence);
@@ -40,7 +40,7 @@ raw_pose_t to_wire(const RawPose& pose) {
   return wire;
 }
 
-Result<EkfPose> from_wire(const ekf_pose_t& wire) {
+Result<model::EkfPose> from_wire(const ekf_pose_t& wire) {
   Checks checks;
   checks.pose("ekf_map_T_vehicle", wire.ekf_map_T_vehicle);
   check_all("velocity_m_s", wire.velocity_m_s, kFastestMps, checks);
@@ -49,7 +49,7 @@ Result<EkfPose> from_wire(const ekf_pose_t& wire) {
   checks.range("landmarks_refused", wire.landmarks_refused, 0,
                std::numeric_limits<std::int32_t>::max());
   checks.range("reset_counter", static_cast<double>(wire.reset_counter), 0.0, 9.3e18);
-  EkfPose pose;
+  model::EkfPose pose;
   pose.utime = wire.utime;
   pose.sequence = static_cast<std::uint64_t>(wire.seq);
   pose.ekf_map_T_vehicle = from_wire(wire.ekf_map_T_vehicle);
@@ -65,7 +65,7 @@ Result<EkfPose> from_wire(const ekf_pose_t& wire) {
   return pose;
 }
 
-ekf_pose_t to_wire(const EkfPose& pose) {
+ekf_pose_t to_wire(const model::EkfPose& pose) {
   ekf_pose_t wire{};
   wire.utime = pose.utime;
   wire.seq = static_cast<std::int64_t>(pose.sequence);
@@ -81,9 +81,9 @@ ekf_pose_t to_wire(const EkfPose& pose) {
   return wire;
 }
 
-Result<EkfMap> from_wire(const ekf_map_t& wire) {
+Result<model::EkfMap> from_wire(const ekf_map_t& wire) {
   Checks checks;
-  EkfMap map;
+  model::EkfMap map;
   map.utime = wire.utime;
   map.sequence = static_cast<std::uint64_t>(wire.seq);
   map.landmarks.reserve(wire.landmarks.size());
@@ -93,64 +93,64 @@ Result<EkfMap> from_wire(const ekf_map_t& wire) {
     check_landmark(from, checks);
     checks.range("track_id", static_cast<double>(from.track_id), 1.0, 9.3e18);
     checks.range("times_seen", from.times_seen, 0, std::numeric_limits<std::int32_t>::max());
-    EkfLandmark& landmark = map.landmarks.emplace_back();
-    landmark.track_id = static_cast<TrackId>(from.track_id);
+    model::EkfLandmark& landmark = map.landmarks.emplace_back();
+    landmark.track_id = static_cast<model::TrackId>(from.track_id);
     landmark.position_m = Eigen::Map<const Eigen::Vector2d>(from.position_m);
     landmark.covariance_m2 = checks.covariance("covariance_m2", from.covariance_m2);
     landmark.radius_m = from.radius_m;
-    landmark.kind = static_cast<LandmarkKind>(from.kind);
-    landmark.times_seen = static_cast<std::uint32_t>(from.times_seen);
+    landmark.kind = static_cast<model::LandmarkKind>(from.kind);
+    landmark.observation_count = static_cast<std::uint32_t>(from.times_seen);
   }
   if (checks.refusal()) return *checks.refusal();
   return map;
 }
 
-ekf_map_t to_wire(const EkfMap& map) {
+ekf_map_t to_wire(const model::EkfMap& map) {
   ekf_map_t wire{};
   wire.utime = map.utime;
   wire.seq = static_cast<std::int64_t>(map.sequence);
   wire.num_landmarks = static_cast<std::int32_t>(map.landmarks.size());
   wire.landmarks.reserve(map.landmarks.size());
-  for (const EkfLandmark& landmark : map.landmarks) {
+  for (const model::EkfLandmark& landmark : map.landmarks) {
     ekf_landmark_t& out = wire.landmarks.emplace_back();
     out.track_id = static_cast<std::int64_t>(landmark.track_id);
     copy_vector(landmark.position_m, out.position_m);
     copy_matrix(landmark.covariance_m2, out.covariance_m2);
     out.radius_m = landmark.radius_m;
     out.kind = static_cast<std::int8_t>(landmark.kind);
-    out.times_seen = static_cast<std::int32_t>(landmark.times_seen);
+    out.times_seen = static_cast<std::int32_t>(landmark.observation_count);
   }
   return wire;
 }
 
-Result<EkfLevel> from_wire(const ekf_level_t& wire) {
+Result<model::EkfLevel> from_wire(const ekf_level_t& wire) {
   Checks checks;
   check_all("error_rad", wire.error_rad, kLargestLevel_rad, checks);
-  EkfLevel level;
+  model::EkfLevel level;
   level.utime = wire.utime;
   level.sequence = static_cast<std::uint64_t>(wire.seq);
   level.error_rad = Eigen::Map<const Eigen::Vector2d>(wire.error_rad);
   level.covariance = checks.covariance("covariance", wire.covariance);
-  level.told_covariance = checks.covariance("told_covariance", wire.told_covariance);
+  level.reported_covariance = checks.covariance("told_covariance", wire.told_covariance);
   if (checks.refusal()) return *checks.refusal();
   return level;
 }
 
-ekf_level_t to_wire(const EkfLevel& level) {
+ekf_level_t to_wire(const model::EkfLevel& level) {
   ekf_level_t wire{};
   wire.utime = level.utime;
   wire.seq = static_cast<std::int64_t>(level.sequence);
   copy_vector(level.error_rad, wire.error_rad);
   copy_matrix(level.covariance, wire.covariance);
-  copy_matrix(level.told_covariance, wire.told_covariance);
+  copy_matrix(level.reported_covariance, wire.told_covariance);
   return wire;
 }
 
-Result<VelocityCorrection> from_wire(const velocity_correction_t& wire) {
+Result<model::VelocityCorrection> from_wire(const velocity_correction_t& wire) {
   Checks checks;
   check_all("velocity_m_s", wire.velocity_m_s, kFastestMps, checks);
   check_all("bias", wire.bias, kLargestBias, checks);
-  VelocityCorrection correction;
+  model::VelocityCorrection correction;
   correction.utime = wire.utime;
   correction.sequence = static_cast<std::uint64_t>(wire.seq);
   correction.velocity_mps = Eigen::Map<const Eigen::Vector2d>(wire.velocity_m_s);
@@ -160,7 +160,7 @@ Result<VelocityCorrection> from_wire(const velocity_correction_t& wire) {
   return correction;
 }
 
-velocity_correction_t to_wire(const VelocityCorrection& correction) {
+velocity_correction_t to_wire(const model::VelocityCorrection& correction) {
   velocity_correction_t wire{};
   wire.utime = correction.utime;
   wire.seq = static_cast<std::int64_t>(correction.sequence);
@@ -170,4 +170,4 @@ velocity_correction_t to_wire(const VelocityCorrection& correction) {
   return wire;
 }
 
-}  // namespace understory
+}  // namespace understory::wire

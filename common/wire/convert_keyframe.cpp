@@ -1,14 +1,14 @@
 #include "common/wire/convert.hpp"
 #include "common/wire/convert_shared.hpp"
 
-namespace understory {
+namespace understory::wire {
 namespace {
 
-KeyframeMember member(const keyframe_member_t& wire, Checks& checks) {
+model::KeyframeMember member(const keyframe_member_t& wire, Checks& checks) {
   checks.range("utime", static_cast<double>(wire.utime), 0.0, 9.1e15);
   checks.range("seq", static_cast<double>(wire.seq), 0.0, 9.3e18);
   checks.pose("centre_T_vehicle", wire.centre_T_vehicle);
-  KeyframeMember result;
+  model::KeyframeMember result;
   result.utime = wire.utime;
   result.sequence = static_cast<std::uint64_t>(wire.seq);
   result.centre_T_vehicle = from_wire(wire.centre_T_vehicle);
@@ -16,15 +16,15 @@ KeyframeMember member(const keyframe_member_t& wire, Checks& checks) {
   return result;
 }
 
-KeyframeLandmark landmark(const keyframe_landmark_t& wire, Checks& checks) {
+model::KeyframeLandmark landmark(const keyframe_landmark_t& wire, Checks& checks) {
   check_landmark(wire, checks);
   checks.range("times_seen", wire.times_seen, 0, std::numeric_limits<std::uint16_t>::max());
-  KeyframeLandmark result;
+  model::KeyframeLandmark result;
   result.position_m = Eigen::Map<const Eigen::Vector2d>(wire.position_m);
   result.covariance_m2 = checks.covariance("covariance_m2", wire.covariance_m2);
   result.radius_m = wire.radius_m;
-  result.times_seen = static_cast<std::uint16_t>(wire.times_seen);
-  result.kind = static_cast<LandmarkKind>(wire.kind);
+  result.observation_count = static_cast<std::uint16_t>(wire.times_seen);
+  result.kind = static_cast<model::LandmarkKind>(wire.kind);
   return result;
 }
 
@@ -42,10 +42,10 @@ void check_order(const keyframe_t& wire, Checks& checks) {
 
 }  // namespace
 
-Result<Keyframe> from_wire(const keyframe_t& wire) {
+Result<model::Keyframe> from_wire(const keyframe_t& wire) {
   Checks checks;
   check_order(wire, checks);
-  Keyframe keyframe;
+  model::Keyframe keyframe;
   keyframe.utime = wire.utime;
   keyframe.sequence = static_cast<std::uint64_t>(wire.seq);
   keyframe.field_of_view = field_of_view(wire, checks);
@@ -67,15 +67,15 @@ Result<Keyframe> from_wire(const keyframe_t& wire) {
   return keyframe;
 }
 
-keyframe_t to_wire(const Keyframe& keyframe) {
+keyframe_t to_wire(const model::Keyframe& keyframe) {
   keyframe_t wire{};
   wire.utime = keyframe.utime;
   wire.seq = static_cast<std::int64_t>(keyframe.sequence);
   copy_field_of_view(keyframe.field_of_view, wire);
   wire.has_previous = keyframe.previous_T_base.has_value() ? 1 : 0;
-  wire.previous_T_base = to_wire(keyframe.previous_T_base.value_or(SE2()));
+  wire.previous_T_base = to_wire(keyframe.previous_T_base.value_or(geometry::SE2()));
   wire.num_members = static_cast<std::int32_t>(keyframe.members.size());
-  for (const KeyframeMember& member : keyframe.members) {
+  for (const model::KeyframeMember& member : keyframe.members) {
     keyframe_member_t& out = wire.members.emplace_back();
     out.utime = member.utime;
     out.seq = static_cast<std::int64_t>(member.sequence);
@@ -83,15 +83,15 @@ keyframe_t to_wire(const Keyframe& keyframe) {
     copy_matrix(member.covariance, out.covariance);
   }
   wire.num_landmarks = static_cast<std::int32_t>(keyframe.landmarks.size());
-  for (const KeyframeLandmark& landmark : keyframe.landmarks) {
+  for (const model::KeyframeLandmark& landmark : keyframe.landmarks) {
     keyframe_landmark_t& out = wire.landmarks.emplace_back();
     copy_vector(landmark.position_m, out.position_m);
     copy_matrix(landmark.covariance_m2, out.covariance_m2);
     out.radius_m = landmark.radius_m;
-    out.times_seen = landmark.times_seen;
+    out.times_seen = landmark.observation_count;
     out.kind = static_cast<std::int8_t>(landmark.kind);
   }
   return wire;
 }
 
-}  // namespace understory
+}  // namespace understory::wire

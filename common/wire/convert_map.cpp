@@ -1,41 +1,41 @@
 #include "common/wire/convert.hpp"
 #include "common/wire/convert_shared.hpp"
 
-namespace understory {
+namespace understory::wire {
 namespace {
 
-LandmarkId landmark_id(std::int64_t wire, Checks& checks) {
+model::LandmarkId landmark_id(std::int64_t wire, Checks& checks) {
   checks.consistent(wire != 0, "landmark id is not 0");
-  return static_cast<LandmarkId>(wire);
+  return static_cast<model::LandmarkId>(wire);
 }
 
-MapLandmark landmark(const map_landmark_t& wire, Checks& checks) {
+model::MapLandmark landmark(const map_landmark_t& wire, Checks& checks) {
   check_landmark(wire, checks);
   checks.range("times_seen", wire.times_seen, 0, std::numeric_limits<std::int32_t>::max());
-  MapLandmark result;
+  model::MapLandmark result;
   result.id = landmark_id(wire.id, checks);
   result.position_m = Eigen::Map<const Eigen::Vector2d>(wire.position_m);
   result.covariance_m2 = checks.covariance("covariance_m2", wire.covariance_m2);
   result.radius_m = wire.radius_m;
-  result.times_seen = static_cast<std::uint32_t>(wire.times_seen);
-  result.kind = static_cast<LandmarkKind>(wire.kind);
+  result.observation_count = static_cast<std::uint32_t>(wire.times_seen);
+  result.kind = static_cast<model::LandmarkKind>(wire.kind);
   return result;
 }
 
-map_landmark_t to_wire(const MapLandmark& landmark) {
+map_landmark_t to_wire(const model::MapLandmark& landmark) {
   map_landmark_t wire{};
   wire.id = static_cast<std::int64_t>(landmark.id);
   copy_vector(landmark.position_m, wire.position_m);
   copy_matrix(landmark.covariance_m2, wire.covariance_m2);
   wire.radius_m = landmark.radius_m;
-  wire.times_seen = static_cast<std::int32_t>(landmark.times_seen);
+  wire.times_seen = static_cast<std::int32_t>(landmark.observation_count);
   wire.kind = static_cast<std::int8_t>(landmark.kind);
   return wire;
 }
 
-std::vector<MapLandmark> landmarks(std::string_view field, const std::vector<map_landmark_t>& wire,
-                                   Checks& checks) {
-  std::vector<MapLandmark> result;
+std::vector<model::MapLandmark> landmarks(std::string_view field,
+                                          const std::vector<map_landmark_t>& wire, Checks& checks) {
+  std::vector<model::MapLandmark> result;
   result.reserve(wire.size());
   for (std::size_t i = 0; i < wire.size(); ++i) {
     checks.in(field, i);
@@ -44,16 +44,16 @@ std::vector<MapLandmark> landmarks(std::string_view field, const std::vector<map
   return result;
 }
 
-std::vector<map_landmark_t> to_wire(const std::vector<MapLandmark>& landmarks) {
+std::vector<map_landmark_t> to_wire(const std::vector<model::MapLandmark>& landmarks) {
   std::vector<map_landmark_t> wire;
   wire.reserve(landmarks.size());
-  for (const MapLandmark& landmark : landmarks) wire.push_back(to_wire(landmark));
+  for (const model::MapLandmark& landmark : landmarks) wire.push_back(to_wire(landmark));
   return wire;
 }
 
-std::vector<LandmarkId> ids(std::string_view field, const std::vector<std::int64_t>& wire,
-                            Checks& checks) {
-  std::vector<LandmarkId> result;
+std::vector<model::LandmarkId> ids(std::string_view field, const std::vector<std::int64_t>& wire,
+                                   Checks& checks) {
+  std::vector<model::LandmarkId> result;
   result.reserve(wire.size());
   for (std::size_t i = 0; i < wire.size(); ++i) {
     checks.in(field, i);
@@ -62,7 +62,7 @@ std::vector<LandmarkId> ids(std::string_view field, const std::vector<std::int64
   return result;
 }
 
-using Merges = std::vector<std::pair<LandmarkId, LandmarkId>>;
+using Merges = std::vector<std::pair<model::LandmarkId, model::LandmarkId>>;
 
 Merges merges(const std::vector<merge_t>& wire, Checks& checks) {
   Merges result;
@@ -92,8 +92,8 @@ void copy_counts(Wire& wire) {
   wire.num_merged = static_cast<std::int32_t>(wire.merged.size());
 }
 
-std::vector<Association> associations(const slam_update_t& wire, Checks& checks) {
-  std::vector<Association> result;
+std::vector<model::Association> associations(const slam_update_t& wire, Checks& checks) {
+  std::vector<model::Association> result;
   result.reserve(wire.associations.size());
   for (std::size_t i = 0; i < wire.associations.size(); ++i) {
     checks.in("associations", i);
@@ -105,7 +105,7 @@ std::vector<Association> associations(const slam_update_t& wire, Checks& checks)
   return result;
 }
 
-void copy_diagnostics(const slam_update_t& wire, MapUpdate& update, Checks& checks) {
+void copy_diagnostics(const slam_update_t& wire, model::MapUpdate& update, Checks& checks) {
   constexpr double kMost = std::numeric_limits<std::int32_t>::max();
   checks.in_message();
   checks.range("candidates", wire.candidates, 0, kMost);
@@ -123,16 +123,16 @@ void copy_diagnostics(const slam_update_t& wire, MapUpdate& update, Checks& chec
 
 }  // namespace
 
-Result<MapUpdate> from_wire(const slam_update_t& wire) {
+Result<model::MapUpdate> from_wire(const slam_update_t& wire) {
   Checks checks;
   checks.range("keyframe_seq", static_cast<double>(wire.keyframe_seq), 0.0, 9.3e18);
   checks.range("status", wire.status, slam_update_t::FIRST_MAP, slam_update_t::REJECTED);
   checks.pose("map_T_vehicle", wire.map_T_vehicle);
   checks.pose("map_T_latest_vehicle", wire.map_T_latest_vehicle);
-  MapUpdate update;
+  model::MapUpdate update;
   update.keyframe_sequence = static_cast<std::uint64_t>(wire.keyframe_seq);
   update.utime = wire.utime;
-  update.status = static_cast<MapUpdateStatus>(wire.status);
+  update.status = static_cast<model::MapUpdateStatus>(wire.status);
   update.map_T_vehicle = from_wire(wire.map_T_vehicle);
   update.covariance = checks.covariance("covariance", wire.covariance);
   update.map_T_latest_vehicle = from_wire(wire.map_T_latest_vehicle);
@@ -145,7 +145,7 @@ Result<MapUpdate> from_wire(const slam_update_t& wire) {
   return update;
 }
 
-slam_update_t to_wire(const MapUpdate& update) {
+slam_update_t to_wire(const model::MapUpdate& update) {
   slam_update_t wire{};
   wire.utime = update.utime;
   wire.seq = static_cast<std::int64_t>(update.keyframe_sequence);
@@ -155,7 +155,7 @@ slam_update_t to_wire(const MapUpdate& update) {
   copy_matrix(update.covariance, wire.covariance);
   wire.map_T_latest_vehicle = to_wire(update.map_T_latest_vehicle);
   wire.num_associations = static_cast<std::int32_t>(update.associations.size());
-  for (const Association& one : update.associations) {
+  for (const model::Association& one : update.associations) {
     association_t& out = wire.associations.emplace_back();
     out.keyframe_landmark = static_cast<std::int32_t>(one.keyframe_landmark);
     out.landmark_id = static_cast<std::int64_t>(one.landmark_id);
@@ -174,10 +174,10 @@ slam_update_t to_wire(const MapUpdate& update) {
   return wire;
 }
 
-Result<WholeMap> from_wire(const map_t& wire) {
+Result<model::WholeMap> from_wire(const map_t& wire) {
   Checks checks;
   checks.range("version", static_cast<double>(wire.version), 0.0, 9.3e18);
-  WholeMap map;
+  model::WholeMap map;
   map.utime = wire.utime;
   map.sequence = static_cast<std::uint64_t>(wire.seq);
   map.version = static_cast<std::uint64_t>(wire.version);
@@ -197,7 +197,7 @@ Result<WholeMap> from_wire(const map_t& wire) {
   return map;
 }
 
-map_t to_wire(const WholeMap& map) {
+map_t to_wire(const model::WholeMap& map) {
   map_t wire{};
   wire.utime = map.utime;
   wire.seq = static_cast<std::int64_t>(map.sequence);
@@ -206,7 +206,7 @@ map_t to_wire(const WholeMap& map) {
   wire.landmarks = to_wire(map.landmarks);
   wire.num_landmarks = static_cast<std::int32_t>(wire.landmarks.size());
   wire.keyframes.reserve(map.keyframes.size());
-  for (const KeyframePose& pose : map.keyframes) {
+  for (const model::KeyframePose& pose : map.keyframes) {
     keyframe_pose_t& out = wire.keyframes.emplace_back();
     out.utime = pose.utime;
     out.keyframe_seq = static_cast<std::int64_t>(pose.keyframe_sequence);
@@ -217,11 +217,11 @@ map_t to_wire(const WholeMap& map) {
   return wire;
 }
 
-Result<MapDelta> from_wire(const map_delta_t& wire) {
+Result<model::MapDelta> from_wire(const map_delta_t& wire) {
   Checks checks;
   checks.consistent(wire.base_version >= 0 && wire.base_version < wire.version,
                     "base_version < version");
-  MapDelta delta;
+  model::MapDelta delta;
   delta.utime = wire.utime;
   delta.sequence = static_cast<std::uint64_t>(wire.seq);
   delta.base_version = static_cast<std::uint64_t>(wire.base_version);
@@ -234,7 +234,7 @@ Result<MapDelta> from_wire(const map_delta_t& wire) {
   return delta;
 }
 
-map_delta_t to_wire(const MapDelta& delta) {
+map_delta_t to_wire(const model::MapDelta& delta) {
   map_delta_t wire{};
   wire.utime = delta.utime;
   wire.seq = static_cast<std::int64_t>(delta.sequence);
@@ -249,4 +249,4 @@ map_delta_t to_wire(const MapDelta& delta) {
   return wire;
 }
 
-}  // namespace understory
+}  // namespace understory::wire

@@ -1,9 +1,9 @@
 #include "common/wire/convert.hpp"
 #include "common/wire/convert_shared.hpp"
 
-namespace understory {
+namespace understory::wire {
 
-Result<SlamPose> from_wire(const slam_pose_t& wire) {
+Result<model::SlamPose> from_wire(const slam_pose_t& wire) {
   Checks checks;
   checks.range("status", wire.status, slam_pose_t::FIRST_MAP, slam_pose_t::TRACKED);
   checks.pose("submap_T_vehicle", wire.submap_T_vehicle);
@@ -13,11 +13,11 @@ Result<SlamPose> from_wire(const slam_pose_t& wire) {
   checks.range("submap_id", static_cast<double>(wire.submap_id), 0.0, 9.3e18);
   checks.range("correction_version", static_cast<double>(wire.correction_version), 0.0, 9.3e18);
   checks.range("reset_counter", static_cast<double>(wire.reset_counter), 0.0, 9.3e18);
-  SlamPose pose;
+  model::SlamPose pose;
   pose.utime = wire.utime;
   pose.sequence = static_cast<std::uint64_t>(wire.seq);
   if (wire.status != slam_pose_t::TRACKED) {
-    pose.status = static_cast<MapUpdateStatus>(wire.status);
+    pose.status = static_cast<model::MapUpdateStatus>(wire.status);
   }
   if (wire.keyframe_seq >= 0) {
     pose.keyframe_sequence = static_cast<std::uint64_t>(wire.keyframe_seq);
@@ -34,7 +34,7 @@ Result<SlamPose> from_wire(const slam_pose_t& wire) {
   return pose;
 }
 
-slam_pose_t to_wire(const SlamPose& pose) {
+slam_pose_t to_wire(const model::SlamPose& pose) {
   slam_pose_t wire{};
   wire.utime = pose.utime;
   wire.seq = static_cast<std::int64_t>(pose.sequence);
@@ -52,4 +52,4 @@ slam_pose_t to_wire(const SlamPose& pose) {
   return wire;
 }
 
-}  // namespace understory
+}  // namespace understory::wire

@@ -3,19 +3,19 @@
 #include "common/wire/convert.hpp"
 #include "common/wire/convert_shared.hpp"
 
-namespace understory {
+namespace understory::wire {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
 constexpr double kFastestMps = 1000.0;
 
-Detection detection(const detection_t& wire, Checks& checks) {
+model::Detection detection(const detection_t& wire, Checks& checks) {
   check_landmark(wire, checks);
-  Detection result;
+  model::Detection result;
   result.position_m = Eigen::Map<const Eigen::Vector3d>(wire.position_m);
   result.covariance_m2 = checks.covariance("covariance_m2", wire.covariance_m2);
   result.radius_m = wire.radius_m;
-  result.kind = static_cast<LandmarkKind>(wire.kind);
+  result.kind = static_cast<model::LandmarkKind>(wire.kind);
   checks.range("bearing_rad", wire.bearing_rad, -kTurn, kTurn);
   checks.range("bearing_sigma_rad", wire.bearing_sigma_rad, 0.0, kTurn);
   result.bearing_rad = wire.bearing_rad;
@@ -23,7 +23,7 @@ Detection detection(const detection_t& wire, Checks& checks) {
   return result;
 }
 
-detection_t to_wire(const Detection& detection) {
+detection_t to_wire(const model::Detection& detection) {
   detection_t out{};
   copy_vector(detection.position_m, out.position_m);
   copy_matrix(detection.covariance_m2, out.covariance_m2);
@@ -34,10 +34,10 @@ detection_t to_wire(const Detection& detection) {
   return out;
 }
 
-Preintegration preintegration(const preintegration_t& wire, Checks& checks) {
+model::Preintegration preintegration(const preintegration_t& wire, Checks& checks) {
   checks.range("seconds", wire.seconds, 0.0, 1e5);
   checks.range("yaw_rad", wire.yaw_rad, -1e5, 1e5);
-  Preintegration result;
+  model::Preintegration result;
   result.seconds = wire.seconds;
   result.yaw_rad = wire.yaw_rad;
   result.velocity_mps = Eigen::Map<const Eigen::Vector2d>(wire.velocity_m_s);
@@ -51,7 +51,7 @@ Preintegration preintegration(const preintegration_t& wire, Checks& checks) {
   return result;
 }
 
-preintegration_t to_wire(const Preintegration& value) {
+preintegration_t to_wire(const model::Preintegration& value) {
   preintegration_t wire{};
   wire.seconds = value.seconds;
   wire.yaw_rad = value.yaw_rad;
@@ -65,9 +65,9 @@ preintegration_t to_wire(const Preintegration& value) {
   return wire;
 }
 
-LevelError level_error(const level_error_t& wire, Checks& checks) {
+model::LevelError level_error(const level_error_t& wire, Checks& checks) {
   checks.in("level", 0);
-  LevelError result;
+  model::LevelError result;
   result.covariance = checks.covariance("covariance", wire.covariance);
   result.added = checks.covariance("added", wire.added);
   result.memory =
@@ -79,7 +79,7 @@ LevelError level_error(const level_error_t& wire, Checks& checks) {
   return result;
 }
 
-level_error_t to_wire(const LevelError& value) {
+level_error_t to_wire(const model::LevelError& value) {
   level_error_t wire{};
   copy_matrix(value.covariance, wire.covariance);
   copy_matrix(value.memory, wire.memory);
@@ -90,17 +90,17 @@ level_error_t to_wire(const LevelError& value) {
 
 /// What both versions have.
 template <class Wire>
-Odometry odometry(const Wire& wire, Checks& checks) {
+model::Odometry odometry(const Wire& wire, Checks& checks) {
   checks.consistent(wire.from_utime >= 0 && wire.from_utime <= wire.utime, "from_utime <= utime");
   checks.pose("from_T_to", wire.from_T_to);
-  Odometry odometry;
+  model::Odometry odometry;
   odometry.from_utime = wire.from_utime;
   odometry.utime = wire.utime;
   odometry.sequence = static_cast<std::uint64_t>(wire.seq);
   odometry.from_T_to = from_wire(wire.from_T_to);
   odometry.covariance = checks.covariance("covariance", wire.covariance);
   odometry.has_wheels = wire.has_wheels != 0;
-  odometry.is_standing = wire.is_standing != 0;
+  odometry.is_stationary = wire.is_standing != 0;
   checks.range("num_inertial", wire.num_inertial, 0, 1);
   if (wire.num_inertial == 1) odometry.inertial = preintegration(wire.inertial[0], checks);
   return odometry;
@@ -108,7 +108,7 @@ Odometry odometry(const Wire& wire, Checks& checks) {
 
 }  // namespace
 
-pose2_t to_wire(const SE2& pose) {
+pose2_t to_wire(const geometry::SE2& pose) {
   pose2_t wire{};
   wire.x = pose.x();
   wire.y = pose.y();
@@ -116,11 +116,11 @@ pose2_t to_wire(const SE2& pose) {
   return wire;
 }
 
-SE2 from_wire(const pose2_t& pose) { return {pose.x, pose.y, pose.theta}; }
+geometry::SE2 from_wire(const pose2_t& pose) { return {pose.x, pose.y, pose.theta}; }
 
-Result<LandmarkScan> from_wire(const landmarks_t& wire) {
+Result<model::LandmarkScan> from_wire(const landmarks_t& wire) {
   Checks checks;
-  LandmarkScan scan;
+  model::LandmarkScan scan;
   scan.utime = wire.utime;
   scan.sequence = static_cast<std::uint64_t>(wire.seq);
   scan.field_of_view = field_of_view(wire, checks);
@@ -133,29 +133,29 @@ Result<LandmarkScan> from_wire(const landmarks_t& wire) {
   return scan;
 }
 
-landmarks_t to_wire(const LandmarkScan& scan) {
+landmarks_t to_wire(const model::LandmarkScan& scan) {
   landmarks_t wire{};
   wire.utime = scan.utime;
   wire.seq = static_cast<std::int64_t>(scan.sequence);
   copy_field_of_view(scan.field_of_view, wire);
   wire.num_detections = static_cast<std::int32_t>(scan.detections.size());
   wire.detections.reserve(scan.detections.size());
-  for (const Detection& detection : scan.detections) {
+  for (const model::Detection& detection : scan.detections) {
     wire.detections.push_back(to_wire(detection));
   }
   return wire;
 }
 
-Result<Odometry> from_wire(const odometry_t& wire) {
+Result<model::Odometry> from_wire(const odometry_t& wire) {
   Checks checks;
-  Odometry value = odometry(wire, checks);
+  model::Odometry value = odometry(wire, checks);
   if (checks.refusal()) return *checks.refusal();
   return value;
 }
 
-Result<Odometry> from_wire(const odometry2_t& wire) {
+Result<model::Odometry> from_wire(const odometry2_t& wire) {
   Checks checks;
-  Odometry value = odometry(wire, checks);
+  model::Odometry value = odometry(wire, checks);
   checks.consistent(wire.num_level == wire.num_inertial, "num_level = num_inertial");
   if (checks.refusal()) return *checks.refusal();
   if (value.inertial) value.inertial->level = level_error(wire.level[0], checks);
@@ -163,7 +163,7 @@ Result<Odometry> from_wire(const odometry2_t& wire) {
   return value;
 }
 
-odometry2_t to_wire(const Odometry& odometry) {
+odometry2_t to_wire(const model::Odometry& odometry) {
   odometry2_t wire{};
   wire.utime = odometry.utime;
   wire.seq = static_cast<std::int64_t>(odometry.sequence);
@@ -171,7 +171,7 @@ odometry2_t to_wire(const Odometry& odometry) {
   wire.from_T_to = to_wire(odometry.from_T_to);
   copy_matrix(odometry.covariance, wire.covariance);
   wire.has_wheels = odometry.has_wheels ? 1 : 0;
-  wire.is_standing = odometry.is_standing ? 1 : 0;
+  wire.is_standing = odometry.is_stationary ? 1 : 0;
   if (odometry.inertial) wire.inertial.push_back(to_wire(*odometry.inertial));
   wire.num_inertial = static_cast<std::int32_t>(wire.inertial.size());
   if (odometry.inertial) wire.level.push_back(to_wire(odometry.inertial->level));
@@ -179,7 +179,7 @@ odometry2_t to_wire(const Odometry& odometry) {
   return wire;
 }
 
-Result<PlanarScan> from_wire(const lidar_scan_t& wire) {
+Result<model::PlanarScan> from_wire(const lidar_scan_t& wire) {
   Checks checks;
   checks.pose("vehicle_T_sensor", wire.vehicle_T_sensor);
   checks.range("start_angle_rad", wire.start_angle_rad, -2.0 * kTurn, 2.0 * kTurn);
@@ -193,7 +193,7 @@ Result<PlanarScan> from_wire(const lidar_scan_t& wire) {
     checks.range("value", wire.ranges_m[i], 0.0, kLongestRangeM);
   }
   if (checks.refusal()) return *checks.refusal();
-  PlanarScan scan;
+  model::PlanarScan scan;
   scan.utime = wire.utime;
   scan.sequence = static_cast<std::uint64_t>(wire.seq);
   scan.first_bearing_rad = wire.start_angle_rad;
@@ -203,7 +203,7 @@ Result<PlanarScan> from_wire(const lidar_scan_t& wire) {
   return scan;
 }
 
-lidar_scan_t to_wire(const PlanarScan& scan) {
+lidar_scan_t to_wire(const model::PlanarScan& scan) {
   lidar_scan_t wire{};
   wire.utime = scan.utime;
   wire.seq = static_cast<std::int64_t>(scan.sequence);
@@ -218,12 +218,12 @@ lidar_scan_t to_wire(const PlanarScan& scan) {
   return wire;
 }
 
-Result<WheelSample> from_wire(const wheels_t& wire) {
+Result<model::WheelSample> from_wire(const wheels_t& wire) {
   Checks checks;
   checks.range("speed_m_s", wire.speed_m_s, -200.0, 200.0);
   checks.range("steering_rad", wire.steering_rad, -std::numbers::pi, std::numbers::pi);
   if (checks.refusal()) return *checks.refusal();
-  WheelSample sample;
+  model::WheelSample sample;
   sample.utime = wire.utime;
   sample.sequence = static_cast<std::uint64_t>(wire.seq);
   sample.speed_mps = wire.speed_m_s;
@@ -231,7 +231,7 @@ Result<WheelSample> from_wire(const wheels_t& wire) {
   return sample;
 }
 
-wheels_t to_wire(const WheelSample& sample) {
+wheels_t to_wire(const model::WheelSample& sample) {
   wheels_t wire{};
   wire.utime = sample.utime;
   wire.seq = static_cast<std::int64_t>(sample.sequence);
@@ -240,14 +240,14 @@ wheels_t to_wire(const WheelSample& sample) {
   return wire;
 }
 
-Result<ImuSample> from_wire(const imu_t& wire) {
+Result<model::ImuSample> from_wire(const imu_t& wire) {
   Checks checks;
   for (int i = 0; i < 3; ++i) {
     checks.range("angular_rate_rad_s", wire.angular_rate_rad_s[i], -1000.0, 1000.0);
     checks.range("specific_force_m_s2", wire.specific_force_m_s2[i], -1e5, 1e5);
   }
   if (checks.refusal()) return *checks.refusal();
-  ImuSample sample;
+  model::ImuSample sample;
   sample.utime = wire.utime;
   sample.sequence = static_cast<std::uint64_t>(wire.seq);
   sample.angular_rate_rad_s = Eigen::Map<const Eigen::Vector3d>(wire.angular_rate_rad_s);
@@ -255,7 +255,7 @@ Result<ImuSample> from_wire(const imu_t& wire) {
   return sample;
 }
 
-imu_t to_wire(const ImuSample& sample) {
+imu_t to_wire(const model::ImuSample& sample) {
   imu_t wire{};
   wire.utime = sample.utime;
   wire.seq = static_cast<std::int64_t>(sample.sequence);
@@ -264,9 +264,9 @@ imu_t to_wire(const ImuSample& sample) {
   return wire;
 }
 
-Result<TrackedScan> from_wire(const tracked_landmarks_t& wire) {
+Result<model::TrackedScan> from_wire(const tracked_landmarks_t& wire) {
   Checks checks;
-  TrackedScan scan;
+  model::TrackedScan scan;
   scan.utime = wire.utime;
   scan.sequence = static_cast<std::uint64_t>(wire.seq);
   scan.field_of_view = field_of_view(wire, checks);
@@ -276,7 +276,7 @@ Result<TrackedScan> from_wire(const tracked_landmarks_t& wire) {
     checks.in("landmarks", i);
     checks.range("track_id", static_cast<double>(from.track_id), 1.0, 9.3e18);
     checks.range("detection", from.detection, 0, std::numeric_limits<std::int32_t>::max());
-    scan.landmarks.push_back({static_cast<TrackId>(from.track_id),
+    scan.landmarks.push_back({static_cast<model::TrackId>(from.track_id),
                               static_cast<std::uint32_t>(from.detection),
                               detection(from.observed, checks)});
   }
@@ -284,14 +284,14 @@ Result<TrackedScan> from_wire(const tracked_landmarks_t& wire) {
   return scan;
 }
 
-tracked_landmarks_t to_wire(const TrackedScan& scan) {
+tracked_landmarks_t to_wire(const model::TrackedScan& scan) {
   tracked_landmarks_t wire{};
   wire.utime = scan.utime;
   wire.seq = static_cast<std::int64_t>(scan.sequence);
   copy_field_of_view(scan.field_of_view, wire);
   wire.num_landmarks = static_cast<std::int32_t>(scan.landmarks.size());
   wire.landmarks.reserve(scan.landmarks.size());
-  for (const TrackedLandmark& landmark : scan.landmarks) {
+  for (const model::TrackedLandmark& landmark : scan.landmarks) {
     tracked_landmark_t& out = wire.landmarks.emplace_back();
     out.track_id = static_cast<std::int64_t>(landmark.track_id);
     out.detection = static_cast<std::int32_t>(landmark.detection);
@@ -300,7 +300,7 @@ tracked_landmarks_t to_wire(const TrackedScan& scan) {
   return wire;
 }
 
-Result<GnssFix> from_wire(const gnss_t& wire) {
+Result<model::GnssFix> from_wire(const gnss_t& wire) {
   if (wire.valid == 0) return Refusal{Reason::kInconsistent, "the receiver has no fix"};
   Checks checks;
   checks.range("east_m", wire.east_m, -kFarthestPositionM, kFarthestPositionM);
@@ -310,7 +310,7 @@ Result<GnssFix> from_wire(const gnss_t& wire) {
   checks.range("north_velocity_m_s", wire.north_velocity_m_s, -kFastestMps, kFastestMps);
   checks.range("velocity_sigma_m_s", wire.velocity_sigma_m_s, 0.0, kFastestMps);
   if (checks.refusal()) return *checks.refusal();
-  GnssFix fix;
+  model::GnssFix fix;
   fix.utime = wire.utime;
   fix.sequence = static_cast<std::uint64_t>(wire.seq);
   fix.east_north_m = {wire.east_m, wire.north_m};
@@ -322,7 +322,7 @@ Result<GnssFix> from_wire(const gnss_t& wire) {
   return fix;
 }
 
-gnss_t to_wire(const GnssFix& fix) {
+gnss_t to_wire(const model::GnssFix& fix) {
   gnss_t wire{};
   wire.utime = fix.utime;
   wire.seq = static_cast<std::int64_t>(fix.sequence);
@@ -339,4 +339,4 @@ gnss_t to_wire(const GnssFix& fix) {
   return wire;
 }
 
-}  // namespace understory
+}  // namespace understory::wire

@@ -9,7 +9,7 @@
 #include "common/wire/checks.hpp"
 #include "understory/pose2_t.hpp"
 
-namespace understory {
+namespace understory::wire {
 
 inline constexpr double kFarthestPositionM = 1e7;
 inline constexpr double kLargestRadiusM = 100.0;
@@ -39,7 +39,7 @@ void check_landmark(const Wire& wire, Checks& checks) {
 
 /// The three fields of a message that describe the field of view.
 template <class Wire>
-FieldOfView field_of_view(const Wire& wire, Checks& checks) {
+model::FieldOfView field_of_view(const Wire& wire, Checks& checks) {
   constexpr double kTurn = 2.0 * std::numbers::pi;
   checks.range("max_range_m", wire.max_range_m, 0.0, kLongestRangeM);
   checks.range("bearing_rad", wire.bearing_rad, -kTurn, kTurn);
@@ -48,10 +48,10 @@ FieldOfView field_of_view(const Wire& wire, Checks& checks) {
 }
 
 template <class Wire>
-void copy_field_of_view(const FieldOfView& from, Wire& wire) {
+void copy_field_of_view(const model::FieldOfView& from, Wire& wire) {
   wire.max_range_m = from.max_range_m;
   wire.bearing_rad = from.bearing_rad;
   wire.width_rad = from.width_rad;
 }
 
-}  // namespace understory
+}  // namespace understory::wire

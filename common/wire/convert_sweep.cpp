@@ -7,7 +7,7 @@
 #include "common/wire/convert.hpp"
 #include "common/wire/convert_shared.hpp"
 
-namespace understory {
+namespace understory::wire {
 namespace {
 
 constexpr double kFinestResolutionM = 0.001;
@@ -35,10 +35,10 @@ std::int16_t rounded(float value, double inverse_step) {
 std::uint32_t size_bits(float value) { return std::bit_cast<std::uint32_t>(value) & 0x7fffffffU; }
 
 /// Fills the points in, with steps that hold the largest. Throws where one is not finite.
-void write_points(const std::vector<SweepPoint>& points, lidar_sweep_t& wire) {
+void write_points(const std::vector<model::SweepPoint>& points, lidar_sweep_t& wire) {
   std::uint32_t farthest = 0;
   std::uint32_t longest = 0;
-  for (const SweepPoint& p : points) {
+  for (const model::SweepPoint& p : points) {
     farthest = std::max({farthest, size_bits(p.x_m), size_bits(p.y_m), size_bits(p.z_m)});
     longest = std::max(longest, size_bits(p.time_s));
   }
@@ -56,7 +56,7 @@ void write_points(const std::vector<SweepPoint>& points, lidar_sweep_t& wire) {
   for (auto* numbers : {&wire.x, &wire.y, &wire.z, &wire.time}) numbers->resize(count);
   for (auto* numbers : {&wire.ring, &wire.intensity}) numbers->resize(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const SweepPoint& p = points[i];
+    const model::SweepPoint& p = points[i];
     wire.x[i] = rounded(p.x_m, per_metre);
     wire.y[i] = rounded(p.y_m, per_metre);
     wire.z[i] = rounded(p.z_m, per_metre);
@@ -66,8 +66,8 @@ void write_points(const std::vector<SweepPoint>& points, lidar_sweep_t& wire) {
   }
 }
 
-Attitude attitude(const lidar_sweep_t& wire, Checks& checks) {
-  Attitude result;
+model::Attitude attitude(const lidar_sweep_t& wire, Checks& checks) {
+  model::Attitude result;
   const Eigen::Quaterniond q(wire.level_Q_vehicle[0], wire.level_Q_vehicle[1],
                              wire.level_Q_vehicle[2], wire.level_Q_vehicle[3]);
   checks.range("level_Q_vehicle: norm", q.norm(), 0.999, 1.001);
@@ -90,7 +90,8 @@ void check_counts(const lidar_sweep_t& wire, Checks& checks) {
   }
 }
 
-void copy_points(const lidar_sweep_t& wire, Checks& checks, std::vector<SweepPoint>& points) {
+void copy_points(const lidar_sweep_t& wire, Checks& checks,
+                 std::vector<model::SweepPoint>& points) {
   points.resize(wire.x.size());
   const auto resolution = static_cast<float>(wire.resolution_m);
   const auto step = static_cast<float>(wire.time_step_s);
@@ -109,10 +110,10 @@ void copy_points(const lidar_sweep_t& wire, Checks& checks, std::vector<SweepPoi
 
 }  // namespace
 
-Result<PointSweep> from_wire(const lidar_sweep_t& wire) {
+Result<model::PointSweep> from_wire(const lidar_sweep_t& wire) {
   Checks checks;
   check_counts(wire, checks);
-  PointSweep sweep;
+  model::PointSweep sweep;
   sweep.utime = wire.utime;
   sweep.sequence = static_cast<std::uint64_t>(wire.seq);
   sweep.turn = static_cast<std::uint64_t>(wire.turn);
@@ -129,7 +130,7 @@ Result<PointSweep> from_wire(const lidar_sweep_t& wire) {
   return sweep;
 }
 
-lidar_sweep_t to_wire(const PointSweep& sweep) {
+lidar_sweep_t to_wire(const model::PointSweep& sweep) {
   lidar_sweep_t wire{};
   wire.utime = sweep.utime;
   wire.seq = static_cast<std::int64_t>(sweep.sequence);
@@ -141,7 +142,7 @@ lidar_sweep_t to_wire(const PointSweep& sweep) {
   wire.rings = sweep.rings;
   wire.max_range_m = sweep.max_range_m;
   copy_vector(sweep.sensor_position_m, wire.sensor_position_m);
-  const Attitude attitude = sweep.attitude.value_or(Attitude{});
+  const model::Attitude attitude = sweep.attitude.value_or(model::Attitude{});
   wire.has_attitude = sweep.attitude ? 1 : 0;
   const Eigen::Quaterniond& q = attitude.level_Q_vehicle;
   copy_vector(Eigen::Vector4d(q.w(), q.x(), q.y(), q.z()), wire.level_Q_vehicle);
@@ -150,4 +151,4 @@ lidar_sweep_t to_wire(const PointSweep& sweep) {
   return wire;
 }
 
-}  // namespace understory
+}  // namespace understory::wire

@@ -4,7 +4,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace understory {
+namespace understory::wire {
 namespace {
 
 /// LCM's own lengths are 32 bit and signed; nothing larger can be decoded.
@@ -225,4 +225,4 @@ const WireType* find_wire_type(std::int64_t fingerprint) {
   return nullptr;
 }
 
-}  // namespace understory
+}  // namespace understory::wire

@@ -15,7 +15,7 @@
 #include "common/wire/layout.hpp"
 #include "common/wire/result.hpp"
 
-namespace understory {
+namespace understory::wire {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -66,4 +66,4 @@ Bytes encode_bytes(const Message& message) {
   return bytes;
 }
 
-}  // namespace understory
+}  // namespace understory::wire

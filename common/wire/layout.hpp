@@ -6,7 +6,7 @@
 #include <span>
 #include <string_view>
 
-namespace understory {
+namespace understory::wire {
 
 enum class FieldKind : std::uint8_t {
   kInt8,
@@ -55,4 +55,4 @@ std::span<const WireType> wire_types();
 const WireType* find_wire_type(std::string_view name);
 const WireType* find_wire_type(std::int64_t fingerprint);
 
-}  // namespace understory
+}  // namespace understory::wire

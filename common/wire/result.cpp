@@ -1,6 +1,6 @@
 #include "common/wire/result.hpp"
 
-namespace understory {
+namespace understory::wire {
 
 std::string_view to_string(Reason reason) {
   switch (reason) {
@@ -60,4 +60,4 @@ std::string_view to_string(Reason reason) {
   return "unknown";
 }
 
-}  // namespace understory
+}  // namespace understory::wire

@@ -7,7 +7,7 @@
 #include <utility>
 #include <variant>
 
-namespace understory {
+namespace understory::wire {
 
 /// Why a message or a value was not taken. The names (`to_string`) are what HEALTH and LOG show.
 enum class Reason : std::uint8_t {
@@ -68,4 +68,4 @@ class [[nodiscard]] Result {
   std::variant<T, Refusal> content_;
 };
 
-}  // namespace understory
+}  // namespace understory::wire

@@ -4,7 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
-namespace understory {
+namespace understory::cli {
 
 void add_doctor_command(CLI::App& parent);
 void add_export_command(CLI::App& parent);
@@ -15,4 +15,4 @@ void add_replay_command(CLI::App& parent);
 void add_sim_command(CLI::App& parent);
 void add_status_command(CLI::App& parent);
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -16,7 +16,7 @@
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
 enum class Verdict { kGood, kAdvice, kBad };
@@ -172,4 +172,4 @@ void add_doctor_command(CLI::App& parent) {
   command->callback([url] { doctor(*url); });
 }
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -8,11 +8,11 @@
 #include "sim/point_grid.hpp"
 #include "understory/ground_truth_t.hpp"
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
 /// Between two true poses the motion is taken to be even if they are no further apart [us].
-constexpr Utime kLongestGap = 200'000;
+constexpr model::Utime kLongestGap = 200'000;
 constexpr double kTileM = 5.0;
 
 }  // namespace
@@ -22,37 +22,38 @@ double ComparedPose::position_error_m() const {
 }
 
 double ComparedPose::heading_error_rad() const {
-  return std::abs(wrap_angle(world_T_vehicle.theta() - true_world_T_vehicle.theta()));
+  return std::abs(geometry::wrap_angle(world_T_vehicle.theta() - true_world_T_vehicle.theta()));
 }
 
-void DriveAccuracyCollector::add(const LogEvent& event) {
+void DriveAccuracyCollector::add(const io::LogEvent& event) {
   if (event.channel == "GROUND_TRUTH") {
-    const auto truth = decode_message<ground_truth_t>(event.data);
-    if (truth) truth_.insert_or_assign(truth->utime, from_wire(truth->world_T_vehicle));
+    const auto truth = wire::decode_message<ground_truth_t>(event.data);
+    if (truth) truth_.insert_or_assign(truth->utime, wire::from_wire(truth->world_T_vehicle));
   } else if (event.channel == "TRUTH_LANDMARKS") {
-    const auto landmarks = decode_message<truth_landmarks_t>(event.data);
+    const auto landmarks = wire::decode_message<truth_landmarks_t>(event.data);
     if (landmarks) true_landmarks_ = *landmarks;
   } else if (event.channel == "LANDMARKS") {
     add_landmarks_event(event);
   } else if (event.channel == "SLAM_POSE") {
-    const auto pose = decode_message<SlamPose>(event.data);
+    const auto pose = wire::decode_message<model::SlamPose>(event.data);
     if (pose && pose->is_localised()) poses_.push_back(*pose);
   } else if (event.channel == "SLAM_UPDATE") {
-    const auto update = decode_message<MapUpdate>(event.data);
+    const auto update = wire::decode_message<model::MapUpdate>(event.data);
     if (!update) return;
     ++counted_.updates[update->status];
-    if (!first_update_ && update->status == MapUpdateStatus::kFirstMap) first_update_ = *update;
+    if (!first_update_ && update->status == model::MapUpdateStatus::kFirstMap)
+      first_update_ = *update;
   } else if (event.channel == "MAP") {
-    const auto map = decode_message<WholeMap>(event.data);
+    const auto map = wire::decode_message<model::WholeMap>(event.data);
     if (map && map->complete) map_ = *map;
   } else if (event.channel == "HEALTH") {
-    const auto health = decode_message<health_t>(event.data);
+    const auto health = wire::decode_message<health_t>(event.data);
     if (health) counted_.last_health.insert_or_assign(health->process, *health);
   }
 }
 
-void DriveAccuracyCollector::add_landmarks_event(const LogEvent& event) {
-  const auto header = header_of(event.data);
+void DriveAccuracyCollector::add_landmarks_event(const io::LogEvent& event) {
+  const auto header = wire::header_of(event.data);
   if (!header) return;
   ++counted_.scans;
   if (last_scan_ && header->sequence > *last_scan_ + 1) {
@@ -61,7 +62,7 @@ void DriveAccuracyCollector::add_landmarks_event(const LogEvent& event) {
   last_scan_ = header->sequence;
 }
 
-std::optional<SE2> DriveAccuracyCollector::truth_at(Utime utime) const {
+std::optional<geometry::SE2> DriveAccuracyCollector::truth_at(model::Utime utime) const {
   const auto after = truth_.lower_bound(utime);
   if (after == truth_.end()) return std::nullopt;
   if (after->first == utime) return after->second;
@@ -70,11 +71,13 @@ std::optional<SE2> DriveAccuracyCollector::truth_at(Utime utime) const {
   if (after->first - before->first > kLongestGap) return std::nullopt;
   const double share = static_cast<double>(utime - before->first) /
                        static_cast<double>(after->first - before->first);
-  return before->second * SE2::Exp(share * (before->second.inverse() * after->second).Log());
+  return before->second *
+         geometry::SE2::Exp(share * (before->second.inverse() * after->second).Log());
 }
 
-std::optional<ComparedPose> DriveAccuracyCollector::compare(Utime utime, const SE2& map_T_vehicle,
-                                                            const SE2& world_T_map) const {
+std::optional<ComparedPose> DriveAccuracyCollector::compare(
+    model::Utime utime, const geometry::SE2& map_T_vehicle,
+    const geometry::SE2& world_T_map) const {
   const auto truth = truth_at(utime);
   if (!truth) return std::nullopt;
   return ComparedPose{utime, world_T_map * map_T_vehicle, *truth};
@@ -84,7 +87,7 @@ std::optional<DriveAccuracy> DriveAccuracyCollector::finish() const {
   if (!first_update_) return std::nullopt;
   const auto base = truth_at(first_update_->utime);
   if (!base) return std::nullopt;
-  const SE2 world_T_map = *base * first_update_->map_T_vehicle.inverse();
+  const geometry::SE2 world_T_map = *base * first_update_->map_T_vehicle.inverse();
 
   DriveAccuracy accuracy = counted_;
   for (const auto& pose : poses_) {
@@ -131,4 +134,4 @@ std::vector<double> position_errors_m(const std::vector<ComparedPose>& poses) {
   return errors;
 }
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -13,13 +13,13 @@
 #include "understory/health_t.hpp"
 #include "understory/truth_landmarks_t.hpp"
 
-namespace understory {
+namespace understory::cli {
 
 /// A pose estimate beside the truth of the same instant, frame world.
 struct ComparedPose {
-  Utime utime = 0;
-  SE2 world_T_vehicle;
-  SE2 true_world_T_vehicle;
+  model::Utime utime = 0;
+  geometry::SE2 world_T_vehicle;
+  geometry::SE2 true_world_T_vehicle;
 
   double position_error_m() const;
   double heading_error_rad() const;
@@ -32,7 +32,7 @@ struct DriveAccuracy {
   std::vector<Eigen::Vector2d> true_landmarks_m;  ///< Frame world.
   std::vector<double> landmark_errors_m;          ///< To the nearest true one.
   std::uint64_t scans = 0;                        ///< Of LANDMARKS in the log.
-  std::map<MapUpdateStatus, std::uint64_t> updates;
+  std::map<model::MapUpdateStatus, std::uint64_t> updates;
   std::map<std::string, health_t> last_health;  ///< By process.
   std::uint64_t log_lost = 0;                   ///< LANDMARKS missing in the log itself.
 };
@@ -41,21 +41,21 @@ struct DriveAccuracy {
 /// nothing is aligned, so an error in the first heading counts.
 class DriveAccuracyCollector {
  public:
-  void add(const LogEvent& event);
+  void add(const io::LogEvent& event);
   /// None when the log has no ground truth or no first map.
   std::optional<DriveAccuracy> finish() const;
 
  private:
-  void add_landmarks_event(const LogEvent& event);
+  void add_landmarks_event(const io::LogEvent& event);
   /// The true pose at `utime`, interpolated where it was recorded at other instants.
-  std::optional<SE2> truth_at(Utime utime) const;
-  std::optional<ComparedPose> compare(Utime utime, const SE2& map_T_vehicle,
-                                      const SE2& world_T_map) const;
+  std::optional<geometry::SE2> truth_at(model::Utime utime) const;
+  std::optional<ComparedPose> compare(model::Utime utime, const geometry::SE2& map_T_vehicle,
+                                      const geometry::SE2& world_T_map) const;
 
-  std::map<Utime, SE2> truth_;
-  std::vector<SlamPose> poses_;
-  std::optional<MapUpdate> first_update_;
-  std::optional<WholeMap> map_;
+  std::map<model::Utime, geometry::SE2> truth_;
+  std::vector<model::SlamPose> poses_;
+  std::optional<model::MapUpdate> first_update_;
+  std::optional<model::WholeMap> map_;
   truth_landmarks_t true_landmarks_{};
   std::optional<std::int64_t> last_scan_;
   DriveAccuracy counted_;
@@ -66,4 +66,4 @@ double maximum(const std::vector<double>& values);  ///< 0 of none.
 double rms(const std::vector<double>& values);      ///< 0 of none.
 std::vector<double> position_errors_m(const std::vector<ComparedPose>& poses);
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -4,14 +4,14 @@
 #include <filesystem>
 #include <memory>
 
+#include "common/terminal/interrupt.hpp"
+#include "common/terminal/progress.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
-#include "deploy/cli/interrupt.hpp"
-#include "deploy/cli/progress.hpp"
 #include "deploy/cli/slam_results.hpp"
 #include "deploy/cli/text_file.hpp"
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
 struct Options {
@@ -22,10 +22,10 @@ struct Options {
 
 SlamResults read_results(const std::string& log) {
   SlamResults results;
-  LcmLogReader reader(log);
-  Progress progress("reading " + log, static_cast<double>(reader.size_bytes()));
+  io::LcmLogReader reader(log);
+  terminal::Progress progress("reading " + log, static_cast<double>(reader.size_bytes()));
   while (const auto event = reader.next()) {
-    throw_if_interrupted();
+    terminal::throw_if_interrupted();
     results.add(*event);
     progress.update(static_cast<double>(reader.position_bytes()));
   }
@@ -39,7 +39,7 @@ void write(const std::filesystem::path& file, const std::string& text) {
 
 void export_as(const std::string& format, const SlamResults& results,
                const std::filesystem::path& out) {
-  const WholeMap& map = *results.map;
+  const model::WholeMap& map = *results.map;
   if (format == "tum") {
     write(out / "live.tum", to_tum(live_trajectory(results)));
     write(out / "keyframes.tum", to_tum(keyframe_trajectory(map)));
@@ -53,15 +53,15 @@ void export_as(const std::string& format, const SlamResults& results,
 }
 
 void run(const Options& options) {
-  catch_interrupts();
+  terminal::catch_interrupts();
   try {
     const auto results = read_results(options.log);
     if (!results.map) fail(fmt::format("{}: no whole MAP in it (run replay first)", options.log));
     std::filesystem::create_directories(options.out);
     for (const auto& format : options.formats) export_as(format, results, options.out);
-  } catch (const LogError& error) {
+  } catch (const io::LogError& error) {
     fail(error.what());
-  } catch (const Interrupted& error) {
+  } catch (const terminal::Interrupted& error) {
     fail(fmt::format("{}: {}", options.log, error.what()));
   }
 }
@@ -80,4 +80,4 @@ void add_export_command(CLI::App& parent) {
   command->callback([options] { run(*options); });
 }
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -5,7 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
-namespace understory {
+namespace understory::cli {
 
 void fail(const std::string& what) {
   fmt::print(stderr, "understory: {}\n", what);
@@ -17,4 +17,4 @@ void wrong_usage(const std::string& what) {
   throw CLI::RuntimeError(2);
 }
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -3,11 +3,11 @@
 
 #include <string>
 
-namespace understory {
+namespace understory::cli {
 
 /// Prints `what` as one line to stderr and ends the command with exit status 1.
 [[noreturn]] void fail(const std::string& what);
 /// The same for wrong usage: exit status 2.
 [[noreturn]] void wrong_usage(const std::string& what);
 
-}  // namespace understory
+}  // namespace understory::cli

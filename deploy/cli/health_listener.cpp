@@ -2,21 +2,22 @@
 
 #include "common/wire/guard.hpp"
 
-namespace understory {
+namespace understory::cli {
 
 HealthListener::HealthListener(const std::string& lcm_url, Handler handler) : bus_(lcm_url) {
-  bus_.subscribe("HEALTH", 200, [this, handler = std::move(handler)](const BusMessage& message) {
-    const auto health = decode_bytes<health_t>(message.bytes);
-    if (health) {
-      handler(*health);
-    } else {
-      ++refused_;
-    }
-  });
+  bus_.subscribe("HEALTH", 200,
+                 [this, handler = std::move(handler)](const bus::BusMessage& message) {
+                   const auto health = wire::decode_bytes<health_t>(message.bytes);
+                   if (health) {
+                     handler(*health);
+                   } else {
+                     ++refused_;
+                   }
+                 });
 }
 
 bool HealthListener::handle(std::chrono::milliseconds timeout) {
   return bus_.handle_one(static_cast<int>(timeout.count()));
 }
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -9,7 +9,7 @@
 #include "common/bus/live_bus.hpp"
 #include "understory/health_t.hpp"
 
-namespace understory {
+namespace understory::cli {
 
 class HealthListener {
  public:
@@ -23,8 +23,8 @@ class HealthListener {
   std::uint64_t refused() const { return refused_; }  ///< Messages that were not of the type.
 
  private:
-  LiveBus bus_;
+  bus::LiveBus bus_;
   std::uint64_t refused_ = 0;
 };
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -8,15 +8,15 @@
 #include "common/io/data_error.hpp"
 #include "common/io/lcm_log.hpp"
 #include "common/io/victoria_park.hpp"
+#include "common/terminal/interrupt.hpp"
+#include "common/terminal/progress.hpp"
 #include "common/wire/convert.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/import_sensors.hpp"
-#include "deploy/cli/interrupt.hpp"
-#include "deploy/cli/progress.hpp"
 #include "services/lidar_imu_input/wheel_odometry.hpp"
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
 struct Options {
@@ -30,37 +30,37 @@ struct Options {
 class Importer {
  public:
   /// `raw`: what the sensors gave, for lidar_imu_input; else what it makes of that.
-  Importer(const VictoriaPark& recording, LcmLogWriter& writer, bool raw)
+  Importer(const io::VictoriaPark& recording, io::LcmLogWriter& writer, bool raw)
       : recording_(recording), writer_(writer), odometry_(parameters()), raw_(raw) {}
 
   void run() {
-    Progress progress("importing", static_cast<double>(recording_.scans.size()));
-    for (const PlanarScan& scan : recording_.scans) {
-      throw_if_interrupted();
+    terminal::Progress progress("importing", static_cast<double>(recording_.scans.size()));
+    for (const model::PlanarScan& scan : recording_.scans) {
+      terminal::throw_if_interrupted();
       write_until(scan.utime);
       const auto motion = odometry_.advance_to(scan.utime);
       if (motion && !raw_) write("ODOMETRY", *motion);
       write(raw_ ? "RAW_SCAN" : "LIDAR_SCAN", scan);
       progress.update(static_cast<double>(scan.sequence + 1));
     }
-    write_until(std::numeric_limits<Utime>::max());
+    write_until(std::numeric_limits<model::Utime>::max());
   }
 
  private:
-  static WheelOdometryParameters parameters() {
-    WheelOdometryParameters parameters;
-    parameters.car = {victoria_park::kWheelbase_m, victoria_park::kEncoderLeft_m,
-                      victoria_park::axle_T_vehicle()};
+  static lidar_imu_input::WheelOdometryParameters parameters() {
+    lidar_imu_input::WheelOdometryParameters parameters;
+    parameters.car = {io::victoria_park::kWheelbase_m, io::victoria_park::kEncoderLeft_m,
+                      io::victoria_park::axle_T_vehicle()};
     return parameters;
   }
 
   template <class Message>
   void write(const std::string& channel, const Message& message) {
-    writer_.write(message.utime, channel, encode_message(message));
+    writer_.write(message.utime, channel, wire::encode_message(message));
   }
 
   /// Wheels and fixes up to a stamp, the earlier ones first.
-  void write_until(Utime stamp) {
+  void write_until(model::Utime stamp) {
     const auto& wheels = recording_.wheels;
     const auto& fixes = recording_.gnss;
     const auto due = [&](const auto& list, std::size_t at) {
@@ -78,28 +78,28 @@ class Importer {
     }
   }
 
-  const VictoriaPark& recording_;
-  LcmLogWriter& writer_;
-  WheelOdometry odometry_;
+  const io::VictoriaPark& recording_;
+  io::LcmLogWriter& writer_;
+  lidar_imu_input::WheelOdometry odometry_;
   bool raw_;
   std::size_t wheel_ = 0;
   std::size_t fix_ = 0;
 };
 
 void import_victoria_park(const Options& options) {
-  catch_interrupts();
+  terminal::catch_interrupts();
   try {
-    const VictoriaPark recording = read_victoria_park(options.path);
-    LcmLogWriter writer(options.out);
+    const io::VictoriaPark recording = io::read_victoria_park(options.path);
+    io::LcmLogWriter writer(options.out);
     Importer(recording, writer, options.raw).run();
     writer.commit();
     fmt::print("{} sweeps, {} wheel samples, {} fixes -> {}\n", recording.scans.size(),
                recording.wheels.size(), recording.gnss.size(), options.out);
-  } catch (const DataError& error) {
+  } catch (const io::DataError& error) {
     fail(error.what());
-  } catch (const LogError& error) {
+  } catch (const io::LogError& error) {
     fail(error.what());
-  } catch (const Interrupted& error) {
+  } catch (const terminal::Interrupted& error) {
     fail(fmt::format("import: {}", error.what()));
   }
 }
@@ -123,4 +123,4 @@ void add_import_command(CLI::App& parent) {
   add_sensor_imports(*command);
 }
 
-}  // namespace understory
+}  // namespace understory::cli

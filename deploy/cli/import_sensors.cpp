@@ -17,13 +17,13 @@
 #include "common/io/sensor_tables.hpp"
 #include "common/io/velodyne.hpp"
 #include "common/io/velodyne_fixes.hpp"
+#include "common/terminal/interrupt.hpp"
+#include "common/terminal/progress.hpp"
 #include "deploy/cli/failure.hpp"
-#include "deploy/cli/interrupt.hpp"
-#include "deploy/cli/progress.hpp"
 #include "deploy/cli/recording_log.hpp"
 #include "understory/ground_truth_t.hpp"
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
 struct Options {
@@ -38,14 +38,14 @@ struct Options {
 
 /// Runs an import; what is wrong with the data or the log ends the command in one line.
 void guarded(const std::function<void()>& import) {
-  catch_interrupts();
+  terminal::catch_interrupts();
   try {
     import();
-  } catch (const DataError& error) {
+  } catch (const io::DataError& error) {
     fail(error.what());
-  } catch (const LogError& error) {
+  } catch (const io::LogError& error) {
     fail(error.what());
-  } catch (const Interrupted& error) {
+  } catch (const terminal::Interrupted& error) {
     fail(fmt::format("import: {}", error.what()));
   }
 }
@@ -53,28 +53,28 @@ void guarded(const std::function<void()>& import) {
 std::string read_file(const std::string& path) {
   const std::filesystem::path file(path);
   const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
-  return RecordingFolder(folder).read(file.filename().string());
+  return io::RecordingFolder(folder).read(file.filename().string());
 }
 
-ground_truth_t truth(Utime utime, const SE2& pose) {
+ground_truth_t truth(model::Utime utime, const geometry::SE2& pose) {
   ground_truth_t message{};
   message.utime = utime;
-  message.world_T_vehicle = to_wire(pose);
+  message.world_T_vehicle = wire::to_wire(pose);
   return message;
 }
 
-void add_oxts(const KittiRaw& drive, bool wheels, RecordingLog& log) {
+void add_oxts(const io::KittiRaw& drive, bool wheels, RecordingLog& log) {
   if (drive.oxts().empty()) return;
-  const LocalPlane plane(drive.oxts().front().latitude_deg, drive.oxts().front().longitude_deg);
-  for (const OxtsRecord& record : drive.oxts()) {
-    ImuSample imu;
+  const io::LocalPlane plane(drive.oxts().front().latitude_deg, drive.oxts().front().longitude_deg);
+  for (const io::OxtsRecord& record : drive.oxts()) {
+    model::ImuSample imu;
     imu.utime = record.utime;
     imu.angular_rate_rad_s = record.angular_rate_rad_s;
     imu.specific_force_mps2 = record.specific_force_mps2;
     log.add("RAW_IMU", imu);
     if (wheels)
-      log.add("RAW_WHEELS", WheelSample{record.utime, 0, record.forward_velocity_mps, 0.0});
-    GnssFix fix;
+      log.add("RAW_WHEELS", model::WheelSample{record.utime, 0, record.forward_velocity_mps, 0.0});
+    model::GnssFix fix;
     fix.utime = record.utime;
     fix.east_north_m = plane.east_north_m(record.latitude_deg, record.longitude_deg);
     fix.sigma_m = record.position_sigma_m;
@@ -82,7 +82,7 @@ void add_oxts(const KittiRaw& drive, bool wheels, RecordingLog& log) {
     fix.velocity_sigma_mps = record.velocity_sigma_mps;
     log.add("RAW_GNSS", fix);
     log.add("GROUND_TRUTH",
-            truth(record.utime, SE2(fix.east_north_m, record.roll_pitch_yaw_rad.z())));
+            truth(record.utime, geometry::SE2(fix.east_north_m, record.roll_pitch_yaw_rad.z())));
   }
 }
 
@@ -98,16 +98,16 @@ void print_mount(const Eigen::Isometry3d& imu_T_velo) {
 
 template <class Drive>
 void add_sweeps(const Drive& drive, RecordingLog& log) {
-  Progress progress("importing", static_cast<double>(drive.sweeps()));
+  terminal::Progress progress("importing", static_cast<double>(drive.sweeps()));
   for (std::size_t i = 0; i < drive.sweeps(); ++i) {
-    throw_if_interrupted();
+    terminal::throw_if_interrupted();
     log.add_sweep("RAW_SWEEP", drive.read_sweep(i));
     progress.update(static_cast<double>(i + 1));
   }
 }
 
 void import_kitti(const Options& options) {
-  const KittiRaw drive(options.path);
+  const io::KittiRaw drive(options.path);
   RecordingLog log(options.out);
   add_oxts(drive, options.wheels, log);
   add_sweeps(drive, log);
@@ -118,40 +118,40 @@ void import_kitti(const Options& options) {
 }
 
 void import_kitti_reduced(const Options& options) {
-  const ReducedKitti drive(options.path, options.poses);
+  const io::ReducedKitti drive(options.path, options.poses);
   RecordingLog log(options.out);
-  for (const ReducedKittiPose& pose : drive.poses())
+  for (const io::ReducedKittiPose& pose : drive.poses())
     log.add("GROUND_TRUTH", truth(pose.utime, pose.world_T_sensor));
   add_sweeps(drive, log);
   log.commit();
   fmt::print("{} sweeps with poses ({}) -> {}\n", drive.sweeps(), options.poses, options.out);
 }
 
-VelodyneCalibration calibration_of(const Options& options) {
-  const auto model = velodyne_model(options.model);
+io::VelodyneCalibration calibration_of(const Options& options) {
+  const auto model = io::velodyne_model(options.model);
   if (!model) fail(fmt::format("--model {}: vlp16, vlp32c, hdl32e or hdl64e", options.model));
   if (options.calibration.empty()) return velodyne_calibration(*model);
-  return parse_hdl64_calibration(read_file(options.calibration), options.calibration);
+  return io::parse_hdl64_calibration(read_file(options.calibration), options.calibration);
 }
 
 void import_pcap(const Options& options) {
-  PacketCapture capture(options.path);
-  VelodyneDecoder decoder(calibration_of(options));
+  io::PacketCapture capture(options.path);
+  io::VelodyneDecoder decoder(calibration_of(options));
   RecordingLog log(options.out);
-  VelodyneFixes fixes;
+  io::VelodyneFixes fixes;
   while (const auto packet = capture.next()) {
-    throw_if_interrupted();
-    if (packet->port == kVelodynePositionPort) {
-      const auto position = parse_velodyne_position(packet->payload);
+    terminal::throw_if_interrupted();
+    if (packet->port == io::kVelodynePositionPort) {
+      const auto position = io::parse_velodyne_position(packet->payload);
       const auto fix = position ? fixes.add(*position, packet->utime) : std::nullopt;
       if (fix) log.add("RAW_GNSS", *fix);
     }
-    if (packet->port != kVelodyneDataPort) continue;
+    if (packet->port != io::kVelodyneDataPort) continue;
     if (const auto turn = decoder.add(packet->payload, packet->utime))
       log.add_sweep("RAW_SWEEP", *turn);
   }
   if (const auto turn = decoder.finish()) log.add_sweep("RAW_SWEEP", *turn);
-  const VelodyneCounts& counts = decoder.counts();
+  const io::VelodyneCounts& counts = decoder.counts();
   if (counts.turns == 0)
     fail(fmt::format("{}: {} {} packets, {} refused: not one whole turn", options.path,
                      counts.packets, options.model, counts.refused));
@@ -163,16 +163,16 @@ void import_pcap(const Options& options) {
 
 void add_tables(const Options& options, RecordingLog& log) {
   if (!options.imu.empty()) {
-    for (const ImuSample& sample : parse_imu_table(read_file(options.imu), options.imu))
+    for (const model::ImuSample& sample : io::parse_imu_table(read_file(options.imu), options.imu))
       log.add("RAW_IMU", sample);
   }
   if (!options.wheel_table.empty()) {
-    for (const WheelSample& sample :
-         parse_wheel_table(read_file(options.wheel_table), options.wheel_table))
+    for (const model::WheelSample& sample :
+         io::parse_wheel_table(read_file(options.wheel_table), options.wheel_table))
       log.add("RAW_WHEELS", sample);
   }
   if (!options.gnss.empty()) {
-    for (const GnssFix& fix : parse_gnss_table(read_file(options.gnss), options.gnss))
+    for (const model::GnssFix& fix : io::parse_gnss_table(read_file(options.gnss), options.gnss))
       log.add("RAW_GNSS", fix);
   }
 }
@@ -183,13 +183,14 @@ void report_tables(const RecordingLog& log, std::size_t sweeps, const std::strin
 }
 
 void import_pcd(const Options& options) {
-  const std::vector<PcdFile> files = find_pcd_sequence(options.path);
+  const std::vector<io::PcdFile> files = io::find_pcd_sequence(options.path);
   RecordingLog log(options.out);
   add_tables(options, log);
-  Progress progress("importing", static_cast<double>(files.size()));
+  terminal::Progress progress("importing", static_cast<double>(files.size()));
   for (std::size_t i = 0; i < files.size(); ++i) {
-    throw_if_interrupted();
-    PointSweep sweep = parse_pcd(read_file(files[i].path.string()), files[i].path.string());
+    terminal::throw_if_interrupted();
+    model::PointSweep sweep =
+        io::parse_pcd(read_file(files[i].path.string()), files[i].path.string());
     sweep.utime = files[i].utime;
     sweep.turn = i;
     log.add_sweep("RAW_SWEEP", sweep);
@@ -251,4 +252,4 @@ void add_sensor_imports(CLI::App& import) {
   add_table_options(*csv, options);
 }
 
-}  // namespace understory
+}  // namespace understory::cli

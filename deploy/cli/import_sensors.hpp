@@ -3,9 +3,9 @@
 
 #include <CLI/CLI.hpp>
 
-namespace understory {
+namespace understory::cli {
 
 /// Adds kitti, kitti-reduced, pcap, pcd and csv.
 void add_sensor_imports(CLI::App& import);
 
-}  // namespace understory
+}  // namespace understory::cli

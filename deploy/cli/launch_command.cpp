@@ -18,7 +18,7 @@
 #include "deploy/launch/registry.hpp"
 #include "deploy/launch/supervisor.hpp"
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
 using launch::Clock;
@@ -192,4 +192,4 @@ void add_launch_command(CLI::App& parent) {
   command->callback([options] { launch_processes(*options); });
 }
 
-}  // namespace understory
+}  // namespace understory::cli

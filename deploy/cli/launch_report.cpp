@@ -10,7 +10,7 @@
 
 #include "deploy/cli/text_file.hpp"
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
 std::string time_of_day() {
@@ -52,4 +52,4 @@ void LaunchReport::write(const std::filesystem::path& file,
   write_text_file(file, report.dump(2) + "\n");
 }
 
-}  // namespace understory
+}  // namespace understory::cli

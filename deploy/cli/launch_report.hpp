@@ -7,7 +7,7 @@
 
 #include "deploy/launch/supervisor.hpp"
 
-namespace understory {
+namespace understory::cli {
 
 class LaunchReport {
  public:
@@ -31,4 +31,4 @@ class LaunchReport {
   std::vector<Event> events_;
 };
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -3,17 +3,17 @@
 
 #include <nlohmann/json.hpp>
 
+#include "common/terminal/interrupt.hpp"
+#include "common/terminal/progress.hpp"
 #include "deploy/cli/drive_accuracy.hpp"
 #include "deploy/cli/failure.hpp"
-#include "deploy/cli/interrupt.hpp"
 #include "deploy/cli/log_commands.hpp"
-#include "deploy/cli/progress.hpp"
 #include "deploy/cli/text_file.hpp"
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
-std::uint64_t count_of(const DriveAccuracy& accuracy, MapUpdateStatus status) {
+std::uint64_t count_of(const DriveAccuracy& accuracy, model::MapUpdateStatus status) {
   const auto found = accuracy.updates.find(status);
   return found == accuracy.updates.end() ? 0 : found->second;
 }
@@ -51,10 +51,10 @@ nlohmann::ordered_json summary(const DriveAccuracy& accuracy) {
           {"rpe_cm", 100.0 * mean(keyframes)},
           {"landmarks", accuracy.landmarks_m.size()},
           {"lpe_cm", 100.0 * mean(accuracy.landmark_errors_m)},
-          {"updates", count_of(accuracy, MapUpdateStatus::kFirstMap) +
-                          count_of(accuracy, MapUpdateStatus::kUpdated)},
-          {"updates_not_sure", count_of(accuracy, MapUpdateStatus::kNotSure)},
-          {"updates_rolled_back", count_of(accuracy, MapUpdateStatus::kRolledBack)},
+          {"updates", count_of(accuracy, model::MapUpdateStatus::kFirstMap) +
+                          count_of(accuracy, model::MapUpdateStatus::kUpdated)},
+          {"updates_not_sure", count_of(accuracy, model::MapUpdateStatus::kNotSure)},
+          {"updates_rolled_back", count_of(accuracy, model::MapUpdateStatus::kRolledBack)},
           {"lost", drops.lost},
           {"malformed", drops.malformed},
           {"dropped", drops.dropped},
@@ -108,11 +108,11 @@ void write_series(const std::string& file, nlohmann::ordered_json json,
 }  // namespace
 
 void log_accuracy(const std::string& file, const std::string& json_file) {
-  LcmLogReader reader(file);
+  io::LcmLogReader reader(file);
   DriveAccuracyCollector collector;
-  Progress progress("reading " + file, static_cast<double>(reader.size_bytes()));
+  terminal::Progress progress("reading " + file, static_cast<double>(reader.size_bytes()));
   while (const auto event = reader.next()) {
-    throw_if_interrupted();
+    terminal::throw_if_interrupted();
     collector.add(*event);
     progress.update(static_cast<double>(reader.position_bytes()));
   }
@@ -125,4 +125,4 @@ void log_accuracy(const std::string& file, const std::string& json_file) {
   if (!json_file.empty()) write_series(json_file, json, *accuracy);
 }
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -7,30 +7,30 @@
 #include <regex>
 
 #include "common/io/lcm_log.hpp"
+#include "common/terminal/interrupt.hpp"
+#include "common/terminal/progress.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
-#include "deploy/cli/interrupt.hpp"
 #include "deploy/cli/log_commands.hpp"
 #include "deploy/cli/log_statistics.hpp"
-#include "deploy/cli/progress.hpp"
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
 struct LogContents {
   LogStatistics statistics;
-  LogDamage damage;
+  io::LogDamage damage;
 };
 
 /// Reads a log from end to end with progress; `visit` sees every event.
 template <class Visit>
 LogContents walk(const std::string& file, const Visit& visit) {
   LogContents contents;
-  LcmLogReader reader(file);
-  Progress progress("reading " + file, static_cast<double>(reader.size_bytes()));
-  catch_interrupts();
+  io::LcmLogReader reader(file);
+  terminal::Progress progress("reading " + file, static_cast<double>(reader.size_bytes()));
+  terminal::catch_interrupts();
   while (auto event = reader.next()) {
-    throw_if_interrupted();
+    terminal::throw_if_interrupted();
     contents.statistics.add(*event);
     visit(*event, reader.damage());
     progress.update(static_cast<double>(reader.position_bytes()));
@@ -39,7 +39,7 @@ LogContents walk(const std::string& file, const Visit& visit) {
   return contents;
 }
 
-void ignore(const LogEvent& /*event*/, const LogDamage& /*damage*/) {}
+void ignore(const io::LogEvent& /*event*/, const io::LogDamage& /*damage*/) {}
 
 nlohmann::ordered_json to_json(const std::string& file, const LogContents& contents) {
   nlohmann::ordered_json json{{"file", file},
@@ -106,12 +106,12 @@ std::size_t print_channel_findings(const std::string& name, const ChannelStatist
 
 void check(const std::string& file) {
   std::size_t findings = 0;
-  const auto place = [&](const LogDamage& damage) {
+  const auto place = [&](const io::LogDamage& damage) {
     fmt::print("byte {}: {} bytes are no event\n", damage.last_offset, damage.last_bytes);
     ++findings;
   };
   std::uint64_t places = 0;
-  const auto contents = walk(file, [&](const LogEvent&, const LogDamage& damage) {
+  const auto contents = walk(file, [&](const io::LogEvent&, const io::LogDamage& damage) {
     if (damage.places != places) place(damage);
     places = damage.places;
   });
@@ -134,8 +134,8 @@ void check(const std::string& file) {
 }
 
 void repair(const std::string& file, const std::string& out) {
-  LcmLogWriter writer(out);
-  const auto contents = walk(file, [&](const LogEvent& event, const LogDamage&) {
+  io::LcmLogWriter writer(out);
+  const auto contents = walk(file, [&](const io::LogEvent& event, const io::LogDamage&) {
     writer.write(event.utime, event.channel, event.data);
   });
   if (contents.statistics.events() == 0 && contents.damage.bytes > 0) {
@@ -160,9 +160,9 @@ void cut(const std::string& file, const std::string& out, const Cut& wanted) {
     wrong_usage(fmt::format("--channels {}: not a regular expression", wanted.channels));
   }
   if (!(wanted.from_s <= wanted.to_s)) wrong_usage("--from lies behind --to");
-  LcmLogWriter writer(out);
+  io::LcmLogWriter writer(out);
   std::optional<std::int64_t> start;
-  walk(file, [&](const LogEvent& event, const LogDamage&) {
+  walk(file, [&](const io::LogEvent& event, const io::LogDamage&) {
     if (!start) start = event.utime;
     const double time_s = 1e-6 * (static_cast<double>(event.utime) - static_cast<double>(*start));
     if (time_s < wanted.from_s || time_s > wanted.to_s) return;
@@ -188,9 +188,9 @@ auto guarded(std::shared_ptr<Options> options, Work work) {
   return [options = std::move(options), work = std::move(work)] {
     try {
       work(*options);
-    } catch (const LogError& error) {
+    } catch (const io::LogError& error) {
       fail(error.what());
-    } catch (const Interrupted& error) {
+    } catch (const terminal::Interrupted& error) {
       fail(options->file + ": " + error.what());
     }
   };
@@ -232,4 +232,4 @@ void add_log_command(CLI::App& parent) {
   cut_command->callback(guarded(options, [](const Options& o) { cut(o.file, o.out, o.cut); }));
 }
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -6,7 +6,7 @@
 
 #include "common/wire/guard.hpp"
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
 constexpr std::int64_t kClockJumpUs = 10'000'000;
@@ -30,7 +30,7 @@ double ChannelStatistics::rate_hz() const {
   return events > 1 && span_us > 0.0 ? 1e6 * static_cast<double>(events - 1) / span_us : 0.0;
 }
 
-void LogStatistics::add(const LogEvent& event) {
+void LogStatistics::add(const io::LogEvent& event) {
   auto& channel = channels_[event.channel];
   if (channel.events == 0) channel.first_utime = event.utime;
   channel.last_utime = event.utime;
@@ -53,9 +53,9 @@ void LogStatistics::add(const LogEvent& event) {
   ++events_;
 }
 
-void LogStatistics::check_payload(const LogEvent& event, ChannelStatistics& channel) {
-  const auto fingerprint = fingerprint_of(event.data);
-  const WireType* type = fingerprint ? find_wire_type(*fingerprint) : nullptr;
+void LogStatistics::check_payload(const io::LogEvent& event, ChannelStatistics& channel) {
+  const auto fingerprint = wire::fingerprint_of(event.data);
+  const wire::WireType* type = fingerprint ? wire::find_wire_type(*fingerprint) : nullptr;
   const std::string name{type != nullptr ? type->layout->name : std::string_view("?")};
   if (channel.type.empty()) channel.type = name;
   if (channel.type != name) channel.type = "mixed";
@@ -66,7 +66,7 @@ void LogStatistics::check_payload(const LogEvent& event, ChannelStatistics& chan
     return;
   }
   if (!type->is_message || counted_per_process(event.channel)) return;
-  const auto header = header_of(event.data);
+  const auto header = wire::header_of(event.data);
   if (!header) return;
   const auto [last, first_one] =
       last_headers_.try_emplace(event.channel, LastHeader{header->utime, header->sequence});
@@ -78,4 +78,4 @@ void LogStatistics::check_payload(const LogEvent& event, ChannelStatistics& chan
   last->second = {header->utime, header->sequence};
 }
 
-}  // namespace understory
+}  // namespace understory::cli

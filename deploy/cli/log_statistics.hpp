@@ -8,7 +8,7 @@
 
 #include "common/io/lcm_log.hpp"
 
-namespace understory {
+namespace understory::cli {
 
 struct ChannelStatistics {
   std::string type;  ///< Wire type; "?" = none of ours, "mixed" = several.
@@ -27,7 +27,7 @@ struct ChannelStatistics {
 
 class LogStatistics {
  public:
-  void add(const LogEvent& event);
+  void add(const io::LogEvent& event);
 
   const std::map<std::string, ChannelStatistics>& channels() const { return channels_; }
   std::uint64_t events() const { return events_; }
@@ -44,7 +44,7 @@ class LogStatistics {
     std::int64_t utime = 0;
     std::int64_t sequence = 0;
   };
-  void check_payload(const LogEvent& event, ChannelStatistics& channel);
+  void check_payload(const io::LogEvent& event, ChannelStatistics& channel);
 
   std::map<std::string, ChannelStatistics> channels_;
   std::map<std::string, LastHeader> last_headers_;
@@ -58,4 +58,4 @@ class LogStatistics {
   std::int64_t longest_silence_us_ = 0;
 };
 
-}  // namespace understory
+}  // namespace understory::cli

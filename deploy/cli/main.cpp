@@ -6,7 +6,7 @@
 
 #include "common/bus/process_memory.hpp"
 #include "deploy/cli/commands.hpp"
-#include "eval/command.hpp"
+#include "eval/experiments/command.hpp"
 
 namespace {
 
@@ -14,15 +14,15 @@ int run(int argc, char** argv) {
   CLI::App app{"Localisation and mapping among landmarks that all look alike.", "understory"};
   app.require_subcommand(1);
   app.set_version_flag("--version", UNDERSTORY_VERSION);
-  understory::add_launch_command(app);
-  understory::add_sim_command(app);
-  understory::add_status_command(app);
-  understory::add_replay_command(app);
-  understory::eval::add_eval_command(app);
-  understory::add_doctor_command(app);
-  understory::add_import_command(app);
-  understory::add_export_command(app);
-  understory::add_log_command(app);
+  understory::cli::add_launch_command(app);
+  understory::cli::add_sim_command(app);
+  understory::cli::add_status_command(app);
+  understory::cli::add_replay_command(app);
+  understory::eval::experiments::add_eval_command(app);
+  understory::cli::add_doctor_command(app);
+  understory::cli::add_import_command(app);
+  understory::cli::add_export_command(app);
+  understory::cli::add_log_command(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::RuntimeError& error) {
@@ -38,7 +38,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  understory::keep_freed_memory();
+  understory::bus::keep_freed_memory();
   try {
     return run(argc, argv);
   } catch (const std::exception& error) {

@@ -2,7 +2,7 @@
 
 #include <cstdlib>
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
 std::string environment(const char* name) {
@@ -37,4 +37,4 @@ std::filesystem::path default_state_directory() {
   return std::filesystem::path(environment("HOME")) / ".local" / "state" / "understory";
 }
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-namespace understory {
+namespace understory::cli {
 
 /// The directory of this executable: its processes lie beside it, built or installed.
 std::filesystem::path executable_directory();
@@ -15,4 +15,4 @@ std::filesystem::path default_config_directory();
 /// UNDERSTORY_STATE, else the user's state directory (XDG), else one below the home directory.
 std::filesystem::path default_state_directory();
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -11,7 +11,7 @@
 #include "common/model/point_sweep.hpp"
 #include "common/wire/convert.hpp"
 
-namespace understory {
+namespace understory::cli {
 
 class RecordingLog {
  public:
@@ -21,17 +21,17 @@ class RecordingLog {
   template <class Message>
   void add(const std::string& channel, Message message) {
     set_sequence(message, counts_[channel]++);
-    small_.emplace(message.utime, Event{channel, encode_message(message)});
+    small_.emplace(message.utime, Event{channel, wire::encode_message(message)});
   }
   /// Writes what is due before the turn ends, then its parts.
-  void add_sweep(const std::string& channel, const PointSweep& sweep) {
+  void add_sweep(const std::string& channel, const model::PointSweep& sweep) {
     float last = 0.0F;
-    for (const SweepPoint& point : sweep.points) last = std::max(last, point.time_s);
-    const Utime end = sweep.utime + static_cast<Utime>(1e6F * last);
+    for (const model::SweepPoint& point : sweep.points) last = std::max(last, point.time_s);
+    const model::Utime end = sweep.utime + static_cast<model::Utime>(1e6F * last);
     write_until(end);
-    for (PointSweep& part : split_sweep(sweep, kPointsPerPart)) {
+    for (model::PointSweep& part : split_sweep(sweep, kPointsPerPart)) {
       part.sequence = counts_[channel]++;
-      writer_.write(std::max(end, latest_), channel, encode_message(part));
+      writer_.write(std::max(end, latest_), channel, wire::encode_message(part));
     }
     latest_ = std::max(end, latest_);
   }
@@ -49,7 +49,7 @@ class RecordingLog {
   static constexpr std::size_t kPointsPerPart = 4000;
   struct Event {
     std::string channel;
-    Bytes bytes;
+    wire::Bytes bytes;
   };
 
   template <class Message>
@@ -60,7 +60,7 @@ class RecordingLog {
       message.sequence = sequence;
     }
   }
-  void write_until(Utime utime) {
+  void write_until(model::Utime utime) {
     while (!small_.empty() && small_.begin()->first <= utime) write_first();
   }
   void write_first() {
@@ -70,10 +70,10 @@ class RecordingLog {
     small_.erase(first);
   }
 
-  LcmLogWriter writer_;
-  std::multimap<Utime, Event> small_;
+  io::LcmLogWriter writer_;
+  std::multimap<model::Utime, Event> small_;
   std::map<std::string, std::uint64_t> counts_;
-  Utime latest_ = 0;
+  model::Utime latest_ = 0;
 };
 
-}  // namespace understory
+}  // namespace understory::cli

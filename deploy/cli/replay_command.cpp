@@ -8,15 +8,15 @@
 
 #include "common/bus/replay.hpp"
 #include "common/io/lcm_log.hpp"
+#include "common/terminal/interrupt.hpp"
+#include "common/terminal/progress.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
-#include "deploy/cli/interrupt.hpp"
 #include "deploy/cli/paths.hpp"
-#include "deploy/cli/progress.hpp"
 #include "deploy/cli/services.hpp"
 #include "deploy/launch/launch_config.hpp"
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
 struct Options {
@@ -30,7 +30,7 @@ struct Options {
 
 bool reads_a_sensor(const std::string& name) {
   const auto services = sensor_services();
-  return std::ranges::find(services, name, &Service::name) != services.end();
+  return std::ranges::find(services, name, &bus::Service::name) != services.end();
 }
 
 /// The processes that the configuration launches, so that one directory says the same live and
@@ -49,13 +49,14 @@ std::vector<std::string> stages_of(const std::filesystem::path& config) {
 }
 
 /// The services named, in the order in which data runs through them.
-std::vector<Service> chosen_services(const std::vector<std::string>& names) {
-  std::vector<Service> chosen;
+std::vector<bus::Service> chosen_services(const std::vector<std::string>& names) {
+  std::vector<bus::Service> chosen;
   std::string known;
   for (const auto& name : names) {
     const auto services = all_services();
-    const auto found = std::find_if(services.begin(), services.end(),
-                                    [&](const Service& service) { return service.name == name; });
+    const auto found =
+        std::find_if(services.begin(), services.end(),
+                     [&](const bus::Service& service) { return service.name == name; });
     if (found != services.end()) continue;
     for (const auto& service : services) known += " " + service.name;
     wrong_usage(fmt::format("--stages {}: no such stage; there are:{}", name, known));
@@ -70,14 +71,14 @@ std::vector<Service> chosen_services(const std::vector<std::string>& names) {
 
 bool interrupted() {
   try {
-    throw_if_interrupted();
-  } catch (const Interrupted&) {
+    terminal::throw_if_interrupted();
+  } catch (const terminal::Interrupted&) {
     return true;
   }
   return false;
 }
 
-void print(const ReplayReport& report, const Options& options) {
+void print(const bus::ReplayReport& report, const Options& options) {
   fmt::print("{} events read, {} fed to {} stages, {} messages derived -> {}\n", report.events,
              report.fed, report.health.size(), report.derived, options.out);
   if (report.damaged_places > 0) {
@@ -92,8 +93,8 @@ void print(const ReplayReport& report, const Options& options) {
 }
 
 void run(const Options& options) {
-  catch_interrupts();
-  ReplayOptions replay_options;
+  terminal::catch_interrupts();
+  bus::ReplayOptions replay_options;
   replay_options.log = options.log;
   replay_options.out = options.out;
   replay_options.services =
@@ -101,7 +102,7 @@ void run(const Options& options) {
   replay_options.config_dir = options.config;
   replay_options.channel_suffix = options.channel_suffix;
   replay_options.keeps_inputs = !options.outputs_only;
-  Progress progress("replaying " + options.log, 1.0);
+  terminal::Progress progress("replaying " + options.log, 1.0);
   replay_options.progress = [&](double part) {
     progress.update(part);
     return interrupted();
@@ -110,9 +111,9 @@ void run(const Options& options) {
     const auto report = replay(replay_options);
     if (report.was_stopped) fail(options.log + ": interrupted");
     print(report, options);
-  } catch (const ConfigurationError& error) {
+  } catch (const bus::ConfigurationError& error) {
     wrong_usage(error.what());
-  } catch (const LogError& error) {
+  } catch (const io::LogError& error) {
     fail(error.what());
   }
 }
@@ -136,4 +137,4 @@ void add_replay_command(CLI::App& parent) {
   command->callback([options] { run(*options); });
 }
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -10,7 +10,7 @@
 #include "sim/point_grid.hpp"
 #include "understory/ground_truth_t.hpp"
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
 constexpr std::string_view kPoles = "poles:";
@@ -78,7 +78,7 @@ std::optional<sim::LidarParameters> lidar_of(const std::string& name) {
 }
 
 truth_landmark_t truth_landmark(std::size_t id, const Eigen::Vector2d& position_m, double radius_m,
-                                LandmarkKind kind) {
+                                model::LandmarkKind kind) {
   truth_landmark_t landmark{};
   landmark.id = static_cast<std::int64_t>(id);
   landmark.position_m[0] = position_m.x();
@@ -108,37 +108,38 @@ sim::SensorDrive make_sensor_drive(const SensorSimulationOptions& options) {
 
 void SensorPublisher::publish(const sim::SensorReading& reading) {
   const auto send = [&](const std::string& channel, const auto& message) {
-    publish_(channel, message.utime, encode_message(message));
+    publish_(channel, message.utime, wire::encode_message(message));
   };
   if (const auto* pose = std::get_if<sim::TruePose>(&reading)) {
     ground_truth_t truth{};
     truth.utime = pose->utime;
     truth.seq = static_cast<std::int64_t>(pose->sequence);
-    truth.world_T_vehicle = to_wire(pose->state.world_T_level());
+    truth.world_T_vehicle = wire::to_wire(pose->state.world_T_level());
     send("GROUND_TRUTH", truth);
-  } else if (const auto* imu = std::get_if<ImuSample>(&reading)) {
+  } else if (const auto* imu = std::get_if<model::ImuSample>(&reading)) {
     send("RAW_IMU", *imu);
-  } else if (const auto* wheels = std::get_if<WheelSample>(&reading)) {
+  } else if (const auto* wheels = std::get_if<model::WheelSample>(&reading)) {
     send("RAW_WHEELS", *wheels);
-  } else if (const auto* fix = std::get_if<GnssFix>(&reading)) {
+  } else if (const auto* fix = std::get_if<model::GnssFix>(&reading)) {
     send("RAW_GNSS", *fix);
   } else if (const auto* scan = std::get_if<sim::SimulatedPlanarScan>(&reading)) {
     send("RAW_SCAN", scan->scan);
   } else if (const auto* sweep = std::get_if<sim::SimulatedSweep>(&reading)) {
-    for (PointSweep& part : split_sweep(sweep->raw, kPointsPerMessage)) {
+    for (model::PointSweep& part : split_sweep(sweep->raw, kPointsPerMessage)) {
       part.sequence = sweep_parts_++;
       send("RAW_SWEEP", part);
     }
   }
 }
 
-Utime complete_at(const sim::SensorReading& reading, const sim::SensorDrive& drive) {
+model::Utime complete_at(const sim::SensorReading& reading, const sim::SensorDrive& drive) {
   return std::visit(
-      [&](const auto& value) -> Utime {
+      [&](const auto& value) -> model::Utime {
         using Value = std::decay_t<decltype(value)>;
         if constexpr (std::is_same_v<Value, sim::SimulatedSweep>) {
-          const double turn_s = drive.suite().lidar->turn_s();
-          return static_cast<Utime>(1e6 * turn_s * static_cast<double>(value.raw.turn + 1));
+          const double revolution_s = drive.suite().lidar->revolution_s();
+          return static_cast<model::Utime>(1e6 * revolution_s *
+                                           static_cast<double>(value.raw.turn + 1));
         } else if constexpr (std::is_same_v<Value, sim::SimulatedPlanarScan>) {
           return value.scan.utime;
         } else {
@@ -148,7 +149,7 @@ Utime complete_at(const sim::SensorReading& reading, const sim::SensorDrive& dri
       reading);
 }
 
-truth_landmarks_t true_landmarks_on_way(const sim::SensorDrive& drive) {
+truth_landmarks_t true_landmarks_on_path(const sim::SensorDrive& drive) {
   const sim::PointGrid way(drive.route().places(1.0), 20.0);
   truth_landmarks_t message{};
   const auto trunks = drive.world().trunks();
@@ -156,16 +157,16 @@ truth_landmarks_t true_landmarks_on_way(const sim::SensorDrive& drive) {
     const Eigen::Vector2d position = trunks[i].centre_m.head<2>();
     if (!way.any_within(position, kLandmarkReach)) continue;
     message.landmarks.push_back(
-        truth_landmark(i, position, trunks[i].radius_m, LandmarkKind::kTrunk));
+        truth_landmark(i, position, trunks[i].radius_m, model::LandmarkKind::kTrunk));
   }
   const auto corners = drive.world().corners();
   for (std::size_t i = 0; i < corners.size(); ++i) {
     if (!way.any_within(corners[i].position_m, kLandmarkReach)) continue;
-    message.landmarks.push_back(
-        truth_landmark(trunks.size() + i, corners[i].position_m, 0.0, LandmarkKind::kCorner));
+    message.landmarks.push_back(truth_landmark(trunks.size() + i, corners[i].position_m, 0.0,
+                                               model::LandmarkKind::kCorner));
   }
   message.num_landmarks = static_cast<std::int32_t>(message.landmarks.size());
   return message;
 }
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -11,7 +11,7 @@
 #include "sim/scenarios.hpp"
 #include "understory/truth_landmarks_t.hpp"
 
-namespace understory {
+namespace understory::cli {
 
 struct SensorSimulationOptions {
   std::string world;  ///< See is_sensor_world.
@@ -33,7 +33,8 @@ bool is_sensor_world(std::string_view world);
 /// Fails (see failure.hpp) where a name is unknown or a file cannot be read.
 sim::SensorDrive make_sensor_drive(const SensorSimulationOptions& options);
 
-using Publish = std::function<void(const std::string& channel, Utime utime, const Bytes& bytes)>;
+using Publish =
+    std::function<void(const std::string& channel, model::Utime utime, const wire::Bytes& bytes)>;
 
 /// Readings to messages: RAW_SWEEP (in parts), RAW_SCAN, RAW_IMU, RAW_WHEELS, RAW_GNSS,
 /// GROUND_TRUTH.
@@ -48,9 +49,9 @@ class SensorPublisher {
 };
 
 /// When a reading is complete and can be sent.
-Utime complete_at(const sim::SensorReading& reading, const sim::SensorDrive& drive);
+model::Utime complete_at(const sim::SensorReading& reading, const sim::SensorDrive& drive);
 
 /// Trunks, poles and corners within 40 m of the way: what a map can hold. Ids count trunks first.
-truth_landmarks_t true_landmarks_on_way(const sim::SensorDrive& drive);
+truth_landmarks_t true_landmarks_on_path(const sim::SensorDrive& drive);
 
-}  // namespace understory
+}  // namespace understory::cli

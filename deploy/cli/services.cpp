@@ -8,14 +8,17 @@
 #include "services/lidar_imu_input/adapter.hpp"
 #include "services/velodyne_driver/adapter.hpp"
 
-namespace understory {
+namespace understory::cli {
 
-std::vector<Service> all_services() {
-  return {lidar_imu_input_service(), landmark_extractor_service(),
-          associator_service(),      ekf_service(),
-          keyframer_service(),       geoslam_mapper_service()};
+std::vector<bus::Service> all_services() {
+  return {lidar_imu_input::lidar_imu_input_service(),
+          landmark_extractor::landmark_extractor_service(),
+          associator::associator_service(),
+          ekf::ekf_service(),
+          keyframer::keyframer_service(),
+          geoslam_mapper::geoslam_mapper_service()};
 }
 
-std::vector<Service> sensor_services() { return {velodyne_driver_service()}; }
+std::vector<bus::Service> sensor_services() { return {velodyne_driver::velodyne_driver_service()}; }
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -5,12 +5,12 @@
 
 #include "common/bus/service.hpp"
 
-namespace understory {
+namespace understory::cli {
 
 /// In the order in which data runs through them.
-std::vector<Service> all_services();
+std::vector<bus::Service> all_services();
 /// Those that read a sensor themselves: they run as processes only, in a replay the log stands for
 /// them.
-std::vector<Service> sensor_services();
+std::vector<bus::Service> sensor_services();
 
-}  // namespace understory
+}  // namespace understory::cli

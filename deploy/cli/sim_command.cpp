@@ -11,17 +11,17 @@
 
 #include "common/bus/split_bus.hpp"
 #include "common/io/lcm_log.hpp"
+#include "common/terminal/interrupt.hpp"
+#include "common/terminal/progress.hpp"
 #include "common/wire/convert.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
-#include "deploy/cli/interrupt.hpp"
-#include "deploy/cli/progress.hpp"
 #include "deploy/cli/sensor_simulation.hpp"
 #include "sim/drive.hpp"
 #include "understory/ground_truth_t.hpp"
 #include "understory/truth_landmarks_t.hpp"
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
 struct Options {
@@ -82,58 +82,58 @@ void publish_scan(const sim::Drive& drive, std::size_t k, const Publish& publish
   ground_truth_t truth{};
   truth.utime = simulated.scan.utime;
   truth.seq = static_cast<std::int64_t>(k);
-  truth.world_T_vehicle = to_wire(simulated.world_T_vehicle);
-  publish("GROUND_TRUTH", truth.utime, encode_message(truth));
-  publish("LANDMARKS", simulated.scan.utime, encode_message(simulated.scan));
+  truth.world_T_vehicle = wire::to_wire(simulated.world_T_vehicle);
+  publish("GROUND_TRUTH", truth.utime, wire::encode_message(truth));
+  publish("LANDMARKS", simulated.scan.utime, wire::encode_message(simulated.scan));
 }
 
 void write_log(const sim::Drive& drive, const std::string& file) {
-  LcmLogWriter writer(file);
-  const Publish publish = [&](const std::string& channel, Utime utime, const Bytes& bytes) {
-    writer.write(utime, channel, bytes);
-  };
-  Progress progress("simulating", static_cast<double>(drive.size()));
-  publish("TRUTH_LANDMARKS", drive.utime(0), encode_message(truth_landmarks(drive)));
+  io::LcmLogWriter writer(file);
+  const Publish publish = [&](const std::string& channel, model::Utime utime,
+                              const wire::Bytes& bytes) { writer.write(utime, channel, bytes); };
+  terminal::Progress progress("simulating", static_cast<double>(drive.size()));
+  publish("TRUTH_LANDMARKS", drive.utime(0), wire::encode_message(truth_landmarks(drive)));
   for (std::size_t k = 0; k < drive.size(); ++k) {
-    throw_if_interrupted();
+    terminal::throw_if_interrupted();
     publish_scan(drive, k, publish);
     progress.update(static_cast<double>(k + 1));
   }
   writer.commit();
 }
 
-Publish publish_on(Bus& bus) {
-  return [&bus](const std::string& channel, Utime /*utime*/, const Bytes& bytes) {
+Publish publish_on(bus::Bus& bus) {
+  return [&bus](const std::string& channel, model::Utime /*utime*/, const wire::Bytes& bytes) {
     const auto refusal = bus.publish(channel, bytes);
     if (refusal) fail(fmt::format("channel {}: {}", channel, refusal->detail));
   };
 }
 
 void drive_live(const sim::Drive& drive, const Options& options) {
-  const auto bus = make_live_bus(options.lcm_url);
+  const auto bus = bus::make_live_bus(options.lcm_url);
   const Publish publish = publish_on(*bus);
-  Progress progress("driving", static_cast<double>(drive.size()), Progress::Without::kLines);
-  publish("TRUTH_LANDMARKS", drive.utime(0), encode_message(truth_landmarks(drive)));
+  terminal::Progress progress("driving", static_cast<double>(drive.size()),
+                              terminal::Progress::Without::kTenths);
+  publish("TRUTH_LANDMARKS", drive.utime(0), wire::encode_message(truth_landmarks(drive)));
   const auto start = std::chrono::steady_clock::now();
   for (std::size_t k = 0; k < drive.size(); ++k) {
     const double elapsed_us = static_cast<double>(drive.utime(k) - drive.utime(0)) / options.rate;
     std::this_thread::sleep_until(start +
                                   std::chrono::microseconds(static_cast<std::int64_t>(elapsed_us)));
-    throw_if_interrupted();
+    terminal::throw_if_interrupted();
     publish_scan(drive, k, publish);
     progress.update(static_cast<double>(k + 1));
   }
 }
 
 /// Everything in the order in which real sensors would give it.
-void send_readings(sim::SensorDrive& drive, const Publish& publish, Progress& progress,
-                   const std::function<void(Utime)>& wait_until) {
-  const truth_landmarks_t landmarks = true_landmarks_on_way(drive);
-  publish("TRUTH_LANDMARKS", landmarks.utime, encode_message(landmarks));
+void send_readings(sim::SensorDrive& drive, const Publish& publish, terminal::Progress& progress,
+                   const std::function<void(model::Utime)>& wait_until) {
+  const truth_landmarks_t landmarks = true_landmarks_on_path(drive);
+  publish("TRUTH_LANDMARKS", landmarks.utime, wire::encode_message(landmarks));
   SensorPublisher publisher(publish);
   while (const auto reading = drive.next()) {
-    throw_if_interrupted();
-    const Utime complete = complete_at(*reading, drive);
+    terminal::throw_if_interrupted();
+    const model::Utime complete = complete_at(*reading, drive);
     wait_until(complete);
     publisher.publish(*reading);
     progress.update(1e-6 * static_cast<double>(complete));
@@ -141,24 +141,25 @@ void send_readings(sim::SensorDrive& drive, const Publish& publish, Progress& pr
 }
 
 void write_sensor_log(sim::SensorDrive& drive, const std::string& file) {
-  LcmLogWriter writer(file);
-  Progress progress("simulating", drive.motion().duration_s());
+  io::LcmLogWriter writer(file);
+  terminal::Progress progress("simulating", drive.motion().duration_s());
   // A log's events are in the order of their stamps: those of sweeps begin before they are sent.
-  Utime now = 0;
+  model::Utime now = 0;
   send_readings(
       drive,
-      [&](const std::string& channel, Utime /*utime*/, const Bytes& bytes) {
+      [&](const std::string& channel, model::Utime /*utime*/, const wire::Bytes& bytes) {
         writer.write(now, channel, bytes);
       },
-      progress, [&](Utime complete) { now = complete; });
+      progress, [&](model::Utime complete) { now = complete; });
   writer.commit();
 }
 
 void send_sensors_live(sim::SensorDrive& drive, const Options& options) {
-  const auto bus = make_live_bus(options.lcm_url);
-  Progress progress("driving", drive.motion().duration_s(), Progress::Without::kLines);
+  const auto bus = bus::make_live_bus(options.lcm_url);
+  terminal::Progress progress("driving", drive.motion().duration_s(),
+                              terminal::Progress::Without::kTenths);
   const auto start = std::chrono::steady_clock::now();
-  send_readings(drive, publish_on(*bus), progress, [&](Utime complete) {
+  send_readings(drive, publish_on(*bus), progress, [&](model::Utime complete) {
     const auto elapsed_us = static_cast<std::int64_t>(static_cast<double>(complete) / options.rate);
     std::this_thread::sleep_until(start + std::chrono::microseconds(elapsed_us));
   });
@@ -175,7 +176,7 @@ void simulate_sensors(Options& options) {
     } else {
       write_sensor_log(drive, options.out);
     }
-  } catch (const Interrupted& error) {
+  } catch (const terminal::Interrupted& error) {
     fail(fmt::format("sim: {}", error.what()));
   }
   fmt::print("{:.1f} m driven in {:.1f} s{}{}\n", drive.motion().driven_m(),
@@ -183,7 +184,7 @@ void simulate_sensors(Options& options) {
 }
 
 void simulate(Options& options) {
-  catch_interrupts();
+  terminal::catch_interrupts();
   if (is_sensor_world(options.world)) {
     simulate_sensors(options);
     return;
@@ -202,7 +203,7 @@ void simulate(Options& options) {
     } else {
       write_log(drive, options.out);
     }
-  } catch (const Interrupted& error) {
+  } catch (const terminal::Interrupted& error) {
     fail(fmt::format("sim: {}", error.what()));
   }
   const double last_s = 1e-6 * static_cast<double>(drive.utime(drive.size() - 1) - drive.utime(0));
@@ -293,4 +294,4 @@ void add_sim_command(CLI::App& parent) {
   command->callback([options] { simulate(*options); });
 }
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -9,13 +9,13 @@
 #include "common/wire/convert.hpp"
 #include "understory/ground_truth_t.hpp"
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
-void append_edge(std::string& out, const Keyframe& keyframe, std::size_t index,
+void append_edge(std::string& out, const model::Keyframe& keyframe, std::size_t index,
                  std::uint64_t landmark_vertex) {
   const auto& landmark = keyframe.landmarks.at(index);
-  const SE2 base_T_centre = keyframe.centre_T_base().inverse();
+  const geometry::SE2 base_T_centre = keyframe.centre_T_base().inverse();
   const Eigen::Vector2d in_base = base_T_centre * landmark.position_m;
   // d(in_base)/d(xi) for a right perturbation of centre_T_base.
   Eigen::Matrix<double, 2, 3> jacobian;
@@ -34,28 +34,28 @@ void append_edge(std::string& out, const Keyframe& keyframe, std::size_t index,
 
 }  // namespace
 
-void SlamResults::add(const LogEvent& event) {
+void SlamResults::add(const io::LogEvent& event) {
   if (event.channel == "SLAM_POSE") {
-    const auto pose = decode_message<SlamPose>(event.data);
+    const auto pose = wire::decode_message<model::SlamPose>(event.data);
     if (pose && pose->is_localised()) poses.push_back(*pose);
   } else if (event.channel == "MAP") {
-    const auto whole = decode_message<WholeMap>(event.data);
+    const auto whole = wire::decode_message<model::WholeMap>(event.data);
     if (whole && whole->complete) map = *whole;
   } else if (event.channel == "KEYFRAME") {
-    const auto keyframe = decode_message<Keyframe>(event.data);
+    const auto keyframe = wire::decode_message<model::Keyframe>(event.data);
     if (keyframe) keyframes.insert_or_assign(keyframe->sequence, *keyframe);
   } else if (event.channel == "SLAM_UPDATE") {
-    const auto update = decode_message<MapUpdate>(event.data);
-    const bool fused = update && (update->status == MapUpdateStatus::kFirstMap ||
-                                  update->status == MapUpdateStatus::kUpdated);
+    const auto update = wire::decode_message<model::MapUpdate>(event.data);
+    const bool fused = update && (update->status == model::MapUpdateStatus::kFirstMap ||
+                                  update->status == model::MapUpdateStatus::kUpdated);
     if (fused) updates.push_back(*update);
   } else if (event.channel == "GROUND_TRUTH") {
-    const auto one = decode_message<ground_truth_t>(event.data);
-    if (one) truth.emplace_back(one->utime, from_wire(one->world_T_vehicle));
+    const auto one = wire::decode_message<ground_truth_t>(event.data);
+    if (one) truth.emplace_back(one->utime, wire::from_wire(one->world_T_vehicle));
   }
 }
 
-std::string to_tum(const std::vector<std::pair<Utime, SE2>>& poses) {
+std::string to_tum(const std::vector<std::pair<model::Utime, geometry::SE2>>& poses) {
   std::string out;
   for (const auto& [utime, pose] : poses) {
     fmt::format_to(std::back_inserter(out), "{:.6f} {:.9g} {:.9g} 0 0 0 {:.9g} {:.9g}\n",
@@ -65,29 +65,31 @@ std::string to_tum(const std::vector<std::pair<Utime, SE2>>& poses) {
   return out;
 }
 
-std::vector<std::pair<Utime, SE2>> live_trajectory(const SlamResults& results) {
-  std::vector<std::pair<Utime, SE2>> trajectory;
+std::vector<std::pair<model::Utime, geometry::SE2>> live_trajectory(const SlamResults& results) {
+  std::vector<std::pair<model::Utime, geometry::SE2>> trajectory;
   for (const auto& pose : results.poses) trajectory.emplace_back(pose.utime, pose.map_T_vehicle());
   return trajectory;
 }
 
-std::vector<std::pair<Utime, SE2>> keyframe_trajectory(const WholeMap& map) {
-  std::vector<std::pair<Utime, SE2>> trajectory;
+std::vector<std::pair<model::Utime, geometry::SE2>> keyframe_trajectory(
+    const model::WholeMap& map) {
+  std::vector<std::pair<model::Utime, geometry::SE2>> trajectory;
   for (const auto& pose : map.keyframes) trajectory.emplace_back(pose.utime, pose.map_T_vehicle);
   return trajectory;
 }
 
-std::string landmarks_csv(const WholeMap& map) {
+std::string landmarks_csv(const model::WholeMap& map) {
   std::string out = "id,x_m,y_m,cov_xx_m2,cov_xy_m2,cov_yy_m2,radius_m,times_seen\n";
   for (const auto& one : map.landmarks) {
     fmt::format_to(std::back_inserter(out), "{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{}\n",
                    one.id, one.position_m.x(), one.position_m.y(), one.covariance_m2(0, 0),
-                   one.covariance_m2(0, 1), one.covariance_m2(1, 1), one.radius_m, one.times_seen);
+                   one.covariance_m2(0, 1), one.covariance_m2(1, 1), one.radius_m,
+                   one.observation_count);
   }
   return out;
 }
 
-std::string keyframes_csv(const WholeMap& map) {
+std::string keyframes_csv(const model::WholeMap& map) {
   std::string out = "keyframe,utime_us,x_m,y_m,theta_rad\n";
   for (const auto& one : map.keyframes) {
     fmt::format_to(std::back_inserter(out), "{},{},{:.9g},{:.9g},{:.9g}\n", one.keyframe_sequence,
@@ -111,7 +113,7 @@ std::string to_g2o(const SlamResults& results) {
     fmt::format_to(std::back_inserter(out), "FIX {}\n",
                    results.map->keyframes.front().keyframe_sequence);
   }
-  std::map<LandmarkId, std::uint64_t> vertices;
+  std::map<model::LandmarkId, std::uint64_t> vertices;
   for (const auto& one : results.map->landmarks) {
     vertices[one.id] = next;
     fmt::format_to(std::back_inserter(out), "VERTEX_XY {} {:.9g} {:.9g}\n", next++,
@@ -130,4 +132,4 @@ std::string to_g2o(const SlamResults& results) {
   return out;
 }
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -10,25 +10,26 @@
 #include "common/model/keyframe.hpp"
 #include "common/model/slam_output.hpp"
 
-namespace understory {
+namespace understory::cli {
 
 struct SlamResults {
-  std::vector<SlamPose> poses;                  ///< As published live, localised ones.
-  std::optional<WholeMap> map;                  ///< The last one.
-  std::vector<std::pair<Utime, SE2>> truth;     ///< world_T_vehicle, where the log has it.
-  std::map<std::uint64_t, Keyframe> keyframes;  ///< By number.
-  std::vector<MapUpdate> updates;               ///< Those that were fused.
+  std::vector<model::SlamPose> poses;  ///< As published live, localised ones.
+  std::optional<model::WholeMap> map;  ///< The last one.
+  std::vector<std::pair<model::Utime, geometry::SE2>>
+      truth;                                           ///< world_T_vehicle, where the log has it.
+  std::map<std::uint64_t, model::Keyframe> keyframes;  ///< By number.
+  std::vector<model::MapUpdate> updates;               ///< Those that were fused.
 
-  void add(const LogEvent& event);
+  void add(const io::LogEvent& event);
 };
 
 /// "time x y z qx qy qz qw", one pose a line [s, m]: what evo and the TUM tools read.
-std::string to_tum(const std::vector<std::pair<Utime, SE2>>& poses);
-std::vector<std::pair<Utime, SE2>> live_trajectory(const SlamResults& results);
-std::vector<std::pair<Utime, SE2>> keyframe_trajectory(const WholeMap& map);
+std::string to_tum(const std::vector<std::pair<model::Utime, geometry::SE2>>& poses);
+std::vector<std::pair<model::Utime, geometry::SE2>> live_trajectory(const SlamResults& results);
+std::vector<std::pair<model::Utime, geometry::SE2>> keyframe_trajectory(const model::WholeMap& map);
 
-std::string landmarks_csv(const WholeMap& map);
-std::string keyframes_csv(const WholeMap& map);
+std::string landmarks_csv(const model::WholeMap& map);
+std::string keyframes_csv(const model::WholeMap& map);
 
 /// The map as a graph for g2o: VERTEX_SE2 for keyframes (their number), VERTEX_XY for landmarks
 /// (numbered behind them, in order of id), EDGE_SE2_XY for every association. An edge's information
@@ -36,4 +37,4 @@ std::string keyframes_csv(const WholeMap& map);
 /// base's own uncertainty the format cannot say.
 std::string to_g2o(const SlamResults& results);
 
-}  // namespace understory
+}  // namespace understory::cli

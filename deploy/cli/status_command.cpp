@@ -7,13 +7,13 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/terminal/interrupt.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/health_listener.hpp"
-#include "deploy/cli/interrupt.hpp"
 #include "deploy/cli/status_table.hpp"
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
 using Clock = StatusTable::Clock;
@@ -26,7 +26,7 @@ struct Options {
 
 void listen_until(HealthListener& listener, Clock::time_point end) {
   while (Clock::now() < end) {
-    throw_if_interrupted();
+    terminal::throw_if_interrupted();
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now());
     listener.handle(std::max(std::chrono::milliseconds(1), left));
   }
@@ -39,7 +39,7 @@ void print(const StatusTable& table, bool json) {
 }
 
 void status(const Options& options) {
-  catch_interrupts();
+  terminal::catch_interrupts();
   StatusTable table;
   HealthListener listener(options.lcm_url,
                           [&](const health_t& health) { table.add(health, Clock::now()); });
@@ -57,7 +57,7 @@ void status(const Options& options) {
       if (terminal) fmt::print("\033[H\033[2J");
       print(table, options.json);
     }
-  } catch (const Interrupted&) {
+  } catch (const terminal::Interrupted&) {
     return;  // Ctrl-C is how this command ends.
   }
 }
@@ -73,4 +73,4 @@ void add_status_command(CLI::App& parent) {
   command->callback([options] { status(*options); });
 }
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -5,7 +5,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-namespace understory {
+namespace understory::cli {
 namespace {
 
 const char* state_name(std::int8_t state) {
@@ -107,4 +107,4 @@ nlohmann::ordered_json StatusTable::json(Clock::time_point now) const {
   return {{"processes", std::move(processes)}};
 }
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -8,7 +8,7 @@
 
 #include "understory/health_t.hpp"
 
-namespace understory {
+namespace understory::cli {
 
 class StatusTable {
  public:
@@ -30,4 +30,4 @@ class StatusTable {
   std::map<std::string, Entry> latest_;  ///< By name of the process.
 };
 
-}  // namespace understory
+}  // namespace understory::cli

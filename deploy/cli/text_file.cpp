@@ -5,7 +5,7 @@
 #include <fstream>
 #include <stdexcept>
 
-namespace understory {
+namespace understory::cli {
 
 void write_text_file(const std::filesystem::path& file, const std::string& text) {
   const std::filesystem::path part = file.string() + ".part";
@@ -19,4 +19,4 @@ void write_text_file(const std::filesystem::path& file, const std::string& text)
   throw std::runtime_error(fmt::format("{}: cannot be written", file.string()));
 }
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <string>
 
-namespace understory {
+namespace understory::cli {
 
 /// Throws std::runtime_error naming the file; nothing is left behind then.
 void write_text_file(const std::filesystem::path& file, const std::string& text);
 
-}  // namespace understory
+}  // namespace understory::cli

@@ -13,7 +13,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
-COLOURS = {"source": "tab:red", "ours": "tab:blue", "oracle": "tab:green",
+COLOURS = {"baseline": "tab:red", "smoothing": "tab:blue", "oracle": "tab:green",
            "lidar": "tab:purple", "lidar-ekf": "tab:orange"}
 
 
@@ -136,7 +136,7 @@ def plot_ratios(rows, file):
     labels = list(oracle)
     figure, axes = plt.subplots(2, 1, figsize=(max(8, 0.7 * len(labels)), 9), sharex=True)
     for axis, key, name in [(axes[0], "rpe_cm", "RPE"), (axes[1], "lpe_cm", "LPE")]:
-        for number, method in enumerate(["source", "ours"]):
+        for number, method in enumerate(["baseline", "smoothing"]):
             found = [(labels.index(cell_label(r)), r[key] / oracle[cell_label(r)][key])
                      for r in rows if r["method"] == method and cell_label(r) in oracle]
             if found:

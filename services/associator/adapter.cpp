@@ -6,30 +6,30 @@
 #include "services/associator/adapter_parameters.hpp"
 #include "services/associator/associator.hpp"
 
-namespace understory {
+namespace understory::associator {
 namespace {
 
-class AssociatorAdapter : public Adapter {
+class AssociatorAdapter : public bus::Adapter {
  public:
   explicit AssociatorAdapter(AssociatorChannels channels) : channels_(std::move(channels)) {}
 
-  void describe(ParameterTable& table) override { understory::describe(parameters_, table); }
+  void describe(bus::ParameterTable& table) override { associator::describe(parameters_, table); }
 
-  void bind(Node& node) override {
+  void bind(bus::Node& node) override {
     stage_.emplace(parameters_);
-    node.subscribe<LandmarkScan>(channels_.landmarks,
-                                 [this](const LandmarkScan& scan) {
-                                   if (const auto tracked = stage_->add(scan))
-                                     tracked_.publish(*tracked);
-                                 },
-                                 {.queue_size = 200});
+    node.subscribe<model::LandmarkScan>(channels_.landmarks,
+                                        [this](const model::LandmarkScan& scan) {
+                                          if (const auto tracked = stage_->add(scan))
+                                            tracked_.publish(*tracked);
+                                        },
+                                        {.queue_size = 200});
     // Each piece that is shed is a gap in the motion: a long queue.
-    node.subscribe<Odometry>(channels_.odometry,
-                             [this](const Odometry& piece) { stage_->add(piece); },
-                             {.queue_size = 2000});
-    node.subscribe<EkfPose>(channels_.filter_pose,
-                            [this](const EkfPose& pose) { stage_->add(pose); });
-    tracked_ = node.advertise<TrackedScan>(channels_.tracked_landmarks);
+    node.subscribe<model::Odometry>(
+        channels_.odometry, [this](const model::Odometry& increment) { stage_->add(increment); },
+        {.queue_size = 2000});
+    node.subscribe<model::EkfPose>(channels_.filter_pose,
+                                   [this](const model::EkfPose& pose) { stage_->add(pose); });
+    tracked_ = node.advertise<model::TrackedScan>(channels_.tracked_landmarks);
   }
 
   std::string save() const override { return stage_->save(); }
@@ -39,16 +39,16 @@ class AssociatorAdapter : public Adapter {
   AssociatorChannels channels_;
   AssociatorParameters parameters_;
   std::optional<Associator> stage_;
-  Publisher<TrackedScan> tracked_;
+  bus::Publisher<model::TrackedScan> tracked_;
 };
 
 }  // namespace
 
-Service associator_service(const AssociatorChannels& channels) {
+bus::Service associator_service(const AssociatorChannels& channels) {
   return {"associator",
           channels.landmarks + ", " + channels.odometry + ", " + channels.filter_pose + " -> " +
               channels.tracked_landmarks,
           [channels] { return std::make_unique<AssociatorAdapter>(channels); }};
 }
 
-}  // namespace understory
+}  // namespace understory::associator

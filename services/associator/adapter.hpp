@@ -5,7 +5,7 @@
 
 #include "common/bus/service.hpp"
 
-namespace understory {
+namespace understory::associator {
 
 struct AssociatorChannels {
   std::string landmarks = "LANDMARKS";
@@ -14,6 +14,6 @@ struct AssociatorChannels {
   std::string tracked_landmarks = "TRACKED_LANDMARKS";
 };
 
-Service associator_service(const AssociatorChannels& channels = {});
+bus::Service associator_service(const AssociatorChannels& channels = {});
 
-}  // namespace understory
+}  // namespace understory::associator

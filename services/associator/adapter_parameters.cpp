@@ -1,8 +1,8 @@
 #include "services/associator/adapter_parameters.hpp"
 
-namespace understory {
+namespace understory::associator {
 
-void describe(AssociatorParameters& p, ParameterTable& table) {
+void describe(AssociatorParameters& p, bus::ParameterTable& table) {
   table.add(
       "method", p.method, {"auto", "nearest", "registered", "consistent"},
       "nearest: gated nearest neighbour at the predicted pose. registered: the pose is refined "
@@ -13,7 +13,7 @@ void describe(AssociatorParameters& p, ParameterTable& table) {
             "Of the step between two scans, where only the last one predicts it.");
   table.add("motion_sigma_rad", p.motion_sigma_rad, {1e-5, 3.2}, "rad",
             "Of the turn between two scans, where only the last one predicts it.");
-  table.add("max_turn_rad", p.max_turn_rad, {0.0, 3.2}, "rad",
+  table.add("max_rotation_rad", p.max_rotation_rad, {0.0, 3.2}, "rad",
             "Largest unpredicted turn between two scans that is searched.");
   table.add("min_matched_ratio", p.min_matched_ratio, {0.0, 1.0}, "",
             "Of what could match: below, a scan is lost and all tracks begin anew.");
@@ -33,6 +33,7 @@ void describe(AssociatorParameters& p, ParameterTable& table) {
   table.add("walking_mps", p.walking_mps, {0.0, 100.0}, "m/s",
             "What moves against the wheels is no landmark; where few that stand are in view, a "
             "track is published once this speed would have been noticed. 0: nothing is checked.");
+  table.renamed("max_turn_rad", "max_rotation_rad");
 }
 
-}  // namespace understory
+}  // namespace understory::associator

@@ -4,8 +4,8 @@
 #include "common/bus/parameter_table.hpp"
 #include "services/associator/parameters.hpp"
 
-namespace understory {
+namespace understory::associator {
 
-void describe(AssociatorParameters& parameters, ParameterTable& table);
+void describe(AssociatorParameters& parameters, bus::ParameterTable& table);
 
-}  // namespace understory
+}  // namespace understory::associator

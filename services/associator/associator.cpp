@@ -8,27 +8,24 @@
 #include "common/geometry/alignment.hpp"
 #include "services/associator/consistent_set.hpp"
 
-namespace understory {
+namespace understory::associator {
 namespace {
-
-using associator::Seen;
-using associator::Track;
 
 /// Odometry's own uncertainty is never trusted below this [m^2, rad^2].
 constexpr double kMotionFloor = 1e-8;
 constexpr double kMaxPoseAge_s = 1.0;
 /// By it sightings are compared.
-constexpr Utime kOdometryKept_us = 2'000'000;
+constexpr model::Utime kOdometryKept_us = 2'000'000;
 /// A stamp so far back starts the clock anew.
-constexpr Utime kClockJump_us = 10'000'000;
+constexpr model::Utime kClockJump_us = 10'000'000;
 /// Acceleration [m/s^2] that a constant velocity may have missed.
 constexpr double kUnknownAcceleration = 3.0;
 
-std::vector<Seen> usable(const LandmarkScan& scan) {
+std::vector<Seen> usable(const model::LandmarkScan& scan) {
   std::vector<Seen> seen;
   seen.reserve(scan.detections.size());
   for (std::uint32_t i = 0; i < scan.detections.size(); ++i) {
-    const Detection& d = scan.detections[i];
+    const model::Detection& d = scan.detections[i];
     if (!d.position_m.allFinite() || !d.covariance_m2.allFinite()) continue;
     const Eigen::Matrix2d covariance = d.covariance_m2.topLeftCorner<2, 2>();
     if (covariance.llt().info() != Eigen::Success) continue;
@@ -38,17 +35,19 @@ std::vector<Seen> usable(const LandmarkScan& scan) {
   return seen;
 }
 
-std::vector<UncertainPoint> points_of(const std::vector<Track>& tracks, LandmarkKind kind) {
-  std::vector<UncertainPoint> points;
+std::vector<geometry::UncertainPoint> points_of(const std::vector<Track>& tracks,
+                                                model::LandmarkKind kind) {
+  std::vector<geometry::UncertainPoint> points;
   for (const Track& track : tracks) {
-    if (track.kind != kind || track.steadiness == associator::Steadiness::kMoves) continue;
-    points.push_back({track.position_m, track.variance_m2(), track.sightings < 4 ? 8.0 : 0.0});
+    if (track.kind != kind || track.steadiness == Steadiness::kMoves) continue;
+    points.push_back({track.position_m, track.variance_m2(), track.observations < 4 ? 8.0 : 0.0});
   }
   return points;
 }
 
-std::vector<UncertainPoint> points_of(const std::vector<Seen>& seen, LandmarkKind kind) {
-  std::vector<UncertainPoint> points;
+std::vector<geometry::UncertainPoint> points_of(const std::vector<Seen>& seen,
+                                                model::LandmarkKind kind) {
+  std::vector<geometry::UncertainPoint> points;
   for (const Seen& one : seen) {
     if (one.kind == kind) points.push_back({one.position_m, one.variance_m2()});
   }
@@ -56,12 +55,14 @@ std::vector<UncertainPoint> points_of(const std::vector<Seen>& seen, LandmarkKin
 }
 
 /// Refines a pose by trunks, then by corners; the pairs of both are counted in `pairs`.
-Registration register_kinds(const std::vector<Track>& tracks, const std::vector<Seen>& seen,
-                            const SE2WithCovariance& guess,
-                            const RegistrationParameters& parameters) {
-  Registration result{guess.mean, guess.covariance, {}};
-  for (const LandmarkKind kind : {LandmarkKind::kTrunk, LandmarkKind::kCorner}) {
-    Registration part =
+geometry::Registration register_kinds(const std::vector<Track>& tracks,
+                                      const std::vector<Seen>& seen,
+                                      const geometry::SE2WithCovariance& guess,
+                                      const geometry::RegistrationParameters& parameters) {
+  geometry::Registration result{guess.mean, guess.covariance, {}};
+  for (const model::LandmarkKind kind :
+       {model::LandmarkKind::kTrunk, model::LandmarkKind::kCorner}) {
+    geometry::Registration part =
         register_points(points_of(tracks, kind), points_of(seen, kind),
                         {result.reference_T_observed, result.covariance}, parameters);
     result.reference_T_observed = part.reference_T_observed;
@@ -81,53 +82,55 @@ Associator::Associator(const AssociatorParameters& parameters)
   throw std::invalid_argument("method: no method is named " + parameters.method);
 }
 
-void Associator::add(const Odometry& piece) {
-  if (!piece.from_T_to.coordinates().allFinite() || !piece.covariance.allFinite()) return;
-  const Utime newest =
-      odometry_.pieces().empty() ? piece.from_utime : odometry_.pieces().back().utime;
-  if (piece.utime < newest - kClockJump_us) odometry_ = OdometryBuffer();
-  odometry_.add(piece);
+void Associator::add(const model::Odometry& increment) {
+  if (!increment.from_T_to.coordinates().allFinite() || !increment.covariance.allFinite()) return;
+  const model::Utime newest =
+      odometry_.increments().empty() ? increment.from_utime : odometry_.increments().back().utime;
+  if (increment.utime < newest - kClockJump_us) odometry_ = model::OdometryBuffer();
+  odometry_.add(increment);
 }
 
-void Associator::add(const EkfPose& pose) {
+void Associator::add(const model::EkfPose& pose) {
   if (pose.velocity_mps.allFinite() && pose.bias.allFinite()) filter_pose_ = pose;
 }
 
 /// Where no wheels measure the way, the filter's velocity and the IMU since its pose tell it best.
-std::optional<SE2WithCovariance> Associator::motion_by_filter(Utime utime) const {
+std::optional<geometry::SE2WithCovariance> Associator::motion_by_filter(model::Utime utime) const {
   if (!filter_pose_ || !last_scan_ || filter_pose_->utime != *last_scan_) return std::nullopt;
   const double duration = 1e-6 * static_cast<double>(utime - *last_scan_);
   if (duration > kMaxPoseAge_s) return std::nullopt;
-  const EkfPose& start = *filter_pose_;
+  const model::EkfPose& start = *filter_pose_;
   double yaw = 0.0;
   Eigen::Vector2d velocity = start.velocity_mps;
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
-  Utime reached = *last_scan_;
-  for (const Odometry& piece : odometry_.pieces()) {
-    if (piece.utime <= reached) continue;
-    if (!piece.inertial || piece.from_utime > reached + 1000 || piece.utime > utime + 1000) break;
-    const Preintegration& p = *piece.inertial;
+  model::Utime reached = *last_scan_;
+  for (const model::Odometry& increment : odometry_.increments()) {
+    if (increment.utime <= reached) continue;
+    if (!increment.inertial || increment.from_utime > reached + 1000 ||
+        increment.utime > utime + 1000)
+      break;
+    const model::Preintegration& p = *increment.inertial;
     const Eigen::Matrix<double, 5, 1> shift = p.bias_jacobian * (start.bias - p.bias);
-    const Eigen::Matrix2d rotation = SE2(0.0, 0.0, yaw).rotation();
+    const Eigen::Matrix2d rotation = geometry::SE2(0.0, 0.0, yaw).rotation();
     position += velocity * p.seconds + rotation * (p.position_m + shift.tail<2>());
     velocity += rotation * (p.velocity_mps + shift.segment<2>(1));
     yaw += p.yaw_rad + shift(0);
-    reached = piece.utime;
+    reached = increment.utime;
   }
   const double blind = 1e-6 * static_cast<double>(utime - reached);
   position += velocity * blind;
   const double shift_variance = std::pow(0.5 * kUnknownAcceleration * blind * blind, 2) +
                                 kMotionFloor +
                                 start.velocity_covariance.trace() * duration * duration;
-  const double turn_variance = std::pow(parameters_.motion_sigma_rad * blind / 0.1, 2) + 1e-6;
-  return SE2WithCovariance{
-      SE2(position, yaw),
-      Eigen::Vector3d(shift_variance, shift_variance, turn_variance).asDiagonal()};
+  const double rotation_variance = std::pow(parameters_.motion_sigma_rad * blind / 0.1, 2) + 1e-6;
+  return geometry::SE2WithCovariance{
+      geometry::SE2(position, yaw),
+      Eigen::Vector3d(shift_variance, shift_variance, rotation_variance).asDiagonal()};
 }
 
-std::optional<SE2WithCovariance> Associator::motion_to(Utime utime) const {
+std::optional<geometry::SE2WithCovariance> Associator::motion_to(model::Utime utime) const {
   auto motion = odometry_.between(*last_scan_, utime);
-  const bool has_wheels = motion && odometry_.pieces().back().has_wheels;
+  const bool has_wheels = motion && odometry_.increments().back().has_wheels;
   if (has_wheels) return motion;
   if (auto filtered = motion_by_filter(utime)) {
     // The filter may be wrong: whoever is surer of the way leads.
@@ -136,23 +139,24 @@ std::optional<SE2WithCovariance> Associator::motion_to(Utime utime) const {
   return motion;
 }
 
-std::optional<SE2WithCovariance> Associator::motion_by_wheels(Utime from, Utime to) const {
-  if (odometry_.pieces().empty()) return std::nullopt;
+std::optional<geometry::SE2WithCovariance> Associator::motion_by_wheels(model::Utime from,
+                                                                        model::Utime to) const {
+  if (odometry_.increments().empty()) return std::nullopt;
   // The heading by steering alone is too poor.
-  const Odometry& latest = odometry_.pieces().back();
+  const model::Odometry& latest = odometry_.increments().back();
   if (!latest.has_wheels || !latest.inertial) return std::nullopt;
   return odometry_.between(from, to);
 }
 
-bool Associator::fits(const Registration& registration, std::size_t seen,
-                      const FieldOfView& view) const {
-  const SE2 vehicle_T_local = registration.reference_T_observed.inverse();
+bool Associator::fits(const geometry::Registration& registration, std::size_t seen,
+                      const model::FieldOfView& view) const {
+  const geometry::SE2 vehicle_T_local = registration.reference_T_observed.inverse();
   std::size_t visible = 0, known = 0;
   for (const Track& track : tracks_.tracks()) {
-    if (track.steadiness == associator::Steadiness::kMoves) continue;
+    if (track.steadiness == Steadiness::kMoves) continue;
     if (!view.contains(vehicle_T_local * track.position_m)) continue;
     ++known;
-    if (track.sightings >= 2) ++visible;
+    if (track.observations >= 2) ++visible;
   }
   const double possible = static_cast<double>(std::min(seen, visible > 0 ? visible : known));
   return static_cast<double>(registration.pairs.size()) >=
@@ -162,9 +166,9 @@ bool Associator::fits(const Registration& registration, std::size_t seen,
                                    std::min(seen, known));
 }
 
-Registration Associator::locate(const std::vector<Seen>& seen, const FieldOfView& view,
-                                Utime utime) {
-  RegistrationParameters registration;
+geometry::Registration Associator::locate(const std::vector<Seen>& seen,
+                                          const model::FieldOfView& view, model::Utime utime) {
+  geometry::RegistrationParameters registration;
   registration.gate_sigmas = parameters_.gate_sigmas;
   const double interval = 1e-6 * static_cast<double>(utime - *last_scan_);
   auto motion = motion_to(utime);
@@ -173,38 +177,39 @@ Registration Associator::locate(const std::vector<Seen>& seen, const FieldOfView
     ++counters_.scans_without_motion;
     const Eigen::Vector3d sigma(parameters_.motion_sigma_m, parameters_.motion_sigma_m,
                                 parameters_.motion_sigma_rad);
-    motion = {SE2::Exp(interval / last_interval_s_ * last_motion_.Log()),
+    motion = {geometry::SE2::Exp(interval / last_interval_s_ * last_motion_.Log()),
               (stretch * sigma).cwiseAbs2().asDiagonal()};
   }
   motion->covariance += kMotionFloor * Eigen::Matrix3d::Identity();
-  const SE2WithCovariance guess{local_T_vehicle_ * motion->mean, motion->covariance};
+  const geometry::SE2WithCovariance guess{local_T_vehicle_ * motion->mean, motion->covariance};
   if (parameters_.method == "nearest") return {guess.mean, guess.covariance, {}};
-  Registration found = register_kinds(tracks_.tracks(), seen, guess, registration);
+  geometry::Registration found = register_kinds(tracks_.tracks(), seen, guess, registration);
   const bool good = fits(found, seen.size(), view);
   if (parameters_.method == "registered" || (parameters_.method == "auto" && good)) return found;
-  Registration searched = search(seen, guess, registration);
+  geometry::Registration searched = search(seen, guess, registration);
   return searched.pairs.size() > found.pairs.size() || !good ? searched : found;
 }
 
 /// The pose by the largest consistent set, refined.
-Registration Associator::search(const std::vector<Seen>& seen, const SE2WithCovariance& guess,
-                                const RegistrationParameters& registration) {
+geometry::Registration Associator::search(const std::vector<Seen>& seen,
+                                          const geometry::SE2WithCovariance& guess,
+                                          const geometry::RegistrationParameters& registration) {
   ++counters_.searches;
-  std::vector<associator::ConsistencyPoint> reference, observed;
+  std::vector<ConsistencyPoint> reference, observed;
   for (const Track& track : tracks_.tracks()) {
     reference.push_back({track.position_m, track.variance_m2(), static_cast<int>(track.kind)});
   }
   for (const Seen& one : seen) {
     observed.push_back({one.position_m, one.variance_m2(), static_cast<int>(one.kind)});
   }
-  associator::ConsistencyGate gate;
+  ConsistencyGate gate;
   const double sigma = std::sqrt(guess.covariance.topLeftCorner<2, 2>().trace());
   gate.sigmas = parameters_.gate_sigmas;
   gate.shift_m = std::max(parameters_.motion_sigma_m, sigma) * parameters_.gate_sigmas;
-  gate.turn_rad = parameters_.max_turn_rad;
-  const auto pairs = associator::consistent_set(reference, observed, guess.mean, gate);
+  gate.rotation_rad = parameters_.max_rotation_rad;
+  const auto pairs = consistent_set(reference, observed, guess.mean, gate);
   if (pairs.size() < 3) return {guess.mean, guess.covariance, {}};
-  RigidAlignment2 alignment;
+  geometry::RigidAlignment2 alignment;
   double variance = 0.0;
   for (const auto& pair : pairs) {
     const auto& a = reference[pair.reference];
@@ -217,7 +222,7 @@ Registration Associator::search(const std::vector<Seen>& seen, const SE2WithCova
   return register_kinds(tracks_.tracks(), seen, {alignment.a_T_b(), covariance}, registration);
 }
 
-std::optional<TrackedScan> Associator::add(const LandmarkScan& scan) {
+std::optional<model::TrackedScan> Associator::add(const model::LandmarkScan& scan) {
   ++counters_.scans;
   counters_.detections += scan.detections.size();
   if (last_scan_ && scan.utime < *last_scan_ - kClockJump_us) {
@@ -231,7 +236,7 @@ std::optional<TrackedScan> Associator::add(const LandmarkScan& scan) {
   }
   const std::vector<Seen> seen = usable(scan);
   counters_.detections_unusable += scan.detections.size() - seen.size();
-  Registration pose;
+  geometry::Registration pose;
   if (last_scan_) {
     pose = locate(seen, scan.field_of_view, scan.utime);
     if (parameters_.method != "nearest" && !seen.empty() &&
@@ -241,21 +246,22 @@ std::optional<TrackedScan> Associator::add(const LandmarkScan& scan) {
       // landmarks are to have gone.
       if (!tracks_.tracks().empty() && ++misfits_ <= parameters_.max_misfits) {
         ++counters_.scans_passed_over;
-        return TrackedScan{scan.utime, next_sequence_++, scan.field_of_view, {}};
+        return model::TrackedScan{scan.utime, next_sequence_++, scan.field_of_view, {}};
       }
       ++counters_.scans_lost;
       tracks_.clear();
     }
   }
   misfits_ = 0;
-  const auto matches = associator::match(tracks_.tracks(), seen,
-                                         {pose.reference_T_observed, pose.covariance}, parameters_);
+  const auto matches =
+      match(tracks_.tracks(), seen, {pose.reference_T_observed, pose.covariance}, parameters_);
   return publish(scan, seen, matches, pose.reference_T_observed);
 }
 
-TrackedScan Associator::publish(const LandmarkScan& scan, const std::vector<Seen>& seen,
-                                const std::vector<associator::Match>& matches,
-                                const SE2& local_T_vehicle) {
+model::TrackedScan Associator::publish(const model::LandmarkScan& scan,
+                                       const std::vector<Seen>& seen,
+                                       const std::vector<Match>& matches,
+                                       const geometry::SE2& local_T_vehicle) {
   if (last_scan_) {
     last_motion_ = local_T_vehicle_.inverse() * local_T_vehicle;
     last_interval_s_ = 1e-6 * static_cast<double>(scan.utime - *last_scan_);
@@ -263,15 +269,15 @@ TrackedScan Associator::publish(const LandmarkScan& scan, const std::vector<Seen
   local_T_vehicle_ = local_T_vehicle;
   last_scan_ = scan.utime;
   odometry_.forget_before(scan.utime - kOdometryKept_us);
-  const TrackId before = tracks_.next_id();
+  const model::TrackId before = tracks_.next_id();
   if (parameters_.walking_mps > 0.0) {
     tracks_.check_steadiness(seen, matches, scan.utime,
-                             [&](Utime from) { return motion_by_wheels(from, scan.utime); });
+                             [&](model::Utime from) { return motion_by_wheels(from, scan.utime); });
   }
   const auto ids = tracks_.update(seen, matches, local_T_vehicle, scan.field_of_view, scan.utime);
   counters_.tracks_confirmed += tracks_.next_id() - before;
-  for (const associator::Match& match : matches) counters_.ambiguous += match.ambiguous ? 1 : 0;
-  TrackedScan out{scan.utime, next_sequence_++, scan.field_of_view, {}};
+  for (const Match& match : matches) counters_.ambiguous += match.ambiguous ? 1 : 0;
+  model::TrackedScan out{scan.utime, next_sequence_++, scan.field_of_view, {}};
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (ids[i] == 0) continue;
     out.landmarks.push_back({ids[i], seen[i].detection, scan.detections[seen[i].detection]});
@@ -280,4 +286,4 @@ TrackedScan Associator::publish(const LandmarkScan& scan, const std::vector<Seen
   return out;
 }
 
-}  // namespace understory
+}  // namespace understory::associator

@@ -14,7 +14,7 @@
 #include "services/associator/parameters.hpp"
 #include "services/associator/track_list.hpp"
 
-namespace understory {
+namespace understory::associator {
 
 /// Counted for HEALTH.
 struct AssociatorCounters {
@@ -38,12 +38,12 @@ class Associator {
   explicit Associator(const AssociatorParameters& parameters);
 
   /// Motion since the last scan; must come before the scan at its end to be of use.
-  void add(const Odometry& piece);
+  void add(const model::Odometry& increment);
   /// The filter's pose at an earlier scan: its velocity and biases predict the next motion. Never
   /// changes a track.
-  void add(const EkfPose& pose);
+  void add(const model::EkfPose& pose);
   /// The consistent landmarks of a scan (perhaps none); nothing from a late or repeated scan.
-  std::optional<TrackedScan> add(const LandmarkScan& scan);
+  std::optional<model::TrackedScan> add(const model::LandmarkScan& scan);
 
   const AssociatorCounters& counters() const { return counters_; }
   std::size_t track_count() const { return tracks_.tracks().size(); }
@@ -52,28 +52,32 @@ class Associator {
   void load(const std::string& state);
 
  private:
-  std::optional<SE2WithCovariance> motion_to(Utime utime) const;
-  std::optional<SE2WithCovariance> motion_by_wheels(Utime from, Utime to) const;
-  std::optional<SE2WithCovariance> motion_by_filter(Utime utime) const;
-  Registration locate(const std::vector<associator::Seen>& seen, const FieldOfView& view,
-                      Utime utime);
-  Registration search(const std::vector<associator::Seen>& seen, const SE2WithCovariance& guess,
-                      const RegistrationParameters& registration);
-  TrackedScan publish(const LandmarkScan& scan, const std::vector<associator::Seen>& seen,
-                      const std::vector<associator::Match>& matches, const SE2& local_T_vehicle);
-  bool fits(const Registration& registration, std::size_t seen, const FieldOfView& view) const;
+  std::optional<geometry::SE2WithCovariance> motion_to(model::Utime utime) const;
+  std::optional<geometry::SE2WithCovariance> motion_by_wheels(model::Utime from,
+                                                              model::Utime to) const;
+  std::optional<geometry::SE2WithCovariance> motion_by_filter(model::Utime utime) const;
+  geometry::Registration locate(const std::vector<Seen>& seen, const model::FieldOfView& view,
+                                model::Utime utime);
+  geometry::Registration search(const std::vector<Seen>& seen,
+                                const geometry::SE2WithCovariance& guess,
+                                const geometry::RegistrationParameters& registration);
+  model::TrackedScan publish(const model::LandmarkScan& scan, const std::vector<Seen>& seen,
+                             const std::vector<Match>& matches,
+                             const geometry::SE2& local_T_vehicle);
+  bool fits(const geometry::Registration& registration, std::size_t seen,
+            const model::FieldOfView& view) const;
 
   AssociatorParameters parameters_;
-  associator::TrackList tracks_;
-  OdometryBuffer odometry_;
-  std::optional<EkfPose> filter_pose_;
-  std::optional<Utime> last_scan_;
+  TrackList tracks_;
+  model::OdometryBuffer odometry_;
+  std::optional<model::EkfPose> filter_pose_;
+  std::optional<model::Utime> last_scan_;
   double last_interval_s_ = 0.1;
-  SE2 local_T_vehicle_;
-  SE2 last_motion_;
+  geometry::SE2 local_T_vehicle_;
+  geometry::SE2 last_motion_;
   int misfits_ = 0;  ///< Scans in a row that fitted no track.
   std::uint64_t next_sequence_ = 0;
   AssociatorCounters counters_;
 };
 
-}  // namespace understory
+}  // namespace understory::associator

@@ -71,7 +71,8 @@ class CliqueSearch {
 
 std::vector<ConsistencyPair> consistent_set(std::span<const ConsistencyPoint> reference,
                                             std::span<const ConsistencyPoint> observed,
-                                            const SE2& guess, const ConsistencyGate& gate) {
+                                            const geometry::SE2& guess,
+                                            const ConsistencyGate& gate) {
   std::vector<std::uint32_t> near(observed.size());
   std::iota(near.begin(), near.end(), 0u);
   std::stable_sort(near.begin(), near.end(), [&](std::uint32_t a, std::uint32_t b) {
@@ -81,7 +82,7 @@ std::vector<ConsistencyPair> consistent_set(std::span<const ConsistencyPoint> re
   std::vector<Pair> pairs;
   for (const std::uint32_t i : near) {
     const Eigen::Vector2d at = guess * observed[i].position_m;
-    const double reach = gate.shift_m + gate.turn_rad * observed[i].position_m.norm();
+    const double reach = gate.shift_m + gate.rotation_rad * observed[i].position_m.norm();
     for (std::uint32_t r = 0; r < reference.size(); ++r) {
       const double off = (reference[r].position_m - at).norm();
       if (reference[r].kind == observed[i].kind && off < reach) pairs.push_back({off, {r, i}});

@@ -19,7 +19,7 @@ struct ConsistencyGate {
   double sigmas = 4.0;
   /// Farthest that the guess may be off: translation, plus a turn at the point's range.
   double shift_m = 2.0;
-  double turn_rad = 0.5;
+  double rotation_rad = 0.5;
   int max_nodes = 20000;  ///< Of the search; then the best set found so far is taken.
 };
 
@@ -33,6 +33,7 @@ struct ConsistencyPair {
 /// colour bounds (Tomita & Seki 2003). The observed nearest to the origin are used, at most 24.
 std::vector<ConsistencyPair> consistent_set(std::span<const ConsistencyPoint> reference,
                                             std::span<const ConsistencyPoint> observed,
-                                            const SE2& guess, const ConsistencyGate& gate);
+                                            const geometry::SE2& guess,
+                                            const ConsistencyGate& gate);
 
 }  // namespace understory::associator

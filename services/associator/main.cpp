@@ -2,8 +2,8 @@
 #include "services/associator/adapter.hpp"
 
 int main(int argc, char** argv) {
-  return understory::run_service(
-      understory::associator_service({
+  return understory::bus::run_service(
+      understory::associator::associator_service({
           .landmarks = "LANDMARKS",                  // in: detections of one sweep
           .odometry = "ODOMETRY",                    // in: motion, where there is any
           .filter_pose = "EKF_POSE",                 // in: the filter, one sweep behind

@@ -30,8 +30,8 @@ bool cheaper(const Candidate& a, const Candidate& b) {
 
 class Matcher {
  public:
-  Matcher(std::span<const Track> tracks, std::span<const Seen> seen, const SE2WithCovariance& pose,
-          const AssociatorParameters& parameters)
+  Matcher(std::span<const Track> tracks, std::span<const Seen> seen,
+          const geometry::SE2WithCovariance& pose, const AssociatorParameters& parameters)
       : tracks_(tracks),
         by_seen_(seen.size()),
         partner_(seen.size(), kFree),
@@ -62,19 +62,19 @@ class Matcher {
     owner_[track] = seen;
   }
 
-  void collect(std::span<const Seen> seen, const SE2WithCovariance& pose, double sigmas) {
+  void collect(std::span<const Seen> seen, const geometry::SE2WithCovariance& pose, double sigmas) {
     std::vector<Eigen::Vector2d> positions;
     double track_variance = 0.0;
     for (const Track& track : tracks_) {
       positions.push_back(track.position_m);
       track_variance = std::max(track_variance, track.variance_m2());
     }
-    const PointBins bins(positions, kBin_m);
+    const geometry::PointBins bins(positions, kBin_m);
     const Eigen::Matrix2d rotation = pose.mean.rotation();
     for (std::uint32_t i = 0; i < seen.size(); ++i) {
       // Everything in the axes of `local`.
       Eigen::Matrix<double, 2, 3> by_pose;
-      by_pose << Eigen::Matrix2d::Identity(), turned_left(seen[i].position_m);
+      by_pose << Eigen::Matrix2d::Identity(), geometry::perpendicular(seen[i].position_m);
       const Eigen::Matrix2d base =
           rotation * (seen[i].covariance_m2 + by_pose * pose.covariance * by_pose.transpose()) *
               rotation.transpose() +
@@ -88,7 +88,7 @@ class Matcher {
         const Eigen::Vector2d error = at - track.position_m;
         const double distance = error.dot(spread.inverse() * error);
         if (distance > sigmas * sigmas) return;
-        const double reluctance = track.sightings < kYoung ? kReluctance : 0.0;
+        const double reluctance = track.observations < kYoung ? kReluctance : 0.0;
         const Candidate c{distance + std::log(spread.determinant()) + reluctance, i, t};
         all_.push_back(c);
         by_seen_[i].push_back(c);
@@ -131,7 +131,7 @@ class Matcher {
     const double now = cost(i, own);
     for (const Candidate& c : by_seen_[i]) {
       // One sighting beside an older track is more likely an outlier or a false detection.
-      const bool counts = tracks_[c.track].sightings >= 2 || tracks_[own].sightings < kYoung;
+      const bool counts = tracks_[c.track].observations >= 2 || tracks_[own].observations < kYoung;
       if (c.track == own || !counts) continue;
       const std::uint32_t j = owner_[c.track];
       const double other =
@@ -156,7 +156,7 @@ class Matcher {
 }  // namespace
 
 std::vector<Match> match(std::span<const Track> tracks, std::span<const Seen> seen,
-                         const SE2WithCovariance& local_T_vehicle,
+                         const geometry::SE2WithCovariance& local_T_vehicle,
                          const AssociatorParameters& parameters) {
   if (tracks.empty() || seen.empty()) return {};
   return Matcher(tracks, seen, local_T_vehicle, parameters).run();

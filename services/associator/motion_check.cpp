@@ -18,10 +18,10 @@ constexpr double kFloor_m = 0.03;
 
 void check_motion(Track& track, const Seen& seen, const MotionCheck& check,
                   const AssociatorParameters& parameters) {
-  const SE2 now_T_then = check.then_T_now.mean.inverse();
+  const geometry::SE2 now_T_then = check.then_T_now.mean.inverse();
   const Eigen::Vector2d expected = now_T_then * track.begin.position_m;
   Eigen::Matrix<double, 2, 3> by_motion;
-  by_motion << Eigen::Matrix2d::Identity(), turned_left(expected);
+  by_motion << Eigen::Matrix2d::Identity(), geometry::perpendicular(expected);
   const Eigen::Matrix2d turn = now_T_then.rotation();
   const Eigen::Matrix2d spread = seen.covariance_m2 +
                                  turn * track.begin.covariance_m2 * turn.transpose() +
@@ -41,7 +41,7 @@ void check_motion(Track& track, const Seen& seen, const MotionCheck& check,
   const double noticed_m = std::sqrt(kGate * widest);
   const bool is_told = parameters.walking_mps * check.seconds > noticed_m;
   // Where so long a time does not tell, nothing will.
-  if (is_told || check.seconds > kCompared_s) track.steadiness = Steadiness::kStands;
+  if (is_told || check.seconds > kCompared_s) track.steadiness = Steadiness::kStationary;
 }
 
 }  // namespace understory::associator

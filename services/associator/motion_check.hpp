@@ -13,7 +13,7 @@ constexpr double kCompared_s = 1.5;
 /// would follow somebody who is the only one in view.
 struct MotionCheck {
   double seconds = 0.0;  ///< Between the two sightings.
-  SE2WithCovariance then_T_now;
+  geometry::SE2WithCovariance then_T_now;
 };
 
 /// Updates `track.steadiness` by a sighting that it was matched with.

@@ -3,7 +3,7 @@
 
 #include <string>
 
-namespace understory {
+namespace understory::associator {
 
 struct AssociatorParameters {
   /// How detections and tracks are paired: "nearest" (gated nearest neighbour at the predicted
@@ -15,7 +15,7 @@ struct AssociatorParameters {
   /// Of the motion between two scans where only the last motion predicts it.
   double motion_sigma_m = 0.3;
   double motion_sigma_rad = 0.04;
-  double max_turn_rad = 0.5;       ///< Largest unpredicted turn between two scans that is searched.
+  double max_rotation_rad = 0.5;   ///< Largest unpredicted turn between two scans that is searched.
   double min_matched_ratio = 0.5;  ///< Of what could match: below, a scan is lost.
   int min_matched = 3;             ///< Fewest matches of a scan that fits.
   /// Scans in a row that fit no track and are passed over; then all tracks begin anew.
@@ -32,4 +32,4 @@ struct AssociatorParameters {
   double walking_mps = 0.8;
 };
 
-}  // namespace understory
+}  // namespace understory::associator

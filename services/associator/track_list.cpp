@@ -19,13 +19,14 @@ constexpr std::size_t kEnough = 3;
 }  // namespace
 
 double Track::variance_m2() const {
-  return detection_variance_m2 / std::min<double>(std::max(1u, sightings), kMaxWeight);
+  return detection_variance_m2 / std::min<double>(std::max(1u, observations), kMaxWeight);
 }
 
-std::vector<TrackId> TrackList::update(std::span<const Seen> seen, std::span<const Match> matches,
-                                       const SE2& local_T_vehicle, const FieldOfView& view,
-                                       Utime utime) {
-  const SE2 vehicle_T_local = local_T_vehicle.inverse();
+std::vector<model::TrackId> TrackList::update(std::span<const Seen> seen,
+                                              std::span<const Match> matches,
+                                              const geometry::SE2& local_T_vehicle,
+                                              const model::FieldOfView& view, model::Utime utime) {
+  const geometry::SE2 vehicle_T_local = local_T_vehicle.inverse();
   const std::size_t known = tracks_.size();
   const auto matched = std::make_unique<bool[]>(known);
   std::vector<bool> used(seen.size(), false);
@@ -33,7 +34,7 @@ std::vector<TrackId> TrackList::update(std::span<const Seen> seen, std::span<con
     matched[match.track] = true;
     used[match.seen] = true;
   }
-  FieldOfView inner = view;
+  model::FieldOfView inner = view;
   inner.max_range_m -= kEdge_m;
   for (std::size_t i = 0; i < known; ++i) {
     Track& track = tracks_[i];
@@ -42,7 +43,7 @@ std::vector<TrackId> TrackList::update(std::span<const Seen> seen, std::span<con
     ++track.age;
     track.missed = matched[i] ? 0 : track.missed + 1;
   }
-  std::vector<TrackId> published(seen.size(), 0);
+  std::vector<model::TrackId> published(seen.size(), 0);
   for (const Match& match : matches) {
     Track& track = tracks_[match.track];
     take(track, seen[match.seen], match, local_T_vehicle);
@@ -59,7 +60,7 @@ std::vector<TrackId> TrackList::update(std::span<const Seen> seen, std::span<con
     track.detection_variance_m2 = seen[i].variance_m2();
     track.radius_m = seen[i].radius_m;
     track.kind = seen[i].kind;
-    track.sightings = track.age = 1;
+    track.observations = track.age = 1;
     track.history = 1;
     track.begin = {utime, seen[i].position_m, seen[i].covariance_m2};
     confirm(track);
@@ -70,8 +71,8 @@ std::vector<TrackId> TrackList::update(std::span<const Seen> seen, std::span<con
 }
 
 void TrackList::check_steadiness(
-    std::span<const Seen> seen, std::span<const Match> matches, Utime utime,
-    const std::function<std::optional<SE2WithCovariance>(Utime)>& motion_since) {
+    std::span<const Seen> seen, std::span<const Match> matches, model::Utime utime,
+    const std::function<std::optional<geometry::SE2WithCovariance>(model::Utime)>& motion_since) {
   std::size_t standing = 0;
   bool is_known = false;
   for (const Match& match : matches) {
@@ -85,7 +86,7 @@ void TrackList::check_steadiness(
     } else if (!motion) {
       track.begin = {utime, now.position_m, now.covariance_m2};
     }
-    if (track.steadiness == Steadiness::kStands) ++standing;
+    if (track.steadiness == Steadiness::kStationary) ++standing;
   }
   needs_proof_ = is_known && standing < kEnough;
 }
@@ -93,15 +94,15 @@ void TrackList::check_steadiness(
 /// Where hardly anything stands in view, the vehicle's motion would be told by one that walks.
 bool TrackList::is_steady(const Track& track) const {
   if (parameters_.walking_mps <= 0.0) return true;
-  return track.steadiness == Steadiness::kStands ||
+  return track.steadiness == Steadiness::kStationary ||
          (track.steadiness == Steadiness::kUnknown && !needs_proof_);
 }
 
 void TrackList::take(Track& track, const Seen& seen, const Match& match,
-                     const SE2& local_T_vehicle) {
+                     const geometry::SE2& local_T_vehicle) {
   if (match.ambiguous) return;  // Whose position it is cannot be told.
-  ++track.sightings;
-  const double weight = std::min<double>(track.sightings, kMaxWeight);
+  ++track.observations;
+  const double weight = std::min<double>(track.observations, kMaxWeight);
   track.position_m += (local_T_vehicle * seen.position_m - track.position_m) / weight;
   track.detection_variance_m2 += (seen.variance_m2() - track.detection_variance_m2) / weight;
   track.radius_m += (seen.radius_m - track.radius_m) / weight;
@@ -127,7 +128,7 @@ void TrackList::confirm(Track& track) {
   if (std::popcount(recent) >= parameters_.confirm_matches) track.id = next_id_++;
 }
 
-void TrackList::drop(const SE2& local_T_vehicle, const FieldOfView& view) {
+void TrackList::drop(const geometry::SE2& local_T_vehicle, const model::FieldOfView& view) {
   const double range = parameters_.keep_range_factor * view.max_range_m;
   const auto window = static_cast<unsigned>(std::clamp(parameters_.confirm_window, 1, 63));
   const std::uint64_t mask = (std::uint64_t{1} << window) - 1;

@@ -5,7 +5,7 @@
 
 #include "common/bus/service.hpp"
 
-namespace understory {
+namespace understory::ekf {
 
 struct EkfChannels {
   std::string odometry = "ODOMETRY";
@@ -16,6 +16,6 @@ struct EkfChannels {
   std::string velocity_correction = "VELOCITY_CORRECTION";
 };
 
-Service ekf_service(const EkfChannels& channels = {});
+bus::Service ekf_service(const EkfChannels& channels = {});
 
-}  // namespace understory
+}  // namespace understory::ekf

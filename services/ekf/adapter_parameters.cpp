@@ -1,9 +1,9 @@
 #include "services/ekf/adapter_parameters.hpp"
 
-namespace understory {
+namespace understory::ekf {
 namespace {
 
-void describe(EkfPriorParameters& p, ParameterTable& table) {
+void describe(EkfPriorParameters& p, bus::ParameterTable& table) {
   table.add("prior.velocity_sigma_mps", p.velocity_sigma_mps, {0.001, 100.0}, "m/s",
             "Of the velocity at the start, per axis.");
   table.add("prior.gyro_bias_sigma", p.gyro_bias_sigma, {1e-7, 1.0}, "rad/s",
@@ -15,16 +15,16 @@ void describe(EkfPriorParameters& p, ParameterTable& table) {
             "wheels, but after so long at the latest.");
 }
 
-void describe(EkfMotionParameters& p, ParameterTable& table) {
+void describe(EkfMotionParameters& p, bus::ParameterTable& table) {
   table.add("motion.gyro_walk", p.gyro_walk, {0.0, 0.1}, "rad/s/sqrt(s)",
             "Random walk of the gyro's bias.");
   table.add("motion.accelerometer_walk", p.accelerometer_walk, {0.0, 1.0}, "m/s^2/sqrt(s)",
             "Random walk of the accelerometer's bias.");
-  table.add("motion.standing_sigma_mps", p.standing_sigma_mps, {1e-5, 1.0}, "m/s",
+  table.add("motion.stationary_sigma_mps", p.stationary_sigma_mps, {1e-5, 1.0}, "m/s",
             "Of the velocity while the vehicle is found to stand.");
-  table.add("motion.standing_sigma_m", p.standing_sigma_m, {1e-6, 1.0}, "m",
+  table.add("motion.stationary_sigma_m", p.stationary_sigma_m, {1e-6, 1.0}, "m",
             "Of the body's sway about the place where it is parked, per axis.");
-  table.add("motion.standing_sigma_rad", p.standing_sigma_rad, {1e-7, 0.1}, "rad",
+  table.add("motion.stationary_sigma_rad", p.stationary_sigma_rad, {1e-7, 0.1}, "rad",
             "Of the body's turning about its heading where it is parked.");
   table.add("motion.sideways_sigma_mps", p.sideways_sigma_mps, {0.0, 100.0}, "m/s",
             "Of the velocity across the vehicle, per piece; 0 = it may slide freely.");
@@ -36,7 +36,7 @@ void describe(EkfMotionParameters& p, ParameterTable& table) {
             "Speed may change so much within a piece of wheel odometry.");
 }
 
-void describe(EkfMapParameters& p, ParameterTable& table) {
+void describe(EkfMapParameters& p, bus::ParameterTable& table) {
   table.add("map.max_landmarks", p.max_landmarks, {1, 1000}, "", "Of the active state.");
   table.add("map.min_separation_m", p.min_separation_m, {0.0, 10.0}, "m",
             "A new landmark nearer to an old one is refused.");
@@ -48,16 +48,16 @@ void describe(EkfMapParameters& p, ParameterTable& table) {
             "In a row, in which its gate refused a landmark: it leaves.");
 }
 
-void describe(EkfSightingParameters& p, ParameterTable& table) {
-  table.add("sighting.lasting_share", p.lasting_share, {0.0, 0.9}, "",
+void describe(EkfObservationParameters& p, bus::ParameterTable& table) {
+  table.add("observation.correlated_share", p.correlated_share, {0.0, 0.9}, "",
             "Of a sighting's variance, the same from scan to scan; 0 = all noise is new.");
-  table.add("sighting.lasting_m", p.lasting_m, {0.01, 1000.0}, "m",
+  table.add("observation.correlation_m", p.correlation_m, {0.01, 1000.0}, "m",
             "Such errors fade over so much way.");
-  table.add("sighting.scale_sigma", p.scale_sigma, {0.0, 0.1}, "",
+  table.add("observation.scale_sigma", p.scale_sigma, {0.0, 0.1}, "",
             "Of distances, the same for all landmarks and for ever.");
 }
 
-void describe(EkfGateParameters& p, ParameterTable& table) {
+void describe(EkfGateParameters& p, bus::ParameterTable& table) {
   table.add("gate.landmark_probability", p.landmark_probability, {0.5, 0.999999}, "",
             "chi^2 gate of each landmark.");
   table.add("gate.set_probability", p.set_probability, {0.5, 0.999999}, "",
@@ -72,7 +72,7 @@ void describe(EkfGateParameters& p, ParameterTable& table) {
             "Of the search for the largest compatible set.");
 }
 
-void describe(EkfRestartParameters& p, ParameterTable& table) {
+void describe(EkfRestartParameters& p, bus::ParameterTable& table) {
   table.add("restart.after_refused_scans", p.after_refused_scans, {1, 100000}, "scans",
             "In a row, of which most landmarks were refused.");
   table.add("restart.sigma_m", p.sigma_m, {0.0, 1000.0}, "m",
@@ -87,7 +87,7 @@ void describe(EkfRestartParameters& p, ParameterTable& table) {
 
 }  // namespace
 
-void describe(EkfParameters& parameters, ParameterTable& table) {
+void describe(EkfParameters& parameters, bus::ParameterTable& table) {
   table.add("error_form", parameters.error_form, {"right_invariant", "first_estimate", "plain"},
             "How errors are measured; plain grows sure of a heading that nothing tells.");
   table.add("max_scan_delay_s", parameters.max_scan_delay_s, {0.0, 10.0}, "s",
@@ -95,9 +95,15 @@ void describe(EkfParameters& parameters, ParameterTable& table) {
   describe(parameters.prior, table);
   describe(parameters.motion, table);
   describe(parameters.map, table);
-  describe(parameters.sighting, table);
+  describe(parameters.observation, table);
   describe(parameters.gate, table);
   describe(parameters.restart, table);
+  table.renamed("sighting.lasting_share", "observation.correlated_share");
+  table.renamed("sighting.lasting_m", "observation.correlation_m");
+  table.renamed("sighting.", "observation.");
+  table.renamed("motion.standing_sigma_mps", "motion.stationary_sigma_mps");
+  table.renamed("motion.standing_sigma_m", "motion.stationary_sigma_m");
+  table.renamed("motion.standing_sigma_rad", "motion.stationary_sigma_rad");
 }
 
-}  // namespace understory
+}  // namespace understory::ekf

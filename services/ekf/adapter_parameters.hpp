@@ -4,8 +4,8 @@
 #include "common/bus/parameter_table.hpp"
 #include "services/ekf/parameters.hpp"
 
-namespace understory {
+namespace understory::ekf {
 
-void describe(EkfParameters& parameters, ParameterTable& table);
+void describe(EkfParameters& parameters, bus::ParameterTable& table);
 
-}  // namespace understory
+}  // namespace understory::ekf

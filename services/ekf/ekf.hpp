@@ -17,7 +17,7 @@
 #include "services/ekf/low_rank.hpp"
 #include "services/ekf/parameters.hpp"
 
-namespace understory {
+namespace understory::ekf {
 
 /// What was refused and why; counted for HEALTH.
 struct EkfCounters {
@@ -38,10 +38,10 @@ struct EkfCounters {
 };
 
 struct EkfOutput {
-  std::optional<EkfPose> pose;
-  std::optional<EkfMap> map;
-  std::optional<VelocityCorrection> correction;
-  std::optional<EkfLevel> level;  ///< With each pose, where sweeps are levelled.
+  std::optional<model::EkfPose> pose;
+  std::optional<model::EkfMap> map;
+  std::optional<model::VelocityCorrection> correction;
+  std::optional<model::EkfLevel> level;  ///< With each pose, where sweeps are levelled.
 };
 
 class Ekf {
@@ -51,75 +51,75 @@ class Ekf {
 
   /// Motion waits for the scan at its end; without one it is used after `max_scan_delay_s`, and a
   /// pose is given then.
-  EkfOutput add(const Odometry& piece);
+  EkfOutput add(const model::Odometry& increment);
   /// Pose, map and velocity correction at the scan's stamp; nothing from a late or repeated scan,
   /// nor before the map begins (EkfPriorParameters::wait_s).
-  EkfOutput add(const TrackedScan& scan);
+  EkfOutput add(const model::TrackedScan& scan);
 
   const EkfCounters& counters() const { return counters_; }
   /// The estimate at utime().
-  const ekf::FilterState& state() const { return state_; }
-  Utime utime() const { return utime_; }
+  const FilterState& state() const { return state_; }
+  model::Utime utime() const { return utime_; }
 
   std::string save() const;
   void load(const std::string& state);
 
  private:
   struct Alias {
-    TrackId track = 0;
-    TrackId landmark = 0;
+    model::TrackId track = 0;
+    model::TrackId landmark = 0;
   };
 
   /// Unknown tracks that may be lost landmarks, those with the fewest choices first.
   struct RejoinSearch {
-    std::vector<ekf::Candidates> candidates;
+    std::vector<Candidates> candidates;
     double widest_gate_m = 0.0;
-    double turn_variance = 0.0;  ///< [rad^2] Of the vehicle against the lost landmarks, at most.
+    double rotation_variance =
+        0.0;  ///< [rad^2] Of the vehicle against the lost landmarks, at most.
   };
 
   // ekf.cpp: time and motion.
-  bool may_begin(const Odometry& piece);
-  void start(Utime utime);
-  void restart(Utime utime, const std::string& reason);
+  bool may_begin(const model::Odometry& increment);
+  void start(model::Utime utime);
+  void restart(model::Utime utime, const std::string& reason);
   void set_prior();
-  void advance(Utime utime);
-  void use(const Odometry& piece);
-  void predict(const Odometry& piece, bool stands);
-  bool believes_standing(const Odometry& piece);
+  void advance(model::Utime utime);
+  void use(const model::Odometry& increment);
+  void predict(const model::Odometry& increment, bool is_stationary);
+  bool believes_stationary(const model::Odometry& increment);
   void stand();
-  void doubt_standing();
+  void doubt_stationary();
   void leave_place();
-  void bridge(Utime utime);
-  EkfPose pose();
-  std::optional<EkfLevel> level() const;
+  void bridge(model::Utime utime);
+  model::EkfPose pose();
+  std::optional<model::EkfLevel> level() const;
   EkfOutput outputs();
 
   // ekf_scan.cpp: landmarks.
-  void read(const TrackedScan& scan);
-  ekf::Sighting sighting(const Detection& seen) const;
+  void read(const model::TrackedScan& scan);
+  Observation observation(const model::Detection& seen) const;
   void steady_heights();
-  void check_standing();
+  void check_stationary();
   void update_known();
-  void update_checked(std::vector<ekf::Pairing>& pairings,
-                      std::span<const ekf::Sighting> sightings);
-  void rejoin_lost(const TrackedScan& scan);
-  bool rejoin_round(const TrackedScan& scan);
-  RejoinSearch rejoin_candidates(const TrackedScan& scan) const;
-  void add_new(const TrackedScan& scan);
-  void count_missed(const FieldOfView& view);
-  void remove_distant(const FieldOfView& view);
-  bool make_room(const FieldOfView& view);
+  void update_checked(std::vector<Pairing>& pairings, std::span<const Observation> observations);
+  void rejoin_lost(const model::TrackedScan& scan);
+  bool rejoin_round(const model::TrackedScan& scan);
+  RejoinSearch rejoin_candidates(const model::TrackedScan& scan) const;
+  void add_new(const model::TrackedScan& scan);
+  void count_missed(const model::FieldOfView& view);
+  void remove_distant(const model::FieldOfView& view);
+  bool make_room(const model::FieldOfView& view);
   void remove(std::size_t landmark);
-  void weaken(const ekf::Pairing& pairing);
-  void see(const TrackedScan& scan, const ekf::Pairing& pairing);
-  std::optional<std::uint32_t> landmark_of(TrackId track) const;
+  void weaken(const Pairing& pairing);
+  void see(const model::TrackedScan& scan, const Pairing& pairing);
+  std::optional<std::uint32_t> landmark_of(model::TrackId track) const;
   void check_lost();
   bool near_old(const Eigen::Vector2d& position) const;
 
   EkfParameters parameters_;
-  ekf::FilterState state_;
-  ekf::LowRank room_;
-  ekf::JointUpdate joint_;
+  FilterState state_;
+  LowRank room_;
+  JointUpdate joint_;
   Eigen::MatrixXd backup_;
   double landmark_gate_ = 0.0;
   double parked_gate_ = 0.0;       ///< Of the marks on the ground, 4 degrees of freedom.
@@ -128,33 +128,33 @@ class Ekf {
   std::vector<double> set_gates_;  ///< By number of landmarks.
 
   bool started_ = false;
-  std::optional<Utime> heard_;  ///< Start of the first odometry, while it is not started.
-  Utime utime_ = 0;
-  std::optional<Utime> last_scan_;
-  std::deque<Odometry> waiting_;
+  std::optional<model::Utime> heard_;  ///< Start of the first odometry, while it is not started.
+  model::Utime utime_ = 0;
+  std::optional<model::Utime> last_scan_;
+  std::deque<model::Odometry> waiting_;
   std::uint64_t scan_count_ = 0;
   std::uint64_t pose_sequence_ = 0;
   std::uint64_t map_sequence_ = 0;
   std::uint64_t reset_counter_ = 0;
   int refused_scans_ = 0;
   /// Set: it moves though it is said to stand; when that was last found.
-  std::optional<Utime> doubted_;
-  double way_m_ = 0.0;  ///< Driven so far.
+  std::optional<model::Utime> doubted_;
+  double distance_m_ = 0.0;  ///< Driven so far.
   /// Covariance of the level's error as the latest odometry has it: what detections have in theirs.
   std::optional<Eigen::Matrix2d> level_covariance_;
   double pitch_tangent_ = 0.0;  ///< Of the vehicle, as the latest odometry has it.
   std::uint32_t used_ = 0;
   std::uint32_t refused_ = 0;
   std::vector<Alias> aliases_;  ///< In order of track.
-  EkfPose last_sound_;
+  model::EkfPose last_sound_;
   EkfCounters counters_;
 
   // Of the scan at hand.
-  std::vector<ekf::Sighting> sightings_;
-  std::vector<std::uint32_t> source_;  ///< Index in the scan, per sighting.
-  std::vector<TrackId> tracks_;        ///< Per sighting.
-  std::vector<bool> settled_;          ///< Per sighting: paired, or refused.
-  std::vector<ekf::Pairing> pairings_;
+  std::vector<Observation> observations_;
+  std::vector<std::uint32_t> source_;   ///< Index in the scan, per sighting.
+  std::vector<model::TrackId> tracks_;  ///< Per sighting.
+  std::vector<bool> settled_;           ///< Per sighting: paired, or refused.
+  std::vector<Pairing> pairings_;
 };
 
-}  // namespace understory
+}  // namespace understory::ekf

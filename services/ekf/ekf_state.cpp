@@ -5,21 +5,21 @@
 #include "common/model/state.hpp"
 #include "services/ekf/ekf.hpp"
 
-namespace understory {
+namespace understory::ekf {
 namespace {
 
 constexpr int kStateVersion = 4;
 
-Json vector_json(const Eigen::Vector2d& v) { return matrix_to_json<2, 1>(v); }
-Eigen::Vector2d vector_from(const Json& json) { return matrix_from_json<2, 1>(json); }
+model::Json vector_json(const Eigen::Vector2d& v) { return model::matrix_to_json<2, 1>(v); }
+Eigen::Vector2d vector_from(const model::Json& json) { return model::matrix_from_json<2, 1>(json); }
 
-Json landmark_json(const ekf::MapLandmark& l) {
+model::Json landmark_json(const MapLandmark& l) {
   return {l.id,
           vector_json(l.position),
           vector_json(l.first_position),
           l.radius_m,
           static_cast<int>(l.kind),
-          l.times_seen,
+          l.observation_count,
           l.missed,
           l.refused,
           l.last_scan,
@@ -29,14 +29,14 @@ Json landmark_json(const ekf::MapLandmark& l) {
           l.height_m};
 }
 
-ekf::MapLandmark landmark_from(const Json& json) {
-  ekf::MapLandmark l;
-  l.id = json.at(0).get<TrackId>();
+MapLandmark landmark_from(const model::Json& json) {
+  MapLandmark l;
+  l.id = json.at(0).get<model::TrackId>();
   l.position = vector_from(json.at(1));
   l.first_position = vector_from(json.at(2));
   l.radius_m = json.at(3).get<double>();
-  l.kind = static_cast<LandmarkKind>(json.at(4).get<int>());
-  l.times_seen = json.at(5).get<std::uint32_t>();
+  l.kind = static_cast<model::LandmarkKind>(json.at(4).get<int>());
+  l.observation_count = json.at(5).get<std::uint32_t>();
   l.missed = json.at(6).get<std::uint32_t>();
   l.refused = json.at(7).get<std::uint32_t>();
   l.last_scan = json.at(8).get<std::uint64_t>();
@@ -49,7 +49,7 @@ ekf::MapLandmark landmark_from(const Json& json) {
 
 /// The lower triangle, column by column, as bytes: as a list of numbers it would take ten times as
 /// long.
-Json covariance_json(const ekf::FilterState& state) {
+model::Json covariance_json(const FilterState& state) {
   const int n = state.size();
   std::vector<std::uint8_t> bytes;
   bytes.reserve(sizeof(double) * static_cast<std::size_t>(n * (n + 1) / 2));
@@ -61,11 +61,11 @@ Json covariance_json(const ekf::FilterState& state) {
       bytes.insert(bytes.end(), raw, raw + sizeof(double));
     }
   }
-  return Json::binary(std::move(bytes));
+  return model::Json::binary(std::move(bytes));
 }
 
-void load_covariance(const Json& json, ekf::FilterState& state) {
-  const Json::binary_t& bytes = json.get_binary();
+void load_covariance(const model::Json& json, FilterState& state) {
+  const model::Json::binary_t& bytes = json.get_binary();
   const int n = state.size();
   if (bytes.size() != sizeof(double) * static_cast<std::size_t>(n * (n + 1) / 2)) {
     throw std::invalid_argument("state: the covariance has the wrong size");
@@ -81,13 +81,13 @@ void load_covariance(const Json& json, ekf::FilterState& state) {
   }
 }
 
-Json filter_json(const ekf::FilterState& state) {
-  Json landmarks = Json::array();
+model::Json filter_json(const FilterState& state) {
+  model::Json landmarks = model::Json::array();
   for (const auto& landmark : state.landmarks()) landmarks.push_back(landmark_json(landmark));
   return {{"heading", state.heading},
           {"position", vector_json(state.position)},
           {"velocity", vector_json(state.velocity)},
-          {"bias", matrix_to_json<3, 1>(state.bias)},
+          {"bias", model::matrix_to_json<3, 1>(state.bias)},
           {"level", vector_json(state.level)},
           {"anchor", vector_json(state.anchor_m)},
           {"first_position", vector_json(state.first_position)},
@@ -96,17 +96,18 @@ Json filter_json(const ekf::FilterState& state) {
           {"covariance", covariance_json(state)}};
 }
 
-void load_filter(const Json& json, ekf::FilterState& state) {
+void load_filter(const model::Json& json, FilterState& state) {
   state.heading = json.at("heading").get<double>();
   state.position = vector_from(json.at("position"));
   state.velocity = vector_from(json.at("velocity"));
-  state.bias = matrix_from_json<3, 1>(json.at("bias"));
+  state.bias = model::matrix_from_json<3, 1>(json.at("bias"));
   state.level = vector_from(json.at("level"));
   state.anchor_m = vector_from(json.at("anchor"));
   state.first_position = vector_from(json.at("first_position"));
   state.first_velocity = vector_from(json.at("first_velocity"));
-  std::vector<ekf::MapLandmark> landmarks;
-  for (const Json& landmark : json.at("landmarks")) landmarks.push_back(landmark_from(landmark));
+  std::vector<MapLandmark> landmarks;
+  for (const model::Json& landmark : json.at("landmarks"))
+    landmarks.push_back(landmark_from(landmark));
   if (landmarks.size() > static_cast<std::size_t>(state.max_landmarks())) {
     throw std::invalid_argument("state: more landmarks than map.max_landmarks");
   }
@@ -117,67 +118,69 @@ void load_filter(const Json& json, ekf::FilterState& state) {
 }  // namespace
 
 std::string Ekf::save() const {
-  Json waiting = Json::array();
-  for (const Odometry& piece : waiting_) waiting.push_back(piece);
-  Json aliases = Json::array();
+  model::Json waiting = model::Json::array();
+  for (const model::Odometry& increment : waiting_) waiting.push_back(increment);
+  model::Json aliases = model::Json::array();
   for (const Alias& alias : aliases_) aliases.push_back({alias.track, alias.landmark});
-  return to_state({{"version", kStateVersion},
-                   {"form", parameters_.error_form},
-                   {"filter", filter_json(state_)},
-                   {"started", started_},
-                   {"heard", optional_to_json(heard_)},
-                   {"utime", utime_},
-                   {"last_scan", optional_to_json(last_scan_)},
-                   {"waiting", waiting},
-                   {"aliases", aliases},
-                   {"scan_count", scan_count_},
-                   {"pose_sequence", pose_sequence_},
-                   {"map_sequence", map_sequence_},
-                   {"reset_counter", reset_counter_},
-                   {"refused_scans", refused_scans_},
-                   {"doubted", optional_to_json(doubted_)},
-                   {"way_m", way_m_},
-                   {"level_covariance",
-                    level_covariance_ ? matrix_to_json<2, 2>(*level_covariance_) : Json(nullptr)},
-                   {"pitch_tangent", pitch_tangent_},
-                   {"last_pose", last_sound_.ekf_map_T_vehicle},
-                   {"last_covariance", matrix_to_json<3, 3>(last_sound_.covariance)},
-                   {"last_bias", matrix_to_json<3, 1>(last_sound_.bias)}});
+  return model::to_state(
+      {{"version", kStateVersion},
+       {"form", parameters_.error_form},
+       {"filter", filter_json(state_)},
+       {"started", started_},
+       {"heard", model::optional_to_json(heard_)},
+       {"utime", utime_},
+       {"last_scan", model::optional_to_json(last_scan_)},
+       {"waiting", waiting},
+       {"aliases", aliases},
+       {"scan_count", scan_count_},
+       {"pose_sequence", pose_sequence_},
+       {"map_sequence", map_sequence_},
+       {"reset_counter", reset_counter_},
+       {"refused_scans", refused_scans_},
+       {"doubted", model::optional_to_json(doubted_)},
+       {"way_m", distance_m_},
+       {"level_covariance",
+        level_covariance_ ? model::matrix_to_json<2, 2>(*level_covariance_) : model::Json(nullptr)},
+       {"pitch_tangent", pitch_tangent_},
+       {"last_pose", last_sound_.ekf_map_T_vehicle},
+       {"last_covariance", model::matrix_to_json<3, 3>(last_sound_.covariance)},
+       {"last_bias", model::matrix_to_json<3, 1>(last_sound_.bias)}});
 }
 
 void Ekf::load(const std::string& state) {
-  const Json json = from_state(state);
+  const model::Json json = model::from_state(state);
   if (json.at("version").get<int>() != kStateVersion ||
       json.at("form").get<std::string>() != parameters_.error_form) {
     throw std::invalid_argument("state: of another version or error form");
   }
   load_filter(json.at("filter"), state_);
   started_ = json.at("started").get<bool>();
-  heard_ = optional_from_json<Utime>(json.at("heard"));
-  utime_ = json.at("utime").get<Utime>();
-  last_scan_ = optional_from_json<Utime>(json.at("last_scan"));
+  heard_ = model::optional_from_json<model::Utime>(json.at("heard"));
+  utime_ = json.at("utime").get<model::Utime>();
+  last_scan_ = model::optional_from_json<model::Utime>(json.at("last_scan"));
   waiting_.clear();
-  for (const Json& piece : json.at("waiting")) waiting_.push_back(piece.get<Odometry>());
+  for (const model::Json& increment : json.at("waiting"))
+    waiting_.push_back(increment.get<model::Odometry>());
   aliases_.clear();
-  for (const Json& alias : json.at("aliases")) {
-    aliases_.push_back({alias.at(0).get<TrackId>(), alias.at(1).get<TrackId>()});
+  for (const model::Json& alias : json.at("aliases")) {
+    aliases_.push_back({alias.at(0).get<model::TrackId>(), alias.at(1).get<model::TrackId>()});
   }
   scan_count_ = json.at("scan_count").get<std::uint64_t>();
   pose_sequence_ = json.at("pose_sequence").get<std::uint64_t>();
   map_sequence_ = json.at("map_sequence").get<std::uint64_t>();
   reset_counter_ = json.at("reset_counter").get<std::uint64_t>();
   refused_scans_ = json.at("refused_scans").get<int>();
-  doubted_ =
-      json.contains("doubted") ? optional_from_json<Utime>(json.at("doubted")) : std::nullopt;
-  way_m_ = json.at("way_m").get<double>();
-  const Json& level = json.at("level_covariance");
+  doubted_ = json.contains("doubted") ? model::optional_from_json<model::Utime>(json.at("doubted"))
+                                      : std::nullopt;
+  distance_m_ = json.at("way_m").get<double>();
+  const model::Json& level = json.at("level_covariance");
   level_covariance_.reset();
-  if (!level.is_null()) level_covariance_ = matrix_from_json<2, 2>(level);
+  if (!level.is_null()) level_covariance_ = model::matrix_from_json<2, 2>(level);
   pitch_tangent_ = json.at("pitch_tangent").get<double>();
-  last_sound_ = EkfPose{};
-  last_sound_.ekf_map_T_vehicle = json.at("last_pose").get<SE2>();
-  last_sound_.covariance = matrix_from_json<3, 3>(json.at("last_covariance"));
-  last_sound_.bias = matrix_from_json<3, 1>(json.at("last_bias"));
+  last_sound_ = model::EkfPose{};
+  last_sound_.ekf_map_T_vehicle = json.at("last_pose").get<geometry::SE2>();
+  last_sound_.covariance = model::matrix_from_json<3, 3>(json.at("last_covariance"));
+  last_sound_.bias = model::matrix_from_json<3, 1>(json.at("last_bias"));
 }
 
-}  // namespace understory
+}  // namespace understory::ekf

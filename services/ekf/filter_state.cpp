@@ -10,7 +10,7 @@ constexpr double kAnchorReach_m = 150.0;
 
 /// V with Exp(rho, t) = (V rho, t): the translation part of the exponential map.
 Eigen::Matrix2d translation_map(double angle) {
-  const SE2 x = SE2::Exp({1.0, 0.0, angle});
+  const geometry::SE2 x = geometry::SE2::Exp({1.0, 0.0, angle});
   return (Eigen::Matrix2d() << x.x(), -x.y(), x.y(), x.x()).finished();
 }
 
@@ -18,7 +18,7 @@ Eigen::Matrix2d translation_map(double angle) {
 
 Eigen::Matrix2d quarter_turn() { return (Eigen::Matrix2d() << 0.0, -1.0, 1.0, 0.0).finished(); }
 Eigen::Matrix2d level_displacement() { return -quarter_turn(); }
-Eigen::Matrix2d rotation_of(double heading) { return SE2(0.0, 0.0, heading).rotation(); }
+Eigen::Matrix2d rotation_of(double heading) { return geometry::SE2(0.0, 0.0, heading).rotation(); }
 
 FilterState::FilterState(ErrorForm form, int max_landmarks)
     : form_(form), max_landmarks_(max_landmarks) {
@@ -28,7 +28,7 @@ FilterState::FilterState(ErrorForm form, int max_landmarks)
 }
 
 Eigen::Vector2d FilterState::lever(const Eigen::Vector2d& x) const {
-  if (form_ == ErrorForm::kRightInvariant) return turned_left(x);
+  if (form_ == ErrorForm::kRightInvariant) return geometry::perpendicular(x);
   return Eigen::Vector2d::Zero();
 }
 
@@ -40,7 +40,7 @@ void FilterState::retract(const Eigen::Ref<const Eigen::VectorXd>& delta) {
   const auto move = [&](Eigen::Vector2d& x, int at) {
     x = whole * x + part * delta.segment<2>(at);
   };
-  heading = wrap_angle(heading + turn);
+  heading = geometry::wrap_angle(heading + turn);
   move(position, kPosition);
   move(velocity, kVelocity);
   bias += delta.segment<3>(kBias);
@@ -60,7 +60,8 @@ void FilterState::add_landmark(const MapLandmark& landmark, const Eigen::Vector2
   added.first_position = added.position;
   // Its error is the position's, plus the heading's on the way (zero if right invariant), less the
   // level's, plus noise.
-  const Eigen::Vector2d by_heading = turned_left(offset) + lever(position) - lever(added.position);
+  const Eigen::Vector2d by_heading =
+      geometry::perpendicular(offset) + lever(position) - lever(added.position);
   for (int i = 0; i < n; ++i) {
     for (int k = 0; k < 2; ++k) {
       covariance_(n + k, i) =
@@ -116,7 +117,8 @@ void FilterState::set_pose_covariance(const Eigen::Matrix3d& covariance) {
 Eigen::Matrix<double, 5, 5> FilterState::velocity_covariance() const {
   Eigen::Matrix<double, 5, kVehicle> to_vehicle = Eigen::Matrix<double, 5, kVehicle>::Zero();
   const Eigen::Matrix2d back = rotation_of(heading).transpose();
-  to_vehicle.block<2, 1>(0, kHeading) = back * (lever(velocity) - turned_left(velocity));
+  to_vehicle.block<2, 1>(0, kHeading) =
+      back * (lever(velocity) - geometry::perpendicular(velocity));
   to_vehicle.block<2, 2>(0, kVelocity) = back;
   to_vehicle.block<3, 3>(2, kBias).setIdentity();
   return to_vehicle * covariance_block<kVehicle, kVehicle>(0, 0) * to_vehicle.transpose();

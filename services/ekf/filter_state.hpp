@@ -35,13 +35,13 @@ inline constexpr int kVehicle = 10;
 using VehicleMatrix = Eigen::Matrix<double, kVehicle, kVehicle>;
 
 struct MapLandmark {
-  TrackId id =
+  model::TrackId id =
       0;  ///< Of the track that it began with; 0 = a mark on the ground (ground_marks.hpp).
   Eigen::Vector2d position = Eigen::Vector2d::Zero();        ///< From the anchor [m].
   Eigen::Vector2d first_position = Eigen::Vector2d::Zero();  ///< When it was added.
   double radius_m = 0.0;
-  LandmarkKind kind = LandmarkKind::kTrunk;
-  std::uint32_t times_seen = 0;
+  model::LandmarkKind kind = model::LandmarkKind::kTrunk;
+  std::uint32_t observation_count = 0;
   std::uint32_t missed = 0;       ///< Scans in a row that should have shown it.
   std::uint32_t refused = 0;      ///< Scans in a row in which its gate refused it.
   std::uint64_t last_scan = 0;    ///< Number of the scan that saw it last.
@@ -67,7 +67,7 @@ class FilterState {
   double heading = 0.0;
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
   Eigen::Vector2d velocity = Eigen::Vector2d::Zero();
-  InertialBias bias = InertialBias::Zero();
+  model::InertialBias bias = model::InertialBias::Zero();
   /// By how much the attitude that levels sweeps is off [rad] (LevelError).
   Eigen::Vector2d level = Eigen::Vector2d::Zero();
   Eigen::Vector2d anchor_m = Eigen::Vector2d::Zero();  ///< In `ekf_map`.
@@ -116,7 +116,7 @@ class FilterState {
   void remove_landmark(std::size_t i);
   void clear_landmarks() { landmarks_.clear(); }
 
-  SE2 pose() const { return {position + anchor_m, heading}; }
+  geometry::SE2 pose() const { return {position + anchor_m, heading}; }
   /// Tangent order, right perturbation.
   Eigen::Matrix3d pose_covariance() const;
   /// Of (velocity, bias), velocity in the vehicle's axes.

@@ -9,10 +9,10 @@ namespace {
 
 /// The marks as the parked vehicle sees them. Their noise and their distance are such that both
 /// together tell the position with variance sigma_m^2 per axis and the heading with sigma_rad^2.
-std::array<Sighting, kGroundMarks> sightings(const Sway& sway) {
+std::array<Observation, kGroundMarks> observations(const Sway& sway) {
   const double reach = sway.sigma_m / sway.sigma_rad;
   const Eigen::Matrix2d noise = 2.0 * sway.sigma_m * sway.sigma_m * Eigen::Matrix2d::Identity();
-  return {Sighting{{reach, 0.0}, noise}, Sighting{{-reach, 0.0}, noise}};
+  return {Observation{{reach, 0.0}, noise}, Observation{{-reach, 0.0}, noise}};
 }
 
 bool is_mark(const MapLandmark& landmark) { return landmark.is_ground_mark(); }
@@ -24,7 +24,7 @@ bool has_ground_marks(const FilterState& state) {
 }
 
 void add_ground_marks(FilterState& state, const Sway& sway) {
-  for (const Sighting& seen : sightings(sway)) {
+  for (const Observation& seen : observations(sway)) {
     state.add_landmark(MapLandmark{}, seen.position_m, seen.covariance_m2);
   }
 }
@@ -37,7 +37,7 @@ void remove_ground_marks(FilterState& state) {
 
 bool measure_ground_marks(FilterState& state, const Sway& sway, double gate, JointUpdate& joint,
                           LowRank& room) {
-  const auto seen = sightings(sway);
+  const auto seen = observations(sway);
   const auto& landmarks = state.landmarks();
   std::array<Pairing, kGroundMarks> pairings;
   std::uint32_t found = 0;
@@ -61,7 +61,7 @@ bool measure_ground_marks(FilterState& state, const Sway& sway, double gate, Joi
   return true;
 }
 
-double common_motion(const FilterState& state, std::span<const Sighting> sightings,
+double common_motion(const FilterState& state, std::span<const Observation> observations,
                      std::span<const Pairing> pairings) {
   const int rows = 2 * static_cast<int>(pairings.size());
   const Eigen::Matrix2d rotation = rotation_of(state.heading);
@@ -70,15 +70,15 @@ double common_motion(const FilterState& state, std::span<const Sighting> sightin
   Eigen::MatrixX3d motion(rows, 3);
   for (int a = 0; a < rows; a += 2) {
     const Pairing& pairing = pairings[static_cast<std::size_t>(a / 2)];
-    const Sighting& seen = sightings[pairing.sighting];
+    const Observation& seen = observations[pairing.observation];
     error.segment<2>(a) = innovation(state, pairing.landmark, seen);
     motion.block<2, 2>(a, 0).setIdentity();
-    motion.block<2, 1>(a, 2) = turned_left(rotation * seen.position_m);
+    motion.block<2, 1>(a, 2) = geometry::perpendicular(rotation * seen.position_m);
     for (int b = 0; b <= a; b += 2) {
       const Pairing& other = pairings[static_cast<std::size_t>(b / 2)];
       spread.block<2, 2>(a, b) =
           innovation_covariance(state, pairing.landmark, other.landmark, seen.height_m,
-                                sightings[other.sighting].height_m);
+                                observations[other.observation].height_m);
     }
     spread.block<2, 2>(a, a) += rotation * seen.covariance_m2 * rotation.transpose();
   }

@@ -32,7 +32,7 @@ bool measure_ground_marks(FilterState& state, const Sway& sway, double gate, Joi
 /// Whether all sightings together are displaced: squared Mahalanobis distance (3 degrees of
 /// freedom) of the one motion of the vehicle that fits their innovations best. Finds creeping long
 /// before any single landmark does. At most kMaxRows / 2 pairings, of two landmarks at least.
-double common_motion(const FilterState& state, std::span<const Sighting> sightings,
+double common_motion(const FilterState& state, std::span<const Observation> observations,
                      std::span<const Pairing> pairings);
 
 }  // namespace understory::ekf

@@ -13,9 +13,12 @@ namespace {
 /// time.
 class Search {
  public:
-  Search(const FilterState& state, std::span<const Sighting> sightings,
+  Search(const FilterState& state, std::span<const Observation> observations,
          std::span<const Candidates> candidates, const CompatibilityGates& gates)
-      : state_(state), sightings_(sightings), candidates_(candidates), nodes_(gates.max_nodes) {
+      : state_(state),
+        observations_(observations),
+        candidates_(candidates),
+        nodes_(gates.max_nodes) {
     const auto rows = static_cast<Eigen::Index>(2 * candidates.size());
     factor_ = Eigen::MatrixXd::Zero(rows, rows);
     whitened_ = Eigen::VectorXd::Zero(rows);
@@ -42,7 +45,7 @@ class Search {
     if (!may_improve(chosen_.size() + (candidates_.size() - level), distance)) return;
     for (const std::uint32_t landmark : candidates_[level].landmarks) {
       if (taken(landmark)) continue;
-      const Pairing pairing{candidates_[level].sighting, landmark};
+      const Pairing pairing{candidates_[level].observation, landmark};
       const double more = extend(pairing);
       if (more < 0.0 || distance + more > limits_[chosen_.size()]) continue;
       chosen_.push_back(pairing);
@@ -68,12 +71,12 @@ class Search {
   /// covariance is not positive definite.
   double extend(const Pairing& pairing) {
     const auto at = static_cast<Eigen::Index>(2 * chosen_.size());
-    const Sighting& seen = sightings_[pairing.sighting];
+    const Observation& seen = observations_[pairing.observation];
     const Eigen::Matrix2d rotation = rotation_of(state_.heading);
     for (std::size_t k = 0; k < chosen_.size(); ++k) {
       factor_.block<2, 2>(at, static_cast<Eigen::Index>(2 * k)) =
           innovation_covariance(state_, pairing.landmark, chosen_[k].landmark, seen.height_m,
-                                sightings_[chosen_[k].sighting].height_m);
+                                observations_[chosen_[k].observation].height_m);
     }
     auto row = factor_.block(at, 0, 2, at);
     if (at > 0) {
@@ -96,7 +99,7 @@ class Search {
   }
 
   const FilterState& state_;
-  std::span<const Sighting> sightings_;
+  std::span<const Observation> observations_;
   std::span<const Candidates> candidates_;
   int nodes_;
   std::vector<double> limits_;
@@ -110,11 +113,11 @@ class Search {
 }  // namespace
 
 std::vector<Pairing> joint_compatibility(const FilterState& state,
-                                         std::span<const Sighting> sightings,
+                                         std::span<const Observation> observations,
                                          std::span<const Candidates> candidates,
                                          const CompatibilityGates& gates) {
   if (candidates.empty()) return {};
-  return Search(state, sightings, candidates, gates).run();
+  return Search(state, observations, candidates, gates).run();
 }
 
 }  // namespace understory::ekf

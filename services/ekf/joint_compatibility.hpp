@@ -16,14 +16,14 @@ struct CompatibilityGates {
 
 /// A sighting and the landmarks that it may be by itself, the most likely first.
 struct Candidates {
-  std::uint32_t sighting = 0;
+  std::uint32_t observation = 0;
   std::vector<std::uint32_t> landmarks;
 };
 
 /// The largest set of pairings, one to one, whose innovations are compatible together; among equals
 /// the one with the least squared distance.
 std::vector<Pairing> joint_compatibility(const FilterState& state,
-                                         std::span<const Sighting> sightings,
+                                         std::span<const Observation> observations,
                                          std::span<const Candidates> candidates,
                                          const CompatibilityGates& gates);
 

@@ -9,16 +9,16 @@ Eigen::Vector2d heading_row(const FilterState& state, std::size_t i) {
   if (state.form() == ErrorForm::kRightInvariant) return Eigen::Vector2d::Zero();
   const MapLandmark& landmark = state.landmarks()[i];
   if (state.form() == ErrorForm::kFirstEstimate) {
-    return -turned_left(landmark.first_position - state.first_position);
+    return -geometry::perpendicular(landmark.first_position - state.first_position);
   }
-  return -turned_left(landmark.position - state.position);
+  return -geometry::perpendicular(landmark.position - state.position);
 }
 
 Eigen::Matrix2d level_rows(const FilterState& state, double height_m) {
   return height_m * rotation_of(state.heading) * level_displacement();
 }
 
-Eigen::Vector2d innovation(const FilterState& state, std::size_t i, const Sighting& seen) {
+Eigen::Vector2d innovation(const FilterState& state, std::size_t i, const Observation& seen) {
   return rotation_of(state.heading) *
              (seen.position_m - seen.height_m * level_displacement() * state.level) -
          (state.landmarks()[i].position - state.position);
@@ -53,7 +53,7 @@ Eigen::Matrix2d innovation_covariance(const FilterState& state, std::size_t a, s
   return sum;
 }
 
-double squared_distance(const FilterState& state, std::size_t i, const Sighting& seen) {
+double squared_distance(const FilterState& state, std::size_t i, const Observation& seen) {
   const Eigen::Matrix2d rotation = rotation_of(state.heading);
   const Eigen::Vector2d error = innovation(state, i, seen);
   const Eigen::Matrix2d spread = innovation_covariance(state, i, i, seen.height_m, seen.height_m) +
@@ -63,21 +63,21 @@ double squared_distance(const FilterState& state, std::size_t i, const Sighting&
 
 JointUpdate::JointUpdate(int max_landmarks) : vehicle_(kVehicle + 2 * max_landmarks, 5) {}
 
-double JointUpdate::apply(FilterState& state, std::span<const Sighting> sightings,
+double JointUpdate::apply(FilterState& state, std::span<const Observation> observations,
                           std::span<const Pairing> pairings, LowRank& room) {
   room.start(state.size());
   constexpr std::size_t kStep = kMaxRows / 2;
   double distance = 0.0;
   for (std::size_t at = 0; at < pairings.size(); at += kStep) {
     const std::size_t count = std::min(kStep, pairings.size() - at);
-    const double step = apply_some(state, sightings, pairings.subspan(at, count), room);
+    const double step = apply_some(state, observations, pairings.subspan(at, count), room);
     if (step < 0.0) return -1.0;
     distance += step;
   }
   return distance;
 }
 
-double JointUpdate::apply_some(FilterState& state, std::span<const Sighting> sightings,
+double JointUpdate::apply_some(FilterState& state, std::span<const Observation> observations,
                                std::span<const Pairing> pairings, LowRank& room) {
   const int n = state.size();
   const int rows = 2 * static_cast<int>(pairings.size());
@@ -91,9 +91,9 @@ double JointUpdate::apply_some(FilterState& state, std::span<const Sighting> sig
     const Pairing& pairing = pairings[static_cast<std::size_t>(k / 2)];
     const int at = FilterState::row(pairing.landmark);
     const Eigen::Vector2d heading = heading_row(state, pairing.landmark);
-    const Eigen::Matrix2d level = level_rows(state, sightings[pairing.sighting].height_m);
+    const Eigen::Matrix2d level = level_rows(state, observations[pairing.observation].height_m);
     auto delta = room.delta(n);
-    error.segment<2>(k) = innovation(state, pairing.landmark, sightings[pairing.sighting]) -
+    error.segment<2>(k) = innovation(state, pairing.landmark, observations[pairing.observation]) -
                           (delta.segment<2>(at) - delta.segment<2>(kPosition) +
                            heading * delta(kHeading) + level * delta.segment<2>(kLevel));
     for (int r = 0; r < 2; ++r) {
@@ -108,14 +108,14 @@ double JointUpdate::apply_some(FilterState& state, std::span<const Sighting> sig
   for (int k = 0; k < rows; k += 2) {
     const Pairing& pairing = pairings[static_cast<std::size_t>(k / 2)];
     const int at = FilterState::row(pairing.landmark);
-    const Eigen::Matrix2d level = level_rows(state, sightings[pairing.sighting].height_m);
+    const Eigen::Matrix2d level = level_rows(state, observations[pairing.observation].height_m);
     spread.middleRows<2>(k) = cross.middleRows<2>(at) - cross.middleRows<2>(kPosition) +
                               level * cross.middleRows<2>(kLevel);
     if (!invariant) {
       spread.middleRows<2>(k) += heading_row(state, pairing.landmark) * cross.row(kHeading);
     }
     spread.block<2, 2>(k, k) +=
-        rotation * sightings[pairing.sighting].covariance_m2 * rotation.transpose();
+        rotation * observations[pairing.observation].covariance_m2 * rotation.transpose();
   }
   return room.apply(state, error, spread);
 }

@@ -2,8 +2,8 @@
 #include "services/ekf/adapter.hpp"
 
 int main(int argc, char** argv) {
-  return understory::run_service(
-      understory::ekf_service({
+  return understory::bus::run_service(
+      understory::ekf::ekf_service({
           .odometry = "ODOMETRY",                        // in: motion without landmarks
           .tracked_landmarks = "TRACKED_LANDMARKS",      // in: consistent landmarks of a sweep
           .pose = "EKF_POSE",                            // out: pose, velocity, biases

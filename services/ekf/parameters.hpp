@@ -3,7 +3,7 @@
 
 #include <string>
 
-namespace understory {
+namespace understory::ekf {
 
 /// What is known at the start, of the vehicle's motion and of the inertial sensors.
 struct EkfPriorParameters {
@@ -16,12 +16,12 @@ struct EkfPriorParameters {
 };
 
 struct EkfMotionParameters {
-  double gyro_walk = 1e-5;           ///< [rad/s/sqrt(s)] Random walk of the bias.
-  double accelerometer_walk = 1e-3;  ///< [m/s^2/sqrt(s)]
-  double standing_sigma_mps = 0.01;  ///< Of the velocity while the vehicle is found to stand.
+  double gyro_walk = 1e-5;             ///< [rad/s/sqrt(s)] Random walk of the bias.
+  double accelerometer_walk = 1e-3;    ///< [m/s^2/sqrt(s)]
+  double stationary_sigma_mps = 0.01;  ///< Of the velocity while the vehicle is found to stand.
   /// The body's sway about the place where it is parked (engine, wind): it does not add up.
-  double standing_sigma_m = 2e-4;  ///< Per axis.
-  double standing_sigma_rad = 3e-5;
+  double stationary_sigma_m = 2e-4;  ///< Per axis.
+  double stationary_sigma_rad = 3e-5;
   /// Of the velocity across the vehicle, per piece; 0 = it may slide freely.
   double sideways_sigma_mps = 0.0;
   double gap_acceleration = 2.0;  ///< [m/s^2/sqrt(Hz)] Where no odometry tells the motion.
@@ -40,9 +40,10 @@ struct EkfMapParameters {
 
 /// What errors of sightings have in common from scan to scan: how a trunk is no circle, where the
 /// beams meet it. It cannot be averaged out from one place.
-struct EkfSightingParameters {
-  double lasting_share = 0.05;  ///< Of a sighting's variance; 0 = all noise is new in every scan.
-  double lasting_m = 20.0;      ///< It fades over so much way.
+struct EkfObservationParameters {
+  double correlated_share =
+      0.05;                     ///< Of a sighting's variance; 0 = all noise is new in every scan.
+  double correlation_m = 20.0;  ///< It fades over so much way.
   /// Of distances, the same for all landmarks and for ever: a laser's scale, trunks that look the
   /// nearer the farther they are. All that is built on sightings is too large or small by it.
   double scale_sigma = 1e-4;
@@ -74,9 +75,9 @@ struct EkfParameters {
   EkfPriorParameters prior;
   EkfMotionParameters motion;
   EkfMapParameters map;
-  EkfSightingParameters sighting;
+  EkfObservationParameters observation;
   EkfGateParameters gate;
   EkfRestartParameters restart;
 };
 
-}  // namespace understory
+}  // namespace understory::ekf

@@ -27,7 +27,7 @@ constexpr double kGravity = 9.81;  // [m/s^2], as common/model/imu.hpp has it
 Eigen::Matrix2d gravity_by_level() { return kGravity * level_displacement(); }
 
 /// The level's error goes on, and with it the part that it has in the accelerometer's bias.
-void pass_level(const FilterState& state, const LevelError& level, Transition& t) {
+void pass_level(const FilterState& state, const model::LevelError& level, Transition& t) {
   const Eigen::Matrix2d change = level.memory - Eigen::Matrix2d::Identity();
   t.level = level.memory * state.level;
   t.bias = state.bias;
@@ -38,7 +38,7 @@ void pass_level(const FilterState& state, const LevelError& level, Transition& t
 }
 
 /// Fills `error` and `noise_input` for a start of heading `rotation` and preintegrated Jacobians.
-void linearise(const FilterState& state, const Preintegration& inertial, Transition& t) {
+void linearise(const FilterState& state, const model::Preintegration& inertial, Transition& t) {
   const Eigen::Matrix2d rotation = rotation_of(state.heading);
   const Change turned =
       change(state, t, rotation * inertial.position_m, rotation * inertial.velocity_mps);
@@ -48,12 +48,12 @@ void linearise(const FilterState& state, const Preintegration& inertial, Transit
   t.error.block<1, 3>(kHeading, kBias) = t.yaw_by_bias;
   t.error.block<2, 1>(kPosition, kHeading) = state.lever(state.position) +
                                              t.seconds * state.lever(state.velocity) +
-                                             turned_left(turned.position) - p;
+                                             geometry::perpendicular(turned.position) - p;
   t.error.block<2, 2>(kPosition, kVelocity) = t.seconds * Eigen::Matrix2d::Identity();
   t.error.block<2, 3>(kPosition, kBias) =
       rotation * inertial.bias_jacobian.bottomRows<2>() - p * t.yaw_by_bias;
   t.error.block<2, 1>(kVelocity, kHeading) =
-      state.lever(state.velocity) + turned_left(turned.velocity) - v;
+      state.lever(state.velocity) + geometry::perpendicular(turned.velocity) - v;
   t.error.block<2, 3>(kVelocity, kBias) =
       rotation * inertial.bias_jacobian.middleRows<2>(1) - v * t.yaw_by_bias;
   t.noise_input(kHeading, 0) = 1.0;
@@ -75,8 +75,8 @@ void landmark_arms(const FilterState& state, Arms&& arms) {
 
 /// What turning does to right invariant landmarks: their block and what they share with the
 /// vehicle, before the vehicle's own error moves on.
-void turn_landmarks(FilterState& state, const Transition& t, const VehicleMatrix& vehicle,
-                    LowRank& room) {
+void rotate_landmarks(FilterState& state, const Transition& t, const VehicleMatrix& vehicle,
+                      LowRank& room) {
   const int count = state.size() - kVehicle;
   auto shared = state.covariance().bottomLeftCorner(count, kVehicle);
   auto arms = room.first(count);
@@ -97,7 +97,7 @@ void pass_covariance(FilterState& state, const Transition& t, const EkfMotionPar
   const int count = state.size() - kVehicle;
   const bool turns = state.form() == ErrorForm::kRightInvariant;
   const VehicleMatrix vehicle = state.covariance_block<kVehicle, kVehicle>(0, 0);
-  if (turns) turn_landmarks(state, t, vehicle, room);
+  if (turns) rotate_landmarks(state, t, vehicle, room);
   auto shared = state.covariance().bottomLeftCorner(count, kVehicle);
   const VehicleMatrix passed_on = t.error.transpose();
   for (int i = 0; i < count; ++i) {
@@ -116,7 +116,7 @@ void pass_covariance(FilterState& state, const Transition& t, const EkfMotionPar
 }
 
 void move_estimate(FilterState& state, const Transition& t) {
-  state.heading = wrap_angle(t.heading);
+  state.heading = geometry::wrap_angle(t.heading);
   state.position = t.position;
   state.velocity = t.velocity;
   state.bias = t.bias;
@@ -127,8 +127,8 @@ void move_estimate(FilterState& state, const Transition& t) {
 
 }  // namespace
 
-Transition transition_by(const FilterState& state, const Preintegration& given) {
-  const Preintegration inertial = at_bias(given, state.bias);
+Transition transition_by(const FilterState& state, const model::Preintegration& given) {
+  const model::Preintegration inertial = at_bias(given, state.bias);
   const Eigen::Matrix2d rotation = rotation_of(state.heading);
   Transition t;
   t.seconds = inertial.seconds;
@@ -142,7 +142,7 @@ Transition transition_by(const FilterState& state, const Preintegration& given) 
 
 Transition transition_over_gap(const FilterState& state, double seconds,
                                const EkfMotionParameters& parameters) {
-  Preintegration nothing;
+  model::Preintegration nothing;
   nothing.seconds = seconds;
   nothing.bias = state.bias;
   const double q = parameters.gap_acceleration * parameters.gap_acceleration;
@@ -156,9 +156,9 @@ Transition transition_over_gap(const FilterState& state, double seconds,
   return transition_by(state, nothing);
 }
 
-Transition transition_by(const FilterState& state, const SE2WithCovariance& motion, double seconds,
-                         const EkfMotionParameters& parameters) {
-  const SE2 next = SE2(state.position, state.heading) * motion.mean;
+Transition transition_by(const FilterState& state, const geometry::SE2WithCovariance& motion,
+                         double seconds, const EkfMotionParameters& parameters) {
+  const geometry::SE2 next = geometry::SE2(state.position, state.heading) * motion.mean;
   const Eigen::Matrix2d rotation = next.rotation();
   Transition t;
   t.seconds = seconds;
@@ -169,11 +169,12 @@ Transition transition_by(const FilterState& state, const SE2WithCovariance& moti
   t.level = state.level;
   const Eigen::Vector2d p = state.lever(t.position);
   // The new velocity is fixed to the vehicle: it turns with the new heading.
-  const Eigen::Vector2d v = turned_left(t.velocity) - state.lever(t.velocity);
+  const Eigen::Vector2d v = geometry::perpendicular(t.velocity) - state.lever(t.velocity);
   const Eigen::Vector2d way =
       t.position -
       (state.form() == ErrorForm::kFirstEstimate ? state.first_position : state.position);
-  t.error.block<2, 1>(kPosition, kHeading) = state.lever(state.position) + turned_left(way) - p;
+  t.error.block<2, 1>(kPosition, kHeading) =
+      state.lever(state.position) + geometry::perpendicular(way) - p;
   t.error.middleRows<2>(kVelocity).setZero();
   t.error.block<2, 1>(kVelocity, kHeading) = v;
   t.noise_input(kHeading, 0) = 1.0;
@@ -195,7 +196,7 @@ Transition transition_by(const FilterState& state, const SE2WithCovariance& moti
   return t;
 }
 
-void know_level(FilterState& state, const LevelError& level) {
+void know_level(FilterState& state, const model::LevelError& level) {
   Eigen::Matrix<double, kVehicle, 2> by_level = Eigen::Matrix<double, kVehicle, 2>::Zero();
   // Of the heading, and of what right invariant errors have of it.
   by_level(kHeading, 0) = level.pitch_tangent;
@@ -215,15 +216,15 @@ void predict(FilterState& state, const Transition& transition,
   move_estimate(state, transition);
 }
 
-void predict(FilterState& state, const Preintegration& inertial, const MeasuredMotion& measured,
-             const EkfMotionParameters& parameters, LowRank& room) {
+void predict(FilterState& state, const model::Preintegration& inertial,
+             const MeasuredMotion& measured, const EkfMotionParameters& parameters, LowRank& room) {
   const Transition t = transition_by(state, inertial);
-  const Preintegration own = at_bias(inertial, state.bias);
+  const model::Preintegration own = at_bias(inertial, state.bias);
   const Eigen::Matrix2d back = rotation_of(state.heading).transpose();
   // Measured: the way in the axes of the start.
   Eigen::Matrix<double, 2, kVehicle> rows = Eigen::Matrix<double, 2, kVehicle>::Zero();
   rows.col(kHeading) =
-      t.seconds * back * (state.lever(state.velocity) - turned_left(state.velocity));
+      t.seconds * back * (state.lever(state.velocity) - geometry::perpendicular(state.velocity));
   rows.block<2, 2>(0, kVelocity) = t.seconds * back;
   rows.block<2, 3>(0, kBias) = own.bias_jacobian.bottomRows<2>();
   const Eigen::Vector2d innovation =
@@ -257,7 +258,8 @@ template <int Rows>
 void measure_velocity(FilterState& state, const Eigen::Matrix<double, Rows, 2>& axes,
                       double sigma_mps, LowRank& room) {
   const int n = state.size();
-  const Eigen::Vector2d by_heading = state.lever(state.velocity) - turned_left(state.velocity);
+  const Eigen::Vector2d by_heading =
+      state.lever(state.velocity) - geometry::perpendicular(state.velocity);
   Eigen::Matrix<double, kVehicle, Rows> rows = Eigen::Matrix<double, kVehicle, Rows>::Zero();
   rows.row(kHeading) = (axes * by_heading).transpose();
   rows.template middleRows<2>(kVelocity) = axes.transpose();
@@ -279,7 +281,7 @@ void measure_velocity(FilterState& state, const Eigen::Matrix<double, Rows, 2>& 
 
 }  // namespace
 
-void measure_standing(FilterState& state, double sigma_mps, LowRank& room) {
+void measure_stationary(FilterState& state, double sigma_mps, LowRank& room) {
   measure_velocity<2>(state, Eigen::Matrix2d::Identity(), sigma_mps, room);
 }
 

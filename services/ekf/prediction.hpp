@@ -18,7 +18,7 @@ struct Transition {
   double heading = 0.0;
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
   Eigen::Vector2d velocity = Eigen::Vector2d::Zero();
-  InertialBias bias = InertialBias::Zero();
+  model::InertialBias bias = model::InertialBias::Zero();
   Eigen::Vector2d level = Eigen::Vector2d::Zero();
   VehicleMatrix error = VehicleMatrix::Identity();
   VehicleInput noise_input = VehicleInput::Zero();
@@ -29,10 +29,10 @@ struct Transition {
 };
 
 /// By integrated IMU samples.
-Transition transition_by(const FilterState& state, const Preintegration& inertial);
+Transition transition_by(const FilterState& state, const model::Preintegration& inertial);
 /// By measured motion (wheels): the velocity is that of the motion.
-Transition transition_by(const FilterState& state, const SE2WithCovariance& motion, double seconds,
-                         const EkfMotionParameters& parameters);
+Transition transition_by(const FilterState& state, const geometry::SE2WithCovariance& motion,
+                         double seconds, const EkfMotionParameters& parameters);
 /// By nothing: velocity goes on, its uncertainty and the heading's grow.
 Transition transition_over_gap(const FilterState& state, double seconds,
                                const EkfMotionParameters& parameters);
@@ -45,17 +45,17 @@ struct MeasuredMotion {
 
 /// The level's error begins as this. It is a part of the accelerometer's bias, which has the
 /// level's error in it, and, on a slope, of the heading.
-void know_level(FilterState& state, const LevelError& level);
+void know_level(FilterState& state, const model::LevelError& level);
 
 /// Predicts the state. `measured` is weighed against the same interval's IMU samples, their common
 /// noise respected.
 void predict(FilterState& state, const Transition& transition,
              const EkfMotionParameters& parameters, LowRank& room);
-void predict(FilterState& state, const Preintegration& inertial, const MeasuredMotion& measured,
-             const EkfMotionParameters& parameters, LowRank& room);
+void predict(FilterState& state, const model::Preintegration& inertial,
+             const MeasuredMotion& measured, const EkfMotionParameters& parameters, LowRank& room);
 
 /// The vehicle stands: velocity zero.
-void measure_standing(FilterState& state, double sigma_mps, LowRank& room);
+void measure_stationary(FilterState& state, double sigma_mps, LowRank& room);
 /// The vehicle does not slide sideways.
 void measure_no_slide(FilterState& state, double sigma_mps, LowRank& room);
 

@@ -10,11 +10,11 @@
 #include "services/geoslam_mapper/map_publishing.hpp"
 #include "understory/map_request_t.hpp"
 
-namespace understory {
+namespace understory::geoslam_mapper {
 namespace {
 
 /// Removes what lies outside the bounds that the request gives.
-void cut(WholeMap& map, const map_request_t& request) {
+void cut(model::WholeMap& map, const map_request_t& request) {
   const auto is_outside = [&](const Eigen::Vector2d& position) {
     return position.x() < request.min_m[0] || position.x() > request.max_m[0] ||
            position.y() < request.min_m[1] || position.y() > request.max_m[1];
@@ -40,45 +40,46 @@ std::string read_block(std::istream& in, std::size_t limit) {
   return block;
 }
 
-class MapperAdapter : public Adapter {
+class MapperAdapter : public bus::Adapter {
  public:
   explicit MapperAdapter(MapperChannels channels) : channels_(std::move(channels)) {}
 
-  void describe(ParameterTable& table) override {
-    understory::describe(parameters_, table);
-    understory::describe(output_, table);
+  void describe(bus::ParameterTable& table) override {
+    geoslam_mapper::describe(parameters_, table);
+    geoslam_mapper::describe(output_, table);
   }
 
-  void bind(Node& node) override {
+  void bind(bus::Node& node) override {
     stage_ = make_mapper(parameters_);
     jumps_ = JumpWatch(output_.reset_distance_m, output_.reset_angle_rad);
-    node.subscribe<Keyframe>(channels_.keyframe, [this](const Keyframe& one) { add(one); },
-                             {.queue_size = 200});
+    node.subscribe<model::Keyframe>(
+        channels_.keyframe, [this](const model::Keyframe& one) { add(one); }, {.queue_size = 200});
     // Not in the journal: a scan leaves nothing in the map, and the next one finds its place again.
-    node.subscribe<LandmarkScan>(channels_.landmarks,
-                                 [this](const LandmarkScan& scan) { locate(scan); },
-                                 {.journaled = false});
+    node.subscribe<model::LandmarkScan>(channels_.landmarks,
+                                        [this](const model::LandmarkScan& scan) { locate(scan); },
+                                        {.journaled = false});
     // Small, and each one that is shed breaks the chain of motion: a long queue.
-    node.subscribe<Odometry>(channels_.odometry,
-                             [this](const Odometry& motion) {
-                               stage_->add(motion);
-                               odometry_.add(motion);
-                             },
-                             {.queue_size = 2000});
+    node.subscribe<model::Odometry>(channels_.odometry,
+                                    [this](const model::Odometry& motion) {
+                                      stage_->add(motion);
+                                      odometry_.add(motion);
+                                    },
+                                    {.queue_size = 2000});
     // Bias and velocity, and the motion to gate by; no measurement: it was made from the same
     // detections.
-    node.subscribe<EkfPose>(channels_.ekf_pose, [this](const EkfPose& pose) { stage_->add(pose); });
-    node.subscribe<EkfLevel>(channels_.ekf_level,
-                             [this](const EkfLevel& level) { stage_->add(level); });
+    node.subscribe<model::EkfPose>(channels_.ekf_pose,
+                                   [this](const model::EkfPose& pose) { stage_->add(pose); });
+    node.subscribe<model::EkfLevel>(channels_.ekf_level,
+                                    [this](const model::EkfLevel& level) { stage_->add(level); });
     node.subscribe<map_request_t>(channels_.map_request,
                                   [this](const map_request_t& request) { answer(request); },
                                   {.queue_size = 4, .sequenced = false, .journaled = false});
-    poses_ = node.advertise<SlamPose>(channels_.slam_pose);
-    updates_ = node.advertise<MapUpdate>(channels_.slam_update);
-    maps_ = node.advertise<WholeMap>(channels_.map);
-    deltas_ = node.advertise<MapDelta>(channels_.map_delta);
-    node.every(static_cast<Utime>(output_.map_period_s * 1e6),
-               [this](Utime /*now*/) { publish_changed_map(); });
+    poses_ = node.advertise<model::SlamPose>(channels_.slam_pose);
+    updates_ = node.advertise<model::MapUpdate>(channels_.slam_update);
+    maps_ = node.advertise<model::WholeMap>(channels_.map);
+    deltas_ = node.advertise<model::MapDelta>(channels_.map_delta);
+    node.every(static_cast<model::Utime>(output_.map_period_s * 1e6),
+               [this](model::Utime /*now*/) { publish_changed_map(); });
   }
 
   void finish() override { publish_changed_map(); }
@@ -86,7 +87,7 @@ class MapperAdapter : public Adapter {
   std::string save() const override {
     std::ostringstream out;
     out << "mapper 1 " << map_is_published_ << ' ' << newest_pose_utime_ << '\n';
-    const Bytes known = encode_message(known_);
+    const wire::Bytes known = wire::encode_message(known_);
     write_block(out, std::string(known.begin(), known.end()));
     write_block(out, odometry_.save());
     write_block(out, jumps_.save());
@@ -103,8 +104,8 @@ class MapperAdapter : public Adapter {
       throw std::runtime_error("the mapper's saved state is of another version");
     }
     const std::string known = read_block(in, state.size());
-    const Bytes bytes(known.begin(), known.end());
-    auto map = decode_message<WholeMap>(bytes);
+    const wire::Bytes bytes(known.begin(), known.end());
+    auto map = wire::decode_message<model::WholeMap>(bytes);
     if (!map) throw std::runtime_error("the mapper's saved map: " + map.refusal().detail);
     known_ = std::move(*map);
     odometry_.load(read_block(in, state.size()));
@@ -113,8 +114,8 @@ class MapperAdapter : public Adapter {
   }
 
  private:
-  void add(const Keyframe& keyframe) {
-    const MapUpdate update = stage_->add(keyframe);
+  void add(const model::Keyframe& keyframe) {
+    const model::MapUpdate update = stage_->add(keyframe);
     updates_.publish(update);
     jumps_.add(keyframe, update);
     publish_poses(keyframe, update);
@@ -122,25 +123,25 @@ class MapperAdapter : public Adapter {
   }
 
   /// The pose of a scan at once, in the map as it is; its keyframe comes later.
-  void locate(const LandmarkScan& scan) {
-    const std::optional<SE2WithCovariance> found = stage_->locate(scan);
+  void locate(const model::LandmarkScan& scan) {
+    const std::optional<geometry::SE2WithCovariance> found = stage_->locate(scan);
     if (!found || scan.utime <= newest_pose_utime_) return;
-    SlamPose pose;
+    model::SlamPose pose;
     pose.utime = scan.utime;
     pose.submap_T_vehicle = found->mean;
     pose.covariance = found->covariance;
     publish(pose);
   }
 
-  void publish_poses(const Keyframe& keyframe, const MapUpdate& update) {
-    for (SlamPose& pose : poses_of(keyframe, update)) {
+  void publish_poses(const model::Keyframe& keyframe, const model::MapUpdate& update) {
+    for (model::SlamPose& pose : poses_of(keyframe, update)) {
       // Keyframes may share scans; the stamp always grows.
       if (pose.utime <= newest_pose_utime_) continue;
       publish(pose);
     }
   }
 
-  void publish(SlamPose& pose) {
+  void publish(model::SlamPose& pose) {
     newest_pose_utime_ = pose.utime;
     pose.map_T_odom = pose.map_T_vehicle() * odometry_.odom_T_vehicle(pose.utime).inverse();
     pose.reset_counter = jumps_.count();
@@ -148,9 +149,9 @@ class MapperAdapter : public Adapter {
     poses_.publish(pose);
   }
 
-  void publish_delta(const MapUpdate& update) {
+  void publish_delta(const model::MapUpdate& update) {
     const auto changed = stage_->take_changed_landmarks();
-    MapDelta delta =
+    model::MapDelta delta =
         changed ? map_change(known_.landmarks, *changed, update, output_.moved_m)
                 : map_difference(known_.landmarks, stage_->landmarks(), update, output_.moved_m);
     known_.utime = std::max(known_.utime, update.utime);
@@ -164,8 +165,8 @@ class MapperAdapter : public Adapter {
     deltas_.publish(delta);
   }
 
-  WholeMap whole_map() const {
-    WholeMap map;
+  model::WholeMap whole_map() const {
+    model::WholeMap map;
     map.utime = known_.utime;
     map.version = known_.version;
     map.landmarks = stage_->landmarks();
@@ -180,7 +181,7 @@ class MapperAdapter : public Adapter {
   }
 
   void answer(const map_request_t& request) {
-    WholeMap map = whole_map();
+    model::WholeMap map = whole_map();
     if (request.everything == 0) cut(map, request);
     maps_.publish(map);
   }
@@ -191,18 +192,18 @@ class MapperAdapter : public Adapter {
   std::unique_ptr<MapperMethod> stage_;
   OdometryFrame odometry_;
   JumpWatch jumps_;
-  WholeMap known_;  // what a holder of every MAP_DELTA knows; without keyframes
+  model::WholeMap known_;  // what a holder of every MAP_DELTA knows; without keyframes
   bool map_is_published_ = true;
-  Utime newest_pose_utime_ = -1;
-  Publisher<SlamPose> poses_;
-  Publisher<MapUpdate> updates_;
-  Publisher<WholeMap> maps_;
-  Publisher<MapDelta> deltas_;
+  model::Utime newest_pose_utime_ = -1;
+  bus::Publisher<model::SlamPose> poses_;
+  bus::Publisher<model::MapUpdate> updates_;
+  bus::Publisher<model::WholeMap> maps_;
+  bus::Publisher<model::MapDelta> deltas_;
 };
 
 }  // namespace
 
-Service geoslam_mapper_service(const MapperChannels& channels) {
+bus::Service geoslam_mapper_service(const MapperChannels& channels) {
   return {"geoslam_mapper",
           channels.keyframe + ", " + channels.landmarks + ", " + channels.odometry + ", " +
               channels.ekf_pose + ", " + channels.ekf_level + " -> " + channels.slam_pose + ", " +
@@ -210,4 +211,4 @@ Service geoslam_mapper_service(const MapperChannels& channels) {
           [channels] { return std::make_unique<MapperAdapter>(channels); }};
 }
 
-}  // namespace understory
+}  // namespace understory::geoslam_mapper

@@ -5,7 +5,7 @@
 
 #include "common/bus/service.hpp"
 
-namespace understory {
+namespace understory::geoslam_mapper {
 
 struct MapperChannels {
   std::string keyframe = "KEYFRAME";
@@ -20,6 +20,6 @@ struct MapperChannels {
   std::string map_delta = "MAP_DELTA";
 };
 
-Service geoslam_mapper_service(const MapperChannels& channels = {});
+bus::Service geoslam_mapper_service(const MapperChannels& channels = {});
 
-}  // namespace understory
+}  // namespace understory::geoslam_mapper

@@ -4,7 +4,7 @@
 #include "common/bus/parameter_table.hpp"
 #include "services/geoslam_mapper/parameters.hpp"
 
-namespace understory {
+namespace understory::geoslam_mapper {
 
 /// What the adapter decides itself.
 struct MapperOutputParameters {
@@ -14,7 +14,7 @@ struct MapperOutputParameters {
   double reset_angle_rad = 0.05;
 };
 
-void describe(MapperParameters& parameters, ParameterTable& table);
-void describe(MapperOutputParameters& parameters, ParameterTable& table);
+void describe(MapperParameters& parameters, bus::ParameterTable& table);
+void describe(MapperOutputParameters& parameters, bus::ParameterTable& table);
 
-}  // namespace understory
+}  // namespace understory::geoslam_mapper

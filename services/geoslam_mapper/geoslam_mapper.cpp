@@ -2,16 +2,17 @@
 
 #include <stdexcept>
 
-#include "services/geoslam_mapper/smoothing_mapper.hpp"
-#include "services/geoslam_mapper/source_mapper.hpp"
+#include "services/geoslam_mapper/baseline/mapper.hpp"
+#include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
 
-namespace understory {
+namespace understory::geoslam_mapper {
 
 std::unique_ptr<MapperMethod> make_mapper(const MapperParameters& parameters) {
-  if (parameters.method == "ours") return make_smoothing_mapper(parameters.ours);
-  if (parameters.method == "source") return make_source_mapper(parameters.source);
+  if (parameters.method == "smoothing")
+    return smoothing::make_smoothing_mapper(parameters.smoothing);
+  if (parameters.method == "baseline") return baseline::make_baseline_mapper(parameters.baseline);
   throw std::invalid_argument("geoslam_mapper: method '" + parameters.method +
                               "' is not one of ours, source");
 }
 
-}  // namespace understory
+}  // namespace understory::geoslam_mapper

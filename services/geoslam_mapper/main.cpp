@@ -2,8 +2,8 @@
 #include "services/geoslam_mapper/adapter.hpp"
 
 int main(int argc, char** argv) {
-  return understory::run_service(
-      understory::geoslam_mapper_service({
+  return understory::bus::run_service(
+      understory::geoslam_mapper::geoslam_mapper_service({
           .keyframe = "KEYFRAME",        // in: local landmarks of n sweeps
           .landmarks = "LANDMARKS",      // in: every sweep, located at once
           .odometry = "ODOMETRY",        // in: motion, where there is any

@@ -9,21 +9,22 @@
 #include <sstream>
 #include <stdexcept>
 
-namespace understory {
+namespace understory::geoslam_mapper {
 namespace {
 
 constexpr int kExactDigits = std::numeric_limits<double>::max_digits10;
 
-bool is_localised(const MapUpdate& update) {
-  return update.status == MapUpdateStatus::kFirstMap || update.status == MapUpdateStatus::kUpdated;
+bool is_localised(const model::MapUpdate& update) {
+  return update.status == model::MapUpdateStatus::kFirstMap ||
+         update.status == model::MapUpdateStatus::kUpdated;
 }
 
-void write(std::ostream& out, const SE2& pose) {
+void write(std::ostream& out, const geometry::SE2& pose) {
   out << std::setprecision(kExactDigits) << pose.x() << ' ' << pose.y() << ' ' << pose.theta()
       << ' ';
 }
 
-SE2 read_pose(std::istream& in) {
+geometry::SE2 read_pose(std::istream& in) {
   double x = 0.0;
   double y = 0.0;
   double theta = 0.0;
@@ -37,19 +38,19 @@ void require_whole(const std::istream& in) {
 
 }  // namespace
 
-MapDelta map_difference(const std::vector<MapLandmark>& before,
-                        const std::vector<MapLandmark>& after, const MapUpdate& update,
-                        double moved_m) {
-  MapDelta delta;
+model::MapDelta map_difference(const std::vector<model::MapLandmark>& before,
+                               const std::vector<model::MapLandmark>& after,
+                               const model::MapUpdate& update, double moved_m) {
+  model::MapDelta delta;
   delta.utime = update.utime;
   delta.merged = update.merged;
-  std::set<LandmarkId> merged;
+  std::set<model::LandmarkId> merged;
   for (const auto& [old_id, new_id] : update.merged) merged.insert(old_id);
   auto old = before.begin();
-  const auto gone = [&](const MapLandmark& landmark) {
+  const auto gone = [&](const model::MapLandmark& landmark) {
     if (!merged.contains(landmark.id)) delta.removed.push_back(landmark.id);
   };
-  for (const MapLandmark& landmark : after) {
+  for (const model::MapLandmark& landmark : after) {
     while (old != before.end() && old->id < landmark.id) gone(*old++);
     if (old == before.end() || old->id != landmark.id) {
       delta.added.push_back(landmark);
@@ -65,23 +66,24 @@ MapDelta map_difference(const std::vector<MapLandmark>& before,
 
 namespace {
 
-auto place_of(std::vector<MapLandmark>& landmarks, LandmarkId id) {
+auto place_of(std::vector<model::MapLandmark>& landmarks, model::LandmarkId id) {
   return std::lower_bound(
       landmarks.begin(), landmarks.end(), id,
-      [](const MapLandmark& one, LandmarkId wanted) { return one.id < wanted; });
+      [](const model::MapLandmark& one, model::LandmarkId wanted) { return one.id < wanted; });
 }
 
 }  // namespace
 
-MapDelta map_change(const std::vector<MapLandmark>& before, const std::vector<MapLandmark>& changed,
-                    const MapUpdate& update, double moved_m) {
-  MapDelta delta;
+model::MapDelta map_change(const std::vector<model::MapLandmark>& before,
+                           const std::vector<model::MapLandmark>& changed,
+                           const model::MapUpdate& update, double moved_m) {
+  model::MapDelta delta;
   delta.utime = update.utime;
   delta.merged = update.merged;
-  for (const MapLandmark& landmark : changed) {
-    const auto old =
-        std::lower_bound(before.begin(), before.end(), landmark.id,
-                         [](const MapLandmark& one, LandmarkId wanted) { return one.id < wanted; });
+  for (const model::MapLandmark& landmark : changed) {
+    const auto old = std::lower_bound(
+        before.begin(), before.end(), landmark.id,
+        [](const model::MapLandmark& one, model::LandmarkId wanted) { return one.id < wanted; });
     if (old == before.end() || old->id != landmark.id) {
       delta.added.push_back(landmark);
     } else if ((old->position_m - landmark.position_m).norm() > moved_m) {
@@ -91,8 +93,9 @@ MapDelta map_change(const std::vector<MapLandmark>& before, const std::vector<Ma
   return delta;
 }
 
-std::vector<MapLandmark> with_delta(std::vector<MapLandmark> landmarks, const MapDelta& delta) {
-  const auto put = [&](const MapLandmark& landmark) {
+std::vector<model::MapLandmark> with_delta(std::vector<model::MapLandmark> landmarks,
+                                           const model::MapDelta& delta) {
+  const auto put = [&](const model::MapLandmark& landmark) {
     const auto place = place_of(landmarks, landmark.id);
     if (place != landmarks.end() && place->id == landmark.id) {
       *place = landmark;
@@ -100,28 +103,30 @@ std::vector<MapLandmark> with_delta(std::vector<MapLandmark> landmarks, const Ma
       landmarks.insert(place, landmark);
     }
   };
-  const auto drop = [&](LandmarkId id) {
+  const auto drop = [&](model::LandmarkId id) {
     const auto place = place_of(landmarks, id);
     if (place != landmarks.end() && place->id == id) landmarks.erase(place);
   };
-  for (const MapLandmark& landmark : delta.added) put(landmark);
-  for (const MapLandmark& landmark : delta.moved) put(landmark);
-  for (const LandmarkId id : delta.removed) drop(id);
+  for (const model::MapLandmark& landmark : delta.added) put(landmark);
+  for (const model::MapLandmark& landmark : delta.moved) put(landmark);
+  for (const model::LandmarkId id : delta.removed) drop(id);
   for (const auto& [old_id, new_id] : delta.merged) drop(old_id);
   return landmarks;
 }
 
-void OdometryFrame::add(const Odometry& motion) {
-  const SE2 last = poses_.empty() ? SE2() : poses_.back().odom_T_vehicle;
+void OdometryFrame::add(const model::Odometry& motion) {
+  const geometry::SE2 last = poses_.empty() ? geometry::SE2() : poses_.back().odom_T_vehicle;
   if (poses_.empty()) poses_.push_back({motion.from_utime, last});
   poses_.push_back({motion.utime, last * motion.from_T_to});
   if (poses_.size() > kKept) poses_.pop_front();
 }
 
-SE2 OdometryFrame::odom_T_vehicle(Utime utime) const {
-  const auto behind = std::upper_bound(poses_.begin(), poses_.end(), utime,
-                                       [](Utime t, const Pose& pose) { return t < pose.utime; });
-  if (behind == poses_.begin()) return poses_.empty() ? SE2() : poses_.front().odom_T_vehicle;
+geometry::SE2 OdometryFrame::odom_T_vehicle(model::Utime utime) const {
+  const auto behind =
+      std::upper_bound(poses_.begin(), poses_.end(), utime,
+                       [](model::Utime t, const Pose& pose) { return t < pose.utime; });
+  if (behind == poses_.begin())
+    return poses_.empty() ? geometry::SE2() : poses_.front().odom_T_vehicle;
   return std::prev(behind)->odom_T_vehicle;
 }
 
@@ -143,27 +148,28 @@ void OdometryFrame::load(const std::string& state) {
   require_whole(in);
   poses_.clear();
   for (std::size_t i = 0; i < size; ++i) {
-    Utime utime = 0;
+    model::Utime utime = 0;
     in >> utime;
     poses_.push_back({utime, read_pose(in)});
   }
   require_whole(in);
 }
 
-std::vector<SlamPose> poses_of(const Keyframe& keyframe, const MapUpdate& update) {
-  SlamPose pose;
+std::vector<model::SlamPose> poses_of(const model::Keyframe& keyframe,
+                                      const model::MapUpdate& update) {
+  model::SlamPose pose;
   pose.status = update.status;
   pose.keyframe_sequence = keyframe.sequence;
   pose.utime = keyframe.members.back().utime;
   if (!is_localised(update)) return {pose};
-  std::vector<SlamPose> poses;
-  const SE2 base_T_centre = keyframe.centre_T_base().inverse();
-  for (const KeyframeMember& member : keyframe.members) {
-    const SE2 base_T_vehicle = base_T_centre * member.centre_T_vehicle;
+  std::vector<model::SlamPose> poses;
+  const geometry::SE2 base_T_centre = keyframe.centre_T_base().inverse();
+  for (const model::KeyframeMember& member : keyframe.members) {
+    const geometry::SE2 base_T_vehicle = base_T_centre * member.centre_T_vehicle;
     const bool is_base = &member == &keyframe.members.front();
     const Eigen::Matrix3d own = is_base ? Eigen::Matrix3d::Zero() : member.covariance;
-    const SE2WithCovariance map_T_vehicle =
-        compound({update.map_T_vehicle, update.covariance}, {base_T_vehicle, own});
+    const geometry::SE2WithCovariance map_T_vehicle =
+        geometry::compound({update.map_T_vehicle, update.covariance}, {base_T_vehicle, own});
     pose.utime = member.utime;
     pose.submap_T_vehicle = map_T_vehicle.mean;
     pose.covariance = map_T_vehicle.covariance;
@@ -173,7 +179,7 @@ std::vector<SlamPose> poses_of(const Keyframe& keyframe, const MapUpdate& update
   return poses;
 }
 
-void JumpWatch::add(const Keyframe& keyframe, const MapUpdate& update) {
+void JumpWatch::add(const model::Keyframe& keyframe, const model::MapUpdate& update) {
   if (predicted_ && keyframe.previous_T_base) {
     predicted_ = *predicted_ * *keyframe.previous_T_base;
   } else {
@@ -181,7 +187,7 @@ void JumpWatch::add(const Keyframe& keyframe, const MapUpdate& update) {
   }
   if (!is_localised(update)) return;
   if (predicted_) {
-    const SE2 jump = predicted_->inverse() * update.map_T_vehicle;
+    const geometry::SE2 jump = predicted_->inverse() * update.map_T_vehicle;
     if (jump.translation().norm() > distance_m_ || std::abs(jump.theta()) > angle_rad_) {
       ++count_;
       delta_ = jump;
@@ -193,7 +199,7 @@ void JumpWatch::add(const Keyframe& keyframe, const MapUpdate& update) {
 std::string JumpWatch::save() const {
   std::ostringstream out;
   out << predicted_.has_value() << ' ' << count_ << ' ';
-  write(out, predicted_.value_or(SE2()));
+  write(out, predicted_.value_or(geometry::SE2()));
   write(out, delta_);
   return out.str();
 }
@@ -208,4 +214,4 @@ void JumpWatch::load(const std::string& state) {
   require_whole(in);
 }
 
-}  // namespace understory
+}  // namespace understory::geoslam_mapper

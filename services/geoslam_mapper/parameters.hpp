@@ -2,10 +2,10 @@
 
 #include <string>
 
-namespace understory {
+namespace understory::geoslam_mapper {
 
 /// The source's own method (GeoSLAM Table 5.3). Symbols of the thesis in brackets.
-struct SourceMapperParameters {
+struct BaselineMapperParameters {
   double descriptor_step = 0.05;             ///< [s] of the perimeter.
   int max_side_difference = 3;               ///< [Delta_N]
   double min_triangle_match_ratio = 0.5;     ///< [eta]
@@ -59,8 +59,8 @@ struct SmoothingMapperParameters {
   int recent_keyframes = 20;
   /// A landmark enters the map when it was detected so often, in this share of the scans that had
   /// it in view.
-  int min_sightings = 3;
-  double min_sighting_ratio = 0.5;
+  int min_observations = 3;
+  double min_observation_ratio = 0.5;
   /// A candidate seen too seldom is forgotten after so many keyframes.
   int candidate_keyframes = 12;
   /// Two landmarks this near to each other that were never seen from one place are one.
@@ -74,10 +74,10 @@ struct SmoothingMapperParameters {
   double fold_angle_rad = 0.02;
   /// Of a sighting's variance: what stays the same over so much way (a trunk is no cylinder, and
   /// looks the same from the same place); 0 = all noise is new in every scan.
-  double lasting_share = 0.0;
-  double lasting_m = 20.0;
+  double correlated_share = 0.0;
+  double correlation_m = 20.0;
   /// The same while the vehicle stands, where beams meet the same bark again and again.
-  double standing_share = 0.0;
+  double stationary_share = 0.0;
   /// Of distances, the same for all landmarks and for ever. Told in covariances, not estimated.
   double scale_sigma = 0.0;
   /// A map begins with a keyframe whose ends the odometry ties to so much heading (before that the
@@ -89,9 +89,9 @@ struct SmoothingMapperParameters {
 };
 
 struct MapperParameters {
-  std::string method = "ours";  ///< "ours" or "source".
-  SourceMapperParameters source;
-  SmoothingMapperParameters ours;
+  std::string method = "smoothing";  ///< "smoothing" or "baseline".
+  BaselineMapperParameters baseline;
+  SmoothingMapperParameters smoothing;
 };
 
-}  // namespace understory
+}  // namespace understory::geoslam_mapper

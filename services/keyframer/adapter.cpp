@@ -5,32 +5,33 @@
 #include "services/keyframer/adapter_parameters.hpp"
 #include "services/keyframer/keyframer.hpp"
 
-namespace understory {
+namespace understory::keyframer {
 namespace {
 
-class KeyframerAdapter : public Adapter {
+class KeyframerAdapter : public bus::Adapter {
  public:
   explicit KeyframerAdapter(KeyframerChannels channels) : channels_(std::move(channels)) {}
 
-  void describe(ParameterTable& table) override { understory::describe(parameters_, table); }
+  void describe(bus::ParameterTable& table) override { keyframer::describe(parameters_, table); }
 
-  void bind(Node& node) override {
+  void bind(bus::Node& node) override {
     stage_ = make_keyframer(parameters_);
-    node.subscribe<LandmarkScan>(channels_.landmarks,
-                                 [this](const LandmarkScan& scan) {
-                                   if (const auto keyframe = stage_->add(scan))
-                                     keyframes_.publish(*keyframe);
-                                 },
-                                 {.queue_size = 200});
+    node.subscribe<model::LandmarkScan>(channels_.landmarks,
+                                        [this](const model::LandmarkScan& scan) {
+                                          if (const auto keyframe = stage_->add(scan))
+                                            keyframes_.publish(*keyframe);
+                                        },
+                                        {.queue_size = 200});
     // Small, and each one that is shed breaks the chain of motion: a long queue.
-    node.subscribe<Odometry>(channels_.odometry,
-                             [this](const Odometry& motion) { stage_->add(motion); },
-                             {.queue_size = 2000});
+    node.subscribe<model::Odometry>(channels_.odometry,
+                                    [this](const model::Odometry& motion) { stage_->add(motion); },
+                                    {.queue_size = 2000});
     // Of the filter's words the bias and the velocity: its pose was made from the same detections.
-    node.subscribe<EkfPose>(channels_.ekf_pose, [this](const EkfPose& pose) { stage_->add(pose); });
-    node.subscribe<EkfLevel>(channels_.ekf_level,
-                             [this](const EkfLevel& level) { stage_->add(level); });
-    keyframes_ = node.advertise<Keyframe>(channels_.keyframe);
+    node.subscribe<model::EkfPose>(channels_.ekf_pose,
+                                   [this](const model::EkfPose& pose) { stage_->add(pose); });
+    node.subscribe<model::EkfLevel>(channels_.ekf_level,
+                                    [this](const model::EkfLevel& level) { stage_->add(level); });
+    keyframes_ = node.advertise<model::Keyframe>(channels_.keyframe);
   }
 
   std::string save() const override { return stage_->save(); }
@@ -40,16 +41,16 @@ class KeyframerAdapter : public Adapter {
   KeyframerChannels channels_;
   KeyframerParameters parameters_;
   std::unique_ptr<KeyframerMethod> stage_;
-  Publisher<Keyframe> keyframes_;
+  bus::Publisher<model::Keyframe> keyframes_;
 };
 
 }  // namespace
 
-Service keyframer_service(const KeyframerChannels& channels) {
+bus::Service keyframer_service(const KeyframerChannels& channels) {
   return {"keyframer",
           channels.landmarks + ", " + channels.odometry + ", " + channels.ekf_pose + ", " +
               channels.ekf_level + " -> " + channels.keyframe,
           [channels] { return std::make_unique<KeyframerAdapter>(channels); }};
 }
 
-}  // namespace understory
+}  // namespace understory::keyframer

@@ -5,7 +5,7 @@
 
 #include "common/bus/service.hpp"
 
-namespace understory {
+namespace understory::keyframer {
 
 struct KeyframerChannels {
   std::string landmarks = "LANDMARKS";
@@ -15,6 +15,6 @@ struct KeyframerChannels {
   std::string keyframe = "KEYFRAME";
 };
 
-Service keyframer_service(const KeyframerChannels& channels = {});
+bus::Service keyframer_service(const KeyframerChannels& channels = {});
 
-}  // namespace understory
+}  // namespace understory::keyframer

@@ -4,8 +4,8 @@
 #include "common/bus/parameter_table.hpp"
 #include "services/keyframer/parameters.hpp"
 
-namespace understory {
+namespace understory::keyframer {
 
-void describe(KeyframerParameters& parameters, ParameterTable& table);
+void describe(KeyframerParameters& parameters, bus::ParameterTable& table);
 
-}  // namespace understory
+}  // namespace understory::keyframer

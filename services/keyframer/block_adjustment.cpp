@@ -4,7 +4,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
-namespace understory {
+namespace understory::keyframer {
 namespace {
 
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
@@ -14,7 +14,7 @@ constexpr double kConverged = 1e-9;
 /// d(centre point)/d(left perturbation of the member's pose).
 Matrix23 point_jacobian(const Eigen::Vector2d& point) {
   Matrix23 jacobian;
-  jacobian << Eigen::Matrix2d::Identity(), turned_left(point);
+  jacobian << Eigen::Matrix2d::Identity(), geometry::perpendicular(point);
   return jacobian;
 }
 
@@ -26,8 +26,9 @@ class BlockAdjuster {
       : problem_(problem),
         members_(problem.local_T_member.size()),
         landmarks_(problem.landmarks.size()) {
-    const SE2 centre_T_local = problem.local_T_member[members_ / 2].inverse();
-    for (const SE2& pose : problem.local_T_member) poses_.push_back(centre_T_local * pose);
+    const geometry::SE2 centre_T_local = problem.local_T_member[members_ / 2].inverse();
+    for (const geometry::SE2& pose : problem.local_T_member)
+      poses_.push_back(centre_T_local * pose);
     for (const Eigen::Vector2d& point : problem.landmarks)
       points_.push_back(centre_T_local * point);
   }
@@ -61,7 +62,7 @@ class BlockAdjuster {
   }
 
   void add(const BlockObservation& z) {
-    const SE2& pose = poses_[z.member];
+    const geometry::SE2& pose = poses_[z.member];
     const Eigen::Vector2d point = pose * z.position_m;
     const Eigen::Matrix2d rotation = pose.rotation();
     const Eigen::Matrix2d weight = rotation * z.covariance_m2.inverse() * rotation.transpose();
@@ -77,13 +78,13 @@ class BlockAdjuster {
     chi2_.push_back(error.dot(weight * error));
   }
 
-  void add_motion(std::size_t k, const SE2WithCovariance& motion) {
+  void add_motion(std::size_t k, const geometry::SE2WithCovariance& motion) {
     // Error Log(Z^-1 A^-1 B) with both poses perturbed on the left: dB = Ad(B^-1), dA = -Ad(B^-1),
     // times Jr^-1.
     const Eigen::Vector3d error =
         (motion.mean.inverse() * poses_[k].inverse() * poses_[k + 1]).Log();
     const Eigen::Matrix3d jacobian =
-        inverse_right_jacobian(error) * poses_[k + 1].inverse().Adjoint();
+        geometry::inverse_right_jacobian(error) * poses_[k + 1].inverse().Adjoint();
     const Eigen::Matrix3d information = motion.covariance.inverse();
     const Eigen::Matrix3d hessian = jacobian.transpose() * information * jacobian;
     const Eigen::Vector3d gradient = jacobian.transpose() * information * error;
@@ -141,7 +142,7 @@ class BlockAdjuster {
     }
     for (std::size_t k = 0; k < members_; ++k) {
       const Eigen::Vector3d xi = delta.segment<3>(3 * static_cast<Eigen::Index>(k));
-      poses_[k] = SE2::Exp(xi) * poses_[k];
+      poses_[k] = geometry::SE2::Exp(xi) * poses_[k];
     }
     return delta.cwiseAbs().maxCoeff();
   }
@@ -192,7 +193,7 @@ class BlockAdjuster {
   const BlockProblem& problem_;
   std::size_t members_;
   std::size_t landmarks_;
-  std::vector<SE2> poses_;
+  std::vector<geometry::SE2> poses_;
   std::vector<Eigen::Vector2d> points_;
   Eigen::MatrixXd reduced_;
   Eigen::VectorXd gradient_;
@@ -209,4 +210,4 @@ BlockEstimate adjust_block(const BlockProblem& problem) {
   return BlockAdjuster(problem).run();
 }
 
-}  // namespace understory
+}  // namespace understory::keyframer

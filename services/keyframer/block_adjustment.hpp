@@ -6,7 +6,7 @@
 
 #include "common/geometry/se2.hpp"
 
-namespace understory {
+namespace understory::keyframer {
 
 /// One detection of landmark `landmark` by member `member`.
 struct BlockObservation {
@@ -17,11 +17,11 @@ struct BlockObservation {
 };
 
 struct BlockProblem {
-  std::vector<SE2> local_T_member;         ///< First guess, in any frame `local`.
-  std::vector<Eigen::Vector2d> landmarks;  ///< First guess, same frame.
+  std::vector<geometry::SE2> local_T_member;  ///< First guess, in any frame `local`.
+  std::vector<Eigen::Vector2d> landmarks;     ///< First guess, same frame.
   std::vector<BlockObservation> observations;
   /// motion[k]: from member k to member k + 1, where odometry knows it; size members - 1.
-  std::vector<std::optional<SE2WithCovariance>> motion;
+  std::vector<std::optional<geometry::SE2WithCovariance>> motion;
 };
 
 /// The estimate in the frame `centre`.
@@ -31,7 +31,7 @@ struct BlockProblem {
 /// `landmark_covariance` are the exact 2 x 2 blocks in that gauge.
 struct BlockEstimate {
   bool converged = false;
-  std::vector<SE2WithCovariance> centre_T_member;
+  std::vector<geometry::SE2WithCovariance> centre_T_member;
   std::vector<Eigen::Vector2d> landmarks;
   std::vector<Eigen::Matrix2d> landmark_covariance;
   std::vector<double> chi2;  ///< Per observation, 2 degrees of freedom, after the fit.
@@ -41,4 +41,4 @@ struct BlockEstimate {
 /// O(observations n + n^3).
 BlockEstimate adjust_block(const BlockProblem& problem);
 
-}  // namespace understory
+}  // namespace understory::keyframer

@@ -4,14 +4,14 @@
 #include <algorithm>
 #include <map>
 
-namespace understory {
+namespace understory::keyframer {
 namespace {
 
 /// chi^2 of a detection (2 degrees of freedom) beyond which it is not the landmark's: one in
 /// 30,000.
 constexpr double kOutlierChi2 = 20.7;
 
-std::vector<std::uint32_t> sightings(const BlockProblem& problem) {
+std::vector<std::uint32_t> observations(const BlockProblem& problem) {
   std::vector<std::uint32_t> count(problem.landmarks.size(), 0);
   for (const BlockObservation& z : problem.observations) ++count[z.landmark];
   return count;
@@ -20,14 +20,15 @@ std::vector<std::uint32_t> sightings(const BlockProblem& problem) {
 /// Scans that few landmarks tie together leave motions open; what the solver then gives for their
 /// covariance is rounding, and may be anything.
 bool are_covariances(const BlockEstimate& estimate) {
-  return std::ranges::all_of(estimate.centre_T_member, [](const SE2WithCovariance& member) {
-    const Eigen::Matrix3d symmetric = 0.5 * (member.covariance + member.covariance.transpose());
-    if (!symmetric.allFinite()) return false;
-    const Eigen::Vector3d eigenvalues =
-        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(symmetric, Eigen::EigenvaluesOnly)
-            .eigenvalues();
-    return eigenvalues.minCoeff() >= -1e-9 * eigenvalues.maxCoeff();
-  });
+  return std::ranges::all_of(
+      estimate.centre_T_member, [](const geometry::SE2WithCovariance& member) {
+        const Eigen::Matrix3d symmetric = 0.5 * (member.covariance + member.covariance.transpose());
+        if (!symmetric.allFinite()) return false;
+        const Eigen::Vector3d eigenvalues =
+            Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(symmetric, Eigen::EigenvaluesOnly)
+                .eigenvalues();
+        return eigenvalues.minCoeff() >= -1e-9 * eigenvalues.maxCoeff();
+      });
 }
 
 }  // namespace
@@ -35,17 +36,17 @@ bool are_covariances(const BlockEstimate& estimate) {
 JointKeyframer::JointKeyframer(const JointKeyframerParameters& parameters)
     : parameters_(parameters), tracker_(parameters) {}
 
-void JointKeyframer::add(const Odometry& odometry) { odometry_.add(odometry); }
+void JointKeyframer::add(const model::Odometry& odometry) { odometry_.add(odometry); }
 
-std::optional<Keyframe> JointKeyframer::add(const LandmarkScan& raw) {
-  const LandmarkScan scan = level_.levelled(raw);
+std::optional<model::Keyframe> JointKeyframer::add(const model::LandmarkScan& raw) {
+  const model::LandmarkScan scan = level_.levelled(raw);
   ++counters_.scans;
   if (last_utime_ && scan.utime <= *last_utime_) {
     counters_.last_reason = "scan not later than the last one";
     ++counters_.scans_unmatched;
     return std::nullopt;
   }
-  std::optional<SE2WithCovariance> motion;
+  std::optional<geometry::SE2WithCovariance> motion;
   if (last_utime_) motion = odometry_.between(*last_utime_, scan.utime);
   FollowedScan tracked = tracker_.add(scan, motion);
   if (!tracked.tracked) return lost(scan);
@@ -59,10 +60,10 @@ std::optional<Keyframe> JointKeyframer::add(const LandmarkScan& raw) {
 }
 
 /// The chain is broken: what was gathered is published, and tracking starts anew at this scan.
-std::optional<Keyframe> JointKeyframer::lost(const LandmarkScan& scan) {
+std::optional<model::Keyframe> JointKeyframer::lost(const model::LandmarkScan& scan) {
   ++counters_.scans_unmatched;
   counters_.last_reason = "scan matches the landmarks before it too badly";
-  std::optional<Keyframe> result;
+  std::optional<model::Keyframe> result;
   if (members_.size() >= 2) {
     result = finish();
   } else if (!members_.empty()) {
@@ -89,7 +90,7 @@ BlockProblem JointKeyframer::problem(std::vector<std::uint32_t>& tracks) const {
       const std::uint32_t id = tracker_.resolved(member.tracked.tracks[i]);
       const Track* track = tracker_.find(id);
       if (track == nullptr ||
-          track->sightings < static_cast<std::uint32_t>(parameters_.min_sightings) ||
+          track->observations < static_cast<std::uint32_t>(parameters_.min_observations) ||
           tracker_.doubtful(*track)) {
         continue;
       }
@@ -100,7 +101,7 @@ BlockProblem JointKeyframer::problem(std::vector<std::uint32_t>& tracks) const {
         tracks.push_back(id);
         problem.landmarks.push_back(track->position_m);
       }
-      const Detection& detection = member.scan.detections[i];
+      const model::Detection& detection = member.scan.detections[i];
       problem.observations.push_back({k, entry->second, detection.position_m.head<2>(),
                                       detection.covariance_m2.topLeftCorner<2, 2>()});
     }
@@ -108,10 +109,10 @@ BlockProblem JointKeyframer::problem(std::vector<std::uint32_t>& tracks) const {
   return problem;
 }
 
-std::optional<Keyframe> JointKeyframer::finish() {
+std::optional<model::Keyframe> JointKeyframer::finish() {
   std::vector<std::uint32_t> tracks;
   BlockProblem block = problem(tracks);
-  const SE2 local_T_base = block.local_T_member.front();
+  const geometry::SE2 local_T_base = block.local_T_member.front();
   BlockEstimate estimate = adjust_block(block);
   for (int round = 0; round < 2; ++round) {
     std::size_t kept = 0;
@@ -138,7 +139,7 @@ std::optional<Keyframe> JointKeyframer::finish() {
     members_.clear();
     return std::nullopt;
   }
-  Keyframe result = keyframe(block, estimate, tracks);
+  model::Keyframe result = keyframe(block, estimate, tracks);
   if (local_T_previous_base_)
     result.previous_T_base = local_T_previous_base_->inverse() * local_T_base;
   local_T_previous_base_ = local_T_base;
@@ -147,9 +148,9 @@ std::optional<Keyframe> JointKeyframer::finish() {
   return result;
 }
 
-Keyframe JointKeyframer::keyframe(const BlockProblem& block, const BlockEstimate& estimate,
-                                  const std::vector<std::uint32_t>& tracks) {
-  Keyframe result;
+model::Keyframe JointKeyframer::keyframe(const BlockProblem& block, const BlockEstimate& estimate,
+                                         const std::vector<std::uint32_t>& tracks) {
+  model::Keyframe result;
   result.utime = members_.front().scan.utime;
   result.sequence = next_sequence_++;
   result.field_of_view = members_.front().scan.field_of_view;
@@ -158,7 +159,7 @@ Keyframe JointKeyframer::keyframe(const BlockProblem& block, const BlockEstimate
                               estimate.centre_T_member[k].mean,
                               estimate.centre_T_member[k].covariance});
   }
-  const std::vector<std::uint32_t> seen = sightings(block);
+  const std::vector<std::uint32_t> seen = observations(block);
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     if (seen[i] == 0) continue;
     const Track* track = tracker_.find(tracks[i]);
@@ -168,4 +169,4 @@ Keyframe JointKeyframer::keyframe(const BlockProblem& block, const BlockEstimate
   return result;
 }
 
-}  // namespace understory
+}  // namespace understory::keyframer

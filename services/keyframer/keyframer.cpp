@@ -2,16 +2,17 @@
 
 #include <stdexcept>
 
+#include "services/keyframer/baseline/keyframer.hpp"
 #include "services/keyframer/joint_keyframer.hpp"
-#include "services/keyframer/source_keyframer.hpp"
 
-namespace understory {
+namespace understory::keyframer {
 
 std::unique_ptr<KeyframerMethod> make_keyframer(const KeyframerParameters& parameters) {
   if (parameters.method == "joint") return std::make_unique<JointKeyframer>(parameters.joint);
-  if (parameters.method == "source") return make_source_keyframer(parameters.source);
+  if (parameters.method == "baseline")
+    return baseline::make_baseline_keyframer(parameters.baseline);
   throw std::invalid_argument("keyframer: method '" + parameters.method +
                               "' is not one of joint, source");
 }
 
-}  // namespace understory
+}  // namespace understory::keyframer

@@ -11,7 +11,7 @@
 #include "common/model/odometry.hpp"
 #include "services/keyframer/parameters.hpp"
 
-namespace understory {
+namespace understory::keyframer {
 
 /// Why a scan or a keyframe was not used; counted for HEALTH.
 struct KeyframerCounters {
@@ -27,15 +27,15 @@ class KeyframerMethod {
  public:
   virtual ~KeyframerMethod() = default;
   /// Takes one scan; gives the keyframe that it completes, if any.
-  virtual std::optional<Keyframe> add(const LandmarkScan& scan) = 0;
+  virtual std::optional<model::Keyframe> add(const model::LandmarkScan& scan) = 0;
   /// Motion without landmarks, where there is any; used as a prediction and to bridge scans that
   /// see nothing.
-  virtual void add(const Odometry& odometry) = 0;
+  virtual void add(const model::Odometry& odometry) = 0;
   /// The inertial bias and the velocity as the filter knows them: odometry that comes later starts
   /// from there.
-  virtual void add(const EkfPose& /*pose*/) {}
+  virtual void add(const model::EkfPose& /*pose*/) {}
   /// The error of the level as the filter knows it: scans that come later are levelled by it.
-  virtual void add(const EkfLevel& /*level*/) {}
+  virtual void add(const model::EkfLevel& /*level*/) {}
   virtual const KeyframerCounters& counters() const = 0;
   /// The whole state, for a restart; load() takes what save() of the same method gave.
   virtual std::string save() const = 0;
@@ -45,4 +45,4 @@ class KeyframerMethod {
 /// The method that `parameters.method` names.
 std::unique_ptr<KeyframerMethod> make_keyframer(const KeyframerParameters& parameters);
 
-}  // namespace understory
+}  // namespace understory::keyframer

@@ -2,8 +2,8 @@
 #include "services/keyframer/adapter.hpp"
 
 int main(int argc, char** argv) {
-  return understory::run_service(
-      understory::keyframer_service({
+  return understory::bus::run_service(
+      understory::keyframer::keyframer_service({
           .landmarks = "LANDMARKS",  // in: detections of one sweep
           .odometry = "ODOMETRY",    // in: motion, where there is any
           .ekf_pose = "EKF_POSE",    // in: bias and velocity, where a filter runs

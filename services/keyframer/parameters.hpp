@@ -2,10 +2,10 @@
 
 #include <string>
 
-namespace understory {
+namespace understory::keyframer {
 
 /// The source's own method (GeoSLAM Table 5.2). Symbols of the thesis in brackets.
-struct SourceKeyframerParameters {
+struct BaselineKeyframerParameters {
   double descriptor_step = 0.05;            ///< [s] of the perimeter.
   double max_descriptor_distance = 9.0;     ///< [tau]
   int max_side_difference = 3;              ///< [Delta_N]
@@ -23,17 +23,17 @@ struct JointKeyframerParameters {
   double gate_sigmas = 4.0;        ///< Association gate.
   double motion_sigma_m = 0.3;     ///< Of the step between two scans, where no odometry tells it.
   double motion_sigma_rad = 0.04;  ///< Likewise.
-  double max_turn_rad = 0.5;       ///< Largest unpredicted turn between two scans that is searched.
+  double max_rotation_rad = 0.5;   ///< Largest unpredicted turn between two scans that is searched.
   double min_matched_ratio =
       0.5;  ///< Of the detections (or of the landmarks, if fewer): below, a scan is lost.
-  int min_matched = 4;    ///< Fewest matches without odometry.
-  int min_sightings = 2;  ///< A landmark seen less often does not pass.
+  int min_matched = 4;       ///< Fewest matches without odometry.
+  int min_observations = 2;  ///< A landmark seen less often does not pass.
 };
 
 struct KeyframerParameters {
-  std::string method = "joint";  ///< "joint" (ours) or "source".
-  SourceKeyframerParameters source;
+  std::string method = "joint";  ///< "joint" (ours) or "baseline".
+  BaselineKeyframerParameters baseline;
   JointKeyframerParameters joint;
 };
 
-}  // namespace understory
+}  // namespace understory::keyframer

@@ -4,7 +4,7 @@
 #include <bit>
 #include <cmath>
 
-namespace understory {
+namespace understory::keyframer {
 namespace {
 
 /// A track's mean forgets after so many sightings, so that slow drift of `local` does not smear it.
@@ -16,56 +16,58 @@ constexpr double kReluctance = 8.0;
 constexpr std::size_t kMaxMergeMemory = 4096;
 constexpr double kMaxMergeDistance2 = 4.0;  // m^2
 
-std::vector<UncertainPoint> observed_points(const LandmarkScan& scan) {
-  std::vector<UncertainPoint> points;
+std::vector<geometry::UncertainPoint> observed_points(const model::LandmarkScan& scan) {
+  std::vector<geometry::UncertainPoint> points;
   points.reserve(scan.detections.size());
-  for (const Detection& detection : scan.detections) {
+  for (const model::Detection& detection : scan.detections) {
     points.push_back({detection.position_m.head<2>(), plane_variance(detection)});
   }
   return points;
 }
 
-std::vector<UncertainPoint> reference_points(std::span<const Track> tracks) {
-  std::vector<UncertainPoint> points;
+std::vector<geometry::UncertainPoint> reference_points(std::span<const Track> tracks) {
+  std::vector<geometry::UncertainPoint> points;
   points.reserve(tracks.size());
   for (const Track& track : tracks) {
-    const double weight = std::min<double>(track.sightings, kMaxWeight);
+    const double weight = std::min<double>(track.observations, kMaxWeight);
     points.push_back({track.position_m, track.detection_variance_m2 / weight,
-                      track.sightings < kConfirmed ? kReluctance : 0.0});
+                      track.observations < kConfirmed ? kReluctance : 0.0});
   }
   return points;
 }
 
 }  // namespace
 
-double plane_variance(const Detection& detection) {
+double plane_variance(const model::Detection& detection) {
   return 0.5 * detection.covariance_m2.topLeftCorner<2, 2>().trace();
 }
 
-FollowedScan ScanTracker::restart(const LandmarkScan& scan) {
+FollowedScan ScanTracker::restart(const model::LandmarkScan& scan) {
   tracks_.clear();
   merged_.clear();
   started_ = true;
-  local_T_vehicle_ = SE2();
-  last_motion_ = SE2();
-  return fuse(scan, Registration{SE2(), Eigen::Matrix3d::Zero(), {}});
+  local_T_vehicle_ = geometry::SE2();
+  last_motion_ = geometry::SE2();
+  return fuse(scan, geometry::Registration{geometry::SE2(), Eigen::Matrix3d::Zero(), {}});
 }
 
-FollowedScan ScanTracker::add(const LandmarkScan& scan,
-                              const std::optional<SE2WithCovariance>& motion) {
+FollowedScan ScanTracker::add(const model::LandmarkScan& scan,
+                              const std::optional<geometry::SE2WithCovariance>& motion) {
   if (!started_) return restart(scan);
-  const std::optional<Registration> registration = locate(scan, motion);
+  const std::optional<geometry::Registration> registration = locate(scan, motion);
   if (!registration) return {};
   last_motion_ = local_T_vehicle_.inverse() * registration->reference_T_observed;
   local_T_vehicle_ = registration->reference_T_observed;
   return fuse(scan, *registration);
 }
 
-bool ScanTracker::fits(const Registration& registration, const LandmarkScan& scan) const {
-  const SE2 vehicle_T_local = registration.reference_T_observed.inverse();
+bool ScanTracker::fits(const geometry::Registration& registration,
+                       const model::LandmarkScan& scan) const {
+  const geometry::SE2 vehicle_T_local = registration.reference_T_observed.inverse();
   std::size_t visible = 0;
   for (const Track& track : tracks_) {
-    if (track.sightings >= 2 && scan.field_of_view.contains(vehicle_T_local * track.position_m)) {
+    if (track.observations >= 2 &&
+        scan.field_of_view.contains(vehicle_T_local * track.position_m)) {
       ++visible;
     }
   }
@@ -77,37 +79,39 @@ bool ScanTracker::fits(const Registration& registration, const LandmarkScan& sca
          registration.pairs.size() >= static_cast<std::size_t>(parameters_.min_matched);
 }
 
-std::optional<Registration> ScanTracker::locate(
-    const LandmarkScan& scan, const std::optional<SE2WithCovariance>& motion) const {
-  const std::vector<UncertainPoint> reference = reference_points(tracks_);
-  const std::vector<UncertainPoint> observed = observed_points(scan);
-  RegistrationParameters registration;
+std::optional<geometry::Registration> ScanTracker::locate(
+    const model::LandmarkScan& scan,
+    const std::optional<geometry::SE2WithCovariance>& motion) const {
+  const std::vector<geometry::UncertainPoint> reference = reference_points(tracks_);
+  const std::vector<geometry::UncertainPoint> observed = observed_points(scan);
+  geometry::RegistrationParameters registration;
   registration.gate_sigmas = parameters_.gate_sigmas;
   if (motion) {
-    const SE2WithCovariance guess{local_T_vehicle_ * motion->mean,
-                                  motion->covariance + 1e-8 * Eigen::Matrix3d::Identity()};
+    const geometry::SE2WithCovariance guess{
+        local_T_vehicle_ * motion->mean, motion->covariance + 1e-8 * Eigen::Matrix3d::Identity()};
     return register_points(reference, observed, guess, registration);
   }
-  const StepModel step{parameters_.motion_sigma_m, parameters_.motion_sigma_rad,
-                       parameters_.max_turn_rad};
-  Registration found =
+  const geometry::StepModel step{parameters_.motion_sigma_m, parameters_.motion_sigma_rad,
+                                 parameters_.max_rotation_rad};
+  geometry::Registration found =
       register_step(reference, observed, local_T_vehicle_, last_motion_, step, registration,
-                    [&](const Registration& tried) { return fits(tried, scan); });
+                    [&](const geometry::Registration& tried) { return fits(tried, scan); });
   if (!fits(found, scan)) return std::nullopt;
   return found;
 }
 
-FollowedScan ScanTracker::fuse(const LandmarkScan& scan, const Registration& registration) {
+FollowedScan ScanTracker::fuse(const model::LandmarkScan& scan,
+                               const geometry::Registration& registration) {
   FollowedScan result{true, local_T_vehicle_, {}};
   result.tracks.assign(scan.detections.size(), 0);
   update_visibility(scan);
-  for (const PointPair& pair : registration.pairs) {
-    const Detection& detection = scan.detections[pair.observed];
+  for (const geometry::PointPair& pair : registration.pairs) {
+    const model::Detection& detection = scan.detections[pair.observed];
     Track& track = tracks_[pair.reference];
-    ++track.sightings;
+    ++track.observations;
     track.seen |= 1u;
     track.in_view |= 1u;
-    const double weight = std::min<double>(track.sightings, kMaxWeight);
+    const double weight = std::min<double>(track.observations, kMaxWeight);
     const Eigen::Vector2d position =
         local_T_vehicle_ * Eigen::Vector2d(detection.position_m.head<2>());
     track.position_m += (position - track.position_m) / weight;
@@ -118,14 +122,14 @@ FollowedScan ScanTracker::fuse(const LandmarkScan& scan, const Registration& reg
   }
   for (std::size_t i = 0; i < scan.detections.size(); ++i) {
     if (result.tracks[i] != 0) continue;
-    const Detection& detection = scan.detections[i];
+    const model::Detection& detection = scan.detections[i];
     Track track;
     track.id = next_id_++;
     track.position_m = local_T_vehicle_ * Eigen::Vector2d(detection.position_m.head<2>());
     track.detection_variance_m2 = plane_variance(detection);
     track.radius_m = detection.radius_m;
     track.kind = detection.kind;
-    track.sightings = 1;
+    track.observations = 1;
     track.seen = track.in_view = 1;
     result.tracks[i] = track.id;
     tracks_.push_back(track);
@@ -135,8 +139,8 @@ FollowedScan ScanTracker::fuse(const LandmarkScan& scan, const Registration& reg
   return result;
 }
 
-void ScanTracker::update_visibility(const LandmarkScan& scan) {
-  const SE2 vehicle_T_local = local_T_vehicle_.inverse();
+void ScanTracker::update_visibility(const model::LandmarkScan& scan) {
+  const geometry::SE2 vehicle_T_local = local_T_vehicle_.inverse();
   for (Track& track : tracks_) {
     const bool visible = scan.field_of_view.contains(vehicle_T_local * track.position_m);
     track.seen <<= 1;
@@ -164,7 +168,7 @@ bool ScanTracker::doubtful(const Track& track) const {
 void ScanTracker::merge_doubles() {
   for (std::size_t young = 1; young < tracks_.size(); ++young) {
     const Track& b = tracks_[young];
-    if (b.sightings < 2 || std::popcount(b.in_view) < 6) continue;
+    if (b.observations < 2 || std::popcount(b.in_view) < 6) continue;
     for (std::size_t old = 0; old < young; ++old) {
       Track& a = tracks_[old];
       if (!within_noise(a, b)) continue;
@@ -181,21 +185,21 @@ void ScanTracker::merge_doubles() {
 }
 
 void ScanTracker::absorb(Track& a, const Track& b) {
-  const double na = std::min<double>(a.sightings, kMaxWeight);
-  const double nb = std::min<double>(b.sightings, kMaxWeight);
+  const double na = std::min<double>(a.observations, kMaxWeight);
+  const double nb = std::min<double>(b.observations, kMaxWeight);
   a.position_m = (na * a.position_m + nb * b.position_m) / (na + nb);
-  a.sightings += b.sightings;
+  a.observations += b.observations;
   a.seen |= b.seen;
   a.in_view |= b.in_view;
   merged_.emplace_back(b.id, a.id);
 }
 
-void ScanTracker::drop_distant(const LandmarkScan& scan) {
+void ScanTracker::drop_distant(const model::LandmarkScan& scan) {
   const double limit = 1.5 * scan.field_of_view.max_range_m;
   std::erase_if(tracks_, [&](const Track& track) {
     const bool distant = (track.position_m - local_T_vehicle_.translation()).norm() > limit;
     // Seen once and not in the sixteen views since: noise.
-    const bool noise = track.sightings < 2 && std::popcount(track.in_view) > 16;
+    const bool noise = track.observations < 2 && std::popcount(track.in_view) > 16;
     return distant || noise;
   });
 }
@@ -227,4 +231,4 @@ void ScanTracker::set_state(const State& state) {
   last_motion_ = state.last_motion;
 }
 
-}  // namespace understory
+}  // namespace understory::keyframer

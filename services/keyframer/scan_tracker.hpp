@@ -9,7 +9,7 @@
 #include "common/model/landmarks.hpp"
 #include "services/keyframer/parameters.hpp"
 
-namespace understory {
+namespace understory::keyframer {
 
 /// A landmark of the rolling local map.
 struct Track {
@@ -17,16 +17,16 @@ struct Track {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `local`.
   double detection_variance_m2 = 0.0;                    ///< Mean over its detections.
   double radius_m = 0.0;
-  std::uint32_t sightings = 0;
+  std::uint32_t observations = 0;
   std::uint64_t seen = 0;     ///< Bit k: detected k scans ago.
   std::uint64_t in_view = 0;  ///< Bit k: in the field of view k scans ago.
-  LandmarkKind kind = LandmarkKind::kTrunk;
+  model::LandmarkKind kind = model::LandmarkKind::kTrunk;
 };
 
 /// A scan with its place in `local` and the track of each detection.
 struct FollowedScan {
   bool tracked = false;
-  SE2 local_T_vehicle;
+  geometry::SE2 local_T_vehicle;
   std::vector<std::uint32_t> tracks;  ///< Per detection; the scan's own new tracks included.
 };
 
@@ -39,9 +39,10 @@ class ScanTracker {
 
   /// `motion`: of the vehicle since the last scan, where odometry knows it. An untracked scan
   /// changes nothing.
-  FollowedScan add(const LandmarkScan& scan, const std::optional<SE2WithCovariance>& motion);
+  FollowedScan add(const model::LandmarkScan& scan,
+                   const std::optional<geometry::SE2WithCovariance>& motion);
   /// Forgets everything and starts `local` at this scan.
-  FollowedScan restart(const LandmarkScan& scan);
+  FollowedScan restart(const model::LandmarkScan& scan);
   bool empty() const { return tracks_.empty() && !started_; }
   /// The track that `id` was merged into, or itself.
   std::uint32_t resolved(std::uint32_t id) const;
@@ -57,33 +58,34 @@ class ScanTracker {
     std::vector<std::pair<std::uint32_t, std::uint32_t>> merged;
     std::uint32_t next_id = 1;
     bool started = false;
-    SE2 local_T_vehicle;
-    SE2 last_motion;
+    geometry::SE2 local_T_vehicle;
+    geometry::SE2 last_motion;
   };
   State state() const;
   void set_state(const State& state);
 
  private:
-  std::optional<Registration> locate(const LandmarkScan& scan,
-                                     const std::optional<SE2WithCovariance>& motion) const;
-  bool fits(const Registration& registration, const LandmarkScan& scan) const;
-  FollowedScan fuse(const LandmarkScan& scan, const Registration& registration);
-  void update_visibility(const LandmarkScan& scan);
+  std::optional<geometry::Registration> locate(
+      const model::LandmarkScan& scan,
+      const std::optional<geometry::SE2WithCovariance>& motion) const;
+  bool fits(const geometry::Registration& registration, const model::LandmarkScan& scan) const;
+  FollowedScan fuse(const model::LandmarkScan& scan, const geometry::Registration& registration);
+  void update_visibility(const model::LandmarkScan& scan);
   bool within_noise(const Track& a, const Track& b) const;
   void merge_doubles();
   void absorb(Track& a, const Track& b);
-  void drop_distant(const LandmarkScan& scan);
+  void drop_distant(const model::LandmarkScan& scan);
 
   JointKeyframerParameters parameters_;
   std::vector<Track> tracks_;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> merged_;  ///< (old, new), recent ones.
   std::uint32_t next_id_ = 1;
   bool started_ = false;
-  SE2 local_T_vehicle_;
-  SE2 last_motion_;
+  geometry::SE2 local_T_vehicle_;
+  geometry::SE2 last_motion_;
 };
 
 /// Isotropic variance [m^2] in the plane of a detection.
-double plane_variance(const Detection& detection);
+double plane_variance(const model::Detection& detection);
 
-}  // namespace understory
+}  // namespace understory::keyframer

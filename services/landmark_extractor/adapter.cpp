@@ -9,10 +9,10 @@
 #include "services/landmark_extractor/adapter_parameters.hpp"
 #include "services/landmark_extractor/landmark_extractor.hpp"
 
-namespace understory {
+namespace understory::landmark_extractor {
 namespace {
 
-constexpr Utime kSummaryPeriod_us = 10000000;
+constexpr model::Utime kSummaryPeriod_us = 10000000;
 
 /// "trunks 12 (too_few_points 3, ...), corners ..."; empty when there was no sweep.
 std::string summary(const SweepCounters& now, const SweepCounters& before) {
@@ -21,10 +21,10 @@ std::string summary(const SweepCounters& now, const SweepCounters& before) {
   const auto say = [&](std::string_view name, std::uint64_t count) {
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", name, count);
   };
-  const TrunkCounters& t = now.trunks;
-  const TrunkCounters& t0 = before.trunks;
-  const CornerCounters& c = now.corners;
-  const CornerCounters& c0 = before.corners;
+  const trunks::TrunkCounters& t = now.trunks;
+  const trunks::TrunkCounters& t0 = before.trunks;
+  const corners::CornerCounters& c = now.corners;
+  const corners::CornerCounters& c0 = before.corners;
   say("sweeps", now.sweeps - before.sweeps);
   say("trunks", t.trunks - t0.trunks);
   say("columns of returns that are none: too few points", t.too_few_points - t0.too_few_points);
@@ -45,85 +45,87 @@ std::string summary(const SweepCounters& now, const SweepCounters& before) {
   return text;
 }
 
-class LandmarkExtractorAdapter : public Adapter {
+class LandmarkExtractorAdapter : public bus::Adapter {
  public:
   explicit LandmarkExtractorAdapter(LandmarkExtractorChannels channels)
       : channels_(std::move(channels)) {}
 
-  void describe(ParameterTable& table) override { understory::describe(parameters_, table); }
+  void describe(bus::ParameterTable& table) override {
+    landmark_extractor::describe(parameters_, table);
+  }
 
-  void bind(Node& node) override {
+  void bind(bus::Node& node) override {
     node_ = &node;
     stage_.emplace(parameters_);
-    node.subscribe<PlanarScan>(
+    node.subscribe<model::PlanarScan>(
         channels_.lidar_scan,
-        [this](const PlanarScan& scan) { landmarks_.publish(stage_->extract(scan)); },
+        [this](const model::PlanarScan& scan) { landmarks_.publish(stage_->extract(scan)); },
         {.queue_size = 200});
     // Each sweep is judged by itself: there is no state to save but counters, which begin anew. A
     // sweep that was under way at a restart is lost, and counted when its next part comes.
-    node.subscribe<PointSweep>(channels_.lidar_sweep,
-                               [this](const PointSweep& part) { add_part(part); },
-                               {.queue_size = 1000, .journaled = false});
-    landmarks_ = node.advertise<LandmarkScan>(channels_.landmarks);
-    node.every(kSummaryPeriod_us, [this](Utime /*now*/) { say_summary(); });
+    node.subscribe<model::PointSweep>(channels_.lidar_sweep,
+                                      [this](const model::PointSweep& part) { add_part(part); },
+                                      {.queue_size = 1000, .journaled = false});
+    landmarks_ = node.advertise<model::LandmarkScan>(channels_.landmarks);
+    node.every(kSummaryPeriod_us, [this](model::Utime /*now*/) { say_summary(); });
   }
 
  private:
-  void add_part(const PointSweep& part) {
+  void add_part(const model::PointSweep& part) {
     const auto sweep = assembler_.add(part);
-    if (assembler_.incomplete_turns() > incomplete_) {
-      incomplete_ = assembler_.incomplete_turns();
-      node_->report(Reason::kPartsMissing, "a turn of which parts are missing is left out",
+    if (assembler_.incomplete_revolutions() > incomplete_) {
+      incomplete_ = assembler_.incomplete_revolutions();
+      node_->report(wire::Reason::kPartsMissing, "a turn of which parts are missing is left out",
                     channels_.lidar_sweep);
     }
     if (!sweep) return;
     const SweepCounters before = stage_->sweep_counters();
-    const LandmarkScan landmarks = stage_->extract(*sweep);
+    const model::LandmarkScan landmarks = stage_->extract(*sweep);
     say_what_is_wrong(before, stage_->sweep_counters());
     if (stage_->sweep_counters().malformed == before.malformed) landmarks_.publish(landmarks);
   }
 
   void say_what_is_wrong(const SweepCounters& before, const SweepCounters& now) {
-    const auto say = [&](Reason reason, std::string_view text) {
+    const auto say = [&](wire::Reason reason, std::string_view text) {
       node_->report(reason, text, channels_.lidar_sweep);
     };
     if (now.malformed > before.malformed) {
-      say(Reason::kInconsistent, "a sweep without rings or not in frame vehicle is left out");
+      say(wire::Reason::kInconsistent, "a sweep without rings or not in frame vehicle is left out");
     }
     if (now.without_attitude > before.without_attitude) {
-      say(Reason::kNotCalibrated, "a sweep without attitude is taken as level");
+      say(wire::Reason::kNotCalibrated, "a sweep without attitude is taken as level");
     }
     if (now.points.not_finite > before.points.not_finite) {
-      say(Reason::kNotFinite, "points that are no numbers are left out");
+      say(wire::Reason::kNotFinite, "points that are no numbers are left out");
     }
     if (now.points.bad_ring > before.points.bad_ring) {
-      say(Reason::kOutOfRange, "points of rings that the sensor does not have are left out");
+      say(wire::Reason::kOutOfRange, "points of rings that the sensor does not have are left out");
     }
   }
 
   /// What became of the objects since the last time, with why.
   void say_summary() {
-    const std::string all = summary(stage_->sweep_counters(), told_);
-    if (!all.empty()) node_->log(Node::Level::kInfo, "landmarks", all, channels_.lidar_sweep);
-    told_ = stage_->sweep_counters();
+    const std::string all = summary(stage_->sweep_counters(), reported_);
+    if (!all.empty()) node_->log(bus::Node::Level::kInfo, "landmarks", all, channels_.lidar_sweep);
+    reported_ = stage_->sweep_counters();
   }
 
   LandmarkExtractorChannels channels_;
   LandmarkExtractorParameters parameters_;
-  Node* node_ = nullptr;
+  bus::Node* node_ = nullptr;
   std::optional<LandmarkExtractor> stage_;
-  SweepAssembler assembler_;
+  model::SweepAssembler assembler_;
   std::uint64_t incomplete_ = 0;
-  SweepCounters told_;
-  Publisher<LandmarkScan> landmarks_;
+  SweepCounters reported_;
+  bus::Publisher<model::LandmarkScan> landmarks_;
 };
 
 }  // namespace
 
-Service landmark_extractor_service(const LandmarkExtractorChannels& channels) {
+bus::Service landmark_extractor_service(const LandmarkExtractorChannels& channels) {
   return {"landmark_extractor",
           channels.lidar_scan + ", " + channels.lidar_sweep + " -> " + channels.landmarks,
           [channels] { return std::make_unique<LandmarkExtractorAdapter>(channels); }};
 }
 
-}  // namespace understory
+}  // namespace understory::landmark_extractor

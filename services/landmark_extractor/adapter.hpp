@@ -5,7 +5,7 @@
 
 #include "common/bus/service.hpp"
 
-namespace understory {
+namespace understory::landmark_extractor {
 
 struct LandmarkExtractorChannels {
   std::string lidar_scan = "LIDAR_SCAN";
@@ -13,6 +13,6 @@ struct LandmarkExtractorChannels {
   std::string landmarks = "LANDMARKS";
 };
 
-Service landmark_extractor_service(const LandmarkExtractorChannels& channels = {});
+bus::Service landmark_extractor_service(const LandmarkExtractorChannels& channels = {});
 
-}  // namespace understory
+}  // namespace understory::landmark_extractor

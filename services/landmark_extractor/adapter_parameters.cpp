@@ -1,9 +1,9 @@
 #include "services/landmark_extractor/adapter_parameters.hpp"
 
-namespace understory {
+namespace understory::landmark_extractor {
 namespace {
 
-void describe_sensor(PlanarTrunkParameters& p, ParameterTable& table) {
+void describe_sensor(PlanarTrunkParameters& p, bus::ParameterTable& table) {
   table.add("planar.min_range_m", p.min_range_m, {0.0, 100.0}, "m",
             "What is nearer is the vehicle itself.");
   table.add("planar.max_range_m", p.max_range_m, {1.0, 1000.0}, "m",
@@ -13,7 +13,7 @@ void describe_sensor(PlanarTrunkParameters& p, ParameterTable& table) {
             "By how much a beam's footprint widens a trunk on each side.");
 }
 
-void describe_shape(PlanarTrunkParameters& p, ParameterTable& table) {
+void describe_shape(PlanarTrunkParameters& p, bus::ParameterTable& table) {
   table.add("planar.roundness_sigma_m", p.roundness_sigma_m, {0.0, 1.0}, "m",
             "Of the bark from a circle.");
   table.add("planar.shape_sigma_m", p.shape_sigma_m, {0.0, 1.0}, "m",
@@ -28,7 +28,7 @@ void describe_shape(PlanarTrunkParameters& p, ParameterTable& table) {
             "Standard deviation of that.");
 }
 
-void describe_selection(PlanarTrunkParameters& p, ParameterTable& table) {
+void describe_selection(PlanarTrunkParameters& p, bus::ParameterTable& table) {
   table.add("planar.break_distance_m", p.break_distance_m, {0.01, 10.0}, "m",
             "Neighbouring returns farther apart are two objects.");
   table.add("planar.break_per_range", p.break_per_range, {0.0, 1.0}, "m per m",
@@ -44,7 +44,7 @@ void describe_selection(PlanarTrunkParameters& p, ParameterTable& table) {
             "Of the ranges from the fitted circle.");
 }
 
-void describe_sweep(SweepParameters& p, ParameterTable& table) {
+void describe_sweep(SweepParameters& p, bus::ParameterTable& table) {
   table.add("sweep.min_range_m", p.min_range_m, {0.0, 100.0}, "m",
             "What is nearer is the vehicle itself.");
   table.add("sweep.max_range_m", p.max_range_m, {1.0, 100.0}, "m",
@@ -70,7 +70,7 @@ void describe_sweep(SweepParameters& p, ParameterTable& table) {
             "Of roll and of pitch where the sweep does not say them.");
 }
 
-void describe_trunk_shape(SweepTrunkParameters& p, ParameterTable& table) {
+void describe_trunk_shape(SweepTrunkParameters& p, bus::ParameterTable& table) {
   table.add("trunk.min_radius_m", p.min_radius_m, {0.001, 10.0}, "m", "Of a trunk.");
   table.add("trunk.max_radius_m", p.max_radius_m, {0.01, 10.0}, "m", "Of a trunk.");
   table.add("trunk.prior_radius_m", p.prior_radius_m, {0.001, 10.0}, "m",
@@ -91,7 +91,7 @@ void describe_trunk_shape(SweepTrunkParameters& p, ParameterTable& table) {
             "More than that is a branch.");
 }
 
-void describe_trunk_selection(SweepTrunkParameters& p, ParameterTable& table) {
+void describe_trunk_selection(SweepTrunkParameters& p, bus::ParameterTable& table) {
   table.add("trunk.max_sigma_m", p.max_sigma_m, {0.001, 10.0}, "m",
             "Trunks whose centre is known worse are not reported.");
   table.add("trunk.max_mean_square_residual", p.max_mean_square_residual, {0.1, 1e6}, "sigma^2",
@@ -106,7 +106,7 @@ void describe_trunk_selection(SweepTrunkParameters& p, ParameterTable& table) {
   table.add("trunk.min_rings", p.min_rings, {1, 100}, "", "Fewest rings that see it.");
 }
 
-void describe_corner(CornerParameters& p, ParameterTable& table) {
+void describe_corner(CornerParameters& p, bus::ParameterTable& table) {
   table.add("corner.line_tolerance_m", p.line_tolerance_m, {0.001, 1.0}, "m",
             "What is so near a line is on it.");
   table.add("corner.min_length_m", p.min_length_m, {0.05, 100.0}, "m",
@@ -126,7 +126,7 @@ void describe_corner(CornerParameters& p, ParameterTable& table) {
 
 }  // namespace
 
-void describe(LandmarkExtractorParameters& parameters, ParameterTable& table) {
+void describe(LandmarkExtractorParameters& parameters, bus::ParameterTable& table) {
   describe_sensor(parameters.planar, table);
   describe_shape(parameters.planar, table);
   describe_selection(parameters.planar, table);
@@ -136,4 +136,4 @@ void describe(LandmarkExtractorParameters& parameters, ParameterTable& table) {
   describe_corner(parameters.corner, table);
 }
 
-}  // namespace understory
+}  // namespace understory::landmark_extractor

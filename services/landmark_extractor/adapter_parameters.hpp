@@ -4,8 +4,8 @@
 #include "common/bus/parameter_table.hpp"
 #include "services/landmark_extractor/parameters.hpp"
 
-namespace understory {
+namespace understory::landmark_extractor {
 
-void describe(LandmarkExtractorParameters& parameters, ParameterTable& table);
+void describe(LandmarkExtractorParameters& parameters, bus::ParameterTable& table);
 
-}  // namespace understory
+}  // namespace understory::landmark_extractor

@@ -5,16 +5,16 @@
 #include <numbers>
 #include <optional>
 
-#include "services/landmark_extractor/segments.hpp"
-#include "services/landmark_extractor/trunk_fit.hpp"
+#include "services/landmark_extractor/planar/segments.hpp"
+#include "services/landmark_extractor/planar/trunk_fit.hpp"
 
-namespace understory {
+namespace understory::landmark_extractor {
 namespace {
 
 /// How much a trunk's height above the sensor's plane is unknown [m]: a planar laser has no say.
 constexpr double kHeightSigma_m = 0.5;
 
-bool well_formed(const PlanarScan& scan) {
+bool well_formed(const model::PlanarScan& scan) {
   const double width = scan.bearing_step_rad *
                        static_cast<double>(scan.ranges_m.empty() ? 0 : scan.ranges_m.size() - 1);
   return scan.ranges_m.size() > 1 && std::isfinite(scan.first_bearing_rad) &&
@@ -22,27 +22,29 @@ bool well_formed(const PlanarScan& scan) {
          scan.max_range_m > 0.0;
 }
 
-FieldOfView field_of_view(const PlanarScan& scan, const PlanarTrunkParameters& parameters) {
-  FieldOfView view;
+model::FieldOfView field_of_view(const model::PlanarScan& scan,
+                                 const PlanarTrunkParameters& parameters) {
+  model::FieldOfView view;
   view.max_range_m = std::min(scan.max_range_m, parameters.max_range_m);
   view.width_rad = scan.bearing_step_rad * static_cast<double>(scan.ranges_m.size() - 1);
-  view.bearing_rad = wrap_angle(scan.first_bearing_rad + 0.5 * view.width_rad +
-                                parameters.vehicle_T_sensor.theta());
+  view.bearing_rad = geometry::wrap_angle(scan.first_bearing_rad + 0.5 * view.width_rad +
+                                          parameters.vehicle_T_sensor.theta());
   return view;
 }
 
 /// Whether the borders let the object be one that stands alone; at most one side may be hidden.
-bool stands_alone(const Segment& segment) {
-  const auto seen = [](Border border) { return border == Border::kClear; };
-  const auto hidden = [](Border border) { return border == Border::kOccluded; };
+bool stands_alone(const planar::Segment& segment) {
+  const auto seen = [](planar::Border border) { return border == planar::Border::kClear; };
+  const auto hidden = [](planar::Border border) { return border == planar::Border::kOccluded; };
   return (seen(segment.left) && (seen(segment.right) || hidden(segment.right))) ||
          (seen(segment.right) && hidden(segment.left));
 }
 
-Detection to_detection(const TrunkFit& fit, const PlanarTrunkParameters& parameters) {
-  const SE2& vehicle_T_sensor = parameters.vehicle_T_sensor;
+model::Detection to_detection(const planar::TrunkFit& fit,
+                              const PlanarTrunkParameters& parameters) {
+  const geometry::SE2& vehicle_T_sensor = parameters.vehicle_T_sensor;
   const Eigen::Matrix2d rotation = vehicle_T_sensor.rotation();
-  Detection detection;
+  model::Detection detection;
   detection.position_m.head<2>() = vehicle_T_sensor * fit.centre();
   detection.covariance_m2.topLeftCorner<2, 2>() =
       rotation * fit.centre_covariance() * rotation.transpose() +
@@ -50,11 +52,11 @@ Detection to_detection(const TrunkFit& fit, const PlanarTrunkParameters& paramet
           Eigen::Matrix2d::Identity();
   detection.covariance_m2(2, 2) = kHeightSigma_m * kHeightSigma_m;
   detection.radius_m = fit.radius_m;
-  detection.kind = LandmarkKind::kTrunk;
+  detection.kind = model::LandmarkKind::kTrunk;
   return detection;
 }
 
-bool apart_from_others(const PlanarScan& scan, const std::vector<Segment>& segments,
+bool apart_from_others(const model::PlanarScan& scan, const std::vector<planar::Segment>& segments,
                        std::size_t index, const PlanarTrunkParameters& parameters) {
   return stands_alone(segments[index]) &&
          !continues_a_line(scan, segments[index], parameters.line_tolerance_m) &&
@@ -62,16 +64,17 @@ bool apart_from_others(const PlanarScan& scan, const std::vector<Segment>& segme
 }
 
 /// A single beam leaves a radius of nothing possible: thin is what is thin beyond doubt.
-bool trunk_sized(const TrunkFit& fit, const PlanarTrunkParameters& parameters) {
+bool trunk_sized(const planar::TrunkFit& fit, const PlanarTrunkParameters& parameters) {
   const double sigma = std::sqrt(fit.covariance(2, 2));
   return fit.radius_m + 2.0 * sigma >= parameters.min_radius_m &&
          fit.radius_m <= parameters.max_radius_m;
 }
 
-std::optional<Detection> to_trunk(const PlanarScan& scan, const std::vector<Segment>& segments,
-                                  std::size_t index, const PlanarTrunkParameters& parameters,
-                                  ExtractorCounters& counters) {
-  const Segment& segment = segments[index];
+std::optional<model::Detection> to_trunk(const model::PlanarScan& scan,
+                                         const std::vector<planar::Segment>& segments,
+                                         std::size_t index, const PlanarTrunkParameters& parameters,
+                                         ExtractorCounters& counters) {
+  const planar::Segment& segment = segments[index];
   if (segment.size() < static_cast<std::size_t>(std::max(1, parameters.min_points))) {
     ++counters.too_few_points;
     return std::nullopt;
@@ -95,8 +98,8 @@ std::optional<Detection> to_trunk(const PlanarScan& scan, const std::vector<Segm
 
 }  // namespace
 
-LandmarkScan LandmarkExtractor::extract(const PlanarScan& scan) {
-  LandmarkScan result;
+model::LandmarkScan LandmarkExtractor::extract(const model::PlanarScan& scan) {
+  model::LandmarkScan result;
   result.utime = scan.utime;
   result.sequence = scan.sequence;
   ++counters_.scans;
@@ -105,7 +108,7 @@ LandmarkScan LandmarkExtractor::extract(const PlanarScan& scan) {
     return result;
   }
   result.field_of_view = field_of_view(scan, parameters_.planar);
-  const std::vector<Segment> segments = split(scan, parameters_.planar);
+  const std::vector<planar::Segment> segments = planar::split(scan, parameters_.planar);
   counters_.objects += segments.size();
   for (std::size_t i = 0; i < segments.size(); ++i) {
     if (const auto trunk = to_trunk(scan, segments, i, parameters_.planar, counters_)) {
@@ -116,4 +119,4 @@ LandmarkScan LandmarkExtractor::extract(const PlanarScan& scan) {
   return result;
 }
 
-}  // namespace understory
+}  // namespace understory::landmark_extractor

@@ -8,7 +8,7 @@
 #include "services/landmark_extractor/parameters.hpp"
 #include "services/landmark_extractor/sweep_extractor.hpp"
 
-namespace understory {
+namespace understory::landmark_extractor {
 
 /// Why objects did not become landmarks; counted for HEALTH.
 struct ExtractorCounters {
@@ -29,9 +29,9 @@ class LandmarkExtractor {
 
   /// Trunks of a one-plane laser: objects that stand alone, are round, and have a trunk's size.
   /// A malformed scan gives none. Invariant: detections are in order of bearing.
-  LandmarkScan extract(const PlanarScan& scan);
+  model::LandmarkScan extract(const model::PlanarScan& scan);
   /// Trunks and corners of a laser that scans in space.
-  LandmarkScan extract(const PointSweep& sweep) { return sweeps_.extract(sweep); }
+  model::LandmarkScan extract(const model::PointSweep& sweep) { return sweeps_.extract(sweep); }
   const ExtractorCounters& counters() const { return counters_; }
   const SweepCounters& sweep_counters() const { return sweeps_.counters(); }
 
@@ -41,4 +41,4 @@ class LandmarkExtractor {
   SweepExtractor sweeps_;
 };
 
-}  // namespace understory
+}  // namespace understory::landmark_extractor

@@ -2,8 +2,8 @@
 #include "services/landmark_extractor/adapter.hpp"
 
 int main(int argc, char** argv) {
-  return understory::run_service(
-      understory::landmark_extractor_service({
+  return understory::bus::run_service(
+      understory::landmark_extractor::landmark_extractor_service({
           .lidar_scan = "LIDAR_SCAN",    // in: sweeps of a planar laser
           .lidar_sweep = "LIDAR_SWEEP",  // in: turns in space, in parts
           .landmarks = "LANDMARKS",      // out: trunks and corners of each sweep

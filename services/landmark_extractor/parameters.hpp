@@ -2,11 +2,11 @@
 
 #include "common/geometry/se2.hpp"
 
-namespace understory {
+namespace understory::landmark_extractor {
 
 /// Trunks from lasers that sweep one plane. Noise figures: SICK LMS 2xx at 0.5 degrees.
 struct PlanarTrunkParameters {
-  SE2 vehicle_T_sensor;             ///< Where the laser is in frame `vehicle`.
+  geometry::SE2 vehicle_T_sensor;   ///< Where the laser is in frame `vehicle`.
   double min_range_m = 1.5;         ///< What is nearer is the car itself.
   double max_range_m = 40.0;        ///< Trunks farther than this are not reported.
   double range_sigma_m = 0.03;      ///< Of one beam.
@@ -88,4 +88,4 @@ struct LandmarkExtractorParameters {
   CornerParameters corner;
 };
 
-}  // namespace understory
+}  // namespace understory::landmark_extractor

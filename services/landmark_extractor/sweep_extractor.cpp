@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace understory {
+namespace understory::landmark_extractor {
 namespace {
 
 /// More beams than any sensor has.
@@ -16,7 +16,7 @@ constexpr double kWall_m = 1.5;
 constexpr double kOnWall_m = 0.25;
 constexpr double kWallEnd_m = 0.5;
 
-bool well_formed(const PointSweep& sweep) {
+bool well_formed(const model::PointSweep& sweep) {
   const bool has_frame = sweep.is_deskewed && sweep.sensor_position_m.allFinite() &&
                          sweep.rings > 0 && sweep.rings <= kMaxRings;
   if (!has_frame || !sweep.attitude) return has_frame;
@@ -25,27 +25,27 @@ bool well_formed(const PointSweep& sweep) {
 }
 
 /// A piece of a wall between two windows or two cars looks like a trunk.
-bool is_on(const WallLine& wall, const Detection& trunk) {
+bool is_on(const corners::WallLine& wall, const model::Detection& trunk) {
   const Eigen::Vector2d offset = trunk.position_m.head<2>() - wall.centroid_m;
   const double along = wall.direction.dot(offset);
   return wall.length() > kWall_m && std::abs(wall.normal().dot(offset)) < kOnWall_m &&
          along > wall.from_m - kWallEnd_m && along < wall.to_m + kWallEnd_m;
 }
 
-void sort_by_bearing(std::vector<Detection>& detections) {
-  const auto bearing = [](const Detection& detection) {
+void sort_by_bearing(std::vector<model::Detection>& detections) {
+  const auto bearing = [](const model::Detection& detection) {
     return std::atan2(detection.position_m.y(), detection.position_m.x());
   };
   std::stable_sort(detections.begin(), detections.end(),
-                   [&](const Detection& a, const Detection& b) {
+                   [&](const model::Detection& a, const model::Detection& b) {
                      return a.kind != b.kind ? a.kind < b.kind : bearing(a) < bearing(b);
                    });
 }
 
 }  // namespace
 
-LandmarkScan SweepExtractor::extract(const PointSweep& sweep) {
-  LandmarkScan result;
+model::LandmarkScan SweepExtractor::extract(const model::PointSweep& sweep) {
+  model::LandmarkScan result;
   result.utime = sweep.utime;
   result.sequence = sweep.sequence;
   ++counters_.sweeps;
@@ -71,14 +71,14 @@ LandmarkScan SweepExtractor::extract(const PointSweep& sweep) {
   trunks_.find(cloud_, runs_, ground_, level_covariance, result.detections);
   const std::size_t trunks = result.detections.size();
   corners_.find(cloud_, runs_, ground_, level_covariance, result.detections);
-  std::erase_if(result.detections, [&](const Detection& detection) {
-    return detection.kind == LandmarkKind::kTrunk &&
+  std::erase_if(result.detections, [&](const model::Detection& detection) {
+    return detection.kind == model::LandmarkKind::kTrunk &&
            std::any_of(corners_.walls().begin(), corners_.walls().end(),
-                       [&](const WallLine& wall) { return is_on(wall, detection); });
+                       [&](const corners::WallLine& wall) { return is_on(wall, detection); });
   });
-  const auto left = static_cast<std::size_t>(
-      std::count_if(result.detections.begin(), result.detections.end(),
-                    [](const Detection& d) { return d.kind == LandmarkKind::kTrunk; }));
+  const auto left = static_cast<std::size_t>(std::count_if(
+      result.detections.begin(), result.detections.end(),
+      [](const model::Detection& d) { return d.kind == model::LandmarkKind::kTrunk; }));
   counters_.on_wall += trunks - left;
   counters_.trunks = trunks_.counters();
   counters_.corners = corners_.counters();
@@ -86,4 +86,4 @@ LandmarkScan SweepExtractor::extract(const PointSweep& sweep) {
   return result;
 }
 
-}  // namespace understory
+}  // namespace understory::landmark_extractor

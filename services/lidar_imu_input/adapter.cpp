@@ -6,64 +6,64 @@
 #include "services/lidar_imu_input/adapter_parameters.hpp"
 #include "services/lidar_imu_input/lidar_imu_input.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 namespace {
 
 constexpr std::size_t kPointsPerPart = 4000;  // 10 bytes each: one message is well below 60 kB
 
-Reason reason_of(InputFaultKind kind) {
+wire::Reason reason_of(InputFaultKind kind) {
   switch (kind) {
     case InputFaultKind::kNotFinite:
-      return Reason::kNotFinite;
+      return wire::Reason::kNotFinite;
     case InputFaultKind::kLate:
-      return Reason::kLate;
+      return wire::Reason::kLate;
     case InputFaultKind::kClockJump:
-      return Reason::kClockJump;
+      return wire::Reason::kClockJump;
     case InputFaultKind::kSilent:
     case InputFaultKind::kNoMotion:
-      return Reason::kSensorSilent;
+      return wire::Reason::kSensorSilent;
     case InputFaultKind::kFrozen:
-      return Reason::kSensorFrozen;
+      return wire::Reason::kSensorFrozen;
     case InputFaultKind::kSaturated:
-      return Reason::kSaturated;
+      return wire::Reason::kSaturated;
     case InputFaultKind::kNoPointTimes:
-      return Reason::kNoPointTimes;
+      return wire::Reason::kNoPointTimes;
     case InputFaultKind::kNotCalibrated:
-      return Reason::kNotCalibrated;
+      return wire::Reason::kNotCalibrated;
   }
-  return Reason::kInconsistent;
+  return wire::Reason::kInconsistent;
 }
 
-class LidarImuInputAdapter : public Adapter {
+class LidarImuInputAdapter : public bus::Adapter {
  public:
   explicit LidarImuInputAdapter(LidarImuInputChannels channels) : channels_(std::move(channels)) {}
 
-  void describe(ParameterTable& table) override {
-    understory::describe(parameters_, axle_T_vehicle_, table);
+  void describe(bus::ParameterTable& table) override {
+    lidar_imu_input::describe(parameters_, axle_T_vehicle_, table);
   }
 
-  void bind(Node& node) override {
+  void bind(bus::Node& node) override {
     node_ = &node;
     parameters_.wheels.car.axle_T_vehicle =
-        SE2(axle_T_vehicle_.x_m, axle_T_vehicle_.y_m, axle_T_vehicle_.yaw_rad);
+        geometry::SE2(axle_T_vehicle_.x_m, axle_T_vehicle_.y_m, axle_T_vehicle_.yaw_rad);
     stage_.emplace(parameters_);
-    take<ImuSample>(channels_.raw_imu, 4000);
-    take<WheelSample>(channels_.raw_wheels, 2000);
-    take<GnssFix>(channels_.raw_gnss, 200);
-    take<PlanarScan>(channels_.raw_scan, 200);
-    take<VelocityCorrection>(channels_.velocity_correction, 200);
-    take<EkfPose>(channels_.ekf_pose, 200);
+    take<model::ImuSample>(channels_.raw_imu, 4000);
+    take<model::WheelSample>(channels_.raw_wheels, 2000);
+    take<model::GnssFix>(channels_.raw_gnss, 200);
+    take<model::PlanarScan>(channels_.raw_scan, 200);
+    take<model::VelocityCorrection>(channels_.velocity_correction, 200);
+    take<model::EkfPose>(channels_.ekf_pose, 200);
     // Bulk is no state: a sweep that was under way at a restart is lost.
-    node.subscribe<PointSweep>(channels_.raw_sweep,
-                               [this](const PointSweep& part) { add_part(part); },
-                               {.queue_size = 1000, .journaled = false});
-    imu_ = node.advertise<ImuSample>(channels_.imu);
-    wheels_ = node.advertise<WheelSample>(channels_.wheels);
-    gnss_ = node.advertise<GnssFix>(channels_.gnss);
-    odometry_ = node.advertise<Odometry>(channels_.odometry);
-    raw_pose_ = node.advertise<RawPose>(channels_.raw_pose);
-    sweeps_ = node.advertise<PointSweep>(channels_.lidar_sweep);
-    scans_ = node.advertise<PlanarScan>(channels_.lidar_scan);
+    node.subscribe<model::PointSweep>(channels_.raw_sweep,
+                                      [this](const model::PointSweep& part) { add_part(part); },
+                                      {.queue_size = 1000, .journaled = false});
+    imu_ = node.advertise<model::ImuSample>(channels_.imu);
+    wheels_ = node.advertise<model::WheelSample>(channels_.wheels);
+    gnss_ = node.advertise<model::GnssFix>(channels_.gnss);
+    odometry_ = node.advertise<model::Odometry>(channels_.odometry);
+    raw_pose_ = node.advertise<model::RawPose>(channels_.raw_pose);
+    sweeps_ = node.advertise<model::PointSweep>(channels_.lidar_sweep);
+    scans_ = node.advertise<model::PlanarScan>(channels_.lidar_scan);
   }
 
   void finish() override { publish(stage_->finish()); }
@@ -77,11 +77,11 @@ class LidarImuInputAdapter : public Adapter {
                         {.queue_size = queue_size});
   }
 
-  void add_part(const PointSweep& part) {
+  void add_part(const model::PointSweep& part) {
     auto sweep = assembler_.add(part);
-    if (assembler_.incomplete_turns() > incomplete_) {
-      incomplete_ = assembler_.incomplete_turns();
-      node_->report(Reason::kPartsMissing, "a turn of which parts are missing is left out",
+    if (assembler_.incomplete_revolutions() > incomplete_) {
+      incomplete_ = assembler_.incomplete_revolutions();
+      node_->report(wire::Reason::kPartsMissing, "a turn of which parts are missing is left out",
                     channels_.raw_sweep);
     }
     if (sweep) publish(stage_->add(*std::move(sweep)));
@@ -91,14 +91,14 @@ class LidarImuInputAdapter : public Adapter {
     for (const InputResult& result : results)
       std::visit([this](const auto& value) { send(value); }, result);
   }
-  void send(const ImuSample& value) { imu_.publish(value); }
-  void send(const WheelSample& value) { wheels_.publish(value); }
-  void send(const GnssFix& value) { gnss_.publish(value); }
-  void send(const Odometry& value) { odometry_.publish(value); }
-  void send(const RawPose& value) { raw_pose_.publish(value); }
-  void send(const PlanarScan& value) { scans_.publish(value); }
-  void send(const PointSweep& value) {
-    for (const PointSweep& part : split_sweep(value, kPointsPerPart)) sweeps_.publish(part);
+  void send(const model::ImuSample& value) { imu_.publish(value); }
+  void send(const model::WheelSample& value) { wheels_.publish(value); }
+  void send(const model::GnssFix& value) { gnss_.publish(value); }
+  void send(const model::Odometry& value) { odometry_.publish(value); }
+  void send(const model::RawPose& value) { raw_pose_.publish(value); }
+  void send(const model::PlanarScan& value) { scans_.publish(value); }
+  void send(const model::PointSweep& value) {
+    for (const model::PointSweep& part : split_sweep(value, kPointsPerPart)) sweeps_.publish(part);
   }
   void send(const InputFault& fault) {
     node_->report(reason_of(fault.kind), fault.text, fault.channel);
@@ -107,22 +107,22 @@ class LidarImuInputAdapter : public Adapter {
   LidarImuInputChannels channels_;
   LidarImuInputParameters parameters_;
   AxlePlace axle_T_vehicle_;
-  Node* node_ = nullptr;
+  bus::Node* node_ = nullptr;
   std::optional<LidarImuInput> stage_;
-  SweepAssembler assembler_;
+  model::SweepAssembler assembler_;
   std::uint64_t incomplete_ = 0;
-  Publisher<ImuSample> imu_;
-  Publisher<WheelSample> wheels_;
-  Publisher<GnssFix> gnss_;
-  Publisher<Odometry> odometry_;
-  Publisher<RawPose> raw_pose_;
-  Publisher<PointSweep> sweeps_;
-  Publisher<PlanarScan> scans_;
+  bus::Publisher<model::ImuSample> imu_;
+  bus::Publisher<model::WheelSample> wheels_;
+  bus::Publisher<model::GnssFix> gnss_;
+  bus::Publisher<model::Odometry> odometry_;
+  bus::Publisher<model::RawPose> raw_pose_;
+  bus::Publisher<model::PointSweep> sweeps_;
+  bus::Publisher<model::PlanarScan> scans_;
 };
 
 }  // namespace
 
-Service lidar_imu_input_service(const LidarImuInputChannels& channels) {
+bus::Service lidar_imu_input_service(const LidarImuInputChannels& channels) {
   return {"lidar_imu_input",
           channels.raw_imu + ", " + channels.raw_wheels + ", " + channels.raw_gnss + ", " +
               channels.raw_sweep + ", " + channels.raw_scan + ", " + channels.velocity_correction +
@@ -132,4 +132,4 @@ Service lidar_imu_input_service(const LidarImuInputChannels& channels) {
           [channels] { return std::make_unique<LidarImuInputAdapter>(channels); }};
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

@@ -5,7 +5,7 @@
 
 #include "common/bus/service.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 
 struct LidarImuInputChannels {
   std::string raw_imu = "RAW_IMU";
@@ -24,6 +24,6 @@ struct LidarImuInputChannels {
   std::string lidar_scan = "LIDAR_SCAN";
 };
 
-Service lidar_imu_input_service(const LidarImuInputChannels& channels = {});
+bus::Service lidar_imu_input_service(const LidarImuInputChannels& channels = {});
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

@@ -1,9 +1,9 @@
 #include "services/lidar_imu_input/adapter_parameters.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 namespace {
 
-void describe_mount(SensorMount& mount, const std::string& name, ParameterTable& table) {
+void describe_mount(SensorMount& mount, const std::string& name, bus::ParameterTable& table) {
   table.add(name + ".x_m", mount.x_m, {-50.0, 50.0}, "m", "Forward of the vehicle's origin.");
   table.add(name + ".y_m", mount.y_m, {-50.0, 50.0}, "m", "Left of it.");
   table.add(name + ".z_m", mount.z_m, {-50.0, 50.0}, "m", "Above it.");
@@ -12,7 +12,7 @@ void describe_mount(SensorMount& mount, const std::string& name, ParameterTable&
   table.add(name + ".yaw_rad", mount.yaw_rad, {-3.2, 3.2}, "rad", "Turned last, about z.");
 }
 
-void describe_imu(ImuParameters& p, ParameterTable& table) {
+void describe_imu(ImuParameters& p, bus::ParameterTable& table) {
   describe_mount(p.mount, "imu.mount", table);
   table.add("imu.gyro_noise", p.gyro_noise, {1e-7, 1.0}, "rad/s/sqrt(Hz)", "White.");
   table.add("imu.force_noise", p.force_noise, {1e-7, 10.0}, "m/s^2/sqrt(Hz)", "White.");
@@ -37,7 +37,7 @@ void describe_imu(ImuParameters& p, ParameterTable& table) {
             "Samples farther apart are not joined.");
 }
 
-void describe_wheels(WheelOdometryParameters& p, AxlePlace& axle, ParameterTable& table) {
+void describe_wheels(WheelOdometryParameters& p, AxlePlace& axle, bus::ParameterTable& table) {
   WheelNoise& n = p.noise;
   table.add("wheels.wheelbase_m", p.car.wheelbase_m, {0.1, 30.0}, "m", "From axle to axle.");
   table.add("wheels.encoder_left_m", p.car.encoder_left_m, {-5.0, 5.0}, "m",
@@ -62,7 +62,7 @@ void describe_wheels(WheelOdometryParameters& p, AxlePlace& axle, ParameterTable
             "What is never known better.");
 }
 
-void describe_standstill(StandstillParameters& p, ParameterTable& table) {
+void describe_standstill(StandstillParameters& p, bus::ParameterTable& table) {
   table.add("standstill.calibration_s", p.calibration_s, {0.0, 3600.0}, "s",
             "Standing this long in one piece calibrates.");
   table.add("standstill.window_s", p.window_s, {0.05, 10.0}, "s", "What is looked at.");
@@ -80,7 +80,7 @@ void describe_standstill(StandstillParameters& p, ParameterTable& table) {
             "Of \"the vehicle stands\".");
 }
 
-void describe_constraint(ConstraintParameters& p, ParameterTable& table) {
+void describe_constraint(ConstraintParameters& p, bus::ParameterTable& table) {
   table.add("constraint.nonholonomic", p.nonholonomic,
             "Wheels do not slip sideways, nor leave the ground.");
   table.add("constraint.side_slip_mps", p.side_slip_mps, {1e-6, 10.0}, "m/s",
@@ -96,8 +96,9 @@ void describe_constraint(ConstraintParameters& p, ParameterTable& table) {
   table.add("constraint.period_s", p.period_s, {0.001, 10.0}, "s", "Between two uses.");
 }
 
-void describe_output(OutputParameters& p, ParameterTable& table) {
-  table.add("output.max_piece_s", p.max_piece_s, {0.005, 60.0}, "s", "Longest piece of ODOMETRY.");
+void describe_output(OutputParameters& p, bus::ParameterTable& table) {
+  table.add("output.max_increment_s", p.max_increment_s, {0.005, 60.0}, "s",
+            "Longest piece of ODOMETRY.");
   table.add("output.lag_s", p.lag_s, {0.0, 10.0}, "s",
             "How long a piece without sweep waits for one to end it.");
   table.add("output.max_wait_s", p.max_wait_s, {0.0, 10.0}, "s",
@@ -110,7 +111,7 @@ void describe_output(OutputParameters& p, ParameterTable& table) {
             "How long errors of dead-reckoned velocity last.");
 }
 
-void describe_fault(FaultParameters& p, ParameterTable& table) {
+void describe_fault(FaultParameters& p, bus::ParameterTable& table) {
   table.add("fault.silent_s", p.silent_s, {0.01, 60.0}, "s", "IMU or wheels without a sample.");
   table.add("fault.sweep_silent_s", p.sweep_silent_s, {0.01, 60.0}, "s", "Lasers without a turn.");
   table.add("fault.frozen_s", p.frozen_s, {0.01, 60.0}, "s", "The very same IMU sample.");
@@ -123,14 +124,15 @@ void describe_fault(FaultParameters& p, ParameterTable& table) {
 }  // namespace
 
 void describe(LidarImuInputParameters& parameters, AxlePlace& axle_T_vehicle,
-              ParameterTable& table) {
+              bus::ParameterTable& table) {
   table.add("gnss_aided", parameters.gnss_aided,
             "RAW_POSE takes velocity from GNSS and is a reference, not for mapping.");
   describe_mount(parameters.lidar.mount, "lidar.mount", table);
   table.add("lidar.times_from_azimuth", parameters.lidar.times_from_azimuth,
             {"none", "clockwise", "counterclockwise"},
             "Times for sweeps that have none: how the laser turns, seen from above.");
-  table.add("lidar.turn_s", parameters.lidar.turn_s, {0.001, 1.0}, "s", "Of one turn, for these.");
+  table.add("lidar.revolution_s", parameters.lidar.revolution_s, {0.001, 1.0}, "s",
+            "Of one turn, for these.");
   table.add("lidar.min_range_m", parameters.lidar.min_range_m, {0.0, 100.0}, "m",
             "What is nearer is the vehicle itself.");
   describe_imu(parameters.imu, table);
@@ -139,6 +141,8 @@ void describe(LidarImuInputParameters& parameters, AxlePlace& axle_T_vehicle,
   describe_constraint(parameters.constraint, table);
   describe_output(parameters.output, table);
   describe_fault(parameters.fault, table);
+  table.renamed("lidar.turn_s", "lidar.revolution_s");
+  table.renamed("output.max_piece_s", "output.max_increment_s");
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

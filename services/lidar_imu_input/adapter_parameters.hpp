@@ -4,7 +4,7 @@
 #include "common/bus/parameter_table.hpp"
 #include "services/lidar_imu_input/parameters.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 
 /// Where the wheels are: scalars of `CarGeometry::axle_T_vehicle`, put together after loading.
 struct AxlePlace {
@@ -14,6 +14,6 @@ struct AxlePlace {
 };
 
 void describe(LidarImuInputParameters& parameters, AxlePlace& axle_T_vehicle,
-              ParameterTable& table);
+              bus::ParameterTable& table);
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

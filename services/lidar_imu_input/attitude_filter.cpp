@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace understory {
+namespace understory::lidar_imu_input {
 namespace {
 
 constexpr double kStartTilt_rad = 0.1;  // one metre per second squared, mistaken for gravity
@@ -170,9 +170,9 @@ void AttitudeFilter::mark_level() {
   twist_rad_ = 0.0;
 }
 
-LevelError AttitudeFilter::level_since_mark() const {
+model::LevelError AttitudeFilter::level_since_mark() const {
   const Eigen::Matrix2d shared = level_of_attitude() * with_mark_.topRows<3>();
-  LevelError level;
+  model::LevelError level;
   level.covariance = tilt_covariance();
   level.pitch_tangent = pitch_tangent();
   level.memory = marked_.ldlt().solve(shared.transpose()).transpose();
@@ -184,4 +184,4 @@ LevelError AttitudeFilter::level_since_mark() const {
   return level;
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

@@ -15,7 +15,7 @@
 #include "common/model/odometry.hpp"
 #include "services/lidar_imu_input/parameters.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 
 constexpr double kGravity_mps2 = 9.81;
 
@@ -56,7 +56,7 @@ class AttitudeFilter {
   /// Of (roll, pitch) [rad^2].
   Eigen::Matrix2d tilt_covariance() const;
   /// Of the error of (roll, pitch): how it goes on from the last mark_level().
-  LevelError level_since_mark() const;
+  model::LevelError level_since_mark() const;
   void mark_level();
   /// By how much corrections of roll and pitch have turned the heading of the level since the last
   /// mark: on a slope they do. What is levelled by it turns alike.
@@ -96,4 +96,4 @@ class AttitudeFilter {
   double twist_rad_ = 0.0;
 };
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

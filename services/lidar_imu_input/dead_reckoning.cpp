@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-namespace understory {
+namespace understory::lidar_imu_input {
 namespace {
 
 constexpr double kStartSpeed_mps = 10.0;
@@ -33,7 +33,7 @@ void DeadReckoning::propagate(const LevelSample& a, const LevelSample& b) {
       0.5 * (back * (a.force_mps2 - force_bias) + back.transpose() * (b.force_mps2 - force_bias));
 
   const Eigen::Matrix2d& turn = quarter_turn();
-  const Eigen::Vector2d velocity_turned = turned_left(velocity_);
+  const Eigen::Vector2d velocity_turned = geometry::perpendicular(velocity_);
   Covariance step = Covariance::Identity();
   step.block<2, 2>(0, 0) -= rate * dt * turn;
   step.block<2, 1>(0, 2) = velocity_turned * dt;
@@ -58,12 +58,12 @@ void DeadReckoning::propagate(const LevelSample& a, const LevelSample& b) {
   covariance_.block<2, 2>(6, 6).diagonal().array() += square(imu_.force_bias_walk) * dt;
 
   const Eigen::Vector2d moved = velocity_ * dt + 0.5 * dt * dt * (back.transpose() * force);
-  pose_ = pose_ * SE2(moved, rate * dt);
+  pose_ = pose_ * geometry::SE2(moved, rate * dt);
   velocity_ = back * (back * velocity_ + force * dt);
 }
 
-void DeadReckoning::bridge(const SE2WithCovariance& motion) {
-  const SE2WithCovariance moved = compound({pose_, pose_covariance()}, motion);
+void DeadReckoning::bridge(const geometry::SE2WithCovariance& motion) {
+  const geometry::SE2WithCovariance moved = compound({pose_, pose_covariance()}, motion);
   pose_ = moved.mean;
   covariance_.topRightCorner<3, 5>().setZero();
   covariance_.bottomLeftCorner<5, 3>().setZero();
@@ -79,7 +79,7 @@ void DeadReckoning::update(const Row& row, double residual, double variance, boo
   if (!moves_heading) gain(2) = 0.0;
   const Covariance left = Covariance::Identity() - gain * row;
   covariance_ = left * covariance_ * left.transpose() + variance * gain * gain.transpose();
-  if (moves_heading) pose_ = SE2(pose_.translation(), pose_.theta() + gain(2) * residual);
+  if (moves_heading) pose_ = geometry::SE2(pose_.translation(), pose_.theta() + gain(2) * residual);
   velocity_ += gain.segment<2>(3) * residual;
   bias_ += gain.segment<3>(5) * residual;
 }
@@ -88,7 +88,7 @@ void DeadReckoning::add_velocity(const Eigen::Vector2d& direction, const Eigen::
                                  double residual_mps, double sigma_mps) {
   Row row = Row::Zero();
   row.segment<2>(3) = direction.transpose();
-  row(5) = -direction.dot(turned_left(at));
+  row(5) = -direction.dot(geometry::perpendicular(at));
   update(row, residual_mps, square(sigma_mps), false);
 }
 
@@ -113,7 +113,7 @@ void DeadReckoning::set_gyro_bias(double bias_rad_s, double sigma_rad_s) {
   covariance_(5, 5) = square(sigma_rad_s);
 }
 
-void DeadReckoning::correct(const VelocityCorrection& correction,
+void DeadReckoning::correct(const model::VelocityCorrection& correction,
                             const Eigen::Vector2d& then_velocity, double then_heading) {
   const Eigen::Matrix2d turn = rotation_of(then_heading - pose_.theta());
   velocity_ += turn * (correction.velocity_mps - then_velocity);
@@ -125,4 +125,4 @@ void DeadReckoning::correct(const VelocityCorrection& correction,
   covariance_.bottomRightCorner<5, 5>() = carry * correction.covariance * carry.transpose();
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

@@ -8,7 +8,7 @@
 
 #include "services/lidar_imu_input/attitude_filter.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 namespace {
 
 constexpr float kStep_s = 1e-3F;  // between exact poses; in between they are mixed
@@ -18,7 +18,7 @@ constexpr float kLongestTurn_s = 1.0F;
 using Motion = Eigen::Matrix<float, 3, 4>;
 
 /// target_T_sensor at steps of kStep_s over the turn.
-std::vector<Motion> motions(const PointSweep& raw, const MotionState& target,
+std::vector<Motion> motions(const model::PointSweep& raw, const MotionState& target,
                             const MotionHistory& history, const SensorMount& mount,
                             std::size_t steps) {
   const Eigen::Isometry3d vehicle_T_sensor = mount.vehicle_T_sensor();
@@ -32,7 +32,8 @@ std::vector<Motion> motions(const PointSweep& raw, const MotionState& target,
   std::vector<Motion> result;
   result.reserve(steps);
   for (std::size_t i = 0; i < steps; ++i) {
-    const Utime at = raw.utime + static_cast<Utime>(std::llround(static_cast<double>(i) * 1e3));
+    const model::Utime at =
+        raw.utime + static_cast<model::Utime>(std::llround(static_cast<double>(i) * 1e3));
     const MotionState state = history.at(at).value_or(target);
     const Eigen::Isometry3d motion = target_T_odom * pose(state) * vehicle_T_sensor;
     result.emplace_back(motion.matrix().topRows<3>().cast<float>());
@@ -42,16 +43,16 @@ std::vector<Motion> motions(const PointSweep& raw, const MotionState& target,
 
 }  // namespace
 
-Utime end_of_turn(const PointSweep& sweep) {
+model::Utime end_of_revolution(const model::PointSweep& sweep) {
   float last = 0.0F;
-  for (const SweepPoint& point : sweep.points) last = std::max(last, point.time_s);
-  return sweep.utime + static_cast<Utime>(std::llround(static_cast<double>(last) * 1e6));
+  for (const model::SweepPoint& point : sweep.points) last = std::max(last, point.time_s);
+  return sweep.utime + static_cast<model::Utime>(std::llround(static_cast<double>(last) * 1e6));
 }
 
-std::size_t remove_bad_points(PointSweep& sweep, double min_range_m) {
+std::size_t remove_bad_points(model::PointSweep& sweep, double min_range_m) {
   std::size_t bad = 0;
   const auto least = static_cast<float>(min_range_m * min_range_m);
-  std::erase_if(sweep.points, [&](const SweepPoint& p) {
+  std::erase_if(sweep.points, [&](const model::SweepPoint& p) {
     const float sum = p.x_m * p.x_m + p.y_m * p.y_m + p.z_m * p.z_m;
     const bool good = std::isfinite(sum) && p.time_s >= 0.0F && p.time_s <= kLongestTurn_s;
     if (!good) ++bad;
@@ -60,41 +61,42 @@ std::size_t remove_bad_points(PointSweep& sweep, double min_range_m) {
   return bad;
 }
 
-void times_from_azimuth(PointSweep& sweep, double turn_s, bool clockwise) {
+void times_from_azimuth(model::PointSweep& sweep, double revolution_s, bool clockwise) {
   if (sweep.points.empty()) return;
   const float sign = clockwise ? -1.0F : 1.0F;
   constexpr float kTurn = 2.0F * std::numbers::pi_v<float>;
   const float start = sign * std::atan2(sweep.points.front().y_m, sweep.points.front().x_m);
-  for (SweepPoint& point : sweep.points) {
+  for (model::SweepPoint& point : sweep.points) {
     float angle = sign * std::atan2(point.y_m, point.x_m) - start;
     if (angle < 0.0F) angle += kTurn;
     // Beams of one firing look to slightly different azimuths: a little before the start.
     if (angle > kTurn - 0.02F) angle = 0.0F;
-    point.time_s = static_cast<float>(turn_s) * angle / kTurn;
+    point.time_s = static_cast<float>(revolution_s) * angle / kTurn;
   }
-  std::ranges::stable_sort(sweep.points, {}, &SweepPoint::time_s);
+  std::ranges::stable_sort(sweep.points, {}, &model::SweepPoint::time_s);
   sweep.has_times = true;
 }
 
-DeskewedSweep deskew(PointSweep raw, Utime utime, const MotionHistory& history,
+DeskewedSweep deskew(model::PointSweep raw, model::Utime utime, const MotionHistory& history,
                      const SensorMount& mount) {
   DeskewedSweep result;
   const auto known = history.at(utime);
   const MotionState target = known.value_or(MotionState{});
   result.had_motion = known && raw.has_times && history.at(raw.utime);
 
-  const auto last_s = static_cast<float>(static_cast<double>(end_of_turn(raw) - raw.utime) * 1e-6);
+  const auto last_s =
+      static_cast<float>(static_cast<double>(end_of_revolution(raw) - raw.utime) * 1e-6);
   const auto steps = static_cast<std::size_t>(std::max(0.0F, last_s) / kStep_s) + 2;
   const MotionHistory still;
   const std::vector<Motion> table =
       motions(raw, target, result.had_motion ? history : still, mount, steps);
   const auto shift_s = static_cast<float>(static_cast<double>(utime - raw.utime) * 1e-6);
   // In place: a turn of many beams is megabytes.
-  PointSweep& sweep = result.sweep;
+  model::PointSweep& sweep = result.sweep;
   sweep = std::move(raw);
   sweep.utime = utime;
   sweep.is_deskewed = true;
-  for (SweepPoint& point : sweep.points) {
+  for (model::SweepPoint& point : sweep.points) {
     const float at = std::clamp(point.time_s / kStep_s, 0.0F, static_cast<float>(steps) - 1.001F);
     const auto step = static_cast<std::size_t>(at);
     const float share = at - static_cast<float>(step);
@@ -110,12 +112,12 @@ DeskewedSweep deskew(PointSweep raw, Utime utime, const MotionHistory& history,
   sweep.sensor_position_m = mount.position_m();
   if (known) {
     const RollPitchYaw angles = roll_pitch_yaw(known->odom_Q_vehicle);
-    sweep.attitude =
-        Attitude{Eigen::Quaterniond(Eigen::AngleAxisd(angles.pitch_rad, Eigen::Vector3d::UnitY()) *
-                                    Eigen::AngleAxisd(angles.roll_rad, Eigen::Vector3d::UnitX())),
-                 known->tilt_covariance};
+    sweep.attitude = model::Attitude{
+        Eigen::Quaterniond(Eigen::AngleAxisd(angles.pitch_rad, Eigen::Vector3d::UnitY()) *
+                           Eigen::AngleAxisd(angles.roll_rad, Eigen::Vector3d::UnitX())),
+        known->tilt_covariance};
   }
   return result;
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

@@ -1,16 +1,18 @@
 #include "services/lidar_imu_input/filter_motion.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 namespace {
 
 constexpr std::uint32_t kFewLandmarks = 3;
 
-double seconds_between(Utime from, Utime to) { return static_cast<double>(to - from) * 1e-6; }
+double seconds_between(model::Utime from, model::Utime to) {
+  return static_cast<double>(to - from) * 1e-6;
+}
 
 }  // namespace
 
-void FilterMotion::add(const EkfPose& pose) {
-  const SE2& at = pose.ekf_map_T_vehicle;
+void FilterMotion::add(const model::EkfPose& pose) {
+  const geometry::SE2& at = pose.ekf_map_T_vehicle;
   // A filter that sees nothing only says what it thought before.
   if (!at.coordinates().allFinite() || pose.landmarks_used < kFewLandmarks) return;
   const bool begins =
@@ -25,15 +27,15 @@ void FilterMotion::add(const EkfPose& pose) {
     poses_.pop_front();
 }
 
-std::optional<MotionState> FilterMotion::at(Utime stamp) const {
+std::optional<MotionState> FilterMotion::at(model::Utime stamp) const {
   if (poses_.size() < 2) return std::nullopt;
   const Pose& first = poses_.front();
   const Pose& last = poses_.back();
   const double ago_s = seconds_between(last.utime, stamp);
   const double seconds = seconds_between(first.utime, last.utime);
   if (ago_s < 0.0 || ago_s > kLongest_s || seconds < 0.5 * kBaseline_s) return std::nullopt;
-  const SE2 way = SE2(first.x_m, first.y_m, first.heading_rad).inverse() *
-                  SE2(last.x_m, last.y_m, last.heading_rad);
+  const geometry::SE2 way = geometry::SE2(first.x_m, first.y_m, first.heading_rad).inverse() *
+                            geometry::SE2(last.x_m, last.y_m, last.heading_rad);
   const Eigen::Vector3d twist = way.Log() / seconds;
   MotionState state;
   state.utime = stamp;
@@ -42,4 +44,4 @@ std::optional<MotionState> FilterMotion::at(Utime stamp) const {
   return state;
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

@@ -8,7 +8,7 @@
 #include "common/model/ekf_output.hpp"
 #include "services/lidar_imu_input/motion_history.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 
 /// The filter's latest poses, taken as one even motion (constant twist, as in KISS-ICP, Vizzo et
 /// al. 2023). A landmark that is passed is seen at all times of the turn: without this it seems to
@@ -16,10 +16,10 @@ namespace understory {
 /// the map.
 class FilterMotion {
  public:
-  void add(const EkfPose& pose);
+  void add(const model::EkfPose& pose);
   /// Motion at `stamp`, from which at() of a history goes back over the turn. None where the filter
   /// did not speak within kLongest_s before, or began anew since.
-  std::optional<MotionState> at(Utime stamp) const;
+  std::optional<MotionState> at(model::Utime stamp) const;
 
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
@@ -31,7 +31,7 @@ class FilterMotion {
 
  private:
   struct Pose {
-    Utime utime = 0;
+    model::Utime utime = 0;
     double x_m = 0.0;
     double y_m = 0.0;
     double heading_rad = 0.0;
@@ -46,4 +46,4 @@ class FilterMotion {
   std::uint64_t reset_counter_ = 0;
 };
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

@@ -5,13 +5,15 @@
 #include <algorithm>
 #include <cmath>
 
-namespace understory {
+namespace understory::lidar_imu_input {
 namespace {
 
 constexpr double kNeverSilent_s = 1e9;
-constexpr Utime kSmallOffset_us = 20'000;  // not told apart from jitter
+constexpr model::Utime kSmallOffset_us = 20'000;  // not told apart from jitter
 
-double seconds_between(Utime from, Utime to) { return static_cast<double>(to - from) * 1e-6; }
+double seconds_between(model::Utime from, model::Utime to) {
+  return static_cast<double>(to - from) * 1e-6;
+}
 
 }  // namespace
 
@@ -31,7 +33,7 @@ std::string channel_of(Sensor sensor) {
   return "";
 }
 
-bool SensorClock::is_plausible(Utime utime, std::optional<Utime> others) const {
+bool SensorClock::is_plausible(model::Utime utime, std::optional<model::Utime> others) const {
   const double step = seconds_between(*last_, utime);
   if (step < -parameters_.clock_jump_s) return false;
   if (step <= parameters_.clock_jump_s || !others) return true;
@@ -39,8 +41,8 @@ bool SensorClock::is_plausible(Utime utime, std::optional<Utime> others) const {
   return seconds_between(*others, utime) <= parameters_.clock_jump_s;
 }
 
-SensorClock::Answer SensorClock::take(Utime raw, std::optional<Utime> others) {
-  const Utime utime = raw + offset_;
+SensorClock::Answer SensorClock::take(model::Utime raw, std::optional<model::Utime> others) {
+  const model::Utime utime = raw + offset_;
   // Once in quarantine, only a stamp that goes on behind the last good one ends it early.
   const bool suspected = first_candidate_ && utime <= last_.value_or(utime);
   const bool resumes = is_resumed_ && last_ && utime > *last_;
@@ -56,7 +58,7 @@ SensorClock::Answer SensorClock::take(Utime raw, std::optional<Utime> others) {
   return {Verdict::kFine, utime};
 }
 
-SensorClock::Answer SensorClock::quarantine(Utime raw) {
+SensorClock::Answer SensorClock::quarantine(model::Utime raw) {
   const bool agrees =
       first_candidate_ && raw > candidate_ &&
       seconds_between(candidate_, raw) <= parameters_.clock_jump_s + 3e-6 * period_us_;
@@ -70,7 +72,7 @@ SensorClock::Answer SensorClock::quarantine(Utime raw) {
   ++agreeing_;
   const bool long_enough = agreeing_ >= 2 && seconds_between(*first_candidate_, raw) >= 1.0;
   if (agreeing_ < parameters_.resync_samples && !long_enough) return {Verdict::kQuarantined, 0};
-  offset_ = *last_ + static_cast<Utime>(std::llround(period_us_)) - *first_candidate_;
+  offset_ = *last_ + static_cast<model::Utime>(std::llround(period_us_)) - *first_candidate_;
   if (std::abs(offset_) < kSmallOffset_us && raw > *last_) offset_ = 0;
   first_candidate_.reset();
   last_ = raw + offset_;
@@ -80,8 +82,8 @@ SensorClock::Answer SensorClock::quarantine(Utime raw) {
 InputGuard::InputGuard(const FaultParameters& parameters, const ImuParameters& imu)
     : parameters_(parameters), imu_(imu), states_(kSensors, State{SensorClock(parameters)}) {}
 
-std::optional<Utime> InputGuard::newest_but(Sensor sensor) const {
-  std::optional<Utime> newest;
+std::optional<model::Utime> InputGuard::newest_but(Sensor sensor) const {
+  std::optional<model::Utime> newest;
   for (std::size_t i = 0; i < states_.size(); ++i) {
     const auto last = states_[i].clock.last();
     if (i != static_cast<std::size_t>(sensor) && last)
@@ -90,15 +92,16 @@ std::optional<Utime> InputGuard::newest_but(Sensor sensor) const {
   return newest;
 }
 
-std::optional<Utime> InputGuard::now() const {
-  std::optional<Utime> newest;
+std::optional<model::Utime> InputGuard::now() const {
+  std::optional<model::Utime> newest;
   for (const State& state : states_) {
     if (const auto last = state.clock.last()) newest = std::max(*last, newest.value_or(*last));
   }
   return newest;
 }
 
-std::optional<Utime> InputGuard::admit(Sensor sensor, Utime raw, std::vector<InputFault>& faults) {
+std::optional<model::Utime> InputGuard::admit(Sensor sensor, model::Utime raw,
+                                              std::vector<InputFault>& faults) {
   State& state = this->state(sensor);
   const SensorClock::Answer answer = state.clock.take(raw, newest_but(sensor));
   const std::string channel = channel_of(sensor);
@@ -126,7 +129,7 @@ std::optional<Utime> InputGuard::admit(Sensor sensor, Utime raw, std::vector<Inp
   return answer.utime;
 }
 
-bool InputGuard::is_frozen(const ImuSample& sample, std::vector<InputFault>& faults) {
+bool InputGuard::is_frozen(const model::ImuSample& sample, std::vector<InputFault>& faults) {
   const bool same = same_since_ && same_since_->angular_rate_rad_s == sample.angular_rate_rad_s &&
                     same_since_->specific_force_mps2 == sample.specific_force_mps2;
   if (!same) {
@@ -142,7 +145,8 @@ bool InputGuard::is_frozen(const ImuSample& sample, std::vector<InputFault>& fau
   return true;
 }
 
-bool InputGuard::is_saturated(const ImuSample& sample, std::vector<InputFault>& faults) const {
+bool InputGuard::is_saturated(const model::ImuSample& sample,
+                              std::vector<InputFault>& faults) const {
   const bool rate = sample.angular_rate_rad_s.cwiseAbs().maxCoeff() >= imu_.gyro_range_rad_s;
   const bool force = sample.specific_force_mps2.cwiseAbs().maxCoeff() >= imu_.force_range_mps2;
   if (rate || force)
@@ -178,4 +182,4 @@ void InputGuard::find_silent(std::vector<InputFault>& faults) {
   }
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

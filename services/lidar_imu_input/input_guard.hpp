@@ -11,7 +11,7 @@
 #include "common/model/imu.hpp"
 #include "services/lidar_imu_input/parameters.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 
 enum class InputFaultKind : std::uint8_t {
   kNotFinite,      ///< NaN or infinite: dropped.
@@ -43,14 +43,14 @@ class SensorClock {
   enum class Verdict : std::uint8_t { kFine, kLate, kJumped, kQuarantined, kFollowed };
   struct Answer {
     Verdict verdict = Verdict::kFine;
-    Utime utime = 0;  ///< Of the sample, on the stage's time; for kFine and kFollowed.
+    model::Utime utime = 0;  ///< Of the sample, on the stage's time; for kFine and kFollowed.
   };
 
   explicit SensorClock(const FaultParameters& parameters) : parameters_(parameters) {}
   /// `others`: the newest stamp of the other sensors, if there is any.
-  Answer take(Utime raw, std::optional<Utime> others);
-  std::optional<Utime> last() const { return last_; }
-  Utime offset_us() const { return offset_; }
+  Answer take(model::Utime raw, std::optional<model::Utime> others);
+  std::optional<model::Utime> last() const { return last_; }
+  model::Utime offset_us() const { return offset_; }
   /// The service was away: the next stamp may be far ahead of the last one.
   void resume() { is_resumed_ = true; }
 
@@ -62,15 +62,15 @@ class SensorClock {
   }
 
  private:
-  Answer quarantine(Utime raw);
-  bool is_plausible(Utime utime, std::optional<Utime> others) const;
+  Answer quarantine(model::Utime raw);
+  bool is_plausible(model::Utime utime, std::optional<model::Utime> others) const;
 
   FaultParameters parameters_;
-  std::optional<Utime> last_;
+  std::optional<model::Utime> last_;
   double period_us_ = 0.0;
-  Utime offset_ = 0;
-  std::optional<Utime> first_candidate_;
-  Utime candidate_ = 0;
+  model::Utime offset_ = 0;
+  std::optional<model::Utime> first_candidate_;
+  model::Utime candidate_ = 0;
   int agreeing_ = 0;
   bool is_resumed_ = false;
 };
@@ -82,21 +82,22 @@ class InputGuard {
   InputGuard(const FaultParameters& parameters, const ImuParameters& imu);
 
   /// The stamp to use, or none where the sample is to be dropped.
-  std::optional<Utime> admit(Sensor sensor, Utime raw, std::vector<InputFault>& faults);
+  std::optional<model::Utime> admit(Sensor sensor, model::Utime raw,
+                                    std::vector<InputFault>& faults);
   /// Whether the sample is the same for too long: not to be used.
-  bool is_frozen(const ImuSample& sample, std::vector<InputFault>& faults);
-  bool is_saturated(const ImuSample& sample, std::vector<InputFault>& faults) const;
+  bool is_frozen(const model::ImuSample& sample, std::vector<InputFault>& faults);
+  bool is_saturated(const model::ImuSample& sample, std::vector<InputFault>& faults) const;
   /// Looks for sensors that have gone silent by `now()`.
   void find_silent(std::vector<InputFault>& faults);
 
   /// Newest stamp of all sensors.
-  std::optional<Utime> now() const;
-  std::optional<Utime> last(Sensor sensor) const { return state(sensor).clock.last(); }
+  std::optional<model::Utime> now() const;
+  std::optional<model::Utime> last(Sensor sensor) const { return state(sensor).clock.last(); }
   /// It has spoken, and not gone silent.
   bool is_live(Sensor sensor) const;
   bool has_spoken(Sensor sensor) const { return state(sensor).clock.last().has_value(); }
   /// What a sensor's stamp is on the stage's time, as far as is known.
-  Utime on_stage_time(Sensor sensor, Utime raw) const {
+  model::Utime on_stage_time(Sensor sensor, model::Utime raw) const {
     return raw + state(sensor).clock.offset_us();
   }
 
@@ -119,13 +120,13 @@ class InputGuard {
   const State& state(Sensor sensor) const { return states_[static_cast<std::size_t>(sensor)]; }
   State& state(Sensor sensor) { return states_[static_cast<std::size_t>(sensor)]; }
   double silent_s(Sensor sensor) const;
-  std::optional<Utime> newest_but(Sensor sensor) const;
+  std::optional<model::Utime> newest_but(Sensor sensor) const;
 
   FaultParameters parameters_;
   ImuParameters imu_;
   std::vector<State> states_;
-  std::optional<ImuSample> same_since_;
+  std::optional<model::ImuSample> same_since_;
   bool is_frozen_ = false;
 };
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

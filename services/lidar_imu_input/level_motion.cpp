@@ -4,15 +4,17 @@
 #include <algorithm>
 #include <cmath>
 
-namespace understory {
+namespace understory::lidar_imu_input {
 namespace {
 
 double square(double value) { return value * value; }
-double seconds_between(Utime from, Utime to) { return static_cast<double>(to - from) * 1e-6; }
+double seconds_between(model::Utime from, model::Utime to) {
+  return static_cast<double>(to - from) * 1e-6;
+}
 Eigen::Matrix2d rotation_of(double angle) { return Eigen::Rotation2Dd(angle).toRotationMatrix(); }
 
 /// Adds one step of constant rate and force to a preintegration.
-void step(Preintegration& sum, const LevelSample& a, const LevelSample& b,
+void step(model::Preintegration& sum, const LevelSample& a, const LevelSample& b,
           const ImuParameters& imu) {
   const double dt = seconds_between(a.utime, b.utime);
   const double rate = 0.5 * (a.yaw_rate_rad_s + b.yaw_rate_rad_s) - sum.bias(0);
@@ -23,7 +25,7 @@ void step(Preintegration& sum, const LevelSample& a, const LevelSample& b,
       0.5 * (back * (a.force_mps2 - force_bias) + back.transpose() * (b.force_mps2 - force_bias));
   const Eigen::Matrix2d middle = rotation_of(sum.yaw_rad + 0.5 * rate * dt);
   const Eigen::Vector2d acceleration = middle * force;
-  const Eigen::Vector2d turned = turned_left(acceleration);
+  const Eigen::Vector2d turned = geometry::perpendicular(acceleration);
 
   Eigen::Matrix<double, 5, 5> forward = Eigen::Matrix<double, 5, 5>::Identity();
   forward.block<2, 1>(1, 0) = turned * dt;
@@ -56,7 +58,7 @@ void step(Preintegration& sum, const LevelSample& a, const LevelSample& b,
 
 /// The IMU's place is taken out with the rate at both ends: their noise, times the lever, is noise
 /// of the velocity there; that of the start moves the end's position.
-void add_lever_noise(Preintegration& sum, const ImuParameters& imu) {
+void add_lever_noise(model::Preintegration& sum, const ImuParameters& imu) {
   const double at_end = square(imu.gyro_noise) / kLeverBaseline_s *
                         (square(imu.mount.x_m) + square(imu.mount.y_m) + square(imu.mount.z_m));
   const Eigen::Matrix2d one = at_end * Eigen::Matrix2d::Identity();
@@ -66,7 +68,7 @@ void add_lever_noise(Preintegration& sum, const ImuParameters& imu) {
   sum.covariance.block<2, 2>(3, 3) += square(sum.seconds) * one;
 }
 
-double speed_at(const std::deque<SpeedSample>& speeds, Utime utime) {
+double speed_at(const std::deque<SpeedSample>& speeds, model::Utime utime) {
   auto after = std::ranges::lower_bound(speeds, utime, {}, &SpeedSample::utime);
   if (after == speeds.end()) return speeds.back().speed_mps;
   if (after == speeds.begin() || after->utime == utime) return after->speed_mps;
@@ -76,9 +78,10 @@ double speed_at(const std::deque<SpeedSample>& speeds, Utime utime) {
   return before->speed_mps + share * (after->speed_mps - before->speed_mps);
 }
 
-bool covers(const std::deque<SpeedSample>& speeds, Utime from, Utime to, double max_gap_s) {
+bool covers(const std::deque<SpeedSample>& speeds, model::Utime from, model::Utime to,
+            double max_gap_s) {
   if (speeds.empty() || speeds.front().utime > from) return false;
-  Utime reached = speeds.front().utime;
+  model::Utime reached = speeds.front().utime;
   for (const SpeedSample& sample : speeds) {
     if (sample.utime > from && seconds_between(std::max(reached, from), sample.utime) > max_gap_s)
       return reached >= to;
@@ -90,7 +93,7 @@ bool covers(const std::deque<SpeedSample>& speeds, Utime from, Utime to, double 
 
 }  // namespace
 
-LevelSample interpolate(const LevelSample& before, const LevelSample& after, Utime utime) {
+LevelSample interpolate(const LevelSample& before, const LevelSample& after, model::Utime utime) {
   if (after.utime == before.utime) return after;
   const double share =
       seconds_between(before.utime, utime) / seconds_between(before.utime, after.utime);
@@ -104,11 +107,12 @@ LevelSample interpolate(const LevelSample& before, const LevelSample& after, Uti
   return sample;
 }
 
-void LevelSamples::forget_before(Utime utime) {
+void LevelSamples::forget_before(model::Utime utime) {
   while (samples_.size() > 1 && samples_[1].utime <= utime) samples_.pop_front();
 }
 
-std::optional<std::deque<LevelSample>> LevelSamples::between(Utime from, Utime to) const {
+std::optional<std::deque<LevelSample>> LevelSamples::between(model::Utime from,
+                                                             model::Utime to) const {
   if (samples_.empty() || samples_.front().utime > from || samples_.back().utime < to || to <= from)
     return std::nullopt;
   std::deque<LevelSample> result;
@@ -127,24 +131,24 @@ std::optional<std::deque<LevelSample>> LevelSamples::between(Utime from, Utime t
   }
 }
 
-Preintegration preintegrate(const std::deque<LevelSample>& samples, const ImuParameters& imu,
-                            const InertialBias& bias) {
-  Preintegration sum;
+model::Preintegration preintegrate(const std::deque<LevelSample>& samples, const ImuParameters& imu,
+                                   const model::InertialBias& bias) {
+  model::Preintegration sum;
   sum.bias = bias;
   for (std::size_t i = 0; i + 1 < samples.size(); ++i) step(sum, samples[i], samples[i + 1], imu);
   add_lever_noise(sum, imu);
   return sum;
 }
 
-std::optional<SE2WithCovariance> drive(const std::deque<LevelSample>& samples,
-                                       const std::deque<SpeedSample>& speeds,
-                                       const LidarImuInputParameters& parameters,
-                                       const YawRateBias& bias) {
-  const Utime from = samples.front().utime;
-  const Utime to = samples.back().utime;
+std::optional<geometry::SE2WithCovariance> drive(const std::deque<LevelSample>& samples,
+                                                 const std::deque<SpeedSample>& speeds,
+                                                 const LidarImuInputParameters& parameters,
+                                                 const YawRateBias& bias) {
+  const model::Utime from = samples.front().utime;
+  const model::Utime to = samples.back().utime;
   if (!covers(speeds, from, to, parameters.wheels.max_gap_s)) return std::nullopt;
   const WheelNoise& noise = parameters.wheels.noise;
-  SE2WithCovariance motion;
+  geometry::SE2WithCovariance motion;
   for (std::size_t i = 0; i + 1 < samples.size(); ++i) {
     const LevelSample& a = samples[i];
     const LevelSample& b = samples[i + 1];
@@ -157,25 +161,26 @@ std::optional<SE2WithCovariance> drive(const std::deque<LevelSample>& samples,
     const bool saturated = a.is_saturated || b.is_saturated;
     const double gyro =
         saturated ? parameters.imu.saturation_gyro_noise : parameters.imu.gyro_noise;
-    SE2WithCovariance piece{SE2::Exp({speed * dt, 0.0, rate * dt}), Eigen::Matrix3d::Zero()};
+    geometry::SE2WithCovariance increment{geometry::SE2::Exp({speed * dt, 0.0, rate * dt}),
+                                          Eigen::Matrix3d::Zero()};
     const double stand = square(noise.standstill_sigma_m) * dt;
-    piece.covariance(0, 0) = square(speed * speeds.back().scale_sigma) * power + stand;
-    piece.covariance(1, 1) = square(speed * noise.side_slip_sigma) * power + stand;
-    piece.covariance(2, 2) =
+    increment.covariance(0, 0) = square(speed * speeds.back().scale_sigma) * power + stand;
+    increment.covariance(1, 1) = square(speed * noise.side_slip_sigma) * power + stand;
+    increment.covariance(2, 2) =
         square(gyro) * dt +
         (square(bias.sigma_rad_s) + square(rate * parameters.imu.gyro_scale_sigma)) * power;
-    motion = compound(motion, piece);
+    motion = compound(motion, increment);
   }
   // Each end of the interval is off by the stamps' jitter; the gyro's yaw is not the wheels'.
   Eigen::Vector3d twist = motion.mean.Log() / seconds_between(from, to);
   twist.z() = 0.0;
   motion.covariance += 2.0 * square(noise.stamp_sigma_s) * twist * twist.transpose();
 
-  const SE2& axle_T_vehicle = parameters.wheels.car.axle_T_vehicle;
-  const SE2 vehicle_T_axle = axle_T_vehicle.inverse();
+  const geometry::SE2& axle_T_vehicle = parameters.wheels.car.axle_T_vehicle;
+  const geometry::SE2 vehicle_T_axle = axle_T_vehicle.inverse();
   const Eigen::Matrix3d adjoint = vehicle_T_axle.Adjoint();
-  return SE2WithCovariance{vehicle_T_axle * motion.mean * axle_T_vehicle,
-                           adjoint * motion.covariance * adjoint.transpose()};
+  return geometry::SE2WithCovariance{vehicle_T_axle * motion.mean * axle_T_vehicle,
+                                     adjoint * motion.covariance * adjoint.transpose()};
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

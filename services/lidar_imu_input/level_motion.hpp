@@ -8,11 +8,11 @@
 #include "common/model/odometry.hpp"
 #include "services/lidar_imu_input/parameters.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 
 /// One sample of the IMU after levelling: nothing subtracted but gravity.
 struct LevelSample {
-  Utime utime = 0;
+  model::Utime utime = 0;
   double yaw_rate_rad_s = 0.0;                           ///< Of the heading.
   Eigen::Vector2d force_mps2 = Eigen::Vector2d::Zero();  ///< Along level x and y.
   double pitch_cosine = 1.0;
@@ -26,7 +26,7 @@ struct LevelSample {
 
 /// Speed of the axle's middle along the vehicle's x axis.
 struct SpeedSample {
-  Utime utime = 0;
+  model::Utime utime = 0;
   double speed_mps = 0.0;
   double scale_sigma = 0.0;  ///< Of the speed, relative.
 
@@ -37,7 +37,7 @@ struct SpeedSample {
 };
 
 /// The sample at `utime`, between its two neighbours in proportion to time.
-LevelSample interpolate(const LevelSample& before, const LevelSample& after, Utime utime);
+LevelSample interpolate(const LevelSample& before, const LevelSample& after, model::Utime utime);
 
 /// Recent levelled samples, asked for the stretch between two stamps.
 class LevelSamples {
@@ -46,9 +46,9 @@ class LevelSamples {
   void add(const LevelSample& sample) { samples_.push_back(sample); }
   void clear() { samples_.clear(); }
   /// Keeps what is needed from `utime` on.
-  void forget_before(Utime utime);
+  void forget_before(model::Utime utime);
   /// Samples at `from`, all in between, and at `to`; none where a gap or an end is in between.
-  std::optional<std::deque<LevelSample>> between(Utime from, Utime to) const;
+  std::optional<std::deque<LevelSample>> between(model::Utime from, model::Utime to) const;
 
   /// For saving and loading: what changes while it runs.
   template <class Archive, class Self>
@@ -63,8 +63,8 @@ class LevelSamples {
 
 /// Integrates samples (the first at the start, the last at the end of the interval) with the
 /// trapezoidal rule. Noise: that of the samples and of the level.
-Preintegration preintegrate(const std::deque<LevelSample>& samples, const ImuParameters& imu,
-                            const InertialBias& bias);
+model::Preintegration preintegrate(const std::deque<LevelSample>& samples, const ImuParameters& imu,
+                                   const model::InertialBias& bias);
 
 /// How well the gyro's bias is known.
 struct YawRateBias {
@@ -74,9 +74,9 @@ struct YawRateBias {
 
 /// Motion of the vehicle from the wheels' speed and the gyro's yaw rate over the same samples.
 /// `speeds`: covers the interval; the last one holds. None where it does not.
-std::optional<SE2WithCovariance> drive(const std::deque<LevelSample>& samples,
-                                       const std::deque<SpeedSample>& speeds,
-                                       const LidarImuInputParameters& parameters,
-                                       const YawRateBias& bias);
+std::optional<geometry::SE2WithCovariance> drive(const std::deque<LevelSample>& samples,
+                                                 const std::deque<SpeedSample>& speeds,
+                                                 const LidarImuInputParameters& parameters,
+                                                 const YawRateBias& bias);
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

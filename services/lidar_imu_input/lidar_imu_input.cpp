@@ -8,24 +8,26 @@
 
 #include "services/lidar_imu_input/deskew.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 namespace {
 
 constexpr std::size_t kComparedPoints = 64;
 
-Utime microseconds(double seconds) { return static_cast<Utime>(std::llround(seconds * 1e6)); }
+model::Utime microseconds(double seconds) {
+  return static_cast<model::Utime>(std::llround(seconds * 1e6));
+}
 
-bool is_finite(const ImuSample& s) {
+bool is_finite(const model::ImuSample& s) {
   return s.angular_rate_rad_s.allFinite() && s.specific_force_mps2.allFinite();
 }
-bool is_finite(const WheelSample& s) {
+bool is_finite(const model::WheelSample& s) {
   return std::isfinite(s.speed_mps) && std::isfinite(s.steering_rad);
 }
-bool is_finite(const GnssFix& f) {
+bool is_finite(const model::GnssFix& f) {
   return f.east_north_m.allFinite() && std::isfinite(f.sigma_m) &&
          (!f.velocity_mps || f.velocity_mps->allFinite());
 }
-bool is_finite(const VelocityCorrection& c) {
+bool is_finite(const model::VelocityCorrection& c) {
   return c.velocity_mps.allFinite() && c.bias.allFinite() && c.covariance.allFinite();
 }
 
@@ -43,7 +45,7 @@ void LidarImuInput::report(std::vector<InputFault>& faults, InputResults& out) {
   faults.clear();
 }
 
-InputResults LidarImuInput::add(const ImuSample& raw) {
+InputResults LidarImuInput::add(const model::ImuSample& raw) {
   InputResults out;
   if (!is_finite(raw)) return {not_finite(Sensor::kImu)};
   check_pause(Sensor::kImu, raw.utime, out);
@@ -58,7 +60,7 @@ InputResults LidarImuInput::add(const ImuSample& raw) {
     ++counters_.samples_saturated;
     was_saturated_ = true;
   } else if (utime) {
-    ImuSample sample = raw;
+    model::ImuSample sample = raw;
     sample.utime = *utime;
     sample = motion_.to_vehicle(sample);
     motion_.add_imu(sample, std::exchange(was_saturated_, false));
@@ -70,7 +72,7 @@ InputResults LidarImuInput::add(const ImuSample& raw) {
   return out;
 }
 
-InputResults LidarImuInput::add(const WheelSample& raw) {
+InputResults LidarImuInput::add(const model::WheelSample& raw) {
   InputResults out;
   if (!is_finite(raw)) return {not_finite(Sensor::kWheels)};
   check_pause(Sensor::kWheels, raw.utime, out);
@@ -78,7 +80,7 @@ InputResults LidarImuInput::add(const WheelSample& raw) {
   const auto utime = guard_.admit(Sensor::kWheels, raw.utime, faults);
   report(faults, out);
   if (utime) {
-    WheelSample sample = raw;
+    model::WheelSample sample = raw;
     sample.utime = *utime;
     motion_.add_wheels(sample);
     out.emplace_back(sample);
@@ -87,7 +89,7 @@ InputResults LidarImuInput::add(const WheelSample& raw) {
   return out;
 }
 
-InputResults LidarImuInput::add(const GnssFix& raw) {
+InputResults LidarImuInput::add(const model::GnssFix& raw) {
   InputResults out;
   if (!is_finite(raw)) return {not_finite(Sensor::kGnss)};
   check_pause(Sensor::kGnss, raw.utime, out);
@@ -95,7 +97,7 @@ InputResults LidarImuInput::add(const GnssFix& raw) {
   const auto utime = guard_.admit(Sensor::kGnss, raw.utime, faults);
   report(faults, out);
   if (utime) {
-    GnssFix fix = raw;
+    model::GnssFix fix = raw;
     fix.utime = *utime;
     motion_.add_gnss(fix);
     out.emplace_back(fix);
@@ -104,9 +106,9 @@ InputResults LidarImuInput::add(const GnssFix& raw) {
   return out;
 }
 
-bool LidarImuInput::is_repeated(const PointSweep& sweep) {
+bool LidarImuInput::is_repeated(const model::PointSweep& sweep) {
   const auto count = std::min(sweep.points.size(), kComparedPoints);
-  const auto same = [](const SweepPoint& a, const SweepPoint& b) {
+  const auto same = [](const model::SweepPoint& a, const model::SweepPoint& b) {
     return a.x_m == b.x_m && a.y_m == b.y_m && a.z_m == b.z_m;
   };
   const bool repeated =
@@ -117,7 +119,7 @@ bool LidarImuInput::is_repeated(const PointSweep& sweep) {
   return repeated;
 }
 
-InputResults LidarImuInput::add(PointSweep sweep) {
+InputResults LidarImuInput::add(model::PointSweep sweep) {
   InputResults out;
   const std::size_t came = sweep.points.size();
   const std::size_t bad = remove_bad_points(sweep, parameters_.lidar.min_range_m);
@@ -130,7 +132,8 @@ InputResults LidarImuInput::add(PointSweep sweep) {
                                 "the same points as in the turn before"});
   if (!sweep.has_times) {
     const std::string& way = parameters_.lidar.times_from_azimuth;
-    if (way != "none") times_from_azimuth(sweep, parameters_.lidar.turn_s, way == "clockwise");
+    if (way != "none")
+      times_from_azimuth(sweep, parameters_.lidar.revolution_s, way == "clockwise");
     out.emplace_back(InputFault{InputFaultKind::kNoPointTimes, channel_of(Sensor::kSweep),
                                 way == "none" ? "points without times: not de-skewed"
                                               : "points without times: taken from the azimuth"});
@@ -141,21 +144,21 @@ InputResults LidarImuInput::add(PointSweep sweep) {
   report(faults, out);
   if (utime) {
     sweep.utime = *utime;
-    const Utime end = end_of_turn(sweep);
+    const model::Utime end = end_of_revolution(sweep);
     wait(end, std::move(sweep), out);
   }
   settle(out, false);
   return out;
 }
 
-InputResults LidarImuInput::add(const PlanarScan& raw) {
+InputResults LidarImuInput::add(const model::PlanarScan& raw) {
   InputResults out;
   check_pause(Sensor::kScan, raw.utime, out);
   std::vector<InputFault> faults;
   const auto utime = guard_.admit(Sensor::kScan, raw.utime, faults);
   report(faults, out);
   if (utime) {
-    PlanarScan scan = raw;
+    model::PlanarScan scan = raw;
     scan.utime = *utime;
     wait(*utime, std::move(scan), out);
   }
@@ -163,7 +166,7 @@ InputResults LidarImuInput::add(const PlanarScan& raw) {
   return out;
 }
 
-InputResults LidarImuInput::add(const VelocityCorrection& correction) {
+InputResults LidarImuInput::add(const model::VelocityCorrection& correction) {
   if (!is_finite(correction))
     return {
         InputFault{InputFaultKind::kNotFinite, "VELOCITY_CORRECTION", "a value that is no number"}};
@@ -173,7 +176,7 @@ InputResults LidarImuInput::add(const VelocityCorrection& correction) {
                      "takes effect later than its delay says"}};
 }
 
-InputResults LidarImuInput::add(const EkfPose& pose) {
+InputResults LidarImuInput::add(const model::EkfPose& pose) {
   filter_motion_.add(pose);
   return {};
 }
@@ -185,8 +188,8 @@ InputResults LidarImuInput::finish() {
 }
 
 void LidarImuInput::publish_raw_pose(bool at_once, InputResults& out) {
-  const RawPose pose = motion_.raw_pose();
-  const Utime period = microseconds(parameters_.output.raw_pose_period_s);
+  const model::RawPose pose = motion_.raw_pose();
+  const model::Utime period = microseconds(parameters_.output.raw_pose_period_s);
   if (raw_pose_utime_ && pose.utime <= *raw_pose_utime_) return;
   if (!at_once && raw_pose_utime_ && pose.utime - *raw_pose_utime_ < period) return;
   raw_pose_utime_ = pose.utime;
@@ -194,16 +197,16 @@ void LidarImuInput::publish_raw_pose(bool at_once, InputResults& out) {
 }
 
 void LidarImuInput::check_calibration(InputResults& out) {
-  if (calibration_told_ || motion_.is_calibrated()) return;
+  if (calibration_reported_ || motion_.is_calibrated()) return;
   const auto state = motion_.history().newest();
   // Surely moving: faster than standing allows, for what is known.
-  const bool moves = !motion_.is_standing() &&
+  const bool moves = !motion_.is_stationary() &&
                      state.utime - motion_.history().oldest().utime > microseconds(1.0) &&
                      guard_.is_live(Sensor::kImu);
   if (!moves) return;
-  calibration_told_ = true;
+  calibration_reported_ = true;
   out.emplace_back(InputFault{InputFaultKind::kNotCalibrated, channel_of(Sensor::kImu),
                               "the vehicle moves before it has stood still long enough"});
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

@@ -22,11 +22,12 @@
 #include "services/lidar_imu_input/input_guard.hpp"
 #include "services/lidar_imu_input/motion_estimator.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 
 /// What the stage gives, in the order of publishing. Frames: vehicle, vehicle_level; see the types.
-using InputResult = std::variant<ImuSample, WheelSample, GnssFix, Odometry, RawPose, PointSweep,
-                                 PlanarScan, InputFault>;
+using InputResult =
+    std::variant<model::ImuSample, model::WheelSample, model::GnssFix, model::Odometry,
+                 model::RawPose, model::PointSweep, model::PlanarScan, InputFault>;
 using InputResults = std::vector<InputResult>;
 
 struct InputCounters {
@@ -52,14 +53,14 @@ class LidarImuInput {
  public:
   explicit LidarImuInput(const LidarImuInputParameters& parameters = {});
 
-  InputResults add(const ImuSample& sample);    ///< RAW_IMU, frame sensor.
-  InputResults add(const WheelSample& sample);  ///< RAW_WHEELS.
-  InputResults add(const GnssFix& fix);         ///< RAW_GNSS.
-  InputResults add(PointSweep sweep);           ///< RAW_SWEEP, a whole turn, frame sensor.
-  InputResults add(const PlanarScan& scan);     ///< RAW_SCAN.
-  InputResults add(const VelocityCorrection& correction);
+  InputResults add(const model::ImuSample& sample);    ///< RAW_IMU, frame sensor.
+  InputResults add(const model::WheelSample& sample);  ///< RAW_WHEELS.
+  InputResults add(const model::GnssFix& fix);         ///< RAW_GNSS.
+  InputResults add(model::PointSweep sweep);           ///< RAW_SWEEP, a whole turn, frame sensor.
+  InputResults add(const model::PlanarScan& scan);     ///< RAW_SCAN.
+  InputResults add(const model::VelocityCorrection& correction);
   /// Where no sensor tells the motion, sweeps are de-skewed by the filter's.
-  InputResults add(const EkfPose& pose);
+  InputResults add(const model::EkfPose& pose);
   /// The drive is over: what still waits goes out.
   InputResults finish();
 
@@ -79,36 +80,37 @@ class LidarImuInput {
   /// A sweep whose points were lost at a restart: its piece of odometry still ends there.
   struct LostSweep {};
   struct Waiting {
-    Utime end = 0;
-    std::variant<LostSweep, PointSweep, PlanarScan> item;
+    model::Utime end = 0;
+    std::variant<LostSweep, model::PointSweep, model::PlanarScan> item;
   };
 
-  void wait(Utime end, std::variant<LostSweep, PointSweep, PlanarScan> item, InputResults& out);
+  void wait(model::Utime end, std::variant<LostSweep, model::PointSweep, model::PlanarScan> item,
+            InputResults& out);
   void settle(InputResults& out, bool everything);
-  bool is_reached(Utime utime) const;
-  void end_piece(Utime utime, InputResults& out);
+  bool is_reached(model::Utime utime) const;
+  void end_increment(model::Utime utime, InputResults& out);
   void release(Waiting waiting, InputResults& out);
-  void release_sweep(PointSweep raw, Utime stamp, InputResults& out);
+  void release_sweep(model::PointSweep raw, model::Utime stamp, InputResults& out);
   void report(std::vector<InputFault>& faults, InputResults& out);
   void publish_raw_pose(bool at_once, InputResults& out);
   void check_calibration(InputResults& out);
-  bool is_repeated(const PointSweep& sweep);
-  void check_pause(Sensor sensor, Utime raw, InputResults& out);
+  bool is_repeated(const model::PointSweep& sweep);
+  void check_pause(Sensor sensor, model::Utime raw, InputResults& out);
 
   LidarImuInputParameters parameters_;
   InputGuard guard_;
   MotionEstimator motion_;
   FilterMotion filter_motion_;
   InputCounters counters_;
-  std::deque<Waiting> waiting_;     ///< In order of their ends.
-  std::optional<Utime> piece_end_;  ///< Of the latest piece.
-  std::optional<Utime> sweep_stamp_;
-  std::optional<Utime> scan_stamp_;
-  std::optional<Utime> raw_pose_utime_;
-  std::vector<SweepPoint> first_points_;  ///< Of the latest sweep, to notice a frozen laser.
-  bool calibration_told_ = false;
-  std::optional<Utime> resumed_from_;  ///< After loading, until a sensor speaks.
-  bool was_saturated_ = false;         ///< The latest sample of the IMU; it was left out.
+  std::deque<Waiting> waiting_;                ///< In order of their ends.
+  std::optional<model::Utime> increment_end_;  ///< Of the latest piece.
+  std::optional<model::Utime> sweep_stamp_;
+  std::optional<model::Utime> scan_stamp_;
+  std::optional<model::Utime> raw_pose_utime_;
+  std::vector<model::SweepPoint> first_points_;  ///< Of the latest sweep, to notice a frozen laser.
+  bool calibration_reported_ = false;
+  std::optional<model::Utime> resumed_from_;  ///< After loading, until a sensor speaks.
+  bool was_saturated_ = false;                ///< The latest sample of the IMU; it was left out.
 };
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

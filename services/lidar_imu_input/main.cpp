@@ -2,8 +2,8 @@
 #include "services/lidar_imu_input/adapter.hpp"
 
 int main(int argc, char** argv) {
-  return understory::run_service(
-      understory::lidar_imu_input_service({
+  return understory::bus::run_service(
+      understory::lidar_imu_input::lidar_imu_input_service({
           .raw_imu = "RAW_IMU",                          // in: rate and force, frame sensor
           .raw_wheels = "RAW_WHEELS",                    // in: speed and steering
           .raw_gnss = "RAW_GNSS",                        // in: fixes, for reference

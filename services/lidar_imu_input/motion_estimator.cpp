@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace understory {
+namespace understory::lidar_imu_input {
 namespace {
 
 constexpr double kBoundPeriod_s = 10.0;
@@ -16,7 +16,9 @@ constexpr double kCorrected_s = 2.0;    // for so long the filter's corrections 
 constexpr double kInsistence_s = 10.0;  // then a velocity that nothing corrects is thought wrong
 
 double square(double value) { return value * value; }
-double seconds_between(Utime from, Utime to) { return static_cast<double>(to - from) * 1e-6; }
+double seconds_between(model::Utime from, model::Utime to) {
+  return static_cast<double>(to - from) * 1e-6;
+}
 Eigen::Vector3d flat(const Eigen::Vector2d& v) { return {v.x(), v.y(), 0.0}; }
 
 }  // namespace
@@ -27,16 +29,16 @@ MotionEstimator::MotionEstimator(const LidarImuInputParameters& parameters)
       standstill_(parameters.standstill),
       wheel_only_(parameters.wheels),
       levels_(parameters.imu.max_gap_s),
-      standing_bias_sigma_(parameters.imu.gyro_bias_sigma) {
-  const SE2 vehicle_T_axle = parameters.wheels.car.axle_T_vehicle.inverse();
+      stationary_bias_sigma_(parameters.imu.gyro_bias_sigma) {
+  const geometry::SE2 vehicle_T_axle = parameters.wheels.car.axle_T_vehicle.inverse();
   axle_position_m_ = flat(vehicle_T_axle.translation());
   axle_forward_ = flat(vehicle_T_axle.rotation().col(0));
   axle_left_ = flat(vehicle_T_axle.rotation().col(1));
 }
 
-ImuSample MotionEstimator::to_vehicle(const ImuSample& sensor_sample) {
+model::ImuSample MotionEstimator::to_vehicle(const model::ImuSample& sensor_sample) {
   const Eigen::Quaterniond turn = parameters_.imu.mount.rotation();
-  ImuSample sample = sensor_sample;
+  model::ImuSample sample = sensor_sample;
   sample.angular_rate_rad_s = turn * sensor_sample.angular_rate_rad_s;
   sample.specific_force_mps2 = turn * sensor_sample.specific_force_mps2;
   // Differences of the rate telescope in the integral: their noise does not add up. Over some
@@ -55,16 +57,16 @@ ImuSample MotionEstimator::to_vehicle(const ImuSample& sensor_sample) {
   return sample;
 }
 
-void MotionEstimator::begin(Utime utime) { wheel_only_.advance_to(utime); }
+void MotionEstimator::begin(model::Utime utime) { wheel_only_.advance_to(utime); }
 
-void MotionEstimator::start(const ImuSample& sample) {
+void MotionEstimator::start(const model::ImuSample& sample) {
   attitude_.emplace(parameters_.imu, sample.specific_force_mps2);
   latest_level_ = level(sample, false);
   levels_.add(*latest_level_);
   moved_utime_ = sample.utime;
 }
 
-void MotionEstimator::add_imu(const ImuSample& sample, bool is_saturated) {
+void MotionEstimator::add_imu(const model::ImuSample& sample, bool is_saturated) {
   if (!attitude_) {
     start(sample);
   } else {
@@ -81,17 +83,17 @@ void MotionEstimator::add_imu(const ImuSample& sample, bool is_saturated) {
   remember(sample);
 }
 
-void MotionEstimator::propagate(const ImuSample& sample, bool is_saturated, double seconds) {
+void MotionEstimator::propagate(const model::ImuSample& sample, bool is_saturated, double seconds) {
   attitude_->propagate(0.5 * (latest_->angular_rate_rad_s + sample.angular_rate_rad_s),
                        0.5 * (latest_->specific_force_mps2 + sample.specific_force_mps2), seconds,
                        is_saturated);
-  standing_bias_sigma_ =
-      std::sqrt(square(standing_bias_sigma_) + square(parameters_.imu.gyro_bias_walk) * seconds);
+  stationary_bias_sigma_ =
+      std::sqrt(square(stationary_bias_sigma_) + square(parameters_.imu.gyro_bias_walk) * seconds);
   const bool bias_known = standstill_.longest_s() > kBiasKnown_s &&
-                          standing_bias_sigma_ < 0.02 * parameters_.standstill.gyro_mean_rad_s;
+                          stationary_bias_sigma_ < 0.02 * parameters_.standstill.gyro_mean_rad_s;
   standstill_.add(raw_.back(), bias_known ? std::optional(attitude_->gyro_bias()) : std::nullopt,
-                  velocity_allows_standing(sample.utime));
-  if (standstill_.is_standing()) {
+                  velocity_allows_stationary(sample.utime));
+  if (standstill_.is_stationary()) {
     use_standstill(sample, seconds);
   } else {
     moved_utime_ = sample.utime;
@@ -102,10 +104,10 @@ void MotionEstimator::propagate(const ImuSample& sample, bool is_saturated, doub
   height_m_ += rise * seconds;
   levels_.add(levelled);
   latest_level_ = levelled;
-  if (!standstill_.is_standing()) use_constraints(sample);
+  if (!standstill_.is_stationary()) use_constraints(sample);
 }
 
-void MotionEstimator::bridge_gap(const ImuSample& sample) {
+void MotionEstimator::bridge_gap(const model::ImuSample& sample) {
   const double seconds = seconds_between(latest_->utime, sample.utime);
   attitude_->bridge(seconds);
   standstill_.reset();
@@ -113,27 +115,27 @@ void MotionEstimator::bridge_gap(const ImuSample& sample) {
   // What the wheels have not told goes on as it was.
   const double open = std::max(0.0, seconds_between(*pose_utime_, sample.utime));
   const Eigen::Vector2d& v = reckoning_.velocity();
-  const double rate = latest_level_->yaw_rate_rad_s - standing_bias_;
-  SE2WithCovariance motion{SE2::Exp({v.x() * open, v.y() * open, rate * open}),
-                           Eigen::Matrix3d::Zero()};
+  const double rate = latest_level_->yaw_rate_rad_s - stationary_bias_;
+  geometry::SE2WithCovariance motion{geometry::SE2::Exp({v.x() * open, v.y() * open, rate * open}),
+                                     Eigen::Matrix3d::Zero()};
   motion.covariance.diagonal() << square(open), square(open), square(0.2 * open);
   reckoning_.bridge(motion);
   latest_level_ = level(sample, false);
   levels_.add(*latest_level_);
 }
 
-void MotionEstimator::use_standstill(const ImuSample& sample, double seconds) {
+void MotionEstimator::use_standstill(const model::ImuSample& sample, double seconds) {
   const double sigma = parameters_.standstill.velocity_sigma_mps;
   attitude_->add_standstill(sample.angular_rate_rad_s, seconds, sigma);
   // The bias of the heading's rate: what the filter has learned while standing, nothing else.
   const Eigen::Vector3d down = attitude_->level_Q_vehicle().conjugate() * Eigen::Vector3d::UnitZ();
-  standing_bias_ = down.dot(attitude_->gyro_bias());
-  standing_bias_sigma_ = std::sqrt(down.dot(attitude_->gyro_bias_covariance() * down));
-  reckoning_.set_gyro_bias(standing_bias_, standing_bias_sigma_);
+  stationary_bias_ = down.dot(attitude_->gyro_bias());
+  stationary_bias_sigma_ = std::sqrt(down.dot(attitude_->gyro_bias_covariance() * down));
+  reckoning_.set_gyro_bias(stationary_bias_, stationary_bias_sigma_);
   reckoning_.add_standstill(sigma);
 }
 
-void MotionEstimator::use_constraints(const ImuSample& sample) {
+void MotionEstimator::use_constraints(const model::ImuSample& sample) {
   const ConstraintParameters& p = parameters_.constraint;
   if (seconds_between(constrained_utime_, sample.utime) < p.period_s) return;
   constrained_utime_ = sample.utime;
@@ -148,7 +150,7 @@ void MotionEstimator::use_constraints(const ImuSample& sample) {
     const Eigen::Vector2d at = axle_position_m_.head<2>();
     const Eigen::Vector2d left = axle_left_.head<2>();
     const double yaw_rate = latest_level_->yaw_rate_rad_s - reckoning_.bias()(0);
-    const double slip = left.dot(reckoning_.velocity() + yaw_rate * turned_left(at));
+    const double slip = left.dot(reckoning_.velocity() + yaw_rate * geometry::perpendicular(at));
     reckoning_.add_velocity(left, at, -slip, side);
   }
   if (!wheels_are_fresh(sample.utime) &&
@@ -162,7 +164,7 @@ void MotionEstimator::use_constraints(const ImuSample& sample) {
 
 /// Without wheels standing is told by quiet samples alone, and a smooth road is quiet too: there
 /// the velocity that the filter corrects by its landmarks must agree.
-bool MotionEstimator::velocity_allows_standing(Utime now) {
+bool MotionEstimator::velocity_allows_stationary(model::Utime now) {
   const double slow = parameters_.standstill.wheel_speed_mps;
   const Eigen::Matrix2d spread =
       reckoning_.velocity_covariance() + square(slow) * Eigen::Matrix2d::Identity();
@@ -177,12 +179,12 @@ bool MotionEstimator::velocity_allows_standing(Utime now) {
          seconds_between(*denied_since_, now) > kInsistence_s;
 }
 
-bool MotionEstimator::wheels_are_fresh(Utime now) const {
+bool MotionEstimator::wheels_are_fresh(model::Utime now) const {
   return !speeds_.empty() &&
          seconds_between(speeds_.back().utime, now) < parameters_.wheels.max_gap_s;
 }
 
-void MotionEstimator::add_wheels(const WheelSample& sample) {
+void MotionEstimator::add_wheels(const model::WheelSample& sample) {
   wheel_only_.add(sample);
   standstill_.add_wheel_speed(sample.utime, sample.speed_mps);
   const CarGeometry& car = parameters_.wheels.car;
@@ -199,7 +201,7 @@ void MotionEstimator::add_wheels(const WheelSample& sample) {
     speeds_.push_back({sample.utime, speed, known});
   }
   while (seconds_between(speeds_.front().utime, sample.utime) > kSpeedsKept_s) speeds_.pop_front();
-  if (!attitude_ || !then || standstill_.is_standing()) return;
+  if (!attitude_ || !then || standstill_.is_stationary()) return;
 
   const double sigma = parameters_.constraint.wheel_sigma_mps;
   const Eigen::Vector3d axle = then->velocity_mps + then->rate_rad_s.cross(axle_position_m_);
@@ -208,38 +210,38 @@ void MotionEstimator::add_wheels(const WheelSample& sample) {
   const Eigen::Vector2d at = axle_position_m_.head<2>();
   const Eigen::Vector2d forward = axle_forward_.head<2>();
   const double thought =
-      forward.dot(then->level_velocity_mps + then->rate_rad_s.z() * turned_left(at));
+      forward.dot(then->level_velocity_mps + then->rate_rad_s.z() * geometry::perpendicular(at));
   const double slope = latest_level_ ? latest_level_->pitch_cosine : 1.0;
   const double scaled = std::hypot(sigma, speeds_.back().scale_sigma * speed);
   reckoning_.add_velocity(forward, at, speeds_.back().speed_mps * slope - thought, scaled);
 }
 
-void MotionEstimator::add_gnss(const GnssFix& fix) {
+void MotionEstimator::add_gnss(const model::GnssFix& fix) {
   if (!parameters_.gnss_aided) return;
   const auto then = history_.at(fix.utime);
   if (!then) return;
   const auto reference = reference_.add(fix, then->heading_rad);
   if (!reference) return;
-  const Eigen::Vector2d level =
-      SE2(0.0, 0.0, then->heading_rad).rotation().transpose() * reference->odom_velocity_mps;
+  const Eigen::Vector2d level = geometry::SE2(0.0, 0.0, then->heading_rad).rotation().transpose() *
+                                reference->odom_velocity_mps;
   for (int axis = 0; axis < 2; ++axis)
     reckoning_.add_velocity(Eigen::Vector2d::Unit(axis), Eigen::Vector2d::Zero(),
                             level(axis) - then->level_velocity_mps(axis), reference->sigma_mps);
   if (reference->heading_rad)
-    reckoning_.add_heading(wrap_angle(*reference->heading_rad - then->heading_rad),
+    reckoning_.add_heading(geometry::wrap_angle(*reference->heading_rad - then->heading_rad),
                            reference->heading_sigma_rad);
 }
 
-bool MotionEstimator::add_correction(const VelocityCorrection& correction) {
-  const auto delay = static_cast<Utime>(parameters_.output.correction_delay_s * 1e6);
+bool MotionEstimator::add_correction(const model::VelocityCorrection& correction) {
+  const auto delay = static_cast<model::Utime>(parameters_.output.correction_delay_s * 1e6);
   corrections_.push_back(correction);
   return !latest_ || latest_->utime < correction.utime + delay;
 }
 
-void MotionEstimator::use_correction(Utime now) {
-  const auto delay = static_cast<Utime>(parameters_.output.correction_delay_s * 1e6);
+void MotionEstimator::use_correction(model::Utime now) {
+  const auto delay = static_cast<model::Utime>(parameters_.output.correction_delay_s * 1e6);
   while (!corrections_.empty() && corrections_.front().utime + delay <= now) {
-    const VelocityCorrection correction = corrections_.front();
+    const model::VelocityCorrection correction = corrections_.front();
     corrections_.pop_front();
     if (parameters_.gnss_aided) continue;
     const auto then = history_.at(correction.utime);
@@ -249,7 +251,7 @@ void MotionEstimator::use_correction(Utime now) {
   }
 }
 
-LevelSample MotionEstimator::level(const ImuSample& sample, bool is_saturated) const {
+LevelSample MotionEstimator::level(const model::ImuSample& sample, bool is_saturated) const {
   const Eigen::Quaterniond level_Q_vehicle = attitude_->level_Q_vehicle();
   const RollPitchYaw angles = roll_pitch_yaw(level_Q_vehicle);
   const Eigen::Vector3d& bias = attitude_->gyro_bias();
@@ -266,7 +268,7 @@ LevelSample MotionEstimator::level(const ImuSample& sample, bool is_saturated) c
   return result;
 }
 
-void MotionEstimator::remember(const ImuSample& sample) {
+void MotionEstimator::remember(const model::ImuSample& sample) {
   if (!history_.empty() && history_.newest().utime >= sample.utime) return;
   MotionState state;
   state.utime = sample.utime;
@@ -282,8 +284,8 @@ void MotionEstimator::remember(const ImuSample& sample) {
   history_.add(state);
 }
 
-RawPose MotionEstimator::raw_pose() const {
-  RawPose pose;
+model::RawPose MotionEstimator::raw_pose() const {
+  model::RawPose pose;
   pose.utime = pose_utime_.value_or(0);
   pose.odom_T_vehicle = reckoning_.pose();
   pose.covariance = reckoning_.pose_covariance();
@@ -291,4 +293,4 @@ RawPose MotionEstimator::raw_pose() const {
   return pose;
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

@@ -19,30 +19,30 @@
 #include "services/lidar_imu_input/velocity_reference.hpp"
 #include "services/lidar_imu_input/wheel_odometry.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 
 class MotionEstimator {
  public:
   explicit MotionEstimator(const LidarImuInputParameters& parameters);
 
   /// The sample in frame vehicle, as if measured at its origin; stamps must advance.
-  ImuSample to_vehicle(const ImuSample& sensor_sample);
-  void add_imu(const ImuSample& vehicle_sample, bool is_saturated);
-  void add_wheels(const WheelSample& sample);
-  void add_gnss(const GnssFix& fix);
+  model::ImuSample to_vehicle(const model::ImuSample& sensor_sample);
+  void add_imu(const model::ImuSample& vehicle_sample, bool is_saturated);
+  void add_wheels(const model::WheelSample& sample);
+  void add_gnss(const model::GnssFix& fix);
   /// False: it came too late to take effect in time; it does so at the next sample.
-  bool add_correction(const VelocityCorrection& correction);
+  bool add_correction(const model::VelocityCorrection& correction);
 
   /// Where the first interval starts.
-  void begin(Utime utime);
+  void begin(model::Utime utime);
   /// Motion between two stamps up to which samples have come; intervals in order. None where
   /// samples are missing.
-  std::optional<Odometry> piece(Utime from, Utime to);
+  std::optional<model::Odometry> increment(model::Utime from, model::Utime to);
 
   const MotionHistory& history() const { return history_; }
-  RawPose raw_pose() const;
-  std::optional<Utime> pose_utime() const { return pose_utime_; }
-  bool is_standing() const { return standstill_.is_standing(); }
+  model::RawPose raw_pose() const;
+  std::optional<model::Utime> pose_utime() const { return pose_utime_; }
+  bool is_stationary() const { return standstill_.is_stationary(); }
   bool is_calibrated() const { return standstill_.is_calibrated(); }
   bool has_attitude() const { return attitude_.has_value(); }
   const std::optional<AttitudeFilter>& attitude() const { return attitude_; }
@@ -64,28 +64,28 @@ class MotionEstimator {
     if (has_attitude) a(*self.attitude_);
     a(self.reckoning_, self.standstill_, self.wheel_only_, self.reference_, self.levels_,
       self.speeds_, self.history_, self.corrections_, self.raw_, self.latest_, self.latest_level_,
-      self.pose_utime_, self.height_m_, self.standing_bias_, self.standing_bias_sigma_,
+      self.pose_utime_, self.height_m_, self.stationary_bias_, self.stationary_bias_sigma_,
       self.moved_utime_, self.constrained_utime_, self.bounded_utime_, self.corrected_utime_,
       self.denied_since_, self.sequence_);
   }
 
  private:
-  void start(const ImuSample& sample);
-  void propagate(const ImuSample& sample, bool is_saturated, double seconds);
-  void use_standstill(const ImuSample& sample, double seconds);
-  void use_constraints(const ImuSample& sample);
-  void use_correction(Utime now);
-  void bridge_gap(const ImuSample& sample);
-  LevelSample level(const ImuSample& sample, bool is_saturated) const;
-  void remember(const ImuSample& sample);
-  std::optional<Odometry> inertial_piece(Utime from, Utime to);
-  std::optional<Odometry> wheel_piece(Utime from, Utime to);
-  SE2WithCovariance dead_reckoned(const std::deque<LevelSample>& samples,
-                                  const Preintegration& inertial) const;
-  YawRateBias yaw_rate_bias() const { return {standing_bias_, standing_bias_sigma_}; }
-  bool wheels_are_fresh(Utime now) const;
-  bool velocity_allows_standing(Utime now);
-  double axle_speed_now(const WheelSample& sample) const;
+  void start(const model::ImuSample& sample);
+  void propagate(const model::ImuSample& sample, bool is_saturated, double seconds);
+  void use_standstill(const model::ImuSample& sample, double seconds);
+  void use_constraints(const model::ImuSample& sample);
+  void use_correction(model::Utime now);
+  void bridge_gap(const model::ImuSample& sample);
+  LevelSample level(const model::ImuSample& sample, bool is_saturated) const;
+  void remember(const model::ImuSample& sample);
+  std::optional<model::Odometry> inertial_increment(model::Utime from, model::Utime to);
+  std::optional<model::Odometry> wheel_increment(model::Utime from, model::Utime to);
+  geometry::SE2WithCovariance dead_reckoned(const std::deque<LevelSample>& samples,
+                                            const model::Preintegration& inertial) const;
+  YawRateBias yaw_rate_bias() const { return {stationary_bias_, stationary_bias_sigma_}; }
+  bool wheels_are_fresh(model::Utime now) const;
+  bool velocity_allows_stationary(model::Utime now);
+  double axle_speed_now(const model::WheelSample& sample) const;
 
   LidarImuInputParameters parameters_;
   Eigen::Vector3d axle_position_m_;  ///< In frame vehicle.
@@ -100,21 +100,21 @@ class MotionEstimator {
   LevelSamples levels_;
   std::deque<SpeedSample> speeds_;
   MotionHistory history_;
-  std::deque<VelocityCorrection> corrections_;
+  std::deque<model::VelocityCorrection> corrections_;
 
-  std::deque<ImuSample> raw_;        ///< Latest, frame vehicle, lever not taken out.
-  std::optional<ImuSample> latest_;  ///< Latest, frame vehicle.
+  std::deque<model::ImuSample> raw_;        ///< Latest, frame vehicle, lever not taken out.
+  std::optional<model::ImuSample> latest_;  ///< Latest, frame vehicle.
   std::optional<LevelSample> latest_level_;
-  std::optional<Utime> pose_utime_;  ///< What the dead reckoning stands at.
+  std::optional<model::Utime> pose_utime_;  ///< What the dead reckoning stands at.
   double height_m_ = 0.0;
-  double standing_bias_ = 0.0;  ///< Of the yaw rate, from standing still only.
-  double standing_bias_sigma_ = 0.0;
-  Utime moved_utime_ = 0;  ///< When the vehicle was last found not to stand.
-  Utime constrained_utime_ = 0;
-  Utime bounded_utime_ = 0;
-  Utime corrected_utime_ = 0;               ///< When a correction last took effect.
-  std::optional<Utime> denied_since_ = {};  ///< Since when the velocity has denied standing.
+  double stationary_bias_ = 0.0;  ///< Of the yaw rate, from standing still only.
+  double stationary_bias_sigma_ = 0.0;
+  model::Utime moved_utime_ = 0;  ///< When the vehicle was last found not to stand.
+  model::Utime constrained_utime_ = 0;
+  model::Utime bounded_utime_ = 0;
+  model::Utime corrected_utime_ = 0;               ///< When a correction last took effect.
+  std::optional<model::Utime> denied_since_ = {};  ///< Since when the velocity has denied standing.
   std::uint64_t sequence_ = 0;
 };
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

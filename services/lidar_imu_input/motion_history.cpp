@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-namespace understory {
+namespace understory::lidar_imu_input {
 namespace {
 
-double seconds_between(Utime from, Utime to) { return static_cast<double>(to - from) * 1e-6; }
+double seconds_between(model::Utime from, model::Utime to) {
+  return static_cast<double>(to - from) * 1e-6;
+}
 
-MotionState moved_on(const MotionState& state, Utime utime) {
+MotionState moved_on(const MotionState& state, model::Utime utime) {
   MotionState moved = state;
   const double seconds = seconds_between(state.utime, utime);
   const Eigen::Vector3d turn = state.rate_rad_s * seconds;
@@ -22,7 +24,7 @@ MotionState moved_on(const MotionState& state, Utime utime) {
   return moved;
 }
 
-constexpr Utime kBaseline_us = 100'000;
+constexpr model::Utime kBaseline_us = 100'000;
 
 }  // namespace
 
@@ -31,7 +33,7 @@ void MotionHistory::add(const MotionState& state) {
   while (seconds_between(states_.front().utime, state.utime) > kKept_s) states_.pop_front();
 }
 
-std::optional<MotionState> MotionHistory::at(Utime utime) const {
+std::optional<MotionState> MotionHistory::at(model::Utime utime) const {
   if (states_.empty()) return std::nullopt;
   const auto after = std::ranges::lower_bound(states_, utime, {}, &MotionState::utime);
   if (after == states_.end() || after == states_.begin()) {
@@ -59,7 +61,7 @@ std::optional<MotionState> MotionHistory::at(Utime utime) const {
 
 /// Of the first state on the way no velocity was known yet, so what came before goes by how the
 /// vehicle moved soon after. What was thought of the velocity stays.
-MotionState MotionHistory::before_first(Utime utime) const {
+MotionState MotionHistory::before_first(model::Utime utime) const {
   const MotionState& first = states_.front();
   if (states_.size() < 2) return moved_on(first, utime);
   auto b = std::ranges::lower_bound(states_, first.utime + kBaseline_us, {}, &MotionState::utime);
@@ -77,4 +79,4 @@ MotionState MotionHistory::before_first(Utime utime) const {
   return moved;
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

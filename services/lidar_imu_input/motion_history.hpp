@@ -7,10 +7,10 @@
 
 #include "common/model/landmarks.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 
 struct MotionState {
-  Utime utime = 0;
+  model::Utime utime = 0;
   Eigen::Quaterniond odom_Q_vehicle = Eigen::Quaterniond::Identity();
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();    ///< In `odom`; z drifts.
   Eigen::Vector3d velocity_mps = Eigen::Vector3d::Zero();  ///< Frame vehicle, free of landmarks.
@@ -36,7 +36,7 @@ class MotionHistory {
   /// Between two states in proportion to time; after the last one that one, moved on at its
   /// velocity and rate, before the first that one, moved as between those soon after; for no longer
   /// than `kMostExtrapolation_s`. None while empty or farther off.
-  std::optional<MotionState> at(Utime utime) const;
+  std::optional<MotionState> at(model::Utime utime) const;
 
   /// For saving and loading: what changes while it runs.
   template <class Archive, class Self>
@@ -48,9 +48,9 @@ class MotionHistory {
   static constexpr double kKept_s = 4.0;
 
  private:
-  MotionState before_first(Utime utime) const;
+  MotionState before_first(model::Utime utime) const;
 
   std::deque<MotionState> states_;
 };
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

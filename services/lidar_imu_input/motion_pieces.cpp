@@ -4,19 +4,21 @@
 
 #include "services/lidar_imu_input/motion_estimator.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 namespace {
 
 double square(double value) { return value * value; }
-double seconds_between(Utime from, Utime to) { return static_cast<double>(to - from) * 1e-6; }
+double seconds_between(model::Utime from, model::Utime to) {
+  return static_cast<double>(to - from) * 1e-6;
+}
 
 }  // namespace
 
-SE2WithCovariance MotionEstimator::dead_reckoned(const std::deque<LevelSample>& samples,
-                                                 const Preintegration& inertial) const {
-  const Utime from = samples.front().utime;
+geometry::SE2WithCovariance MotionEstimator::dead_reckoned(
+    const std::deque<LevelSample>& samples, const model::Preintegration& inertial) const {
+  const model::Utime from = samples.front().utime;
   const double dt = inertial.seconds;
-  SE2WithCovariance motion;
+  geometry::SE2WithCovariance motion;
   Eigen::Vector2d velocity = Eigen::Vector2d::Zero();
   if (const auto then = history_.at(from)) {
     const RollPitchYaw angles = roll_pitch_yaw(then->odom_Q_vehicle);
@@ -25,7 +27,7 @@ SE2WithCovariance MotionEstimator::dead_reckoned(const std::deque<LevelSample>& 
         Eigen::AngleAxisd(angles.roll_rad, Eigen::Vector3d::UnitX()));
     velocity = (level_Q_vehicle * then->velocity_mps).head<2>();
   }
-  motion.mean = SE2(velocity * dt + inertial.position_m, inertial.yaw_rad);
+  motion.mean = geometry::SE2(velocity * dt + inertial.position_m, inertial.yaw_rad);
   // The velocity's error lasts: it has the power tau * dt when pieces are compounded.
   const double power = dt * std::max(dt, parameters_.output.velocity_correlation_s);
   const Eigen::Matrix2d turn = motion.mean.rotation().transpose();
@@ -34,26 +36,27 @@ SE2WithCovariance MotionEstimator::dead_reckoned(const std::deque<LevelSample>& 
   motion.covariance.topLeftCorner<2, 2>() = turn * position * turn.transpose();
   motion.covariance(2, 2) =
       inertial.covariance(0, 0) +
-      square(standing_bias_sigma_) * dt * parameters_.wheels.noise.correlation_time_s;
+      square(stationary_bias_sigma_) * dt * parameters_.wheels.noise.correlation_time_s;
   return motion;
 }
 
-std::optional<Odometry> MotionEstimator::inertial_piece(Utime from, Utime to) {
+std::optional<model::Odometry> MotionEstimator::inertial_increment(model::Utime from,
+                                                                   model::Utime to) {
   const auto samples = levels_.between(from, to);
   if (!samples) return std::nullopt;
-  Odometry odometry;
-  const InertialBias bias(standing_bias_, 0.0, 0.0);
+  model::Odometry odometry;
+  const model::InertialBias bias(stationary_bias_, 0.0, 0.0);
   odometry.inertial = preintegrate(*samples, parameters_.imu, bias);
   odometry.inertial->level = attitude_->level_since_mark();
-  odometry.is_standing = moved_utime_ <= from;
-  const double twist = odometry.is_standing ? 0.0 : attitude_->twist_since_mark_rad();
+  odometry.is_stationary = moved_utime_ <= from;
+  const double twist = odometry.is_stationary ? 0.0 : attitude_->twist_since_mark_rad();
   odometry.inertial->yaw_rad += twist;
   attitude_->mark_level();
-  SE2WithCovariance motion;
+  geometry::SE2WithCovariance motion;
   if (const auto driven = drive(*samples, speeds_, parameters_, yaw_rate_bias())) {
     motion = *driven;
     odometry.has_wheels = true;
-  } else if (odometry.is_standing) {
+  } else if (odometry.is_stationary) {
     const WheelNoise& noise = parameters_.wheels.noise;
     motion.covariance.diagonal() << square(noise.standstill_sigma_m),
         square(noise.standstill_sigma_m), square(noise.standstill_sigma_rad);
@@ -61,32 +64,33 @@ std::optional<Odometry> MotionEstimator::inertial_piece(Utime from, Utime to) {
   } else {
     motion = dead_reckoned(*samples, *odometry.inertial);
   }
-  odometry.from_T_to = motion.mean * SE2(0.0, 0.0, twist);
+  odometry.from_T_to = motion.mean * geometry::SE2(0.0, 0.0, twist);
   odometry.covariance = motion.covariance;
   return odometry;
 }
 
-std::optional<Odometry> MotionEstimator::wheel_piece(Utime from, Utime to) {
+std::optional<model::Odometry> MotionEstimator::wheel_increment(model::Utime from,
+                                                                model::Utime to) {
   auto odometry = wheel_only_.advance_to(to);
   if (!odometry || odometry->from_utime != from) return std::nullopt;
   odometry->has_wheels = true;
   return odometry;
 }
 
-std::optional<Odometry> MotionEstimator::piece(Utime from, Utime to) {
+std::optional<model::Odometry> MotionEstimator::increment(model::Utime from, model::Utime to) {
   if (to <= from) return std::nullopt;
   // Both are asked: each keeps its place.
-  std::optional<Odometry> by_wheels = wheel_piece(from, to);
-  std::optional<Odometry> odometry = inertial_piece(from, to);
+  std::optional<model::Odometry> by_wheels = wheel_increment(from, to);
+  std::optional<model::Odometry> odometry = inertial_increment(from, to);
   levels_.forget_before(to);
   if (!odometry && by_wheels) {
     odometry = by_wheels;
     // The dead reckoning goes on with it where no sample of the IMU has moved it.
-    const Utime reached = std::max(from, pose_utime_.value_or(from));
+    const model::Utime reached = std::max(from, pose_utime_.value_or(from));
     if (reached < to) {
       const double share = seconds_between(reached, to) / seconds_between(from, to);
       reckoning_.bridge(
-          {SE2::Exp(share * odometry->from_T_to.Log()), share * odometry->covariance});
+          {geometry::SE2::Exp(share * odometry->from_T_to.Log()), share * odometry->covariance});
       if (history_.empty()) history_.add({.utime = reached});
       MotionState state = history_.newest();
       state.utime = to;
@@ -111,4 +115,4 @@ std::optional<Odometry> MotionEstimator::piece(Utime from, Utime to) {
   return odometry;
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

@@ -1,6 +1,6 @@
 #include "services/lidar_imu_input/parameters.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 
 Eigen::Quaterniond SensorMount::rotation() const {
   return Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()) *
@@ -15,4 +15,4 @@ Eigen::Isometry3d SensorMount::vehicle_T_sensor() const {
   return pose;
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

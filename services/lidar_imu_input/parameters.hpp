@@ -5,7 +5,7 @@
 
 #include "services/lidar_imu_input/wheel_odometry.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 
 /// Where a sensor sits: vehicle_T_sensor. Rotation: roll, then pitch, then yaw about fixed axes.
 struct SensorMount {
@@ -67,17 +67,17 @@ struct ConstraintParameters {
 };
 
 struct DeskewParameters {
-  SensorMount mount;    ///< Of the laser that scans in space.
-  double turn_s = 0.1;  ///< Of one turn, for sweeps without times.
+  SensorMount mount;          ///< Of the laser that scans in space.
+  double revolution_s = 0.1;  ///< Of one turn, for sweeps without times.
   /// Sweeps without times get them from the azimuth: "none", "clockwise", "counterclockwise".
   std::string times_from_azimuth = "none";
   double min_range_m = 0.0;  ///< What is nearer is the vehicle itself.
 };
 
 struct OutputParameters {
-  double max_piece_s = 0.1;  ///< Longest piece of odometry.
-  double lag_s = 0.15;       ///< How long a piece without sweep waits for one to end it.
-  double max_wait_s = 0.3;   ///< How long a sweep waits for motion.
+  double max_increment_s = 0.1;  ///< Longest piece of odometry.
+  double lag_s = 0.15;           ///< How long a piece without sweep waits for one to end it.
+  double max_wait_s = 0.3;       ///< How long a sweep waits for motion.
   double raw_pose_period_s = 0.02;
   double correction_delay_s = 0.15;     ///< [D] From a correction's stamp to its effect.
   double velocity_correlation_s = 5.0;  ///< How long errors of dead-reckoned velocity last.
@@ -102,4 +102,4 @@ struct LidarImuInputParameters {
   bool gnss_aided = false;  ///< RAW_POSE takes velocity from GNSS: a reference.
 };
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

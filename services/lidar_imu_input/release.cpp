@@ -6,28 +6,32 @@
 #include "services/lidar_imu_input/deskew.hpp"
 #include "services/lidar_imu_input/lidar_imu_input.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 namespace {
 
 constexpr std::size_t kMostWaiting = 20;
 /// A sweep may be carried so far ahead of its own end.
-constexpr Utime kLongestCarry_us = 250'000;
+constexpr model::Utime kLongestCarry_us = 250'000;
 
-Utime microseconds(double seconds) { return static_cast<Utime>(std::llround(seconds * 1e6)); }
+model::Utime microseconds(double seconds) {
+  return static_cast<model::Utime>(std::llround(seconds * 1e6));
+}
 
 }  // namespace
 
-void LidarImuInput::wait(Utime end, std::variant<LostSweep, PointSweep, PlanarScan> item,
+void LidarImuInput::wait(model::Utime end,
+                         std::variant<LostSweep, model::PointSweep, model::PlanarScan> item,
                          InputResults& out) {
   if (waiting_.size() >= kMostWaiting) {
     ++counters_.sweeps_dropped;
     waiting_.pop_front();
   }
-  const bool is_sweep = std::holds_alternative<PointSweep>(item);
+  const bool is_sweep = std::holds_alternative<model::PointSweep>(item);
   // A piece that has ended is not taken back: what comes behind its end is carried to it.
-  if (piece_end_ && end < *piece_end_) {
-    const std::optional<Utime>& last = is_sweep ? sweep_stamp_ : scan_stamp_;
-    const bool too_late = *piece_end_ - end > kLongestCarry_us || (last && *last >= *piece_end_);
+  if (increment_end_ && end < *increment_end_) {
+    const std::optional<model::Utime>& last = is_sweep ? sweep_stamp_ : scan_stamp_;
+    const bool too_late =
+        *increment_end_ - end > kLongestCarry_us || (last && *last >= *increment_end_);
     if (too_late || !is_sweep) {
       ++counters_.sweeps_dropped;
       out.emplace_back(InputFault{InputFaultKind::kLate,
@@ -36,13 +40,13 @@ void LidarImuInput::wait(Utime end, std::variant<LostSweep, PointSweep, PlanarSc
       return;
     }
     ++counters_.sweeps_carried;
-    end = *piece_end_;
+    end = *increment_end_;
   }
   const auto place = std::ranges::upper_bound(waiting_, end, {}, &Waiting::end);
   waiting_.insert(place, Waiting{end, std::move(item)});
 }
 
-bool LidarImuInput::is_reached(Utime utime) const {
+bool LidarImuInput::is_reached(model::Utime utime) const {
   const auto now = guard_.now();
   if (!now) return false;
   if (*now - utime > microseconds(parameters_.output.max_wait_s)) return true;
@@ -56,47 +60,47 @@ void LidarImuInput::settle(InputResults& out, bool everything) {
   std::vector<InputFault> faults;
   guard_.find_silent(faults);
   report(faults, out);
-  const Utime longest = microseconds(parameters_.output.max_piece_s);
-  const Utime lag = microseconds(parameters_.output.lag_s);
+  const model::Utime longest = microseconds(parameters_.output.max_increment_s);
+  const model::Utime lag = microseconds(parameters_.output.lag_s);
   while (true) {
     const auto now = guard_.now();
     const bool has_item = !waiting_.empty();
     const bool moves = guard_.has_spoken(Sensor::kImu) || guard_.has_spoken(Sensor::kWheels);
     // A piece ends without a sweep where none can come any more for its time, or the next is far.
     const bool near =
-        has_item && piece_end_ && 2 * (waiting_.front().end - *piece_end_) <= 3 * longest;
-    const bool regular =
-        now && moves && piece_end_ && !near && (has_item || *now >= *piece_end_ + longest + lag);
+        has_item && increment_end_ && 2 * (waiting_.front().end - *increment_end_) <= 3 * longest;
+    const bool regular = now && moves && increment_end_ && !near &&
+                         (has_item || *now >= *increment_end_ + longest + lag);
     if (regular) {
-      if (!everything && !is_reached(*piece_end_ + longest)) return;
-      end_piece(*piece_end_ + longest, out);
+      if (!everything && !is_reached(*increment_end_ + longest)) return;
+      end_increment(*increment_end_ + longest, out);
     } else if (has_item) {
       if (!everything && !is_reached(waiting_.front().end)) return;
       Waiting next = std::move(waiting_.front());
       waiting_.pop_front();
-      end_piece(next.end, out);
+      end_increment(next.end, out);
       release(std::move(next), out);
     } else {
-      if (now && moves && !piece_end_) end_piece(*now, out);
+      if (now && moves && !increment_end_) end_increment(*now, out);
       return;
     }
   }
 }
 
-void LidarImuInput::end_piece(Utime utime, InputResults& out) {
-  if (!piece_end_) {
+void LidarImuInput::end_increment(model::Utime utime, InputResults& out) {
+  if (!increment_end_) {
     motion_.begin(utime);
-    piece_end_ = utime;
+    increment_end_ = utime;
     return;
   }
-  if (utime <= *piece_end_) return;
-  if (auto piece = motion_.piece(*piece_end_, utime)) {
-    out.emplace_back(*std::move(piece));
+  if (utime <= *increment_end_) return;
+  if (auto increment = motion_.increment(*increment_end_, utime)) {
+    out.emplace_back(*std::move(increment));
     publish_raw_pose(true, out);
   } else {
     ++counters_.pieces_missing;
   }
-  piece_end_ = utime;
+  increment_end_ = utime;
 }
 
 void LidarImuInput::release(Waiting waiting, InputResults& out) {
@@ -104,15 +108,15 @@ void LidarImuInput::release(Waiting waiting, InputResults& out) {
     ++counters_.sweeps_dropped;
     return;
   }
-  if (auto* scan = std::get_if<PlanarScan>(&waiting.item)) {
+  if (auto* scan = std::get_if<model::PlanarScan>(&waiting.item)) {
     scan_stamp_ = waiting.end;
     out.emplace_back(std::move(*scan));
     return;
   }
-  release_sweep(std::get<PointSweep>(std::move(waiting.item)), waiting.end, out);
+  release_sweep(std::get<model::PointSweep>(std::move(waiting.item)), waiting.end, out);
 }
 
-void LidarImuInput::release_sweep(PointSweep raw, Utime stamp, InputResults& out) {
+void LidarImuInput::release_sweep(model::PointSweep raw, model::Utime stamp, InputResults& out) {
   if (sweep_stamp_ && stamp <= *sweep_stamp_) {
     ++counters_.sweeps_dropped;
     return;
@@ -137,4 +141,4 @@ void LidarImuInput::release_sweep(PointSweep raw, Utime stamp, InputResults& out
   out.emplace_back(std::move(result.sweep));
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace understory {
+namespace understory::lidar_imu_input {
 namespace {
 
 constexpr int kFloorWindows = 200;  // windows that tell how quiet the IMU is at rest
@@ -15,34 +15,34 @@ struct Spread {
 };
 
 template <class Get>
-Spread spread_of(const std::deque<ImuSample>& window, const Get& get) {
+Spread spread_of(const std::deque<model::ImuSample>& window, const Get& get) {
   Spread spread;
-  for (const ImuSample& sample : window) spread.mean += get(sample);
+  for (const model::ImuSample& sample : window) spread.mean += get(sample);
   spread.mean /= static_cast<double>(window.size());
   Eigen::Vector3d squares = Eigen::Vector3d::Zero();
-  for (const ImuSample& sample : window) squares += (get(sample) - spread.mean).cwiseAbs2();
+  for (const model::ImuSample& sample : window) squares += (get(sample) - spread.mean).cwiseAbs2();
   spread.sigma = std::sqrt(squares.maxCoeff() / static_cast<double>(window.size()));
   return spread;
 }
 
 }  // namespace
 
-void StandstillDetector::add_wheel_speed(Utime utime, double speed_mps) {
+void StandstillDetector::add_wheel_speed(model::Utime utime, double speed_mps) {
   if (std::abs(speed_mps) <= parameters_.wheel_speed_mps) return;
   wheels_turned_ = utime;
   has_turned_ = true;
-  is_standing_ = false;
+  is_stationary_ = false;
 }
 
-bool StandstillDetector::wheels_turn(Utime now) const {
+bool StandstillDetector::wheels_turn(model::Utime now) const {
   return has_turned_ && static_cast<double>(now - wheels_turned_) * 1e-6 < parameters_.window_s;
 }
 
 bool StandstillDetector::is_quiet(const std::optional<Eigen::Vector3d>& gyro_bias) {
   const Spread gyro = spread_of(
-      window_, [](const ImuSample& s) -> const auto& { return s.angular_rate_rad_s; });
+      window_, [](const model::ImuSample& s) -> const auto& { return s.angular_rate_rad_s; });
   const Spread force = spread_of(
-      window_, [](const ImuSample& s) -> const auto& { return s.specific_force_mps2; });
+      window_, [](const model::ImuSample& s) -> const auto& { return s.specific_force_mps2; });
   const bool floor_known = floor_windows_ >= kFloorWindows;
   const double most_gyro = floor_known ? std::min(parameters_.gyro_sigma_rad_s,
                                                   parameters_.floor_factor * gyro_floor_ + 1e-4)
@@ -64,27 +64,29 @@ bool StandstillDetector::is_quiet(const std::optional<Eigen::Vector3d>& gyro_bia
   return quiet;
 }
 
-void StandstillDetector::add(const ImuSample& sample,
-                             const std::optional<Eigen::Vector3d>& gyro_bias, bool may_stand) {
+void StandstillDetector::add(const model::ImuSample& sample,
+                             const std::optional<Eigen::Vector3d>& gyro_bias,
+                             bool may_be_stationary) {
   window_.push_back(sample);
   const auto length = [this] {
     return static_cast<double>(window_.back().utime - window_.front().utime) * 1e-6;
   };
   while (window_.size() > 2 && length() > parameters_.window_s) window_.pop_front();
   const bool full = window_.size() >= kFewestSamples && length() > 0.8 * parameters_.window_s;
-  const bool stands = full && may_stand && !wheels_turn(sample.utime) && is_quiet(gyro_bias);
-  if (stands && !is_standing_) since_ = window_.front().utime;
-  is_standing_ = stands;
-  if (stands) longest_s_ = std::max(longest_s_, standing_s());
+  const bool is_stationary =
+      full && may_be_stationary && !wheels_turn(sample.utime) && is_quiet(gyro_bias);
+  if (is_stationary && !is_stationary_) since_ = window_.front().utime;
+  is_stationary_ = is_stationary;
+  if (is_stationary) longest_s_ = std::max(longest_s_, standing_s());
 }
 
 double StandstillDetector::standing_s() const {
-  return is_standing_ ? static_cast<double>(window_.back().utime - since_) * 1e-6 : 0.0;
+  return is_stationary_ ? static_cast<double>(window_.back().utime - since_) * 1e-6 : 0.0;
 }
 
 void StandstillDetector::reset() {
   window_.clear();
-  is_standing_ = false;
+  is_stationary_ = false;
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

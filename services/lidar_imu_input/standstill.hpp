@@ -7,7 +7,7 @@
 #include "common/model/imu.hpp"
 #include "services/lidar_imu_input/parameters.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 
 /// Looks at a short window of IMU samples (and at the wheels, where there are any). While the
 /// vehicle stands for the first time, learns how quiet this IMU is on this vehicle at rest, and
@@ -18,12 +18,12 @@ class StandstillDetector {
 
   /// Samples in frame vehicle. `gyro_bias`: what is known of it; none before it is known.
   /// `may_stand`: false where the velocity is known well enough to say no.
-  void add(const ImuSample& sample, const std::optional<Eigen::Vector3d>& gyro_bias,
-           bool may_stand = true);
-  void add_wheel_speed(Utime utime, double speed_mps);
+  void add(const model::ImuSample& sample, const std::optional<Eigen::Vector3d>& gyro_bias,
+           bool may_be_stationary = true);
+  void add_wheel_speed(model::Utime utime, double speed_mps);
   void reset();  ///< After a gap.
 
-  bool is_standing() const { return is_standing_; }
+  bool is_stationary() const { return is_stationary_; }
   /// For how long without a break, up to the latest sample [s].
   double standing_s() const;
   /// Seconds in the longest stand so far.
@@ -33,24 +33,24 @@ class StandstillDetector {
   /// For saving and loading: what changes while it runs.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.window_, self.is_standing_, self.since_, self.longest_s_, self.wheels_turned_,
+    a(self.window_, self.is_stationary_, self.since_, self.longest_s_, self.wheels_turned_,
       self.has_turned_, self.gyro_floor_, self.force_floor_, self.floor_windows_);
   }
 
  private:
   bool is_quiet(const std::optional<Eigen::Vector3d>& gyro_bias);
-  bool wheels_turn(Utime now) const;
+  bool wheels_turn(model::Utime now) const;
 
   StandstillParameters parameters_;
-  std::deque<ImuSample> window_;
-  bool is_standing_ = false;
-  Utime since_ = 0;
+  std::deque<model::ImuSample> window_;
+  bool is_stationary_ = false;
+  model::Utime since_ = 0;
   double longest_s_ = 0.0;
-  Utime wheels_turned_ = 0;
+  model::Utime wheels_turned_ = 0;
   bool has_turned_ = false;
   double gyro_floor_ = 0.0;  ///< Mean spread at rest; 0 = not known yet.
   double force_floor_ = 0.0;
   int floor_windows_ = 0;
 };
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

@@ -27,7 +27,7 @@
 #include "common/model/point_sweep.hpp"
 #include "common/model/wheels.hpp"
 
-namespace understory::state {
+namespace understory::lidar_imu_input {
 
 template <class T>
 concept Number = std::is_arithmetic_v<T> || std::is_enum_v<T>;
@@ -50,28 +50,28 @@ template <class Self, class T>
 concept Is = std::same_as<std::remove_const_t<Self>, T>;
 
 template <class Archive, class Self>
-requires Is<Self, ImuSample>
+requires Is<Self, model::ImuSample>
 void archive(Archive& a, Self& s) {
   a(s.utime, s.sequence, s.angular_rate_rad_s, s.specific_force_mps2);
 }
 template <class Archive, class Self>
-requires Is<Self, WheelSample>
+requires Is<Self, model::WheelSample>
 void archive(Archive& a, Self& s) { a(s.utime, s.sequence, s.speed_mps, s.steering_rad); }
 template <class Archive, class Self>
-requires Is<Self, GnssFix>
+requires Is<Self, model::GnssFix>
 void archive(Archive& a, Self& s) {
   a(s.utime, s.sequence, s.east_north_m, s.sigma_m, s.velocity_mps, s.velocity_sigma_mps);
 }
 template <class Archive, class Self>
-requires Is<Self, VelocityCorrection>
+requires Is<Self, model::VelocityCorrection>
 void archive(Archive& a, Self& s) { a(s.utime, s.sequence, s.velocity_mps, s.bias, s.covariance); }
 template <class Archive, class Self>
-requires Is<Self, PlanarScan>
+requires Is<Self, model::PlanarScan>
 void archive(Archive& a, Self& s) {
   a(s.utime, s.sequence, s.first_bearing_rad, s.bearing_step_rad, s.max_range_m, s.ranges_m);
 }
 template <class Archive, class Self>
-requires Is<Self, SweepPoint>
+requires Is<Self, model::SweepPoint>
 void archive(Archive& a, Self& s) { a(s.x_m, s.y_m, s.z_m, s.time_s, s.ring, s.intensity); }
 
 /// Appends values to bytes.
@@ -92,7 +92,7 @@ class Writer {
       put_bytes(value.data(), sizeof(typename T::Scalar) * T::SizeAtCompileTime);
     } else if constexpr (std::same_as<T, Eigen::Quaterniond>) {
       put(value.coeffs());
-    } else if constexpr (std::same_as<T, SE2>) {
+    } else if constexpr (std::same_as<T, geometry::SE2>) {
       put(value.coordinates());
     } else if constexpr (kIsOptional<T>) {
       put(value.has_value());
@@ -136,10 +136,10 @@ class Reader {
       get_bytes(value.data(), sizeof(typename T::Scalar) * T::SizeAtCompileTime);
     } else if constexpr (std::same_as<T, Eigen::Quaterniond>) {
       get(value.coeffs());
-    } else if constexpr (std::same_as<T, SE2>) {
+    } else if constexpr (std::same_as<T, geometry::SE2>) {
       Eigen::Vector3d coordinates;
       get(coordinates);
-      value = SE2(coordinates.head<2>(), coordinates.z());
+      value = geometry::SE2(coordinates.head<2>(), coordinates.z());
     } else if constexpr (kIsOptional<T>) {
       bool is_there = false;
       get(is_there);
@@ -167,4 +167,4 @@ class Reader {
   std::string_view bytes_;
 };
 
-}  // namespace understory::state
+}  // namespace understory::lidar_imu_input

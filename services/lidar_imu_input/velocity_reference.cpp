@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace understory {
+namespace understory::lidar_imu_input {
 namespace {
 
 constexpr double kFastEnough_mps = 2.0;
@@ -15,7 +15,7 @@ constexpr double kCourseSigma_rad = 0.03;  // of the course against the heading:
 
 /// East, north and sigma.
 std::optional<std::pair<Eigen::Vector2d, double>> velocity_of(
-    const GnssFix& fix, const std::optional<GnssFix>& previous) {
+    const model::GnssFix& fix, const std::optional<model::GnssFix>& previous) {
   if (fix.velocity_mps) {
     const double sigma = fix.velocity_sigma_mps > 0.0 ? fix.velocity_sigma_mps : kUnknownSigma_mps;
     return std::pair{*fix.velocity_mps, sigma};
@@ -30,7 +30,8 @@ std::optional<std::pair<Eigen::Vector2d, double>> velocity_of(
 
 }  // namespace
 
-std::optional<ReferenceVelocity> VelocityReference::add(const GnssFix& fix, double heading_rad) {
+std::optional<ReferenceVelocity> VelocityReference::add(const model::GnssFix& fix,
+                                                        double heading_rad) {
   const auto velocity = velocity_of(fix, previous_);
   previous_ = fix;
   if (!velocity) return std::nullopt;
@@ -58,4 +59,4 @@ std::optional<ReferenceVelocity> VelocityReference::add(const GnssFix& fix, doub
   return reference;
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

@@ -5,7 +5,7 @@
 
 #include "common/model/gnss.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 
 /// What a fix says about the vehicle, given that it moves where it points.
 struct ReferenceVelocity {
@@ -19,7 +19,7 @@ class VelocityReference {
  public:
   /// `heading_rad`: of the vehicle in odom at the fix. None before the first velocity that is fast
   /// enough to tell how odom lies to east and north. Fixes without velocity are differenced.
-  std::optional<ReferenceVelocity> add(const GnssFix& fix, double heading_rad);
+  std::optional<ReferenceVelocity> add(const model::GnssFix& fix, double heading_rad);
 
   /// For saving and loading: what changes while it runs.
   template <class Archive, class Self>
@@ -28,9 +28,9 @@ class VelocityReference {
   }
 
  private:
-  std::optional<GnssFix> previous_;
+  std::optional<model::GnssFix> previous_;
   std::optional<double> east_to_odom_rad_;  ///< How odom lies; grows more certain fix by fix.
   double east_to_odom_variance_ = 0.0;
 };
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

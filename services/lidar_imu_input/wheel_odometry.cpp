@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-namespace understory {
+namespace understory::lidar_imu_input {
 namespace {
 
 double square(double value) { return value * value; }
 
-double seconds_between(Utime from, Utime to) { return static_cast<double>(to - from) * 1e-6; }
+double seconds_between(model::Utime from, model::Utime to) {
+  return static_cast<double>(to - from) * 1e-6;
+}
 
 }  // namespace
 
@@ -16,7 +18,7 @@ double axle_speed(const CarGeometry& car, double encoder_speed_mps, double steer
   return encoder_speed_mps / (1.0 - std::tan(steering_rad) * car.encoder_left_m / car.wheelbase_m);
 }
 
-void WheelOdometry::add(const WheelSample& sample) {
+void WheelOdometry::add(const model::WheelSample& sample) {
   if (!samples_.empty() && sample.utime <= samples_.back().utime) {
     ++out_of_order_;
     return;
@@ -24,7 +26,8 @@ void WheelOdometry::add(const WheelSample& sample) {
   samples_.push_back(sample);
 }
 
-SE2WithCovariance WheelOdometry::step(const WheelSample& sample, double seconds) const {
+geometry::SE2WithCovariance WheelOdometry::step(const model::WheelSample& sample,
+                                                double seconds) const {
   const CarGeometry& car = parameters_.car;
   const WheelNoise& noise = parameters_.noise;
   const double speed = axle_speed(car, sample.speed_mps, sample.steering_rad);
@@ -45,19 +48,20 @@ SE2WithCovariance WheelOdometry::step(const WheelSample& sample, double seconds)
   covariance(0, 2) = along * turn_per_m;
   covariance(2, 0) = covariance(0, 2);
 
-  return {SE2::Exp({speed * seconds, 0.0, speed * turn_per_m * seconds}), covariance};
+  return {geometry::SE2::Exp({speed * seconds, 0.0, speed * turn_per_m * seconds}), covariance};
 }
 
-std::optional<SE2WithCovariance> WheelOdometry::integrate(Utime from, Utime to) {
+std::optional<geometry::SE2WithCovariance> WheelOdometry::integrate(model::Utime from,
+                                                                    model::Utime to) {
   // The sample in force at `from` is the last one that is not later.
   while (samples_.size() > 1 && samples_[1].utime <= from) samples_.pop_front();
   if (samples_.empty() || samples_.front().utime > from) return std::nullopt;
 
-  SE2WithCovariance motion;
-  Utime at = from;
+  geometry::SE2WithCovariance motion;
+  model::Utime at = from;
   for (std::size_t i = 0; i < samples_.size() && at < to; ++i) {
     const bool last = i + 1 == samples_.size();
-    const Utime until = last ? to : std::min(to, samples_[i + 1].utime);
+    const model::Utime until = last ? to : std::min(to, samples_[i + 1].utime);
     if (seconds_between(samples_[i].utime, until) > parameters_.max_gap_s) return std::nullopt;
     motion = compound(motion, step(samples_[i], seconds_between(at, until)));
     at = until;
@@ -68,9 +72,9 @@ std::optional<SE2WithCovariance> WheelOdometry::integrate(Utime from, Utime to) 
   return motion;
 }
 
-std::optional<Odometry> WheelOdometry::advance_to(Utime stamp) {
+std::optional<model::Odometry> WheelOdometry::advance_to(model::Utime stamp) {
   if (last_stamp_ && stamp <= *last_stamp_) return std::nullopt;
-  const std::optional<Utime> from = last_stamp_;
+  const std::optional<model::Utime> from = last_stamp_;
   last_stamp_ = stamp;
   if (!from) return std::nullopt;
   const auto motion = integrate(*from, stamp);
@@ -78,16 +82,16 @@ std::optional<Odometry> WheelOdometry::advance_to(Utime stamp) {
     ++without_samples_;
     return std::nullopt;
   }
-  Odometry odometry;
+  model::Odometry odometry;
   odometry.from_utime = *from;
   odometry.utime = stamp;
   odometry.sequence = sequence_++;
-  const SE2& axle_T_vehicle = parameters_.car.axle_T_vehicle;
-  const SE2 vehicle_T_axle = axle_T_vehicle.inverse();
+  const geometry::SE2& axle_T_vehicle = parameters_.car.axle_T_vehicle;
+  const geometry::SE2 vehicle_T_axle = axle_T_vehicle.inverse();
   odometry.from_T_to = vehicle_T_axle * motion->mean * axle_T_vehicle;
   const Eigen::Matrix3d adjoint = vehicle_T_axle.Adjoint();
   odometry.covariance = adjoint * motion->covariance * adjoint.transpose();
   return odometry;
 }
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

@@ -8,7 +8,7 @@
 #include "common/model/odometry.hpp"
 #include "common/model/wheels.hpp"
 
-namespace understory {
+namespace understory::lidar_imu_input {
 
 /// A car with Ackermann steering; defaults: the Victoria Park car.
 struct CarGeometry {
@@ -16,7 +16,7 @@ struct CarGeometry {
   /// How far the encoder's wheel is left of the middle of the rear axle [m].
   double encoder_left_m = 0.76;
   /// Frame `vehicle` seen from the middle of the rear axle.
-  SE2 axle_T_vehicle;
+  geometry::SE2 axle_T_vehicle;
 };
 
 /// What the wheels do not know. Errors of scale and steering persist for a while: they are given as
@@ -51,11 +51,11 @@ class WheelOdometry {
       : parameters_(parameters) {}
 
   /// Takes a sample; one that does not come after its predecessor is ignored and counted.
-  void add(const WheelSample& sample);
+  void add(const model::WheelSample& sample);
   /// The motion of `vehicle` from the previous stamp to this one. None at the first stamp, when the
   /// stamp does not come after the previous one, and when samples are missing in between; the next
   /// interval starts at `stamp` all the same.
-  std::optional<Odometry> advance_to(Utime stamp);
+  std::optional<model::Odometry> advance_to(model::Utime stamp);
 
   std::uint64_t samples_out_of_order() const { return out_of_order_; }
   std::uint64_t intervals_without_samples() const { return without_samples_; }
@@ -67,15 +67,15 @@ class WheelOdometry {
   }
 
  private:
-  std::optional<SE2WithCovariance> integrate(Utime from, Utime to);
-  SE2WithCovariance step(const WheelSample& sample, double seconds) const;
+  std::optional<geometry::SE2WithCovariance> integrate(model::Utime from, model::Utime to);
+  geometry::SE2WithCovariance step(const model::WheelSample& sample, double seconds) const;
 
   WheelOdometryParameters parameters_;
-  std::deque<WheelSample> samples_;  ///< From the one in force at `last_stamp_` on.
-  std::optional<Utime> last_stamp_;
+  std::deque<model::WheelSample> samples_;  ///< From the one in force at `last_stamp_` on.
+  std::optional<model::Utime> last_stamp_;
   std::uint64_t sequence_ = 0;
   std::uint64_t out_of_order_ = 0;
   std::uint64_t without_samples_ = 0;
 };
 
-}  // namespace understory
+}  // namespace understory::lidar_imu_input

@@ -5,7 +5,7 @@
 
 #include "common/bus/service.hpp"
 
-namespace understory {
+namespace understory::velodyne_driver {
 
 struct VelodyneDriverChannels {
   std::string raw_sweep = "RAW_SWEEP";
@@ -13,6 +13,6 @@ struct VelodyneDriverChannels {
 };
 
 /// Its adapter is a Device (common/bus/device.hpp).
-Service velodyne_driver_service(const VelodyneDriverChannels& channels = {});
+bus::Service velodyne_driver_service(const VelodyneDriverChannels& channels = {});
 
-}  // namespace understory
+}  // namespace understory::velodyne_driver

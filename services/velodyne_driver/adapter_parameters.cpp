@@ -1,9 +1,9 @@
 #include "services/velodyne_driver/adapter_parameters.hpp"
 
-namespace understory {
+namespace understory::velodyne_driver {
 namespace {
 
-void describe_network(VelodyneNetworkParameters& p, ParameterTable& table) {
+void describe_network(VelodyneNetworkParameters& p, bus::ParameterTable& table) {
   table.add("network.bind_address", p.bind_address, {},
             "This computer's IPv4 address to listen on; 0.0.0.0: all, and broadcasts.");
   table.add("network.sensor_address", p.sensor_address, {},
@@ -15,7 +15,7 @@ void describe_network(VelodyneNetworkParameters& p, ParameterTable& table) {
             "Asked of the kernel, which gives at most net.core.rmem_max.");
 }
 
-void describe_sensor(VelodyneSensorParameters& p, ParameterTable& table) {
+void describe_sensor(VelodyneSensorParameters& p, bus::ParameterTable& table) {
   table.add("sensor.model", p.model, {"vlp16", "vlp32c", "hdl32e", "hdl64e"},
             "What the packets are of.");
   table.add("sensor.calibration_file", p.calibration_file, {},
@@ -28,7 +28,7 @@ void describe_sensor(VelodyneSensorParameters& p, ParameterTable& table) {
 
 }  // namespace
 
-void describe(VelodyneDriverParameters& p, ParameterTable& table) {
+void describe(VelodyneDriverParameters& p, bus::ParameterTable& table) {
   describe_network(p.network, table);
   describe_sensor(p.sensor, table);
   table.add("time.source", p.time.source, {"sensor", "received"},
@@ -44,4 +44,4 @@ void describe(VelodyneDriverParameters& p, ParameterTable& table) {
             "East.");
 }
 
-}  // namespace understory
+}  // namespace understory::velodyne_driver

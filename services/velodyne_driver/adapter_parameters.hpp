@@ -4,8 +4,8 @@
 #include "common/bus/parameter_table.hpp"
 #include "services/velodyne_driver/parameters.hpp"
 
-namespace understory {
+namespace understory::velodyne_driver {
 
-void describe(VelodyneDriverParameters& parameters, ParameterTable& table);
+void describe(VelodyneDriverParameters& parameters, bus::ParameterTable& table);
 
-}  // namespace understory
+}  // namespace understory::velodyne_driver

@@ -5,16 +5,16 @@
 
 #include "common/io/velodyne.hpp"
 
-namespace understory {
+namespace understory::velodyne_driver {
 
 struct VelodyneNetworkParameters {
   /// 0.0.0.0 = every address of this computer; another hears no broadcasts, which is how the
   /// sensors send as they come.
   std::string bind_address = "0.0.0.0";
   std::string sensor_address;  ///< Packets of others are refused; empty = whoever spoke first.
-  int data_port = kVelodyneDataPort;          ///< 0 = any free one; LOG says which.
-  int position_port = kVelodynePositionPort;  ///< 0 = any free one.
-  int receive_buffer_bytes = 4194304;         ///< Asked of the kernel.
+  int data_port = io::kVelodyneDataPort;          ///< 0 = any free one; LOG says which.
+  int position_port = io::kVelodynePositionPort;  ///< 0 = any free one.
+  int receive_buffer_bytes = 4194304;             ///< Asked of the kernel.
 };
 
 struct VelodyneSensorParameters {
@@ -43,4 +43,4 @@ struct VelodyneDriverParameters {
   VelodyneGnssParameters gnss;
 };
 
-}  // namespace understory
+}  // namespace understory::velodyne_driver

@@ -12,7 +12,7 @@
 #include <cstring>
 #include <stdexcept>
 
-namespace understory {
+namespace understory::velodyne_driver {
 namespace {
 
 [[noreturn]] void fail(int file, const std::string& address, int port) {
@@ -21,7 +21,7 @@ namespace {
   throw std::runtime_error(fmt::format("UDP port {} of {}: {}", port, address, reason));
 }
 
-Utime wall_now() {
+model::Utime wall_now() {
   return std::chrono::duration_cast<std::chrono::microseconds>(
              std::chrono::system_clock::now().time_since_epoch())
       .count();
@@ -52,7 +52,7 @@ UdpSocket::UdpSocket(const std::string& address, int port, int receive_buffer_by
   if (file_ < 0) fail(file_, address, port);
   ::setsockopt(file_, SOL_SOCKET, SO_RCVBUF, &receive_buffer_bytes, sizeof(receive_buffer_bytes));
   switch_on(file_, SO_TIMESTAMP);
-  tells_overruns_ = switch_on(file_, SO_RXQ_OVFL);
+  reports_overruns_ = switch_on(file_, SO_RXQ_OVFL);
   sockaddr_in name{};
   name.sin_family = AF_INET;
   name.sin_addr.s_addr = htonl(*host);
@@ -96,7 +96,7 @@ std::optional<Datagram> UdpSocket::receive() {
     if (c->cmsg_type == SCM_TIMESTAMP) {
       timeval time{};
       std::memcpy(&time, CMSG_DATA(c), sizeof(time));
-      datagram.received = Utime{time.tv_sec} * 1'000'000 + time.tv_usec;
+      datagram.received = model::Utime{time.tv_sec} * 1'000'000 + time.tv_usec;
     } else if (c->cmsg_type == SO_RXQ_OVFL) {
       std::uint32_t count = 0;
       std::memcpy(&count, CMSG_DATA(c), sizeof(count));
@@ -108,4 +108,4 @@ std::optional<Datagram> UdpSocket::receive() {
   return datagram;
 }
 
-}  // namespace understory
+}  // namespace understory::velodyne_driver

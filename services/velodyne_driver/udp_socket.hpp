@@ -9,12 +9,12 @@
 
 #include "common/model/landmarks.hpp"
 
-namespace understory {
+namespace understory::velodyne_driver {
 
 struct Datagram {
   std::span<const std::uint8_t> bytes;  ///< Until the next receive().
   std::size_t size = 0;                 ///< As sent; larger than `bytes` where it was cut off.
-  Utime received = 0;                   ///< By the kernel, computer's clock [us since 1970].
+  model::Utime received = 0;            ///< By the kernel, computer's clock [us since 1970].
   std::uint32_t sender = 0;             ///< IPv4, host's byte order.
 };
 
@@ -39,7 +39,7 @@ class UdpSocket {
   int receive_buffer_bytes() const { return receive_buffer_bytes_; }
   /// Datagrams that the kernel threw away since nobody took them in time.
   std::uint64_t overruns() const { return overruns_; }
-  bool tells_overruns() const { return tells_overruns_; }
+  bool reports_overruns() const { return reports_overruns_; }
   std::uint64_t errors() const { return errors_; }
   const std::string& last_error() const { return last_error_; }
 
@@ -47,7 +47,7 @@ class UdpSocket {
   int file_ = -1;
   int port_ = 0;
   int receive_buffer_bytes_ = 0;
-  bool tells_overruns_ = false;
+  bool reports_overruns_ = false;
   std::uint32_t kernel_count_ = 0;
   std::uint64_t overruns_ = 0;
   std::uint64_t errors_ = 0;
@@ -55,4 +55,4 @@ class UdpSocket {
   std::array<std::uint8_t, 2048> buffer_{};
 };
 
-}  // namespace understory
+}  // namespace understory::velodyne_driver

@@ -3,17 +3,18 @@
 #include <cmath>
 #include <cstdlib>
 
-namespace understory {
+namespace understory::velodyne_driver {
 namespace {
 
-constexpr Utime kHour_us = 3'600'000'000;
-constexpr Utime kOffsetPeriod_us = 10'000'000;
+constexpr model::Utime kHour_us = 3'600'000'000;
+constexpr model::Utime kOffsetPeriod_us = 10'000'000;
 /// Sensor's and computer's clock may differ so much in what passed between two packets.
-constexpr Utime kLargestMismatch_us = 1'000'000;
+constexpr model::Utime kLargestMismatch_us = 1'000'000;
 
 /// The difference that is nearest to zero.
-Utime hour_difference(std::uint32_t from, std::uint32_t to) {
-  const Utime difference = (static_cast<Utime>(to) - static_cast<Utime>(from)) % kHour_us;
+model::Utime hour_difference(std::uint32_t from, std::uint32_t to) {
+  const model::Utime difference =
+      (static_cast<model::Utime>(to) - static_cast<model::Utime>(from)) % kHour_us;
   if (difference > kHour_us / 2) return difference - kHour_us;
   if (difference <= -kHour_us / 2) return difference + kHour_us;
   return difference;
@@ -21,14 +22,14 @@ Utime hour_difference(std::uint32_t from, std::uint32_t to) {
 
 }  // namespace
 
-void VelodyneClock::lay(std::uint32_t past_hour_us, Utime received) {
+void VelodyneClock::lay(std::uint32_t past_hour_us, model::Utime received) {
   const double hours =
       std::round(static_cast<double>(received - past_hour_us) / static_cast<double>(kHour_us));
-  utime_ = static_cast<Utime>(hours) * kHour_us + past_hour_us;
+  utime_ = static_cast<model::Utime>(hours) * kHour_us + past_hour_us;
 }
 
-void VelodyneClock::measure(Utime received) {
-  const Utime period = utime_ / kOffsetPeriod_us;
+void VelodyneClock::measure(model::Utime received) {
+  const model::Utime period = utime_ / kOffsetPeriod_us;
   if (period != period_) {
     offset_before_ = offset_;
     offset_ = kNone;
@@ -37,20 +38,20 @@ void VelodyneClock::measure(Utime received) {
   offset_ = std::min(offset_, received - utime_);
 }
 
-VelodyneClock::Reading VelodyneClock::take(std::uint32_t past_hour_us, Utime received) {
+VelodyneClock::Reading VelodyneClock::take(std::uint32_t past_hour_us, model::Utime received) {
   Step step = Step::kNext;
   if (!has_started_) {
     has_started_ = true;
     lay(past_hour_us, received);
   } else {
-    const Utime passed = received - received_;
-    Utime delta = hour_difference(past_hour_us_, past_hour_us);
+    const model::Utime passed = received - received_;
+    model::Utime delta = hour_difference(past_hour_us_, past_hour_us);
     if (std::abs(delta - passed) <= kLargestMismatch_us) {
       if (delta < 0 && delta >= -kLargestDisorder_us) return {Step::kLate, utime_ + delta};
       utime_ += delta;
     } else {
       // Silent for more than half an hour, or one of the clocks was set.
-      const Utime before = utime_;
+      const model::Utime before = utime_;
       lay(past_hour_us, received);
       delta = utime_ - before;
       forget_offset();
@@ -67,10 +68,10 @@ VelodyneClock::Reading VelodyneClock::take(std::uint32_t past_hour_us, Utime rec
   return {step, utime_};
 }
 
-std::optional<Utime> VelodyneClock::offset_us() const {
-  const Utime least = std::min(offset_, offset_before_);
+std::optional<model::Utime> VelodyneClock::offset_us() const {
+  const model::Utime least = std::min(offset_, offset_before_);
   if (least == kNone) return std::nullopt;
   return least;
 }
 
-}  // namespace understory
+}  // namespace understory::velodyne_driver

@@ -8,7 +8,7 @@
 
 #include "common/model/landmarks.hpp"
 
-namespace understory {
+namespace understory::velodyne_driver {
 
 /// The first packet's time is laid onto the hour that brings it nearest to when it came; from then
 /// on it is counted on, so that a sensor half an hour off never changes the hour in between.
@@ -22,30 +22,30 @@ class VelodyneClock {
   };
   struct Reading {
     Step step = Step::kNext;
-    Utime utime = 0;  ///< By the sensor's clock.
+    model::Utime utime = 0;  ///< By the sensor's clock.
   };
   /// `received` by the computer's clock.
-  Reading take(std::uint32_t past_hour_us, Utime received);
+  Reading take(std::uint32_t past_hour_us, model::Utime received);
   /// How far the computer's clock is ahead of the sensor's: the least (the least delayed packet) of
   /// the last ten to twenty seconds [us]; none before the first packet.
-  std::optional<Utime> offset_us() const;
+  std::optional<model::Utime> offset_us() const;
 
-  static constexpr Utime kLargestGap_us = 50000;
-  static constexpr Utime kLargestDisorder_us = 20000;
+  static constexpr model::Utime kLargestGap_us = 50000;
+  static constexpr model::Utime kLargestDisorder_us = 20000;
 
  private:
-  void lay(std::uint32_t past_hour_us, Utime received);
-  void measure(Utime received);
+  void lay(std::uint32_t past_hour_us, model::Utime received);
+  void measure(model::Utime received);
   void forget_offset() { offset_ = offset_before_ = kNone; }
 
-  static constexpr Utime kNone = std::numeric_limits<Utime>::max();
+  static constexpr model::Utime kNone = std::numeric_limits<model::Utime>::max();
   bool has_started_ = false;
-  Utime utime_ = 0;
+  model::Utime utime_ = 0;
   std::uint32_t past_hour_us_ = 0;
-  Utime received_ = 0;
-  Utime offset_ = kNone;         ///< Least of this period.
-  Utime offset_before_ = kNone;  ///< Least of the one before.
-  Utime period_ = 0;
+  model::Utime received_ = 0;
+  model::Utime offset_ = kNone;         ///< Least of this period.
+  model::Utime offset_before_ = kNone;  ///< Least of the one before.
+  model::Utime period_ = 0;
 };
 
-}  // namespace understory
+}  // namespace understory::velodyne_driver

@@ -5,16 +5,16 @@
 #include <cmath>
 #include <utility>
 
-namespace understory {
+namespace understory::velodyne_driver {
 namespace {
 
-std::optional<LocalPlane> plane_of(const VelodyneGnssParameters& parameters) {
+std::optional<io::LocalPlane> plane_of(const VelodyneGnssParameters& parameters) {
   if (!parameters.has_origin) return std::nullopt;
-  return LocalPlane(parameters.origin_latitude_deg, parameters.origin_longitude_deg);
+  return io::LocalPlane(parameters.origin_latitude_deg, parameters.origin_longitude_deg);
 }
 
-Refusal wrong_size(std::size_t size, std::size_t right) {
-  return {size < right ? Reason::kTooShort : Reason::kTooLong,
+wire::Refusal wrong_size(std::size_t size, std::size_t right) {
+  return {size < right ? wire::Reason::kTooShort : wire::Reason::kTooLong,
           fmt::format("a packet of {} bytes, not {}", size, right)};
 }
 
@@ -27,31 +27,31 @@ bool is_empty_sentence(std::span<const std::uint8_t> packet) {
 }  // namespace
 
 VelodyneDriver::VelodyneDriver(const VelodyneDriverParameters& parameters,
-                               VelodyneCalibration calibration)
+                               io::VelodyneCalibration calibration)
     : parameters_(parameters),
       calibration_(std::move(calibration)),
       decoder_(calibration_, parameters.sensor.max_range_m),
       fixes_(plane_of(parameters.gnss)) {}
 
 bool VelodyneDriver::refuse(std::span<const std::uint8_t> packet, std::size_t size,
-                            std::vector<Refusal>& faults) {
+                            std::vector<wire::Refusal>& faults) {
   if (size != packet.size()) packet = {};
   const auto fault = check_velodyne_packet(packet, calibration_.model);
   if (!fault) return false;
   switch (*fault) {
-    case VelodynePacketFault::kWrongSize:
+    case io::VelodynePacketFault::kWrongSize:
       ++counts_.wrong_size;
-      faults.push_back(wrong_size(size, kVelodyneDataBytes));
+      faults.push_back(wrong_size(size, io::kVelodyneDataBytes));
       break;
-    case VelodynePacketFault::kOtherModel:
+    case io::VelodynePacketFault::kOtherModel:
       ++counts_.wrong_model;
       faults.push_back(
-          {Reason::kWrongType, fmt::format("a packet that no {} sends (product {:#x})",
-                                           to_string(calibration_.model), packet.back())});
+          {wire::Reason::kWrongType, fmt::format("a packet that no {} sends (product {:#x})",
+                                                 to_string(calibration_.model), packet.back())});
       break;
-    case VelodynePacketFault::kDamaged:
+    case io::VelodynePacketFault::kDamaged:
       ++counts_.damaged;
-      faults.push_back({Reason::kInconsistent, "a packet with impossible flags or azimuths"});
+      faults.push_back({wire::Reason::kInconsistent, "a packet with impossible flags or azimuths"});
       break;
   }
   return true;
@@ -59,42 +59,44 @@ bool VelodyneDriver::refuse(std::span<const std::uint8_t> packet, std::size_t si
 
 void VelodyneDriver::start_over() {
   // Turns that were begun are numbered too: the number must not come again.
-  next_turn_ += decoder_.counts().turns + 1;
-  decoder_ = VelodyneDecoder(calibration_, parameters_.sensor.max_range_m);
+  next_revolution_ += decoder_.counts().turns + 1;
+  decoder_ = io::VelodyneDecoder(calibration_, parameters_.sensor.max_range_m);
   holes_had_ = 0;
 }
 
-std::optional<PointSweep> VelodyneDriver::stamped(std::optional<PointSweep> turn) {
+std::optional<model::PointSweep> VelodyneDriver::stamped(std::optional<model::PointSweep> turn) {
   if (!turn) return turn;
   ++counts_.turns;
-  turn->turn += next_turn_;
+  turn->turn += next_revolution_;
   turn->sequence = turn->turn;
   if (parameters_.time.source == "received") turn->utime += clock_.offset_us().value_or(0);
   return turn;
 }
 
 VelodyneDriverOutput VelodyneDriver::add_data(std::span<const std::uint8_t> packet,
-                                              std::size_t size, Utime received) {
+                                              std::size_t size, model::Utime received) {
   VelodyneDriverOutput output;
   ++counts_.data_packets;
   if (refuse(packet, size, output.faults)) return output;
-  const VelodyneClock::Reading time = clock_.take(velodyne_packet_time_us(packet), received);
+  const VelodyneClock::Reading time = clock_.take(io::velodyne_packet_time_us(packet), received);
   switch (time.step) {
     case VelodyneClock::Step::kNext:
       break;
     case VelodyneClock::Step::kLate:
       ++counts_.late;
-      output.faults.push_back({Reason::kLate, "a packet that is older than the one before it"});
+      output.faults.push_back(
+          {wire::Reason::kLate, "a packet that is older than the one before it"});
       return output;
     case VelodyneClock::Step::kGap:
       ++counts_.gaps;
-      output.faults.push_back({Reason::kPartsMissing, "packets stayed away: a turn is left out"});
+      output.faults.push_back(
+          {wire::Reason::kPartsMissing, "packets stayed away: a turn is left out"});
       start_over();
       break;
     case VelodyneClock::Step::kJump:
       ++counts_.jumps;
       output.faults.push_back(
-          {Reason::kClockJump, "the sensor's clock jumped: a turn is left out"});
+          {wire::Reason::kClockJump, "the sensor's clock jumped: a turn is left out"});
       start_over();
       break;
   }
@@ -102,43 +104,45 @@ VelodyneDriverOutput VelodyneDriver::add_data(std::span<const std::uint8_t> pack
   if (decoder_.counts().lost_azimuth > holes_had_) {
     holes_had_ = decoder_.counts().lost_azimuth;
     ++counts_.holes;
-    output.faults.push_back({Reason::kPartsMissing, "packets are missing: a turn has a hole"});
+    output.faults.push_back(
+        {wire::Reason::kPartsMissing, "packets are missing: a turn has a hole"});
   }
   return output;
 }
 
 VelodyneDriverOutput VelodyneDriver::add_position(std::span<const std::uint8_t> packet,
-                                                  std::size_t size, Utime received) {
+                                                  std::size_t size, model::Utime received) {
   VelodyneDriverOutput output;
   ++counts_.position_packets;
-  if (size != kVelodynePositionBytes || packet.size() != size) {
+  if (size != io::kVelodynePositionBytes || packet.size() != size) {
     ++counts_.bad_positions;
-    output.faults.push_back(wrong_size(size, kVelodynePositionBytes));
+    output.faults.push_back(wrong_size(size, io::kVelodynePositionBytes));
     return output;
   }
-  const auto position = parse_velodyne_position(packet);
+  const auto position = io::parse_velodyne_position(packet);
   if (position) {
     output.fix = fixes_.add(*position, received);
     if (output.fix) ++counts_.fixes;
   } else if (!is_empty_sentence(packet)) {
     ++counts_.bad_positions;
-    output.faults.push_back({Reason::kInconsistent, "no GPRMC sentence, or its checksum is wrong"});
+    output.faults.push_back(
+        {wire::Reason::kInconsistent, "no GPRMC sentence, or its checksum is wrong"});
   }
   return output;
 }
 
-std::optional<PointSweep> VelodyneDriver::finish() { return stamped(decoder_.finish()); }
+std::optional<model::PointSweep> VelodyneDriver::finish() { return stamped(decoder_.finish()); }
 
-std::optional<Refusal> VelodyneDriver::clock_fault() const {
+std::optional<wire::Refusal> VelodyneDriver::clock_fault() const {
   const auto offset = clock_.offset_us();
   if (!offset || parameters_.time.source != "sensor") return std::nullopt;
   const double offset_s = 1e-6 * static_cast<double>(*offset);
   if (std::abs(offset_s) <= parameters_.time.tolerance_s) return std::nullopt;
-  return Refusal{
-      Reason::kClockJump,
+  return wire::Refusal{
+      wire::Reason::kClockJump,
       fmt::format("the sensor's clock is {:.3f} s behind the computer's: without PPS and "
                   "NMEA set time.source = \"received\"",
                   offset_s)};
 }
 
-}  // namespace understory
+}  // namespace understory::velodyne_driver

@@ -22,7 +22,7 @@
 #include "services/velodyne_driver/parameters.hpp"
 #include "services/velodyne_driver/velodyne_clock.hpp"
 
-namespace understory {
+namespace understory::velodyne_driver {
 
 struct VelodyneDriverCounts {
   std::uint64_t data_packets = 0;  ///< All that came to the data port.
@@ -42,44 +42,45 @@ struct VelodyneDriverCounts {
 };
 
 struct VelodyneDriverOutput {
-  std::optional<PointSweep> turn;
-  std::optional<GnssFix> fix;
-  std::vector<Refusal> faults;
+  std::optional<model::PointSweep> turn;
+  std::optional<model::GnssFix> fix;
+  std::vector<wire::Refusal> faults;
 };
 
 class VelodyneDriver {
  public:
-  VelodyneDriver(const VelodyneDriverParameters& parameters, VelodyneCalibration calibration);
+  VelodyneDriver(const VelodyneDriverParameters& parameters, io::VelodyneCalibration calibration);
 
   /// `size`: of the packet as sent, where `packet` holds only its begin. `received`: when it came,
   /// by the computer's clock.
   VelodyneDriverOutput add_data(std::span<const std::uint8_t> packet, std::size_t size,
-                                Utime received);
+                                model::Utime received);
   VelodyneDriverOutput add_position(std::span<const std::uint8_t> packet, std::size_t size,
-                                    Utime received);
+                                    model::Utime received);
   /// The turn under way, where it is as good as whole.
-  std::optional<PointSweep> finish();
+  std::optional<model::PointSweep> finish();
 
   const VelodyneDriverCounts& counts() const { return counts_; }
   /// How far the computer's clock is ahead of the sensor's [us].
-  std::optional<Utime> clock_offset_us() const { return clock_.offset_us(); }
+  std::optional<model::Utime> clock_offset_us() const { return clock_.offset_us(); }
   /// What is wrong with the sensor's clock as it stands, if anything is.
-  std::optional<Refusal> clock_fault() const;
+  std::optional<wire::Refusal> clock_fault() const;
 
  private:
-  bool refuse(std::span<const std::uint8_t> packet, std::size_t size, std::vector<Refusal>& faults);
+  bool refuse(std::span<const std::uint8_t> packet, std::size_t size,
+              std::vector<wire::Refusal>& faults);
   /// Gives up the turn under way: what comes is not its continuation.
   void start_over();
-  std::optional<PointSweep> stamped(std::optional<PointSweep> turn);
+  std::optional<model::PointSweep> stamped(std::optional<model::PointSweep> turn);
 
   VelodyneDriverParameters parameters_;
-  VelodyneCalibration calibration_;
-  VelodyneDecoder decoder_;
+  io::VelodyneCalibration calibration_;
+  io::VelodyneDecoder decoder_;
   VelodyneClock clock_;
-  VelodyneFixes fixes_;
+  io::VelodyneFixes fixes_;
   VelodyneDriverCounts counts_;
-  std::uint64_t next_turn_ = 0;  ///< The number that the decoder's turn 0 has.
-  std::uint64_t holes_had_ = 0;  ///< Of the decoder's count.
+  std::uint64_t next_revolution_ = 0;  ///< The number that the decoder's turn 0 has.
+  std::uint64_t holes_had_ = 0;        ///< Of the decoder's count.
 };
 
-}  // namespace understory
+}  // namespace understory::velodyne_driver

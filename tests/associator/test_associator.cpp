@@ -10,6 +10,7 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::associator;
 
 namespace {
 
@@ -46,16 +47,16 @@ Score score(const sim::InertialDriveParameters& parameters, const std::string& m
   AssociatorParameters associator_parameters;
   associator_parameters.method = method;
   Associator associator(associator_parameters);
-  std::map<TrackId, std::map<std::int64_t, int>> seen;
-  std::map<std::int64_t, TrackId> current;
+  std::map<model::TrackId, std::map<std::int64_t, int>> seen;
+  std::map<std::int64_t, model::TrackId> current;
   Score out;
   double published = 0.0, possible = 0.0, pure = 0.0;
   for (int k = 0; k < static_cast<int>(10 * seconds); ++k) {
     const sim::DriveStep step = drive.next();
-    for (const Odometry& piece : step.odometry) associator.add(piece);
-    const TrackedScan tracked = *associator.add(step.scan);
-    std::map<std::int64_t, TrackId> now;
-    for (const TrackedLandmark& landmark : tracked.landmarks) {
+    for (const model::Odometry& increment : step.odometry) associator.add(increment);
+    const model::TrackedScan tracked = *associator.add(step.scan);
+    std::map<std::int64_t, model::TrackId> now;
+    for (const model::TrackedLandmark& landmark : tracked.landmarks) {
       const std::int64_t trunk = step.trunks[landmark.detection];
       ++seen[landmark.track_id][trunk];
       const auto before = current.find(trunk);
@@ -80,17 +81,19 @@ Score score(const sim::InertialDriveParameters& parameters, const std::string& m
 }
 
 /// The landmarks that a scan gives; a range-for over `add(...)->landmarks` would outlive them.
-std::vector<TrackedLandmark> landmarks_of(Associator& associator, const LandmarkScan& scan) {
+std::vector<model::TrackedLandmark> landmarks_of(Associator& associator,
+                                                 const model::LandmarkScan& scan) {
   const auto tracked = associator.add(scan);
-  return tracked ? tracked->landmarks : std::vector<TrackedLandmark>{};
+  return tracked ? tracked->landmarks : std::vector<model::TrackedLandmark>{};
 }
 
-LandmarkScan grid_scan(Utime utime, LandmarkKind kind = LandmarkKind::kTrunk) {
-  LandmarkScan scan;
+model::LandmarkScan grid_scan(model::Utime utime,
+                              model::LandmarkKind kind = model::LandmarkKind::kTrunk) {
+  model::LandmarkScan scan;
   scan.utime = utime;
   scan.field_of_view.max_range_m = 30.0;
   for (int i = 0; i < 12; ++i) {
-    Detection detection;
+    model::Detection detection;
     detection.position_m << 5.0 * (i % 4) + 0.7 * i, 6.0 * (i / 4) - 5.0, 0.0;
     detection.covariance_m2 = 0.01 * Eigen::Matrix3d::Identity();
     detection.kind = kind;
@@ -126,9 +129,9 @@ TEST_CASE("A track gets its id after k matches in n scans", "[associator]") {
   const AssociatorParameters parameters;
   Associator associator(parameters);
   for (int k = 1; k <= 8; ++k) {
-    const TrackedScan tracked = *associator.add(grid_scan(100000 * k));
+    const model::TrackedScan tracked = *associator.add(grid_scan(100000 * k));
     REQUIRE(tracked.landmarks.size() == (k < parameters.confirm_matches ? 0u : 12u));
-    for (const TrackedLandmark& landmark : tracked.landmarks) {
+    for (const model::TrackedLandmark& landmark : tracked.landmarks) {
       REQUIRE(landmark.track_id > 0);
       REQUIRE(landmark.observed.position_m ==
               grid_scan(0).detections[landmark.detection].position_m);
@@ -138,7 +141,7 @@ TEST_CASE("A track gets its id after k matches in n scans", "[associator]") {
 
 TEST_CASE("A trunk is never matched with a corner", "[associator]") {
   Associator associator((AssociatorParameters()));
-  std::set<TrackId> of_trunks;
+  std::set<model::TrackId> of_trunks;
   for (int k = 1; k <= 8; ++k) {
     for (const auto& landmark : landmarks_of(associator, grid_scan(100000 * k))) {
       of_trunks.insert(landmark.track_id);
@@ -146,7 +149,7 @@ TEST_CASE("A trunk is never matched with a corner", "[associator]") {
   }
   REQUIRE(of_trunks.size() == 12);
   for (int k = 9; k <= 30; ++k) {
-    const auto tracked = associator.add(grid_scan(100000 * k, LandmarkKind::kCorner));
+    const auto tracked = associator.add(grid_scan(100000 * k, model::LandmarkKind::kCorner));
     for (const auto& landmark : tracked->landmarks) {
       REQUIRE(of_trunks.count(landmark.track_id) == 0);
     }
@@ -157,11 +160,11 @@ TEST_CASE("A track that should be seen and is not ends; its id is never used aga
           "[associator]") {
   const AssociatorParameters parameters;
   Associator associator(parameters);
-  Utime utime = 0;
+  model::Utime utime = 0;
   const auto ids_after = [&](int scans, bool with_first) {
-    std::set<TrackId> ids;
+    std::set<model::TrackId> ids;
     for (int k = 0; k < scans; ++k) {
-      LandmarkScan scan = grid_scan(utime += 100000);
+      model::LandmarkScan scan = grid_scan(utime += 100000);
       if (!with_first) scan.detections.erase(scan.detections.begin());
       ids.clear();
       for (const auto& landmark : landmarks_of(associator, scan)) ids.insert(landmark.track_id);
@@ -185,17 +188,17 @@ TEST_CASE("Late, repeated and broken scans do no harm", "[associator]") {
   REQUIRE(!associator.add(grid_scan(600000)));
   REQUIRE(!associator.add(grid_scan(550000)));
   REQUIRE(associator.save() == before);
-  LandmarkScan broken = grid_scan(700000);
+  model::LandmarkScan broken = grid_scan(700000);
   broken.detections[0].position_m.x() = std::numeric_limits<double>::quiet_NaN();
   broken.detections[1].covariance_m2.setZero();
-  Odometry motion;
+  model::Odometry motion;
   motion.utime = 700000;
   motion.from_utime = 600000;
   motion.covariance.setConstant(std::numeric_limits<double>::infinity());
   associator.add(motion);
   REQUIRE(associator.add(broken)->landmarks.size() == 10);
   REQUIRE(associator.counters().detections_unusable == 2);
-  LandmarkScan empty = grid_scan(800000);
+  model::LandmarkScan empty = grid_scan(800000);
   empty.detections.clear();
   REQUIRE(associator.add(empty)->landmarks.empty());
   REQUIRE(associator.add(grid_scan(900000))->landmarks.size() == 12);
@@ -203,7 +206,7 @@ TEST_CASE("Late, repeated and broken scans do no harm", "[associator]") {
 
 TEST_CASE("Scans that fit nothing, one after another, start all tracks anew", "[associator]") {
   Associator associator((AssociatorParameters()));
-  TrackId highest = 0;
+  model::TrackId highest = 0;
   for (int k = 1; k <= 8; ++k) {
     for (const auto& landmark : landmarks_of(associator, grid_scan(100000 * k))) {
       highest = std::max(highest, landmark.track_id);
@@ -211,8 +214,9 @@ TEST_CASE("Scans that fit nothing, one after another, start all tracks anew", "[
   }
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> u(-25.0, 25.0);
-  LandmarkScan elsewhere = grid_scan(900000);
-  for (Detection& detection : elsewhere.detections) detection.position_m << u(random), u(random), 0;
+  model::LandmarkScan elsewhere = grid_scan(900000);
+  for (model::Detection& detection : elsewhere.detections)
+    detection.position_m << u(random), u(random), 0;
   for (int k = 9; k <= 16; ++k) {
     elsewhere.utime = 100000 * k;
     for (const auto& landmark : landmarks_of(associator, elsewhere)) {
@@ -225,17 +229,18 @@ TEST_CASE("Scans that fit nothing, one after another, start all tracks anew", "[
 TEST_CASE("A single scan that fits nothing is passed over, and the tracks live on",
           "[associator]") {
   Associator associator((AssociatorParameters()));
-  std::set<TrackId> before;
+  std::set<model::TrackId> before;
   for (int k = 1; k <= 8; ++k) {
     for (const auto& landmark : landmarks_of(associator, grid_scan(100000 * k)))
       before.insert(landmark.track_id);
   }
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> u(-25.0, 25.0);
-  LandmarkScan elsewhere = grid_scan(900000);
-  for (Detection& detection : elsewhere.detections) detection.position_m << u(random), u(random), 0;
+  model::LandmarkScan elsewhere = grid_scan(900000);
+  for (model::Detection& detection : elsewhere.detections)
+    detection.position_m << u(random), u(random), 0;
   CHECK(landmarks_of(associator, elsewhere).empty());
-  std::set<TrackId> after;
+  std::set<model::TrackId> after;
   for (const auto& landmark : landmarks_of(associator, grid_scan(1000000)))
     after.insert(landmark.track_id);
   CHECK(after == before);
@@ -250,13 +255,13 @@ TEST_CASE("A loaded associator goes on exactly as the saved one", "[associator][
   for (int k = 0; k < 80; ++k) {
     const sim::DriveStep step = drive.next();
     if (k == 40) second.load(first.save());
-    for (const Odometry& piece : step.odometry) {
-      first.add(piece);
-      if (k >= 40) second.add(piece);
+    for (const model::Odometry& increment : step.odometry) {
+      first.add(increment);
+      if (k >= 40) second.add(increment);
     }
-    const TrackedScan expected = *first.add(step.scan);
+    const model::TrackedScan expected = *first.add(step.scan);
     if (k < 40) continue;
-    const TrackedScan actual = *second.add(step.scan);
+    const model::TrackedScan actual = *second.add(step.scan);
     REQUIRE(expected.sequence == actual.sequence);
     REQUIRE(expected.landmarks.size() == actual.landmarks.size());
     for (std::size_t i = 0; i < expected.landmarks.size(); ++i) {
@@ -278,7 +283,7 @@ TEST_CASE("An hour of driving keeps the list of tracks short", "[associator][lon
   std::size_t most = 0;
   for (int k = 0; k < 36000; ++k) {
     const sim::DriveStep step = drive.next();
-    for (const Odometry& piece : step.odometry) associator.add(piece);
+    for (const model::Odometry& increment : step.odometry) associator.add(increment);
     associator.add(step.scan);
     most = std::max(most, associator.track_count());
   }

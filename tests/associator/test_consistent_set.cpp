@@ -6,6 +6,7 @@
 
 using namespace understory;
 using namespace understory::associator;
+using namespace understory::associator;
 
 namespace {
 
@@ -23,7 +24,7 @@ TEST_CASE("The consistent set finds a motion that the guess missed by far", "[as
   std::normal_distribution<double> normal;
   for (int trial = 0; trial < 20; ++trial) {
     const auto reference = scatter(25, random);
-    const SE2 truth(1.0 * normal(random), 1.0 * normal(random), 0.15 * normal(random));
+    const geometry::SE2 truth(1.0 * normal(random), 1.0 * normal(random), 0.15 * normal(random));
     std::vector<ConsistencyPoint> observed;
     std::vector<std::uint32_t> origin;
     for (std::uint32_t i = 0; i < 25; i += 2) {
@@ -34,7 +35,8 @@ TEST_CASE("The consistent set finds a motion that the guess missed by far", "[as
       origin.push_back(i);
     }
     for (const ConsistencyPoint& clutter : scatter(4, random)) observed.push_back(clutter);
-    const auto pairs = consistent_set(reference, observed, SE2(), {4.0, 4.0, 0.5, 200000});
+    const auto pairs =
+        consistent_set(reference, observed, geometry::SE2(), {4.0, 4.0, 0.5, 200000});
     std::size_t right = 0;
     for (const ConsistencyPair& pair : pairs) {
       if (pair.observed < origin.size() && origin[pair.observed] == pair.reference) ++right;
@@ -52,7 +54,7 @@ TEST_CASE("The consistent set is the largest clique, as brute force finds it", "
     observed.push_back(reference[0]);
     observed.push_back(reference[1]);
     const ConsistencyGate gate{4.0, 100.0, 0.0, 200000};
-    const auto pairs = consistent_set(reference, observed, SE2(), gate);
+    const auto pairs = consistent_set(reference, observed, geometry::SE2(), gate);
     std::size_t best = 0;
     for (int code = 0; code < 625; ++code) {
       std::vector<ConsistencyPair> chosen;
@@ -79,5 +81,5 @@ TEST_CASE("Kinds never mix in a consistent set", "[associator]") {
   auto reference = scatter(10, random);
   auto observed = reference;
   for (ConsistencyPoint& point : observed) point.kind = 1;
-  REQUIRE(consistent_set(reference, observed, SE2(), {4.0, 5.0, 0.1, 1000}).empty());
+  REQUIRE(consistent_set(reference, observed, geometry::SE2(), {4.0, 5.0, 0.1, 1000}).empty());
 }

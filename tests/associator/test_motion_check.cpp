@@ -6,6 +6,7 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::associator;
 
 namespace {
 
@@ -27,32 +28,33 @@ std::vector<int> times_published(const std::vector<Thing>& things, double walkin
   parameters.walking_mps = walking_mps;
   Associator associator(parameters);
   std::vector<int> published(things.size(), 0);
-  const auto stamp = [](int k) { return 1'000'000 + static_cast<Utime>(k) * 100'000; };
+  const auto stamp = [](int k) { return 1'000'000 + static_cast<model::Utime>(k) * 100'000; };
   for (int k = 0; k < scans; ++k) {
     if (k > 0) {
-      Odometry piece;
-      piece.from_utime = stamp(k - 1);
-      piece.utime = stamp(k);
-      piece.from_T_to = SE2(kSpeed_mps * kPeriod_s + 1e-3 * normal(random), 0.0, 0.0);
+      model::Odometry increment;
+      increment.from_utime = stamp(k - 1);
+      increment.utime = stamp(k);
+      increment.from_T_to = geometry::SE2(kSpeed_mps * kPeriod_s + 1e-3 * normal(random), 0.0, 0.0);
       // As wheels claim it that count what lasts as noise.
-      piece.covariance = Eigen::Vector3d(1.4e-3, 1.2e-3, 2e-7).asDiagonal();
-      piece.has_wheels = true;
-      piece.inertial.emplace();
-      associator.add(piece);
+      increment.covariance = Eigen::Vector3d(1.4e-3, 1.2e-3, 2e-7).asDiagonal();
+      increment.has_wheels = true;
+      increment.inertial.emplace();
+      associator.add(increment);
     }
-    LandmarkScan scan;
+    model::LandmarkScan scan;
     scan.utime = stamp(k);
     scan.field_of_view.max_range_m = 60.0;
     const double time_s = kPeriod_s * k;
     for (const Thing& thing : things) {
-      Detection& seen = scan.detections.emplace_back();
+      model::Detection& seen = scan.detections.emplace_back();
       seen.position_m.head<2>() = thing.position_m + time_s * thing.velocity_mps +
                                   kSigma_m * Eigen::Vector2d(normal(random), normal(random));
       seen.position_m.x() -= kSpeed_mps * time_s;
       seen.covariance_m2 = kSigma_m * kSigma_m * Eigen::Matrix3d::Identity();
     }
-    const TrackedScan tracked = *associator.add(scan);
-    for (const TrackedLandmark& landmark : tracked.landmarks) ++published[landmark.detection];
+    const model::TrackedScan tracked = *associator.add(scan);
+    for (const model::TrackedLandmark& landmark : tracked.landmarks)
+      ++published[landmark.detection];
   }
   return published;
 }

@@ -11,6 +11,7 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::bus;
 
 namespace {
 
@@ -93,8 +94,8 @@ TEST_CASE("handlers may publish, and what they throw comes out of handle_one") {
 TEST_CASE("what cannot be sent is refused") {
   const auto kind = GENERATE(as<std::string>(), "memory", "live", "split");
   const auto bus = make_bus(kind);
-  CHECK(bus->publish("", Bytes{1})->reason == Reason::kNotSent);
-  CHECK(bus->publish(std::string(64, 'A'), Bytes{1})->reason == Reason::kNotSent);
+  CHECK(bus->publish("", Bytes{1})->reason == wire::Reason::kNotSent);
+  CHECK(bus->publish(std::string(64, 'A'), Bytes{1})->reason == wire::Reason::kNotSent);
   CHECK_FALSE(bus->publish(std::string(63, 'A'), Bytes{1}));
 }
 

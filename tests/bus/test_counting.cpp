@@ -10,6 +10,7 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::bus;
 
 TEST_CASE("losses, duplicates and late comers are counted exactly under random faults") {
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
@@ -109,11 +110,11 @@ TEST_CASE("health follows from fresh reasons and recovers") {
   CHECK(monitor.state() == health_t::STATE_STARTING);
   monitor.ready();
   CHECK(monitor.state() == health_t::STATE_OK);
-  monitor.count_reason("IN", Reason::kDuplicate, "twice");
+  monitor.count_reason("IN", wire::Reason::kDuplicate, "twice");
   CHECK(monitor.state() == health_t::STATE_OK);
-  monitor.count_reason("IN", Reason::kNotFinite, "x");
+  monitor.count_reason("IN", wire::Reason::kNotFinite, "x");
   CHECK(monitor.state() == health_t::STATE_DEGRADED);
-  monitor.count_reason("", Reason::kStageFailed, "y");
+  monitor.count_reason("", wire::Reason::kStageFailed, "y");
   CHECK(monitor.state() == health_t::STATE_ERROR);
   now = HealthMonitor::kFreshUs;
   CHECK(monitor.state() == health_t::STATE_OK);

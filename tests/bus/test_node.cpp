@@ -7,6 +7,7 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::bus;
 using namespace understory::test;
 
 namespace {
@@ -17,17 +18,19 @@ struct Bench {
       : bus(MemoryBus::Queues::kUnlimited),
         hosted(toy_service(), bus, no_clock(), toml, "test.toml") {
     bus.subscribe("RAW_POSE", 0, [this](const BusMessage& message) {
-      const auto pose = decode_message<raw_pose_t>(message.bytes);
+      const auto pose = wire::decode_message<raw_pose_t>(message.bytes);
       REQUIRE(pose);
       poses.push_back(*pose);
     });
     hosted.node().connect();
   }
-  void send(const Odometry& motion) {
-    bus.publish("ODOMETRY", encode_message(motion));
+  void send(const model::Odometry& motion) {
+    bus.publish("ODOMETRY", wire::encode_message(motion));
     bus.drain();
   }
-  std::int64_t count(Reason reason) { return hosted.node().monitor().count_of("ODOMETRY", reason); }
+  std::int64_t count(wire::Reason reason) {
+    return hosted.node().monitor().count_of("ODOMETRY", reason);
+  }
 
   MemoryBus bus;
   HostedService hosted;
@@ -38,7 +41,7 @@ struct Bench {
 
 TEST_CASE("values pass through, outputs are numbered from 0, ticks follow message time") {
   Bench bench("[toy]\ngain = 2\nevery = 5\n");
-  for (int i = 0; i < 25; ++i) bench.send(toy_input(i));
+  for (int i = 0; i < 25; ++i) bench.send(test::toy_input(i));
   REQUIRE(bench.poses.size() == 5);
   for (std::size_t k = 0; k < 5; ++k) CHECK(bench.poses[k].seq == static_cast<std::int64_t>(k));
   CHECK(bench.poses.back().odom_T_vehicle.x == 2.0 * 25.0 * 26.0 / 2.0);
@@ -49,32 +52,32 @@ TEST_CASE("bad messages are refused by rule, counted, and change nothing") {
   Bench bench;
   Bench clean;
   for (int i = 0; i < 10; ++i) {
-    clean.send(toy_input(i));
-    bench.send(toy_input(i));
-    Odometry bad = toy_input(i);
-    bad.from_T_to = SE2(1e300, 0.0, 0.0);
+    clean.send(test::toy_input(i));
+    bench.send(test::toy_input(i));
+    model::Odometry bad = test::toy_input(i);
+    bad.from_T_to = geometry::SE2(1e300, 0.0, 0.0);
     bench.send(bad);
-    bad.from_T_to = SE2(std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0);
+    bad.from_T_to = geometry::SE2(std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0);
     bench.send(bad);
-    bad = toy_input(i);
+    bad = test::toy_input(i);
     bad.covariance(0, 0) = -1.0;
     bench.send(bad);
     bench.bus.publish("ODOMETRY", std::vector<std::uint8_t>{1, 2, 3});
-    bench.send(toy_input(i));
+    bench.send(test::toy_input(i));
   }
-  CHECK(bench.count(Reason::kOutOfRange) == 10);
-  CHECK(bench.count(Reason::kNotFinite) == 10);
-  CHECK(bench.count(Reason::kNotPositive) == 10);
-  CHECK(bench.count(Reason::kTooShort) == 10);
-  CHECK(bench.count(Reason::kDuplicate) == 10);
+  CHECK(bench.count(wire::Reason::kOutOfRange) == 10);
+  CHECK(bench.count(wire::Reason::kNotFinite) == 10);
+  CHECK(bench.count(wire::Reason::kNotPositive) == 10);
+  CHECK(bench.count(wire::Reason::kTooShort) == 10);
+  CHECK(bench.count(wire::Reason::kDuplicate) == 10);
   REQUIRE(bench.poses.size() == clean.poses.size());
-  CHECK(encode_bytes(bench.poses.back()) == encode_bytes(clean.poses.back()));
+  CHECK(wire::encode_bytes(bench.poses.back()) == wire::encode_bytes(clean.poses.back()));
 }
 
 TEST_CASE("a stage that throws is reported and goes on") {
   Bench bench("[toy]\nmode = \"throwing\"\n");
-  for (int i = 0; i < 30; ++i) bench.send(toy_input(i));
-  CHECK(bench.count(Reason::kStageFailed) == 3);
+  for (int i = 0; i < 30; ++i) bench.send(test::toy_input(i));
+  CHECK(bench.count(wire::Reason::kStageFailed) == 3);
   CHECK(bench.poses.size() == 27);
 }
 
@@ -92,7 +95,7 @@ TEST_CASE("nothing that is not finite is published") {
   out.publish(pose);
   bus.drain();
   CHECK(seen == 1);
-  CHECK(node.monitor().count_of("OUT", Reason::kNotSent) == 1);
+  CHECK(node.monitor().count_of("OUT", wire::Reason::kNotSent) == 1);
 }
 
 TEST_CASE("under loss, repetition, disorder and damage every message is accounted for") {
@@ -113,7 +116,7 @@ TEST_CASE("under loss, repetition, disorder and damage every message is accounte
       // The ends pass unharmed: a loss behind the last message cannot be seen.
       Bus& way = i == 0 || i == sent - 1 ? static_cast<Bus&>(bench.bus) : faulty;
       if (i == sent - 1) faulty.flush();
-      way.publish("ODOMETRY", encode_message(toy_input(i)));
+      way.publish("ODOMETRY", wire::encode_message(test::toy_input(i)));
       bench.bus.drain();
     }
     const FaultCounts& faults = faulty.counts();

@@ -4,13 +4,14 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::bus;
 using namespace understory::test;
 
 namespace {
 
 struct Described {
   RuntimeParameters runtime;
-  ToyAdapter toy;
+  test::ToyAdapter toy;
   ParameterTable table;
   Described() {
     describe(runtime, table);

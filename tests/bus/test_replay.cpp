@@ -11,6 +11,7 @@
 #include "understory/config_t.hpp"
 
 using namespace understory;
+using namespace understory::bus;
 using namespace understory::test;
 namespace fs = std::filesystem;
 
@@ -27,18 +28,18 @@ std::string read(const fs::path& file) {
 }
 
 void write_inputs(const fs::path& file, int count) {
-  LcmLogWriter writer(file);
+  io::LcmLogWriter writer(file);
   for (int i = 0; i < count; ++i) {
-    const Odometry input = toy_input(i);
-    writer.write(input.utime + 3, "ODOMETRY", encode_message(input));
+    const model::Odometry input = test::toy_input(i);
+    writer.write(input.utime + 3, "ODOMETRY", wire::encode_message(input));
     writer.write(input.utime + 4, "OTHER", std::vector<std::uint8_t>{1, 2, 3});
   }
   writer.commit();
 }
 
-std::vector<LogEvent> events_of(const fs::path& file, const std::string& channel) {
-  std::vector<LogEvent> events;
-  LcmLogReader reader(file);
+std::vector<io::LogEvent> events_of(const fs::path& file, const std::string& channel) {
+  std::vector<io::LogEvent> events;
+  io::LcmLogReader reader(file);
   while (auto event = reader.next()) {
     if (event->channel == channel) events.push_back(*event);
   }
@@ -56,7 +57,7 @@ TEST_CASE("the same log gives the same bytes; outputs of hosted stages are not f
   ReplayOptions options;
   options.log = in;
   options.out = out;
-  options.services = {toy_service()};
+  options.services = {test::toy_service()};
   const ReplayReport report = replay(options);
   CHECK(report.events == 200);
   CHECK(report.fed == 100);
@@ -76,8 +77,8 @@ TEST_CASE("the same log gives the same bytes; outputs of hosted stages are not f
 
   const auto poses = events_of(out, "RAW_POSE");
   REQUIRE(poses.size() == 100);
-  CHECK(poses[0].utime == toy_input(0).utime + 3);
-  CHECK(decode_message<raw_pose_t>(poses.back().data)->odom_T_vehicle.x == 5050.0);
+  CHECK(poses[0].utime == test::toy_input(0).utime + 3);
+  CHECK(wire::decode_message<raw_pose_t>(poses.back().data)->odom_T_vehicle.x == 5050.0);
   CHECK(events_of(out, "OTHER").size() == 100);
   CHECK(events_of(out, "HEALTH").empty());
   for (const fs::path& file : {in, out, again, twice}) fs::remove(file);
@@ -90,7 +91,7 @@ TEST_CASE("a replay that is stopped writes nothing") {
   ReplayOptions options;
   options.log = in;
   options.out = out;
-  options.services = {toy_service()};
+  options.services = {test::toy_service()};
   options.progress = [](double) { return true; };
   CHECK(replay(options).was_stopped);
   CHECK_FALSE(fs::exists(out));
@@ -107,17 +108,18 @@ TEST_CASE("configuration comes from one file per service and lands in the log") 
   ReplayOptions options;
   options.log = in;
   options.out = out;
-  options.services = {toy_service()};
+  options.services = {test::toy_service()};
   options.config_dir = config;
   options.channel_suffix = "_ALT";
   options.keeps_inputs = false;
   replay(options);
   const auto poses = events_of(out, "RAW_POSE_ALT");
   REQUIRE(poses.size() == 10);
-  CHECK(decode_message<raw_pose_t>(poses.back().data)->odom_T_vehicle.x == 4.0 * 55.0);
+  CHECK(wire::decode_message<raw_pose_t>(poses.back().data)->odom_T_vehicle.x == 4.0 * 55.0);
   const auto configs = events_of(out, "CONFIG");
   REQUIRE(configs.size() == 1);
-  CHECK(decode_message<config_t>(configs[0].data)->toml.find("gain = 4.0") != std::string::npos);
+  CHECK(wire::decode_message<config_t>(configs[0].data)->toml.find("gain = 4.0") !=
+        std::string::npos);
   CHECK(events_of(out, "ODOMETRY").empty());
   std::ofstream(config / "toy.toml") << "[toy]\ngain = 400\n";
   CHECK_THROWS_AS(replay(options), ConfigurationError);

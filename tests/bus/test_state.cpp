@@ -10,6 +10,7 @@
 #include "tests/scratch.hpp"
 
 using namespace understory;
+using namespace understory::bus;
 using namespace understory::test;
 namespace fs = std::filesystem;
 
@@ -26,9 +27,9 @@ void write(const fs::path& file, const std::string& bytes) {
 /// One life of the toy: recovers, takes inputs [from, to), is killed (nothing is saved at the end).
 struct Life {
   explicit Life(const fs::path& directory, const std::string& toml = "")
-      : hosted(toy_service(), bus, no_clock(), toml, "toy.toml"), store(directory, "toy") {
+      : hosted(test::toy_service(), bus, no_clock(), toml, "toy.toml"), store(directory, "toy") {
     bus.subscribe("RAW_POSE", 0, [this](const BusMessage& message) {
-      poses.push_back(*decode_message<raw_pose_t>(message.bytes));
+      poses.push_back(*wire::decode_message<raw_pose_t>(message.bytes));
     });
     is_recovered = hosted.node().recover(store);
     hosted.node().journal_to(&store);
@@ -37,7 +38,7 @@ struct Life {
   }
   void run(int from, int to) {
     for (int i = from; i < to; ++i) {
-      bus.publish("ODOMETRY", encode_message(toy_input(i)));
+      bus.publish("ODOMETRY", wire::encode_message(test::toy_input(i)));
       bus.drain();
     }
   }
@@ -49,7 +50,7 @@ struct Life {
 };
 
 std::vector<raw_pose_t> uninterrupted(int to) {
-  const Scratch scratch("state");
+  const test::Scratch scratch("state");
   Life life(scratch.path());
   life.run(0, to);
   return life.poses;
@@ -63,7 +64,7 @@ TEST_CASE("a killed service goes on as if nothing had happened, whenever it is k
       GENERATE(as<std::string>(), "", "[runtime]\nsnapshot_every_events = 7\n",
                "[runtime]\nsnapshot_every_s = 0.5\n", "[runtime]\nsnapshot_every_events = 1\n");
   for (int killed = 1; killed < 60; killed += 4) {
-    const Scratch scratch("state");
+    const test::Scratch scratch("state");
     Life(scratch.path(), toml).run(0, killed);
     Life second(scratch.path(), toml);
     CHECK(second.is_recovered);
@@ -71,15 +72,15 @@ TEST_CASE("a killed service goes on as if nothing had happened, whenever it is k
     second.run(killed, 60);
     REQUIRE(second.poses.size() == static_cast<std::size_t>(60 - killed));
     for (std::size_t i = 0; i < second.poses.size(); ++i) {
-      CHECK(encode_bytes(second.poses[i]) ==
-            encode_bytes(expected[static_cast<std::size_t>(killed) + i]));
+      CHECK(wire::encode_bytes(second.poses[i]) ==
+            wire::encode_bytes(expected[static_cast<std::size_t>(killed) + i]));
     }
   }
 }
 
 TEST_CASE("a journal cut at every byte gives every whole event before the cut") {
   const auto expected = uninterrupted(9);
-  const Scratch scratch("state");
+  const test::Scratch scratch("state");
   Life(scratch.path()).run(0, 8);
   const fs::path file = scratch.path() / "toy.journal.0";
   const std::string journal = read(file);
@@ -98,7 +99,7 @@ TEST_CASE("a journal cut at every byte gives every whole event before the cut") 
 }
 
 TEST_CASE("a damaged byte anywhere in journal or snapshot is told, never believed") {
-  const Scratch scratch("state");
+  const test::Scratch scratch("state");
   Life(scratch.path(), "[runtime]\nsnapshot_every_events = 5\n").run(0, 8);
   const fs::path snapshot_file = scratch.path() / "toy.snapshot";
   const fs::path journal_file = scratch.path() / "toy.journal.1";
@@ -120,12 +121,13 @@ TEST_CASE("a damaged byte anywhere in journal or snapshot is told, never believe
         CHECK_FALSE(recovered.snapshot);
         CHECK(recovered.events.empty());
         REQUIRE(recovered.problems.size() == 1);
-        CHECK(recovered.problems[0].reason == Reason::kSnapshotDamaged);
+        CHECK(recovered.problems[0].reason == wire::Reason::kSnapshotDamaged);
       } else {
         REQUIRE(recovered.snapshot);
         CHECK(recovered.events.size() < 3);
         for (std::size_t i = 0; i < recovered.events.size(); ++i) {
-          CHECK(recovered.events[i].bytes == encode_message(toy_input(5 + static_cast<int>(i))));
+          CHECK(recovered.events[i].bytes ==
+                wire::encode_message(test::toy_input(5 + static_cast<int>(i))));
         }
       }
       for (const auto& entry : fs::directory_iterator(scratch.path())) fs::remove(entry.path());
@@ -134,18 +136,18 @@ TEST_CASE("a damaged byte anywhere in journal or snapshot is told, never believe
 }
 
 TEST_CASE("a state that the stage cannot load is refused and reported") {
-  const Scratch scratch("state");
+  const test::Scratch scratch("state");
   StateStore(scratch.path(), "toy").open();
   StateStore store(scratch.path(), "toy");
   store.open();
   REQUIRE_FALSE(store.save("node 1 5 0 0 1\n-1\nstage\nrubbish"));
   Life life(scratch.path());
   CHECK_FALSE(life.is_recovered);
-  CHECK(life.hosted.node().monitor().count_of("", Reason::kSnapshotDamaged) == 1);
+  CHECK(life.hosted.node().monitor().count_of("", wire::Reason::kSnapshotDamaged) == 1);
 }
 
 TEST_CASE("a recovery that keeps dying is not tried for ever") {
-  const Scratch scratch("state");
+  const test::Scratch scratch("state");
   Life(scratch.path(), "[runtime]\nsnapshot_every_events = 5\n").run(0, 8);
   std::vector<std::size_t> events;
   std::vector<bool> has_snapshot;
@@ -163,5 +165,5 @@ TEST_CASE("a directory that cannot be written is told, and the service runs on")
   Life life("/proc/no-such-directory");
   life.run(0, 5);
   CHECK(life.poses.size() == 5);
-  CHECK(life.hosted.node().monitor().count_of("", Reason::kStateNotKept) > 0);
+  CHECK(life.hosted.node().monitor().count_of("", wire::Reason::kStateNotKept) > 0);
 }

@@ -8,18 +8,19 @@
 
 namespace understory::test {
 
-class ToyAdapter : public Adapter {
+class ToyAdapter : public bus::Adapter {
  public:
-  void describe(ParameterTable& table) override {
+  void describe(bus::ParameterTable& table) override {
     table.add("toy.gain", gain_, {0.1, 10.0}, "", "Multiplies every step.");
     table.add("toy.every", every_, {1, 100}, "messages", "One output for so many inputs.");
     table.add("toy.negate", negate_, "Turns the sign.");
     table.add("toy.mode", mode_, {"plain", "throwing"}, "Throwing: fails at every tenth input.");
   }
-  void bind(Node& node) override {
-    node.subscribe<Odometry>("ODOMETRY", [this](const Odometry& motion) { add(motion); });
+  void bind(bus::Node& node) override {
+    node.subscribe<model::Odometry>("ODOMETRY",
+                                    [this](const model::Odometry& motion) { add(motion); });
     poses_ = node.advertise<raw_pose_t>("RAW_POSE");
-    node.every(1000000, [this](Utime) { ++ticks_; });
+    node.every(1000000, [this](model::Utime) { ++ticks_; });
   }
   std::string save() const override {
     return std::to_string(count_) + " " + std::to_string(sum_) + " " + std::to_string(ticks_);
@@ -31,7 +32,7 @@ class ToyAdapter : public Adapter {
   }
 
  private:
-  void add(const Odometry& motion) {
+  void add(const model::Odometry& motion) {
     ++count_;
     if (mode_ == "throwing" && count_ % 10 == 0) throw std::runtime_error("the tenth");
     sum_ += (negate_ ? -1.0 : 1.0) * gain_ * motion.from_T_to.x();
@@ -50,20 +51,20 @@ class ToyAdapter : public Adapter {
   int count_ = 0;
   int ticks_ = 0;
   double sum_ = 0.0;
-  Publisher<raw_pose_t> poses_;
+  bus::Publisher<raw_pose_t> poses_;
 };
 
-inline Service toy_service() {
+inline bus::Service toy_service() {
   return {"toy", "ODOMETRY -> RAW_POSE", [] { return std::make_unique<ToyAdapter>(); }};
 }
 
 /// The i-th input: 100 ms apart, x = i + 1 (whole numbers: sums are exact).
-inline Odometry toy_input(int i) {
-  Odometry motion;
-  motion.from_utime = 1000000 + 100000 * static_cast<Utime>(i);
+inline model::Odometry toy_input(int i) {
+  model::Odometry motion;
+  motion.from_utime = 1000000 + 100000 * static_cast<model::Utime>(i);
   motion.utime = motion.from_utime + 100000;
   motion.sequence = static_cast<std::uint64_t>(i);
-  motion.from_T_to = SE2(i + 1.0, 0.0, 0.0);
+  motion.from_T_to = geometry::SE2(i + 1.0, 0.0, 0.0);
   return motion;
 }
 

@@ -16,7 +16,7 @@ namespace understory::test {
 /// complaint, empty = it was taken.
 using ProblemWith = std::function<std::string(const std::string& key, const std::string& value)>;
 
-inline void check_refused(const ParameterTable::Entry& entry, const std::string& value,
+inline void check_refused(const bus::ParameterTable::Entry& entry, const std::string& value,
                           const std::string& what, const ProblemWith& problem_with) {
   const std::string problem = problem_with(entry.key, value);
   INFO(entry.key << " = " << value << ": " << problem);
@@ -27,12 +27,12 @@ inline void check_refused(const ParameterTable::Entry& entry, const std::string&
 
 /// Below, above, not finite, of another type, misspelt: each is refused with file, line, key, what
 /// is wrong and what is allowed.
-inline void check_every_wrong_value(const ParameterTable::Entry& entry,
+inline void check_every_wrong_value(const bus::ParameterTable::Entry& entry,
                                     const ProblemWith& problem_with) {
   const auto refused = [&](const std::string& value, const std::string& what) {
     check_refused(entry, value, what, problem_with);
   };
-  if (const auto* number = std::get_if<ParameterTable::Number>(&entry.target)) {
+  if (const auto* number = std::get_if<bus::ParameterTable::Number>(&entry.target)) {
     const double below = number->range.lowest - std::max(1e-3, std::abs(number->range.lowest));
     const double above = number->range.highest * 2.0 + 1.0;
     refused(std::to_string(below), "too small");
@@ -40,18 +40,18 @@ inline void check_every_wrong_value(const ParameterTable::Entry& entry,
     refused("nan", "not finite");
     refused("inf", "not finite");
     refused("\"1.0\"", "not a number");
-  } else if (const auto* integer = std::get_if<ParameterTable::Integer>(&entry.target)) {
+  } else if (const auto* integer = std::get_if<bus::ParameterTable::Integer>(&entry.target)) {
     refused(std::to_string(std::int64_t{integer->range.lowest} - 1), "too small");
     refused(std::to_string(std::int64_t{integer->range.highest} + 1), "too large");
     refused("9000000000000000000", "too large");
     refused("nan", "not a whole number");
     refused("1.5", "not a whole number");
     refused("true", "not a whole number");
-  } else if (std::holds_alternative<ParameterTable::Boolean>(entry.target)) {
+  } else if (std::holds_alternative<bus::ParameterTable::Boolean>(entry.target)) {
     refused("1", "neither true nor false");
     refused("\"true\"", "neither true nor false");
   } else {
-    const auto& text = std::get<ParameterTable::Text>(entry.target);
+    const auto& text = std::get<bus::ParameterTable::Text>(entry.target);
     refused("3", "not text");
     if (!text.choices.empty()) refused("\"no such\"", "not known");
   }

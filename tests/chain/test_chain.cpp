@@ -1,7 +1,7 @@
 // The whole chain on small simulated drives: accuracy, determinism, and what faults do to it.
 #include <iostream>
 
-#include "eval/frontend.hpp"
+#include "eval/experiments/frontend/frontend.hpp"
 #include "sim/scenarios.hpp"
 #include "tests/catch.hpp"
 
@@ -20,27 +20,29 @@ sim::SensorDrive small_drive(std::uint64_t seed, bool has_wheels = true) {
   return {sim::forest_scenario(forest, seed), sim::SpeedParameters{}, suite, seed};
 }
 
-ChainRun drive_once(std::uint64_t seed) {
+eval::harness::ChainRun drive_once(std::uint64_t seed) {
   sim::SensorDrive drive = small_drive(seed);
-  ChainOptions options;
+  eval::harness::ChainOptions options;
   options.config_dir = UNDERSTORY_SOURCE_CONFIG "/lidar";
   return drive_chain(drive, options);
 }
 
-bool mentions(const FrontendRow& row, const std::string& text) {
+bool mentions(const eval::experiments::frontend::FrontendRow& row, const std::string& text) {
   return row.setting.find(text) != std::string::npos;
 }
 
 }  // namespace
 
 TEST_CASE("raw sensors become a pose, the same every time") {
-  const ChainRun run = drive_once(5);
+  const eval::harness::ChainRun run = drive_once(5);
   REQUIRE(run.slam.size() > 200);
-  CHECK(trajectory_error(poses_of(run.slam), run.truth).ate_rms_m < 0.1);
-  CHECK(trajectory_error(poses_of(run.ekf), run.truth).ate_rms_m < 0.1);
+  CHECK(eval::harness::trajectory_error(eval::harness::poses_of(run.slam), run.truth).ate_rms_m <
+        0.1);
+  CHECK(eval::harness::trajectory_error(eval::harness::poses_of(run.ekf), run.truth).ate_rms_m <
+        0.1);
   CHECK(wrong_updates(run) == 0);
   CHECK(run.landmarks.size() > 20);
-  const ChainRun again = drive_once(5);
+  const eval::harness::ChainRun again = drive_once(5);
   REQUIRE(again.slam.size() == run.slam.size());
   for (std::size_t i = 0; i < run.slam.size(); ++i) {
     REQUIRE(again.slam[i].map_T_vehicle().coordinates() ==
@@ -50,11 +52,12 @@ TEST_CASE("raw sensors become a pose, the same every time") {
 
 TEST_CASE("without wheels smooth driving does not pass for standing") {
   sim::SensorDrive drive = small_drive(6, false);
-  ChainOptions options;
+  eval::harness::ChainOptions options;
   options.config_dir = UNDERSTORY_SOURCE_CONFIG "/lidar";
-  const ChainRun run = drive_chain(drive, options);
+  const eval::harness::ChainRun run = drive_chain(drive, options);
   REQUIRE(run.ekf.size() > 300);
-  const TrajectoryError ekf = trajectory_error(poses_of(run.ekf), run.truth);
+  const eval::harness::TrajectoryError ekf =
+      eval::harness::trajectory_error(eval::harness::poses_of(run.ekf), run.truth);
   CAPTURE(ekf.ate_rms_m, ekf.largest_m, ekf.driven_m);
   CHECK(ekf.driven_m > 50.0);
   CHECK(ekf.ate_rms_m < 0.1);
@@ -63,20 +66,20 @@ TEST_CASE("without wheels smooth driving does not pass for standing") {
 
 TEST_CASE("a configuration that is not there is an error, not the defaults") {
   sim::SensorDrive drive = small_drive(5);
-  ChainOptions options;
+  eval::harness::ChainOptions options;
   options.config_dir = UNDERSTORY_SOURCE_CONFIG "/no-such-vehicle";
-  REQUIRE_THROWS_AS(drive_chain(drive, options), ConfigurationError);
+  REQUIRE_THROWS_AS(drive_chain(drive, options), bus::ConfigurationError);
 }
 
 TEST_CASE("faults of the sensors are named, and the pose comes back") {
-  FrontendOptions options;
+  eval::experiments::frontend::FrontendOptions options;
   options.config_dir = UNDERSTORY_SOURCE_CONFIG "/lidar";
   options.jobs = 2;
   const std::atomic<bool> stop = false;
-  FrontendRows rows;
+  eval::experiments::frontend::FrontendRows rows;
   add_fault_rows(options, stop, rows);
   std::cout << to_table(rows.rows());
-  for (const FrontendRow& row : rows.rows()) {
+  for (const eval::experiments::frontend::FrontendRow& row : rows.rows()) {
     INFO(row.setting << ": " << row.what << " " << row.value);
     CHECK(row.pass().value_or(true));
     if (mentions(row, "silent for")) CHECK(mentions(row, "sensor_silent"));

@@ -35,9 +35,10 @@ class RecordedDrive {
   const std::vector<Circle>& trunks() const { return trunks_; }
 
   /// world_T_vehicle; the axle turns about a point to its left.
-  static SE2 pose(double seconds) {
+  static geometry::SE2 pose(double seconds) {
     const auto from_start = [](double s) {
-      return SE2::Exp({kSpeed_mps * s, 0.0, kTurn_radps * s}) * victoria_park::axle_T_vehicle();
+      return geometry::SE2::Exp({kSpeed_mps * s, 0.0, kTurn_radps * s}) *
+             victoria_park::axle_T_vehicle();
     };
     return from_start(kFirstScan_s).inverse() * from_start(seconds);
   }
@@ -83,7 +84,7 @@ class RecordedDrive {
   void write_laser() {
     std::ofstream file(directory_ / "LASER.txt");
     for (std::size_t k = 0; k < kScans; ++k) {
-      const SE2 vehicle_T_world = pose(scan_time_s(k)).inverse();
+      const geometry::SE2 vehicle_T_world = pose(scan_time_s(k)).inverse();
       std::vector<Circle> seen = trunks_;
       for (Circle& trunk : seen) trunk.centre = vehicle_T_world * trunk.centre;
       file << fmt::format("{:.3f}", scan_time_s(k));
@@ -97,7 +98,7 @@ class RecordedDrive {
   void write_fixes() const {
     std::ofstream file(directory_ / "GPS.txt");
     for (std::size_t i = 0; i < kFixes; ++i) {
-      const SE2 at = pose(static_cast<double>(i));
+      const geometry::SE2 at = pose(static_cast<double>(i));
       file << fmt::format("{:.3f} {:.4f} {:.4f}\n", static_cast<double>(i), at.y(), at.x());
     }
   }

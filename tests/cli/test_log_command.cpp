@@ -4,26 +4,29 @@
 #include "tests/cli/run_command.hpp"
 
 using namespace understory;
+using namespace understory::cli;
 using namespace understory::test;
 using Catch::Matchers::Contains;
 
 namespace {
 
 struct Fixture {
-  TemporaryDirectory directory;
+  test::TemporaryDirectory directory;
   std::mt19937_64 random{3};
-  std::vector<LogEvent> events = random_events(30, random);
+  std::vector<io::LogEvent> events = test::random_events(30, random);
   std::string whole = (directory / "whole.lcm").string();
   std::string damaged = (directory / "damaged.lcm").string();
   std::string out = (directory / "out.lcm").string();
 
   Fixture() {
     write_log(whole, events);
-    auto bytes = read_bytes(whole);
-    bytes[offsets(events)[10]] ^= 0xFFU;
+    auto bytes = test::read_bytes(whole);
+    bytes[test::offsets(events)[10]] ^= 0xFFU;
     write_bytes(damaged, bytes);
   }
-  Outcome run(const std::string& arguments) { return understory_command(directory, arguments); }
+  test::Outcome run(const std::string& arguments) {
+    return understory_command(directory, arguments);
+  }
 };
 
 }  // namespace
@@ -49,7 +52,7 @@ TEST_CASE_METHOD(Fixture, "a file that cannot be read ends with 1 and one line t
     const auto outcome = run(std::string(command) + " " + (directory / "none.lcm").string());
     CAPTURE(command, outcome.error);
     CHECK(outcome.status == 1);
-    CHECK(lines(outcome.error) == 1);
+    CHECK(test::lines(outcome.error) == 1);
     CHECK_THAT(outcome.error, Contains("none.lcm"));
   }
 }
@@ -68,19 +71,19 @@ TEST_CASE_METHOD(Fixture, "log check finds damage and nothing where there is non
   CHECK(run("log check " + whole).status == 0);
   const auto outcome = run("log check " + damaged);
   CHECK(outcome.status == 1);
-  CHECK_THAT(outcome.out, Contains("byte " + std::to_string(offsets(events)[10])));
+  CHECK_THAT(outcome.out, Contains("byte " + std::to_string(test::offsets(events)[10])));
   CHECK_THAT(outcome.error, Contains("damaged.lcm"));
 }
 
 TEST_CASE_METHOD(Fixture, "log repair gives a log with nothing wrong", "[cli]") {
   CHECK(run("log repair " + damaged + " --out " + out).status == 0);
   CHECK(run("log check " + out).status == 0);
-  LcmLogReader reader(out);
+  io::LcmLogReader reader(out);
   CHECK(read_log(reader).size() == events.size() - 1);
 }
 
 TEST_CASE_METHOD(Fixture, "log repair saves nothing from a file that is no log", "[cli]") {
-  write_bytes(damaged, Bytes(1000, 'x'));
+  write_bytes(damaged, test::Bytes(1000, 'x'));
   CHECK(run("log repair " + damaged + " --out " + out).status == 1);
   CHECK_FALSE(std::filesystem::exists(out));
 }
@@ -89,9 +92,9 @@ TEST_CASE_METHOD(Fixture, "log cut takes time and channels", "[cli]") {
   CHECK(
       run("log cut " + whole + " --from 0.95 --to 2.05 --channels 'LAND.*' --out " + out).status ==
       0);
-  LcmLogReader reader(out);
+  io::LcmLogReader reader(out);
   const auto kept = read_log(reader);
-  const auto expected = std::count_if(events.begin(), events.end(), [&](const LogEvent& e) {
+  const auto expected = std::count_if(events.begin(), events.end(), [&](const io::LogEvent& e) {
     const auto time = e.utime - events[0].utime;
     return e.channel == "LANDMARKS" && time >= 950'000 && time <= 2'050'000;
   });

@@ -3,12 +3,13 @@
 #include <map>
 
 #include "common/wire/convert.hpp"
-#include "eval/victoria_park.hpp"
+#include "eval/experiments/victoria_park/victoria_park.hpp"
 #include "tests/catch.hpp"
 #include "tests/cli/recorded_drive.hpp"
 #include "tests/cli/run_command.hpp"
 
 using namespace understory;
+using namespace understory::cli;
 using namespace understory::test;
 using Catch::Matchers::Contains;
 namespace fs = std::filesystem;
@@ -16,62 +17,65 @@ namespace fs = std::filesystem;
 namespace {
 
 struct Fixture {
-  TemporaryDirectory directory;
+  test::TemporaryDirectory directory;
   std::string log = (directory / "drive.lcm").string();
 
-  Outcome run(const std::string& arguments) { return understory_command(directory, arguments); }
+  test::Outcome run(const std::string& arguments) {
+    return understory_command(directory, arguments);
+  }
   void import(const std::string& recording) {
     const auto outcome = run("import victoria-park " + recording + " --out " + log);
     CAPTURE(outcome.error);
     REQUIRE(outcome.status == 0);
   }
-  Bytes replayed(const std::string& name) {
+  wire::Bytes replayed(const std::string& name) {
     const auto outcome =
         run("replay " + log + " --config " UNDERSTORY_SOURCE_CONFIG "/victoria_park --out " +
             (directory / name).string());
     CAPTURE(outcome.error);
     REQUIRE(outcome.status == 0);
-    return read_bytes(directory / name);
+    return test::read_bytes(directory / name);
   }
 };
 
 template <class T>
-std::vector<T> messages(const std::vector<LogEvent>& events, const std::string& channel) {
+std::vector<T> messages(const std::vector<io::LogEvent>& events, const std::string& channel) {
   std::vector<T> found;
   for (const auto& event : events) {
     if (event.channel != channel) continue;
-    auto message = decode_message<T>(event.data);
+    auto message = wire::decode_message<T>(event.data);
     REQUIRE(message);
     found.push_back(std::move(*message));
   }
   return found;
 }
 
-std::vector<LogEvent> events_of(const fs::path& log) {
-  LcmLogReader reader(log);
-  return read_log(reader);
+std::vector<io::LogEvent> events_of(const fs::path& log) {
+  io::LcmLogReader reader(log);
+  return test::read_log(reader);
 }
 
 template <class T>
-std::vector<Bytes> encoded(const std::vector<T>& values) {
-  std::vector<Bytes> all;
+std::vector<wire::Bytes> encoded(const std::vector<T>& values) {
+  std::vector<wire::Bytes> all;
   all.reserve(values.size());
-  for (const T& value : values) all.push_back(encode_message(value));
+  for (const T& value : values) all.push_back(wire::encode_message(value));
   return all;
 }
 
 /// What an importer must have written: exactly the recording, and its odometry.
-void check_holds(const std::vector<LogEvent>& events, const VictoriaPark& recording) {
-  const auto scans = messages<PlanarScan>(events, "LIDAR_SCAN");
+void check_holds(const std::vector<io::LogEvent>& events, const io::VictoriaPark& recording) {
+  const auto scans = messages<model::PlanarScan>(events, "LIDAR_SCAN");
   const bool same_scans = encoded(scans) == encoded(recording.scans);
   const bool same_wheels =
-      encoded(messages<WheelSample>(events, "WHEELS")) == encoded(recording.wheels);
-  const bool same_fixes = encoded(messages<GnssFix>(events, "GNSS")) == encoded(recording.gnss);
+      encoded(messages<model::WheelSample>(events, "WHEELS")) == encoded(recording.wheels);
+  const bool same_fixes =
+      encoded(messages<model::GnssFix>(events, "GNSS")) == encoded(recording.gnss);
   CHECK(same_scans);
   CHECK(same_wheels);
   CHECK(same_fixes);
-  const auto motions = messages<Odometry>(events, "ODOMETRY");
-  const auto expected = eval::victoria_park_odometry(recording);
+  const auto motions = messages<model::Odometry>(events, "ODOMETRY");
+  const auto expected = eval::experiments::victoria_park::victoria_park_odometry(recording);
   REQUIRE(motions.size() == expected.size());
   for (std::size_t i = 0; i < motions.size(); ++i) {
     CHECK(motions[i].utime == expected[i].utime);
@@ -81,9 +85,9 @@ void check_holds(const std::vector<LogEvent>& events, const VictoriaPark& record
 }
 
 /// Whoever takes a sweep has the motion up to it, and time never goes back.
-void check_order(const std::vector<LogEvent>& events) {
-  Utime newest = 0;
-  Utime newest_motion = -1;
+void check_order(const std::vector<io::LogEvent>& events) {
+  model::Utime newest = 0;
+  model::Utime newest_motion = -1;
   std::size_t sweeps_without_motion = 0;
   for (const auto& event : events) {
     CHECK(event.utime >= newest);
@@ -97,40 +101,40 @@ void check_order(const std::vector<LogEvent>& events) {
 }  // namespace
 
 TEST_CASE_METHOD(Fixture, "an imported recording is all in the log, in order", "[cli][recording]") {
-  const RecordedDrive drive;
+  const test::RecordedDrive drive;
   import(drive.path());
   const auto events = events_of(log);
-  CHECK(events.size() ==
-        2 * RecordedDrive::kScans - 1 + RecordedDrive::kWheelSamples + RecordedDrive::kFixes);
-  check_holds(events, read_victoria_park(drive.path()));
+  CHECK(events.size() == 2 * test::RecordedDrive::kScans - 1 + test::RecordedDrive::kWheelSamples +
+                             test::RecordedDrive::kFixes);
+  check_holds(events, io::read_victoria_park(drive.path()));
   check_order(events);
 }
 
 TEST_CASE_METHOD(Fixture, "odometry of exact wheels is the motion", "[cli][recording]") {
-  const RecordedDrive drive;
+  const test::RecordedDrive drive;
   import(drive.path());
-  SE2 reckoned;
-  for (const auto& motion : messages<Odometry>(events_of(log), "ODOMETRY")) {
+  geometry::SE2 reckoned;
+  for (const auto& motion : messages<model::Odometry>(events_of(log), "ODOMETRY")) {
     reckoned = reckoned * motion.from_T_to;
-    const SE2 truth = RecordedDrive::pose(1e-6 * static_cast<double>(motion.utime));
+    const geometry::SE2 truth = test::RecordedDrive::pose(1e-6 * static_cast<double>(motion.utime));
     CHECK((reckoned.inverse() * truth).Log().norm() < 1e-3);
   }
 }
 
 TEST_CASE_METHOD(Fixture, "replay of a recording maps the trunks, the same bytes every time",
                  "[cli][recording]") {
-  const RecordedDrive drive;
+  const test::RecordedDrive drive;
   import(drive.path());
-  const Bytes first = replayed("first.lcm");
+  const wire::Bytes first = replayed("first.lcm");
   const bool is_the_same = replayed("second.lcm") == first;
   CHECK(is_the_same);
 
   const auto events = events_of(directory / "first.lcm");
-  const auto poses = messages<SlamPose>(events, "SLAM_POSE");
-  const auto maps = messages<WholeMap>(events, "MAP");
-  CHECK(poses.size() >= RecordedDrive::kScans - 16);
+  const auto poses = messages<model::SlamPose>(events, "SLAM_POSE");
+  const auto maps = messages<model::WholeMap>(events, "MAP");
+  CHECK(poses.size() >= test::RecordedDrive::kScans - 16);
   for (const auto& pose : poses) {
-    const SE2 truth = RecordedDrive::pose(1e-6 * static_cast<double>(pose.utime));
+    const geometry::SE2 truth = test::RecordedDrive::pose(1e-6 * static_cast<double>(pose.utime));
     CHECK(pose.is_localised());
     CHECK((pose.map_T_vehicle().translation() - truth.translation()).norm() < 0.3);
   }
@@ -140,12 +144,13 @@ TEST_CASE_METHOD(Fixture, "replay of a recording maps the trunks, the same bytes
 }
 
 TEST_CASE_METHOD(Fixture, "the processes and the experiment make one map", "[cli][recording]") {
-  const RecordedDrive drive;
+  const test::RecordedDrive drive;
   import(drive.path());
   replayed("out.lcm");
-  const auto maps = messages<WholeMap>(events_of(directory / "out.lcm"), "MAP");
-  const auto experiment = eval::drive_victoria_park(read_victoria_park(drive.path()),
-                                                    eval::victoria_park_defaults(), [] {});
+  const auto maps = messages<model::WholeMap>(events_of(directory / "out.lcm"), "MAP");
+  const auto experiment = eval::experiments::victoria_park::drive_victoria_park(
+      io::read_victoria_park(drive.path()),
+      eval::experiments::victoria_park::victoria_park_defaults(), [] {});
   REQUIRE_FALSE(maps.empty());
   REQUIRE(maps.back().landmarks.size() == experiment.landmarks.size());
   for (std::size_t i = 0; i < experiment.landmarks.size(); ++i) {
@@ -156,29 +161,30 @@ TEST_CASE_METHOD(Fixture, "the processes and the experiment make one map", "[cli
 }
 
 TEST_CASE_METHOD(Fixture, "what was mapped is exported", "[cli][recording]") {
-  const RecordedDrive drive;
+  const test::RecordedDrive drive;
   import(drive.path());
   replayed("out.lcm");
   const auto outcome = run("export " + (directory / "out.lcm").string() + " --out " +
                            (directory / "export").string());
   CHECK(outcome.status == 0);
   const auto events = events_of(directory / "out.lcm");
-  const auto map = messages<WholeMap>(events, "MAP").back();
-  CHECK(lines(read_text(directory / "export/landmarks.csv")) == map.landmarks.size() + 1);
-  CHECK(lines(read_text(directory / "export/keyframes.tum")) == map.keyframes.size());
-  CHECK(lines(read_text(directory / "export/live.tum")) ==
-        messages<SlamPose>(events, "SLAM_POSE").size());
-  CHECK_THAT(read_text(directory / "export/graph.g2o"),
+  const auto map = messages<model::WholeMap>(events, "MAP").back();
+  CHECK(test::lines(test::read_text(directory / "export/landmarks.csv")) ==
+        map.landmarks.size() + 1);
+  CHECK(test::lines(test::read_text(directory / "export/keyframes.tum")) == map.keyframes.size());
+  CHECK(test::lines(test::read_text(directory / "export/live.tum")) ==
+        messages<model::SlamPose>(events, "SLAM_POSE").size());
+  CHECK_THAT(test::read_text(directory / "export/graph.g2o"),
              Contains("VERTEX_XY") && Contains("EDGE_SE2_XY"));
 }
 
 TEST_CASE_METHOD(Fixture, "a recording that is not whole is named, and no log is left behind",
                  "[cli][recording]") {
-  const RecordedDrive drive;
+  const test::RecordedDrive drive;
   fs::remove(fs::path(drive.path()) / "DRS.txt");
   const auto outcome = run("import victoria-park " + drive.path() + " --out " + log);
   CHECK(outcome.status == 1);
-  CHECK(lines(outcome.error) == 1);
+  CHECK(test::lines(outcome.error) == 1);
   CHECK_THAT(outcome.error, Contains("DRS.txt"));
   CHECK_FALSE(fs::exists(log));
 }
@@ -195,6 +201,6 @@ TEST_CASE_METHOD(Fixture, "the Victoria Park set is imported as it is downloaded
   import(archive.string());
   const auto events = events_of(log);
   CHECK(events.size() == 7230 + 7228 + 61'763 + 948);
-  check_holds(events, read_victoria_park(archive));
+  check_holds(events, io::read_victoria_park(archive));
   check_order(events);
 }

@@ -6,12 +6,12 @@
 using namespace understory::launch;
 
 TEST_CASE("back-off doubles and never exceeds its limits", "[launch]") {
-  RestartPolicyParameters parameters;
+  launch::RestartPolicyParameters parameters;
   parameters.max_deaths = 1000;
-  RestartPolicy policy(parameters);
-  milliseconds before{0};
+  launch::RestartPolicy policy(parameters);
+  launch::milliseconds before{0};
   for (int i = 0; i < 20; ++i) {
-    const auto wait = policy.died(Clock::time_point{});
+    const auto wait = policy.died(launch::Clock::time_point{});
     REQUIRE(wait.has_value());
     CHECK(*wait >= parameters.first_backoff);
     CHECK(*wait <= parameters.max_backoff);
@@ -24,15 +24,15 @@ TEST_CASE("gives up exactly at the fifth death within thirty seconds", "[launch]
   std::mt19937_64 random(5);
   std::uniform_int_distribution<int> step_ms(0, 20'000);
   for (int run = 0; run < 200; ++run) {
-    RestartPolicy policy;
-    std::vector<Clock::time_point> deaths;
-    Clock::time_point now{};
+    launch::RestartPolicy policy;
+    std::vector<launch::Clock::time_point> deaths;
+    launch::Clock::time_point now{};
     for (int i = 0; i < 30; ++i) {
-      now += milliseconds(step_ms(random));
+      now += launch::milliseconds(step_ms(random));
       deaths.push_back(now);
-      const auto recent = std::count_if(deaths.begin(), deaths.end(), [&](Clock::time_point t) {
-        return now - t <= milliseconds(30'000);
-      });
+      const auto recent = std::count_if(
+          deaths.begin(), deaths.end(),
+          [&](launch::Clock::time_point t) { return now - t <= launch::milliseconds(30'000); });
       const auto wait = policy.died(now);
       REQUIRE(wait.has_value() == (recent < 5));
       if (!wait) break;

@@ -7,11 +7,12 @@
 #include "understory/truth_landmarks_t.hpp"
 
 using namespace understory;
+using namespace understory::cli;
 using namespace understory::test;
 using Catch::Matchers::Contains;
 
 TEST_CASE("sim with sensors writes every raw channel, sweeps in parts that fit together", "[cli]") {
-  const TemporaryDirectory directory;
+  const test::TemporaryDirectory directory;
   const auto log = directory / "drive.lcm";
   const auto outcome = understory_command(
       directory,
@@ -21,18 +22,18 @@ TEST_CASE("sim with sensors writes every raw channel, sweeps in parts that fit t
   CHECK_THAT(outcome.out, Contains("m driven in"));
 
   std::map<std::string, int> events;
-  SweepAssembler assembler;
+  model::SweepAssembler assembler;
   int sweeps = 0;
   std::int64_t last_received = 0;
-  Utime last_truth = -1;
-  LcmLogReader reader(log);
+  model::Utime last_truth = -1;
+  io::LcmLogReader reader(log);
   while (const auto event = reader.next()) {
     ++events[event->channel];
     CHECK(event->utime >= last_received);
     last_received = event->utime;
     if (event->channel == "RAW_SWEEP") {
       CHECK(event->data.size() < 65000);
-      auto part = decode_message<PointSweep>(event->data);
+      auto part = wire::decode_message<model::PointSweep>(event->data);
       REQUIRE(part);
       if (const auto sweep = assembler.add(std::move(*part))) {
         ++sweeps;
@@ -41,21 +42,21 @@ TEST_CASE("sim with sensors writes every raw channel, sweeps in parts that fit t
         CHECK(sweep->utime <= event->utime);
       }
     } else if (event->channel == "RAW_IMU") {
-      CHECK(decode_message<ImuSample>(event->data));
+      CHECK(wire::decode_message<model::ImuSample>(event->data));
     } else if (event->channel == "GROUND_TRUTH") {
-      const auto truth = decode_message<ground_truth_t>(event->data);
+      const auto truth = wire::decode_message<ground_truth_t>(event->data);
       REQUIRE(truth);
       CHECK(truth->utime > last_truth);
       last_truth = truth->utime;
     } else if (event->channel == "TRUTH_LANDMARKS") {
-      const auto landmarks = decode_message<truth_landmarks_t>(event->data);
+      const auto landmarks = wire::decode_message<truth_landmarks_t>(event->data);
       REQUIRE(landmarks);
       CHECK(landmarks->num_landmarks > 0);
     }
   }
   const double seconds = 1e-6 * static_cast<double>(last_received);
   CHECK(seconds > 5.0);
-  CHECK(assembler.incomplete_turns() == 0);
+  CHECK(assembler.incomplete_revolutions() == 0);
   CHECK(sweeps == Approx(10.0 * seconds).margin(1.0));
   CHECK(events["RAW_IMU"] == Approx(200.0 * seconds).margin(2.0));
   CHECK(events["RAW_WHEELS"] == Approx(100.0 * seconds).margin(2.0));
@@ -66,7 +67,7 @@ TEST_CASE("sim with sensors writes every raw channel, sweeps in parts that fit t
 }
 
 TEST_CASE("sim names what it does not know", "[cli]") {
-  const TemporaryDirectory directory;
+  const test::TemporaryDirectory directory;
   const auto run = [&](const std::string& arguments) {
     return understory_command(directory,
                               "sim " + arguments + " --out " + (directory / "never.lcm").string());

@@ -13,46 +13,47 @@
 
 using namespace understory::launch;
 using Catch::Matchers::Contains;
-using understory::test::TemporaryDirectory;
+using test::TemporaryDirectory;
 
 namespace {
 
-ProcessSpec shell(const std::string& name, const std::string& script) {
+launch::ProcessSpec shell(const std::string& name, const std::string& script) {
   return {name, {"/bin/sh", {"-c", script}, {}}};
 }
 
 /// Runs a supervisor until a condition holds; generous in time, since other tests run beside it.
 struct Bench {
   std::string said;
-  Supervisor supervisor;
+  launch::Supervisor supervisor;
 
-  explicit Bench(std::vector<ProcessSpec> specs, const SupervisorParameters& parameters = {})
+  explicit Bench(std::vector<launch::ProcessSpec> specs,
+                 const launch::SupervisorParameters& parameters = {})
       : supervisor(std::move(specs), parameters, [this](const auto& process, const auto& text) {
           said += process + ": " + text + "\n";
         }) {}
   ~Bench() {
-    supervisor.stop(Clock::now());
+    supervisor.stop(launch::Clock::now());
     run_until([&] { return supervisor.stopped(); });
   }
 
   template <class Condition>
   bool run_until(Condition condition) {
-    const auto end = Clock::now() + std::chrono::seconds(20);
+    const auto end = launch::Clock::now() + std::chrono::seconds(20);
     while (!condition()) {
-      if (Clock::now() > end) return false;
+      if (launch::Clock::now() > end) return false;
       ::poll(nullptr, 0, 2);
-      supervisor.step(Clock::now());
+      supervisor.step(launch::Clock::now());
     }
     return true;
   }
-  ProcessStatus status(std::size_t i = 0) { return supervisor.status().at(i); }
+  launch::ProcessStatus status(std::size_t i = 0) { return supervisor.status().at(i); }
 };
 
 }  // namespace
 
 TEST_CASE("a killed process is started again, the others go on", "[launch]") {
   Bench bench({shell("a", "exec sleep 1000"), shell("b", "exec sleep 1000")});
-  bench.supervisor.start({}, Clock::now());
+  bench.supervisor.start({}, launch::Clock::now());
   const pid_t a = bench.status(0).pid;
   const pid_t b = bench.status(1).pid;
   ::kill(a, SIGKILL);
@@ -64,16 +65,16 @@ TEST_CASE("a killed process is started again, the others go on", "[launch]") {
 
 TEST_CASE("a process that always dies is given up with the reason", "[launch]") {
   Bench bench({shell("a", "exit 3")});
-  bench.supervisor.start({}, Clock::now());
+  bench.supervisor.start({}, launch::Clock::now());
   REQUIRE(bench.run_until([&] { return bench.supervisor.stopped(); }));
-  CHECK(bench.status().state == ProcessState::kGivenUp);
+  CHECK(bench.status().state == launch::ProcessState::kGivenUp);
   CHECK(bench.status().restarts == 4);
   CHECK_THAT(bench.said, Contains("given up: 5 deaths") && Contains("status 3"));
 }
 
 TEST_CASE("a refused configuration is not tried again", "[launch]") {
   Bench bench({shell("a", "exit 2")});
-  bench.supervisor.start({}, Clock::now());
+  bench.supervisor.start({}, launch::Clock::now());
   REQUIRE(bench.run_until([&] { return bench.supervisor.stopped(); }));
   CHECK(bench.status().restarts == 0);
   CHECK(bench.supervisor.refused() == std::vector<std::string>{"a"});
@@ -81,44 +82,45 @@ TEST_CASE("a refused configuration is not tried again", "[launch]") {
 
 TEST_CASE("an executable that is not there is named", "[launch]") {
   Bench bench({{"a", {"/nonexistent/program", {}, {}}}});
-  bench.supervisor.start({}, Clock::now());
+  bench.supervisor.start({}, launch::Clock::now());
   CHECK(bench.supervisor.stopped());
   CHECK_THAT(bench.said, Contains("/nonexistent/program"));
 }
 
 TEST_CASE("a process that is stopped is degraded, then killed and started again", "[launch]") {
   Bench bench({shell("a", "exec sleep 1000")});
-  bench.supervisor.start({}, Clock::now());
+  bench.supervisor.start({}, launch::Clock::now());
   ::kill(bench.status().pid, SIGSTOP);
-  REQUIRE(bench.run_until([&] { return bench.status().state == ProcessState::kDegraded; }));
+  REQUIRE(bench.run_until([&] { return bench.status().state == launch::ProcessState::kDegraded; }));
   CHECK(bench.status().restarts == 0);
   REQUIRE(bench.run_until([&] { return bench.status().restarts == 1; }));
   CHECK_THAT(bench.said, Contains("hangs: stopped"));
 }
 
 TEST_CASE("silence after heartbeats is a hang, silence from the start is not", "[launch]") {
-  SupervisorParameters parameters;
-  parameters.silent_degraded = milliseconds(100);
-  parameters.silent_restart = milliseconds(200);
+  launch::SupervisorParameters parameters;
+  parameters.silent_degraded = launch::milliseconds(100);
+  parameters.silent_restart = launch::milliseconds(200);
   Bench bench({shell("a", "exec sleep 1000"), shell("b", "exec sleep 1000")}, parameters);
-  bench.supervisor.start({}, Clock::now());
-  bench.supervisor.heartbeat("a", bench.status(0).pid, Clock::now());
-  bench.supervisor.heartbeat("b", bench.status(1).pid + 100'000, Clock::now());  // Not its own.
+  bench.supervisor.start({}, launch::Clock::now());
+  bench.supervisor.heartbeat("a", bench.status(0).pid, launch::Clock::now());
+  bench.supervisor.heartbeat("b", bench.status(1).pid + 100'000,
+                             launch::Clock::now());  // Not its own.
   REQUIRE(bench.run_until([&] { return bench.status(0).restarts == 1; }));
   CHECK(bench.status(1).restarts == 0);
   CHECK_THAT(bench.said, Contains("a: hangs: no HEALTH"));
 }
 
 TEST_CASE("a process that ignores SIGTERM is killed in time", "[launch]") {
-  SupervisorParameters parameters;
-  parameters.stop_timeout = milliseconds(100);
+  launch::SupervisorParameters parameters;
+  parameters.stop_timeout = launch::milliseconds(100);
   Bench bench(
       {shell("a", "trap '' TERM; while :; do sleep 0.01; done"), shell("b", "exec sleep 9")},
       parameters);
-  bench.supervisor.start({}, Clock::now());
+  bench.supervisor.start({}, launch::Clock::now());
   bench.run_until([&] { return true; });
   ::poll(nullptr, 0, 100);  // Time to set the trap.
-  bench.supervisor.stop(Clock::now());
+  bench.supervisor.stop(launch::Clock::now());
   REQUIRE(bench.run_until([&] { return bench.supervisor.stopped(); }));
   CHECK_THAT(bench.said, Contains("a: does not end") && !Contains("b: does not end"));
 }
@@ -128,15 +130,15 @@ TEST_CASE("the next supervisor adopts what still runs", "[launch]") {
   pid_t pid = -1;
   Bench first({shell("a", "exec sleep 1000")});
   {
-    Registry registry(directory.path());
-    first.supervisor.start(registry.read(), Clock::now());
+    launch::Registry registry(directory.path());
+    first.supervisor.start(registry.read(), launch::Clock::now());
     pid = first.status().pid;
     registry.write(first.supervisor.status());
-    CHECK_THROWS_WITH(Registry(directory.path()), Contains("another launch"));
+    CHECK_THROWS_WITH(launch::Registry(directory.path()), Contains("another launch"));
   }
-  Registry registry(directory.path());
+  launch::Registry registry(directory.path());
   Bench second({shell("a", "exec sleep 1000")});
-  second.supervisor.start(registry.read(), Clock::now());
+  second.supervisor.start(registry.read(), launch::Clock::now());
   CHECK(second.status().pid == pid);
   CHECK(second.status().restarts == 0);
 
@@ -144,7 +146,7 @@ TEST_CASE("the next supervisor adopts what still runs", "[launch]") {
   auto known = registry.read();
   known.at(0).start_ticks += 1;
   Bench third({shell("a", "exec sleep 1000")});
-  third.supervisor.start(known, Clock::now());
+  third.supervisor.start(known, launch::Clock::now());
   CHECK(third.status().pid != pid);
   CHECK(third.status().restarts == 1);
 }
@@ -154,8 +156,8 @@ TEST_CASE("launch.toml is refused with file, line and key", "[launch]") {
   const auto refused = [&](const std::string& text) -> std::string {
     std::ofstream(directory / "launch.toml") << text;
     try {
-      read_launch_config(directory.path());
-    } catch (const ConfigError& error) {
+      launch::read_launch_config(directory.path());
+    } catch (const launch::ConfigError& error) {
       return error.what();
     }
     return "accepted";

@@ -11,6 +11,7 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::cli;
 using namespace understory::test;
 namespace fs = std::filesystem;
 
@@ -18,51 +19,52 @@ namespace {
 
 /// All parameters of a service, as its process has them.
 struct Described {
-  RuntimeParameters runtime;
-  std::unique_ptr<Adapter> adapter;
-  ParameterTable table;
-  explicit Described(const Service& service) : adapter(service.make()) {
+  bus::RuntimeParameters runtime;
+  std::unique_ptr<bus::Adapter> adapter;
+  bus::ParameterTable table;
+  explicit Described(const bus::Service& service) : adapter(service.make()) {
     describe(runtime, table);
     adapter->describe(table);
   }
 };
 
-std::string problem_of(const Service& service, const std::string& key, const std::string& value) {
+std::string problem_of(const bus::Service& service, const std::string& key,
+                       const std::string& value) {
   Described described(service);
   try {
     described.table.load_text("\n" + key + " = " + value + "\n", "toy.toml");
-  } catch (const ConfigurationError& error) {
+  } catch (const bus::ConfigurationError& error) {
     return error.what();
   }
   return {};
 }
 
 /// The values that are just allowed.
-std::vector<std::string> bounds(const ParameterTable::Entry& entry) {
-  if (const auto* number = std::get_if<ParameterTable::Number>(&entry.target)) {
+std::vector<std::string> bounds(const bus::ParameterTable::Entry& entry) {
+  if (const auto* number = std::get_if<bus::ParameterTable::Number>(&entry.target)) {
     return {fmt::format("{:.17e}", number->range.lowest),
             fmt::format("{:.17e}", number->range.highest)};
   }
-  if (const auto* integer = std::get_if<ParameterTable::Integer>(&entry.target)) {
+  if (const auto* integer = std::get_if<bus::ParameterTable::Integer>(&entry.target)) {
     return {std::to_string(integer->range.lowest), std::to_string(integer->range.highest)};
   }
-  if (std::holds_alternative<ParameterTable::Boolean>(entry.target)) return {"true", "false"};
+  if (std::holds_alternative<bus::ParameterTable::Boolean>(entry.target)) return {"true", "false"};
   std::vector<std::string> choices;
-  for (const std::string& choice : std::get<ParameterTable::Text>(entry.target).choices) {
+  for (const std::string& choice : std::get<bus::ParameterTable::Text>(entry.target).choices) {
     choices.push_back('"' + choice + '"');
   }
   return choices;
 }
 
-std::vector<Service> every_service() {
-  std::vector<Service> services = all_services();
-  for (Service& service : sensor_services()) services.push_back(std::move(service));
+std::vector<bus::Service> every_service() {
+  std::vector<bus::Service> services = all_services();
+  for (bus::Service& service : sensor_services()) services.push_back(std::move(service));
   return services;
 }
 
-Service service_of(const std::string& name) {
+bus::Service service_of(const std::string& name) {
   const auto services = every_service();
-  const auto found = std::ranges::find(services, name, &Service::name);
+  const auto found = std::ranges::find(services, name, &bus::Service::name);
   REQUIRE(found != services.end());
   return *found;
 }
@@ -70,11 +72,11 @@ Service service_of(const std::string& name) {
 }  // namespace
 
 TEST_CASE("every service refuses every wrong value of every parameter", "[configuration]") {
-  for (const Service& service : every_service()) {
+  for (const bus::Service& service : every_service()) {
     const Described described(service);
     CAPTURE(service.name);
     CHECK(described.table.entries().size() > 10);
-    for (const ParameterTable::Entry& entry : described.table.entries()) {
+    for (const bus::ParameterTable::Entry& entry : described.table.entries()) {
       check_every_wrong_value(entry, [&](const std::string& key, const std::string& value) {
         return problem_of(service, key, value);
       });
@@ -83,10 +85,10 @@ TEST_CASE("every service refuses every wrong value of every parameter", "[config
 }
 
 TEST_CASE("the bounds of every parameter are allowed, and so is its default", "[configuration]") {
-  for (const Service& service : every_service()) {
+  for (const bus::Service& service : every_service()) {
     Described described(service);
     CAPTURE(service.name);
-    for (const ParameterTable::Entry& entry : described.table.entries()) {
+    for (const bus::ParameterTable::Entry& entry : described.table.entries()) {
       for (const std::string& value : bounds(entry)) {
         CAPTURE(entry.key, value);
         CHECK(problem_of(service, entry.key, value).empty());
@@ -120,7 +122,8 @@ TEST_CASE("the recorded car's mapper uses odometry", "[configuration]") {
   Described described(service_of("geoslam_mapper"));
   described.table.load(fs::path(UNDERSTORY_SOURCE_CONFIG) / "victoria_park/geoslam_mapper.toml");
   const auto& entries = described.table.entries();
-  const auto use = std::ranges::find(entries, "ours.use_odometry", &ParameterTable::Entry::key);
+  const auto use =
+      std::ranges::find(entries, "smoothing.use_odometry", &bus::ParameterTable::Entry::key);
   REQUIRE(use != entries.end());
   CHECK(value_as_toml(*use) == "true");
 }

@@ -29,7 +29,7 @@ inline FilterState random_state(ErrorForm form, int landmarks, std::mt19937_64& 
   state.first_velocity = state.velocity;
   for (int i = 0; i < landmarks; ++i) {
     ekf::MapLandmark landmark;
-    landmark.id = static_cast<TrackId>(i + 1);
+    landmark.id = static_cast<model::TrackId>(i + 1);
     state.add_landmark(landmark, 20.0 * Eigen::Vector2d(normal(random), normal(random)),
                        Eigen::Matrix2d::Identity());
   }
@@ -49,7 +49,7 @@ inline Eigen::MatrixXd full_covariance(const FilterState& state) {
 /// The error that takes `from` to `to`, to first order.
 inline Eigen::VectorXd difference(const FilterState& from, const FilterState& to) {
   Eigen::VectorXd delta(from.size());
-  const double turn = wrap_angle(to.heading - from.heading);
+  const double turn = geometry::wrap_angle(to.heading - from.heading);
   const auto of = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
     return Eigen::Vector2d(b - a - turn * from.lever(a));
   };

@@ -5,18 +5,19 @@
 #include "tests/ekf/ekf_drive.hpp"
 
 using namespace understory;
+using namespace understory::ekf;
 using namespace understory::test;
 
 namespace {
 
 /// A tenth of a second by IMU, without motion.
-Odometry piece_at(int k, bool stands) {
-  Odometry piece;
-  piece.from_utime = Utime{100000} * k;
-  piece.utime = piece.from_utime + 100000;
-  piece.covariance = 1e-4 * Eigen::Matrix3d::Identity();
-  piece.is_standing = stands;
-  Preintegration& inertial = piece.inertial.emplace();
+model::Odometry increment_at(int k, bool is_stationary) {
+  model::Odometry increment;
+  increment.from_utime = model::Utime{100000} * k;
+  increment.utime = increment.from_utime + 100000;
+  increment.covariance = 1e-4 * Eigen::Matrix3d::Identity();
+  increment.is_stationary = is_stationary;
+  model::Preintegration& inertial = increment.inertial.emplace();
   inertial.seconds = 0.1;
   inertial.covariance = 1e-8 * Eigen::Matrix<double, 5, 5>::Identity();
   inertial.bias_jacobian(0, 0) = -0.1;
@@ -24,14 +25,14 @@ Odometry piece_at(int k, bool stands) {
     inertial.bias_jacobian(axis, axis) = -0.1;
     inertial.bias_jacobian(axis + 2, axis) = -0.005;
   }
-  return piece;
+  return increment;
 }
 
-TrackedScan scan_after(const Odometry& piece) {
-  TrackedScan scan;
-  scan.utime = piece.utime;
+model::TrackedScan scan_after(const model::Odometry& increment) {
+  model::TrackedScan scan;
+  scan.utime = increment.utime;
   scan.field_of_view.max_range_m = 30.0;
-  Detection seen;
+  model::Detection seen;
   seen.position_m << 8.0, 3.0, 1.0;
   seen.covariance_m2 = 1e-4 * Eigen::Matrix3d::Identity();
   scan.landmarks.push_back({1, 0, seen});
@@ -39,13 +40,13 @@ TrackedScan scan_after(const Odometry& piece) {
 }
 
 /// Pieces until standing is found after half a second; the last pose.
-EkfPose found_standing(const EkfParameters& parameters) {
+model::EkfPose found_stationary(const EkfParameters& parameters) {
   Ekf filter(parameters);
   EkfOutput output;
   for (int k = 0; k < 10; ++k) {
-    const Odometry piece = piece_at(k, k >= 5);
-    filter.add(piece);
-    output = filter.add(scan_after(piece));
+    const model::Odometry increment = increment_at(k, k >= 5);
+    filter.add(increment);
+    output = filter.add(scan_after(increment));
     if (parameters.prior.wait_s > 0.0) REQUIRE(output.pose.has_value() == (k >= 5));
   }
   return *output.pose;
@@ -54,10 +55,10 @@ EkfPose found_standing(const EkfParameters& parameters) {
 }  // namespace
 
 TEST_CASE("The map begins where the vehicle is found to stand", "[ekf][begin]") {
-  const EkfPose waited = found_standing(EkfParameters{});
+  const model::EkfPose waited = found_stationary(EkfParameters{});
   EkfParameters hasty;
   hasty.prior.wait_s = 0.0;
-  const EkfPose at_once = found_standing(hasty);
+  const model::EkfPose at_once = found_stationary(hasty);
   for (int axis = 0; axis < 3; ++axis) {
     CAPTURE(axis, waited.covariance(axis, axis), at_once.covariance(axis, axis));
     CHECK(waited.covariance(axis, axis) < 1e-6);
@@ -68,11 +69,11 @@ TEST_CASE("The map begins where the vehicle is found to stand", "[ekf][begin]") 
 TEST_CASE("What moves by its wheels begins at once, what stands by them waits", "[ekf][begin]") {
   for (const bool moves : {true, false}) {
     Ekf filter(EkfParameters{});
-    Odometry piece = piece_at(0, false);
-    piece.has_wheels = true;
-    piece.from_T_to = SE2(moves ? 0.5 : 0.0, 0.0, 0.0);
-    filter.add(piece);
-    CHECK(filter.add(scan_after(piece)).pose.has_value() == moves);
+    model::Odometry increment = increment_at(0, false);
+    increment.has_wheels = true;
+    increment.from_T_to = geometry::SE2(moves ? 0.5 : 0.0, 0.0, 0.0);
+    filter.add(increment);
+    CHECK(filter.add(scan_after(increment)).pose.has_value() == moves);
   }
 }
 
@@ -81,9 +82,9 @@ TEST_CASE("What moves without wheels begins after a while, over a restart too", 
   Ekf filter(parameters);
   int begun = 0;
   for (int k = 1; k <= 20 && begun == 0; ++k) {
-    const Odometry piece = piece_at(k - 1, false);
-    filter.add(piece);
-    if (filter.add(scan_after(piece)).pose) begun = k;
+    const model::Odometry increment = increment_at(k - 1, false);
+    filter.add(increment);
+    if (filter.add(scan_after(increment)).pose) begun = k;
     Ekf other(parameters);
     other.load(filter.save());
     filter = other;
@@ -93,5 +94,5 @@ TEST_CASE("What moves without wheels begins after a while, over a restart too", 
 
 TEST_CASE("Scans alone begin at once", "[ekf][begin]") {
   Ekf filter(EkfParameters{});
-  CHECK(filter.add(scan_after(piece_at(0, false))).pose.has_value());
+  CHECK(filter.add(scan_after(increment_at(0, false))).pose.has_value());
 }

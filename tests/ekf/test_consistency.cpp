@@ -3,6 +3,7 @@
 #include "tests/ekf/ekf_drive.hpp"
 
 using namespace understory;
+using namespace understory::ekf;
 using namespace understory::test;
 
 namespace {
@@ -17,7 +18,8 @@ Mean over_runs(const sim::InertialDriveParameters& drive, const EkfParameters& f
                double seconds) {
   Mean mean;
   for (int run = 0; run < runs; ++run) {
-    const DriveEnd end = drive_through(drive, filter, seconds, 100 + static_cast<unsigned>(run));
+    const test::DriveEnd end =
+        test::drive_through(drive, filter, seconds, 100 + static_cast<unsigned>(run));
     mean.nees += end.mean_nees / runs;
     mean.last_nees += end.last_nees / runs;
     mean.drift += end.drift / runs;
@@ -30,9 +32,9 @@ Mean over_runs(const sim::InertialDriveParameters& drive, const EkfParameters& f
 TEST_CASE("NEES and drift with an IMU, with wheels, with both", "[ekf][consistency]") {
   for (const auto odometry : {sim::OdometryKind::kInertial, sim::OdometryKind::kWheels,
                               sim::OdometryKind::kInertialAndWheels}) {
-    sim::InertialDriveParameters drive = short_drive();
+    sim::InertialDriveParameters drive = test::short_drive();
     drive.odometry = odometry;
-    const Mean mean = over_runs(drive, white_noise(), 20, 25.0);
+    const Mean mean = over_runs(drive, test::white_noise(), 20, 25.0);
     CAPTURE(static_cast<int>(odometry), mean.nees, mean.drift);
     // 95 % band of a 20-run mean: 2.0 .. 4.2 if scans were one; the mean over a drive lies closer.
     REQUIRE(mean.nees > 1.9);
@@ -42,13 +44,13 @@ TEST_CASE("NEES and drift with an IMU, with wheels, with both", "[ekf][consisten
 }
 
 TEST_CASE("Right invariant errors stay consistent where plain ones do not", "[ekf][consistency]") {
-  sim::InertialDriveParameters drive = short_drive();
+  sim::InertialDriveParameters drive = test::short_drive();
   drive.odometry = sim::OdometryKind::kNone;
   drive.standing_s = 0.0;
   drive.position_sigma_m = 0.5;
   drive.range_m = 15.0;
   drive.loop_length_m = 100.0;
-  EkfParameters filter = white_noise();
+  EkfParameters filter = test::white_noise();
   const Mean invariant = over_runs(drive, filter, 10, 100.0);
   filter.error_form = "first_estimate";
   const Mean first = over_runs(drive, filter, 10, 100.0);

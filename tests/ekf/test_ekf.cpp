@@ -7,19 +7,20 @@
 #include "tests/ekf/ekf_drive.hpp"
 
 using namespace understory;
+using namespace understory::ekf;
 using namespace understory::test;
 
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-double position_sigma(const EkfPose& pose) { return std::sqrt(pose.covariance(0, 0)); }
+double position_sigma(const model::EkfPose& pose) { return std::sqrt(pose.covariance(0, 0)); }
 
 }  // namespace
 
 TEST_CASE("Velocity and biases are found", "[ekf]") {
-  Driven run(40.0, short_drive());
-  const VelocityCorrection correction = *run.go().correction;
+  test::Driven run(40.0, short_drive());
+  const model::VelocityCorrection correction = *run.go().correction;
   const Eigen::Vector2d truth =
       run.step.world_T_vehicle.rotation().transpose() * run.step.velocity_mps;
   REQUIRE((correction.velocity_mps - truth).norm() < 0.1);
@@ -31,44 +32,44 @@ TEST_CASE("Velocity and biases are found", "[ekf]") {
 }
 
 TEST_CASE("Over a gap uncertainty grows, and lost tracks rejoin their landmarks", "[ekf]") {
-  Driven run(15.0, short_drive());
+  test::Driven run(15.0, short_drive());
   const double before = position_sigma(*run.go().pose);
   const std::size_t known = run.filter.state().landmarks().size();
   // Half a second without odometry and scans; then all tracks have new ids.
   for (int k = 0; k < 5; ++k) run.step = run.drive.next();
-  TrackedScan blind = true_tracks(run.step);
+  model::TrackedScan blind = test::true_tracks(run.step);
   blind.landmarks.clear();
-  const EkfPose lost = *run.filter.add(blind).pose;
+  const model::EkfPose lost = *run.filter.add(blind).pose;
   REQUIRE(position_sigma(lost) > 3.0 * before);
-  REQUIRE(nees(lost, run.truth()) < 16.0);
+  REQUIRE(test::nees(lost, run.truth()) < 16.0);
   REQUIRE(run.filter.counters().gaps >= 1);
-  const TrackId other_ids = 1000000;
-  EkfPose found = *run.go(other_ids).pose;
+  const model::TrackId other_ids = 1000000;
+  model::EkfPose found = *run.go(other_ids).pose;
   for (int k = 0; k < 10; ++k) found = *run.go(other_ids).pose;
-  CAPTURE(position_sigma(lost), position_sigma(found), nees(found, run.truth()));
+  CAPTURE(position_sigma(lost), position_sigma(found), test::nees(found, run.truth()));
   REQUIRE(run.filter.counters().rejoined > known / 3);
   REQUIRE(position_sigma(found) < 0.5 * position_sigma(lost));
-  REQUIRE(nees(found, run.truth()) < 16.0);
+  REQUIRE(test::nees(found, run.truth()) < 16.0);
   REQUIRE(found.reset_counter == 0);
 }
 
 TEST_CASE("Too long a gap restarts the filter, and says so", "[ekf]") {
-  Driven run(10.0, short_drive());
-  const EkfPose before = *run.go().pose;
+  test::Driven run(10.0, short_drive());
+  const model::EkfPose before = *run.go().pose;
   for (int k = 0; k < 150; ++k) run.step = run.drive.next();
-  const EkfPose after = *run.filter.add(true_tracks(run.step)).pose;
+  const model::EkfPose after = *run.filter.add(test::true_tracks(run.step)).pose;
   REQUIRE(after.reset_counter == before.reset_counter + 1);
   REQUIRE(position_sigma(after) >= EkfRestartParameters{}.sigma_m);
 }
 
 TEST_CASE("Repeated and late messages change nothing", "[ekf]") {
-  Driven run(8.0, short_drive());
-  const TrackedScan last = true_tracks(run.step);
-  const Odometry piece = run.step.odometry.back();
+  test::Driven run(8.0, short_drive());
+  const model::TrackedScan last = test::true_tracks(run.step);
+  const model::Odometry increment = run.step.odometry.back();
   const std::string before = run.filter.save();
   REQUIRE(!run.filter.add(last).pose);
-  REQUIRE(!run.filter.add(piece).pose);
-  TrackedScan late = last;
+  REQUIRE(!run.filter.add(increment).pose);
+  model::TrackedScan late = last;
   late.utime -= 50000;
   REQUIRE(!run.filter.add(late).pose);
   REQUIRE(run.filter.save() == before);
@@ -77,17 +78,17 @@ TEST_CASE("Repeated and late messages change nothing", "[ekf]") {
 }
 
 TEST_CASE("Odometry that runs ahead of a scan waits for it", "[ekf]") {
-  Driven ahead(5.0, short_drive());
-  Driven in_step(5.0, short_drive());
+  test::Driven ahead(5.0, short_drive());
+  test::Driven in_step(5.0, short_drive());
   for (int k = 0; k < 10; ++k) {
     in_step.go();
     // One scan late: odometry of the next interval comes first.
     const sim::DriveStep first = ahead.drive.next();
     const sim::DriveStep second = ahead.drive.next();
-    for (const Odometry& piece : first.odometry) ahead.filter.add(piece);
-    for (const Odometry& piece : second.odometry) ahead.filter.add(piece);
-    ahead.filter.add(true_tracks(first));
-    ahead.filter.add(true_tracks(second));
+    for (const model::Odometry& increment : first.odometry) ahead.filter.add(increment);
+    for (const model::Odometry& increment : second.odometry) ahead.filter.add(increment);
+    ahead.filter.add(test::true_tracks(first));
+    ahead.filter.add(test::true_tracks(second));
     in_step.go();
   }
   REQUIRE(ahead.filter.state().position == in_step.filter.state().position);
@@ -95,13 +96,13 @@ TEST_CASE("Odometry that runs ahead of a scan waits for it", "[ekf]") {
 }
 
 TEST_CASE("Without scans a pose still comes, ever less sure", "[ekf]") {
-  Driven run(8.0, short_drive());
+  test::Driven run(8.0, short_drive());
   double last = 0.0;
   int poses = 0;
   for (int k = 0; k < 40; ++k) {
     const sim::DriveStep step = run.drive.next();
-    for (const Odometry& piece : step.odometry) {
-      const auto pose = run.filter.add(piece).pose;
+    for (const model::Odometry& increment : step.odometry) {
+      const auto pose = run.filter.add(increment).pose;
       if (!pose) continue;
       ++poses;
       REQUIRE(position_sigma(*pose) > last);
@@ -112,17 +113,17 @@ TEST_CASE("Without scans a pose still comes, ever less sure", "[ekf]") {
 }
 
 TEST_CASE("What is not finite is refused and counted", "[ekf]") {
-  Driven run(8.0, short_drive());
+  test::Driven run(8.0, short_drive());
   const sim::DriveStep step = run.drive.next();
-  Odometry broken = step.odometry.back();
+  model::Odometry broken = step.odometry.back();
   broken.inertial->velocity_mps.x() = kNaN;
   run.filter.add(broken);
   broken = step.odometry.back();
   broken.covariance(1, 1) = -1.0;
   run.filter.add(broken);
   REQUIRE(run.filter.counters().odometry_refused == 2);
-  for (const Odometry& piece : step.odometry) run.filter.add(piece);
-  TrackedScan scan = true_tracks(step);
+  for (const model::Odometry& increment : step.odometry) run.filter.add(increment);
+  model::TrackedScan scan = test::true_tracks(step);
   const auto count = scan.landmarks.size();
   REQUIRE(count > 3);
   scan.landmarks[0].observed.position_m.y() = kNaN;
@@ -136,26 +137,26 @@ TEST_CASE("What is not finite is refused and counted", "[ekf]") {
 }
 
 TEST_CASE("Empty scans are odometry alone", "[ekf]") {
-  Driven run(8.0, short_drive());
+  test::Driven run(8.0, short_drive());
   const double before = position_sigma(*run.go().pose);
-  EkfPose pose;
+  model::EkfPose pose;
   for (int k = 0; k < 30; ++k) {
     run.step = run.drive.next();
-    for (const Odometry& piece : run.step.odometry) run.filter.add(piece);
-    TrackedScan scan = true_tracks(run.step);
+    for (const model::Odometry& increment : run.step.odometry) run.filter.add(increment);
+    model::TrackedScan scan = test::true_tracks(run.step);
     scan.landmarks.clear();
     pose = *run.filter.add(scan).pose;
   }
   REQUIRE(pose.landmarks_used == 0);
   REQUIRE(position_sigma(pose) > before);
-  REQUIRE(nees(pose, run.truth()) < 16.0);
+  REQUIRE(test::nees(pose, run.truth()) < 16.0);
 }
 
 TEST_CASE("An outlier is refused, a scan at odds with the map restarts in the end", "[ekf]") {
-  Driven run(8.0, short_drive());
+  test::Driven run(8.0, short_drive());
   run.step = run.drive.next();
-  for (const Odometry& piece : run.step.odometry) run.filter.add(piece);
-  TrackedScan scan = true_tracks(run.step);
+  for (const model::Odometry& increment : run.step.odometry) run.filter.add(increment);
+  model::TrackedScan scan = test::true_tracks(run.step);
   std::size_t known = 0;
   for (std::size_t i = 0; i < scan.landmarks.size(); ++i) {
     for (const auto& landmark : run.filter.state().landmarks()) {
@@ -166,13 +167,14 @@ TEST_CASE("An outlier is refused, a scan at odds with the map restarts in the en
   REQUIRE(run.filter.add(scan).pose->landmarks_refused >= 1);
   EkfParameters parameters;
   parameters.map.max_refused = 1000;
-  Driven other(8.0, short_drive(), parameters);
-  EkfPose pose = *other.go().pose;
+  test::Driven other(8.0, short_drive(), parameters);
+  model::EkfPose pose = *other.go().pose;
   for (int k = 0; k < parameters.restart.after_refused_scans; ++k) {
     other.step = other.drive.next();
-    for (const Odometry& piece : other.step.odometry) other.filter.add(piece);
-    TrackedScan shifted = true_tracks(other.step);
-    for (TrackedLandmark& landmark : shifted.landmarks) landmark.observed.position_m.y() += 5.0;
+    for (const model::Odometry& increment : other.step.odometry) other.filter.add(increment);
+    model::TrackedScan shifted = test::true_tracks(other.step);
+    for (model::TrackedLandmark& landmark : shifted.landmarks)
+      landmark.observed.position_m.y() += 5.0;
     pose = *other.filter.add(shifted).pose;
   }
   REQUIRE(pose.reset_counter == 1);
@@ -180,12 +182,12 @@ TEST_CASE("An outlier is refused, a scan at odds with the map restarts in the en
 }
 
 TEST_CASE("A new landmark too near to an old one is refused", "[ekf]") {
-  Driven run(5.0, short_drive());
+  test::Driven run(5.0, short_drive());
   run.step = run.drive.next();
-  for (const Odometry& piece : run.step.odometry) run.filter.add(piece);
-  TrackedScan scan = true_tracks(run.step);
+  for (const model::Odometry& increment : run.step.odometry) run.filter.add(increment);
+  model::TrackedScan scan = test::true_tracks(run.step);
   const std::size_t before = run.filter.state().landmarks().size();
-  TrackedLandmark twin = scan.landmarks.front();
+  model::TrackedLandmark twin = scan.landmarks.front();
   twin.track_id = 77777777;
   twin.observed.position_m.x() += 0.3;
   const std::uint64_t refused = run.filter.counters().landmarks_too_near;
@@ -196,8 +198,8 @@ TEST_CASE("A new landmark too near to an old one is refused", "[ekf]") {
 }
 
 TEST_CASE("A clock that jumps back starts anew", "[ekf]") {
-  Driven run(8.0, short_drive());
-  TrackedScan scan = true_tracks(run.step);
+  test::Driven run(8.0, short_drive());
+  model::TrackedScan scan = test::true_tracks(run.step);
   scan.utime -= 3600LL * 1000000;
   const auto output = run.filter.add(scan);
   REQUIRE(output.pose->reset_counter == 1);
@@ -205,13 +207,13 @@ TEST_CASE("A clock that jumps back starts anew", "[ekf]") {
 }
 
 TEST_CASE("A loaded filter goes on exactly as the saved one", "[ekf][state]") {
-  Driven run(12.0, short_drive());
+  test::Driven run(12.0, short_drive());
   Ekf second((EkfParameters()));
   second.load(run.filter.save());
   for (int k = 0; k < 30; ++k) {
     const EkfOutput expected = run.go();
-    for (const Odometry& piece : run.step.odometry) second.add(piece);
-    const EkfOutput actual = second.add(true_tracks(run.step));
+    for (const model::Odometry& increment : run.step.odometry) second.add(increment);
+    const EkfOutput actual = second.add(test::true_tracks(run.step));
     REQUIRE(expected.pose->sequence == actual.pose->sequence);
     REQUIRE(expected.pose->ekf_map_T_vehicle.coordinates() ==
             actual.pose->ekf_map_T_vehicle.coordinates());
@@ -230,7 +232,7 @@ TEST_CASE("A loaded filter goes on exactly as the saved one", "[ekf][state]") {
 TEST_CASE("An hour costs no more memory than a minute", "[ekf][long]") {
   sim::InertialDriveParameters drive = short_drive();
   drive.range_m = 8.0;  // A few landmarks: an hour in a second.
-  Driven run(60.0, drive);
+  test::Driven run(60.0, drive);
   const std::size_t early = run.filter.save().size();
   std::size_t most = 0;
   for (int k = 0; k < 36000; ++k) {
@@ -248,11 +250,11 @@ TEST_CASE("A full state makes room by what is out of sight, and never overflows"
   EkfParameters parameters;
   parameters.map.max_landmarks = 6;
   sim::InertialDriveParameters drive = short_drive();
-  Driven run(20.0, drive, parameters);
+  test::Driven run(20.0, drive, parameters);
   REQUIRE(run.filter.state().landmarks().size() <= 6);
   REQUIRE(run.filter.counters().landmarks_too_near > 0);
   CAPTURE(run.filter.counters().rejoined, run.filter.counters().landmarks_refused,
           run.filter.counters().removed);
-  const EkfPose pose = *run.go().pose;
-  REQUIRE(nees(pose, run.truth()) < 25.0);
+  const model::EkfPose pose = *run.go().pose;
+  REQUIRE(test::nees(pose, run.truth()) < 25.0);
 }

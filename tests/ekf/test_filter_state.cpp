@@ -4,6 +4,7 @@
 #include "tests/ekf/filter_fixture.hpp"
 
 using namespace understory;
+using namespace understory::ekf;
 using namespace understory::test;
 
 TEST_CASE("The dense kernel subtracts what Eigen does", "[ekf][kernel]") {
@@ -18,33 +19,33 @@ TEST_CASE("The dense kernel subtracts what Eigen does", "[ekf][kernel]") {
     const Eigen::MatrixXd expected =
         out.topLeftCorner(rows, columns) -
         a.topLeftCorner(rows, depth) * b.topLeftCorner(columns, depth).transpose();
-    ekf::subtract_product({out.data(), out.outerStride()}, {a.data(), a.outerStride()},
-                          {b.data(), b.outerStride()}, rows, columns, depth, false);
+    subtract_product({out.data(), out.outerStride()}, {a.data(), a.outerStride()},
+                     {b.data(), b.outerStride()}, rows, columns, depth, false);
     REQUIRE((out.topLeftCorner(rows, columns) - expected).cwiseAbs().maxCoeff() < 1e-12);
 
     Eigen::MatrixXd square = Eigen::MatrixXd::Random(72, 72);
     const Eigen::MatrixXd less =
         square.topLeftCorner(rows, rows) -
         a.topLeftCorner(rows, depth) * a.topLeftCorner(rows, depth).transpose();
-    ekf::subtract_product({square.data(), square.outerStride()}, {a.data(), a.outerStride()},
-                          {a.data(), a.outerStride()}, rows, rows, depth, true);
+    subtract_product({square.data(), square.outerStride()}, {a.data(), a.outerStride()},
+                     {a.data(), a.outerStride()}, rows, rows, depth, true);
     const Eigen::MatrixXd error = square.topLeftCorner(rows, rows) - less;
     REQUIRE(error.triangularView<Eigen::Lower>().toDenseMatrix().cwiseAbs().maxCoeff() < 1e-12);
   }
 }
 
 TEST_CASE("Quantiles of the chi-squared distribution agree with its tables", "[ekf]") {
-  REQUIRE(ekf::chi_squared_quantile(0.95, 2) == Approx(5.991).epsilon(1e-3));
-  REQUIRE(ekf::chi_squared_quantile(0.999, 2) == Approx(13.816).epsilon(1e-3));
-  REQUIRE(ekf::chi_squared_quantile(0.95, 4) == Approx(9.488).epsilon(1e-2));
-  REQUIRE(ekf::chi_squared_quantile(0.999, 20) == Approx(45.315).epsilon(1e-2));
-  REQUIRE(ekf::chi_squared_quantile(0.975, 300) == Approx(349.874).epsilon(1e-3));
-  REQUIRE(ekf::chi_squared_quantile(0.025, 300) == Approx(253.912).epsilon(1e-3));
+  REQUIRE(chi_squared_quantile(0.95, 2) == Approx(5.991).epsilon(1e-3));
+  REQUIRE(chi_squared_quantile(0.999, 2) == Approx(13.816).epsilon(1e-3));
+  REQUIRE(chi_squared_quantile(0.95, 4) == Approx(9.488).epsilon(1e-2));
+  REQUIRE(chi_squared_quantile(0.999, 20) == Approx(45.315).epsilon(1e-2));
+  REQUIRE(chi_squared_quantile(0.975, 300) == Approx(349.874).epsilon(1e-3));
+  REQUIRE(chi_squared_quantile(0.025, 300) == Approx(253.912).epsilon(1e-3));
 }
 
 TEST_CASE("A correction and the error that it undoes are one", "[ekf][state]") {
   std::mt19937_64 random(2);
-  for (const ErrorForm form : kForms) {
+  for (const ErrorForm form : test::kForms) {
     const FilterState state = random_state(form, 3, random);
     FilterState moved = state;
     Eigen::VectorXd delta = 1e-5 * Eigen::VectorXd::Random(state.size());
@@ -71,7 +72,7 @@ TEST_CASE("A removed landmark leaves the rest as it was", "[ekf][state]") {
 
 TEST_CASE("A new landmark's covariance follows from where it was seen", "[ekf][state]") {
   std::mt19937_64 random(4);
-  for (const ErrorForm form : kForms) {
+  for (const ErrorForm form : test::kForms) {
     FilterState state = random_state(form, 2, random);
     const int n = state.size();
     const Eigen::Vector2d seen(7.0, -3.0);
@@ -88,7 +89,7 @@ TEST_CASE("A new landmark's covariance follows from where it was seen", "[ekf][s
       jacobian.col(k) = difference(added, moved) / 1e-6;
     }
     Eigen::MatrixXd expected = jacobian * full_covariance(state) * jacobian.transpose();
-    const Eigen::Matrix2d rotation = ekf::rotation_of(state.heading);
+    const Eigen::Matrix2d rotation = rotation_of(state.heading);
     expected.bottomRightCorner<2, 2>() += rotation * noise * rotation.transpose();
     REQUIRE((full_covariance(added) - expected).norm() < 1e-4 * expected.norm());
   }
@@ -96,10 +97,10 @@ TEST_CASE("A new landmark's covariance follows from where it was seen", "[ekf][s
 
 TEST_CASE("Moving the anchor changes no covariance that is told", "[ekf][state]") {
   std::mt19937_64 random(5);
-  for (const ErrorForm form : kForms) {
+  for (const ErrorForm form : test::kForms) {
     FilterState state = random_state(form, 4, random);
     state.position += Eigen::Vector2d(400.0, -300.0);
-    const SE2 pose = state.pose();
+    const geometry::SE2 pose = state.pose();
     const Eigen::Matrix3d covariance = state.pose_covariance();
     const Eigen::Matrix2d landmark = state.landmark_covariance(2);
     const Eigen::Vector2d place = state.anchor_m + state.landmarks()[2].position;
@@ -114,7 +115,7 @@ TEST_CASE("Moving the anchor changes no covariance that is told", "[ekf][state]"
 
 TEST_CASE("The pose's covariance is the one that was set", "[ekf][state]") {
   std::mt19937_64 random(6);
-  for (const ErrorForm form : kForms) {
+  for (const ErrorForm form : test::kForms) {
     FilterState state = random_state(form, 2, random);
     const Eigen::Matrix3d root = Eigen::Matrix3d::Random();
     const Eigen::Matrix3d wanted = root * root.transpose();

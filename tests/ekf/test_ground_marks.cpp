@@ -10,6 +10,7 @@
 
 using namespace understory;
 using namespace understory::ekf;
+using namespace understory::ekf;
 using namespace understory::test;
 
 namespace {
@@ -18,12 +19,12 @@ constexpr Sway kSway{2e-3, 5e-4};
 constexpr double kGate = 30.0;
 
 /// A piece of an IMU that measures nothing, with the noise of the simulated one.
-Odometry still_piece(Utime from, Utime to) {
-  Odometry piece;
-  piece.from_utime = from;
-  piece.utime = to;
-  piece.is_standing = true;
-  Preintegration& inertial = piece.inertial.emplace();
+model::Odometry stationary_increment(model::Utime from, model::Utime to) {
+  model::Odometry increment;
+  increment.from_utime = from;
+  increment.utime = to;
+  increment.is_stationary = true;
+  model::Preintegration& inertial = increment.inertial.emplace();
   inertial.seconds = 1e-6 * static_cast<double>(to - from);
   const double s = inertial.seconds;
   const double q = 2.5e-5;
@@ -36,19 +37,19 @@ Odometry still_piece(Utime from, Utime to) {
     inertial.bias_jacobian(k + 2, k) = -0.5 * s * s;
   }
   inertial.bias_jacobian(0, 0) = -s;
-  return piece;
+  return increment;
 }
 
 }  // namespace
 
 TEST_CASE("Marks set from a pose tell nothing of that pose", "[ekf][standing]") {
   std::mt19937_64 random(21);
-  for (const ErrorForm form : kForms) {
+  for (const ErrorForm form : test::kForms) {
     FilterState state = random_state(form, 3, random);
     LowRank room(state.size() + 4);
     JointUpdate joint(5);
     const Eigen::MatrixXd before = full_covariance(state);
-    const SE2 pose = state.pose();
+    const geometry::SE2 pose = state.pose();
     add_ground_marks(state, kSway);
     REQUIRE(has_ground_marks(state));
     REQUIRE(measure_ground_marks(state, kSway, kGate, joint, room));
@@ -63,10 +64,10 @@ TEST_CASE("Marks set from a pose tell nothing of that pose", "[ekf][standing]") 
 TEST_CASE("Marks keep the pose, but for twice the sway, over motion of which nothing is known",
           "[ekf][standing]") {
   std::mt19937_64 random(22);
-  for (const ErrorForm form : kForms) {
+  for (const ErrorForm form : test::kForms) {
     FilterState state(form, 2);
-    state.heading = normal(random);
-    state.position = 20.0 * Eigen::Vector2d(normal(random), normal(random));
+    state.heading = test::normal(random);
+    state.position = 20.0 * Eigen::Vector2d(test::normal(random), test::normal(random));
     state.first_position = state.position;
     state.set_pose_covariance(Eigen::Vector3d(1e-4, 2e-4, 1e-6).asDiagonal());
     LowRank room(state.size() + 4);
@@ -97,7 +98,7 @@ TEST_CASE("A vehicle that has moved off its marks is found out, and nothing is c
   add_ground_marks(state, kSway);
   state.position.x() += 20.0 * kSway.sigma_m;
   const Eigen::MatrixXd before = full_covariance(state);
-  const SE2 pose = state.pose();
+  const geometry::SE2 pose = state.pose();
   REQUIRE(!measure_ground_marks(state, kSway, kGate, joint, room));
   REQUIRE(full_covariance(state) == before);
   REQUIRE(state.pose().coordinates() == pose.coordinates());
@@ -105,12 +106,12 @@ TEST_CASE("A vehicle that has moved off its marks is found out, and nothing is c
 
 TEST_CASE("Hours of standing leave the pose as sure as it was", "[ekf][standing]") {
   Ekf filter((EkfParameters()));
-  EkfPose pose;
-  const auto stand = [&](int pieces) {
-    for (int k = 0; k < pieces; ++k) {
-      const Utime from = filter.utime();
-      filter.add(still_piece(from, from + 100000));
-      TrackedScan scan;
+  model::EkfPose pose;
+  const auto stand = [&](int increments) {
+    for (int k = 0; k < increments; ++k) {
+      const model::Utime from = filter.utime();
+      filter.add(stationary_increment(from, from + 100000));
+      model::TrackedScan scan;
       scan.utime = from + 100000;
       const EkfOutput output = filter.add(scan);
       REQUIRE(output.map->landmarks.empty());
@@ -123,14 +124,14 @@ TEST_CASE("Hours of standing leave the pose as sure as it was", "[ekf][standing]
   const EkfMotionParameters motion;
   REQUIRE(pose.covariance(0, 0) <= 1.01 * early(0, 0));
   REQUIRE(pose.covariance(2, 2) <= 1.01 * early(2, 2));
-  REQUIRE(std::sqrt(pose.covariance(0, 0)) > 0.9 * motion.standing_sigma_m);
-  REQUIRE(std::sqrt(pose.covariance(2, 2)) > 0.9 * motion.standing_sigma_rad);
+  REQUIRE(std::sqrt(pose.covariance(0, 0)) > 0.9 * motion.stationary_sigma_m);
+  REQUIRE(std::sqrt(pose.covariance(2, 2)) > 0.9 * motion.stationary_sigma_rad);
   REQUIRE(filter.counters().crept == 0);
   // Marks go with the motion.
   REQUIRE(has_ground_marks(filter.state()));
-  Odometry away = still_piece(filter.utime(), filter.utime() + 100000);
-  away.is_standing = false;
-  TrackedScan scan;
+  model::Odometry away = stationary_increment(filter.utime(), filter.utime() + 100000);
+  away.is_stationary = false;
+  model::TrackedScan scan;
   scan.utime = away.utime;
   filter.add(away);
   filter.add(scan);
@@ -141,22 +142,24 @@ TEST_CASE("Landmarks overrule a detector that takes creeping for standing", "[ek
   Ekf filter((EkfParameters()));
   std::mt19937_64 random(23);
   constexpr double kCreep_m = 1e-3;  // per piece: 1 cm/s
-  SE2 truth;
-  EkfPose pose;
+  geometry::SE2 truth;
+  model::EkfPose pose;
   double worst_m = 0.0;
   for (int k = 0; k <= 300; ++k) {
-    if (k > 100) truth = truth * SE2(kCreep_m, 0.0, 0.0);
-    TrackedScan scan;
+    if (k > 100) truth = truth * geometry::SE2(kCreep_m, 0.0, 0.0);
+    model::TrackedScan scan;
     scan.utime = 100000 * k;
     scan.field_of_view.max_range_m = 40.0;
-    if (k > 0) filter.add(still_piece(scan.utime - 100000, scan.utime));
+    if (k > 0) filter.add(stationary_increment(scan.utime - 100000, scan.utime));
     for (int i = 0; i < 12; ++i) {
-      const Eigen::Vector2d place = 15.0 * SE2(0.0, 0.0, 0.5 * i).rotation().col(0);
-      Detection seen;
+      const Eigen::Vector2d place = 15.0 * geometry::SE2(0.0, 0.0, 0.5 * i).rotation().col(0);
+      model::Detection seen;
       seen.position_m.head<2>() =
-          truth.inverse() * place + 0.01 * Eigen::Vector2d(normal(random), normal(random));
+          truth.inverse() * place +
+          0.01 * Eigen::Vector2d(test::normal(random), test::normal(random));
       seen.covariance_m2 = 1e-4 * Eigen::Matrix3d::Identity();
-      scan.landmarks.push_back({static_cast<TrackId>(i + 1), static_cast<std::uint32_t>(i), seen});
+      scan.landmarks.push_back(
+          {static_cast<model::TrackId>(i + 1), static_cast<std::uint32_t>(i), seen});
     }
     pose = *filter.add(scan).pose;
     worst_m = std::max(worst_m, (truth.inverse() * pose.ekf_map_T_vehicle).translation().norm());
@@ -173,13 +176,14 @@ TEST_CASE("Landmarks overrule a detector that takes creeping for standing", "[ek
 TEST_CASE("A swaying vehicle's pose is as good as it says", "[ekf][standing][consistency]") {
   sim::InertialDriveParameters drive = short_drive();
   drive.standing_s = 12.0;
-  drive.sway_sigma_m = EkfMotionParameters{}.standing_sigma_m;
-  drive.sway_sigma_rad = EkfMotionParameters{}.standing_sigma_rad;
-  drive.sway_sigma_mps = EkfMotionParameters{}.standing_sigma_mps;
+  drive.sway_sigma_m = EkfMotionParameters{}.stationary_sigma_m;
+  drive.sway_sigma_rad = EkfMotionParameters{}.stationary_sigma_rad;
+  drive.sway_sigma_mps = EkfMotionParameters{}.stationary_sigma_mps;
   double mean = 0.0;
   constexpr int kRuns = 40;
   for (int run = 0; run < kRuns; ++run) {
-    mean += drive_through(drive, {}, 11.0, 300 + static_cast<unsigned>(run)).last_nees / kRuns;
+    mean +=
+        test::drive_through(drive, {}, 11.0, 300 + static_cast<unsigned>(run)).last_nees / kRuns;
   }
   // 99.9 % band of a 40-run mean.
   REQUIRE(mean > 1.9);
@@ -191,12 +195,12 @@ TEST_CASE("A full state stands too", "[ekf][standing]") {
   parameters.map.max_landmarks = 4;
   sim::InertialDriveParameters drive = short_drive();
   drive.standing_s = 5.0;
-  sim::InertialDrive steps(drive, trunks(), 5);
+  sim::InertialDrive steps(drive, test::trunks(), 5);
   Ekf filter(parameters);
   for (int k = 0; k < 60; ++k) {
     const sim::DriveStep step = steps.next();
-    for (const Odometry& piece : step.odometry) filter.add(piece);
-    REQUIRE(filter.add(true_tracks(step)).map->landmarks.size() <= 4);
+    for (const model::Odometry& increment : step.odometry) filter.add(increment);
+    REQUIRE(filter.add(test::true_tracks(step)).map->landmarks.size() <= 4);
     if (k == 40) {
       REQUIRE(filter.state().landmarks().size() == 4 + kGroundMarks);
       Ekf second(parameters);
@@ -209,11 +213,11 @@ TEST_CASE("A full state stands too", "[ekf][standing]") {
 
 TEST_CASE("Standing is not believed against the filter's own velocity, but in the end",
           "[ekf][standing]") {
-  Driven run(20.0, short_drive());
+  test::Driven run(20.0, short_drive());
   const double speed = run.step.velocity_mps.norm();
   REQUIRE(speed > 3.0);
   // The detector takes a smooth road for standing.
-  EkfPose pose;
+  model::EkfPose pose;
   for (int k = 0; k < 150; ++k) pose = *run.go(1, true).pose;
   CAPTURE(pose.velocity_mps.transpose(), nees(pose, run.truth()));
   REQUIRE(pose.velocity_mps.norm() > 3.0);
@@ -221,10 +225,10 @@ TEST_CASE("Standing is not believed against the filter's own velocity, but in th
   REQUIRE(pose.reset_counter == 0);
   REQUIRE(run.filter.counters().crept == 1);
   // No landmark speaks for moving any more, and the detector insists.
-  Utime utime = run.filter.utime();
+  model::Utime utime = run.filter.utime();
   for (int k = 0; k < 110; ++k, utime += 100000) {
-    run.filter.add(still_piece(utime, utime + 100000));
-    TrackedScan scan;
+    run.filter.add(stationary_increment(utime, utime + 100000));
+    model::TrackedScan scan;
     scan.utime = utime + 100000;
     pose = *run.filter.add(scan).pose;
   }

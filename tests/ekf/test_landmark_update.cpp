@@ -8,13 +8,14 @@
 #include "tests/ekf/filter_fixture.hpp"
 
 using namespace understory;
+using namespace understory::ekf;
 using namespace understory::test;
 using namespace understory::ekf;
 
 namespace {
 
 Eigen::MatrixXd measurement_rows(const FilterState& state, const std::vector<Pairing>& pairings,
-                                 const std::vector<Sighting>& sightings) {
+                                 const std::vector<Observation>& observations) {
   Eigen::MatrixXd rows =
       Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(pairings.size()), state.size());
   for (std::size_t k = 0; k < pairings.size(); ++k) {
@@ -22,37 +23,38 @@ Eigen::MatrixXd measurement_rows(const FilterState& state, const std::vector<Pai
     rows.block<2, 1>(at, kHeading) = heading_row(state, pairings[k].landmark);
     rows.block<2, 2>(at, kPosition) = -Eigen::Matrix2d::Identity();
     rows.block<2, 2>(at, FilterState::row(pairings[k].landmark)).setIdentity();
-    rows.block<2, 2>(at, kLevel) = level_rows(state, sightings[pairings[k].sighting].height_m);
+    rows.block<2, 2>(at, kLevel) =
+        level_rows(state, observations[pairings[k].observation].height_m);
   }
   return rows;
 }
 
-std::vector<Sighting> sightings_near(const FilterState& state, double sigma,
-                                     std::mt19937_64& random) {
-  std::vector<Sighting> sightings;
+std::vector<Observation> observations_near(const FilterState& state, double sigma,
+                                           std::mt19937_64& random) {
+  std::vector<Observation> observations;
   for (const MapLandmark& landmark : state.landmarks()) {
-    Sighting seen;
-    seen.height_m = 2.0 * normal(random);
+    Observation seen;
+    seen.height_m = 2.0 * test::normal(random);
     seen.position_m =
         rotation_of(state.heading).transpose() * (landmark.position - state.position) +
         seen.height_m * level_displacement() * state.level +
-        sigma * Eigen::Vector2d(normal(random), normal(random));
+        sigma * Eigen::Vector2d(test::normal(random), test::normal(random));
     seen.covariance_m2 << 0.02, 0.004, 0.004, 0.01;
-    sightings.push_back(seen);
+    observations.push_back(seen);
   }
-  return sightings;
+  return observations;
 }
 
 /// Joint squared distance of pairings, on full matrices.
-double joint_distance(const FilterState& state, const std::vector<Sighting>& sightings,
+double joint_distance(const FilterState& state, const std::vector<Observation>& observations,
                       const std::vector<Pairing>& pairings) {
-  const Eigen::MatrixXd rows = measurement_rows(state, pairings, sightings);
+  const Eigen::MatrixXd rows = measurement_rows(state, pairings, observations);
   Eigen::MatrixXd spread = rows * full_covariance(state) * rows.transpose();
   Eigen::VectorXd error(rows.rows());
   const Eigen::Matrix2d rotation = rotation_of(state.heading);
   for (std::size_t k = 0; k < pairings.size(); ++k) {
     const auto at = 2 * static_cast<Eigen::Index>(k);
-    const Sighting& seen = sightings[pairings[k].sighting];
+    const Observation& seen = observations[pairings[k].observation];
     spread.block<2, 2>(at, at) += rotation * seen.covariance_m2 * rotation.transpose();
     error.segment<2>(at) = innovation(state, pairings[k].landmark, seen);
   }
@@ -63,9 +65,9 @@ double joint_distance(const FilterState& state, const std::vector<Sighting>& sig
 
 TEST_CASE("Innovations depend on the error as their rows say", "[ekf][update]") {
   std::mt19937_64 random(21);
-  for (const ErrorForm form : kForms) {
+  for (const ErrorForm form : test::kForms) {
     const FilterState state = random_state(form, 3, random);
-    const Sighting seen = sightings_near(state, 0.0, random)[1];
+    const Observation seen = observations_near(state, 0.0, random)[1];
     const Eigen::MatrixXd rows = measurement_rows(state, {{0, 1}}, {seen});
     for (int k = 0; k < state.size(); ++k) {
       const double h = 1e-6;
@@ -89,28 +91,29 @@ TEST_CASE("Innovations depend on the error as their rows say", "[ekf][update]") 
 
 TEST_CASE("Steps of a few landmarks give what one full update gives", "[ekf][update]") {
   std::mt19937_64 random(22);
-  for (const ErrorForm form : kForms) {
+  for (const ErrorForm form : test::kForms) {
     for (const int count : {1, 5, 16, 17, 40}) {
       FilterState state = random_state(form, count, random);
-      const auto sightings = sightings_near(state, 0.2, random);
+      const auto observations = observations_near(state, 0.2, random);
       std::vector<Pairing> pairings;
-      for (std::uint32_t k = 0; k < sightings.size(); ++k) pairings.push_back({k, k});
+      for (std::uint32_t k = 0; k < observations.size(); ++k) pairings.push_back({k, k});
       const Eigen::MatrixXd before = full_covariance(state);
-      const Eigen::MatrixXd rows = measurement_rows(state, pairings, sightings);
+      const Eigen::MatrixXd rows = measurement_rows(state, pairings, observations);
       Eigen::MatrixXd spread = rows * before * rows.transpose();
       Eigen::VectorXd error(rows.rows());
       const Eigen::Matrix2d rotation = rotation_of(state.heading);
       for (std::size_t k = 0; k < pairings.size(); ++k) {
         const auto at = 2 * static_cast<Eigen::Index>(k);
-        spread.block<2, 2>(at, at) += rotation * sightings[k].covariance_m2 * rotation.transpose();
-        error.segment<2>(at) = innovation(state, k, sightings[k]);
+        spread.block<2, 2>(at, at) +=
+            rotation * observations[k].covariance_m2 * rotation.transpose();
+        error.segment<2>(at) = innovation(state, k, observations[k]);
       }
       const Eigen::MatrixXd gain = before * rows.transpose() * spread.inverse();
       FilterState oracle = state;
       oracle.retract(gain * error);
       LowRank room(state.size());
       JointUpdate update(count + 4);
-      const double distance = update.apply(state, sightings, pairings, room);
+      const double distance = update.apply(state, observations, pairings, room);
       update.finish(state, room);
       const Eigen::MatrixXd expected = before - gain * rows * before;
       CAPTURE(static_cast<int>(form), count);
@@ -125,13 +128,13 @@ TEST_CASE("Joint compatibility finds what trying everything finds", "[ekf][jcbb]
   std::mt19937_64 random(23);
   const double probability = 0.95;
   for (int trial = 0; trial < 40; ++trial) {
-    const ErrorForm form = kForms[trial % 3];
+    const ErrorForm form = test::kForms[trial % 3];
     const FilterState state = random_state(form, 4, random);
-    auto sightings = sightings_near(state, 0.3, random);
-    sightings.pop_back();
+    auto observations = observations_near(state, 0.3, random);
+    observations.pop_back();
     std::vector<Candidates> candidates;
-    for (std::uint32_t k = 0; k < sightings.size(); ++k) candidates.push_back({k, {0, 1, 2, 3}});
-    const auto found = joint_compatibility(state, sightings, candidates, {probability, 100000});
+    for (std::uint32_t k = 0; k < observations.size(); ++k) candidates.push_back({k, {0, 1, 2, 3}});
+    const auto found = joint_compatibility(state, observations, candidates, {probability, 100000});
     // Every assignment: 4 = none.
     std::size_t best = 0;
     double least = std::numeric_limits<double>::infinity();
@@ -149,17 +152,17 @@ TEST_CASE("Joint compatibility finds what trying everything finds", "[ekf][jcbb]
       for (std::size_t m = 1; m <= pairings.size(); ++m) {
         const std::vector<Pairing> part(pairings.begin(),
                                         pairings.begin() + static_cast<std::ptrdiff_t>(m));
-        compatible = compatible && joint_distance(state, sightings, part) <=
+        compatible = compatible && joint_distance(state, observations, part) <=
                                        chi_squared_quantile(probability, 2 * static_cast<int>(m));
       }
       if (!compatible) continue;
-      const double distance = joint_distance(state, sightings, pairings);
+      const double distance = joint_distance(state, observations, pairings);
       if (pairings.size() > best || (pairings.size() == best && distance < least)) {
         best = pairings.size();
         least = distance;
       }
     }
     REQUIRE(found.size() == best);
-    if (best > 0) REQUIRE(joint_distance(state, sightings, found) == Approx(least));
+    if (best > 0) REQUIRE(joint_distance(state, observations, found) == Approx(least));
   }
 }

@@ -6,6 +6,7 @@
 #include "tests/ekf/filter_fixture.hpp"
 
 using namespace understory;
+using namespace understory::ekf;
 using namespace understory::test;
 
 namespace {
@@ -23,14 +24,14 @@ class WrongLevel {
   }
 
   /// What the wrong level makes of a piece, and what is said of it.
-  void spoil(Odometry& piece) {
-    Preintegration& inertial = *piece.inertial;
+  void spoil(model::Odometry& increment) {
+    model::Preintegration& inertial = *increment.inertial;
     // While standing the accelerometer's bias hides what the level does.
-    const Eigen::Vector2d force = kGravity * ekf::level_displacement() * (error_ - first_error_);
+    const Eigen::Vector2d force = kGravity * level_displacement() * (error_ - first_error_);
     inertial.velocity_mps += force * inertial.seconds;
     inertial.position_m += 0.5 * force * inertial.seconds * inertial.seconds;
     const double before = variance_;
-    if (!piece.is_standing) {
+    if (!increment.is_stationary) {
       variance_ = std::max(kEnd * kEnd, variance_ * std::exp(-inertial.seconds / 2.0));
     }
     const double memory = variance_ / before;
@@ -39,11 +40,11 @@ class WrongLevel {
     inertial.level = {variance_ * one, memory * one, added * one};
     error_ = memory * error_ + std::sqrt(added) * Eigen::Vector2d(normal(random_), normal(random_));
   }
-  void spoil(TrackedScan& scan) const {
-    for (TrackedLandmark& landmark : scan.landmarks) {
-      Detection& seen = landmark.observed;
+  void spoil(model::TrackedScan& scan) const {
+    for (model::TrackedLandmark& landmark : scan.landmarks) {
+      model::Detection& seen = landmark.observed;
       seen.position_m.z() = kHeight_m;
-      seen.position_m.head<2>() += kHeight_m * ekf::level_displacement() * error_;
+      seen.position_m.head<2>() += kHeight_m * level_displacement() * error_;
       const double share = kHeight_m * kHeight_m * variance_;
       seen.covariance_m2.topLeftCorner<2, 2>() += share * Eigen::Matrix2d::Identity();
       seen.covariance_m2(2, 2) = 1.0;
@@ -61,30 +62,30 @@ class WrongLevel {
 };
 
 double mean_nees_with_wrong_level(std::uint64_t seed, bool is_told) {
-  sim::InertialDriveParameters parameters = short_drive();
+  sim::InertialDriveParameters parameters = test::short_drive();
   parameters.standing_s = 5.0;
   parameters.odometry = sim::OdometryKind::kInertialAndWheels;
   parameters.position_sigma_m = 0.02;
   parameters.range_m = 40.0;
-  sim::InertialDrive drive(parameters, trunks(), seed);
-  Ekf filter(white_noise());
+  sim::InertialDrive drive(parameters, test::trunks(), seed);
+  Ekf filter(test::white_noise());
   WrongLevel level(seed);
-  SE2 start;
+  geometry::SE2 start;
   double sum = 0.0;
   int count = 0;
   for (int k = 0; k < 200; ++k) {
     const sim::DriveStep step = drive.next();
     if (k == 0) start = step.world_T_vehicle;
-    for (Odometry piece : step.odometry) {
-      level.spoil(piece);
-      if (!is_told) piece.inertial->level = LevelError{};
-      filter.add(piece);
+    for (model::Odometry increment : step.odometry) {
+      level.spoil(increment);
+      if (!is_told) increment.inertial->level = model::LevelError{};
+      filter.add(increment);
     }
-    TrackedScan scan = true_tracks(step);
+    model::TrackedScan scan = test::true_tracks(step);
     level.spoil(scan);
     const EkfOutput output = filter.add(scan);
     if (k < 60) continue;
-    sum += nees(*output.pose, start.inverse() * step.world_T_vehicle);
+    sum += test::nees(*output.pose, start.inverse() * step.world_T_vehicle);
     ++count;
   }
   return sum / count;
@@ -95,29 +96,29 @@ double mean_nees_with_wrong_level(std::uint64_t seed, bool is_told) {
 TEST_CASE("A level that is found to be wrong on the way leaves the filter consistent",
           "[ekf][level]") {
   double told = 0.0;
-  double untold = 0.0;
+  double unreported = 0.0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     told += mean_nees_with_wrong_level(seed, true) / 12.0;
-    untold += mean_nees_with_wrong_level(seed, false) / 12.0;
+    unreported += mean_nees_with_wrong_level(seed, false) / 12.0;
   }
-  CAPTURE(told, untold);
+  CAPTURE(told, unreported);
   CHECK(told < 4.0);
   CHECK(told > 1.5);
-  CHECK(untold > 2.0 * told);
+  CHECK(unreported > 2.0 * told);
 }
 
 TEST_CASE("What was seen from one place is less sure once that is left", "[ekf][standing]") {
-  sim::InertialDriveParameters parameters = short_drive();
+  sim::InertialDriveParameters parameters = test::short_drive();
   parameters.standing_s = 10.0;
   EkfParameters honest;
-  honest.sighting.lasting_share = 0.2;
-  Driven driven(0.0, parameters, honest);
+  honest.observation.correlated_share = 0.2;
+  test::Driven driven(0.0, parameters, honest);
   EkfOutput output;
   for (int k = 0; k < 104; ++k) output = driven.go();
   const double noise = parameters.position_sigma_m * parameters.position_sigma_m;
   std::size_t long_seen = 0;
-  for (const EkfLandmark& landmark : output.map->landmarks) {
-    if (landmark.times_seen < 50) continue;
+  for (const model::EkfLandmark& landmark : output.map->landmarks) {
+    if (landmark.observation_count < 50) continue;
     ++long_seen;
     CHECK(landmark.covariance_m2.trace() > 0.5 * 2.0 * 0.2 * noise);
   }
@@ -141,31 +142,31 @@ double level_nees_before_leaning_trunks(std::uint64_t seed) {
   std::vector<Eigen::Vector2d> leans;
   for (int i = 0; i < kTrunks; ++i) {
     const double bearing = 2.0 * M_PI * i / kTrunks;
-    trunks.emplace_back(12.0 * std::cos(bearing), 12.0 * std::sin(bearing), kHeight_m);
+    test::trunks.emplace_back(12.0 * std::cos(bearing), 12.0 * std::sin(bearing), kHeight_m);
     leans.emplace_back(kLean * normal(random), kLean * normal(random));
   }
-  Ekf filter(white_noise());
+  Ekf filter(test::white_noise());
   for (int k = 0; k < 200; ++k) {
-    Odometry piece;
-    piece.from_utime = Utime{100000} * k;
-    piece.utime = piece.from_utime + 100000;
-    piece.covariance = 1e-6 * Eigen::Matrix3d::Identity();
-    piece.is_standing = true;
-    Preintegration& inertial = piece.inertial.emplace();
+    model::Odometry increment;
+    increment.from_utime = model::Utime{100000} * k;
+    increment.utime = increment.from_utime + 100000;
+    increment.covariance = 1e-6 * Eigen::Matrix3d::Identity();
+    increment.is_stationary = true;
+    model::Preintegration& inertial = increment.inertial.emplace();
     inertial.seconds = 0.1;
     inertial.covariance = 1e-8 * Eigen::Matrix<double, 5, 5>::Identity();
     const double memory = 0.9996;
     inertial.level.covariance = kLevel * kLevel * Eigen::Matrix2d::Identity();
     inertial.level.memory = memory * Eigen::Matrix2d::Identity();
     inertial.level.added = (1.0 - memory * memory) * inertial.level.covariance;
-    filter.add(piece);
-    TrackedScan scan;
-    scan.utime = piece.utime;
+    filter.add(increment);
+    model::TrackedScan scan;
+    scan.utime = increment.utime;
     scan.field_of_view.max_range_m = 30.0;
     for (std::uint32_t i = 0; i < kTrunks; ++i) {
       const double up = kHeightNoise * normal(random);
-      Detection seen;
-      seen.position_m = trunks[i] + Eigen::Vector3d(0.0, 0.0, up);
+      model::Detection seen;
+      seen.position_m = test::trunks[i] + Eigen::Vector3d(0.0, 0.0, up);
       seen.position_m.head<2>() +=
           up * leans[i] + kNoise * Eigen::Vector2d(normal(random), normal(random));
       const double own = kNoise * kNoise + std::pow(kLean * kHeightNoise, 2);
@@ -175,7 +176,7 @@ double level_nees_before_leaning_trunks(std::uint64_t seed) {
     }
     filter.add(scan);
   }
-  const Eigen::Matrix2d spread = filter.state().covariance_block<2, 2>(ekf::kLevel, ekf::kLevel);
+  const Eigen::Matrix2d spread = filter.state().covariance_block<2, 2>(kLevel, kLevel);
   const Eigen::Vector2d& level = filter.state().level;
   return level.dot(spread.llt().solve(level));
 }
@@ -192,20 +193,20 @@ TEST_CASE("Leaning trunks of uncertain height do not pass for a wrong level", "[
 
 TEST_CASE("A scale that all distances have in common makes the pose less sure far out", "[ekf]") {
   const auto drive = [](double scale) {
-    EkfParameters parameters = white_noise();
-    parameters.sighting.scale_sigma = scale;
-    Driven driven(20.0, short_drive(), parameters);
+    EkfParameters parameters = test::white_noise();
+    parameters.observation.scale_sigma = scale;
+    test::Driven driven(20.0, test::short_drive(), parameters);
     return driven.go();
   };
   const EkfOutput without = drive(0.0);
   const EkfOutput with = drive(0.01);
-  const SE2& pose = with.pose->ekf_map_T_vehicle;
+  const geometry::SE2& pose = with.pose->ekf_map_T_vehicle;
   REQUIRE(pose.translation().norm() > 20.0);
   const Eigen::Vector2d off = 0.01 * (pose.rotation().transpose() * pose.translation());
   Eigen::Matrix3d expected = without.pose->covariance;
   expected.topLeftCorner<2, 2>() += off * off.transpose();
   CHECK((with.pose->covariance - expected).norm() < 1e-12);
-  const EkfLandmark& landmark = with.map->landmarks.front();
+  const model::EkfLandmark& landmark = with.map->landmarks.front();
   const Eigen::Matrix2d more =
       landmark.covariance_m2 - without.map->landmarks.front().covariance_m2;
   CHECK((more - 1e-4 * landmark.position_m * landmark.position_m.transpose()).norm() < 1e-12);
@@ -216,24 +217,24 @@ namespace {
 constexpr double kRoll = 5e-3;
 
 /// A tenth of a second by IMU, without motion.
-Odometry level_piece(int k, double yaw_rad, double pitch_tangent) {
-  Odometry piece;
-  piece.from_utime = Utime{100000} * k;
-  piece.utime = piece.from_utime + 100000;
-  piece.is_standing = k == 0;
-  Preintegration& inertial = piece.inertial.emplace();
+model::Odometry level_increment(int k, double yaw_rad, double pitch_tangent) {
+  model::Odometry increment;
+  increment.from_utime = model::Utime{100000} * k;
+  increment.utime = increment.from_utime + 100000;
+  increment.is_stationary = k == 0;
+  model::Preintegration& inertial = increment.inertial.emplace();
   inertial.seconds = 0.1;
   inertial.yaw_rad = yaw_rad;
   inertial.covariance = 1e-14 * Eigen::Matrix<double, 5, 5>::Identity();
   inertial.level.covariance = kRoll * kRoll * Eigen::Matrix2d::Identity();
   inertial.level.pitch_tangent = pitch_tangent;
-  return piece;
+  return increment;
 }
 
-EkfPose pose_after(Ekf& filter, const Odometry& piece) {
-  filter.add(piece);
-  TrackedScan scan;
-  scan.utime = piece.utime;
+model::EkfPose pose_after(Ekf& filter, const model::Odometry& increment) {
+  filter.add(increment);
+  model::TrackedScan scan;
+  scan.utime = increment.utime;
   scan.field_of_view.max_range_m = 30.0;
   return *filter.add(scan).pose;
 }
@@ -241,7 +242,7 @@ EkfPose pose_after(Ekf& filter, const Odometry& piece) {
 }  // namespace
 
 TEST_CASE("A wrong roll turns what is levelled, not the vehicle", "[ekf][level]") {
-  EkfParameters parameters = white_noise();
+  EkfParameters parameters = test::white_noise();
   parameters.prior.gyro_bias_sigma = 1e-6;
   std::mt19937_64 random(1);
   std::normal_distribution<double> normal;
@@ -251,10 +252,10 @@ TEST_CASE("A wrong roll turns what is levelled, not the vehicle", "[ekf][level]"
     double mean = 0.0;
     for (int run = 0; run < count; ++run) {
       Ekf filter(parameters);
-      const EkfPose first = pose_after(filter, level_piece(0, 0.0, first_tangent));
+      const model::EkfPose first = pose_after(filter, level_increment(0, 0.0, first_tangent));
       REQUIRE(std::sqrt(first.covariance(2, 2)) < 0.1 * 0.2 * kRoll);
       const double turned = (last_tangent - first_tangent) * kRoll * normal(random);
-      const EkfPose last = pose_after(filter, level_piece(1, turned, last_tangent));
+      const model::EkfPose last = pose_after(filter, level_increment(1, turned, last_tangent));
       const double heading = last.ekf_map_T_vehicle.theta();
       mean += heading * heading / last.covariance(2, 2) / count;
     }

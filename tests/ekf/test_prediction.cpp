@@ -5,32 +5,33 @@
 #include "tests/ekf/filter_fixture.hpp"
 
 using namespace understory;
+using namespace understory::ekf;
 using namespace understory::test;
 using namespace understory::ekf;
 
 namespace {
 
-Preintegration random_motion(std::mt19937_64& random) {
-  Preintegration p;
+model::Preintegration random_motion(std::mt19937_64& random) {
+  model::Preintegration p;
   p.seconds = 0.4;
-  p.yaw_rad = 0.3 * normal(random);
-  p.velocity_mps = Eigen::Vector2d(normal(random), normal(random));
-  p.position_m = 0.2 * Eigen::Vector2d(normal(random), normal(random));
-  for (int k = 0; k < 15; ++k) p.bias_jacobian.data()[k] = 0.3 * normal(random);
+  p.yaw_rad = 0.3 * test::normal(random);
+  p.velocity_mps = Eigen::Vector2d(test::normal(random), test::normal(random));
+  p.position_m = 0.2 * Eigen::Vector2d(test::normal(random), test::normal(random));
+  for (int k = 0; k < 15; ++k) p.bias_jacobian.data()[k] = 0.3 * test::normal(random);
   p.bias_jacobian(0, 1) = p.bias_jacobian(0, 2) = 0.0;
   Eigen::Matrix<double, 5, 5> root;
-  for (int k = 0; k < 25; ++k) root.data()[k] = 0.05 * normal(random);
+  for (int k = 0; k < 25; ++k) root.data()[k] = 0.05 * test::normal(random);
   p.covariance = root * root.transpose();
-  p.bias = 0.05 * Eigen::Vector3d(normal(random), normal(random), normal(random));
+  p.bias = 0.05 * Eigen::Vector3d(test::normal(random), test::normal(random), test::normal(random));
   Eigen::Matrix2d small;
-  for (int k = 0; k < 4; ++k) small.data()[k] = 0.01 * normal(random);
+  for (int k = 0; k < 4; ++k) small.data()[k] = 0.01 * test::normal(random);
   p.level = {small * small.transpose(), Eigen::Matrix2d::Identity() + 20.0 * small,
              0.5 * small * small.transpose(), 0.1};
   return p;
 }
 
 void move(FilterState& state, const Transition& t) {
-  state.heading = wrap_angle(t.heading);
+  state.heading = geometry::wrap_angle(t.heading);
   state.position = t.position;
   state.velocity = t.velocity;
   state.bias = t.bias;
@@ -75,11 +76,12 @@ Eigen::MatrixXd walk(const FilterState& state, const EkfMotionParameters& p, con
 
 TEST_CASE("Errors pass on as the numerical Jacobian says", "[ekf][prediction]") {
   std::mt19937_64 random(11);
-  for (const ErrorForm form : kForms) {
+  for (const ErrorForm form : test::kForms) {
     for (int trial = 0; trial < 10; ++trial) {
       const FilterState state = random_state(form, 2, random);
-      const Preintegration motion = random_motion(random);
-      const SE2WithCovariance wheels{SE2(0.5, 0.1, 0.2), Eigen::Matrix3d::Identity()};
+      const model::Preintegration motion = random_motion(random);
+      const geometry::SE2WithCovariance wheels{geometry::SE2(0.5, 0.1, 0.2),
+                                               Eigen::Matrix3d::Identity()};
       const auto transition = [&](const FilterState& from) {
         return trial % 2 == 0 ? transition_by(from, motion)
                               : transition_by(from, wheels, 0.4, EkfMotionParameters{});
@@ -106,7 +108,7 @@ TEST_CASE("Errors pass on as the numerical Jacobian says", "[ekf][prediction]") 
 TEST_CASE("The block-wise prediction is the full one", "[ekf][prediction]") {
   std::mt19937_64 random(12);
   const EkfMotionParameters parameters;
-  for (const ErrorForm form : kForms) {
+  for (const ErrorForm form : test::kForms) {
     FilterState state = random_state(form, 7, random);
     LowRank room(state.size());
     const Transition t = transition_by(state, random_motion(random));
@@ -125,12 +127,12 @@ TEST_CASE("Motion measured over the samples' own interval shares their noise",
   std::mt19937_64 random(13);
   EkfMotionParameters parameters;
   parameters.gyro_walk = parameters.accelerometer_walk = 0.0;
-  for (const ErrorForm form : kForms) {
+  for (const ErrorForm form : test::kForms) {
     for (int run = 0; run < 2; ++run) {
       FilterState state = random_state(form, 3, random);
       const int n = state.size();
       LowRank room(n);
-      Preintegration motion = random_motion(random);
+      model::Preintegration motion = random_motion(random);
       motion.bias = state.bias;
       const Transition t = transition_by(state, motion);
       MeasuredMotion measured;
@@ -173,11 +175,11 @@ TEST_CASE("Motion measured over the samples' own interval shares their noise",
 
 TEST_CASE("Standing still tells the velocity and no more than that", "[ekf][prediction]") {
   std::mt19937_64 random(14);
-  for (const ErrorForm form : kForms) {
+  for (const ErrorForm form : test::kForms) {
     FilterState state = random_state(form, 3, random);
     state.velocity = 0.01 * Eigen::Vector2d(1.0, -2.0);
     LowRank room(state.size());
-    measure_standing(state, 1e-4, room);
+    measure_stationary(state, 1e-4, room);
     REQUIRE(state.velocity.norm() < 1e-3);
     const Eigen::Matrix2d left = state.velocity_covariance().topLeftCorner<2, 2>();
     // Other forms measure at the old velocity what they tell at the new one.

@@ -1,8 +1,8 @@
 // A simulated street grid is what it says, and the smoother solves it as well as a batch solution.
 #include <cmath>
 
-#include "eval/backend.hpp"
-#include "eval/backend_world.hpp"
+#include "eval/experiments/backend/backend.hpp"
+#include "eval/experiments/backend/backend_world.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
@@ -10,8 +10,8 @@ using namespace understory::eval;
 
 namespace {
 
-WorldParameters small_world() {
-  WorldParameters parameters;
+eval::experiments::backend::WorldParameters small_world() {
+  eval::experiments::backend::WorldParameters parameters;
   parameters.poses = 600;
   return parameters;
 }
@@ -19,11 +19,11 @@ WorldParameters small_world() {
 }  // namespace
 
 TEST_CASE("a street grid has a motion for each step and closures of old places", "[backend]") {
-  const GraphFile graph = make_world(small_world(), 3);
+  const factor_graph::files::GraphFile graph = make_world(small_world(), 3);
   REQUIRE(graph.vertices.size() == 600);
   int motions = 0;
   int closures = 0;
-  for (const Factor& factor : graph.factors) {
+  for (const factor_graph::graph::Factor& factor : graph.factors) {
     const int a = index(factor.variables[0]);
     const int b = index(factor.variables[1]);
     REQUIRE(a < b);
@@ -38,8 +38,8 @@ TEST_CASE("a street grid has a motion for each step and closures of old places",
 }
 
 TEST_CASE("the same seed gives the same streets", "[backend]") {
-  const GraphFile one = make_world(small_world(), 5);
-  const GraphFile two = make_world(small_world(), 5);
+  const factor_graph::files::GraphFile one = make_world(small_world(), 5);
+  const factor_graph::files::GraphFile two = make_world(small_world(), 5);
   REQUIRE(one.factors.size() == two.factors.size());
   for (std::size_t f = 0; f < one.factors.size(); ++f) {
     REQUIRE(one.factors[f].measurement == two.factors[f].measurement);
@@ -49,12 +49,13 @@ TEST_CASE("the same seed gives the same streets", "[backend]") {
 
 TEST_CASE("streets with precise odometry end at the batch optimum, as large as noise is",
           "[backend]") {
-  WorldParameters parameters = small_world();
+  eval::experiments::backend::WorldParameters parameters = small_world();
   parameters.motion_m = parameters.motion_rad = 0.002;
   parameters.closure_m = parameters.closure_rad = 0.1;
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    const GraphFile graph = make_world(parameters, seed);
-    const BackendRun run = run_backend(graph, "streets");
+    const factor_graph::files::GraphFile graph = make_world(parameters, seed);
+    const eval::experiments::backend::BackendRun run =
+        eval::experiments::backend::run_backend(graph, "streets");
     CHECK(run.error.empty());
     CHECK(run.chi2_final < 1.001 * run.chi2_batch);
     // chi^2 of 3 rows a factor less 3 a pose, the first of which is held fast.

@@ -4,10 +4,11 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "eval/campaign.hpp"
-#include "eval/parallel.hpp"
-#include "eval/results.hpp"
-#include "eval/summary.hpp"
+#include "common/terminal/interrupt.hpp"
+#include "eval/harness/campaign.hpp"
+#include "eval/harness/results.hpp"
+#include "eval/harness/summary.hpp"
+#include "eval/tools/parallel.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
@@ -16,16 +17,17 @@ using namespace understory::eval;
 namespace {
 
 nlohmann::json rows_with(int jobs) {
-  Cell cell;
+  eval::harness::Cell cell;
   cell.forest = sim::ForestKind::kSparse;
   cell.interval_m = 1.0;  // a fifth of the scans
-  CampaignOptions options;
+  eval::harness::CampaignOptions options;
   options.runs = 3;
   options.jobs = jobs;
-  options.methods = {"ours", "oracle"};
+  options.methods = {"smoothing", "oracle"};
   const std::atomic<bool> stop{false};
   nlohmann::json rows = nlohmann::json::array();
-  for (const Summary& row : summarise(run_campaign({cell}, options, stop), options.methods)) {
+  for (const eval::harness::Summary& row :
+       summarise(run_campaign({cell}, options, stop), options.methods)) {
     rows.push_back(to_json(row));
   }
   return rows;
@@ -51,35 +53,36 @@ TEST_CASE("Every job runs once; exceptions and stops come through", "[parallel]"
   std::atomic<bool> stop{false};
   std::mutex mutex;
   std::multiset<std::size_t> seen;
-  run_in_parallel(100, 4, "jobs", stop, [&](std::size_t i) {
+  eval::tools::run_in_parallel(100, 4, "jobs", stop, [&](std::size_t i) {
     const std::scoped_lock lock(mutex);
     seen.insert(i);
   });
   CHECK(seen.size() == 100);
   CHECK(std::set<std::size_t>(seen.begin(), seen.end()).size() == 100);
-  CHECK_THROWS_WITH(run_in_parallel(10, 3, "jobs", stop,
-                                    [](std::size_t i) {
-                                      if (i == 4) throw std::runtime_error("job four");
-                                    }),
+  CHECK_THROWS_WITH(eval::tools::run_in_parallel(10, 3, "jobs", stop,
+                                                 [](std::size_t i) {
+                                                   if (i == 4) throw std::runtime_error("job four");
+                                                 }),
                     "job four");
-  CHECK_THROWS_AS(run_in_parallel(10, 2, "jobs", stop, [&](std::size_t) { stop = true; }),
-                  Interrupted);
+  CHECK_THROWS_AS(
+      eval::tools::run_in_parallel(10, 2, "jobs", stop, [&](std::size_t) { stop = true; }),
+      terminal::Interrupted);
 }
 
 TEST_CASE("Statistics and chi^2 bands", "[summary]") {
-  const Statistics s = statistics_of({1.0, 2.0, 3.0, 4.0});
+  const eval::harness::Statistics s = eval::harness::statistics_of({1.0, 2.0, 3.0, 4.0});
   CHECK(s.mean == Approx(2.5));
   CHECK(s.standard_deviation == Approx(1.2909944));
-  CHECK(statistics_of({7.0}).standard_deviation == 0.0);
+  CHECK(eval::harness::statistics_of({7.0}).standard_deviation == 0.0);
   // Tables of the chi^2 distribution, 10 and 300 degrees of freedom.
-  CHECK(chi2_band_95(10).first == Approx(3.247).epsilon(0.01));
-  CHECK(chi2_band_95(10).second == Approx(20.483).epsilon(0.005));
-  CHECK(chi2_band_95(300).first == Approx(253.91).epsilon(0.001));
-  CHECK(chi2_band_95(300).second == Approx(349.87).epsilon(0.001));
+  CHECK(eval::harness::chi2_band_95(10).first == Approx(3.247).epsilon(0.01));
+  CHECK(eval::harness::chi2_band_95(10).second == Approx(20.483).epsilon(0.005));
+  CHECK(eval::harness::chi2_band_95(300).first == Approx(253.91).epsilon(0.001));
+  CHECK(eval::harness::chi2_band_95(300).second == Approx(349.87).epsilon(0.001));
 }
 
 TEST_CASE("Unknown methods are refused", "[methods]") {
-  CHECK_THROWS_AS(make_stages("theirs"), std::invalid_argument);
+  CHECK_THROWS_AS(eval::harness::make_stages("theirs"), std::invalid_argument);
 }
 
 TEST_CASE("Result files are written whole or not at all", "[results]") {
@@ -88,17 +91,18 @@ TEST_CASE("Result files are written whole or not at all", "[results]") {
   fs::remove_all(folder);
   fs::create_directory(folder);
   const fs::path file = folder / "a.json";
-  write_json(file, result_document("paths", {{"runs", 1}}, nlohmann::json::array()));
+  eval::harness::write_json(
+      file, eval::harness::result_document("paths", {{"runs", 1}}, nlohmann::json::array()));
   nlohmann::json read;
   std::ifstream(file) >> read;
   for (const char* key : {"experiment", "config", "rows", "machine", "version"}) {
     CHECK(read.contains(key));
   }
-  CHECK(traces_file(file) == folder / "a.traces.json");
+  CHECK(eval::harness::traces_file(file) == folder / "a.traces.json");
   // A directory stands where the file should go: nothing is left behind.
   fs::create_directories(folder / "b.json" / "full");
-  CHECK_THROWS_AS(write_json(folder / "b.json", read), std::runtime_error);
-  CHECK_THROWS_AS(write_json(folder / "no" / "such.json", read), std::runtime_error);
+  CHECK_THROWS_AS(eval::harness::write_json(folder / "b.json", read), std::runtime_error);
+  CHECK_THROWS_AS(eval::harness::write_json(folder / "no" / "such.json", read), std::runtime_error);
   CHECK(std::distance(fs::directory_iterator(folder), fs::directory_iterator()) == 2);
   fs::remove_all(folder);
 }

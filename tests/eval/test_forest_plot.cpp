@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <numbers>
 
-#include "eval/forest_plot_score.hpp"
+#include "eval/experiments/frontend/forest_plot_score.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
@@ -14,8 +14,8 @@ using namespace understory::eval;
 namespace {
 
 /// Round stems of 0.15 m, 600 points per m^2 as real clouds have, on ground that rises.
-ForestPlot round_stems(const std::vector<Eigen::Vector2d>& places) {
-  ForestPlot plot;
+eval::experiments::frontend::ForestPlot round_stems(const std::vector<Eigen::Vector2d>& places) {
+  eval::experiments::frontend::ForestPlot plot;
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> part(0.0, 1.0);
   std::normal_distribution<double> bark(0.0, 0.005);
@@ -40,13 +40,14 @@ std::filesystem::path plots_folder() {
 }  // namespace
 
 TEST_CASE("A sweep out of a cloud lies on its near surfaces", "[forest_plot]") {
-  const ForestPlot plot = round_stems({{4.0, 0.0}, {8.0, 0.0}, {0.0, 6.0}, {-5.0, -2.0}});
-  const PlotScanner scanner(plot, {});
+  const eval::experiments::frontend::ForestPlot plot =
+      round_stems({{4.0, 0.0}, {8.0, 0.0}, {0.0, 6.0}, {-5.0, -2.0}});
+  const eval::experiments::frontend::PlotScanner scanner(plot, {});
   std::mt19937_64 random(1);
-  const PlotSweep result = scanner.sweep({0.0, 0.0}, random);
+  const eval::experiments::frontend::PlotSweep result = scanner.sweep({0.0, 0.0}, random);
   std::vector<int> returns(plot.stems.size(), 0);
   int behind = 0;
-  for (const SweepPoint& point : result.sweep.points) {
+  for (const model::SweepPoint& point : result.sweep.points) {
     const Eigen::Vector2d at = point.position().head<2>().cast<double>();
     for (std::size_t i = 0; i < plot.stems.size(); ++i) {
       const Eigen::Vector2d& stem = plot.stems[i].position_m;
@@ -67,9 +68,9 @@ TEST_CASE("A sweep out of a cloud lies on its near surfaces", "[forest_plot]") {
 }
 
 TEST_CASE("Round stems of a cloud are found in their place", "[forest_plot]") {
-  const ForestPlot plot =
+  const eval::experiments::frontend::ForestPlot plot =
       round_stems({{0.0, 0.0}, {6.0, 1.0}, {1.0, 7.0}, {7.0, 8.0}, {3.0, 12.0}, {9.0, 13.0}});
-  const PlotScore score = score_plot(plot, {}, {});
+  const eval::experiments::frontend::PlotScore score = score_plot(plot, {}, {});
   CHECK(score.should > 50);
   CHECK(score.recall() > 0.9);
   CHECK(score.precision() > 0.97);
@@ -81,9 +82,11 @@ TEST_CASE("Round stems of a cloud are found in their place", "[forest_plot]") {
 }
 
 TEST_CASE("A stem that a cloud shows from one side only is whole from there", "[forest_plot]") {
-  ForestPlot plot = round_stems({{0.0, 0.0}});
-  std::erase_if(plot.points, [](const PlotPoint& point) { return point.position_m.x() < -0.05; });
-  const PlotScanner scanner(plot, {});
+  eval::experiments::frontend::ForestPlot plot = round_stems({{0.0, 0.0}});
+  std::erase_if(plot.points, [](const eval::experiments::frontend::PlotPoint& point) {
+    return point.position_m.x() < -0.05;
+  });
+  const eval::experiments::frontend::PlotScanner scanner(plot, {});
   std::mt19937_64 random(1);
   CHECK(scanner.sweep({5.0, 0.0}, random).stems.front().is_whole);
   CHECK_FALSE(scanner.sweep({0.0, 5.0}, random).stems.front().is_whole);
@@ -95,11 +98,12 @@ TEST_CASE("Stems of a real plot are found", "[forest_plot]") {
     WARN("no " << plots_folder() << ": nothing to look at");
     return;
   }
-  PlotScoreOptions options;
+  eval::experiments::frontend::PlotScoreOptions options;
   options.grid_m = 3.0;
   options.clearance_m = 0.4;
   for (const char* name : {"TLS_Clip", "pine_plot"}) {
-    const PlotScore score = score_plot(read_forest_plot(plots_folder(), name), {}, options);
+    const eval::experiments::frontend::PlotScore score = score_plot(
+        eval::experiments::frontend::read_forest_plot(plots_folder(), name), {}, options);
     CHECK(score.should > 20);
     CHECK(score.recall() > 0.5);
     CHECK(score.precision() > 0.7);

@@ -1,6 +1,6 @@
 // The measures of the associator and of the filter, on short drives.
-#include "eval/ekf_consistency.hpp"
-#include "eval/tracking.hpp"
+#include "eval/experiments/frontend/ekf_consistency.hpp"
+#include "eval/experiments/frontend/tracking.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
@@ -26,10 +26,10 @@ sim::InertialDriveParameters short_drive() {
 
 TEST_CASE("Tracking is scored against the truth", "[eval][front_end]") {
   const sim::TrunkField forest = small_forest();
-  TrackingOptions options;
+  eval::experiments::frontend::TrackingOptions options;
   options.drive = short_drive();
   options.duration_s = 20.0;
-  const TrackingResult good = run_tracking(options, forest, 1);
+  const eval::experiments::frontend::TrackingResult good = run_tracking(options, forest, 1);
   REQUIRE(good.purity > 0.999);
   REQUIRE(good.tracks > 20);
   REQUIRE(good.published_share > 0.8);
@@ -37,22 +37,22 @@ TEST_CASE("Tracking is scored against the truth", "[eval][front_end]") {
   // The same score must tell a bad associator: nothing but the last motion, and no refinement.
   options.drive.odometry = sim::OdometryKind::kNone;
   options.associator.method = "nearest";
-  const TrackingResult bad = run_tracking(options, forest, 1);
+  const eval::experiments::frontend::TrackingResult bad = run_tracking(options, forest, 1);
   REQUIRE(bad.purity < good.purity);
   REQUIRE(bad.switches > good.switches);
 }
 
 TEST_CASE("Consistency is scored against the truth", "[eval][front_end]") {
   const sim::TrunkField forest = small_forest();
-  EkfDriveOptions options;
+  eval::experiments::frontend::EkfDriveOptions options;
   options.drive = short_drive();
   options.duration_s = 12.0;
-  std::vector<EkfDriveResult> runs;
+  std::vector<eval::experiments::frontend::EkfDriveResult> runs;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     runs.push_back(run_ekf_drive(options, forest, seed));
     REQUIRE(runs.back().nees.size() == 120);
   }
-  const EkfConsistency summary = summarise(runs);
+  const eval::experiments::frontend::EkfConsistency summary = summarise(runs);
   REQUIRE(summary.runs == 8);
   REQUIRE(summary.band_low < 3.0);
   REQUIRE(summary.band_high > 3.0);
@@ -61,7 +61,7 @@ TEST_CASE("Consistency is scored against the truth", "[eval][front_end]") {
   REQUIRE(summary.drift_percent < 2.0);
   REQUIRE(summary.restarts == 0);
   // Errors made ten times larger are seen.
-  for (EkfDriveResult& run : runs) {
+  for (eval::experiments::frontend::EkfDriveResult& run : runs) {
     for (double& nees : run.nees) nees *= 100.0;
   }
   REQUIRE(share_in_band(runs, {1, 120}, runs.size()) < 0.2);
@@ -83,9 +83,9 @@ TEST_CASE("A parked vehicle sways about its place, and its samples tell it", "[e
   double squared_mps = 0.0;
   for (int k = 1; k < 600; ++k) {
     const sim::DriveStep step = steps.next();
-    REQUIRE(step.odometry.front().is_standing);
+    REQUIRE(step.odometry.front().is_stationary);
     REQUIRE(step.driven_m == 0.0);
-    const Preintegration& told = *step.odometry.front().inertial;
+    const model::Preintegration& told = *step.odometry.front().inertial;
     const Eigen::Matrix2d rotation = before.world_T_vehicle.rotation();
     const Eigen::Vector2d velocity = before.velocity_mps + rotation * told.velocity_mps;
     const Eigen::Vector2d position = before.world_T_vehicle.translation() +

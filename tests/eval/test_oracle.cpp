@@ -2,9 +2,9 @@
 #include <cmath>
 #include <random>
 
-#include "eval/oracle.hpp"
-#include "eval/run.hpp"
-#include "eval/summary.hpp"
+#include "eval/harness/run.hpp"
+#include "eval/harness/summary.hpp"
+#include "eval/metrics/oracle.hpp"
 #include "tests/catch.hpp"
 #include "tests/eval/small_drive.hpp"
 
@@ -13,14 +13,14 @@ using namespace understory::eval;
 
 namespace {
 
-struct Sighting {
+struct Observation {
   std::size_t scan;
   std::uint32_t trunk;
   Eigen::Vector2d position_m;
 };
 
-std::vector<Sighting> sightings_of(const RecordedDrive& recorded) {
-  std::vector<Sighting> all;
+std::vector<Observation> observations_of(const eval::harness::RecordedDrive& recorded) {
+  std::vector<Observation> all;
   for (std::size_t k = 0; k < recorded.scans.size(); ++k) {
     for (std::size_t i = 0; i < recorded.scans[k].trunks.size(); ++i) {
       all.push_back({k, recorded.scans[k].trunks[i],
@@ -30,10 +30,11 @@ std::vector<Sighting> sightings_of(const RecordedDrive& recorded) {
   return all;
 }
 
-void feed(BatchOracle& oracle, const RecordedDrive& recorded) {
+void feed(eval::metrics::BatchOracle& oracle, const eval::harness::RecordedDrive& recorded) {
   for (const sim::SimulatedScan& scan : recorded.scans) {
     std::vector<Eigen::Vector2d> positions;
-    for (const Detection& d : scan.scan.detections) positions.emplace_back(d.position_m.head<2>());
+    for (const model::Detection& d : scan.scan.detections)
+      positions.emplace_back(d.position_m.head<2>());
     oracle.add(positions, scan.trunks);
   }
 }
@@ -42,8 +43,8 @@ void feed(BatchOracle& oracle, const RecordedDrive& recorded) {
 /// Gauss-Newton by QR: nothing in common with the oracle's own way.
 class DenseBatch {
  public:
-  DenseBatch(const BatchOracle& start, std::vector<Sighting> sightings)
-      : oracle_(start), sightings_(std::move(sightings)) {
+  DenseBatch(const eval::metrics::BatchOracle& start, std::vector<Observation> observations)
+      : oracle_(start), observations_(std::move(observations)) {
     poses_ = static_cast<Eigen::Index>(start.scans()) - 1;
     x_ = Eigen::VectorXd::Zero(3 * poses_ +
                                2 * static_cast<Eigen::Index>(start.landmarks_m().size()));
@@ -70,7 +71,7 @@ class DenseBatch {
     }
   }
 
-  SE2 pose(std::size_t scan) const {
+  geometry::SE2 pose(std::size_t scan) const {
     if (scan == 0) return {};
     const auto at = 3 * (static_cast<Eigen::Index>(scan) - 1);
     return {x_(at), x_(at + 1), x_(at + 2)};
@@ -84,21 +85,22 @@ class DenseBatch {
 
  private:
   Eigen::VectorXd residuals(const Eigen::VectorXd& x) const {
-    Eigen::VectorXd all(2 * static_cast<Eigen::Index>(sightings_.size()));
+    Eigen::VectorXd all(2 * static_cast<Eigen::Index>(observations_.size()));
     Eigen::Index row = 0;
-    for (const Sighting& sighting : sightings_) {
-      const auto at = 3 * (static_cast<Eigen::Index>(sighting.scan) - 1);
-      const SE2 pose = sighting.scan == 0 ? SE2() : SE2(x(at), x(at + 1), x(at + 2));
+    for (const Observation& observation : observations_) {
+      const auto at = 3 * (static_cast<Eigen::Index>(observation.scan) - 1);
+      const geometry::SE2 pose =
+          observation.scan == 0 ? geometry::SE2() : geometry::SE2(x(at), x(at + 1), x(at + 2));
       const Eigen::Vector2d landmark =
-          x.segment<2>(3 * poses_ + 2 * oracle_.landmark_of(sighting.trunk));
-      all.segment<2>(row) = pose.inverse() * landmark - sighting.position_m;
+          x.segment<2>(3 * poses_ + 2 * oracle_.landmark_of(observation.trunk));
+      all.segment<2>(row) = pose.inverse() * landmark - observation.position_m;
       row += 2;
     }
     return all;
   }
 
   Eigen::MatrixXd numerical_jacobian() const {
-    Eigen::MatrixXd jacobian(2 * static_cast<Eigen::Index>(sightings_.size()), x_.size());
+    Eigen::MatrixXd jacobian(2 * static_cast<Eigen::Index>(observations_.size()), x_.size());
     const double h = 1e-5;
     for (Eigen::Index c = 0; c < x_.size(); ++c) {
       Eigen::VectorXd plus = x_;
@@ -110,8 +112,8 @@ class DenseBatch {
     return jacobian;
   }
 
-  const BatchOracle& oracle_;
-  std::vector<Sighting> sightings_;
+  const eval::metrics::BatchOracle& oracle_;
+  std::vector<Observation> observations_;
   Eigen::Index poses_ = 0;
   Eigen::VectorXd x_;
   Eigen::MatrixXd information_;
@@ -125,12 +127,12 @@ TEST_CASE("The oracle finds the minimum that a dense solver finds, with its cova
   sim::DriveParameters parameters = small_drive_parameters(3.0);
   parameters.sensor.position_sigma_m = sigma;
   parameters.sensor.detection_probability = 0.8;
-  const RecordedDrive recorded(parameters, 5);
-  BatchOracle oracle;
+  const eval::harness::RecordedDrive recorded(parameters, 5);
+  eval::metrics::BatchOracle oracle;
   feed(oracle, recorded);
   CHECK(oracle.solve(1e-9).converged);
 
-  DenseBatch dense(oracle, sightings_of(recorded));
+  DenseBatch dense(oracle, observations_of(recorded));
   std::mt19937_64 random(1);
   dense.perturb(random, 0.02);
   dense.solve();
@@ -149,14 +151,14 @@ TEST_CASE("The oracle finds the minimum that a dense solver finds, with its cova
 }
 
 TEST_CASE("Solved at every step or once at the end, the estimate is the same", "[oracle]") {
-  const RecordedDrive recorded(small_drive_parameters(12.8), 6);
+  const eval::harness::RecordedDrive recorded(small_drive_parameters(12.8), 6);
   const std::atomic<bool> stop{false};
-  BatchOracle once;
+  eval::metrics::BatchOracle once;
   feed(once, recorded);
   once.solve(1e-9);
-  const RunResult stepwise = run_oracle(recorded, stop);
+  const eval::harness::RunResult stepwise = run_oracle(recorded, stop);
   REQUIRE(recorded.scans.size() == 8 * stepwise.trace.states.size());
-  for (const PoseEstimate& pose : stepwise.trace.final_map.poses) {
+  for (const eval::metrics::PoseEstimate& pose : stepwise.trace.final_map.poses) {
     REQUIRE((pose.map_T_vehicle.inverse() * once.first_T_vehicle(pose.scan)).Log().norm() < 1e-4);
   }
 }
@@ -165,7 +167,8 @@ TEST_CASE("Without noise the oracle is exact", "[oracle]") {
   sim::DriveParameters parameters = small_drive_parameters(12.0);
   parameters.sensor.position_sigma_m = 0.0;
   const std::atomic<bool> stop{false};
-  const RunResult result = run_oracle(RecordedDrive(parameters, 7), stop);
+  const eval::harness::RunResult result =
+      run_oracle(eval::harness::RecordedDrive(parameters, 7), stop);
   CHECK(result.score.errors.rpe_m() < 1e-9);
   CHECK(result.score.errors.lpe_m() < 1e-9);
 }
@@ -177,20 +180,21 @@ TEST_CASE("The oracle's covariance tells the truth: NEES", "[oracle]") {
   double sum = 0.0;
   const int runs = 200;
   for (int run = 0; run < runs; ++run) {
-    const RunResult result = run_oracle(RecordedDrive(parameters, 100 + run), stop);
+    const eval::harness::RunResult result =
+        run_oracle(eval::harness::RecordedDrive(parameters, 100 + run), stop);
     sum += result.score.nees.back().second;
   }
-  const auto [low, high] = chi2_band_95(3.0 * runs);
+  const auto [low, high] = eval::harness::chi2_band_95(3.0 * runs);
   CHECK(sum > low);
   CHECK(sum < high);
 }
 
 TEST_CASE("Marks tell the oracle which poses and trunks to give", "[oracle]") {
-  const RecordedDrive recorded(small_drive_parameters(12.0), 6);
+  const eval::harness::RecordedDrive recorded(small_drive_parameters(12.0), 6);
   const std::atomic<bool> stop{false};
-  const std::vector<StateMark> marks{{16, {8}, recorded.scans[8].trunks},
-                                     {32, {8, 20}, {recorded.scans[8].trunks[0]}}};
-  const RunResult result = run_oracle(recorded, marks, stop);
+  const std::vector<eval::harness::StateMark> marks{{16, {8}, recorded.scans[8].trunks},
+                                                    {32, {8, 20}, {recorded.scans[8].trunks[0]}}};
+  const eval::harness::RunResult result = run_oracle(recorded, marks, stop);
   CHECK(result.score.errors.poses == 3);
   CHECK(result.score.errors.landmarks == recorded.scans[8].trunks.size() + 1);
   CHECK(result.trace.final_map.poses[0].map_T_vehicle.Log().norm() < 1e-12);
@@ -199,7 +203,7 @@ TEST_CASE("Marks tell the oracle which poses and trunks to give", "[oracle]") {
 }
 
 TEST_CASE("A scan that shares no trunk with the rest is refused", "[oracle]") {
-  BatchOracle oracle;
+  eval::metrics::BatchOracle oracle;
   const std::vector<Eigen::Vector2d> positions{{1, 2}, {3, 4}};
   oracle.add(positions, std::vector<std::uint32_t>{1, 2});
   CHECK_THROWS_AS(oracle.add(positions, std::vector<std::uint32_t>{2, 3}), std::invalid_argument);

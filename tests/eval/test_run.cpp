@@ -2,7 +2,8 @@
 #include <cmath>
 #include <memory>
 
-#include "eval/run.hpp"
+#include "common/terminal/interrupt.hpp"
+#include "eval/harness/run.hpp"
 #include "tests/catch.hpp"
 #include "tests/eval/small_drive.hpp"
 
@@ -12,13 +13,13 @@ using namespace understory::eval;
 namespace {
 
 /// A keyframe from every eight scans, without landmarks; some can be withheld.
-class EveryEighth : public KeyframerMethod {
+class EveryEighth : public keyframer::KeyframerMethod {
  public:
   explicit EveryEighth(std::uint64_t withheld = ~0ULL) : withheld_(withheld) {}
-  std::optional<Keyframe> add(const LandmarkScan& scan) override {
+  std::optional<model::Keyframe> add(const model::LandmarkScan& scan) override {
     members_.push_back({scan.utime, scan.sequence, {}, Eigen::Matrix3d::Zero()});
     if (members_.size() < 8) return std::nullopt;
-    Keyframe keyframe;
+    model::Keyframe keyframe;
     keyframe.sequence = next_++;
     keyframe.members = std::exchange(members_, {});
     if (keyframe.sequence == withheld_) {
@@ -27,54 +28,55 @@ class EveryEighth : public KeyframerMethod {
     }
     return keyframe;
   }
-  void add(const Odometry&) override {}
-  const KeyframerCounters& counters() const override { return counters_; }
+  void add(const model::Odometry&) override {}
+  const keyframer::KeyframerCounters& counters() const override { return counters_; }
   std::string save() const override { return {}; }
   void load(const std::string&) override {}
 
  private:
   std::uint64_t withheld_;
   std::uint64_t next_ = 0;
-  std::vector<KeyframeMember> members_;
-  KeyframerCounters counters_;
+  std::vector<model::KeyframeMember> members_;
+  keyframer::KeyframerCounters counters_;
 };
 
 /// Knows the truth and adds an offset to all poses but the first; can hold back its first keyframes
 /// and refuse one.
-class Displacing : public MapperMethod {
+class Displacing : public geoslam_mapper::MapperMethod {
  public:
   struct Behaviour {
     double offset_m = 0.0;
     std::uint64_t first_map_after = 0;  ///< Keyframes up to this one are committed with it.
     std::uint64_t refused = ~0ULL;
   };
-  Displacing(const MapTruth& truth, const Behaviour& behaviour)
+  Displacing(const eval::metrics::MapTruth& truth, const Behaviour& behaviour)
       : truth_(truth), behaviour_(behaviour) {}
 
-  MapUpdate add(const Keyframe& keyframe) override {
-    MapUpdate update;
+  model::MapUpdate add(const model::Keyframe& keyframe) override {
+    model::MapUpdate update;
     update.keyframe_sequence = keyframe.sequence;
-    update.status = MapUpdateStatus::kNotSure;
+    update.status = model::MapUpdateStatus::kNotSure;
     if (keyframe.sequence == behaviour_.refused) return update;
     const std::size_t base = keyframe.members.front().sequence;
-    SE2 pose = truth_.map_T_vehicle(base);
+    geometry::SE2 pose = truth_.map_T_vehicle(base);
     if (!buffered_.empty() || !poses_.empty()) {
-      pose = SE2(pose.translation() + Eigen::Vector2d(0, behaviour_.offset_m), pose.theta());
+      pose =
+          geometry::SE2(pose.translation() + Eigen::Vector2d(0, behaviour_.offset_m), pose.theta());
     }
     buffered_.push_back({keyframe.sequence, 0, pose, Eigen::Matrix3d::Identity()});
     update.map_T_vehicle = pose;
     update.covariance = Eigen::Matrix3d::Identity();
     if (keyframe.sequence < behaviour_.first_map_after) return update;
-    update.status = MapUpdateStatus::kUpdated;
+    update.status = model::MapUpdateStatus::kUpdated;
     poses_.insert(poses_.end(), buffered_.begin(), buffered_.end());
     buffered_.clear();
     return update;
   }
-  void add(const Odometry&) override {}
-  void start_with(std::span<const MapLandmark>) override {}
-  std::vector<KeyframePose> trajectory() const override { return poses_; }
-  std::vector<MapLandmark> landmarks() const override {
-    MapLandmark landmark;
+  void add(const model::Odometry&) override {}
+  void start_with(std::span<const model::MapLandmark>) override {}
+  std::vector<model::KeyframePose> trajectory() const override { return poses_; }
+  std::vector<model::MapLandmark> landmarks() const override {
+    model::MapLandmark landmark;
     landmark.id = 1;
     landmark.position_m = truth_.trunk_m(truth_.trunks_in_range()[0]) + Eigen::Vector2d(0.2, 0.0);
     return {landmark};
@@ -83,15 +85,17 @@ class Displacing : public MapperMethod {
   void load(const std::string&) override {}
 
  private:
-  const MapTruth& truth_;
+  const eval::metrics::MapTruth& truth_;
   Behaviour behaviour_;
-  std::vector<KeyframePose> buffered_;
-  std::vector<KeyframePose> poses_;
+  std::vector<model::KeyframePose> buffered_;
+  std::vector<model::KeyframePose> poses_;
 };
 
-RunResult run_with(const Displacing::Behaviour& behaviour, std::uint64_t withheld = ~0ULL) {
-  static const RecordedDrive recorded(small_drive_parameters(), 1);  // 40 scans: five keyframes
-  const MapTruth truth(recorded.drive, 0);
+eval::harness::RunResult run_with(const Displacing::Behaviour& behaviour,
+                                  std::uint64_t withheld = ~0ULL) {
+  static const eval::harness::RecordedDrive recorded(small_drive_parameters(),
+                                                     1);  // 40 scans: five keyframes
+  const eval::metrics::MapTruth truth(recorded.drive, 0);
   const std::atomic<bool> stop{false};
   return run_slam(
       recorded,
@@ -102,14 +106,14 @@ RunResult run_with(const Displacing::Behaviour& behaviour, std::uint64_t withhel
 }  // namespace
 
 TEST_CASE("A perfect mapper has no error, a displaced one what it was displaced by", "[run]") {
-  const RunResult perfect = run_with({});
+  const eval::harness::RunResult perfect = run_with({});
   CHECK(perfect.score.errors.rpe_m() < 1e-12);
   CHECK(perfect.score.updates == 5);
   CHECK(perfect.score.updates_possible == 5);
   CHECK(perfect.score.ate_m < 1e-9);
   CHECK(perfect.score.errors.lpe_m() == Approx(0.2));
 
-  const RunResult displaced = run_with({.offset_m = 0.3});
+  const eval::harness::RunResult displaced = run_with({.offset_m = 0.3});
   // States of 1 .. 5 poses, the first of each exact: 10 of 15 poses are off.
   CHECK(displaced.score.errors.poses == 15);
   CHECK(displaced.score.errors.rpe_m() == Approx(0.3 * 10.0 / 15.0));
@@ -125,29 +129,29 @@ TEST_CASE("Updates beyond a metre are wrong, each counted once", "[run]") {
 }
 
 TEST_CASE("States of withheld keyframes are scored with the map as it is", "[run]") {
-  const RunResult refused = run_with({.offset_m = 0.3, .refused = 2});
+  const eval::harness::RunResult refused = run_with({.offset_m = 0.3, .refused = 2});
   CHECK(refused.score.updates == 4);
   CHECK(refused.score.keyframes_withheld == 1);
   CHECK(refused.score.errors.poses == 1 + 2 + 2 + 3 + 4);
-  const RunResult withheld = run_with({.offset_m = 0.3}, 2);
+  const eval::harness::RunResult withheld = run_with({.offset_m = 0.3}, 2);
   CHECK(withheld.score.updates == 4);
   CHECK(withheld.score.errors.poses == 1 + 2 + 2 + 3 + 4);
 }
 
 TEST_CASE("Keyframes buffered for the first map count when it is committed", "[run]") {
-  const RunResult buffered = run_with({.offset_m = 2.0, .first_map_after = 2});
+  const eval::harness::RunResult buffered = run_with({.offset_m = 2.0, .first_map_after = 2});
   CHECK(buffered.score.updates == 5);
   CHECK(buffered.score.errors.poses == 3 + 4 + 5);
   CHECK(buffered.score.wrong_updates == 4);
 }
 
 TEST_CASE("A run can be stopped", "[run]") {
-  const RecordedDrive recorded(small_drive_parameters(), 1);
-  const MapTruth truth(recorded.drive, 0);
+  const eval::harness::RecordedDrive recorded(small_drive_parameters(), 1);
+  const eval::metrics::MapTruth truth(recorded.drive, 0);
   const std::atomic<bool> stop{true};
   CHECK_THROWS_AS(run_slam(recorded,
                            {std::make_unique<EveryEighth>(),
                             std::make_unique<Displacing>(truth, Displacing::Behaviour{})},
                            stop),
-                  Interrupted);
+                  terminal::Interrupted);
 }

@@ -4,13 +4,13 @@
 #include <Eigen/Dense>
 #include <random>
 
-#include "common/factor_graph/smoother.hpp"
+#include "common/factor_graph/plane/smoother.hpp"
 
-namespace understory {
+namespace understory::test {
 
 /// Converges as far as numbers go.
-inline SmootherParameters exact() {
-  SmootherParameters parameters;
+inline factor_graph::plane::SmootherParameters exact() {
+  factor_graph::plane::SmootherParameters parameters;
   parameters.least_move = 0.0;
   parameters.relinearise_above = 0.0;
   parameters.max_iterations = 1;
@@ -26,26 +26,29 @@ inline Eigen::Vector3d random_tangent(std::mt19937_64& random, double translatio
 
 /// A drive among points: every pose sees every point near by and is tied to the one before; values
 /// are off by `error`.
-inline Graph random_graph(std::mt19937_64& random, int poses, int points, double error) {
+inline factor_graph::plane::Graph random_graph(std::mt19937_64& random, int poses, int points,
+                                               double error) {
   std::uniform_real_distribution<double> where(-15.0, 15.0);
   std::vector<Eigen::Vector2d> true_points;
-  Graph graph;
+  factor_graph::plane::Graph graph;
   for (int i = 0; i < points; ++i) {
     const double x = where(random);
     true_points.emplace_back(x, where(random));
     graph.add_point(true_points.back() + random_tangent(random, error, 0).head<2>());
   }
-  SE2 truth;
-  SE2 before;
+  geometry::SE2 truth;
+  geometry::SE2 before;
   std::normal_distribution<double> normal;
   for (int k = 0; k < poses; ++k) {
-    const PoseId pose =
-        graph.add_pose(truth * SE2::Exp(random_tangent(random, error, 0.2 * error)));
+    const factor_graph::plane::PoseId pose =
+        graph.add_pose(truth * geometry::SE2::Exp(random_tangent(random, error, 0.2 * error)));
     if (k == 0) graph.pose_priors.push_back({pose, truth, 1e6 * Eigen::Matrix3d::Identity()});
     if (k > 0) {
-      const SE2 motion = before.inverse() * truth * SE2::Exp(random_tangent(random, 0.1, 0.05));
-      graph.relative_poses.push_back({PoseId(static_cast<std::uint32_t>(k - 1)), pose, motion,
-                                      Eigen::Vector3d(100.0, 100.0, 400.0).asDiagonal()});
+      const geometry::SE2 motion =
+          before.inverse() * truth * geometry::SE2::Exp(random_tangent(random, 0.1, 0.05));
+      graph.relative_poses.push_back(
+          {factor_graph::plane::PoseId(static_cast<std::uint32_t>(k - 1)), pose, motion,
+           Eigen::Vector3d(100.0, 100.0, 400.0).asDiagonal()});
     }
     for (int i = 0; i < points; ++i) {
       const Eigen::Vector2d seen = truth.inverse() * true_points[static_cast<std::size_t>(i)];
@@ -54,29 +57,30 @@ inline Graph random_graph(std::mt19937_64& random, int poses, int points, double
       information << 25.0, 5.0, 5.0, 16.0;
       const double x = normal(random);
       const double y = normal(random);
-      graph.observations.push_back({pose, PointId(static_cast<std::uint32_t>(i)),
+      graph.observations.push_back({pose,
+                                    factor_graph::plane::PointId(static_cast<std::uint32_t>(i)),
                                     seen + 0.2 * Eigen::Vector2d(x, y), information});
     }
     before = truth;
-    truth = truth * SE2::Exp(Eigen::Vector3d(1.0, 0.1, 0.25));
+    truth = truth * geometry::SE2::Exp(Eigen::Vector3d(1.0, 0.1, 0.25));
   }
   return graph;
 }
 
 /// A road with posts on both sides that never comes back: each pose sees those of its surroundings
 /// alone, exact odometry ties it to the next. Values are dead reckoned.
-inline Graph random_road(std::mt19937_64& random, std::uint32_t poses) {
+inline factor_graph::plane::Graph random_road(std::mt19937_64& random, std::uint32_t poses) {
   constexpr double kStep_m = 4.0;
   constexpr double kSigma_m = 0.01;
   const Eigen::Vector3d step_sigma(3e-3, 3e-3, 2e-4);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> along(-0.5, 0.5);
-  Graph graph;
+  factor_graph::plane::Graph graph;
   std::vector<Eigen::Vector2d> true_points;
-  SE2 truth;
-  SE2 reckoned;
+  geometry::SE2 truth;
+  geometry::SE2 reckoned;
   for (std::uint32_t k = 0; k < poses; ++k) {
-    const PoseId pose = graph.add_pose(reckoned);
+    const factor_graph::plane::PoseId pose = graph.add_pose(reckoned);
     if (k == 0) graph.pose_priors.push_back({pose, truth, 1e12 * Eigen::Matrix3d::Identity()});
     const double side = k % 2 == 0 ? 8.0 : -8.0;
     true_points.push_back(truth * Eigen::Vector2d(4.0 * kStep_m + along(random), side));
@@ -84,27 +88,29 @@ inline Graph random_road(std::mt19937_64& random, std::uint32_t poses) {
     for (std::size_t i = k < 9 ? 0 : k - 9; i < true_points.size(); ++i) {
       const double x = kSigma_m * normal(random);
       const double y = kSigma_m * normal(random);
-      graph.observations.push_back({pose, PointId(static_cast<std::uint32_t>(i)),
+      graph.observations.push_back({pose,
+                                    factor_graph::plane::PointId(static_cast<std::uint32_t>(i)),
                                     truth.inverse() * true_points[i] + Eigen::Vector2d(x, y),
                                     Eigen::Matrix2d::Identity() / (kSigma_m * kSigma_m)});
     }
-    const SE2 step(kStep_m, 0.0, 0.05 * std::sin(0.02 * k));
+    const geometry::SE2 step(kStep_m, 0.0, 0.05 * std::sin(0.02 * k));
     Eigen::Vector3d error;
     for (int c = 0; c < 3; ++c) error(c) = step_sigma(c) * normal(random);
     truth = truth * step;
-    reckoned = reckoned * step * SE2::Exp(error);
+    reckoned = reckoned * step * geometry::SE2::Exp(error);
     if (k + 1 == poses) break;
-    graph.relative_poses.push_back({pose, PoseId(k + 1), step * SE2::Exp(error),
+    graph.relative_poses.push_back({pose, factor_graph::plane::PoseId(k + 1),
+                                    step * geometry::SE2::Exp(error),
                                     step_sigma.cwiseAbs2().cwiseInverse().asDiagonal()});
   }
   return graph;
 }
 
 /// The greatest distance between two graphs' estimates [m, rad].
-inline double difference(const Graph& a, const Graph& b) {
+inline double difference(const factor_graph::plane::Graph& a, const factor_graph::plane::Graph& b) {
   double largest = 0.0;
   for (std::size_t i = 0; i < a.poses.size(); ++i) {
-    const SE2 between = a.poses[i].inverse() * b.poses[i];
+    const geometry::SE2 between = a.poses[i].inverse() * b.poses[i];
     largest = std::max(largest, between.coordinates().cwiseAbs().maxCoeff());
   }
   for (std::size_t i = 0; i < a.points.size(); ++i) {
@@ -113,4 +119,4 @@ inline double difference(const Graph& a, const Graph& b) {
   return largest;
 }
 
-}  // namespace understory
+}  // namespace understory::test

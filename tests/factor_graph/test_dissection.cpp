@@ -5,11 +5,12 @@
 #include <set>
 #include <thread>
 
-#include "common/factor_graph/clique_plan.hpp"
-#include "common/factor_graph/dissection.hpp"
+#include "common/factor_graph/bayes_tree/clique_plan.hpp"
+#include "common/factor_graph/bayes_tree/dissection.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::factor_graph::graph;
 
 namespace {
 
@@ -30,7 +31,7 @@ struct Field {
       }
     }
   }
-  ElementLists elements() const { return {starts, entries}; }
+  factor_graph::bayes_tree::ElementLists elements() const { return {starts, entries}; }
   std::vector<int> numbers() const {
     std::vector<int> all(static_cast<std::size_t>(size));
     std::iota(all.begin(), all.end(), 0);
@@ -56,7 +57,8 @@ double plain_flops(const Field& field, const std::vector<int>& order) {
   }
   double sum = 0.0;
   for (auto& later : tied) {
-    sum += elimination_flops(kDimension, kDimension * static_cast<double>(later.size()) + 1.0);
+    sum += factor_graph::bayes_tree::elimination_flops(
+        kDimension, kDimension * static_cast<double>(later.size()) + 1.0);
     if (later.empty()) continue;
     const int first = *later.begin();
     later.erase(later.begin());
@@ -66,7 +68,7 @@ double plain_flops(const Field& field, const std::vector<int>& order) {
 }
 
 double planned_flops(const Field& field, int last) {
-  CliquePlanner planner;
+  factor_graph::bayes_tree::CliquePlanner planner;
   const std::vector<int> dimensions(static_cast<std::size_t>(field.size), kDimension);
   planner.clear(dimensions);
   for (int e = 0; e < field.elements().count(); ++e) {
@@ -74,11 +76,12 @@ double planned_flops(const Field& field, int last) {
     for (const int v : field.elements()[e]) planner.add_to_element(v);
   }
   planner.set_last(last);
-  const CliquePlan& plan = planner.plan();
+  const factor_graph::bayes_tree::CliquePlan& plan = planner.plan();
   double sum = 0.0;
-  for (const CliquePlan::Clique& clique : plan.cliques) {
-    sum += elimination_flops(kDimension * clique.frontal_count,
-                             kDimension * (clique.row_count - clique.frontal_count) + 1.0);
+  for (const factor_graph::bayes_tree::CliquePlan::Clique& clique : plan.cliques) {
+    sum += factor_graph::bayes_tree::elimination_flops(
+        kDimension * clique.frontal_count,
+        kDimension * (clique.row_count - clique.frontal_count) + 1.0);
   }
   CHECK(plan.rows[static_cast<std::size_t>(plan.cliques.back().first_row +
                                            plan.cliques.back().frontal_count - 1)] == last);

@@ -1,5 +1,5 @@
 // Each kernel against Eigen's dense factorisation.
-#include "common/factor_graph/front_kernel.hpp"
+#include "common/factor_graph/bayes_tree/front_kernel.hpp"
 
 #include <Eigen/Dense>
 #include <limits>
@@ -9,6 +9,7 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::factor_graph::graph;
 
 namespace {
 
@@ -19,12 +20,13 @@ Eigen::MatrixXd random_front(std::mt19937_64& random, int size) {
   return root * root.transpose();
 }
 
-std::vector<FrontKernel> kernels() {
-  std::vector<FrontKernel> all{front_kernel_portable(), front_kernel()};
+std::vector<factor_graph::bayes_tree::FrontKernel> kernels() {
+  std::vector<factor_graph::bayes_tree::FrontKernel> all{
+      factor_graph::bayes_tree::front_kernel_portable(), factor_graph::bayes_tree::front_kernel()};
 #if defined(__x86_64__)
-  if (front_kernel_avx2().factorise != nullptr && __builtin_cpu_supports("avx2") &&
-      __builtin_cpu_supports("fma")) {
-    all.push_back(front_kernel_avx2());
+  if (factor_graph::bayes_tree::front_kernel_avx2().factorise != nullptr &&
+      __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+    all.push_back(factor_graph::bayes_tree::front_kernel_avx2());
   }
 #endif
   return all;
@@ -34,7 +36,7 @@ std::vector<FrontKernel> kernels() {
 
 TEST_CASE("Fronts of any size come out as dense algebra has them", "[front_kernel]") {
   std::mt19937_64 random(3);
-  for (const FrontKernel& kernel : kernels()) {
+  for (const factor_graph::bayes_tree::FrontKernel& kernel : kernels()) {
     for (int size = 2; size < 150; size += size < 40 ? 1 : 13) {
       const int pivots = 1 + static_cast<int>(random() % static_cast<unsigned>(size - 1));
       const Eigen::MatrixXd whole = random_front(random, size);
@@ -72,7 +74,7 @@ TEST_CASE("Fronts of any size come out as dense algebra has them", "[front_kerne
 
 TEST_CASE("A pivot without information is left out and touches nothing", "[front_kernel]") {
   std::mt19937_64 random(4);
-  for (const FrontKernel& kernel : kernels()) {
+  for (const factor_graph::bayes_tree::FrontKernel& kernel : kernels()) {
     for (const int size : {9, 30, 100}) {
       Eigen::MatrixXd front = random_front(random, size);
       const int empty = size / 3;

@@ -1,26 +1,28 @@
-#include "common/factor_graph/graph_file.hpp"
+#include "common/factor_graph/files/graph_file.hpp"
 
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 
-#include "common/factor_graph/batch.hpp"
+#include "common/factor_graph/batch/batch.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::factor_graph::graph;
 
 namespace {
 
-GraphFile require_graph(const std::string& text) {
-  auto result = read_graph(text, guess_format(text));
-  REQUIRE(std::holds_alternative<GraphFile>(result));
-  return std::get<GraphFile>(result);
+factor_graph::files::GraphFile require_graph(const std::string& text) {
+  auto result = read_graph(text, factor_graph::files::guess_format(text));
+  REQUIRE(std::holds_alternative<factor_graph::files::GraphFile>(result));
+  return std::get<factor_graph::files::GraphFile>(result);
 }
 
 /// The file's graph at the file's estimates, the first pose held fast.
-void fill(FactorGraph& graph, const GraphFile& file) {
-  for (const GraphFile::Vertex& vertex : file.vertices) graph.add(vertex.type, vertex.value);
+void fill(FactorGraph& graph, const factor_graph::files::GraphFile& file) {
+  for (const factor_graph::files::GraphFile::Vertex& vertex : file.vertices)
+    graph.add(vertex.type, vertex.value);
   for (const Factor& factor : file.factors) graph.add(factor);
   if (file.vertices.front().type == VariableType::kPose2) {
     graph.add(prior(VariableId(0), pose2_of(file.vertices[0].value),
@@ -34,15 +36,16 @@ void fill(FactorGraph& graph, const GraphFile& file) {
 }  // namespace
 
 TEST_CASE("Each format has its own order of the information", "[graph_file]") {
-  const GraphFile toro =
+  const factor_graph::files::GraphFile toro =
       require_graph("VERTEX2 0 0 0 0\nVERTEX2 1 1 0 0\nEDGE2 0 1 1 0 0 11 12 22 33 13 23\n");
   Eigen::Matrix3d expected;
   expected << 11, 12, 13, 12, 22, 23, 13, 23, 33;
   REQUIRE(toro.factors.at(0).information.isApprox(expected));
-  const GraphFile g2o = require_graph(
+  const factor_graph::files::GraphFile g2o = require_graph(
       "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0 11 12 13 22 23 33\n");
   REQUIRE(g2o.factors.at(0).information.isApprox(expected));
-  const GraphFile isam = require_graph("ODOMETRY 0 1 1 0 0 1 2 3 4 5 6\nLANDMARK 1 1 2 3 7 8 9\n");
+  const factor_graph::files::GraphFile isam =
+      require_graph("ODOMETRY 0 1 1 0 0 1 2 3 4 5 6\nLANDMARK 1 1 2 3 7 8 9\n");
   Eigen::Matrix3d root;
   root << 1, 2, 3, 0, 4, 5, 0, 0, 6;
   REQUIRE(isam.factors.at(0).information.isApprox(root.transpose() * root));
@@ -55,14 +58,14 @@ TEST_CASE("A malformed line is named", "[graph_file]") {
         "EDGE_SE2 0 1 1 0 nan 1 0 0 1 0 1", "VERTEX_SE2 0 0 0 0",
         "EDGE_SE2 0.5 1 1 0 0 1 0 0 1 0 1", "EDGE_SE2_XY 0 1 1 1 1 0 1"}) {
     const std::string text = "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\n" + line + "\n";
-    const auto result = read_graph(text, GraphFormat::kG2o);
-    REQUIRE(std::holds_alternative<GraphFileError>(result));
-    REQUIRE(std::get<GraphFileError>(result).line == 3);
+    const auto result = read_graph(text, factor_graph::files::GraphFormat::kG2o);
+    REQUIRE(std::holds_alternative<factor_graph::files::GraphFileError>(result));
+    REQUIRE(std::get<factor_graph::files::GraphFileError>(result).line == 3);
   }
 }
 
 TEST_CASE("An edge from a vertex to itself is left out, and told", "[graph_file]") {
-  const GraphFile graph = require_graph(
+  const factor_graph::files::GraphFile graph = require_graph(
       "VERTEX_SE2 3 0 0 0\nVERTEX_SE2 5 1 0 0\nEDGE_SE2 5 5 0 0 0 1 0 0 1 0 1\n"
       "EDGE_SE2 3 5 1 0 0 1 0 0 1 0 1\n");
   REQUIRE(graph.factors.size() == 1);
@@ -80,11 +83,11 @@ TEST_CASE("What is written reads back as the same graph", "[graph_file]") {
   FactorGraph graph;
   fill(graph, require_graph(text));
   int skipped = 0;
-  const std::string written = write_g2o(graph, &skipped);
+  const std::string written = factor_graph::files::write_g2o(graph, &skipped);
   REQUIRE(skipped == 1);
   FactorGraph again;
   fill(again, require_graph(written));
-  REQUIRE(write_g2o(again) == written);
+  REQUIRE(factor_graph::files::write_g2o(again) == written);
   REQUIRE(again.chi2() == Approx(graph.chi2()).epsilon(1e-12));
 }
 
@@ -104,7 +107,7 @@ TEST_CASE("The batch solver finds the published optima", "[graph_file]") {
     const std::string text((std::istreambuf_iterator<char>(in)), {});
     FactorGraph graph;
     fill(graph, require_graph(text));
-    const BatchReport report = optimise(graph);
+    const factor_graph::batch::BatchReport report = factor_graph::batch::optimise(graph);
     INFO(name);
     REQUIRE(report.ok);
     REQUIRE(report.chi2 == Approx(chi2).epsilon(1e-4));

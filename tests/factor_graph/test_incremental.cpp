@@ -1,16 +1,17 @@
 // The incremental smoother beyond what the mapper uses: space, removal, marginalisation, undo.
-#include "common/factor_graph/incremental_smoother.hpp"
+#include "common/factor_graph/bayes_tree/incremental_smoother.hpp"
 
 #include <Eigen/Dense>
 #include <map>
 #include <memory>
 #include <random>
 
-#include "common/factor_graph/batch.hpp"
+#include "common/factor_graph/batch/batch.hpp"
 #include "tests/catch.hpp"
 #include "tests/factor_graph/graph_copy.hpp"
 
 using namespace understory;
+using namespace understory::factor_graph::graph;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 namespace {
@@ -37,7 +38,7 @@ class Random {
     const Eigen::Vector3d t = vector<3>(length);
     return {t, exp_rotation(vector<3>(angle))};
   }
-  SE2 pose2(double length, double angle) {
+  geometry::SE2 pose2(double length, double angle) {
     const Eigen::Vector2d t = vector<2>(length);
     return {t, angle * normal()};
   }
@@ -47,8 +48,8 @@ class Random {
   std::normal_distribution<double> normal_;
 };
 
-IncrementalParameters exact() {
-  IncrementalParameters parameters;
+factor_graph::bayes_tree::IncrementalParameters exact() {
+  factor_graph::bayes_tree::IncrementalParameters parameters;
   parameters.least_move = 0.0;
   parameters.relinearise_above = 0.0;
   parameters.max_iterations = 1;
@@ -74,8 +75,8 @@ double distance(const FactorGraph& graph, int v, const FactorGraph& other, Varia
 }
 
 double distance_to_batch(const FactorGraph& graph) {
-  GraphCopy copy(graph);
-  BatchParameters parameters;
+  test::GraphCopy copy(graph);
+  factor_graph::batch::BatchParameters parameters;
   parameters.relative_decrease = 1e-15;
   REQUIRE(optimise(copy.graph, parameters).ok);
   double largest = 0.0;
@@ -86,7 +87,8 @@ double distance_to_batch(const FactorGraph& graph) {
 }
 
 /// A walk in space with loops and a few points.
-void grow(IncrementalSmoother& smoother, std::vector<VariableId>& poses, Random& random) {
+void grow(factor_graph::bayes_tree::IncrementalSmoother& smoother, std::vector<VariableId>& poses,
+          Random& random) {
   const Matrix6 information = random.information<6>(400.0);
   if (poses.empty()) {
     poses.push_back(smoother.add_variable(random.pose3(0.1, 0.1)));
@@ -111,7 +113,7 @@ void grow(IncrementalSmoother& smoother, std::vector<VariableId>& poses, Random&
 TEST_CASE("In space the smoother ends where the batch solution is", "[incremental]") {
   Random random(1);
   for (int trial = 0; trial < 6; ++trial) {
-    IncrementalSmoother smoother(exact());
+    factor_graph::bayes_tree::IncrementalSmoother smoother(exact());
     std::vector<VariableId> poses;
     for (int k = 0; k < 25; ++k) {
       grow(smoother, poses, random);
@@ -124,16 +126,16 @@ TEST_CASE("In space the smoother ends where the batch solution is", "[incrementa
 
 TEST_CASE("What waits for its turn arrives where the batch solution is", "[incremental]") {
   Random random(8);
-  IncrementalParameters parameters = exact();
+  factor_graph::bayes_tree::IncrementalParameters parameters = exact();
   parameters.least_move = 1e-7;
   parameters.wait_below = 1e6;  // a tenth of a deviation
   parameters.turns = 2;
-  IncrementalSmoother smoother(parameters);
+  factor_graph::bayes_tree::IncrementalSmoother smoother(parameters);
   std::vector<VariableId> poses;
   long moved = 0;
   for (int k = 0; k < 120; ++k) {
     grow(smoother, poses, random);
-    const IncrementalUpdate update = smoother.update();
+    const factor_graph::bayes_tree::IncrementalUpdate update = smoother.update();
     REQUIRE(update.ok);
     moved += update.moved_variables;
     if (k % 10 == 0) {
@@ -173,7 +175,7 @@ TEST_CASE("On a torus of noisy poses the steps do not swing for ever", "[increme
         truth[static_cast<std::size_t>(i)].inverse() * truth[static_cast<std::size_t>(j)];
     return between * random.pose3(0.2, 0.5);
   };
-  IncrementalSmoother smoother;
+  factor_graph::bayes_tree::IncrementalSmoother smoother;
   std::vector<VariableId> names;
   long relinearised = 0;
   for (int k = 0; k < kPoses; ++k) {
@@ -192,15 +194,15 @@ TEST_CASE("On a torus of noisy poses the steps do not swing for ever", "[increme
       smoother.add(relative(names[static_cast<std::size_t>(other)], names.back(),
                             measured(other, k), information));
     }
-    const IncrementalUpdate update = smoother.update();
+    const factor_graph::bayes_tree::IncrementalUpdate update = smoother.update();
     REQUIRE(update.ok);
     relinearised += update.relinearised_factors;
   }
   CHECK(relinearised < 250L * kPoses);
-  const IncrementalUpdate last = smoother.settle();
+  const factor_graph::bayes_tree::IncrementalUpdate last = smoother.settle();
   CHECK(last.relinearised_factors == 0);
-  GraphCopy copy(smoother.graph());
-  REQUIRE(optimise(copy.graph, BatchParameters{}).ok);
+  test::GraphCopy copy(smoother.graph());
+  REQUIRE(optimise(copy.graph, factor_graph::batch::BatchParameters{}).ok);
   CHECK(smoother.graph().chi2() < 1.001 * copy.graph.chi2());
 }
 
@@ -208,7 +210,7 @@ TEST_CASE("Any sequence of adding, removing and undoing equals the batch solutio
           "[incremental]") {
   Random random(2);
   for (int trial = 0; trial < 12; ++trial) {
-    IncrementalSmoother smoother(exact());
+    factor_graph::bayes_tree::IncrementalSmoother smoother(exact());
     std::vector<VariableId> poses;
     for (int k = 0; k < 40; ++k) {
       const std::vector<VariableId> before = poses;
@@ -246,7 +248,7 @@ TEST_CASE("Marginalising a variable of a linear graph leaves the others where th
           "[incremental]") {
   Random random(3);
   for (int trial = 0; trial < 20; ++trial) {
-    IncrementalSmoother smoother(exact());
+    factor_graph::bayes_tree::IncrementalSmoother smoother(exact());
     std::vector<VariableId> points;
     for (int i = 0; i < 12; ++i) {
       points.push_back(smoother.add_variable(random.vector<3>(2.0)));
@@ -274,19 +276,19 @@ TEST_CASE("Marginalising a variable of a linear graph leaves the others where th
 TEST_CASE("With a fixed lag the graph stays small and the covariance what it would be",
           "[incremental]") {
   Random random(4);
-  IncrementalSmoother whole(exact());
-  IncrementalSmoother lagging(exact());
+  factor_graph::bayes_tree::IncrementalSmoother whole(exact());
+  factor_graph::bayes_tree::IncrementalSmoother lagging(exact());
   std::vector<VariableId> all;
   std::vector<VariableId> window;
   const Eigen::Matrix3d information = 1e4 * Eigen::Matrix3d::Identity();
   for (int k = 0; k < 60; ++k) {
-    const SE2 step(1.0, 0.1 * random.normal(), 0.1 * random.normal());
+    const geometry::SE2 step(1.0, 0.1 * random.normal(), 0.1 * random.normal());
     for (auto* const part : {&whole, &lagging}) {
       auto& poses = part == &whole ? all : window;
-      const SE2 at = poses.empty() ? SE2() : part->pose2(poses.back()) * step;
+      const geometry::SE2 at = poses.empty() ? geometry::SE2() : part->pose2(poses.back()) * step;
       poses.push_back(part->add_variable(at));
       if (poses.size() == 1) {
-        part->add(prior(poses[0], SE2(), information));
+        part->add(prior(poses[0], geometry::SE2(), information));
       } else {
         part->add(relative(poses[poses.size() - 2], poses.back(), step, information));
       }
@@ -308,17 +310,19 @@ TEST_CASE("With a fixed lag the graph stays small and the covariance what it wou
 TEST_CASE("The three batch methods agree, also with the smoother, under a robust loss",
           "[incremental]") {
   Random random(5);
-  IncrementalParameters parameters = exact();
-  IncrementalSmoother smoother(parameters);
+  factor_graph::bayes_tree::IncrementalParameters parameters = exact();
+  factor_graph::bayes_tree::IncrementalSmoother smoother(parameters);
   std::vector<VariableId> poses;
   for (int k = 0; k < 20; ++k) {
-    poses.push_back(smoother.add_variable(SE2(k, 0.1 * random.normal(), 0.05 * random.normal())));
+    poses.push_back(
+        smoother.add_variable(geometry::SE2(k, 0.1 * random.normal(), 0.05 * random.normal())));
     if (k == 0) {
-      smoother.add(prior(poses[0], SE2(), Eigen::Matrix3d(1e4 * Eigen::Matrix3d::Identity())));
+      smoother.add(
+          prior(poses[0], geometry::SE2(), Eigen::Matrix3d(1e4 * Eigen::Matrix3d::Identity())));
       continue;
     }
-    smoother.add(relative(poses[static_cast<std::size_t>(k) - 1], poses.back(), SE2(1, 0, 0),
-                          random.information<3>(100.0)));
+    smoother.add(relative(poses[static_cast<std::size_t>(k) - 1], poses.back(),
+                          geometry::SE2(1, 0, 0), random.information<3>(100.0)));
     Factor gnss = position(poses.back(), Eigen::Vector2d(0.2, 0.1),
                            Eigen::Vector2d(k + (k == 7 ? 20.0 : 0.3 * random.normal()), 0.1),
                            random.information<2>(10.0));
@@ -327,34 +331,37 @@ TEST_CASE("The three batch methods agree, also with the smoother, under a robust
     REQUIRE(smoother.update().ok);
   }
   for (int i = 0; i < 60; ++i) REQUIRE(smoother.update().ok);
-  for (const BatchMethod method :
-       {BatchMethod::kGaussNewton, BatchMethod::kLevenbergMarquardt, BatchMethod::kDogleg}) {
-    GraphCopy copy(smoother.graph());
+  for (const factor_graph::batch::BatchMethod method :
+       {factor_graph::batch::BatchMethod::kGaussNewton,
+        factor_graph::batch::BatchMethod::kLevenbergMarquardt,
+        factor_graph::batch::BatchMethod::kDogleg}) {
+    test::GraphCopy copy(smoother.graph());
     for (const auto& [v, w] : copy.names) {
       Value value = copy.graph.value(w);
       value[1] += 0.05;
       copy.graph.set_value(index(w), value);
     }
-    BatchParameters how;
+    factor_graph::batch::BatchParameters how;
     how.method = method;
     how.relative_decrease = 1e-14;
-    const BatchReport report = optimise(copy.graph, how);
+    const factor_graph::batch::BatchReport report = optimise(copy.graph, how);
     REQUIRE(report.ok);
     REQUIRE(report.chi2 == Approx(smoother.graph().chi2()).epsilon(1e-6));
   }
 }
 
 TEST_CASE("A landmark seen once by its bearing is named", "[incremental]") {
-  IncrementalSmoother smoother;
-  const VariableId pose = smoother.add_variable(SE2());
-  smoother.add(prior(pose, SE2(), Eigen::Matrix3d(Eigen::Matrix3d::Identity())));
+  factor_graph::bayes_tree::IncrementalSmoother smoother;
+  const VariableId pose = smoother.add_variable(geometry::SE2());
+  smoother.add(prior(pose, geometry::SE2(), Eigen::Matrix3d(Eigen::Matrix3d::Identity())));
   const VariableId seen = smoother.add_variable(Eigen::Vector2d(4.0, 1.0));
   const Eigen::Matrix2d bearing_only = Eigen::Vector2d(0.0, 100.0).asDiagonal();
   smoother.add(range_bearing(pose, seen, 4.0, 0.2, bearing_only));
-  const IncrementalUpdate update = smoother.update();
+  const factor_graph::bayes_tree::IncrementalUpdate update = smoother.update();
   REQUIRE_FALSE(update.ok);
   REQUIRE(update.undetermined == std::vector<VariableId>{seen});
-  REQUIRE(update.error.find(name_of(smoother.graph(), seen)) != std::string::npos);
+  REQUIRE(update.error.find(factor_graph::bayes_tree::name_of(smoother.graph(), seen)) !=
+          std::string::npos);
   REQUIRE(smoother.point2(seen).allFinite());
   REQUIRE_FALSE(smoother.joint_covariance({&seen, 1}));
   const Eigen::Matrix2d both = Eigen::Vector2d(25.0, 100.0).asDiagonal();

@@ -5,17 +5,18 @@
 #include <random>
 #include <vector>
 
-#include "common/factor_graph/incremental_smoother.hpp"
+#include "common/factor_graph/bayes_tree/incremental_smoother.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::factor_graph::graph;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 namespace {
 
 class Walk {
  public:
-  Walk(std::uint64_t seed, const IncrementalParameters& parameters)
+  Walk(std::uint64_t seed, const factor_graph::bayes_tree::IncrementalParameters& parameters)
       : smoother(parameters), engine_(seed) {
     poses.push_back(smoother.add_variable(Pose3{}));
     smoother.add(prior(poses[0], Pose3{}, Matrix6(1e4 * Matrix6::Identity())));
@@ -56,7 +57,7 @@ class Walk {
     std::erase_if(loops, [&](FactorId id) { return !smoother.graph().contains(id); });
   }
 
-  IncrementalSmoother smoother;
+  factor_graph::bayes_tree::IncrementalSmoother smoother;
   std::vector<VariableId> poses;
   std::vector<FactorId> loops;
 
@@ -115,7 +116,7 @@ long operations() {
 }  // namespace
 
 TEST_CASE("In space joint covariances equal the dense inverse", "[incremental]") {
-  IncrementalParameters parameters;
+  factor_graph::bayes_tree::IncrementalParameters parameters;
   parameters.thorough_every = 0;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     Walk walk(seed, parameters);
@@ -143,7 +144,7 @@ TEST_CASE("In space joint covariances equal the dense inverse", "[incremental]")
 // UNDERSTORY_OPERATIONS=1000000 under the sanitizers is the long run.
 TEST_CASE("Random use for long: every answer is finite or names what is undetermined",
           "[incremental]") {
-  IncrementalParameters parameters;
+  factor_graph::bayes_tree::IncrementalParameters parameters;
   parameters.thorough_every = 50;
   Walk walk(7, parameters);
   long undetermined = 0;
@@ -174,7 +175,7 @@ TEST_CASE("Random use for long: every answer is finite or names what is undeterm
       walk.poses.erase(walk.poses.begin(), end);
       walk.forget_dead_loops();
     }
-    const IncrementalUpdate update = walk.smoother.update();
+    const factor_graph::bayes_tree::IncrementalUpdate update = walk.smoother.update();
     // With the newest pose goes all that ties it to others, what held them in space, too: two
     // positions may be left, which let the rest turn about the line between them.
     REQUIRE((update.ok || !update.undetermined.empty()));

@@ -1,20 +1,21 @@
-#include "common/factor_graph/smoother.hpp"
+#include "common/factor_graph/plane/smoother.hpp"
 
 #include <map>
 
-#include "common/factor_graph/batch_smoother.hpp"
 #include "tests/catch.hpp"
+#include "tests/factor_graph/batch_smoother.hpp"
 #include "tests/factor_graph/random_graph.hpp"
 
 using namespace understory;
+using namespace understory::factor_graph::graph;
 
 namespace {
 
-Graph solved_whole(const Graph& graph) {
-  BatchSmootherParameters parameters;
+factor_graph::plane::Graph solved_whole(const factor_graph::plane::Graph& graph) {
+  test::BatchSmootherParameters parameters;
   parameters.max_iterations = 50;
   parameters.converged_m = parameters.converged_rad = 1e-11;
-  BatchSmoother batch(parameters);
+  test::BatchSmoother batch(parameters);
   batch.graph() = graph;
   REQUIRE(batch.update().ok);
   return batch.graph();
@@ -23,18 +24,19 @@ Graph solved_whole(const Graph& graph) {
 /// Hands a graph over bit by bit: each step one pose with all that it measures.
 class Feeder {
  public:
-  Feeder(Graph whole, Smoother& smoother) : whole_(std::move(whole)), smoother_(smoother) {}
+  Feeder(factor_graph::plane::Graph whole, factor_graph::plane::Smoother& smoother)
+      : whole_(std::move(whole)), smoother_(smoother) {}
 
   bool done() const { return next_ == whole_.poses.size(); }
   void feed() {
-    const PoseId pose = smoother_.add_pose(whole_.poses[next_]);
-    for (const PosePrior& f : whole_.pose_priors) {
+    const factor_graph::plane::PoseId pose = smoother_.add_pose(whole_.poses[next_]);
+    for (const factor_graph::plane::PosePrior& f : whole_.pose_priors) {
       if (f.pose == pose) smoother_.add(f);
     }
-    for (const RelativePose& f : whole_.relative_poses) {
+    for (const factor_graph::plane::RelativePose& f : whole_.relative_poses) {
       if (f.b == pose) smoother_.add(f);
     }
-    for (PointObservation f : whole_.observations) {
+    for (factor_graph::plane::PointObservation f : whole_.observations) {
       if (f.pose != pose) continue;
       const auto [known, fresh] = points_.try_emplace(index(f.point));
       if (fresh) known->second = smoother_.add_point(whole_[f.point]);
@@ -44,11 +46,11 @@ class Feeder {
     ++next_;
   }
   std::size_t next_ = 0;
-  std::map<std::uint32_t, PointId> points_;
+  std::map<std::uint32_t, factor_graph::plane::PointId> points_;
 
  private:
-  Graph whole_;
-  Smoother& smoother_;
+  factor_graph::plane::Graph whole_;
+  factor_graph::plane::Smoother& smoother_;
 };
 
 }  // namespace
@@ -56,8 +58,8 @@ class Feeder {
 TEST_CASE("Fed bit by bit, the smoother ends where the batch solution is", "[smoother]") {
   std::mt19937_64 random(11);
   for (int trial = 0; trial < 15; ++trial) {
-    Smoother smoother(exact());
-    Feeder feeder(random_graph(random, 25, 20, 0.2), smoother);
+    factor_graph::plane::Smoother smoother(test::exact());
+    Feeder feeder(test::random_graph(random, 25, 20, 0.2), smoother);
     while (!feeder.done()) {
       feeder.feed();
       REQUIRE(smoother.update().ok);
@@ -70,12 +72,12 @@ TEST_CASE("Fed bit by bit, the smoother ends where the batch solution is", "[smo
 TEST_CASE("With its usual thresholds the smoother stays within its tolerance", "[smoother]") {
   std::mt19937_64 random(12);
   for (int trial = 0; trial < 15; ++trial) {
-    Smoother smoother;
-    Feeder feeder(random_graph(random, 25, 20, 0.2), smoother);
+    factor_graph::plane::Smoother smoother;
+    Feeder feeder(test::random_graph(random, 25, 20, 0.2), smoother);
     while (!feeder.done()) {
       feeder.feed();
       REQUIRE(smoother.update().ok);
-      const Graph now = smoother.graph();
+      const factor_graph::plane::Graph now = smoother.graph();
       REQUIRE(chi2(now) < 1.001 * chi2(solved_whole(now)) + 0.05);
     }
   }
@@ -83,8 +85,8 @@ TEST_CASE("With its usual thresholds the smoother stays within its tolerance", "
 
 TEST_CASE("Poses that see very many landmarks end where the batch solution is", "[smoother]") {
   std::mt19937_64 random(17);
-  const Graph whole = random_graph(random, 25, 120, 0.05);
-  Smoother smoother(exact());
+  const factor_graph::plane::Graph whole = test::random_graph(random, 25, 120, 0.05);
+  factor_graph::plane::Smoother smoother(test::exact());
   Feeder feeder(whole, smoother);
   while (!feeder.done()) {
     feeder.feed();
@@ -101,14 +103,14 @@ TEST_CASE("Poses that see very many landmarks end where the batch solution is", 
 TEST_CASE("Along a road that never comes back the smoother stays with the batch solution",
           "[smoother]") {
   std::mt19937_64 random(17);
-  Smoother smoother;
-  Feeder feeder(random_road(random, 300), smoother);
+  factor_graph::plane::Smoother smoother;
+  Feeder feeder(test::random_road(random, 300), smoother);
   while (!feeder.done()) {
     feeder.feed();
     REQUIRE(smoother.update().ok);
     if (feeder.next_ % 60 != 0) continue;
-    const auto newest = static_cast<PoseId>(feeder.next_ - 1);
-    const Graph exact_graph = solved_whole(smoother.graph());
+    const auto newest = static_cast<factor_graph::plane::PoseId>(feeder.next_ - 1);
+    const factor_graph::plane::Graph exact_graph = solved_whole(smoother.graph());
     const auto covariance = smoother.joint_marginal({&newest, 1}, {});
     REQUIRE(covariance);
     const Eigen::Vector3d off =
@@ -124,34 +126,37 @@ TEST_CASE("Any sequence of adding, changing and taking back equals the batch sol
   std::mt19937_64 random(13);
   std::uniform_int_distribution<int> choose(0, 9);
   for (int trial = 0; trial < 15; ++trial) {
-    Smoother smoother(exact());
-    Feeder feeder(random_graph(random, 20, 15, 0.2), smoother);
+    factor_graph::plane::Smoother smoother(test::exact());
+    Feeder feeder(test::random_graph(random, 20, 15, 0.2), smoother);
     feeder.feed();
     REQUIRE(smoother.update().ok);
     while (!feeder.done()) {
       smoother.checkpoint();
-      const Graph before = smoother.graph();
+      const factor_graph::plane::Graph before = smoother.graph();
       const Feeder saved = feeder;
-      const auto marginal = smoother.joint_marginal(std::vector<PoseId>{PoseId(0)}, {});
+      const auto marginal = smoother.joint_marginal(
+          std::vector<factor_graph::plane::PoseId>{factor_graph::plane::PoseId(0)}, {});
       feeder.feed();
       REQUIRE(smoother.update().ok);
       if (choose(random) < 4) {
         const std::uint32_t last = static_cast<std::uint32_t>(before.observations.size());
-        PointObservation changed = smoother.observation(ObservationId(last / 2));
+        factor_graph::plane::PointObservation changed =
+            smoother.observation(factor_graph::plane::ObservationId(last / 2));
         changed.position.x() += 0.1;
-        smoother.set(ObservationId(last / 2), changed);
+        smoother.set(factor_graph::plane::ObservationId(last / 2), changed);
         REQUIRE(smoother.update().ok);
       }
       if (choose(random) < 5) {
         smoother.rollback();
         feeder.next_ = saved.next_;
         feeder.points_ = saved.points_;
-        const Graph after = smoother.graph();
+        const factor_graph::plane::Graph after = smoother.graph();
         REQUIRE(after.poses.size() == before.poses.size());
         REQUIRE(after.points.size() == before.points.size());
         REQUIRE(after.observations.size() == before.observations.size());
         REQUIRE(difference(after, before) == 0.0);
-        const auto again = smoother.joint_marginal(std::vector<PoseId>{PoseId(0)}, {});
+        const auto again = smoother.joint_marginal(
+            std::vector<factor_graph::plane::PoseId>{factor_graph::plane::PoseId(0)}, {});
         REQUIRE((*again - *marginal).norm() == 0.0);
       }
     }
@@ -163,21 +168,24 @@ TEST_CASE("Any sequence of adding, changing and taking back equals the batch sol
 TEST_CASE("Joint covariances equal the dense inverse", "[smoother]") {
   std::mt19937_64 random(14);
   for (int trial = 0; trial < 10; ++trial) {
-    Smoother smoother(exact());
-    Feeder feeder(random_graph(random, 20, 15, 0.2), smoother);
+    factor_graph::plane::Smoother smoother(test::exact());
+    Feeder feeder(test::random_graph(random, 20, 15, 0.2), smoother);
     while (!feeder.done()) {
       feeder.feed();
       REQUIRE(smoother.update().ok);
     }
     for (int i = 0; i < 12; ++i) REQUIRE(smoother.update().ok);
-    BatchSmootherParameters parameters;
+    test::BatchSmootherParameters parameters;
     parameters.max_iterations = 50;
     parameters.converged_m = parameters.converged_rad = 1e-11;
-    BatchSmoother batch(parameters);
+    test::BatchSmoother batch(parameters);
     batch.graph() = smoother.graph();
     REQUIRE(batch.update().ok);
-    const std::vector<PoseId> poses{PoseId(3), PoseId(19), PoseId(0)};
-    const std::vector<PointId> points{PointId(2), PointId(5)};
+    const std::vector<factor_graph::plane::PoseId> poses{factor_graph::plane::PoseId(3),
+                                                         factor_graph::plane::PoseId(19),
+                                                         factor_graph::plane::PoseId(0)};
+    const std::vector<factor_graph::plane::PointId> points{factor_graph::plane::PointId(2),
+                                                           factor_graph::plane::PointId(5)};
     const auto stated = smoother.joint_marginal(poses, points);
     const auto expected = batch.joint_marginal(poses, points);
     REQUIRE(stated);
@@ -187,15 +195,16 @@ TEST_CASE("Joint covariances equal the dense inverse", "[smoother]") {
 }
 
 TEST_CASE("A graph with a free gauge names its variables and can be mended", "[smoother]") {
-  Smoother smoother;
-  const PoseId a = smoother.add_pose(SE2(1, 2, 0.3));
-  const PoseId b = smoother.add_pose(SE2(2, 2, 0.3));
-  smoother.add(RelativePose{a, b, SE2(1, 0, 0), Eigen::Matrix3d::Identity()});
-  const SmootherUpdate update = smoother.update();
+  factor_graph::plane::Smoother smoother;
+  const factor_graph::plane::PoseId a = smoother.add_pose(geometry::SE2(1, 2, 0.3));
+  const factor_graph::plane::PoseId b = smoother.add_pose(geometry::SE2(2, 2, 0.3));
+  smoother.add(
+      factor_graph::plane::RelativePose{a, b, geometry::SE2(1, 0, 0), Eigen::Matrix3d::Identity()});
+  const factor_graph::plane::SmootherUpdate update = smoother.update();
   REQUIRE_FALSE(update.ok);
   REQUIRE(update.error.find("pose ") != std::string::npos);
-  REQUIRE_FALSE(smoother.joint_marginal(std::vector<PoseId>{b}, {}));
-  smoother.add(PosePrior{a, SE2(), Eigen::Matrix3d::Identity()});
+  REQUIRE_FALSE(smoother.joint_marginal(std::vector<factor_graph::plane::PoseId>{b}, {}));
+  smoother.add(factor_graph::plane::PosePrior{a, geometry::SE2(), Eigen::Matrix3d::Identity()});
   REQUIRE(smoother.update().ok);
   REQUIRE(smoother.update().ok);
   REQUIRE(smoother.pose(b).coordinates().isApprox(Eigen::Vector3d(1, 0, 0), 1e-9));

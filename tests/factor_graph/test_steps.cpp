@@ -2,10 +2,11 @@
 #include <cmath>
 #include <memory>
 
-#include "common/factor_graph/incremental_smoother.hpp"
+#include "common/factor_graph/bayes_tree/incremental_smoother.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::factor_graph::graph;
 
 namespace {
 
@@ -30,12 +31,13 @@ class CurvedFactor : public UserFactor {
 };
 
 template <typename Function>
-void add(IncrementalSmoother& smoother, VariableId point, Function function) {
+void add(factor_graph::bayes_tree::IncrementalSmoother& smoother, VariableId point,
+         Function function) {
   smoother.add(std::make_shared<CurvedFactor<Function>>(function), std::span(&point, 1));
 }
 
 /// Updates; the loss must not become larger.
-void update_downhill(IncrementalSmoother& smoother) {
+void update_downhill(factor_graph::bayes_tree::IncrementalSmoother& smoother) {
   const double before = smoother.graph().chi2();
   REQUIRE(smoother.update().ok);
   CHECK(smoother.graph().chi2() <= 1.001 * before + 1e-3);
@@ -45,7 +47,7 @@ void update_downhill(IncrementalSmoother& smoother) {
 
 TEST_CASE("A step that overshoots is halved until the loss is smaller", "[incremental]") {
   // Newton's steps on this diverge from here.
-  IncrementalSmoother smoother;
+  factor_graph::bayes_tree::IncrementalSmoother smoother;
   const VariableId point = smoother.add_variable(Eigen::Vector2d(1.0, 0.5));
   add(smoother, point,
       [](double x) { return std::pair(10.0 * std::atan(5.0 * x), 50.0 / (1.0 + 25.0 * x * x)); });
@@ -55,7 +57,7 @@ TEST_CASE("A step that overshoots is halved until the loss is smaller", "[increm
 
 TEST_CASE("Many factors, each hardly off its linearisation, do not push the estimate uphill",
           "[incremental]") {
-  IncrementalSmoother smoother;
+  factor_graph::bayes_tree::IncrementalSmoother smoother;
   const VariableId point = smoother.add_variable(Eigen::Vector2d(0.0, 0.0));
   for (int i = 0; i < 400; ++i) {
     add(smoother, point, [](double x) { return std::pair(x + 25.0 * x * x, 1.0 + 50.0 * x); });

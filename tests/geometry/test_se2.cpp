@@ -5,6 +5,7 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::geometry;
 
 namespace {
 

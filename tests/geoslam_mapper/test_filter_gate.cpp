@@ -1,37 +1,39 @@
 // What the filter says of the motion, as a gate.
 #include <random>
 
-#include "services/geoslam_mapper/filter_track.hpp"
-#include "services/geoslam_mapper/smoothing_mapper.hpp"
+#include "services/geoslam_mapper/smoothing/filter_track.hpp"
+#include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
 #include "services/keyframer/joint_keyframer.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::geoslam_mapper;
+using namespace understory::geoslam_mapper::smoothing;
 
 namespace {
 
 constexpr double kSpeed_mps = 4.4;
 constexpr double kScan_s = 0.1;
-constexpr Utime kScan_us = 100'000;
+constexpr model::Utime kScan_us = 100'000;
 
-EkfPose filter_pose(Utime utime, double x) {
-  EkfPose pose;
+model::EkfPose filter_pose(model::Utime utime, double x) {
+  model::EkfPose pose;
   pose.utime = utime;
-  pose.ekf_map_T_vehicle = SE2(x, 0.0, 0.0);
+  pose.ekf_map_T_vehicle = geometry::SE2(x, 0.0, 0.0);
   pose.velocity_mps = {kSpeed_mps, 0.0};
   return pose;
 }
 
 /// Trees for the first 20 m; from 60 m on nothing but somebody who walks along, ten metres aside.
-LandmarkScan scan_at(int k, std::mt19937_64& random) {
+model::LandmarkScan scan_at(int k, std::mt19937_64& random) {
   std::normal_distribution<double> noise(0.0, 0.01);
   const double x = kSpeed_mps * kScan_s * k;
-  LandmarkScan scan;
+  model::LandmarkScan scan;
   scan.utime = (k + 1) * kScan_us;
   scan.sequence = static_cast<std::uint64_t>(k);
   scan.field_of_view.max_range_m = 25.0;
   const auto see = [&](double lx, double ly) {
-    Detection detection;
+    model::Detection detection;
     const double dx = noise(random);
     detection.position_m = {lx - x + dx, ly + noise(random), 1.3};
     if (detection.position_m.head<2>().norm() > 25.0) return;
@@ -51,19 +53,19 @@ struct Outcome {
 
 Outcome drive(bool with_filter) {
   std::mt19937_64 random(4);
-  JointKeyframer keyframer({});
+  keyframer::JointKeyframer keyframer({});
   SmoothingMapperParameters parameters;
   parameters.use_odometry = true;
   SmoothingMapper mapper(parameters);
   Outcome outcome;
   for (int k = 0; k < 190; ++k) {
-    const LandmarkScan scan = scan_at(k, random);
+    const model::LandmarkScan scan = scan_at(k, random);
     if (with_filter) mapper.add(filter_pose(scan.utime, kSpeed_mps * kScan_s * k));
     if (k > 0) {
-      Odometry odometry;
+      model::Odometry odometry;
       odometry.from_utime = scan.utime - kScan_us;
       odometry.utime = scan.utime;
-      odometry.from_T_to = SE2(kSpeed_mps * kScan_s, 0.0, 0.0);
+      odometry.from_T_to = geometry::SE2(kSpeed_mps * kScan_s, 0.0, 0.0);
       odometry.covariance = Eigen::Vector3d(8e-3, 1e-5, 1e-8).asDiagonal();
       odometry.has_wheels = true;
       keyframer.add(odometry);
@@ -71,9 +73,9 @@ Outcome drive(bool with_filter) {
     }
     const auto keyframe = keyframer.add(scan);
     if (!keyframe) continue;
-    const MapUpdate update = mapper.add(*keyframe);
-    if (update.status == MapUpdateStatus::kNotSure) ++outcome.refused;
-    if (update.status != MapUpdateStatus::kUpdated) continue;
+    const model::MapUpdate update = mapper.add(*keyframe);
+    if (update.status == model::MapUpdateStatus::kNotSure) ++outcome.refused;
+    if (update.status != model::MapUpdateStatus::kUpdated) continue;
     const double truth = kSpeed_mps * (1e-6 * static_cast<double>(update.utime) - kScan_s);
     outcome.largest_m = std::max(outcome.largest_m, std::abs(update.map_T_vehicle.x() - truth));
   }
@@ -101,11 +103,11 @@ TEST_CASE("The filter's motion is told where it has poses near both ends", "[map
   CHECK_FALSE(track.between(510'000, 2'100'000));
   CHECK_FALSE(track.between(-100'000, 510'000));
 
-  EkfPose restarted = filter_pose(2'100'000, 0.0);
+  model::EkfPose restarted = filter_pose(2'100'000, 0.0);
   restarted.reset_counter = 1;
   track.add(restarted);
   CHECK_FALSE(track.between(1'500'000, 2'100'000));
-  EkfPose late = filter_pose(2'000'000, 5.0);
+  model::EkfPose late = filter_pose(2'000'000, 5.0);
   late.reset_counter = 1;
   track.add(late);
   CHECK(track.between(2'090'000, 2'100'000));

@@ -1,14 +1,16 @@
 // What is found out about the gyro after a stretch without landmarks straightens that stretch.
 #include <cmath>
 
-#include "services/geoslam_mapper/smoothing_mapper.hpp"
+#include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::geoslam_mapper;
+using namespace understory::geoslam_mapper::smoothing;
 
 namespace {
 
-constexpr Utime kScan_us = 100'000;
+constexpr model::Utime kScan_us = 100'000;
 constexpr double kScan_s = 0.1;
 constexpr double kSpeed_mps = 8.0;
 constexpr double kBias = 1e-3;       // rad/s, of which the filter knows nothing
@@ -18,15 +20,15 @@ constexpr int kScans = 8;
 bool has_landmarks(double x) { return x < 120.0 || x > 280.0; }
 
 /// Straight on along x. Posts left and right every 10 m but for a stretch without.
-Keyframe keyframe(int number) {
-  Keyframe result;
+model::Keyframe keyframe(int number) {
+  model::Keyframe result;
   result.sequence = static_cast<std::uint64_t>(number);
-  const Utime first = number * kScans * kScan_us;
+  const model::Utime first = number * kScans * kScan_us;
   result.utime = first;
   result.field_of_view.max_range_m = 30.0;
   for (int k = 0; k < kScans; ++k) {
     result.members.push_back({first + k * kScan_us, static_cast<std::uint64_t>(k),
-                              SE2((k - 3.5) * kScan_s * kSpeed_mps, 0.0, 0.0),
+                              geometry::SE2((k - 3.5) * kScan_s * kSpeed_mps, 0.0, 0.0),
                               1e-8 * Eigen::Matrix3d::Identity()});
   }
   const double here = (number * kScans + 3.5) * kScan_s * kSpeed_mps;
@@ -34,46 +36,46 @@ Keyframe keyframe(int number) {
     const double x = 10.0 * post;
     if (!has_landmarks(x) || std::abs(x - here) > 25.0) continue;
     for (const double side : {-6.0, 7.0}) {
-      KeyframeLandmark landmark;
+      model::KeyframeLandmark landmark;
       landmark.position_m = {x - here, side};
       landmark.covariance_m2 = 1e-4 * Eigen::Matrix2d::Identity();
       landmark.radius_m = 0.1;
-      landmark.times_seen = kScans;
+      landmark.observation_count = kScans;
       result.landmarks.push_back(landmark);
     }
   }
   return result;
 }
 
-Odometry piece_until(Utime utime) {
-  Odometry piece;
-  piece.from_utime = utime - kScan_us;
-  piece.utime = utime;
-  piece.from_T_to = SE2::Exp({kSpeed_mps * kScan_s, 0.0, kBias * kScan_s});
+model::Odometry increment_until(model::Utime utime) {
+  model::Odometry increment;
+  increment.from_utime = utime - kScan_us;
+  increment.utime = utime;
+  increment.from_T_to = geometry::SE2::Exp({kSpeed_mps * kScan_s, 0.0, kBias * kScan_s});
   const double turn = kGyroNoise * kGyroNoise * kScan_s;
-  piece.covariance = Eigen::Vector3d(1e-5, 1e-5, turn).asDiagonal();
-  piece.has_wheels = true;
-  piece.inertial.emplace();
-  piece.inertial->seconds = kScan_s;
-  piece.inertial->yaw_rad = kBias * kScan_s;
-  piece.inertial->bias_jacobian(0, 0) = -kScan_s;
-  piece.inertial->covariance(0, 0) = turn;
-  return piece;
+  increment.covariance = Eigen::Vector3d(1e-5, 1e-5, turn).asDiagonal();
+  increment.has_wheels = true;
+  increment.inertial.emplace();
+  increment.inertial->seconds = kScan_s;
+  increment.inertial->yaw_rad = kBias * kScan_s;
+  increment.inertial->bias_jacobian(0, 0) = -kScan_s;
+  increment.inertial->covariance(0, 0) = turn;
+  return increment;
 }
 
 /// A filter that knows where it is, and nothing of velocity and bias.
-EkfPose filter_at(Utime utime) {
-  EkfPose pose;
+model::EkfPose filter_at(model::Utime utime) {
+  model::EkfPose pose;
   pose.utime = utime;
-  pose.ekf_map_T_vehicle = SE2(1e-6 * static_cast<double>(utime) * kSpeed_mps, 0.0, 0.0);
+  pose.ekf_map_T_vehicle = geometry::SE2(1e-6 * static_cast<double>(utime) * kSpeed_mps, 0.0, 0.0);
   pose.velocity_covariance = 100.0 * Eigen::Matrix2d::Identity();
   pose.bias_covariance = 4e-6 * Eigen::Matrix3d::Identity();
   return pose;
 }
 
 struct Drive {
-  MapUpdate last;
-  std::vector<KeyframePose> trajectory;
+  model::MapUpdate last;
+  std::vector<model::KeyframePose> trajectory;
 };
 
 /// `saved_at`: after this keyframe the mapper is saved and another goes on from there.
@@ -85,15 +87,15 @@ Drive drive(double gyro_walk, int saved_at = -1) {
   SmoothingMapper mapper(parameters);
   Drive result;
   for (int number = 0; number < 62; ++number) {
-    const Keyframe one = keyframe(number);
-    for (const KeyframeMember& member : one.members) {
+    const model::Keyframe one = keyframe(number);
+    for (const model::KeyframeMember& member : one.members) {
       if (member.utime == 0) continue;
-      mapper.add(piece_until(member.utime));
+      mapper.add(increment_until(member.utime));
       mapper.add(filter_at(member.utime));
     }
     result.last = mapper.add(one);
     INFO(number << " " << result.last.reason);
-    REQUIRE((number == 0 || result.last.status == MapUpdateStatus::kUpdated));
+    REQUIRE((number == 0 || result.last.status == model::MapUpdateStatus::kUpdated));
     if (number != saved_at) continue;
     const std::string state = mapper.save();
     mapper = SmoothingMapper(parameters);
@@ -113,7 +115,7 @@ TEST_CASE("a gyro's bias that shows later straightens the way before", "[mapper]
   CHECK(std::abs(estimated.last.map_T_vehicle.theta()) < 0.001);
   CHECK(std::abs(estimated.last.map_T_vehicle.y()) < 0.1 * std::abs(taken.last.map_T_vehicle.y()));
   // The way before is straight, too, not only its end.
-  for (const KeyframePose& pose : estimated.trajectory)
+  for (const model::KeyframePose& pose : estimated.trajectory)
     CHECK(std::abs(pose.map_T_vehicle.theta()) < 0.003);
   const double sigma = std::sqrt(estimated.last.covariance(2, 2));
   CHECK(std::abs(estimated.last.map_T_vehicle.theta()) < 3.0 * sigma);
@@ -123,7 +125,7 @@ TEST_CASE("a gyro's bias that shows later straightens the way before", "[mapper]
 TEST_CASE("a mapper that was saved in between goes on with the same bias", "[mapper]") {
   const Drive whole = drive(1e-6);
   const Drive cut = drive(1e-6, 30);
-  const SE2 between = whole.last.map_T_vehicle.inverse() * cut.last.map_T_vehicle;
+  const geometry::SE2 between = whole.last.map_T_vehicle.inverse() * cut.last.map_T_vehicle;
   CHECK(between.translation().norm() < 1e-3);
   CHECK(std::abs(between.theta()) < 1e-5);
 }

@@ -8,10 +8,12 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::geoslam_mapper;
+using namespace understory::geoslam_mapper::smoothing;
 
 namespace {
 
-SE2 random_pose(std::mt19937_64& random, double spread_m = 5.0) {
+geometry::SE2 random_pose(std::mt19937_64& random, double spread_m = 5.0) {
   std::uniform_real_distribution<double> coordinate(-spread_m, spread_m);
   std::uniform_real_distribution<double> angle(-std::numbers::pi, std::numbers::pi);
   const double x = coordinate(random);
@@ -19,26 +21,28 @@ SE2 random_pose(std::mt19937_64& random, double spread_m = 5.0) {
   return {x, y, angle(random)};
 }
 
-double difference(const SE2& a, const SE2& b) { return (a.inverse() * b).Log().norm(); }
+double difference(const geometry::SE2& a, const geometry::SE2& b) {
+  return (a.inverse() * b).Log().norm();
+}
 
-MapLandmark landmark(LandmarkId id, std::mt19937_64& random) {
-  MapLandmark one;
+model::MapLandmark landmark(model::LandmarkId id, std::mt19937_64& random) {
+  model::MapLandmark one;
   one.id = id;
   one.position_m = random_pose(random).translation();
-  one.times_seen = static_cast<std::uint32_t>(random() % 100);
+  one.observation_count = static_cast<std::uint32_t>(random() % 100);
   return one;
 }
 
 /// A map and what became of it: some stay, move a little or far, go, are merged, or come.
 struct ChangedMap {
-  std::vector<MapLandmark> before;
-  std::vector<MapLandmark> after;
-  MapUpdate update;
+  std::vector<model::MapLandmark> before;
+  std::vector<model::MapLandmark> after;
+  model::MapUpdate update;
 
   explicit ChangedMap(std::mt19937_64& random, double moved_m) {
-    for (LandmarkId id = 1; id <= 60; ++id) {
+    for (model::LandmarkId id = 1; id <= 60; ++id) {
       const auto fate = random() % 6;
-      MapLandmark one = landmark(id, random);
+      model::MapLandmark one = landmark(id, random);
       if (fate != 0) before.push_back(one);
       if (fate == 1) continue;
       if (fate == 2 && !after.empty()) {
@@ -52,20 +56,20 @@ struct ChangedMap {
   }
 };
 
-std::set<LandmarkId> ids_of(const std::vector<MapLandmark>& landmarks) {
-  std::set<LandmarkId> ids;
+std::set<model::LandmarkId> ids_of(const std::vector<model::MapLandmark>& landmarks) {
+  std::set<model::LandmarkId> ids;
   for (const auto& one : landmarks) ids.insert(one.id);
   return ids;
 }
 
 /// A keyframe of `size` scans, 0.1 s apart, with random member poses.
-Keyframe random_keyframe(std::mt19937_64& random, std::size_t size) {
-  Keyframe keyframe;
+model::Keyframe random_keyframe(std::mt19937_64& random, std::size_t size) {
+  model::Keyframe keyframe;
   keyframe.sequence = 7;
   keyframe.utime = 1000000;
   for (std::size_t i = 0; i < size; ++i) {
-    KeyframeMember member;
-    member.utime = keyframe.utime + 100000 * static_cast<Utime>(i);
+    model::KeyframeMember member;
+    member.utime = keyframe.utime + 100000 * static_cast<model::Utime>(i);
     member.centre_T_vehicle = random_pose(random);
     member.covariance = 0.01 * Eigen::Matrix3d::Identity();
     keyframe.members.push_back(member);
@@ -73,9 +77,9 @@ Keyframe random_keyframe(std::mt19937_64& random, std::size_t size) {
   return keyframe;
 }
 
-MapUpdate updated_at(const SE2& pose) {
-  MapUpdate update;
-  update.status = MapUpdateStatus::kUpdated;
+model::MapUpdate updated_at(const geometry::SE2& pose) {
+  model::MapUpdate update;
+  update.status = model::MapUpdateStatus::kUpdated;
   update.map_T_vehicle = pose;
   update.covariance = 0.04 * Eigen::Matrix3d::Identity();
   update.map_T_latest_vehicle = pose;
@@ -89,7 +93,7 @@ TEST_CASE("a holder of every difference has the map", "[map_publishing]") {
   std::mt19937_64 random(1);
   for (int run = 0; run < 200; ++run) {
     const ChangedMap map(random, kMoved);
-    const MapDelta delta = map_difference(map.before, map.after, map.update, kMoved);
+    const model::MapDelta delta = map_difference(map.before, map.after, map.update, kMoved);
     const auto held = with_delta(map.before, delta);
     REQUIRE(held.size() == map.after.size());
     for (std::size_t i = 0; i < held.size(); ++i) {
@@ -104,12 +108,12 @@ TEST_CASE("a difference says no more than what changed", "[map_publishing]") {
   std::mt19937_64 random(2);
   for (int run = 0; run < 200; ++run) {
     const ChangedMap map(random, kMoved);
-    const MapDelta delta = map_difference(map.before, map.after, map.update, kMoved);
+    const model::MapDelta delta = map_difference(map.before, map.after, map.update, kMoved);
     const auto before = ids_of(map.before);
     const auto after = ids_of(map.after);
     for (const auto& one : delta.added) CHECK_FALSE(before.contains(one.id));
     for (const auto& one : delta.moved) CHECK(before.contains(one.id));
-    for (const LandmarkId id : delta.removed) {
+    for (const model::LandmarkId id : delta.removed) {
       CHECK(before.contains(id));
       CHECK_FALSE(after.contains(id));
       for (const auto& [old_id, new_id] : delta.merged) CHECK(old_id != id);
@@ -123,12 +127,12 @@ TEST_CASE("a difference says no more than what changed", "[map_publishing]") {
 
 TEST_CASE("small steps add up until they are told", "[map_publishing]") {
   std::mt19937_64 random(3);
-  std::vector<MapLandmark> map{landmark(1, random)};
-  std::vector<MapLandmark> held = map;
+  std::vector<model::MapLandmark> map{landmark(1, random)};
+  std::vector<model::MapLandmark> held = map;
   int told = 0;
   for (int step = 0; step < 100; ++step) {
     map[0].position_m.x() += 0.004;
-    const MapDelta delta = map_difference(held, map, {}, 0.01);
+    const model::MapDelta delta = map_difference(held, map, {}, 0.01);
     told += static_cast<int>(delta.moved.size());
     held = with_delta(held, delta);
     CHECK((held[0].position_m - map[0].position_m).norm() <= 0.01);
@@ -139,11 +143,11 @@ TEST_CASE("small steps add up until they are told", "[map_publishing]") {
 TEST_CASE("the odometry frame is the sum of the motions", "[map_publishing]") {
   std::mt19937_64 random(4);
   OdometryFrame frame;
-  CHECK(difference(frame.odom_T_vehicle(5), SE2()) == 0.0);
-  std::vector<SE2> poses{SE2()};
+  CHECK(difference(frame.odom_T_vehicle(5), geometry::SE2()) == 0.0);
+  std::vector<geometry::SE2> poses{geometry::SE2()};
   for (int i = 0; i < 300; ++i) {
-    Odometry motion;
-    motion.from_utime = 1000 + 100 * static_cast<Utime>(i);
+    model::Odometry motion;
+    motion.from_utime = 1000 + 100 * static_cast<model::Utime>(i);
     motion.utime = motion.from_utime + 100;
     motion.from_T_to = random_pose(random, 0.5);
     frame.add(motion);
@@ -152,7 +156,7 @@ TEST_CASE("the odometry frame is the sum of the motions", "[map_publishing]") {
   OdometryFrame loaded;
   loaded.load(frame.save());
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Utime utime = 1000 + 100 * static_cast<Utime>(i);
+    const model::Utime utime = 1000 + 100 * static_cast<model::Utime>(i);
     CHECK(difference(frame.odom_T_vehicle(utime), poses[i]) < 1e-9);
     CHECK(difference(frame.odom_T_vehicle(utime + 99), poses[i]) < 1e-9);
     CHECK(difference(loaded.odom_T_vehicle(utime), frame.odom_T_vehicle(utime)) == 0.0);
@@ -163,7 +167,7 @@ TEST_CASE("the odometry frame is the sum of the motions", "[map_publishing]") {
 
 TEST_CASE("states that are not whole are refused", "[map_publishing]") {
   OdometryFrame frame;
-  frame.add(Odometry{});
+  frame.add(model::Odometry{});
   const std::string state = frame.save();
   OdometryFrame other;
   CHECK_THROWS(other.load(""));
@@ -178,19 +182,19 @@ TEST_CASE("every scan of a keyframe has its pose, known no better than the keyfr
           "[map_publishing]") {
   std::mt19937_64 random(5);
   for (int run = 0; run < 50; ++run) {
-    const Keyframe keyframe = random_keyframe(random, 8);
-    MapUpdate update = updated_at(random_pose(random));
+    const model::Keyframe keyframe = random_keyframe(random, 8);
+    model::MapUpdate update = updated_at(random_pose(random));
     update.map_T_latest_vehicle = random_pose(random);
     const auto poses = poses_of(keyframe, update);
     REQUIRE(poses.size() == keyframe.members.size());
     // The map's frame seen from the keyframe's centre, by the base alone.
-    const SE2 map_T_centre = update.map_T_vehicle * keyframe.centre_T_base().inverse();
+    const geometry::SE2 map_T_centre = update.map_T_vehicle * keyframe.centre_T_base().inverse();
     for (std::size_t i = 0; i < poses.size(); ++i) {
       CHECK(poses[i].utime == keyframe.members[i].utime);
       CHECK(poses[i].keyframe_sequence == keyframe.sequence);
-      const SE2 expected = i + 1 == poses.size()
-                               ? update.map_T_latest_vehicle
-                               : map_T_centre * keyframe.members[i].centre_T_vehicle;
+      const geometry::SE2 expected = i + 1 == poses.size()
+                                         ? update.map_T_latest_vehicle
+                                         : map_T_centre * keyframe.members[i].centre_T_vehicle;
       CHECK(difference(poses[i].map_T_vehicle(), expected) < 1e-9);
       CHECK(poses[i].covariance.determinant() >= update.covariance.determinant() * (1.0 - 1e-9));
     }
@@ -200,9 +204,10 @@ TEST_CASE("every scan of a keyframe has its pose, known no better than the keyfr
 
 TEST_CASE("a keyframe without a place gives one pose that says so", "[map_publishing]") {
   std::mt19937_64 random(6);
-  const Keyframe keyframe = random_keyframe(random, 8);
-  for (const auto status : {MapUpdateStatus::kNotSure, MapUpdateStatus::kRolledBack}) {
-    MapUpdate update;
+  const model::Keyframe keyframe = random_keyframe(random, 8);
+  for (const auto status :
+       {model::MapUpdateStatus::kNotSure, model::MapUpdateStatus::kRolledBack}) {
+    model::MapUpdate update;
     update.status = status;
     const auto poses = poses_of(keyframe, update);
     REQUIRE(poses.size() == 1);
@@ -216,28 +221,29 @@ TEST_CASE("a jump against what was tracked is counted, a tracked motion is none"
           "[map_publishing]") {
   std::mt19937_64 random(7);
   JumpWatch watch(0.5, 0.05);
-  SE2 pose;
-  const auto step = [&](const SE2& tracked, const SE2& jump, MapUpdateStatus status) {
-    Keyframe keyframe = random_keyframe(random, 2);
+  geometry::SE2 pose;
+  const auto step = [&](const geometry::SE2& tracked, const geometry::SE2& jump,
+                        model::MapUpdateStatus status) {
+    model::Keyframe keyframe = random_keyframe(random, 2);
     keyframe.previous_T_base = tracked;
     pose = pose * tracked * jump;
-    MapUpdate update = updated_at(pose);
+    model::MapUpdate update = updated_at(pose);
     update.status = status;
     watch.add(keyframe, update);
   };
-  step(SE2(), SE2(), MapUpdateStatus::kFirstMap);
+  step(geometry::SE2(), geometry::SE2(), model::MapUpdateStatus::kFirstMap);
   for (int i = 0; i < 20; ++i)
-    step(random_pose(random), {0.1, 0.1, 0.01}, MapUpdateStatus::kUpdated);
+    step(random_pose(random), {0.1, 0.1, 0.01}, model::MapUpdateStatus::kUpdated);
   CHECK(watch.count() == 0);
-  step(random_pose(random), {0.6, 0.0, 0.0}, MapUpdateStatus::kUpdated);
+  step(random_pose(random), {0.6, 0.0, 0.0}, model::MapUpdateStatus::kUpdated);
   CHECK(watch.count() == 1);
   CHECK(difference(watch.delta(), {0.6, 0.0, 0.0}) < 1e-9);
   // Through a keyframe without a place the prediction goes on.
-  step(random_pose(random), SE2(), MapUpdateStatus::kNotSure);
+  step(random_pose(random), geometry::SE2(), model::MapUpdateStatus::kNotSure);
   JumpWatch loaded(0.5, 0.05);
   loaded.load(watch.save());
   CHECK(loaded.save() == watch.save());
-  step(random_pose(random), {0.0, 0.0, -0.06}, MapUpdateStatus::kUpdated);
+  step(random_pose(random), {0.0, 0.0, -0.06}, model::MapUpdateStatus::kUpdated);
   CHECK(watch.count() == 2);
   CHECK(watch.delta().theta() == Approx(-0.06));
 }

@@ -2,34 +2,37 @@
 #include <cmath>
 #include <numbers>
 
-#include "services/geoslam_mapper/smoothing_mapper.hpp"
+#include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::geoslam_mapper;
+using namespace understory::geoslam_mapper::smoothing;
 
 namespace {
 
-constexpr Utime kScan_us = 100'000;
-constexpr Utime kKeyframe_us = 800'000;
+constexpr model::Utime kScan_us = 100'000;
+constexpr model::Utime kKeyframe_us = 800'000;
 
 /// Eight landmarks around (0, 0), as seen by a vehicle at (x, 0) that went `way_m` meanwhile.
-Keyframe keyframe_at(double x, int number, double way_m) {
-  Keyframe keyframe;
+model::Keyframe keyframe_at(double x, int number, double distance_m) {
+  model::Keyframe keyframe;
   keyframe.sequence = static_cast<std::uint64_t>(number);
   keyframe.utime = number * kKeyframe_us + kScan_us;
   keyframe.field_of_view.max_range_m = 60.0;
   for (int k = 0; k < 8; ++k) {
     const double share = (k - 3.5) / 7.0;
     keyframe.members.push_back({keyframe.utime + k * kScan_us, static_cast<std::uint64_t>(k),
-                                SE2(share * way_m, 0.0, 0.0), 1e-8 * Eigen::Matrix3d::Identity()});
+                                geometry::SE2(share * distance_m, 0.0, 0.0),
+                                1e-8 * Eigen::Matrix3d::Identity()});
   }
   for (int k = 0; k < 8; ++k) {
     const double bearing = 2.0 * std::numbers::pi * k / 8.0;
-    KeyframeLandmark landmark;
+    model::KeyframeLandmark landmark;
     landmark.position_m = {(10.0 + k) * std::cos(bearing) - x, (10.0 + k) * std::sin(bearing)};
     landmark.covariance_m2 = 1e-4 * Eigen::Matrix2d::Identity();
     landmark.radius_m = 0.2;
-    landmark.times_seen = 8;
+    landmark.observation_count = 8;
     keyframe.landmarks.push_back(landmark);
   }
   return keyframe;
@@ -39,22 +42,22 @@ Keyframe keyframe_at(double x, int number, double way_m) {
 double variance_after(int standing, const SmoothingMapperParameters& parameters) {
   SmoothingMapper mapper(parameters);
   for (int k = 0; k < standing; ++k) mapper.add(keyframe_at(0.0, k, 0.0));
-  Keyframe last = keyframe_at(3.0, standing, 1.0);
-  last.previous_T_base = SE2(2.5, 0.0, 0.0);
-  const MapUpdate update = mapper.add(last);
-  REQUIRE(update.status == MapUpdateStatus::kUpdated);
+  model::Keyframe last = keyframe_at(3.0, standing, 1.0);
+  last.previous_T_base = geometry::SE2(2.5, 0.0, 0.0);
+  const model::MapUpdate update = mapper.add(last);
+  REQUIRE(update.status == model::MapUpdateStatus::kUpdated);
   return update.covariance(0, 0);
 }
 
-Odometry piece_until(Utime utime, double heading_sigma_rad) {
-  Odometry piece;
-  piece.from_utime = utime - kScan_us;
-  piece.utime = utime;
-  piece.covariance =
+model::Odometry increment_until(model::Utime utime, double heading_sigma_rad) {
+  model::Odometry increment;
+  increment.from_utime = utime - kScan_us;
+  increment.utime = utime;
+  increment.covariance =
       Eigen::Vector3d(1e-7, 1e-7, heading_sigma_rad * heading_sigma_rad).asDiagonal();
-  piece.has_wheels = true;
-  piece.inertial.emplace();
-  return piece;
+  increment.has_wheels = true;
+  increment.inertial.emplace();
+  return increment;
 }
 
 }  // namespace
@@ -63,7 +66,7 @@ TEST_CASE("standing longer tells a map with lasting errors nothing new", "[mappe
   SmoothingMapperParameters white;
   CHECK(variance_after(20, white) < 0.75 * variance_after(1, white));
   SmoothingMapperParameters lasting;
-  lasting.standing_share = 1.0;
+  lasting.stationary_share = 1.0;
   CHECK(variance_after(20, lasting) == Approx(variance_after(1, lasting)));
   CHECK(variance_after(1, lasting) > 3.0 * variance_after(1, white));
 }
@@ -81,13 +84,13 @@ TEST_CASE("a map waits for the gyro's bias, but not for ever", "[mapper]") {
   const auto first_map = [&](double unknown_until_s, bool has_odometry) {
     SmoothingMapper mapper(parameters);
     for (int number = 0; number < 8; ++number) {
-      const Keyframe keyframe = keyframe_at(0.0, number, 0.0);
+      const model::Keyframe keyframe = keyframe_at(0.0, number, 0.0);
       for (int k = 0; has_odometry && k < 8; ++k) {
-        const Utime utime = keyframe.utime + k * kScan_us;
+        const model::Utime utime = keyframe.utime + k * kScan_us;
         const bool unknown = 1e-6 * static_cast<double>(utime) < unknown_until_s;
-        mapper.add(piece_until(utime, unknown ? 7e-3 : 3e-4));
+        mapper.add(increment_until(utime, unknown ? 7e-3 : 3e-4));
       }
-      if (mapper.add(keyframe).status == MapUpdateStatus::kFirstMap) return number;
+      if (mapper.add(keyframe).status == model::MapUpdateStatus::kFirstMap) return number;
     }
     return -1;
   };

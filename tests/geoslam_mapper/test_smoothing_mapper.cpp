@@ -1,4 +1,4 @@
-#include "services/geoslam_mapper/smoothing_mapper.hpp"
+#include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -10,6 +10,8 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::geoslam_mapper;
+using namespace understory::geoslam_mapper::smoothing;
 
 namespace {
 
@@ -23,19 +25,19 @@ sim::Drive drive(sim::PathKind path, double length_m, std::uint64_t seed, double
   return {parameters, seed};
 }
 
-std::vector<Keyframe> keyframes(const sim::Drive& drive) {
-  JointKeyframer keyframer({});
-  std::vector<Keyframe> result;
+std::vector<model::Keyframe> keyframes(const sim::Drive& drive) {
+  keyframer::JointKeyframer keyframer({});
+  std::vector<model::Keyframe> result;
   for (std::size_t k = 0; k < drive.size(); ++k) {
     if (auto keyframe = keyframer.add(drive.scan(k).scan)) result.push_back(std::move(*keyframe));
   }
   return result;
 }
 
-std::vector<MapLandmark> true_map(const sim::Drive& drive) {
-  std::vector<MapLandmark> map;
+std::vector<model::MapLandmark> true_map(const sim::Drive& drive) {
+  std::vector<model::MapLandmark> map;
   for (const Eigen::Vector2d& trunk : drive.forest().trunks_m) {
-    MapLandmark landmark;
+    model::MapLandmark landmark;
     landmark.position_m = trunk;
     landmark.covariance_m2 = 1e-4 * Eigen::Matrix2d::Identity();
     map.push_back(landmark);
@@ -43,10 +45,10 @@ std::vector<MapLandmark> true_map(const sim::Drive& drive) {
   return map;
 }
 
-bool same_map(const MapperMethod& a, const std::vector<MapLandmark>& landmarks,
-              const std::vector<KeyframePose>& poses) {
-  const std::vector<MapLandmark> now = a.landmarks();
-  const std::vector<KeyframePose> trajectory = a.trajectory();
+bool same_map(const MapperMethod& a, const std::vector<model::MapLandmark>& landmarks,
+              const std::vector<model::KeyframePose>& poses) {
+  const std::vector<model::MapLandmark> now = a.landmarks();
+  const std::vector<model::KeyframePose> trajectory = a.trajectory();
   if (now.size() != landmarks.size() || trajectory.size() != poses.size()) return false;
   for (std::size_t i = 0; i < now.size(); ++i) {
     if (now[i].id != landmarks[i].id || now[i].position_m != landmarks[i].position_m) return false;
@@ -62,20 +64,21 @@ bool same_map(const MapperMethod& a, const std::vector<MapLandmark>& landmarks,
 
 TEST_CASE("A drive round a circle gives a map of trunks, each once", "[mapper]") {
   const sim::Drive simulated = drive(sim::PathKind::kCircle, 100.0, 11);
-  const SE2 world_T_map = simulated.world_T_vehicle().front();
+  const geometry::SE2 world_T_map = simulated.world_T_vehicle().front();
   SmoothingMapper mapper({});
-  for (const Keyframe& keyframe : keyframes(simulated)) {
-    const MapUpdate update = mapper.add(keyframe);
-    const bool accepted =
-        update.status == MapUpdateStatus::kFirstMap || update.status == MapUpdateStatus::kUpdated;
+  for (const model::Keyframe& keyframe : keyframes(simulated)) {
+    const model::MapUpdate update = mapper.add(keyframe);
+    const bool accepted = update.status == model::MapUpdateStatus::kFirstMap ||
+                          update.status == model::MapUpdateStatus::kUpdated;
     REQUIRE(accepted);
-    const SE2 truth = world_T_map.inverse() * simulated.world_T_vehicle()[8 * keyframe.sequence];
+    const geometry::SE2 truth =
+        world_T_map.inverse() * simulated.world_T_vehicle()[8 * keyframe.sequence];
     REQUIRE((update.map_T_vehicle.translation() - truth.translation()).norm() < 0.5);
     Eigen::LLT<Eigen::Matrix3d> llt(update.covariance + 1e-15 * Eigen::Matrix3d::Identity());
     REQUIRE(llt.info() == Eigen::Success);
   }
   std::vector<std::uint32_t> taken;
-  for (const MapLandmark& landmark : mapper.landmarks()) {
+  for (const model::MapLandmark& landmark : mapper.landmarks()) {
     const auto nearest = simulated.grid().nearest(world_T_map * landmark.position_m);
     REQUIRE(nearest->distance_m < 1.0);
     taken.push_back(nearest->index);
@@ -89,17 +92,17 @@ TEST_CASE("Keyframes of another forest are not sure, and leave the map as it was
   const sim::Drive here = drive(sim::PathKind::kLine, 30.0, 12);
   const sim::Drive there = drive(sim::PathKind::kLine, 30.0, 912);
   SmoothingMapper mapper({});
-  Utime last = 0;
-  for (const Keyframe& keyframe : keyframes(here)) {
+  model::Utime last = 0;
+  for (const model::Keyframe& keyframe : keyframes(here)) {
     mapper.add(keyframe);
     last = keyframe.utime;
   }
-  const std::vector<MapLandmark> landmarks = mapper.landmarks();
-  const std::vector<KeyframePose> poses = mapper.trajectory();
-  for (Keyframe keyframe : keyframes(there)) {
+  const std::vector<model::MapLandmark> landmarks = mapper.landmarks();
+  const std::vector<model::KeyframePose> poses = mapper.trajectory();
+  for (model::Keyframe keyframe : keyframes(there)) {
     keyframe.utime += last + 1;
-    const MapUpdate update = mapper.add(keyframe);
-    REQUIRE(update.status == MapUpdateStatus::kNotSure);
+    const model::MapUpdate update = mapper.add(keyframe);
+    REQUIRE(update.status == model::MapUpdateStatus::kNotSure);
     REQUIRE_FALSE(update.reason.empty());
     REQUIRE(same_map(mapper, landmarks, poses));
   }
@@ -110,41 +113,41 @@ TEST_CASE("A keyframe that contradicts the map is taken back exactly", "[mapper]
   SmoothingMapperParameters parameters;
   parameters.outlier_chi2 = 1e9;
   SmoothingMapper mapper(parameters);
-  std::vector<Keyframe> made = keyframes(simulated);
-  Keyframe bent = made.back();
+  std::vector<model::Keyframe> made = keyframes(simulated);
+  model::Keyframe bent = made.back();
   made.pop_back();
-  for (const Keyframe& keyframe : made) mapper.add(keyframe);
-  const std::vector<MapLandmark> landmarks = mapper.landmarks();
-  const std::vector<KeyframePose> poses = mapper.trajectory();
+  for (const model::Keyframe& keyframe : made) mapper.add(keyframe);
+  const std::vector<model::MapLandmark> landmarks = mapper.landmarks();
+  const std::vector<model::KeyframePose> poses = mapper.trajectory();
   // Everything is found, nothing fits.
   std::mt19937_64 random(1);
   std::normal_distribution<double> normal;
-  for (KeyframeLandmark& landmark : bent.landmarks) {
+  for (model::KeyframeLandmark& landmark : bent.landmarks) {
     landmark.position_m += 0.22 * Eigen::Vector2d(normal(random), normal(random));
   }
-  const MapUpdate update = mapper.add(bent);
-  REQUIRE(update.status == MapUpdateStatus::kRolledBack);
+  const model::MapUpdate update = mapper.add(bent);
+  REQUIRE(update.status == model::MapUpdateStatus::kRolledBack);
   REQUIRE(same_map(mapper, landmarks, poses));
   // And the drive goes on.
-  Keyframe good = keyframes(simulated).back();
+  model::Keyframe good = keyframes(simulated).back();
   good.utime += 1;
-  REQUIRE(mapper.add(good).status == MapUpdateStatus::kUpdated);
+  REQUIRE(mapper.add(good).status == model::MapUpdateStatus::kUpdated);
 }
 
 TEST_CASE("In a given map every keyframe finds its place, and the map is not bent", "[mapper]") {
   const sim::Drive simulated = drive(sim::PathKind::kCircle, 60.0, 14);
   SmoothingMapper mapper({});
   mapper.start_with(true_map(simulated));
-  const std::vector<MapLandmark> given = mapper.landmarks();
-  for (Keyframe keyframe : keyframes(simulated)) {
+  const std::vector<model::MapLandmark> given = mapper.landmarks();
+  for (model::Keyframe keyframe : keyframes(simulated)) {
     keyframe.previous_T_base.reset();  // No prior: each is searched in the whole map.
-    const MapUpdate update = mapper.add(keyframe);
-    REQUIRE(update.status == MapUpdateStatus::kUpdated);
+    const model::MapUpdate update = mapper.add(keyframe);
+    REQUIRE(update.status == model::MapUpdateStatus::kUpdated);
     REQUIRE_FALSE(update.used_prior);
-    const SE2 truth = simulated.world_T_vehicle()[8 * keyframe.sequence];
+    const geometry::SE2 truth = simulated.world_T_vehicle()[8 * keyframe.sequence];
     REQUIRE((update.map_T_vehicle.translation() - truth.translation()).norm() < 0.2);
   }
-  const std::vector<MapLandmark> now = mapper.landmarks();
+  const std::vector<model::MapLandmark> now = mapper.landmarks();
   for (std::size_t i = 0; i < given.size(); ++i) {
     REQUIRE((now[i].position_m - given[i].position_m).norm() < 0.05);
   }
@@ -155,21 +158,21 @@ TEST_CASE("Localisation only leaves the given map alone", "[mapper]") {
   SmoothingMapperParameters parameters;
   parameters.localisation_only = true;
   SmoothingMapper mapper(parameters);
-  const std::vector<Keyframe> made = keyframes(simulated);
-  REQUIRE(mapper.add(made.front()).status == MapUpdateStatus::kNotSure);
+  const std::vector<model::Keyframe> made = keyframes(simulated);
+  REQUIRE(mapper.add(made.front()).status == model::MapUpdateStatus::kNotSure);
   mapper.start_with(true_map(simulated));
-  const std::vector<MapLandmark> given = mapper.landmarks();
+  const std::vector<model::MapLandmark> given = mapper.landmarks();
   for (std::size_t i = 1; i < made.size(); ++i) {
-    const MapUpdate update = mapper.add(made[i]);
-    REQUIRE(update.status == MapUpdateStatus::kUpdated);
+    const model::MapUpdate update = mapper.add(made[i]);
+    REQUIRE(update.status == model::MapUpdateStatus::kUpdated);
     REQUIRE(update.used_prior == (i > 1));
-    const SE2 truth = simulated.world_T_vehicle()[8 * made[i].sequence];
+    const geometry::SE2 truth = simulated.world_T_vehicle()[8 * made[i].sequence];
     const Eigen::Vector3d error = (update.map_T_vehicle.inverse() * truth).Log();
     REQUIRE(error.head<2>().norm() < 0.2);
     REQUIRE(error.dot(update.covariance.ldlt().solve(error)) < 40.0);
   }
   REQUIRE(mapper.trajectory().size() == made.size() - 1);
-  const std::vector<MapLandmark> now = mapper.landmarks();
+  const std::vector<model::MapLandmark> now = mapper.landmarks();
   REQUIRE(now.size() == given.size());
   for (std::size_t i = 0; i < given.size(); ++i) REQUIRE(now[i].position_m == given[i].position_m);
 }
@@ -177,13 +180,13 @@ TEST_CASE("Localisation only leaves the given map alone", "[mapper]") {
 TEST_CASE("Who follows the changed landmarks has the map", "[mapper]") {
   const sim::Drive simulated = drive(sim::PathKind::kCircle, 100.0, 21);
   SmoothingMapper mapper({});
-  std::vector<MapLandmark> held;
-  for (const Keyframe& keyframe : keyframes(simulated)) {
-    const MapUpdate update = mapper.add(keyframe);
+  std::vector<model::MapLandmark> held;
+  for (const model::Keyframe& keyframe : keyframes(simulated)) {
+    const model::MapUpdate update = mapper.add(keyframe);
     const auto changed = mapper.take_changed_landmarks();
     REQUIRE(changed);
     held = with_delta(held, map_change(held, *changed, update, 0.0));
-    const std::vector<MapLandmark> map = mapper.landmarks();
+    const std::vector<model::MapLandmark> map = mapper.landmarks();
     REQUIRE(held.size() == map.size());
     for (std::size_t i = 0; i < map.size(); ++i) {
       REQUIRE(held[i].id == map[i].id);
@@ -198,7 +201,7 @@ TEST_CASE("Standing still does not grow the graph", "[mapper]") {
   SmoothingMapper mapper({});
   std::size_t after_ten = 0;
   std::size_t count = 0;
-  for (const Keyframe& keyframe : keyframes(simulated)) {
+  for (const model::Keyframe& keyframe : keyframes(simulated)) {
     mapper.add(keyframe);
     if (++count == 10) after_ten = mapper.save().size();
   }
@@ -210,16 +213,16 @@ TEST_CASE("Standing still does not grow the graph", "[mapper]") {
 
 TEST_CASE("Scans between keyframes are located, and the map is not changed by it", "[mapper]") {
   const sim::Drive simulated = drive(sim::PathKind::kSquare, 60.0, 16);
-  const SE2 map_T_world = simulated.world_T_vehicle().front().inverse();
-  JointKeyframer keyframer({});
+  const geometry::SE2 map_T_world = simulated.world_T_vehicle().front().inverse();
+  keyframer::JointKeyframer keyframer({});
   SmoothingMapper mapper({});
   std::size_t located = 0;
   for (std::size_t k = 0; k < simulated.size(); ++k) {
-    const LandmarkScan scan = simulated.scan(k).scan;
+    const model::LandmarkScan scan = simulated.scan(k).scan;
     const std::size_t before = mapper.landmarks().size();
     if (const auto pose = mapper.locate(scan)) {
       ++located;
-      const SE2 truth = map_T_world * simulated.world_T_vehicle()[k];
+      const geometry::SE2 truth = map_T_world * simulated.world_T_vehicle()[k];
       REQUIRE((pose->mean.translation() - truth.translation()).norm() < 0.5);
     }
     REQUIRE(mapper.landmarks().size() == before);
@@ -233,14 +236,15 @@ TEST_CASE("The covariance of a located scan is that of its pose in the map", "[m
   int count = 0;
   for (std::uint64_t seed = 40; seed < 52; ++seed) {
     const sim::Drive simulated = drive(sim::PathKind::kLine, 120.0, seed);
-    const SE2 map_T_world = simulated.world_T_vehicle().front().inverse();
-    JointKeyframer keyframer({});
+    const geometry::SE2 map_T_world = simulated.world_T_vehicle().front().inverse();
+    keyframer::JointKeyframer keyframer({});
     SmoothingMapper mapper({});
     for (std::size_t k = 0; k < simulated.size(); ++k) {
-      const LandmarkScan scan = simulated.scan(k).scan;
+      const model::LandmarkScan scan = simulated.scan(k).scan;
       const auto pose = mapper.locate(scan);
       if (pose && k % 20 == 0) {
-        const SE2 error = (map_T_world * simulated.world_T_vehicle()[k]).inverse() * pose->mean;
+        const geometry::SE2 error =
+            (map_T_world * simulated.world_T_vehicle()[k]).inverse() * pose->mean;
         nees += error.coordinates().dot(pose->covariance.inverse() * error.coordinates());
         ++count;
       }
@@ -260,10 +264,10 @@ TEST_CASE("A loaded mapper goes on where the saved one was", "[mapper]") {
   SmoothingMapper first({});
   SmoothingMapper second({});
   std::size_t count = 0;
-  for (const Keyframe& keyframe : keyframes(simulated)) {
-    const MapUpdate expected = whole.add(keyframe);
+  for (const model::Keyframe& keyframe : keyframes(simulated)) {
+    const model::MapUpdate expected = whole.add(keyframe);
     if (count == 9) second.load(first.save());
-    const MapUpdate actual = count < 9 ? first.add(keyframe) : second.add(keyframe);
+    const model::MapUpdate actual = count < 9 ? first.add(keyframe) : second.add(keyframe);
     ++count;
     REQUIRE(actual.status == expected.status);
     REQUIRE((actual.map_T_vehicle.inverse() * expected.map_T_vehicle).Log().norm() < 1e-3);
@@ -275,23 +279,23 @@ TEST_CASE("A loaded mapper goes on where the saved one was", "[mapper]") {
 
 TEST_CASE("Malformed keyframes are refused with a reason", "[mapper]") {
   const sim::Drive simulated = drive(sim::PathKind::kLine, 6.0, 18);
-  std::vector<Keyframe> made = keyframes(simulated);
+  std::vector<model::Keyframe> made = keyframes(simulated);
   SmoothingMapper mapper({});
-  Keyframe empty;
-  REQUIRE(mapper.add(empty).status == MapUpdateStatus::kRejected);
-  Keyframe broken = made.front();
+  model::Keyframe empty;
+  REQUIRE(mapper.add(empty).status == model::MapUpdateStatus::kRejected);
+  model::Keyframe broken = made.front();
   broken.landmarks.front().position_m.x() = std::nan("");
-  REQUIRE(mapper.add(broken).status == MapUpdateStatus::kRejected);
-  REQUIRE(mapper.add(made[0]).status == MapUpdateStatus::kFirstMap);
-  REQUIRE(mapper.add(made[0]).status == MapUpdateStatus::kRejected);
+  REQUIRE(mapper.add(broken).status == model::MapUpdateStatus::kRejected);
+  REQUIRE(mapper.add(made[0]).status == model::MapUpdateStatus::kFirstMap);
+  REQUIRE(mapper.add(made[0]).status == model::MapUpdateStatus::kRejected);
   REQUIRE(mapper.landmarks().size() > 20);
 }
 
 TEST_CASE("A trunk that bad scans moved and doubled is one landmark in the end", "[mapper]") {
   const sim::Drive simulated = drive(sim::PathKind::kLine, 40.0, 13, 0.05);
-  std::vector<Keyframe> made = keyframes(simulated);
+  std::vector<model::Keyframe> made = keyframes(simulated);
   REQUIRE(made.size() > 20);
-  const SE2 centre_T_world =
+  const geometry::SE2 centre_T_world =
       made[0].centre_T_base() * simulated.world_T_vehicle().front().inverse();
   // A trunk beside the way, far from any other.
   std::optional<Eigen::Vector2d> trunk;
@@ -305,12 +309,12 @@ TEST_CASE("A trunk that bad scans moved and doubled is one landmark in the end",
   std::size_t doubled = 0;
   for (std::size_t k = 0; k < made.size(); ++k) {
     const double driven = 1.6 * static_cast<double>(k);
-    Keyframe& keyframe = made[k];
+    model::Keyframe& keyframe = made[k];
     for (std::size_t i = 0; k >= 8 && k < 18 && i < keyframe.landmarks.size(); ++i) {
       const Eigen::Vector2d from_start =
           keyframe.landmarks[i].position_m + Eigen::Vector2d(driven, 0.0);
       if ((from_start - *trunk).norm() > 1.0) continue;
-      KeyframeLandmark moved = keyframe.landmarks[i];
+      model::KeyframeLandmark moved = keyframe.landmarks[i];
       moved.position_m.y() += 0.8;
       if (k == 14) {
         keyframe.landmarks.push_back(moved);
@@ -324,9 +328,9 @@ TEST_CASE("A trunk that bad scans moved and doubled is one landmark in the end",
   }
   REQUIRE(doubled == 1);
   std::size_t near = 0;
-  const SE2 map_T_centre =
+  const geometry::SE2 map_T_centre =
       mapper.trajectory().front().map_T_vehicle * made[0].centre_T_base().inverse();
-  for (const MapLandmark& landmark : mapper.landmarks()) {
+  for (const model::MapLandmark& landmark : mapper.landmarks()) {
     if ((landmark.position_m - map_T_centre * *trunk).norm() < 1.5) ++near;
   }
   CHECK(near == 1);

@@ -11,11 +11,12 @@
 #include "common/geometry/se2.hpp"
 #include "common/hierarchy/geometric_hierarchy.hpp"
 
-namespace understory {
+namespace understory::test {
 
 /// Trunks thrown at random, none closer than 3 m to another, at the density of GeoSLAM's
 /// intermediate forest (13,770 in 40 m discs of 61), ids 1, 2, ...
-inline std::vector<LandmarkPosition> random_forest(std::size_t count, std::mt19937_64& random) {
+inline std::vector<hierarchy::LandmarkPosition> random_forest(std::size_t count,
+                                                              std::mt19937_64& random) {
   constexpr double kMinDistance = 3.0;
   const double half_side = 0.5 * std::sqrt(static_cast<double>(count) / 0.0122);
   std::uniform_real_distribution<double> coordinate(-half_side, half_side);
@@ -23,7 +24,7 @@ inline std::vector<LandmarkPosition> random_forest(std::size_t count, std::mt199
   const auto cell = [](double x) {
     return static_cast<std::int64_t>(std::floor(x / kMinDistance));
   };
-  std::vector<LandmarkPosition> forest;
+  std::vector<hierarchy::LandmarkPosition> forest;
   while (forest.size() < count) {
     const Eigen::Vector2d p(coordinate(random), coordinate(random));
     bool free = true;
@@ -52,15 +53,15 @@ struct View {
 
 /// What is seen from a pose. A true landmark keeps its id, so that pairs can be judged; false ones
 /// have ids from 2^32 on.
-inline std::vector<LandmarkPosition> observe(const std::vector<LandmarkPosition>& forest,
-                                             const SE2& map_T_vehicle, const View& view,
-                                             std::mt19937_64& random) {
+inline std::vector<hierarchy::LandmarkPosition> observe(
+    const std::vector<hierarchy::LandmarkPosition>& forest, const geometry::SE2& map_T_vehicle,
+    const View& view, std::mt19937_64& random) {
   std::normal_distribution<double> noise(0.0, view.noise_m > 0.0 ? view.noise_m : 1.0);
   std::uniform_real_distribution<double> chance(0.0, 1.0);
-  const SE2 vehicle_T_map = map_T_vehicle.inverse();
-  std::vector<LandmarkPosition> seen;
+  const geometry::SE2 vehicle_T_map = map_T_vehicle.inverse();
+  std::vector<hierarchy::LandmarkPosition> seen;
   std::uint64_t false_id = 1ULL << 32U;
-  for (const LandmarkPosition& trunk : forest) {
+  for (const hierarchy::LandmarkPosition& trunk : forest) {
     if ((trunk.position_m - map_T_vehicle.translation()).norm() > view.range_m) {
       continue;
     }
@@ -78,4 +79,4 @@ inline std::vector<LandmarkPosition> observe(const std::vector<LandmarkPosition>
   return seen;
 }
 
-}  // namespace understory
+}  // namespace understory::test

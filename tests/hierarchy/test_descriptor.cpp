@@ -9,6 +9,7 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::hierarchy;
 
 namespace {
 
@@ -70,7 +71,7 @@ TEST_CASE("A descriptor does not depend on pose, start, direction or handedness"
     const Descriptor reference = describe(walk, 20);
 
     Walk moved = walk;
-    const SE2 motion(1000.0 * any(random), 1000.0 * any(random), any(random));
+    const geometry::SE2 motion(1000.0 * any(random), 1000.0 * any(random), any(random));
     std::transform(walk.begin(), walk.end(), moved.begin(),
                    [&](const Eigen::Vector2d& p) { return motion * p; });
     REQUIRE(distance(reference, describe(moved, 20)) < 2e-3F);

@@ -5,6 +5,7 @@
 #include "tests/hierarchy/hierarchy_scene.hpp"
 
 using namespace understory;
+using namespace understory::hierarchy;
 
 namespace {
 
@@ -21,7 +22,7 @@ Tally judge(const std::vector<LandmarkMatch>& pairs) {
   return tally;
 }
 
-SE2 random_pose(std::mt19937_64& random) {
+geometry::SE2 random_pose(std::mt19937_64& random) {
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   return {100.0 * unit(random), 100.0 * unit(random), 3.1 * unit(random)};
 }
@@ -30,9 +31,9 @@ SE2 random_pose(std::mt19937_64& random) {
 
 TEST_CASE("A view without noise matches all of its inner polygons rightly", "[hierarchy]") {
   std::mt19937_64 random(31);
-  const auto forest = random_forest(1200, random);
+  const auto forest = test::random_forest(1200, random);
   const GeometricHierarchy map(forest);
-  const View view{.noise_m = 0.0, .detection = 1.0};
+  const test::View view{.noise_m = 0.0, .detection = 1.0};
   for (int trial = 0; trial < 20; ++trial) {
     const GeometricHierarchy query(observe(forest, random_pose(random), view, random));
     // A polygon of the query exists in the map as well or has been changed by the end of the view.
@@ -60,9 +61,9 @@ TEST_CASE("A view without noise matches all of its inner polygons rightly", "[hi
 
 TEST_CASE("Missed, false and noisy landmarks leave enough right pairs", "[hierarchy]") {
   std::mt19937_64 random(32);
-  const auto forest = random_forest(1200, random);
+  const auto forest = test::random_forest(1200, random);
   const GeometricHierarchy map(forest);
-  const View view{.noise_m = 0.05, .detection = 0.9, .clutter = 0.03};
+  const test::View view{.noise_m = 0.05, .detection = 0.9, .clutter = 0.03};
   int places_found = 0;
   Tally sum;
   for (int trial = 0; trial < 50; ++trial) {
@@ -78,9 +79,9 @@ TEST_CASE("Missed, false and noisy landmarks leave enough right pairs", "[hierar
 
 TEST_CASE("No landmark is in two pairs, and the best come first", "[hierarchy]") {
   std::mt19937_64 random(33);
-  const auto forest = random_forest(1200, random);
+  const auto forest = test::random_forest(1200, random);
   const GeometricHierarchy map(forest);
-  const View view{.noise_m = 0.2, .detection = 0.8, .clutter = 0.2};
+  const test::View view{.noise_m = 0.2, .detection = 0.8, .clutter = 0.2};
   std::size_t pairs_seen = 0;
   for (int trial = 0; trial < 30; ++trial) {
     const GeometricHierarchy query(observe(forest, random_pose(random), view, random));
@@ -100,11 +101,11 @@ TEST_CASE("No landmark is in two pairs, and the best come first", "[hierarchy]")
 
 TEST_CASE("Polygon matches are those of a search through all pairs", "[hierarchy]") {
   std::mt19937_64 random(34);
-  const auto forest = random_forest(1500, random);
+  const auto forest = test::random_forest(1500, random);
   const GeometricHierarchy map(forest);
   const MatchParameters parameters{.max_descriptor_distance = 6.0};
   for (int trial = 0; trial < 10; ++trial) {
-    const GeometricHierarchy query(observe(forest, random_pose(random), View{}, random));
+    const GeometricHierarchy query(observe(forest, random_pose(random), test::View{}, random));
     const auto nearest = [&](const Polygon& polygon, const GeometricHierarchy& among) {
       std::pair<float, std::uint32_t> best{6.0F, kNone};
       for (std::uint32_t p = 0; p < among.polygons().size(); ++p) {
@@ -135,13 +136,13 @@ TEST_CASE("Polygon matches are those of a search through all pairs", "[hierarchy
 
 TEST_CASE("A mirrored scene gives no pairs of its own", "[hierarchy]") {
   std::mt19937_64 random(35);
-  const auto forest = random_forest(400, random);
+  const auto forest = test::random_forest(400, random);
   const GeometricHierarchy map(forest);
-  const View view{.noise_m = 0.0, .detection = 1.0};
+  const test::View view{.noise_m = 0.0, .detection = 1.0};
   std::size_t polygon_matches = 0;
   Tally sum;
   for (int trial = 0; trial < 10; ++trial) {
-    auto seen = observe(forest, SE2(0.0, 0.0, 0.1 * trial), view, random);
+    auto seen = observe(forest, geometry::SE2(0.0, 0.0, 0.1 * trial), view, random);
     for (LandmarkPosition& landmark : seen) {
       landmark.position_m.x() = -landmark.position_m.x();
     }
@@ -158,7 +159,7 @@ TEST_CASE("A mirrored scene gives no pairs of its own", "[hierarchy]") {
 
 TEST_CASE("Too few landmarks match nothing", "[hierarchy]") {
   std::mt19937_64 random(36);
-  const auto forest = random_forest(200, random);
+  const auto forest = test::random_forest(200, random);
   const GeometricHierarchy map(forest);
   REQUIRE(match(GeometricHierarchy(), map).empty());
   REQUIRE(match(map, GeometricHierarchy()).empty());

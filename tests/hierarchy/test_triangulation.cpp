@@ -7,6 +7,7 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::hierarchy;
 
 namespace {
 

@@ -49,11 +49,11 @@ inline void write_bytes(const std::filesystem::path& path, const Bytes& bytes) {
 }
 
 /// `count` events of random sizes and contents on three channels.
-inline std::vector<LogEvent> random_events(std::size_t count, std::mt19937_64& random) {
+inline std::vector<io::LogEvent> random_events(std::size_t count, std::mt19937_64& random) {
   std::uniform_int_distribution<std::size_t> size(0, 400);
   std::uniform_int_distribution<int> byte(0, 255);
   const char* const channels[] = {"LANDMARKS", "KEYFRAME", "X"};
-  std::vector<LogEvent> events(count);
+  std::vector<io::LogEvent> events(count);
   for (std::size_t i = 0; i < count; ++i) {
     events[i].number = static_cast<std::int64_t>(i);
     events[i].utime = 1'700'000'000'000'000 + static_cast<std::int64_t>(i) * 100'000;
@@ -64,24 +64,24 @@ inline std::vector<LogEvent> random_events(std::size_t count, std::mt19937_64& r
   return events;
 }
 
-inline void write_log(const std::filesystem::path& path, const std::vector<LogEvent>& events) {
-  LcmLogWriter writer(path);
+inline void write_log(const std::filesystem::path& path, const std::vector<io::LogEvent>& events) {
+  io::LcmLogWriter writer(path);
   for (const auto& event : events) writer.write(event);
   writer.commit();
 }
 
-inline std::vector<LogEvent> read_log(LcmLogReader& reader) {
-  std::vector<LogEvent> events;
+inline std::vector<io::LogEvent> read_log(io::LcmLogReader& reader) {
+  std::vector<io::LogEvent> events;
   while (auto event = reader.next()) events.push_back(std::move(*event));
   return events;
 }
 
-inline bool same(const LogEvent& a, const LogEvent& b) {
+inline bool same(const io::LogEvent& a, const io::LogEvent& b) {
   return a.number == b.number && a.utime == b.utime && a.channel == b.channel && a.data == b.data;
 }
 
 /// Where each event starts, and the end of the last one.
-inline std::vector<std::size_t> offsets(const std::vector<LogEvent>& events) {
+inline std::vector<std::size_t> offsets(const std::vector<io::LogEvent>& events) {
   std::vector<std::size_t> starts{0};
   for (const auto& e : events)
     starts.push_back(starts.back() + 28 + e.channel.size() + e.data.size());

@@ -7,70 +7,71 @@
 #include "tests/io/log_fixture.hpp"
 
 using namespace understory;
+using namespace understory::io;
 using namespace understory::test;
 
 TEST_CASE("a log reads as it was written", "[log]") {
-  TemporaryDirectory directory;
+  test::TemporaryDirectory directory;
   std::mt19937_64 random(1);
-  auto events = random_events(300, random);
+  auto events = test::random_events(300, random);
   events[7].data.assign(3'000'000, 0xED);  // Larger than the reader's buffer.
   events[8].number = INT64_MAX;
   events[9].utime = -5;
-  write_log(directory / "a.lcm", events);
+  test::write_log(directory / "a.lcm", events);
 
   LcmLogReader reader(directory / "a.lcm");
-  const auto read = read_log(reader);
+  const auto read = test::read_log(reader);
   REQUIRE(read.size() == events.size());
-  for (std::size_t i = 0; i < events.size(); ++i) CHECK(same(read[i], events[i]));
+  for (std::size_t i = 0; i < events.size(); ++i) CHECK(test::same(read[i], events[i]));
   CHECK(reader.damage().places == 0);
   CHECK(reader.damage().bytes == 0);
   CHECK(reader.position_bytes() == reader.size_bytes());
 }
 
 TEST_CASE("the bytes are those of the format", "[log]") {
-  TemporaryDirectory directory;
-  write_log(directory / "a.lcm", {{1, 0x0102030405060708, "AB", {0x7F}}});
-  const Bytes expected{0xED, 0xA1, 0xDA, 0x01, 0, 0, 0, 0, 0, 0, 0, 1, 1,   2,   3,   4,
-                       5,    6,    7,    8,    0, 0, 0, 2, 0, 0, 0, 1, 'A', 'B', 0x7F};
+  test::TemporaryDirectory directory;
+  test::write_log(directory / "a.lcm", {{1, 0x0102030405060708, "AB", {0x7F}}});
+  const test::Bytes expected{0xED, 0xA1, 0xDA, 0x01, 0, 0, 0, 0, 0, 0, 0, 1, 1,   2,   3,   4,
+                             5,    6,    7,    8,    0, 0, 0, 2, 0, 0, 0, 1, 'A', 'B', 0x7F};
   CHECK(read_bytes(directory / "a.lcm") == expected);
 }
 
 TEST_CASE("events number themselves when asked to", "[log]") {
-  TemporaryDirectory directory;
-  const Bytes data{1, 2, 3};
+  test::TemporaryDirectory directory;
+  const test::Bytes data{1, 2, 3};
   {
     LcmLogWriter writer(directory / "a.lcm");
     for (int i = 0; i < 3; ++i) writer.write(i * 10, "C", data);
     writer.commit();
   }
   LcmLogReader reader(directory / "a.lcm");
-  for (int i = 0; i < 3; ++i) CHECK(same(reader.next().value(), {i, i * 10, "C", data}));
+  for (int i = 0; i < 3; ++i) CHECK(test::same(reader.next().value(), {i, i * 10, "C", data}));
   CHECK_FALSE(reader.next());
 }
 
 TEST_CASE("an empty log has no events and no damage", "[log]") {
-  TemporaryDirectory directory;
-  write_log(directory / "a.lcm", {});
+  test::TemporaryDirectory directory;
+  test::write_log(directory / "a.lcm", {});
   LcmLogReader reader(directory / "a.lcm");
   CHECK_FALSE(reader.next());
   CHECK(reader.damage().places == 0);
 }
 
 TEST_CASE("a log appears whole or not at all", "[log]") {
-  TemporaryDirectory directory;
+  test::TemporaryDirectory directory;
   const auto path = directory / "a.lcm";
   {
     LcmLogWriter writer(path);
-    writer.write(0, "C", Bytes{1});
+    writer.write(0, "C", test::Bytes{1});
     CHECK_FALSE(std::filesystem::exists(path));
   }
   CHECK(std::filesystem::is_empty(directory.path()));
 
-  write_log(path, {{0, 0, "OLD", {}}});
+  test::write_log(path, {{0, 0, "OLD", {}}});
   const auto before = read_bytes(path);
   { LcmLogWriter writer(path); }
   CHECK(read_bytes(path) == before);
-  write_log(path, {{0, 0, "NEW", {}}});
+  test::write_log(path, {{0, 0, "NEW", {}}});
   CHECK(read_bytes(path) != before);
   struct stat status {};
   REQUIRE(::stat(path.c_str(), &status) == 0);
@@ -79,21 +80,21 @@ TEST_CASE("a log appears whole or not at all", "[log]") {
 
 TEST_CASE("errors name the file", "[log]") {
   using Catch::Matchers::Contains;
-  TemporaryDirectory directory;
+  test::TemporaryDirectory directory;
   CHECK_THROWS_WITH(LcmLogReader(directory / "none.lcm"), Contains("none.lcm"));
   CHECK_THROWS_WITH(LcmLogReader(directory.path()), Contains("not a regular file"));
   CHECK_THROWS_WITH(LcmLogWriter(directory / "none" / "a.lcm"), Contains("none/a.lcm"));
 
   LcmLogWriter writer(directory / "a.lcm");
-  CHECK_THROWS_WITH(writer.write(0, "", Bytes{}), Contains("a.lcm") && Contains("channel"));
-  CHECK_THROWS_WITH(writer.write(0, std::string(64, 'C'), Bytes{}), Contains("channel"));
-  CHECK_NOTHROW(writer.write(0, std::string(63, 'C'), Bytes{}));
+  CHECK_THROWS_WITH(writer.write(0, "", test::Bytes{}), Contains("a.lcm") && Contains("channel"));
+  CHECK_THROWS_WITH(writer.write(0, std::string(64, 'C'), test::Bytes{}), Contains("channel"));
+  CHECK_NOTHROW(writer.write(0, std::string(63, 'C'), test::Bytes{}));
 }
 
 TEST_CASE("a full disk is reported and the device stays what it is", "[log]") {
   LcmLogWriter writer("/dev/full");
   const auto fill = [&] {
-    for (int i = 0; i < 100; ++i) writer.write(0, "C", Bytes(10'000, 1));
+    for (int i = 0; i < 100; ++i) writer.write(0, "C", test::Bytes(10'000, 1));
     writer.commit();
   };
   CHECK_THROWS_WITH(fill(), Catch::Matchers::Contains("/dev/full: cannot write: No space"));
@@ -113,11 +114,11 @@ TEST_CASE("recorded logs of other people's robots are read whole", "[log]") {
                                                       {"gokart_vlp16_pos.lcm", 11}};
   for (const auto& [name, count] : logs) {
     LcmLogReader reader(folder / name);
-    const auto events = read_log(reader);
+    const auto events = test::read_log(reader);
     CHECK(events.size() == count);
     CHECK(reader.damage().places == 0);
-    TemporaryDirectory directory;
-    write_log(directory / name, events);
+    test::TemporaryDirectory directory;
+    test::write_log(directory / name, events);
     CHECK(read_bytes(directory / name) == read_bytes(folder / name));
   }
 }

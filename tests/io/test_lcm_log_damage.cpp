@@ -4,6 +4,7 @@
 #include "tests/io/log_fixture.hpp"
 
 using namespace understory;
+using namespace understory::io;
 using namespace understory::test;
 
 namespace {
@@ -13,10 +14,10 @@ struct Damaged {
   LogDamage damage;
 };
 
-Damaged read_damaged(const TemporaryDirectory& directory, const Bytes& bytes) {
+Damaged read_damaged(const test::TemporaryDirectory& directory, const test::Bytes& bytes) {
   write_bytes(directory / "damaged.lcm", bytes);
   LcmLogReader reader(directory / "damaged.lcm");
-  Damaged result{read_log(reader), {}};
+  Damaged result{test::read_log(reader), {}};
   result.damage = reader.damage();
   return result;
 }
@@ -26,18 +27,18 @@ std::size_t strangers(const std::vector<LogEvent>& read, const std::vector<LogEv
   return static_cast<std::size_t>(
       std::count_if(read.begin(), read.end(), [&](const LogEvent& event) {
         return std::none_of(written.begin(), written.end(),
-                            [&](const LogEvent& other) { return same(event, other); });
+                            [&](const LogEvent& other) { return test::same(event, other); });
       }));
 }
 
 struct Fixture {
-  TemporaryDirectory directory;
+  test::TemporaryDirectory directory;
   std::mt19937_64 random{7};
-  std::vector<LogEvent> events = random_events(40, random);
-  std::vector<std::size_t> starts = offsets(events);
-  Bytes bytes;
+  std::vector<LogEvent> events = test::random_events(40, random);
+  std::vector<std::size_t> starts = test::offsets(events);
+  test::Bytes bytes;
   Fixture() {
-    write_log(directory / "whole.lcm", events);
+    test::write_log(directory / "whole.lcm", events);
     bytes = read_bytes(directory / "whole.lcm");
   }
 };
@@ -49,7 +50,7 @@ TEST_CASE_METHOD(Fixture, "a damaged header costs its own event at most", "[log]
   for (std::size_t victim = 0; victim < events.size(); ++victim) {
     for (const std::size_t byte : {0U, 1U, 2U, 3U, 20U, 21U, 22U, 23U, 24U, 25U, 26U, 27U}) {
       for (const std::uint8_t flip : {0x01, 0x02, 0x80, 0xFF}) {
-        Bytes damaged = bytes;
+        test::Bytes damaged = bytes;
         damaged[starts[victim] + byte] ^= flip;
         const auto result = read_damaged(directory, damaged);
         CAPTURE(victim, byte, int{flip});
@@ -82,7 +83,7 @@ TEST_CASE_METHOD(Fixture, "a stretch taken out costs the events that it touches"
   for (int run = 0; run < 200; ++run) {
     const std::size_t from = place(random);
     const std::size_t to = from + length(random);
-    Bytes damaged(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(from));
+    test::Bytes damaged(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(from));
     damaged.insert(damaged.end(), bytes.begin() + static_cast<std::ptrdiff_t>(to), bytes.end());
     std::size_t untouched = 0;
     for (std::size_t i = 0; i < events.size(); ++i) {
@@ -100,10 +101,10 @@ TEST_CASE_METHOD(Fixture, "a stretch taken out costs the events that it touches"
 TEST_CASE_METHOD(Fixture, "garbage between events is skipped and counted exactly", "[log]") {
   std::uniform_int_distribution<int> byte(0, 255);
   for (std::size_t victim = 0; victim <= events.size(); ++victim) {
-    Bytes garbage(777);
+    test::Bytes garbage(777);
     for (auto& value : garbage) value = static_cast<std::uint8_t>(byte(random));
     garbage[0] = 0;  // No magic by chance.
-    Bytes damaged = bytes;
+    test::Bytes damaged = bytes;
     damaged.insert(damaged.begin() + static_cast<std::ptrdiff_t>(starts[victim]), garbage.begin(),
                    garbage.end());
     const auto result = read_damaged(directory, damaged);
@@ -118,20 +119,20 @@ TEST_CASE_METHOD(Fixture, "garbage between events is skipped and counted exactly
 
 TEST_CASE_METHOD(Fixture, "a log inside a message is not mistaken for the log", "[log]") {
   events[5].data = bytes;
-  write_log(directory / "nested.lcm", events);
+  test::write_log(directory / "nested.lcm", events);
   LcmLogReader reader(directory / "nested.lcm");
-  const auto read = read_log(reader);
+  const auto read = test::read_log(reader);
   REQUIRE(read.size() == events.size());
-  CHECK(same(read[5], events[5]));
+  CHECK(test::same(read[5], events[5]));
   CHECK(reader.damage().places == 0);
 }
 
 TEST_CASE_METHOD(Fixture, "hostile lengths allocate nothing and end", "[log]") {
   // Headers that claim 2 GiB, each of a magic that a search must look at.
-  Bytes hostile;
+  test::Bytes hostile;
   for (int i = 0; i < 20'000; ++i) {
-    const Bytes header{0xED, 0xA1, 0xDA, 0x01, 0, 0, 0, 0, 0, 0,    0,    0,    0,    0,  0,
-                       0,    0,    0,    0,    0, 0, 0, 0, 1, 0x7F, 0xFF, 0xFF, 0xFF, 'C'};
+    const test::Bytes header{0xED, 0xA1, 0xDA, 0x01, 0, 0, 0, 0, 0, 0,    0,    0,    0,    0,  0,
+                             0,    0,    0,    0,    0, 0, 0, 0, 1, 0x7F, 0xFF, 0xFF, 0xFF, 'C'};
     hostile.insert(hostile.end(), header.begin(), header.end());
   }
   auto result = read_damaged(directory, hostile);
@@ -152,7 +153,7 @@ TEST_CASE_METHOD(Fixture, "random damage never invents sizes or fails", "[log]")
   std::uniform_int_distribution<std::size_t> place(0, bytes.size() - 1);
   std::uniform_int_distribution<int> byte(0, 255);
   for (int run = 0; run < 2000; ++run) {
-    Bytes damaged = bytes;
+    test::Bytes damaged = bytes;
     const int hits = 1 + run % 50;
     for (int i = 0; i < hits; ++i) damaged[place(random)] = static_cast<std::uint8_t>(byte(random));
     const auto result = read_damaged(directory, damaged);

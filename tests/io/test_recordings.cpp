@@ -17,6 +17,7 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::io;
 namespace fs = std::filesystem;
 
 namespace {
@@ -134,7 +135,7 @@ TEST_CASE("PCD files of every kind hold the same points", "[pcd]") {
   const auto points = test_points();
   for (const std::string kind : {"ascii", "binary", "binary_compressed"}) {
     CAPTURE(kind);
-    const PointSweep sweep = parse_pcd(pcd(kind), "cloud.pcd");
+    const model::PointSweep sweep = parse_pcd(pcd(kind), "cloud.pcd");
     REQUIRE(sweep.points.size() == points.size());
     CHECK(sweep.has_times);
     CHECK(sweep.rings == 16);
@@ -198,10 +199,10 @@ TEST_CASE("a KITTI drive is read with rings and times", "[kitti][recorded]") {
   CHECK(plane.east_north_m(last.latitude_deg, last.longitude_deg).norm() ==
         Approx(8.19).margin(0.05));
   for (std::size_t i = 0; i < drive.sweeps(); ++i) {
-    const PointSweep sweep = drive.read_sweep(i);
+    const model::PointSweep sweep = drive.read_sweep(i);
     CHECK(sweep.points.size() > 115'000);
     std::map<int, std::pair<double, int>> elevation;
-    for (const SweepPoint& p : sweep.points) {
+    for (const model::SweepPoint& p : sweep.points) {
       auto& [sum, count] = elevation[p.ring];
       sum += std::atan2(p.z_m, std::hypot(p.x_m, p.y_m));
       ++count;
@@ -230,9 +231,9 @@ TEST_CASE("the reduced KITTI drive is read with its poses", "[kitti][recorded]")
   CHECK(drive.poses().size() == 154);
   std::size_t points = 0;
   for (std::size_t i = 0; i < drive.sweeps(); ++i) {
-    const PointSweep sweep = drive.read_sweep(i);
+    const model::PointSweep sweep = drive.read_sweep(i);
     points += sweep.points.size();
-    for (const SweepPoint& p : sweep.points) REQUIRE(p.ring < 16);
+    for (const model::SweepPoint& p : sweep.points) REQUIRE(p.ring < 16);
   }
   CHECK(points == 4'677'499);
   CHECK_THROWS_AS(ReducedKitti(folder, "gps"), DataError);
@@ -240,7 +241,7 @@ TEST_CASE("the reduced KITTI drive is read with its poses", "[kitti][recorded]")
 
 TEST_CASE("KITTI's texts are checked", "[kitti]") {
   CHECK(kitti::parse_timestamps("2011-09-26 13:02:44.335092332\n", "t") ==
-        std::vector<Utime>{1'317'042'164'335'092});
+        std::vector<model::Utime>{1'317'042'164'335'092});
   for (const char* bad : {"2011-13-26 13:02:44.335092332", "x", "2011-09-26 13:02:44",
                           "2011-09-26 25:02:44.335092332"})
     CHECK_THROWS_AS(kitti::parse_timestamps(bad, "t"), DataError);

@@ -12,6 +12,7 @@
 #include "tests/io/velodyne_packets.hpp"
 
 using namespace understory;
+using namespace understory::io;
 using namespace understory::test;
 namespace fs = std::filesystem;
 
@@ -24,10 +25,11 @@ fs::path data() {
   return set != nullptr ? set : UNDERSTORY_DEFAULT_DATA;
 }
 
-std::vector<PointSweep> turns_of(VelodyneDecoder& decoder, PacketMaker maker, int packets) {
-  std::vector<PointSweep> turns;
+std::vector<model::PointSweep> turns_of(VelodyneDecoder& decoder, test::PacketMaker maker,
+                                        int packets) {
+  std::vector<model::PointSweep> turns;
   for (int i = 0; i < packets; ++i) {
-    const auto received = static_cast<Utime>(7'200'000'000.0 + maker.time_us);
+    const auto received = static_cast<model::Utime>(7'200'000'000.0 + maker.time_us);
     if (auto turn = decoder.add(maker.next(), received)) turns.push_back(*std::move(turn));
   }
   return turns;
@@ -39,13 +41,13 @@ TEST_CASE("a turn of the VLP-16 is where its beams look", "[velodyne]") {
   VelodyneDecoder decoder(velodyne_calibration(VelodyneModel::kVlp16));
   const auto turns = turns_of(decoder, {.azimuth = 35000}, 230);
   REQUIRE(turns.size() == 3);
-  const PointSweep& turn = turns.front();
+  const model::PointSweep& turn = turns.front();
   CHECK(turn.rings == 16);
   CHECK(turn.points.size() == 900 * 32);
   CHECK(turn.utime >= 7'200'000'000);
   CHECK(turn.utime < 7'200'100'000);
   float last = 0.0F;
-  for (const SweepPoint& p : turn.points) {
+  for (const model::SweepPoint& p : turn.points) {
     const double elevation = (2.0 * p.ring - 15.0) * kDegree;
     const double flat = std::hypot(p.x_m, p.y_m);
     CHECK(std::abs(flat - 10.0 * std::cos(elevation)) < 0.02);
@@ -83,7 +85,7 @@ TEST_CASE("dual returns give both points, and one where they are the same", "[ve
   REQUIRE(turns.size() >= 2);
   CHECK(turns[0].points.size() == 2 * 900 * 32);
   int far = 0;
-  for (const SweepPoint& p : turns[0].points) far += p.position().norm() > 10.5F;
+  for (const model::SweepPoint& p : turns[0].points) far += p.position().norm() > 10.5F;
   CHECK(far == 900 * 32);
 }
 
@@ -100,7 +102,7 @@ TEST_CASE("the 32 beam models decode", "[velodyne]") {
 }
 
 TEST_CASE("the HDL-64E decodes with its own calibration", "[velodyne]") {
-  const VelodyneCalibration calibration = parse_hdl64_calibration(hdl64_yaml(), "db.yaml");
+  const VelodyneCalibration calibration = parse_hdl64_calibration(test::hdl64_yaml(), "db.yaml");
   CHECK(calibration.rings[0] == 63);
   CHECK(calibration.rings[63] == 0);
   VelodyneDecoder decoder(calibration);
@@ -109,10 +111,11 @@ TEST_CASE("the HDL-64E decodes with its own calibration", "[velodyne]") {
       {.hdl64 = true, .product = 0, .azimuth = 35000, .azimuth_step = 20, .packet_us = 288.0}, 500);
   REQUIRE(!turns.empty());
   CHECK(turns[0].points.size() == 1800 * 64);
-  for (const SweepPoint& p : turns[0].points)
+  for (const model::SweepPoint& p : turns[0].points)
     CHECK(p.position().norm() == Approx(11.2).epsilon(0.002));
   CHECK_THROWS_AS(parse_hdl64_calibration("lasers:\n", "db.yaml"), DataError);
-  CHECK_THROWS_AS(parse_hdl64_calibration(hdl64_yaml().substr(0, 3000), "db.yaml"), DataError);
+  CHECK_THROWS_AS(parse_hdl64_calibration(test::hdl64_yaml().substr(0, 3000), "db.yaml"),
+                  DataError);
   std::string xml = "<boost_serialization>";
   for (int i = 0; i < 64; ++i)
     xml += "<item><px><id_>" + std::to_string(i) + "</id_><rotCorrection_>1.5</rotCorrection_>" +
@@ -125,23 +128,23 @@ TEST_CASE("the HDL-64E decodes with its own calibration", "[velodyne]") {
 
 TEST_CASE("packets that are none are refused", "[velodyne]") {
   VelodyneDecoder decoder(velodyne_calibration(VelodyneModel::kVlp16));
-  PacketMaker maker;
-  const Packet good = maker.next();
+  test::PacketMaker maker;
+  const test::Packet good = maker.next();
   std::mt19937_64 random(1);
   for (std::size_t size = 0; size < good.size(); size += 7)
     CHECK_FALSE(decoder.add({good.data(), size}, 0));
   const auto refused = decoder.counts().refused;
   CHECK(refused == decoder.counts().packets);
-  Packet other = good;
+  test::Packet other = good;
   other[1205] = 0x21;
   decoder.add(other, 0);
   CHECK(decoder.counts().refused == refused + 1);
   for (int i = 0; i < 20000; ++i) {
-    Packet noisy = good;
+    test::Packet noisy = good;
     for (int k = 0; k < 20; ++k)
       noisy[random() % noisy.size()] = static_cast<std::uint8_t>(random());
-    if (const auto turn = decoder.add(noisy, static_cast<Utime>(random() >> 12U))) {
-      for (const SweepPoint& p : turn->points) {
+    if (const auto turn = decoder.add(noisy, static_cast<model::Utime>(random() >> 12U))) {
+      for (const model::SweepPoint& p : turn->points) {
         REQUIRE(p.position().allFinite());
         REQUIRE(p.time_s >= 0.0F);
       }
@@ -180,7 +183,7 @@ TEST_CASE("a recorded capture of a VLP-16", "[velodyne][recorded]") {
   }
   PacketCapture capture(file);
   VelodyneDecoder decoder(velodyne_calibration(VelodyneModel::kVlp16));
-  std::vector<PointSweep> turns;
+  std::vector<model::PointSweep> turns;
   int positions = 0;
   while (const auto packet = capture.next()) {
     if (packet->port == kVelodynePositionPort)
@@ -192,10 +195,10 @@ TEST_CASE("a recorded capture of a VLP-16", "[velodyne][recorded]") {
   CHECK(decoder.counts().refused == 0);
   CHECK(positions > 0);
   REQUIRE(turns.size() >= 2);
-  for (const PointSweep& turn : turns) {
+  for (const model::PointSweep& turn : turns) {
     CHECK(turn.points.size() > 10'000);
     CHECK(turn.points.back().time_s == Approx(0.1).margin(0.005));
-    for (const SweepPoint& p : turn.points) {
+    for (const model::SweepPoint& p : turn.points) {
       const double elevation = std::atan2(p.z_m, std::hypot(p.x_m, p.y_m));
       // Near the laser the beams' offsets show.
       CHECK(std::abs(elevation - (2.0 * p.ring - 15.0) * kDegree) <
@@ -213,7 +216,7 @@ TEST_CASE("VLP-16 packets inside a foreign LCM log", "[velodyne][recorded]") {
   }
   LcmLogReader reader(file);
   VelodyneDecoder decoder(velodyne_calibration(VelodyneModel::kVlp16));
-  std::vector<PointSweep> turns;
+  std::vector<model::PointSweep> turns;
   while (const auto event = reader.next()) {
     if (event->channel != "vlp16.center.ray") continue;
     const std::span<const std::uint8_t> data(event->data);

@@ -11,6 +11,7 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::io;
 namespace fs = std::filesystem;
 
 namespace {

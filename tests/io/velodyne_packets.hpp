@@ -23,7 +23,7 @@ struct PacketMaker {
   double packet_us = 1327.104;
 
   Packet next() {
-    Packet packet(kVelodyneDataBytes, 0);
+    Packet packet(io::kVelodyneDataBytes, 0);
     const auto put = [&](std::size_t at, std::uint32_t value, int bytes) {
       for (int i = 0; i < bytes; ++i)
         packet[at + static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(value >> (8 * i));

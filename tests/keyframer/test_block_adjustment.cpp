@@ -5,11 +5,12 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::keyframer;
 
 namespace {
 
 struct World {
-  std::vector<SE2> poses;
+  std::vector<geometry::SE2> poses;
   std::vector<Eigen::Vector2d> points;
 };
 
@@ -43,13 +44,13 @@ TEST_CASE("Without noise the block is found exactly, from a bad guess", "[block]
   std::mt19937_64 random(1);
   const World truth = world(random, 8, 40);
   BlockProblem block = problem(truth, 1e-6, 0.8, random);
-  for (SE2& pose : block.local_T_member) pose = pose * SE2(0.2, -0.1, 0.05);
+  for (geometry::SE2& pose : block.local_T_member) pose = pose * geometry::SE2(0.2, -0.1, 0.05);
   for (Eigen::Vector2d& point : block.landmarks) point += Eigen::Vector2d(0.3, -0.2);
   const BlockEstimate estimate = adjust_block(block);
   REQUIRE(estimate.converged);
   for (std::size_t k = 1; k < truth.poses.size(); ++k) {
-    const SE2 expected = truth.poses[0].inverse() * truth.poses[k];
-    const SE2 actual =
+    const geometry::SE2 expected = truth.poses[0].inverse() * truth.poses[k];
+    const geometry::SE2 actual =
         estimate.centre_T_member[0].mean.inverse() * estimate.centre_T_member[k].mean;
     REQUIRE((expected.inverse() * actual).Log().norm() < 1e-5);
   }
@@ -66,13 +67,13 @@ TEST_CASE("Covariances of a block agree with Monte Carlo", "[block]") {
   for (int run = 0; run < runs; ++run) {
     const BlockEstimate estimate = adjust_block(problem(truth, sigma, 0.85, random));
     REQUIRE(estimate.converged);
-    const SE2WithCovariance& base = estimate.centre_T_member.front();
+    const geometry::SE2WithCovariance& base = estimate.centre_T_member.front();
     // A landmark as the base sees it: both errors act.
     for (std::size_t i = 0; i < truth.points.size(); ++i) {
-      const SE2 base_T_centre = base.mean.inverse();
+      const geometry::SE2 base_T_centre = base.mean.inverse();
       const Eigen::Vector2d seen = base_T_centre * estimate.landmarks[i];
       Eigen::Matrix<double, 2, 3> jacobian;
-      jacobian << -Eigen::Matrix2d::Identity(), -turned_left(seen);
+      jacobian << -Eigen::Matrix2d::Identity(), -geometry::perpendicular(seen);
       const Eigen::Matrix2d rotation = base_T_centre.rotation();
       const Eigen::Matrix2d covariance =
           rotation * estimate.landmark_covariance[i] * rotation.transpose() +
@@ -82,7 +83,8 @@ TEST_CASE("Covariances of a block agree with Monte Carlo", "[block]") {
                        (2.0 * static_cast<double>(truth.points.size()) * runs);
     }
     // The last member as the base sees it.
-    const SE2WithCovariance relative = compound(inverse(base), estimate.centre_T_member.back());
+    const geometry::SE2WithCovariance relative =
+        compound(inverse(base), estimate.centre_T_member.back());
     const Eigen::Vector3d error =
         (relative.mean.inverse() * truth.poses[0].inverse() * truth.poses.back()).Log();
     base_nees += error.dot(relative.covariance.inverse() * error) / (3.0 * runs);
@@ -98,11 +100,12 @@ TEST_CASE("Odometry between members holds a block with few landmarks together", 
   for (std::size_t k = 0; k + 1 < truth.poses.size(); ++k) {
     const Eigen::Matrix3d covariance = Eigen::Vector3d(1e-6, 1e-6, 1e-7).asDiagonal();
     block.motion.push_back(
-        SE2WithCovariance{truth.poses[k].inverse() * truth.poses[k + 1], covariance});
+        geometry::SE2WithCovariance{truth.poses[k].inverse() * truth.poses[k + 1], covariance});
   }
   const BlockEstimate estimate = adjust_block(block);
   REQUIRE(estimate.converged);
-  const SE2 expected = truth.poses[0].inverse() * truth.poses[5];
-  const SE2 actual = estimate.centre_T_member[0].mean.inverse() * estimate.centre_T_member[5].mean;
+  const geometry::SE2 expected = truth.poses[0].inverse() * truth.poses[5];
+  const geometry::SE2 actual =
+      estimate.centre_T_member[0].mean.inverse() * estimate.centre_T_member[5].mean;
   REQUIRE((expected.inverse() * actual).Log().norm() < 0.01);
 }

@@ -6,6 +6,7 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::keyframer;
 
 namespace {
 
@@ -21,8 +22,8 @@ sim::Drive drive(sim::PathKind path, double length_m, double detection, double s
   return {parameters, seed};
 }
 
-std::vector<Keyframe> keyframes(const sim::Drive& drive, JointKeyframer& keyframer) {
-  std::vector<Keyframe> result;
+std::vector<model::Keyframe> keyframes(const sim::Drive& drive, JointKeyframer& keyframer) {
+  std::vector<model::Keyframe> result;
   for (std::size_t k = 0; k < drive.size(); ++k) {
     if (auto keyframe = keyframer.add(drive.scan(k).scan)) result.push_back(std::move(*keyframe));
   }
@@ -40,13 +41,13 @@ TEST_CASE("Every eight scans give a keyframe, at corners too", "[keyframer]") {
       GENERATE(sim::PathKind::kCircle, sim::PathKind::kSquare, sim::PathKind::kTriangle);
   const sim::Drive simulated = drive(path, 80.0, 0.85, 0.2, 3);
   JointKeyframer keyframer({});
-  const std::vector<Keyframe> made = keyframes(simulated, keyframer);
+  const std::vector<model::Keyframe> made = keyframes(simulated, keyframer);
   REQUIRE(made.size() == simulated.size() / 8);
   REQUIRE(keyframer.counters().scans_unmatched == 0);
   for (std::size_t i = 1; i < made.size(); ++i) {
     REQUIRE(made[i].sequence == made[i - 1].sequence + 1);
     REQUIRE(made[i].previous_T_base);
-    const SE2 truth =
+    const geometry::SE2 truth =
         simulated.world_T_vehicle()[8 * (i - 1)].inverse() * simulated.world_T_vehicle()[8 * i];
     REQUIRE((truth.inverse() * *made[i].previous_T_base).Log().norm() < 0.3);
   }
@@ -58,12 +59,12 @@ TEST_CASE("Landmarks of a keyframe are trunks, each once, and as uncertain as st
   JointKeyframer keyframer({});
   double chi2 = 0.0;
   std::size_t count = 0;
-  for (const Keyframe& keyframe : keyframes(simulated, keyframer)) {
-    const SE2 world_T_base = simulated.world_T_vehicle()[8 * keyframe.sequence];
-    const SE2WithCovariance base_T_centre =
-        inverse(SE2WithCovariance{keyframe.centre_T_base(), keyframe.members.front().covariance});
-    for (const KeyframeLandmark& landmark : keyframe.landmarks) {
-      REQUIRE(landmark.times_seen >= 1);
+  for (const model::Keyframe& keyframe : keyframes(simulated, keyframer)) {
+    const geometry::SE2 world_T_base = simulated.world_T_vehicle()[8 * keyframe.sequence];
+    const geometry::SE2WithCovariance base_T_centre = inverse(
+        geometry::SE2WithCovariance{keyframe.centre_T_base(), keyframe.members.front().covariance});
+    for (const model::KeyframeLandmark& landmark : keyframe.landmarks) {
+      REQUIRE(landmark.observation_count >= 1);
       const double error =
           nearest_trunk_m(simulated, world_T_base * (base_T_centre.mean * landmark.position_m));
       if (error > 1.5) continue;  // Not its own trunk: counted as missing below.
@@ -88,18 +89,18 @@ TEST_CASE("What is seen once does not pass", "[keyframer]") {
   std::size_t clutter_passed = 0;
   std::size_t clutter_made = 0;
   for (std::size_t k = 0; k < simulated.size(); ++k) {
-    LandmarkScan scan = simulated.scan(k).scan;
+    model::LandmarkScan scan = simulated.scan(k).scan;
     for (int i = 0; i < 5; ++i) {
-      Detection clutter = scan.detections.front();
+      model::Detection clutter = scan.detections.front();
       clutter.position_m = {where(random), where(random), 0.0};
       scan.detections.push_back(clutter);
       ++clutter_made;
     }
     const auto keyframe = keyframer.add(scan);
     if (!keyframe) continue;
-    const SE2 world_T_centre =
+    const geometry::SE2 world_T_centre =
         simulated.world_T_vehicle()[k - 7] * keyframe->centre_T_base().inverse();
-    for (const KeyframeLandmark& landmark : keyframe->landmarks) {
+    for (const model::KeyframeLandmark& landmark : keyframe->landmarks) {
       if (nearest_trunk_m(simulated, world_T_centre * landmark.position_m) > 0.6) ++clutter_passed;
       ++landmarks;
     }
@@ -116,10 +117,10 @@ TEST_CASE("A vehicle that was carried away starts anew", "[keyframer]") {
   JointKeyframer keyframer({});
   const std::size_t first = keyframes(here, keyframer).size();
   REQUIRE(first > 3);
-  Utime offset = here.utime(here.size() - 1) + 200000;
-  std::vector<Keyframe> later;
+  model::Utime offset = here.utime(here.size() - 1) + 200000;
+  std::vector<model::Keyframe> later;
   for (std::size_t k = 0; k < there.size(); ++k) {
-    LandmarkScan scan = there.scan(k).scan;
+    model::LandmarkScan scan = there.scan(k).scan;
     scan.utime = offset + there.utime(k);
     if (auto keyframe = keyframer.add(scan)) later.push_back(*keyframe);
   }
@@ -127,7 +128,7 @@ TEST_CASE("A vehicle that was carried away starts anew", "[keyframer]") {
   REQUIRE(later.size() >= there.size() / 8);
   // No motion is claimed across the gap.
   const auto unlinked = std::count_if(later.begin(), later.end(),
-                                      [](const Keyframe& k) { return !k.previous_T_base; });
+                                      [](const model::Keyframe& k) { return !k.previous_T_base; });
   REQUIRE(unlinked == 1);
 }
 
@@ -146,7 +147,7 @@ TEST_CASE("A loaded state goes on exactly where the saved one was", "[keyframer]
   JointKeyframer first({});
   JointKeyframer second({});
   for (std::size_t k = 0; k < simulated.size(); ++k) {
-    const LandmarkScan scan = simulated.scan(k).scan;
+    const model::LandmarkScan scan = simulated.scan(k).scan;
     if (k == 29) second.load(first.save());
     const auto expected = whole.add(scan);
     const auto actual = k < 29 ? first.add(scan) : second.add(scan);

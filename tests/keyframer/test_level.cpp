@@ -8,17 +8,18 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::keyframer;
 
 namespace {
 
-LandmarkScan random_scan(std::uint64_t seed) {
+model::LandmarkScan random_scan(std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> place(-30.0, 30.0);
   std::uniform_real_distribution<double> height(-1.0, 3.0);
-  LandmarkScan scan;
+  model::LandmarkScan scan;
   scan.field_of_view.max_range_m = 60.0;
   for (int k = 0; k < 10; ++k) {
-    Detection& detection = scan.detections.emplace_back();
+    model::Detection& detection = scan.detections.emplace_back();
     detection.position_m << place(random), place(random), height(random);
     detection.covariance_m2 = 1e-4 * Eigen::Matrix3d::Identity();
   }
@@ -26,19 +27,20 @@ LandmarkScan random_scan(std::uint64_t seed) {
 }
 
 /// As it looks to who takes the level to be where it is not.
-LandmarkScan tilted(LandmarkScan scan, const Eigen::Vector2d& error_rad) {
+model::LandmarkScan tilted(model::LandmarkScan scan, const Eigen::Vector2d& error_rad) {
   const Eigen::Vector3d turn(error_rad.x(), error_rad.y(), 0.0);
   const Eigen::AngleAxisd rotation(turn.norm(), turn.normalized());
-  for (Detection& detection : scan.detections)
+  for (model::Detection& detection : scan.detections)
     detection.position_m = rotation * detection.position_m;
   return scan;
 }
 
-KnownLevel known(const Eigen::Vector2d& error_rad, double sigma_rad = 0.0,
-                 double told_sigma_rad = 0.0) {
+model::LevelCorrection known(const Eigen::Vector2d& error_rad, double sigma_rad = 0.0,
+                             double reported_sigma_rad = 0.0) {
   const Eigen::Matrix2d one = Eigen::Matrix2d::Identity();
-  KnownLevel level;
-  level.know({0, 0, error_rad, sigma_rad * sigma_rad * one, told_sigma_rad * told_sigma_rad * one});
+  model::LevelCorrection level;
+  level.set({0, 0, error_rad, sigma_rad * sigma_rad * one,
+             reported_sigma_rad * reported_sigma_rad * one});
   return level;
 }
 
@@ -47,8 +49,8 @@ KnownLevel known(const Eigen::Vector2d& error_rad, double sigma_rad = 0.0,
 TEST_CASE("a wrong level is taken out to second order", "[keyframer][level]") {
   const Eigen::Vector2d error_rad(5e-3, -8e-3);
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const LandmarkScan truth = random_scan(seed);
-    const LandmarkScan found = known(error_rad).levelled(tilted(truth, error_rad));
+    const model::LandmarkScan truth = random_scan(seed);
+    const model::LandmarkScan found = known(error_rad).levelled(tilted(truth, error_rad));
     for (std::size_t k = 0; k < truth.detections.size(); ++k) {
       const Eigen::Vector3d off = found.detections[k].position_m - truth.detections[k].position_m;
       // 45 m away, 0.01 rad squared.
@@ -59,30 +61,30 @@ TEST_CASE("a wrong level is taken out to second order", "[keyframer][level]") {
 
 TEST_CASE("what is told of the level in covariances gives way to what is left of it",
           "[keyframer][level]") {
-  constexpr double kTold = 6e-3;
+  constexpr double kReported = 6e-3;
   constexpr double kLeft = 1e-3;
-  LandmarkScan scan = random_scan(3);
-  for (Detection& detection : scan.detections) {
+  model::LandmarkScan scan = random_scan(3);
+  for (model::Detection& detection : scan.detections) {
     const double z = detection.position_m.z();
     detection.covariance_m2.topLeftCorner<2, 2>() +=
-        kTold * kTold * z * z * Eigen::Matrix2d::Identity();
+        kReported * kReported * z * z * Eigen::Matrix2d::Identity();
   }
-  const LandmarkScan found = known({1e-3, 0.0}, kLeft, kTold).levelled(scan);
-  for (const Detection& detection : found.detections) {
+  const model::LandmarkScan found = known({1e-3, 0.0}, kLeft, kReported).levelled(scan);
+  for (const model::Detection& detection : found.detections) {
     const double z = detection.position_m.z();
     const Eigen::Matrix2d expected = (1e-4 + kLeft * kLeft * z * z) * Eigen::Matrix2d::Identity();
     REQUIRE((detection.covariance_m2.topLeftCorner<2, 2>() - expected).norm() < 1e-9);
   }
   // More than there is cannot be taken out.
-  const LandmarkScan odd = known({1e-3, 0.0}, 0.0, 1.0).levelled(random_scan(3));
-  for (const Detection& detection : odd.detections)
+  const model::LandmarkScan odd = known({1e-3, 0.0}, 0.0, 1.0).levelled(random_scan(3));
+  for (const model::Detection& detection : odd.detections)
     REQUIRE(detection.covariance_m2.topLeftCorner<2, 2>().determinant() > 0.0);
 }
 
 TEST_CASE("an old word on the level means nothing", "[keyframer][level]") {
-  LandmarkScan scan = random_scan(2);
+  model::LandmarkScan scan = random_scan(2);
   scan.utime = 3'000'000;
-  const LandmarkScan same = known({0.1, 0.1}).levelled(scan);
+  const model::LandmarkScan same = known({0.1, 0.1}).levelled(scan);
   for (std::size_t k = 0; k < scan.detections.size(); ++k)
     REQUIRE(same.detections[k].position_m == scan.detections[k].position_m);
 }
@@ -92,16 +94,17 @@ TEST_CASE("keyframes have the level that the filter tells, over a restart too",
   const Eigen::Vector2d error_rad(5e-3, -8e-3);
   JointKeyframerParameters parameters;
   parameters.observations_per_keyframe = 2;
-  const LandmarkScan truth = random_scan(1);
-  const auto keyframe_of = [&](const LandmarkScan& scan, const Eigen::Vector2d& told_rad) {
+  const model::LandmarkScan truth = random_scan(1);
+  const auto keyframe_of = [&](const model::LandmarkScan& scan,
+                               const Eigen::Vector2d& reported_rad) {
     JointKeyframer before(parameters);
-    EkfLevel level;
+    model::EkfLevel level;
     level.utime = 1'000'000;
-    level.error_rad = told_rad;
+    level.error_rad = reported_rad;
     before.add(level);
     JointKeyframer keyframer(parameters);
     keyframer.load(before.save());
-    LandmarkScan at = scan;
+    model::LandmarkScan at = scan;
     at.utime = 1'000'000;
     REQUIRE_FALSE(keyframer.add(at));
     at.utime = 1'100'000;
@@ -110,14 +113,14 @@ TEST_CASE("keyframes have the level that the filter tells, over a restart too",
     REQUIRE(made->landmarks.size() == scan.detections.size());
     return *made;
   };
-  const auto farthest_off = [](const Keyframe& a, const Keyframe& b) {
+  const auto farthest_off = [](const model::Keyframe& a, const model::Keyframe& b) {
     double off_m = 0.0;
     for (std::size_t k = 0; k < a.landmarks.size(); ++k)
       off_m = std::max(off_m, (a.landmarks[k].position_m - b.landmarks[k].position_m).norm());
     return off_m;
   };
-  const Keyframe expected = keyframe_of(truth, Eigen::Vector2d::Zero());
-  const LandmarkScan seen = tilted(truth, error_rad);
+  const model::Keyframe expected = keyframe_of(truth, Eigen::Vector2d::Zero());
+  const model::LandmarkScan seen = tilted(truth, error_rad);
   REQUIRE(farthest_off(keyframe_of(seen, error_rad), expected) < 45.0 * 1e-4);
   REQUIRE(farthest_off(keyframe_of(seen, Eigen::Vector2d::Zero()), expected) > 0.01);
 }

@@ -6,18 +6,19 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::keyframer;
 
 namespace {
 
-constexpr Utime kPiece_us = 100'000;
+constexpr model::Utime kIncrement_us = 100'000;
 constexpr double kBias = 2e-3;  // rad/s
 
 /// Straight on at 10 m/s, integrated with a gyro that is off by kBias.
-Odometry piece(int k) {
-  Odometry odometry;
-  odometry.from_utime = k * kPiece_us;
-  odometry.utime = (k + 1) * kPiece_us;
-  odometry.from_T_to = SE2::Exp({1.0, 0.0, kBias * 0.1});
+model::Odometry increment(int k) {
+  model::Odometry odometry;
+  odometry.from_utime = k * kIncrement_us;
+  odometry.utime = (k + 1) * kIncrement_us;
+  odometry.from_T_to = geometry::SE2::Exp({1.0, 0.0, kBias * 0.1});
   odometry.covariance = 1e-6 * Eigen::Matrix3d::Identity();
   odometry.has_wheels = true;
   odometry.inertial.emplace();
@@ -30,13 +31,13 @@ Odometry piece(int k) {
 }  // namespace
 
 TEST_CASE("The filter's bias straightens the pieces that come after it", "[odometry]") {
-  OdometryBuffer buffer;
-  for (int k = 0; k < 10; ++k) REQUIRE(buffer.add(piece(k)));
+  model::OdometryBuffer buffer;
+  for (int k = 0; k < 10; ++k) REQUIRE(buffer.add(increment(k)));
   buffer.set_bias({kBias, 0.0, 0.0});
-  for (int k = 10; k < 20; ++k) REQUIRE(buffer.add(piece(k)));
+  for (int k = 10; k < 20; ++k) REQUIRE(buffer.add(increment(k)));
 
-  const auto before = buffer.between(0, 10 * kPiece_us);
-  const auto after = buffer.between(10 * kPiece_us, 20 * kPiece_us);
+  const auto before = buffer.between(0, 10 * kIncrement_us);
+  const auto after = buffer.between(10 * kIncrement_us, 20 * kIncrement_us);
   REQUIRE(before);
   REQUIRE(after);
   REQUIRE(std::abs(before->mean.theta() - kBias) < 1e-12);
@@ -44,30 +45,30 @@ TEST_CASE("The filter's bias straightens the pieces that come after it", "[odome
 }
 
 TEST_CASE("A standing vehicle does not turn, whatever the bias", "[odometry]") {
-  OdometryBuffer buffer;
+  model::OdometryBuffer buffer;
   buffer.set_bias({kBias, 0.0, 0.0});
-  Odometry standing = piece(0);
-  standing.from_T_to = SE2();
-  standing.is_standing = true;
+  model::Odometry standing = increment(0);
+  standing.from_T_to = geometry::SE2();
+  standing.is_stationary = true;
   REQUIRE(buffer.add(standing));
-  REQUIRE(buffer.between(0, kPiece_us)->mean.coordinates().norm() == 0.0);
+  REQUIRE(buffer.between(0, kIncrement_us)->mean.coordinates().norm() == 0.0);
 }
 
 namespace {
 
 /// The filter at the end of piece k-1: surer of the speed than wheels, which are 2 % off.
-EkfPose filter_at(int k, double speed_mps, double sigma_mps) {
-  EkfPose pose;
-  pose.utime = k * kPiece_us;
+model::EkfPose filter_at(int k, double speed_mps, double sigma_mps) {
+  model::EkfPose pose;
+  pose.utime = k * kIncrement_us;
   pose.velocity_mps << speed_mps, 0.0;
   pose.velocity_covariance = sigma_mps * sigma_mps * Eigen::Matrix2d::Identity();
   pose.bias << kBias, 0.0, 0.0;
   return pose;
 }
 
-Odometry wheel_piece(int k) {
-  Odometry odometry = piece(k);
-  odometry.from_T_to = SE2::Exp({1.02, 0.0, kBias * 0.1});
+model::Odometry wheel_increment(int k) {
+  model::Odometry odometry = increment(k);
+  odometry.from_T_to = geometry::SE2::Exp({1.02, 0.0, kBias * 0.1});
   odometry.covariance = 1e-3 * Eigen::Matrix3d::Identity();
   odometry.inertial->covariance = 1e-8 * Eigen::Matrix<double, 5, 5>::Identity();
   return odometry;
@@ -77,10 +78,10 @@ Odometry wheel_piece(int k) {
 
 TEST_CASE("Pieces start at the filter's velocity where that is surer", "[odometry]") {
   for (const bool is_sure : {true, false}) {
-    OdometryBuffer buffer;
-    buffer.know(filter_at(0, 10.0, is_sure ? 0.02 : 2.0));
-    for (int k = 0; k < 5; ++k) REQUIRE(buffer.add(wheel_piece(k)));
-    const auto motion = buffer.between(0, 5 * kPiece_us);
+    model::OdometryBuffer buffer;
+    buffer.set_filter_pose(filter_at(0, 10.0, is_sure ? 0.02 : 2.0));
+    for (int k = 0; k < 5; ++k) REQUIRE(buffer.add(wheel_increment(k)));
+    const auto motion = buffer.between(0, 5 * kIncrement_us);
     REQUIRE(motion);
     REQUIRE(std::abs(motion->mean.x() - (is_sure ? 5.0 : 5.1)) < 1e-6);
     REQUIRE(std::abs(motion->mean.theta()) < 1e-9);
@@ -90,58 +91,58 @@ TEST_CASE("Pieces start at the filter's velocity where that is surer", "[odometr
 }
 
 TEST_CASE("The filter's word counts the same, late or in time", "[odometry]") {
-  OdometryBuffer late;
-  OdometryBuffer in_time;
+  model::OdometryBuffer late;
+  model::OdometryBuffer in_time;
   for (int k = 0; k < 3; ++k) {
-    REQUIRE(in_time.add(wheel_piece(k)));
-    REQUIRE(late.add(wheel_piece(k)));
-    if (k == 0) in_time.know(filter_at(1, 10.0, 0.02));
+    REQUIRE(in_time.add(wheel_increment(k)));
+    REQUIRE(late.add(wheel_increment(k)));
+    if (k == 0) in_time.set_filter_pose(filter_at(1, 10.0, 0.02));
   }
-  late.know(filter_at(1, 10.0, 0.02));
-  for (OdometryBuffer* one : {&late, &in_time}) REQUIRE(one->add(wheel_piece(3)));
-  const auto a = in_time.between(3 * kPiece_us, 4 * kPiece_us);
-  const auto b = late.between(3 * kPiece_us, 4 * kPiece_us);
+  late.set_filter_pose(filter_at(1, 10.0, 0.02));
+  for (model::OdometryBuffer* one : {&late, &in_time}) REQUIRE(one->add(wheel_increment(3)));
+  const auto a = in_time.between(3 * kIncrement_us, 4 * kIncrement_us);
+  const auto b = late.between(3 * kIncrement_us, 4 * kIncrement_us);
   REQUIRE(a->mean.x() < 1.001);
   REQUIRE((a->mean.coordinates() - b->mean.coordinates()).norm() < 1e-12);
   REQUIRE((a->covariance - b->covariance).norm() < 1e-15);
 }
 
 TEST_CASE("After a gap the filter's velocity is not known", "[odometry]") {
-  OdometryBuffer buffer;
-  buffer.know(filter_at(0, 10.0, 0.02));
-  REQUIRE(buffer.add(wheel_piece(3)));
-  REQUIRE(std::abs(buffer.between(3 * kPiece_us, 4 * kPiece_us)->mean.x() - 1.02) < 1e-6);
+  model::OdometryBuffer buffer;
+  buffer.set_filter_pose(filter_at(0, 10.0, 0.02));
+  REQUIRE(buffer.add(wheel_increment(3)));
+  REQUIRE(std::abs(buffer.between(3 * kIncrement_us, 4 * kIncrement_us)->mean.x() - 1.02) < 1e-6);
   REQUIRE(!buffer.velocity());
 }
 
 TEST_CASE("A restored buffer tells the same motion and goes on with the same bias", "[odometry]") {
-  OdometryBuffer buffer;
-  buffer.know(filter_at(0, 10.0, 1e-4));
-  for (int k = 0; k < 5; ++k) REQUIRE(buffer.add(piece(k)));
-  OdometryBuffer restored;
-  Json(buffer).get_to(restored);
-  for (OdometryBuffer* one : {&buffer, &restored}) REQUIRE(one->add(piece(5)));
-  const SE2 a = buffer.between(0, 6 * kPiece_us)->mean;
-  const SE2 b = restored.between(0, 6 * kPiece_us)->mean;
+  model::OdometryBuffer buffer;
+  buffer.set_filter_pose(filter_at(0, 10.0, 1e-4));
+  for (int k = 0; k < 5; ++k) REQUIRE(buffer.add(increment(k)));
+  model::OdometryBuffer restored;
+  model::Json(buffer).get_to(restored);
+  for (model::OdometryBuffer* one : {&buffer, &restored}) REQUIRE(one->add(increment(5)));
+  const geometry::SE2 a = buffer.between(0, 6 * kIncrement_us)->mean;
+  const geometry::SE2 b = restored.between(0, 6 * kIncrement_us)->mean;
   REQUIRE(a.coordinates() == b.coordinates());
 }
 
 TEST_CASE("A gyro's turn adds up, with the bias that was taken out", "[odometry]") {
-  OdometryBuffer buffer(0.0);
-  EkfPose filter = filter_at(0, 10.0, 0.02);
+  model::OdometryBuffer buffer(0.0);
+  model::EkfPose filter = filter_at(0, 10.0, 0.02);
   filter.bias_covariance(0, 0) = 1e-6;
-  buffer.know(filter);
-  for (int k = 0; k < 5; ++k) REQUIRE(buffer.add(wheel_piece(k)));
-  const auto turn = buffer.gyro_turn(kPiece_us / 2, 3 * kPiece_us);
+  buffer.set_filter_pose(filter);
+  for (int k = 0; k < 5; ++k) REQUIRE(buffer.add(wheel_increment(k)));
+  const auto turn = buffer.gyro_rotation(kIncrement_us / 2, 3 * kIncrement_us);
   REQUIRE(turn);
-  CHECK(std::abs(turn->turn_rad) < 1e-12);
+  CHECK(std::abs(turn->rotation_rad) < 1e-12);
   CHECK(std::abs(turn->seconds - 0.25) < 1e-12);
   CHECK(std::abs(turn->bias_rad - 0.25 * kBias) < 1e-12);
   // White noise alone: what is not known of the bias is a variable of its own.
   CHECK(std::abs(turn->variance - 2.5e-8) < 1e-12);
-  CHECK(!buffer.gyro_turn(0, 6 * kPiece_us));
-  Odometry blind = wheel_piece(5);
+  CHECK(!buffer.gyro_rotation(0, 6 * kIncrement_us));
+  model::Odometry blind = wheel_increment(5);
   blind.inertial.reset();
   REQUIRE(buffer.add(blind));
-  CHECK(!buffer.gyro_turn(0, 6 * kPiece_us));
+  CHECK(!buffer.gyro_rotation(0, 6 * kIncrement_us));
 }

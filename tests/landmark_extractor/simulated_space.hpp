@@ -109,15 +109,15 @@ inline double hit_ground(const Space& space, const Eigen::Vector3d& o, const Eig
 }
 
 /// The turn of a standing vehicle with the given attitude; points in frame `vehicle`.
-inline PointSweep sweep(
+inline model::PointSweep sweep(
     const Space& space, const Spinner& spinner, std::mt19937_64& random,
     const Eigen::Quaterniond& level_Q_vehicle = Eigen::Quaterniond::Identity()) {
-  PointSweep result;
+  model::PointSweep result;
   result.is_deskewed = true;
   result.rings = static_cast<std::uint16_t>(spinner.rings);
   result.max_range_m = 80.0;
   result.sensor_position_m = spinner.sensor;
-  result.attitude = Attitude{level_Q_vehicle, Eigen::Matrix2d::Zero()};
+  result.attitude = model::Attitude{level_Q_vehicle, Eigen::Matrix2d::Zero()};
   std::normal_distribution<double> noise(0.0, spinner.sigma_m);
   std::uniform_real_distribution<double> luck(0.0, 1.0);
   const Eigen::Vector3d origin = level_Q_vehicle * spinner.sensor;

@@ -42,9 +42,9 @@ inline double hit(const Wall& wall, const Eigen::Vector2d& direction) {
 }
 
 /// What a SICK-like laser (361 beams over 180 degrees) sees, with range noise.
-inline PlanarScan sweep(const std::vector<Circle>& circles, const std::vector<Wall>& walls,
-                        double sigma, std::mt19937_64& random) {
-  PlanarScan scan;
+inline model::PlanarScan sweep(const std::vector<Circle>& circles, const std::vector<Wall>& walls,
+                               double sigma, std::mt19937_64& random) {
+  model::PlanarScan scan;
   scan.first_bearing_rad = -0.5 * std::numbers::pi;
   scan.bearing_step_rad = std::numbers::pi / 360.0;
   scan.max_range_m = 80.0;

@@ -10,6 +10,7 @@
 #include "tests/landmark_extractor/simulated_sweep.hpp"
 
 using namespace understory;
+using namespace understory::landmark_extractor;
 using namespace understory::test;
 
 namespace {
@@ -40,9 +41,9 @@ TEST_CASE("the centre of a lone trunk is found, with an honest covariance", "[ex
   double nees = 0.0;
   constexpr int kRuns = 2000;
   for (int run = 0; run < kRuns; ++run) {
-    const Circle trunk =
-        circle_at(ranges(random), bearings(random), std::clamp(radii(random), 0.08, 0.4));
-    const LandmarkScan scan = extractor.extract(sweep({trunk}, {}, kSigma, random));
+    const test::Circle trunk =
+        test::circle_at(ranges(random), bearings(random), std::clamp(radii(random), 0.08, 0.4));
+    const model::LandmarkScan scan = extractor.extract(sweep({trunk}, {}, kSigma, random));
     if (scan.detections.size() != 1) continue;
     ++found;
     const Eigen::Vector2d error = scan.detections[0].position_m.head<2>() - trunk.centre;
@@ -61,12 +62,12 @@ TEST_CASE("a trunk half hidden behind another keeps its centre", "[extractor]") 
   std::mt19937_64 random(2);
   LandmarkExtractor extractor(exact_world(0.01));
   // The near one covers the right half of the far one.
-  const Circle near = circle_at(5.0, -0.02, 0.1);
-  const Circle far = circle_at(12.0, 0.01, 0.35);
-  const LandmarkScan scan = extractor.extract(sweep({near, far}, {}, 0.01, random));
+  const test::Circle near = test::circle_at(5.0, -0.02, 0.1);
+  const test::Circle far = test::circle_at(12.0, 0.01, 0.35);
+  const model::LandmarkScan scan = extractor.extract(sweep({near, far}, {}, 0.01, random));
   REQUIRE(scan.detections.size() == 2);
-  for (const Detection& detection : scan.detections) {
-    const Circle& truth = detection.position_m.x() < 8.0 ? near : far;
+  for (const model::Detection& detection : scan.detections) {
+    const test::Circle& truth = detection.position_m.x() < 8.0 ? near : far;
     const Eigen::Vector2d error = detection.position_m.head<2>() - truth.centre;
     const Eigen::Matrix2d covariance = detection.covariance_m2.topLeftCorner<2, 2>();
     CHECK(error.norm() < 0.2);
@@ -77,12 +78,12 @@ TEST_CASE("a trunk half hidden behind another keeps its centre", "[extractor]") 
 TEST_CASE("walls and fences are no trunks", "[extractor]") {
   std::mt19937_64 random(3);
   LandmarkExtractor extractor(exact_world(0.02));
-  const std::vector<Wall> walls{{{10.0, -30.0}, {10.0, 30.0}},   // Across.
-                                {{2.0, 6.0}, {70.0, 9.0}},       // Seen at a grazing angle.
-                                {{20.0, -12.0}, {24.0, -12.0}},  // A short one.
-                                {{8.0, -3.0}, {8.0, -1.8}}};
-  for (const Wall& wall : walls) {
-    const LandmarkScan scan = extractor.extract(sweep({}, {wall}, 0.02, random));
+  const std::vector<test::Wall> walls{{{10.0, -30.0}, {10.0, 30.0}},   // Across.
+                                      {{2.0, 6.0}, {70.0, 9.0}},       // Seen at a grazing angle.
+                                      {{20.0, -12.0}, {24.0, -12.0}},  // A short one.
+                                      {{8.0, -3.0}, {8.0, -1.8}}};
+  for (const test::Wall& wall : walls) {
+    const model::LandmarkScan scan = extractor.extract(sweep({}, {wall}, 0.02, random));
     CHECK(scan.detections.empty());
   }
 }
@@ -93,7 +94,7 @@ TEST_CASE("bushes are no trunks", "[extractor]") {
   LandmarkExtractor extractor(exact_world(0.02));
   std::size_t false_trunks = 0;
   for (int run = 0; run < 100; ++run) {
-    std::vector<Circle> twigs;
+    std::vector<test::Circle> twigs;
     for (int i = 0; i < 60; ++i) {
       twigs.push_back({{12.0 + spread(random), 3.0 + spread(random)}, 0.02});
     }
@@ -105,10 +106,10 @@ TEST_CASE("bushes are no trunks", "[extractor]") {
 TEST_CASE("detections are moved into the frame of the vehicle", "[extractor]") {
   std::mt19937_64 random(5);
   LandmarkExtractorParameters parameters = exact_world(0.01);
-  const Circle trunk = circle_at(8.0, 0.5, 0.15);
-  const PlanarScan scan = sweep({trunk}, {}, 0.01, random);
+  const test::Circle trunk = test::circle_at(8.0, 0.5, 0.15);
+  const model::PlanarScan scan = sweep({trunk}, {}, 0.01, random);
   const auto at_sensor = LandmarkExtractor(parameters).extract(scan);
-  parameters.planar.vehicle_T_sensor = SE2(3.0, 0.5, 0.3);
+  parameters.planar.vehicle_T_sensor = geometry::SE2(3.0, 0.5, 0.3);
   const auto moved = LandmarkExtractor(parameters).extract(scan);
   REQUIRE(at_sensor.detections.size() == 1);
   REQUIRE(moved.detections.size() == 1);
@@ -122,7 +123,7 @@ TEST_CASE("detections are moved into the frame of the vehicle", "[extractor]") {
 
 TEST_CASE("malformed sweeps give nothing and are counted", "[extractor]") {
   LandmarkExtractor extractor;
-  PlanarScan scan;
+  model::PlanarScan scan;
   scan.utime = 7;
   CHECK(extractor.extract(scan).detections.empty());
   scan.ranges_m.assign(361, std::numeric_limits<float>::quiet_NaN());

@@ -10,18 +10,19 @@
 #include "tests/landmark_extractor/simulated_space.hpp"
 
 using namespace understory;
+using namespace understory::landmark_extractor;
 using namespace understory::test;
 
 namespace {
 
 /// A house whose corner nearest to the vehicle is at `corner`; the bisector points out of it.
-Space house(const Eigen::Vector2d& corner, double bisector_rad, double top) {
+test::Space house(const Eigen::Vector2d& corner, double bisector_rad, double top) {
   const auto wall_end = [&](double turned) {
     const double direction = bisector_rad + std::numbers::pi + turned;
     return Eigen::Vector2d(corner +
                            6.0 * Eigen::Vector2d(std::cos(direction), std::sin(direction)));
   };
-  Space space;
+  test::Space space;
   space.facades.push_back({wall_end(0.25 * std::numbers::pi), corner, top});
   space.facades.push_back({corner, wall_end(-0.25 * std::numbers::pi), top});
   return space;
@@ -58,33 +59,33 @@ CornerNees corner_nees(const CornerNoise& noise, int sweeps, std::mt19937_64& ra
   LandmarkExtractorParameters parameters;
   parameters.sweep.range_sigma_m = noise.range_sigma_m;
   LandmarkExtractor extractor(parameters);
-  Spinner spinner = spinner_of(noise.rings);
+  test::Spinner spinner = test::spinner_of(noise.rings);
   spinner.sigma_m = noise.range_sigma_m;
   CornerNees result;
   for (int run = 0; run < sweeps; ++run) {
-    Space space;
+    test::Space space;
     std::vector<std::pair<Eigen::Vector2d, double>> truth;
     for (int k = 0; k < 3; ++k) {
       const double bearing = 2.0 * std::numbers::pi * k / 3.0 + turns(random);
       const Eigen::Vector2d corner =
           ranges(random) * Eigen::Vector2d(std::cos(bearing), std::sin(bearing));
       truth.emplace_back(corner, bearing + std::numbers::pi + turns(random));
-      for (Facade wall : house(corner, truth.back().second, 6.0).facades) {
+      for (test::Facade wall : house(corner, truth.back().second, 6.0).facades) {
         wall.wave = noise.wave_m;
         wall.wave_length = lengths(random);
         wall.phase = phases(random);
         space.facades.push_back(wall);
       }
     }
-    PointSweep turn = sweep(space, spinner, random);
+    model::PointSweep turn = sweep(space, spinner, random);
     turn.attitude->level_Q_vehicle = Eigen::AngleAxisd(tilts(random), Eigen::Vector3d::UnitY()) *
                                      Eigen::AngleAxisd(tilts(random), Eigen::Vector3d::UnitX());
     turn.attitude->covariance_rad2 =
         noise.tilt_sigma_rad * noise.tilt_sigma_rad * Eigen::Matrix2d::Identity();
-    for (const Detection& seen : extractor.extract(turn).detections) {
+    for (const model::Detection& seen : extractor.extract(turn).detections) {
       for (const auto& [corner, bisector] : truth) {
         const Eigen::Vector2d error = seen.position_m.head<2>() - corner;
-        if (seen.kind != LandmarkKind::kCorner || error.norm() > 0.5) continue;
+        if (seen.kind != model::LandmarkKind::kCorner || error.norm() > 0.5) continue;
         const Eigen::Matrix2d covariance = seen.covariance_m2.topLeftCorner<2, 2>();
         const double turned = std::remainder(seen.bearing_rad - bisector, 2.0 * std::numbers::pi) /
                               seen.bearing_sigma_rad;
@@ -150,10 +151,10 @@ TEST_CASE("a corner's place and bisector are found, with honest covariances", "[
       const Eigen::Vector2d corner =
           ranges(random) * Eigen::Vector2d(std::cos(bearing), std::sin(bearing));
       const double bisector = bearing + std::numbers::pi + turns(random);
-      const LandmarkScan scan =
-          extractor.extract(sweep(house(corner, bisector, 6.0), spinner_of(rings), random));
-      for (const Detection& detection : scan.detections) {
-        REQUIRE(detection.kind == LandmarkKind::kCorner);
+      const model::LandmarkScan scan =
+          extractor.extract(sweep(house(corner, bisector, 6.0), test::spinner_of(rings), random));
+      for (const model::Detection& detection : scan.detections) {
+        REQUIRE(detection.kind == model::LandmarkKind::kCorner);
         const Eigen::Vector2d error = detection.position_m.head<2>() - corner;
         REQUIRE(error.norm() < 0.3);
         ++found;
@@ -179,17 +180,17 @@ TEST_CASE("an edge of a house is told once, whatever interrupts its walls", "[ex
   std::mt19937_64 random(5);
   LandmarkExtractor extractor;
   for (int run = 0; run < 10; ++run) {
-    Space space;
+    test::Space space;
     // Above and below windows the wall stands back a little; doors interrupt it.
-    for (const Facade& wall : house({9.0, 3.0}, 3.4, 6.0).facades) {
+    for (const test::Facade& wall : house({9.0, 3.0}, 3.4, 6.0).facades) {
       const Eigen::Vector2d along = wall.to - wall.from;
       space.facades.push_back({wall.from, wall.from + 0.35 * along, 6.0});
       space.facades.push_back({wall.from + 0.45 * along, wall.from + 0.6 * along, 6.0});
       space.facades.push_back({wall.from + 0.75 * along, wall.to, 6.0});
     }
-    const LandmarkScan scan = extractor.extract(sweep(space, spinner_of(64), random));
+    const model::LandmarkScan scan = extractor.extract(sweep(space, test::spinner_of(64), random));
     std::size_t at_edge = 0;
-    for (const Detection& seen : scan.detections) {
+    for (const model::Detection& seen : scan.detections) {
       if ((seen.position_m.head<2>() - Eigen::Vector2d(9.0, 3.0)).norm() < 0.3) ++at_edge;
     }
     CHECK(at_edge == 1);
@@ -199,9 +200,9 @@ TEST_CASE("an edge of a house is told once, whatever interrupts its walls", "[ex
 TEST_CASE("an inner corner points to who sees it", "[extractor]") {
   std::mt19937_64 random(3);
   LandmarkExtractor extractor;
-  Space room;
+  test::Space room;
   room.facades = {{{8.0, -2.0}, {8.0, 5.0}, 5.0}, {{8.0, 5.0}, {1.0, 5.0}, 5.0}};
-  const LandmarkScan scan = extractor.extract(sweep(room, spinner_of(64), random));
+  const model::LandmarkScan scan = extractor.extract(sweep(room, test::spinner_of(64), random));
   REQUIRE(scan.detections.size() == 1);
   CHECK((scan.detections[0].position_m.head<2>() - Eigen::Vector2d(8.0, 5.0)).norm() < 0.05);
   CHECK(scan.detections[0].bearing_rad == Approx(-0.75 * std::numbers::pi).margin(0.03));
@@ -211,14 +212,14 @@ TEST_CASE("cars, single walls and blunt angles are no corners", "[extractor]") {
   std::mt19937_64 random(4);
   LandmarkExtractor extractor;
   for (const int rings : {32, 64}) {
-    const Space car = house({8.0, 3.0}, 3.5, 1.5);
-    CHECK(extractor.extract(sweep(car, spinner_of(rings), random)).detections.empty());
-    Space wall;
+    const test::Space car = house({8.0, 3.0}, 3.5, 1.5);
+    CHECK(extractor.extract(sweep(car, test::spinner_of(rings), random)).detections.empty());
+    test::Space wall;
     wall.facades.push_back({{8.0, -6.0}, {8.0, 6.0}, 5.0});
-    CHECK(extractor.extract(sweep(wall, spinner_of(rings), random)).detections.empty());
-    Space blunt;
+    CHECK(extractor.extract(sweep(wall, test::spinner_of(rings), random)).detections.empty());
+    test::Space blunt;
     blunt.facades = {{{8.0, -6.0}, {8.0, 0.0}, 5.0}, {{8.0, 0.0}, {11.0, 6.0}, 5.0}};
-    CHECK(extractor.extract(sweep(blunt, spinner_of(rings), random)).detections.empty());
+    CHECK(extractor.extract(sweep(blunt, test::spinner_of(rings), random)).detections.empty());
   }
   CHECK(extractor.sweep_counters().corners.low >= 1);
   CHECK(extractor.sweep_counters().corners.skew >= 1);

@@ -10,6 +10,7 @@
 #include "tests/landmark_extractor/simulated_space.hpp"
 
 using namespace understory;
+using namespace understory::landmark_extractor;
 using namespace understory::test;
 
 namespace {
@@ -22,17 +23,18 @@ LandmarkExtractorParameters exact_stems() {
   return parameters;
 }
 
-Space random_wood(std::mt19937_64& random) {
+test::Space random_wood(std::mt19937_64& random) {
   std::uniform_real_distribution<double> place(-20.0, 20.0);
   std::uniform_real_distribution<double> radii(0.06, 0.35);
   std::normal_distribution<double> leans(0.0, 0.03);
-  Space space;
+  test::Space space;
   space.slope = {0.004 * place(random), 0.004 * place(random)};
   while (space.stems.size() < 25) {
     const Eigen::Vector2d at(place(random), place(random));
-    const bool is_free =
-        at.norm() > 3.0 && std::all_of(space.stems.begin(), space.stems.end(),
-                                       [&](const Stem& s) { return (s.breast - at).norm() > 1.5; });
+    const bool is_free = at.norm() > 3.0 && std::all_of(space.stems.begin(), space.stems.end(),
+                                                        [&](const test::Stem& s) {
+                                                          return (s.breast - at).norm() > 1.5;
+                                                        });
     if (is_free) {
       space.stems.push_back({at, radii(random), {leans(random), leans(random)}, 0.01});
     }
@@ -40,9 +42,9 @@ Space random_wood(std::mt19937_64& random) {
   return space;
 }
 
-const Stem* stem_of(const Detection& detection, const Space& space) {
-  const auto nearest =
-      std::min_element(space.stems.begin(), space.stems.end(), [&](const Stem& a, const Stem& b) {
+const test::Stem* stem_of(const model::Detection& detection, const test::Space& space) {
+  const auto nearest = std::min_element(
+      space.stems.begin(), space.stems.end(), [&](const test::Stem& a, const test::Stem& b) {
         return (a.breast - detection.position_m.head<2>()).norm() <
                (b.breast - detection.position_m.head<2>()).norm();
       });
@@ -67,12 +69,12 @@ TEST_CASE("trunks of a wood are found by 16, 32 and 64 beams", "[extractor]") {
     double square = 0.0;
     double nees = 0.0;
     for (int run = 0; run < 6; ++run) {
-      const Space space = random_wood(random);
-      const LandmarkScan scan =
-          extractor.extract(sweep(space, spinner_of(rings), random, tilt(0.05, -0.03)));
+      const test::Space space = random_wood(random);
+      const model::LandmarkScan scan =
+          extractor.extract(sweep(space, test::spinner_of(rings), random, tilt(0.05, -0.03)));
       true_ones += space.stems.size();
-      for (const Detection& detection : scan.detections) {
-        const Stem* stem = stem_of(detection, space);
+      for (const model::Detection& detection : scan.detections) {
+        const test::Stem* stem = stem_of(detection, space);
         REQUIRE(stem != nullptr);
         ++found;
         const Eigen::Vector2d error = detection.position_m.head<2>() - stem->breast;
@@ -100,12 +102,13 @@ TEST_CASE("stems seem no nearer and no thinner, also where beams are lost", "[ex
     double thicker = 0.0;
     double found = 0.0;
     for (int run = 0; run < 25; ++run) {
-      const Space space = random_wood(random);
-      Spinner spinner = spinner_of(32);
+      const test::Space space = random_wood(random);
+      test::Spinner spinner = test::spinner_of(32);
       spinner.drop_out = drop_out;
-      const LandmarkScan scan = extractor.extract(sweep(space, spinner, random, tilt(0.0, 0.0)));
-      for (const Detection& detection : scan.detections) {
-        const Stem* stem = stem_of(detection, space);
+      const model::LandmarkScan scan =
+          extractor.extract(sweep(space, spinner, random, tilt(0.0, 0.0)));
+      for (const model::Detection& detection : scan.detections) {
+        const test::Stem* stem = stem_of(detection, space);
         if (stem == nullptr || stem->breast.norm() < 10.0) continue;
         along += stem->breast.normalized().dot(detection.position_m.head<2>() - stem->breast);
         thicker += detection.radius_m - stem->radius;
@@ -128,20 +131,20 @@ TEST_CASE("the covariance of a lone stem is true, and that of the attitude in it
   LandmarkExtractorParameters parameters = exact_stems();
   parameters.trunk.prior_lean_sigma_rad = 0.05;  // As drawn.
   LandmarkExtractor extractor(parameters);
-  Spinner spinner = spinner_of(16);
+  test::Spinner spinner = test::spinner_of(16);
   spinner.sensor.z() = 0.5;  // Trunks are well above the origin's level where they are seen.
   double plan = 0.0;
   double space_nees = 0.0;
   int count = 0;
   for (int run = 0; run < 150; ++run) {
-    Space space;
+    test::Space space;
     space.stems = {{{ranges(random), -3.0}, 0.2, {leans(random), leans(random)}, 0.01}};
-    PointSweep turn = sweep(space, spinner, random);
+    model::PointSweep turn = sweep(space, spinner, random);
     turn.attitude->level_Q_vehicle = tilt(tilts(random), tilts(random));
     turn.attitude->covariance_rad2 = kTilt * kTilt * Eigen::Matrix2d::Identity();
-    const LandmarkScan scan = extractor.extract(turn);
+    const model::LandmarkScan scan = extractor.extract(turn);
     if (scan.detections.size() != 1) continue;
-    const Detection& seen = scan.detections[0];
+    const model::Detection& seen = scan.detections[0];
     Eigen::Vector3d error = seen.position_m;
     error.head<2>() -= space.stems[0].breast;
     error.z() -= 1.3;
@@ -161,34 +164,34 @@ TEST_CASE("the way of the sensor during a turn is taken out of its lines of sigh
   // What a sensor at 10 m/s sees: each column of the turn from where it was then.
   std::mt19937_64 random(9);
   const Eigen::Vector2d velocity(10.0, 1.0);
-  const Space space = random_wood(random);
-  const Spinner spinner = spinner_of(32);
-  PointSweep moving;
-  Spinner part = spinner;
+  const test::Space space = random_wood(random);
+  const test::Spinner spinner = test::spinner_of(32);
+  model::PointSweep moving;
+  test::Spinner part = spinner;
   std::mt19937_64 noise(10);
   constexpr int kStops = 64;
   for (int k = 0; k < kStops; ++k) {
     const double middle_s = 0.1 * ((k + 0.5) / kStops - 1.0);
     part.sensor.head<2>() = velocity * middle_s;
     noise.seed(10);  // The turns begin at one azimuth.
-    const PointSweep still = sweep(space, part, noise);
+    const model::PointSweep still = sweep(space, part, noise);
     if (k == 0) moving = still;
     if (k == 0) moving.points.clear();
-    for (const SweepPoint& point : still.points) {
+    for (const model::SweepPoint& point : still.points) {
       const int stop = static_cast<int>((point.time_s / 0.1 + 1.0) * kStops);
       if (stop == k) moving.points.push_back(point);
     }
   }
   moving.sensor_position_m = spinner.sensor;
   LandmarkExtractor extractor(exact_stems());
-  const LandmarkScan scan = extractor.extract(moving);
+  const model::LandmarkScan scan = extractor.extract(moving);
   CHECK(scan.detections.size() >= 20);
-  for (const Detection& detection : scan.detections) {
-    const Stem* stem = stem_of(detection, space);
+  for (const model::Detection& detection : scan.detections) {
+    const test::Stem* stem = stem_of(detection, space);
     REQUIRE(stem != nullptr);
     CHECK((detection.position_m.head<2>() - stem->breast).norm() < 0.08);
   }
-  RingCloud cloud;
+  landmark_extractor::rings::RingCloud cloud;
   cloud.look_at(moving, 1.0, 30.0);
   CHECK(cloud.velocity_mps().x() == Approx(10.0).margin(0.5));
   CHECK(cloud.velocity_mps().y() == Approx(1.0).margin(0.5));
@@ -198,7 +201,7 @@ TEST_CASE("people, posts, hanging branches and bushes are no trunks", "[extracto
   std::mt19937_64 random(11);
   LandmarkExtractor extractor(exact_stems());
   for (const int rings : {32, 64}) {
-    Space space;
+    test::Space space;
     space.stems.push_back({{9.0, 2.0}, 0.22, {0.0, 0.0}, 0.0, 1.75});      // A person.
     space.stems.push_back({{7.0, -6.0}, 0.08, {0.0, 0.0}, 0.0, 1.0});      // A post.
     space.stems.push_back({{-8.0, 3.0}, 0.1, {0.0, 0.0}, 0.0, 9.0, 1.4});  // Hangs in the air.
@@ -211,7 +214,7 @@ TEST_CASE("people, posts, hanging branches and bushes are no trunks", "[extracto
                              0.0,
                              1.8});
     }
-    CHECK(extractor.extract(sweep(space, spinner_of(rings), random)).detections.empty());
+    CHECK(extractor.extract(sweep(space, test::spinner_of(rings), random)).detections.empty());
   }
   CHECK(extractor.sweep_counters().trunks.not_standing >= 4);
 }
@@ -228,7 +231,7 @@ TEST_CASE("trunks with branches at the height of many beams are found in their p
   for (const int rings : {32, 64}) {
     std::size_t found = 0;
     for (int run = 0; run < 10; ++run) {
-      Space space;
+      test::Space space;
       for (int k = 0; k < 6; ++k) {
         space.stems.push_back({place(k), 0.13});
         for (int branch = 0; branch < 20; ++branch) {  // Each rises by 36 cm on 36 cm.
@@ -239,9 +242,10 @@ TEST_CASE("trunks with branches at the height of many beams are found in their p
               {place(k) + lean * (1.3 - bottom), 0.03, lean, 0.0, bottom + 0.36, bottom});
         }
       }
-      const LandmarkScan scan = extractor.extract(sweep(space, spinner_of(rings), random));
+      const model::LandmarkScan scan =
+          extractor.extract(sweep(space, test::spinner_of(rings), random));
       for (int k = 0; k < 6; ++k) {
-        const bool is_found = std::ranges::any_of(scan.detections, [&](const Detection& d) {
+        const bool is_found = std::ranges::any_of(scan.detections, [&](const model::Detection& d) {
           return (d.position_m.head<2>() - place(k)).norm() < 0.06;
         });
         found += is_found ? 1 : 0;
@@ -257,7 +261,7 @@ TEST_CASE("what is seen near the ground alone is a tuft", "[extractor]") {
   for (const int rings : {16, 32, 64}) {
     std::size_t detections = 0;
     for (int run = 0; run < 10; ++run) {
-      Space space;
+      test::Space space;
       for (int k = 0; k < 6; ++k) {
         const Eigen::Vector2d at =
             (5.0 + 2.0 * k + 0.1 * run) * Eigen::Vector2d(std::cos(k), std::sin(k));
@@ -266,7 +270,8 @@ TEST_CASE("what is seen near the ground alone is a tuft", "[extractor]") {
           space.stems.push_back({at + 0.04 * aside, 0.012, {0.0, 0.0}, 0.0, 0.55});
         }
       }
-      detections += extractor.extract(sweep(space, spinner_of(rings), random)).detections.size();
+      detections +=
+          extractor.extract(sweep(space, test::spinner_of(rings), random)).detections.size();
     }
     CHECK(detections == 0);
   }
@@ -280,14 +285,14 @@ TEST_CASE("far people are told from trunks by the next beam above them", "[extra
     std::size_t found = 0;
     for (int run = 0; run < 10; ++run) {
       // Houses all around, for the beams that pass above.
-      Space people;
+      test::Space people;
       const std::array<Eigen::Vector2d, 4> yard{
           Eigen::Vector2d{28.0, 0.0}, {0.0, 28.0}, {-28.0, 0.0}, {0.0, -28.0}};
       for (std::size_t k = 0; k < 4; ++k) {
         const Eigen::Vector2d side = 0.5 * (yard[(k + 1) % 4] - yard[(k + 3) % 4]);
         people.facades.push_back({yard[k] - side, yard[k] + side, 15.0});
       }
-      Space trunks = people;
+      test::Space trunks = people;
       for (int k = 0; k < 5; ++k) {
         const double bearing = 1.2 * k;
         const Eigen::Vector2d at =
@@ -295,11 +300,12 @@ TEST_CASE("far people are told from trunks by the next beam above them", "[extra
         people.stems.push_back({at, 0.22, {0.0, 0.0}, 0.0, 1.75});
         trunks.stems.push_back({at, 0.22});
       }
-      const auto count = [&](const Space& space) {
-        const LandmarkScan scan = extractor.extract(sweep(space, spinner_of(rings), random));
-        return static_cast<std::size_t>(
-            std::count_if(scan.detections.begin(), scan.detections.end(), [](const Detection& d) {
-              return d.kind == LandmarkKind::kTrunk && d.position_m.head<2>().norm() < 26.0;
+      const auto count = [&](const test::Space& space) {
+        const model::LandmarkScan scan =
+            extractor.extract(sweep(space, test::spinner_of(rings), random));
+        return static_cast<std::size_t>(std::count_if(
+            scan.detections.begin(), scan.detections.end(), [](const model::Detection& d) {
+              return d.kind == model::LandmarkKind::kTrunk && d.position_m.head<2>().norm() < 26.0;
             }));
       };
       CHECK(count(people) == 0);
@@ -317,8 +323,8 @@ TEST_CASE("strips of walls are no trunks, posts of signs are", "[extractor]") {
     std::size_t strips = 0;
     std::size_t posts = 0;
     for (int run = 0; run < 10; ++run) {
-      Space space;
-      Space signs;
+      test::Space space;
+      test::Space signs;
       for (int k = 0; k < 5; ++k) {
         const double bearing = 1.2 * k;
         const Eigen::Vector2d middle =
@@ -328,8 +334,8 @@ TEST_CASE("strips of walls are no trunks, posts of signs are", "[extractor]") {
         space.facades.push_back({middle - half, middle + half, 6.0});
         signs.stems.push_back({0.6 * middle, 0.03, {0.0, 0.0}, 0.0, 2.8});
       }
-      strips += extractor.extract(sweep(space, spinner_of(rings), random)).detections.size();
-      posts += extractor.extract(sweep(signs, spinner_of(rings), random)).detections.size();
+      strips += extractor.extract(sweep(space, test::spinner_of(rings), random)).detections.size();
+      posts += extractor.extract(sweep(signs, test::spinner_of(rings), random)).detections.size();
     }
     CHECK(strips <= 2);
     CHECK(posts >= 35);
@@ -338,12 +344,12 @@ TEST_CASE("strips of walls are no trunks, posts of signs are", "[extractor]") {
 
 TEST_CASE("sweeps that cannot be give nothing, and bad points are left out", "[extractor]") {
   std::mt19937_64 random(12);
-  const Space space = random_wood(random);
-  const PointSweep good = sweep(space, spinner_of(32), random);
+  const test::Space space = random_wood(random);
+  const model::PointSweep good = sweep(space, test::spinner_of(32), random);
   LandmarkExtractor extractor;
   const std::size_t seen = extractor.extract(good).detections.size();
   REQUIRE(seen >= 15);
-  PointSweep bad = good;
+  model::PointSweep bad = good;
   bad.is_deskewed = false;
   CHECK(extractor.extract(bad).detections.empty());
   bad = good;
@@ -357,7 +363,7 @@ TEST_CASE("sweeps that cannot be give nothing, and bad points are left out", "[e
   bad.points.clear();
   CHECK(extractor.extract(bad).detections.empty());
   bad = good;
-  for (SweepPoint& point : bad.points) point.x_m = std::numeric_limits<float>::quiet_NaN();
+  for (model::SweepPoint& point : bad.points) point.x_m = std::numeric_limits<float>::quiet_NaN();
   CHECK(extractor.extract(bad).detections.empty());
   CHECK(extractor.sweep_counters().points.not_finite == good.points.size());
   bad = good;

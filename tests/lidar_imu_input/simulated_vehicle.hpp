@@ -14,7 +14,7 @@
 
 namespace understory::test {
 
-inline double seconds(Utime utime) { return static_cast<double>(utime) * 1e-6; }
+inline double seconds(model::Utime utime) { return static_cast<double>(utime) * 1e-6; }
 
 /// Stands for `stand_s`, then drives: speed and heading swing, the body pitches and rolls.
 struct Drive {
@@ -85,7 +85,7 @@ class Track {
         positions_[i] + drive_.velocity(t) * (t - static_cast<double>(i) * kStep_s);
     return pose;
   }
-  SE2 planar(double t) const {
+  geometry::SE2 planar(double t) const {
     const Eigen::Isometry3d at = pose(t);
     return {Eigen::Vector2d(at.translation().head<2>()), drive_.heading(t)};
   }
@@ -105,14 +105,14 @@ struct SensorErrors {
   double wheel_noise_mps = 0.0;
 };
 
-inline ImuSample imu_at(const Drive& drive, Utime utime, double rate_hz, const SensorErrors& errors,
-                        std::mt19937_64& random) {
+inline model::ImuSample imu_at(const Drive& drive, model::Utime utime, double rate_hz,
+                               const SensorErrors& errors, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
   const auto noise = [&](double density) {
     return Eigen::Vector3d(Eigen::Vector3d::NullaryExpr(
         [&](Eigen::Index) { return density * std::sqrt(rate_hz) * normal(random); }));
   };
-  ImuSample sample;
+  model::ImuSample sample;
   sample.utime = utime;
   sample.angular_rate_rad_s =
       drive.rate(seconds(utime)) + errors.gyro_bias + noise(errors.gyro_noise);
@@ -122,10 +122,10 @@ inline ImuSample imu_at(const Drive& drive, Utime utime, double rate_hz, const S
 }
 
 /// Encoder in the middle of the axle, which is where the frame `vehicle` is.
-inline WheelSample wheels_at(const Drive& drive, Utime utime, const SensorErrors& errors,
-                             std::mt19937_64& random) {
+inline model::WheelSample wheels_at(const Drive& drive, model::Utime utime,
+                                    const SensorErrors& errors, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
-  WheelSample sample;
+  model::WheelSample sample;
   sample.utime = utime;
   const double speed = drive.speed(seconds(utime));
   sample.speed_mps =
@@ -133,17 +133,17 @@ inline WheelSample wheels_at(const Drive& drive, Utime utime, const SensorErrors
   return sample;
 }
 
-inline LidarImuInputParameters parameters_for_drive() {
-  LidarImuInputParameters parameters;
+inline lidar_imu_input::LidarImuInputParameters parameters_for_drive() {
+  lidar_imu_input::LidarImuInputParameters parameters;
   parameters.wheels.car.encoder_left_m = 0.0;
   return parameters;
 }
 
 /// One turn of 0.1 s: posts around the vehicle, each point where the sensor saw it.
-inline PointSweep sweep_at(const Track& track, Utime start,
-                           const Eigen::Isometry3d& vehicle_T_sensor,
-                           const std::vector<Eigen::Vector3d>& world_points) {
-  PointSweep sweep;
+inline model::PointSweep sweep_at(const Track& track, model::Utime start,
+                                  const Eigen::Isometry3d& vehicle_T_sensor,
+                                  const std::vector<Eigen::Vector3d>& world_points) {
+  model::PointSweep sweep;
   sweep.utime = start;
   sweep.rings = 1;
   sweep.max_range_m = 100.0;
@@ -152,7 +152,7 @@ inline PointSweep sweep_at(const Track& track, Utime start,
         0.1 * static_cast<double>(i) / static_cast<double>(world_points.size() - 1);
     const Eigen::Vector3d p =
         (track.pose(seconds(start) + after) * vehicle_T_sensor).inverse() * world_points[i];
-    SweepPoint point;
+    model::SweepPoint point;
     point.x_m = static_cast<float>(p.x());
     point.y_m = static_cast<float>(p.y());
     point.z_m = static_cast<float>(p.z());

@@ -8,49 +8,51 @@
 #include "tests/lidar_imu_input/simulated_vehicle.hpp"
 
 using namespace understory;
+using namespace understory::lidar_imu_input;
 using namespace understory::test;
 
 namespace {
 
 /// A drive of which each message can be changed or left out; keeps what came of it.
 struct FaultyRun {
-  std::function<bool(ImuSample&)> imu = [](ImuSample&) { return true; };
-  std::function<bool(WheelSample&)> wheels = [](WheelSample&) { return true; };
-  std::function<bool(PointSweep&)> sweep = [](PointSweep&) { return true; };
+  std::function<bool(model::ImuSample&)> imu = [](model::ImuSample&) { return true; };
+  std::function<bool(model::WheelSample&)> wheels = [](model::WheelSample&) { return true; };
+  std::function<bool(model::PointSweep&)> sweep = [](model::PointSweep&) { return true; };
 
   std::map<InputFaultKind, int> faults;
   std::map<std::string, int> channels;  ///< Faults per channel.
   int sweeps = 0;
-  Utime largest_gap_us = 0;       ///< Between ends of pieces or sweeps.
-  double position_error_m = 0.0;  ///< Of RAW_POSE at the end, over the drive.
+  model::Utime largest_gap_us = 0;  ///< Between ends of pieces or sweeps.
+  double position_error_m = 0.0;    ///< Of RAW_POSE at the end, over the drive.
   InputCounters counters;
 
   void go(double length_s = 34.0) {
-    Drive drive;
-    const Track track(drive, length_s + 1.0);
+    test::Drive drive;
+    const test::Track track(drive, length_s + 1.0);
     std::mt19937_64 random(2);
     std::normal_distribution<double> normal;
-    SensorErrors errors;
+    test::SensorErrors errors;
     errors.gyro_noise = 3e-4;
     errors.force_noise = 4e-3;
     errors.wheel_noise_mps = 0.02;
-    LidarImuInput input(parameters_for_drive());
+    LidarImuInput input(test::parameters_for_drive());
     std::vector<Eigen::Vector3d> world(100, Eigen::Vector3d(20.0, 5.0, 1.0));
     for (std::size_t i = 0; i < world.size(); ++i) world[i].y() += static_cast<double>(i);
-    for (Utime t = 0; seconds(t) < length_s; t += 10'000) {
-      ImuSample imu_sample = imu_at(drive, t, 100.0, errors, random);
-      WheelSample wheel_sample = wheels_at(drive, t, errors, random);
+    for (model::Utime t = 0; test::seconds(t) < length_s; t += 10'000) {
+      model::ImuSample imu_sample = imu_at(drive, t, 100.0, errors, random);
+      model::WheelSample wheel_sample = wheels_at(drive, t, errors, random);
       if (imu(imu_sample)) take(input.add(imu_sample));
       if (t % 20'000 == 0 && wheels(wheel_sample)) take(input.add(wheel_sample));
       if (t >= 200'000 && t % 100'000 == 0) {
-        PointSweep turn = sweep_at(track, t - 101'000, Eigen::Isometry3d::Identity(), world);
-        for (SweepPoint& p : turn.points) p.x_m += 1e-3F * static_cast<float>(normal(random));
+        model::PointSweep turn = sweep_at(track, t - 101'000, Eigen::Isometry3d::Identity(), world);
+        for (model::SweepPoint& p : turn.points)
+          p.x_m += 1e-3F * static_cast<float>(normal(random));
         if (sweep(turn)) take(input.add(turn));
       }
     }
     take(input.finish());
     counters = input.counters();
-    const SE2 truth = track.planar(0.0).inverse() * track.planar(length_s - 0.01);
+    const geometry::SE2 truth = track.planar(0.0).inverse() * track.planar(length_s - 0.01);
     position_error_m =
         (input.motion().raw_pose().odom_T_vehicle.translation() - truth.translation()).norm();
   }
@@ -62,7 +64,7 @@ struct FaultyRun {
         ++faults[fault->kind];
         ++channels[fault->channel];
       }
-      if (const auto* odometry = std::get_if<Odometry>(&result)) {
+      if (const auto* odometry = std::get_if<model::Odometry>(&result)) {
         CHECK(odometry->utime > last_odometry_);
         if (last_odometry_ > 0)
           largest_gap_us = std::max(largest_gap_us, odometry->utime - last_odometry_);
@@ -70,31 +72,31 @@ struct FaultyRun {
         CHECK(odometry->covariance.allFinite());
         CHECK(odometry->from_T_to.coordinates().allFinite());
       }
-      if (const auto* turn = std::get_if<PointSweep>(&result)) {
+      if (const auto* turn = std::get_if<model::PointSweep>(&result)) {
         CHECK(turn->utime > last_sweep_);
         last_sweep_ = turn->utime;
         ++sweeps;
-        for (const SweepPoint& p : turn->points) CHECK(p.position().allFinite());
+        for (const model::SweepPoint& p : turn->points) CHECK(p.position().allFinite());
       }
-      if (const auto* pose = std::get_if<RawPose>(&result)) {
+      if (const auto* pose = std::get_if<model::RawPose>(&result)) {
         CHECK(pose->utime > last_pose_);
         last_pose_ = pose->utime;
         CHECK(pose->odom_T_vehicle.coordinates().allFinite());
       }
-      if (const auto* sample = std::get_if<ImuSample>(&result)) {
+      if (const auto* sample = std::get_if<model::ImuSample>(&result)) {
         CHECK(sample->utime > last_imu_);
         last_imu_ = sample->utime;
       }
     }
   }
-  Utime last_odometry_ = -1;
-  Utime last_sweep_ = -1;
-  Utime last_pose_ = -1;
-  Utime last_imu_ = -1;
+  model::Utime last_odometry_ = -1;
+  model::Utime last_sweep_ = -1;
+  model::Utime last_pose_ = -1;
+  model::Utime last_imu_ = -1;
 };
 
-bool within(Utime t, double from_s, double to_s) {
-  return seconds(t) >= from_s && seconds(t) < to_s;
+bool within(model::Utime t, double from_s, double to_s) {
+  return test::seconds(t) >= from_s && test::seconds(t) < to_s;
 }
 
 }  // namespace
@@ -109,7 +111,7 @@ TEST_CASE("a drive without faults reports none", "[faults]") {
 
 TEST_CASE("an IMU that stops is named, and the wheels carry on", "[faults]") {
   FaultyRun run;
-  run.imu = [](ImuSample& s) { return !within(s.utime, 26.0, 31.0); };
+  run.imu = [](model::ImuSample& s) { return !within(s.utime, 26.0, 31.0); };
   run.go();
   CHECK(run.faults[InputFaultKind::kSilent] == 1);
   CHECK(run.channels["RAW_IMU"] == 1);
@@ -121,7 +123,7 @@ TEST_CASE("an IMU that stops is named, and the wheels carry on", "[faults]") {
 
 TEST_CASE("wheels that stop are named, and the IMU carries on", "[faults]") {
   FaultyRun run;
-  run.wheels = [](WheelSample& s) { return !within(s.utime, 26.0, 31.0); };
+  run.wheels = [](model::WheelSample& s) { return !within(s.utime, 26.0, 31.0); };
   run.go();
   CHECK(run.faults[InputFaultKind::kSilent] == 1);
   CHECK(run.sweeps >= 337);
@@ -130,8 +132,8 @@ TEST_CASE("wheels that stop are named, and the IMU carries on", "[faults]") {
 
 TEST_CASE("IMU and wheels both stop: sweeps do not wait for ever", "[faults]") {
   FaultyRun run;
-  run.imu = [](ImuSample& s) { return !within(s.utime, 26.0, 31.0); };
-  run.wheels = [](WheelSample& s) { return !within(s.utime, 26.0, 31.0); };
+  run.imu = [](model::ImuSample& s) { return !within(s.utime, 26.0, 31.0); };
+  run.wheels = [](model::WheelSample& s) { return !within(s.utime, 26.0, 31.0); };
   run.go();
   CHECK(run.faults[InputFaultKind::kSilent] == 2);
   CHECK(run.faults[InputFaultKind::kNoMotion] > 30);
@@ -141,7 +143,7 @@ TEST_CASE("IMU and wheels both stop: sweeps do not wait for ever", "[faults]") {
 
 TEST_CASE("a laser that stops is named", "[faults]") {
   FaultyRun run;
-  run.sweep = [](PointSweep& s) { return !within(s.utime, 26.0, 31.0); };
+  run.sweep = [](model::PointSweep& s) { return !within(s.utime, 26.0, 31.0); };
   run.go();
   CHECK(run.faults[InputFaultKind::kSilent] == 1);
   CHECK(run.channels["RAW_SWEEP"] == 1);
@@ -151,13 +153,13 @@ TEST_CASE("a laser that stops is named", "[faults]") {
 TEST_CASE("a clock that jumps back by a second is followed within two", "[faults]") {
   const int which = GENERATE(0, 1, 2, 3);
   FaultyRun run;
-  const auto jump = [](Utime& utime) {
-    if (seconds(utime) >= 27.0) utime -= 1'000'000;
+  const auto jump = [](model::Utime& utime) {
+    if (test::seconds(utime) >= 27.0) utime -= 1'000'000;
     return true;
   };
-  if (which == 0 || which == 3) run.imu = [&](ImuSample& s) { return jump(s.utime); };
-  if (which == 1 || which == 3) run.wheels = [&](WheelSample& s) { return jump(s.utime); };
-  if (which == 2 || which == 3) run.sweep = [&](PointSweep& s) { return jump(s.utime); };
+  if (which == 0 || which == 3) run.imu = [&](model::ImuSample& s) { return jump(s.utime); };
+  if (which == 1 || which == 3) run.wheels = [&](model::WheelSample& s) { return jump(s.utime); };
+  if (which == 2 || which == 3) run.sweep = [&](model::PointSweep& s) { return jump(s.utime); };
   run.go();
   CAPTURE(which, run.position_error_m, run.sweeps, run.largest_gap_us);
   CHECK(run.faults[InputFaultKind::kClockJump] == (which == 3 ? 6 : 2));
@@ -167,8 +169,8 @@ TEST_CASE("a clock that jumps back by a second is followed within two", "[faults
 
 TEST_CASE("a clock that jumps ahead is followed", "[faults]") {
   FaultyRun run;
-  run.imu = [](ImuSample& s) {
-    if (seconds(s.utime) >= 27.0) s.utime += 5'000'000;
+  run.imu = [](model::ImuSample& s) {
+    if (test::seconds(s.utime) >= 27.0) s.utime += 5'000'000;
     return true;
   };
   run.go();
@@ -181,14 +183,14 @@ TEST_CASE("values that are no numbers are dropped and counted", "[faults]") {
   FaultyRun run;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   int count = 0;
-  run.imu = [&](ImuSample& s) {
+  run.imu = [&](model::ImuSample& s) {
     if (within(s.utime, 26.0, 27.0) && ++count % 3 == 0) s.specific_force_mps2.x() = nan;
     return true;
   };
-  run.sweep = [](PointSweep& s) {
+  run.sweep = [](model::PointSweep& s) {
     if (within(s.utime, 28.0, 28.5)) s.points[3].x_m = std::numeric_limits<float>::infinity();
     if (within(s.utime, 29.0, 29.1))
-      for (SweepPoint& p : s.points) p.z_m = std::numeric_limits<float>::quiet_NaN();
+      for (model::SweepPoint& p : s.points) p.z_m = std::numeric_limits<float>::quiet_NaN();
     return true;
   };
   run.go();
@@ -199,7 +201,7 @@ TEST_CASE("values that are no numbers are dropped and counted", "[faults]") {
 
 TEST_CASE("a saturated IMU is counted and widens the covariance", "[faults]") {
   FaultyRun run;
-  run.imu = [](ImuSample& s) {
+  run.imu = [](model::ImuSample& s) {
     if (within(s.utime, 27.0, 27.295)) s.angular_rate_rad_s.z() = 8.7;
     return true;
   };
@@ -210,8 +212,8 @@ TEST_CASE("a saturated IMU is counted and widens the covariance", "[faults]") {
 
 TEST_CASE("a frozen IMU is named and not believed", "[faults]") {
   FaultyRun run;
-  ImuSample frozen;
-  run.imu = [&](ImuSample& s) {
+  model::ImuSample frozen;
+  run.imu = [&](model::ImuSample& s) {
     if (within(s.utime, 26.0, 29.0)) {
       s.angular_rate_rad_s = frozen.angular_rate_rad_s;
       s.specific_force_mps2 = frozen.specific_force_mps2;
@@ -227,9 +229,9 @@ TEST_CASE("a frozen IMU is named and not believed", "[faults]") {
 }
 
 TEST_CASE("messages that repeat or come out of order are dropped", "[faults]") {
-  LidarImuInput input(parameters_for_drive());
+  LidarImuInput input(test::parameters_for_drive());
   std::mt19937_64 random(1);
-  const ImuSample sample = imu_at({}, 50'000, 100.0, {}, random);
+  const model::ImuSample sample = imu_at({}, 50'000, 100.0, {}, random);
   input.add(sample);
   const InputResults again = input.add(sample);
   REQUIRE(again.size() == 1);

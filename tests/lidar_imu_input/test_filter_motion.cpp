@@ -7,16 +7,17 @@
 #include "tests/lidar_imu_input/simulated_vehicle.hpp"
 
 using namespace understory;
+using namespace understory::lidar_imu_input;
 using namespace understory::test;
 
 namespace {
 
-constexpr Utime kBegin = 40'000'000;
-constexpr Utime kTurn_us = 100'000;
+constexpr model::Utime kBegin = 40'000'000;
+constexpr model::Utime kRevolution_us = 100'000;
 
 class LaserAlone {
  public:
-  LaserAlone() : track_(level_drive(), 50.0), input_(parameters_for_drive()) {
+  LaserAlone() : track_(level_drive(), 50.0), input_(test::parameters_for_drive()) {
     std::mt19937_64 random(5);
     std::uniform_real_distribution<double> place(-40.0, 40.0);
     for (int i = 0; i < 200; ++i) {
@@ -27,17 +28,17 @@ class LaserAlone {
 
   /// The next turn; RMS of its points' errors in the plan [m], where they are at its stamp.
   double turn() {
-    const Utime begin = kBegin + count_++ * kTurn_us;
-    const InputResults results = input_.add(
-        sweep_at(track_, begin, parameters_for_drive().lidar.mount.vehicle_T_sensor(), world_));
+    const model::Utime begin = kBegin + count_++ * kRevolution_us;
+    const InputResults results = input_.add(sweep_at(
+        track_, begin, test::parameters_for_drive().lidar.mount.vehicle_T_sensor(), world_));
     double square_m2 = 0.0;
     int sweeps = 0;
     for (const InputResult& result : results) {
-      const auto* sweep = std::get_if<PointSweep>(&result);
+      const auto* sweep = std::get_if<model::PointSweep>(&result);
       if (sweep == nullptr) continue;
       ++sweeps;
       stamp_ = sweep->utime;
-      const SE2 vehicle_T_world = track_.planar(seconds(sweep->utime)).inverse();
+      const geometry::SE2 vehicle_T_world = track_.planar(test::seconds(sweep->utime)).inverse();
       REQUIRE(sweep->points.size() == world_.size());
       for (std::size_t i = 0; i < world_.size(); ++i) {
         const Eigen::Vector2d is = vehicle_T_world * Eigen::Vector2d(world_[i].head<2>());
@@ -50,11 +51,11 @@ class LaserAlone {
 
   /// The filter's pose of the latest sweep.
   void filter_speaks(std::uint32_t landmarks, std::uint64_t resets = 0) {
-    EkfPose pose;
+    model::EkfPose pose;
     pose.utime = stamp_;
     // In a frame of its own.
-    pose.ekf_map_T_vehicle =
-        SE2(3.0, -2.0, 0.7 + static_cast<double>(resets)) * track_.planar(seconds(stamp_));
+    pose.ekf_map_T_vehicle = geometry::SE2(3.0, -2.0, 0.7 + static_cast<double>(resets)) *
+                             track_.planar(test::seconds(stamp_));
     pose.landmarks_used = landmarks;
     pose.reset_counter = resets;
     input_.add(pose);
@@ -63,17 +64,17 @@ class LaserAlone {
   LidarImuInput& input() { return input_; }
 
  private:
-  static Drive level_drive() {
-    Drive drive;
+  static test::Drive level_drive() {
+    test::Drive drive;
     drive.tilt_rad = 0.0;
     drive.rough_rad = 0.0;
     return drive;
   }
 
-  Track track_;
+  test::Track track_;
   LidarImuInput input_;
   std::vector<Eigen::Vector3d> world_;
-  Utime stamp_ = 0;
+  model::Utime stamp_ = 0;
   int count_ = 0;
 };
 
@@ -118,7 +119,7 @@ TEST_CASE("the filter's motion outlives a restart", "[state][deskew]") {
     laser.turn();
     laser.filter_speaks(6);
   }
-  LidarImuInput loaded(parameters_for_drive());
+  LidarImuInput loaded(test::parameters_for_drive());
   loaded.load(laser.input().save());
   laser.input() = std::move(loaded);
   CHECK(laser.turn() < 0.05);

@@ -12,85 +12,86 @@
 #include "tests/scratch.hpp"
 
 using namespace understory;
+using namespace understory::lidar_imu_input;
 using namespace understory::test;
 namespace fs = std::filesystem;
 
 namespace {
 
-constexpr Utime kStep_us = 10'000;
+constexpr model::Utime kStep_us = 10'000;
 
 /// From its start until it is killed: nothing is saved at the end.
 struct Life {
   explicit Life(const fs::path& directory)
-      : hosted(lidar_imu_input_service({}), bus, no_clock(), "wheels.encoder_left_m = 0.0\n",
+      : hosted(lidar_imu_input_service({}), bus, bus::no_clock(), "wheels.encoder_left_m = 0.0\n",
                "test.toml"),
         store(directory, "lidar_imu_input") {
-    bus.subscribe("RAW_POSE", 0, [this](const BusMessage& message) {
-      poses.push_back(*decode_message<RawPose>(message.bytes));
+    bus.subscribe("RAW_POSE", 0, [this](const bus::BusMessage& message) {
+      poses.push_back(*wire::decode_message<model::RawPose>(message.bytes));
     });
-    bus.subscribe("ODOMETRY", 0, [this](const BusMessage& message) {
-      pieces.push_back(*decode_message<Odometry>(message.bytes));
+    bus.subscribe("ODOMETRY", 0, [this](const bus::BusMessage& message) {
+      increments.push_back(*wire::decode_message<model::Odometry>(message.bytes));
     });
     REQUIRE(hosted.node().recover(store));
     hosted.node().journal_to(&store);
     hosted.node().connect();
     bus.drain();
   }
-  void run(Utime from, Utime to) {
-    const Drive drive;
-    SensorErrors errors;
+  void run(model::Utime from, model::Utime to) {
+    const test::Drive drive;
+    test::SensorErrors errors;
     errors.gyro_bias = {0.003, -0.002, 0.004};
     std::mt19937_64 random(1);
-    for (Utime t = from; t < to; t += kStep_us) {
-      ImuSample imu = imu_at(drive, t, 100.0, errors, random);
+    for (model::Utime t = from; t < to; t += kStep_us) {
+      model::ImuSample imu = imu_at(drive, t, 100.0, errors, random);
       imu.sequence = static_cast<std::uint64_t>(t / kStep_us);
-      bus.publish("RAW_IMU", encode_message(imu));
-      WheelSample wheels = wheels_at(drive, t, errors, random);
+      bus.publish("RAW_IMU", wire::encode_message(imu));
+      model::WheelSample wheels = wheels_at(drive, t, errors, random);
       wheels.sequence = imu.sequence;
-      bus.publish("RAW_WHEELS", encode_message(wheels));
+      bus.publish("RAW_WHEELS", wire::encode_message(wheels));
       bus.drain();
     }
   }
 
-  MemoryBus bus{MemoryBus::Queues::kUnlimited};
-  HostedService hosted;
-  StateStore store;
-  std::vector<RawPose> poses;
-  std::vector<Odometry> pieces;
+  bus::MemoryBus bus{bus::MemoryBus::Queues::kUnlimited};
+  bus::HostedService hosted;
+  bus::StateStore store;
+  std::vector<model::RawPose> poses;
+  std::vector<model::Odometry> increments;
 };
 
 }  // namespace
 
 TEST_CASE("killed in the middle of a drive, the input goes on where it was", "[state]") {
-  const Scratch scratch("input");
+  const test::Scratch scratch("input");
   const fs::path uncut_directory = scratch.path() / "uncut";
   const fs::path cut_directory = scratch.path() / "cut";
   fs::create_directories(uncut_directory);
   fs::create_directories(cut_directory);
   // Between two snapshots, so that the journal has to be read as well.
-  constexpr Utime kKilled = 27'730'000;
-  constexpr Utime kEnd = 32'000'000;
+  constexpr model::Utime kKilled = 27'730'000;
+  constexpr model::Utime kEnd = 32'000'000;
   Life uncut(uncut_directory);
   uncut.run(kStep_us, kEnd);
   {
     Life first(cut_directory);
     first.run(kStep_us, kKilled);
-    CHECK(first.pieces.size() > 200);
+    CHECK(first.increments.size() > 200);
   }
   Life second(cut_directory);
   CHECK(second.poses.empty());
   second.run(kKilled, kEnd);
-  REQUIRE(second.pieces.size() > 30);
+  REQUIRE(second.increments.size() > 30);
   REQUIRE(second.poses.size() > 100);
   const auto after = [&](const auto& all, std::size_t count) {
     return std::vector(all.end() - static_cast<std::ptrdiff_t>(count), all.end());
   };
-  const auto pieces = after(uncut.pieces, second.pieces.size());
-  for (std::size_t i = 0; i < pieces.size(); ++i) {
-    REQUIRE(second.pieces[i].from_utime == pieces[i].from_utime);
-    REQUIRE(second.pieces[i].utime == pieces[i].utime);
-    REQUIRE((second.pieces[i].from_T_to.coordinates() - pieces[i].from_T_to.coordinates()).norm() <
-            1e-9);
+  const auto increments = after(uncut.increments, second.increments.size());
+  for (std::size_t i = 0; i < increments.size(); ++i) {
+    REQUIRE(second.increments[i].from_utime == increments[i].from_utime);
+    REQUIRE(second.increments[i].utime == increments[i].utime);
+    REQUIRE((second.increments[i].from_T_to.coordinates() - increments[i].from_T_to.coordinates())
+                .norm() < 1e-9);
   }
   const auto poses = after(uncut.poses, second.poses.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {

@@ -8,6 +8,7 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::lidar_imu_input;
 
 namespace {
 
@@ -48,11 +49,11 @@ struct Figures {
   double tilt_squares = 0.0;
   double tilt_nees = 0.0;
   int samples = 0;
-  SE2WithCovariance driven;  ///< From the first piece that moves.
-  std::optional<Utime> from;
-  Utime to = 0;
+  geometry::SE2WithCovariance driven;  ///< From the first piece that moves.
+  std::optional<model::Utime> from;
+  model::Utime to = 0;
   double inertial_nees = 0.0;  ///< 5 degrees of freedom, over a piece.
-  int pieces = 0;
+  int increments = 0;
   double before = 0.0;  ///< Of points, squared.
   double after = 0.0;
   int points = 0;
@@ -69,27 +70,28 @@ void compare_tilt(const MotionEstimator& motion, const sim::VehicleState& truth,
 }
 
 /// Against the truth, with what is known of biases beforehand.
-void compare_piece(const Odometry& piece, const sim::SensorDrive& drive, Figures& figures) {
-  const sim::VehicleState a = drive.state_at(piece.from_utime);
-  const sim::VehicleState b = drive.state_at(piece.utime);
-  if (!figures.from) figures.from = piece.from_utime;
-  figures.driven = compound(figures.driven, {piece.from_T_to, piece.covariance});
-  figures.to = piece.utime;
-  const Preintegration& p = *piece.inertial;
+void compare_increment(const model::Odometry& increment, const sim::SensorDrive& drive,
+                       Figures& figures) {
+  const sim::VehicleState a = drive.state_at(increment.from_utime);
+  const sim::VehicleState b = drive.state_at(increment.utime);
+  if (!figures.from) figures.from = increment.from_utime;
+  figures.driven = compound(figures.driven, {increment.from_T_to, increment.covariance});
+  figures.to = increment.utime;
+  const model::Preintegration& p = *increment.inertial;
   const Eigen::Matrix2d back = a.world_T_level().rotation().transpose();
   Eigen::Matrix<double, 5, 1> error;
-  error << wrap_angle(p.yaw_rad - (b.yaw_rad - a.yaw_rad)),
+  error << geometry::wrap_angle(p.yaw_rad - (b.yaw_rad - a.yaw_rad)),
       p.velocity_mps - back * (b.velocity_mps - a.velocity_mps).head<2>(),
       p.position_m - back * (b.position_m - a.position_m - a.velocity_mps * p.seconds).head<2>();
   const Eigen::Vector3d bias(1e-4, 0.05, 0.05);
   const Eigen::Matrix<double, 5, 5> covariance =
       p.covariance + p.bias_jacobian * bias.cwiseAbs2().asDiagonal() * p.bias_jacobian.transpose();
   figures.inertial_nees += error.dot(covariance.ldlt().solve(error));
-  ++figures.pieces;
+  ++figures.increments;
 }
 
-void compare_sweep(const PointSweep& sweep, const PointSweep& raw, sim::SensorDrive& drive,
-                   const SensorMount& mount, Figures& figures) {
+void compare_sweep(const model::PointSweep& sweep, const model::PointSweep& raw,
+                   sim::SensorDrive& drive, const SensorMount& mount, Figures& figures) {
   const Eigen::Isometry3d vehicle_T_world = drive.state_at(sweep.utime).world_T_vehicle().inverse();
   const auto truth = drive.sweep(sweep.turn);
   if (sweep.points.size() != truth.true_m.size()) return;
@@ -106,26 +108,26 @@ void compare_sweep(const PointSweep& sweep, const PointSweep& raw, sim::SensorDr
 Figures run(Drive& scene) {
   LidarImuInput input(scene.parameters);
   Figures figures;
-  std::optional<PointSweep> raw;
+  std::optional<model::PointSweep> raw;
   const auto take = [&](const InputResults& results) {
     for (const InputResult& result : results) {
       figures.faults += std::holds_alternative<InputFault>(result);
-      if (const auto* piece = std::get_if<Odometry>(&result)) {
-        if (!piece->is_standing) compare_piece(*piece, *scene.drive, figures);
-      } else if (const auto* sweep = std::get_if<PointSweep>(&result)) {
+      if (const auto* increment = std::get_if<model::Odometry>(&result)) {
+        if (!increment->is_stationary) compare_increment(*increment, *scene.drive, figures);
+      } else if (const auto* sweep = std::get_if<model::PointSweep>(&result)) {
         if (raw && sweep->utime > 30'000'000 && sweep->turn % 10 == 0 && raw->turn == sweep->turn)
           compare_sweep(*sweep, *raw, *scene.drive, scene.parameters.lidar.mount, figures);
       }
     }
   };
   while (const auto reading = scene.drive->next()) {
-    if (const auto* imu = std::get_if<ImuSample>(&*reading)) {
+    if (const auto* imu = std::get_if<model::ImuSample>(&*reading)) {
       take(input.add(*imu));
       if (imu->utime > 22'000'000)
         compare_tilt(input.motion(), scene.drive->state_at(imu->utime), figures);
-    } else if (const auto* wheels = std::get_if<WheelSample>(&*reading)) {
+    } else if (const auto* wheels = std::get_if<model::WheelSample>(&*reading)) {
       take(input.add(*wheels));
-    } else if (const auto* fix = std::get_if<GnssFix>(&*reading)) {
+    } else if (const auto* fix = std::get_if<model::GnssFix>(&*reading)) {
       take(input.add(*fix));
     } else if (const auto* sweep = std::get_if<sim::SimulatedSweep>(&*reading)) {
       raw = sweep->raw;
@@ -145,23 +147,23 @@ TEST_CASE("a simulated drive with wheels: attitude, odometry and its honesty", "
     Drive scene(seed, true, 250.0, false);
     const Figures figures = run(scene);
     const double rms = std::sqrt(figures.tilt_squares / figures.samples);
-    const SE2 truth = scene.drive->state_at(*figures.from).world_T_level().inverse() *
-                      scene.drive->state_at(figures.to).world_T_level();
+    const geometry::SE2 truth = scene.drive->state_at(*figures.from).world_T_level().inverse() *
+                                scene.drive->state_at(figures.to).world_T_level();
     const Eigen::Vector3d error = (figures.driven.mean.inverse() * truth).Log();
     const double drive_nees = error.dot(figures.driven.covariance.ldlt().solve(error));
     nees += drive_nees / kRuns;
     INFO("seed " << seed << ": tilt worst " << figures.worst_tilt_rad / kDegree << " rms "
                  << rms / kDegree << " deg, NEES " << figures.tilt_nees / figures.samples
                  << "; odometry error " << error.transpose() << " NEES " << drive_nees
-                 << "; inertial NEES " << figures.inertial_nees / figures.pieces);
+                 << "; inertial NEES " << figures.inertial_nees / figures.increments);
     CHECK(figures.faults == 0);
     // What the accelerometer's bias (sigma 0.03 m/s^2) feigns at the start is not to be told apart.
     CHECK(figures.worst_tilt_rad < 0.35 * kDegree);
     CHECK(rms < 0.15 * kDegree);
     CHECK(figures.tilt_nees / figures.samples < 6.0);
     CHECK(error.head<2>().norm() < 0.01 * 250.0);
-    CHECK(figures.inertial_nees / figures.pieces < 7.5);
-    CHECK(figures.inertial_nees / figures.pieces > 0.5);
+    CHECK(figures.inertial_nees / figures.increments < 7.5);
+    CHECK(figures.inertial_nees / figures.increments > 0.5);
   }
   CHECK(nees < 7.8);
 }
@@ -171,10 +173,10 @@ TEST_CASE("a simulated drive without wheels", "[sim]") {
   const Figures figures = run(scene);
   INFO("tilt worst " << figures.worst_tilt_rad / kDegree << " deg, NEES "
                      << figures.tilt_nees / figures.samples << "; inertial NEES "
-                     << figures.inertial_nees / figures.pieces);
+                     << figures.inertial_nees / figures.increments);
   CHECK(figures.worst_tilt_rad < 0.6 * kDegree);
   CHECK(figures.tilt_nees / figures.samples < 8.0);
-  CHECK(figures.inertial_nees / figures.pieces < 7.5);
+  CHECK(figures.inertial_nees / figures.increments < 7.5);
 }
 
 TEST_CASE("simulated sweeps are de-skewed to a centimetre", "[sim][deskew]") {

@@ -8,6 +8,7 @@
 #include "tests/lidar_imu_input/simulated_vehicle.hpp"
 
 using namespace understory;
+using namespace understory::lidar_imu_input;
 using namespace understory::test;
 
 namespace {
@@ -26,8 +27,8 @@ int faults_of(const InputResults& results, InputFaultKind kind) {
   return count;
 }
 
-SensorErrors mild_errors() {
-  SensorErrors errors;
+test::SensorErrors mild_errors() {
+  test::SensorErrors errors;
   errors.gyro_bias = {0.003, -0.002, 0.004};
   errors.force_bias = {0.01, 0.01, 0.02};
   errors.gyro_noise = 3e-4;
@@ -39,25 +40,25 @@ SensorErrors mild_errors() {
 
 /// Everything that the sensors of a drive say, in the order in which it comes.
 struct Run {
-  Drive drive;
+  test::Drive drive;
   double length_s = 40.0;
   bool has_wheels = true;
-  SensorErrors errors = mild_errors();
-  LidarImuInputParameters parameters = parameters_for_drive();
+  test::SensorErrors errors = mild_errors();
+  LidarImuInputParameters parameters = test::parameters_for_drive();
   std::vector<Eigen::Vector3d> world;
-  Utime sweep_delay_us = 0;  ///< A sweep comes so long after its end.
+  model::Utime sweep_delay_us = 0;  ///< A sweep comes so long after its end.
 
   InputResults go(LidarImuInput& input) const {
     std::mt19937_64 random(1);
-    const Track track(drive, length_s + 1.0);
+    const test::Track track(drive, length_s + 1.0);
     InputResults all;
     const auto take = [&all](InputResults results) {
       for (InputResult& result : results) all.push_back(std::move(result));
     };
-    for (Utime t = 0; seconds(t) < length_s; t += 5'000) {
+    for (model::Utime t = 0; test::seconds(t) < length_s; t += 5'000) {
       take(input.add(imu_at(drive, t, 200.0, errors, random)));
       if (has_wheels && t % 20'000 == 0) take(input.add(wheels_at(drive, t, errors, random)));
-      const Utime start = t - 103'000 - sweep_delay_us;
+      const model::Utime start = t - 103'000 - sweep_delay_us;
       if (start >= 0 && (start - 2'000) % 100'000 == 0 && !world.empty())
         take(input.add(sweep_at(track, start, parameters.lidar.mount.vehicle_T_sensor(), world)));
     }
@@ -84,17 +85,17 @@ TEST_CASE("a piece of odometry ends at each sweep and comes before it", "[stage]
   run.sweep_delay_us = GENERATE(0, 40'000, 120'000);
   LidarImuInput input(run.parameters);
   const InputResults results = run.go(input);
-  std::optional<Utime> end;
+  std::optional<model::Utime> end;
   int sweeps = 0;
   for (const InputResult& result : results) {
-    if (const auto* odometry = std::get_if<Odometry>(&result)) {
+    if (const auto* odometry = std::get_if<model::Odometry>(&result)) {
       if (end) CHECK(odometry->from_utime == *end);
       CHECK(odometry->utime > odometry->from_utime);
       CHECK(odometry->utime - odometry->from_utime <= 160'000);
       CHECK(odometry->has_wheels == run.has_wheels);
       CHECK(odometry->inertial);
       end = odometry->utime;
-    } else if (const auto* sweep = std::get_if<PointSweep>(&result)) {
+    } else if (const auto* sweep = std::get_if<model::PointSweep>(&result)) {
       REQUIRE(end);
       CHECK(sweep->utime == *end);
       CHECK(sweep->is_deskewed);
@@ -113,10 +114,10 @@ TEST_CASE("a sweep that comes very late is carried to the end of a piece", "[sta
   run.length_s = 5.0;
   run.sweep_delay_us = 270'000;
   LidarImuInput input(run.parameters);
-  const auto sweeps = all_of<PointSweep>(run.go(input));
+  const auto sweeps = all_of<model::PointSweep>(run.go(input));
   CHECK(sweeps.size() > 40);
   CHECK(input.counters().sweeps_carried > 0);
-  CHECK(std::ranges::is_sorted(sweeps, std::ranges::less_equal{}, &PointSweep::utime));
+  CHECK(std::ranges::is_sorted(sweeps, std::ranges::less_equal{}, &model::PointSweep::utime));
 }
 
 TEST_CASE("de-skewing puts points where they are at the end of the turn", "[stage][deskew]") {
@@ -125,18 +126,18 @@ TEST_CASE("de-skewing puts points where they are at the end of the turn", "[stag
   run.parameters.lidar.mount = {1.2, 0.1, 1.9, 0.02, -0.03, 0.4};
   run.has_wheels = GENERATE(true, false);
   LidarImuInput input(run.parameters);
-  const Track track(run.drive, run.length_s + 1.0);
+  const test::Track track(run.drive, run.length_s + 1.0);
   double before = 0.0;
   double after = 0.0;
   double worst = 0.0;
   int count = 0;
-  for (const PointSweep& sweep : all_of<PointSweep>(run.go(input))) {
-    const double end = seconds(sweep.utime);
+  for (const model::PointSweep& sweep : all_of<model::PointSweep>(run.go(input))) {
+    const double end = test::seconds(sweep.utime);
     if (end < run.drive.stand_s + 2.0) continue;
     const Eigen::Isometry3d vehicle_T_world = track.pose(end).inverse();
     REQUIRE(sweep.points.size() == run.world.size());
-    const PointSweep raw = sweep_at(track, sweep.utime - 100'000,
-                                    run.parameters.lidar.mount.vehicle_T_sensor(), run.world);
+    const model::PointSweep raw = sweep_at(
+        track, sweep.utime - 100'000, run.parameters.lidar.mount.vehicle_T_sensor(), run.world);
     for (std::size_t i = 0; i < run.world.size(); ++i) {
       const Eigen::Vector3d is = vehicle_T_world * run.world[i];
       const double error = (sweep.points[i].position().cast<double>() - is).norm();
@@ -157,15 +158,15 @@ TEST_CASE("de-skewing puts points where they are at the end of the turn", "[stag
 }
 
 /// Points of the first sweep off where they are, RMS [m].
-double first_sweep_error(Utime imu_period_us) {
-  constexpr Utime kBegin = 40'000'000;
-  Drive drive;
+double first_sweep_error(model::Utime imu_period_us) {
+  constexpr model::Utime kBegin = 40'000'000;
+  test::Drive drive;
   drive.tilt_rad = 0.0;
   drive.rough_rad = 0.0;
-  const Track track(drive, 42.0);
+  const test::Track track(drive, 42.0);
   auto world = posts();
   for (auto& point : world) point.z() = 0.0;  // tilt is not known yet
-  LidarImuInputParameters parameters = parameters_for_drive();
+  LidarImuInputParameters parameters = test::parameters_for_drive();
   parameters.imu.max_gap_s = 0.3;
   LidarImuInput input(parameters);
   std::mt19937_64 random(1);
@@ -173,7 +174,7 @@ double first_sweep_error(Utime imu_period_us) {
   const auto take = [&all](InputResults results) {
     for (InputResult& result : results) all.push_back(std::move(result));
   };
-  for (Utime t = kBegin; t <= kBegin + 400'000; t += imu_period_us) {
+  for (model::Utime t = kBegin; t <= kBegin + 400'000; t += imu_period_us) {
     take(input.add(imu_at(drive, t, 10.0, {}, random)));
     take(input.add(wheels_at(drive, t, {}, random)));
     if (t == kBegin)
@@ -181,10 +182,10 @@ double first_sweep_error(Utime imu_period_us) {
           sweep_at(track, kBegin - 70'000, parameters.lidar.mount.vehicle_T_sensor(), world)));
   }
   take(input.finish());
-  const auto sweeps = all_of<PointSweep>(all);
+  const auto sweeps = all_of<model::PointSweep>(all);
   REQUIRE(sweeps.size() == 1);
   REQUIRE(sweeps.front().points.size() == world.size());
-  const SE2 vehicle_T_world = track.planar(seconds(sweeps.front().utime)).inverse();
+  const geometry::SE2 vehicle_T_world = track.planar(test::seconds(sweeps.front().utime)).inverse();
   double square_m2 = 0.0;
   for (std::size_t i = 0; i < world.size(); ++i) {
     const Eigen::Vector2d is = vehicle_T_world * Eigen::Vector2d(world[i].head<2>());
@@ -201,10 +202,10 @@ TEST_CASE("a sweep that began before the first sample of a drive on the way is d
 
 TEST_CASE("sweeps without times get them from the azimuth", "[stage][deskew]") {
   const bool clockwise = GENERATE(true, false);
-  PointSweep sweep;
+  model::PointSweep sweep;
   for (int i = 0; i < 180; ++i) {
     const double angle = (clockwise ? -1.0 : 1.0) * 2.0 * (i + 0.5) * M_PI / 180.0 + 2.0;
-    SweepPoint point;
+    model::SweepPoint point;
     point.x_m = static_cast<float>(10.0 * std::cos(angle));
     point.y_m = static_cast<float>(10.0 * std::sin(angle));
     sweep.points.push_back(point);
@@ -220,18 +221,19 @@ TEST_CASE("odometry with wheels and gyro follows the drive", "[stage]") {
   Run run;
   run.length_s = 82.0;
   LidarImuInput input(run.parameters);
-  const Track track(run.drive, run.length_s + 1.0);
-  SE2WithCovariance driven;
-  std::optional<Utime> from;
-  Utime to = 0;
-  for (const Odometry& piece : all_of<Odometry>(run.go(input))) {
-    if (seconds(piece.from_utime) < run.drive.stand_s) continue;
-    if (!from) from = piece.from_utime;
-    driven = compound(driven, {piece.from_T_to, piece.covariance});
-    to = piece.utime;
+  const test::Track track(run.drive, run.length_s + 1.0);
+  geometry::SE2WithCovariance driven;
+  std::optional<model::Utime> from;
+  model::Utime to = 0;
+  for (const model::Odometry& increment : all_of<model::Odometry>(run.go(input))) {
+    if (test::seconds(increment.from_utime) < run.drive.stand_s) continue;
+    if (!from) from = increment.from_utime;
+    driven = compound(driven, {increment.from_T_to, increment.covariance});
+    to = increment.utime;
   }
   REQUIRE(from);
-  const SE2 truth = track.planar(seconds(*from)).inverse() * track.planar(seconds(to));
+  const geometry::SE2 truth =
+      track.planar(test::seconds(*from)).inverse() * track.planar(test::seconds(to));
   const Eigen::Vector3d error = (driven.mean.inverse() * truth).Log();
   const double nees = error.dot(driven.covariance.ldlt().solve(error));
   CAPTURE(error.transpose(), driven.covariance.diagonal().cwiseSqrt().transpose(), nees);
@@ -242,70 +244,70 @@ TEST_CASE("odometry with wheels and gyro follows the drive", "[stage]") {
 
 TEST_CASE("wheels alone give what wheel odometry gives", "[stage]") {
   LidarImuInputParameters parameters;
-  parameters.output.max_piece_s = 1.0;
+  parameters.output.max_increment_s = 1.0;
   LidarImuInput input(parameters);
   WheelOdometry wheels(parameters.wheels);
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> steering(-0.4, 0.4);
   InputResults results;
-  std::vector<Odometry> expected;
-  Utime scan = 200'000;
-  for (Utime t = 0; t < 20'000'000; t += 25'000) {
+  std::vector<model::Odometry> expected;
+  model::Utime scan = 200'000;
+  for (model::Utime t = 0; t < 20'000'000; t += 25'000) {
     while (scan < t) {
-      PlanarScan turn;
+      model::PlanarScan turn;
       turn.utime = scan;
       for (InputResult& r : input.add(turn)) results.push_back(std::move(r));
-      if (const auto piece = wheels.advance_to(scan)) expected.push_back(*piece);
+      if (const auto increment = wheels.advance_to(scan)) expected.push_back(*increment);
       scan += 214'000;
     }
-    const WheelSample sample{t, 0, 4.0, steering(random)};
+    const model::WheelSample sample{t, 0, 4.0, steering(random)};
     wheels.add(sample);
     for (InputResult& r : input.add(sample)) results.push_back(std::move(r));
   }
   for (InputResult& r : input.finish()) results.push_back(std::move(r));
-  std::vector<Odometry> pieces = all_of<Odometry>(results);
+  std::vector<model::Odometry> increments = all_of<model::Odometry>(results);
   // The stage starts at the first sample, not at the first scan.
-  REQUIRE(!pieces.empty());
-  pieces.erase(pieces.begin());
-  REQUIRE(pieces.size() >= expected.size());
+  REQUIRE(!increments.empty());
+  increments.erase(increments.begin());
+  REQUIRE(increments.size() >= expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
-    CHECK(pieces[i].from_utime == expected[i].from_utime);
-    CHECK(pieces[i].from_T_to.coordinates() == expected[i].from_T_to.coordinates());
-    CHECK(pieces[i].covariance == expected[i].covariance);
-    CHECK_FALSE(pieces[i].inertial);
+    CHECK(increments[i].from_utime == expected[i].from_utime);
+    CHECK(increments[i].from_T_to.coordinates() == expected[i].from_T_to.coordinates());
+    CHECK(increments[i].covariance == expected[i].covariance);
+    CHECK_FALSE(increments[i].inertial);
   }
-  CHECK(all_of<PlanarScan>(results).size() == expected.size() + 1);
+  CHECK(all_of<model::PlanarScan>(results).size() == expected.size() + 1);
 }
 
 TEST_CASE("a velocity correction takes effect after its delay, and moves no position", "[stage]") {
   Run run;
   run.has_wheels = false;
   run.parameters.constraint.nonholonomic = false;
-  const Track track(run.drive, 41.0);
+  const test::Track track(run.drive, 41.0);
   std::mt19937_64 random(1);
   LidarImuInput input(run.parameters);
   double worst_jump = 0.0;
   double worst_speed = 0.0;
-  std::optional<RawPose> last;
+  std::optional<model::RawPose> last;
   const auto watch = [&](const InputResults& results) {
-    for (const RawPose& pose : all_of<RawPose>(results)) {
+    for (const model::RawPose& pose : all_of<model::RawPose>(results)) {
       if (last) {
-        const double dt = seconds(pose.utime - last->utime);
+        const double dt = test::seconds(pose.utime - last->utime);
         const double moved = (last->odom_T_vehicle.inverse() * pose.odom_T_vehicle).x();
         worst_jump = std::max(worst_jump, std::abs(moved));
-        if (seconds(pose.utime) > 25.0)
-          worst_speed =
-              std::max(worst_speed, std::abs(moved / dt - run.drive.speed(seconds(pose.utime))));
+        if (test::seconds(pose.utime) > 25.0)
+          worst_speed = std::max(worst_speed,
+                                 std::abs(moved / dt - run.drive.speed(test::seconds(pose.utime))));
       }
       last = pose;
     }
   };
-  for (Utime t = 0; seconds(t) < 40.0; t += 5'000) {
+  for (model::Utime t = 0; test::seconds(t) < 40.0; t += 5'000) {
     watch(input.add(imu_at(run.drive, t, 200.0, mild_errors(), random)));
     if (t >= 100'000 && t % 100'000 == 0) {
-      VelocityCorrection correction;
+      model::VelocityCorrection correction;
       correction.utime = t - 100'000;
-      const double then = seconds(correction.utime);
+      const double then = test::seconds(correction.utime);
       correction.velocity_mps << run.drive.speed(then) * std::cos(run.drive.pitch(then)), 0.0;
       correction.bias << 0.004, 0.0, 0.0;
       correction.covariance.setIdentity();
@@ -317,7 +319,7 @@ TEST_CASE("a velocity correction takes effect after its delay, and moves no posi
   CHECK(worst_jump < 8.5 * 0.02 + 0.01);
   CHECK(worst_speed < 0.3);
   CHECK(input.counters().corrections_late == 0);
-  VelocityCorrection late;
+  model::VelocityCorrection late;
   late.utime = 39'000'000;
   CHECK(faults_of(input.add(late), InputFaultKind::kLate) == 1);
   CHECK(input.counters().corrections_late == 1);
@@ -327,35 +329,35 @@ TEST_CASE("aided by GNSS the pose is a reference and drifts less", "[stage][gnss
   Run run;
   run.has_wheels = false;
   run.length_s = 82.0;
-  const Track track(run.drive, run.length_s + 1.0);
+  const test::Track track(run.drive, run.length_s + 1.0);
   double error[2] = {0.0, 0.0};
   for (const bool aided : {false, true}) {
     run.parameters.gnss_aided = aided;
     LidarImuInput input(run.parameters);
     std::mt19937_64 random(3);
     std::normal_distribution<double> normal;
-    std::optional<RawPose> start;
-    std::optional<RawPose> end;
-    for (Utime t = 0; seconds(t) < run.length_s; t += 10'000) {
+    std::optional<model::RawPose> start;
+    std::optional<model::RawPose> end;
+    for (model::Utime t = 0; test::seconds(t) < run.length_s; t += 10'000) {
       InputResults results = input.add(imu_at(run.drive, t, 100.0, run.errors, random));
       if (t % 200'000 == 0) {
-        GnssFix fix;
+        model::GnssFix fix;
         fix.utime = t;
-        const Eigen::Vector3d v = run.drive.velocity(seconds(t));
+        const Eigen::Vector3d v = run.drive.velocity(test::seconds(t));
         // East and north lie turned against odom.
         fix.velocity_mps = Eigen::Rotation2Dd(1.1) * v.head<2>() +
                            0.05 * Eigen::Vector2d(normal(random), normal(random));
         fix.velocity_sigma_mps = 0.05;
         input.add(fix);
       }
-      for (const RawPose& pose : all_of<RawPose>(results)) {
+      for (const model::RawPose& pose : all_of<model::RawPose>(results)) {
         CHECK(pose.is_reference == aided);
-        if (!start && seconds(pose.utime) > 30.0) start = pose;
+        if (!start && test::seconds(pose.utime) > 30.0) start = pose;
         end = pose;
       }
     }
-    const SE2 truth =
-        track.planar(seconds(start->utime)).inverse() * track.planar(seconds(end->utime));
+    const geometry::SE2 truth = track.planar(test::seconds(start->utime)).inverse() *
+                                track.planar(test::seconds(end->utime));
     error[aided] = ((start->odom_T_vehicle.inverse() * end->odom_T_vehicle).inverse() * truth)
                        .translation()
                        .norm();

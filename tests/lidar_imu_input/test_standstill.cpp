@@ -6,11 +6,12 @@
 #include "tests/lidar_imu_input/simulated_vehicle.hpp"
 
 using namespace understory;
+using namespace understory::lidar_imu_input;
 using namespace understory::test;
 
 namespace {
 
-constexpr Utime kStep_us = 5'000;
+constexpr model::Utime kStep_us = 5'000;
 constexpr double kStart_s = 22.0;
 constexpr double kSpeedUp_s = 3.0;
 constexpr double kStop_s = 45.0;
@@ -22,22 +23,22 @@ double acceleration_at(double time_s) {
   return 0.0;
 }
 
-struct Stands {
+struct Stationary {
   double on_the_road_s = 0.0;  ///< Said to stand while driving evenly.
   double at_the_end_s = 0.0;   ///< ... and in the last seconds, when it does.
 };
 
 /// `corrects`: a filter says what the velocity is, as it does ten times a second.
-Stands drive_smoothly(bool corrects) {
+Stationary drive_smoothly(bool corrects) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> noise;
-  MotionEstimator motion(parameters_for_drive());
-  Stands stands;
+  MotionEstimator motion(test::parameters_for_drive());
+  Stationary is_stationary;
   double velocity = 0.0;
-  for (Utime t = 0; seconds(t) < 60.0; t += kStep_us) {
-    const double acceleration = acceleration_at(seconds(t));
-    velocity += acceleration * seconds(kStep_us);
-    ImuSample sample;
+  for (model::Utime t = 0; test::seconds(t) < 60.0; t += kStep_us) {
+    const double acceleration = acceleration_at(test::seconds(t));
+    velocity += acceleration * test::seconds(kStep_us);
+    model::ImuSample sample;
     sample.utime = t;
     for (int axis = 0; axis < 3; ++axis) {
       sample.angular_rate_rad_s(axis) = 2e-3 * noise(random);
@@ -46,25 +47,26 @@ Stands drive_smoothly(bool corrects) {
     sample.specific_force_mps2 += Eigen::Vector3d(acceleration, 0.0, kGravity_mps2);
     motion.add_imu(motion.to_vehicle(sample), false);
     if (corrects && t % 100'000 == 0) {
-      VelocityCorrection correction;
+      model::VelocityCorrection correction;
       correction.utime = t;
       correction.velocity_mps = {velocity, 0.0};
       correction.covariance.diagonal() << 1e-4, 1e-4, 1e-8, 1e-4, 1e-4;
       motion.add_correction(correction);
     }
-    if (!motion.is_standing()) continue;
-    const double now = seconds(t);
-    if (now > kStart_s + kSpeedUp_s && now < kStop_s) stands.on_the_road_s += seconds(kStep_us);
-    if (now > 55.0) stands.at_the_end_s += seconds(kStep_us);
+    if (!motion.is_stationary()) continue;
+    const double now = test::seconds(t);
+    if (now > kStart_s + kSpeedUp_s && now < kStop_s)
+      is_stationary.on_the_road_s += test::seconds(kStep_us);
+    if (now > 55.0) is_stationary.at_the_end_s += test::seconds(kStep_us);
   }
-  return stands;
+  return is_stationary;
 }
 
 }  // namespace
 
 TEST_CASE("a smooth road is no standstill where the filter knows the velocity", "[standstill]") {
-  const Stands alone = drive_smoothly(false);
-  const Stands corrected = drive_smoothly(true);
+  const Stationary alone = drive_smoothly(false);
+  const Stationary corrected = drive_smoothly(true);
   CAPTURE(alone.on_the_road_s, corrected.on_the_road_s, corrected.at_the_end_s);
   CHECK(alone.on_the_road_s > 1.0);  // The samples are as quiet as that.
   CHECK(corrected.on_the_road_s == 0.0);

@@ -10,14 +10,15 @@
 #include "tests/lidar_imu_input/simulated_vehicle.hpp"
 
 using namespace understory;
+using namespace understory::lidar_imu_input;
 using namespace understory::test;
 
 namespace {
 
-using Event =
-    std::variant<ImuSample, WheelSample, GnssFix, PlanarScan, PointSweep, VelocityCorrection>;
+using Event = std::variant<model::ImuSample, model::WheelSample, model::GnssFix, model::PlanarScan,
+                           model::PointSweep, model::VelocityCorrection>;
 
-Utime utime_of(const Event& event) {
+model::Utime utime_of(const Event& event) {
   return std::visit([](const auto& value) { return value.utime; }, event);
 }
 
@@ -28,8 +29,8 @@ struct DriveWith {
   bool gnss = false;
 };
 
-SensorErrors errors_of_drive() {
-  SensorErrors errors;
+test::SensorErrors errors_of_drive() {
+  test::SensorErrors errors;
   errors.gyro_bias = {0.003, -0.002, 0.004};
   errors.force_bias = {0.01, 0.01, 0.02};
   errors.gyro_noise = 3e-4;
@@ -39,8 +40,8 @@ SensorErrors errors_of_drive() {
   return errors;
 }
 
-PlanarScan scan_at(Utime utime) {
-  PlanarScan scan;
+model::PlanarScan scan_at(model::Utime utime) {
+  model::PlanarScan scan;
   scan.utime = utime;
   scan.bearing_step_rad = 0.01;
   scan.max_range_m = 80.0;
@@ -48,10 +49,10 @@ PlanarScan scan_at(Utime utime) {
   return scan;
 }
 
-VelocityCorrection correction_at(const Drive& drive, Utime utime) {
-  VelocityCorrection correction;
+model::VelocityCorrection correction_at(const test::Drive& drive, model::Utime utime) {
+  model::VelocityCorrection correction;
   correction.utime = utime;
-  correction.velocity_mps << drive.speed(seconds(utime)), 0.02;
+  correction.velocity_mps << drive.speed(test::seconds(utime)), 0.02;
   correction.bias << 0.0041, 0.001, -0.002;
   correction.covariance.diagonal() << 1e-3, 1e-3, 1e-7, 1e-4, 1e-4;
   return correction;
@@ -59,25 +60,25 @@ VelocityCorrection correction_at(const Drive& drive, Utime utime) {
 
 /// Everything that the sensors say in 40 s, the first 22 of which the vehicle stands.
 std::vector<Event> events_of(const DriveWith& with) {
-  const Drive drive;
-  const SensorErrors errors = errors_of_drive();
-  const Track track(drive, 41.0);
+  const test::Drive drive;
+  const test::SensorErrors errors = errors_of_drive();
+  const test::Track track(drive, 41.0);
   std::mt19937_64 random(4);
   std::uniform_real_distribution<double> place(-30.0, 30.0);
   std::vector<Eigen::Vector3d> world;
   world.reserve(80);
   for (int i = 0; i < 80; ++i) world.emplace_back(place(random), place(random), 1.0);
   std::vector<Event> events;
-  for (Utime t = 0; t < 40'000'000; t += 5'000) {
+  for (model::Utime t = 0; t < 40'000'000; t += 5'000) {
     events.emplace_back(imu_at(drive, t, 200.0, errors, random));
     if (with.wheels && t % 20'000 == 0) events.emplace_back(wheels_at(drive, t, errors, random));
     if (with.sweeps && t > 200'000 && t % 100'000 == 0)
       events.emplace_back(sweep_at(track, t - 103'000, Eigen::Isometry3d::Identity(), world));
     if (with.scans && t % 75'000 == 0) events.emplace_back(scan_at(t + 3'000));
     if (with.gnss && t % 1'000'000 == 0) {
-      GnssFix fix;
+      model::GnssFix fix;
       fix.utime = t;
-      fix.east_north_m = track.planar(seconds(t)).translation();
+      fix.east_north_m = track.planar(test::seconds(t)).translation();
       fix.sigma_m = 0.5;
       events.emplace_back(fix);
     }
@@ -104,14 +105,15 @@ int faults_of(const InputResults& results, InputFaultKind kind) {
   return static_cast<int>(std::ranges::count(faults, kind, &InputFault::kind));
 }
 
-void check_same(const std::vector<Odometry>& is, const std::vector<Odometry>& should) {
+void check_same(const std::vector<model::Odometry>& is,
+                const std::vector<model::Odometry>& should) {
   REQUIRE(is.size() == should.size());
   for (std::size_t i = 0; i < is.size(); ++i) {
     REQUIRE(is[i].from_utime == should[i].from_utime);
     REQUIRE(is[i].utime == should[i].utime);
     REQUIRE(is[i].sequence == should[i].sequence);
     REQUIRE(is[i].has_wheels == should[i].has_wheels);
-    REQUIRE(is[i].is_standing == should[i].is_standing);
+    REQUIRE(is[i].is_stationary == should[i].is_stationary);
     REQUIRE((is[i].from_T_to.coordinates() - should[i].from_T_to.coordinates()).norm() < 1e-9);
     REQUIRE((is[i].covariance - should[i].covariance).norm() < 1e-9);
     REQUIRE(is[i].inertial.has_value() == should[i].inertial.has_value());
@@ -122,20 +124,21 @@ void check_same(const std::vector<Odometry>& is, const std::vector<Odometry>& sh
   }
 }
 
-void check_same(const std::vector<RawPose>& is, const std::vector<RawPose>& should) {
+void check_same(const std::vector<model::RawPose>& is, const std::vector<model::RawPose>& should) {
   REQUIRE(is.size() == should.size());
   for (std::size_t i = 0; i < is.size(); ++i) {
     REQUIRE(is[i].utime == should[i].utime);
-    const SE2 apart = should[i].odom_T_vehicle.inverse() * is[i].odom_T_vehicle;
+    const geometry::SE2 apart = should[i].odom_T_vehicle.inverse() * is[i].odom_T_vehicle;
     REQUIRE(apart.coordinates().norm() < 1e-9);
     REQUIRE((is[i].covariance - should[i].covariance).norm() < 1e-9);
   }
 }
 
 /// Of those that came out, each is in `should` as it is.
-void check_among(const std::vector<PointSweep>& is, const std::vector<PointSweep>& should) {
-  for (const PointSweep& sweep : is) {
-    const auto same = std::ranges::find(should, sweep.utime, &PointSweep::utime);
+void check_among(const std::vector<model::PointSweep>& is,
+                 const std::vector<model::PointSweep>& should) {
+  for (const model::PointSweep& sweep : is) {
+    const auto same = std::ranges::find(should, sweep.utime, &model::PointSweep::utime);
     REQUIRE(same != should.end());
     REQUIRE(sweep.points.size() == same->points.size());
     REQUIRE(sweep.attitude.has_value() == same->attitude.has_value());
@@ -159,12 +162,12 @@ void check_cut(const std::vector<Event>& events, std::size_t cut,
     feed(uncut, events[i], should);
     feed(loaded, events[i], is);
   }
-  check_same(all_of<Odometry>(is), all_of<Odometry>(should));
-  check_same(all_of<RawPose>(is), all_of<RawPose>(should));
-  CHECK(all_of<PlanarScan>(is).size() == all_of<PlanarScan>(should).size());
+  check_same(all_of<model::Odometry>(is), all_of<model::Odometry>(should));
+  check_same(all_of<model::RawPose>(is), all_of<model::RawPose>(should));
+  CHECK(all_of<model::PlanarScan>(is).size() == all_of<model::PlanarScan>(should).size());
   CHECK(all_of<InputFault>(is).size() == all_of<InputFault>(should).size());
-  const auto sweeps = all_of<PointSweep>(is);
-  const auto all_sweeps = all_of<PointSweep>(should);
+  const auto sweeps = all_of<model::PointSweep>(is);
+  const auto all_sweeps = all_of<model::PointSweep>(should);
   check_among(sweeps, all_sweeps);
   const auto lost = loaded.counters().sweeps_dropped - uncut.counters().sweeps_dropped;
   CHECK(sweeps.size() + lost == all_sweeps.size());
@@ -173,7 +176,7 @@ void check_cut(const std::vector<Event>& events, std::size_t cut,
 
 std::size_t index_at(const std::vector<Event>& events, double time_s) {
   const auto it = std::ranges::find_if(
-      events, [&](const Event& event) { return seconds(utime_of(event)) >= time_s; });
+      events, [&](const Event& event) { return test::seconds(utime_of(event)) >= time_s; });
   return static_cast<std::size_t>(it - events.begin());
 }
 
@@ -184,7 +187,7 @@ TEST_CASE("a drive that is cut by saving and loading goes on as the uncut one", 
   for (const DriveWith with :
        {DriveWith{}, DriveWith{.wheels = false}, DriveWith{.sweeps = false, .scans = true},
         DriveWith{.wheels = false, .scans = true, .gnss = true}}) {
-    LidarImuInputParameters parameters = parameters_for_drive();
+    LidarImuInputParameters parameters = test::parameters_for_drive();
     parameters.gnss_aided = with.gnss;
     const std::vector<Event> events = events_of(with);
     std::uniform_int_distribution<std::size_t> any(1, events.size() - 200);
@@ -198,7 +201,7 @@ TEST_CASE("a drive that is cut by saving and loading goes on as the uncut one", 
 
 TEST_CASE("a sweep that waits at the cut is dropped and counted", "[state]") {
   const std::vector<Event> events = events_of({});
-  LidarImuInput stage(parameters_for_drive());
+  LidarImuInput stage(test::parameters_for_drive());
   InputResults all;
   std::size_t i = 0;
   // A sweep that comes before the motion of its time.
@@ -206,7 +209,7 @@ TEST_CASE("a sweep that waits at the cut is dropped and counted", "[state]") {
   const auto next = std::find_if(events.begin() + static_cast<std::ptrdiff_t>(i), events.end(),
                                  [](const Event& e) { return e.index() == 4; });
   feed(stage, *next, all);
-  LidarImuInput loaded(parameters_for_drive());
+  LidarImuInput loaded(test::parameters_for_drive());
   loaded.load(stage.save());
   CHECK(loaded.counters().sweeps_dropped == 0);
   for (; i < events.size(); ++i) {
@@ -217,11 +220,11 @@ TEST_CASE("a sweep that waits at the cut is dropped and counted", "[state]") {
 
 TEST_CASE("after a pause the calibrated motion goes on, on the sensors' own clocks", "[state]") {
   const std::vector<Event> events = events_of({});
-  LidarImuInput stage(parameters_for_drive());
+  LidarImuInput stage(test::parameters_for_drive());
   InputResults before;
   const std::size_t cut = index_at(events, 27.0);
   for (std::size_t i = 0; i < cut; ++i) feed(stage, events[i], before);
-  LidarImuInput loaded(parameters_for_drive());
+  LidarImuInput loaded(test::parameters_for_drive());
   loaded.load(stage.save());
   InputResults after;
   for (std::size_t i = index_at(events, 33.0); i < events.size(); ++i) {
@@ -230,32 +233,33 @@ TEST_CASE("after a pause the calibrated motion goes on, on the sensors' own cloc
   CHECK(loaded.is_calibrated());
   CHECK(faults_of(after, InputFaultKind::kClockJump) == 0);
   CHECK(faults_of(after, InputFaultKind::kNotCalibrated) == 0);
-  const auto samples = all_of<ImuSample>(after);
+  const auto samples = all_of<model::ImuSample>(after);
   REQUIRE_FALSE(samples.empty());
   CHECK(samples.front().utime == 33'000'000);
-  CHECK(all_of<ImuSample>(after).back().utime == 39'995'000);
-  const auto sweeps = all_of<PointSweep>(after);
+  CHECK(all_of<model::ImuSample>(after).back().utime == 39'995'000);
+  const auto sweeps = all_of<model::PointSweep>(after);
   REQUIRE(sweeps.size() > 50);
   CHECK(std::ranges::all_of(sweeps, [](const auto& s) { return s.attitude.has_value(); }));
   // The turn per piece: the gyro's bias of 0.23 degrees per second was learned before the cut.
-  const Drive drive;
+  const test::Drive drive;
   double turned = 0.0;
   double should = 0.0;
-  for (const Odometry& piece : all_of<Odometry>(after)) {
-    if (piece.from_utime < 33'100'000) continue;
-    turned += piece.from_T_to.theta();
-    should += drive.heading(seconds(piece.utime)) - drive.heading(seconds(piece.from_utime));
+  for (const model::Odometry& increment : all_of<model::Odometry>(after)) {
+    if (increment.from_utime < 33'100'000) continue;
+    turned += increment.from_T_to.theta();
+    should += drive.heading(test::seconds(increment.utime)) -
+              drive.heading(test::seconds(increment.from_utime));
   }
   CHECK(turned == Approx(should).margin(0.006));
 }
 
 TEST_CASE("a state that is too old is not gone on with", "[state]") {
   std::vector<Event> events = events_of({});
-  LidarImuInput stage(parameters_for_drive());
+  LidarImuInput stage(test::parameters_for_drive());
   InputResults all;
   const std::size_t cut = index_at(events, 27.0);
   for (std::size_t i = 0; i < cut; ++i) feed(stage, events[i], all);
-  LidarImuInput loaded(parameters_for_drive());
+  LidarImuInput loaded(test::parameters_for_drive());
   loaded.load(stage.save());
   REQUIRE(loaded.is_calibrated());
   InputResults after;
@@ -266,16 +270,16 @@ TEST_CASE("a state that is too old is not gone on with", "[state]") {
   CHECK_FALSE(loaded.is_calibrated());
   CHECK(faults_of(after, InputFaultKind::kNotCalibrated) >= 1);
   CHECK(faults_of(after, InputFaultKind::kClockJump) == 0);
-  CHECK(all_of<Odometry>(after).front().from_utime > 3'600'000'000);
+  CHECK(all_of<model::Odometry>(after).front().from_utime > 3'600'000'000);
 }
 
 TEST_CASE("a damaged state is refused", "[state]") {
   const std::vector<Event> events = events_of({});
-  LidarImuInput stage(parameters_for_drive());
+  LidarImuInput stage(test::parameters_for_drive());
   InputResults all;
   for (std::size_t i = 0; i < 3000; ++i) feed(stage, events[i], all);
   const std::string state = stage.save();
-  LidarImuInput loaded(parameters_for_drive());
+  LidarImuInput loaded(test::parameters_for_drive());
   for (const std::size_t size : {std::size_t{0}, std::size_t{7}, std::size_t{30}, state.size() / 3,
                                  state.size() / 2, state.size() - 1}) {
     CHECK_THROWS_AS(loaded.load(state.substr(0, size)), std::invalid_argument);

@@ -7,10 +7,11 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
+using namespace understory::lidar_imu_input;
 
 namespace {
 
-constexpr Utime kStep = 25'000;
+constexpr model::Utime kStep = 25'000;
 
 /// Encoder speed for a wanted speed of the axle.
 double encoder_speed(const CarGeometry& car, double speed, double steering) {
@@ -18,11 +19,11 @@ double encoder_speed(const CarGeometry& car, double speed, double steering) {
 }
 
 /// Motion over `seconds` at constant speed and steering.
-Odometry drive(const WheelOdometryParameters& parameters, double speed, double steering,
-               double seconds) {
+model::Odometry drive(const WheelOdometryParameters& parameters, double speed, double steering,
+                      double seconds) {
   WheelOdometry wheels(parameters);
-  const Utime end = static_cast<Utime>(seconds * 1e6);
-  for (Utime t = 0; t <= end; t += kStep) {
+  const model::Utime end = static_cast<model::Utime>(seconds * 1e6);
+  for (model::Utime t = 0; t <= end; t += kStep) {
     wheels.add({t, 0, encoder_speed(parameters.car, speed, steering), steering});
   }
   CHECK_FALSE(wheels.advance_to(1'000));
@@ -43,10 +44,10 @@ TEST_CASE("constant speed and steering drive an arc", "[wheel_odometry]") {
     const double steering = steerings(random);
     const double seconds = std::floor(times(random) / 0.025) * 0.025;
     const WheelOdometryParameters parameters;
-    const SE2 motion = drive(parameters, speed, steering, seconds).from_T_to;
+    const geometry::SE2 motion = drive(parameters, speed, steering, seconds).from_T_to;
     const double radius = parameters.car.wheelbase_m / std::tan(steering);
     const double angle = speed * seconds / radius;
-    const SE2 arc(radius * std::sin(angle), radius * (1.0 - std::cos(angle)), angle);
+    const geometry::SE2 arc(radius * std::sin(angle), radius * (1.0 - std::cos(angle)), angle);
     CHECK((motion.inverse() * arc).Log().norm() < 1e-6);
   }
 }
@@ -60,29 +61,29 @@ TEST_CASE("the inner wheel is slower", "[wheel_odometry]") {
 
 TEST_CASE("the vehicle frame may lie anywhere on the car", "[wheel_odometry]") {
   WheelOdometryParameters parameters;
-  const SE2 at_axle = drive(parameters, 4.0, 0.2, 2.0).from_T_to;
-  parameters.car.axle_T_vehicle = SE2(3.78, 0.5, 0.1);
-  const SE2 expected =
+  const geometry::SE2 at_axle = drive(parameters, 4.0, 0.2, 2.0).from_T_to;
+  parameters.car.axle_T_vehicle = geometry::SE2(3.78, 0.5, 0.1);
+  const geometry::SE2 expected =
       parameters.car.axle_T_vehicle.inverse() * at_axle * parameters.car.axle_T_vehicle;
-  const SE2 motion = drive(parameters, 4.0, 0.2, 2.0).from_T_to;
+  const geometry::SE2 motion = drive(parameters, 4.0, 0.2, 2.0).from_T_to;
   CHECK((motion.inverse() * expected).Log().norm() < 1e-9);
 }
 
 TEST_CASE("intervals compound to the whole", "[wheel_odometry]") {
-  WheelOdometry pieces;
+  WheelOdometry increments;
   WheelOdometry whole;
   std::mt19937_64 random(2);
   std::uniform_real_distribution<double> steering(-0.4, 0.4);
-  for (Utime t = 0; t <= 10'000'000; t += kStep) {
-    const WheelSample sample{t, 0, 3.0, steering(random)};
-    pieces.add(sample);
+  for (model::Utime t = 0; t <= 10'000'000; t += kStep) {
+    const model::WheelSample sample{t, 0, 3.0, steering(random)};
+    increments.add(sample);
     whole.add(sample);
   }
-  pieces.advance_to(0);
+  increments.advance_to(0);
   whole.advance_to(0);
-  SE2 compounded;
-  for (Utime t = 213'700; t < 10'000'000; t += 213'700) {
-    const auto motion = pieces.advance_to(t);
+  geometry::SE2 compounded;
+  for (model::Utime t = 213'700; t < 10'000'000; t += 213'700) {
+    const auto motion = increments.advance_to(t);
     REQUIRE(motion);
     CHECK(motion->utime - motion->from_utime == 213'700);
     compounded = compounded * motion->from_T_to;
@@ -116,7 +117,7 @@ TEST_CASE("covariances hold against errors of calibration", "[wheel_odometry]") 
   const double speed = 4.0;
   const double steering = 0.15;
   for (const double seconds : {1.0, 5.0, 20.0}) {
-    const Odometry nominal = drive(parameters, speed, steering, seconds);
+    const model::Odometry nominal = drive(parameters, speed, steering, seconds);
     double heading2 = 0.0;
     constexpr int kRuns = 300;
     for (int run = 0; run < kRuns; ++run) {

@@ -6,11 +6,12 @@
 
 using namespace understory;
 using namespace understory::sim;
+using namespace understory::sim;
 using std::numbers::pi;
 
 namespace {
 
-std::vector<SE2> path_of(PathKind kind, double interval = 0.2, double length_m = 200.0) {
+std::vector<geometry::SE2> path_of(PathKind kind, double interval = 0.2, double length_m = 200.0) {
   PathParameters parameters;
   parameters.kind = kind;
   parameters.interval = interval;
@@ -66,7 +67,7 @@ TEST_CASE("Every step of a path costs one interval, shared between driving and t
 TEST_CASE("Paths have the shapes of the figure", "[path]") {
   const auto circle = path_of(PathKind::kCircle);
   const double radius = 100.0 / pi;
-  for (const SE2& pose : circle) {
+  for (const geometry::SE2& pose : circle) {
     REQUIRE((pose.translation() - Eigen::Vector2d(0, radius)).norm() == Approx(radius));
   }
   const auto eight = path_of(PathKind::kFigureEight);
@@ -75,7 +76,7 @@ TEST_CASE("Paths have the shapes of the figure", "[path]") {
   CHECK(eight[750].y() < 0.0);
   const auto square = path_of(PathKind::kSquare);
   Eigen::Vector2d high = Eigen::Vector2d::Zero();
-  for (const SE2& pose : square) high = high.cwiseMax(pose.translation());
+  for (const geometry::SE2& pose : square) high = high.cwiseMax(pose.translation());
   CHECK((high - Eigen::Vector2d(50, 50)).norm() < 1e-9);
   CHECK(square.back().theta() == Approx(-0.5 * pi));
   CHECK(path_of(PathKind::kTriangle).back().theta() == Approx(-2.0 * pi / 3.0));
@@ -98,7 +99,7 @@ TEST_CASE("The drive keeps clear of trunks and inside the forest", "[drive]") {
   const PathKind kind = GENERATE(PathKind::kCircle, PathKind::kLine, PathKind::kSquare);
   const ForestKind forest = GENERATE(ForestKind::kDense, ForestKind::kIntermediate);
   const Drive drive(drive_parameters(forest, kind), 11);
-  for (const SE2& pose : drive.world_T_vehicle()) {
+  for (const geometry::SE2& pose : drive.world_T_vehicle()) {
     REQUIRE(drive.grid().nearest(pose.translation())->distance_m > 0.3);
     REQUIRE(pose.translation().minCoeff() >= 40.0);
     REQUIRE(pose.translation().maxCoeff() <= 960.0);
@@ -109,10 +110,10 @@ TEST_CASE("A long drive fells the trunks in its way", "[drive]") {
   DriveParameters parameters = drive_parameters(ForestKind::kSparse, PathKind::kMeander);
   parameters.path.length_m = 2000.0;
   parameters.path.lane_length_m = 300.0;
-  parameters.clear_the_way = true;
+  parameters.clear_the_path = true;
   const Drive drive(parameters, 2);
   CHECK(drive.size() == 10000);
-  for (const SE2& pose : drive.world_T_vehicle()) {
+  for (const geometry::SE2& pose : drive.world_T_vehicle()) {
     REQUIRE(drive.grid().nearest(pose.translation())->distance_m > 0.3);
   }
   DriveParameters small = drive_parameters(ForestKind::kSparse, PathKind::kLine);
@@ -134,7 +135,7 @@ TEST_CASE("Detections have the noise, the rate and the range that were asked for
   for (std::size_t k = 0; k < drive.size(); k += 4) {
     const SimulatedScan scan = drive.scan(k);
     REQUIRE(scan.trunks.size() == scan.scan.detections.size());
-    const SE2 vehicle_T_world = scan.world_T_vehicle.inverse();
+    const geometry::SE2 vehicle_T_world = scan.world_T_vehicle.inverse();
     // Well inside the range the test of the range does not cut the noise.
     for (std::size_t i = 0; i < scan.trunks.size(); ++i) {
       const Eigen::Vector2d seen = scan.scan.detections[i].position_m.head<2>();

@@ -10,8 +10,8 @@ using namespace understory::sim;
 
 namespace {
 
-double mean_nearest_distance(const Forest& forest) {
-  const PointGrid grid(forest.trunks_m, 10.0);
+double mean_nearest_distance(const sim::Forest& forest) {
+  const sim::PointGrid grid(forest.trunks_m, 10.0);
   double sum = 0.0;
   for (std::size_t i = 0; i < forest.trunks_m.size(); ++i) {
     double radius = 2.0;
@@ -26,8 +26,8 @@ double mean_nearest_distance(const Forest& forest) {
   return sum / static_cast<double>(forest.trunks_m.size());
 }
 
-Forest forest_of(ForestParameters parameters, std::uint64_t seed) {
-  auto random = random_stream(seed, Stream::kForest);
+sim::Forest forest_of(sim::ForestParameters parameters, std::uint64_t seed) {
+  auto random = random_stream(seed, sim::Stream::kForest);
   return make_forest(parameters, random);
 }
 
@@ -35,14 +35,14 @@ Forest forest_of(ForestParameters parameters, std::uint64_t seed) {
 
 TEST_CASE("The forests have as many trunks as the source's, as far apart", "[forest]") {
   struct Expected {
-    ForestKind kind;
+    sim::ForestKind kind;
     double trunks;
     double nearest_m;
   };
-  const Expected row = GENERATE(Expected{ForestKind::kDense, 42011, 2.733},
-                                Expected{ForestKind::kIntermediate, 13770, 4.968},
-                                Expected{ForestKind::kSparse, 8419, 6.560});
-  const Forest forest = forest_of(forest_parameters(row.kind), 1);
+  const Expected row = GENERATE(Expected{sim::ForestKind::kDense, 42011, 2.733},
+                                Expected{sim::ForestKind::kIntermediate, 13770, 4.968},
+                                Expected{sim::ForestKind::kSparse, 8419, 6.560});
+  const sim::Forest forest = forest_of(forest_parameters(row.kind), 1);
   INFO(to_string(row.kind) << " " << forest.trunks_m.size() << " trunks, nearest "
                            << mean_nearest_distance(forest));
   CHECK(static_cast<double>(forest.trunks_m.size()) == Approx(row.trunks).epsilon(0.015));
@@ -51,19 +51,19 @@ TEST_CASE("The forests have as many trunks as the source's, as far apart", "[for
 
 TEST_CASE("The correct Poisson-disc algorithm keeps its distance and gives fewer trunks",
           "[forest]") {
-  ForestParameters parameters = forest_parameters(ForestKind::kIntermediate);
+  sim::ForestParameters parameters = forest_parameters(sim::ForestKind::kIntermediate);
   parameters.jitter_sigma_m = 0.0;
   parameters.tile_reach = 2;
-  const Forest forest = forest_of(parameters, 1);
+  const sim::Forest forest = forest_of(parameters, 1);
   CHECK(static_cast<double>(forest.trunks_m.size()) == Approx(12800).epsilon(0.02));
-  const PointGrid grid(forest.trunks_m, 10.0);
+  const sim::PointGrid grid(forest.trunks_m, 10.0);
   for (const Eigen::Vector2d& trunk : forest.trunks_m) {
     REQUIRE(grid.within(trunk, 0.999999 * parameters.min_distance_m).size() == 1);
   }
 }
 
 TEST_CASE("A forest follows from its seed alone", "[forest]") {
-  const ForestParameters parameters = forest_parameters(ForestKind::kSparse);
+  const sim::ForestParameters parameters = forest_parameters(sim::ForestKind::kSparse);
   CHECK(forest_of(parameters, 5).trunks_m == forest_of(parameters, 5).trunks_m);
   CHECK(forest_of(parameters, 5).trunks_m != forest_of(parameters, 6).trunks_m);
 }
@@ -74,7 +74,7 @@ TEST_CASE("The grid finds what brute force finds", "[grid]") {
   std::uniform_real_distribution<double> beyond(-150.0, 150.0);
   std::vector<Eigen::Vector2d> points(300);
   for (auto& p : points) p = {anywhere(random), anywhere(random)};
-  const PointGrid grid(points, 7.0);
+  const sim::PointGrid grid(points, 7.0);
   for (int i = 0; i < 500; ++i) {
     const Eigen::Vector2d centre(beyond(random), beyond(random));
     const double radius = std::abs(beyond(random)) / 5.0;
@@ -88,21 +88,23 @@ TEST_CASE("The grid finds what brute force finds", "[grid]") {
     REQUIRE(grid.any_within(centre, radius) == !expected.empty());
     REQUIRE(grid.nearest(centre)->index == nearest);
   }
-  CHECK_FALSE(PointGrid({}, 7.0).nearest({0, 0}));
-  CHECK(PointGrid({}, 7.0).within({0, 0}, 5.0).empty());
+  CHECK_FALSE(sim::PointGrid({}, 7.0).nearest({0, 0}));
+  CHECK(sim::PointGrid({}, 7.0).within({0, 0}, 5.0).empty());
 }
 
 TEST_CASE("Stem maps: columns by name, faults with their line", "[stem_map]") {
-  const auto good = parse_stem_map("tag,y_m,x_m,dbh_m\n# note\n1,2.0,1.0,0.4\r\n\n2,-4.5,3.25,\n");
+  const auto good =
+      sim::parse_stem_map("tag,y_m,x_m,dbh_m\n# note\n1,2.0,1.0,0.4\r\n\n2,-4.5,3.25,\n");
   REQUIRE(good.error.empty());
   REQUIRE(good.forest.trunks_m.size() == 2);
   CHECK(good.forest.trunks_m[0] == Eigen::Vector2d(1.0, 2.0));
   CHECK(good.forest.radii_m[0] == Approx(0.2));
   CHECK(good.forest.radii_m[1] == 0.0);
   CHECK(good.forest.low_m == Eigen::Vector2d(1.0, -4.5));
-  CHECK(parse_stem_map("x_m,y_m\n1,2\n1,two\n").error.find("line 3") != std::string::npos);
-  CHECK(parse_stem_map("x_m,y_m\n1,nan\n").error.find("line 2") != std::string::npos);
-  CHECK(parse_stem_map("x_m,y_m,dbh_m\n1,2,-0.1\n").error.find("negative") != std::string::npos);
-  CHECK_FALSE(parse_stem_map("a,b\n1,2\n").error.empty());
-  CHECK_FALSE(parse_stem_map("").error.empty());
+  CHECK(sim::parse_stem_map("x_m,y_m\n1,2\n1,two\n").error.find("line 3") != std::string::npos);
+  CHECK(sim::parse_stem_map("x_m,y_m\n1,nan\n").error.find("line 2") != std::string::npos);
+  CHECK(sim::parse_stem_map("x_m,y_m,dbh_m\n1,2,-0.1\n").error.find("negative") !=
+        std::string::npos);
+  CHECK_FALSE(sim::parse_stem_map("a,b\n1,2\n").error.empty());
+  CHECK_FALSE(sim::parse_stem_map("").error.empty());
 }

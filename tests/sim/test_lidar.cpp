@@ -13,6 +13,7 @@
 
 using namespace understory;
 using namespace understory::sim;
+using namespace understory::sim;
 using std::numbers::pi;
 
 namespace {
@@ -43,10 +44,10 @@ SpeedParameters short_standstill() {
   return speed;
 }
 
-bool same_points(const PointSweep& a, const PointSweep& b) {
+bool same_points(const model::PointSweep& a, const model::PointSweep& b) {
   return a.utime == b.utime &&
          std::equal(a.points.begin(), a.points.end(), b.points.begin(), b.points.end(),
-                    [](const SweepPoint& p, const SweepPoint& q) {
+                    [](const model::SweepPoint& p, const model::SweepPoint& q) {
                       return p.position() == q.position() && p.time_s == q.time_s &&
                              p.ring == q.ring && p.intensity == q.intensity;
                     });
@@ -133,7 +134,7 @@ TEST_CASE("A raw sweep is skewed by exactly the motion of the vehicle", "[lidar]
   CHECK(drive.motion().at(6.0).velocity_mps.norm() > 2.0);
   double worst_standing_m = 0.0;
   for (std::size_t i = 0; i < sweep.raw.points.size(); ++i) {
-    const SweepPoint& point = sweep.raw.points[i];
+    const model::SweepPoint& point = sweep.raw.points[i];
     if (i > 0) REQUIRE(point.time_s >= sweep.raw.points[i - 1].time_s);
     const double time_s = 1e-6 * static_cast<double>(sweep.raw.utime) + point.time_s;
     const auto world_m = [&](double at_s) -> Eigen::Vector3d {
@@ -209,9 +210,9 @@ TEST_CASE("A drive's readings come in order and follow from the seed", "[drive]"
   SensorDrive first(scenario, short_standstill(), suite, 7);
   SensorDrive second(forest_scenario(small_forest(), 3), short_standstill(), suite, 7);
   SensorDrive other(scenario, short_standstill(), suite, 8);
-  const PointSweep asked_before = second.sweep(30).raw;
+  const model::PointSweep asked_before = second.sweep(30).raw;
   CHECK_FALSE(same_points(asked_before, other.sweep(30).raw));
-  Utime last = 0;
+  model::Utime last = 0;
   std::array<int, 6> counts{};
   for (int i = 0; i < 1500; ++i) {
     const auto a = first.next();
@@ -220,14 +221,14 @@ TEST_CASE("A drive's readings come in order and follow from the seed", "[drive]"
     REQUIRE(b.has_value());
     REQUIRE(a->index() == b->index());
     ++counts.at(a->index());
-    Utime complete = 0;
-    if (const auto* imu = std::get_if<ImuSample>(&*a)) {
+    model::Utime complete = 0;
+    if (const auto* imu = std::get_if<model::ImuSample>(&*a)) {
       complete = imu->utime;
-      CHECK(imu->specific_force_mps2 == std::get<ImuSample>(*b).specific_force_mps2);
+      CHECK(imu->specific_force_mps2 == std::get<model::ImuSample>(*b).specific_force_mps2);
     } else if (const auto* sweep = std::get_if<SimulatedSweep>(&*a)) {
       CHECK(same_points(sweep->raw, std::get<SimulatedSweep>(*b).raw));
       if (sweep->raw.turn == 30) CHECK(same_points(sweep->raw, asked_before));
-      complete = static_cast<Utime>(sweep->raw.turn + 1) * 100'000;
+      complete = static_cast<model::Utime>(sweep->raw.turn + 1) * 100'000;
     } else if (const auto* pose = std::get_if<TruePose>(&*a)) {
       complete = pose->utime;
     } else if (const auto* scan = std::get_if<SimulatedPlanarScan>(&*a)) {
@@ -250,7 +251,7 @@ TEST_CASE("A drive ends when its time is over", "[drive]") {
   SensorDrive drive(forest_scenario(small_forest(), 3), short_standstill(), suite, 7);
   std::size_t samples = 0;
   while (const auto reading = drive.next()) {
-    samples += std::holds_alternative<ImuSample>(*reading) ? 1 : 0;
+    samples += std::holds_alternative<model::ImuSample>(*reading) ? 1 : 0;
   }
   CHECK(static_cast<double>(samples) == Approx(200.0 * drive.motion().duration_s()).margin(2.0));
 }
@@ -273,7 +274,7 @@ TEST_CASE("Corners of houses are told with what is seen of their walls", "[lidar
   const auto& near = corners.front();
   CHECK(near.corner == 0);
   CHECK(near.angle_rad == Approx(1.5 * pi));
-  CHECK(std::abs(wrap_angle(near.bisector_rad - (pi - 0.5))) < 1e-9);
+  CHECK(std::abs(geometry::wrap_angle(near.bisector_rad - (pi - 0.5))) < 1e-9);
   CHECK(near.range_m == Approx(10.0));
   CHECK(near.position_m.x() == Approx(10.0 * std::cos(0.5)));
   CHECK(near.position_m.y() == Approx(-10.0 * std::sin(0.5)));

@@ -7,6 +7,7 @@
 
 using namespace understory;
 using namespace understory::sim;
+using namespace understory::sim;
 using std::numbers::pi;
 
 namespace {

@@ -7,6 +7,7 @@
 
 using namespace understory;
 using namespace understory::sim;
+using namespace understory::sim;
 
 namespace {
 
@@ -17,7 +18,7 @@ std::vector<Eigen::Vector2d> trunk_places(const World& world) {
 }
 
 /// Nothing solid stands on the way, but walkers, who may come near.
-void check_way_is_clear(const Scenario& scenario, double clearance_m) {
+void check_path_is_clear(const Scenario& scenario, double clearance_m) {
   const PointGrid way(scenario.route.places(0.5), 10.0);
   for (const TrueTrunk& trunk : scenario.world->trunks()) {
     CHECK_FALSE(way.any_within(trunk.centre_m.head<2>(), clearance_m));
@@ -47,7 +48,7 @@ TEST_CASE("A forest in three dimensions has the density of its kind and a clear 
   parameters.forest = forest_parameters(ForestKind::kIntermediate);
   parameters.length_m = 400.0;
   const Scenario scenario = forest_scenario(parameters, 1);
-  check_way_is_clear(scenario, parameters.world.clearance_m);
+  check_path_is_clear(scenario, parameters.world.clearance_m);
   CHECK(scenario.route.length_m() == Approx(400.0).epsilon(0.01));
   const double side_m = 400.0 / 3.14159 + 2.0 * parameters.margin_m;
   const double per_m2 = static_cast<double>(scenario.world->trunks().size()) / (side_m * side_m);
@@ -74,7 +75,7 @@ TEST_CASE("Around the block is about 700 m, closed, with houses on both sides", 
   CHECK(nearest < 0.2);
   CHECK(scenario.world->corners().size() > 120);
   CHECK(scenario.world->trunks().size() > 50);
-  check_way_is_clear(scenario, 2.0);
+  check_path_is_clear(scenario, 2.0);
 }
 
 TEST_CASE("Country roads are as long as asked for and do not meet themselves", "[scenario]") {
@@ -83,7 +84,7 @@ TEST_CASE("Country roads are as long as asked for and do not meet themselves", "
       from_town ? urban_to_countryside_scenario(3000.0, 4) : countryside_scenario(3000.0, 4);
   CHECK(scenario.route.length_m() == Approx(3000.0).epsilon(0.02));
   CHECK(least_radius_m(scenario.route) > 4.5);
-  check_way_is_clear(scenario, 2.0);
+  check_path_is_clear(scenario, 2.0);
   const std::vector<Eigen::Vector2d> places = scenario.route.places(10.0);
   for (std::size_t i = 0; i < places.size(); ++i) {
     for (std::size_t k = i + 20; k < places.size(); ++k) {
@@ -114,7 +115,7 @@ TEST_CASE("A map of poles with a trajectory becomes a world", "[scenario]") {
   REQUIRE(result.scenario.has_value());
   CHECK(result.scenario->world->trunks().size() == 3);  // one stood on the way
   CHECK(result.scenario->route.length_m() > 199.0);
-  check_way_is_clear(*result.scenario, 1.4);
+  check_path_is_clear(*result.scenario, 1.4);
 
   CHECK(pole_map_scenario("x,y\n1,2\n", trajectory, 1).error.find("poles: line 1") == 0);
   CHECK(pole_map_scenario("x_m,y_m\n1,2\n", "x_m,y_m\n1,a\n", 1).error.find("trajectory: line 2") ==

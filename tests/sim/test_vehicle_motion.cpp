@@ -10,6 +10,7 @@
 
 using namespace understory;
 using namespace understory::sim;
+using namespace understory::sim;
 
 namespace {
 
@@ -19,7 +20,7 @@ Route route_of(PathKind kind, double length_m) {
   parameters.length_m = length_m;
   parameters.interval = 0.5;
   std::vector<Eigen::Vector2d> points;
-  for (const SE2& pose : make_path(parameters)) points.push_back(pose.translation());
+  for (const geometry::SE2& pose : make_path(parameters)) points.push_back(pose.translation());
   return Route::through(points, 6.0);
 }
 
@@ -47,8 +48,9 @@ TEST_CASE("A route keeps near its way points and has continuous curvature", "[ro
     // The heading is that of the step, on average.
     const double bearing = std::atan2((next.position_m - here.position_m).y(),
                                       (next.position_m - here.position_m).x());
-    const double middle = here.heading_rad + 0.5 * wrap_angle(next.heading_rad - here.heading_rad);
-    CHECK(std::abs(wrap_angle(bearing - middle)) < 0.002);
+    const double middle =
+        here.heading_rad + 0.5 * geometry::wrap_angle(next.heading_rad - here.heading_rad);
+    CHECK(std::abs(geometry::wrap_angle(bearing - middle)) < 0.002);
   }
   CHECK(greatest_change < 0.05);
   CHECK((route.at(0.0).position_m - Eigen::Vector2d::Zero()).norm() < 0.1);
@@ -114,14 +116,14 @@ TEST_CASE("A perfect inertial unit integrates back to the drive", "[imu]") {
   Eigen::Quaterniond attitude(sensor_at(0.0).linear());
   Eigen::Vector3d position = sensor_at(0.0).translation();
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
-  ImuSample last = imu.next(motion);
+  model::ImuSample last = imu.next(motion);
   const Eigen::Vector3d gravity(0.0, 0.0, -kGravity);
   double worst_m = 0.0;
   const double end_s = 80.0;  // the last 58 of them driving
   REQUIRE(motion.duration_s() > end_s);
   while (imu.next_time_s() <= end_s) {
     const double dt = 1.0 / parameters.rate_hz;
-    const ImuSample sample = imu.next(motion);
+    const model::ImuSample sample = imu.next(motion);
     const Eigen::Vector3d turn =
         0.5 * dt * (last.angular_rate_rad_s + sample.angular_rate_rad_s) +
         dt * dt / 12.0 * last.angular_rate_rad_s.cross(sample.angular_rate_rad_s);
@@ -155,7 +157,7 @@ TEST_CASE("The errors of the inertial unit have the size that was asked for", "[
     SimulatedImu imu(parameters, unit);
     bias_squares += imu.gyro_bias().squaredNorm();
     while (imu.next_time_s() < 20.0) {
-      const ImuSample sample = imu.next(motion);
+      const model::ImuSample sample = imu.next(motion);
       gyro_squares += (sample.angular_rate_rad_s - imu.gyro_bias()).squaredNorm();
       ++samples;
     }
@@ -180,7 +182,7 @@ TEST_CASE("Wheels and satellites say what the car does, within their errors", "[
   int count = 0;
   while (wheels.next_time_s() < motion.duration_s()) {
     const double t = wheels.next_time_s();
-    const WheelSample sample = wheels.next(motion);
+    const model::WheelSample sample = wheels.next(motion);
     if (t < 20.0) CHECK(sample.speed_mps == 0.0);
     driven_m += sample.speed_mps / wheel_parameters.rate_hz;
     if (t > 40.0 && t < 60.0) {

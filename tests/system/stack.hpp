@@ -72,7 +72,7 @@ class Stack {
   /// Sends scans first..last-1 with pauses that let everybody keep up, and listens meanwhile.
   void drive(const sim::Drive& drive, std::size_t first, std::size_t last) {
     for (std::size_t k = first; k < last; ++k) {
-      publish("LANDMARKS", encode_message(drive.scan(k).scan));
+      publish("LANDMARKS", wire::encode_message(drive.scan(k).scan));
       const auto next = SteadyClock::now() + std::chrono::milliseconds(10);
       while (SteadyClock::now() < next) bus_.handle_one(2);
     }
@@ -93,8 +93,8 @@ class Stack {
     }
     return -1;
   }
-  Utime newest_pose() const { return poses.empty() ? -1 : poses.back().utime; }
-  std::size_t updates(MapUpdateStatus status) const {
+  model::Utime newest_pose() const { return poses.empty() ? -1 : poses.back().utime; }
+  std::size_t updates(model::MapUpdateStatus status) const {
     return static_cast<std::size_t>(std::count_if(
         all_updates.begin(), all_updates.end(), [&](const auto& u) { return u.status == status; }));
   }
@@ -114,15 +114,15 @@ class Stack {
   std::string report() const { return directory_ / "report.json"; }
 
   std::map<std::string, health_t> health;  ///< Latest of each process.
-  std::vector<SlamPose> poses;             ///< Localised ones.
-  std::vector<MapUpdate> all_updates;
+  std::vector<model::SlamPose> poses;      ///< Localised ones.
+  std::vector<model::MapUpdate> all_updates;
   std::size_t refused = 0;  ///< Messages of the processes that are not as they must be.
 
  private:
   template <class T, class Take>
   void subscribe(const std::string& channel, Take take) {
-    bus_.subscribe(channel, 0, [this, take](const BusMessage& message) {
-      const auto value = decode_message<T>(message.bytes);
+    bus_.subscribe(channel, 0, [this, take](const bus::BusMessage& message) {
+      const auto value = wire::decode_message<T>(message.bytes);
       if (value) {
         take(*value);
       } else {
@@ -132,15 +132,16 @@ class Stack {
   }
   void listen() {
     subscribe<health_t>("HEALTH", [this](const auto& one) { health[one.process] = one; });
-    subscribe<SlamPose>("SLAM_POSE", [this](const SlamPose& pose) {
+    subscribe<model::SlamPose>("SLAM_POSE", [this](const model::SlamPose& pose) {
       if (pose.is_localised()) poses.push_back(pose);
     });
-    subscribe<MapUpdate>("SLAM_UPDATE", [this](const auto& one) { all_updates.push_back(one); });
+    subscribe<model::MapUpdate>("SLAM_UPDATE",
+                                [this](const auto& one) { all_updates.push_back(one); });
   }
 
   TemporaryDirectory directory_;
   std::string url_ = private_url();
-  LiveBus bus_;
+  bus::LiveBus bus_;
   std::optional<launch::ChildProcess> launch_;
   launch::Ending ending_;
 };
@@ -157,15 +158,15 @@ inline sim::Drive short_drive(std::uint64_t seed) {
 /// The largest position error [m] of localised poses from `first` on, the map tied to the world at
 /// the first update; -1 where there is nothing to compare.
 inline double largest_error_m(const Stack& stack, const sim::Drive& drive, std::size_t first = 0) {
-  std::map<Utime, SE2> truth;
+  std::map<model::Utime, geometry::SE2> truth;
   for (std::size_t k = 0; k < drive.size(); ++k) truth[drive.utime(k)] = drive.world_T_vehicle()[k];
   if (stack.all_updates.empty() || !truth.contains(stack.all_updates.front().utime)) return -1.0;
   const auto& base = stack.all_updates.front();
-  const SE2 world_T_map = truth.at(base.utime) * base.map_T_vehicle.inverse();
+  const geometry::SE2 world_T_map = truth.at(base.utime) * base.map_T_vehicle.inverse();
   double largest = -1.0;
   for (std::size_t i = first; i < stack.poses.size(); ++i) {
     const auto& pose = stack.poses[i];
-    const SE2 estimate = world_T_map * pose.map_T_vehicle();
+    const geometry::SE2 estimate = world_T_map * pose.map_T_vehicle();
     largest =
         std::max(largest, (estimate.translation() - truth.at(pose.utime).translation()).norm());
   }

@@ -7,14 +7,14 @@ using namespace understory::test;
 using Catch::Matchers::Contains;
 
 TEST_CASE("processes on the bus localise a vehicle and stop cleanly", "[system]") {
-  const auto drive = short_drive(11);
-  Stack stack;
+  const auto drive = test::short_drive(11);
+  test::Stack stack;
   REQUIRE(stack.wait_for_processes());
   stack.drive(drive, 0, drive.size());
   CHECK(stack.wait_until([&] { return stack.newest_pose() >= drive.utime(drive.size() - 1); }));
 
-  CHECK(stack.updates(MapUpdateStatus::kFirstMap) == 1);
-  CHECK(stack.updates(MapUpdateStatus::kUpdated) >= drive.size() / 8 - 2);
+  CHECK(stack.updates(model::MapUpdateStatus::kFirstMap) == 1);
+  CHECK(stack.updates(model::MapUpdateStatus::kUpdated) >= drive.size() / 8 - 2);
   const double error_m = largest_error_m(stack, drive);
   CHECK(error_m >= 0.0);
   CHECK(error_m < 0.5);
@@ -25,14 +25,14 @@ TEST_CASE("processes on the bus localise a vehicle and stop cleanly", "[system]"
   CHECK(ending.signal == 0);
   CHECK(ending.exit_code == 0);
   // What does not end within its 0.9 s is killed, and the report says so.
-  CHECK_THAT(read_text(stack.report()),
+  CHECK_THAT(test::read_text(stack.report()),
              Contains("\"text\": \"ended\"") && !Contains("does not end"));
 }
 
 TEST_CASE("a killed process comes back with its state", "[system]") {
-  const auto drive = short_drive(12);
+  const auto drive = test::short_drive(12);
   for (const std::string victim : {"keyframer", "geoslam_mapper"}) {
-    Stack stack;
+    test::Stack stack;
     REQUIRE(stack.wait_for_processes());
     const std::size_t half = drive.size() / 2;
     stack.drive(drive, 0, half);
@@ -44,11 +44,12 @@ TEST_CASE("a killed process comes back with its state", "[system]") {
     CAPTURE(victim);
     CHECK(stack.wait_until([&] { return stack.pid(victim) != killed; }));
     CHECK(stack.wait_until([&] { return stack.newest_pose() >= drive.utime(drive.size() - 12); }));
-    CHECK(stack.updates(MapUpdateStatus::kFirstMap) == 1);  // The map was not begun anew.
+    CHECK(stack.updates(model::MapUpdateStatus::kFirstMap) == 1);  // The map was not begun anew.
     CHECK(stack.poses.size() > poses_before + half / 2);
     CHECK(largest_error_m(stack, drive, poses_before) < 0.5);
     stack.stop();
-    CHECK_THAT(read_text(stack.report()), Contains("killed by signal 9") &&
-                                              Contains("\"restarts\": 1") && !Contains("given up"));
+    CHECK_THAT(test::read_text(stack.report()), Contains("killed by signal 9") &&
+                                                    Contains("\"restarts\": 1") &&
+                                                    !Contains("given up"));
   }
 }

@@ -12,11 +12,11 @@ using Catch::Matchers::Contains;
 namespace {
 
 /// Messages that nobody may take: noise, cut ones, counts of two billion and of minus one.
-std::vector<Bytes> hostile_messages(const Bytes& good, std::mt19937_64& random) {
+std::vector<wire::Bytes> hostile_messages(const wire::Bytes& good, std::mt19937_64& random) {
   std::uniform_int_distribution<int> byte(0, 255);
-  std::vector<Bytes> messages{{}, {0}, Bytes(8, 0xFF)};
+  std::vector<wire::Bytes> messages{{}, {0}, wire::Bytes(8, 0xFF)};
   for (int i = 0; i < 50; ++i) {
-    Bytes noise(1 + static_cast<std::size_t>(i) * 13);
+    wire::Bytes noise(1 + static_cast<std::size_t>(i) * 13);
     for (auto& value : noise) value = static_cast<std::uint8_t>(byte(random));
     messages.push_back(noise);
     messages.emplace_back(
@@ -26,7 +26,7 @@ std::vector<Bytes> hostile_messages(const Bytes& good, std::mt19937_64& random) 
   // Every place where a count may stand.
   for (std::size_t at = 8; at + 4 <= std::min<std::size_t>(good.size(), 200); at += 4) {
     for (const std::uint8_t value : {0x7F, 0xFF}) {
-      Bytes message = good;
+      wire::Bytes message = good;
       std::fill_n(message.begin() + static_cast<std::ptrdiff_t>(at), 4, value);
       message.pop_back();  // Whatever the four bytes meant, it is not whole.
       messages.push_back(std::move(message));
@@ -39,8 +39,8 @@ std::vector<Bytes> hostile_messages(const Bytes& good, std::mt19937_64& random) 
 
 TEST_CASE("hostile bytes and numbers are counted and stop nobody", "[system]") {
   std::mt19937_64 random(99);
-  const auto drive = short_drive(13);
-  Stack stack;
+  const auto drive = test::short_drive(13);
+  test::Stack stack;
   REQUIRE(stack.wait_for_processes());
   const std::size_t half = drive.size() / 2;
   stack.drive(drive, 0, half);
@@ -49,7 +49,7 @@ TEST_CASE("hostile bytes and numbers are counted and stop nobody", "[system]") {
   const pid_t mapper = stack.pid("geoslam_mapper");
 
   auto scan = drive.scan(half).scan;
-  const auto bad = hostile_messages(encode_message(scan), random);
+  const auto bad = hostile_messages(wire::encode_message(scan), random);
   for (const auto& message : bad) {
     for (const char* channel : {"LANDMARKS", "KEYFRAME", "ODOMETRY", "MAP_REQUEST"}) {
       stack.publish(channel, message);
@@ -60,10 +60,10 @@ TEST_CASE("hostile bytes and numbers are counted and stop nobody", "[system]") {
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e300}) {
     auto poisoned = scan;
     poisoned.detections.at(0).position_m.x() = value;
-    stack.publish("LANDMARKS", encode_message(poisoned));
+    stack.publish("LANDMARKS", wire::encode_message(poisoned));
     poisoned = scan;
     poisoned.detections.at(0).covariance_m2(0, 0) = value;
-    stack.publish("LANDMARKS", encode_message(poisoned));
+    stack.publish("LANDMARKS", wire::encode_message(poisoned));
   }
   const std::size_t poses_before = stack.poses.size();
   stack.drive(drive, half, drive.size());
@@ -83,11 +83,11 @@ TEST_CASE("hostile bytes and numbers are counted and stop nobody", "[system]") {
 }
 
 TEST_CASE("a wrong configuration is refused with file and key", "[system]") {
-  TemporaryDirectory directory;
+  test::TemporaryDirectory directory;
   write_config(directory, "colour = 1\n");
   const auto outcome = understory_command(
       directory, "launch --config " + directory.path().string() + " --state-dir " +
-                     (directory / "state").string() + " --lcm-url '" + private_url() + "'");
+                     (directory / "state").string() + " --lcm-url '" + test::private_url() + "'");
   CAPTURE(outcome.out, outcome.error);
   CHECK(outcome.status == 2);
   CHECK_THAT(outcome.error, Contains("keyframer.toml") && Contains("colour"));

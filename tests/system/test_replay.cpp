@@ -7,19 +7,19 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-Bytes derived_log(const TemporaryDirectory& directory, const std::string& name) {
+test::Bytes derived_log(const test::TemporaryDirectory& directory, const std::string& name) {
   const auto outcome = understory_command(
       directory, "replay " + (directory / "drive.lcm").string() + " --config " +
                      directory.path().string() + " --out " + (directory / name).string());
   CAPTURE(outcome.error);
   REQUIRE(outcome.status == 0);
-  return read_bytes(directory / name);
+  return test::read_bytes(directory / name);
 }
 
 }  // namespace
 
 TEST_CASE("replay of one log gives the same bytes every time", "[system]") {
-  TemporaryDirectory directory;
+  test::TemporaryDirectory directory;
   REQUIRE(understory_command(directory, "sim intermediate --length 30 --seed 5 --out " +
                                             (directory / "drive.lcm").string())
               .status == 0);
@@ -34,7 +34,7 @@ TEST_CASE("replay of one log gives the same bytes every time", "[system]") {
 }
 
 TEST_CASE("replay refuses what it does not know", "[system]") {
-  TemporaryDirectory directory;
+  test::TemporaryDirectory directory;
   const auto none = understory_command(directory, "replay none.lcm --out o.lcm");
   CHECK(none.status == 1);
   CHECK_THAT(none.error, Contains("none.lcm"));

@@ -59,12 +59,12 @@ class Sender {
 class LiveDriver {
  public:
   explicit LiveDriver(const std::string& toml = "")
-      : hosted_(velodyne_driver_service(), bus_, clock(),
+      : hosted_(velodyne_driver::velodyne_driver_service(), bus_, clock(),
                 "[network]\nbind_address = \"127.0.0.1\"\n"
                 "data_port = 0\nposition_port = 0\n" +
                     toml,
                 "test.toml"),
-        device_(dynamic_cast<Device&>(hosted_.adapter())) {
+        device_(dynamic_cast<bus::Device&>(hosted_.adapter())) {
     device_.open();
     hosted_.node().connect();
     for (const log_t& line : log) {
@@ -92,7 +92,7 @@ class LiveDriver {
     settle();
     hosted_.adapter().finish();
   }
-  std::int64_t count(const std::string& channel, Reason reason) {
+  std::int64_t count(const std::string& channel, wire::Reason reason) {
     return hosted_.node().monitor().count_of(channel, reason);
   }
   std::int8_t state() { return hosted_.node().monitor().state(); }
@@ -104,21 +104,22 @@ class LiveDriver {
   std::vector<log_t> log;
 
  private:
-  Clock clock() {
+  bus::Clock clock() {
     return {[this] { return now_us; }, [this] { return now_us; }};
   }
-  void keep(const BusMessage& message) {
+  void keep(const bus::BusMessage& message) {
     if (message.channel == "LOG") {
-      log.push_back(decode_message<log_t>(message.bytes).value());
+      log.push_back(wire::decode_message<log_t>(message.bytes).value());
     } else {
       published[std::string(message.channel)].emplace_back(message.bytes.begin(),
                                                            message.bytes.end());
     }
   }
 
-  MemoryBus bus_{MemoryBus::Queues::kBounded, [this](const BusMessage& m) { keep(m); }};
-  HostedService hosted_;
-  Device& device_;
+  bus::MemoryBus bus_{bus::MemoryBus::Queues::kBounded,
+                      [this](const bus::BusMessage& m) { keep(m); }};
+  bus::HostedService hosted_;
+  bus::Device& device_;
   Sender sensor_;
   int sent_ = 0;
 };
@@ -128,7 +129,7 @@ class OfflineDriver {
  public:
   explicit OfflineDriver(VelodyneCalibration calibration) : decoder_(std::move(calibration)) {}
 
-  void add(std::span<const std::uint8_t> packet, Utime received) {
+  void add(std::span<const std::uint8_t> packet, model::Utime received) {
     if (const auto turn = decoder_.add(packet, received)) write(*turn);
   }
   void finish() {
@@ -137,17 +138,17 @@ class OfflineDriver {
   std::vector<Message> parts;
 
  private:
-  void write(const PointSweep& turn) {
-    for (PointSweep& part : split_sweep(turn, 4000)) {
+  void write(const model::PointSweep& turn) {
+    for (model::PointSweep& part : split_sweep(turn, 4000)) {
       part.sequence = parts.size();
-      parts.push_back(encode_message(part));
+      parts.push_back(wire::encode_message(part));
     }
   }
   VelodyneDecoder decoder_;
 };
 
-inline PointSweep sweep_of(const Message& message) {
-  return decode_message<PointSweep>(message).value();
+inline model::PointSweep sweep_of(const Message& message) {
+  return wire::decode_message<model::PointSweep>(message).value();
 }
 
 }  // namespace understory::test

@@ -13,15 +13,17 @@
 #include "tests/velodyne_driver/live_driver.hpp"
 
 using namespace understory;
+using namespace understory::velodyne_driver;
 using namespace understory::test;
 
 namespace {
 
 std::string configured(const std::string& toml) {
-  MemoryBus bus;
+  bus::MemoryBus bus;
   try {
-    const HostedService hosted(velodyne_driver_service(), bus, no_clock(), toml, "test.toml");
-  } catch (const ConfigurationError& error) {
+    const bus::HostedService hosted(velodyne_driver_service(), bus, bus::no_clock(), toml,
+                                    "test.toml");
+  } catch (const bus::ConfigurationError& error) {
     return error.what();
   }
   return {};
@@ -29,21 +31,21 @@ std::string configured(const std::string& toml) {
 
 /// The process, its configuration and what it says on a bus of its own.
 struct Running {
-  TemporaryDirectory directory;
+  test::TemporaryDirectory directory;
   std::string url =
       "udpm://239.255.76.67:" + std::to_string(30'000 + ::getpid() * 7 % 20'000) + "?ttl=0";
-  std::unique_ptr<Bus> bus = make_live_bus(url);
-  std::vector<Message> sweeps;
+  std::unique_ptr<bus::Bus> bus = bus::make_live_bus(url);
+  std::vector<test::Message> sweeps;
   int port = 0;
 
   Running() {
     std::ofstream(directory / "driver.toml") << "[network]\nbind_address = \"127.0.0.1\"\n"
                                                 "data_port = 0\nposition_port = 0\n";
-    bus->subscribe("RAW_SWEEP", 0, [this](const BusMessage& m) {
+    bus->subscribe("RAW_SWEEP", 0, [this](const bus::BusMessage& m) {
       sweeps.emplace_back(m.bytes.begin(), m.bytes.end());
     });
-    bus->subscribe("LOG", 0, [this](const BusMessage& m) {
-      const auto line = decode_message<log_t>(m.bytes);
+    bus->subscribe("LOG", 0, [this](const bus::BusMessage& m) {
+      const auto line = wire::decode_message<log_t>(m.bytes);
       if (line && line->code == "listens")
         std::sscanf(line->text.c_str(), "127.0.0.1: data port %d", &port);
     });
@@ -93,7 +95,7 @@ TEST_CASE("a port that is taken is named", "[velodyne_driver]") {
   }
   CHECK(problem.starts_with("UDP port " + port + " of 127.0.0.1: "));
 
-  const TemporaryDirectory directory;
+  const test::TemporaryDirectory directory;
   std::ofstream(directory / "driver.toml")
       << "[network]\nbind_address = \"127.0.0.1\"\nposition_port = 0\ndata_port = " << port << '\n';
   Running other;
@@ -114,17 +116,18 @@ TEST_CASE("the process publishes turns, and SIGTERM ends it with status 0", "[ve
        {}});
   REQUIRE(running.wait_until([&] { return running.port > 0 || process.ended(); }));
   REQUIRE(running.port > 0);
-  Sender sensor;
-  PacketMaker maker{.azimuth = 35000};
-  OfflineDriver offline(velodyne_calibration(VelodyneModel::kVlp16));
-  std::vector<Packet> packets;
+  test::Sender sensor;
+  test::PacketMaker maker{.azimuth = 35000};
+  test::OfflineDriver offline(velodyne_calibration(io::VelodyneModel::kVlp16));
+  std::vector<test::Packet> packets;
   for (int i = 0; i < 250; ++i) {
     packets.push_back(maker.next());
     sensor.send(running.port, packets.back());
     running.bus->handle_one(1);
   }
   REQUIRE(running.wait_until([&] { return running.sweeps.size() >= 16; }));
-  for (const Packet& packet : packets) offline.add(packet, sweep_of(running.sweeps.front()).utime);
+  for (const test::Packet& packet : packets)
+    offline.add(packet, sweep_of(running.sweeps.front()).utime);
   REQUIRE(offline.parts.size() >= running.sweeps.size());
   offline.parts.resize(running.sweeps.size());
   CHECK(running.sweeps == offline.parts);

@@ -22,9 +22,12 @@ using AllTypes =
                reason_count_t, slam_pose_t, slam_update_t, tracked_landmark_t, tracked_landmarks_t,
                truth_landmark_t, truth_landmarks_t, velocity_correction_t, wheels_t>;
 
-using AllValues = std::tuple<LandmarkScan, Odometry, Keyframe, MapUpdate, SlamPose, WholeMap,
-                             MapDelta, PlanarScan, WheelSample, GnssFix, ImuSample, PointSweep,
-                             TrackedScan, RawPose, EkfPose, EkfMap, EkfLevel, VelocityCorrection>;
+using AllValues =
+    std::tuple<model::LandmarkScan, model::Odometry, model::Keyframe, model::MapUpdate,
+               model::SlamPose, model::WholeMap, model::MapDelta, model::PlanarScan,
+               model::WheelSample, model::GnssFix, model::ImuSample, model::PointSweep,
+               model::TrackedScan, model::RawPose, model::EkfPose, model::EkfMap, model::EkfLevel,
+               model::VelocityCorrection>;
 
 /// Calls `f` with a null pointer to each type of the tuple.
 template <class Tuple, class F>

@@ -8,7 +8,8 @@ namespace {
 
 class Writer {
  public:
-  Writer(std::mt19937_64& random, std::vector<RealPlace>* reals, std::vector<std::size_t>* lengths)
+  Writer(std::mt19937_64& random, std::vector<test::RealPlace>* reals,
+         std::vector<std::size_t>* lengths)
       : random_(random), reals_(reals), lengths_(lengths) {}
 
   void integer(std::uint64_t value, std::size_t size) {
@@ -17,9 +18,9 @@ class Writer {
     }
   }
 
-  void write(const Layout& layout) {
-    std::array<std::size_t, kMostCounts> counts{};
-    for (const Field& field : layout.fields) {
+  void write(const wire::Layout& layout) {
+    std::array<std::size_t, wire::kMostCounts> counts{};
+    for (const wire::Field& field : layout.fields) {
       std::size_t elements = field.fixed;
       if (field.counted_by >= 0) elements *= counts[static_cast<std::size_t>(field.counted_by)];
       if (field.counts >= 0) {
@@ -33,27 +34,27 @@ class Writer {
     }
   }
 
-  Bytes take() { return std::move(bytes_); }
+  wire::Bytes take() { return std::move(bytes_); }
 
  private:
-  void element(const Field& field) {
+  void element(const wire::Field& field) {
     std::normal_distribution<double> normal(0.0, 1.0);
     switch (field.kind) {
-      case FieldKind::kStruct:
+      case wire::FieldKind::kStruct:
         return write(*field.part);
-      case FieldKind::kString:
+      case wire::FieldKind::kString:
         return string();
-      case FieldKind::kDouble:
+      case wire::FieldKind::kDouble:
         if (reals_ != nullptr) reals_->push_back({bytes_.size(), field.kind});
         return integer(std::bit_cast<std::uint64_t>(normal(random_)), 8);
-      case FieldKind::kFloat:
+      case wire::FieldKind::kFloat:
         if (reals_ != nullptr) reals_->push_back({bytes_.size(), field.kind});
         return integer(std::bit_cast<std::uint32_t>(static_cast<float>(normal(random_))), 4);
-      case FieldKind::kInt64:
+      case wire::FieldKind::kInt64:
         return integer(random_() % 1000, 8);
-      case FieldKind::kInt32:
+      case wire::FieldKind::kInt32:
         return integer(random_() % 1000, 4);
-      case FieldKind::kInt16:
+      case wire::FieldKind::kInt16:
         return integer(random_() % 1000, 2);
       default:
         return integer(random_() % 2, 1);
@@ -71,22 +72,22 @@ class Writer {
   }
 
   std::mt19937_64& random_;
-  std::vector<RealPlace>* reals_;
+  std::vector<test::RealPlace>* reals_;
   std::vector<std::size_t>* lengths_;
-  Bytes bytes_;
+  wire::Bytes bytes_;
 };
 
 }  // namespace
 
-Bytes random_message(const WireType& type, std::mt19937_64& random, std::vector<RealPlace>* reals,
-                     std::vector<std::size_t>* lengths) {
+wire::Bytes random_message(const wire::WireType& type, std::mt19937_64& random,
+                           std::vector<test::RealPlace>* reals, std::vector<std::size_t>* lengths) {
   Writer writer(random, reals, lengths);
   writer.integer(static_cast<std::uint64_t>(type.fingerprint()), 8);
   writer.write(*type.layout);
   return writer.take();
 }
 
-void put(Bytes& bytes, std::size_t offset, std::uint64_t value, std::size_t size) {
+void put(wire::Bytes& bytes, std::size_t offset, std::uint64_t value, std::size_t size) {
   for (std::size_t i = 0; i < size; ++i) {
     bytes.at(offset + i) = static_cast<std::uint8_t>(value >> (8U * (size - 1 - i)));
   }

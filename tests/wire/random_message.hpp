@@ -11,16 +11,16 @@ namespace understory::test {
 /// Where a number that may not be NaN sits in the bytes.
 struct RealPlace {
   std::size_t offset = 0;
-  FieldKind kind = FieldKind::kDouble;
+  wire::FieldKind kind = wire::FieldKind::kDouble;
 };
 
 /// A well-formed message with random values; every array has 0..3 elements. Positions of floats and
 /// doubles, and of counts and string lengths, are given where asked for.
-Bytes random_message(const WireType& type, std::mt19937_64& random,
-                     std::vector<RealPlace>* reals = nullptr,
-                     std::vector<std::size_t>* lengths = nullptr);
+wire::Bytes random_message(const wire::WireType& type, std::mt19937_64& random,
+                           std::vector<RealPlace>* reals = nullptr,
+                           std::vector<std::size_t>* lengths = nullptr);
 
 /// Overwrites `size` bytes at `offset`, big-endian.
-void put(Bytes& bytes, std::size_t offset, std::uint64_t value, std::size_t size);
+void put(wire::Bytes& bytes, std::size_t offset, std::uint64_t value, std::size_t size);
 
 }  // namespace understory::test

@@ -8,6 +8,7 @@
 #include "tests/wire/all_types.hpp"
 
 using namespace understory;
+using namespace understory::wire;
 
 namespace {
 
@@ -25,11 +26,11 @@ class Maker {
     const Eigen::Matrix<double, N, N> product = root * root.transpose();
     return 0.5 * (product + product.transpose());
   }
-  SE2 pose() { return {real(100.0), real(100.0), real(3.0)}; }
-  LandmarkKind kind() { return static_cast<LandmarkKind>(random_() % 2); }
+  geometry::SE2 pose() { return {real(100.0), real(100.0), real(3.0)}; }
+  model::LandmarkKind kind() { return static_cast<model::LandmarkKind>(random_() % 2); }
 
-  LandmarkScan scan() {
-    LandmarkScan scan{1000, 7, {40.0, real(1.0), 3.0}, {}};
+  model::LandmarkScan scan() {
+    model::LandmarkScan scan{1000, 7, {40.0, real(1.0), 3.0}, {}};
     for (std::size_t i = count(); i > 0; --i) {
       scan.detections.push_back({{real(40.0), real(40.0), real(2.0)},
                                  covariance<3>(),
@@ -46,10 +47,11 @@ class Maker {
     for (int i = 0; i < N; ++i) result[i] = real(scale);
     return result;
   }
-  Odometry odometry() {
-    Odometry odometry{5, 10, 2, pose(), covariance<3>(), std::nullopt, count() > 2, count() > 2};
+  model::Odometry odometry() {
+    model::Odometry odometry{5,           10,         2, pose(), covariance<3>(), std::nullopt,
+                             count() > 2, count() > 2};
     if (count() < 3) return odometry;
-    Preintegration inertial;
+    model::Preintegration inertial;
     inertial.seconds = 0.1;
     inertial.yaw_rad = real(1.0);
     inertial.velocity_mps = vector<2>(3.0);
@@ -62,8 +64,8 @@ class Maker {
     odometry.inertial = inertial;
     return odometry;
   }
-  PointSweep sweep(double farthest_m) {
-    PointSweep sweep;
+  model::PointSweep sweep(double farthest_m) {
+    model::PointSweep sweep;
     sweep.utime = 1000;
     sweep.turn = 7;
     sweep.part = static_cast<std::uint16_t>(count());
@@ -73,7 +75,7 @@ class Maker {
     sweep.max_range_m = 100.0;
     sweep.sensor_position_m = vector<3>(2.0);
     if (count() > 2) {
-      Attitude attitude;
+      model::Attitude attitude;
       attitude.level_Q_vehicle = Eigen::AngleAxisd(0.1, vector<3>(1.0).normalized());
       attitude.covariance_rad2 = covariance<2>();
       sweep.attitude = attitude;
@@ -86,12 +88,12 @@ class Maker {
     }
     return sweep;
   }
-  Keyframe keyframe() {
-    Keyframe keyframe{1000, 3, {40.0, 0.0, 2.0 * std::numbers::pi}, {}, {}, std::nullopt};
+  model::Keyframe keyframe() {
+    model::Keyframe keyframe{1000, 3, {40.0, 0.0, 2.0 * std::numbers::pi}, {}, {}, std::nullopt};
     if (count() > 2) keyframe.previous_T_base = pose();
     for (std::size_t i = 0; i <= count(); ++i) {
       keyframe.members.push_back(
-          {static_cast<Utime>(1000 + 100 * i), 50 + i, pose(), covariance<3>()});
+          {static_cast<model::Utime>(1000 + 100 * i), 50 + i, pose(), covariance<3>()});
     }
     for (std::size_t i = count(); i > 0; --i) {
       keyframe.landmarks.push_back(
@@ -99,12 +101,12 @@ class Maker {
     }
     return keyframe;
   }
-  MapLandmark landmark() {
+  model::MapLandmark landmark() {
     return {random_() | 1U, {real(400.0), real(400.0)}, covariance<2>(), 0.2, 9, kind()};
   }
-  std::vector<MapLandmark> landmarks() {
-    std::vector<MapLandmark> result(count());
-    for (MapLandmark& one : result) one = landmark();
+  std::vector<model::MapLandmark> landmarks() {
+    std::vector<model::MapLandmark> result(count());
+    for (model::MapLandmark& one : result) one = landmark();
     return result;
   }
 
@@ -163,11 +165,11 @@ TEST_CASE("odometry of the version before is read, without the level's error") {
   Maker values(11);
   bool had_inertial = false;
   for (int i = 0; i < 50; ++i) {
-    Odometry should = values.odometry();
-    const auto is = decode_message<Odometry>(encode_bytes(old_version(to_wire(should))));
+    model::Odometry should = values.odometry();
+    const auto is = decode_message<model::Odometry>(encode_bytes(old_version(to_wire(should))));
     REQUIRE(is);
     had_inertial = had_inertial || should.inertial;
-    if (should.inertial) should.inertial->level = LevelError{};
+    if (should.inertial) should.inertial->level = model::LevelError{};
     CHECK(encode_message(*is) == encode_message(should));
   }
   CHECK(had_inertial);
@@ -179,17 +181,20 @@ TEST_CASE("values survive the wire") {
     check_round_trip(make.scan());
     check_round_trip(make.keyframe());
     check_round_trip(make.odometry());
-    check_round_trip(SlamPose{10, 2, MapUpdateStatus::kUpdated, 4, 0, make.pose(),
-                              make.covariance<3>(), 3, make.pose(), make.pose(), 1, make.pose()});
-    check_round_trip(SlamPose{10, 2, std::nullopt, std::nullopt, 0, make.pose(),
-                              make.covariance<3>(), 3, make.pose(), make.pose(), 1, make.pose()});
+    check_round_trip(model::SlamPose{10, 2, model::MapUpdateStatus::kUpdated, 4, 0, make.pose(),
+                                     make.covariance<3>(), 3, make.pose(), make.pose(), 1,
+                                     make.pose()});
+    check_round_trip(model::SlamPose{10, 2, std::nullopt, std::nullopt, 0, make.pose(),
+                                     make.covariance<3>(), 3, make.pose(), make.pose(), 1,
+                                     make.pose()});
+    check_round_trip(model::WholeMap{
+        10, 1, 5, true, make.landmarks(), {{1, 10, make.pose(), make.covariance<3>()}}});
     check_round_trip(
-        WholeMap{10, 1, 5, true, make.landmarks(), {{1, 10, make.pose(), make.covariance<3>()}}});
-    check_round_trip(MapDelta{10, 1, 4, 5, make.landmarks(), make.landmarks(), {8, 9}, {{6, 7}}});
-    MapUpdate update;
+        model::MapDelta{10, 1, 4, 5, make.landmarks(), make.landmarks(), {8, 9}, {{6, 7}}});
+    model::MapUpdate update;
     update.keyframe_sequence = 12;
     update.utime = 99;
-    update.status = MapUpdateStatus::kNotSure;
+    update.status = model::MapUpdateStatus::kNotSure;
     update.map_T_vehicle = make.pose();
     update.covariance = make.covariance<3>();
     update.associations = {{0, 5}, {2, 6}};
@@ -201,15 +206,15 @@ TEST_CASE("values survive the wire") {
 }
 
 TEST_CASE("sensor values survive the wire") {
-  PlanarScan scan{100, 5, -1.5, 0.01, 80.0, {1.0F, 0.0F, 90.0F, 80.5F}};
-  const auto back = decode_message<PlanarScan>(encode_message(scan));
+  model::PlanarScan scan{100, 5, -1.5, 0.01, 80.0, {1.0F, 0.0F, 90.0F, 80.5F}};
+  const auto back = decode_message<model::PlanarScan>(encode_message(scan));
   REQUIRE(back);
   CHECK(back->ranges_m == std::vector<float>{1.0F, 0.0F, 0.0F, 0.0F});
   CHECK(back->bearing(1) == Approx(scan.bearing(1)));
-  check_round_trip(WheelSample{3, 4, 1.5, -0.2});
-  check_round_trip(GnssFix{3, 4, {10.0, -20.0}, 0.0, std::nullopt, 0.0});
-  check_round_trip(GnssFix{3, 4, {10.0, -20.0}, 2.0, Eigen::Vector2d(1.0, 2.0), 0.1});
-  gnss_t none = to_wire(GnssFix{3, 4, {10.0, -20.0}, 0.0, std::nullopt, 0.0});
+  check_round_trip(model::WheelSample{3, 4, 1.5, -0.2});
+  check_round_trip(model::GnssFix{3, 4, {10.0, -20.0}, 0.0, std::nullopt, 0.0});
+  check_round_trip(model::GnssFix{3, 4, {10.0, -20.0}, 2.0, Eigen::Vector2d(1.0, 2.0), 0.1});
+  gnss_t none = to_wire(model::GnssFix{3, 4, {10.0, -20.0}, 0.0, std::nullopt, 0.0});
   none.valid = 0;
   CHECK_FALSE(from_wire(none));
 }
@@ -217,22 +222,22 @@ TEST_CASE("sensor values survive the wire") {
 TEST_CASE("the front end's values survive the wire") {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     Maker make(seed);
-    check_round_trip(ImuSample{3, 4, make.vector<3>(1.0), make.vector<3>(10.0)});
-    check_round_trip(RawPose{3, 4, make.pose(), make.covariance<3>(), seed % 2 == 0});
-    check_round_trip(EkfPose{3, 4, make.pose(), make.covariance<3>(), make.vector<2>(5.0),
-                             make.covariance<2>(), make.vector<3>(0.1), make.covariance<3>(), 7, 1,
-                             2});
+    check_round_trip(model::ImuSample{3, 4, make.vector<3>(1.0), make.vector<3>(10.0)});
+    check_round_trip(model::RawPose{3, 4, make.pose(), make.covariance<3>(), seed % 2 == 0});
+    check_round_trip(model::EkfPose{3, 4, make.pose(), make.covariance<3>(), make.vector<2>(5.0),
+                                    make.covariance<2>(), make.vector<3>(0.1), make.covariance<3>(),
+                                    7, 1, 2});
+    check_round_trip(model::VelocityCorrection{3, 4, make.vector<2>(5.0), make.vector<3>(0.1),
+                                               make.covariance<5>()});
     check_round_trip(
-        VelocityCorrection{3, 4, make.vector<2>(5.0), make.vector<3>(0.1), make.covariance<5>()});
-    check_round_trip(
-        EkfLevel{3, 4, make.vector<2>(0.01), make.covariance<2>(), make.covariance<2>()});
-    EkfMap map{3, 4, {}};
-    TrackedScan tracked{3, 4, {40.0, 0.1, 2.0}, {}};
+        model::EkfLevel{3, 4, make.vector<2>(0.01), make.covariance<2>(), make.covariance<2>()});
+    model::EkfMap map{3, 4, {}};
+    model::TrackedScan tracked{3, 4, {40.0, 0.1, 2.0}, {}};
     for (std::size_t i = make.count(); i > 0; --i) {
       map.landmarks.push_back({i, make.vector<2>(50.0), make.covariance<2>(), 0.2, make.kind(), 9});
     }
     std::uint32_t index = 0;
-    for (const Detection& detection : make.scan().detections) {
+    for (const model::Detection& detection : make.scan().detections) {
       tracked.landmarks.push_back({100 + index, index, detection});
       ++index;
     }
@@ -246,8 +251,8 @@ TEST_CASE("the front end's values survive the wire") {
 
 TEST_CASE("a sweep's points keep their places to half a step") {
   Maker make(3);
-  const PointSweep sweep = make.sweep(120.0);
-  const auto back = decode_message<PointSweep>(encode_message(sweep));
+  const model::PointSweep sweep = make.sweep(120.0);
+  const auto back = decode_message<model::PointSweep>(encode_message(sweep));
   REQUIRE(back);
   REQUIRE(back->points.size() == sweep.points.size());
   for (std::size_t i = 0; i < sweep.points.size(); ++i) {
@@ -257,7 +262,7 @@ TEST_CASE("a sweep's points keep their places to half a step") {
     CHECK(back->points[i].ring == sweep.points[i].ring);
     CHECK(back->points[i].intensity == sweep.points[i].intensity);
   }
-  PointSweep broken = sweep;
+  model::PointSweep broken = sweep;
   broken.points[7].y_m = std::numeric_limits<float>::quiet_NaN();
   CHECK_THROWS_AS(to_wire(broken), std::invalid_argument);
   broken.points[7].y_m = std::numeric_limits<float>::infinity();
@@ -277,12 +282,12 @@ TEST_CASE("a sweep that cannot be is refused") {
 
 TEST_CASE("a sweep in parts is put together again, and one with a hole is dropped") {
   Maker make(8);
-  PointSweep whole = make.sweep(30.0);
+  model::PointSweep whole = make.sweep(30.0);
   whole.part = 0;
   whole.parts = 1;
-  SweepAssembler assembler;
+  model::SweepAssembler assembler;
   for (std::size_t size = 1; size <= 45; ++size) {
-    const std::vector<PointSweep> parts = split_sweep(whole, size);
+    const std::vector<model::PointSweep> parts = split_sweep(whole, size);
     REQUIRE(parts.size() == (whole.points.size() + size - 1) / size);
     for (std::size_t i = 0; i < parts.size(); ++i) {
       const auto result = assembler.add(parts[i]);
@@ -290,8 +295,8 @@ TEST_CASE("a sweep in parts is put together again, and one with a hole is droppe
       if (result) CHECK(encode_message(*result) == encode_message(whole));
     }
   }
-  CHECK(assembler.incomplete_turns() == 0);
-  const std::vector<PointSweep> parts = split_sweep(whole, 10);
+  CHECK(assembler.incomplete_revolutions() == 0);
+  const std::vector<model::PointSweep> parts = split_sweep(whole, 10);
   for (std::size_t lost = 0; lost < parts.size(); ++lost) {
     for (std::size_t i = 0; i < parts.size(); ++i) {
       if (i != lost) CHECK_FALSE(assembler.add(parts[i]));
@@ -299,14 +304,14 @@ TEST_CASE("a sweep in parts is put together again, and one with a hole is droppe
     for (std::size_t i = 0; i + 1 < parts.size(); ++i) CHECK_FALSE(assembler.add(parts[i]));
     CHECK(assembler.add(parts.back()));
   }
-  CHECK(assembler.incomplete_turns() == parts.size());
+  CHECK(assembler.incomplete_revolutions() == parts.size());
 }
 
 TEST_CASE("values are carried field by field") {
   Maker make(5);
-  LandmarkScan scan = make.scan();
+  model::LandmarkScan scan = make.scan();
   while (scan.detections.empty()) scan = make.scan();
-  const auto back = decode_message<LandmarkScan>(encode_message(scan));
+  const auto back = decode_message<model::LandmarkScan>(encode_message(scan));
   REQUIRE(back);
   CHECK(back->sequence == scan.sequence);
   CHECK(back->field_of_view.bearing_rad == scan.field_of_view.bearing_rad);
@@ -342,7 +347,7 @@ TEST_CASE("a scan is refused for each thing that cannot be") {
 
 TEST_CASE("a keyframe without members, or with members out of order, is refused") {
   Maker make(1);
-  Keyframe keyframe = make.keyframe();
+  model::Keyframe keyframe = make.keyframe();
   keyframe.members.resize(1);
   keyframe_t wire = to_wire(keyframe);
   REQUIRE(from_wire(wire));

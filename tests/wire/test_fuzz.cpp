@@ -29,6 +29,7 @@ void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 namespace {
 
 using namespace understory;
+using namespace understory::wire;
 using namespace understory::test;
 
 /// One way of damaging a message.
@@ -99,8 +100,8 @@ TEST_CASE("a hundred thousand damaged packets over all types") {
   constexpr std::size_t kEach = 3000;
   std::mt19937_64 random(20260101);
   Tally tally;
-  for_each_type<AllTypes>([&]<class T>(T*) { fuzz<T>(kEach, random, tally); });
-  for_each_type<AllValues>([&]<class T>(T*) { fuzz<T>(kEach, random, tally); });
+  test::for_each_type<test::AllTypes>([&]<class T>(T*) { fuzz<T>(kEach, random, tally); });
+  test::for_each_type<test::AllValues>([&]<class T>(T*) { fuzz<T>(kEach, random, tally); });
   CHECK(tally.packets >= 100000);
   CHECK(tally.accepted + tally.refused == tally.packets);
   CHECK(tally.refused > tally.packets / 2);
@@ -116,7 +117,7 @@ TEST_CASE("a large message of every kind decodes in four times its size") {
   scan.detections.assign(10000, detection_t{});
   const Bytes bytes = encode_bytes(scan);
   allocated_bytes = 0;
-  REQUIRE(decode_message<LandmarkScan>(bytes));
+  REQUIRE(decode_message<model::LandmarkScan>(bytes));
   CHECK(allocated_bytes >= bytes.size());  // it does count
   CHECK(allocated_bytes <= 4 * bytes.size());
 
@@ -126,6 +127,6 @@ TEST_CASE("a large message of every kind decodes in four times its size") {
   delta.removed.assign(10000, 1);
   const Bytes removal = encode_bytes(delta);
   allocated_bytes = 0;
-  REQUIRE(decode_message<MapDelta>(removal));
+  REQUIRE(decode_message<model::MapDelta>(removal));
   CHECK(allocated_bytes <= 4 * removal.size());
 }

@@ -7,12 +7,13 @@
 #include "tests/wire/random_message.hpp"
 
 using namespace understory;
+using namespace understory::wire;
 using namespace understory::test;
 
 TEST_CASE("the table knows every type, with the fingerprint that lcm-gen gives it") {
   std::size_t types = 0;
   std::set<std::int64_t> fingerprints;
-  for_each_type<AllTypes>([&]<class T>(T*) {
+  test::for_each_type<test::AllTypes>([&]<class T>(T*) {
     const WireType* type = find_wire_type(T::getTypeName());
     REQUIRE(type != nullptr);
     CHECK(type->fingerprint() == T::getHash());
@@ -27,7 +28,7 @@ TEST_CASE("the table knows every type, with the fingerprint that lcm-gen gives i
 
 TEST_CASE("what the layout calls well-formed decodes, and encodes to the same bytes") {
   std::mt19937_64 random(1);
-  for_each_type<AllTypes>([&]<class T>(T*) {
+  test::for_each_type<test::AllTypes>([&]<class T>(T*) {
     for (int i = 0; i < 50; ++i) {
       const Bytes bytes = random_message(wire_type_of<T>(), random);
       const auto message = decode_bytes<T>(bytes);
@@ -63,9 +64,9 @@ TEST_CASE("a number that is not finite is refused in every field that could hold
   std::mt19937_64 random(3);
   std::size_t places = 0;
   for (const WireType& type : wire_types()) {
-    std::vector<RealPlace> reals;
+    std::vector<test::RealPlace> reals;
     const Bytes bytes = random_message(type, random, &reals);
-    for (const RealPlace& real : reals) {
+    for (const test::RealPlace& real : reals) {
       const bool is_double = real.kind == FieldKind::kDouble;
       for (const std::uint64_t value :
            {is_double ? 0x7FF8000000000000ULL : 0x7FC00000ULL,     // NaN

@@ -1,0 +1,121 @@
+// A map of landmarks that all look alike, in which one observation finds its place at once.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/constellation/grid.hpp"
+#include "common/constellation/localisation.hpp"
+#include "common/constellation/triangles.hpp"
+
+namespace understory::constellation {
+
+struct NearestLandmark {
+  LandmarkId id = 0;
+  double distance_m = 0.0;
+};
+
+/// Landmarks in a grid, and the triangles that each forms with its nearest neighbours, by their
+/// side lengths. Every change is made in place and touches the neighbourhood only; the result does
+/// not depend on the order of changes (ties between distances are broken by id).
+///
+/// Positions must be finite and within constellation::PointGrid::kMaxCoordinate.
+class ConstellationMap {
+ public:
+  struct Parameters {
+    double cell_m = 4.0;    ///< Of the grid.
+    double bucket_m = 0.5;  ///< Of side lengths.
+    /// Neighbours further away than this form no triangles [m].
+    double max_neighbour_distance_m = 30.0;
+  };
+  /// Triangles are made among a landmark and two of its so many nearest neighbours.
+  static constexpr std::size_t kNeighbours = 6;
+
+  ConstellationMap() : ConstellationMap(Parameters{}) {}
+  explicit ConstellationMap(const Parameters& parameters);
+
+  /// False (and nothing is changed) if `id` is already there or the position cannot be stored.
+  bool insert(LandmarkId id, const Eigen::Vector2d& position_m);
+  /// False if `id` is not there.
+  bool remove(LandmarkId id);
+  /// False if `id` is not there or the position cannot be stored.
+  bool move(LandmarkId id, const Eigen::Vector2d& position_m);
+
+  std::size_t size() const { return slots_.size(); }
+  bool contains(LandmarkId id) const { return slots_.find(id) != kNoSlot; }
+  std::optional<Eigen::Vector2d> position(LandmarkId id) const;
+
+  /// The landmark closest to `point_m` within `radius_m`; of equally close ones the smaller id.
+  std::optional<NearestLandmark> nearest(const Eigen::Vector2d& point_m, double radius_m) const;
+  /// Calls f(id, position [m], distance [m]) for each landmark within `radius_m`, in no meaningful
+  /// order: sort what reaches an output.
+  template <class F>
+  void for_each_within(const Eigen::Vector2d& point_m, double radius_m, F&& f) const {
+    if (!PointGrid::representable(point_m)) return;
+    grid_.for_each_within(point_m.x(), point_m.y(), radius_m, [&](Slot slot, double squared) {
+      f(ids_[slot], grid_.position(slot), std::sqrt(squared));
+    });
+  }
+  /// Ids of the landmarks in the disc, in ascending order.
+  std::vector<LandmarkId> near(const Disc& disc) const;
+
+  /// The pose from which `points` were observed, with no prior; if `where` is given, only poses
+  /// whose position lies in it are considered.
+  ///
+  /// Triangles among nearest neighbours of the observation are looked up by side lengths, the most
+  /// telling first; each similar triangle of the map is a hypothesis, tested on the points around
+  /// it one by one (Wald's sequential test), then refined on all points. Accepted is a pose that
+  /// chance does not give and that no different pose comes close to.
+  Localisation localise(std::span<const ObservedPoint> points,
+                        const LocaliseParameters& parameters = {},
+                        const std::optional<Disc>& where = std::nullopt) const;
+
+  /// Every triangle as ascending ids, sorted: for comparisons.
+  std::vector<std::array<LandmarkId, 3>> triangles() const;
+  std::size_t triangle_count() const { return triangles_.size(); }
+  /// Memory held [bytes].
+  std::size_t bytes() const;
+
+  // For the search, which lives in files of its own.
+  const PointGrid& grid() const { return grid_; }
+  const TriangleIndex& triangle_index() const { return triangles_; }
+  LandmarkId id_of(Slot slot) const { return ids_[slot]; }
+
+ private:
+  using SlotTriple = std::array<Slot, 3>;
+  struct Neighbours {
+    std::array<Slot, kNeighbours> slot{};
+    std::uint32_t count = 0;
+    bool has(Slot wanted) const;
+  };
+
+  Neighbours nearest_neighbours(Slot slot) const;
+  /// Landmarks whose neighbours a landmark `slot` at `position` is, or would be.
+  void collect_anchors(Slot slot, const Eigen::Vector2d& position,
+                       std::vector<Slot>& anchors) const;
+  /// Triangles with that corner that the anchors' neighbourhoods hold: sorted, each once.
+  std::vector<SlotTriple> triangles_at(Slot corner, const std::vector<Slot>& anchors) const;
+  /// Triangles that `anchor` holds with the neighbours `in` and not with `out`, without `except`.
+  static void collect_difference(Slot anchor, const Neighbours& in, const Neighbours& out,
+                                 Slot except, std::vector<SlotTriple>& triangles);
+  static bool holds(Slot anchor, const Neighbours& list, const SlotTriple& triangle);
+  Triangle canonical(const SlotTriple& triangle) const;
+  /// Brings neighbourhoods and triangles up to date around `changed` while `change` is made; `gone`
+  /// is `changed` if it is no longer there afterwards.
+  template <class Change>
+  void update(Slot changed, std::vector<Slot>& anchors, Change&& change, Slot gone = kNoSlot);
+
+  Parameters parameters_;
+  PointGrid grid_;
+  TriangleIndex triangles_;
+  IndexTable slots_;                    // id -> slot
+  std::vector<LandmarkId> ids_;         // by slot
+  std::vector<Neighbours> neighbours_;  // by slot
+  std::vector<Slot> free_slots_;
+};
+
+}  // namespace understory::constellation

@@ -1,0 +1,44 @@
+// From a few pairs of observed point and landmark to the best pose on all of them.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/constellation/grid.hpp"
+#include "common/constellation/observation.hpp"
+#include "common/geometry/se2.hpp"
+
+namespace understory::constellation {
+
+struct Pair {
+  std::uint32_t point = 0;  ///< Prepared point.
+  Slot slot = kNoSlot;
+  double squared_m2 = 0.0;  ///< Distance left between them.
+};
+
+/// A pose with the pairs that it rests on.
+struct FittedPose {
+  geometry::SE2 map_T_sensor;
+  std::vector<Pair> pairs;   ///< One to one, by point.
+  double mean_chance = 1.0;  ///< That a point of no landmark hits one, averaged over the points.
+  /// log10 of the bound on the probability of so many hits by chance, for one hypothesis.
+  double log10_tail = 0.0;
+};
+
+/// The landmark closest to (x, y) within the gate; kNoSlot if none. The squared distance is
+/// returned in `squared_m2`.
+Slot nearest_slot(const PointGrid& grid, double x, double y, double gate_m, double& squared_m2);
+
+/// Refits the motion in closed form and gathers the pairs anew, each point's gate following from
+/// its own noise and the pose's, until the pairs stay the same. Precondition: at least two pairs.
+FittedPose fit_pose(const PreparedObservation& observation, const PointGrid& grid,
+                    std::vector<Pair> pairs, const LocaliseParameters& parameters);
+
+/// Covariance of the pose from its pairs (tangent order, right perturbation): inverse of the
+/// information sum J^T J / variance with J = R [I | S p].
+Eigen::Matrix3d pose_covariance(const PreparedObservation& observation, const FittedPose& pose);
+
+/// True if both rest on largely the same pairs.
+bool same_pose(const FittedPose& a, const FittedPose& b);
+
+}  // namespace understory::constellation

@@ -1,0 +1,35 @@
+// A factor graph solved whole: Gauss-Newton, Levenberg-Marquardt, Dogleg, on CHOLMOD.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/factor_graph/graph/factor_graph.hpp"
+
+namespace understory::factor_graph::batch {
+
+enum class BatchMethod : std::uint8_t { kGaussNewton, kLevenbergMarquardt, kDogleg };
+
+struct BatchParameters {
+  BatchMethod method = BatchMethod::kLevenbergMarquardt;
+  int max_iterations = 100;
+  /// Converged when a step lowers chi^2 by less than this part of it.
+  double relative_decrease = 1e-9;
+  double first_damping = 1e-6;  ///< Of Levenberg-Marquardt, relative to the Hessian's diagonal.
+  double first_radius = 10.0;   ///< Of Dogleg [m, rad].
+};
+
+struct BatchReport {
+  bool ok = false;
+  bool converged = false;
+  int iterations = 0;
+  double chi2 = 0.0;
+  std::vector<graph::VariableId> undetermined;  ///< The first that the measurements leave open.
+  std::string error;
+};
+
+/// Moves the graph's estimates to the optimum that they lead to; variables without factors stay. On
+/// an error the estimates are the last good ones.
+BatchReport optimise(graph::FactorGraph& graph, const BatchParameters& parameters = {});
+
+}  // namespace understory::factor_graph::batch

@@ -1,0 +1,27 @@
+// Dense elimination of the leading variables of one front.
+#pragma once
+
+namespace understory::factor_graph::bayes_tree {
+
+/// Partial Cholesky factorisation in place. `front`: symmetric, size x size, column-major, lower
+/// triangle. The first `pivots` columns become those of L; the rest becomes the Schur complement.
+/// A pivot that is not above least[column] is left out: its column becomes that of the identity.
+/// The last row and column (the right-hand side) is never a pivot. Returns how many were left out;
+/// their numbers go to `left_out`.
+///
+/// Back-substitution: `step` holds the separator's values behind `pivots` free places, which it
+/// fills.
+struct FrontKernel {
+  int (*factorise)(double* front, int size, int pivots, const double* least,
+                   int* left_out) = nullptr;
+  void (*back_substitute)(const double* front, int size, int pivots, double* step) = nullptr;
+};
+
+/// The fastest one that this processor can run.
+FrontKernel front_kernel();
+
+FrontKernel front_kernel_portable();
+FrontKernel front_kernel_avx2();    ///< Empty where the compiler does not know it.
+FrontKernel front_kernel_avx512();  ///< The same.
+
+}  // namespace understory::factor_graph::bayes_tree

@@ -1,0 +1,55 @@
+// Graphs as text: g2o, TORO, iSAM.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "common/factor_graph/graph/factor.hpp"
+
+namespace understory::factor_graph::files {
+
+class FactorGraph;
+
+/// A graph with the numbers that its file gives. Variables of factors are positions in `vertices`.
+struct GraphFile {
+  struct Vertex {
+    std::int64_t number = 0;
+    graph::VariableType type = graph::VariableType::kPose2;
+    graph::Value value{};
+    bool has_value = false;  ///< Formats of measurements alone give none.
+  };
+  std::vector<Vertex> vertices;        ///< In order of their numbers; iSAM's landmarks last.
+  std::vector<graph::Factor> factors;  ///< In order of the file.
+  std::vector<std::int64_t> fixed;     ///< Numbers of vertices that the file holds fast.
+  /// Lines of edges from a vertex to itself: left out, for they tell nothing about it.
+  std::vector<int> self_edges;
+};
+
+/// What is wrong with a file, and in which line.
+struct GraphFileError {
+  int line = 0;
+  std::string what;
+};
+
+enum class GraphFormat : std::uint8_t {
+  kG2o,   ///< VERTEX_SE2, VERTEX_XY, VERTEX_SE3:QUAT, VERTEX_TRACKXYZ and the edges between them;
+          ///< information by rows; FIX.
+  kToro,  ///< VERTEX2, EDGE2; information in the order 11 12 22 33 13 23.
+  kIsam,  ///< ODOMETRY or EDGE2, LANDMARK; the ROOT of the information by rows.
+};
+
+/// By what the first words say.
+GraphFormat guess_format(std::string_view text);
+/// Unknown words are passed over. A rotation's information in g2o files is of the vector part of
+/// the quaternion; the factors have it of the rotation vector.
+std::variant<GraphFile, GraphFileError> read_graph(std::string_view text, GraphFormat format);
+
+/// g2o text of a graph at its estimates: relative poses and Cartesian observations of points, and
+/// all variables; `skipped` counts the factors that the format has no word for. Losses are not
+/// told.
+std::string write_g2o(const FactorGraph& graph, int* skipped = nullptr);
+
+}  // namespace understory::factor_graph::files

@@ -1,0 +1,129 @@
+// Measurements between variables, as they are given to a factor graph.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/factor_graph/graph/variable.hpp"
+
+namespace understory::factor_graph::graph {
+
+/// What is measured. The residual e is as said; a factor's cost is e' * information * e.
+/// `t`, `R`, `theta`: of a pose; `p`: a point; `z`: the measurement; vec: of a unit quaternion with
+/// w >= 0.
+enum class FactorKind : std::uint8_t {
+  kPriorPose2,     ///< R_z' (t - t_z), theta - theta_z
+  kPriorPose3,     ///< R_z' (t - t_z), 2 vec(q_z* q)
+  kPriorPoint2,    ///< p - z
+  kPriorPoint3,    ///< p - z
+  kRelativePose2,  ///< R_z' (R_a' (t_b - t_a) - t_z), theta_b - theta_a - theta_z
+  kRelativePose3,  ///< R_z' (R_a' (t_b - t_a) - t_z), 2 vec(q_z* q_a* q_b)
+  kPoint2,         ///< R' (p - t) - z: a landmark seen from a pose, Cartesian
+  kPoint3,         ///< R' (p - t) - z
+  kRangeBearing2,  ///< |R' (p - t)| - z_0 [m], direction of R' (p - t) - z_1 [rad]
+  kPosition2,      ///< t + R * antenna - z: GNSS
+  kPosition3,      ///< t + R * antenna - z
+  /// As kRelativePose2, of a motion whose turn was measured too large by b * seconds; b: a scalar.
+  kBiasedRelativePose2,
+  kPriorScalar,  ///< b - z
+  kStepScalar,   ///< b_b - b_a
+  kCondensed2,   ///< Several poses and points of the plane as seen from the first variable.
+  kLinear,       ///< J (value - base) - b: what a marginalisation leaves.
+  kUser,         ///< See UserFactor.
+};
+
+/// Loss of s = e' * information * e: s, and for large s as below with k the width [sigmas].
+enum class RobustKernel : std::uint8_t {
+  kNone,
+  kHuber,         ///< 2 k sqrt(s) - k^2 beyond k^2
+  kCauchy,        ///< k^2 log(1 + s / k^2)
+  kGemanMcClure,  ///< s / (1 + s / k^2)
+};
+
+struct Loss {
+  RobustKernel kernel = RobustKernel::kNone;
+  double width = 1.0;
+};
+
+/// rho(s) and its derivative, which is the factor's weight.
+struct LossValue {
+  double cost = 0.0;
+  double weight = 1.0;
+};
+LossValue evaluate(const Loss& loss, double squared_error);
+
+/// A factor of up to three variables.
+struct Factor {
+  FactorKind kind = FactorKind::kPriorPose2;
+  int variable_count = 1;
+  std::array<VariableId, 3> variables{};
+  std::array<double, 7> measurement{};
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6> information;
+  Loss loss;
+};
+
+/// Where a kTurningPose2's measurement has its time; before it: that of a kRelativePose2.
+constexpr std::size_t kBiasedSeconds = 5;
+
+// Orders of covariances: as the residuals above. Angles in rad, lengths in m.
+Factor prior(VariableId pose, const geometry::SE2& mean, const Eigen::Matrix3d& information);
+Factor prior(VariableId pose, const Pose3& mean, const Eigen::Matrix<double, 6, 6>& information);
+Factor prior(VariableId point, const Eigen::Vector2d& mean, const Eigen::Matrix2d& information);
+Factor prior(VariableId point, const Eigen::Vector3d& mean, const Eigen::Matrix3d& information);
+Factor relative(VariableId a, VariableId b, const geometry::SE2& a_T_b,
+                const Eigen::Matrix3d& information);
+Factor relative(VariableId a, VariableId b, const Pose3& a_T_b,
+                const Eigen::Matrix<double, 6, 6>& information);
+/// A motion that took `seconds`, measured with an instrument whose rate of turn [rad/s] is off by
+/// `bias`: the way turned by half of what the heading did.
+Factor turning(VariableId a, VariableId b, VariableId bias, const geometry::SE2& a_T_b,
+               double seconds, const Eigen::Matrix3d& information);
+Factor prior(VariableId scalar, double mean, double information);
+/// Two scalars that differ by chance alone.
+Factor step(VariableId a, VariableId b, double information);
+Factor observation(VariableId pose, VariableId point, const Eigen::Vector2d& position,
+                   const Eigen::Matrix2d& information);
+Factor observation(VariableId pose, VariableId point, const Eigen::Vector3d& position,
+                   const Eigen::Matrix3d& information);
+Factor range_bearing(VariableId pose, VariableId point, double range_m, double bearing_rad,
+                     const Eigen::Matrix2d& information);
+/// Position of an antenna (in the pose's frame) in the world.
+Factor position(VariableId pose, const Eigen::Vector2d& antenna, const Eigen::Vector2d& measured,
+                const Eigen::Matrix2d& information);
+Factor position(VariableId pose, const Eigen::Vector3d& antenna, const Eigen::Vector3d& measured,
+                const Eigen::Matrix3d& information);
+
+/// Condensed measurement: where `variables[1..]` (pose2: x, y, theta; point2: x, y) are in the
+/// frame of the pose `variables[0]`, with the joint information of all of them.
+struct CondensedFactor {
+  std::vector<VariableId> variables;
+  Eigen::VectorXd measurement;
+  Eigen::MatrixXd information;
+  Loss loss;
+};
+
+/// A factor that a program brings along.
+class UserFactor {
+ public:
+  virtual ~UserFactor() = default;
+  /// Rows of the residual.
+  virtual int residual_dimension() const = 0;
+  /// Whitened residual at `values` (one for each variable) and, unless null, its derivative:
+  /// column-major, the variables' columns side by side. A pose2 is perturbed in (x, y, theta) of
+  /// the world; a pose3 in its translation in the world and, on the right, in its rotation vector.
+  virtual void evaluate(std::span<const Value> values, double* residual,
+                        double* jacobian) const = 0;
+};
+
+/// Residual, and unless null its derivative in the sense of UserFactor, before whitening. `data`:
+/// the measurement. Not for kLinear and kUser.
+void evaluate(FactorKind kind, const double* data, std::span<const Value* const> values,
+              std::span<const VariableType> types, double* residual, double* jacobian);
+/// Rows of the residual; none for those whose size the data tell.
+int residual_dimension(FactorKind kind);
+/// The types that a factor's variables must have; condensed ones only tell the first.
+std::span<const VariableType> variable_types(FactorKind kind);
+
+}  // namespace understory::factor_graph::graph

@@ -1,0 +1,52 @@
+// Variables of a factor graph, and where they are.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "common/factor_graph/graph/pose3.hpp"
+#include "common/geometry/se2.hpp"
+
+namespace understory::factor_graph::graph {
+
+/// Number of a variable or factor in its graph. A removed one's number is given out again.
+enum class VariableId : std::int32_t {};
+enum class FactorId : std::int32_t {};
+constexpr int index(VariableId id) { return static_cast<int>(id); }
+constexpr int index(FactorId id) { return static_cast<int>(id); }
+
+enum class VariableType : std::uint8_t { kPose2, kPose3, kPoint2, kPoint3, kScalar };
+
+/// Degrees of freedom.
+constexpr int dimension(VariableType type) {
+  constexpr std::array<int, 5> dimensions{3, 6, 2, 3, 1};
+  return dimensions[static_cast<std::size_t>(type)];
+}
+constexpr int kMaxVariableDimension = 6;
+
+/// Numbers of a variable's value:
+///   pose2: x, y [m], theta [rad, not wrapped], cos theta, sin theta
+///   pose3: x, y, z [m], quaternion x, y, z, w (body to world)
+///   point: x, y (, z) [m]
+///   scalar: itself, in a unit of its own
+using Value = std::array<double, 7>;
+
+/// Where a variable is, in a chart about its `base`: (x, y, theta) of a pose2 and the coordinates
+/// of points are added; a pose3 is (translation + d[0..2], rotation * Exp(d[3..5])). In the plane
+/// this chart is flat, so nothing is lost by staying at one base for ever.
+using Delta = std::array<double, kMaxVariableDimension>;
+
+Value value_of(const geometry::SE2& pose);
+Value value_of(const Pose3& pose);
+Value value_of(const Eigen::Vector2d& point);
+Value value_of(const Eigen::Vector3d& point);
+Value value_of(double scalar);
+geometry::SE2 pose2_of(const Value& value);
+Pose3 pose3_of(const Value& value);
+inline Eigen::Vector2d point2_of(const Value& value) { return {value[0], value[1]}; }
+inline Eigen::Vector3d point3_of(const Value& value) { return {value[0], value[1], value[2]}; }
+
+/// The value at `delta` about `base`.
+Value moved(VariableType type, const Value& base, const double* delta);
+
+}  // namespace understory::factor_graph::graph

@@ -1,0 +1,109 @@
+// Records by number, with the way back to an earlier state.
+#pragma once
+
+#include <cstdint>
+#include <type_traits>
+#include <vector>
+
+namespace understory::factor_graph::storage {
+
+/// A table of plain records. A record's first change since the last commit() keeps what it was:
+/// rollback() costs what changed and restores it exactly, with the order in which numbers are given
+/// out. Numbers given back serve again after the next commit().
+template <typename T>
+class JournaledTable {
+  static_assert(std::is_trivially_copyable_v<T>);
+
+ public:
+  int add() {
+    int id = 0;
+    if (free_.empty()) {
+      id = size();
+      records_.emplace_back();
+      saved_at_.push_back(0);
+    } else {
+      id = free_.back();
+      free_.pop_back();
+      records_[static_cast<std::size_t>(id)] = T{};
+    }
+    saved_at_[static_cast<std::size_t>(id)] = epoch_;
+    added_.push_back(id);
+    return id;
+  }
+  void remove(int id) { removed_.push_back(id); }
+
+  const T& operator[](int id) const { return records_[static_cast<std::size_t>(id)]; }
+  T& edit(int id) {
+    const auto at = static_cast<std::size_t>(id);
+    if (saved_at_[at] != epoch_) {
+      saved_at_[at] = epoch_;
+      saved_.push_back({id, records_[at]});
+    }
+    return records_[at];
+  }
+  /// For what is no part of the state.
+  T& edit_unsaved(int id) { return records_[static_cast<std::size_t>(id)]; }
+
+  int size() const { return static_cast<int>(records_.size()); }
+  /// Grows with every commit: what carries it was made since the last one.
+  std::uint64_t epoch() const { return epoch_; }
+
+  /// `on_removed(record)` for every record that is now gone for good; `on_saved(before, now)` for
+  /// every one that was changed.
+  template <typename OnRemoved, typename OnSaved>
+  void commit(OnRemoved&& on_removed, OnSaved&& on_saved) {
+    for (const Saved& saved : saved_) on_saved(saved.record, (*this)[saved.id]);
+    for (const int id : removed_) {
+      on_removed((*this)[id]);
+      free_.push_back(id);
+    }
+    forget();
+  }
+
+  /// `on_undone(now, before)` for every changed record, `on_added(now)` for every one that ceases
+  /// to be.
+  template <typename OnUndone, typename OnAdded>
+  void rollback(OnUndone&& on_undone, OnAdded&& on_added) {
+    for (const Saved& saved : saved_) {
+      T& record = records_[static_cast<std::size_t>(saved.id)];
+      on_undone(record, saved.record);
+      record = saved.record;
+    }
+    for (std::size_t i = added_.size(); i-- > 0;) {
+      T& record = records_[static_cast<std::size_t>(added_[i])];
+      on_added(record);
+      record = T{};
+      free_.push_back(added_[i]);
+    }
+    while (!free_.empty() && free_.back() == size() - 1) {
+      free_.pop_back();
+      records_.pop_back();
+      saved_at_.pop_back();
+    }
+    forget();
+  }
+
+  const std::vector<int>& added() const { return added_; }
+
+ private:
+  struct Saved {
+    int id;
+    T record;
+  };
+  void forget() {
+    saved_.clear();
+    added_.clear();
+    removed_.clear();
+    ++epoch_;
+  }
+
+  std::vector<T> records_;
+  std::vector<std::uint64_t> saved_at_;
+  std::vector<int> free_;
+  std::vector<Saved> saved_;
+  std::vector<int> added_;
+  std::vector<int> removed_;
+  std::uint64_t epoch_ = 1;
+};
+
+}  // namespace understory::factor_graph::storage

@@ -1,0 +1,29 @@
+// The source's getTf: a linear least-squares similarity. Its scale is never taken out.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+
+#include "common/geometry/se2.hpp"
+
+namespace understory::hierarchy::baseline {
+
+/// q = s R p + t, kept as the four parameters of the linear problem.
+struct Similarity {
+  double cosine = 1.0;  ///< s cos(theta)
+  double sine = 0.0;    ///< s sin(theta)
+  Eigen::Vector2d translation_m = Eigen::Vector2d::Zero();
+
+  Eigen::Vector2d operator*(const Eigen::Vector2d& point) const;
+  Similarity operator*(const Similarity& other) const;
+  /// The heading, with the translation as it was solved beside the scale.
+  geometry::SE2 pose() const;
+};
+
+/// Least squares for to[i] ~ similarity * from[i] over equally weighted pairs; none when all `from`
+/// coincide. Precondition: from.size() == to.size().
+std::optional<Similarity> fit_similarity(std::span<const Eigen::Vector2d> from,
+                                         std::span<const Eigen::Vector2d> to);
+
+}  // namespace understory::hierarchy::baseline

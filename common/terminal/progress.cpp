@@ -1,0 +1,77 @@
+#include "common/terminal/progress.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+namespace understory::terminal {
+namespace {
+
+constexpr int kWidth = 30;
+/// Calls that end sooner show nothing.
+constexpr std::chrono::milliseconds kQuiet{500};
+constexpr std::chrono::milliseconds kRedraw{100};
+constexpr std::chrono::seconds kLine{5};
+
+std::string duration(double seconds) {
+  const auto whole = std::lround(seconds);
+  if (whole < 60) return fmt::format("{} s", whole);
+  if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+  return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+}
+
+}  // namespace
+
+Progress::Progress(std::string what, double total, Without without)
+    : what_(std::move(what)),
+      total_(total),
+      without_(without),
+      is_terminal_(::isatty(STDERR_FILENO) == 1),
+      next_(start_ + (is_terminal_ ? std::chrono::milliseconds(kQuiet) : kLine)) {}
+
+Progress::~Progress() {
+  if (is_shown_) fmt::print(stderr, "\r\033[K");
+}
+
+void Progress::update(double done) {
+  if (total_ <= 0.0) return;
+  done_ = std::clamp(done, 0.0, total_);
+  if (is_terminal_ || without_ == Without::kSeconds) {
+    const auto now = Clock::now();
+    if (now >= next_) draw(now);
+  } else if (without_ == Without::kTenths) {
+    const int tenths = static_cast<int>(10.0 * done_ / total_);
+    if (tenths > tenths_) fmt::print(stderr, "{}: {} %\n", what_, 10 * tenths);
+    tenths_ = tenths;
+  }
+}
+
+std::string Progress::time_left(Clock::time_point now) const {
+  const double share = done_ / total_;
+  if (share < 0.01) return {};
+  const double elapsed_s = std::chrono::duration<double>(now - start_).count();
+  return fmt::format(", {} left", duration(elapsed_s * (1.0 - share) / share));
+}
+
+void Progress::draw(Clock::time_point now) {
+  const double share = done_ / total_;
+  const int filled = static_cast<int>(share * kWidth);
+  const std::string line = fmt::format("{} [{:#<{}}{:.<{}}] {:3.0f} %{}", what_, "", filled, "",
+                                       kWidth - filled, 100.0 * share, time_left(now));
+
+  if (is_terminal_) {
+    fmt::print(stderr, "\r\033[K{}", line);
+    std::fflush(stderr);
+    is_shown_ = true;
+    next_ = now + kRedraw;
+  } else {
+    fmt::print(stderr, "{}\n", line);
+    next_ = now + kLine;
+  }
+}
+
+}  // namespace understory::terminal

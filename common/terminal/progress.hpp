@@ -1,0 +1,44 @@
+// How far a long call is and when it will end, on stderr.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <string>
+
+namespace understory::terminal {
+
+/// A bar that is redrawn in place where stderr is a terminal; it disappears at the end.
+class Progress {
+ public:
+  /// What to do where stderr is no terminal: nothing, one line for every tenth of the work, or one
+  /// line every five seconds.
+  enum class Without { kSilence, kTenths, kSeconds };
+
+  /// `total`: the amount of work in any unit; 0 or less draws nothing.
+  Progress(std::string what, double total, Without without = Without::kSilence);
+  ~Progress();  ///< Clears the line.
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  /// So much of `total` is done.
+  void update(double done);
+  /// So much more is done.
+  void advance(double steps = 1.0) { update(done_ + steps); }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  void draw(Clock::time_point now);
+  std::string time_left(Clock::time_point now) const;
+
+  std::string what_;
+  double total_;
+  double done_ = 0.0;
+  Without without_;
+  bool is_terminal_;
+  bool is_shown_ = false;
+  int tenths_ = 0;
+  Clock::time_point start_ = Clock::now();
+  Clock::time_point next_;
+};
+
+}  // namespace understory::terminal

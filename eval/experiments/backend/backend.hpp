@@ -1,0 +1,32 @@
+// Standard graphs through the smoother, one pose per update.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/factor_graph/files/graph_file.hpp"
+
+namespace understory::eval::experiments::backend {
+
+/// One graph, fed as a robot would: a pose, then all that ties it to earlier ones.
+struct BackendRun {
+  std::string dataset;
+  std::size_t poses = 0, points = 0, factors = 0;
+  std::vector<double> update_ms;  ///< Processor time, estimate included.
+  double settle_ms = 0.0;         ///< After the last pose, until nothing is stale.
+  double whole_ms = 0.0;          ///< One fresh ordering, linearisation and factorisation of all.
+  double chi2_final = 0.0;
+  double chi2_batch = 0.0;  ///< Levenberg-Marquardt (CHOLMOD) from the final estimates.
+  double batch_s = 0.0;
+  double chi2_dead_reckoning = 0.0;  ///< The same from dead reckoning: often another basin.
+  double rss_mb = 0.0;               ///< Of the process, at the end of the run.
+  double smoother_mb = 0.0;
+  std::string error;
+};
+
+/// Throws std::runtime_error where the file cannot be read.
+BackendRun run_backend(const std::filesystem::path& file);
+BackendRun run_backend(const factor_graph::files::GraphFile& graph, const std::string& dataset);
+
+}  // namespace understory::eval::experiments::backend

@@ -1,0 +1,24 @@
+#include "eval/experiments/command.hpp"
+
+#include "eval/experiments/experiments.hpp"
+#include "eval/experiments/large_map/large_map.hpp"
+
+namespace understory::eval::experiments {
+
+void add_eval_command(CLI::App& parent) {
+  CLI::App& eval =
+      *parent.add_subcommand("eval", "Experiments: tables beside the source's, JSON, plots");
+  eval.require_subcommand(1);
+  add_paths_experiment(eval);
+  add_density_experiment(eval);
+  add_noise_experiment(eval);
+  add_efficiency_experiment(eval);
+  large_map::add_large_map_experiment(eval);
+  add_backend_experiment(eval);
+  add_victoria_park_experiment(eval);
+  add_frontend_experiment(eval);
+  add_recording_experiment(eval);
+  add_landmarks_vs_error_experiment(eval);
+}
+
+}  // namespace understory::eval::experiments

@@ -1,0 +1,207 @@
+// eval efficiency (GeoSLAM §5.5, Fig. 5.1): time per keyframe along the run.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "common/terminal/interrupt.hpp"
+#include "common/terminal/progress.hpp"
+#include "eval/experiments/experiments.hpp"
+#include "eval/harness/results.hpp"
+#include "eval/harness/slam_session.hpp"
+#include "eval/tools/memory.hpp"
+#include "eval/tools/quantile.hpp"
+#include "eval/tools/yardstick.hpp"
+
+namespace understory::eval::experiments::efficiency {
+namespace {
+
+struct EfficiencyOptions {
+  harness::CampaignOptions campaign;
+  double drive_km = 10.0;
+  double standing_h = 2.0;
+};
+
+/// One drive that is timed.
+struct Scenario {
+  std::string name;
+  sim::DriveParameters drive;
+  std::vector<std::string> methods;
+};
+
+struct KeyframeTime {
+  double position = 0.0;  ///< Metres driven, or hours stood, up to this keyframe.
+  double keyframer_ms = 0.0;
+  double mapper_ms = 0.0;
+};
+
+struct Timing {
+  std::string scenario;
+  std::string method;
+  std::vector<KeyframeTime> keyframes;
+  std::size_t updates = 0;
+  std::size_t landmarks = 0;
+  double rss_mb = 0.0;  ///< Of the whole process, at the end.
+};
+
+std::vector<Scenario> scenarios(const EfficiencyOptions& options) {
+  const auto& methods = options.campaign.methods;
+  std::vector<Scenario> result(1);
+  result[0].name = "circle-200m";
+  result[0].methods = methods;
+  if (options.drive_km > 0.0) {
+    Scenario scenario;
+    scenario.name = fmt::format("drive-{:g}km", options.drive_km);
+    scenario.drive.path.kind = sim::PathKind::kMeander;
+    scenario.drive.path.length_m = 1000.0 * options.drive_km;
+    scenario.drive.clear_the_path = true;
+    result.push_back(scenario);
+  }
+  if (options.standing_h > 0.0) {
+    Scenario scenario;
+    scenario.name = fmt::format("standing-{:g}h", options.standing_h);
+    scenario.drive.path.kind = sim::PathKind::kStanding;
+    scenario.drive.path.length_m = 3600.0 * options.standing_h * scenario.drive.speed_mps;
+    result.push_back(scenario);
+  }
+  // The source's cost grows without bound: on the long ones it is not asked.
+  for (std::size_t i = 1; i < result.size(); ++i) {
+    if (std::find(methods.begin(), methods.end(), "smoothing") != methods.end()) {
+      result[i].methods = {"smoothing"};
+    }
+  }
+  return result;
+}
+
+Timing time_drive(const Scenario& scenario, const std::string& method, std::uint64_t seed,
+                  const std::atomic<bool>& stop) {
+  const sim::Drive drive(scenario.drive, seed);
+  harness::SlamSession session(harness::make_stages(method));
+  Timing timing{scenario.name, method, {}, 0, 0, 0.0};
+  terminal::Progress progress(fmt::format("scans, {} {}", scenario.name, method),
+                              static_cast<double>(drive.size()),
+                              terminal::Progress::Without::kSeconds);
+  const bool standing = scenario.drive.path.kind == sim::PathKind::kStanding;
+  for (std::size_t k = 0; k < drive.size(); ++k) {
+    if (stop) throw terminal::Interrupted{};
+    const auto outcome = session.feed(drive.scan(k).scan);
+    progress.advance();
+    if (!outcome) continue;
+    const double driven = static_cast<double>(k + 1) * scenario.drive.path.interval;
+    timing.keyframes.push_back({standing ? driven / scenario.drive.speed_mps / 3600.0 : driven,
+                                1e3 * outcome->keyframer_s, 1e3 * outcome->mapper_s});
+    const model::MapUpdateStatus status = outcome->update.status;
+    if (status == model::MapUpdateStatus::kUpdated || status == model::MapUpdateStatus::kFirstMap) {
+      ++timing.updates;
+    }
+  }
+  timing.landmarks = session.mapper().landmarks().size();
+  timing.rss_mb = tools::resident_mb();
+  return timing;
+}
+
+/// One row per component, and one for the whole; `first` and `last` are medians of a tenth of the
+/// run: flat cost has them equal.
+nlohmann::json rows_of(const Timing& timing, double yardstick_s) {
+  nlohmann::json rows = nlohmann::json::array();
+  const auto add = [&](const std::string& component, auto value) {
+    std::vector<double> all;
+    for (const KeyframeTime& keyframe : timing.keyframes) all.push_back(value(keyframe));
+    const auto tenth = static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, all.size() / 10));
+    if (all.empty()) return;
+    rows.push_back(
+        {{"method", timing.method},
+         {"scenario", timing.scenario},
+         {"component", component},
+         {"keyframes", all.size()},
+         {"updates", timing.updates},
+         {"landmarks", timing.landmarks},
+         {"ms_p50", tools::quantile(all, 0.5)},
+         {"ms_p99", tools::quantile(all, 0.99)},
+         {"ms_max", tools::quantile(all, 1.0)},
+         {"ms_p50_first_tenth", tools::quantile({all.begin(), all.begin() + tenth}, 0.5)},
+         {"ms_p50_last_tenth", tools::quantile({all.end() - tenth, all.end()}, 0.5)},
+         {"p50_per_yardstick", tools::quantile(all, 0.5) / (1e3 * yardstick_s)},
+         {"rss_mb", timing.rss_mb}});
+  };
+  add("keyframer", [](const KeyframeTime& t) { return t.keyframer_ms; });
+  add("mapper", [](const KeyframeTime& t) { return t.mapper_ms; });
+  add("all", [](const KeyframeTime& t) { return t.keyframer_ms + t.mapper_ms; });
+  return rows;
+}
+
+void print_rows(const nlohmann::json& rows, double yardstick_s) {
+  fmt::print("{:<14} {:<7} {:<10} {:>9} {:>9} {:>9} {:>9} {:>11} {:>10} {:>8} {:>7}\n", "scenario",
+             "method", "component", "keyframes", "p50 ms", "p99 ms", "max ms", "first tenth",
+             "last tenth", "/Delaun.", "RSS MB");
+  for (const nlohmann::json& row : rows) {
+    fmt::print(
+        "{:<14} {:<7} {:<10} {:>9} {:>9.3f} {:>9.3f} {:>9.3f} {:>11.3f} {:>10.3f} {:>8.4f} "
+        "{:>7.0f}\n",
+        row["scenario"].get<std::string>(), row["method"].get<std::string>(),
+        row["component"].get<std::string>(), row["keyframes"].get<std::size_t>(),
+        row["ms_p50"].get<double>(), row["ms_p99"].get<double>(), row["ms_max"].get<double>(),
+        row["ms_p50_first_tenth"].get<double>(), row["ms_p50_last_tenth"].get<double>(),
+        row["p50_per_yardstick"].get<double>(), row["rss_mb"].get<double>());
+  }
+  fmt::print("yardstick: CGAL Delaunay of 13,770 points in {:.2f} ms\n", 1e3 * yardstick_s);
+}
+
+nlohmann::json trace_of(const Timing& timing) {
+  nlohmann::json trace{{"scenario", timing.scenario}, {"method", timing.method}};
+  for (const KeyframeTime& keyframe : timing.keyframes) {
+    trace["position"].push_back(keyframe.position);
+    trace["keyframer_ms"].push_back(keyframe.keyframer_ms);
+    trace["mapper_ms"].push_back(keyframe.mapper_ms);
+  }
+  return trace;
+}
+
+void run_efficiency(const EfficiencyOptions& options) {
+  const std::atomic<bool>& stop = terminal::catch_interrupts();
+  const double yardstick_s = tools::delaunay_build_s();
+  nlohmann::json rows = nlohmann::json::array();
+  nlohmann::json traces = nlohmann::json::array();
+  for (const Scenario& scenario : scenarios(options)) {
+    for (const std::string& method : scenario.methods) {
+      if (method == "oracle") continue;
+      const Timing timing =
+          time_drive(scenario, method, harness::run_seed(options.campaign.seed, 0), stop);
+      for (const nlohmann::json& row : rows_of(timing, yardstick_s)) rows.push_back(row);
+      traces.push_back(trace_of(timing));
+    }
+  }
+  print_rows(rows, yardstick_s);
+  if (options.campaign.json.empty()) return;
+  const std::filesystem::path file = options.campaign.json;
+  const nlohmann::json config{{"seed", options.campaign.seed},
+                              {"drive_km", options.drive_km},
+                              {"standing_h", options.standing_h},
+                              {"yardstick_ms", 1e3 * yardstick_s}};
+  harness::write_json(harness::traces_file(file), traces);
+  harness::write_json(file, harness::result_document("efficiency", config, rows));
+  if (options.campaign.plots)
+    harness::plot("efficiency.py", {file, harness::traces_file(file).string()});
+}
+
+}  // namespace
+
+void add_efficiency_experiment(CLI::App& eval) {
+  CLI::App& command = *eval.add_subcommand(
+      "efficiency", "Time per keyframe: 200 m, a long drive, standing still (one run, one job)");
+  const auto options = std::make_shared<EfficiencyOptions>();
+  add_campaign_options(command, options->campaign);
+  command.add_option("--drive-km", options->drive_km, "Length of the long drive; 0 = none")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  command.add_option("--standing-h", options->standing_h, "Hours of standing still; 0 = none")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  command.callback([options] { run_guarded("efficiency", [&] { run_efficiency(*options); }); });
+}
+
+}  // namespace understory::eval::experiments::efficiency

@@ -1,0 +1,38 @@
+// The experiments of simulated drives, each added to `understory eval` by a function of its own.
+#pragma once
+
+#include <CLI/App.hpp>
+#include <functional>
+
+#include "eval/harness/campaign.hpp"
+
+namespace understory::eval::experiments {
+
+/// --runs, --seed, --jobs, --json, --method, --no-plots.
+void add_campaign_options(CLI::App& command, harness::CampaignOptions& options);
+/// The same with the method "lidar", and --config for it.
+void add_campaign_options_with_lidar(CLI::App& command, harness::CampaignOptions& options);
+
+/// Runs `work` and turns what it throws into one line on stderr and exit status 1.
+void run_guarded(const std::string& experiment, const std::function<void()>& work);
+
+/// Five paths and the double circle, intermediate forest (GeoSLAM §5.1).
+void add_paths_experiment(CLI::App& eval);
+/// Circles in three forests (GeoSLAM §5.2).
+void add_density_experiment(CLI::App& eval);
+/// Circles, five position noises times five detection rates, at two intervals (GeoSLAM §5.3).
+void add_noise_experiment(CLI::App& eval);
+/// Time per component along the run (GeoSLAM §5.5), over a long drive, and standing still.
+void add_efficiency_experiment(CLI::App& eval);
+/// Standard pose and landmark graphs through the smoother.
+void add_backend_experiment(CLI::App& eval);
+/// The recorded Victoria Park drive.
+void add_victoria_park_experiment(CLI::App& eval);
+/// From raw sensors to a pose, part by part and as a whole (specs/frontend.md).
+void add_frontend_experiment(CLI::App& eval);
+/// A recorded drive through the whole chain.
+void add_recording_experiment(CLI::App& eval);
+/// Change of the error against the number of landmarks (thesis on submaps, chapter 4).
+void add_landmarks_vs_error_experiment(CLI::App& eval);
+
+}  // namespace understory::eval::experiments

@@ -1,0 +1,51 @@
+// `understory eval frontend`: from raw sensors to a pose, part by part and as a whole
+// (specs/frontend.md).
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "eval/experiments/frontend/frontend_rows.hpp"
+#include "eval/harness/chain_drive.hpp"
+
+namespace understory::eval::experiments::frontend {
+
+struct FrontendOptions {
+  int runs = 10;  ///< Monte-Carlo runs of the filter; a tenth of them of the others.
+  std::uint64_t seed = 1;
+  int jobs = 1;
+  double drive_m = 1000.0;           ///< Of the simulated forest drive.
+  std::filesystem::path config_dir;  ///< Of the chain's services.
+  std::filesystem::path data;        ///< Recordings.
+  std::string json;
+  std::vector<std::string> sections;
+  bool plots = true;
+};
+
+/// Tracks on simulated detections: purity, switches, time.
+void add_tracking_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
+                       FrontendRows& rows);
+/// The filter on simulated detections: consistency, drift, time.
+void add_filter_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
+                     FrontendRows& rows);
+/// Trunks and corners in simulated sweeps: precision, recall, error, covariance, time.
+void add_extraction_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
+                         FrontendRows& rows);
+/// Trunks in registered clouds of real forest plots, where the data are there; for the plots too.
+void add_forest_plot_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
+                          FrontendRows& rows, nlohmann::json& traces);
+/// Accuracy and time of one drive of the whole chain.
+void add_chain_rows(const harness::ChainRun& run, std::optional<double> ate_target_m,
+                    FrontendRows& rows);
+/// Where the chain's time goes.
+void add_time_rows(const harness::ChainRun& run, FrontendRows& rows);
+/// Trajectories and map, for the plots.
+nlohmann::json trace_of(const harness::ChainRun& run);
+/// What faults of the sensors do: what HEALTH says, and how far the pose is off afterwards.
+void add_fault_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
+                    FrontendRows& rows);
+
+}  // namespace understory::eval::experiments::frontend

@@ -1,0 +1,102 @@
+// The whole chain on simulated drives: accuracy, time, and what faults do to it.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "eval/experiments/frontend/frontend.hpp"
+#include "eval/harness/chain_drive.hpp"
+
+namespace understory::eval::experiments::frontend {
+namespace {
+
+double quantile_ms(std::vector<float> values, double part) {
+  if (values.empty()) return 0.0;
+  const auto index = static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + index, values.end());
+  return values[static_cast<std::size_t>(index)];
+}
+
+std::size_t accepted(const harness::ChainRun& run) {
+  return static_cast<std::size_t>(
+      std::count_if(run.updates.begin(), run.updates.end(),
+                    [](const model::MapUpdate& update) { return metrics::localised(update); }));
+}
+
+/// Seconds of the drive over seconds of processor.
+double real_time_factor(const harness::ChainRun& run) {
+  double busy_s = 0.0;
+  for (const auto& [service, time] : run.times) busy_s += time.total_s;
+  return run.simulated_s / std::max(busy_s, 1e-9);
+}
+
+}  // namespace
+
+void add_time_rows(const harness::ChainRun& run, FrontendRows& rows) {
+  rows.at_least("real-time factor of the chain (one core)", real_time_factor(run), "x", 10.0);
+  for (const auto& [service, time] : run.times) {
+    rows.state(service + ": share of the drive's time", 100.0 * time.total_s / run.simulated_s,
+               "%");
+    rows.state(service + ": message p99", quantile_ms(time.calls_ms, 0.99), "ms");
+  }
+}
+
+void add_chain_rows(const harness::ChainRun& run, std::optional<double> ate_target_m,
+                    FrontendRows& rows) {
+  const harness::TrajectoryError slam =
+      harness::trajectory_error(harness::poses_of(run.slam), run.truth);
+  const harness::TrajectoryError ekf =
+      harness::trajectory_error(harness::poses_of(run.ekf), run.truth);
+  const harness::TrajectoryError reckoned = harness::trajectory_error(run.dead_reckoned, run.truth);
+  rows.state("driven", ekf.driven_m, "m");
+  if (ate_target_m) {
+    rows.at_most("SLAM_POSE ATE", slam.ate_rms_m, "m", *ate_target_m);
+  } else {
+    rows.state("SLAM_POSE ATE", slam.ate_rms_m, "m");
+  }
+  rows.state("SLAM_POSE largest error", slam.largest_m, "m");
+  rows.state("map's keyframes at the end, ATE",
+             harness::trajectory_error(harness::poses_of(run.keyframes), run.truth).ate_rms_m, "m");
+  const harness::PoseConsistency said = harness::pose_consistency(run.slam, run.truth);
+  rows.state("SLAM_POSE, first pose held: mean NEES (3)", said.mean_nees, "");
+  rows.state("SLAM_POSE, first pose held: error at the end", said.end_error_m, "m");
+  rows.state("SLAM_POSE, first pose held: what it says of it", said.end_sigma_m, "m");
+  rows.state("EKF_POSE ATE", ekf.ate_rms_m, "m");
+  rows.at_most("EKF_POSE drift", 100.0 * ekf.end_m / std::max(ekf.driven_m, 1.0), "%", 0.5);
+  rows.state("RAW_POSE ATE", reckoned.ate_rms_m, "m");
+  rows.at_most("wrong updates", static_cast<double>(wrong_updates(run)), "", 0.0);
+  rows.state("keyframes accepted", static_cast<double>(accepted(run)), "");
+  rows.state("keyframes offered", static_cast<double>(run.updates.size()), "");
+  rows.state("SLAM_POSE share of sweeps",
+             100.0 * static_cast<double>(run.slam.size()) / static_cast<double>(run.sweeps), "%");
+  add_time_rows(run, rows);
+}
+
+nlohmann::json trace_of(const harness::ChainRun& run) {
+  const auto points = [](const std::vector<metrics::StampedPose>& poses, std::size_t stride) {
+    nlohmann::json out = nlohmann::json::array();
+    for (std::size_t i = 0; i < poses.size(); i += stride) {
+      out.push_back({1e-6 * static_cast<double>(poses[i].utime), poses[i].pose.x(),
+                     poses[i].pose.y(), poses[i].pose.theta()});
+    }
+    return out;
+  };
+  nlohmann::json landmarks = nlohmann::json::array();
+  for (const model::MapLandmark& landmark : run.landmarks) {
+    landmarks.push_back({landmark.position_m.x(), landmark.position_m.y(), landmark.radius_m,
+                         static_cast<int>(landmark.kind)});
+  }
+  nlohmann::json counts = nlohmann::json::array();
+  for (const model::EkfPose& pose : run.ekf) {
+    counts.push_back({1e-6 * static_cast<double>(pose.utime), pose.landmarks_used});
+  }
+  return {{"truth", points(run.truth, 5)},
+          {"raw", points(run.dead_reckoned, 10)},
+          {"ekf", points(harness::poses_of(run.ekf), 1)},
+          {"slam", points(harness::poses_of(run.slam), 1)},
+          {"landmarks", landmarks},
+          {"landmarks_used", counts}};
+}
+
+}  // namespace understory::eval::experiments::frontend

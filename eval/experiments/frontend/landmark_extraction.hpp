@@ -1,0 +1,78 @@
+// How good the landmark extractor is on a simulated drive, against what its sweeps really hit.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "common/model/point_sweep.hpp"
+#include "services/landmark_extractor/landmark_extractor.hpp"
+#include "sim/sensor_drive.hpp"
+
+namespace understory::eval::experiments::frontend {
+
+struct ExtractionOptions {
+  int sweeps = 20;
+  std::uint64_t first_revolution = 0;
+  std::uint64_t stride = 10;              ///< Turns from one scored sweep to the next.
+  double recall_range_m = 25.0;           ///< Landmarks farther away need not be found...
+  std::uint32_t least_returns = 5;        ///< ... nor trunks with fewer returns than this...
+  std::uint32_t least_side_returns = 10;  ///< ... nor corners with fewer on either wall within 2 m.
+  double error_range_m = 20.0;            ///< Up to here errors of position are counted.
+  double match_m = 0.5;                   ///< A detection farther from every true one is false.
+  double attitude_sigma_rad = 0.003;      ///< Error of roll and of pitch that the sweep comes with.
+  std::uint64_t seed = 1;
+};
+
+/// One kind of landmark, over all sweeps.
+struct KindScore {
+  std::uint64_t should = 0;  ///< True landmarks that had to be found.
+  std::uint64_t found = 0;   ///< Of those.
+  std::uint64_t detections = 0;
+  std::uint64_t right = 0;       ///< Detections of a true landmark, the first for each.
+  double rms_m = 0.0;            ///< In the plan, within the range for errors.
+  double bias_along_m = 0.0;     ///< Mean error along the ray, away from the vehicle, and to its
+  double bias_across_m = 0.0;    ///< left; within the same range. It does not average out.
+  double nees_plan = 0.0;        ///< Mean, all matched; 2 is right.
+  double nees_space = 0.0;       ///< With the height; 3 is right.
+  double bearing_rms_rad = 0.0;  ///< Corners: of the bisector.
+  double nees_bearing = 0.0;     ///< Corners; 1 is right.
+
+  double precision() const {
+    return detections > 0 ? static_cast<double>(right) / detections : 1.0;
+  }
+  double recall() const { return should > 0 ? static_cast<double>(found) / should : 1.0; }
+};
+
+/// What a false detection lay on, or what a landmark was that was not found: for people who look.
+struct ExtractionMiss {
+  model::Utime utime = 0;
+  bool is_false = false;       ///< Else not found.
+  model::Detection detection;  ///< Of a landmark not found: its true place.
+  std::uint32_t returns = 0;
+};
+
+struct ExtractionScore {
+  int beams = 0;
+  std::uint64_t sweeps = 0;
+  double points = 0.0;  ///< Mean per sweep.
+  KindScore trunks;     ///< And poles.
+  KindScore corners;
+  /// Processor time per sweep.
+  double time_p50_ms = 0.0;
+  double time_p99_ms = 0.0;
+  std::vector<ExtractionMiss> misses;
+};
+
+/// LIDAR_SWEEP as a perfect input would make it: de-skewed with the true motion to the time of the
+/// turn's last point; the attitude is off by `attitude_error_rad` (roll, pitch), with covariance.
+model::PointSweep ideal_input(const sim::SimulatedSweep& sweep, const sim::SensorDrive& drive,
+                              const Eigen::Vector2d& attitude_error_rad, double attitude_sigma_rad);
+
+/// Runs the extractor over a drive that has a spinning lidar. `progress` is called per sweep.
+ExtractionScore score_extraction(sim::SensorDrive& drive,
+                                 const landmark_extractor::LandmarkExtractorParameters& parameters,
+                                 const ExtractionOptions& options,
+                                 const std::function<void(int)>& progress = {});
+
+}  // namespace understory::eval::experiments::frontend

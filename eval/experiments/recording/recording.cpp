@@ -1,0 +1,185 @@
+// `understory eval recording`: a recorded drive through the whole chain, against the reference that
+// the log carries.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/io/lcm_log.hpp"
+#include "common/terminal/interrupt.hpp"
+#include "common/terminal/progress.hpp"
+#include "eval/experiments/experiments.hpp"
+#include "eval/experiments/frontend/frontend.hpp"
+#include "eval/harness/chain_drive.hpp"
+#include "eval/harness/results.hpp"
+#include "understory/ground_truth_t.hpp"
+
+namespace understory::eval::experiments::recording {
+namespace {
+
+struct Options {
+  std::string log;
+  std::string name;
+  std::string config_dir = "deploy/config/lidar";
+  std::string json;
+  bool plots = true;
+};
+
+struct Recording {
+  harness::ChainRun run;
+  std::vector<model::GnssFix> fixes;
+  /// Every `stride`-th sweep as it went to the extractor, with the detections in it, for pictures.
+  std::vector<model::PointSweep> sweeps;
+  std::vector<model::LandmarkScan> landmarks;
+};
+
+void watch_pictures(harness::SensorChain& chain, Recording& recording) {
+  auto assembler = std::make_shared<model::SweepAssembler>();
+  auto wanted = std::make_shared<std::optional<model::Utime>>();
+  chain.watch<model::PointSweep>("LIDAR_SWEEP",
+                                 [&recording, assembler, wanted](const model::PointSweep& part) {
+                                   constexpr std::uint64_t kStride = 50;
+                                   auto whole = assembler->add(part);
+                                   if (!whole || whole->turn % kStride != 5) return;
+                                   *wanted = whole->utime;
+                                   recording.sweeps.push_back(std::move(*whole));
+                                 });
+  chain.watch<model::LandmarkScan>("LANDMARKS",
+                                   [&recording, wanted](const model::LandmarkScan& scan) {
+                                     if (*wanted == scan.utime) recording.landmarks.push_back(scan);
+                                   });
+}
+
+Recording drive_recording(const Options& options, const std::atomic<bool>& stop) {
+  Recording recording;
+  harness::SensorChain chain(harness::front_end_services(), options.config_dir);
+  watch_chain(chain, recording.run);
+  watch_pictures(chain, recording);
+  io::LcmLogReader reader(options.log);
+  terminal::Progress progress(options.name, static_cast<double>(reader.size_bytes()),
+                              terminal::Progress::Without::kSeconds);
+  std::uint64_t position = 0;
+  std::optional<model::Utime> begin;
+  while (const auto event = reader.next()) {
+    if (stop) throw std::runtime_error("interrupted");
+    begin = begin.value_or(event->utime);
+    recording.run.simulated_s = 1e-6 * static_cast<double>(event->utime - *begin);
+    if (event->channel == "GROUND_TRUTH") {
+      if (const auto truth = wire::decode_message<ground_truth_t>(event->data)) {
+        recording.run.truth.push_back({truth->utime, wire::from_wire(truth->world_T_vehicle)});
+      }
+    } else if (event->channel == "RAW_GNSS") {
+      if (const auto fix = wire::decode_message<model::GnssFix>(event->data))
+        recording.fixes.push_back(*fix);
+    }
+    if (event->channel.starts_with("RAW_")) chain.feed(event->channel, event->data);
+    progress.advance(reader.position_bytes() - position);
+    position = reader.position_bytes();
+  }
+  finish_chain(chain, recording.run);
+  recording.run.sweeps = recording.run.detections.size();
+  return recording;
+}
+
+void add_gnss_rows(const Recording& recording, frontend::FrontendRows& rows) {
+  const auto add = [&](const std::string& name, const std::vector<metrics::StampedPose>& poses) {
+    if (poses.size() < 2) return;
+    const metrics::FixErrors errors = against_fixes(poses, recording.fixes);
+    if (errors.to_path_m.empty()) return;
+    rows.state(name + ": GNSS fix to path, median", errors.to_path_median_m, "m");
+    rows.state(name + ": GNSS fix to path, 90 %", errors.to_path_p90_m, "m");
+    rows.state(name + ": GNSS fix at its time, median", errors.at_time_median_m, "m");
+  };
+  add("SLAM_POSE", harness::poses_of(recording.run.slam));
+  add("EKF_POSE", harness::poses_of(recording.run.ekf));
+  add("RAW_POSE", recording.run.dead_reckoned);
+}
+
+double mean_detections(const harness::ChainRun& run) {
+  std::size_t sum = 0;
+  for (const std::size_t count : run.detections) sum += count;
+  return run.detections.empty()
+             ? 0.0
+             : static_cast<double>(sum) / static_cast<double>(run.detections.size());
+}
+
+nlohmann::json pictures_of(const Recording& recording) {
+  nlohmann::json pictures = nlohmann::json::array();
+  for (const model::LandmarkScan& scan : recording.landmarks) {
+    for (const model::PointSweep& sweep : recording.sweeps) {
+      if (sweep.utime != scan.utime) continue;
+      nlohmann::json points = nlohmann::json::array();
+      const Eigen::Quaternionf level =
+          sweep.attitude.value_or(model::Attitude{}).level_Q_vehicle.cast<float>();
+      const std::size_t stride = 1 + sweep.points.size() / 40000;
+      for (std::size_t i = 0; i < sweep.points.size(); i += stride) {
+        const Eigen::Vector3f p = level * sweep.points[i].position();
+        points.push_back({p.x(), p.y(), p.z()});
+      }
+      nlohmann::json detections = nlohmann::json::array();
+      for (const model::Detection& detection : scan.detections) {
+        detections.push_back({detection.position_m.x(), detection.position_m.y(),
+                              detection.radius_m, static_cast<int>(detection.kind)});
+      }
+      pictures.push_back({{"utime", scan.utime}, {"points", points}, {"detections", detections}});
+    }
+  }
+  return pictures;
+}
+
+void run(Options options) {
+  const auto& stop = terminal::catch_interrupts();
+  if (options.name.empty()) options.name = std::filesystem::path(options.log).stem().string();
+  const Recording recording = drive_recording(options, stop);
+  frontend::FrontendRows rows;
+  rows.in(fmt::format("recording {}: {:.1f} s, {} sweeps", options.name, recording.run.simulated_s,
+                      recording.run.sweeps));
+  rows.state("landmarks in a sweep", mean_detections(recording.run), "");
+  rows.state("landmarks in the map", static_cast<double>(recording.run.landmarks.size()), "");
+  if (!recording.run.truth.empty()) {
+    add_chain_rows(recording.run, {}, rows);
+  } else {
+    add_time_rows(recording.run, rows);
+  }
+  if (!recording.fixes.empty()) add_gnss_rows(recording, rows);
+  std::cout << to_table(rows.rows());
+  for (const auto& [service, health] : recording.run.health) {
+    for (const reason_count_t& reason : health.reasons) {
+      std::cout << fmt::format("  {}: {} {} {}\n", service, reason.channel, reason.reason,
+                               reason.count);
+    }
+  }
+  if (options.json.empty()) return;
+  nlohmann::json trace = frontend::trace_of(recording.run);
+  nlohmann::json fixes = nlohmann::json::array();
+  for (const model::GnssFix& fix : recording.fixes) {
+    fixes.push_back(
+        {1e-6 * static_cast<double>(fix.utime), fix.east_north_m.x(), fix.east_north_m.y()});
+  }
+  trace["fixes"] = fixes;
+  trace["pictures"] = pictures_of(recording);
+  harness::write_json(
+      options.json,
+      harness::result_document("recording", {{"recording", options.name}}, to_json(rows.rows())));
+  harness::write_json(harness::traces_file(options.json), {{options.name, trace}});
+  if (options.plots)
+    harness::plot("frontend.py", {options.json, harness::traces_file(options.json).string()});
+}
+
+}  // namespace
+
+void add_recording_experiment(CLI::App& eval) {
+  auto* command = eval.add_subcommand(
+      "recording", "A recorded drive (a log of `understory import`) through the whole chain");
+  auto options = std::make_shared<Options>();
+  command->add_option("log", options->log, "Log with the raw channels")->required();
+  command->add_option("--name", options->name, "In tables and pictures; default the file's");
+  command->add_option("--config", options->config_dir, "Configuration of the chain's services");
+  command->add_option("--json", options->json, "Results; traces and plots go beside it");
+  command->add_flag("!--no-plots", options->plots, "No plots");
+  command->callback([options] { run_guarded("recording", [options] { run(*options); }); });
+}
+
+}  // namespace understory::eval::experiments::recording

@@ -1,0 +1,89 @@
+#include "eval/harness/campaign.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "eval/harness/lidar_run.hpp"
+#include "eval/tools/parallel.hpp"
+
+namespace understory::eval::harness {
+namespace {
+
+bool wanted(const CampaignOptions& options, const std::string& method) {
+  return std::find(options.methods.begin(), options.methods.end(), method) != options.methods.end();
+}
+
+std::map<std::string, RunResult> run_all_methods(const Cell& cell, const CampaignOptions& options,
+                                                 int run, const std::atomic<bool>& stop) {
+  const RecordedDrive recorded(cell.drive(), run_seed(options.seed, run));
+  std::map<std::string, RunResult> results;
+  for (const std::string& method : options.methods) {
+    if (method == "oracle" || method == kLidarFilter) continue;
+    if (method == kLidarMethod) {
+      LidarResult lidar =
+          run_lidar(recorded.drive, options.chain_config, run_seed(options.seed, run), stop);
+      results[method] = std::move(lidar.slam);
+      results[kLidarFilter] = std::move(lidar.ekf);
+      continue;
+    }
+    results[method] = run_slam(recorded, make_stages(method), stop);
+  }
+  if (wanted(options, "oracle")) {
+    // The oracle estimates what ours did, so that their ratio compares like with like.
+    const auto smoothing = results.find("smoothing");
+    results["oracle"] = smoothing != results.end() && !smoothing->second.marks.empty()
+                            ? run_oracle(recorded, smoothing->second.marks, stop)
+                            : run_oracle(recorded, stop);
+  }
+  for (auto& [method, result] : results) {
+    result.marks.clear();
+    if (run > 0) result.trace.snapshot.reset();
+  }
+  return results;
+}
+
+}  // namespace
+
+sim::DriveParameters Cell::drive() const {
+  sim::DriveParameters parameters;
+  parameters.forest = sim::forest_parameters(forest);
+  parameters.path.kind = path;
+  parameters.path.interval = interval_m;
+  parameters.sensor.position_sigma_m = sigma_m;
+  parameters.sensor.detection_probability = detection;
+  return parameters;
+}
+
+std::string Cell::name() const {
+  return fmt::format("{}-{}-{:.0f}cm-{:.0f}-every{:.0f}cm", sim::to_string(path),
+                     sim::to_string(forest), 100.0 * sigma_m, 100.0 * detection,
+                     100.0 * interval_m);
+}
+
+std::vector<CellResult> run_campaign(const std::vector<Cell>& cells, const CampaignOptions& options,
+                                     const std::atomic<bool>& stop) {
+  std::vector<CellResult> results(cells.size());
+  const auto runs = static_cast<std::size_t>(options.runs);
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    results[i].cell = cells[i];
+    for (const std::string& method : options.methods) results[i].runs[method].resize(runs);
+  }
+  tools::run_in_parallel(cells.size() * runs, options.jobs, "runs", stop, [&](std::size_t job) {
+    const Cell& cell = cells[job / runs];
+    const auto run = static_cast<int>(job % runs);
+    try {
+      for (auto& [method, result] : run_all_methods(cell, options, run, stop)) {
+        results[job / runs].runs.at(method)[run] = std::move(result);
+      }
+    } catch (const std::exception& error) {
+      throw std::runtime_error(
+          fmt::format("{} run {} (seed {}): {}", cell.name(), run, options.seed, error.what()));
+    }
+  });
+  return results;
+}
+
+}  // namespace understory::eval::harness

@@ -1,0 +1,62 @@
+// Many runs of several methods on the same drives, side by side.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "eval/harness/published_tables.hpp"
+#include "eval/harness/run.hpp"
+#include "sim/drive.hpp"
+
+namespace understory::eval::harness {
+
+/// What every experiment can be asked for on the command line.
+struct CampaignOptions {
+  int runs = 10;
+  std::uint64_t seed = 1;
+  int jobs = 1;
+  std::string json;  ///< Where the results go; the plots go beside it. Empty = only the screen.
+  std::vector<std::string> methods{"baseline", "smoothing", "oracle"};
+  std::string chain_config = "deploy/config/lidar";  ///< Folder; for the method "lidar" alone.
+  bool plots = true;
+};
+
+/// One setting of the simulation.
+struct Cell {
+  sim::ForestKind forest = sim::ForestKind::kIntermediate;
+  sim::PathKind path = sim::PathKind::kCircle;
+  double sigma_m = 0.2;
+  double detection = 0.9;
+  double interval_m = 0.2;
+  std::optional<PublishedFigures> published;
+
+  sim::DriveParameters drive() const;
+  std::string name() const;  ///< For progress and file names, e.g. circle-intermediate-20cm-90.
+};
+
+struct CellResult {
+  Cell cell;
+  std::map<std::string, std::vector<RunResult>> runs;  ///< By method; [run].
+};
+
+/// Runs all cells, `options.jobs` runs at a time. The results do not depend on the number of jobs.
+/// Only run 0 keeps its snapshot. Throws Interrupted when `stop` turns true, and
+/// std::runtime_error with the name of the run when a method throws.
+std::vector<CellResult> run_campaign(const std::vector<Cell>& cells, const CampaignOptions& options,
+                                     const std::atomic<bool>& stop);
+
+/// The whole chain from simulated sensors instead of ideal detections, and its filter alone: two
+/// rows of one run.
+inline constexpr const char* kLidarMethod = "lidar";
+inline constexpr const char* kLidarFilter = "lidar-ekf";
+
+/// Seed of a run: the same for every cell and every method.
+inline std::uint64_t run_seed(std::uint64_t seed, int run) {
+  return (seed << 20) + static_cast<std::uint64_t>(run);
+}
+
+}  // namespace understory::eval::harness

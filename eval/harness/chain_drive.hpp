@@ -1,0 +1,100 @@
+// The whole chain, from raw sensors to SLAM_POSE, on a simulated drive, against the truth.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/model/ekf_output.hpp"
+#include "common/model/map.hpp"
+#include "common/model/slam_output.hpp"
+#include "eval/harness/sensor_chain.hpp"
+#include "eval/metrics/victoria_park_score.hpp"
+#include "sim/sensor_drive.hpp"
+
+namespace understory::eval::harness {
+
+/// The map right after an update.
+struct MapAfterUpdate {
+  std::vector<model::KeyframePose> keyframes;
+  std::vector<model::MapLandmark> landmarks;
+};
+
+/// What the chain said, and what was true.
+struct ChainRun {
+  std::vector<metrics::StampedPose> truth;  ///< `world`, at the truth's own rate.
+  std::vector<metrics::StampedPose> dead_reckoned;
+  std::vector<model::EkfPose> ekf;
+  std::vector<model::SlamPose> slam;  ///< Those that are localised.
+  std::uint64_t slam_unsure = 0;      ///< SLAM_POSE without a pose that means something.
+  std::vector<model::MapUpdate> updates;
+  std::vector<MapAfterUpdate> states;          ///< One for each update, where they were asked for.
+  std::vector<model::KeyframePose> keyframes;  ///< As estimated at the end.
+  std::vector<model::MapLandmark> landmarks;   ///< Of the last map.
+  std::vector<std::size_t> detections;         ///< Of each sweep.
+  std::uint64_t sweeps = 0;
+  double simulated_s = 0.0;
+  std::map<std::string, ServiceTime> times;
+  std::map<std::string, health_t> health;
+};
+
+/// A reading on its way to the chain: may be changed, dropped (empty) or repeated.
+using Meddle = std::function<std::vector<RawMessage>(RawMessage)>;
+
+struct ChainOptions {
+  std::filesystem::path config_dir;
+  std::map<std::string, std::string> toml_instead;
+  double end_s = 1e9;  ///< Of the drive.
+  Meddle meddle;       ///< Faults; empty = none.
+  std::function<void(double done)> progress;
+  /// Every sweep before it goes to the chain, with the truth in it.
+  std::function<void(const sim::SimulatedSweep&)> on_sweep;
+  bool keep_states = false;  ///< Asks for the whole map after each update.
+};
+
+/// One message a reading; sweeps in parts. Truth gives none.
+std::vector<RawMessage> raw_messages(const sim::SensorReading& reading, std::uint64_t& sweep_parts);
+
+/// Listens to everything that the chain says; to be called before the first message is fed.
+void watch_chain(SensorChain& chain, ChainRun& run);
+/// The services' last words, times and health.
+void finish_chain(SensorChain& chain, ChainRun& run);
+
+/// The services from raw sensors to the map.
+std::vector<bus::Service> front_end_services();
+
+/// Drives once through.
+ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options);
+
+/// Errors after one rigid alignment (SE(2), over all given poses).
+struct TrajectoryError {
+  std::size_t poses = 0;
+  double ate_rms_m = 0.0;
+  double largest_m = 0.0;
+  double end_m = 0.0;  ///< With the first pose held instead: error at the end of the drive.
+  double driven_m = 0.0;
+};
+TrajectoryError trajectory_error(std::span<const metrics::StampedPose> estimate,
+                                 std::span<const metrics::StampedPose> truth);
+
+/// Errors against what is said of them, with the first pose held: it is the map's frame.
+struct PoseConsistency {
+  double mean_nees = 0.0;  ///< Of the pose; 3 is exact.
+  double end_error_m = 0.0;
+  double end_sigma_m = 0.0;  ///< Root of the trace of the position's covariance.
+};
+PoseConsistency pose_consistency(std::span<const model::SlamPose> poses,
+                                 std::span<const metrics::StampedPose> truth);
+
+/// Updates that were accepted more than `limit_m` from the truth, after one rigid alignment: the
+/// heading of a single first scan (3 mrad) would be 6 m at the end of a road.
+std::size_t wrong_updates(const ChainRun& run, double limit_m = 1.0);
+
+std::vector<metrics::StampedPose> poses_of(std::span<const model::EkfPose> poses);
+std::vector<metrics::StampedPose> poses_of(std::span<const model::SlamPose> poses);
+std::vector<metrics::StampedPose> poses_of(std::span<const model::KeyframePose> keyframes);
+
+}  // namespace understory::eval::harness

@@ -1,0 +1,89 @@
+#include "eval/harness/results.hpp"
+
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "eval/tools/machine.hpp"
+
+namespace understory::eval::harness {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::optional<fs::path> plot_script(const std::string& script) {
+  std::error_code ignored;
+  const fs::path executable = fs::read_symlink("/proc/self/exe", ignored);
+  for (const fs::path& folder : {executable.parent_path().parent_path() / UNDERSTORY_PLOT_INSTALLED,
+                                 fs::path(UNDERSTORY_PLOT_SOURCE)}) {
+    if (fs::exists(folder / script, ignored)) return folder / script;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+nlohmann::json result_document(const std::string& experiment, nlohmann::json config,
+                               nlohmann::json rows) {
+  const tools::Machine machine = tools::this_machine();
+  return {{"experiment", experiment},
+          {"config", std::move(config)},
+          {"rows", std::move(rows)},
+          {"machine", {{"cpu", machine.cpu}, {"cores", machine.cores}}},
+          {"version", tools::version()}};
+}
+
+void write_json(const fs::path& file, const nlohmann::json& json) {
+  fs::path partial = file;
+  partial += fmt::format(".{}.partial", getpid());
+  std::error_code error;
+  {
+    std::ofstream out(partial);
+    out << json.dump(1) << '\n';
+    out.close();
+    if (!out) {
+      fs::remove(partial, error);
+      throw std::runtime_error(file.string() + ": cannot write");
+    }
+  }
+  fs::rename(partial, file, error);
+  if (error) {
+    const std::string why = error.message();
+    fs::remove(partial, error);
+    throw std::runtime_error(file.string() + ": " + why);
+  }
+}
+
+fs::path traces_file(const fs::path& results) {
+  fs::path file = results;
+  return file.replace_extension(".traces.json");
+}
+
+bool plot(const std::string& script, const std::vector<std::string>& arguments) {
+  const auto path = plot_script(script);
+  if (!path) {
+    fmt::print(stderr, "plots: {} is not installed\n", script);
+    return false;
+  }
+  std::vector<std::string> words{"/usr/bin/python3", path->string()};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  pid_t child = 0;
+  int status = -1;
+  if (posix_spawn(&child, argv[0], nullptr, nullptr, argv.data(), environ) != 0 ||
+      waitpid(child, &status, 0) != child || status != 0) {
+    fmt::print(stderr, "plots: {} failed; the results themselves are complete\n", path->string());
+    return false;
+  }
+  return true;
+}
+
+}  // namespace understory::eval::harness

@@ -1,0 +1,104 @@
+#include "eval/harness/sensor_chain.hpp"
+
+#include <fstream>
+#include <stdexcept>
+
+#include "eval/tools/thread_clock.hpp"
+
+namespace understory::eval::harness {
+namespace {
+
+std::string read_if_there(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+}  // namespace
+
+/// The shared bus, with a stopwatch around one service's handlers.
+class SensorChain::TimedBus : public bus::Bus {
+ public:
+  explicit TimedBus(bus::Bus& bus) : bus_(bus) {}
+
+  std::optional<wire::Refusal> publish(std::string_view channel,
+                                       std::span<const std::uint8_t> bytes) override {
+    return bus_.publish(channel, bytes);
+  }
+  void subscribe(std::string_view channel, std::size_t queue_size, Handler handler) override {
+    bus_.subscribe(channel, queue_size,
+                   [this, handler = std::move(handler)](const bus::BusMessage& message) {
+                     const double start_s = tools::thread_time_s();
+                     handler(message);
+                     const double took_s = tools::thread_time_s() - start_s;
+                     time.total_s += took_s;
+                     time.calls_ms.push_back(static_cast<float>(took_s * 1e3));
+                   });
+  }
+  bool handle_one(int timeout_ms) override { return bus_.handle_one(timeout_ms); }
+  std::uint64_t dropped(std::string_view channel) const override { return bus_.dropped(channel); }
+
+  ServiceTime time;
+
+ private:
+  bus::Bus& bus_;
+};
+
+SensorChain::SensorChain(const std::vector<bus::Service>& services,
+                         const std::filesystem::path& config_dir,
+                         const std::map<std::string, std::string>& toml_instead)
+    : bus_(bus::MemoryBus::Queues::kUnlimited) {
+  // Defaults instead of a configuration that is not found would be wrong in silence.
+  if (!config_dir.empty() && !std::filesystem::is_directory(config_dir))
+    throw bus::ConfigurationError({"no such configuration folder: " + config_dir.string()});
+  for (const bus::Service& service : services) {
+    const std::filesystem::path file = config_dir / (service.name + ".toml");
+    const auto instead = toml_instead.find(service.name);
+    const std::string toml = instead != toml_instead.end() ? instead->second : read_if_there(file);
+    auto bus = std::make_unique<TimedBus>(bus_);
+    auto hosted =
+        std::make_unique<bus::HostedService>(service, *bus, bus::no_clock(), toml, file.string());
+    hosted_.push_back({service.name, std::move(bus), std::move(hosted)});
+  }
+}
+
+SensorChain::~SensorChain() = default;
+
+void SensorChain::begin() {
+  has_begun_ = true;
+  for (const Hosted& hosted : hosted_) hosted.service->node().connect();
+}
+
+void SensorChain::feed(std::string_view channel, std::span<const std::uint8_t> bytes) {
+  if (!has_begun_) begin();
+  bus_.publish(channel, bytes);
+  bus_.drain();
+}
+
+void SensorChain::finish() {
+  for (const Hosted& hosted : hosted_) {
+    hosted.service->adapter().finish();
+    bus_.drain();
+  }
+}
+
+const ServiceTime& SensorChain::time_of(std::string_view service) const {
+  for (const Hosted& hosted : hosted_) {
+    if (hosted.name == service) return hosted.bus->time;
+  }
+  throw std::out_of_range("no service " + std::string(service) + " in the chain");
+}
+
+std::vector<std::string> SensorChain::services() const {
+  std::vector<std::string> names;
+  for (const Hosted& hosted : hosted_) names.push_back(hosted.name);
+  return names;
+}
+
+health_t SensorChain::health_of(std::string_view service) {
+  for (const Hosted& hosted : hosted_) {
+    if (hosted.name == service) return hosted.service->node().health();
+  }
+  throw std::out_of_range("no service " + std::string(service) + " in the chain");
+}
+
+}  // namespace understory::eval::harness

@@ -1,0 +1,73 @@
+// Services on one bus in one process, fed with raw readings and timed one by one.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/bus/memory_bus.hpp"
+#include "common/bus/service.hpp"
+#include "understory/health_t.hpp"
+
+namespace understory::eval::harness {
+
+/// A message before it is on a bus.
+struct RawMessage {
+  model::Utime utime = 0;
+  std::string channel;
+  wire::Bytes bytes;
+};
+
+/// Processor time of one service.
+struct ServiceTime {
+  double total_s = 0.0;
+  std::vector<float> calls_ms;  ///< Of each message that it handled, in order.
+};
+
+/// As `understory replay` hosts them: what a message leads to is handed out before the next one.
+class SensorChain {
+ public:
+  /// NAME.toml of each service is read from `config_dir` where it exists, unless
+  /// `toml_instead` has its text. Throws ConfigurationError, also where that folder is not there;
+  /// an empty one stands for the defaults.
+  SensorChain(const std::vector<bus::Service>& services, const std::filesystem::path& config_dir,
+              const std::map<std::string, std::string>& toml_instead = {});
+  ~SensorChain();
+
+  /// Hands the message in, and out all that follows from it.
+  void feed(std::string_view channel, std::span<const std::uint8_t> bytes);
+  void feed(const RawMessage& message) { feed(message.channel, message.bytes); }
+  /// Calls the services' last words.
+  void finish();
+
+  /// `handler` takes a T (a value of common/model or a wire type); to be called before feed().
+  template <class T, class F>
+  void watch(const std::string& channel, F handler) {
+    bus_.subscribe(channel, 0, [handler = std::move(handler)](const bus::BusMessage& message) {
+      if (const auto value = wire::decode_message<T>(message.bytes)) handler(*value);
+    });
+  }
+
+  const ServiceTime& time_of(std::string_view service) const;
+  std::vector<std::string> services() const;
+  health_t health_of(std::string_view service);
+
+ private:
+  class TimedBus;
+  struct Hosted {
+    std::string name;
+    std::unique_ptr<TimedBus> bus;
+    std::unique_ptr<bus::HostedService> service;
+  };
+  void begin();
+
+  bus::MemoryBus bus_;
+  std::vector<Hosted> hosted_;
+  bool has_begun_ = false;
+};
+
+}  // namespace understory::eval::harness

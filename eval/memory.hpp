@@ -1,9 +1,0 @@
-// What this process takes.
-#pragma once
-
-namespace understory::eval {
-
-/// Memory of this process that is in use now [MB].
-double resident_mb();
-
-}  // namespace understory::eval

@@ -1,0 +1,24 @@
+#include "eval/tools/machine.hpp"
+
+#include <fstream>
+#include <thread>
+
+#include "understory_eval_version.hpp"
+
+namespace understory::eval::tools {
+
+Machine this_machine() {
+  Machine machine{"unknown", std::thread::hardware_concurrency()};
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    const auto colon = line.find(": ");
+    if (line.rfind("model name", 0) != 0 || colon == std::string::npos) continue;
+    machine.cpu = line.substr(colon + 2);
+    break;
+  }
+  return machine;
+}
+
+std::string version() { return UNDERSTORY_GIT_DESCRIBE; }
+
+}  // namespace understory::eval::tools

@@ -1,0 +1,9 @@
+// What this process takes.
+#pragma once
+
+namespace understory::eval::tools {
+
+/// Memory of this process that is in use now [MB].
+double resident_mb();
+
+}  // namespace understory::eval::tools

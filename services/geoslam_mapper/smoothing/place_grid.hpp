@@ -1,0 +1,60 @@
+// Places by where they are.
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
+
+namespace understory::geoslam_mapper::smoothing {
+
+/// Numbered points in square cells. Every change costs what it touches.
+class PlaceGrid {
+ public:
+  /// Adds the point, or moves it.
+  void put(std::uint32_t number, const Eigen::Vector2d& position_m) {
+    const std::uint64_t cell = cell_of(position_m);
+    if (cells_of_.size() <= number) cells_of_.resize(number + 1, kNowhere);
+    std::uint64_t& now = cells_of_[number];
+    if (now == cell) return;
+    if (now != kNowhere) std::erase(cells_[now], number);
+    cells_[cell].push_back(number);
+    now = cell;
+  }
+
+  /// Calls f(number) for every point of the cells within `radius_m`, and for some beyond.
+  template <typename F>
+  void for_each_near(const Eigen::Vector2d& centre_m, double radius_m, F&& f) const {
+    const Eigen::Vector2d reach(radius_m, radius_m);
+    const auto [x0, y0] = indices_of(centre_m - reach);
+    const auto [x1, y1] = indices_of(centre_m + reach);
+    for (std::int32_t x = x0; x <= x1; ++x) {
+      for (std::int32_t y = y0; y <= y1; ++y) {
+        const auto cell = cells_.find(key(x, y));
+        if (cell == cells_.end()) continue;
+        for (const std::uint32_t number : cell->second) f(number);
+      }
+    }
+  }
+
+ private:
+  static constexpr double kCell_m = 1.0;
+  static constexpr std::uint64_t kNowhere = ~std::uint64_t{0};
+  static std::pair<std::int32_t, std::int32_t> indices_of(const Eigen::Vector2d& p) {
+    return {static_cast<std::int32_t>(std::floor(p.x() / kCell_m)),
+            static_cast<std::int32_t>(std::floor(p.y() / kCell_m))};
+  }
+  static std::uint64_t key(std::int32_t x, std::int32_t y) {
+    return (std::uint64_t{static_cast<std::uint32_t>(x)} << 32U) | static_cast<std::uint32_t>(y);
+  }
+  static std::uint64_t cell_of(const Eigen::Vector2d& p) {
+    const auto [x, y] = indices_of(p);
+    return key(x, y);
+  }
+
+  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
+  std::vector<std::uint64_t> cells_of_;
+};
+
+}  // namespace understory::geoslam_mapper::smoothing

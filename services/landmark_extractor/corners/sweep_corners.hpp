@@ -1,0 +1,64 @@
+// Corners of houses: where two upright walls meet at about a right angle.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/model/landmarks.hpp"
+#include "services/landmark_extractor/corners/wall_lines.hpp"
+#include "services/landmark_extractor/ground/ground_surface.hpp"
+
+namespace understory::landmark_extractor::corners {
+
+/// Why pairs of walls did not become corners.
+struct CornerCounters {
+  std::uint64_t walls = 0;
+  std::uint64_t pairs = 0;   ///< Walls that meet.
+  std::uint64_t skew = 0;    ///< At no right angle.
+  std::uint64_t low = 0;     ///< Ends below a person's height: a car, a hedge, a box.
+  std::uint64_t hidden = 0;  ///< From where the sensor is the two cannot be seen so.
+  std::uint64_t corners = 0;
+};
+
+class SweepCorners {
+ public:
+  SweepCorners(const SweepParameters& sweep, const CornerParameters& corner)
+      : sweep_(sweep), corner_(corner), walls_(sweep, corner) {}
+
+  /// Appends the corners to `detections`.
+  void find(const rings::RingCloud& cloud, const std::vector<rings::Run>& runs,
+            const ground::GroundSurface& ground, const Eigen::Matrix2d& level_covariance_rad2,
+            std::vector<model::Detection>& detections);
+  const CornerCounters& counters() const { return counters_; }
+  /// Of the last sweep.
+  const std::vector<WallLine>& walls() const { return found_; }
+
+ private:
+  /// Where two walls meet, from the corner along each.
+  struct Meeting {
+    Eigen::Vector2d place_m = Eigen::Vector2d::Zero();
+    Eigen::Vector2d along_a = Eigen::Vector2d::Zero();
+    Eigen::Vector2d along_b = Eigen::Vector2d::Zero();
+    double reach_a_m = 0.0;  ///< From the centroid of wall a.
+    double reach_b_m = 0.0;
+  };
+  std::optional<Meeting> meet(const WallLine& a, const WallLine& b,
+                              const Eigen::Vector2d& sensor) const;
+  std::optional<model::Detection> judge(const rings::RingCloud& cloud, const WallLine& a,
+                                        const WallLine& b, const ground::GroundSurface& ground,
+                                        const Eigen::Matrix2d& level_covariance_rad2);
+  void add(const model::Detection& corner, std::size_t first,
+           std::vector<model::Detection>& detections) const;
+  bool is_stationary(const rings::RingCloud& cloud, const WallLine& wall,
+                     const Eigen::Vector2d& corner, const Eigen::Vector2d& along,
+                     double ground_z) const;
+
+  SweepParameters sweep_;
+  CornerParameters corner_;
+  WallFinder walls_;
+  std::vector<WallLine> found_;
+  CornerCounters counters_;
+};
+
+}  // namespace understory::landmark_extractor::corners

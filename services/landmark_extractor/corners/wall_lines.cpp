@@ -1,0 +1,243 @@
+#include "services/landmark_extractor/corners/wall_lines.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace understory::landmark_extractor::corners {
+namespace {
+
+/// Pieces of one wall have directions that differ by less than this [rad]...
+constexpr double kSameDirection = 0.1;
+/// ... and are found this many rings apart at most: windows and shutters interrupt a wall.
+constexpr std::size_t kRingReach = 4;
+
+/// A wall's unevenness is looked for in so many stretches of it.
+constexpr std::size_t kStretches = 8;
+/// Points scatter across a wall at least by this part of their range's noise.
+constexpr double kLeastAcross = 0.1;
+/// So many neighbours on a piece are looked at together.
+constexpr std::size_t kPartPoints = 8;
+
+double square(double value) { return value * value; }
+
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+}  // namespace
+
+void LineSums::add(const Eigen::Vector2d& point) {
+  count += 1.0;
+  sum += point;
+  square += point * point.transpose();
+}
+
+LineSums& LineSums::operator+=(const LineSums& other) {
+  count += other.count;
+  sum += other.sum;
+  square += other.square;
+  return *this;
+}
+
+const std::vector<WallLine>& WallFinder::find(const rings::RingCloud& cloud,
+                                              const std::vector<rings::Run>& runs) {
+  increments_.clear();
+  parts_.clear();
+  walls_.clear();
+  ring_begins_.assign(cloud.rings() + 1, 0);
+  for (const rings::Run& run : runs) {
+    if (run.size() >= rings::kLeastOfWall && run.width_m > 0.5 * corner_.min_length_m) {
+      split(cloud, run, run.first, run.last);
+    }
+    ring_begins_[run.ring + std::size_t{1}] = increments_.size();
+  }
+  for (std::size_t ring = 0; ring < cloud.rings(); ++ring) {
+    ring_begins_[ring + 1] = std::max(ring_begins_[ring], ring_begins_[ring + 1]);
+  }
+  join();
+  return walls_;
+}
+
+/// Douglas and Peucker: cuts at the point that is farthest from the chord.
+void WallFinder::split(const rings::RingCloud& cloud, const rings::Run& run, std::size_t first,
+                       std::size_t last) {
+  if (last - first + 1 < rings::kLeastOfWall) return;
+  const Eigen::Vector2f from(cloud.points()[first].x_m, cloud.points()[first].y_m);
+  const Eigen::Vector2f to(cloud.points()[last].x_m, cloud.points()[last].y_m);
+  const Eigen::Vector2f along = (to - from).normalized();
+  const auto tolerance = static_cast<float>(corner_.line_tolerance_m);
+  float farthest = 0.0F;
+  std::size_t cut = first;
+  for (std::size_t i = first + 1; i < last; ++i) {
+    const points::RingPoint& point = cloud.points()[i];
+    const float off =
+        std::abs(along.x() * (point.y_m - from.y()) - along.y() * (point.x_m - from.x()));
+    if (off > farthest) {
+      farthest = off;
+      cut = i;
+    }
+  }
+  if (farthest > tolerance) {
+    split(cloud, run, first, cut);
+    split(cloud, run, cut, last);
+  } else {
+    add_increment(cloud, run, first, last);
+  }
+}
+
+void WallFinder::add_increment(const rings::RingCloud& cloud, const rings::Run& run,
+                               std::size_t first, std::size_t last) {
+  LinePiece piece;
+  piece.from_m = cloud.points()[first].position();
+  piece.to_m = cloud.points()[last].position();
+  piece.length_m = (piece.to_m - piece.from_m).norm();
+  if (piece.length_m < 0.5 * corner_.min_length_m) return;
+  piece.direction = (piece.to_m - piece.from_m) / piece.length_m;
+  // A piece along the beams is a row of edges, not a wall.
+  const Eigen::Vector2d beam = piece.from_m - cloud.sensor_m().head<2>().cast<double>();
+  if (std::abs(cross(beam.normalized(), piece.direction)) < 0.05) return;
+  double z = 0.0;
+  double height = 0.0;
+  // The points where pieces meet belong to neither for sure.
+  piece.first_part = static_cast<std::uint32_t>(parts_.size());
+  for (std::size_t i = first + 1; i < last; ++i) {
+    if ((i - first - 1) % kPartPoints == 0) parts_.emplace_back();
+    parts_.back().count += 1.0;
+    parts_.back().sum += cloud.points()[i].position();
+    piece.sums.add(cloud.points()[i].position());
+    z += cloud.points()[i].z_m;
+    height += cloud.points()[i].height_m;
+  }
+  piece.parts = static_cast<std::uint32_t>(parts_.size()) - piece.first_part;
+  piece.ring = run.ring;
+  piece.z_m = z / piece.sums.count;
+  piece.height_m = height / piece.sums.count;
+  piece.first = static_cast<std::uint32_t>(first);
+  piece.last = static_cast<std::uint32_t>(last);
+  increments_.push_back(piece);
+}
+
+bool WallFinder::same_wall(const LinePiece& a, const LinePiece& b) const {
+  const Eigen::Vector2d& direction = a.direction;
+  if (std::abs(cross(direction, b.direction)) > kSameDirection ||
+      direction.dot(b.direction) < 0.0) {
+    return false;
+  }
+  const Eigen::Vector2d middle = 0.5 * (b.from_m + b.to_m) - a.from_m;
+  const double length = a.length_m;
+  const double half = 0.5 * b.length_m;
+  const double along = direction.dot(middle);
+  const double lever = std::max(length, 2.0 * half);
+  const double across = std::abs(cross(direction, middle));
+  // Two short pieces' directions are uncertain; their neighbourhood is not.
+  return across < corner_.line_tolerance_m * (1.0 + std::abs(along - 0.5 * length) / lever) &&
+         along + half > 0.0 && along - half < length;
+}
+
+std::uint32_t WallFinder::root(std::uint32_t piece) {
+  while (parents_[piece] != piece) {
+    parents_[piece] = parents_[parents_[piece]];
+    piece = parents_[piece];
+  }
+  return piece;
+}
+
+void WallFinder::join() {
+  parents_.resize(increments_.size());
+  std::iota(parents_.begin(), parents_.end(), 0U);
+  for (std::uint32_t i = 0; i < increments_.size(); ++i) {
+    const std::size_t last_ring =
+        std::min<std::size_t>(ring_begins_.size() - 2, increments_[i].ring + kRingReach);
+    const std::size_t end = ring_begins_[last_ring + 1];
+    for (auto j = static_cast<std::uint32_t>(ring_begins_[increments_[i].ring + std::size_t{1}]);
+         j < end; ++j) {
+      if (same_wall(increments_[i], increments_[j])) parents_[root(j)] = root(i);
+    }
+  }
+  members_.resize(std::max(members_.size(), increments_.size()));
+  for (std::uint32_t i = 0; i < increments_.size(); ++i) members_[root(i)].push_back(i);
+  for (std::uint32_t i = 0; i < increments_.size(); ++i) {
+    if (!members_[i].empty()) add_wall(members_[i]);
+    members_[i].clear();
+  }
+}
+
+/// How far stretches of the wall are from its line beyond what the noise of their points explains,
+/// in root mean square: neighbouring rings see the same bumps.
+double WallFinder::unevenness(const std::vector<std::uint32_t>& members, const WallLine& wall,
+                              double variance_m2) const {
+  std::array<double, kStretches> counts{};
+  std::array<double, kStretches> offsets{};
+  const Eigen::Vector2d normal = wall.normal();
+  for (const std::uint32_t i : members) {
+    for (std::uint32_t k = 0; k < increments_[i].parts; ++k) {
+      const IncrementPart& part = parts_[increments_[i].first_part + k];
+      const Eigen::Vector2d offset = part.sum / part.count - wall.centroid_m;
+      const double along = (wall.direction.dot(offset) - wall.from_m) / wall.length();
+      const auto stretch = static_cast<std::size_t>(
+          std::clamp(along * kStretches, 0.0, static_cast<double>(kStretches) - 1.0));
+      counts[stretch] += part.count;
+      offsets[stretch] += part.count * normal.dot(offset);
+    }
+  }
+  double excess = 0.0;
+  double stretches = 0.0;
+  for (std::size_t k = 0; k < kStretches; ++k) {
+    if (counts[k] < static_cast<double>(kPartPoints)) continue;
+    excess += square(offsets[k] / counts[k]) - variance_m2 / counts[k];
+    stretches += 1.0;
+  }
+  // The line took two of them.
+  return stretches > 3.0 ? std::sqrt(std::max(0.0, excess / (stretches - 2.0))) : 0.0;
+}
+
+/// Total least squares.
+void WallFinder::add_wall(const std::vector<std::uint32_t>& members) {
+  LineSums sums;
+  WallLine wall;
+  wall.low_z_m = std::numeric_limits<double>::infinity();
+  wall.high_z_m = wall.high_height_m = -wall.low_z_m;
+  std::uint16_t ring = 0xffff;
+  for (const std::uint32_t i : members) {
+    const LinePiece& piece = increments_[i];
+    sums += piece.sums;
+    wall.z_m += piece.sums.count * piece.z_m;
+    wall.low_z_m = std::min(wall.low_z_m, piece.z_m);
+    wall.high_z_m = std::max(wall.high_z_m, piece.z_m);
+    wall.high_height_m = std::max(wall.high_height_m, piece.height_m);
+    if (piece.ring != ring) ++wall.rings;
+    ring = piece.ring;
+  }
+  if (wall.rings < corner_.min_rings || wall.high_z_m - wall.low_z_m < corner_.min_extent_m) return;
+  wall.centroid_m = sums.sum / sums.count;
+  wall.z_m /= sums.count;
+  const Eigen::Matrix2d scatter =
+      sums.square / sums.count - wall.centroid_m * wall.centroid_m.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(scatter);
+  wall.direction = axes.eigenvectors().col(1);
+  if (wall.direction.dot(increments_[members[0]].direction) < 0.0) wall.direction *= -1.0;
+  const double across2 =
+      std::max(axes.eigenvalues()[0], square(kLeastAcross * sweep_.range_sigma_m));
+  if (std::sqrt(across2) > corner_.line_tolerance_m) return;
+  wall.from_m = std::numeric_limits<double>::infinity();
+  wall.to_m = -wall.from_m;
+  for (const std::uint32_t i : members) {
+    wall.from_m =
+        std::min(wall.from_m, wall.direction.dot(increments_[i].from_m - wall.centroid_m));
+    wall.to_m = std::max(wall.to_m, wall.direction.dot(increments_[i].to_m - wall.centroid_m));
+  }
+  if (wall.length() < corner_.min_length_m) return;
+  // Noise averages out over points; unevenness, over stretches of the wall.
+  wall.unevenness_m = std::hypot(unevenness(members, wall, across2), corner_.flatness_sigma_m);
+  const double of_offset = across2 / sums.count + square(wall.unevenness_m) / kStretches;
+  wall.offset_sigma_m = std::sqrt(of_offset);
+  const double length2 = axes.eigenvalues()[1];
+  wall.direction_sigma_rad = std::sqrt(of_offset / length2);
+  walls_.push_back(wall);
+}
+
+}  // namespace understory::landmark_extractor::corners

@@ -1,0 +1,30 @@
+// Linear systems whose matrix is symmetric, positive and zero far from its diagonal.
+#pragma once
+
+#include <cstddef>
+
+namespace understory::landmark_extractor::ground {
+
+/// Layout of the lower band, column by column: column j begins at j * stride with its diagonal
+/// entry; zeros follow the band's entries up to the stride.
+struct BandLayout {
+  std::size_t size = 0;    ///< Unknowns.
+  std::size_t band = 0;    ///< Entries per column, with the diagonal one.
+  std::size_t stride = 0;  ///< From column to column.
+
+  static BandLayout of(std::size_t size, std::size_t band) {
+    return {size, band, (band + kLanes - 1) / kLanes * kLanes + kLanes};
+  }
+  std::size_t entries() const { return size * stride; }
+  /// Values of a right-hand side, with zeros behind it.
+  std::size_t padded_size() const { return size + stride; }
+
+ private:
+  static constexpr std::size_t kLanes = 8;
+};
+
+/// Solves in place: `matrix` becomes its Cholesky factor, `right` (padded_size() values) the
+/// solution. Entries of rows beyond the last must be zero.
+void solve_band(const BandLayout& layout, float* matrix, float* right);
+
+}  // namespace understory::landmark_extractor::ground

@@ -1,0 +1,36 @@
+// A circle through the returns of one object.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "common/model/planar_scan.hpp"
+#include "services/landmark_extractor/parameters.hpp"
+#include "services/landmark_extractor/planar/segments.hpp"
+
+namespace understory::landmark_extractor::planar {
+
+/// A trunk in the polar coordinates of the sensor.
+struct TrunkFit {
+  double range_m = 0.0;      ///< Of the centre.
+  double bearing_rad = 0.0;  ///< Of the centre.
+  double radius_m = 0.0;
+  /// Of (range, bearing, radius) [m, rad, m].
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  /// Mean square of the ranges' residuals, in their standard deviations.
+  double mean_square_residual = 0.0;
+
+  /// Centre in frame `sensor` [m].
+  Eigen::Vector2d centre() const;
+  /// Its covariance [m^2].
+  Eigen::Matrix2d centre_covariance() const;
+};
+
+/// Maximum a posteriori estimate of centre and radius. Evidence: the range of each beam, the
+/// bearings of those edges that are seen (`Border::kClear`), and the prior of the radius, which
+/// decides where a trunk is so far away that its width is within one beam. None when the
+/// estimate does not settle on a circle before the sensor.
+std::optional<TrunkFit> fit_trunk(const model::PlanarScan& scan, const Segment& segment,
+                                  const PlanarTrunkParameters& parameters);
+
+}  // namespace understory::landmark_extractor::planar

@@ -1,0 +1,61 @@
+// Where the nodes and the cells of the ground surface are, and its height between them.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+
+namespace understory::landmark_extractor::points {
+
+/// The surface between four nodes, from the one at its low corner.
+struct GroundPatch {
+  float constant = 0.0F;
+  float along_x = 0.0F;
+  float along_y = 0.0F;
+  float twist = 0.0F;
+};
+
+/// A square about the sensor. A node every 4 m; each node is the low corner of a patch of 4 x 4
+/// cells. The patches of the last row and column lie outside and are never occupied.
+///
+/// Cells are kept plane by plane: first the low corner cell of every patch, then the next one of
+/// every patch, so that several patches are summed at once.
+struct GroundGrid {
+  static constexpr float kSpacing_m = 4.0F;
+  static constexpr int kCellsPerSpan = 4;
+  static constexpr int kPlanes = kCellsPerSpan * kCellsPerSpan;
+
+  float corner_x_m = 0.0F;
+  float corner_y_m = 0.0F;
+  float limit = 0.0F;  ///< Places in node distances are less.
+  int nodes_per_side = 0;
+  int plane = 0;  ///< Cells from plane to plane; a whole number of vector registers.
+
+  /// Covers `reach_m` around the place, with whole distances between nodes.
+  static GroundGrid around(float x_m, float y_m, float reach_m) {
+    const int spans = static_cast<int>(std::ceil(2.0F * reach_m / kSpacing_m)) + 1;
+    const float half = 0.5F * static_cast<float>(spans) * kSpacing_m;
+    const int nodes = spans + 1;
+    constexpr int kLanes = 8;
+    return {x_m - half, y_m - half, static_cast<float>(spans) - 1e-3F, nodes,
+            (nodes * nodes + kLanes) / kLanes * kLanes};
+  }
+  int nodes() const { return nodes_per_side * nodes_per_side; }
+  int cells_per_side() const { return (nodes_per_side - 1) * kCellsPerSpan; }
+  std::size_t cells() const { return static_cast<std::size_t>(plane) * kPlanes; }
+  /// A cell that is outside.
+  int nowhere() const { return plane - 1; }
+
+  /// In node distances from the corner, within the square; 0 for a number that is none.
+  float place(float coordinate_m, float corner_m) const {
+    const float value = (coordinate_m - corner_m) * (1.0F / kSpacing_m);
+    const float positive = value > 0.0F ? value : 0.0F;
+    return positive < limit ? positive : limit;
+  }
+  /// Index of the cell in column `i` and row `j` of the whole square.
+  int cell(int i, int j) const {
+    const int patch = (j / kCellsPerSpan) * nodes_per_side + i / kCellsPerSpan;
+    return ((j % kCellsPerSpan) * kCellsPerSpan + i % kCellsPerSpan) * plane + patch;
+  }
+};
+
+}  // namespace understory::landmark_extractor::points

@@ -1,0 +1,70 @@
+// What is done to every point of a sweep, several points at once.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "common/model/point_sweep.hpp"
+#include "services/landmark_extractor/points/ground_grid.hpp"
+
+namespace understory::landmark_extractor::points {
+
+/// A return in `vehicle_level`, with the beam that brought it. As long as one vector register, and
+/// without initial values, so that memory for many costs nothing before they come.
+struct alignas(32) RingPoint {
+  float x_m;
+  float y_m;
+  float z_m;
+  float azimuth_rad;  ///< Of the beam, left positive; goes on beyond pi within a ring.
+  float range_m;      ///< Horizontal distance from where the sensor was at that time.
+  float height_m;     ///< Above ground.
+  float time_s;       ///< From the sweep's utime.
+  float is_in_range;  ///< 1, or 0 where a coordinate is too near, too far or no number.
+
+  Eigen::Vector2d position() const { return {x_m, y_m}; }
+};
+
+/// Some points, coordinate by coordinate.
+struct PointBlock {
+  static constexpr std::size_t kSize = 128;
+  template <class Value>
+  using Array = std::array<Value, kSize>;
+
+  alignas(32) Array<float> x{};  ///< Frame `vehicle_level`.
+  Array<float> y{};
+  Array<float> z{};
+  Array<float> time{};
+  Array<float> range{};
+  Array<float> azimuth{};
+  Array<float> height{};  ///< Above ground.
+  Array<float> in_range{};
+  Array<std::int32_t> cell{};
+  Array<RingPoint> points{};
+};
+
+/// What turns points of a sweep into points around the sensor.
+struct Levelling {
+  Eigen::Matrix3f level_R_vehicle = Eigen::Matrix3f::Identity();
+  Eigen::Vector3f sensor_m = Eigen::Vector3f::Zero();      ///< Frame `vehicle_level`, at utime.
+  Eigen::Vector3f velocity_mps = Eigen::Vector3f::Zero();  ///< The same frame.
+  float min_range_m = 0.0F;
+  float max_range_m = 0.0F;
+};
+
+/// Above or below the vehicle: nothing on the ground is so far up [m].
+inline constexpr float kHighest_m = 1000.0F;
+
+/// Fills x, y, z and cell, which is nowhere() for points that do not count: out of range of where
+/// the sensor is at utime, or no numbers. Precondition: at most PointBlock::kSize points.
+void locate_block(std::span<const model::SweepPoint> points, const Levelling& by,
+                  const GroundGrid& grid, PointBlock& block);
+/// Fills `points`. `patches`: one per node of the grid.
+void place_block(std::span<const model::SweepPoint> points, const Levelling& by,
+                 const GroundGrid& grid, const GroundPatch* patches, PointBlock& block);
+/// height = z - the surface at (x, y), for `count` places: a whole number of registers of 8.
+void heights_above(const float* x, const float* y, const float* z, std::size_t count,
+                   const GroundGrid& grid, const GroundPatch* patches, float* height);
+
+}  // namespace understory::landmark_extractor::points

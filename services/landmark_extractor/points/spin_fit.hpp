@@ -1,0 +1,92 @@
+// How the sensor moved while it turned, from the points of the turn alone.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <vector>
+
+#include "common/model/point_sweep.hpp"
+
+namespace understory::landmark_extractor::points {
+
+/// What a turn's points say of the sensor, in the frame of the points.
+struct Spin {
+  /// Of the sensor in the plan; zero where the times are unknown or do not fit.
+  Eigen::Vector2f velocity_mps = Eigen::Vector2f::Zero();
+  float rate_radps = 0.0F;  ///< Left positive; 0 = unknown.
+  bool is_leftward = true;
+};
+
+/// A sensor turns evenly: the azimuth of its beams grows linearly with time, each ring from an
+/// offset of its own. A de-skewed point at time t was seen from `velocity * t` away, which turns
+/// its azimuth by parallax; the velocity is what leaves beams that turn evenly (least squares on a
+/// part of the points). Keeps its memory from sweep to sweep.
+class SpinFitter {
+ public:
+  void fit(const model::PointSweep& sweep, double max_range_m, Spin& spin);
+
+ private:
+  /// One point as its beam is seen from where the sensor is at utime.
+  struct Sample {
+    float x;
+    float y;
+    float time_s;
+    std::uint16_t ring;
+  };
+  /// What one sample says: time, d azimuth / d velocity, azimuth without the spin.
+  struct Row {
+    float time_s;
+    float by_x;
+    float by_y;
+    float turned;
+  };
+  struct Means {
+    double count = 0.0;
+    Eigen::Vector4d sum = Eigen::Vector4d::Zero();  ///< Of (t, d azimuth / d velocity, residual).
+    float offset = 0.0F;                            ///< Of the first residual.
+    std::size_t samples = 0;
+  };
+
+  void take_samples(const model::PointSweep& sweep, double max_range_m);
+  float look_at_neighbours(const model::PointSweep& sweep, std::uint16_t ring, Spin& spin);
+  /// Whether there is more to improve.
+  bool improve();
+
+  std::vector<Sample> samples_;
+  std::vector<Row> rows_;
+  std::vector<Means> means_;  ///< Per ring.
+  std::vector<float> rates_;
+  double rate_ = 0.0;  ///< [rad/s]
+  Eigen::Vector2d velocity_ = Eigen::Vector2d::Zero();
+  double residual_rms_ = 0.0;
+};
+
+/// The same angle between -pi and pi, for few turns.
+inline float wrap_angle_f(float angle_rad) {
+  constexpr float kTurn = 2.0F * std::numbers::pi_v<float>;
+  const float turns = angle_rad * (1.0F / kTurn);
+  return angle_rad -
+         kTurn * static_cast<float>(static_cast<int>(turns + (turns < 0 ? -0.5F : 0.5F)));
+}
+
+/// atan2 to 1e-5 rad without a branch on the data (polynomial of least maximum error).
+inline float fast_atan2(float y, float x) {
+  constexpr float kPi = std::numbers::pi_v<float>;
+  const float ax = std::abs(x);
+  const float ay = std::abs(y);
+  const float large = std::max(std::max(ax, ay), 1e-20F);
+  const float q = std::min(ax, ay) / large;
+  const float s = q * q;
+  float angle =
+      q * (0.99997726F +
+           s * (-0.33262347F +
+                s * (0.19354346F + s * (-0.11643287F + s * (0.05265332F - s * 0.01172120F)))));
+  angle = ay > ax ? 0.5F * kPi - angle : angle;
+  angle = x < 0.0F ? kPi - angle : angle;
+  return y < 0.0F ? -angle : angle;
+}
+
+}  // namespace understory::landmark_extractor::points

@@ -1,0 +1,82 @@
+// What beams say of a stem: residuals of many of them at once, and their sums.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <span>
+
+namespace understory::landmark_extractor::trunks {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+inline constexpr std::size_t kLanes = 8;
+using Lanes = std::array<float, kLanes>;
+
+/// Beams that hit a stem, in the plan about some anchor. As many as one vector register holds.
+struct alignas(32) HitLanes {
+  Lanes origin_x{};  ///< Where the sensor was.
+  Lanes origin_y{};
+  Lanes along_x{};  ///< Whereto it looked, unit.
+  Lanes along_y{};
+  Lanes range{};
+  Lanes z{};
+  Lanes counts{};  ///< 1, or 0 where there is no beam.
+};
+
+/// Lines of sight that just pass by.
+struct alignas(32) EdgeLanes {
+  Lanes origin_x{};
+  Lanes origin_y{};
+  Lanes along_x{};
+  Lanes along_y{};
+  Lanes z{};
+  Lanes side{};  ///< +1 = left.
+  Lanes variance{};
+  Lanes surplus{};  ///< By which part of it the error is smaller, together with the others.
+  Lanes counts{};
+};
+
+/// A stem about the same anchor: x, y, radius at the reference height, and their changes per metre.
+struct StemState {
+  std::array<float, 6> values{};
+  float reference_z_m = 0.0F;
+};
+
+/// Noise of what a beam says [m, rad].
+struct BeamNoise {
+  float range_variance = 0.0F;  ///< Of the sensor and of the bark.
+  float beam_width_rad = 0.0F;
+};
+
+/// Normal equations: their sums with the height to the power of 0, 1, 2.
+struct StemSums {
+  /// The upper triangle of the information of (x, y, radius), row by row, then the gradient.
+  static constexpr std::size_t kTerms = 9;
+  std::array<std::array<Lanes, kTerms>, 3> powers{};
+  Lanes squared{};  ///< Residuals in their standard deviations.
+
+  void normal_equations(Matrix6d& information, Vector6d& gradient) const;
+  double sum_of_squares() const;
+};
+
+/// Adds what hits and edges say; residuals beyond two standard deviations weigh less (Huber).
+void add_terms(std::span<const HitLanes> hits, std::span<const EdgeLanes> edges,
+               const StemState& stem, const BeamNoise& noise, StemSums& sums);
+
+/// Adds the part of the information that hits and edges do not weigh (hits weigh less, the more
+/// they graze): with weights t / variance the estimate's spread is that of t^2 / variance.
+void add_unused(std::span<const HitLanes> hits, std::span<const EdgeLanes> edges,
+                const StemState& stem, const BeamNoise& noise, StemSums& sums);
+
+/// Mean squared residual of each group of hits, and the squared ones of the edges, in their
+/// standard deviations.
+void square_terms(std::span<const HitLanes> hits, std::span<const EdgeLanes> edges,
+                  const StemState& stem, const BeamNoise& noise, std::span<float> hit_means,
+                  std::span<Lanes> edge_squares);
+
+/// Solves information * change = gradient; false where the matrix is not positive.
+bool solve_normal(const Matrix6d& information, const Vector6d& gradient, Vector6d& change);
+
+}  // namespace understory::landmark_extractor::trunks

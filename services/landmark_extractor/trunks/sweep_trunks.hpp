@@ -1,0 +1,61 @@
+// Which columns of returns are trunks.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/model/landmarks.hpp"
+#include "services/landmark_extractor/ground/ground_surface.hpp"
+#include "services/landmark_extractor/trunks/column_fit.hpp"
+#include "services/landmark_extractor/trunks/level.hpp"
+#include "services/landmark_extractor/trunks/stem_probe.hpp"
+#include "services/landmark_extractor/trunks/trunk_columns.hpp"
+
+namespace understory::landmark_extractor::trunks {
+
+/// Why columns of returns did not become trunks.
+struct TrunkCounters {
+  std::uint64_t columns = 0;
+  std::uint64_t too_few_points = 0;
+  std::uint64_t no_fit = 0;        ///< The estimate did not settle, or runs disagreed.
+  std::uint64_t wrong_radius = 0;  ///< Thinner or thicker than a trunk.
+  std::uint64_t leaning = 0;       ///< A branch.
+  std::uint64_t not_round = 0;     ///< Residuals too large.
+  std::uint64_t uncertain = 0;     ///< Too little of it seen to say where its centre is.
+  std::uint64_t not_standing = 0;  ///< Ends above the ground or below a person's height.
+  std::uint64_t in_leaves = 0;     ///< More returns around it than on it.
+  std::uint64_t out_of_range = 0;
+  std::uint64_t trunks = 0;
+};
+
+class SweepTrunks {
+ public:
+  SweepTrunks(const SweepParameters& sweep, const SweepTrunkParameters& trunk)
+      : sweep_(sweep), trunk_(trunk), fitter_(sweep, trunk) {}
+
+  /// Appends the trunks to `detections`.
+  void find(const rings::RingCloud& cloud, const std::vector<rings::Run>& runs,
+            const ground::GroundSurface& ground, const Eigen::Matrix2d& level_covariance_rad2,
+            std::vector<model::Detection>& detections);
+  const TrunkCounters& counters() const { return counters_; }
+
+ private:
+  std::optional<model::Detection> judge(const rings::RingCloud& cloud,
+                                        const std::vector<rings::Run>& runs, const Column& column,
+                                        const ground::GroundSurface& ground,
+                                        const Eigen::Matrix2d& level_covariance_rad2);
+  bool plausible(const StemFit& fit, double breast_z);
+  bool is_in_leaves(const rings::RingCloud& cloud, const std::vector<rings::Run>& runs,
+                    const StemFit& fit);
+  bool is_stationary(const StemProbe& probe);
+
+  SweepParameters sweep_;
+  SweepTrunkParameters trunk_;
+  ColumnFinder columns_;
+  StemFitter fitter_;
+  TrunkCounters counters_;
+  std::vector<std::uint32_t> near_;
+};
+
+}  // namespace understory::landmark_extractor::trunks
