@@ -18,6 +18,11 @@ class LevelCorrection {
   LandmarkScan levelled(LandmarkScan scan) const;
   const std::optional<EkfLevel>& latest() const { return level_; }
   void restore(const std::optional<EkfLevel>& level) { level_ = level; }
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.level_);
+  }
 
  private:
   std::optional<EkfLevel> level_;

@@ -15,12 +15,24 @@ struct VelocityEstimate {
   Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Frame `vehicle_level` at utime.
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
   double gyro_bias_variance = 0.0;  ///< [(rad/s)^2]
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.utime, s.velocity_mps, s.covariance, s.gyro_bias_variance);
+  }
 };
 
 /// The gyro's bias as a filter knows it [rad/s], [(rad/s)^2].
 struct FilterBias {
   double bias = 0.0;
   double variance = 0.0;
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.bias, s.variance);
+  }
 };
 
 /// What a gyro said of a time.
@@ -29,6 +41,12 @@ struct GyroRotation {
   double variance = 0.0;  ///< Of that [rad^2]; of white noise alone, see OdometryBuffer.
   double seconds = 0.0;   ///< On the move.
   double bias_rad = 0.0;  ///< What was taken out as the gyro's bias in that time.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.rotation_rad, s.variance, s.seconds, s.bias_rad);
+  }
 
   void operator+=(const GyroRotation& other) {
     rotation_rad += other.rotation_rad;
@@ -77,6 +95,12 @@ class OdometryBuffer {
   const std::deque<Odometry>& increments() const { return increments_; }
   /// A piece that pieces() gave, into an empty buffer: as it is.
   void restore(const Odometry& increment) { increments_.push_back(increment); }
+  /// Members of a saved state (include common/model/archive.hpp); see common/state. The correlation
+  /// time is configuration.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.increments_, self.bias_, self.velocity_);
+  }
 
  private:
   void start_at_velocity(Odometry& increment);

@@ -121,7 +121,7 @@ def main():
     lines = ["// Generated from lcmtypes/*.lcm by common/wire/generate_layouts.py.",
              '#include "common/wire/layout.hpp"', ""]
     lines += [f'#include "understory/{name}.hpp"' for name in sorted(types)]
-    lines += ["", "namespace understory {", "namespace {", ""]
+    lines += ["", "namespace understory::wire {", "namespace {", ""]
     lines += [table(types, name) for name in order]
     lines += ["// Decoding must not need more than four times a message's size."]
     lines += [f"static_assert(sizeof({name}) <= 4 * k_{name}.min_bytes);" for name in repeated]
@@ -130,7 +130,7 @@ def main():
               for name in sorted(types)]
     lines += ["};", "", "}  // namespace", "",
               "std::span<const WireType> wire_types() { return kTypes; }", "",
-              "}  // namespace understory", ""]
+              "}  // namespace understory::wire", ""]
     out = pathlib.Path(arguments.out)
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text("\n".join(lines), encoding="utf-8")

@@ -7,7 +7,7 @@
 #include "tests/baseline/clouds.hpp"
 #include "tests/catch.hpp"
 
-namespace understory::source {
+namespace understory::test {
 namespace {
 
 Eigen::VectorXd flatten(const geoslam_mapper::baseline::Graph& graph) {
@@ -128,4 +128,4 @@ TEST_CASE("A graph without a determined solution is refused") {
 }
 
 }  // namespace
-}  // namespace understory::source
+}  // namespace understory::test

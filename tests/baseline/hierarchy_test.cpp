@@ -12,7 +12,7 @@
 #include "tests/baseline/clouds.hpp"
 #include "tests/catch.hpp"
 
-namespace understory::source {
+namespace understory::test {
 namespace {
 
 using test::moved;
@@ -214,4 +214,4 @@ TEST_CASE("Moved landmarks change edge lengths and leave descriptors") {
 }
 
 }  // namespace
-}  // namespace understory::source
+}  // namespace understory::test

@@ -9,7 +9,7 @@
 
 #include <Eigen/QR>
 
-namespace understory::source {
+namespace understory::test {
 namespace {
 
 using test::moved;
@@ -148,4 +148,4 @@ TEST_CASE("Coinciding points have no similarity") {
 }
 
 }  // namespace
-}  // namespace understory::source
+}  // namespace understory::test

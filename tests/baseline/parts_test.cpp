@@ -7,7 +7,7 @@
 #include "tests/baseline/clouds.hpp"
 #include "tests/catch.hpp"
 
-namespace understory::source {
+namespace understory::test {
 namespace {
 
 using test::moved;
@@ -148,4 +148,4 @@ TEST_CASE("Too few associations give no pose") {
 }
 
 }  // namespace
-}  // namespace understory::source
+}  // namespace understory::test

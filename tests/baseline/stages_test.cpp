@@ -5,7 +5,7 @@
 #include "sim/drive.hpp"
 #include "tests/catch.hpp"
 
-namespace understory {
+namespace understory::test {
 namespace {
 
 sim::DriveParameters small_drive(double sigma_m, double detection_probability) {
@@ -223,4 +223,4 @@ TEST_CASE("Foreign bytes are no state") {
 }
 
 }  // namespace
-}  // namespace understory
+}  // namespace understory::test

@@ -38,7 +38,7 @@ class RecordedDrive {
   static geometry::SE2 pose(double seconds) {
     const auto from_start = [](double s) {
       return geometry::SE2::Exp({kSpeed_mps * s, 0.0, kTurn_radps * s}) *
-             victoria_park::axle_T_vehicle();
+             io::victoria_park::axle_T_vehicle();
     };
     return from_start(kFirstScan_s).inverse() * from_start(seconds);
   }
@@ -72,8 +72,8 @@ class RecordedDrive {
   }
 
   void write_wheels() const {
-    const double encoder_mps = kSpeed_mps - kTurn_radps * victoria_park::kEncoderLeft_m;
-    const double steering = std::atan(victoria_park::kWheelbase_m * kTurn_radps / kSpeed_mps);
+    const double encoder_mps = kSpeed_mps - kTurn_radps * io::victoria_park::kEncoderLeft_m;
+    const double steering = std::atan(io::victoria_park::kWheelbase_m * kTurn_radps / kSpeed_mps);
     std::ofstream file(directory_ / "DRS.txt");
     for (std::size_t i = 0; i < kWheelSamples; ++i) {
       file << fmt::format("{:.3f} {:.9f} {:.9f}\n", 0.025 * static_cast<double>(i), encoder_mps,

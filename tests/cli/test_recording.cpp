@@ -9,7 +9,6 @@
 #include "tests/cli/run_command.hpp"
 
 using namespace understory;
-using namespace understory::cli;
 using namespace understory::test;
 using Catch::Matchers::Contains;
 namespace fs = std::filesystem;

@@ -3,6 +3,7 @@
 #include "deploy/launch/restart_policy.hpp"
 #include "tests/catch.hpp"
 
+using namespace understory;
 using namespace understory::launch;
 
 TEST_CASE("back-off doubles and never exceeds its limits", "[launch]") {

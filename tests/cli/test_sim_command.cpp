@@ -7,7 +7,6 @@
 #include "understory/truth_landmarks_t.hpp"
 
 using namespace understory;
-using namespace understory::cli;
 using namespace understory::test;
 using Catch::Matchers::Contains;
 

@@ -11,9 +11,10 @@
 #include "tests/catch.hpp"
 #include "tests/io/log_fixture.hpp"
 
+using namespace understory;
 using namespace understory::launch;
 using Catch::Matchers::Contains;
-using test::TemporaryDirectory;
+using understory::test::TemporaryDirectory;
 
 namespace {
 

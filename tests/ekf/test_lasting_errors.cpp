@@ -67,7 +67,7 @@ double mean_nees_with_wrong_level(std::uint64_t seed, bool is_told) {
   parameters.odometry = sim::OdometryKind::kInertialAndWheels;
   parameters.position_sigma_m = 0.02;
   parameters.range_m = 40.0;
-  sim::InertialDrive drive(parameters, test::trunks(), seed);
+  sim::InertialDrive drive(parameters, trunks(), seed);
   Ekf filter(test::white_noise());
   WrongLevel level(seed);
   geometry::SE2 start;
@@ -142,7 +142,7 @@ double level_nees_before_leaning_trunks(std::uint64_t seed) {
   std::vector<Eigen::Vector2d> leans;
   for (int i = 0; i < kTrunks; ++i) {
     const double bearing = 2.0 * M_PI * i / kTrunks;
-    test::trunks.emplace_back(12.0 * std::cos(bearing), 12.0 * std::sin(bearing), kHeight_m);
+    trunks.emplace_back(12.0 * std::cos(bearing), 12.0 * std::sin(bearing), kHeight_m);
     leans.emplace_back(kLean * normal(random), kLean * normal(random));
   }
   Ekf filter(test::white_noise());
@@ -166,7 +166,7 @@ double level_nees_before_leaning_trunks(std::uint64_t seed) {
     for (std::uint32_t i = 0; i < kTrunks; ++i) {
       const double up = kHeightNoise * normal(random);
       model::Detection seen;
-      seen.position_m = test::trunks[i] + Eigen::Vector3d(0.0, 0.0, up);
+      seen.position_m = trunks[i] + Eigen::Vector3d(0.0, 0.0, up);
       seen.position_m.head<2>() +=
           up * leans[i] + kNoise * Eigen::Vector2d(normal(random), normal(random));
       const double own = kNoise * kNoise + std::pow(kLean * kHeightNoise, 2);

@@ -4,6 +4,8 @@
 #include "eval/harness/run.hpp"
 #include "sim/drive.hpp"
 
+namespace understory::test {
+
 inline sim::DriveParameters small_drive_parameters(double length_m = 8.0) {
   sim::DriveParameters parameters;
   parameters.forest = sim::forest_parameters(sim::ForestKind::kSparse);
@@ -11,3 +13,5 @@ inline sim::DriveParameters small_drive_parameters(double length_m = 8.0) {
   parameters.path.length_m = length_m;
   return parameters;
 }
+
+}  // namespace understory::test

@@ -20,7 +20,7 @@ eval::metrics::PoseEstimate displaced(const eval::metrics::MapTruth& truth, std:
 }  // namespace
 
 TEST_CASE("RPE, ROE and LPE of two states, by hand", "[metric]") {
-  const sim::Drive drive(small_drive_parameters(), 1);
+  const sim::Drive drive(test::small_drive_parameters(), 1);
   const eval::metrics::MapTruth truth(drive, 4);
   CHECK(truth.map_T_vehicle(4).Log().norm() < 1e-12);
   const std::uint32_t a = truth.trunks_in_range()[0];
@@ -49,7 +49,7 @@ TEST_CASE("A landmark is compared with the nearest trunk that was ever in range"
     for (int j = 0; j <= 20; ++j) forest.trunks_m.emplace_back(20.0 * i, 20.0 * j);
   }
   forest.radii_m.assign(forest.trunks_m.size(), 0.0);
-  const sim::Drive drive(small_drive_parameters(), forest, 3);
+  const sim::Drive drive(test::small_drive_parameters(), forest, 3);
   const eval::metrics::MapTruth truth(drive, 0);
   REQUIRE(truth.trunks_in_range().size() < forest.trunks_m.size());
   for (const std::uint32_t trunk : truth.trunks_in_range()) {
@@ -65,7 +65,7 @@ TEST_CASE("A landmark is compared with the nearest trunk that was ever in range"
 }
 
 TEST_CASE("ATE does not see a rigid motion of the whole, and measures the rest", "[metric]") {
-  const sim::Drive drive(small_drive_parameters(40.0), 2);
+  const sim::Drive drive(test::small_drive_parameters(40.0), 2);
   const eval::metrics::MapTruth truth(drive, 0);
   std::vector<eval::metrics::PoseEstimate> poses;
   const geometry::SE2 moved(3.0, -1.0, 0.3);
@@ -82,7 +82,7 @@ TEST_CASE("ATE does not see a rigid motion of the whole, and measures the rest",
 }
 
 TEST_CASE("Doubled and invented landmarks are false, missing ones lower the recall", "[metric]") {
-  const sim::Drive drive(small_drive_parameters(), 1);
+  const sim::Drive drive(test::small_drive_parameters(), 1);
   const eval::metrics::MapTruth truth(drive, 0);
   std::vector<std::uint32_t> observation_count(drive.forest().trunks_m.size(), 0);
   std::vector<Eigen::Vector2d> landmarks;

@@ -124,7 +124,7 @@ class DenseBatch {
 TEST_CASE("The oracle finds the minimum that a dense solver finds, with its covariance",
           "[oracle]") {
   const double sigma = GENERATE(0.05, 0.4);
-  sim::DriveParameters parameters = small_drive_parameters(3.0);
+  sim::DriveParameters parameters = test::small_drive_parameters(3.0);
   parameters.sensor.position_sigma_m = sigma;
   parameters.sensor.detection_probability = 0.8;
   const eval::harness::RecordedDrive recorded(parameters, 5);
@@ -151,7 +151,7 @@ TEST_CASE("The oracle finds the minimum that a dense solver finds, with its cova
 }
 
 TEST_CASE("Solved at every step or once at the end, the estimate is the same", "[oracle]") {
-  const eval::harness::RecordedDrive recorded(small_drive_parameters(12.8), 6);
+  const eval::harness::RecordedDrive recorded(test::small_drive_parameters(12.8), 6);
   const std::atomic<bool> stop{false};
   eval::metrics::BatchOracle once;
   feed(once, recorded);
@@ -164,7 +164,7 @@ TEST_CASE("Solved at every step or once at the end, the estimate is the same", "
 }
 
 TEST_CASE("Without noise the oracle is exact", "[oracle]") {
-  sim::DriveParameters parameters = small_drive_parameters(12.0);
+  sim::DriveParameters parameters = test::small_drive_parameters(12.0);
   parameters.sensor.position_sigma_m = 0.0;
   const std::atomic<bool> stop{false};
   const eval::harness::RunResult result =
@@ -174,7 +174,7 @@ TEST_CASE("Without noise the oracle is exact", "[oracle]") {
 }
 
 TEST_CASE("The oracle's covariance tells the truth: NEES", "[oracle]") {
-  sim::DriveParameters parameters = small_drive_parameters(6.4);
+  sim::DriveParameters parameters = test::small_drive_parameters(6.4);
   parameters.forest.side_m = 150.0;
   const std::atomic<bool> stop{false};
   double sum = 0.0;
@@ -190,7 +190,7 @@ TEST_CASE("The oracle's covariance tells the truth: NEES", "[oracle]") {
 }
 
 TEST_CASE("Marks tell the oracle which poses and trunks to give", "[oracle]") {
-  const eval::harness::RecordedDrive recorded(small_drive_parameters(12.0), 6);
+  const eval::harness::RecordedDrive recorded(test::small_drive_parameters(12.0), 6);
   const std::atomic<bool> stop{false};
   const std::vector<eval::harness::StateMark> marks{{16, {8}, recorded.scans[8].trunks},
                                                     {32, {8, 20}, {recorded.scans[8].trunks[0]}}};

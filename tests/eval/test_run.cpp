@@ -93,7 +93,7 @@ class Displacing : public geoslam_mapper::MapperMethod {
 
 eval::harness::RunResult run_with(const Displacing::Behaviour& behaviour,
                                   std::uint64_t withheld = ~0ULL) {
-  static const eval::harness::RecordedDrive recorded(small_drive_parameters(),
+  static const eval::harness::RecordedDrive recorded(test::small_drive_parameters(),
                                                      1);  // 40 scans: five keyframes
   const eval::metrics::MapTruth truth(recorded.drive, 0);
   const std::atomic<bool> stop{false};
@@ -146,7 +146,7 @@ TEST_CASE("Keyframes buffered for the first map count when it is committed", "[r
 }
 
 TEST_CASE("A run can be stopped", "[run]") {
-  const eval::harness::RecordedDrive recorded(small_drive_parameters(), 1);
+  const eval::harness::RecordedDrive recorded(test::small_drive_parameters(), 1);
   const eval::metrics::MapTruth truth(recorded.drive, 0);
   const std::atomic<bool> stop{true};
   CHECK_THROWS_AS(run_slam(recorded,

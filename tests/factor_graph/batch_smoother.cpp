@@ -13,8 +13,8 @@ constexpr double kMaxDamping = 1e6;
 /// chi^2 may rise by rounding at the optimum.
 constexpr double kRoundingRise = 1e-9;
 
-std::string undetermined(const factor_graph::plane::Graph& graph,
-                         const test::NormalEquations& equations, int column) {
+std::string undetermined(const factor_graph::plane::Graph& graph, const NormalEquations& equations,
+                         int column) {
   for (std::uint32_t i = 0; i < graph.poses.size(); ++i) {
     const int first = equations.column(factor_graph::plane::PoseId(i));
     if (first >= 0 && column >= first && column < first + 3) {
@@ -35,7 +35,7 @@ struct StepSize {
   double heading_rad = 0.0;
 };
 
-StepSize retract(factor_graph::plane::Graph& graph, const test::NormalEquations& equations,
+StepSize retract(factor_graph::plane::Graph& graph, const NormalEquations& equations,
                  const Eigen::VectorXd& delta) {
   StepSize size;
   for (std::uint32_t i = 0; i < graph.poses.size(); ++i) {
@@ -57,37 +57,35 @@ StepSize retract(factor_graph::plane::Graph& graph, const test::NormalEquations&
 
 }  // namespace
 
-struct test::BatchSmoother::Solver {
-  std::unique_ptr<test::NormalEquations> equations;
+struct BatchSmoother::Solver {
+  std::unique_ptr<NormalEquations> equations;
   factor_graph::batch::SparseCholesky cholesky;
   bool factorised = false;  ///< The factor belongs to `equations` as they are.
 };
 
-struct test::BatchSmoother::Checkpoint {
+struct BatchSmoother::Checkpoint {
   factor_graph::plane::Graph graph;
 };
 
-test::BatchSmoother::BatchSmoother(const test::BatchSmootherParameters& parameters)
+BatchSmoother::BatchSmoother(const BatchSmootherParameters& parameters)
     : parameters_(parameters), solver_(std::make_unique<Solver>()) {}
-test::BatchSmoother::~test::BatchSmoother() = default;
-test::BatchSmoother::BatchSmoother(test::BatchSmoother&&) noexcept = default;
-test::BatchSmoother& test::BatchSmoother::operator=(test::BatchSmoother&&) noexcept = default;
+BatchSmoother::~BatchSmoother() = default;
+BatchSmoother::BatchSmoother(BatchSmoother&&) noexcept = default;
+BatchSmoother& BatchSmoother::operator=(BatchSmoother&&) noexcept = default;
 
-void test::BatchSmoother::checkpoint() {
-  checkpoint_ = std::make_unique<Checkpoint>(Checkpoint{graph_});
-}
+void BatchSmoother::checkpoint() { checkpoint_ = std::make_unique<Checkpoint>(Checkpoint{graph_}); }
 
-void test::BatchSmoother::rollback() {
+void BatchSmoother::rollback() {
   if (checkpoint_) graph_ = checkpoint_->graph;
   solver_->factorised = false;
 }
 
-test::BatchUpdate test::BatchSmoother::update() {
-  test::BatchUpdate result;
+BatchUpdate BatchSmoother::update() {
+  BatchUpdate result;
   Solver& solver = *solver_;
   solver.factorised = false;
-  solver.equations = std::make_unique<test::NormalEquations>(graph_);
-  test::NormalEquations& equations = *solver.equations;
+  solver.equations = std::make_unique<NormalEquations>(graph_);
+  NormalEquations& equations = *solver.equations;
   const std::vector<geometry::SE2> first_poses = graph_.poses;
   const std::vector<Eigen::Vector2d> first_points = graph_.points;
   equations.linearise(graph_);
@@ -128,11 +126,11 @@ test::BatchUpdate test::BatchSmoother::update() {
   return result;
 }
 
-std::optional<Eigen::MatrixXd> test::BatchSmoother::joint_marginal(
+std::optional<Eigen::MatrixXd> BatchSmoother::joint_marginal(
     std::span<const factor_graph::plane::PoseId> poses,
     std::span<const factor_graph::plane::PointId> points) const {
   if (!solver_->factorised) return std::nullopt;
-  const test::NormalEquations& equations = *solver_->equations;
+  const NormalEquations& equations = *solver_->equations;
   std::vector<int> columns;
   for (const factor_graph::plane::PoseId pose : poses) {
     const int first = equations.column(pose);

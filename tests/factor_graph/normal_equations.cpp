@@ -14,14 +14,14 @@ struct BlockEntry {
 
 }  // namespace
 
-test::NormalEquations::NormalEquations(const factor_graph::plane::Graph& graph) {
+NormalEquations::NormalEquations(const factor_graph::plane::Graph& graph) {
   if (!graph.scalars.empty())
     throw std::invalid_argument("normal equations: of poses and points alone");
   number_variables(graph);
   build_pattern(graph);
 }
 
-void test::NormalEquations::number_variables(const factor_graph::plane::Graph& graph) {
+void NormalEquations::number_variables(const factor_graph::plane::Graph& graph) {
   pose_columns_.assign(graph.poses.size(), -1);
   point_columns_.assign(graph.points.size(), -1);
   const auto use_pose = [&](factor_graph::plane::PoseId id) { pose_columns_[index(id)] = 0; };
@@ -46,7 +46,7 @@ void test::NormalEquations::number_variables(const factor_graph::plane::Graph& g
   hessian_.size = next;
 }
 
-void test::NormalEquations::build_pattern(const factor_graph::plane::Graph& graph) {
+void NormalEquations::build_pattern(const factor_graph::plane::Graph& graph) {
   // Off-diagonal blocks, each once, sorted by column and row.
   std::vector<BlockEntry> blocks;
   blocks.reserve(graph.relative_poses.size() + graph.observations.size());
@@ -124,22 +124,21 @@ void test::NormalEquations::build_pattern(const factor_graph::plane::Graph& grap
 }
 
 template <typename Block>
-void test::NormalEquations::add_block(std::size_t slot, int first_column, const Block& block) {
+void NormalEquations::add_block(std::size_t slot, int first_column, const Block& block) {
   for (int k = 0; k < block.cols(); ++k) {
     double* values = &hessian_.values[hessian_.column_starts[first_column + k] + slot];
     for (int r = 0; r < block.rows(); ++r) values[r] += block(r, k);
   }
 }
 
-void test::NormalEquations::add_diagonal(int column,
-                                         const Eigen::Ref<const Eigen::MatrixXd>& block) {
+void NormalEquations::add_diagonal(int column, const Eigen::Ref<const Eigen::MatrixXd>& block) {
   for (int k = 0; k < block.cols(); ++k) {
     double* values = &hessian_.values[hessian_.column_starts[column + k + 1] - (k + 1)];
     for (int r = 0; r <= k; ++r) values[r] += block(r, k);
   }
 }
 
-void test::NormalEquations::linearise(const factor_graph::plane::Graph& graph) {
+void NormalEquations::linearise(const factor_graph::plane::Graph& graph) {
   std::fill(hessian_.values.begin(), hessian_.values.end(), 0.0);
   gradient_ = Eigen::VectorXd::Zero(hessian_.size);
   chi2_ = 0.0;
@@ -190,7 +189,7 @@ void test::NormalEquations::linearise(const factor_graph::plane::Graph& graph) {
   }
 }
 
-factor_graph::batch::SymmetricSparse test::NormalEquations::damped(double lambda) const {
+factor_graph::batch::SymmetricSparse NormalEquations::damped(double lambda) const {
   factor_graph::batch::SymmetricSparse result = hessian_;
   for (int c = 0; c < result.size; ++c)
     result.values[result.column_starts[c + 1] - 1] *= 1.0 + lambda;

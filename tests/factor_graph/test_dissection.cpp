@@ -10,7 +10,6 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
-using namespace understory::factor_graph::graph;
 
 namespace {
 

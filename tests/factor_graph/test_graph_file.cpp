@@ -20,7 +20,7 @@ factor_graph::files::GraphFile require_graph(const std::string& text) {
 }
 
 /// The file's graph at the file's estimates, the first pose held fast.
-void fill(FactorGraph& graph, const factor_graph::files::GraphFile& file) {
+void fill(factor_graph::graph::FactorGraph& graph, const factor_graph::files::GraphFile& file) {
   for (const factor_graph::files::GraphFile::Vertex& vertex : file.vertices)
     graph.add(vertex.type, vertex.value);
   for (const Factor& factor : file.factors) graph.add(factor);
@@ -80,12 +80,12 @@ TEST_CASE("What is written reads back as the same graph", "[graph_file]") {
       "EDGE_SE2 3 5 1 0.1 0.2 10 1 2 20 3 30\nEDGE_SE2_XY 5 9 2 3 4 0.5 5\n"
       "EDGE_SE3:QUAT 10 11 0.1 0.2 0.3 0.5 0.5 0.5 0.5 "
       "10 0 0 0 0 1 10 0 0 0 0 10 0 0 0 40 0 0 40 0 40\n";
-  FactorGraph graph;
+  factor_graph::graph::FactorGraph graph;
   fill(graph, require_graph(text));
   int skipped = 0;
   const std::string written = factor_graph::files::write_g2o(graph, &skipped);
   REQUIRE(skipped == 1);
-  FactorGraph again;
+  factor_graph::graph::FactorGraph again;
   fill(again, require_graph(written));
   REQUIRE(factor_graph::files::write_g2o(again) == written);
   REQUIRE(again.chi2() == Approx(graph.chi2()).epsilon(1e-12));
@@ -105,7 +105,7 @@ TEST_CASE("The batch solver finds the published optima", "[graph_file]") {
       return;
     }
     const std::string text((std::istreambuf_iterator<char>(in)), {});
-    FactorGraph graph;
+    factor_graph::graph::FactorGraph graph;
     fill(graph, require_graph(text));
     const factor_graph::batch::BatchReport report = factor_graph::batch::optimise(graph);
     INFO(name);

@@ -12,6 +12,7 @@
 
 using namespace understory;
 using namespace understory::factor_graph::graph;
+using namespace understory::test;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 namespace {

@@ -7,7 +7,7 @@
 #include "tests/factor_graph/random_graph.hpp"
 
 using namespace understory;
-using namespace understory::factor_graph::graph;
+using namespace understory::test;
 
 namespace {
 

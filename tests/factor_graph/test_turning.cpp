@@ -9,6 +9,7 @@
 
 using namespace understory;
 using namespace understory::factor_graph::graph;
+using namespace understory::test;
 
 namespace {
 

@@ -10,6 +10,7 @@
 
 using namespace understory;
 using namespace understory::factor_graph::graph;
+using namespace understory::test;
 
 namespace {
 

@@ -9,7 +9,6 @@
 
 using namespace understory;
 using namespace understory::geoslam_mapper;
-using namespace understory::geoslam_mapper::smoothing;
 
 namespace {
 

@@ -6,7 +6,6 @@
 #include "tests/catch.hpp"
 
 using namespace understory;
-using namespace understory::keyframer;
 
 namespace {
 

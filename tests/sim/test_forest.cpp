@@ -6,6 +6,7 @@
 #include "sim/random_streams.hpp"
 #include "tests/catch.hpp"
 
+using namespace understory;
 using namespace understory::sim;
 
 namespace {

@@ -127,7 +127,7 @@ class LiveDriver {
 /// What the import of a capture would have written: decoder and parts, without driver.
 class OfflineDriver {
  public:
-  explicit OfflineDriver(VelodyneCalibration calibration) : decoder_(std::move(calibration)) {}
+  explicit OfflineDriver(io::VelodyneCalibration calibration) : decoder_(std::move(calibration)) {}
 
   void add(std::span<const std::uint8_t> packet, model::Utime received) {
     if (const auto turn = decoder_.add(packet, received)) write(*turn);
@@ -144,7 +144,7 @@ class OfflineDriver {
       parts.push_back(wire::encode_message(part));
     }
   }
-  VelodyneDecoder decoder_;
+  io::VelodyneDecoder decoder_;
 };
 
 inline model::PointSweep sweep_of(const Message& message) {

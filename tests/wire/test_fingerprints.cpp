@@ -61,10 +61,13 @@ constexpr Pin kPins[] = {
 TEST_CASE("no wire type has changed") {
   for (const Pin& pin : kPins) {
     INFO(pin.type);
-    const wire::WireType* type = wire::find_wire_type(std::string_view(pin.type));
+    const understory::wire::WireType* type =
+        understory::wire::find_wire_type(std::string_view(pin.type));
     REQUIRE(type != nullptr);
     CHECK(static_cast<std::uint64_t>(type->fingerprint()) == pin.fingerprint);
   }
 }
 
-TEST_CASE("every wire type is pinned") { CHECK(wire::wire_types().size() == std::size(kPins)); }
+TEST_CASE("every wire type is pinned") {
+  CHECK(understory::wire::wire_types().size() == std::size(kPins));
+}

@@ -9,9 +9,11 @@
 
 #include "common/factor_graph/graph/factor.hpp"
 
-namespace understory::factor_graph::files {
-
+namespace understory::factor_graph::graph {
 class FactorGraph;
+}
+
+namespace understory::factor_graph::files {
 
 /// A graph with the numbers that its file gives. Variables of factors are positions in `vertices`.
 struct GraphFile {
@@ -50,6 +52,6 @@ std::variant<GraphFile, GraphFileError> read_graph(std::string_view text, GraphF
 /// g2o text of a graph at its estimates: relative poses and Cartesian observations of points, and
 /// all variables; `skipped` counts the factors that the format has no word for. Losses are not
 /// told.
-std::string write_g2o(const FactorGraph& graph, int* skipped = nullptr);
+std::string write_g2o(const graph::FactorGraph& graph, int* skipped = nullptr);
 
 }  // namespace understory::factor_graph::files

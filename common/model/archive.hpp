@@ -1,0 +1,115 @@
+// Which members of the values that stages exchange go into a saved state.
+#pragma once
+
+#include "common/model/ekf_output.hpp"
+#include "common/model/gnss.hpp"
+#include "common/model/imu.hpp"
+#include "common/model/keyframe.hpp"
+#include "common/model/landmarks.hpp"
+#include "common/model/map.hpp"
+#include "common/model/odometry.hpp"
+#include "common/model/planar_scan.hpp"
+#include "common/model/point_sweep.hpp"
+#include "common/model/tracked.hpp"
+#include "common/model/wheels.hpp"
+#include "common/state/archive.hpp"
+
+namespace understory::model {
+
+/// Each function below lists the members of one type, for state::Writer and state::Reader.
+template <class Archive, class Self>
+requires state::Is<Self, ImuSample>
+void archive(Archive& a, Self& s) {
+  a(s.utime, s.sequence, s.angular_rate_rad_s, s.specific_force_mps2);
+}
+template <class Archive, class Self>
+requires state::Is<Self, WheelSample>
+void archive(Archive& a, Self& s) { a(s.utime, s.sequence, s.speed_mps, s.steering_rad); }
+template <class Archive, class Self>
+requires state::Is<Self, GnssFix>
+void archive(Archive& a, Self& s) {
+  a(s.utime, s.sequence, s.east_north_m, s.sigma_m, s.velocity_mps, s.velocity_sigma_mps);
+}
+template <class Archive, class Self>
+requires state::Is<Self, VelocityCorrection>
+void archive(Archive& a, Self& s) { a(s.utime, s.sequence, s.velocity_mps, s.bias, s.covariance); }
+template <class Archive, class Self>
+requires state::Is<Self, PlanarScan>
+void archive(Archive& a, Self& s) {
+  a(s.utime, s.sequence, s.first_bearing_rad, s.bearing_step_rad, s.max_range_m, s.ranges_m);
+}
+template <class Archive, class Self>
+requires state::Is<Self, SweepPoint>
+void archive(Archive& a, Self& s) { a(s.x_m, s.y_m, s.z_m, s.time_s, s.ring, s.intensity); }
+
+template <class Archive, class Self>
+requires state::Is<Self, Detection>
+void archive(Archive& a, Self& s) {
+  a(s.position_m, s.covariance_m2, s.radius_m, s.kind, s.bearing_rad, s.bearing_sigma_rad);
+}
+template <class Archive, class Self>
+requires state::Is<Self, FieldOfView>
+void archive(Archive& a, Self& s) { a(s.max_range_m, s.bearing_rad, s.width_rad); }
+template <class Archive, class Self>
+requires state::Is<Self, LandmarkScan>
+void archive(Archive& a, Self& s) { a(s.utime, s.sequence, s.field_of_view, s.detections); }
+template <class Archive, class Self>
+requires state::Is<Self, TrackedLandmark>
+void archive(Archive& a, Self& s) { a(s.track_id, s.detection, s.observed); }
+template <class Archive, class Self>
+requires state::Is<Self, TrackedScan>
+void archive(Archive& a, Self& s) { a(s.utime, s.sequence, s.field_of_view, s.landmarks); }
+
+template <class Archive, class Self>
+requires state::Is<Self, LevelError>
+void archive(Archive& a, Self& s) { a(s.covariance, s.memory, s.added, s.pitch_tangent); }
+template <class Archive, class Self>
+requires state::Is<Self, Preintegration>
+void archive(Archive& a, Self& s) {
+  a(s.seconds, s.yaw_rad, s.velocity_mps, s.position_m, s.covariance, s.bias_jacobian, s.bias,
+    s.level);
+}
+template <class Archive, class Self>
+requires state::Is<Self, Odometry>
+void archive(Archive& a, Self& s) {
+  a(s.from_utime, s.utime, s.sequence, s.from_T_to, s.covariance, s.inertial, s.has_wheels,
+    s.is_stationary);
+}
+
+template <class Archive, class Self>
+requires state::Is<Self, EkfPose>
+void archive(Archive& a, Self& s) {
+  a(s.utime, s.sequence, s.ekf_map_T_vehicle, s.covariance, s.velocity_mps, s.velocity_covariance,
+    s.bias, s.bias_covariance, s.landmarks_used, s.landmarks_refused, s.reset_counter);
+}
+template <class Archive, class Self>
+requires state::Is<Self, EkfLevel>
+void archive(Archive& a, Self& s) {
+  a(s.utime, s.sequence, s.error_rad, s.covariance, s.reported_covariance);
+}
+
+template <class Archive, class Self>
+requires state::Is<Self, KeyframeLandmark>
+void archive(Archive& a, Self& s) {
+  a(s.position_m, s.covariance_m2, s.radius_m, s.observation_count, s.kind);
+}
+template <class Archive, class Self>
+requires state::Is<Self, KeyframeMember>
+void archive(Archive& a, Self& s) { a(s.utime, s.sequence, s.centre_T_vehicle, s.covariance); }
+template <class Archive, class Self>
+requires state::Is<Self, Keyframe>
+void archive(Archive& a, Self& s) {
+  a(s.utime, s.sequence, s.field_of_view, s.members, s.landmarks, s.previous_T_base);
+}
+template <class Archive, class Self>
+requires state::Is<Self, MapLandmark>
+void archive(Archive& a, Self& s) {
+  a(s.id, s.position_m, s.covariance_m2, s.radius_m, s.observation_count, s.kind);
+}
+template <class Archive, class Self>
+requires state::Is<Self, KeyframePose>
+void archive(Archive& a, Self& s) {
+  a(s.keyframe_sequence, s.utime, s.map_T_vehicle, s.covariance);
+}
+
+}  // namespace understory::model
