@@ -9,16 +9,16 @@ void add_eval_command(CLI::App& parent) {
   CLI::App& eval =
       *parent.add_subcommand("eval", "Experiments: tables beside the source's, JSON, plots");
   eval.require_subcommand(1);
-  add_paths_experiment(eval);
-  add_density_experiment(eval);
-  add_noise_experiment(eval);
-  add_efficiency_experiment(eval);
+  accuracy::add_paths_experiment(eval);
+  accuracy::add_density_experiment(eval);
+  accuracy::add_noise_experiment(eval);
+  efficiency::add_efficiency_experiment(eval);
   large_map::add_large_map_experiment(eval);
-  add_backend_experiment(eval);
-  add_victoria_park_experiment(eval);
-  add_frontend_experiment(eval);
-  add_recording_experiment(eval);
-  add_landmarks_vs_error_experiment(eval);
+  backend::add_backend_experiment(eval);
+  victoria_park::add_victoria_park_experiment(eval);
+  frontend::add_frontend_experiment(eval);
+  recording::add_recording_experiment(eval);
+  roads::add_landmarks_vs_error_experiment(eval);
 }
 
 }  // namespace understory::eval::experiments

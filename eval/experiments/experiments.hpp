@@ -16,23 +16,43 @@ void add_campaign_options_with_lidar(CLI::App& command, harness::CampaignOptions
 /// Runs `work` and turns what it throws into one line on stderr and exit status 1.
 void run_guarded(const std::string& experiment, const std::function<void()>& work);
 
+namespace accuracy {
 /// Five paths and the double circle, intermediate forest (GeoSLAM §5.1).
 void add_paths_experiment(CLI::App& eval);
 /// Circles in three forests (GeoSLAM §5.2).
 void add_density_experiment(CLI::App& eval);
 /// Circles, five position noises times five detection rates, at two intervals (GeoSLAM §5.3).
 void add_noise_experiment(CLI::App& eval);
-/// Time per component along the run (GeoSLAM §5.5), over a long drive, and standing still.
+}  // namespace accuracy
+
+namespace efficiency {
+/// Time per component along the run (GeoSLAM §5.5), over a long drive, and without motion.
 void add_efficiency_experiment(CLI::App& eval);
+}  // namespace efficiency
+
+namespace backend {
 /// Standard pose and landmark graphs through the smoother.
 void add_backend_experiment(CLI::App& eval);
+}  // namespace backend
+
+namespace victoria_park {
 /// The recorded Victoria Park drive.
 void add_victoria_park_experiment(CLI::App& eval);
-/// From raw sensors to a pose, part by part and as a whole (specs/frontend.md).
+}  // namespace victoria_park
+
+namespace frontend {
+/// From raw sensors to a pose, part by part and as a whole.
 void add_frontend_experiment(CLI::App& eval);
+}  // namespace frontend
+
+namespace recording {
 /// A recorded drive through the whole chain.
 void add_recording_experiment(CLI::App& eval);
+}  // namespace recording
+
+namespace roads {
 /// Change of the error against the number of landmarks (thesis on submaps, chapter 4).
 void add_landmarks_vs_error_experiment(CLI::App& eval);
+}  // namespace roads
 
 }  // namespace understory::eval::experiments
