@@ -6,7 +6,7 @@
 #include "common/hierarchy/baseline/matching.hpp"
 #include "eval/harness/results.hpp"
 
-namespace understory::eval::experiments::accuracy {
+namespace understory::eval::harness {
 namespace {
 
 using nlohmann::json;
@@ -51,7 +51,7 @@ struct LocalMap {
 
 /// Figure 4.9: two hierarchies, associations by polygons alone and after localisation. Figure 4.10:
 /// the graph before the optimisation with old, current and new landmarks.
-json snapshot_json(const harness::Snapshot& snapshot) {
+json snapshot_json(const Snapshot& snapshot) {
   const geometry::SE2 base_T_centre = snapshot.keyframe.centre_T_base().inverse();
   std::vector<Eigen::Vector2d> local;
   for (const model::KeyframeLandmark& landmark : snapshot.keyframe.landmarks) {
@@ -103,11 +103,11 @@ json snapshot_json(const harness::Snapshot& snapshot) {
           {"degrees_of_freedom", snapshot.update.degrees_of_freedom}};
 }
 
-json trace_json(const harness::RunTrace& trace, double interval_m) {
+json trace_json(const RunTrace& trace, double interval_m) {
   json result{{"travelled_m", json::array()}, {"rpe_cm", json::array()},
               {"lpe_cm", json::array()},      {"newest_pose_cm", json::array()},
               {"poses", json::array()},       {"landmarks", points(trace.final_map.landmarks_m)}};
-  for (const harness::StateError& state : trace.states) {
+  for (const StateError& state : trace.states) {
     result["travelled_m"].push_back(interval_m * static_cast<double>(state.scans));
     result["rpe_cm"].push_back(100.0 * state.rpe_m);
     result["lpe_cm"].push_back(100.0 * state.lpe_m);
@@ -127,11 +127,10 @@ json trace_json(const harness::RunTrace& trace, double interval_m) {
 
 }  // namespace
 
-json traces_of(const std::vector<harness::CellResult>& cells,
-               const harness::CampaignOptions& options) {
+json traces_of(const std::vector<CellResult>& cells, const CampaignOptions& options) {
   json result = json::array();
-  for (const harness::CellResult& cell : cells) {
-    const sim::Drive drive(cell.cell.drive(), harness::run_seed(options.seed, 0));
+  for (const CellResult& cell : cells) {
+    const sim::Drive drive(cell.cell.drive(), run_seed(options.seed, 0));
     json methods = json::object();
     std::size_t base = 0;
     for (const auto& [method, runs] : cell.runs) {
@@ -157,4 +156,4 @@ json traces_of(const std::vector<harness::CellResult>& cells,
   return result;
 }
 
-}  // namespace understory::eval::experiments::accuracy
+}  // namespace understory::eval::harness
