@@ -12,8 +12,7 @@ find_program(CCACHE_PROGRAM ccache)
 if(CCACHE_PROGRAM)
   # Relative paths in the cache key: another checkout of the same source hits the same cache.
   set(CMAKE_CXX_COMPILER_LAUNCHER "${CMAKE_COMMAND}" -E env
-      "CCACHE_BASEDIR=${CMAKE_SOURCE_DIR}" CCACHE_NOHASHDIR=1
-      CCACHE_SLOPPINESS=pch_defines,time_macros,include_file_mtime,include_file_ctime "${CCACHE_PROGRAM}")
+      "CCACHE_BASEDIR=${CMAKE_SOURCE_DIR}" CCACHE_NOHASHDIR=1 "${CCACHE_PROGRAM}")
 endif()
 
 add_library(understory_flags INTERFACE)
@@ -65,16 +64,6 @@ function(understory_service name)
     add_executable(understory-${dashed} main.cpp)
     target_link_libraries(understory-${dashed} PRIVATE understory::${name} understory_flags)
     install(TARGETS understory-${dashed})
-  endif()
-endfunction()
-
-# understory_precompile(NAME headers...): heavy headers of other libraries, which most files of the
-# folder include, are parsed once. The files still include what they use.
-function(understory_precompile name)
-  if(UNDERSTORY_PRECOMPILE)
-    target_precompile_headers(understory_${name} PRIVATE ${ARGN})
-    # ccache reads a precompiled header's content only from the preprocessor's output.
-    target_compile_options(understory_${name} PRIVATE -fpch-preprocess)
   endif()
 endfunction()
 
