@@ -32,11 +32,10 @@ std::optional<fs::path> plot_script(const std::string& script) {
 nlohmann::json result_document(const std::string& experiment, nlohmann::json config,
                                nlohmann::json rows) {
   const tools::Machine machine = tools::this_machine();
-  return {{"experiment", experiment},
-          {"config", std::move(config)},
-          {"rows", std::move(rows)},
-          {"machine", {{"cpu", machine.cpu}, {"cores", machine.cores}}},
-          {"version", tools::version()}};
+  return {
+      {"experiment", experiment},    {"config", std::move(config)},
+      {"rows", std::move(rows)},     {"machine", {{"cpu", machine.cpu}, {"cores", machine.cores}}},
+      {"version", tools::version()}, {"date", tools::today()}};
 }
 
 void write_json(const fs::path& file, const nlohmann::json& json) {

@@ -10,7 +10,8 @@
 
 namespace understory::eval::harness {
 
-/// {"experiment", "config", "rows", "machine", "version"}.
+/// What a result file holds: {"experiment", "config", "rows", "machine": {"cpu", "cores"},
+/// "version", "date"}. `rows` is a list of objects; their keys end with the unit, e.g. "rpe_cm".
 nlohmann::json result_document(const std::string& experiment, nlohmann::json config,
                                nlohmann::json rows);
 

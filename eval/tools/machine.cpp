@@ -1,5 +1,6 @@
 #include "eval/tools/machine.hpp"
 
+#include <ctime>
 #include <fstream>
 #include <thread>
 
@@ -17,6 +18,15 @@ Machine this_machine() {
     break;
   }
   return machine;
+}
+
+std::string today() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  gmtime_r(&now, &utc);
+  char text[sizeof "YYYY-MM-DD"] = "";
+  std::strftime(text, sizeof text, "%F", &utc);
+  return text;
 }
 
 std::string version() { return UNDERSTORY_GIT_DESCRIBE; }

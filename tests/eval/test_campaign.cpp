@@ -95,7 +95,7 @@ TEST_CASE("Result files are written whole or not at all", "[results]") {
       file, eval::harness::result_document("paths", {{"runs", 1}}, nlohmann::json::array()));
   nlohmann::json read;
   std::ifstream(file) >> read;
-  for (const char* key : {"experiment", "config", "rows", "machine", "version"}) {
+  for (const char* key : {"experiment", "config", "rows", "machine", "version", "date"}) {
     CHECK(read.contains(key));
   }
   CHECK(eval::harness::traces_file(file) == folder / "a.traces.json");

@@ -23,7 +23,7 @@ namespace {
 struct EfficiencyOptions {
   harness::CampaignOptions campaign;
   double drive_km = 10.0;
-  double standing_h = 2.0;
+  double stationary_h = 2.0;
 };
 
 /// One drive that is timed.
@@ -61,11 +61,11 @@ std::vector<Scenario> scenarios(const EfficiencyOptions& options) {
     scenario.drive.clear_the_path = true;
     result.push_back(scenario);
   }
-  if (options.standing_h > 0.0) {
+  if (options.stationary_h > 0.0) {
     Scenario scenario;
-    scenario.name = fmt::format("standing-{:g}h", options.standing_h);
+    scenario.name = fmt::format("stationary-{:g}h", options.stationary_h);
     scenario.drive.path.kind = sim::PathKind::kStanding;
-    scenario.drive.path.length_m = 3600.0 * options.standing_h * scenario.drive.speed_mps;
+    scenario.drive.path.length_m = 3600.0 * options.stationary_h * scenario.drive.speed_mps;
     result.push_back(scenario);
   }
   // The source's cost grows without bound: on the long ones it is not asked.
@@ -85,14 +85,14 @@ Timing time_drive(const Scenario& scenario, const std::string& method, std::uint
   terminal::Progress progress(fmt::format("scans, {} {}", scenario.name, method),
                               static_cast<double>(drive.size()),
                               terminal::Progress::Without::kSeconds);
-  const bool standing = scenario.drive.path.kind == sim::PathKind::kStanding;
+  const bool is_stationary = scenario.drive.path.kind == sim::PathKind::kStanding;
   for (std::size_t k = 0; k < drive.size(); ++k) {
     if (stop) throw terminal::Interrupted{};
     const auto outcome = session.feed(drive.scan(k).scan);
     progress.advance();
     if (!outcome) continue;
     const double driven = static_cast<double>(k + 1) * scenario.drive.path.interval;
-    timing.keyframes.push_back({standing ? driven / scenario.drive.speed_mps / 3600.0 : driven,
+    timing.keyframes.push_back({is_stationary ? driven / scenario.drive.speed_mps / 3600.0 : driven,
                                 1e3 * outcome->keyframer_s, 1e3 * outcome->mapper_s});
     const model::MapUpdateStatus status = outcome->update.status;
     if (status == model::MapUpdateStatus::kUpdated || status == model::MapUpdateStatus::kFirstMap) {
@@ -180,7 +180,7 @@ void run_efficiency(const EfficiencyOptions& options) {
   const std::filesystem::path file = options.campaign.json;
   const nlohmann::json config{{"seed", options.campaign.seed},
                               {"drive_km", options.drive_km},
-                              {"standing_h", options.standing_h},
+                              {"stationary_h", options.stationary_h},
                               {"yardstick_ms", 1e3 * yardstick_s}};
   harness::write_json(harness::traces_file(file), traces);
   harness::write_json(file, harness::result_document("efficiency", config, rows));
@@ -192,13 +192,13 @@ void run_efficiency(const EfficiencyOptions& options) {
 
 void add_efficiency_experiment(CLI::App& eval) {
   CLI::App& command = *eval.add_subcommand(
-      "efficiency", "Time per keyframe: 200 m, a long drive, standing still (one run, one job)");
+      "efficiency", "Time per keyframe: 200 m, a long drive, stationary (one run, one job)");
   const auto options = std::make_shared<EfficiencyOptions>();
   add_campaign_options(command, options->campaign);
   command.add_option("--drive-km", options->drive_km, "Length of the long drive; 0 = none")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
-  command.add_option("--standing-h", options->standing_h, "Hours of standing still; 0 = none")
+  command.add_option("--stationary-h", options->stationary_h, "Hours stationary; 0 = none")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
   command.callback([options] { run_guarded("efficiency", [&] { run_efficiency(*options); }); });

@@ -1,0 +1,83 @@
+"""The list of stored results: what makes each, and how long it takes. Read by `tables.py` and `refresh`."""
+
+from dataclasses import dataclass
+
+FOREST_GRAPHS = """w100.graph g2o_intel.g2o sesync_CSAIL.g2o g2o_manhattanOlson3500.g2o
+isam_manhattanOlson3500.txt""".split()
+GRAPHS = ([f"DATA/pose_graphs/{name}" for name in FOREST_GRAPHS]
+          + ["DATA/victoria_park_landmark/victoriaPark_isam.txt"]
+          + [f"DATA/pose_graphs/{name}" for name in """isam_cityTrees10000.txt sesync_city10000.g2o parking-garage.g2o
+tinyGrid3D.g2o smallGrid3D.g2o sphere2500.g2o torus3D.g2o rrr_NewCollege.g2o""".split()])
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One result file `NAME.json`.
+
+    `commands` are run in order from the root of the repository; `understory` stands for the built
+    command, DATA for the folder of recordings ($UNDERSTORY_DATA) and OUT for the folder of new results.
+    `minutes` is an estimate on two cores at 2.5 GHz. `needs` are folders or files below DATA.
+    """
+
+    name: str
+    commands: tuple
+    minutes: float
+    needs: tuple = ()
+
+
+def _eval(name, arguments, minutes, needs=(), before=()):
+    return Experiment(name, (*before, f"understory eval {arguments} --json OUT/{name}.json"), minutes, needs)
+
+
+def _recording(name, source, title, config, minutes, needs):
+    """A recording: imported into a log first, then played through the whole chain."""
+    named = f' --name "{title}"' if title else ""
+    return _eval(name, f"recording OUT/{name}.lcm{named} --config deploy/config/{config}", minutes, needs,
+                 before=(f"understory import {source} --out OUT/{name}.lcm",))
+
+
+EXPERIMENTS = (
+    _eval("paths", "paths --runs 10 --seed 1 --jobs 2", 12),
+    _eval("paths-lidar", "paths --method lidar --runs 3 --seed 1", 15),
+    _eval("density", "density --runs 10 --seed 1 --jobs 2", 8),
+    _eval("noise", "noise --runs 5 --seed 1 --jobs 2 --interval 20", 25),
+    _eval("noise-10cm", "noise --runs 2 --seed 1 --jobs 2 --interval 10", 25),
+    _eval("baseline-batches", "paths --path circle --method baseline --runs 200 --seed 3 --jobs 2 --no-plots", 12),
+    _eval("baseline-paths",
+          "paths --path line,double-circle,square,triangle --method baseline --runs 100 --seed 3 --jobs 2 --no-plots",
+          25),
+    _eval("large-map", "large-map --runs 10 --seed 1 --method smoothing", 4),
+    _eval("efficiency", "efficiency --drive-km 10 --stationary-h 2", 6),
+    _eval("victoria-park", "victoria-park --data DATA", 1, ("victoria_park_raw", "victoria_park_landmark")),
+    _eval("frontend-chain", "frontend --only chain --config deploy/config/lidar --jobs 2 --data DATA", 25,
+          ("pole_maps",)),
+    _eval("frontend-parts", "frontend --runs 20 --jobs 1 --only extraction tracking", 10),
+    _eval("forest-plots", "frontend --only forest-plots --data DATA", 8, ("forest_3d_scans",)),
+    _eval("frontend-filter", "frontend --runs 1000 --jobs 2 --only filter", 60),
+    _eval("frontend-filter-lidar", "frontend --runs 150 --seed 7 --jobs 2 --only filter", 20),
+    _eval("frontend-faults", "frontend --only faults --config deploy/config/lidar", 6),
+    _eval("landmarks-vs-error", "landmarks-vs-error --seed 1 --jobs 2", 10),
+    _recording("recording-victoria-park", "victoria-park DATA/victoria_park_raw/victoria_park_ascii.zip --raw",
+               "Victoria Park", "victoria_park", 1, ("victoria_park_raw",)),
+    _recording("recording-kitti-0002", "kitti DATA/kitti_raw_drive0002 --speed-as-wheels", "k2", "kitti", 1,
+               ("kitti_raw_drive0002",)),
+    _recording("recording-kitti-0005", "kitti-reduced DATA/kitti_raw_drive0005_16ring", "k5", "kitti", 1,
+               ("kitti_raw_drive0005_16ring",)),
+    _recording("recording-vlp16", "pcap DATA/lidar_packets/velodyne_vlp16_gps.pcap", "VLP-16 capture", "kitti", 1,
+               ("lidar_packets",)),
+    _eval("backend", "backend --streets 20000 --data " + " ".join(GRAPHS), 15,
+          ("pose_graphs", "victoria_park_landmark")),
+)
+
+
+def experiment(name):
+    """The experiment of that name. Raises KeyError for an unknown one."""
+    for entry in EXPERIMENTS:
+        if entry.name == name:
+            return entry
+    raise KeyError(name)
+
+
+def printed(command, name):
+    """The command as a reader types it: results go to the current folder."""
+    return command.replace("OUT/", "")

@@ -1,0 +1,270 @@
+"""Result documents of `understory eval --json` as Markdown tables."""
+
+import os
+import re
+import statistics
+
+# Stored documents of older versions carry older terms: they are mapped when read, never edited.
+METHODS = {"source": "baseline", "ours": "smoothing", "ours, as published": "smoothing, as published live"}
+TERMS = (
+    (r"\bstanding-(\d+h)", r"stationary-\1"),
+    (r"(NEES of the pose, |in groups of 50, )standing", r"\1stationary"),
+    (r"lidar: standing", "lidar: stationary"),
+    (r"what it says of it", "standard deviation reported for it"),
+    (r"not standing", "not upright"),
+)
+
+
+def term(text):
+    """The text with today's terms."""
+    for old, new in TERMS:
+        text = re.sub(old, new, text)
+    return text
+
+
+def method(row):
+    """Today's name of the row's method."""
+    return METHODS.get(row.get("method"), row.get("method"))
+
+
+def number(value, digits=2):
+    """A number with that many decimals; "-" for none."""
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def figure(value):
+    """A number with four significant digits, as short as it gets; "-" for none."""
+    if value is None:
+        return "-"
+    if value != 0 and abs(value) >= 1000:
+        return f"{value:.0f}"
+    return f"{value:.4g}"
+
+
+def table(head, rows):
+    """Markdown table of texts."""
+    lines = ["| " + " | ".join(head) + " |", "| " + " | ".join("---" for _ in head) + " |"]
+    return lines + ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
+
+
+def folded(summary, lines):
+    """Lines that a reader opens on demand."""
+    return ["<details>", f"<summary>{summary}</summary>", "", *lines, "", "</details>"]
+
+
+def pair(row, prefix=""):
+    """RPE / LPE [cm] of an accuracy row, or the published ones."""
+    rpe, lpe = row.get(prefix + "rpe_cm"), row.get(prefix + "lpe_cm")
+    return "-" if rpe is None else f"{rpe:.2f} / {number(lpe)}"
+
+
+def cells(rows, *keys):
+    """Rows grouped by the values of the keys, in order: {values: {method: row}}."""
+    groups = {}
+    for row in rows:
+        groups.setdefault(tuple(row[key] for key in keys), {})[method(row)] = row
+    return groups
+
+
+# ---------------------------------------------------------------- accuracy (paths, density, noise)
+
+def accuracy_summary(document, key):
+    """One line per path or forest: published, the thesis's method, smoothing, limit."""
+    lines = []
+    for (name,), by in cells(document["rows"], key).items():
+        smoothing = by["smoothing"]
+        lines.append((name, pair(smoothing, "published_"), pair(by["baseline"]), f"**{pair(smoothing)}**",
+                      pair(by["oracle"]), number(smoothing["ratio"], 3), number(smoothing["ratio_lpe"], 3),
+                      f"{number(smoothing['updates'], 1)} of {smoothing['updates_possible']}"))
+    return table((key, "published", "baseline", "**smoothing**", "oracle", "RPE ratio", "LPE ratio", "updates"), lines)
+
+
+def _share(value):
+    return "-" if value is None else f"{value:g} %"
+
+
+def accuracy_rows(document):
+    """Every row with every column."""
+    lines = []
+    for row in document["rows"]:
+        sigma = row["sigma_cm"]
+        updates = "-" if row.get("updates") is None else f"{number(row['updates'], 1)} of {row['updates_possible']}"
+        lines.append((row["path"], row["forest"], "-" if sigma is None else f"{sigma:g}", _share(row["detection_pct"]),
+                      method(row), f"{number(row['rpe_cm'])} ± {number(row['rpe_cm_sd'])}", number(row["lpe_cm"]),
+                      number(row["ratio"], 3), number(row["ratio_lpe"], 3), updates, row["wrong_updates"],
+                      number(row["map_recall_pct"], 1), number(row["false_landmarks_pct"]), number(row["ate_cm"]),
+                      number(row["nees"]), pair(row, "published_"), number(row.get("published_updates"), 1)))
+    return table(("path", "forest", "noise cm", "detection", "method", "RPE cm ± sd of a run", "LPE cm", "RPE ratio",
+                  "LPE ratio", "updates", "wrong", "recall %", "false %", "ATE cm", "NEES (3)",
+                  "published RPE / LPE", "published updates"), lines)
+
+
+def noise_matrix(document):
+    """Smoothing by noise and detection rate; in brackets the published figures, then the ratio to the oracle."""
+    groups = cells(document["rows"], "sigma_cm", "detection_pct")
+    rates = sorted({rate for _, rate in groups}, reverse=True)
+    lines = []
+    for sigma in sorted({sigma for sigma, _ in groups}):
+        line = [f"{sigma:g} cm"]
+        for rate in rates:
+            row = groups[sigma, rate]["smoothing"]
+            line.append(f"**{pair(row)}** ({pair(row, 'published_')}), {number(row['ratio'], 3)}")
+        lines.append(line)
+    return table(("noise", *(f"{rate:g} %" for rate in rates)), lines)
+
+
+def noise_worst(document):
+    """Worst ratio, lost and wrong updates of smoothing over all cells."""
+    rows = [row for row in document["rows"] if method(row) == "smoothing"]
+    worst = max(row["ratio"] for row in rows if row["ratio"] is not None)
+    lost = sum(row["updates"] != row["updates_possible"] for row in rows)
+    wrong = sum(row["wrong_updates"] for row in rows)
+    above = [f"{row['sigma_cm']:g} cm / {row['detection_pct']:g} %" for row in rows
+             if row["rpe_cm"] > row["published_rpe_cm"] or row["lpe_cm"] > row["published_lpe_cm"]]
+    beaten = "below the published figures in every cell" if not above else \
+        f"below the published figures except at {', '.join(above)}"
+    return [f"Smoothing: worst RPE ratio {worst:.3f}; {beaten}; cells with lost updates: {lost}; wrong updates: {wrong}."]
+
+
+def batches(document, size=10):
+    """Mean of the thesis's method over batches of runs, as many as the thesis averages."""
+    lines = []
+    for row in document["rows"]:
+        line = [row["path"], row["runs"] // size]
+        for name in ("rpe_cm", "lpe_cm"):
+            runs = row[name + "_runs"]
+            means = [statistics.mean(runs[i:i + size]) for i in range(0, len(runs), size)]
+            mean, spread = statistics.mean(means), 1.96 * statistics.stdev(means)
+            line += [number(mean), f"{mean - spread:.1f} .. {mean + spread:.1f}", number(row["published_" + name])]
+        lines.append(line)
+    return table(("path", "batches of ten", "RPE cm", "95 % of a batch", "published", "LPE cm", "95 % of a batch",
+                  "published"), lines)
+
+
+# ------------------------------------------------------------------------------------ other experiments
+
+def large_map(document):
+    """One-shot localisation, a line per setting."""
+    return table(
+        ("setting", "keyframes", "within 0.10 m", "first scan alone within 0.10 m", "wrong", "not sure", "median error cm",
+         "largest error cm", "median ms", "p99 ms", "max ms", "median / Delaunay build", "bytes per landmark"),
+        [(row["setting"], row["keyframes"], row["within_0_10m"], row["base_within_0_10m"], row["wrong"], row["unsure"],
+          number(row["error_p50_cm"]), number(row["error_max_cm"]), number(row["ms_p50"], 3), number(row["ms_p99"], 3),
+          number(row["ms_max"], 3), number(row["ratio"], 4), number(row["bytes_per_landmark"], 0))
+         for row in document["rows"]])
+
+
+def efficiency(document):
+    """Time per keyframe by scenario, method and component."""
+    lines = table(
+        ("scenario", "method", "component", "keyframes", "p50 ms", "p99 ms", "max ms", "p50 of the first tenth ms",
+         "p50 of the last tenth ms", "p50 / Delaunay build", "RSS MB"),
+        [(term(row["scenario"]), method(row), row["component"], row["keyframes"], number(row["ms_p50"], 3),
+          number(row["ms_p99"], 3), number(row["ms_max"], 3), number(row["ms_p50_first_tenth"], 3),
+          number(row["ms_p50_last_tenth"], 3), number(row["p50_per_yardstick"], 4), number(row["rss_mb"], 0))
+         for row in document["rows"]])
+    return lines + ["", f"Yardstick: a CGAL Delaunay triangulation of 13,770 points takes "
+                        f"{document['config']['yardstick_ms']:.2f} ms."]
+
+
+def victoria_park(document):
+    """GPS fixes against the paths, trees, time per scan."""
+    rows = document["rows"]
+    run = rows[0]
+    lines = table(("trajectory", "fix to pose, median m", "90 % m", "fix to path, median m", "90 % m"),
+                  [(method(row), number(row["fix_median_m"]), number(row["fix_p90_m"]), number(row["path_median_m"]),
+                    number(row["path_p90_m"])) for row in rows])
+    localised = run["keyframes"] - run["not_sure"] - run["rolled_back"]
+    return lines + [
+        "",
+        f"{run['keyframes']} keyframes: {localised} localised, {run['not_sure']} not sure, {run['rolled_back']} rolled "
+        f"back, {run['keyframes_withheld']} withheld; longest gap {run['longest_gap_s']:.1f} s. {run['landmarks']} "
+        f"landmarks; of {run['trees']} curated trees {run['trees_found']} found, {run['trees_doubled']} doubled; "
+        f"{run['landmarks_elsewhere']} landmarks belong to no curated tree. Observations of a tree spread by "
+        f"{run['tree_spread_median_m']:.2f} m (median); its landmark is {run['tree_distance_median_m']:.2f} m off. Time "
+        f"per scan: {run['ms_p50']:.3f} ms median, {run['ms_p99']:.2f} ms p99, {run['ms_max']:.2f} ms max; of it "
+        f"extraction {run['extractor_ms_p50']:.3f} ms median, {run['extractor_ms_p99']:.3f} ms p99."]
+
+
+def backend(document):
+    """Standard graphs through the smoother, beside ISAM2's stated figures."""
+    lines = []
+    for row in document["rows"]:
+        theirs = row.get("reference", {})
+        excess = 100 * (row["chi2_final"] / row["chi2_batch"] - 1)
+        lines.append((row["dataset"], row["poses"], row["factors"], number(row["total_s"]), number(theirs.get("total_s")),
+                      number(row["ms_p50"], 3), number(theirs.get("ms_p50"), 2), number(row["ms_p99"]),
+                      number(theirs.get("ms_p99"), 1), number(row["ms_max"]), number(theirs.get("ms_max"), 0),
+                      number(row["whole_ms"]), figure(row["chi2_final"]), f"{excess:.4f}",
+                      figure(row["chi2_dead_reckoning"]), number(row["rss_mb"], 0)))
+    return table(("graph", "poses", "factors", "total s", "ISAM2 s", "p50 ms", "ISAM2 ms", "p99 ms", "ISAM2 ms", "max ms",
+                  "ISAM2 ms", "one fresh factorisation ms", "chi²", "above the batch optimum %",
+                  "chi² of a batch from odometry", "RSS MB"), lines)
+
+
+def backend_shares(document):
+    """Medians of total and p99 time, as shares of ISAM2's."""
+    def share(key, spatial):
+        values = [row[key] / row["reference"][key] for row in document["rows"]
+                  if "reference" in row and row["dataset"] != "isam_manhattanOlson3500"  # M3500 once more
+                  and (row["dataset"] in ("parking-garage", "sphere2500", "torus3D")) in spatial]
+        return statistics.median(values)
+    return [f"Median share of ISAM2's figures: total {share('total_s', (False,)):.2f} in the plane, "
+            f"{share('total_s', (True,)):.2f} in space; p99 {share('ms_p99', (False, True)):.2f} over all graphs."]
+
+
+def landmarks_vs_error(document):
+    """Error against the number of landmarks used: a table per route and estimate, numbers binned as in print."""
+    bins = ((0, 0), (1, 1), (2, 2), (3, 3), (4, 6), (7, 9), (10, 15), (16, 10**9))
+    lines = []
+    for (route, estimate) in dict.fromkeys((row["route"], row["estimate"]) for row in document["rows"]):
+        for low, high in bins:
+            rows = [row for row in document["rows"]
+                    if (row["route"], row["estimate"]) == (route, estimate) and low <= row["landmarks"] <= high]
+            sweeps, seconds = sum(row["samples"] for row in rows), sum(row["seconds"] for row in rows)
+            if not sweeps:
+                continue
+            change = sum(row["samples"] * (row["mean_error_change_m"] or 0) for row in rows) / sweeps
+            second = sum(row["seconds"] * (row["mean_error_of_a_second_m"] or 0) for row in rows) / max(seconds, 1)
+            label = f"{low}" if low == high else f"{low} .. {high if high < 10**9 else ''}"
+            lines.append((route, estimate, label, sweeps, number(1e3 * change), number(1e3 * second, 1)))
+    return table(("route", "estimate", "landmarks", "sweeps", "change of error mm (thesis eq. 4.1)",
+                  "error over one second mm"), lines)
+
+
+# -------------------------------------------------- rows of figures with targets (frontend, recordings)
+
+def _columns(settings):
+    """A caption that all settings share, and what is left of each."""
+    if len(settings) == 1:
+        return settings[0], ["value"]
+    shared = os.path.commonprefix(settings)
+    shared = shared[:max(shared.rfind(", "), shared.rfind(": ")) + 1]
+    return shared.rstrip(" ,:"), [setting[len(shared):].strip() for setting in settings]
+
+
+def _with_target(settings, names, label):
+    """Cells of a row; a target that not all settings share stands in the cell."""
+    targets = {settings[name][label][1] for name in names}
+    shared = targets.pop() if len(targets) == 1 else ""
+    cells_of_row = [value + (f" (target {target})" if target and not shared else "")
+                    for value, target in (settings[name][label] for name in names)]
+    return (label + (f", target {shared}" if shared else ""), *cells_of_row)
+
+
+def figures(rows):
+    """Rows of {setting, what, value, unit, target, pass}: settings with the same figures share a table."""
+    settings = {}
+    for row in rows:
+        label = term(row["what"]) + (f" [{row['unit']}]" if row["unit"] else "")
+        value = figure(row["value"]) + (" **missed**" if row["pass"] is False else "")
+        settings.setdefault(term(row["setting"]), {})[label] = (value, row["target"])
+    groups = {}
+    for setting, values in settings.items():
+        groups.setdefault(tuple(values), []).append(setting)
+    lines = []
+    for labels, names in groups.items():
+        caption, heads = _columns(names)
+        lines += ([""] if lines else []) + [f"*{caption}*", ""]
+        lines += table(("figure", *heads), [_with_target(settings, names, label) for label in labels])
+    return lines
