@@ -26,7 +26,7 @@ void add_noise_experiment(CLI::App& eval);
 }  // namespace accuracy
 
 namespace efficiency {
-/// Time per component along the run (GeoSLAM §5.5), over a long drive, and without motion.
+/// Time per component along the run (GeoSLAM §5.5), over a long drive, and stationary.
 void add_efficiency_experiment(CLI::App& eval);
 }  // namespace efficiency
 

@@ -32,7 +32,8 @@ std::map<std::string, RunResult> run_all_methods(const Cell& cell, const Campaig
     results[method] = run_slam(recorded, make_stages(method), stop);
   }
   if (wanted(options, "oracle")) {
-    // The oracle estimates what ours did, so that their ratio compares like with like.
+    // The oracle estimates the states of the smoothing method: the ratio compares the same
+    // quantities.
     const auto smoothing = results.find("smoothing");
     results["oracle"] = smoothing != results.end() && !smoothing->second.marks.empty()
                             ? run_oracle(recorded, smoothing->second.marks, stop)

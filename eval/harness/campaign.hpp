@@ -14,7 +14,7 @@
 
 namespace understory::eval::harness {
 
-/// What every experiment can be asked for on the command line.
+/// Options that all experiments of simulated drives have in common.
 struct CampaignOptions {
   int runs = 10;
   std::uint64_t seed = 1;
@@ -29,15 +29,17 @@ struct CampaignOptions {
 struct Cell {
   sim::ForestKind forest = sim::ForestKind::kIntermediate;
   sim::PathKind path = sim::PathKind::kCircle;
-  double sigma_m = 0.2;
-  double detection = 0.9;
-  double interval_m = 0.2;
+  double sigma_m = 0.2;     ///< Standard deviation of a detected position, per axis.
+  double detection = 0.9;   ///< Probability that a trunk in range is detected.
+  double interval_m = 0.2;  ///< Between two scans.
   std::optional<PublishedFigures> published;
 
+  /// The parameters of the simulated drive.
   sim::DriveParameters drive() const;
   std::string name() const;  ///< For progress and file names, e.g. circle-intermediate-20cm-90.
 };
 
+/// All runs of all methods in one cell.
 struct CellResult {
   Cell cell;
   std::map<std::string, std::vector<RunResult>> runs;  ///< By method; [run].

@@ -23,13 +23,13 @@ struct MapAfterUpdate {
   std::vector<model::MapLandmark> landmarks;
 };
 
-/// What the chain said, and what was true.
+/// What the chain published on a drive, and the truth.
 struct ChainRun {
   std::vector<metrics::StampedPose> truth;  ///< `world`, at the truth's own rate.
   std::vector<metrics::StampedPose> dead_reckoned;
   std::vector<model::EkfPose> ekf;
   std::vector<model::SlamPose> slam;  ///< Those that are localised.
-  std::uint64_t slam_unsure = 0;      ///< SLAM_POSE without a pose that means something.
+  std::uint64_t slam_unsure = 0;      ///< SLAM_POSE that are not localised.
   std::vector<model::MapUpdate> updates;
   std::vector<MapAfterUpdate> states;          ///< One for each update, where they were asked for.
   std::vector<model::KeyframePose> keyframes;  ///< As estimated at the end.
@@ -41,9 +41,10 @@ struct ChainRun {
   std::map<std::string, health_t> health;
 };
 
-/// A reading on its way to the chain: may be changed, dropped (empty) or repeated.
+/// A reading before it reaches the chain: may be changed, dropped (empty) or repeated.
 using Meddle = std::function<std::vector<RawMessage>(RawMessage)>;
 
+/// How a simulated drive goes through the chain.
 struct ChainOptions {
   std::filesystem::path config_dir;
   std::map<std::string, std::string> toml_instead;
@@ -55,18 +56,19 @@ struct ChainOptions {
   bool keep_states = false;  ///< Asks for the whole map after each update.
 };
 
-/// One message a reading; sweeps in parts. Truth gives none.
+/// The messages of a reading: one, but sweeps come in parts, and truth gives none. `sweep_parts`
+/// counts the parts of the whole drive.
 std::vector<RawMessage> raw_messages(const sim::SensorReading& reading, std::uint64_t& sweep_parts);
 
-/// Listens to everything that the chain says; to be called before the first message is fed.
+/// Keeps in `run` what the chain publishes; to be called before the first message is fed.
 void watch_chain(SensorChain& chain, ChainRun& run);
-/// The services' last words, times and health.
+/// Ends the drive: last outputs of the services, their times and health.
 void finish_chain(SensorChain& chain, ChainRun& run);
 
 /// The services from raw sensors to the map.
 std::vector<bus::Service> front_end_services();
 
-/// Drives once through.
+/// Drives once through. Throws what a service or `options.progress` throws.
 ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options);
 
 /// Errors after one rigid alignment (SE(2), over all given poses).
@@ -77,24 +79,30 @@ struct TrajectoryError {
   double end_m = 0.0;  ///< With the first pose held instead: error at the end of the drive.
   double driven_m = 0.0;
 };
+/// Errors of `estimate` (in order of time) at its own stamps; poses outside of the truth's time are
+/// left out.
 TrajectoryError trajectory_error(std::span<const metrics::StampedPose> estimate,
                                  std::span<const metrics::StampedPose> truth);
 
-/// Errors against what is said of them, with the first pose held: it is the map's frame.
+/// Errors against the reported covariance, with the first pose held: it is the map's frame.
 struct PoseConsistency {
   double mean_nees = 0.0;  ///< Of the pose; 3 is exact.
   double end_error_m = 0.0;
   double end_sigma_m = 0.0;  ///< Root of the trace of the position's covariance.
 };
+/// Consistency of SLAM_POSE. The truth is interpolated at the stamps of the poses.
 PoseConsistency pose_consistency(std::span<const model::SlamPose> poses,
                                  std::span<const metrics::StampedPose> truth);
 
 /// Updates that were accepted more than `limit_m` from the truth, after one rigid alignment: the
-/// heading of a single first scan (3 mrad) would be 6 m at the end of a road.
+/// heading error of a single first scan (3 mrad) would be 6 m at the end of a road.
 std::size_t wrong_updates(const ChainRun& run, double limit_m = 1.0);
 
+/// Stamps and poses of EKF_POSE, frame `ekf_map`.
 std::vector<metrics::StampedPose> poses_of(std::span<const model::EkfPose> poses);
+/// Stamps and poses of SLAM_POSE, frame `map`.
 std::vector<metrics::StampedPose> poses_of(std::span<const model::SlamPose> poses);
+/// Stamps and poses of keyframes' bases, frame `map`.
 std::vector<metrics::StampedPose> poses_of(std::span<const model::KeyframePose> keyframes);
 
 }  // namespace understory::eval::harness

@@ -171,8 +171,9 @@ class ChainScorer {
 
   const ChainRun& run_;
   const ChainTruth& truth_;
-  std::map<std::uint64_t, std::optional<std::size_t>> place_of_;  ///< By keyframe; none = stood.
-  std::vector<geometry::SE2> poses_;                              ///< True, of each place.
+  std::map<std::uint64_t, std::optional<std::size_t>>
+      place_of_;                      ///< By keyframe; none = stationary.
+  std::vector<geometry::SE2> poses_;  ///< True, of each place.
   std::vector<double> travelled_;
   std::vector<const model::EkfPose*> ekf_of_place_;
   std::optional<metrics::MapTruth> map_truth_;

@@ -1,4 +1,4 @@
-// The figures that the source publishes (GeoSLAM chapter 5), to be printed beside ours.
+// The figures that GeoSLAM publishes (its chapter 5), for the columns "published".
 #pragma once
 
 #include <array>
@@ -10,14 +10,15 @@
 
 namespace understory::eval::harness {
 
+/// One cell of a table of GeoSLAM.
 struct PublishedFigures {
   double rpe_cm = 0.0;
   double lpe_cm = 0.0;
-  std::optional<double> updates;
-  std::optional<double> landmarks;  ///< True ones ever in range.
+  std::optional<double> updates;    ///< Mean per run.
+  std::optional<double> landmarks;  ///< True trunks ever in range.
 };
 
-/// Table 5.4: intermediate forest, 90 %, 20 cm.
+/// GeoSLAM Table 5.4: intermediate forest, detection rate 90 %, noise 20 cm. None for other paths.
 inline std::optional<PublishedFigures> published_path_figures(sim::PathKind path) {
   switch (path) {
     case sim::PathKind::kCircle:
@@ -25,7 +26,7 @@ inline std::optional<PublishedFigures> published_path_figures(sim::PathKind path
     case sim::PathKind::kLine:
       return PublishedFigures{25.26, 24.87, 124.7, 289.0};
     case sim::PathKind::kFigureEight:
-    case sim::PathKind::kDoubleCircle:  // what its code drove in nine of the ten runs
+    case sim::PathKind::kDoubleCircle:  // what GeoSLAM's code drove in nine of its ten runs
       return PublishedFigures{15.22, 14.45, 124.7, 138.0};
     case sim::PathKind::kSquare:
       return PublishedFigures{18.49, 17.89, 126.8, 211.3};
@@ -36,7 +37,7 @@ inline std::optional<PublishedFigures> published_path_figures(sim::PathKind path
   }
 }
 
-/// Table 5.5: circle, 90 %, 20 cm.
+/// GeoSLAM Table 5.5: circle, detection rate 90 %, noise 20 cm.
 inline PublishedFigures published_density_figures(sim::ForestKind forest) {
   switch (forest) {
     case sim::ForestKind::kDense:
@@ -49,11 +50,14 @@ inline PublishedFigures published_density_figures(sim::ForestKind forest) {
   return {21.21, 21.34, 124.9, std::nullopt};
 }
 
+/// Standard deviations of a detected position, per axis [m]: rows of the tables below.
 inline constexpr std::array<double, 5> kNoiseSigmas_m{0.0, 0.1, 0.2, 0.3, 0.4};
+/// Probabilities of detection: columns of the tables below.
 inline constexpr std::array<double, 5> kNoiseDetection{1.0, 0.95, 0.9, 0.85, 0.8};
 
-/// Tables 5.6 and 5.7: circle, intermediate forest; [row] position noise, [column] detection. Some
-/// cells of high noise were run at 10 cm; the tables do not say which in print.
+/// GeoSLAM Tables 5.6 and 5.7: circle, intermediate forest; [row] position noise, [column]
+/// detection rate. Some cells of high noise were run with a scan every 10 cm; the print does not
+/// mark them.
 inline constexpr double kPublishedNoiseRpe_cm[5][5] = {{0.41, 0.64, 1.20, 1.23, 1.00},
                                                        {2.97, 4.16, 8.44, 12.63, 13.56},
                                                        {7.24, 12.46, 17.95, 26.32, 31.39},

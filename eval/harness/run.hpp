@@ -19,6 +19,7 @@ struct RecordedDrive {
   std::vector<sim::SimulatedScan> scans;
   std::vector<std::uint32_t> observation_count_of_trunk;
 
+  /// Makes all scans of the drive; they follow from `seed`.
   RecordedDrive(const sim::DriveParameters& parameters, std::uint64_t seed);
 };
 
@@ -46,6 +47,7 @@ struct Snapshot {
   std::vector<model::MapLandmark> landmarks_after;
 };
 
+/// The figures of one run.
 struct RunScore {
   metrics::ErrorSums errors;   ///< Over all states.
   int updates = 0;             ///< Keyframes that are in the map at the end.
@@ -56,19 +58,21 @@ struct RunScore {
   double ate_m = 0.0;
   std::size_t landmarks_in_range = 0;  ///< True trunks ever in range.
   /// Normalised squared error of each accepted pose at its update, by number of the keyframe; 3 on
-  /// average if the covariance tells the truth.
+  /// average if the covariance is right.
   std::vector<std::pair<std::size_t, double>> nees;
 };
 
+/// What a run gave, for the plots.
 struct RunTrace {
   std::vector<StateError> states;
   metrics::MapState final_map;
   std::optional<Snapshot> snapshot;
-  /// In the frame of the map, where the run had a way and trunks of its own; else the drive's.
+  /// In the frame of the map, where the run had a path and trunks of its own; else the drive's.
   std::vector<geometry::SE2> true_path;
   std::vector<Eigen::Vector2d> true_trunks_m;
 };
 
+/// Score, trace and states of one run.
 struct RunResult {
   RunScore score;
   RunTrace trace;
@@ -82,8 +86,8 @@ RunResult run_slam(const RecordedDrive& recorded, Stages stages, const std::atom
 /// The oracle at the same states, poses and trunks as `marks`.
 RunResult run_oracle(const RecordedDrive& recorded, std::span<const StateMark> marks,
                      const std::atomic<bool>& stop);
-/// The oracle on its own: a pose and a state every 8 scans, trunks seen at least `min_times_seen`
-/// times.
+/// The oracle on its own: a pose and a state every 8 scans, trunks observed at least
+/// `min_observation_count` times.
 RunResult run_oracle(const RecordedDrive& recorded, const std::atomic<bool>& stop,
                      std::uint32_t min_observation_count = 8);
 

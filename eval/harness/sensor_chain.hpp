@@ -33,15 +33,16 @@ class SensorChain {
  public:
   /// NAME.toml of each service is read from `config_dir` where it exists, unless
   /// `toml_instead` has its text. Throws ConfigurationError, also where that folder is not there;
-  /// an empty one stands for the defaults.
+  /// an empty path means the defaults.
   SensorChain(const std::vector<bus::Service>& services, const std::filesystem::path& config_dir,
               const std::map<std::string, std::string>& toml_instead = {});
   ~SensorChain();
 
   /// Hands the message in, and out all that follows from it.
   void feed(std::string_view channel, std::span<const std::uint8_t> bytes);
+  /// The same for a message in one value.
   void feed(const RawMessage& message) { feed(message.channel, message.bytes); }
-  /// Calls the services' last words.
+  /// Ends the drive: the services may publish once more.
   void finish();
 
   /// `handler` takes a T (a value of common/model or a wire type); to be called before feed().
@@ -52,8 +53,11 @@ class SensorChain {
     });
   }
 
+  /// Processor time of a service. Throws std::out_of_range for an unknown name.
   const ServiceTime& time_of(std::string_view service) const;
+  /// Names of the services, in the order in which they were given.
   std::vector<std::string> services() const;
+  /// The service's HEALTH as of now. Throws std::out_of_range for an unknown name.
   health_t health_of(std::string_view service);
 
  private:

@@ -18,7 +18,7 @@ struct Stages {
   std::unique_ptr<geoslam_mapper::MapperMethod> mapper;
 };
 
-/// Names of the methods that make_stages() knows: "baseline", "smoothing".
+/// Names of the methods that make_stages() takes: "baseline", "smoothing".
 const std::vector<std::string>& method_names();
 /// New stages of a method with its parameters as published. Throws std::invalid_argument for an
 /// unknown name.
@@ -32,15 +32,20 @@ struct KeyframeOutcome {
   double mapper_s = 0.0;
 };
 
+/// Keyframer and mapper of one method, fed with scans in order of time.
 class SlamSession {
  public:
+  /// Takes the stages over, as they are: new or loaded.
   explicit SlamSession(Stages stages);
 
+  /// Takes one scan; gives what became of the keyframe that it completed, if any.
   std::optional<KeyframeOutcome> feed(const model::LandmarkScan& scan);
   /// True if the last scan completed a keyframe that the keyframer withheld.
   bool withheld_one() const { return withheld_one_; }
 
+  /// The mapper, to ask for its map.
   const geoslam_mapper::MapperMethod& mapper() const { return *stages_.mapper; }
+  /// The keyframer, to ask for its counters.
   const keyframer::KeyframerMethod& keyframer() const { return *stages_.keyframer; }
 
  private:

@@ -9,10 +9,12 @@
 
 namespace understory::eval::harness {
 
+/// Mean and spread of a figure over runs.
 struct Statistics {
   double mean = 0.0;
   double standard_deviation = 0.0;  ///< Of the sample (n - 1); 0 for fewer than two.
 };
+/// Of the values; zeros where there are none.
 Statistics statistics_of(const std::vector<double>& values);
 
 /// One method in one cell.
@@ -47,6 +49,7 @@ std::vector<Summary> summarise(const std::vector<CellResult>& cells,
 /// The two-sided 95 % band of chi^2 with `dof` degrees of freedom (Wilson & Hilferty 1931).
 std::pair<double, double> chi2_band_95(double dof);
 
+/// One object of a result document's "rows"; keys end with the unit.
 nlohmann::json to_json(const Summary& summary);
 /// The table for the screen, the published figures in the last columns.
 std::string to_table(const std::vector<Summary>& rows);

@@ -11,7 +11,7 @@ namespace understory::eval::metrics {
 namespace {
 
 constexpr double kTile = 5.0;
-constexpr double kPairing = 1.0;  // [m] beyond it, a landmark does not stand for the trunk
+constexpr double kPairing = 1.0;  // [m] largest distance of a landmark to its trunk
 
 std::vector<std::uint32_t> trunks_ever_in_range(const sim::Drive& drive) {
   std::vector<bool> in_range(drive.forest().trunks_m.size(), false);

@@ -10,8 +10,10 @@
 
 namespace understory::eval::metrics {
 
+/// An estimated pose and the scan that it belongs to.
 struct PoseEstimate {
   std::size_t scan = 0;  ///< Index of the scan whose pose this is.
+  /// True pose of the vehicle at a scan.
   geometry::SE2 map_T_vehicle;
 };
 
@@ -25,19 +27,23 @@ struct MapState {
 /// the first accepted keyframe. Nothing is aligned.
 class MapTruth {
  public:
+  /// The truth of a simulated drive.
   MapTruth(const sim::Drive& drive, std::size_t base);
-  /// Poses of any vehicle among any trunks; `in_range` (ascending) are those that it could see.
+  /// Poses of any vehicle among any trunks; `in_range` (ascending) are those that were in its
+  /// range.
   MapTruth(std::vector<geometry::SE2> world_T_vehicle, std::size_t base,
            std::vector<Eigen::Vector2d> trunks_m, std::vector<std::uint32_t> in_range);
 
   geometry::SE2 map_T_vehicle(std::size_t scan) const {
     return map_T_world_ * world_T_vehicle_[scan];
   }
-  /// The true trunk nearest to a point of the map. Of all trunks: one that stands just out of range
-  /// is seen when noise brings it in, and is no false landmark.
+  /// The true trunk nearest to a point of the map. Of all trunks: one just out of range is
+  /// detected when noise brings it in, and is no false landmark.
   sim::PointGrid::Neighbour nearest_trunk(const Eigen::Vector2d& point_in_map_m) const;
+  /// True trunks within `radius_m` of a point of the map, in no meaningful order.
   std::vector<std::uint32_t> trunks_within(const Eigen::Vector2d& point_in_map_m,
                                            double radius_m) const;
+  /// True position of a trunk, frame `map`.
   Eigen::Vector2d trunk_m(std::uint32_t trunk) const { return map_T_world_ * trunks_m_[trunk]; }
   /// Trunks that were ever in range, ascending.
   std::span<const std::uint32_t> trunks_in_range() const { return in_range_; }
@@ -65,17 +71,18 @@ struct ErrorSums {
 };
 
 /// The sums of one state. A run's RPE is `rpe_m()` of the sum over its states, so that late states
-/// count for more (as in the source's code).
+/// count for more (as in GeoSLAM's code).
 ErrorSums errors_of(const MapState& state, const MapTruth& truth);
 
 /// Absolute trajectory error [m]: RMSE of the positions after the best rigid alignment.
 double absolute_trajectory_error(std::span<const PoseEstimate> poses, const MapTruth& truth);
 
+/// How many trunks the map has, and how many landmarks are none.
 struct MapCompleteness {
-  std::size_t well_seen = 0;      ///< Trunks detected in at least `min_times_seen` scans.
+  std::size_t well_seen = 0;      ///< Trunks detected in at least `min_observation_count` scans.
   std::size_t recalled = 0;       ///< Of those, the ones that have a landmark of their own.
   std::size_t landmarks = 0;      ///< In the map.
-  std::size_t without_trunk = 0;  ///< Landmarks that stand for no trunk, or for one already taken.
+  std::size_t without_trunk = 0;  ///< Landmarks paired with no trunk: false or double.
 };
 /// Landmarks and trunks are paired one to one, nearest pairs first, up to 1 m apart.
 MapCompleteness map_completeness(std::span<const Eigen::Vector2d> landmarks_m,

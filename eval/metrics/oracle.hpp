@@ -22,9 +22,10 @@ namespace understory::eval::metrics {
 class BatchOracle {
  public:
   /// Adds a scan: detection i at positions_m[i] (vehicle frame) of trunk trunks[i].
-  /// Precondition: from the second scan on, it sees at least two trunks seen before.
+  /// Precondition: from the second scan on, at least two of its trunks were observed before.
   void add(std::span<const Eigen::Vector2d> positions_m, std::span<const std::uint32_t> trunks);
 
+  /// How the iteration ended.
   struct Solution {
     int iterations = 0;
     double last_step_m = 0.0;  ///< Largest movement of a landmark in the last iteration.
@@ -33,11 +34,15 @@ class BatchOracle {
   /// Iterates until no landmark moves by more than `tolerance_m`.
   Solution solve(double tolerance_m = 1e-5, int max_iterations = 50);
 
+  /// Scans taken so far.
   std::size_t scans() const { return scans_.size(); }
+  /// Estimated pose of a scan in the frame of the first; as of the last solve().
   const geometry::SE2& first_T_vehicle(std::size_t scan) const { return scans_[scan].pose; }
-  /// Trunks seen so far, in order of first sight; landmark i stands for trunks()[i].
+  /// Trunks observed so far, in order of their first observation; landmark i is trunks()[i].
   std::span<const std::uint32_t> trunks() const { return trunks_; }
+  /// Estimated positions, frame of the first scan.
   std::span<const Eigen::Vector2d> landmarks_m() const { return landmarks_; }
+  /// Detections of each landmark so far.
   std::span<const std::uint32_t> observation_count() const { return observation_count_; }
   /// Index of the trunk's landmark, or -1.
   int landmark_of(std::uint32_t trunk) const;

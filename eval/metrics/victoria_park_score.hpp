@@ -15,11 +15,13 @@
 
 namespace understory::eval::metrics {
 
+/// A pose with its time; the frame is the user's.
 struct StampedPose {
   model::Utime utime = 0;
   geometry::SE2 pose;
 };
 
+/// Whether the update places its keyframe in the map: started, updated or folded.
 bool localised(const model::MapUpdate& update);
 
 /// The pose at a time, between the poses before and after; none outside of the trajectory. The
@@ -31,6 +33,7 @@ std::optional<geometry::SE2> pose_at(std::span<const StampedPose> trajectory, mo
 std::vector<StampedPose> fill_between(std::span<const StampedPose> known,
                                       std::span<const StampedPose> dead_reckoned);
 
+/// Distances between satellite fixes and a trajectory.
 struct FixErrors {
   geometry::SE2
       world_T_map;  ///< Best rigid alignment of the poses at the fixes' times; frame east, north.
@@ -46,7 +49,7 @@ struct FixErrors {
 FixErrors against_fixes(std::span<const StampedPose> trajectory,
                         std::span<const model::GnssFix> fixes);
 
-/// An observation of a tree whose identity somebody else has established.
+/// An observation of a tree whose identity is given.
 struct CuratedObservation {
   model::Utime utime = 0;
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `vehicle`.
@@ -56,6 +59,7 @@ struct CuratedObservation {
 /// Reads "t_s, range_m, bearing_rad_from_right, tree_id" with a heading. Throws DataError.
 std::vector<CuratedObservation> read_curated_observations(const std::filesystem::path& file);
 
+/// A curated tree and what the map has of it.
 struct CuratedTree {
   int id = 0;
   std::size_t observations = 0;
@@ -63,15 +67,16 @@ struct CuratedTree {
   double spread_m = 0.0;           ///< RMS distance of its observations, placed by the trajectory.
   model::LandmarkId landmark = 0;  ///< The map's landmark for it; 0 = none.
   double distance_m = 0.0;         ///< To that landmark.
-  std::size_t doubles = 0;         ///< Further landmarks at this tree that stand for no other tree.
+  std::size_t doubles = 0;         ///< Further landmarks at this tree that belong to no other tree.
 };
 
+/// How well the map agrees with the curated trees.
 struct TreeScore {
   std::vector<CuratedTree> trees;
   std::size_t well_seen = 0;  ///< Trees observed at least `min_observations` times; of these:
   std::size_t found = 0;
   std::size_t doubled = 0;
-  std::size_t landmarks_elsewhere = 0;  ///< Landmarks that stand for no curated tree.
+  std::size_t landmarks_elsewhere = 0;  ///< Landmarks that belong to no curated tree.
   double median_spread_m = 0.0;
   double median_distance_m = 0.0;
 };

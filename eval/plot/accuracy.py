@@ -1,7 +1,7 @@
 """Plots of eval paths, density and noise: python3 accuracy.py RESULTS.json TRACES.json
 
 Beside RESULTS.json: RESULTS.CELL.map.png (trajectory and map against the truth),
-RESULTS.CELL.along.png (error along the run), RESULTS.CELL.matches.png (the source's Fig. 4.9, first and
+RESULTS.CELL.along.png (error along the run), RESULTS.CELL.matches.png (GeoSLAM's Fig. 4.9, first and
 filtered associations), RESULTS.CELL.graph.png (its Fig. 4.10), and RESULTS.ratio.png.
 """
 import json

@@ -1,7 +1,7 @@
 """Plot of eval landmarks-vs-error: python3 landmarks_vs_error.py RESULTS.json TRACES.json
 
 RESULTS.error.png, a row for each route: along the first drive the filter's change of the error
-(running mean) above the number of landmarks used (the source's figures 4.4-4.6); its mean for each
+(running mean) above the number of landmarks used (figures 4.4-4.6 of the thesis on submaps); its mean for each
 number of landmarks with the number of samples (figures 4.7-4.9); and the error of a second's way,
 which no older error of the heading is in, of the filter and of the mapper.
 """

@@ -1,4 +1,4 @@
-// What this process takes.
+// Memory of this process.
 #pragma once
 
 namespace understory::eval::tools {

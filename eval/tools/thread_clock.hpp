@@ -1,11 +1,11 @@
-// How long the calling thread has computed.
+// Processor time of the calling thread.
 #pragma once
 
 #include <ctime>
 
 namespace understory::eval::tools {
 
-/// Processor time of this thread [s]: what else the machine does is left out.
+/// Processor time of this thread [s]; other work of the machine does not count.
 inline double thread_time_s() {
   timespec now{};
   ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);

@@ -1,4 +1,4 @@
-// A piece of work that every machine can do, to compare times across machines.
+// A fixed computation, to compare times across machines.
 #pragma once
 
 #include <cstddef>

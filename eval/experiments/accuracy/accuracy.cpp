@@ -85,7 +85,7 @@ void run_accuracy(const std::string& experiment, const std::vector<harness::Cell
   const std::vector<harness::CellResult> results =
       run_campaign(cells, options, terminal::catch_interrupts());
   const std::vector<harness::Summary> rows = summarise(results, options.methods);
-  fmt::print("eval {}: {} runs per cell, seed {}; the source's published figures on the right\n{}",
+  fmt::print("eval {}: {} runs per cell, seed {}; GeoSLAM's published figures on the right\n{}",
              experiment, options.runs, options.seed, to_table(rows));
   if (options.json.empty()) return;
   nlohmann::json json_rows = nlohmann::json::array();
@@ -101,7 +101,8 @@ void run_accuracy(const std::string& experiment, const std::vector<harness::Cell
 }  // namespace
 
 void add_paths_experiment(CLI::App& eval) {
-  CLI::App& command = *eval.add_subcommand("paths", "Accuracy on the source's five paths");
+  CLI::App& command =
+      *eval.add_subcommand("paths", "Accuracy on GeoSLAM's five paths and the double circle");
   const auto options = std::make_shared<harness::CampaignOptions>();
   const auto paths = std::make_shared<std::vector<std::string>>();
   add_campaign_options_with_lidar(command, *options);

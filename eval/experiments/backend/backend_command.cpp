@@ -136,7 +136,7 @@ void run_experiment(const BackendOptions& options) {
   if (options.json.empty()) return;
   const std::filesystem::path out = options.json;
   harness::write_json(harness::traces_file(out), traces);
-  std::vector<std::string> names;  // where they lay is nobody else's business
+  std::vector<std::string> names;  // names alone: folders are those of one machine
   for (const std::string& file : options.files) {
     names.push_back(std::filesystem::path(file).filename().string());
   }

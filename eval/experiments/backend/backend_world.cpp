@@ -18,7 +18,7 @@ constexpr std::array<std::pair<int, int>, 4> kSteps{{{1, 0}, {0, 1}, {-1, 0}, {0
 
 struct Place {
   int x = 0, y = 0;
-  int heading = 0;  ///< Quarters of a turn.
+  int heading = 0;  ///< In quarters of a full rotation.
 
   geometry::SE2 pose() const { return {double(x), double(y), 0.5 * std::numbers::pi * heading}; }
 };
@@ -43,7 +43,7 @@ std::vector<Place> walk(const WorldParameters& parameters, std::mt19937_64& rand
     const bool leaves =
         next.x + dx < 0 || next.y + dy < 0 || next.x + dx > side || next.y + dy > side;
     if (leaves) {
-      // Walls stand at corners: another turn.
+      // Beyond the edge of the town: try another heading.
       places.back().heading = (places.back().heading + 1) % 4;
       continue;
     }

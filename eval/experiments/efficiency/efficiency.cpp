@@ -34,7 +34,7 @@ struct Scenario {
 };
 
 struct KeyframeTime {
-  double position = 0.0;  ///< Metres driven, or hours stood, up to this keyframe.
+  double position = 0.0;  ///< Metres driven, or hours stationary, up to this keyframe.
   double keyframer_ms = 0.0;
   double mapper_ms = 0.0;
 };
@@ -68,7 +68,7 @@ std::vector<Scenario> scenarios(const EfficiencyOptions& options) {
     scenario.drive.path.length_m = 3600.0 * options.stationary_h * scenario.drive.speed_mps;
     result.push_back(scenario);
   }
-  // The source's cost grows without bound: on the long ones it is not asked.
+  // The cost of the baseline grows without bound: it is left out of the long drives.
   for (std::size_t i = 1; i < result.size(); ++i) {
     if (std::find(methods.begin(), methods.end(), "smoothing") != methods.end()) {
       result[i].methods = {"smoothing"};

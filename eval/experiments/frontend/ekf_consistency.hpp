@@ -1,4 +1,4 @@
-// Is the filter as good as it says? Simulated drives, errors against the filter's own covariance.
+// Consistency of the filter: errors on simulated drives against the filter's own covariance.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,8 @@
 
 namespace understory::eval::experiments::frontend {
 
-/// For simulated detections: all their noise is new in every scan, and distances are right.
+/// Filter for simulated detections: their noise is independent in every scan and distances have no
+/// common scale error.
 inline ekf::EkfParameters white_noise_filter() {
   ekf::EkfParameters parameters;
   parameters.observation.correlated_share = 0.0;
@@ -20,13 +21,14 @@ inline ekf::EkfParameters white_noise_filter() {
   return parameters;
 }
 
+/// One simulated drive through associator and filter.
 struct EkfDriveOptions {
   sim::InertialDriveParameters drive;
   ekf::EkfParameters filter = white_noise_filter();
   associator::AssociatorParameters associator;
   /// Track ids from the associator; else the true ones.
   bool use_associator = true;
-  double duration_s = 60.0;  ///< Standing at the start included.
+  double duration_s = 60.0;  ///< Including the stationary start.
 };
 
 /// One drive.
@@ -36,7 +38,7 @@ struct EkfDriveResult {
   std::vector<double> position_nees;  ///< Of the position alone (2).
   std::vector<double> velocity_nees;  ///< Of velocity and biases (5), per scan.
   std::vector<double> error_m2;       ///< Squared error of the position, per scan.
-  std::vector<double> claimed_m2;     ///< What the filter says of it.
+  std::vector<double> claimed_m2;     ///< The filter's variance of it.
   double final_error_m = 0.0;
   double final_error_rad = 0.0;
   double driven_m = 0.0;
@@ -46,6 +48,7 @@ struct EkfDriveResult {
   std::uint64_t landmarks_used = 0;
   double mean_active_landmarks = 0.0;
 };
+/// Drives once through `world`; everything follows from `seed`.
 EkfDriveResult run_ekf_drive(const EkfDriveOptions& options, const sim::TrunkField& world,
                              std::uint64_t seed);
 
@@ -71,6 +74,7 @@ struct EkfConsistency {
   double refused_share = 0.0;  ///< Of the landmarks offered.
   std::uint64_t restarts = 0;
 };
+/// The figures of many drives, which have the same scans; empty where there are none.
 EkfConsistency summarise(const std::vector<EkfDriveResult>& runs);
 
 /// Scans from `first` to before `last`.
@@ -83,6 +87,7 @@ struct ScanRange {
 /// of all runs shows the least bias; but errors last for many scans, so that its share may be far
 /// from 95 % by chance. Many groups have the share of a consistent filter close to 95 %.
 double share_in_band(std::span<const EkfDriveResult> runs, ScanRange scans, std::size_t group);
+/// Mean NEES of the pose over those scans of all runs; 3 is exact.
 double mean_nees(std::span<const EkfDriveResult> runs, ScanRange scans);
 
 }  // namespace understory::eval::experiments::frontend

@@ -164,7 +164,7 @@ void PlotScanner::look_around_stems() {
   }
 }
 
-/// All sectors that are seen from there, but those at the very edges.
+/// All sectors that are visible from there, but those at the very edges.
 bool PlotScanner::is_whole(std::size_t stem, const Eigen::Vector2d& station_m) const {
   const Eigen::Vector2d to_station = station_m - plot_.stems[stem].position_m;
   const double turns = std::atan2(to_station.y(), to_station.x()) / (2.0 * pi) + 0.5;
@@ -226,30 +226,31 @@ double PlotScanner::azimuth_of(int column) const {
   return pi - 2.0 * pi * (column + 0.5) / parameters_.columns;  // clockwise, from behind
 }
 
-std::vector<PlotScanner::Seen> PlotScanner::seen_from(const Eigen::Vector3d& sensor_m) const {
-  std::vector<Seen> seen;
-  seen.reserve(plot_.points.size());
+std::vector<PlotScanner::Return> PlotScanner::returns_at(const Eigen::Vector3d& sensor_m) const {
+  std::vector<Return> returns;
+  returns.reserve(plot_.points.size());
   for (std::size_t i = 0; i < plot_.points.size(); ++i) {
     const PlotPoint& point = plot_.points[i];
     const Eigen::Vector3d ray = point.position_m - sensor_m;
     const double range = ray.norm();
     if (range < parameters_.min_range_m || range > parameters_.max_range_m) continue;
-    seen.push_back({std::atan2(ray.y(), ray.x()), std::asin(ray.z() / range), range, reach_m_[i]});
+    returns.push_back(
+        {std::atan2(ray.y(), ray.x()), std::asin(ray.z() / range), range, reach_m_[i]});
   }
-  return seen;
+  return returns;
 }
 
 /// The nearest surface that the beam meets. It ends at its outermost points; a point all alone is
 /// as wide as a beam.
-double PlotScanner::surface(std::span<const Seen* const> near_beam, double azimuth_rad) const {
+double PlotScanner::surface(std::span<const Return* const> near_beam, double azimuth_rad) const {
   const double own_rad = pi / parameters_.columns;
-  for (const Seen* const nearest : near_beam) {  // by range
-    const Seen* left = nullptr;
-    const Seen* right = nullptr;
+  for (const Return* const nearest : near_beam) {  // by range
+    const Return* left = nullptr;
+    const Return* right = nullptr;
     double left_rad = kNothing;
     double right_rad = kNothing;
     int points = 0;
-    for (const Seen* const other : near_beam) {
+    for (const Return* const other : near_beam) {
       if (std::abs(other->range_m - nearest->range_m) > parameters_.depth_m) continue;
       ++points;
       const double side = turned(other->azimuth_rad - azimuth_rad);
@@ -270,10 +271,10 @@ double PlotScanner::surface(std::span<const Seen* const> near_beam, double azimu
   return kNothing;
 }
 
-std::vector<double> PlotScanner::ring(std::span<const Seen> seen, double elevation_rad) const {
+std::vector<double> PlotScanner::ring(std::span<const Return> returns, double elevation_rad) const {
   const auto columns = static_cast<std::size_t>(parameters_.columns);
-  std::vector<std::vector<const Seen*>> near_beam(columns);
-  for (const Seen& point : seen) {
+  std::vector<std::vector<const Return*>> near_beam(columns);
+  for (const Return& point : returns) {
     if (std::abs(point.elevation_rad - elevation_rad) * point.range_m > point.reach_m) {
       continue;
     }
@@ -290,7 +291,7 @@ std::vector<double> PlotScanner::ring(std::span<const Seen> seen, double elevati
   std::vector<double> ranges(columns, kNothing);
   for (std::size_t column = 0; column < columns; ++column) {
     std::stable_sort(near_beam[column].begin(), near_beam[column].end(),
-                     [](const Seen* a, const Seen* b) { return a->range_m < b->range_m; });
+                     [](const Return* a, const Return* b) { return a->range_m < b->range_m; });
     ranges[column] = surface(near_beam[column], azimuth_of(static_cast<int>(column)));
   }
   return ranges;
@@ -325,10 +326,10 @@ double PlotScanner::ground_range(const Eigen::Vector3d& sensor_m, double azimuth
 PlotSweep PlotScanner::sweep(const Eigen::Vector2d& station_m, std::mt19937_64& random) const {
   const Eigen::Vector3d sensor(station_m.x(), station_m.y(),
                                ground_.height_m(station_m) + parameters_.sensor_height_m);
-  const std::vector<Seen> seen = seen_from(sensor);
+  const std::vector<Return> returns = returns_at(sensor);
   std::vector<std::vector<double>> ranges;
   for (const double elevation : parameters_.elevations_rad) {
-    ranges.push_back(ring(seen, elevation));
+    ranges.push_back(ring(returns, elevation));
   }
   PlotSweep result;
   result.stems.resize(plot_.stems.size());

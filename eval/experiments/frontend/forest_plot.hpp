@@ -1,4 +1,4 @@
-// Registered clouds of real forest plots, and what a turning laser would see that stands in one.
+// Registered clouds of real forest plots, and the sweeps of a spinning LIDAR in them.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,15 +16,17 @@
 
 namespace understory::eval::experiments::frontend {
 
+/// One point of a registered cloud.
 struct PlotPoint {
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< Frame of the plot, z up.
   double height_m = 0.0;                                 ///< Above the ground.
 };
-/// As somebody else estimated it from the same cloud, at 1.1-1.6 m: indicative, no truth.
+/// A stem as others estimated it from the same cloud, at 1.1-1.6 m: indicative, no truth.
 struct PlotStem {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
   double radius_m = 0.0;
 };
+/// A registered cloud and the list of its stems.
 struct ForestPlot {
   std::string name;
   std::vector<PlotPoint> points;
@@ -38,7 +40,9 @@ ForestPlot read_forest_plot(const std::filesystem::path& folder, const std::stri
 /// The ground below a plot's points: mean per cell, smooth between; level on beyond them.
 class PlotGround {
  public:
+  /// `cell_m`: side of the cells over which heights are averaged.
   explicit PlotGround(std::span<const PlotPoint> points, double cell_m = 1.0);
+  /// Height of the ground, frame of the plot [m].
   double height_m(const Eigen::Vector2d& place_m) const;
 
  private:
@@ -62,6 +66,7 @@ struct StemObservation {
   /// ends where the scan of the plot ended, which is no edge of the stem.
   bool is_whole = false;
 };
+/// A sweep and what of each stem it could show.
 struct PlotSweep {
   model::PointSweep sweep;
   std::vector<StemObservation> stems;  ///< As many as the plot has.
@@ -69,10 +74,12 @@ struct PlotSweep {
 
 /// Makes sweeps out of a cloud. A beam returns the surface between the points to its left and to
 /// its right, where both are near it and at about the same range; the nearest such surface hides
-/// the others. A point all alone returns the beam that meets it. Clouds show some stems from one
-/// side only: what is listed as a stem is opaque, so that nobody sees its far side from within.
+/// the others. A single point returns the beam that meets it. Clouds show some stems from one
+/// side only: what is listed as a stem is opaque, so that its far side is never visible from
+/// within.
 class PlotScanner {
  public:
+  /// The laser, and how a cloud becomes a surface.
   struct Parameters {
     std::vector<double> elevations_rad = sim::beam_elevations_rad(sim::LidarModel::kVlp32);
     int columns = 1800;
@@ -89,13 +96,14 @@ class PlotScanner {
   /// `plot` must outlive the scanner.
   PlotScanner(const ForestPlot& plot, Parameters parameters);
 
-  /// A sweep as LIDAR_SWEEP of a level vehicle that stands at `station_m`; its origin is there on
+  /// A sweep as LIDAR_SWEEP of a level, stationary vehicle at `station_m`; its origin is there on
   /// the ground, its axes are the plot's.
   PlotSweep sweep(const Eigen::Vector2d& station_m, std::mt19937_64& random) const;
+  /// The ground below the plot.
   const PlotGround& ground() const { return ground_; }
 
  private:
-  struct Seen {
+  struct Return {
     double azimuth_rad = 0.0;
     double elevation_rad = 0.0;
     double range_m = 0.0;
@@ -110,10 +118,10 @@ class PlotScanner {
   void look_around_stems();
   bool is_whole(std::size_t stem, const Eigen::Vector2d& station_m) const;
   Meeting meeting(const Eigen::Vector2d& station_m, double azimuth_rad) const;
-  std::vector<Seen> seen_from(const Eigen::Vector3d& sensor_m) const;
+  std::vector<Return> returns_at(const Eigen::Vector3d& sensor_m) const;
   /// Range of each column of a beam; infinite = no return.
-  std::vector<double> ring(std::span<const Seen> seen, double elevation_rad) const;
-  double surface(std::span<const Seen* const> near_beam, double azimuth_rad) const;
+  std::vector<double> ring(std::span<const Return> returns, double elevation_rad) const;
+  double surface(std::span<const Return* const> near_beam, double azimuth_rad) const;
   double ground_range(const Eigen::Vector3d& sensor_m, double azimuth_rad,
                       double elevation_rad) const;
   double azimuth_of(int column) const;

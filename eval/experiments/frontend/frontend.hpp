@@ -1,5 +1,4 @@
-// `understory eval frontend`: from raw sensors to a pose, part by part and as a whole
-// (specs/frontend.md).
+// `understory eval frontend`: from raw sensors to a pose, part by part and as a whole.
 #pragma once
 
 #include <atomic>
@@ -13,6 +12,7 @@
 
 namespace understory::eval::experiments::frontend {
 
+/// The command line of `understory eval frontend`.
 struct FrontendOptions {
   int runs = 10;  ///< Monte-Carlo runs of the filter; a tenth of them of the others.
   std::uint64_t seed = 1;
@@ -40,11 +40,11 @@ void add_forest_plot_rows(const FrontendOptions& options, const std::atomic<bool
 /// Accuracy and time of one drive of the whole chain.
 void add_chain_rows(const harness::ChainRun& run, std::optional<double> ate_target_m,
                     FrontendRows& rows);
-/// Where the chain's time goes.
+/// Processor time of each service, as a share of the drive's time and as a quantile per message.
 void add_time_rows(const harness::ChainRun& run, FrontendRows& rows);
 /// Trajectories and map, for the plots.
 nlohmann::json trace_of(const harness::ChainRun& run);
-/// What faults of the sensors do: what HEALTH says, and how far the pose is off afterwards.
+/// Faults of the sensors: what HEALTH counts, and the error of the pose afterwards.
 void add_fault_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
                     FrontendRows& rows);
 

@@ -61,7 +61,8 @@ void add_chain_rows(const harness::ChainRun& run, std::optional<double> ate_targ
   const harness::PoseConsistency said = harness::pose_consistency(run.slam, run.truth);
   rows.state("SLAM_POSE, first pose held: mean NEES (3)", said.mean_nees, "");
   rows.state("SLAM_POSE, first pose held: error at the end", said.end_error_m, "m");
-  rows.state("SLAM_POSE, first pose held: what it says of it", said.end_sigma_m, "m");
+  rows.state("SLAM_POSE, first pose held: standard deviation reported for it", said.end_sigma_m,
+             "m");
   rows.state("EKF_POSE ATE", ekf.ate_rms_m, "m");
   rows.at_most("EKF_POSE drift", 100.0 * ekf.end_m / std::max(ekf.driven_m, 1.0), "%", 0.5);
   rows.state("RAW_POSE ATE", reckoned.ate_rms_m, "m");

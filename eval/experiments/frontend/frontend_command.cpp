@@ -121,7 +121,7 @@ void run(const FrontendOptions& options) {
                       harness::result_document("frontend", config, to_json(rows.rows())));
   harness::write_json(harness::traces_file(options.json), traces);
   if (!plots.empty()) {
-    // The clouds are not ours: their picture is kept, they are not.
+    // The clouds may not be redistributed: their picture is kept, they are not.
     fs::path file = options.json;
     file.replace_extension(".plots.json");
     harness::write_json(file, plots);

@@ -36,7 +36,7 @@ sim::TrunkField field(std::uint64_t seed) {
 }
 
 /// Sway of a parked vehicle with its engine on, as the filter's own default takes it: error and
-/// covariance of a vehicle that stands absolutely still would both be nothing.
+/// covariance of a perfectly stationary vehicle would both be zero.
 void let_sway(sim::InertialDriveParameters& drive) {
   drive.sway_sigma_m = 2e-4;
   drive.sway_sigma_rad = 3e-5;
@@ -63,7 +63,7 @@ void add_consistency_rows(const EkfDriveOptions& options, std::span<const EkfDri
       std::lround(options.drive.standing_s / options.drive.scan_interval_s));
   const std::size_t scans = summary.mean_nees.size();
   const ScanRange whole{1, scans};  // The first pose is exact.
-  const ScanRange standing{1, moving};
+  const ScanRange stationary{1, moving};
   const ScanRange driving{moving, scans};
   const auto share = [&](ScanRange range, std::size_t group) {
     return 100.0 * share_in_band(results, range, group);
@@ -71,9 +71,9 @@ void add_consistency_rows(const EkfDriveOptions& options, std::span<const EkfDri
   rows.between("NEES of the pose inside its 95 % band", share(whole, results.size()), "%", 90.0,
                99.0);
   rows.between("the same, in groups of 50 runs", share(whole, kGroup), "%", 93.0, 97.0);
-  rows.state("in groups of 50, standing", share(standing, kGroup), "%");
+  rows.state("in groups of 50, stationary", share(stationary, kGroup), "%");
   rows.state("in groups of 50, moving", share(driving, kGroup), "%");
-  rows.state("mean NEES of the pose, standing (3 is exact)", mean_nees(results, standing), "");
+  rows.state("mean NEES of the pose, stationary (3 is exact)", mean_nees(results, stationary), "");
   rows.state("mean NEES of the pose, moving (3)", mean_nees(results, driving), "");
   rows.state("mean NEES of the heading (1)", summary.heading_nees, "");
   rows.state("mean NEES of the position (2)", summary.position_nees, "");

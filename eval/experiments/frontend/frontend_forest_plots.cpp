@@ -1,4 +1,4 @@
-// Trunks in real forest plots, as a turning laser would see them (eval/forest_plot.hpp).
+// Trunks in real forest plots, as a spinning LIDAR observes them (forest_plot.hpp).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -72,7 +72,7 @@ void add_rows(const PlotScore& score, FrontendRows& rows) {
   refused("leaning", score.trunks.leaning);
   refused("not round", score.trunks.not_round);
   refused("uncertain", score.trunks.uncertain);
-  refused("not standing", score.trunks.not_standing);
+  refused("not upright", score.trunks.not_standing);
   refused("in leaves", score.trunks.in_leaves);
   rows.state("stems that had to be found from some station", ever(score.should_of_stem), "");
   rows.state("of them found from some station", ever(score.found_of_stem), "");

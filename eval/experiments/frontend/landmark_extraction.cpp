@@ -92,7 +92,7 @@ struct Tally {
 };
 
 /// Each detection takes the nearest true landmark that is free; nearest pairs of a sweep would
-/// differ only where two trunks stand within half a metre.
+/// differ only where two trunks are within half a metre.
 void score_kind(const model::LandmarkScan& scan, model::LandmarkKind kind,
                 std::vector<Truth> truths, const ExtractionOptions& options, Tally& tally,
                 std::vector<ExtractionMiss>& misses) {

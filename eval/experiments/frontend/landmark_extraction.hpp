@@ -1,4 +1,4 @@
-// How good the landmark extractor is on a simulated drive, against what its sweeps really hit.
+// Score of the landmark extractor on a simulated drive, against what its sweeps really hit.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,11 @@
 
 namespace understory::eval::experiments::frontend {
 
+/// Which sweeps are scored, and which landmarks must be found in them.
 struct ExtractionOptions {
   int sweeps = 20;
   std::uint64_t first_revolution = 0;
-  std::uint64_t stride = 10;              ///< Turns from one scored sweep to the next.
+  std::uint64_t stride = 10;              ///< Revolutions from one scored sweep to the next.
   double recall_range_m = 25.0;           ///< Landmarks farther away need not be found...
   std::uint32_t least_returns = 5;        ///< ... nor trunks with fewer returns than this...
   std::uint32_t least_side_returns = 10;  ///< ... nor corners with fewer on either wall within 2 m.
@@ -33,18 +34,20 @@ struct KindScore {
   double rms_m = 0.0;            ///< In the plan, within the range for errors.
   double bias_along_m = 0.0;     ///< Mean error along the ray, away from the vehicle, and to its
   double bias_across_m = 0.0;    ///< left; within the same range. It does not average out.
-  double nees_plan = 0.0;        ///< Mean, all matched; 2 is right.
-  double nees_space = 0.0;       ///< With the height; 3 is right.
+  double nees_plan = 0.0;        ///< Mean, all matched; 2 is exact.
+  double nees_space = 0.0;       ///< With the height; 3 is exact.
   double bearing_rms_rad = 0.0;  ///< Corners: of the bisector.
-  double nees_bearing = 0.0;     ///< Corners; 1 is right.
+  double nees_bearing = 0.0;     ///< Corners; 1 is exact.
 
+  /// Share of the detections that are right; 1 where there are none.
   double precision() const {
     return detections > 0 ? static_cast<double>(right) / detections : 1.0;
   }
+  /// Share of the landmarks that had to be found; 1 where there are none.
   double recall() const { return should > 0 ? static_cast<double>(found) / should : 1.0; }
 };
 
-/// What a false detection lay on, or what a landmark was that was not found: for people who look.
+/// A false detection, or a landmark that was not found: for inspection.
 struct ExtractionMiss {
   model::Utime utime = 0;
   bool is_false = false;       ///< Else not found.
@@ -52,6 +55,7 @@ struct ExtractionMiss {
   std::uint32_t returns = 0;
 };
 
+/// What the extractor found on a drive.
 struct ExtractionScore {
   int beams = 0;
   std::uint64_t sweeps = 0;
@@ -65,7 +69,8 @@ struct ExtractionScore {
 };
 
 /// LIDAR_SWEEP as a perfect input would make it: de-skewed with the true motion to the time of the
-/// turn's last point; the attitude is off by `attitude_error_rad` (roll, pitch), with covariance.
+/// revolution's last point; the attitude is off by `attitude_error_rad` (roll, pitch), with
+/// covariance.
 model::PointSweep ideal_input(const sim::SimulatedSweep& sweep, const sim::SensorDrive& drive,
                               const Eigen::Vector2d& attitude_error_rad, double attitude_sigma_rad);
 

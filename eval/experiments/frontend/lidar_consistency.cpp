@@ -26,11 +26,11 @@ sim::SensorDrive lidar_drive(const LidarDriveOptions& options, std::uint64_t see
   suite.gnss.reset();
   if (!options.has_wheels) suite.wheels.reset();
   sim::SpeedParameters speed;
-  speed.standstill_s = options.standing_s;
+  speed.standstill_s = options.stationary_s;
   return {sim::forest_scenario(forest, seed), speed, suite, seed};
 }
 
-/// Root of the mean square of what the filter says of its position's error.
+/// Root of the filter's mean variance of the position [m].
 double claimed_rms_m(std::span<const EkfDriveResult> runs, ScanRange scans) {
   double sum = 0.0;
   for (const EkfDriveResult& run : runs) {
@@ -53,7 +53,8 @@ void add_range_rows(std::span<const EkfDriveResult> results, ScanRange scans,
   rows.state("NEES of single drives inside their 95 % band, " + when,
              100.0 * share_in_band(results, scans, 1), "%");
   rows.state("position's error, " + when, 1e3 * error_rms_m(results, scans), "mm");
-  rows.state("what the filter says of it, " + when, 1e3 * claimed_rms_m(results, scans), "mm");
+  rows.state("standard deviation reported for it, " + when, 1e3 * claimed_rms_m(results, scans),
+             "mm");
 }
 
 }  // namespace
@@ -109,11 +110,11 @@ void add_lidar_filter_rows(const FrontendOptions& options, const std::atomic<boo
       scans = std::min(scans, result.nees.size());
       restarts += result.restarts;
     }
-    const auto moving = static_cast<std::size_t>(std::lround(drive.standing_s / kTurn_s));
+    const auto moving = static_cast<std::size_t>(std::lround(drive.stationary_s / kTurn_s));
     rows.in(fmt::format("ekf behind the simulated LIDAR, forest, {} ({} drives of {:.0f} s)",
                         has_wheels ? "wheels and IMU" : "IMU alone", results.size(),
                         drive.duration_s));
-    add_range_rows(results, {1, std::min(moving, scans)}, "standing", rows);
+    add_range_rows(results, {1, std::min(moving, scans)}, "stationary", rows);
     if (moving < scans) add_range_rows(results, {moving, scans}, "moving", rows);
     rows.at_most("restarts", static_cast<double>(restarts), "", 0.0);
   }

@@ -1,4 +1,4 @@
-// Is the filter as good as it says behind real sensors? Simulated drives through the chain up to
+// Consistency of the filter behind simulated sensors: drives through the chain up to
 // EKF_POSE, errors against the filter's own covariance.
 #pragma once
 
@@ -11,11 +11,11 @@
 
 namespace understory::eval::experiments::frontend {
 
-/// A forest drive from a standstill, which the whole of the first seconds is.
+/// A forest drive that begins stationary.
 struct LidarDriveOptions {
   std::filesystem::path config_dir;  ///< Of the chain's services.
-  double duration_s = 60.0;          ///< Standing included.
-  double standing_s = 22.0;          ///< The stage asks for 20 s.
+  double duration_s = 60.0;          ///< Including the stationary start.
+  double stationary_s = 22.0;        ///< The stage needs 20 s to estimate its biases.
   double length_m = 250.0;           ///< Of the circle.
   bool has_wheels = true;
   std::function<void()> progress;  ///< Called at every sweep.

@@ -1,4 +1,4 @@
-// Are a track's detections all of one landmark, and does a landmark keep its track?
+// Score of the associator: purity of tracks, and landmarks that change their track.
 #pragma once
 
 #include <cstdint>
@@ -8,12 +8,14 @@
 
 namespace understory::eval::experiments::frontend {
 
+/// One simulated drive through the associator.
 struct TrackingOptions {
   sim::InertialDriveParameters drive;
   associator::AssociatorParameters associator;
   double duration_s = 120.0;
 };
 
+/// How well tracks and landmarks agree.
 struct TrackingResult {
   double driven_km = 0.0;
   std::uint64_t published = 0;  ///< Detections with a track id.
@@ -30,6 +32,7 @@ struct TrackingResult {
   double scan_p50_s = 0.0;
   double scan_p99_s = 0.0;
 };
+/// Drives once through `world`; everything but the times follows from `seed`.
 TrackingResult run_tracking(const TrackingOptions& options, const sim::TrunkField& world,
                             std::uint64_t seed);
 

@@ -13,6 +13,7 @@
 
 namespace understory::eval::experiments::large_map {
 
+/// Where a keyframe was found.
 struct PlaceAnswer {
   std::optional<geometry::SE2> map_T_base;  ///< None: not sure.
   std::string reason;                       ///< Why not, where not.
@@ -22,11 +23,13 @@ struct PlaceAnswer {
 class PlaceFinder {
  public:
   virtual ~PlaceFinder() = default;
+  /// The pose of the base, or why there is none.
   virtual PlaceAnswer find(const model::Keyframe& keyframe) const = 0;
+  /// Memory that the map takes for each landmark [bytes]; 0 = not known.
   virtual double bytes_per_landmark() const { return 0.0; }  ///< 0 = not known.
 };
 
-/// "smoothing" or "baseline" (its algorithms 3 and 4 up to the pose, its parameters).
+/// "smoothing" or "baseline" (GeoSLAM algorithms 3 and 4 up to the pose, with its parameters).
 std::unique_ptr<PlaceFinder> make_place_finder(std::string_view method,
                                                std::span<const Eigen::Vector2d> landmarks_m);
 

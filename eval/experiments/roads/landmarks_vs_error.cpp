@@ -38,10 +38,11 @@ struct Sample {
   int run = 0;
   double time_s = 0.0;
   std::uint32_t landmarks = 0;  ///< That the filter used.
-  /// |(x[k] - x_ref[k]) - (x[k-1] - x_ref[k-1])| / 2, the source's equation 4.1, in the gauge of
-  /// the first pose. An error of the heading made long before goes on to count in it.
+  /// |(x[k] - x_ref[k]) - (x[k-1] - x_ref[k-1])| / 2, equation 4.1 of the thesis on submaps, in the
+  /// gauge of the first pose. An error of the heading made long before goes on to count in it.
   double change_m = 0.0;
-  /// Error of the way made in the second before, seen from its start: what is made now alone.
+  /// Error of the motion over the last second, in the frame of its start: errors that arise now
+  /// alone.
   std::optional<double> second_m;
   /// Of that second.
   double mean_landmarks = 0.0;
@@ -54,8 +55,8 @@ struct Curve {
   std::vector<Sample> samples;
 };
 
-constexpr double kStanding_m = 0.05;  // less way than this in a sweep
-constexpr std::size_t kSecond = 10;   // sweeps
+constexpr double kStationary_m = 0.05;  // path in a sweep below which the vehicle is stationary
+constexpr std::size_t kSecond = 10;     // sweeps
 
 struct Step {
   model::Utime utime;
@@ -90,7 +91,7 @@ std::vector<Sample> samples_of(std::span<const Step> steps, int run) {
     const Step& before = steps[k - 1];
     const double pause_s = 1e-6 * static_cast<double>(now.utime - before.utime);
     const double way = (now.truth.translation() - before.truth.translation()).norm();
-    if (pause_s > 0.15 || way < kStanding_m) continue;
+    if (pause_s > 0.15 || way < kStationary_m) continue;
     Sample sample;
     sample.run = run;
     sample.time_s = 1e-6 * static_cast<double>(now.utime);
@@ -190,7 +191,8 @@ nlohmann::json traces_of(const std::vector<Curve>& curves) {
   return traces;
 }
 
-/// The source's routes. The first two share their way; noise and biases differ, as on two days.
+/// The routes of the thesis on submaps. The first two share their path; noise and biases differ, as
+/// on two days.
 struct Route {
   std::string name;
   sim::Scenario (*scenario)(double length_m, std::uint64_t seed);
@@ -272,7 +274,7 @@ void add_landmarks_vs_error_experiment(CLI::App& eval) {
   command->add_option("--jobs", options->jobs, "Drives side by side")->check(CLI::Range(1, 256));
   command->add_option("--runs", options->runs, "Of each route, in a world of its own each")
       ->check(CLI::Range(1, 1000));
-  command->add_flag("!--no-wheels", options->wheels, "An IMU alone, as the source had");
+  command->add_flag("!--no-wheels", options->wheels, "An IMU alone, as in the thesis on submaps");
   command->add_option("--length-m", options->length_m, "Of the city routes; the country is 1.5 x")
       ->check(CLI::Range(200.0, 100000.0));
   command->add_option("--config", options->config_dir, "Configuration of the chain's services");

@@ -18,6 +18,7 @@
 
 namespace understory::eval::experiments::victoria_park {
 
+/// Parameters of the three stages, and how much of the recording is used.
 struct VictoriaParkConfig {
   landmark_extractor::LandmarkExtractorParameters extractor;
   keyframer::KeyframerParameters keyframer;
@@ -25,7 +26,7 @@ struct VictoriaParkConfig {
   double end_s = 1e9;  ///< Stop the drive here [s].
 };
 
-/// Joint keyframes, our mapper, dead reckoning between keyframes.
+/// Joint keyframes, the smoothing mapper, dead reckoning between keyframes.
 VictoriaParkConfig victoria_park_defaults();
 
 /// Wall time of one stage, per scan [s].
@@ -35,6 +36,7 @@ struct StageTimes {
   std::vector<double> mapper_s;  ///< Zero for a scan that completed no keyframe.
 };
 
+/// What the stages gave on the recording.
 struct VictoriaParkRun {
   std::vector<model::Odometry> odometry;            ///< Between consecutive scans.
   std::vector<metrics::StampedPose> dead_reckoned;  ///< Of every scan, from the first one's pose.
@@ -51,7 +53,7 @@ struct VictoriaParkRun {
 /// Relative motion of the car between consecutive scans.
 std::vector<model::Odometry> victoria_park_odometry(const io::VictoriaPark& recording);
 
-/// Drives through the recording; `progress` is told of each scan.
+/// Drives through the recording; `progress` is called after each scan.
 VictoriaParkRun drive_victoria_park(const io::VictoriaPark& recording,
                                     const VictoriaParkConfig& config,
                                     const std::function<void()>& progress);

@@ -12,7 +12,7 @@
 namespace understory::eval::experiments::victoria_park {
 namespace {
 
-/// Way of `point` (frame `vehicle`) up to each pose [m].
+/// Path length of `point` (frame `vehicle`) up to each pose [m].
 std::vector<double> lengths(const std::vector<metrics::StampedPose>& path,
                             const Eigen::Vector2d& point) {
   std::vector<double> sums{0.0};
@@ -117,7 +117,7 @@ VictoriaParkReport assess(VictoriaParkRun run, const io::VictoriaPark& recording
   if (!curated.empty()) smoothing.trees = against_trees(run.trajectory, curated, run.landmarks);
   report.rows.push_back(std::move(smoothing));
   report.rows.push_back(
-      {"ours, as published", against_fixes(run.live, recording.gnss), std::nullopt});
+      {"smoothing, as published live", against_fixes(run.live, recording.gnss), std::nullopt});
   report.rows.push_back(
       {"dead reckoning", against_fixes(run.dead_reckoned, recording.gnss), std::nullopt});
   if (!batch.empty()) {
@@ -142,11 +142,11 @@ std::vector<metrics::StampedPose> read_batch_solution(
   }
   // Its poses are those of the rear axle.
   const Eigen::Vector2d axle = io::victoria_park::axle_T_vehicle().inverse().translation();
-  const std::vector<double> way = lengths(poses, {0.0, 0.0});
+  const std::vector<double> driven = lengths(poses, {0.0, 0.0});
   const std::vector<double> reckoned_path = lengths(dead_reckoned, axle);
-  const double scale = way.back() > 0.0 ? reckoned_path.back() / way.back() : 1.0;
+  const double scale = driven.back() > 0.0 ? reckoned_path.back() / driven.back() : 1.0;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const auto at = std::ranges::lower_bound(reckoned_path, way[i] * scale);
+    const auto at = std::ranges::lower_bound(reckoned_path, driven[i] * scale);
     const auto index =
         std::min<std::ptrdiff_t>(at - reckoned_path.begin(), std::ssize(dead_reckoned) - 1);
     poses[i].utime = dead_reckoned[static_cast<std::size_t>(index)].utime;
