@@ -55,6 +55,7 @@ void watch_chain(SensorChain& chain, ChainRun& run) {
   });
   chain.watch<model::EkfPose>("EKF_POSE",
                               [&run](const model::EkfPose& pose) { run.ekf.push_back(pose); });
+
   chain.watch<model::SlamPose>("SLAM_POSE", [&run](const model::SlamPose& pose) {
     if (pose.is_localised()) {
       run.slam.push_back(pose);
@@ -62,6 +63,7 @@ void watch_chain(SensorChain& chain, ChainRun& run) {
       ++run.slam_unsure;
     }
   });
+
   chain.watch<model::MapUpdate>(
       "SLAM_UPDATE", [&run](const model::MapUpdate& update) { run.updates.push_back(update); });
   chain.watch<model::WholeMap>("MAP", [&run](const model::WholeMap& map) {
@@ -114,14 +116,17 @@ ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options) {
   ChainRun run;
   SensorChain chain(front_end_services(), options.config_dir, options.toml_instead);
   watch_chain(chain, run);
+
   const double duration_s = std::min(options.end_s, drive.motion().duration_s());
   std::uint64_t sweep_parts = 0;
   std::optional<model::Utime> begin;
+
   while (const auto reading = drive.next()) {
     const model::Utime utime = utime_of(*reading);
     begin = begin.value_or(utime);
     run.simulated_s = 1e-6 * static_cast<double>(utime - *begin);
     if (run.simulated_s > options.end_s) break;
+
     if (const auto* truth = std::get_if<sim::TruePose>(&*reading)) {
       run.truth.push_back({truth->utime, truth->state.world_T_level()});
     }
@@ -130,6 +135,7 @@ ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options) {
       if (options.progress) options.progress(run.simulated_s / duration_s);
       if (options.on_sweep) options.on_sweep(std::get<sim::SimulatedSweep>(*reading));
     }
+
     for (RawMessage& message : raw_messages(*reading, sweep_parts)) {
       if (!options.meddle) {
         chain.feed(message);
@@ -139,6 +145,7 @@ ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options) {
     }
     if (options.keep_states) keep_states(chain, run);
   }
+
   finish_chain(chain, run);
   return run;
 }

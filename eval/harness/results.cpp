@@ -42,6 +42,7 @@ void write_json(const fs::path& file, const nlohmann::json& json) {
   fs::path partial = file;
   partial += fmt::format(".{}.partial", getpid());
   std::error_code error;
+
   {
     std::ofstream out(partial);
     out << json.dump(1) << '\n';
@@ -51,6 +52,7 @@ void write_json(const fs::path& file, const nlohmann::json& json) {
       throw std::runtime_error(file.string() + ": cannot write");
     }
   }
+
   fs::rename(partial, file, error);
   if (error) {
     const std::string why = error.message();
@@ -70,11 +72,13 @@ bool plot(const std::string& script, const std::vector<std::string>& arguments) 
     fmt::print(stderr, "plots: {} is not installed\n", script);
     return false;
   }
+
   std::vector<std::string> words{"/usr/bin/python3", path->string()};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
+
   pid_t child = 0;
   int status = -1;
   if (posix_spawn(&child, argv[0], nullptr, nullptr, argv.data(), environ) != 0 ||

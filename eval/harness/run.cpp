@@ -66,13 +66,16 @@ class Scorer {
     state.landmarks_m.clear();
     for (const model::MapLandmark& landmark : landmarks_)
       state.landmarks_m.push_back(landmark.position_m);
+
     if (state.poses.empty()) return;
     if (!truth_) truth_.emplace(recorded_.drive, state.poses.front().scan);
+
     for (const metrics::PoseEstimate& pose : state.poses) {
       if (accepted_.insert(pose.scan).second && error_m(pose) > kWrong) {
         ++result_.score.wrong_updates;
       }
     }
+
     const metrics::ErrorSums errors = errors_of(state, *truth_);
     result_.score.errors += errors;
     result_.trace.states.push_back(

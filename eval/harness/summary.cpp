@@ -25,6 +25,7 @@ void summarise_nees(const std::vector<RunResult>& runs, Summary& summary) {
       sum_and_count[keyframe].second += 1.0;
     }
   }
+
   double sum = 0.0;
   double count = 0.0;
   std::size_t in_band = 0;
@@ -34,6 +35,7 @@ void summarise_nees(const std::vector<RunResult>& runs, Summary& summary) {
     const auto [low, high] = chi2_band_95(3.0 * entry.second);
     if (entry.first >= low && entry.first <= high) ++in_band;
   }
+
   if (count > 0.0) summary.nees = sum / count;
   summary.nees_in_band_pct = percent(in_band, sum_and_count.size());
 }
@@ -143,10 +145,12 @@ nlohmann::json to_json(const Summary& row) {
                       {"map_recall_pct", row.map_recall_pct},
                       {"false_landmarks_pct", row.false_landmarks_pct},
                       {"landmarks_in_range", row.landmarks_in_range}};
+
   // Null where there is nothing to compare with, so that no script takes it for a number.
   const auto or_null = [](double value) {
     return value > 0.0 ? nlohmann::json(value) : nlohmann::json(nullptr);
   };
+
   json["ratio"] = or_null(row.ratio);
   json["ratio_lpe"] = or_null(row.ratio_lpe);
   json["nees"] = or_null(row.nees);
@@ -158,6 +162,7 @@ nlohmann::json to_json(const Summary& row) {
       json[key] = nullptr;
     }
   }
+
   json["nees_in_band_pct"] = row.nees > 0.0 ? nlohmann::json(row.nees_in_band_pct) : nullptr;
   if (row.cell.published) {
     json["published_rpe_cm"] = row.cell.published->rpe_cm;
@@ -173,6 +178,7 @@ std::string to_table(const std::vector<Summary>& rows) {
       "{:>6} {:>7} {:>5} | {:>7} {:>7} {:>6}\n",
       "path", "forest", "noise", "det", "step", "method", "RPE cm", "+-sd", "LPE cm", "ratio",
       "r.LPE", "updates", "wrong", "recall", "false", "ATE cm", "NEES", "RPE", "LPE", "upd.");
+
   for (const Summary& row : rows) {
     const auto number = [](double value, const char* format) {
       return value > 0.0 ? fmt::format(fmt::runtime(format), value) : std::string("-");
@@ -180,6 +186,7 @@ std::string to_table(const std::vector<Summary>& rows) {
     const auto if_any = [](bool any, double value, const char* format) {
       return any ? fmt::format(fmt::runtime(format), value) : std::string("-");
     };
+
     table += fmt::format(
         "{:<14} {:<12} {:>5} {:>4} {:>2.0f}cm  {:<9} {:>8.2f} {:>6.2f} {:>8} {:>6} {:>6} "
         "{:>11} {:>5} {:>7} {:>6} {:>7.2f} {:>5} |",
@@ -193,6 +200,7 @@ std::string to_table(const std::vector<Summary>& rows) {
         row.wrong_updates, if_any(row.has_map, row.map_recall_pct, "{:.1f}%"),
         if_any(row.has_map, row.false_landmarks_pct, "{:.2f}%"), row.ate_cm.mean,
         number(row.nees, "{:.2f}"));
+
     if (row.cell.published) {
       table += fmt::format(" {:>7.2f} {:>7.2f} {:>6}", row.cell.published->rpe_cm,
                            row.cell.published->lpe_cm,

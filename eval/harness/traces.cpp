@@ -57,6 +57,8 @@ json snapshot_json(const Snapshot& snapshot) {
   for (const model::KeyframeLandmark& landmark : snapshot.keyframe.landmarks) {
     local.push_back(base_T_centre * landmark.position_m);
   }
+
+  // Both hierarchies as GeoSLAM builds them, and what their polygons match.
   const LocalMap map(snapshot.landmarks_before, snapshot.update.map_T_vehicle.translation());
   const hierarchy::baseline::Hierarchy local_hierarchy(local, kDescriptorStep);
   const hierarchy::baseline::Hierarchy map_hierarchy(map.positions_m, kDescriptorStep);
@@ -65,6 +67,8 @@ json snapshot_json(const Snapshot& snapshot) {
        hierarchy::baseline::match_hierarchies(local_hierarchy, map_hierarchy, {})) {
     first.push_back({match.local, match.other});
   }
+
+  // Associations of the update, as numbers in the local map.
   json filtered = json::array();
   json current = json::array();
   for (const model::Association& association : snapshot.update.associations) {
@@ -73,6 +77,7 @@ json snapshot_json(const Snapshot& snapshot) {
     filtered.push_back({association.keyframe_landmark, number});
     current.push_back(number);
   }
+
   json added = json::array();
   json old = json::array();
   for (const model::MapLandmark& landmark : snapshot.landmarks_before) {
@@ -84,10 +89,12 @@ json snapshot_json(const Snapshot& snapshot) {
       added.push_back(point(landmark.position_m));
     }
   }
+
   json poses = json::array();
   for (const metrics::PoseEstimate& estimate : snapshot.poses_before) {
     poses.push_back(pose(estimate.map_T_vehicle));
   }
+
   return {{"keyframe", points(local)},
           {"keyframe_polygons", polygons_of(local_hierarchy)},
           {"map", points(map.positions_m)},
@@ -107,15 +114,18 @@ json trace_json(const RunTrace& trace, double interval_m) {
   json result{{"travelled_m", json::array()}, {"rpe_cm", json::array()},
               {"lpe_cm", json::array()},      {"newest_pose_cm", json::array()},
               {"poses", json::array()},       {"landmarks", points(trace.final_map.landmarks_m)}};
+
   for (const StateError& state : trace.states) {
     result["travelled_m"].push_back(interval_m * static_cast<double>(state.scans));
     result["rpe_cm"].push_back(100.0 * state.rpe_m);
     result["lpe_cm"].push_back(100.0 * state.lpe_m);
     result["newest_pose_cm"].push_back(100.0 * state.newest_pose_m);
   }
+
   for (const metrics::PoseEstimate& estimate : trace.final_map.poses) {
     result["poses"].push_back(pose(estimate.map_T_vehicle));
   }
+
   if (!trace.true_path.empty()) {
     result["true_path"] = json::array();
     for (const geometry::SE2& place : trace.true_path) result["true_path"].push_back(pose(place));

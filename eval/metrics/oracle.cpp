@@ -96,11 +96,14 @@ void BatchOracle::grow_hessian() {
 
 void BatchOracle::update_hessian(const Scan& scan, double sign) {
   const std::size_t n = scan.landmarks.size();
+
   for (const int landmark : scan.landmarks) {
     hessian_.diagonal().segment<2>(2 * landmark).array() += sign;
   }
+
   if (&scan == &scans_.front()) return;  // held fixed: nothing to eliminate
   const PoseBlock block = pose_block(scan.positions_m, scan.linearised_heading);
+
   for (std::size_t j = 0; j < n; ++j) {
     const Eigen::Matrix<double, 3, 2> right =
         sign * block.inverse * transposed_jacobian(block.lever[j]);
@@ -149,10 +152,12 @@ Eigen::VectorXd BatchOracle::project_poses_and_descend() {
 BatchOracle::Solution BatchOracle::solve(double tolerance_m, int max_iterations) {
   const auto size = static_cast<Eigen::Index>(2 * landmarks_.size());
   Solution solution;
+
   Eigen::VectorXd descent = project_poses_and_descend();
   relinearise();
   factor_.compute(hessian_.topLeftCorner(size, size));
   if (factor_.info() != Eigen::Success) throw std::runtime_error("oracle: singular system");
+
   while (solution.iterations < max_iterations) {
     const Eigen::VectorXd step = factor_.solve(descent);
     for (std::size_t i = 0; i < landmarks_.size(); ++i) {

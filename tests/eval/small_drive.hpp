@@ -6,6 +6,7 @@
 
 namespace understory::test {
 
+/// A drive of that length [m] through 200 m x 200 m of sparse forest.
 inline sim::DriveParameters small_drive_parameters(double length_m = 8.0) {
   sim::DriveParameters parameters;
   parameters.forest = sim::forest_parameters(sim::ForestKind::kSparse);

@@ -66,6 +66,7 @@ std::vector<harness::Cell> noise_cells(const NoiseOptions& options) {
                                                    harness::kPublishedNoiseLpe_cm[row][column],
                                                    {},
                                                    {}};
+
         const auto sigma_cm = static_cast<int>(std::lround(100.0 * cell.sigma_m));
         const auto detection_pct = static_cast<int>(std::lround(100.0 * cell.detection));
         if (!selected(options.sigmas_cm, sigma_cm)) continue;

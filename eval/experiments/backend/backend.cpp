@@ -152,6 +152,7 @@ factor_graph::batch::BatchReport solve_whole(const factor_graph::graph::FactorGr
     names.push_back(graph.add(from.type(factor_graph::graph::VariableId(v)),
                               from.value(factor_graph::graph::VariableId(v))));
   }
+
   for (int f = 0; f < from.factor_capacity(); ++f) {
     factor_graph::graph::Factor factor;
     factor.kind = from.kind(factor_graph::graph::FactorId(f));
@@ -165,6 +166,7 @@ factor_graph::batch::BatchReport solve_whole(const factor_graph::graph::FactorGr
     factor.information = from.information(factor_graph::graph::FactorId(f));
     graph.add(factor);
   }
+
   factor_graph::batch::BatchParameters parameters;
   parameters.relative_decrease = 1e-10;
   return optimise(graph, parameters);
@@ -191,6 +193,8 @@ BackendRun run_backend(const factor_graph::files::GraphFile& graph, const std::s
   Feeder feeder(graph);
   run.poses = feeder.poses();
   run.points = graph.vertices.size() - run.poses;
+
+  // Pose by pose; then until all estimates are up to date.
   const auto smoother = std::make_unique<factor_graph::bayes_tree::IncrementalSmoother>();
   for (std::size_t k = 0; k < feeder.poses(); ++k) {
     const double begin = tools::thread_time_s();
@@ -199,20 +203,26 @@ BackendRun run_backend(const factor_graph::files::GraphFile& graph, const std::s
     run.update_ms.push_back(1e3 * (tools::thread_time_s() - begin));
     if (!update.ok && run.error.empty()) run.error = update.error;
   }
+
   const double begin = tools::thread_time_s();
   smoother->settle();
   run.settle_ms = 1e3 * (tools::thread_time_s() - begin);
+
   run.chi2_final = smoother->graph().chi2();
   run.rss_mb = tools::resident_mb();
   run.smoother_mb = static_cast<double>(smoother->bytes()) / 1048576.0;
+
+  // References: one fresh factorisation, a batch solver from here and from dead reckoning.
   const double before = tools::thread_time_s();
   const int iterations = std::max(1, smoother->update_everything().iterations);
   run.whole_ms = 1e3 * (tools::thread_time_s() - before) / iterations;
+
   const double start = tools::thread_time_s();
   const factor_graph::batch::BatchReport report = solve_whole(smoother->graph());
   run.batch_s = tools::thread_time_s() - start;
   run.chi2_batch = report.chi2;
   if (!report.ok) run.error = "batch: " + report.error;
+
   run.chi2_dead_reckoning = solve_from_dead_reckoning(graph);
   return run;
 }

@@ -48,6 +48,7 @@ struct BackendOptions {
 nlohmann::json row_of(const BackendRun& run) {
   double total_ms = run.settle_ms;
   for (const double ms : run.update_ms) total_ms += ms;
+
   nlohmann::json row{{"dataset", run.dataset},
                      {"method", "smoothing"},
                      {"poses", run.poses},
@@ -66,6 +67,7 @@ nlohmann::json row_of(const BackendRun& run) {
                      {"rss_mb", run.rss_mb},
                      {"smoother_mb", run.smoother_mb},
                      {"error", run.error}};
+
   for (const Reference& reference : kReferences) {
     if (run.dataset != reference.dataset) continue;
     row["reference"] = {{"total_s", reference.total_s},
@@ -91,6 +93,7 @@ void print_row(const nlohmann::json& row) {
   const nlohmann::json reference = row.value("reference", nlohmann::json::object());
   const double final = row["chi2_final"].get<double>();
   const double batch = row["chi2_batch"].get<double>();
+
   fmt::print(
       "{:<26}{:>7}{:>8} |{:>9.2f}{:>8.3f}{:>9.2f}{:>9.2f}{:>9.2f} |{:>9}{:>8}{:>8} "
       "|{:>13.5f}{:>13.5f}"
@@ -119,27 +122,33 @@ void run_experiment(const BackendOptions& options) {
   const std::atomic<bool>& stop = terminal::catch_interrupts();
   nlohmann::json rows = nlohmann::json::array();
   nlohmann::json traces = nlohmann::json::array();
+
   const auto keep = [&](const BackendRun& run) {
     rows.push_back(row_of(run));
     print_row(rows.back());
     traces.push_back({{"dataset", run.dataset}, {"update_ms", run.update_ms}});
     if (stop) throw terminal::Interrupted{};
   };
+
   if (options.files.empty() && options.world_poses == 0) {
     throw std::invalid_argument("backend: neither --data nor --streets is given");
   }
+
   print_heading();
   for (const std::string& file : options.files) keep(run_backend(file));
   for (const auto& [name, parameters] : worlds(options.world_poses)) {
     keep(run_backend(make_world(parameters, options.seed), name));
   }
+
   if (options.json.empty()) return;
   const std::filesystem::path out = options.json;
   harness::write_json(harness::traces_file(out), traces);
+
   std::vector<std::string> names;  // names alone: folders are those of one machine
   for (const std::string& file : options.files) {
     names.push_back(std::filesystem::path(file).filename().string());
   }
+
   harness::write_json(
       out, harness::result_document(
                "backend",

@@ -34,11 +34,13 @@ std::vector<Place> walk(const WorldParameters& parameters, std::mt19937_64& rand
   const int side = parameters.steps_per_block * side_in_blocks(parameters);
   std::uniform_int_distribution<int> turn(-1, 1);
   std::vector<Place> places{Place{}};
+
   while (static_cast<int>(places.size()) < parameters.poses) {
     Place next = places.back();
     const bool at_corner =
         next.x % parameters.steps_per_block == 0 && next.y % parameters.steps_per_block == 0;
     if (at_corner) next.heading = (next.heading + turn(random) + 4) % 4;
+
     const auto [dx, dy] = kSteps[static_cast<std::size_t>(next.heading)];
     const bool leaves =
         next.x + dx < 0 || next.y + dy < 0 || next.x + dx > side || next.y + dy > side;
@@ -47,6 +49,7 @@ std::vector<Place> walk(const WorldParameters& parameters, std::mt19937_64& rand
       places.back().heading = (places.back().heading + 1) % 4;
       continue;
     }
+
     next.x += dx;
     next.y += dy;
     places.push_back(next);
@@ -76,6 +79,7 @@ factor_graph::files::GraphFile make_world(const WorldParameters& parameters, std
   factor_graph::files::GraphFile graph;
   std::map<std::pair<int, int>, std::vector<int>> visits;
   std::bernoulli_distribution is_seen(parameters.closure_chance);
+
   for (int k = 0; k < static_cast<int>(places.size()); ++k) {
     const Place& place = places[static_cast<std::size_t>(k)];
     graph.vertices.push_back({k, factor_graph::graph::VariableType::kPose2, {}, false});
@@ -83,6 +87,7 @@ factor_graph::files::GraphFile make_world(const WorldParameters& parameters, std
       graph.factors.push_back(
           measured(k - 1, k, places, parameters.motion_m, parameters.motion_rad, random));
     }
+
     std::vector<int>& earlier = visits[{place.x, place.y}];
     if (!earlier.empty() && k - earlier.back() > kClosureAge && is_seen(random)) {
       std::uniform_int_distribution<std::size_t> any(0, earlier.size() - 1);

@@ -53,6 +53,7 @@ std::vector<Scenario> scenarios(const EfficiencyOptions& options) {
   std::vector<Scenario> result(1);
   result[0].name = "circle-200m";
   result[0].methods = methods;
+
   if (options.drive_km > 0.0) {
     Scenario scenario;
     scenario.name = fmt::format("drive-{:g}km", options.drive_km);
@@ -61,6 +62,7 @@ std::vector<Scenario> scenarios(const EfficiencyOptions& options) {
     scenario.drive.clear_the_path = true;
     result.push_back(scenario);
   }
+
   if (options.stationary_h > 0.0) {
     Scenario scenario;
     scenario.name = fmt::format("stationary-{:g}h", options.stationary_h);
@@ -68,6 +70,7 @@ std::vector<Scenario> scenarios(const EfficiencyOptions& options) {
     scenario.drive.path.length_m = 3600.0 * options.stationary_h * scenario.drive.speed_mps;
     result.push_back(scenario);
   }
+
   // The cost of the baseline grows without bound: it is left out of the long drives.
   for (std::size_t i = 1; i < result.size(); ++i) {
     if (std::find(methods.begin(), methods.end(), "smoothing") != methods.end()) {
@@ -113,6 +116,7 @@ nlohmann::json rows_of(const Timing& timing, double yardstick_s) {
     for (const KeyframeTime& keyframe : timing.keyframes) all.push_back(value(keyframe));
     const auto tenth = static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, all.size() / 10));
     if (all.empty()) return;
+
     rows.push_back(
         {{"method", timing.method},
          {"scenario", timing.scenario},
@@ -128,6 +132,7 @@ nlohmann::json rows_of(const Timing& timing, double yardstick_s) {
          {"p50_per_yardstick", tools::quantile(all, 0.5) / (1e3 * yardstick_s)},
          {"rss_mb", timing.rss_mb}});
   };
+
   add("keyframer", [](const KeyframeTime& t) { return t.keyframer_ms; });
   add("mapper", [](const KeyframeTime& t) { return t.mapper_ms; });
   add("all", [](const KeyframeTime& t) { return t.keyframer_ms + t.mapper_ms; });
@@ -166,6 +171,7 @@ void run_efficiency(const EfficiencyOptions& options) {
   const double yardstick_s = tools::delaunay_build_s();
   nlohmann::json rows = nlohmann::json::array();
   nlohmann::json traces = nlohmann::json::array();
+
   for (const Scenario& scenario : scenarios(options)) {
     for (const std::string& method : scenario.methods) {
       if (method == "oracle") continue;
@@ -175,8 +181,10 @@ void run_efficiency(const EfficiencyOptions& options) {
       traces.push_back(trace_of(timing));
     }
   }
+
   print_rows(rows, yardstick_s);
   if (options.campaign.json.empty()) return;
+
   const std::filesystem::path file = options.campaign.json;
   const nlohmann::json config{{"seed", options.campaign.seed},
                               {"drive_km", options.drive_km},

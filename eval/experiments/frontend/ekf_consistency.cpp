@@ -112,14 +112,18 @@ EkfConsistency summarise(const std::vector<EkfDriveResult>& runs) {
   EkfConsistency out;
   out.runs = static_cast<int>(runs.size());
   if (runs.empty()) return out;
+
   const auto count = static_cast<double>(runs.size());
   const Band band = band_of_mean(runs.size());
   out.band_low = band.low;
   out.band_high = band.high;
   out.mean_nees.assign(runs.front().nees.size(), 0.0);
+
+  // Sums over the runs.
   std::vector<double> times;
   double squared = 0.0, used = 0.0, refused = 0.0;
   double velocity = 0.0, heading = 0.0, position = 0.0;
+
   for (const EkfDriveResult& run : runs) {
     for (std::size_t k = 0; k < out.mean_nees.size(); ++k) {
       out.mean_nees[k] += run.nees[k] / count;
@@ -136,6 +140,8 @@ EkfConsistency summarise(const std::vector<EkfDriveResult>& runs) {
     used += static_cast<double>(run.landmarks_used);
     refused += static_cast<double>(run.landmarks_refused);
   }
+
+  // Means.
   const auto scans = static_cast<double>(out.mean_nees.size());
   for (const double nees : out.mean_nees) out.overall_nees += nees / scans;
   out.heading_nees = heading / (scans * count);

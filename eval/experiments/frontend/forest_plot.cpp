@@ -36,6 +36,7 @@ std::vector<PlotPoint> read_points(const std::filesystem::path& file) {
   const std::string bytes = text_of(file);
   constexpr std::size_t kRecord = 4 * sizeof(float);
   if (bytes.size() % kRecord != 0) throw std::runtime_error(file.string() + ": cut short");
+
   std::vector<PlotPoint> points;
   points.reserve(bytes.size() / kRecord);
   for (std::size_t i = 0; i < bytes.size(); i += kRecord) {
@@ -45,6 +46,7 @@ std::vector<PlotPoint> read_points(const std::filesystem::path& file) {
     if (!std::isfinite(x + y + z + height)) continue;
     points.push_back({{x, y, z}, height});
   }
+
   if (points.empty()) throw std::runtime_error(file.string() + ": no points");
   return points;
 }
@@ -56,6 +58,7 @@ std::vector<PlotStem> read_stems(const std::filesystem::path& file) {
   if (!line.starts_with("x_m,y_m,dbh_m")) {
     throw std::runtime_error(file.string() + ": columns x_m,y_m,dbh_m expected");
   }
+
   std::vector<PlotStem> stems;
   while (std::getline(lines, line)) {
     std::replace(line.begin(), line.end(), ',', ' ');
@@ -83,15 +86,19 @@ ForestPlot read_forest_plot(const std::filesystem::path& folder, const std::stri
 PlotGround::PlotGround(std::span<const PlotPoint> points, double cell_m) : cell_m_(cell_m) {
   if (points.empty()) throw std::invalid_argument("no points to tell the ground");
   low_m_ = points.front().position_m.head<2>();
+
   Eigen::Vector2d high = low_m_;
   for (const PlotPoint& point : points) {
     low_m_ = low_m_.cwiseMin(point.position_m.head<2>());
     high = high.cwiseMax(point.position_m.head<2>());
   }
+
   columns_ = static_cast<int>((high - low_m_).x() / cell_m_) + 1;
   rows_ = static_cast<int>((high - low_m_).y() / cell_m_) + 1;
   const auto cells = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
   heights_m_.assign(cells, 0.0);
+
+  // Mean height of the ground below the points of each cell.
   std::vector<int> counts(cells, 0);
   for (const PlotPoint& point : points) {
     const Eigen::Vector2d cell = (point.position_m.head<2>() - low_m_) / cell_m_;
@@ -117,6 +124,7 @@ double PlotGround::clamped(int column, int row) const {
 void PlotGround::fill_gaps(const std::vector<int>& counts) {
   const std::vector<double> known = heights_m_;
   const auto columns = static_cast<std::size_t>(columns_);
+
   for (std::size_t gap = 0; gap < counts.size(); ++gap) {
     if (counts[gap] > 0) continue;
     double sum = 0.0;
@@ -131,6 +139,7 @@ void PlotGround::fill_gaps(const std::vector<int>& counts) {
       sum += weight * known[i];
       weights += weight;
     }
+
     heights_m_[gap] = sum / weights;
   }
 }
@@ -182,6 +191,7 @@ void PlotScanner::measure_reach() {
   constexpr double kMore = 1.2;
   constexpr std::size_t kNeighbours = 4;
   const double most = parameters_.most_reach_m;
+
   std::vector<std::size_t> by_x(plot_.points.size());
   std::iota(by_x.begin(), by_x.end(), std::size_t{0});
   const auto place = [&](std::size_t i) -> const Eigen::Vector3d& {
@@ -190,6 +200,8 @@ void PlotScanner::measure_reach() {
   std::sort(by_x.begin(), by_x.end(), [&](std::size_t a, std::size_t b) {
     return plot_.points[a].position_m.x() < plot_.points[b].position_m.x();
   });
+
+  // Distance to the fourth neighbour, along a sorted axis.
   reach_m_.assign(by_x.size(), most);
   std::vector<double> distances;
   std::size_t first = 0;
@@ -199,6 +211,7 @@ void PlotScanner::measure_reach() {
     for (std::size_t j = first; j < by_x.size() && place(j).x() - place(i).x() <= most; ++j) {
       if (j != i) distances.push_back((place(j) - place(i)).norm());
     }
+
     if (distances.size() < kNeighbours) continue;
     std::nth_element(distances.begin(), distances.begin() + kNeighbours - 1, distances.end());
     reach_m_[by_x[i]] =
@@ -273,6 +286,8 @@ double PlotScanner::surface(std::span<const Return* const> near_beam, double azi
 
 std::vector<double> PlotScanner::ring(std::span<const Return> returns, double elevation_rad) const {
   const auto columns = static_cast<std::size_t>(parameters_.columns);
+
+  // Which points are near the beam, by column.
   std::vector<std::vector<const Return*>> near_beam(columns);
   for (const Return& point : returns) {
     if (std::abs(point.elevation_rad - elevation_rad) * point.range_m > point.reach_m) {
@@ -288,6 +303,7 @@ std::vector<double> PlotScanner::ring(std::span<const Return> returns, double el
       near_beam[static_cast<std::size_t>(wrapped)].push_back(&point);
     }
   }
+
   std::vector<double> ranges(columns, kNothing);
   for (std::size_t column = 0; column < columns; ++column) {
     std::stable_sort(near_beam[column].begin(), near_beam[column].end(),
@@ -327,15 +343,18 @@ PlotSweep PlotScanner::sweep(const Eigen::Vector2d& station_m, std::mt19937_64& 
   const Eigen::Vector3d sensor(station_m.x(), station_m.y(),
                                ground_.height_m(station_m) + parameters_.sensor_height_m);
   const std::vector<Return> returns = returns_at(sensor);
+
   std::vector<std::vector<double>> ranges;
   for (const double elevation : parameters_.elevations_rad) {
     ranges.push_back(ring(returns, elevation));
   }
+
   PlotSweep result;
   result.stems.resize(plot_.stems.size());
   for (std::size_t i = 0; i < result.stems.size(); ++i) {
     result.stems[i].is_whole = is_whole(i, station_m);
   }
+
   model::PointSweep& sweep = result.sweep;
   sweep.is_deskewed = true;
   sweep.rings = static_cast<std::uint16_t>(ranges.size());
@@ -343,6 +362,7 @@ PlotSweep PlotScanner::sweep(const Eigen::Vector2d& station_m, std::mt19937_64& 
   sweep.sensor_position_m = {0.0, 0.0, parameters_.sensor_height_m};
   sweep.attitude =
       model::Attitude{Eigen::Quaterniond::Identity(), 1e-6 * Eigen::Matrix2d::Identity()};
+
   constexpr double kTurn_s = 0.1;
   std::normal_distribution<double> noise(0.0, parameters_.range_sigma_m);
   for (int column = 0; column < parameters_.columns; ++column) {
@@ -352,6 +372,7 @@ PlotSweep PlotScanner::sweep(const Eigen::Vector2d& station_m, std::mt19937_64& 
       const double elevation = parameters_.elevations_rad[i];
       const double exact = std::min(ranges[i][static_cast<std::size_t>(column)],
                                     ground_range(sensor, azimuth, elevation));
+
       const double surplus = exact * std::cos(elevation) - stem.level_m;  // NaN: nothing at all
       const double above =
           sensor.z() + stem.level_m * std::tan(elevation) - ground_.height_m(station_m);
@@ -360,6 +381,7 @@ PlotSweep PlotScanner::sweep(const Eigen::Vector2d& station_m, std::mt19937_64& 
         if (surplus <= kBark_m) ++result.stems[stem.stem].returns;
       }
       if (!std::isfinite(exact) || surplus > kBark_m) continue;
+
       const double range = exact + noise(random);
       model::SweepPoint point;
       point.x_m = static_cast<float>(range * std::cos(elevation) * std::cos(azimuth));

@@ -58,6 +58,8 @@ template <class Counts>
 PlotErrors errors_of(const ForestPlot& plot, const PlotScore& score, Counts counts) {
   std::vector<Eigen::Vector2d> means(plot.stems.size(), Eigen::Vector2d::Zero());
   std::vector<double> numbers(plot.stems.size(), 0.0);
+
+  // Differences to the list, and the mean of each stem's detections.
   PlotErrors errors;
   double square_m2 = 0.0;
   for (const PlotDetection& one : score.detections) {
@@ -68,7 +70,10 @@ PlotErrors errors_of(const ForestPlot& plot, const PlotScore& score, Counts coun
     means[i] += (one.position_m - means[i]) / ++numbers[i];
     ++errors.detections;
   }
+
   if (errors.detections == 0) return errors;
+
+  // Spread of the detections about their stem's mean.
   double spread_m2 = 0.0;
   double freedom = 0.0;
   for (const PlotDetection& one : score.detections) {
@@ -79,6 +84,7 @@ PlotErrors errors_of(const ForestPlot& plot, const PlotScore& score, Counts coun
     errors.nees += off.dot(one.covariance_m2.inverse() * off);
     freedom += 1.0 - 1.0 / numbers[i];  // the mean is of the same detections
   }
+
   const auto number = static_cast<double>(errors.detections);
   errors.difference_m = std::sqrt(square_m2 / number);
   errors.radius_bias_m /= number;

@@ -83,15 +83,18 @@ nlohmann::json trace_of(const harness::ChainRun& run) {
     }
     return out;
   };
+
   nlohmann::json landmarks = nlohmann::json::array();
   for (const model::MapLandmark& landmark : run.landmarks) {
     landmarks.push_back({landmark.position_m.x(), landmark.position_m.y(), landmark.radius_m,
                          static_cast<int>(landmark.kind)});
   }
+
   nlohmann::json counts = nlohmann::json::array();
   for (const model::EkfPose& pose : run.ekf) {
     counts.push_back({1e-6 * static_cast<double>(pose.utime), pose.landmarks_used});
   }
+
   return {{"truth", points(run.truth, 5)},
           {"raw", points(run.dead_reckoned, 10)},
           {"ekf", points(harness::poses_of(run.ekf), 1)},

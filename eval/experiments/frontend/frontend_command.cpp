@@ -78,6 +78,7 @@ void add_drive_rows(const FrontendOptions& options, const std::atomic<bool>& sto
              return section == "chain" || drive.name.starts_with(section);
            });
   });
+
   std::vector<harness::ChainRun> runs(drives.size());
   tools::run_in_parallel(drives.size(), options.jobs, "chain", stop, [&](std::size_t i) {
     sim::SensorSuite suite;
@@ -90,6 +91,7 @@ void add_drive_rows(const FrontendOptions& options, const std::atomic<bool>& sto
     };
     runs[i] = drive_chain(drive, chain);
   });
+
   for (std::size_t i = 0; i < drives.size(); ++i) {
     rows.in("whole chain, simulated " + drives[i].name + ", 32 beams");
     add_chain_rows(runs[i], drives[i].ate_target_m, rows);
@@ -106,6 +108,7 @@ void run(const FrontendOptions& options) {
   const auto& stop = terminal::catch_interrupts();
   FrontendRows rows;
   nlohmann::json traces = nlohmann::json::object();
+
   if (wants(options, "extraction")) add_extraction_rows(options, stop, rows);
   nlohmann::json plots = nlohmann::json::object();
   if (wants(options, "forest-plots")) add_forest_plot_rows(options, stop, rows, plots);
@@ -113,13 +116,16 @@ void run(const FrontendOptions& options) {
   if (wants(options, "filter")) add_filter_rows(options, stop, rows);
   add_drive_rows(options, stop, rows, traces);
   if (wants(options, "faults")) add_fault_rows(options, stop, rows);
+
   std::cout << to_table(rows.rows());
   if (options.json.empty()) return;
+
   const nlohmann::json config = {
       {"seed", options.seed}, {"runs", options.runs}, {"drive_m", options.drive_m}};
   harness::write_json(options.json,
                       harness::result_document("frontend", config, to_json(rows.rows())));
   harness::write_json(harness::traces_file(options.json), traces);
+
   if (!plots.empty()) {
     // The clouds may not be redistributed: their picture is kept, they are not.
     fs::path file = options.json;
@@ -139,6 +145,7 @@ void add_frontend_experiment(CLI::App& eval) {
       "frontend", "From raw sensors to a pose: extraction, tracks, filter, whole chain, faults");
   auto options = std::make_shared<FrontendOptions>();
   options->config_dir = "deploy/config/lidar";
+
   command->add_option("--runs", options->runs, "Runs of the filter; others follow from it")
       ->check(CLI::Range(1, 100000));
   command->add_option("--seed", options->seed, "Seed of everything");
@@ -146,6 +153,7 @@ void add_frontend_experiment(CLI::App& eval) {
   command->add_option("--drive-m", options->drive_m, "Length of the forest drive [m]")
       ->check(CLI::Range(50.0, 100000.0));
   command->add_option("--config", options->config_dir, "Configuration of the chain's services");
+
   const char* const data = std::getenv("UNDERSTORY_DATA");  // NOLINT(concurrency-mt-unsafe)
   options->data = data != nullptr ? data : "../shared/data";
   command->add_option("--data", options->data, "Folder with pole_maps; default $UNDERSTORY_DATA");
@@ -155,6 +163,7 @@ void add_frontend_experiment(CLI::App& eval) {
       "extraction, forest-plots, tracking, filter, chain, faults, or the beginning of a chain "
       "drive's name (forest, urban, country, poles)");
   command->add_flag("!--no-plots", options->plots, "No plots");
+
   command->callback([options] { run_guarded("frontend", [options] { run(*options); }); });
 }
 

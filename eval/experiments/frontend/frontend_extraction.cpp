@@ -47,6 +47,7 @@ void add_extraction_rows(const FrontendOptions& options, const std::atomic<bool>
     extraction.seed = options.seed;
     scores[i] = score_extraction(drive, {}, extraction);
   });
+
   for (std::size_t i = 0; i < count; ++i) {
     const ExtractionScore& score = scores[i];
     const bool is_urban = i % 2 == 1;
@@ -54,6 +55,7 @@ void add_extraction_rows(const FrontendOptions& options, const std::atomic<bool>
     rows.in(fmt::format("landmark_extractor, simulated {}: {} ({} sweeps of {:.0f} points)",
                         is_urban ? "town" : "forest", kLidars[i / 2].name, score.sweeps,
                         score.points));
+
     const char* what = is_urban ? "corners" : "trunks";
     rows.at_least(fmt::format("{}: precision", what), kind.precision(), "", is_urban ? 0.95 : 0.97);
     rows.at_least(fmt::format("{}: recall", what), kind.recall(), "", is_urban ? 0.85 : 0.9);
@@ -61,6 +63,7 @@ void add_extraction_rows(const FrontendOptions& options, const std::atomic<bool>
                  is_urban ? 5.0 : 3.0);
     rows.state(fmt::format("{}: mean error along the ray", what), 1e3 * kind.bias_along_m, "mm");
     rows.state(fmt::format("{}: mean error across it", what), 1e3 * kind.bias_across_m, "mm");
+
     if (is_urban) {
       rows.at_most("corners: bisector, RMS", 180.0 / std::numbers::pi * kind.bearing_rms_rad, "deg",
                    2.0);
@@ -68,6 +71,7 @@ void add_extraction_rows(const FrontendOptions& options, const std::atomic<bool>
       rows.at_least("poles and trunks in town: precision", score.trunks.precision(), "", 0.97);
       rows.at_least("poles and trunks in town: recall", score.trunks.recall(), "", 0.9);
     }
+
     rows.between(fmt::format("{}: NEES in the plan (2)", what), kind.nees_plan, "", 1.5, 2.5);
     rows.at_most("time per sweep p99", score.time_p99_ms, "ms", 10.0);
     rows.state("time per sweep median", score.time_p50_ms, "ms");

@@ -25,20 +25,24 @@ nlohmann::json trace_of(const ForestPlot& plot, const PlotScore& score) {
   for (const PlotPoint& point : plot.points) {
     points.push_back({point.position_m.x(), point.position_m.y(), point.height_m});
   }
+
   nlohmann::json stems = nlohmann::json::array();
   for (std::size_t i = 0; i < plot.stems.size(); ++i) {
     const PlotStem& stem = plot.stems[i];
     stems.push_back({stem.position_m.x(), stem.position_m.y(), stem.radius_m,
                      score.should_of_stem[i], score.found_of_stem[i]});
   }
+
   nlohmann::json detections = nlohmann::json::array();
   for (const PlotDetection& one : score.detections) {
     detections.push_back({one.position_m.x(), one.position_m.y(), one.radius_m, one.stem});
   }
+
   nlohmann::json stations = nlohmann::json::array();
   for (const Eigen::Vector2d& place : score.stations_m) {
     stations.push_back({place.x(), place.y()});
   }
+
   return {{"points", points}, {"stems", stems}, {"detections", detections}, {"stations", stations}};
 }
 
@@ -57,12 +61,14 @@ void add_rows(const PlotScore& score, FrontendRows& rows) {
   const auto ever = [](const std::vector<std::uint32_t>& counts) {
     return static_cast<double>(std::ranges::count_if(counts, [](auto n) { return n > 0; }));
   };
+
   rows.state("stems to be found", static_cast<double>(score.should), "");
   rows.state("stems found of those with 5 returns", score.recall(), "");
   rows.state("detections that are a stem", score.precision(), "");
   rows.state("corners (there are none)", static_cast<double>(score.corners), "");
   add_errors("near side shown", score.whole, rows);
   add_errors("all", score.all, rows);
+
   const auto refused = [&](const char* why, std::uint64_t count) {
     rows.state(fmt::format("refused columns: {}", why), static_cast<double>(count), "");
   };
@@ -74,6 +80,7 @@ void add_rows(const PlotScore& score, FrontendRows& rows) {
   refused("uncertain", score.trunks.uncertain);
   refused("not upright", score.trunks.not_standing);
   refused("in leaves", score.trunks.in_leaves);
+
   rows.state("stems that had to be found from some station", ever(score.should_of_stem), "");
   rows.state("of them found from some station", ever(score.found_of_stem), "");
 }

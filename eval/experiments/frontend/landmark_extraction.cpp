@@ -61,6 +61,7 @@ struct Tally {
     const Eigen::Matrix2d plan = detection.covariance_m2.topLeftCorner<2, 2>();
     score.nees_plan += error.head<2>().dot(plan.inverse() * error.head<2>());
     score.nees_space += error.dot(detection.covariance_m2.inverse() * error);
+
     if (truth.position_m.head<2>().norm() <= error_range_m) {
       square_m2 += error.head<2>().squaredNorm();
       const Eigen::Vector2d ray = truth.position_m.head<2>().normalized();
@@ -68,6 +69,7 @@ struct Tally {
       score.bias_across_m += ray.x() * error.y() - ray.y() * error.x();
       ++near;
     }
+
     if (truth.bisector_rad) {
       const double turned =
           std::remainder(detection.bearing_rad - *truth.bisector_rad, 2.0 * std::numbers::pi);

@@ -65,6 +65,7 @@ EkfDriveResult run_lidar_drive(const LidarDriveOptions& options, std::uint64_t s
       {lidar_imu_input::lidar_imu_input_service(), landmark_extractor::landmark_extractor_service(),
        associator::associator_service(), ekf::ekf_service()},
       options.config_dir);
+
   EkfDriveResult result;
   std::optional<geometry::SE2> start;
   model::Utime last_scan = 0;
@@ -77,6 +78,7 @@ EkfDriveResult run_lidar_drive(const LidarDriveOptions& options, std::uint64_t s
     if (pose.utime == last_scan) add_pose_nees(pose, start->inverse() * world, result);
     result.restarts = pose.reset_counter;
   });
+
   std::uint64_t parts = 0;
   while (const auto reading = drive.next()) {
     const auto* sweep = std::get_if<sim::SimulatedSweep>(&*reading);
@@ -87,6 +89,7 @@ EkfDriveResult run_lidar_drive(const LidarDriveOptions& options, std::uint64_t s
     for (const harness::RawMessage& message : harness::raw_messages(*reading, parts))
       chain.feed(message);
   }
+
   chain.finish();
   return result;
 }

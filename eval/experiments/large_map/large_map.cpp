@@ -158,14 +158,17 @@ void ask(const PlaceFinder& finder, const PlaceQuestion& question, Score& score)
   const PlaceAnswer answer = finder.find(question.keyframe);
   score.ms.push_back(1e3 * (tools::thread_time_s() - start));
   ++score.keyframes;
+
   if (!answer.map_T_base) {
     ++score.unsure;
     ++score.reasons[answer.reason];
     return;
   }
+
   const double error = keyframe_error_m(question, *answer.map_T_base);
   const double base_error =
       (answer.map_T_base->translation() - question.world_T_member[0].translation()).norm();
+
   score.error_m.push_back(error);
   score.base_error_m.push_back(base_error);
   score.within_0_10m += error <= 0.1 ? 1 : 0;
@@ -234,6 +237,7 @@ void print_rows(const nlohmann::json& rows, double yardstick_ms) {
   fmt::print("{:<27} {:<7} {:>9} {:>9} {:>7} {:>7} {:>6} {:>6} {:>7} {:>8} {:>8} {:>8} {:>8}\n",
              "setting", "method", "keyframes", "<= 0.1 m", "(base)", "<= .5 m", "wrong", "unsure",
              "p50 cm", "p50 ms", "p99 ms", "max ms", "/Delaun.");
+
   for (const nlohmann::json& row : rows) {
     fmt::print(
         "{:<27} {:<7} {:>9} {:>9} {:>7} {:>7} {:>6} {:>6} {:>7.2f} {:>8.3f} {:>8.3f} {:>8.3f} "
@@ -244,6 +248,7 @@ void print_rows(const nlohmann::json& rows, double yardstick_ms) {
         row["unsure"].get<int>(), row["error_p50_cm"].get<double>(), row["ms_p50"].get<double>(),
         row["ms_p99"].get<double>(), row["ms_max"].get<double>(), row["ratio"].get<double>());
   }
+
   fmt::print(
       "<= 0.1 m: the keyframe (mean of its scans' positions); (base): its first scan alone, whose "
       "own "
@@ -256,6 +261,7 @@ void run_large_map(const LargeMapOptions& options) {
   const std::atomic<bool>& stop = terminal::catch_interrupts();
   const double yardstick_ms = 1e3 * tools::delaunay_build_s();
   nlohmann::json rows = nlohmann::json::array();
+
   for (const Setting& setting : settings()) {
     for (const std::string& method : options.campaign.methods) {
       if (method == "oracle") continue;
@@ -263,8 +269,10 @@ void run_large_map(const LargeMapOptions& options) {
       rows.push_back(row_of(setting, method, score, yardstick_ms));
     }
   }
+
   print_rows(rows, yardstick_ms);
   if (options.campaign.json.empty()) return;
+
   const nlohmann::json config{{"seed", options.campaign.seed},
                               {"runs", options.campaign.runs},
                               {"side_km", options.side_km},

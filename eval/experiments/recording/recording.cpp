@@ -57,15 +57,18 @@ Recording drive_recording(const Options& options, const std::atomic<bool>& stop)
   harness::SensorChain chain(harness::front_end_services(), options.config_dir);
   watch_chain(chain, recording.run);
   watch_pictures(chain, recording);
+
   io::LcmLogReader reader(options.log);
   terminal::Progress progress(options.name, static_cast<double>(reader.size_bytes()),
                               terminal::Progress::Without::kSeconds);
+
   std::uint64_t position = 0;
   std::optional<model::Utime> begin;
   while (const auto event = reader.next()) {
     if (stop) throw std::runtime_error("interrupted");
     begin = begin.value_or(event->utime);
     recording.run.simulated_s = 1e-6 * static_cast<double>(event->utime - *begin);
+
     if (event->channel == "GROUND_TRUTH") {
       if (const auto truth = wire::decode_message<ground_truth_t>(event->data)) {
         recording.run.truth.push_back({truth->utime, wire::from_wire(truth->world_T_vehicle)});
@@ -74,10 +77,12 @@ Recording drive_recording(const Options& options, const std::atomic<bool>& stop)
       if (const auto fix = wire::decode_message<model::GnssFix>(event->data))
         recording.fixes.push_back(*fix);
     }
+
     if (event->channel.starts_with("RAW_")) chain.feed(event->channel, event->data);
     progress.advance(reader.position_bytes() - position);
     position = reader.position_bytes();
   }
+
   finish_chain(chain, recording.run);
   recording.run.sweeps = recording.run.detections.size();
   return recording;
@@ -110,6 +115,7 @@ nlohmann::json pictures_of(const Recording& recording) {
   for (const model::LandmarkScan& scan : recording.landmarks) {
     for (const model::PointSweep& sweep : recording.sweeps) {
       if (sweep.utime != scan.utime) continue;
+
       nlohmann::json points = nlohmann::json::array();
       const Eigen::Quaternionf level =
           sweep.attitude.value_or(model::Attitude{}).level_Q_vehicle.cast<float>();
@@ -118,11 +124,13 @@ nlohmann::json pictures_of(const Recording& recording) {
         const Eigen::Vector3f p = level * sweep.points[i].position();
         points.push_back({p.x(), p.y(), p.z()});
       }
+
       nlohmann::json detections = nlohmann::json::array();
       for (const model::Detection& detection : scan.detections) {
         detections.push_back({detection.position_m.x(), detection.position_m.y(),
                               detection.radius_m, static_cast<int>(detection.kind)});
       }
+
       pictures.push_back({{"utime", scan.utime}, {"points", points}, {"detections", detections}});
     }
   }
@@ -133,6 +141,8 @@ void run(Options options) {
   const auto& stop = terminal::catch_interrupts();
   if (options.name.empty()) options.name = std::filesystem::path(options.log).stem().string();
   const Recording recording = drive_recording(options, stop);
+
+  // The table.
   frontend::FrontendRows rows;
   rows.in(fmt::format("recording {}: {:.1f} s, {} sweeps", options.name, recording.run.simulated_s,
                       recording.run.sweeps));
@@ -144,6 +154,7 @@ void run(Options options) {
     add_time_rows(recording.run, rows);
   }
   if (!recording.fixes.empty()) add_gnss_rows(recording, rows);
+
   std::cout << to_table(rows.rows());
   for (const auto& [service, health] : recording.run.health) {
     for (const reason_count_t& reason : health.reasons) {
@@ -151,7 +162,10 @@ void run(Options options) {
                                reason.count);
     }
   }
+
   if (options.json.empty()) return;
+
+  // The documents, with what the plots draw.
   nlohmann::json trace = frontend::trace_of(recording.run);
   nlohmann::json fixes = nlohmann::json::array();
   for (const model::GnssFix& fix : recording.fixes) {
@@ -160,6 +174,7 @@ void run(Options options) {
   }
   trace["fixes"] = fixes;
   trace["pictures"] = pictures_of(recording);
+
   harness::write_json(
       options.json,
       harness::result_document("recording", {{"recording", options.name}}, to_json(rows.rows())));

@@ -82,21 +82,25 @@ std::vector<Step> steps_of(const harness::ChainRun& run,
 std::vector<Sample> samples_of(std::span<const Step> steps, int run) {
   std::vector<Sample> samples;
   if (steps.empty()) return samples;
+
   const geometry::SE2 world_T_map = steps.front().truth * steps.front().estimate.inverse();
   const auto error = [&](const Step& step) {
     return Eigen::Vector2d(world_T_map * step.estimate.translation() - step.truth.translation());
   };
+
   for (std::size_t k = 1; k < steps.size(); ++k) {
     const Step& now = steps[k];
     const Step& before = steps[k - 1];
     const double pause_s = 1e-6 * static_cast<double>(now.utime - before.utime);
     const double way = (now.truth.translation() - before.truth.translation()).norm();
     if (pause_s > 0.15 || way < kStationary_m) continue;
+
     Sample sample;
     sample.run = run;
     sample.time_s = 1e-6 * static_cast<double>(now.utime);
     sample.landmarks = now.landmarks;
     sample.change_m = 0.5 * (error(now) - error(before)).norm();
+
     if (k >= kSecond && now.utime - steps[k - kSecond].utime < 1150000) {
       const Step& start = steps[k - kSecond];
       sample.second_m = ((start.estimate.inverse() * now.estimate).translation() -
@@ -127,12 +131,14 @@ Means means_of(const std::vector<Sample>& samples, std::uint32_t first, std::uin
       ++means.sweeps;
       means.change_m += sample.change_m;
     }
+
     const auto around = static_cast<std::uint32_t>(std::lround(sample.mean_landmarks));
     if (sample.second_m && around >= first && around <= last) {
       ++means.seconds;
       means.second_m += *sample.second_m;
     }
   }
+
   means.change_m /= static_cast<double>(std::max<std::size_t>(1, means.sweeps));
   means.second_m /= static_cast<double>(std::max<std::size_t>(1, means.seconds));
   return means;
@@ -143,6 +149,7 @@ nlohmann::json rows_of(const std::vector<Curve>& curves) {
   for (const Curve& curve : curves) {
     std::uint32_t most = 0;
     for (const Sample& sample : curve.samples) most = std::max(most, sample.landmarks);
+
     for (std::uint32_t landmarks = 0; landmarks <= most; ++landmarks) {
       const Means means = means_of(curve.samples, landmarks, landmarks);
       if (means.sweeps + means.seconds == 0) continue;
@@ -162,12 +169,14 @@ void print(const std::vector<Curve>& curves) {
   constexpr std::uint32_t kBounds[] = {0, 1, 2, 3, 4, 7, 10, 16, 1000};
   std::cout << fmt::format("{:<20} {:<10} {:>9} {:>7} {:>24} {:>20}\n", "route", "estimate",
                            "landmarks", "sweeps", "change of error (4.1)", "error of a second");
+
   for (const Curve& curve : curves) {
     for (std::size_t b = 0; b + 1 < std::size(kBounds); ++b) {
       const std::uint32_t first = kBounds[b];
       const std::uint32_t last = kBounds[b + 1] - 1;
       const Means means = means_of(curve.samples, first, last);
       if (means.sweeps == 0) continue;
+
       const std::string range = first == last ? fmt::format("{}", first)
                                 : last >= 999 ? fmt::format("{}..", first)
                                               : fmt::format("{}..{}", first, last);

@@ -60,6 +60,7 @@ void run(const Options& options) {
   const auto& stop = terminal::catch_interrupts();
   const Sources sources = find_sources(data_folder(options));
   const io::VictoriaPark recording = io::read_victoria_park(sources.recording);
+
   VictoriaParkConfig config = victoria_park_defaults();
   config.end_s = options.end_s;
   VictoriaParkRun driven = [&] {
@@ -70,12 +71,14 @@ void run(const Options& options) {
       progress.advance();
     });
   }();
+
   std::vector<metrics::CuratedObservation> curated;
   std::vector<metrics::StampedPose> batch;
   if (fs::exists(sources.curated)) curated = metrics::read_curated_observations(sources.curated);
   if (fs::exists(sources.batch)) {
     batch = read_batch_solution(sources.batch, driven.dead_reckoned);
   }
+
   const VictoriaParkReport report = assess(std::move(driven), recording, curated, batch);
   print(report);
   if (!options.json.empty()) write_results(options, report);

@@ -162,15 +162,18 @@ void print(const VictoriaParkReport& report) {
                row.errors.at_time_median_m, row.errors.at_time_p90_m, row.errors.to_path_median_m,
                row.errors.to_path_p90_m);
   }
+
   fmt::print(
       "fix: distance of a GPS fix from the pose at its time; path: from the nearest point of the\n"
       "path (the batch solution has no stamps of its own). After one rigid alignment.\n\n");
   const VictoriaParkRun& run = report.run;
+
   fmt::print(
       "{} keyframes: {} localised, {} not sure, {} rolled back; {} withheld; longest gap {:.1f} "
       "s\n",
       run.updates.size(), run.live.size(), count(run, model::MapUpdateStatus::kNotSure),
       count(run, model::MapUpdateStatus::kRolledBack), run.keyframes_withheld,
+
       longest_gap_s(run.live));
   fmt::print("{} landmarks", run.landmarks.size());
   if (const auto& trees = report.rows.front().trees) {
@@ -180,6 +183,7 @@ void print(const VictoriaParkReport& report) {
         trees->well_seen, trees->found, trees->doubled, trees->landmarks_elsewhere,
         trees->median_spread_m, trees->median_distance_m);
   }
+
   const std::vector<double> times = scan_times_ms(run);
   fmt::print("\ntime per scan: {:.3f} ms median, {:.2f} ms p99, {:.2f} ms max\n",
              tools::quantile(times, 0.5), tools::quantile(times, 0.99),
@@ -191,11 +195,13 @@ nlohmann::json to_json(const VictoriaParkReport& report) {
   nlohmann::json json;
   json["rows"] = array_of(report.rows, row_json);
   add_run(run, json["rows"][0]);
+
   const geometry::SE2& world_T_map = report.rows.front().errors.world_T_map;
   json["world_T_map"] = {world_T_map.x(), world_T_map.y(), world_T_map.theta()};
   const auto pose = [](const metrics::StampedPose& value) { return to_json(value); };
   json["trajectory"] = array_of(run.trajectory, pose);
   json["published"] = array_of(run.live, pose);
+
   json["dead_reckoned"] = array_of(run.dead_reckoned, pose);
   json["landmarks"] = array_of(run.landmarks, [](const model::MapLandmark& landmark) {
     return nlohmann::json{landmark.position_m.x(), landmark.position_m.y(), landmark.radius_m,
@@ -205,9 +211,11 @@ nlohmann::json to_json(const VictoriaParkReport& report) {
     return nlohmann::json{static_cast<double>(fix.utime) * 1e-6, fix.east_north_m.x(),
                           fix.east_north_m.y()};
   });
+
   if (report.rows.front().trees) json["trees"] = trees_json(*report.rows.front().trees);
   json["updates"] = array_of(run.updates, [](const model::MapUpdate& update) {
     return nlohmann::json{{"t_s", static_cast<double>(update.utime) * 1e-6},
+
                           {"status", static_cast<int>(update.status)},
                           {"prior", update.used_prior},
                           {"inliers", update.inliers},
