@@ -14,10 +14,12 @@ model::Keyframe keyframe_of(const model::LandmarkScan& scan, std::uint64_t seque
   keyframe.utime = scan.utime;
   keyframe.sequence = sequence;
   keyframe.field_of_view = scan.field_of_view;
-  // The only member is the base: the landmarks' frame is the vehicle's, without an error.
+  // The only member is the base, and the landmarks' frame is the vehicle's: the pose of the base in
+  // it is exact, but for a millimetre, so that no covariance is singular.
   model::KeyframeMember base;
   base.utime = scan.utime;
   base.sequence = scan.sequence;
+  base.covariance = 1e-6 * Eigen::Matrix3d::Identity();
   keyframe.members.push_back(base);
   for (const model::Detection& detection : scan.detections) {
     keyframe.landmarks.push_back({.position_m = detection.position_m.head<2>(),
