@@ -40,7 +40,7 @@ class MapTruth {
   /// The true trunk nearest to a point of the map. Of all trunks: one just out of range is
   /// detected when noise brings it in, and is no false landmark.
   sim::PointGrid::Neighbour nearest_trunk(const Eigen::Vector2d& point_in_map_m) const;
-  /// True trunks within `radius_m` of a point of the map, in no meaningful order.
+  /// True trunks within `radius_m` of a point of the map.
   std::vector<std::uint32_t> trunks_within(const Eigen::Vector2d& point_in_map_m,
                                            double radius_m) const;
   /// True position of a trunk, frame `map`.

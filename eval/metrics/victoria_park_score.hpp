@@ -21,7 +21,7 @@ struct StampedPose {
   geometry::SE2 pose;
 };
 
-/// Whether the update places its keyframe in the map: started, updated or folded.
+/// Whether the update has a pose of its keyframe in the map: it started the map or updated it.
 bool localised(const model::MapUpdate& update);
 
 /// The pose at a time, between the poses before and after; none outside of the trajectory. The

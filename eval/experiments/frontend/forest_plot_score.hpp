@@ -64,8 +64,7 @@ struct PlotScore {
 /// Places on a grid in the plot where a vehicle has room [m], frame of the plot.
 std::vector<Eigen::Vector2d> plot_stations(const ForestPlot& plot, const PlotScoreOptions& options);
 
-/// Runs the extractor on a sweep from every station. Takes seconds to minutes: a sweep of a plot
-/// costs about 0.1 s.
+/// Runs the extractor on one sweep from every station. Everything follows from `options.seed`.
 PlotScore score_plot(const ForestPlot& plot,
                      const landmark_extractor::LandmarkExtractorParameters& parameters,
                      const PlotScoreOptions& options);
