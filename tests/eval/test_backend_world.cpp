@@ -1,4 +1,4 @@
-// A simulated street grid is what it says, and the smoother solves it as well as a batch solution.
+// A simulated street grid has the stated noise, and the smoother solves it as well as a batch solver.
 #include <cmath>
 
 #include "eval/experiments/backend/backend.hpp"

@@ -99,7 +99,7 @@ TEST_CASE("Result files are written whole or not at all", "[results]") {
     CHECK(read.contains(key));
   }
   CHECK(eval::harness::traces_file(file) == folder / "a.traces.json");
-  // A directory stands where the file should go: nothing is left behind.
+  // A directory has the name of the file: nothing is left behind.
   fs::create_directories(folder / "b.json" / "full");
   CHECK_THROWS_AS(eval::harness::write_json(folder / "b.json", read), std::runtime_error);
   CHECK_THROWS_AS(eval::harness::write_json(folder / "no" / "such.json", read), std::runtime_error);

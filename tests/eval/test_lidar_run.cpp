@@ -66,7 +66,7 @@ eval::harness::ChainTruth truth() {
 TEST_CASE("A vehicle that stands counts once, and errors are those of all states", "[lidar]") {
   const eval::harness::LidarResult result = score_chain(run_of(6, 0.2), truth());
   const eval::harness::RunScore& slam = result.slam.score;
-  // Places: the standing one without error, and three off by 0.2 m; states with 1 to 4 of them.
+  // Places: the stationary one without error, and three off by 0.2 m; states with 1 to 4 of them.
   CHECK(slam.errors.poses == 1 + 2 + 3 + 4);
   CHECK(slam.errors.rpe_m() == Approx(0.2 * (1 + 2 + 3) / 10.0));
   CHECK(slam.errors.lpe_m() == Approx(0.25));
@@ -91,7 +91,7 @@ TEST_CASE("The filter is scored in its own frame", "[lidar]") {
   CHECK(result.slam.score.ate_m > 0.01);
 }
 
-TEST_CASE("Updates that are wrong or refused are seen", "[lidar]") {
+TEST_CASE("Updates that are wrong or refused are counted", "[lidar]") {
   CHECK(score_chain(run_of(6, 1.5), truth()).slam.score.wrong_updates == 3);
   eval::harness::ChainRun run = run_of(6, 0.2);
   // Not sure: the map stays as it was, and counts once more.

@@ -40,7 +40,7 @@ void feed(eval::metrics::BatchOracle& oracle, const eval::harness::RecordedDrive
 }
 
 /// All unknowns in one vector, residuals in the vehicle's frame, Jacobian by central differences,
-/// Gauss-Newton by QR: nothing in common with the oracle's own way.
+/// Gauss-Newton by QR: nothing in common with the oracle's own method.
 class DenseBatch {
  public:
   DenseBatch(const eval::metrics::BatchOracle& start, std::vector<Observation> observations)

@@ -100,7 +100,7 @@ TEST_CASE("dead reckoning fills the gaps and ends where the next pose is known",
   CHECK(difference(filled.back().pose, after) < 1e-12);
 }
 
-TEST_CASE("fixes on the path, seen from elsewhere, have no error", "[victoria_park]") {
+TEST_CASE("fixes on the path, in another frame, have no error", "[victoria_park]") {
   const auto trajectory = arc(30);
   const geometry::SE2 world_T_map(100.0, -50.0, 2.0);
   std::vector<model::GnssFix> fixes;
