@@ -1,4 +1,5 @@
-// A simulated street grid has the stated noise, and the smoother solves it as well as a batch solver.
+// A simulated street grid has the stated noise, and the smoother solves it as well as a batch
+// solver.
 #include <cmath>
 
 #include "eval/experiments/backend/backend.hpp"
@@ -21,6 +22,7 @@ eval::experiments::backend::WorldParameters small_world() {
 TEST_CASE("a street grid has a motion for each step and closures of old places", "[backend]") {
   const factor_graph::files::GraphFile graph = make_world(small_world(), 3);
   REQUIRE(graph.vertices.size() == 600);
+
   int motions = 0;
   int closures = 0;
   for (const factor_graph::graph::Factor& factor : graph.factors) {
@@ -28,11 +30,13 @@ TEST_CASE("a street grid has a motion for each step and closures of old places",
     const int b = index(factor.variables[1]);
     REQUIRE(a < b);
     (b == a + 1 ? motions : closures) += 1;
-    // A step is a metre, and a closure is where one has been.
+
+    // A step is a metre, and a closure is at a place visited before.
     const double length = std::hypot(factor.measurement[0], factor.measurement[1]);
     CHECK(std::abs(length - (b == a + 1 ? 1.0 : 0.0)) < 0.5);
     CHECK((b == a + 1 || b - a > 20));
   }
+
   CHECK(motions == 599);
   CHECK(closures > 50);
 }

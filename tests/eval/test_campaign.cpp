@@ -52,13 +52,14 @@ TEST_CASE("Results do not depend on the number of jobs", "[campaign]") {
 TEST_CASE("Every job runs once; exceptions and stops come through", "[parallel]") {
   std::atomic<bool> stop{false};
   std::mutex mutex;
-  std::multiset<std::size_t> seen;
+  std::multiset<std::size_t> calls;
   eval::tools::run_in_parallel(100, 4, "jobs", stop, [&](std::size_t i) {
     const std::scoped_lock lock(mutex);
-    seen.insert(i);
+    calls.insert(i);
   });
-  CHECK(seen.size() == 100);
-  CHECK(std::set<std::size_t>(seen.begin(), seen.end()).size() == 100);
+  CHECK(calls.size() == 100);
+  CHECK(std::set<std::size_t>(calls.begin(), calls.end()).size() == 100);
+
   CHECK_THROWS_WITH(eval::tools::run_in_parallel(10, 3, "jobs", stop,
                                                  [](std::size_t i) {
                                                    if (i == 4) throw std::runtime_error("job four");
@@ -91,6 +92,7 @@ TEST_CASE("Result files are written whole or not at all", "[results]") {
   fs::remove_all(folder);
   fs::create_directory(folder);
   const fs::path file = folder / "a.json";
+
   eval::harness::write_json(
       file, eval::harness::result_document("paths", {{"runs", 1}}, nlohmann::json::array()));
   nlohmann::json read;
@@ -98,7 +100,9 @@ TEST_CASE("Result files are written whole or not at all", "[results]") {
   for (const char* key : {"experiment", "config", "rows", "machine", "version", "date"}) {
     CHECK(read.contains(key));
   }
+
   CHECK(eval::harness::traces_file(file) == folder / "a.traces.json");
+
   // A directory has the name of the file: nothing is left behind.
   fs::create_directories(folder / "b.json" / "full");
   CHECK_THROWS_AS(eval::harness::write_json(folder / "b.json", read), std::runtime_error);

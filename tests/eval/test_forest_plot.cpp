@@ -19,6 +19,7 @@ eval::experiments::frontend::ForestPlot round_stems(const std::vector<Eigen::Vec
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> part(0.0, 1.0);
   std::normal_distribution<double> bark(0.0, 0.005);
+
   for (const Eigen::Vector2d& place : places) {
     plot.stems.push_back({place, 0.15});
     for (int i = 0; i < 1600; ++i) {
@@ -29,6 +30,7 @@ eval::experiments::frontend::ForestPlot round_stems(const std::vector<Eigen::Vec
       plot.points.push_back({{at.x(), at.y(), 0.05 * at.x() + height}, height});
     }
   }
+
   return plot;
 }
 
@@ -45,6 +47,7 @@ TEST_CASE("A sweep out of a cloud lies on its near surfaces", "[forest_plot]") {
   const eval::experiments::frontend::PlotScanner scanner(plot, {});
   std::mt19937_64 random(1);
   const eval::experiments::frontend::PlotSweep result = scanner.sweep({0.0, 0.0}, random);
+
   std::vector<int> returns(plot.stems.size(), 0);
   int behind = 0;
   for (const model::SweepPoint& point : result.sweep.points) {
@@ -58,11 +61,13 @@ TEST_CASE("A sweep out of a cloud lies on its near surfaces", "[forest_plot]") {
       if (at.dot(stem.normalized()) > stem.norm() + 0.05) ++behind;
     }
   }
+
   CHECK(behind < 10);
   CHECK(returns[0] > 100);
   CHECK(returns[1] == 0);  // hidden
   CHECK(returns[2] > 100);
   CHECK(returns[3] > 100);
+
   CHECK(result.stems[0].returns > 0.9 * result.stems[0].beams);
   CHECK(result.stems[1].beams == 0);
 }

@@ -47,11 +47,13 @@ TEST_CASE("Consistency is scored against the truth", "[eval][front_end]") {
   eval::experiments::frontend::EkfDriveOptions options;
   options.drive = short_drive();
   options.duration_s = 12.0;
+
   std::vector<eval::experiments::frontend::EkfDriveResult> runs;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     runs.push_back(run_ekf_drive(options, forest, seed));
     REQUIRE(runs.back().nees.size() == 120);
   }
+
   const eval::experiments::frontend::EkfConsistency summary = summarise(runs);
   REQUIRE(summary.runs == 8);
   REQUIRE(summary.band_low < 3.0);
@@ -60,14 +62,16 @@ TEST_CASE("Consistency is scored against the truth", "[eval][front_end]") {
   REQUIRE(summary.overall_nees < 6.0);
   REQUIRE(summary.drift_percent < 2.0);
   REQUIRE(summary.restarts == 0);
-  // Errors made ten times larger are seen.
+
+  // Errors that are ten times larger are out of the band.
   for (eval::experiments::frontend::EkfDriveResult& run : runs) {
     for (double& nees : run.nees) nees *= 100.0;
   }
   REQUIRE(share_in_band(runs, {1, 120}, runs.size()) < 0.2);
 }
 
-TEST_CASE("A parked vehicle sways about its place, and its samples tell it", "[eval][front_end]") {
+TEST_CASE("A parked vehicle sways about its place, and its samples contain it",
+          "[eval][front_end]") {
   const sim::TrunkField forest = small_forest();
   sim::InertialDriveParameters drive = short_drive();
   drive.standing_s = 60.0;
@@ -77,32 +81,39 @@ TEST_CASE("A parked vehicle sways about its place, and its samples tell it", "[e
   drive.gyro_noise = drive.accelerometer_noise = 1e-9;
   drive.gyro_bias_sigma = drive.accelerometer_bias_sigma = 0.0;
   drive.gyro_walk = drive.accelerometer_walk = 0.0;
+
   sim::InertialDrive steps(drive, forest, 4);
   sim::DriveStep before = steps.next();
   std::vector<Eigen::Vector3d> places;
   double squared_mps = 0.0;
+
   for (int k = 1; k < 600; ++k) {
     const sim::DriveStep step = steps.next();
     REQUIRE(step.odometry.front().is_stationary);
     REQUIRE(step.driven_m == 0.0);
-    const model::Preintegration& told = *step.odometry.front().inertial;
+    const model::Preintegration& motion = *step.odometry.front().inertial;
+
     const Eigen::Matrix2d rotation = before.world_T_vehicle.rotation();
-    const Eigen::Vector2d velocity = before.velocity_mps + rotation * told.velocity_mps;
+    const Eigen::Vector2d velocity = before.velocity_mps + rotation * motion.velocity_mps;
     const Eigen::Vector2d position = before.world_T_vehicle.translation() +
-                                     before.velocity_mps * told.seconds +
-                                     rotation * told.position_m;
+                                     before.velocity_mps * motion.seconds +
+                                     rotation * motion.position_m;
+
     REQUIRE((velocity - step.velocity_mps).norm() < 1e-7);
     REQUIRE((position - step.world_T_vehicle.translation()).norm() < 1e-7);
+
     places.push_back(step.world_T_vehicle.coordinates());
     squared_mps += step.velocity_mps.squaredNorm() / (2.0 * 599.0);
     before = step;
   }
+
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& place : places) mean += place / static_cast<double>(places.size());
   Eigen::Vector3d variance = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& place : places) {
     variance += (place - mean).cwiseAbs2() / static_cast<double>(places.size());
   }
+
   // A standard deviation of 600 draws is right within 15 %, a random walk would be 20 times larger.
   REQUIRE(std::abs(std::sqrt(variance.x()) / drive.sway_sigma_m - 1.0) < 0.15);
   REQUIRE(std::abs(std::sqrt(variance.y()) / drive.sway_sigma_m - 1.0) < 0.15);

@@ -28,11 +28,13 @@ eval::harness::ChainRun run_of(int count, double offset_m) {
     landmark.position_m = position;
     state.landmarks.push_back(landmark);
   }
+
   for (int k = 0; k < count; ++k) {
     model::MapUpdate update;
     update.keyframe_sequence = static_cast<std::uint64_t>(k);
     update.utime = k * kKeyframe;
     update.status = k == 0 ? model::MapUpdateStatus::kFirstMap : model::MapUpdateStatus::kUpdated;
+
     const geometry::SE2 moved = truth_at(0).inverse() * truth_at(update.utime);
     update.map_T_vehicle = k < 3 ? moved : moved * geometry::SE2(0.0, offset_m, 0.0);
     update.covariance = 0.01 * Eigen::Matrix3d::Identity();
@@ -40,6 +42,7 @@ eval::harness::ChainRun run_of(int count, double offset_m) {
     state.keyframes.push_back(
         {update.keyframe_sequence, update.utime, update.map_T_vehicle, Eigen::Matrix3d::Zero()});
     run.states.push_back(state);
+
     // The filter has a frame of its own and no error.
     model::EkfPose ekf;
     ekf.utime = update.utime;
@@ -47,6 +50,7 @@ eval::harness::ChainRun run_of(int count, double offset_m) {
     ekf.covariance = 0.01 * Eigen::Matrix3d::Identity();
     run.ekf.push_back(ekf);
   }
+
   run.sweeps = 8 * static_cast<std::uint64_t>(count);
   return run;
 }
@@ -63,9 +67,10 @@ eval::harness::ChainTruth truth() {
 
 }  // namespace
 
-TEST_CASE("A vehicle that stands counts once, and errors are those of all states", "[lidar]") {
+TEST_CASE("A stationary vehicle counts once, and errors are those of all states", "[lidar]") {
   const eval::harness::LidarResult result = score_chain(run_of(6, 0.2), truth());
   const eval::harness::RunScore& slam = result.slam.score;
+
   // Places: the stationary one without error, and three off by 0.2 m; states with 1 to 4 of them.
   CHECK(slam.errors.poses == 1 + 2 + 3 + 4);
   CHECK(slam.errors.rpe_m() == Approx(0.2 * (1 + 2 + 3) / 10.0));
@@ -74,10 +79,12 @@ TEST_CASE("A vehicle that stands counts once, and errors are those of all states
   CHECK(slam.updates_possible == 6);
   CHECK(slam.wrong_updates == 0);
   CHECK(slam.landmarks_in_range == 3);
-  // Three trunks were seen well, one of them is not in the map.
+
+  // Three trunks were observed well, one of them is not in the map.
   CHECK(slam.completeness.well_seen == 3);
   CHECK(slam.completeness.recalled == 2);
   CHECK(slam.completeness.without_trunk == 0);
+
   REQUIRE(slam.nees.size() == 3);
   for (const auto& [place, nees] : slam.nees) CHECK(nees == Approx(4.0));
   CHECK(result.slam.trace.true_path.size() == 4);

@@ -49,8 +49,10 @@ TEST_CASE("A landmark is compared with the nearest trunk that was ever in range"
     for (int j = 0; j <= 20; ++j) forest.trunks_m.emplace_back(20.0 * i, 20.0 * j);
   }
   forest.radii_m.assign(forest.trunks_m.size(), 0.0);
+
   const sim::Drive drive(test::small_drive_parameters(), forest, 3);
   const eval::metrics::MapTruth truth(drive, 0);
+
   REQUIRE(truth.trunks_in_range().size() < forest.trunks_m.size());
   for (const std::uint32_t trunk : truth.trunks_in_range()) {
     const auto nearest = truth.nearest_trunk(truth.trunk_m(trunk));
@@ -84,19 +86,23 @@ TEST_CASE("ATE does not see a rigid motion of the whole, and measures the rest",
 TEST_CASE("Doubled and invented landmarks are false, missing ones lower the recall", "[metric]") {
   const sim::Drive drive(test::small_drive_parameters(), 1);
   const eval::metrics::MapTruth truth(drive, 0);
+
   std::vector<std::uint32_t> observation_count(drive.forest().trunks_m.size(), 0);
   std::vector<Eigen::Vector2d> landmarks;
   for (const std::uint32_t trunk : truth.trunks_in_range()) {
     observation_count[trunk] = 20;
     landmarks.push_back(truth.trunk_m(trunk) + Eigen::Vector2d(0.05, 0.0));
   }
+
   const std::size_t trunks = landmarks.size();
-  observation_count[truth.trunks_in_range()[0]] = 19;  // not seen often enough to be asked for
+  observation_count[truth.trunks_in_range()[0]] = 19;  // too few observations to be counted
   landmarks.push_back(landmarks[1] + Eigen::Vector2d(0.01, 0.0));
   landmarks.emplace_back(1000.0, 1000.0);
   landmarks.erase(landmarks.begin() + 2);
+
   const eval::metrics::MapCompleteness result =
       map_completeness(landmarks, truth, observation_count);
+
   CHECK(result.well_seen == trunks - 1);
   CHECK(result.recalled == trunks - 2);
   CHECK(result.landmarks == trunks + 1);

@@ -57,15 +57,18 @@ class Displacing : public geoslam_mapper::MapperMethod {
     update.keyframe_sequence = keyframe.sequence;
     update.status = model::MapUpdateStatus::kNotSure;
     if (keyframe.sequence == behaviour_.refused) return update;
+
     const std::size_t base = keyframe.members.front().sequence;
     geometry::SE2 pose = truth_.map_T_vehicle(base);
     if (!buffered_.empty() || !poses_.empty()) {
       pose =
           geometry::SE2(pose.translation() + Eigen::Vector2d(0, behaviour_.offset_m), pose.theta());
     }
+
     buffered_.push_back({keyframe.sequence, 0, pose, Eigen::Matrix3d::Identity()});
     update.map_T_vehicle = pose;
     update.covariance = Eigen::Matrix3d::Identity();
+
     if (keyframe.sequence < behaviour_.first_map_after) return update;
     update.status = model::MapUpdateStatus::kUpdated;
     poses_.insert(poses_.end(), buffered_.begin(), buffered_.end());

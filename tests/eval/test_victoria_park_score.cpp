@@ -152,10 +152,12 @@ TEST_CASE("trees are found, doubled and missed as they are", "[victoria_park]") 
   observe(observations, trajectory, 1, {10.0, 5.0}, 50);   // One landmark, 0.3 m off.
   observe(observations, trajectory, 2, {20.0, -8.0}, 50);  // Two landmarks.
   observe(observations, trajectory, 3, {40.0, 12.0}, 50);  // None.
-  observe(observations, trajectory, 4, {60.0, 12.0}, 5);   // Seen too seldom to count; one.
+  observe(observations, trajectory, 4, {60.0, 12.0}, 5);   // Too few observations to count; one.
+
   const std::vector<model::MapLandmark> landmarks{
       landmark(11, 10.3, 5.0), landmark(12, 20.1, -8.0), landmark(13, 20.0, -8.4),
       landmark(14, 60.0, 12.0), landmark(15, 90.0, 90.0)};
+
   const eval::metrics::TreeScore score = against_trees(trajectory, observations, landmarks);
   REQUIRE(score.trees.size() == 4);
   CHECK(score.well_seen == 3);
@@ -163,6 +165,7 @@ TEST_CASE("trees are found, doubled and missed as they are", "[victoria_park]") 
   CHECK(score.doubled == 1);
   CHECK(score.landmarks_elsewhere == 1);
   CHECK(score.median_spread_m < 1e-9);
+
   CHECK(score.trees[0].landmark == 11);
   CHECK(score.trees[0].distance_m == Approx(0.3));
   CHECK(score.trees[1].landmark == 12);  // The nearer one.
@@ -190,6 +193,7 @@ TEST_CASE("the spread of a tree is that of its observations", "[victoria_park]")
   std::normal_distribution<double> noise(0.0, 0.2);
   std::vector<eval::metrics::CuratedObservation> observations;
   observe(observations, trajectory, 1, {10.0, 5.0}, 60);
+
   double sum = 0.0;
   for (auto& one : observations) {
     const double dx = noise(random);
@@ -197,6 +201,7 @@ TEST_CASE("the spread of a tree is that of its observations", "[victoria_park]")
     one.position_m += Eigen::Vector2d(dx, dy);
     sum += dx * dx + dy * dy;
   }
+
   const eval::metrics::TreeScore score = against_trees(trajectory, observations, {});
   // Against the mean of the observations, which takes up a little of the noise.
   CHECK(score.median_spread_m == Approx(std::sqrt(sum / 60.0)).epsilon(0.1));
