@@ -12,7 +12,7 @@ std::unique_ptr<MapperMethod> make_mapper(const MapperParameters& parameters) {
     return smoothing::make_smoothing_mapper(parameters.smoothing);
   if (parameters.method == "baseline") return baseline::make_baseline_mapper(parameters.baseline);
   throw std::invalid_argument("geoslam_mapper: method '" + parameters.method +
-                              "' is not one of ours, source");
+                              "' is not one of: smoothing, baseline");
 }
 
 }  // namespace understory::geoslam_mapper

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "services/geoslam_mapper/geoslam_mapper.hpp"
+#include "services/geoslam_mapper/mapper_method.hpp"
 #include "services/geoslam_mapper/parameters.hpp"
 
 namespace understory::geoslam_mapper::baseline {

@@ -1,22 +1,32 @@
-// Where the filter says that the vehicle went lately: to gate by, never a measurement (the filter
-// sees the same detections).
+// Recent poses of the filter.
 #pragma once
 
 #include <deque>
 #include <optional>
 
 #include "common/geometry/se2.hpp"
+#include "common/model/archive.hpp"
 #include "common/model/ekf_output.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 
+/// The filter's poses of the last 10 s. They serve as a gate, never as a measurement: the filter
+/// uses the same detections.
 class FilterTrack {
  public:
-  /// In order of time; a pose that does not come later than the last is ignored. A restart of the
-  /// filter forgets all before it.
+  /// Adds a pose. One that is not later than the last is ignored; a restart of the filter forgets
+  /// all poses before it.
   void add(const model::EkfPose& pose);
-  /// Motion between two times, where the filter told poses near both.
+
+  /// Motion of the vehicle between two times; none where the filter gave no pose within 60 ms of
+  /// both.
   std::optional<geometry::SE2> between(model::Utime from, model::Utime to) const;
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.poses_);
+  }
 
  private:
   std::optional<geometry::SE2> pose_at(model::Utime utime) const;

@@ -5,29 +5,35 @@
 
 #include "common/factor_graph/plane/smoother.hpp"
 #include "common/model/odometry_buffer.hpp"
-#include "common/model/state.hpp"
+#include "services/geoslam_mapper/smoothing/centre_motion.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// One scalar for some seconds each, tied to the one before by the bias's random walk. They count
-/// from the filter's bias when the vehicle first moved, so they are small.
+/// A chain of scalars, one for 5 s each, tied to the one before by the bias's random walk. They
+/// count from the filter's bias at the first motion, so they are small.
 class GyroBias {
  public:
-  /// `walk`: [rad/s/sqrt(s)]; 0 = the bias is not estimated.
+  /// `walk`: random walk of the bias [rad/s/sqrt(s)]; 0 = the bias is not estimated.
   explicit GyroBias(double walk) : walk_(walk) {}
 
+  /// Whether the bias is a variable of the graph.
   bool is_estimated() const { return walk_ > 0.0; }
-  /// A keyframe came from the place of the one before.
-  void stood() { was_stationary_ = true; }
-  /// Adds the motion with the bias at `utime` as a third variable; its turn is `turn`. `filter`:
-  /// what the filter knows of the bias then; it is used once when the vehicle first moves, and what
-  /// it learned while the vehicle stood, of which the graph has nothing.
-  void add_motion(const factor_graph::plane::RelativePose& motion, const model::GyroRotation& turn,
-                  const model::FilterBias& filter, model::Utime utime,
+
+  /// The vehicle was stationary between two keyframes: the filter has learned the bias meanwhile.
+  void set_stationary() { was_stationary_ = true; }
+
+  /// Adds the motion between two poses with the bias as a third variable. `measured` holds the two
+  /// poses; its motion and information are those of `motion`, which must have `gyro` and
+  /// `filter_bias`. The filter's bias is used once at the first motion, and after that only for
+  /// what the filter learned while the vehicle was stationary: the graph has nothing of that.
+  void add_motion(factor_graph::plane::RelativePose measured, const CentreMotion& motion,
                   factor_graph::plane::Smoother& smoother);
 
-  model::Json save() const;
-  void load(const model::Json& json);
+  /// Members of a saved state; see common/state. The walk is configuration.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.reference_, self.newest_, self.was_stationary_, self.before_, self.before_utime_);
+  }
 
  private:
   void learn_from(const model::FilterBias& filter, model::Utime utime,
@@ -36,13 +42,17 @@ class GyroBias {
   struct Newest {
     factor_graph::plane::ScalarId id{};
     model::Utime since = 0;
+
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& s) {
+      a(s.id, s.since);
+    }
   };
-  double walk_;
-  double reference_ = 0.0;  ///< [rad/s]
+  double walk_;             ///< [rad/s/sqrt(s)]
+  double reference_ = 0.0;  ///< From which the scalars count [rad/s].
   std::optional<Newest> newest_;
   bool was_stationary_ = false;
-  /// The filter's word when the vehicle last moved.
-  model::FilterBias before_;
+  model::FilterBias before_;  ///< The filter's bias at the last motion.
   model::Utime before_utime_ = 0;
 };
 

@@ -1,16 +1,17 @@
-// Places by where they are.
+// Viewpoints by their position.
 #pragma once
 
 #include <Eigen/Core>
 #include <cmath>
 #include <cstdint>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Numbered points in square cells. Every change costs what it touches.
-class PlaceGrid {
+/// Numbered points in square cells of 1 m. Every change costs what it touches.
+class ViewpointGrid {
  public:
   /// Adds the point, or moves it.
   void put(std::uint32_t number, const Eigen::Vector2d& position_m) {
@@ -23,7 +24,8 @@ class PlaceGrid {
     now = cell;
   }
 
-  /// Calls f(number) for every point of the cells within `radius_m`, and for some beyond.
+  /// Calls f(number) for every point of the cells within `radius_m` of `centre_m`, and for some
+  /// beyond.
   template <typename F>
   void for_each_near(const Eigen::Vector2d& centre_m, double radius_m, F&& f) const {
     const Eigen::Vector2d reach(radius_m, radius_m);
@@ -54,7 +56,7 @@ class PlaceGrid {
   }
 
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
-  std::vector<std::uint64_t> cells_of_;
+  std::vector<std::uint64_t> cells_of_;  ///< By number.
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

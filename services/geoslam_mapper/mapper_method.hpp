@@ -1,0 +1,70 @@
+// What every method of mapping offers to the service.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/model/ekf_output.hpp"
+#include "common/model/keyframe.hpp"
+#include "common/model/map.hpp"
+#include "common/model/odometry.hpp"
+
+namespace understory::geoslam_mapper {
+
+/// The global map: localises keyframes in it, grows it and keeps it consistent (GeoSLAM §4.3,
+/// algorithms 3-5). Two methods exist: `baseline` as the thesis describes it, and `smoothing`.
+/// Poses are of `vehicle_level` in the frame `map`.
+class MapperMethod {
+ public:
+  virtual ~MapperMethod() = default;
+
+  /// Localises the keyframe and fuses it. The map changes only with the statuses kFirstMap and
+  /// kUpdated; for the others `reason` states why. Throws nothing on bad data.
+  virtual model::MapUpdate add(const model::Keyframe& keyframe) = 0;
+
+  /// Pose of a single scan between keyframes, with its covariance (right perturbation). The map is
+  /// not changed. None where the method does not offer it, where there is no map yet, or where too
+  /// few detections match.
+  virtual std::optional<geometry::SE2WithCovariance> locate(const model::LandmarkScan& /*scan*/) {
+    return std::nullopt;
+  }
+
+  /// Motion without landmarks; becomes a factor between keyframes if the configuration asks for it.
+  virtual void add(const model::Odometry& odometry) = 0;
+
+  /// The filter's pose, bias and velocity. Later odometry is corrected by its gyro bias, and a
+  /// keyframe with few landmarks that contradicts its motion is refused. Never a measurement: the
+  /// filter uses the same detections.
+  virtual void add(const model::EkfPose& /*pose*/) {}
+
+  /// The filter's estimate of the level error; single scans are levelled by it.
+  virtual void add(const model::EkfLevel& /*level*/) {}
+
+  /// A map to start from (GeoSLAM §4.3.1), frame `map`; call it before the first keyframe.
+  virtual void start_with(std::span<const model::MapLandmark> landmarks) = 0;
+
+  /// The pose of every keyframe's base at the present estimate, in order of time; folded keyframes
+  /// are reconstructed. O(keyframes).
+  virtual std::vector<model::KeyframePose> trajectory() const = 0;
+
+  /// Every landmark of the map at the present estimate, in order of id. O(map).
+  virtual std::vector<model::MapLandmark> landmarks() const = 0;
+
+  /// Those landmarks that are new or have moved since the last call, in order of id; costs what
+  /// changed. None where the method does not track changes.
+  virtual std::optional<std::vector<model::MapLandmark>> take_changed_landmarks() {
+    return std::nullopt;
+  }
+
+  /// The whole state, for a restart. O(state).
+  virtual std::string save() const = 0;
+
+  /// Continues from what save() of the same method gave. Throws std::invalid_argument on other
+  /// bytes; the state is then as it was.
+  virtual void load(const std::string& state) = 0;
+};
+
+}  // namespace understory::geoslam_mapper

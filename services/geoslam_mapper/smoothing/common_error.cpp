@@ -1,0 +1,29 @@
+#include "services/geoslam_mapper/smoothing/common_error.hpp"
+
+#include <Eigen/Geometry>
+#include <numbers>
+
+namespace understory::geoslam_mapper::smoothing {
+namespace {
+
+/// Landmarks are given at breast height; an error of the level displaces them by it.
+constexpr double kLandmarkHeight_m = 1.3;
+
+}  // namespace
+
+void CommonError::set_start_level(const model::EkfLevel& level) {
+  const Eigen::Rotation2D<double> quarter(-0.5 * std::numbers::pi);
+  const Eigen::Matrix2d arm = kLandmarkHeight_m * quarter.toRotationMatrix();
+  start_covariance_m2_ = arm * level.covariance * arm.transpose();
+}
+
+Eigen::Matrix3d CommonError::covariance_at(const geometry::SE2& map_T_vehicle) const {
+  const Eigen::Matrix2d back = map_T_vehicle.rotation().transpose();
+  const Eigen::Vector2d off = scale_sigma_ * (back * map_T_vehicle.translation());
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  covariance.topLeftCorner<2, 2>() =
+      back * start_covariance_m2_ * back.transpose() + off * off.transpose();
+  return covariance;
+}
+
+}  // namespace understory::geoslam_mapper::smoothing

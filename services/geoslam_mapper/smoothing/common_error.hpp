@@ -1,0 +1,36 @@
+// Errors that all observations share.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "common/geometry/se2.hpp"
+#include "common/model/ekf_output.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+
+/// Common-mode errors, which the graph cannot know since no observation shows them: the level at
+/// the first keyframe and the scale of distances. They are not estimated; they are reported in the
+/// covariances of poses.
+class CommonError {
+ public:
+  /// `scale_sigma`: standard deviation of the scale of distances (1e-3 = 1 mm per metre).
+  explicit CommonError(double scale_sigma) : scale_sigma_(scale_sigma) {}
+
+  /// The level error at the keyframe that starts the map: it displaces landmarks at breast height.
+  void set_start_level(const model::EkfLevel& level);
+  /// What it adds to the covariance of a pose (right perturbation).
+  Eigen::Matrix3d covariance_at(const geometry::SE2& map_T_vehicle) const;
+
+  /// Members of a saved state; see common/state. The scale is configuration.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.start_covariance_m2_);
+  }
+
+ private:
+  double scale_sigma_;
+  /// Of the first scan's position against its observations: frame `map` [m^2].
+  Eigen::Matrix2d start_covariance_m2_ = Eigen::Matrix2d::Zero();
+};
+
+}  // namespace understory::geoslam_mapper::smoothing

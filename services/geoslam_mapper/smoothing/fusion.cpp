@@ -1,0 +1,147 @@
+#include "services/geoslam_mapper/smoothing/fusion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "services/geoslam_mapper/smoothing/observation_noise.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+namespace {
+
+/// chi^2 as a standard normal deviate (Wilson & Hilferty 1931).
+double chi2_deviate(double chi2, double degrees_of_freedom) {
+  const double spread = 2.0 / (9.0 * degrees_of_freedom);
+  return (std::cbrt(chi2 / degrees_of_freedom) - (1.0 - spread)) / std::sqrt(spread);
+}
+
+/// The keyframe as the node's centre would have observed it: what both observed ties the two frames
+/// together.
+model::Keyframe in_frame_of(const geometry::SE2& node_T_keyframe, model::Keyframe keyframe) {
+  const Eigen::Matrix2d rotation = node_T_keyframe.rotation();
+  for (model::KeyframeLandmark& landmark : keyframe.landmarks) {
+    landmark.position_m = node_T_keyframe * landmark.position_m;
+    landmark.covariance_m2 = rotation * landmark.covariance_m2 * rotation.transpose();
+  }
+  for (model::KeyframeMember& member : keyframe.members)
+    member.centre_T_vehicle = node_T_keyframe * member.centre_T_vehicle;
+  return keyframe;
+}
+
+/// The node for the keyframe, an old or a new one, and the keyframe in its frame.
+FusedKeyframe enter(const model::Keyframe& arrived, const Placement& placement, GlobalMap& map) {
+  const geometry::SE2& map_T_centre = placement.map_T_centre.mean;
+  const auto revisited = map.trajectory.revisited(map_T_centre * middle_of(arrived), map.graph);
+  map.graph.checkpoint(revisited);
+
+  FusedKeyframe fused;
+  fused.associations = placement.associations;
+  if (revisited) {
+    fused.node = *revisited;
+    fused.keyframe = in_frame_of(map.graph.pose(*revisited).inverse() * map_T_centre, arrived);
+  } else {
+    fused.node = map.graph.add_node(map_T_centre, map.trajectory.is_stationary(arrived));
+    fused.keyframe = arrived;
+  }
+  return fused;
+}
+
+/// A landmark of a given map enters the graph with its prior at its first observation (GeoSLAM
+/// §4.3.1).
+void add_observations(const FusedKeyframe& fused, const SmoothingMapperParameters& parameters,
+                      GlobalMap& map) {
+  for (const model::Association& pair : fused.associations) {
+    const StoredLandmark& landmark = map.landmarks.at(pair.landmark_id);
+    if (!map.graph.position(landmark.id))
+      map.graph.add_landmark(landmark.id, landmark.position_m, landmark.prior_covariance);
+    observe(fused.keyframe.landmarks[pair.keyframe_landmark], fused.node, landmark.id, parameters,
+            map);
+  }
+}
+
+/// Sums up the associations that fit; the others are returned.
+std::set<model::LandmarkId> judge(FusedKeyframe& fused, double outlier_chi2,
+                                  const PoseGraph& graph) {
+  std::set<model::LandmarkId> outliers;
+  for (const model::Association& pair : fused.associations) {
+    const double error = graph.chi2(fused.node, pair.landmark_id);
+    if (error > outlier_chi2) {
+      outliers.insert(pair.landmark_id);
+    } else {
+      fused.chi2 += error;
+      fused.degrees_of_freedom += 2;
+    }
+  }
+  return outliers;
+}
+
+/// Solves, takes out single associations that do not fit, and judges the rest. False with the
+/// reason where the keyframe contradicts the map.
+bool solve(FusedKeyframe& fused, const SmoothingMapperParameters& parameters, PoseGraph& graph) {
+  factor_graph::plane::SmootherUpdate solved = graph.solve();
+  if (!solved.ok) {
+    fused.reason = solved.error;
+    return false;
+  }
+
+  // Does the keyframe fit as a whole?
+  const std::set<model::LandmarkId> outliers = judge(fused, parameters.outlier_chi2, graph);
+  if (fused.degrees_of_freedom > 0 &&
+      chi2_deviate(fused.chi2, fused.degrees_of_freedom) > parameters.max_innovation_sigmas) {
+    fused.reason = "innovation too large for its covariance";
+    return false;
+  }
+  if (2 * outliers.size() > fused.associations.size()) {
+    fused.reason = "most associations do not fit";
+    return false;
+  }
+  if (outliers.empty()) return true;
+
+  // Without the outliers.
+  for (const model::LandmarkId id : outliers) graph.ignore(fused.node, id);
+  std::erase_if(fused.associations, [&](const model::Association& pair) {
+    return outliers.contains(pair.landmark_id);
+  });
+  solved = graph.solve();
+  fused.reason = solved.error;
+  return solved.ok;
+}
+
+/// What the landmarks' observations add up to.
+void count_observations(const FusedKeyframe& fused, GlobalMap& map) {
+  for (const model::Association& pair : fused.associations) {
+    const model::KeyframeLandmark& observed = fused.keyframe.landmarks[pair.keyframe_landmark];
+    StoredLandmark& landmark = map.landmarks.at(pair.landmark_id);
+    landmark.observation_count += observed.observation_count;
+    landmark.last_keyframe = map.trajectory.size();
+    landmark.information += 2.0 / observed.covariance_m2.trace();
+    landmark.radius_m +=
+        (observed.radius_m - landmark.radius_m) / static_cast<double>(landmark.nodes.size() + 1);
+    if (landmark.nodes.empty() || landmark.nodes.back() != fused.node)
+      landmark.nodes.push_back(fused.node);
+  }
+}
+
+}  // namespace
+
+FusedKeyframe fuse(const model::Keyframe& arrived, const Placement& placement, const Motion& motion,
+                   const SmoothingMapperParameters& parameters, GlobalMap& map) {
+  FusedKeyframe fused = enter(arrived, placement, map);
+  add_observations(fused, parameters, map);
+  if (const auto driven = motion.since_last_centre(fused.keyframe))
+    map.graph.add_motion(*driven, fused.node);
+
+  fused.ok = solve(fused, parameters, map.graph);
+  if (!fused.ok) {
+    map.graph.rollback();
+    fused.associations.clear();
+    return fused;
+  }
+
+  map.trajectory.add(base_of(fused.keyframe, fused.node), map.graph);
+  count_observations(fused, map);
+  map.adopt_estimates();
+  return fused;
+}
+
+}  // namespace understory::geoslam_mapper::smoothing

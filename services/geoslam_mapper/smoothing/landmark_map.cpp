@@ -1,0 +1,111 @@
+#include "services/geoslam_mapper/smoothing/landmark_map.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace understory::geoslam_mapper::smoothing {
+namespace {
+
+/// The index serves search and gating only: following every millimetre costs more than it gives.
+/// Most moves are small rotations of whole stretches of the map; each costs a triangulation.
+constexpr double kIndexTolerance_m = 0.01;
+
+}  // namespace
+
+void LandmarkMap::add_given(const model::MapLandmark& given, double sigma_m) {
+  const bool has_covariance = given.covariance_m2.determinant() > 0.0;
+
+  StoredLandmark landmark;
+  landmark.position_m = given.position_m;
+  landmark.prior_covariance =
+      has_covariance ? given.covariance_m2
+                     : Eigen::Matrix2d(sigma_m * sigma_m * Eigen::Matrix2d::Identity());
+  landmark.information = 2.0 / landmark.prior_covariance.trace();
+  landmark.radius_m = given.radius_m;
+  landmark.observation_count = given.observation_count;
+  landmark.kind = given.kind;
+
+  if (given.id == 0) {
+    insert(landmark);
+    return;
+  }
+  landmark.id = given.id;
+  put(landmark);
+  next_id_ = std::max(next_id_, given.id + 1);
+}
+
+model::LandmarkId LandmarkMap::insert(StoredLandmark landmark) {
+  landmark.id = next_id_++;
+  put(landmark);
+  return landmark.id;
+}
+
+void LandmarkMap::put(const StoredLandmark& landmark) {
+  landmarks_[landmark.id] = landmark;
+  index_.insert(landmark.id, landmark.position_m);
+  changed_.push_back(landmark.id);
+}
+
+void LandmarkMap::remove(model::LandmarkId id) {
+  landmarks_.erase(id);
+  index_.remove(id);
+}
+
+void LandmarkMap::move(model::LandmarkId id, const Eigen::Vector2d& position_m) {
+  StoredLandmark& landmark = landmarks_.at(id);
+  landmark.position_m = position_m;
+  changed_.push_back(id);
+
+  const std::optional<Eigen::Vector2d> indexed = index_.position(id);
+  if (!indexed) return;
+  const double distance = (*indexed - position_m).norm();
+  if (distance > kStaleness_m) {
+    index_.move(id, position_m);
+  } else if (distance > kIndexTolerance_m && !landmark.is_late) {
+    landmark.is_late = true;
+    late_.push_back(id);
+  }
+}
+
+void LandmarkMap::catch_up() {
+  for (const model::LandmarkId id : late_) {
+    const auto found = landmarks_.find(id);
+    if (found == landmarks_.end()) continue;
+
+    found->second.is_late = false;
+    const std::optional<Eigen::Vector2d> indexed = index_.position(id);
+    if (indexed && (*indexed - found->second.position_m).norm() > kIndexTolerance_m)
+      index_.move(id, found->second.position_m);
+  }
+  late_.clear();
+}
+
+std::vector<model::LandmarkId> LandmarkMap::take_changed() {
+  std::sort(changed_.begin(), changed_.end());
+  changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
+  std::erase_if(changed_, [&](model::LandmarkId id) { return !landmarks_.contains(id); });
+  return std::exchange(changed_, {});
+}
+
+void LandmarkMap::mark_all_changed() {
+  for (const auto& [id, landmark] : landmarks_) changed_.push_back(id);
+}
+
+std::vector<Eigen::Vector2d> LandmarkMap::indexed_positions() const {
+  std::vector<Eigen::Vector2d> result;
+  result.reserve(landmarks_.size());
+  for (const auto& [id, landmark] : landmarks_)
+    result.push_back(index_.position(id).value_or(landmark.position_m));
+  return result;
+}
+
+void LandmarkMap::rebuild_index(const std::vector<Eigen::Vector2d>& indexed_m) {
+  if (indexed_m.size() != landmarks_.size())
+    throw std::invalid_argument("mapper state: its index does not fit its landmarks");
+  index_ = {};
+  auto position = indexed_m.begin();
+  for (const auto& [id, landmark] : landmarks_) index_.insert(id, *position++);
+}
+
+}  // namespace understory::geoslam_mapper::smoothing

@@ -1,0 +1,98 @@
+// The landmarks of the map and which of them changed.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "common/constellation/map.hpp"
+#include "common/model/archive.hpp"
+#include "common/model/map.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+
+/// Number of a node of the pose graph, in order of time.
+using NodeIndex = std::uint32_t;
+
+/// What the mapper knows of a landmark beside its place in the graph.
+struct StoredLandmark {
+  model::LandmarkId id = 0;
+  /// Frame `map`; follows the graph as soon as the landmark is in it.
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
+  /// Of a landmark of a given map [m^2], frame `map`; zero for all others.
+  Eigen::Matrix2d prior_covariance = Eigen::Matrix2d::Zero();
+  double information = 0.0;             ///< Sum of 1 / variance over its observations [1/m^2].
+  double radius_m = 0.0;                ///< Mean over its observations; 0 for corners.
+  std::uint32_t observation_count = 0;  ///< Scans in which it was detected.
+  std::uint32_t last_keyframe = 0;      ///< Number of accepted keyframes at its last observation.
+  std::vector<NodeIndex> nodes;         ///< That observed it, ascending.
+  model::LandmarkKind kind = model::LandmarkKind::kTrunk;
+  bool is_late = false;  ///< Its place in the index is older than its position.
+
+  /// Variance [m^2] of the position relative to the keyframes that observed it.
+  double local_variance() const { return 1.0 / information; }
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.id, s.position_m, s.prior_covariance, s.information, s.radius_m, s.observation_count,
+      s.last_keyframe, s.nodes, s.kind, s.is_late);
+  }
+};
+
+/// Landmarks by id, with a dynamic index over their positions. Every change costs what it touches.
+class LandmarkMap {
+ public:
+  /// Largest distance [m] between a landmark and its place in the index; see move().
+  static constexpr double kStaleness_m = 0.25;
+
+  /// Adds a landmark of a given map (GeoSLAM §4.3.1). One without id gets the next one; one without
+  /// covariance gets `sigma_m` per axis.
+  void add_given(const model::MapLandmark& given, double sigma_m);
+  /// Adds a new landmark, whatever `id` it carries, and returns the id that it gets.
+  model::LandmarkId insert(StoredLandmark landmark);
+  /// Removes a landmark; its id is never used again.
+  void remove(model::LandmarkId id);
+  /// Moves a landmark (frame `map`). The index follows at once where it is off by kStaleness_m,
+  /// otherwise with the next catch_up().
+  void move(model::LandmarkId id, const Eigen::Vector2d& position_m);
+
+  /// The landmark of an id. Throws std::out_of_range where there is none.
+  StoredLandmark& at(model::LandmarkId id) { return landmarks_.at(id); }
+  const StoredLandmark& at(model::LandmarkId id) const { return landmarks_.at(id); }
+  /// All landmarks by id, ascending.
+  const std::map<model::LandmarkId, StoredLandmark>& all() const { return landmarks_; }
+  /// Whether there is no landmark.
+  bool empty() const { return landmarks_.empty(); }
+
+  /// Index over all landmarks; positions in it may be off by kStaleness_m.
+  const constellation::ConstellationMap& index() const { return index_; }
+  /// Brings the index to within a centimetre, before a search by descriptors. O(what moved).
+  void catch_up();
+
+  /// Ids of landmarks that are new or moved since the last call, ascending, without the removed.
+  std::vector<model::LandmarkId> take_changed();
+  /// Reports all landmarks as changed: after a load, when the graph was solved anew.
+  void mark_all_changed();
+
+  /// Members of a saved state; see common/state. `changed_` is not among them: after a load all
+  /// landmarks are reported as changed.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    std::vector<Eigen::Vector2d> indexed_m = self.indexed_positions();
+    a(self.landmarks_, self.late_, self.next_id_, indexed_m);
+    if constexpr (Archive::kReads) self.rebuild_index(indexed_m);
+  }
+
+ private:
+  void put(const StoredLandmark& landmark);
+  std::vector<Eigen::Vector2d> indexed_positions() const;
+  void rebuild_index(const std::vector<Eigen::Vector2d>& indexed_m);
+
+  std::map<model::LandmarkId, StoredLandmark> landmarks_;
+  constellation::ConstellationMap index_;
+  std::vector<model::LandmarkId> late_;     ///< Those with is_late, and some removed ones.
+  std::vector<model::LandmarkId> changed_;  ///< With repetitions.
+  model::LandmarkId next_id_ = (model::LandmarkId{1} << 48U) | 1U;  ///< Map 1, landmark 1.
+};
+
+}  // namespace understory::geoslam_mapper::smoothing

@@ -1,0 +1,86 @@
+// How the vehicle moved since the last keyframe, by odometry and by the filter.
+#pragma once
+
+#include <optional>
+
+#include "common/model/archive.hpp"
+#include "common/model/keyframe.hpp"
+#include "common/model/odometry_buffer.hpp"
+#include "services/geoslam_mapper/parameters.hpp"
+#include "services/geoslam_mapper/smoothing/centre_motion.hpp"
+#include "services/geoslam_mapper/smoothing/filter_track.hpp"
+#include "services/geoslam_mapper/smoothing/placement.hpp"
+#include "services/geoslam_mapper/smoothing/trajectory.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+
+/// Odometry since the last accepted keyframe, the filter's recent poses, and the pose from which
+/// both go on. The gyro's bias as a variable is in the graph (GyroBias): a refused keyframe takes
+/// it back together with the graph.
+class Motion {
+ public:
+  explicit Motion(const SmoothingMapperParameters& parameters);
+
+  /// Adds an odometry increment, if the configuration uses odometry.
+  void add(const model::Odometry& increment);
+  /// Adds the filter's pose: its bias and velocity correct later increments.
+  void add(const model::EkfPose& pose);
+
+  /// Where the keyframe's centre should be: by odometry from the last accepted keyframe, else by
+  /// the keyframer's track from the last one. None where neither reaches it.
+  std::optional<Prediction> predict(const model::Keyframe& keyframe, const PoseGraph& graph) const;
+  /// Odometry from the last accepted keyframe's centre to the centre of this one; none where
+  /// odometry has a gap.
+  std::optional<CentreMotion> since_last_centre(const model::Keyframe& keyframe) const;
+  /// Odometry between two times (right perturbation); none without odometry or with a gap.
+  std::optional<geometry::SE2WithCovariance> between(model::Utime from, model::Utime to) const;
+  /// Whether an IMU ties both ends of the keyframe to a heading within
+  /// `start_heading_sigma_rad`; true also where there is no IMU to wait for.
+  bool knows_heading(const model::Keyframe& keyframe) const;
+
+  /// An accepted keyframe with its base: odometry goes on from its last member.
+  void continue_from(const model::Keyframe& keyframe, const Base& base,
+                     const geometry::SE2WithCovariance& map_T_base);
+  /// A keyframe that found no place: its prediction serves the next one.
+  void assume(const model::Keyframe& keyframe, const Prediction& prediction);
+
+  /// The last accepted keyframe's last member in the frame of its node; none before the first.
+  std::optional<geometry::SE2WithCovariance> centre_T_last_member() const;
+  /// The last keyframe's base, accepted or assumed; none before the first.
+  const std::optional<geometry::SE2WithCovariance>& map_T_last_base() const {
+    return map_T_last_base_;
+  }
+  /// Recent poses of the filter.
+  const FilterTrack& filter() const { return filter_; }
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.odometry_, self.filter_, self.last_member_, self.map_T_last_base_);
+  }
+
+ private:
+  /// The last accepted keyframe's last member, in the frame of its node's centre.
+  struct LastMember {
+    NodeIndex node = 0;
+    model::Utime utime = 0;
+    geometry::SE2WithCovariance centre_T_vehicle;
+    std::optional<model::GyroRotation> rotation;  ///< From the centre to here, by the gyro.
+
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& s) {
+      a(s.node, s.utime, s.centre_T_vehicle, s.rotation);
+    }
+  };
+  std::optional<model::GyroRotation> rotation_to_centre(const model::Keyframe& keyframe) const;
+  std::optional<model::GyroRotation> rotation_since_last_centre(
+      const model::Keyframe& keyframe) const;
+
+  SmoothingMapperParameters parameters_;
+  model::OdometryBuffer odometry_;  ///< Without the bias, where that is a variable of the graph.
+  FilterTrack filter_;
+  std::optional<LastMember> last_member_;
+  std::optional<geometry::SE2WithCovariance> map_T_last_base_;
+};
+
+}  // namespace understory::geoslam_mapper::smoothing

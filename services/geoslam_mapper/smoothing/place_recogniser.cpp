@@ -1,0 +1,121 @@
+#include "services/geoslam_mapper/smoothing/place_recogniser.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/geometry/registration.hpp"
+#include "services/geoslam_mapper/smoothing/relative_variance.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+namespace {
+
+/// Beyond the field of view, so that a landmark at its edge is found whatever the pose's error.
+constexpr double kViewMargin_m = 5.0;
+
+double plane_variance(const model::KeyframeLandmark& landmark) {
+  return 0.5 * landmark.covariance_m2.trace();
+}
+
+std::vector<model::LandmarkId> landmarks_in_view(const model::Keyframe& keyframe,
+                                                 const geometry::SE2WithCovariance& guess,
+                                                 const LandmarkMap& landmarks) {
+  double reach = 0.0;
+  for (const model::KeyframeLandmark& landmark : keyframe.landmarks)
+    reach = std::max(reach, landmark.position_m.norm());
+  const double spread = std::sqrt(guess.covariance.topLeftCorner<2, 2>().trace());
+  return landmarks.index().near({guess.mean.translation(), reach + kViewMargin_m + 3.0 * spread});
+}
+
+/// How many of the keyframe's landmarks could be in the map: not more than the map has in the field
+/// of view.
+std::size_t count_matchable(const model::Keyframe& keyframe, const geometry::SE2& map_T_centre,
+                            const LandmarkMap& landmarks) {
+  std::size_t in_view = 0;
+  const geometry::SE2 vehicle_T_map = (map_T_centre * keyframe.centre_T_base()).inverse();
+  const double range = keyframe.field_of_view.max_range_m;
+  landmarks.index().for_each_within(
+      map_T_centre.translation(), range + kViewMargin_m,
+      [&](model::LandmarkId, const Eigen::Vector2d& position, double) {
+        if (keyframe.field_of_view.contains(vehicle_T_map * position)) ++in_view;
+      });
+  return std::min(in_view, keyframe.landmarks.size());
+}
+
+}  // namespace
+
+Placement PlaceRecogniser::associate(const model::Keyframe& keyframe,
+                                     const geometry::SE2WithCovariance& guess,
+                                     const GlobalMap& map) const {
+  // The map's landmarks around the guess.
+  const std::vector<model::LandmarkId> ids = landmarks_in_view(keyframe, guess, map.landmarks);
+  const std::vector<double> variances = relative_variances(ids, map, parameters_.recent_keyframes);
+  std::vector<geometry::UncertainPoint> reference;
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    reference.push_back({map.landmarks.at(ids[i]).position_m, variances[i]});
+
+  // The keyframe's landmarks.
+  std::vector<geometry::UncertainPoint> observed;
+  for (const model::KeyframeLandmark& landmark : keyframe.landmarks)
+    observed.push_back({landmark.position_m, plane_variance(landmark)});
+
+  // The keyframe registered to the map.
+  geometry::RegistrationParameters gating;
+  gating.gate_sigmas = parameters_.gate_sigmas;
+  gating.gate_floor_m = parameters_.gate_floor_m;
+  const geometry::SE2WithCovariance broad{guess.mean,
+                                          guess.covariance + 1e-8 * Eigen::Matrix3d::Identity()};
+  const geometry::Registration found = register_points(reference, observed, broad, gating);
+
+  // Pairs of the same kind.
+  Placement placement{{found.reference_T_observed, found.covariance}, {}, true};
+  for (const geometry::PointPair& pair : found.pairs) {
+    const model::LandmarkId id = ids[pair.reference];
+    if (keyframe.landmarks[pair.observed].kind != map.landmarks.at(id).kind) continue;
+    placement.associations.push_back({pair.observed, id});
+  }
+  return placement;
+}
+
+std::optional<Placement> PlaceRecogniser::track(const model::Keyframe& keyframe,
+                                                const Prediction& prediction,
+                                                const GlobalMap& map) const {
+  Placement placement = associate(keyframe, prediction.map_T_centre, map);
+  const std::size_t possible =
+      count_matchable(keyframe, placement.map_T_centre.mean, map.landmarks);
+  const std::size_t matched = placement.associations.size();
+  const auto fewest = static_cast<std::size_t>(parameters_.min_matched);
+  const bool is_enough =
+      static_cast<double>(matched) >= parameters_.min_matched_ratio * static_cast<double>(possible);
+
+  // Odometry alone will do where there is next to nothing to match.
+  const bool is_placed =
+      prediction.from_odometry ? is_enough || possible < fewest : is_enough && matched >= fewest;
+  if (!is_placed) return std::nullopt;
+  return placement;
+}
+
+SearchResult PlaceRecogniser::search(const model::Keyframe& keyframe, const GlobalMap& map) const {
+  // A pose by the constellation of landmarks.
+  std::vector<constellation::ObservedPoint> points;
+  for (const model::KeyframeLandmark& landmark : keyframe.landmarks)
+    points.push_back({landmark.position_m, std::sqrt(plane_variance(landmark))});
+  const constellation::Localisation found = map.landmarks.index().localise(points);
+  SearchResult result;
+  result.hypotheses = found.hypotheses;
+  result.log10_false_alarm = found.log10_false_alarm;
+  if (!found.found()) {
+    result.reason = describe(found.outcome);
+    return result;
+  }
+
+  // Association around that pose.
+  result.placement = associate(keyframe, {found.map_T_sensor, found.covariance}, map);
+  result.placement->by_prediction = false;
+  if (result.placement->associations.size() < static_cast<std::size_t>(parameters_.min_matched)) {
+    result.placement.reset();
+    result.reason = "the place found has too few matching landmarks";
+  }
+  return result;
+}
+
+}  // namespace understory::geoslam_mapper::smoothing

@@ -1,0 +1,42 @@
+// Where is a keyframe in the map? By prediction and gating, or by search of the whole map.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "common/model/keyframe.hpp"
+#include "services/geoslam_mapper/smoothing/global_map.hpp"
+#include "services/geoslam_mapper/smoothing/placement.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+
+/// What a search of the whole map gave.
+struct SearchResult {
+  std::optional<Placement> placement;  ///< None where the search is not sure.
+  std::uint32_t hypotheses = 0;        ///< Poses that were tried.
+  double log10_false_alarm = 0.0;      ///< Bound on the chance of so good a pose anywhere.
+  std::string reason;                  ///< Why there is no placement.
+};
+
+/// Places keyframes in a map that it does not change. It has no state.
+class PlaceRecogniser {
+ public:
+  explicit PlaceRecogniser(const SmoothingMapperParameters& parameters) : parameters_(parameters) {}
+
+  /// Association in gates around a prediction. None where too few landmarks match: less than
+  /// `min_matched_ratio` of those that could, or without odometry fewer than `min_matched`.
+  std::optional<Placement> track(const model::Keyframe& keyframe, const Prediction& prediction,
+                                 const GlobalMap& map) const;
+
+  /// Search of the whole map without any prior (constellation::ConstellationMap). Its index must be
+  /// up to date: LandmarkMap::catch_up().
+  SearchResult search(const model::Keyframe& keyframe, const GlobalMap& map) const;
+
+ private:
+  Placement associate(const model::Keyframe& keyframe, const geometry::SE2WithCovariance& guess,
+                      const GlobalMap& map) const;
+
+  SmoothingMapperParameters parameters_;
+};
+
+}  // namespace understory::geoslam_mapper::smoothing

@@ -1,0 +1,192 @@
+#include "services/geoslam_mapper/smoothing/pose_graph.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <stdexcept>
+
+namespace understory::geoslam_mapper::smoothing {
+namespace {
+
+namespace plane = factor_graph::plane;
+
+/// Keeps an exactly known pose invertible: a micrometre, a microradian.
+const Eigen::Matrix3d kTiny = 1e-12 * Eigen::Matrix3d::Identity();
+
+plane::SmootherParameters limits(const SmoothingMapperParameters& parameters) {
+  plane::SmootherParameters result;
+  result.relinearise_above = parameters.relinearise_above;
+  result.least_move = std::clamp(0.1 * parameters.relinearise_above, 1e-4, 1e-3);
+  return result;
+}
+
+}  // namespace
+
+PoseGraph::PoseGraph(const SmoothingMapperParameters& parameters)
+    : smoother_(limits(parameters)), gyro_(parameters.gyro_walk) {}
+
+void PoseGraph::checkpoint(std::optional<NodeIndex> revisited) {
+  smoother_.checkpoint();
+  before_ = Checkpoint{nodes_.size(), landmark_of_point_.size(), {}, gyro_};
+  if (revisited) before_->revisited.emplace(*revisited, nodes_[*revisited]);
+}
+
+void PoseGraph::rollback() {
+  smoother_.rollback();
+  gyro_ = before_->gyro;
+
+  for (std::size_t i = before_->points; i < landmark_of_point_.size(); ++i)
+    point_of_.erase(landmark_of_point_[i]);
+  landmark_of_point_.resize(before_->points);
+
+  nodes_.resize(before_->nodes);
+  if (before_->revisited) nodes_[before_->revisited->first] = std::move(before_->revisited->second);
+  before_.reset();
+}
+
+NodeIndex PoseGraph::add_node(const geometry::SE2& map_T_centre, bool is_stationary,
+                              bool is_fixed) {
+  const plane::PoseId centre = smoother_.add_pose(map_T_centre);
+  if (is_fixed) smoother_.add(plane::PosePrior{centre, map_T_centre, kTiny.inverse()});
+  nodes_.push_back({centre, {}, is_stationary});
+  return static_cast<NodeIndex>(nodes_.size() - 1);
+}
+
+void PoseGraph::add_landmark(model::LandmarkId id, const Eigen::Vector2d& position_m,
+                             const std::optional<Eigen::Matrix2d>& prior_covariance_m2) {
+  const plane::PointId point = smoother_.add_point(position_m);
+  point_of_.emplace(id, point);
+  landmark_of_point_.push_back(id);
+  if (prior_covariance_m2)
+    smoother_.add(plane::PointPrior{point, position_m, prior_covariance_m2->inverse()});
+}
+
+void PoseGraph::observe(NodeIndex node, model::LandmarkId id, const Eigen::Vector2d& position_m,
+                        const Eigen::Matrix2d& information) {
+  const auto [entry, is_new] = nodes_[node].observations.try_emplace(id);
+  if (is_new) {
+    entry->second = smoother_.add(
+        plane::PointObservation{nodes_[node].centre, point_of_.at(id), position_m, information});
+    return;
+  }
+
+  plane::PointObservation factor = smoother_.observation(entry->second);
+  const Eigen::Matrix2d sum = factor.information + information;
+  factor.position =
+      sum.inverse() * (factor.information * factor.position + information * position_m);
+  factor.information = sum;
+  smoother_.set(entry->second, factor);
+}
+
+void PoseGraph::ignore(NodeIndex node, model::LandmarkId id) {
+  const auto entry = nodes_[node].observations.find(id);
+  plane::PointObservation nothing = smoother_.observation(entry->second);
+  nothing.information.setZero();
+  smoother_.set(entry->second, nothing);
+  nodes_[node].observations.erase(entry);
+}
+
+void PoseGraph::hand_over(model::LandmarkId old_id, model::LandmarkId new_id,
+                          std::span<const NodeIndex> nodes, bool agree) {
+  const plane::PointId new_point = point_of_.at(new_id);
+  for (const NodeIndex node : nodes) {
+    auto& observations = nodes_[node].observations;
+    auto handle = observations.extract(old_id);
+    if (handle.empty()) continue;
+
+    // A node that observed both keeps its observation of the landmark that stays.
+    plane::PointObservation factor = smoother_.observation(handle.mapped());
+    factor.point = new_point;
+    if (!agree || observations.contains(new_id)) factor.information.setZero();
+    smoother_.set(handle.mapped(), factor);
+
+    handle.key() = new_id;
+    observations.insert(std::move(handle));
+  }
+
+  const auto old_point = point_of_.find(old_id);
+  landmark_of_point_[index(old_point->second)] = 0;
+  point_of_.erase(old_point);
+}
+
+void PoseGraph::add_motion(const CentreMotion& motion, NodeIndex node) {
+  if (motion.from == node) return gyro_.set_stationary();
+  plane::RelativePose measured{nodes_[motion.from].centre, nodes_[node].centre,
+                               motion.from_T_to.mean, Eigen::Matrix3d::Zero()};
+  if (gyro_.is_estimated() && motion.gyro && motion.filter_bias)
+    return gyro_.add_motion(measured, motion, smoother_);
+  measured.information = motion.from_T_to.covariance.inverse();
+  smoother_.add(measured);
+}
+
+std::optional<Eigen::Vector2d> PoseGraph::position(model::LandmarkId id) const {
+  const auto found = point_of_.find(id);
+  if (found == point_of_.end()) return std::nullopt;
+  return smoother_.point(found->second);
+}
+
+double PoseGraph::chi2(NodeIndex node, model::LandmarkId id) const {
+  return smoother_.chi2(nodes_[node].observations.at(id));
+}
+
+geometry::SE2WithCovariance PoseGraph::marginal(NodeIndex node) const {
+  const plane::PoseId centre = nodes_[node].centre;
+  geometry::SE2WithCovariance result{smoother_.pose(centre), Eigen::Matrix3d::Zero()};
+  if (const auto covariance = smoother_.joint_marginal({&centre, 1}, {}))
+    result.covariance = *covariance;
+  return result;
+}
+
+std::vector<double> PoseGraph::relative_variances(NodeIndex node,
+                                                  std::span<const model::LandmarkId> ids) const {
+  const plane::PoseId centre = nodes_[node].centre;
+  std::vector<plane::PointId> points;
+  points.reserve(ids.size());
+  for (const model::LandmarkId id : ids) points.push_back(point_of_.at(id));
+
+  std::vector<double> variances;
+  const auto joint = smoother_.joint_marginal({&centre, 1}, points);
+  if (!joint) return variances;
+
+  const geometry::SE2 map_T_centre = smoother_.pose(centre);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    // d(landmark in the node's frame) / d(pose, landmark)
+    const plane::ObservationJacobian j = plane::linearise(map_T_centre, smoother_.point(points[i]));
+    const auto at = 3 + 2 * static_cast<Eigen::Index>(i);
+    const Eigen::Matrix2d cross = j.pose * joint->block<3, 2>(0, at) * j.point.transpose();
+    const Eigen::Matrix2d covariance = j.pose * joint->topLeftCorner<3, 3>() * j.pose.transpose() +
+                                       j.point * joint->block<2, 2>(at, at) * j.point.transpose() +
+                                       cross + cross.transpose();
+    variances.push_back(0.5 * covariance.trace());
+  }
+  return variances;
+}
+
+std::vector<std::pair<model::LandmarkId, Eigen::Vector2d>> PoseGraph::moved_landmarks() const {
+  std::vector<std::pair<model::LandmarkId, Eigen::Vector2d>> result;
+  result.reserve(smoother_.moved_points().size());
+  for (const plane::PointId point : smoother_.moved_points()) {
+    const model::LandmarkId id = landmark_of_point_[index(point)];
+    if (id != 0) result.emplace_back(id, smoother_.point(point));
+  }
+  return result;
+}
+
+std::vector<NodeIndex> PoseGraph::moved_nodes() const {
+  std::vector<NodeIndex> result;
+  result.reserve(smoother_.moved_poses().size());
+  for (const plane::PoseId pose : smoother_.moved_poses()) result.push_back(index(pose));
+  return result;
+}
+
+void PoseGraph::restore(const plane::Graph& graph) {
+  if (graph.poses.size() != nodes_.size() || graph.points.size() != landmark_of_point_.size())
+    throw std::invalid_argument("mapper state: its graph does not fit its nodes");
+  smoother_.start_from(graph);
+
+  for (std::size_t i = 0; i < landmark_of_point_.size(); ++i) {
+    if (landmark_of_point_[i] != 0)
+      point_of_.emplace(landmark_of_point_[i], plane::PointId(static_cast<std::uint32_t>(i)));
+  }
+}
+
+}  // namespace understory::geoslam_mapper::smoothing

@@ -1,0 +1,115 @@
+// The graph of keyframe centres and landmarks, with checkpoint and rollback.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <span>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "common/factor_graph/plane/archive.hpp"
+#include "common/factor_graph/plane/smoother.hpp"
+#include "services/geoslam_mapper/parameters.hpp"
+#include "services/geoslam_mapper/smoothing/centre_motion.hpp"
+#include "services/geoslam_mapper/smoothing/gyro_bias.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+
+/// A pose of the graph: the centre of one keyframe, or of several that were folded together.
+struct Node {
+  factor_graph::plane::PoseId centre{};
+  /// Each observed landmark's factor in the graph.
+  std::map<model::LandmarkId, factor_graph::plane::ObservationId> observations;
+  bool is_stationary = false;  ///< The vehicle was stationary during the keyframe.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.centre, s.observations, s.is_stationary);
+  }
+};
+
+/// Nodes and landmarks as variables, their measurements as factors, solved incrementally. Numbers
+/// of nodes are those of the smoother's poses. Everything that a refused keyframe may have changed
+/// is in here: rollback() takes it back exactly. Frame: `map`.
+class PoseGraph {
+ public:
+  /// An empty graph.
+  explicit PoseGraph(const SmoothingMapperParameters& parameters);
+
+  /// Remembers the state. Until a rollback() only `revisited` (if any) may change among the nodes
+  /// that are there now.
+  void checkpoint(std::optional<NodeIndex> revisited);
+  /// Restores exactly the state of the last checkpoint(). Costs what changed.
+  void rollback();
+
+  /// Adds a node at a first guess of its pose. A fixed one is held there, to a micrometre: it
+  /// carries the origin of the map.
+  NodeIndex add_node(const geometry::SE2& map_T_centre, bool is_stationary, bool is_fixed = false);
+  /// Adds a landmark at a first guess of its position, with a prior [m^2] if it was given.
+  void add_landmark(model::LandmarkId id, const Eigen::Vector2d& position_m,
+                    const std::optional<Eigen::Matrix2d>& prior_covariance_m2);
+  /// Adds an observation: position [m] in the node's frame with its information [1/m^2]. A further
+  /// one of the same landmark from the same node is averaged into the first by information.
+  void observe(NodeIndex node, model::LandmarkId id, const Eigen::Vector2d& position_m,
+               const Eigen::Matrix2d& information);
+  /// Takes an observation out.
+  void ignore(NodeIndex node, model::LandmarkId id);
+  /// Makes two landmarks one: the observations of `old_id` from `nodes` become those of `new_id`.
+  /// They count only if `agree`, and not where a node observed both.
+  void hand_over(model::LandmarkId old_id, model::LandmarkId new_id,
+                 std::span<const NodeIndex> nodes, bool agree);
+  /// Adds the motion from an earlier node; nothing but "stationary" if it is the same node.
+  void add_motion(const CentreMotion& motion, NodeIndex node);
+
+  /// Updates the estimates. Not `ok` where the measurements leave variables undetermined.
+  factor_graph::plane::SmootherUpdate solve() { return smoother_.update(); }
+
+  /// A node of the graph. Throws std::out_of_range where there is none.
+  const Node& node(NodeIndex node) const { return nodes_.at(node); }
+  /// map_T_centre of a node.
+  geometry::SE2 pose(NodeIndex node) const { return smoother_.pose(nodes_[node].centre); }
+  /// Position of a landmark [m]; none while it is not in the graph.
+  std::optional<Eigen::Vector2d> position(model::LandmarkId id) const;
+  /// chi^2 (2 degrees of freedom) of one observation at the present estimate.
+  double chi2(NodeIndex node, model::LandmarkId id) const;
+  /// map_T_centre with its marginal covariance (right perturbation), zero where it is undetermined.
+  geometry::SE2WithCovariance marginal(NodeIndex node) const;
+  /// Variances [m^2] of landmarks of the graph relative to a node, per axis. Empty where a variable
+  /// is undetermined.
+  std::vector<double> relative_variances(NodeIndex node,
+                                         std::span<const model::LandmarkId> ids) const;
+  /// Landmarks that updates moved since the checkpoint, with their positions [m], each once.
+  std::vector<std::pair<model::LandmarkId, Eigen::Vector2d>> moved_landmarks() const;
+  /// Nodes that updates moved since the checkpoint, each once.
+  std::vector<NodeIndex> moved_nodes() const;
+
+  /// Members of a saved state; see common/state. The graph is stored at its estimates and is
+  /// linearised anew after a load. A checkpoint exists only during the fusion of a keyframe.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    factor_graph::plane::Graph graph = self.smoother_.graph();
+    a(graph, self.nodes_, self.landmark_of_point_, self.gyro_);
+    if constexpr (Archive::kReads) self.restore(graph);
+  }
+
+ private:
+  struct Checkpoint {
+    std::size_t nodes = 0;
+    std::size_t points = 0;
+    std::optional<std::pair<NodeIndex, Node>> revisited;
+    GyroBias gyro;
+  };
+  void restore(const factor_graph::plane::Graph& graph);
+
+  factor_graph::plane::Smoother smoother_;
+  std::vector<Node> nodes_;
+  std::unordered_map<model::LandmarkId, factor_graph::plane::PointId> point_of_;
+  /// By point of the smoother; 0 where the landmark was merged into another.
+  std::vector<model::LandmarkId> landmark_of_point_;
+  GyroBias gyro_;
+  std::optional<Checkpoint> before_;
+};
+
+}  // namespace understory::geoslam_mapper::smoothing

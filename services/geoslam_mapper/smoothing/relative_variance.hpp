@@ -1,0 +1,17 @@
+// How uncertain landmarks are as seen from the vehicle.
+#pragma once
+
+#include <vector>
+
+#include "services/geoslam_mapper/smoothing/global_map.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+
+/// Variance [m^2, per axis] of each landmark's position relative to the last accepted keyframe.
+/// Landmarks observed within `recent_keyframes` share the vehicle's error: theirs is the local one.
+/// For the others (a loop is closing) the graph's joint covariance is asked, exactly for at most
+/// eight that are spread out; the rest take that of their nearest one.
+std::vector<double> relative_variances(const std::vector<model::LandmarkId>& ids,
+                                       const GlobalMap& map, int recent_keyframes);
+
+}  // namespace understory::geoslam_mapper::smoothing

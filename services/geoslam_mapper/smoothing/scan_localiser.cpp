@@ -1,0 +1,97 @@
+#include "services/geoslam_mapper/smoothing/scan_localiser.hpp"
+
+#include <algorithm>
+
+namespace understory::geoslam_mapper::smoothing {
+namespace {
+
+/// Beyond the sensor's range, so that a landmark at its edge is found.
+constexpr double kReachMargin_m = 5.0;
+constexpr double kLeastVariance = 1e-6;  ///< A millimetre, a milliradian.
+
+std::vector<geometry::UncertainPoint> landmarks_around(const Eigen::Vector2d& centre_m,
+                                                       double radius_m,
+                                                       const LandmarkMap& landmarks) {
+  std::vector<geometry::UncertainPoint> points;
+  for (const model::LandmarkId id : landmarks.index().near({centre_m, radius_m})) {
+    const StoredLandmark& landmark = landmarks.at(id);
+    points.push_back({landmark.position_m, landmark.local_variance()});
+  }
+  return points;
+}
+
+std::vector<geometry::UncertainPoint> points_of(const model::LandmarkScan& scan) {
+  std::vector<geometry::UncertainPoint> points;
+  for (const model::Detection& detection : scan.detections) {
+    points.push_back({detection.position_m.head<2>(),
+                      0.5 * detection.covariance_m2.topLeftCorner<2, 2>().trace()});
+  }
+  return points;
+}
+
+/// The pose among the landmarks near by, in the map: those share the error of the last keyframe, so
+/// the covariance is that of both.
+geometry::SE2WithCovariance in_map(
+    const geometry::Registration& found,
+    const std::optional<geometry::SE2WithCovariance>& map_T_last_base) {
+  if (!map_T_last_base) return {found.reference_T_observed, found.covariance};
+  return compound(*map_T_last_base,
+                  {map_T_last_base->mean.inverse() * found.reference_T_observed, found.covariance});
+}
+
+}  // namespace
+
+void ScanLocaliser::restart_at(model::Utime utime, const geometry::SE2& map_T_vehicle,
+                               const Eigen::Matrix3d& covariance) {
+  if (latest_ && latest_->utime > utime) return;
+  latest_ =
+      LocatedScan{utime, map_T_vehicle, latest_ ? latest_->step : geometry::SE2(), covariance};
+}
+
+std::optional<geometry::SE2WithCovariance> ScanLocaliser::locate(const model::LandmarkScan& raw,
+                                                                 const LandmarkMap& landmarks,
+                                                                 const Motion& motion) {
+  if (!latest_ || raw.utime <= latest_->utime) return std::nullopt;
+  const auto found = register_scan(level_.levelled(raw), landmarks, motion);
+  if (!found) return std::nullopt;
+
+  const geometry::SE2& pose = found->reference_T_observed;
+  latest_ =
+      LocatedScan{raw.utime, pose, latest_->map_T_vehicle.inverse() * pose, found->covariance};
+  return in_map(*found, motion.map_T_last_base());
+}
+
+/// By odometry where it reaches from the last scan, else by the last step and a search of
+/// rotations. None where too few detections match.
+std::optional<geometry::Registration> ScanLocaliser::register_scan(const model::LandmarkScan& scan,
+                                                                   const LandmarkMap& landmarks,
+                                                                   const Motion& motion) const {
+  const auto reference =
+      landmarks_around(latest_->map_T_vehicle.translation(),
+                       scan.field_of_view.max_range_m + kReachMargin_m, landmarks);
+  const auto observed = points_of(scan);
+
+  const auto fits = [&](const geometry::Registration& found) {
+    const double possible = static_cast<double>(std::min(reference.size(), observed.size()));
+    return found.pairs.size() >= static_cast<std::size_t>(parameters_.min_matched) &&
+           static_cast<double>(found.pairs.size()) >= parameters_.min_matched_ratio * possible;
+  };
+  geometry::RegistrationParameters gating;
+  gating.gate_sigmas = parameters_.gate_sigmas;
+  gating.gate_floor_m = parameters_.gate_floor_m;
+
+  const auto step = motion.between(latest_->utime, scan.utime);
+  const geometry::Registration found =
+      step ? register_points(
+                 reference, observed,
+                 compound({latest_->map_T_vehicle,
+                           latest_->covariance + kLeastVariance * Eigen::Matrix3d::Identity()},
+                          *step),
+                 gating)
+           : register_step(reference, observed, latest_->map_T_vehicle, latest_->step,
+                           geometry::StepModel{}, gating, fits);
+  if (!fits(found)) return std::nullopt;
+  return found;
+}
+
+}  // namespace understory::geoslam_mapper::smoothing

@@ -1,0 +1,92 @@
+// Where every keyframe was, and which of them were at one place.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/model/keyframe.hpp"
+#include "common/model/map.hpp"
+#include "services/geoslam_mapper/smoothing/pose_graph.hpp"
+#include "services/geoslam_mapper/smoothing/viewpoint_grid.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+
+/// A keyframe's base, rigidly tied to a node: nothing else measures it.
+struct Base {
+  NodeIndex node = 0;
+  std::uint64_t sequence = 0;  ///< Of the keyframe.
+  model::Utime utime = 0;
+  geometry::SE2WithCovariance centre_T_base;  ///< In the node's frame.
+  /// Mean of the keyframe's members, in the node's frame: the position of the keyframe, three times
+  /// as exact as the base alone.
+  geometry::SE2 centre_T_middle;
+  bool is_origin = false;  ///< The origin of the map: known exactly.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.node, s.sequence, s.utime, s.centre_T_base, s.centre_T_middle, s.is_origin);
+  }
+};
+
+/// The base of a keyframe whose landmarks and members are in the frame of `node`.
+Base base_of(const model::Keyframe& keyframe, NodeIndex node, bool is_origin = false);
+/// Mean of the members' poses, in the keyframe's centre frame.
+geometry::SE2 middle_of(const model::Keyframe& keyframe);
+
+/// The bases of all accepted keyframes, and an index of the viewpoints that differ: a keyframe from
+/// a viewpoint that the graph has already is folded into its node, so that a stationary vehicle
+/// does not grow the graph. Poses follow the graph, which is passed in.
+class Trajectory {
+ public:
+  /// `parameters` gives fold_distance_m and fold_angle_rad.
+  explicit Trajectory(const SmoothingMapperParameters& parameters)
+      : fold_distance_m_(parameters.fold_distance_m), fold_angle_rad_(parameters.fold_angle_rad) {}
+
+  /// Adds the base of an accepted keyframe. O(viewpoints of its node).
+  void add(const Base& base, const PoseGraph& graph);
+  /// Brings the index of viewpoints to where the graph's last updates moved the nodes.
+  void follow(const PoseGraph& graph);
+
+  /// The bases, in order of time.
+  std::span<const Base> bases() const { return bases_; }
+  /// Number of accepted keyframes.
+  std::uint32_t size() const { return static_cast<std::uint32_t>(bases_.size()); }
+  /// The last accepted keyframe's base; there must be one.
+  const Base& last() const { return bases_.back(); }
+  /// map_T_base at the present estimate.
+  geometry::SE2 pose(const Base& base, const PoseGraph& graph) const;
+  /// Whether the vehicle stayed within the folding distance and angle during the keyframe.
+  bool is_stationary(const model::Keyframe& keyframe) const;
+  /// The node of the nearest viewpoint within the folding distance and angle; none where the
+  /// keyframe sees from a new one. `map_T_middle`: see middle_of().
+  std::optional<NodeIndex> revisited(const geometry::SE2& map_T_middle,
+                                     const PoseGraph& graph) const;
+  /// A node's pose with its marginal covariance, which counts from the map's origin.
+  geometry::SE2WithCovariance centre_from_origin(NodeIndex node, const PoseGraph& graph) const;
+
+  /// Indexes the viewpoints anew, after a load. Throws std::out_of_range where a base has no node
+  /// in the graph.
+  void rebuild_index(const PoseGraph& graph);
+  /// Members of a saved state; see common/state. rebuild_index() makes the rest from them.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.bases_);
+  }
+
+ private:
+  void index(std::uint32_t number, const PoseGraph& graph);
+  geometry::SE2 middle(const Base& base, const PoseGraph& graph) const {
+    return graph.pose(base.node) * base.centre_T_middle;
+  }
+
+  double fold_distance_m_;
+  double fold_angle_rad_;
+  std::vector<Base> bases_;
+  std::vector<std::uint32_t> viewpoints_;  ///< Bases apart from the others of their node.
+  std::vector<std::vector<std::uint32_t>> viewpoints_of_node_;
+  ViewpointGrid grid_;  ///< Of the viewpoints.
+};
+
+}  // namespace understory::geoslam_mapper::smoothing
