@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <memory>
-#include <sstream>
-#include <stdexcept>
 
 #include "services/geoslam_mapper/adapter_parameters.hpp"
 #include "services/geoslam_mapper/geoslam_mapper.hpp"
-#include "services/geoslam_mapper/map_publishing.hpp"
+#include "services/geoslam_mapper/map_difference.hpp"
+#include "services/geoslam_mapper/pose_publishing.hpp"
 #include "understory/map_request_t.hpp"
 
 namespace understory::geoslam_mapper {
@@ -25,20 +24,35 @@ void cut(model::WholeMap& map, const map_request_t& request) {
   map.complete = false;
 }
 
-/// Blocks of text with their lengths before them.
-void write_block(std::ostream& out, const std::string& block) {
-  out << block.size() << '\n' << block << '\n';
-}
-std::string read_block(std::istream& in, std::size_t limit) {
-  std::size_t size = 0;
-  if (!(in >> size) || in.get() != '\n' || size > limit) {
-    throw std::runtime_error("the mapper's saved state is not whole");
+constexpr state::Format kFormat{"geoslam_mapper", 2};
+
+/// What a holder of every MAP_DELTA has.
+struct KnownMap {
+  model::Utime utime = 0;
+  std::uint64_t version = 0;
+  std::vector<model::MapLandmark> landmarks;  // in order of id
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.utime, s.version, s.landmarks);
   }
-  std::string block(size, '\0');
-  in.read(block.data(), static_cast<std::streamsize>(size));
-  if (!in || in.get() != '\n') throw std::runtime_error("the mapper's saved state is not whole");
-  return block;
-}
+};
+
+/// What the adapter itself remembers between messages.
+struct Memory {
+  KnownMap known;
+  OdometryFrame odometry;
+  JumpWatch jumps;
+  bool map_is_published = true;
+  model::Utime newest_pose_utime = -1;
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.known, s.odometry, s.jumps, s.map_is_published, s.newest_pose_utime);
+  }
+};
 
 class MapperAdapter : public bus::Adapter {
  public:
@@ -51,18 +65,44 @@ class MapperAdapter : public bus::Adapter {
 
   void bind(bus::Node& node) override {
     stage_ = make_mapper(parameters_);
-    jumps_ = JumpWatch(output_.reset_distance_m, output_.reset_angle_rad);
+    memory_ = empty_memory();
+    subscribe(node);
+    advertise(node);
+    node.every(static_cast<model::Utime>(output_.map_period_s * 1e6),
+               [this](model::Utime /*now*/) { publish_changed_map(); });
+  }
+
+  void finish() override { publish_changed_map(); }
+
+  std::string save() const override { return state::save(kFormat, memory_, stage_->save()); }
+
+  void load(const std::string& state) override {
+    Memory memory = empty_memory();
+    std::string stage;
+    state::load(state, kFormat, memory, stage);
+    stage_->load(stage);
+    memory_ = std::move(memory);
+  }
+
+ private:
+  Memory empty_memory() const {
+    Memory memory;
+    memory.jumps = JumpWatch(output_.reset_distance_m, output_.reset_angle_rad);
+    return memory;
+  }
+
+  void subscribe(bus::Node& node) {
     node.subscribe<model::Keyframe>(
         channels_.keyframe, [this](const model::Keyframe& one) { add(one); }, {.queue_size = 200});
-    // Not in the journal: a scan leaves nothing in the map, and the next one finds its place again.
+    // Not in the journal: a scan changes nothing in the map, and the next one is located anew.
     node.subscribe<model::LandmarkScan>(channels_.landmarks,
                                         [this](const model::LandmarkScan& scan) { locate(scan); },
                                         {.journaled = false});
-    // Small, and each one that is shed breaks the chain of motion: a long queue.
+    // Small, and each one that is lost breaks the chain of motion: a long queue.
     node.subscribe<model::Odometry>(channels_.odometry,
                                     [this](const model::Odometry& motion) {
                                       stage_->add(motion);
-                                      odometry_.add(motion);
+                                      memory_.odometry.add(motion);
                                     },
                                     {.queue_size = 2000});
     // Bias and velocity, and the motion to gate by; no measurement: it was made from the same
@@ -74,50 +114,19 @@ class MapperAdapter : public bus::Adapter {
     node.subscribe<map_request_t>(channels_.map_request,
                                   [this](const map_request_t& request) { answer(request); },
                                   {.queue_size = 4, .sequenced = false, .journaled = false});
+  }
+
+  void advertise(bus::Node& node) {
     poses_ = node.advertise<model::SlamPose>(channels_.slam_pose);
     updates_ = node.advertise<model::MapUpdate>(channels_.slam_update);
     maps_ = node.advertise<model::WholeMap>(channels_.map);
     deltas_ = node.advertise<model::MapDelta>(channels_.map_delta);
-    node.every(static_cast<model::Utime>(output_.map_period_s * 1e6),
-               [this](model::Utime /*now*/) { publish_changed_map(); });
   }
 
-  void finish() override { publish_changed_map(); }
-
-  std::string save() const override {
-    std::ostringstream out;
-    out << "mapper 1 " << map_is_published_ << ' ' << newest_pose_utime_ << '\n';
-    const wire::Bytes known = wire::encode_message(known_);
-    write_block(out, std::string(known.begin(), known.end()));
-    write_block(out, odometry_.save());
-    write_block(out, jumps_.save());
-    write_block(out, stage_->save());
-    return out.str();
-  }
-
-  void load(const std::string& state) override {
-    std::istringstream in(state);
-    std::string word;
-    int version = 0;
-    in >> word >> version >> map_is_published_ >> newest_pose_utime_;
-    if (!in || word != "mapper" || version != 1 || in.get() != '\n') {
-      throw std::runtime_error("the mapper's saved state is of another version");
-    }
-    const std::string known = read_block(in, state.size());
-    const wire::Bytes bytes(known.begin(), known.end());
-    auto map = wire::decode_message<model::WholeMap>(bytes);
-    if (!map) throw std::runtime_error("the mapper's saved map: " + map.refusal().detail);
-    known_ = std::move(*map);
-    odometry_.load(read_block(in, state.size()));
-    jumps_.load(read_block(in, state.size()));
-    stage_->load(read_block(in, state.size()));
-  }
-
- private:
   void add(const model::Keyframe& keyframe) {
     const model::MapUpdate update = stage_->add(keyframe);
     updates_.publish(update);
-    jumps_.add(keyframe, update);
+    memory_.jumps.add(keyframe, update);
     publish_poses(keyframe, update);
     publish_delta(update);
   }
@@ -125,7 +134,7 @@ class MapperAdapter : public bus::Adapter {
   /// The pose of a scan at once, in the map as it is; its keyframe comes later.
   void locate(const model::LandmarkScan& scan) {
     const std::optional<geometry::SE2WithCovariance> found = stage_->locate(scan);
-    if (!found || scan.utime <= newest_pose_utime_) return;
+    if (!found || scan.utime <= memory_.newest_pose_utime) return;
     model::SlamPose pose;
     pose.utime = scan.utime;
     pose.submap_T_vehicle = found->mean;
@@ -136,47 +145,50 @@ class MapperAdapter : public bus::Adapter {
   void publish_poses(const model::Keyframe& keyframe, const model::MapUpdate& update) {
     for (model::SlamPose& pose : poses_of(keyframe, update)) {
       // Keyframes may share scans; the stamp always grows.
-      if (pose.utime <= newest_pose_utime_) continue;
+      if (pose.utime <= memory_.newest_pose_utime) continue;
       publish(pose);
     }
   }
 
   void publish(model::SlamPose& pose) {
-    newest_pose_utime_ = pose.utime;
-    pose.map_T_odom = pose.map_T_vehicle() * odometry_.odom_T_vehicle(pose.utime).inverse();
-    pose.reset_counter = jumps_.count();
-    pose.reset_delta = jumps_.delta();
+    memory_.newest_pose_utime = pose.utime;
+    pose.map_T_odom = pose.map_T_vehicle() * memory_.odometry.odom_T_vehicle(pose.utime).inverse();
+    pose.reset_counter = memory_.jumps.count();
+    pose.reset_delta = memory_.jumps.delta();
     poses_.publish(pose);
   }
 
   void publish_delta(const model::MapUpdate& update) {
     const auto changed = stage_->take_changed_landmarks();
     model::MapDelta delta =
-        changed ? map_change(known_.landmarks, *changed, update, output_.moved_m)
-                : map_difference(known_.landmarks, stage_->landmarks(), update, output_.moved_m);
-    known_.utime = std::max(known_.utime, update.utime);
+        changed
+            ? map_change(memory_.known.landmarks, *changed, update, output_.moved_m)
+            : map_difference(memory_.known.landmarks, stage_->landmarks(), update, output_.moved_m);
+
+    memory_.known.utime = std::max(memory_.known.utime, update.utime);
     const bool changes = !delta.added.empty() || !delta.moved.empty() || !delta.removed.empty() ||
                          !delta.merged.empty();
     if (!changes) return;
-    delta.base_version = known_.version;
-    delta.version = ++known_.version;
-    known_.landmarks = with_delta(std::move(known_.landmarks), delta);
-    map_is_published_ = false;
+
+    delta.base_version = memory_.known.version;
+    delta.version = ++memory_.known.version;
+    memory_.known.landmarks = with_delta(std::move(memory_.known.landmarks), delta);
+    memory_.map_is_published = false;
     deltas_.publish(delta);
   }
 
   model::WholeMap whole_map() const {
     model::WholeMap map;
-    map.utime = known_.utime;
-    map.version = known_.version;
+    map.utime = memory_.known.utime;
+    map.version = memory_.known.version;
     map.landmarks = stage_->landmarks();
     map.keyframes = stage_->trajectory();
     return map;
   }
 
   void publish_changed_map() {
-    if (map_is_published_) return;
-    map_is_published_ = true;
+    if (memory_.map_is_published) return;
+    memory_.map_is_published = true;
     maps_.publish(whole_map());
   }
 
@@ -190,11 +202,7 @@ class MapperAdapter : public bus::Adapter {
   MapperParameters parameters_;
   MapperOutputParameters output_;
   std::unique_ptr<MapperMethod> stage_;
-  OdometryFrame odometry_;
-  JumpWatch jumps_;
-  model::WholeMap known_;  // what a holder of every MAP_DELTA knows; without keyframes
-  bool map_is_published_ = true;
-  model::Utime newest_pose_utime_ = -1;
+  Memory memory_;
   bus::Publisher<model::SlamPose> poses_;
   bus::Publisher<model::MapUpdate> updates_;
   bus::Publisher<model::WholeMap> maps_;

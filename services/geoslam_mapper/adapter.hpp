@@ -7,19 +7,23 @@
 
 namespace understory::geoslam_mapper {
 
+/// Names of the channels; see the README for what each carries.
 struct MapperChannels {
+  // In.
   std::string keyframe = "KEYFRAME";
   std::string landmarks = "LANDMARKS";
   std::string odometry = "ODOMETRY";
   std::string ekf_pose = "EKF_POSE";
   std::string ekf_level = "EKF_LEVEL";
   std::string map_request = "MAP_REQUEST";
+  // Out.
   std::string slam_pose = "SLAM_POSE";
   std::string slam_update = "SLAM_UPDATE";
   std::string map = "MAP";
   std::string map_delta = "MAP_DELTA";
 };
 
+/// The mapper as a service: name, channels and what makes its adapter.
 bus::Service geoslam_mapper_service(const MapperChannels& channels = {});
 
 }  // namespace understory::geoslam_mapper

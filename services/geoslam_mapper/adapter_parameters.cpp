@@ -5,17 +5,17 @@ namespace {
 
 void describe_baseline(BaselineMapperParameters& p, bus::ParameterTable& table) {
   table.add("baseline.descriptor_step", p.descriptor_step, {0.001, 0.5}, "of the perimeter",
-            "[s] Step at which an outline is sampled.");
+            "[s] Step at which a polygon's outline is sampled.");
   table.add("baseline.max_side_difference", p.max_side_difference, {0, 100}, "",
             "[Delta_N] Polygons whose numbers of sides differ by more do not match.");
   table.add("baseline.min_triangle_match_ratio", p.min_triangle_match_ratio, {0.0, 1.0}, "",
             "[eta] Share of triangles that must match inside a matched polygon.");
   table.add("baseline.initial_descriptor_distance", p.initial_descriptor_distance, {0.0, 1000.0},
-            "m", "[tau] Descriptor distance with which the search begins.");
+            "m", "[tau] Largest descriptor distance of a match, in the first attempt.");
   table.add("baseline.descriptor_distance_step", p.descriptor_distance_step, {0.001, 1000.0}, "m",
-            "[psi] By how much it widens.");
+            "[psi] Increment of that distance from attempt to attempt.");
   table.add("baseline.max_descriptor_distance", p.max_descriptor_distance, {0.0, 1000.0}, "m",
-            "Where it ends.");
+            "Largest descriptor distance of all attempts.");
   table.add("baseline.min_associations", p.min_associations, {2, 10000}, "",
             "[gamma] Fewest associations with which a pose is tried.");
   table.add("baseline.max_pose_attempts", p.max_pose_attempts, {1, 1000000}, "",
@@ -26,77 +26,95 @@ void describe_baseline(BaselineMapperParameters& p, bus::ParameterTable& table) 
             "[Lambda] Largest distance of an inlier.");
   table.add("baseline.discovery_distance_m", p.discovery_distance_m, {0.001, 1000.0}, "m",
             "[rho] A detection farther than this from the map may be new.");
-  table.add("baseline.sensor_range_m", p.sensor_range_m, {0.1, 10000.0}, "m", "[r] Of the sensor.");
+  table.add("baseline.sensor_range_m", p.sensor_range_m, {0.1, 10000.0}, "m",
+            "[r] Range of the sensor.");
   table.add("baseline.min_pose_associations", p.min_pose_associations, {2, 10000}, "",
             "[mu] Fewest inliers of a pose.");
   table.add("baseline.early_exit_ratio", p.early_exit_ratio, {0.0, 1.0}, "",
             "[beta] Share of inliers at which no more samples are drawn.");
   table.add("baseline.discovery_observations", p.discovery_observations, {1, 1000}, "keyframes",
-            "[k] So often a new landmark must be seen ...");
+            "[k] A new landmark must be observed in so many keyframes ...");
   table.add("baseline.discovery_window", p.discovery_window, {1, 1000}, "keyframes",
-            "[omega] ... within so many keyframes.");
+            "[omega] ... of the last so many.");
   table.add("baseline.discovery_association_m", p.discovery_association_m, {0.001, 100.0}, "m",
-            "[delta] Sightings of a new landmark this near to each other are one.");
+            "[delta] Observations this near to each other, per axis, are of one new landmark.");
   table.add("baseline.max_newest_pose_error", p.max_newest_pose_error, {0.0, 1e12}, "",
-            "Error of the newest pose beyond which the update is rolled back.");
+            "Squared error of the newest pose beyond which the update is rolled back.");
 }
 
 void describe_evidence(SmoothingMapperParameters& p, bus::ParameterTable& table) {
+  table.add("smoothing.use_odometry", p.use_odometry,
+            "Use ODOMETRY between keyframes as a measurement.");
+  table.add(
+      "smoothing.gyro_walk", p.gyro_walk, {0.0, 1.0}, "rad/s/sqrt(s)",
+      "Random walk of the gyro's bias, which is estimated in the graph: what is learned of it "
+      "later straightens the path before. 0: the filter's estimate is used instead.");
   table.add("smoothing.relinearise_above", p.relinearise_above, {1e-6, 1.0}, "sigma",
-            "A measurement is linearised again beyond this: 1e-4 on long open roads.");
-  table.add("smoothing.gate_sigmas", p.gate_sigmas, {0.1, 100.0}, "sigma", "Association gate.");
-  table.add("smoothing.gate_floor_m", p.gate_floor_m, {0.0, 10.0}, "m", "Added to the gate.");
+            "A measurement is linearised again beyond this. Use 1e-6 on long roads, open or in "
+            "loops: with 1e-4 the end of a 3 km road jumped by 0.25 m per keyframe, with 1e-2 by "
+            "metres. In a forest 1e-6 takes six times as long and gains nothing.");
   table.add("smoothing.predicted_sigma_m", p.predicted_sigma_m, {1e-4, 100.0}, "m",
-            "Of a predicted pose that no odometry made.");
+            "Standard deviation of a pose that was predicted without odometry.");
   table.add("smoothing.predicted_sigma_rad", p.predicted_sigma_rad, {1e-5, 3.2}, "rad",
-            "Of the heading of a predicted pose that no odometry made.");
-  table.add("smoothing.filter_disagreement_m", p.filter_disagreement_m, {0.0, 100.0}, "m",
-            "a keyframe with at most two landmarks that moves so much otherwise than the filter "
-            "is not believed; 0: the filter is not asked");
-  table.add("smoothing.min_matched_ratio", p.min_matched_ratio, {0.0, 1.0}, "",
-            "Of what can be matched: below, a predicted pose is not believed.");
+            "Standard deviation of its heading.");
   table.add("smoothing.correlated_share", p.correlated_share, {0.0, 0.9}, "",
-            "Of a sighting's variance: what stays the same over lasting_m; 0 = all is new.");
+            "Share of an observation's variance that is correlated along the path (a trunk is no "
+            "cylinder, and looks the same from the same place). 0: white noise.");
   table.add("smoothing.correlation_m", p.correlation_m, {0.01, 1000.0}, "m",
-            "Way over which what lasts of a sighting's error fades.");
+            "Distance over which that correlation falls to 1/e.");
   table.add("smoothing.stationary_share", p.stationary_share, {0.0, 1.0}, "",
-            "Of a sighting's variance: what stays the same while the vehicle stands.");
+            "The same share while the vehicle is stationary: the beams meet the same bark again.");
   table.add("smoothing.scale_sigma", p.scale_sigma, {0.0, 0.1}, "",
-            "Of distances, the same for all landmarks and for ever: told in covariances.");
-  table.add("smoothing.start_heading_sigma_rad", p.start_heading_sigma_rad, {1e-5, 10.0}, "rad",
-            "A map begins with a keyframe whose ends the odometry ties to so much heading...");
-  table.add("smoothing.start_wait_s", p.start_wait_s, {0.0, 60.0}, "s",
-            "... or, after so long, with any.");
+            "Standard deviation of the scale of distances, a common-mode error of all landmarks. "
+            "It is not estimated, but reported in the covariances of poses.");
+  table.add("smoothing.given_map_sigma_m", p.given_map_sigma_m, {1e-4, 100.0}, "m",
+            "Standard deviation of the landmarks of a given map that states no covariance.");
+}
+
+void describe_association(SmoothingMapperParameters& p, bus::ParameterTable& table) {
+  table.add("smoothing.gate_sigmas", p.gate_sigmas, {0.1, 100.0}, "sigma",
+            "Half width of the association gate.");
+  table.add("smoothing.gate_floor_m", p.gate_floor_m, {0.0, 10.0}, "m",
+            "Added to the half width of the gate.");
+  table.add("smoothing.min_matched_ratio", p.min_matched_ratio, {0.0, 1.0}, "",
+            "Smallest share of matches among the landmarks that could match. With fewer the "
+            "predicted pose is not believed, and the whole map is searched.");
   table.add("smoothing.min_matched", p.min_matched, {1, 1000}, "",
             "Fewest matches of a pose that odometry does not support.");
+  table.add("smoothing.filter_disagreement_m", p.filter_disagreement_m, {0.0, 100.0}, "m",
+            "A keyframe with at most two matches is refused where its motion differs from the "
+            "filter's by more than this: the trunk may be a pedestrian. 0: no such test.");
+  table.add("smoothing.recent_keyframes", p.recent_keyframes, {1, 100000}, "keyframes",
+            "Landmarks observed within so many keyframes share the error of the pose.");
   table.add("smoothing.outlier_chi2", p.outlier_chi2, {1.0, 1e6}, "",
-            "Of one association after the update (2 degrees of freedom): it is taken out.");
+            "An association with a larger chi^2 after the update (2 degrees of freedom) is taken "
+            "out.");
   table.add("smoothing.max_innovation_sigmas", p.max_innovation_sigmas, {1.0, 1e6}, "sigma",
             "chi^2 of all associations as a normal deviate: beyond, the update is rolled back.");
 }
 
 void describe_growth(SmoothingMapperParameters& p, bus::ParameterTable& table) {
-  table.add("smoothing.use_odometry", p.use_odometry, "ODOMETRY between keyframes as a factor.");
-  table.add("smoothing.gyro_walk", p.gyro_walk, {0.0, 1.0}, "rad/s/sqrt(s)",
-            "Random walk of the gyro's bias in the graph; 0 = the filter's word is taken for it.");
   table.add("smoothing.localisation_only", p.localisation_only,
             "Never change the map that was given.");
-  table.add("smoothing.recent_keyframes", p.recent_keyframes, {1, 100000}, "keyframes",
-            "Landmarks seen within so many share their error with the pose.");
-  table.add("smoothing.min_observations", p.min_observations, {1, 1000}, "",
-            "A landmark enters the map when it was detected so often.");
+  table.add("smoothing.start_heading_sigma_rad", p.start_heading_sigma_rad, {1e-5, 10.0}, "rad",
+            "A map starts with a keyframe whose ends odometry ties to so much heading (before, the "
+            "gyro's bias is unknown) ...");
+  table.add("smoothing.start_wait_s", p.start_wait_s, {0.0, 60.0}, "s",
+            "... or, after so long, with any keyframe.");
+  table.add("smoothing.min_observations", p.min_observations, {1, 1000}, "scans",
+            "A landmark enters the map when it was detected in so many scans ...");
   table.add("smoothing.min_observation_ratio", p.min_observation_ratio, {0.0, 1.0}, "",
             "... and in this share of the scans that had it in view.");
   table.add("smoothing.candidate_keyframes", p.candidate_keyframes, {1, 100000}, "keyframes",
-            "A candidate seen too seldom is forgotten after so many.");
-  table.add("smoothing.merge_distance_m", p.merge_distance_m, {0.0, 100.0}, "m",
-            "Two landmarks this near that were never seen from one place are one.");
-  table.add("smoothing.fold_distance_m", p.fold_distance_m, {0.0, 100.0}, "m",
-            "A keyframe this near to an earlier one and similarly turned is folded into it.");
+            "A candidate for the map is forgotten after so many keyframes.");
+  table.add(
+      "smoothing.merge_distance_m", p.merge_distance_m, {0.0, 100.0}, "m",
+      "Two landmarks this near to each other that were not observed side by side are merged.");
+  table.add(
+      "smoothing.fold_distance_m", p.fold_distance_m, {0.0, 100.0}, "m",
+      "A keyframe this near to an earlier one, and with a similar heading, is folded into it.");
   table.add("smoothing.fold_angle_rad", p.fold_angle_rad, {0.0, 3.2}, "rad",
-            "How similarly turned.");
-  table.add("smoothing.given_map_sigma_m", p.given_map_sigma_m, {1e-4, 100.0}, "m",
-            "Of the landmarks of a given map that states no covariance.");
+            "Largest difference of their headings.");
 }
 
 void describe_renamed(bus::ParameterTable& table) {
@@ -115,8 +133,10 @@ void describe_renamed(bus::ParameterTable& table) {
 
 void describe(MapperParameters& parameters, bus::ParameterTable& table) {
   table.add("method", parameters.method, {"smoothing", "baseline"},
-            "smoothing: this project's; baseline: as the GeoSLAM thesis describes it.");
+            "smoothing: incremental smoothing with covariances; baseline: the method of the "
+            "GeoSLAM thesis.");
   describe_evidence(parameters.smoothing, table);
+  describe_association(parameters.smoothing, table);
   describe_growth(parameters.smoothing, table);
   describe_baseline(parameters.baseline, table);
   describe_renamed(table);

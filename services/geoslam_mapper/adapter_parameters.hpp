@@ -1,4 +1,4 @@
-// The mapper's parameters as a list: units, ranges, meanings.
+// The mapper's parameters as a list: keys, units, ranges, meanings.
 #pragma once
 
 #include "common/bus/parameter_table.hpp"
@@ -6,7 +6,7 @@
 
 namespace understory::geoslam_mapper {
 
-/// What the adapter decides itself.
+/// What the adapter decides itself; documented as MapperParameters is.
 struct MapperOutputParameters {
   double map_period_s = 2.0;
   double moved_m = 0.001;
@@ -14,7 +14,9 @@ struct MapperOutputParameters {
   double reset_angle_rad = 0.05;
 };
 
+/// Adds the parameters of the methods to the table, with their older names.
 void describe(MapperParameters& parameters, bus::ParameterTable& table);
+/// Adds the parameters of the outputs to the table.
 void describe(MapperOutputParameters& parameters, bus::ParameterTable& table);
 
 }  // namespace understory::geoslam_mapper

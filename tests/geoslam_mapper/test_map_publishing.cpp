@@ -1,10 +1,12 @@
-// What the mapper tells beside the stage: differences of maps, odometry's frame, poses, jumps.
+// What the mapper publishes beyond the stage: differences of maps, the odometry frame, poses,
+// jumps.
 #include <Eigen/LU>
 #include <numbers>
 #include <random>
 #include <set>
 
-#include "services/geoslam_mapper/map_publishing.hpp"
+#include "services/geoslam_mapper/map_difference.hpp"
+#include "services/geoslam_mapper/pose_publishing.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
@@ -55,6 +57,16 @@ struct ChangedMap {
   }
 };
 
+/// The bytes of one value's saved state.
+template <class T>
+std::string saved(const T& value) {
+  return state::save({"test"}, value);
+}
+template <class T>
+void load(const std::string& bytes, T& value) {
+  state::load(bytes, {"test"}, value);
+}
+
 std::set<model::LandmarkId> ids_of(const std::vector<model::MapLandmark>& landmarks) {
   std::set<model::LandmarkId> ids;
   for (const auto& one : landmarks) ids.insert(one.id);
@@ -102,7 +114,7 @@ TEST_CASE("a holder of every difference has the map", "[map_publishing]") {
   }
 }
 
-TEST_CASE("a difference says no more than what changed", "[map_publishing]") {
+TEST_CASE("a difference holds no more than what changed", "[map_publishing]") {
   constexpr double kMoved = 0.01;
   std::mt19937_64 random(2);
   for (int run = 0; run < 200; ++run) {
@@ -124,19 +136,19 @@ TEST_CASE("a difference says no more than what changed", "[map_publishing]") {
   }
 }
 
-TEST_CASE("small steps add up until they are told", "[map_publishing]") {
+TEST_CASE("small steps add up until they are reported", "[map_publishing]") {
   std::mt19937_64 random(3);
   std::vector<model::MapLandmark> map{landmark(1, random)};
   std::vector<model::MapLandmark> held = map;
-  int told = 0;
+  int reported = 0;
   for (int step = 0; step < 100; ++step) {
     map[0].position_m.x() += 0.004;
     const model::MapDelta delta = map_difference(held, map, {}, 0.01);
-    told += static_cast<int>(delta.moved.size());
+    reported += static_cast<int>(delta.moved.size());
     held = with_delta(held, delta);
     CHECK((held[0].position_m - map[0].position_m).norm() <= 0.01);
   }
-  CHECK(told == 33);  // At every third step of 4 mm.
+  CHECK(reported == 33);  // At every third step of 4 mm.
 }
 
 TEST_CASE("the odometry frame is the sum of the motions", "[map_publishing]") {
@@ -153,7 +165,7 @@ TEST_CASE("the odometry frame is the sum of the motions", "[map_publishing]") {
     poses.push_back(poses.back() * motion.from_T_to);
   }
   OdometryFrame loaded;
-  loaded.load(frame.save());
+  load(saved(frame), loaded);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const model::Utime utime = 1000 + 100 * static_cast<model::Utime>(i);
     CHECK(difference(frame.odom_T_vehicle(utime), poses[i]) < 1e-9);
@@ -161,20 +173,20 @@ TEST_CASE("the odometry frame is the sum of the motions", "[map_publishing]") {
     CHECK(difference(loaded.odom_T_vehicle(utime), frame.odom_T_vehicle(utime)) == 0.0);
   }
   CHECK(difference(frame.odom_T_vehicle(0), poses.front()) < 1e-9);
-  CHECK(loaded.save() == frame.save());
+  CHECK(saved(loaded) == saved(frame));
 }
 
 TEST_CASE("states that are not whole are refused", "[map_publishing]") {
   OdometryFrame frame;
   frame.add(model::Odometry{});
-  const std::string state = frame.save();
+  const std::string state = saved(frame);
   OdometryFrame other;
-  CHECK_THROWS(other.load(""));
-  CHECK_THROWS(other.load("1000000000 1 2 3"));
-  CHECK_THROWS(other.load(state.substr(0, state.find(' ') + 2)));
+  CHECK_THROWS_AS(load("", other), std::invalid_argument);
+  CHECK_THROWS_AS(load(state.substr(0, state.size() - 1), other), std::invalid_argument);
+  CHECK_THROWS_AS(load(state + "x", other), std::invalid_argument);
   JumpWatch watch;
-  CHECK_THROWS(watch.load(""));
-  CHECK_THROWS(watch.load("1 2 3"));
+  CHECK_THROWS_AS(load("", watch), std::invalid_argument);
+  CHECK_THROWS_AS(load(state, watch), std::invalid_argument);
 }
 
 TEST_CASE("every scan of a keyframe has its pose, known no better than the keyframe's",
@@ -201,7 +213,7 @@ TEST_CASE("every scan of a keyframe has its pose, known no better than the keyfr
   }
 }
 
-TEST_CASE("a keyframe without a place gives one pose that says so", "[map_publishing]") {
+TEST_CASE("a keyframe without a place gives one pose with its status", "[map_publishing]") {
   std::mt19937_64 random(6);
   const model::Keyframe keyframe = random_keyframe(random, 8);
   for (const auto status :
@@ -240,8 +252,8 @@ TEST_CASE("a jump against what was tracked is counted, a tracked motion is none"
   // Through a keyframe without a place the prediction goes on.
   step(random_pose(random), geometry::SE2(), model::MapUpdateStatus::kNotSure);
   JumpWatch loaded(0.5, 0.05);
-  loaded.load(watch.save());
-  CHECK(loaded.save() == watch.save());
+  load(saved(watch), loaded);
+  CHECK(saved(loaded) == saved(watch));
   step(random_pose(random), {0.0, 0.0, -0.06}, model::MapUpdateStatus::kUpdated);
   CHECK(watch.count() == 2);
   CHECK(watch.delta().theta() == Approx(-0.06));

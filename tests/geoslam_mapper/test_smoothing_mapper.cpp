@@ -4,7 +4,7 @@
 #include <Eigen/LU>
 #include <random>
 
-#include "services/geoslam_mapper/map_publishing.hpp"
+#include "services/geoslam_mapper/map_difference.hpp"
 #include "services/keyframer/joint_keyframer.hpp"
 #include "sim/drive.hpp"
 #include "tests/catch.hpp"

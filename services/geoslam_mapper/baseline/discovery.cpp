@@ -14,6 +14,7 @@ std::set<ObservationKey> DiscoveryNetwork::link(ObservationKey id, const Observa
       added.neighbours.insert(other_id);
     }
   }
+
   std::set<ObservationKey> group{id};
   for (const ObservationKey& neighbour : added.neighbours) {
     int tally = 2;
@@ -24,6 +25,7 @@ std::set<ObservationKey> DiscoveryNetwork::link(ObservationKey id, const Observa
       group.insert(neighbour);
     }
   }
+
   for (const ObservationKey& neighbour : added.neighbours) {
     nodes_.at(neighbour).neighbours.insert(id);
   }
@@ -52,6 +54,7 @@ std::vector<Discovery> DiscoveryNetwork::add(std::uint32_t pose,
     if (static_cast<int>(group.size()) < parameters.observations_needed) {
       continue;
     }
+
     Discovery discovery;
     for (const ObservationKey& member : group) {
       const Observation& observation = nodes_.at(member).observation;

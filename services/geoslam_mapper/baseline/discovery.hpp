@@ -1,4 +1,4 @@
-// The source's discovery of new landmarks (GeoSLAM §4.3.4, algorithm 5).
+// The baseline's discovery of new landmarks (GeoSLAM §4.3.4, algorithm 5).
 #pragma once
 
 #include <Eigen/Core>
@@ -15,48 +15,76 @@ namespace understory::geoslam_mapper::baseline {
 /// One unmatched landmark of one keyframe: pose number, number within that pose.
 using ObservationKey = std::pair<std::uint32_t, std::uint32_t>;
 
+/// A landmark of a keyframe that the map does not have.
 struct Observation {
-  Eigen::Vector2d in_map_m = Eigen::Vector2d::Zero();  ///< As placed when it was seen.
-  Eigen::Vector2d in_pose_m = Eigen::Vector2d::Zero();
+  /// Frame `map`, by the pose of the keyframe when it was added.
+  Eigen::Vector2d in_map_m = Eigen::Vector2d::Zero();
+  Eigen::Vector2d in_pose_m = Eigen::Vector2d::Zero();  ///< Frame of the keyframe's base.
   double radius_m = 0.0;
   model::LandmarkKind kind = model::LandmarkKind::kTrunk;
-  std::uint16_t observation_count = 0;
+  std::uint16_t observation_count = 0;  ///< Scans of the keyframe that detected it.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.in_map_m, s.in_pose_m, s.radius_m, s.kind, s.observation_count);
+  }
 };
 
+/// A new landmark.
 struct Discovery {
-  Eigen::Vector2d position_m =
-      Eigen::Vector2d::Zero();  ///< Mean of the sightings, frame of the map.
-  std::vector<std::pair<std::uint32_t, Observation>> observations;  ///< Pose, what it saw.
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Observations' mean, frame `map`.
+  /// Number of the pose, and what it observed.
+  std::vector<std::pair<std::uint32_t, Observation>> observations;
 };
 
+/// Symbols of the thesis in brackets.
 struct DiscoveryParameters {
   int observations_needed = 4;          ///< [k]
   int window = 5;                       ///< [omega] Poses.
   double association_distance_m = 0.5;  ///< [delta] Per axis.
 };
 
-/// Sightings of the last poses and which of them lie together.
+/// Observations of the last poses, linked where they lie together.
 class DiscoveryNetwork {
  public:
-  /// Adds what pose number `pose` saw and could not match; gives the landmarks that this makes
-  /// certain, whose sightings leave the network. The published tally: a sighting belongs when it
-  /// shares enough links, so the result need not be a clique and may hold two sightings of one
-  /// pose.
+  /// An empty network.
+  DiscoveryNetwork() = default;
+
+  /// Adds what pose number `pose` observed and could not match. Returns the landmarks that this
+  /// confirms; their observations leave the network. As published, an observation belongs to a
+  /// landmark when it shares enough links: the result need not be a clique, and may hold two
+  /// observations of one pose. O(observations in the window) per observation.
   std::vector<Discovery> add(std::uint32_t pose, const std::vector<Observation>& observations,
                              const DiscoveryParameters& parameters);
   /// Forgets the oldest pose when the window is full; after an accepted update.
   void slide(const DiscoveryParameters& parameters);
 
+  /// An observation and the observations near it.
   struct Node {
     Observation observation;
     std::set<ObservationKey> neighbours;
+
+    /// Members of a saved state; see common/state.
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& s) {
+      std::vector<ObservationKey> neighbours(s.neighbours.begin(), s.neighbours.end());
+      a(s.observation, neighbours);
+      if constexpr (Archive::kReads) s.neighbours = {neighbours.begin(), neighbours.end()};
+    }
   };
+  /// All observations in the window.
   const std::map<ObservationKey, Node>& nodes() const { return nodes_; }
+  /// Numbers of the poses in the window.
   const std::set<std::uint32_t>& poses() const { return poses_; }
-  /// For load(): links are given by the nodes.
-  DiscoveryNetwork(std::map<ObservationKey, Node> nodes, std::set<std::uint32_t> poses)
-      : nodes_(std::move(nodes)), poses_(std::move(poses)) {}
-  DiscoveryNetwork() = default;
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    std::vector<std::uint32_t> poses(self.poses_.begin(), self.poses_.end());
+    a(self.nodes_, poses);
+    if constexpr (Archive::kReads) self.poses_ = {poses.begin(), poses.end()};
+  }
 
  private:
   std::set<ObservationKey> link(ObservationKey id, const Observation& observation,
@@ -64,7 +92,7 @@ class DiscoveryNetwork {
   void remove(ObservationKey id);
 
   std::map<ObservationKey, Node> nodes_;
-  std::set<std::uint32_t> poses_;  ///< In the window, also those that left no node.
+  std::set<std::uint32_t> poses_;  ///< In the window, also those without an observation.
 };
 
 }  // namespace understory::geoslam_mapper::baseline

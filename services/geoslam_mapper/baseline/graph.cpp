@@ -12,14 +12,14 @@ namespace {
 constexpr double kInformation = 100.0;
 
 /// R(theta)^T
-Eigen::Matrix2d turned_back(double theta) {
+Eigen::Matrix2d rotated_back(double theta) {
   Eigen::Matrix2d r;
   r << std::cos(theta), std::sin(theta), -std::sin(theta), std::cos(theta);
   return r;
 }
 
 /// d R(theta)^T / d theta
-Eigen::Matrix2d turned_back_derivative(double theta) {
+Eigen::Matrix2d rotated_back_derivative(double theta) {
   Eigen::Matrix2d r;
   r << -std::sin(theta), std::cos(theta), -std::cos(theta), -std::sin(theta);
   return r;
@@ -27,7 +27,7 @@ Eigen::Matrix2d turned_back_derivative(double theta) {
 
 Eigen::Vector2d landmark_residual(const Eigen::Vector3d& pose, const Eigen::Vector2d& landmark,
                                   const Eigen::Vector2d& measured) {
-  return turned_back(pose.z()) * (landmark - pose.head<2>()) - measured;
+  return rotated_back(pose.z()) * (landmark - pose.head<2>()) - measured;
 }
 
 /// The normal equations with the landmarks still in: their block is diagonal, since the derivative
@@ -46,17 +46,20 @@ void add_pose_edge(const Graph& graph, const PoseEdge& edge, NormalEquations& eq
   const Eigen::Vector3d& from = graph.poses[edge.from];
   const Eigen::Vector3d& to = graph.poses[edge.to];
   const Eigen::Vector2d moved = to.head<2>() - from.head<2>();
-  const Eigen::Matrix2d difference_back = turned_back(edge.difference.z());
-  const Eigen::Matrix2d by_translation = difference_back * turned_back(from.z());
+  const Eigen::Matrix2d difference_back = rotated_back(edge.difference.z());
+  const Eigen::Matrix2d by_translation = difference_back * rotated_back(from.z());
+
   Eigen::Vector3d residual;
   residual.head<2>() = by_translation * moved - difference_back * edge.difference.head<2>();
   residual.z() = geometry::wrap_angle(to.z() - from.z() - edge.difference.z());
+
   Eigen::Matrix<double, 3, 6> jacobian = Eigen::Matrix<double, 3, 6>::Zero();
   jacobian.block<2, 2>(0, 0) = -by_translation;
-  jacobian.block<2, 1>(0, 2) = difference_back * turned_back_derivative(from.z()) * moved;
+  jacobian.block<2, 1>(0, 2) = difference_back * rotated_back_derivative(from.z()) * moved;
   jacobian(2, 2) = -1.0;
   jacobian.block<2, 2>(0, 3) = by_translation;
   jacobian(2, 5) = 1.0;
+
   const Eigen::Matrix<double, 6, 6> square = kInformation * jacobian.transpose() * jacobian;
   const Eigen::Matrix<double, 6, 1> gradient = kInformation * jacobian.transpose() * residual;
   const Eigen::Index i = 3 * static_cast<Eigen::Index>(edge.from);
@@ -73,10 +76,12 @@ void add_landmark_edge(const Graph& graph, const LandmarkEdge& edge, NormalEquat
   const Eigen::Vector3d& pose = graph.poses[edge.pose];
   const Eigen::Vector2d& landmark = graph.landmarks_m[edge.landmark];
   const Eigen::Vector2d residual = landmark_residual(pose, landmark, edge.measured_m);
-  const Eigen::Matrix2d by_landmark = turned_back(pose.z());
+  const Eigen::Matrix2d by_landmark = rotated_back(pose.z());
+
   Eigen::Matrix<double, 2, 3> by_pose;
   by_pose.leftCols<2>() = -by_landmark;
-  by_pose.col(2) = turned_back_derivative(pose.z()) * (landmark - pose.head<2>());
+  by_pose.col(2) = rotated_back_derivative(pose.z()) * (landmark - pose.head<2>());
+
   const Eigen::Index i = 3 * static_cast<Eigen::Index>(edge.pose);
   equations.poses.block<3, 3>(i, i) += kInformation * by_pose.transpose() * by_pose;
   equations.pose_gradient.segment<3>(i) += kInformation * by_pose.transpose() * residual;
@@ -95,9 +100,11 @@ NormalEquations assemble(const Graph& graph) {
   equations.landmark_weights.assign(graph.landmarks_m.size(), 0.0);
   equations.landmark_gradients.assign(graph.landmarks_m.size(), Eigen::Vector2d::Zero());
   equations.couplings.resize(graph.landmarks_m.size());
+
   if (size > 0) {
     equations.poses.topLeftCorner<3, 3>() += Eigen::Matrix3d::Identity();
   }
+
   for (const PoseEdge& edge : graph.pose_edges) {
     add_pose_edge(graph, edge, equations);
   }
@@ -136,10 +143,12 @@ std::optional<GraphStep> gauss_newton_step(const Graph& graph) {
   if (factorisation.info() != Eigen::Success) {
     return std::nullopt;
   }
+
   const Eigen::VectorXd solution = factorisation.solve(equations.pose_gradient);
   if (!solution.allFinite()) {
     return std::nullopt;
   }
+
   GraphStep step;
   for (Eigen::Index i = 0; i < solution.size(); i += 3) {
     step.poses.emplace_back(solution.segment<3>(i));

@@ -28,6 +28,7 @@ std::vector<Eigen::Vector2d> positions_of(const model::Keyframe& keyframe) {
 
 geometry::SE2 to_pose(const Eigen::Vector3d& pose) { return {pose.x(), pose.y(), pose.z()}; }
 
+/// The thesis's method; see MapperMethod for the functions.
 class BaselineMapper final : public MapperMethod {
  public:
   explicit BaselineMapper(const BaselineMapperParameters& parameters)
@@ -36,7 +37,7 @@ class BaselineMapper final : public MapperMethod {
                    parameters.discovery_association_m} {}
 
   model::MapUpdate add(const model::Keyframe& keyframe) override;
-  void add(const model::Odometry& /*odometry*/) override {}  // The source knows none.
+  void add(const model::Odometry& /*odometry*/) override {}  // The thesis uses none.
   void start_with(std::span<const model::MapLandmark> landmarks) override;
   std::vector<model::KeyframePose> trajectory() const override;
   std::vector<model::MapLandmark> landmarks() const override;
@@ -48,6 +49,7 @@ class BaselineMapper final : public MapperMethod {
  private:
   std::vector<hierarchy::baseline::PointMatch> match(std::span<const Eigen::Vector2d> local) const;
   void start_map(const model::Keyframe& keyframe, model::MapUpdate& update);
+  bool localise_and_fuse(const model::Keyframe& keyframe, model::MapUpdate& update);
   bool extend(const model::Keyframe& keyframe, const PoseEstimate& estimate,
               model::MapUpdate& update);
   bool fuse(const model::Keyframe& keyframe, const PoseEstimate& estimate,
@@ -80,27 +82,13 @@ model::MapUpdate BaselineMapper::add(const model::Keyframe& keyframe) {
     update.reason = "fewer than three landmarks";
     return update;
   }
+
   if (state_.map.landmarks.empty()) {
     start_map(keyframe, update);
-  } else {
-    const std::vector<Eigen::Vector2d> local = positions_of(keyframe);
-    const std::vector<hierarchy::baseline::PointMatch> matches = match(local);
-    update.status = model::MapUpdateStatus::kNotSure;
-    if (matches.size() < static_cast<std::size_t>(parameters_.min_associations)) {
-      update.reason = "too few associations of polygons";
-      return update;
-    }
-    std::mt19937 random(kSampleSeed);
-    const auto estimate =
-        estimate_pose(local, state_.map.graph.landmarks_m, matches, parameters_, random);
-    if (!estimate) {
-      update.reason = "no pose with enough associations";
-      return update;
-    }
-    if (!fuse(keyframe, *estimate, update)) {
-      return update;
-    }
+  } else if (!localise_and_fuse(keyframe, update)) {
+    return update;
   }
+
   update.map_T_vehicle = to_pose(state_.map.graph.poses.back());
   const auto latest =
       std::max_element(keyframe.members.begin(), keyframe.members.end(),
@@ -112,6 +100,30 @@ model::MapUpdate BaselineMapper::add(const model::Keyframe& keyframe) {
   return update;
 }
 
+/// Algorithm 3. Whether the keyframe is in the map now; otherwise `update` states why not.
+bool BaselineMapper::localise_and_fuse(const model::Keyframe& keyframe, model::MapUpdate& update) {
+  update.status = model::MapUpdateStatus::kNotSure;
+
+  // Which polygons match?
+  const std::vector<Eigen::Vector2d> local = positions_of(keyframe);
+  const std::vector<hierarchy::baseline::PointMatch> matches = match(local);
+  if (matches.size() < static_cast<std::size_t>(parameters_.min_associations)) {
+    update.reason = "too few associations of polygons";
+    return false;
+  }
+
+  // Which pose do they give?
+  std::mt19937 random(kSampleSeed);
+  const auto estimate =
+      estimate_pose(local, state_.map.graph.landmarks_m, matches, parameters_, random);
+  if (!estimate) {
+    update.reason = "no pose with enough associations";
+    return false;
+  }
+
+  return fuse(keyframe, *estimate, update);
+}
+
 /// Algorithm 3, lines 5-7: a larger and larger tau until there are associations enough.
 std::vector<hierarchy::baseline::PointMatch> BaselineMapper::match(
     std::span<const Eigen::Vector2d> local) const {
@@ -120,6 +132,7 @@ std::vector<hierarchy::baseline::PointMatch> BaselineMapper::match(
       hierarchy, state_.hierarchy,
       {parameters_.max_descriptor_distance, parameters_.max_side_difference,
        parameters_.min_triangle_match_ratio});
+
   double tau = parameters_.initial_descriptor_distance;
   while (true) {
     std::vector<hierarchy::baseline::PointMatch> pairs = matches.points(tau);
@@ -170,8 +183,7 @@ void BaselineMapper::rebuild_hierarchy() {
   state_.hierarchy_points_m = state_.map.graph.landmarks_m;
 }
 
-/// Adds the pose, its associations and what it makes certain to exist; whether anything new is in
-/// the map.
+/// Adds the pose, its associations and the landmarks that it confirms; whether there are any such.
 bool BaselineMapper::extend(const model::Keyframe& keyframe, const PoseEstimate& estimate,
                             model::MapUpdate& update) {
   MapContents& map = state_.map;
@@ -183,18 +195,20 @@ bool BaselineMapper::extend(const model::Keyframe& keyframe, const PoseEstimate&
     map.landmarks[pair.other].observation_count += landmark.observation_count;
     update.associations.push_back({pair.local, map.landmarks[pair.other].id});
   }
+
   std::vector<Observation> observations;
   for (const PlacedLandmark& placed : estimate.unmatched) {
     const model::KeyframeLandmark& landmark = keyframe.landmarks[placed.local];
     observations.push_back({placed.position_m, landmark.position_m, landmark.radius_m,
                             landmark.kind, landmark.observation_count});
   }
+
   const std::vector<Discovery> discoveries = map.network.add(pose, observations, discovery_);
   for (const Discovery& discovery : discoveries) {
     const auto number = static_cast<std::uint32_t>(map.graph.landmarks_m.size());
     LandmarkRecord record;
-    for (const auto& [seen_from, observation] : discovery.observations) {
-      map.graph.landmark_edges.push_back({seen_from, number, observation.in_pose_m});
+    for (const auto& [observer, observation] : discovery.observations) {
+      map.graph.landmark_edges.push_back({observer, number, observation.in_pose_m});
       record.radius_m += observation.radius_m / static_cast<double>(discovery.observations.size());
       record.observation_count += observation.observation_count;
       record.kind = observation.kind;
@@ -204,18 +218,20 @@ bool BaselineMapper::extend(const model::Keyframe& keyframe, const PoseEstimate&
   return !discoveries.empty();
 }
 
-/// Extends the map, takes one step, and takes all of it back if the newest pose then disagrees too
-/// much with what it saw.
+/// Extends the map and takes one step. All of it is rolled back if the newest pose then disagrees
+/// too much with its observations.
 bool BaselineMapper::fuse(const model::Keyframe& keyframe, const PoseEstimate& estimate,
                           model::MapUpdate& update) {
   MapContents before = state_.map;
   const std::size_t first_edge = state_.map.graph.landmark_edges.size();
   const bool has_new = extend(keyframe, estimate, update);
+
   const auto step = gauss_newton_step(state_.map.graph);
   update.candidates = estimate.attempts;
   update.inliers = static_cast<std::uint32_t>(estimate.associations.size());
   update.degrees_of_freedom = 2 * update.inliers;
   update.chi2 = step ? newest_pose_error(state_.map.graph, *step, first_edge) : 0.0;
+
   if (!step || update.chi2 > parameters_.max_newest_pose_error) {
     state_.map = std::move(before);
     update.status = model::MapUpdateStatus::kRolledBack;
@@ -224,6 +240,7 @@ bool BaselineMapper::fuse(const model::Keyframe& keyframe, const PoseEstimate& e
     update.added.clear();
     return false;
   }
+
   apply(*step, state_.map.graph);
   if (has_new) {
     rebuild_hierarchy();

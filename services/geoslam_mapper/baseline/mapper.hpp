@@ -1,4 +1,4 @@
-// The source's global map (GeoSLAM §4.3, algorithms 3-5), as its published code does it.
+// The baseline's global map (GeoSLAM §4.3, algorithms 3-5), as the thesis's published code has it.
 #pragma once
 
 #include <memory>
@@ -8,7 +8,8 @@
 
 namespace understory::geoslam_mapper::baseline {
 
-/// No odometry, no covariances, no removal or merging of landmarks: the source has none.
+/// The thesis's method with an empty map: no odometry, no covariances, no removal or merging of
+/// landmarks.
 std::unique_ptr<MapperMethod> make_baseline_mapper(const BaselineMapperParameters& parameters);
 
 }  // namespace understory::geoslam_mapper::baseline

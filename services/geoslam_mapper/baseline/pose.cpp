@@ -10,7 +10,7 @@
 namespace understory::geoslam_mapper::baseline {
 namespace {
 
-/// The code looks a little further than the sensor [r].
+/// The published code looks a little further than the range of the sensor [r].
 constexpr double kRangeFactor = 1.1;
 
 /// Numbers of the map's landmarks in the max-norm box around `centre`.
@@ -52,6 +52,7 @@ Claims associate(std::span<const Eigen::Vector2d> local_m, std::span<const Eigen
                  const BaselineMapperParameters& parameters) {
   const std::vector<std::uint32_t> near =
       landmarks_near(map_m, map_T_base.translation_m, kRangeFactor * parameters.sensor_range_m);
+
   Claims claims;
   if (near.empty()) {
     return claims;
@@ -67,6 +68,7 @@ Claims associate(std::span<const Eigen::Vector2d> local_m, std::span<const Eigen
         nearest = candidate;
       }
     }
+
     const double distance_m = std::sqrt(least);
     if (distance_m < parameters.association_distance_m) {
       claims.claim(nearest, placed);
@@ -103,6 +105,7 @@ std::optional<PoseEstimate> estimate_pose(std::span<const Eigen::Vector2d> local
   if (order.size() < sample_size) {
     return std::nullopt;
   }
+
   const auto enough =
       static_cast<std::size_t>(parameters.early_exit_ratio * static_cast<double>(local_m.size()));
   PoseEstimate best;
@@ -116,15 +119,18 @@ std::optional<PoseEstimate> estimate_pose(std::span<const Eigen::Vector2d> local
     if (!map_T_base) {
       continue;
     }
+
     Claims claims = associate(local_m, map_m, *map_T_base, parameters);
     if (claims.accepted.size() > best_claims.accepted.size()) {
       best_claims = std::move(claims);
       best.map_T_base = *map_T_base;
     }
   }
+
   if (best_claims.accepted.size() < static_cast<std::size_t>(parameters.min_pose_associations)) {
     return std::nullopt;
   }
+
   best.attempts = static_cast<std::uint32_t>(attempt);
   for (const auto& [map_landmark, placed] : best_claims.accepted) {
     best.associations.push_back({placed.local, map_landmark});

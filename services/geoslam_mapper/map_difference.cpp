@@ -1,0 +1,87 @@
+#include "services/geoslam_mapper/map_difference.hpp"
+
+#include <algorithm>
+#include <set>
+
+namespace understory::geoslam_mapper {
+namespace {
+
+/// In a list in order of id, the first that is not below `id`.
+template <class Landmarks>
+auto first_not_below(Landmarks& landmarks, model::LandmarkId id) {
+  return std::lower_bound(
+      landmarks.begin(), landmarks.end(), id,
+      [](const model::MapLandmark& one, model::LandmarkId wanted) { return one.id < wanted; });
+}
+
+}  // namespace
+
+model::MapDelta map_difference(const std::vector<model::MapLandmark>& before,
+                               const std::vector<model::MapLandmark>& after,
+                               const model::MapUpdate& update, double moved_m) {
+  model::MapDelta delta;
+  delta.utime = update.utime;
+  delta.merged = update.merged;
+
+  std::set<model::LandmarkId> merged;
+  for (const auto& [old_id, new_id] : update.merged) merged.insert(old_id);
+
+  auto old = before.begin();
+  const auto gone = [&](const model::MapLandmark& landmark) {
+    if (!merged.contains(landmark.id)) delta.removed.push_back(landmark.id);
+  };
+
+  for (const model::MapLandmark& landmark : after) {
+    while (old != before.end() && old->id < landmark.id) gone(*old++);
+    if (old == before.end() || old->id != landmark.id) {
+      delta.added.push_back(landmark);
+      continue;
+    }
+    const bool has_moved = (old->position_m - landmark.position_m).norm() > moved_m;
+    if (has_moved) delta.moved.push_back(landmark);
+    ++old;
+  }
+  while (old != before.end()) gone(*old++);
+  return delta;
+}
+
+model::MapDelta map_change(const std::vector<model::MapLandmark>& before,
+                           const std::vector<model::MapLandmark>& changed,
+                           const model::MapUpdate& update, double moved_m) {
+  model::MapDelta delta;
+  delta.utime = update.utime;
+  delta.merged = update.merged;
+  for (const model::MapLandmark& landmark : changed) {
+    const auto old = first_not_below(before, landmark.id);
+    if (old == before.end() || old->id != landmark.id) {
+      delta.added.push_back(landmark);
+    } else if ((old->position_m - landmark.position_m).norm() > moved_m) {
+      delta.moved.push_back(landmark);
+    }
+  }
+  return delta;
+}
+
+std::vector<model::MapLandmark> with_delta(std::vector<model::MapLandmark> landmarks,
+                                           const model::MapDelta& delta) {
+  const auto put = [&](const model::MapLandmark& landmark) {
+    const auto place = first_not_below(landmarks, landmark.id);
+    if (place != landmarks.end() && place->id == landmark.id) {
+      *place = landmark;
+    } else {
+      landmarks.insert(place, landmark);
+    }
+  };
+  const auto drop = [&](model::LandmarkId id) {
+    const auto place = first_not_below(landmarks, id);
+    if (place != landmarks.end() && place->id == id) landmarks.erase(place);
+  };
+
+  for (const model::MapLandmark& landmark : delta.added) put(landmark);
+  for (const model::MapLandmark& landmark : delta.moved) put(landmark);
+  for (const model::LandmarkId id : delta.removed) drop(id);
+  for (const auto& [old_id, new_id] : delta.merged) drop(old_id);
+  return landmarks;
+}
+
+}  // namespace understory::geoslam_mapper

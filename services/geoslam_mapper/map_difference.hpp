@@ -1,0 +1,26 @@
+// Differences between two versions of the map.
+#pragma once
+
+#include <vector>
+
+#include "common/model/slam_output.hpp"
+
+namespace understory::geoslam_mapper {
+
+/// What leads from `before` to `after`, both in order of id. Landmarks that moved by less than
+/// `moved_m` are left out; the old ids of `update.merged` count as merged, not as removed. O(map).
+model::MapDelta map_difference(const std::vector<model::MapLandmark>& before,
+                               const std::vector<model::MapLandmark>& after,
+                               const model::MapUpdate& update, double moved_m);
+
+/// The same from those landmarks alone that are new or have moved, in order of id; those that are
+/// gone must be in `update.merged`. O(changed * log(map)).
+model::MapDelta map_change(const std::vector<model::MapLandmark>& before,
+                           const std::vector<model::MapLandmark>& changed,
+                           const model::MapUpdate& update, double moved_m);
+
+/// `landmarks` as a holder has them after `delta`: in order of id.
+std::vector<model::MapLandmark> with_delta(std::vector<model::MapLandmark> landmarks,
+                                           const model::MapDelta& delta);
+
+}  // namespace understory::geoslam_mapper

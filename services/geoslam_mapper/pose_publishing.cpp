@@ -1,0 +1,76 @@
+#include "services/geoslam_mapper/pose_publishing.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace understory::geoslam_mapper {
+namespace {
+
+bool is_localised(const model::MapUpdate& update) {
+  return update.status == model::MapUpdateStatus::kFirstMap ||
+         update.status == model::MapUpdateStatus::kUpdated;
+}
+
+}  // namespace
+
+void OdometryFrame::add(const model::Odometry& motion) {
+  const geometry::SE2 last = poses_.empty() ? geometry::SE2() : poses_.back().odom_T_vehicle;
+  if (poses_.empty()) poses_.push_back({motion.from_utime, last});
+  poses_.push_back({motion.utime, last * motion.from_T_to});
+  if (poses_.size() > kKept) poses_.pop_front();
+}
+
+geometry::SE2 OdometryFrame::odom_T_vehicle(model::Utime utime) const {
+  const auto behind =
+      std::upper_bound(poses_.begin(), poses_.end(), utime,
+                       [](model::Utime t, const Pose& pose) { return t < pose.utime; });
+  if (behind == poses_.begin())
+    return poses_.empty() ? geometry::SE2() : poses_.front().odom_T_vehicle;
+  return std::prev(behind)->odom_T_vehicle;
+}
+
+std::vector<model::SlamPose> poses_of(const model::Keyframe& keyframe,
+                                      const model::MapUpdate& update) {
+  model::SlamPose pose;
+  pose.status = update.status;
+  pose.keyframe_sequence = keyframe.sequence;
+  pose.utime = keyframe.members.back().utime;
+  if (!is_localised(update)) return {pose};
+
+  std::vector<model::SlamPose> poses;
+  const geometry::SE2 base_T_centre = keyframe.centre_T_base().inverse();
+  for (const model::KeyframeMember& member : keyframe.members) {
+    const geometry::SE2 base_T_vehicle = base_T_centre * member.centre_T_vehicle;
+    const bool is_base = &member == &keyframe.members.front();
+    const Eigen::Matrix3d own = is_base ? Eigen::Matrix3d::Zero() : member.covariance;
+    const geometry::SE2WithCovariance map_T_vehicle =
+        geometry::compound({update.map_T_vehicle, update.covariance}, {base_T_vehicle, own});
+
+    pose.utime = member.utime;
+    pose.submap_T_vehicle = map_T_vehicle.mean;
+    pose.covariance = map_T_vehicle.covariance;
+    poses.push_back(pose);
+  }
+  poses.back().submap_T_vehicle = update.map_T_latest_vehicle;
+  return poses;
+}
+
+void JumpWatch::add(const model::Keyframe& keyframe, const model::MapUpdate& update) {
+  if (predicted_ && keyframe.previous_T_base) {
+    predicted_ = *predicted_ * *keyframe.previous_T_base;
+  } else {
+    predicted_.reset();
+  }
+  if (!is_localised(update)) return;
+
+  if (predicted_) {
+    const geometry::SE2 jump = predicted_->inverse() * update.map_T_vehicle;
+    if (jump.translation().norm() > distance_m_ || std::abs(jump.theta()) > angle_rad_) {
+      ++count_;
+      delta_ = jump;
+    }
+  }
+  predicted_ = update.map_T_vehicle;
+}
+
+}  // namespace understory::geoslam_mapper

@@ -1,0 +1,78 @@
+// What the mapper's poses need beyond the stage: a pose for each scan, the odometry frame, jumps.
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "common/model/archive.hpp"
+#include "common/model/keyframe.hpp"
+#include "common/model/odometry.hpp"
+#include "common/model/slam_output.hpp"
+
+namespace understory::geoslam_mapper {
+
+/// The sum of ODOMETRY: frame `odom`, kept for the last 4000 stamps.
+class OdometryFrame {
+ public:
+  /// Adds an increment, in order of time.
+  void add(const model::Odometry& motion);
+  /// Pose at the newest stamp not after `utime`; the oldest one known before that, and identity
+  /// before the first.
+  geometry::SE2 odom_T_vehicle(model::Utime utime) const;
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.poses_);
+  }
+
+ private:
+  static constexpr std::size_t kKept = 4000;
+  struct Pose {
+    model::Utime utime = 0;
+    geometry::SE2 odom_T_vehicle;
+
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& s) {
+      a(s.utime, s.odom_T_vehicle);
+    }
+  };
+  std::deque<Pose> poses_;
+};
+
+/// One pose for each scan of a localised keyframe, in order of time. For a keyframe that was not
+/// localised a single one with its status, at the last scan. The map's frame is that of the submap.
+std::vector<model::SlamPose> poses_of(const model::Keyframe& keyframe,
+                                      const model::MapUpdate& update);
+
+/// Notices jumps of the keyframes' poses against what the keyframer tracked.
+class JumpWatch {
+ public:
+  /// A pose that differs from the tracked one by more than `distance_m` or `angle_rad` is a jump.
+  explicit JumpWatch(double distance_m = 0.5, double angle_rad = 0.05)
+      : distance_m_(distance_m), angle_rad_(angle_rad) {}
+
+  /// The next keyframe and what became of it.
+  void add(const model::Keyframe& keyframe, const model::MapUpdate& update);
+  /// Number of jumps so far.
+  std::uint64_t count() const { return count_; }
+  /// The last jump: tracked_T_new of the vehicle.
+  const geometry::SE2& delta() const { return delta_; }
+
+  /// Members of a saved state; see common/state. The limits are configuration.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.predicted_, self.count_, self.delta_);
+  }
+
+ private:
+  double distance_m_;
+  double angle_rad_;
+  /// map_T_base by tracking; none before the first, and where tracking broke off.
+  std::optional<geometry::SE2> predicted_;
+  std::uint64_t count_ = 0;
+  geometry::SE2 delta_;
+};
+
+}  // namespace understory::geoslam_mapper
