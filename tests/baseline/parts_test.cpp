@@ -66,7 +66,7 @@ geoslam_mapper::baseline::Observation observation(double x, double y) {
   return s;
 }
 
-TEST_CASE("The fourth sighting near three others makes a landmark, at their mean") {
+TEST_CASE("The fourth observation near three others makes a landmark, at their mean") {
   geoslam_mapper::baseline::DiscoveryNetwork network;
   const geoslam_mapper::baseline::DiscoveryParameters parameters;
   for (std::uint32_t pose = 0; pose < 3; ++pose) {
@@ -80,13 +80,13 @@ TEST_CASE("The fourth sighting near three others makes a landmark, at their mean
   CHECK(network.nodes().size() == 1);  // The one at 30 m stays.
 }
 
-TEST_CASE("Sightings older than the window do not count") {
+TEST_CASE("Observations older than the window do not count") {
   geoslam_mapper::baseline::DiscoveryNetwork network;
   const geoslam_mapper::baseline::DiscoveryParameters parameters;
   for (std::uint32_t pose = 0; pose < 8; ++pose) {
-    const bool seen = pose % 2 == 0;  // Three within any five poses.
+    const bool is_observed = pose % 2 == 0;  // Three within any five poses.
     std::vector<geoslam_mapper::baseline::Observation> observations;
-    if (seen) {
+    if (is_observed) {
       observations.push_back(observation(10.0, 5.0));
     }
     CHECK(network.add(pose, observations, parameters).empty());
@@ -95,7 +95,7 @@ TEST_CASE("Sightings older than the window do not count") {
   }
 }
 
-TEST_CASE("A chain of sightings is no landmark") {
+TEST_CASE("A chain of observations is no landmark") {
   geoslam_mapper::baseline::DiscoveryNetwork network;
   const geoslam_mapper::baseline::DiscoveryParameters parameters;
   for (std::uint32_t pose = 0; pose < 5; ++pose) {

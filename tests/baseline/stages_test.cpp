@@ -177,7 +177,7 @@ TEST_CASE("A mapper that was saved and loaded continues identically") {
   }
 }
 
-TEST_CASE("In a given map a landmark counts once it was seen") {
+TEST_CASE("In a given map a landmark counts once it was observed") {
   const sim::Drive drive(small_drive(0.05, 0.95), 7);
   std::vector<model::MapLandmark> given;
   for (const Eigen::Vector2d& trunk : drive.forest().trunks_m) {
@@ -200,19 +200,19 @@ TEST_CASE("In a given map a landmark counts once it was seen") {
     }
   }
   CHECK(updates >= 10);
-  std::size_t seen = 0;
+  std::size_t observed = 0;
   for (const model::MapLandmark& landmark : mapper->landmarks()) {
     const std::size_t number = landmark.id - 1000;
     if (number >= given.size()) {
       continue;  // Discovered, not given.
     }
-    seen += landmark.observation_count > 0 ? 1 : 0;
+    observed += landmark.observation_count > 0 ? 1 : 0;
     if (landmark.observation_count == 0) {
       CHECK(landmark.position_m == given[number].position_m);
     }
   }
-  CHECK(seen > 30);
-  CHECK(seen < given.size());
+  CHECK(observed > 30);
+  CHECK(observed < given.size());
 }
 
 TEST_CASE("Foreign bytes are no state") {

@@ -1,4 +1,4 @@
-// What the filter says of the motion, as a gate.
+// The filter's motion as a gate.
 #include <random>
 
 #include "services/geoslam_mapper/smoothing/filter_track.hpp"
@@ -24,7 +24,8 @@ model::EkfPose filter_pose(model::Utime utime, double x) {
   return pose;
 }
 
-/// Trees for the first 20 m; from 60 m on nothing but somebody who walks along, ten metres aside.
+/// Trees for the first 20 m; from 60 m on nothing but a pedestrian who walks along, ten metres
+/// aside.
 model::LandmarkScan scan_at(int k, std::mt19937_64& random) {
   std::normal_distribution<double> noise(0.0, 0.01);
   const double x = kSpeed_mps * kScan_s * k;
@@ -32,7 +33,7 @@ model::LandmarkScan scan_at(int k, std::mt19937_64& random) {
   scan.utime = (k + 1) * kScan_us;
   scan.sequence = static_cast<std::uint64_t>(k);
   scan.field_of_view.max_range_m = 25.0;
-  const auto see = [&](double lx, double ly) {
+  const auto observe = [&](double lx, double ly) {
     model::Detection detection;
     const double dx = noise(random);
     detection.position_m = {lx - x + dx, ly + noise(random), 1.3};
@@ -41,8 +42,8 @@ model::LandmarkScan scan_at(int k, std::mt19937_64& random) {
     detection.radius_m = 0.2;
     scan.detections.push_back(detection);
   };
-  for (int tree = 0; tree < 8; ++tree) see(2.9 * tree, tree % 2 == 0 ? 6.0 : -7.0);
-  if (x > 60.0) see(65.0 + 1.2 * kScan_s * k - 0.27 * 60.0, 10.0);
+  for (int tree = 0; tree < 8; ++tree) observe(2.9 * tree, tree % 2 == 0 ? 6.0 : -7.0);
+  if (x > 60.0) observe(65.0 + 1.2 * kScan_s * k - 0.27 * 60.0, 10.0);
   return scan;
 }
 
@@ -84,8 +85,7 @@ Outcome drive(bool with_filter) {
 
 }  // namespace
 
-TEST_CASE("Somebody who walks does not take the map along where the filter knows better",
-          "[mapper]") {
+TEST_CASE("A pedestrian does not drag the map along where the filter knows better", "[mapper]") {
   const Outcome alone = drive(false);
   const Outcome gated = drive(true);
   INFO("alone " << alone.largest_m << " m, gated " << gated.largest_m << " m");
@@ -94,7 +94,7 @@ TEST_CASE("Somebody who walks does not take the map along where the filter knows
   CHECK(gated.refused > 0);
 }
 
-TEST_CASE("The filter's motion is told where it has poses near both ends", "[mapper]") {
+TEST_CASE("The filter's motion is known where it has poses near both ends", "[mapper]") {
   FilterTrack track;
   for (int k = 0; k <= 20; ++k) track.add(filter_pose(k * kScan_us, 0.44 * k));
   const auto motion = track.between(510'000, 1'540'000);

@@ -1,4 +1,4 @@
-// What is found out about the gyro after a stretch without landmarks straightens that stretch.
+// What is learned of the gyro's bias after a stretch without landmarks straightens that stretch.
 #include <cmath>
 
 #include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
@@ -52,14 +52,14 @@ model::Odometry increment_until(model::Utime utime) {
   increment.from_utime = utime - kScan_us;
   increment.utime = utime;
   increment.from_T_to = geometry::SE2::Exp({kSpeed_mps * kScan_s, 0.0, kBias * kScan_s});
-  const double turn = kGyroNoise * kGyroNoise * kScan_s;
-  increment.covariance = Eigen::Vector3d(1e-5, 1e-5, turn).asDiagonal();
+  const double yaw_variance = kGyroNoise * kGyroNoise * kScan_s;
+  increment.covariance = Eigen::Vector3d(1e-5, 1e-5, yaw_variance).asDiagonal();
   increment.has_wheels = true;
   increment.inertial.emplace();
   increment.inertial->seconds = kScan_s;
   increment.inertial->yaw_rad = kBias * kScan_s;
   increment.inertial->bias_jacobian(0, 0) = -kScan_s;
-  increment.inertial->covariance(0, 0) = turn;
+  increment.inertial->covariance(0, 0) = yaw_variance;
   return increment;
 }
 
@@ -107,14 +107,14 @@ Drive drive(double gyro_walk, int saved_at = -1) {
 
 }  // namespace
 
-TEST_CASE("a gyro's bias that shows later straightens the way before", "[mapper]") {
+TEST_CASE("a gyro's bias that shows later straightens the path before", "[mapper]") {
   // Almost 20 s without landmarks, 1 mrad more each.
   const Drive taken = drive(0.0);
   CHECK(std::abs(taken.last.map_T_vehicle.theta()) > 0.004);
   const Drive estimated = drive(1e-6);
   CHECK(std::abs(estimated.last.map_T_vehicle.theta()) < 0.001);
   CHECK(std::abs(estimated.last.map_T_vehicle.y()) < 0.1 * std::abs(taken.last.map_T_vehicle.y()));
-  // The way before is straight, too, not only its end.
+  // The path before is straight, too, not only its end.
   for (const model::KeyframePose& pose : estimated.trajectory)
     CHECK(std::abs(pose.map_T_vehicle.theta()) < 0.003);
   const double sigma = std::sqrt(estimated.last.covariance(2, 2));

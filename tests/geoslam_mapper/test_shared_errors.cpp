@@ -1,4 +1,4 @@
-// What all sightings share, and what they repeat, is told in the poses' covariances.
+// Correlated and common-mode errors of observations are in the poses' covariances.
 #include <cmath>
 #include <numbers>
 
@@ -14,7 +14,8 @@ namespace {
 constexpr model::Utime kScan_us = 100'000;
 constexpr model::Utime kKeyframe_us = 800'000;
 
-/// Eight landmarks around (0, 0), as seen by a vehicle at (x, 0) that went `way_m` meanwhile.
+/// Eight landmarks around (0, 0), as observed by a vehicle at (x, 0) that drove `distance_m`
+/// meanwhile.
 model::Keyframe keyframe_at(double x, int number, double distance_m) {
   model::Keyframe keyframe;
   keyframe.sequence = static_cast<std::uint64_t>(number);
@@ -38,11 +39,11 @@ model::Keyframe keyframe_at(double x, int number, double distance_m) {
   return keyframe;
 }
 
-/// Variance along x that is told 3 m on, after as many keyframes at the start.
-double variance_after(int standing, const SmoothingMapperParameters& parameters) {
+/// Variance along x that is reported 3 m on, after as many keyframes at the start.
+double variance_after(int stationary, const SmoothingMapperParameters& parameters) {
   SmoothingMapper mapper(parameters);
-  for (int k = 0; k < standing; ++k) mapper.add(keyframe_at(0.0, k, 0.0));
-  model::Keyframe last = keyframe_at(3.0, standing, 1.0);
+  for (int k = 0; k < stationary; ++k) mapper.add(keyframe_at(0.0, k, 0.0));
+  model::Keyframe last = keyframe_at(3.0, stationary, 1.0);
   last.previous_T_base = geometry::SE2(2.5, 0.0, 0.0);
   const model::MapUpdate update = mapper.add(last);
   REQUIRE(update.status == model::MapUpdateStatus::kUpdated);
@@ -62,16 +63,17 @@ model::Odometry increment_until(model::Utime utime, double heading_sigma_rad) {
 
 }  // namespace
 
-TEST_CASE("standing longer tells a map with lasting errors nothing new", "[mapper]") {
+TEST_CASE("a longer halt adds nothing where errors are correlated", "[mapper]") {
   SmoothingMapperParameters white;
   CHECK(variance_after(20, white) < 0.75 * variance_after(1, white));
-  SmoothingMapperParameters lasting;
-  lasting.stationary_share = 1.0;
-  CHECK(variance_after(20, lasting) == Approx(variance_after(1, lasting)));
-  CHECK(variance_after(1, lasting) > 3.0 * variance_after(1, white));
+  SmoothingMapperParameters correlated;
+  correlated.stationary_share = 1.0;
+  CHECK(variance_after(20, correlated) == Approx(variance_after(1, correlated)));
+  CHECK(variance_after(1, correlated) > 3.0 * variance_after(1, white));
 }
 
-TEST_CASE("a scale of distances is told by the way from the origin", "[mapper]") {
+TEST_CASE("the scale of distances adds a variance that grows with the distance from the origin",
+          "[mapper]") {
   SmoothingMapperParameters parameters;
   const double before = variance_after(1, parameters);
   parameters.scale_sigma = 1e-2;

@@ -45,6 +45,10 @@ std::vector<model::MapLandmark> true_map(const sim::Drive& drive) {
   return map;
 }
 
+double distance(const geometry::SE2& a, const geometry::SE2& b) {
+  return (a.translation() - b.translation()).norm();
+}
+
 bool same_map(const MapperMethod& a, const std::vector<model::MapLandmark>& landmarks,
               const std::vector<model::KeyframePose>& poses) {
   const std::vector<model::MapLandmark> now = a.landmarks();
@@ -66,6 +70,7 @@ TEST_CASE("A drive round a circle gives a map of trunks, each once", "[mapper]")
   const sim::Drive simulated = drive(sim::PathKind::kCircle, 100.0, 11);
   const geometry::SE2 world_T_map = simulated.world_T_vehicle().front();
   SmoothingMapper mapper({});
+  double largest_m = 0.0;
   for (const model::Keyframe& keyframe : keyframes(simulated)) {
     const model::MapUpdate update = mapper.add(keyframe);
     const bool accepted = update.status == model::MapUpdateStatus::kFirstMap ||
@@ -73,16 +78,20 @@ TEST_CASE("A drive round a circle gives a map of trunks, each once", "[mapper]")
     REQUIRE(accepted);
     const geometry::SE2 truth =
         world_T_map.inverse() * simulated.world_T_vehicle()[8 * keyframe.sequence];
-    REQUIRE((update.map_T_vehicle.translation() - truth.translation()).norm() < 0.5);
+    largest_m = std::max(largest_m, distance(update.map_T_vehicle, truth));
     Eigen::LLT<Eigen::Matrix3d> llt(update.covariance + 1e-15 * Eigen::Matrix3d::Identity());
     REQUIRE(llt.info() == Eigen::Success);
   }
+  CHECK(largest_m < 0.5);
+
+  double largest_landmark_m = 0.0;
   std::vector<std::uint32_t> taken;
   for (const model::MapLandmark& landmark : mapper.landmarks()) {
     const auto nearest = simulated.grid().nearest(world_T_map * landmark.position_m);
-    REQUIRE(nearest->distance_m < 1.0);
+    largest_landmark_m = std::max(largest_landmark_m, nearest->distance_m);
     taken.push_back(nearest->index);
   }
+  CHECK(largest_landmark_m < 1.0);
   std::sort(taken.begin(), taken.end());
   const auto doubled = std::unique(taken.begin(), taken.end());
   REQUIRE(std::distance(doubled, taken.end()) <= 1);
@@ -108,7 +117,7 @@ TEST_CASE("Keyframes of another forest are not sure, and leave the map as it was
   }
 }
 
-TEST_CASE("A keyframe that contradicts the map is taken back exactly", "[mapper]") {
+TEST_CASE("A keyframe that contradicts the map is rolled back exactly", "[mapper]") {
   const sim::Drive simulated = drive(sim::PathKind::kLine, 40.0, 13);
   SmoothingMapperParameters parameters;
   parameters.outlier_chi2 = 1e9;
@@ -139,18 +148,22 @@ TEST_CASE("In a given map every keyframe finds its place, and the map is not ben
   SmoothingMapper mapper({});
   mapper.start_with(true_map(simulated));
   const std::vector<model::MapLandmark> given = mapper.landmarks();
+  double largest_m = 0.0;
   for (model::Keyframe keyframe : keyframes(simulated)) {
     keyframe.previous_T_base.reset();  // No prior: each is searched in the whole map.
     const model::MapUpdate update = mapper.add(keyframe);
     REQUIRE(update.status == model::MapUpdateStatus::kUpdated);
     REQUIRE_FALSE(update.used_prior);
     const geometry::SE2 truth = simulated.world_T_vehicle()[8 * keyframe.sequence];
-    REQUIRE((update.map_T_vehicle.translation() - truth.translation()).norm() < 0.2);
+    largest_m = std::max(largest_m, distance(update.map_T_vehicle, truth));
   }
+  CHECK(largest_m < 0.2);
+
+  double largest_move_m = 0.0;
   const std::vector<model::MapLandmark> now = mapper.landmarks();
-  for (std::size_t i = 0; i < given.size(); ++i) {
-    REQUIRE((now[i].position_m - given[i].position_m).norm() < 0.05);
-  }
+  for (std::size_t i = 0; i < given.size(); ++i)
+    largest_move_m = std::max(largest_move_m, (now[i].position_m - given[i].position_m).norm());
+  CHECK(largest_move_m < 0.05);
 }
 
 TEST_CASE("Localisation only leaves the given map alone", "[mapper]") {
@@ -162,15 +175,19 @@ TEST_CASE("Localisation only leaves the given map alone", "[mapper]") {
   REQUIRE(mapper.add(made.front()).status == model::MapUpdateStatus::kNotSure);
   mapper.start_with(true_map(simulated));
   const std::vector<model::MapLandmark> given = mapper.landmarks();
+  double largest_m = 0.0;
+  double largest_nees = 0.0;
   for (std::size_t i = 1; i < made.size(); ++i) {
     const model::MapUpdate update = mapper.add(made[i]);
     REQUIRE(update.status == model::MapUpdateStatus::kUpdated);
     REQUIRE(update.used_prior == (i > 1));
     const geometry::SE2 truth = simulated.world_T_vehicle()[8 * made[i].sequence];
     const Eigen::Vector3d error = (update.map_T_vehicle.inverse() * truth).Log();
-    REQUIRE(error.head<2>().norm() < 0.2);
-    REQUIRE(error.dot(update.covariance.ldlt().solve(error)) < 40.0);
+    largest_m = std::max(largest_m, error.head<2>().norm());
+    largest_nees = std::max(largest_nees, error.dot(update.covariance.ldlt().solve(error)));
   }
+  CHECK(largest_m < 0.2);
+  CHECK(largest_nees < 40.0);
   REQUIRE(mapper.trajectory().size() == made.size() - 1);
   const std::vector<model::MapLandmark> now = mapper.landmarks();
   REQUIRE(now.size() == given.size());
@@ -196,7 +213,7 @@ TEST_CASE("Who follows the changed landmarks has the map", "[mapper]") {
   REQUIRE(held.size() > 20);
 }
 
-TEST_CASE("Standing still does not grow the graph", "[mapper]") {
+TEST_CASE("A stationary vehicle does not grow the graph", "[mapper]") {
   const sim::Drive simulated = drive(sim::PathKind::kStanding, 400.0, 15);
   SmoothingMapper mapper({});
   std::size_t after_ten = 0;
@@ -208,7 +225,7 @@ TEST_CASE("Standing still does not grow the graph", "[mapper]") {
   REQUIRE(count > 50);
   REQUIRE(mapper.trajectory().size() == count);
   // What grows is one pose per keyframe in the trajectory; the map and its factors do not.
-  REQUIRE(mapper.save().size() < after_ten + (count - 10) * 250);
+  CHECK((mapper.save().size() - after_ten) / (count - 10) < 250);
 }
 
 TEST_CASE("Scans between keyframes are located, and the map is not changed by it", "[mapper]") {
@@ -217,18 +234,20 @@ TEST_CASE("Scans between keyframes are located, and the map is not changed by it
   keyframer::JointKeyframer keyframer({});
   SmoothingMapper mapper({});
   std::size_t located = 0;
+  double largest_m = 0.0;
   for (std::size_t k = 0; k < simulated.size(); ++k) {
     const model::LandmarkScan scan = simulated.scan(k).scan;
     const std::size_t before = mapper.landmarks().size();
     if (const auto pose = mapper.locate(scan)) {
       ++located;
       const geometry::SE2 truth = map_T_world * simulated.world_T_vehicle()[k];
-      REQUIRE((pose->mean.translation() - truth.translation()).norm() < 0.5);
+      largest_m = std::max(largest_m, distance(pose->mean, truth));
     }
     REQUIRE(mapper.landmarks().size() == before);
     if (const auto keyframe = keyframer.add(scan)) mapper.add(*keyframe);
   }
   REQUIRE(located >= simulated.size() - 12);
+  CHECK(largest_m < 0.5);
 }
 
 TEST_CASE("The covariance of a located scan is that of its pose in the map", "[mapper]") {
@@ -264,16 +283,19 @@ TEST_CASE("A loaded mapper goes on where the saved one was", "[mapper]") {
   SmoothingMapper first({});
   SmoothingMapper second({});
   std::size_t count = 0;
+  double largest = 0.0;
   for (const model::Keyframe& keyframe : keyframes(simulated)) {
     const model::MapUpdate expected = whole.add(keyframe);
     if (count == 9) second.load(first.save());
     const model::MapUpdate actual = count < 9 ? first.add(keyframe) : second.add(keyframe);
     ++count;
     REQUIRE(actual.status == expected.status);
-    REQUIRE((actual.map_T_vehicle.inverse() * expected.map_T_vehicle).Log().norm() < 1e-3);
+    largest =
+        std::max(largest, (actual.map_T_vehicle.inverse() * expected.map_T_vehicle).Log().norm());
     REQUIRE(actual.added == expected.added);
   }
   REQUIRE(count > 12);
+  CHECK(largest < 1e-3);
   REQUIRE_THROWS(second.load("not a state"));
 }
 
@@ -297,7 +319,7 @@ TEST_CASE("A trunk that bad scans moved and doubled is one landmark in the end",
   REQUIRE(made.size() > 20);
   const geometry::SE2 centre_T_world =
       made[0].centre_T_base() * simulated.world_T_vehicle().front().inverse();
-  // A trunk beside the way, far from any other.
+  // A trunk beside the path, far from any other.
   std::optional<Eigen::Vector2d> trunk;
   for (const Eigen::Vector2d& one : simulated.forest().trunks_m) {
     const Eigen::Vector2d seen = centre_T_world * one;
