@@ -150,7 +150,7 @@ void describe(MapperOutputParameters& parameters, bus::ParameterTable& table) {
   table.add("output.reset_distance_m", parameters.reset_distance_m, {0.001, 1000.0}, "m",
             "SLAM_POSE counts a reset where the pose jumps farther ...");
   table.add("output.reset_angle_rad", parameters.reset_angle_rad, {0.001, 3.2}, "rad",
-            "... or turns more than this against its prediction.");
+            "... or rotates more than this against its prediction.");
 }
 
 }  // namespace understory::geoslam_mapper

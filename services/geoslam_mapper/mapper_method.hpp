@@ -19,6 +19,7 @@ namespace understory::geoslam_mapper {
 /// Poses are of `vehicle_level` in the frame `map`.
 class MapperMethod {
  public:
+  /// Methods are owned through this interface.
   virtual ~MapperMethod() = default;
 
   /// Localises the keyframe and fuses it. The map changes only with the statuses kFirstMap and

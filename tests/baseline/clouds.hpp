@@ -1,4 +1,4 @@
-// Random clouds of landmarks for the tests of the source's method.
+// Random clouds of landmarks for the tests of the baseline method.
 #pragma once
 
 #include <Eigen/Core>

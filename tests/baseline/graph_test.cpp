@@ -112,7 +112,7 @@ TEST_CASE("Pose 0 stays where it is") {
   CHECK(step->poses[0].norm() < 1e-9);
 }
 
-TEST_CASE("A landmark that nobody saw does not move") {
+TEST_CASE("A landmark without an observation does not move") {
   std::mt19937_64 random(3);
   geoslam_mapper::baseline::Graph graph = random_graph(false, random);
   graph.landmarks_m.emplace_back(100.0, 100.0);

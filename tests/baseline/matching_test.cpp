@@ -73,12 +73,12 @@ TEST_CASE("A cloud matches itself, each landmark with itself") {
   }
 }
 
-TEST_CASE("A turned cloud matches itself") {
+TEST_CASE("A rotated cloud matches itself") {
   std::mt19937_64 random(2);
   const auto cloud = test::random_cloud(60, 70.0, random);
-  const auto turned = test::moved(cloud, geometry::SE2(30.0, -4.0, 1.9));
+  const auto rotated = test::moved(cloud, geometry::SE2(30.0, -4.0, 1.9));
   const auto pairs = match_hierarchies(hierarchy::baseline::Hierarchy(cloud, 0.05),
-                                       hierarchy::baseline::Hierarchy(turned, 0.05), {});
+                                       hierarchy::baseline::Hierarchy(rotated, 0.05), {});
   const auto right = std::count_if(
       pairs.begin(), pairs.end(),
       [](const hierarchy::baseline::PointMatch& pair) { return pair.local == pair.other; });

@@ -198,7 +198,7 @@ TEST_CASE("every scan of a keyframe has its pose, known no better than the keyfr
     update.map_T_latest_vehicle = random_pose(random);
     const auto poses = poses_of(keyframe, update);
     REQUIRE(poses.size() == keyframe.members.size());
-    // The map's frame seen from the keyframe's centre, by the base alone.
+    // The keyframe's centre in the map, by the base alone.
     const geometry::SE2 map_T_centre = update.map_T_vehicle * keyframe.centre_T_base().inverse();
     for (std::size_t i = 0; i < poses.size(); ++i) {
       CHECK(poses[i].utime == keyframe.members[i].utime);

@@ -322,9 +322,10 @@ TEST_CASE("A trunk that bad scans moved and doubled is one landmark in the end",
   // A trunk beside the path, far from any other.
   std::optional<Eigen::Vector2d> trunk;
   for (const Eigen::Vector2d& one : simulated.forest().trunks_m) {
-    const Eigen::Vector2d seen = centre_T_world * one;
+    const Eigen::Vector2d position = centre_T_world * one;
     const auto others = simulated.grid().within(one, 4.0);
-    if (others.size() == 1 && (seen - Eigen::Vector2d(20.0, 0.0)).norm() < 15.0) trunk = seen;
+    if (others.size() == 1 && (position - Eigen::Vector2d(20.0, 0.0)).norm() < 15.0)
+      trunk = position;
   }
   REQUIRE(trunk);
   SmoothingMapper mapper({});

@@ -8,9 +8,9 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Common-mode errors, which the graph cannot know since no observation shows them: the level at
-/// the first keyframe and the scale of distances. They are not estimated; they are reported in the
-/// covariances of poses.
+/// Common-mode errors, which the graph cannot estimate since no observation shows them: the level
+/// at the first keyframe and the scale of distances. They are not estimated; they are reported in
+/// the covariances of poses.
 class CommonError {
  public:
   /// `scale_sigma`: standard deviation of the scale of distances (1e-3 = 1 mm per metre).

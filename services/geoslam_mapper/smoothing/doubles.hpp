@@ -1,4 +1,4 @@
-// Pairs of landmarks that turn out to be one.
+// Merging of landmarks that are the same.
 #pragma once
 
 #include <span>

@@ -57,9 +57,9 @@ std::optional<Prediction> Motion::predict(const model::Keyframe& keyframe,
 }
 
 /// From the keyframe's first member to its centre by the gyro. The keyframe's gauge leaves the
-/// members' errors without a mean. So the centre is where the gyro has the members' mean: what the
-/// landmarks say of rotations within the keyframe does not enter, nor is it lost to the gyro's
-/// bias.
+/// members' errors without a mean. So the centre is where the gyro has the members' mean: the
+/// landmarks' share in rotations within the keyframe does not enter, and is not taken for the
+/// gyro's bias.
 std::optional<model::GyroRotation> Motion::rotation_to_centre(
     const model::Keyframe& keyframe) const {
   model::GyroRotation mean;

@@ -19,6 +19,8 @@ namespace understory::geoslam_mapper::smoothing {
 /// it back together with the graph.
 class Motion {
  public:
+  /// No odometry yet. `parameters` gives `use_odometry`, `gyro_walk`, the noise of predictions
+  /// without odometry and `start_heading_sigma_rad`.
   explicit Motion(const SmoothingMapperParameters& parameters);
 
   /// Adds an odometry increment, if the configuration uses odometry.

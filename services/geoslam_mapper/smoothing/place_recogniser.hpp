@@ -21,6 +21,7 @@ struct SearchResult {
 /// Places keyframes in a map that it does not change. It has no state.
 class PlaceRecogniser {
  public:
+  /// `parameters` gives the gates and how many matches are enough.
   explicit PlaceRecogniser(const SmoothingMapperParameters& parameters) : parameters_(parameters) {}
 
   /// Association in gates around a prediction. None where too few landmarks match: less than

@@ -1,4 +1,4 @@
-// How uncertain landmarks are as seen from the vehicle.
+// Uncertainty of landmarks relative to the vehicle.
 #pragma once
 
 #include <vector>

@@ -14,6 +14,7 @@ namespace understory::geoslam_mapper::smoothing {
 /// Registers each scan to the landmarks around the last one. The map is not changed.
 class ScanLocaliser {
  public:
+  /// No scan yet. `parameters` gives the gates and how many matches are enough.
   explicit ScanLocaliser(const SmoothingMapperParameters& parameters) : parameters_(parameters) {}
 
   /// The filter's estimate of the level error, by which later scans are levelled.

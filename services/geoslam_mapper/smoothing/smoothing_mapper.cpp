@@ -114,9 +114,9 @@ std::string SmoothingMapper::why_not_start(const model::Keyframe& keyframe) {
   return "the gyro's bias is not known yet";
 }
 
-/// The first keyframe's base is the origin of the map; its centre is fixed where it is seen from
-/// there. How uncertain that is comes in where covariances are reported. As a prior in the graph it
-/// would hold the map by 3 mrad only, and the residues of linearisation would turn it.
+/// The first keyframe's base is the origin of the map; its centre is fixed relative to it. The
+/// uncertainty of that is added where covariances are reported. As a prior in the graph it would
+/// hold the map by 3 mrad only, and the residues of linearisation would rotate the map.
 void SmoothingMapper::start_map(const model::Keyframe& keyframe, model::MapUpdate& update) {
   const NodeIndex node = map_.graph.add_node(keyframe.centre_T_base().inverse(),
                                              map_.trajectory.is_stationary(keyframe), true);
@@ -164,7 +164,7 @@ void SmoothingMapper::keep_pose(const model::Keyframe& keyframe, const Placement
   map_.trajectory.add(base_of(keyframe, node), map_.graph);
 }
 
-/// New landmarks of a fused keyframe, and landmarks that turn out to be one.
+/// New landmarks of a fused keyframe, and landmarks that are merged.
 void SmoothingMapper::extend(const FusedKeyframe& fused, model::MapUpdate& update) {
   for (const model::Association& pair :
        discovery_.update(fused.keyframe, fused.node, fused.associations, map_)) {

@@ -60,7 +60,7 @@ class Trajectory {
   /// Whether the vehicle stayed within the folding distance and angle during the keyframe.
   bool is_stationary(const model::Keyframe& keyframe) const;
   /// The node of the nearest viewpoint within the folding distance and angle; none where the
-  /// keyframe sees from a new one. `map_T_middle`: see middle_of().
+  /// viewpoint is a new one. `map_T_middle`: see middle_of().
   std::optional<NodeIndex> revisited(const geometry::SE2& map_T_middle,
                                      const PoseGraph& graph) const;
   /// A node's pose with its marginal covariance, which counts from the map's origin.
