@@ -3,17 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+
+#include "services/lidar_imu_input/stamps.hpp"
 
 namespace understory::lidar_imu_input {
 namespace {
 
 constexpr double kNeverSilent_s = 1e9;
-constexpr model::Utime kSmallOffset_us = 20'000;  // not told apart from jitter
-
-double seconds_between(model::Utime from, model::Utime to) {
-  return static_cast<double>(to - from) * 1e-6;
-}
+/// So many points of a sweep are compared with those of the sweep before.
+constexpr std::size_t kComparedPoints = 64;
 
 }  // namespace
 
@@ -31,52 +29,6 @@ std::string channel_of(Sensor sensor) {
       return "RAW_SCAN";
   }
   return "";
-}
-
-bool SensorClock::is_plausible(model::Utime utime, std::optional<model::Utime> others) const {
-  const double step = seconds_between(*last_, utime);
-  if (step < -parameters_.clock_jump_s) return false;
-  if (step <= parameters_.clock_jump_s || !others) return true;
-  // A long pause is silence where the others' time has gone on as well, else a jump.
-  return seconds_between(*others, utime) <= parameters_.clock_jump_s;
-}
-
-SensorClock::Answer SensorClock::take(model::Utime raw, std::optional<model::Utime> others) {
-  const model::Utime utime = raw + offset_;
-  // Once in quarantine, only a stamp that goes on behind the last good one ends it early.
-  const bool suspected = first_candidate_ && utime <= last_.value_or(utime);
-  const bool resumes = is_resumed_ && last_ && utime > *last_;
-  if (resumes) is_resumed_ = false;
-  if (last_ && !resumes && (suspected || !is_plausible(utime, others))) return quarantine(raw);
-  first_candidate_.reset();
-  if (last_ && utime <= *last_) return {Verdict::kLate, utime};
-  if (last_ && !(resumes && seconds_between(*last_, utime) > parameters_.clock_jump_s)) {
-    const auto step = static_cast<double>(utime - *last_);
-    period_us_ = period_us_ == 0.0 ? step : period_us_ + 0.1 * (step - period_us_);
-  }
-  last_ = utime;
-  return {Verdict::kFine, utime};
-}
-
-SensorClock::Answer SensorClock::quarantine(model::Utime raw) {
-  const bool agrees =
-      first_candidate_ && raw > candidate_ &&
-      seconds_between(candidate_, raw) <= parameters_.clock_jump_s + 3e-6 * period_us_;
-  if (!agrees) {
-    first_candidate_ = raw;
-    candidate_ = raw;
-    agreeing_ = 1;
-    return {Verdict::kJumped, 0};
-  }
-  candidate_ = raw;
-  ++agreeing_;
-  const bool long_enough = agreeing_ >= 2 && seconds_between(*first_candidate_, raw) >= 1.0;
-  if (agreeing_ < parameters_.resync_samples && !long_enough) return {Verdict::kQuarantined, 0};
-  offset_ = *last_ + static_cast<model::Utime>(std::llround(period_us_)) - *first_candidate_;
-  if (std::abs(offset_) < kSmallOffset_us && raw > *last_) offset_ = 0;
-  first_candidate_.reset();
-  last_ = raw + offset_;
-  return {Verdict::kFollowed, *last_};
 }
 
 InputGuard::InputGuard(const FaultParameters& parameters, const ImuParameters& imu)
@@ -112,7 +64,7 @@ std::optional<model::Utime> InputGuard::admit(Sensor sensor, model::Utime raw,
     case SensorClock::Verdict::kJumped:
       faults.push_back(
           {InputFaultKind::kClockJump, channel,
-           fmt::format("the clock jumped by {:+.3f} s: not believed yet",
+           fmt::format("the clock jumped by {:+.3f} s: samples are left out for now",
                        seconds_between(*state.clock.last(), raw + state.clock.offset_us()))});
       return std::nullopt;
     case SensorClock::Verdict::kQuarantined:
@@ -137,12 +89,30 @@ bool InputGuard::is_frozen(const model::ImuSample& sample, std::vector<InputFaul
     is_frozen_ = false;
     return false;
   }
+
   if (seconds_between(same_since_->utime, sample.utime) < parameters_.frozen_s) return false;
   if (!is_frozen_)
     faults.push_back({InputFaultKind::kFrozen, channel_of(Sensor::kImu),
                       fmt::format("the same sample for {:.1f} s", parameters_.frozen_s)});
   is_frozen_ = true;
   return true;
+}
+
+bool InputGuard::is_frozen(const model::PointSweep& sweep, std::vector<InputFault>& faults) {
+  const auto count = std::min(sweep.points.size(), kComparedPoints);
+  const auto same = [](const model::SweepPoint& a, const model::SweepPoint& b) {
+    return a.x_m == b.x_m && a.y_m == b.y_m && a.z_m == b.z_m;
+  };
+  const bool is_repeated =
+      count == kComparedPoints && first_points_.size() == count &&
+      std::equal(first_points_.begin(), first_points_.end(), sweep.points.begin(), same);
+  first_points_.assign(sweep.points.begin(),
+                       sweep.points.begin() + static_cast<std::ptrdiff_t>(count));
+
+  if (is_repeated)
+    faults.push_back({InputFaultKind::kFrozen, channel_of(Sensor::kSweep),
+                      "the same points as in the revolution before"});
+  return is_repeated;
 }
 
 bool InputGuard::is_saturated(const model::ImuSample& sample,
@@ -170,6 +140,16 @@ double InputGuard::silent_s(Sensor sensor) const {
 
 bool InputGuard::is_live(Sensor sensor) const {
   return has_spoken(sensor) && seconds_between(*last(sensor), *now()) <= silent_s(sensor);
+}
+
+bool InputGuard::has_motion_until(model::Utime utime, double max_wait_s) const {
+  const auto newest = now();
+  if (!newest) return false;
+  if (*newest - utime > microseconds(max_wait_s)) return true;
+  const auto has_reached = [&](Sensor sensor) {
+    return !is_live(sensor) || *last(sensor) >= utime;
+  };
+  return has_reached(Sensor::kImu) && has_reached(Sensor::kWheels);
 }
 
 void InputGuard::find_silent(std::vector<InputFault>& faults) {

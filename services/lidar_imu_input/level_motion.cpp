@@ -4,13 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/lidar_imu_input/stamps.hpp"
+
 namespace understory::lidar_imu_input {
 namespace {
 
-double square(double value) { return value * value; }
-double seconds_between(model::Utime from, model::Utime to) {
-  return static_cast<double>(to - from) * 1e-6;
-}
 Eigen::Matrix2d rotation_of(double angle) { return Eigen::Rotation2Dd(angle).toRotationMatrix(); }
 
 /// Adds one step of constant rate and force to a preintegration.
@@ -68,29 +66,6 @@ void add_lever_noise(model::Preintegration& sum, const ImuParameters& imu) {
   sum.covariance.block<2, 2>(3, 3) += square(sum.seconds) * one;
 }
 
-double speed_at(const std::deque<SpeedSample>& speeds, model::Utime utime) {
-  auto after = std::ranges::lower_bound(speeds, utime, {}, &SpeedSample::utime);
-  if (after == speeds.end()) return speeds.back().speed_mps;
-  if (after == speeds.begin() || after->utime == utime) return after->speed_mps;
-  const auto before = std::prev(after);
-  const double share =
-      seconds_between(before->utime, utime) / seconds_between(before->utime, after->utime);
-  return before->speed_mps + share * (after->speed_mps - before->speed_mps);
-}
-
-bool covers(const std::deque<SpeedSample>& speeds, model::Utime from, model::Utime to,
-            double max_gap_s) {
-  if (speeds.empty() || speeds.front().utime > from) return false;
-  model::Utime reached = speeds.front().utime;
-  for (const SpeedSample& sample : speeds) {
-    if (sample.utime > from && seconds_between(std::max(reached, from), sample.utime) > max_gap_s)
-      return reached >= to;
-    reached = sample.utime;
-    if (reached >= to) return true;
-  }
-  return seconds_between(reached, to) <= max_gap_s;
-}
-
 }  // namespace
 
 LevelSample interpolate(const LevelSample& before, const LevelSample& after, model::Utime utime) {
@@ -141,12 +116,12 @@ model::Preintegration preintegrate(const std::deque<LevelSample>& samples, const
 }
 
 std::optional<geometry::SE2WithCovariance> drive(const std::deque<LevelSample>& samples,
-                                                 const std::deque<SpeedSample>& speeds,
+                                                 const WheelSpeeds& speeds,
                                                  const LidarImuInputParameters& parameters,
                                                  const YawRateBias& bias) {
   const model::Utime from = samples.front().utime;
   const model::Utime to = samples.back().utime;
-  if (!covers(speeds, from, to, parameters.wheels.max_gap_s)) return std::nullopt;
+  if (!speeds.cover(from, to)) return std::nullopt;
   const WheelNoise& noise = parameters.wheels.noise;
   geometry::SE2WithCovariance motion;
   for (std::size_t i = 0; i + 1 < samples.size(); ++i) {
@@ -154,7 +129,7 @@ std::optional<geometry::SE2WithCovariance> drive(const std::deque<LevelSample>& 
     const LevelSample& b = samples[i + 1];
     const double dt = seconds_between(a.utime, b.utime);
     const double rate = 0.5 * (a.yaw_rate_rad_s + b.yaw_rate_rad_s) - bias.bias_rad_s;
-    const double speed = 0.5 * (speed_at(speeds, a.utime) + speed_at(speeds, b.utime)) * 0.5 *
+    const double speed = 0.5 * (speeds.at(a.utime) + speeds.at(b.utime)) * 0.5 *
                          (a.pitch_cosine + b.pitch_cosine);
     // Errors that last for a time tau and act for dt << tau have the power tau * dt.
     const double power = dt * noise.correlation_time_s;
@@ -164,7 +139,7 @@ std::optional<geometry::SE2WithCovariance> drive(const std::deque<LevelSample>& 
     geometry::SE2WithCovariance increment{geometry::SE2::Exp({speed * dt, 0.0, rate * dt}),
                                           Eigen::Matrix3d::Zero()};
     const double stand = square(noise.standstill_sigma_m) * dt;
-    increment.covariance(0, 0) = square(speed * speeds.back().scale_sigma) * power + stand;
+    increment.covariance(0, 0) = square(speed * speeds.latest().scale_sigma) * power + stand;
     increment.covariance(1, 1) = square(speed * noise.side_slip_sigma) * power + stand;
     increment.covariance(2, 2) =
         square(gyro) * dt +

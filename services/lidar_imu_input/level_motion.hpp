@@ -7,6 +7,7 @@
 
 #include "common/model/odometry.hpp"
 #include "services/lidar_imu_input/parameters.hpp"
+#include "services/lidar_imu_input/wheel_speeds.hpp"
 
 namespace understory::lidar_imu_input {
 
@@ -21,18 +22,6 @@ struct LevelSample {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.utime, self.yaw_rate_rad_s, self.force_mps2, self.pitch_cosine, self.is_saturated);
-  }
-};
-
-/// Speed of the axle's middle along the vehicle's x axis.
-struct SpeedSample {
-  model::Utime utime = 0;
-  double speed_mps = 0.0;
-  double scale_sigma = 0.0;  ///< Of the speed, relative.
-
-  template <class Archive, class Self>
-  static void archive(Archive& a, Self& self) {
-    a(self.utime, self.speed_mps, self.scale_sigma);
   }
 };
 
@@ -75,7 +64,7 @@ struct YawRateBias {
 /// Motion of the vehicle from the wheels' speed and the gyro's yaw rate over the same samples.
 /// `speeds`: covers the interval; the last one holds. None where it does not.
 std::optional<geometry::SE2WithCovariance> drive(const std::deque<LevelSample>& samples,
-                                                 const std::deque<SpeedSample>& speeds,
+                                                 const WheelSpeeds& speeds,
                                                  const LidarImuInputParameters& parameters,
                                                  const YawRateBias& bias);
 

@@ -2,20 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "services/lidar_imu_input/deskew.hpp"
+#include "services/lidar_imu_input/stamps.hpp"
 
 namespace understory::lidar_imu_input {
 namespace {
-
-constexpr std::size_t kComparedPoints = 64;
-
-model::Utime microseconds(double seconds) {
-  return static_cast<model::Utime>(std::llround(seconds * 1e6));
-}
 
 bool is_finite(const model::ImuSample& s) {
   return s.angular_rate_rad_s.allFinite() && s.specific_force_mps2.allFinite();
@@ -31,32 +25,50 @@ bool is_finite(const model::VelocityCorrection& c) {
   return c.velocity_mps.allFinite() && c.bias.allFinite() && c.covariance.allFinite();
 }
 
-InputFault not_finite(Sensor sensor) {
-  return {InputFaultKind::kNotFinite, channel_of(sensor), "a value that is no number"};
+InputFault not_finite(const std::string& channel) {
+  return {InputFaultKind::kNotFinite, channel, "a value that is no number"};
+}
+
+/// Moves the faults behind the results.
+void report(std::vector<InputFault>& faults, InputResults& out) {
+  for (InputFault& fault : faults) out.emplace_back(std::move(fault));
+  faults.clear();
+}
+
+/// A sweep without times is not de-skewed, unless its azimuths give them.
+InputFault without_times(model::PointSweep& sweep, const DeskewParameters& parameters) {
+  const std::string& direction = parameters.times_from_azimuth;
+  if (direction == "none")
+    return {InputFaultKind::kNoPointTimes, channel_of(Sensor::kSweep),
+            "points without times: not de-skewed"};
+  times_from_azimuth(sweep, parameters.revolution_s, direction == "clockwise");
+  return {InputFaultKind::kNoPointTimes, channel_of(Sensor::kSweep),
+          "points without times: taken from the azimuth"};
 }
 
 }  // namespace
 
 LidarImuInput::LidarImuInput(const LidarImuInputParameters& parameters)
-    : parameters_(parameters), guard_(parameters.fault, parameters.imu), motion_(parameters) {}
-
-void LidarImuInput::report(std::vector<InputFault>& faults, InputResults& out) {
-  for (InputFault& fault : faults) out.emplace_back(std::move(fault));
-  faults.clear();
-}
+    : parameters_(parameters),
+      guard_(parameters.fault, parameters.imu),
+      motion_(parameters),
+      raw_poses_(parameters.output.raw_pose_period_s) {}
 
 InputResults LidarImuInput::add(const model::ImuSample& raw) {
+  if (!is_finite(raw)) return {not_finite(channel_of(Sensor::kImu))};
   InputResults out;
-  if (!is_finite(raw)) return {not_finite(Sensor::kImu)};
   check_pause(Sensor::kImu, raw.utime, out);
+
+  // What is wrong with it?
   std::vector<InputFault> faults;
   const bool frozen = guard_.is_frozen(raw, faults);
   const bool saturated = guard_.is_saturated(raw, faults);
   const auto utime = frozen ? std::nullopt : guard_.admit(Sensor::kImu, raw.utime, faults);
   report(faults, out);
+
   if (utime && saturated) {
-    // It tells a bound, not a motion. Over a bump the samples beside it are joined, with more
-    // noise; where it lasts the wheels go on alone, as without an IMU.
+    // It is a bound, no measurement. Over a bump the samples beside it are joined, with more noise;
+    // where it lasts longer the wheels go on alone, as without an IMU.
     ++counters_.samples_saturated;
     was_saturated_ = true;
   } else if (utime) {
@@ -65,17 +77,20 @@ InputResults LidarImuInput::add(const model::ImuSample& raw) {
     sample = motion_.to_vehicle(sample);
     motion_.add_imu(sample, std::exchange(was_saturated_, false));
     out.emplace_back(sample);
-    publish_raw_pose(false, out);
-    check_calibration(out);
+    if (auto pose = raw_poses_.take(motion_.raw_pose(), false)) out.emplace_back(*pose);
+    if (auto fault = calibration_.check(motion_, guard_.is_live(Sensor::kImu)))
+      out.emplace_back(*std::move(fault));
   }
+
   settle(out, false);
   return out;
 }
 
 InputResults LidarImuInput::add(const model::WheelSample& raw) {
+  if (!is_finite(raw)) return {not_finite(channel_of(Sensor::kWheels))};
   InputResults out;
-  if (!is_finite(raw)) return {not_finite(Sensor::kWheels)};
   check_pause(Sensor::kWheels, raw.utime, out);
+
   std::vector<InputFault> faults;
   const auto utime = guard_.admit(Sensor::kWheels, raw.utime, faults);
   report(faults, out);
@@ -85,14 +100,16 @@ InputResults LidarImuInput::add(const model::WheelSample& raw) {
     motion_.add_wheels(sample);
     out.emplace_back(sample);
   }
+
   settle(out, false);
   return out;
 }
 
 InputResults LidarImuInput::add(const model::GnssFix& raw) {
+  if (!is_finite(raw)) return {not_finite(channel_of(Sensor::kGnss))};
   InputResults out;
-  if (!is_finite(raw)) return {not_finite(Sensor::kGnss)};
   check_pause(Sensor::kGnss, raw.utime, out);
+
   std::vector<InputFault> faults;
   const auto utime = guard_.admit(Sensor::kGnss, raw.utime, faults);
   report(faults, out);
@@ -102,50 +119,35 @@ InputResults LidarImuInput::add(const model::GnssFix& raw) {
     motion_.add_gnss(fix);
     out.emplace_back(fix);
   }
+
   settle(out, false);
   return out;
 }
 
-bool LidarImuInput::is_repeated(const model::PointSweep& sweep) {
-  const auto count = std::min(sweep.points.size(), kComparedPoints);
-  const auto same = [](const model::SweepPoint& a, const model::SweepPoint& b) {
-    return a.x_m == b.x_m && a.y_m == b.y_m && a.z_m == b.z_m;
-  };
-  const bool repeated =
-      count == kComparedPoints && first_points_.size() == count &&
-      std::equal(first_points_.begin(), first_points_.end(), sweep.points.begin(), same);
-  first_points_.assign(sweep.points.begin(),
-                       sweep.points.begin() + static_cast<std::ptrdiff_t>(count));
-  return repeated;
-}
-
 InputResults LidarImuInput::add(model::PointSweep sweep) {
   InputResults out;
+  std::vector<InputFault> faults;
+
+  // What is wrong with its points?
   const std::size_t came = sweep.points.size();
   const std::size_t bad = remove_bad_points(sweep, parameters_.lidar.min_range_m);
   counters_.points_dropped += bad;
   if (bad > 0)
-    out.emplace_back(InputFault{InputFaultKind::kNotFinite, channel_of(Sensor::kSweep),
-                                fmt::format("{} of {} points are no points", bad, came)});
-  if (is_repeated(sweep))
-    out.emplace_back(InputFault{InputFaultKind::kFrozen, channel_of(Sensor::kSweep),
-                                "the same points as in the turn before"});
-  if (!sweep.has_times) {
-    const std::string& way = parameters_.lidar.times_from_azimuth;
-    if (way != "none")
-      times_from_azimuth(sweep, parameters_.lidar.revolution_s, way == "clockwise");
-    out.emplace_back(InputFault{InputFaultKind::kNoPointTimes, channel_of(Sensor::kSweep),
-                                way == "none" ? "points without times: not de-skewed"
-                                              : "points without times: taken from the azimuth"});
-  }
+    faults.push_back({InputFaultKind::kNotFinite, channel_of(Sensor::kSweep),
+                      fmt::format("{} of {} points are not finite", bad, came)});
+  guard_.is_frozen(sweep, faults);
+  if (!sweep.has_times) faults.push_back(without_times(sweep, parameters_.lidar));
+  report(faults, out);
+
+  // And with its stamp?
   check_pause(Sensor::kSweep, sweep.utime, out);
-  std::vector<InputFault> faults;
   const auto utime = guard_.admit(Sensor::kSweep, sweep.utime, faults);
   report(faults, out);
+
   if (utime) {
     sweep.utime = *utime;
     const model::Utime end = end_of_revolution(sweep);
-    wait(end, std::move(sweep), out);
+    wait({end, std::move(sweep)}, out);
   }
   settle(out, false);
   return out;
@@ -154,26 +156,26 @@ InputResults LidarImuInput::add(model::PointSweep sweep) {
 InputResults LidarImuInput::add(const model::PlanarScan& raw) {
   InputResults out;
   check_pause(Sensor::kScan, raw.utime, out);
+
   std::vector<InputFault> faults;
   const auto utime = guard_.admit(Sensor::kScan, raw.utime, faults);
   report(faults, out);
   if (utime) {
     model::PlanarScan scan = raw;
     scan.utime = *utime;
-    wait(*utime, std::move(scan), out);
+    wait({*utime, std::move(scan)}, out);
   }
+
   settle(out, false);
   return out;
 }
 
 InputResults LidarImuInput::add(const model::VelocityCorrection& correction) {
-  if (!is_finite(correction))
-    return {
-        InputFault{InputFaultKind::kNotFinite, "VELOCITY_CORRECTION", "a value that is no number"}};
+  if (!is_finite(correction)) return {not_finite("VELOCITY_CORRECTION")};
   if (motion_.add_correction(correction)) return {};
   ++counters_.corrections_late;
   return {InputFault{InputFaultKind::kLate, "VELOCITY_CORRECTION",
-                     "takes effect later than its delay says"}};
+                     "takes effect later than output.correction_delay_s after its stamp"}};
 }
 
 InputResults LidarImuInput::add(const model::EkfPose& pose) {
@@ -187,26 +189,102 @@ InputResults LidarImuInput::finish() {
   return out;
 }
 
-void LidarImuInput::publish_raw_pose(bool at_once, InputResults& out) {
-  const model::RawPose pose = motion_.raw_pose();
-  const model::Utime period = microseconds(parameters_.output.raw_pose_period_s);
-  if (raw_pose_utime_ && pose.utime <= *raw_pose_utime_) return;
-  if (!at_once && raw_pose_utime_ && pose.utime - *raw_pose_utime_ < period) return;
-  raw_pose_utime_ = pose.utime;
-  out.emplace_back(pose);
+void LidarImuInput::wait(WaitingSweep waiting, InputResults& out) {
+  Admission admission = queue_.add(std::move(waiting), increment_end_);
+  if (admission.dropped_oldest) ++counters_.sweeps_dropped;
+  if (admission.is_carried) ++counters_.sweeps_carried;
+  if (!admission.fault) return;
+  ++counters_.sweeps_dropped;
+  out.emplace_back(*std::move(admission.fault));
 }
 
-void LidarImuInput::check_calibration(InputResults& out) {
-  if (calibration_reported_ || motion_.is_calibrated()) return;
-  const auto state = motion_.history().newest();
-  // Surely moving: faster than standing allows, for what is known.
-  const bool moves = !motion_.is_stationary() &&
-                     state.utime - motion_.history().oldest().utime > microseconds(1.0) &&
-                     guard_.is_live(Sensor::kImu);
-  if (!moves) return;
-  calibration_reported_ = true;
-  out.emplace_back(InputFault{InputFaultKind::kNotCalibrated, channel_of(Sensor::kImu),
-                              "the vehicle moves before it has stood still long enough"});
+/// Ends increments of odometry and releases sweeps, as far as motion is known (or `everything`).
+void LidarImuInput::settle(InputResults& out, bool everything) {
+  std::vector<InputFault> faults;
+  guard_.find_silent(faults);
+  report(faults, out);
+
+  const model::Utime longest = microseconds(parameters_.output.max_increment_s);
+  const model::Utime lag = microseconds(parameters_.output.lag_s);
+  const auto is_known = [&](model::Utime utime) {
+    return everything || guard_.has_motion_until(utime, parameters_.output.max_wait_s);
+  };
+  while (true) {
+    const auto now = guard_.now();
+    const bool has_item = !queue_.empty();
+    const bool moves = guard_.has_spoken(Sensor::kImu) || guard_.has_spoken(Sensor::kWheels);
+
+    // An increment ends without a sweep where none can come any more for its time, or the next is
+    // far: then increments of the usual length lead up to it.
+    const bool near =
+        has_item && increment_end_ && 2 * (queue_.front().end - *increment_end_) <= 3 * longest;
+    const bool regular = now && moves && increment_end_ && !near &&
+                         (has_item || *now >= *increment_end_ + longest + lag);
+
+    if (regular) {
+      if (!is_known(*increment_end_ + longest)) return;
+      end_increment(*increment_end_ + longest, out);
+    } else if (has_item) {
+      if (!is_known(queue_.front().end)) return;
+      WaitingSweep next = queue_.take();
+      end_increment(next.end, out);
+      release(std::move(next), out);
+    } else {
+      if (now && moves && !increment_end_) end_increment(*now, out);
+      return;
+    }
+  }
+}
+
+void LidarImuInput::end_increment(model::Utime utime, InputResults& out) {
+  if (!increment_end_) {
+    motion_.begin(utime);
+    increment_end_ = utime;
+    return;
+  }
+  if (utime <= *increment_end_) return;
+
+  if (auto increment = motion_.increment(*increment_end_, utime)) {
+    out.emplace_back(*std::move(increment));
+    if (auto pose = raw_poses_.take(motion_.raw_pose(), true)) out.emplace_back(*pose);
+  } else {
+    ++counters_.increments_missing;
+  }
+  increment_end_ = utime;
+}
+
+void LidarImuInput::release(WaitingSweep waiting, InputResults& out) {
+  if (!queue_.release(waiting)) {
+    ++counters_.sweeps_dropped;
+  } else if (auto* scan = std::get_if<model::PlanarScan>(&waiting.item)) {
+    out.emplace_back(std::move(*scan));
+  } else {
+    release_sweep(std::get<model::PointSweep>(std::move(waiting.item)), waiting.end, out);
+  }
+}
+
+void LidarImuInput::release_sweep(model::PointSweep raw, model::Utime stamp, InputResults& out) {
+  // Where no sensor measures the motion, the filter's is taken.
+  MotionHistory by_filter;
+  if (!motion_.history().at(stamp)) {
+    if (const auto motion = filter_motion_.at(stamp)) by_filter.add(*motion);
+  }
+  const MotionHistory& history = by_filter.empty() ? motion_.history() : by_filter;
+
+  const bool has_times = raw.has_times;
+  DeskewedSweep result = deskew(std::move(raw), stamp, history, parameters_.lidar.mount);
+  // Without an IMU the attitude is not known.
+  if (!motion_.attitude()) result.sweep.attitude.reset();
+
+  ++counters_.sweeps;
+  if (!by_filter.empty() && result.had_motion) ++counters_.sweeps_by_filter;
+  if (!result.had_motion) {
+    ++counters_.sweeps_not_deskewed;
+    if (has_times)
+      out.emplace_back(InputFault{InputFaultKind::kNoMotion, channel_of(Sensor::kSweep),
+                                  "no motion is known for the revolution: not de-skewed"});
+  }
+  out.emplace_back(std::move(result.sweep));
 }
 
 }  // namespace understory::lidar_imu_input

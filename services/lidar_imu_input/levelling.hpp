@@ -1,0 +1,61 @@
+// The IMU's latest sample, and the attitude that levels it.
+#pragma once
+
+#include <optional>
+
+#include "common/model/imu.hpp"
+#include "services/lidar_imu_input/attitude_filter.hpp"
+#include "services/lidar_imu_input/level_motion.hpp"
+
+namespace understory::lidar_imu_input {
+
+/// Owns the attitude filter and the sample up to which it has been propagated. Invariant: once
+/// begun there are an attitude, a latest sample, and that sample levelled.
+class Levelling {
+ public:
+  explicit Levelling(const ImuParameters& imu) : imu_(imu) {}
+
+  /// The first sample (frame vehicle): tilt from its force.
+  void begin(const model::ImuSample& sample);
+  /// Propagates the attitude from the latest sample to this one, `seconds` later. `is_saturated`:
+  /// samples between the two were left out. Precondition: has begun.
+  void propagate(const model::ImuSample& sample, bool is_saturated, double seconds);
+  /// `seconds` pass that no sample covers: the attitude becomes less certain.
+  void bridge(double seconds) { attitude_->bridge(seconds); }
+  /// The sample in `vehicle_level`, by the attitude as it is now. Precondition: has begun.
+  LevelSample level(const model::ImuSample& sample, bool is_saturated) const;
+  /// The sample becomes the latest one.
+  void set_latest(const model::ImuSample& sample, const LevelSample& level);
+
+  /// None before the first sample.
+  const std::optional<AttitudeFilter>& attitude() const { return attitude_; }
+  std::optional<AttitudeFilter>& attitude() { return attitude_; }  ///< To be updated.
+  /// Latest sample, frame vehicle; none before the first one.
+  const std::optional<model::ImuSample>& latest() const { return latest_; }
+  /// The same sample levelled.
+  const std::optional<LevelSample>& latest_level() const { return latest_level_; }
+  /// Whether a loaded state keeps the invariant.
+  bool is_whole() const { return !attitude_ || (latest_ && latest_level_); }
+
+  /// For saving and loading: what changes while it runs.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    bool has_attitude = self.attitude_.has_value();
+    a(has_attitude);
+    if constexpr (Archive::kReads) {
+      self.attitude_.reset();
+      const Eigen::Vector3d any_force(0.0, 0.0, kGravity_mps2);
+      if (has_attitude) self.attitude_.emplace(self.imu_, any_force);
+    }
+    if (has_attitude) a(*self.attitude_);
+    a(self.latest_, self.latest_level_);
+  }
+
+ private:
+  ImuParameters imu_;
+  std::optional<AttitudeFilter> attitude_;
+  std::optional<model::ImuSample> latest_;
+  std::optional<LevelSample> latest_level_;
+};
+
+}  // namespace understory::lidar_imu_input

@@ -1,0 +1,51 @@
+// Where the vehicle is by dead reckoning, and where it was during the last seconds.
+#pragma once
+
+#include <optional>
+
+#include "common/model/ekf_output.hpp"
+#include "common/model/imu.hpp"
+#include "common/model/odometry.hpp"
+#include "services/lidar_imu_input/attitude_filter.hpp"
+#include "services/lidar_imu_input/dead_reckoning.hpp"
+#include "services/lidar_imu_input/motion_history.hpp"
+
+namespace understory::lidar_imu_input {
+
+/// Owns the dead reckoning with its stamp, the height, and their history. The pose is in `odom`.
+class PoseTrack {
+ public:
+  explicit PoseTrack(const ImuParameters& imu) : reckoning_(imu) {}
+
+  /// From one levelled sample to the next, `seconds` later. `climb_mps`: vertical velocity.
+  void propagate(const LevelSample& from, const LevelSample& to, double climb_mps, double seconds);
+  /// Up to `utime` no sensor covered the motion: velocity and `yaw_rate_rad_s` go on as they were.
+  void bridge_gap(model::Utime utime, double yaw_rate_rad_s);
+  /// Follows odometry that the wheels alone gave, as far as the IMU has not moved the pose.
+  void follow_wheels(const model::Odometry& odometry);
+  /// The IMU has moved the pose up to `utime`.
+  void reach(model::Utime utime);
+  /// Puts the motion at an IMU sample (frame vehicle) into the history.
+  void remember(const model::ImuSample& sample, const AttitudeFilter& attitude);
+
+  /// To be updated with measurements.
+  DeadReckoning& reckoning() { return reckoning_; }
+  const DeadReckoning& reckoning() const { return reckoning_; }
+  const MotionHistory& history() const { return history_; }
+  /// RAW_POSE. `is_reference`: corrected by GNSS, not for mapping.
+  model::RawPose raw_pose(bool is_reference) const;
+
+  /// For saving and loading: what changes while it runs.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.reckoning_, self.history_, self.utime_, self.height_m_);
+  }
+
+ private:
+  DeadReckoning reckoning_;
+  MotionHistory history_;
+  std::optional<model::Utime> utime_;  ///< Of the pose.
+  double height_m_ = 0.0;              ///< Above the start; drifts.
+};
+
+}  // namespace understory::lidar_imu_input

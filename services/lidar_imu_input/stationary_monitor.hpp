@@ -1,0 +1,71 @@
+// Whether the vehicle is stationary, and what its gyro shows meanwhile.
+#pragma once
+
+#include <optional>
+
+#include "common/model/imu.hpp"
+#include "services/lidar_imu_input/attitude_filter.hpp"
+#include "services/lidar_imu_input/dead_reckoning.hpp"
+#include "services/lidar_imu_input/level_motion.hpp"
+#include "services/lidar_imu_input/standstill.hpp"
+
+namespace understory::lidar_imu_input {
+
+/// What else is known of the velocity when the IMU is quiet.
+struct VelocityEvidence {
+  Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();      ///< Dead reckoned, vehicle_level.
+  Eigen::Matrix2d covariance_m2ps2 = Eigen::Matrix2d::Zero();  ///< Of it.
+  bool wheels_are_fresh = false;
+  model::Utime corrected_utime = 0;  ///< When a VELOCITY_CORRECTION last took effect.
+
+  /// From the dead reckoning as it is now.
+  static VelocityEvidence of(const DeadReckoning& reckoning, bool wheels_are_fresh,
+                             model::Utime corrected_utime);
+};
+
+/// Owns the standstill detector, the gyro's bias learned while stationary, and since when the
+/// vehicle has not moved. Quiet samples alone do not make a standstill where the velocity denies
+/// it: a smooth road is quiet, too.
+class StationaryMonitor {
+ public:
+  StationaryMonitor(const StandstillParameters& standstill, const ImuParameters& imu);
+
+  /// Takes an IMU sample (frame vehicle, lever force not taken out), `seconds` after the one
+  /// before. `gyro_bias`: the attitude filter's [rad/s].
+  void add(const model::ImuSample& sample, double seconds, const Eigen::Vector3d& gyro_bias,
+           const VelocityEvidence& velocity);
+  /// Learns the bias of the heading's rate from the attitude filter. Precondition: is_stationary().
+  void learn_bias(const AttitudeFilter& attitude);
+  /// Takes the speed of the wheels [m/s].
+  void add_wheel_speed(model::Utime utime, double speed_mps) {
+    detector_.add_wheel_speed(utime, speed_mps);
+  }
+  /// The vehicle may have moved until `utime`: the first sample, or the end of a gap.
+  void begin_at(model::Utime utime);
+
+  bool is_stationary() const { return detector_.is_stationary(); }
+  /// Whether it was stationary long enough in one stretch to calibrate.
+  bool is_calibrated() const { return detector_.is_calibrated(); }
+  /// Whether it has not moved since `utime`.
+  bool is_stationary_since(model::Utime utime) const { return moved_utime_ <= utime; }
+  /// Bias of the heading's rate, from standstills only; its sigma grows while the vehicle moves.
+  const YawRateBias& bias() const { return bias_; }
+
+  /// For saving and loading: what changes while it runs.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.detector_, self.bias_, self.moved_utime_, self.denied_since_);
+  }
+
+ private:
+  bool allows_stationary(model::Utime now, const VelocityEvidence& velocity);
+
+  StandstillParameters parameters_;
+  double gyro_bias_walk_;  ///< [rad/s/sqrt(s)]
+  StandstillDetector detector_;
+  YawRateBias bias_;
+  model::Utime moved_utime_ = 0;              ///< When the vehicle was last found to move.
+  std::optional<model::Utime> denied_since_;  ///< Since when the velocity denies a standstill.
+};
+
+}  // namespace understory::lidar_imu_input

@@ -1,0 +1,60 @@
+// Speeds of the rear axle, from the wheels.
+#pragma once
+
+#include <deque>
+
+#include "common/model/wheels.hpp"
+#include "services/lidar_imu_input/wheel_odometry.hpp"
+
+namespace understory::lidar_imu_input {
+
+/// Speed of the axle's middle along the vehicle's x axis.
+struct SpeedSample {
+  model::Utime utime = 0;
+  double speed_mps = 0.0;
+  double scale_sigma = 0.0;  ///< Of the speed, relative.
+
+  /// For saving and loading.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.utime, self.speed_mps, self.scale_sigma);
+  }
+};
+
+/// How much the wheels read too much, as IMU and wheels together show it.
+struct WheelScale {
+  double measured_over_true = 1.0;
+  double sigma = 0.0;
+};
+
+/// The speeds of the last 5 s, corrected by the wheels' scale. Invariant: in order of time.
+class WheelSpeeds {
+ public:
+  explicit WheelSpeeds(const WheelOdometryParameters& wheels) : wheels_(wheels) {}
+
+  /// Takes the axle's speed as the wheels measured it [m/s], corrected by the scale where that is
+  /// known. The result is never less certain than the wheels' own noise.
+  void add(model::Utime utime, double measured_mps, const std::optional<WheelScale>& scale);
+
+  /// Whether a sample came so lately that it still holds at `now`.
+  bool are_fresh(model::Utime now) const;
+  /// Whether samples without a gap cover the interval.
+  bool cover(model::Utime from, model::Utime to) const;
+  /// Speed at `utime` [m/s], between neighbours in proportion to time; the first and the last one
+  /// hold beyond the ends. Precondition: not empty.
+  double at(model::Utime utime) const;
+  /// Precondition: not empty.
+  const SpeedSample& latest() const { return speeds_.back(); }
+
+  /// For saving and loading: what changes while it runs.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.speeds_);
+  }
+
+ private:
+  WheelOdometryParameters wheels_;
+  std::deque<SpeedSample> speeds_;
+};
+
+}  // namespace understory::lidar_imu_input
