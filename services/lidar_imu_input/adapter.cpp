@@ -34,6 +34,43 @@ wire::Reason reason_of(InputFaultKind kind) {
   return wire::Reason::kInconsistent;
 }
 
+/// Every output on its channel; faults into HEALTH.
+class Publishers {
+ public:
+  Publishers(bus::Node& node, const LidarImuInputChannels& channels)
+      : node_(&node),
+        imu_(node.advertise<model::ImuSample>(channels.imu)),
+        wheels_(node.advertise<model::WheelSample>(channels.wheels)),
+        gnss_(node.advertise<model::GnssFix>(channels.gnss)),
+        odometry_(node.advertise<model::Odometry>(channels.odometry)),
+        raw_pose_(node.advertise<model::RawPose>(channels.raw_pose)),
+        sweeps_(node.advertise<model::PointSweep>(channels.lidar_sweep)),
+        scans_(node.advertise<model::PlanarScan>(channels.lidar_scan)) {}
+
+  void operator()(const model::ImuSample& value) { imu_.publish(value); }
+  void operator()(const model::WheelSample& value) { wheels_.publish(value); }
+  void operator()(const model::GnssFix& value) { gnss_.publish(value); }
+  void operator()(const model::Odometry& value) { odometry_.publish(value); }
+  void operator()(const model::RawPose& value) { raw_pose_.publish(value); }
+  void operator()(const model::PlanarScan& value) { scans_.publish(value); }
+  void operator()(const model::PointSweep& value) {
+    for (const model::PointSweep& part : split_sweep(value, kPointsPerPart)) sweeps_.publish(part);
+  }
+  void operator()(const InputFault& fault) {
+    node_->report(reason_of(fault.kind), fault.text, fault.channel);
+  }
+
+ private:
+  bus::Node* node_;
+  bus::Publisher<model::ImuSample> imu_;
+  bus::Publisher<model::WheelSample> wheels_;
+  bus::Publisher<model::GnssFix> gnss_;
+  bus::Publisher<model::Odometry> odometry_;
+  bus::Publisher<model::RawPose> raw_pose_;
+  bus::Publisher<model::PointSweep> sweeps_;
+  bus::Publisher<model::PlanarScan> scans_;
+};
+
 class LidarImuInputAdapter : public bus::Adapter {
  public:
   explicit LidarImuInputAdapter(LidarImuInputChannels channels) : channels_(std::move(channels)) {}
@@ -44,26 +81,21 @@ class LidarImuInputAdapter : public bus::Adapter {
 
   void bind(bus::Node& node) override {
     node_ = &node;
+    publishers_.emplace(node, channels_);
     parameters_.wheels.car.axle_T_vehicle =
         geometry::SE2(axle_T_vehicle_.x_m, axle_T_vehicle_.y_m, axle_T_vehicle_.yaw_rad);
     stage_.emplace(parameters_);
+
     take<model::ImuSample>(channels_.raw_imu, 4000);
     take<model::WheelSample>(channels_.raw_wheels, 2000);
     take<model::GnssFix>(channels_.raw_gnss, 200);
     take<model::PlanarScan>(channels_.raw_scan, 200);
     take<model::VelocityCorrection>(channels_.velocity_correction, 200);
     take<model::EkfPose>(channels_.ekf_pose, 200);
-    // Bulk is no state: a sweep that was under way at a restart is lost.
+    // Bulk is no state: a sweep that arrives in part before a restart is lost.
     node.subscribe<model::PointSweep>(channels_.raw_sweep,
                                       [this](const model::PointSweep& part) { add_part(part); },
                                       {.queue_size = 1000, .journaled = false});
-    imu_ = node.advertise<model::ImuSample>(channels_.imu);
-    wheels_ = node.advertise<model::WheelSample>(channels_.wheels);
-    gnss_ = node.advertise<model::GnssFix>(channels_.gnss);
-    odometry_ = node.advertise<model::Odometry>(channels_.odometry);
-    raw_pose_ = node.advertise<model::RawPose>(channels_.raw_pose);
-    sweeps_ = node.advertise<model::PointSweep>(channels_.lidar_sweep);
-    scans_ = node.advertise<model::PlanarScan>(channels_.lidar_scan);
   }
 
   void finish() override { publish(stage_->finish()); }
@@ -81,27 +113,14 @@ class LidarImuInputAdapter : public bus::Adapter {
     auto sweep = assembler_.add(part);
     if (assembler_.incomplete_revolutions() > incomplete_) {
       incomplete_ = assembler_.incomplete_revolutions();
-      node_->report(wire::Reason::kPartsMissing, "a turn of which parts are missing is left out",
+      node_->report(wire::Reason::kPartsMissing, "a sweep of which parts are missing is left out",
                     channels_.raw_sweep);
     }
     if (sweep) publish(stage_->add(*std::move(sweep)));
   }
 
   void publish(const InputResults& results) {
-    for (const InputResult& result : results)
-      std::visit([this](const auto& value) { send(value); }, result);
-  }
-  void send(const model::ImuSample& value) { imu_.publish(value); }
-  void send(const model::WheelSample& value) { wheels_.publish(value); }
-  void send(const model::GnssFix& value) { gnss_.publish(value); }
-  void send(const model::Odometry& value) { odometry_.publish(value); }
-  void send(const model::RawPose& value) { raw_pose_.publish(value); }
-  void send(const model::PlanarScan& value) { scans_.publish(value); }
-  void send(const model::PointSweep& value) {
-    for (const model::PointSweep& part : split_sweep(value, kPointsPerPart)) sweeps_.publish(part);
-  }
-  void send(const InputFault& fault) {
-    node_->report(reason_of(fault.kind), fault.text, fault.channel);
+    for (const InputResult& result : results) std::visit(*publishers_, result);
   }
 
   LidarImuInputChannels channels_;
@@ -110,14 +129,8 @@ class LidarImuInputAdapter : public bus::Adapter {
   bus::Node* node_ = nullptr;
   std::optional<LidarImuInput> stage_;
   model::SweepAssembler assembler_;
-  std::uint64_t incomplete_ = 0;
-  bus::Publisher<model::ImuSample> imu_;
-  bus::Publisher<model::WheelSample> wheels_;
-  bus::Publisher<model::GnssFix> gnss_;
-  bus::Publisher<model::Odometry> odometry_;
-  bus::Publisher<model::RawPose> raw_pose_;
-  bus::Publisher<model::PointSweep> sweeps_;
-  bus::Publisher<model::PlanarScan> scans_;
+  std::uint64_t incomplete_ = 0;  ///< Sweeps with missing parts that were reported.
+  std::optional<Publishers> publishers_;
 };
 
 }  // namespace

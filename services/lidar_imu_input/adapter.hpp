@@ -1,4 +1,4 @@
-// The input stage's place on the bus.
+// The input stage on the bus.
 #pragma once
 
 #include <string>
@@ -7,6 +7,7 @@
 
 namespace understory::lidar_imu_input {
 
+/// Names of the channels; every one can be replaced, for tests and for two vehicles on one bus.
 struct LidarImuInputChannels {
   std::string raw_imu = "RAW_IMU";
   std::string raw_wheels = "RAW_WHEELS";
@@ -24,6 +25,7 @@ struct LidarImuInputChannels {
   std::string lidar_scan = "LIDAR_SCAN";
 };
 
+/// The service, for run_service() and replay. It refuses to start with parameters out of range.
 bus::Service lidar_imu_input_service(const LidarImuInputChannels& channels = {});
 
 }  // namespace understory::lidar_imu_input

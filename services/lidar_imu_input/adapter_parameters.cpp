@@ -7,24 +7,32 @@ void describe_mount(SensorMount& mount, const std::string& name, bus::ParameterT
   table.add(name + ".x_m", mount.x_m, {-50.0, 50.0}, "m", "Forward of the vehicle's origin.");
   table.add(name + ".y_m", mount.y_m, {-50.0, 50.0}, "m", "Left of it.");
   table.add(name + ".z_m", mount.z_m, {-50.0, 50.0}, "m", "Above it.");
-  table.add(name + ".roll_rad", mount.roll_rad, {-3.2, 3.2}, "rad", "Turned first, about x.");
-  table.add(name + ".pitch_rad", mount.pitch_rad, {-3.2, 3.2}, "rad", "Turned second, about y.");
-  table.add(name + ".yaw_rad", mount.yaw_rad, {-3.2, 3.2}, "rad", "Turned last, about z.");
+  table.add(name + ".roll_rad", mount.roll_rad, {-3.2, 3.2}, "rad",
+            "Rotation about x, applied first.");
+  table.add(name + ".pitch_rad", mount.pitch_rad, {-3.2, 3.2}, "rad",
+            "Rotation about y, applied second.");
+  table.add(name + ".yaw_rad", mount.yaw_rad, {-3.2, 3.2}, "rad",
+            "Rotation about z, applied last.");
 }
 
 void describe_imu(ImuParameters& p, bus::ParameterTable& table) {
   describe_mount(p.mount, "imu.mount", table);
-  table.add("imu.gyro_noise", p.gyro_noise, {1e-7, 1.0}, "rad/s/sqrt(Hz)", "White.");
-  table.add("imu.force_noise", p.force_noise, {1e-7, 10.0}, "m/s^2/sqrt(Hz)", "White.");
-  table.add("imu.gyro_bias_sigma", p.gyro_bias_sigma, {1e-6, 1.0}, "rad/s", "At the start.");
-  table.add("imu.force_bias_sigma", p.force_bias_sigma, {1e-6, 10.0}, "m/s^2", "At the start.");
+  table.add("imu.gyro_noise", p.gyro_noise, {1e-7, 1.0}, "rad/s/sqrt(Hz)",
+            "White noise of the rate.");
+  table.add("imu.force_noise", p.force_noise, {1e-7, 10.0}, "m/s^2/sqrt(Hz)",
+            "White noise of the force.");
+  table.add("imu.gyro_bias_sigma", p.gyro_bias_sigma, {1e-6, 1.0}, "rad/s",
+            "Bias of the rate at the start, sigma.");
+  table.add("imu.force_bias_sigma", p.force_bias_sigma, {1e-6, 10.0}, "m/s^2",
+            "Bias of the force at the start, sigma.");
   table.add("imu.gyro_bias_walk", p.gyro_bias_walk, {0.0, 1.0}, "rad/s/sqrt(s)",
-            "How the bias wanders.");
+            "Random walk of the rate's bias.");
   table.add("imu.force_bias_walk", p.force_bias_walk, {0.0, 10.0}, "m/s^2/sqrt(s)",
-            "How the bias wanders.");
-  table.add("imu.gyro_scale_sigma", p.gyro_scale_sigma, {0.0, 0.5}, "", "Of the rate.");
+            "Random walk of the force's bias.");
+  table.add("imu.gyro_scale_sigma", p.gyro_scale_sigma, {0.0, 0.5}, "",
+            "Relative error of the rate.");
   table.add("imu.level_noise", p.level_noise, {0.0, 10.0}, "m/s^2/sqrt(Hz)",
-            "Of gravity taken out, from errors of the level.");
+            "Of removed gravity, from errors of the level.");
   table.add("imu.gyro_range_rad_s", p.gyro_range_rad_s, {0.1, 1000.0}, "rad/s",
             "A rate this large is saturated.");
   table.add("imu.force_range_mps2", p.force_range_mps2, {10.0, 10000.0}, "m/s^2",
@@ -41,31 +49,35 @@ void describe_wheels(WheelOdometryParameters& p, AxlePlace& axle, bus::Parameter
   WheelNoise& n = p.noise;
   table.add("wheels.wheelbase_m", p.car.wheelbase_m, {0.1, 30.0}, "m", "From axle to axle.");
   table.add("wheels.encoder_left_m", p.car.encoder_left_m, {-5.0, 5.0}, "m",
-            "Of the wheel with the encoder, from the middle of the rear axle.");
+            "The wheel with the encoder, left of the middle of the rear axle.");
   table.add("wheels.axle_T_vehicle.x_m", axle.x_m, {-50.0, 50.0}, "m",
             "The vehicle's origin, forward of the middle of the rear axle.");
   table.add("wheels.axle_T_vehicle.y_m", axle.y_m, {-50.0, 50.0}, "m", "Left of it.");
-  table.add("wheels.axle_T_vehicle.yaw_rad", axle.yaw_rad, {-3.2, 3.2}, "rad", "Turned.");
-  table.add("wheels.max_gap_s", p.max_gap_s, {0.001, 10.0}, "s", "So long a sample holds.");
-  table.add("wheels.speed_scale_sigma", n.speed_scale_sigma, {0.0, 1.0}, "", "Of the speed.");
+  table.add("wheels.axle_T_vehicle.yaw_rad", axle.yaw_rad, {-3.2, 3.2}, "rad", "Rotation about z.");
+  table.add("wheels.max_gap_s", p.max_gap_s, {0.001, 10.0}, "s", "How long a sample holds.");
+  table.add("wheels.speed_scale_sigma", n.speed_scale_sigma, {0.0, 1.0}, "",
+            "Relative error of the speed.");
   table.add("wheels.steering_sigma_rad", n.steering_sigma_rad, {0.0, 1.0}, "rad",
-            "Of the steering's zero.");
+            "Error of the steering's zero.");
   table.add("wheels.steering_scale_sigma", n.steering_scale_sigma, {0.0, 1.0}, "",
-            "Of the steering angle.");
-  table.add("wheels.side_slip_sigma", n.side_slip_sigma, {0.0, 1.0}, "", "Of the speed.");
+            "Relative error of the steering angle.");
+  table.add("wheels.side_slip_sigma", n.side_slip_sigma, {0.0, 1.0}, "",
+            "Sideways velocity, part of the speed.");
   table.add("wheels.correlation_time_s", n.correlation_time_s, {0.001, 1000.0}, "s",
-            "How long these errors last.");
-  table.add("wheels.stamp_sigma_s", n.stamp_sigma_s, {0.0, 1.0}, "s", "Of an interval's ends.");
+            "Correlation time of these errors.");
+  table.add("wheels.stamp_sigma_s", n.stamp_sigma_s, {0.0, 1.0}, "s",
+            "Jitter of an interval's ends.");
   table.add("wheels.standstill_sigma_m", n.standstill_sigma_m, {1e-9, 10.0}, "m/sqrt(s)",
-            "What is never known better.");
+            "Least error of the position.");
   table.add("wheels.standstill_sigma_rad", n.standstill_sigma_rad, {1e-9, 10.0}, "rad/sqrt(s)",
-            "What is never known better.");
+            "Least error of the heading.");
 }
 
 void describe_standstill(StandstillParameters& p, bus::ParameterTable& table) {
   table.add("standstill.calibration_s", p.calibration_s, {0.0, 3600.0}, "s",
-            "Standing this long in one piece calibrates.");
-  table.add("standstill.window_s", p.window_s, {0.05, 10.0}, "s", "What is looked at.");
+            "A standstill this long, without a break, calibrates.");
+  table.add("standstill.window_s", p.window_s, {0.05, 10.0}, "s",
+            "Length of the window of samples.");
   table.add("standstill.gyro_sigma_rad_s", p.gyro_sigma_rad_s, {0.0, 10.0}, "rad/s",
             "Largest spread of the rate in the window.");
   table.add("standstill.force_sigma_mps2", p.force_sigma_mps2, {0.0, 100.0}, "m/s^2",
@@ -75,32 +87,34 @@ void describe_standstill(StandstillParameters& p, bus::ParameterTable& table) {
   table.add("standstill.wheel_speed_mps", p.wheel_speed_mps, {0.0, 10.0}, "m/s",
             "Largest speed of the wheels.");
   table.add("standstill.floor_factor", p.floor_factor, {1.0, 1000.0}, "",
-            "Largest spread, in units of that at the first stand.");
+            "Largest spread, in units of that at the first standstill.");
   table.add("standstill.velocity_sigma_mps", p.velocity_sigma_mps, {1e-6, 10.0}, "m/s",
-            "Of \"the vehicle stands\".");
+            "Of velocity zero at a standstill, sigma.");
 }
 
 void describe_constraint(ConstraintParameters& p, bus::ParameterTable& table) {
   table.add("constraint.nonholonomic", p.nonholonomic,
             "Wheels do not slip sideways, nor leave the ground.");
   table.add("constraint.side_slip_mps", p.side_slip_mps, {1e-6, 10.0}, "m/s",
-            "Sideways velocity of the axle.");
-  table.add("constraint.side_slip_scale", p.side_slip_scale, {0.0, 1.0}, "", "Of the speed.");
+            "Sideways velocity of the axle, sigma.");
+  table.add("constraint.side_slip_scale", p.side_slip_scale, {0.0, 1.0}, "",
+            "The same, part of the speed.");
   table.add("constraint.vertical_mps", p.vertical_mps, {1e-6, 10.0}, "m/s",
-            "Velocity across the vehicle's floor.");
-  table.add("constraint.vertical_scale", p.vertical_scale, {0.0, 1.0}, "", "Of the speed.");
+            "Velocity across the vehicle's floor, sigma.");
+  table.add("constraint.vertical_scale", p.vertical_scale, {0.0, 1.0}, "",
+            "The same, part of the speed.");
   table.add("constraint.typical_speed_mps", p.typical_speed_mps, {0.1, 1000.0}, "m/s",
-            "Bounds the velocity where no wheels tell it.");
+            "Bounds the velocity where no wheels measure it.");
   table.add("constraint.wheel_sigma_mps", p.wheel_sigma_mps, {1e-6, 10.0}, "m/s",
-            "Of the wheels' speed, for the attitude.");
+            "Of the wheels' speed, for the attitude, sigma.");
   table.add("constraint.period_s", p.period_s, {0.001, 10.0}, "s", "Between two uses.");
 }
 
 void describe_output(OutputParameters& p, bus::ParameterTable& table) {
   table.add("output.max_increment_s", p.max_increment_s, {0.005, 60.0}, "s",
-            "Longest piece of ODOMETRY.");
+            "Longest increment of ODOMETRY.");
   table.add("output.lag_s", p.lag_s, {0.0, 10.0}, "s",
-            "How long a piece without sweep waits for one to end it.");
+            "How long an increment waits for a sweep to end it.");
   table.add("output.max_wait_s", p.max_wait_s, {0.0, 10.0}, "s",
             "How long a sweep waits for motion.");
   table.add("output.raw_pose_period_s", p.raw_pose_period_s, {0.0, 10.0}, "s",
@@ -108,17 +122,18 @@ void describe_output(OutputParameters& p, bus::ParameterTable& table) {
   table.add("output.correction_delay_s", p.correction_delay_s, {0.0, 10.0}, "s",
             "From a VELOCITY_CORRECTION's stamp to its effect.");
   table.add("output.velocity_correlation_s", p.velocity_correlation_s, {0.0, 1000.0}, "s",
-            "How long errors of dead-reckoned velocity last.");
+            "Correlation time of the error of dead-reckoned velocity.");
 }
 
 void describe_fault(FaultParameters& p, bus::ParameterTable& table) {
   table.add("fault.silent_s", p.silent_s, {0.01, 60.0}, "s", "IMU or wheels without a sample.");
-  table.add("fault.sweep_silent_s", p.sweep_silent_s, {0.01, 60.0}, "s", "Lasers without a turn.");
-  table.add("fault.frozen_s", p.frozen_s, {0.01, 60.0}, "s", "The very same IMU sample.");
+  table.add("fault.sweep_silent_s", p.sweep_silent_s, {0.01, 60.0}, "s", "Lasers without a sweep.");
+  table.add("fault.frozen_s", p.frozen_s, {0.01, 60.0}, "s",
+            "The same IMU sample again and again.");
   table.add("fault.clock_jump_s", p.clock_jump_s, {0.01, 60.0}, "s",
             "Stamps that go back, or lead the others, by more.");
   table.add("fault.resync_samples", p.resync_samples, {2, 1000}, "samples",
-            "In step with each other, then a clock that jumped is followed.");
+            "Stamps that go on evenly, until a clock that jumped is followed.");
 }
 
 }  // namespace
@@ -130,11 +145,11 @@ void describe(LidarImuInputParameters& parameters, AxlePlace& axle_T_vehicle,
   describe_mount(parameters.lidar.mount, "lidar.mount", table);
   table.add("lidar.times_from_azimuth", parameters.lidar.times_from_azimuth,
             {"none", "clockwise", "counterclockwise"},
-            "Times for sweeps that have none: how the laser turns, seen from above.");
+            "Times for sweeps that have none: how the laser rotates, seen from above.");
   table.add("lidar.revolution_s", parameters.lidar.revolution_s, {0.001, 1.0}, "s",
-            "Of one turn, for these.");
+            "Time of one revolution, for these.");
   table.add("lidar.min_range_m", parameters.lidar.min_range_m, {0.0, 100.0}, "m",
-            "What is nearer is the vehicle itself.");
+            "Nearer points are on the vehicle itself.");
   describe_imu(parameters.imu, table);
   describe_wheels(parameters.wheels, axle_T_vehicle, table);
   describe_standstill(parameters.standstill, table);

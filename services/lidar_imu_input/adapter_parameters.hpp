@@ -13,6 +13,7 @@ struct AxlePlace {
   double yaw_rad = 0.0;
 };
 
+/// Adds every parameter to the table, with unit, range and meaning. Both structs must outlive it.
 void describe(LidarImuInputParameters& parameters, AxlePlace& axle_T_vehicle,
               bus::ParameterTable& table);
 

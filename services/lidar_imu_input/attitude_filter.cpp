@@ -5,18 +5,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/lidar_imu_input/stamps.hpp"
+
 namespace understory::lidar_imu_input {
 namespace {
 
-constexpr double kStartTilt_rad = 0.1;  // one metre per second squared, mistaken for gravity
+constexpr double kStartTilt_rad = 0.1;  // 1 m/s^2 taken for gravity
 constexpr double kStartSpeed_mps = 10.0;
 constexpr double kBridgeTilt = 0.03;  // rad per square root of a second
 constexpr double kBridgeSpeed = 2.0;  // m/s per square root of a second
 
 constexpr double kWheelScaleSigma = 0.02;
 constexpr double kWheelScaleWalk = 2e-4;  // per square root of a second
-
-double square(double value) { return value * value; }
 
 Eigen::Matrix3d cross(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
@@ -38,13 +38,33 @@ RollPitchYaw roll_pitch_yaw(const Eigen::Quaterniond& rotation) {
           std::atan2(m(1, 0), m(0, 0))};
 }
 
+namespace {
+
+/// Ry(pitch) Rx(roll) of a rotation.
+Eigen::Quaterniond tilt_of(const Eigen::Quaterniond& rotation) {
+  const RollPitchYaw angles = roll_pitch_yaw(rotation);
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angles.pitch_rad, Eigen::Vector3d::UnitY()) *
+                            Eigen::AngleAxisd(angles.roll_rad, Eigen::Vector3d::UnitX()));
+}
+
+/// (Roll, pitch) of an error of the attitude: errors about the level axes x and y, to first order.
+Eigen::Matrix<double, 2, 3> level_of_attitude(const Eigen::Quaterniond& world_Q_vehicle) {
+  return tilt_of(world_Q_vehicle).toRotationMatrix().topRows<2>();
+}
+
+double pitch_tangent(const Eigen::Quaterniond& world_Q_vehicle) {
+  return std::tan(roll_pitch_yaw(world_Q_vehicle).pitch_rad);
+}
+
+}  // namespace
+
 AttitudeFilter::AttitudeFilter(const ImuParameters& imu, const Eigen::Vector3d& force)
     : imu_(imu),
       world_Q_vehicle_(Eigen::Quaterniond::FromTwoVectors(
           force.norm() > 0.1 * kGravity_mps2 ? force : Eigen::Vector3d::UnitZ(),
           Eigen::Vector3d::UnitZ())) {
   covariance_.block<3, 3>(0, 0).diagonal().setConstant(square(kStartTilt_rad));
-  covariance_(2, 2) = 1e-12;  // yaw is nobody's business here
+  covariance_(2, 2) = 1e-12;  // yaw is not estimated
   covariance_.block<3, 3>(3, 3).diagonal() << square(kStartSpeed_mps), 1.0, 0.25;
   covariance_.block<3, 3>(6, 6).diagonal().setConstant(square(imu.gyro_bias_sigma));
   covariance_.block<3, 3>(9, 9).diagonal().setConstant(square(imu.force_bias_sigma));
@@ -58,6 +78,7 @@ void AttitudeFilter::propagate(const Eigen::Vector3d& rate, const Eigen::Vector3
   const Eigen::Vector3d gravity =
       world_Q_vehicle_.conjugate() * Eigen::Vector3d(0.0, 0.0, -kGravity_mps2);
 
+  // Transition of the error.
   Covariance step = Covariance::Identity();
   step.block<3, 3>(0, 0) -= cross(w) * seconds;
   step.block<3, 3>(0, 6) = -Eigen::Matrix3d::Identity() * seconds;
@@ -66,13 +87,15 @@ void AttitudeFilter::propagate(const Eigen::Vector3d& rate, const Eigen::Vector3
   step.block<3, 3>(3, 6) = -cross(velocity_) * seconds;
   step.block<3, 3>(3, 9) = -Eigen::Matrix3d::Identity() * seconds;
 
+  // Noise. A scale error of the gyro acts like noise of its power over a rotation of about a
+  // second.
   const double gyro_noise = saturated ? imu_.saturation_gyro_noise : imu_.gyro_noise;
   const double force_noise = saturated ? imu_.saturation_force_noise : imu_.force_noise;
   const Eigen::Matrix3d lever = cross(velocity_);
-  // A scale error of the gyro acts like noise of its power over a turn of about a second.
   const Eigen::Vector3d scale = imu_.gyro_scale_sigma * w;
   const Eigen::Matrix3d rate_power =
       (Eigen::Vector3d::Constant(square(gyro_noise)) + scale.cwiseAbs2()).asDiagonal();
+
   covariance_ = step * covariance_ * step.transpose();
   with_mark_ = step * with_mark_;
   covariance_.block<3, 3>(0, 0) += rate_power * seconds;
@@ -82,7 +105,6 @@ void AttitudeFilter::propagate(const Eigen::Vector3d& rate, const Eigen::Vector3
   covariance_.block<3, 3>(3, 3).diagonal().array() += square(force_noise) * seconds;
   covariance_.block<3, 3>(6, 6).diagonal().array() += square(imu_.gyro_bias_walk) * seconds;
   covariance_.block<3, 3>(9, 9).diagonal().array() += square(imu_.force_bias_walk) * seconds;
-
   covariance_(12, 12) += square(kWheelScaleWalk) * seconds;
 
   // Velocity with the attitude at the middle of the step.
@@ -103,10 +125,13 @@ void AttitudeFilter::update(const Row& row, double residual, double variance) {
   const double total = row.dot(spread) + variance;
   const Eigen::Matrix<double, 13, 1> gain = spread / total;
   const Eigen::Matrix<double, 13, 1> error = gain * residual;
+
   covariance_ -= gain * spread.transpose();
   with_mark_ -= gain * (row * with_mark_).eval();
   covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();
-  twist_rad_ += pitch_tangent() * level_of_attitude().row(0).dot(error.head<3>());
+
+  twist_rad_ += pitch_tangent(world_Q_vehicle_) *
+                level_of_attitude(world_Q_vehicle_).row(0).dot(error.head<3>());
   world_Q_vehicle_ = (world_Q_vehicle_ * rotation_of(error.head<3>())).normalized();
   velocity_ += error.segment<3>(3);
   gyro_bias_ += error.segment<3>(6);
@@ -124,12 +149,12 @@ void AttitudeFilter::add_velocity(const Eigen::Vector3d& direction, const Eigen:
 }
 
 void AttitudeFilter::add_wheel_speed(const Eigen::Vector3d& forward, const Eigen::Vector3d& at,
-                                     double thought_mps, double measured_mps, double sigma_mps) {
+                                     double predicted_mps, double measured_mps, double sigma_mps) {
   Row row = Row::Zero();
   row.segment<3>(3) = wheel_scale_ * forward.transpose();
   row.segment<3>(6) = wheel_scale_ * forward.transpose() * cross(at);
-  row(12) = thought_mps;
-  update(row, measured_mps - wheel_scale_ * thought_mps, square(sigma_mps));
+  row(12) = predicted_mps;
+  update(row, measured_mps - wheel_scale_ * predicted_mps, square(sigma_mps));
 }
 
 void AttitudeFilter::add_standstill(const Eigen::Vector3d& rate, double seconds,
@@ -144,39 +169,27 @@ void AttitudeFilter::add_standstill(const Eigen::Vector3d& rate, double seconds,
   }
 }
 
-Eigen::Quaterniond AttitudeFilter::level_Q_vehicle() const {
-  const RollPitchYaw angles = roll_pitch_yaw(world_Q_vehicle_);
-  return Eigen::Quaterniond(Eigen::AngleAxisd(angles.pitch_rad, Eigen::Vector3d::UnitY()) *
-                            Eigen::AngleAxisd(angles.roll_rad, Eigen::Vector3d::UnitX()));
-}
+Eigen::Quaterniond AttitudeFilter::level_Q_vehicle() const { return tilt_of(world_Q_vehicle_); }
 
 Eigen::Matrix2d AttitudeFilter::tilt_covariance() const {
-  const Eigen::Matrix<double, 2, 3> level = level_of_attitude();
+  const Eigen::Matrix<double, 2, 3> level = level_of_attitude(world_Q_vehicle_);
   return level * covariance_.block<3, 3>(0, 0) * level.transpose();
 }
 
-Eigen::Matrix<double, 2, 3> AttitudeFilter::level_of_attitude() const {
-  // Errors about the level axes x and y; roll and pitch to first order.
-  return level_Q_vehicle().toRotationMatrix().topRows<2>();
-}
-
-double AttitudeFilter::pitch_tangent() const {
-  return std::tan(roll_pitch_yaw(world_Q_vehicle_).pitch_rad);
-}
-
 void AttitudeFilter::mark_level() {
-  with_mark_ = covariance_.leftCols<3>() * level_of_attitude().transpose();
+  with_mark_ = covariance_.leftCols<3>() * level_of_attitude(world_Q_vehicle_).transpose();
   marked_ = tilt_covariance();
   twist_rad_ = 0.0;
 }
 
 model::LevelError AttitudeFilter::level_since_mark() const {
-  const Eigen::Matrix2d shared = level_of_attitude() * with_mark_.topRows<3>();
+  const Eigen::Matrix2d shared = level_of_attitude(world_Q_vehicle_) * with_mark_.topRows<3>();
   model::LevelError level;
   level.covariance = tilt_covariance();
-  level.pitch_tangent = pitch_tangent();
+  level.pitch_tangent = pitch_tangent(world_Q_vehicle_);
   level.memory = marked_.ldlt().solve(shared.transpose()).transpose();
-  // What is new cannot be less than nothing but for rounding.
+
+  // The added covariance is negative by rounding only.
   const Eigen::Matrix2d added = level.covariance - level.memory * shared.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> parts(0.5 * (added + added.transpose()));
   level.added = parts.eigenvectors() * parts.eigenvalues().cwiseMax(0.0).asDiagonal() *

@@ -1,10 +1,9 @@
-// Roll and pitch of a moving vehicle from its IMU, helped by what the wheels and standing still
-// say.
+// Roll and pitch of a moving vehicle from its IMU, helped by the wheels and by standstills.
 //
-// Gravity is only seen through the accelerometer, which also feels the vehicle's acceleration. So
-// the filter carries the velocity along, in the frame of the vehicle u:
+// Gravity is measured by the accelerometer alone, which also feels the vehicle's acceleration. So
+// the filter has the velocity u, in the frame of the vehicle, in its state:
 //   du/dt = f - b_a - (w - b_g) x u + R^T g
-// Where wheels (or standing still) tell u, what remains of f is gravity: acceleration and
+// Where wheels (or a standstill) measure u, what remains of f is gravity: acceleration and
 // centripetal force are compensated to the degree that u is known. No landmark enters.
 #pragma once
 
@@ -17,56 +16,67 @@
 
 namespace understory::lidar_imu_input {
 
+/// Of the Earth, as the accelerometer of a level vehicle at rest measures it.
 constexpr double kGravity_mps2 = 9.81;
 
-/// Roll, pitch and yaw of a rotation Rz(yaw) Ry(pitch) Rx(roll).
+/// Angles of a rotation Rz(yaw) Ry(pitch) Rx(roll).
 struct RollPitchYaw {
   double roll_rad = 0.0;
   double pitch_rad = 0.0;
   double yaw_rad = 0.0;
 };
+/// The angles of a unit quaternion; pitch in [-pi / 2, pi / 2].
 RollPitchYaw roll_pitch_yaw(const Eigen::Quaterniond& rotation);
 
 /// Error state filter; errors: attitude (right perturbation), velocity, gyro and force bias, scale
 /// of the wheels' speed (which would pass for tilt whenever the vehicle accelerates or turns).
+/// Frame vehicle throughout. Cost: one 13 x 13 product per propagation.
 class AttitudeFilter {
  public:
+  /// Of (attitude [rad], velocity [m/s], gyro bias [rad/s], force bias [m/s^2], wheel scale).
   using Covariance = Eigen::Matrix<double, 13, 13>;
 
   /// Starts from one sample: tilt from the force, velocity unknown.
   AttitudeFilter(const ImuParameters& imu, const Eigen::Vector3d& specific_force_mps2);
 
-  /// Rate and force (vehicle frame, at the vehicle's origin) over `seconds`.
+  /// Rate [rad/s] and specific force [m/s^2] (frame vehicle, at its origin) over `seconds`.
+  /// `saturated`: with the noise of left-out samples.
   void propagate(const Eigen::Vector3d& rate, const Eigen::Vector3d& force, double seconds,
                  bool saturated);
-  /// Time passes that no sample covers.
+  /// `seconds` pass that no sample covers: tilt and velocity become less certain.
   void bridge(double seconds);
 
-  /// Difference between a measured and the predicted value of `direction . (u + w x at)`.
+  /// Updates with a velocity component: `residual_mps` = measured - predicted value of
+  /// `direction . (u + w x at)`; `direction` unit, `at` [m].
   void add_velocity(const Eigen::Vector3d& direction, const Eigen::Vector3d& at,
                     double residual_mps, double sigma_mps);
-  /// Speed along `forward` at `at`: what the wheels measured, and what was thought then.
+  /// Updates with the speed along `forward` at `at` [m]: predicted without the wheels' scale, and
+  /// as the wheels measured it.
   void add_wheel_speed(const Eigen::Vector3d& forward, const Eigen::Vector3d& at,
-                       double thought_mps, double measured_mps, double sigma_mps);
-  /// Velocity zero, and rate zero: the gyro shows its bias.
+                       double predicted_mps, double measured_mps, double sigma_mps);
+  /// Velocity and true rate are zero: the gyro (`rate` [rad/s]) shows its bias. `seconds`: since
+  /// the sample before.
   void add_standstill(const Eigen::Vector3d& rate, double seconds, double velocity_sigma_mps);
 
   /// Vehicle to level: Ry(pitch) Rx(roll).
   Eigen::Quaterniond level_Q_vehicle() const;
   /// Of (roll, pitch) [rad^2].
   Eigen::Matrix2d tilt_covariance() const;
-  /// Of the error of (roll, pitch): how it goes on from the last mark_level().
+  /// How the error of (roll, pitch) goes on from the last mark_level(): its covariance, and what it
+  /// has in common with the error then.
   model::LevelError level_since_mark() const;
+  /// Remembers the level's error of now for level_since_mark().
   void mark_level();
-  /// By how much corrections of roll and pitch have turned the heading of the level since the last
-  /// mark: on a slope they do. What is levelled by it turns alike.
+  /// By how much corrections of roll and pitch have rotated the heading of the level since the last
+  /// mark [rad]: on a slope they do. What is levelled by it rotates alike.
   double twist_since_mark_rad() const { return twist_rad_; }
   const Eigen::Vector3d& velocity() const { return velocity_; }  ///< Frame vehicle.
+  /// Of velocity() [m^2/s^2].
   Eigen::Matrix3d velocity_covariance() const { return covariance_.block<3, 3>(3, 3); }
-  const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }
-  const Eigen::Vector3d& force_bias() const { return force_bias_; }
-  double wheel_scale() const { return wheel_scale_; }
+  const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }  ///< [rad/s]
+  double wheel_scale() const { return wheel_scale_; }              ///< Measured over true speed.
   double wheel_scale_sigma() const { return std::sqrt(covariance_(12, 12)); }
+  /// Of gyro_bias() [rad^2/s^2].
   Eigen::Matrix3d gyro_bias_covariance() const { return covariance_.block<3, 3>(6, 6); }
 
   /// For saving and loading: what changes while it runs.
@@ -79,9 +89,6 @@ class AttitudeFilter {
  private:
   using Row = Eigen::Matrix<double, 1, 13>;
   void update(const Row& row, double residual, double variance);
-  /// (Roll, pitch) of an error of the attitude.
-  Eigen::Matrix<double, 2, 3> level_of_attitude() const;
-  double pitch_tangent() const;
 
   ImuParameters imu_;
   Eigen::Quaterniond world_Q_vehicle_;

@@ -3,18 +3,20 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "services/lidar_imu_input/stamps.hpp"
+
 namespace understory::lidar_imu_input {
 namespace {
 
 constexpr double kStartSpeed_mps = 10.0;
 constexpr double kBridgeSpeed = 2.0;  // m/s per square root of a second
 
-double square(double value) { return value * value; }
 Eigen::Matrix2d rotation_of(double angle) { return Eigen::Rotation2Dd(angle).toRotationMatrix(); }
 
-const Eigen::Matrix2d& quarter_turn() {
-  static const Eigen::Matrix2d turn = (Eigen::Matrix2d() << 0.0, -1.0, 1.0, 0.0).finished();
-  return turn;
+/// Rotation by +90 degrees.
+const Eigen::Matrix2d& quarter_rotation() {
+  static const Eigen::Matrix2d rotation = (Eigen::Matrix2d() << 0.0, -1.0, 1.0, 0.0).finished();
+  return rotation;
 }
 
 }  // namespace
@@ -26,13 +28,16 @@ DeadReckoning::DeadReckoning(const ImuParameters& imu) : imu_(imu) {
 
 void DeadReckoning::propagate(const LevelSample& a, const LevelSample& b) {
   const double dt = static_cast<double>(b.utime - a.utime) * 1e-6;
+
+  // Mean rate and force, both ends rotated to the middle of the step.
   const double rate = 0.5 * (a.yaw_rate_rad_s + b.yaw_rate_rad_s) - bias_(0);
   const Eigen::Matrix2d back = rotation_of(-0.5 * rate * dt);
   const Eigen::Vector2d force_bias = bias_.tail<2>();
   const Eigen::Vector2d force =
       0.5 * (back * (a.force_mps2 - force_bias) + back.transpose() * (b.force_mps2 - force_bias));
 
-  const Eigen::Matrix2d& turn = quarter_turn();
+  // Transition of the error (pose, velocity, bias).
+  const Eigen::Matrix2d& turn = quarter_rotation();
   const Eigen::Vector2d velocity_turned = geometry::perpendicular(velocity_);
   Covariance step = Covariance::Identity();
   step.block<2, 2>(0, 0) -= rate * dt * turn;
@@ -43,6 +48,7 @@ void DeadReckoning::propagate(const LevelSample& a, const LevelSample& b) {
   step.block<2, 1>(3, 5) = velocity_turned * dt;
   step.block<2, 2>(3, 6) = -Eigen::Matrix2d::Identity() * dt;
 
+  // Noise: an error of the rate moves heading and velocity together.
   const bool saturated = a.is_saturated || b.is_saturated;
   const double gyro = square(saturated ? imu_.saturation_gyro_noise : imu_.gyro_noise) +
                       square(imu_.gyro_scale_sigma * rate);
@@ -57,6 +63,7 @@ void DeadReckoning::propagate(const LevelSample& a, const LevelSample& b) {
   covariance_(5, 5) += square(imu_.gyro_bias_walk) * dt;
   covariance_.block<2, 2>(6, 6).diagonal().array() += square(imu_.force_bias_walk) * dt;
 
+  // The motion itself.
   const Eigen::Vector2d moved = velocity_ * dt + 0.5 * dt * dt * (back.transpose() * force);
   pose_ = pose_ * geometry::SE2(moved, rate * dt);
   velocity_ = back * (back * velocity_ + force * dt);
@@ -74,11 +81,15 @@ void DeadReckoning::bridge(const geometry::SE2WithCovariance& motion) {
 void DeadReckoning::update(const Row& row, double residual, double variance, bool moves_heading) {
   const Eigen::Matrix<double, 8, 1> spread = covariance_ * row.transpose();
   const double total = row.dot(spread) + variance;
+
+  // The position never jumps, the heading only where it is measured: a gain that is not optimal
+  // needs Joseph's form.
   Eigen::Matrix<double, 8, 1> gain = spread / total;
   gain.head<2>().setZero();
   if (!moves_heading) gain(2) = 0.0;
   const Covariance left = Covariance::Identity() - gain * row;
   covariance_ = left * covariance_ * left.transpose() + variance * gain * gain.transpose();
+
   if (moves_heading) pose_ = geometry::SE2(pose_.translation(), pose_.theta() + gain(2) * residual);
   velocity_ += gain.segment<2>(3) * residual;
   bias_ += gain.segment<3>(5) * residual;

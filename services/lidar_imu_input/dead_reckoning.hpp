@@ -11,39 +11,44 @@
 namespace understory::lidar_imu_input {
 
 /// Pose (in `odom`), velocity (in `vehicle_level`) and biases from levelled samples. The pose
-/// drifts and never jumps: measurements move velocity and biases only; that pose errors are
-/// correlated with them is kept in the covariance.
+/// drifts and never jumps: measurements change velocity and biases only; the correlation of pose
+/// errors with them is kept in the covariance.
 class DeadReckoning {
  public:
-  /// Of pose (right perturbation, tangent order), velocity, bias.
+  /// Of pose (right perturbation, tangent order), velocity [m/s], bias (order of InertialBias).
   using Covariance = Eigen::Matrix<double, 8, 8>;
 
+  /// Starts at the origin of `odom` with unknown velocity and the biases' prior.
   explicit DeadReckoning(const ImuParameters& imu);
 
   /// From sample a to sample b, trapezoidal rule.
   void propagate(const LevelSample& a, const LevelSample& b);
-  /// Motion over a time that no sample covers.
+  /// Motion over a time that no sample covers, in frame `vehicle_level`.
   void bridge(const geometry::SE2WithCovariance& motion);
-  /// direction . (velocity + yaw rate x at) differs from what was measured by `residual`.
+  /// Updates with a velocity component: `residual_mps` = measured - predicted value of
+  /// direction . (velocity + yaw rate x at); `direction` unit, `at` [m].
   void add_velocity(const Eigen::Vector2d& direction, const Eigen::Vector2d& at,
                     double residual_mps, double sigma_mps);
-  /// Velocity is zero; the gyro bias comes from elsewhere.
+  /// The velocity is zero; the gyro's bias comes by set_gyro_bias().
   void add_standstill(double velocity_sigma_mps);
-  /// The heading is off by `residual` (GNSS aided only: the heading jumps).
+  /// Updates with a heading: `residual_rad` = measured - predicted (GNSS aided only: the heading
+  /// jumps).
   void add_heading(double residual_rad, double sigma_rad);
+  /// The bias of the yaw rate becomes this one, independent of everything else.
   void set_gyro_bias(double bias_rad_s, double sigma_rad_s);
-  /// Velocity and biases become the filter's. `then_velocity`, `then_heading`: what was thought at
-  /// the correction's stamp; the difference is carried to now.
+  /// Velocity and biases become the filter's. `then_velocity` [m/s], `then_heading` [rad]: the dead
+  /// reckoning's own at the correction's stamp; the difference is carried to now.
   void correct(const model::VelocityCorrection& correction, const Eigen::Vector2d& then_velocity,
                double then_heading);
 
-  const geometry::SE2& pose() const { return pose_; }
+  const geometry::SE2& pose() const { return pose_; }  ///< odom_T_vehicle.
+  /// Of pose(): tangent order, right perturbation.
   Eigen::Matrix3d pose_covariance() const { return covariance_.topLeftCorner<3, 3>(); }
-  const Eigen::Vector2d& velocity() const { return velocity_; }
+  const Eigen::Vector2d& velocity() const { return velocity_; }  ///< Frame vehicle_level [m/s].
+  /// Of velocity() [m^2/s^2].
   Eigen::Matrix2d velocity_covariance() const { return covariance_.block<2, 2>(3, 3); }
+  /// Of yaw rate [rad/s] and force along level x, y [m/s^2].
   const model::InertialBias& bias() const { return bias_; }
-
-  void set_pose(const geometry::SE2& pose) { pose_ = pose; }
 
   /// For saving and loading: what changes while it runs.
   template <class Archive, class Self>
@@ -56,7 +61,7 @@ class DeadReckoning {
   void update(const Row& row, double residual, double variance, bool moves_heading);
 
   ImuParameters imu_;
-  geometry::SE2 pose_;
+  geometry::SE2 pose_;  ///< odom_T_vehicle.
   Eigen::Vector2d velocity_ = Eigen::Vector2d::Zero();
   model::InertialBias bias_ = model::InertialBias::Zero();
   Covariance covariance_ = Covariance::Zero();

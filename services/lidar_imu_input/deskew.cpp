@@ -11,13 +11,12 @@
 namespace understory::lidar_imu_input {
 namespace {
 
-constexpr float kStep_s = 1e-3F;  // between exact poses; in between they are mixed
-
-constexpr float kLongestTurn_s = 1.0F;
+constexpr float kStep_s = 1e-3F;  // between exact poses; in between they are interpolated
+constexpr float kLongestRevolution_s = 1.0F;
 
 using Motion = Eigen::Matrix<float, 3, 4>;
 
-/// target_T_sensor at steps of kStep_s over the turn.
+/// target_T_sensor at steps of kStep_s over the revolution.
 std::vector<Motion> motions(const model::PointSweep& raw, const MotionState& target,
                             const MotionHistory& history, const SensorMount& mount,
                             std::size_t steps) {
@@ -28,6 +27,7 @@ std::vector<Motion> motions(const model::PointSweep& raw, const MotionState& tar
     odom_T_vehicle.translation() = state.position_m;
     return odom_T_vehicle;
   };
+
   const Eigen::Isometry3d target_T_odom = pose(target).inverse();
   std::vector<Motion> result;
   result.reserve(steps);
@@ -54,7 +54,7 @@ std::size_t remove_bad_points(model::PointSweep& sweep, double min_range_m) {
   const auto least = static_cast<float>(min_range_m * min_range_m);
   std::erase_if(sweep.points, [&](const model::SweepPoint& p) {
     const float sum = p.x_m * p.x_m + p.y_m * p.y_m + p.z_m * p.z_m;
-    const bool good = std::isfinite(sum) && p.time_s >= 0.0F && p.time_s <= kLongestTurn_s;
+    const bool good = std::isfinite(sum) && p.time_s >= 0.0F && p.time_s <= kLongestRevolution_s;
     if (!good) ++bad;
     return !good || sum < least;
   });
@@ -77,25 +77,11 @@ void times_from_azimuth(model::PointSweep& sweep, double revolution_s, bool cloc
   sweep.has_times = true;
 }
 
-DeskewedSweep deskew(model::PointSweep raw, model::Utime utime, const MotionHistory& history,
-                     const SensorMount& mount) {
-  DeskewedSweep result;
-  const auto known = history.at(utime);
-  const MotionState target = known.value_or(MotionState{});
-  result.had_motion = known && raw.has_times && history.at(raw.utime);
+namespace {
 
-  const auto last_s =
-      static_cast<float>(static_cast<double>(end_of_revolution(raw) - raw.utime) * 1e-6);
-  const auto steps = static_cast<std::size_t>(std::max(0.0F, last_s) / kStep_s) + 2;
-  const MotionHistory still;
-  const std::vector<Motion> table =
-      motions(raw, target, result.had_motion ? history : still, mount, steps);
-  const auto shift_s = static_cast<float>(static_cast<double>(utime - raw.utime) * 1e-6);
-  // In place: a turn of many beams is megabytes.
-  model::PointSweep& sweep = result.sweep;
-  sweep = std::move(raw);
-  sweep.utime = utime;
-  sweep.is_deskewed = true;
+/// Moves each point between the two steps that its time lies between.
+void move_points(model::PointSweep& sweep, const std::vector<Motion>& table, float shift_s) {
+  const std::size_t steps = table.size();
   for (model::SweepPoint& point : sweep.points) {
     const float at = std::clamp(point.time_s / kStep_s, 0.0F, static_cast<float>(steps) - 1.001F);
     const auto step = static_cast<std::size_t>(at);
@@ -109,14 +95,43 @@ DeskewedSweep deskew(model::PointSweep raw, model::Utime utime, const MotionHist
     point.z_m = moved.z();
     if (sweep.has_times) point.time_s = std::min(0.0F, point.time_s - shift_s);
   }
+}
+
+/// Roll and pitch of a state.
+model::Attitude attitude_of(const MotionState& state) {
+  const RollPitchYaw angles = roll_pitch_yaw(state.odom_Q_vehicle);
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(angles.pitch_rad, Eigen::Vector3d::UnitY()) *
+                             Eigen::AngleAxisd(angles.roll_rad, Eigen::Vector3d::UnitX())),
+          state.tilt_covariance};
+}
+
+}  // namespace
+
+DeskewedSweep deskew(model::PointSweep raw, model::Utime utime, const MotionHistory& history,
+                     const SensorMount& mount) {
+  DeskewedSweep result;
+  const auto known = history.at(utime);
+  const MotionState target = known.value_or(MotionState{});
+  result.had_motion = known && raw.has_times && history.at(raw.utime);
+
+  // Where the sensor was, millisecond by millisecond.
+  const auto last_s =
+      static_cast<float>(static_cast<double>(end_of_revolution(raw) - raw.utime) * 1e-6);
+  const auto steps = static_cast<std::size_t>(std::max(0.0F, last_s) / kStep_s) + 2;
+  const MotionHistory still;
+  const std::vector<Motion> table =
+      motions(raw, target, result.had_motion ? history : still, mount, steps);
+  const auto shift_s = static_cast<float>(static_cast<double>(utime - raw.utime) * 1e-6);
+
+  // In place: a revolution of many beams is megabytes.
+  model::PointSweep& sweep = result.sweep;
+  sweep = std::move(raw);
+  sweep.utime = utime;
+  sweep.is_deskewed = true;
+  move_points(sweep, table, shift_s);
+
   sweep.sensor_position_m = mount.position_m();
-  if (known) {
-    const RollPitchYaw angles = roll_pitch_yaw(known->odom_Q_vehicle);
-    sweep.attitude = model::Attitude{
-        Eigen::Quaterniond(Eigen::AngleAxisd(angles.pitch_rad, Eigen::Vector3d::UnitY()) *
-                           Eigen::AngleAxisd(angles.roll_rad, Eigen::Vector3d::UnitX())),
-        known->tilt_covariance};
-  }
+  if (known) sweep.attitude = attitude_of(*known);
   return result;
 }
 

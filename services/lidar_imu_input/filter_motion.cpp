@@ -1,20 +1,19 @@
 #include "services/lidar_imu_input/filter_motion.hpp"
 
+#include "services/lidar_imu_input/stamps.hpp"
+
 namespace understory::lidar_imu_input {
 namespace {
 
 constexpr std::uint32_t kFewLandmarks = 3;
 
-double seconds_between(model::Utime from, model::Utime to) {
-  return static_cast<double>(to - from) * 1e-6;
-}
-
 }  // namespace
 
 void FilterMotion::add(const model::EkfPose& pose) {
   const geometry::SE2& at = pose.ekf_map_T_vehicle;
-  // A filter that sees nothing only says what it thought before.
+  // A filter without landmarks only predicts.
   if (!at.coordinates().allFinite() || pose.landmarks_used < kFewLandmarks) return;
+
   const bool begins =
       pose.reset_counter != reset_counter_ ||
       (!poses_.empty() && pose.utime <= poses_.back().utime) ||
@@ -29,14 +28,16 @@ void FilterMotion::add(const model::EkfPose& pose) {
 
 std::optional<MotionState> FilterMotion::at(model::Utime stamp) const {
   if (poses_.size() < 2) return std::nullopt;
+
   const Pose& first = poses_.front();
   const Pose& last = poses_.back();
   const double ago_s = seconds_between(last.utime, stamp);
   const double seconds = seconds_between(first.utime, last.utime);
   if (ago_s < 0.0 || ago_s > kLongest_s || seconds < 0.5 * kBaseline_s) return std::nullopt;
-  const geometry::SE2 way = geometry::SE2(first.x_m, first.y_m, first.heading_rad).inverse() *
-                            geometry::SE2(last.x_m, last.y_m, last.heading_rad);
-  const Eigen::Vector3d twist = way.Log() / seconds;
+
+  const geometry::SE2 moved = geometry::SE2(first.x_m, first.y_m, first.heading_rad).inverse() *
+                              geometry::SE2(last.x_m, last.y_m, last.heading_rad);
+  const Eigen::Vector3d twist = moved.Log() / seconds;
   MotionState state;
   state.utime = stamp;
   state.velocity_mps << twist.x(), twist.y(), 0.0;

@@ -1,6 +1,7 @@
 // What can be wrong with a sensor's messages.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 

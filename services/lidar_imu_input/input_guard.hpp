@@ -35,8 +35,8 @@ class InputGuard {
   std::optional<model::Utime> last(Sensor sensor) const { return state(sensor).clock.last(); }
   /// It has sent something, and has not gone silent.
   bool is_live(Sensor sensor) const;
-  /// Whether nothing is to be expected any more from IMU and wheels for the time up to `utime`: both
-  /// have reached it or are silent, or it is more than `max_wait_s` ago.
+  /// Whether nothing is to be expected any more from IMU and wheels for the time up to `utime`:
+  /// both have reached it or are silent, or it is more than `max_wait_s` ago.
   bool has_motion_until(model::Utime utime, double max_wait_s) const;
   /// Whether the sensor has sent anything yet.
   bool has_spoken(Sensor sensor) const { return state(sensor).clock.last().has_value(); }
@@ -69,8 +69,8 @@ class InputGuard {
   FaultParameters parameters_;
   ImuParameters imu_;
   std::vector<State> states_;
-  std::optional<model::ImuSample> same_since_;  ///< First one of those that are the same.
-  bool is_frozen_ = false;                      ///< The IMU: reported.
+  std::optional<model::ImuSample> same_since_;   ///< First one of those that are the same.
+  bool is_frozen_ = false;                       ///< The IMU: reported.
   std::vector<model::SweepPoint> first_points_;  ///< Of the latest sweep.
 };
 

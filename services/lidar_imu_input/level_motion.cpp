@@ -16,7 +16,8 @@ void step(model::Preintegration& sum, const LevelSample& a, const LevelSample& b
           const ImuParameters& imu) {
   const double dt = seconds_between(a.utime, b.utime);
   const double rate = 0.5 * (a.yaw_rate_rad_s + b.yaw_rate_rad_s) - sum.bias(0);
-  // Both ends' forces, turned to the middle of the step.
+
+  // Both ends' forces, rotated to the middle of the step.
   const Eigen::Matrix2d back = rotation_of(-0.5 * rate * dt);
   const Eigen::Vector2d force_bias = sum.bias.tail<2>();
   const Eigen::Vector2d force =
@@ -25,12 +26,13 @@ void step(model::Preintegration& sum, const LevelSample& a, const LevelSample& b
   const Eigen::Vector2d acceleration = middle * force;
   const Eigen::Vector2d turned = geometry::perpendicular(acceleration);
 
+  // Transition of the error (yaw, velocity, position).
   Eigen::Matrix<double, 5, 5> forward = Eigen::Matrix<double, 5, 5>::Identity();
   forward.block<2, 1>(1, 0) = turned * dt;
   forward.block<2, 1>(3, 0) = 0.5 * turned * dt * dt;
   forward.block<2, 2>(3, 1) = Eigen::Matrix2d::Identity() * dt;
 
-  // Of the step's mean rate and force (the force turns by half of the step's own turn).
+  // Of the step's mean rate and force (the force rotates by half of the step's own rotation).
   Eigen::Matrix<double, 5, 3> input = Eigen::Matrix<double, 5, 3>::Zero();
   input(0, 0) = dt;
   input.block<2, 1>(1, 0) = 0.5 * turned * dt * dt;
@@ -38,6 +40,7 @@ void step(model::Preintegration& sum, const LevelSample& a, const LevelSample& b
   input.block<2, 2>(1, 1) = middle * dt;
   input.block<2, 2>(3, 1) = 0.5 * middle * dt * dt;
 
+  // Noise of rate and force over the step.
   const bool saturated = a.is_saturated || b.is_saturated;
   const double gyro = square(saturated ? imu.saturation_gyro_noise : imu.gyro_noise) +
                       square(imu.gyro_scale_sigma * rate);
@@ -54,7 +57,7 @@ void step(model::Preintegration& sum, const LevelSample& a, const LevelSample& b
   sum.seconds += dt;
 }
 
-/// The IMU's place is taken out with the rate at both ends: their noise, times the lever, is noise
+/// The IMU's lever is taken out with the rate at both ends: their noise, times the lever, is noise
 /// of the velocity there; that of the start moves the end's position.
 void add_lever_noise(model::Preintegration& sum, const ImuParameters& imu) {
   const double at_end = square(imu.gyro_noise) / kLeverBaseline_s *
@@ -64,6 +67,38 @@ void add_lever_noise(model::Preintegration& sum, const ImuParameters& imu) {
   sum.covariance.block<2, 2>(1, 3) += sum.seconds * one;
   sum.covariance.block<2, 2>(3, 1) += sum.seconds * one;
   sum.covariance.block<2, 2>(3, 3) += square(sum.seconds) * one;
+}
+
+/// Speed and yaw rate over one step.
+struct DriveStep {
+  double seconds = 0.0;
+  double speed_mps = 0.0;
+  double rate_rad_s = 0.0;
+  bool is_saturated = false;
+};
+
+/// Motion of the axle's middle over one step. Errors that last for a time tau and act for
+/// dt << tau have the power tau * dt.
+geometry::SE2WithCovariance driven(const DriveStep& step, double scale_sigma,
+                                   const LidarImuInputParameters& parameters,
+                                   const YawRateBias& bias) {
+  const WheelNoise& noise = parameters.wheels.noise;
+  const double dt = step.seconds;
+  const double speed = step.speed_mps;
+  const double power = dt * noise.correlation_time_s;
+  const double gyro =
+      step.is_saturated ? parameters.imu.saturation_gyro_noise : parameters.imu.gyro_noise;
+  const double stationary = square(noise.standstill_sigma_m) * dt;
+
+  geometry::SE2WithCovariance increment{geometry::SE2::Exp({speed * dt, 0.0, step.rate_rad_s * dt}),
+                                        Eigen::Matrix3d::Zero()};
+  increment.covariance(0, 0) = square(speed * scale_sigma) * power + stationary;
+  increment.covariance(1, 1) = square(speed * noise.side_slip_sigma) * power + stationary;
+  increment.covariance(2, 2) =
+      square(gyro) * dt +
+      (square(bias.sigma_rad_s) + square(step.rate_rad_s * parameters.imu.gyro_scale_sigma)) *
+          power;
+  return increment;
 }
 
 }  // namespace
@@ -90,6 +125,7 @@ std::optional<std::deque<LevelSample>> LevelSamples::between(model::Utime from,
                                                              model::Utime to) const {
   if (samples_.empty() || samples_.front().utime > from || samples_.back().utime < to || to <= from)
     return std::nullopt;
+
   std::deque<LevelSample> result;
   auto next = std::ranges::upper_bound(samples_, from, {}, &LevelSample::utime);
   const auto gap = [this](const LevelSample& a, const LevelSample& b) {
@@ -122,35 +158,27 @@ std::optional<geometry::SE2WithCovariance> drive(const std::deque<LevelSample>& 
   const model::Utime from = samples.front().utime;
   const model::Utime to = samples.back().utime;
   if (!speeds.cover(from, to)) return std::nullopt;
-  const WheelNoise& noise = parameters.wheels.noise;
+
+  // Motion of the axle's middle.
   geometry::SE2WithCovariance motion;
   for (std::size_t i = 0; i + 1 < samples.size(); ++i) {
     const LevelSample& a = samples[i];
     const LevelSample& b = samples[i + 1];
-    const double dt = seconds_between(a.utime, b.utime);
     const double rate = 0.5 * (a.yaw_rate_rad_s + b.yaw_rate_rad_s) - bias.bias_rad_s;
-    const double speed = 0.5 * (speeds.at(a.utime) + speeds.at(b.utime)) * 0.5 *
-                         (a.pitch_cosine + b.pitch_cosine);
-    // Errors that last for a time tau and act for dt << tau have the power tau * dt.
-    const double power = dt * noise.correlation_time_s;
-    const bool saturated = a.is_saturated || b.is_saturated;
-    const double gyro =
-        saturated ? parameters.imu.saturation_gyro_noise : parameters.imu.gyro_noise;
-    geometry::SE2WithCovariance increment{geometry::SE2::Exp({speed * dt, 0.0, rate * dt}),
-                                          Eigen::Matrix3d::Zero()};
-    const double stand = square(noise.standstill_sigma_m) * dt;
-    increment.covariance(0, 0) = square(speed * speeds.latest().scale_sigma) * power + stand;
-    increment.covariance(1, 1) = square(speed * noise.side_slip_sigma) * power + stand;
-    increment.covariance(2, 2) =
-        square(gyro) * dt +
-        (square(bias.sigma_rad_s) + square(rate * parameters.imu.gyro_scale_sigma)) * power;
-    motion = compound(motion, increment);
+    const double speed =
+        0.5 * (speeds.at(a.utime) + speeds.at(b.utime)) * 0.5 * (a.pitch_cosine + b.pitch_cosine);
+    const DriveStep step{seconds_between(a.utime, b.utime), speed, rate,
+                         a.is_saturated || b.is_saturated};
+    motion = compound(motion, driven(step, speeds.latest().scale_sigma, parameters, bias));
   }
+
   // Each end of the interval is off by the stamps' jitter; the gyro's yaw is not the wheels'.
   Eigen::Vector3d twist = motion.mean.Log() / seconds_between(from, to);
   twist.z() = 0.0;
-  motion.covariance += 2.0 * square(noise.stamp_sigma_s) * twist * twist.transpose();
+  motion.covariance +=
+      2.0 * square(parameters.wheels.noise.stamp_sigma_s) * twist * twist.transpose();
 
+  // The same motion of frame vehicle.
   const geometry::SE2& axle_T_vehicle = parameters.wheels.car.axle_T_vehicle;
   const geometry::SE2 vehicle_T_axle = axle_T_vehicle.inverse();
   const Eigen::Matrix3d adjoint = vehicle_T_axle.Adjoint();

@@ -11,29 +11,33 @@
 
 namespace understory::lidar_imu_input {
 
-/// One sample of the IMU after levelling: nothing subtracted but gravity.
+/// One sample of the IMU after levelling: nothing is subtracted but gravity.
 struct LevelSample {
   model::Utime utime = 0;
   double yaw_rate_rad_s = 0.0;                           ///< Of the heading.
   Eigen::Vector2d force_mps2 = Eigen::Vector2d::Zero();  ///< Along level x and y.
-  double pitch_cosine = 1.0;
-  bool is_saturated = false;
+  double pitch_cosine = 1.0;                             ///< Of the vehicle.
+  bool is_saturated = false;                             ///< Samples before it were left out.
 
+  /// For saving and loading.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.utime, self.yaw_rate_rad_s, self.force_mps2, self.pitch_cosine, self.is_saturated);
   }
 };
 
-/// The sample at `utime`, between its two neighbours in proportion to time.
+/// The sample at `utime`, between its two neighbours in proportion to time; saturated where either
+/// is.
 LevelSample interpolate(const LevelSample& before, const LevelSample& after, model::Utime utime);
 
-/// Recent levelled samples, asked for the stretch between two stamps.
+/// Recent levelled samples, asked for the interval between two stamps. Invariant: in order of time.
 class LevelSamples {
  public:
+  /// `max_gap_s`: samples farther apart are not joined.
   explicit LevelSamples(double max_gap_s) : max_gap_s_(max_gap_s) {}
+
+  /// Precondition: not before the latest one.
   void add(const LevelSample& sample) { samples_.push_back(sample); }
-  void clear() { samples_.clear(); }
   /// Keeps what is needed from `utime` on.
   void forget_before(model::Utime utime);
   /// Samples at `from`, all in between, and at `to`; none where a gap or an end is in between.
@@ -51,18 +55,25 @@ class LevelSamples {
 };
 
 /// Integrates samples (the first at the start, the last at the end of the interval) with the
-/// trapezoidal rule. Noise: that of the samples and of the level.
+/// trapezoidal rule. `bias`: taken out, and what the Jacobian is about. Noise: that of the samples,
+/// of the level and of the lever.
 model::Preintegration preintegrate(const std::deque<LevelSample>& samples, const ImuParameters& imu,
                                    const model::InertialBias& bias);
 
-/// How well the gyro's bias is known.
+/// Bias of the gyro's yaw rate, and how well it is known.
 struct YawRateBias {
   double bias_rad_s = 0.0;
   double sigma_rad_s = 0.0;
+
+  /// For saving and loading.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.bias_rad_s, self.sigma_rad_s);
+  }
 };
 
-/// Motion of the vehicle from the wheels' speed and the gyro's yaw rate over the same samples.
-/// `speeds`: covers the interval; the last one holds. None where it does not.
+/// Motion of frame `vehicle` from the wheels' speed and the gyro's yaw rate over the samples (first
+/// and last at the interval's ends). None where the speeds do not cover the interval.
 std::optional<geometry::SE2WithCovariance> drive(const std::deque<LevelSample>& samples,
                                                  const WheelSpeeds& speeds,
                                                  const LidarImuInputParameters& parameters,

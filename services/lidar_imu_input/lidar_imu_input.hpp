@@ -2,8 +2,8 @@
 //
 // An increment of ODOMETRY ends exactly at the stamp of each published sweep or scan and is
 // published before it; in between, increments end at most `max_increment_s` apart. So a sweep waits
-// until the IMU and the wheels have reached its end, but no longer than `max_wait_s` of the sensors'
-// own time.
+// until the IMU and the wheels have reached its end, but no longer than `max_wait_s` of the
+// sensors' own time.
 #pragma once
 
 #include <optional>
@@ -64,7 +64,7 @@ class LidarImuInput {
   InputResults add(const model::ImuSample& raw);    ///< RAW_IMU, frame sensor.
   InputResults add(const model::WheelSample& raw);  ///< RAW_WHEELS.
   InputResults add(const model::GnssFix& raw);      ///< RAW_GNSS.
-  InputResults add(model::PointSweep sweep);  ///< RAW_SWEEP, a whole revolution, frame sensor.
+  InputResults add(model::PointSweep sweep);       ///< RAW_SWEEP, a whole revolution, frame sensor.
   InputResults add(const model::PlanarScan& raw);  ///< RAW_SCAN.
   InputResults add(const model::VelocityCorrection& correction);  ///< VELOCITY_CORRECTION.
   /// EKF_POSE: where no sensor measures the motion, sweeps are de-skewed by the filter's.
@@ -110,7 +110,7 @@ class LidarImuInput {
   RawPosePacer raw_poses_;
   CalibrationWatch calibration_;
   std::optional<model::Utime> resumed_from_;  ///< After loading, until a sensor sends something.
-  bool was_saturated_ = false;  ///< The latest sample of the IMU; it was left out.
+  bool was_saturated_ = false;                ///< The latest sample of the IMU; it was left out.
 };
 
 }  // namespace understory::lidar_imu_input

@@ -4,19 +4,20 @@
 int main(int argc, char** argv) {
   return understory::bus::run_service(
       understory::lidar_imu_input::lidar_imu_input_service({
-          .raw_imu = "RAW_IMU",                          // in: rate and force, frame sensor
-          .raw_wheels = "RAW_WHEELS",                    // in: speed and steering
-          .raw_gnss = "RAW_GNSS",                        // in: fixes, for reference
-          .raw_sweep = "RAW_SWEEP",                      // in: turns of the laser, skewed, in parts
-          .raw_scan = "RAW_SCAN",                        // in: turns of a one-plane laser
-          .velocity_correction = "VELOCITY_CORRECTION",  // in: the filter's word on RAW_POSE
-          .imu = "IMU",                                  // out: frame vehicle
-          .wheels = "WHEELS",                            // out: checked
-          .gnss = "GNSS",                                // out: checked
-          .odometry = "ODOMETRY",                        // out: motion that no landmark touched
-          .raw_pose = "RAW_POSE",                        // out: dead reckoning
-          .lidar_sweep = "LIDAR_SWEEP",                  // out: de-skewed, with attitude, in parts
-          .lidar_scan = "LIDAR_SCAN",                    // out: as they are
+          .raw_imu = "RAW_IMU",        // in: rate and force, frame sensor
+          .raw_wheels = "RAW_WHEELS",  // in: speed and steering
+          .raw_gnss = "RAW_GNSS",      // in: fixes, for reference
+          .raw_sweep = "RAW_SWEEP",    // in: sweeps of the laser, skewed, in parts
+          .raw_scan = "RAW_SCAN",      // in: scans of a one-plane laser
+          .velocity_correction = "VELOCITY_CORRECTION",  // in: the filter's correction of RAW_POSE
+          .ekf_pose = "EKF_POSE",        // in: the filter's motion, for a laser alone
+          .imu = "IMU",                  // out: frame vehicle
+          .wheels = "WHEELS",            // out: checked
+          .gnss = "GNSS",                // out: checked
+          .odometry = "ODOMETRY",        // out: motion without landmarks
+          .raw_pose = "RAW_POSE",        // out: dead reckoning
+          .lidar_sweep = "LIDAR_SWEEP",  // out: de-skewed, with attitude, in parts
+          .lidar_scan = "LIDAR_SCAN",    // out: as they are
       }),
       argc, argv);
 }

@@ -130,9 +130,8 @@ void MotionEstimator::add_gnss(const model::GnssFix& fix) {
                                    level(axis) - then->level_velocity_mps(axis),
                                    reference->sigma_mps);
   if (reference->heading_rad)
-    pose_.reckoning().add_heading(
-        geometry::wrap_angle(*reference->heading_rad - then->heading_rad),
-        reference->heading_sigma_rad);
+    pose_.reckoning().add_heading(geometry::wrap_angle(*reference->heading_rad - then->heading_rad),
+                                  reference->heading_sigma_rad);
 }
 
 bool MotionEstimator::add_correction(const model::VelocityCorrection& correction) {
@@ -153,8 +152,8 @@ void MotionEstimator::use_corrections(model::Utime now) {
 
 std::optional<model::Odometry> MotionEstimator::increment(model::Utime from, model::Utime to) {
   std::optional<AttitudeFilter>& attitude = levelling_.attitude();
-  const auto odometry =
-      increments_.make(from, to, {attitude ? &*attitude : nullptr, speeds_, history(), stationary_});
+  const auto odometry = increments_.make(
+      from, to, {attitude ? &*attitude : nullptr, speeds_, history(), stationary_});
   // Where no sample of the IMU has moved the pose, it goes on with the wheels.
   if (odometry && !odometry->inertial) pose_.follow_wheels(*odometry);
   return odometry;

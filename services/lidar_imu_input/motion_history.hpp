@@ -1,4 +1,4 @@
-// Where the vehicle was lately, for points and messages that are older than now.
+// Where the vehicle was during the last seconds, for points and messages that are older than now.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -9,6 +9,7 @@
 
 namespace understory::lidar_imu_input {
 
+/// Pose and velocity at one time.
 struct MotionState {
   model::Utime utime = 0;
   Eigen::Quaterniond odom_Q_vehicle = Eigen::Quaterniond::Identity();
@@ -16,9 +17,10 @@ struct MotionState {
   Eigen::Vector3d velocity_mps = Eigen::Vector3d::Zero();  ///< Frame vehicle, free of landmarks.
   Eigen::Vector2d level_velocity_mps = Eigen::Vector2d::Zero();  ///< Of the dead reckoning.
   Eigen::Vector3d rate_rad_s = Eigen::Vector3d::Zero();          ///< Frame vehicle, bias taken out.
-  double heading_rad = 0.0;
-  Eigen::Matrix2d tilt_covariance = Eigen::Matrix2d::Zero();
+  double heading_rad = 0.0;                                      ///< In `odom`.
+  Eigen::Matrix2d tilt_covariance = Eigen::Matrix2d::Zero();     ///< Of (roll, pitch) [rad^2].
 
+  /// For saving and loading.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.utime, self.odom_Q_vehicle, self.position_m, self.velocity_mps, self.level_velocity_mps,
@@ -26,16 +28,17 @@ struct MotionState {
   }
 };
 
-/// The last seconds, in order of time.
+/// States of the last `kKept_s`. Invariant: in order of time.
 class MotionHistory {
  public:
+  /// Precondition: after the newest one.
   void add(const MotionState& state);
   bool empty() const { return states_.empty(); }
-  const MotionState& newest() const { return states_.back(); }
-  const MotionState& oldest() const { return states_.front(); }
-  /// Between two states in proportion to time; after the last one that one, moved on at its
-  /// velocity and rate, before the first that one, moved as between those soon after; for no longer
-  /// than `kMostExtrapolation_s`. None while empty or farther off.
+  const MotionState& newest() const { return states_.back(); }   ///< Precondition: not empty.
+  const MotionState& oldest() const { return states_.front(); }  ///< Precondition: not empty.
+  /// The motion at a time: between two states in proportion to time; after the last one, that one
+  /// moved on at its velocity and rate; before the first, that one moved as between those soon
+  /// after. Extrapolates by `kMostExtrapolation_s` at most. None while empty or farther off.
   std::optional<MotionState> at(model::Utime utime) const;
 
   /// For saving and loading: what changes while it runs.
@@ -44,8 +47,8 @@ class MotionHistory {
     a(self.states_);
   }
 
-  static constexpr double kMostExtrapolation_s = 0.5;
-  static constexpr double kKept_s = 4.0;
+  static constexpr double kMostExtrapolation_s = 0.5;  ///< Beyond the first or the last state.
+  static constexpr double kKept_s = 4.0;               ///< Older states are forgotten.
 
  private:
   MotionState before_first(model::Utime utime) const;

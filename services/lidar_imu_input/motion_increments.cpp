@@ -28,9 +28,7 @@ geometry::SE2WithCovariance no_motion(const WheelNoise& noise, double seconds) {
 }  // namespace
 
 MotionIncrements::MotionIncrements(const LidarImuInputParameters& parameters)
-    : parameters_(parameters),
-      levels_(parameters.imu.max_gap_s),
-      wheel_only_(parameters.wheels) {}
+    : parameters_(parameters), levels_(parameters.imu.max_gap_s), wheel_only_(parameters.wheels) {}
 
 std::optional<model::Odometry> MotionIncrements::make(model::Utime from, model::Utime to,
                                                       const IncrementSources& sources) {
@@ -94,9 +92,9 @@ geometry::SE2WithCovariance MotionIncrements::planar_motion(const std::deque<Lev
   return dead_reckoned(samples, *odometry.inertial, sources);
 }
 
-geometry::SE2WithCovariance MotionIncrements::dead_reckoned(
-    const std::deque<LevelSample>& samples, const model::Preintegration& inertial,
-    const IncrementSources& sources) const {
+geometry::SE2WithCovariance MotionIncrements::dead_reckoned(const std::deque<LevelSample>& samples,
+                                                            const model::Preintegration& inertial,
+                                                            const IncrementSources& sources) const {
   const double dt = inertial.seconds;
   Eigen::Vector2d velocity = Eigen::Vector2d::Zero();
   if (const auto then = sources.history.at(samples.front().utime)) velocity = level_velocity(*then);
@@ -111,9 +109,9 @@ geometry::SE2WithCovariance MotionIncrements::dead_reckoned(
       sources.attitude->velocity_covariance().topLeftCorner<2, 2>() * power +
       inertial.covariance.bottomRightCorner<2, 2>();
   motion.covariance.topLeftCorner<2, 2>() = rotation * position * rotation.transpose();
-  motion.covariance(2, 2) = inertial.covariance(0, 0) +
-                            square(sources.stationary.bias().sigma_rad_s) * dt *
-                                parameters_.wheels.noise.correlation_time_s;
+  motion.covariance(2, 2) =
+      inertial.covariance(0, 0) + square(sources.stationary.bias().sigma_rad_s) * dt *
+                                      parameters_.wheels.noise.correlation_time_s;
   return motion;
 }
 

@@ -13,8 +13,7 @@ std::optional<model::RawPose> RawPosePacer::take(const model::RawPose& pose, boo
   return pose;
 }
 
-std::optional<InputFault> CalibrationWatch::check(const MotionEstimator& motion,
-                                                  bool imu_is_live) {
+std::optional<InputFault> CalibrationWatch::check(const MotionEstimator& motion, bool imu_is_live) {
   if (is_reported_ || motion.is_calibrated()) return std::nullopt;
 
   // In the first second nothing is known yet.

@@ -6,9 +6,10 @@
 namespace understory::lidar_imu_input {
 namespace {
 
-constexpr int kFloorWindows = 200;  // windows that tell how quiet the IMU is at rest
+constexpr int kFloorWindows = 200;  // windows that show how quiet the IMU is at rest
 constexpr std::size_t kFewestSamples = 5;
 
+/// Mean and spread over a window.
 struct Spread {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   double sigma = 0.0;  ///< Of the worst axis.
@@ -43,6 +44,8 @@ bool StandstillDetector::is_quiet(const std::optional<Eigen::Vector3d>& gyro_bia
       window_, [](const model::ImuSample& s) -> const auto& { return s.angular_rate_rad_s; });
   const Spread force = spread_of(
       window_, [](const model::ImuSample& s) -> const auto& { return s.specific_force_mps2; });
+
+  // Limits: those of this IMU at rest, once they are known.
   const bool floor_known = floor_windows_ >= kFloorWindows;
   const double most_gyro = floor_known ? std::min(parameters_.gyro_sigma_rad_s,
                                                   parameters_.floor_factor * gyro_floor_ + 1e-4)
@@ -50,12 +53,14 @@ bool StandstillDetector::is_quiet(const std::optional<Eigen::Vector3d>& gyro_bia
   const double most_force = floor_known ? std::min(parameters_.force_sigma_mps2,
                                                    parameters_.floor_factor * force_floor_ + 1e-3)
                                         : parameters_.force_sigma_mps2;
-  const Eigen::Vector3d turning = gyro.mean - gyro_bias.value_or(Eigen::Vector3d::Zero());
+
   // A known bias leaves little room: a slow, smooth curve is no standstill.
-  const double most_turning =
+  const Eigen::Vector3d rate = gyro.mean - gyro_bias.value_or(Eigen::Vector3d::Zero());
+  const double most_rate =
       gyro_bias ? 0.1 * parameters_.gyro_mean_rad_s : parameters_.gyro_mean_rad_s;
   const bool quiet = gyro.sigma <= most_gyro && force.sigma <= most_force &&
-                     turning.cwiseAbs().maxCoeff() <= most_turning;
+                     rate.cwiseAbs().maxCoeff() <= most_rate;
+
   if (quiet && !floor_known) {
     ++floor_windows_;
     gyro_floor_ += (gyro.sigma - gyro_floor_) / floor_windows_;
@@ -72,15 +77,16 @@ void StandstillDetector::add(const model::ImuSample& sample,
     return static_cast<double>(window_.back().utime - window_.front().utime) * 1e-6;
   };
   while (window_.size() > 2 && length() > parameters_.window_s) window_.pop_front();
+
   const bool full = window_.size() >= kFewestSamples && length() > 0.8 * parameters_.window_s;
   const bool is_stationary =
       full && may_be_stationary && !wheels_turn(sample.utime) && is_quiet(gyro_bias);
   if (is_stationary && !is_stationary_) since_ = window_.front().utime;
   is_stationary_ = is_stationary;
-  if (is_stationary) longest_s_ = std::max(longest_s_, standing_s());
+  if (is_stationary) longest_s_ = std::max(longest_s_, stationary_s());
 }
 
-double StandstillDetector::standing_s() const {
+double StandstillDetector::stationary_s() const {
   return is_stationary_ ? static_cast<double>(window_.back().utime - since_) * 1e-6 : 0.0;
 }
 

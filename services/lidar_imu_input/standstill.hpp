@@ -1,4 +1,4 @@
-// Whether the vehicle stands still: found, not assumed.
+// Whether the vehicle is stationary, from its sensors.
 #pragma once
 
 #include <deque>
@@ -10,24 +10,26 @@
 namespace understory::lidar_imu_input {
 
 /// Looks at a short window of IMU samples (and at the wheels, where there are any). While the
-/// vehicle stands for the first time, learns how quiet this IMU is on this vehicle at rest, and
-/// asks for that later.
+/// vehicle is stationary for the first time, learns how quiet this IMU is on this vehicle at rest,
+/// and demands that later.
 class StandstillDetector {
  public:
   explicit StandstillDetector(const StandstillParameters& parameters) : parameters_(parameters) {}
 
-  /// Samples in frame vehicle. `gyro_bias`: what is known of it; none before it is known.
-  /// `may_stand`: false where the velocity is known well enough to say no.
+  /// Takes a sample in frame vehicle. `gyro_bias` [rad/s]: none before it is known.
+  /// `may_be_stationary`: false where the velocity is known well enough to exclude it.
   void add(const model::ImuSample& sample, const std::optional<Eigen::Vector3d>& gyro_bias,
            bool may_be_stationary = true);
+  /// Takes the speed of the wheels [m/s]: wheels that turn exclude a standstill for `window_s`.
   void add_wheel_speed(model::Utime utime, double speed_mps);
-  void reset();  ///< After a gap.
+  void reset();  ///< Forgets the window, after a gap.
 
   bool is_stationary() const { return is_stationary_; }
-  /// For how long without a break, up to the latest sample [s].
-  double standing_s() const;
-  /// Seconds in the longest stand so far.
+  /// For how long without a break, up to the latest sample [s]; 0 while it moves.
+  double stationary_s() const;
+  /// Length of the longest standstill so far [s].
   double longest_s() const { return longest_s_; }
+  /// Whether one of at least `calibration_s` was found.
   bool is_calibrated() const { return longest_s_ >= parameters_.calibration_s; }
 
   /// For saving and loading: what changes while it runs.
@@ -44,13 +46,13 @@ class StandstillDetector {
   StandstillParameters parameters_;
   std::deque<model::ImuSample> window_;
   bool is_stationary_ = false;
-  model::Utime since_ = 0;
+  model::Utime since_ = 0;  ///< Begin of the present standstill.
   double longest_s_ = 0.0;
-  model::Utime wheels_turned_ = 0;
+  model::Utime wheels_turned_ = 0;  ///< When the wheels last turned.
   bool has_turned_ = false;
-  double gyro_floor_ = 0.0;  ///< Mean spread at rest; 0 = not known yet.
-  double force_floor_ = 0.0;
-  int floor_windows_ = 0;
+  double gyro_floor_ = 0.0;   ///< Mean spread at rest [rad/s]; 0 = not known yet.
+  double force_floor_ = 0.0;  ///< The same of the force [m/s^2].
+  int floor_windows_ = 0;     ///< Windows that these were learned from.
 };
 
 }  // namespace understory::lidar_imu_input

@@ -34,8 +34,7 @@ void StationaryMonitor::begin_at(model::Utime utime) {
 
 void StationaryMonitor::add(const model::ImuSample& sample, double seconds,
                             const Eigen::Vector3d& gyro_bias, const VelocityEvidence& velocity) {
-  bias_.sigma_rad_s =
-      std::sqrt(square(bias_.sigma_rad_s) + square(gyro_bias_walk_) * seconds);
+  bias_.sigma_rad_s = std::sqrt(square(bias_.sigma_rad_s) + square(gyro_bias_walk_) * seconds);
 
   const bool bias_known = detector_.longest_s() > kBiasKnown_s &&
                           bias_.sigma_rad_s < 0.02 * parameters_.gyro_mean_rad_s;

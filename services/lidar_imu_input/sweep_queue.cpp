@@ -35,7 +35,7 @@ Admission SweepQueue::add(WaitingSweep waiting, std::optional<model::Utime> incr
   }
 
   const auto place = std::ranges::upper_bound(waiting_, waiting.end, {}, &WaitingSweep::end);
-  waiting_.insert(place, std::move(waiting));
+  waiting_.insert(place, WaitingSweep{waiting.end, std::move(waiting.item)});
   return admission;
 }
 

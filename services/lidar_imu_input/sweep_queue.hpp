@@ -33,8 +33,8 @@ struct WaitingSweep {
 
 /// What became of an item that was put into the queue.
 struct Admission {
-  bool is_carried = false;      ///< It came late: its stamp is the end of the latest increment.
-  bool dropped_oldest = false;  ///< The queue was full.
+  bool is_carried = false;          ///< It came late: its stamp is the end of the latest increment.
+  bool dropped_oldest = false;      ///< The queue was full.
   std::optional<InputFault> fault;  ///< It came too late and was dropped.
 };
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 
+#include "common/model/imu.hpp"
 #include "services/lidar_imu_input/attitude_filter.hpp"
 #include "services/lidar_imu_input/dead_reckoning.hpp"
 #include "services/lidar_imu_input/motion_history.hpp"

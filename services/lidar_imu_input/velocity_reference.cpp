@@ -35,11 +35,15 @@ std::optional<ReferenceVelocity> VelocityReference::add(const model::GnssFix& fi
   const auto velocity = velocity_of(fix, previous_);
   previous_ = fix;
   if (!velocity) return std::nullopt;
+
+  // Below some speed the course shows no heading.
   const auto& [east_north, sigma] = *velocity;
   const double speed = east_north.norm();
   const bool fast = speed > std::max(kFastEnough_mps, 4.0 * sigma);
   const double course = std::atan2(east_north.y(), east_north.x());
   if (!east_to_odom_rad_ && !fast) return std::nullopt;
+
+  // The rotation between east and odom, as a scalar Kalman filter.
   ReferenceVelocity reference;
   if (fast) {
     const double variance = std::pow(std::hypot(sigma / speed, kCourseSigma_rad), 2);
@@ -54,6 +58,7 @@ std::optional<ReferenceVelocity> VelocityReference::add(const model::GnssFix& fi
     reference.heading_rad = course + *east_to_odom_rad_;
     reference.heading_sigma_rad = std::sqrt(variance + east_to_odom_variance_);
   }
+
   reference.odom_velocity_mps = Eigen::Rotation2Dd(*east_to_odom_rad_) * east_north;
   reference.sigma_mps = sigma;
   return reference;

@@ -3,17 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/lidar_imu_input/stamps.hpp"
+
 namespace understory::lidar_imu_input {
-namespace {
-
-double square(double value) { return value * value; }
-
-double seconds_between(model::Utime from, model::Utime to) {
-  return static_cast<double>(to - from) * 1e-6;
-}
-
-}  // namespace
-
 double axle_speed(const CarGeometry& car, double encoder_speed_mps, double steering_rad) {
   return encoder_speed_mps / (1.0 - std::tan(steering_rad) * car.encoder_left_m / car.wheelbase_m);
 }
@@ -31,24 +23,26 @@ geometry::SE2WithCovariance WheelOdometry::step(const model::WheelSample& sample
   const CarGeometry& car = parameters_.car;
   const WheelNoise& noise = parameters_.noise;
   const double speed = axle_speed(car, sample.speed_mps, sample.steering_rad);
-  const double turn_per_m = std::tan(sample.steering_rad) / car.wheelbase_m;
+  const double curvature_per_m = std::tan(sample.steering_rad) / car.wheelbase_m;
 
   // Errors that last for a time tau and act for seconds << tau have the power tau * seconds.
   const double power = seconds * noise.correlation_time_s;
   const double slope = (1.0 + square(std::tan(sample.steering_rad))) / car.wheelbase_m;
   const double steering_variance =
       square(noise.steering_sigma_rad) + square(noise.steering_scale_sigma * sample.steering_rad);
+
   const double along = square(speed * noise.speed_scale_sigma) * power;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   covariance(0, 0) = along + square(noise.standstill_sigma_m) * seconds;
   covariance(1, 1) =
       square(speed * noise.side_slip_sigma) * power + square(noise.standstill_sigma_m) * seconds;
   covariance(2, 2) = square(speed * slope) * steering_variance * power +
-                     along * square(turn_per_m) + square(noise.standstill_sigma_rad) * seconds;
-  covariance(0, 2) = along * turn_per_m;
+                     along * square(curvature_per_m) + square(noise.standstill_sigma_rad) * seconds;
+  covariance(0, 2) = along * curvature_per_m;
   covariance(2, 0) = covariance(0, 2);
 
-  return {geometry::SE2::Exp({speed * seconds, 0.0, speed * turn_per_m * seconds}), covariance};
+  return {geometry::SE2::Exp({speed * seconds, 0.0, speed * curvature_per_m * seconds}),
+          covariance};
 }
 
 std::optional<geometry::SE2WithCovariance> WheelOdometry::integrate(model::Utime from,
@@ -77,11 +71,13 @@ std::optional<model::Odometry> WheelOdometry::advance_to(model::Utime stamp) {
   const std::optional<model::Utime> from = last_stamp_;
   last_stamp_ = stamp;
   if (!from) return std::nullopt;
+
   const auto motion = integrate(*from, stamp);
   if (!motion) {
     ++without_samples_;
     return std::nullopt;
   }
+
   model::Odometry odometry;
   odometry.from_utime = *from;
   odometry.utime = stamp;

@@ -12,17 +12,17 @@ namespace understory::lidar_imu_input {
 
 /// A car with Ackermann steering; defaults: the Victoria Park car.
 struct CarGeometry {
-  double wheelbase_m = 2.83;
+  double wheelbase_m = 2.83;  ///< From axle to axle.
   /// How far the encoder's wheel is left of the middle of the rear axle [m].
   double encoder_left_m = 0.76;
   /// Frame `vehicle` seen from the middle of the rear axle.
   geometry::SE2 axle_T_vehicle;
 };
 
-/// What the wheels do not know. Errors of scale and steering persist for a while: they are given as
-/// a standard deviation and the time over which they last, and counted as white noise of the same
-/// power. Motions over that time or longer then have honest covariances when intervals are
-/// compounded as independent; shorter ones have too large a covariance, never too small.
+/// Errors of the wheels. Those of scale and steering are correlated over time: they are given as a
+/// standard deviation and a correlation time, and counted as white noise of the same power. Motions
+/// over that time or longer then have consistent covariances when intervals are compounded as
+/// independent; shorter ones have too large a covariance, never too small.
 struct WheelNoise {
   double speed_scale_sigma = 0.02;       ///< Of the measured speed; wheel radius, slip.
   double steering_sigma_rad = 0.006;     ///< Zero point and play of the steering.
@@ -34,6 +34,7 @@ struct WheelNoise {
   double standstill_sigma_rad = 0.0002;  ///< Per square root of a second.
 };
 
+/// Geometry and noise of a car with wheel sensors.
 struct WheelOdometryParameters {
   CarGeometry car;
   WheelNoise noise;
@@ -41,12 +42,15 @@ struct WheelOdometryParameters {
   double max_gap_s = 0.5;
 };
 
-/// Speed of the middle of the rear axle [m/s], from that of the encoder's wheel.
+/// Speed of the middle of the rear axle [m/s], from that of the encoder's wheel: that is slower in
+/// a turn to its own side.
 double axle_speed(const CarGeometry& car, double encoder_speed_mps, double steering_rad);
 
-/// Relative motion between the stamps that it is asked for. Samples and stamps in order of time.
+/// Relative motion of frame `vehicle` between stamps, from speed and steering alone. Samples and
+/// stamps come in order of time.
 class WheelOdometry {
  public:
+  /// Defaults: the Victoria Park car.
   explicit WheelOdometry(const WheelOdometryParameters& parameters = {})
       : parameters_(parameters) {}
 
@@ -57,7 +61,9 @@ class WheelOdometry {
   /// interval starts at `stamp` all the same.
   std::optional<model::Odometry> advance_to(model::Utime stamp);
 
+  /// Samples that were ignored.
   std::uint64_t samples_out_of_order() const { return out_of_order_; }
+  /// Intervals for which no motion could be given.
   std::uint64_t intervals_without_samples() const { return without_samples_; }
 
   /// For saving and loading: what changes while it runs.

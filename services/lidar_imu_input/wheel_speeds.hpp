@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <optional>
 
 #include "common/model/wheels.hpp"
 #include "services/lidar_imu_input/wheel_odometry.hpp"

@@ -119,7 +119,7 @@ TEST_CASE("a start that is no standstill is no calibration", "[attitude][standst
       told += fault != nullptr && fault->kind == InputFaultKind::kNotCalibrated;
     }
   }
-  CHECK_FALSE(input.is_calibrated());
+  CHECK_FALSE(input.motion().is_calibrated());
   CHECK(told == 1);
 }
 

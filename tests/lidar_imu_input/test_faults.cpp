@@ -138,7 +138,7 @@ TEST_CASE("IMU and wheels both stop: sweeps do not wait for ever", "[faults]") {
   CHECK(run.faults[InputFaultKind::kSilent] == 2);
   CHECK(run.faults[InputFaultKind::kNoMotion] > 30);
   CHECK(run.sweeps >= 337);
-  CHECK(run.counters.pieces_missing > 0);
+  CHECK(run.counters.increments_missing > 0);
 }
 
 TEST_CASE("a laser that stops is named", "[faults]") {

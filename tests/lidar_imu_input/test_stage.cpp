@@ -105,7 +105,7 @@ TEST_CASE("a piece of odometry ends at each sweep and comes before it", "[stage]
   }
   CHECK(sweeps >= 297);
   CHECK(input.counters().sweeps_dropped == 0);
-  CHECK(input.counters().pieces_missing == 0);
+  CHECK(input.counters().increments_missing == 0);
 }
 
 TEST_CASE("a sweep that comes very late is carried to the end of a piece", "[stage]") {

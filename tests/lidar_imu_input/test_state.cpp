@@ -5,6 +5,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/wire/convert.hpp"
 #include "services/lidar_imu_input/lidar_imu_input.hpp"
 #include "tests/catch.hpp"
 #include "tests/lidar_imu_input/simulated_vehicle.hpp"
@@ -105,33 +106,17 @@ int faults_of(const InputResults& results, InputFaultKind kind) {
   return static_cast<int>(std::ranges::count(faults, kind, &InputFault::kind));
 }
 
-void check_same(const std::vector<model::Odometry>& is,
-                const std::vector<model::Odometry>& should) {
+/// Bit by bit, as on the wire.
+template <class T>
+void check_same(const std::vector<T>& is, const std::vector<T>& should) {
   REQUIRE(is.size() == should.size());
-  for (std::size_t i = 0; i < is.size(); ++i) {
-    REQUIRE(is[i].from_utime == should[i].from_utime);
-    REQUIRE(is[i].utime == should[i].utime);
-    REQUIRE(is[i].sequence == should[i].sequence);
-    REQUIRE(is[i].has_wheels == should[i].has_wheels);
-    REQUIRE(is[i].is_stationary == should[i].is_stationary);
-    REQUIRE((is[i].from_T_to.coordinates() - should[i].from_T_to.coordinates()).norm() < 1e-9);
-    REQUIRE((is[i].covariance - should[i].covariance).norm() < 1e-9);
-    REQUIRE(is[i].inertial.has_value() == should[i].inertial.has_value());
-    if (!is[i].inertial) continue;
-    REQUIRE((is[i].inertial->position_m - should[i].inertial->position_m).norm() < 1e-9);
-    REQUIRE(std::abs(is[i].inertial->yaw_rad - should[i].inertial->yaw_rad) < 1e-9);
-    REQUIRE((is[i].inertial->covariance - should[i].inertial->covariance).norm() < 1e-9);
-  }
+  for (std::size_t i = 0; i < is.size(); ++i)
+    REQUIRE(wire::encode_message(is[i]) == wire::encode_message(should[i]));
 }
 
-void check_same(const std::vector<model::RawPose>& is, const std::vector<model::RawPose>& should) {
-  REQUIRE(is.size() == should.size());
-  for (std::size_t i = 0; i < is.size(); ++i) {
-    REQUIRE(is[i].utime == should[i].utime);
-    const geometry::SE2 apart = should[i].odom_T_vehicle.inverse() * is[i].odom_T_vehicle;
-    REQUIRE(apart.coordinates().norm() < 1e-9);
-    REQUIRE((is[i].covariance - should[i].covariance).norm() < 1e-9);
-  }
+bool same_point(const model::SweepPoint& a, const model::SweepPoint& b) {
+  return a.x_m == b.x_m && a.y_m == b.y_m && a.z_m == b.z_m && a.time_s == b.time_s &&
+         a.ring == b.ring;
 }
 
 /// Of those that came out, each is in `should` as it is.
@@ -140,11 +125,11 @@ void check_among(const std::vector<model::PointSweep>& is,
   for (const model::PointSweep& sweep : is) {
     const auto same = std::ranges::find(should, sweep.utime, &model::PointSweep::utime);
     REQUIRE(same != should.end());
-    REQUIRE(sweep.points.size() == same->points.size());
+    REQUIRE(std::ranges::equal(sweep.points, same->points, same_point));
     REQUIRE(sweep.attitude.has_value() == same->attitude.has_value());
-    for (std::size_t i = 0; i < sweep.points.size(); ++i) {
-      REQUIRE((sweep.points[i].position() - same->points[i].position()).norm() < 1e-6F);
-    }
+    if (!sweep.attitude) continue;
+    REQUIRE(sweep.attitude->level_Q_vehicle.coeffs() == same->attitude->level_Q_vehicle.coeffs());
+    REQUIRE(sweep.attitude->covariance_rad2 == same->attitude->covariance_rad2);
   }
 }
 
@@ -155,7 +140,7 @@ void check_cut(const std::vector<Event>& events, std::size_t cut,
   for (std::size_t i = 0; i < cut; ++i) feed(uncut, events[i], before);
   LidarImuInput loaded(parameters);
   loaded.load(uncut.save());
-  CHECK(loaded.is_calibrated() == uncut.is_calibrated());
+  CHECK(loaded.motion().is_calibrated() == uncut.motion().is_calibrated());
   InputResults should;
   InputResults is;
   for (std::size_t i = cut; i < events.size(); ++i) {
@@ -164,7 +149,9 @@ void check_cut(const std::vector<Event>& events, std::size_t cut,
   }
   check_same(all_of<model::Odometry>(is), all_of<model::Odometry>(should));
   check_same(all_of<model::RawPose>(is), all_of<model::RawPose>(should));
-  CHECK(all_of<model::PlanarScan>(is).size() == all_of<model::PlanarScan>(should).size());
+  check_same(all_of<model::ImuSample>(is), all_of<model::ImuSample>(should));
+  check_same(all_of<model::WheelSample>(is), all_of<model::WheelSample>(should));
+  check_same(all_of<model::PlanarScan>(is), all_of<model::PlanarScan>(should));
   CHECK(all_of<InputFault>(is).size() == all_of<InputFault>(should).size());
   const auto sweeps = all_of<model::PointSweep>(is);
   const auto all_sweeps = all_of<model::PointSweep>(should);
@@ -182,7 +169,8 @@ std::size_t index_at(const std::vector<Event>& events, double time_s) {
 
 }  // namespace
 
-TEST_CASE("a drive that is cut by saving and loading goes on as the uncut one", "[state]") {
+TEST_CASE("a drive that is cut by saving and loading goes on bit by bit as the uncut one",
+          "[state]") {
   std::mt19937_64 random(8);
   for (const DriveWith with :
        {DriveWith{}, DriveWith{.wheels = false}, DriveWith{.sweeps = false, .scans = true},
@@ -230,7 +218,7 @@ TEST_CASE("after a pause the calibrated motion goes on, on the sensors' own cloc
   for (std::size_t i = index_at(events, 33.0); i < events.size(); ++i) {
     feed(loaded, events[i], after);
   }
-  CHECK(loaded.is_calibrated());
+  CHECK(loaded.motion().is_calibrated());
   CHECK(faults_of(after, InputFaultKind::kClockJump) == 0);
   CHECK(faults_of(after, InputFaultKind::kNotCalibrated) == 0);
   const auto samples = all_of<model::ImuSample>(after);
@@ -261,13 +249,13 @@ TEST_CASE("a state that is too old is not gone on with", "[state]") {
   for (std::size_t i = 0; i < cut; ++i) feed(stage, events[i], all);
   LidarImuInput loaded(test::parameters_for_drive());
   loaded.load(stage.save());
-  REQUIRE(loaded.is_calibrated());
+  REQUIRE(loaded.motion().is_calibrated());
   InputResults after;
   for (std::size_t i = cut; i < events.size(); ++i) {
     std::visit([](auto& value) { value.utime += 3'600'000'000; }, events[i]);
     feed(loaded, events[i], after);
   }
-  CHECK_FALSE(loaded.is_calibrated());
+  CHECK_FALSE(loaded.motion().is_calibrated());
   CHECK(faults_of(after, InputFaultKind::kNotCalibrated) >= 1);
   CHECK(faults_of(after, InputFaultKind::kClockJump) == 0);
   CHECK(all_of<model::Odometry>(after).front().from_utime > 3'600'000'000);
@@ -280,6 +268,7 @@ TEST_CASE("a damaged state is refused", "[state]") {
   for (std::size_t i = 0; i < 3000; ++i) feed(stage, events[i], all);
   const std::string state = stage.save();
   LidarImuInput loaded(test::parameters_for_drive());
+  const std::string before = loaded.save();
   for (const std::size_t size : {std::size_t{0}, std::size_t{7}, std::size_t{30}, state.size() / 3,
                                  state.size() / 2, state.size() - 1}) {
     CHECK_THROWS_AS(loaded.load(state.substr(0, size)), std::invalid_argument);
@@ -288,5 +277,7 @@ TEST_CASE("a damaged state is refused", "[state]") {
   std::string other = state;
   other[8] = 'x';
   CHECK_THROWS_AS(loaded.load(other), std::invalid_argument);
+  CHECK(loaded.save() == before);  // refused as a whole
   CHECK_NOTHROW(loaded.load(state));
+  CHECK(loaded.save() == state);
 }
