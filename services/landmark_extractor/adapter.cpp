@@ -18,30 +18,32 @@ constexpr model::Utime kSummaryPeriod_us = 10000000;
 std::string summary(const SweepCounters& now, const SweepCounters& before) {
   if (now.sweeps == before.sweeps) return "";
   std::string text;
-  const auto say = [&](std::string_view name, std::uint64_t count) {
+  const auto add = [&](std::string_view name, std::uint64_t count) {
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", name, count);
   };
   const trunks::TrunkCounters& t = now.trunks;
   const trunks::TrunkCounters& t0 = before.trunks;
   const corners::CornerCounters& c = now.corners;
   const corners::CornerCounters& c0 = before.corners;
-  say("sweeps", now.sweeps - before.sweeps);
-  say("trunks", t.trunks - t0.trunks);
-  say("columns of returns that are none: too few points", t.too_few_points - t0.too_few_points);
-  say("no fit", t.no_fit - t0.no_fit);
-  say("wrong radius", t.wrong_radius - t0.wrong_radius);
-  say("leaning", t.leaning - t0.leaning);
-  say("not round", t.not_round - t0.not_round);
-  say("uncertain", t.uncertain - t0.uncertain);
-  say("not standing", t.not_standing - t0.not_standing);
-  say("in leaves", t.in_leaves - t0.in_leaves);
-  say("out of range", t.out_of_range - t0.out_of_range);
-  say("on a wall", now.on_wall - before.on_wall);
-  say("corners", c.corners - c0.corners);
-  say("walls", c.walls - c0.walls);
-  say("meetings of walls that are none: skew", c.skew - c0.skew);
-  say("low", c.low - c0.low);
-  say("hidden", c.hidden - c0.hidden);
+
+  add("sweeps", now.sweeps - before.sweeps);
+  add("trunks", t.trunks - t0.trunks);
+  add("columns of returns left out: too few points", t.too_few_points - t0.too_few_points);
+  add("no fit", t.no_fit - t0.no_fit);
+  add("wrong radius", t.wrong_radius - t0.wrong_radius);
+  add("leaning", t.leaning - t0.leaning);
+  add("not round", t.not_round - t0.not_round);
+  add("uncertain", t.uncertain - t0.uncertain);
+  add("not standing", t.not_standing - t0.not_standing);
+  add("in leaves", t.in_leaves - t0.in_leaves);
+  add("out of range", t.out_of_range - t0.out_of_range);
+  add("on a wall", now.on_wall - before.on_wall);
+
+  add("corners", c.corners - c0.corners);
+  add("walls", c.walls - c0.walls);
+  add("pairs of walls left out: skew", c.skew - c0.skew);
+  add("low", c.low - c0.low);
+  add("hidden", c.hidden - c0.hidden);
   return text;
 }
 
@@ -62,12 +64,12 @@ class LandmarkExtractorAdapter : public bus::Adapter {
         [this](const model::PlanarScan& scan) { landmarks_.publish(stage_->extract(scan)); },
         {.queue_size = 200});
     // Each sweep is judged by itself: there is no state to save but counters, which begin anew. A
-    // sweep that was under way at a restart is lost, and counted when its next part comes.
+    // sweep that arrives in part before a restart is lost, and counted when its next part comes.
     node.subscribe<model::PointSweep>(channels_.lidar_sweep,
                                       [this](const model::PointSweep& part) { add_part(part); },
                                       {.queue_size = 1000, .journaled = false});
     landmarks_ = node.advertise<model::LandmarkScan>(channels_.landmarks);
-    node.every(kSummaryPeriod_us, [this](model::Utime /*now*/) { say_summary(); });
+    node.every(kSummaryPeriod_us, [this](model::Utime /*now*/) { log_summary(); });
   }
 
  private:
@@ -75,36 +77,38 @@ class LandmarkExtractorAdapter : public bus::Adapter {
     const auto sweep = assembler_.add(part);
     if (assembler_.incomplete_revolutions() > incomplete_) {
       incomplete_ = assembler_.incomplete_revolutions();
-      node_->report(wire::Reason::kPartsMissing, "a turn of which parts are missing is left out",
+      node_->report(wire::Reason::kPartsMissing, "a sweep of which parts are missing is left out",
                     channels_.lidar_sweep);
     }
     if (!sweep) return;
     const SweepCounters before = stage_->sweep_counters();
     const model::LandmarkScan landmarks = stage_->extract(*sweep);
-    say_what_is_wrong(before, stage_->sweep_counters());
+    report_faults(before, stage_->sweep_counters());
     if (stage_->sweep_counters().malformed == before.malformed) landmarks_.publish(landmarks);
   }
 
-  void say_what_is_wrong(const SweepCounters& before, const SweepCounters& now) {
-    const auto say = [&](wire::Reason reason, std::string_view text) {
+  void report_faults(const SweepCounters& before, const SweepCounters& now) {
+    const auto report = [&](wire::Reason reason, std::string_view text) {
       node_->report(reason, text, channels_.lidar_sweep);
     };
     if (now.malformed > before.malformed) {
-      say(wire::Reason::kInconsistent, "a sweep without rings or not in frame vehicle is left out");
+      report(wire::Reason::kInconsistent,
+             "a sweep without rings or not in frame vehicle is left out");
     }
     if (now.without_attitude > before.without_attitude) {
-      say(wire::Reason::kNotCalibrated, "a sweep without attitude is taken as level");
+      report(wire::Reason::kNotCalibrated, "a sweep without attitude is taken as level");
     }
     if (now.points.not_finite > before.points.not_finite) {
-      say(wire::Reason::kNotFinite, "points that are no numbers are left out");
+      report(wire::Reason::kNotFinite, "points that are not finite are left out");
     }
     if (now.points.bad_ring > before.points.bad_ring) {
-      say(wire::Reason::kOutOfRange, "points of rings that the sensor does not have are left out");
+      report(wire::Reason::kOutOfRange,
+             "points of rings that the sensor does not have are left out");
     }
   }
 
   /// What became of the objects since the last time, with why.
-  void say_summary() {
+  void log_summary() {
     const std::string all = summary(stage_->sweep_counters(), reported_);
     if (!all.empty()) node_->log(bus::Node::Level::kInfo, "landmarks", all, channels_.lidar_sweep);
     reported_ = stage_->sweep_counters();

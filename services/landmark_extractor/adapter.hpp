@@ -1,4 +1,4 @@
-// The landmark extractor's place on the bus.
+// The landmark extractor on the bus.
 #pragma once
 
 #include <string>
@@ -7,12 +7,14 @@
 
 namespace understory::landmark_extractor {
 
+/// Names of its channels; every one can be replaced.
 struct LandmarkExtractorChannels {
   std::string lidar_scan = "LIDAR_SCAN";
   std::string lidar_sweep = "LIDAR_SWEEP";
   std::string landmarks = "LANDMARKS";
 };
 
+/// The service, for run_service() and replay.
 bus::Service landmark_extractor_service(const LandmarkExtractorChannels& channels = {});
 
 }  // namespace understory::landmark_extractor

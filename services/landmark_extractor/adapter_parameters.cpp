@@ -5,7 +5,7 @@ namespace {
 
 void describe_sensor(PlanarTrunkParameters& p, bus::ParameterTable& table) {
   table.add("planar.min_range_m", p.min_range_m, {0.0, 100.0}, "m",
-            "What is nearer is the vehicle itself.");
+            "Nearer returns are of the vehicle itself.");
   table.add("planar.max_range_m", p.max_range_m, {1.0, 1000.0}, "m",
             "Trunks farther than this are not reported.");
   table.add("planar.range_sigma_m", p.range_sigma_m, {1e-4, 10.0}, "m", "Noise of one beam.");
@@ -15,17 +15,17 @@ void describe_sensor(PlanarTrunkParameters& p, bus::ParameterTable& table) {
 
 void describe_shape(PlanarTrunkParameters& p, bus::ParameterTable& table) {
   table.add("planar.roundness_sigma_m", p.roundness_sigma_m, {0.0, 1.0}, "m",
-            "Of the bark from a circle.");
+            "Deviation of the bark from a circle, sigma.");
   table.add("planar.shape_sigma_m", p.shape_sigma_m, {0.0, 1.0}, "m",
-            "How far the centre as seen from one side is off.");
+            "Error of the centre as seen from one side, sigma.");
   table.add("planar.shape_correlation_scans", p.shape_correlation_scans, {1.0, 1000.0}, "scans",
-            "Over how many scans that stays the same.");
+            "Over how many scans that error is correlated.");
   table.add("planar.min_radius_m", p.min_radius_m, {0.001, 10.0}, "m", "Of a trunk.");
   table.add("planar.max_radius_m", p.max_radius_m, {0.01, 10.0}, "m", "Of a trunk.");
   table.add("planar.prior_radius_m", p.prior_radius_m, {0.001, 10.0}, "m",
-            "What a trunk's radius is before it is measured.");
+            "A trunk's radius before it is measured.");
   table.add("planar.prior_radius_sigma_m", p.prior_radius_sigma_m, {0.001, 10.0}, "m",
-            "Standard deviation of that.");
+            "Sigma of the prior.");
 }
 
 void describe_selection(PlanarTrunkParameters& p, bus::ParameterTable& table) {
@@ -34,19 +34,19 @@ void describe_selection(PlanarTrunkParameters& p, bus::ParameterTable& table) {
   table.add("planar.break_per_range", p.break_per_range, {0.0, 1.0}, "m per m",
             "Added to that for each metre of range.");
   table.add("planar.clearance_m", p.clearance_m, {0.0, 100.0}, "m",
-            "What stands beside a trunk must be so much farther away.");
+            "Whatever is beside a trunk must be so much farther away.");
   table.add("planar.separation_m", p.separation_m, {0.0, 100.0}, "m",
             "A trunk's distance to any other object; bushes have less.");
   table.add("planar.line_tolerance_m", p.line_tolerance_m, {0.0, 10.0}, "m",
             "What is so near the line between its neighbours is a wall.");
   table.add("planar.min_points", p.min_points, {1, 1000}, "", "Fewest beams on a trunk.");
   table.add("planar.max_mean_square_residual", p.max_mean_square_residual, {0.1, 1e6}, "sigma^2",
-            "Of the ranges from the fitted circle.");
+            "Mean square residual of the ranges.");
 }
 
 void describe_sweep(SweepParameters& p, bus::ParameterTable& table) {
   table.add("sweep.min_range_m", p.min_range_m, {0.0, 100.0}, "m",
-            "What is nearer is the vehicle itself.");
+            "Nearer returns are of the vehicle itself.");
   table.add("sweep.max_range_m", p.max_range_m, {1.0, 100.0}, "m",
             "Landmarks farther than this are not reported.");
   table.add("sweep.range_sigma_m", p.range_sigma_m, {1e-4, 1.0}, "m", "Noise of one beam.");
@@ -61,56 +61,57 @@ void describe_sweep(SweepParameters& p, bus::ParameterTable& table) {
   table.add("sweep.break_per_range", p.break_per_range, {0.0, 1.0}, "m per m",
             "Added to that for each metre of range.");
   table.add("sweep.clearance_m", p.clearance_m, {0.0, 100.0}, "m",
-            "What stands beside an object's edge is so much farther away.");
+            "Whatever is beside an object's edge is so much farther away.");
   table.add("sweep.standing_height_m", p.standing_height_m, {0.5, 20.0}, "m",
             "What ends below this is a person, a bush, a car, a stump.");
   table.add("sweep.breast_height_m", p.breast_height_m, {0.0, 5.0}, "m",
             "Above ground: where a landmark's position is given.");
   table.add("sweep.level_sigma_rad", p.level_sigma_rad, {1e-5, 1.0}, "rad",
-            "Of roll and of pitch where the sweep does not say them.");
+            "Sigma of roll and of pitch where the sweep has no attitude.");
 }
 
 void describe_trunk_shape(SweepTrunkParameters& p, bus::ParameterTable& table) {
   table.add("trunk.min_radius_m", p.min_radius_m, {0.001, 10.0}, "m", "Of a trunk.");
   table.add("trunk.max_radius_m", p.max_radius_m, {0.01, 10.0}, "m", "Of a trunk.");
   table.add("trunk.prior_radius_m", p.prior_radius_m, {0.001, 10.0}, "m",
-            "What a trunk's radius is before it is measured.");
+            "A trunk's radius before it is measured.");
   table.add("trunk.prior_radius_sigma_m", p.prior_radius_sigma_m, {0.001, 10.0}, "m",
-            "Standard deviation of that.");
+            "Sigma of the prior.");
   table.add("trunk.prior_lean_sigma_rad", p.prior_lean_sigma_rad, {1e-4, 1.0}, "rad",
             "Of a trunk's axis from the vertical.");
   table.add("trunk.prior_taper", p.prior_taper, {-0.2, 0.2}, "m per m",
             "Change of radius per metre of height.");
   table.add("trunk.prior_taper_sigma", p.prior_taper_sigma, {1e-4, 0.2}, "m per m",
-            "Standard deviation of that.");
+            "Sigma of the prior.");
   table.add("trunk.roundness_sigma_m", p.roundness_sigma_m, {0.0, 1.0}, "m",
-            "Of the bark from a circle.");
-  table.add("trunk.out_of_round", p.out_of_round, {0.0, 1.0}, "m per m",
-            "RMS of a stem's low waves from a circle, in parts of its radius.");
+            "Deviation of the bark from a circle, sigma.");
+  table.add(
+      "trunk.out_of_round", p.out_of_round, {0.0, 1.0}, "m per m",
+      "RMS deviation of a stem's outline from a circle in its low waves, part of its radius.");
   table.add("trunk.max_lean_rad", p.max_lean_rad, {0.01, 1.5}, "rad",
             "More than that is a branch.");
 }
 
 void describe_trunk_selection(SweepTrunkParameters& p, bus::ParameterTable& table) {
   table.add("trunk.max_sigma_m", p.max_sigma_m, {0.001, 10.0}, "m",
-            "Trunks whose centre is known worse are not reported.");
+            "Trunks with a larger sigma of the centre are left out.");
   table.add("trunk.max_mean_square_residual", p.max_mean_square_residual, {0.1, 1e6}, "sigma^2",
-            "Of ranges and edges from the stem.");
+            "Mean square residual of ranges and edges.");
   table.add("trunk.gather_radius_m", p.gather_radius_m, {0.01, 10.0}, "m",
-            "How far apart the slices of one trunk may seem.");
+            "Largest distance of the runs of one trunk in the plan.");
   table.add("trunk.leaf_radius_m", p.leaf_radius_m, {0.01, 10.0}, "m",
-            "Of the returns so near a trunk ...");
+            "Returns so near a trunk are counted for trunk.min_share.");
   table.add("trunk.min_share", p.min_share, {0.0, 1.0}, "",
-            "... at least this part must be on it.");
+            "Part of the returns within trunk.leaf_radius_m that must be on the bark.");
   table.add("trunk.min_points", p.min_points, {1, 1000}, "", "Fewest returns on a trunk.");
-  table.add("trunk.min_rings", p.min_rings, {1, 100}, "", "Fewest rings that see it.");
+  table.add("trunk.min_rings", p.min_rings, {1, 100}, "", "Fewest rings that measure it.");
 }
 
 void describe_corner(CornerParameters& p, bus::ParameterTable& table) {
   table.add("corner.line_tolerance_m", p.line_tolerance_m, {0.001, 1.0}, "m",
             "What is so near a line is on it.");
   table.add("corner.min_length_m", p.min_length_m, {0.05, 100.0}, "m",
-            "Of a wall, as far as it is seen.");
+            "Of a wall, as far as it is measured.");
   table.add("corner.min_extent_m", p.min_extent_m, {0.0, 10.0}, "m",
             "In height, of the returns on a wall.");
   table.add("corner.max_gap_m", p.max_gap_m, {0.0, 10.0}, "m",
@@ -118,10 +119,10 @@ void describe_corner(CornerParameters& p, bus::ParameterTable& table) {
   table.add("corner.max_gap_per_range", p.max_gap_per_range, {0.0, 1.0}, "m per m",
             "Added to that for each metre of range.");
   table.add("corner.max_skew_rad", p.max_skew_rad, {0.0, 1.5}, "rad",
-            "Of the angle between the walls from a right one.");
+            "Deviation of the angle between the walls from a right one.");
   table.add("corner.flatness_sigma_m", p.flatness_sigma_m, {1e-4, 1.0}, "m",
             "Of a wall, besides the unevenness that its points show.");
-  table.add("corner.min_rings", p.min_rings, {1, 100}, "", "Fewest rings that see a wall.");
+  table.add("corner.min_rings", p.min_rings, {1, 100}, "", "Fewest rings that measure a wall.");
 }
 
 }  // namespace

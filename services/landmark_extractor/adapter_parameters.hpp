@@ -6,6 +6,7 @@
 
 namespace understory::landmark_extractor {
 
+/// Adds every parameter to the table, with unit, range and meaning. `parameters` must outlive it.
 void describe(LandmarkExtractorParameters& parameters, bus::ParameterTable& table);
 
 }  // namespace understory::landmark_extractor

@@ -11,7 +11,7 @@
 namespace understory::landmark_extractor {
 namespace {
 
-/// How much a trunk's height above the sensor's plane is unknown [m]: a planar laser has no say.
+/// Sigma of a trunk's height against the sensor's plane [m]: a planar laser does not measure it.
 constexpr double kHeightSigma_m = 0.5;
 
 bool well_formed(const model::PlanarScan& scan) {
@@ -75,6 +75,7 @@ std::optional<model::Detection> to_trunk(const model::PlanarScan& scan,
                                          std::size_t index, const PlanarTrunkParameters& parameters,
                                          ExtractorCounters& counters) {
   const planar::Segment& segment = segments[index];
+  // Enough of it, and nothing beside it?
   if (segment.size() < static_cast<std::size_t>(std::max(1, parameters.min_points))) {
     ++counters.too_few_points;
     return std::nullopt;
@@ -83,6 +84,8 @@ std::optional<model::Detection> to_trunk(const model::PlanarScan& scan,
     ++counters.not_alone;
     return std::nullopt;
   }
+
+  // Round, of a trunk's size, within range?
   const auto fit = fit_trunk(scan, segment, parameters);
   if (!fit || !trunk_sized(*fit, parameters) ||
       fit->mean_square_residual > parameters.max_mean_square_residual) {
@@ -107,9 +110,11 @@ model::LandmarkScan LandmarkExtractor::extract(const model::PlanarScan& scan) {
     ++counters_.scans_malformed;
     return result;
   }
+
   result.field_of_view = field_of_view(scan, parameters_.planar);
   const std::vector<planar::Segment> segments = planar::split(scan, parameters_.planar);
   counters_.objects += segments.size();
+
   for (std::size_t i = 0; i < segments.size(); ++i) {
     if (const auto trunk = to_trunk(scan, segments, i, parameters_.planar, counters_)) {
       result.detections.push_back(*trunk);

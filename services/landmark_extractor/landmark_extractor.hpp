@@ -10,29 +10,34 @@
 
 namespace understory::landmark_extractor {
 
-/// Why objects did not become landmarks; counted for HEALTH.
+/// What became of the objects in planar scans since the start, for HEALTH.
 struct ExtractorCounters {
   std::uint64_t scans = 0;
-  std::uint64_t scans_malformed = 0;  ///< No beams, or angles that make no sense.
-  std::uint64_t objects = 0;
-  std::uint64_t too_few_points = 0;
-  std::uint64_t not_alone = 0;  ///< Something beside it at about the same distance.
-  std::uint64_t out_of_range = 0;
-  std::uint64_t not_round = 0;  ///< No circle fits, or one of the wrong size.
+  std::uint64_t scans_malformed = 0;  ///< No beams, or impossible angles.
+  std::uint64_t objects = 0;          ///< Segments of scans.
+  std::uint64_t too_few_points = 0;   ///< Less than `min_points` beams.
+  std::uint64_t not_alone = 0;        ///< Something beside it at about the same distance.
+  std::uint64_t out_of_range = 0;     ///< Nearer or farther than landmarks are reported.
+  std::uint64_t not_round = 0;        ///< No circle fits, or one of the wrong size.
   std::uint64_t landmarks = 0;
 };
 
+/// The stage, for both kinds of laser. It has no state: each sweep is judged by itself, and
+/// counters begin anew after a restart.
 class LandmarkExtractor {
  public:
+  /// Parameters of both kinds.
   explicit LandmarkExtractor(const LandmarkExtractorParameters& parameters = {})
       : parameters_(parameters), sweeps_(parameters) {}
 
-  /// Trunks of a one-plane laser: objects that stand alone, are round, and have a trunk's size.
-  /// A malformed scan gives none. Invariant: detections are in order of bearing.
+  /// Trunks of a one-plane laser (frame sensor), in frame vehicle: objects that stand alone, are
+  /// round, and have a trunk's size. A malformed scan gives none. They are in order of bearing.
   model::LandmarkScan extract(const model::PlanarScan& scan);
-  /// Trunks and corners of a laser that scans in space.
+  /// Trunks and corners of a laser that scans in space; see SweepExtractor.
   model::LandmarkScan extract(const model::PointSweep& sweep) { return sweeps_.extract(sweep); }
+  /// Of planar scans.
   const ExtractorCounters& counters() const { return counters_; }
+  /// Of sweeps in space.
   const SweepCounters& sweep_counters() const { return sweeps_.counters(); }
 
  private:

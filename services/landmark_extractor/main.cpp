@@ -4,8 +4,8 @@
 int main(int argc, char** argv) {
   return understory::bus::run_service(
       understory::landmark_extractor::landmark_extractor_service({
-          .lidar_scan = "LIDAR_SCAN",    // in: sweeps of a planar laser
-          .lidar_sweep = "LIDAR_SWEEP",  // in: turns in space, in parts
+          .lidar_scan = "LIDAR_SCAN",    // in: scans of a planar laser
+          .lidar_sweep = "LIDAR_SWEEP",  // in: sweeps in space, in parts
           .landmarks = "LANDMARKS",      // out: trunks and corners of each sweep
       }),
       argc, argv);

@@ -1,3 +1,4 @@
+// Parameters of the extractor. What each is for, and how sensitive results are: README.md.
 #pragma once
 
 #include "common/geometry/se2.hpp"
@@ -7,32 +8,32 @@ namespace understory::landmark_extractor {
 /// Trunks from lasers that sweep one plane. Noise figures: SICK LMS 2xx at 0.5 degrees.
 struct PlanarTrunkParameters {
   geometry::SE2 vehicle_T_sensor;   ///< Where the laser is in frame `vehicle`.
-  double min_range_m = 1.5;         ///< What is nearer is the car itself.
+  double min_range_m = 1.5;         ///< Nearer returns are of the car itself.
   double max_range_m = 40.0;        ///< Trunks farther than this are not reported.
   double range_sigma_m = 0.03;      ///< Of one beam.
   double beam_width_rad = 0.001;    ///< By how much a beam's footprint widens a trunk on each side.
-  double roundness_sigma_m = 0.03;  ///< Of the bark from a circle.
-  /// How far the centre as seen from one side is off: trunks lean and are no cylinders. ...
+  double roundness_sigma_m = 0.03;  ///< Deviation of the bark from a circle.
+  /// Error of the centre as seen from one side: trunks lean and are no cylinders.
   double shape_sigma_m = 0.08;
-  /// ... It stays the same over about so many scans, and is counted as white noise of the same
-  /// power: what averages over that many detections or more stays honest.
+  /// That error is correlated over about so many scans, and is counted as white noise of the same
+  /// power: averages over that many detections or more have a consistent covariance.
   double shape_correlation_scans = 8.0;
-  double min_radius_m = 0.02;
-  double max_radius_m = 0.8;
-  double prior_radius_m = 0.15;  ///< What a trunk's radius is before it is measured.
-  double prior_radius_sigma_m = 0.15;
-  double break_distance_m = 0.35;  ///< Neighbouring returns farther apart are two objects...
-  double break_per_range = 0.01;   ///< ... plus this much per metre of range.
-  double clearance_m = 1.0;        ///< What stands beside a trunk must be so much farther away.
+  double min_radius_m = 0.02;          ///< Of a trunk.
+  double max_radius_m = 0.8;           ///< Of a trunk.
+  double prior_radius_m = 0.15;        ///< A trunk's radius before it is measured.
+  double prior_radius_sigma_m = 0.15;  ///< Of the prior.
+  double break_distance_m = 0.35;      ///< Neighbouring returns farther apart are two objects...
+  double break_per_range = 0.01;       ///< ... plus this much per metre of range.
+  double clearance_m = 1.0;            ///< What stands beside a trunk must be so much farther away.
   double separation_m = 2.0;       ///< A trunk's distance to any other object; bushes have less.
   double line_tolerance_m = 0.25;  ///< What is so near the line between its neighbours is a wall.
-  int min_points = 1;
+  int min_points = 1;              ///< Fewest beams on a trunk.
   double max_mean_square_residual = 6.0;  ///< Of the ranges from the fitted circle, in sigma^2.
 };
 
 /// What both kinds of landmark need of a sweep in space. Noise figures: Velodyne, 16 to 64 beams.
 struct SweepParameters {
-  double min_range_m = 1.0;       ///< What is nearer is the vehicle itself.
+  double min_range_m = 1.0;       ///< Nearer returns are of the vehicle itself.
   double max_range_m = 30.0;      ///< Landmarks farther than this are not reported.
   double range_sigma_m = 0.02;    ///< Of one beam.
   double beam_width_rad = 0.0;    ///< By how much a beam's footprint widens an object on each side.
@@ -48,25 +49,26 @@ struct SweepParameters {
 
 /// Trunks from lasers that scan in space.
 struct SweepTrunkParameters {
-  double min_radius_m = 0.03;  ///< Posts of street signs are pipes of 60 mm.
-  double max_radius_m = 0.8;
-  double prior_radius_m = 0.15;  ///< What a trunk's radius is before it is measured.
-  double prior_radius_sigma_m = 0.15;
+  double min_radius_m = 0.03;          ///< Posts of street signs are pipes of 60 mm diameter.
+  double max_radius_m = 0.8;           ///< Of a trunk.
+  double prior_radius_m = 0.15;        ///< A trunk's radius before it is measured.
+  double prior_radius_sigma_m = 0.15;  ///< Of the prior.
   double prior_lean_sigma_rad = 0.06;  ///< Of a trunk's axis from the vertical.
   double prior_taper = -0.01;          ///< Change of radius per metre of height.
-  double prior_taper_sigma = 0.01;
-  double roundness_sigma_m = 0.005;  ///< Of the bark from a circle.
-  /// RMS of a stem's low waves (oval, three-cornered) from a circle, in parts of its radius; more
-  /// points do not average it out. Greatest and least diameter of trees differ by 3 to 5 %.
+  double prior_taper_sigma = 0.01;     ///< Of the prior.
+  double roundness_sigma_m = 0.005;    ///< Deviation of the bark from a circle.
+  /// RMS deviation of a stem's outline from a circle in its low waves (oval, three-cornered), part
+  /// of its radius; more points do not average it out. Greatest and least diameter of trees differ
+  /// by 3 to 5 %.
   double out_of_round = 0.015;
   double max_lean_rad = 0.35;             ///< More than that is a branch.
-  double max_sigma_m = 0.08;              ///< Trunks whose centre is known worse are not reported.
+  double max_sigma_m = 0.08;              ///< Trunks with a larger sigma of the centre: left out.
   double max_mean_square_residual = 3.0;  ///< Of ranges and edges from the axis, in sigma^2.
   double gather_radius_m = 0.3;           ///< How far apart the slices of one trunk may seem.
   double leaf_radius_m = 0.6;             ///< Of the returns so near a trunk...
   double min_share = 0.4;                 ///< ... at least this part must be on it.
-  int min_points = 5;
-  int min_rings = 2;
+  int min_points = 5;                     ///< Fewest returns on a trunk.
+  int min_rings = 2;                      ///< Fewest rings that measure it.
 };
 
 /// Corners of houses from lasers that scan in space.
@@ -78,9 +80,10 @@ struct CornerParameters {
   double max_gap_per_range = 0.02;   ///< ... plus this much per metre of range.
   double max_skew_rad = 0.2;         ///< Of the angle between the walls from a right one.
   double flatness_sigma_m = 0.0005;  ///< Of a wall, besides the unevenness that its points show.
-  int min_rings = 3;
+  int min_rings = 3;                 ///< Fewest rings that measure a wall.
 };
 
+/// All parameters of the stage.
 struct LandmarkExtractorParameters {
   PlanarTrunkParameters planar;
   SweepParameters sweep;

@@ -8,7 +8,7 @@ namespace {
 
 /// More beams than any sensor has.
 constexpr std::uint16_t kMaxRings = 1024;
-/// What stands behind a landmark is looked at this far beyond the range of landmarks [m].
+/// What is behind a landmark is looked at this far beyond the range of landmarks [m].
 constexpr double kMargin_m = 2.0;
 
 /// Walls at least this long swallow trunks so near their plane and so near their ends [m].
@@ -24,7 +24,14 @@ bool well_formed(const model::PointSweep& sweep) {
   return std::abs(norm - 1.0) < 1e-3 && sweep.attitude->covariance_rad2.allFinite();
 }
 
-/// A piece of a wall between two windows or two cars looks like a trunk.
+/// Covariance of (roll, pitch) [rad^2]: the sweep's own, or the default where it has no attitude.
+Eigen::Matrix2d level_covariance_of(const model::PointSweep& sweep,
+                                    const SweepParameters& parameters) {
+  if (sweep.attitude) return sweep.attitude->covariance_rad2;
+  return parameters.level_sigma_rad * parameters.level_sigma_rad * Eigen::Matrix2d::Identity();
+}
+
+/// The part of a wall between two windows or two cars looks like a trunk.
 bool is_on(const corners::WallLine& wall, const model::Detection& trunk) {
   const Eigen::Vector2d offset = trunk.position_m.head<2>() - wall.centroid_m;
   const double along = wall.direction.dot(offset);
@@ -53,37 +60,46 @@ model::LandmarkScan SweepExtractor::extract(const model::PointSweep& sweep) {
     ++counters_.malformed;
     return result;
   }
-  result.field_of_view.max_range_m = sweep_.max_range_m;
-  Eigen::Matrix2d level_covariance =
-      sweep_.level_sigma_rad * sweep_.level_sigma_rad * Eigen::Matrix2d::Identity();
-  if (sweep.attitude) level_covariance = sweep.attitude->covariance_rad2;
   if (!sweep.attitude) ++counters_.without_attitude;
-  const double reach = sweep_.max_range_m + kMargin_m;
-  const auto lowest = static_cast<float>(sweep_.min_height_m);
-  sample_.take(sweep, cloud_.look_at(sweep, sweep_.min_range_m, reach));
+  result.field_of_view.max_range_m = sweep_.max_range_m;
+  const Eigen::Matrix2d level_covariance = level_covariance_of(sweep, sweep_);
+
+  // Ground below the vehicle's surroundings.
+  const points::Levelling& levelling =
+      cloud_.look_at(sweep, sweep_.min_range_m, sweep_.max_range_m + kMargin_m);
+  sample_.take(sweep, levelling);
   ground_.fit(sample_);
+
+  // Objects above it, ring by ring.
   cloud_.fill(sweep, ground_, counters_.points);
-  runs_.clear();
-  for (std::size_t ring = 0; ring < cloud_.rings(); ++ring) {
-    cloud_.order(ring, lowest);
-    find_runs(cloud_, sweep_, ring, runs_);
-  }
+  find_runs_of_all_rings();
+
+  // Landmarks.
   trunks_.find(cloud_, runs_, ground_, level_covariance, result.detections);
-  const std::size_t trunks = result.detections.size();
   corners_.find(cloud_, runs_, ground_, level_covariance, result.detections);
-  std::erase_if(result.detections, [&](const model::Detection& detection) {
-    return detection.kind == model::LandmarkKind::kTrunk &&
-           std::any_of(corners_.walls().begin(), corners_.walls().end(),
-                       [&](const corners::WallLine& wall) { return is_on(wall, detection); });
-  });
-  const auto left = static_cast<std::size_t>(std::count_if(
-      result.detections.begin(), result.detections.end(),
-      [](const model::Detection& d) { return d.kind == model::LandmarkKind::kTrunk; }));
-  counters_.on_wall += trunks - left;
+  leave_out_walls(result.detections);
+
   counters_.trunks = trunks_.counters();
   counters_.corners = corners_.counters();
   sort_by_bearing(result.detections);
   return result;
+}
+
+void SweepExtractor::find_runs_of_all_rings() {
+  runs_.clear();
+  const auto lowest = static_cast<float>(sweep_.min_height_m);
+  for (std::size_t ring = 0; ring < cloud_.rings(); ++ring) {
+    cloud_.order(ring, lowest);
+    find_runs(cloud_, sweep_, ring, runs_);
+  }
+}
+
+void SweepExtractor::leave_out_walls(std::vector<model::Detection>& detections) {
+  counters_.on_wall += std::erase_if(detections, [&](const model::Detection& detection) {
+    return detection.kind == model::LandmarkKind::kTrunk &&
+           std::any_of(corners_.walls().begin(), corners_.walls().end(),
+                       [&](const corners::WallLine& wall) { return is_on(wall, detection); });
+  });
 }
 
 }  // namespace understory::landmark_extractor

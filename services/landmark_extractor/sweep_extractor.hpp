@@ -1,4 +1,4 @@
-// Finds the landmarks in one turn of a laser that scans in space.
+// Finds the landmarks in one sweep of a laser that scans in space.
 #pragma once
 
 #include <cstdint>
@@ -14,30 +14,38 @@
 
 namespace understory::landmark_extractor {
 
-/// What came in and what became of it; counted for HEALTH.
+/// What came in and what became of it since the start, for HEALTH.
 struct SweepCounters {
   std::uint64_t sweeps = 0;
-  std::uint64_t malformed = 0;         ///< No rings, not de-skewed, numbers that are none.
+  std::uint64_t malformed = 0;         ///< No rings, not de-skewed, frames that are not finite.
   std::uint64_t without_attitude = 0;  ///< Taken as level.
   rings::PointCounters points;
-  std::uint64_t on_wall = 0;  ///< Trunks that were pieces of a wall.
+  std::uint64_t on_wall = 0;  ///< Trunks that were parts of a wall.
   trunks::TrunkCounters trunks;
   corners::CornerCounters corners;
 };
 
-/// Keeps its working memory from sweep to sweep.
+/// Points -> ground -> rings -> runs -> trunks and corners. Keeps its working memory from sweep to
+/// sweep, but no state: each sweep is judged by itself, so nothing is saved over a restart but
+/// counters, which begin anew. Cost: 5 ms for 64 x 2048 points.
 class SweepExtractor {
  public:
+  /// Parameters of trunks, corners, and what both need.
   explicit SweepExtractor(const LandmarkExtractorParameters& parameters)
       : sweep_(parameters.sweep),
         trunks_(parameters.sweep, parameters.trunk),
         corners_(parameters.sweep, parameters.corner) {}
 
-  /// A malformed sweep gives no detections. Invariant: trunks first, each kind in order of bearing.
+  /// Landmarks of a de-skewed sweep (frame vehicle), in `vehicle_level`. A malformed sweep gives
+  /// none and is counted. Trunks come first, each kind in order of bearing.
   model::LandmarkScan extract(const model::PointSweep& sweep);
   const SweepCounters& counters() const { return counters_; }
 
  private:
+  void find_runs_of_all_rings();
+  /// Leaves out trunks on walls.
+  void leave_out_walls(std::vector<model::Detection>& detections);
+
   SweepParameters sweep_;
   ground::GroundSample sample_;
   rings::RingCloud cloud_;

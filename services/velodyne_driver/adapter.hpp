@@ -1,4 +1,4 @@
-// The Velodyne driver's place between the network and the bus.
+// The Velodyne driver between the network and the bus.
 #pragma once
 
 #include <string>
@@ -7,12 +7,14 @@
 
 namespace understory::velodyne_driver {
 
+/// Names of the channels that it publishes on.
 struct VelodyneDriverChannels {
   std::string raw_sweep = "RAW_SWEEP";
   std::string raw_gnss = "RAW_GNSS";
 };
 
-/// Its adapter is a Device (common/bus/device.hpp).
+/// The service, for run_service(). Its adapter is a Device (common/bus/device.hpp). It refuses to
+/// start with a wrong configuration, and ends with status 1 where a port is taken.
 bus::Service velodyne_driver_service(const VelodyneDriverChannels& channels = {});
 
 }  // namespace understory::velodyne_driver

@@ -6,6 +6,7 @@
 
 namespace understory::velodyne_driver {
 
+/// Adds every parameter to the table, with unit, range and meaning. `parameters` must outlive it.
 void describe(VelodyneDriverParameters& parameters, bus::ParameterTable& table);
 
 }  // namespace understory::velodyne_driver

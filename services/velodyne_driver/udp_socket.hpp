@@ -1,4 +1,4 @@
-// A UDP socket that is only listened to.
+// A UDP socket that only receives.
 #pragma once
 
 #include <array>
@@ -11,6 +11,7 @@
 
 namespace understory::velodyne_driver {
 
+/// One packet as it came.
 struct Datagram {
   std::span<const std::uint8_t> bytes;  ///< Until the next receive().
   std::size_t size = 0;                 ///< As sent; larger than `bytes` where it was cut off.
@@ -20,27 +21,32 @@ struct Datagram {
 
 /// "192.168.1.201", host's byte order; none where it is no IPv4 address.
 std::optional<std::uint32_t> parse_ipv4(const std::string& text);
+/// The inverse of parse_ipv4().
 std::string ipv4_text(std::uint32_t address);
 
+/// Owns a bound, non-blocking socket. The kernel stamps the packets and counts those it drops.
 class UdpSocket {
  public:
-  /// Throws std::runtime_error that names address and port. Nobody else may listen on the port:
-  /// two readers would each get some of the packets.
+  /// Binds `address`:`port` (0 = any free one). Throws std::runtime_error that names both. No other
+  /// process may use the port: two readers would each get some of the packets.
   UdpSocket(const std::string& address, int port, int receive_buffer_bytes);
   ~UdpSocket();
   UdpSocket(const UdpSocket&) = delete;
   UdpSocket& operator=(const UdpSocket&) = delete;
 
-  /// None where nothing waits or the network fails; errors are counted.
+  /// The next packet; none where nothing waits or the network fails; errors are counted.
   std::optional<Datagram> receive();
 
-  int file_descriptor() const { return file_; }
-  int port() const { return port_; }
+  int file_descriptor() const { return file_; }  ///< To be polled.
+  int port() const { return port_; }             ///< The one that it is bound to.
+  /// What the kernel granted.
   int receive_buffer_bytes() const { return receive_buffer_bytes_; }
-  /// Datagrams that the kernel threw away since nobody took them in time.
+  /// Packets that the kernel threw away because they were not received in time.
   std::uint64_t overruns() const { return overruns_; }
+  /// Whether this kernel counts them.
   bool reports_overruns() const { return reports_overruns_; }
-  std::uint64_t errors() const { return errors_; }
+  std::uint64_t errors() const { return errors_; }  ///< Failed receptions so far.
+  /// Text of the latest one; empty = none yet.
   const std::string& last_error() const { return last_error_; }
 
  private:

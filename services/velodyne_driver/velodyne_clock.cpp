@@ -22,7 +22,7 @@ model::Utime hour_difference(std::uint32_t from, std::uint32_t to) {
 
 }  // namespace
 
-void VelodyneClock::lay(std::uint32_t past_hour_us, model::Utime received) {
+void VelodyneClock::put_into_hour(std::uint32_t past_hour_us, model::Utime received) {
   const double hours =
       std::round(static_cast<double>(received - past_hour_us) / static_cast<double>(kHour_us));
   utime_ = static_cast<model::Utime>(hours) * kHour_us + past_hour_us;
@@ -42,8 +42,9 @@ VelodyneClock::Reading VelodyneClock::take(std::uint32_t past_hour_us, model::Ut
   Step step = Step::kNext;
   if (!has_started_) {
     has_started_ = true;
-    lay(past_hour_us, received);
+    put_into_hour(past_hour_us, received);
   } else {
+    // Both clocks should have advanced alike.
     const model::Utime passed = received - received_;
     model::Utime delta = hour_difference(past_hour_us_, past_hour_us);
     if (std::abs(delta - passed) <= kLargestMismatch_us) {
@@ -52,16 +53,18 @@ VelodyneClock::Reading VelodyneClock::take(std::uint32_t past_hour_us, model::Ut
     } else {
       // Silent for more than half an hour, or one of the clocks was set.
       const model::Utime before = utime_;
-      lay(past_hour_us, received);
+      put_into_hour(past_hour_us, received);
       delta = utime_ - before;
       forget_offset();
       if (std::abs(delta - passed) > kLargestMismatch_us && delta > kLargestGap_us)
         step = Step::kJump;
     }
+
     if (delta < 0) step = Step::kJump;
     if (step == Step::kNext && delta > kLargestGap_us) step = Step::kGap;
     if (step == Step::kJump) forget_offset();
   }
+
   past_hour_us_ = past_hour_us;
   received_ = received;
   measure(received);

@@ -1,4 +1,4 @@
-// The sensor's clock: from microseconds past some hour to stamps that go on.
+// The sensor's clock: from microseconds past the hour to stamps that advance.
 #pragma once
 
 #include <algorithm>
@@ -10,31 +10,33 @@
 
 namespace understory::velodyne_driver {
 
-/// The first packet's time is laid onto the hour that brings it nearest to when it came; from then
-/// on it is counted on, so that a sensor half an hour off never changes the hour in between.
+/// The first packet's time is put into the hour that brings it nearest to its reception; from then
+/// on differences are added, so that a sensor half an hour off never changes the hour in between.
 class VelodyneClock {
  public:
+  /// How a packet's time follows that of the one before.
   enum class Step : std::uint8_t {
-    kNext,
+    kNext,  ///< In order.
     kGap,   ///< More time has passed than between two packets.
     kLate,  ///< Before the last one by less than kLargestDisorder_us; the clock stays.
     kJump,  ///< The sensor's clock was set, or the sensor started again.
   };
+  /// The time of one packet.
   struct Reading {
     Step step = Step::kNext;
     model::Utime utime = 0;  ///< By the sensor's clock.
   };
-  /// `received` by the computer's clock.
+  /// Takes a packet's time [us past the hour] and when it was received by the computer's clock.
   Reading take(std::uint32_t past_hour_us, model::Utime received);
   /// How far the computer's clock is ahead of the sensor's: the least (the least delayed packet) of
   /// the last ten to twenty seconds [us]; none before the first packet.
   std::optional<model::Utime> offset_us() const;
 
-  static constexpr model::Utime kLargestGap_us = 50000;
-  static constexpr model::Utime kLargestDisorder_us = 20000;
+  static constexpr model::Utime kLargestGap_us = 50000;       ///< More is kGap.
+  static constexpr model::Utime kLargestDisorder_us = 20000;  ///< Less, back in time, is kLate.
 
  private:
-  void lay(std::uint32_t past_hour_us, model::Utime received);
+  void put_into_hour(std::uint32_t past_hour_us, model::Utime received);
   void measure(model::Utime received);
   void forget_offset() { offset_ = offset_before_ = kNone; }
 

@@ -58,19 +58,19 @@ bool VelodyneDriver::refuse(std::span<const std::uint8_t> packet, std::size_t si
 }
 
 void VelodyneDriver::start_over() {
-  // Turns that were begun are numbered too: the number must not come again.
+  // Sweeps that were begun are numbered, too: no number must come twice.
   next_revolution_ += decoder_.counts().turns + 1;
   decoder_ = io::VelodyneDecoder(calibration_, parameters_.sensor.max_range_m);
-  holes_had_ = 0;
+  holes_reported_ = 0;
 }
 
-std::optional<model::PointSweep> VelodyneDriver::stamped(std::optional<model::PointSweep> turn) {
-  if (!turn) return turn;
-  ++counts_.turns;
-  turn->turn += next_revolution_;
-  turn->sequence = turn->turn;
-  if (parameters_.time.source == "received") turn->utime += clock_.offset_us().value_or(0);
-  return turn;
+std::optional<model::PointSweep> VelodyneDriver::stamped(std::optional<model::PointSweep> sweep) {
+  if (!sweep) return sweep;
+  ++counts_.sweeps;
+  sweep->turn += next_revolution_;
+  sweep->sequence = sweep->turn;
+  if (parameters_.time.source == "received") sweep->utime += clock_.offset_us().value_or(0);
+  return sweep;
 }
 
 VelodyneDriverOutput VelodyneDriver::add_data(std::span<const std::uint8_t> packet,
@@ -78,6 +78,8 @@ VelodyneDriverOutput VelodyneDriver::add_data(std::span<const std::uint8_t> pack
   VelodyneDriverOutput output;
   ++counts_.data_packets;
   if (refuse(packet, size, output.faults)) return output;
+
+  // Does its time follow?
   const VelodyneClock::Reading time = clock_.take(io::velodyne_packet_time_us(packet), received);
   switch (time.step) {
     case VelodyneClock::Step::kNext:
@@ -90,22 +92,23 @@ VelodyneDriverOutput VelodyneDriver::add_data(std::span<const std::uint8_t> pack
     case VelodyneClock::Step::kGap:
       ++counts_.gaps;
       output.faults.push_back(
-          {wire::Reason::kPartsMissing, "packets stayed away: a turn is left out"});
+          {wire::Reason::kPartsMissing, "no packets for a while: a sweep is left out"});
       start_over();
       break;
     case VelodyneClock::Step::kJump:
       ++counts_.jumps;
       output.faults.push_back(
-          {wire::Reason::kClockJump, "the sensor's clock jumped: a turn is left out"});
+          {wire::Reason::kClockJump, "the sensor's clock jumped: a sweep is left out"});
       start_over();
       break;
   }
-  output.turn = stamped(decoder_.add(packet, time.utime));
-  if (decoder_.counts().lost_azimuth > holes_had_) {
-    holes_had_ = decoder_.counts().lost_azimuth;
+
+  output.sweep = stamped(decoder_.add(packet, time.utime));
+  if (decoder_.counts().lost_azimuth > holes_reported_) {
+    holes_reported_ = decoder_.counts().lost_azimuth;
     ++counts_.holes;
     output.faults.push_back(
-        {wire::Reason::kPartsMissing, "packets are missing: a turn has a hole"});
+        {wire::Reason::kPartsMissing, "packets are missing: a sweep has a hole"});
   }
   return output;
 }
@@ -119,6 +122,7 @@ VelodyneDriverOutput VelodyneDriver::add_position(std::span<const std::uint8_t> 
     output.faults.push_back(wrong_size(size, io::kVelodynePositionBytes));
     return output;
   }
+
   const auto position = io::parse_velodyne_position(packet);
   if (position) {
     output.fix = fixes_.add(*position, received);

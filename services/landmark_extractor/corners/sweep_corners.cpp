@@ -8,7 +8,7 @@
 namespace understory::landmark_extractor::corners {
 namespace {
 
-/// A wall is looked at this far from its corner to see whether it ends below a person's height [m].
+/// The height of a wall is checked this far from its corner [m].
 constexpr double kAside_m = 0.4;
 /// Rings this much above its highest return should have met it, were it higher [m].
 constexpr double kAbove_m = 0.02;
@@ -38,7 +38,7 @@ Eigen::Matrix3d from_level_error(const Eigen::Vector3d& place, const WallLine& a
   return jacobian * level_covariance_rad2 * jacobian.transpose();
 }
 
-/// Whether the ring's beams about an azimuth go on beyond the range, or to nowhere.
+/// Whether the ring's beams about an azimuth go beyond the range, or have no return.
 bool passes(const rings::RingCloud& cloud, std::size_t ring, float azimuth, double range) {
   const float half = kBeamsAside * cloud.step_rad(ring);
   const std::size_t end = cloud.ring_end(ring);
@@ -76,8 +76,8 @@ void SweepCorners::find(const rings::RingCloud& cloud, const std::vector<rings::
   counters_.corners += detections.size() - first;
 }
 
-/// Windows and doors make several walls of one: the edge of a house is told once, by those that
-/// know it best.
+/// Windows and doors make several walls of one: the edge of a house is given once, by the pair with
+/// the smallest covariance.
 void SweepCorners::add(const model::Detection& corner, std::size_t first,
                        std::vector<model::Detection>& detections) const {
   const auto is_same = [&](const model::Detection& other) {
@@ -86,6 +86,7 @@ void SweepCorners::add(const model::Detection& corner, std::size_t first,
     return (corner.position_m - other.position_m).head<2>().norm() < corner_.max_gap_m &&
            std::abs(turned) < corner_.max_skew_rad;
   };
+
   const auto same = std::find_if(detections.begin() + static_cast<std::ptrdiff_t>(first),
                                  detections.end(), is_same);
   if (same == detections.end()) {
@@ -96,7 +97,6 @@ void SweepCorners::add(const model::Detection& corner, std::size_t first,
   }
 }
 
-/// Where the lines meet, if both walls are seen up to there.
 std::optional<SweepCorners::Meeting> SweepCorners::meet(const WallLine& a, const WallLine& b,
                                                         const Eigen::Vector2d& sensor) const {
   const double sine = cross(a.direction, b.direction);
@@ -106,6 +106,8 @@ std::optional<SweepCorners::Meeting> SweepCorners::meet(const WallLine& a, const
   meeting.reach_a_m = cross(between, b.direction) / sine;
   meeting.reach_b_m = cross(between, a.direction) / sine;
   meeting.place_m = a.centroid_m + meeting.reach_a_m * a.direction;
+
+  // At the ends of both, and at the same heights?
   const double gap =
       corner_.max_gap_m + corner_.max_gap_per_range * (meeting.place_m - sensor).norm();
   const auto at_end = [&](const WallLine& wall, double reach) {
@@ -114,6 +116,7 @@ std::optional<SweepCorners::Meeting> SweepCorners::meet(const WallLine& a, const
   if (!at_end(a, meeting.reach_a_m) || !at_end(b, meeting.reach_b_m)) return std::nullopt;
   const double overlap = std::min(a.high_z_m, b.high_z_m) - std::max(a.low_z_m, b.low_z_m);
   if (overlap < 0.5 * corner_.min_extent_m) return std::nullopt;
+
   meeting.along_a = along(a, meeting.place_m);
   meeting.along_b = along(b, meeting.place_m);
   return meeting;
@@ -126,13 +129,16 @@ std::optional<model::Detection> SweepCorners::judge(const rings::RingCloud& clou
   const Eigen::Vector2d sensor = cloud.sensor_m().head<2>().cast<double>();
   const auto meeting = meet(a, b, sensor);
   if (!meeting || (meeting->place_m - sensor).norm() > sweep_.max_range_m) return std::nullopt;
+
+  // At a right angle?
   ++counters_.pairs;
   if (std::abs(std::asin(std::clamp(meeting->along_a.dot(meeting->along_b), -1.0, 1.0))) >
       corner_.max_skew_rad) {
     ++counters_.skew;
     return std::nullopt;
   }
-  // Both faces are seen from in front of the corner or from within it.
+
+  // Both faces are measured from in front of the corner or from within it.
   const Eigen::Vector2d to_sensor = sensor - meeting->place_m;
   const bool inside_a = meeting->along_a.dot(to_sensor) > 0.0;
   const bool inside_b = meeting->along_b.dot(to_sensor) > 0.0;
@@ -140,15 +146,20 @@ std::optional<model::Detection> SweepCorners::judge(const rings::RingCloud& clou
     ++counters_.hidden;
     return std::nullopt;
   }
+
+  // A house is taller than a person.
   const ground::GroundHeight below = ground.below(meeting->place_m);
-  if (!is_stationary(cloud, a, meeting->place_m, meeting->along_a, below.height_m) ||
-      !is_stationary(cloud, b, meeting->place_m, meeting->along_b, below.height_m)) {
+  if (!is_tall(cloud, a, meeting->place_m, meeting->along_a, below.height_m) ||
+      !is_tall(cloud, b, meeting->place_m, meeting->along_b, below.height_m)) {
     ++counters_.low;
     return std::nullopt;
   }
+
+  // Position, covariance, bearing.
   model::Detection corner;
   corner.kind = model::LandmarkKind::kCorner;
   corner.position_m << meeting->place_m, below.height_m + sweep_.breast_height_m;
+
   // Each wall fixes the place across itself; unevenness counts at the corner, not at the centroid.
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
   const auto add = [&](const WallLine& wall, double reach) {
@@ -160,6 +171,7 @@ std::optional<model::Detection> SweepCorners::judge(const rings::RingCloud& clou
   corner.covariance_m2 = from_level_error(corner.position_m, a, b, level_covariance_rad2);
   corner.covariance_m2.topLeftCorner<2, 2>() += information.inverse();
   corner.covariance_m2(2, 2) += square(below.sigma_m);
+
   const Eigen::Vector2d inward = meeting->along_a + meeting->along_b;
   const Eigen::Vector2d open = inside_a ? inward : Eigen::Vector2d(-inward);
   corner.bearing_rad = std::atan2(open.y(), open.x());
@@ -168,15 +180,16 @@ std::optional<model::Detection> SweepCorners::judge(const rings::RingCloud& clou
 }
 
 /// Whether no beam passes over the wall, near its corner, below a person's height.
-bool SweepCorners::is_stationary(const rings::RingCloud& cloud, const WallLine& wall,
-                                 const Eigen::Vector2d& corner, const Eigen::Vector2d& along,
-                                 double ground_z) const {
+bool SweepCorners::is_tall(const rings::RingCloud& cloud, const WallLine& wall,
+                           const Eigen::Vector2d& corner, const Eigen::Vector2d& along,
+                           double ground_z) const {
   const Eigen::Vector2d sensor = cloud.sensor_m().head<2>().cast<double>();
   const double aside = std::min(kAside_m, 0.5 * wall.length());
   const Eigen::Vector2d place = corner + aside * along;
   const double distance = (place - sensor).norm();
   const auto azimuth =
       static_cast<float>(std::atan2(place.y() - sensor.y(), place.x() - sensor.x()));
+
   for (std::size_t ring = 0; ring < cloud.rings(); ++ring) {
     if (cloud.step_rad(ring) <= 0.0F) continue;
     const double z = cloud.sensor_m().z() + cloud.slope(ring, azimuth) * distance;

@@ -11,27 +11,30 @@
 
 namespace understory::landmark_extractor::corners {
 
-/// Why pairs of walls did not become corners.
+/// What became of walls and their pairs since the start.
 struct CornerCounters {
-  std::uint64_t walls = 0;
-  std::uint64_t pairs = 0;   ///< Walls that meet.
-  std::uint64_t skew = 0;    ///< At no right angle.
-  std::uint64_t low = 0;     ///< Ends below a person's height: a car, a hedge, a box.
-  std::uint64_t hidden = 0;  ///< From where the sensor is the two cannot be seen so.
-  std::uint64_t corners = 0;
+  std::uint64_t walls = 0;    ///< Found.
+  std::uint64_t pairs = 0;    ///< Walls that meet.
+  std::uint64_t skew = 0;     ///< At no right angle.
+  std::uint64_t low = 0;      ///< Ends below a person's height: a car, a hedge, a box.
+  std::uint64_t hidden = 0;   ///< From the sensor's place these two faces cannot both be seen.
+  std::uint64_t corners = 0;  ///< Given out.
 };
 
+/// Finds the edges of houses in one sweep. Keeps its memory from sweep to sweep, but no state.
 class SweepCorners {
  public:
+  /// `sweep`: what is common with trunks.
   SweepCorners(const SweepParameters& sweep, const CornerParameters& corner)
       : sweep_(sweep), corner_(corner), walls_(sweep, corner) {}
 
-  /// Appends the corners to `detections`.
+  /// Appends the corners to `detections`, frame `vehicle_level`: position at breast height, bearing
+  /// out of the house. `level_covariance_rad2`: of (roll, pitch).
   void find(const rings::RingCloud& cloud, const std::vector<rings::Run>& runs,
             const ground::GroundSurface& ground, const Eigen::Matrix2d& level_covariance_rad2,
             std::vector<model::Detection>& detections);
-  const CornerCounters& counters() const { return counters_; }
-  /// Of the last sweep.
+  const CornerCounters& counters() const { return counters_; }  ///< Since the start.
+  /// The walls of the last sweep.
   const std::vector<WallLine>& walls() const { return found_; }
 
  private:
@@ -43,16 +46,17 @@ class SweepCorners {
     double reach_a_m = 0.0;  ///< From the centroid of wall a.
     double reach_b_m = 0.0;
   };
+  /// Where the lines meet, if both walls are measured up to there.
   std::optional<Meeting> meet(const WallLine& a, const WallLine& b,
                               const Eigen::Vector2d& sensor) const;
+  /// The corner of two walls, or none and a count why.
   std::optional<model::Detection> judge(const rings::RingCloud& cloud, const WallLine& a,
                                         const WallLine& b, const ground::GroundSurface& ground,
                                         const Eigen::Matrix2d& level_covariance_rad2);
   void add(const model::Detection& corner, std::size_t first,
            std::vector<model::Detection>& detections) const;
-  bool is_stationary(const rings::RingCloud& cloud, const WallLine& wall,
-                     const Eigen::Vector2d& corner, const Eigen::Vector2d& along,
-                     double ground_z) const;
+  bool is_tall(const rings::RingCloud& cloud, const WallLine& wall, const Eigen::Vector2d& corner,
+               const Eigen::Vector2d& along, double ground_z) const;
 
   SweepParameters sweep_;
   CornerParameters corner_;

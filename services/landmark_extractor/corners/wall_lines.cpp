@@ -10,16 +10,16 @@
 namespace understory::landmark_extractor::corners {
 namespace {
 
-/// Pieces of one wall have directions that differ by less than this [rad]...
+/// Segments of one wall have directions that differ by less than this [rad]...
 constexpr double kSameDirection = 0.1;
 /// ... and are found this many rings apart at most: windows and shutters interrupt a wall.
 constexpr std::size_t kRingReach = 4;
 
-/// A wall's unevenness is looked for in so many stretches of it.
+/// A wall's unevenness is measured over so many stretches of it.
 constexpr std::size_t kStretches = 8;
 /// Points scatter across a wall at least by this part of their range's noise.
 constexpr double kLeastAcross = 0.1;
-/// So many neighbours on a piece are looked at together.
+/// So many neighbours on a segment are summed.
 constexpr std::size_t kPartPoints = 8;
 
 double square(double value) { return value * value; }
@@ -45,16 +45,18 @@ LineSums& LineSums::operator+=(const LineSums& other) {
 
 const std::vector<WallLine>& WallFinder::find(const rings::RingCloud& cloud,
                                               const std::vector<rings::Run>& runs) {
-  increments_.clear();
+  segments_.clear();
   parts_.clear();
   walls_.clear();
   ring_begins_.assign(cloud.rings() + 1, 0);
+
   for (const rings::Run& run : runs) {
     if (run.size() >= rings::kLeastOfWall && run.width_m > 0.5 * corner_.min_length_m) {
       split(cloud, run, run.first, run.last);
     }
-    ring_begins_[run.ring + std::size_t{1}] = increments_.size();
+    ring_begins_[run.ring + std::size_t{1}] = segments_.size();
   }
+  // Rings without a segment.
   for (std::size_t ring = 0; ring < cloud.rings(); ++ring) {
     ring_begins_[ring + 1] = std::max(ring_begins_[ring], ring_begins_[ring + 1]);
   }
@@ -70,6 +72,7 @@ void WallFinder::split(const rings::RingCloud& cloud, const rings::Run& run, std
   const Eigen::Vector2f to(cloud.points()[last].x_m, cloud.points()[last].y_m);
   const Eigen::Vector2f along = (to - from).normalized();
   const auto tolerance = static_cast<float>(corner_.line_tolerance_m);
+
   float farthest = 0.0F;
   std::size_t cut = first;
   for (std::size_t i = first + 1; i < last; ++i) {
@@ -81,101 +84,107 @@ void WallFinder::split(const rings::RingCloud& cloud, const rings::Run& run, std
       cut = i;
     }
   }
+
   if (farthest > tolerance) {
     split(cloud, run, first, cut);
     split(cloud, run, cut, last);
   } else {
-    add_increment(cloud, run, first, last);
+    add_segment(cloud, run, first, last);
   }
 }
 
-void WallFinder::add_increment(const rings::RingCloud& cloud, const rings::Run& run,
-                               std::size_t first, std::size_t last) {
-  LinePiece piece;
-  piece.from_m = cloud.points()[first].position();
-  piece.to_m = cloud.points()[last].position();
-  piece.length_m = (piece.to_m - piece.from_m).norm();
-  if (piece.length_m < 0.5 * corner_.min_length_m) return;
-  piece.direction = (piece.to_m - piece.from_m) / piece.length_m;
-  // A piece along the beams is a row of edges, not a wall.
-  const Eigen::Vector2d beam = piece.from_m - cloud.sensor_m().head<2>().cast<double>();
-  if (std::abs(cross(beam.normalized(), piece.direction)) < 0.05) return;
+void WallFinder::add_segment(const rings::RingCloud& cloud, const rings::Run& run,
+                             std::size_t first, std::size_t last) {
+  LineSegment segment;
+  segment.from_m = cloud.points()[first].position();
+  segment.to_m = cloud.points()[last].position();
+  segment.length_m = (segment.to_m - segment.from_m).norm();
+  if (segment.length_m < 0.5 * corner_.min_length_m) return;
+  segment.direction = (segment.to_m - segment.from_m) / segment.length_m;
+  // A segment along the beams is a row of edges, not a wall.
+  const Eigen::Vector2d beam = segment.from_m - cloud.sensor_m().head<2>().cast<double>();
+  if (std::abs(cross(beam.normalized(), segment.direction)) < 0.05) return;
+
+  // Sums of its inner points.
   double z = 0.0;
   double height = 0.0;
-  // The points where pieces meet belong to neither for sure.
-  piece.first_part = static_cast<std::uint32_t>(parts_.size());
+  // The points where segments meet belong to neither for sure.
+  segment.first_part = static_cast<std::uint32_t>(parts_.size());
   for (std::size_t i = first + 1; i < last; ++i) {
     if ((i - first - 1) % kPartPoints == 0) parts_.emplace_back();
     parts_.back().count += 1.0;
     parts_.back().sum += cloud.points()[i].position();
-    piece.sums.add(cloud.points()[i].position());
+    segment.sums.add(cloud.points()[i].position());
     z += cloud.points()[i].z_m;
     height += cloud.points()[i].height_m;
   }
-  piece.parts = static_cast<std::uint32_t>(parts_.size()) - piece.first_part;
-  piece.ring = run.ring;
-  piece.z_m = z / piece.sums.count;
-  piece.height_m = height / piece.sums.count;
-  piece.first = static_cast<std::uint32_t>(first);
-  piece.last = static_cast<std::uint32_t>(last);
-  increments_.push_back(piece);
+
+  segment.parts = static_cast<std::uint32_t>(parts_.size()) - segment.first_part;
+  segment.ring = run.ring;
+  segment.z_m = z / segment.sums.count;
+  segment.height_m = height / segment.sums.count;
+  segment.first = static_cast<std::uint32_t>(first);
+  segment.last = static_cast<std::uint32_t>(last);
+  segments_.push_back(segment);
 }
 
-bool WallFinder::same_wall(const LinePiece& a, const LinePiece& b) const {
+bool WallFinder::same_wall(const LineSegment& a, const LineSegment& b) const {
   const Eigen::Vector2d& direction = a.direction;
   if (std::abs(cross(direction, b.direction)) > kSameDirection ||
       direction.dot(b.direction) < 0.0) {
     return false;
   }
+
   const Eigen::Vector2d middle = 0.5 * (b.from_m + b.to_m) - a.from_m;
   const double length = a.length_m;
   const double half = 0.5 * b.length_m;
   const double along = direction.dot(middle);
   const double lever = std::max(length, 2.0 * half);
   const double across = std::abs(cross(direction, middle));
-  // Two short pieces' directions are uncertain; their neighbourhood is not.
+  // The directions of two short segments are uncertain, but not their neighbourhood.
   return across < corner_.line_tolerance_m * (1.0 + std::abs(along - 0.5 * length) / lever) &&
          along + half > 0.0 && along - half < length;
 }
 
-std::uint32_t WallFinder::root(std::uint32_t piece) {
-  while (parents_[piece] != piece) {
-    parents_[piece] = parents_[parents_[piece]];
-    piece = parents_[piece];
+std::uint32_t WallFinder::root(std::uint32_t segment) {
+  while (parents_[segment] != segment) {
+    parents_[segment] = parents_[parents_[segment]];
+    segment = parents_[segment];
   }
-  return piece;
+  return segment;
 }
 
 void WallFinder::join() {
-  parents_.resize(increments_.size());
+  parents_.resize(segments_.size());
   std::iota(parents_.begin(), parents_.end(), 0U);
-  for (std::uint32_t i = 0; i < increments_.size(); ++i) {
+  for (std::uint32_t i = 0; i < segments_.size(); ++i) {
     const std::size_t last_ring =
-        std::min<std::size_t>(ring_begins_.size() - 2, increments_[i].ring + kRingReach);
+        std::min<std::size_t>(ring_begins_.size() - 2, segments_[i].ring + kRingReach);
     const std::size_t end = ring_begins_[last_ring + 1];
-    for (auto j = static_cast<std::uint32_t>(ring_begins_[increments_[i].ring + std::size_t{1}]);
+    for (auto j = static_cast<std::uint32_t>(ring_begins_[segments_[i].ring + std::size_t{1}]);
          j < end; ++j) {
-      if (same_wall(increments_[i], increments_[j])) parents_[root(j)] = root(i);
+      if (same_wall(segments_[i], segments_[j])) parents_[root(j)] = root(i);
     }
   }
-  members_.resize(std::max(members_.size(), increments_.size()));
-  for (std::uint32_t i = 0; i < increments_.size(); ++i) members_[root(i)].push_back(i);
-  for (std::uint32_t i = 0; i < increments_.size(); ++i) {
+
+  members_.resize(std::max(members_.size(), segments_.size()));
+  for (std::uint32_t i = 0; i < segments_.size(); ++i) members_[root(i)].push_back(i);
+  for (std::uint32_t i = 0; i < segments_.size(); ++i) {
     if (!members_[i].empty()) add_wall(members_[i]);
     members_[i].clear();
   }
 }
 
-/// How far stretches of the wall are from its line beyond what the noise of their points explains,
-/// in root mean square: neighbouring rings see the same bumps.
+/// RMS distance of stretches of the wall from its line beyond what the noise of their points
+/// explains: neighbouring rings measure the same bumps.
 double WallFinder::unevenness(const std::vector<std::uint32_t>& members, const WallLine& wall,
                               double variance_m2) const {
   std::array<double, kStretches> counts{};
   std::array<double, kStretches> offsets{};
   const Eigen::Vector2d normal = wall.normal();
   for (const std::uint32_t i : members) {
-    for (std::uint32_t k = 0; k < increments_[i].parts; ++k) {
-      const IncrementPart& part = parts_[increments_[i].first_part + k];
+    for (std::uint32_t k = 0; k < segments_[i].parts; ++k) {
+      const SegmentPart& part = parts_[segments_[i].first_part + k];
       const Eigen::Vector2d offset = part.sum / part.count - wall.centroid_m;
       const double along = (wall.direction.dot(offset) - wall.from_m) / wall.length();
       const auto stretch = static_cast<std::size_t>(
@@ -184,6 +193,7 @@ double WallFinder::unevenness(const std::vector<std::uint32_t>& members, const W
       offsets[stretch] += part.count * normal.dot(offset);
     }
   }
+
   double excess = 0.0;
   double stretches = 0.0;
   for (std::size_t k = 0; k < kStretches; ++k) {
@@ -195,7 +205,6 @@ double WallFinder::unevenness(const std::vector<std::uint32_t>& members, const W
   return stretches > 3.0 ? std::sqrt(std::max(0.0, excess / (stretches - 2.0))) : 0.0;
 }
 
-/// Total least squares.
 void WallFinder::add_wall(const std::vector<std::uint32_t>& members) {
   LineSums sums;
   WallLine wall;
@@ -203,34 +212,38 @@ void WallFinder::add_wall(const std::vector<std::uint32_t>& members) {
   wall.high_z_m = wall.high_height_m = -wall.low_z_m;
   std::uint16_t ring = 0xffff;
   for (const std::uint32_t i : members) {
-    const LinePiece& piece = increments_[i];
-    sums += piece.sums;
-    wall.z_m += piece.sums.count * piece.z_m;
-    wall.low_z_m = std::min(wall.low_z_m, piece.z_m);
-    wall.high_z_m = std::max(wall.high_z_m, piece.z_m);
-    wall.high_height_m = std::max(wall.high_height_m, piece.height_m);
-    if (piece.ring != ring) ++wall.rings;
-    ring = piece.ring;
+    const LineSegment& segment = segments_[i];
+    sums += segment.sums;
+    wall.z_m += segment.sums.count * segment.z_m;
+    wall.low_z_m = std::min(wall.low_z_m, segment.z_m);
+    wall.high_z_m = std::max(wall.high_z_m, segment.z_m);
+    wall.high_height_m = std::max(wall.high_height_m, segment.height_m);
+    if (segment.ring != ring) ++wall.rings;
+    ring = segment.ring;
   }
   if (wall.rings < corner_.min_rings || wall.high_z_m - wall.low_z_m < corner_.min_extent_m) return;
+
+  // Total least squares.
   wall.centroid_m = sums.sum / sums.count;
   wall.z_m /= sums.count;
   const Eigen::Matrix2d scatter =
       sums.square / sums.count - wall.centroid_m * wall.centroid_m.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(scatter);
   wall.direction = axes.eigenvectors().col(1);
-  if (wall.direction.dot(increments_[members[0]].direction) < 0.0) wall.direction *= -1.0;
+  if (wall.direction.dot(segments_[members[0]].direction) < 0.0) wall.direction *= -1.0;
   const double across2 =
       std::max(axes.eigenvalues()[0], square(kLeastAcross * sweep_.range_sigma_m));
   if (std::sqrt(across2) > corner_.line_tolerance_m) return;
+
+  // Its extent.
   wall.from_m = std::numeric_limits<double>::infinity();
   wall.to_m = -wall.from_m;
   for (const std::uint32_t i : members) {
-    wall.from_m =
-        std::min(wall.from_m, wall.direction.dot(increments_[i].from_m - wall.centroid_m));
-    wall.to_m = std::max(wall.to_m, wall.direction.dot(increments_[i].to_m - wall.centroid_m));
+    wall.from_m = std::min(wall.from_m, wall.direction.dot(segments_[i].from_m - wall.centroid_m));
+    wall.to_m = std::max(wall.to_m, wall.direction.dot(segments_[i].to_m - wall.centroid_m));
   }
   if (wall.length() < corner_.min_length_m) return;
+
   // Noise averages out over points; unevenness, over stretches of the wall.
   wall.unevenness_m = std::hypot(unevenness(members, wall, across2), corner_.flatness_sigma_m);
   const double of_offset = across2 / sums.count + square(wall.unevenness_m) / kStretches;

@@ -1,4 +1,4 @@
-// Upright walls: straight pieces of several rings, one above the other.
+// Upright walls: straight parts of several rings, one above the other.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,83 +13,90 @@ namespace understory::landmark_extractor::corners {
 /// Sums over points of the plan, relative to an anchor, from which a line follows.
 struct LineSums {
   double count = 0.0;
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();  ///< [m]
   Eigen::Matrix2d square = Eigen::Matrix2d::Zero();
 
+  /// Adds one point.
   void add(const Eigen::Vector2d& point);
+  /// Adds the points of another sum with the same anchor.
   LineSums& operator+=(const LineSums& other);
 };
 
-/// A straight piece of one ring.
-struct LinePiece {
+/// A straight part of one ring, frame `vehicle_level`.
+struct LineSegment {
   Eigen::Vector2d from_m = Eigen::Vector2d::Zero();  ///< Right end as seen from the sensor.
-  Eigen::Vector2d to_m = Eigen::Vector2d::Zero();
+  Eigen::Vector2d to_m = Eigen::Vector2d::Zero();    ///< Left end.
   LineSums sums;
-  std::uint32_t first_part = 0;  ///< Sums of some neighbours each.
+  std::uint32_t first_part = 0;  ///< Its parts (some neighbours each), among those of the sweep.
   std::uint32_t parts = 0;
   std::uint16_t ring = 0;
-  double z_m = 0.0;
-  double height_m = 0.0;  ///< Above ground.
-  /// Last point of the cloud at either end.
-  std::uint32_t first = 0;
+  double z_m = 0.0;         ///< Mean.
+  double height_m = 0.0;    ///< Above ground, mean.
+  std::uint32_t first = 0;  ///< Points of the cloud at either end.
   std::uint32_t last = 0;
   Eigen::Vector2d direction = Eigen::Vector2d::UnitX();  ///< Unit, from end to end.
   double length_m = 0.0;
 };
 
-/// A vertical plane, as far as it is seen.
+/// A vertical plane, as far as it is measured; frame `vehicle_level`.
 struct WallLine {
   Eigen::Vector2d centroid_m = Eigen::Vector2d::Zero();
   Eigen::Vector2d direction = Eigen::Vector2d::UnitX();  ///< Unit; to the left for the sensor.
-  double from_m = 0.0;  ///< Extent along `direction`, from the centroid.
-  double to_m = 0.0;
-  double z_m = 0.0;             ///< Mean height of its points.
-  double unevenness_m = 0.0;    ///< Of the wall beyond the noise of its points, as they show it.
-  double offset_sigma_m = 0.0;  ///< Of the centroid, across.
-  double direction_sigma_rad = 0.0;
-  double low_z_m = 0.0;
-  double high_z_m = 0.0;
-  double high_height_m = 0.0;  ///< Above ground.
-  int rings = 0;
+  double from_m = 0.0;               ///< Extent along `direction`, from the centroid.
+  double to_m = 0.0;                 ///< The same of the other end.
+  double z_m = 0.0;                  ///< Mean of its points.
+  double unevenness_m = 0.0;         ///< RMS deviation from a plane beyond the points' noise.
+  double offset_sigma_m = 0.0;       ///< Of the centroid, across.
+  double direction_sigma_rad = 0.0;  ///< Of `direction`.
+  double low_z_m = 0.0;              ///< Of the lowest ring.
+  double high_z_m = 0.0;             ///< Of the highest ring.
+  double high_height_m = 0.0;        ///< The same above ground.
+  int rings = 0;                     ///< That measured it.
 
+  /// Extent along `direction` [m].
   double length() const { return to_m - from_m; }
+  /// Unit, left of `direction`.
   Eigen::Vector2d normal() const { return {-direction.y(), direction.x()}; }
 };
 
-/// Keeps its memory from sweep to sweep.
+/// Cuts runs into straight segments (Douglas and Peucker), joins those of neighbouring rings in one
+/// upright plane, and fits a line to each group. Keeps its memory from sweep to sweep, but no
+/// state.
 class WallFinder {
  public:
+  /// Noise and limits are taken from the parameters.
   WallFinder(const SweepParameters& sweep, const CornerParameters& corner)
       : sweep_(sweep), corner_(corner) {}
 
+  /// The walls of one sweep; they are valid until the next call.
   const std::vector<WallLine>& find(const rings::RingCloud& cloud,
                                     const std::vector<rings::Run>& runs);
 
  private:
   void split(const rings::RingCloud& cloud, const rings::Run& run, std::size_t first,
              std::size_t last);
-  void add_increment(const rings::RingCloud& cloud, const rings::Run& run, std::size_t first,
-                     std::size_t last);
+  void add_segment(const rings::RingCloud& cloud, const rings::Run& run, std::size_t first,
+                   std::size_t last);
   void join();
-  bool same_wall(const LinePiece& a, const LinePiece& b) const;
-  std::uint32_t root(std::uint32_t piece);
+  bool same_wall(const LineSegment& a, const LineSegment& b) const;
+  std::uint32_t root(std::uint32_t segment);
   void add_wall(const std::vector<std::uint32_t>& members);
   double unevenness(const std::vector<std::uint32_t>& members, const WallLine& wall,
                     double variance_m2) const;
 
-  /// Some neighbours on a piece.
-  struct IncrementPart {
+  /// Some neighbours on a segment.
+  struct SegmentPart {
     double count = 0.0;
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   };
 
   SweepParameters sweep_;
   CornerParameters corner_;
-  std::vector<LinePiece> increments_;
-  std::vector<IncrementPart> parts_;
-  std::vector<std::size_t> ring_begins_;  ///< Among the pieces.
-  std::vector<std::uint32_t> parents_;
-  std::vector<std::vector<std::uint32_t>> members_;
+  std::vector<LineSegment> segments_;
+  std::vector<SegmentPart> parts_;
+  std::vector<std::size_t> ring_begins_;             ///< Among the segments.
+  std::vector<std::uint32_t> parents_;               ///< Of each segment: a disjoint-set forest.
+  std::vector<std::vector<std::uint32_t>> members_;  ///< Segments by root.
   std::vector<WallLine> walls_;
 };
 

@@ -12,9 +12,11 @@ struct BandLayout {
   std::size_t band = 0;    ///< Entries per column, with the diagonal one.
   std::size_t stride = 0;  ///< From column to column.
 
+  /// For `size` unknowns with `band` entries per column.
   static BandLayout of(std::size_t size, std::size_t band) {
     return {size, band, (band + kLanes - 1) / kLanes * kLanes + kLanes};
   }
+  /// Values of the whole matrix.
   std::size_t entries() const { return size * stride; }
   /// Values of a right-hand side, with zeros behind it.
   std::size_t padded_size() const { return size + stride; }
@@ -23,8 +25,8 @@ struct BandLayout {
   static constexpr std::size_t kLanes = 8;
 };
 
-/// Solves in place: `matrix` becomes its Cholesky factor, `right` (padded_size() values) the
-/// solution. Entries of rows beyond the last must be zero.
+/// Solves in place (Cholesky without pivoting, vectorised): `matrix` becomes its Cholesky factor,
+/// `right` (padded_size() values) the solution. Entries of rows beyond the last must be zero.
 void solve_band(const BandLayout& layout, float* matrix, float* right);
 
 }  // namespace understory::landmark_extractor::ground

@@ -5,7 +5,7 @@
 namespace understory::landmark_extractor::ground {
 namespace {
 
-/// So many points tell the ground well enough.
+/// So many points are enough for the ground.
 constexpr std::size_t kEnough = 20000;
 constexpr std::size_t kLanes = 8;
 
@@ -14,11 +14,13 @@ constexpr std::size_t kLanes = 8;
 void GroundSample::take(const model::PointSweep& sweep, const points::Levelling& levelling) {
   grid_ = points::GroundGrid::around(levelling.sensor_m.x(), levelling.sensor_m.y(),
                                      levelling.max_range_m);
+
   // A column at least, so that no beam is always left out.
   const std::size_t column = std::max<std::size_t>(sweep.rings, 1);
   const std::size_t stride = std::max<std::size_t>(1, sweep.points.size() / kEnough);
   const std::size_t length = stride == 1 ? points::PointBlock::kSize : column;
   reserve(std::min(sweep.points.size(), sweep.points.size() / stride + 2 * length) + kLanes);
+
   std::size_t size = 0;
   for (std::size_t begin = 0; begin < sweep.points.size(); begin += stride * length) {
     const std::size_t end = std::min(begin + length, sweep.points.size());

@@ -1,4 +1,4 @@
-// Returns that tell where the ground is: enough of a turn's points, levelled.
+// Returns from which the ground is found: enough of a sweep's points, levelled.
 #pragma once
 
 #include <cstdint>
@@ -9,18 +9,23 @@
 
 namespace understory::landmark_extractor::ground {
 
-/// Every so manieth column of a turn that has many. Keeps its memory from sweep to sweep.
+/// Every n-th column of a sweep with many points. Keeps its memory from sweep to sweep, but no
+/// state.
 class GroundSample {
  public:
-  /// The grid covers levelling.max_range_m around the sensor.
+  /// Takes about 20000 points. The grid covers levelling.max_range_m around the sensor.
   void take(const model::PointSweep& sweep, const points::Levelling& levelling);
 
+  /// Of the cells below.
   const points::GroundGrid& grid() const { return grid_; }
-  /// Frame `vehicle_level`; their number is a whole number of registers. Those in the cell
-  /// nowhere() do not count.
+  /// Coordinates in frame `vehicle_level` [m]; their number is a whole number of registers. Points
+  /// in the cell nowhere() do not count.
   std::span<const float> x() const { return {x_.data(), size_}; }
+  /// See x().
   std::span<const float> y() const { return {y_.data(), size_}; }
+  /// See x().
   std::span<const float> z() const { return {z_.data(), size_}; }
+  /// Index of the grid's cell that each point is in.
   std::span<const std::int32_t> cell() const { return {cell_.data(), size_}; }
 
  private:

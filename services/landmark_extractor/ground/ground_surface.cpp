@@ -114,6 +114,8 @@ void GroundSurface::fit(const GroundSample& sample) {
   const auto side = static_cast<std::size_t>(grid_.nodes_per_side);
   layout_ = BandLayout::of(side * side, 2 * side + 1);
   if (!is_same_size) add_smoothness();
+
+  // Iteratively reweighted least squares: cells above the surface lose their weight.
   find_lowest(sample);
   nodes_.assign(layout_.padded_size(), 0.0F);
   for (std::size_t k = 0; k <= kScales_m.size(); ++k) {
@@ -122,6 +124,7 @@ void GroundSurface::fit(const GroundSample& sample) {
     // What the last columns left behind the end.
     std::fill(nodes_.begin() + static_cast<std::ptrdiff_t>(layout_.size), nodes_.end(), 0.0F);
   }
+
   make_patches();
   find_residuals(sample);
 }
@@ -176,6 +179,8 @@ void GroundSurface::add_smoothness() {
       }
     }
   };
+
+  // Second differences along x and y, and the twist.
   constexpr std::array<float, 3> kSecond{1.0F, -2.0F, 1.0F};
   constexpr std::array<float, 4> kTwist{1.0F, -1.0F, -1.0F, 1.0F};
   for (std::size_t j = 0; j < n; ++j) {
@@ -207,6 +212,7 @@ void GroundSurface::add_cells(float per_scale) {
     PatchSums sums;
     add_planes(lowest_.data() + first, static_cast<std::size_t>(grid_.plane), nodes, per_scale,
                sums);
+
     const std::size_t count = std::min(kLanes, layout_.size - n - 1 - first);
     for (std::size_t l = 0; l < count; ++l) {
       const std::size_t k = first + l;
@@ -243,7 +249,8 @@ GroundHeight GroundSurface::below(const Eigen::Vector2d& place_m) const {
   const int column = static_cast<int>(kCells * grid_.place(x, grid_.corner_x_m));
   const int row = static_cast<int>(kCells * grid_.place(y, grid_.corner_y_m));
   const int side = grid_.cells_per_side();
-  // Ring of cells by ring of cells outwards until one has seen the ground.
+
+  // Ring of cells by ring of cells outwards until one has ground returns.
   for (int reach = 1; reach <= 8; ++reach) {
     double sum = 0.0;
     double cells = 0.0;

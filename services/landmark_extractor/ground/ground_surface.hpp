@@ -12,20 +12,23 @@ namespace understory::landmark_extractor::ground {
 /// Ground below one place.
 struct GroundHeight {
   double height_m = 0.0;  ///< z in `vehicle_level`.
-  double sigma_m = 0.0;
+  double sigma_m = 0.0;   ///< Of height_m.
 };
 
 /// A smooth surface (bilinear between nodes, second differences penalised) under the lowest returns
 /// of small cells. Returns above it are trunks and bushes and lose their weight step by step.
-/// Keeps its memory from sweep to sweep.
+/// Keeps its memory from sweep to sweep, but no state.
 class GroundSurface {
  public:
+  /// Fits the surface: four linear solutions with a band matrix, about 0.5 ms.
   void fit(const GroundSample& sample);
 
+  /// Of nodes and cells.
   const points::GroundGrid& grid() const { return grid_; }
-  /// Per node.
+  /// One per node: height [m] between it and the next ones.
   const points::GroundPatch* patches() const { return patches_.data(); }
-  /// The surface, moved to the ground returns near by; sigma grows where there are none.
+  /// The ground below a place of the plan, frame `vehicle_level`: the surface, moved to the ground
+  /// returns near by; sigma grows with the distance to them.
   GroundHeight below(const Eigen::Vector2d& place_m) const;
 
  private:

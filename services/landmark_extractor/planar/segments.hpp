@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "common/model/planar_scan.hpp"
@@ -11,27 +12,28 @@ namespace understory::landmark_extractor::planar {
 
 /// What bounds an object on one side.
 enum class Border : std::uint8_t {
-  kClear = 0,     ///< Nothing, or something well behind: the object's own edge is seen.
+  kClear = 0,     ///< Nothing, or something well behind: the object's own edge is measured.
   kOccluded = 1,  ///< Something well in front: the object goes on behind it, unseen.
   kCrowded = 2,   ///< Something about as far away: not an object that stands alone.
   kUnknown = 3,   ///< The end of the scan.
 };
 
-/// Beams first..last (both included), all with a return.
+/// An object: beams first..last (both included) of a scan, all with a return.
 struct Segment {
-  std::size_t first = 0;
-  std::size_t last = 0;
+  std::size_t first = 0;            ///< Rightmost beam.
+  std::size_t last = 0;             ///< Leftmost beam.
   Border right = Border::kUnknown;  ///< Before `first`.
   Border left = Border::kUnknown;   ///< After `last`.
 
+  /// Beams on it.
   std::size_t size() const { return last - first + 1; }
 };
 
-/// All segments in order of bearing.
+/// All objects of a scan, in order of bearing.
 std::vector<Segment> split(const model::PlanarScan& scan, const PlanarTrunkParameters& parameters);
 
 /// Whether the object lies on the straight line between the returns of the beams beside it. So does
-/// every piece of a wall or fence that is seen at a grazing angle and falls apart into single
+/// every part of a wall or fence at a grazing angle and falls apart into single
 /// beams.
 bool continues_a_line(const model::PlanarScan& scan, const Segment& segment, double tolerance_m);
 

@@ -8,10 +8,10 @@ namespace understory::landmark_extractor::points {
 
 /// The surface between four nodes, from the one at its low corner.
 struct GroundPatch {
-  float constant = 0.0F;
-  float along_x = 0.0F;
-  float along_y = 0.0F;
-  float twist = 0.0F;
+  float constant = 0.0F;  ///< Height at the low corner [m].
+  float along_x = 0.0F;   ///< Rise to the next node along x [m].
+  float along_y = 0.0F;   ///< Rise to the next node along y [m].
+  float twist = 0.0F;     ///< Rise along x of the rise along y [m].
 };
 
 /// A square about the sensor. A node every 4 m; each node is the low corner of a patch of 4 x 4
@@ -20,17 +20,17 @@ struct GroundPatch {
 /// Cells are kept plane by plane: first the low corner cell of every patch, then the next one of
 /// every patch, so that several patches are summed at once.
 struct GroundGrid {
-  static constexpr float kSpacing_m = 4.0F;
-  static constexpr int kCellsPerSpan = 4;
-  static constexpr int kPlanes = kCellsPerSpan * kCellsPerSpan;
+  static constexpr float kSpacing_m = 4.0F;                      ///< From node to node.
+  static constexpr int kCellsPerSpan = 4;                        ///< Along one side of a patch.
+  static constexpr int kPlanes = kCellsPerSpan * kCellsPerSpan;  ///< Cells of a patch.
 
-  float corner_x_m = 0.0F;
+  float corner_x_m = 0.0F;  ///< Low corner, frame `vehicle_level`.
   float corner_y_m = 0.0F;
   float limit = 0.0F;  ///< Places in node distances are less.
   int nodes_per_side = 0;
   int plane = 0;  ///< Cells from plane to plane; a whole number of vector registers.
 
-  /// Covers `reach_m` around the place, with whole distances between nodes.
+  /// The grid that covers `reach_m` around the place, with whole distances between nodes.
   static GroundGrid around(float x_m, float y_m, float reach_m) {
     const int spans = static_cast<int>(std::ceil(2.0F * reach_m / kSpacing_m)) + 1;
     const float half = 0.5F * static_cast<float>(spans) * kSpacing_m;
@@ -39,13 +39,15 @@ struct GroundGrid {
     return {x_m - half, y_m - half, static_cast<float>(spans) - 1e-3F, nodes,
             (nodes * nodes + kLanes) / kLanes * kLanes};
   }
-  int nodes() const { return nodes_per_side * nodes_per_side; }
+  int nodes() const { return nodes_per_side * nodes_per_side; }  ///< Of the whole square.
+  /// Of the whole square.
   int cells_per_side() const { return (nodes_per_side - 1) * kCellsPerSpan; }
+  /// Of all planes, with those between the planes that are not used.
   std::size_t cells() const { return static_cast<std::size_t>(plane) * kPlanes; }
   /// A cell that is outside.
   int nowhere() const { return plane - 1; }
 
-  /// In node distances from the corner, within the square; 0 for a number that is none.
+  /// A coordinate in node distances from the corner, within the square; 0 for NaN.
   float place(float coordinate_m, float corner_m) const {
     const float value = (coordinate_m - corner_m) * (1.0F / kSpacing_m);
     const float positive = value > 0.0F ? value : 0.0F;

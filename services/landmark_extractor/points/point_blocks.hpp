@@ -1,4 +1,4 @@
-// What is done to every point of a sweep, several points at once.
+// Levelling and heights of all points of a sweep, several points at once.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,12 +23,14 @@ struct alignas(32) RingPoint {
   float time_s;       ///< From the sweep's utime.
   float is_in_range;  ///< 1, or 0 where a coordinate is too near, too far or no number.
 
+  /// In the plan.
   Eigen::Vector2d position() const { return {x_m, y_m}; }
 };
 
 /// Some points, coordinate by coordinate.
 struct PointBlock {
-  static constexpr std::size_t kSize = 128;
+  static constexpr std::size_t kSize = 128;  ///< Most points.
+  /// One value per point.
   template <class Value>
   using Array = std::array<Value, kSize>;
 
@@ -44,13 +46,13 @@ struct PointBlock {
   Array<RingPoint> points{};
 };
 
-/// What turns points of a sweep into points around the sensor.
+/// How points of a sweep become points around the sensor.
 struct Levelling {
   Eigen::Matrix3f level_R_vehicle = Eigen::Matrix3f::Identity();
   Eigen::Vector3f sensor_m = Eigen::Vector3f::Zero();      ///< Frame `vehicle_level`, at utime.
   Eigen::Vector3f velocity_mps = Eigen::Vector3f::Zero();  ///< The same frame.
-  float min_range_m = 0.0F;
-  float max_range_m = 0.0F;
+  float min_range_m = 0.0F;                                ///< Horizontal distance to the sensor.
+  float max_range_m = 0.0F;                                ///< Likewise.
 };
 
 /// Above or below the vehicle: nothing on the ground is so far up [m].
@@ -60,10 +62,11 @@ inline constexpr float kHighest_m = 1000.0F;
 /// the sensor is at utime, or no numbers. Precondition: at most PointBlock::kSize points.
 void locate_block(std::span<const model::SweepPoint> points, const Levelling& by,
                   const GroundGrid& grid, PointBlock& block);
-/// Fills `points`. `patches`: one per node of the grid.
+/// Fills `points`, levelled and with heights above ground. `patches`: one per node of the grid.
+/// Precondition: at most PointBlock::kSize points.
 void place_block(std::span<const model::SweepPoint> points, const Levelling& by,
                  const GroundGrid& grid, const GroundPatch* patches, PointBlock& block);
-/// height = z - the surface at (x, y), for `count` places: a whole number of registers of 8.
+/// Sets height = z - the surface at (x, y), for `count` places: a whole number of registers of 8.
 void heights_above(const float* x, const float* y, const float* z, std::size_t count,
                    const GroundGrid& grid, const GroundPatch* patches, float* height);
 

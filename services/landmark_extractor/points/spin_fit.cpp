@@ -10,16 +10,16 @@ namespace understory::landmark_extractor::points {
 namespace {
 
 constexpr float kTurn = 2.0F * std::numbers::pi_v<float>;
-/// So many points tell the motion well enough.
+/// So many points are enough for the motion.
 constexpr std::size_t kSample = 2000;
 constexpr std::size_t kTogether = 4;
 constexpr int kRounds = 3;
 /// What one more round would change is less than the square of this in parts of the range.
 constexpr double kSettledRate = 0.01;
 constexpr double kSettledSpeed_mps = 0.3;
-/// So many neighbours tell the rate of the spin well enough to begin with.
+/// So many neighbours are enough for the rate of the spin to begin with.
 constexpr std::size_t kRates = 300;
-/// Beams turn evenly to this [rad]; a motor that does not says nothing of the motion.
+/// Beams rotate evenly to this [rad]; with a motor that does not the motion cannot be found.
 constexpr double kEvenness = 0.01;
 /// A vehicle is not faster [m/s].
 constexpr double kSpeedPrior = 40.0;
@@ -50,6 +50,7 @@ float SpinFitter::look_at_neighbours(const model::PointSweep& sweep, std::uint16
     previous = &point;
     if (seen >= kRates) break;
   }
+
   spin.is_leftward = leftward >= 0;
   if (rates_.empty()) return 0.0F;
   const auto middle = rates_.begin() + static_cast<std::ptrdiff_t>(rates_.size() / 2);
@@ -71,6 +72,7 @@ void SpinFitter::take_samples(const model::PointSweep& sweep, double max_range_m
     samples_.push_back({p.x(), p.y(), point.time_s, point.ring});
     ++means_[point.ring].samples;
   };
+
   std::size_t shift = 0;
   for (std::size_t first = 0; first < sweep.points.size(); first += stride + shift) {
     const std::size_t end = std::min(first + kTogether, sweep.points.size());
@@ -85,6 +87,8 @@ bool SpinFitter::improve() {
     mean.count = 0.0;
     mean.sum.setZero();
   }
+
+  // Residuals and derivatives of all samples.
   rows_.resize(samples_.size());
   const Eigen::Vector2f velocity = velocity_.cast<float>();
   const auto rate = static_cast<float>(rate_);
@@ -96,6 +100,8 @@ bool SpinFitter::improve() {
     const float lever = sample.time_s / (x * x + y * y);
     rows_[i] = {sample.time_s, lever * y, -lever * x, fast_atan2(y, x) - rate * sample.time_s};
   }
+
+  // Their sums, each ring's mean taken out.
   Eigen::Matrix4d sums = Eigen::Matrix4d::Zero();
   for (std::size_t i = 0; i < samples_.size(); ++i) {
     Means& mean = means_[samples_[i].ring];
@@ -111,6 +117,7 @@ bool SpinFitter::improve() {
     if (mean.count > 0.0) sums -= mean.sum * mean.sum.transpose() / mean.count;
     count += mean.count;
   }
+
   // residual + d(residual)/d(rate, v) * change = 0, where d(residual)/d(rate) = -time.
   Eigen::Matrix3d information = sums.topLeftCorner<3, 3>();
   Eigen::Vector3d gradient = sums.topRightCorner<3, 1>();
@@ -123,6 +130,7 @@ bool SpinFitter::improve() {
   information(0, 0) += 1e-12;
   const Eigen::Vector3d change = -information.ldlt().solve(gradient);
   residual_rms_ = std::sqrt(std::max(0.0, sums(3, 3) + change.dot(gradient)) / count);
+
   if (!change.allFinite()) {
     residual_rms_ = std::numeric_limits<double>::infinity();
     return false;
@@ -142,12 +150,14 @@ void SpinFitter::fit(const model::PointSweep& sweep, double max_range_m, Spin& s
     if (means_[ring].samples > means_[fullest].samples) fullest = ring;
   }
   if (samples_.empty()) return;
+
   rate_ = look_at_neighbours(sweep, static_cast<std::uint16_t>(fullest), spin);
   if (!sweep.has_times || rate_ == 0.0) return;
   velocity_.setZero();
   residual_rms_ = std::numeric_limits<double>::infinity();
   for (int round = 0; round < kRounds && improve(); ++round) {
   }
+
   if (residual_rms_ >= kEvenness) return;
   spin.velocity_mps = velocity_.cast<float>();
   spin.rate_radps = static_cast<float>(rate_);

@@ -1,4 +1,4 @@
-// How the sensor moved while it turned, from the points of the turn alone.
+// How the sensor moved during a revolution, from the points of the sweep alone.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,20 +12,22 @@
 
 namespace understory::landmark_extractor::points {
 
-/// What a turn's points say of the sensor, in the frame of the points.
+/// Motion of the sensor, in the frame of the points.
 struct Spin {
   /// Of the sensor in the plan; zero where the times are unknown or do not fit.
   Eigen::Vector2f velocity_mps = Eigen::Vector2f::Zero();
   float rate_radps = 0.0F;  ///< Left positive; 0 = unknown.
-  bool is_leftward = true;
+  bool is_leftward = true;  ///< Direction of the rotation, seen from above.
 };
 
-/// A sensor turns evenly: the azimuth of its beams grows linearly with time, each ring from an
-/// offset of its own. A de-skewed point at time t was seen from `velocity * t` away, which turns
-/// its azimuth by parallax; the velocity is what leaves beams that turn evenly (least squares on a
-/// part of the points). Keeps its memory from sweep to sweep.
+/// A sensor rotates evenly: the azimuth of its beams grows linearly with time, each ring from an
+/// offset of its own. A de-skewed point at time t was seen from `velocity * t` away, which changes
+/// its azimuth by parallax; the velocity sought is the one after which beams rotate evenly (least
+/// squares on a part of the points). Keeps its memory from sweep to sweep, but no state.
 class SpinFitter {
  public:
+  /// Sets the spin from points within `max_range_m`. The velocity is zero and the rate unknown
+  /// where the sweep has no times, or the beams do not rotate evenly to 0.01 rad.
   void fit(const model::PointSweep& sweep, double max_range_m, Spin& spin);
 
  private:
@@ -36,13 +38,14 @@ class SpinFitter {
     float time_s;
     std::uint16_t ring;
   };
-  /// What one sample says: time, d azimuth / d velocity, azimuth without the spin.
+  /// One sample linearised: time, d azimuth / d velocity, azimuth without the spin.
   struct Row {
     float time_s;
     float by_x;
     float by_y;
     float turned;
   };
+  /// Sums over the samples of one ring.
   struct Means {
     double count = 0.0;
     Eigen::Vector4d sum = Eigen::Vector4d::Zero();  ///< Of (t, d azimuth / d velocity, residual).
@@ -64,7 +67,7 @@ class SpinFitter {
   double residual_rms_ = 0.0;
 };
 
-/// The same angle between -pi and pi, for few turns.
+/// The same angle between -pi and pi [rad], for few turns.
 inline float wrap_angle_f(float angle_rad) {
   constexpr float kTurn = 2.0F * std::numbers::pi_v<float>;
   const float turns = angle_rad * (1.0F / kTurn);

@@ -1,9 +1,12 @@
-// Is it a stem or a strip of a wall?
+#include "services/landmark_extractor/trunks/column_plane.hpp"
+
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 
-#include "services/landmark_extractor/trunks/column_fit.hpp"
+#include "services/landmark_extractor/trunks/stem_evidence.hpp"
 
 namespace understory::landmark_extractor::trunks {
 namespace {
@@ -15,16 +18,19 @@ double square(double value) { return value * value; }
 
 }  // namespace
 
-/// A strip of a wall looks like a thick stem of which little is seen.
-void StemFitter::compare_with_plane(const Vector6d& state, StemFit& fit) {
+PlaneComparison compare_with_plane(const std::vector<HitLanes>& hits, const StemState& stem,
+                                   const BeamNoise& noise, const SweepParameters& sweep,
+                                   const SweepTrunkParameters& trunk) {
   const auto visit = [&](const auto& see) {
-    for (const HitLanes& group : used_hits_) {
+    for (const HitLanes& group : hits) {
       for (std::size_t l = 0; l < kLanes && group.counts[l] > 0.0F; ++l) {
         const Eigen::Vector2d along(group.along_x[l], group.along_y[l]);
         see(Eigen::Vector2d(group.origin_x[l], group.origin_y[l]) + group.range[l] * along, along);
       }
     }
   };
+
+  // Direction of the plane.
   double count = 0.0;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   Eigen::Matrix2d square_sum = Eigen::Matrix2d::Zero();
@@ -38,6 +44,8 @@ void StemFitter::compare_with_plane(const Vector6d& state, StemFit& fit) {
   const double angle = 0.5 * std::atan2(2.0 * scatter(0, 1), scatter(0, 0) - scatter(1, 1));
   const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
   const Eigen::Vector2d normal(-direction.y(), direction.x());
+
+  // Extent along it and squared residuals across it.
   double least = 0.0;
   double most = 0.0;
   double flat = 0.0;
@@ -46,17 +54,18 @@ void StemFitter::compare_with_plane(const Vector6d& state, StemFit& fit) {
     least = std::min(least, place);
     most = std::max(most, place);
     flat += square(normal.dot(point - mean)) /
-            (square(sweep_.range_sigma_m * normal.dot(along)) + square(trunk_.roundness_sigma_m) +
+            (square(sweep.range_sigma_m * normal.dot(along)) + square(trunk.roundness_sigma_m) +
              square(kLeastAcross_m));
   });
-  hit_means_.resize(used_hits_.size());
-  square_terms(used_hits_, {}, stem_of(state), noise_, hit_means_, {});
+
+  // The same of the stem.
+  std::array<float, kMaxRuns> hit_means{};
+  square_terms(hits, {}, stem, noise, std::span(hit_means).first(hits.size()), {});
   double round = 0.0;
-  for (std::size_t k = 0; k < used_hits_.size(); ++k) {
-    for (const float counts : used_hits_[k].counts) round += counts * hit_means_[k];
+  for (std::size_t k = 0; k < hits.size(); ++k) {
+    for (const float counts : hits[k].counts) round += counts * hit_means[k];
   }
-  fit.width_m = most - least;
-  fit.flat_excess = flat - round;
+  return {most - least, flat - round};
 }
 
 }  // namespace understory::landmark_extractor::trunks

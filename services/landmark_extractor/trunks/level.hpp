@@ -1,11 +1,11 @@
-// What an error of roll and pitch does to a place in `vehicle_level`.
+// How an error of roll and pitch moves a place in `vehicle_level`.
 #pragma once
 
 #include <Eigen/Core>
 
 namespace understory::landmark_extractor::trunks {
 
-/// Covariance of a place that was turned by an attitude with covariance of (roll, pitch) [rad^2].
+/// Covariance [m^2] of a place from that of (roll, pitch) [rad^2] which levelled it.
 inline Eigen::Matrix3d from_level_error(const Eigen::Vector3d& place_m,
                                         const Eigen::Matrix2d& level_covariance_rad2) {
   Eigen::Matrix<double, 3, 2> jacobian;

@@ -11,7 +11,7 @@ namespace {
 
 /// Beams that pass the axis within this part of the radius must meet the stem.
 constexpr double kCore = 0.6;
-/// Returns so near the surface are on the stem.
+/// Returns so near the surface are on the stem [m].
 constexpr double kOnStem_m = 0.12;
 /// From here upwards a trunk must be seen where nothing hides it.
 constexpr double kFoot_m = 0.5;
@@ -65,6 +65,8 @@ class Look {
     const double radius = std::max(0.01, fit_.radius_at(z_m_));
     const double core = kCore * radius - largest_axis_sigma(fit_, z_m_);
     if (core <= 0.0 || distance <= radius) return Met::kUnknown;
+
+    // The points of the ring whose beams pass near the axis.
     const float azimuth = azimuth_of(offset);
     const auto half = static_cast<float>(core / distance);
     const std::size_t first = first_beyond(azimuth - half);
@@ -82,6 +84,7 @@ class Look {
         result = behind > clearance_ ? Met::kThrough : Met::kBeside;
       }
     }
+
     const bool went_nowhere = seen == 0 && 2.0F * half > kSureBeams * cloud_.step_rad(ring_);
     return went_nowhere ? Met::kThrough : result;
   }
@@ -121,8 +124,8 @@ class Look {
   double z_m_ = 0.0;
 };
 
-/// Where the beams are so far apart that none passes between a person's height and that of what
-/// stands: whether the next one above passes through.
+/// Where beams are so far apart that none passes between a person's height and the least height of
+/// a trunk: whether the next one above passes through.
 bool ends_below_next_ring(const rings::RingCloud& cloud, const StemFit& fit, double ground_z,
                           const SweepParameters& parameters) {
   double lowest = ground_z + parameters.max_height_m;
@@ -151,6 +154,8 @@ StemProbe probe_stem(const rings::RingCloud& cloud, const StemFit& fit, double g
   double highest_on = -lowest_on;
   double lowest_through = lowest_on;
   double highest_through = highest_on;
+
+  // Rings that pass at the stem's height, by a rough estimate.
   const Eigen::Vector2d offset = fit.state.head<2>() - cloud.sensor_m().head<2>().cast<double>();
   const double distance = offset.norm();
   const rings::RoughSlopes slopes = cloud.rough_slopes((offset / distance).cast<float>());
@@ -161,6 +166,7 @@ StemProbe probe_stem(const rings::RingCloud& cloud, const StemFit& fit, double g
     if (cloud.step_rad(ring) <= 0.0F) continue;
     const double about = cloud.sensor_m().z() + slopes(ring) * distance;
     if (about < lowest || about > highest) continue;
+
     const Look look(cloud, ring, fit, parameters.clearance_m);
     const double z = look.z_m();
     const bool in_zone = z > ground_z + kFoot_m && z < ground_z + parameters.standing_height_m;
@@ -184,6 +190,7 @@ StemProbe probe_stem(const rings::RingCloud& cloud, const StemFit& fit, double g
         break;
     }
   }
+
   result.open_above =
       highest_through > highest_on ||
       (highest_on < ground_z + kPerson_m && ends_below_next_ring(cloud, fit, ground_z, parameters));

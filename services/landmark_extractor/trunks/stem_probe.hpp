@@ -1,4 +1,4 @@
-// What the beams say about a stem that was fitted to some of them.
+// Whether the beams agree with a stem that was fitted to some of them.
 #pragma once
 
 #include "services/landmark_extractor/rings/ring_cloud.hpp"
@@ -6,17 +6,17 @@
 
 namespace understory::landmark_extractor::trunks {
 
-/// What the beams that should meet a stem met, counted in rings.
+/// What those beams met that should meet a stem, counted in rings.
 struct StemProbe {
   int on = 0;               ///< The stem.
   int beside = 0;           ///< Something else at about the distance of the stem.
-  int through = 0;          ///< Nothing: they went on to something behind, or to nowhere.
+  int through = 0;          ///< Nothing there: something behind it, or no return.
   bool open_above = false;  ///< Beams pass where the stem should go on upwards.
   bool open_below = false;  ///< The same downwards.
 };
 
-/// Looks at the stem as far as it was fitted, and where everything that stands must be: from
-/// knee height to above a person's.
+/// Looks at the stem as far as it was fitted, and between knee height and above a person's height,
+/// where every trunk must be. `ground_z`: below the stem, frame `vehicle_level` [m].
 StemProbe probe_stem(const rings::RingCloud& cloud, const StemFit& fit, double ground_z,
                      const SweepParameters& parameters);
 

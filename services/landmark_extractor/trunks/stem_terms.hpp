@@ -1,4 +1,4 @@
-// What beams say of a stem: residuals of many of them at once, and their sums.
+// Residuals of many beams at once against a stem, and their sums.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,20 +8,24 @@
 
 namespace understory::landmark_extractor::trunks {
 
+/// Of a stem: x, y, radius, and their changes per metre of height.
 using Vector6d = Eigen::Matrix<double, 6, 1>;
+/// Information or covariance of a Vector6d.
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
+/// Numbers that one vector register holds.
 inline constexpr std::size_t kLanes = 8;
+/// One number of each of some beams.
 using Lanes = std::array<float, kLanes>;
 
 /// Beams that hit a stem, in the plan about some anchor. As many as one vector register holds.
 struct alignas(32) HitLanes {
   Lanes origin_x{};  ///< Where the sensor was.
   Lanes origin_y{};
-  Lanes along_x{};  ///< Whereto it looked, unit.
+  Lanes along_x{};  ///< Direction in which it looked, unit.
   Lanes along_y{};
-  Lanes range{};
-  Lanes z{};
+  Lanes range{};   ///< In the plan [m].
+  Lanes z{};       ///< Height, frame `vehicle_level` [m].
   Lanes counts{};  ///< 1, or 0 where there is no beam.
 };
 
@@ -32,36 +36,38 @@ struct alignas(32) EdgeLanes {
   Lanes along_x{};
   Lanes along_y{};
   Lanes z{};
-  Lanes side{};  ///< +1 = left.
-  Lanes variance{};
-  Lanes surplus{};  ///< By which part of it the error is smaller, together with the others.
-  Lanes counts{};
+  Lanes side{};      ///< +1 = left, -1 = right.
+  Lanes variance{};  ///< Of its distance from the edge [m^2].
+  Lanes surplus{};   ///< Part by which the common error of all edges is smaller than that.
+  Lanes counts{};    ///< 1, or 0 where there is none.
 };
 
 /// A stem about the same anchor: x, y, radius at the reference height, and their changes per metre.
 struct StemState {
   std::array<float, 6> values{};
-  float reference_z_m = 0.0F;
+  float reference_z_m = 0.0F;  ///< Frame `vehicle_level`.
 };
 
-/// Noise of what a beam says [m, rad].
+/// Noise of one beam.
 struct BeamNoise {
-  float range_variance = 0.0F;  ///< Of the sensor and of the bark.
-  float beam_width_rad = 0.0F;
+  float range_variance = 0.0F;  ///< Of the sensor and of the bark [m^2].
+  float beam_width_rad = 0.0F;  ///< By how much its footprint widens an object on each side.
 };
 
-/// Normal equations: their sums with the height to the power of 0, 1, 2.
+/// Sums of the normal equations, times the height above the reference to the power of 0, 1, 2.
 struct StemSums {
   /// The upper triangle of the information of (x, y, radius), row by row, then the gradient.
   static constexpr std::size_t kTerms = 9;
   std::array<std::array<Lanes, kTerms>, 3> powers{};
   Lanes squared{};  ///< Residuals in their standard deviations.
 
+  /// Both sides of the normal equations.
   void normal_equations(Matrix6d& information, Vector6d& gradient) const;
+  /// Of all residuals, in their standard deviations.
   double sum_of_squares() const;
 };
 
-/// Adds what hits and edges say; residuals beyond two standard deviations weigh less (Huber).
+/// Adds hits and edges; residuals beyond two standard deviations weigh less (Huber).
 void add_terms(std::span<const HitLanes> hits, std::span<const EdgeLanes> edges,
                const StemState& stem, const BeamNoise& noise, StemSums& sums);
 

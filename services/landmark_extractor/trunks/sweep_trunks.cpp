@@ -7,16 +7,16 @@
 namespace understory::landmark_extractor::trunks {
 namespace {
 
-/// What is so wide must not be explained better by an upright plane.
+/// Anything so wide must not fit better to an upright plane.
 constexpr double kFlatWidth_m = 0.2;
-/// What is seen nowhere above this is a stone, a stump, a tuft of grass: nothing says that it
-/// stands.
+/// Anything not measured above this height is a stone, a stump, a tuft of grass.
 constexpr double kStump_m = 0.6;
 /// Returns so near the fitted surface are on it [sigma].
 constexpr double kOnBark = 2.0;
 
-/// What is seen in so many rings is a stem rather than a bush.
+/// Runs of so many rings are of a stem rather than a bush.
 constexpr std::size_t kTall = 5;
+/// Largest share of lost beams that is believed.
 constexpr double kMostLost = 0.5;
 
 /// How far the centre of a stem that is not round is off. An oval that reaches farther towards the
@@ -37,8 +37,10 @@ model::Detection to_detection(const StemFit& fit, const ground::GroundHeight& gr
   jacobian(0, 3) = jacobian(1, 4) = above;
   model::Detection detection;
   detection.kind = model::LandmarkKind::kTrunk;
+
   detection.position_m << fit.centre_at(z), z;
   detection.radius_m = fit.radius_at(z);
+
   Eigen::Vector3d along_axis;
   along_axis << fit.state.segment<2>(3), 1.0;
   detection.covariance_m2 = ground.sigma_m * ground.sigma_m * along_axis * along_axis.transpose() +
@@ -47,8 +49,8 @@ model::Detection to_detection(const StemFit& fit, const ground::GroundHeight& gr
   return detection;
 }
 
-/// How likely a beam without a return beside a run met the same object and was lost. Such beams are
-/// seen between the points of runs; at the edges are as many, among those that passed by.
+/// Probability that a beam without a return beside a run met the same object and was lost. Such
+/// beams show between the points of runs; at the edges are as many, among those that passed by.
 double share_of_lost(const std::vector<rings::Run>& runs, const std::vector<Column>& columns) {
   double met = 0.0;
   double lost = 0.0;
@@ -59,6 +61,7 @@ double share_of_lost(const std::vector<rings::Run>& runs, const std::vector<Colu
     edges += 1.0;
     silent += is_silent ? 1.0 : 0.0;
   };
+
   for (const Column& column : columns) {
     if (column.runs.size() < kTall) continue;
     for (const std::uint32_t k : column.runs) {
@@ -103,6 +106,7 @@ std::optional<model::Detection> SweepTrunks::judge(const rings::RingCloud& cloud
                                                    const Column& column,
                                                    const ground::GroundSurface& ground,
                                                    const Eigen::Matrix2d& level_covariance_rad2) {
+  // Enough of it?
   const auto enough = [&](std::size_t points, std::size_t rings) {
     return points >= static_cast<std::size_t>(trunk_.min_points) &&
            rings >= static_cast<std::size_t>(trunk_.min_rings);
@@ -111,11 +115,15 @@ std::optional<model::Detection> SweepTrunks::judge(const rings::RingCloud& cloud
     ++counters_.too_few_points;
     return std::nullopt;
   }
+
+  // A stem?
   const auto fit = fitter_.fit(cloud, runs, column);
   if (!fit || !enough(fit->points, fit->rings)) {
     ++counters_.no_fit;
     return std::nullopt;
   }
+
+  // Of a trunk's shape, above the ground, and not in leaves?
   const ground::GroundHeight below = ground.below(fit->state.head<2>());
   if (!plausible(*fit, below.height_m + sweep_.breast_height_m)) return std::nullopt;
   if (fit->high_z_m < below.height_m + kStump_m) {
@@ -126,6 +134,8 @@ std::optional<model::Detection> SweepTrunks::judge(const rings::RingCloud& cloud
     ++counters_.in_leaves;
     return std::nullopt;
   }
+
+  // Certain enough, and within range?
   model::Detection detection =
       to_detection(*fit, below, sweep_.breast_height_m, level_covariance_rad2);
   const Eigen::Vector2d from_sensor =
@@ -141,8 +151,9 @@ std::optional<model::Detection> SweepTrunks::judge(const rings::RingCloud& cloud
     ++counters_.out_of_range;
     return std::nullopt;
   }
-  // What costs most comes last.
-  if (!is_stationary(probe_stem(cloud, *fit, below.height_m, sweep_))) return std::nullopt;
+
+  // The most expensive check comes last.
+  if (!is_tall(probe_stem(cloud, *fit, below.height_m, sweep_))) return std::nullopt;
   return detection;
 }
 
@@ -154,6 +165,7 @@ bool SweepTrunks::is_in_leaves(const rings::RingCloud& cloud, const std::vector<
                      static_cast<float>(trunk_.leaf_radius_m),
                      static_cast<float>(sweep_.standing_height_m), near_);
   const double bark = kOnBark * std::hypot(sweep_.range_sigma_m, trunk_.roundness_sigma_m);
+
   std::size_t on = 0;
   std::size_t around = 0;
   for (const std::uint32_t i : near_) {
@@ -171,7 +183,7 @@ bool SweepTrunks::is_in_leaves(const rings::RingCloud& cloud, const std::vector<
 bool SweepTrunks::plausible(const StemFit& fit, double breast_z) {
   const double radius = fit.radius_at(breast_z);
   const double radius_sigma = std::sqrt(fit.covariance(2, 2));
-  // Thin is what is thin beyond doubt.
+  // Too thin only where it is thin beyond doubt.
   if (radius + 2.0 * radius_sigma < trunk_.min_radius_m || radius > trunk_.max_radius_m) {
     ++counters_.wrong_radius;
     return false;
@@ -188,7 +200,7 @@ bool SweepTrunks::plausible(const StemFit& fit, double breast_z) {
   return true;
 }
 
-bool SweepTrunks::is_stationary(const StemProbe& probe) {
+bool SweepTrunks::is_tall(const StemProbe& probe) {
   if (probe.open_above || probe.open_below || 4 * probe.through > probe.on) {
     ++counters_.not_standing;
     return false;

@@ -8,7 +8,7 @@ namespace {
 
 constexpr float kCell_m = 0.5F;
 constexpr int kRounds = 3;
-/// No run has more.
+/// More points than any run has.
 constexpr std::uint32_t kMostPoints = 0xffffffffU;
 
 Eigen::Vector2f mean_centre(const std::vector<rings::Run>& runs,
@@ -92,14 +92,17 @@ const std::vector<Column>& ColumnFinder::find(const std::vector<rings::Run>& run
   taken_.assign(runs.size(), 0);
   columns_.clear();
   fill_grid(runs, parameters);
-  // Each run is in one column at most: what points into it stays true.
+
+  // Each run is in one column at most, so spans of members_ stay valid.
   members_.clear();
   members_.reserve(order_.size());
   for (const std::uint64_t entry : order_) {
     const auto seed = static_cast<std::uint32_t>(entry);
     if (taken_[seed] != 0) continue;
+
+    // Runs around the seed, then around their mean.
     Eigen::Vector2f axis(runs[seed].x_m, runs[seed].y_m);
-    // Half hidden slices of a thick trunk seem farther apart than whole slices of a thin one.
+    // Half hidden runs of a thick trunk are farther apart than whole runs of a thin one.
     const float radius =
         static_cast<float>(parameters.gather_radius_m) + 0.25F * runs[seed].width_m;
     for (int round = 0; round < kRounds; ++round) {
@@ -109,6 +112,7 @@ const std::vector<Column>& ColumnFinder::find(const std::vector<rings::Run>& run
     }
     taken_[seed] = 1;
     if (gathered_.empty()) continue;
+
     Column column;
     column.centre_m = axis.cast<double>();
     for (const std::uint32_t i : gathered_) {
@@ -118,6 +122,7 @@ const std::vector<Column>& ColumnFinder::find(const std::vector<rings::Run>& run
     std::sort(gathered_.begin(), gathered_.end(), [&](std::uint32_t a, std::uint32_t b) {
       return runs[a].z_m < runs[b].z_m || (runs[a].z_m == runs[b].z_m && a < b);
     });
+
     column.runs = {members_.data() + members_.size(), gathered_.size()};
     members_.insert(members_.end(), gathered_.begin(), gathered_.end());
     columns_.push_back(column);

@@ -1,4 +1,4 @@
-// Gathers runs of several rings that stand one above the other.
+// Gathers runs of several rings that are one above the other.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +14,16 @@ namespace understory::landmark_extractor::trunks {
 struct Column {
   std::span<const std::uint32_t> runs;                 ///< Indices, in order of height.
   Eigen::Vector2d centre_m = Eigen::Vector2d::Zero();  ///< Mean of the runs' centres.
-  std::size_t points = 0;
+  std::size_t points = 0;                              ///< Of all its runs.
 };
 
-/// Keeps its memory from sweep to sweep.
+/// Finds columns in the plan by a grid of cells of 0.5 m. Keeps its memory from sweep to sweep, but
+/// no state.
 class ColumnFinder {
  public:
-  /// Greedy: the run with most points first; each takes the free runs around its vertical, once
-  /// more around their mean. Runs wider than a trunk or with neighbours that touch them stay out.
+  /// The columns within `reach_m` of `centre_m`, valid until the next call. Greedy: the run with
+  /// most points first; each takes the free runs around its vertical, once more around their mean.
+  /// Runs wider than a trunk or with neighbours that touch them are left out.
   const std::vector<Column>& find(const std::vector<rings::Run>& runs,
                                   const SweepTrunkParameters& parameters,
                                   const Eigen::Vector2f& centre_m, float reach_m);

@@ -1,0 +1,23 @@
+// Is it a stem or a strip of a wall?
+#pragma once
+
+#include <vector>
+
+#include "services/landmark_extractor/parameters.hpp"
+#include "services/landmark_extractor/trunks/stem_terms.hpp"
+
+namespace understory::landmark_extractor::trunks {
+
+/// An upright plane against a stem through the same hits.
+struct PlaneComparison {
+  double width_m = 0.0;      ///< Of the hits along the plane.
+  double flat_excess = 0.0;  ///< How much worse the plane explains the hits than the stem [chi^2].
+};
+
+/// Fits a plane by total least squares. A strip of a wall looks like a thick stem of which little
+/// is seen; then the excess is negative. Precondition: at least one hit, at most `kMaxRuns` groups.
+PlaneComparison compare_with_plane(const std::vector<HitLanes>& hits, const StemState& stem,
+                                   const BeamNoise& noise, const SweepParameters& sweep,
+                                   const SweepTrunkParameters& trunk);
+
+}  // namespace understory::landmark_extractor::trunks
