@@ -67,16 +67,27 @@ function(understory_service name)
   endif()
 endfunction()
 
-# understory_test(NAME targets...): one Catch2 executable from every .cpp in tests/NAME.
+# understory_test(NAME [RECORDED] targets...): one Catch2 executable from every .cpp in tests/NAME.
+# RECORDED: its cases with the tag [recorded] read recordings. They are a CTest test of their own,
+# NAME_recorded, which CTest reports as "Skipped" where recordings are missing (tests/skip.hpp).
 function(understory_test name)
+  cmake_parse_arguments(ARG "RECORDED" "" "" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_SOURCE_DIR}/tests/${name}/*.cpp")
   if(NOT sources)
     return()
   endif()
   add_executable(test_${name} ${sources})
-  target_link_libraries(test_${name} PRIVATE understory_test_main ${ARGN} understory_flags)
+  target_link_libraries(test_${name} PRIVATE understory_test_main ${ARG_UNPARSED_ARGUMENTS} understory_flags)
   target_include_directories(test_${name} PRIVATE "${CMAKE_SOURCE_DIR}")
   set_target_properties(test_${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}/tests")
-  add_test(NAME ${name} COMMAND test_${name})
-  set_tests_properties(${name} PROPERTIES TIMEOUT 300)
+  if(ARG_RECORDED)
+    add_test(NAME ${name} COMMAND test_${name} "~[recorded]")
+    add_test(NAME ${name}_recorded COMMAND test_${name} "[recorded]")
+    # Printed only where nothing failed: no failure hides behind it.
+    set_tests_properties(${name}_recorded PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 4
+                         SKIP_REGULAR_EXPRESSION "cases skipped, none failed")
+  else()
+    add_test(NAME ${name} COMMAND test_${name})
+  endif()
+  set_tests_properties(${name} PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 4)
 endfunction()

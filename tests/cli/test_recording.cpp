@@ -1,5 +1,4 @@
 // A recorded drive through the command: import, replay, export.
-#include <cstdlib>
 #include <map>
 
 #include "common/wire/convert.hpp"
@@ -7,6 +6,7 @@
 #include "tests/catch.hpp"
 #include "tests/cli/recorded_drive.hpp"
 #include "tests/cli/run_command.hpp"
+#include "tests/data.hpp"
 
 using namespace understory;
 using namespace understory::test;
@@ -189,14 +189,8 @@ TEST_CASE_METHOD(Fixture, "a recording that is not whole is named, and no log is
 }
 
 TEST_CASE_METHOD(Fixture, "the Victoria Park set is imported as it is downloaded",
-                 "[cli][recording]") {
-  const char* const root = std::getenv("UNDERSTORY_DATA");
-  const fs::path archive = fs::path(root != nullptr ? root : UNDERSTORY_DEFAULT_DATA) /
-                           "victoria_park_raw" / "victoria_park_ascii.zip";
-  if (!fs::exists(archive)) {
-    WARN("skipped: no " << archive);
-    return;
-  }
+                 "[cli][recording][recorded]") {
+  const fs::path archive = test::recording("victoria_park_raw/victoria_park_ascii.zip");
   import(archive.string());
   const auto events = events_of(log);
   CHECK(events.size() == 7230 + 7228 + 61'763 + 948);

@@ -7,6 +7,7 @@
 
 #include "eval/experiments/frontend/forest_plot_score.hpp"
 #include "tests/catch.hpp"
+#include "tests/data.hpp"
 
 using namespace understory;
 using namespace understory::eval;
@@ -32,11 +33,6 @@ eval::experiments::frontend::ForestPlot round_stems(const std::vector<Eigen::Vec
   }
 
   return plot;
-}
-
-std::filesystem::path plots_folder() {
-  const char* const root = std::getenv("UNDERSTORY_DATA");
-  return std::filesystem::path(root != nullptr ? root : "../shared/data") / "forest_3d_scans";
 }
 
 }  // namespace
@@ -98,17 +94,14 @@ TEST_CASE("A stem that a cloud shows from one side only is whole from there", "[
   CHECK_FALSE(scanner.sweep({-5.0, 0.0}, random).stems.front().is_whole);
 }
 
-TEST_CASE("Stems of a real plot are found", "[forest_plot]") {
-  if (!std::filesystem::is_directory(plots_folder())) {
-    WARN("no " << plots_folder() << ": nothing to look at");
-    return;
-  }
+TEST_CASE("Stems of a real plot are found", "[forest_plot][recorded]") {
+  const std::filesystem::path plots_folder = test::recording("forest_3d_scans");
   eval::experiments::frontend::PlotScoreOptions options;
   options.grid_m = 3.0;
   options.clearance_m = 0.4;
   for (const char* name : {"TLS_Clip", "pine_plot"}) {
     const eval::experiments::frontend::PlotScore score = score_plot(
-        eval::experiments::frontend::read_forest_plot(plots_folder(), name), {}, options);
+        eval::experiments::frontend::read_forest_plot(plots_folder, name), {}, options);
     CHECK(score.should > 20);
     CHECK(score.recall() > 0.5);
     CHECK(score.precision() > 0.7);

@@ -1,12 +1,12 @@
 #include "common/factor_graph/files/graph_file.hpp"
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 
 #include "common/factor_graph/batch/batch.hpp"
 #include "tests/catch.hpp"
+#include "tests/data.hpp"
 
 using namespace understory;
 using namespace understory::factor_graph::graph;
@@ -91,19 +91,14 @@ TEST_CASE("What is written reads back as the same graph", "[graph_file]") {
   REQUIRE(again.chi2() == Approx(graph.chi2()).epsilon(1e-12));
 }
 
-TEST_CASE("The batch solver finds the published optima", "[graph_file]") {
-  const char* set = std::getenv("UNDERSTORY_DATA");
-  const std::filesystem::path data = set != nullptr ? set : UNDERSTORY_DEFAULT_DATA;
+TEST_CASE("The batch solver finds the published optima", "[graph_file][recorded]") {
   const std::pair<const char*, double> optima[] = {{"w100.graph", 1.13783},
                                                    {"g2o_intel.g2o", 546.461},
                                                    {"tinyGrid3D.g2o", 6.72788},
                                                    {"smallGrid3D.g2o", 458.154}};
   for (const auto& [name, chi2] : optima) {
-    std::ifstream in(data / "pose_graphs" / name);
-    if (!in) {
-      WARN("no recorded graphs here: " << name << " is not tried");
-      return;
-    }
+    std::ifstream in(test::recording(std::filesystem::path("pose_graphs") / name));
+    REQUIRE(in);
     const std::string text((std::istreambuf_iterator<char>(in)), {});
     factor_graph::graph::FactorGraph graph;
     fill(graph, require_graph(text));

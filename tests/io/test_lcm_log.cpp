@@ -1,9 +1,9 @@
 #include <sys/stat.h>
 
 #include <algorithm>
-#include <cstdlib>
 
 #include "tests/catch.hpp"
+#include "tests/data.hpp"
 #include "tests/io/log_fixture.hpp"
 
 using namespace understory;
@@ -101,14 +101,8 @@ TEST_CASE("a full disk is reported and the device stays what it is", "[log]") {
   CHECK(std::filesystem::is_character_file("/dev/full"));
 }
 
-TEST_CASE("recorded logs of other people's robots are read whole", "[log]") {
-  const char* const root = std::getenv("UNDERSTORY_DATA");
-  const auto folder =
-      std::filesystem::path(root != nullptr ? root : UNDERSTORY_DEFAULT_DATA) / "lcm_logs";
-  if (!std::filesystem::exists(folder)) {
-    WARN("skipped: no " << folder);
-    return;
-  }
+TEST_CASE("recorded logs of other people's robots are read whole", "[log][recorded]") {
+  const auto folder = test::recording("lcm_logs");
   const std::pair<const char*, std::size_t> logs[] = {{"mbot_drive_square.lcm", 45'246},
                                                       {"gokart_vlp16_rimo.lcm", 161},
                                                       {"gokart_vlp16_pos.lcm", 11}};

@@ -1,5 +1,4 @@
 // KITTI drives, PCD files, packet captures and tables.
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -15,17 +14,13 @@
 #include "common/io/point_cloud_file.hpp"
 #include "common/io/sensor_tables.hpp"
 #include "tests/catch.hpp"
+#include "tests/data.hpp"
 
 using namespace understory;
 using namespace understory::io;
 namespace fs = std::filesystem;
 
 namespace {
-
-fs::path data() {
-  const char* set = std::getenv("UNDERSTORY_DATA");
-  return set != nullptr ? set : UNDERSTORY_DEFAULT_DATA;
-}
 
 class Folder {
  public:
@@ -182,11 +177,7 @@ TEST_CASE("a sequence of PCD files has its times from the names or from a table"
 }
 
 TEST_CASE("a KITTI drive is read with rings and times", "[kitti][recorded]") {
-  const fs::path folder = data() / "kitti_raw_drive0002";
-  if (!fs::exists(folder)) {
-    WARN("no recording at " << folder);
-    return;
-  }
+  const fs::path folder = test::recording("kitti_raw_drive0002");
   const KittiRaw drive(folder);
   REQUIRE(drive.sweeps() == 10);
   REQUIRE(drive.oxts().size() == 10);
@@ -221,11 +212,7 @@ TEST_CASE("a KITTI drive is read with rings and times", "[kitti][recorded]") {
 }
 
 TEST_CASE("the reduced KITTI drive is read with its poses", "[kitti][recorded]") {
-  const fs::path folder = data() / "kitti_raw_drive0005_16ring";
-  if (!fs::exists(folder)) {
-    WARN("no recording at " << folder);
-    return;
-  }
+  const fs::path folder = test::recording("kitti_raw_drive0005_16ring");
   const ReducedKitti drive(folder, "icp");
   REQUIRE(drive.sweeps() == 154);
   CHECK(drive.poses().size() == 154);
@@ -267,12 +254,8 @@ TEST_CASE("tables of sensors are read by the names of their columns", "[csv]") {
   CHECK_THROWS_AS(parse_wheel_table("", "w.csv"), DataError);
 }
 
-TEST_CASE("captures that are cut or damaged end, and give whole packets", "[pcap]") {
-  const fs::path file = data() / "lidar_packets" / "velodyne_vlp16_gps.pcap";
-  if (!fs::exists(file)) {
-    WARN("no recording at " << file);
-    return;
-  }
+TEST_CASE("captures that are cut or damaged end, and give whole packets", "[pcap][recorded]") {
+  const fs::path file = test::recording("lidar_packets/velodyne_vlp16_gps.pcap");
   std::string bytes(fs::file_size(file), '\0');
   std::ifstream(file, std::ios::binary)
       .read(bytes.data(), static_cast<std::streamsize>(bytes.size()));

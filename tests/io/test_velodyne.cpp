@@ -1,5 +1,4 @@
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <numbers>
 #include <random>
@@ -9,6 +8,7 @@
 #include "common/io/packet_capture.hpp"
 #include "common/io/velodyne.hpp"
 #include "tests/catch.hpp"
+#include "tests/data.hpp"
 #include "tests/io/velodyne_packets.hpp"
 
 using namespace understory;
@@ -19,11 +19,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-
-fs::path data() {
-  const char* set = std::getenv("UNDERSTORY_DATA");
-  return set != nullptr ? set : UNDERSTORY_DEFAULT_DATA;
-}
 
 std::vector<model::PointSweep> turns_of(VelodyneDecoder& decoder, test::PacketMaker maker,
                                         int packets) {
@@ -176,11 +171,7 @@ TEST_CASE("NMEA sentences are read when their checksum is right", "[velodyne]") 
 }
 
 TEST_CASE("a recorded capture of a VLP-16", "[velodyne][recorded]") {
-  const fs::path file = data() / "lidar_packets" / "velodyne_vlp16_gps.pcap";
-  if (!fs::exists(file)) {
-    WARN("no recording at " << file);
-    return;
-  }
+  const fs::path file = test::recording("lidar_packets/velodyne_vlp16_gps.pcap");
   PacketCapture capture(file);
   VelodyneDecoder decoder(velodyne_calibration(VelodyneModel::kVlp16));
   std::vector<model::PointSweep> turns;
@@ -209,11 +200,7 @@ TEST_CASE("a recorded capture of a VLP-16", "[velodyne][recorded]") {
 }
 
 TEST_CASE("VLP-16 packets inside a foreign LCM log", "[velodyne][recorded]") {
-  const fs::path file = data() / "lcm_logs" / "gokart_vlp16_rimo.lcm";
-  if (!fs::exists(file)) {
-    WARN("no recording at " << file);
-    return;
-  }
+  const fs::path file = test::recording("lcm_logs/gokart_vlp16_rimo.lcm");
   LcmLogReader reader(file);
   VelodyneDecoder decoder(velodyne_calibration(VelodyneModel::kVlp16));
   std::vector<model::PointSweep> turns;

@@ -9,6 +9,7 @@
 #include "common/io/recording_folder.hpp"
 #include "common/io/victoria_park.hpp"
 #include "tests/catch.hpp"
+#include "tests/data.hpp"
 
 using namespace understory;
 using namespace understory::io;
@@ -38,11 +39,6 @@ std::string error_of(const std::function<void()>& work) {
 
 bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
-}
-
-fs::path data_folder() {
-  const char* const root = std::getenv("UNDERSTORY_DATA");
-  return fs::path(root != nullptr ? root : UNDERSTORY_DEFAULT_DATA) / "victoria_park_raw";
 }
 
 struct TemporaryFolder {
@@ -124,12 +120,8 @@ TEST_CASE("what is no recording is named", "[victoria_park]") {
   CHECK(contains(error_of([&] { read_victoria_park(file); }), "broken.zip: neither a folder"));
 }
 
-TEST_CASE("the set is read as it is downloaded", "[victoria_park]") {
-  const fs::path archive = data_folder() / "victoria_park_ascii.zip";
-  if (!fs::exists(archive)) {
-    WARN("skipped: no " << archive);
-    return;
-  }
+TEST_CASE("the set is read as it is downloaded", "[victoria_park][recorded]") {
+  const fs::path archive = test::recording("victoria_park_raw/victoria_park_ascii.zip");
   const auto recording = read_victoria_park(archive);
   CHECK(recording.scans.size() == 7230);
   CHECK(recording.wheels.size() == 61'763);

@@ -2,13 +2,13 @@
 // byte, whatever else comes in.
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <random>
 
 #include "common/io/packet_capture.hpp"
 #include "common/io/velodyne_fixes.hpp"
+#include "tests/data.hpp"
 #include "tests/io/log_fixture.hpp"
 #include "tests/io/velodyne_packets.hpp"
 #include "tests/velodyne_driver/live_driver.hpp"
@@ -58,12 +58,6 @@ std::vector<test::Message> offline(const std::string& model,
   return driver.parts;
 }
 
-fs::path capture_file() {
-  const char* set = std::getenv("UNDERSTORY_DATA");
-  return fs::path(set != nullptr ? set : UNDERSTORY_DEFAULT_DATA) / "lidar_packets" /
-         "velodyne_vlp16_gps.pcap";
-}
-
 /// A packet that is none of a VLP-16.
 test::Packet garbage(const test::Packet& good, std::mt19937_64& random) {
   test::Packet packet = good;
@@ -108,16 +102,13 @@ TEST_CASE("live sweeps are those of the offline decoder, byte for byte", "[velod
 
 TEST_CASE("a recorded capture, sent again, gives the sweeps and fixes of its import",
           "[velodyne_driver][recorded]") {
-  if (!fs::exists(capture_file())) {
-    WARN("no recording at " << capture_file());
-    return;
-  }
+  const fs::path capture_file = test::recording("lidar_packets/velodyne_vlp16_gps.pcap");
   test::LiveDriver driver;
   test::Sender positions;
   std::vector<test::Packet> data;
   std::vector<model::GnssFix> fixes;
   io::VelodyneFixes offline_fixes;
-  io::PacketCapture capture(capture_file());
+  io::PacketCapture capture(capture_file);
   while (const auto packet = capture.next()) {
     if (packet->port == io::kVelodynePositionPort) {
       positions.send(driver.position_port, packet->payload);
