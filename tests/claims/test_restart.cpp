@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "common/bus/state_store.hpp"
@@ -98,13 +99,31 @@ Recording interrupted(const bus::Service& service, const std::string& toml, cons
   return published;
 }
 
+/// The extractor's fit of a stem starts from the height at which the fit of the stem before ended:
+/// after a restart the first one comes out up to 2e-6 m elsewhere.
+constexpr double kStemFit_m = 1e-5;
+
+bool are_same(const RecordedMessage& expected, const RecordedMessage& got) {
+  if (expected == got) return true;
+  if (expected.channel != "LANDMARKS" || got.channel != "LANDMARKS") return false;
+  const auto a = wire::decode_message<model::LandmarkScan>(expected.bytes).value();
+  const auto b = wire::decode_message<model::LandmarkScan>(got.bytes).value();
+  return a.utime == b.utime && a.sequence == b.sequence &&
+         std::ranges::equal(a.detections, b.detections,
+                            [](const model::Detection& one, const model::Detection& other) {
+                              return one.kind == other.kind &&
+                                     (one.position_m - other.position_m).norm() < kStemFit_m &&
+                                     std::abs(one.radius_m - other.radius_m) < kStemFit_m;
+                            });
+}
+
 /// Where the runs part; empty = nowhere.
 std::string first_difference(const Recording& expected, const Recording& got) {
   const std::size_t common = std::min(expected.size(), got.size());
   std::size_t first = common;
   std::map<std::string, int> differing;
   for (std::size_t i = 0; i < common; ++i) {
-    if (got[i] == expected[i]) continue;
+    if (are_same(expected[i], got[i])) continue;
     first = std::min(first, i);
     ++differing[expected[i].channel];
   }
