@@ -31,6 +31,7 @@ const Scene& scene(sim::ForestKind kind) {
     }
     return made;
   }();
+
   return scenes[static_cast<std::size_t>(kind)];
 }
 
@@ -55,15 +56,18 @@ void BM_Localise(benchmark::State& state) {
   const Scene& in = scene(static_cast<sim::ForestKind>(state.range(0)));
   std::mt19937_64 random(2);
   std::vector<std::vector<constellation::ObservedPoint>> observations(200);
+
   for (auto& points : observations) {
     points = observe(in.forest, 0.01 * static_cast<double>(state.range(1)),
                      0.001 * static_cast<double>(state.range(2)), random);
   }
+
   std::size_t i = 0;
   std::size_t found = 0;
   for (auto _ : state) {
     found += in.map.localise(observations[i++ % observations.size()]).found() ? 1 : 0;
   }
+
   state.counters["found"] = static_cast<double>(found) / static_cast<double>(state.iterations());
 }
 BENCHMARK(BM_Localise)

@@ -62,6 +62,7 @@ void triangulate_from_scratch(benchmark::State& state) {
   for (const hierarchy::LandmarkPosition& landmark : forest) {
     positions.push_back(landmark.position_m);
   }
+
   for (auto _ : state) {
     hierarchy::Triangulation triangulation;
     hierarchy::TriangulationChange change;
@@ -130,6 +131,7 @@ void describe_polygon(benchmark::State& state) {
       break;
     }
   }
+
   for (auto _ : state) {
     benchmark::DoNotOptimize(hierarchy::describe(corners, 20));
   }
@@ -141,17 +143,20 @@ void query_index(benchmark::State& state) {
   if (too_large(state)) {
     return;
   }
+
   Scene& world = scene(state.range(0));
   const hierarchy::GeometricHierarchy view(
       observe(world.forest, world.pose(), test::View{}, world.random));
   std::vector<hierarchy::DescriptorIndex::Hit> hits;
   std::size_t next = 0;
   std::size_t found = 0;
+
   for (auto _ : state) {
     const hierarchy::Polygon& polygon = view.polygons()[next++ % view.polygons().size()];
     world.hierarchy.index().within(polygon.descriptor, 2.0F, hits);
     found += hits.size();
   }
+
   state.counters["hits"] = static_cast<double>(found) / static_cast<double>(state.iterations());
 }
 BENCHMARK(query_index)->Arg(kThesisMap)->Arg(kLargeMap)->Unit(benchmark::kMicrosecond);
@@ -163,6 +168,7 @@ void match_views(benchmark::State& state) {
   if (too_large(state)) {
     return;
   }
+
   Scene& world = scene(state.range(0));
   const test::View view{.noise_m = 0.01 * static_cast<double>(state.range(1)),
                         .detection = 0.01 * static_cast<double>(state.range(2)),
@@ -173,13 +179,16 @@ void match_views(benchmark::State& state) {
   std::vector<std::vector<hierarchy::LandmarkPosition>> views;
   std::mt19937_64 random(7);
   world.random.seed(8);
+
   for (std::size_t i = 0; i < kViews; ++i) {
     views.push_back(observe(world.forest, world.pose(), view, random));
   }
+
   std::size_t right = 0;
   std::size_t wrong = 0;
   std::size_t found = 0;
   std::size_t next = 0;
+
   for (auto _ : state) {
     const hierarchy::GeometricHierarchy query(views[next++ % kViews]);
     const auto pairs = match(query, world.hierarchy, parameters);
@@ -191,6 +200,7 @@ void match_views(benchmark::State& state) {
     wrong += pairs.size() - right_here;
     found += right_here >= 6 ? 1 : 0;
   }
+
   const auto n = static_cast<double>(state.iterations());
   state.counters["found"] = static_cast<double>(found) / n;
   state.counters["right"] = static_cast<double>(right) / n;

@@ -37,12 +37,14 @@ void sweep(benchmark::State& state) {
   const double rays =
       static_cast<double>(suite.lidar->elevations_rad.size()) * suite.lidar->columns;
   std::uint64_t turn = 250;
+
   std::size_t points = 0;
   for (auto _ : state) {
     const sim::SimulatedSweep simulated = drive.sweep(turn);
     points += simulated.raw.points.size();
     turn = turn + 37 < drive.sweep_count() ? turn + 37 : 250;
   }
+
   const auto turns = static_cast<double>(state.iterations());
   state.counters["points"] = static_cast<double>(points) / turns;
   state.counters["s_per_ray"] =

@@ -66,8 +66,10 @@ SimulatedScan observe(const Forest& forest, const PointGrid& grid,
   model::Detection detection;
   detection.covariance_m2.topLeftCorner<2, 2>() = variance * Eigen::Matrix2d::Identity();
   std::uniform_real_distribution<double> chance(0.0, 1.0);
+
   std::normal_distribution<double> noise(0.0, 1.0);
   const geometry::SE2 vehicle_T_world = world_T_vehicle.inverse();
+
   // Noise moves some trunks from outside into range: 6 sigma are enough.
   const double reach = sensor.range_m + 6.0 * sensor.position_sigma_m;
   std::vector<std::pair<model::Detection, std::uint32_t>> seen;
@@ -81,12 +83,14 @@ SimulatedScan observe(const Forest& forest, const PointGrid& grid,
     detection.radius_m = forest.radii_m[trunk];
     seen.emplace_back(detection, trunk);
   }
+
   // The order of the trunks would tell which is which.
   std::shuffle(seen.begin(), seen.end(), random);
   for (const auto& [seen_detection, trunk] : seen) {
     result.scan.detections.push_back(seen_detection);
     result.trunks.push_back(trunk);
   }
+
   return result;
 }
 
@@ -134,12 +138,14 @@ void Drive::fell_trunks_on(const std::vector<geometry::SE2>& path) {
       felled[trunk] = true;
     }
   }
+
   Forest cleared{forest_.low_m, forest_.high_m, {}, {}};
   for (std::size_t i = 0; i < felled.size(); ++i) {
     if (felled[i]) continue;
     cleared.trunks_m.push_back(forest_.trunks_m[i]);
     cleared.radii_m.push_back(forest_.radii_m[i]);
   }
+
   forest_ = std::move(cleared);
   grid_ = std::make_unique<PointGrid>(forest_.trunks_m, kTile);
 }

@@ -1,4 +1,4 @@
-// A simulated drive: a forest, a path in it, what the robot sees on the way, and the truth.
+// A simulated drive: a forest, a path in it, what the robot observes on it, and the truth.
 #pragma once
 
 #include <cstdint>
@@ -15,6 +15,7 @@
 
 namespace understory::sim {
 
+/// An ideal landmark sensor; symbols and defaults as in GeoSLAM §4.5.
 struct SensorParameters {
   double range_m = 40.0;
   double detection_probability = 0.9;  ///< [kappa] Of every landmark in range, independently.
@@ -31,11 +32,12 @@ struct SimulatedScan {
 };
 
 /// All trunks in range of the pose, each detected by chance, its position noisy; the noise comes
-/// before the test of the range (as in the source's code). In random order.
+/// before the test of the range (as in the code published with GeoSLAM). In random order.
 SimulatedScan observe(const Forest& forest, const PointGrid& grid,
                       const geometry::SE2& world_T_vehicle, const SensorParameters& sensor,
                       std::mt19937_64& random);
 
+/// What a start pose has to keep clear of.
 struct StartPoseParameters {
   double clearance_m = 0.3;  ///< No trunk nearer than this to the path.
   double margin_m = 40.0;    ///< Of forest around the whole path.
@@ -49,6 +51,7 @@ std::optional<geometry::SE2> draw_start_pose(const Forest& forest, const PointGr
                                              const StartPoseParameters& parameters,
                                              std::mt19937_64& random);
 
+/// Everything of a simulated drive but its seed.
 struct DriveParameters {
   ForestParameters forest;
   PathParameters path;
@@ -70,13 +73,20 @@ class Drive {
   /// The same in a given forest (`parameters.forest` is not used).
   Drive(const DriveParameters& parameters, Forest forest, std::uint64_t seed);
 
+  /// Number of scans.
   std::size_t size() const { return world_T_vehicle_.size(); }
+  /// Scan k with its truth; the same at every call. Precondition: k < size().
   SimulatedScan scan(std::size_t k) const;
+  /// Stamp of scan k [us].
   model::Utime utime(std::size_t k) const;
 
+  /// The forest driven through, felled trunks left out.
   const Forest& forest() const { return forest_; }
+  /// The forest's trunks, for queries by position.
   const PointGrid& grid() const { return *grid_; }
+  /// The true pose at every scan.
   const std::vector<geometry::SE2>& world_T_vehicle() const { return world_T_vehicle_; }
+  /// The parameters in force (the forest may have grown to hold the path).
   const DriveParameters& parameters() const { return parameters_; }
 
  private:

@@ -68,17 +68,20 @@ std::vector<Eigen::Vector2d> poisson_disc(const ForestParameters& parameters,
   std::vector<Eigen::Vector2d> points;
   Tiles tiles(parameters, points);
   std::vector<std::size_t> active;
+
   const auto add = [&](const Eigen::Vector2d& p) {
     tiles.take(p, points.size());
     active.push_back(points.size());
     points.push_back(p);
   };
+
   const double first_x = anywhere(random);
   add({first_x, anywhere(random)});
   while (!active.empty()) {
     std::uniform_int_distribution<std::size_t> pick(0, active.size() - 1);
     const std::size_t slot = pick(random);
     bool found = false;
+
     for (int i = 0; i < parameters.tries && !found; ++i) {
       const double a = angle(random);
       const double d = distance(random);
@@ -87,11 +90,13 @@ std::vector<Eigen::Vector2d> poisson_disc(const ForestParameters& parameters,
       found = tiles.free(p);
       if (found) add(p);
     }
+
     if (!found) {
       active[slot] = active.back();
       active.pop_back();
     }
   }
+
   return points;
 }
 
@@ -111,6 +116,7 @@ ForestParameters forest_parameters(ForestKind kind) {
       parameters.jitter_sigma_m = 3.5;
       break;
   }
+
   return parameters;
 }
 

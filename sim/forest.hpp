@@ -18,28 +18,33 @@ struct Forest {
   std::vector<double> radii_m;  ///< As many as trunks; 0 where unknown.
 };
 
+/// The three forests of GeoSLAM Table 4.4.
 enum class ForestKind { kDense, kIntermediate, kSparse };
 
+/// How densely and how evenly trunks stand.
 struct ForestParameters {
   double side_m = 1000.0;
   double min_distance_m = 7.0;  ///< Of the Poisson-disc points, before the jitter.
   double jitter_sigma_m = 3.0;  ///< Per axis.
   int tries = 30;               ///< k of Bridson's algorithm.
-  /// Tiles to each side that are searched for points too near. 1 is what the source does (its Fig.
+  /// Tiles to each side that are searched for points too near. 1 is what GeoSLAM does (Fig.
   /// 4.6): it misses some and gives 7 % more trees. 2 is the correct algorithm.
   int tile_reach = 1;
   double trunk_radius_m = 0.0;
 };
 
-/// Table 4.4 of the source.
+/// The parameters of GeoSLAM Table 4.4.
 ForestParameters forest_parameters(ForestKind kind);
+/// "dense", "intermediate", "sparse".
 std::string_view to_string(ForestKind kind);
+/// The kind of this name; none for another.
 std::optional<ForestKind> forest_kind(std::string_view name);
 
 /// Poisson-disc points (Bridson 2007) in the square [0, side]^2, each then moved by Gaussian
 /// jitter, which may take it out of the square.
 Forest make_forest(const ForestParameters& parameters, std::mt19937_64& random);
 
+/// A surveyed forest, or why there is none.
 struct StemMapResult {
   Forest forest;
   std::string error;  ///< Empty if good; else what is wrong, with the line.

@@ -47,6 +47,7 @@ void add_people(World& world, std::span<const Eigen::Vector2d> distance_m, int c
         distance_m[place] + aside * Eigen::Vector2d(std::cos(bearing), std::sin(bearing));
     walker.middle_m.z() = world.ground().height(walker.middle_m.head<2>());
     const double walk = uniform(random, -pi, pi);
+
     if (i % 3 != 0) walker.reach_m = 2.0 * Eigen::Vector2d(std::cos(walk), std::sin(walk));
     walker.speed_mps = uniform(random, 0.5, 1.4);
     walker.phase_rad = uniform(random, -pi, pi);
@@ -68,6 +69,7 @@ void plant_tree(World& world, const Eigen::Vector2d& at_m, double radius_m, doub
       std::clamp(6.0 + 70.0 * radius_m + normal(random, 1.5), crown_base_m + 3.0, 28.0);
   const double lean_x = normal(random, parameters.lean_sigma_rad);
   const Eigen::Vector2d lean(lean_x, normal(random, parameters.lean_sigma_rad));
+
   // Not thinner than 1 cm at the top.
   const double taper =
       std::min(parameters.taper * uniform(random, 0.6, 1.4), (radius_m - 0.01) / height_m);
@@ -77,6 +79,7 @@ void plant_tree(World& world, const Eigen::Vector2d& at_m, double radius_m, doub
   crown.half_height_m = 0.5 * (height_m + 0.5 - crown_base_m);
   crown.level_radius_m = std::clamp(8.0 * radius_m + normal(random, 0.3), 0.8, 3.5);
   const double middle_m = crown_base_m + crown.half_height_m;
+
   crown.centre_m << at_m + middle_m * lean, ground_m + middle_m;
   crown.density_per_m = parameters.crown_density_per_m;
   world.add(ObjectClass::kCrown, crown);
@@ -84,6 +87,7 @@ void plant_tree(World& world, const Eigen::Vector2d& at_m, double radius_m, doub
   trunk.base_m << at_m - 1.8 * lean, ground_m - 0.5;
   trunk.axis = Eigen::Vector3d(lean.x(), lean.y(), 1.0).normalized();
   trunk.base_radius_m = radius_m;
+
   add_branches(world, trunk, crown_base_m, parameters.branches_per_trunk, random);
 }
 
@@ -108,6 +112,7 @@ World make_forest_world(const Forest& forest, const ForestWorldParameters& param
     const double crown_base_m = parameters.crown_base_m * uniform(random, 0.7, 1.3);
     plant_tree(world, forest.trunks_m[i], radius_m, crown_base_m, parameters, random);
   }
+
   const Eigen::Vector2d size = forest.high_m - forest.low_m;
   const auto bushes = static_cast<int>(1e-4 * size.x() * size.y() * parameters.bushes_per_hectare);
   for (int i = 0; i < bushes; ++i) {
@@ -116,6 +121,7 @@ World make_forest_world(const Forest& forest, const ForestWorldParameters& param
     if (way.any_within(at_m, parameters.clearance_m + 1.3)) continue;
     plant_bush(world, at_m, parameters.bush_density_per_m, random);
   }
+
   add_people(world, distance_m, parameters.people, random);
   return world;
 }

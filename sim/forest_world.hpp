@@ -11,6 +11,7 @@
 
 namespace understory::sim {
 
+/// Shapes and densities of what grows.
 struct ForestWorldParameters {
   GroundParameters ground{
       .slope = {0.03, -0.02}, .relief_m = 0.5, .roughness_m = 0.025, .cover_m = 0.02};
@@ -25,19 +26,21 @@ struct ForestWorldParameters {
   double branches_per_trunk = 2.0;  ///< Dead ones below the crown.
   double bushes_per_hectare = 80.0;
   double bush_density_per_m = 2.5;
-  int people = 0;            ///< Who walk about along the way.
-  double clearance_m = 2.0;  ///< Nothing grows nearer than this to the way.
+  int people = 0;            ///< Walkers along the path.
+  double clearance_m = 2.0;  ///< Nothing grows nearer than this to the path.
 };
 
-/// The forest's trunks (but those on the way, `way_m`: points a metre or so apart) with crowns and
-/// branches, bushes and people between them. Trunk i of World::trunks() is the i-th that was kept.
+/// The forest's trunks (but those on the path, `path_m`: points a metre or so apart) with crowns
+/// and branches, bushes and people between them. Trunk i of World::trunks() is the i-th that was
+/// kept.
 World make_forest_world(const Forest& forest, const ForestWorldParameters& parameters,
-                        std::span<const Eigen::Vector2d> distance_m, std::mt19937_64& random);
+                        std::span<const Eigen::Vector2d> path_m, std::mt19937_64& random);
 
-/// A trunk with crown and branches; `crown_base_m` above the ground. (For streets and fields too.)
+/// Adds a trunk with crown and branches; `crown_base_m` above the ground. (For streets and fields
+/// too.)
 void plant_tree(World& world, const Eigen::Vector2d& at_m, double radius_m, double crown_base_m,
                 const ForestWorldParameters& parameters, std::mt19937_64& random);
-/// A bush, low and round, that stands on the ground.
+/// Adds a bush, low and round, on the ground.
 void plant_bush(World& world, const Eigen::Vector2d& at_m, double density_per_m,
                 std::mt19937_64& random);
 /// Radius at breast height of a random trunk.

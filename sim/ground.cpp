@@ -47,6 +47,7 @@ void Ground::add_waves(int count, double min_length_m, double max_length_m, doub
   std::uniform_real_distribution<double> angle(0.0, 2.0 * std::numbers::pi);
   std::uniform_real_distribution<double> log_length(std::log(min_length_m), std::log(max_length_m));
   const std::size_t first = waves_.size();
+
   for (int i = 0; i < count; ++i) {
     const double length_m = std::exp(log_length(random));
     const double direction = angle(random);
@@ -55,6 +56,7 @@ void Ground::add_waves(int count, double min_length_m, double max_length_m, doub
                                 std::round(kTile / length_m * std::sin(direction)));
     waves_.push_back({2.0 * std::numbers::pi / kTile * turns, angle(random), length_m});
   }
+
   // Waves of one length and direction add up or cancel: the sum is measured.
   const Ground waves_alone(
       std::vector<Wave>(waves_.begin() + static_cast<std::ptrdiff_t>(first), waves_.end()));
@@ -79,6 +81,7 @@ void Ground::fill_table() {
       }
     }
   }
+
   highest_m_ = *std::max_element(table_.begin(), table_.end());
   fill_blocks();
 }
@@ -90,6 +93,7 @@ void Ground::fill_blocks() {
       float max_m = -std::numeric_limits<float>::infinity();
       float slope_x = 0.0F;
       float slope_y = 0.0F;
+
       for (int r = row * kBlockCells; r <= (row + 1) * kBlockCells; ++r) {
         for (int c = column * kBlockCells; c <= (column + 1) * kBlockCells; ++c) {
           const float here = table_[node(c, r)];
@@ -98,6 +102,7 @@ void Ground::fill_blocks() {
           slope_y = std::max(slope_y, std::abs(table_[node(c, r + 1)] - here));
         }
       }
+
       blocks_[static_cast<std::size_t>(row) * kBlocks + column] = {
           max_m, std::hypot(slope_x, slope_y) / static_cast<float>(kCell)};
     }
@@ -196,11 +201,14 @@ std::optional<GroundHit> Ground::cast(const Eigen::Vector3d& origin_m,
   double t = 0.0;
   double clearance = track.z0 - Cell(table_, track.u0, track.v0).height();
   if (clearance <= 0.0) return hit_at(track, 0.0, direction);
+
   while (t < max_m) {
     const double z = track.z(t);
     if (track.climb >= 0.0 && z > highest_m_) return std::nullopt;
+
     const double u = track.u(t);
     const double v = track.v(t);
+
     // A hair beyond the border, to be in the next block.
     const double border =
         t + 1e-6 + std::min(to_border(u, track.du, u_inverse), to_border(v, track.dv, v_inverse));
@@ -210,20 +218,24 @@ std::optional<GroundHit> Ground::cast(const Eigen::Vector3d& origin_m,
       clearance = -1.0;  // not known
       continue;
     }
+
     if (clearance < 0.0) clearance = std::max(0.0, z - Cell(table_, u, v).height());
     const double closing = block.slope * level_speed - track.climb;
     const double step = closing > 0.0 ? std::max(clearance / closing, kLeastStep) : border - t;
     const double next = std::min(border, t + step);
     const double after = track.z(next) - Cell(table_, track.u(next), track.v(next)).height();
+
     if (after <= 0.0) {
       // Straight between the two: the cells are larger than the least step.
       const double crossing = t + (next - t) * clearance / (clearance - after);
       if (crossing >= max_m) return std::nullopt;
       return hit_at(track, crossing, direction);
     }
+
     t = next;
     clearance = after;
   }
+
   return std::nullopt;
 }
 

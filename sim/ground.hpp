@@ -8,6 +8,7 @@
 
 namespace understory::sim {
 
+/// The shape of the ground and what covers it.
 struct GroundParameters {
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();  ///< Rise per metre along x and y.
   double relief_m = 0.0;     ///< Standard deviation of hills with wavelengths of 25-130 m.
@@ -15,6 +16,7 @@ struct GroundParameters {
   double cover_m = 0.0;      ///< Mean height at which grass or leaves stop a ray.
 };
 
+/// Where a ray meets the ground.
 struct GroundHit {
   double range_m = 0.0;
   double cosine = 1.0;       ///< Of the angle between the ray and the ground's normal.
@@ -26,15 +28,19 @@ class Ground {
  public:
   /// Level, at height 0.
   Ground();
+  /// Ground with waves drawn from `random`.
   Ground(const GroundParameters& parameters, std::mt19937_64& random);
 
-  /// Height and its gradient at (x, y) [m].
+  /// Height at (x, y) [m].
   double height(const Eigen::Vector2d& at_m) const;
+  /// Rise per metre along x and y.
   Eigen::Vector2d gradient(const Eigen::Vector2d& at_m) const;
+  /// Unit normal, upwards.
   Eigen::Vector3d normal(const Eigen::Vector2d& at_m) const;
+  /// Mean height of the cover (grass, leaves).
   double cover_m() const { return cover_m_; }
 
-  /// Where the ray (unit direction) meets the ground within `max_m`. Made from a table with cells
+  /// Where the ray (unit direction) meets the ground within `max_m`. Uses a table with cells
   /// of 0.5 m, within 5 mm of `height`; a bump that the ray grazes for less than 0.25 m may be
   /// missed. At 0 where the ray starts below the ground.
   std::optional<GroundHit> cast(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction,

@@ -1,5 +1,5 @@
-// Chance without a state: numbers that depend on keys alone, so that a ray's luck is the same
-// whoever was cast before it.
+// Chance without a state: numbers that depend on keys alone, so that the fate of a ray does not
+// depend on the rays cast before it.
 #pragma once
 
 #include <cmath>
@@ -15,6 +15,7 @@ inline std::uint64_t mixed(std::uint64_t z) {
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
   return z ^ (z >> 31);
 }
+/// Of two keys, in order.
 inline std::uint64_t mixed(std::uint64_t a, std::uint64_t b) { return mixed(mixed(a) ^ b); }
 
 /// In (0, 1), from the upper half of `hash`.

@@ -23,6 +23,7 @@ void integrate(model::Preintegration& p, double rate, const Eigen::Vector2d& for
   Eigen::Matrix<double, 5, 5> step = Eigen::Matrix<double, 5, 5>::Identity();
   step.block<2, 1>(1, 0) = sideways * dt;
   step.block<2, 1>(3, 0) = 0.5 * sideways * dt * dt;
+
   step.block<2, 2>(3, 1) = dt * Eigen::Matrix2d::Identity();
   Eigen::Matrix<double, 5, 3> input = Eigen::Matrix<double, 5, 3>::Zero();  // Of (rate, force).
   input(0, 0) = dt;
@@ -30,6 +31,7 @@ void integrate(model::Preintegration& p, double rate, const Eigen::Vector2d& for
   input.block<2, 1>(3, 0) = 0.25 * sideways * dt * dt * dt;
   input.block<2, 2>(1, 1) = to_start * dt;
   input.block<2, 2>(3, 1) = 0.5 * to_start * dt * dt;
+
   const double gyro = gyro_noise * gyro_noise / dt;
   const double accelerometer = accelerometer_noise * accelerometer_noise / dt;
   const Eigen::Matrix3d noise = Eigen::Vector3d(gyro, accelerometer, accelerometer).asDiagonal();
@@ -37,6 +39,7 @@ void integrate(model::Preintegration& p, double rate, const Eigen::Vector2d& for
   p.bias_jacobian = step * p.bias_jacobian - input;
   p.position_m += p.velocity_mps * dt + 0.5 * acceleration * dt * dt;
   p.velocity_mps += acceleration * dt;
+
   p.yaw_rad += turn;
   p.seconds += dt;
 }
@@ -57,6 +60,7 @@ InertialDrive::InertialDrive(const InertialDriveParameters& parameters, const Tr
   std::uniform_real_distribution<double> angle(0.0, kTwoPi);
   phase_ = angle(random_);
   theta_ = angle(random_);
+
   // The loop lies around the middle of the forest.
   const double radius = parameters_.loop_length_m / kTwoPi;
   const Eigen::Vector2d middle = 0.5 * (world.forest.low_m + world.forest.high_m);
@@ -64,6 +68,7 @@ InertialDrive::InertialDrive(const InertialDriveParameters& parameters, const Tr
   bias_ << parameters_.gyro_bias_sigma * normal(), parameters_.accelerometer_bias_sigma * normal(),
       parameters_.accelerometer_bias_sigma * normal();
   parked_ = geometry::SE2(position_, theta_);
+
   if (sways()) {
     const geometry::SE2 first = sway_place();
     position_ = first.translation();
@@ -138,11 +143,13 @@ InertialDrive::Tick InertialDrive::advance(double dt) {
   const double curvature = kTwoPi / parameters_.loop_length_m +
                            parameters_.wiggle_curvature *
                                std::sin(phase_ + kTwoPi * driven_m_ / parameters_.wiggle_length_m);
+
   const double heading = theta_ + length * curvature;
   Tick tick = turn_and_push(dt, length * curvature,
                             speed_mps_ * Eigen::Vector2d(std::cos(heading), std::sin(heading)));
   driven_m_ += length;
   walk_bias(dt);
+
   return tick;
 }
 
@@ -159,6 +166,7 @@ model::Odometry InertialDrive::drive_increment() {
   const bool swaying = sways();
   if (swaying) begin_sway();
   model::Preintegration inertial;
+
   for (int k = 0; k < p.samples_per_scan; ++k) {
     const model::InertialBias bias = bias_;
     const Tick tick = swaying ? sway(dt, 2 * k < p.samples_per_scan) : advance(dt);
@@ -168,6 +176,7 @@ model::Odometry InertialDrive::drive_increment() {
     force.y() += p.accelerometer_noise / std::sqrt(dt) * normal();
     integrate(inertial, rate, force, dt, p.gyro_noise, p.accelerometer_noise);
   }
+
   const geometry::SE2 truth = before.inverse() * geometry::SE2(position_, theta_);
   const bool wheels = p.odometry != OdometryKind::kInertial;
   const bool imu = p.odometry != OdometryKind::kWheels;
@@ -177,6 +186,7 @@ model::Odometry InertialDrive::drive_increment() {
           : p.wheel_sigma_rad;
   model::Odometry increment;
   increment.is_stationary = speed_mps_ <= 0.0;
+
   increment.has_wheels = wheels;
   if (imu) increment.inertial = inertial;
   const double moved = increment.is_stationary && wheels ? 0.0 : 1.0;
@@ -186,6 +196,7 @@ model::Odometry InertialDrive::drive_increment() {
   if (imu) increment.from_T_to = geometry::SE2(increment.from_T_to.translation(), inertial.yaw_rad);
   increment.covariance =
       Eigen::Vector3d(sigma * sigma, sigma * sigma, turn_sigma * turn_sigma).asDiagonal();
+
   return increment;
 }
 
@@ -194,6 +205,7 @@ void InertialDrive::observe(DriveStep& step) {
   const geometry::SE2 vehicle_T_world = step.world_T_vehicle.inverse();
   std::bernoulli_distribution detected(p.detection_probability);
   const double variance = p.position_sigma_m * p.position_sigma_m;
+
   const auto add = [&](const Eigen::Vector2d& position, std::int64_t trunk) {
     model::Detection detection;
     detection.position_m << position, 0.0;
@@ -202,16 +214,19 @@ void InertialDrive::observe(DriveStep& step) {
     step.scan.detections.push_back(detection);
     step.trunks.push_back(trunk);
   };
+
   const auto near = world_.grid->within(step.world_T_vehicle.translation(), p.range_m);
   for (const std::uint32_t trunk : near) {
     if (!detected(random_)) continue;
     const Eigen::Vector2d noise(normal(), normal());
     add(vehicle_T_world * world_.forest.trunks_m[trunk] + p.position_sigma_m * noise, trunk);
   }
+
   std::poisson_distribution<int> clutter(
       std::max(1e-9, p.clutter_share * p.detection_probability * static_cast<double>(near.size())));
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   const int false_ones = p.clutter_share > 0.0 ? clutter(random_) : 0;
+
   for (int k = 0; k < false_ones; ++k) {
     const double range = p.range_m * std::sqrt(unit(random_));
     const double bearing = kTwoPi * unit(random_);
@@ -224,6 +239,7 @@ DriveStep InertialDrive::next() {
   const auto interval_us =
       static_cast<model::Utime>(std::llround(1e6 * parameters_.scan_interval_s));
   const model::Utime utime = static_cast<model::Utime>(scans_) * interval_us;
+
   if (scans_ > 0) {
     model::Odometry increment = drive_increment();
     increment.from_utime = utime - interval_us;
@@ -231,6 +247,7 @@ DriveStep InertialDrive::next() {
     increment.sequence = scans_ - 1;
     if (parameters_.odometry != OdometryKind::kNone) step.odometry.push_back(increment);
   }
+
   step.world_T_vehicle = geometry::SE2(position_, theta_);
   step.velocity_mps = velocity_;
   step.bias = bias_;
@@ -238,6 +255,7 @@ DriveStep InertialDrive::next() {
   step.scan.utime = utime;
   step.scan.sequence = scans_++;
   step.scan.field_of_view.max_range_m = parameters_.range_m;
+
   observe(step);
   return step;
 }

@@ -19,18 +19,21 @@ struct TrunkField {
   Forest forest;
   std::unique_ptr<PointGrid> grid;
 };
+/// A forest drawn from `seed`, with its grid.
 TrunkField make_trunk_field(const ForestParameters& parameters, std::uint64_t seed);
 
+/// Where the odometry of an InertialDrive comes from.
 enum class OdometryKind {
   kInertial,           ///< IMU only.
   kWheels,             ///< Wheels only.
-  kInertialAndWheels,  ///< Both in one piece.
+  kInertialAndWheels,  ///< Both in one increment.
   kNone
 };
 
+/// Motion, sensors and their errors.
 struct InertialDriveParameters {
   double standing_s = 10.0;  ///< At the start.
-  /// Sway of the standing body about its place (engine, wind), drawn anew for each scan; 0 = none.
+  /// Sway of the stationary vehicle's body (engine, wind), drawn anew for each scan; 0 = none.
   double sway_sigma_m = 0.0;  ///< Per axis.
   double sway_sigma_rad = 0.0;
   double sway_sigma_mps = 0.0;  ///< Per axis.
@@ -49,8 +52,8 @@ struct InertialDriveParameters {
   double accelerometer_bias_sigma = 0.05;  ///< [m/s^2]
   double gyro_walk = 1e-5;                 ///< [rad/s/sqrt(s)]
   double accelerometer_walk = 1e-3;        ///< [m/s^2/sqrt(s)]
-  double wheel_sigma_m = 0.01;             ///< Per axis of a piece's translation.
-  double wheel_sigma_rad = 0.002;          ///< Of a piece's turn, without an IMU.
+  double wheel_sigma_m = 0.01;             ///< Per axis of an increment's translation.
+  double wheel_sigma_rad = 0.002;          ///< Of an increment's rotation, without an IMU.
   double dead_reckoning_sigma_mps =
       0.3;  ///< Of `from_T_to` where nothing but the IMU is behind it.
   double range_m = 40.0;

@@ -62,6 +62,7 @@ model::ImuSample SimulatedImu::next(const VehicleMotion& motion, model::Utime ut
   const double root_dt = 1.0 / std::sqrt(parameters_.rate_hz);
   gyro_bias_ += normal3(parameters_.gyro_bias_walk * root_dt);
   accelerometer_bias_ += normal3(parameters_.accelerometer_bias_walk * root_dt);
+
   sample.angular_rate_rad_s = gyro_scale_.cwiseProduct(sample.angular_rate_rad_s) + gyro_bias_ +
                               normal3(parameters_.gyro_noise / root_dt);
   sample.specific_force_mps2 = accelerometer_scale_.cwiseProduct(sample.specific_force_mps2) +
@@ -70,6 +71,7 @@ model::ImuSample SimulatedImu::next(const VehicleMotion& motion, model::Utime ut
   sample.angular_rate_rad_s = limited(sample.angular_rate_rad_s, parameters_.gyro_limit_rad_s);
   sample.specific_force_mps2 =
       limited(sample.specific_force_mps2, parameters_.accelerometer_limit_mps2);
+
   return sample;
 }
 
@@ -87,6 +89,7 @@ model::WheelSample SimulatedWheels::next(const VehicleMotion& motion, model::Uti
   model::WheelSample sample;
   sample.utime = utime_at(time_s, utime_of_start);
   sample.sequence = count_++;
+
   const double speed = velocity.x() - yaw_rate * parameters_.encoder_left_m;
   const double noise = parameters_.speed_sigma_mps * normal_(random_);
   sample.speed_mps = std::abs(speed) < 1e-3 ? 0.0 : scale_ * speed + noise;
@@ -96,6 +99,7 @@ model::WheelSample SimulatedWheels::next(const VehicleMotion& motion, model::Uti
           : std::atan(motion.parameters().wheelbase_m * yaw_rate / velocity.x());
   sample.steering_rad =
       steering + steering_offset_rad_ + parameters_.steering_sigma_rad * normal_(random_);
+
   return sample;
 }
 
@@ -118,11 +122,13 @@ std::optional<model::GnssFix> SimulatedGnss::next(const VehicleMotion& motion,
   const Eigen::Vector2d noise = normal2(parameters_.sigma_m);
   const Eigen::Vector2d velocity_noise = normal2(parameters_.velocity_sigma_mps);
   const auto& outages = parameters_.outages;
+
   if (std::any_of(outages.begin(), outages.end(), [&](const GnssParameters::Outage& outage) {
         return time_s >= outage.from_s && time_s < outage.to_s;
       })) {
     return std::nullopt;
   }
+
   const VehicleState state = motion.at(time_s);
   const Eigen::Vector3d lever = state.world_Q_vehicle * parameters_.antenna_m;
   const Eigen::Vector3d turning =
@@ -131,9 +137,11 @@ std::optional<model::GnssFix> SimulatedGnss::next(const VehicleMotion& motion,
   fix.utime = utime_at(time_s, utime_of_start);
   fix.sequence = fixes_++;
   fix.east_north_m = (state.position_m + lever).head<2>() + drift_m_ + noise;
+
   fix.sigma_m = std::hypot(parameters_.sigma_m, parameters_.drift_sigma_m);
   fix.velocity_mps = (state.velocity_mps + turning).head<2>() + velocity_noise;
   fix.velocity_sigma_mps = parameters_.velocity_sigma_mps;
+
   return fix;
 }
 

@@ -17,6 +17,7 @@ namespace understory::sim {
 
 inline constexpr double kGravity = 9.81;  ///< [m/s^2], as common/model/imu.hpp has it.
 
+/// Rate and errors of an inertial unit.
 struct ImuParameters {
   double rate_hz = 200.0;
   double gyro_noise = 1.7e-4;              ///< White [rad/s/sqrt(Hz)]; 0.01 degrees/s/sqrt(Hz).
@@ -41,12 +42,17 @@ model::ImuSample true_imu_sample(const VehicleState& state,
 /// Errors come one after another: samples are made in order.
 class SimulatedImu {
  public:
+  /// Draws biases and scales from `seed`.
   SimulatedImu(const ImuParameters& parameters, std::uint64_t seed);
+  /// Time of the next sample.
   double next_time_s() const { return static_cast<double>(count_) / parameters_.rate_hz; }
+  /// The sample at next_time_s().
   model::ImuSample next(const VehicleMotion& motion, model::Utime utime_of_start = 0);
 
-  const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }  ///< Of the last sample.
+  const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }  ///< Of the last sample [rad/s].
+  /// Of the last sample [m/s^2].
   const Eigen::Vector3d& accelerometer_bias() const { return accelerometer_bias_; }
+  /// As given to the constructor.
   const ImuParameters& parameters() const { return parameters_; }
 
  private:
@@ -62,19 +68,24 @@ class SimulatedImu {
   std::uint64_t count_ = 0;
 };
 
+/// Rate and errors of wheel encoder and steering sensor.
 struct WheelParameters {
   double rate_hz = 100.0;
   double scale_sigma = 5e-3;                ///< Of the scale error, drawn once (wrong radius).
-  double speed_sigma_mps = 0.02;            ///< White; none while the wheels stand.
+  double speed_sigma_mps = 0.02;            ///< White; none while the vehicle is stationary.
   double steering_sigma_rad = 5e-3;         ///< White.
   double steering_offset_sigma_rad = 3e-3;  ///< Drawn once.
   double encoder_left_m = 0.0;  ///< The wheel with the encoder, left of the rear axle's middle.
 };
 
+/// Errors come one after another: samples are made in order.
 class SimulatedWheels {
  public:
+  /// Draws scale and offset from `seed`.
   SimulatedWheels(const WheelParameters& parameters, std::uint64_t seed);
+  /// Time of the next sample.
   double next_time_s() const { return static_cast<double>(count_) / parameters_.rate_hz; }
+  /// The sample at next_time_s().
   model::WheelSample next(const VehicleMotion& motion, model::Utime utime_of_start = 0);
 
  private:
@@ -86,12 +97,14 @@ class SimulatedWheels {
   std::uint64_t count_ = 0;
 };
 
+/// Rate and errors of a satellite receiver.
 struct GnssParameters {
   double rate_hz = 2.0;
   double sigma_m = 0.5;              ///< White, per axis.
   double drift_sigma_m = 0.5;        ///< Of a slow error (Gauss-Markov) besides, per axis.
   double drift_time_s = 120.0;       ///< Its correlation time.
   double velocity_sigma_mps = 0.05;  ///< Per axis.
+  /// No fix from `from_s` to `to_s` of the drive.
   struct Outage {
     double from_s = 0.0;
     double to_s = 0.0;
@@ -100,9 +113,12 @@ struct GnssParameters {
   Eigen::Vector3d antenna_m = {0.5, 0.0, 1.6};  ///< Frame `vehicle`.
 };
 
+/// Errors come one after another: fixes are made in order.
 class SimulatedGnss {
  public:
+  /// Draws the slow error's start from `seed`.
   SimulatedGnss(const GnssParameters& parameters, std::uint64_t seed);
+  /// Time of the next fix.
   double next_time_s() const { return static_cast<double>(count_) / parameters_.rate_hz; }
   /// The fix at next_time_s(); none during an outage.
   std::optional<model::GnssFix> next(const VehicleMotion& motion, model::Utime utime_of_start = 0);

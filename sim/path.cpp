@@ -65,6 +65,7 @@ std::vector<Segment> segments_of(const PathParameters& parameters) {
     case PathKind::kFigureEight:
       return {arc(0.5 * length, 2.0 * round), arc(0.5 * length, -2.0 * round)};
     case PathKind::kSquare:
+
       return polygon(length, 4);
     case PathKind::kTriangle:
       return polygon(length, 3);
@@ -72,9 +73,11 @@ std::vector<Segment> segments_of(const PathParameters& parameters) {
       return {arc(length, -2.0 * round)};
     case PathKind::kMeander:
       return meander(parameters);
+
     case PathKind::kStanding:
       return {{length, Eigen::Vector3d::Zero()}};
   }
+
   return {};
 }
 
@@ -98,6 +101,7 @@ std::vector<geometry::SE2> make_path(const PathParameters& parameters) {
   std::vector<geometry::SE2> poses;
   geometry::SE2 segment_start;
   double effort_before = 0.0;
+
   // An observation within rounding of the end of a segment belongs to the next one.
   const double slack = 1e-6 * parameters.interval;
   for (const Segment& segment : segments_of(parameters)) {
@@ -111,6 +115,7 @@ std::vector<geometry::SE2> make_path(const PathParameters& parameters) {
     segment_start = segment_start * geometry::SE2::Exp(segment.effort * segment.twist);
     effort_before = effort_end;
   }
+
   return poses;
 }
 

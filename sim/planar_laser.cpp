@@ -20,6 +20,7 @@ SimulatedPlanarScan PlanarLaser::scan(const VehicleMotion& motion, std::uint64_t
   result.scan.sequence = k;
   result.scan.first_bearing_rad = parameters_.first_bearing_rad;
   result.scan.bearing_step_rad = parameters_.bearing_step_rad;
+
   result.scan.max_range_m = parameters_.max_range_m;
   for (int beam = 0; beam < parameters_.beams; ++beam) {
     const double bearing = parameters_.first_bearing_rad + beam * parameters_.bearing_step_rad;
@@ -32,10 +33,12 @@ SimulatedPlanarScan PlanarLaser::scan(const VehicleMotion& motion, std::uint64_t
     const double range = hit.range_m + parameters_.range_sigma_m * normal_of(mixed(luck, 1));
     const bool is_return = hit.is_hit && uniform_of(mixed(luck, 2)) >= parameters_.drop_out &&
                            range > 0.0 && range < parameters_.max_range_m;
+
     result.scan.ranges_m.push_back(static_cast<float>(is_return ? range : parameters_.max_range_m));
     result.objects.push_back(hit.object);
     result.is_return.push_back(is_return ? 1 : 0);
   }
+
   return result;
 }
 

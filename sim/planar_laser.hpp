@@ -1,4 +1,4 @@
-// A laser scanner that sees one plane.
+// A laser scanner with one plane.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -12,8 +12,8 @@
 
 namespace understory::sim {
 
-/// As the SICK LMS of Victoria Park, if a little faster. The turn of its mirror takes 13 ms, in
-/// which the car moves by centimetres: a scan is taken at once.
+/// As the SICK LMS of Victoria Park, if a little faster. Its mirror takes 13 ms for a revolution,
+/// in which the car moves by centimetres: a scan is taken at one instant.
 struct PlanarLaserParameters {
   int beams = 361;
   double first_bearing_rad = -0.5 * std::numbers::pi;
@@ -25,19 +25,22 @@ struct PlanarLaserParameters {
   Eigen::Isometry3d vehicle_T_sensor = Eigen::Isometry3d(Eigen::Translation3d(3.6, 0.0, 0.8));
 };
 
+/// A scan as the sensor gives it, with the truth.
 struct SimulatedPlanarScan {
   model::PlanarScan scan;         ///< Beams without a return have max_range_m.
   std::vector<ObjectId> objects;  ///< Per beam; the ground's where there is no return.
   std::vector<std::uint8_t> is_return;
 };
 
+/// A one-plane laser in a world.
 class PlanarLaser {
  public:
   /// `world` must outlive the sensor and stay as it is.
   PlanarLaser(const World& world, const PlanarLaserParameters& parameters, std::uint64_t seed);
 
+  /// Time of scan k in the drive.
   double time_s(std::uint64_t k) const { return static_cast<double>(k) / parameters_.rate_hz; }
-  /// Scan number k, at time_s(k) of the drive.
+  /// Scan number k, at time_s(k) of the drive. Depends on nothing that was asked before.
   SimulatedPlanarScan scan(const VehicleMotion& motion, std::uint64_t k,
                            model::Utime utime_of_start = 0);
 

@@ -11,16 +11,20 @@ PointGrid::PointGrid(std::span<const Eigen::Vector2d> points_m, double tile_m)
   if (points_.empty()) return;
   Eigen::Vector2d low = points_.front();
   Eigen::Vector2d high = points_.front();
+
   for (const Eigen::Vector2d& p : points_) {
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
   }
+
   origin_m_ = low;
   columns_ = static_cast<int>((high.x() - low.x()) / tile_m_) + 1;
   rows_ = static_cast<int>((high.y() - low.y()) / tile_m_) + 1;
+
   const auto tile_of = [this](const Eigen::Vector2d& p) {
     return static_cast<std::size_t>(row(p.y())) * columns_ + column(p.x());
   };
+
   first_of_tile_.assign(static_cast<std::size_t>(columns_) * rows_ + 1, 0);
   for (const Eigen::Vector2d& p : points_) ++first_of_tile_[tile_of(p) + 1];
   for (std::size_t t = 1; t < first_of_tile_.size(); ++t)
@@ -78,6 +82,7 @@ bool PointGrid::any_within(const Eigen::Vector2d& centre_m, double radius_m) con
 
 std::optional<PointGrid::Neighbour> PointGrid::nearest(const Eigen::Vector2d& centre_m) const {
   if (points_.empty()) return std::nullopt;
+
   // Far outside the box the search would start with many empty rings; it starts at the box instead.
   const Eigen::Vector2d high = origin_m_ + tile_m_ * Eigen::Vector2d(columns_, rows_);
   const double outside = (centre_m - centre_m.cwiseMax(origin_m_).cwiseMin(high)).norm();

@@ -9,11 +9,13 @@
 
 namespace understory::sim {
 
+/// A static index of points; a query looks only into the tiles that it touches.
 class PointGrid {
  public:
   /// Tiles of `tile_m` over the bounding box of `points_m`; the points are copied.
   PointGrid(std::span<const Eigen::Vector2d> points_m, double tile_m);
 
+  /// A point found and its distance.
   struct Neighbour {
     std::uint32_t index = 0;
     double distance_m = 0.0;
@@ -25,6 +27,7 @@ class PointGrid {
   /// The nearest point (the lowest index among equals); none if there are no points.
   std::optional<Neighbour> nearest(const Eigen::Vector2d& centre_m) const;
 
+  /// The points as given.
   std::span<const Eigen::Vector2d> points() const { return points_; }
 
  private:

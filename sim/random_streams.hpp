@@ -1,5 +1,5 @@
 // Independent random streams from one seed, so that a change in one part of a simulation leaves the
-// others as they were, and every method sees the same runs.
+// others as they were, and every method is compared on the same runs.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +7,7 @@
 
 namespace understory::sim {
 
+/// What a stream of random numbers is for.
 enum class Stream : std::uint64_t {
   kForest = 1,
   kStartPose = 2,

@@ -43,6 +43,7 @@ void RayCaster::fill_grid() {
     high_m = is_first ? high : high_m.cwiseMax(high).eval();
     is_first = false;
   }
+
   choose_tile(high_m - low_m_);
   const auto for_each_tile = [&](auto visit) {
     for (ObjectId i = 0; i < world_.object_count(); ++i) {
@@ -58,11 +59,13 @@ void RayCaster::fill_grid() {
       }
     }
   };
+
   first_of_tile_.assign(static_cast<std::size_t>(columns_) * rows_ + 1, 0);
   for_each_tile([&](std::size_t tile, ObjectId /*object*/) { ++first_of_tile_[tile + 1]; });
   for (std::size_t t = 1; t < first_of_tile_.size(); ++t) {
     first_of_tile_[t] += first_of_tile_[t - 1];
   }
+
   order_.resize(first_of_tile_.back());
   std::vector<std::uint32_t> next(first_of_tile_.begin(), first_of_tile_.end() - 1);
   for_each_tile([&](std::size_t tile, ObjectId object) { order_[next[tile]++] = object; });
@@ -75,6 +78,7 @@ bool RayCaster::sector_of(const Eigen::Vector3d& origin_m,
   sector.reach_m = max_m;
   const double length = directions.front().head<2>().norm();
   if (length < 1e-9) return false;
+
   sector.ahead = directions.front().head<2>() / length;
   sector.right = sector.left = 0.0;
   for (const Eigen::Vector3d& direction : directions) {
@@ -84,6 +88,7 @@ bool RayCaster::sector_of(const Eigen::Vector3d& origin_m,
     sector.right = std::min(sector.right, aside / along);
     sector.left = std::max(sector.left, aside / along);
   }
+
   return true;
 }
 
@@ -94,14 +99,17 @@ void RayCaster::consider(ObjectId object, const Sector& sector, double height_m)
   const Eigen::Vector2d to_centre = b.centre_m - sector.apex_m;
   const double along = sector.ahead.dot(to_centre);
   if (along < -b.radius_m) return;
+
   const double aside = cross(sector.ahead, to_centre);
   const double r = b.radius_m + 1e-9;
   if (aside - sector.left * along > r * std::sqrt(1.0 + sector.left * sector.left) ||
       sector.right * along - aside > r * std::sqrt(1.0 + sector.right * sector.right)) {
     return;
   }
+
   const double distance_m = to_centre.norm();
   if (distance_m - r > sector.reach_m) return;
+
   candidates_.push_back({std::max(0.0, distance_m - r), distance_m + r, b.low_m - height_m,
                          b.high_m - height_m, r, to_centre, object});
 }
@@ -122,6 +130,7 @@ void RayCaster::gather(const Sector& sector, double height_m) {
   const int v = 1 - u;
   const Eigen::Vector2d aside(-sector.ahead.y(), sector.ahead.x());
   const Eigen::Vector2d right = sector.ahead + sector.right * aside;
+
   const Eigen::Vector2d left = sector.ahead + sector.left * aside;
   const double u0 = sector.apex_m[u];
   const double v0 = sector.apex_m[v];
@@ -130,12 +139,15 @@ void RayCaster::gather(const Sector& sector, double height_m) {
   const double reach = sector.reach_m * std::max(std::abs(right[u]), std::abs(left[u])) *
                        (sector.ahead[u] < 0 ? -1 : 1);
   const int u_count = u == 0 ? columns_ : rows_;
+
   const int v_count = u == 0 ? rows_ : columns_;
   const double from = std::min(u0, u0 + reach);
   const double to = std::max(u0, u0 + reach);
+
   const auto tile_of = [&](double x, int axis) {
     return static_cast<int>(std::floor((x - low_m_[axis]) / tile_m_));
   };
+
   const int last = std::min(u_count - 1, tile_of(to, u));
   for (int i = std::max(0, tile_of(from, u)); i <= last; ++i) {
     const double a = std::max(from, low_m_[u] + i * tile_m_) - u0;
@@ -147,6 +159,7 @@ void RayCaster::gather(const Sector& sector, double height_m) {
       gather_tile(u == 0 ? i : j, u == 0 ? j : i, sector, height_m);
     }
   }
+
   std::sort(candidates_.begin(), candidates_.end(), [](const Candidate& p, const Candidate& q) {
     return p.near_m != q.near_m ? p.near_m < q.near_m : p.object < q.object;
   });
@@ -157,6 +170,7 @@ RayHit RayCaster::cast_one(const Ray& ray, double time_s, double max_m, std::uin
   const double level = ray.direction.head<2>().norm();
   const Eigen::Vector2d ahead = ray.direction.head<2>() / std::max(level, 1e-12);
   const double climb = ray.direction.z() / std::max(level, 1e-12);
+
   for (const Candidate& c : candidates_) {
     if (c.near_m > hit.range_m * level) break;
     const double z_near = climb * c.near_m;
@@ -166,8 +180,10 @@ RayHit RayCaster::cast_one(const Ray& ray, double time_s, double max_m, std::uin
     const auto met = world_.meet_object(ray, c.object, time_s, luck);
     if (met && met->range_m < hit.range_m) hit = {met->range_m, met->cosine, c.object, true};
   }
+
   const auto ground = world_.meet_ground(ray, hit.range_m, luck);
   if (ground) hit = {ground->range_m, ground->cosine, kGroundObject, true};
+
   return hit;
 }
 
@@ -179,6 +195,7 @@ void RayCaster::cast(const Eigen::Vector3d& origin_m, std::span<const Eigen::Vec
                      double time_s, double max_m, std::uint64_t luck, std::span<RayHit> hits) {
   assert(hits.size() == directions.size());
   if (directions.empty()) return;
+
   Sector sector;
   if (sector_of(origin_m, directions, max_m, sector)) {
     gather(sector, origin_m.z());
@@ -187,6 +204,7 @@ void RayCaster::cast(const Eigen::Vector3d& origin_m, std::span<const Eigen::Vec
     }
     return;
   }
+
   // No common bearing: one by one. A ray straight up or down sees what stands at the apex.
   for (std::size_t i = 0; i < directions.size(); ++i) {
     if (!sector_of(origin_m, directions.subspan(i, 1), max_m, sector)) {

@@ -10,6 +10,7 @@
 
 namespace understory::sim {
 
+/// What one ray met.
 struct RayHit {
   double range_m = 0.0;  ///< The greatest range where nothing was met.
   double cosine = 0.0;   ///< Of the angle between the ray and the surface's normal.
@@ -26,7 +27,7 @@ class RayCaster {
 
   /// The nearest hit of each ray from `origin_m` within `max_m`. Best if the directions (unit)
   /// have nearly one bearing, as the beams of a spinning laser do. `luck` + index of the ray
-  /// decides what foliage lets through. hits.size() == directions.size().
+  /// decides where foliage stops it. hits.size() == directions.size().
   void cast(const Eigen::Vector3d& origin_m, std::span<const Eigen::Vector3d> directions,
             double time_s, double max_m, std::uint64_t luck, std::span<RayHit> hits);
   /// The luck of ray `index` of a fan, as World::meet_object takes it.

@@ -60,6 +60,7 @@ void append_country(std::vector<Stretch>& stretches, double length_m, std::mt199
     } else {
       stretch = {uniform(random, 80.0, 200.0), village_roadside()};
     }
+
     covered += stretch.length_m;
     stretches.push_back(stretch);
   }
@@ -79,6 +80,7 @@ Points shortened(const Points& points, double length_m) {
     }
     result.push_back(points[i]);
   }
+
   return result;
 }
 
@@ -123,19 +125,23 @@ ScenarioResult pole_map_scenario(std::string_view poles_csv, std::string_view tr
                                  std::uint64_t seed) {
   const StemMapResult poles = parse_stem_map(poles_csv);
   if (!poles.error.empty()) return {std::nullopt, "poles: " + poles.error};
+
   // A trajectory has the same columns.
   const StemMapResult way = parse_stem_map(trajectory_csv);
   if (!way.error.empty()) return {std::nullopt, "trajectory: " + way.error};
+
   // While the car stood, its places scatter.
   Points points{way.forest.trunks_m.front()};
   for (const Eigen::Vector2d& p : way.forest.trunks_m) {
     if ((p - points.back()).norm() > 0.7) points.push_back(p);
   }
+
   if (points.size() < 10) return {std::nullopt, "trajectory: less than 10 places 0.7 m apart"};
   const Route route = Route::through(points, 3.0);
   std::mt19937_64 random = random_stream(seed, Stream::kScenery);
   StreetWorldParameters parameters;
   parameters.clearance_m = 1.5;
+
   return {Scenario{std::make_shared<const World>(
                        make_pole_world(route, poles.forest, parameters, random)),
                    route},

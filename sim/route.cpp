@@ -27,6 +27,7 @@ Points resampled(std::span<const Eigen::Vector2d> polyline, double step_m) {
     }
     covered += length;
   }
+
   return result;
 }
 
@@ -64,15 +65,18 @@ Route Route::through(std::span<const Eigen::Vector2d> waypoints_m, double roundi
   const double fine_m = 0.1;
   Points points = resampled(waypoints_m, fine_m);
   if (points.size() < 10) throw std::runtime_error("a route must be 1 m long at least");
+
   const int half = static_cast<int>(std::lround(0.5 * rounding_m / fine_m));
   points = extended(points, 3 * half);
   for (int i = 0; i < 3; ++i) points = box_smoothed(points, half);
+
   // Smoothing shortened the way in curves: even spacing again.
   points = resampled(points, kStep);
   Route route;
   route.length_m_ = kStep * static_cast<double>(points.size() - 1);
   route.start_ = kStep * kBeyond;
   route.curve_ = UniformSpline<2>(extended(points, kBeyond), kStep);
+
   return route;
 }
 

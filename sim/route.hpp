@@ -1,4 +1,4 @@
-// A smooth way through the plane.
+// A smooth path through the plane.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,13 +13,15 @@ namespace understory::sim {
 /// A curve by its length, smooth enough to be driven: curvature and its change are continuous.
 class Route {
  public:
-  /// Through `way_points_m`, corners rounded over about 3 * `rounding_m` (the least radius
+  /// Through `waypoints_m`, corners rounded over about 3 * `rounding_m` (the least radius
   /// in a right angle is then about half of `rounding_m`) and measurement noise smoothed away.
-  /// Straight beyond its ends. Throws std::runtime_error where the points do not give a way of at
+  /// Straight beyond its ends. Throws std::runtime_error where the points do not give a path of at
   /// least 1 m.
   static Route through(std::span<const Eigen::Vector2d> waypoints_m, double rounding_m);
 
+  /// From end to end.
   double length_m() const { return length_m_; }
+  /// A point of the route, frame of the waypoints.
   struct Place {
     Eigen::Vector2d position_m;
     double heading_rad;
@@ -27,6 +29,7 @@ class Route {
   };
   /// `along_m` is clamped to the route.
   Place at(double along_m) const;
+  /// The place as a pose, x along the route.
   geometry::SE2 pose(double along_m) const;
   /// Places every `spacing_m`, the end included.
   std::vector<Eigen::Vector2d> places(double spacing_m) const;

@@ -1,4 +1,4 @@
-// Worlds with a way through them, ready to be driven.
+// Worlds with a path through them, ready to be driven.
 #pragma once
 
 #include <cstdint>
@@ -14,15 +14,16 @@
 
 namespace understory::sim {
 
+/// A forest and the path through it.
 struct ForestScenarioParameters {
   ForestParameters forest = forest_parameters(ForestKind::kIntermediate);  ///< The side follows.
   ForestWorldParameters world;
   PathKind path = PathKind::kCircle;
   double length_m = 1000.0;  ///< Of one lap.
   int laps = 1;              ///< More than one only for paths that end where they began.
-  double margin_m = 110.0;   ///< Forest around the way: what the laser can see.
+  double margin_m = 110.0;   ///< Forest around the path: the laser's range.
 };
-/// A forest of the source's kind (GeoSLAM §4.5.2) with a path in its middle.
+/// A simulated forest (GeoSLAM §4.5.2) with a path in its middle.
 Scenario forest_scenario(const ForestScenarioParameters& parameters, std::uint64_t seed);
 /// The same in a given forest, where the path's start is at `world_T_start`.
 Scenario forest_scenario(const ForestScenarioParameters& parameters, const Forest& forest,
@@ -37,12 +38,13 @@ Scenario urban_to_countryside_scenario(double length_m, std::uint64_t seed);
 /// Country roads: woods, avenues, fields, a village now and then (*Countryside*).
 Scenario countryside_scenario(double length_m, std::uint64_t seed);
 
+/// A scenario from files, or why there is none.
 struct ScenarioResult {
   std::optional<Scenario> scenario;
   std::string error;  ///< Empty if good; else what is wrong with the texts.
 };
-/// A real map of poles and trunks (CSV x_m,y_m[,dbh_m]) and the real way of a car among them (CSV
-/// frame,x_m,y_m,yaw_rad; frames without number are fine). Poles on the way are left out; thick
+/// A real map of poles and trunks (CSV x_m,y_m[,dbh_m]) and the real path of a car among them (CSV
+/// frame,x_m,y_m,yaw_rad; frames without number are fine). Poles on the path are left out; thick
 /// ones and half of those of unknown thickness are trees. Bushes, parked cars and people are added.
 ScenarioResult pole_map_scenario(std::string_view poles_csv, std::string_view trajectory_csv,
                                  std::uint64_t seed);

@@ -37,16 +37,21 @@ SensorDrive::Due SensorDrive::next_due() const {
     // Times are sums of different steps: nearly equal is equal.
     if (time_s < due.time_s - 1e-9) due = {time_s, source};
   };
+
   if (suite_.truth_rate_hz > 0.0) {
     offer(static_cast<double>(truths_) / suite_.truth_rate_hz, Source::kTruth);
   }
+
   if (imu_) offer(imu_->next_time_s(), Source::kImu);
   if (wheels_) offer(wheels_->next_time_s(), Source::kWheels);
   if (gnss_) offer(gnss_->next_time_s(), Source::kGnss);
   if (planar_laser_) offer(planar_laser_->time_s(scans_), Source::kPlanarLaser);
+
   if (lidar_) {
-    offer(static_cast<double>(turns_ + 1) * lidar_->parameters().revolution_s(), Source::kLidar);
+    offer(static_cast<double>(revolutions_ + 1) * lidar_->parameters().revolution_s(),
+          Source::kLidar);
   }
+
   return due;
 }
 
@@ -58,6 +63,7 @@ std::optional<SensorReading> SensorDrive::read(Source source) {
           utime_of_start_ + static_cast<model::Utime>(std::llround(time_s * 1e6));
       return TruePose{utime, truths_++, motion_.at(time_s)};
     }
+
     case Source::kImu:
       return imu_->next(motion_, utime_of_start_);
     case Source::kWheels:
@@ -65,10 +71,13 @@ std::optional<SensorReading> SensorDrive::read(Source source) {
     case Source::kGnss:
       return gnss_->next(motion_, utime_of_start_);
     case Source::kPlanarLaser:
+
       return planar_laser_->scan(motion_, scans_++, utime_of_start_);
     case Source::kLidar:
-      return lidar_->sweep(motion_, turns_++, utime_of_start_);
+
+      return lidar_->sweep(motion_, revolutions_++, utime_of_start_);
   }
+
   return std::nullopt;
 }
 

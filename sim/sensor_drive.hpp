@@ -25,27 +25,32 @@ struct SensorSuite {
   double truth_rate_hz = 50.0;
 };
 
+/// The true state of the vehicle as a reading.
 struct TruePose {
   model::Utime utime = 0;
   std::uint64_t sequence = 0;
   VehicleState state;
 };
 
+/// Any reading of a drive.
 using SensorReading = std::variant<TruePose, model::ImuSample, model::WheelSample, model::GnssFix,
                                    SimulatedPlanarScan, SimulatedSweep>;
 
-/// A world and a way through it.
+/// A world and a path through it.
 struct Scenario {
   std::shared_ptr<const World> world;
   Route route;
 };
 
 /// Readings are made when asked for, in order of the time at which each is complete (a sweep when
-/// its turn ends): a drive of any length costs no memory for them. Same arguments, same readings.
+/// its revolution ends): a drive of any length costs no memory for them. Same arguments, same
+/// readings.
 class SensorDrive {
  public:
+  /// A drive of `vehicle` along the scenario's route. `utime_of_start` is the stamp of time 0 [us].
   SensorDrive(Scenario scenario, const VehicleParameters& vehicle, const SpeedParameters& speed,
               SensorSuite suite, std::uint64_t seed, model::Utime utime_of_start = 0);
+  /// The same with the default vehicle, from stamp 0.
   SensorDrive(Scenario scenario, const SpeedParameters& speed, SensorSuite suite,
               std::uint64_t seed)
       : SensorDrive(std::move(scenario), VehicleParameters{}, speed, std::move(suite), seed) {}
@@ -53,16 +58,23 @@ class SensorDrive {
   /// The next reading; none at the end of the drive.
   std::optional<SensorReading> next();
 
+  /// The world driven through.
   const World& world() const { return *scenario_.world; }
+  /// The route driven.
   const Route& route() const { return scenario_.route; }
+  /// The true motion.
   const VehicleMotion& motion() const { return motion_; }
+  /// The sensors on board.
   const SensorSuite& suite() const { return suite_; }
   /// State of the vehicle at the time of a reading.
   VehicleState state_at(model::Utime utime) const {
     return motion_.at(1e-6 * static_cast<double>(utime - utime_of_start_));
   }
-  /// Any turn of the lidar (which there must be), the same whether or not next() gave it.
-  SimulatedSweep sweep(std::uint64_t turn) { return lidar_->sweep(motion_, turn, utime_of_start_); }
+  /// Any revolution of the LIDAR (which there must be), the same whether or not next() gave it.
+  SimulatedSweep sweep(std::uint64_t revolution) {
+    return lidar_->sweep(motion_, revolution, utime_of_start_);
+  }
+  /// Whole revolutions of the LIDAR within the drive.
   std::uint64_t sweep_count() const;
 
  private:
@@ -85,7 +97,7 @@ class SensorDrive {
   std::unique_ptr<SpinningLidar> lidar_;
   std::uint64_t truths_ = 0;
   std::uint64_t scans_ = 0;
-  std::uint64_t turns_ = 0;
+  std::uint64_t revolutions_ = 0;
 };
 
 }  // namespace understory::sim

@@ -38,12 +38,16 @@ std::optional<SurfaceHit> meet(const Ray& ray, const Stem& stem) {
   const double a = 1.0 - along_speed * along_speed * (1.0 + stem.taper * stem.taper);
   const double b = w.dot(ray.direction) - along * along_speed + stem.taper * along_speed * radius;
   const double c = w.squaredNorm() - along * along - radius * radius;
+
   const double discriminant = b * b - a * c;
   if (a <= 1e-12 || c <= 0.0 || discriminant < 0.0) return std::nullopt;
+
   const double t = (-b - std::sqrt(discriminant)) / a;
   if (t <= 0.0) return std::nullopt;
+
   const double s = along + t * along_speed;
   if (s < 0.0 || s > stem.length_m) return std::nullopt;
+
   // d(implicit)/dt at the root is 2 sqrt(discriminant); the gradient's norm is 2 r sqrt(1 + k^2).
   const double slant = stem.radius_at(s) * std::sqrt(1.0 + stem.taper * stem.taper);
   return SurfaceHit{t, slant > 0.0 ? std::min(1.0, std::sqrt(discriminant) / slant) : 1.0};
@@ -69,11 +73,13 @@ std::optional<SurfaceHit> meet(const Ray& ray, const Box& box) {
   const auto turned = [&](const Eigen::Vector3d& v) {
     return Eigen::Vector3d(cosine * v.x() + sine * v.y(), cosine * v.y() - sine * v.x(), v.z());
   };
+
   const Eigen::Vector3d o = turned(ray.origin_m - box.centre_m);
   const Eigen::Vector3d d = turned(ray.direction);
   double enter = -std::numeric_limits<double>::infinity();
   double leave = std::numeric_limits<double>::infinity();
   double facing = 1.0;
+
   for (int i = 0; i < 3; ++i) {
     if (std::abs(d[i]) < 1e-12) {
       if (std::abs(o[i]) > box.half_size_m[i]) return std::nullopt;
@@ -87,6 +93,7 @@ std::optional<SurfaceHit> meet(const Ray& ray, const Box& box) {
     }
     leave = std::min(leave, last);
   }
+
   if (enter <= 0.0 || enter > leave) return std::nullopt;
   return SurfaceHit{enter, facing};
 }
@@ -101,10 +108,12 @@ std::optional<SurfaceHit> meet(const Ray& ray, const Foliage& foliage, double fr
   const double b = o.dot(d);
   const double discriminant = b * b - a * (o.squaredNorm() - 1.0);
   if (discriminant <= 0.0) return std::nullopt;
+
   const double root = std::sqrt(discriminant);
   const double leave = (-b + root) / a;
   const double t = std::max(0.0, (-b - root) / a) + free_path / foliage.density_per_m;
   if (t >= leave) return std::nullopt;
+
   return SurfaceHit{t, 0.7};
 }
 

@@ -6,6 +6,7 @@
 
 namespace understory::sim {
 
+/// A half-line.
 struct Ray {
   Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d direction = Eigen::Vector3d::UnitX();  ///< Unit.
@@ -25,7 +26,9 @@ struct Stem {
   double taper = 0.0;  ///< Loss of radius per metre along the axis.
   double length_m = 10.0;
 
+  /// Radius at a distance from the base along the axis.
   double radius_at(double along_m) const { return base_radius_m - taper * along_m; }
+  /// Point of the axis at a distance from the base.
   Eigen::Vector3d centre_at(double along_m) const { return base_m + along_m * axis; }
 };
 
@@ -46,31 +49,37 @@ struct Wall {
   double high_m = 5.0;
 };
 
-/// An upright box turned about the vertical.
+/// An upright box rotated about the vertical.
 struct Box {
   Eigen::Vector3d centre_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d half_size_m = Eigen::Vector3d::Ones();
   double heading_rad = 0.0;
 };
 
-/// An upright cylinder that holds the object: to pass by it cheaply.
+/// An upright cylinder around an object, by which most rays rule it out cheaply.
 struct Bounds {
   Eigen::Vector2d centre_m = Eigen::Vector2d::Zero();
   double radius_m = 0.0;
   double low_m = 0.0;
   double high_m = 0.0;
 };
+/// The bounds of a stem, for its whole length.
 Bounds bounds_of(const Stem& stem);
+/// The bounds of foliage.
 Bounds bounds_of(const Foliage& foliage);
+/// The bounds of a wall.
 Bounds bounds_of(const Wall& wall);
+/// The bounds of a box.
 Bounds bounds_of(const Box& box);
 
 /// The first touch from outside at a positive distance; none where the ray misses (or starts
 /// inside).
 std::optional<SurfaceHit> meet(const Ray& ray, const Stem& stem);
+/// The same for a wall, from its outside.
 std::optional<SurfaceHit> meet(const Ray& ray, const Wall& wall);
+/// The same for a box.
 std::optional<SurfaceHit> meet(const Ray& ray, const Box& box);
-/// The leaf that the ray hits if its luck lets it go `free_path` mean free paths.
+/// The leaf that the ray hits after `free_path` mean free paths in the foliage.
 std::optional<SurfaceHit> meet(const Ray& ray, const Foliage& foliage, double free_path);
 
 }  // namespace understory::sim

@@ -82,38 +82,44 @@ void SpinningLidar::point_beams(const Eigen::Vector3d& ahead, const Eigen::Vecto
   const double width = 2.0 * parameters_.beam_half_width_rad;
   for (std::size_t i = 0; i < beams_.size(); ++i) {
     const std::uint64_t hash = mixed(luck + i);
-    const double turn = width * (uniform_of(hash) - 0.5);
+    const double shift = width * (uniform_of(hash) - 0.5);
     const double lift = width * (uniform_of(hash << 32) - 0.5);
     const Eigen::Vector3d direction = (beams_[i].x() - lift * beams_[i].y()) * ahead +
-                                      (beams_[i].y() + lift * beams_[i].x()) * up + turn * aside;
-    directions_[i] = direction / std::sqrt(1.0 + turn * turn + lift * lift);
+                                      (beams_[i].y() + lift * beams_[i].x()) * up + shift * aside;
+    directions_[i] = direction / std::sqrt(1.0 + shift * shift + lift * lift);
   }
 }
 
 void SpinningLidar::add_column(int column, double time_s, const Eigen::Isometry3d& world_T_vehicle,
-                               std::uint64_t turn, SimulatedSweep& sweep) {
-  const double turned = 2.0 * pi * column / parameters_.columns;
-  const double bearing = parameters_.first_bearing_rad + (parameters_.clockwise ? -turned : turned);
+                               std::uint64_t revolution, SimulatedSweep& sweep) {
+  const double rotated = 2.0 * pi * column / parameters_.columns;
+  const double bearing =
+      parameters_.first_bearing_rad + (parameters_.clockwise ? -rotated : rotated);
   const Eigen::Vector2d ahead(std::cos(bearing), std::sin(bearing));
   const Eigen::Isometry3d world_T_sensor = world_T_vehicle * parameters_.vehicle_T_sensor;
   const Eigen::Vector3d level = world_T_sensor.linear().leftCols<2>() * ahead;
   const Eigen::Vector3d up = world_T_sensor.linear().col(2);
   const std::uint64_t column_luck =
-      mixed(mixed(seed_, turn), static_cast<std::uint64_t>(column)) & ~std::uint64_t{0xffff};
+      mixed(mixed(seed_, revolution), static_cast<std::uint64_t>(column)) & ~std::uint64_t{0xffff};
+
   point_beams(level, up, mixed(column_luck, kWidth));
   const Eigen::Vector3d origin = world_T_sensor.translation();
   caster_.cast(origin, directions_, time_s, parameters_.max_range_m, mixed(column_luck, kFoliage),
                hits_);
+
   for (std::size_t i = 0; i < beams_.size(); ++i) {
     const RayHit& hit = hits_[i];
     if (!hit.is_hit) continue;
+
     const std::uint64_t luck = mixed(column_luck + i);
     const Reflection reflection = reflection_of(world_, hit);
     RayHit effective = hit;
     effective.cosine = reflection.cosine;
     if (is_lost(effective, reflection.reflectivity, luck)) continue;
+
     const double range = hit.range_m + parameters_.range_sigma_m * normal_of(mixed(luck, kNoise));
     if (range < parameters_.min_range_m || range > parameters_.max_range_m) continue;
+
     model::SweepPoint point;
     point.x_m = static_cast<float>(range * beams_[i].x() * ahead.x());
     point.y_m = static_cast<float>(range * beams_[i].x() * ahead.y());
@@ -122,47 +128,53 @@ void SpinningLidar::add_column(int column, double time_s, const Eigen::Isometry3
     point.ring = static_cast<std::uint16_t>(i);
     point.intensity = static_cast<std::uint8_t>(
         std::clamp(255.0 * reflection.reflectivity * (0.5 + 0.5 * reflection.cosine), 1.0, 255.0));
+
     sweep.raw.points.push_back(point);
     sweep.objects.push_back(hit.object);
     sweep.true_m.emplace_back((origin + hit.range_m * directions_[i]).cast<float>());
   }
 }
 
-SimulatedSweep SpinningLidar::sweep(const PoseAt& world_T_vehicle, std::uint64_t turn,
+SimulatedSweep SpinningLidar::sweep(const PoseAt& world_T_vehicle, std::uint64_t revolution,
                                     model::Utime utime_of_start) {
   SimulatedSweep result;
   model::PointSweep& raw = result.raw;
-  raw.sequence = raw.turn = turn;
+  raw.sequence = raw.turn = revolution;
   raw.rings = static_cast<std::uint16_t>(beams_.size());
   raw.max_range_m = parameters_.max_range_m;
   const std::size_t most = beams_.size() * static_cast<std::size_t>(parameters_.columns);
   raw.points.reserve(most);
+
   result.objects.reserve(most);
   result.true_m.reserve(most);
-  const double start_s = static_cast<double>(turn) * parameters_.revolution_s();
+  const double start_s = static_cast<double>(revolution) * parameters_.revolution_s();
+
   for (int column = 0; column < parameters_.columns; ++column) {
     const double time_s = start_s + column * parameters_.revolution_s() / parameters_.columns;
-    add_column(column, time_s, world_T_vehicle(time_s), turn, result);
+    add_column(column, time_s, world_T_vehicle(time_s), revolution, result);
   }
+
   // The stamp is that of the first point; the times count from it.
   const double first_s = raw.points.empty() ? 0.0 : raw.points.front().time_s;
   raw.utime = utime_of_start + static_cast<model::Utime>(std::floor((start_s + first_s) * 1e6));
   const double stamp_s = 1e-6 * static_cast<double>(raw.utime - utime_of_start) - start_s;
+
   for (model::SweepPoint& point : raw.points) {
     point.time_s = static_cast<float>(std::max(0.0, point.time_s - stamp_s));
   }
+
   return result;
 }
 
-SimulatedSweep SpinningLidar::sweep(const VehicleMotion& motion, std::uint64_t turn,
+SimulatedSweep SpinningLidar::sweep(const VehicleMotion& motion, std::uint64_t revolution,
                                     model::Utime utime_of_start) {
-  return sweep([&](double time_s) { return motion.at(time_s).world_T_vehicle(); }, turn,
+  return sweep([&](double time_s) { return motion.at(time_s).world_T_vehicle(); }, revolution,
                utime_of_start);
 }
 
-SimulatedSweep SpinningLidar::sweep_standing(const Eigen::Isometry3d& world_T_vehicle,
-                                             std::uint64_t turn) {
-  return sweep([&](double /*time_s*/) { return world_T_vehicle; }, turn);
+SimulatedSweep SpinningLidar::sweep_stationary(const Eigen::Isometry3d& world_T_vehicle,
+                                               std::uint64_t revolution) {
+  return sweep([&](double /*time_s*/) { return world_T_vehicle; }, revolution);
 }
 
 }  // namespace understory::sim

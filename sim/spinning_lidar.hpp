@@ -1,4 +1,4 @@
-// A laser scanner that turns: many beams, one above the other, all around.
+// A rotating laser scanner: many beams, one above the other, all around.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,18 +15,20 @@
 
 namespace understory::sim {
 
+/// Models with known elevations.
 enum class LidarModel { kVlp16, kVlp32, kHdl32, kHdl64 };
 /// Elevations of the beams, ascending [rad], from the makers' manuals.
 std::vector<double> beam_elevations_rad(LidarModel model);
 
+/// Geometry, rate and errors of the sensor.
 struct LidarParameters {
   std::vector<double> elevations_rad = beam_elevations_rad(LidarModel::kVlp32);  ///< Ascending.
-  int columns = 1800;  ///< Firings per turn; all beams of a column fire at once.
+  int columns = 1800;  ///< Firings per revolution; all beams of a column fire at once.
   double revolutions_per_s = 10.0;
-  bool clockwise = true;                        ///< Seen from above, as Velodyne's turn.
-  double first_bearing_rad = std::numbers::pi;  ///< Frame `sensor`; where a turn begins.
+  bool clockwise = true;                        ///< Viewed from above, as Velodyne's rotate.
+  double first_bearing_rad = std::numbers::pi;  ///< Frame `sensor`; where a revolution begins.
   double range_sigma_m = 0.02;
-  /// A beam is as wide as this to each side: what it meets anywhere in that is told as if it lay in
+  /// A beam is as wide as this to each side: what it meets within that is reported as if it lay in
   /// its middle.
   double beam_half_width_rad = 0.5e-3;
   double min_range_m = 0.8;
@@ -38,10 +40,11 @@ struct LidarParameters {
   double white_range_m = 220.0;
   Eigen::Isometry3d vehicle_T_sensor = Eigen::Isometry3d(Eigen::Translation3d(1.2, 0.0, 1.9));
 
+  /// Duration of a revolution.
   double revolution_s() const { return 1.0 / revolutions_per_s; }
 };
 
-/// A turn as the sensor gives it, and what nobody but the simulator knows.
+/// A revolution as the sensor gives it, with the truth of every point.
 struct SimulatedSweep {
   model::PointSweep raw;                ///< Frame `sensor`, skewed; utime of the first point.
   std::vector<ObjectId> objects;        ///< What each point lies on.
@@ -51,25 +54,29 @@ struct SimulatedSweep {
 /// Pose of the vehicle in `world` at a time [s].
 using PoseAt = std::function<Eigen::Isometry3d(double time_s)>;
 
+/// A rotating LIDAR in a world.
 class SpinningLidar {
  public:
   /// `world` must outlive the sensor and stay as it is.
   SpinningLidar(const World& world, LidarParameters parameters, std::uint64_t seed);
 
-  /// Turn number `turn`, which begins at turn * turn_s() of the drive. Depends on nothing that was
-  /// asked before. `utime_of_start` is the utime of time 0.
-  SimulatedSweep sweep(const VehicleMotion& motion, std::uint64_t turn,
+  /// Revolution number `revolution`, which begins at revolution * revolution_s() of the drive.
+  /// Depends on nothing that was asked before. `utime_of_start` is the utime of time 0.
+  SimulatedSweep sweep(const VehicleMotion& motion, std::uint64_t revolution,
                        model::Utime utime_of_start = 0);
-  SimulatedSweep sweep(const PoseAt& world_T_vehicle, std::uint64_t turn,
+  /// The same for any motion.
+  SimulatedSweep sweep(const PoseAt& world_T_vehicle, std::uint64_t revolution,
                        model::Utime utime_of_start = 0);
-  /// As seen by a vehicle that stands at `world_T_vehicle`.
-  SimulatedSweep sweep_standing(const Eigen::Isometry3d& world_T_vehicle, std::uint64_t turn = 0);
+  /// The same for a vehicle that is stationary at `world_T_vehicle`.
+  SimulatedSweep sweep_stationary(const Eigen::Isometry3d& world_T_vehicle,
+                                  std::uint64_t revolution = 0);
 
+  /// As given to the constructor.
   const LidarParameters& parameters() const { return parameters_; }
 
  private:
   void add_column(int column, double time_s, const Eigen::Isometry3d& world_T_vehicle,
-                  std::uint64_t turn, SimulatedSweep& sweep);
+                  std::uint64_t revolution, SimulatedSweep& sweep);
   void point_beams(const Eigen::Vector3d& ahead, const Eigen::Vector3d& up, std::uint64_t luck);
   bool is_lost(const RayHit& hit, double reflectivity, std::uint64_t luck) const;
 

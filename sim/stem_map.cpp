@@ -62,14 +62,17 @@ StemMapResult parse_stem_map(std::string_view csv) {
   StemMapResult result;
   std::optional<Columns> columns;
   int line_number = 0;
+
   for (std::size_t begin = 0; begin < csv.size();) {
     const std::size_t end = std::min(csv.find('\n', begin), csv.size());
     const std::string_view line = trimmed(csv.substr(begin, end - begin));
     begin = end + 1;
     ++line_number;
+
     const auto failed = [&](std::string_view what) {
       return StemMapResult{{}, "line " + std::to_string(line_number) + ": " + std::string(what)};
     };
+
     if (line.empty() || line.front() == '#') continue;
     const std::vector<std::string_view> cells = cells_of(line);
     if (!columns) {
@@ -77,20 +80,26 @@ StemMapResult parse_stem_map(std::string_view csv) {
       if (columns->x < 0 || columns->y < 0) return failed("the header has no x_m and y_m");
       continue;
     }
+
     const auto cell = [&](int column) -> std::optional<double> {
       if (column < 0 || column >= static_cast<int>(cells.size())) return std::nullopt;
       return number(cells[column]);
     };
+
     const auto x = cell(columns->x);
     const auto y = cell(columns->y);
     if (!x || !y) return failed("x_m or y_m is not a number");
+
     const double dbh_m = cell(columns->dbh).value_or(0.0);
     if (dbh_m < 0.0) return failed("dbh_m is negative");
+
     result.forest.trunks_m.emplace_back(*x, *y);
     result.forest.radii_m.push_back(0.5 * dbh_m);
   }
+
   if (result.forest.trunks_m.empty()) return {{}, "no stems"};
   set_extent(result.forest);
+
   return result;
 }
 

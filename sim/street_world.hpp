@@ -1,4 +1,4 @@
-// Streets, gardens and fields along a way: houses, cars, poles, trees, bushes, people.
+// Streets, gardens and fields along a route: houses, cars, poles, trees, bushes, people.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,44 +12,45 @@
 
 namespace understory::sim {
 
-/// What stands beside a stretch of the way; numbers are means per 100 m of it, both sides together.
+/// What lines a stretch of the route; numbers are means per 100 m of it, both sides together.
 struct Roadside {
   double houses = 0.0;
   double cars = 0.0;   ///< Parked.
-  double poles = 0.0;  ///< Lamps and signs, near the way.
-  double trees = 0.0;  ///< In gardens and along the way.
+  double poles = 0.0;  ///< Lamps and signs, near the route.
+  double trees = 0.0;  ///< In gardens and along the route.
   double bushes = 0.0;
   double people = 0.0;
-  double wood_trees = 0.0;  ///< In a wood that lies a little off the way, on one side.
+  double wood_trees = 0.0;  ///< In a wood a little off the route, on one side.
 };
-Roadside town_roadside();
+Roadside town_roadside();     ///< Houses, parked cars, lamps, gardens.
 Roadside avenue_roadside();   ///< Trees and delineators along a country road.
 Roadside field_roadside();    ///< Next to nothing.
 Roadside wood_roadside();     ///< A wood on one side.
 Roadside village_roadside();  ///< A few houses and their gardens.
 
+/// A part of the route and what lines it.
 struct Stretch {
   double length_m = 100.0;
   Roadside roadside;
 };
 
-/// Frame `world`; the way is the middle of the lane that is driven.
+/// Frame `world`; the route is the middle of the lane that is driven.
 struct StreetWorldParameters {
   GroundParameters ground{
       .slope = {0.004, -0.006}, .relief_m = 0.15, .roughness_m = 0.006, .cover_m = 0.005};
   ForestWorldParameters plants;   ///< Shapes of trees.
-  double house_distance_m = 9.0;  ///< Least, from the way to a house.
-  double clearance_m = 2.2;       ///< Nothing stands nearer than this to the way.
+  double house_distance_m = 9.0;  ///< Least, from the route to a house.
+  double clearance_m = 2.2;       ///< Nothing is placed nearer than this to the route.
 };
 
-/// A world along `route`; the last stretch goes on to its end. No house stands where the way
-/// passes elsewhere, nor in another house.
+/// A world along `route`; the last stretch goes on to its end. No house is placed where another
+/// part of the route passes, nor in another house.
 World make_street_world(const Route& route, std::span<const Stretch> stretches,
                         const StreetWorldParameters& parameters, std::mt19937_64& random);
 
 /// The given poles, those of unknown radius half of them trees (as are those thicker than 0.12 m),
-/// with parked cars, bushes and people along `route`. Poles nearer to the way than the clearance
-/// are left out.
+/// with parked cars, bushes and people along `route`. Poles nearer to the route than the
+/// clearance are left out.
 World make_pole_world(const Route& route, const Forest& poles,
                       const StreetWorldParameters& parameters, std::mt19937_64& random);
 

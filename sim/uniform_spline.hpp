@@ -1,4 +1,4 @@
-// A smooth curve through time or along a way, from evenly spaced control points.
+// A smooth curve through time or along a path, from evenly spaced control points.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,25 +17,33 @@ namespace understory::sim {
 template <int N>
 class UniformSpline {
  public:
+  /// A point of the curve.
   using Vector = Eigen::Matrix<double, N, 1>;
+  /// The curve at one parameter.
   struct Value {
     Vector position;
     Vector first;   ///< Derivative by the parameter.
     Vector second;  ///< Second derivative.
   };
 
+  /// Without control points: only size(), step() and end() may be called.
   UniformSpline() = default;
+  /// Control points `step` apart, > 0; at least one.
   UniformSpline(std::vector<Vector> points, double step)
       : points_(std::move(points)), step_(step) {}
 
+  /// Number of control points.
   std::size_t size() const { return points_.size(); }
+  /// Parameter between two control points.
   double step() const { return step_; }
   /// Parameter of the last control point.
   double end() const {
     return points_.empty() ? 0.0 : static_cast<double>(points_.size() - 1) * step_;
   }
+  /// The control points.
   const std::vector<Vector>& points() const { return points_; }
 
+  /// Point and derivatives, defined for every parameter.
   Value at(double parameter) const {
     const double u = parameter / step_;
     const double knot = std::floor(u);
@@ -43,6 +51,7 @@ class UniformSpline {
     const auto first = static_cast<std::ptrdiff_t>(knot) - 2;
     const Weights w = weights(x);
     Value value{Vector::Zero(), Vector::Zero(), Vector::Zero()};
+
     for (int i = 0; i < 6; ++i) {
       const auto k =
           std::clamp<std::ptrdiff_t>(first + i, 0, static_cast<std::ptrdiff_t>(points_.size()) - 1);
@@ -51,8 +60,10 @@ class UniformSpline {
       value.first += w.first[i] * p;
       value.second += w.second[i] * p;
     }
+
     value.first /= step_;
     value.second /= step_ * step_;
+
     return value;
   }
 
@@ -85,6 +96,7 @@ class UniformSpline {
     base<4>(x, quartic);
     double cubic[4];
     base<3>(x, cubic);
+
     // The derivative of a base function is the difference of two of the degree below.
     for (int i = 0; i < 6; ++i) {
       w.first[i] = (i > 0 ? quartic[i - 1] : 0.0) - (i < 5 ? quartic[i] : 0.0);
@@ -93,6 +105,7 @@ class UniformSpline {
       const double before = i > 1 ? cubic[i - 2] : 0.0;
       w.second[i] = before - 2.0 * middle + here;
     }
+
     return w;
   }
 

@@ -21,19 +21,23 @@ std::vector<double> speed_limits(const Route& route, const SpeedParameters& para
     squared[i] = std::min(parameters.cruise_mps * parameters.cruise_mps,
                           parameters.lateral_mps2 / std::max(curvature, 1e-9));
   }
+
   squared.front() = squared.back() = 0.0;
   for (const auto& stop : parameters.stops) {
     const double at = std::clamp(stop.along_m / kSpacing, 0.0, static_cast<double>(count - 1));
     squared[static_cast<std::size_t>(std::lround(at))] = 0.0;
   }
+
   for (std::size_t i = 1; i < count; ++i) {
     squared[i] =
         std::min(squared[i], squared[i - 1] + 2.0 * kSpacing * parameters.acceleration_mps2);
   }
+
   for (std::size_t i = count - 1; i > 0; --i) {
     squared[i - 1] =
         std::min(squared[i - 1], squared[i] + 2.0 * kSpacing * parameters.braking_mps2);
   }
+
   for (double& value : squared) value = std::sqrt(value);
   return squared;
 }
@@ -49,11 +53,13 @@ double standing_at(const SpeedParameters& parameters, std::size_t place, std::si
 /// Distance driven at every step of time.
 std::vector<double> distances(const Route& route, const SpeedParameters& parameters) {
   const std::vector<double> limits = speed_limits(route, parameters);
+
   // Time at which each place is left and reached; between places the acceleration is constant.
   std::vector<double> along;
   const auto stand = [&](double seconds, double at_m) {
     along.insert(along.end(), static_cast<std::size_t>(std::lround(seconds / kStep)), at_m);
   };
+
   stand(parameters.standstill_s, 0.0);
   double late = 0.0;  // of the next sample, after the place was left
   for (std::size_t i = 0; i + 1 < limits.size(); ++i) {
@@ -61,10 +67,12 @@ std::vector<double> distances(const Route& route, const SpeedParameters& paramet
     const double to = limits[i + 1];
     const double seconds = 2.0 * kSpacing / std::max(from + to, 1e-3);
     const double acceleration = (to - from) / seconds;
+
     for (; late < seconds; late += kStep) {
       along.push_back(static_cast<double>(i) * kSpacing + from * late +
                       0.5 * acceleration * late * late);
     }
+
     late -= seconds;
     const double standing_s = standing_at(parameters, i + 1, limits.size());
     if (standing_s > 0.0) {
@@ -72,6 +80,7 @@ std::vector<double> distances(const Route& route, const SpeedParameters& paramet
       late = 0.0;
     }
   }
+
   return along;
 }
 
@@ -104,15 +113,18 @@ class Suspension {
       value_ = goal_ = goal;
       started_ = true;
     }
+
     constexpr int kSubsteps = 4;
     const double dt = kStep / kSubsteps;
     const Eigen::Vector3d goal_rate = (goal - goal_) / kStep;
+
     for (int i = 1; i <= kSubsteps; ++i) {
       const Eigen::Vector3d target = goal_ + static_cast<double>(i) / kSubsteps * (goal - goal_);
       rate_ += dt * (omega_ * omega_ * (target - value_) +
                      2.0 * damping_ * omega_ * (goal_rate - rate_));
       value_ += dt * rate_;
     }
+
     goal_ = goal;
     return value_;
   }
@@ -191,6 +203,7 @@ VehicleState VehicleMotion::at(double time_s) const {
   state.velocity_mps = value.first.head<3>();
   state.acceleration_mps2 = value.second.head<3>();
   state.roll_rad = value.position[3];
+
   state.pitch_rad = value.position[4];
   state.yaw_rad = value.position[5];
   const double sr = std::sin(state.roll_rad), cr = std::cos(state.roll_rad);
@@ -198,6 +211,7 @@ VehicleState VehicleMotion::at(double time_s) const {
   state.world_Q_vehicle = Eigen::AngleAxisd(state.yaw_rad, Eigen::Vector3d::UnitZ()) *
                           Eigen::AngleAxisd(state.pitch_rad, Eigen::Vector3d::UnitY()) *
                           Eigen::AngleAxisd(state.roll_rad, Eigen::Vector3d::UnitX());
+
   // Rates of the Euler angles in the body's frame, and their derivative.
   const double roll1 = value.first[3], pitch1 = value.first[4], yaw1 = value.first[5];
   const double roll2 = value.second[3], pitch2 = value.second[4], yaw2 = value.second[5];
@@ -208,6 +222,7 @@ VehicleState VehicleMotion::at(double time_s) const {
                                            yaw1 * (roll1 * cr * cp - pitch1 * sr * sp),
                                        -pitch2 * sr - pitch1 * roll1 * cr + yaw2 * cr * cp -
                                            yaw1 * (roll1 * sr * cp + pitch1 * cr * sp)};
+
   return state;
 }
 

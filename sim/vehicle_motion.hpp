@@ -23,13 +23,15 @@ struct VehicleParameters {
   double roll_per_mps2 = 0.012;     ///< [rad] Outwards per acceleration to the side.
 };
 
+/// How the vehicle is driven: speeds, accelerations, stops.
 struct SpeedParameters {
-  double standstill_s = 22.0;  ///< At the start.
+  double standstill_s = 22.0;  ///< At the start, where an IMU is calibrated.
   double end_standstill_s = 3.0;
   double cruise_mps = 5.0;
   double acceleration_mps2 = 1.0;
   double braking_mps2 = 1.5;
   double lateral_mps2 = 1.5;  ///< Greatest in curves.
+  /// A stop of `seconds` on the route.
   struct Stop {
     double along_m = 0.0;
     double seconds = 5.0;
@@ -51,6 +53,7 @@ struct VehicleState {
   Eigen::Vector3d angular_rate_rad_s = Eigen::Vector3d::Zero();           ///< Frame `vehicle`.
   Eigen::Vector3d angular_acceleration_rad_s2 = Eigen::Vector3d::Zero();  ///< Frame `vehicle`.
 
+  /// The pose in three dimensions.
   Eigen::Isometry3d world_T_vehicle() const;
   /// Heading and place in the plan: `world` from `vehicle_level`.
   geometry::SE2 world_T_level() const { return {position_m.head<2>(), yaw_rad}; }
@@ -60,13 +63,17 @@ struct VehicleState {
 /// time, of which everything else is derived.
 class VehicleMotion {
  public:
+  /// Simulates the drive along `route` on `ground`.
   VehicleMotion(const Route& route, const Ground& ground, const VehicleParameters& vehicle,
                 const SpeedParameters& speed);
 
+  /// From the first to the last instant, both stationary.
   double duration_s() const { return pose_.end(); }
+  /// Path length from start to end.
   double driven_m() const { return driven_m_; }
-  /// Clamped to [0, duration].
+  /// The state at a time, clamped to [0, duration].
   VehicleState at(double time_s) const;
+  /// As given to the constructor.
   const VehicleParameters& parameters() const { return vehicle_; }
 
  private:

@@ -20,6 +20,7 @@ std::vector<VisibleTrunk> trunks_among(const World& world, std::vector<ObjectId>
   std::sort(objects.begin(), objects.end());
   std::vector<VisibleTrunk> result;
   auto hit = objects.begin();
+
   // Trunks were added in order of object.
   for (const TrueTrunk& trunk : world.trunks()) {
     hit = std::lower_bound(hit, objects.end(), trunk.object);
@@ -32,6 +33,7 @@ std::vector<VisibleTrunk> trunks_among(const World& world, std::vector<ObjectId>
     result.push_back({trunk.object, world.kind(trunk.object), centre, trunk.radius_m,
                       centre.head<2>().norm(), returns});
   }
+
   return result;
 }
 
@@ -59,6 +61,7 @@ std::vector<VisibleCorner> visible_corners(const World& world, const SimulatedSw
     if (world.kind(sweep.objects[i]) != ObjectClass::kWall) continue;
     walls[sweep.objects[i]].emplace_back(sweep.true_m[i].head<2>().cast<double>());
   }
+
   const auto returns_near = [&](ObjectId wall, const Eigen::Vector2d& edge) {
     const auto points = walls.find(wall);
     if (points == walls.end()) return std::uint32_t{0};
@@ -66,6 +69,7 @@ std::vector<VisibleCorner> visible_corners(const World& world, const SimulatedSw
         std::count_if(points->second.begin(), points->second.end(),
                       [&](const Eigen::Vector2d& p) { return (p - edge).norm() <= side_m; }));
   };
+
   std::vector<VisibleCorner> result;
   const auto corners = world.corners();
   for (std::size_t i = 0; i < corners.size(); ++i) {
@@ -74,6 +78,7 @@ std::vector<VisibleCorner> visible_corners(const World& world, const SimulatedSw
     visible.returns_before = returns_near(corner.wall_before, corner.position_m);
     visible.returns_after = returns_near(corner.wall_after, corner.position_m);
     if (visible.returns_before + visible.returns_after == 0) continue;
+
     visible.corner = static_cast<std::uint32_t>(i);
     visible.position_m =
         in_level(state, {corner.position_m.x(), corner.position_m.y(), corner.ground_m});
@@ -83,6 +88,7 @@ std::vector<VisibleCorner> visible_corners(const World& world, const SimulatedSw
     visible.range_m = visible.position_m.head<2>().norm();
     result.push_back(visible);
   }
+
   return result;
 }
 

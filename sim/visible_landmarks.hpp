@@ -1,4 +1,4 @@
-// What a landmark extractor should find in a sweep: the truth to hold it to.
+// What a landmark extractor should find in a sweep: the truth to measure it against.
 #pragma once
 
 #include <Eigen/Core>
@@ -37,6 +37,7 @@ struct VisibleCorner {
 std::vector<VisibleTrunk> visible_trunks(const World& world, const SimulatedSweep& sweep,
                                          const VehicleState& state,
                                          std::uint32_t least_returns = 1);
+/// The same for a one-plane laser.
 std::vector<VisibleTrunk> visible_trunks(const World& world, const SimulatedPlanarScan& scan,
                                          const VehicleState& state,
                                          std::uint32_t least_returns = 1);

@@ -74,11 +74,13 @@ ObjectId World::add_trunk(ObjectClass kind, const Eigen::Vector2d& breast_m, dou
   stem.axis = Eigen::Vector3d(lean.x(), lean.y(), 1.0).normalized();
   const double below = (kBreastHeight + kRoot) / stem.axis.z();
   stem.base_m = trunk.centre_m - below * stem.axis;
+
   stem.base_radius_m = radius_m + taper * below;
   stem.taper = taper;
   stem.length_m = height_m + kRoot;
   trunk.object = add(kind, stem);
   trunks_.push_back(trunk);
+
   return trunk.object;
 }
 
@@ -89,18 +91,21 @@ void World::add_house(std::span<const Eigen::Vector2d> footprint_m, double heigh
     low_m = std::min(low_m, ground_.height(corner));
     high_m = std::max(high_m, ground_.height(corner));
   }
+
   const std::size_t count = footprint_m.size();
   const auto first = static_cast<ObjectId>(objects_.size());
   for (std::size_t i = 0; i < count; ++i) {
     add(ObjectClass::kWall,
         Wall{footprint_m[i], footprint_m[(i + 1) % count], low_m - kRoot, high_m + height_m});
   }
+
   for (std::size_t i = 0; i < count; ++i) {
     const Eigen::Vector2d before = footprint_m[(i + count - 1) % count] - footprint_m[i];
     const Eigen::Vector2d after = footprint_m[(i + 1) % count] - footprint_m[i];
     TrueCorner corner;
     corner.position_m = footprint_m[i];
     corner.ground_m = ground_.height(footprint_m[i]);
+
     // Counter-clockwise, the air is on the right of each wall: from `before` round to `after`.
     corner.angle_rad = turn_from_to(before, after);
     const double bisector = direction_of(before) + 0.5 * corner.angle_rad;
@@ -130,6 +135,7 @@ std::optional<SurfaceHit> World::meet_object(const Ray& ray, ObjectId object, do
     case Shape::kWalker:
       return meet(ray, walkers_[entry.index].at(time_s));
   }
+
   return std::nullopt;
 }
 

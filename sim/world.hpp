@@ -1,4 +1,4 @@
-// A simulated world in three dimensions: ground, and what stands on it.
+// A simulated world in three dimensions: ground, and the objects on it.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,6 +13,7 @@
 
 namespace understory::sim {
 
+/// What an object is, for reflectivity and for the truth of a classifier.
 enum class ObjectClass : std::uint8_t {
   kGround,
   kTrunk,
@@ -47,27 +48,35 @@ struct TrueCorner {
   ObjectId wall_after = 0;   ///< Begins there.
 };
 
-/// Somebody who walks to and fro.
+/// A person who walks between two points.
 struct Walker {
-  Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();  ///< Of the way, on the ground.
-  Eigen::Vector2d reach_m = Eigen::Vector2d::Zero();   ///< From the middle to the end; 0 = stands.
-  double speed_mps = 1.2;                              ///< Mean; turns gently at the ends.
+  Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();  ///< Of the walker's path, on the ground.
+  Eigen::Vector2d reach_m =
+      Eigen::Vector2d::Zero();  ///< From the middle to the end; 0 = stationary.
+  double speed_mps = 1.2;       ///< Mean; turns gently at the ends.
   double phase_rad = 0.0;
   double radius_m = 0.22;
   double height_m = 1.75;
 
+  /// The walker's shape at a time [s].
   Stem at(double time_s) const;
 };
 
 /// Everything in frame `world` (x east, y north, z up). Objects are added once and then fixed.
 class World {
  public:
+  /// Without objects.
   explicit World(Ground ground = {}) : ground_(std::move(ground)) {}
 
+  /// Adds a stem; gives its index.
   ObjectId add(ObjectClass kind, const Stem& stem);
+  /// Adds foliage; gives its index.
   ObjectId add(ObjectClass kind, const Foliage& foliage);
+  /// Adds a wall; gives its index.
   ObjectId add(ObjectClass kind, const Wall& wall);
+  /// Adds a box; gives its index.
   ObjectId add(ObjectClass kind, const Box& box);
+  /// Adds a walker; gives its index.
   ObjectId add(const Walker& walker);
   /// A trunk or pole whose centre 1.3 m above the ground at `breast_m` has radius `radius_m`;
   /// rooted below the ground. `lean` is the horizontal part of its axis.
@@ -78,13 +87,20 @@ class World {
   /// the highest ground at a corner.
   void add_house(std::span<const Eigen::Vector2d> footprint_m, double height_m);
 
+  /// The ground below the objects.
   const Ground& ground() const { return ground_; }
+  /// Number of objects.
   std::size_t object_count() const { return objects_.size(); }
+  /// Class of an object, or of the ground.
   ObjectClass kind(ObjectId object) const;
+  /// Bounds of an object; of a walker, of its whole path.
   const Bounds& bounds(ObjectId object) const { return objects_[object].bounds; }
+  /// Whether the object is a walker.
   bool moves(ObjectId object) const { return objects_[object].shape == Shape::kWalker; }
 
+  /// The trunks and poles added by add_trunk(), in order.
   std::span<const TrueTrunk> trunks() const { return trunks_; }
+  /// The corners of all houses.
   std::span<const TrueCorner> corners() const { return corners_; }
 
   /// Where the ray meets the object at `time_s`. `luck` decides how far the ray gets through

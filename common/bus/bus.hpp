@@ -12,6 +12,7 @@
 
 namespace understory::bus {
 
+/// One message as it came; the views are valid during the handler only.
 struct BusMessage {
   std::string_view channel;
   std::span<const std::uint8_t> bytes;
@@ -28,15 +29,16 @@ struct ReceiveBuffer {
 /// publish. What they throw comes out of handle_one(); no C frame is ever crossed.
 class Bus {
  public:
+  /// Called with each message of a subscription.
   using Handler = std::function<void(const BusMessage&)>;
   virtual ~Bus() = default;
 
-  /// Gives a refusal where the message was not sent: a channel name that is empty or longer than 63
-  /// bytes, a message over 2^28 bytes, a socket that fails.
+  /// Sends one message. Refused where it was not sent: a channel name that is empty or longer than
+  /// 63 bytes, a message over 2^28 bytes, a socket that fails.
   virtual std::optional<wire::Refusal> publish(std::string_view channel,
                                                std::span<const std::uint8_t> bytes) = 0;
-  /// All messages of this channel, by its exact name. At most `queue_size` wait (0 = no limit);
-  /// when more come the oldest is dropped and counted.
+  /// Subscribes to all messages of this channel, by its exact name. At most `queue_size` wait (0 =
+  /// no limit); when more come the oldest is dropped and counted.
   virtual void subscribe(std::string_view channel, std::size_t queue_size, Handler handler) = 0;
   /// Takes in what has come and hands out one message. False: none came within the time given.
   virtual bool handle_one(int timeout_ms) = 0;
@@ -44,6 +46,7 @@ class Bus {
   virtual std::uint64_t dropped(std::string_view channel) const = 0;
   /// Readable when there may be something to handle; -1 = the bus has none.
   virtual int file_descriptor() const { return -1; }
+  /// The socket buffer of the bus, for HEALTH.
   virtual ReceiveBuffer receive_buffer() const { return {}; }
 };
 

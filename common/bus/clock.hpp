@@ -8,13 +8,13 @@ namespace understory::bus {
 
 /// Functions, so that tests and replay bring their own.
 struct Clock {
-  std::function<std::int64_t()> wall_us;       ///< Since 1970.
-  std::function<std::int64_t()> monotonic_us;  ///< Never goes back.
+  std::function<std::int64_t()> wall_us;       ///< Since 1970 [us].
+  std::function<std::int64_t()> monotonic_us;  ///< Never goes back [us].
 };
 
 /// The computer's own.
 Clock system_clock();
-/// Stands still at zero: in replay nothing may depend on a clock.
+/// Always zero: in replay nothing may depend on a clock.
 Clock no_clock();
 
 }  // namespace understory::bus

@@ -45,11 +45,13 @@ bool DispatchQueue::handle_one() {
       oldest = &subscription;
     }
   }
+
   if (oldest == nullptr) return false;
   const Waiting message = std::move(oldest->queue.front());
   oldest->queue.pop_front();
   --waiting_;
   oldest->handler({oldest->channel, message.bytes, message.received_us});
+
   return true;
 }
 

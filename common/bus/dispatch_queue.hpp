@@ -9,15 +9,20 @@
 
 namespace understory::bus {
 
+/// The queues of all subscriptions of one bus.
 class DispatchQueue {
  public:
+  /// Adds a subscription of `channel` (exact name) that holds `queue_size` messages (0 = no limit).
   void subscribe(std::string_view channel, std::size_t queue_size, Bus::Handler handler);
-  /// For every subscription of the channel; the oldest makes room.
+  /// Copies a message to every subscription of the channel; where one is full, its oldest is
+  /// dropped and counted.
   void push(std::string_view channel, std::span<const std::uint8_t> bytes,
             std::int64_t received_us);
-  /// Calls one handler; false = nothing waits.
+  /// Calls the handler of the message that came first; false = nothing waits.
   bool handle_one();
+  /// True when nothing waits.
   bool empty() const { return waiting_ == 0; }
+  /// Messages dropped from the full queues of this channel so far.
   std::uint64_t dropped(std::string_view channel) const;
 
  private:

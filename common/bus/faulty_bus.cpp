@@ -12,12 +12,14 @@ std::optional<wire::Refusal> FaultyBus::publish(std::string_view channel,
       plan_.channels.empty() ||
       std::find(plan_.channels.begin(), plan_.channels.end(), channel) != plan_.channels.end();
   std::optional<wire::Refusal> refusal;
+
   if (is_target) {
     const double chance = std::uniform_real_distribution<double>(0.0, 1.0)(random_);
     refusal = send_damaged(channel, {bytes.begin(), bytes.end()}, chance);
   } else {
     refusal = inner_.publish(channel, bytes);
   }
+
   release_due();
   return refusal;
 }
@@ -31,25 +33,30 @@ std::optional<wire::Refusal> FaultyBus::send_damaged(std::string_view channel,
     chance -= probability;
     return hit;
   };
+
   if (falls_to(plan_.drop)) {
     ++counts_.dropped;
     return std::nullopt;
   }
+
   if (falls_to(plan_.duplicate)) {
     ++counts_.duplicated;
     inner_.publish(channel, bytes);
     return inner_.publish(channel, bytes);
   }
+
   if (falls_to(plan_.delay)) {
     ++counts_.delayed;
     held_.push_back({std::string(channel), std::move(bytes), plan_.delay_messages + 1});
     return std::nullopt;
   }
+
   if (falls_to(plan_.reorder)) {
     ++counts_.reordered;
     held_.push_back({std::string(channel), std::move(bytes), 2});
     return std::nullopt;
   }
+
   if (falls_to(plan_.corrupt) && !bytes.empty()) {
     ++counts_.corrupted;
     for (std::uint64_t i = 0; i <= random_() % 8; ++i) {
@@ -57,15 +64,18 @@ std::optional<wire::Refusal> FaultyBus::send_damaged(std::string_view channel,
     }
     return inner_.publish(channel, bytes);
   }
+
   if (falls_to(plan_.truncate) && !bytes.empty()) {
     ++counts_.truncated;
     bytes.resize(random_() % bytes.size());
     return inner_.publish(channel, bytes);
   }
+
   if (falls_to(plan_.flood)) {
     flood(channel);
     return inner_.publish(channel, bytes);
   }
+
   ++counts_.passed;
   return inner_.publish(channel, bytes);
 }

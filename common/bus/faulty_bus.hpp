@@ -27,6 +27,7 @@ struct FaultPlan {
   std::vector<std::string> channels;  ///< Only these; empty = all.
 };
 
+/// How many messages met which fault.
 struct FaultCounts {
   std::uint64_t passed = 0;  ///< Untouched.
   std::uint64_t dropped = 0;
@@ -38,8 +39,10 @@ struct FaultCounts {
   std::uint64_t flood_packets = 0;
 };
 
+/// A bus around `inner` that applies a FaultPlan to what is published; what comes in is left alone.
 class FaultyBus : public Bus {
  public:
+  /// `inner` must outlive it. The same seed and messages give the same faults.
   FaultyBus(Bus& inner, FaultPlan plan, std::uint64_t seed)
       : inner_(inner), plan_(std::move(plan)), random_(seed) {}
 
@@ -51,8 +54,9 @@ class FaultyBus : public Bus {
   int file_descriptor() const override { return inner_.file_descriptor(); }
   ReceiveBuffer receive_buffer() const override { return inner_.receive_buffer(); }
 
-  /// Lets go of everything that is held back, in order.
+  /// Sends everything that is held back, in order.
   void flush();
+  /// The faults so far.
   const FaultCounts& counts() const { return counts_; }
 
  private:

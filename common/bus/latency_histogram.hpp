@@ -9,11 +9,15 @@ namespace understory::bus {
 /// Logarithmic buckets, 16 per octave: a percentile is too large by at most 1/16 of its value.
 class LatencyHistogram {
  public:
+  /// Counts one duration; a negative one as 0.
   void add(std::int64_t microseconds);
   /// Upper bound of the bucket that holds the quantile (0..1); 0 when empty, never above max().
   std::int64_t quantile(double q) const;
+  /// The longest duration [us]; 0 when empty.
   std::int64_t max() const { return max_; }
+  /// Number of durations.
   std::uint64_t count() const { return count_; }
+  /// Adds the counts of another histogram.
   void merge(const LatencyHistogram& other);
 
  private:

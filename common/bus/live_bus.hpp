@@ -16,6 +16,7 @@ inline constexpr std::int64_t kWantedReceiveBuffer = 4194304;
 /// The bus cannot be joined; what() names the URL.
 class BusError : public std::runtime_error {
  public:
+  /// From the one-line message that what() gives.
   using std::runtime_error::runtime_error;
 };
 
@@ -27,6 +28,7 @@ std::string complete_lcm_url(const std::string& url);
 /// What the kernel grants a socket that asks for `wanted_bytes`.
 std::int64_t granted_receive_buffer(std::int64_t wanted_bytes);
 
+/// LCM on one multicast group, through liblcm. Handlers run outside its C frames.
 class LiveBus : public Bus {
  public:
   /// Throws BusError.
@@ -40,6 +42,7 @@ class LiveBus : public Bus {
   std::uint64_t dropped(std::string_view channel) const override;
   int file_descriptor() const override;
   ReceiveBuffer receive_buffer() const override;
+  /// The URL in use, completed.
   const std::string& url() const;
 
  private:

@@ -6,6 +6,7 @@
 
 namespace understory::bus {
 
+/// A bus whose messages wait in queues of this process until handle_one() or drain().
 class MemoryBus : public Bus {
  public:
   /// Whether subscriptions' queues are as long as they ask for, or lose nothing.

@@ -1,4 +1,4 @@
-// The time by which a service lives: the stamps of what it takes in.
+// The time of a service: the newest stamp of what it takes in.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,18 @@ namespace understory::bus {
 /// wrong stamp must neither stop the service nor make everything after it look old.
 class MessageClock {
  public:
+  /// What take() did with a stamp: believed it, waits for proof, or jumped to it.
   enum class Verdict : std::uint8_t { kFine, kQuarantined, kJumped };
 
+  /// `largest_jump_us`: a stamp farther than this from now() needs proof.
   explicit MessageClock(std::int64_t largest_jump_us) : largest_jump_us_(largest_jump_us) {}
 
-  /// kJumped: it agreed with the ones before it, and the clock now stands there.
+  /// Takes the stamp of a message [us]. kJumped: three stamps in a row agreed, and now() is the
+  /// last of them.
   Verdict take(std::int64_t utime);
   /// Newest believed stamp [us]; -1 before the first.
   std::int64_t now() const { return now_; }
+  /// Sets now(), for a restart.
   void resume(std::int64_t now) { now_ = now; }
 
  private:

@@ -54,6 +54,7 @@ std::string shown(const toml::node& node) {
   } else {
     text << "a " << node.type();
   }
+
   return text.str();
 }
 

@@ -146,10 +146,12 @@ std::string ParameterTable::to_toml() const {
     found->second += fmt::format("# {} Allowed: {}.\n{} = {}\n", entry.doc, allowed(entry),
                                  entry.key.substr(has_table ? dot + 1 : 0), value_as_toml(entry));
   }
+
   std::string text = tables.front().second;
   for (std::size_t i = 1; i < tables.size(); ++i) {
     text += fmt::format("\n[{}]\n{}", tables[i].first, tables[i].second);
   }
+
   return text;
 }
 

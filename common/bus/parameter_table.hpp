@@ -14,7 +14,9 @@ namespace understory::bus {
 /// What is wrong with a configuration, one line each: file:line: key: what, and what is allowed.
 class ConfigurationError : public std::runtime_error {
  public:
+  /// what() is all problems, one per line.
   explicit ConfigurationError(std::vector<std::string> problems);
+  /// One line each.
   const std::vector<std::string>& problems() const { return problems_; }
 
  private:
@@ -29,28 +31,33 @@ struct Range {
 };
 
 /// A list of parameters, each bound to a variable that holds its default when it is added. Keys are
-/// dotted paths of TOML tables, e.g. source.descriptor_step.
+/// dotted paths of TOML tables, e.g. baseline.descriptor_step.
 class ParameterTable {
  public:
+  /// A real parameter with its default and range.
   struct Number {
     double* value;
     double fallback;
     Range<double> range;
   };
+  /// A whole-number parameter with its default and range.
   struct Integer {
     int* value;
     int fallback;
     Range<int> range;
   };
+  /// A yes-or-no parameter with its default.
   struct Boolean {
     bool* value;
     bool fallback;
   };
+  /// A text parameter with its default.
   struct Text {
     std::string* value;
     std::string fallback;
     std::vector<std::string> choices;  ///< Empty = anything.
   };
+  /// One parameter: its key, its unit ("" = none), one sentence on it, and the variable behind it.
   struct Entry {
     std::string key;
     std::string unit;
@@ -65,23 +72,29 @@ class ParameterTable {
     std::string new_name;
   };
 
+  /// Adds a real parameter; `value` holds the default and must outlive the table. Throws
+  /// std::logic_error for a key that is there already.
   void add(std::string key, double& value, Range<double> range, std::string unit, std::string doc);
+  /// Adds a whole-number parameter.
   void add(std::string key, int& value, Range<int> range, std::string unit, std::string doc);
+  /// Adds a yes-or-no parameter.
   void add(std::string key, bool& value, std::string doc);
+  /// Adds a text parameter; `choices` empty = any text.
   void add(std::string key, std::string& value, std::vector<std::string> choices, std::string doc);
 
   /// A key of an older version, which is refused with the new one in the message. Both may end in
-  /// "." and then stand for all keys of a TOML table.
+  /// "." and then mean all keys of a TOML table.
   void renamed(std::string old_key, std::string new_key);
   /// The same of a choice of a text parameter.
   void renamed_choice(std::string key, std::string old_choice, std::string new_choice);
 
+  /// All parameters in the order of adding.
   const std::vector<Entry>& entries() const { return entries_; }
 
   /// Sets what the file states; the rest keeps its default. Throws ConfigurationError with all that
   /// is wrong; then nothing has been set.
   void load(const std::filesystem::path& file);
-  /// The same from text; `name` stands for the file in messages.
+  /// The same from text; `name` is the file's name in messages.
   void load_text(std::string_view toml, const std::string& name);
 
   /// A configuration file with the values in force, each with its unit, range and meaning.

@@ -41,12 +41,14 @@ class Replay {
         return report_;
       }
     }
+
     if (has_begun) finish();
     if (writer_) writer_->commit();
     report_.damaged_places = reader_.damage().places;
     report_.damaged_bytes = reader_.damage().bytes;
     for (const auto& hosted : hosted_) report_.health.push_back(hosted->node().health());
     if (options_.progress) options_.progress(1.0);
+
     return report_;
   }
 
@@ -84,10 +86,12 @@ class Replay {
       ++report_.left_out;
       return;
     }
+
     if (writer_ && options_.keeps_inputs) writer_->write(event.utime, event.channel, event.data);
     bool is_taken = false;
     for (const auto& hosted : hosted_) is_taken |= hosted->node().takes(event.channel);
     if (!is_taken) return;
+
     ++report_.fed;
     is_feeding_ = true;
     bus_.publish(event.channel, event.data);

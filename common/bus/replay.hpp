@@ -12,6 +12,7 @@
 
 namespace understory::bus {
 
+/// What is replayed, through which services, into which file.
 struct ReplayOptions {
   std::filesystem::path log;
   std::filesystem::path out;         ///< Empty = nothing is written.
@@ -19,10 +20,11 @@ struct ReplayOptions {
   std::filesystem::path config_dir;  ///< NAME.toml for each service that has one; may be empty.
   std::string channel_suffix;        ///< Of the outputs of every hosted service.
   bool keeps_inputs = true;          ///< The log's own events go into `out` too.
-  /// Called now and then with the part done, 0..1; true = stop here, write nothing.
+  /// Called every 256 events with the part done, 0..1; true = stop here, write nothing.
   std::function<bool(double)> progress;
 };
 
+/// What a replay did.
 struct ReplayReport {
   std::uint64_t events = 0;  ///< Read from the log.
   std::uint64_t fed = 0;     ///< Of them taken by a hosted service.

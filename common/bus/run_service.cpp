@@ -91,9 +91,11 @@ void run_until_stopped(HostedService& hosted, Bus& bus, StopSignal& stop, const 
   auto* const device = dynamic_cast<Device*>(&hosted.adapter());
   std::vector<pollfd> files = {{bus.file_descriptor(), POLLIN, 0},
                                {stop.file_descriptor(), POLLIN, 0}};
+
   if (device != nullptr) {
     for (const int file : device->file_descriptors()) files.push_back({file, POLLIN, 0});
   }
+
   while (!stop.has_come()) {
     if (device != nullptr) device->attend(clock.monotonic_us());
     health.report_when_due();
@@ -101,6 +103,7 @@ void run_until_stopped(HostedService& hosted, Bus& bus, StopSignal& stop, const 
     const int wait_ms = device != nullptr ? device->wait_ms() : health.milliseconds_left();
     ::poll(files.data(), files.size(), std::min(wait_ms, health.milliseconds_left()));
   }
+
   // The last words are numbered too: the state is saved behind them.
   hosted.adapter().finish();
   node.save_snapshot();
@@ -143,10 +146,12 @@ int serve(const Service& service, const Options& options) {
   const std::string toml = read_config(options.config);
   std::string printed;
   const RuntimeParameters runtime = check_config(service, toml, options.config, &printed);
+
   if (options.prints_config) {
     std::cout << "# " << service.name << ": " << service.summary << "\n" << printed;
     return kDone;
   }
+
   StopSignal stop;
   const Clock clock = system_clock();
   const std::unique_ptr<Bus> live =
@@ -154,6 +159,7 @@ int serve(const Service& service, const Options& options) {
   Bus& bus = *live;
   auto hosted = make_hosted(service, bus, clock, toml, options);
   std::unique_ptr<StateStore> store;
+
   if (!options.state_dir.empty()) {
     store = std::make_unique<StateStore>(options.state_dir, service.name);
     if (!hosted->node().recover(*store)) {
@@ -164,6 +170,7 @@ int serve(const Service& service, const Options& options) {
     }
     hosted->node().journal_to(store.get());
   }
+
   Node& node = hosted->node();
   const ReceiveBuffer buffer = bus.receive_buffer();
   if (buffer.granted_bytes < buffer.wanted_bytes) {
@@ -171,10 +178,12 @@ int serve(const Service& service, const Options& options) {
                                                        std::to_string(buffer.wanted_bytes) +
                                                        " bytes granted: raise net.core.rmem_max");
   }
+
   if (auto* const device = dynamic_cast<Device*>(&hosted->adapter())) device->open();
   node.connect();
   node.publish_config(hosted->table().to_toml());
   run_until_stopped(*hosted, bus, stop, clock);
+
   return kDone;
 }
 
@@ -197,6 +206,7 @@ int run_service(const Service& service, int argc, char** argv) {
   app.add_option("--lcm-url", options.lcm_url, "Bus; default LCM_DEFAULT_URL or LCM's own");
   app.add_option("--state-dir", options.state_dir, "Keep the state here, to go on after a restart");
   app.add_option("--channel-suffix", options.channel_suffix, "Appended to every output channel");
+
   app.add_flag("--print-config", options.prints_config, "Print the configuration file in force");
   app.set_version_flag("--version", program_version());
   try {

@@ -17,6 +17,7 @@ std::size_t slot(std::int64_t sequence) {
 Arrival SequenceTracker::take(std::int64_t sequence, std::int64_t utime) {
   ++counts_.messages;
   if (newest_sequence_ < 0) return begin(sequence, utime);
+
   // A smaller number with a newer stamp is no old message: the sender counts from the start again.
   const bool restarted = (sequence <= newest_sequence_ && utime > newest_utime_) ||
                          sequence - newest_sequence_ > kLargestGap;
@@ -24,19 +25,23 @@ Arrival SequenceTracker::take(std::int64_t sequence, std::int64_t utime) {
     ++counts_.restarts;
     return begin(sequence, utime);
   }
+
   if (sequence <= newest_sequence_) return take_old(sequence);
   const std::int64_t missing = sequence - newest_sequence_ - 1;
   for (std::int64_t i =
            std::max(newest_sequence_ + 1, sequence - static_cast<std::int64_t>(kWindow));
        i < sequence; ++i) {
-    had_.reset(slot(i));
+    taken_.reset(slot(i));
   }
-  had_.set(slot(sequence));
+
+  taken_.set(slot(sequence));
   newest_sequence_ = sequence;
   newest_utime_ = std::max(newest_utime_, utime);
   if (missing == 0) return Arrival::kNext;
+
   ++counts_.gaps;
   counts_.lost += static_cast<std::uint64_t>(missing);
+
   return Arrival::kAfterGap;
 }
 
@@ -47,12 +52,12 @@ Arrival SequenceTracker::begin(std::int64_t sequence, std::int64_t utime) {
 
 Arrival SequenceTracker::take_old(std::int64_t sequence) {
   const bool is_in_window = newest_sequence_ - sequence < static_cast<std::int64_t>(kWindow);
-  if (is_in_window && had_.test(slot(sequence))) {
+  if (is_in_window && taken_.test(slot(sequence))) {
     ++counts_.duplicates;
     return Arrival::kDuplicate;
   }
   if (is_in_window) {
-    had_.set(slot(sequence));
+    taken_.set(slot(sequence));
     if (counts_.lost > 0) --counts_.lost;
   }
   ++counts_.late;
@@ -62,7 +67,7 @@ Arrival SequenceTracker::take_old(std::int64_t sequence) {
 void SequenceTracker::resume(std::int64_t newest_sequence, std::int64_t newest_utime) {
   newest_sequence_ = newest_sequence;
   newest_utime_ = newest_utime;
-  had_.set();
+  taken_.set();
 }
 
 }  // namespace understory::bus

@@ -1,4 +1,4 @@
-// What the sequence numbers of one channel tell: losses, repetitions, late comers, restarts.
+// What the sequence numbers of one channel show: losses, repetitions, late comers, restarts.
 #pragma once
 
 #include <bitset>
@@ -6,14 +6,16 @@
 
 namespace understory::bus {
 
+/// What the sequence number of a message shows.
 enum class Arrival : std::uint8_t {
   kFirst,      ///< Of this channel, or of a sender that started again.
   kNext,       ///< As expected.
   kAfterGap,   ///< Some before it are missing (yet).
-  kDuplicate,  ///< Had already.
-  kLate,       ///< Older than one that was had.
+  kDuplicate,  ///< Came before.
+  kLate,       ///< Came after a later one.
 };
 
+/// Counts over the life of a tracker.
 struct SequenceCounts {
   std::uint64_t messages = 0;  ///< All that came.
   std::uint64_t gaps = 0;      ///< Holes.
@@ -26,15 +28,20 @@ struct SequenceCounts {
 /// Exact as long as a message is late by fewer than kWindow messages.
 class SequenceTracker {
  public:
-  static constexpr std::size_t kWindow = 1024;
+  static constexpr std::size_t kWindow = 1024;  ///< [messages]
 
+  /// Counts a message by its sequence number (>= 0) and stamp [us]. A number that is not larger
+  /// than the newest, with a newer stamp, is a restarted sender; so is a step of more than a
+  /// million.
   Arrival take(std::int64_t sequence, std::int64_t utime);
+  /// The counts so far.
   const SequenceCounts& counts() const { return counts_; }
 
-  /// Where it stands, for a restart: the newest message taken; -1 = none.
+  /// Sequence number of the newest message taken, saved over restarts; -1 = none.
   std::int64_t newest_sequence() const { return newest_sequence_; }
+  /// Newest stamp taken [us], saved over restarts; -1 = none.
   std::int64_t newest_utime() const { return newest_utime_; }
-  /// Goes on behind this message; older ones count as had. Counts are kept.
+  /// Goes on behind this message; older ones count as duplicates. Counts are kept.
   void resume(std::int64_t newest_sequence, std::int64_t newest_utime);
 
  private:
@@ -43,7 +50,7 @@ class SequenceTracker {
 
   std::int64_t newest_sequence_ = -1;
   std::int64_t newest_utime_ = -1;
-  std::bitset<kWindow> had_;  // at sequence modulo kWindow, for the kWindow newest numbers
+  std::bitset<kWindow> taken_;  // at sequence modulo kWindow, for the kWindow newest numbers
   SequenceCounts counts_;
 };
 

@@ -1,5 +1,5 @@
-// A service as the drivers see it: something that describes its parameters, binds itself to
-// channels, and can save itself.
+// A service as the drivers see it: it describes its parameters, binds itself to channels, and can
+// save itself.
 #pragma once
 
 #include <functional>
@@ -21,11 +21,13 @@ class Adapter {
   virtual void bind(Node& node) = 0;
   /// The last call: the drive is over, or the process is asked to stop. May publish.
   virtual void finish() {}
-  /// The stage's state; load() takes what save() gave, and throws where it cannot.
+  /// The stage's state as bytes; empty = it keeps none.
   virtual std::string save() const { return {}; }
+  /// Takes what save() gave. Throws where it cannot; the adapter is then thrown away.
   virtual void load(const std::string& /*state*/) {}
 };
 
+/// A service by name, and how to make its adapter.
 struct Service {
   std::string name;     ///< As in the executable's name and in HEALTH, e.g. keyframer.
   std::string summary;  ///< One line: what it takes and gives.
@@ -34,13 +36,14 @@ struct Service {
 
 /// Parameters that every process has (table `runtime` of its file).
 struct RuntimeParameters {
-  std::string lcm_url;          ///< Empty = LCM_DEFAULT_URL, or LCM's default group.
-  std::string channel_suffix;   ///< Of every output.
-  std::string suffixed_inputs;  ///< Comma-separated inputs that carry the suffix too.
-  double snapshot_every_s = 30.0;
-  int snapshot_every_events = 1000;
-  double largest_clock_jump_s = 10.0;
+  std::string lcm_url;                 ///< Empty = LCM_DEFAULT_URL, or LCM's default group.
+  std::string channel_suffix;          ///< Of every output.
+  std::string suffixed_inputs;         ///< Comma-separated inputs that carry the suffix too.
+  double snapshot_every_s = 30.0;      ///< Message time between two snapshots.
+  int snapshot_every_events = 1000;    ///< Inputs between two snapshots.
+  double largest_clock_jump_s = 10.0;  ///< Of a stamp, without proof.
 };
+/// Lists them in `table`, bound to `parameters`, which must outlive it.
 void describe(RuntimeParameters& parameters, ParameterTable& table);
 
 /// The version that HEALTH and CONFIG show.
@@ -58,9 +61,13 @@ class HostedService {
                 const std::string& toml_name,
                 const std::function<void(RuntimeParameters&)>& adjust = {});
 
+  /// The service's place on the bus.
   Node& node() { return *node_; }
+  /// The adapter, bound.
   Adapter& adapter() { return *adapter_; }
+  /// All parameters, loaded.
   const ParameterTable& table() const { return table_; }
+  /// The runtime parameters in force.
   const RuntimeParameters& runtime() const { return runtime_; }
 
  private:

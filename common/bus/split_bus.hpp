@@ -20,7 +20,9 @@ std::string bulk_lcm_url(const std::string& lcm_url);
 /// two, messages have no order. `dropped` and the receive buffer are those of the bus in question.
 class SplitBus : public Bus {
  public:
+  /// Joins the bulk group when it is first needed.
   using MakeBus = std::function<std::unique_ptr<Bus>()>;
+  /// `main` must not be null; `make_bulk` is called once at most.
   SplitBus(std::unique_ptr<Bus> main, MakeBus make_bulk);
   ~SplitBus() override;
 

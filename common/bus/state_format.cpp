@@ -47,19 +47,23 @@ wire::Result<Snapshot> decode_snapshot(std::string_view bytes) {
   const auto damaged = [](const char* what) {
     return wire::Refusal{wire::Reason::kSnapshotDamaged, what};
   };
+
   if (bytes.size() < kSnapshotMagic.size() + 36) return damaged("too short");
   const std::string_view covered = bytes.substr(0, bytes.size() - 8);
   std::string_view tail = bytes.substr(bytes.size() - 8);
   if (!bytes.starts_with(kSnapshotMagic)) return damaged("not a snapshot");
   if (take(tail, 8) != checksum(covered)) return damaged("the checksum does not fit");
+
   bytes.remove_prefix(kSnapshotMagic.size());
   if (take(bytes, 4) != kSnapshotVersion) return damaged("of another version");
+
   Snapshot snapshot;
   snapshot.generation = take(bytes, 8);
   const std::uint64_t size = take(bytes, 8);
   const std::uint64_t sum = take(bytes, 8);
   bytes.remove_suffix(8);
   if (bytes.size() != size || checksum(bytes) != sum) return damaged("the state is not whole");
+
   snapshot.state = std::string(bytes);
   return snapshot;
 }
@@ -83,32 +87,38 @@ JournalContent decode_journal(std::string_view bytes) {
       content.is_torn = true;
       break;
     }
+
     const std::uint64_t size = take(rest, 4);
     const std::uint64_t sum = take(rest, 8);
     if (size < 2 || size > kLargestEvent) {
       content.is_damaged = true;
       break;
     }
+
     if (rest.size() < size) {
       content.is_torn = true;
       break;
     }
+
     std::string_view body = rest.substr(0, size);
     if (checksum(body) != sum) {
       content.is_damaged = true;
       break;
     }
+
     const std::uint64_t letters = take(body, 2);
     if (letters > body.size()) {
       content.is_damaged = true;
       break;
     }
+
     JournalEvent event{std::string(body.substr(0, letters)), {}};
     event.bytes.assign(body.begin() + static_cast<std::ptrdiff_t>(letters), body.end());
     content.events.push_back(std::move(event));
     content.valid_bytes += 12 + size;
     bytes = rest.substr(size);
   }
+
   return content;
 }
 

@@ -85,6 +85,7 @@ void StateStore::refuse_what_killed_before(Recovered& recovered) {
         {wire::Reason::kSnapshotDamaged, path(".snapshot").string() + ": recovery with it died " +
                                              std::to_string(attempts) + " times, put aside"});
   }
+
   if (attempts >= kAttemptsWithJournal) {
     std::error_code ignored;
     for (const auto& entry : fs::directory_iterator(directory_, ignored)) {
@@ -97,6 +98,7 @@ void StateStore::refuse_what_killed_before(Recovered& recovered) {
         {wire::Reason::kJournalDamaged, directory_.string() + ": recovery with the journal died " +
                                             std::to_string(attempts) + " times, put aside"});
   }
+
   replace_file(path(".recovering"), std::to_string(attempts + 1));
 }
 
@@ -106,6 +108,7 @@ StateStore::Recovered StateStore::open() {
   fs::create_directories(directory_, error);
   refuse_what_killed_before(recovered);
   bool snapshot_is_lost = false;
+
   if (const auto bytes = read_file(path(".snapshot"))) {
     auto snapshot = decode_snapshot(*bytes);
     if (snapshot) {
@@ -119,8 +122,10 @@ StateStore::Recovered StateStore::open() {
       put_aside(path(".snapshot"));
     }
   }
+
   std::uint64_t valid_bytes = 0;
   const auto journal = read_file(journal_path(generation_));
+
   // Events that followed a lost snapshot mean nothing without it; only journal 0 starts at nothing.
   if (journal && !snapshot_is_lost) {
     JournalContent content = decode_journal(*journal);
@@ -134,8 +139,10 @@ StateStore::Recovered StateStore::open() {
                                         " events before"});
     }
   }
+
   remove_other_journals();
   if (auto refusal = open_journal(valid_bytes)) recovered.problems.push_back(*refusal);
+
   return recovered;
 }
 

@@ -14,6 +14,7 @@
 
 namespace understory::bus {
 
+/// One input message as it came.
 struct JournalEvent {
   std::string channel;
   std::vector<std::uint8_t> bytes;
@@ -26,11 +27,13 @@ struct JournalEvent {
 /// torn one at the end.
 class StateStore {
  public:
+  /// `name`: the service's. Touches no file before open() or start_over().
   StateStore(std::filesystem::path directory, std::string name);
   ~StateStore();
   StateStore(const StateStore&) = delete;
   StateStore& operator=(const StateStore&) = delete;
 
+  /// What a process finds of its predecessor.
   struct Recovered {
     std::optional<std::string> snapshot;
     std::vector<JournalEvent> events;     ///< Since the snapshot, in order.
@@ -39,18 +42,23 @@ class StateStore {
   /// Reads what is there and starts to journal behind it. When earlier recoveries died on the way
   /// (begin_recovery without end_recovery), the journal is put aside, later the snapshot too.
   Recovered open();
+  /// The stage has taken what open() gave and lives.
   void end_recovery();
 
   /// Puts everything aside and starts empty.
   void start_over();
 
+  /// Writes one input behind the snapshot, in one write(). Refused as kStateNotKept where the
+  /// device fails; needs_snapshot() is then true.
   std::optional<wire::Refusal> append(std::string_view channel,
                                       std::span<const std::uint8_t> bytes);
-  /// Takes the place of the snapshot before and of its journal.
+  /// Writes a snapshot, which replaces the one before and its journal. Refused as kStateNotKept
+  /// where the device fails; the one before then stays.
   std::optional<wire::Refusal> save(std::string_view state);
 
-  /// After a failed append the journal has a hole: only a snapshot makes the state whole again.
+  /// True after a failed append: the journal has a hole, only a snapshot makes the state whole.
   bool needs_snapshot() const { return journal_broken_; }
+  /// Size of the journal [bytes].
   std::uint64_t journal_bytes() const { return journal_bytes_; }
 
  private:

@@ -7,7 +7,8 @@ namespace understory::constellation {
 
 /// log10 of an upper bound (Chernoff) on the probability of at least `hits` successes in `tries`
 /// independent tries of mean probability `chance`; tries may differ in probability (Hoeffding
-/// 1956). 0 where the bound says nothing.
+/// 1956). 0 where the bound is trivial
+/// (no more hits than the mean).
 inline double log10_binomial_tail_bound(double hits, double tries, double chance) {
   if (tries <= 0.0 || hits <= chance * tries || chance >= 1.0) return 0.0;
   if (chance <= 0.0) return -1e3;

@@ -8,6 +8,7 @@ std::uint32_t PointGrid::tile_for(std::uint32_t cx, std::uint32_t cy) {
   const std::uint64_t key = tile_key(cx, cy);
   std::uint32_t tile = directory_.find(key);
   if (tile != IndexTable::kNone) return tile;
+
   if (free_tiles_.empty()) {
     tile = static_cast<std::uint32_t>(tiles_.size());
     tiles_.emplace_back();
@@ -15,8 +16,10 @@ std::uint32_t PointGrid::tile_for(std::uint32_t cx, std::uint32_t cy) {
     tile = free_tiles_.back();
     free_tiles_.pop_back();
   }
+
   tiles_[tile].heads.fill(kNoSlot);
   directory_.insert(key, tile);
+
   return tile;
 }
 

@@ -22,20 +22,28 @@ class PointGrid {
   /// Largest absolute coordinate that can be stored or asked for [m].
   static constexpr double kMaxCoordinate = 2.0e6;
 
+  /// Empty, with cells of `cell_m` [m], > 0. Fastest where a cell holds about one point.
   explicit PointGrid(double cell_m) : cell_m_(cell_m), per_m_(1.0 / cell_m) {}
 
+  /// Whether a point can be stored: finite, and within kMaxCoordinate on both axes.
   static bool representable(const Eigen::Vector2d& point) {
     // Written so that NaN fails.
     return std::abs(point.x()) <= kMaxCoordinate && std::abs(point.y()) <= kMaxCoordinate;
   }
 
+  /// Stores `point` [m] under `slot`; constant time. Preconditions: the slot is not in the grid,
+  /// the point is representable.
   void insert(Slot slot, const Eigen::Vector2d& point);
+  /// Removes the slot's point; constant time. Precondition: it is in the grid.
   void remove(Slot slot);
+  /// Gives the slot's point a new position [m]; constant time. Preconditions as of remove() and
+  /// insert().
   void move(Slot slot, const Eigen::Vector2d& point);
+  /// Position of the slot's point [m].
   Eigen::Vector2d position(Slot slot) const { return {points_[slot].x, points_[slot].y}; }
 
-  /// Calls f(slot, squared distance) for every point within `radius_m` of (x, y), in no meaningful
-  /// order.
+  /// Calls f(slot, squared distance [m^2]) for every point within `radius_m` of (x, y), in no
+  /// meaningful order.
   template <class F>
   void for_each_within(double x, double y, double radius_m, F&& f) const {
     const double squared = radius_m * radius_m;
@@ -44,12 +52,14 @@ class PointGrid {
     const std::uint32_t y_end = cell_of(y + radius_m);
     std::uint64_t key = ~std::uint64_t{0};
     std::uint32_t tile = IndexTable::kNone;
+
     for (std::uint32_t cx = cell_of(x - radius_m); cx <= x_end; ++cx) {
       for (std::uint32_t cy = y_begin; cy <= y_end; ++cy) {
         if (tile_key(cx, cy) != key) {  // cells of one tile share its look-up
           key = tile_key(cx, cy);
           tile = directory_.find(key);
         }
+
         if (tile == IndexTable::kNone) continue;
         Slot slot = tiles_[tile].heads[index_in_tile(cx, cy)];
         for (; slot != kNoSlot; slot = points_[slot].next) {
@@ -79,6 +89,7 @@ class PointGrid {
     }
   }
 
+  /// Memory held [bytes].
   std::size_t bytes() const {
     return points_.capacity() * sizeof(Point) + tiles_.capacity() * sizeof(Tile) +
            directory_.bytes();

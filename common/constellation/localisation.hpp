@@ -19,11 +19,14 @@ struct ObservedPoint {
   double sigma_m = 0.0;  ///< Standard deviation per axis.
 };
 
+/// A disc in the map, e.g. where a prior puts the sensor. Frame `map`.
 struct Disc {
   Eigen::Vector2d centre_m = Eigen::Vector2d::Zero();
   double radius_m = 0.0;
 };
 
+/// What localising assumes of sensor and map, and when it accepts a pose. Sigmas are standard
+/// deviations.
 struct LocaliseParameters {
   /// Triangles of the observation are taken among so many nearest neighbours; in (1, 8].
   int neighbours = 5;
@@ -50,6 +53,7 @@ struct LocaliseParameters {
   std::uint32_t max_hypotheses = 15000;
 };
 
+/// Why a search ended as it did. Everything but kFound means "no pose".
 enum class LocaliseOutcome : std::uint8_t {
   kFound = 0,
   kTooFewPoints = 1,  ///< Fewer than three usable points, in the observation or in the map.
@@ -58,14 +62,17 @@ enum class LocaliseOutcome : std::uint8_t {
   kAmbiguous = 4,     ///< A different pose fits nearly as well.
   kGaveUp = 5,        ///< max_hypotheses tried.
 };
+/// One line for a person, e.g. "too few points".
 std::string_view describe(LocaliseOutcome outcome);
 
+/// An observed point and the landmark that the final pose gives it.
 struct PointAssociation {
   std::uint32_t observed = 0;  ///< Index in the observation.
   LandmarkId landmark_id = 0;
   double distance_m = 0.0;  ///< What the final pose leaves between the two.
 };
 
+/// The result of ConstellationMap::localise().
 struct Localisation {
   LocaliseOutcome outcome = LocaliseOutcome::kNoMatch;
   /// Pose, covariance and associations are of the best hypothesis, also where it was not accepted
@@ -73,8 +80,8 @@ struct Localisation {
   geometry::SE2 map_T_sensor;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Tangent order, right perturbation.
   std::vector<PointAssociation> associations;            ///< One to one, by observed index.
-  std::uint32_t inliers = 0;
-  std::uint32_t hypotheses = 0;
+  std::uint32_t inliers = 0;                             ///< Associations of the pose.
+  std::uint32_t hypotheses = 0;                          ///< Poses tried, the work done.
   /// log10 of an upper bound on the expected number of such good poses by chance.
   double log10_false_alarm = 0.0;
   /// Inliers of the best pose that is another one; 0 if none was seen.
@@ -82,6 +89,7 @@ struct Localisation {
   /// Decades between the false-alarm bounds of the two.
   double log10_margin = 0.0;
 
+  /// True if the pose was accepted.
   bool found() const { return outcome == LocaliseOutcome::kFound; }
 };
 

@@ -172,12 +172,14 @@ Motion Search::motion_from(const Query& query, const std::array<Slot, 3>& corner
   const Eigen::Vector2d centroid = (landmark[0] + landmark[1] + landmark[2]) / 3.0;
   double dot = 0.0;
   double cross = 0.0;
+
   for (std::size_t i = 0; i < 3; ++i) {
     const Eigen::Vector2d& p = query.about_centroid[i];
     const Eigen::Vector2d m = landmark[i] - centroid;
     dot += p.dot(m);
     cross += p.x() * m.y() - p.y() * m.x();
   }
+
   const double norm = std::sqrt(dot * dot + cross * cross);
   return {dot / norm, cross / norm, centroid};
 }
@@ -245,6 +247,7 @@ bool Search::search(std::span<const Triangle> triangles, double side_sigmas) {
     if (accepted()) return true;
     if (spent()) return false;
   }
+
   return false;
 }
 
@@ -255,11 +258,13 @@ void Search::look_for_runner_up(double side_sigmas) {
   std::vector<Slot> explained(observation_.points.size(), kNoSlot);
   for (const Pair& pair : best_->pairs) explained[pair.point] = pair.slot;
   int probes = parameters_.runner_up_probes;
+
   for (const Triangle& triangle : triangles_) {
     if (probes <= 0 || spent() || ambiguous()) break;
     const std::array<Slot, 3> own{explained[triangle.vertex[0]], explained[triangle.vertex[1]],
                                   explained[triangle.vertex[2]]};
     if (own[0] == kNoSlot || own[1] == kNoSlot || own[2] == kNoSlot) continue;
+
     Query query = make_query(triangle);
     map_.triangle_index().for_each_similar(triangle, tolerance(triangle, side_sigmas),
                                            [&](const TriangleIndex::Entry& entry) {
@@ -282,19 +287,23 @@ Localisation Search::result() const {
     result.outcome = spent() ? LocaliseOutcome::kGaveUp : LocaliseOutcome::kNoMatch;
     return result;
   }
+
   result.map_T_sensor = best_->map_T_sensor;
   result.covariance = pose_covariance(observation_, *best_);
   result.inliers = static_cast<std::uint32_t>(best_->pairs.size());
   result.associations.reserve(best_->pairs.size());
+
   for (const Pair& pair : best_->pairs) {
     result.associations.push_back(
         {observation_.observed[pair.point], map_.id_of(pair.slot), std::sqrt(pair.squared_m2)});
   }
+
   result.log10_false_alarm = false_alarm(*best_);
   result.log10_margin = margin();
   if (runner_up_) {
     result.runner_up_inliers = static_cast<std::uint32_t>(runner_up_->pairs.size());
   }
+
   if (!accepted()) {
     result.outcome = spent() ? LocaliseOutcome::kGaveUp : LocaliseOutcome::kLikelyChance;
   } else if (ambiguous()) {
@@ -302,6 +311,7 @@ Localisation Search::result() const {
   } else {
     result.outcome = LocaliseOutcome::kFound;
   }
+
   return result;
 }
 

@@ -49,12 +49,15 @@ std::string_view describe(LocaliseOutcome outcome) {
     case LocaliseOutcome::kNoMatch:
       return "no hypothesis held";
     case LocaliseOutcome::kLikelyChance:
+
       return "too few hits to rule out chance";
     case LocaliseOutcome::kAmbiguous:
       return "a different pose fits nearly as well";
     case LocaliseOutcome::kGaveUp:
+
       return "gave up after the allowed number of hypotheses";
   }
+
   return "unknown";
 }
 
@@ -80,10 +83,12 @@ bool ConstellationMap::insert(LandmarkId id, const Eigen::Vector2d& position_m) 
     ids_[slot] = id;
     neighbours_[slot] = {};
   }
+
   slots_.insert(id, slot);
   std::vector<Slot> anchors{slot};
   collect_anchors(slot, position_m, anchors);
   update(slot, anchors, [&] { grid_.insert(slot, position_m); });
+
   return true;
 }
 
@@ -174,6 +179,7 @@ std::vector<ConstellationMap::SlotTriple> ConstellationMap::triangles_at(
       }
     }
   }
+
   sort_unique(triangles);
   return triangles;
 }
@@ -213,12 +219,15 @@ ConstellationMap::Neighbours ConstellationMap::nearest_neighbours(Slot slot) con
     double squared;
     Slot slot;
   };
+
   std::array<Near, kNeighbours> best;
   std::uint32_t count = 0;
   const double limit = parameters_.max_neighbour_distance_m * parameters_.max_neighbour_distance_m;
+
   const auto closer = [this](const Near& a, const Near& b) {
     return a.squared < b.squared || (a.squared == b.squared && ids_[a.slot] < ids_[b.slot]);
   };
+
   const Eigen::Vector2d position = grid_.position(slot);
   grid_.for_each_outward(
       position.x(), position.y(),
@@ -234,9 +243,11 @@ ConstellationMap::Neighbours ConstellationMap::nearest_neighbours(Slot slot) con
         const double squared = complete_m * complete_m;
         return squared > limit || (count == kNeighbours && best[count - 1].squared < squared);
       });
+
   Neighbours result;
   result.count = count;
   for (std::uint32_t i = 0; i < count; ++i) result.slot[i] = best[i].slot;
+
   return result;
 }
 

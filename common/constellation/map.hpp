@@ -14,6 +14,7 @@
 
 namespace understory::constellation {
 
+/// A landmark and its distance from the point that was asked for.
 struct NearestLandmark {
   LandmarkId id = 0;
   double distance_m = 0.0;
@@ -26,6 +27,8 @@ struct NearestLandmark {
 /// Positions must be finite and within constellation::PointGrid::kMaxCoordinate.
 class ConstellationMap {
  public:
+  /// Sizes of the look-up structures. They decide speed and memory; max_neighbour_distance_m also
+  /// decides which triangles exist.
   struct Parameters {
     double cell_m = 4.0;    ///< Of the grid.
     double bucket_m = 0.5;  ///< Of side lengths.
@@ -35,7 +38,9 @@ class ConstellationMap {
   /// Triangles are made among a landmark and two of its so many nearest neighbours.
   static constexpr std::size_t kNeighbours = 6;
 
+  /// An empty map with the default parameters.
   ConstellationMap() : ConstellationMap(Parameters{}) {}
+  /// An empty map.
   explicit ConstellationMap(const Parameters& parameters);
 
   /// False (and nothing is changed) if `id` is already there or the position cannot be stored.
@@ -45,8 +50,11 @@ class ConstellationMap {
   /// False if `id` is not there or the position cannot be stored.
   bool move(LandmarkId id, const Eigen::Vector2d& position_m);
 
+  /// Number of landmarks.
   std::size_t size() const { return slots_.size(); }
+  /// Whether the landmark is in the map.
   bool contains(LandmarkId id) const { return slots_.find(id) != kNoSlot; }
+  /// Position of the landmark [m]; none if it is not in the map.
   std::optional<Eigen::Vector2d> position(LandmarkId id) const;
 
   /// The landmark closest to `point_m` within `radius_m`; of equally close ones the smaller id.
@@ -66,23 +74,26 @@ class ConstellationMap {
   /// The pose from which `points` were observed, with no prior; if `where` is given, only poses
   /// whose position lies in it are considered.
   ///
-  /// Triangles among nearest neighbours of the observation are looked up by side lengths, the most
-  /// telling first; each similar triangle of the map is a hypothesis, tested on the points around
-  /// it one by one (Wald's sequential test), then refined on all points. Accepted is a pose that
-  /// chance does not give and that no different pose comes close to.
+  /// Triangles among nearest neighbours of the observation are looked up by side lengths, those
+  /// with the fewest candidates first; each similar triangle of the map is a hypothesis, tested on
+  /// the points around it one by one (Wald's sequential test), then refined on all points. Accepted
+  /// is a pose that chance does not give and that no different pose comes close to.
   Localisation localise(std::span<const ObservedPoint> points,
                         const LocaliseParameters& parameters = {},
                         const std::optional<Disc>& where = std::nullopt) const;
 
   /// Every triangle as ascending ids, sorted: for comparisons.
   std::vector<std::array<LandmarkId, 3>> triangles() const;
+  /// Number of triangles in the index.
   std::size_t triangle_count() const { return triangles_.size(); }
   /// Memory held [bytes].
   std::size_t bytes() const;
 
-  // For the search, which lives in files of its own.
+  /// The landmarks by slot, for the search in localise.cpp.
   const PointGrid& grid() const { return grid_; }
+  /// The triangles by side lengths, for the search in localise.cpp. Vertices are slots.
   const TriangleIndex& triangle_index() const { return triangles_; }
+  /// Id of the landmark in a slot. Precondition: the slot is in use.
   LandmarkId id_of(Slot slot) const { return ids_[slot]; }
 
  private:

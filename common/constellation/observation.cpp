@@ -28,6 +28,7 @@ PreparedObservation prepare(std::span<const ObservedPoint> points,
   prepared.points.reserve(points.size());
   prepared.observed.reserve(points.size());
   const double map_variance = parameters.map_sigma_m * parameters.map_sigma_m;
+
   for (std::uint32_t i = 0; i < points.size(); ++i) {
     const ObservedPoint& point = points[i];
     if (!PointGrid::representable(point.position_m) || !(std::abs(point.sigma_m) < 1e3)) continue;
@@ -36,16 +37,20 @@ PreparedObservation prepare(std::span<const ObservedPoint> points,
     prepared.observed.push_back(i);
     prepared.centre += point.position_m;
   }
+
   if (prepared.points.empty()) return prepared;
   const auto n = static_cast<double>(prepared.points.size());
   prepared.centre /= n;
   double moment = 0.0;
+
   for (const auto& point : prepared.points) {
     moment += (point.position - prepared.centre).squaredNorm();
   }
+
   const double area = std::max(1.0, 2.0 * std::numbers::pi * moment / n);
   prepared.radius_m = std::sqrt(area / std::numbers::pi);
   prepared.density_per_m2 = n / area;
+
   return prepared;
 }
 
@@ -63,9 +68,11 @@ TriangleSource::TriangleSource(const PreparedObservation& observation, int neigh
   for (std::uint32_t i = 0; i < n; ++i) {
     by_x_[i] = {observation.points[i].position.x(), observation.points[i].position.y(), i};
   }
+
   std::sort(by_x_.begin(), by_x_.end(), [](const ByX& a, const ByX& b) {
     return a.x < b.x || (a.x == b.x && (a.y < b.y || (a.y == b.y && a.point < b.point)));
   });
+
   // Strides of the golden ratio spread the first few points evenly, whatever the order given.
   auto stride = static_cast<std::size_t>(0.618 * static_cast<double>(n)) | 1U;
   while (std::gcd(stride, n) != 1) ++stride;
@@ -79,34 +86,42 @@ TriangleSource::Neighbours TriangleSource::nearest(std::size_t place) const {
   Neighbours list;
   std::array<double, kMaxNeighbours> squared{};
   const ByX& own = by_x_[place];
+
   // True while the walk may go on.
   const auto consider = [&](const ByX& other) {
     const double dx = other.x - own.x;
     const double dy = other.y - own.y;
     const double d = dx * dx + dy * dy;
+
     if (list.count == wanted_) {
       const double farthest = squared[static_cast<std::size_t>(wanted_) - 1];
       if (dx * dx > farthest) return false;
       if (d >= farthest) return true;
     }
+
     auto k = static_cast<std::size_t>(list.count < wanted_ ? list.count++ : wanted_ - 1);
     for (; k > 0 && d < squared[k - 1]; --k) {
       squared[k] = squared[k - 1];
       list.point[k] = list.point[k - 1];
     }
+
     squared[k] = d;
     list.point[k] = other.point;
+
     return true;
   };
+
   // Both ways in turn, so that far points leave the list early.
   std::size_t down = place;
   std::size_t up = place + 1;
   bool go_down = down > 0;
   bool go_up = up < by_x_.size();
+
   while (go_down || go_up) {
     if (go_down) go_down = consider(by_x_[--down]) && down > 0;
     if (go_up) go_up = consider(by_x_[up++]) && up < by_x_.size();
   }
+
   return list;
 }
 
@@ -114,6 +129,7 @@ std::vector<Triangle> TriangleSource::take(std::size_t count) {
   const auto corner = [&](std::uint32_t point) {
     return Corner{point, point, observation_.points[point].position};
   };
+
   std::vector<Triangle> triangles;
   triangles.reserve(count * static_cast<std::size_t>(wanted_ * (wanted_ - 1) / 2));
   for (; count > 0 && !exhausted(); --count, ++next_) {
@@ -130,8 +146,10 @@ std::vector<Triangle> TriangleSource::take(std::size_t count) {
         if (!flat(triangle, observation_.points)) triangles.push_back(triangle);
       }
     }
+
     neighbours_[a] = list;
   }
+
   return triangles;
 }
 

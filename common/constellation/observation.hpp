@@ -12,11 +12,13 @@
 
 namespace understory::constellation {
 
+/// A usable observed point, frame `sensor`.
 struct PreparedPoint {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
   double variance = 0.0;  ///< Per axis, of the difference to its landmark: both sides' together.
 };
 
+/// The usable points of an observation and how densely they lie.
 struct PreparedObservation {
   std::vector<PreparedPoint> points;
   std::vector<std::uint32_t> observed;  ///< Index in the observation as given.
@@ -25,7 +27,8 @@ struct PreparedObservation {
   double density_per_m2 = 0.0;  ///< Points in that disc.
 };
 
-/// Leaves out points that are not finite; a point's sigma counts at least as much as the map's.
+/// Leaves out points that are not finite. A point's variance is the sum of its own and the map's
+/// (LocaliseParameters::map_sigma_m), the former not below the latter.
 PreparedObservation prepare(std::span<const ObservedPoint> points,
                             const LocaliseParameters& parameters);
 
@@ -37,6 +40,7 @@ class TriangleSource {
   /// the source.
   TriangleSource(const PreparedObservation& observation, int neighbours);
 
+  /// True when every point's triangles were taken.
   bool exhausted() const { return next_ == order_.size(); }
   /// The triangles of the next `count` points, each triangle once in the life of the source;
   /// vertices are indices of prepared points. Those so flat that noise could mirror them are left

@@ -27,6 +27,7 @@ geometry::SE2 align(const PreparedObservation& observation, const PointGrid& gri
   geometry::RigidAlignment2 sums;
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double moment = 0.0;
+
   for (const Pair& pair : pairs) {
     const PreparedPoint& point = observation.points[pair.point];
     const double weight = 1.0 / point.variance;
@@ -34,10 +35,12 @@ geometry::SE2 align(const PreparedObservation& observation, const PointGrid& gri
     sum += weight * point.position;
     moment += weight * point.position.squaredNorm();
   }
+
   uncertainty.centre = sum / sums.weight();
   uncertainty.translation_variance = 1.0 / sums.weight();
   const double about_centre = moment - sums.weight() * uncertainty.centre.squaredNorm();
   uncertainty.rotation_variance = 1.0 / std::max(about_centre, 1.0);
+
   return sums.a_T_b();
 }
 
@@ -68,6 +71,7 @@ std::vector<Pair> gather(const PreparedObservation& observation, const PointGrid
   const Eigen::Matrix2d rotation = map_T_sensor.rotation();
   std::vector<Pair> pairs;
   pairs.reserve(observation.points.size());
+
   for (std::uint32_t i = 0; i < observation.points.size(); ++i) {
     const PreparedPoint& point = observation.points[i];
     const Eigen::Vector2d mapped = rotation * point.position + map_T_sensor.translation();
@@ -76,6 +80,7 @@ std::vector<Pair> gather(const PreparedObservation& observation, const PointGrid
                              pair.squared_m2);
     if (pair.slot != kNoSlot) pairs.push_back(pair);
   }
+
   make_one_to_one(pairs);
   return pairs;
 }
@@ -129,12 +134,15 @@ FittedPose fit_pose(const PreparedObservation& observation, const PointGrid& gri
     pairs = std::move(next);
     if (settled || pairs.size() < 3) break;
   }
+
   fitted.pairs = std::move(pairs);
   if (fitted.pairs.size() < 3) return fitted;
+
   fitted.mean_chance = mean_chance(observation, grid, fitted.map_T_sensor, motion, parameters);
   fitted.log10_tail = log10_binomial_tail_bound(
       static_cast<double>(fitted.pairs.size()) - kGiven,
       static_cast<double>(observation.points.size()) - kGiven, fitted.mean_chance);
+
   return fitted;
 }
 

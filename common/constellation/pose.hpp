@@ -10,6 +10,7 @@
 
 namespace understory::constellation {
 
+/// An observed point and the landmark that a pose gives it.
 struct Pair {
   std::uint32_t point = 0;  ///< Prepared point.
   Slot slot = kNoSlot;

@@ -13,6 +13,7 @@ class IndexTable {
  public:
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
 
+  /// An empty table.
   IndexTable() : entries_(kMinimum) {}
 
   /// The value of `key`, or kNone.
@@ -35,6 +36,7 @@ class IndexTable {
       if (entries_[hole].key == kFree) return;
       hole = (hole + 1) & mask();
     }
+
     for (std::size_t i = (hole + 1) & mask(); entries_[i].key != kFree; i = (i + 1) & mask()) {
       const std::size_t wanted = home(entries_[i].key);
       if (((i - wanted) & mask()) >= ((i - hole) & mask())) {
@@ -42,10 +44,13 @@ class IndexTable {
         hole = i;
       }
     }
+
     entries_[hole].key = kFree;
     --size_;
   }
+  /// Number of keys.
   std::size_t size() const { return size_; }
+  /// Memory held [bytes].
   std::size_t bytes() const { return entries_.capacity() * sizeof(Entry); }
 
  private:

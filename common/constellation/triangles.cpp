@@ -45,6 +45,7 @@ void TriangleIndex::add(const Triangle& triangle) {
     }
     directory_.insert(key, index);
   }
+
   buckets_[index].push_back({triangle.side_m, triangle.vertex});
   ++size_;
 }
@@ -58,6 +59,7 @@ void TriangleIndex::remove(const Triangle& triangle) {
                                [&](const Entry& entry) { return entry.vertex == triangle.vertex; });
   assert(it != entries.end());
   *it = entries.back();
+
   entries.pop_back();
   --size_;
   if (entries.empty()) {

@@ -20,6 +20,7 @@ struct Triangle {
   bool left = false;              ///< vertex 0, 1, 2 turn left.
 };
 
+/// A landmark as a triangle's corner; position in any one frame [m].
 struct Corner {
   Slot slot = kNoSlot;
   std::uint64_t id = 0;  ///< Breaks ties between equal sides.
@@ -32,20 +33,26 @@ Triangle canonical_triangle(const Corner& a, const Corner& b, const Corner& c);
 /// Triangles in buckets of side lengths (longest, middle, shortest) and chirality.
 class TriangleIndex {
  public:
+  /// A triangle as the index stores it, in canonical order.
   struct Entry {
     std::array<float, 3> side_m{};
     std::array<Slot, 3> vertex{};
   };
 
+  /// An empty index with buckets of `bucket_m` [m] per side, > 0.
   explicit TriangleIndex(double bucket_m) : per_m_(static_cast<float>(1.0 / bucket_m)) {}
 
+  /// Stores a triangle; constant time. Precondition: it is not in the index.
   void add(const Triangle& triangle);
   /// Precondition: exactly this triangle was added before.
   void remove(const Triangle& triangle);
+  /// Number of triangles.
   std::size_t size() const { return size_; }
+  /// Memory held [bytes].
   std::size_t bytes() const;
 
-  /// How many triangles share the bucket of `triangle`: a quick measure of how telling it is.
+  /// How many triangles share the bucket of `triangle`: a quick estimate of the number of
+  /// candidates that it would give.
   std::size_t crowd(const Triangle& triangle) const {
     return bucket(key_of(triangle.left, bins(triangle.side_m))).size();
   }
@@ -69,6 +76,7 @@ class TriangleIndex {
         }
       }
     }
+
     return true;
   }
 

@@ -61,15 +61,18 @@ class Spectrum {
     const auto my = static_cast<float>(middle.y());
     const auto hx = static_cast<float>(half.x());
     const auto hy = static_cast<float>(half.y());
+
     const auto swing = static_cast<float>(half_phase);
     Lanes step_re;
     Lanes step_im;
     Lanes re;
     Lanes im{};
+
     for (std::size_t j = 0; j < kLanes; ++j) {
       const float x = mx + kNode[j] * hx;
       const float y = my + kNode[j] * hy;
       re[j] = kWeight[j] * scale * std::sqrt(x * x + y * y);
+
       // Short series instead of a sine and cosine per point: |angle| < pi / 4.
       const float angle = kNode[j] * swing;
       const float sq = angle * angle;
@@ -80,6 +83,7 @@ class Spectrum {
       step_re[j] = cosine * c - sine * s;
       step_im[j] = sine * c + cosine * s;
     }
+
     for (int k = 0; k < bins_; ++k) {
       Lanes& sum_re = re_[k];
       Lanes& sum_im = im_[k];

@@ -14,18 +14,18 @@ inline constexpr std::size_t kMaxDescriptorBins = 16;
 /// Magnitudes of the spectrum of the distance to the centroid along the perimeter (GeoSLAM §3.2.2)
 /// [m, times the number of samples]. Bin 0 is the mean distance. Unused bins are zero.
 ///
-/// The source samples 1/s points from some vertex on and takes all 1/s bins of their DFT. That
+/// The thesis samples 1/s points from some vertex on and takes all 1/s bins of their DFT. That
 /// depends on the vertex, by as much as its threshold tau. Here the Fourier integral is taken
 /// along the edges instead, which is what the samples approximate. Only the distinct bins
 /// 0 ... 1/(2s) are kept; all but bin 0 are weighted by sqrt(2), for their mirror images. So
-/// Euclidean distances, and with them tau, mean what they mean in the source.
+/// Euclidean distances and tau have the units of the thesis.
 using Descriptor = std::array<float, kMaxDescriptorBins>;
 
 /// Number of samples 1/s that a step stands for. Precondition: 1/30 <= step <= 1/4.
 int sample_count(double descriptor_step);
 
 /// Descriptor of the closed walk along `boundary` [m]. Its centroid is the mean of the vertices, as
-/// in the source. `samples` is 1/s. Invariant to rotation, translation, reflection, first vertex
+/// in the thesis. `samples` is 1/s. Invariant to rotation, translation, reflection, first vertex
 /// and direction of travel up to rounding. Precondition: at least two vertices, not all equal.
 Descriptor describe(std::span<const Eigen::Vector2d> boundary, int samples);
 

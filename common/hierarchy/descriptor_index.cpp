@@ -39,21 +39,25 @@ bool DescriptorIndex::erase(std::uint32_t key, const Descriptor& descriptor) {
   for (std::size_t i = 0; i < kBins.size(); ++i) {
     cell[i] = cell_of(descriptor[kBins[i]]);
   }
+
   const auto found = cells_.find(key_of(cell));
   if (found == cells_.end()) {
     return false;
   }
+
   auto& entries = found->second;
   const auto entry = std::find_if(entries.begin(), entries.end(),
                                   [key](const Entry& candidate) { return candidate.key == key; });
   if (entry == entries.end()) {
     return false;
   }
+
   *entry = entries.back();
   entries.pop_back();
   if (entries.empty()) {
     cells_.erase(found);
   }
+
   --size_;
   return true;
 }
@@ -74,6 +78,7 @@ void DescriptorIndex::within(const Descriptor& descriptor, float radius,
   Cell low{};
   Cell high{};
   double cells = 1.0;
+
   for (std::size_t i = 0; i < kBins.size(); ++i) {
     // A little wider than the radius: the subtraction rounds, the distance is what decides.
     const float reach = radius + 1e-4F * (1.0F + descriptor[kBins[i]]);
@@ -81,6 +86,7 @@ void DescriptorIndex::within(const Descriptor& descriptor, float radius,
     high[i] = cell_of(descriptor[kBins[i]] + reach);
     cells *= high[i] - low[i] + 1.0;
   }
+
   if (cells > static_cast<double>(cells_.size())) {
     for (const auto& cell : cells_) {
       scan(cell.second, descriptor, radius, hits);
@@ -97,6 +103,7 @@ void DescriptorIndex::within(const Descriptor& descriptor, float radius,
       }
     }
   }
+
   std::sort(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) {
     return a.distance != b.distance ? a.distance < b.distance : a.key < b.key;
   });

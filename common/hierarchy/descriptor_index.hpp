@@ -15,6 +15,7 @@ namespace understory::hierarchy {
 /// its radius. Exact for every radius; fastest up to about the size of a cell.
 class DescriptorIndex {
  public:
+  /// A descriptor found, by its key.
   struct Hit {
     std::uint32_t key = 0;
     float distance = 0.0F;
@@ -23,6 +24,7 @@ class DescriptorIndex {
   /// `cell_size` in units of a descriptor's distance; > 0.
   explicit DescriptorIndex(float cell_size = 2.0F) : cell_size_(cell_size) {}
 
+  /// Adds a descriptor in constant time. Precondition: `key` is not in the index.
   void insert(std::uint32_t key, const Descriptor& descriptor);
   /// `descriptor` is the one that `key` was inserted with. Returns whether it was there.
   bool erase(std::uint32_t key, const Descriptor& descriptor);
@@ -30,6 +32,7 @@ class DescriptorIndex {
   /// Replaces `hits` by all within `radius` (inclusive), nearest first, ties by key.
   void within(const Descriptor& descriptor, float radius, std::vector<Hit>& hits) const;
 
+  /// Number of descriptors.
   std::size_t size() const { return size_; }
 
  private:

@@ -16,12 +16,14 @@ GeometricHierarchy::GeometricHierarchy(std::span<const LandmarkPosition> landmar
   std::vector<Eigen::Vector2d> positions;
   std::vector<std::uint32_t> candidates;
   std::unordered_set<std::uint64_t> seen;
+
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     if (landmarks[i].position_m.allFinite() && seen.insert(landmarks[i].id).second) {
       positions.push_back(landmarks[i].position_m);
       candidates.push_back(static_cast<std::uint32_t>(i));
     }
   }
+
   std::size_t refusals = landmarks.size() - candidates.size();
   for (const std::uint32_t i : insertion_order(positions)) {
     const LandmarkPosition& landmark = landmarks[candidates[i]];
@@ -32,6 +34,7 @@ GeometricHierarchy::GeometricHierarchy(std::span<const LandmarkPosition> landmar
       ++refusals;
     }
   }
+
   remake_polygons();
   if (refused != nullptr) {
     *refused = refusals;
@@ -112,14 +115,17 @@ void GeometricHierarchy::remake_polygons() {
       absorb_neighbours(loose_[i]);
     }
   }
+
   for (const std::uint32_t triangle : loose_) {
     if (triangulation_.is_triangle(triangle) && polygon_of_[triangle] == kNone) {
       make_polygon(triangle);
     }
   }
+
   for (const std::uint32_t triangle : loose_) {
     is_loose_[triangle] = 0;
   }
+
   loose_.clear();
   recount_hull_edges();
 }
@@ -192,19 +198,23 @@ std::vector<HierarchyEdge> edges(const GeometricHierarchy& hierarchy) {
       if (across != kNone && across < t) {
         continue;  // seen from the other side
       }
+
       std::uint32_t from = triangle.vertices[(edge + 1) % 3];
       std::uint32_t to = triangle.vertices[(edge + 2) % 3];
       if (triangulation.id(from) > triangulation.id(to)) {
         std::swap(from, to);
       }
+
       result.push_back({triangulation.id(from), triangulation.id(to), triangulation.position(from),
                         triangulation.position(to), !is_dropped(triangulation, t, edge),
                         across == kNone});
     }
   }
+
   std::sort(result.begin(), result.end(), [](const HierarchyEdge& a, const HierarchyEdge& b) {
     return std::pair(a.from_id, a.to_id) < std::pair(b.from_id, b.to_id);
   });
+
   return result;
 }
 

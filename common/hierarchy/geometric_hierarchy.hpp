@@ -11,22 +11,25 @@
 
 namespace understory::hierarchy {
 
+/// Resolution of the descriptors and of their index.
 struct HierarchyParameters {
   double descriptor_step = 0.05;         ///< [s] part of the perimeter; 1/30 ... 1/4.
   double max_descriptor_distance = 2.0;  ///< [tau] the index is fastest for radii up to this.
 };
 
+/// A landmark by its permanent id, in any one frame.
 struct LandmarkPosition {
   std::uint64_t id = 0;
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
 };
 
 /// The geometric hierarchy of a set of landmarks (GeoSLAM §3.2). A change costs what it touches: a
-/// handful of triangles and the polygons that they belong to (thesis §7.1 asks for this). The
+/// handful of triangles and the polygons that they belong to (asked for in GeoSLAM §7.1). The
 /// hierarchy depends on the set of landmarks alone, not on its history; only the numbering of
 /// slots, triangles and polygons does.
 class GeometricHierarchy {
  public:
+  /// An empty hierarchy.
   explicit GeometricHierarchy(const HierarchyParameters& parameters = {});
   /// From many landmarks at once, each polygon made once. Of several with one id the first is
   /// taken, of several at one place any one; they and those not finite are counted in `refused`, if
@@ -35,21 +38,29 @@ class GeometricHierarchy {
                               const HierarchyParameters& parameters = {},
                               std::size_t* refused = nullptr);
 
+  /// Adds a landmark. Refused (and nothing is changed): an id in use, a position taken, a position
+  /// that is not finite.
   ChangeStatus insert(std::uint64_t id, const Eigen::Vector2d& position_m);
+  /// Removes a landmark. Refused: an unknown id.
   ChangeStatus remove(std::uint64_t id);
+  /// Gives a landmark a new position. Refused (and nothing is changed): an unknown id, a position
+  /// taken, a position that is not finite.
   ChangeStatus move(std::uint64_t id, const Eigen::Vector2d& position_m);
   /// Many moves, after which each polygon is made once (the graph has moved the map). Returns one
   /// status per landmark.
   std::vector<ChangeStatus> move(std::span<const LandmarkPosition> landmarks);
 
+  /// The triangulation on which the polygons are built.
   const Triangulation& triangulation() const { return triangulation_; }
   /// By index; those with !exists() are free.
   std::span<const Polygon> polygons() const { return polygons_; }
+  /// Number of polygons that exist.
   std::size_t polygon_count() const { return polygons_.size() - free_polygons_.size(); }
   /// The polygon that a triangle belongs to.
   std::uint32_t polygon_of(std::uint32_t triangle) const { return polygon_of_[triangle]; }
   /// Keys are polygon indices.
   const DescriptorIndex& index() const { return index_; }
+  /// As given to the constructor.
   const HierarchyParameters& parameters() const { return parameters_; }
 
  private:

@@ -13,6 +13,7 @@ namespace understory::hierarchy {
 /// reader checks that the slot is in use) and decides nothing but the length of a walk.
 class LocationHints {
  public:
+  /// Makes `slot` the answer for the cell of this place.
   void remember(const Eigen::Vector2d& position_m, std::uint32_t slot) {
     cells_[key(cell(position_m.x()), cell(position_m.y()))] = slot;
   }
@@ -36,6 +37,7 @@ class LocationHints {
     if (const auto own = cells_.find(key(x, y)); own != cells_.end()) {
       return own->second;
     }
+
     for (std::int64_t dx = -1; dx <= 1; ++dx) {
       for (std::int64_t dy = -1; dy <= 1; ++dy) {
         if (const auto found = cells_.find(key(x + dx, y + dy)); found != cells_.end()) {
@@ -43,6 +45,7 @@ class LocationHints {
         }
       }
     }
+
     return std::nullopt;
   }
 

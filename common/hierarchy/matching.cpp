@@ -73,6 +73,7 @@ Fit fit(const TriangleShape& a, const TriangleShape& b, double max_edge_differen
       best = {cost, turn};
     }
   }
+
   return best;
 }
 
@@ -83,6 +84,7 @@ std::map<SlotPair, int> vote(const std::vector<TriangleShape>& a,
   std::vector<std::vector<Fit>> fits(a.size(), std::vector<Fit>(b.size()));
   std::vector<double> best_of_a(a.size(), std::numeric_limits<double>::infinity());
   std::vector<double> best_of_b(b.size(), std::numeric_limits<double>::infinity());
+
   for (std::size_t i = 0; i < a.size(); ++i) {
     for (std::size_t j = 0; j < b.size(); ++j) {
       fits[i][j] = fit(a[i], b[j], parameters.max_edge_difference_m);
@@ -90,6 +92,7 @@ std::map<SlotPair, int> vote(const std::vector<TriangleShape>& a,
       best_of_b[j] = std::min(best_of_b[j], fits[i][j].cost);
     }
   }
+
   std::map<SlotPair, int> votes;
   std::size_t matched = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -103,6 +106,7 @@ std::map<SlotPair, int> vote(const std::vector<TriangleShape>& a,
       }
     }
   }
+
   const double required =
       parameters.min_triangle_match_ratio * static_cast<double>(std::min(a.size(), b.size()));
   return static_cast<double>(matched) < required ? std::map<SlotPair, int>{} : votes;
@@ -155,12 +159,15 @@ class PolygonAlignment {
         }
       }
     }
+
     std::sort(near.begin(), near.end());
     std::vector<SlotPair> ordered;
     ordered.reserve(near.size());
+
     for (const auto& candidate : near) {
       ordered.push_back(candidate.second);
     }
+
     return one_to_one(ordered);
   }
 
@@ -193,6 +200,7 @@ std::vector<PolygonMatch> match_polygons(const GeometricHierarchy& query,
     if (!polygon.exists()) {
       continue;
     }
+
     map.index().within(polygon.descriptor, static_cast<float>(parameters.max_descriptor_distance),
                        hits);
     const auto* there =
@@ -200,15 +208,18 @@ std::vector<PolygonMatch> match_polygons(const GeometricHierarchy& query,
     if (there == nullptr) {
       continue;
     }
+
     const PolygonMatch match{q, there->key, there->distance};
     const Polygon& partner = map.polygons()[match.map];
     query.index().within(partner.descriptor, match.distance, hits);
     const auto* back =
         nearest_of_like_size(query, hits, partner.boundary.size(), parameters.max_side_difference);
+
     if (back != nullptr && back->key == q) {
       result.push_back(match);
     }
   }
+
   return result;
 }
 
@@ -221,30 +232,37 @@ std::vector<LandmarkMatch> match_landmarks(const GeometricHierarchy& query,
                           shapes_of(map.triangulation(), there), parameters);
   std::vector<SlotPair> ordered;
   ordered.reserve(votes.size());
+
   for (const auto& [pair, count] : votes) {
     ordered.push_back(pair);
   }
+
   std::stable_sort(ordered.begin(), ordered.end(),
                    [&](const SlotPair& a, const SlotPair& b) { return votes.at(a) > votes.at(b); });
   const PolygonAlignment alignment(query.triangulation(), map.triangulation(),
                                    parameters.max_residual_m);
   const auto map_T_query = alignment.agree(one_to_one(ordered));
+
   if (!map_T_query) {
     return {};
   }
+
   const auto pairs = alignment.coincident(*map_T_query, here, there);
   if (pairs.size() < 3) {
     return {};
   }
+
   const double closeness = match.distance / parameters.max_descriptor_distance;
   const double score = (static_cast<double>(pairs.size()) - 2.0) *
                        std::exp(-0.5 * closeness * closeness) *
                        (here.touches_hull() || there.touches_hull() ? kHullTrust : 1.0);
   std::vector<LandmarkMatch> result;
   result.reserve(pairs.size());
+
   for (const auto& [q, m] : pairs) {
     result.push_back({query.triangulation().id(q), map.triangulation().id(m), score});
   }
+
   return result;
 }
 
@@ -256,17 +274,20 @@ std::vector<LandmarkMatch> match(const GeometricHierarchy& query, const Geometri
       scores[{pair.query_id, pair.map_id}] += pair.score;
     }
   }
+
   std::vector<LandmarkMatch> ordered;
   ordered.reserve(scores.size());
   for (const auto& [ids, score] : scores) {
     ordered.push_back({ids.first, ids.second, score});
   }
+
   std::stable_sort(
       ordered.begin(), ordered.end(),
       [](const LandmarkMatch& a, const LandmarkMatch& b) { return a.score > b.score; });
   std::vector<LandmarkMatch> result;
   std::unordered_set<std::uint64_t> query_taken;
   std::unordered_set<std::uint64_t> map_taken;
+
   for (const LandmarkMatch& pair : ordered) {
     if (!query_taken.contains(pair.query_id) && !map_taken.contains(pair.map_id)) {
       query_taken.insert(pair.query_id);
@@ -274,6 +295,7 @@ std::vector<LandmarkMatch> match(const GeometricHierarchy& query, const Geometri
       result.push_back(pair);
     }
   }
+
   return result;
 }
 

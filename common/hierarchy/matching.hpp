@@ -8,6 +8,7 @@
 
 namespace understory::hierarchy {
 
+/// Thresholds of matching; symbols as in GeoSLAM §3.2.3.
 struct MatchParameters {
   double max_descriptor_distance = 2.0;   ///< [tau]
   int max_side_difference = 3;            ///< [Delta_N] sides of two polygons.
@@ -25,6 +26,7 @@ struct PolygonMatch {
   float distance = 0.0F;
 };
 
+/// A landmark of the query that is probably a landmark of the map.
 struct LandmarkMatch {
   std::uint64_t query_id = 0;
   std::uint64_t map_id = 0;
@@ -40,7 +42,7 @@ std::vector<PolygonMatch> match_polygons(const GeometricHierarchy& query,
                                          const GeometricHierarchy& map,
                                          const MatchParameters& parameters = {});
 
-/// Landmark pairs that one polygon match gives; empty if its triangles do not bear it out. Mirror
+/// Landmark pairs that one polygon match gives; empty if too few of its triangles match. Mirror
 /// images never match: triangles are compared in their counter-clockwise order, and the pairs must
 /// fit one rigid motion.
 std::vector<LandmarkMatch> match_landmarks(const GeometricHierarchy& query,
@@ -48,8 +50,8 @@ std::vector<LandmarkMatch> match_landmarks(const GeometricHierarchy& query,
                                            const MatchParameters& parameters = {});
 
 /// All landmark pairs between a query and a map, best first. No landmark is in two pairs: of
-/// conflicting ones the higher score wins. Different matches need not agree on one motion: finding
-/// that is for whoever localises.
+/// conflicting ones the higher score wins. Different matches need not agree on one motion: the
+/// caller has to find it.
 std::vector<LandmarkMatch> match(const GeometricHierarchy& query, const GeometricHierarchy& map,
                                  const MatchParameters& parameters = {});
 

@@ -15,6 +15,7 @@ void start_at_smallest(const Triangulation& triangulation, std::vector<std::uint
   const auto id = [&](std::size_t start, std::size_t i) {
     return triangulation.id(walk[(start + i) % size]);
   };
+
   std::size_t best = 0;
   for (std::size_t start = 1; start < size; ++start) {
     std::size_t i = 0;
@@ -25,6 +26,7 @@ void start_at_smallest(const Triangulation& triangulation, std::vector<std::uint
       best = start;
     }
   }
+
   std::rotate(walk.begin(), walk.begin() + static_cast<std::ptrdiff_t>(best), walk.end());
 }
 
@@ -56,10 +58,12 @@ std::vector<std::uint32_t> boundary_of(const Triangulation& triangulation,
       }
     }
   }
+
   // Walk: note the start of each boundary edge, then turn about its end to the next one.
   std::vector<std::uint32_t> walk;
   const std::size_t length = triangles.size() + 2;
   walk.reserve(length);
+
   while (walk.size() < length) {
     const Triangle* triangle = &triangulation.triangles()[index];
     walk.push_back(triangle->vertices[(edge + 1) % 3]);
@@ -72,6 +76,7 @@ std::vector<std::uint32_t> boundary_of(const Triangulation& triangulation,
       edge = (index_in(*triangle, end) + 2) % 3;
     }
   }
+
   start_at_smallest(triangulation, walk);
   return walk;
 }

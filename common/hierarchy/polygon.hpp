@@ -10,19 +10,21 @@
 namespace understory::hierarchy {
 
 /// A connected set of triangles across longest edges (GeoSLAM algorithm 1, components merged as in
-/// its published code). The dual of such a set is a tree (lengths never fall along the way and only
-/// two triangles can share their longest edge), so its boundary is one closed walk of triangles + 2
-/// edges; it may pass a landmark, or both sides of an edge, twice.
+/// its published code). The dual of such a set is a tree (lengths never fall along its branches and
+/// only two triangles can share their longest edge), so its boundary is one closed walk of
+/// triangles + 2 edges; it may pass a landmark, or both sides of an edge, twice.
 struct Polygon {
   /// Landmark slots along the boundary, counter-clockwise, from the one that makes the sequence of
   /// ids smallest. Empty where the polygon does not exist.
   std::vector<std::uint32_t> boundary;
-  std::vector<std::uint32_t> triangles;
+  std::vector<std::uint32_t> triangles;  ///< Indices in the triangulation.
   Descriptor descriptor{};
   /// Edges on the convex hull. They are where the view ends, not where the forest does.
   std::uint32_t hull_edges = 0;
 
+  /// False for a free index.
   bool exists() const { return !boundary.empty(); }
+  /// Whether the polygon may be cut off by the end of the view.
   bool touches_hull() const { return hull_edges > 0; }
 };
 

@@ -98,17 +98,20 @@ struct Triangulation::Impl {
     for (const Face& face : faces) {
       face->info().triangle = kNone;
     }
+
     for (const Face& face : faces) {
       if (!delaunay.is_infinite(face)) {
         allocate(face, change);
       }
     }
+
     for (const Face& face : faces) {
       if (face->info().triangle != kNone) {
         refresh(face);
         self->find_longest_edge(self->triangles_[face->info().triangle]);
       }
     }
+
     for (const Face& face : rim) {
       if (face->info().triangle != kNone) {
         refresh(face);
@@ -150,10 +153,12 @@ struct Triangulation::Impl {
     const int dimension_before = delaunay.dimension();
     const Vertex vertex = delaunay.insert(point, place.type, place.face, place.index);
     vertex->info() = slot;
+
     if (dimension_before < 2 || delaunay.dimension() < 2) {
       adopt_everything(change);
       return vertex;
     }
+
     // CGAL inserts by flips, which keep their faces: each face that lost its triangle is now one of
     // those around the new vertex and still carries the old index.
     collect_star(vertex, scratch_faces, scratch_rim);
@@ -162,6 +167,7 @@ struct Triangulation::Impl {
         release(face->info().triangle, change);
       }
     }
+
     adopt(scratch_faces, scratch_rim, change);
     return vertex;
   }
@@ -172,6 +178,7 @@ struct Triangulation::Impl {
       adopt_everything(change);
       return;
     }
+
     collect_star(vertex, scratch_faces, scratch_rim);
     std::vector<std::uint32_t> old;
     for (const Face& face : scratch_faces) {
@@ -179,20 +186,24 @@ struct Triangulation::Impl {
         old.push_back(face->info().triangle);
       }
     }
+
     // The rim's faces survive the removal, and so does the index of the edge that looks at the
     // hole.
     std::vector<int> looks_inside;
     for (std::size_t i = 0; i < scratch_rim.size(); ++i) {
       looks_inside.push_back(scratch_rim[i]->index(scratch_faces[i]));
     }
+
     delaunay.remove(vertex);
     if (delaunay.dimension() < 2) {
       adopt_everything(change);
       return;
     }
+
     for (const std::uint32_t triangle : old) {
       release(triangle, change);
     }
+
     flood_hole(looks_inside);
     adopt(scratch_faces, scratch_rim, change);
   }
@@ -204,15 +215,18 @@ struct Triangulation::Impl {
     for (const Face& face : scratch_rim) {
       face->info().visit = visit;
     }
+
     const auto visit_face = [this](Face face) {
       if (face->info().visit != visit) {
         face->info().visit = visit;
         scratch_faces.push_back(face);
       }
     };
+
     for (std::size_t i = 0; i < scratch_rim.size(); ++i) {
       visit_face(scratch_rim[i]->neighbor(looks_inside[i]));
     }
+
     for (std::size_t i = 0; i < scratch_faces.size(); ++i) {
       for (int j = 0; j < 3; ++j) {
         visit_face(scratch_faces[i]->neighbor(j));
@@ -236,26 +250,32 @@ struct Triangulation::Impl {
     if (delaunay.dimension() < 2) {
       return false;
     }
+
     collect_star(vertex, scratch_faces, scratch_rim);
     for (const Face& face : scratch_faces) {
       if (delaunay.is_infinite(face)) {
         return false;
       }
     }
+
     const Point before = vertex->point();
     vertex->set_point(point);
     bool keeps = true;
+
     for (std::size_t i = 0; keeps && i < scratch_faces.size(); ++i) {
       keeps = turns_left(scratch_faces[i]);
     }
+
     for (std::size_t i = 0; keeps && i < scratch_faces.size(); ++i) {
       const int v = scratch_faces[i]->index(vertex);
       keeps = is_locally_delaunay(scratch_faces[i], Delaunay::ccw(v)) &&
               (delaunay.is_infinite(scratch_rim[i]) || is_locally_delaunay(scratch_faces[i], v));
     }
+
     if (!keeps) {
       vertex->set_point(before);
     }
+
     return keeps;
   }
 
@@ -323,17 +343,21 @@ ChangeStatus Triangulation::insert(std::uint64_t id, const Eigen::Vector2d& posi
   if (!position_m.allFinite()) {
     return ChangeStatus::kNotFinite;
   }
+
   if (slot_of_id_.contains(id)) {
     return ChangeStatus::kIdInUse;
   }
+
   const Impl::Place place = impl_->locate(position_m);
   if (place.occupied()) {
     return ChangeStatus::kCoincident;
   }
+
   const std::uint32_t slot = allocate_slot(id, position_m);
   impl_->vertices[slot] = impl_->insert(slot, to_cgal(position_m), place, change);
   impl_->hints.remember(position_m, slot);
   impl_->last_slot = slot;
+
   return ChangeStatus::kDone;
 }
 
@@ -358,15 +382,18 @@ ChangeStatus Triangulation::move(std::uint64_t id, const Eigen::Vector2d& positi
   if (!position_m.allFinite()) {
     return ChangeStatus::kNotFinite;
   }
+
   const auto found = slot(id);
   if (!found) {
     return ChangeStatus::kUnknownId;
   }
+
   const Point point = to_cgal(position_m);
   const Vertex vertex = impl_->vertices[*found];
   if (vertex->point() == point) {
     return ChangeStatus::kDone;
   }
+
   if (impl_->move_in_place(vertex, point)) {
     positions_[*found] = position_m;
     for (const Face& face : impl_->scratch_faces) {
@@ -376,13 +403,16 @@ ChangeStatus Triangulation::move(std::uint64_t id, const Eigen::Vector2d& positi
     change.removed = change.made;
     return ChangeStatus::kDone;
   }
+
   if (impl_->locate(position_m).occupied()) {
     return ChangeStatus::kCoincident;
   }
+
   TriangulationChange removal;
   remove(id, removal);
   insert(id, position_m, change);
   change.prepend(removal, triangles_);
+
   return ChangeStatus::kDone;
 }
 

@@ -39,6 +39,7 @@ struct TriangulationChange {
   std::vector<std::uint32_t> made;     ///< New, or of another shape since a vertex moved.
   std::vector<std::uint32_t> rim;      ///< Unchanged, but with another neighbour across an edge.
 
+  /// Empties the three lists and keeps their memory.
   void clear();
   /// Puts an earlier change before this one; `triangles` is what is there after both. Triangles
   /// made by the first and gone with the second are in `removed` only.
@@ -54,31 +55,44 @@ struct TriangulationChange {
 /// removal, ids never are.
 class Triangulation {
  public:
+  /// An empty triangulation.
   Triangulation();
   ~Triangulation();
+  /// Leaves the other one fit for assignment and destruction only.
   Triangulation(Triangulation&&) noexcept;
   Triangulation& operator=(Triangulation&&) noexcept;
   Triangulation(const Triangulation&) = delete;
   Triangulation& operator=(const Triangulation&) = delete;
 
-  /// Each replaces `change` by what it touched.
+  /// Adds a landmark and replaces `change` by the triangles touched. Refused (and nothing is
+  /// changed): an id in use, a position taken, a position that is not finite.
   ChangeStatus insert(std::uint64_t id, const Eigen::Vector2d& position_m,
                       TriangulationChange& change);
+  /// Removes a landmark and replaces `change` by the triangles touched. Refused: an unknown id.
   ChangeStatus remove(std::uint64_t id, TriangulationChange& change);
+  /// Gives a landmark a new position and replaces `change` by the triangles touched. Refused (and
+  /// nothing is changed): an unknown id, a position taken, a position that is not finite.
   ChangeStatus move(std::uint64_t id, const Eigen::Vector2d& position_m,
                     TriangulationChange& change);
 
+  /// Number of landmarks.
   std::size_t landmark_count() const { return slot_of_id_.size(); }
+  /// Number of triangles.
   std::size_t triangle_count() const { return triangles_.size() - free_triangles_.size(); }
   /// All triangles by index; a free one has vertices of kNone.
   std::span<const Triangle> triangles() const { return triangles_; }
+  /// Whether the index is in use.
   bool is_triangle(std::uint32_t index) const { return triangles_[index].vertices[0] != kNone; }
 
+  /// Slot of a landmark; none for an unknown id.
   std::optional<std::uint32_t> slot(std::uint64_t id) const;
+  /// Id of the landmark in a slot in use.
   std::uint64_t id(std::uint32_t slot) const { return ids_[slot]; }
+  /// Position [m] of the landmark in a slot in use.
   const Eigen::Vector2d& position(std::uint32_t slot) const { return positions_[slot]; }
   /// One past the largest slot in use.
   std::size_t slot_count() const { return ids_.size(); }
+  /// Whether the slot is in use.
   bool is_landmark(std::uint32_t slot) const;
   /// The slot of the landmark nearest to a place (ties: whichever is found first); none if empty.
   std::optional<std::uint32_t> nearest(const Eigen::Vector2d& position_m) const;

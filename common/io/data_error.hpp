@@ -9,6 +9,7 @@ namespace understory::io {
 /// it, and what was expected.
 class DataError : public std::runtime_error {
  public:
+  /// From the one-line message that what() gives.
   using std::runtime_error::runtime_error;
 };
 

@@ -44,6 +44,7 @@ std::size_t FileWindow::read_some(std::uint64_t offset, std::span<std::uint8_t> 
     if (got == 0) break;
     done += static_cast<std::size_t>(got);
   }
+
   return done;
 }
 

@@ -17,6 +17,7 @@ class FileWindow {
   FileWindow(const FileWindow&) = delete;
   FileWindow& operator=(const FileWindow&) = delete;
 
+  /// Size of the file when it was opened [bytes].
   std::uint64_t size() const { return size_; }
   /// Up to `count` bytes (at most kWindowBytes) from `offset`; fewer at the end of the file. Valid
   /// until the next call.

@@ -41,6 +41,7 @@ std::vector<model::Utime> parse_timestamps(std::string_view text, std::string_vi
     text.remove_prefix(std::min(text.size(), line.size() + 1));
     ++number;
     if (line.find_first_not_of(" \r\t") == std::string_view::npos) continue;
+
     const std::string where = fmt::format("{}, line {}", source, number);
     const std::chrono::year_month_day day{
         std::chrono::year(digits(line, 0, 4, where)),
@@ -52,11 +53,13 @@ std::vector<model::Utime> parse_timestamps(std::string_view text, std::string_vi
     const int micros = digits(line, 20, 6, where);
     if (!day.ok() || hour > 23 || minute > 59 || second > 60)
       throw DataError(fmt::format("{}: '{}' is no time stamp", where, line.substr(0, 40)));
+
     const auto days = std::chrono::sys_days(day).time_since_epoch().count();
     const model::Utime seconds =
         static_cast<model::Utime>(days) * 86400 + hour * 3600 + minute * 60 + second;
     stamps.push_back(seconds * 1'000'000 + micros);
   }
+
   return stamps;
 }
 
@@ -65,12 +68,14 @@ model::PointSweep parse_points(std::string_view bytes, double revolution_s,
   if (bytes.size() % kPointBytes != 0)
     throw DataError(
         fmt::format("{}: {} bytes are no whole points of {}", source, bytes.size(), kPointBytes));
+
   model::PointSweep sweep;
   sweep.rings = kitti::kRings;
   sweep.max_range_m = kitti::kMaxRange_m;
   sweep.points.reserve(bytes.size() / kPointBytes);
   int beam = 0;  // from the top
   float last = 0.0F;
+
   for (std::size_t at = 0; at < bytes.size(); at += kPointBytes) {
     std::array<float, 4> v{};
     std::memcpy(v.data(), bytes.data() + at, kPointBytes);
@@ -79,20 +84,24 @@ model::PointSweep parse_points(std::string_view bytes, double revolution_s,
     point.y_m = v[1];
     point.z_m = v[2];
     point.intensity = static_cast<std::uint8_t>(std::clamp(v[3] * 255.0F, 0.0F, 255.0F));
+
     const float azimuth = std::atan2(v[1], v[0]);
     const float around = azimuth < 0.0F ? azimuth + 2.0F * std::numbers::pi_v<float> : azimuth;
     if (around < last - std::numbers::pi_v<float>) ++beam;
     last = around;
     point.ring = static_cast<std::uint16_t>(std::max(0, kitti::kRings - 1 - beam));
+
     // From behind the car, clockwise.
     point.time_s =
         static_cast<float>(revolution_s) * 0.5F * (1.0F - azimuth / std::numbers::pi_v<float>);
     if (std::isfinite(point.time_s)) sweep.points.push_back(point);
   }
+
   std::ranges::stable_sort(sweep.points,
                            [](const model::SweepPoint& a, const model::SweepPoint& b) {
                              return a.time_s != b.time_s ? a.time_s < b.time_s : a.ring < b.ring;
                            });
+
   return sweep;
 }
 
@@ -104,15 +113,18 @@ Eigen::Isometry3d parse_transform(std::string_view text, std::string_view source
     NumberReader reader(rest.substr(0, rest.find('\n')), std::string(source));
     for (std::size_t i = 0; i < count; ++i) out[i] = reader.require(key);
   };
+
   Eigen::Matrix<double, 3, 3, Eigen::RowMajor> rotation;
   Eigen::Vector3d translation;
   values("\nR:", rotation.data(), 9);
   values("\nT:", translation.data(), 3);
   if ((rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm() > 1e-3)
     throw DataError(fmt::format("{}: R is no rotation", source));
+
   Eigen::Isometry3d transform = Eigen::Isometry3d::Identity();
   transform.linear() = Eigen::Quaterniond(Eigen::Matrix3d(rotation)).normalized().matrix();
   transform.translation() = translation;
+
   return transform;
 }
 

@@ -1,8 +1,8 @@
 // A drive of the KITTI raw data: Velodyne HDL-64E sweeps and OXTS records with their time stamps.
 //
 // The .bin files hold x, y, z, reflectance alone, beam by beam from the top, each from azimuth 0 to
-// the left. The beam is got back from where the azimuth wraps, the time of a point from its
-// azimuth: the laser turns clockwise and starts behind the car. Sweeps are not corrected for the
+// the left. The beam follows from where the azimuth wraps, the time of a point from its
+// azimuth: the laser rotates clockwise and starts behind the car. Sweeps are not corrected for the
 // car's motion ("sync" and "extract" alike).
 #pragma once
 
@@ -17,15 +17,18 @@
 
 namespace understory::io {
 
+/// One drive: the names and times of its sweeps, read on demand, and all its OXTS records.
 class KittiRaw {
  public:
   /// The folder of one drive (with velodyne_points/, oxts/); the calibration beside them or one
   /// folder up, where there is any. Throws DataError.
   explicit KittiRaw(std::filesystem::path folder);
 
+  /// Number of sweeps.
   std::size_t sweeps() const { return starts_.size(); }
   /// Frame sensor, skewed, with rings (0 = lowest) and times. Throws DataError.
   model::PointSweep read_sweep(std::size_t index) const;
+  /// The OXTS records in order of time.
   const std::vector<OxtsRecord>& oxts() const { return oxts_; }
   /// Where the laser sits on the OXTS unit; none without calibration.
   const std::optional<Eigen::Isometry3d>& imu_T_velo() const { return imu_T_velo_; }
@@ -46,26 +49,31 @@ constexpr std::uint16_t kRings = 64;
 
 /// "2011-09-26 13:02:44.335092332" per line (UTC). Throws DataError.
 std::vector<model::Utime> parse_timestamps(std::string_view text, std::string_view source);
-/// Bytes of a .bin file to points with rings and times within `turn_s`.
+/// Bytes of a .bin file to points with rings and times within `revolution_s`. Throws DataError.
 model::PointSweep parse_points(std::string_view bytes, double revolution_s,
                                std::string_view source);
-/// "R: ... T: ..." of calib_imu_to_velo.txt: velo_T_imu.
+/// "R: ... T: ..." of calib_imu_to_velo.txt: velo_T_imu. Throws DataError.
 Eigen::Isometry3d parse_transform(std::string_view text, std::string_view source);
 
 }  // namespace kitti
 
-/// Drive 0005 reduced to 16 of its 64 beams: sweeps.bin with poses beside it.
+/// The pose of one sweep of ReducedKitti, in the middle of its revolution.
 struct ReducedKittiPose {
   model::Utime utime = 0;
   geometry::SE2 world_T_sensor;
 };
+/// Drive 0005 reduced to 16 of its 64 beams: sweeps.bin with poses beside it.
 class ReducedKitti {
  public:
-  /// A folder with sweeps.bin and poses_icp.csv or poses_oxts.csv (`poses`: "icp", "oxts").
+  /// A folder with sweeps.bin and poses_icp.csv or poses_oxts.csv (`poses`: "icp", "oxts"). Throws
+  /// DataError.
   ReducedKitti(const std::filesystem::path& folder, std::string_view poses);
+  /// Number of sweeps.
   std::size_t sweeps() const { return offsets_.size(); }
-  /// Frame sensor; times from the azimuth, turns of 0.1 s of which the middle is the pose's time.
+  /// Frame sensor; times from the azimuth, revolutions of 0.1 s of which the middle is the pose's
+  /// time.
   model::PointSweep read_sweep(std::size_t index) const;
+  /// One pose per sweep, by index.
   const std::vector<ReducedKittiPose>& poses() const { return poses_; }
 
  private:

@@ -35,6 +35,7 @@ std::vector<ReducedKittiPose> parse_poses(std::string_view text, const std::stri
   NumberReader reader(text, source);
   reader.skip_line();
   std::vector<ReducedKittiPose> poses;
+
   while (reader.next()) {
     const double t = reader.require("the time");
     std::array<double, 7> v{};
@@ -46,6 +47,7 @@ std::vector<ReducedKittiPose> parse_poses(std::string_view text, const std::stri
     poses.push_back({kStart_us + static_cast<model::Utime>(std::llround(t * 1e6)),
                      geometry::SE2(v[0], v[1], std::atan2(forward.y(), forward.x()))});
   }
+
   return poses;
 }
 
@@ -58,6 +60,7 @@ ReducedKitti::ReducedKitti(const std::filesystem::path& path, std::string_view p
   const std::string name = fmt::format("poses_{}.csv", poses);
   poses_ = parse_poses(folder.read(name), folder.describe(name));
   std::size_t at = 0;
+
   while (at < bytes_.size()) {
     if (at + kHeaderBytes > bytes_.size())
       throw DataError(fmt::format("{}: cut off at byte {}", source_, at));
@@ -68,6 +71,7 @@ ReducedKitti::ReducedKitti(const std::filesystem::path& path, std::string_view p
     offsets_.push_back(at);
     at += kHeaderBytes + count * kPointBytes;
   }
+
   if (offsets_.size() != poses_.size())
     throw DataError(
         fmt::format("{}: {} sweeps for {} poses", source_, offsets_.size(), poses_.size()));
@@ -81,6 +85,7 @@ model::PointSweep ReducedKitti::read_sweep(std::size_t index) const {
   sweep.sequence = index;
   sweep.utime = poses_[index].utime - static_cast<model::Utime>(0.5 * kTurn_s * 1e6);
   const std::size_t count = count_at(bytes_, offsets_[index] + 4);
+
   sweep.points.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t at = offsets_[index] + kHeaderBytes + i * kPointBytes;
@@ -90,16 +95,19 @@ model::PointSweep ReducedKitti::read_sweep(std::size_t index) const {
     point.z_m = metres_at(bytes_, at + 4);
     point.intensity = static_cast<std::uint8_t>(bytes_[at + 6]);
     const int from_top = std::min<int>(63, static_cast<std::uint8_t>(bytes_[at + 7]));
+
     point.ring = static_cast<std::uint16_t>((63 - from_top) / 4);
     const float azimuth = std::atan2(point.y_m, point.x_m);
     point.time_s =
         static_cast<float>(kTurn_s) * 0.5F * (1.0F - azimuth / std::numbers::pi_v<float>);
     sweep.points.push_back(point);
   }
+
   std::ranges::stable_sort(sweep.points,
                            [](const model::SweepPoint& a, const model::SweepPoint& b) {
                              return a.time_s != b.time_s ? a.time_s < b.time_s : a.ring < b.ring;
                            });
+
   return sweep;
 }
 

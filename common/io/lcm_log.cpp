@@ -114,18 +114,22 @@ class LcmLogReader::Impl {
     event.data.resize(header.data_bytes);
     const auto channel = file_.peek(position_ + kHeaderBytes, header.channel_bytes);
     std::copy(channel.begin(), channel.end(), event.channel.begin());
+
     if (!file_.read(position_ + kHeaderBytes + header.channel_bytes, event.data)) {
       skip_to(file_.size());  // The file has shrunk since it was opened.
       return std::nullopt;
     }
+
     // Only a gap across damage is a loss: a log that was cut or filtered has gaps by intent. Two
     // billion is more than any damage can hide.
     if (in_place_ && event.number > next_number_ && event.number - next_number_ < (1LL << 31)) {
       damage_.events_lost += static_cast<std::uint64_t>(event.number - next_number_);
     }
+
     close_place();
     next_number_ = event.number < INT64_MAX ? event.number + 1 : event.number;
     position_ += header.event_bytes();
+
     return event;
   }
 

@@ -2,7 +2,7 @@
 //
 // An event is: magic 0xEDA1DA01, event number (int64), receive time (int64, microseconds), channel
 // length (int32), data length (int32), channel, data; integers big-endian. The format has no
-// checksum and no index: the reader tells damage by what cannot be an event and by where the next
+// checksum and no index: the reader finds damage by what cannot be an event and by where the next
 // one starts.
 #pragma once
 
@@ -18,6 +18,7 @@
 
 namespace understory::io {
 
+/// One message as the logger received it.
 struct LogEvent {
   std::int64_t number = 0;  ///< Counts from 0 in a log that is whole.
   std::int64_t utime = 0;   ///< When the logger received it [us since the epoch].
@@ -28,6 +29,7 @@ struct LogEvent {
 /// A file that cannot be opened, read or written; what() names the file and the cause.
 class LogError : public std::runtime_error {
  public:
+  /// From the one-line message that what() gives.
   using std::runtime_error::runtime_error;
 };
 
@@ -36,7 +38,7 @@ struct LogDamage {
   std::uint64_t places = 0;       ///< Contiguous stretches that are no event.
   std::uint64_t bytes = 0;        ///< In all of them together.
   std::uint64_t events_lost = 0;  ///< By the event numbers before and after each place; 0 where
-                                  ///< they do not tell (end of the file, numbers that go back).
+                                  ///< they do not show it (end of the file, numbers that go back).
   std::uint64_t last_offset = 0;  ///< Where the latest place starts [bytes].
   std::uint64_t last_bytes = 0;   ///< How long it is.
 };
@@ -51,11 +53,13 @@ class LcmLogReader {
   /// Throws LogError when the file cannot be opened or is no regular file.
   explicit LcmLogReader(const std::filesystem::path& path);
   ~LcmLogReader();
+  /// Leaves the other one fit for assignment and destruction only.
   LcmLogReader(LcmLogReader&&) noexcept;
   LcmLogReader& operator=(LcmLogReader&&) noexcept;
 
   /// The next event, or none at the end. Throws LogError when the device fails.
   std::optional<LogEvent> next();
+  /// What was skipped so far.
   const LogDamage& damage() const;
   std::uint64_t position_bytes() const;  ///< Behind the event given last.
   std::uint64_t size_bytes() const;      ///< Of the file when it was opened.
@@ -70,8 +74,10 @@ class LcmLogReader {
 /// written directly.
 class LcmLogWriter {
  public:
+  /// Opens the temporary file. Throws LogError when it cannot be created.
   explicit LcmLogWriter(const std::filesystem::path& path);
   ~LcmLogWriter();
+  /// Leaves the other one fit for assignment and destruction only.
   LcmLogWriter(LcmLogWriter&&) noexcept;
   LcmLogWriter& operator=(LcmLogWriter&&) noexcept;
 
@@ -80,8 +86,9 @@ class LcmLogWriter {
   void write(const LogEvent& event);
   /// The same, numbered in order of writing.
   void write(std::int64_t utime, std::string_view channel, std::span<const std::uint8_t> data);
-  /// Flushes to the device and gives the file its name; the writer takes nothing afterwards.
+  /// Flushes to the device and gives the file its name; no write() may follow. Throws LogError.
   void commit();
+  /// Number of events written.
   std::uint64_t events() const;
 
  private:

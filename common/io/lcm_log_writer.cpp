@@ -43,10 +43,12 @@ class LcmLogWriter::Impl {
       throw LogError(fmt::format("{}: channel \"{}\": a channel has 1 to {} bytes", path_.string(),
                                  channel, kMaxChannelBytes));
     }
+
     if (data.size() > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max())) {
       throw LogError(fmt::format("{}: channel \"{}\": {} bytes are more than an event holds",
                                  path_.string(), channel, data.size()));
     }
+
     const auto header = encode({number, utime, static_cast<std::uint32_t>(channel.size()),
                                 static_cast<std::uint32_t>(data.size())});
     buffer_.insert(buffer_.end(), header.begin(), header.end());

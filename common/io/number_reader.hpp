@@ -19,7 +19,7 @@ class NumberReader {
   std::optional<double> next();
   /// The next number, called `what` in the error when it is missing or no finite number.
   double require(std::string_view what);
-  /// Passes over the rest of the present line (a heading, say).
+  /// Skips the rest of the present line (e.g. a heading).
   void skip_line();
 
   std::uint64_t tokens() const { return tokens_; }  ///< Given so far.

@@ -25,6 +25,7 @@ OxtsRecord parse_oxts(std::string_view text, std::string_view source) {
   for (double& value : v) value = reader.require("one of 25 values of an OXTS record");
   if (std::abs(v[0]) > 90.0 || std::abs(v[1]) > 180.0)
     throw DataError(fmt::format("{}: {}, {} is no latitude and longitude", source, v[0], v[1]));
+
   OxtsRecord record;
   record.latitude_deg = v[0];
   record.longitude_deg = v[1];
@@ -32,10 +33,12 @@ OxtsRecord parse_oxts(std::string_view text, std::string_view source) {
   record.roll_pitch_yaw_rad << v[3], v[4], v[5];
   record.east_north_velocity_mps << v[7], v[6];
   record.forward_velocity_mps = v[8];
+
   record.specific_force_mps2 << v[11], v[12], v[13];
   record.angular_rate_rad_s << v[17], v[18], v[19];
   record.position_sigma_m = std::abs(v[23]);
   record.velocity_sigma_mps = std::abs(v[24]);
+
   return record;
 }
 

@@ -26,13 +26,16 @@ struct OxtsRecord {
   double velocity_sigma_mps = 0.0;
 };
 
+/// One record from its line of 30 numbers; `source` names the text in errors. The stamp stays 0.
 /// Throws DataError.
 OxtsRecord parse_oxts(std::string_view text, std::string_view source);
 
 /// Metres east and north of an origin (WGS 84, good for a drive of some tens of kilometres).
 class LocalPlane {
  public:
+  /// A plane that touches the earth at this origin.
   LocalPlane(double latitude_deg, double longitude_deg);
+  /// Metres east and north of the origin.
   Eigen::Vector2d east_north_m(double latitude_deg, double longitude_deg) const;
 
  private:

@@ -45,13 +45,16 @@ std::optional<CapturedPacket> udp_payload(Frame packet) {
   const bool is_fragment = (word(packet, 6) & 0x3FFFU) != 0;
   if (header < 20 || packet[9] != kUdp || is_fragment || packet.size() < header + kUdpBytes)
     return std::nullopt;
+
   const Frame datagram = packet.subspan(header);
   const std::size_t length = word(datagram, 4);
   if (length < kUdpBytes || length > datagram.size()) return std::nullopt;
+
   const Frame payload = datagram.subspan(kUdpBytes, length - kUdpBytes);
   CapturedPacket result;
   result.port = word(datagram, 2);
   result.payload.assign(payload.begin(), payload.end());
+
   return result;
 }
 
@@ -78,13 +81,16 @@ class PacketCapture::Impl {
         is_cut_off_ = status == PCAP_ERROR;
         return std::nullopt;
       }
+
       ++counts_.frames;
       const Frame frame(data, header->caplen);
       auto packet = udp_payload(link_ == DLT_RAW ? frame : internet_packet(frame));
+
       if (!packet) {
         ++counts_.not_udp;
         continue;
       }
+
       packet->utime = static_cast<model::Utime>(header->ts.tv_sec) * 1'000'000 + header->ts.tv_usec;
       return packet;
     }

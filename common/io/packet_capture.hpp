@@ -11,12 +11,14 @@
 
 namespace understory::io {
 
+/// The payload of one UDP packet.
 struct CapturedPacket {
   model::Utime utime = 0;  ///< When it was captured [us since the epoch].
   std::uint16_t port = 0;  ///< UDP, destination.
   std::vector<std::uint8_t> payload;
 };
 
+/// What was in the file so far.
 struct CaptureCounts {
   std::uint64_t frames = 0;
   std::uint64_t not_udp = 0;  ///< Other protocols, fragments, cut off: passed over.
@@ -28,12 +30,15 @@ class PacketCapture {
   /// Throws DataError.
   explicit PacketCapture(const std::filesystem::path& path);
   ~PacketCapture();
+  /// Leaves the other one fit for assignment and destruction only.
   PacketCapture(PacketCapture&&) noexcept;
   PacketCapture& operator=(PacketCapture&&) noexcept;
 
   /// The next UDP payload; none at the end. A file that ends in the middle of a frame ends there.
   std::optional<CapturedPacket> next();
+  /// What next() came across so far.
   const CaptureCounts& counts() const;
+  /// Whether the file ends in the middle of a frame; known once next() gave none.
   bool is_cut_off() const;
 
  private:

@@ -57,9 +57,11 @@ void check(Header& header, std::string_view source) {
     field.offset = header.point_bytes;
     header.point_bytes += field.bytes * field.count;
   }
+
   if (header.points > kMostPoints)
     refuse(source,
            fmt::format("{} points, more than the {} that are read", header.points, kMostPoints));
+
   if (header.fields.empty() || header.fields.size() > 256)
     refuse(source, "no line FIELDS that could be");
 }
@@ -73,6 +75,7 @@ Header parse_header(std::string_view bytes, std::string_view source) {
     at = end + 1;
     std::string key;
     line >> key;
+
     if (key == "FIELDS") {
       std::string name;
       while (line >> name) header.fields.push_back({name});
@@ -88,6 +91,7 @@ Header parse_header(std::string_view bytes, std::string_view source) {
       set_column(line, header.fields, key);
     }
   }
+
   refuse(source, "no line DATA");
 }
 
@@ -108,6 +112,7 @@ double value_at(const Field& field, const char* at) {
              : field.bytes == 4 ? number_at<std::uint32_t>(at)
                                 : number_at<std::uint64_t>(at);
     default:
+
       return field.bytes == 1   ? number_at<std::int8_t>(at)
              : field.bytes == 2 ? number_at<std::int16_t>(at)
              : field.bytes == 4 ? number_at<std::int32_t>(at)
@@ -147,6 +152,7 @@ std::vector<Column> ascii_columns(const Header& header, std::string_view text,
                                  text.substr(begin, std::min<std::size_t>(at - begin, 40)), begin));
     return value;
   };
+
   for (std::size_t i = 0; i < header.points; ++i) {
     for (std::size_t f = 0; f < header.fields.size(); ++f) {
       for (std::size_t c = 0; c < header.fields[f].count; ++c) {
@@ -155,6 +161,7 @@ std::vector<Column> ascii_columns(const Header& header, std::string_view text,
       }
     }
   }
+
   return columns;
 }
 
@@ -163,18 +170,22 @@ std::vector<Column> columns_of(const Header& header, std::string_view bytes,
   const std::string_view data = bytes.substr(header.end);
   const std::size_t size = header.points * header.point_bytes;
   if (header.data == "ascii") return ascii_columns(header, data, source);
+
   if (header.data == "binary") {
     if (data.size() < size) refuse(source, fmt::format("{} of {} bytes", data.size(), size));
     return binary_columns(header, data, false);
   }
+
   if (header.data != "binary_compressed")
     refuse(source, fmt::format("DATA {} is not known", header.data));
   if (data.size() < 8) refuse(source, "cut off");
+
   const auto packed = static_cast<std::size_t>(number_at<std::uint32_t>(data.data()));
   const auto unpacked = static_cast<std::size_t>(number_at<std::uint32_t>(data.data() + 4));
   if (unpacked != size || packed > data.size() - 8)
     refuse(source, fmt::format("{} bytes for {} points of {}", unpacked, header.points,
                                header.point_bytes));
+
   return binary_columns(header, decompress_lzf(data.substr(8, packed), unpacked, source), true);
 }
 
@@ -182,14 +193,17 @@ std::vector<Column> columns_of(const Header& header, std::string_view bytes,
 
 std::string decompress_lzf(std::string_view compressed, std::size_t size, std::string_view source) {
   std::string out;
+
   // LZF makes at most 264 bytes of three: a size beyond that is a lie, found before allocating.
   if (size > 100 * compressed.size() + 100) refuse(source, "more bytes than LZF can have packed");
   out.reserve(size);
   std::size_t at = 0;
+
   const auto byte = [&]() -> std::size_t {
     if (at >= compressed.size()) refuse(source, "compressed points are cut off");
     return static_cast<std::uint8_t>(compressed[at++]);
   };
+
   while (at < compressed.size()) {
     const std::size_t control = byte();
     if (control < 32) {
@@ -200,14 +214,17 @@ std::string decompress_lzf(std::string_view compressed, std::size_t size, std::s
       at += count;
       continue;
     }
+
     std::size_t length = control >> 5U;
     if (length == 7) length += byte();
     length += 2;
     const std::size_t back = ((control & 0x1FU) << 8U) + byte() + 1;
     if (back > out.size() || length > size - out.size())
       refuse(source, "compressed points are damaged");
+
     for (std::size_t i = 0; i < length; ++i) out.push_back(out[out.size() - back]);
   }
+
   if (out.size() != size) refuse(source, "compressed points are cut off");
   return out;
 }
@@ -258,11 +275,13 @@ std::vector<PcdFile> find_pcd_sequence(const std::filesystem::path& folder) {
   for (const auto& entry : std::filesystem::directory_iterator(folder, failed)) {
     if (entry.path().extension() == ".pcd") files.push_back({0, entry.path()});
   }
+
   if (failed || files.empty())
     throw DataError(fmt::format("{}: no folder with .pcd files", folder.string()));
   std::ranges::sort(files, {}, &PcdFile::path);
   std::vector<double> seconds;
   const std::filesystem::path stamps = folder / "timestamps.txt";
+
   if (std::filesystem::exists(stamps, failed)) {
     const std::string text = RecordingFolder(folder).read("timestamps.txt");
     NumberReader reader(text, stamps.string());
@@ -275,14 +294,17 @@ std::vector<PcdFile> find_pcd_sequence(const std::filesystem::path& folder) {
       seconds.push_back(value > 1e15 ? value * 1e-9 : value);
     }
   }
+
   if (seconds.size() != files.size())
     throw DataError(fmt::format("{}: {} files for {} time stamps", folder.string(), files.size(),
                                 seconds.size()));
+
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (!(seconds[i] >= 0.0 && seconds[i] < 9e9))
       throw DataError(fmt::format("{}: {} s is no time", files[i].path.string(), seconds[i]));
     files[i].utime = static_cast<model::Utime>(std::llround(seconds[i] * 1e6));
   }
+
   std::ranges::stable_sort(files, {}, &PcdFile::utime);
   return files;
 }

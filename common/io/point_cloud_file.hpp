@@ -17,6 +17,7 @@ model::PointSweep parse_pcd(std::string_view bytes, std::string_view source);
 /// LZF, as PCD uses it; throws DataError where the data is not what it should be.
 std::string decompress_lzf(std::string_view compressed, std::size_t size, std::string_view source);
 
+/// One file of a sequence and the time of its first point.
 struct PcdFile {
   model::Utime utime = 0;
   std::filesystem::path path;

@@ -70,21 +70,26 @@ std::string read_entry(const fs::path& path, std::string_view name, const std::s
   const ZipArchive archive = open_archive(path);
   const auto index = find_entry(archive.get(), name);
   if (!index) throw DataError(fmt::format("{}: no such file in the archive", what));
+
   zip_stat_t status;
   if (zip_stat_index(archive.get(), *index, 0, &status) != 0 ||
       (status.valid & ZIP_STAT_SIZE) == 0) {
     throw DataError(fmt::format("{}: {}", what, zip_strerror(archive.get())));
   }
+
   check_size(status.size, what);
   const ZipFile file(zip_fopen_index(archive.get(), *index, 0));
   if (!file) throw DataError(fmt::format("{}: {}", what, zip_strerror(archive.get())));
+
   std::string content(status.size, '\0');
+
   // zip_fread checks the checksum of the entry when it reaches its end.
   const zip_int64_t got = zip_fread(file.get(), content.data(), content.size());
   char beyond = 0;
   if (got != static_cast<zip_int64_t>(content.size()) || zip_fread(file.get(), &beyond, 1) != 0) {
     throw DataError(fmt::format("{}: damaged: {}", what, zip_file_strerror(file.get())));
   }
+
   return content;
 }
 

@@ -17,10 +17,10 @@ class RecordingFolder {
   /// The whole content of the file of this name (case and leading folders do not matter). Throws
   /// DataError when it is missing, damaged, or larger than `kMaxFileBytes`.
   std::string read(std::string_view name) const;
-  /// What to call the file in messages: "archive.zip:LASER.txt", "folder/LASER.txt".
+  /// The file's name for messages: "archive.zip:LASER.txt", "folder/LASER.txt".
   std::string describe(std::string_view name) const;
 
-  /// A bound on what is unpacked into memory: archives may claim anything.
+  /// Limit for one unpacked file [bytes]: a damaged archive may state any size.
   static constexpr std::uint64_t kMaxFileBytes = 1ULL << 30U;
 
  private:

@@ -28,8 +28,10 @@ class Table {
         name.push_back(c);
       }
     }
+
     if (!name.empty()) names_.push_back(name);
     if (names_.empty()) throw DataError(fmt::format("{}: no heading", source_));
+
     NumberReader reader(text.substr(end), source_);
     while (const auto first = reader.next()) {
       values_.push_back(*first);
@@ -57,6 +59,7 @@ class Table {
     const std::size_t column = nanos ? *nanos : micros ? *micros : require("t_s");
     const double unit = nanos ? 1e-3 : micros ? 1.0 : 1e6;
     std::vector<model::Utime> stamps;
+
     for (std::size_t row = 0; row < rows(); ++row) {
       const double value = at(row, column) * unit;
       if (!(value >= 0.0 && value < 9e15))
@@ -65,6 +68,7 @@ class Table {
       if (row > 0 && stamps[row] <= stamps[row - 1])
         throw DataError(fmt::format("{}, row {}: time does not advance", source_, row + 1));
     }
+
     return stamps;
   }
 
@@ -82,6 +86,7 @@ std::vector<model::ImuSample> parse_imu_table(std::string_view text, std::string
   const std::size_t g[] = {table.require("gx"), table.require("gy"), table.require("gz")};
   const std::size_t a[] = {table.require("ax"), table.require("ay"), table.require("az")};
   std::vector<model::ImuSample> samples(table.rows());
+
   for (std::size_t row = 0; row < samples.size(); ++row) {
     samples[row].utime = stamps[row];
     samples[row].sequence = row;
@@ -90,6 +95,7 @@ std::vector<model::ImuSample> parse_imu_table(std::string_view text, std::string
       samples[row].specific_force_mps2(axis) = table.at(row, a[axis]);
     }
   }
+
   return samples;
 }
 
@@ -101,11 +107,13 @@ std::vector<model::GnssFix> parse_gnss_table(std::string_view text, std::string_
   const std::size_t east = table.require(geodetic ? "longitude_deg" : "east_m");
   const auto sigma = table.find("sigma_m");
   const auto east_velocity = table.find("ve_mps");
+
   const auto north_velocity = table.find("vn_mps");
   const auto velocity_sigma = table.find("velocity_sigma_mps");
   std::vector<model::GnssFix> fixes(table.rows());
   std::optional<LocalPlane> plane;
   if (geodetic && table.rows() > 0) plane.emplace(table.at(0, north), table.at(0, east));
+
   for (std::size_t row = 0; row < fixes.size(); ++row) {
     model::GnssFix& fix = fixes[row];
     fix.utime = stamps[row];
@@ -118,6 +126,7 @@ std::vector<model::GnssFix> parse_gnss_table(std::string_view text, std::string_
           Eigen::Vector2d(table.at(row, *east_velocity), table.at(row, *north_velocity));
     if (velocity_sigma) fix.velocity_sigma_mps = std::abs(table.at(row, *velocity_sigma));
   }
+
   return fixes;
 }
 

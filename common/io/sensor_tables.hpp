@@ -14,9 +14,10 @@ namespace understory::io {
 /// Throws DataError.
 std::vector<model::ImuSample> parse_imu_table(std::string_view text, std::string_view source);
 /// t_s, and latitude_deg longitude_deg or east_m north_m; where there: sigma_m, ve_mps vn_mps,
-/// velocity_sigma_mps. The first fix is the origin of latitudes.
+/// velocity_sigma_mps. The first fix is the origin of latitudes. Throws
+/// DataError.
 std::vector<model::GnssFix> parse_gnss_table(std::string_view text, std::string_view source);
-/// t_s, speed_mps; where there: steering_rad.
+/// t_s, speed_mps; where there: steering_rad. Throws DataError.
 std::vector<model::WheelSample> parse_wheel_table(std::string_view text, std::string_view source);
 
 }  // namespace understory::io

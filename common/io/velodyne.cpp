@@ -16,8 +16,9 @@ constexpr std::uint16_t kUpperFlag = 0xEEFF;
 constexpr std::uint16_t kLowerFlag = 0xDDFF;
 constexpr int kTurn = 36000;  // hundredths of a degree
 constexpr double kHour_us = 3.6e9;
-constexpr std::size_t kMostPoints = 2'000'000;  // of a turn: more is no turn
-constexpr int kLargestStep = 600;               // of the azimuth from packet to packet
+constexpr std::size_t kMostPoints =
+    2'000'000;  // of a revolution; a packet stream without azimuth zero ends here
+constexpr int kLargestStep = 600;  // of the azimuth from packet to packet
 
 std::uint16_t word(std::span<const std::uint8_t> packet, std::size_t at) {
   return static_cast<std::uint16_t>(packet[at] | (packet[at + 1] << 8U));
@@ -104,17 +105,17 @@ VelodyneDecoder::VelodyneDecoder(VelodyneCalibration calibration, double max_ran
 }
 
 std::optional<model::PointSweep> VelodyneDecoder::take_revolution() {
-  model::PointSweep turn = std::exchange(turn_, {});
+  model::PointSweep sweep = std::exchange(sweep_, {});
   const bool whole = std::exchange(revolution_started_, true);
-  if (turn.points.empty()) return std::nullopt;
-  turn.rings = static_cast<std::uint16_t>(calibration_.beams.size());
-  turn.max_range_m = max_range_m_;
-  turn.turn = turns_;
-  turn.sequence = turns_++;
-  // What came before the first passage of azimuth zero is a part of a turn.
+  if (sweep.points.empty()) return std::nullopt;
+  sweep.rings = static_cast<std::uint16_t>(calibration_.beams.size());
+  sweep.max_range_m = max_range_m_;
+  sweep.turn = revolutions_;
+  sweep.sequence = revolutions_++;
+  // What came before the first passage of azimuth zero is part of a revolution.
   if (!whole) return std::nullopt;
   ++counts_.turns;
-  return turn;
+  return sweep;
 }
 
 std::optional<model::PointSweep> VelodyneDecoder::finish() {
@@ -139,25 +140,27 @@ std::optional<model::PointSweep> VelodyneDecoder::add(std::span<const std::uint8
 
   if (last_azimuth_ >= 0 && azimuth_between(last_azimuth_, block.azimuth[0]) > kLargestStep)
     ++counts_.lost_azimuth;
-  // The turn ends at the first block behind azimuth zero; the rest of the packet is of the next.
-  std::optional<model::PointSweep> turn;
+  // The revolution ends at the first block behind azimuth zero; the rest of the packet is of the
+  // next.
+  std::optional<model::PointSweep> sweep;
   if ((last_azimuth_ > block.azimuth[0] && last_azimuth_ - block.azimuth[0] > kTurn / 2) ||
-      turn_.points.size() > kMostPoints)
-    turn = take_revolution();
+      sweep_.points.size() > kMostPoints)
+    sweep = take_revolution();
   add_block(packet, block);
   if (!pending_.points.empty()) {
-    if (!turn) turn = take_revolution();
-    turn_ = std::exchange(pending_, {});
+    if (!sweep) sweep = take_revolution();
+    sweep_ = std::exchange(pending_, {});
   }
   last_azimuth_ = block.azimuth[kBlocks - 1];
-  return turn;
+  return sweep;
 }
 
 void VelodyneDecoder::add_block(std::span<const std::uint8_t> packet, const Block& block) {
   const Layout layout = layout_of(calibration_.model);
   const std::size_t returns = block.is_dual ? 2 : 1;
   const std::size_t stride = layout.blocks_per_firing * returns;  // blocks from firing to firing
-  model::PointSweep* turn = &turn_;
+  model::PointSweep* sweep = &sweep_;
+
   for (std::size_t b = 0; b + stride <= kBlocks; b += stride) {
     const std::size_t firing = b / stride * layout.firings_per_block;
     const double block_us = static_cast<double>(firing) * layout.firing_us;
@@ -166,7 +169,8 @@ void VelodyneDecoder::add_block(std::span<const std::uint8_t> packet, const Bloc
       const int step = azimuth_between(block.azimuth[b], block.azimuth[b + stride]);
       if (step < kLargestStep) azimuth_rate_ = step / span_us;
     }
-    if (b > 0 && block.azimuth[b - stride] - block.azimuth[b] > kTurn / 2) turn = &pending_;
+
+    if (b > 0 && block.azimuth[b - stride] - block.azimuth[b] > kTurn / 2) sweep = &pending_;
     for (std::size_t f = 0; f < layout.firings_per_block; ++f) {
       const double firing_us = static_cast<double>(f) * layout.firing_us;
       for (const std::size_t beam : order_) {
@@ -176,47 +180,52 @@ void VelodyneDecoder::add_block(std::span<const std::uint8_t> packet, const Bloc
         const std::size_t channel =
             layout.firings_per_block * layout.beams > 32 ? beam % 32 : f * layout.beams + beam;
         std::uint16_t first = 0;
+
         for (std::size_t r = 0; r < returns; ++r) {
           const std::size_t at =
               (b + r * layout.blocks_per_firing + beam / 32) * kBlockBytes + 4 + 3 * channel;
           const std::uint16_t distance = word(packet, at);
           if (distance == 0 || (r == 1 && distance == first)) continue;
           first = distance;
-          add_point(*turn, {beam, azimuth, distance, packet[at + 2],
-                            block.packet_us + block_us + shot_us});
+          add_point(*sweep, {beam, azimuth, distance, packet[at + 2],
+                             block.packet_us + block_us + shot_us});
         }
       }
     }
   }
 }
 
-void VelodyneDecoder::add_point(model::PointSweep& turn, const Reading& reading) {
+void VelodyneDecoder::add_point(model::PointSweep& sweep, const Reading& reading) {
   const VelodyneBeam& beam = calibration_.beams[reading.beam];
   const double range = reading.distance * calibration_.distance_step_m + beam.distance_correction_m;
   if (range <= 0.0 || range >= max_range_m_) return;
+
   const double hundredths =
       reading.azimuth + beam.azimuth_rad * static_cast<double>(kTurn) / (2.0 * std::numbers::pi);
   const auto index = static_cast<std::size_t>(
       (static_cast<long>(std::lround(hundredths)) % kTurn + kTurn) % kTurn);
   const double flat =
       range * std::cos(beam.elevation_rad) - beam.vertical_offset_m * std::sin(beam.elevation_rad);
-  if (turn.points.empty()) {
-    turn.utime = static_cast<model::Utime>(std::floor(reading.utime));
-    turn.points.reserve(calibration_.beams.size() * 2000);
+
+  if (sweep.points.empty()) {
+    sweep.utime = static_cast<model::Utime>(std::floor(reading.utime));
+    sweep.points.reserve(calibration_.beams.size() * 2000);
   }
+
   model::SweepPoint point;
   const auto forward = static_cast<float>(flat);
   const auto side = static_cast<float>(beam.horizontal_offset_m);
+
   // Clockwise from the x axis; a positive horizontal offset is to the left.
   point.x_m = forward * cosine_[index] + side * sine_[index];
   point.y_m = -forward * sine_[index] + side * cosine_[index];
   point.z_m = static_cast<float>(range * std::sin(beam.elevation_rad) +
                                  beam.vertical_offset_m * std::cos(beam.elevation_rad));
   point.time_s =
-      static_cast<float>(std::max(0.0, (reading.utime - static_cast<double>(turn.utime)) * 1e-6));
+      static_cast<float>(std::max(0.0, (reading.utime - static_cast<double>(sweep.utime)) * 1e-6));
   point.ring = calibration_.rings[reading.beam];
   point.intensity = reading.intensity;
-  turn.points.push_back(point);
+  sweep.points.push_back(point);
 }
 
 }  // namespace understory::io

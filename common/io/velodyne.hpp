@@ -20,9 +20,11 @@
 
 namespace understory::io {
 
+/// The models that are decoded.
 enum class VelodyneModel : std::uint8_t { kVlp16, kVlp32c, kHdl32e, kHdl64e };
-/// "vlp16", "vlp32c", "hdl32e", "hdl64e".
+/// By name: "vlp16", "vlp32c", "hdl32e", "hdl64e"; none for another.
 std::optional<VelodyneModel> velodyne_model(std::string_view name);
+/// The name that velodyne_model() takes.
 std::string_view to_string(VelodyneModel model);
 
 constexpr std::size_t kVelodyneDataBytes = 1206;
@@ -39,6 +41,7 @@ struct VelodyneBeam {
   double horizontal_offset_m = 0.0;
 };
 
+/// The geometry of one sensor: where each beam points.
 struct VelodyneCalibration {
   VelodyneModel model = VelodyneModel::kVlp16;
   std::vector<VelodyneBeam> beams;   ///< In order of the laser's own numbers.
@@ -53,6 +56,7 @@ VelodyneCalibration velodyne_calibration(VelodyneModel model);
 /// (`lasers:` with rot_correction and so on). Throws DataError.
 VelodyneCalibration parse_hdl64_calibration(std::string_view text, std::string_view source);
 
+/// Why bytes are no data packet of the model.
 enum class VelodynePacketFault : std::uint8_t {
   kWrongSize,
   kOtherModel,  ///< Another model's product code or flags.
@@ -65,24 +69,28 @@ std::optional<VelodynePacketFault> check_velodyne_packet(std::span<const std::ui
 /// right.
 std::uint32_t velodyne_packet_time_us(std::span<const std::uint8_t> packet);
 
+/// What a decoder saw so far.
 struct VelodyneCounts {
   std::uint64_t packets = 0;
-  std::uint64_t refused = 0;  ///< Wrong size, flag, azimuth or product.
-  std::uint64_t turns = 0;
+  std::uint64_t refused = 0;       ///< Wrong size, flag, azimuth or product.
+  std::uint64_t turns = 0;         ///< Whole revolutions.
   std::uint64_t lost_azimuth = 0;  ///< Gaps in the azimuth: packets are missing.
 };
 
-/// Data packets in, whole turns out, in frame sensor (x forward = azimuth 0, y left, z up).
+/// Data packets in, whole revolutions out, in frame sensor (x forward = azimuth 0, y left, z up).
 /// Dual returns give both points, unless they are the same.
 class VelodyneDecoder {
  public:
+  /// Points at `max_range_m` and beyond are left out; 0 = the model's own range (VLP-32C: 200 m,
+  /// others 120 m).
   explicit VelodyneDecoder(VelodyneCalibration calibration, double max_range_m = 0.0);
 
   /// `received`: when the packet came [us]; the packet's own time is laid onto it (the hour that is
-  /// nearest). The turn that this packet completes, if any.
+  /// nearest). The revolution that this packet completes, if any.
   std::optional<model::PointSweep> add(std::span<const std::uint8_t> packet, model::Utime received);
-  /// The turn under way, where it lacks no more than the last packet.
+  /// The revolution under way, where it lacks no more than the last packet.
   std::optional<model::PointSweep> finish();
+  /// What was seen so far.
   const VelodyneCounts& counts() const { return counts_; }
 
  private:
@@ -96,7 +104,7 @@ class VelodyneDecoder {
   };
   std::optional<model::PointSweep> take_revolution();
   void add_block(std::span<const std::uint8_t> packet, const Block& block);
-  void add_point(model::PointSweep& turn, const Reading& reading);
+  void add_point(model::PointSweep& sweep, const Reading& reading);
 
   VelodyneCalibration calibration_;
   double max_range_m_;
@@ -104,12 +112,12 @@ class VelodyneDecoder {
   std::array<float, 36000> sine_{};
   std::array<float, 36000> cosine_{};
   std::vector<std::size_t> order_;  ///< Beams in order of their rings.
-  model::PointSweep turn_;
-  model::PointSweep pending_;  ///< The begin of the next turn, in the packet that ends this one.
-  bool revolution_started_ = false;  ///< The turn under way began at azimuth 0.
+  model::PointSweep sweep_;         ///< The revolution under way.
+  model::PointSweep pending_;  ///< The begin of the next one, in the packet that ends this one.
+  bool revolution_started_ = false;  ///< The one under way began at azimuth 0.
   int last_azimuth_ = -1;
   double azimuth_rate_ = 0.2;  ///< Hundredths of a degree per microsecond.
-  std::uint64_t turns_ = 0;
+  std::uint64_t revolutions_ = 0;
 };
 
 /// The NMEA sentence of a position packet: where and when, by GNSS.
@@ -122,8 +130,9 @@ struct VelodynePosition {
   double course_rad = 0.0;  ///< From north, clockwise.
   std::int64_t day_us = 0;  ///< Time of day, UTC [us].
 };
+/// The position packet's sentence; none where the size is wrong or there is no valid $GPRMC.
 std::optional<VelodynePosition> parse_velodyne_position(std::span<const std::uint8_t> packet);
-/// $GPRMC with a right checksum.
+/// A $GPRMC sentence; none where the checksum is wrong or a field is missing. past_hour_us stays 0.
 std::optional<VelodynePosition> parse_gprmc(std::string_view sentence);
 
 }  // namespace understory::io

@@ -87,6 +87,7 @@ VelodyneBeam parse_beam(std::string_view record, const Names& names, const std::
     if (!value && required) throw DataError(fmt::format("{}: no number for {}", where, key));
     return value.value_or(0.0) * unit;
   };
+
   VelodyneBeam beam;
   beam.elevation_rad = read(names.elevation, names.to_rad, true);
   beam.azimuth_rad = -read(names.azimuth, names.to_rad, true);
@@ -95,6 +96,7 @@ VelodyneBeam parse_beam(std::string_view record, const Names& names, const std::
   beam.horizontal_offset_m = read(names.horizontal, names.to_m, false);
   if (std::abs(beam.elevation_rad) > 1.0 || std::abs(beam.distance_correction_m) > 10.0)
     throw DataError(fmt::format("{}: angles or distances that no laser has", where));
+
   return beam;
 }
 
@@ -134,15 +136,18 @@ VelodyneCalibration velodyne_calibration(VelodyneModel model) {
         beam.vertical_offset_m = kVlp16Offsets_mm[i] * 1e-3;
         calibration.beams.push_back(beam);
       }
+
       break;
     case VelodyneModel::kVlp32c:
       calibration.distance_step_m = 0.004;
+
       for (const Angles& angles : kVlp32c) {
         VelodyneBeam beam;
         beam.elevation_rad = angles.elevation_deg * kDegree;
         beam.azimuth_rad = angles.azimuth_deg * kDegree;
         calibration.beams.push_back(beam);
       }
+
       break;
     case VelodyneModel::kHdl32e:
       for (std::size_t i = 0; i < 32; ++i) {
@@ -151,10 +156,12 @@ VelodyneCalibration velodyne_calibration(VelodyneModel model) {
         beam.elevation_rad = (-92.0 / 3.0 + 4.0 / 3.0 * step) * kDegree;
         calibration.beams.push_back(beam);
       }
+
       break;
     case VelodyneModel::kHdl64e:
       throw DataError("hdl64e: each one has a calibration file of its own, which must be given");
   }
+
   calibration.rings = rings_of(calibration.beams);
   return calibration;
 }
@@ -165,6 +172,7 @@ VelodyneCalibration parse_hdl64_calibration(std::string_view text, std::string_v
   calibration.model = VelodyneModel::kHdl64e;
   calibration.beams.resize(64);
   std::vector<bool> seen(64, false);
+
   // A record starts at its id in the XML; in the YAML at a "- {" or "-" before its first key.
   const std::string_view start = names.id == kXml.id ? kXml.id : std::string_view("- ");
   std::size_t at = text.find(start);
@@ -174,17 +182,21 @@ VelodyneCalibration parse_hdl64_calibration(std::string_view text, std::string_v
         text.substr(at, next == std::string_view::npos ? next : next - at);
     std::size_t in_record = 0;
     const auto id = number_after(record, names.id, in_record, record.size());
+
     if (id && *id >= 0.0 && *id < 64.0 && *id == std::floor(*id)) {
       const auto index = static_cast<std::size_t>(*id);
       calibration.beams[index] =
           parse_beam(record, names, fmt::format("{}: laser {}", source, index));
       seen[index] = true;
     }
+
     at = next;
   }
+
   const auto missing = std::ranges::count(seen, false);
   if (missing > 0)
     throw DataError(fmt::format("{}: {} of 64 lasers are not described", source, missing));
+
   calibration.rings = rings_of(calibration.beams);
   return calibration;
 }

@@ -16,8 +16,9 @@ class VelodyneFixes {
   /// From where metres east and north count; none = the first fix.
   explicit VelodyneFixes(std::optional<LocalPlane> plane = {}) : plane_(plane) {}
 
-  /// `received`: when the packet came [us]; the fix's stamp. None where the sentence says that it
-  /// is not valid, or was had: the receiver gives one a second, the sensor repeats it.
+  /// `received`: when the packet came [us]; the fix's stamp. None where the sentence is
+  /// marked as not valid or repeats the last one: the receiver gives one a second, the sensor
+  /// repeats it.
   std::optional<model::GnssFix> add(const VelodynePosition& position, model::Utime received);
 
  private:

@@ -50,18 +50,21 @@ std::optional<VelodynePosition> parse_gprmc(std::string_view sentence) {
   std::array<std::string_view, 13> fields{};
   std::string_view rest = sentence.substr(0, sentence.find('*'));
   std::size_t count = 0;
+
   while (count < fields.size()) {
     const std::size_t comma = rest.find(',');
     fields[count++] = rest.substr(0, comma);
     if (comma == std::string_view::npos) break;
     rest.remove_prefix(comma + 1);
   }
+
   if (count < 10 || fields[0].size() != 6 || fields[0].substr(3) != "RMC") return std::nullopt;
   VelodynePosition position;
   const auto clock = number(fields[1]);
   const auto latitude = angle(fields[3], fields[4], 'S');
   const auto longitude = angle(fields[5], fields[6], 'W');
   if (!clock || *clock < 0.0 || *clock >= 240000.0) return std::nullopt;
+
   const double hours = std::floor(*clock / 10000.0);
   const double minutes = std::floor((*clock - 10000.0 * hours) / 100.0);
   const double seconds = *clock - 10000.0 * hours - 100.0 * minutes;
@@ -69,8 +72,10 @@ std::optional<VelodynePosition> parse_gprmc(std::string_view sentence) {
   position.is_valid = fields[2] == "A" && latitude && longitude && std::abs(*latitude) <= 90.0;
   position.latitude_deg = latitude.value_or(0.0);
   position.longitude_deg = longitude.value_or(0.0);
+
   position.speed_mps = number(fields[7]).value_or(0.0) * kKnot_mps;
   position.course_rad = number(fields[8]).value_or(0.0) * std::numbers::pi / 180.0;
+
   return position;
 }
 

@@ -24,16 +24,19 @@ class Stamps {
   std::optional<model::Utime> next(NumberReader& reader) {
     const auto seconds = reader.next();
     if (!seconds) return std::nullopt;
+
     if (*seconds < 0.0 || *seconds > kMaxTime_s) {
       throw DataError(
           fmt::format("{}: {} s is no time of this recording", reader.where(), *seconds));
     }
+
     const auto utime = static_cast<model::Utime>(std::llround(*seconds * 1e6));
     if (utime <= last_) {
       throw DataError(fmt::format(
           "{}: time {} s does not come after {} s (a token too many or too few before?)",
           reader.where(), *seconds, static_cast<double>(last_) * 1e-6));
     }
+
     last_ = utime;
     return utime;
   }
@@ -62,6 +65,7 @@ std::vector<model::PlanarScan> parse_laser(std::string_view text, std::string_vi
   std::vector<model::PlanarScan> scans;
   NumberReader reader(text, std::string(source));
   Stamps stamps;
+
   while (const auto utime = stamps.next(reader)) {
     model::PlanarScan scan;
     scan.utime = *utime;
@@ -75,6 +79,7 @@ std::vector<model::PlanarScan> parse_laser(std::string_view text, std::string_vi
     }
     scans.push_back(std::move(scan));
   }
+
   require_some(scans, source);
   return scans;
 }

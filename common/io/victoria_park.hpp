@@ -17,6 +17,7 @@
 
 namespace understory::io {
 
+/// The whole recording, each sensor in order of time.
 struct VictoriaPark {
   std::vector<model::PlanarScan> scans;  ///< 7230, every 0.214 s; frame `sensor` (the laser).
   std::vector<model::WheelSample>
@@ -27,7 +28,7 @@ struct VictoriaPark {
 namespace victoria_park {
 
 constexpr std::size_t kBeams = 361;      ///< 0.5 degrees apart, from the right to the left.
-constexpr double kMaxRange_m = 80.0;     ///< Readings beyond mean that nothing came back.
+constexpr double kMaxRange_m = 80.0;     ///< A greater reading stands for "no return".
 constexpr double kWheelbase_m = 2.83;    ///< [L]
 constexpr double kEncoderLeft_m = 0.76;  ///< [H] Of the encoder's wheel, left of the middle.
 constexpr double kLaserAhead_m = 3.78;   ///< [L + a] Of the rear axle.
@@ -40,9 +41,11 @@ inline geometry::SE2 axle_T_vehicle() {
   return {victoria_park::kLaserAhead_m, victoria_park::kLaserLeft_m, 0.0};
 }
 
-/// Each parser takes the text of its file; `source` names it in errors. Throws DataError.
+/// Scans from the text of LASER.txt; `source` names it in errors. Throws DataError.
 std::vector<model::PlanarScan> parse_laser(std::string_view text, std::string_view source);
+/// Speeds and steering angles from the text of DRS.txt. Throws DataError.
 std::vector<model::WheelSample> parse_wheels(std::string_view text, std::string_view source);
+/// Fixes from the text of GPS.txt. Throws DataError.
 std::vector<model::GnssFix> parse_gnss(std::string_view text, std::string_view source);
 
 }  // namespace victoria_park

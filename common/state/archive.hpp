@@ -41,11 +41,14 @@ struct Format {
   std::uint32_t version = 1;
 };
 
+/// What is stored as its bytes.
 template <class T>
 concept Number = std::is_arithmetic_v<T> || std::is_enum_v<T>;
+/// An Eigen matrix whose size its type gives.
 template <class T>
 concept FixedMatrix =
     std::derived_from<T, Eigen::PlainObjectBase<T>> && T::SizeAtCompileTime != Eigen::Dynamic;
+/// An Eigen matrix that is stored behind its numbers of rows and columns.
 template <class T>
 concept DynamicMatrix =
     std::derived_from<T, Eigen::PlainObjectBase<T>> && T::SizeAtCompileTime == Eigen::Dynamic;
@@ -84,11 +87,14 @@ class Writer {
  public:
   static constexpr bool kReads = false;
 
+  /// Appends the values, one behind the other.
   template <class... Values>
   void operator()(const Values&... values) {
     (put(values), ...);
   }
+  /// What was written so far.
   const std::string& bytes() const { return bytes_; }
+  /// What was written, moved out.
   std::string take() { return std::move(bytes_); }
 
  private:
@@ -144,11 +150,14 @@ class Reader {
  public:
   static constexpr bool kReads = true;
 
+  /// `bytes` must outlive the reader.
   explicit Reader(std::string_view bytes) : bytes_(bytes) {}
+  /// Fills the values in the order in which they were written.
   template <class... Values>
   void operator()(Values&... values) {
     (get(values), ...);
   }
+  /// True when nothing is left to read.
   bool is_at_end() const { return bytes_.empty(); }
 
  private:

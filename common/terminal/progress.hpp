@@ -20,9 +20,9 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// So much of `total` is done.
+  /// Sets the amount done; draws ten times a second at most.
   void update(double done);
-  /// So much more is done.
+  /// Adds to the amount done.
   void advance(double steps = 1.0) { update(done_ + steps); }
 
  private:

@@ -53,12 +53,14 @@ std::optional<Refusal> covariance_refusal(const Eigen::Matrix<double, N, N>& mat
       }
     }
   }
+
   const Eigen::Matrix<double, N, N> symmetric = 0.5 * (matrix + matrix.transpose());
   if constexpr (N == 5) {
     if (is_positive_semidefinite_5(symmetric)) return std::nullopt;
   } else {
     if (is_positive_semidefinite(symmetric)) return std::nullopt;
   }
+
   return Refusal{Reason::kNotPositive, "is not positive semidefinite"};
 }
 

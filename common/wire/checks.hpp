@@ -25,10 +25,14 @@ class Checks {
     array_ = array;
     index_ = index;
   }
+  /// The following fields are of the message itself.
   void in_message() { array_ = {}; }
 
+  /// Refuses a value outside lowest .. highest (both included) as kOutOfRange; NaN fails.
   void range(std::string_view field, double value, double lowest, double highest);
+  /// Refuses as kInconsistent where a relation between fields does not hold; `what` names it.
   void consistent(bool holds, std::string_view what);
+  /// Refuses a position beyond 10,000 km or a heading outside -pi .. pi.
   void pose(std::string_view field, const pose2_t& pose);
   /// Symmetric within rounding and positive semidefinite; gives the exactly symmetric one.
   template <int N>
@@ -39,6 +43,7 @@ class Checks {
     return 0.5 * (matrix + matrix.transpose());
   }
 
+  /// The first failure; none if all checks passed.
   const std::optional<Refusal>& refusal() const { return refusal_; }
 
  private:
@@ -52,9 +57,10 @@ class Checks {
   std::optional<Refusal> refusal_;
 };
 
-/// Whether a covariance (2 x 2 padded to 3 x 3, 3 x 3, or 5 x 5) is positive semidefinite within
+/// Whether a covariance (3 x 3, or 2 x 2 padded with zeros) is positive semidefinite within
 /// rounding, whatever the scales of its coordinates.
 bool is_positive_semidefinite(const Eigen::Matrix3d& symmetric);
+/// The same for 5 x 5.
 bool is_positive_semidefinite_5(const Eigen::Matrix<double, 5, 5>& symmetric);
 
 }  // namespace understory::wire

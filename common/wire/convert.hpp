@@ -4,6 +4,9 @@
 // symmetric and positive semidefinite, fields that agree. `to_wire` cannot fail.
 #pragma once
 
+#include <type_traits>
+#include <utility>
+
 #include "common/model/ekf_output.hpp"
 #include "common/model/gnss.hpp"
 #include "common/model/imu.hpp"
@@ -40,128 +43,99 @@
 
 namespace understory::wire {
 
+/// A scan of detected landmarks, frame `vehicle_level`.
 Result<model::LandmarkScan> from_wire(const landmarks_t& wire);
+/// An odometry increment of logs written before odometry2_t: without the level's error.
 Result<model::Odometry> from_wire(const odometry_t& wire);
+/// An odometry increment between two stamps.
 Result<model::Odometry> from_wire(const odometry2_t& wire);
+/// A keyframe with its members and landmarks.
 Result<model::Keyframe> from_wire(const keyframe_t& wire);
+/// What a mapper did with one keyframe.
 Result<model::MapUpdate> from_wire(const slam_update_t& wire);
+/// A mapper's pose at one scan.
 Result<model::SlamPose> from_wire(const slam_pose_t& wire);
+/// A whole map.
 Result<model::WholeMap> from_wire(const map_t& wire);
+/// A change of a map.
 Result<model::MapDelta> from_wire(const map_delta_t& wire);
-/// Where the laser sits and the intensities stay behind.
+/// A scan of one plane; where the laser sits and the intensities are left out.
 Result<model::PlanarScan> from_wire(const lidar_scan_t& wire);
+/// A reading of wheel encoder and steering sensor.
 Result<model::WheelSample> from_wire(const wheels_t& wire);
+/// A reading of the inertial unit.
 Result<model::ImuSample> from_wire(const imu_t& wire);
+/// A part of a sweep, coordinates in metres.
 Result<model::PointSweep> from_wire(const lidar_sweep_t& wire);
+/// A scan of landmarks with track ids.
 Result<model::TrackedScan> from_wire(const tracked_landmarks_t& wire);
+/// A dead-reckoned pose.
 Result<model::RawPose> from_wire(const raw_pose_t& wire);
+/// The filter's pose.
 Result<model::EkfPose> from_wire(const ekf_pose_t& wire);
+/// The filter's map.
 Result<model::EkfMap> from_wire(const ekf_map_t& wire);
+/// The filter's estimate of the level.
 Result<model::EkfLevel> from_wire(const ekf_level_t& wire);
+/// The filter's correction of velocity and biases.
 Result<model::VelocityCorrection> from_wire(const velocity_correction_t& wire);
-/// Refused where the receiver has no fix.
+/// A satellite fix; refused where the receiver has none.
 Result<model::GnssFix> from_wire(const gnss_t& wire);
 
+/// A scan of detected landmarks.
 landmarks_t to_wire(const model::LandmarkScan& scan);
+/// An odometry increment.
 odometry2_t to_wire(const model::Odometry& odometry);
+/// A keyframe.
 keyframe_t to_wire(const model::Keyframe& keyframe);
-slam_update_t to_wire(const model::MapUpdate& update);  ///< `seq` is the keyframe's.
+/// What a mapper did with one keyframe; `seq` is the keyframe's.
+slam_update_t to_wire(const model::MapUpdate& update);
+/// A mapper's pose.
 slam_pose_t to_wire(const model::SlamPose& pose);
+/// A whole map.
 map_t to_wire(const model::WholeMap& map);
+/// A change of a map.
 map_delta_t to_wire(const model::MapDelta& delta);
+/// A scan of one plane.
 lidar_scan_t to_wire(const model::PlanarScan& scan);
+/// A reading of wheel encoder and steering sensor.
 wheels_t to_wire(const model::WheelSample& sample);
+/// A satellite fix.
 gnss_t to_wire(const model::GnssFix& fix);
+/// A reading of the inertial unit.
 imu_t to_wire(const model::ImuSample& sample);
-/// Rounded to {1, 2, 4 ...} mm and us, as fine as 16 bits allow. Throws std::invalid_argument
-/// where a coordinate is not finite.
+/// A part of a sweep, rounded to {1, 2, 4 ...} mm and us, as fine as 16 bits allow. Throws
+/// std::invalid_argument where a coordinate is not finite.
 lidar_sweep_t to_wire(const model::PointSweep& sweep);
+/// A scan of landmarks with track ids.
 tracked_landmarks_t to_wire(const model::TrackedScan& scan);
+/// A dead-reckoned pose.
 raw_pose_t to_wire(const model::RawPose& pose);
+/// The filter's pose.
 ekf_pose_t to_wire(const model::EkfPose& pose);
+/// The filter's map.
 ekf_map_t to_wire(const model::EkfMap& map);
+/// The filter's estimate of the level.
 ekf_level_t to_wire(const model::EkfLevel& level);
+/// The filter's correction of velocity and biases.
 velocity_correction_t to_wire(const model::VelocityCorrection& correction);
 
+/// A pose [m, rad].
 pose2_t to_wire(const geometry::SE2& pose);
+/// A pose [m, rad], unchecked: Checks::pose() looks at it before.
 geometry::SE2 from_wire(const pose2_t& pose);
 
-/// The wire type of a value that stages exchange; a wire type is its own.
+/// The wire type of a value that stages exchange is what to_wire() makes of it; a wire type is its
+/// own.
 template <class T>
 struct WireOf {
-  using type = T;
+  using type = T;  ///< The wire type.
 };
-template <>
-struct WireOf<model::LandmarkScan> {
-  using type = landmarks_t;
-};
-template <>
-struct WireOf<model::Odometry> {
-  using type = odometry2_t;
-};
-template <>
-struct WireOf<model::Keyframe> {
-  using type = keyframe_t;
-};
-template <>
-struct WireOf<model::MapUpdate> {
-  using type = slam_update_t;
-};
-template <>
-struct WireOf<model::SlamPose> {
-  using type = slam_pose_t;
-};
-template <>
-struct WireOf<model::WholeMap> {
-  using type = map_t;
-};
-template <>
-struct WireOf<model::MapDelta> {
-  using type = map_delta_t;
-};
-template <>
-struct WireOf<model::PlanarScan> {
-  using type = lidar_scan_t;
-};
-template <>
-struct WireOf<model::WheelSample> {
-  using type = wheels_t;
-};
-template <>
-struct WireOf<model::GnssFix> {
-  using type = gnss_t;
-};
-template <>
-struct WireOf<model::ImuSample> {
-  using type = imu_t;
-};
-template <>
-struct WireOf<model::PointSweep> {
-  using type = lidar_sweep_t;
-};
-template <>
-struct WireOf<model::TrackedScan> {
-  using type = tracked_landmarks_t;
-};
-template <>
-struct WireOf<model::RawPose> {
-  using type = raw_pose_t;
-};
-template <>
-struct WireOf<model::EkfPose> {
-  using type = ekf_pose_t;
-};
-template <>
-struct WireOf<model::EkfMap> {
-  using type = ekf_map_t;
-};
-template <>
-struct WireOf<model::EkfLevel> {
-  using type = ekf_level_t;
-};
-template <>
-struct WireOf<model::VelocityCorrection> {
-  using type = velocity_correction_t;
+/// For the values of common/model.
+template <class T>
+requires requires(const T& value) { to_wire(value); }
+struct WireOf<T> {
+  using type = decltype(to_wire(std::declval<const T&>()));  ///< The wire type.
 };
 
 /// Bytes to a value (or a wire type), with every check there is.
@@ -177,7 +151,7 @@ Result<T> decode_message(std::span<const std::uint8_t> bytes) {
   }
 }
 
-/// Logs may have the version of before, which says nothing of the level's error.
+/// Odometry: older logs have odometry_t, which lacks the level's error.
 template <>
 inline Result<model::Odometry> decode_message<model::Odometry>(
     std::span<const std::uint8_t> bytes) {

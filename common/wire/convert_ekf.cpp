@@ -49,6 +49,7 @@ Result<model::EkfPose> from_wire(const ekf_pose_t& wire) {
   checks.range("landmarks_refused", wire.landmarks_refused, 0,
                std::numeric_limits<std::int32_t>::max());
   checks.range("reset_counter", static_cast<double>(wire.reset_counter), 0.0, 9.3e18);
+
   model::EkfPose pose;
   pose.utime = wire.utime;
   pose.sequence = static_cast<std::uint64_t>(wire.seq);
@@ -56,12 +57,14 @@ Result<model::EkfPose> from_wire(const ekf_pose_t& wire) {
   pose.covariance = checks.covariance("covariance", wire.covariance);
   pose.velocity_mps = Eigen::Map<const Eigen::Vector2d>(wire.velocity_m_s);
   pose.velocity_covariance = checks.covariance("velocity_covariance", wire.velocity_covariance);
+
   pose.bias = Eigen::Map<const Eigen::Vector3d>(wire.bias);
   pose.bias_covariance = checks.covariance("bias_covariance", wire.bias_covariance);
   pose.landmarks_used = static_cast<std::uint32_t>(wire.landmarks_used);
   pose.landmarks_refused = static_cast<std::uint32_t>(wire.landmarks_refused);
   pose.reset_counter = static_cast<std::uint64_t>(wire.reset_counter);
   if (checks.refusal()) return *checks.refusal();
+
   return pose;
 }
 
@@ -73,11 +76,13 @@ ekf_pose_t to_wire(const model::EkfPose& pose) {
   copy_matrix(pose.covariance, wire.covariance);
   copy_vector(pose.velocity_mps, wire.velocity_m_s);
   copy_matrix(pose.velocity_covariance, wire.velocity_covariance);
+
   copy_vector(pose.bias, wire.bias);
   copy_matrix(pose.bias_covariance, wire.bias_covariance);
   wire.landmarks_used = static_cast<std::int32_t>(pose.landmarks_used);
   wire.landmarks_refused = static_cast<std::int32_t>(pose.landmarks_refused);
   wire.reset_counter = static_cast<std::int64_t>(pose.reset_counter);
+
   return wire;
 }
 
@@ -87,6 +92,7 @@ Result<model::EkfMap> from_wire(const ekf_map_t& wire) {
   map.utime = wire.utime;
   map.sequence = static_cast<std::uint64_t>(wire.seq);
   map.landmarks.reserve(wire.landmarks.size());
+
   for (std::size_t i = 0; i < wire.landmarks.size(); ++i) {
     const ekf_landmark_t& from = wire.landmarks[i];
     checks.in("landmarks", i);
@@ -95,12 +101,14 @@ Result<model::EkfMap> from_wire(const ekf_map_t& wire) {
     checks.range("times_seen", from.times_seen, 0, std::numeric_limits<std::int32_t>::max());
     model::EkfLandmark& landmark = map.landmarks.emplace_back();
     landmark.track_id = static_cast<model::TrackId>(from.track_id);
+
     landmark.position_m = Eigen::Map<const Eigen::Vector2d>(from.position_m);
     landmark.covariance_m2 = checks.covariance("covariance_m2", from.covariance_m2);
     landmark.radius_m = from.radius_m;
     landmark.kind = static_cast<model::LandmarkKind>(from.kind);
     landmark.observation_count = static_cast<std::uint32_t>(from.times_seen);
   }
+
   if (checks.refusal()) return *checks.refusal();
   return map;
 }
@@ -111,6 +119,7 @@ ekf_map_t to_wire(const model::EkfMap& map) {
   wire.seq = static_cast<std::int64_t>(map.sequence);
   wire.num_landmarks = static_cast<std::int32_t>(map.landmarks.size());
   wire.landmarks.reserve(map.landmarks.size());
+
   for (const model::EkfLandmark& landmark : map.landmarks) {
     ekf_landmark_t& out = wire.landmarks.emplace_back();
     out.track_id = static_cast<std::int64_t>(landmark.track_id);
@@ -120,6 +129,7 @@ ekf_map_t to_wire(const model::EkfMap& map) {
     out.kind = static_cast<std::int8_t>(landmark.kind);
     out.times_seen = static_cast<std::int32_t>(landmark.observation_count);
   }
+
   return wire;
 }
 

@@ -49,20 +49,24 @@ Result<model::Keyframe> from_wire(const keyframe_t& wire) {
   keyframe.utime = wire.utime;
   keyframe.sequence = static_cast<std::uint64_t>(wire.seq);
   keyframe.field_of_view = field_of_view(wire, checks);
+
   if (wire.has_previous != 0) {
     checks.pose("previous_T_base", wire.previous_T_base);
     keyframe.previous_T_base = from_wire(wire.previous_T_base);
   }
+
   keyframe.members.reserve(wire.members.size());
   for (std::size_t i = 0; i < wire.members.size(); ++i) {
     checks.in("members", i);
     keyframe.members.push_back(member(wire.members[i], checks));
   }
+
   keyframe.landmarks.reserve(wire.landmarks.size());
   for (std::size_t i = 0; i < wire.landmarks.size(); ++i) {
     checks.in("landmarks", i);
     keyframe.landmarks.push_back(landmark(wire.landmarks[i], checks));
   }
+
   if (checks.refusal()) return *checks.refusal();
   return keyframe;
 }
@@ -75,6 +79,7 @@ keyframe_t to_wire(const model::Keyframe& keyframe) {
   wire.has_previous = keyframe.previous_T_base.has_value() ? 1 : 0;
   wire.previous_T_base = to_wire(keyframe.previous_T_base.value_or(geometry::SE2()));
   wire.num_members = static_cast<std::int32_t>(keyframe.members.size());
+
   for (const model::KeyframeMember& member : keyframe.members) {
     keyframe_member_t& out = wire.members.emplace_back();
     out.utime = member.utime;
@@ -82,6 +87,7 @@ keyframe_t to_wire(const model::Keyframe& keyframe) {
     out.centre_T_vehicle = to_wire(member.centre_T_vehicle);
     copy_matrix(member.covariance, out.covariance);
   }
+
   wire.num_landmarks = static_cast<std::int32_t>(keyframe.landmarks.size());
   for (const model::KeyframeLandmark& landmark : keyframe.landmarks) {
     keyframe_landmark_t& out = wire.landmarks.emplace_back();
@@ -91,6 +97,7 @@ keyframe_t to_wire(const model::Keyframe& keyframe) {
     out.times_seen = landmark.observation_count;
     out.kind = static_cast<std::int8_t>(landmark.kind);
   }
+
   return wire;
 }
 

@@ -11,17 +11,21 @@ Result<model::SlamPose> from_wire(const slam_pose_t& wire) {
   checks.pose("map_T_odom", wire.map_T_odom);
   checks.pose("reset_delta", wire.reset_delta);
   checks.range("submap_id", static_cast<double>(wire.submap_id), 0.0, 9.3e18);
+
   checks.range("correction_version", static_cast<double>(wire.correction_version), 0.0, 9.3e18);
   checks.range("reset_counter", static_cast<double>(wire.reset_counter), 0.0, 9.3e18);
   model::SlamPose pose;
   pose.utime = wire.utime;
   pose.sequence = static_cast<std::uint64_t>(wire.seq);
+
   if (wire.status != slam_pose_t::TRACKED) {
     pose.status = static_cast<model::MapUpdateStatus>(wire.status);
   }
+
   if (wire.keyframe_seq >= 0) {
     pose.keyframe_sequence = static_cast<std::uint64_t>(wire.keyframe_seq);
   }
+
   pose.submap_id = static_cast<std::uint64_t>(wire.submap_id);
   pose.submap_T_vehicle = from_wire(wire.submap_T_vehicle);
   pose.covariance = checks.covariance("covariance", wire.covariance);
@@ -29,8 +33,10 @@ Result<model::SlamPose> from_wire(const slam_pose_t& wire) {
   pose.map_T_submap = from_wire(wire.map_T_submap);
   pose.map_T_odom = from_wire(wire.map_T_odom);
   pose.reset_counter = static_cast<std::uint64_t>(wire.reset_counter);
+
   pose.reset_delta = from_wire(wire.reset_delta);
   if (checks.refusal()) return *checks.refusal();
+
   return pose;
 }
 
@@ -43,12 +49,14 @@ slam_pose_t to_wire(const model::SlamPose& pose) {
       pose.keyframe_sequence ? static_cast<std::int64_t>(*pose.keyframe_sequence) : -1;
   wire.submap_id = static_cast<std::int64_t>(pose.submap_id);
   wire.submap_T_vehicle = to_wire(pose.submap_T_vehicle);
+
   copy_matrix(pose.covariance, wire.covariance);
   wire.correction_version = static_cast<std::int64_t>(pose.correction_version);
   wire.map_T_submap = to_wire(pose.map_T_submap);
   wire.map_T_odom = to_wire(pose.map_T_odom);
   wire.reset_counter = static_cast<std::int64_t>(pose.reset_counter);
   wire.reset_delta = to_wire(pose.reset_delta);
+
   return wire;
 }
 

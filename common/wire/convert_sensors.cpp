@@ -42,12 +42,14 @@ model::Preintegration preintegration(const preintegration_t& wire, Checks& check
   result.yaw_rad = wire.yaw_rad;
   result.velocity_mps = Eigen::Map<const Eigen::Vector2d>(wire.velocity_m_s);
   result.position_m = Eigen::Map<const Eigen::Vector2d>(wire.position_m);
+
   checks.range("velocity_m_s", result.velocity_mps.cwiseAbs().maxCoeff(), 0.0, 1e6);
   checks.range("position_m", result.position_m.cwiseAbs().maxCoeff(), 0.0, kFarthestPositionM);
   result.covariance = checks.covariance("covariance", wire.covariance);
   result.bias_jacobian =
       Eigen::Map<const Eigen::Matrix<double, 5, 3, Eigen::RowMajor>>(&wire.bias_jacobian[0][0]);
   result.bias = Eigen::Map<const Eigen::Vector3d>(wire.bias);
+
   return result;
 }
 
@@ -98,11 +100,13 @@ model::Odometry odometry(const Wire& wire, Checks& checks) {
   odometry.utime = wire.utime;
   odometry.sequence = static_cast<std::uint64_t>(wire.seq);
   odometry.from_T_to = from_wire(wire.from_T_to);
+
   odometry.covariance = checks.covariance("covariance", wire.covariance);
   odometry.has_wheels = wire.has_wheels != 0;
   odometry.is_stationary = wire.is_standing != 0;
   checks.range("num_inertial", wire.num_inertial, 0, 1);
   if (wire.num_inertial == 1) odometry.inertial = preintegration(wire.inertial[0], checks);
+
   return odometry;
 }
 
@@ -171,11 +175,13 @@ odometry2_t to_wire(const model::Odometry& odometry) {
   wire.from_T_to = to_wire(odometry.from_T_to);
   copy_matrix(odometry.covariance, wire.covariance);
   wire.has_wheels = odometry.has_wheels ? 1 : 0;
+
   wire.is_standing = odometry.is_stationary ? 1 : 0;
   if (odometry.inertial) wire.inertial.push_back(to_wire(*odometry.inertial));
   wire.num_inertial = static_cast<std::int32_t>(wire.inertial.size());
   if (odometry.inertial) wire.level.push_back(to_wire(odometry.inertial->level));
   wire.num_level = wire.num_inertial;
+
   return wire;
 }
 
@@ -188,10 +194,12 @@ Result<model::PlanarScan> from_wire(const lidar_scan_t& wire) {
   checks.range("beam_interval_s", wire.beam_interval_s, 0.0, 10.0);
   checks.consistent(wire.num_intensities == 0 || wire.num_intensities == wire.num_ranges,
                     "num_intensities = num_ranges or 0");
+
   for (std::size_t i = 0; i < wire.ranges_m.size(); ++i) {
     checks.in("ranges_m", i);
     checks.range("value", wire.ranges_m[i], 0.0, kLongestRangeM);
   }
+
   if (checks.refusal()) return *checks.refusal();
   model::PlanarScan scan;
   scan.utime = wire.utime;
@@ -199,6 +207,7 @@ Result<model::PlanarScan> from_wire(const lidar_scan_t& wire) {
   scan.first_bearing_rad = wire.start_angle_rad;
   scan.bearing_step_rad = wire.angle_step_rad;
   scan.max_range_m = wire.max_range_m;
+
   scan.ranges_m = wire.ranges_m;
   return scan;
 }
@@ -271,6 +280,7 @@ Result<model::TrackedScan> from_wire(const tracked_landmarks_t& wire) {
   scan.sequence = static_cast<std::uint64_t>(wire.seq);
   scan.field_of_view = field_of_view(wire, checks);
   scan.landmarks.reserve(wire.landmarks.size());
+
   for (std::size_t i = 0; i < wire.landmarks.size(); ++i) {
     const tracked_landmark_t& from = wire.landmarks[i];
     checks.in("landmarks", i);
@@ -280,6 +290,7 @@ Result<model::TrackedScan> from_wire(const tracked_landmarks_t& wire) {
                               static_cast<std::uint32_t>(from.detection),
                               detection(from.observed, checks)});
   }
+
   if (checks.refusal()) return *checks.refusal();
   return scan;
 }
@@ -291,12 +302,14 @@ tracked_landmarks_t to_wire(const model::TrackedScan& scan) {
   copy_field_of_view(scan.field_of_view, wire);
   wire.num_landmarks = static_cast<std::int32_t>(scan.landmarks.size());
   wire.landmarks.reserve(scan.landmarks.size());
+
   for (const model::TrackedLandmark& landmark : scan.landmarks) {
     tracked_landmark_t& out = wire.landmarks.emplace_back();
     out.track_id = static_cast<std::int64_t>(landmark.track_id);
     out.detection = static_cast<std::int32_t>(landmark.detection);
     out.observed = to_wire(landmark.observed);
   }
+
   return wire;
 }
 
@@ -308,17 +321,21 @@ Result<model::GnssFix> from_wire(const gnss_t& wire) {
   checks.range("sigma_m", wire.sigma_m, 0.0, kFarthestPositionM);
   checks.range("east_velocity_m_s", wire.east_velocity_m_s, -kFastestMps, kFastestMps);
   checks.range("north_velocity_m_s", wire.north_velocity_m_s, -kFastestMps, kFastestMps);
+
   checks.range("velocity_sigma_m_s", wire.velocity_sigma_m_s, 0.0, kFastestMps);
   if (checks.refusal()) return *checks.refusal();
+
   model::GnssFix fix;
   fix.utime = wire.utime;
   fix.sequence = static_cast<std::uint64_t>(wire.seq);
   fix.east_north_m = {wire.east_m, wire.north_m};
   fix.sigma_m = wire.sigma_m;
+
   if (wire.has_velocity != 0) {
     fix.velocity_mps = {wire.east_velocity_m_s, wire.north_velocity_m_s};
     fix.velocity_sigma_mps = wire.velocity_sigma_m_s;
   }
+
   return fix;
 }
 
@@ -330,12 +347,14 @@ gnss_t to_wire(const model::GnssFix& fix) {
   wire.east_m = fix.east_north_m.x();
   wire.north_m = fix.east_north_m.y();
   wire.sigma_m = fix.sigma_m;
+
   if (fix.velocity_mps) {
     wire.has_velocity = 1;
     wire.east_velocity_m_s = fix.velocity_mps->x();
     wire.north_velocity_m_s = fix.velocity_mps->y();
     wire.velocity_sigma_m_s = fix.velocity_sigma_mps;
   }
+
   return wire;
 }
 

@@ -1,4 +1,4 @@
-// Pieces that several conversions need.
+// Checks and copies that several conversions share.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,14 @@
 
 namespace understory::wire {
 
+/// Largest absolute coordinate of a landmark.
 inline constexpr double kFarthestPositionM = 1e7;
+/// Largest radius of a landmark.
 inline constexpr double kLargestRadiusM = 100.0;
+/// Longest range of a field of view.
 inline constexpr double kLongestRangeM = 1e6;
 
+/// Into the rows of a wire type.
 template <int N>
 void copy_matrix(const Eigen::Matrix<double, N, N>& matrix, SquareArray<N>& rows) {
   for (int row = 0; row < N; ++row) {
@@ -22,12 +26,13 @@ void copy_matrix(const Eigen::Matrix<double, N, N>& matrix, SquareArray<N>& rows
   }
 }
 
+/// Into an array of at least the vector's size.
 template <class Vector>
 void copy_vector(const Vector& vector, double* out) {
   for (Eigen::Index i = 0; i < vector.size(); ++i) out[i] = vector[i];
 }
 
-/// Position, radius and kind, which every landmark type has.
+/// Checks position, radius and kind, which every landmark type has.
 template <class Wire>
 void check_landmark(const Wire& wire, Checks& checks) {
   for (const double coordinate : wire.position_m) {
@@ -37,16 +42,17 @@ void check_landmark(const Wire& wire, Checks& checks) {
   checks.range("kind", wire.kind, 0, 1);
 }
 
-/// The three fields of a message that describe the field of view.
+/// Checks and takes the three fields of a message that describe the field of view.
 template <class Wire>
 model::FieldOfView field_of_view(const Wire& wire, Checks& checks) {
-  constexpr double kTurn = 2.0 * std::numbers::pi;
+  constexpr double kFullCircle = 2.0 * std::numbers::pi;
   checks.range("max_range_m", wire.max_range_m, 0.0, kLongestRangeM);
-  checks.range("bearing_rad", wire.bearing_rad, -kTurn, kTurn);
-  checks.range("width_rad", wire.width_rad, 0.0, kTurn + 1e-9);
+  checks.range("bearing_rad", wire.bearing_rad, -kFullCircle, kFullCircle);
+  checks.range("width_rad", wire.width_rad, 0.0, kFullCircle + 1e-9);
   return {wire.max_range_m, wire.bearing_rad, wire.width_rad};
 }
 
+/// The opposite of field_of_view().
 template <class Wire>
 void copy_field_of_view(const model::FieldOfView& from, Wire& wire) {
   wire.max_range_m = from.max_range_m;

@@ -42,11 +42,13 @@ void write_points(const std::vector<model::SweepPoint>& points, lidar_sweep_t& w
     farthest = std::max({farthest, size_bits(p.x_m), size_bits(p.y_m), size_bits(p.z_m)});
     longest = std::max(longest, size_bits(p.time_s));
   }
+
   const auto farthest_m = std::bit_cast<float>(farthest);
   const auto longest_s = std::bit_cast<float>(longest);
   if (!std::isfinite(farthest_m) || !std::isfinite(longest_s)) {
     throw std::invalid_argument("to_wire(PointSweep): a point is not finite");
   }
+
   wire.resolution_m = step_for(farthest_m, kFinestResolutionM);
   wire.time_step_s = step_for(longest_s, kFinestTimeStepS);
   const double per_metre = 1.0 / wire.resolution_m;
@@ -54,6 +56,7 @@ void write_points(const std::vector<model::SweepPoint>& points, lidar_sweep_t& w
   const std::size_t count = points.size();
   wire.num_points = static_cast<std::int32_t>(count);
   for (auto* numbers : {&wire.x, &wire.y, &wire.z, &wire.time}) numbers->resize(count);
+
   for (auto* numbers : {&wire.ring, &wire.intensity}) numbers->resize(count);
   for (std::size_t i = 0; i < count; ++i) {
     const model::SweepPoint& p = points[i];
@@ -96,6 +99,7 @@ void copy_points(const lidar_sweep_t& wire, Checks& checks,
   const auto resolution = static_cast<float>(wire.resolution_m);
   const auto step = static_cast<float>(wire.time_step_s);
   bool rings_fit = true;
+
   for (std::size_t i = 0; i < points.size(); ++i) {
     points[i] = {static_cast<float>(wire.x[i]) * resolution,
                  static_cast<float>(wire.y[i]) * resolution,
@@ -105,6 +109,7 @@ void copy_points(const lidar_sweep_t& wire, Checks& checks,
                  wire.intensity[i]};
     rings_fit = rings_fit && wire.ring[i] < wire.rings;
   }
+
   checks.consistent(rings_fit, "ring < rings");
 }
 
@@ -118,6 +123,7 @@ Result<model::PointSweep> from_wire(const lidar_sweep_t& wire) {
   sweep.sequence = static_cast<std::uint64_t>(wire.seq);
   sweep.turn = static_cast<std::uint64_t>(wire.turn);
   sweep.part = static_cast<std::uint16_t>(wire.part);
+
   sweep.parts = static_cast<std::uint16_t>(wire.parts);
   sweep.has_times = wire.has_times != 0;
   sweep.is_deskewed = wire.is_deskewed != 0;
@@ -125,8 +131,10 @@ Result<model::PointSweep> from_wire(const lidar_sweep_t& wire) {
   sweep.max_range_m = wire.max_range_m;
   sweep.sensor_position_m = Eigen::Map<const Eigen::Vector3d>(wire.sensor_position_m);
   if (wire.has_attitude != 0) sweep.attitude = attitude(wire, checks);
+
   copy_points(wire, checks, sweep.points);
   if (checks.refusal()) return *checks.refusal();
+
   return sweep;
 }
 
@@ -138,6 +146,7 @@ lidar_sweep_t to_wire(const model::PointSweep& sweep) {
   wire.part = sweep.part;
   wire.parts = sweep.parts;
   wire.has_times = sweep.has_times ? 1 : 0;
+
   wire.is_deskewed = sweep.is_deskewed ? 1 : 0;
   wire.rings = sweep.rings;
   wire.max_range_m = sweep.max_range_m;
@@ -145,9 +154,11 @@ lidar_sweep_t to_wire(const model::PointSweep& sweep) {
   const model::Attitude attitude = sweep.attitude.value_or(model::Attitude{});
   wire.has_attitude = sweep.attitude ? 1 : 0;
   const Eigen::Quaterniond& q = attitude.level_Q_vehicle;
+
   copy_vector(Eigen::Vector4d(q.w(), q.x(), q.y(), q.z()), wire.level_Q_vehicle);
   copy_matrix(attitude.covariance_rad2, wire.attitude_covariance_rad2);
   write_points(sweep.points, wire);
+
   return wire;
 }
 

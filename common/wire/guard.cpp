@@ -66,6 +66,7 @@ class Walker {
         if (!count_is_possible(count, field)) return refused_in(field.name);
         elements *= static_cast<std::size_t>(count);
       }
+
       if (field.counts >= 0) {
         const std::size_t size = size_of(field.kind);
         if (left_.size() < size) {
@@ -74,8 +75,10 @@ class Walker {
         }
         counts[static_cast<std::size_t>(field.counts)] = integer(left_.first(size));
       }
+
       if (!walk_elements(field, elements)) return refused_in(field.name);
     }
+
     return true;
   }
 
@@ -102,12 +105,15 @@ class Walker {
       }
       return true;
     }
+
     if (field.kind == FieldKind::kString) return walk_string();
     const std::size_t size = size_of(field.kind);
     if (left_.size() / size < elements) return refuse(Reason::kTooShort, "ends here");
+
     for (std::size_t i = 0; i < elements; ++i) {
       if (!value_is_fine(field.kind, left_.data() + i * size)) return refused_at(i, elements);
     }
+
     left_ = left_.subspan(elements * size);
     return true;
   }
@@ -130,15 +136,18 @@ class Walker {
     const std::int64_t length = integer(left_.first(4));
     left_ = left_.subspan(4);
     if (length < 1) return refuse(Reason::kBadString, "length " + std::to_string(length));
+
     if (static_cast<std::uint64_t>(length) > left_.size()) {
       return refuse(Reason::kBadString, "length " + std::to_string(length) + ", but only " +
                                             std::to_string(left_.size()) + " bytes are left");
     }
+
     const auto text = left_.first(static_cast<std::size_t>(length));
     for (std::size_t i = 0; i < text.size(); ++i) {
       const bool is_last = i + 1 == text.size();
       if ((text[i] == 0) != is_last) return refuse(Reason::kBadString, "not ended where it says");
     }
+
     left_ = left_.subspan(text.size());
     return true;
   }
@@ -187,17 +196,21 @@ std::optional<Refusal> check_bytes(std::span<const std::uint8_t> bytes, const Wi
   const auto fingerprint = fingerprint_of(bytes);
   if (!fingerprint) return Refusal{Reason::kTooShort, "no fingerprint"};
   if (bytes.size() > kMostBytes) return Refusal{Reason::kTooLong, "more than 2 GiB"};
+
   if (*fingerprint != type.fingerprint()) {
     const WireType* other = find_wire_type(*fingerprint);
     return Refusal{Reason::kWrongType,
                    "expected " + std::string(type.layout->name) + ", got " +
                        (other != nullptr ? std::string(other->layout->name) : "an unknown type")};
   }
+
   Walker walker(bytes.subspan(8));
   if (!walker.walk(*type.layout)) return std::move(walker).refusal();
+
   if (walker.left() != 0) {
     return Refusal{Reason::kTooLong, std::to_string(walker.left()) + " bytes are left over"};
   }
+
   return type.is_message ? check_header(*header_of(bytes)) : std::nullopt;
 }
 

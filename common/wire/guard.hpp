@@ -17,6 +17,7 @@
 
 namespace understory::wire {
 
+/// A whole encoded message, fingerprint included.
 using Bytes = std::vector<std::uint8_t>;
 
 /// Why `bytes` are no whole, well-formed message of this type; none = they are. The fingerprint is
@@ -29,25 +30,24 @@ struct MessageHeader {
   std::int64_t sequence = 0;
 };
 
-/// Of bytes that are long enough; none where they are not.
+/// The first eight bytes, LCM's hash of the type; none where there are fewer.
 std::optional<std::int64_t> fingerprint_of(std::span<const std::uint8_t> bytes);
+/// `utime` and `seq` behind the fingerprint; none where the bytes are too few. Nothing is checked.
 std::optional<MessageHeader> header_of(std::span<const std::uint8_t> bytes);
 
-/// The table entry of a generated type; throws std::logic_error for one that lcmtypes/ lacks.
-template <class Message>
-const WireType& wire_type_of();
-
 namespace internal {
+/// The table entry of this name; throws std::logic_error where there is none.
 const WireType& required_wire_type(std::string_view name);
-}
+}  // namespace internal
 
+/// The table entry of a generated type; throws std::logic_error for one that lcmtypes/ lacks.
 template <class Message>
 const WireType& wire_type_of() {
   static const WireType& type = internal::required_wire_type(Message::getTypeName());
   return type;
 }
 
-/// Checks, then decodes.
+/// Checks the bytes, then decodes them. Time and memory are linear in their number.
 template <class Message>
 Result<Message> decode_bytes(std::span<const std::uint8_t> bytes) {
   if (auto refusal = check_bytes(bytes, wire_type_of<Message>())) return *std::move(refusal);
@@ -59,6 +59,7 @@ Result<Message> decode_bytes(std::span<const std::uint8_t> bytes) {
   return message;
 }
 
+/// A wire type to bytes; cannot fail.
 template <class Message>
 Bytes encode_bytes(const Message& message) {
   Bytes bytes(static_cast<std::size_t>(message.getEncodedSize()));

@@ -8,6 +8,7 @@
 
 namespace understory::wire {
 
+/// The types of fields that LCM has.
 enum class FieldKind : std::uint8_t {
   kInt8,
   kInt16,
@@ -36,23 +37,26 @@ struct Field {
 /// A struct may have this many counts.
 inline constexpr std::size_t kMostCounts = 8;
 
+/// The fields of a type in the order of their bytes.
 struct Layout {
   std::string_view name;
   std::span<const Field> fields;
   std::size_t min_bytes = 0;  ///< Of the shortest one, without the fingerprint.
 };
 
+/// A type of lcmtypes/.
 struct WireType {
   const Layout* layout = nullptr;
-  std::int64_t (*fingerprint)() = nullptr;
+  std::int64_t (*fingerprint)() = nullptr;  ///< LCM's hash of names and types.
   bool is_message = false;  ///< Begins with utime and seq: it travels on a channel of its own.
 };
 
 /// Every type of lcmtypes/, in order of name.
 std::span<const WireType> wire_types();
 
-/// By name (`landmarks_t`) or by fingerprint; null where there is none.
+/// By name (`landmarks_t`); null where there is none.
 const WireType* find_wire_type(std::string_view name);
+/// By fingerprint; null where there is none.
 const WireType* find_wire_type(std::int64_t fingerprint);
 
 }  // namespace understory::wire

@@ -11,6 +11,7 @@ std::string_view to_string(Reason reason) {
     case Reason::kWrongType:
       return "wrong_type";
     case Reason::kBadCount:
+
       return "bad_count";
     case Reason::kBadString:
       return "bad_string";
@@ -18,6 +19,7 @@ std::string_view to_string(Reason reason) {
       return "not_finite";
     case Reason::kOutOfRange:
       return "out_of_range";
+
     case Reason::kNotSymmetric:
       return "not_symmetric";
     case Reason::kNotPositive:
@@ -25,6 +27,7 @@ std::string_view to_string(Reason reason) {
     case Reason::kInconsistent:
       return "inconsistent";
     case Reason::kDuplicate:
+
       return "duplicate";
     case Reason::kLate:
       return "late";
@@ -32,6 +35,7 @@ std::string_view to_string(Reason reason) {
       return "clock_jump";
     case Reason::kQueueFull:
       return "queue_full";
+
     case Reason::kNotSent:
       return "not_sent";
     case Reason::kStageFailed:
@@ -39,6 +43,7 @@ std::string_view to_string(Reason reason) {
     case Reason::kSnapshotDamaged:
       return "snapshot_damaged";
     case Reason::kJournalDamaged:
+
       return "journal_damaged";
     case Reason::kStateNotKept:
       return "state_not_kept";
@@ -46,6 +51,7 @@ std::string_view to_string(Reason reason) {
       return "sensor_silent";
     case Reason::kSensorFrozen:
       return "sensor_frozen";
+
     case Reason::kSaturated:
       return "saturated";
     case Reason::kNoPointTimes:
@@ -53,10 +59,13 @@ std::string_view to_string(Reason reason) {
     case Reason::kPartsMissing:
       return "parts_missing";
     case Reason::kNotCalibrated:
+
       return "not_calibrated";
     case Reason::kReceiveBufferSmall:
+
       return "receive_buffer_small";
   }
+
   return "unknown";
 }
 

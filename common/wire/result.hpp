@@ -21,7 +21,7 @@ enum class Reason : std::uint8_t {
   kNotSymmetric,        ///< Of a covariance.
   kNotPositive,         ///< A covariance that is not positive semidefinite.
   kInconsistent,        ///< Fields that contradict each other.
-  kDuplicate,           ///< Already had.
+  kDuplicate,           ///< Came before.
   kLate,                ///< Came after a later one.
   kClockJump,           ///< A stamp far from the others'.
   kQueueFull,           ///< Shed: more came than could be handled.
@@ -30,38 +30,49 @@ enum class Reason : std::uint8_t {
   kSnapshotDamaged,     ///< The saved state cannot be read.
   kJournalDamaged,      ///< The journal is cut or damaged.
   kStateNotKept,        ///< The state directory cannot be written.
-  kSensorSilent,        ///< Nothing came from a sensor that should speak.
-  kSensorFrozen,        ///< A sensor says the same again and again.
+  kSensorSilent,        ///< Nothing came from a sensor that is configured.
+  kSensorFrozen,        ///< A sensor repeats the same reading.
   kSaturated,           ///< At the end of the sensor's range.
   kNoPointTimes,        ///< A sweep whose points have no times: not de-skewed.
   kPartsMissing,        ///< A sweep of which parts were lost.
-  kNotCalibrated,       ///< The vehicle moved before it had stood still long enough.
+  kNotCalibrated,       ///< The vehicle moved before the standstill was long enough.
   kReceiveBufferSmall,  ///< The kernel grants less socket buffer than asked for.
 };
 
 /// Name of the reason, lower_snake.
 std::string_view to_string(Reason reason);
 
-/// A refusal: the reason and, in words, where and what.
+/// A refusal: the reason code, and a text for a person that names the place.
 struct Refusal {
   Reason reason = Reason::kInconsistent;
   std::string detail;
 };
 
-/// A value, or why there is none.
+/// A value, or why there is none. Asking for the part that is not there throws
+/// std::bad_variant_access.
 template <class T>
 class [[nodiscard]] Result {
  public:
-  Result(T value) : content_(std::move(value)) {}            // NOLINT(google-explicit-constructor)
+  /// A success.
+  Result(T value) : content_(std::move(value)) {}  // NOLINT(google-explicit-constructor)
+  /// A failure.
   Result(Refusal refusal) : content_(std::move(refusal)) {}  // NOLINT(google-explicit-constructor)
 
+  /// True for a value.
   explicit operator bool() const { return content_.index() == 0; }
+  /// The value.
   T& value() { return std::get<0>(content_); }
+  /// The value.
   const T& value() const { return std::get<0>(content_); }
+  /// Why there is no value.
   const Refusal& refusal() const { return std::get<1>(content_); }
+  /// The value's members.
   T* operator->() { return &value(); }
+  /// The value's members.
   const T* operator->() const { return &value(); }
+  /// The value.
   T& operator*() { return value(); }
+  /// The value.
   const T& operator*() const { return value(); }
 
  private:

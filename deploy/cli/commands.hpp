@@ -6,13 +6,21 @@
 
 namespace understory::cli {
 
+/// `understory doctor`: checks this computer.
 void add_doctor_command(CLI::App& parent);
+/// `understory export`: results in formats that other tools read.
 void add_export_command(CLI::App& parent);
+/// `understory import`: a recording made elsewhere into an LCM log.
 void add_import_command(CLI::App& parent);
+/// `understory launch`: starts, watches and restarts the processes.
 void add_launch_command(CLI::App& parent);
+/// `understory log`: information, checks, repair and cuts of logs.
 void add_log_command(CLI::App& parent);
+/// `understory replay`: a log through chosen services.
 void add_replay_command(CLI::App& parent);
+/// `understory sim`: a simulated drive.
 void add_sim_command(CLI::App& parent);
+/// `understory status`: HEALTH of all processes.
 void add_status_command(CLI::App& parent);
 
 }  // namespace understory::cli

@@ -53,6 +53,7 @@ Finding check_multicast(const std::string& url) {
     finding.text = "the bus cannot be opened";
     return finding;
   }
+
   bool heard = false;
   const auto channel = fmt::format("DOCTOR_{}", ::getpid());
   ::lcm_subscribe(
@@ -61,16 +62,19 @@ Finding check_multicast(const std::string& url) {
       &heard);
   const auto start = std::chrono::steady_clock::now();
   const char text[] = "hello";
+
   if (::lcm_publish(lcm.get(), channel.c_str(), text, sizeof text) != 0) {
     finding.text = "a message cannot be sent";
     return finding;
   }
+
   for (int i = 0; i < 10 && !heard; ++i) ::lcm_handle_timeout(lcm.get(), 100);
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
   if (!heard) {
     finding.text = "a message to ourselves does not arrive";
     return finding;
   }
+
   return {Verdict::kGood, "multicast",
           fmt::format("a message went round in {:.1f} ms", took.count()), ""};
 }
@@ -83,9 +87,11 @@ Finding check_receive_buffer() {
   ::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &granted, &size);
   ::close(socket);
   granted /= 2;  // The kernel reports twice what it gives to data.
+
   if (granted >= kWantedBufferBytes) {
     return {Verdict::kGood, "receive buffer", fmt::format("{} bytes", granted), ""};
   }
+
   return {Verdict::kAdvice, "receive buffer",
           fmt::format("{} of {} bytes: bursts may be lost", granted, kWantedBufferBytes),
           "deploy/setup --tune"};
@@ -151,6 +157,7 @@ void doctor(const std::string& url) {
           "/usr/bin/python3 -c 'import matplotlib; print(matplotlib.__version__)' 2>/dev/null",
           "apt-get install python3-matplotlib (for pictures only)"),
   };
+
   bool bad = false;
   for (const auto& finding : findings) {
     const char* const mark = finding.verdict == Verdict::kGood     ? "ok    "
@@ -160,6 +167,7 @@ void doctor(const std::string& url) {
     if (!finding.advice.empty()) fmt::print("       {:<15} -> {}\n", "", finding.advice);
     bad = bad || finding.verdict == Verdict::kBad;
   }
+
   if (bad) fail("doctor: processes on this computer cannot hear each other");
 }
 

@@ -21,13 +21,16 @@ struct ComparedPose {
   geometry::SE2 world_T_vehicle;
   geometry::SE2 true_world_T_vehicle;
 
+  /// Distance between the two positions.
   double position_error_m() const;
+  /// Absolute difference of the headings.
   double heading_error_rad() const;
 };
 
+/// The errors of one run.
 struct DriveAccuracy {
-  std::vector<ComparedPose> live;       ///< Every pose of SLAM_POSE that claims to mean something.
-  std::vector<ComparedPose> keyframes;  ///< Of the last MAP.
+  std::vector<ComparedPose> live;                 ///< Every localised pose of SLAM_POSE.
+  std::vector<ComparedPose> keyframes;            ///< Of the last MAP.
   std::vector<Eigen::Vector2d> landmarks_m;       ///< Of the last MAP, frame world.
   std::vector<Eigen::Vector2d> true_landmarks_m;  ///< Frame world.
   std::vector<double> landmark_errors_m;          ///< To the nearest true one.
@@ -41,6 +44,7 @@ struct DriveAccuracy {
 /// nothing is aligned, so an error in the first heading counts.
 class DriveAccuracyCollector {
  public:
+  /// Takes one event, in the order of the log; channels that do not matter are passed over.
   void add(const io::LogEvent& event);
   /// None when the log has no ground truth or no first map.
   std::optional<DriveAccuracy> finish() const;
@@ -64,6 +68,7 @@ class DriveAccuracyCollector {
 double mean(const std::vector<double>& values);     ///< 0 of none.
 double maximum(const std::vector<double>& values);  ///< 0 of none.
 double rms(const std::vector<double>& values);      ///< 0 of none.
+/// The position error of each pose.
 std::vector<double> position_errors_m(const std::vector<ComparedPose>& poses);
 
 }  // namespace understory::cli

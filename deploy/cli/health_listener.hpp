@@ -11,14 +11,16 @@
 
 namespace understory::cli {
 
+/// Subscribed to HEALTH on the bus; decodes nothing that is malformed.
 class HealthListener {
  public:
+  /// Called with each HEALTH message.
   using Handler = std::function<void(const health_t&)>;
   /// Throws BusError naming the URL when the bus cannot be joined.
   HealthListener(const std::string& lcm_url, Handler handler);
 
   int descriptor() const { return bus_.file_descriptor(); }  ///< Readable when a message waits.
-  /// Waits up to `timeout` for one message and hands it over; false when none came.
+  /// Waits up to `timeout` for one message and handles it; false when none came.
   bool handle(std::chrono::milliseconds timeout);
   std::uint64_t refused() const { return refused_; }  ///< Messages that were not of the type.
 

@@ -66,6 +66,7 @@ class Importer {
     const auto due = [&](const auto& list, std::size_t at) {
       return at < list.size() && list[at].utime <= stamp;
     };
+
     while (due(wheels, wheel_) || due(fixes, fix_)) {
       const bool wheel_first =
           due(wheels, wheel_) && (!due(fixes, fix_) || wheels[wheel_].utime <= fixes[fix_].utime);
@@ -119,6 +120,7 @@ void add_import_command(CLI::App& parent) {
   victoria->add_option("--out", options->out, "The log to write")->required();
   victoria->add_flag("--raw", options->raw,
                      "RAW_SCAN, RAW_WHEELS, RAW_GNSS: what lidar_imu_input takes");
+
   victoria->callback([options] { import_victoria_park(*options); });
   add_sensor_imports(*command);
 }

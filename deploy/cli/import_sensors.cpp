@@ -75,6 +75,7 @@ void add_oxts(const io::KittiRaw& drive, bool wheels, RecordingLog& log) {
     if (wheels)
       log.add("RAW_WHEELS", model::WheelSample{record.utime, 0, record.forward_velocity_mps, 0.0});
     model::GnssFix fix;
+
     fix.utime = record.utime;
     fix.east_north_m = plane.east_north_m(record.latitude_deg, record.longitude_deg);
     fix.sigma_m = record.position_sigma_m;
@@ -139,6 +140,7 @@ void import_pcap(const Options& options) {
   io::VelodyneDecoder decoder(calibration_of(options));
   RecordingLog log(options.out);
   io::VelodyneFixes fixes;
+
   while (const auto packet = capture.next()) {
     terminal::throw_if_interrupted();
     if (packet->port == io::kVelodynePositionPort) {
@@ -150,11 +152,13 @@ void import_pcap(const Options& options) {
     if (const auto turn = decoder.add(packet->payload, packet->utime))
       log.add_sweep("RAW_SWEEP", *turn);
   }
+
   if (const auto turn = decoder.finish()) log.add_sweep("RAW_SWEEP", *turn);
   const io::VelodyneCounts& counts = decoder.counts();
   if (counts.turns == 0)
     fail(fmt::format("{}: {} {} packets, {} refused: not one whole turn", options.path,
                      counts.packets, options.model, counts.refused));
+
   log.commit();
   fmt::print("{} turns of {} packets ({} refused, {} gaps), {} fixes{} -> {}\n", counts.turns,
              counts.packets, counts.refused, counts.lost_azimuth, log.count("RAW_GNSS"),
@@ -166,11 +170,13 @@ void add_tables(const Options& options, RecordingLog& log) {
     for (const model::ImuSample& sample : io::parse_imu_table(read_file(options.imu), options.imu))
       log.add("RAW_IMU", sample);
   }
+
   if (!options.wheel_table.empty()) {
     for (const model::WheelSample& sample :
          io::parse_wheel_table(read_file(options.wheel_table), options.wheel_table))
       log.add("RAW_WHEELS", sample);
   }
+
   if (!options.gnss.empty()) {
     for (const model::GnssFix& fix : io::parse_gnss_table(read_file(options.gnss), options.gnss))
       log.add("RAW_GNSS", fix);
@@ -187,6 +193,7 @@ void import_pcd(const Options& options) {
   RecordingLog log(options.out);
   add_tables(options, log);
   terminal::Progress progress("importing", static_cast<double>(files.size()));
+
   for (std::size_t i = 0; i < files.size(); ++i) {
     terminal::throw_if_interrupted();
     model::PointSweep sweep =
@@ -196,6 +203,7 @@ void import_pcd(const Options& options) {
     log.add_sweep("RAW_SWEEP", sweep);
     progress.update(static_cast<double>(i + 1));
   }
+
   log.commit();
   report_tables(log, files.size(), options.out);
 }
@@ -246,6 +254,7 @@ void add_sensor_imports(CLI::App& import) {
   CLI::App* pcd =
       add_format(import, "pcd", "A sequence of PCD files, each one turn",
                  "Folder; times from timestamps.txt or from the names", options, import_pcd);
+
   add_table_options(*pcd, options);
   CLI::App* csv =
       add_format(import, "csv", "Tables of IMU, GNSS and wheels", "", options, import_csv);

@@ -69,21 +69,26 @@ std::vector<launch::ProcessSpec> process_specs(const Options& options) {
     launch::ProcessSpec spec;
     spec.name = entry.name;
     spec.command.executable = find_executable(entry.executable);
+
     if (!entry.config.empty()) {
       spec.command.arguments.insert(spec.command.arguments.end(),
                                     {"--config", entry.config.string()});
     }
+
     if (entry.keeps_state) {
       spec.command.arguments.insert(spec.command.arguments.end(),
                                     {"--state-dir", (options.state / entry.name).string()});
     }
+
     spec.command.arguments.insert(spec.command.arguments.end(), entry.arguments.begin(),
                                   entry.arguments.end());
     if (!options.lcm_url.empty()) {
       spec.command.environment.push_back("LCM_DEFAULT_URL=" + options.lcm_url);
     }
+
     specs.push_back(std::move(spec));
   }
+
   return specs;
 }
 
@@ -129,14 +134,17 @@ void run(launch::Supervisor& supervisor, launch::Registry& registry, const StopS
       report.say("launch", "stopping");
       supervisor.stop(now);
     }
+
     if (!supervisor.refused().empty()) supervisor.stop(now);
     supervisor.step(now);
     std::vector<pid_t> pids;
     for (const auto& process : supervisor.status()) pids.push_back(process.pid);
+
     if (pids != noted) {
       registry.write(supervisor.status());
       noted = std::move(pids);
     }
+
     if (supervisor.stopped()) break;  // The note is empty by now: the next launch begins anew.
     wait(supervisor, signals, health);
     while (health != nullptr && health->handle(std::chrono::milliseconds(0))) {
@@ -187,6 +195,7 @@ void add_launch_command(CLI::App& parent) {
   command->add_option("--lcm-url", options->lcm_url, "Bus, e.g. udpm://239.255.76.67:7667?ttl=0");
   command->add_option("--report", options->report, "Write what happened to this JSON file");
   command->add_option("--only", options->only, "Only these processes")->delimiter(',');
+
   command->add_flag("--fresh", options->fresh, "Forget the state of earlier runs first");
   command->add_flag("--quiet", options->quiet, "Say nothing but errors");
   command->callback([options] { launch_processes(*options); });

@@ -44,11 +44,13 @@ void LaunchReport::write(const std::filesystem::path& file,
                                    {"restarts", process.restarts},
                                    {"last_ending", process.last_ending}});
   }
+
   report["events"] = nlohmann::ordered_json::array();
   for (const auto& event : events_) {
     report["events"].push_back(
         {{"time", event.time}, {"process", event.process}, {"text", event.text}});
   }
+
   write_text_file(file, report.dump(2) + "\n");
 }
 

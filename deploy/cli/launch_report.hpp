@@ -9,13 +9,15 @@
 
 namespace understory::cli {
 
+/// The events of a launch; the first 10,000 are kept.
 class LaunchReport {
  public:
+  /// `quiet`: print nothing.
   explicit LaunchReport(bool quiet) : quiet_(quiet) {}
   /// One thing that happened: printed with the time of day, kept for the report.
-  void say(const std::string& process, const std::string& text);
-  /// {"processes": [{name, state, restarts, last_ending}], "events": [{time, process, text}]}.
-  /// Throws std::runtime_error naming the file.
+  void add(const std::string& process, const std::string& text);
+  /// Writes {"processes": [{name, state, restarts, last_ending}], "events": [{time, process,
+  /// text}]}. Throws std::runtime_error naming the file.
   void write(const std::filesystem::path& file,
              const std::vector<launch::ProcessStatus>& processes) const;
 

@@ -42,6 +42,7 @@ nlohmann::ordered_json summary(const DriveAccuracy& accuracy) {
   const auto live = position_errors_m(accuracy.live);
   const auto keyframes = position_errors_m(accuracy.keyframes);
   const auto drops = drops_of(accuracy);
+
   return {{"scans", accuracy.scans},
           {"live_poses", live.size()},
           {"live_mean_cm", 100.0 * mean(live)},
@@ -90,6 +91,7 @@ void print_table(const nlohmann::ordered_json& s) {
              count("keyframes"));
   fmt::print("{:<34} mean {:.1f} cm, of {}\n", "landmarks in the final map", number("lpe_cm"),
              count("landmarks"));
+
   fmt::print("{:<34} lost {}, malformed {}, dropped {} (and {} by the recorder)\n",
              "messages that did not arrive", count("lost"), count("malformed"), count("dropped"),
              count("lost_by_the_log"));
@@ -111,15 +113,18 @@ void log_accuracy(const std::string& file, const std::string& json_file) {
   io::LcmLogReader reader(file);
   DriveAccuracyCollector collector;
   terminal::Progress progress("reading " + file, static_cast<double>(reader.size_bytes()));
+
   while (const auto event = reader.next()) {
     terminal::throw_if_interrupted();
     collector.add(*event);
     progress.update(static_cast<double>(reader.position_bytes()));
   }
+
   const auto accuracy = collector.finish();
   if (!accuracy) {
     fail(fmt::format("{}: no GROUND_TRUTH, or no SLAM_UPDATE that starts a map, in it", file));
   }
+
   const auto json = summary(*accuracy);
   print_table(json);
   if (!json_file.empty()) write_series(json_file, json, *accuracy);

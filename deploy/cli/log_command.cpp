@@ -58,6 +58,7 @@ nlohmann::ordered_json to_json(const std::string& file, const LogContents& conte
                                 {"lost", channel.lost},
                                 {"malformed", channel.malformed}});
   }
+
   return json;
 }
 
@@ -68,12 +69,14 @@ void print_info(const std::string& file, const LogContents& contents) {
     fmt::print(", received from {:%Y-%m-%d %H:%M:%S} UTC",
                fmt::gmtime(static_cast<std::time_t>(statistics.first_utime() / 1'000'000)));
   }
+
   fmt::print("\n{:<32} {:<20} {:>9} {:>9} {:>12} {:>7}\n", "channel", "type", "events", "Hz",
              "bytes", "lost");
   for (const auto& [name, channel] : statistics.channels()) {
     fmt::print("{:<32} {:<20} {:>9} {:>9.2f} {:>12} {:>7}\n", name, channel.type, channel.events,
                channel.rate_hz(), channel.bytes, channel.lost);
   }
+
   if (contents.damage.places > 0) {
     fmt::print("damaged: {} bytes in {} places (understory log check says more)\n",
                contents.damage.bytes, contents.damage.places);
@@ -110,11 +113,13 @@ void check(const std::string& file) {
     fmt::print("byte {}: {} bytes are no event\n", damage.last_offset, damage.last_bytes);
     ++findings;
   };
+
   std::uint64_t places = 0;
   const auto contents = walk(file, [&](const io::LogEvent&, const io::LogDamage& damage) {
     if (damage.places != places) place(damage);
     places = damage.places;
   });
+
   if (contents.damage.places != places) place(contents.damage);
   const auto& statistics = contents.statistics;
   const auto finding = [&](std::uint64_t count, std::string_view what) {
@@ -122,12 +127,15 @@ void check(const std::string& file) {
     fmt::print("{} {}\n", count, what);
     ++findings;
   };
+
   finding(statistics.missing_numbers(), "event numbers are missing");
   finding(statistics.clock_back(), "times the receive time goes back");
   finding(statistics.clock_forward(), "times the receive time jumps by more than ten seconds");
+
   for (const auto& [name, channel] : statistics.channels()) {
     findings += print_channel_findings(name, channel);
   }
+
   if (findings > 0) fail(fmt::format("{}: {} findings", file, findings));
   fmt::print("{}: {} events on {} channels, nothing wrong\n", file, statistics.events(),
              statistics.channels().size());
@@ -159,9 +167,11 @@ void cut(const std::string& file, const std::string& out, const Cut& wanted) {
   } catch (const std::regex_error&) {
     wrong_usage(fmt::format("--channels {}: not a regular expression", wanted.channels));
   }
+
   if (!(wanted.from_s <= wanted.to_s)) wrong_usage("--from lies behind --to");
   io::LcmLogWriter writer(out);
   std::optional<std::int64_t> start;
+
   walk(file, [&](const io::LogEvent& event, const io::LogDamage&) {
     if (!start) start = event.utime;
     const double time_s = 1e-6 * (static_cast<double>(event.utime) - static_cast<double>(*start));
@@ -170,6 +180,7 @@ void cut(const std::string& file, const std::string& out, const Cut& wanted) {
       writer.write(event.utime, event.channel, event.data);
     }
   });
+
   if (writer.events() == 0) fail(fmt::format("{}: nothing in it lies in the cut", file));
   writer.commit();
   fmt::print("{} events -> {}\n", writer.events(), out);

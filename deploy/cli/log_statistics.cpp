@@ -60,17 +60,21 @@ void LogStatistics::check_payload(const io::LogEvent& event, ChannelStatistics& 
   if (channel.type.empty()) channel.type = name;
   if (channel.type != name) channel.type = "mixed";
   if (type == nullptr) return;
+
   if (const auto refusal = check_bytes(event.data, *type)) {
     ++channel.malformed;
     channel.last_malformed = std::string(to_string(refusal->reason)) + ": " + refusal->detail;
     return;
   }
+
   if (!type->is_message || counted_per_process(event.channel)) return;
   const auto header = wire::header_of(event.data);
   if (!header) return;
+
   const auto [last, first_one] =
       last_headers_.try_emplace(event.channel, LastHeader{header->utime, header->sequence});
   if (first_one) return;
+
   const auto step = difference(header->sequence, last->second.sequence);
   if (step > 1) channel.lost += static_cast<std::uint64_t>(step - 1);
   if (step < 0) ++channel.restarts;

@@ -10,6 +10,7 @@
 
 namespace understory::cli {
 
+/// Counts of one channel.
 struct ChannelStatistics {
   std::string type;  ///< Wire type; "?" = none of ours, "mixed" = several.
   std::uint64_t events = 0;
@@ -17,26 +18,34 @@ struct ChannelStatistics {
   std::int64_t first_utime = 0;
   std::int64_t last_utime = 0;
   std::uint64_t malformed = 0;    ///< Of our types: bytes that are no whole message.
-  std::string last_malformed;     ///< Why, in words.
+  std::string last_malformed;     ///< Why the last of them was refused.
   std::uint64_t lost = 0;         ///< Missing sequence numbers, between the first and the last.
   std::uint64_t restarts = 0;     ///< Times the sequence went back.
   std::uint64_t stamps_back = 0;  ///< Times the message's own stamp went back without a restart.
 
+  /// Mean rate between the first and the last event; 0 of one event.
   double rate_hz() const;
 };
 
+/// Collects a log's events.
 class LogStatistics {
  public:
+  /// Takes one event, in the order of the log.
   void add(const io::LogEvent& event);
 
+  /// By channel name.
   const std::map<std::string, ChannelStatistics>& channels() const { return channels_; }
+  /// Number of events.
   std::uint64_t events() const { return events_; }
   std::int64_t first_utime() const { return first_utime_; }  ///< Receive times [us].
-  std::int64_t last_utime() const { return last_utime_; }
+  std::int64_t last_utime() const { return last_utime_; }    ///< Receive times [us].
+  /// Between the first and the last event.
   double duration_s() const { return 1e-6 * static_cast<double>(last_utime_ - first_utime_); }
+  /// Event numbers missing in the log.
   std::uint64_t missing_numbers() const { return missing_numbers_; }
   std::uint64_t clock_back() const { return clock_back_; }        ///< Receive time went back.
   std::uint64_t clock_forward() const { return clock_forward_; }  ///< By more than ten seconds.
+  /// Longest time without any event.
   double longest_silence_s() const { return 1e-6 * static_cast<double>(longest_silence_us_); }
 
  private:

@@ -18,11 +18,13 @@ int run(int argc, char** argv) {
   understory::cli::add_sim_command(app);
   understory::cli::add_status_command(app);
   understory::cli::add_replay_command(app);
+
   understory::eval::experiments::add_eval_command(app);
   understory::cli::add_doctor_command(app);
   understory::cli::add_import_command(app);
   understory::cli::add_export_command(app);
   understory::cli::add_log_command(app);
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::RuntimeError& error) {
@@ -32,6 +34,7 @@ int run(int argc, char** argv) {
     app.exit(error);
     return asked_for_help ? 0 : 2;
   }
+
   return 0;
 }
 

@@ -1,5 +1,5 @@
-// A recording on its way into a log: small messages are kept and come out in order of time between
-// the sweeps, which are too large to keep.
+// A recording that becomes a log: small messages are kept and written in order of time between the
+// sweeps, which are too large to keep.
 #pragma once
 
 #include <algorithm>
@@ -13,17 +13,19 @@
 
 namespace understory::cli {
 
+/// Writes a log whole or not at all; without commit() nothing is left behind.
 class RecordingLog {
  public:
+  /// Throws LogError when the file cannot be created.
   explicit RecordingLog(const std::string& file) : writer_(file) {}
 
-  /// To be written when the log reaches its stamp; those of one stamp in the order of adding.
+  /// Keeps a message until the log reaches its stamp; those of one stamp in the order of adding.
   template <class Message>
   void add(const std::string& channel, Message message) {
     set_sequence(message, counts_[channel]++);
     small_.emplace(message.utime, Event{channel, wire::encode_message(message)});
   }
-  /// Writes what is due before the turn ends, then its parts.
+  /// Writes what is due before the revolution ends, then the sweep's parts.
   void add_sweep(const std::string& channel, const model::PointSweep& sweep) {
     float last = 0.0F;
     for (const model::SweepPoint& point : sweep.points) last = std::max(last, point.time_s);
@@ -40,6 +42,7 @@ class RecordingLog {
     while (!small_.empty()) write_first();
     writer_.commit();
   }
+  /// Messages added on this channel, parts of sweeps counted singly.
   std::uint64_t count(const std::string& channel) const {
     const auto found = counts_.find(channel);
     return found == counts_.end() ? 0 : found->second;

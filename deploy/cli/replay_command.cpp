@@ -61,11 +61,13 @@ std::vector<bus::Service> chosen_services(const std::vector<std::string>& names)
     for (const auto& service : services) known += " " + service.name;
     wrong_usage(fmt::format("--stages {}: no such stage; there are:{}", name, known));
   }
+
   for (const auto& service : all_services()) {
     if (std::find(names.begin(), names.end(), service.name) != names.end()) {
       chosen.push_back(service);
     }
   }
+
   return chosen;
 }
 
@@ -101,12 +103,14 @@ void run(const Options& options) {
       chosen_services(options.stages.empty() ? stages_of(options.config) : options.stages);
   replay_options.config_dir = options.config;
   replay_options.channel_suffix = options.channel_suffix;
+
   replay_options.keeps_inputs = !options.outputs_only;
   terminal::Progress progress("replaying " + options.log, 1.0);
   replay_options.progress = [&](double part) {
     progress.update(part);
     return interrupted();
   };
+
   try {
     const auto report = replay(replay_options);
     if (report.was_stopped) fail(options.log + ": interrupted");
@@ -133,6 +137,7 @@ void add_replay_command(CLI::App& parent) {
   command->add_option("--config", options->config, "Directory with NAME.toml for each stage")
       ->capture_default_str();
   command->add_option("--channel-suffix", options->channel_suffix, "Of every output, e.g. _ALT");
+
   command->add_flag("--outputs-only", options->outputs_only, "Leave the log's own events out");
   command->callback([options] { run(*options); });
 }

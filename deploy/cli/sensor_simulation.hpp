@@ -13,6 +13,7 @@
 
 namespace understory::cli {
 
+/// The options of `understory sim` with sensors.
 struct SensorSimulationOptions {
   std::string world;  ///< See is_sensor_world.
   std::string forest = "intermediate";
@@ -27,12 +28,15 @@ struct SensorSimulationOptions {
   std::uint64_t seed = 1;
 };
 
-/// forest3d, urban, urban-countryside, countryside, poles:POLES.csv,TRAJECTORY.csv
+/// Whether the name is a world with sensors: forest3d, urban, urban-countryside, countryside,
+/// poles:POLES.csv,TRAJECTORY.csv
 bool is_sensor_world(std::string_view world);
 
-/// Fails (see failure.hpp) where a name is unknown or a file cannot be read.
+/// The drive that the options describe. Fails (see failure.hpp) where a name is unknown or a file
+/// cannot be read.
 sim::SensorDrive make_sensor_drive(const SensorSimulationOptions& options);
 
+/// Where messages go: onto the bus or into a log.
 using Publish =
     std::function<void(const std::string& channel, model::Utime utime, const wire::Bytes& bytes)>;
 
@@ -40,7 +44,9 @@ using Publish =
 /// GROUND_TRUTH.
 class SensorPublisher {
  public:
+  /// Sends through `publish`.
   explicit SensorPublisher(Publish publish) : publish_(std::move(publish)) {}
+  /// Sends one reading.
   void publish(const sim::SensorReading& reading);
 
  private:
@@ -48,10 +54,10 @@ class SensorPublisher {
   std::uint64_t sweep_parts_ = 0;
 };
 
-/// When a reading is complete and can be sent.
+/// When a reading is complete and can be sent [us].
 model::Utime complete_at(const sim::SensorReading& reading, const sim::SensorDrive& drive);
 
-/// Trunks, poles and corners within 40 m of the way: what a map can hold. Ids count trunks first.
+/// Trunks, poles and corners within 40 m of the path: what a map can hold. Ids count trunks first.
 truth_landmarks_t true_landmarks_on_path(const sim::SensorDrive& drive);
 
 }  // namespace understory::cli

@@ -62,6 +62,7 @@ truth_landmarks_t truth_landmarks(const sim::Drive& drive) {
     const auto near = drive.grid().within(pose.translation(), drive.parameters().sensor.range_m);
     in_range.insert(near.begin(), near.end());
   }
+
   truth_landmarks_t message{};
   message.utime = drive.utime(0);
   for (const auto trunk : in_range) {
@@ -72,6 +73,7 @@ truth_landmarks_t truth_landmarks(const sim::Drive& drive) {
     landmark.radius_m = drive.forest().radii_m[trunk];
     message.landmarks.push_back(landmark);
   }
+
   message.num_landmarks = static_cast<std::int32_t>(message.landmarks.size());
   return message;
 }
@@ -115,6 +117,7 @@ void drive_live(const sim::Drive& drive, const Options& options) {
                               terminal::Progress::Without::kTenths);
   publish("TRUTH_LANDMARKS", drive.utime(0), wire::encode_message(truth_landmarks(drive)));
   const auto start = std::chrono::steady_clock::now();
+
   for (std::size_t k = 0; k < drive.size(); ++k) {
     const double elapsed_us = static_cast<double>(drive.utime(k) - drive.utime(0)) / options.rate;
     std::this_thread::sleep_until(start +
@@ -170,6 +173,7 @@ void simulate_sensors(Options& options) {
   options.sensors.path = options.path;
   options.sensors.seed = options.seed;
   sim::SensorDrive drive = make_sensor_drive(options.sensors);
+
   try {
     if (options.out.empty()) {
       send_sensors_live(drive, options);
@@ -179,6 +183,7 @@ void simulate_sensors(Options& options) {
   } catch (const terminal::Interrupted& error) {
     fail(fmt::format("sim: {}", error.what()));
   }
+
   fmt::print("{:.1f} m driven in {:.1f} s{}{}\n", drive.motion().driven_m(),
              drive.motion().duration_s(), options.out.empty() ? "" : " -> ", options.out);
 }
@@ -189,6 +194,7 @@ void simulate(Options& options) {
     simulate_sensors(options);
     return;
   }
+
   const auto drive = [&] {
     try {
       return make_drive(options);
@@ -197,6 +203,7 @@ void simulate(Options& options) {
       fail(fmt::format("sim {} --path {}: {}", options.world, options.path, error.what()));
     }
   }();
+
   try {
     if (options.out.empty()) {
       drive_live(drive, options);
@@ -206,6 +213,7 @@ void simulate(Options& options) {
   } catch (const terminal::Interrupted& error) {
     fail(fmt::format("sim: {}", error.what()));
   }
+
   const double last_s = 1e-6 * static_cast<double>(drive.utime(drive.size() - 1) - drive.utime(0));
   fmt::print("{} scans in {:.1f} s of driving{}{}\n", drive.size(), last_s,
              options.out.empty() ? "" : " -> ", options.out);
@@ -257,6 +265,7 @@ void add_sensor_options(CLI::App& command, Options& options) {
       ->group(group)
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();
+
   command.add_option("--lidar", sensors.lidar, "vlp16, vlp32, hdl32, hdl64, none")
       ->group(group)
       ->capture_default_str();
@@ -286,6 +295,7 @@ void add_sim_command(CLI::App& parent) {
                    "circle, line, figure-eight, square, triangle, double-circle, meander, standing")
       ->capture_default_str();
   add_landmark_options(*command, *options);
+
   add_sensor_options(*command, *options);
   command->add_option("--seed", options->seed, "Of world, start and noise")->capture_default_str();
   command->add_option("--rate", options->rate, "Live: times faster than the clock")

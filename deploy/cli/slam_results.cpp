@@ -17,6 +17,7 @@ void append_edge(std::string& out, const model::Keyframe& keyframe, std::size_t 
   const auto& landmark = keyframe.landmarks.at(index);
   const geometry::SE2 base_T_centre = keyframe.centre_T_base().inverse();
   const Eigen::Vector2d in_base = base_T_centre * landmark.position_m;
+
   // d(in_base)/d(xi) for a right perturbation of centre_T_base.
   Eigen::Matrix<double, 2, 3> jacobian;
   jacobian << -1.0, 0.0, in_base.y(), 0.0, -1.0, -in_base.x();
@@ -26,6 +27,7 @@ void append_edge(std::string& out, const model::Keyframe& keyframe, std::size_t 
       jacobian * keyframe.members.front().covariance * jacobian.transpose();
   const double determinant = covariance.determinant();
   if (!(determinant > 0.0)) return;
+
   const Eigen::Matrix2d information = covariance.inverse();
   fmt::format_to(std::back_inserter(out), "EDGE_SE2_XY {} {} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g}\n",
                  keyframe.sequence, landmark_vertex, in_base.x(), in_base.y(), information(0, 0),
@@ -102,6 +104,7 @@ std::string keyframes_csv(const model::WholeMap& map) {
 std::string to_g2o(const SlamResults& results) {
   std::string out;
   if (!results.map) return out;
+
   std::uint64_t next = 0;
   for (const auto& one : results.map->keyframes) {
     fmt::format_to(std::back_inserter(out), "VERTEX_SE2 {} {:.9g} {:.9g} {:.9g}\n",
@@ -109,16 +112,19 @@ std::string to_g2o(const SlamResults& results) {
                    one.map_T_vehicle.theta());
     next = std::max(next, one.keyframe_sequence + 1);
   }
+
   if (!results.map->keyframes.empty()) {
     fmt::format_to(std::back_inserter(out), "FIX {}\n",
                    results.map->keyframes.front().keyframe_sequence);
   }
+
   std::map<model::LandmarkId, std::uint64_t> vertices;
   for (const auto& one : results.map->landmarks) {
     vertices[one.id] = next;
     fmt::format_to(std::back_inserter(out), "VERTEX_XY {} {:.9g} {:.9g}\n", next++,
                    one.position_m.x(), one.position_m.y());
   }
+
   for (const auto& update : results.updates) {
     const auto keyframe = results.keyframes.find(update.keyframe_sequence);
     if (keyframe == results.keyframes.end()) continue;
@@ -129,6 +135,7 @@ std::string to_g2o(const SlamResults& results) {
       append_edge(out, keyframe->second, association.keyframe_landmark, vertex->second);
     }
   }
+
   return out;
 }
 

@@ -1,4 +1,4 @@
-// What a mapper said in a log, and how other tools read it.
+// A mapper's output in a log, and the formats in which other tools read it.
 #pragma once
 
 #include <map>
@@ -12,6 +12,7 @@
 
 namespace understory::cli {
 
+/// The output of the last mapper run in a log.
 struct SlamResults {
   std::vector<model::SlamPose> poses;  ///< As published live, localised ones.
   std::optional<model::WholeMap> map;  ///< The last one.
@@ -20,21 +21,26 @@ struct SlamResults {
   std::map<std::uint64_t, model::Keyframe> keyframes;  ///< By number.
   std::vector<model::MapUpdate> updates;               ///< Those that were fused.
 
+  /// Takes one event; channels that do not matter are passed over.
   void add(const io::LogEvent& event);
 };
 
 /// "time x y z qx qy qz qw", one pose a line [s, m]: what evo and the TUM tools read.
 std::string to_tum(const std::vector<std::pair<model::Utime, geometry::SE2>>& poses);
+/// map_T_vehicle as published live, by stamp.
 std::vector<std::pair<model::Utime, geometry::SE2>> live_trajectory(const SlamResults& results);
+/// map_T_base of the map's keyframes, by stamp.
 std::vector<std::pair<model::Utime, geometry::SE2>> keyframe_trajectory(const model::WholeMap& map);
 
+/// One landmark a line, with a heading: id, position, covariance, radius, kind.
 std::string landmarks_csv(const model::WholeMap& map);
+/// One keyframe a line, with a heading: number, stamp, pose, covariance.
 std::string keyframes_csv(const model::WholeMap& map);
 
 /// The map as a graph for g2o: VERTEX_SE2 for keyframes (their number), VERTEX_XY for landmarks
 /// (numbered behind them, in order of id), EDGE_SE2_XY for every association. An edge's information
-/// is of the landmark as the keyframe's base sees it; what edges of one keyframe share through the
-/// base's own uncertainty the format cannot say.
+/// is of the landmark in the frame of the keyframe's base; the format cannot hold the correlation
+/// of a keyframe's edges through the base's own uncertainty.
 std::string to_g2o(const SlamResults& results);
 
 }  // namespace understory::cli

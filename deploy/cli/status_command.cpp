@@ -43,6 +43,7 @@ void status(const Options& options) {
   StatusTable table;
   HealthListener listener(options.lcm_url,
                           [&](const health_t& health) { table.add(health, Clock::now()); });
+
   if (options.once) {
     // HEALTH comes once a second: everybody who answers has spoken by then.
     listen_until(listener, Clock::now() + std::chrono::milliseconds(1500));
@@ -50,6 +51,7 @@ void status(const Options& options) {
     if (table.empty()) fail("status: no process is heard on HEALTH");
     return;
   }
+
   const bool terminal = ::isatty(STDOUT_FILENO) == 1;
   try {
     while (true) {

@@ -17,10 +17,12 @@ const char* state_name(std::int8_t state) {
     case health_t::STATE_DEGRADED:
       return "DEGRADED";
     case health_t::STATE_ERROR:
+
       return "ERROR";
     case health_t::STATE_STOPPING:
       return "STOPPING";
     default:
+
       return "?";
   }
 }
@@ -69,10 +71,12 @@ std::string StatusTable::text(Clock::time_point now) const {
       fmt::format_to(std::back_inserter(result), "  last error {}: {}\n", health.last_error_code,
                      health.last_error);
     }
+
     result += fmt::format("     {:<24} {:>9} {:>8} {:>7} {:>6} {:>6} {:>9} {:>7}\n", "channel",
                           "messages", "Hz", "lost", "twice", "late", "malformed", "dropped");
     for (const auto& channel : health.channels) result += channel_line(channel);
   }
+
   return result.empty() ? "no process is heard\n" : result;
 }
 
@@ -98,12 +102,15 @@ nlohmann::ordered_json StatusTable::json(Clock::time_point now) const {
         {"reasons", nlohmann::ordered_json::array()}};
     for (const auto& channel : health.channels)
       process["channels"].push_back(channel_json(channel));
+
     for (const auto& reason : health.reasons) {
       process["reasons"].push_back(
           {{"channel", reason.channel}, {"reason", reason.reason}, {"count", reason.count}});
     }
+
     processes.push_back(std::move(process));
   }
+
   return {{"processes", std::move(processes)}};
 }
 

@@ -10,15 +10,21 @@
 
 namespace understory::cli {
 
+/// The latest HEALTH of every process.
 class StatusTable {
  public:
+  /// The clock by which a process counts as silent.
   using Clock = std::chrono::steady_clock;
   /// HEALTH comes once a second: three missed, and the process does not answer.
   static constexpr std::chrono::seconds kSilent{3};
 
+  /// Replaces the process's latest message.
   void add(const health_t& health, Clock::time_point now);
+  /// True before the first message.
   bool empty() const { return latest_.empty(); }
+  /// The table for a terminal, one process a line.
   std::string text(Clock::time_point now) const;
+  /// The same for scripts.
   nlohmann::ordered_json json(Clock::time_point now) const;
 
  private:

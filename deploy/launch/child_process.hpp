@@ -11,6 +11,7 @@
 
 namespace understory::launch {
 
+/// A program to start.
 struct Command {
   std::string executable;  ///< A path, or a name that is looked for in PATH.
   std::vector<std::string> arguments;
@@ -19,32 +20,38 @@ struct Command {
 
 /// How a process ended.
 struct Ending {
-  bool known = true;  ///< False for an adopted process: only its parent is told.
+  bool known = true;  ///< False for an adopted process: only its parent gets to know.
   int exit_code = 0;  ///< Where it exited.
   int signal = 0;     ///< Where a signal ended it.
 
+  /// "exit status 1", "signal 9 (Killed)" and the like.
   std::string text() const;
 };
 
+/// A running or ended process.
 class ChildProcess {
  public:
   /// Starts a process in a group of its own (Ctrl-C at the terminal reaches the supervisor alone).
   /// Throws std::system_error when it cannot be executed.
   static ChildProcess start(const Command& command);
-  /// Takes over a running process that another supervisor started; none when it no longer runs.
+  /// Takes over a running process that another supervisor started; none when it no longer runs
+  /// (or another process has its number).
   static std::optional<ChildProcess> adopt(pid_t pid, std::uint64_t start_ticks);
 
+  /// Moves the handle.
   ChildProcess(ChildProcess&& other) noexcept;
   ChildProcess& operator=(ChildProcess&& other) noexcept;
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;
-  ~ChildProcess();  ///< Lets go of the handle; the process lives on.
+  ~ChildProcess();  ///< Closes the handle; the process lives on.
 
+  /// The process's number.
   pid_t pid() const { return pid_; }
   int descriptor() const { return pidfd_; }  ///< Readable once the process has ended.
   /// When it started, in the kernel's ticks since boot: with the pid, its identity.
   std::uint64_t start_ticks() const { return start_ticks_; }
 
+  /// Sends a signal; none to a process that has ended.
   void signal(int number) const;
   /// How it ended; none while it runs.
   std::optional<Ending> ended() const;

@@ -24,12 +24,15 @@ class Reader {
         fail(node, fmt::format("unknown key \"{}\"; allowed: [[process]]", key.str()));
       }
     }
+
     const toml::array* processes = root["process"].as_array();
     if (processes == nullptr || processes->empty()) {
       throw ConfigError(fmt::format("{}: no [[process]] in it", file_.string()));
     }
+
     LaunchConfig config;
     for (const auto& node : *processes) config.processes.push_back(process(node, config));
+
     return config;
   }
 
@@ -53,29 +56,35 @@ class Reader {
   ProcessEntry process(const toml::node& node, const LaunchConfig& before) const {
     const toml::table* table = node.as_table();
     if (table == nullptr) fail(node, "\"process\" must be a list of tables: [[process]]");
+
     for (const auto& [key, value] : *table) {
       if (std::find(kProcessKeys.begin(), kProcessKeys.end(), key.str()) == kProcessKeys.end()) {
         fail(value, fmt::format("unknown key \"{}\"; allowed: {}", key.str(),
                                 fmt::join(kProcessKeys, ", ")));
       }
     }
+
     ProcessEntry entry;
     entry.name = text(*table, "name", true);
     entry.executable = text(*table, "executable", true);
     const std::filesystem::path config = text(*table, "config", false);
     if (!config.empty()) entry.config = file_.parent_path() / config;
+
     if (!entry.config.empty() && !std::filesystem::is_regular_file(entry.config)) {
       fail(*table->get("config"), fmt::format("config: no file {}", entry.config.string()));
     }
+
     entry.arguments = texts(*table, "arguments");
     if (const toml::node* keeps = table->get("keeps_state")) {
       if (!keeps->is_boolean()) fail(*keeps, "keeps_state: must be true or false");
       entry.keeps_state = *keeps->value<bool>();
     }
+
     for (const auto& other : before.processes) {
       if (other.name == entry.name)
         fail(node, fmt::format("name \"{}\" is there twice", entry.name));
     }
+
     return entry;
   }
 

@@ -9,6 +9,7 @@
 
 namespace understory::launch {
 
+/// The note and the lock on its directory.
 class Registry {
  public:
   /// Takes the lock on the directory (which is made where missing). Throws std::runtime_error
@@ -18,7 +19,7 @@ class Registry {
   Registry(const Registry&) = delete;
   Registry& operator=(const Registry&) = delete;
 
-  /// What the latest note says; empty where there is none or it cannot be read.
+  /// The latest note; empty where there is none or it cannot be read.
   std::vector<ProcessStatus> read() const;
   /// Replaces the note in one step. Errors are ignored: a vehicle drives on with a full disk.
   void write(const std::vector<ProcessStatus>& processes) const;

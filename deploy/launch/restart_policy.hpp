@@ -7,9 +7,11 @@
 
 namespace understory::launch {
 
+/// The supervisor's clock: never goes back.
 using Clock = std::chrono::steady_clock;
-using std::chrono::milliseconds;
+using std::chrono::milliseconds;  ///< The unit of all its times.
 
+/// Waiting times and the limit of deaths.
 struct RestartPolicyParameters {
   milliseconds first_backoff{10};
   milliseconds max_backoff{1000};
@@ -21,12 +23,15 @@ struct RestartPolicyParameters {
 /// window, so that a crash loop does not eat the processor.
 class RestartPolicy {
  public:
+  /// Without a death so far.
   explicit RestartPolicy(const RestartPolicyParameters& parameters = {})
       : parameters_(parameters) {}
 
   /// Counts a death; gives how long to wait before the next start, or none: give up.
   std::optional<milliseconds> died(Clock::time_point now);
+  /// Deaths within the window before the last one.
   std::size_t deaths_in_window() const { return deaths_.size(); }
+  /// As given to the constructor.
   const RestartPolicyParameters& parameters() const { return parameters_; }
 
  private:

@@ -28,6 +28,7 @@ const char* to_string(ProcessState state) {
     case ProcessState::kGivenUp:
       return "given up";
   }
+
   return "?";
 }
 
@@ -47,15 +48,18 @@ void Supervisor::start(const std::vector<ProcessStatus>& known, Clock::time_poin
     const auto before = std::find_if(known.begin(), known.end(), [&](const auto& process) {
       return process.name == entry.spec.name;
     });
+
     if (before != known.end()) {
       entry.starts = before->restarts + 1;
       entry.died = now;
       entry.child = ChildProcess::adopt(before->pid, before->start_ticks);
     }
+
     if (!entry.child) {
       launch(entry, now);
       continue;
     }
+
     entry.state = ProcessState::kRunning;
     entry.started = now;
     say_(entry.spec.name, fmt::format("adopted (pid {})", entry.child->pid()));
@@ -68,6 +72,7 @@ void Supervisor::launch(Entry& entry, Clock::time_point now) {
   entry.stopped_since.reset();
   entry.started = now;
   ++entry.starts;
+
   try {
     entry.child = ChildProcess::start(entry.spec.command);
   } catch (const std::system_error& error) {
@@ -78,6 +83,7 @@ void Supervisor::launch(Entry& entry, Clock::time_point now) {
     if (entry.starts == 1) refused_.push_back(entry.spec.name);
     return;
   }
+
   entry.state = ProcessState::kRunning;
   if (entry.starts == 1) {
     say_(entry.spec.name, fmt::format("started (pid {})", entry.child->pid()));
@@ -103,6 +109,7 @@ void Supervisor::step(Clock::time_point now) {
     if (entry.child && !stopping()) watch(entry, now);
     if (entry.start_due && now >= *entry.start_due) launch(entry, now);
   }
+
   if (!stopping() || killed_ || now - *stop_time_ < parameters_.stop_timeout) return;
   killed_ = true;
   for (auto& entry : entries_) {
@@ -117,12 +124,14 @@ void Supervisor::bury(Entry& entry, const Ending& ending, Clock::time_point now)
   entry.child.reset();
   entry.died = now;
   const bool wanted = stopping() || (ending.known && ending.signal == 0 && ending.exit_code == 0);
+
   if (wanted) {
     entry.state = ProcessState::kFinished;
     const bool clean = ending.known && ending.signal == 0 && ending.exit_code == 0;
     say_(entry.spec.name, clean ? "ended" : ending.text());
     return;
   }
+
   entry.last_ending = ending.text();
   say_(entry.spec.name,
        fmt::format("{} after {:.1f} s", ending.text(), seconds(now - entry.started)));
@@ -132,6 +141,7 @@ void Supervisor::bury(Entry& entry, const Ending& ending, Clock::time_point now)
     say_(entry.spec.name, "refuses its configuration: not started again");
     return;
   }
+
   schedule_restart(entry, now);
 }
 
@@ -154,6 +164,7 @@ void Supervisor::watch(Entry& entry, Clock::time_point now) {
   } else if (!entry.stopped_since) {
     entry.stopped_since = now;
   }
+
   const auto stopped_for = entry.stopped_since ? now - *entry.stopped_since : Clock::duration(0);
   const auto silent_for = entry.last_heartbeat ? now - *entry.last_heartbeat : Clock::duration(0);
   if (stopped_for >= parameters_.stopped_restart || silent_for >= parameters_.silent_restart) {
@@ -166,6 +177,7 @@ void Supervisor::watch(Entry& entry, Clock::time_point now) {
     entry.child->signal(SIGKILL);
     return;
   }
+
   const bool degraded =
       stopped_for >= parameters_.stopped_degraded || silent_for >= parameters_.silent_degraded;
   if (degraded && entry.state == ProcessState::kRunning) {
@@ -173,6 +185,7 @@ void Supervisor::watch(Entry& entry, Clock::time_point now) {
   } else if (!degraded && entry.state == ProcessState::kDegraded) {
     say_(entry.spec.name, "answers again");
   }
+
   entry.state = degraded ? ProcessState::kDegraded : ProcessState::kRunning;
 }
 
@@ -224,6 +237,7 @@ std::vector<ProcessStatus> Supervisor::status() const {
     status.last_ending = entry.last_ending;
     result.push_back(std::move(status));
   }
+
   return result;
 }
 

@@ -1,7 +1,7 @@
 // Starts processes, notices when one dies or hangs, starts it again, stops all cleanly.
 //
-// It has no loop and no clock of its own: the caller polls the descriptors, says what time it is
-// and calls step(). So the same object runs in `understory launch` and in tests.
+// It has no loop and no clock of its own: the caller polls the descriptors and calls step() with
+// the time. So the same object runs in `understory launch` and in tests.
 #pragma once
 
 #include <functional>
@@ -15,14 +15,15 @@
 
 namespace understory::launch {
 
+/// A process to run.
 struct ProcessSpec {
   std::string name;  ///< As in its HEALTH messages.
   Command command;
 };
 
-/// A process that is stopped (SIGSTOP) is seen in /proc within a tenth of a second, hence the short
-/// times. Any other hang shows only as missing HEALTH, which comes once a second: three missed are
-/// DEGRADED, five a hang. Fewer would restart healthy processes on a busy computer.
+/// A process that is stopped (SIGSTOP) is noticed in /proc within a tenth of a second, hence the
+/// short times. Any other hang shows only as missing HEALTH, which comes once a second: three
+/// missed are DEGRADED, five a hang. Fewer would restart healthy processes on a busy computer.
 struct SupervisorParameters {
   RestartPolicyParameters restart;
   milliseconds stopped_degraded{300};
@@ -32,9 +33,12 @@ struct SupervisorParameters {
   milliseconds stop_timeout{900};  ///< From SIGTERM to SIGKILL.
 };
 
+/// What a process is doing.
 enum class ProcessState { kWaiting, kRunning, kDegraded, kFinished, kGivenUp };
+/// "waiting", "running", "degraded", "finished", "given up".
 const char* to_string(ProcessState state);
 
+/// How a process is, for reports and for the registry.
 struct ProcessStatus {
   std::string name;
   ProcessState state = ProcessState::kWaiting;
@@ -44,10 +48,12 @@ struct ProcessStatus {
   std::string last_ending;  ///< Empty before the first death.
 };
 
+/// All processes of a launch.
 class Supervisor {
  public:
-  /// `say` is called with one line for everything that happens: (process, text).
+  /// Called with one line for everything that happens: (process, text).
   using Say = std::function<void(const std::string&, const std::string&)>;
+  /// Starts nothing yet.
   Supervisor(std::vector<ProcessSpec> specs, const SupervisorParameters& parameters, Say say);
 
   /// Takes over those of `known` that still run, starts the others; restarts go on being counted.
@@ -60,10 +66,14 @@ class Supervisor {
   /// Asks every process to end; step() goes on until stopped().
   void stop(Clock::time_point now);
 
+  /// True after stop().
   bool stopping() const { return stop_time_.has_value(); }
   bool stopped() const;  ///< No process runs and none will be started.
+  /// Readable when a process has ended: for poll().
   std::vector<int> descriptors() const;
+  /// When step() must be called at the latest.
   Clock::time_point wake_up(Clock::time_point now) const;
+  /// One per process, in the order of the specs.
   std::vector<ProcessStatus> status() const;
   /// Processes that were refused at their first start (exit status 2: wrong configuration).
   const std::vector<std::string>& refused() const { return refused_; }

@@ -42,18 +42,22 @@ TEST_CASE("messages arrive whole, in order, on their channel only") {
   INFO(kind);
   const auto bus = make_bus(kind);
   std::vector<std::pair<std::string, Bytes>> got;
+
   const auto note = [&](const BusMessage& message) {
     got.emplace_back(message.channel, Bytes(message.bytes.begin(), message.bytes.end()));
   };
+
   bus->subscribe("A.B", 100, note);  // a dot is a dot, not any letter
   bus->subscribe("LARGE", 100, note);
   std::vector<std::pair<std::string, Bytes>> sent;
   for (int i = 0; i < 20; ++i) sent.emplace_back("A.B", Bytes(static_cast<std::size_t>(i), 7));
   sent.emplace_back("LARGE", Bytes(300000, 9));
+
   for (const auto& [channel, bytes] : sent) {
     CHECK_FALSE(bus->publish("AXB", bytes));
     CHECK_FALSE(bus->publish(channel, bytes));
   }
+
   handle(*bus, [&] { return got.size() == sent.size(); });
   CHECK(got == sent);
 }
@@ -81,6 +85,7 @@ TEST_CASE("handlers may publish, and what they throw comes out of handle_one") {
                  [&](const BusMessage& message) { bus->publish("ANSWER", message.bytes); });
   bus->subscribe("ANSWER", 10, [&](const BusMessage&) { ++answers; });
   bus->subscribe("BAD", 10, [](const BusMessage&) { throw std::runtime_error("bad"); });
+
   bus->publish("ASK", Bytes{1});
   handle(*bus, [&] { return answers == 1; });
   CHECK(answers == 1);
@@ -88,6 +93,7 @@ TEST_CASE("handlers may publish, and what they throw comes out of handle_one") {
   CHECK_THROWS_WITH(handle(*bus, [] { return false; }), "bad");
   bus->publish("ASK", Bytes{1});
   handle(*bus, [&] { return answers == 2; });
+
   CHECK(answers == 2);
 }
 
@@ -107,18 +113,22 @@ TEST_CASE("sweeps travel in a group of their own, paced, and only to who wants t
   const auto sender = make_live_bus(private_url());
   const auto receiver = make_live_bus(private_url());
   LiveBus bystander(private_url());
+
   int sweeps = 0;
   int others = 0;
   int overheard = 0;
+
   receiver->subscribe("LIDAR_SWEEP", 0, [&](const BusMessage& message) {
     if (message.bytes.size() == 50000) ++sweeps;
   });
+
   receiver->subscribe("OTHER", 0, [&](const BusMessage&) { ++others; });
   bystander.subscribe("LIDAR_SWEEP", 0, [&](const BusMessage&) { ++overheard; });
   for (int i = 0; i < 60; ++i) {
     CHECK_FALSE(sender->publish("LIDAR_SWEEP", Bytes(50000, 3)));
     if (i % 10 == 0) CHECK_FALSE(sender->publish("OTHER", Bytes(5, 3)));
   }
+
   handle(*receiver, [&] { return sweeps == 60 && others == 6; });
   CHECK(sweeps == 60);
   CHECK(others == 6);
@@ -153,28 +163,34 @@ TEST_CASE("faults are counted, seeded, and together make up all messages") {
                    .channels = {"X"}},
                   seed);
     std::vector<Bytes> got;
+
     bus.subscribe("X", 0, [&](const BusMessage& message) {
       got.emplace_back(message.bytes.begin(), message.bytes.end());
     });
+
     std::size_t others = 0;
     bus.subscribe("Y", 0, [&](const BusMessage&) { ++others; });
     for (int i = 0; i < 2000; ++i) {
       bus.publish("X", Bytes(8, static_cast<std::uint8_t>(i)));
       bus.publish("Y", Bytes(8, 0));
     }
+
     bus.flush();
     inner.drain();
     const FaultCounts& c = bus.counts();
     CHECK(others == 2000);
     CHECK(got.size() == 2000 - c.dropped + c.duplicated + c.flood_packets);
+
     for (const std::uint64_t count :
          {c.dropped, c.duplicated, c.delayed, c.reordered, c.corrupted, c.truncated}) {
       CHECK(count > 120);
       CHECK(count < 280);
     }
+
     CHECK(c.flood_packets > 0);
     return got;
   };
+
   CHECK(run(1) == run(1));
   CHECK(run(1) != run(2));
 }

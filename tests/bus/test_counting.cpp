@@ -15,10 +15,12 @@ using namespace understory::bus;
 TEST_CASE("losses, duplicates and late comers are counted exactly under random faults") {
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     std::mt19937_64 random(seed);
+
     // Some of 0..1999 are lost, some come twice, some come up to 20 places late.
     std::vector<std::pair<double, std::int64_t>> arrivals;
     std::set<std::int64_t> distinct;
     std::uint64_t duplicates = 0;
+
     for (std::int64_t i = 0; i < 2000; ++i) {
       const auto chance = random() % 100;
       if (i > 0 && i < 1999 && chance < 10) continue;
@@ -30,12 +32,14 @@ TEST_CASE("losses, duplicates and late comers are counted exactly under random f
         ++duplicates;
       }
     }
+
     std::stable_sort(arrivals.begin(), arrivals.end(),
                      [](const auto& a, const auto& b) { return a.first < b.first; });
     std::uint64_t late = 0;
     std::int64_t newest = -1;
     std::set<std::int64_t> had;
     SequenceTracker tracker;
+
     for (const auto& [when, sequence] : arrivals) {
       const bool is_duplicate = !had.insert(sequence).second;
       if (!is_duplicate && sequence < newest) ++late;
@@ -43,6 +47,7 @@ TEST_CASE("losses, duplicates and late comers are counted exactly under random f
       const Arrival arrival = tracker.take(sequence, 1000 + sequence);
       CHECK((arrival == Arrival::kDuplicate) == is_duplicate);
     }
+
     CHECK(tracker.counts().messages == arrivals.size());
     CHECK(tracker.counts().duplicates == duplicates);
     CHECK(tracker.counts().late == late);
@@ -74,10 +79,12 @@ TEST_CASE("percentiles agree with sorting, within a sixteenth") {
   std::lognormal_distribution<double> spread(6.0, 2.0);
   LatencyHistogram histogram;
   std::vector<std::int64_t> values;
+
   for (int i = 0; i < 20000; ++i) {
     values.push_back(static_cast<std::int64_t>(spread(random)));
     histogram.add(values.back());
   }
+
   std::sort(values.begin(), values.end());
   for (const double q : {0.01, 0.5, 0.9, 0.99, 1.0}) {
     const auto rank = static_cast<std::size_t>(std::ceil(q * 20000.0)) - 1;
@@ -86,6 +93,7 @@ TEST_CASE("percentiles agree with sorting, within a sixteenth") {
     CHECK(estimate >= exact);
     CHECK(estimate <= exact * (1.0 + 1.0 / 16.0) + 1.0);
   }
+
   CHECK(histogram.max() == values.back());
   CHECK(LatencyHistogram().quantile(0.5) == 0);
 }
@@ -111,6 +119,7 @@ TEST_CASE("health follows from fresh reasons and recovers") {
   monitor.ready();
   CHECK(monitor.state() == health_t::STATE_OK);
   monitor.count_reason("IN", wire::Reason::kDuplicate, "twice");
+
   CHECK(monitor.state() == health_t::STATE_OK);
   monitor.count_reason("IN", wire::Reason::kNotFinite, "x");
   CHECK(monitor.state() == health_t::STATE_DEGRADED);
@@ -118,6 +127,7 @@ TEST_CASE("health follows from fresh reasons and recovers") {
   CHECK(monitor.state() == health_t::STATE_ERROR);
   now = HealthMonitor::kFreshUs;
   CHECK(monitor.state() == health_t::STATE_OK);
+
   for (int i = 0; i < 30; ++i) monitor.count_message(channel, 100 + i);
   for (int i = 1; i <= 100; ++i) monitor.count_latency(i);
   const health_t report = monitor.report(129);
@@ -125,6 +135,7 @@ TEST_CASE("health follows from fresh reasons and recovers") {
   CHECK(report.channels.at(0).rate_hz == Approx(30.0 / 3.0));
   CHECK(report.channels.at(0).malformed == 1);
   CHECK(report.handled == 30);
+
   CHECK(report.latency_p50_us >= 50);
   CHECK(report.latency_p50_us <= 54);
   CHECK(report.latency_max_us == 100);
@@ -132,5 +143,6 @@ TEST_CASE("health follows from fresh reasons and recovers") {
   CHECK(report.rss_bytes > 0);
   REQUIRE(report.reasons.size() == 3);
   CHECK(report.reasons[1].reason == "duplicate");
+
   CHECK(report.reasons[1].count == 1);
 }

@@ -59,12 +59,14 @@ TEST_CASE("bad messages are refused by rule, counted, and change nothing") {
     bench.send(bad);
     bad.from_T_to = geometry::SE2(std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0);
     bench.send(bad);
+
     bad = test::toy_input(i);
     bad.covariance(0, 0) = -1.0;
     bench.send(bad);
     bench.bus.publish("ODOMETRY", std::vector<std::uint8_t>{1, 2, 3});
     bench.send(test::toy_input(i));
   }
+
   CHECK(bench.count(wire::Reason::kOutOfRange) == 10);
   CHECK(bench.count(wire::Reason::kNotFinite) == 10);
   CHECK(bench.count(wire::Reason::kNotPositive) == 10);
@@ -89,6 +91,7 @@ TEST_CASE("nothing that is not finite is published") {
   options.process = "test";
   Node node(bus, options, no_clock());
   const auto out = node.advertise<raw_pose_t>("OUT");
+
   raw_pose_t pose{};
   out.publish(pose);
   pose.odom_T_vehicle.x = std::numeric_limits<double>::infinity();
@@ -112,6 +115,7 @@ TEST_CASE("under loss, repetition, disorder and damage every message is accounte
                       .channels = {}},
                      seed);
     const int sent = 1000;
+
     for (int i = 0; i < sent; ++i) {
       // The ends pass unharmed: a loss behind the last message cannot be seen.
       Bus& way = i == 0 || i == sent - 1 ? static_cast<Bus&>(bench.bus) : faulty;
@@ -119,6 +123,7 @@ TEST_CASE("under loss, repetition, disorder and damage every message is accounte
       way.publish("ODOMETRY", wire::encode_message(test::toy_input(i)));
       bench.bus.drain();
     }
+
     const FaultCounts& faults = faulty.counts();
     const SequenceCounts& counts = bench.hosted.node().sequence_counts("ODOMETRY");
     CHECK(counts.lost == faults.dropped + faults.truncated);
@@ -127,6 +132,7 @@ TEST_CASE("under loss, repetition, disorder and damage every message is accounte
     CHECK(health.channels.at(0).malformed ==
           static_cast<std::int64_t>(faults.truncated + faults.flood_packets));
     CHECK(bench.poses.size() == sent - counts.lost - counts.late);
+
     for (std::size_t k = 1; k < bench.poses.size(); ++k) {
       CHECK(bench.poses[k - 1].utime < bench.poses[k].utime);
     }

@@ -57,6 +57,7 @@ TEST_CASE("keys without a table are printed before every table") {
   table.add("second", second, {0.0, 9.0}, "m", "Two.");
   table.load_text("second = 3\n[part]\nfirst = 4\n", "x.toml");
   CHECK(first == 4.0);
+
   CHECK(second == 3.0);
   const std::string printed = table.to_toml();
   first = second = 0.0;
@@ -78,6 +79,7 @@ TEST_CASE("a file with one mistake sets nothing, and all mistakes are named") {
     CHECK(error.problems()[1] ==
           "toy.toml:4: toy.negat: unknown key; the nearest valid one is toy.negate");
   }
+
   CHECK(described.table.to_toml() == before);
   CHECK_THROWS_WITH(described.table.load_text("[toy\n", "toy.toml"),
                     Catch::Matchers::StartsWith("toy.toml:"));

@@ -106,6 +106,7 @@ TEST_CASE("configuration comes from one file per service and lands in the log") 
   fs::create_directories(config);
   std::ofstream(config / "toy.toml") << "[toy]\ngain = 4\n";
   ReplayOptions options;
+
   options.log = in;
   options.out = out;
   options.services = {test::toy_service()};
@@ -113,6 +114,7 @@ TEST_CASE("configuration comes from one file per service and lands in the log") 
   options.channel_suffix = "_ALT";
   options.keeps_inputs = false;
   replay(options);
+
   const auto poses = events_of(out, "RAW_POSE_ALT");
   REQUIRE(poses.size() == 10);
   CHECK(wire::decode_message<raw_pose_t>(poses.back().data)->odom_T_vehicle.x == 4.0 * 55.0);
@@ -121,6 +123,7 @@ TEST_CASE("configuration comes from one file per service and lands in the log") 
   CHECK(wire::decode_message<config_t>(configs[0].data)->toml.find("gain = 4.0") !=
         std::string::npos);
   CHECK(events_of(out, "ODOMETRY").empty());
+
   std::ofstream(config / "toy.toml") << "[toy]\ngain = 400\n";
   CHECK_THROWS_AS(replay(options), ConfigurationError);
   fs::remove(in);

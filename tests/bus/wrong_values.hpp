@@ -32,6 +32,7 @@ inline void check_every_wrong_value(const bus::ParameterTable::Entry& entry,
   const auto refused = [&](const std::string& value, const std::string& what) {
     check_refused(entry, value, what, problem_with);
   };
+
   if (const auto* number = std::get_if<bus::ParameterTable::Number>(&entry.target)) {
     const double below = number->range.lowest - std::max(1e-3, std::abs(number->range.lowest));
     const double above = number->range.highest * 2.0 + 1.0;
@@ -55,6 +56,7 @@ inline void check_every_wrong_value(const bus::ParameterTable::Entry& entry,
     refused("3", "not text");
     if (!text.choices.empty()) refused("\"no such\"", "not known");
   }
+
   const std::string unknown = problem_with(entry.key + "x", "1");
   INFO(entry.key << "x: " << unknown);
   CHECK(unknown.find("unknown key; the nearest valid one is " + entry.key) != std::string::npos);

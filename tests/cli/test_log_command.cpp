@@ -93,10 +93,12 @@ TEST_CASE_METHOD(Fixture, "log cut takes time and channels", "[cli]") {
       0);
   io::LcmLogReader reader(out);
   const auto kept = read_log(reader);
+
   const auto expected = std::count_if(events.begin(), events.end(), [&](const io::LogEvent& e) {
     const auto time = e.utime - events[0].utime;
     return e.channel == "LANDMARKS" && time >= 950'000 && time <= 2'050'000;
   });
+
   CHECK(kept.size() == static_cast<std::size_t>(expected));
   CHECK(
       run("log cut " + whole + " --channels NONE --out " + (directory / "n.lcm").string()).status ==

@@ -73,9 +73,11 @@ void check_holds(const std::vector<io::LogEvent>& events, const io::VictoriaPark
   CHECK(same_scans);
   CHECK(same_wheels);
   CHECK(same_fixes);
+
   const auto motions = messages<model::Odometry>(events, "ODOMETRY");
   const auto expected = eval::experiments::victoria_park::victoria_park_odometry(recording);
   REQUIRE(motions.size() == expected.size());
+
   for (std::size_t i = 0; i < motions.size(); ++i) {
     CHECK(motions[i].utime == expected[i].utime);
     CHECK(motions[i].from_utime == expected[i].from_utime);
@@ -152,6 +154,7 @@ TEST_CASE_METHOD(Fixture, "the processes and the experiment make one map", "[cli
       eval::experiments::victoria_park::victoria_park_defaults(), [] {});
   REQUIRE_FALSE(maps.empty());
   REQUIRE(maps.back().landmarks.size() == experiment.landmarks.size());
+
   for (std::size_t i = 0; i < experiment.landmarks.size(); ++i) {
     CHECK(maps.back().landmarks[i].id == experiment.landmarks[i].id);
     const auto apart = maps.back().landmarks[i].position_m - experiment.landmarks[i].position_m;
@@ -168,6 +171,7 @@ TEST_CASE_METHOD(Fixture, "what was mapped is exported", "[cli][recording]") {
   CHECK(outcome.status == 0);
   const auto events = events_of(directory / "out.lcm");
   const auto map = messages<model::WholeMap>(events, "MAP").back();
+
   CHECK(test::lines(test::read_text(directory / "export/landmarks.csv")) ==
         map.landmarks.size() + 1);
   CHECK(test::lines(test::read_text(directory / "export/keyframes.tum")) == map.keyframes.size());

@@ -28,6 +28,7 @@ TEST_CASE("gives up exactly at the fifth death within thirty seconds", "[launch]
     launch::RestartPolicy policy;
     std::vector<launch::Clock::time_point> deaths;
     launch::Clock::time_point now{};
+
     for (int i = 0; i < 30; ++i) {
       now += launch::milliseconds(step_ms(random));
       deaths.push_back(now);

@@ -71,6 +71,7 @@ TEST_CASE("sim names what it does not know", "[cli]") {
     return understory_command(directory,
                               "sim " + arguments + " --out " + (directory / "never.lcm").string());
   };
+
   const auto lidar = run("urban --lidar vlp17");
   CHECK(lidar.status == 2);
   CHECK_THAT(lidar.error, Contains("vlp17"));
@@ -78,6 +79,7 @@ TEST_CASE("sim names what it does not know", "[cli]") {
   CHECK(run("poles:a.csv").status == 2);
   const auto missing = run("poles:" + (directory / "none.csv").string() + ",b.csv");
   CHECK(missing.status == 1);
+
   CHECK_THAT(missing.error, Contains("none.csv"));
   CHECK_FALSE(std::filesystem::exists(directory / "never.lcm"));
 }

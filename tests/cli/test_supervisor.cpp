@@ -163,6 +163,7 @@ TEST_CASE("launch.toml is refused with file, line and key", "[launch]") {
     }
     return "accepted";
   };
+
   const std::string good = "[[process]]\nname = \"a\"\nexecutable = \"x\"\n";
   CHECK(refused(good) == "accepted");
   CHECK_THAT(refused(""), Contains("no [[process]]"));
@@ -170,6 +171,7 @@ TEST_CASE("launch.toml is refused with file, line and key", "[launch]") {
   CHECK_THAT(refused(good + "config = \"none.toml\"\n"), Contains(":4") && Contains("none.toml"));
   CHECK_THAT(refused(good + "arguments = [1]\n"), Contains(":4") && Contains("arguments"));
   CHECK_THAT(refused(good + "keeps_state = 1\n"), Contains(":4") && Contains("keeps_state"));
+
   CHECK_THAT(refused(good + good), Contains("twice"));
   CHECK_THAT(refused("[[process]]\nname = \"a\"\n"), Contains("executable"));
   CHECK_THAT(refused("[[process]]\nname = 3\nexecutable = \"x\"\n"), Contains(":2"));

@@ -45,14 +45,17 @@ std::vector<std::string> bounds(const bus::ParameterTable::Entry& entry) {
     return {fmt::format("{:.17e}", number->range.lowest),
             fmt::format("{:.17e}", number->range.highest)};
   }
+
   if (const auto* integer = std::get_if<bus::ParameterTable::Integer>(&entry.target)) {
     return {std::to_string(integer->range.lowest), std::to_string(integer->range.highest)};
   }
+
   if (std::holds_alternative<bus::ParameterTable::Boolean>(entry.target)) return {"true", "false"};
   std::vector<std::string> choices;
   for (const std::string& choice : std::get<bus::ParameterTable::Text>(entry.target).choices) {
     choices.push_back('"' + choice + '"');
   }
+
   return choices;
 }
 
@@ -115,6 +118,7 @@ TEST_CASE("the configurations that come with the project start services that the
       CHECK(process.executable == "understory-" + dashed);
     }
   }
+
   CHECK(directories >= 2);
 }
 

@@ -53,11 +53,13 @@ Observation observe(const Points& scene, const geometry::SE2& scene_T_sensor, co
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   std::normal_distribution<double> noise(0.0, view.sigma_m);
   std::vector<std::pair<ObservedPoint, LandmarkId>> seen;
+
   for (std::size_t i = 0; i < scene.size(); ++i) {
     const Eigen::Vector2d point = scene_T_sensor.inverse() * scene[i];
     if (point.norm() > view.range_m || unit(random) > view.detection) continue;
     seen.push_back({{point + Eigen::Vector2d(noise(random), noise(random)), view.sigma_m}, i + 1});
   }
+
   const auto clutter = static_cast<int>(view.clutter * static_cast<double>(seen.size()));
   for (int i = 0; i < clutter; ++i) {
     const double radius = view.range_m * std::sqrt(unit(random));
@@ -65,12 +67,14 @@ Observation observe(const Points& scene, const geometry::SE2& scene_T_sensor, co
     seen.push_back(
         {{{radius * std::cos(angle), radius * std::sin(angle)}, view.sigma_m}, LandmarkId{0}});
   }
+
   std::shuffle(seen.begin(), seen.end(), random);
   Observation observation;
   for (const auto& [point, id] : seen) {
     observation.points.push_back(point);
     observation.truth.push_back(id);
   }
+
   return observation;
 }
 
@@ -96,11 +100,13 @@ TEST_CASE("An observation finds its place, its landmarks and its covariance", "[
       {40, 0.1, 0.9, 0.0}, {40, 0.2, 0.8, 0.0}, {40, 0.1, 0.6, 1.0}, {25, 0.05, 1.0, 0.0}};
   LocaliseParameters parameters;
   parameters.map_sigma_m = 0.001;  // the map is exact here
+
   for (const View& view : views) {
     double nees = 0.0;
     int wrong_pairs = 0;
     int pairs = 0;
     const int n = 300;
+
     for (int i = 0; i < n; ++i) {
       const geometry::SE2 truth = random_pose(random, 50, 350);
       const Observation observation = observe(scene, truth, view, random);
@@ -109,17 +115,21 @@ TEST_CASE("An observation finds its place, its landmarks and its covariance", "[
       REQUIRE(distance(result.map_T_sensor, truth) < 0.25);
       REQUIRE(result.inliers == result.associations.size());
       std::vector<LandmarkId> ids;
+
       for (const PointAssociation& association : result.associations) {
         ids.push_back(association.landmark_id);
         wrong_pairs += observation.truth[association.observed] != association.landmark_id ? 1 : 0;
         ++pairs;
       }
+
       std::sort(ids.begin(), ids.end());
       REQUIRE(std::adjacent_find(ids.begin(), ids.end()) == ids.end());
       const Eigen::Vector3d error = (result.map_T_sensor.inverse() * truth).Log();
       nees += error.dot(result.covariance.ldlt().solve(error)) / n;
     }
+
     REQUIRE(wrong_pairs < 0.02 * pairs);
+
     // 3 degrees of freedom, 300 runs: 2.6 to 3.4 is four sigmas; false pairs add a little.
     REQUIRE(nees > 2.4);
     REQUIRE(nees < 4.2);
@@ -130,15 +140,18 @@ TEST_CASE("The answer moves with the map and with the observation", "[constellat
   std::mt19937_64 random(2);
   const Points scene = random_scene(random, 300.0, 0.0138, 2.0);
   const ConstellationMap map = map_of(scene);
+
   for (int i = 0; i < 40; ++i) {
     const geometry::SE2 moved_T_scene = random_pose(random, -1000, 1000);
     const geometry::SE2 turned_T_sensor = random_pose(random, -5, 5);
     const ConstellationMap moved = map_of(scene, moved_T_scene);
     Observation observation = observe(scene, random_pose(random, 50, 250), {}, random);
     const Localisation first = map.localise(observation.points);
+
     for (ObservedPoint& point : observation.points) {
       point.position_m = turned_T_sensor * point.position_m;
     }
+
     const Localisation second = moved.localise(observation.points);
     REQUIRE(first.found());
     REQUIRE(second.found());
@@ -153,6 +166,7 @@ TEST_CASE("Scenes that are not in the map are not found", "[constellation]") {
   const Points scene = random_scene(random, 500.0, 0.0138, 2.0);
   const Points other = random_scene(random, 500.0, 0.0138, 2.0);
   const ConstellationMap map = map_of(scene);
+
   for (const double sigma_m : {0.05, 0.2}) {
     for (int i = 0; i < 120; ++i) {
       View view;
@@ -174,6 +188,7 @@ TEST_CASE("Doubled landmarks of another scene are not found", "[constellation]")
   const Points other = random_scene(random, 200.0, 0.042, 0.5);
   const ConstellationMap map = map_of(scene);
   std::normal_distribution<double> apart(0.0, 0.3);
+
   for (int i = 0; i < 40; ++i) {
     View view;
     view.sigma_m = 0.05;
@@ -194,6 +209,7 @@ TEST_CASE("A scene that stands in the map twice is ambiguous", "[constellation]"
   ConstellationMap map = map_of(scene);
   const geometry::SE2 map_T_copy(400.0, -300.0, 2.0);
   for (std::size_t i = 0; i < scene.size(); ++i) map.insert(10000 + i, map_T_copy * scene[i]);
+
   for (int i = 0; i < 100; ++i) {
     const Observation observation = observe(scene, random_pose(random, 45, 75), {}, random);
     const Localisation result = map.localise(observation.points);
@@ -211,10 +227,12 @@ TEST_CASE("Rows of a plantation are never mistaken for a place", "[constellation
   std::mt19937_64 random(5);
   std::normal_distribution<double> jitter(0.0, 0.05);
   Points scene;
+
   for (int i = 0; i < 50; ++i) {
     for (int j = 0; j < 50; ++j)
       scene.emplace_back(5.0 * i + jitter(random), 4.0 * j + jitter(random));
   }
+
   const ConstellationMap map = map_of(scene);
   for (int i = 0; i < 60; ++i) {
     const geometry::SE2 truth = random_pose(random, 60, 140);
@@ -228,9 +246,11 @@ TEST_CASE("A scene of which a part is mapped is found by that part", "[constella
   std::mt19937_64 random(6);
   const Points scene = random_scene(random, 300.0, 0.0138, 2.0);
   ConstellationMap half;
+
   for (std::size_t i = 0; i < scene.size(); ++i) {
     if (scene[i].x() < 150.0) half.insert(i + 1, scene[i]);
   }
+
   int found = 0;
   for (int i = 0; i < 200; ++i) {
     // 5 to 20 m outside the mapped half: a half down to a fifth of the view is mapped.
@@ -240,6 +260,7 @@ TEST_CASE("A scene of which a part is mapped is found by that part", "[constella
     ++found;
     REQUIRE(distance(result.map_T_sensor, truth) < 0.5);
   }
+
   REQUIRE(found >= 196);
 }
 
@@ -249,6 +270,7 @@ TEST_CASE("The same question gets the same answer", "[constellation]") {
   const ConstellationMap map = map_of(scene);
   ConstellationMap backwards;
   for (std::size_t i = scene.size(); i > 0; --i) backwards.insert(i, scene[i - 1]);
+
   for (int i = 0; i < 100; ++i) {
     const Observation observation = observe(scene, random_pose(random, 50, 250), {}, random);
     const Localisation first = map.localise(observation.points);
@@ -271,11 +293,14 @@ TEST_CASE("Too little and unusable observations are told apart from the rest", "
   std::vector<ObservedPoint> points;
   REQUIRE(map.localise(points).outcome == LocaliseOutcome::kTooFewPoints);
   points = {{{1, 2}, 0.1}, {{3, nan}, 0.1}, {{5, 9}, nan}, {{1e9, 0}, 0.1}, {{4, 4}, 0.1}};
+
   REQUIRE(map.localise(points).outcome == LocaliseOutcome::kTooFewPoints);
   REQUIRE(ConstellationMap().localise(points).outcome == LocaliseOutcome::kTooFewPoints);
+
   // Three points fit somewhere in any forest, and one place is no news.
   points = {{scene[0], 0.1}, {scene[1], 0.1}, {scene[2], 0.1}};
   REQUIRE_FALSE(map.localise(points).found());
+
   // One point many times over, and all in a line.
   points.assign(50, {{1, 2}, 0.1});
   REQUIRE_FALSE(map.localise(points).found());

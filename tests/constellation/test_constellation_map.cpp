@@ -39,8 +39,10 @@ std::vector<Triple> brute_force_triangles(const Model& model, double limit_m) {
       }
     }
   }
+
   std::sort(triangles.begin(), triangles.end());
   triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
+
   return triangles;
 }
 
@@ -105,6 +107,7 @@ TEST_CASE("Triangles after random changes equal those made by brute force", "[co
       RandomChanges changes(seed, extent_m, lattice);
       ConstellationMap map;
       Model model;
+
       for (int i = 0; i < 4000; ++i) {
         changes.apply(map, model);
         if (i % 400 == 399 || i < 12) {
@@ -112,10 +115,12 @@ TEST_CASE("Triangles after random changes equal those made by brute force", "[co
           REQUIRE(map.triangles() == brute_force_triangles(model, 30.0));
         }
       }
+
       while (!model.empty()) {
         REQUIRE(map.remove(model.begin()->first));
         model.erase(model.begin());
       }
+
       REQUIRE(map.triangle_count() == 0);
     }
   }
@@ -139,17 +144,20 @@ TEST_CASE("Nearest and all landmarks within a radius equal brute force", "[const
   std::uniform_real_distribution<double> place(-220, 220);
   std::uniform_real_distribution<double> radius(0.0, 40.0);
   const Model model = clustered_model(random, 800);
+
   for (const double cell_m : {1.0, 4.0, 17.0}) {
     ConstellationMap::Parameters parameters;
     parameters.cell_m = cell_m;
     ConstellationMap map(parameters);
     for (const auto& [id, position] : model) map.insert(id, position);
+
     for (int i = 0; i < 2000; ++i) {
       const Eigen::Vector2d point(place(random), place(random));
       const double r = radius(random);
       std::vector<LandmarkId> within;
       std::pair<double, LandmarkId> best(r, 0);
       bool any = false;
+
       for (const auto& [id, position] : model) {
         const double distance = (position - point).norm();
         if (distance > r) continue;
@@ -157,6 +165,7 @@ TEST_CASE("Nearest and all landmarks within a radius equal brute force", "[const
         if (!any || distance < best.first) best = {distance, id};
         any = true;
       }
+
       REQUIRE(map.near({point, r}) == within);
       const auto nearest = map.nearest(point, r);
       REQUIRE(nearest.has_value() == any);

@@ -21,9 +21,11 @@ inline std::vector<hierarchy::LandmarkPosition> random_forest(std::size_t count,
   const double half_side = 0.5 * std::sqrt(static_cast<double>(count) / 0.0122);
   std::uniform_real_distribution<double> coordinate(-half_side, half_side);
   std::unordered_map<std::int64_t, std::vector<Eigen::Vector2d>> cells;
+
   const auto cell = [](double x) {
     return static_cast<std::int64_t>(std::floor(x / kMinDistance));
   };
+
   std::vector<hierarchy::LandmarkPosition> forest;
   while (forest.size() < count) {
     const Eigen::Vector2d p(coordinate(random), coordinate(random));
@@ -36,11 +38,13 @@ inline std::vector<hierarchy::LandmarkPosition> random_forest(std::size_t count,
                            [&](const Eigen::Vector2d& q) { return (p - q).norm() > kMinDistance; });
       }
     }
+
     if (free) {
       cells[cell(p.x()) * 1000003 + cell(p.y())].push_back(p);
       forest.push_back({forest.size() + 1, p});
     }
   }
+
   return forest;
 }
 
@@ -61,21 +65,25 @@ inline std::vector<hierarchy::LandmarkPosition> observe(
   const geometry::SE2 vehicle_T_map = map_T_vehicle.inverse();
   std::vector<hierarchy::LandmarkPosition> seen;
   std::uint64_t false_id = 1ULL << 32U;
+
   for (const hierarchy::LandmarkPosition& trunk : forest) {
     if ((trunk.position_m - map_T_vehicle.translation()).norm() > view.range_m) {
       continue;
     }
+
     if (chance(random) < view.clutter) {
       const double radius = view.range_m * std::sqrt(chance(random));
       const double bearing = 2.0 * std::numbers::pi * chance(random);
       seen.push_back({false_id++, radius * Eigen::Vector2d(std::cos(bearing), std::sin(bearing))});
     }
+
     if (chance(random) < view.detection) {
       const Eigen::Vector2d error(noise(random), noise(random));
       seen.push_back({trunk.id, vehicle_T_map * trunk.position_m +
                                     (view.noise_m > 0.0 ? error : Eigen::Vector2d::Zero())});
     }
   }
+
   return seen;
 }
 

@@ -38,6 +38,7 @@ Descriptor sampled(const Walk& walk, int samples, int fine) {
     centroid += walk[i] / static_cast<double>(walk.size());
     until.push_back(until.back() + (walk[(i + 1) % walk.size()] - walk[i]).norm());
   }
+
   std::vector<double> radii;
   std::size_t edge = 0;
   for (int i = 0; i < fine; ++i) {
@@ -50,6 +51,7 @@ Descriptor sampled(const Walk& walk, int samples, int fine) {
         walk[edge] + part * (walk[(edge + 1) % walk.size()] - walk[edge]) - centroid;
     radii.push_back(p.norm());
   }
+
   Descriptor result{};
   for (int k = 0; k <= samples / 2; ++k) {
     std::complex<double> sum = 0.0;
@@ -58,6 +60,7 @@ Descriptor sampled(const Walk& walk, int samples, int fine) {
     }
     result[k] = static_cast<float>(std::abs(sum) / fine * samples * (k == 0 ? 1.0 : std::sqrt(2)));
   }
+
   return result;
 }
 
@@ -147,6 +150,7 @@ TEST_CASE("The index finds what a search through everything finds", "[hierarchy]
   DescriptorIndex index(2.0F);
   std::vector<DescriptorIndex::Hit> hits;
   std::size_t found_in_all = 0;
+
   for (int step = 0; step < 4000; ++step) {
     if (random() % 3 != 0 || descriptors.empty()) {
       descriptors.push_back(describe(random_polygon(random), 20));
@@ -157,9 +161,11 @@ TEST_CASE("The index finds what a search through everything finds", "[hierarchy]
       REQUIRE(index.erase(static_cast<std::uint32_t>(key), descriptors[key]) == present[key]);
       present[key] = false;
     }
+
     if (step % 10 != 0) {
       continue;
     }
+
     const Descriptor query = step % 20 == 0 ? describe(random_polygon(random), 20)
                                             : descriptors[random() % descriptors.size()];
     for (const float radius : {0.0F, 2.0F, 7.5F, 40.0F, 1000.0F}) {
@@ -168,6 +174,7 @@ TEST_CASE("The index finds what a search through everything finds", "[hierarchy]
       for (std::size_t key = 0; key < descriptors.size(); ++key) {
         expected += present[key] && distance(query, descriptors[key]) <= radius ? 1 : 0;
       }
+
       REQUIRE(hits.size() == expected);
       found_in_all += hits.size();
       for (std::size_t i = 0; i < hits.size(); ++i) {
@@ -177,6 +184,7 @@ TEST_CASE("The index finds what a search through everything finds", "[hierarchy]
       }
     }
   }
+
   REQUIRE(index.size() ==
           static_cast<std::size_t>(std::count(present.begin(), present.end(), true)));
   REQUIRE(found_in_all > 10000);

@@ -33,6 +33,7 @@ std::vector<Summary> summarise(const GeometricHierarchy& hierarchy) {
       summary.triangles = polygon.triangles.size();
     }
   }
+
   std::sort(result.begin(), result.end());
   return result;
 }
@@ -43,9 +44,11 @@ void check_same_as_from_scratch(const GeometricHierarchy& changed,
   for (const auto& [id, position] : landmarks) {
     list.push_back({id, position});
   }
+
   const GeometricHierarchy fresh(list);
   REQUIRE(changed.triangulation().landmark_count() == landmarks.size());
   REQUIRE(changed.triangulation().triangle_count() == fresh.triangulation().triangle_count());
+
   // Bit for bit: same walks from the same vertex, so the same sums.
   REQUIRE(summarise(changed) == summarise(fresh));
   REQUIRE(changed.index().size() == changed.polygon_count());
@@ -69,17 +72,20 @@ void change_at_random(std::mt19937_64& random, std::size_t typical_size, int ste
   GeometricHierarchy hierarchy;
   std::map<std::uint64_t, Eigen::Vector2d> landmarks;
   std::uint64_t next_id = 1;
+
   for (int step = 1; step <= steps; ++step) {
     const bool grow = landmarks.size() < typical_size / 2 || random() % 2 == 0;
     const auto any = [&] {
       auto it = landmarks.lower_bound(1 + random() % next_id);
       return it == landmarks.end() ? landmarks.begin() : it;
     };
+
     if (landmarks.empty() || (random() % 3 == 0 && grow && landmarks.size() < typical_size)) {
       const Eigen::Vector2d position = place();
       if (hierarchy.insert(next_id, position) == ChangeStatus::kDone) {
         landmarks[next_id] = position;
       }
+
       ++next_id;
     } else if (random() % 3 == 0 && !grow) {
       const auto it = any();
@@ -92,6 +98,7 @@ void change_at_random(std::mt19937_64& random, std::size_t typical_size, int ste
         it->second = position;
       }
     }
+
     if (step % check_every == 0) {
       CAPTURE(step);
       check_same_as_from_scratch(hierarchy, landmarks);
@@ -149,6 +156,7 @@ TEST_CASE("So it is on a circle, where every four points are cocircular", "[hier
       }
     }
   }
+
   REQUIRE(circle.size() == 36);
   circle.emplace_back(0.0, 0.0);  // a hub: its removal leaves a hole with many sides
   std::mt19937_64 random(14);
@@ -164,17 +172,20 @@ TEST_CASE("The polygons are the components across longest edges", "[hierarchy]")
   const Triangulation& triangulation = hierarchy.triangulation();
   std::size_t boundary_edges = 0;
   std::size_t triangles = 0;
+
   for (const Polygon& polygon : hierarchy.polygons()) {
     REQUIRE(polygon.boundary.size() == polygon.triangles.size() + 2);
     boundary_edges += polygon.boundary.size();
     triangles += polygon.triangles.size();
     double area = 0.0;
+
     for (std::size_t i = 0; i < polygon.boundary.size(); ++i) {
       const Eigen::Vector2d a = triangulation.position(polygon.boundary[i]);
       const Eigen::Vector2d b =
           triangulation.position(polygon.boundary[(i + 1) % polygon.boundary.size()]);
       area += 0.5 * (a.x() * b.y() - a.y() * b.x());
     }
+
     double sum = 0.0;
     for (const std::uint32_t t : polygon.triangles) {
       const auto& v = triangulation.triangles()[t].vertices;
@@ -182,9 +193,12 @@ TEST_CASE("The polygons are the components across longest edges", "[hierarchy]")
       const Eigen::Vector2d ac = triangulation.position(v[2]) - triangulation.position(v[0]);
       sum += 0.5 * (ab.x() * ac.y() - ab.y() * ac.x());
     }
+
     REQUIRE(area == Approx(sum));
   }
+
   REQUIRE(triangles == triangulation.triangle_count());
+
   // The oracle: a triangle and its neighbour across its longest edge share a polygon, and nothing
   // else joins polygons (a forest with as many trees as polygons).
   std::size_t joins = 0;
@@ -193,12 +207,14 @@ TEST_CASE("The polygons are the components across longest edges", "[hierarchy]")
     joins += edge.in_polygon_boundary ? 0 : 1;
     kept += edge.in_polygon_boundary ? (edge.on_hull ? 1 : 2) : 0;
   }
+
   REQUIRE(joins == triangles - hierarchy.polygon_count());
   REQUIRE(kept == boundary_edges);
   for (std::uint32_t t = 0; t < triangulation.triangles().size(); ++t) {
     const Triangle& triangle = triangulation.triangles()[t];
     double longest = 0.0;
     std::uint32_t across = kNone;
+
     for (int i = 0; i < 3; ++i) {
       const double length = (triangulation.position(triangle.vertices[(i + 1) % 3]) -
                              triangulation.position(triangle.vertices[(i + 2) % 3]))
@@ -208,6 +224,7 @@ TEST_CASE("The polygons are the components across longest edges", "[hierarchy]")
         across = triangle.neighbours[i];
       }
     }
+
     if (across != kNone) {
       REQUIRE(hierarchy.polygon_of(across) == hierarchy.polygon_of(t));
     }
@@ -218,15 +235,18 @@ TEST_CASE("Polygons know whether they touch the hull", "[hierarchy]") {
   std::mt19937_64 random(16);
   const GeometricHierarchy hierarchy(random_landmarks(random, 300, 80.0));
   std::size_t hull = 0;
+
   for (const HierarchyEdge& edge : edges(hierarchy)) {
     hull += edge.on_hull ? 1 : 0;
   }
+
   std::size_t counted = 0;
   std::size_t inside = 0;
   for (const Polygon& polygon : hierarchy.polygons()) {
     counted += polygon.hull_edges;
     inside += polygon.touches_hull() ? 0 : 1;
   }
+
   REQUIRE(hull >= 3);
   REQUIRE(counted == hull);
   REQUIRE(inside > hierarchy.polygon_count() / 2);
@@ -238,13 +258,16 @@ TEST_CASE("Many moves at once are the same as one by one", "[hierarchy]") {
   auto landmarks = random_landmarks(random, 500, 80.0);
   GeometricHierarchy hierarchy(landmarks);
   std::map<std::uint64_t, Eigen::Vector2d> expected;
+
   for (LandmarkPosition& landmark : landmarks) {
     landmark.position_m += Eigen::Vector2d(small(random), small(random));
     expected[landmark.id] = landmark.position_m;
   }
+
   for (const ChangeStatus status : hierarchy.move(landmarks)) {
     REQUIRE(status == ChangeStatus::kDone);
   }
+
   check_same_as_from_scratch(hierarchy, expected);
 }
 

@@ -34,8 +34,10 @@ TEST_CASE("A view without noise matches all of its inner polygons rightly", "[hi
   const auto forest = test::random_forest(1200, random);
   const GeometricHierarchy map(forest);
   const test::View view{.noise_m = 0.0, .detection = 1.0};
+
   for (int trial = 0; trial < 20; ++trial) {
     const GeometricHierarchy query(observe(forest, random_pose(random), view, random));
+
     // A polygon of the query exists in the map as well or has been changed by the end of the view.
     const auto in_map = polygon_ids(map);
     std::set<std::uint64_t> findable;
@@ -44,6 +46,7 @@ TEST_CASE("A view without noise matches all of its inner polygons rightly", "[hi
         findable.insert(ids.begin(), ids.end());
       }
     }
+
     const auto pairs = match(query, map);
     std::set<std::uint64_t> found;
     for (const LandmarkMatch& pair : pairs) {
@@ -51,10 +54,12 @@ TEST_CASE("A view without noise matches all of its inner polygons rightly", "[hi
         found.insert(pair.query_id);
       }
     }
+
     REQUIRE(findable.size() > 15);
     for (const std::uint64_t id : findable) {
       REQUIRE(found.contains(id));
     }
+
     REQUIRE(judge(pairs).wrong <= pairs.size() / 5);
   }
 }
@@ -66,6 +71,7 @@ TEST_CASE("Missed, false and noisy landmarks leave enough right pairs", "[hierar
   const test::View view{.noise_m = 0.05, .detection = 0.9, .clutter = 0.03};
   int places_found = 0;
   Tally sum;
+
   for (int trial = 0; trial < 50; ++trial) {
     const GeometricHierarchy query(observe(forest, random_pose(random), view, random));
     const Tally tally = judge(match(query, map));
@@ -73,6 +79,7 @@ TEST_CASE("Missed, false and noisy landmarks leave enough right pairs", "[hierar
     sum.right += tally.right;
     sum.wrong += tally.wrong;
   }
+
   REQUIRE(places_found >= 48);
   REQUIRE(sum.right > 3 * sum.wrong);
 }
@@ -83,6 +90,7 @@ TEST_CASE("No landmark is in two pairs, and the best come first", "[hierarchy]")
   const GeometricHierarchy map(forest);
   const test::View view{.noise_m = 0.2, .detection = 0.8, .clutter = 0.2};
   std::size_t pairs_seen = 0;
+
   for (int trial = 0; trial < 30; ++trial) {
     const GeometricHierarchy query(observe(forest, random_pose(random), view, random));
     const auto pairs = match(query, map, {.max_descriptor_distance = 8.0});
@@ -96,6 +104,7 @@ TEST_CASE("No landmark is in two pairs, and the best come first", "[hierarchy]")
     }
     pairs_seen += pairs.size();
   }
+
   REQUIRE(pairs_seen > 100);
 }
 
@@ -104,6 +113,7 @@ TEST_CASE("Polygon matches are those of a search through all pairs", "[hierarchy
   const auto forest = test::random_forest(1500, random);
   const GeometricHierarchy map(forest);
   const MatchParameters parameters{.max_descriptor_distance = 6.0};
+
   for (int trial = 0; trial < 10; ++trial) {
     const GeometricHierarchy query(observe(forest, random_pose(random), test::View{}, random));
     const auto nearest = [&](const Polygon& polygon, const GeometricHierarchy& among) {
@@ -118,6 +128,7 @@ TEST_CASE("Polygon matches are those of a search through all pairs", "[hierarchy
       }
       return best.second;
     };
+
     std::vector<std::pair<std::uint32_t, std::uint32_t>> expected;
     for (std::uint32_t q = 0; q < query.polygons().size(); ++q) {
       const std::uint32_t m = nearest(query.polygons()[q], map);
@@ -125,10 +136,12 @@ TEST_CASE("Polygon matches are those of a search through all pairs", "[hierarchy
         expected.emplace_back(q, m);
       }
     }
+
     std::vector<std::pair<std::uint32_t, std::uint32_t>> found;
     for (const PolygonMatch& match : match_polygons(query, map, parameters)) {
       found.emplace_back(match.query, match.map);
     }
+
     REQUIRE(found == expected);
     REQUIRE(found.size() > 3);
   }
@@ -141,6 +154,7 @@ TEST_CASE("A mirrored scene gives no pairs of its own", "[hierarchy]") {
   const test::View view{.noise_m = 0.0, .detection = 1.0};
   std::size_t polygon_matches = 0;
   Tally sum;
+
   for (int trial = 0; trial < 10; ++trial) {
     auto seen = observe(forest, geometry::SE2(0.0, 0.0, 0.1 * trial), view, random);
     for (LandmarkPosition& landmark : seen) {
@@ -153,6 +167,7 @@ TEST_CASE("A mirrored scene gives no pairs of its own", "[hierarchy]") {
     sum.right += tally.right;
     sum.wrong += tally.wrong;
   }
+
   REQUIRE(polygon_matches > 100);
   REQUIRE(sum.right + sum.wrong < polygon_matches);
 }

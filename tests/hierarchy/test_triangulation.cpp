@@ -61,6 +61,7 @@ std::set<Ids> brute_force(const std::vector<Eigen::Vector2d>& points) {
       }
     }
   }
+
   return result;
 }
 
@@ -92,11 +93,13 @@ TEST_CASE("Triangles are those whose circles are empty", "[hierarchy]") {
     Triangulation triangulation;
     TriangulationChange change;
     std::vector<Eigen::Vector2d> points;
+
     for (std::uint64_t id = 0; id < 25; ++id) {
       points.emplace_back(coordinate(random), coordinate(random));
       REQUIRE(triangulation.insert(id, points.back(), change) == ChangeStatus::kDone);
       check_neighbours(triangulation);
     }
+
     REQUIRE(triangle_ids(triangulation) == brute_force(points));
     for (std::uint64_t id = 24; id >= 8; --id) {
       REQUIRE(triangulation.remove(id, change) == ChangeStatus::kDone);
@@ -104,6 +107,7 @@ TEST_CASE("Triangles are those whose circles are empty", "[hierarchy]") {
       check_neighbours(triangulation);
       REQUIRE(triangle_ids(triangulation) == brute_force(points));
     }
+
     for (std::uint64_t id = 0; id < points.size(); ++id) {
       // Small moves keep the triangles, large ones do not: both ways must be exact.
       const double scale = id % 2 == 0 ? 0.02 : 1.0;
@@ -121,12 +125,14 @@ TEST_CASE("Changes are reported completely", "[hierarchy]") {
   Triangulation triangulation;
   TriangulationChange change;
   std::vector<Triangle> before;
+
   for (int step = 0; step < 3000; ++step) {
     before.assign(triangulation.triangles().begin(), triangulation.triangles().end());
     std::vector<Eigen::Vector2d> places(triangulation.slot_count());
     for (std::uint32_t slot = 0; slot < places.size(); ++slot) {
       places[slot] = triangulation.position(slot);
     }
+
     const std::uint64_t id = 1 + random() % 40;
     const Eigen::Vector2d place(cell(random), cell(random));
     switch (random() % 3) {
@@ -139,9 +145,11 @@ TEST_CASE("Changes are reported completely", "[hierarchy]") {
       default:
         triangulation.move(id, place, change);
     }
+
     const auto has = [](const std::vector<std::uint32_t>& list, std::uint32_t t) {
       return std::find(list.begin(), list.end(), t) != list.end();
     };
+
     before.resize(triangulation.triangles().size());
     for (std::uint32_t t = 0; t < before.size(); ++t) {
       const Triangle& now = triangulation.triangles()[t];
@@ -149,13 +157,16 @@ TEST_CASE("Changes are reported completely", "[hierarchy]") {
       for (int i = 0; same_shape && i < 3 && triangulation.is_triangle(t); ++i) {
         same_shape = places[now.vertices[i]] == triangulation.position(now.vertices[i]);
       }
+
       if (same_shape && before[t].neighbours == now.neighbours) {
         continue;
       }
+
       CAPTURE(step, t);
       if (before[t].vertices[0] != kNone && !same_shape) {
         REQUIRE(has(change.removed, t));
       }
+
       if (triangulation.is_triangle(t)) {
         const bool reported = has(change.made, t) || (same_shape && has(change.rim, t));
         REQUIRE(reported);
@@ -172,6 +183,7 @@ TEST_CASE("What cannot be done is refused and changes nothing", "[hierarchy]") {
   REQUIRE(triangulation.insert(2, {4.0, 0.0}, change) == ChangeStatus::kDone);
   REQUIRE(triangulation.insert(3, {0.0, 3.0}, change) == ChangeStatus::kDone);
   REQUIRE(triangulation.insert(4, {3.0, 3.5}, change) == ChangeStatus::kDone);
+
   const auto before = triangle_ids(triangulation);
   REQUIRE(triangulation.insert(1, {1.0, 1.0}, change) == ChangeStatus::kIdInUse);
   REQUIRE(triangulation.insert(5, {4.0, 0.0}, change) == ChangeStatus::kCoincident);
@@ -179,6 +191,7 @@ TEST_CASE("What cannot be done is refused and changes nothing", "[hierarchy]") {
   REQUIRE(triangulation.remove(5, change) == ChangeStatus::kUnknownId);
   REQUIRE(triangulation.move(5, {1.0, 1.0}, change) == ChangeStatus::kUnknownId);
   REQUIRE(triangulation.move(1, {0.0, nan}, change) == ChangeStatus::kNotFinite);
+
   REQUIRE(triangulation.move(1, {3.0, 3.5}, change) == ChangeStatus::kCoincident);
   REQUIRE(change.made.empty());
   REQUIRE(triangle_ids(triangulation) == before);
@@ -193,6 +206,7 @@ TEST_CASE("Fewer than three landmarks, or all in one line, have no triangles", "
     triangulation.insert(id, {static_cast<double>(id), 2.0 * static_cast<double>(id)}, change);
     REQUIRE(triangulation.triangle_count() == 0);
   }
+
   triangulation.insert(6, {0.0, 9.0}, change);
   REQUIRE(triangulation.triangle_count() == 4);
   triangulation.move(6, {6.0, 12.0}, change);
@@ -200,6 +214,7 @@ TEST_CASE("Fewer than three landmarks, or all in one line, have no triangles", "
   triangulation.move(3, {5.0, 0.0}, change);
   REQUIRE(triangulation.triangle_count() == 4);
   triangulation.remove(3, change);
+
   REQUIRE(triangulation.triangle_count() == 0);
 }
 
@@ -209,6 +224,7 @@ TEST_CASE("The nearest landmark is found", "[hierarchy]") {
   Triangulation triangulation;
   TriangulationChange change;
   REQUIRE_FALSE(triangulation.nearest({0.0, 0.0}));
+
   for (std::uint64_t id = 0; id < 300; ++id) {
     triangulation.insert(id, {coordinate(random), coordinate(random)}, change);
     const Eigen::Vector2d place(coordinate(random), coordinate(random));

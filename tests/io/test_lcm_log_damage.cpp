@@ -86,11 +86,14 @@ TEST_CASE_METHOD(Fixture, "a stretch taken out costs the events that it touches"
     test::Bytes damaged(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(from));
     damaged.insert(damaged.end(), bytes.begin() + static_cast<std::ptrdiff_t>(to), bytes.end());
     std::size_t untouched = 0;
+
     for (std::size_t i = 0; i < events.size(); ++i) {
       untouched += starts[i + 1] <= from || starts[i] >= to ? 1 : 0;
     }
+
     const auto result = read_damaged(directory, damaged);
     CAPTURE(from, to);
+
     // A stretch may begin and end inside two payloads so that they join: one more event then.
     REQUIRE(result.events.size() + 1 >= untouched);
     REQUIRE(result.events.size() <= untouched + 1);
@@ -109,6 +112,7 @@ TEST_CASE_METHOD(Fixture, "garbage between events is skipped and counted exactly
                    garbage.end());
     const auto result = read_damaged(directory, damaged);
     CAPTURE(victim);
+
     // Without a header behind it the event before the garbage is not beyond doubt.
     REQUIRE(result.events.size() + 1 >= events.size());
     REQUIRE(strangers(result.events, events) == 0);

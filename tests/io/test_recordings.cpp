@@ -80,6 +80,7 @@ std::string pcd(const std::string& kind) {
     }
     return text;
   }
+
   std::string body;
   if (kind == "binary") {
     for (const TestPoint& p : points) {
@@ -89,12 +90,14 @@ std::string pcd(const std::string& kind) {
     }
     return text + body;
   }
+
   for (const TestPoint& p : points) append(body, p.x);
   for (const TestPoint& p : points) append(body, p.y);
   for (const TestPoint& p : points) append(body, p.z);
   for (const TestPoint& p : points) append(body, p.intensity);
   for (const TestPoint& p : points) append(body, p.ring);
   for (const TestPoint& p : points) append(body, p.time);
+
   // LZF with literals, and one back reference where bytes repeat.
   std::string packed;
   std::size_t at = 0;
@@ -110,8 +113,10 @@ std::string pcd(const std::string& kind) {
     packed += body.substr(at, count);
     at += count;
   }
+
   append(text, static_cast<std::uint32_t>(packed.size()));
   append(text, static_cast<std::uint32_t>(body.size()));
+
   return text + packed;
 }
 
@@ -134,6 +139,7 @@ TEST_CASE("PCD files of every kind hold the same points", "[pcd]") {
     REQUIRE(sweep.points.size() == points.size());
     CHECK(sweep.has_times);
     CHECK(sweep.rings == 16);
+
     for (std::size_t i = 0; i < points.size(); ++i) {
       CHECK(sweep.points[i].x_m == Approx(points[i].x));
       CHECK(sweep.points[i].z_m == Approx(points[i].z));
@@ -156,6 +162,7 @@ TEST_CASE("a PCD file that is cut or damaged is refused or read, never worse", "
       parses([&] { parse_pcd(damaged, "damaged.pcd"); });
     }
   }
+
   CHECK_FALSE(parses([] {
     parse_pcd("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nPOINTS 99999999999\nDATA ascii\n",
               "huge.pcd");
@@ -184,20 +191,24 @@ TEST_CASE("a KITTI drive is read with rings and times", "[kitti][recorded]") {
   REQUIRE(drive.imu_T_velo());
   CHECK(drive.imu_T_velo()->translation().z() == Approx(0.80).margin(0.02));
   CHECK(drive.oxts()[0].forward_velocity_mps == Approx(8.62).margin(0.01));
+
   // The records' own track agrees with their speed.
   const LocalPlane plane(drive.oxts()[0].latitude_deg, drive.oxts()[0].longitude_deg);
   const auto& last = drive.oxts().back();
   CHECK(plane.east_north_m(last.latitude_deg, last.longitude_deg).norm() ==
         Approx(8.19).margin(0.05));
+
   for (std::size_t i = 0; i < drive.sweeps(); ++i) {
     const model::PointSweep sweep = drive.read_sweep(i);
     CHECK(sweep.points.size() > 115'000);
     std::map<int, std::pair<double, int>> elevation;
+
     for (const model::SweepPoint& p : sweep.points) {
       auto& [sum, count] = elevation[p.ring];
       sum += std::atan2(p.z_m, std::hypot(p.x_m, p.y_m));
       ++count;
     }
+
     CHECK(elevation.size() == 64);
     double below = -1.0;
     for (const auto& [ring, sums] : elevation) {
@@ -205,6 +216,7 @@ TEST_CASE("a KITTI drive is read with rings and times", "[kitti][recorded]") {
       CHECK(mean > below - 0.003);
       below = mean;
     }
+
     CHECK(sweep.points.front().time_s >= 0.0F);
     CHECK(sweep.points.back().time_s == Approx(0.1032).margin(0.001));
     if (i > 0) CHECK(sweep.utime > drive.read_sweep(i - 1).utime);
@@ -217,11 +229,13 @@ TEST_CASE("the reduced KITTI drive is read with its poses", "[kitti][recorded]")
   REQUIRE(drive.sweeps() == 154);
   CHECK(drive.poses().size() == 154);
   std::size_t points = 0;
+
   for (std::size_t i = 0; i < drive.sweeps(); ++i) {
     const model::PointSweep sweep = drive.read_sweep(i);
     points += sweep.points.size();
     for (const model::SweepPoint& p : sweep.points) REQUIRE(p.ring < 16);
   }
+
   CHECK(points == 4'677'499);
   CHECK_THROWS_AS(ReducedKitti(folder, "gps"), DataError);
 }
@@ -247,6 +261,7 @@ TEST_CASE("tables of sensors are read by the names of their columns", "[csv]") {
       "t_ns;latitude_deg;longitude_deg;sigma_m\n1000;49.0;8.0;0.5\n2000;49.001;8.0;0.5\n", "g.csv");
   REQUIRE(fixes.size() == 2);
   CHECK(fixes[1].east_north_m.y() == Approx(111.2).margin(0.2));
+
   CHECK(parse_wheel_table("t_us speed_mps\n5 2.5\n", "w.csv")[0].speed_mps == 2.5);
   CHECK_THROWS_AS(parse_imu_table("t_s,ax\n1,2\n", "imu.csv"), DataError);
   CHECK_THROWS_AS(parse_wheel_table("t_s,speed_mps\n2,1\n1,1\n", "w.csv"), DataError);
@@ -261,6 +276,7 @@ TEST_CASE("captures that are cut or damaged end, and give whole packets", "[pcap
       .read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   const Folder folder;
   std::mt19937_64 random(3);
+
   const auto read = [&](const std::string& content) -> std::size_t {
     const fs::path copy = folder.write("copy.pcap", content);
     std::size_t count = 0;
@@ -273,11 +289,14 @@ TEST_CASE("captures that are cut or damaged end, and give whole packets", "[pcap
     } catch (const DataError&) {
       return 0;
     }
+
     return count;
   };
+
   CHECK(read(bytes) == 350);
   CHECK(read("") == 0);
   for (int i = 0; i < 40; ++i) CHECK(read(bytes.substr(0, random() % 60'000)) < 60);
+
   for (int i = 0; i < 40; ++i) {
     std::string damaged = bytes.substr(0, 40'000);
     for (int k = 0; k < 10; ++k) damaged[random() % damaged.size()] = static_cast<char>(random());

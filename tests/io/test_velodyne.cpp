@@ -40,6 +40,7 @@ TEST_CASE("a turn of the VLP-16 is where its beams look", "[velodyne]") {
   CHECK(turn.rings == 16);
   CHECK(turn.points.size() == 900 * 32);
   CHECK(turn.utime >= 7'200'000'000);
+
   CHECK(turn.utime < 7'200'100'000);
   float last = 0.0F;
   for (const model::SweepPoint& p : turn.points) {
@@ -61,6 +62,7 @@ TEST_CASE("models tell their beams apart", "[velodyne]") {
   const VelodyneCalibration hdl32 = velodyne_calibration(VelodyneModel::kHdl32e);
   CHECK(hdl32.beams[0].elevation_rad == Approx(-30.6667 * kDegree).epsilon(1e-4));
   CHECK(hdl32.beams[31].elevation_rad == Approx(10.6667 * kDegree).epsilon(1e-4));
+
   for (const VelodyneModel model :
        {VelodyneModel::kVlp16, VelodyneModel::kVlp32c, VelodyneModel::kHdl32e}) {
     const VelodyneCalibration calibration = velodyne_calibration(model);
@@ -70,6 +72,7 @@ TEST_CASE("models tell their beams apart", "[velodyne]") {
       by_ring[calibration.rings[i]] = calibration.beams[i].elevation_rad;
     CHECK(std::ranges::is_sorted(by_ring, std::ranges::less_equal{}));
   }
+
   CHECK_THROWS_AS(velodyne_calibration(VelodyneModel::kHdl64e), DataError);
   CHECK_FALSE(velodyne_model("os1"));
 }
@@ -106,16 +109,19 @@ TEST_CASE("the HDL-64E decodes with its own calibration", "[velodyne]") {
       {.hdl64 = true, .product = 0, .azimuth = 35000, .azimuth_step = 20, .packet_us = 288.0}, 500);
   REQUIRE(!turns.empty());
   CHECK(turns[0].points.size() == 1800 * 64);
+
   for (const model::SweepPoint& p : turns[0].points)
     CHECK(p.position().norm() == Approx(11.2).epsilon(0.002));
   CHECK_THROWS_AS(parse_hdl64_calibration("lasers:\n", "db.yaml"), DataError);
   CHECK_THROWS_AS(parse_hdl64_calibration(test::hdl64_yaml().substr(0, 3000), "db.yaml"),
                   DataError);
   std::string xml = "<boost_serialization>";
+
   for (int i = 0; i < 64; ++i)
     xml += "<item><px><id_>" + std::to_string(i) + "</id_><rotCorrection_>1.5</rotCorrection_>" +
            "<vertCorrection_>" + std::to_string(2.0 - 0.4 * i) + "</vertCorrection_>" +
            "<distCorrection_>120</distCorrection_></px></item>";
+
   const VelodyneCalibration from_xml = parse_hdl64_calibration(xml, "db.xml");
   CHECK(from_xml.beams[3].distance_correction_m == Approx(1.2));
   CHECK(from_xml.beams[0].elevation_rad == Approx(2.0 * kDegree));
@@ -130,10 +136,12 @@ TEST_CASE("packets that are none are refused", "[velodyne]") {
     CHECK_FALSE(decoder.add({good.data(), size}, 0));
   const auto refused = decoder.counts().refused;
   CHECK(refused == decoder.counts().packets);
+
   test::Packet other = good;
   other[1205] = 0x21;
   decoder.add(other, 0);
   CHECK(decoder.counts().refused == refused + 1);
+
   for (int i = 0; i < 20000; ++i) {
     test::Packet noisy = good;
     for (int k = 0; k < 20; ++k)
@@ -155,6 +163,7 @@ TEST_CASE("NMEA sentences are read when their checksum is right", "[velodyne]") 
   char digits[3];
   std::snprintf(digits, sizeof digits, "%02X", sum);
   const std::string sentence = good.substr(0, star + 1) + digits;
+
   const auto position = parse_gprmc(sentence);
   REQUIRE(position);
   CHECK(position->is_valid);
@@ -162,6 +171,7 @@ TEST_CASE("NMEA sentences are read when their checksum is right", "[velodyne]") 
   CHECK(position->longitude_deg == Approx(-(4.0 + 26.388 / 60.0)));
   CHECK(position->speed_mps == Approx(5.14444).epsilon(1e-4));
   CHECK(position->day_us == (8 * 3600 + 18 * 60 + 1) * 1'000'000LL);
+
   for (std::size_t i = 0; i < sentence.size(); ++i) {
     parse_gprmc(std::string_view(sentence).substr(0, i));
     std::string changed = sentence;
@@ -176,16 +186,19 @@ TEST_CASE("a recorded capture of a VLP-16", "[velodyne][recorded]") {
   VelodyneDecoder decoder(velodyne_calibration(VelodyneModel::kVlp16));
   std::vector<model::PointSweep> turns;
   int positions = 0;
+
   while (const auto packet = capture.next()) {
     if (packet->port == kVelodynePositionPort)
       positions += parse_velodyne_position(packet->payload).has_value();
     if (packet->port != kVelodyneDataPort) continue;
     if (auto turn = decoder.add(packet->payload, packet->utime)) turns.push_back(*std::move(turn));
   }
+
   CHECK(decoder.counts().packets == 293);
   CHECK(decoder.counts().refused == 0);
   CHECK(positions > 0);
   REQUIRE(turns.size() >= 2);
+
   for (const model::PointSweep& turn : turns) {
     CHECK(turn.points.size() > 10'000);
     CHECK(turn.points.back().time_s == Approx(0.1).margin(0.005));
@@ -196,6 +209,7 @@ TEST_CASE("a recorded capture of a VLP-16", "[velodyne][recorded]") {
             0.001 + 0.012 / p.position().norm());
     }
   }
+
   CHECK(std::abs(turns[1].utime - turns[0].utime - 100'000) < 3'000);
 }
 
@@ -204,12 +218,14 @@ TEST_CASE("VLP-16 packets inside a foreign LCM log", "[velodyne][recorded]") {
   LcmLogReader reader(file);
   VelodyneDecoder decoder(velodyne_calibration(VelodyneModel::kVlp16));
   std::vector<model::PointSweep> turns;
+
   while (const auto event = reader.next()) {
     if (event->channel != "vlp16.center.ray") continue;
     const std::span<const std::uint8_t> data(event->data);
     if (auto turn = decoder.add(data.last(kVelodyneDataBytes), event->utime))
       turns.push_back(*std::move(turn));
   }
+
   CHECK(decoder.counts().refused == 0);
   CHECK(decoder.counts().packets == 120);
   REQUIRE(!turns.empty());

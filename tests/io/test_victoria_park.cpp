@@ -129,9 +129,11 @@ TEST_CASE("the set is read as it is downloaded", "[victoria_park][recorded]") {
   CHECK(recording.scans.front().utime == 852'000);
   CHECK(recording.scans.back().utime == 1'545'182'000);
   std::size_t near = 0;
+
   for (const auto& scan : recording.scans) {
     for (const float range : scan.ranges_m) near += range < 75.0F ? 1 : 0;
   }
+
   CHECK(static_cast<double>(near) / (7230.0 * 361.0) == Approx(0.17).margin(0.01));
   CHECK(contains(error_of([&] { RecordingFolder(archive).read("NONE.txt"); }),
                  "victoria_park_ascii.zip:NONE.txt"));

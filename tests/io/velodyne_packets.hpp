@@ -28,6 +28,7 @@ struct PacketMaker {
       for (int i = 0; i < bytes; ++i)
         packet[at + static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(value >> (8 * i));
     };
+
     const int shared = (dual ? 2 : 1) * (hdl64 ? 2 : 1);
     for (int b = 0; b < 12; ++b) {
       const auto at = static_cast<std::size_t>(b) * 100;
@@ -39,11 +40,13 @@ struct PacketMaker {
         packet[at + 6 + 3 * c] = static_cast<std::uint8_t>(c);
       }
     }
+
     put(1200, static_cast<std::uint32_t>(time_us), 4);
     packet[1204] = dual ? 0x39 : 0x37;
     packet[1205] = product;
     azimuth = (azimuth + 12 / shared * azimuth_step) % 36000;
     time_us += packet_us;
+
     return packet;
   }
 };

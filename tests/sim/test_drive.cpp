@@ -70,6 +70,7 @@ TEST_CASE("Paths have the shapes of the figure", "[path]") {
   for (const geometry::SE2& pose : circle) {
     REQUIRE((pose.translation() - Eigen::Vector2d(0, radius)).norm() == Approx(radius));
   }
+
   const auto eight = path_of(PathKind::kFigureEight);
   CHECK((eight[500].translation()).norm() < 1e-6);
   CHECK(eight[250].y() > 0.0);  // left first
@@ -77,6 +78,7 @@ TEST_CASE("Paths have the shapes of the figure", "[path]") {
   const auto square = path_of(PathKind::kSquare);
   Eigen::Vector2d high = Eigen::Vector2d::Zero();
   for (const geometry::SE2& pose : square) high = high.cwiseMax(pose.translation());
+
   CHECK((high - Eigen::Vector2d(50, 50)).norm() < 1e-9);
   CHECK(square.back().theta() == Approx(-0.5 * pi));
   CHECK(path_of(PathKind::kTriangle).back().theta() == Approx(-2.0 * pi / 3.0));
@@ -129,13 +131,16 @@ TEST_CASE("Detections have the noise, the rate and the range that were asked for
   parameters.sensor.detection_probability = rate;
   const Drive drive(parameters, 4);
   double sum_squared = 0.0;
+
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double count = 0.0;
   double in_range = 0.0;
+
   for (std::size_t k = 0; k < drive.size(); k += 4) {
     const SimulatedScan scan = drive.scan(k);
     REQUIRE(scan.trunks.size() == scan.scan.detections.size());
     const geometry::SE2 vehicle_T_world = scan.world_T_vehicle.inverse();
+
     // Well inside the range the test of the range does not cut the noise.
     for (std::size_t i = 0; i < scan.trunks.size(); ++i) {
       const Eigen::Vector2d seen = scan.scan.detections[i].position_m.head<2>();
@@ -147,9 +152,11 @@ TEST_CASE("Detections have the noise, the rate and the range that were asked for
       sum_squared += (seen - truth).squaredNorm();
       count += 1.0;
     }
+
     in_range +=
         static_cast<double>(drive.grid().within(scan.world_T_vehicle.translation(), 37.0).size());
   }
+
   const double error = 4.0 / std::sqrt(count);
   CHECK(std::sqrt(sum_squared / (2.0 * count)) == Approx(sigma).epsilon(error));
   CHECK((sum / count).norm() < error * sigma);

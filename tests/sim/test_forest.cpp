@@ -24,6 +24,7 @@ double mean_nearest_distance(const sim::Forest& forest) {
     }
     sum += best;
   }
+
   return sum / static_cast<double>(forest.trunks_m.size());
 }
 
@@ -40,6 +41,7 @@ TEST_CASE("The forests have as many trunks as the source's, as far apart", "[for
     double trunks;
     double nearest_m;
   };
+
   const Expected row = GENERATE(Expected{sim::ForestKind::kDense, 42011, 2.733},
                                 Expected{sim::ForestKind::kIntermediate, 13770, 4.968},
                                 Expected{sim::ForestKind::kSparse, 8419, 6.560});
@@ -76,6 +78,7 @@ TEST_CASE("The grid finds what brute force finds", "[grid]") {
   std::vector<Eigen::Vector2d> points(300);
   for (auto& p : points) p = {anywhere(random), anywhere(random)};
   const sim::PointGrid grid(points, 7.0);
+
   for (int i = 0; i < 500; ++i) {
     const Eigen::Vector2d centre(beyond(random), beyond(random));
     const double radius = std::abs(beyond(random)) / 5.0;
@@ -89,6 +92,7 @@ TEST_CASE("The grid finds what brute force finds", "[grid]") {
     REQUIRE(grid.any_within(centre, radius) == !expected.empty());
     REQUIRE(grid.nearest(centre)->index == nearest);
   }
+
   CHECK_FALSE(sim::PointGrid({}, 7.0).nearest({0, 0}));
   CHECK(sim::PointGrid({}, 7.0).within({0, 0}, 5.0).empty());
 }
@@ -102,6 +106,7 @@ TEST_CASE("Stem maps: columns by name, faults with their line", "[stem_map]") {
   CHECK(good.forest.radii_m[0] == Approx(0.2));
   CHECK(good.forest.radii_m[1] == 0.0);
   CHECK(good.forest.low_m == Eigen::Vector2d(1.0, -4.5));
+
   CHECK(sim::parse_stem_map("x_m,y_m\n1,2\n1,two\n").error.find("line 3") != std::string::npos);
   CHECK(sim::parse_stem_map("x_m,y_m\n1,nan\n").error.find("line 2") != std::string::npos);
   CHECK(sim::parse_stem_map("x_m,y_m,dbh_m\n1,2,-0.1\n").error.find("negative") !=

@@ -90,7 +90,7 @@ TEST_CASE("Points of a trunk lie on its surface, and one trunk hides another", "
   const World world = two_trunks();
   SpinningLidar lidar(world, exact_lidar(), 1);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  const SimulatedSweep sweep = lidar.sweep_standing(pose);
+  const SimulatedSweep sweep = lidar.sweep_stationary(pose);
   std::array<int, 3> returns{};
   for (std::size_t i = 0; i < sweep.objects.size(); ++i) {
     if (sweep.objects[i] == kGroundObject) {
@@ -131,6 +131,7 @@ TEST_CASE("A raw sweep is skewed by exactly the motion of the vehicle", "[lidar]
   SensorDrive drive(forest_scenario(small_forest(), 1), short_standstill(), suite, 1);
   const SimulatedSweep sweep = drive.sweep(60);
   REQUIRE(sweep.raw.points.size() > 3000);
+
   CHECK(drive.motion().at(6.0).velocity_mps.norm() > 2.0);
   double worst_standing_m = 0.0;
   for (std::size_t i = 0; i < sweep.raw.points.size(); ++i) {
@@ -146,6 +147,7 @@ TEST_CASE("A raw sweep is skewed by exactly the motion of the vehicle", "[lidar]
     worst_standing_m = std::max(
         worst_standing_m, (world_m(1e-6 * static_cast<double>(sweep.raw.utime)) - truth).norm());
   }
+
   CHECK(worst_standing_m > 0.2);
   CHECK(sweep.raw.points.front().time_s < 2e-6F);
   CHECK(sweep.raw.points.back().time_s < 0.1F);
@@ -157,9 +159,10 @@ TEST_CASE("Beams are as wide as asked for", "[lidar]") {
   LidarParameters wide = exact_lidar();
   wide.beam_half_width_rad = 2e-3;
   const SimulatedSweep sweep =
-      SpinningLidar(world, wide, 1).sweep_standing(Eigen::Isometry3d::Identity());
+      SpinningLidar(world, wide, 1).sweep_stationary(Eigen::Isometry3d::Identity());
   double greatest = 0.0;
   double squares = 0.0;
+
   for (std::size_t i = 0; i < sweep.raw.points.size(); ++i) {
     const Eigen::Vector3d told = sweep.raw.points[i].position().cast<double>().normalized();
     const Eigen::Vector3d hit =
@@ -167,7 +170,9 @@ TEST_CASE("Beams are as wide as asked for", "[lidar]") {
     greatest = std::max(greatest, (told - hit).norm());
     squares += (told - hit).squaredNorm();
   }
+
   CHECK(greatest < 2e-3 * std::sqrt(2.0) + 1e-6);
+
   // Uniform in a square.
   const double expected = 2e-3 * std::sqrt(2.0 / 3.0);
   CHECK(std::sqrt(squares / static_cast<double>(sweep.raw.points.size())) ==
@@ -182,14 +187,16 @@ TEST_CASE("Noise of range and share of lost returns are as asked for", "[lidar]"
   noisy.range_sigma_m = 0.03;
   noisy.drop_out = 0.1;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+
   pose.translation() << scenario.route.at(10.0).position_m, 0.0;
   pose.translation().z() = scenario.world->ground().height(pose.translation().head<2>());
-  const SimulatedSweep clean = SpinningLidar(*scenario.world, exact, 3).sweep_standing(pose);
-  const SimulatedSweep sweep = SpinningLidar(*scenario.world, noisy, 3).sweep_standing(pose);
+  const SimulatedSweep clean = SpinningLidar(*scenario.world, exact, 3).sweep_stationary(pose);
+  const SimulatedSweep sweep = SpinningLidar(*scenario.world, noisy, 3).sweep_stationary(pose);
   const double kept =
       static_cast<double>(sweep.raw.points.size()) / static_cast<double>(clean.raw.points.size());
   CHECK(kept == Approx(0.9).margin(0.015));
   const Eigen::Vector3d origin = pose * exact.vehicle_T_sensor.translation();
+
   double sum = 0.0;
   double squares = 0.0;
   for (std::size_t i = 0; i < sweep.raw.points.size(); ++i) {
@@ -198,6 +205,7 @@ TEST_CASE("Noise of range and share of lost returns are as asked for", "[lidar]"
     sum += error;
     squares += error * error;
   }
+
   const auto n = static_cast<double>(sweep.raw.points.size());
   CHECK(std::abs(sum / n) < 0.001);
   CHECK(std::sqrt(squares / n) == Approx(0.03).epsilon(0.03));
@@ -211,9 +219,11 @@ TEST_CASE("A drive's readings come in order and follow from the seed", "[drive]"
   SensorDrive second(forest_scenario(small_forest(), 3), short_standstill(), suite, 7);
   SensorDrive other(scenario, short_standstill(), suite, 8);
   const model::PointSweep asked_before = second.sweep(30).raw;
+
   CHECK_FALSE(same_points(asked_before, other.sweep(30).raw));
   model::Utime last = 0;
   std::array<int, 6> counts{};
+
   for (int i = 0; i < 1500; ++i) {
     const auto a = first.next();
     const auto b = second.next();
@@ -222,6 +232,7 @@ TEST_CASE("A drive's readings come in order and follow from the seed", "[drive]"
     REQUIRE(a->index() == b->index());
     ++counts.at(a->index());
     model::Utime complete = 0;
+
     if (const auto* imu = std::get_if<model::ImuSample>(&*a)) {
       complete = imu->utime;
       CHECK(imu->specific_force_mps2 == std::get<model::ImuSample>(*b).specific_force_mps2);
@@ -237,9 +248,11 @@ TEST_CASE("A drive's readings come in order and follow from the seed", "[drive]"
     } else {
       continue;
     }
+
     CHECK(complete >= last);
     last = complete;
   }
+
   for (const int count : counts) CHECK(count > 0);
 }
 
@@ -258,6 +271,7 @@ TEST_CASE("A drive ends when its time is over", "[drive]") {
 
 TEST_CASE("Corners of houses are told with what is seen of their walls", "[lidar]") {
   World world;
+
   // Ten metres ahead: its near corner points at the sensor.
   const Eigen::Vector2d corner(10.0, 0.0);
   const std::vector<Eigen::Vector2d> square{corner, corner + Eigen::Vector2d(6.0, -6.0),
@@ -265,9 +279,10 @@ TEST_CASE("Corners of houses are told with what is seen of their walls", "[lidar
                                             corner + Eigen::Vector2d(6.0, 6.0)};
   world.add_house(square, 5.0);
   SpinningLidar lidar(world, exact_lidar(), 1);
-  const SimulatedSweep sweep = lidar.sweep_standing(Eigen::Isometry3d::Identity());
+  const SimulatedSweep sweep = lidar.sweep_stationary(Eigen::Isometry3d::Identity());
   VehicleState state;
   state.yaw_rad = 0.5;
+
   state.world_Q_vehicle = Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ());
   const auto corners = visible_corners(world, sweep, state);
   REQUIRE(corners.size() == 3);  // the far one is hidden
@@ -275,11 +290,13 @@ TEST_CASE("Corners of houses are told with what is seen of their walls", "[lidar
   CHECK(near.corner == 0);
   CHECK(near.angle_rad == Approx(1.5 * pi));
   CHECK(std::abs(geometry::wrap_angle(near.bisector_rad - (pi - 0.5))) < 1e-9);
+
   CHECK(near.range_m == Approx(10.0));
   CHECK(near.position_m.x() == Approx(10.0 * std::cos(0.5)));
   CHECK(near.position_m.y() == Approx(-10.0 * std::sin(0.5)));
   CHECK(near.returns_before > 100);
   CHECK(near.returns_after > 100);
+
   // Of the corners at the sides, one wall is on the far side.
   for (std::size_t i = 1; i < 3; ++i) {
     CHECK(std::min(corners[i].returns_before, corners[i].returns_after) == 0);
@@ -295,10 +312,12 @@ TEST_CASE("A planar laser sees the plane of its beams", "[lidar]") {
   parameters.drop_out = 0.0;
   PlanarLaser laser(world, parameters, 1);
   const std::vector<Eigen::Vector2d> way{{0, 0}, {30, 0}};
+
   const VehicleMotion motion(Route::through(way, 1.0), world.ground(), {}, {});
   const SimulatedPlanarScan simulated = laser.scan(motion, 0);
   REQUIRE(simulated.scan.ranges_m.size() == 361);
   int hits = 0;
+
   for (std::size_t beam = 0; beam < 361; ++beam) {
     CHECK(simulated.scan.is_return(beam) == (simulated.is_return[beam] != 0));
     if (!simulated.scan.is_return(beam)) continue;
@@ -309,6 +328,7 @@ TEST_CASE("A planar laser sees the plane of its beams", "[lidar]") {
                                         Eigen::Vector2d(std::cos(bearing), std::sin(bearing));
     CHECK((p - Eigen::Vector2d(13.6, 5.0)).norm() == Approx(0.3).margin(1e-4));
   }
+
   // 0.6 m wide at 11.2 m: 3.1 degrees.
   CHECK(hits >= 5);
   CHECK(hits <= 7);

@@ -30,6 +30,7 @@ World cluttered_world(Random& random) {
     const double bearing = uniform(random, -pi, pi);
     const Eigen::Vector2d at = range * Eigen::Vector2d(std::cos(bearing), std::sin(bearing));
     const double ground = world.ground().height(at);
+
     switch (i % 5) {
       case 0:
         world.add_trunk(ObjectClass::kTrunk, at, uniform(random, 0.05, 0.5), 12.0, 0.004,
@@ -39,6 +40,7 @@ World cluttered_world(Random& random) {
         world.add(ObjectClass::kCrown, Foliage{{at.x(), at.y(), ground + 6.0}, 2.5, 3.0, 0.4});
         break;
       case 2:
+
         world.add(ObjectClass::kCar,
                   Box{{at.x(), at.y(), ground + 0.8}, {2.2, 0.9, 0.8}, uniform(random, -pi, pi)});
         break;
@@ -51,6 +53,7 @@ World cluttered_world(Random& random) {
         world.add(Walker{{at.x(), at.y(), ground}, {1.0, 1.0}, 1.2, uniform(random, -pi, pi)});
     }
   }
+
   return world;
 }
 
@@ -80,9 +83,11 @@ TEST_CASE("A fan of rays meets what brute force over all objects meets", "[caste
   RayCaster caster(world);
   const Eigen::Vector3d origin(0.3, -0.4, world.ground().height({0.3, -0.4}) + 1.9);
   int hits_on_objects = 0;
+
   for (int fan = 0; fan < 500; ++fan) {
     const double bearing = uniform(random, -pi, pi);
     const double spread = fan % 2 == 0 ? 0.02 : 0.0;
+
     // Some fans are too wide for a sector and must be cast ray by ray.
     const double spread_or_wide = fan % 10 == 9 ? 2.0 : spread;
     std::vector<Eigen::Vector3d> directions;
@@ -90,9 +95,11 @@ TEST_CASE("A fan of rays meets what brute force over all objects meets", "[caste
       directions.push_back(direction_of(bearing + uniform(random, -spread_or_wide, spread_or_wide),
                                         uniform(random, -0.5, 0.5)));
     }
+
     std::vector<RayHit> hits(directions.size());
     const double time_s = 0.1 * fan;
     caster.cast(origin, directions, time_s, 100.0, fan, hits);
+
     for (std::size_t i = 0; i < directions.size(); ++i) {
       const std::uint64_t luck = RayCaster::luck_of_ray(fan, i);
       const RayHit expected = cast_at_all(world, {origin, directions[i]}, time_s, 100.0, luck);
@@ -103,6 +110,7 @@ TEST_CASE("A fan of rays meets what brute force over all objects meets", "[caste
       if (hits[i].object != kGroundObject) ++hits_on_objects;
     }
   }
+
   CHECK(hits_on_objects > 1000);
 }
 
@@ -110,6 +118,7 @@ TEST_CASE("Rays end on the ground where the height field says it is", "[ground]"
   Random random(3);
   const Ground ground(rough_ground(), random);
   int below_horizon = 0;
+
   for (int i = 0; i < 300; ++i) {
     const Eigen::Vector2d at(uniform(random, -2000, 2000), uniform(random, -2000, 2000));
     Eigen::Vector3d origin;
@@ -117,6 +126,7 @@ TEST_CASE("Rays end on the ground where the height field says it is", "[ground]"
     const Eigen::Vector3d direction =
         direction_of(uniform(random, -pi, pi), uniform(random, -1.5, 0.2));
     const auto hit = ground.cast(origin, direction, 120.0);
+
     // The first place on a fine search along the ray.
     double expected = 120.0;
     for (double t = 0.0; t < 120.0; t += 0.02) {
@@ -126,22 +136,26 @@ TEST_CASE("Rays end on the ground where the height field says it is", "[ground]"
         break;
       }
     }
+
     if (!hit) {
       // Only where the ray is missed by a hair.
       const Eigen::Vector3d p = origin + expected * direction;
       CHECK((expected > 119.0 || p.z() - ground.height(p.head<2>()) > -0.01));
       continue;
     }
+
     ++below_horizon;
     const Eigen::Vector3d p = origin + hit->range_m * direction;
     CHECK(std::abs(p.z() - ground.height(p.head<2>())) < 0.008);
     CHECK(std::abs(hit->cosine - std::abs(direction.dot(ground.normal(p.head<2>())))) < 0.03);
+
     // No earlier crossing deeper than the table's error.
     for (double t = 0.0; t < hit->range_m - 0.3; t += 0.05) {
       const Eigen::Vector3d q = origin + t * direction;
       REQUIRE(q.z() - ground.height(q.head<2>()) > -0.02);
     }
   }
+
   CHECK(below_horizon > 200);
 }
 
@@ -151,6 +165,7 @@ TEST_CASE("The ground has the slope and the unevenness that were asked for", "[g
   double sum = 0.0;
   double squares = 0.0;
   const int n = 20000;
+
   for (int i = 0; i < n; ++i) {
     const Eigen::Vector2d at(uniform(random, 0, 256), uniform(random, 0, 256));
     const double above_plane = ground.height(at) - Eigen::Vector2d(0.05, -0.04).dot(at);
@@ -164,6 +179,7 @@ TEST_CASE("The ground has the slope and the unevenness that were asked for", "[g
             (2 * h));
     REQUIRE((numeric - ground.gradient(at)).norm() < 1e-6);
   }
+
   CHECK(std::abs(sum / n) < 0.05);
   CHECK(std::sqrt(squares / n) == Approx(std::hypot(0.6, 0.03)).epsilon(0.1));
 }
@@ -181,6 +197,7 @@ TEST_CASE("Surface hits lie on the surface, and nothing of it is nearer", "[shap
     const Ray ray{{uniform(random, -8, 8), uniform(random, -8, 8), uniform(random, 0, 4)},
                   direction_of(uniform(random, -pi, pi), uniform(random, -1, 1))};
     const auto hit = meet(ray, stem);
+
     // Distance to the surface along the ray, by sampling: negative inside.
     const auto depth = [&](double t) {
       const Eigen::Vector3d p = ray.origin_m + t * ray.direction - stem.base_m;
@@ -188,14 +205,17 @@ TEST_CASE("Surface hits lie on the surface, and nothing of it is nearer", "[shap
       if (along < 0.0 || along > stem.length_m) return 1.0;
       return (p - along * stem.axis).norm() - stem.radius_at(along);
     };
+
     if (hit) {
       ++stems;
       CHECK(std::abs(depth(hit->range_m)) < 1e-9);
       CHECK(hit->cosine >= 0.0);
       CHECK(hit->cosine <= 1.0);
     }
+
     if (i % 20 == 0 && depth(0.0) > 0.0) {
       const double until = hit ? hit->range_m - 1e-6 : 20.0;
+
       // A ray that gets into the stem without touching it came in through an open end.
       bool through_end = false;
       for (double t = 0.0; t < until && !through_end; t += 0.01) through_end = depth(t) < 0.0;
@@ -209,6 +229,7 @@ TEST_CASE("Surface hits lie on the surface, and nothing of it is nearer", "[shap
       }
     }
   }
+
   CHECK(stems > 200);
 }
 
@@ -217,6 +238,7 @@ TEST_CASE("What covers the ground stops rays at the height that was asked for", 
   const World world(Ground(GroundParameters{.cover_m = 0.05}, random));
   double sum = 0.0;
   const int n = 5000;
+
   for (int i = 0; i < n; ++i) {
     const Ray ray{{0.0, 0.0, 2.0}, direction_of(uniform(random, -pi, pi), -0.6)};
     const auto hit = world.meet_ground(ray, 100.0, random());
@@ -225,6 +247,7 @@ TEST_CASE("What covers the ground stops rays at the height that was asked for", 
     CHECK(height_m >= 0.0);
     sum += height_m;
   }
+
   CHECK(sum / n == Approx(0.05).epsilon(0.05));
 }
 
@@ -236,6 +259,7 @@ TEST_CASE("Foliage lets rays through as often as its density says", "[shapes]") 
   RayCaster caster(world);
   const Eigen::Vector3d direction = Eigen::Vector3d::UnitX();
   int through = 0;
+
   double sum_of_depths = 0.0;
   const int n = 20000;
   for (int i = 0; i < n; ++i) {
@@ -247,8 +271,10 @@ TEST_CASE("Foliage lets rays through as often as its density says", "[shapes]") 
       sum_of_depths += hit.range_m - 8.0;
     }
   }
+
   const double expected = std::exp(-4.0 * density);
   CHECK(through / double(n) == Approx(expected).margin(0.01));
+
   // Mean depth of those that were stopped within 4 m.
   const double mean = 1.0 / density - 4.0 * expected / (1.0 - expected);
   CHECK(sum_of_depths / (n - through) == Approx(mean).margin(0.03));

@@ -51,6 +51,7 @@ TEST_CASE("A forest in three dimensions has the density of its kind and a clear 
   check_path_is_clear(scenario, parameters.world.clearance_m);
   CHECK(scenario.route.length_m() == Approx(400.0).epsilon(0.01));
   const double side_m = 400.0 / 3.14159 + 2.0 * parameters.margin_m;
+
   const double per_m2 = static_cast<double>(scenario.world->trunks().size()) / (side_m * side_m);
   CHECK(per_m2 == Approx(0.0138).epsilon(0.1));
   for (const TrueTrunk& trunk : scenario.world->trunks()) {
@@ -65,13 +66,16 @@ TEST_CASE("Around the block is about 700 m, closed, with houses on both sides", 
   const Scenario scenario = urban_scenario(1, 1, 60.0);
   CHECK(scenario.route.length_m() - 60.0 == Approx(700.0).margin(25.0));
   CHECK(least_radius_m(scenario.route) > 4.5);
+
   // The overlap drives the same street again.
   const double lap_m = scenario.route.length_m() - 60.0;
   const auto again = scenario.route.at(lap_m + 45.0);
   double nearest = 1e9;
+
   for (double s = 20.0; s < 80.0; s += 0.1) {
     nearest = std::min(nearest, (scenario.route.at(s).position_m - again.position_m).norm());
   }
+
   CHECK(nearest < 0.2);
   CHECK(scenario.world->corners().size() > 120);
   CHECK(scenario.world->trunks().size() > 50);
@@ -86,20 +90,24 @@ TEST_CASE("Country roads are as long as asked for and do not meet themselves", "
   CHECK(least_radius_m(scenario.route) > 4.5);
   check_path_is_clear(scenario, 2.0);
   const std::vector<Eigen::Vector2d> places = scenario.route.places(10.0);
+
   for (std::size_t i = 0; i < places.size(); ++i) {
     for (std::size_t k = i + 20; k < places.size(); ++k) {
       REQUIRE((places[i] - places[k]).norm() > 20.0);
     }
   }
+
   // Some of the way has landmarks, some has none.
   const PointGrid trunks(trunk_places(*scenario.world), 10.0);
   int rich = 0;
   int poor = 0;
+
   for (const Eigen::Vector2d& place : places) {
     const std::size_t near = trunks.within(place, 20.0).size();
     rich += near >= 6 ? 1 : 0;
     poor += near <= 2 ? 1 : 0;
   }
+
   CHECK(rich > 20);
   CHECK(poor > 10);
 }

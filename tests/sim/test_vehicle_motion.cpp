@@ -40,6 +40,7 @@ TEST_CASE("A route keeps near its way points and has continuous curvature", "[ro
   const Route route = route_of(kind, 400.0);
   CHECK(route.length_m() == Approx(400.0).epsilon(0.05));
   double greatest_change = 0.0;
+
   for (double s = 0.0; s + 0.25 < route.length_m(); s += 0.25) {
     const auto here = route.at(s);
     const auto next = route.at(s + 0.25);
@@ -52,6 +53,7 @@ TEST_CASE("A route keeps near its way points and has continuous curvature", "[ro
         here.heading_rad + 0.5 * geometry::wrap_angle(next.heading_rad - here.heading_rad);
     CHECK(std::abs(geometry::wrap_angle(bearing - middle)) < 0.002);
   }
+
   CHECK(greatest_change < 0.05);
   CHECK((route.at(0.0).position_m - Eigen::Vector2d::Zero()).norm() < 0.1);
 }
@@ -81,15 +83,18 @@ TEST_CASE("The car stands first, keeps its limits, and stands on the ground", "[
   const VehicleMotion motion(route_of(PathKind::kSquare, 400.0), ground, {}, speed);
   double fastest = 0.0;
   double standing_s = 0.0;
+
   for (double t = 0.0; t < motion.duration_s(); t += 0.05) {
     const VehicleState state = motion.at(t);
     const Eigen::Vector3d velocity = state.world_Q_vehicle.conjugate() * state.velocity_mps;
     const Eigen::Vector3d force = state.world_Q_vehicle.conjugate() * state.acceleration_mps2;
     fastest = std::max(fastest, velocity.x());
+
     if (t < 20.0) {
       CHECK(state.velocity_mps.norm() < 1e-12);
       CHECK(state.angular_rate_rad_s.norm() < 1e-12);
     }
+
     if (t > 25.0 && state.velocity_mps.norm() < 1e-6) standing_s += 0.05;
     CHECK(velocity.x() > -1e-6);
     CHECK(std::abs(velocity.y()) < 0.05);  // the rear axle does not slip, but it sways
@@ -97,8 +102,10 @@ TEST_CASE("The car stands first, keeps its limits, and stands on the ground", "[
     CHECK(std::abs(force.x()) < 1.5 * 1.1 + 0.5);
     CHECK(std::abs(state.position_m.z() - ground.height(state.position_m.head<2>())) < 0.2);
     CHECK(std::abs(state.roll_rad) < 0.3);
+
     CHECK(std::abs(state.pitch_rad) < 0.3);
   }
+
   CHECK(fastest == Approx(5.0).epsilon(0.02));
   CHECK(standing_s > 4.5);  // the stop on the way and the one at the end
   CHECK(motion.driven_m() == Approx(route_of(PathKind::kSquare, 400.0).length_m()).margin(0.5));
@@ -110,9 +117,11 @@ TEST_CASE("A perfect inertial unit integrates back to the drive", "[imu]") {
   parameters.vehicle_T_sensor = Eigen::Translation3d(0.7, -0.2, 0.5) *
                                 Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 3).normalized());
   SimulatedImu imu(parameters, 1);
+
   const auto sensor_at = [&](double t) {
     return motion.at(t).world_T_vehicle() * parameters.vehicle_T_sensor;
   };
+
   Eigen::Quaterniond attitude(sensor_at(0.0).linear());
   Eigen::Vector3d position = sensor_at(0.0).translation();
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
@@ -120,6 +129,7 @@ TEST_CASE("A perfect inertial unit integrates back to the drive", "[imu]") {
   const Eigen::Vector3d gravity(0.0, 0.0, -kGravity);
   double worst_m = 0.0;
   const double end_s = 80.0;  // the last 58 of them driving
+
   REQUIRE(motion.duration_s() > end_s);
   while (imu.next_time_s() <= end_s) {
     const double dt = 1.0 / parameters.rate_hz;
@@ -134,12 +144,14 @@ TEST_CASE("A perfect inertial unit integrates back to the drive", "[imu]") {
     const Eigen::Vector3d a0 = attitude * last.specific_force_mps2 + gravity;
     const Eigen::Vector3d a1 = next * sample.specific_force_mps2 + gravity;
     position += dt * velocity + dt * dt / 6.0 * (2.0 * a0 + a1);
+
     velocity += 0.5 * dt * (a0 + a1);
     attitude = next;
     last = sample;
     worst_m =
         std::max(worst_m, (position - sensor_at(1e-6 * double(sample.utime)).translation()).norm());
   }
+
   CHECK(worst_m < 0.01);
 }
 

@@ -161,15 +161,18 @@ inline double largest_error_m(const Stack& stack, const sim::Drive& drive, std::
   std::map<model::Utime, geometry::SE2> truth;
   for (std::size_t k = 0; k < drive.size(); ++k) truth[drive.utime(k)] = drive.world_T_vehicle()[k];
   if (stack.all_updates.empty() || !truth.contains(stack.all_updates.front().utime)) return -1.0;
+
   const auto& base = stack.all_updates.front();
   const geometry::SE2 world_T_map = truth.at(base.utime) * base.map_T_vehicle.inverse();
   double largest = -1.0;
+
   for (std::size_t i = first; i < stack.poses.size(); ++i) {
     const auto& pose = stack.poses[i];
     const geometry::SE2 estimate = world_T_map * pose.map_T_vehicle();
     largest =
         std::max(largest, (estimate.translation() - truth.at(pose.utime).translation()).norm());
   }
+
   return largest;
 }
 

@@ -39,6 +39,7 @@ TEST_CASE("a killed process comes back with its state", "[system]") {
     REQUIRE(stack.wait_until([&] { return stack.newest_pose() >= drive.utime(half - 12); }));
     const pid_t killed = stack.pid(victim);
     const std::size_t poses_before = stack.poses.size();
+
     ::kill(killed, SIGKILL);
     stack.drive(drive, half, drive.size());
     CAPTURE(victim);
@@ -46,6 +47,7 @@ TEST_CASE("a killed process comes back with its state", "[system]") {
     CHECK(stack.wait_until([&] { return stack.newest_pose() >= drive.utime(drive.size() - 12); }));
     CHECK(stack.updates(model::MapUpdateStatus::kFirstMap) == 1);  // The map was not begun anew.
     CHECK(stack.poses.size() > poses_before + half / 2);
+
     CHECK(largest_error_m(stack, drive, poses_before) < 0.5);
     stack.stop();
     CHECK_THAT(test::read_text(stack.report()), Contains("killed by signal 9") &&

@@ -23,6 +23,7 @@ std::vector<wire::Bytes> hostile_messages(const wire::Bytes& good, std::mt19937_
         good.begin(),
         good.begin() + static_cast<std::ptrdiff_t>(good.size() * static_cast<std::size_t>(i) / 50));
   }
+
   // Every place where a count may stand.
   for (std::size_t at = 8; at + 4 <= std::min<std::size_t>(good.size(), 200); at += 4) {
     for (const std::uint8_t value : {0x7F, 0xFF}) {
@@ -32,6 +33,7 @@ std::vector<wire::Bytes> hostile_messages(const wire::Bytes& good, std::mt19937_
       messages.push_back(std::move(message));
     }
   }
+
   return messages;
 }
 

@@ -47,6 +47,7 @@ class Writer {
       case wire::FieldKind::kDouble:
         if (reals_ != nullptr) reals_->push_back({bytes_.size(), field.kind});
         return integer(std::bit_cast<std::uint64_t>(normal(random_)), 8);
+
       case wire::FieldKind::kFloat:
         if (reals_ != nullptr) reals_->push_back({bytes_.size(), field.kind});
         return integer(std::bit_cast<std::uint32_t>(static_cast<float>(normal(random_))), 4);
@@ -54,9 +55,11 @@ class Writer {
         return integer(random_() % 1000, 8);
       case wire::FieldKind::kInt32:
         return integer(random_() % 1000, 4);
+
       case wire::FieldKind::kInt16:
         return integer(random_() % 1000, 2);
       default:
+
         return integer(random_() % 2, 1);
     }
   }

@@ -51,6 +51,7 @@ class Maker {
     model::Odometry odometry{5,           10,         2, pose(), covariance<3>(), std::nullopt,
                              count() > 2, count() > 2};
     if (count() < 3) return odometry;
+
     model::Preintegration inertial;
     inertial.seconds = 0.1;
     inertial.yaw_rad = real(1.0);
@@ -58,10 +59,12 @@ class Maker {
     inertial.position_m = vector<2>(1.0);
     inertial.covariance = covariance<5>();
     inertial.level = {covariance<2>(), Eigen::Matrix2d::Identity(), covariance<2>(), real(0.1)};
+
     inertial.level.memory(0, 1) = real(1.0);
     for (int i = 0; i < 15; ++i) inertial.bias_jacobian(i) = real(1.0);
     inertial.bias = vector<3>(0.1);
     odometry.inertial = inertial;
+
     return odometry;
   }
   model::PointSweep sweep(double farthest_m) {
@@ -72,6 +75,7 @@ class Maker {
     sweep.parts = 8;
     sweep.is_deskewed = count() > 2;
     sweep.rings = 32;
+
     sweep.max_range_m = 100.0;
     sweep.sensor_position_m = vector<3>(2.0);
     if (count() > 2) {
@@ -80,12 +84,14 @@ class Maker {
       attitude.covariance_rad2 = covariance<2>();
       sweep.attitude = attitude;
     }
+
     for (int i = 0; i < 40; ++i) {
       const Eigen::Vector3f p = vector<3>(farthest_m).cast<float>();
       sweep.points.push_back({p.x(), p.y(), p.z(), static_cast<float>(real(0.1)),
                               static_cast<std::uint16_t>(random_() % 32),
                               static_cast<std::uint8_t>(random_() % 256)});
     }
+
     return sweep;
   }
   model::Keyframe keyframe() {
@@ -131,15 +137,18 @@ odometry_t old_version(const odometry2_t& wire) {
   old.seq = wire.seq;
   old.from_utime = wire.from_utime;
   old.from_T_to = wire.from_T_to;
+
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
       old.covariance[row][column] = wire.covariance[row][column];
     }
   }
+
   old.has_wheels = wire.has_wheels;
   old.is_standing = wire.is_standing;
   old.num_inertial = wire.num_inertial;
   old.inertial = wire.inertial;
+
   return old;
 }
 
@@ -189,6 +198,7 @@ TEST_CASE("values survive the wire") {
                                      make.pose()});
     check_round_trip(model::WholeMap{
         10, 1, 5, true, make.landmarks(), {{1, 10, make.pose(), make.covariance<3>()}}});
+
     check_round_trip(
         model::MapDelta{10, 1, 4, 5, make.landmarks(), make.landmarks(), {8, 9}, {{6, 7}}});
     model::MapUpdate update;
@@ -197,6 +207,7 @@ TEST_CASE("values survive the wire") {
     update.status = model::MapUpdateStatus::kNotSure;
     update.map_T_vehicle = make.pose();
     update.covariance = make.covariance<3>();
+
     update.associations = {{0, 5}, {2, 6}};
     update.added = {7};
     update.merged = {{5, 6}};
@@ -232,15 +243,18 @@ TEST_CASE("the front end's values survive the wire") {
     check_round_trip(
         model::EkfLevel{3, 4, make.vector<2>(0.01), make.covariance<2>(), make.covariance<2>()});
     model::EkfMap map{3, 4, {}};
+
     model::TrackedScan tracked{3, 4, {40.0, 0.1, 2.0}, {}};
     for (std::size_t i = make.count(); i > 0; --i) {
       map.landmarks.push_back({i, make.vector<2>(50.0), make.covariance<2>(), 0.2, make.kind(), 9});
     }
+
     std::uint32_t index = 0;
     for (const model::Detection& detection : make.scan().detections) {
       tracked.landmarks.push_back({100 + index, index, detection});
       ++index;
     }
+
     check_round_trip(map);
     check_round_trip(tracked);
     for (const double farthest_m : {0.5, 30.0, 32.768, 120.0}) {
@@ -255,6 +269,7 @@ TEST_CASE("a sweep's points keep their places to half a step") {
   const auto back = decode_message<model::PointSweep>(encode_message(sweep));
   REQUIRE(back);
   REQUIRE(back->points.size() == sweep.points.size());
+
   for (std::size_t i = 0; i < sweep.points.size(); ++i) {
     CHECK((back->points[i].position() - sweep.points[i].position()).cwiseAbs().maxCoeff() <=
           2.1e-3F);
@@ -262,6 +277,7 @@ TEST_CASE("a sweep's points keep their places to half a step") {
     CHECK(back->points[i].ring == sweep.points[i].ring);
     CHECK(back->points[i].intensity == sweep.points[i].intensity);
   }
+
   model::PointSweep broken = sweep;
   broken.points[7].y_m = std::numeric_limits<float>::quiet_NaN();
   CHECK_THROWS_AS(to_wire(broken), std::invalid_argument);
@@ -286,6 +302,7 @@ TEST_CASE("a sweep in parts is put together again, and one with a hole is droppe
   whole.part = 0;
   whole.parts = 1;
   model::SweepAssembler assembler;
+
   for (std::size_t size = 1; size <= 45; ++size) {
     const std::vector<model::PointSweep> parts = split_sweep(whole, size);
     REQUIRE(parts.size() == (whole.points.size() + size - 1) / size);
@@ -295,6 +312,7 @@ TEST_CASE("a sweep in parts is put together again, and one with a hole is droppe
       if (result) CHECK(encode_message(*result) == encode_message(whole));
     }
   }
+
   CHECK(assembler.incomplete_revolutions() == 0);
   const std::vector<model::PointSweep> parts = split_sweep(whole, 10);
   for (std::size_t lost = 0; lost < parts.size(); ++lost) {
@@ -304,6 +322,7 @@ TEST_CASE("a sweep in parts is put together again, and one with a hole is droppe
     for (std::size_t i = 0; i + 1 < parts.size(); ++i) CHECK_FALSE(assembler.add(parts[i]));
     CHECK(assembler.add(parts.back()));
   }
+
   CHECK(assembler.incomplete_revolutions() == parts.size());
 }
 
@@ -328,6 +347,7 @@ TEST_CASE("a scan is refused for each thing that cannot be") {
   scan = scan_with_one();
   scan.detections[0].position_m[1] = 1e9;
   CHECK(reason_of(scan) == Reason::kOutOfRange);
+
   scan = scan_with_one();
   scan.detections[0].radius_m = -0.1;
   CHECK(reason_of(scan) == Reason::kOutOfRange);
@@ -335,6 +355,7 @@ TEST_CASE("a scan is refused for each thing that cannot be") {
   scan.max_range_m = -1.0;
   CHECK(reason_of(scan) == Reason::kOutOfRange);
   scan = scan_with_one();
+
   scan.detections[0].covariance_m2[0][1] = 0.005;
   CHECK(reason_of(scan) == Reason::kNotSymmetric);
   scan = scan_with_one();
@@ -342,6 +363,7 @@ TEST_CASE("a scan is refused for each thing that cannot be") {
   CHECK(reason_of(scan) == Reason::kNotPositive);
   scan = scan_with_one();
   scan.detections[0].covariance_m2[0][1] = scan.detections[0].covariance_m2[1][0] = 0.011;
+
   CHECK(reason_of(scan) == Reason::kNotPositive);
 }
 
@@ -363,6 +385,7 @@ TEST_CASE("positive semidefinite agrees with the eigenvalues, whatever the scale
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
   int positive = 0;
+
   for (int i = 0; i < 2000; ++i) {
     Eigen::Matrix3d matrix;
     for (int k = 0; k < 9; ++k) matrix(k) = normal(random);
@@ -371,12 +394,14 @@ TEST_CASE("positive semidefinite agrees with the eigenvalues, whatever the scale
     const Eigen::Vector3d eigenvalues =
         Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(matrix).eigenvalues();
     if (eigenvalues.cwiseAbs().minCoeff() < 1e-3) continue;
+
     const bool expected = eigenvalues.minCoeff() > 0.0;
     positive += expected ? 1 : 0;
     const Eigen::Vector3d scale(1e-3, 1.0, 1e3);
     CHECK(is_positive_semidefinite(matrix) == expected);
     CHECK(is_positive_semidefinite(scale.asDiagonal() * matrix * scale.asDiagonal()) == expected);
   }
+
   CHECK(positive > 200);
   CHECK(is_positive_semidefinite(Eigen::Matrix3d::Zero()));
 }

@@ -40,11 +40,13 @@ void damage(Bytes& bytes, const std::vector<std::size_t>& lengths, std::mt19937_
       for (std::uint64_t i = 0; i <= random() % 8; ++i) {
         bytes[random() % bytes.size()] ^= static_cast<std::uint8_t>(1U << (random() % 8));
       }
+
       break;
     case 1:  // bytes behind the fingerprint
       for (std::uint64_t i = 0; i <= random() % 16; ++i) {
         bytes[8 + random() % (bytes.size() - 8)] = static_cast<std::uint8_t>(random());
       }
+
       break;
     case 2:  // cut
       bytes.resize(random() % bytes.size());
@@ -52,6 +54,7 @@ void damage(Bytes& bytes, const std::vector<std::size_t>& lengths, std::mt19937_
     case 3:  // longer
       bytes.resize(bytes.size() + 1 + random() % 64, static_cast<std::uint8_t>(random()));
       break;
+
     case 4:  // a hostile count or length
       if (!lengths.empty())
         put(bytes, lengths[random() % lengths.size()], extremes[random() % 7], 4);
@@ -60,6 +63,7 @@ void damage(Bytes& bytes, const std::vector<std::size_t>& lengths, std::mt19937_
       for (std::size_t i = 8; i < bytes.size(); ++i) bytes[i] = static_cast<std::uint8_t>(random());
       break;
     default:  // a count that fits what is left in bytes, not in elements
+
       if (!lengths.empty()) {
         put(bytes, lengths[random() % lengths.size()], random() % bytes.size(), 4);
       }
@@ -83,11 +87,13 @@ void fuzz(std::size_t packets, std::mt19937_64& random, Tally& tally) {
     damage(bytes, lengths, random);
     allocated_bytes = 0;
     const auto message = decode_message<T>(bytes);
+
     if (allocated_bytes > 4 * bytes.size() + kFixed) {
       ++tally.beyond_memory;
       WARN("beyond memory: " << type.layout->name << ": " << allocated_bytes << " for "
                              << bytes.size());
     }
+
     ++tally.packets;
     ++(message ? tally.accepted : tally.refused);
     if (!message && message.refusal().detail.empty()) FAIL("a refusal without words");

@@ -21,6 +21,7 @@ TEST_CASE("the table knows every type, with the fingerprint that lcm-gen gives i
     fingerprints.insert(T::getHash());
     ++types;
   });
+
   CHECK(types == wire_types().size());
   CHECK(fingerprints.size() == types);
   CHECK(find_wire_type("no_such_t") == nullptr);
@@ -52,6 +53,7 @@ TEST_CASE("a message cut anywhere, or with anything behind it, is refused") {
                             refusal->reason == Reason::kBadString;
       CHECK(says_why);
     }
+
     Bytes longer = bytes;
     longer.push_back(0);
     const auto refusal = check_bytes(longer, type);
@@ -81,6 +83,7 @@ TEST_CASE("a number that is not finite is refused in every field that could hold
       }
     }
   }
+
   CHECK(places > 300);
 }
 
@@ -104,6 +107,7 @@ TEST_CASE("hostile counts and string lengths are refused wherever they stand") {
       }
     }
   }
+
   CHECK(places > 60);
 }
 
@@ -112,6 +116,7 @@ TEST_CASE("a string of length zero, without end or with a zero inside is refused
   message.text = "abc";
   const Bytes good = encode_bytes(message);
   REQUIRE_FALSE(check_bytes(good, wire_type_of<log_t>()));
+
   for (const auto& [offset_from_end, value] : {std::pair<std::size_t, int>{1, 'x'}, {2, 0}}) {
     Bytes bad = good;
     bad[bad.size() - offset_from_end] = static_cast<std::uint8_t>(value);
@@ -120,6 +125,7 @@ TEST_CASE("a string of length zero, without end or with a zero inside is refused
     CHECK(refusal->reason == Reason::kBadString);
     CHECK(refusal->detail.rfind("text: ", 0) == 0);
   }
+
   Bytes empty = good;
   put(empty, good.size() - 8, 0, 4);
   REQUIRE(check_bytes(empty, wire_type_of<log_t>()));

@@ -25,15 +25,18 @@ std::vector<DelaunayTriangle> delaunay(std::span<const Eigen::Vector2d> points) 
     numbered.emplace_back(Kernel::Point_2(point.x(), point.y()),
                           static_cast<std::uint32_t>(numbered.size()));
   }
+
   Delaunay triangulation;
   triangulation.insert(numbered.begin(), numbered.end());
   if (triangulation.dimension() < 2) {
     return {};
   }
+
   std::int32_t count = 0;
   for (const auto face : triangulation.all_face_handles()) {
     face->info() = triangulation.is_infinite(face) ? -1 : count++;
   }
+
   std::vector<DelaunayTriangle> triangles;
   triangles.reserve(static_cast<std::size_t>(count));
   for (const auto face : triangulation.finite_face_handles()) {
@@ -46,6 +49,7 @@ std::vector<DelaunayTriangle> delaunay(std::span<const Eigen::Vector2d> points) 
     }
     triangles.push_back(triangle);
   }
+
   return triangles;
 }
 

@@ -9,6 +9,7 @@
 
 namespace understory::hierarchy::baseline {
 
+/// A triangle by the numbers of its points and of its neighbours.
 struct DelaunayTriangle {
   std::array<std::uint32_t, 3> vertices{};  ///< Counter-clockwise.
   /// neighbours[i] lies across the edge vertices[i] -> vertices[i + 1]; -1 on the hull.

@@ -10,10 +10,12 @@ DescriptorMaker::DescriptorMaker(double step) : step_(step), samples_(0) {
   if (!(step >= 1.0 / 64.0 && step < 1.0)) {
     throw std::invalid_argument("descriptor step outside [1/64, 1)");
   }
+
   samples_ = static_cast<Eigen::Index>(std::ceil(1.0 / step - 1e-9));
   const Eigen::Index bins = samples_ / 2 + 1;
   cosines_.resize(bins, samples_);
   sines_.resize(bins, samples_);
+
   for (Eigen::Index k = 0; k < bins; ++k) {
     // Bins 0 and (even count) N/2 have no mirror image among the N bins; all others do.
     const bool single = k == 0 || 2 * k == samples_;
@@ -33,15 +35,18 @@ std::vector<Eigen::Vector2d> DescriptorMaker::sample(
   const auto end_of = [&](std::size_t edge) -> const Eigen::Vector2d& {
     return boundary[(edge + 1) % n];
   };
+
   double perimeter = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
     perimeter += (end_of(i) - boundary[i]).norm();
   }
+
   std::vector<Eigen::Vector2d> points;
   points.reserve(static_cast<std::size_t>(samples_));
   std::size_t edge = 0;
   double start = 0.0;
   double length = (end_of(0) - boundary[0]).norm();
+
   for (Eigen::Index i = 0; i < samples_; ++i) {
     const double along = static_cast<double>(i) * step_ * perimeter;
     while (edge + 1 < n && along > start + length) {
@@ -52,6 +57,7 @@ std::vector<Eigen::Vector2d> DescriptorMaker::sample(
     const double share = length > 0.0 ? (along - start) / length : 0.0;
     points.emplace_back(boundary[edge] + share * (end_of(edge) - boundary[edge]));
   }
+
   return points;
 }
 
@@ -61,14 +67,18 @@ Descriptor DescriptorMaker::operator()(std::span<const Eigen::Vector2d> boundary
   for (const Eigen::Vector2d& vertex : boundary) {
     centroid += vertex;
   }
+
   centroid /= static_cast<double>(boundary.size());
   const std::vector<Eigen::Vector2d> points = sample(boundary);
   Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 64, 1> radii(samples_);
+
   for (Eigen::Index i = 0; i < samples_; ++i) {
     radii(i) = (points[static_cast<std::size_t>(i)] - centroid).norm();
   }
+
   const Descriptor real = cosines_ * radii;
   const Descriptor imaginary = sines_ * radii;
+
   return (real.array().square() + imaginary.array().square()).sqrt().matrix();
 }
 

@@ -1,5 +1,5 @@
-// The source's polygon descriptor (GeoSLAM §3.2.2), with the dependence on the start vertex that
-// the source's own method has.
+// The thesis' polygon descriptor (GeoSLAM §3.2.2), with the dependence on the start vertex that its
+// published code has.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,9 +8,9 @@
 
 namespace understory::hierarchy::baseline {
 
-/// Magnitudes of the distinct DFT bins of the sampled radii [m]. Bins that the source counts twice
+/// Magnitudes of the distinct DFT bins of the sampled radii [m]. Bins that the thesis counts twice
 /// (the signal is real) carry a factor sqrt(2), so the Euclidean distance of two descriptors is the
-/// source's distance over all bins. Element 0 is the mean radius times the number of samples.
+/// thesis' distance over all bins. Element 0 is the mean radius times the number of samples.
 using Descriptor = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 33, 1>;
 
 /// Computes descriptors with one resolution; holds the DFT's table.
@@ -19,8 +19,9 @@ class DescriptorMaker {
   /// `step` [s]: share of the perimeter between samples, in [1/64, 1).
   explicit DescriptorMaker(double step);
 
-  /// Descriptor of the closed polygon `boundary` [m], sampled from boundary[0] on. Unlike the
-  /// thesis says, it is invariant to the start only up to whole samples: the published code is so.
+  /// Descriptor of the closed polygon `boundary` [m], sampled from boundary[0] on. It is
+  /// invariant to the start only up to whole samples, as in the published code (the text of the
+  /// thesis claims more).
   Descriptor operator()(std::span<const Eigen::Vector2d> boundary) const;
 
  private:

@@ -56,21 +56,26 @@ void join_across_longest_edge(std::uint32_t t, std::span<const Triangle> triangl
   const auto longest = static_cast<std::size_t>(
       std::distance(lengths.begin(), std::max_element(lengths.begin(), lengths.end())));
   const std::int32_t neighbour = delaunay_triangles[t].neighbours[longest];
+
   if (neighbour < 0) {
     return;  // On the hull: stays by itself unless a neighbour joins it.
   }
+
   const std::uint32_t mine = joining.owner[t];
   const std::uint32_t other = joining.owner[static_cast<std::size_t>(neighbour)];
   if (mine == other) {
     return;
   }
+
   Polygon& kept = joining.polygons[mine];
   Polygon& swallowed = joining.polygons[other];
   kept.vertices = join(std::move(kept.vertices), std::move(swallowed.vertices),
                        triangles[t].vertices[longest], triangles[t].vertices[(longest + 1) % 3]);
+
   for (const std::uint32_t moved : swallowed.triangles) {
     joining.owner[moved] = mine;
   }
+
   kept.triangles.insert(kept.triangles.end(), swallowed.triangles.begin(),
                         swallowed.triangles.end());
   swallowed = Polygon{};
@@ -114,14 +119,17 @@ void Hierarchy::make_polygons(std::span<const Eigen::Vector2d> points,
   joining.owner.resize(count);
   std::iota(joining.owner.begin(), joining.owner.end(), 0U);
   joining.polygons.resize(count);
+
   for (std::uint32_t t = 0; t < count; ++t) {
     const auto& vertices = triangles_[t].vertices;
     joining.polygons[t].vertices.assign(vertices.begin(), vertices.end());
     joining.polygons[t].triangles = {t};
   }
+
   for (std::uint32_t t = 0; t < count; ++t) {
     join_across_longest_edge(t, triangles_, delaunay_triangles, joining);
   }
+
   std::vector<Eigen::Vector2d> boundary;
   for (Polygon& polygon : joining.polygons) {
     if (polygon.triangles.empty()) {

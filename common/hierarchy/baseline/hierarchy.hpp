@@ -1,4 +1,4 @@
-// The source's geometric hierarchy (GeoSLAM §3.2.1, algorithm 1), built from scratch.
+// The geometric hierarchy as published (GeoSLAM §3.2.1, algorithm 1), built from scratch.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,6 +12,7 @@
 
 namespace understory::hierarchy::baseline {
 
+/// A Delaunay triangle; vertices are numbers of points.
 struct Triangle {
   std::array<std::uint32_t, 3> vertices{};
   /// edge_lengths_m[i] is that of vertices[i] -> vertices[i + 1], opposite vertices[i + 2].
@@ -27,6 +28,7 @@ struct Polygon {
   Descriptor descriptor;
 };
 
+/// Triangles and polygons of one set of points, numbered as given.
 class Hierarchy {
  public:
   Hierarchy() = default;
@@ -34,11 +36,13 @@ class Hierarchy {
   Hierarchy(std::span<const Eigen::Vector2d> points, double descriptor_step);
 
   /// Takes moved points (same count, same numbers): edge lengths follow. Descriptors and structure
-  /// stay as they were built; §4.3.5 says that descriptors follow too, the published code computes
-  /// them on a copy and drops it.
+  /// stay as they were built, as in the published code, which computes new descriptors on a copy
+  /// and drops it (GeoSLAM §4.3.5 lets descriptors follow too).
   void move_points(std::span<const Eigen::Vector2d> points);
 
+  /// All triangles, by number.
   std::span<const Triangle> triangles() const { return triangles_; }
+  /// All polygons, by number.
   std::span<const Polygon> polygons() const { return polygons_; }
   /// Numbers of the polygons in ascending order of descriptor(0).
   std::span<const std::uint32_t> by_mean_radius() const { return by_mean_radius_; }

@@ -28,6 +28,7 @@ std::optional<Nearest> nearest_polygon(const Polygon& polygon, const Hierarchy& 
   auto above = static_cast<std::size_t>(std::distance(order.begin(), above_start));
   std::size_t below = above;
   std::optional<Nearest> best;
+
   double limit = max_distance;
   while (true) {
     const double gap_above =
@@ -36,12 +37,15 @@ std::optional<Nearest> nearest_polygon(const Polygon& polygon, const Hierarchy& 
     if (gap_above >= limit && gap_below >= limit) {
       return best;
     }
+
     const std::uint32_t number = gap_above <= gap_below ? order[above++] : order[--below];
     const Polygon& candidate = polygons[number];
     const auto sides = static_cast<int>(polygon.vertices.size());
+
     if (std::abs(sides - static_cast<int>(candidate.vertices.size())) > max_side_difference) {
       continue;
     }
+
     const double distance = (polygon.descriptor - candidate.descriptor).norm();
     if (distance < limit) {
       limit = distance;
@@ -57,6 +61,7 @@ std::array<std::size_t, 3> match_edges(const Triangle& local, const Triangle& ot
       {{0, 1, 2}, {0, 2, 1}, {1, 2, 0}, {1, 0, 2}, {2, 0, 1}, {2, 1, 0}}};
   std::array<std::size_t, 3> best = kPermutations.front();
   double least = -1.0;
+
   for (const auto& permutation : kPermutations) {
     double sum = 0.0;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -68,6 +73,7 @@ std::array<std::size_t, 3> match_edges(const Triangle& local, const Triangle& ot
       best = permutation;
     }
   }
+
   return best;
 }
 
@@ -84,11 +90,13 @@ HierarchyMatches::HierarchyMatches(const Hierarchy& local, const Hierarchy& othe
     if (!forth) {
       continue;
     }
+
     const Polygon& theirs = other.polygons()[forth->number];
     const auto back = nearest_polygon(theirs, local, sides, tau);
     if (!back || back->number != l) {
       continue;
     }
+
     PolygonMatch match;
     match.polygon = {l, forth->number, forth->distance};
     match.triangles = match_triangles(mine, theirs, tau);
@@ -115,6 +123,7 @@ std::vector<HierarchyMatches::Match> HierarchyMatches::match_triangles(const Pol
       }
     }
   }
+
   std::vector<Match> matches;
   for (std::uint32_t l = 0; l < local.triangles.size(); ++l) {
     const Nearest& forth = nearest_other[l];
@@ -122,6 +131,7 @@ std::vector<HierarchyMatches::Match> HierarchyMatches::match_triangles(const Pol
       matches.push_back({local.triangles[l], other.triangles[forth.number], forth.distance});
     }
   }
+
   return matches;
 }
 
@@ -135,6 +145,7 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> HierarchyMatches::polygons(
 
 std::vector<PointMatch> HierarchyMatches::points(double max_descriptor_distance) const {
   std::vector<PointMatch> pairs;
+
   // The source's filter of duplicates orders each pair, although the two numbers count different
   // things: 3 -> 7 hides a true 7 -> 3.
   std::set<std::pair<std::uint32_t, std::uint32_t>> seen;
@@ -142,19 +153,23 @@ std::vector<PointMatch> HierarchyMatches::points(double max_descriptor_distance)
     if (match.polygon.distance >= max_descriptor_distance) {
       continue;
     }
+
     const auto accepted = std::count_if(
         match.triangles.begin(), match.triangles.end(),
         [&](const Match& triangle) { return triangle.distance < max_descriptor_distance; });
     if (static_cast<double>(accepted) < match.triangles_needed) {
       continue;
     }
+
     for (const Match& triangle : match.triangles) {
       if (triangle.distance >= max_descriptor_distance) {
         continue;
       }
+
       const Triangle& mine = local_->triangles()[triangle.local];
       const Triangle& theirs = other_->triangles()[triangle.other];
       const std::array<std::size_t, 3> edges = match_edges(mine, theirs);
+
       for (std::size_t i = 0; i < 3; ++i) {
         const PointMatch pair{mine.vertices[(i + 2) % 3], theirs.vertices[(edges[i] + 2) % 3]};
         if (seen.insert(std::minmax(pair.local, pair.other)).second) {
@@ -163,6 +178,7 @@ std::vector<PointMatch> HierarchyMatches::points(double max_descriptor_distance)
       }
     }
   }
+
   return pairs;
 }
 

@@ -1,4 +1,4 @@
-// Matching two of the source's hierarchies (GeoSLAM §3.2.3).
+// Matching two baseline hierarchies (GeoSLAM §3.2.3).
 #pragma once
 
 #include <cstdint>
@@ -9,10 +9,11 @@
 
 namespace understory::hierarchy::baseline {
 
+/// Thresholds of matching; symbols as in GeoSLAM §3.2.3.
 struct MatchingParameters {
   double max_descriptor_distance = 9.0;   ///< [tau]
   int max_side_difference = 3;            ///< [Delta_N]
-  double min_triangle_match_ratio = 0.5;  ///< [eta]
+  double min_triangle_match_ratio = 0.5;  ///< [eta] Of the triangles of the smaller polygon.
 };
 
 /// Landmark `local` of the first hierarchy is landmark `other` of the second.

@@ -21,17 +21,20 @@ std::optional<Similarity> fit_similarity(std::span<const Eigen::Vector2d> from,
   if (from.size() < 2) {
     return std::nullopt;
   }
+
   Eigen::Vector2d mean_from = Eigen::Vector2d::Zero();
   Eigen::Vector2d mean_to = Eigen::Vector2d::Zero();
   for (std::size_t i = 0; i < from.size(); ++i) {
     mean_from += from[i];
     mean_to += to[i];
   }
+
   mean_from /= static_cast<double>(from.size());
   mean_to /= static_cast<double>(from.size());
   double dot = 0.0;
   double cross = 0.0;
   double square = 0.0;
+
   for (std::size_t i = 0; i < from.size(); ++i) {
     const Eigen::Vector2d p = from[i] - mean_from;
     const Eigen::Vector2d q = to[i] - mean_to;
@@ -39,11 +42,14 @@ std::optional<Similarity> fit_similarity(std::span<const Eigen::Vector2d> from,
     cross += p.x() * q.y() - p.y() * q.x();
     square += p.squaredNorm();
   }
+
   if (!(square > 0.0)) {
     return std::nullopt;
   }
+
   Similarity fit{dot / square, cross / square, Eigen::Vector2d::Zero()};
   fit.translation_m = mean_to - fit * mean_from;
+
   return fit;
 }
 

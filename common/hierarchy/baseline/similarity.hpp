@@ -1,4 +1,4 @@
-// The source's getTf: a linear least-squares similarity. Its scale is never taken out.
+// A linear least-squares similarity, the published code's getTf. Its scale is never taken out.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +15,9 @@ struct Similarity {
   double sine = 0.0;    ///< s sin(theta)
   Eigen::Vector2d translation_m = Eigen::Vector2d::Zero();
 
+  /// The point moved by the similarity, scale included [m].
   Eigen::Vector2d operator*(const Eigen::Vector2d& point) const;
+  /// First `other`, then this.
   Similarity operator*(const Similarity& other) const;
   /// The heading, with the translation as it was solved beside the scale.
   geometry::SE2 pose() const;
