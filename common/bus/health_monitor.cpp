@@ -2,46 +2,10 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
-#include <utility>
 
 namespace understory::bus {
-namespace {
-
-constexpr std::int64_t kLongAgo = -(std::int64_t{1} << 60U);
-
-bool is_malformed(wire::Reason reason) {
-  switch (reason) {
-    case wire::Reason::kTooShort:
-    case wire::Reason::kTooLong:
-    case wire::Reason::kWrongType:
-    case wire::Reason::kBadCount:
-    case wire::Reason::kBadString:
-    case wire::Reason::kNotFinite:
-    case wire::Reason::kOutOfRange:
-    case wire::Reason::kNotSymmetric:
-    case wire::Reason::kNotPositive:
-    case wire::Reason::kInconsistent:
-      return true;
-    default:
-      return false;
-  }
-}
-
-}  // namespace
-
-Severity severity(wire::Reason reason) {
-  switch (reason) {
-    case wire::Reason::kDuplicate:
-    case wire::Reason::kLate:
-      return Severity::kNote;
-    case wire::Reason::kStageFailed:
-    case wire::Reason::kStateNotKept:
-      return Severity::kError;
-    default:
-      return Severity::kDegraded;
-  }
-}
 
 HealthMonitor::HealthMonitor(std::string process, std::string version, Clock clock)
     : process_(std::move(process)),
@@ -49,8 +13,7 @@ HealthMonitor::HealthMonitor(std::string process, std::string version, Clock clo
       clock_(std::move(clock)),
       started_us_(clock_.monotonic_us()),
       reported_us_(started_us_),
-      last_degraded_us_(kLongAgo),
-      last_error_us_(kLongAgo) {}
+      reasons_(clock_) {}
 
 std::size_t HealthMonitor::add_channel(std::string name, bool is_output) {
   Channel channel;
@@ -66,57 +29,49 @@ void HealthMonitor::count_message(std::size_t channel, std::int64_t utime) {
   if (!channels_[channel].is_output) ++handled_;
 }
 
-void HealthMonitor::count_latency(std::int64_t microseconds) { latest_.add(microseconds); }
-
 void HealthMonitor::count_reason(std::string_view channel, wire::Reason reason,
                                  std::string_view text) {
-  ++reasons_[{std::string(channel), std::string(to_string(reason))}];
   for (Channel& one : channels_) {
     if (one.name == channel && is_malformed(reason)) ++one.malformed;
     if (one.name == channel && reason == wire::Reason::kNotSent) ++one.dropped;
   }
-  const Severity how_bad = severity(reason);
-  if (how_bad == Severity::kNote) return;
-  (how_bad == Severity::kError ? last_error_us_ : last_degraded_us_) = clock_.monotonic_us();
-  last_code_ = to_string(reason);
-  last_text_ =
-      channel.empty() ? std::string(text) : std::string(channel) + ": " + std::string(text);
-  last_text_utime_ = clock_.wall_us();
+  reasons_.add(channel, reason, text);
 }
 
 void HealthMonitor::set_sequence(std::size_t channel, const SequenceCounts& counts) {
-  if (counts.gaps > channels_[channel].sequence.gaps) last_degraded_us_ = clock_.monotonic_us();
+  if (counts.gaps > channels_[channel].sequence.gaps) reasons_.add_degraded();
   channels_[channel].sequence = counts;
 }
 
 void HealthMonitor::set_dropped(std::size_t channel, std::uint64_t dropped) {
   const auto now = static_cast<std::int64_t>(dropped);
-  if (now > channels_[channel].dropped) last_degraded_us_ = clock_.monotonic_us();
+  if (now > channels_[channel].dropped) reasons_.add_degraded();
   channels_[channel].dropped = now;
 }
 
 std::int8_t HealthMonitor::state() const {
-  const std::int64_t now = clock_.monotonic_us();
   if (is_stopping_) return health_t::STATE_STOPPING;
   if (!is_ready_) return health_t::STATE_STARTING;
-  if (now - last_error_us_ < kFreshUs) return health_t::STATE_ERROR;
-  if (now - last_degraded_us_ < kFreshUs) return health_t::STATE_DEGRADED;
-  return health_t::STATE_OK;
+  switch (reasons_.fresh()) {
+    case Severity::kError:
+      return health_t::STATE_ERROR;
+    case Severity::kDegraded:
+      return health_t::STATE_DEGRADED;
+    default:
+      return health_t::STATE_OK;
+  }
 }
 
-std::int64_t HealthMonitor::count_of(std::string_view channel, wire::Reason reason) const {
-  const auto found = reasons_.find({std::string(channel), std::string(to_string(reason))});
-  return found == reasons_.end() ? 0 : found->second;
-}
-
-channel_health_t HealthMonitor::channel_report(Channel& channel, double seconds) const {
+channel_health_t HealthMonitor::channel_report(Channel& channel, double seconds) {
   channel_health_t out{};
   out.channel = channel.name;
   out.output = channel.is_output ? 1 : 0;
+
   out.messages = channel.messages;
   const auto fresh = static_cast<double>(channel.messages - channel.messages_reported);
   out.rate_hz = seconds > 0.0 ? fresh / seconds : 0.0;
   channel.messages_reported = channel.messages;
+
   out.gaps = static_cast<std::int64_t>(channel.sequence.gaps);
   out.lost = static_cast<std::int64_t>(channel.sequence.lost);
   out.duplicates = static_cast<std::int64_t>(channel.sequence.duplicates);
@@ -132,6 +87,8 @@ health_t HealthMonitor::report(std::int64_t message_utime) {
   const std::int64_t now = clock_.monotonic_us();
   const double seconds = static_cast<double>(now - reported_us_) * 1e-6;
   reported_us_ = now;
+
+  // Who it is, and how it is.
   health_t out{};
   out.utime = clock_.wall_us();
   out.seq = sequence_++;
@@ -142,27 +99,20 @@ health_t HealthMonitor::report(std::int64_t message_utime) {
   out.uptime_s = static_cast<double>(now - started_us_) * 1e-6;
   out.message_utime = message_utime;
   out.handled = handled_;
-  LatencyHistogram window = before_;
-  window.merge(latest_);
+  out.rss_bytes = resident_memory_bytes();
+  out.snapshot_utime = -1;
+
+  // How fast it is.
+  const LatencyHistogram window = latencies_.report();
   out.latency_p50_us = window.quantile(0.5);
   out.latency_p90_us = window.quantile(0.9);
   out.latency_p99_us = window.quantile(0.99);
   out.latency_max_us = window.max();
-  before_ = std::exchange(latest_, {});
-  out.rss_bytes = resident_memory_bytes();
-  out.snapshot_utime = -1;
-  out.last_error_code = last_code_;
-  out.last_error = last_text_;
-  out.last_error_utime = last_text_utime_;
+
+  // What came and went, and what was wrong.
   for (Channel& channel : channels_) out.channels.push_back(channel_report(channel, seconds));
   out.num_channels = static_cast<std::int32_t>(out.channels.size());
-  for (const auto& [where, count] : reasons_) {
-    reason_count_t& reason = out.reasons.emplace_back();
-    reason.channel = where.first;
-    reason.reason = where.second;
-    reason.count = count;
-  }
-  out.num_reasons = static_cast<std::int32_t>(out.reasons.size());
+  reasons_.fill(out);
   return out;
 }
 

@@ -1,55 +1,71 @@
 // How a process is: counts, rates, latencies, and the state that follows from them.
 #pragma once
 
-#include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "common/bus/clock.hpp"
 #include "common/bus/latency_histogram.hpp"
+#include "common/bus/reason_counts.hpp"
 #include "common/bus/sequence_tracker.hpp"
 #include "common/wire/result.hpp"
 #include "understory/health_t.hpp"
 
 namespace understory::bus {
 
-/// How bad a reason is while it is fresh (kFreshUs).
-enum class Severity : std::uint8_t {
-  kNote,      ///< Counted; the state stays OK.
-  kDegraded,  ///< Input or output is missing or wrong.
-  kError,     ///< The service does not do what it is for.
-};
-Severity severity(wire::Reason reason);
+/// Latencies since about two reports ago: percentiles do not jump when a report is due.
+class LatencyWindow {
+ public:
+  /// Counts one latency [us].
+  void add(std::int64_t microseconds) { latest_.add(microseconds); }
+  /// The latencies since the report before the last one; begins a new part.
+  LatencyHistogram report() {
+    LatencyHistogram window = before_;
+    window.merge(latest_);
+    before_ = std::exchange(latest_, {});
+    return window;
+  }
 
+ private:
+  LatencyHistogram latest_;
+  LatencyHistogram before_;
+};
+
+/// Collects what HEALTH publishes about one process.
 class HealthMonitor {
  public:
-  /// A reason counts towards the state for this long [us].
-  static constexpr std::int64_t kFreshUs = 3000000;
-
+  /// `process` and `version` as HEALTH shows them.
   HealthMonitor(std::string process, std::string version, Clock clock);
 
-  /// Channels are given in the order in which they are added.
+  /// Adds a channel; gives its number. HEALTH lists channels in the order of adding.
   std::size_t add_channel(std::string name, bool is_output);
+  /// Counts a message on a channel, by its stamp [us].
   void count_message(std::size_t channel, std::int64_t utime);
-  void count_latency(std::int64_t microseconds);
+  /// Counts the time from receiving a message to the end of its handler [us].
+  void count_latency(std::int64_t microseconds) { latencies_.add(microseconds); }
+  /// Counts what was wrong with a message of a channel, or with the process (empty channel).
   void count_reason(std::string_view channel, wire::Reason reason, std::string_view text);
+  /// Sets the sequence counts of an input; a new gap degrades the state.
   void set_sequence(std::size_t channel, const SequenceCounts& counts);
+  /// Sets how many messages the bus dropped; an increase degrades the state.
   void set_dropped(std::size_t channel, std::uint64_t dropped);
 
-  /// STARTING until the first call of ready(), STOPPING after stop(), else from the reasons.
+  /// From now on the state follows from the reasons; before it is STARTING.
   void ready() { is_ready_ = true; }
+  /// From now on the state is STOPPING.
   void stop() { is_stopping_ = true; }
+  /// The state as health_t has it: STARTING, OK, DEGRADED, ERROR or STOPPING.
   std::int8_t state() const;
 
-  /// The message for HEALTH; rates and latencies are over the time since about two calls ago.
+  /// The message for HEALTH. Rates are over the time since the last call, latencies since the call
+  /// before that. The caller adds what it alone has: buffers, journal, snapshot.
   health_t report(std::int64_t message_utime);
-  /// What report() does not know is set by the caller: buffers, journal, snapshot.
-
-  const std::map<std::pair<std::string, std::string>, std::int64_t>& reasons() const {
-    return reasons_;
+  /// How often this reason came for this channel.
+  std::int64_t count_of(std::string_view channel, wire::Reason reason) const {
+    return reasons_.count_of(channel, reason);
   }
-  std::int64_t count_of(std::string_view channel, wire::Reason reason) const;
 
  private:
   struct Channel {
@@ -63,7 +79,7 @@ class HealthMonitor {
     SequenceCounts sequence;
   };
 
-  channel_health_t channel_report(Channel& channel, double seconds) const;
+  static channel_health_t channel_report(Channel& channel, double seconds);
 
   std::string process_;
   std::string version_;
@@ -73,19 +89,13 @@ class HealthMonitor {
   bool is_ready_ = false;
   bool is_stopping_ = false;
   std::vector<Channel> channels_;
-  std::map<std::pair<std::string, std::string>, std::int64_t> reasons_;  // channel, reason
-  std::int64_t last_degraded_us_;
-  std::int64_t last_error_us_;
+  ReasonCounts reasons_;
+  LatencyWindow latencies_;
   std::int64_t handled_ = 0;
   std::int64_t sequence_ = 0;
-  LatencyHistogram latest_;
-  LatencyHistogram before_;
-  std::string last_code_;
-  std::string last_text_;
-  std::int64_t last_text_utime_ = -1;
 };
 
-/// Resident memory of this process [bytes]; 0 where it cannot be told.
+/// Resident memory of this process [bytes]; 0 where it cannot be read.
 std::int64_t resident_memory_bytes();
 
 }  // namespace understory::bus

@@ -1,11 +1,7 @@
 #include "common/bus/node.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <stdexcept>
-
-#include "understory/config_t.hpp"
-#include "understory/log_t.hpp"
 
 namespace understory::bus {
 
@@ -14,7 +10,9 @@ Node::Node(Bus& bus, NodeOptions options, Clock clock)
       options_(std::move(options)),
       computer_clock_(std::move(clock)),
       clock_(options_.largest_clock_jump_us),
-      monitor_(options_.process, options_.version, computer_clock_) {}
+      monitor_(options_.process, options_.version, computer_clock_),
+      announcer_(bus, options_.process, options_.version),
+      state_(options_.snapshot_every_us, options_.snapshot_every_events) {}
 
 void Node::add_input(const std::string& channel, Take take, SubscribeOptions options) {
   const auto& suffixed = options_.suffixed_inputs;
@@ -33,11 +31,6 @@ std::size_t Node::add_output(const std::string& channel) {
   if (const auto refusal = check_publishable(name, 0)) throw std::logic_error(refusal->detail);
   outputs_.push_back({name, 0, monitor_.add_channel(name, true)});
   return outputs_.size() - 1;
-}
-
-void Node::every(model::Utime period_us, std::function<void(model::Utime)> handler) {
-  if (period_us <= 0) throw std::logic_error("a tick needs a period");
-  timers_.push_back({period_us, -1, std::move(handler)});
 }
 
 void Node::connect() {
@@ -65,38 +58,38 @@ void Node::handle(Input& input, const BusMessage& message) {
     report(wire::Reason::kStageFailed, error.what(), input.channel);
   }
   if (refusal) report(refusal->reason, refusal->detail, input.channel);
+
   if (message.received_us != 0) {
     monitor_.count_latency(computer_clock_.wall_us() - message.received_us);
   }
-  if (!is_recovering_) snapshot_when_due();
+  if (!is_recovering_ && state_.is_due(now())) save_snapshot();
 }
 
 bool Node::admit(Input& input, const BusMessage& message) {
   const wire::MessageHeader header = *wire::header_of(message.bytes);
   if (input.options.sequenced) {
-    if (!admit_time(input, header.utime)) return false;
-    const Arrival arrival = input.sequence.take(header.sequence, header.utime);
-    monitor_.set_sequence(input.health, input.sequence.counts());
-    if (arrival == Arrival::kDuplicate) {
-      report(wire::Reason::kDuplicate, "seq " + std::to_string(header.sequence), input.channel);
-      return false;
-    }
-    if (arrival == Arrival::kLate) {
-      report(wire::Reason::kLate, "seq " + std::to_string(header.sequence), input.channel);
-      return false;
-    }
-    fire_timers(clock_.now());
+    if (!admit_time(input, header.utime) || !admit_sequence(input, header)) return false;
+    timers_.fire(clock_.now());
   }
+
   monitor_.count_message(input.health, header.utime);
-  if (store_ != nullptr && !is_recovering_ && input.options.journaled) {
-    ++events_since_snapshot_;
-    if (!store_->needs_snapshot()) {
-      if (const auto refusal = store_->append(input.channel, message.bytes)) {
-        report(refusal->reason, refusal->detail);
-      }
+  if (!is_recovering_ && input.options.journaled) {
+    if (const auto refusal = state_.append(input.channel, message.bytes)) {
+      report(refusal->reason, refusal->detail);
     }
   }
   return true;
+}
+
+bool Node::admit_sequence(Input& input, const wire::MessageHeader& header) {
+  const Arrival arrival = input.sequence.take(header.sequence, header.utime);
+  monitor_.set_sequence(input.health, input.sequence.counts());
+  if (arrival != Arrival::kDuplicate && arrival != Arrival::kLate) return true;
+
+  const bool is_late = arrival == Arrival::kLate;
+  report(is_late ? wire::Reason::kLate : wire::Reason::kDuplicate,
+         "seq " + std::to_string(header.sequence), input.channel);
+  return false;
 }
 
 bool Node::admit_time(Input& input, model::Utime utime) {
@@ -106,6 +99,7 @@ bool Node::admit_time(Input& input, model::Utime utime) {
     clock_.resume(utime);
     return start_at_jump();
   }
+
   switch (verdict) {
     case MessageClock::Verdict::kFine:
       return true;
@@ -123,72 +117,28 @@ bool Node::admit_time(Input& input, model::Utime utime) {
 }
 
 bool Node::start_at_jump() {
-  // Numbers from before the jump say nothing about what comes now.
+  // Sequence numbers from before the jump do not bind what comes now.
   for (const auto& one : inputs_) one->sequence.resume(-1, -1);
-  for (Timer& timer : timers_) timer.due = -1;
+  timers_.start_over();
   return true;
-}
-
-void Node::fire_timers(model::Utime now) {
-  for (std::size_t i = 0; i < timers_.size(); ++i) {
-    if (timers_[i].due < 0) timers_[i].due = now + timers_[i].period;
-    while (timers_[i].due <= now) {
-      const model::Utime due = timers_[i].due;
-      timers_[i].due += timers_[i].period;
-      timers_[i].handler(due);
-    }
-  }
 }
 
 void Node::send(Output& output, model::Utime utime, const wire::Bytes& bytes,
                 const wire::WireType& type) {
   if (is_recovering_) return;
-  // The same walk as on the way in: nothing that is not finite is ever published.
+
+  // The same checks as for inputs: nothing that is not finite is ever published.
   std::optional<wire::Refusal> refusal = check_bytes(bytes, type);
   if (refusal) refusal = wire::Refusal{wire::Reason::kNotSent, refusal->detail};
   if (!refusal) refusal = bus_.publish(output.channel, bytes);
   if (refusal) return report(refusal->reason, refusal->detail, output.channel);
+
   monitor_.count_message(output.health, utime);
 }
 
 void Node::report(wire::Reason reason, std::string_view text, std::string_view channel) {
   monitor_.count_reason(channel, reason, text);
-  const std::uint64_t count = ++logged_[{std::string(to_string(reason)), std::string(channel)}];
-  // The 1st, 2nd, 4th, 8th ... of a kind: a flood of bad input must not become a flood of LOG.
-  if (!std::has_single_bit(count)) return;
-  std::string line(text);
-  if (count > 1) line += " (" + std::to_string(count) + " so far)";
-  const bool is_note = severity(reason) == Severity::kNote;
-  send_log(is_note ? Level::kInfo : Level::kWarning, to_string(reason), line, channel);
-}
-
-void Node::log(Level level, std::string_view code, std::string_view text,
-               std::string_view channel) {
-  send_log(level, code, text, channel);
-}
-
-void Node::send_log(Level level, std::string_view code, std::string_view text,
-                    std::string_view channel) {
-  if (is_recovering_) return;
-  log_t message{};
-  message.utime = std::max<model::Utime>(now(), 0);
-  message.seq = log_sequence_++;
-  message.process = options_.process;
-  message.level = static_cast<std::int8_t>(level);
-  message.channel = channel;
-  message.code = code;
-  message.text = text;
-  bus_.publish("LOG", wire::encode_bytes(message));
-}
-
-void Node::publish_config(const std::string& toml) {
-  config_t message{};
-  message.utime = std::max<model::Utime>(now(), 0);
-  message.seq = config_sequence_++;
-  message.process = options_.process;
-  message.version = options_.version;
-  message.toml = toml;
-  bus_.publish("CONFIG", wire::encode_bytes(message));
+  announcer_.report(now(), reason, text, channel);
 }
 
 health_t Node::health() {
@@ -196,11 +146,12 @@ health_t Node::health() {
     monitor_.set_dropped(input->health, bus_.dropped(input->channel));
   }
   health_t report = monitor_.report(now());
+
   const ReceiveBuffer buffer = bus_.receive_buffer();
   report.receive_buffer_bytes = buffer.granted_bytes;
   report.receive_buffer_wanted_bytes = buffer.wanted_bytes;
-  report.snapshot_utime = snapshot_utime_;
-  if (store_ != nullptr) report.journal_bytes = static_cast<std::int64_t>(store_->journal_bytes());
+  report.snapshot_utime = state_.saved_utime();
+  report.journal_bytes = state_.journal_bytes();
   return report;
 }
 

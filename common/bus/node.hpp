@@ -1,6 +1,6 @@
 // A service's place on the bus: typed messages in and out, ticks, state, health.
 //
-// What an adapter says when it is bound:
+// What an adapter calls when it is bound:
 //   node.subscribe<LandmarkScan>("LANDMARKS", [this](const LandmarkScan& scan) { ... });
 //   keyframes_ = node.advertise<Keyframe>("KEYFRAME");
 //   node.every(1'000'000, [this](Utime now) { ... });
@@ -16,11 +16,15 @@
 #include <utility>
 #include <vector>
 
+#include "common/bus/announcer.hpp"
 #include "common/bus/bus.hpp"
 #include "common/bus/clock.hpp"
 #include "common/bus/health_monitor.hpp"
 #include "common/bus/message_clock.hpp"
+#include "common/bus/message_timers.hpp"
+#include "common/bus/node_state.hpp"
 #include "common/bus/sequence_tracker.hpp"
+#include "common/bus/state_keeper.hpp"
 #include "common/bus/state_store.hpp"
 #include "common/wire/convert.hpp"
 
@@ -28,18 +32,22 @@ namespace understory::bus {
 
 class Node;
 
+/// How an input is taken.
 struct SubscribeOptions {
-  std::size_t queue_size = 30;  ///< Messages that may wait; the oldest makes room.
-  bool sequenced = true;  ///< One sender counts: duplicates and late comers are dropped. False
-                          ///< for requests, which anybody may send.
+  std::size_t queue_size = 30;  ///< Messages that may wait; when full, the oldest is dropped.
+  /// One sender numbers its messages: duplicates and late comers are dropped. False for requests,
+  /// which anybody may send.
+  bool sequenced = true;
   bool journaled = true;  ///< Part of the state: fed again after a restart.
 };
 
-/// The way out to one channel; copies share it. Stamps `seq`, counting from 0.
+/// An output channel; copies share it. Stamps `seq`, counting from 0.
 template <class T>
 class Publisher {
  public:
+  /// Without a channel: publish() must not be called.
   Publisher() = default;
+  /// Sends a value. One that is not finite, or that the bus refuses, is counted and not sent.
   void publish(const T& value) const;
 
  private:
@@ -49,21 +57,26 @@ class Publisher {
   std::size_t output_ = 0;
 };
 
+/// How a node names its channels, believes stamps and keeps its state.
 struct NodeOptions {
-  std::string process;
-  std::string version;
-  std::string channel_suffix;                ///< Of every output, e.g. _ALT.
-  std::vector<std::string> suffixed_inputs;  ///< Inputs that carry the suffix too.
-  std::int64_t largest_clock_jump_us = 10000000;
-  model::Utime snapshot_every_us = 30000000;  ///< Message time.
-  int snapshot_every_events = 1000;
-  bool publishes_health = true;  ///< HEALTH; LOG and CONFIG are always published.
+  std::string process;                            ///< As in HEALTH.
+  std::string version;                            ///< As in HEALTH and CONFIG.
+  std::string channel_suffix;                     ///< Of every output, e.g. _ALT.
+  std::vector<std::string> suffixed_inputs;       ///< Inputs that carry the suffix too.
+  std::int64_t largest_clock_jump_us = 10000000;  ///< MessageClock's.
+  model::Utime snapshot_every_us = 30000000;      ///< Message time between two snapshots.
+  int snapshot_every_events = 1000;               ///< Inputs between two snapshots.
+  bool publishes_health = true;                   ///< HEALTH; LOG and CONFIG are always published.
 };
 
+/// A facade, hence the number of functions: adapters see channels, ticks and messages for people;
+/// drivers see state, health and the feed. What it does is owned by its members; it decides which
+/// messages reach the stage.
 class Node {
  public:
-  enum class Level : std::uint8_t { kDebug, kInfo, kWarning, kError };
+  using Level = LogLevel;  ///< How urgent a line of LOG is.
 
+  /// `bus` must outlive it. `clock` is for HEALTH only.
   Node(Bus& bus, NodeOptions options, Clock clock);
   Node(const Node&) = delete;
   Node& operator=(const Node&) = delete;
@@ -71,18 +84,24 @@ class Node {
   // For adapters.
 
   /// `handler` takes a T: a value of common/model or a wire type. It may throw: counted, reported,
-  /// the message is done with.
+  /// the message is done with. Throws std::logic_error for a channel that is subscribed already.
   template <class T, class F>
   void subscribe(const std::string& channel, F handler, SubscribeOptions options = {});
+  /// An output for values T of common/model or a wire type. Throws std::logic_error for a name that
+  /// no channel can have.
   template <class T>
   Publisher<T> advertise(const std::string& channel);
   /// Called with the time that is due, in message time: before the message that moves time past it.
-  void every(model::Utime period_us, std::function<void(model::Utime)> handler);
+  void every(model::Utime period_us, std::function<void(model::Utime)> handler) {
+    timers_.add(period_us, std::move(handler));
+  }
   /// Newest stamp among the inputs; -1 before the first.
   model::Utime now() const { return clock_.now(); }
   /// Something a person should read: LOG.
   void log(Level level, std::string_view code, std::string_view text,
-           std::string_view channel = "");
+           std::string_view channel = "") {
+    announcer_.log(now(), level, code, text, channel);
+  }
   /// Something is wrong: counted for HEALTH, and LOG at a limited rate.
   void report(wire::Reason reason, std::string_view text, std::string_view channel = "");
 
@@ -94,21 +113,29 @@ class Node {
   /// loaded; the stage may be half loaded and must be made anew.
   bool recover(StateStore& store);
   /// From now on inputs are written to the store before they are handled.
-  void journal_to(StateStore* store) { store_ = store; }
+  void journal_to(StateStore* store) { state_.journal_to(store); }
+  /// Saves the state, where there is a store. A failure is reported.
   void save_snapshot();
   /// Subscribes on the bus: from now on messages come.
   void connect();
   /// Handles one message as if it came from the bus; false = no input has this channel.
   bool feed(const BusMessage& message);
 
+  /// Whether a channel is an input.
   bool takes(std::string_view channel) const;
+  /// Names of the outputs, suffix included; HEALTH, LOG and CONFIG are not among them.
   std::vector<std::string> outputs() const;
   /// The message for HEALTH, as of now.
   health_t health();
+  /// Publishes HEALTH, where the options allow it.
   void publish_health();
-  void publish_config(const std::string& toml);
+  /// Publishes CONFIG with the configuration in force.
+  void publish_config(const std::string& toml) { announcer_.config(now(), toml); }
+  /// The counts behind HEALTH.
   HealthMonitor& monitor() { return monitor_; }
+  /// As given to the constructor.
   const NodeOptions& options() const { return options_; }
+  /// Sequence counts of an input. Throws std::logic_error for another channel.
   const SequenceCounts& sequence_counts(std::string_view channel) const;
 
   /// Sends an encoded message whose `seq` is stamped; for Publisher.
@@ -132,46 +159,35 @@ class Node {
     std::int64_t next_sequence = 0;
     std::size_t health = 0;
   };
-  struct Timer {
-    model::Utime period = 0;
-    model::Utime due = -1;
-    std::function<void(model::Utime)> handler;
+  struct Stage {
+    std::function<std::string()> save;
+    std::function<void(const std::string&)> load;
   };
 
   void add_input(const std::string& channel, Take take, SubscribeOptions options);
   std::size_t add_output(const std::string& channel);
   void handle(Input& input, const BusMessage& message);
   bool admit(Input& input, const BusMessage& message);
+  bool admit_sequence(Input& input, const wire::MessageHeader& header);
   bool admit_time(Input& input, model::Utime utime);
   bool start_at_jump();
-  void fire_timers(model::Utime now);
-  void snapshot_when_due();
   void send(Output& output, model::Utime utime, const wire::Bytes& bytes,
             const wire::WireType& type);
-  void send_log(Level level, std::string_view code, std::string_view text,
-                std::string_view channel);
   std::string save_state() const;
-  void load_state(const std::string& state);
+  void load_state(const std::string& bytes);
 
   Bus& bus_;
   NodeOptions options_;
   Clock computer_clock_;
   MessageClock clock_;
   HealthMonitor monitor_;
+  Announcer announcer_;
   std::vector<std::unique_ptr<Input>> inputs_;
   std::vector<Output> outputs_;
-  std::vector<Timer> timers_;
-  std::function<std::string()> save_;
-  std::function<void(const std::string&)> load_;
-  StateStore* store_ = nullptr;
+  MessageTimers timers_;
+  Stage stage_;
+  StateKeeper state_;
   bool is_recovering_ = false;
-  model::Utime snapshot_utime_ = -1;
-  model::Utime snapshot_tried_ = -1;
-  model::Utime snapshot_base_ = -1;  // what the snapshot's period counts from
-  int events_since_snapshot_ = 0;
-  std::int64_t log_sequence_ = 0;
-  std::int64_t config_sequence_ = 0;
-  std::map<std::pair<std::string, std::string>, std::uint64_t> logged_;  // code, channel -> count
 };
 
 template <class T, class F>

@@ -4,6 +4,7 @@
 #include <random>
 
 #include "common/bus/memory_bus.hpp"
+#include "common/bus/node_state.hpp"
 #include "common/bus/state_format.hpp"
 #include "tests/bus/toy_service.hpp"
 #include "tests/catch.hpp"
@@ -86,6 +87,7 @@ TEST_CASE("a journal cut at every byte gives every whole event before the cut") 
   const std::string journal = read(file);
   std::size_t one = journal.size() / 8;
   REQUIRE(one * 8 == journal.size());
+
   for (std::size_t size = 0; size <= journal.size(); ++size) {
     write(file, journal.substr(0, size));
     Life life(scratch.path());
@@ -106,6 +108,7 @@ TEST_CASE("a damaged byte anywhere in journal or snapshot is told, never believe
   const std::string snapshot = read(snapshot_file);
   const std::string journal = read(journal_file);
   REQUIRE(journal.size() > 0);
+
   std::mt19937_64 random(1);
   for (const bool in_snapshot : {true, false}) {
     const std::string& whole = in_snapshot ? snapshot : journal;
@@ -117,6 +120,7 @@ TEST_CASE("a damaged byte anywhere in journal or snapshot is told, never believe
       StateStore store(scratch.path(), "toy");
       const auto recovered = store.open();
       store.end_recovery();
+
       if (in_snapshot) {
         CHECK_FALSE(recovered.snapshot);
         CHECK(recovered.events.empty());
@@ -130,6 +134,7 @@ TEST_CASE("a damaged byte anywhere in journal or snapshot is told, never believe
                 wire::encode_message(test::toy_input(5 + static_cast<int>(i))));
         }
       }
+
       for (const auto& entry : fs::directory_iterator(scratch.path())) fs::remove(entry.path());
     }
   }
@@ -140,7 +145,11 @@ TEST_CASE("a state that the stage cannot load is refused and reported") {
   StateStore(scratch.path(), "toy").open();
   StateStore store(scratch.path(), "toy");
   store.open();
-  REQUIRE_FALSE(store.save("node 1 5 0 0 1\n-1\nstage\nrubbish"));
+  NodeState state;
+  state.now_us = 5;
+  state.timers_due_us = {-1};
+  state.stage = "rubbish";
+  REQUIRE_FALSE(store.save(state::save(NodeState::kFormat, state)));
   Life life(scratch.path());
   CHECK_FALSE(life.is_recovered);
   CHECK(life.hosted.node().monitor().count_of("", wire::Reason::kSnapshotDamaged) == 1);

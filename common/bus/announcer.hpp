@@ -1,0 +1,47 @@
+// What a process publishes about itself besides HEALTH: LOG and CONFIG.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "common/bus/bus.hpp"
+#include "common/wire/result.hpp"
+
+namespace understory::bus {
+
+/// How urgent a line of LOG is; the numbers are those of log_t.
+enum class LogLevel : std::uint8_t { kDebug, kInfo, kWarning, kError };
+
+/// Publishes LOG and CONFIG under the process's name and numbers them.
+class Announcer {
+ public:
+  /// `bus` must outlive it.
+  Announcer(Bus& bus, std::string process, std::string version);
+
+  /// While muted nothing is published or numbered: a recovery repeats what was published before.
+  void mute(bool is_muted) { is_muted_ = is_muted; }
+
+  /// One line of LOG. `utime`: message time [us]; -1 (none yet) becomes 0.
+  void log(std::int64_t utime, LogLevel level, std::string_view code, std::string_view text,
+           std::string_view channel);
+  /// A line of LOG for the 1st, 2nd, 4th, 8th ... of each reason and channel: a flood of bad input
+  /// must not become a flood of LOG.
+  void report(std::int64_t utime, wire::Reason reason, std::string_view text,
+              std::string_view channel);
+  /// The configuration in force.
+  void config(std::int64_t utime, const std::string& toml);
+
+ private:
+  Bus& bus_;
+  std::string process_;
+  std::string version_;
+  bool is_muted_ = false;
+  std::int64_t log_sequence_ = 0;
+  std::int64_t config_sequence_ = 0;
+  std::map<std::pair<std::string, std::string>, std::uint64_t> reported_;  // reason, channel
+};
+
+}  // namespace understory::bus

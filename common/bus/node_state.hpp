@@ -1,0 +1,34 @@
+// What a node keeps over a restart.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/state/archive.hpp"
+
+namespace understory::bus {
+
+/// The node's own part of a service's state, and the stage's as it gave it. Counts for HEALTH are
+/// not part of it: they are of one process.
+struct NodeState {
+  /// The list of members that follows.
+  static constexpr state::Format kFormat{"node", 2};
+
+  std::int64_t now_us = -1;  ///< MessageClock::now().
+  /// Newest sequence number and stamp [us] of each input, by channel.
+  std::map<std::string, std::pair<std::int64_t, std::int64_t>> inputs;
+  std::map<std::string, std::int64_t> outputs;  ///< Next sequence number, by channel.
+  std::vector<std::int64_t> timers_due_us;      ///< MessageTimers::due_us().
+  std::string stage;                            ///< Adapter::save().
+
+  /// Lists the members, see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.now_us, self.inputs, self.outputs, self.timers_due_us, self.stage);
+  }
+};
+
+}  // namespace understory::bus

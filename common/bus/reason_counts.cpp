@@ -1,0 +1,82 @@
+#include "common/bus/reason_counts.hpp"
+
+namespace understory::bus {
+namespace {
+
+constexpr std::int64_t kLongAgo = -(std::int64_t{1} << 60U);
+
+}  // namespace
+
+bool is_malformed(wire::Reason reason) {
+  switch (reason) {
+    case wire::Reason::kTooShort:
+    case wire::Reason::kTooLong:
+    case wire::Reason::kWrongType:
+    case wire::Reason::kBadCount:
+    case wire::Reason::kBadString:
+    case wire::Reason::kNotFinite:
+    case wire::Reason::kOutOfRange:
+    case wire::Reason::kNotSymmetric:
+    case wire::Reason::kNotPositive:
+    case wire::Reason::kInconsistent:
+      return true;
+    default:
+      return false;
+  }
+}
+
+Severity severity(wire::Reason reason) {
+  switch (reason) {
+    case wire::Reason::kDuplicate:
+    case wire::Reason::kLate:
+      return Severity::kNote;
+    case wire::Reason::kStageFailed:
+    case wire::Reason::kStateNotKept:
+      return Severity::kError;
+    default:
+      return Severity::kDegraded;
+  }
+}
+
+ReasonCounts::ReasonCounts(Clock clock)
+    : clock_(std::move(clock)), last_degraded_us_(kLongAgo), last_error_us_(kLongAgo) {}
+
+void ReasonCounts::add(std::string_view channel, wire::Reason reason, std::string_view text) {
+  ++counts_[{std::string(channel), std::string(to_string(reason))}];
+  const Severity how_bad = severity(reason);
+  if (how_bad == Severity::kNote) return;
+
+  (how_bad == Severity::kError ? last_error_us_ : last_degraded_us_) = clock_.monotonic_us();
+  last_code_ = to_string(reason);
+  last_text_ =
+      channel.empty() ? std::string(text) : std::string(channel) + ": " + std::string(text);
+  last_text_utime_ = clock_.wall_us();
+}
+
+Severity ReasonCounts::fresh() const {
+  const std::int64_t now = clock_.monotonic_us();
+  if (now - last_error_us_ < kFreshUs) return Severity::kError;
+  if (now - last_degraded_us_ < kFreshUs) return Severity::kDegraded;
+  return Severity::kNote;
+}
+
+std::int64_t ReasonCounts::count_of(std::string_view channel, wire::Reason reason) const {
+  const auto found = counts_.find({std::string(channel), std::string(to_string(reason))});
+  return found == counts_.end() ? 0 : found->second;
+}
+
+void ReasonCounts::fill(health_t& message) const {
+  message.last_error_code = last_code_;
+  message.last_error = last_text_;
+  message.last_error_utime = last_text_utime_;
+
+  for (const auto& [where, count] : counts_) {
+    reason_count_t& reason = message.reasons.emplace_back();
+    reason.channel = where.first;
+    reason.reason = where.second;
+    reason.count = count;
+  }
+  message.num_reasons = static_cast<std::int32_t>(message.reasons.size());
+}
+
+}  // namespace understory::bus

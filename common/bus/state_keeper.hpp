@@ -1,0 +1,56 @@
+// When a service's inputs are journaled and when a snapshot of its state is due.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "common/bus/state_store.hpp"
+#include "common/wire/result.hpp"
+
+namespace understory::bus {
+
+/// Between a node and its store. Keeps nothing as long as there is no store. Times are message time
+/// [us].
+class StateKeeper {
+ public:
+  /// A snapshot is due after this much message time or this many inputs, whichever comes first.
+  StateKeeper(std::int64_t every_us, int every_events)
+      : every_us_(every_us), every_events_(every_events) {}
+
+  /// From now on inputs go to the store, which must outlive the keeper; null = none.
+  void journal_to(StateStore* store) { store_ = store; }
+  /// The state of time `utime` was loaded.
+  void resume(std::int64_t utime) { saved_utime_ = period_start_ = utime; }
+  /// This many inputs were fed since that state.
+  void set_events(int events) { events_ = events; }
+
+  /// Journals an input before it is handled. A refusal: the device fails.
+  std::optional<wire::Refusal> append(std::string_view channel,
+                                      std::span<const std::uint8_t> bytes);
+  /// Whether a snapshot should be saved now.
+  bool is_due(std::int64_t now);
+  /// Saves what `make_state` gives. Without a store, or before the first message (now < 0), does
+  /// nothing. A refusal: the device fails, or `make_state` threw.
+  std::optional<wire::Refusal> save(std::int64_t now,
+                                    const std::function<std::string()>& make_state);
+
+  /// Time of the last state saved or loaded; -1 = none.
+  std::int64_t saved_utime() const { return saved_utime_; }
+  /// Size of the journal; 0 without a store.
+  std::int64_t journal_bytes() const;
+
+ private:
+  std::int64_t every_us_;
+  int every_events_;
+  StateStore* store_ = nullptr;
+  std::int64_t saved_utime_ = -1;
+  std::int64_t tried_utime_ = -1;
+  std::int64_t period_start_ = -1;
+  int events_ = 0;  // since the snapshot
+};
+
+}  // namespace understory::bus
