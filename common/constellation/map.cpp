@@ -4,39 +4,9 @@
 #include <cmath>
 
 namespace understory::constellation {
-
 namespace {
 
 constexpr LandmarkId kReservedId = ~LandmarkId{0};
-
-using SlotTriple = std::array<Slot, 3>;
-
-SlotTriple ascending(Slot a, Slot b, Slot c) {
-  if (a > b) std::swap(a, b);
-  if (b > c) std::swap(b, c);
-  if (a > b) std::swap(a, b);
-  return {a, b, c};
-}
-
-/// The library's comparison of arrays goes byte by byte.
-bool before(const SlotTriple& a, const SlotTriple& b) {
-  const std::uint64_t first = (std::uint64_t{a[0]} << 32) | a[1];
-  const std::uint64_t second = (std::uint64_t{b[0]} << 32) | b[1];
-  return first != second ? first < second : a[2] < b[2];
-}
-
-void sort_unique(std::vector<SlotTriple>& triangles) {
-  std::sort(triangles.begin(), triangles.end(), before);
-  const auto same = [](const SlotTriple& a, const SlotTriple& b) {
-    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
-  };
-  triangles.erase(std::unique(triangles.begin(), triangles.end(), same), triangles.end());
-}
-
-void sort_unique(std::vector<Slot>& slots) {
-  std::sort(slots.begin(), slots.end());
-  slots.erase(std::unique(slots.begin(), slots.end()), slots.end());
-}
 
 }  // namespace
 
@@ -49,56 +19,35 @@ std::string_view describe(LocaliseOutcome outcome) {
     case LocaliseOutcome::kNoMatch:
       return "no hypothesis held";
     case LocaliseOutcome::kLikelyChance:
-
       return "too few hits to rule out chance";
     case LocaliseOutcome::kAmbiguous:
       return "a different pose fits nearly as well";
     case LocaliseOutcome::kGaveUp:
-
       return "gave up after the allowed number of hypotheses";
   }
 
   return "unknown";
 }
 
-ConstellationMap::ConstellationMap(const Parameters& parameters)
-    : parameters_(parameters), grid_(parameters.cell_m), triangles_(parameters.bucket_m) {}
-
-bool ConstellationMap::Neighbours::has(Slot wanted) const {
-  for (std::uint32_t i = 0; i < count; ++i) {
-    if (slot[i] == wanted) return true;
-  }
-  return false;
-}
+ConstellationMap::ConstellationMap(const Parameters& parameters) : net_(parameters) {}
 
 bool ConstellationMap::insert(LandmarkId id, const Eigen::Vector2d& position_m) {
   if (id == kReservedId || contains(id) || !PointGrid::representable(position_m)) return false;
-  Slot slot = static_cast<Slot>(ids_.size());
-  if (free_slots_.empty()) {
-    ids_.push_back(id);
-    neighbours_.emplace_back();
-  } else {
+
+  Slot slot = static_cast<Slot>(net_.slot_count());
+  if (!free_slots_.empty()) {
     slot = free_slots_.back();
     free_slots_.pop_back();
-    ids_[slot] = id;
-    neighbours_[slot] = {};
   }
-
   slots_.insert(id, slot);
-  std::vector<Slot> anchors{slot};
-  collect_anchors(slot, position_m, anchors);
-  update(slot, anchors, [&] { grid_.insert(slot, position_m); });
-
+  net_.insert(slot, id, position_m);
   return true;
 }
 
 bool ConstellationMap::remove(LandmarkId id) {
   const Slot slot = slots_.find(id);
   if (slot == kNoSlot) return false;
-  std::vector<Slot> anchors{slot};
-  collect_anchors(slot, grid_.position(slot), anchors);
-  update(
-      slot, anchors, [&] { grid_.remove(slot); }, slot);
+  net_.remove(slot);
   slots_.erase(id);
   free_slots_.push_back(slot);
   return true;
@@ -107,164 +56,14 @@ bool ConstellationMap::remove(LandmarkId id) {
 bool ConstellationMap::move(LandmarkId id, const Eigen::Vector2d& position_m) {
   const Slot slot = slots_.find(id);
   if (slot == kNoSlot || !PointGrid::representable(position_m)) return false;
-  std::vector<Slot> anchors{slot};
-  collect_anchors(slot, grid_.position(slot), anchors);
-  collect_anchors(slot, position_m, anchors);
-  sort_unique(anchors);
-  update(slot, anchors, [&] { grid_.move(slot, position_m); });
+  net_.move(slot, position_m);
   return true;
-}
-
-template <class Change>
-void ConstellationMap::update(Slot changed, std::vector<Slot>& anchors, Change&& change,
-                              Slot gone) {
-  std::sort(anchors.begin(), anchors.end());
-  std::vector<Neighbours> lists_before;
-  lists_before.reserve(anchors.size());
-  for (const Slot anchor : anchors) lists_before.push_back(neighbours_[anchor]);
-
-  // Sides that end at the changed landmark have to be computed before it changes.
-  const std::vector<SlotTriple> old_ends = triangles_at(changed, anchors);
-  for (const SlotTriple& triangle : old_ends) triangles_.remove(canonical(triangle));
-  change();
-  for (const Slot anchor : anchors) {
-    neighbours_[anchor] = anchor == gone ? Neighbours{} : nearest_neighbours(anchor);
-  }
-  for (const SlotTriple& triangle : triangles_at(changed, anchors)) {
-    triangles_.add(canonical(triangle));
-  }
-
-  // Of the others only those count that an anchor holds no longer, or newly.
-  std::vector<SlotTriple> lost;
-  std::vector<SlotTriple> gained;
-  for (std::size_t i = 0; i < anchors.size(); ++i) {
-    if (anchors[i] == changed) continue;
-    collect_difference(anchors[i], lists_before[i], neighbours_[anchors[i]], changed, lost);
-    collect_difference(anchors[i], neighbours_[anchors[i]], lists_before[i], changed, gained);
-  }
-  sort_unique(lost);
-  sort_unique(gained);
-  const auto held_before = [&](Slot corner, const SlotTriple& triangle) {
-    const auto it = std::lower_bound(anchors.begin(), anchors.end(), corner);
-    const bool rewired = it != anchors.end() && *it == corner;
-    return holds(corner,
-                 rewired ? lists_before[static_cast<std::size_t>(it - anchors.begin())]
-                         : neighbours_[corner],
-                 triangle);
-  };
-  for (const SlotTriple& triangle : lost) {
-    const bool held = std::any_of(triangle.begin(), triangle.end(), [&](Slot corner) {
-      return holds(corner, neighbours_[corner], triangle);
-    });
-    if (!held) triangles_.remove(canonical(triangle));
-  }
-  for (const SlotTriple& triangle : gained) {
-    const bool held = std::any_of(triangle.begin(), triangle.end(),
-                                  [&](Slot corner) { return held_before(corner, triangle); });
-    if (!held) triangles_.add(canonical(triangle));
-  }
-}
-
-std::vector<ConstellationMap::SlotTriple> ConstellationMap::triangles_at(
-    Slot corner, const std::vector<Slot>& anchors) const {
-  std::vector<SlotTriple> triangles;
-  triangles.reserve(64);
-  for (const Slot anchor : anchors) {
-    const Neighbours& list = neighbours_[anchor];
-    if (anchor != corner && !list.has(corner)) continue;
-    for (std::uint32_t i = 0; i < list.count; ++i) {
-      for (std::uint32_t j = i + 1; j < list.count; ++j) {
-        if (anchor != corner && list.slot[i] != corner && list.slot[j] != corner) continue;
-        triangles.push_back(ascending(anchor, list.slot[i], list.slot[j]));
-      }
-    }
-  }
-
-  sort_unique(triangles);
-  return triangles;
-}
-
-void ConstellationMap::collect_difference(Slot anchor, const Neighbours& in, const Neighbours& out,
-                                          Slot except, std::vector<SlotTriple>& triangles) {
-  std::array<bool, kNeighbours> common{};
-  for (std::uint32_t i = 0; i < in.count; ++i) common[i] = out.has(in.slot[i]);
-  for (std::uint32_t i = 0; i < in.count; ++i) {
-    for (std::uint32_t j = i + 1; j < in.count; ++j) {
-      if ((common[i] && common[j]) || in.slot[i] == except || in.slot[j] == except) continue;
-      triangles.push_back(ascending(anchor, in.slot[i], in.slot[j]));
-    }
-  }
-}
-
-void ConstellationMap::collect_anchors(Slot slot, const Eigen::Vector2d& position,
-                                       std::vector<Slot>& anchors) const {
-  grid_.for_each_within(position.x(), position.y(), parameters_.max_neighbour_distance_m,
-                        [&](Slot other, double squared) {
-                          if (other == slot) return;
-                          const Neighbours& list = neighbours_[other];
-                          if (list.count < kNeighbours || list.has(slot)) {
-                            anchors.push_back(other);
-                            return;
-                          }
-                          const Slot last = list.slot[list.count - 1];
-                          const double farthest =
-                              (grid_.position(last) - grid_.position(other)).squaredNorm();
-                          // Generous by rounding: an anchor too many costs time only.
-                          if (squared <= farthest * (1.0 + 1e-9)) anchors.push_back(other);
-                        });
-}
-
-ConstellationMap::Neighbours ConstellationMap::nearest_neighbours(Slot slot) const {
-  struct Near {
-    double squared;
-    Slot slot;
-  };
-
-  std::array<Near, kNeighbours> best;
-  std::uint32_t count = 0;
-  const double limit = parameters_.max_neighbour_distance_m * parameters_.max_neighbour_distance_m;
-
-  const auto closer = [this](const Near& a, const Near& b) {
-    return a.squared < b.squared || (a.squared == b.squared && ids_[a.slot] < ids_[b.slot]);
-  };
-
-  const Eigen::Vector2d position = grid_.position(slot);
-  grid_.for_each_outward(
-      position.x(), position.y(),
-      [&](Slot other, double squared) {
-        const Near candidate{squared, other};
-        if (other == slot || squared > limit) return;
-        if (count == kNeighbours && !closer(candidate, best[count - 1])) return;
-        std::uint32_t i = count < kNeighbours ? count++ : count - 1;
-        for (; i > 0 && closer(candidate, best[i - 1]); --i) best[i] = best[i - 1];
-        best[i] = candidate;
-      },
-      [&](double complete_m) {
-        const double squared = complete_m * complete_m;
-        return squared > limit || (count == kNeighbours && best[count - 1].squared < squared);
-      });
-
-  Neighbours result;
-  result.count = count;
-  for (std::uint32_t i = 0; i < count; ++i) result.slot[i] = best[i].slot;
-
-  return result;
-}
-
-bool ConstellationMap::holds(Slot anchor, const Neighbours& list, const SlotTriple& triangle) {
-  return std::all_of(triangle.begin(), triangle.end(),
-                     [&](Slot corner) { return corner == anchor || list.has(corner); });
-}
-
-Triangle ConstellationMap::canonical(const SlotTriple& triangle) const {
-  const auto corner = [this](Slot slot) { return Corner{slot, ids_[slot], grid_.position(slot)}; };
-  return canonical_triangle(corner(triangle[0]), corner(triangle[1]), corner(triangle[2]));
 }
 
 std::optional<Eigen::Vector2d> ConstellationMap::position(LandmarkId id) const {
   const Slot slot = slots_.find(id);
   if (slot == kNoSlot) return std::nullopt;
-  return grid_.position(slot);
+  return net_.grid().position(slot);
 }
 
 std::optional<NearestLandmark> ConstellationMap::nearest(const Eigen::Vector2d& point_m,
@@ -288,9 +87,9 @@ std::vector<LandmarkId> ConstellationMap::near(const Disc& disc) const {
 
 std::vector<std::array<LandmarkId, 3>> ConstellationMap::triangles() const {
   std::vector<std::array<LandmarkId, 3>> result;
-  result.reserve(triangles_.size());
-  for (const SlotTriple& triangle : triangles_.all()) {
-    std::array<LandmarkId, 3> ids{ids_[triangle[0]], ids_[triangle[1]], ids_[triangle[2]]};
+  result.reserve(triangle_count());
+  for (const auto& triangle : net_.triangles().all()) {
+    std::array<LandmarkId, 3> ids{id_of(triangle[0]), id_of(triangle[1]), id_of(triangle[2])};
     std::sort(ids.begin(), ids.end());
     result.push_back(ids);
   }
@@ -299,9 +98,7 @@ std::vector<std::array<LandmarkId, 3>> ConstellationMap::triangles() const {
 }
 
 std::size_t ConstellationMap::bytes() const {
-  return grid_.bytes() + triangles_.bytes() + slots_.bytes() +
-         ids_.capacity() * sizeof(LandmarkId) + neighbours_.capacity() * sizeof(Neighbours) +
-         free_slots_.capacity() * sizeof(Slot);
+  return net_.bytes() + slots_.bytes() + free_slots_.capacity() * sizeof(Slot);
 }
 
 }  // namespace understory::constellation

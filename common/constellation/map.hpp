@@ -10,7 +10,8 @@
 
 #include "common/constellation/grid.hpp"
 #include "common/constellation/localisation.hpp"
-#include "common/constellation/triangles.hpp"
+#include "common/constellation/table.hpp"
+#include "common/constellation/triangle_net.hpp"
 
 namespace understory::constellation {
 
@@ -20,23 +21,16 @@ struct NearestLandmark {
   double distance_m = 0.0;
 };
 
-/// Landmarks in a grid, and the triangles that each forms with its nearest neighbours, by their
-/// side lengths. Every change is made in place and touches the neighbourhood only; the result does
-/// not depend on the order of changes (ties between distances are broken by id).
+/// Landmarks by id, and the triangles that each forms with its nearest neighbours, by their side
+/// lengths. Every change is made in place and touches the neighbourhood only; the result does not
+/// depend on the order of changes.
 ///
 /// Positions must be finite and within constellation::PointGrid::kMaxCoordinate.
 class ConstellationMap {
  public:
-  /// Sizes of the look-up structures. They decide speed and memory; max_neighbour_distance_m also
-  /// decides which triangles exist.
-  struct Parameters {
-    double cell_m = 4.0;    ///< Of the grid.
-    double bucket_m = 0.5;  ///< Of side lengths.
-    /// Neighbours further away than this form no triangles [m].
-    double max_neighbour_distance_m = 30.0;
-  };
+  using Parameters = MapParameters;  ///< Sizes of the look-up structures.
   /// Triangles are made among a landmark and two of its so many nearest neighbours.
-  static constexpr std::size_t kNeighbours = 6;
+  static constexpr std::size_t kNeighbours = TriangleNet::kNeighbours;
 
   /// An empty map with the default parameters.
   ConstellationMap() : ConstellationMap(Parameters{}) {}
@@ -64,8 +58,8 @@ class ConstellationMap {
   template <class F>
   void for_each_within(const Eigen::Vector2d& point_m, double radius_m, F&& f) const {
     if (!PointGrid::representable(point_m)) return;
-    grid_.for_each_within(point_m.x(), point_m.y(), radius_m, [&](Slot slot, double squared) {
-      f(ids_[slot], grid_.position(slot), std::sqrt(squared));
+    grid().for_each_within(point_m.x(), point_m.y(), radius_m, [&](Slot slot, double squared) {
+      f(id_of(slot), grid().position(slot), std::sqrt(squared));
     });
   }
   /// Ids of the landmarks in the disc, in ascending order.
@@ -85,47 +79,20 @@ class ConstellationMap {
   /// Every triangle as ascending ids, sorted: for comparisons.
   std::vector<std::array<LandmarkId, 3>> triangles() const;
   /// Number of triangles in the index.
-  std::size_t triangle_count() const { return triangles_.size(); }
+  std::size_t triangle_count() const { return net_.triangles().size(); }
   /// Memory held [bytes].
   std::size_t bytes() const;
 
   /// The landmarks by slot, for the search in localise.cpp.
-  const PointGrid& grid() const { return grid_; }
+  const PointGrid& grid() const { return net_.grid(); }
   /// The triangles by side lengths, for the search in localise.cpp. Vertices are slots.
-  const TriangleIndex& triangle_index() const { return triangles_; }
+  const TriangleIndex& triangle_index() const { return net_.triangles(); }
   /// Id of the landmark in a slot. Precondition: the slot is in use.
-  LandmarkId id_of(Slot slot) const { return ids_[slot]; }
+  LandmarkId id_of(Slot slot) const { return net_.id_of(slot); }
 
  private:
-  using SlotTriple = std::array<Slot, 3>;
-  struct Neighbours {
-    std::array<Slot, kNeighbours> slot{};
-    std::uint32_t count = 0;
-    bool has(Slot wanted) const;
-  };
-
-  Neighbours nearest_neighbours(Slot slot) const;
-  /// Landmarks whose neighbours a landmark `slot` at `position` is, or would be.
-  void collect_anchors(Slot slot, const Eigen::Vector2d& position,
-                       std::vector<Slot>& anchors) const;
-  /// Triangles with that corner that the anchors' neighbourhoods hold: sorted, each once.
-  std::vector<SlotTriple> triangles_at(Slot corner, const std::vector<Slot>& anchors) const;
-  /// Triangles that `anchor` holds with the neighbours `in` and not with `out`, without `except`.
-  static void collect_difference(Slot anchor, const Neighbours& in, const Neighbours& out,
-                                 Slot except, std::vector<SlotTriple>& triangles);
-  static bool holds(Slot anchor, const Neighbours& list, const SlotTriple& triangle);
-  Triangle canonical(const SlotTriple& triangle) const;
-  /// Brings neighbourhoods and triangles up to date around `changed` while `change` is made; `gone`
-  /// is `changed` if it is no longer there afterwards.
-  template <class Change>
-  void update(Slot changed, std::vector<Slot>& anchors, Change&& change, Slot gone = kNoSlot);
-
-  Parameters parameters_;
-  PointGrid grid_;
-  TriangleIndex triangles_;
-  IndexTable slots_;                    // id -> slot
-  std::vector<LandmarkId> ids_;         // by slot
-  std::vector<Neighbours> neighbours_;  // by slot
+  TriangleNet net_;
+  IndexTable slots_;  // id -> slot
   std::vector<Slot> free_slots_;
 };
 
