@@ -13,17 +13,16 @@ constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
 Eigen::Matrix2d rotation(double angle) { return geometry::SE2(0.0, 0.0, angle).rotation(); }
 
-/// Adds one IMU sample: rate and force held over `dt`, the force in the frame at mid-turn.
+/// Adds one IMU sample: rate and force held over `dt`, the force in the frame at mid-rotation.
 void integrate(model::Preintegration& p, double rate, const Eigen::Vector2d& force, double dt,
                double gyro_noise, double accelerometer_noise) {
-  const double turn = rate * dt;
-  const Eigen::Matrix2d to_start = rotation(p.yaw_rad + 0.5 * turn);
+  const double yaw = rate * dt;
+  const Eigen::Matrix2d to_start = rotation(p.yaw_rad + 0.5 * yaw);
   const Eigen::Vector2d acceleration = to_start * force;
   const Eigen::Vector2d sideways = geometry::perpendicular(acceleration);
   Eigen::Matrix<double, 5, 5> step = Eigen::Matrix<double, 5, 5>::Identity();
   step.block<2, 1>(1, 0) = sideways * dt;
   step.block<2, 1>(3, 0) = 0.5 * sideways * dt * dt;
-
   step.block<2, 2>(3, 1) = dt * Eigen::Matrix2d::Identity();
   Eigen::Matrix<double, 5, 3> input = Eigen::Matrix<double, 5, 3>::Zero();  // Of (rate, force).
   input(0, 0) = dt;
@@ -39,8 +38,7 @@ void integrate(model::Preintegration& p, double rate, const Eigen::Vector2d& for
   p.bias_jacobian = step * p.bias_jacobian - input;
   p.position_m += p.velocity_mps * dt + 0.5 * acceleration * dt * dt;
   p.velocity_mps += acceleration * dt;
-
-  p.yaw_rad += turn;
+  p.yaw_rad += yaw;
   p.seconds += dt;
 }
 
@@ -58,29 +56,42 @@ InertialDrive::InertialDrive(const InertialDriveParameters& parameters, const Tr
                              std::uint64_t seed)
     : parameters_(parameters), world_(world), random_(random_stream(seed, Stream::kObservation)) {
   std::uniform_real_distribution<double> angle(0.0, kTwoPi);
-  phase_ = angle(random_);
-  theta_ = angle(random_);
+  progress_.phase_rad = angle(random_);
+  body_.theta_rad = angle(random_);
 
   // The loop lies around the middle of the forest.
   const double radius = parameters_.loop_length_m / kTwoPi;
   const Eigen::Vector2d middle = 0.5 * (world.forest.low_m + world.forest.high_m);
-  position_ = middle + radius * Eigen::Vector2d(std::sin(theta_), -std::cos(theta_));
+  body_.position_m =
+      middle + radius * Eigen::Vector2d(std::sin(body_.theta_rad), -std::cos(body_.theta_rad));
   bias_ << parameters_.gyro_bias_sigma * normal(), parameters_.accelerometer_bias_sigma * normal(),
       parameters_.accelerometer_bias_sigma * normal();
-  parked_ = geometry::SE2(position_, theta_);
 
+  sway_.parked = body_.pose();
   if (sways()) {
     const geometry::SE2 first = sway_place();
-    position_ = first.translation();
-    theta_ = first.theta();
-    velocity_ = sway_velocity();
+    body_.position_m = first.translation();
+    body_.theta_rad = first.theta();
+    body_.velocity_mps = sway_velocity();
   }
+}
+
+InertialDrive::Tick InertialDrive::Body::move(double dt, double yaw_rad,
+                                              const Eigen::Vector2d& velocity_mps_after) {
+  Tick tick;
+  tick.yaw_rad = yaw_rad;
+  const double mid = theta_rad + 0.5 * yaw_rad;
+  theta_rad += yaw_rad;
+  tick.acceleration_mps2 = rotation(-mid) * (velocity_mps_after - velocity_mps) / dt;
+  position_m += 0.5 * (velocity_mps_after + velocity_mps) * dt;
+  velocity_mps = velocity_mps_after;
+  return tick;
 }
 
 /// Whether the body sways until the next scan.
 bool InertialDrive::sways() const {
   const InertialDriveParameters& p = parameters_;
-  const bool is_stationary = time_s_ + p.scan_interval_s < p.standing_s + 1e-6;
+  const bool is_stationary = progress_.time_s + p.scan_interval_s < p.standing_s + 1e-6;
   return is_stationary &&
          (p.sway_sigma_m > 0.0 || p.sway_sigma_rad > 0.0 || p.sway_sigma_mps > 0.0);
 }
@@ -88,7 +99,7 @@ bool InertialDrive::sways() const {
 geometry::SE2 InertialDrive::sway_place() {
   const double x = parameters_.sway_sigma_m * normal();
   const double y = parameters_.sway_sigma_m * normal();
-  return parked_ * geometry::SE2(x, y, parameters_.sway_sigma_rad * normal());
+  return sway_.parked * geometry::SE2(x, y, parameters_.sway_sigma_rad * normal());
 }
 
 Eigen::Vector2d InertialDrive::sway_velocity() {
@@ -96,60 +107,54 @@ Eigen::Vector2d InertialDrive::sway_velocity() {
   return {x, parameters_.sway_sigma_mps * normal()};
 }
 
-/// Pushes by which the body is at a place and a velocity of its sway when the next scan comes.
+/// Accelerations by which the body reaches a new place and velocity of its sway at the next scan.
 void InertialDrive::begin_sway() {
   const geometry::SE2 next = sway_place();
   const Eigen::Vector2d velocity = sway_velocity();
   const double half = 0.5 * parameters_.scan_interval_s;
-  // With pushes a, b over the halves: velocity + (a + b) half, and way + (1.5 a + 0.5 b) half^2.
-  const Eigen::Vector2d sum = (velocity - velocity_) / half;
-  const Eigen::Vector2d way = next.translation() - position_ - 2.0 * half * velocity_;
-  sway_push_.col(0) = way / (half * half) - 0.5 * sum;
-  sway_push_.col(1) = sum - sway_push_.col(0);
-  sway_rate_ = geometry::wrap_angle(next.theta() - theta_) / parameters_.scan_interval_s;
+
+  // With accelerations a, b over the halves: velocity + (a + b) half, and
+  // displacement + (1.5 a + 0.5 b) half^2.
+  const Eigen::Vector2d sum = (velocity - body_.velocity_mps) / half;
+  const Eigen::Vector2d displacement =
+      next.translation() - body_.position_m - 2.0 * half * body_.velocity_mps;
+  sway_.push.col(0) = displacement / (half * half) - 0.5 * sum;
+  sway_.push.col(1) = sum - sway_.push.col(0);
+  sway_.rate_rad_s =
+      geometry::wrap_angle(next.theta() - body_.theta_rad) / parameters_.scan_interval_s;
 }
 
 InertialDrive::Tick InertialDrive::sway(double dt, bool first_half) {
-  time_s_ += dt;
-  Tick tick =
-      turn_and_push(dt, sway_rate_ * dt, velocity_ + sway_push_.col(first_half ? 0 : 1) * dt);
+  progress_.time_s += dt;
+  Tick tick = body_.move(dt, sway_.rate_rad_s * dt,
+                         body_.velocity_mps + sway_.push.col(first_half ? 0 : 1) * dt);
   walk_bias(dt);
-  return tick;
-}
-
-/// One sample's motion, after which the vehicle has turned and has this velocity.
-InertialDrive::Tick InertialDrive::turn_and_push(double dt, double yaw_rad,
-                                                 const Eigen::Vector2d& velocity_mps) {
-  Tick tick;
-  tick.yaw_rad = yaw_rad;
-  const double mid = theta_ + 0.5 * yaw_rad;
-  theta_ += yaw_rad;
-  tick.acceleration_mps2 = rotation(-mid) * (velocity_mps - velocity_) / dt;
-  position_ += 0.5 * (velocity_mps + velocity_) * dt;
-  velocity_ = velocity_mps;
   return tick;
 }
 
 InertialDrive::Tick InertialDrive::advance(double dt) {
-  time_s_ += dt;
-  const double moving = time_s_ - parameters_.standing_s;
+  const InertialDriveParameters& p = parameters_;
+  progress_.time_s += dt;
+
+  // The speed follows the wanted one as far as the acceleration allows.
+  const double moving = progress_.time_s - p.standing_s;
   const double wanted =
-      moving <= 0.0
-          ? 0.0
-          : parameters_.speed_mps * (1.0 + parameters_.speed_swing * std::sin(0.4 * moving));
-  const double change = parameters_.acceleration_mps2 * dt;
-  speed_mps_ = std::clamp(wanted, speed_mps_ - change, speed_mps_ + change);
-  const double length = speed_mps_ * dt;
-  const double curvature = kTwoPi / parameters_.loop_length_m +
-                           parameters_.wiggle_curvature *
-                               std::sin(phase_ + kTwoPi * driven_m_ / parameters_.wiggle_length_m);
+      moving <= 0.0 ? 0.0 : p.speed_mps * (1.0 + p.speed_swing * std::sin(0.4 * moving));
+  const double change = p.acceleration_mps2 * dt;
+  double& speed = progress_.speed_mps;
+  speed = std::clamp(wanted, speed - change, speed + change);
 
-  const double heading = theta_ + length * curvature;
-  Tick tick = turn_and_push(dt, length * curvature,
-                            speed_mps_ * Eigen::Vector2d(std::cos(heading), std::sin(heading)));
-  driven_m_ += length;
+  // The heading follows the loop and its bends.
+  const double length = speed * dt;
+  const double curvature =
+      kTwoPi / p.loop_length_m +
+      p.wiggle_curvature *
+          std::sin(progress_.phase_rad + kTwoPi * progress_.driven_m / p.wiggle_length_m);
+  const double heading = body_.theta_rad + length * curvature;
+  Tick tick = body_.move(dt, length * curvature,
+                         speed * Eigen::Vector2d(std::cos(heading), std::sin(heading)));
+  progress_.driven_m += length;
   walk_bias(dt);
-
   return tick;
 }
 
@@ -159,14 +164,13 @@ void InertialDrive::walk_bias(double dt) {
   bias_.z() += parameters_.accelerometer_walk * std::sqrt(dt) * normal();
 }
 
-model::Odometry InertialDrive::drive_increment() {
+/// Drives to the next scan and integrates the IMU's samples of `dt`.
+model::Preintegration InertialDrive::drive_samples(double dt) {
   const InertialDriveParameters& p = parameters_;
-  const double dt = p.scan_interval_s / p.samples_per_scan;
-  const geometry::SE2 before(position_, theta_);
   const bool swaying = sways();
   if (swaying) begin_sway();
-  model::Preintegration inertial;
 
+  model::Preintegration inertial;
   for (int k = 0; k < p.samples_per_scan; ++k) {
     const model::InertialBias bias = bias_;
     const Tick tick = swaying ? sway(dt, 2 * k < p.samples_per_scan) : advance(dt);
@@ -176,27 +180,36 @@ model::Odometry InertialDrive::drive_increment() {
     force.y() += p.accelerometer_noise / std::sqrt(dt) * normal();
     integrate(inertial, rate, force, dt, p.gyro_noise, p.accelerometer_noise);
   }
+  return inertial;
+}
 
-  const geometry::SE2 truth = before.inverse() * geometry::SE2(position_, theta_);
+model::Odometry InertialDrive::drive_increment() {
+  const InertialDriveParameters& p = parameters_;
+  const geometry::SE2 before = body_.pose();
+  const model::Preintegration inertial = drive_samples(p.scan_interval_s / p.samples_per_scan);
+  const geometry::SE2 truth = before.inverse() * body_.pose();
+
+  // How well the sensors on board measure the increment.
   const bool wheels = p.odometry != OdometryKind::kInertial;
   const bool imu = p.odometry != OdometryKind::kWheels;
   const double sigma = wheels ? p.wheel_sigma_m : p.dead_reckoning_sigma_mps * p.scan_interval_s;
-  const double turn_sigma =
+  const double rotation_sigma =
       imu ? std::sqrt(inertial.covariance(0, 0)) + p.gyro_bias_sigma * p.scan_interval_s
           : p.wheel_sigma_rad;
-  model::Odometry increment;
-  increment.is_stationary = speed_mps_ <= 0.0;
 
+  model::Odometry increment;
+  increment.is_stationary = progress_.speed_mps <= 0.0;
   increment.has_wheels = wheels;
   if (imu) increment.inertial = inertial;
+
+  // Its error; stationary wheels measure none.
   const double moved = increment.is_stationary && wheels ? 0.0 : 1.0;
   const Eigen::Vector3d error(sigma * moved * normal(), sigma * moved * normal(),
-                              imu ? 0.0 : turn_sigma * moved * normal());
+                              imu ? 0.0 : rotation_sigma * moved * normal());
   increment.from_T_to = truth * geometry::SE2::Exp(error);
   if (imu) increment.from_T_to = geometry::SE2(increment.from_T_to.translation(), inertial.yaw_rad);
   increment.covariance =
-      Eigen::Vector3d(sigma * sigma, sigma * sigma, turn_sigma * turn_sigma).asDiagonal();
-
+      Eigen::Vector3d(sigma * sigma, sigma * sigma, rotation_sigma * rotation_sigma).asDiagonal();
   return increment;
 }
 
@@ -248,10 +261,10 @@ DriveStep InertialDrive::next() {
     if (parameters_.odometry != OdometryKind::kNone) step.odometry.push_back(increment);
   }
 
-  step.world_T_vehicle = geometry::SE2(position_, theta_);
-  step.velocity_mps = velocity_;
+  step.world_T_vehicle = body_.pose();
+  step.velocity_mps = body_.velocity_mps;
   step.bias = bias_;
-  step.driven_m = driven_m_;
+  step.driven_m = progress_.driven_m;
   step.scan.utime = utime;
   step.scan.sequence = scans_++;
   step.scan.field_of_view.max_range_m = parameters_.range_m;

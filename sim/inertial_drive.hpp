@@ -85,18 +85,44 @@ class InertialDrive {
   DriveStep next();
 
  private:
+  /// One IMU sample's true motion.
   struct Tick {
     double yaw_rad = 0.0;
-    Eigen::Vector2d acceleration_mps2 = Eigen::Vector2d::Zero();  ///< Mid-turn body frame.
+    Eigen::Vector2d acceleration_mps2 = Eigen::Vector2d::Zero();  ///< Frame body at mid-rotation.
   };
+  /// Where the vehicle is and how fast, frame world.
+  struct Body {
+    Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
+    double theta_rad = 0.0;
+    Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();
+
+    geometry::SE2 pose() const { return {position_m, theta_rad}; }
+    /// Rotates by `yaw_rad` within `dt`, at the end of which it has this velocity.
+    Tick move(double dt, double yaw_rad, const Eigen::Vector2d& velocity_mps_after);
+  };
+  /// How far along the loop the vehicle is.
+  struct Progress {
+    double time_s = 0.0;
+    double speed_mps = 0.0;
+    double driven_m = 0.0;
+    double phase_rad = 0.0;  ///< Of the bends.
+  };
+  /// The sway of a stationary body between two scans.
+  struct Sway {
+    geometry::SE2 parked;     ///< Its mean pose.
+    double rate_rad_s = 0.0;  ///< Until the next scan.
+    /// [m/s^2] In the first and the second half of the interval.
+    Eigen::Matrix2d push = Eigen::Matrix2d::Zero();
+  };
+
   Tick advance(double dt);
-  Tick turn_and_push(double dt, double yaw_rad, const Eigen::Vector2d& velocity_mps);
-  void walk_bias(double dt);
+  Tick sway(double dt, bool first_half);
   bool sways() const;
   geometry::SE2 sway_place();
   Eigen::Vector2d sway_velocity();
   void begin_sway();
-  Tick sway(double dt, bool first_half);
+  void walk_bias(double dt);
+  model::Preintegration drive_samples(double dt);
   model::Odometry drive_increment();
   void observe(DriveStep& step);
   double normal() { return normal_(random_); }
@@ -106,17 +132,9 @@ class InertialDrive {
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
   std::uint64_t scans_ = 0;
-  double time_s_ = 0.0;
-  double speed_mps_ = 0.0;
-  double driven_m_ = 0.0;
-  double phase_ = 0.0;
-  double theta_ = 0.0;
-  Eigen::Vector2d position_ = Eigen::Vector2d::Zero();
-  Eigen::Vector2d velocity_ = Eigen::Vector2d::Zero();
-  geometry::SE2 parked_;    ///< What the sway goes round.
-  double sway_rate_ = 0.0;  ///< [rad/s] Until the next scan.
-  /// [m/s^2] In its first and its second half.
-  Eigen::Matrix2d sway_push_ = Eigen::Matrix2d::Zero();
+  Body body_;
+  Progress progress_;
+  Sway sway_;
   model::InertialBias bias_ = model::InertialBias::Zero();
 };
 
