@@ -1,4 +1,4 @@
-// A fixed set of points in the plane, sorted into square tiles.
+// Nearest and within-radius queries in a fixed set of points in the plane.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,12 +7,16 @@
 #include <span>
 #include <vector>
 
+#include "common/geometry/point_bins.hpp"
+
 namespace understory::sim {
 
-/// A static index of points; a query looks only into the tiles that it touches.
+/// A static index of points. Answers do not depend on the size of the tiles: indices come in
+/// ascending order, equal distances are decided by the index.
 class PointGrid {
  public:
-  /// Tiles of `tile_m` over the bounding box of `points_m`; the points are copied.
+  /// Tiles of `tile_m` over the bounding box of `points_m`; the points are copied. Fastest where
+  /// `tile_m` is about the usual radius of a query.
   PointGrid(std::span<const Eigen::Vector2d> points_m, double tile_m);
 
   /// A point found and its distance.
@@ -31,20 +35,11 @@ class PointGrid {
   std::span<const Eigen::Vector2d> points() const { return points_; }
 
  private:
-  /// Calls visit(index, squared distance) for the points of the tiles that touch the disc; stops
-  /// when it returns false.
-  template <typename Visit>
-  void visit_within(const Eigen::Vector2d& centre_m, double radius_m, Visit visit) const;
-  int column(double x_m) const;
-  int row(double y_m) const;
-
   std::vector<Eigen::Vector2d> points_;
-  double tile_m_ = 1.0;
-  Eigen::Vector2d origin_m_ = Eigen::Vector2d::Zero();
-  int columns_ = 0;
-  int rows_ = 0;
-  std::vector<std::uint32_t> first_of_tile_;  ///< columns * rows + 1 offsets into order_.
-  std::vector<std::uint32_t> order_;
+  double tile_m_;
+  Eigen::Vector2d low_m_ = Eigen::Vector2d::Zero();
+  Eigen::Vector2d high_m_ = Eigen::Vector2d::Zero();
+  geometry::PointBins bins_;
 };
 
 }  // namespace understory::sim
