@@ -137,7 +137,6 @@ std::optional<model::GnssFix> SimulatedGnss::next(const VehicleMotion& motion,
   fix.utime = utime_at(time_s, utime_of_start);
   fix.sequence = fixes_++;
   fix.east_north_m = (state.position_m + lever).head<2>() + drift_m_ + noise;
-
   fix.sigma_m = std::hypot(parameters_.sigma_m, parameters_.drift_sigma_m);
   fix.velocity_mps = (state.velocity_mps + turning).head<2>() + velocity_noise;
   fix.velocity_sigma_mps = parameters_.velocity_sigma_mps;

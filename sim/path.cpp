@@ -65,7 +65,6 @@ std::vector<Segment> segments_of(const PathParameters& parameters) {
     case PathKind::kFigureEight:
       return {arc(0.5 * length, 2.0 * round), arc(0.5 * length, -2.0 * round)};
     case PathKind::kSquare:
-
       return polygon(length, 4);
     case PathKind::kTriangle:
       return polygon(length, 3);

@@ -20,7 +20,6 @@ SimulatedPlanarScan PlanarLaser::scan(const VehicleMotion& motion, std::uint64_t
   result.scan.sequence = k;
   result.scan.first_bearing_rad = parameters_.first_bearing_rad;
   result.scan.bearing_step_rad = parameters_.bearing_step_rad;
-
   result.scan.max_range_m = parameters_.max_range_m;
   for (int beam = 0; beam < parameters_.beams; ++beam) {
     const double bearing = parameters_.first_bearing_rad + beam * parameters_.bearing_step_rad;

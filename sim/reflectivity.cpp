@@ -21,7 +21,6 @@ Surface surface_of(ObjectClass kind) {
     case ObjectClass::kPole:
       return {0.45, 0.05};
     case ObjectClass::kBranch:
-
       return {0.25, 0.3};
     case ObjectClass::kCrown:
     case ObjectClass::kBush:
@@ -29,10 +28,8 @@ Surface surface_of(ObjectClass kind) {
     case ObjectClass::kWall:
       return {0.45, 0.05};
     case ObjectClass::kCar:
-
       return {0.25, 0.05};
     case ObjectClass::kPerson:
-
       return {0.35, 0.2};
   }
 

@@ -71,10 +71,8 @@ std::optional<SensorReading> SensorDrive::read(Source source) {
     case Source::kGnss:
       return gnss_->next(motion_, utime_of_start_);
     case Source::kPlanarLaser:
-
       return planar_laser_->scan(motion_, scans_++, utime_of_start_);
     case Source::kLidar:
-
       return lidar_->sweep(motion_, revolutions_++, utime_of_start_);
   }
 

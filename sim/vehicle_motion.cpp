@@ -203,7 +203,6 @@ VehicleState VehicleMotion::at(double time_s) const {
   state.velocity_mps = value.first.head<3>();
   state.acceleration_mps2 = value.second.head<3>();
   state.roll_rad = value.position[3];
-
   state.pitch_rad = value.position[4];
   state.yaw_rad = value.position[5];
   const double sr = std::sin(state.roll_rad), cr = std::cos(state.roll_rad);

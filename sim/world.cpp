@@ -74,7 +74,6 @@ ObjectId World::add_trunk(ObjectClass kind, const Eigen::Vector2d& breast_m, dou
   stem.axis = Eigen::Vector3d(lean.x(), lean.y(), 1.0).normalized();
   const double below = (kBreastHeight + kRoot) / stem.axis.z();
   stem.base_m = trunk.centre_m - below * stem.axis;
-
   stem.base_radius_m = radius_m + taper * below;
   stem.taper = taper;
   stem.length_m = height_m + kRoot;

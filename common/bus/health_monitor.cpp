@@ -66,7 +66,6 @@ channel_health_t HealthMonitor::channel_report(Channel& channel, double seconds)
   channel_health_t out{};
   out.channel = channel.name;
   out.output = channel.is_output ? 1 : 0;
-
   out.messages = channel.messages;
   const auto fresh = static_cast<double>(channel.messages - channel.messages_reported);
   out.rate_hz = seconds > 0.0 ? fresh / seconds : 0.0;

@@ -33,7 +33,6 @@ OxtsRecord parse_oxts(std::string_view text, std::string_view source) {
   record.roll_pitch_yaw_rad << v[3], v[4], v[5];
   record.east_north_velocity_mps << v[7], v[6];
   record.forward_velocity_mps = v[8];
-
   record.specific_force_mps2 << v[11], v[12], v[13];
   record.angular_rate_rad_s << v[17], v[18], v[19];
   record.position_sigma_m = std::abs(v[23]);

@@ -112,7 +112,6 @@ double value_at(const Field& field, const char* at) {
              : field.bytes == 4 ? number_at<std::uint32_t>(at)
                                 : number_at<std::uint64_t>(at);
     default:
-
       return field.bytes == 1   ? number_at<std::int8_t>(at)
              : field.bytes == 2 ? number_at<std::int16_t>(at)
              : field.bytes == 4 ? number_at<std::int32_t>(at)

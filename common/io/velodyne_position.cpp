@@ -72,7 +72,6 @@ std::optional<VelodynePosition> parse_gprmc(std::string_view sentence) {
   position.is_valid = fields[2] == "A" && latitude && longitude && std::abs(*latitude) <= 90.0;
   position.latitude_deg = latitude.value_or(0.0);
   position.longitude_deg = longitude.value_or(0.0);
-
   position.speed_mps = number(fields[7]).value_or(0.0) * kKnot_mps;
   position.course_rad = number(fields[8]).value_or(0.0) * std::numbers::pi / 180.0;
 

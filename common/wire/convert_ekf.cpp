@@ -57,7 +57,6 @@ Result<model::EkfPose> from_wire(const ekf_pose_t& wire) {
   pose.covariance = checks.covariance("covariance", wire.covariance);
   pose.velocity_mps = Eigen::Map<const Eigen::Vector2d>(wire.velocity_m_s);
   pose.velocity_covariance = checks.covariance("velocity_covariance", wire.velocity_covariance);
-
   pose.bias = Eigen::Map<const Eigen::Vector3d>(wire.bias);
   pose.bias_covariance = checks.covariance("bias_covariance", wire.bias_covariance);
   pose.landmarks_used = static_cast<std::uint32_t>(wire.landmarks_used);
@@ -101,7 +100,6 @@ Result<model::EkfMap> from_wire(const ekf_map_t& wire) {
     checks.range("times_seen", from.times_seen, 0, std::numeric_limits<std::int32_t>::max());
     model::EkfLandmark& landmark = map.landmarks.emplace_back();
     landmark.track_id = static_cast<model::TrackId>(from.track_id);
-
     landmark.position_m = Eigen::Map<const Eigen::Vector2d>(from.position_m);
     landmark.covariance_m2 = checks.covariance("covariance_m2", from.covariance_m2);
     landmark.radius_m = from.radius_m;

@@ -113,7 +113,6 @@ void copy_diagnostics(const slam_update_t& wire, model::MapUpdate& update, Check
   checks.range("degrees_of_freedom", wire.degrees_of_freedom, 0, kMost);
   checks.range("chi2", wire.chi2, 0.0, std::numeric_limits<double>::max());
   update.used_prior = wire.used_prior != 0;
-
   update.candidates = static_cast<std::uint32_t>(wire.candidates);
   update.inliers = static_cast<std::uint32_t>(wire.inliers);
   update.chi2 = wire.chi2;
@@ -132,7 +131,6 @@ Result<model::MapUpdate> from_wire(const slam_update_t& wire) {
   checks.pose("map_T_latest_vehicle", wire.map_T_latest_vehicle);
   model::MapUpdate update;
   update.keyframe_sequence = static_cast<std::uint64_t>(wire.keyframe_seq);
-
   update.utime = wire.utime;
   update.status = static_cast<model::MapUpdateStatus>(wire.status);
   update.map_T_vehicle = from_wire(wire.map_T_vehicle);
@@ -140,7 +138,6 @@ Result<model::MapUpdate> from_wire(const slam_update_t& wire) {
   update.map_T_latest_vehicle = from_wire(wire.map_T_latest_vehicle);
   update.associations = associations(wire, checks);
   update.added = ids("added", wire.added, checks);
-
   update.removed = ids("removed", wire.removed, checks);
   update.merged = merges(wire.merged, checks);
   copy_diagnostics(wire, update, checks);
@@ -173,7 +170,6 @@ slam_update_t to_wire(const model::MapUpdate& update) {
   wire.used_prior = update.used_prior ? 1 : 0;
   wire.candidates = static_cast<std::int32_t>(update.candidates);
   wire.inliers = static_cast<std::int32_t>(update.inliers);
-
   wire.chi2 = update.chi2;
   wire.degrees_of_freedom = static_cast<std::int32_t>(update.degrees_of_freedom);
   wire.log10_false_alarm = update.log10_false_alarm;
@@ -190,7 +186,6 @@ Result<model::WholeMap> from_wire(const map_t& wire) {
   map.sequence = static_cast<std::uint64_t>(wire.seq);
   map.version = static_cast<std::uint64_t>(wire.version);
   map.complete = wire.complete != 0;
-
   map.landmarks = landmarks("landmarks", wire.landmarks, checks);
   map.keyframes.reserve(wire.keyframes.size());
   for (std::size_t i = 0; i < wire.keyframes.size(); ++i) {
@@ -215,7 +210,6 @@ map_t to_wire(const model::WholeMap& map) {
   wire.complete = map.complete ? 1 : 0;
   wire.landmarks = to_wire(map.landmarks);
   wire.num_landmarks = static_cast<std::int32_t>(wire.landmarks.size());
-
   wire.keyframes.reserve(map.keyframes.size());
   for (const model::KeyframePose& pose : map.keyframes) {
     keyframe_pose_t& out = wire.keyframes.emplace_back();
@@ -238,7 +232,6 @@ Result<model::MapDelta> from_wire(const map_delta_t& wire) {
   delta.sequence = static_cast<std::uint64_t>(wire.seq);
   delta.base_version = static_cast<std::uint64_t>(wire.base_version);
   delta.version = static_cast<std::uint64_t>(wire.version);
-
   delta.added = landmarks("added", wire.added, checks);
   delta.moved = landmarks("moved", wire.moved, checks);
   delta.removed = ids("removed", wire.removed, checks);

@@ -33,7 +33,6 @@ Result<model::SlamPose> from_wire(const slam_pose_t& wire) {
   pose.map_T_submap = from_wire(wire.map_T_submap);
   pose.map_T_odom = from_wire(wire.map_T_odom);
   pose.reset_counter = static_cast<std::uint64_t>(wire.reset_counter);
-
   pose.reset_delta = from_wire(wire.reset_delta);
   if (checks.refusal()) return *checks.refusal();
 

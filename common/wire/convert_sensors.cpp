@@ -100,7 +100,6 @@ model::Odometry odometry(const Wire& wire, Checks& checks) {
   odometry.utime = wire.utime;
   odometry.sequence = static_cast<std::uint64_t>(wire.seq);
   odometry.from_T_to = from_wire(wire.from_T_to);
-
   odometry.covariance = checks.covariance("covariance", wire.covariance);
   odometry.has_wheels = wire.has_wheels != 0;
   odometry.is_stationary = wire.is_standing != 0;
@@ -175,7 +174,6 @@ odometry2_t to_wire(const model::Odometry& odometry) {
   wire.from_T_to = to_wire(odometry.from_T_to);
   copy_matrix(odometry.covariance, wire.covariance);
   wire.has_wheels = odometry.has_wheels ? 1 : 0;
-
   wire.is_standing = odometry.is_stationary ? 1 : 0;
   if (odometry.inertial) wire.inertial.push_back(to_wire(*odometry.inertial));
   wire.num_inertial = static_cast<std::int32_t>(wire.inertial.size());
@@ -207,7 +205,6 @@ Result<model::PlanarScan> from_wire(const lidar_scan_t& wire) {
   scan.first_bearing_rad = wire.start_angle_rad;
   scan.bearing_step_rad = wire.angle_step_rad;
   scan.max_range_m = wire.max_range_m;
-
   scan.ranges_m = wire.ranges_m;
   return scan;
 }

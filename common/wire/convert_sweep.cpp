@@ -123,7 +123,6 @@ Result<model::PointSweep> from_wire(const lidar_sweep_t& wire) {
   sweep.sequence = static_cast<std::uint64_t>(wire.seq);
   sweep.turn = static_cast<std::uint64_t>(wire.turn);
   sweep.part = static_cast<std::uint16_t>(wire.part);
-
   sweep.parts = static_cast<std::uint16_t>(wire.parts);
   sweep.has_times = wire.has_times != 0;
   sweep.is_deskewed = wire.is_deskewed != 0;
@@ -146,7 +145,6 @@ lidar_sweep_t to_wire(const model::PointSweep& sweep) {
   wire.part = sweep.part;
   wire.parts = sweep.parts;
   wire.has_times = sweep.has_times ? 1 : 0;
-
   wire.is_deskewed = sweep.is_deskewed ? 1 : 0;
   wire.rings = sweep.rings;
   wire.max_range_m = sweep.max_range_m;

@@ -11,7 +11,6 @@ std::string_view to_string(Reason reason) {
     case Reason::kWrongType:
       return "wrong_type";
     case Reason::kBadCount:
-
       return "bad_count";
     case Reason::kBadString:
       return "bad_string";
@@ -27,7 +26,6 @@ std::string_view to_string(Reason reason) {
     case Reason::kInconsistent:
       return "inconsistent";
     case Reason::kDuplicate:
-
       return "duplicate";
     case Reason::kLate:
       return "late";
@@ -43,7 +41,6 @@ std::string_view to_string(Reason reason) {
     case Reason::kSnapshotDamaged:
       return "snapshot_damaged";
     case Reason::kJournalDamaged:
-
       return "journal_damaged";
     case Reason::kStateNotKept:
       return "state_not_kept";
@@ -59,10 +56,8 @@ std::string_view to_string(Reason reason) {
     case Reason::kPartsMissing:
       return "parts_missing";
     case Reason::kNotCalibrated:
-
       return "not_calibrated";
     case Reason::kReceiveBufferSmall:
-
       return "receive_buffer_small";
   }
 

@@ -103,7 +103,6 @@ void run(const Options& options) {
       chosen_services(options.stages.empty() ? stages_of(options.config) : options.stages);
   replay_options.config_dir = options.config;
   replay_options.channel_suffix = options.channel_suffix;
-
   replay_options.keeps_inputs = !options.outputs_only;
   terminal::Progress progress("replaying " + options.log, 1.0);
   replay_options.progress = [&](double part) {

@@ -17,12 +17,10 @@ const char* state_name(std::int8_t state) {
     case health_t::STATE_DEGRADED:
       return "DEGRADED";
     case health_t::STATE_ERROR:
-
       return "ERROR";
     case health_t::STATE_STOPPING:
       return "STOPPING";
     default:
-
       return "?";
   }
 }

@@ -282,7 +282,6 @@ TEST_CASE("Corners of houses are told with what is seen of their walls", "[lidar
   const SimulatedSweep sweep = lidar.sweep_stationary(Eigen::Isometry3d::Identity());
   VehicleState state;
   state.yaw_rad = 0.5;
-
   state.world_Q_vehicle = Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ());
   const auto corners = visible_corners(world, sweep, state);
   REQUIRE(corners.size() == 3);  // the far one is hidden

@@ -40,7 +40,6 @@ World cluttered_world(Random& random) {
         world.add(ObjectClass::kCrown, Foliage{{at.x(), at.y(), ground + 6.0}, 2.5, 3.0, 0.4});
         break;
       case 2:
-
         world.add(ObjectClass::kCar,
                   Box{{at.x(), at.y(), ground + 0.8}, {2.2, 0.9, 0.8}, uniform(random, -pi, pi)});
         break;

@@ -59,7 +59,6 @@ class Writer {
       case wire::FieldKind::kInt16:
         return integer(random_() % 1000, 2);
       default:
-
         return integer(random_() % 2, 1);
     }
   }

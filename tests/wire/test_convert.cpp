@@ -59,7 +59,6 @@ class Maker {
     inertial.position_m = vector<2>(1.0);
     inertial.covariance = covariance<5>();
     inertial.level = {covariance<2>(), Eigen::Matrix2d::Identity(), covariance<2>(), real(0.1)};
-
     inertial.level.memory(0, 1) = real(1.0);
     for (int i = 0; i < 15; ++i) inertial.bias_jacobian(i) = real(1.0);
     inertial.bias = vector<3>(0.1);
@@ -75,7 +74,6 @@ class Maker {
     sweep.parts = 8;
     sweep.is_deskewed = count() > 2;
     sweep.rings = 32;
-
     sweep.max_range_m = 100.0;
     sweep.sensor_position_m = vector<3>(2.0);
     if (count() > 2) {
@@ -207,7 +205,6 @@ TEST_CASE("values survive the wire") {
     update.status = model::MapUpdateStatus::kNotSure;
     update.map_T_vehicle = make.pose();
     update.covariance = make.covariance<3>();
-
     update.associations = {{0, 5}, {2, 6}};
     update.added = {7};
     update.merged = {{5, 6}};
