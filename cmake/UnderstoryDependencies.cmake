@@ -34,10 +34,16 @@ add_library(understory_zip INTERFACE)
 target_include_directories(understory_zip INTERFACE "${ZIP_INCLUDE_DIR}")
 target_link_libraries(understory_zip INTERFACE "${ZIP_LIBRARY}")
 
+find_path(LZF_INCLUDE_DIR lzf.h PATH_SUFFIXES liblzf REQUIRED)
+find_library(LZF_LIBRARY lzf REQUIRED)
+add_library(understory_lzf INTERFACE)
+target_include_directories(understory_lzf INTERFACE "${LZF_INCLUDE_DIR}")
+target_link_libraries(understory_lzf INTERFACE "${LZF_LIBRARY}")
+
 find_path(PCAP_INCLUDE_DIR pcap/pcap.h REQUIRED)
 find_library(PCAP_LIBRARY pcap REQUIRED)
 add_library(understory_pcap INTERFACE)
 target_include_directories(understory_pcap INTERFACE "${PCAP_INCLUDE_DIR}")
 target_link_libraries(understory_pcap INTERFACE "${PCAP_LIBRARY}")
 
-install(TARGETS understory_lcm understory_cholmod understory_zip understory_pcap EXPORT understory)
+install(TARGETS understory_lcm understory_cholmod understory_zip understory_lzf understory_pcap EXPORT understory)

@@ -1,11 +1,13 @@
 #include "common/io/point_cloud_file.hpp"
 
 #include <fmt/format.h>
+#include <lzf.h>
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <optional>
 #include <sstream>
 
@@ -191,40 +193,20 @@ std::vector<Column> columns_of(const Header& header, std::string_view bytes,
 }  // namespace
 
 std::string decompress_lzf(std::string_view compressed, std::size_t size, std::string_view source) {
-  std::string out;
-
-  // LZF makes at most 264 bytes of three: a size beyond that is a lie, found before allocating.
+  // LZF makes at most 264 bytes of three: a larger size is wrong, found before allocating.
   if (size > 100 * compressed.size() + 100) refuse(source, "more bytes than LZF can have packed");
-  out.reserve(size);
-  std::size_t at = 0;
+  std::string out(size, '\0');
+  if (compressed.empty() && size == 0) return out;
 
-  const auto byte = [&]() -> std::size_t {
-    if (at >= compressed.size()) refuse(source, "compressed points are cut off");
-    return static_cast<std::uint8_t>(compressed[at++]);
-  };
-
-  while (at < compressed.size()) {
-    const std::size_t control = byte();
-    if (control < 32) {
-      const std::size_t count = control + 1;
-      if (count > compressed.size() - at || count > size - out.size())
-        refuse(source, "compressed points are damaged");
-      out.append(compressed.substr(at, count));
-      at += count;
-      continue;
-    }
-
-    std::size_t length = control >> 5U;
-    if (length == 7) length += byte();
-    length += 2;
-    const std::size_t back = ((control & 0x1FU) << 8U) + byte() + 1;
-    if (back > out.size() || length > size - out.size())
-      refuse(source, "compressed points are damaged");
-
-    for (std::size_t i = 0; i < length; ++i) out.push_back(out[out.size() - back]);
-  }
-
-  if (out.size() != size) refuse(source, "compressed points are cut off");
+  // liblzf counts in 32 bits; 0 is its failure.
+  constexpr std::size_t kMost = std::numeric_limits<unsigned int>::max();
+  if (compressed.empty() || size > kMost || compressed.size() > kMost)
+    refuse(source, "compressed points are cut off");
+  const unsigned int unpacked =
+      lzf_decompress(compressed.data(), static_cast<unsigned int>(compressed.size()), out.data(),
+                     static_cast<unsigned int>(size));
+  if (unpacked == 0) refuse(source, "compressed points are damaged");
+  if (unpacked != size) refuse(source, "compressed points are cut off");
   return out;
 }
 

@@ -1,5 +1,5 @@
 // PCD files (version 0.7): ascii, binary and binary_compressed. A reader of our own: PCL's costs
-// half a minute of compiling and 200 MB of packages for a header of ten lines and LZF.
+// half a minute of compiling and 200 MB of packages for a header of ten lines; liblzf unpacks.
 #pragma once
 
 #include <filesystem>

@@ -150,6 +150,20 @@ TEST_CASE("PCD files of every kind hold the same points", "[pcd]") {
   }
 }
 
+TEST_CASE("LZF is unpacked to the size that is asked for, or refused", "[pcd]") {
+  // Three literals, then the same three and two more from a back reference.
+  const std::string packed{'\x02', 'a', 'b', 'c', '\x60', '\x02'};
+  CHECK(decompress_lzf(packed, 8, "cloud.pcd") == "abcabcab");
+  CHECK(decompress_lzf("", 0, "cloud.pcd").empty());
+
+  CHECK_THROWS_AS(decompress_lzf(packed, 9, "cloud.pcd"), DataError);  // too few
+  CHECK_THROWS_AS(decompress_lzf(packed, 7, "cloud.pcd"), DataError);  // too many
+  CHECK_THROWS_AS(decompress_lzf("", 8, "cloud.pcd"), DataError);
+  CHECK_THROWS_AS(decompress_lzf(packed.substr(0, 5), 8, "cloud.pcd"), DataError);
+  CHECK_THROWS_WITH(decompress_lzf(packed, 1'000'000, "cloud.pcd"),
+                    "cloud.pcd: more bytes than LZF can have packed");
+}
+
 TEST_CASE("a PCD file that is cut or damaged is refused or read, never worse", "[pcd]") {
   std::mt19937_64 random(2);
   for (const std::string kind : {"ascii", "binary", "binary_compressed"}) {
