@@ -90,6 +90,8 @@ class ParameterTable {
 
   /// All parameters in the order of adding.
   const std::vector<Entry>& entries() const { return entries_; }
+  /// All rules added by renamed() and renamed_choice().
+  const std::vector<Renamed>& renames() const { return renamed_; }
 
   /// Sets what the file states; the rest keeps its default. Throws ConfigurationError with all that
   /// is wrong; then nothing has been set.

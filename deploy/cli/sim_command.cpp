@@ -54,7 +54,7 @@ sim::Drive make_drive(Options& options) {
   return {options.drive, std::move(stems.forest), options.seed};
 }
 
-/// The trunks that come into range on the way: no map can hold others, and a whole square
+/// The trunks that come into range on the path: no map can hold others, and a whole square
 /// kilometre would be a message of half a megabyte.
 truth_landmarks_t truth_landmarks(const sim::Drive& drive) {
   std::set<std::uint32_t> in_range;
@@ -128,7 +128,7 @@ void drive_live(const sim::Drive& drive, const Options& options) {
   }
 }
 
-/// Everything in the order in which real sensors would give it.
+/// Sends every reading in the order in which real sensors would give it.
 void send_readings(sim::SensorDrive& drive, const Publish& publish, terminal::Progress& progress,
                    const std::function<void(model::Utime)>& wait_until) {
   const truth_landmarks_t landmarks = true_landmarks_on_path(drive);
@@ -219,26 +219,42 @@ void simulate(Options& options) {
              options.out.empty() ? "" : " -> ", options.out);
 }
 
+/// An option of an older version: refused with the new name in the message.
+void refuse_renamed(CLI::App& command, const std::string& old_name, const std::string& new_name) {
+  command
+      .add_option_function<std::string>(
+          old_name,
+          [=](const std::string& /*value*/) {
+            wrong_usage(fmt::format("{} is now called {}", old_name, new_name));
+          },
+          "")
+      ->group("");  // not in --help
+}
+
 void add_landmark_options(CLI::App& command, Options& options) {
   auto& drive = options.drive;
-  command.add_option("--length", drive.path.length_m, "Of the path [m]")
+  command.add_option("--length", drive.path.length_m, "Length of the path [m]")
       ->check(CLI::Range(1.0, 1e6))
       ->capture_default_str();
-  command.add_option("--interval", drive.path.interval, "Between scans [m, or rad when turning]")
+  command
+      .add_option("--interval", drive.path.interval,
+                  "Between scans: metres driven or radians rotated")
       ->check(CLI::Range(1e-3, 100.0))
       ->capture_default_str();
-  command.add_option("--speed", drive.speed_mps, "Of the vehicle [m/s]")
+  command.add_option("--speed", drive.speed_mps, "Speed of the vehicle [m/s]")
       ->check(CLI::Range(1e-3, 100.0))
       ->capture_default_str();
-  command.add_option("--sensor-range", drive.sensor.range_m, "[m]")
+  command.add_option("--sensor-range", drive.sensor.range_m, "Range of the sensor [m]")
       ->check(CLI::Range(1.0, 1e3))
       ->capture_default_str();
   command
       .add_option("--detection", drive.sensor.detection_probability,
-                  "Probability that a landmark in range is seen")
+                  "Probability that a landmark in range is detected")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  command.add_option("--noise", drive.sensor.position_sigma_m, "Sigma of a position per axis [m]")
+  command
+      .add_option("--noise", drive.sensor.position_sigma_m,
+                  "Standard deviation of a position per axis [m]")
       ->check(CLI::Range(0.0, 10.0))
       ->capture_default_str();
 }
@@ -249,11 +265,12 @@ void add_sensor_options(CLI::App& command, Options& options) {
   command.add_option("--forest", sensors.forest, "forest3d: dense, intermediate, sparse")
       ->group(group)
       ->capture_default_str();
-  command.add_option("--way", sensors.length_m, "Of the way [m]; `urban` has its own")
+  command.add_option("--distance", sensors.length_m, "To drive [m]; `urban` has its own")
       ->group(group)
       ->check(CLI::Range(20.0, 2e5))
       ->capture_default_str();
-  command.add_option("--laps", sensors.laps, "forest3d, urban: rounds of the way")
+  refuse_renamed(command, "--way", "--distance");
+  command.add_option("--laps", sensors.laps, "forest3d, urban: laps of the path")
       ->group(group)
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
@@ -261,7 +278,7 @@ void add_sensor_options(CLI::App& command, Options& options) {
       ->group(group)
       ->check(CLI::Range(0.5, 30.0))
       ->capture_default_str();
-  command.add_option("--standstill", sensors.standstill_s, "At the start [s]")
+  command.add_option("--standstill", sensors.standstill_s, "Standstill at the start [s]")
       ->group(group)
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();
@@ -288,8 +305,9 @@ void add_sim_command(CLI::App& parent) {
                    "x_m,y_m[,dbh_m]. Sensors: forest3d, urban, urban-countryside, countryside, "
                    "poles:POLES.csv,TRAJECTORY.csv")
       ->required();
-  command->add_option("--out", options->out, "Write this log instead of sending");
-  command->add_option("--lcm-url", options->lcm_url, "Bus, e.g. udpm://239.255.76.67:7667?ttl=0");
+  command->add_option("--out", options->out, "Write this log instead of sending on the bus");
+  command->add_option("--lcm-url", options->lcm_url,
+                      "LCM URL of the bus, e.g. udpm://239.255.76.67:7667?ttl=0");
   command
       ->add_option("--path", options->path,
                    "circle, line, figure-eight, square, triangle, double-circle, meander, standing")
@@ -297,8 +315,10 @@ void add_sim_command(CLI::App& parent) {
   add_landmark_options(*command, *options);
 
   add_sensor_options(*command, *options);
-  command->add_option("--seed", options->seed, "Of world, start and noise")->capture_default_str();
-  command->add_option("--rate", options->rate, "Live: times faster than the clock")
+  command->add_option("--seed", options->seed, "Seed of world, start and noise")
+      ->capture_default_str();
+  command
+      ->add_option("--rate", options->rate, "Live: factor by which it runs faster than the clock")
       ->check(CLI::Range(1e-3, 1e3))
       ->capture_default_str();
   command->callback([options] { simulate(*options); });

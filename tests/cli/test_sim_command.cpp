@@ -15,7 +15,8 @@ TEST_CASE("sim with sensors writes every raw channel, sweeps in parts that fit t
   const auto log = directory / "drive.lcm";
   const auto outcome = understory_command(
       directory,
-      "sim countryside --way 20 --standstill 1 --lidar vlp16 --planar-laser --out " + log.string());
+      "sim countryside --distance 20 --standstill 1 --lidar vlp16 --planar-laser --out " +
+          log.string());
   CAPTURE(outcome.error);
   REQUIRE(outcome.status == 0);
   CHECK_THAT(outcome.out, Contains("m driven in"));
@@ -79,7 +80,10 @@ TEST_CASE("sim names what it does not know", "[cli]") {
   CHECK(run("poles:a.csv").status == 2);
   const auto missing = run("poles:" + (directory / "none.csv").string() + ",b.csv");
   CHECK(missing.status == 1);
-
   CHECK_THAT(missing.error, Contains("none.csv"));
+
+  const auto renamed = run("countryside --way 20");
+  CHECK(renamed.status == 2);
+  CHECK_THAT(renamed.error, Contains("--way is now called --distance"));
   CHECK_FALSE(std::filesystem::exists(directory / "never.lcm"));
 }

@@ -87,6 +87,57 @@ TEST_CASE("every service refuses every wrong value of every parameter", "[config
   }
 }
 
+TEST_CASE("a key of an older version is refused with the new one in the message",
+          "[configuration]") {
+  struct Renamed {
+    std::string service;
+    std::string old_key;
+    std::string value;
+    std::string new_name;  ///< As the message shows it.
+  };
+  const std::vector<Renamed> all = {
+      // A key by itself, and one that was renamed together with its table.
+      {"associator", "max_turn_rad", "0.1", "max_rotation_rad"},
+      {"lidar_imu_input", "lidar.turn_s", "0.1", "lidar.revolution_s"},
+      {"lidar_imu_input", "output.max_piece_s", "0.1", "output.max_increment_s"},
+      {"keyframer", "joint.min_sightings", "2", "joint.min_observations"},
+      {"ekf", "sighting.lasting_m", "1.0", "observation.correlation_m"},
+      {"ekf", "motion.standing_sigma_mps", "0.1", "motion.stationary_sigma_mps"},
+      {"geoslam_mapper", "ours.lasting_share", "0.5", "smoothing.correlated_share"},
+      // A key of a renamed table that kept its own name.
+      {"geoslam_mapper", "ours.gate_sigmas", "3.0", "smoothing.gate_sigmas"},
+      {"geoslam_mapper", "source.descriptor_step", "0.05", "baseline.descriptor_step"},
+      // A choice of a text parameter.
+      {"geoslam_mapper", "method", "\"ours\"", "\"smoothing\""},
+      {"geoslam_mapper", "method", "\"source\"", "\"baseline\""},
+      {"keyframer", "method", "\"source\"", "\"baseline\""},
+  };
+
+  for (const Renamed& one : all) {
+    CAPTURE(one.service, one.old_key, one.value);
+    const std::string problem = problem_of(service_of(one.service), one.old_key, one.value);
+    CHECK_THAT(problem, Catch::Matchers::StartsWith("toy.toml:2: " + one.old_key + ": "));
+    CHECK_THAT(problem, Catch::Matchers::EndsWith("is now called " + one.new_name));
+  }
+}
+
+TEST_CASE("every new name of a renamed key is a key", "[configuration]") {
+  for (const bus::Service& service : every_service()) {
+    const Described described(service);
+    CAPTURE(service.name);
+    const auto& entries = described.table.entries();
+    for (const bus::ParameterTable::Renamed& rule : described.table.renames()) {
+      CAPTURE(rule.key, rule.old_name, rule.new_name);
+      const auto is_there = [&](const bus::ParameterTable::Entry& entry) {
+        if (!rule.key.empty()) return entry.key == rule.key;
+        return rule.new_name.ends_with('.') ? entry.key.starts_with(rule.new_name)
+                                            : entry.key == rule.new_name;
+      };
+      CHECK(std::ranges::any_of(entries, is_there));
+    }
+  }
+}
+
 TEST_CASE("the bounds of every parameter are allowed, and so is its default", "[configuration]") {
   for (const bus::Service& service : every_service()) {
     Described described(service);
