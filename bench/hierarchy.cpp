@@ -138,7 +138,7 @@ void describe_polygon(benchmark::State& state) {
 }
 BENCHMARK(describe_polygon)->Arg(4)->Arg(8);
 
-/// Polygons within tau of one that is seen with 5 cm noise.
+/// Polygons within tau of one that is observed with 5 cm noise.
 void query_index(benchmark::State& state) {
   if (too_large(state)) {
     return;

@@ -1,6 +1,6 @@
-// Simulated sweeps: time per turn, and per ray, in each kind of world.
+// Simulated sweeps: time per revolution, and per ray, in each kind of world.
 //   build/release/bench/bench_lidar_simulation
-// The vehicle drives; turns are taken all along the way.
+// The vehicle drives; revolutions are taken all along the path.
 #include <benchmark/benchmark.h>
 
 #include "sim/scenarios.hpp"
@@ -36,19 +36,19 @@ void sweep(benchmark::State& state) {
                          suite, 1);
   const double rays =
       static_cast<double>(suite.lidar->elevations_rad.size()) * suite.lidar->columns;
-  std::uint64_t turn = 250;
+  std::uint64_t revolution = 250;
 
   std::size_t points = 0;
   for (auto _ : state) {
-    const sim::SimulatedSweep simulated = drive.sweep(turn);
+    const sim::SimulatedSweep simulated = drive.sweep(revolution);
     points += simulated.raw.points.size();
-    turn = turn + 37 < drive.sweep_count() ? turn + 37 : 250;
+    revolution = revolution + 37 < drive.sweep_count() ? revolution + 37 : 250;
   }
 
-  const auto turns = static_cast<double>(state.iterations());
-  state.counters["points"] = static_cast<double>(points) / turns;
-  state.counters["s_per_ray"] =
-      benchmark::Counter(turns * rays, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  const auto revolutions = static_cast<double>(state.iterations());
+  state.counters["points"] = static_cast<double>(points) / revolutions;
+  state.counters["s_per_ray"] = benchmark::Counter(
+      revolutions * rays, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 BENCHMARK(sweep)
     ->ArgNames({"world", "beams"})

@@ -33,7 +33,7 @@ bool inside(const Forest& forest, const Eigen::Vector2d& p, double margin_m) {
          ((forest.high_m - p).array() >= margin_m).all();
 }
 
-/// The path, densely enough that a disc around each point covers the way to the next.
+/// The path, densely enough that a disc around each point covers the distance to the next.
 bool fits(const Forest& forest, const PointGrid& grid, const std::vector<geometry::SE2>& path,
           const geometry::SE2& start, const StartPoseParameters& parameters) {
   for (const geometry::SE2& pose : path) {
@@ -84,7 +84,7 @@ SimulatedScan observe(const Forest& forest, const PointGrid& grid,
     seen.emplace_back(detection, trunk);
   }
 
-  // The order of the trunks would tell which is which.
+  // The order of the trunks would identify them.
   std::shuffle(seen.begin(), seen.end(), random);
   for (const auto& [seen_detection, trunk] : seen) {
     result.scan.detections.push_back(seen_detection);

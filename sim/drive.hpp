@@ -24,7 +24,7 @@ struct SensorParameters {
   double variance_floor_m2 = 1e-8;
 };
 
-/// One scan with the truth that a mapper must not see.
+/// One scan with the truth that a mapper must not get.
 struct SimulatedScan {
   model::LandmarkScan scan;
   geometry::SE2 world_T_vehicle;

@@ -21,7 +21,7 @@ struct Forest {
 /// The three forests of GeoSLAM Table 4.4.
 enum class ForestKind { kDense, kIntermediate, kSparse };
 
-/// How densely and how evenly trunks stand.
+/// How densely and how evenly trunks are placed.
 struct ForestParameters {
   double side_m = 1000.0;
   double min_distance_m = 7.0;  ///< Of the Poisson-disc points, before the jitter.

@@ -104,11 +104,11 @@ void plant_bush(World& world, const Eigen::Vector2d& at_m, double density_per_m,
 World make_forest_world(const Forest& forest, const ForestWorldParameters& parameters,
                         std::span<const Eigen::Vector2d> distance_m, std::mt19937_64& random) {
   World world(Ground(parameters.ground, random));
-  const PointGrid way(distance_m, 20.0);
+  const PointGrid path(path_m, 20.0);
   for (std::size_t i = 0; i < forest.trunks_m.size(); ++i) {
     const double known_m = forest.radii_m[i];
     const double radius_m = known_m > 0.0 ? known_m : draw_radius_m(parameters, random);
-    if (way.any_within(forest.trunks_m[i], parameters.clearance_m + radius_m)) continue;
+    if (path.any_within(forest.trunks_m[i], parameters.clearance_m + radius_m)) continue;
     const double crown_base_m = parameters.crown_base_m * uniform(random, 0.7, 1.3);
     plant_tree(world, forest.trunks_m[i], radius_m, crown_base_m, parameters, random);
   }
@@ -118,7 +118,7 @@ World make_forest_world(const Forest& forest, const ForestWorldParameters& param
   for (int i = 0; i < bushes; ++i) {
     const double x = uniform(random, forest.low_m.x(), forest.high_m.x());
     const Eigen::Vector2d at_m(x, uniform(random, forest.low_m.y(), forest.high_m.y()));
-    if (way.any_within(at_m, parameters.clearance_m + 1.3)) continue;
+    if (path.any_within(at_m, parameters.clearance_m + 1.3)) continue;
     plant_bush(world, at_m, parameters.bush_density_per_m, random);
   }
 

@@ -15,7 +15,7 @@ namespace understory::sim {
 struct ForestWorldParameters {
   GroundParameters ground{
       .slope = {0.03, -0.02}, .relief_m = 0.5, .roughness_m = 0.025, .cover_m = 0.02};
-  double radius_median_m = 0.14;   ///< At breast height, where the forest knows none.
+  double radius_median_m = 0.14;   ///< At breast height, where the forest has none.
   double radius_log_sigma = 0.45;  ///< Of the logarithm.
   double least_radius_m = 0.05;
   double greatest_radius_m = 0.5;

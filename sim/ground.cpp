@@ -70,14 +70,14 @@ void Ground::add_waves(int count, double min_length_m, double max_length_m, doub
 void Ground::fill_table() {
   table_.assign(static_cast<std::size_t>(kCells) * kCells, 0.0F);
   for (const Wave& wave : waves_) {
-    // Along a row the wave turns by the same angle from node to node: no sine for each.
-    const std::complex<double> turn = std::polar(1.0, kCell * wave.wave_vector.x());
+    // Along a row the phase advances by the same angle from node to node: no sine for each.
+    const std::complex<double> step = std::polar(1.0, kCell * wave.wave_vector.x());
     for (int row = 0; row < kCells; ++row) {
       const double start = kCell * row * wave.wave_vector.y() + wave.phase_rad;
       std::complex<double> here = std::polar(wave.amplitude_m, start);
       for (int column = 0; column < kCells; ++column) {
         table_[node(column, row)] += static_cast<float>(here.imag());
-        here *= turn;
+        here *= step;
       }
     }
   }

@@ -30,7 +30,7 @@ Scenario along_streets(const Route& route, const std::vector<Stretch>& stretches
 void append_country_road(Points& points, double heading_rad, double length_m,
                          std::mt19937_64& random) {
   const double step = 2.0;
-  const double home_rad = heading_rad;  // keeps the way from crossing itself
+  const double home_rad = heading_rad;  // keeps the path from crossing itself
   for (double driven = 0.0; driven < length_m;) {
     const double bend_m = uniform(random, 60.0, 220.0);
     const double straight_m = uniform(random, 0.0, 150.0);
@@ -115,7 +115,7 @@ Scenario countryside_scenario(double length_m, std::uint64_t seed) {
   Points points{{0, 0}, {20, 0}};
   append_country_road(points, 0.0, length_m, random);
   const Route route = Route::through(shortened(points, length_m), kRounding);
-  // Begins where there is something to see: a filter needs a start.
+  // Begins where there are landmarks: a filter needs a start.
   std::vector<Stretch> stretches{{120.0, avenue_roadside()}};
   append_country(stretches, length_m, random);
   return along_streets(route, stretches, seed);
@@ -127,12 +127,12 @@ ScenarioResult pole_map_scenario(std::string_view poles_csv, std::string_view tr
   if (!poles.error.empty()) return {std::nullopt, "poles: " + poles.error};
 
   // A trajectory has the same columns.
-  const StemMapResult way = parse_stem_map(trajectory_csv);
-  if (!way.error.empty()) return {std::nullopt, "trajectory: " + way.error};
+  const StemMapResult path = parse_stem_map(trajectory_csv);
+  if (!path.error.empty()) return {std::nullopt, "trajectory: " + path.error};
 
   // While the car stood, its places scatter.
-  Points points{way.forest.trunks_m.front()};
-  for (const Eigen::Vector2d& p : way.forest.trunks_m) {
+  Points points{path.forest.trunks_m.front()};
+  for (const Eigen::Vector2d& p : path.forest.trunks_m) {
     if ((p - points.back()).norm() > 0.7) points.push_back(p);
   }
 

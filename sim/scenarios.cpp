@@ -39,8 +39,8 @@ std::vector<Eigen::Vector2d> waypoints(const ForestScenarioParameters& parameter
 Scenario in_forest(const ForestScenarioParameters& parameters, const Forest& forest,
                    const Route& route, std::uint64_t seed) {
   std::mt19937_64 random = random_stream(seed, Stream::kScenery);
-  const std::vector<Eigen::Vector2d> way = route.places(0.5);
-  return {std::make_shared<const World>(make_forest_world(forest, parameters.world, way, random)),
+  const std::vector<Eigen::Vector2d> path = route.places(0.5);
+  return {std::make_shared<const World>(make_forest_world(forest, parameters.world, path, random)),
           route};
 }
 

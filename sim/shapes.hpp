@@ -18,7 +18,7 @@ struct SurfaceHit {
   double cosine = 1.0;  ///< Of the angle between the ray and the surface's normal, in [0, 1].
 };
 
-/// A straight stem: a cone that stands on `base_m`, without end faces.
+/// A straight stem: a cone on `base_m`, without end faces.
 struct Stem {
   Eigen::Vector3d base_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< Unit, upwards.

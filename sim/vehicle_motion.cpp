@@ -138,7 +138,7 @@ class Suspension {
   Eigen::Vector3d rate_ = Eigen::Vector3d::Zero();
 };
 
-/// (height at the rear axle, roll, pitch) of a plane through what the four wheels stand on.
+/// (height at the rear axle, roll, pitch) of a plane through the contact points of the four wheels.
 Eigen::Vector3d on_wheels(const Ground& ground, const geometry::SE2& pose,
                           const VehicleParameters& vehicle) {
   const double half = 0.5 * vehicle.track_m;
@@ -184,7 +184,7 @@ VehicleMotion::VehicleMotion(const Route& route, const Ground& ground,
     const double acceleration =
         (distance(k + 1) - 2.0 * distance(k) + distance(k - 1)) / (kStep * kStep);
     Eigen::Vector3d goal = on_wheels(ground, {place.position_m, yaw}, vehicle);
-    // A left turn throws the body to the right: positive roll (left side up).
+    // A curve to the left rolls the body to the right: positive roll (left side up).
     goal.y() += vehicle.roll_per_mps2 * velocity * velocity * place.curvature;
     goal.z() -= vehicle.pitch_per_mps2 * acceleration;
     const Eigen::Vector3d body = suspension.follow(goal);

@@ -25,7 +25,7 @@ double turn_from_to(const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
 
 Stem Walker::at(double time_s) const {
   const double half_m = reach_m.norm();
-  // A sine of this rate covers four times the half way per period at the mean speed.
+  // A sine of this rate covers four times the half path per period at the mean speed.
   const double rate = half_m > 0.0 ? 0.5 * pi * speed_mps / half_m : 0.0;
   Stem stem;
   stem.base_m = middle_m;

@@ -53,7 +53,7 @@ struct Walker {
   Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();  ///< Of the walker's path, on the ground.
   Eigen::Vector2d reach_m =
       Eigen::Vector2d::Zero();  ///< From the middle to the end; 0 = stationary.
-  double speed_mps = 1.2;       ///< Mean; turns gently at the ends.
+  double speed_mps = 1.2;       ///< Mean; slows down towards the ends.
   double phase_rad = 0.0;
   double radius_m = 0.22;
   double height_m = 1.75;

@@ -12,8 +12,8 @@ namespace understory::bus {
 class Device {
  public:
   virtual ~Device() = default;
-  /// Before the process connects to the bus. Throws where the device cannot be had; what() says
-  /// which.
+  /// Before the process connects to the bus. Throws where the device cannot be opened; what()
+  /// names it.
   virtual void open() = 0;
   /// Each is readable when there is something to take in; they stay the same after open().
   virtual std::vector<int> file_descriptors() const = 0;

@@ -134,7 +134,7 @@ void ParameterTable::add(std::string key, std::string& value, std::vector<std::s
 }
 
 std::string ParameterTable::to_toml() const {
-  // Keys without a table stand first: behind a table's head they would belong to it.
+  // Keys without a table come first: behind a table's head they would belong to it.
   std::vector<std::pair<std::string, std::string>> tables{{"", ""}};
   for (const Entry& entry : entries_) {
     const std::size_t dot = entry.key.rfind('.');

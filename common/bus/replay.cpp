@@ -66,14 +66,14 @@ class Replay {
     for (const std::string& channel : node.outputs()) outputs_.insert(channel);
   }
 
-  /// Messages that say the configuration come first, with the log's first stamp.
+  /// CONFIG comes first, with the log's first stamp.
   void begin() {
     for (const auto& hosted : hosted_) hosted->node().connect();
     for (const auto& hosted : hosted_) hosted->node().publish_config(hosted->table().to_toml());
     bus_.drain();
   }
 
-  /// What services still have to say, with the log's last stamp.
+  /// What services publish at the end, with the log's last stamp.
   void finish() {
     for (const auto& hosted : hosted_) {
       hosted->adapter().finish();
@@ -99,7 +99,7 @@ class Replay {
     bus_.drain();
   }
 
-  /// A recorded output of a hosted service, or what it said about itself.
+  /// A recorded output of a hosted service, or its HEALTH, LOG or CONFIG.
   bool is_own_output(const io::LogEvent& event) const {
     if (outputs_.contains(event.channel)) return true;
     if (event.channel == "HEALTH") return is_from_hosted<health_t>(event);

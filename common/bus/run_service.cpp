@@ -58,7 +58,7 @@ class StopSignal {
   bool came_ = false;
 };
 
-/// Says how the process is, once a second and when that changes.
+/// Publishes HEALTH once a second and when the state changes.
 class HealthReporter {
  public:
   HealthReporter(Node& node, const Clock& clock) : node_(node), clock_(clock) {}
@@ -66,9 +66,9 @@ class HealthReporter {
     const std::int64_t now = clock_.monotonic_us();
     const bool has_changed = node_.monitor().state() != reported_;
     if (now - reported_us_ < (has_changed ? kHealthChangeUs : kHealthPeriodUs)) return;
-    tell();
+    publish();
   }
-  void tell() {
+  void publish() {
     reported_us_ = clock_.monotonic_us();
     reported_ = node_.monitor().state();
     node_.publish_health();
@@ -104,11 +104,11 @@ void run_until_stopped(HostedService& hosted, Bus& bus, StopSignal& stop, const 
     ::poll(files.data(), files.size(), std::min(wait_ms, health.milliseconds_left()));
   }
 
-  // The last words are numbered too: the state is saved behind them.
+  // What finish() publishes is numbered too: the state is saved behind it.
   hosted.adapter().finish();
   node.save_snapshot();
   node.monitor().stop();
-  health.tell();
+  health.publish();
 }
 
 std::unique_ptr<HostedService> make_hosted(const Service& service, Bus& bus, const Clock& clock,

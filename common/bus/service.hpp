@@ -1,5 +1,5 @@
-// A service as the drivers see it: it describes its parameters, binds itself to channels, and can
-// save itself.
+// The interface of services and drivers: a service describes its parameters, binds itself to
+// channels, and can save itself.
 #pragma once
 
 #include <functional>
@@ -56,7 +56,7 @@ NodeOptions node_options(const std::string& process, const RuntimeParameters& pa
 class HostedService {
  public:
   /// `toml` and its name, as ParameterTable::load_text takes them; throws ConfigurationError.
-  /// `adjust` sees the runtime parameters after loading and may change them.
+  /// `adjust` gets the runtime parameters after loading and may change them.
   HostedService(const Service& service, Bus& bus, const Clock& clock, const std::string& toml,
                 const std::string& toml_name,
                 const std::function<void(RuntimeParameters&)>& adjust = {});

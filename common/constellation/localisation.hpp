@@ -84,7 +84,7 @@ struct Localisation {
   std::uint32_t hypotheses = 0;                          ///< Poses tried, the work done.
   /// log10 of an upper bound on the expected number of such good poses by chance.
   double log10_false_alarm = 0.0;
-  /// Inliers of the best pose that is another one; 0 if none was seen.
+  /// Inliers of the best pose that is another one; 0 if none was found.
   std::uint32_t runner_up_inliers = 0;
   /// Decades between the false-alarm bounds of the two.
   double log10_margin = 0.0;

@@ -111,7 +111,7 @@ TriangleSource::Neighbours TriangleSource::nearest(std::size_t place) const {
     return true;
   };
 
-  // Both ways in turn, so that far points leave the list early.
+  // Left and right alternately, so that far points leave the list early.
   std::size_t down = place;
   std::size_t up = place + 1;
   bool go_down = down > 0;
@@ -139,7 +139,7 @@ std::vector<Triangle> TriangleSource::take(std::size_t count) {
       for (int j = i + 1; j < list.count; ++j) {
         const std::uint32_t b = list.point[static_cast<std::size_t>(i)];
         const std::uint32_t c = list.point[static_cast<std::size_t>(j)];
-        // Given out before, on another corner's turn?
+        // Given out before, with another corner?
         if (neighbours_[b].has(a) && neighbours_[b].has(c)) continue;
         if (neighbours_[c].has(a) && neighbours_[c].has(b)) continue;
         const Triangle triangle = canonical_triangle(corner(a), corner(b), corner(c));

@@ -65,7 +65,7 @@ class TriangleSource {
   int wanted_;
   std::vector<ByX> by_x_;
   std::vector<std::uint32_t> order_;    // places in by_x_, spread over the scene
-  std::vector<Neighbours> neighbours_;  // by prepared point; empty until its turn
+  std::vector<Neighbours> neighbours_;  // by prepared point; empty until it is taken
   std::size_t next_ = 0;
 };
 

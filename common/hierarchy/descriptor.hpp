@@ -21,7 +21,7 @@ inline constexpr std::size_t kMaxDescriptorBins = 16;
 /// Euclidean distances and tau have the units of the thesis.
 using Descriptor = std::array<float, kMaxDescriptorBins>;
 
-/// Number of samples 1/s that a step stands for. Precondition: 1/30 <= step <= 1/4.
+/// Number of samples 1/s of a step. Precondition: 1/30 <= step <= 1/4.
 int sample_count(double descriptor_step);
 
 /// Descriptor of the closed walk along `boundary` [m]. Its centroid is the mean of the vertices, as

@@ -196,7 +196,7 @@ std::vector<HierarchyEdge> edges(const GeometricHierarchy& hierarchy) {
     for (int edge = 0; edge < 3 && triangulation.is_triangle(t); ++edge) {
       const std::uint32_t across = triangle.neighbours[edge];
       if (across != kNone && across < t) {
-        continue;  // seen from the other side
+        continue;  // found from the other side
       }
 
       std::uint32_t from = triangle.vertices[(edge + 1) % 3];

@@ -52,25 +52,25 @@ std::vector<TriangleShape> shapes_of(const Triangulation& triangulation, const P
   return shapes;
 }
 
-/// How two triangles lie on each other best: vertex i of the first on vertex i + turn of the
+/// How two triangles fit best: vertex i of the first on vertex i + shift of the
 /// second.
 struct Fit {
   double cost = std::numeric_limits<double>::infinity();
-  std::size_t turn = 0;
+  std::size_t shift = 0;
 };
 
-/// Only the three turns, not the six permutations: the others are mirror images.
+/// Only the three cyclic shifts, not the six permutations: the others are mirror images.
 Fit fit(const TriangleShape& a, const TriangleShape& b, double max_edge_difference_m) {
   Fit best;
-  for (std::size_t turn = 0; turn < 3; ++turn) {
+  for (std::size_t shift = 0; shift < 3; ++shift) {
     double cost = 0.0;
     for (std::size_t i = 0; i < 3; ++i) {
-      const double difference = std::abs(a.lengths_m[i] - b.lengths_m[(i + turn) % 3]);
+      const double difference = std::abs(a.lengths_m[i] - b.lengths_m[(i + shift) % 3]);
       cost += difference <= max_edge_difference_m ? difference * difference
                                                   : std::numeric_limits<double>::infinity();
     }
     if (cost < best.cost) {
-      best = {cost, turn};
+      best = {cost, shift};
     }
   }
 
@@ -101,7 +101,7 @@ std::map<SlotPair, int> vote(const std::vector<TriangleShape>& a,
       if (std::isfinite(f.cost) && f.cost == best_of_a[i] && f.cost == best_of_b[j]) {
         ++matched;
         for (std::size_t v = 0; v < 3; ++v) {
-          ++votes[{a[i].slots[v], b[j].slots[(v + f.turn) % 3]}];
+          ++votes[{a[i].slots[v], b[j].slots[(v + f.shift) % 3]}];
         }
       }
     }

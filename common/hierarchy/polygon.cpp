@@ -59,7 +59,7 @@ std::vector<std::uint32_t> boundary_of(const Triangulation& triangulation,
     }
   }
 
-  // Walk: note the start of each boundary edge, then turn about its end to the next one.
+  // Walk: note the start of each boundary edge, then rotate about its end to the next one.
   std::vector<std::uint32_t> walk;
   const std::size_t length = triangles.size() + 2;
   walk.reserve(length);

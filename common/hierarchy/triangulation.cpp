@@ -92,7 +92,7 @@ struct Triangulation::Impl {
     }
   }
 
-  /// Gives the finite ones of `faces` new triangles and tells their neighbours of them.
+  /// Gives the finite ones of `faces` new triangles and links their neighbours to them.
   void adopt(const std::vector<Face>& faces, const std::vector<Face>& rim,
              TriangulationChange& change) {
     for (const Face& face : faces) {

@@ -48,8 +48,9 @@ struct TriangulationChange {
 
 /// Delaunay triangulation with insertion, removal and motion of single landmarks, each in time that
 /// does not grow with the map. The result depends on the set of landmarks alone and not on how it
-/// came about: cocircular points are told apart by symbolic perturbation in the lexicographic order
-/// of their coordinates (Devillers & Teillaud 2011). Coordinates are metres in any one frame.
+/// came about: ties between cocircular points are broken by symbolic perturbation in the
+/// lexicographic order of their coordinates (Devillers & Teillaud 2011). Coordinates are metres in
+/// any one frame.
 ///
 /// Landmarks and triangles are kept in flat arrays; their indices ("slots") are used again after a
 /// removal, ids never are.

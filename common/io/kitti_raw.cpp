@@ -206,7 +206,8 @@ KittiRaw::KittiRaw(fs::path folder) : folder_(std::move(folder)) {
 model::PointSweep KittiRaw::read_sweep(std::size_t index) const {
   const double revolution_s = static_cast<double>(ends_.at(index) - starts_.at(index)) * 1e-6;
   if (revolution_s <= 0.0 || revolution_s > 1.0)
-    throw DataError(fmt::format("{}: turn {} lasts {} s", folder_.string(), index, revolution_s));
+    throw DataError(
+        fmt::format("{}: revolution {} takes {} s", folder_.string(), index, revolution_s));
   model::PointSweep sweep =
       kitti::parse_points(read_whole(files_[index]), revolution_s, files_[index].string());
   sweep.utime = starts_[index];

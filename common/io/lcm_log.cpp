@@ -78,7 +78,7 @@ class LcmLogReader::Impl {
     return confirmed_ = std::min(at, file_.size());
   }
 
-  /// Where the magic number next stands, at or behind `offset`; the size of the file when nowhere.
+  /// Where the magic number next occurs, at or behind `offset`; the size of the file when nowhere.
   std::uint64_t find_magic(std::uint64_t offset) {
     constexpr std::size_t kStep = 4096;
     while (offset < file_.size()) {

@@ -41,8 +41,7 @@ std::optional<double> NumberReader::next() {
 
 double NumberReader::require(std::string_view what) {
   const auto value = next();
-  if (!value)
-    throw DataError(fmt::format("{}: the file ends where {} should stand", where(), what));
+  if (!value) throw DataError(fmt::format("{}: the file ends where {} is expected", where(), what));
   return *value;
 }
 

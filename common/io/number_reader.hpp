@@ -1,4 +1,4 @@
-// Numbers separated by white space, commas or semicolons, with errors that say where.
+// Numbers separated by white space, commas or semicolons, with errors that name the place.
 #pragma once
 
 #include <cstdint>

@@ -5,7 +5,8 @@
 // once a block; in between they are interpolated, and each firing gets its own time, from the
 // firing sequences of the manuals (VLP-16: 63-9243; VLP-32C: 63-9325; HDL-32E: 63-9113; HDL-64E:
 // 63-HDL64ES3). Why a decoder of our own: PCL's grabbers need vtk and pcap at build time, give no
-// time per point, know neither dual returns of the HDL-64 nor position packets, and own a thread.
+// time per point, support neither dual returns of the HDL-64 nor position packets, and own a
+// thread.
 #pragma once
 
 #include <array>
@@ -90,7 +91,7 @@ class VelodyneDecoder {
   std::optional<model::PointSweep> add(std::span<const std::uint8_t> packet, model::Utime received);
   /// The revolution under way, where it lacks no more than the last packet.
   std::optional<model::PointSweep> finish();
-  /// What was seen so far.
+  /// The packets and revolutions so far.
   const VelodyneCounts& counts() const { return counts_; }
 
  private:

@@ -57,7 +57,7 @@ std::optional<double> number_after(std::string_view text, std::string_view key, 
   return value;
 }
 
-/// How the two forms of the file name things, and what turns their numbers into SI.
+/// The names in the two forms of the file, and the factors that give SI units.
 struct Names {
   std::string_view id, azimuth, elevation, distance, vertical, horizontal;
   double to_rad, to_m;

@@ -1,4 +1,4 @@
-// Position packets: where and when, as the GNSS receiver at the laser says in NMEA.
+// Position packets: where and when, as the GNSS receiver at the laser reports in NMEA.
 #include <algorithm>
 #include <charconv>
 #include <cmath>

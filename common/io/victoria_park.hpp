@@ -28,15 +28,15 @@ struct VictoriaPark {
 namespace victoria_park {
 
 constexpr std::size_t kBeams = 361;      ///< 0.5 degrees apart, from the right to the left.
-constexpr double kMaxRange_m = 80.0;     ///< A greater reading stands for "no return".
+constexpr double kMaxRange_m = 80.0;     ///< A greater reading means "no return".
 constexpr double kWheelbase_m = 2.83;    ///< [L]
 constexpr double kEncoderLeft_m = 0.76;  ///< [H] Of the encoder's wheel, left of the middle.
 constexpr double kLaserAhead_m = 3.78;   ///< [L + a] Of the rear axle.
 constexpr double kLaserLeft_m = 0.5;     ///< [b] Of the middle of the car.
 
-/// Frame `vehicle` of this recording: the laser, x forward, seen from the middle of the rear axle.
-/// The field of view of a scan is a sector around the vehicle, so the vehicle is where the laser
-/// is.
+/// Frame `vehicle` of this recording: the laser, x forward, relative to the middle of the rear
+/// axle. The field of view of a scan is a sector around the vehicle, so the vehicle is where the
+/// laser is.
 inline geometry::SE2 axle_T_vehicle() {
   return {victoria_park::kLaserAhead_m, victoria_park::kLaserLeft_m, 0.0};
 }

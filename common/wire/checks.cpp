@@ -11,7 +11,7 @@ namespace understory::wire {
 namespace {
 
 constexpr double kRounding = 1e-6;         // relative to the geometric mean of the diagonal
-constexpr double kFarthestM = 1e7;         // no local frame of ours is larger than a country
+constexpr double kFarthestM = 1e7;         // no local frame is larger than a country
 constexpr double kLargestVariance = 1e14;  // its square
 
 /// Short whatever the value: std::to_string writes out all of 1e300's digits.

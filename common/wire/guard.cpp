@@ -145,7 +145,8 @@ class Walker {
     const auto text = left_.first(static_cast<std::size_t>(length));
     for (std::size_t i = 0; i < text.size(); ++i) {
       const bool is_last = i + 1 == text.size();
-      if ((text[i] == 0) != is_last) return refuse(Reason::kBadString, "not ended where it says");
+      if ((text[i] == 0) != is_last)
+        return refuse(Reason::kBadString, "does not end at its stated length");
     }
 
     left_ = left_.subspan(text.size());

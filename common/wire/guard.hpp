@@ -3,7 +3,7 @@
 // The decoders that lcm-gen writes allocate what a count promises and throw inside C frames on a
 // negative one. So the bytes are walked against the type's layout first: after that, decoding can
 // neither fail nor need more than four times the message's size. All numbers are checked to be
-// finite on the way.
+// finite in the same walk.
 #pragma once
 
 #include <cstdint>

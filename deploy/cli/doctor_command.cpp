@@ -1,4 +1,4 @@
-// `understory doctor`: checks this computer and says what to do.
+// `understory doctor`: checks this computer and lists what to do.
 #include <fmt/format.h>
 #include <lcm/lcm.h>
 #include <sys/socket.h>
@@ -174,7 +174,7 @@ void doctor(const std::string& url) {
 }  // namespace
 
 void add_doctor_command(CLI::App& parent) {
-  auto* command = parent.add_subcommand("doctor", "Checks this computer and says what to do");
+  auto* command = parent.add_subcommand("doctor", "Checks this computer and lists what to do");
   auto url = std::make_shared<std::string>();
   command->add_option("--lcm-url", *url, "Bus, e.g. udpm://239.255.76.67:7667?ttl=0");
   command->callback([url] { doctor(*url); });

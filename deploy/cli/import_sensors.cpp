@@ -149,18 +149,18 @@ void import_pcap(const Options& options) {
       if (fix) log.add("RAW_GNSS", *fix);
     }
     if (packet->port != io::kVelodyneDataPort) continue;
-    if (const auto turn = decoder.add(packet->payload, packet->utime))
-      log.add_sweep("RAW_SWEEP", *turn);
+    if (const auto sweep = decoder.add(packet->payload, packet->utime))
+      log.add_sweep("RAW_SWEEP", *sweep);
   }
 
-  if (const auto turn = decoder.finish()) log.add_sweep("RAW_SWEEP", *turn);
+  if (const auto sweep = decoder.finish()) log.add_sweep("RAW_SWEEP", *sweep);
   const io::VelodyneCounts& counts = decoder.counts();
   if (counts.turns == 0)
-    fail(fmt::format("{}: {} {} packets, {} refused: not one whole turn", options.path,
+    fail(fmt::format("{}: {} {} packets, {} refused: not one whole revolution", options.path,
                      counts.packets, options.model, counts.refused));
 
   log.commit();
-  fmt::print("{} turns of {} packets ({} refused, {} gaps), {} fixes{} -> {}\n", counts.turns,
+  fmt::print("{} revolutions of {} packets ({} refused, {} gaps), {} fixes{} -> {}\n", counts.turns,
              counts.packets, counts.refused, counts.lost_azimuth, log.count("RAW_GNSS"),
              capture.is_cut_off() ? ", the file is cut off" : "", options.out);
 }
@@ -242,7 +242,7 @@ void add_sensor_imports(CLI::App& import) {
   add_format(import, "kitti", "A drive of the KITTI raw data: Velodyne sweeps and OXTS records",
              "Folder of the drive (with velodyne_points and oxts)", options, import_kitti)
       ->add_flag("--speed-as-wheels", options->wheels,
-                 "Write the OXTS forward velocity as RAW_WHEELS (it has seen GNSS)");
+                 "Write the OXTS forward velocity as RAW_WHEELS (derived from GNSS)");
   add_format(import, "kitti-reduced", "KITTI drive 0005 with 16 of 64 beams, and its poses",
              "Folder with sweeps.bin and poses_*.csv", options, import_kitti_reduced)
       ->add_option("--poses", options->poses, "icp (default) or oxts")
@@ -252,7 +252,7 @@ void add_sensor_imports(CLI::App& import) {
   pcap->add_option("--model", options->model, "vlp16 (default), vlp32c, hdl32e or hdl64e");
   pcap->add_option("--calibration", options->calibration, "The HDL-64E's own XML or YAML file");
   CLI::App* pcd =
-      add_format(import, "pcd", "A sequence of PCD files, each one turn",
+      add_format(import, "pcd", "A sequence of PCD files, one revolution each",
                  "Folder; times from timestamps.txt or from the names", options, import_pcd);
 
   add_table_options(*pcd, options);

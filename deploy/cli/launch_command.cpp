@@ -112,7 +112,7 @@ void wait(const launch::Supervisor& supervisor, const StopSignals& signals,
   ::poll(polled.data(), polled.size(), static_cast<int>(std::clamp<long>(left, 0, 1000)));
 }
 
-/// Heartbeats tell a hang from work; without a bus deaths are still seen.
+/// Heartbeats distinguish a hang from work; without a bus deaths are still noticed.
 std::unique_ptr<HealthListener> listen(const Options& options, launch::Supervisor& supervisor,
                                        LaunchReport& report) {
   try {
@@ -120,7 +120,7 @@ std::unique_ptr<HealthListener> listen(const Options& options, launch::Superviso
       supervisor.heartbeat(message.process, static_cast<pid_t>(message.pid), Clock::now());
     });
   } catch (const std::runtime_error& error) {
-    report.say("launch", fmt::format("{}; hangs will not be noticed", error.what()));
+    report.add("launch", fmt::format("{}; hangs will not be noticed", error.what()));
     return nullptr;
   }
 }
@@ -131,7 +131,7 @@ void run(launch::Supervisor& supervisor, launch::Registry& registry, const StopS
   while (!supervisor.stopped()) {
     const auto now = Clock::now();
     if (signals.received() && !supervisor.stopping()) {
-      report.say("launch", "stopping");
+      report.add("launch", "stopping");
       supervisor.stop(now);
     }
 
@@ -167,7 +167,7 @@ void launch_processes(const Options& options) {
   LaunchReport report(options.quiet);
   launch::Supervisor supervisor(
       std::move(specs), {},
-      [&](const std::string& process, const std::string& text) { report.say(process, text); });
+      [&](const std::string& process, const std::string& text) { report.add(process, text); });
   const auto health = listen(options, supervisor, report);
   supervisor.start(registry.read(), Clock::now());
   run(supervisor, registry, signals, health.get(), report);
@@ -197,7 +197,7 @@ void add_launch_command(CLI::App& parent) {
   command->add_option("--only", options->only, "Only these processes")->delimiter(',');
 
   command->add_flag("--fresh", options->fresh, "Forget the state of earlier runs first");
-  command->add_flag("--quiet", options->quiet, "Say nothing but errors");
+  command->add_flag("--quiet", options->quiet, "Print nothing but errors");
   command->callback([options] { launch_processes(*options); });
 }
 

@@ -24,7 +24,7 @@ std::string time_of_day() {
 
 }  // namespace
 
-void LaunchReport::say(const std::string& process, const std::string& text) {
+void LaunchReport::add(const std::string& process, const std::string& text) {
   const auto time = time_of_day();
   if (!quiet_) {
     fmt::print("{} {}: {}\n", time, process, text);

@@ -18,7 +18,7 @@ std::uint64_t count_of(const DriveAccuracy& accuracy, model::MapUpdateStatus sta
   return found == accuracy.updates.end() ? 0 : found->second;
 }
 
-/// What the processes say that they did not get.
+/// Messages that the processes report as missing.
 struct Drops {
   std::int64_t lost = 0;
   std::int64_t malformed = 0;

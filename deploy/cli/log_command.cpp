@@ -22,7 +22,7 @@ struct LogContents {
   io::LogDamage damage;
 };
 
-/// Reads a log from end to end with progress; `visit` sees every event.
+/// Reads a log from end to end with progress; `visit` gets every event.
 template <class Visit>
 LogContents walk(const std::string& file, const Visit& visit) {
   LogContents contents;
@@ -78,7 +78,7 @@ void print_info(const std::string& file, const LogContents& contents) {
   }
 
   if (contents.damage.places > 0) {
-    fmt::print("damaged: {} bytes in {} places (understory log check says more)\n",
+    fmt::print("damaged: {} bytes in {} places (details: understory log check)\n",
                contents.damage.bytes, contents.damage.places);
   }
 }

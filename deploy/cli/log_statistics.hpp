@@ -12,7 +12,7 @@ namespace understory::cli {
 
 /// Counts of one channel.
 struct ChannelStatistics {
-  std::string type;  ///< Wire type; "?" = none of ours, "mixed" = several.
+  std::string type;  ///< Wire type; "?" = none of lcmtypes/, "mixed" = several.
   std::uint64_t events = 0;
   std::uint64_t bytes = 0;  ///< Of the payloads.
   std::int64_t first_utime = 0;

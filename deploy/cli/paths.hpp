@@ -8,9 +8,9 @@ namespace understory::cli {
 
 /// The directory of this executable: its processes lie beside it, built or installed.
 std::filesystem::path executable_directory();
-/// `name` beside this executable if it is there; else `name` as it stands, for PATH.
+/// `name` beside this executable if it is there; else `name` unchanged, for PATH.
 std::string find_executable(const std::string& name);
-/// UNDERSTORY_CONFIG, else the installed configuration, else that of the source tree.
+/// UNDERSTORY_CONFIG, else the installed configuration, else that of the working tree.
 std::filesystem::path default_config_directory();
 /// UNDERSTORY_STATE, else the user's state directory (XDG), else one below the home directory.
 std::filesystem::path default_state_directory();

@@ -33,8 +33,8 @@ bool reads_a_sensor(const std::string& name) {
   return std::ranges::find(services, name, &bus::Service::name) != services.end();
 }
 
-/// The processes that the configuration launches, so that one directory says the same live and
-/// here, but for those that read a sensor; both mapping stages where it has no launch.toml.
+/// The processes that the configuration launches, so that one directory has the same effect live
+/// and here, but for those that read a sensor; both mapping stages where it has no launch.toml.
 std::vector<std::string> stages_of(const std::filesystem::path& config) {
   if (!std::filesystem::exists(config / "launch.toml")) return {"keyframer", "geoslam_mapper"};
   std::vector<std::string> names;

@@ -151,20 +151,20 @@ model::Utime complete_at(const sim::SensorReading& reading, const sim::SensorDri
 }
 
 truth_landmarks_t true_landmarks_on_path(const sim::SensorDrive& drive) {
-  const sim::PointGrid way(drive.route().places(1.0), 20.0);
+  const sim::PointGrid path(drive.route().places(1.0), 20.0);
   truth_landmarks_t message{};
   const auto trunks = drive.world().trunks();
 
   for (std::size_t i = 0; i < trunks.size(); ++i) {
     const Eigen::Vector2d position = trunks[i].centre_m.head<2>();
-    if (!way.any_within(position, kLandmarkReach)) continue;
+    if (!path.any_within(position, kLandmarkReach)) continue;
     message.landmarks.push_back(
         truth_landmark(i, position, trunks[i].radius_m, model::LandmarkKind::kTrunk));
   }
 
   const auto corners = drive.world().corners();
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    if (!way.any_within(corners[i].position_m, kLandmarkReach)) continue;
+    if (!path.any_within(corners[i].position_m, kLandmarkReach)) continue;
     message.landmarks.push_back(truth_landmark(trunks.size() + i, corners[i].position_m, 0.0,
                                                model::LandmarkKind::kCorner));
   }

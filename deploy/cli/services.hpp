@@ -1,4 +1,4 @@
-// The services that this build knows, for commands that host them in one process.
+// The services in this build, for commands that host them in one process.
 #pragma once
 
 #include <vector>

@@ -151,7 +151,7 @@ std::optional<Ending> ChildProcess::ended() const {
     (info.si_code == CLD_EXITED ? ending.exit_code : ending.signal) = info.si_status;
     return ending;
   }
-  // Not a child of ours: the handle alone tells.
+  // Not our child: only the handle shows whether it has ended.
   pollfd handle{pidfd_, POLLIN, 0};
   if (::poll(&handle, 1, 0) <= 0) return std::nullopt;
   return Ending{.known = false};

@@ -20,7 +20,7 @@ struct Command {
 
 /// How a process ended.
 struct Ending {
-  bool known = true;  ///< False for an adopted process: only its parent gets to know.
+  bool known = true;  ///< False for an adopted process: only its parent can ask.
   int exit_code = 0;  ///< Where it exited.
   int signal = 0;     ///< Where a signal ended it.
 

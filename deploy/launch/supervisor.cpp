@@ -33,8 +33,8 @@ const char* to_string(ProcessState state) {
 }
 
 Supervisor::Supervisor(std::vector<ProcessSpec> specs, const SupervisorParameters& parameters,
-                       Say say)
-    : parameters_(parameters), say_(std::move(say)) {
+                       Report report)
+    : parameters_(parameters), report_(std::move(report)) {
   for (auto& spec : specs) {
     Entry entry;
     entry.spec = std::move(spec);
@@ -62,7 +62,7 @@ void Supervisor::start(const std::vector<ProcessStatus>& known, Clock::time_poin
 
     entry.state = ProcessState::kRunning;
     entry.started = now;
-    say_(entry.spec.name, fmt::format("adopted (pid {})", entry.child->pid()));
+    report_(entry.spec.name, fmt::format("adopted (pid {})", entry.child->pid()));
   }
 }
 
@@ -79,18 +79,18 @@ void Supervisor::launch(Entry& entry, Clock::time_point now) {
     // Neither the program nor the permission to run it comes back by trying again.
     entry.state = ProcessState::kGivenUp;
     entry.last_ending = fmt::format("cannot be started: {}", error.what());
-    say_(entry.spec.name, entry.last_ending);
+    report_(entry.spec.name, entry.last_ending);
     if (entry.starts == 1) refused_.push_back(entry.spec.name);
     return;
   }
 
   entry.state = ProcessState::kRunning;
   if (entry.starts == 1) {
-    say_(entry.spec.name, fmt::format("started (pid {})", entry.child->pid()));
+    report_(entry.spec.name, fmt::format("started (pid {})", entry.child->pid()));
   } else {
-    say_(entry.spec.name,
-         fmt::format("started again (pid {}) {:.0f} ms after its end was noticed; restart {}",
-                     entry.child->pid(), 1e3 * seconds(now - entry.died), entry.starts - 1));
+    report_(entry.spec.name,
+            fmt::format("started again (pid {}) {:.0f} ms after its end was noticed; restart {}",
+                        entry.child->pid(), 1e3 * seconds(now - entry.died), entry.starts - 1));
   }
 }
 
@@ -114,8 +114,8 @@ void Supervisor::step(Clock::time_point now) {
   killed_ = true;
   for (auto& entry : entries_) {
     if (!entry.child) continue;
-    say_(entry.spec.name,
-         fmt::format("does not end within {} ms: killed", parameters_.stop_timeout.count()));
+    report_(entry.spec.name,
+            fmt::format("does not end within {} ms: killed", parameters_.stop_timeout.count()));
     entry.child->signal(SIGKILL);
   }
 }
@@ -128,17 +128,17 @@ void Supervisor::bury(Entry& entry, const Ending& ending, Clock::time_point now)
   if (wanted) {
     entry.state = ProcessState::kFinished;
     const bool clean = ending.known && ending.signal == 0 && ending.exit_code == 0;
-    say_(entry.spec.name, clean ? "ended" : ending.text());
+    report_(entry.spec.name, clean ? "ended" : ending.text());
     return;
   }
 
   entry.last_ending = ending.text();
-  say_(entry.spec.name,
-       fmt::format("{} after {:.1f} s", ending.text(), seconds(now - entry.started)));
+  report_(entry.spec.name,
+          fmt::format("{} after {:.1f} s", ending.text(), seconds(now - entry.started)));
   if (ending.known && ending.signal == 0 && ending.exit_code == kWrongUsage) {
     entry.state = ProcessState::kGivenUp;
     if (entry.starts == 1) refused_.push_back(entry.spec.name);
-    say_(entry.spec.name, "refuses its configuration: not started again");
+    report_(entry.spec.name, "refuses its configuration: not started again");
     return;
   }
 
@@ -153,9 +153,9 @@ void Supervisor::schedule_restart(Entry& entry, Clock::time_point now) {
     return;
   }
   entry.state = ProcessState::kGivenUp;
-  say_(entry.spec.name, fmt::format("given up: {} deaths in {:.0f} s, the last time {}",
-                                    entry.policy.deaths_in_window(),
-                                    seconds(parameters_.restart.window), entry.last_ending));
+  report_(entry.spec.name, fmt::format("given up: {} deaths in {:.0f} s, the last time {}",
+                                       entry.policy.deaths_in_window(),
+                                       seconds(parameters_.restart.window), entry.last_ending));
 }
 
 void Supervisor::watch(Entry& entry, Clock::time_point now) {
@@ -168,10 +168,10 @@ void Supervisor::watch(Entry& entry, Clock::time_point now) {
   const auto stopped_for = entry.stopped_since ? now - *entry.stopped_since : Clock::duration(0);
   const auto silent_for = entry.last_heartbeat ? now - *entry.last_heartbeat : Clock::duration(0);
   if (stopped_for >= parameters_.stopped_restart || silent_for >= parameters_.silent_restart) {
-    say_(entry.spec.name,
-         entry.stopped_since
-             ? fmt::format("hangs: stopped for {:.1f} s; killed", seconds(stopped_for))
-             : fmt::format("hangs: no HEALTH for {:.1f} s; killed", seconds(silent_for)));
+    report_(entry.spec.name,
+            entry.stopped_since
+                ? fmt::format("hangs: stopped for {:.1f} s; killed", seconds(stopped_for))
+                : fmt::format("hangs: no HEALTH for {:.1f} s; killed", seconds(silent_for)));
     entry.last_heartbeat.reset();
     entry.stopped_since.reset();
     entry.child->signal(SIGKILL);
@@ -181,9 +181,9 @@ void Supervisor::watch(Entry& entry, Clock::time_point now) {
   const bool degraded =
       stopped_for >= parameters_.stopped_degraded || silent_for >= parameters_.silent_degraded;
   if (degraded && entry.state == ProcessState::kRunning) {
-    say_(entry.spec.name, "DEGRADED: it does not answer");
+    report_(entry.spec.name, "DEGRADED: it does not answer");
   } else if (!degraded && entry.state == ProcessState::kDegraded) {
-    say_(entry.spec.name, "answers again");
+    report_(entry.spec.name, "answers again");
   }
 
   entry.state = degraded ? ProcessState::kDegraded : ProcessState::kRunning;

@@ -52,13 +52,14 @@ struct ProcessStatus {
 class Supervisor {
  public:
   /// Called with one line for everything that happens: (process, text).
-  using Say = std::function<void(const std::string&, const std::string&)>;
+  using Report = std::function<void(const std::string&, const std::string&)>;
   /// Starts nothing yet.
-  Supervisor(std::vector<ProcessSpec> specs, const SupervisorParameters& parameters, Say say);
+  Supervisor(std::vector<ProcessSpec> specs, const SupervisorParameters& parameters, Report report);
 
   /// Takes over those of `known` that still run, starts the others; restarts go on being counted.
   void start(const std::vector<ProcessStatus>& known, Clock::time_point now);
-  /// A HEALTH message of a process; one of another pid than ours is not counted.
+  /// A HEALTH message of a process; one of another pid than that of the running process is not
+  /// counted.
   void heartbeat(const std::string& name, pid_t pid, Clock::time_point now);
   /// Notices deaths and hangs, starts what is due. Cheap; to be called whenever a descriptor is
   /// ready and at the latest at wake_up().
@@ -100,7 +101,7 @@ class Supervisor {
 
   std::vector<Entry> entries_;
   SupervisorParameters parameters_;
-  Say say_;
+  Report report_;
   std::optional<Clock::time_point> stop_time_;
   bool killed_ = false;
   std::vector<std::string> refused_;

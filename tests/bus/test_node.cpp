@@ -1,4 +1,4 @@
-// The way from bytes to a stage and back, with faults.
+// From bytes to a stage and back, with faults.
 #include <limits>
 
 #include "common/bus/faulty_bus.hpp"
@@ -12,7 +12,7 @@ using namespace understory::test;
 
 namespace {
 
-/// A toy on a bus, with everything that it says.
+/// A toy on a bus, with everything that it publishes.
 struct Bench {
   explicit Bench(const std::string& toml = "")
       : bus(MemoryBus::Queues::kUnlimited),
@@ -117,7 +117,7 @@ TEST_CASE("under loss, repetition, disorder and damage every message is accounte
     const int sent = 1000;
 
     for (int i = 0; i < sent; ++i) {
-      // The ends pass unharmed: a loss behind the last message cannot be seen.
+      // The ends pass unharmed: a loss behind the last message cannot be noticed.
       Bus& way = i == 0 || i == sent - 1 ? static_cast<Bus&>(bench.bus) : faulty;
       if (i == sent - 1) faulty.flush();
       way.publish("ODOMETRY", wire::encode_message(test::toy_input(i)));

@@ -1,4 +1,4 @@
-// Configuration: for every parameter, each way of being wrong is refused by name.
+// Configuration: for every parameter, each kind of wrong value is refused by name.
 #include "tests/bus/toy_service.hpp"
 #include "tests/bus/wrong_values.hpp"
 #include "tests/catch.hpp"
@@ -19,7 +19,7 @@ struct Described {
   }
 };
 
-/// What loading this says; empty = it was taken.
+/// The error of loading this; empty = it was taken.
 std::string problem_with(const std::string& key, const std::string& value) {
   Described described;
   try {

@@ -69,7 +69,7 @@ TEST_CASE("a killed service goes on as if nothing had happened, whenever it is k
     Life(scratch.path(), toml).run(0, killed);
     Life second(scratch.path(), toml);
     CHECK(second.is_recovered);
-    CHECK(second.poses.empty());  // what was said before is not said again
+    CHECK(second.poses.empty());  // what was published before is not published again
     second.run(killed, 60);
     REQUIRE(second.poses.size() == static_cast<std::size_t>(60 - killed));
     for (std::size_t i = 0; i < second.poses.size(); ++i) {
@@ -100,7 +100,7 @@ TEST_CASE("a journal cut at every byte gives every whole event before the cut") 
   }
 }
 
-TEST_CASE("a damaged byte anywhere in journal or snapshot is told, never believed") {
+TEST_CASE("a damaged byte anywhere in journal or snapshot is reported, never loaded") {
   const test::Scratch scratch("state");
   Life(scratch.path(), "[runtime]\nsnapshot_every_events = 5\n").run(0, 8);
   const fs::path snapshot_file = scratch.path() / "toy.snapshot";
@@ -170,7 +170,7 @@ TEST_CASE("a recovery that keeps dying is not tried for ever") {
   CHECK(has_snapshot == std::vector<bool>{true, true, true, true, false});
 }
 
-TEST_CASE("a directory that cannot be written is told, and the service runs on") {
+TEST_CASE("a directory that cannot be written is reported, and the service runs on") {
   Life life("/proc/no-such-directory");
   life.run(0, 5);
   CHECK(life.poses.size() == 5);

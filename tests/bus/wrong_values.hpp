@@ -1,4 +1,4 @@
-// Every way in which a parameter can be wrong, made from its description.
+// Every wrong value of a parameter, made from its description.
 #pragma once
 
 #include <cmath>

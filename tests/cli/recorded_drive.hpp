@@ -34,7 +34,7 @@ class RecordedDrive {
   std::string path() const { return directory_.path().string(); }
   const std::vector<Circle>& trunks() const { return trunks_; }
 
-  /// world_T_vehicle; the axle turns about a point to its left.
+  /// world_T_vehicle; the axle rotates about a point to its left.
   static geometry::SE2 pose(double seconds) {
     const auto from_start = [](double s) {
       return geometry::SE2::Exp({kSpeed_mps * s, 0.0, kTurn_radps * s}) *

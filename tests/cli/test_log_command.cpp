@@ -30,7 +30,7 @@ struct Fixture {
 
 }  // namespace
 
-TEST_CASE_METHOD(Fixture, "wrong usage ends with 2 and says how it goes", "[cli]") {
+TEST_CASE_METHOD(Fixture, "wrong usage ends with 2 and shows the right one", "[cli]") {
   for (const char* arguments : {"", "log", "log info", "nonsense", "log info a b", "log cut ",
                                 "log repair x", "launch --nonsense"}) {
     const auto outcome = run(arguments);
@@ -56,7 +56,7 @@ TEST_CASE_METHOD(Fixture, "a file that cannot be read ends with 1 and one line t
   }
 }
 
-TEST_CASE_METHOD(Fixture, "log info tells what is in a log", "[cli]") {
+TEST_CASE_METHOD(Fixture, "log info lists what is in a log", "[cli]") {
   const auto text = run("log info " + whole);
   CHECK(text.status == 0);
   CHECK_THAT(text.out, Contains("30 events in 2.9 s") && Contains("LANDMARKS"));
@@ -66,7 +66,7 @@ TEST_CASE_METHOD(Fixture, "log info tells what is in a log", "[cli]") {
 }
 
 TEST_CASE_METHOD(Fixture, "log check finds damage and nothing where there is none", "[cli]") {
-  // Random payloads are of no type of ours: nothing can be wrong with them.
+  // Random payloads are of no known type: nothing can be wrong with them.
   CHECK(run("log check " + whole).status == 0);
   const auto outcome = run("log check " + damaged);
   CHECK(outcome.status == 1);

@@ -96,7 +96,7 @@ void check_order(const std::vector<io::LogEvent>& events) {
     if (event.channel == "ODOMETRY") newest_motion = event.utime;
     if (event.channel == "LIDAR_SCAN" && newest_motion != event.utime) ++sweeps_without_motion;
   }
-  CHECK(sweeps_without_motion <= 2);  // The first ones, before the wheels say anything.
+  CHECK(sweeps_without_motion <= 2);  // The first ones, before the first wheel reading.
 }
 
 }  // namespace

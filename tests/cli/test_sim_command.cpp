@@ -66,7 +66,7 @@ TEST_CASE("sim with sensors writes every raw channel, sweeps in parts that fit t
   CHECK(events["TRUTH_LANDMARKS"] == 1);
 }
 
-TEST_CASE("sim names what it does not know", "[cli]") {
+TEST_CASE("sim names an unknown value", "[cli]") {
   const test::TemporaryDirectory directory;
   const auto run = [&](const std::string& arguments) {
     return understory_command(directory,

@@ -203,7 +203,7 @@ TEST_CASE("Doubled landmarks of another scene are not found", "[constellation]")
   }
 }
 
-TEST_CASE("A scene that stands in the map twice is ambiguous", "[constellation]") {
+TEST_CASE("A scene that is in the map twice is ambiguous", "[constellation]") {
   std::mt19937_64 random(4);
   const Points scene = random_scene(random, 120.0, 0.0138, 2.0);
   ConstellationMap map = map_of(scene);
@@ -285,7 +285,7 @@ TEST_CASE("The same question gets the same answer", "[constellation]") {
   }
 }
 
-TEST_CASE("Too little and unusable observations are told apart from the rest", "[constellation]") {
+TEST_CASE("Too small and unusable observations are reported as such", "[constellation]") {
   std::mt19937_64 random(8);
   const Points scene = random_scene(random, 100.0, 0.0138, 2.0);
   const ConstellationMap map = map_of(scene);

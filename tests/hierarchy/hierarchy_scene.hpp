@@ -1,4 +1,4 @@
-// A forest and what is seen of it, for the tests and the benchmarks of common/hierarchy.
+// A forest and what is observed of it, for the tests and the benchmarks of common/hierarchy.
 #pragma once
 
 #include <algorithm>
@@ -51,12 +51,12 @@ inline std::vector<hierarchy::LandmarkPosition> random_forest(std::size_t count,
 struct View {
   double range_m = 40.0;
   double noise_m = 0.05;   ///< Standard deviation per axis.
-  double detection = 0.9;  ///< Probability that a trunk is seen.
+  double detection = 0.9;  ///< Probability that a trunk is detected.
   double clutter = 0.0;    ///< False landmarks, as part of the true ones in range.
 };
 
-/// What is seen from a pose. A true landmark keeps its id, so that pairs can be judged; false ones
-/// have ids from 2^32 on.
+/// What is observed from a pose. A true landmark keeps its id, so that pairs can be judged; false
+/// ones have ids from 2^32 on.
 inline std::vector<hierarchy::LandmarkPosition> observe(
     const std::vector<hierarchy::LandmarkPosition>& forest, const geometry::SE2& map_T_vehicle,
     const View& view, std::mt19937_64& random) {

@@ -30,7 +30,7 @@ Walk random_polygon(std::mt19937_64& random) {
   return walk;
 }
 
-/// The source's way with many samples: what the integral is the limit of.
+/// The thesis' method with many samples: what the integral is the limit of.
 Descriptor sampled(const Walk& walk, int samples, int fine) {
   Eigen::Vector2d centroid = Eigen::Vector2d::Zero();
   std::vector<double> until{0.0};
@@ -108,7 +108,7 @@ TEST_CASE("A descriptor is the limit of finer and finer sampling", "[hierarchy]"
   }
 }
 
-TEST_CASE("Bin 0 is the mean distance, so tau has the source's meaning", "[hierarchy]") {
+TEST_CASE("Bin 0 is the mean distance, so tau has the thesis' meaning", "[hierarchy]") {
   const Walk square{{-1.0, -1.0}, {1.0, -1.0}, {1.0, 1.0}, {-1.0, 1.0}};
   // Mean of sqrt(1 + x^2) over [0, 1].
   const double mean = 0.5 * (std::sqrt(2.0) + std::asinh(1.0));

@@ -161,7 +161,7 @@ TEST_CASE("A mirrored scene gives no pairs of its own", "[hierarchy]") {
       landmark.position_m.x() = -landmark.position_m.x();
     }
     const GeometricHierarchy query(seen);
-    // The descriptors are those of the unmirrored polygons; only the landmarks tell.
+    // The descriptors are those of the unmirrored polygons; only the landmarks differ.
     polygon_matches += match_polygons(query, map).size();
     const Tally tally = judge(match(query, map));
     sum.right += tally.right;

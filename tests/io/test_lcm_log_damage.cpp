@@ -46,7 +46,7 @@ struct Fixture {
 }  // namespace
 
 TEST_CASE_METHOD(Fixture, "a damaged header costs its own event at most", "[log]") {
-  // Bytes of the magic and of the two lengths; number and time cannot be told from good ones.
+  // Bytes of the magic and of the two lengths; a wrong number or time looks like a good one.
   for (std::size_t victim = 0; victim < events.size(); ++victim) {
     for (const std::size_t byte : {0U, 1U, 2U, 3U, 20U, 21U, 22U, 23U, 24U, 25U, 26U, 27U}) {
       for (const std::uint8_t flip : {0x01, 0x02, 0x80, 0xFF}) {

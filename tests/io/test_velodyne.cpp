@@ -32,7 +32,7 @@ std::vector<model::PointSweep> turns_of(VelodyneDecoder& decoder, test::PacketMa
 
 }  // namespace
 
-TEST_CASE("a turn of the VLP-16 is where its beams look", "[velodyne]") {
+TEST_CASE("a revolution of the VLP-16 is where its beams point", "[velodyne]") {
   VelodyneDecoder decoder(velodyne_calibration(VelodyneModel::kVlp16));
   const auto turns = turns_of(decoder, {.azimuth = 35000}, 230);
   REQUIRE(turns.size() == 3);
@@ -48,7 +48,7 @@ TEST_CASE("a turn of the VLP-16 is where its beams look", "[velodyne]") {
     const double flat = std::hypot(p.x_m, p.y_m);
     CHECK(std::abs(flat - 10.0 * std::cos(elevation)) < 0.02);
     CHECK(std::abs(p.z_m - 10.0 * std::sin(elevation)) < 0.02);
-    // The laser turns clockwise at 0.4 degrees in two firings.
+    // The laser rotates clockwise by 0.4 degrees in two firings.
     double azimuth = -std::atan2(p.y_m, p.x_m) / kDegree;
     if (azimuth < -0.5) azimuth += 360.0;
     const double expected = azimuth / 0.4 * 110.592e-6;

@@ -90,7 +90,7 @@ TEST_CASE("errors name the file, the line and the token", "[victoria_park]") {
   CHECK(contains(wheels("0.1 1.0 0.1\n0.1 1.0 0.1\n"), "does not come after"));
   CHECK(contains(wheels("0.1 nan 0.1\n"), "not a finite number"));
   CHECK(contains(wheels("0.1 1.0 3.0\n"), "steering"));
-  CHECK(contains(wheels("0.1 1.0"), "the file ends where the steering angle [rad] should stand"));
+  CHECK(contains(wheels("0.1 1.0"), "the file ends where the steering angle [rad] is expected"));
 }
 
 TEST_CASE("GPS.txt gives the latitude first", "[victoria_park]") {

@@ -11,7 +11,7 @@ namespace understory::test {
 
 using Packet = std::vector<std::uint8_t>;
 
-/// Data packets of a laser that turns evenly and sees everything at one distance.
+/// Data packets of a laser that rotates evenly and measures one distance everywhere.
 struct PacketMaker {
   bool dual = false;
   bool hdl64 = false;

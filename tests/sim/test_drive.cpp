@@ -43,13 +43,14 @@ TEST_CASE("A path of 200 m has an observation every 0.2 m and every 0.2 rad", "[
   CHECK(path_of(PathKind::kDoubleCircle).size() == 1000);
   CHECK(path_of(PathKind::kStanding).size() == 1000);
   CHECK(path_of(PathKind::kMeander, 0.2, 2000.0).size() == 10000);
-  // 200 m and three turns of pi/2, two of 2 pi/3: the steps that 1023.6 and 1020.9 begin.
+  // 200 m and three rotations by pi/2, two of 2 pi/3: the steps that 1023.6 and 1020.9 begin.
   CHECK(path_of(PathKind::kSquare).size() == 1024);
   CHECK(path_of(PathKind::kTriangle).size() == 1021);
   CHECK(path_of(PathKind::kCircle, 0.1).size() == 2000);
 }
 
-TEST_CASE("Every step of a path costs one interval, shared between driving and turning", "[path]") {
+TEST_CASE("Every step of a path costs one interval, shared between driving and rotating",
+          "[path]") {
   const PathKind kind = GENERATE(PathKind::kCircle, PathKind::kLine, PathKind::kFigureEight,
                                  PathKind::kSquare, PathKind::kTriangle, PathKind::kMeander);
   const double length_m = kind == PathKind::kMeander ? 3000.0 : 200.0;
@@ -59,7 +60,7 @@ TEST_CASE("Every step of a path costs one interval, shared between driving and t
   for (std::size_t k = 1; k < poses.size(); ++k) {
     const Eigen::Vector3d xi = (poses[k - 1].inverse() * poses[k]).Log();
     const double effort = xi.head<2>().norm() + (corners ? std::abs(xi.z()) : 0.0);
-    // A chord in which the vehicle turns at once is a little longer or shorter than its parts.
+    // A chord in which the vehicle also rotates is a little longer or shorter than its parts.
     REQUIRE(effort == Approx(0.2).margin(corners ? 2e-2 : 2e-3));
   }
 }
@@ -108,7 +109,7 @@ TEST_CASE("The drive keeps clear of trunks and inside the forest", "[drive]") {
   }
 }
 
-TEST_CASE("A long drive fells the trunks in its way", "[drive]") {
+TEST_CASE("A long drive fells the trunks on its path", "[drive]") {
   DriveParameters parameters = drive_parameters(ForestKind::kSparse, PathKind::kMeander);
   parameters.path.length_m = 2000.0;
   parameters.path.lane_length_m = 300.0;

@@ -35,7 +35,7 @@ sim::Forest forest_of(sim::ForestParameters parameters, std::uint64_t seed) {
 
 }  // namespace
 
-TEST_CASE("The forests have as many trunks as the source's, as far apart", "[forest]") {
+TEST_CASE("The forests have as many trunks as the published ones, as far apart", "[forest]") {
   struct Expected {
     sim::ForestKind kind;
     double trunks;

@@ -269,7 +269,7 @@ TEST_CASE("A drive ends when its time is over", "[drive]") {
   CHECK(static_cast<double>(samples) == Approx(200.0 * drive.motion().duration_s()).margin(2.0));
 }
 
-TEST_CASE("Corners of houses are told with what is seen of their walls", "[lidar]") {
+TEST_CASE("Corners of houses are listed with the returns on their walls", "[lidar]") {
   World world;
 
   // Ten metres ahead: its near corner points at the sensor.
@@ -303,16 +303,16 @@ TEST_CASE("Corners of houses are told with what is seen of their walls", "[lidar
   }
 }
 
-TEST_CASE("A planar laser sees the plane of its beams", "[lidar]") {
+TEST_CASE("A planar laser measures the plane of its beams", "[lidar]") {
   World world;
   world.add_trunk(ObjectClass::kTrunk, {13.6, 5.0}, 0.3, 15.0);
   PlanarLaserParameters parameters;
   parameters.range_sigma_m = 0.0;
   parameters.drop_out = 0.0;
   PlanarLaser laser(world, parameters, 1);
-  const std::vector<Eigen::Vector2d> way{{0, 0}, {30, 0}};
+  const std::vector<Eigen::Vector2d> path{{0, 0}, {30, 0}};
 
-  const VehicleMotion motion(Route::through(way, 1.0), world.ground(), {}, {});
+  const VehicleMotion motion(Route::through(path, 1.0), world.ground(), {}, {});
   const SimulatedPlanarScan simulated = laser.scan(motion, 0);
   REQUIRE(simulated.scan.ranges_m.size() == 361);
   int hits = 0;

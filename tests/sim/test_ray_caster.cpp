@@ -113,7 +113,7 @@ TEST_CASE("A fan of rays meets what brute force over all objects meets", "[caste
   CHECK(hits_on_objects > 1000);
 }
 
-TEST_CASE("Rays end on the ground where the height field says it is", "[ground]") {
+TEST_CASE("Rays end on the ground at the height field", "[ground]") {
   Random random(3);
   const Ground ground(rough_ground(), random);
   int below_horizon = 0;
@@ -250,7 +250,7 @@ TEST_CASE("What covers the ground stops rays at the height that was asked for", 
   CHECK(sum / n == Approx(0.05).epsilon(0.05));
 }
 
-TEST_CASE("Foliage lets rays through as often as its density says", "[shapes]") {
+TEST_CASE("Foliage lets rays through as often as its density implies", "[shapes]") {
   Random random(6);
   const double density = 0.4;
   World world;

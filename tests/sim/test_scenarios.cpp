@@ -17,18 +17,18 @@ std::vector<Eigen::Vector2d> trunk_places(const World& world) {
   return places;
 }
 
-/// Nothing solid stands on the way, but walkers, who may come near.
+/// Nothing solid is on the path; walkers may come near.
 void check_path_is_clear(const Scenario& scenario, double clearance_m) {
-  const PointGrid way(scenario.route.places(0.5), 10.0);
+  const PointGrid path(scenario.route.places(0.5), 10.0);
   for (const TrueTrunk& trunk : scenario.world->trunks()) {
-    CHECK_FALSE(way.any_within(trunk.centre_m.head<2>(), clearance_m));
+    CHECK_FALSE(path.any_within(trunk.centre_m.head<2>(), clearance_m));
   }
   for (const TrueCorner& corner : scenario.world->corners()) {
-    CHECK_FALSE(way.any_within(corner.position_m, clearance_m));
+    CHECK_FALSE(path.any_within(corner.position_m, clearance_m));
   }
   for (ObjectId i = 0; i < scenario.world->object_count(); ++i) {
     if (scenario.world->kind(i) != ObjectClass::kCar) continue;
-    CHECK_FALSE(way.any_within(scenario.world->bounds(i).centre_m, 2.0));
+    CHECK_FALSE(path.any_within(scenario.world->bounds(i).centre_m, 2.0));
   }
 }
 
@@ -42,7 +42,7 @@ double least_radius_m(const Route& route) {
 
 }  // namespace
 
-TEST_CASE("A forest in three dimensions has the density of its kind and a clear way",
+TEST_CASE("A forest in three dimensions has the density of its kind and a clear path",
           "[scenario]") {
   ForestScenarioParameters parameters;
   parameters.forest = forest_parameters(ForestKind::kIntermediate);
@@ -97,7 +97,7 @@ TEST_CASE("Country roads are as long as asked for and do not meet themselves", "
     }
   }
 
-  // Some of the way has landmarks, some has none.
+  // Some of the path has landmarks, some has none.
   const PointGrid trunks(trunk_places(*scenario.world), 10.0);
   int rich = 0;
   int poor = 0;
@@ -121,7 +121,7 @@ TEST_CASE("A map of poles with a trajectory becomes a world", "[scenario]") {
   const auto result = pole_map_scenario("x_m,y_m\n50,20\n60,-15\n100,12\n0.5,0.1\n", trajectory, 1);
   REQUIRE(result.error.empty());
   REQUIRE(result.scenario.has_value());
-  CHECK(result.scenario->world->trunks().size() == 3);  // one stood on the way
+  CHECK(result.scenario->world->trunks().size() == 3);  // one was on the path
   CHECK(result.scenario->route.length_m() > 199.0);
   check_path_is_clear(*result.scenario, 1.4);
 

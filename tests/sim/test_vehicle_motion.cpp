@@ -35,7 +35,7 @@ VehicleMotion motion_on(PathKind kind, double length_m) {
 
 }  // namespace
 
-TEST_CASE("A route keeps near its way points and has continuous curvature", "[route]") {
+TEST_CASE("A route keeps near its waypoints and has continuous curvature", "[route]") {
   const PathKind kind = GENERATE(PathKind::kCircle, PathKind::kSquare, PathKind::kFigureEight);
   const Route route = route_of(kind, 400.0);
   CHECK(route.length_m() == Approx(400.0).epsilon(0.05));
@@ -76,13 +76,13 @@ TEST_CASE("Rates and accelerations are the derivatives of the pose", "[motion]")
   }
 }
 
-TEST_CASE("The car stands first, keeps its limits, and stands on the ground", "[motion]") {
+TEST_CASE("The car is stationary first, keeps its limits, and stays on the ground", "[motion]") {
   const Ground ground = rough_ground();
   SpeedParameters speed;
   speed.stops = {{100.0, 6.0}};
   const VehicleMotion motion(route_of(PathKind::kSquare, 400.0), ground, {}, speed);
   double fastest = 0.0;
-  double standing_s = 0.0;
+  double stationary_s = 0.0;
 
   for (double t = 0.0; t < motion.duration_s(); t += 0.05) {
     const VehicleState state = motion.at(t);
@@ -95,7 +95,7 @@ TEST_CASE("The car stands first, keeps its limits, and stands on the ground", "[
       CHECK(state.angular_rate_rad_s.norm() < 1e-12);
     }
 
-    if (t > 25.0 && state.velocity_mps.norm() < 1e-6) standing_s += 0.05;
+    if (t > 25.0 && state.velocity_mps.norm() < 1e-6) stationary_s += 0.05;
     CHECK(velocity.x() > -1e-6);
     CHECK(std::abs(velocity.y()) < 0.05);  // the rear axle does not slip, but it sways
     CHECK(std::abs(force.y()) < 1.5 * 1.1 + 0.5);
@@ -107,7 +107,7 @@ TEST_CASE("The car stands first, keeps its limits, and stands on the ground", "[
   }
 
   CHECK(fastest == Approx(5.0).epsilon(0.02));
-  CHECK(standing_s > 4.5);  // the stop on the way and the one at the end
+  CHECK(stationary_s > 4.5);  // the stop on the route and the one at the end
   CHECK(motion.driven_m() == Approx(route_of(PathKind::kSquare, 400.0).length_m()).margin(0.5));
 }
 
@@ -185,7 +185,7 @@ TEST_CASE("The errors of the inertial unit have the size that was asked for", "[
   CHECK(imu.next(motion).specific_force_mps2.z() == 5.0);
 }
 
-TEST_CASE("Wheels and satellites say what the car does, within their errors", "[sensors]") {
+TEST_CASE("Wheels and satellites measure what the car does, within their errors", "[sensors]") {
   const VehicleMotion motion = motion_on(PathKind::kCircle, 300.0);
   WheelParameters wheel_parameters;
   SimulatedWheels wheels(wheel_parameters, 3);

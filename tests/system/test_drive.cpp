@@ -24,7 +24,7 @@ TEST_CASE("processes on the bus localise a vehicle and stop cleanly", "[system]"
   CHECK(ending.known);
   CHECK(ending.signal == 0);
   CHECK(ending.exit_code == 0);
-  // What does not end within its 0.9 s is killed, and the report says so.
+  // What does not end within its 0.9 s is killed, and the report names it.
   CHECK_THAT(test::read_text(stack.report()),
              Contains("\"text\": \"ended\"") && !Contains("does not end"));
 }

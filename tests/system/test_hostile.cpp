@@ -24,7 +24,7 @@ std::vector<wire::Bytes> hostile_messages(const wire::Bytes& good, std::mt19937_
         good.begin() + static_cast<std::ptrdiff_t>(good.size() * static_cast<std::size_t>(i) / 50));
   }
 
-  // Every place where a count may stand.
+  // Every place where a count may be.
   for (std::size_t at = 8; at + 4 <= std::min<std::size_t>(good.size(), 200); at += 4) {
     for (const std::uint8_t value : {0x7F, 0xFF}) {
       wire::Bytes message = good;
@@ -71,7 +71,7 @@ TEST_CASE("hostile bytes and numbers are counted and stop nobody", "[system]") {
   stack.drive(drive, half, drive.size());
   CHECK(stack.wait_until([&] { return stack.newest_pose() >= drive.utime(drive.size() - 12); }));
 
-  // Some may be lost on the way when the processors are busy; most must have been counted.
+  // Some may be lost when the processors are busy; most must have been counted.
   const auto sent = static_cast<std::int64_t>(bad.size());
   CHECK(
       stack.wait_until([&] { return stack.malformed("keyframer", "LANDMARKS") >= sent * 3 / 4; }));

@@ -33,7 +33,7 @@ TEST_CASE("replay of one log gives the same bytes every time", "[system]") {
   CHECK_THAT(accuracy.out, Contains("map updates"));
 }
 
-TEST_CASE("replay refuses what it does not know", "[system]") {
+TEST_CASE("replay refuses unknown stages and files", "[system]") {
   test::TemporaryDirectory directory;
   const auto none = understory_command(directory, "replay none.lcm --out o.lcm");
   CHECK(none.status == 1);

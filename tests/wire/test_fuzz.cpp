@@ -32,7 +32,7 @@ using namespace understory;
 using namespace understory::wire;
 using namespace understory::test;
 
-/// One way of damaging a message.
+/// One kind of damage to a message.
 void damage(Bytes& bytes, const std::vector<std::size_t>& lengths, std::mt19937_64& random) {
   const std::uint32_t extremes[] = {0, 1, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 0x00FFFFFF, 4096};
   switch (random() % 7) {
@@ -96,7 +96,7 @@ void fuzz(std::size_t packets, std::mt19937_64& random, Tally& tally) {
 
     ++tally.packets;
     ++(message ? tally.accepted : tally.refused);
-    if (!message && message.refusal().detail.empty()) FAIL("a refusal without words");
+    if (!message && message.refusal().detail.empty()) FAIL("a refusal without a text");
   }
 }
 

@@ -10,7 +10,7 @@ using namespace understory;
 using namespace understory::wire;
 using namespace understory::test;
 
-TEST_CASE("the table knows every type, with the fingerprint that lcm-gen gives it") {
+TEST_CASE("the table has every type, with the fingerprint that lcm-gen gives it") {
   std::size_t types = 0;
   std::set<std::int64_t> fingerprints;
   test::for_each_type<test::AllTypes>([&]<class T>(T*) {
@@ -87,7 +87,7 @@ TEST_CASE("a number that is not finite is refused in every field that could hold
   CHECK(places > 300);
 }
 
-TEST_CASE("hostile counts and string lengths are refused wherever they stand") {
+TEST_CASE("hostile counts and string lengths are refused wherever they are") {
   std::mt19937_64 random(4);
   std::size_t places = 0;
   for (const WireType& type : wire_types()) {

@@ -55,7 +55,7 @@ std::optional<Nearest> nearest_polygon(const Polygon& polygon, const Hierarchy& 
 }
 
 /// For each edge of `local` the edge of `other`, by the permutation with least squared difference
-/// of lengths. Mirror images are accepted, as in the source.
+/// of lengths. Mirror images are accepted, as in the published code.
 std::array<std::size_t, 3> match_edges(const Triangle& local, const Triangle& other) {
   constexpr std::array<std::array<std::size_t, 3>, 6> kPermutations{
       {{0, 1, 2}, {0, 2, 1}, {1, 2, 0}, {1, 0, 2}, {2, 0, 1}, {2, 1, 0}}};
@@ -146,8 +146,8 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> HierarchyMatches::polygons(
 std::vector<PointMatch> HierarchyMatches::points(double max_descriptor_distance) const {
   std::vector<PointMatch> pairs;
 
-  // The source's filter of duplicates orders each pair, although the two numbers count different
-  // things: 3 -> 7 hides a true 7 -> 3.
+  // The published code's filter of duplicates orders each pair, although the two numbers count
+  // different things: 3 -> 7 hides a true 7 -> 3.
   std::set<std::pair<std::uint32_t, std::uint32_t>> seen;
   for (const PolygonMatch& match : matches_) {
     if (match.polygon.distance >= max_descriptor_distance) {
