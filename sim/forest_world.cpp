@@ -26,6 +26,7 @@ void add_branches(World& world, const Stem& trunk, double up_to_m, double mean_c
     const double along = uniform(random, 1.0, up_to_m) + 0.5;
     const double bearing = uniform(random, -pi, pi);
     const double climb = uniform(random, -0.2, 0.7);
+
     Stem branch;
     branch.base_m = trunk.centre_at(along);
     branch.axis = Eigen::Vector3d(std::cos(bearing), std::sin(bearing), climb).normalized();
@@ -36,15 +37,15 @@ void add_branches(World& world, const Stem& trunk, double up_to_m, double mean_c
   }
 }
 
-void add_people(World& world, std::span<const Eigen::Vector2d> distance_m, int count,
+void add_people(World& world, std::span<const Eigen::Vector2d> path_m, int count,
                 std::mt19937_64& random) {
-  for (int i = 0; i < count && !distance_m.empty(); ++i) {
-    const auto place = std::uniform_int_distribution<std::size_t>(0, distance_m.size() - 1)(random);
+  for (int i = 0; i < count && !path_m.empty(); ++i) {
+    const auto place = std::uniform_int_distribution<std::size_t>(0, path_m.size() - 1)(random);
     const double bearing = uniform(random, -pi, pi);
     const double aside = uniform(random, 3.0, 12.0);
     Walker walker;
     walker.middle_m.head<2>() =
-        distance_m[place] + aside * Eigen::Vector2d(std::cos(bearing), std::sin(bearing));
+        path_m[place] + aside * Eigen::Vector2d(std::cos(bearing), std::sin(bearing));
     walker.middle_m.z() = world.ground().height(walker.middle_m.head<2>());
     const double walk = uniform(random, -pi, pi);
 
@@ -102,7 +103,7 @@ void plant_bush(World& world, const Eigen::Vector2d& at_m, double density_per_m,
 }
 
 World make_forest_world(const Forest& forest, const ForestWorldParameters& parameters,
-                        std::span<const Eigen::Vector2d> distance_m, std::mt19937_64& random) {
+                        std::span<const Eigen::Vector2d> path_m, std::mt19937_64& random) {
   World world(Ground(parameters.ground, random));
   const PointGrid path(path_m, 20.0);
   for (std::size_t i = 0; i < forest.trunks_m.size(); ++i) {
@@ -122,7 +123,7 @@ World make_forest_world(const Forest& forest, const ForestWorldParameters& param
     plant_bush(world, at_m, parameters.bush_density_per_m, random);
   }
 
-  add_people(world, distance_m, parameters.people, random);
+  add_people(world, path_m, parameters.people, random);
   return world;
 }
 

@@ -36,6 +36,7 @@ void append_country_road(Points& points, double heading_rad, double length_m,
     const double straight_m = uniform(random, 0.0, 150.0);
     const double wish_rad = home_rad + uniform(random, -0.9, 0.9);
     const double rotation_rad = std::clamp(wish_rad - heading_rad, -bend_m / 45.0, bend_m / 45.0);
+
     const auto steps = static_cast<int>(std::lround((bend_m + straight_m) / step));
     for (int i = 0; i < steps; ++i) {
       if (i * step < bend_m) heading_rad += rotation_rad * step / bend_m;

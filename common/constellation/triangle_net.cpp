@@ -99,7 +99,7 @@ void TriangleNet::update(Slot changed, std::vector<Slot>& anchors, Change&& chan
 
 void TriangleNet::exchange_others(Slot changed, const std::vector<Slot>& anchors,
                                   const std::vector<Neighbours>& lists_before) {
-  // Of the others only those count that an anchor holds no longer, or newly.
+  // Only those count that an anchor holds no longer, or newly.
   std::vector<SlotTriple> lost;
   std::vector<SlotTriple> gained;
   for (std::size_t i = 0; i < anchors.size(); ++i) {
@@ -109,6 +109,8 @@ void TriangleNet::exchange_others(Slot changed, const std::vector<Slot>& anchors
   }
   sort_unique(lost);
   sort_unique(gained);
+
+  // A triangle exists as long as one of its corners holds it.
   const auto held_before = [&](Slot corner, const SlotTriple& triangle) {
     const auto it = std::lower_bound(anchors.begin(), anchors.end(), corner);
     const bool rewired = it != anchors.end() && *it == corner;
@@ -117,12 +119,14 @@ void TriangleNet::exchange_others(Slot changed, const std::vector<Slot>& anchors
                          : neighbours_[corner],
                  triangle);
   };
+
   for (const SlotTriple& triangle : lost) {
     const bool held = std::any_of(triangle.begin(), triangle.end(), [&](Slot corner) {
       return holds(corner, neighbours_[corner], triangle);
     });
     if (!held) triangles_.remove(canonical(triangle));
   }
+
   for (const SlotTriple& triangle : gained) {
     const bool held = std::any_of(triangle.begin(), triangle.end(),
                                   [&](Slot corner) { return held_before(corner, triangle); });

@@ -47,9 +47,7 @@ struct Triangulation::Impl {
     if (const auto slot = hints.near(position); slot && self->is_landmark(*slot)) {
       return vertices[*slot]->face();
     }
-    if (last_slot != kNone && self->is_landmark(last_slot)) {
-      return vertices[last_slot]->face();
-    }
+    if (last_slot != kNone && self->is_landmark(last_slot)) return vertices[last_slot]->face();
     return {};
   }
 
@@ -247,15 +245,11 @@ struct Triangulation::Impl {
 
   /// Moves a vertex if that keeps all triangles; only for one inside the hull.
   bool move_in_place(Vertex vertex, const Point& point) {
-    if (delaunay.dimension() < 2) {
-      return false;
-    }
+    if (delaunay.dimension() < 2) return false;
 
     collect_star(vertex, scratch_faces, scratch_rim);
     for (const Face& face : scratch_faces) {
-      if (delaunay.is_infinite(face)) {
-        return false;
-      }
+      if (delaunay.is_infinite(face)) return false;
     }
 
     const Point before = vertex->point();
@@ -281,15 +275,11 @@ struct Triangulation::Impl {
 
   /// Any landmark that shares an edge with this one.
   std::optional<std::uint32_t> some_neighbour(Vertex vertex) const {
-    if (delaunay.dimension() < 1) {
-      return std::nullopt;
-    }
+    if (delaunay.dimension() < 1) return std::nullopt;
     auto circulator = delaunay.incident_vertices(vertex);
     const auto done = circulator;
     do {
-      if (!delaunay.is_infinite(circulator)) {
-        return circulator->info();
-      }
+      if (!delaunay.is_infinite(circulator)) return circulator->info();
     } while (++circulator != done);
     return std::nullopt;
   }
@@ -340,18 +330,11 @@ void Triangulation::release_slot(std::uint32_t slot) {
 ChangeStatus Triangulation::insert(std::uint64_t id, const Eigen::Vector2d& position_m,
                                    TriangulationChange& change) {
   change.clear();
-  if (!position_m.allFinite()) {
-    return ChangeStatus::kNotFinite;
-  }
-
-  if (slot_of_id_.contains(id)) {
-    return ChangeStatus::kIdInUse;
-  }
+  if (!position_m.allFinite()) return ChangeStatus::kNotFinite;
+  if (slot_of_id_.contains(id)) return ChangeStatus::kIdInUse;
 
   const Impl::Place place = impl_->locate(position_m);
-  if (place.occupied()) {
-    return ChangeStatus::kCoincident;
-  }
+  if (place.occupied()) return ChangeStatus::kCoincident;
 
   const std::uint32_t slot = allocate_slot(id, position_m);
   impl_->vertices[slot] = impl_->insert(slot, to_cgal(position_m), place, change);
@@ -364,9 +347,7 @@ ChangeStatus Triangulation::insert(std::uint64_t id, const Eigen::Vector2d& posi
 ChangeStatus Triangulation::remove(std::uint64_t id, TriangulationChange& change) {
   change.clear();
   const auto found = slot(id);
-  if (!found) {
-    return ChangeStatus::kUnknownId;
-  }
+  if (!found) return ChangeStatus::kUnknownId;
   const Vertex vertex = impl_->vertices[*found];
   const auto neighbour = impl_->some_neighbour(vertex);
   impl_->hints.forget(positions_[*found], *found, neighbour);
@@ -379,20 +360,14 @@ ChangeStatus Triangulation::remove(std::uint64_t id, TriangulationChange& change
 ChangeStatus Triangulation::move(std::uint64_t id, const Eigen::Vector2d& position_m,
                                  TriangulationChange& change) {
   change.clear();
-  if (!position_m.allFinite()) {
-    return ChangeStatus::kNotFinite;
-  }
+  if (!position_m.allFinite()) return ChangeStatus::kNotFinite;
 
   const auto found = slot(id);
-  if (!found) {
-    return ChangeStatus::kUnknownId;
-  }
+  if (!found) return ChangeStatus::kUnknownId;
 
   const Point point = to_cgal(position_m);
   const Vertex vertex = impl_->vertices[*found];
-  if (vertex->point() == point) {
-    return ChangeStatus::kDone;
-  }
+  if (vertex->point() == point) return ChangeStatus::kDone;
 
   if (impl_->move_in_place(vertex, point)) {
     positions_[*found] = position_m;
@@ -404,9 +379,7 @@ ChangeStatus Triangulation::move(std::uint64_t id, const Eigen::Vector2d& positi
     return ChangeStatus::kDone;
   }
 
-  if (impl_->locate(position_m).occupied()) {
-    return ChangeStatus::kCoincident;
-  }
+  if (impl_->locate(position_m).occupied()) return ChangeStatus::kCoincident;
 
   TriangulationChange removal;
   remove(id, removal);

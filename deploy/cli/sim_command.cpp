@@ -244,6 +244,7 @@ void add_landmark_options(CLI::App& command, Options& options) {
   command.add_option("--speed", drive.speed_mps, "Speed of the vehicle [m/s]")
       ->check(CLI::Range(1e-3, 100.0))
       ->capture_default_str();
+
   command.add_option("--sensor-range", drive.sensor.range_m, "Range of the sensor [m]")
       ->check(CLI::Range(1.0, 1e3))
       ->capture_default_str();
