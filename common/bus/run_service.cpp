@@ -142,48 +142,55 @@ RuntimeParameters check_config(const Service& service, const std::string& toml,
   return runtime;
 }
 
+/// The store of a process with --state-dir, after recovering `hosted` from it; null without.
+std::unique_ptr<StateStore> recover_state(std::unique_ptr<HostedService>& hosted,
+                                          const Service& service, Bus& bus, const Clock& clock,
+                                          const std::string& toml, const Options& options) {
+  if (options.state_dir.empty()) return nullptr;
+  auto store = std::make_unique<StateStore>(options.state_dir, service.name);
+
+  if (!hosted->node().recover(*store)) {
+    // The stage may be half loaded: a new one.
+    store->start_over();
+    hosted = make_hosted(service, bus, clock, toml, options);
+    hosted->node().report(wire::Reason::kSnapshotDamaged,
+                          "the state cannot be used; starting fresh");
+  }
+  hosted->node().journal_to(store.get());
+  return store;
+}
+
+void report_small_buffer(Node& node, const ReceiveBuffer& buffer) {
+  if (buffer.granted_bytes >= buffer.wanted_bytes) return;
+  node.report(wire::Reason::kReceiveBufferSmall, std::to_string(buffer.granted_bytes) + " of " +
+                                                     std::to_string(buffer.wanted_bytes) +
+                                                     " bytes granted: raise net.core.rmem_max");
+}
+
 int serve(const Service& service, const Options& options) {
+  // A wrong configuration ends the process before anything is opened.
   const std::string toml = read_config(options.config);
   std::string printed;
   const RuntimeParameters runtime = check_config(service, toml, options.config, &printed);
-
   if (options.prints_config) {
     std::cout << "# " << service.name << ": " << service.summary << "\n" << printed;
     return kDone;
   }
 
+  // The bus, the service on it, and its state.
   StopSignal stop;
   const Clock clock = system_clock();
-  const std::unique_ptr<Bus> live =
+  const std::unique_ptr<Bus> bus =
       make_live_bus(options.lcm_url.empty() ? runtime.lcm_url : options.lcm_url);
-  Bus& bus = *live;
-  auto hosted = make_hosted(service, bus, clock, toml, options);
-  std::unique_ptr<StateStore> store;
+  auto hosted = make_hosted(service, *bus, clock, toml, options);
+  const auto store = recover_state(hosted, service, *bus, clock, toml, options);
+  report_small_buffer(hosted->node(), bus->receive_buffer());
 
-  if (!options.state_dir.empty()) {
-    store = std::make_unique<StateStore>(options.state_dir, service.name);
-    if (!hosted->node().recover(*store)) {
-      store->start_over();
-      hosted = make_hosted(service, bus, clock, toml, options);
-      hosted->node().report(wire::Reason::kSnapshotDamaged,
-                            "the state cannot be used; starting fresh");
-    }
-    hosted->node().journal_to(store.get());
-  }
-
-  Node& node = hosted->node();
-  const ReceiveBuffer buffer = bus.receive_buffer();
-  if (buffer.granted_bytes < buffer.wanted_bytes) {
-    node.report(wire::Reason::kReceiveBufferSmall, std::to_string(buffer.granted_bytes) + " of " +
-                                                       std::to_string(buffer.wanted_bytes) +
-                                                       " bytes granted: raise net.core.rmem_max");
-  }
-
+  // Begin: from here on messages come.
   if (auto* const device = dynamic_cast<Device*>(&hosted->adapter())) device->open();
-  node.connect();
-  node.publish_config(hosted->table().to_toml());
-  run_until_stopped(*hosted, bus, stop, clock);
-
+  hosted->node().connect();
+  hosted->node().publish_config(hosted->table().to_toml());
+  run_until_stopped(*hosted, *bus, stop, clock);
   return kDone;
 }
 
