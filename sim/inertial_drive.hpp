@@ -57,9 +57,9 @@ struct InertialDriveParameters {
   double dead_reckoning_sigma_mps =
       0.3;  ///< Of `from_T_to` where nothing but the IMU is behind it.
   double range_m = 40.0;
-  double detection_probability = 0.9;
-  double position_sigma_m = 0.1;  ///< Per axis.
-  double clutter_share = 0.0;     ///< False detections, as a share of the true ones expected.
+  double detection_probability = 0.9;  ///< Of every trunk in range, independently.
+  double position_sigma_m = 0.1;       ///< Per axis.
+  double clutter_share = 0.0;          ///< False detections, as a share of the true ones expected.
 };
 
 /// Everything between two scans, and the scan.

@@ -15,13 +15,13 @@ namespace understory::sim {
 /// As the SICK LMS of Victoria Park, if a little faster. Its mirror takes 13 ms for a revolution,
 /// in which the car moves by centimetres: a scan is taken at one instant.
 struct PlanarLaserParameters {
-  int beams = 361;
+  int beams = 361;  ///< From the right to the left.
   double first_bearing_rad = -0.5 * std::numbers::pi;
   double bearing_step_rad = std::numbers::pi / 360.0;
   double rate_hz = 10.0;
   double range_sigma_m = 0.02;
   double max_range_m = 80.0;
-  double drop_out = 0.005;
+  double drop_out = 0.005;  ///< Share of returns lost by chance.
   Eigen::Isometry3d vehicle_T_sensor = Eigen::Isometry3d(Eigen::Translation3d(3.6, 0.0, 0.8));
 };
 

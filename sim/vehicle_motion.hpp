@@ -33,7 +33,7 @@ struct SpeedParameters {
   double lateral_mps2 = 1.5;  ///< Greatest in curves.
   /// A stop of `seconds` on the route.
   struct Stop {
-    double along_m = 0.0;
+    double along_m = 0.0;  ///< Of the route.
     double seconds = 5.0;
   };
   std::vector<Stop> stops;  ///< In order of along_m.

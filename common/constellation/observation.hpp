@@ -14,17 +14,18 @@ namespace understory::constellation {
 
 /// A usable observed point, frame `sensor`.
 struct PreparedPoint {
-  Eigen::Vector2d position = Eigen::Vector2d::Zero();
-  double variance = 0.0;  ///< Per axis, of the difference to its landmark: both sides' together.
+  Eigen::Vector2d position = Eigen::Vector2d::Zero();  ///< [m]
+  double variance =
+      0.0;  ///< [m^2] Per axis, of the difference to its landmark: both sides' together.
 };
 
 /// The usable points of an observation and how densely they lie.
 struct PreparedObservation {
   std::vector<PreparedPoint> points;
-  std::vector<std::uint32_t> observed;  ///< Index in the observation as given.
-  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
-  double radius_m = 0.0;        ///< Of a disc with the same second moment.
-  double density_per_m2 = 0.0;  ///< Points in that disc.
+  std::vector<std::uint32_t> observed;               ///< Index in the observation as given.
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< [m] Mean of the points, frame `sensor`.
+  double radius_m = 0.0;                             ///< Of a disc with the same second moment.
+  double density_per_m2 = 0.0;                       ///< Points in that disc.
 };
 
 /// Leaves out points that are not finite. A point's variance is the sum of its own and the map's

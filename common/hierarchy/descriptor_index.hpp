@@ -18,7 +18,7 @@ class DescriptorIndex {
   /// A descriptor found, by its key.
   struct Hit {
     std::uint32_t key = 0;
-    float distance = 0.0F;
+    float distance = 0.0F;  ///< As hierarchy::distance() gives it.
   };
 
   /// `cell_size` in units of a descriptor's distance; > 0.

@@ -24,7 +24,7 @@ struct Ending {
   int exit_code = 0;  ///< Where it exited.
   int signal = 0;     ///< Where a signal ended it.
 
-  /// "exit status 1", "signal 9 (Killed)" and the like.
+  /// "exited with status 1", "killed by signal 9 (Killed)" and the like.
   std::string text() const;
 };
 
