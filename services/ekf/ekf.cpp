@@ -1,150 +1,63 @@
 #include "services/ekf/ekf.hpp"
 
-#include <Eigen/LU>
-#include <algorithm>
-#include <cmath>
 #include <stdexcept>
+#include <utility>
 
-#include "services/ekf/chi_squared.hpp"
-#include "services/ekf/ground_marks.hpp"
-#include "services/ekf/prediction.hpp"
+#include "common/state/archive.hpp"
+#include "services/ekf/rejoin.hpp"
+#include "services/ekf/state_covariances.hpp"
 
 namespace understory::ekf {
 namespace {
 
-/// Stamps of one instant may miss each other by rounding.
-constexpr model::Utime kTolerance_us = 1000;
+constexpr state::Format kFormat{"ekf", 5};
+/// Variance of the first pose, by definition the map's origin; above zero for the factorisations.
 constexpr double kStartVariance = 1e-12;
-/// Of a piece's sway: a vehicle may stand for hours, in which chance must not pass for motion.
-constexpr double kStationaryProbability = 1.0 - 1e-6;
-/// Standing that is doubted is believed after all when it is told for so long.
-constexpr double kInsistence_s = 10.0;
-/// Squared way of a piece, of its variance: so far nothing goes that stands.
-constexpr double kMoves = 50.0;
+/// Searches for lost landmarks per scan.
+constexpr int kMaxRejoinRounds = 4;
+/// Time that creeping may have lasted before it was found [s].
+constexpr double kUnnoticed_s = 0.1;
+/// Refused observations from which a scan may be at odds with the map.
+constexpr std::uint32_t kFewRefused = 4;
 
 ErrorForm error_form(const std::string& name) {
   if (name == "right_invariant") return ErrorForm::kRightInvariant;
   if (name == "first_estimate") return ErrorForm::kFirstEstimate;
   if (name == "plain") return ErrorForm::kPlain;
-  throw std::invalid_argument("error_form: no form is named " + name);
+  throw std::invalid_argument("error_form: " + name +
+                              " is not one of right_invariant, first_estimate, plain");
 }
 
-double seconds(model::Utime duration) { return 1e-6 * static_cast<double>(duration); }
-model::Utime microseconds(double duration_s) { return static_cast<model::Utime>(1e6 * duration_s); }
+/// Puts the vehicle at `last`, stationary, less certain than it was.
+void place_at(const SoundPose& last, const EkfRestartParameters& grow, FilterState& state) {
+  state.anchor_m.setZero();
+  state.position = last.ekf_map_T_vehicle.translation();
+  state.heading = last.ekf_map_T_vehicle.theta();
+  state.velocity.setZero();
+  state.bias = last.bias;
+  state.level.setZero();
+  state.first_position = state.position;
+  state.first_velocity = state.velocity;
 
-Sway sway(const EkfMotionParameters& motion) {
-  return {motion.stationary_sigma_m, motion.stationary_sigma_rad};
-}
-
-bool is_usable(const model::Odometry& increment) {
-  bool usable = increment.utime > increment.from_utime &&
-                increment.from_T_to.coordinates().allFinite() && increment.covariance.allFinite() &&
-                increment.covariance.diagonal().minCoeff() >= 0.0;
-  if (increment.inertial) {
-    const model::Preintegration& p = *increment.inertial;
-    usable = usable && std::isfinite(p.yaw_rad) && p.velocity_mps.allFinite() &&
-             p.position_m.allFinite() && p.covariance.allFinite() &&
-             p.covariance.diagonal().minCoeff() >= 0.0 && p.bias_jacobian.allFinite() &&
-             p.bias.allFinite() && p.level.covariance.allFinite() && p.level.memory.allFinite() &&
-             p.level.added.allFinite() && std::isfinite(p.level.pitch_tangent);
-  }
-  return usable;
-}
-
-/// Of the vehicle's pose (right perturbation), whose heading is the state's less `pitch_tangent`
-/// times the roll's error.
-Eigen::Matrix3d pose_covariance(const FilterState& state, double pitch_tangent) {
-  const Eigen::Matrix2d back = rotation_of(state.heading).transpose();
-  Eigen::Matrix<double, 3, 4> pose_by_state = Eigen::Matrix<double, 3, 4>::Zero();
-  pose_by_state.block<2, 1>(0, 0) = back * state.lever(state.position);
-  pose_by_state.block<2, 2>(0, 1) = back;
-  pose_by_state(2, 0) = 1.0;
-  pose_by_state(2, 3) = -pitch_tangent;
-  Eigen::Matrix4d covariance;
-  covariance.topLeftCorner<3, 3>() = state.covariance_block<3, 3>(0, 0);
-  covariance.topRightCorner<3, 1>() = state.covariance_block<3, 1>(0, kLevel);
-  covariance.bottomLeftCorner<1, 3>() = covariance.topRightCorner<3, 1>().transpose();
-  covariance(3, 3) = state.covariance(kLevel, kLevel);
-  return pose_by_state * covariance * pose_by_state.transpose();
+  const Eigen::Vector3d sigma(grow.sigma_m, grow.sigma_m, grow.sigma_rad);
+  const Eigen::Matrix3d added = sigma.cwiseAbs2().asDiagonal();
+  set_pose_covariance(state, last.covariance + added);
+  state.follow_with_anchor();
 }
 
 }  // namespace
 
 Ekf::Ekf(const EkfParameters& parameters)
     : parameters_(parameters),
+      gates_(parameters.gate, parameters.map.max_landmarks),
+      scratch_(parameters.map.max_landmarks + kGroundMarks),
       state_(error_form(parameters.error_form), parameters.map.max_landmarks + kGroundMarks),
-      room_(kVehicle + 2 * state_.max_landmarks()),
-      joint_(state_.max_landmarks()),
-      landmark_gate_(chi_squared_quantile(parameters.gate.landmark_probability, 2)),
-      parked_gate_(chi_squared_quantile(kStationaryProbability, 2 * kGroundMarks)),
-      creeping_gate_(chi_squared_quantile(kStationaryProbability, 3)),
-      still_gate_(chi_squared_quantile(kStationaryProbability, 2)) {
-  const int capacity = kVehicle + 2 * state_.max_landmarks();
-  backup_ = Eigen::MatrixXd::Zero(capacity, capacity);
-  set_gates_.push_back(0.0);
-  for (int k = 1; k <= parameters.map.max_landmarks; ++k) {
-    set_gates_.push_back(chi_squared_quantile(parameters.gate.set_probability, 2 * k));
-  }
-}
-
-void Ekf::set_prior() {
-  const EkfPriorParameters& prior = parameters_.prior;
-  state_.clear_landmarks();
-  aliases_.clear();
-  level_covariance_.reset();
-  pitch_tangent_ = 0.0;
-  auto covariance = state_.covariance();
-  covariance.setZero();
-  covariance.diagonal().segment<2>(kVelocity).setConstant(prior.velocity_sigma_mps *
-                                                          prior.velocity_sigma_mps);
-  const double gyro = prior.gyro_bias_sigma * prior.gyro_bias_sigma;
-  const double force = prior.accelerometer_bias_sigma * prior.accelerometer_bias_sigma;
-  covariance.diagonal().segment<3>(kBias) << gyro, force, force;
-}
-
-/// Until it is found to stand, which takes half a second, a vehicle may move at any speed, and turn
-/// as the gyro's bias likes. A map that began before that would be off by as much for ever.
-bool Ekf::may_begin(const model::Odometry& increment) {
-  if (!heard_ || increment.utime < *heard_) heard_ = increment.from_utime;
-  if (!increment.inertial || increment.is_stationary) return true;
-  if (increment.utime - *heard_ > microseconds(parameters_.prior.wait_s)) return true;
-  const double spread = increment.covariance.topLeftCorner<2, 2>().trace();
-  return increment.has_wheels && increment.from_T_to.translation().squaredNorm() > kMoves * spread;
-}
-
-void Ekf::start(model::Utime utime) {
-  started_ = true;
-  heard_.reset();
-  utime_ = utime;
-  set_prior();
-  state_.set_pose_covariance(kStartVariance * Eigen::Matrix3d::Identity());
-  last_sound_ = pose();
-  pose_sequence_ = 0;
-}
-
-void Ekf::restart(model::Utime utime, const std::string& reason) {
-  ++counters_.restarts;
-  ++reset_counter_;
-  counters_.last_reason = reason;
-  refused_scans_ = 0;
-  doubted_.reset();
-  utime_ = utime;
-  set_prior();
-  const model::EkfPose& last = last_sound_;
-  state_.anchor_m.setZero();
-  state_.position = last.ekf_map_T_vehicle.translation();
-  state_.heading = last.ekf_map_T_vehicle.theta();
-  state_.velocity.setZero();
-  state_.bias = last.bias;
-  state_.level.setZero();
-  state_.first_position = state_.position;
-  state_.first_velocity = state_.velocity;
-  const EkfRestartParameters& grow = parameters_.restart;
-  const Eigen::Vector3d sigma(grow.sigma_m, grow.sigma_m, grow.sigma_rad);
-  const Eigen::Matrix3d added = sigma.cwiseAbs2().asDiagonal();
-  state_.set_pose_covariance(last.covariance + added);
-  state_.follow_with_anchor();
-}
+      timeline_(parameters.prior.wait_s, parameters.restart.clock_jump_s),
+      queue_(parameters.max_scan_delay_s, parameters.restart.clock_jump_s),
+      motion_(parameters.motion),
+      stationary_(parameters, gates_.stationary),
+      map_(parameters.map, parameters.observation),
+      report_(parameters.observation) {}
 
 EkfOutput Ekf::add(const model::Odometry& increment) {
   ++counters_.odometry;
@@ -153,217 +66,261 @@ EkfOutput Ekf::add(const model::Odometry& increment) {
     counters_.last_reason = "odometry is not finite";
     return {};
   }
-  if (!started_ && !may_begin(increment)) return {};
-  if (!started_) start(increment.from_utime);
-  const model::Utime newest = waiting_.empty() ? utime_ : waiting_.back().utime;
-  if (increment.utime < newest - microseconds(parameters_.restart.clock_jump_s)) {
-    waiting_.clear();
-    last_scan_.reset();
-    restart(increment.from_utime, "the clock jumped back");
-  } else if (increment.from_utime < newest - kTolerance_us) {
-    ++counters_.odometry_refused;
-    counters_.last_reason = "odometry is late or overlaps";
-    return {};
+
+  // The map begins where the vehicle's motion is known.
+  if (!timeline_.has_begun()) {
+    if (!timeline_.may_begin(increment)) return {};
+    begin(increment.from_utime);
   }
-  waiting_.push_back(increment);
-  const model::Utime overdue = increment.utime - microseconds(parameters_.max_scan_delay_s);
-  if (waiting_.front().utime > overdue) return {};
-  advance(overdue);
-  used_ = refused_ = 0;
-  EkfOutput output;
-  output.pose = pose();
-  output.level = level();
-  if (waiting_.empty() ? increment.is_stationary : waiting_.front().is_stationary) {
-    output.correction = outputs().correction;
+
+  // It waits for its scan.
+  if (!accept(increment)) return {};
+  queue_.push(increment);
+  const std::optional<model::Utime> overdue = queue_.overdue();
+  if (!overdue) return {};
+
+  // Its scan did not come.
+  advance(*overdue);
+  EkfOutput output = report_.pose(state_, motion_, timeline_.now(), {});
+  const model::Odometry* next = queue_.next();
+  if (next ? next->is_stationary : increment.is_stationary) {
+    output.correction = report_.all(state_, motion_, timeline_.now(), {}).correction;
   }
   return output;
 }
 
-/// Uses the odometry that ends by `utime`.
-void Ekf::advance(model::Utime utime) {
-  while (!waiting_.empty() && waiting_.front().utime <= utime + kTolerance_us) {
-    use(waiting_.front());
-    waiting_.pop_front();
+EkfOutput Ekf::add(const model::TrackedScan& scan) {
+  ++counters_.scans;
+  if (timeline_.is_waiting()) return {};  // Its landmarks will be observed again.
+  if (!timeline_.has_begun()) begin(scan.utime);
+  if (!accept_scan(scan.utime)) return {};
+
+  // Predict to the scan's stamp.
+  advance(scan.utime);
+  if (timeline_.is_behind(scan.utime)) bridge(scan.utime);
+
+  // Landmarks that move together show a vehicle that is not stationary.
+  ScanUpdate update = read(scan);
+  check_stationary(update);
+
+  // Update by known landmarks, then by lost ones, for which the pose is now better known.
+  update_known(scan, update);
+  rejoin_lost(scan, update);
+
+  // New landmarks enter the map, others leave it; a filter that is lost starts again.
+  maintain_map(scan, update);
+
+  stationary_.confirm_motion(timeline_.now(), update.used);
+  counters_.landmarks_used += update.used;
+  counters_.landmarks_refused += update.refused;
+  return report_.all(state_, motion_, timeline_.now(), update);
+}
+
+void Ekf::begin(model::Utime utime) {
+  timeline_.begin(utime);
+  set_prior();
+  set_pose_covariance(state_, kStartVariance * Eigen::Matrix3d::Identity());
+  report_.begin(state_, motion_);
+}
+
+/// Goes on from the last sound pose, without a map.
+void Ekf::restart(model::Utime utime, const std::string& reason) {
+  ++counters_.restarts;
+  counters_.last_reason = reason;
+  report_.count_restart();
+  refused_scans_ = 0;
+  stationary_.reset();
+  timeline_.move_to(utime);
+  set_prior();
+  place_at(report_.last_sound(), parameters_.restart, state_);
+}
+
+void Ekf::set_prior() {
+  ekf::set_prior(state_, parameters_.prior);
+  map_.clear();
+  motion_.forget_level();
+}
+
+/// Scan after scan at odds with the map: the error is larger than the covariance states.
+void Ekf::restart_if_lost(const ScanUpdate& update) {
+  const bool is_at_odds = update.refused >= kFewRefused && update.refused > 2 * update.used;
+  refused_scans_ = is_at_odds ? refused_scans_ + 1 : 0;
+  if (refused_scans_ >= parameters_.restart.after_refused_scans) {
+    restart(timeline_.now(), "most landmarks were refused, scan after scan");
   }
 }
 
-void Ekf::use(const model::Odometry& increment) {
-  if (increment.utime <= utime_ + kTolerance_us) {
-    ++counters_.odometry_refused;
-    counters_.last_reason = "odometry came after the scan at its end";
-    return;
+/// False where the increment is late; a clock that jumped back restarts the filter.
+bool Ekf::accept(const model::Odometry& increment) {
+  switch (queue_.order_of(increment, timeline_.now())) {
+    case StampOrder::kInOrder:
+      return true;
+    case StampOrder::kClockJumpedBack:
+      queue_.clear();
+      timeline_.forget_scans();
+      restart(increment.from_utime, "the clock jumped back");
+      return true;
+    case StampOrder::kLate:
+      break;
   }
-  if (increment.from_utime < utime_ - kTolerance_us) {
-    // The piece began before a scan that came without it: what is left of it is unknown.
-    ++counters_.odometry_refused;
-    counters_.last_reason = "odometry overlaps a scan";
-    bridge(increment.utime);
-    return;
-  }
-  if (increment.from_utime > utime_ + kTolerance_us) bridge(increment.from_utime);
-  const EkfMotionParameters& motion = parameters_.motion;
-  const bool is_stationary = believes_stationary(increment);
-  const bool has_marks = has_ground_marks(state_);
-  if (is_stationary && !has_marks) add_ground_marks(state_, sway(motion));
-  if (!is_stationary && has_marks) leave_place();
-  predict(increment, is_stationary);
-  if (is_stationary) {
-    stand();
-  } else if (motion.sideways_sigma_mps > 0.0) {
-    measure_no_slide(state_, motion.sideways_sigma_mps, room_);
-  }
-  if (!is_stationary) distance_m_ += increment.from_T_to.translation().norm();
-  utime_ = increment.utime;
-  state_.follow_with_anchor();
-  if (!state_.is_sound()) restart(utime_, "the state was not finite after a prediction");
-}
-
-void Ekf::predict(const model::Odometry& increment, bool is_stationary) {
-  const EkfMotionParameters& motion = parameters_.motion;
-  if (increment.inertial) {
-    if (!level_covariance_) know_level(state_, increment.inertial->level);
-    level_covariance_ = increment.inertial->level.covariance;
-    pitch_tangent_ = increment.inertial->level.pitch_tangent;
-  }
-  if (!increment.inertial) {
-    const geometry::SE2WithCovariance moved{increment.from_T_to, increment.covariance};
-    const double duration = seconds(increment.utime - increment.from_utime);
-    ekf::predict(state_, transition_by(state_, moved, duration, motion), motion, room_);
-  } else if (increment.has_wheels && !is_stationary) {
-    const Eigen::Matrix2d turn = increment.from_T_to.rotation();
-    const MeasuredMotion measured{
-        increment.from_T_to.translation(),
-        turn * increment.covariance.topLeftCorner<2, 2>() * turn.transpose()};
-    ekf::predict(state_, *increment.inertial, measured, motion, room_);
-  } else {
-    ekf::predict(state_, transition_by(state_, *increment.inertial), motion, room_);
-  }
-}
-
-/// Standing is told by quiet samples alone, where there are no wheels: a smooth road is quiet too.
-/// So it is not believed against the filter's own velocity, nor, once found wrong, before it is
-/// said to move; but after a while in which no landmark spoke for moving, the filter must be wrong.
-bool Ekf::believes_stationary(const model::Odometry& increment) {
-  if (!increment.is_stationary) doubted_.reset();
-  if (!increment.is_stationary) return false;
-  if (doubted_) {
-    if (increment.utime - *doubted_ < microseconds(kInsistence_s)) return false;
-    doubted_.reset();
-    const double unknown = parameters_.prior.velocity_sigma_mps;
-    state_.covariance().diagonal().segment<2>(kVelocity).array() += unknown * unknown;
-    return true;
-  }
-  const double sigma = parameters_.motion.stationary_sigma_mps;
-  Eigen::Matrix2d spread = state_.velocity_covariance().topLeftCorner<2, 2>();
-  spread.diagonal().array() += sigma * sigma;
-  const Eigen::Vector2d velocity = rotation_of(state_.heading).transpose() * state_.velocity;
-  if (velocity.dot(spread.inverse() * velocity) <= still_gate_) return true;
-  doubt_stationary();
+  ++counters_.odometry_refused;
+  counters_.last_reason = "odometry is late or overlaps";
   return false;
 }
 
-void Ekf::doubt_stationary() {
-  ++counters_.crept;
-  doubted_ = utime_;
-  leave_place();
+/// The same for a scan.
+bool Ekf::accept_scan(model::Utime utime) {
+  switch (timeline_.order_of_scan(utime)) {
+    case StampOrder::kInOrder:
+      break;
+    case StampOrder::kClockJumpedBack:
+      queue_.clear();
+      restart(utime, "the clock jumped back");
+      break;
+    case StampOrder::kLate:
+      ++counters_.scans_refused;
+      counters_.last_reason = "scan is late or came twice";
+      return false;
+  }
+  timeline_.set_last_scan(utime);
+  return true;
 }
 
-/// While it stood, landmarks were where they seemed to be from there; from elsewhere they will seem
-/// to be somewhere else.
-void Ekf::leave_place() {
-  remove_ground_marks(state_);
-  for (std::size_t i = 0; i < state_.landmarks().size(); ++i) {
-    const MapLandmark& landmark = state_.landmarks()[i];
-    if (landmark.seen_at_m < distance_m_) continue;
-    state_.loosen_landmark(i, parameters_.observation.correlated_share * landmark.seen_variance_m2);
+/// Uses the odometry that ends by `utime`.
+void Ekf::advance(model::Utime utime) {
+  while (const auto increment = queue_.take_ended_by(utime)) use(*increment);
+}
+
+void Ekf::use(const model::Odometry& increment) {
+  // Its interval must continue the filter's time.
+  switch (timeline_.interval_of(increment)) {
+    case Interval::kPast:
+      ++counters_.odometry_refused;
+      counters_.last_reason = "odometry came after the scan at its end";
+      return;
+    case Interval::kOverlaps:  // The part after the scan is unknown.
+      ++counters_.odometry_refused;
+      counters_.last_reason = "odometry overlaps a scan";
+      bridge(increment.utime);
+      return;
+    case Interval::kAfterGap:
+      bridge(increment.from_utime);
+      break;
+    case Interval::kFollows:
+      break;
+  }
+
+  // Is the vehicle stationary?
+  const bool was_doubted = stationary_.is_doubted();
+  const bool is_stationary =
+      stationary_.is_stationary(increment, timeline_.now(), motion_.distance_m(), state_);
+  if (!was_doubted && stationary_.is_doubted()) ++counters_.crept;
+
+  // Predict, and measure what a stationary vehicle is known to do.
+  motion_.predict(increment, is_stationary, state_, scratch_.low_rank);
+  if (is_stationary) stationary_.hold(state_, scratch_);
+  timeline_.move_to(increment.utime);
+  state_.follow_with_anchor();
+
+  if (!is_sound(state_)) {
+    restart(timeline_.now(), "the state was not finite after a prediction");
   }
 }
 
-/// The vehicle is where it was parked, and its velocity is that of its sway.
-void Ekf::stand() {
-  const EkfMotionParameters& motion = parameters_.motion;
-  measure_stationary(state_, motion.stationary_sigma_mps, room_);
-  if (measure_ground_marks(state_, sway(motion), parked_gate_, joint_, room_)) return;
-  // A door was slammed, say.
-  remove_ground_marks(state_);
-  add_ground_marks(state_, sway(motion));
-}
-
-/// Nothing tells the motion until `utime`.
+/// Predicts to `utime` without odometry.
 void Ekf::bridge(model::Utime utime) {
   ++counters_.gaps;
-  remove_ground_marks(state_);  // It may have been driven on and parked again.
-  const double duration = seconds(utime - utime_);
+  remove_ground_marks(state_);  // The vehicle may have moved and stopped elsewhere.
+  const double duration = seconds(utime - timeline_.now());
   if (duration > parameters_.restart.max_gap_s) return restart(utime, "too long a gap");
-  distance_m_ += state_.velocity.norm() * duration;
-  ekf::predict(state_, transition_over_gap(state_, duration, parameters_.motion),
-               parameters_.motion, room_);
-  utime_ = utime;
+  motion_.bridge(duration, state_, scratch_.low_rank);
+  timeline_.move_to(utime);
 }
 
-/// The state's heading is that of the frame that sweeps and odometry are levelled to. A wrong roll
-/// turns it by as much times the pitch's tangent: up and down with every slope, not the vehicle.
-/// A scale that sightings have in common makes the whole map, with the vehicle in it, larger or
-/// smaller about its origin. No sighting tells that, so the state does without it.
-model::EkfPose Ekf::pose() {
-  model::EkfPose out;
-  out.utime = utime_;
-  out.sequence = pose_sequence_++;
-  const geometry::SE2 pose = state_.pose();
-  const double turned = pitch_tangent_ * state_.level.x();
-  out.ekf_map_T_vehicle =
-      geometry::SE2(pose.x(), pose.y(), geometry::wrap_angle(pose.theta() - turned));
-  out.covariance = pose_covariance(state_, pitch_tangent_);
-  const Eigen::Matrix<double, 5, 5> motion = state_.velocity_covariance();
-  out.velocity_mps = rotation_of(state_.heading).transpose() * state_.velocity;
-  out.velocity_covariance = motion.topLeftCorner<2, 2>();
-  out.bias = state_.bias;
-  out.bias_covariance = motion.bottomRightCorner<3, 3>();
-  out.landmarks_used = used_;
-  out.landmarks_refused = refused_;
-  out.reset_counter = reset_counter_;
-  last_sound_ = out;
-  const Eigen::Vector2d off =
-      out.ekf_map_T_vehicle.inverse().translation() * parameters_.observation.scale_sigma;
-  out.covariance.topLeftCorner<2, 2>() += off * off.transpose();
-  return out;
+ScanUpdate Ekf::read(const model::TrackedScan& scan) {
+  map_.begin_scan();
+  ScanUpdate update = read_scan(scan, motion_.level_covariance());
+  counters_.landmarks_unusable += scan.landmarks.size() - update.observations.size();
+  steady_heights(state_, map_.known(state_, update), update);
+  return update;
 }
 
-/// Of the latest pose.
-std::optional<model::EkfLevel> Ekf::level() const {
-  if (!level_covariance_) return std::nullopt;
-  return model::EkfLevel{utime_, last_sound_.sequence, state_.level,
-                         state_.covariance_block<2, 2>(kLevel, kLevel), *level_covariance_};
-}
-
-EkfOutput Ekf::outputs() {
-  EkfOutput out;
-  out.pose = pose();
-  out.level = level();
-  model::EkfMap& map = out.map.emplace();
-  map.utime = utime_;
-  map.sequence = map_sequence_++;
-  const auto& landmarks = state_.landmarks();
-  for (std::size_t i = 0; i < landmarks.size(); ++i) {
-    const MapLandmark& landmark = landmarks[i];
-    if (landmark.is_ground_mark()) continue;
-    const Eigen::Vector2d position = landmark.position + state_.anchor_m;
-    const Eigen::Vector2d off = position * parameters_.observation.scale_sigma;
-    map.landmarks.push_back({landmark.id, position,
-                             state_.landmark_covariance(i) + off * off.transpose(),
-                             landmark.radius_m, landmark.kind, landmark.observation_count});
+void Ekf::check_stationary(const ScanUpdate& update) {
+  if (!stationary_.is_creeping(state_, update.observations, map_.known(state_, update),
+                               gates_.landmark)) {
+    return;
   }
-  std::sort(map.landmarks.begin(), map.landmarks.end(),
-            [](const model::EkfLandmark& a, const model::EkfLandmark& b) {
-              return a.track_id < b.track_id;
-            });
-  model::VelocityCorrection& correction = out.correction.emplace();
-  correction.utime = utime_;
-  correction.sequence = out.pose->sequence;
-  correction.velocity_mps = out.pose->velocity_mps;
-  correction.bias = state_.bias;
-  correction.covariance = state_.velocity_covariance();
-  return out;
+  ++counters_.crept;
+  stationary_.doubt(timeline_.now(), motion_.distance_m(), state_);
+  motion_.loosen(kUnnoticed_s, state_, scratch_.low_rank);
+}
+
+/// Landmarks whose track continues: each through its own gate, then all through the gate of the set.
+void Ekf::update_known(const model::TrackedScan& scan, ScanUpdate& update) {
+  std::vector<Pairing> pairings;
+  std::vector<bool> is_taken(state_.landmarks().size(), false);
+  for (const Pairing& pairing : map_.known(state_, update)) {
+    update.is_settled[pairing.observation] = true;
+    const Observation& observation = update.observations[pairing.observation];
+    if (is_taken[pairing.landmark] ||
+        squared_distance(state_, pairing.landmark, observation) > gates_.landmark) {
+      ++update.refused;
+      ++state_.landmark(pairing.landmark).refused;
+      continue;
+    }
+    is_taken[pairing.landmark] = true;
+    pairings.push_back(pairing);
+  }
+
+  for (const Pairing& pairing : pairings) {
+    map_.weaken(pairing, motion_.distance_m(), state_, update);
+  }
+  update.refused +=
+      update_compatible(state_, update.observations, pairings, gates_.set, scratch_);
+  update.used += static_cast<std::uint32_t>(pairings.size());
+  for (const Pairing& pairing : pairings) map_.count_observed(scan, pairing, state_, update);
+}
+
+/// Unknown tracks may be landmarks whose track was lost. Each round makes the pose more certain, so
+/// that the next one finds more.
+void Ekf::rejoin_lost(const model::TrackedScan& scan, ScanUpdate& update) {
+  const RejoinRules rules{parameters_.gate, gates_, parameters_.map.min_separation_m};
+  for (int round = 0; round < kMaxRejoinRounds; ++round) {
+    auto proposal = find_rejoining(state_, scan, update, map_.scan_number(), rules);
+    if (!proposal) return;
+
+    std::vector<Pairing>& pairings = proposal->pairings;
+    update.refused +=
+        update_compatible(state_, proposal->observations, pairings, gates_.set, scratch_);
+    update.used += static_cast<std::uint32_t>(pairings.size());
+    for (const Pairing& pairing : pairings) map_.rejoin(scan, pairing, state_, update);
+    counters_.rejoined += pairings.size();
+    if (pairings.empty()) return;
+  }
+}
+
+void Ekf::maintain_map(const model::TrackedScan& scan, const ScanUpdate& update) {
+  if (!is_sound(state_)) {
+    restart(timeline_.now(), "the state was not finite after an update");
+    return;
+  }
+  map_.add_new(scan, motion_.distance_m(), update, state_, counters_);
+  map_.count_missed(scan.field_of_view, state_);
+  map_.remove_stale(scan.field_of_view, state_, counters_);
+  restart_if_lost(update);
+}
+
+std::string Ekf::save() const {
+  return state::save(kFormat, timeline_, queue_, motion_, stationary_, map_, report_,
+                     refused_scans_, state_);
+}
+
+void Ekf::load(const std::string& state) {
+  Ekf loaded(parameters_);
+  state::load(state, kFormat, loaded.timeline_, loaded.queue_, loaded.motion_, loaded.stationary_,
+              loaded.map_, loaded.report_, loaded.refused_scans_, loaded.state_);
+  loaded.counters_ = counters_;  // Of this process, not of the one that saved.
+  *this = std::move(loaded);
 }
 
 }  // namespace understory::ekf

@@ -33,14 +33,15 @@ Eigen::Vector2d FilterState::lever(const Eigen::Vector2d& x) const {
 }
 
 void FilterState::retract(const Eigen::Ref<const Eigen::VectorXd>& delta) {
-  const double turn = delta(kHeading);
+  const double rotation = delta(kHeading);
   const bool invariant = form_ == ErrorForm::kRightInvariant;
-  const Eigen::Matrix2d whole = invariant ? rotation_of(turn) : Eigen::Matrix2d::Identity();
-  const Eigen::Matrix2d part = invariant ? translation_map(turn) : Eigen::Matrix2d::Identity();
+  const Eigen::Matrix2d whole = invariant ? rotation_of(rotation) : Eigen::Matrix2d::Identity();
+  const Eigen::Matrix2d part = invariant ? translation_map(rotation) : Eigen::Matrix2d::Identity();
   const auto move = [&](Eigen::Vector2d& x, int at) {
     x = whole * x + part * delta.segment<2>(at);
   };
-  heading = geometry::wrap_angle(heading + turn);
+
+  heading = geometry::wrap_angle(heading + rotation);
   move(position, kPosition);
   move(velocity, kVelocity);
   bias += delta.segment<3>(kBias);
@@ -54,12 +55,14 @@ void FilterState::add_landmark(const MapLandmark& landmark, const Eigen::Vector2
   const Eigen::Matrix2d rotation = rotation_of(heading);
   const Eigen::Matrix2d by_level = height_m * rotation * level_displacement();
   const Eigen::Vector2d offset = rotation * in_vehicle - by_level * level;
+
   landmarks_.push_back(landmark);
   MapLandmark& added = landmarks_.back();
   added.position = position + offset;
   added.first_position = added.position;
-  // Its error is the position's, plus the heading's on the way (zero if right invariant), less the
-  // level's, plus noise.
+
+  // Its error is the position's, plus the heading's by the offset (zero if right invariant), less
+  // the level's, plus noise.
   const Eigen::Vector2d by_heading =
       geometry::perpendicular(offset) + lever(position) - lever(added.position);
   for (int i = 0; i < n; ++i) {
@@ -69,6 +72,7 @@ void FilterState::add_landmark(const MapLandmark& landmark, const Eigen::Vector2
           by_level(k, 0) * covariance(kLevel, i) - by_level(k, 1) * covariance(kLevel + 1, i);
     }
   }
+
   const Eigen::Matrix2d noise = rotation * variance * rotation.transpose();
   for (int c = 0; c < 2; ++c) {
     for (int r = c; r < 2; ++r) {
@@ -78,10 +82,6 @@ void FilterState::add_landmark(const MapLandmark& landmark, const Eigen::Vector2
                                   by_level(c, 1) * covariance_(n + r, kLevel + 1) + noise(r, c);
     }
   }
-}
-
-void FilterState::loosen_landmark(std::size_t i, double variance_m2) {
-  covariance().diagonal().segment<2>(row(i)).array() += variance_m2;
 }
 
 void FilterState::remove_landmark(std::size_t i) {
@@ -96,43 +96,9 @@ void FilterState::remove_landmark(std::size_t i) {
   landmarks_.erase(landmarks_.begin() + static_cast<std::ptrdiff_t>(i));
 }
 
-Eigen::Matrix3d FilterState::pose_covariance() const {
-  Eigen::Matrix3d to_right = Eigen::Matrix3d::Zero();
-  const Eigen::Matrix2d back = rotation_of(heading).transpose();
-  to_right.block<2, 1>(0, 0) = back * lever(position);
-  to_right.block<2, 2>(0, 1) = back;
-  to_right(2, 0) = 1.0;
-  return to_right * covariance_block<3, 3>(0, 0) * to_right.transpose();
-}
-
-void FilterState::set_pose_covariance(const Eigen::Matrix3d& covariance) {
-  Eigen::Matrix3d from_right = Eigen::Matrix3d::Zero();
-  from_right(0, 2) = 1.0;
-  from_right.block<2, 2>(1, 0) = rotation_of(heading);
-  from_right.block<2, 1>(1, 2) = -lever(position);
-  covariance_.leftCols(3).topRows(size()).setZero();
-  covariance_.topLeftCorner<3, 3>() = from_right * covariance * from_right.transpose();
-}
-
-Eigen::Matrix<double, 5, 5> FilterState::velocity_covariance() const {
-  Eigen::Matrix<double, 5, kVehicle> to_vehicle = Eigen::Matrix<double, 5, kVehicle>::Zero();
-  const Eigen::Matrix2d back = rotation_of(heading).transpose();
-  to_vehicle.block<2, 1>(0, kHeading) =
-      back * (lever(velocity) - geometry::perpendicular(velocity));
-  to_vehicle.block<2, 2>(0, kVelocity) = back;
-  to_vehicle.block<3, 3>(2, kBias).setIdentity();
-  return to_vehicle * covariance_block<kVehicle, kVehicle>(0, 0) * to_vehicle.transpose();
-}
-
-Eigen::Matrix2d FilterState::landmark_covariance(std::size_t i) const {
-  const Eigen::Vector2d arm = lever(landmarks_[i].position);
-  const Eigen::Vector2d shared = covariance_block<2, 1>(row(i), kHeading);
-  return covariance_block<2, 2>(row(i), row(i)) + arm * shared.transpose() +
-         shared * arm.transpose() + covariance_(0, 0) * arm * arm.transpose();
-}
-
 void FilterState::follow_with_anchor() {
   if (position.norm() < kAnchorReach_m) return;
+
   // With x = y + d, the error d_x - t S x becomes d_y - t S y by adding t S d.
   const Eigen::Vector2d shift = position;
   const Eigen::Vector2d arm = lever(shift);
@@ -140,11 +106,13 @@ void FilterState::follow_with_anchor() {
   Eigen::VectorXd moved = Eigen::VectorXd::Zero(n);
   moved.segment<2>(kPosition) = arm;
   for (std::size_t i = 0; i < landmarks_.size(); ++i) moved.segment<2>(row(i)) = arm;
+
   Eigen::VectorXd heading_column(n);
   copy_column(kHeading, heading_column);
   const double variance = heading_column(0);
   heading_column += 0.5 * variance * moved;
   covariance().selfadjointView<Eigen::Lower>().rankUpdate(moved, heading_column);
+
   position -= shift;
   first_position -= shift;
   anchor_m += shift;
@@ -152,15 +120,6 @@ void FilterState::follow_with_anchor() {
     landmark.position -= shift;
     landmark.first_position -= shift;
   }
-}
-
-bool FilterState::is_sound() const {
-  const int n = size();
-  bool sound = std::isfinite(heading) && position.allFinite() && velocity.allFinite() &&
-               bias.allFinite() && level.allFinite();
-  for (int i = 0; i < n; ++i) sound = sound && covariance_(i, i) >= 0.0;
-  for (int i = 0; i < n; ++i) sound = sound && std::isfinite(covariance_(n - 1, i));
-  return sound;
 }
 
 }  // namespace understory::ekf

@@ -1,8 +1,9 @@
-// Estimate and covariance of the filter: the vehicle and the landmarks near by.
+// Estimate and covariance of the filter: the vehicle and the landmarks near it.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <stdexcept>
 #include <vector>
 
 #include "common/geometry/se2.hpp"
@@ -13,78 +14,117 @@
 
 namespace understory::ekf {
 
-/// How an error of the state is measured. With S = turned_left, heading error t and an error d in
-/// the axes of the map of any point or velocity x:
-///  * right invariant (Barrau & Bonnabel 2017): d - t S x. A turn of the whole map is then an error
-///    of the heading alone, whatever the estimates are, so linearising at changing estimates
-///    invents no knowledge of the heading.
-///  * plain: d. As in every textbook; grows sure of a heading that nothing tells.
+/// How an error of the state is measured. With S = rotation by 90 degrees to the left, heading error
+/// t and an error d, in the axes of the map, of any point or velocity x:
+///  * right invariant (Barrau & Bonnabel 2017): d - t S x. A rotation of the whole map is then an
+///    error of the heading alone, whatever the estimates are, so linearisation at changing estimates
+///    creates no false information about the heading.
+///  * plain: d, as in textbooks. The heading becomes too certain: no measurement observes it.
 ///  * first estimate (Huang, Mourikis & Roumeliotis 2010): d, with Jacobians taken at the first
 ///    estimates.
 enum class ErrorForm : std::uint8_t { kRightInvariant, kFirstEstimate, kPlain };
 
-/// Order of the state: heading, position, velocity (both in the axes of the map), bias, error of
-/// the level (roll, pitch, in the axes of the vehicle), landmarks.
+// Order of the state: heading, position, velocity (both in the axes of the map), bias, error of the
+// level (roll, pitch, in the axes of the vehicle), landmarks.
+
+/// Row of the heading [rad].
 inline constexpr int kHeading = 0;
+/// First of two rows of the position [m].
 inline constexpr int kPosition = 1;
+/// First of two rows of the velocity [m/s].
 inline constexpr int kVelocity = 3;
+/// First of three rows of the inertial bias (gyro z [rad/s], accelerometer x, y [m/s^2]).
 inline constexpr int kBias = 5;
+/// First of two rows of the level's error (roll, pitch) [rad].
 inline constexpr int kLevel = 8;
+/// Rows of the vehicle; landmarks follow, two rows each.
 inline constexpr int kVehicle = 10;
 
+/// A matrix over the vehicle's rows.
 using VehicleMatrix = Eigen::Matrix<double, kVehicle, kVehicle>;
 
+/// A landmark of the state and its history. Its covariance is in FilterState.
 struct MapLandmark {
-  model::TrackId id =
-      0;  ///< Of the track that it began with; 0 = a mark on the ground (ground_marks.hpp).
+  /// Track with which it began; 0 = a mark on the ground (ground_marks.hpp).
+  model::TrackId id = 0;
   Eigen::Vector2d position = Eigen::Vector2d::Zero();        ///< From the anchor [m].
-  Eigen::Vector2d first_position = Eigen::Vector2d::Zero();  ///< When it was added.
-  double radius_m = 0.0;
+  Eigen::Vector2d first_position = Eigen::Vector2d::Zero();  ///< `position` when it was added [m].
+  double radius_m = 0.0;                                     ///< Mean radius; 0 = unknown.
   model::LandmarkKind kind = model::LandmarkKind::kTrunk;
   std::uint32_t observation_count = 0;
-  std::uint32_t missed = 0;       ///< Scans in a row that should have shown it.
-  std::uint32_t refused = 0;      ///< Scans in a row in which its gate refused it.
-  std::uint64_t last_scan = 0;    ///< Number of the scan that saw it last.
-  double views = 0.0;             ///< Sightings of it from about the same place, the last included.
-  double seen_at_m = 0.0;         ///< Way at the last of them.
-  double seen_variance_m2 = 0.0;  ///< Of the last of them, per axis.
-  double height_m = 0.0;          ///< Above the vehicle's origin; 0 = no level took part.
+  std::uint32_t missed = 0;    ///< Consecutive scans that should have observed it and did not.
+  std::uint32_t refused = 0;   ///< Consecutive scans in which its gate refused it.
+  std::uint64_t last_scan = 0;  ///< Number of the latest scan that observed it.
+  /// Effective number of observations with the same correlated error, the latest one included.
+  double views = 0.0;
+  double observed_at_m = 0.0;         ///< Distance driven at the latest observation.
+  double observed_variance_m2 = 0.0;  ///< Variance of the latest observation, per axis.
+  double height_m = 0.0;  ///< Above the vehicle's origin; 0 = the level took no part.
 
+  /// True for a mark on the ground, which is no landmark of the map.
   bool is_ground_mark() const { return id == 0; }
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.id, self.position, self.first_position, self.radius_m, self.kind,
+      self.observation_count, self.missed, self.refused, self.last_scan, self.views,
+      self.observed_at_m, self.observed_variance_m2, self.height_m);
+  }
 };
 
-/// Positions count from the anchor, a place in the map that follows the vehicle, so that the
-/// covariance of right invariant errors stays well conditioned far out.
+/// Writes or reads the lower triangle of the first `size` rows of a square matrix, column by
+/// column: half the bytes of the whole. The rest of the matrix is left as it is.
+template <class Archive, class Matrix>
+void archive_lower_triangle(Archive& a, Matrix& matrix, int size) {
+  for (int c = 0; c < size; ++c) {
+    for (int r = c; r < size; ++r) a(matrix(r, c));
+  }
+}
+
+/// Estimate and covariance. Positions count from the anchor, a point of the map that follows the
+/// vehicle, so that the covariance of right invariant errors stays well conditioned far from the
+/// origin. Memory is allocated once, for `max_landmarks`.
 class FilterState {
  public:
+  /// An estimate of zero with a covariance of zero and no landmarks.
   FilterState(ErrorForm form, int max_landmarks);
 
+  /// How its errors are measured.
   ErrorForm form() const { return form_; }
+  /// Rows in use.
   int size() const { return kVehicle + 2 * static_cast<int>(landmarks_.size()); }
+  /// Capacity.
   int max_landmarks() const { return max_landmarks_; }
+  /// First row of a landmark.
   static int row(std::size_t landmark) { return kVehicle + 2 * static_cast<int>(landmark); }
 
-  double heading = 0.0;
-  Eigen::Vector2d position = Eigen::Vector2d::Zero();
-  Eigen::Vector2d velocity = Eigen::Vector2d::Zero();
+  double heading = 0.0;                                ///< [rad]
+  Eigen::Vector2d position = Eigen::Vector2d::Zero();  ///< From the anchor [m].
+  Eigen::Vector2d velocity = Eigen::Vector2d::Zero();  ///< Axes of the map [m/s].
   model::InertialBias bias = model::InertialBias::Zero();
-  /// By how much the attitude that levels sweeps is off [rad] (LevelError).
+  /// Error (roll, pitch) of the attitude that levels sweeps [rad]; see model::LevelError.
   Eigen::Vector2d level = Eigen::Vector2d::Zero();
-  Eigen::Vector2d anchor_m = Eigen::Vector2d::Zero();  ///< In `ekf_map`.
-  /// Position and velocity as predicted, before any measurement: for first-estimate Jacobians.
+  Eigen::Vector2d anchor_m = Eigen::Vector2d::Zero();  ///< Frame `ekf_map`.
+  /// Position as predicted, before any measurement [m]: for first-estimate Jacobians.
   Eigen::Vector2d first_position = Eigen::Vector2d::Zero();
+  /// The same of the velocity [m/s].
   Eigen::Vector2d first_velocity = Eigen::Vector2d::Zero();
 
+  /// In the order of their rows; ground marks included.
   const std::vector<MapLandmark>& landmarks() const { return landmarks_; }
+  /// Landmark `i`, to change its history.
   MapLandmark& landmark(std::size_t i) { return landmarks_[i]; }
 
-  /// The place of the true heading error in the error of a point x: S x, or zero (see ErrorForm).
+  /// Factor of the true heading error in the error of a point x: S x, or zero (see ErrorForm).
   Eigen::Vector2d lever(const Eigen::Vector2d& x) const;
 
-  /// The lower triangle alone is kept.
+  /// The rows in use. Only the lower triangle has a meaning.
   auto covariance() { return covariance_.topLeftCorner(size(), size()); }
+  /// The same to read.
   auto covariance() const { return covariance_.topLeftCorner(size(), size()); }
+  /// Element (i, j) of the symmetric matrix.
   double covariance(int i, int j) const { return i >= j ? covariance_(i, j) : covariance_(j, i); }
+  /// Block at (i, j) of the symmetric matrix.
   template <int Rows, int Cols>
   Eigen::Matrix<double, Rows, Cols> covariance_block(int i, int j) const {
     Eigen::Matrix<double, Rows, Cols> block;
@@ -95,7 +135,7 @@ class FilterState {
   }
   /// The whole covariance, padded as the kernel needs it.
   Panel covariance_panel() { return {covariance_.data(), covariance_.outerStride()}; }
-  /// Column `j` of the whole covariance.
+  /// Column `j` of the symmetric matrix into `out` (size() rows).
   template <typename Column>
   void copy_column(int j, Column&& out) const {
     const int n = size();
@@ -106,32 +146,34 @@ class FilterState {
   /// Moves the estimate by an error `delta` of the form in use (size() numbers).
   void retract(const Eigen::Ref<const Eigen::VectorXd>& delta);
 
-  /// Adds a landmark seen at `in_vehicle` with noise `variance` (axes of the vehicle), `height_m`
-  /// above the vehicle's origin. Precondition: fewer than max_landmarks().
+  /// Adds a landmark observed at `in_vehicle` [m] with covariance `variance` [m^2] (axes of the
+  /// vehicle), `height_m` above the vehicle's origin. O(size). Precondition: fewer than
+  /// max_landmarks().
   void add_landmark(const MapLandmark& landmark, const Eigen::Vector2d& in_vehicle,
                     const Eigen::Matrix2d& variance, double height_m = 0.0);
-  /// Makes a landmark less certain, alone.
-  void loosen_landmark(std::size_t i, double variance_m2);
-  /// Takes a landmark out: the others keep what they know (marginalisation).
+  /// Removes a landmark; the rest keeps its estimate and covariance (marginalisation). O(size^2).
   void remove_landmark(std::size_t i);
+  /// Removes all landmarks.
   void clear_landmarks() { landmarks_.clear(); }
-
-  geometry::SE2 pose() const { return {position + anchor_m, heading}; }
-  /// Tangent order, right perturbation.
-  Eigen::Matrix3d pose_covariance() const;
-  /// Of (velocity, bias), velocity in the vehicle's axes.
-  Eigen::Matrix<double, 5, 5> velocity_covariance() const;
-  /// Axes of the map.
-  Eigen::Matrix2d landmark_covariance(std::size_t i) const;
-  /// Moves the anchor to the vehicle when that is far from it.
+  /// Moves the anchor to the vehicle when that is more than 150 m from it. Estimates in `ekf_map`
+  /// and their covariances stay the same.
   void follow_with_anchor();
-  /// All finite and no variance negative.
-  bool is_sound() const;
-  /// Sets the covariance of the pose (right perturbation) and forgets what it shares with the rest.
-  void set_pose_covariance(const Eigen::Matrix3d& covariance);
 
-  /// For saving and loading.
-  void resize_landmarks(const std::vector<MapLandmark>& landmarks) { landmarks_ = landmarks; }
+  /// Members of a saved state; see common/state. The capacity is configuration. Throws
+  /// std::invalid_argument where the state is of another error form or exceeds the capacity.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    ErrorForm form = self.form_;
+    a(form, self.heading, self.position, self.velocity, self.bias, self.level, self.anchor_m,
+      self.first_position, self.first_velocity, self.landmarks_);
+    if constexpr (Archive::kReads) {
+      if (form != self.form_) throw std::invalid_argument("state: of another error_form");
+      if (self.landmarks_.size() > static_cast<std::size_t>(self.max_landmarks_)) {
+        throw std::invalid_argument("state: more landmarks than map.max_landmarks");
+      }
+    }
+    archive_lower_triangle(a, self.covariance_, self.size());
+  }
 
  private:
   ErrorForm form_;
@@ -140,10 +182,11 @@ class FilterState {
   Eigen::MatrixXd covariance_;  ///< Of full capacity; the upper left corner is in use.
 };
 
-/// Turns by 90 degrees to the left.
+/// The matrix S that rotates by 90 degrees to the left.
 Eigen::Matrix2d quarter_turn();
-/// How a level off by (roll, pitch) displaces what is 1 m above the vehicle's origin.
+/// Displacement by a level error of (roll, pitch) at 1 m above the vehicle's origin [m/rad].
 Eigen::Matrix2d level_displacement();
+/// Rotation by `heading` [rad].
 Eigen::Matrix2d rotation_of(double heading);
 
 }  // namespace understory::ekf

@@ -1,0 +1,43 @@
+#include "services/ekf/compatible_update.hpp"
+
+#include <algorithm>
+
+namespace understory::ekf {
+namespace {
+
+/// Pairings removed at once, of their number: a scan at odds with the map ends soon.
+constexpr std::size_t kPartRemoved = 20;
+
+}  // namespace
+
+std::uint32_t update_compatible(FilterState& state, std::span<const Observation> observations,
+                                std::vector<Pairing>& pairings, std::span<const double> set_gates,
+                                UpdateScratch& scratch) {
+  if (pairings.empty()) return 0;
+  scratch.backup.take(state);
+  const auto is_better = [&](const Pairing& a, const Pairing& b) {
+    return squared_distance(state, a.landmark, observations[a.observation]) <
+           squared_distance(state, b.landmark, observations[b.observation]);
+  };
+
+  std::uint32_t removed = 0;
+  while (!pairings.empty()) {
+    const double distance = scratch.joint.apply(state, observations, pairings, scratch.low_rank);
+    if (distance >= 0.0 && distance <= set_gates[pairings.size()]) {
+      scratch.joint.finish(state, scratch.low_rank);
+      break;
+    }
+    scratch.backup.restore(state);
+
+    const std::size_t drop = 1 + pairings.size() / kPartRemoved;
+    for (std::size_t k = 0; k < drop && !pairings.empty(); ++k) {
+      const auto worst = std::max_element(pairings.begin(), pairings.end(), is_better);
+      ++state.landmark(worst->landmark).refused;
+      ++removed;
+      pairings.erase(worst);
+    }
+  }
+  return removed;
+}
+
+}  // namespace understory::ekf

@@ -1,0 +1,79 @@
+// The filter's outputs, and the last sound pose.
+#pragma once
+
+#include <optional>
+
+#include "common/model/ekf_output.hpp"
+#include "services/ekf/filter_state.hpp"
+#include "services/ekf/parameters.hpp"
+#include "services/ekf/scan_update.hpp"
+#include "services/ekf/vehicle_motion.hpp"
+
+namespace understory::ekf {
+
+/// What one message to the filter gives; each part has a channel of its own.
+struct EkfOutput {
+  std::optional<model::EkfPose> pose;
+  std::optional<model::EkfMap> map;
+  std::optional<model::VelocityCorrection> correction;
+  std::optional<model::EkfLevel> level;  ///< With each pose, where sweeps are levelled.
+};
+
+/// Where the filter starts again when its state is of no use.
+struct SoundPose {
+  geometry::SE2 ekf_map_T_vehicle;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Right perturbation.
+  model::InertialBias bias = model::InertialBias::Zero();
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.ekf_map_T_vehicle, self.covariance, self.bias);
+  }
+};
+
+/// Builds outputs from the state. Owner of their sequence numbers, of the number of restarts, and of
+/// the last pose that was given.
+///
+/// The state's heading is that of the frame to which sweeps and odometry are levelled. A wrong roll
+/// rotates that frame by its product with the tangent of the pitch, on each slope anew; the
+/// published heading is without that rotation. A scale error that all distances have in common
+/// (`scale_sigma`) makes the whole map larger or smaller about its origin. No observation measures
+/// it, so it is added to the published covariances and not to the state's.
+class EkfReport {
+ public:
+  explicit EkfReport(const EkfObservationParameters& parameters)
+      : scale_sigma_(parameters.scale_sigma) {}
+
+  /// The pose at `now`, with the level where odometry reports one. `update`: the scan that it
+  /// follows; an empty one after odometry alone.
+  EkfOutput pose(const FilterState& state, const VehicleMotion& motion, model::Utime now,
+                 const ScanUpdate& update);
+  /// Pose, map and velocity correction at `now`, with the level where odometry reports one.
+  EkfOutput all(const FilterState& state, const VehicleMotion& motion, model::Utime now,
+                const ScanUpdate& update);
+
+  /// The map begins: `state` is the first sound pose, sequence numbers of poses begin at 0.
+  void begin(const FilterState& state, const VehicleMotion& motion);
+  /// Counts a restart, which consumers see in EkfPose::reset_counter.
+  void count_restart() { ++reset_counter_; }
+  /// The last pose that was given.
+  const SoundPose& last_sound() const { return last_sound_; }
+
+  /// Members of a saved state; see common/state. The rest is configuration.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.pose_sequence_, self.map_sequence_, self.reset_counter_, self.last_sound_);
+  }
+
+ private:
+  model::EkfMap map(const FilterState& state, model::Utime now);
+
+  double scale_sigma_;
+  std::uint64_t pose_sequence_ = 0;
+  std::uint64_t map_sequence_ = 0;
+  std::uint64_t reset_counter_ = 0;
+  SoundPose last_sound_;
+};
+
+}  // namespace understory::ekf

@@ -1,0 +1,50 @@
+// Odometry that waits for the scan at its end.
+#pragma once
+
+#include <deque>
+#include <optional>
+
+#include "common/model/archive.hpp"
+#include "common/model/odometry.hpp"
+#include "services/ekf/timeline.hpp"
+
+namespace understory::ekf {
+
+/// True if the interval is positive, all numbers are finite and no variance is negative.
+bool is_usable(const model::Odometry& increment);
+
+/// Increments in order of time. A scan arrives later than the odometry after it, so odometry is used
+/// when its scan is there, or when it has waited for `max_delay_s`.
+class OdometryQueue {
+ public:
+  /// `max_delay_s`: longest wait for a scan. `clock_jump_s`: a stamp that is earlier by more is a
+  /// clock that jumped back.
+  OdometryQueue(double max_delay_s, double clock_jump_s);
+
+  /// How `increment` follows the increments received before it; `now`: the filter's time.
+  StampOrder order_of(const model::Odometry& increment, model::Utime now) const;
+  /// Adds the latest increment. Precondition: order_of() it is kInOrder, or the queue is empty.
+  void push(const model::Odometry& increment);
+  /// Takes out the oldest increment if it ends by `utime` (tolerance 1 ms).
+  std::optional<model::Odometry> take_ended_by(model::Utime utime);
+  /// Forgets all increments.
+  void clear() { increments_.clear(); }
+
+  /// Stamp up to which increments have waited for too long; none where the oldest may still wait.
+  std::optional<model::Utime> overdue() const;
+  /// The oldest increment that waits; null where none does.
+  const model::Odometry* next() const { return increments_.empty() ? nullptr : &increments_.front(); }
+
+  /// Members of a saved state; see common/state. The rest is configuration.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.increments_);
+  }
+
+ private:
+  model::Utime max_delay_us_;
+  model::Utime clock_jump_us_;
+  std::deque<model::Odometry> increments_;
+};
+
+}  // namespace understory::ekf
