@@ -41,8 +41,7 @@ void ActiveMap::weaken(const Pairing& pairing, double distance_m, FilterState& s
     return;
   }
   landmark.views = 1.0 + landmark.views * std::exp(-moved / observation_.correlation_m);
-  observation.covariance_m2 *=
-      1.0 + 2.0 * observation_.correlated_share * (landmark.views - 1.0);
+  observation.covariance_m2 *= 1.0 + 2.0 * observation_.correlated_share * (landmark.views - 1.0);
 }
 
 void ActiveMap::count_observed(const model::TrackedScan& scan, const Pairing& pairing,

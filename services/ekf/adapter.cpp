@@ -18,7 +18,7 @@ class EkfAdapter : public bus::Adapter {
   void bind(bus::Node& node) override {
     node_ = &node;
     stage_.emplace(parameters_);
-    // Each piece that is shed is a gap in the motion: a long queue.
+    // An increment that the queue drops is a gap in the motion: the queue is long.
     node.subscribe<model::Odometry>(
         channels_.odometry,
         [this](const model::Odometry& increment) { publish(stage_->add(increment)); },

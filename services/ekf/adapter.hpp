@@ -1,4 +1,4 @@
-// The filter's place on the bus.
+// The filter on the bus.
 #pragma once
 
 #include <string>
@@ -7,6 +7,7 @@
 
 namespace understory::ekf {
 
+/// Names of the channels; README.md lists their messages.
 struct EkfChannels {
   std::string odometry = "ODOMETRY";
   std::string tracked_landmarks = "TRACKED_LANDMARKS";
@@ -16,6 +17,8 @@ struct EkfChannels {
   std::string velocity_correction = "VELOCITY_CORRECTION";
 };
 
+/// The filter as a service: decodes, calls Ekf, publishes. Its state is saved and loaded by the
+/// runtime.
 bus::Service ekf_service(const EkfChannels& channels = {});
 
 }  // namespace understory::ekf

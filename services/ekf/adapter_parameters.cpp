@@ -5,14 +5,16 @@ namespace {
 
 void describe(EkfPriorParameters& p, bus::ParameterTable& table) {
   table.add("prior.velocity_sigma_mps", p.velocity_sigma_mps, {0.001, 100.0}, "m/s",
-            "Of the velocity at the start, per axis.");
+            "Standard deviation of the velocity before the first measurement, per axis.");
   table.add("prior.gyro_bias_sigma", p.gyro_bias_sigma, {1e-7, 1.0}, "rad/s",
-            "Of the gyro's bias at the start.");
-  table.add("prior.accelerometer_bias_sigma", p.accelerometer_bias_sigma, {1e-6, 10.0}, "m/s^2",
-            "Of the accelerometer's bias at the start, the level's error included.");
+            "Standard deviation of the gyro's bias before the first measurement.");
+  table.add(
+      "prior.accelerometer_bias_sigma", p.accelerometer_bias_sigma, {1e-6, 10.0}, "m/s^2",
+      "Standard deviation of the accelerometer's bias before the first measurement, the level's "
+      "error included.");
   table.add("prior.wait_s", p.wait_s, {0.0, 60.0}, "s",
-            "With an IMU the map begins where the vehicle is found to stand, or to move by its "
-            "wheels, but after so long at the latest.");
+            "With an IMU the map begins where the vehicle is found to be stationary, or to move by "
+            "its wheels, but after this time at the latest.");
 }
 
 void describe(EkfMotionParameters& p, bus::ParameterTable& table) {
@@ -21,40 +23,44 @@ void describe(EkfMotionParameters& p, bus::ParameterTable& table) {
   table.add("motion.accelerometer_walk", p.accelerometer_walk, {0.0, 1.0}, "m/s^2/sqrt(s)",
             "Random walk of the accelerometer's bias.");
   table.add("motion.stationary_sigma_mps", p.stationary_sigma_mps, {1e-5, 1.0}, "m/s",
-            "Of the velocity while the vehicle is found to stand.");
+            "Standard deviation of the velocity of a stationary vehicle.");
   table.add("motion.stationary_sigma_m", p.stationary_sigma_m, {1e-6, 1.0}, "m",
-            "Of the body's sway about the place where it is parked, per axis.");
+            "Standard deviation of the body's sway about the place where it is parked, per axis.");
   table.add("motion.stationary_sigma_rad", p.stationary_sigma_rad, {1e-7, 0.1}, "rad",
-            "Of the body's turning about its heading where it is parked.");
-  table.add("motion.sideways_sigma_mps", p.sideways_sigma_mps, {0.0, 100.0}, "m/s",
-            "Of the velocity across the vehicle, per piece; 0 = it may slide freely.");
+            "Standard deviation of the body's sway about its heading where it is parked.");
+  table.add(
+      "motion.sideways_sigma_mps", p.sideways_sigma_mps, {0.0, 100.0}, "m/s",
+      "Standard deviation of the velocity across the vehicle, per odometry increment; 0 = it may "
+      "slide freely.");
   table.add("motion.gap_acceleration", p.gap_acceleration, {0.01, 100.0}, "m/s^2/sqrt(Hz)",
-            "White acceleration where no odometry tells the motion.");
+            "White acceleration in intervals without odometry.");
   table.add("motion.gap_yaw_rate", p.gap_yaw_rate, {0.001, 10.0}, "rad/s",
-            "Yaw rate where no odometry tells the motion.");
+            "Yaw rate in intervals without odometry.");
   table.add("motion.wheel_acceleration", p.wheel_acceleration, {0.01, 100.0}, "m/s^2",
-            "Speed may change so much within a piece of wheel odometry.");
+            "Change of speed within an increment of wheel odometry.");
 }
 
 void describe(EkfMapParameters& p, bus::ParameterTable& table) {
-  table.add("map.max_landmarks", p.max_landmarks, {1, 1000}, "", "Of the active state.");
+  table.add("map.max_landmarks", p.max_landmarks, {1, 1000}, "", "Capacity of the active state.");
   table.add("map.min_separation_m", p.min_separation_m, {0.0, 10.0}, "m",
             "A new landmark nearer to an old one is refused.");
   table.add("map.keep_range_factor", p.keep_range_factor, {1.0, 10.0}, "of the range",
-            "Landmarks farther than this leave the active state.");
+            "Landmarks farther than this times the sensor's range leave the active state.");
   table.add("map.max_missed", p.max_missed, {1, 1000000}, "scans",
-            "In a row, that should have shown a landmark and did not: it leaves.");
+            "Consecutive scans that should have observed a landmark and did not, after which it "
+            "leaves.");
   table.add("map.max_refused", p.max_refused, {1, 1000000}, "scans",
-            "In a row, in which its gate refused a landmark: it leaves.");
+            "Consecutive scans in which its gate refused a landmark, after which it leaves.");
 }
 
 void describe(EkfObservationParameters& p, bus::ParameterTable& table) {
-  table.add("observation.correlated_share", p.correlated_share, {0.0, 0.9}, "",
-            "Of a sighting's variance, the same from scan to scan; 0 = all noise is new.");
+  table.add(
+      "observation.correlated_share", p.correlated_share, {0.0, 0.9}, "",
+      "Share of an observation's variance that is correlated from scan to scan; 0 = white noise.");
   table.add("observation.correlation_m", p.correlation_m, {0.01, 1000.0}, "m",
-            "Such errors fade over so much way.");
+            "Distance driven over which that correlation falls to 1/e.");
   table.add("observation.scale_sigma", p.scale_sigma, {0.0, 0.1}, "",
-            "Of distances, the same for all landmarks and for ever.");
+            "Standard deviation of a constant scale error of all distances.");
 }
 
 void describe(EkfGateParameters& p, bus::ParameterTable& table) {
@@ -65,33 +71,34 @@ void describe(EkfGateParameters& p, bus::ParameterTable& table) {
   table.add("gate.rejoin_probability", p.rejoin_probability, {0.5, 0.999999}, "",
             "Joint compatibility of new tracks with landmarks whose track was lost.");
   table.add("gate.rejoin_after_scans", p.rejoin_after_scans, {1, 10000}, "scans",
-            "Only landmarks not seen for so long take a new track.");
+            "Scans without an observation after which a landmark may take a new track.");
   table.add("gate.rejoin_max_gate_m", p.rejoin_max_gate_m, {0.1, 100.0}, "m",
-            "Nor such whose place is less certain than this.");
+            "A lost landmark whose gate is wider takes no new track.");
   table.add("gate.rejoin_max_nodes", p.rejoin_max_nodes, {1, 1000000}, "",
-            "Of the search for the largest compatible set.");
+            "Nodes of the search for the largest compatible set.");
 }
 
 void describe(EkfRestartParameters& p, bus::ParameterTable& table) {
-  table.add("restart.after_refused_scans", p.after_refused_scans, {1, 100000}, "scans",
-            "In a row, of which most landmarks were refused.");
+  table.add(
+      "restart.after_refused_scans", p.after_refused_scans, {1, 100000}, "scans",
+      "Consecutive scans of which most landmarks were refused, after which the filter restarts.");
   table.add("restart.sigma_m", p.sigma_m, {0.0, 1000.0}, "m",
-            "Added to the position's uncertainty at a restart.");
+            "Added to the standard deviation of the position at a restart.");
   table.add("restart.sigma_rad", p.sigma_rad, {0.0, 3.2}, "rad",
-            "Added to the heading's uncertainty at a restart.");
+            "Added to the standard deviation of the heading at a restart.");
   table.add("restart.max_gap_s", p.max_gap_s, {0.1, 1000.0}, "s",
-            "Without odometry and scans, after which the way is lost.");
+            "Longest interval without odometry and scans; after a longer one the filter restarts.");
   table.add("restart.clock_jump_s", p.clock_jump_s, {0.1, 1e6}, "s",
-            "A stamp so far back starts the clock anew.");
+            "A stamp that is earlier than the latest one by more starts the clock anew.");
 }
 
 }  // namespace
 
 void describe(EkfParameters& parameters, bus::ParameterTable& table) {
   table.add("error_form", parameters.error_form, {"right_invariant", "first_estimate", "plain"},
-            "How errors are measured; plain grows sure of a heading that nothing tells.");
+            "How errors are measured; plain becomes too certain of the heading.");
   table.add("max_scan_delay_s", parameters.max_scan_delay_s, {0.0, 10.0}, "s",
-            "Odometry waits so long at most for the scan that belongs before it.");
+            "Longest time that odometry waits for the scan at its end.");
   describe(parameters.prior, table);
   describe(parameters.motion, table);
   describe(parameters.map, table);

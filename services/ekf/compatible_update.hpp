@@ -14,7 +14,8 @@ namespace understory::ekf {
 class CovarianceBackup {
  public:
   /// For states of up to `max_size` rows.
-  explicit CovarianceBackup(int max_size) : covariance_(Eigen::MatrixXd::Zero(max_size, max_size)) {}
+  explicit CovarianceBackup(int max_size)
+      : covariance_(Eigen::MatrixXd::Zero(max_size, max_size)) {}
 
   /// Copies the covariance. O(size^2).
   void take(const FilterState& state) {
@@ -42,9 +43,10 @@ struct UpdateScratch {
   CovarianceBackup backup;
 };
 
-/// Updates the state by as many `pairings` as pass the gate of their number together: the worst ones
-/// are removed from `pairings` and counted at their landmark until the rest passes. `set_gates`:
-/// limit of the squared Mahalanobis distance by number of pairings. Gives how many were removed.
+/// Updates the state by as many `pairings` as pass the gate of their number together: the worst
+/// ones are removed from `pairings` and counted at their landmark until the rest passes.
+/// `set_gates`: limit of the squared Mahalanobis distance by number of pairings. Gives how many
+/// were removed.
 std::uint32_t update_compatible(FilterState& state, std::span<const Observation> observations,
                                 std::vector<Pairing>& pairings, std::span<const double> set_gates,
                                 UpdateScratch& scratch);

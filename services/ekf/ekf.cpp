@@ -255,7 +255,8 @@ void Ekf::check_stationary(const ScanUpdate& update) {
   motion_.loosen(kUnnoticed_s, state_, scratch_.low_rank);
 }
 
-/// Landmarks whose track continues: each through its own gate, then all through the gate of the set.
+/// Landmarks whose track continues: each through its own gate, then all through the gate of the
+/// set.
 void Ekf::update_known(const model::TrackedScan& scan, ScanUpdate& update) {
   std::vector<Pairing> pairings;
   std::vector<bool> is_taken(state_.landmarks().size(), false);
@@ -275,8 +276,7 @@ void Ekf::update_known(const model::TrackedScan& scan, ScanUpdate& update) {
   for (const Pairing& pairing : pairings) {
     map_.weaken(pairing, motion_.distance_m(), state_, update);
   }
-  update.refused +=
-      update_compatible(state_, update.observations, pairings, gates_.set, scratch_);
+  update.refused += update_compatible(state_, update.observations, pairings, gates_.set, scratch_);
   update.used += static_cast<std::uint32_t>(pairings.size());
   for (const Pairing& pairing : pairings) map_.count_observed(scan, pairing, state_, update);
 }

@@ -1,4 +1,5 @@
-// EKF-SLAM in the plane on odometry and tracked landmarks (vehicle stack, section 3.2.3 "EKF Node").
+// EKF-SLAM in the plane on odometry and tracked landmarks (vehicle stack, section 3.2.3 "EKF
+// Node").
 #pragma once
 
 #include <string>

@@ -51,8 +51,7 @@ EkfOutput EkfReport::pose(const FilterState& state, const VehicleMotion& motion,
   pose.reset_counter = reset_counter_;
   last_sound_ = sound_pose(pose);
 
-  const Eigen::Vector2d scaled =
-      pose.ekf_map_T_vehicle.inverse().translation() * scale_sigma_;
+  const Eigen::Vector2d scaled = pose.ekf_map_T_vehicle.inverse().translation() * scale_sigma_;
   pose.covariance.topLeftCorner<2, 2>() += scaled * scaled.transpose();
 
   if (const auto& level_covariance = motion.level_covariance()) {

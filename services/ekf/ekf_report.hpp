@@ -32,8 +32,8 @@ struct SoundPose {
   }
 };
 
-/// Builds outputs from the state. Owner of their sequence numbers, of the number of restarts, and of
-/// the last pose that was given.
+/// Builds outputs from the state. Owner of their sequence numbers, of the number of restarts, and
+/// of the last pose that was given.
 ///
 /// The state's heading is that of the frame to which sweeps and odometry are levelled. A wrong roll
 /// rotates that frame by its product with the tangent of the pitch, on each slope anew; the

@@ -14,11 +14,11 @@
 
 namespace understory::ekf {
 
-/// How an error of the state is measured. With S = rotation by 90 degrees to the left, heading error
-/// t and an error d, in the axes of the map, of any point or velocity x:
+/// How an error of the state is measured. With S = rotation by 90 degrees to the left, heading
+/// error t and an error d, in the axes of the map, of any point or velocity x:
 ///  * right invariant (Barrau & Bonnabel 2017): d - t S x. A rotation of the whole map is then an
-///    error of the heading alone, whatever the estimates are, so linearisation at changing estimates
-///    creates no false information about the heading.
+///    error of the heading alone, whatever the estimates are, so linearisation at changing
+///    estimates creates no false information about the heading.
 ///  * plain: d, as in textbooks. The heading becomes too certain: no measurement observes it.
 ///  * first estimate (Huang, Mourikis & Roumeliotis 2010): d, with Jacobians taken at the first
 ///    estimates.
@@ -52,23 +52,23 @@ struct MapLandmark {
   double radius_m = 0.0;                                     ///< Mean radius; 0 = unknown.
   model::LandmarkKind kind = model::LandmarkKind::kTrunk;
   std::uint32_t observation_count = 0;
-  std::uint32_t missed = 0;    ///< Consecutive scans that should have observed it and did not.
-  std::uint32_t refused = 0;   ///< Consecutive scans in which its gate refused it.
+  std::uint32_t missed = 0;     ///< Consecutive scans that should have observed it and did not.
+  std::uint32_t refused = 0;    ///< Consecutive scans in which its gate refused it.
   std::uint64_t last_scan = 0;  ///< Number of the latest scan that observed it.
   /// Effective number of observations with the same correlated error, the latest one included.
   double views = 0.0;
   double observed_at_m = 0.0;         ///< Distance driven at the latest observation.
   double observed_variance_m2 = 0.0;  ///< Variance of the latest observation, per axis.
-  double height_m = 0.0;  ///< Above the vehicle's origin; 0 = the level took no part.
+  double height_m = 0.0;              ///< Above the vehicle's origin; 0 = the level took no part.
 
   /// True for a mark on the ground, which is no landmark of the map.
   bool is_ground_mark() const { return id == 0; }
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.id, self.position, self.first_position, self.radius_m, self.kind,
-      self.observation_count, self.missed, self.refused, self.last_scan, self.views,
-      self.observed_at_m, self.observed_variance_m2, self.height_m);
+    a(self.id, self.position, self.first_position, self.radius_m, self.kind, self.observation_count,
+      self.missed, self.refused, self.last_scan, self.views, self.observed_at_m,
+      self.observed_variance_m2, self.height_m);
   }
 };
 

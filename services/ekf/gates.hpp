@@ -30,8 +30,8 @@ struct Gates {
   StationaryGates stationary;
 };
 
-/// Limits for sets of 0 .. `max_landmarks` landmarks, two degrees of freedom each; that of the empty
-/// set is 0.
+/// Limits for sets of 0 .. `max_landmarks` landmarks, two degrees of freedom each; that of the
+/// empty set is 0.
 std::vector<double> set_gates(double probability, int max_landmarks);
 
 }  // namespace understory::ekf

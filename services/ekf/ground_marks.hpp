@@ -1,4 +1,4 @@
-// While the vehicle stands, the ground under it is a landmark.
+// While the vehicle is stationary, the ground under it is a landmark.
 #pragma once
 
 #include <span>
@@ -9,29 +9,31 @@
 
 namespace understory::ekf {
 
-/// Marks in the state while the vehicle stands: one ahead of it, one behind.
+/// Marks in the state while the vehicle is stationary: one ahead of it, one behind.
 inline constexpr int kGroundMarks = 2;
 
-/// How far the body sways about the place where it is parked: the same at every moment, however
-/// long it stands, unlike motion noise, which would add up.
+/// Standard deviation of the body's sway (engine, wind) about the place where it is parked. It does
+/// not grow with time, unlike motion noise.
 struct Sway {
   double sigma_m = 0.0;    ///< Per axis.
-  double sigma_rad = 0.0;  ///< > 0.
+  double sigma_rad = 0.0;  ///< Of the heading; > 0.
 };
 
+/// True while the state has marks. O(landmarks).
 bool has_ground_marks(const FilterState& state);
 /// Sets marks where the vehicle is. Precondition: none are set and there is room for them.
 void add_ground_marks(FilterState& state, const Sway& sway);
+/// Removes the marks, if there are any.
 void remove_ground_marks(FilterState& state);
-/// The vehicle is still where the marks were set, but for its sway. Nothing changes, and false is
-/// returned, where the squared Mahalanobis distance (4 degrees of freedom) is above `gate`: then it
-/// has moved after all.
+/// Measures that the vehicle is where the marks were set, with the noise of its sway. Returns
+/// false, and changes nothing, where the squared Mahalanobis distance (4 degrees of freedom) is
+/// above `gate`: the vehicle has moved. Precondition: the marks are set.
 bool measure_ground_marks(FilterState& state, const Sway& sway, double gate, JointUpdate& joint,
-                          LowRank& room);
+                          LowRank& low_rank);
 
-/// Whether all sightings together are displaced: squared Mahalanobis distance (3 degrees of
-/// freedom) of the one motion of the vehicle that fits their innovations best. Finds creeping long
-/// before any single landmark does. At most kMaxRows / 2 pairings, of two landmarks at least.
+/// Squared Mahalanobis distance (3 degrees of freedom) of the one motion of the vehicle that fits
+/// the innovations of all pairings best. Finds creeping long before any single landmark does.
+/// Precondition: 2 to kMaxRows / 2 pairings, of two landmarks at least.
 double common_motion(const FilterState& state, std::span<const Observation> observations,
                      std::span<const Pairing> pairings);
 

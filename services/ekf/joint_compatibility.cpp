@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <limits>
 
-#include "services/ekf/chi_squared.hpp"
-
 namespace understory::ekf {
 namespace {
 
@@ -18,13 +16,11 @@ class Search {
       : state_(state),
         observations_(observations),
         candidates_(candidates),
+        limits_(gates.limits),
         nodes_(gates.max_nodes) {
     const auto rows = static_cast<Eigen::Index>(2 * candidates.size());
     factor_ = Eigen::MatrixXd::Zero(rows, rows);
     whitened_ = Eigen::VectorXd::Zero(rows);
-    for (int k = 1; k <= static_cast<int>(candidates.size()); ++k) {
-      limits_.push_back(chi_squared_quantile(gates.probability, 2 * k));
-    }
   }
 
   std::vector<Pairing> run() {
@@ -41,18 +37,23 @@ class Search {
       }
       return;
     }
+
+    // Bounds.
     if (nodes_-- <= 0) return visit(candidates_.size(), distance);
     if (!may_improve(chosen_.size() + (candidates_.size() - level), distance)) return;
+
+    // With each landmark that is still free.
     for (const std::uint32_t landmark : candidates_[level].landmarks) {
-      if (taken(landmark)) continue;
+      if (is_taken(landmark)) continue;
       const Pairing pairing{candidates_[level].observation, landmark};
       const double more = extend(pairing);
-      if (more < 0.0 || distance + more > limits_[chosen_.size()]) continue;
+      if (more < 0.0 || distance + more > limits_[chosen_.size() + 1]) continue;
       chosen_.push_back(pairing);
       visit(level + 1, distance + more);
       chosen_.pop_back();
     }
-    // Without this sighting, if that can still be better than the best.
+
+    // Without this observation, if that can still be better than the best.
     if (may_improve(chosen_.size() + (candidates_.size() - level - 1), distance)) {
       visit(level + 1, distance);
     }
@@ -62,22 +63,23 @@ class Search {
     return size > best_.size() || (size == best_.size() && distance < best_distance_);
   }
 
-  bool taken(std::uint32_t landmark) const {
+  bool is_taken(std::uint32_t landmark) const {
     return std::any_of(chosen_.begin(), chosen_.end(),
                        [&](const Pairing& p) { return p.landmark == landmark; });
   }
 
-  /// Adds two rows to the factor; gives what they add to the squared distance, negative if the
+  /// Adds two rows to the factor; returns what they add to the squared distance, negative if the
   /// covariance is not positive definite.
   double extend(const Pairing& pairing) {
     const auto at = static_cast<Eigen::Index>(2 * chosen_.size());
-    const Observation& seen = observations_[pairing.observation];
+    const Observation& observation = observations_[pairing.observation];
     const Eigen::Matrix2d rotation = rotation_of(state_.heading);
     for (std::size_t k = 0; k < chosen_.size(); ++k) {
       factor_.block<2, 2>(at, static_cast<Eigen::Index>(2 * k)) =
-          innovation_covariance(state_, pairing.landmark, chosen_[k].landmark, seen.height_m,
+          innovation_covariance(state_, pairing.landmark, chosen_[k].landmark, observation.height_m,
                                 observations_[chosen_[k].observation].height_m);
     }
+
     auto row = factor_.block(at, 0, 2, at);
     if (at > 0) {
       factor_.topLeftCorner(at, at)
@@ -85,15 +87,17 @@ class Search {
           .transpose()
           .solveInPlace<Eigen::OnTheRight>(row);
     }
+
     const Eigen::Matrix2d own = innovation_covariance(state_, pairing.landmark, pairing.landmark,
-                                                      seen.height_m, seen.height_m) +
-                                rotation * seen.covariance_m2 * rotation.transpose() -
+                                                      observation.height_m, observation.height_m) +
+                                rotation * observation.covariance_m2 * rotation.transpose() -
                                 row * row.transpose();
     const Eigen::LLT<Eigen::Matrix2d> llt(own);
     if (llt.info() != Eigen::Success) return -1.0;
     factor_.block<2, 2>(at, at) = llt.matrixL();
+
     const Eigen::Vector2d error =
-        innovation(state_, pairing.landmark, seen) - row * whitened_.head(at);
+        innovation(state_, pairing.landmark, observation) - row * whitened_.head(at);
     whitened_.segment<2>(at) = llt.matrixL().solve(error);
     return whitened_.segment<2>(at).squaredNorm();
   }
@@ -101,8 +105,8 @@ class Search {
   const FilterState& state_;
   std::span<const Observation> observations_;
   std::span<const Candidates> candidates_;
+  std::span<const double> limits_;
   int nodes_;
-  std::vector<double> limits_;
   Eigen::MatrixXd factor_;
   Eigen::VectorXd whitened_;
   std::vector<Pairing> chosen_;

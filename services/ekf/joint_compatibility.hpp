@@ -1,7 +1,8 @@
-// Which landmarks of the map the sightings of unknown tracks may be: joint compatibility branch and
-// bound (Neira & Tardos 2001).
+// Which landmarks of the map the observations of unknown tracks may be: joint compatibility branch
+// and bound (Neira & Tardos 2001).
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -9,19 +10,24 @@
 
 namespace understory::ekf {
 
+/// Limits of a search for joint compatibility.
 struct CompatibilityGates {
-  double probability = 0.99;
-  int max_nodes = 2000;  ///< Of the search; then the best set found so far is taken.
+  /// Largest squared Mahalanobis distance by number of pairings (set_gates()), for as many as there
+  /// are observations.
+  std::span<const double> limits;
+  /// Nodes visited at most; after these the best set found so far is taken.
+  int max_nodes = 2000;
 };
 
-/// A sighting and the landmarks that it may be by itself, the most likely first.
+/// An observation and the landmarks that it may be by itself, the most likely first.
 struct Candidates {
   std::uint32_t observation = 0;
   std::vector<std::uint32_t> landmarks;
 };
 
-/// The largest set of pairings, one to one, whose innovations are compatible together; among equals
-/// the one with the least squared distance.
+/// The largest set of pairings, one to one, whose innovations are compatible together; among sets
+/// of one size the one with the smallest squared distance. Exponential in the number of candidates
+/// in the worst case, therefore bounded by `max_nodes`.
 std::vector<Pairing> joint_compatibility(const FilterState& state,
                                          std::span<const Observation> observations,
                                          std::span<const Candidates> candidates,

@@ -10,51 +10,58 @@
 
 namespace understory::ekf {
 
-/// An observation, seen from the vehicle.
+/// A landmark as observed from the vehicle (frame `vehicle_level`, in the plane).
 struct Observation {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
-  /// Above the vehicle's origin, as the level displaces it; 0 = no level took part.
+  /// Above the vehicle's origin, as the level displaces it; 0 = the level took no part.
   double height_m = 0.0;
 };
 
-/// The innovation of a sighting of landmark i, in the axes of the map, depends on the errors of the
-/// landmark and of the position as +1 and -1, and on the heading's as this (zero if right
-/// invariant).
+/// Jacobian of the innovation (axes of the map) of `landmark` with respect to the heading's error;
+/// zero for right invariant errors. With respect to the errors of the landmark and of the position
+/// it is +1 and -1.
 Eigen::Vector2d heading_row(const FilterState& state, std::size_t landmark);
-/// On the level's error as this.
+/// The same with respect to the level's error, of an observation at `height_m`.
 Eigen::Matrix2d level_rows(const FilterState& state, double height_m);
-/// Innovation of a sighting: where it lies less where the landmark is expected [m], axes of the
-/// map.
-Eigen::Vector2d innovation(const FilterState& state, std::size_t landmark, const Observation& seen);
-/// Covariance of the innovations of landmarks a and b that the state's uncertainty makes; seen at
-/// these heights.
+/// Observed less expected position of `landmark` [m], axes of the map.
+Eigen::Vector2d innovation(const FilterState& state, std::size_t landmark,
+                           const Observation& observation);
+/// Covariance between the innovations of landmarks a and b, observed at these heights, by the
+/// state's uncertainty alone [m^2]; the observations' noise is not in it.
 Eigen::Matrix2d innovation_covariance(const FilterState& state, std::size_t a, std::size_t b,
                                       double height_a_m = 0.0, double height_b_m = 0.0);
-/// Squared Mahalanobis distance of one sighting.
-double squared_distance(const FilterState& state, std::size_t landmark, const Observation& seen);
+/// Squared Mahalanobis distance of one innovation, the observation's noise included.
+double squared_distance(const FilterState& state, std::size_t landmark,
+                        const Observation& observation);
 
+/// An observation of a landmark, both by index.
 struct Pairing {
   std::uint32_t observation = 0;
   std::uint32_t landmark = 0;
 };
 
-/// The joint Kalman update of one scan. Done in steps of a few landmarks at one linearisation,
-/// which gives what one large step would (the map is linear) at half its cost.
+/// The joint Kalman update of one scan, in steps of 16 landmarks at one linearisation: the result
+/// of a single large step (the map is linear) at half its cost.
 class JointUpdate {
  public:
+  /// Allocates for states of up to `max_landmarks`.
   explicit JointUpdate(int max_landmarks);
 
-  /// Updates the state by all pairings; gives the squared Mahalanobis distance of all innovations
-  /// together, or a negative number where the covariance is not positive definite. The estimate
-  /// itself is moved by finish() only.
+  /// Updates the covariance by all pairings and gathers the correction in `low_rank`; returns the
+  /// squared Mahalanobis distance of all innovations together, or a negative number where their
+  /// covariance is not positive definite (the state's covariance may then have changed in part).
+  /// The estimate is moved by finish() only. O(size^2) per step.
   double apply(FilterState& state, std::span<const Observation> observations,
-               std::span<const Pairing> pairings, LowRank& room);
-  void finish(FilterState& state, LowRank& room) { state.retract(room.delta(state.size())); }
+               std::span<const Pairing> pairings, LowRank& low_rank);
+  /// Moves the estimate by the correction that apply() gathered.
+  void finish(FilterState& state, LowRank& low_rank) {
+    state.retract(low_rank.delta(state.size()));
+  }
 
  private:
   double apply_some(FilterState& state, std::span<const Observation> observations,
-                    std::span<const Pairing> pairings, LowRank& room);
+                    std::span<const Pairing> pairings, LowRank& low_rank);
 
   Eigen::MatrixXd vehicle_;  ///< Covariance of the state with (heading, position, level).
 };

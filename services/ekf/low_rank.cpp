@@ -17,21 +17,25 @@ double LowRank::apply_rows(FilterState& state, const double* innovation, const d
                            Eigen::Index stride, int rows) {
   using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxRows, kMaxRows>;
   using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxRows, 1>;
+
   const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> spread_map(
       spread, rows, rows, Eigen::OuterStride<>(stride));
   const Eigen::LLT<Square> factor{Square(spread_map)};
   if (factor.info() != Eigen::Success) return -1.0;
   Column whitened = Eigen::Map<const Eigen::VectorXd>(innovation, rows);
   factor.matrixL().solveInPlace(whitened);
+
   // With spread = L L^T, gain = -cross L^-T: the covariance loses gain gain^T.
   Eigen::Matrix<double, kMaxRows, kMaxRows> inverse;
   inverse.setZero();
   inverse.topLeftCorner(rows, rows).diagonal().setOnes();
   factor.matrixL().solveInPlace(inverse.topLeftCorner(rows, rows));
+
   const int n = state.size();
   const int columns = padded(rows);
   cross_.middleRows(n, padded(n) - n).leftCols(rows).setZero();
   gain_.topLeftCorner(padded(n), columns).setZero();
+
   const Panel gain{gain_.data(), gain_.outerStride()};
   const ConstPanel gain_read{gain_.data(), gain_.outerStride()};
   subtract_product(gain, {cross_.data(), cross_.outerStride()}, {inverse.data(), kMaxRows}, n, rows,

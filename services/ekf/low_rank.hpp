@@ -7,27 +7,31 @@
 
 namespace understory::ekf {
 
-/// Rows of measurement that one low-rank step takes at most.
+/// Rows of measurement that one step takes at most.
 inline constexpr int kMaxRows = 32;
 
-/// Room for low-rank steps, made once.
+/// Low-rank Kalman steps, with their memory allocated once. A measurement fills cross(), then calls
+/// apply() for up to kMaxRows rows; the correction of all steps since start() is delta().
 class LowRank {
  public:
+  /// For states of up to `max_size` rows.
   explicit LowRank(int max_size);
 
   /// Covariance of the state's error with the innovation, to be filled by the caller: size x rows.
   auto cross(int size, int rows) { return cross_.topLeftCorner(size, rows); }
-  /// Correction gathered since start().
+  /// Correction of the state's error gathered since start() (`size` numbers).
   auto delta(int size) { return delta_.head(size); }
+  /// Begins a measurement of a state of `size` rows: no correction yet.
   void start(int size) { delta_.head(size).setZero(); }
-  /// Two vectors for whoever needs them in between.
+  /// A vector of `size` numbers for the caller's intermediate results.
   auto first(int size) { return first_.head(size); }
+  /// Another one.
   auto second(int size) { return second_.head(size); }
 
-  /// Adds the correction by `innovation` (rows numbers; what delta() says already taken out) with
-  /// covariance `spread` (lower triangle), takes what was learned out of the state's covariance,
-  /// and gives the squared Mahalanobis distance of the innovation; a negative number, and nothing
-  /// changed, where `spread` is not positive definite.
+  /// Adds the correction by `innovation` (one number per row, without the part that delta() has
+  /// corrected) with covariance `spread` (lower triangle), reduces the state's covariance, and
+  /// returns the squared Mahalanobis distance of the innovation; a negative number, and nothing
+  /// changed, where `spread` is not positive definite. O(size^2 rows).
   template <typename Innovation, typename Spread>
   double apply(FilterState& state, const Innovation& innovation, const Spread& spread) {
     return apply_rows(state, innovation.data(), spread.data(), spread.outerStride(),

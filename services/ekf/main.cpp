@@ -9,7 +9,7 @@ int main(int argc, char** argv) {
           .pose = "EKF_POSE",                            // out: pose, velocity, biases
           .map = "EKF_MAP",                              // out: landmarks of the active state
           .level = "EKF_LEVEL",                          // out: error of the sweeps' level
-          .velocity_correction = "VELOCITY_CORRECTION",  // out: what the input should know
+          .velocity_correction = "VELOCITY_CORRECTION",  // out: velocity and biases for the input
       }),
       argc, argv);
 }

@@ -16,9 +16,8 @@ bool is_usable(const model::Preintegration& p) {
 }  // namespace
 
 bool is_usable(const model::Odometry& increment) {
-  return increment.utime > increment.from_utime &&
-         increment.from_T_to.coordinates().allFinite() && increment.covariance.allFinite() &&
-         increment.covariance.diagonal().minCoeff() >= 0.0 &&
+  return increment.utime > increment.from_utime && increment.from_T_to.coordinates().allFinite() &&
+         increment.covariance.allFinite() && increment.covariance.diagonal().minCoeff() >= 0.0 &&
          (!increment.inertial || is_usable(*increment.inertial));
 }
 

@@ -13,8 +13,8 @@ namespace understory::ekf {
 /// True if the interval is positive, all numbers are finite and no variance is negative.
 bool is_usable(const model::Odometry& increment);
 
-/// Increments in order of time. A scan arrives later than the odometry after it, so odometry is used
-/// when its scan is there, or when it has waited for `max_delay_s`.
+/// Increments in order of time. A scan arrives later than the odometry after it, so odometry is
+/// used when its scan is there, or when it has waited for `max_delay_s`.
 class OdometryQueue {
  public:
   /// `max_delay_s`: longest wait for a scan. `clock_jump_s`: a stamp that is earlier by more is a
@@ -33,7 +33,9 @@ class OdometryQueue {
   /// Stamp up to which increments have waited for too long; none where the oldest may still wait.
   std::optional<model::Utime> overdue() const;
   /// The oldest increment that waits; null where none does.
-  const model::Odometry* next() const { return increments_.empty() ? nullptr : &increments_.front(); }
+  const model::Odometry* next() const {
+    return increments_.empty() ? nullptr : &increments_.front();
+  }
 
   /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>

@@ -7,8 +7,8 @@
 namespace understory::ekf {
 namespace {
 
-/// A change that the turned vehicle made in the map's axes, as it depends on the heading at its
-/// start; with first-estimate Jacobians from first estimates.
+/// Displacement and change of velocity in the axes of the map, as they depend on the heading at the
+/// start; for first-estimate Jacobians from first estimates.
 struct Change {
   Eigen::Vector2d position;
   Eigen::Vector2d velocity;
@@ -23,10 +23,10 @@ Change change(const FilterState& state, const Transition& t, const Eigen::Vector
 
 constexpr double kGravity = 9.81;  // [m/s^2], as common/model/imu.hpp has it
 
-/// What a level that is off by (roll, pitch) makes of gravity [m/s^2].
+/// Horizontal part of gravity by a level error of (roll, pitch) [m/s^2/rad].
 Eigen::Matrix2d gravity_by_level() { return kGravity * level_displacement(); }
 
-/// The level's error goes on, and with it the part that it has in the accelerometer's bias.
+/// Propagates the level's error and its part in the accelerometer's bias.
 void pass_level(const FilterState& state, const model::LevelError& level, Transition& t) {
   const Eigen::Matrix2d change = level.memory - Eigen::Matrix2d::Identity();
   t.level = level.memory * state.level;
@@ -40,22 +40,24 @@ void pass_level(const FilterState& state, const model::LevelError& level, Transi
 /// Fills `error` and `noise_input` for a start of heading `rotation` and preintegrated Jacobians.
 void linearise(const FilterState& state, const model::Preintegration& inertial, Transition& t) {
   const Eigen::Matrix2d rotation = rotation_of(state.heading);
-  const Change turned =
+  const Change changed =
       change(state, t, rotation * inertial.position_m, rotation * inertial.velocity_mps);
   const Eigen::Vector2d p = state.lever(t.position);
   const Eigen::Vector2d v = state.lever(t.velocity);
+
   t.yaw_by_bias = inertial.bias_jacobian.row(0);
   t.error.block<1, 3>(kHeading, kBias) = t.yaw_by_bias;
   t.error.block<2, 1>(kPosition, kHeading) = state.lever(state.position) +
                                              t.seconds * state.lever(state.velocity) +
-                                             geometry::perpendicular(turned.position) - p;
+                                             geometry::perpendicular(changed.position) - p;
   t.error.block<2, 2>(kPosition, kVelocity) = t.seconds * Eigen::Matrix2d::Identity();
   t.error.block<2, 3>(kPosition, kBias) =
       rotation * inertial.bias_jacobian.bottomRows<2>() - p * t.yaw_by_bias;
   t.error.block<2, 1>(kVelocity, kHeading) =
-      state.lever(state.velocity) + geometry::perpendicular(turned.velocity) - v;
+      state.lever(state.velocity) + geometry::perpendicular(changed.velocity) - v;
   t.error.block<2, 3>(kVelocity, kBias) =
       rotation * inertial.bias_jacobian.middleRows<2>(1) - v * t.yaw_by_bias;
+
   t.noise_input(kHeading, 0) = 1.0;
   t.noise_input.block<2, 1>(kPosition, 0) = -p;
   t.noise_input.block<2, 2>(kPosition, 3) = rotation;
@@ -64,7 +66,7 @@ void linearise(const FilterState& state, const model::Preintegration& inertial, 
   t.noise = inertial.covariance;
 }
 
-/// What turning by noise does to the landmarks: -lever, stacked.
+/// Jacobian of the landmarks' errors with respect to a yaw error: -lever, stacked.
 template <typename Arms>
 void landmark_arms(const FilterState& state, Arms&& arms) {
   for (std::size_t i = 0; i < state.landmarks().size(); ++i) {
@@ -73,43 +75,50 @@ void landmark_arms(const FilterState& state, Arms&& arms) {
   }
 }
 
-/// What turning does to right invariant landmarks: their block and what they share with the
-/// vehicle, before the vehicle's own error moves on.
+/// Propagates the block of right invariant landmarks and their covariance with the vehicle for a
+/// yaw error. `vehicle`: the vehicle's covariance before the transition.
 void rotate_landmarks(FilterState& state, const Transition& t, const VehicleMatrix& vehicle,
-                      LowRank& room) {
+                      LowRank& low_rank) {
   const int count = state.size() - kVehicle;
   auto shared = state.covariance().bottomLeftCorner(count, kVehicle);
-  auto arms = room.first(count);
-  auto mixed = room.second(count);
+  auto arms = low_rank.first(count);
+  auto mixed = low_rank.second(count);
   landmark_arms(state, arms);
-  const double turn =
+  const double yaw_variance =
       (t.yaw_by_bias * vehicle.block<3, 3>(kBias, kBias)).dot(t.yaw_by_bias) + t.noise(0, 0);
   mixed.noalias() = shared.middleCols<3>(kBias) * t.yaw_by_bias.transpose();
-  mixed += 0.5 * turn * arms;
+  mixed += 0.5 * yaw_variance * arms;
+
   auto block = state.covariance().bottomRightCorner(count, count);
   block.selfadjointView<Eigen::Lower>().rankUpdate(arms, mixed);
   shared.noalias() += arms * (t.yaw_by_bias * vehicle.middleRows<3>(kBias));
 }
 
-/// Passes the covariance through the transition: O(size^2) where right invariant, else O(size).
+/// Propagates the covariance: O(size^2) where right invariant, else O(size).
 void pass_covariance(FilterState& state, const Transition& t, const EkfMotionParameters& parameters,
-                     LowRank& room) {
+                     LowRank& low_rank) {
   const int count = state.size() - kVehicle;
-  const bool turns = state.form() == ErrorForm::kRightInvariant;
+  const bool is_invariant = state.form() == ErrorForm::kRightInvariant;
   const VehicleMatrix vehicle = state.covariance_block<kVehicle, kVehicle>(0, 0);
-  if (turns) rotate_landmarks(state, t, vehicle, room);
+  if (is_invariant) rotate_landmarks(state, t, vehicle, low_rank);
+
+  // Landmarks against the vehicle.
   auto shared = state.covariance().bottomLeftCorner(count, kVehicle);
   const VehicleMatrix passed_on = t.error.transpose();
   for (int i = 0; i < count; ++i) {
     const Eigen::Matrix<double, 1, kVehicle> row = shared.row(i);
     shared.row(i).noalias() = row * passed_on;
   }
-  if (turns) shared.noalias() += room.first(count) * (t.noise.row(0) * t.noise_input.transpose());
+  if (is_invariant)
+    shared.noalias() += low_rank.first(count) * (t.noise.row(0) * t.noise_input.transpose());
+
+  // The vehicle.
   auto own = state.covariance().topLeftCorner<kVehicle, kVehicle>();
   own = t.error * vehicle * passed_on + t.noise_input * t.noise * t.noise_input.transpose();
   Eigen::Matrix<double, 4, 2> level_input;
   level_input << gravity_by_level(), Eigen::Matrix2d::Identity();
   own.bottomRightCorner<4, 4>() += level_input * t.level_added * level_input.transpose();
+
   const double gyro = parameters.gyro_walk * parameters.gyro_walk * t.seconds;
   const double force = parameters.accelerometer_walk * parameters.accelerometer_walk * t.seconds;
   own.diagonal().segment<3>(kBias) += Eigen::Vector3d(gyro, force, force);
@@ -146,8 +155,8 @@ Transition transition_over_gap(const FilterState& state, double seconds,
   nothing.seconds = seconds;
   nothing.bias = state.bias;
   const double q = parameters.gap_acceleration * parameters.gap_acceleration;
-  const double turn = parameters.gap_yaw_rate * seconds;
-  nothing.covariance(0, 0) = turn * turn;
+  const double yaw = parameters.gap_yaw_rate * seconds;
+  nothing.covariance(0, 0) = yaw * yaw;
   for (int k = 1; k <= 2; ++k) {
     nothing.covariance(k, k) = q * seconds;
     nothing.covariance(k, k + 2) = nothing.covariance(k + 2, k) = 0.5 * q * seconds * seconds;
@@ -167,38 +176,43 @@ Transition transition_by(const FilterState& state, const geometry::SE2WithCovari
   t.velocity = rotation * motion.mean.Log().head<2>() / seconds;
   t.bias = state.bias;
   t.level = state.level;
+
+  // Jacobians.
   const Eigen::Vector2d p = state.lever(t.position);
-  // The new velocity is fixed to the vehicle: it turns with the new heading.
+  // The new velocity is fixed to the vehicle: it rotates with the new heading.
   const Eigen::Vector2d v = geometry::perpendicular(t.velocity) - state.lever(t.velocity);
-  const Eigen::Vector2d way =
+  const Eigen::Vector2d displacement =
       t.position -
       (state.form() == ErrorForm::kFirstEstimate ? state.first_position : state.position);
   t.error.block<2, 1>(kPosition, kHeading) =
-      state.lever(state.position) + geometry::perpendicular(way) - p;
+      state.lever(state.position) + geometry::perpendicular(displacement) - p;
   t.error.middleRows<2>(kVelocity).setZero();
   t.error.block<2, 1>(kVelocity, kHeading) = v;
+
   t.noise_input(kHeading, 0) = 1.0;
   t.noise_input.block<2, 1>(kPosition, 0) = -p;
   t.noise_input.block<2, 2>(kPosition, 3) = rotation;
   t.noise_input.block<2, 1>(kVelocity, 0) = v;
   t.noise_input.block<2, 2>(kVelocity, 1) = rotation;
-  const Eigen::Matrix2d way_noise = motion.covariance.topLeftCorner<2, 2>();
+
+  // Noise: the velocity is the displacement's over the interval, and may change within it.
+  const Eigen::Matrix2d displacement_noise = motion.covariance.topLeftCorner<2, 2>();
   const double change_mps = parameters.wheel_acceleration * seconds;
   t.noise(0, 0) = motion.covariance(2, 2);
-  t.noise.block<2, 2>(3, 3) = way_noise;
-  t.noise.block<2, 2>(1, 3) = way_noise / seconds;
-  t.noise.block<2, 2>(3, 1) = way_noise / seconds;
-  t.noise.block<2, 2>(1, 1) =
-      way_noise / (seconds * seconds) + change_mps * change_mps * Eigen::Matrix2d::Identity();
+  t.noise.block<2, 2>(3, 3) = displacement_noise;
+  t.noise.block<2, 2>(1, 3) = displacement_noise / seconds;
+  t.noise.block<2, 2>(3, 1) = displacement_noise / seconds;
+  t.noise.block<2, 2>(1, 1) = displacement_noise / (seconds * seconds) +
+                              change_mps * change_mps * Eigen::Matrix2d::Identity();
   t.noise.block<2, 1>(3, 0) = motion.covariance.block<2, 1>(0, 2);
   t.noise.block<2, 1>(1, 0) = motion.covariance.block<2, 1>(0, 2) / seconds;
   t.noise.row(0).tail<4>() = t.noise.col(0).tail<4>().transpose();
   return t;
 }
 
-void know_level(FilterState& state, const model::LevelError& level) {
+void initialise_level(FilterState& state, const model::LevelError& level) {
   Eigen::Matrix<double, kVehicle, 2> by_level = Eigen::Matrix<double, kVehicle, 2>::Zero();
-  // Of the heading, and of what right invariant errors have of it.
+  // In the heading, and in right invariant errors, which depend on it.
   by_level(kHeading, 0) = level.pitch_tangent;
   by_level.block<2, 1>(kPosition, 0) = -level.pitch_tangent * state.lever(state.position);
   by_level.block<2, 1>(kVelocity, 0) = -level.pitch_tangent * state.lever(state.velocity);
@@ -211,17 +225,19 @@ void know_level(FilterState& state, const model::LevelError& level) {
 }
 
 void predict(FilterState& state, const Transition& transition,
-             const EkfMotionParameters& parameters, LowRank& room) {
-  pass_covariance(state, transition, parameters, room);
+             const EkfMotionParameters& parameters, LowRank& low_rank) {
+  pass_covariance(state, transition, parameters, low_rank);
   move_estimate(state, transition);
 }
 
 void predict(FilterState& state, const model::Preintegration& inertial,
-             const MeasuredMotion& measured, const EkfMotionParameters& parameters, LowRank& room) {
+             const MeasuredMotion& measured, const EkfMotionParameters& parameters,
+             LowRank& low_rank) {
   const Transition t = transition_by(state, inertial);
   const model::Preintegration own = at_bias(inertial, state.bias);
   const Eigen::Matrix2d back = rotation_of(state.heading).transpose();
-  // Measured: the way in the axes of the start.
+
+  // Measured: the displacement in the axes of the start.
   Eigen::Matrix<double, 2, kVehicle> rows = Eigen::Matrix<double, 2, kVehicle>::Zero();
   rows.col(kHeading) =
       t.seconds * back * (state.lever(state.velocity) - geometry::perpendicular(state.velocity));
@@ -229,26 +245,29 @@ void predict(FilterState& state, const model::Preintegration& inertial,
   rows.block<2, 3>(0, kBias) = own.bias_jacobian.bottomRows<2>();
   const Eigen::Vector2d innovation =
       measured.position_m - back * state.velocity * t.seconds - own.position_m;
+
+  // Its covariance with the state at the end.
   const int count = state.size() - kVehicle;
   const Eigen::Matrix<double, kVehicle, 2> before =
       state.covariance_block<kVehicle, kVehicle>(0, 0) * rows.transpose();
   const Eigen::Matrix2d spread =
       rows * before + t.noise.bottomRightCorner<2, 2>() + measured.covariance_m2;
 
-  auto cross = room.cross(state.size(), 2);
+  auto cross = low_rank.cross(state.size(), 2);
   const Eigen::Matrix<double, 5, 2> noise = t.noise.rightCols<2>();
   cross.topRows<kVehicle>() = t.error * before + t.noise_input * noise;
-  const Eigen::RowVector2d turning = t.yaw_by_bias * before.middleRows<3>(kBias) + noise.row(0);
+  const Eigen::RowVector2d yaw_cross = t.yaw_by_bias * before.middleRows<3>(kBias) + noise.row(0);
   for (int i = 0; i < count; i += 2) {
     const Eigen::Vector2d arm =
         -state.lever(state.landmarks()[static_cast<std::size_t>(i / 2)].position);
     cross.middleRows<2>(kVehicle + i) =
-        state.covariance().block<2, kVehicle>(kVehicle + i, 0) * rows.transpose() + arm * turning;
+        state.covariance().block<2, kVehicle>(kVehicle + i, 0) * rows.transpose() + arm * yaw_cross;
   }
-  predict(state, t, parameters, room);
-  room.start(state.size());
-  room.apply(state, innovation, spread);
-  state.retract(room.delta(state.size()));
+
+  predict(state, t, parameters, low_rank);
+  low_rank.start(state.size());
+  low_rank.apply(state, innovation, spread);
+  state.retract(low_rank.delta(state.size()));
 }
 
 namespace {
@@ -256,38 +275,40 @@ namespace {
 /// Measures the velocity's component along each row of `axes` (unit vectors in the map) as zero.
 template <int Rows>
 void measure_velocity(FilterState& state, const Eigen::Matrix<double, Rows, 2>& axes,
-                      double sigma_mps, LowRank& room) {
+                      double sigma_mps, LowRank& low_rank) {
   const int n = state.size();
   const Eigen::Vector2d by_heading =
       state.lever(state.velocity) - geometry::perpendicular(state.velocity);
   Eigen::Matrix<double, kVehicle, Rows> rows = Eigen::Matrix<double, kVehicle, Rows>::Zero();
   rows.row(kHeading) = (axes * by_heading).transpose();
   rows.template middleRows<2>(kVelocity) = axes.transpose();
+
   const Eigen::Matrix<double, kVehicle, Rows> vehicle =
       state.covariance_block<kVehicle, kVehicle>(0, 0) * rows;
-  auto cross = room.cross(n, Rows);
+  auto cross = low_rank.cross(n, Rows);
   cross.template topRows<kVehicle>() = vehicle;
   if (n > kVehicle) {
     cross.bottomRows(n - kVehicle).noalias() =
         state.covariance().bottomLeftCorner(n - kVehicle, kVehicle) * rows;
   }
+
   Eigen::Matrix<double, Rows, Rows> spread = rows.transpose() * vehicle;
   spread.diagonal().array() += sigma_mps * sigma_mps;
   const Eigen::Matrix<double, Rows, 1> innovation = -axes * state.velocity;
-  room.start(n);
-  room.apply(state, innovation, spread);
-  state.retract(room.delta(n));
+  low_rank.start(n);
+  low_rank.apply(state, innovation, spread);
+  state.retract(low_rank.delta(n));
 }
 
 }  // namespace
 
-void measure_stationary(FilterState& state, double sigma_mps, LowRank& room) {
-  measure_velocity<2>(state, Eigen::Matrix2d::Identity(), sigma_mps, room);
+void measure_stationary(FilterState& state, double sigma_mps, LowRank& low_rank) {
+  measure_velocity<2>(state, Eigen::Matrix2d::Identity(), sigma_mps, low_rank);
 }
 
-void measure_no_slide(FilterState& state, double sigma_mps, LowRank& room) {
+void measure_no_slide(FilterState& state, double sigma_mps, LowRank& low_rank) {
   const Eigen::RowVector2d across = rotation_of(state.heading).col(1).transpose();
-  measure_velocity<1>(state, across, sigma_mps, room);
+  measure_velocity<1>(state, across, sigma_mps, low_rank);
 }
 
 }  // namespace understory::ekf

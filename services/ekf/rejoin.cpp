@@ -109,9 +109,8 @@ std::optional<RejoinProposal> find_rejoining(const FilterState& state,
   // The largest set that is compatible together.
   RejoinProposal proposal;
   proposal.observations = with_bend(update.observations, lost.rotation_variance);
-  proposal.pairings =
-      joint_compatibility(state, proposal.observations, found.candidates,
-                          {rules.gates.rejoin, rules.parameters.rejoin_max_nodes});
+  proposal.pairings = joint_compatibility(state, proposal.observations, found.candidates,
+                                          {rules.gates.rejoin, rules.parameters.rejoin_max_nodes});
 
   // Where the gates are wide, a few agree by chance.
   const bool is_wide = found.widest_gate_m > 2.0 * rules.min_separation_m;

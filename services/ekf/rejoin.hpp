@@ -26,9 +26,9 @@ struct RejoinRules {
 };
 
 /// The largest set of the scan's unsettled observations that is compatible with landmarks which
-/// were not observed for `rejoin_after_scans` though the scan could show them (joint compatibility).
-/// None where no landmark is lost, or where the gates are wide and few agree: by chance.
-/// `scan_number`: of this scan.
+/// were not observed for `rejoin_after_scans` though the scan could show them (joint
+/// compatibility). None where no landmark is lost, or where the gates are wide and few agree: by
+/// chance. `scan_number`: of this scan.
 std::optional<RejoinProposal> find_rejoining(const FilterState& state,
                                              const model::TrackedScan& scan,
                                              const ScanUpdate& update, std::uint64_t scan_number,

@@ -18,8 +18,8 @@ Eigen::Matrix3d pose_covariance(const FilterState& state);
 /// error of the roll. Order as pose_covariance().
 Eigen::Matrix3d pose_covariance(const FilterState& state, double pitch_tangent);
 
-/// Sets the covariance of the pose (order as pose_covariance()) and its correlation with the rest of
-/// the state to zero.
+/// Sets the covariance of the pose (order as pose_covariance()) and its correlation with the rest
+/// of the state to zero.
 void set_pose_covariance(FilterState& state, const Eigen::Matrix3d& covariance);
 
 /// Covariance of (velocity [m/s], bias), the velocity in the axes of the vehicle.

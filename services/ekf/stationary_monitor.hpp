@@ -12,8 +12,8 @@
 
 namespace understory::ekf {
 
-/// Owner of the doubt in odometry's `is_stationary`. While the vehicle is believed to be stationary,
-/// marks on the ground are landmarks of the state (ground_marks.hpp).
+/// Owner of the doubt in odometry's `is_stationary`. While the vehicle is believed to be
+/// stationary, marks on the ground are landmarks of the state (ground_marks.hpp).
 ///
 /// Without wheels `is_stationary` rests on quiet IMU samples, and a smooth road is quiet too. So it
 /// is not believed against the filter's own velocity; once found wrong, it is not believed before
@@ -35,7 +35,8 @@ class StationaryMonitor {
   /// displaced alike, or most are outside of `landmark_gate`.
   bool is_creeping(const FilterState& state, std::span<const Observation> observations,
                    std::span<const Pairing> known, double landmark_gate) const;
-  /// `is_stationary` was found wrong at `now`: it is not believed, and the vehicle leaves its place.
+  /// `is_stationary` was found wrong at `now`: it is not believed, and the vehicle leaves its
+  /// place.
   void doubt(model::Utime now, double distance_m, FilterState& state);
   /// Landmarks of a scan at `now` updated the state: doubt lasts.
   void confirm_motion(model::Utime now, std::uint32_t landmarks_used);

@@ -16,7 +16,8 @@ Timeline::Timeline(double wait_s, double clock_jump_s)
     : wait_us_(microseconds(wait_s)), clock_jump_us_(microseconds(clock_jump_s)) {}
 
 bool Timeline::may_begin(const model::Odometry& increment) {
-  if (!first_odometry_ || increment.utime < *first_odometry_) first_odometry_ = increment.from_utime;
+  if (!first_odometry_ || increment.utime < *first_odometry_)
+    first_odometry_ = increment.from_utime;
   if (!increment.inertial || increment.is_stationary) return true;
   if (increment.utime - *first_odometry_ > wait_us_) return true;
   const double spread = increment.covariance.topLeftCorner<2, 2>().trace();

@@ -39,8 +39,8 @@ class Timeline {
   bool has_begun() const { return has_begun_; }
   /// True while odometry was received and the map has not begun.
   bool is_waiting() const { return first_odometry_.has_value(); }
-  /// Whether the map may begin with `increment`: without an IMU, stationary, moving by its wheels, or
-  /// after the longest wait.
+  /// Whether the map may begin with `increment`: without an IMU, stationary, moving by its wheels,
+  /// or after the longest wait.
   bool may_begin(const model::Odometry& increment);
   /// The map begins at `utime`.
   void begin(model::Utime utime);

@@ -17,9 +17,10 @@ class TrackAliases {
  public:
   /// Index in `state` of the landmark that `track` is; none where the track is unknown.
   std::optional<std::uint32_t> landmark_of(const FilterState& state, model::TrackId track) const;
-  /// Observations whose track is a landmark of `state`, in the order of `tracks`. Indices hold until
-  /// a landmark leaves the state.
-  std::vector<Pairing> known(const FilterState& state, std::span<const model::TrackId> tracks) const;
+  /// Observations whose track is a landmark of `state`, in the order of `tracks`. Indices hold
+  /// until a landmark leaves the state.
+  std::vector<Pairing> known(const FilterState& state,
+                             std::span<const model::TrackId> tracks) const;
 
   /// `track` is the landmark that began with track `landmark`.
   void set(model::TrackId track, model::TrackId landmark);
