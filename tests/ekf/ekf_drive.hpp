@@ -101,7 +101,7 @@ struct Driven {
     filter.add(true_tracks(step));
     for (int k = 0; k < static_cast<int>(10 * seconds); ++k) go();
   }
-  /// `said_to_stand`: as a detector of standing may say wrongly.
+  /// `reported_stationary`: as a detector may report wrongly.
   ekf::EkfOutput go(model::TrackId offset = 1, bool reported_stationary = false) {
     step = drive.next();
     for (model::Odometry increment : step.odometry) {

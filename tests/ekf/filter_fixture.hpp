@@ -49,11 +49,11 @@ inline Eigen::MatrixXd full_covariance(const FilterState& state) {
 /// The error that takes `from` to `to`, to first order.
 inline Eigen::VectorXd difference(const FilterState& from, const FilterState& to) {
   Eigen::VectorXd delta(from.size());
-  const double turn = geometry::wrap_angle(to.heading - from.heading);
+  const double rotation = geometry::wrap_angle(to.heading - from.heading);
   const auto of = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-    return Eigen::Vector2d(b - a - turn * from.lever(a));
+    return Eigen::Vector2d(b - a - rotation * from.lever(a));
   };
-  delta(0) = turn;
+  delta(0) = rotation;
   delta.segment<2>(ekf::kPosition) = of(from.position, to.position);
   delta.segment<2>(ekf::kVelocity) = of(from.velocity, to.velocity);
   delta.segment<3>(ekf::kBias) = to.bias - from.bias;

@@ -32,14 +32,14 @@ model::TrackedScan scan_after(const model::Odometry& increment) {
   model::TrackedScan scan;
   scan.utime = increment.utime;
   scan.field_of_view.max_range_m = 30.0;
-  model::Detection seen;
-  seen.position_m << 8.0, 3.0, 1.0;
-  seen.covariance_m2 = 1e-4 * Eigen::Matrix3d::Identity();
-  scan.landmarks.push_back({1, 0, seen});
+  model::Detection detection;
+  detection.position_m << 8.0, 3.0, 1.0;
+  detection.covariance_m2 = 1e-4 * Eigen::Matrix3d::Identity();
+  scan.landmarks.push_back({1, 0, detection});
   return scan;
 }
 
-/// Pieces until standing is found after half a second; the last pose.
+/// Increments until the vehicle is found to be stationary after half a second; the last pose.
 model::EkfPose found_stationary(const EkfParameters& parameters) {
   Ekf filter(parameters);
   EkfOutput output;
@@ -54,7 +54,7 @@ model::EkfPose found_stationary(const EkfParameters& parameters) {
 
 }  // namespace
 
-TEST_CASE("The map begins where the vehicle is found to stand", "[ekf][begin]") {
+TEST_CASE("The map begins where the vehicle is found to be stationary", "[ekf][begin]") {
   const model::EkfPose waited = found_stationary(EkfParameters{});
   EkfParameters hasty;
   hasty.prior.wait_s = 0.0;
@@ -66,7 +66,8 @@ TEST_CASE("The map begins where the vehicle is found to stand", "[ekf][begin]") 
   }
 }
 
-TEST_CASE("What moves by its wheels begins at once, what stands by them waits", "[ekf][begin]") {
+TEST_CASE("A vehicle that moves by its wheels begins at once, a stationary one waits",
+          "[ekf][begin]") {
   for (const bool moves : {true, false}) {
     Ekf filter(EkfParameters{});
     model::Odometry increment = increment_at(0, false);
@@ -77,7 +78,8 @@ TEST_CASE("What moves by its wheels begins at once, what stands by them waits", 
   }
 }
 
-TEST_CASE("What moves without wheels begins after a while, over a restart too", "[ekf][begin]") {
+TEST_CASE("A vehicle that moves without wheels begins after wait_s, over a restart too",
+          "[ekf][begin]") {
   const EkfParameters parameters;
   Ekf filter(parameters);
   int begun = 0;

@@ -1,4 +1,4 @@
-// The filter's covariance is that of its errors, whatever tells the motion.
+// The filter's covariance is that of its errors, with any kind of odometry.
 #include "tests/catch.hpp"
 #include "tests/ekf/ekf_drive.hpp"
 

@@ -1,4 +1,5 @@
 #include "services/ekf/chi_squared.hpp"
+#include "services/ekf/state_covariances.hpp"
 #include "services/ekf/subtract_product.hpp"
 #include "tests/catch.hpp"
 #include "tests/ekf/filter_fixture.hpp"
@@ -70,22 +71,23 @@ TEST_CASE("A removed landmark leaves the rest as it was", "[ekf][state]") {
   }
 }
 
-TEST_CASE("A new landmark's covariance follows from where it was seen", "[ekf][state]") {
+TEST_CASE("A new landmark's covariance is that of its observation and of the pose",
+          "[ekf][state]") {
   std::mt19937_64 random(4);
   for (const ErrorForm form : test::kForms) {
     FilterState state = random_state(form, 2, random);
     const int n = state.size();
-    const Eigen::Vector2d seen(7.0, -3.0);
+    const Eigen::Vector2d observed(7.0, -3.0);
     Eigen::Matrix2d noise;
     noise << 0.04, 0.01, 0.01, 0.09;
     FilterState added = state;
-    added.add_landmark({}, seen, noise, 1.5);
+    added.add_landmark({}, observed, noise, 1.5);
     // The Jacobian of the whole new state with respect to the old one, by differences.
     Eigen::MatrixXd jacobian(n + 2, n);
     for (int k = 0; k < n; ++k) {
       FilterState moved = state;
       moved.retract(1e-6 * Eigen::VectorXd::Unit(n, k));
-      moved.add_landmark({}, seen, noise, 1.5);
+      moved.add_landmark({}, observed, noise, 1.5);
       jacobian.col(k) = difference(added, moved) / 1e-6;
     }
     Eigen::MatrixXd expected = jacobian * full_covariance(state) * jacobian.transpose();
@@ -95,20 +97,20 @@ TEST_CASE("A new landmark's covariance follows from where it was seen", "[ekf][s
   }
 }
 
-TEST_CASE("Moving the anchor changes no covariance that is told", "[ekf][state]") {
+TEST_CASE("Moving the anchor changes no covariance in the map's frame", "[ekf][state]") {
   std::mt19937_64 random(5);
   for (const ErrorForm form : test::kForms) {
     FilterState state = random_state(form, 4, random);
     state.position += Eigen::Vector2d(400.0, -300.0);
-    const geometry::SE2 pose = state.pose();
-    const Eigen::Matrix3d covariance = state.pose_covariance();
-    const Eigen::Matrix2d landmark = state.landmark_covariance(2);
+    const geometry::SE2 pose = vehicle_pose(state);
+    const Eigen::Matrix3d covariance = pose_covariance(state);
+    const Eigen::Matrix2d landmark = landmark_covariance(state, 2);
     const Eigen::Vector2d place = state.anchor_m + state.landmarks()[2].position;
     state.follow_with_anchor();
     REQUIRE(state.position.norm() < 1.0);
-    REQUIRE((state.pose().inverse() * pose).Log().norm() < 1e-9);
-    REQUIRE((state.pose_covariance() - covariance).norm() < 1e-9 * covariance.norm());
-    REQUIRE((state.landmark_covariance(2) - landmark).norm() < 1e-9 * covariance.norm() * 1e4);
+    REQUIRE((vehicle_pose(state).inverse() * pose).Log().norm() < 1e-9);
+    REQUIRE((pose_covariance(state) - covariance).norm() < 1e-9 * covariance.norm());
+    REQUIRE((landmark_covariance(state, 2) - landmark).norm() < 1e-9 * covariance.norm() * 1e4);
     REQUIRE((state.anchor_m + state.landmarks()[2].position - place).norm() < 1e-9);
   }
 }
@@ -119,7 +121,7 @@ TEST_CASE("The pose's covariance is the one that was set", "[ekf][state]") {
     FilterState state = random_state(form, 2, random);
     const Eigen::Matrix3d root = Eigen::Matrix3d::Random();
     const Eigen::Matrix3d wanted = root * root.transpose();
-    state.set_pose_covariance(wanted);
-    REQUIRE((state.pose_covariance() - wanted).norm() < 1e-9);
+    set_pose_covariance(state, wanted);
+    REQUIRE((pose_covariance(state) - wanted).norm() < 1e-9);
   }
 }

@@ -1,15 +1,15 @@
-// Standing still: the parked place is kept, however long it lasts, and creeping is found.
+// A stationary vehicle: its pose is kept for hours, and creeping is found.
 #include "services/ekf/ground_marks.hpp"
 
 #include <cmath>
 
 #include "services/ekf/prediction.hpp"
+#include "services/ekf/state_covariances.hpp"
 #include "tests/catch.hpp"
 #include "tests/ekf/ekf_drive.hpp"
 #include "tests/ekf/filter_fixture.hpp"
 
 using namespace understory;
-using namespace understory::ekf;
 using namespace understory::ekf;
 using namespace understory::test;
 
@@ -18,7 +18,7 @@ namespace {
 constexpr Sway kSway{2e-3, 5e-4};
 constexpr double kGate = 30.0;
 
-/// A piece of an IMU that measures nothing, with the noise of the simulated one.
+/// An increment of an IMU that measures no motion, with the noise of the simulated one.
 model::Odometry stationary_increment(model::Utime from, model::Utime to) {
   model::Odometry increment;
   increment.from_utime = from;
@@ -42,45 +42,44 @@ model::Odometry stationary_increment(model::Utime from, model::Utime to) {
 
 }  // namespace
 
-TEST_CASE("Marks set from a pose tell nothing of that pose", "[ekf][standing]") {
+TEST_CASE("Marks set from a pose add no information about that pose", "[ekf][stationary]") {
   std::mt19937_64 random(21);
   for (const ErrorForm form : test::kForms) {
     FilterState state = random_state(form, 3, random);
-    LowRank room(state.size() + 4);
+    LowRank low_rank(state.size() + 4);
     JointUpdate joint(5);
     const Eigen::MatrixXd before = full_covariance(state);
-    const geometry::SE2 pose = state.pose();
+    const geometry::SE2 pose = vehicle_pose(state);
     add_ground_marks(state, kSway);
     REQUIRE(has_ground_marks(state));
-    REQUIRE(measure_ground_marks(state, kSway, kGate, joint, room));
+    REQUIRE(measure_ground_marks(state, kSway, kGate, joint, low_rank));
     remove_ground_marks(state);
     REQUIRE(!has_ground_marks(state));
     REQUIRE(state.landmarks().size() == 3);
     REQUIRE((full_covariance(state) - before).norm() < 1e-9 * before.norm());
-    REQUIRE((pose.inverse() * state.pose()).Log().norm() < 1e-9);
+    REQUIRE((pose.inverse() * vehicle_pose(state)).Log().norm() < 1e-9);
   }
 }
 
-TEST_CASE("Marks keep the pose, but for twice the sway, over motion of which nothing is known",
-          "[ekf][standing]") {
+TEST_CASE("Marks keep the pose, but for twice the sway, over unknown motion", "[ekf][stationary]") {
   std::mt19937_64 random(22);
   for (const ErrorForm form : test::kForms) {
     FilterState state(form, 2);
     state.heading = test::normal(random);
     state.position = 20.0 * Eigen::Vector2d(test::normal(random), test::normal(random));
     state.first_position = state.position;
-    state.set_pose_covariance(Eigen::Vector3d(1e-4, 2e-4, 1e-6).asDiagonal());
-    LowRank room(state.size() + 4);
+    set_pose_covariance(state, Eigen::Vector3d(1e-4, 2e-4, 1e-6).asDiagonal());
+    LowRank low_rank(state.size() + 4);
     JointUpdate joint(2);
-    const Eigen::Matrix3d before = state.pose_covariance();
+    const Eigen::Matrix3d before = pose_covariance(state);
     add_ground_marks(state, kSway);
     EkfMotionParameters motion;
     motion.gap_acceleration = 100.0;
     motion.gap_yaw_rate = 0.5;
-    predict(state, transition_over_gap(state, 0.2, motion), motion, room);
-    REQUIRE(state.pose_covariance()(2, 2) > before(2, 2) + 0.009);
-    REQUIRE(measure_ground_marks(state, kSway, kGate, joint, room));
-    const Eigen::Matrix3d grown = state.pose_covariance() - before;
+    predict(state, transition_over_gap(state, 0.2, motion), motion, low_rank);
+    REQUIRE(pose_covariance(state)(2, 2) > before(2, 2) + 0.009);
+    REQUIRE(measure_ground_marks(state, kSway, kGate, joint, low_rank));
+    const Eigen::Matrix3d grown = pose_covariance(state) - before;
     // Twice: when the marks were set, and now.
     const Eigen::Vector3d expected =
         2.0 * Eigen::Vector3d(kSway.sigma_m, kSway.sigma_m, kSway.sigma_rad).cwiseAbs2();
@@ -89,25 +88,26 @@ TEST_CASE("Marks keep the pose, but for twice the sway, over motion of which not
   }
 }
 
-TEST_CASE("A vehicle that has moved off its marks is found out, and nothing is changed",
-          "[ekf][standing]") {
+TEST_CASE("A vehicle that has moved off its marks is found, and the state is not changed",
+          "[ekf][stationary]") {
   FilterState state(ErrorForm::kRightInvariant, 2);
-  LowRank room(state.size() + 4);
+  LowRank low_rank(state.size() + 4);
   JointUpdate joint(2);
-  state.set_pose_covariance(1e-8 * Eigen::Matrix3d::Identity());
+  set_pose_covariance(state, 1e-8 * Eigen::Matrix3d::Identity());
   add_ground_marks(state, kSway);
   state.position.x() += 20.0 * kSway.sigma_m;
   const Eigen::MatrixXd before = full_covariance(state);
-  const geometry::SE2 pose = state.pose();
-  REQUIRE(!measure_ground_marks(state, kSway, kGate, joint, room));
+  const geometry::SE2 pose = vehicle_pose(state);
+  REQUIRE(!measure_ground_marks(state, kSway, kGate, joint, low_rank));
   REQUIRE(full_covariance(state) == before);
-  REQUIRE(state.pose().coordinates() == pose.coordinates());
+  REQUIRE(vehicle_pose(state).coordinates() == pose.coordinates());
 }
 
-TEST_CASE("Hours of standing leave the pose as sure as it was", "[ekf][standing]") {
+TEST_CASE("The covariance of a vehicle that is stationary for hours does not grow",
+          "[ekf][stationary]") {
   Ekf filter((EkfParameters()));
   model::EkfPose pose;
-  const auto stand = [&](int increments) {
+  const auto wait = [&](int increments) {
     for (int k = 0; k < increments; ++k) {
       const model::Utime from = filter.utime();
       filter.add(stationary_increment(from, from + 100000));
@@ -118,9 +118,9 @@ TEST_CASE("Hours of standing leave the pose as sure as it was", "[ekf][standing]
       pose = *output.pose;
     }
   };
-  stand(50);
+  wait(50);
   const Eigen::Matrix3d early = pose.covariance;
-  stand(50000);
+  wait(50000);
   const EkfMotionParameters motion;
   REQUIRE(pose.covariance(0, 0) <= 1.01 * early(0, 0));
   REQUIRE(pose.covariance(2, 2) <= 1.01 * early(2, 2));
@@ -138,10 +138,10 @@ TEST_CASE("Hours of standing leave the pose as sure as it was", "[ekf][standing]
   REQUIRE(!has_ground_marks(filter.state()));
 }
 
-TEST_CASE("Landmarks overrule a detector that takes creeping for standing", "[ekf][standing]") {
+TEST_CASE("Landmarks overrule a detector that takes creeping for stationary", "[ekf][stationary]") {
   Ekf filter((EkfParameters()));
   std::mt19937_64 random(23);
-  constexpr double kCreep_m = 1e-3;  // per piece: 1 cm/s
+  constexpr double kCreep_m = 1e-3;  // per increment: 1 cm/s
   geometry::SE2 truth;
   model::EkfPose pose;
   double worst_m = 0.0;
@@ -173,7 +173,7 @@ TEST_CASE("Landmarks overrule a detector that takes creeping for standing", "[ek
   REQUIRE(nees(pose, truth) < 25.0);
 }
 
-TEST_CASE("A swaying vehicle's pose is as good as it says", "[ekf][standing][consistency]") {
+TEST_CASE("The pose of a swaying vehicle is consistent", "[ekf][stationary][consistency]") {
   sim::InertialDriveParameters drive = short_drive();
   drive.standing_s = 12.0;
   drive.sway_sigma_m = EkfMotionParameters{}.stationary_sigma_m;
@@ -190,7 +190,7 @@ TEST_CASE("A swaying vehicle's pose is as good as it says", "[ekf][standing][con
   REQUIRE(mean < 4.4);
 }
 
-TEST_CASE("A full state stands too", "[ekf][standing]") {
+TEST_CASE("A full state has room for the ground marks", "[ekf][stationary]") {
   EkfParameters parameters;
   parameters.map.max_landmarks = 4;
   sim::InertialDriveParameters drive = short_drive();
@@ -211,12 +211,12 @@ TEST_CASE("A full state stands too", "[ekf][standing]") {
   REQUIRE(filter.counters().restarts == 0);
 }
 
-TEST_CASE("Standing is not believed against the filter's own velocity, but in the end",
-          "[ekf][standing]") {
+TEST_CASE("A stationary flag is believed against the filter's own velocity after 10 s only",
+          "[ekf][stationary]") {
   test::Driven run(20.0, short_drive());
   const double speed = run.step.velocity_mps.norm();
   REQUIRE(speed > 3.0);
-  // The detector takes a smooth road for standing.
+  // The detector takes a smooth road for a stationary vehicle.
   model::EkfPose pose;
   for (int k = 0; k < 150; ++k) pose = *run.go(1, true).pose;
   CAPTURE(pose.velocity_mps.transpose(), nees(pose, run.truth()));
@@ -224,7 +224,7 @@ TEST_CASE("Standing is not believed against the filter's own velocity, but in th
   REQUIRE(nees(pose, run.truth()) < 16.0);
   REQUIRE(pose.reset_counter == 0);
   REQUIRE(run.filter.counters().crept == 1);
-  // No landmark speaks for moving any more, and the detector insists.
+  // No landmark shows motion any more, and the detector keeps its report.
   model::Utime utime = run.filter.utime();
   for (int k = 0; k < 110; ++k, utime += 100000) {
     run.filter.add(stationary_increment(utime, utime + 100000));

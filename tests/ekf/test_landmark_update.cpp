@@ -1,7 +1,7 @@
 // Landmarks' innovations, the joint update and joint compatibility against brute force.
 #include <limits>
 
-#include "services/ekf/chi_squared.hpp"
+#include "services/ekf/gates.hpp"
 #include "services/ekf/joint_compatibility.hpp"
 #include "services/ekf/landmark_update.hpp"
 #include "tests/catch.hpp"
@@ -10,7 +10,6 @@
 using namespace understory;
 using namespace understory::ekf;
 using namespace understory::test;
-using namespace understory::ekf;
 
 namespace {
 
@@ -33,14 +32,14 @@ std::vector<Observation> observations_near(const FilterState& state, double sigm
                                            std::mt19937_64& random) {
   std::vector<Observation> observations;
   for (const MapLandmark& landmark : state.landmarks()) {
-    Observation seen;
-    seen.height_m = 2.0 * test::normal(random);
-    seen.position_m =
+    Observation observation;
+    observation.height_m = 2.0 * test::normal(random);
+    observation.position_m =
         rotation_of(state.heading).transpose() * (landmark.position - state.position) +
-        seen.height_m * level_displacement() * state.level +
+        observation.height_m * level_displacement() * state.level +
         sigma * Eigen::Vector2d(test::normal(random), test::normal(random));
-    seen.covariance_m2 << 0.02, 0.004, 0.004, 0.01;
-    observations.push_back(seen);
+    observation.covariance_m2 << 0.02, 0.004, 0.004, 0.01;
+    observations.push_back(observation);
   }
   return observations;
 }
@@ -54,38 +53,38 @@ double joint_distance(const FilterState& state, const std::vector<Observation>& 
   const Eigen::Matrix2d rotation = rotation_of(state.heading);
   for (std::size_t k = 0; k < pairings.size(); ++k) {
     const auto at = 2 * static_cast<Eigen::Index>(k);
-    const Observation& seen = observations[pairings[k].observation];
-    spread.block<2, 2>(at, at) += rotation * seen.covariance_m2 * rotation.transpose();
-    error.segment<2>(at) = innovation(state, pairings[k].landmark, seen);
+    const Observation& observation = observations[pairings[k].observation];
+    spread.block<2, 2>(at, at) += rotation * observation.covariance_m2 * rotation.transpose();
+    error.segment<2>(at) = innovation(state, pairings[k].landmark, observation);
   }
   return error.dot(spread.llt().solve(error));
 }
 
 }  // namespace
 
-TEST_CASE("Innovations depend on the error as their rows say", "[ekf][update]") {
+TEST_CASE("Innovations depend on the error by their Jacobian", "[ekf][update]") {
   std::mt19937_64 random(21);
   for (const ErrorForm form : test::kForms) {
     const FilterState state = random_state(form, 3, random);
-    const Observation seen = observations_near(state, 0.0, random)[1];
-    const Eigen::MatrixXd rows = measurement_rows(state, {{0, 1}}, {seen});
+    const Observation observation = observations_near(state, 0.0, random)[1];
+    const Eigen::MatrixXd rows = measurement_rows(state, {{0, 1}}, {observation});
     for (int k = 0; k < state.size(); ++k) {
       const double h = 1e-6;
       FilterState plus = state, minus = state;
       plus.retract(h * Eigen::VectorXd::Unit(state.size(), k));
       minus.retract(-h * Eigen::VectorXd::Unit(state.size(), k));
-      // The innovation falls by what the prediction gains, seen in the axes of the estimate.
+      // The innovation falls by what the prediction gains, in the axes of the estimate.
       const auto predicted = [&](const FilterState& at) {
         return Eigen::Vector2d(
             rotation_of(state.heading) *
             (rotation_of(at.heading).transpose() * (at.landmarks()[1].position - at.position) +
-             seen.height_m * level_displacement() * at.level));
+             observation.height_m * level_displacement() * at.level));
       };
       const Eigen::Vector2d column = (predicted(plus) - predicted(minus)) / (2 * h);
       CAPTURE(static_cast<int>(form), k);
       REQUIRE((column - rows.col(k)).norm() < 1e-6);
     }
-    REQUIRE(innovation(state, 1, seen).norm() < 1e-9);
+    REQUIRE(innovation(state, 1, observation).norm() < 1e-9);
   }
 }
 
@@ -111,10 +110,10 @@ TEST_CASE("Steps of a few landmarks give what one full update gives", "[ekf][upd
       const Eigen::MatrixXd gain = before * rows.transpose() * spread.inverse();
       FilterState oracle = state;
       oracle.retract(gain * error);
-      LowRank room(state.size());
+      LowRank low_rank(state.size());
       JointUpdate update(count + 4);
-      const double distance = update.apply(state, observations, pairings, room);
-      update.finish(state, room);
+      const double distance = update.apply(state, observations, pairings, low_rank);
+      update.finish(state, low_rank);
       const Eigen::MatrixXd expected = before - gain * rows * before;
       CAPTURE(static_cast<int>(form), count);
       REQUIRE(distance == Approx(error.dot(spread.llt().solve(error))).epsilon(1e-8));
@@ -126,7 +125,7 @@ TEST_CASE("Steps of a few landmarks give what one full update gives", "[ekf][upd
 
 TEST_CASE("Joint compatibility finds what trying everything finds", "[ekf][jcbb]") {
   std::mt19937_64 random(23);
-  const double probability = 0.95;
+  const std::vector<double> limits = set_gates(0.95, 3);
   for (int trial = 0; trial < 40; ++trial) {
     const ErrorForm form = test::kForms[trial % 3];
     const FilterState state = random_state(form, 4, random);
@@ -134,7 +133,7 @@ TEST_CASE("Joint compatibility finds what trying everything finds", "[ekf][jcbb]
     observations.pop_back();
     std::vector<Candidates> candidates;
     for (std::uint32_t k = 0; k < observations.size(); ++k) candidates.push_back({k, {0, 1, 2, 3}});
-    const auto found = joint_compatibility(state, observations, candidates, {probability, 100000});
+    const auto found = joint_compatibility(state, observations, candidates, {limits, 100000});
     // Every assignment: 4 = none.
     std::size_t best = 0;
     double least = std::numeric_limits<double>::infinity();
@@ -152,8 +151,7 @@ TEST_CASE("Joint compatibility finds what trying everything finds", "[ekf][jcbb]
       for (std::size_t m = 1; m <= pairings.size(); ++m) {
         const std::vector<Pairing> part(pairings.begin(),
                                         pairings.begin() + static_cast<std::ptrdiff_t>(m));
-        compatible = compatible && joint_distance(state, observations, part) <=
-                                       chi_squared_quantile(probability, 2 * static_cast<int>(m));
+        compatible = compatible && joint_distance(state, observations, part) <= limits[m];
       }
       if (!compatible) continue;
       const double distance = joint_distance(state, observations, pairings);

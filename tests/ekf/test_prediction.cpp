@@ -1,6 +1,7 @@
 // The filter's motion against numerical differences and against textbook formulas on full matrices.
 #include "services/ekf/prediction.hpp"
 
+#include "services/ekf/state_covariances.hpp"
 #include "tests/catch.hpp"
 #include "tests/ekf/filter_fixture.hpp"
 
@@ -74,7 +75,7 @@ Eigen::MatrixXd walk(const FilterState& state, const EkfMotionParameters& p, con
 
 }  // namespace
 
-TEST_CASE("Errors pass on as the numerical Jacobian says", "[ekf][prediction]") {
+TEST_CASE("Errors propagate by the numerical Jacobian", "[ekf][prediction]") {
   std::mt19937_64 random(11);
   for (const ErrorForm form : test::kForms) {
     for (int trial = 0; trial < 10; ++trial) {
@@ -110,14 +111,14 @@ TEST_CASE("The block-wise prediction is the full one", "[ekf][prediction]") {
   const EkfMotionParameters parameters;
   for (const ErrorForm form : test::kForms) {
     FilterState state = random_state(form, 7, random);
-    LowRank room(state.size());
+    LowRank low_rank(state.size());
     const Transition t = transition_by(state, random_motion(random));
     const Eigen::MatrixXd error = whole_error(state, t);
     const Eigen::MatrixXd input = whole_input(state, t);
     const Eigen::MatrixXd expected = error * full_covariance(state) * error.transpose() +
                                      input * t.noise * input.transpose() +
                                      walk(state, parameters, t);
-    predict(state, t, parameters, room);
+    predict(state, t, parameters, low_rank);
     REQUIRE((full_covariance(state) - expected).norm() < 1e-12 * expected.norm());
   }
 }
@@ -131,14 +132,14 @@ TEST_CASE("Motion measured over the samples' own interval shares their noise",
     for (int run = 0; run < 2; ++run) {
       FilterState state = random_state(form, 3, random);
       const int n = state.size();
-      LowRank room(n);
+      LowRank low_rank(n);
       model::Preintegration motion = random_motion(random);
       motion.bias = state.bias;
       const Transition t = transition_by(state, motion);
       MeasuredMotion measured;
       measured.position_m << 0.3, -0.2;
       measured.covariance_m2 << 0.02, 0.005, 0.005, 0.03;
-      // Oracle: state and noise as one vector, measured first, passed on then.
+      // Oracle: state and noise as one vector, measured first, propagated then.
       Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(n + 5, n + 5);
       joint.topLeftCorner(n, n) = full_covariance(state);
       joint.bottomRightCorner(5, 5) = t.noise;
@@ -166,23 +167,23 @@ TEST_CASE("Motion measured over the samples' own interval shares their noise",
       FilterState oracle = state;
       move(oracle, t);
       oracle.retract(delta);
-      predict(state, motion, measured, parameters, room);
+      predict(state, motion, measured, parameters, low_rank);
       REQUIRE((full_covariance(state) - expected).norm() < 1e-6 * expected.norm());
       REQUIRE(difference(oracle, state).norm() < 1e-5 * (1.0 + delta.norm()));
     }
   }
 }
 
-TEST_CASE("Standing still tells the velocity and no more than that", "[ekf][prediction]") {
+TEST_CASE("A stationary measurement observes the velocity alone", "[ekf][prediction]") {
   std::mt19937_64 random(14);
   for (const ErrorForm form : test::kForms) {
     FilterState state = random_state(form, 3, random);
     state.velocity = 0.01 * Eigen::Vector2d(1.0, -2.0);
-    LowRank room(state.size());
-    measure_stationary(state, 1e-4, room);
+    LowRank low_rank(state.size());
+    measure_stationary(state, 1e-4, low_rank);
     REQUIRE(state.velocity.norm() < 1e-3);
-    const Eigen::Matrix2d left = state.velocity_covariance().topLeftCorner<2, 2>();
-    // Other forms measure at the old velocity what they tell at the new one.
+    const Eigen::Matrix2d left = velocity_covariance(state).topLeftCorner<2, 2>();
+    // Other forms measure at the old velocity and report at the new one.
     REQUIRE(left.trace() < (form == ErrorForm::kRightInvariant ? 2.1e-8 : 1e-3));
     REQUIRE(state.covariance(kPosition, kPosition) > 1e-4);
   }
@@ -193,11 +194,11 @@ TEST_CASE("Uncertainty grows over a gap", "[ekf][prediction]") {
   const EkfMotionParameters parameters;
   FilterState state = random_state(ErrorForm::kRightInvariant, 2, random);
   state.covariance() = 0.01 * Eigen::MatrixXd::Identity(state.size(), state.size());
-  LowRank room(state.size());
-  double last = state.pose_covariance().trace();
+  LowRank low_rank(state.size());
+  double last = pose_covariance(state).trace();
   for (int k = 0; k < 5; ++k) {
-    predict(state, transition_over_gap(state, 1.0, parameters), parameters, room);
-    const double now = state.pose_covariance().trace();
+    predict(state, transition_over_gap(state, 1.0, parameters), parameters, low_rank);
+    const double now = pose_covariance(state).trace();
     REQUIRE(now > last);
     last = now;
   }

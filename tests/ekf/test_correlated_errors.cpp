@@ -1,4 +1,4 @@
-// Errors that scans have in common: of the level, and of how a trunk looks from one place.
+// Errors that scans have in common: of the level, and of a trunk observed from one place.
 #include <cmath>
 
 #include "tests/catch.hpp"
@@ -14,7 +14,7 @@ namespace {
 constexpr double kHeight_m = 1.5;
 constexpr double kGravity = 9.81;
 
-/// A level that is off by the accelerometer's bias until the drive tells it: roll and pitch each
+/// A level with the error of the accelerometer's bias until the drive shows it: roll and pitch each
 /// with a standard deviation of 6 mrad that falls to 1 mrad within some seconds.
 class WrongLevel {
  public:
@@ -23,10 +23,10 @@ class WrongLevel {
     first_error_ = error_;
   }
 
-  /// What the wrong level makes of a piece, and what is said of it.
+  /// Adds the effect of the wrong level to an increment, with its covariance.
   void spoil(model::Odometry& increment) {
     model::Preintegration& inertial = *increment.inertial;
-    // While standing the accelerometer's bias hides what the level does.
+    // While the vehicle is stationary the accelerometer's bias hides the level's error.
     const Eigen::Vector2d force = kGravity * level_displacement() * (error_ - first_error_);
     inertial.velocity_mps += force * inertial.seconds;
     inertial.position_m += 0.5 * force * inertial.seconds * inertial.seconds;
@@ -42,12 +42,12 @@ class WrongLevel {
   }
   void spoil(model::TrackedScan& scan) const {
     for (model::TrackedLandmark& landmark : scan.landmarks) {
-      model::Detection& seen = landmark.observed;
-      seen.position_m.z() = kHeight_m;
-      seen.position_m.head<2>() += kHeight_m * level_displacement() * error_;
+      model::Detection& detection = landmark.observed;
+      detection.position_m.z() = kHeight_m;
+      detection.position_m.head<2>() += kHeight_m * level_displacement() * error_;
       const double share = kHeight_m * kHeight_m * variance_;
-      seen.covariance_m2.topLeftCorner<2, 2>() += share * Eigen::Matrix2d::Identity();
-      seen.covariance_m2(2, 2) = 1.0;
+      detection.covariance_m2.topLeftCorner<2, 2>() += share * Eigen::Matrix2d::Identity();
+      detection.covariance_m2(2, 2) = 1.0;
     }
   }
 
@@ -61,7 +61,7 @@ class WrongLevel {
   double variance_ = kStart * kStart;
 };
 
-double mean_nees_with_wrong_level(std::uint64_t seed, bool is_told) {
+double mean_nees_with_wrong_level(std::uint64_t seed, bool is_reported) {
   sim::InertialDriveParameters parameters = test::short_drive();
   parameters.standing_s = 5.0;
   parameters.odometry = sim::OdometryKind::kInertialAndWheels;
@@ -78,7 +78,7 @@ double mean_nees_with_wrong_level(std::uint64_t seed, bool is_told) {
     if (k == 0) start = step.world_T_vehicle;
     for (model::Odometry increment : step.odometry) {
       level.spoil(increment);
-      if (!is_told) increment.inertial->level = model::LevelError{};
+      if (!is_reported) increment.inertial->level = model::LevelError{};
       filter.add(increment);
     }
     model::TrackedScan scan = test::true_tracks(step);
@@ -93,21 +93,22 @@ double mean_nees_with_wrong_level(std::uint64_t seed, bool is_told) {
 
 }  // namespace
 
-TEST_CASE("A level that is found to be wrong on the way leaves the filter consistent",
+TEST_CASE("A level whose error is found while driving leaves the filter consistent",
           "[ekf][level]") {
-  double told = 0.0;
+  double reported = 0.0;
   double unreported = 0.0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-    told += mean_nees_with_wrong_level(seed, true) / 12.0;
+    reported += mean_nees_with_wrong_level(seed, true) / 12.0;
     unreported += mean_nees_with_wrong_level(seed, false) / 12.0;
   }
-  CAPTURE(told, unreported);
-  CHECK(told < 4.0);
-  CHECK(told > 1.5);
-  CHECK(unreported > 2.0 * told);
+  CAPTURE(reported, unreported);
+  CHECK(reported < 4.0);
+  CHECK(reported > 1.5);
+  CHECK(unreported > 2.0 * reported);
 }
 
-TEST_CASE("What was seen from one place is less sure once that is left", "[ekf][standing]") {
+TEST_CASE("Landmarks observed from one place are less certain once it is left",
+          "[ekf][stationary]") {
   sim::InertialDriveParameters parameters = test::short_drive();
   parameters.standing_s = 10.0;
   EkfParameters honest;
@@ -116,20 +117,20 @@ TEST_CASE("What was seen from one place is less sure once that is left", "[ekf][
   EkfOutput output;
   for (int k = 0; k < 104; ++k) output = driven.go();
   const double noise = parameters.position_sigma_m * parameters.position_sigma_m;
-  std::size_t long_seen = 0;
+  std::size_t long_observed = 0;
   for (const model::EkfLandmark& landmark : output.map->landmarks) {
     if (landmark.observation_count < 50) continue;
-    ++long_seen;
+    ++long_observed;
     CHECK(landmark.covariance_m2.trace() > 0.5 * 2.0 * 0.2 * noise);
   }
-  CHECK(long_seen > 3);
+  CHECK(long_observed > 3);
 }
 
 namespace {
 
-/// Twenty seconds of standing before trunks that lean, whose heights are told with much noise: as
-/// it is told, the place on a trunk moves. The level is right, but nobody knows. Squared
-/// Mahalanobis distance of what the filter makes of it.
+/// A vehicle that is stationary for 20 s before trunks that lean and whose heights are noisy: with
+/// the height the position on the trunk moves. The level is right, but unknown. Returns the squared
+/// Mahalanobis distance of the filter's estimate of the level.
 double level_nees_before_leaning_trunks(std::uint64_t seed) {
   constexpr int kTrunks = 12;
   constexpr double kLevel = 5e-3;
@@ -165,14 +166,14 @@ double level_nees_before_leaning_trunks(std::uint64_t seed) {
     scan.field_of_view.max_range_m = 30.0;
     for (std::uint32_t i = 0; i < kTrunks; ++i) {
       const double up = kHeightNoise * normal(random);
-      model::Detection seen;
-      seen.position_m = trunks[i] + Eigen::Vector3d(0.0, 0.0, up);
-      seen.position_m.head<2>() +=
+      model::Detection detection;
+      detection.position_m = trunks[i] + Eigen::Vector3d(0.0, 0.0, up);
+      detection.position_m.head<2>() +=
           up * leans[i] + kNoise * Eigen::Vector2d(normal(random), normal(random));
       const double own = kNoise * kNoise + std::pow(kLean * kHeightNoise, 2);
-      seen.covariance_m2.setIdentity();
-      seen.covariance_m2.topLeftCorner<2, 2>() *= own + std::pow(kHeight_m * kLevel, 2);
-      scan.landmarks.push_back({i + 1, i, seen});
+      detection.covariance_m2.setIdentity();
+      detection.covariance_m2.topLeftCorner<2, 2>() *= own + std::pow(kHeight_m * kLevel, 2);
+      scan.landmarks.push_back({i + 1, i, detection});
     }
     filter.add(scan);
   }
@@ -183,7 +184,8 @@ double level_nees_before_leaning_trunks(std::uint64_t seed) {
 
 }  // namespace
 
-TEST_CASE("Leaning trunks of uncertain height do not pass for a wrong level", "[ekf][level]") {
+TEST_CASE("Leaning trunks of uncertain height do not pass for an error of the level",
+          "[ekf][level]") {
   double mean = 0.0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     mean += level_nees_before_leaning_trunks(seed) / 20.0;
@@ -191,7 +193,8 @@ TEST_CASE("Leaning trunks of uncertain height do not pass for a wrong level", "[
   CHECK(mean < 3.5);
 }
 
-TEST_CASE("A scale that all distances have in common makes the pose less sure far out", "[ekf]") {
+TEST_CASE("A scale error of all distances makes the pose less certain far from the origin",
+          "[ekf]") {
   const auto drive = [](double scale) {
     EkfParameters parameters = test::white_noise();
     parameters.observation.scale_sigma = scale;
@@ -241,7 +244,7 @@ model::EkfPose pose_after(Ekf& filter, const model::Odometry& increment) {
 
 }  // namespace
 
-TEST_CASE("A wrong roll turns what is levelled, not the vehicle", "[ekf][level]") {
+TEST_CASE("A wrong roll rotates the levelled frame, not the vehicle", "[ekf][level]") {
   EkfParameters parameters = test::white_noise();
   parameters.prior.gyro_bias_sigma = 1e-6;
   std::mt19937_64 random(1);
