@@ -15,13 +15,14 @@ void RigidAlignment2::add(const Eigen::Vector2d& a, const Eigen::Vector2d& b, do
 
 SE2 RigidAlignment2::a_T_b() const {
   if (weight_ <= 0.0) return {};
+
   const Eigen::Vector2d mean_a = sum_a_ / weight_;
   const Eigen::Vector2d mean_b = sum_b_ / weight_;
   const double dot = sum_dot_ - weight_ * mean_a.dot(mean_b);
   const double cross = sum_cross_ - weight_ * (mean_b.x() * mean_a.y() - mean_b.y() * mean_a.x());
   const double theta = (dot == 0.0 && cross == 0.0) ? 0.0 : std::atan2(cross, dot);
-  const SE2 turn(0.0, 0.0, theta);
-  return {mean_a - turn * mean_b, theta};
+  const SE2 rotation(0.0, 0.0, theta);
+  return {mean_a - rotation * mean_b, theta};
 }
 
 SE2 align_rigid(std::span<const Eigen::Vector2d> a, std::span<const Eigen::Vector2d> b) {

@@ -42,6 +42,8 @@ class Registrar {
   Registration run() {
     Registration result{guess_.mean, guess_.covariance, {}};
     std::vector<PointPair> previous;
+
+    // Pair the unambiguous points and fit the pose to them, until the pairs stay the same.
     for (int round = 0; round < parameters_.max_rounds; ++round) {
       previous = result.pairs;
       result.pairs = pairs_at(result);
@@ -50,6 +52,7 @@ class Registrar {
       refine(result);
       if (same(previous, result.pairs)) break;
     }
+
     result.pairs = pairs_at(result);
     return result;
   }
@@ -67,11 +70,13 @@ class Registrar {
     const double k2 = parameters_.gate_sigmas * parameters_.gate_sigmas;
     const double floor2 = parameters_.gate_floor_m * parameters_.gate_floor_m / k2;
     const Eigen::Matrix2d rotation = at.reference_T_observed.rotation();
+
     for (std::uint32_t i = 0; i < observed_.size(); ++i) {
       const Eigen::Vector2d& z = observed_[i].position_m;
       const double base = observed_[i].variance_m2 + pose_variance(at.covariance, z) + floor2;
       const double reach = parameters_.gate_sigmas * std::sqrt(base + max_reference_variance_);
       if (parameters_.gate_sigmas * std::sqrt(base) > parameters_.max_gate_m) continue;
+
       const Eigen::Vector2d p = rotation * z + at.reference_T_observed.translation();
       bins_.for_each_within(p, reach, [&](std::uint32_t r, double d2) {
         const double m2 = d2 / (base + reference_[r].variance_m2);
@@ -82,20 +87,24 @@ class Registrar {
     }
   }
 
-  /// One to one, likeliest first; a pair is ambiguous when either end had another
-  /// candidate.
+  /// One to one, likeliest first. A pair is ambiguous where either end had another candidate.
   std::vector<PointPair> pairs_at(const Registration& at) {
+    // The candidates inside the gates, likeliest first; ties go by index.
     collect_candidates(at);
     std::sort(candidates_.begin(), candidates_.end(), [](const Candidate& a, const Candidate& b) {
       if (a.rank != b.rank) return a.rank < b.rank;
       return a.observed != b.observed ? a.observed < b.observed : a.reference < b.reference;
     });
+
+    // How many candidates each point has.
     reference_count_.assign(reference_.size(), 0);
     observed_count_.assign(observed_.size(), 0);
     for (const Candidate& c : candidates_) {
       ++reference_count_[c.reference];
       ++observed_count_[c.observed];
     }
+
+    // Each point is used once.
     reference_used_.assign(reference_.size(), false);
     observed_used_.assign(observed_.size(), false);
     std::vector<PointPair> pairs;
@@ -105,6 +114,7 @@ class Registrar {
       pairs.push_back({c.reference, c.observed,
                        reference_count_[c.reference] > 1 || observed_count_[c.observed] > 1});
     }
+
     std::sort(pairs.begin(), pairs.end(),
               [](const PointPair& a, const PointPair& b) { return a.observed < b.observed; });
     return pairs;
@@ -113,10 +123,13 @@ class Registrar {
   /// Two Gauss-Newton steps on the pairs and the guess.
   void refine(Registration& result) const {
     for (int step = 0; step < 2; ++step) {
+      // The guess.
       const SE2& pose = result.reference_T_observed;
       const Eigen::Vector3d off = (guess_.mean.inverse() * pose).Log();
       Eigen::Matrix3d hessian = information_;
       Eigen::Vector3d gradient = information_ * off;
+
+      // The pairs: errors in the observed frame.
       const Eigen::Matrix2d to_observed = pose.rotation().transpose();
       for (const PointPair& pair : result.pairs) {
         const UncertainPoint& a = reference_[pair.reference];
@@ -129,6 +142,7 @@ class Registrar {
         hessian.noalias() += weight * jacobian.transpose() * jacobian;
         gradient.noalias() += weight * jacobian.transpose() * error;
       }
+
       const Eigen::LLT<Eigen::Matrix3d> llt(hessian);
       result.reference_T_observed = pose * SE2::Exp(-llt.solve(gradient));
       result.covariance = llt.solve(Eigen::Matrix3d::Identity());
@@ -161,13 +175,17 @@ Registration register_step(Points reference, Points observed, const SE2& last, c
   const double t2 = model.sigma_m * model.sigma_m;
   const double r2 = model.sigma_rad * model.sigma_rad;
   const Eigen::Matrix3d covariance = Eigen::Vector3d(t2, t2, r2).asDiagonal();
+
+  // The last step repeats.
   Registration best =
       register_points(reference, observed, {last * last_step, covariance}, parameters);
   if (fits(best)) return best;
+
+  // It did not: rotations on the spot.
   const int steps = static_cast<int>(std::ceil(model.max_rotation_rad / model.sigma_rad));
   for (int step = -steps; step <= steps; ++step) {
-    const SE2 turned = last * SE2(0.0, 0.0, step * model.sigma_rad);
-    Registration tried = register_points(reference, observed, {turned, covariance}, parameters);
+    const SE2 rotated = last * SE2(0.0, 0.0, step * model.sigma_rad);
+    Registration tried = register_points(reference, observed, {rotated, covariance}, parameters);
     if (tried.pairs.size() < model.min_searched_pairs) continue;
     if (tried.pairs.size() > best.pairs.size()) best = std::move(tried);
   }

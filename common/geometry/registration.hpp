@@ -1,6 +1,8 @@
-// Registration of a small set of points to a reference, from an uncertain guess.
+// Registration of a small set of points to a reference set, from an uncertain guess.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -10,59 +12,87 @@
 
 namespace understory::geometry {
 
-/// A point with isotropic position variance [m^2].
+/// A point with isotropic position noise. Its frame is that of the set that it belongs to.
 struct UncertainPoint {
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
-  double variance_m2 = 0.0;
-  /// Added to the squared Mahalanobis distance when candidates inside a gate are ranked: doubtful
-  /// points come second.
+  double variance_m2 = 0.0;  ///< Per axis.
+  /// Added to the squared Mahalanobis distance when the candidates inside a gate are ranked, so
+  /// that doubtful points are paired last. Dimensionless.
   double reluctance = 0.0;
 };
 
+/// One observed point and the reference point that it is taken for.
 struct PointPair {
-  std::uint32_t reference = 0;
-  std::uint32_t observed = 0;
-  bool ambiguous = false;  ///< Another point lies inside the gate as well.
+  std::uint32_t reference = 0;  ///< Index in the reference set.
+  std::uint32_t observed = 0;   ///< Index in the observed set.
+  bool ambiguous = false;       ///< Another point lies inside the gate as well.
 };
 
+/// Limits of a registration.
 struct RegistrationParameters {
   double gate_sigmas = 4.0;    ///< Half width of the association gate, in standard deviations.
-  double gate_floor_m = 0.03;  ///< Added to it: what the noise model does not know.
-  double max_gate_m = 4.0;     ///< Points with a wider gate wait until the pose is better known.
-  int max_rounds = 12;
+  double gate_floor_m = 0.03;  ///< Added to the gate for errors that the noise model lacks.
+  double max_gate_m = 4.0;     ///< A point with a wider gate waits until the pose is better known.
+  int max_rounds = 12;         ///< Largest number of pairing and fitting rounds.
 };
 
+/// Result of a registration: the pose, its covariance and the pairs that it rests on.
 struct Registration {
   SE2 reference_T_observed;
-  /// Of reference_T_observed (right perturbation), the guess' information included.
+  /// Of reference_T_observed (order x, y, theta; right perturbation; m, rad). It includes the
+  /// information of the guess.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   std::vector<PointPair> pairs;  ///< One to one, in order of `observed`.
 };
 
-/// Registers `observed` (frame `observed`) to `reference` (frame `reference`) starting from `guess`
-/// with its covariance.
+/// How many pairs a registration needs before its pose is accepted.
+struct MatchQuota {
+  std::size_t min_matched = 4;     ///< Least number of pairs.
+  double min_matched_ratio = 0.5;  ///< Least share of the points that can be matched, 0 to 1.
+
+  /// True where `matched` pairs are enough, if `possible` points can be matched.
+  bool is_met(std::size_t matched, std::size_t possible) const {
+    return share_is_met(matched, possible) && matched >= min_matched;
+  }
+
+  /// The share alone, for callers that replace the least number by another condition.
+  bool share_is_met(std::size_t matched, std::size_t possible) const {
+    return static_cast<double>(matched) >= min_matched_ratio * static_cast<double>(possible);
+  }
+
+  /// The same quota for a scene with `available` points: it never asks for more pairs than that.
+  MatchQuota capped_at(std::size_t available) const {
+    return {std::min(min_matched, available), min_matched_ratio};
+  }
+};
+
+/// Registers `observed` (frame `observed`) to `reference` (frame `reference`), starting from
+/// `guess` (reference_T_observed with its covariance). Where either set is empty the guess comes
+/// back without pairs.
 ///
-/// The gate of each pair follows from the points' variances and from the pose's own uncertainty,
-/// which shrinks from round to round; while it is wide, only points with a single candidate inside
-/// their gate count. So near points fix the heading before far ones are used. Cost O(rounds (n +
-/// m)).
+/// The gate of each pair follows from the points' variances and from the pose covariance, which
+/// shrinks from round to round. While the gate is wide, only points with a single candidate inside
+/// it count. So near points fix the heading before far ones are used. Cost O(rounds (n + m)).
 Registration register_points(std::span<const UncertainPoint> reference,
                              std::span<const UncertainPoint> observed,
                              const SE2WithCovariance& guess,
                              const RegistrationParameters& parameters = {});
 
-/// What is known of the step between two observations when nothing measures it.
+/// Uncertainty of the motion between two observations when no odometry measures it.
 struct StepModel {
-  double sigma_m = 0.3;
-  double sigma_rad = 0.04;
-  double max_rotation_rad = 0.5;  ///< Largest turn that is searched.
-  /// A turn that was searched needs so many pairs: among 27 tried, four points fit one by chance.
+  double sigma_m = 0.3;           ///< Of the translation, per axis.
+  double sigma_rad = 0.04;        ///< Of the rotation; also the step width of the search.
+  double max_rotation_rad = 0.5;  ///< Largest rotation that is searched, to either side.
+  /// Least number of pairs of a searched rotation. Four points fit one of 27 rotations by chance.
   std::size_t min_searched_pairs = 8;
 };
 
-/// Registers an observation made one step after `last` (pose in `reference`). First the last step
-/// is taken to repeat; where the result does not `fit`, turns on the spot are tried from -max_turn
-/// to max_turn, and the one with the most pairs, if they are enough, is returned, fitting or not.
+/// Registers an observation that was made one step after the pose `last` (reference_T_observed).
+///
+/// The first guess repeats `last_step` (previous_T_last). Where its result does not satisfy `fits`,
+/// rotations on the spot from -max_rotation_rad to max_rotation_rad are tried, and the result with
+/// the most pairs is returned. That result may not satisfy `fits` either: the caller must ask.
+/// Cost: that of register_points(), times the number of rotations where the first guess fails.
 Registration register_step(std::span<const UncertainPoint> reference,
                            std::span<const UncertainPoint> observed, const SE2& last,
                            const SE2& last_step, const StepModel& model,

@@ -7,9 +7,9 @@
 namespace understory::model {
 namespace {
 
-/// The level's error changes over some seconds.
-constexpr Utime kLately_us = 2'000'000;
-/// Of a detection's covariance, when the level's part is out.
+/// An older estimate is not used: the level's error changes over some seconds.
+constexpr Utime kMaxAge_us = 2'000'000;
+/// Least share of a detection's covariance that remains without the level's part.
 constexpr double kLeastOwnShare = 0.05;
 
 }  // namespace
@@ -20,19 +20,24 @@ Eigen::Matrix2d without_level(const Eigen::Matrix2d& covariance_m2, const Eigen:
   const Eigen::Matrix2d root = factor.matrixL().solve(arm);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> share(root * level_covariance_rad2 *
                                                              root.transpose());
-  const Eigen::Matrix2d turn = factor.matrixL() * share.eigenvectors();
-  const Eigen::Vector2d left = (1.0 - share.eigenvalues().array()).cwiseMax(kLeastOwnShare);
-  return turn * left.asDiagonal() * turn.transpose();
+  const Eigen::Matrix2d axes = factor.matrixL() * share.eigenvectors();
+  const Eigen::Vector2d own_share = (1.0 - share.eigenvalues().array()).cwiseMax(kLeastOwnShare);
+  return axes * own_share.asDiagonal() * axes.transpose();
 }
 
 LandmarkScan LevelCorrection::levelled(LandmarkScan scan) const {
-  if (!level_ || std::abs(scan.utime - level_->utime) > kLately_us) return scan;
+  if (!level_ || std::abs(scan.utime - level_->utime) > kMaxAge_us) return scan;
   Eigen::Matrix2d by_height;
   by_height << 0.0, 1.0, -1.0, 0.0;
+
   for (Detection& detection : scan.detections) {
     if (!detection.position_m.allFinite() || !detection.covariance_m2.allFinite()) continue;
+
+    // The estimated error displaces the detection by its height.
     const Eigen::Matrix2d arm = detection.position_m.z() * by_height;
     detection.position_m.head<2>() -= arm * level_->error_rad;
+
+    // Its covariance has the remaining error instead of the whole one.
     const Eigen::Matrix2d whole = detection.covariance_m2.topLeftCorner<2, 2>();
     if (whole.llt().info() != Eigen::Success) continue;
     const Eigen::Matrix2d own = without_level(whole, arm, level_->reported_covariance);

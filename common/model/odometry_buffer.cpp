@@ -8,11 +8,11 @@
 namespace understory::model {
 namespace {
 
-/// Pieces from one source may miss each other by rounding of their stamps.
+/// Rounding of stamps between consecutive increments.
 constexpr Utime kGapTolerance_us = 1000;
 
-/// Errors of the filter's velocity last for about so long: they have the power tau * dt when pieces
-/// are compounded.
+/// Correlation time of the error of the filter's velocity: it has the power tau * dt when
+/// increments are compounded.
 constexpr double kVelocityCorrelation_s = 0.5;
 constexpr std::size_t kMaxIncrements = 20000;
 
@@ -20,12 +20,14 @@ bool begins_at(const Odometry& increment, Utime utime) {
   return std::abs(increment.from_utime - utime) <= kGapTolerance_us;
 }
 
-/// The piece's way, started at the given velocity.
-geometry::SE2WithCovariance way_from(const VelocityEstimate& start,
-                                     const Preintegration& inertial) {
+/// The increment's motion, started at the given velocity.
+geometry::SE2WithCovariance motion_from(const VelocityEstimate& start,
+                                        const Preintegration& inertial) {
   const double dt = inertial.seconds;
   geometry::SE2WithCovariance motion;
   motion.mean = geometry::SE2(start.velocity_mps * dt + inertial.position_m, inertial.yaw_rad);
+
+  // The noise of the IMU and of the starting velocity, in the axes of the end.
   Eigen::Matrix<double, 3, 5> of_noise = Eigen::Matrix<double, 3, 5>::Zero();
   const Eigen::Matrix2d back = motion.mean.rotation().transpose();
   of_noise.topRightCorner<2, 2>() = back;
@@ -36,7 +38,7 @@ geometry::SE2WithCovariance way_from(const VelocityEstimate& start,
   return motion;
 }
 
-/// The velocity at the piece's end.
+/// The velocity at the increment's end.
 VelocityEstimate carried_over(const VelocityEstimate& start, const Odometry& increment,
                               const Preintegration& inertial) {
   const Eigen::Matrix2d back = geometry::SE2(0.0, 0.0, inertial.yaw_rad).rotation().transpose();
@@ -56,9 +58,8 @@ geometry::SE2WithCovariance part(const Odometry& increment, Utime from, Utime to
           fraction * increment.covariance};
 }
 
-/// The piece as it would be had its samples been integrated at `bias`: its turn alone, spread
-/// evenly over the way. The accelerometer's bias moves it by less than a millimetre between two
-/// scans.
+/// The increment with its samples integrated at `bias`: the rotation alone, spread evenly over the
+/// path. The accelerometer's bias displaces it by less than a millimetre between two scans.
 Odometry at_bias(const Odometry& increment, const InertialBias& bias) {
   Odometry moved = increment;
   if (!increment.inertial || increment.is_stationary) return moved;
@@ -70,7 +71,7 @@ Odometry at_bias(const Odometry& increment, const InertialBias& bias) {
   return moved;
 }
 
-/// The heading's variance, with what it shares with the way in proportion.
+/// Sets the heading's variance; its covariances with the translation change in proportion.
 void set_heading_variance(Eigen::Matrix3d& covariance, double variance) {
   const double ratio = covariance(2, 2) > 0.0 ? std::sqrt(variance / covariance(2, 2)) : 0.0;
   covariance.row(2) *= ratio;
@@ -95,9 +96,11 @@ void OdometryBuffer::start_at_velocity(Odometry& increment) {
     velocity_.reset();
     return;
   }
+
+  // The filter's velocity replaces the wheels where it is more certain.
   const Preintegration inertial = at_bias(*increment.inertial, *bias_);
   if (!increment.is_stationary) {
-    const geometry::SE2WithCovariance motion = way_from(*velocity_, inertial);
+    const geometry::SE2WithCovariance motion = motion_from(*velocity_, inertial);
     const auto spread = [](const Eigen::Matrix3d& c) { return c(0, 0) + c(1, 1); };
     if (spread(motion.covariance) < spread(increment.covariance)) {
       increment.from_T_to = motion.mean;
@@ -109,6 +112,7 @@ void OdometryBuffer::start_at_velocity(Odometry& increment) {
     if (bias_correlation_s_ == 0.0 && inertial.covariance(0, 0) > 0.0)
       set_heading_variance(increment.covariance, inertial.covariance(0, 0));
   }
+
   velocity_ = carried_over(*velocity_, increment, inertial);
 }
 
@@ -116,7 +120,8 @@ void OdometryBuffer::set_filter_pose(const EkfPose& pose) {
   bias_ = pose.bias;
   VelocityEstimate known{pose.utime, pose.velocity_mps, pose.velocity_covariance,
                          pose.bias_covariance(0, 0)};
-  // The filter may speak of a time before the latest pieces: it is carried over them.
+
+  // The pose may be older than the latest increments: its velocity is carried over them.
   auto increment = std::find_if(increments_.begin(), increments_.end(), [&](const Odometry& one) {
     return one.utime > known.utime + kGapTolerance_us;
   });
@@ -131,6 +136,7 @@ std::optional<geometry::SE2WithCovariance> OdometryBuffer::between(Utime from, U
   if (to < from) return std::nullopt;
   auto increment = std::upper_bound(increments_.begin(), increments_.end(), from,
                                     [](Utime t, const Odometry& p) { return t < p.utime; });
+
   geometry::SE2WithCovariance motion;
   Utime reached = from;
   while (reached + kGapTolerance_us < to || (reached < to && increment != increments_.end())) {
@@ -154,12 +160,15 @@ std::optional<GyroRotation> OdometryBuffer::gyro_rotation(Utime from, Utime to) 
     if (overlap <= 0) continue;
     if (!increment.inertial) return std::nullopt;
     covered += overlap;
+
+    // In proportion to time; at standstill the bias has no effect.
     const double part =
         static_cast<double>(overlap) / static_cast<double>(increment.utime - increment.from_utime);
     const double seconds = increment.is_stationary ? 0.0 : 1e-6 * static_cast<double>(overlap);
     sum += {part * increment.from_T_to.theta(), part * increment.covariance(2, 2), seconds,
             seconds * increment.inertial->bias.x()};
   }
+
   if (covered + kGapTolerance_us < to - from) return std::nullopt;
   return sum;
 }

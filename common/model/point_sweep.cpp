@@ -8,7 +8,7 @@ namespace understory::model {
 
 namespace {
 
-/// A turn is not thought to be larger before it is there [points]: a header may claim anything.
+/// Largest number of points for which memory is reserved by the header alone, which may be wrong.
 constexpr std::size_t kLargestReserve = std::size_t{1} << 20;
 
 PointSweep without_points(const PointSweep& sweep) {
@@ -24,6 +24,7 @@ std::vector<PointSweep> split_sweep(const PointSweep& sweep, std::size_t max_poi
   const std::vector<SweepPoint>& points = sweep.points;
   const std::size_t count = std::max<std::size_t>(1, (points.size() + max_points - 1) / max_points);
   if (count > 65535) throw std::invalid_argument("split_sweep: too many parts");
+
   std::vector<PointSweep> parts(count, without_points(sweep));
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t begin = i * max_points;
@@ -39,6 +40,8 @@ std::vector<PointSweep> split_sweep(const PointSweep& sweep, std::size_t max_poi
 std::optional<PointSweep> SweepAssembler::add(PointSweep part) {
   const bool continues = pending_ && pending_->turn == part.turn && pending_->utime == part.utime &&
                          pending_->parts == part.parts && part.part == next_part_;
+
+  // The first part of a revolution, or the next one of the pending revolution.
   if (!continues) {
     if (pending_) count_incomplete(pending_->turn);
     pending_.reset();
@@ -54,6 +57,7 @@ std::optional<PointSweep> SweepAssembler::add(PointSweep part) {
     pending_->points.insert(pending_->points.end(), part.points.begin(), part.points.end());
     ++next_part_;
   }
+
   if (next_part_ < pending_->parts) return std::nullopt;
   std::optional<PointSweep> whole = std::exchange(pending_, std::nullopt);
   whole->part = 0;
@@ -61,9 +65,9 @@ std::optional<PointSweep> SweepAssembler::add(PointSweep part) {
   return whole;
 }
 
-void SweepAssembler::count_incomplete(std::uint64_t turn) {
+void SweepAssembler::count_incomplete(std::uint64_t revolution) {
   ++incomplete_;
-  lost_revolution_ = turn;
+  lost_revolution_ = revolution;
 }
 
 }  // namespace understory::model

@@ -17,18 +17,20 @@ class AssociatorAdapter : public bus::Adapter {
 
   void bind(bus::Node& node) override {
     stage_.emplace(parameters_);
+
     node.subscribe<model::LandmarkScan>(channels_.landmarks,
                                         [this](const model::LandmarkScan& scan) {
                                           if (const auto tracked = stage_->add(scan))
                                             tracked_.publish(*tracked);
                                         },
                                         {.queue_size = 200});
-    // Each piece that is shed is a gap in the motion: a long queue.
+    // A lost increment is a gap in the motion: a long queue.
     node.subscribe<model::Odometry>(
         channels_.odometry, [this](const model::Odometry& increment) { stage_->add(increment); },
         {.queue_size = 2000});
     node.subscribe<model::EkfPose>(channels_.filter_pose,
                                    [this](const model::EkfPose& pose) { stage_->add(pose); });
+
     tracked_ = node.advertise<model::TrackedScan>(channels_.tracked_landmarks);
   }
 

@@ -1,4 +1,4 @@
-// The associator's place on the bus.
+// The associator on the bus.
 #pragma once
 
 #include <string>
@@ -7,6 +7,7 @@
 
 namespace understory::associator {
 
+/// Names of the channels that the process reads and writes.
 struct AssociatorChannels {
   std::string landmarks = "LANDMARKS";
   std::string odometry = "ODOMETRY";
@@ -14,6 +15,8 @@ struct AssociatorChannels {
   std::string tracked_landmarks = "TRACKED_LANDMARKS";
 };
 
+/// The process: its name, its channels and how to make its adapter. The stage is made when the
+/// service is bound, by the parameters that are then in force.
 bus::Service associator_service(const AssociatorChannels& channels = {});
 
 }  // namespace understory::associator

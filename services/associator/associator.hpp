@@ -1,5 +1,4 @@
-// Which detection is which landmark, from scan to scan ("Association Node", section 3.2.2 of the
-// vehicle stack's source).
+// Which detection is which landmark, from scan to scan ("Association Node", vehicle stack §3.2.2).
 #pragma once
 
 #include <cstdint>
@@ -7,75 +6,86 @@
 #include <string>
 #include <vector>
 
-#include "common/geometry/registration.hpp"
 #include "common/model/ekf_output.hpp"
-#include "common/model/odometry_buffer.hpp"
+#include "common/model/odometry.hpp"
 #include "common/model/tracked.hpp"
+#include "services/associator/match.hpp"
+#include "services/associator/motion_predictor.hpp"
 #include "services/associator/parameters.hpp"
+#include "services/associator/scan_localiser.hpp"
 #include "services/associator/track_list.hpp"
 
 namespace understory::associator {
 
-/// Counted for HEALTH.
+/// Counts for HEALTH, since the process started.
 struct AssociatorCounters {
-  std::uint64_t scans = 0;
-  std::uint64_t scans_refused = 0;         ///< Late or twice.
-  std::uint64_t scans_passed_over = 0;     ///< Fitted no track: nothing was made of it.
-  std::uint64_t scans_lost = 0;            ///< Fitted no track once more: all tracks began anew.
-  std::uint64_t scans_without_motion = 0;  ///< Nothing but the last motion predicted them.
-  std::uint64_t detections = 0;
-  std::uint64_t detections_unusable = 0;  ///< Not finite, or no covariance.
-  std::uint64_t published = 0;
-  std::uint64_t ambiguous = 0;  ///< Matched, but not published.
-  std::uint64_t tracks_confirmed = 0;
-  std::uint64_t searches = 0;  ///< For the largest consistent set.
-  std::string last_reason;
+  std::uint64_t scans = 0;                 ///< Received.
+  std::uint64_t scans_refused = 0;         ///< Late or repeated.
+  std::uint64_t scans_passed_over = 0;     ///< Fitted no track; the tracks were kept.
+  std::uint64_t scans_lost = 0;            ///< Fitted no track once more; all tracks began anew.
+  std::uint64_t scans_without_motion = 0;  ///< Predicted by the last motion alone.
+  std::uint64_t detections = 0;            ///< Received.
+  std::uint64_t detections_unusable = 0;   ///< Not finite, or without a covariance.
+  std::uint64_t published = 0;             ///< Detections with a track id.
+  std::uint64_t ambiguous = 0;             ///< Matched, but not published.
+  std::uint64_t tracks_confirmed = 0;      ///< Tracks that got an id.
+  std::uint64_t searches = 0;  ///< Scans for which the largest consistent set was sought.
+  std::string last_reason;     ///< Why the last scan was not used.
 };
 
+/// Gives the detections of consistent landmarks an id that lasts as long as the track.
+///
+/// It works in the frame `local`, which drifts slowly. All inputs come in order of time; what
+/// cannot be used is counted, never thrown.
 class Associator {
  public:
   /// Throws std::invalid_argument where `method` names none.
   explicit Associator(const AssociatorParameters& parameters);
 
-  /// Motion since the last scan; must come before the scan at its end to be of use.
-  void add(const model::Odometry& increment);
-  /// The filter's pose at an earlier scan: its velocity and biases predict the next motion. Never
+  /// Motion of the vehicle; it must come before the scan at its end to be of use.
+  void add(const model::Odometry& increment) { motion_.add(increment); }
+  /// The filter's pose at the last scan: its velocity and biases predict the next motion. It never
   /// changes a track.
-  void add(const model::EkfPose& pose);
-  /// The consistent landmarks of a scan (perhaps none); nothing from a late or repeated scan.
+  void add(const model::EkfPose& pose) { motion_.add(pose); }
+  /// The consistent landmarks of a scan (perhaps none). Nothing for a late or repeated scan; one
+  /// that is more than 10 s earlier than the last one starts the tracks anew (the clock was set
+  /// back).
   std::optional<model::TrackedScan> add(const model::LandmarkScan& scan);
 
+  /// Counts for HEALTH.
   const AssociatorCounters& counters() const { return counters_; }
+  /// Number of tracks, consistent or not.
   std::size_t track_count() const { return tracks_.tracks().size(); }
 
+  /// The whole state as bytes, in the format "associator" of common/state.
   std::string save() const;
-  void load(const std::string& state);
+  /// Throws std::invalid_argument on bytes that save() did not make; the state is then as before.
+  void load(const std::string& bytes);
+
+  /// Members of a saved state; see common/state. The parameters are configuration, and the counters
+  /// are of this process.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.tracks_, self.motion_, self.local_T_vehicle_, self.misfits_, self.next_sequence_);
+  }
 
  private:
-  std::optional<geometry::SE2WithCovariance> motion_to(model::Utime utime) const;
-  std::optional<geometry::SE2WithCovariance> motion_by_wheels(model::Utime from,
-                                                              model::Utime to) const;
-  std::optional<geometry::SE2WithCovariance> motion_by_filter(model::Utime utime) const;
-  geometry::Registration locate(const std::vector<Seen>& seen, const model::FieldOfView& view,
-                                model::Utime utime);
-  geometry::Registration search(const std::vector<Seen>& seen,
-                                const geometry::SE2WithCovariance& guess,
-                                const geometry::RegistrationParameters& registration);
-  model::TrackedScan publish(const model::LandmarkScan& scan, const std::vector<Seen>& seen,
-                             const std::vector<Match>& matches,
-                             const geometry::SE2& local_T_vehicle);
-  bool fits(const geometry::Registration& registration, std::size_t seen,
-            const model::FieldOfView& view) const;
+  bool is_in_time(const model::LandmarkScan& scan);
+  Localisation locate(const std::vector<Observation>& observations,
+                      const model::LandmarkScan& scan);
+  bool pass_over();
+  std::vector<model::TrackId> update_tracks(const std::vector<Observation>& observations,
+                                            const std::vector<Match>& matches,
+                                            const model::LandmarkScan& scan);
+  model::TrackedScan tracked_scan(const std::vector<Observation>& observations,
+                                  const std::vector<model::TrackId>& ids,
+                                  const model::LandmarkScan& scan);
 
   AssociatorParameters parameters_;
   TrackList tracks_;
-  model::OdometryBuffer odometry_;
-  std::optional<model::EkfPose> filter_pose_;
-  std::optional<model::Utime> last_scan_;
-  double last_interval_s_ = 0.1;
-  geometry::SE2 local_T_vehicle_;
-  geometry::SE2 last_motion_;
-  int misfits_ = 0;  ///< Scans in a row that fitted no track.
+  MotionPredictor motion_;
+  geometry::SE2 local_T_vehicle_;  ///< At the last scan that was placed.
+  int misfits_ = 0;                ///< Scans in a row that fitted no track.
   std::uint64_t next_sequence_ = 0;
   AssociatorCounters counters_;
 };

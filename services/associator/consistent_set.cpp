@@ -12,8 +12,9 @@ constexpr std::size_t kMaxObserved = 24;
 constexpr std::size_t kMaxPairs = 512;
 using Set = std::bitset<kMaxPairs>;
 
+/// A possible pair.
 struct Pair {
-  double off_m = 0.0;  ///< From where the guess puts it.
+  double off_m = 0.0;  ///< Distance from the position by the guess.
   ConsistencyPair ends;
 };
 
@@ -33,6 +34,7 @@ class CliqueSearch {
  private:
   void expand(Set open) {
     if (nodes_-- <= 0) return;
+
     // Vertices of one colour exclude each other: the number of colours bounds the clique.
     std::vector<std::size_t> order;
     std::vector<std::size_t> colour;
@@ -46,6 +48,8 @@ class CliqueSearch {
         colour.push_back(c);
       }
     }
+
+    // Branch on the vertices of the highest colour first.
     for (std::size_t k = order.size(); k-- > 0;) {
       if (current_.size() + colour[k] <= best_.size()) return;
       const std::size_t v = order[k];
@@ -67,20 +71,23 @@ class CliqueSearch {
   std::vector<std::size_t> best_;
 };
 
-}  // namespace
-
-std::vector<ConsistencyPair> consistent_set(std::span<const ConsistencyPoint> reference,
-                                            std::span<const ConsistencyPoint> observed,
-                                            const geometry::SE2& guess,
-                                            const ConsistencyGate& gate) {
+/// Indices of the observed points nearest to the origin.
+std::vector<std::uint32_t> nearest(std::span<const ConsistencyPoint> observed) {
   std::vector<std::uint32_t> near(observed.size());
   std::iota(near.begin(), near.end(), 0u);
   std::stable_sort(near.begin(), near.end(), [&](std::uint32_t a, std::uint32_t b) {
     return observed[a].position_m.squaredNorm() < observed[b].position_m.squaredNorm();
   });
   if (near.size() > kMaxObserved) near.resize(kMaxObserved);
+  return near;
+}
+
+/// Pairs of one kind within reach of the guess, nearest to it first.
+std::vector<Pair> possible_pairs(std::span<const ConsistencyPoint> reference,
+                                 std::span<const ConsistencyPoint> observed,
+                                 const geometry::SE2& guess, const ConsistencyGate& gate) {
   std::vector<Pair> pairs;
-  for (const std::uint32_t i : near) {
+  for (const std::uint32_t i : nearest(observed)) {
     const Eigen::Vector2d at = guess * observed[i].position_m;
     const double reach = gate.shift_m + gate.rotation_rad * observed[i].position_m.norm();
     for (std::uint32_t r = 0; r < reference.size(); ++r) {
@@ -88,25 +95,46 @@ std::vector<ConsistencyPair> consistent_set(std::span<const ConsistencyPoint> re
       if (reference[r].kind == observed[i].kind && off < reach) pairs.push_back({off, {r, i}});
     }
   }
+
   std::stable_sort(pairs.begin(), pairs.end(),
                    [](const Pair& a, const Pair& b) { return a.off_m < b.off_m; });
   if (pairs.size() > kMaxPairs) pairs.resize(kMaxPairs);
+  return pairs;
+}
+
+/// Which pairs one rigid motion can explain together.
+std::vector<Set> compatibility(const std::vector<Pair>& pairs,
+                               std::span<const ConsistencyPoint> reference,
+                               std::span<const ConsistencyPoint> observed, double sigmas) {
   std::vector<Set> adjacent(pairs.size());
   for (std::size_t a = 0; a < pairs.size(); ++a) {
     const ConsistencyPair& p = pairs[a].ends;
     for (std::size_t b = a + 1; b < pairs.size(); ++b) {
       const ConsistencyPair& q = pairs[b].ends;
       if (p.reference == q.reference || p.observed == q.observed) continue;
+
       const ConsistencyPoint &r1 = reference[p.reference], &r2 = reference[q.reference];
       const ConsistencyPoint &o1 = observed[p.observed], &o2 = observed[q.observed];
       const double difference =
           (r1.position_m - r2.position_m).norm() - (o1.position_m - o2.position_m).norm();
       const double variance = r1.variance_m2 + r2.variance_m2 + o1.variance_m2 + o2.variance_m2;
-      if (std::abs(difference) > gate.sigmas * std::sqrt(variance)) continue;
+      if (std::abs(difference) > sigmas * std::sqrt(variance)) continue;
       adjacent[a].set(b);
       adjacent[b].set(a);
     }
   }
+  return adjacent;
+}
+
+}  // namespace
+
+std::vector<ConsistencyPair> consistent_set(std::span<const ConsistencyPoint> reference,
+                                            std::span<const ConsistencyPoint> observed,
+                                            const geometry::SE2& guess,
+                                            const ConsistencyGate& gate) {
+  const std::vector<Pair> pairs = possible_pairs(reference, observed, guess, gate);
+  const std::vector<Set> adjacent = compatibility(pairs, reference, observed, gate.sigmas);
+
   std::vector<ConsistencyPair> found;
   for (const std::size_t k : CliqueSearch(adjacent, gate.max_nodes).run()) {
     found.push_back(pairs[k].ends);

@@ -1,11 +1,11 @@
-// Pairing the detections of one scan with tracks, at a known pose.
+#include "services/associator/match.hpp"
+
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "common/geometry/point_bins.hpp"
-#include "services/associator/track_list.hpp"
 
 namespace understory::associator {
 namespace {
@@ -17,36 +17,39 @@ constexpr double kGateFloor_m = 0.03;
 constexpr double kBin_m = 4.0;
 constexpr double kNone = std::numeric_limits<double>::infinity();
 
+/// A pair inside the gate.
 struct Candidate {
   double cost = 0.0;  ///< Minus twice the log likelihood, up to a constant.
-  std::uint32_t seen = 0;
+  std::uint32_t observation = 0;
   std::uint32_t track = 0;
 };
 
 bool cheaper(const Candidate& a, const Candidate& b) {
   if (a.cost != b.cost) return a.cost < b.cost;
-  return a.seen != b.seen ? a.seen < b.seen : a.track < b.track;
+  return a.observation != b.observation ? a.observation < b.observation : a.track < b.track;
 }
 
 class Matcher {
  public:
-  Matcher(std::span<const Track> tracks, std::span<const Seen> seen,
+  Matcher(std::span<const Track> tracks, std::span<const Observation> observations,
           const geometry::SE2WithCovariance& pose, const AssociatorParameters& parameters)
       : tracks_(tracks),
-        by_seen_(seen.size()),
-        partner_(seen.size(), kFree),
+        by_observation_(observations.size()),
+        partner_(observations.size(), kFree),
         owner_(tracks.size(), kFree) {
-    collect(seen, pose, parameters.gate_sigmas);
+    collect(observations, pose, parameters.gate_sigmas);
     margin_ = 2.0 * std::log(parameters.min_likelihood_ratio);
   }
 
   std::vector<Match> run() {
+    // Likeliest first; then swaps that make the scan likelier.
     std::sort(all_.begin(), all_.end(), cheaper);
     for (const Candidate& c : all_) {
-      if (partner_[c.seen] != kFree || owner_[c.track] != kFree) continue;
-      pair(c.seen, c.track);
+      if (partner_[c.observation] != kFree || owner_[c.track] != kFree) continue;
+      pair(c.observation, c.track);
     }
     improve();
+
     std::vector<Match> matches;
     for (std::uint32_t i = 0; i < partner_.size(); ++i) {
       if (partner_[i] != kFree) matches.push_back({i, partner_[i], is_ambiguous(i)});
@@ -57,12 +60,14 @@ class Matcher {
  private:
   static constexpr std::uint32_t kFree = std::numeric_limits<std::uint32_t>::max();
 
-  void pair(std::uint32_t seen, std::uint32_t track) {
-    partner_[seen] = track;
-    owner_[track] = seen;
+  void pair(std::uint32_t observation, std::uint32_t track) {
+    partner_[observation] = track;
+    owner_[track] = observation;
   }
 
-  void collect(std::span<const Seen> seen, const geometry::SE2WithCovariance& pose, double sigmas) {
+  void collect(std::span<const Observation> observations, const geometry::SE2WithCovariance& pose,
+               double sigmas) {
+    // The tracks, sorted into bins.
     std::vector<Eigen::Vector2d> positions;
     double track_variance = 0.0;
     for (const Track& track : tracks_) {
@@ -70,46 +75,50 @@ class Matcher {
       track_variance = std::max(track_variance, track.variance_m2());
     }
     const geometry::PointBins bins(positions, kBin_m);
+
+    // Each observation in the axes of `local`, with the covariance of the pose.
     const Eigen::Matrix2d rotation = pose.mean.rotation();
-    for (std::uint32_t i = 0; i < seen.size(); ++i) {
-      // Everything in the axes of `local`.
+    for (std::uint32_t i = 0; i < observations.size(); ++i) {
       Eigen::Matrix<double, 2, 3> by_pose;
-      by_pose << Eigen::Matrix2d::Identity(), geometry::perpendicular(seen[i].position_m);
+      by_pose << Eigen::Matrix2d::Identity(), geometry::perpendicular(observations[i].position_m);
       const Eigen::Matrix2d base =
-          rotation * (seen[i].covariance_m2 + by_pose * pose.covariance * by_pose.transpose()) *
+          rotation *
+              (observations[i].covariance_m2 + by_pose * pose.covariance * by_pose.transpose()) *
               rotation.transpose() +
           kGateFloor_m * kGateFloor_m / (sigmas * sigmas) * Eigen::Matrix2d::Identity();
-      const Eigen::Vector2d at = pose.mean * seen[i].position_m;
+      const Eigen::Vector2d at = pose.mean * observations[i].position_m;
       const double reach = sigmas * std::sqrt(base.trace() + track_variance);
+
       bins.for_each_within(at, reach, [&](std::uint32_t t, double) {
         const Track& track = tracks_[t];
-        if (track.kind != seen[i].kind) return;
+        if (track.kind != observations[i].kind) return;
         const Eigen::Matrix2d spread = base + track.variance_m2() * Eigen::Matrix2d::Identity();
         const Eigen::Vector2d error = at - track.position_m;
         const double distance = error.dot(spread.inverse() * error);
         if (distance > sigmas * sigmas) return;
+
         const double reluctance = track.observations < kYoung ? kReluctance : 0.0;
         const Candidate c{distance + std::log(spread.determinant()) + reluctance, i, t};
         all_.push_back(c);
-        by_seen_[i].push_back(c);
+        by_observation_[i].push_back(c);
       });
     }
   }
 
-  double cost(std::uint32_t seen, std::uint32_t track) const {
-    for (const Candidate& c : by_seen_[seen]) {
+  double cost(std::uint32_t observation, std::uint32_t track) const {
+    for (const Candidate& c : by_observation_[observation]) {
       if (c.track == track) return c.cost;
     }
     return kNone;
   }
 
-  /// Swaps partners of two detections while that makes the scan likelier.
+  /// Swaps the tracks of two observations while that makes the scan likelier.
   void improve() {
     for (int round = 0; round < 3; ++round) {
       bool changed = false;
       for (std::uint32_t i = 0; i < partner_.size(); ++i) {
         if (partner_[i] == kFree) continue;
-        for (const Candidate& c : by_seen_[i]) {
+        for (const Candidate& c : by_observation_[i]) {
           const std::uint32_t j = owner_[c.track];
           if (j == kFree || j == i) continue;
           const std::uint32_t own = partner_[i];
@@ -124,13 +133,13 @@ class Matcher {
     }
   }
 
-  /// Giving the detection to another track, and that track's own to this one's (or to none),
-  /// explains the scan nearly as well.
+  /// The scan is nearly as likely with another track for observation `i`, whose own observation
+  /// then takes the track of `i` (or none).
   bool is_ambiguous(std::uint32_t i) const {
     const std::uint32_t own = partner_[i];
     const double now = cost(i, own);
-    for (const Candidate& c : by_seen_[i]) {
-      // One sighting beside an older track is more likely an outlier or a false detection.
+    for (const Candidate& c : by_observation_[i]) {
+      // One observation beside an older track is more likely an outlier or a false detection.
       const bool counts = tracks_[c.track].observations >= 2 || tracks_[own].observations < kYoung;
       if (c.track == own || !counts) continue;
       const std::uint32_t j = owner_[c.track];
@@ -138,7 +147,8 @@ class Matcher {
           j == kFree ? c.cost - now : c.cost + cost(j, own) - now - cost(j, c.track);
       if (other < margin_) return true;
     }
-    // Another detection, left over, may be this track's instead.
+
+    // Another observation, without a track, may be this track's instead.
     for (std::uint32_t j = 0; j < partner_.size(); ++j) {
       if (j != i && partner_[j] == kFree && cost(j, own) - now < margin_) return true;
     }
@@ -146,20 +156,20 @@ class Matcher {
   }
 
   std::span<const Track> tracks_;
-  std::vector<std::vector<Candidate>> by_seen_;
+  std::vector<std::vector<Candidate>> by_observation_;
   std::vector<Candidate> all_;
-  std::vector<std::uint32_t> partner_;  ///< Track of each detection.
-  std::vector<std::uint32_t> owner_;    ///< Detection of each track.
-  double margin_ = 0.0;
+  std::vector<std::uint32_t> partner_;  ///< Track of each observation.
+  std::vector<std::uint32_t> owner_;    ///< Observation of each track.
+  double margin_ = 0.0;                 ///< Least difference of costs to be unambiguous.
 };
 
 }  // namespace
 
-std::vector<Match> match(std::span<const Track> tracks, std::span<const Seen> seen,
+std::vector<Match> match(std::span<const Track> tracks, std::span<const Observation> observations,
                          const geometry::SE2WithCovariance& local_T_vehicle,
                          const AssociatorParameters& parameters) {
-  if (tracks.empty() || seen.empty()) return {};
-  return Matcher(tracks, seen, local_T_vehicle, parameters).run();
+  if (tracks.empty() || observations.empty()) return {};
+  return Matcher(tracks, observations, local_T_vehicle, parameters).run();
 }
 
 }  // namespace understory::associator

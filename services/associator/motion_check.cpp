@@ -9,39 +9,44 @@ namespace {
 
 /// chi^2 of 2 degrees of freedom: one in 100,000.
 constexpr double kGate = 23.0;
-/// Farther off in so many sightings in a row, it moves.
-constexpr std::uint32_t kSightings = 2;
-/// What of two sightings' errors their covariances do not know [m].
+/// Contradictions in a row after which a track moves.
+constexpr std::uint32_t kContradictions = 2;
+/// Error of the difference of two observations that their covariances lack, per axis.
 constexpr double kFloor_m = 0.03;
 
 }  // namespace
 
-void check_motion(Track& track, const Seen& seen, const MotionCheck& check,
+void check_motion(Track& track, const Observation& observation, const MotionCheck& check,
                   const AssociatorParameters& parameters) {
+  // Where a stationary track is expected now, and with which covariance.
   const geometry::SE2 now_T_then = check.then_T_now.mean.inverse();
-  const Eigen::Vector2d expected = now_T_then * track.begin.position_m;
+  const Eigen::Vector2d expected = now_T_then * track.reference.position_m;
   Eigen::Matrix<double, 2, 3> by_motion;
   by_motion << Eigen::Matrix2d::Identity(), geometry::perpendicular(expected);
-  const Eigen::Matrix2d turn = now_T_then.rotation();
-  const Eigen::Matrix2d spread = seen.covariance_m2 +
-                                 turn * track.begin.covariance_m2 * turn.transpose() +
+  const Eigen::Matrix2d rotation = now_T_then.rotation();
+  const Eigen::Matrix2d spread = observation.covariance_m2 +
+                                 rotation * track.reference.covariance_m2 * rotation.transpose() +
                                  by_motion * check.then_T_now.covariance * by_motion.transpose() +
                                  kFloor_m * kFloor_m * Eigen::Matrix2d::Identity();
-  const Eigen::Vector2d off = seen.position_m - expected;
+
+  // It is not there.
+  const Eigen::Vector2d off = observation.position_m - expected;
   if (off.dot(spread.inverse() * off) > kGate) {
-    if (++track.times_off >= kSightings) track.steadiness = Steadiness::kMoves;
+    if (++track.moved_in_a_row >= kContradictions) track.steadiness = Steadiness::kMoves;
     return;
   }
-  track.times_off = 0;
+  track.moved_in_a_row = 0;
   if (track.steadiness != Steadiness::kUnknown) return;
+
+  // It is: stationary, if somebody who walks would be outside the gate by now.
   const double widest =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(spread, Eigen::EigenvaluesOnly)
           .eigenvalues()
           .maxCoeff();
   const double noticed_m = std::sqrt(kGate * widest);
-  const bool is_told = parameters.walking_mps * check.seconds > noticed_m;
-  // Where so long a time does not tell, nothing will.
-  if (is_told || check.seconds > kCompared_s) track.steadiness = Steadiness::kStationary;
+  const bool is_noticed = parameters.walking_mps * check.seconds > noticed_m;
+  // A longer comparison would not decide it either.
+  if (is_noticed || check.seconds > kMaxComparison_s) track.steadiness = Steadiness::kStationary;
 }
 
 }  // namespace understory::associator

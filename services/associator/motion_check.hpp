@@ -1,23 +1,25 @@
-// Whether a track stands: what walks is no landmark.
+// Whether a track moves: who walks is no landmark.
 #pragma once
 
 #include "services/associator/track_list.hpp"
 
 namespace understory::associator {
 
-/// Sightings are compared with one at most so old [s]: wheels forget.
-constexpr double kCompared_s = 1.5;
+/// Longest time [s] over which two observations are compared: errors of wheels accumulate.
+constexpr double kMaxComparison_s = 1.5;
 
-/// What a track's sighting is compared with: the one that it began with, or one a while ago. The
-/// vehicle's own motion between the two is by wheels and IMU alone: a pose refined by the tracks
-/// would follow somebody who is the only one in view.
+/// The vehicle's motion from a track's reference observation until now, by wheels and IMU alone. A
+/// pose that is refined by the tracks would follow somebody who is alone in view.
 struct MotionCheck {
-  double seconds = 0.0;  ///< Between the two sightings.
+  double seconds = 0.0;  ///< Between the two observations.
   geometry::SE2WithCovariance then_T_now;
 };
 
-/// Updates `track.steadiness` by a sighting that it was matched with.
-void check_motion(Track& track, const Seen& seen, const MotionCheck& check,
+/// Updates `track.steadiness` by an observation that it was matched with. Two contradictions in a
+/// row (chi^2 of 2 degrees of freedom above 23, one in 100,000) mean that it moves. It is
+/// stationary once somebody who walks at `walking_mps` would have been noticed, or after
+/// kMaxComparison_s.
+void check_motion(Track& track, const Observation& observation, const MotionCheck& check,
                   const AssociatorParameters& parameters);
 
 }  // namespace understory::associator

@@ -1,34 +1,30 @@
-// The associator's parameters.
+// The associator's parameters. Ranges and the texts of --help are in adapter_parameters.cpp.
 #pragma once
 
 #include <string>
 
 namespace understory::associator {
 
+/// Parameters of the stage and of its process.
 struct AssociatorParameters {
-  /// How detections and tracks are paired: "nearest" (gated nearest neighbour at the predicted
-  /// pose), "registered" (the pose is refined first, in rounds), or "consistent" (the largest set
-  /// of pairs that one rigid motion explains, then refined). "auto": registered, and consistent
-  /// where that fits badly.
+  /// "nearest": gated nearest neighbour at the predicted pose. "registered": the pose is refined
+  /// first. "consistent": the largest set of pairs that one rigid motion explains, then refined.
+  /// "auto": registered, and consistent where that does not fit.
   std::string method = "auto";
-  double gate_sigmas = 4.0;
-  /// Of the motion between two scans where only the last motion predicts it.
-  double motion_sigma_m = 0.3;
-  double motion_sigma_rad = 0.04;
-  double max_rotation_rad = 0.5;   ///< Largest unpredicted turn between two scans that is searched.
-  double min_matched_ratio = 0.5;  ///< Of what could match: below, a scan is lost.
-  int min_matched = 3;             ///< Fewest matches of a scan that fits.
-  /// Scans in a row that fit no track and are passed over; then all tracks begin anew.
-  int max_misfits = 2;
-  int confirm_matches = 4;         ///< [k] A track is consistent once matched so often ...
-  int confirm_window = 6;          ///< [n] ... in so many scans.
-  int max_missed = 20;             ///< Scans in a row that should have shown it: it is dropped.
-  double keep_range_factor = 1.2;  ///< Tracks farther than this times the range are dropped.
-  /// A detection that another track explains nearly as well is not published: its likelihood must
-  /// be so many times the other's.
+  double gate_sigmas = 4.0;        ///< Half width of the gate of a pair.
+  double motion_sigma_m = 0.3;     ///< Of the step between two scans without a measurement.
+  double motion_sigma_rad = 0.04;  ///< Of the rotation between two scans without a measurement.
+  double max_rotation_rad = 0.5;   ///< Largest unpredicted rotation between two scans.
+  double min_matched_ratio = 0.5;  ///< Least share of what can match of a scan that fits.
+  int min_matched = 3;             ///< Least number of matches of a scan that fits.
+  int max_misfits = 2;             ///< Scans in a row without a fit before all tracks begin anew.
+  int confirm_matches = 4;         ///< [k] Matches that make a track consistent ...
+  int confirm_window = 6;          ///< [n] ... within so many scans.
+  int max_missed = 20;             ///< Scans in a row without a match before a track ends.
+  double keep_range_factor = 1.2;  ///< Tracks end beyond this multiple of the range.
+  /// A match is published if it is so many times likelier than any other pairing.
   double min_likelihood_ratio = 1000.0;
-  /// What moves against the wheels is no landmark; where few that stand are in view, a track is
-  /// published once somebody who walks like this would have been noticed. 0: nothing is checked.
+  /// Speed of somebody who walks; 0: no track is checked for motion (motion_check.hpp).
   double walking_mps = 0.8;
 };
 

@@ -1,4 +1,5 @@
-// The landmarks that are followed at the moment, in a frame that drifts slowly.
+// The landmarks around the vehicle that are followed from scan to scan, in a frame that drifts
+// slowly.
 #pragma once
 
 #include <cstdint>
@@ -7,102 +8,122 @@
 #include <span>
 #include <vector>
 
-#include "common/geometry/registration.hpp"
+#include "common/geometry/se2.hpp"
 #include "common/model/landmarks.hpp"
 #include "common/model/tracked.hpp"
+#include "services/associator/observation.hpp"
 #include "services/associator/parameters.hpp"
 
 namespace understory::associator {
 
-/// A usable detection.
-struct Seen {
-  std::uint32_t detection = 0;                           ///< Index in the scan.
-  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `vehicle_level`.
-  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
-  double radius_m = 0.0;
-  model::LandmarkKind kind = model::LandmarkKind::kTrunk;
-
-  double variance_m2() const { return 0.5 * covariance_m2.trace(); }
+/// Whether a track moves, by its observations and the vehicle's motion by wheels and IMU.
+enum class Steadiness : std::uint8_t {
+  kUnknown = 0,
+  kStationary = 1,
+  kMoves = 2,
 };
 
-/// Whether the track stands, by what wheels say of the vehicle.
-enum class Steadiness : std::uint8_t { kUnknown = 0, kStationary = 1, kMoves = 2 };
-
-/// A sighting to compare later ones with.
-struct Beginning {
+/// The observation of a track that later ones are compared with.
+struct ReferenceObservation {
   model::Utime utime = 0;
-  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `vehicle_level` at utime.
-  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();     ///< Frame `vehicle_level` at utime.
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< Likewise.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.utime, self.position_m, self.covariance_m2);
+  }
 };
 
+/// One landmark that is followed.
 struct Track {
   model::TrackId id = 0;                                 ///< 0 = not consistent yet.
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `local`.
-  double detection_variance_m2 = 0.0;                    ///< Mean over its detections.
-  double radius_m = 0.0;
-  std::uint32_t observations = 0;
-  std::uint64_t history = 0;  ///< Bit k: matched k scans ago, counting scans that should show it.
-  std::uint32_t age = 0;      ///< Such scans since it began.
-  std::uint32_t missed = 0;   ///< Such scans in a row without it.
+  double detection_variance_m2 = 0.0;                    ///< Mean over its detections, per axis.
+  double radius_m = 0.0;                                 ///< Mean; 0 where unknown.
+  std::uint32_t observations = 0;                        ///< Matched without ambiguity.
+  std::uint64_t history = 0;  ///< Bit k: matched k scans ago, of the scans that had it in view.
+  std::uint32_t age = 0;      ///< Number of scans that had it in view.
+  std::uint32_t missed = 0;   ///< Scans in a row that had it in view and did not match it.
   model::LandmarkKind kind = model::LandmarkKind::kTrunk;
   Steadiness steadiness = Steadiness::kUnknown;
-  std::uint32_t times_off = 0;  ///< Sightings in a row that say that it moves.
-  Beginning begin;
+  std::uint32_t moved_in_a_row = 0;  ///< Observations in a row that contradict a stationary track.
+  ReferenceObservation reference;    ///< The first one, later one of the last 1.5 s.
 
-  /// Of the position.
+  /// Isotropic variance of the position, per axis.
   double variance_m2() const;
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.id, self.position_m, self.detection_variance_m2, self.radius_m, self.observations,
+      self.history, self.age, self.missed, self.kind, self.steadiness, self.moved_in_a_row,
+      self.reference);
+  }
 };
 
-/// Pair of a seen detection and a track.
+/// An observation and the track that it is taken for, as indices.
 struct Match {
-  std::uint32_t seen = 0;
+  std::uint32_t observation = 0;
   std::uint32_t track = 0;
   bool ambiguous = false;  ///< Another pairing explains the scan nearly as well.
 };
 
-/// One-to-one pairs inside the gate at the pose `local_T_vehicle`, likeliest first, then improved
-/// by swaps; kinds never mix.
-std::vector<Match> match(std::span<const Track> tracks, std::span<const Seen> seen,
-                         const geometry::SE2WithCovariance& local_T_vehicle,
-                         const AssociatorParameters& parameters);
+/// The vehicle's motion (then_T_now) by wheels and IMU from a time until now; nothing where it was
+/// not measured.
+using MotionSince =
+    std::function<std::optional<geometry::SE2WithCovariance>(model::Utime then_utime)>;
 
+/// Owns the tracks and their life: begin, confirmation, end. Bounded by the range of the sensor.
 class TrackList {
  public:
+  /// No tracks; the first id is 1.
   explicit TrackList(const AssociatorParameters& parameters) : parameters_(parameters) {}
 
+  /// All tracks, consistent or not.
   const std::vector<Track>& tracks() const { return tracks_; }
+  /// The id of the next track that becomes consistent.
+  model::TrackId next_id() const { return next_id_; }
+  /// Ends all tracks. Ids go on.
   void clear() { tracks_.clear(); }
 
-  /// Takes a scan's matches at the pose; unmatched detections begin tracks, tracks that should have
-  /// been seen and were not end. Gives the track id of each seen detection, 0 = none to publish.
-  std::vector<model::TrackId> update(std::span<const Seen> seen, std::span<const Match> matches,
+  /// Decides for each matched track whether it moves. To be called before update() of the same
+  /// scan, where the check is on (`walking_mps` > 0).
+  void check_steadiness(std::span<const Observation> observations, std::span<const Match> matches,
+                        model::Utime utime, const MotionSince& motion_since);
+
+  /// Takes a scan's matches from the pose `local_T_vehicle`. Observations without a match begin
+  /// tracks; tracks that were in view too often without a match end. Returns the track id to
+  /// publish for each observation, 0 = none. Cost O(tracks^2) in the worst case.
+  std::vector<model::TrackId> update(std::span<const Observation> observations,
+                                     std::span<const Match> matches,
                                      const geometry::SE2& local_T_vehicle,
                                      const model::FieldOfView& view, model::Utime utime);
 
-  /// Looks whether tracks stand that the scan matches; to be called before update().
-  /// `motion_since` gives the vehicle's motion by wheels from a time until now, where it is known.
-  void check_steadiness(
-      std::span<const Seen> seen, std::span<const Match> matches, model::Utime utime,
-      const std::function<std::optional<geometry::SE2WithCovariance>(model::Utime)>& motion_since);
-
-  model::TrackId next_id() const { return next_id_; }
-  void set(const std::vector<Track>& tracks, model::TrackId next_id) {
-    tracks_ = tracks;
-    next_id_ = next_id;
+  /// Members of a saved state; see common/state. The parameters are configuration.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.tracks_, self.next_id_, self.requires_proof_);
   }
 
  private:
-  void take(Track& track, const Seen& seen, const Match& match,
-            const geometry::SE2& local_T_vehicle);
+  void age(std::span<const std::uint8_t> matched, const geometry::SE2& vehicle_T_local,
+           const model::FieldOfView& view);
+  void take(Track& track, const Observation& observation, const geometry::SE2& local_T_vehicle);
+  Track& begin(const Observation& observation, const geometry::SE2& local_T_vehicle,
+               model::Utime utime);
   bool is_steady(const Track& track) const;
-  bool stands_in(const Track& track, std::span<const bool> matched) const;
+  bool stands_in(const Track& track, std::span<const std::uint8_t> matched) const;
   void confirm(Track& track);
   void drop(const geometry::SE2& local_T_vehicle, const model::FieldOfView& view);
 
   AssociatorParameters parameters_;
   std::vector<Track> tracks_;
   model::TrackId next_id_ = 1;
-  bool needs_proof_ = false;  ///< Too few that stand are in the scan to do without.
+  /// Too few stationary tracks are in view: only tracks that are known to be stationary are
+  /// published.
+  bool requires_proof_ = false;
 };
 
 }  // namespace understory::associator

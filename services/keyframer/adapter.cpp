@@ -16,21 +16,23 @@ class KeyframerAdapter : public bus::Adapter {
 
   void bind(bus::Node& node) override {
     stage_ = make_keyframer(parameters_);
+
     node.subscribe<model::LandmarkScan>(channels_.landmarks,
                                         [this](const model::LandmarkScan& scan) {
                                           if (const auto keyframe = stage_->add(scan))
                                             keyframes_.publish(*keyframe);
                                         },
                                         {.queue_size = 200});
-    // Small, and each one that is shed breaks the chain of motion: a long queue.
+    // Increments are small, and a lost one breaks the chain of motion: a long queue.
     node.subscribe<model::Odometry>(channels_.odometry,
                                     [this](const model::Odometry& motion) { stage_->add(motion); },
                                     {.queue_size = 2000});
-    // Of the filter's words the bias and the velocity: its pose was made from the same detections.
+    // Bias and velocity are used, the pose is not: it was estimated from the same detections.
     node.subscribe<model::EkfPose>(channels_.ekf_pose,
                                    [this](const model::EkfPose& pose) { stage_->add(pose); });
     node.subscribe<model::EkfLevel>(channels_.ekf_level,
                                     [this](const model::EkfLevel& level) { stage_->add(level); });
+
     keyframes_ = node.advertise<model::Keyframe>(channels_.keyframe);
   }
 

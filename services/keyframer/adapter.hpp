@@ -1,4 +1,4 @@
-// The keyframer's place on the bus.
+// The keyframer on the bus.
 #pragma once
 
 #include <string>
@@ -7,6 +7,7 @@
 
 namespace understory::keyframer {
 
+/// Names of the channels that the process reads and writes.
 struct KeyframerChannels {
   std::string landmarks = "LANDMARKS";
   std::string odometry = "ODOMETRY";
@@ -15,6 +16,8 @@ struct KeyframerChannels {
   std::string keyframe = "KEYFRAME";
 };
 
+/// The process: its name, its channels and how to make its adapter. The stage is made when the
+/// service is bound, by the parameters that are then in force.
 bus::Service keyframer_service(const KeyframerChannels& channels = {});
 
 }  // namespace understory::keyframer

@@ -6,7 +6,6 @@
 
 using namespace understory;
 using namespace understory::associator;
-using namespace understory::associator;
 
 namespace {
 

@@ -1,4 +1,4 @@
-// Who walks is no landmark; what stands is one, however alone.
+// Who walks is no landmark; a stationary trunk is one, however alone.
 #include <cmath>
 #include <random>
 
@@ -35,7 +35,7 @@ std::vector<int> times_published(const std::vector<Thing>& things, double walkin
       increment.from_utime = stamp(k - 1);
       increment.utime = stamp(k);
       increment.from_T_to = geometry::SE2(kSpeed_mps * kPeriod_s + 1e-3 * normal(random), 0.0, 0.0);
-      // As wheels claim it that count what lasts as noise.
+      // As wheels report it that count their correlated error as noise.
       increment.covariance = Eigen::Vector3d(1.4e-3, 1.2e-3, 2e-7).asDiagonal();
       increment.has_wheels = true;
       increment.inertial.emplace();
@@ -46,11 +46,11 @@ std::vector<int> times_published(const std::vector<Thing>& things, double walkin
     scan.field_of_view.max_range_m = 60.0;
     const double time_s = kPeriod_s * k;
     for (const Thing& thing : things) {
-      model::Detection& seen = scan.detections.emplace_back();
-      seen.position_m.head<2>() = thing.position_m + time_s * thing.velocity_mps +
-                                  kSigma_m * Eigen::Vector2d(normal(random), normal(random));
-      seen.position_m.x() -= kSpeed_mps * time_s;
-      seen.covariance_m2 = kSigma_m * kSigma_m * Eigen::Matrix3d::Identity();
+      model::Detection& detection = scan.detections.emplace_back();
+      detection.position_m.head<2>() = thing.position_m + time_s * thing.velocity_mps +
+                                       kSigma_m * Eigen::Vector2d(normal(random), normal(random));
+      detection.position_m.x() -= kSpeed_mps * time_s;
+      detection.covariance_m2 = kSigma_m * kSigma_m * Eigen::Matrix3d::Identity();
     }
     const model::TrackedScan tracked = *associator.add(scan);
     for (const model::TrackedLandmark& landmark : tracked.landmarks)
@@ -65,8 +65,8 @@ TEST_CASE("Somebody who walks, alone in view, is not published", "[associator][m
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> angle(-3.14, 3.14);
-    const double way = angle(random);
-    const Thing walker{{25.0, 6.0}, 1.3 * Eigen::Vector2d(std::cos(way), std::sin(way))};
+    const double heading = angle(random);
+    const Thing walker{{25.0, 6.0}, 1.3 * Eigen::Vector2d(std::cos(heading), std::sin(heading))};
     REQUIRE(times_published({walker}, 0.8, seed).front() == 0);
   }
   // Without the check it would be.
@@ -74,7 +74,7 @@ TEST_CASE("Somebody who walks, alone in view, is not published", "[associator][m
   REQUIRE(times_published({walker}, 0.0, 1).front() > 0);
 }
 
-TEST_CASE("What stands is published, however alone", "[associator][motion]") {
+TEST_CASE("A stationary trunk is published, however alone", "[associator][motion]") {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     REQUIRE(times_published({{{25.0, 6.0}}}, 0.8, seed).front() >= 17);
   }

@@ -3,7 +3,7 @@
 
 #include "services/geoslam_mapper/smoothing/filter_track.hpp"
 #include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
-#include "services/keyframer/joint_keyframer.hpp"
+#include "services/keyframer/joint/joint_keyframer.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
@@ -54,7 +54,7 @@ struct Outcome {
 
 Outcome drive(bool with_filter) {
   std::mt19937_64 random(4);
-  keyframer::JointKeyframer keyframer({});
+  keyframer::joint::JointKeyframer keyframer({});
   SmoothingMapperParameters parameters;
   parameters.use_odometry = true;
   SmoothingMapper mapper(parameters);

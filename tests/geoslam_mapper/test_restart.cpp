@@ -3,7 +3,7 @@
 #include <random>
 
 #include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
-#include "services/keyframer/joint_keyframer.hpp"
+#include "services/keyframer/joint/joint_keyframer.hpp"
 #include "sim/drive.hpp"
 #include "tests/catch.hpp"
 
@@ -57,7 +57,7 @@ model::Odometry odometry_between(const sim::Drive& drive, std::size_t k, std::mt
 std::vector<Inputs> inputs_of(const sim::Drive& drive, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
-  keyframer::JointKeyframer keyframer({});
+  keyframer::joint::JointKeyframer keyframer({});
   std::vector<Inputs> result(drive.size());
   for (std::size_t k = 0; k < drive.size(); ++k) {
     Inputs& inputs = result[k];

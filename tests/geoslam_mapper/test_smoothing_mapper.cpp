@@ -5,7 +5,7 @@
 #include <random>
 
 #include "services/geoslam_mapper/map_difference.hpp"
-#include "services/keyframer/joint_keyframer.hpp"
+#include "services/keyframer/joint/joint_keyframer.hpp"
 #include "sim/drive.hpp"
 #include "tests/catch.hpp"
 
@@ -26,7 +26,7 @@ sim::Drive drive(sim::PathKind path, double length_m, std::uint64_t seed, double
 }
 
 std::vector<model::Keyframe> keyframes(const sim::Drive& drive) {
-  keyframer::JointKeyframer keyframer({});
+  keyframer::joint::JointKeyframer keyframer({});
   std::vector<model::Keyframe> result;
   for (std::size_t k = 0; k < drive.size(); ++k) {
     if (auto keyframe = keyframer.add(drive.scan(k).scan)) result.push_back(std::move(*keyframe));
@@ -231,7 +231,7 @@ TEST_CASE("A stationary vehicle does not grow the graph", "[mapper]") {
 TEST_CASE("Scans between keyframes are located, and the map is not changed by it", "[mapper]") {
   const sim::Drive simulated = drive(sim::PathKind::kSquare, 60.0, 16);
   const geometry::SE2 map_T_world = simulated.world_T_vehicle().front().inverse();
-  keyframer::JointKeyframer keyframer({});
+  keyframer::joint::JointKeyframer keyframer({});
   SmoothingMapper mapper({});
   std::size_t located = 0;
   double largest_m = 0.0;
@@ -256,7 +256,7 @@ TEST_CASE("The covariance of a located scan is that of its pose in the map", "[m
   for (std::uint64_t seed = 40; seed < 52; ++seed) {
     const sim::Drive simulated = drive(sim::PathKind::kLine, 120.0, seed);
     const geometry::SE2 map_T_world = simulated.world_T_vehicle().front().inverse();
-    keyframer::JointKeyframer keyframer({});
+    keyframer::joint::JointKeyframer keyframer({});
     SmoothingMapper mapper({});
     for (std::size_t k = 0; k < simulated.size(); ++k) {
       const model::LandmarkScan scan = simulated.scan(k).scan;

@@ -1,11 +1,12 @@
 #include <Eigen/Dense>
 #include <random>
 
-#include "services/keyframer/block_adjustment.hpp"
+#include "services/keyframer/joint/block_adjustment.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
 using namespace understory::keyframer;
+using namespace understory::keyframer::joint;
 
 namespace {
 
@@ -68,21 +69,21 @@ TEST_CASE("Covariances of a block agree with Monte Carlo", "[block]") {
     const BlockEstimate estimate = adjust_block(problem(truth, sigma, 0.85, random));
     REQUIRE(estimate.converged);
     const geometry::SE2WithCovariance& base = estimate.centre_T_member.front();
-    // A landmark as the base sees it: both errors act.
+    // A landmark in the base's frame: both errors act.
     for (std::size_t i = 0; i < truth.points.size(); ++i) {
       const geometry::SE2 base_T_centre = base.mean.inverse();
-      const Eigen::Vector2d seen = base_T_centre * estimate.landmarks[i];
+      const Eigen::Vector2d expected = base_T_centre * estimate.landmarks[i];
       Eigen::Matrix<double, 2, 3> jacobian;
-      jacobian << -Eigen::Matrix2d::Identity(), -geometry::perpendicular(seen);
+      jacobian << -Eigen::Matrix2d::Identity(), -geometry::perpendicular(expected);
       const Eigen::Matrix2d rotation = base_T_centre.rotation();
       const Eigen::Matrix2d covariance =
           rotation * estimate.landmark_covariance[i] * rotation.transpose() +
           jacobian * base.covariance * jacobian.transpose();
-      const Eigen::Vector2d error = truth.poses[0].inverse() * truth.points[i] - seen;
+      const Eigen::Vector2d error = truth.poses[0].inverse() * truth.points[i] - expected;
       landmark_nees += error.dot(covariance.inverse() * error) /
                        (2.0 * static_cast<double>(truth.points.size()) * runs);
     }
-    // The last member as the base sees it.
+    // The last member in the base's frame.
     const geometry::SE2WithCovariance relative =
         compound(inverse(base), estimate.centre_T_member.back());
     const Eigen::Vector3d error =

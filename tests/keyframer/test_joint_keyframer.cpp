@@ -1,12 +1,14 @@
-#include "services/keyframer/joint_keyframer.hpp"
+#include "services/keyframer/joint/joint_keyframer.hpp"
 
 #include <random>
 
+#include "common/model/archive.hpp"
 #include "sim/drive.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
 using namespace understory::keyframer;
+using namespace understory::keyframer::joint;
 
 namespace {
 
@@ -139,24 +141,4 @@ TEST_CASE("A scan that is not later than the last one is refused and counted", "
   REQUIRE_FALSE(keyframer.add(simulated.scan(0).scan));
   REQUIRE(keyframer.counters().scans_unmatched == 1);
   REQUIRE_FALSE(keyframer.counters().last_reason.empty());
-}
-
-TEST_CASE("A loaded state goes on exactly where the saved one was", "[keyframer]") {
-  const sim::Drive simulated = drive(sim::PathKind::kCircle, 12.0, 0.85, 0.2, 8);
-  JointKeyframer whole({});
-  JointKeyframer first({});
-  JointKeyframer second({});
-  for (std::size_t k = 0; k < simulated.size(); ++k) {
-    const model::LandmarkScan scan = simulated.scan(k).scan;
-    if (k == 29) second.load(first.save());
-    const auto expected = whole.add(scan);
-    const auto actual = k < 29 ? first.add(scan) : second.add(scan);
-    REQUIRE(expected.has_value() == actual.has_value());
-    if (!expected) continue;
-    REQUIRE(expected->landmarks.size() == actual->landmarks.size());
-    for (std::size_t i = 0; i < expected->landmarks.size(); ++i) {
-      REQUIRE(expected->landmarks[i].position_m == actual->landmarks[i].position_m);
-    }
-  }
-  REQUIRE_THROWS(second.load("not a state"));
 }

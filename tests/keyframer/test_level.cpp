@@ -1,14 +1,15 @@
-// Sweeps that were levelled wrongly, as the filter finds out.
+// Sweeps that were levelled with a wrong attitude, and the correction by the filter.
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <random>
 
 #include "common/model/level.hpp"
-#include "services/keyframer/joint_keyframer.hpp"
+#include "services/keyframer/joint/joint_keyframer.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
 using namespace understory::keyframer;
+using namespace understory::keyframer::joint;
 
 namespace {
 
@@ -26,10 +27,10 @@ model::LandmarkScan random_scan(std::uint64_t seed) {
   return scan;
 }
 
-/// As it looks to who takes the level to be where it is not.
+/// As a sensor with a wrong attitude measures it.
 model::LandmarkScan tilted(model::LandmarkScan scan, const Eigen::Vector2d& error_rad) {
-  const Eigen::Vector3d turn(error_rad.x(), error_rad.y(), 0.0);
-  const Eigen::AngleAxisd rotation(turn.norm(), turn.normalized());
+  const Eigen::Vector3d axis(error_rad.x(), error_rad.y(), 0.0);
+  const Eigen::AngleAxisd rotation(axis.norm(), axis.normalized());
   for (model::Detection& detection : scan.detections)
     detection.position_m = rotation * detection.position_m;
   return scan;
@@ -46,7 +47,7 @@ model::LevelCorrection known(const Eigen::Vector2d& error_rad, double sigma_rad 
 
 }  // namespace
 
-TEST_CASE("a wrong level is taken out to second order", "[keyframer][level]") {
+TEST_CASE("A wrong level is corrected to second order", "[keyframer][level]") {
   const Eigen::Vector2d error_rad(5e-3, -8e-3);
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const model::LandmarkScan truth = random_scan(seed);
@@ -59,7 +60,7 @@ TEST_CASE("a wrong level is taken out to second order", "[keyframer][level]") {
   }
 }
 
-TEST_CASE("what is told of the level in covariances gives way to what is left of it",
+TEST_CASE("The reported variance of the level is replaced by what the filter leaves of it",
           "[keyframer][level]") {
   constexpr double kReported = 6e-3;
   constexpr double kLeft = 1e-3;
@@ -75,13 +76,13 @@ TEST_CASE("what is told of the level in covariances gives way to what is left of
     const Eigen::Matrix2d expected = (1e-4 + kLeft * kLeft * z * z) * Eigen::Matrix2d::Identity();
     REQUIRE((detection.covariance_m2.topLeftCorner<2, 2>() - expected).norm() < 1e-9);
   }
-  // More than there is cannot be taken out.
+  // A larger variance than there is cannot be removed.
   const model::LandmarkScan odd = known({1e-3, 0.0}, 0.0, 1.0).levelled(random_scan(3));
   for (const model::Detection& detection : odd.detections)
     REQUIRE(detection.covariance_m2.topLeftCorner<2, 2>().determinant() > 0.0);
 }
 
-TEST_CASE("an old word on the level means nothing", "[keyframer][level]") {
+TEST_CASE("An old level is ignored", "[keyframer][level]") {
   model::LandmarkScan scan = random_scan(2);
   scan.utime = 3'000'000;
   const model::LandmarkScan same = known({0.1, 0.1}).levelled(scan);
@@ -89,7 +90,7 @@ TEST_CASE("an old word on the level means nothing", "[keyframer][level]") {
     REQUIRE(same.detections[k].position_m == scan.detections[k].position_m);
 }
 
-TEST_CASE("keyframes have the level that the filter tells, over a restart too",
+TEST_CASE("Keyframes are at the level that the filter gives, after a restart too",
           "[keyframer][level]") {
   const Eigen::Vector2d error_rad(5e-3, -8e-3);
   JointKeyframerParameters parameters;
@@ -120,7 +121,7 @@ TEST_CASE("keyframes have the level that the filter tells, over a restart too",
     return off_m;
   };
   const model::Keyframe expected = keyframe_of(truth, Eigen::Vector2d::Zero());
-  const model::LandmarkScan seen = tilted(truth, error_rad);
-  REQUIRE(farthest_off(keyframe_of(seen, error_rad), expected) < 45.0 * 1e-4);
-  REQUIRE(farthest_off(keyframe_of(seen, Eigen::Vector2d::Zero()), expected) > 0.01);
+  const model::LandmarkScan observed = tilted(truth, error_rad);
+  REQUIRE(farthest_off(keyframe_of(observed, error_rad), expected) < 45.0 * 1e-4);
+  REQUIRE(farthest_off(keyframe_of(observed, Eigen::Vector2d::Zero()), expected) > 0.01);
 }

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "common/model/state.hpp"
+#include "common/model/archive.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
@@ -29,7 +29,7 @@ model::Odometry increment(int k) {
 
 }  // namespace
 
-TEST_CASE("The filter's bias straightens the pieces that come after it", "[odometry]") {
+TEST_CASE("The filter's bias straightens the increments that come after it", "[odometry]") {
   model::OdometryBuffer buffer;
   for (int k = 0; k < 10; ++k) REQUIRE(buffer.add(increment(k)));
   buffer.set_bias({kBias, 0.0, 0.0});
@@ -43,19 +43,20 @@ TEST_CASE("The filter's bias straightens the pieces that come after it", "[odome
   REQUIRE((after->mean.coordinates() - Eigen::Vector3d(10.0, 0.0, 0.0)).norm() < 1e-12);
 }
 
-TEST_CASE("A standing vehicle does not turn, whatever the bias", "[odometry]") {
+TEST_CASE("A stationary vehicle does not rotate, whatever the bias", "[odometry]") {
   model::OdometryBuffer buffer;
   buffer.set_bias({kBias, 0.0, 0.0});
-  model::Odometry standing = increment(0);
-  standing.from_T_to = geometry::SE2();
-  standing.is_stationary = true;
-  REQUIRE(buffer.add(standing));
+  model::Odometry stationary = increment(0);
+  stationary.from_T_to = geometry::SE2();
+  stationary.is_stationary = true;
+  REQUIRE(buffer.add(stationary));
   REQUIRE(buffer.between(0, kIncrement_us)->mean.coordinates().norm() == 0.0);
 }
 
 namespace {
 
-/// The filter at the end of piece k-1: surer of the speed than wheels, which are 2 % off.
+/// The filter at the end of increment k-1: its speed is more certain than that of the wheels, which
+/// are 2 % off.
 model::EkfPose filter_at(int k, double speed_mps, double sigma_mps) {
   model::EkfPose pose;
   pose.utime = k * kIncrement_us;
@@ -75,7 +76,7 @@ model::Odometry wheel_increment(int k) {
 
 }  // namespace
 
-TEST_CASE("Pieces start at the filter's velocity where that is surer", "[odometry]") {
+TEST_CASE("Increments start at the filter's velocity where that is more certain", "[odometry]") {
   for (const bool is_sure : {true, false}) {
     model::OdometryBuffer buffer;
     buffer.set_filter_pose(filter_at(0, 10.0, is_sure ? 0.02 : 2.0));
@@ -84,12 +85,12 @@ TEST_CASE("Pieces start at the filter's velocity where that is surer", "[odometr
     REQUIRE(motion);
     REQUIRE(std::abs(motion->mean.x() - (is_sure ? 5.0 : 5.1)) < 1e-6);
     REQUIRE(std::abs(motion->mean.theta()) < 1e-9);
-    // 0.02 m/s, for 0.5 s each time: five times 0.02^2 * 0.1 * 0.5, and the IMU's own.
+    // 0.02 m/s, correlated over 0.5 s: five times 0.02^2 * 0.1 * 0.5, and the IMU's own.
     if (is_sure) REQUIRE(std::abs(motion->covariance(0, 0) - 1e-4) < 2e-6);
   }
 }
 
-TEST_CASE("The filter's word counts the same, late or in time", "[odometry]") {
+TEST_CASE("The filter's pose has the same effect, late or in time", "[odometry]") {
   model::OdometryBuffer late;
   model::OdometryBuffer in_time;
   for (int k = 0; k < 3; ++k) {
@@ -114,31 +115,32 @@ TEST_CASE("After a gap the filter's velocity is not known", "[odometry]") {
   REQUIRE(!buffer.velocity());
 }
 
-TEST_CASE("A restored buffer tells the same motion and goes on with the same bias", "[odometry]") {
+TEST_CASE("A restored buffer gives the same motion and continues with the same bias",
+          "[odometry]") {
   model::OdometryBuffer buffer;
   buffer.set_filter_pose(filter_at(0, 10.0, 1e-4));
   for (int k = 0; k < 5; ++k) REQUIRE(buffer.add(increment(k)));
   model::OdometryBuffer restored;
-  model::Json(buffer).get_to(restored);
+  state::load(state::save({"buffer", 1}, buffer), {"buffer", 1}, restored);
   for (model::OdometryBuffer* one : {&buffer, &restored}) REQUIRE(one->add(increment(5)));
   const geometry::SE2 a = buffer.between(0, 6 * kIncrement_us)->mean;
   const geometry::SE2 b = restored.between(0, 6 * kIncrement_us)->mean;
   REQUIRE(a.coordinates() == b.coordinates());
 }
 
-TEST_CASE("A gyro's turn adds up, with the bias that was taken out", "[odometry]") {
+TEST_CASE("A gyro's rotation adds up, with the bias that was subtracted", "[odometry]") {
   model::OdometryBuffer buffer(0.0);
   model::EkfPose filter = filter_at(0, 10.0, 0.02);
   filter.bias_covariance(0, 0) = 1e-6;
   buffer.set_filter_pose(filter);
   for (int k = 0; k < 5; ++k) REQUIRE(buffer.add(wheel_increment(k)));
-  const auto turn = buffer.gyro_rotation(kIncrement_us / 2, 3 * kIncrement_us);
-  REQUIRE(turn);
-  CHECK(std::abs(turn->rotation_rad) < 1e-12);
-  CHECK(std::abs(turn->seconds - 0.25) < 1e-12);
-  CHECK(std::abs(turn->bias_rad - 0.25 * kBias) < 1e-12);
-  // White noise alone: what is not known of the bias is a variable of its own.
-  CHECK(std::abs(turn->variance - 2.5e-8) < 1e-12);
+  const auto rotation = buffer.gyro_rotation(kIncrement_us / 2, 3 * kIncrement_us);
+  REQUIRE(rotation);
+  CHECK(std::abs(rotation->rotation_rad) < 1e-12);
+  CHECK(std::abs(rotation->seconds - 0.25) < 1e-12);
+  CHECK(std::abs(rotation->bias_rad - 0.25 * kBias) < 1e-12);
+  // White noise alone: the error of the bias is a variable of its own.
+  CHECK(std::abs(rotation->variance - 2.5e-8) < 1e-12);
   CHECK(!buffer.gyro_rotation(0, 6 * kIncrement_us));
   model::Odometry blind = wheel_increment(5);
   blind.inertial.reset();

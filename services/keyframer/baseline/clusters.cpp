@@ -6,7 +6,7 @@
 namespace understory::keyframer::baseline {
 namespace {
 
-/// The representative of `i`, halving the way to it.
+/// The representative of `i`, with path halving.
 std::uint32_t find_root(std::vector<std::uint32_t>& parents, std::uint32_t i) {
   while (parents[i] != i) {
     parents[i] = parents[parents[i]];
@@ -22,6 +22,7 @@ std::vector<std::uint32_t> link(std::span<const Eigen::Vector2d> points, double 
   std::vector<std::uint32_t> order = parents;
   std::stable_sort(order.begin(), order.end(),
                    [&](std::uint32_t a, std::uint32_t b) { return points[a].x() < points[b].x(); });
+
   for (std::size_t i = 0; i < order.size(); ++i) {
     const Eigen::Vector2d& point = points[order[i]];
     for (std::size_t j = i + 1; j < order.size() && points[order[j]].x() - point.x() <= tolerance_m;

@@ -13,7 +13,7 @@ namespace {
 
 using hierarchy::baseline::Similarity;
 
-/// Of a landmark, per axis [m^2]: the information in the source's graph is 100 I.
+/// Of a landmark, per axis [m^2]: the information in the thesis's graph is 100 I.
 constexpr double kLandmarkVariance = 0.01;
 
 AlignmentParameters alignment_parameters(const BaselineKeyframerParameters& parameters) {
@@ -28,11 +28,11 @@ class BaselineKeyframer final : public KeyframerMethod {
       : parameters_(parameters), alignment_(alignment_parameters(parameters)) {}
 
   std::optional<model::Keyframe> add(const model::LandmarkScan& scan) override;
-  void add(const model::Odometry& /*odometry*/) override {}  // The source knows none.
+  void add(const model::Odometry& /*odometry*/) override {}  // The method uses landmarks alone.
   const KeyframerCounters& counters() const override { return state_.counters; }
   std::string save() const override { return baseline::save(state_); }
-  void load(const std::string& state) override {
-    state_ = load_keyframer_state(state, parameters_.descriptor_step);
+  void load(const std::string& bytes) override {
+    state_ = load_keyframer_state(bytes, parameters_.descriptor_step);
   }
 
  private:
@@ -40,7 +40,9 @@ class BaselineKeyframer final : public KeyframerMethod {
   void start_keyframe(Observation scan);
   void insert_member(Observation member);
   bool is_due(std::uint64_t number) const;
+  void drop_stale(std::uint64_t number);
   model::Keyframe publish();
+  std::vector<model::KeyframeLandmark> centroids() const;
 
   BaselineKeyframerParameters parameters_;
   AlignmentParameters alignment_;
@@ -54,23 +56,32 @@ std::optional<model::Keyframe> BaselineKeyframer::add(const model::LandmarkScan&
     state_.counters.last_reason = "fewer than three landmarks";
     return std::nullopt;
   }
+
+  // Align the scan with the keyframe in progress, or begin one.
   Observation observation = make_observation(scan, number, parameters_.descriptor_step);
   if (state_.members.empty()) {
     start_keyframe(std::move(observation));
   } else {
     link_to_members(std::move(observation));
   }
+
+  // Give the keyframe out when it is full or no scan has joined it for a while.
   std::optional<model::Keyframe> keyframe;
   if (is_due(number)) {
     keyframe = publish();
   }
-  // One stale scan per step, after the decision, as in the code (the thesis drops it before).
+  drop_stale(number);
+  return keyframe;
+}
+
+/// One stale scan per step, after the keyframe, as in the published code (the thesis drops it
+/// before).
+void BaselineKeyframer::drop_stale(std::uint64_t number) {
   const auto stale = static_cast<std::uint64_t>(parameters_.stale_after_observations);
   if (!state_.waiting.empty() && state_.waiting.front().number + stale <= number) {
     state_.waiting.erase(state_.waiting.begin());
     ++state_.counters.scans_unmatched;
   }
-  return keyframe;
 }
 
 /// Newest member first; the first that matches is taken. Scans that waited follow, oldest first.
@@ -83,6 +94,7 @@ void BaselineKeyframer::link_to_members(Observation scan) {
     }
     // Composed in the published order, the reverse of the right one; equal only where they commute.
     scan.base_T_vehicle = *target_T_scan * member->base_T_vehicle;
+
     auto& waiting = state_.waiting;
     for (auto other = waiting.begin(); other != waiting.end();) {
       const auto scan_T_other = align(*other, scan, alignment_);
@@ -94,6 +106,7 @@ void BaselineKeyframer::link_to_members(Observation scan) {
       insert_member(std::move(*other));
       other = waiting.erase(other);
     }
+
     insert_member(std::move(scan));
     return;
   }
@@ -109,11 +122,15 @@ void BaselineKeyframer::start_keyframe(Observation scan) {
     if (!base_T_scan) {
       continue;
     }
+
+    // The pair that matches.
     waiting[i].base_T_vehicle = Similarity{};
     waiting[i].is_base = true;
     scan.base_T_vehicle = *base_T_scan;
     insert_member(std::move(waiting[i]));
     waiting.erase(waiting.begin() + static_cast<std::ptrdiff_t>(i));
+
+    // Older scans that match the new one.
     for (std::size_t j = i; j-- > 0;) {
       if (const auto scan_T_other = align(waiting[j], scan, alignment_)) {
         waiting[j].base_T_vehicle = *scan_T_other * scan.base_T_vehicle;
@@ -144,26 +161,39 @@ bool BaselineKeyframer::is_due(std::uint64_t number) const {
 }
 
 model::Keyframe BaselineKeyframer::publish() {
-  model::Keyframe keyframe;
+  // The base comes first, the other members in order of time.
   const auto base = std::find_if(state_.members.begin(), state_.members.end(),
                                  [](const Observation& member) { return member.is_base; });
   std::rotate(state_.members.begin(), base, base + 1);
+
+  model::Keyframe keyframe;
   const Observation& first = state_.members.front();
   keyframe.utime = first.utime;
   keyframe.sequence = state_.counters.keyframes++;
   keyframe.field_of_view = first.field_of_view;
+  for (const Observation& member : state_.members) {
+    keyframe.members.push_back(
+        {member.utime, member.sequence, member.base_T_vehicle.pose(), Eigen::Matrix3d::Zero()});
+  }
 
+  keyframe.landmarks = centroids();
+  state_.members.clear();
+  return keyframe;
+}
+
+/// The means of the clusters of all members' landmarks, in the frame of the base.
+std::vector<model::KeyframeLandmark> BaselineKeyframer::centroids() const {
   std::vector<Eigen::Vector2d> cloud;
   std::vector<std::pair<std::size_t, std::size_t>> origins;  // Member, detection.
   for (std::size_t m = 0; m < state_.members.size(); ++m) {
     const Observation& member = state_.members[m];
-    keyframe.members.push_back(
-        {member.utime, member.sequence, member.base_T_vehicle.pose(), Eigen::Matrix3d::Zero()});
     for (std::size_t i = 0; i < member.points.size(); ++i) {
       cloud.push_back(member.base_T_vehicle * member.points[i]);
       origins.emplace_back(m, i);
     }
   }
+
+  std::vector<model::KeyframeLandmark> landmarks;
   const auto largest = static_cast<std::size_t>(parameters_.observations_per_keyframe);
   for (const auto& cluster : single_linkage(cloud, parameters_.cluster_tolerance_m, 2, largest)) {
     model::KeyframeLandmark landmark;
@@ -177,10 +207,9 @@ model::Keyframe BaselineKeyframer::publish() {
     landmark.radius_m /= static_cast<double>(cluster.size());
     landmark.covariance_m2 = kLandmarkVariance * Eigen::Matrix2d::Identity();
     landmark.observation_count = static_cast<std::uint16_t>(cluster.size());
-    keyframe.landmarks.push_back(landmark);
+    landmarks.push_back(landmark);
   }
-  state_.members.clear();
-  return keyframe;
+  return landmarks;
 }
 
 }  // namespace

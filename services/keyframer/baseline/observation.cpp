@@ -11,11 +11,13 @@ Observation make_observation(const model::LandmarkScan& scan, std::uint64_t numb
   observation.utime = scan.utime;
   observation.sequence = scan.sequence;
   observation.field_of_view = scan.field_of_view;
+
   for (const model::Detection& detection : scan.detections) {
     observation.points.emplace_back(detection.position_m.head<2>());
     observation.radii_m.push_back(detection.radius_m);
     observation.kinds.push_back(detection.kind);
   }
+
   observation.hierarchy = hierarchy::baseline::Hierarchy(observation.points, descriptor_step);
   return observation;
 }
@@ -25,6 +27,8 @@ std::optional<hierarchy::baseline::Similarity> align(const Observation& from, co
   const hierarchy::baseline::MatchingParameters matching{parameters.max_descriptor_distance,
                                                          parameters.max_side_difference,
                                                          parameters.min_triangle_match_ratio};
+
+  // Matched landmarks that have hardly moved between the two scans.
   std::vector<Eigen::Vector2d> from_points;
   std::vector<Eigen::Vector2d> to_points;
   for (const hierarchy::baseline::PointMatch& match :
@@ -36,6 +40,7 @@ std::optional<hierarchy::baseline::Similarity> align(const Observation& from, co
       to_points.push_back(q);
     }
   }
+
   if (static_cast<int>(from_points.size()) < parameters.min_associations) {
     return std::nullopt;
   }

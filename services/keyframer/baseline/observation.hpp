@@ -1,6 +1,7 @@
-// A scan while the source's keyframer holds it.
+// A scan while the thesis's keyframer holds it.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -10,23 +11,34 @@
 
 namespace understory::keyframer::baseline {
 
+/// [thisObs] of GeoSLAM algorithm 2: the landmarks of one scan with their geometric hierarchy.
 struct Observation {
-  std::uint64_t number = 0;  ///< Counts scans, used and unused.
+  std::uint64_t number = 0;  ///< [id] Counts scans, used and unused.
   model::Utime utime = 0;
-  std::uint64_t sequence = 0;
+  std::uint64_t sequence = 0;  ///< Of the LANDMARKS message.
   model::FieldOfView field_of_view;
-  std::vector<Eigen::Vector2d> points;  ///< Frame of the vehicle [m].
-  std::vector<double> radii_m;
-  std::vector<model::LandmarkKind> kinds;
+  std::vector<Eigen::Vector2d> points;     ///< [cloud] Frame of the vehicle, m.
+  std::vector<double> radii_m;             ///< Of each point; 0 where unknown.
+  std::vector<model::LandmarkKind> kinds;  ///< Of each point.
   hierarchy::baseline::Hierarchy hierarchy;
-  /// Once it is in a keyframe: vehicle to base.
+  /// [tf] Valid once the scan is in a keyframe.
   hierarchy::baseline::Similarity base_T_vehicle;
-  bool is_base = false;
+  bool is_base = false;  ///< Its frame is the keyframe's.
+
+  /// Members of a saved state; see common/state. The hierarchy follows from the points.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    auto& pose = self.base_T_vehicle;
+    a(self.number, self.utime, self.sequence, self.field_of_view, self.points, self.radii_m,
+      self.kinds, pose.cosine, pose.sine, pose.translation_m, self.is_base);
+  }
 };
 
+/// The observation of a scan; builds its hierarchy. `descriptor_step`: [s] of the perimeter.
 Observation make_observation(const model::LandmarkScan& scan, std::uint64_t number,
                              double descriptor_step);
 
+/// Thresholds of align(); symbols of the thesis (GeoSLAM Table 4.2) in brackets.
 struct AlignmentParameters {
   double max_descriptor_distance = 9.0;   ///< [tau]
   int max_side_difference = 3;            ///< [Delta_N]
@@ -35,9 +47,9 @@ struct AlignmentParameters {
   double max_distance_m = 1.0;            ///< [lambda]
 };
 
-/// Least-squares similarity that takes `from` to `to`, over landmarks that match and lie within
-/// `max_distance_m` [lambda] per axis in the two vehicles' frames; none with fewer than
-/// `min_associations` [gamma] of them. (The thesis asks for more than gamma, the code for gamma.)
+/// Least-squares similarity to_T_from over landmarks that match and lie within `max_distance_m`
+/// [lambda] per axis in the two vehicles' frames (GeoSLAM §4.2.1). Nothing with fewer than
+/// `min_associations` [gamma] of them: the thesis asks for more than gamma, its code for gamma.
 std::optional<hierarchy::baseline::Similarity> align(const Observation& from, const Observation& to,
                                                      const AlignmentParameters& parameters);
 

@@ -1,10 +1,10 @@
-#include "services/keyframer/block_adjustment.hpp"
+#include "services/keyframer/joint/block_adjustment.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
 
-namespace understory::keyframer {
+namespace understory::keyframer::joint {
 namespace {
 
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
@@ -18,8 +18,8 @@ Matrix23 point_jacobian(const Eigen::Vector2d& point) {
   return jacobian;
 }
 
-/// Poses are perturbed on the left here (in `centre`), which makes a point's Jacobian depend on the
-/// point alone.
+/// One solution of a problem. Poses are perturbed on the left here (in `centre`), which makes a
+/// point's Jacobian depend on the point alone.
 class BlockAdjuster {
  public:
   explicit BlockAdjuster(const BlockProblem& problem)
@@ -54,6 +54,7 @@ class BlockAdjuster {
     landmark_gradient_.assign(landmarks_, Eigen::Vector2d::Zero());
     coupling_.assign(landmarks_, {});
     chi2_.clear();
+
     for (const BlockObservation& z : problem_.observations) add(z);
     for (std::size_t k = 0; k + 1 < members_ && k < problem_.motion.size(); ++k) {
       if (problem_.motion[k]) add_motion(k, *problem_.motion[k]);
@@ -64,11 +65,14 @@ class BlockAdjuster {
   void add(const BlockObservation& z) {
     const geometry::SE2& pose = poses_[z.member];
     const Eigen::Vector2d point = pose * z.position_m;
+
+    // Error, weight and Jacobian in the axes of `centre`.
     const Eigen::Matrix2d rotation = pose.rotation();
     const Eigen::Matrix2d weight = rotation * z.covariance_m2.inverse() * rotation.transpose();
     const Eigen::Vector2d error = point - points_[z.landmark];
     const Matrix23 jacobian = point_jacobian(point);
     const Eigen::Matrix<double, 3, 2> weighted = jacobian.transpose() * weight;
+
     const Eigen::Index at = 3 * static_cast<Eigen::Index>(z.member);
     reduced_.block<3, 3>(at, at) += weighted * jacobian;
     gradient_.segment<3>(at) += weighted * error;
@@ -88,6 +92,7 @@ class BlockAdjuster {
     const Eigen::Matrix3d information = motion.covariance.inverse();
     const Eigen::Matrix3d hessian = jacobian.transpose() * information * jacobian;
     const Eigen::Vector3d gradient = jacobian.transpose() * information * error;
+
     const Eigen::Index a = 3 * static_cast<Eigen::Index>(k);
     const Eigen::Index b = a + 3;
     reduced_.block<3, 3>(a, a) += hessian;
@@ -110,8 +115,8 @@ class BlockAdjuster {
     }
   }
 
-  /// With sum(delta) = 0 imposed: adding C^T C does not change the solution, since the gauge
-  /// directions carry no error.
+  /// The reduced system with sum(delta) = 0 imposed. Adding C^T C does not change the solution,
+  /// since the gauge directions carry no error.
   Eigen::LDLT<Eigen::MatrixXd> factorised() const {
     Eigen::MatrixXd fixed = reduced_;
     const double scale = reduced_.diagonal().mean() / static_cast<double>(members_);
@@ -126,13 +131,16 @@ class BlockAdjuster {
 
   double step() {
     Eigen::VectorXd delta = -factorised().solve(gradient_);
-    // Weights turn with their members, which the linearisation leaves out: where they are not
-    // isotropic, a trace of common motion remains and would never settle.
+
+    // The weights rotate with their members, which the linearisation leaves out. Where they are not
+    // isotropic a trace of common motion remains, which would never converge.
     Eigen::Vector3d common = Eigen::Vector3d::Zero();
     for (std::size_t k = 0; k < members_; ++k) {
       common += delta.segment<3>(3 * static_cast<Eigen::Index>(k));
     }
     delta -= (common / static_cast<double>(members_)).replicate(dimension() / 3, 1);
+
+    // Back-substitution: the landmarks, then the poses.
     for (std::size_t i = 0; i < landmarks_; ++i) {
       Eigen::Vector2d right = -landmark_gradient_[i];
       for (const Coupling& c : coupling_[i]) {
@@ -147,8 +155,9 @@ class BlockAdjuster {
     return delta.cwiseAbs().maxCoeff();
   }
 
-  void finish(BlockEstimate& estimate) const {
-    // The gauge term adds 1/(scale n^2) along the common motion; the projection takes it out again.
+  /// Joint covariance of the poses (left perturbation, in `centre`). The gauge term adds
+  /// 1/(scale n^2) along the common motion; the projection removes it.
+  Eigen::MatrixXd pose_covariance() const {
     const Eigen::MatrixXd raw =
         factorised().solve(Eigen::MatrixXd::Identity(dimension(), dimension()));
     Eigen::MatrixXd projection = Eigen::MatrixXd::Identity(dimension(), dimension());
@@ -159,13 +168,18 @@ class BlockAdjuster {
             Eigen::Matrix3d::Identity() / static_cast<double>(members_);
       }
     }
-    const Eigen::MatrixXd covariance = projection * raw * projection.transpose();
+    return projection * raw * projection.transpose();
+  }
+
+  void finish(BlockEstimate& estimate) const {
+    const Eigen::MatrixXd covariance = pose_covariance();
     for (std::size_t k = 0; k < members_; ++k) {
       const Eigen::Index at = 3 * static_cast<Eigen::Index>(k);
       const Eigen::Matrix3d to_right = poses_[k].inverse().Adjoint();
       estimate.centre_T_member.push_back(
           {poses_[k], to_right * covariance.block<3, 3>(at, at) * to_right.transpose()});
     }
+
     estimate.landmarks = points_;
     estimate.chi2 = chi2_;
     for (std::size_t i = 0; i < landmarks_; ++i) {
@@ -210,4 +224,4 @@ BlockEstimate adjust_block(const BlockProblem& problem) {
   return BlockAdjuster(problem).run();
 }
 
-}  // namespace understory::keyframer
+}  // namespace understory::keyframer::joint

@@ -1,0 +1,20 @@
+// Pairs the observations of one scan with tracks, at a known pose.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "common/geometry/se2.hpp"
+#include "services/associator/track_list.hpp"
+
+namespace understory::associator {
+
+/// One-to-one pairs inside the gate at the pose `local_T_vehicle`: likeliest first, then improved
+/// by swaps. A trunk and a corner never pair. A pair is ambiguous where another pairing is not
+/// `min_likelihood_ratio` times less likely. In order of observation. Cost O(candidates log
+/// candidates); few candidates per observation in any forest.
+std::vector<Match> match(std::span<const Track> tracks, std::span<const Observation> observations,
+                         const geometry::SE2WithCovariance& local_T_vehicle,
+                         const AssociatorParameters& parameters);
+
+}  // namespace understory::associator

@@ -1,0 +1,28 @@
+// Where the vehicle was at a scan, relative to the tracks.
+#pragma once
+
+#include <span>
+
+#include "common/geometry/registration.hpp"
+#include "common/model/landmarks.hpp"
+#include "services/associator/observation.hpp"
+#include "services/associator/parameters.hpp"
+#include "services/associator/track_list.hpp"
+
+namespace understory::associator {
+
+/// Result of the localisation of one scan.
+struct Localisation {
+  geometry::Registration pose;  ///< local_T_vehicle, with the pairs (per kind) that it rests on.
+  bool fits = true;             ///< Enough of what can be matched was matched.
+  bool was_searched = false;    ///< The largest consistent set was searched.
+};
+
+/// Locates a scan from the predicted pose `guess` (local_T_vehicle) by the method that the
+/// parameters name. Tracks that move take part in the search alone. With the method "nearest" the
+/// guess is the result and always fits; so does a scan without observations.
+Localisation locate(std::span<const Track> tracks, std::span<const Observation> observations,
+                    const model::FieldOfView& view, const geometry::SE2WithCovariance& guess,
+                    const AssociatorParameters& parameters);
+
+}  // namespace understory::associator

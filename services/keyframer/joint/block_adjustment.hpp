@@ -1,0 +1,47 @@
+// Joint maximum-likelihood estimate of a few scans' poses and of the landmarks that they observed.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/geometry/se2.hpp"
+
+namespace understory::keyframer::joint {
+
+/// One detection of landmark `landmark` by member `member`.
+struct BlockObservation {
+  std::uint32_t member = 0;                                 ///< Index in local_T_member.
+  std::uint32_t landmark = 0;                               ///< Index in landmarks.
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();     ///< Frame of the member's vehicle.
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< Likewise; positive definite.
+};
+
+/// What is to be estimated, and from what.
+struct BlockProblem {
+  std::vector<geometry::SE2> local_T_member;  ///< First guess, in any frame `local`.
+  std::vector<Eigen::Vector2d> landmarks;     ///< First guess [m], same frame.
+  std::vector<BlockObservation> observations;
+  /// motion[k]: from member k to member k + 1, where odometry measured it; size members - 1 or 0.
+  std::vector<std::optional<geometry::SE2WithCovariance>> motion;
+};
+
+/// The estimate in the frame `centre`.
+///
+/// Detections and odometry leave the motion of the whole block undetermined. It is fixed by the
+/// condition that the members' pose errors sum to zero (inner constraint). In this gauge the
+/// landmarks' errors are as independent as they can be.
+struct BlockEstimate {
+  bool converged = false;  ///< Within eight iterations.
+  std::vector<geometry::SE2WithCovariance> centre_T_member;
+  std::vector<Eigen::Vector2d> landmarks;  ///< Frame `centre` [m].
+  /// Exact 2 x 2 blocks in that gauge [m^2]; NaN where a landmark has no observation.
+  std::vector<Eigen::Matrix2d> landmark_covariance;
+  std::vector<double> chi2;  ///< Per observation, 2 degrees of freedom, after the fit.
+};
+
+/// Gauss-Newton with the landmarks eliminated (Schur complement on the 3n pose parameters). An
+/// empty problem gives an empty estimate. Cost O(observations n + n^3) per iteration.
+BlockEstimate adjust_block(const BlockProblem& problem);
+
+}  // namespace understory::keyframer::joint

@@ -1,0 +1,70 @@
+// Keyframes by joint estimation: scans are tracked one by one, then their poses and landmarks are
+// estimated together.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/model/level.hpp"
+#include "common/model/odometry_buffer.hpp"
+#include "services/keyframer/joint/member_block.hpp"
+#include "services/keyframer/joint/scan_tracker.hpp"
+#include "services/keyframer/keyframer_method.hpp"
+#include "services/keyframer/parameters.hpp"
+
+namespace understory::keyframer::joint {
+
+/// The method `joint`. Its keyframes are in the frame `centre`, in which the errors of the member
+/// poses sum to zero and the landmarks' errors are as independent as they can be
+/// (block_adjustment.hpp).
+class JointKeyframer final : public KeyframerMethod {
+ public:
+  /// Starts without any landmark.
+  explicit JointKeyframer(const JointKeyframerParameters& parameters);
+
+  /// A scan that is not later than the last one is refused. One that matches too little of the
+  /// local map ends the keyframe: what was gathered (two scans or more) is given out as a short
+  /// one. Cost O(detections) per scan, O(observations n + n^3) for the n-th of a keyframe.
+  std::optional<model::Keyframe> add(const model::LandmarkScan& scan) override;
+  /// Increments that overlap or run backwards are ignored.
+  void add(const model::Odometry& odometry) override;
+  /// Sets bias and velocity of the odometry that follows.
+  void add(const model::EkfPose& pose) override { odometry_.set_filter_pose(pose); }
+  /// Valid for scans within 2 s of its utime.
+  void add(const model::EkfLevel& level) override { level_.set(level); }
+
+  /// Counts for HEALTH.
+  const KeyframerCounters& counters() const override { return counters_; }
+
+  /// The format is "keyframer.joint" of common/state.
+  std::string save() const override;
+  /// Throws std::invalid_argument on other bytes; the state is then as before.
+  void load(const std::string& bytes) override;
+
+  /// Members of a saved state; see common/state. The parameters are configuration.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.tracker_, self.odometry_, self.level_, self.members_, self.last_utime_,
+      self.next_sequence_, self.local_T_previous_base_, self.counters_);
+  }
+
+ private:
+  std::optional<model::Keyframe> refuse(std::string reason);
+  std::optional<model::Keyframe> start_anew(const model::LandmarkScan& scan);
+  void gather(Member member);
+  std::optional<model::Keyframe> finish();
+
+  JointKeyframerParameters parameters_;
+  ScanTracker tracker_;
+  /// A keyframe takes less than a second: its scans share the error of the gyro's bias.
+  model::OdometryBuffer odometry_{0.8};
+  model::LevelCorrection level_;
+  std::vector<Member> members_;  ///< Of the keyframe that is being gathered.
+  std::optional<model::Utime> last_utime_;
+  std::uint64_t next_sequence_ = 0;
+  std::optional<geometry::SE2> local_T_previous_base_;  ///< None where tracking began anew.
+  KeyframerCounters counters_;
+};
+
+}  // namespace understory::keyframer::joint

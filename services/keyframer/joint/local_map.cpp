@@ -1,0 +1,189 @@
+#include "services/keyframer/joint/local_map.hpp"
+
+#include <algorithm>
+#include <bit>
+
+namespace understory::keyframer::joint {
+namespace {
+
+/// Observations after which a track's mean starts to forget, so that the drift of `local` does not
+/// smear it.
+constexpr double kMaxWeight = 24.0;
+/// A track with fewer observations may be an outlier of its neighbour: it takes a detection only if
+/// that is e^4 times likelier.
+constexpr std::uint32_t kConfirmed = 4;
+constexpr double kReluctance = 8.0;
+/// Scans with both tracks in view that it takes to merge them. Two trunks with detection
+/// probability 0.8 are never detected together in six scans once in 500 cases.
+constexpr int kMergeViews = 6;
+constexpr double kMaxMergeDistance2_m2 = 4.0;
+constexpr std::size_t kMaxMergeMemory = 4096;
+/// A track that was not detected again in so many views was noise.
+constexpr int kNoiseViews = 16;
+/// Tracks are kept up to this multiple of the sensor's range.
+constexpr double kKeepRangeFactor = 1.5;
+
+void take(Track& track, const model::Detection& detection, const geometry::SE2& local_T_vehicle) {
+  ++track.observations;
+  track.detected_bits |= 1u;
+  track.in_view_bits |= 1u;
+
+  const double weight = std::min<double>(track.observations, kMaxWeight);
+  const Eigen::Vector2d position =
+      local_T_vehicle * Eigen::Vector2d(detection.position_m.head<2>());
+  track.position_m += (position - track.position_m) / weight;
+  track.detection_variance_m2 += (plane_variance(detection) - track.detection_variance_m2) / weight;
+  track.radius_m += (detection.radius_m - track.radius_m) / weight;
+}
+
+}  // namespace
+
+double plane_variance(const model::Detection& detection) {
+  return 0.5 * detection.covariance_m2.topLeftCorner<2, 2>().trace();
+}
+
+void LocalMap::clear() {
+  tracks_.clear();
+  merged_.clear();
+}
+
+std::vector<geometry::UncertainPoint> LocalMap::reference_points() const {
+  std::vector<geometry::UncertainPoint> points;
+  points.reserve(tracks_.size());
+  for (const Track& track : tracks_) {
+    const double weight = std::min<double>(track.observations, kMaxWeight);
+    points.push_back({track.position_m, track.detection_variance_m2 / weight,
+                      track.observations < kConfirmed ? kReluctance : 0.0});
+  }
+  return points;
+}
+
+std::size_t LocalMap::matchable(const geometry::SE2& local_T_vehicle,
+                                const model::FieldOfView& view) const {
+  const geometry::SE2 vehicle_T_local = local_T_vehicle.inverse();
+  const auto visible = std::count_if(tracks_.begin(), tracks_.end(), [&](const Track& track) {
+    return track.observations >= 2 && view.contains(vehicle_T_local * track.position_m);
+  });
+  // After the first scan no track has two observations yet: then all of them count.
+  return visible > 0 ? static_cast<std::size_t>(visible) : tracks_.size();
+}
+
+std::vector<TrackNumber> LocalMap::add(const model::LandmarkScan& scan,
+                                       std::span<const geometry::PointPair> pairs,
+                                       const geometry::SE2& local_T_vehicle) {
+  std::vector<TrackNumber> track_of(scan.detections.size(), 0);
+  age(scan.field_of_view, local_T_vehicle);
+
+  // Matched detections update their tracks.
+  for (const geometry::PointPair& pair : pairs) {
+    Track& track = tracks_[pair.reference];
+    take(track, scan.detections[pair.observed], local_T_vehicle);
+    track_of[pair.observed] = track.id;
+  }
+
+  // The others begin new ones.
+  for (std::size_t i = 0; i < scan.detections.size(); ++i) {
+    if (track_of[i] != 0) continue;
+    begin(scan.detections[i], local_T_vehicle);
+    track_of[i] = tracks_.back().id;
+  }
+
+  // The map stays clean and bounded.
+  merge_doubles();
+  drop_distant(scan.field_of_view.max_range_m, local_T_vehicle.translation());
+  return track_of;
+}
+
+void LocalMap::age(const model::FieldOfView& view, const geometry::SE2& local_T_vehicle) {
+  const geometry::SE2 vehicle_T_local = local_T_vehicle.inverse();
+  for (Track& track : tracks_) {
+    const bool visible = view.contains(vehicle_T_local * track.position_m);
+    track.detected_bits <<= 1;
+    track.in_view_bits = (track.in_view_bits << 1) | (visible ? 1u : 0u);
+  }
+}
+
+void LocalMap::begin(const model::Detection& detection, const geometry::SE2& local_T_vehicle) {
+  Track track;
+  track.id = next_id_++;
+  track.position_m = local_T_vehicle * Eigen::Vector2d(detection.position_m.head<2>());
+  track.detection_variance_m2 = plane_variance(detection);
+  track.radius_m = detection.radius_m;
+  track.kind = detection.kind;
+  track.observations = 1;
+  track.detected_bits = track.in_view_bits = 1;
+  tracks_.push_back(track);
+}
+
+bool LocalMap::within_noise(const Track& a, const Track& b) const {
+  const double variance = std::max(a.detection_variance_m2, b.detection_variance_m2);
+  const double gate2 = gate_sigmas_ * gate_sigmas_ * variance;
+  return (a.position_m - b.position_m).squaredNorm() <= std::min(gate2, kMaxMergeDistance2_m2);
+}
+
+bool LocalMap::is_doubtful(const Track& track) const {
+  for (const Track& older : tracks_) {
+    if (older.id >= track.id) break;
+    if (within_noise(older, track) && (older.detected_bits & track.detected_bits) == 0) return true;
+  }
+  return false;
+}
+
+/// Two tracks within the noise of each other that were never detected together, over enough scans
+/// that had both in view, are one landmark.
+void LocalMap::merge_doubles() {
+  for (std::size_t young = 1; young < tracks_.size(); ++young) {
+    const Track& b = tracks_[young];
+    if (b.observations < 2 || std::popcount(b.in_view_bits) < kMergeViews) continue;
+
+    for (std::size_t old = 0; old < young; ++old) {
+      Track& a = tracks_[old];
+      if (!within_noise(a, b)) continue;
+      if ((a.detected_bits & b.detected_bits) != 0) continue;
+      if (std::popcount(a.in_view_bits & b.in_view_bits) < kMergeViews) continue;
+      absorb(a, b);
+      tracks_.erase(tracks_.begin() + static_cast<std::ptrdiff_t>(young));
+      --young;
+      break;
+    }
+  }
+
+  if (merged_.size() > kMaxMergeMemory) {
+    merged_.erase(merged_.begin(), merged_.begin() + kMaxMergeMemory / 2);
+  }
+}
+
+void LocalMap::absorb(Track& a, const Track& b) {
+  const double na = std::min<double>(a.observations, kMaxWeight);
+  const double nb = std::min<double>(b.observations, kMaxWeight);
+  a.position_m = (na * a.position_m + nb * b.position_m) / (na + nb);
+  a.observations += b.observations;
+  a.detected_bits |= b.detected_bits;
+  a.in_view_bits |= b.in_view_bits;
+  merged_.emplace_back(b.id, a.id);
+}
+
+void LocalMap::drop_distant(double max_range_m, const Eigen::Vector2d& vehicle_m) {
+  const double limit = kKeepRangeFactor * max_range_m;
+  std::erase_if(tracks_, [&](const Track& track) {
+    const bool distant = (track.position_m - vehicle_m).norm() > limit;
+    const bool noise = track.observations < 2 && std::popcount(track.in_view_bits) > kNoiseViews;
+    return distant || noise;
+  });
+}
+
+TrackNumber LocalMap::resolved(TrackNumber id) const {
+  for (const auto& [from, to] : merged_) {
+    if (from == id) id = to;
+  }
+  return id;
+}
+
+const Track* LocalMap::find(TrackNumber id) const {
+  const auto found =
+      std::lower_bound(tracks_.begin(), tracks_.end(), id,
+                       [](const Track& track, TrackNumber key) { return track.id < key; });
+  return found != tracks_.end() && found->id == id ? &*found : nullptr;
+}
+
+}  // namespace understory::keyframer::joint

@@ -1,0 +1,143 @@
+#include "services/keyframer/joint/member_block.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <map>
+
+namespace understory::keyframer::joint {
+namespace {
+
+/// chi^2 of a detection (2 degrees of freedom) beyond which it is not the landmark's: one in
+/// 30,000.
+constexpr double kOutlierChi2 = 20.7;
+constexpr int kOutlierRounds = 2;
+
+/// Collects the observations of the members, and gives each track a number as a landmark.
+class BlockBuilder {
+ public:
+  BlockBuilder(const LocalMap& map, int min_observations)
+      : map_(map), min_observations_(static_cast<std::uint32_t>(min_observations)) {}
+
+  void add(const Member& member, bool is_first) {
+    const auto number = static_cast<std::uint32_t>(block_.problem.local_T_member.size());
+    block_.problem.local_T_member.push_back(member.placed.local_T_vehicle);
+    if (!is_first) block_.problem.motion.push_back(member.motion);
+
+    std::vector<TrackNumber> used;  // A merged track may have two detections in one scan.
+    for (std::size_t i = 0; i < member.scan.detections.size(); ++i) {
+      const Track* track = map_.find(map_.resolved(member.placed.tracks[i]));
+      if (track == nullptr || !is_sure(*track)) continue;
+      if (std::find(used.begin(), used.end(), track->id) != used.end()) continue;
+      used.push_back(track->id);
+
+      const model::Detection& detection = member.scan.detections[i];
+      block_.problem.observations.push_back({number, landmark_of(*track),
+                                             detection.position_m.head<2>(),
+                                             detection.covariance_m2.topLeftCorner<2, 2>()});
+    }
+  }
+
+  MemberBlock take() { return std::move(block_); }
+
+ private:
+  bool is_sure(const Track& track) const {
+    return track.observations >= min_observations_ && !map_.is_doubtful(track);
+  }
+
+  std::uint32_t landmark_of(const Track& track) {
+    const auto next = static_cast<std::uint32_t>(block_.tracks.size());
+    const auto [entry, fresh] = landmarks_.try_emplace(track.id, next);
+    if (fresh) {
+      block_.tracks.push_back(track.id);
+      block_.problem.landmarks.push_back(track.position_m);
+    }
+    return entry->second;
+  }
+
+  const LocalMap& map_;
+  std::uint32_t min_observations_;
+  MemberBlock block_;
+  std::map<TrackNumber, std::uint32_t> landmarks_;
+};
+
+/// Removes the observations that do not fit the estimate. Returns false where there are none.
+bool remove_outliers(BlockProblem& problem, const BlockEstimate& estimate) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < problem.observations.size(); ++i) {
+    if (estimate.chi2[i] <= kOutlierChi2) problem.observations[kept++] = problem.observations[i];
+  }
+  if (kept == problem.observations.size()) return false;
+  problem.observations.resize(kept);
+  return true;
+}
+
+std::vector<std::uint32_t> observation_counts(const BlockProblem& problem) {
+  std::vector<std::uint32_t> count(problem.landmarks.size(), 0);
+  for (const BlockObservation& z : problem.observations) ++count[z.landmark];
+  return count;
+}
+
+/// Scans that few landmarks connect leave motions undetermined. The solver then gives rounding
+/// errors for their covariance, which may be anything.
+bool are_covariances(const BlockEstimate& estimate) {
+  return std::ranges::all_of(
+      estimate.centre_T_member, [](const geometry::SE2WithCovariance& member) {
+        const Eigen::Matrix3d symmetric = 0.5 * (member.covariance + member.covariance.transpose());
+        if (!symmetric.allFinite()) return false;
+        const Eigen::Vector3d eigenvalues =
+            Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(symmetric, Eigen::EigenvaluesOnly)
+                .eigenvalues();
+        return eigenvalues.minCoeff() >= -1e-9 * eigenvalues.maxCoeff();
+      });
+}
+
+}  // namespace
+
+MemberBlock adjust_members(std::span<const Member> members, const LocalMap& map,
+                           int min_observations) {
+  BlockBuilder builder(map, min_observations);
+  for (std::size_t k = 0; k < members.size(); ++k) builder.add(members[k], k == 0);
+
+  MemberBlock block = builder.take();
+  block.estimate = adjust_block(block.problem);
+  for (int round = 0; round < kOutlierRounds; ++round) {
+    if (!remove_outliers(block.problem, block.estimate)) break;
+    block.estimate = adjust_block(block.problem);
+  }
+  return block;
+}
+
+std::optional<std::string> why_unusable(std::span<const Member> members, const MemberBlock& block) {
+  const bool has_motion =
+      std::ranges::any_of(members, [](const Member& member) { return member.motion.has_value(); });
+  if (!block.estimate.converged) return "joint estimate did not converge";
+  if (!has_motion && block.tracks.size() < 3) return "fewer than three landmarks";
+  if (!are_covariances(block.estimate)) return "the scans have too little in common";
+  return std::nullopt;
+}
+
+model::Keyframe to_keyframe(std::span<const Member> members, const MemberBlock& block,
+                            const LocalMap& map) {
+  const BlockEstimate& estimate = block.estimate;
+  model::Keyframe keyframe;
+  keyframe.utime = members.front().scan.utime;
+  keyframe.field_of_view = members.front().scan.field_of_view;
+
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    keyframe.members.push_back({members[k].scan.utime, members[k].scan.sequence,
+                                estimate.centre_T_member[k].mean,
+                                estimate.centre_T_member[k].covariance});
+  }
+
+  const std::vector<std::uint32_t> count = observation_counts(block.problem);
+  for (std::size_t i = 0; i < block.tracks.size(); ++i) {
+    if (count[i] == 0) continue;
+    const Track& track = *map.find(block.tracks[i]);
+    keyframe.landmarks.push_back({estimate.landmarks[i], estimate.landmark_covariance[i],
+                                  track.radius_m, static_cast<std::uint16_t>(count[i]),
+                                  track.kind});
+  }
+  return keyframe;
+}
+
+}  // namespace understory::keyframer::joint

@@ -1,0 +1,66 @@
+// Follows landmarks from scan to scan in a frame that drifts slowly: which detection is which
+// landmark.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "common/geometry/registration.hpp"
+#include "common/model/landmarks.hpp"
+#include "services/keyframer/joint/local_map.hpp"
+#include "services/keyframer/parameters.hpp"
+
+namespace understory::keyframer::joint {
+
+/// Where a scan was made, and the track of each of its detections.
+struct PlacedScan {
+  geometry::SE2 local_T_vehicle;
+  std::vector<TrackNumber> tracks;  ///< Per detection; tracks that the scan began included.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.local_T_vehicle, self.tracks);
+  }
+};
+
+/// Registers each scan to a rolling map of the last ones. It works without odometry, and through
+/// rotations between scans that no motion model predicts: where the predicted pose does not fit,
+/// the headings around it are tried.
+class ScanTracker {
+ public:
+  /// An empty map: the first scan starts it.
+  explicit ScanTracker(const JointKeyframerParameters& parameters)
+      : parameters_(parameters), map_(parameters.gate_sigmas) {}
+
+  /// Takes the next scan. `motion`: of the vehicle since the last scan (last_T_this), where
+  /// odometry measured it. Returns nothing where the scan matches too little of the map; then
+  /// nothing has changed. With odometry a scan is always placed.
+  std::optional<PlacedScan> add(const model::LandmarkScan& scan,
+                                const std::optional<geometry::SE2WithCovariance>& motion);
+  /// Drops the map and starts `local` at this scan.
+  PlacedScan restart(const model::LandmarkScan& scan);
+
+  /// The tracks as they are after the last scan.
+  const LocalMap& map() const { return map_; }
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.map_, self.started_, self.local_T_vehicle_, self.last_motion_);
+  }
+
+ private:
+  std::optional<geometry::Registration> locate(
+      const model::LandmarkScan& scan,
+      const std::optional<geometry::SE2WithCovariance>& motion) const;
+  bool fits(const geometry::Registration& registration, const model::LandmarkScan& scan) const;
+
+  JointKeyframerParameters parameters_;
+  LocalMap map_;
+  bool started_ = false;
+  geometry::SE2 local_T_vehicle_;  ///< At the last scan.
+  geometry::SE2 last_motion_;      ///< Between the last two scans.
+};
+
+}  // namespace understory::keyframer::joint

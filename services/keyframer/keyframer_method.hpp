@@ -1,0 +1,59 @@
+// What every method of making keyframes has in common.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "common/model/ekf_output.hpp"
+#include "common/model/keyframe.hpp"
+#include "common/model/landmarks.hpp"
+#include "common/model/odometry.hpp"
+
+namespace understory::keyframer {
+
+/// What became of scans and keyframes, since the first start (a saved state includes it).
+struct KeyframerCounters {
+  std::uint64_t scans = 0;               ///< Received.
+  std::uint64_t scans_unmatched = 0;     ///< Not used for a keyframe.
+  std::uint64_t keyframes = 0;           ///< Given out.
+  std::uint64_t keyframes_withheld = 0;  ///< Gathered, but not good enough to give out.
+  std::string last_reason;               ///< Why the last scan or keyframe was not used.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.scans, self.scans_unmatched, self.keyframes, self.keyframes_withheld, self.last_reason);
+  }
+};
+
+/// Local bundle adjustment (GeoSLAM §4.2, algorithm 2): n scans become one keyframe.
+///
+/// All inputs come in order of time; what a method cannot use is counted, never thrown.
+class KeyframerMethod {
+ public:
+  virtual ~KeyframerMethod() = default;
+
+  /// Takes one scan. Returns the keyframe that the scan completes, if any.
+  virtual std::optional<model::Keyframe> add(const model::LandmarkScan& scan) = 0;
+  /// Motion of the vehicle by wheels or IMU, where there is any. It must come before the scan at
+  /// its end. It predicts the next scan and bridges scans with few landmarks.
+  virtual void add(const model::Odometry& odometry) = 0;
+  /// The filter's pose, of which the inertial bias and the velocity are used: odometry that comes
+  /// later starts from them. Ignored by default.
+  virtual void add(const model::EkfPose& /*pose*/) {}
+  /// The error of roll and pitch as the filter estimates it: scans that come later are corrected by
+  /// it. Ignored by default.
+  virtual void add(const model::EkfLevel& /*level*/) {}
+
+  /// Counts for HEALTH.
+  virtual const KeyframerCounters& counters() const = 0;
+
+  /// The whole state as bytes, for a restart.
+  virtual std::string save() const = 0;
+  /// Takes what save() of the same method gave. Throws std::invalid_argument on other bytes; the
+  /// state is then as before.
+  virtual void load(const std::string& bytes) = 0;
+};
+
+}  // namespace understory::keyframer
