@@ -10,34 +10,40 @@ void describe(AssociatorParameters& p, bus::ParameterTable& table) {
       "consistent where that does not fit.");
   table.add("gate_sigmas", p.gate_sigmas, {0.5, 20.0}, "sigma",
             "Half width of the gate of a pair.");
+
   table.add("motion_sigma_m", p.motion_sigma_m, {1e-4, 100.0}, "m",
             "Standard deviation per axis of the step between two scans that nothing measures.");
   table.add("motion_sigma_rad", p.motion_sigma_rad, {1e-5, 3.2}, "rad",
             "Standard deviation of the rotation between two scans that nothing measures.");
   table.add("max_rotation_rad", p.max_rotation_rad, {0.0, 3.2}, "rad",
             "Largest unpredicted rotation between two scans that is searched.");
+
   table.add(
       "min_matched_ratio", p.min_matched_ratio, {0.0, 1.0}, "",
       "Least share of the detections (or of the tracks in view, if fewer) that a scan matches; "
       "below it the scan does not fit.");
   table.add("min_matched", p.min_matched, {0, 1000}, "",
             "Least number of matches of a scan that fits.");
+
   table.add("confirm_matches", p.confirm_matches, {1, 63}, "scans",
             "[k] A track gets its id after so many matches ...");
   table.add("confirm_window", p.confirm_window, {1, 63}, "scans",
             "[n] ... within so many scans that had it in view.");
+
   table.add("max_misfits", p.max_misfits, {0, 1000}, "scans",
             "Scans in a row that fit no track and are passed over; then all tracks begin anew.");
   table.add("max_missed", p.max_missed, {1, 100000}, "scans",
             "A track ends after so many scans in a row that had it in view and did not match it.");
   table.add("keep_range_factor", p.keep_range_factor, {1.0, 10.0}, "of the range",
             "Tracks beyond this multiple of the sensor's range end.");
+
   table.add("min_likelihood_ratio", p.min_likelihood_ratio, {1.0, 1e9}, "",
             "A match is published if it is so many times likelier than any other pairing.");
   table.add("walking_mps", p.walking_mps, {0.0, 100.0}, "m/s",
             "A track that moves against wheels and gyro is not published. Where fewer than three "
             "stationary tracks are in view, a track is published once this speed would have been "
             "noticed. 0: no check.");
+
   table.renamed("max_turn_rad", "max_rotation_rad");
 }
 

@@ -123,6 +123,7 @@ class Matcher {
           if (j == kFree || j == i) continue;
           const std::uint32_t own = partner_[i];
           if (c.cost + cost(j, own) >= cost(i, own) + cost(j, c.track) - 1e-9) continue;
+
           pair(i, c.track);
           pair(j, own);
           changed = true;

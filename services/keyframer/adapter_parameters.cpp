@@ -12,12 +12,14 @@ void describe_baseline(BaselineKeyframerParameters& p, bus::ParameterTable& tabl
             "[Delta_N] Largest difference of the numbers of sides of two polygons that match.");
   table.add("baseline.min_triangle_match_ratio", p.min_triangle_match_ratio, {0.0, 1.0}, "",
             "[eta] Least share of triangles that must match inside a matched polygon.");
+
   table.add("baseline.min_associations", p.min_associations, {2, 10000}, "",
             "[gamma] Least number of associations of a scan.");
   table.add("baseline.max_association_distance_m", p.max_association_distance_m, {0.01, 100.0}, "m",
             "[lambda] Largest distance of an association after alignment.");
   table.add("baseline.cluster_tolerance_m", p.cluster_tolerance_m, {0.01, 100.0}, "m",
             "[sigma] Detections within this distance of each other are one landmark.");
+
   table.add("baseline.observations_per_keyframe", p.observations_per_keyframe, {1, 1000}, "scans",
             "[n] Scans that make a keyframe.");
   table.add("baseline.stale_after_observations", p.stale_after_observations, {1, 1000}, "scans",
@@ -30,6 +32,7 @@ void describe_joint(JointKeyframerParameters& p, bus::ParameterTable& table) {
             "Scans that make a keyframe.");
   table.add("joint.gate_sigmas", p.gate_sigmas, {0.1, 100.0}, "sigma",
             "Half width of the association gate.");
+
   table.add(
       "joint.motion_sigma_m", p.motion_sigma_m, {1e-4, 100.0}, "m",
       "Standard deviation per axis of the step between two scans, where there is no odometry.");
@@ -55,6 +58,7 @@ void describe(KeyframerParameters& parameters, bus::ParameterTable& table) {
       "thesis (section 4.2).");
   describe_joint(parameters.joint, table);
   describe_baseline(parameters.baseline, table);
+
   table.renamed("source.", "baseline.");
   table.renamed("joint.min_sightings", "joint.min_observations");
   table.renamed("joint.max_turn_rad", "joint.max_rotation_rad");

@@ -1,4 +1,5 @@
 // Range queries against brute force, registration against a known motion, and the quota.
+#include <Eigen/LU>
 #include <algorithm>
 #include <random>
 #include <utility>
