@@ -8,14 +8,16 @@
 namespace understory::geometry {
 
 /// Weighted sums over point pairs, from which the best rigid motion follows in closed form (Umeyama
-/// 1991 without scale). Pairs can be added and taken away one by one; each costs a dozen flops.
+/// 1991 without scale). Pairs can be added and removed one by one; each costs a dozen flops.
 class RigidAlignment2 {
  public:
-  /// Adds the pair `a` ~ a_T_b * `b`. A negative weight takes an earlier pair away again.
+  /// Adds the pair `a` ~ a_T_b * `b` [m]. The weight is an inverse variance or any number in
+  /// proportion to it; a negative weight removes an earlier pair.
   void add(const Eigen::Vector2d& a, const Eigen::Vector2d& b, double weight = 1.0);
+  /// Sum of the weights.
   double weight() const { return weight_; }
-  /// The motion a_T_b with least weighted squared distance. With fewer than two distinct pairs only
-  /// the translation is determined and the heading is zero.
+  /// The motion a_T_b with the least weighted squared distance. With fewer than two distinct pairs
+  /// only the translation is determined and the heading is zero; without pairs it is the identity.
   SE2 a_T_b() const;
 
  private:

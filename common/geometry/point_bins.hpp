@@ -1,4 +1,4 @@
-// Points of the plane sorted into square bins, for many look-ups in one fixed set.
+// Points of the plane sorted into square bins, for many range queries on one fixed set.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,14 +9,17 @@
 
 namespace understory::geometry {
 
-/// A counting-sort grid over a fixed set of points. Building costs O(n + bins).
+/// A counting-sort grid over a fixed set of points, which it copies. Building costs O(n + bins).
 class PointBins {
  public:
+  /// An empty set: no query finds anything.
   PointBins() = default;
-  /// `bin_m` is enlarged where the points' extent would need more than 4 bins per point (or 4096).
+  /// Sorts `points` [m] into bins of side `bin_m`. The side is doubled until the grid has at most
+  /// 4 bins per point (or 4096 bins).
   PointBins(std::span<const Eigen::Vector2d> points, double bin_m);
 
-  /// Calls f(index, squared distance) for every point within `radius_m` of `centre`.
+  /// Calls f(index, squared distance [m^2]) for every point within `radius_m` of `centre`, bin by
+  /// bin. Cost: the points in the bins that the square around the circle touches.
   template <typename F>
   void for_each_within(const Eigen::Vector2d& centre, double radius_m, F&& f) const {
     if (points_.empty()) return;

@@ -17,9 +17,12 @@ double wrap_angle(double angle_rad);
 /// A pose in the plane, or the rigid motion between two frames. The heading is kept in (-pi, pi].
 class SE2 {
  public:
+  /// The identity.
   SE2() = default;
+  /// The heading is wrapped into (-pi, pi].
   SE2(double x_m, double y_m, double theta_rad)
       : translation_(x_m, y_m), theta_(wrap_angle(theta_rad)) {}
+  /// Likewise.
   SE2(const Eigen::Vector2d& translation_m, double theta_rad)
       : translation_(translation_m), theta_(wrap_angle(theta_rad)) {}
 
@@ -28,16 +31,24 @@ class SE2 {
   /// Inverse of Exp; theta in (-pi, pi].
   Eigen::Vector3d Log() const;
 
+  /// First coordinate of the translation [m].
   double x() const { return translation_.x(); }
+  /// Second coordinate of the translation [m].
   double y() const { return translation_.y(); }
+  /// Heading [rad], in (-pi, pi].
   double theta() const { return theta_; }
+  /// Translation [m].
   const Eigen::Vector2d& translation() const { return translation_; }
+  /// Rotation matrix of the heading; one sine and one cosine per call.
   Eigen::Matrix2d rotation() const;
   /// (x, y, theta), for printing and for the wire. Not a tangent vector.
   Eigen::Vector3d coordinates() const { return {x(), y(), theta_}; }
 
+  /// b_T_a of a_T_b.
   SE2 inverse() const;
+  /// Composition: a_T_c = a_T_b * b_T_c.
   SE2 operator*(const SE2& other) const;
+  /// The point [m] of frame b in frame a.
   Eigen::Vector2d operator*(const Eigen::Vector2d& point) const;
 
   /// Ad with T Exp(xi) T^-1 = Exp(Ad xi); 3 x 3.
@@ -54,7 +65,7 @@ Eigen::Matrix3d inverse_right_jacobian(const Eigen::Vector3d& xi);
 /// A pose or motion with its covariance (3 x 3, tangent order, right perturbation).
 struct SE2WithCovariance {
   SE2 mean;
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Units m and rad.
 };
 
 /// Compounding of independent motions, to first order (Smith, Self & Cheeseman 1990).
@@ -62,7 +73,7 @@ SE2WithCovariance compound(const SE2WithCovariance& a_T_b, const SE2WithCovarian
 /// Inverse of an uncertain motion, to first order.
 SE2WithCovariance inverse(const SE2WithCovariance& a_T_b);
 
-/// S with S * p = p turned by +90 degrees: the derivative of a rotation at zero.
+/// The point rotated by +90 degrees: the derivative of R(theta) p by theta at zero.
 inline Eigen::Vector2d perpendicular(const Eigen::Vector2d& p) { return {-p.y(), p.x()}; }
 
 }  // namespace understory::geometry

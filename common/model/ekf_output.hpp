@@ -1,4 +1,4 @@
-// What the filter and the dead reckoning say.
+// Output of the filter and of dead reckoning.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,33 +16,35 @@ namespace understory::model {
 struct RawPose {
   Utime utime = 0;
   std::uint64_t sequence = 0;
-  geometry::SE2 odom_T_vehicle;  ///< Identity at the start.
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  geometry::SE2 odom_T_vehicle;                          ///< Identity at the start.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Right perturbation; m, rad.
   bool is_reference = false;  ///< GNSS aided: for evaluation, never for mapping.
 };
 
-/// Channel EKF_POSE.
+/// Channel EKF_POSE: the filter's state after one scan. Its pose serves for gating and
+/// linearisation, never as a measurement.
 struct EkfPose {
   Utime utime = 0;
   std::uint64_t sequence = 0;
   geometry::SE2 ekf_map_T_vehicle;
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();    ///< Right perturbation.
-  Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Frame `vehicle_level`.
-  Eigen::Matrix2d velocity_covariance = Eigen::Matrix2d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();           ///< Right perturbation; m, rad.
+  Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();         ///< Frame `vehicle_level`.
+  Eigen::Matrix2d velocity_covariance = Eigen::Matrix2d::Zero();  ///< [(m/s)^2]
   InertialBias bias = InertialBias::Zero();
-  Eigen::Matrix3d bias_covariance = Eigen::Matrix3d::Zero();
-  std::uint32_t landmarks_used = 0;     ///< In the latest update.
+  Eigen::Matrix3d bias_covariance = Eigen::Matrix3d::Zero();  ///< In the order and units of `bias`.
+  std::uint32_t landmarks_used = 0;                           ///< In the latest update.
   std::uint32_t landmarks_refused = 0;  ///< By the chi^2 tests, in the latest update.
   std::uint64_t reset_counter = 0;      ///< Counts restarts of the filter: the pose jumped.
 };
 
+/// One landmark of the filter's active state.
 struct EkfLandmark {
   TrackId track_id = 0;
-  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `ekf_map`.
-  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
-  double radius_m = 0.0;
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();     ///< Frame `ekf_map`.
+  Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< Likewise.
+  double radius_m = 0.0;                                    ///< 0 where unknown.
   LandmarkKind kind = LandmarkKind::kTrunk;
-  std::uint32_t observation_count = 0;
+  std::uint32_t observation_count = 0;  ///< Scans that updated it.
 };
 
 /// Channel EKF_MAP: the landmarks of the active state.
@@ -56,19 +58,19 @@ struct EkfMap {
 struct EkfLevel {
   Utime utime = 0;
   std::uint64_t sequence = 0;
-  Eigen::Vector2d error_rad = Eigen::Vector2d::Zero();   ///< Roll, pitch; as the filter knows it.
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< Of that [rad^2].
-  /// Of the whole error, as detections' covariances have it.
+  Eigen::Vector2d error_rad = Eigen::Vector2d::Zero();   ///< Roll, pitch; the filter's estimate.
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< Of the estimate [rad^2].
+  /// Of the whole error [rad^2], as it is included in the covariances of detections.
   Eigen::Matrix2d reported_covariance = Eigen::Matrix2d::Zero();
 };
 
-/// Channel VELOCITY_CORRECTION: what the filter knows about velocity and biases at utime.
+/// Channel VELOCITY_CORRECTION: the filter's estimate of velocity and biases at utime.
 struct VelocityCorrection {
   Utime utime = 0;
   std::uint64_t sequence = 0;
   Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Frame `vehicle_level`.
   InertialBias bias = InertialBias::Zero();
-  /// Of (velocity, bias).
+  /// Of (velocity, bias), in their units squared.
   Eigen::Matrix<double, 5, 5> covariance = Eigen::Matrix<double, 5, 5>::Zero();
 };
 

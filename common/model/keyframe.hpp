@@ -11,39 +11,41 @@ namespace understory::model {
 
 /// One landmark of a keyframe, in the frame of the keyframe's `centre`.
 struct KeyframeLandmark {
-  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
-  /// D: what this landmark's own detections leave uncertain, independent between landmarks [m^2].
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `centre`.
+  /// D: the uncertainty by this landmark's own detections, independent between landmarks.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
-  double radius_m = 0.0;
-  std::uint16_t observation_count = 0;
+  double radius_m = 0.0;                ///< 0 where unknown.
+  std::uint16_t observation_count = 0;  ///< Detections that it was estimated from.
   LandmarkKind kind = LandmarkKind::kTrunk;
 };
 
 /// One scan that went into a keyframe.
 struct KeyframeMember {
   Utime utime = 0;
-  std::uint64_t sequence = 0;
+  std::uint64_t sequence = 0;  ///< Of the LANDMARKS message.
   geometry::SE2 centre_T_vehicle;
-  /// Covariance of `centre_T_vehicle`: what this scan's own detections leave uncertain.
+  /// Of `centre_T_vehicle` (right perturbation; m, rad): the uncertainty by this scan's detections.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 
 /// Channel KEYFRAME.
 ///
 /// The member scans and the local landmarks are estimated together. Landmarks are given in the
-/// frame `centre`, in which their errors are independent (covariance D); the base (the first
-/// member) is known in it with `Sigma_base`, the covariance of members[0]. In the base's frame the
-/// landmarks' joint covariance is D + J Sigma_base J^T.
+/// frame `centre`, in which their errors are independent (covariance D). The pose of the base (the
+/// first member) in that frame has `Sigma_base`, the covariance of members[0]. In the base's frame
+/// the landmarks' joint covariance is D + J Sigma_base J^T.
 struct Keyframe {
   Utime utime = 0;                      ///< Of the base scan.
   std::uint64_t sequence = 0;           ///< Counts keyframes.
   FieldOfView field_of_view;            ///< Of the scans.
   std::vector<KeyframeMember> members;  ///< In order of time; members[0] is the base.
   std::vector<KeyframeLandmark> landmarks;
-  /// Where the base is, seen from the previous keyframe's base, as the keyframer tracked it. It is
-  /// made from the same detections: good for gating and linearisation, never a measurement.
+  /// Motion from the previous keyframe's base to this one, as the keyframer tracked it; none after
+  /// a gap. It is estimated from the same detections: for gating and linearisation, never a
+  /// measurement.
   std::optional<geometry::SE2> previous_T_base;
 
+  /// Pose of the base. Precondition: there is a member.
   const geometry::SE2& centre_T_base() const { return members.front().centre_T_vehicle; }
 };
 

@@ -1,4 +1,4 @@
-// What the landmark extractor (or the simulator) says about one sweep.
+// The landmarks that the extractor (or the simulator) detects in one sweep.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,9 +11,10 @@ namespace understory::model {
 /// Microseconds since the epoch of the recording: the time of the measurement.
 using Utime = std::int64_t;
 
+/// A tree trunk (a circle) or the corner of a house (a vertical edge).
 enum class LandmarkKind : std::uint8_t { kTrunk = 0, kCorner = 1 };
 
-/// One landmark as seen from the vehicle.
+/// One landmark as the vehicle detects it.
 struct Detection {
   /// Centre (trunk) or edge (corner), each 1.3 m above the ground, in `vehicle_level` [m].
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
@@ -27,14 +28,15 @@ struct Detection {
   double bearing_sigma_rad = 0.0;  ///< Standard deviation of it; 0 = none (a trunk).
 };
 
-/// What the sensor could have seen: a sector of a disc around the vehicle.
+/// Where the sensor can detect landmarks: a sector of a disc around the vehicle.
 struct FieldOfView {
-  double max_range_m = 0.0;
+  double max_range_m = 0.0;  ///< In the plane.
   /// Middle of the sector [rad], 0 = straight ahead, left positive.
   double bearing_rad = 0.0;
   /// Whole width of the sector [rad]; 2 pi = all around.
   double width_rad = 2.0 * std::numbers::pi;
 
+  /// True where a landmark at this position (frame `vehicle_level`) is in the sector.
   bool contains(const Eigen::Vector2d& position_in_vehicle_m) const;
 };
 

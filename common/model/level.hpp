@@ -1,4 +1,4 @@
-// Detections at the true level.
+// Detections at the true level, by the filter's estimate of the error of roll and pitch.
 #pragma once
 
 #include <optional>
@@ -8,15 +8,18 @@
 
 namespace understory::model {
 
-/// The filter's latest word on the level, for those who take LANDMARKS.
+/// The filter's latest estimate of the level's error, for stages that take LANDMARKS.
 class LevelCorrection {
  public:
+  /// Replaces the estimate.
   void set(const EkfLevel& level) { level_ = level; }
-  /// The scan as it is at the true level: an error of roll and pitch displaces detections by their
-  /// height. The covariance that this error had in theirs is replaced by what is left of it. As it
-  /// came where the filter said nothing lately.
+  /// The scan at the true level: an error of roll and pitch displaces detections in proportion to
+  /// their height. The part of this error in their covariances is replaced by that of the remaining
+  /// error. The scan comes back as it is where the estimate is older than 2 s, or there is none.
   LandmarkScan levelled(LandmarkScan scan) const;
+  /// The estimate; none at the start.
   const std::optional<EkfLevel>& latest() const { return level_; }
+  /// Replaces the estimate, or removes it.
   void restore(const std::optional<EkfLevel>& level) { level_ = level; }
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -28,8 +31,8 @@ class LevelCorrection {
   std::optional<EkfLevel> level_;
 };
 
-/// A detection's covariance in the plan without the part that an error of the level has in it, as
-/// far as there is something left. `arm`: displacement by (roll, pitch).
+/// A detection's covariance [m^2] in the plane without the part by an error of the level; at least
+/// 5 % remains in each direction. `arm` [m/rad]: d(position) / d(roll, pitch).
 Eigen::Matrix2d without_level(const Eigen::Matrix2d& covariance_m2, const Eigen::Matrix2d& arm,
                               const Eigen::Matrix2d& level_covariance_rad2);
 

@@ -1,4 +1,4 @@
-// What the mapper knows and says.
+// The map, and what a keyframe changed in it.
 #pragma once
 
 #include <optional>
@@ -13,12 +13,13 @@ namespace understory::model {
 /// 64 bit: map id (upper 16), counter (lower 48). Permanent, never used again. 0 = none.
 using LandmarkId = std::uint64_t;
 
+/// One landmark of the map.
 struct MapLandmark {
   LandmarkId id = 0;
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `map`.
   Eigen::Matrix2d covariance_m2 =
-      Eigen::Matrix2d::Zero();  ///< Marginal, frame `map`; zero where not computed.
-  double radius_m = 0.0;
+      Eigen::Matrix2d::Zero();          ///< Marginal, frame `map`; zero where not computed.
+  double radius_m = 0.0;                ///< 0 where unknown.
   std::uint32_t observation_count = 0;  ///< Scans in which it was detected.
   LandmarkKind kind = LandmarkKind::kTrunk;
 };
@@ -28,7 +29,7 @@ struct KeyframePose {
   std::uint64_t keyframe_sequence = 0;
   Utime utime = 0;
   geometry::SE2 map_T_vehicle;
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Zero where not computed.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< m, rad; zero where not computed.
 };
 
 /// What became of a keyframe.
@@ -36,12 +37,12 @@ enum class MapUpdateStatus : std::uint8_t {
   kFirstMap = 0,  ///< It started the map.
   kUpdated = 1,   ///< Localised and fused.
   kNotSure =
-      2,  ///< No pose could be told apart from chance or from a runner-up; nothing was changed.
-  kRolledBack = 3,  ///< Fused, found inconsistent (chi^2), taken back exactly.
+      2,  ///< No pose is significantly better than chance or the second best; nothing was changed.
+  kRolledBack = 3,  ///< Fused, found inconsistent (chi^2), undone exactly.
   kRejected = 4,    ///< Malformed, empty, or out of order.
 };
 
-/// One detection of a keyframe in the map.
+/// A keyframe's landmark and the landmark of the map that it is.
 struct Association {
   std::uint32_t keyframe_landmark = 0;  ///< Index in Keyframe::landmarks.
   LandmarkId landmark_id = 0;
@@ -53,20 +54,20 @@ struct MapUpdate {
   Utime utime = 0;
   MapUpdateStatus status = MapUpdateStatus::kRejected;
   geometry::SE2 map_T_vehicle;                           ///< Of the keyframe's base.
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Of map_T_vehicle.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Of map_T_vehicle; m, rad.
   geometry::SE2 map_T_latest_vehicle;                    ///< Of the keyframe's last member.
   std::vector<Association> associations;
-  std::vector<LandmarkId> added;
-  std::vector<LandmarkId> removed;
+  std::vector<LandmarkId> added;                          ///< By this keyframe.
+  std::vector<LandmarkId> removed;                        ///< By this keyframe.
   std::vector<std::pair<LandmarkId, LandmarkId>> merged;  ///< old -> new.
   // Diagnostics.
   bool used_prior = false;       ///< Localised by gating around the predicted pose, not by search.
   std::uint32_t candidates = 0;  ///< Hypotheses tried by the search.
-  std::uint32_t inliers = 0;
-  double chi2 = 0.0;  ///< Of the innovation, over `degrees_of_freedom`.
+  std::uint32_t inliers = 0;     ///< Associations that the accepted pose rests on.
+  double chi2 = 0.0;             ///< Of the innovation, over `degrees_of_freedom`.
   std::uint32_t degrees_of_freedom = 0;
   double log10_false_alarm = 0.0;  ///< Of the accepted pose (search only).
-  std::string reason;              ///< Why not, where not.
+  std::string reason;              ///< Why it was not fused; empty where it was.
 };
 
 }  // namespace understory::model

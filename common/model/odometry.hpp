@@ -1,4 +1,4 @@
-// Relative motion that no landmark has touched.
+// Relative motion, measured without landmarks.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,20 +9,20 @@
 
 namespace understory::model {
 
-/// Errors of the inertial sensors that last, in `vehicle_level`: gyro about z [rad/s],
+/// Slowly changing errors of the inertial sensors, in `vehicle_level`: gyro about z [rad/s],
 /// accelerometer along x and y [m/s^2] (the level's own error included).
 using InertialBias = Eigen::Vector3d;
 
 /// Error of (roll, pitch) [rad], about the axes of `vehicle_level`, that all sweeps levelled with
-/// one estimate of the attitude share. It lasts: while the vehicle stands it is the accelerometer's
-/// bias; what the vehicle's motion then tells takes it away.
+/// one estimate of the attitude share. It is correlated over time: while the vehicle is stationary
+/// it is the accelerometer's bias; the vehicle's motion then reduces it.
 struct LevelError {
-  /// At the end of the interval.
+  /// At the end of the interval [rad^2].
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
-  /// Error at the end = memory * error at the start + something new of covariance `added`.
+  /// Error at the end = memory * error at the start + new error with covariance `added` [rad^2].
   Eigen::Matrix2d memory = Eigen::Matrix2d::Identity();
   Eigen::Matrix2d added = Eigen::Matrix2d::Zero();
-  /// Of the vehicle's pitch: on a slope a wrong roll is a wrong heading too, by this times as much.
+  /// Of the vehicle's pitch: on a slope an error of roll is one of heading too, by this factor.
   double pitch_tangent = 0.0;
 };
 
@@ -35,7 +35,7 @@ struct Preintegration {
   double yaw_rad = 0.0;
   Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
-  /// Of (yaw, velocity, position): white noise of the sensors and of the level.
+  /// Of (yaw, velocity, position), in rad, m/s, m: white noise of the sensors and of the level.
   Eigen::Matrix<double, 5, 5> covariance = Eigen::Matrix<double, 5, 5>::Zero();
   /// d(yaw, velocity, position) / d(bias) at `bias`, which was subtracted from the samples.
   Eigen::Matrix<double, 5, 3> bias_jacobian = Eigen::Matrix<double, 5, 3>::Zero();
@@ -52,12 +52,12 @@ struct Odometry {
   geometry::SE2 from_T_to;
   /// Covariance of `from_T_to` (tangent order x, y, theta; right perturbation).
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  /// Where there is an IMU. `from_T_to` is then made of the same samples (and of the wheels, where
-  /// there are any): whoever uses the preintegration takes from `from_T_to` only what wheels said.
+  /// Where there is an IMU. `from_T_to` rests on the same samples (and on the wheels, where there
+  /// are any): a user of the preintegration takes from `from_T_to` the wheels' translation alone.
   std::optional<Preintegration> inertial = {};
-  /// Wheels stood behind `from_T_to`; without them its translation rests on dead-reckoned velocity.
+  /// `from_T_to` rests on wheels; without them its translation rests on dead-reckoned velocity.
   bool has_wheels = false;
-  bool is_stationary = false;  ///< The vehicle was found to stand still during the interval.
+  bool is_stationary = false;  ///< The vehicle did not move during the interval.
 };
 
 }  // namespace understory::model

@@ -1,4 +1,4 @@
-// Recent odometry, asked for the motion between any two stamps.
+// Recent odometry: the motion between any two stamps.
 #pragma once
 
 #include <deque>
@@ -9,12 +9,12 @@
 
 namespace understory::model {
 
-/// How fast the vehicle is, from a filter that sees landmarks.
+/// The vehicle's velocity by a filter that uses landmarks.
 struct VelocityEstimate {
   Utime utime = 0;
   Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Frame `vehicle_level` at utime.
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
-  double gyro_bias_variance = 0.0;  ///< [(rad/s)^2]
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();    ///< [(m/s)^2]
+  double gyro_bias_variance = 0.0;                         ///< [(rad/s)^2]
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -23,10 +23,10 @@ struct VelocityEstimate {
   }
 };
 
-/// The gyro's bias as a filter knows it [rad/s], [(rad/s)^2].
+/// The gyro's bias by a filter that uses landmarks.
 struct FilterBias {
-  double bias = 0.0;
-  double variance = 0.0;
+  double bias = 0.0;      ///< [rad/s]
+  double variance = 0.0;  ///< [(rad/s)^2]
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -35,12 +35,12 @@ struct FilterBias {
   }
 };
 
-/// What a gyro said of a time.
+/// The rotation over an interval by the gyro.
 struct GyroRotation {
   double rotation_rad = 0.0;
-  double variance = 0.0;  ///< Of that [rad^2]; of white noise alone, see OdometryBuffer.
-  double seconds = 0.0;   ///< On the move.
-  double bias_rad = 0.0;  ///< What was taken out as the gyro's bias in that time.
+  double variance = 0.0;  ///< Of the rotation [rad^2]; white noise alone, see OdometryBuffer.
+  double seconds = 0.0;   ///< Time in motion.
+  double bias_rad = 0.0;  ///< Rotation that was subtracted as the gyro's bias.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -48,6 +48,7 @@ struct GyroRotation {
     a(s.rotation_rad, s.variance, s.seconds, s.bias_rad);
   }
 
+  /// Appends the interval that follows.
   void operator+=(const GyroRotation& other) {
     rotation_rad += other.rotation_rad;
     variance += other.variance;
@@ -56,44 +57,51 @@ struct GyroRotation {
   }
 };
 
-/// Keeps consecutive pieces of odometry. Bounded: old pieces are forgotten.
+/// Keeps consecutive increments of odometry: at most 20,000, the oldest are dropped.
 class OdometryBuffer {
  public:
+  /// Correlation time [s] of the error of the filter's gyro bias.
   static constexpr double kBiasCorrelation_s = 5.0;
 
-  /// `bias_lasts_s`: for how long what the filter does not know of the gyro's bias stays the same,
-  /// as far as it counts to whoever compounds pieces. 0: they have it as a variable of their own,
-  /// covariances are of what is new in each piece.
+  /// `bias_correlation_s`: time over which the error of the filter's gyro bias stays the same, for
+  /// covariances of compounded increments. 0: the caller estimates the bias as a variable of its
+  /// own, and covariances are those of the new error in each increment.
   explicit OdometryBuffer(double bias_correlation_s = kBiasCorrelation_s)
       : bias_correlation_s_(bias_correlation_s) {}
 
-  /// Adds a piece; one that overlaps or runs backwards is refused (false).
+  /// Adds an increment. One that overlaps the last one or runs backwards is refused (false).
   bool add(const Odometry& increment);
-  /// What is known from now on of the gyro's bias (from a filter that sees landmarks): pieces with
-  /// an IMU that are added later turn by as much as their own bias differed from it.
+  /// Sets the inertial bias by a filter that uses landmarks: increments with an IMU that are added
+  /// later are corrected by the difference to the bias that they were integrated with.
   void set_bias(const InertialBias& bias) { bias_ = bias; }
+  /// The bias that was set; none at the start.
   const std::optional<InertialBias>& bias() const { return bias_; }
-  /// The filter's bias and velocity. What wheels do not know (their radius, slip) lasts for
-  /// seconds; counted as noise of the same power it makes the way from scan to scan thirty times as
-  /// uncertain as it is. A filter has learned it: pieces with an IMU start at its velocity, where
-  /// that is surer.
+  /// Sets the filter's bias and velocity. The errors of wheels (radius, slip) are correlated over
+  /// seconds; counted as noise of the same power they make the path from scan to scan thirty times
+  /// as uncertain as it is. A filter has estimated them: increments with an IMU start at its
+  /// velocity, where that is more certain.
   void set_filter_pose(const EkfPose& pose);
+  /// The filter's velocity at the end of the last increment; none before the first filter pose and
+  /// after a gap.
   const std::optional<VelocityEstimate>& velocity() const { return velocity_; }
-  /// None before the filter spoke, and after a gap.
+  /// The filter's gyro bias; none where there is no velocity().
   std::optional<FilterBias> filter_bias() const {
     if (!bias_ || !velocity_ || !(velocity_->gyro_bias_variance > 0.0)) return std::nullopt;
     return FilterBias{bias_->x(), velocity_->gyro_bias_variance};
   }
+  /// Sets the velocity as velocity() gave it.
   void restore(const VelocityEstimate& velocity) { velocity_ = velocity; }
-  /// Motion of the vehicle from `from` to `to`, or none where a gap or the end of the buffer is in
-  /// between. Inside a piece the motion is taken at constant twist and its covariance in proportion
-  /// to time.
+  /// Motion of the vehicle (from_T_to), or none where a gap or the end of the buffer is in between.
+  /// Inside an increment the twist is constant and the covariance in proportion to time. Cost: the
+  /// increments in between, and a binary search.
   std::optional<geometry::SE2WithCovariance> between(Utime from, Utime to) const;
-  /// The same of the turn alone; none also where there was no IMU.
+  /// The rotation alone by the gyro; none also where there was no IMU.
   std::optional<GyroRotation> gyro_rotation(Utime from, Utime to) const;
+  /// Drops the increments that end at `utime` or before.
   void forget_before(Utime utime);
+  /// The increments in order of time, as they were corrected.
   const std::deque<Odometry>& increments() const { return increments_; }
-  /// A piece that pieces() gave, into an empty buffer: as it is.
+  /// Appends an increment that increments() gave, without correction.
   void restore(const Odometry& increment) { increments_.push_back(increment); }
   /// Members of a saved state (include common/model/archive.hpp); see common/state. The correlation
   /// time is configuration.
@@ -108,7 +116,8 @@ class OdometryBuffer {
   double bias_correlation_s_;
   std::deque<Odometry> increments_;
   std::optional<InertialBias> bias_;
-  std::optional<VelocityEstimate> velocity_;  ///< At the end of the last piece that continued it.
+  std::optional<VelocityEstimate>
+      velocity_;  ///< At the end of the last increment that continued it.
 };
 
 }  // namespace understory::model

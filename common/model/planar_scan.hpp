@@ -1,4 +1,4 @@
-// One turn of a laser that sweeps a plane.
+// One revolution of a laser that sweeps a plane.
 #pragma once
 
 #include <cstdint>
@@ -13,15 +13,17 @@ namespace understory::model {
 struct PlanarScan {
   Utime utime = 0;
   std::uint64_t sequence = 0;
-  double first_bearing_rad = 0.0;
-  double bearing_step_rad = 0.0;
+  double first_bearing_rad = 0.0;  ///< Of beam 0.
+  double bearing_step_rad = 0.0;   ///< Between two beams; negative = clockwise.
   /// A range at or beyond this, or one that is not a positive number, is no return [m].
   double max_range_m = 0.0;
-  std::vector<float> ranges_m;
+  std::vector<float> ranges_m;  ///< Per beam.
 
+  /// Direction of a beam [rad], frame `sensor`.
   double bearing(std::size_t beam) const {
     return first_bearing_rad + static_cast<double>(beam) * bearing_step_rad;
   }
+  /// True where the beam hit something.
   bool is_return(std::size_t beam) const {
     return ranges_m[beam] > 0.0F && ranges_m[beam] < max_range_m;
   }

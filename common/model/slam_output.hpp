@@ -1,4 +1,4 @@
-// What the mapper publishes about the vehicle and about the map as a whole.
+// Output of the mapper: the vehicle's pose and the map as a whole.
 #pragma once
 
 #include <cstdint>
@@ -14,36 +14,37 @@ namespace understory::model {
 struct SlamPose {
   Utime utime = 0;
   std::uint64_t sequence = 0;
-  /// What the keyframe's update says; none = tracked between keyframes.
+  /// Of the keyframe's update; none = tracked between keyframes.
   std::optional<MapUpdateStatus> status;
   std::optional<std::uint64_t> keyframe_sequence;  ///< The keyframe that decided the pose.
-  std::uint64_t submap_id = 0;
+  std::uint64_t submap_id = 0;                     ///< The active submap.
   geometry::SE2 submap_T_vehicle;
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Of submap_T_vehicle.
-  std::uint64_t correction_version = 0;
-  geometry::SE2 map_T_submap;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Of submap_T_vehicle; m, rad.
+  std::uint64_t correction_version = 0;                  ///< Of the MAP_CORRECTION in force.
+  geometry::SE2 map_T_submap;                            ///< By that correction.
   geometry::SE2 map_T_odom;
-  std::uint64_t reset_counter = 0;
-  geometry::SE2 reset_delta;  ///< Latest jump: old_T_new of the vehicle.
+  std::uint64_t reset_counter = 0;  ///< Counts jumps of the pose.
+  geometry::SE2 reset_delta;        ///< Latest jump: old_T_new of the vehicle.
 
-  /// The pose means something.
+  /// True where the pose is localised or tracked.
   bool is_localised() const {
     return !status || *status == MapUpdateStatus::kFirstMap || *status == MapUpdateStatus::kUpdated;
   }
+  /// The vehicle's pose in the map.
   geometry::SE2 map_T_vehicle() const { return map_T_submap * submap_T_vehicle; }
 };
 
-/// Channel MAP.
+/// Channel MAP: landmarks and keyframes of the active submap.
 struct WholeMap {
   Utime utime = 0;
   std::uint64_t sequence = 0;
   std::uint64_t version = 0;            ///< Counts changes of the map.
-  bool complete = true;                 ///< False: cut to the bounds that were asked for.
+  bool complete = true;                 ///< False: cut to the bounds of the request.
   std::vector<MapLandmark> landmarks;   ///< In order of id.
   std::vector<KeyframePose> keyframes;  ///< In order of time.
 };
 
-/// Channel MAP_DELTA: what leads from `base_version` of the map to `version`.
+/// Channel MAP_DELTA: the changes from `base_version` of the map to `version`.
 struct MapDelta {
   Utime utime = 0;
   std::uint64_t sequence = 0;

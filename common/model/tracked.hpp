@@ -1,4 +1,4 @@
-// Landmarks that were seen again, scan after scan.
+// Landmarks that are detected scan after scan.
 #pragma once
 
 #include <cstdint>
@@ -8,13 +8,14 @@
 
 namespace understory::model {
 
-/// Never used again by another track; 0 = none.
+/// Id of a track; never used again by another one; 0 = none.
 using TrackId = std::uint64_t;
 
+/// A detection with the track of its landmark.
 struct TrackedLandmark {
   TrackId track_id = 0;
   std::uint32_t detection = 0;  ///< Index in the LANDMARKS message of the same utime.
-  Detection observed;
+  Detection observed;           ///< A copy of that detection.
 };
 
 /// Channel TRACKED_LANDMARKS: the consistent ones among the detections of one sweep.

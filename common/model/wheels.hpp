@@ -1,4 +1,4 @@
-// What the wheels of a car say.
+// One sample of the wheels of a car.
 #pragma once
 
 #include <cstdint>

@@ -51,7 +51,7 @@ TEST_CASE("Every eight scans give a keyframe, at corners too", "[keyframer]") {
     REQUIRE(made[i].previous_T_base);
     const geometry::SE2 truth =
         simulated.world_T_vehicle()[8 * (i - 1)].inverse() * simulated.world_T_vehicle()[8 * i];
-    REQUIRE((truth.inverse() * *made[i].previous_T_base).Log().norm() < 0.3);
+    REQUIRE((truth.inverse() * *made[i].previous_T_base).Log().norm() < 0.23);
   }
 }
 
@@ -77,12 +77,11 @@ TEST_CASE("Landmarks of a keyframe are trunks, each once, and as uncertain as st
       ++count;
     }
   }
-  REQUIRE(count > 1500);
-  REQUIRE(chi2 / static_cast<double>(count) < 1.4);
-  REQUIRE(chi2 / static_cast<double>(count) > 0.6);
+  REQUIRE(count > 2000);
+  REQUIRE(chi2 / static_cast<double>(count) == Approx(1.0).margin(0.1));
 }
 
-TEST_CASE("What is seen once does not pass", "[keyframer]") {
+TEST_CASE("A landmark with one observation is left out", "[keyframer]") {
   const sim::Drive simulated = drive(sim::PathKind::kLine, 10.0, 0.95, 0.05, 5);
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> where(-35.0, 35.0);
@@ -107,10 +106,10 @@ TEST_CASE("What is seen once does not pass", "[keyframer]") {
       ++landmarks;
     }
   }
-  REQUIRE(landmarks > 100);
+  REQUIRE(landmarks > 300);
   REQUIRE(clutter_made > 200);
   // Two false detections of different scans fall into one gate by chance now and then.
-  REQUIRE(clutter_passed <= 4);
+  REQUIRE(clutter_passed <= 2);
 }
 
 TEST_CASE("A vehicle that was carried away starts anew", "[keyframer]") {
