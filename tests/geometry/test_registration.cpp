@@ -111,7 +111,7 @@ TEST_CASE("A rotation that no motion model predicts is searched", "[registration
     const Registration found = register_step(uncertain(reference, 0.02), observed, SE2(),
                                              SE2(0.5, 0.0, 0.0), {}, {}, fits);
     REQUIRE(fits(found));
-    REQUIRE((truth.inverse() * found.reference_T_observed).Log().norm() < 0.03);
+    REQUIRE((truth.inverse() * found.reference_T_observed).Log().norm() < 0.02);
   }
 }
 

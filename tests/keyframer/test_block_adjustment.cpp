@@ -53,7 +53,7 @@ TEST_CASE("Without noise the block is found exactly, from a bad guess", "[block]
     const geometry::SE2 expected = truth.poses[0].inverse() * truth.poses[k];
     const geometry::SE2 actual =
         estimate.centre_T_member[0].mean.inverse() * estimate.centre_T_member[k].mean;
-    REQUIRE((expected.inverse() * actual).Log().norm() < 1e-5);
+    REQUIRE((expected.inverse() * actual).Log().norm() < 1e-6);
   }
 }
 
@@ -90,7 +90,8 @@ TEST_CASE("Covariances of a block agree with Monte Carlo", "[block]") {
         (relative.mean.inverse() * truth.poses[0].inverse() * truth.poses.back()).Log();
     base_nees += error.dot(relative.covariance.inverse() * error) / (3.0 * runs);
   }
-  REQUIRE(landmark_nees == Approx(1.0).margin(0.1));
+  REQUIRE(landmark_nees == Approx(1.0).margin(0.02));
+  // Above 1: the two members' errors sum to zero with the others', so they are not independent.
   REQUIRE(base_nees == Approx(1.0).margin(0.25));
 }
 
@@ -108,5 +109,5 @@ TEST_CASE("Odometry between members holds a block with few landmarks together", 
   const geometry::SE2 expected = truth.poses[0].inverse() * truth.poses[5];
   const geometry::SE2 actual =
       estimate.centre_T_member[0].mean.inverse() * estimate.centre_T_member[5].mean;
-  REQUIRE((expected.inverse() * actual).Log().norm() < 0.01);
+  REQUIRE((expected.inverse() * actual).Log().norm() < 1.2e-4);
 }

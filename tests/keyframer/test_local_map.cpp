@@ -1,0 +1,90 @@
+// The life of a track: begun, matched, merged with its double, dropped.
+#include "services/keyframer/joint/local_map.hpp"
+#include "tests/catch.hpp"
+
+using namespace understory;
+using namespace understory::keyframer::joint;
+
+namespace {
+
+/// Detections at these places, 0.1 m uncertain per axis.
+model::LandmarkScan scan_of(const std::vector<Eigen::Vector2d>& places) {
+  model::LandmarkScan scan;
+  scan.field_of_view.max_range_m = 40.0;
+  for (const Eigen::Vector2d& place : places) {
+    model::Detection& detection = scan.detections.emplace_back();
+    detection.position_m << place, 0.0;
+    detection.covariance_m2 = 0.01 * Eigen::Matrix3d::Identity();
+  }
+  return scan;
+}
+
+}  // namespace
+
+TEST_CASE("A matched detection updates its track, another one begins one", "[keyframer][map]") {
+  LocalMap map(4.0);
+  const auto first = map.add(scan_of({{10.0, 0.0}}), {}, {});
+  const std::vector<geometry::PointPair> pairs{{0, 1}};
+  const auto second = map.add(scan_of({{0.0, 20.0}, {10.2, 0.0}}), pairs, {});
+  REQUIRE(second[1] == first[0]);
+  REQUIRE(second[0] != first[0]);
+  const Track* track = map.find(first[0]);
+  REQUIRE(track != nullptr);
+  CHECK(track->observations == 2);
+  CHECK((track->position_m - Eigen::Vector2d(10.1, 0.0)).norm() < 1e-12);
+  CHECK(track->detected_bits == 0b11);
+  CHECK(map.find(second[0])->detected_bits == 0b1);
+}
+
+TEST_CASE("A scan can match what is in view, or everything after one scan", "[keyframer][map]") {
+  LocalMap map(4.0);
+  const auto scan = scan_of({{10.0, 0.0}, {30.0, 0.0}});
+  map.add(scan, {}, {});
+  const model::FieldOfView near{.max_range_m = 20.0};
+  CHECK(map.matchable({}, near) == 2);
+  const std::vector<geometry::PointPair> pairs{{0, 0}, {1, 1}};
+  map.add(scan, pairs, {});
+  CHECK(map.matchable({}, near) == 1);
+  CHECK(map.matchable(geometry::SE2(20.0, 0.0, 0.0), near) == 2);
+}
+
+TEST_CASE("Two tracks that are never detected together become one", "[keyframer][map]") {
+  LocalMap map(4.0);
+  const auto first = map.add(scan_of({{10.0, 0.0}}), {}, {});
+  const auto second = map.add(scan_of({{10.3, 0.0}}), {}, {});
+  REQUIRE(map.find(second[0]) != nullptr);
+  CHECK(map.is_doubtful(*map.find(second[0])));
+  CHECK_FALSE(map.is_doubtful(*map.find(first[0])));
+
+  // Detected in turns, until both were in view often enough.
+  const std::vector<geometry::PointPair> to_first{{0, 0}};
+  const std::vector<geometry::PointPair> to_second{{1, 0}};
+  for (int k = 0; k < 3; ++k) {
+    map.add(scan_of({{10.0, 0.0}}), to_first, {});
+    if (map.find(second[0]) != nullptr) map.add(scan_of({{10.3, 0.0}}), to_second, {});
+  }
+  CHECK(map.find(second[0]) == nullptr);
+  CHECK(map.resolved(second[0]) == first[0]);
+  CHECK(map.find(first[0])->observations >= 7);
+}
+
+TEST_CASE("Two tracks that are detected together stay two", "[keyframer][map]") {
+  LocalMap map(4.0);
+  const auto scan = scan_of({{10.0, 0.0}, {10.3, 0.0}});
+  const auto tracks = map.add(scan, {}, {});
+  const std::vector<geometry::PointPair> pairs{{0, 0}, {1, 1}};
+  for (int k = 0; k < 10; ++k) map.add(scan, pairs, {});
+  REQUIRE(map.find(tracks[1]) != nullptr);
+  CHECK_FALSE(map.is_doubtful(*map.find(tracks[1])));
+}
+
+TEST_CASE("A track out of range is dropped, and its number is not used again", "[keyframer][map]") {
+  LocalMap map(4.0);
+  const auto first = map.add(scan_of({{10.0, 0.0}}), {}, {});
+  const geometry::SE2 far(75.0, 0.0, 0.0);
+  const auto second = map.add(scan_of({{10.0, 0.0}}), {}, far);
+  CHECK(map.find(first[0]) == nullptr);
+  CHECK(second[0] > first[0]);
+  map.clear();
+  CHECK(map.add(scan_of({{10.0, 0.0}}), {}, {})[0] > second[0]);
+}
