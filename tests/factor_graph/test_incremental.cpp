@@ -130,7 +130,7 @@ TEST_CASE("What waits for its turn arrives where the batch solution is", "[incre
   factor_graph::bayes_tree::IncrementalParameters parameters = exact();
   parameters.least_move = 1e-7;
   parameters.wait_below = 1e6;  // a tenth of a deviation
-  parameters.turns = 2;
+  parameters.waiting_slots = 2;
   factor_graph::bayes_tree::IncrementalSmoother smoother(parameters);
   std::vector<VariableId> poses;
   long moved = 0;

@@ -1,84 +1,35 @@
 #include "common/factor_graph/bayes_tree/clique_tree.hpp"
 
-#include <algorithm>
+#include "common/factor_graph/bayes_tree/clique_plan.hpp"
 
 namespace understory::factor_graph::bayes_tree {
 
-CliqueTree::CliqueTree(graph::FactorGraph& graph) : graph_(graph), kernel_(front_kernel()) {
+double flops_of(const CliqueRecord& clique) {
+  return elimination_flops(clique.pivots, clique.size - clique.pivots);
+}
+
+CliqueTree::CliqueTree() {
   cliques_.add();
-  mark_.push_back(kClean);
   commit();
 }
 
-void CliqueTree::mark_structure_from(int clique) {
-  for (int c = clique; c != kRoot; c = cliques_[c].parent) {
-    char& mark = mark_[static_cast<std::size_t>(c)];
-    if (mark == kStructural) return;
-    mark = kStructural;
-    structural_.push_back(c);
-  }
+int CliqueTree::add(int frontal_count, int row_count) {
+  const int id = cliques_.add();
+  CliqueRecord& clique = cliques_.edit(id);
+  clique.frontal_count = frontal_count;
+  clique.row_count = row_count;
+  clique.rows = rows_.take(static_cast<std::size_t>(row_count));
+  clique.size = 1;
+  return id;
 }
 
-void CliqueTree::mark_numbers_from(int clique) {
-  for (int c = clique; c != kRoot; c = cliques_[c].parent) {
-    char& mark = mark_[static_cast<std::size_t>(c)];
-    if (mark != kClean) return;
-    mark = kDirty;
-    dirty_.push_back(c);
-  }
-}
-
-void CliqueTree::mark_structure(int variable) {
-  const int clique = graph_.variable(variable).clique;
-  if (clique != graph::kNone) mark_structure_from(clique);
-}
-
-void CliqueTree::mark_numbers(int factor) {
-  const int clique = graph_.factor(factor).clique;
-  if (clique != graph::kNone) mark_numbers_from(clique);
-}
-
-void CliqueTree::mark_everything() {
-  for (int v = 0; v < graph_.variable_capacity(); ++v) {
-    if (graph_.variable(v).in_use) mark_structure(v);
-  }
-}
-
-void CliqueTree::detach(int factor) {
-  const int clique = graph_.factor(factor).clique;
-  if (clique == graph::kNone) return;
-  mark_structure_from(clique);
-  const int next = graph_.factor(factor).next;
-  if (cliques_[clique].first_factor == factor) {
-    cliques_.edit(clique).first_factor = next;
-  } else {
-    int before = cliques_[clique].first_factor;
-    while (graph_.factor(before).next != factor) before = graph_.factor(before).next;
-    graph_.edit_factor(before).next = next;
-  }
-  graph_.edit_factor(factor).clique = graph::kNone;
-}
-
-void CliqueTree::clear_marks() {
-  for (const int c : structural_) mark_[static_cast<std::size_t>(c)] = kClean;
-  for (const int c : dirty_) mark_[static_cast<std::size_t>(c)] = kClean;
-  structural_.clear();
-  dirty_.clear();
-}
-
-void CliqueTree::free_blocks(const CliqueRecord& clique) {
-  if (clique.rows != nullptr) {
-    rows_.give_back(clique.rows, static_cast<std::size_t>(clique.row_count));
-  }
-  if (clique.panel != nullptr) pool_.give_back(clique.panel, clique.numbers());
-}
-
-void CliqueTree::link_child(int parent, int child) {
+void CliqueTree::link(int parent, int child) {
   const int sibling = cliques_[parent].first_child;
   CliqueRecord& record = cliques_.edit(child);
   record.parent = parent;
   record.next_sibling = sibling;
   record.previous_sibling = graph::kNone;
+
   if (sibling != graph::kNone) cliques_.edit(sibling).previous_sibling = child;
   cliques_.edit(parent).first_child = child;
 }
@@ -95,67 +46,66 @@ void CliqueTree::unlink_from_root(int child) {
   }
 }
 
-/// The root keeps how many cliques lack information.
-void CliqueTree::count_left_out(int change) {
+void CliqueTree::count_work(int id) { total_flops_ += flops_of(cliques_[id]); }
+
+void CliqueTree::remove(std::span<const int> ids) {
+  double flops = 0.0;
+  for (const int c : ids) {
+    flops += flops_of(cliques_[c]);
+    if (cliques_[c].parent == kRoot) unlink_from_root(c);
+    count_undetermined(cliques_[c].left_out > 0 ? -1 : 0);
+    cliques_.edit(c).parent = graph::kNone;
+    cliques_.remove(c);
+  }
+  total_flops_ -= flops;
+}
+
+double* CliqueTree::writable_panel(int id, bool keeps_schur) {
+  CliqueRecord& clique = cliques_.edit(id);
+  if (clique.panel == nullptr || clique.panel_epoch != cliques_.epoch()) {
+    clique.keeps_schur = keeps_schur;
+    clique.panel = panels_.take(clique.numbers());
+    clique.panel_epoch = cliques_.epoch();
+  }
+  return clique.panel;
+}
+
+void CliqueTree::set_left_out(int id, int count) {
+  CliqueRecord& clique = cliques_.edit(id);
+  const int before = clique.left_out;
+  clique.left_out = count;
+  count_undetermined((count > 0 ? 1 : 0) - (before > 0 ? 1 : 0));
+}
+
+/// The root's `left_out` is journaled with it.
+void CliqueTree::count_undetermined(int change) {
   if (change != 0) cliques_.edit(kRoot).left_out += change;
 }
 
-std::vector<int> CliqueTree::undetermined() const {
-  std::vector<int> variables;
-  if (undetermined_cliques() == 0) return variables;
-  for (int c = 1; c < cliques_.size(); ++c) {
-    const CliqueRecord& clique = cliques_[c];
-    if (clique.panel == nullptr || clique.left_out == 0 || clique.parent == graph::kNone) continue;
-    int column = 0;
-    for (int i = 0; i < clique.frontal_count; ++i) {
-      const int name = clique.rows[i];
-      const int size = dimension(graph_.variable(name).type);
-      bool is_left_out = false;
-      for (int k = 0; k < size; ++k, ++column) {
-        const double* l = clique.panel + static_cast<std::ptrdiff_t>(column) * clique.size;
-        // A column of the identity: no measurement gives exactly that.
-        const bool identity = l[column] == 1.0 && std::all_of(l + column + 1, l + clique.size,
-                                                              [](double x) { return x == 0.0; });
-        is_left_out = is_left_out || identity;
-      }
-      if (is_left_out) variables.push_back(name);
-    }
+void CliqueTree::free_blocks(const CliqueRecord& clique) {
+  if (clique.rows != nullptr) {
+    rows_.give_back(clique.rows, static_cast<std::size_t>(clique.row_count));
   }
-  return variables;
+  if (clique.panel != nullptr) panels_.give_back(clique.panel, clique.numbers());
 }
 
 void CliqueTree::commit() {
   cliques_.commit([&](const CliqueRecord& gone) { free_blocks(gone); },
                   [&](const CliqueRecord& before, const CliqueRecord& now) {
                     if (before.panel != nullptr && before.panel != now.panel) {
-                      pool_.give_back(before.panel, before.numbers());
+                      panels_.give_back(before.panel, before.numbers());
                     }
                   });
-  saved_marks_.structural.assign(structural_.begin(), structural_.end());
-  saved_marks_.dirty.assign(dirty_.begin(), dirty_.end());
-  saved_marks_.waiting.clear();
-  for (const int c : waiting_) {
-    if (is_waiting_[static_cast<std::size_t>(c)] != 0) saved_marks_.waiting.push_back(c);
-  }
-  saved_marks_.total_flops = total_flops_;
+  saved_total_flops_ = total_flops_;
 }
 
 void CliqueTree::rollback() {
-  clear_marks();
   cliques_.rollback(
       [&](const CliqueRecord& now, const CliqueRecord& before) {
-        if (now.panel != before.panel) pool_.give_back(now.panel, now.numbers());
+        if (now.panel != before.panel) panels_.give_back(now.panel, now.numbers());
       },
       [&](const CliqueRecord& gone) { free_blocks(gone); });
-  mark_.resize(static_cast<std::size_t>(cliques_.size()));
-  structural_.assign(saved_marks_.structural.begin(), saved_marks_.structural.end());
-  dirty_.assign(saved_marks_.dirty.begin(), saved_marks_.dirty.end());
-  // In the order of marking: what was dirty first may have become structural.
-  for (const int c : dirty_) mark_[static_cast<std::size_t>(c)] = kDirty;
-  for (const int c : structural_) mark_[static_cast<std::size_t>(c)] = kStructural;
-  forget_waiting();
-  for (const int c : saved_marks_.waiting) queue(c);
-  total_flops_ = saved_marks_.total_flops;
+  total_flops_ = saved_total_flops_;
 }
 
 }  // namespace understory::factor_graph::bayes_tree

@@ -8,7 +8,7 @@ namespace understory::factor_graph::bayes_tree {
 namespace {
 
 /// A pose3's chart is left before its rotation gets far from the base [rad].
-constexpr double kFarTurn = 0.6;
+constexpr double kFarRotation = 0.6;
 /// Updates that share the work of a thorough one.
 constexpr int kSweepParts = 4;
 /// An update that has done more than this part of one factorisation's work leaves further
@@ -20,6 +20,21 @@ constexpr double kSettledPart = 0.2;  ///< Of the thorough updates' limit.
 constexpr double kLeastUnit = 1e-4;
 constexpr double kLeastUsualUnit = 0.02;
 
+bool has_curved_charts(const graph::FactorGraph& graph) {
+  for (int v = 0; v < graph.variable_capacity(); ++v) {
+    if (graph.variable(v).in_use && graph.variable(v).type == graph::VariableType::kPose3)
+      return true;
+  }
+  return false;
+}
+
+/// The diagonal block at `first` in another frame: rows and columns are rotated by `by`.
+void rotate(Eigen::MatrixXd& covariance, Eigen::Index first, const Eigen::MatrixXd& by) {
+  covariance.middleRows(first, by.rows()) = by * covariance.middleRows(first, by.rows());
+  covariance.middleCols(first, by.rows()) =
+      covariance.middleCols(first, by.rows()) * by.transpose();
+}
+
 }  // namespace
 
 std::string name_of(const graph::FactorGraph& graph, graph::VariableId id) {
@@ -30,7 +45,10 @@ std::string name_of(const graph::FactorGraph& graph, graph::VariableId id) {
 }
 
 IncrementalSmoother::IncrementalSmoother(const IncrementalParameters& parameters)
-    : parameters_(parameters), tree_(graph_) {
+    : parameters_(parameters),
+      tree_(graph_),
+      relinearisation_(graph_, tree_),
+      judge_(graph_, tree_) {
   pending_.unit = saved_pending_.unit = parameters.first_unit;
 }
 
@@ -44,6 +62,7 @@ void IncrementalSmoother::begin_change() {
 void IncrementalSmoother::commit() {
   graph_.commit();
   tree_.commit();
+  relinearisation_.commit();
   saved_pending_ = pending_;
   updated_ = false;
 }
@@ -56,6 +75,7 @@ void IncrementalSmoother::checkpoint() {
 void IncrementalSmoother::rollback() {
   tree_.rollback();
   graph_.rollback();
+  relinearisation_.rollback();
   pending_ = saved_pending_;
   has_checkpoint_ = false;
   updated_ = false;
@@ -77,7 +97,7 @@ void IncrementalSmoother::remove(graph::FactorId id) {
     for (const int v : graph_.variables_of(index(id))) tree_.mark_structure(v);
     tree_.detach(index(id));
   }
-  if (graph_.factor(index(id)).is_pending) std::erase(pending_.stale, index(id));
+  relinearisation_.forget_factor(index(id));
   graph_.remove(id);
 }
 
@@ -88,28 +108,8 @@ void IncrementalSmoother::remove(graph::VariableId id) {
     remove(graph::FactorId(graph_.incidence(graph_.variable(index(id)).first_incidence).factor));
   }
   tree_.mark_structure(index(id));
-  std::erase(pending_.rebase, index(id));
+  relinearisation_.forget_variable(index(id));
   pending_.doomed.push_back(index(id));
-}
-
-/// Linearises what is due; returns how many.
-long IncrementalSmoother::relinearise() {
-  for (const int v : pending_.rebase) {
-    graph_.rebase(v);
-    for (int i = graph_.variable(v).first_incidence; i != graph::kNone;
-         i = graph_.incidence(i).next) {
-      make_stale(graph_.incidence(i).factor);
-    }
-  }
-  pending_.rebase.clear();
-  for (const int f : pending_.stale) {
-    graph_.edit_factor(f).is_pending = false;
-    graph_.linearise(f);
-    tree_.mark_numbers(f);
-  }
-  const auto count = static_cast<long>(pending_.stale.size());
-  pending_.stale.clear();
-  return count;
 }
 
 void IncrementalSmoother::measure_unit() {
@@ -124,113 +124,85 @@ void IncrementalSmoother::measure_unit() {
   pending_.unit = std::clamp(std::sqrt(chi2 / rows), kLeastUnit, 1.0);
 }
 
-/// Factors whose linearisations are noticeably old, neighbours in the tree side by side.
-std::vector<int> IncrementalSmoother::noticeably_old(double relinearise_above) const {
-  const double limit = relinearise_above * pending_.unit;
-  std::vector<int> old;
-  std::vector<int> stack{CliqueTree::kRoot};
-  while (!stack.empty()) {
-    const CliqueRecord& clique = tree_.clique(stack.back());
-    stack.pop_back();
-    for (int f = clique.first_factor; f != graph::kNone; f = graph_.factor(f).next) {
-      const graph::FactorRecord& factor = graph_.factor(f);
-      if (factor.is_pending) continue;
-      if (graph_.deviation(f).residual > limit * part_of_rows(factor)) old.push_back(f);
-    }
-    for (int c = clique.first_child; c != graph::kNone; c = tree_.clique(c).next_sibling) {
-      stack.push_back(c);
-    }
-  }
-  return old;
-}
-
-void IncrementalSmoother::make_stale(int factor) {
-  graph::FactorRecord& record = graph_.edit_factor(factor);
-  if (record.is_pending) return;
-  record.is_pending = true;
-  pending_.stale.push_back(factor);
-}
-
-bool IncrementalSmoother::has_curved_charts() const {
-  for (int v = 0; v < graph_.variable_capacity(); ++v) {
-    if (graph_.variable(v).in_use && graph_.variable(v).type == graph::VariableType::kPose3)
-      return true;
-  }
-  return false;
-}
-
 void IncrementalSmoother::begin_sweep() {
   measure_unit();
-  pending_.sweep = noticeably_old(parameters_.thorough_relinearise_above);
+  const double limit = parameters_.thorough_relinearise_above * pending_.unit;
   // In space charts are curved: linearisations of different ages push their neighbours to and fro.
-  const int parts = has_curved_charts() ? 1 : kSweepParts;
-  pending_.sweep_part = 1 + static_cast<int>(pending_.sweep.size()) / parts;
-}
-
-/// In the tree's order: each part refactorises subtrees of its own, and what is above all.
-void IncrementalSmoother::take_part_of_sweep() {
-  for (int i = 0; i < pending_.sweep_part && !pending_.sweep.empty(); ++i) {
-    const int f = pending_.sweep.back();
-    pending_.sweep.pop_back();
-    // It may have been removed, and its name given to another, since.
-    if (f >= graph_.factor_capacity()) continue;
-    if (graph_.factor(f).in_use && graph_.factor(f).clique != graph::kNone) make_stale(f);
-  }
+  const int parts = has_curved_charts(graph_) ? 1 : kSweepParts;
+  relinearisation_.begin_sweep(stale_factors(graph_, tree_.cliques(), limit), parts);
 }
 
 void IncrementalSmoother::collect_moved() {
   for (const int v : tree_.changed()) {
-    if (moved_at_[static_cast<std::size_t>(v)] != 1) moved_.push_back(v);
-    moved_at_[static_cast<std::size_t>(v)] = 1;
+    char& is_moved = is_moved_[static_cast<std::size_t>(v)];
+    if (is_moved == 0) moved_.push_back(v);
+    is_moved = 1;
     const graph::VariableRecord& variable = graph_.variable(v);
     if (variable.type == graph::VariableType::kPose3 &&
-        Eigen::Map<const Eigen::Vector3d>(variable.delta.data() + 3).norm() > kFarTurn) {
-      pending_.rebase.push_back(v);
+        Eigen::Map<const Eigen::Vector3d>(variable.delta.data() + 3).norm() > kFarRotation) {
+      relinearisation_.rebase(v);
     }
   }
 }
 
-bool IncrementalSmoother::iterate(IncrementalUpdate& update, bool thorough) {
-  ++update.iterations;
-  update.relinearised_factors += relinearise();
+void IncrementalSmoother::eliminate(IncrementalUpdate& update) {
   last_.clear();
   for (const int f : pending_.fresh) {
     for (const int v : graph_.variables_of(f)) last_.push_back(v);
   }
+
   const TreeStatistics statistics = tree_.eliminate(pending_.fresh, last_);
   pending_.fresh.clear();
+
   update.eliminated_variables += statistics.eliminated_variables;
   update.refreshed_cliques += statistics.refreshed_cliques;
   update.flops += statistics.flops;
+}
+
+void IncrementalSmoother::solve(bool thorough) {
   if (pending_.solve_everything || thorough) {
     pending_.solve_everything = false;
     tree_.solve_everything(thorough ? parameters_.thorough_move * pending_.unit
                                     : parameters_.least_move * usual_unit());
-  } else {
-    const double finest = parameters_.least_move * usual_unit();
-    tree_.solve({finest, parameters_.wait_below * finest, parameters_.turns});
+    return;
   }
-  const double limit = parameters_.relinearise_above * usual_unit();
-  update.deviation = judge(kNegligible * limit, limit);
-  const bool accepted = accept_step(update, thorough);
-  for (const int f : off_) make_stale(f);
+  const double finest = parameters_.least_move * usual_unit();
+  tree_.solve({finest, parameters_.wait_below * finest, parameters_.waiting_slots});
+}
+
+/// One step; false where it was taken back.
+bool IncrementalSmoother::iterate(IncrementalUpdate& update, bool thorough) {
+  ++update.iterations;
+  update.relinearised_factors += relinearisation_.run();
+  eliminate(update);
+  solve(thorough);
+
+  const StepVerdict verdict = judge_.judge({parameters_.relinearise_above * usual_unit(),
+                                            std::max(pending_.unit * pending_.unit, pending_.chi2),
+                                            thorough, update.iterations > 1});
+  update.deviation = verdict.largest_deviation;
+  if (verdict.is_shortened) pending_.solve_everything = true;
+
+  for (const int f : judge_.stale()) relinearisation_.add(f);
   collect_moved();
-  return accepted;
+  return verdict.is_accepted;
 }
 
 IncrementalUpdate IncrementalSmoother::run(bool thorough, double most_work) {
   IncrementalUpdate update;
   moved_.clear();
-  moved_at_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);
+  is_moved_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);
   pending_.since_thorough = thorough ? 0 : pending_.since_thorough + 1;
+
   bool accepted = true;
   do {
     accepted = iterate(update, thorough);
   } while (update.iterations < parameters_.max_iterations &&
            update.flops < std::max(kLittleWork, most_work * tree_.total_flops()) &&
            (!accepted || update.deviation > parameters_.iterate_above));
+
   update.moved_variables = static_cast<long>(moved_.size());
-  for (const int v : moved_) moved_at_[static_cast<std::size_t>(v)] = 0;
+  for (const int v : moved_) is_moved_[static_cast<std::size_t>(v)] = 0;
   finish(update);
   return update;
 }
@@ -238,22 +210,24 @@ IncrementalUpdate IncrementalSmoother::run(bool thorough, double most_work) {
 IncrementalUpdate IncrementalSmoother::run_thoroughly(double relinearise_above) {
   begin_change();
   measure_unit();
-  pending_.sweep.clear();
-  for (const int f : noticeably_old(relinearise_above)) make_stale(f);
+  relinearisation_.end_sweep();
+  const double limit = relinearise_above * pending_.unit;
+  for (const int f : stale_factors(graph_, tree_.cliques(), limit)) relinearisation_.add(f);
   return run(true, kAnyWork);
 }
 
 IncrementalUpdate IncrementalSmoother::update() {
   begin_change();
-  const bool is_sweeping = !pending_.sweep.empty();
+  const bool is_sweeping = relinearisation_.is_sweeping();
   if (is_sweeping) {
-    take_part_of_sweep();
+    relinearisation_.take_part_of_sweep();
   } else if (parameters_.thorough_every > 0 &&
              pending_.since_thorough + 1 >= parameters_.thorough_every) {
     begin_sweep();
-    if (pending_.sweep.empty()) return run(true, kMostWork);
+    if (!relinearisation_.is_sweeping()) return run(true, kMostWork);
   }
-  return run(is_sweeping && pending_.sweep.empty(), kMostWork);
+  // The last part of a sweep ends it as a thorough update.
+  return run(is_sweeping && !relinearisation_.is_sweeping(), kMostWork);
 }
 
 IncrementalUpdate IncrementalSmoother::update_thoroughly() {
@@ -264,7 +238,8 @@ IncrementalUpdate IncrementalSmoother::settle(int max_updates) {
   const double limit = kSettledPart * parameters_.thorough_relinearise_above;
   IncrementalUpdate update = run_thoroughly(limit);
   const auto is_settled = [&] {
-    return update.relinearised_factors == 0 && !pending_.solve_everything && pending_.stale.empty();
+    return update.relinearised_factors == 0 && !pending_.solve_everything &&
+           relinearisation_.is_empty();
   };
   for (int i = 1; i < max_updates && !is_settled(); ++i) {
     update = run_thoroughly(limit);
@@ -276,7 +251,7 @@ IncrementalUpdate IncrementalSmoother::update_everything() {
   begin_change();
   tree_.mark_everything();
   for (int v = 0; v < graph_.variable_capacity(); ++v) {
-    if (graph_.variable(v).in_use) pending_.rebase.push_back(v);
+    if (graph_.variable(v).in_use) relinearisation_.rebase(v);
   }
   return update_thoroughly();
 }
@@ -285,7 +260,8 @@ void IncrementalSmoother::finish(IncrementalUpdate& update) {
   for (const int v : pending_.doomed) graph_.remove(graph::VariableId(v));
   pending_.doomed.clear();
   updated_ = true;
-  if (tree_.undetermined_cliques() == 0) return;
+  if (tree_.cliques().undetermined_cliques() == 0) return;
+
   update.ok = false;
   for (const int v : tree_.undetermined()) {
     update.undetermined.push_back(graph::VariableId(v));
@@ -303,22 +279,21 @@ std::optional<Eigen::MatrixXd> IncrementalSmoother::joint_covariance(
     if (!graph_.contains(id)) return std::nullopt;
     variables.push_back(index(id));
   }
+
   std::optional<Eigen::MatrixXd> covariance = tree_.joint_covariance(variables);
   if (!covariance) return covariance;
+
+  // From the charts, which are those of the world, to the poses' own frames.
   Eigen::Index at = 0;
-  const auto turn = [&](Eigen::Index first, const Eigen::MatrixXd& by) {
-    covariance->middleRows(first, by.rows()) = by * covariance->middleRows(first, by.rows());
-    covariance->middleCols(first, by.rows()) =
-        covariance->middleCols(first, by.rows()) * by.transpose();
-  };
   for (const int v : variables) {
     const graph::VariableRecord& variable = graph_.variable(v);
     if (variable.type == graph::VariableType::kPose2) {
-      turn(at, graph::pose2_of(variable.value).rotation().transpose());
+      rotate(*covariance, at, graph::pose2_of(variable.value).rotation().transpose());
     } else if (variable.type == graph::VariableType::kPose3) {
-      turn(at, graph::pose3_of(variable.value).rotation.conjugate().toRotationMatrix());
-      turn(at + 3,
-           graph::right_jacobian(Eigen::Map<const Eigen::Vector3d>(variable.delta.data() + 3)));
+      rotate(*covariance, at,
+             graph::pose3_of(variable.value).rotation.conjugate().toRotationMatrix());
+      rotate(*covariance, at + 3,
+             graph::right_jacobian(Eigen::Map<const Eigen::Vector3d>(variable.delta.data() + 3)));
     }
     at += dimension(variable.type);
   }

@@ -5,118 +5,139 @@
 #include <string>
 #include <vector>
 
-#include "common/factor_graph/bayes_tree/clique_tree.hpp"
+#include "common/factor_graph/bayes_tree/bayes_tree.hpp"
+#include "common/factor_graph/bayes_tree/relinearisation.hpp"
+#include "common/factor_graph/bayes_tree/step_judge.hpp"
 #include "common/factor_graph/graph/factor_graph.hpp"
 
 namespace understory::factor_graph::bayes_tree {
 
-/// Limits are in parts of the residuals' own root mean square (`unit`), which the thorough updates
-/// measure: information that is stated a thousand times too small needs no less precision.
+/// When and how exactly the smoother follows. Limits are in parts of the residuals' own root mean
+/// square (the `unit`), which the thorough updates measure: information that is stated a thousand
+/// times too small needs no less precision.
 struct IncrementalParameters {
   /// A variable that would move by less of its conditional standard deviation stays.
   double least_move = 0.2;
-  /// What lies below changes that are all smaller than so many times least_move waits for its turn;
-  /// so many cliques have theirs in an update. 1: nothing waits.
+  /// Cliques below changes that are all smaller than this many times least_move wait in a queue.
+  /// 1: nothing waits.
   double wait_below = 1.0;
-  int turns = 100;
-  /// A factor whose residual is further than this from what its linearisation says is linearised
-  /// again with the next update. Of a relative pose in the plane; in space by the root of its rows
-  /// more.
+  int waiting_slots = 100;  ///< Number of waiting cliques that an update serves.
+  /// A factor whose residual is this far from its linearisation is linearised again with the next
+  /// update. Of a relative pose in the plane; in space by the root of its rows more.
   double relinearise_above = 0.5;
   /// An update goes on (up to max_iterations) while a factor is this far from its linearisation
   /// [sigmas].
   double iterate_above = 1.0;
-  int max_iterations = 5;
-  /// Every so many updates, one looks at all factors, with limits of its own: what is below the
-  /// usual ones adds up. What it finds is made up for over the updates that follow. 0: never.
+  int max_iterations = 5;  ///< Of one update.
+  /// Number of updates from one thorough update, which compares all factors with finer limits, to
+  /// the next: deviations below the usual limits add up. The updates that follow share the work
+  /// that it finds. 0: none is thorough.
   int thorough_every = 200;
-  double thorough_move = 0.01;
-  double thorough_relinearise_above = 0.05;
-  double first_unit = 0.1;  ///< Until it is measured [sigmas].
+  double thorough_move = 0.01;               ///< least_move of a thorough update.
+  double thorough_relinearise_above = 0.05;  ///< relinearise_above of a thorough update.
+  double first_unit = 0.1;                   ///< The unit until it is measured [sigmas].
 };
 
-/// What an update found. Never throws for what was measured; see `undetermined`.
+/// What an update found. An update never throws for what was measured; see `undetermined`.
 struct IncrementalUpdate {
-  bool ok = true;
-  std::vector<graph::VariableId> undetermined;  ///< By the measurements; left where they are.
-  std::string error;                            ///< Names them.
-  int iterations = 0;
-  long eliminated_variables = 0;
-  long refreshed_cliques = 0;
-  long relinearised_factors = 0;
-  long moved_variables = 0;
-  double flops = 0.0;
-  double deviation = 0.0;  ///< Largest one left [sigmas].
+  bool ok = true;  ///< False: variables are undetermined.
+  /// Variables that the measurements leave undetermined; they stay where they are.
+  std::vector<graph::VariableId> undetermined;
+  std::string error;              ///< Names them.
+  int iterations = 0;             ///< Steps of linearisation, elimination and solution.
+  long eliminated_variables = 0;  ///< Variables whose cliques were built anew.
+  long refreshed_cliques = 0;     ///< Cliques computed anew with the same structure.
+  long relinearised_factors = 0;  ///< Factors linearised again.
+  long moved_variables = 0;       ///< Variables that moved.
+  double flops = 0.0;             ///< Floating-point operations of the eliminations.
+  double deviation = 0.0;         ///< Largest one left between factor and linearisation [sigmas].
 };
 
 /// Incremental smoother. Variables and factors are added and removed at any time; update() brings
-/// the estimates up to date.
+/// the estimates up to date. Wrong arguments throw std::invalid_argument.
 ///
 /// Undo: rollback() takes everything back that happened since checkpoint(), or, where there was
 /// none, since before the changes that the last update() took in: estimates, factors, structure and
 /// numbers are exactly those of then. It costs what had changed.
+///
+/// More than 20 functions because it is the facade of graph and tree: half of them are overloads
+/// and accessors that pass on.
 class IncrementalSmoother {
  public:
   explicit IncrementalSmoother(const IncrementalParameters& parameters = {});
   IncrementalSmoother(IncrementalSmoother&&) = delete;
   ~IncrementalSmoother() = default;
 
+  /// Adds a variable at this estimate (SE2, Pose3, Vector2d, Vector3d or a scalar).
   template <typename Initial>
   graph::VariableId add_variable(const Initial& initial) {
     begin_change();
     return graph_.add(initial);
   }
+  /// Adds a measurement; see FactorGraph::add() for what it must fulfil.
   graph::FactorId add(const graph::Factor& factor) {
     return begin_change(), keep(graph_.add(factor));
   }
+  /// Adds a condensed measurement.
   graph::FactorId add(const graph::CondensedFactor& factor) {
     return begin_change(), keep(graph_.add(factor));
   }
+  /// Adds a user-defined factor of these variables.
   graph::FactorId add(std::shared_ptr<const graph::UserFactor> factor,
                       std::span<const graph::VariableId> variables) {
     return begin_change(), keep(graph_.add(std::move(factor), variables));
   }
+  /// Removes a factor.
   void remove(graph::FactorId id);
-  /// With all its factors.
+  /// Removes a variable with all its factors.
   void remove(graph::VariableId id);
-  /// Takes variables out and leaves what they tell about their neighbours, linearised here.
-  /// False (and nothing is changed) where the variables' own factors do not determine them.
+  /// Takes variables out and leaves their information about their neighbours as one linear factor,
+  /// linearised here. False (and nothing is removed) where the variables' own factors do not
+  /// determine them.
   bool marginalise(std::span<const graph::VariableId> ids);
 
-  /// At most about one factorisation's work: what is left over is done by the next ones.
+  /// Takes the changes in. At most about one factorisation's work: what is left over is done by the
+  /// next updates.
   IncrementalUpdate update();
-  /// With the limits of the thorough ones, and to the end.
+  /// An update with the limits of the thorough ones, and to the end. O(graph).
   IncrementalUpdate update_thoroughly();
   /// Thorough updates until nothing has to be linearised again.
   IncrementalUpdate settle(int max_updates = 20);
   /// Orders and factorises everything anew, linearised at the estimates, and iterates.
   IncrementalUpdate update_everything();
 
+  /// Remembers the state as it is.
   void checkpoint();
+  /// Restores the state of the checkpoint, see above.
   void rollback();
 
+  /// Variables and factors with their estimates.
   const graph::FactorGraph& graph() const { return graph_; }
+  /// Estimate of a pose in the plane [m, rad].
   geometry::SE2 pose2(graph::VariableId id) const { return graph::pose2_of(graph_.value(id)); }
+  /// Estimate of a pose in space [m].
   graph::Pose3 pose3(graph::VariableId id) const { return graph::pose3_of(graph_.value(id)); }
+  /// Estimate of a point in the plane [m].
   Eigen::Vector2d point2(graph::VariableId id) const { return graph::point2_of(graph_.value(id)); }
+  /// Estimate of a point in space [m].
   Eigen::Vector3d point3(graph::VariableId id) const { return graph::point3_of(graph_.value(id)); }
-  /// Variables that the last update moved.
+  /// Variables that the last update moved, each once.
   std::span<const int> moved() const { return moved_; }
 
-  /// Joint covariance in the order given: poses perturbed on the right, in their own frames. None
-  /// where one has no factor or is not determined. Costs what the paths to the root cost.
+  /// Joint covariance in the order given: poses perturbed on the right, in their own frames [m,
+  /// rad]. None where a variable has no factor or is not determined. Costs what the paths to the
+  /// root cost.
   std::optional<Eigen::MatrixXd> joint_covariance(std::span<const graph::VariableId> ids);
 
-  const CliqueTree& tree() const { return tree_; }
-  std::size_t bytes() const { return graph_.bytes() + tree_.bytes(); }
+  /// The factorised graph.
+  const BayesTree& tree() const { return tree_; }
+  /// Memory taken from the system for measurements and numbers [bytes].
+  std::size_t bytes() const { return graph_.bytes() + tree_.cliques().bytes(); }
 
  private:
+  /// What the next update starts from, besides graph, tree and Relinearisation.
   struct Pending {
     std::vector<int> fresh;   ///< Factors that the tree does not hold yet.
-    std::vector<int> stale;   ///< Factors to be linearised again.
-    std::vector<int> rebase;  ///< Variables far from their charts' bases.
-    std::vector<int> sweep;   ///< Factors that wait for their part of a thorough update.
-    int sweep_part = 0;       ///< So many of them with each update.
     std::vector<int> doomed;  ///< Variables to be removed.
     bool solve_everything = false;
     int since_thorough = 0;  ///< Updates.
@@ -127,65 +148,35 @@ class IncrementalSmoother {
   void begin_change();
   void commit();
   graph::FactorId keep(graph::FactorId id);
-  long relinearise();
-  bool iterate(IncrementalUpdate& update, bool thorough);
 
-  /// Sums over the judged factors.
-  struct Losses {
-    double loss = 0.0;
-    double linearised = 0.0;  ///< As the linearisations have it.
-    double left_out = 0.0;    ///< By them, at the end of the step.
-  };
-  /// Part of the limit to deviations, that may grow unseen.
-  static constexpr double kNegligible = 0.2;
-  /// Limits are stated for relative poses in the plane; a residual in space is larger by its rows.
-  static double part_of_rows(const graph::FactorRecord& factor);
-  void judge_factor(int factor, double limit);
-  double judge(double unless_below, double limit);
-  void keep_judgement();
-  Losses go_back(double limit);
-  void move_changed(const std::vector<graph::Delta>& to);
-  void go_half_the_way();
-  bool accept_step(IncrementalUpdate& update, bool thorough);
-
-  void finish(IncrementalUpdate& update);
-  void measure_unit();
-  std::vector<int> noticeably_old(double relinearise_above) const;
-  void make_stale(int factor);
-  bool has_curved_charts() const;
-  void begin_sweep();
-  void take_part_of_sweep();
-  double usual_unit() const;
-  void collect_moved();
-  IncrementalUpdate run(bool thorough, double most_work);
   IncrementalUpdate run_thoroughly(double relinearise_above);
+  IncrementalUpdate run(bool thorough, double most_work);
+  bool iterate(IncrementalUpdate& update, bool thorough);
+  void eliminate(IncrementalUpdate& update);
+  void solve(bool thorough);
+  void collect_moved();
+  void finish(IncrementalUpdate& update);
+
+  void begin_sweep();
+  void measure_unit();
+  double usual_unit() const;
 
   IncrementalParameters parameters_;
   graph::FactorGraph graph_;
-  CliqueTree tree_;
+  BayesTree tree_;
+  Relinearisation relinearisation_;
+  StepJudge judge_;
   Pending pending_;
   Pending saved_pending_;
   bool has_checkpoint_ = false;
-  bool updated_ = false;
+  bool updated_ = false;  ///< Nothing was changed since the last update.
 
-  std::vector<int> last_;
+  std::vector<int> last_;  ///< Variables to be eliminated last; scratch.
   std::vector<int> moved_;
-  std::vector<std::uint64_t> moved_at_;
-
-  // Of the last step.
-  std::vector<int> judged_variables_;
-  std::vector<int> judged_;               ///< Factors.
-  std::vector<int> off_;                  ///< Of those, what has to be linearised again.
-  std::vector<int> old_;                  ///< And what had to be before the step.
-  std::vector<std::uint64_t> judged_at_;  ///< Per factor: number of the judgement.
-  std::vector<double> factor_turned_;     ///< And how far it had turned then [rad].
-  Losses at_end_;
-  double largest_deviation_ = 0.0;
-  std::vector<graph::Delta> reached_;
-  std::uint64_t count_ = 0;
+  std::vector<char> is_moved_;  ///< Per variable; zero between updates.
 };
 
-/// "pose 3", "point 7": for messages.
+/// Name of a variable for messages: "pose 3", "point 7".
 std::string name_of(const graph::FactorGraph& graph, graph::VariableId id);
 
 }  // namespace understory::factor_graph::bayes_tree

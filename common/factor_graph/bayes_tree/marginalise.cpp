@@ -87,9 +87,9 @@ bool IncrementalSmoother::marginalise(std::span<const graph::VariableId> ids) {
   const Neighbourhood all = neighbourhood_of(graph_, ids);
   // Poses turn their charts with them: what is kept counts from the present estimates.
   for (const int v : all.variables) {
-    if (graph_.variable(v).type == graph::VariableType::kPose3) pending_.rebase.push_back(v);
+    if (graph_.variable(v).type == graph::VariableType::kPose3) relinearisation_.rebase(v);
   }
-  relinearise();
+  relinearisation_.run();
   const Eigen::MatrixXd sum = information_of(graph_, all);
   const Eigen::Index gone = all.gone_columns;
   const Eigen::Index kept = all.columns - gone;

@@ -17,7 +17,7 @@ bayes_tree::IncrementalParameters incremental(const SmootherParameters& paramete
   result.first_unit = 1.0;
   result.thorough_every = 0;
   result.wait_below = parameters.wait_below;
-  result.turns = parameters.turns;
+  result.waiting_slots = parameters.waiting_slots;
   return result;
 }
 

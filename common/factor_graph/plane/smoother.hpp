@@ -18,7 +18,7 @@ struct SmootherParameters {
   /// Far from where an update took place, changes of less than so many times that wait for their
   /// turn, which so many cliques have in an update: its cost does not follow the map.
   double wait_below = 100.0;
-  int turns = 100;
+  int waiting_slots = 100;  ///< Number of waiting cliques that an update serves.
   /// A measurement is linearised again beyond this [sigmas]. Linearisations of different age leave
   /// torques that turn all that hangs on them: the prior that holds the map must hold it firmly,
   /// and at 1e-2 the end of a 5 km road swung by 2 m from update to update.

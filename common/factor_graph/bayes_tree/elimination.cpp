@@ -1,19 +1,16 @@
-// The numbers of the tree.
-#include <algorithm>
-#include <cmath>
-#include <cstring>
+#include "common/factor_graph/bayes_tree/elimination.hpp"
 
-#include "common/factor_graph/bayes_tree/clique_tree.hpp"
+#include <algorithm>
 
 namespace understory::factor_graph::bayes_tree {
 namespace {
 
-/// A pivot below this part of the information that went into it is rounding.
+/// A pivot below this part of the information that went into it is rounding noise.
 constexpr double kLeastPivot = 1e-13;
-/// A leaf with so many times as many separator rows as pivots is cheaper to compute again than to
-/// keep: a pose that saw a hundred landmarks.
+/// A leaf with this many times more separator rows than pivots is cheaper to compute again than to
+/// keep: a pose that observed a hundred landmarks.
 constexpr int kManyRows = 8;
-constexpr int kFewRows = 24;
+constexpr int kFewRows = 24;  ///< With fewer separator rows it is always kept.
 
 bool worth_keeping(const CliqueRecord& clique) {
   const int rest = clique.size - clique.pivots;
@@ -22,29 +19,32 @@ bool worth_keeping(const CliqueRecord& clique) {
 
 }  // namespace
 
-/// Lists the cliques whose numbers alone change, children first.
-void CliqueTree::order_dirty() {
-  made_.clear();
-  pending_.resize(static_cast<std::size_t>(cliques_.size()), 0);
-  const auto is_dirty = [&](int c) { return mark_[static_cast<std::size_t>(c)] == kDirty; };
-  for (const int c : dirty_) {
+void Elimination::list_dirty(const Marks& marks, std::vector<int>& computed) {
+  computed.clear();
+  pending_.resize(static_cast<std::size_t>(cliques_.capacity()), 0);
+
+  // How many children each one has to wait for.
+  for (const int c : marks.dirty()) {
     const int parent = cliques_[c].parent;
-    if (is_dirty(c) && is_dirty(parent)) ++pending_[static_cast<std::size_t>(parent)];
+    if (marks.is_dirty(c) && marks.is_dirty(parent)) ++pending_[static_cast<std::size_t>(parent)];
   }
-  for (const int c : dirty_) {
-    if (is_dirty(c) && pending_[static_cast<std::size_t>(c)] == 0) made_.push_back(c);
+
+  // Those without such children, then each as soon as its last child is listed.
+  for (const int c : marks.dirty()) {
+    if (marks.is_dirty(c) && pending_[static_cast<std::size_t>(c)] == 0) computed.push_back(c);
   }
-  for (std::size_t i = 0; i < made_.size(); ++i) {
-    const int parent = cliques_[made_[i]].parent;
-    if (is_dirty(parent) && --pending_[static_cast<std::size_t>(parent)] == 0) {
-      made_.push_back(parent);
+  for (std::size_t i = 0; i < computed.size(); ++i) {
+    const int parent = cliques_[computed[i]].parent;
+    if (marks.is_dirty(parent) && --pending_[static_cast<std::size_t>(parent)] == 0) {
+      computed.push_back(parent);
     }
   }
 }
 
-void CliqueTree::place_rows(const CliqueRecord& clique, Workspace& at) const {
+void Elimination::place_rows(const CliqueRecord& clique, Workspace& at) const {
   at.offset.resize(static_cast<std::size_t>(graph_.variable_capacity()));
   at.least.resize(static_cast<std::size_t>(clique.pivots));
+
   int row = 0;
   for (int i = 0; i < clique.row_count; ++i) {
     const graph::VariableRecord& variable = graph_.variable(clique.rows[i]);
@@ -99,7 +99,7 @@ void add_products_any(const double* j, int rows, int columns, const int* targets
 
 }  // namespace
 
-void CliqueTree::add_factors(const CliqueRecord& clique, Workspace& at) {
+void Elimination::add_factors(const CliqueRecord& clique, Workspace& at) {
   for (int f = clique.first_factor; f != graph::kNone; f = graph_.factor(f).next) {
     const graph::FactorRecord& factor = graph_.factor(f);
     targets_.clear();
@@ -109,6 +109,7 @@ void CliqueTree::add_factors(const CliqueRecord& clique, Workspace& at) {
       for (int k = 0; k < size; ++k) targets_.push_back(first + k);
     }
     targets_.push_back(clique.size - 1);
+
     const int columns = factor.columns + 1;
     switch (factor.rows) {
       case 2:
@@ -127,11 +128,8 @@ void CliqueTree::add_factors(const CliqueRecord& clique, Workspace& at) {
   }
 }
 
-/// A child's Schur complement, in runs of rows that stay side by side. `column_of(c)` points at its
-/// column c's row 0 (what is above the diagonal is not read).
-template <typename ColumnOf>
-void CliqueTree::add_schur(const CliqueRecord& child, const ColumnOf& column_of, Workspace& at,
-                           int size) {
+/// Rows of the child's Schur complement in the parent's front, in runs that stay side by side.
+void Elimination::find_runs(const CliqueRecord& child, const Workspace& at, int size) {
   runs_.clear();
   int row = 0;
   for (int i = child.frontal_count; i <= child.row_count; ++i) {
@@ -145,12 +143,18 @@ void CliqueTree::add_schur(const CliqueRecord& child, const ColumnOf& column_of,
     }
     row += length;
   }
-  double* front = at.front;
+}
+
+/// Adds the Schur complement whose `runs_` were found. `column_of(c)` points at its column c's row
+/// 0 (what is above the diagonal is not read).
+template <typename ColumnOf>
+void Elimination::add_schur(const ColumnOf& column_of, double* front, int size) const {
   for (std::size_t a = 0; a < runs_.size(); ++a) {
     const Run column = runs_[a];
     for (int c = 0; c < column.length; ++c) {
       const double* from = column_of(column.from + c);
       double* to = front + static_cast<std::ptrdiff_t>(column.to + c) * size;
+
       for (int r = c; r < column.length; ++r) to[column.to + r] += from[column.from + r];
       for (std::size_t b = a + 1; b < runs_.size(); ++b) {
         const Run rows = runs_[b];
@@ -168,27 +172,30 @@ void CliqueTree::add_schur(const CliqueRecord& child, const ColumnOf& column_of,
   }
 }
 
-void CliqueTree::add_child(const CliqueRecord& child, Workspace& at, int size) {
+void Elimination::add_child(const CliqueRecord& child, Workspace& at, int size) {
   if (child.keeps_schur) {
     const double* schur = child.panel + child.panel_numbers();
     const std::ptrdiff_t rest = child.size - child.pivots;
+    find_runs(child, at, size);
     // Column c begins with its row c, behind rest + (rest - 1) + ... numbers.
-    add_schur(
-        child, [&](std::ptrdiff_t c) { return schur + c * rest - c * (c - 1) / 2 - c; }, at, size);
+    const auto column_of = [&](std::ptrdiff_t c) { return schur + c * rest - c * (c - 1) / 2 - c; };
+    add_schur(column_of, at.front, size);
     return;
   }
+
   compute(child, leaf_space_);
   const double* schur =
       leaf_space_.front + static_cast<std::ptrdiff_t>(child.pivots) * (child.size + 1);
-  add_schur(
-      child, [&](std::ptrdiff_t c) { return schur + c * child.size; }, at, size);
+  find_runs(child, at, size);
+  add_schur([&](std::ptrdiff_t c) { return schur + c * child.size; }, at.front, size);
 }
 
-void CliqueTree::assemble(const CliqueRecord& clique, Workspace& at) {
+void Elimination::assemble(const CliqueRecord& clique, Workspace& at) {
   const auto size = static_cast<std::size_t>(clique.size);
   if (at.numbers.size() < size * size) at.numbers.resize(size * size);
   at.front = at.numbers.data();
   for (std::size_t c = 0; c < size; ++c) std::fill_n(at.front + c * (size + 1), size - c, 0.0);
+
   place_rows(clique, at);
   add_factors(clique, at);
   for (int c = clique.first_child; c != graph::kNone; c = cliques_[c].next_sibling) {
@@ -197,31 +204,27 @@ void CliqueTree::assemble(const CliqueRecord& clique, Workspace& at) {
 }
 
 /// The front, factorised; returns how many pivots were left out.
-int CliqueTree::compute(const CliqueRecord& clique, Workspace& at) {
+int Elimination::compute(const CliqueRecord& clique, Workspace& at) {
   assemble(clique, at);
   left_out_.resize(static_cast<std::size_t>(clique.pivots));
   return kernel_.factorise(at.front, clique.size, clique.pivots, at.least.data(), left_out_.data());
 }
 
-void CliqueTree::factorise(int id) {
-  const int left_out = compute(cliques_[id], work_space_);
-  CliqueRecord& clique = cliques_.edit(id);
-  if (clique.panel == nullptr || clique.panel_epoch != cliques_.epoch()) {
-    clique.keeps_schur = worth_keeping(clique);
-    clique.panel = pool_.take(clique.numbers());
-    clique.panel_epoch = cliques_.epoch();
-  }
-  const double* front = work_space_.front;
-  double* to = std::copy_n(front, clique.panel_numbers(), clique.panel);
+void Elimination::factorise(int id) {
+  const int left_out = compute(cliques_[id], own_space_);
+  double* to = cliques_.writable_panel(id, worth_keeping(cliques_[id]));
+
+  const CliqueRecord& clique = cliques_[id];
+  const double* front = own_space_.front;
+  to = std::copy_n(front, clique.panel_numbers(), to);
   const std::ptrdiff_t size = clique.size;
   if (clique.keeps_schur) {
     for (std::ptrdiff_t c = clique.pivots; c < size; ++c) {
       to = std::copy_n(front + c * (size + 1), size - c, to);
     }
   }
-  const int before = clique.left_out;
-  clique.left_out = left_out;
-  count_left_out((left_out > 0 ? 1 : 0) - (before > 0 ? 1 : 0));
+
+  cliques_.set_left_out(id, left_out);
 }
 
 }  // namespace understory::factor_graph::bayes_tree

@@ -1,0 +1,124 @@
+#include "common/factor_graph/bayes_tree/bayes_tree.hpp"
+
+#include <algorithm>
+
+namespace understory::factor_graph::bayes_tree {
+namespace {
+
+/// True of a column of the identity: a pivot without information; no measurement gives exactly
+/// that.
+bool is_left_out(const CliqueRecord& clique, int column) {
+  const double* l = clique.panel + static_cast<std::ptrdiff_t>(column) * clique.size;
+  return l[column] == 1.0 &&
+         std::all_of(l + column + 1, l + clique.size, [](double x) { return x == 0.0; });
+}
+
+}  // namespace
+
+BayesTree::BayesTree(graph::FactorGraph& graph)
+    : graph_(graph),
+      restructuring_(graph_, cliques_),
+      elimination_(graph_, cliques_),
+      back_substitution_(graph_, cliques_, waiting_),
+      covariance_(graph_, cliques_) {}
+
+void BayesTree::mark_structure(int variable) {
+  const int clique = graph_.variable(variable).clique;
+  if (clique != graph::kNone) marks_.mark_structure(cliques_, clique);
+}
+
+void BayesTree::mark_numbers(int factor) {
+  const int clique = graph_.factor(factor).clique;
+  if (clique != graph::kNone) marks_.mark_numbers(cliques_, clique);
+}
+
+void BayesTree::mark_everything() {
+  for (int v = 0; v < graph_.variable_capacity(); ++v) {
+    if (graph_.variable(v).in_use) mark_structure(v);
+  }
+}
+
+void BayesTree::detach(int factor) {
+  const int clique = graph_.factor(factor).clique;
+  if (clique == graph::kNone) return;
+  marks_.mark_structure(cliques_, clique);
+
+  const int next = graph_.factor(factor).next;
+  if (cliques_[clique].first_factor == factor) {
+    cliques_.edit(clique).first_factor = next;
+  } else {
+    int before = cliques_[clique].first_factor;
+    while (graph_.factor(before).next != factor) before = graph_.factor(before).next;
+    graph_.edit_factor(before).next = next;
+  }
+  graph_.edit_factor(factor).clique = graph::kNone;
+}
+
+TreeStatistics BayesTree::eliminate(std::span<const int> fresh, std::span<const int> last) {
+  TreeStatistics statistics;
+
+  // The variables that the new factors tie together are ordered anew.
+  for (const int f : fresh) {
+    for (const int v : graph_.variables_of(f)) mark_structure(v);
+  }
+
+  // First the cliques that keep their structure, then the new ones above them.
+  elimination_.list_dirty(marks_, computed_);
+  statistics.refreshed_cliques = static_cast<long>(computed_.size());
+  for (const int c : marks_.structural()) waiting_.drop(c);
+  statistics.eliminated_variables = restructuring_.rebuild(fresh, last, marks_, computed_);
+
+  // From here on the structure is final.
+  marks_.clear();
+  marks_.resize(cliques_.capacity());
+  for (const int c : computed_) {
+    elimination_.factorise(c);
+    statistics.flops += flops_of(cliques_[c]);
+  }
+  return statistics;
+}
+
+void BayesTree::solve(const MoveLimits& limits) { back_substitution_.solve(computed_, limits); }
+
+void BayesTree::solve_everything(double threshold) {
+  waiting_.clear();
+  computed_.clear();
+  for (int c = cliques_[CliqueTree::kRoot].first_child; c != graph::kNone;
+       c = cliques_[c].next_sibling) {
+    computed_.push_back(c);
+  }
+  solve({threshold, threshold, 0, true});
+}
+
+std::vector<int> BayesTree::undetermined() const {
+  std::vector<int> variables;
+  if (cliques_.undetermined_cliques() == 0) return variables;
+
+  for (int c = 1; c < cliques_.capacity(); ++c) {
+    const CliqueRecord& clique = cliques_[c];
+    if (clique.panel == nullptr || clique.left_out == 0 || clique.parent == graph::kNone) continue;
+    int column = 0;
+    for (int i = 0; i < clique.frontal_count; ++i) {
+      const int name = clique.rows[i];
+      const int end = column + dimension(graph_.variable(name).type);
+      bool any = false;
+      for (; column < end; ++column) any = any || is_left_out(clique, column);
+      if (any) variables.push_back(name);
+    }
+  }
+  return variables;
+}
+
+void BayesTree::commit() {
+  cliques_.commit();
+  marks_.commit();
+  waiting_.commit();
+}
+
+void BayesTree::rollback() {
+  cliques_.rollback();
+  marks_.rollback(cliques_.capacity());
+  waiting_.rollback(cliques_.capacity());
+}
+
+}  // namespace understory::factor_graph::bayes_tree

@@ -1,0 +1,88 @@
+// The factorised graph (the Bayes tree of iSAM2, Kaess et al. 2012).
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/factor_graph/bayes_tree/back_substitution.hpp"
+#include "common/factor_graph/bayes_tree/clique_tree.hpp"
+#include "common/factor_graph/bayes_tree/covariance.hpp"
+#include "common/factor_graph/bayes_tree/elimination.hpp"
+#include "common/factor_graph/bayes_tree/marks.hpp"
+#include "common/factor_graph/bayes_tree/restructuring.hpp"
+#include "common/factor_graph/bayes_tree/waiting_queue.hpp"
+
+namespace understory::factor_graph::bayes_tree {
+
+/// Work of one elimination.
+struct TreeStatistics {
+  long eliminated_variables = 0;  ///< Variables whose cliques were planned and built anew.
+  long refreshed_cliques = 0;     ///< Cliques whose numbers alone were computed anew.
+  double flops = 0.0;             ///< Floating-point operations.
+};
+
+/// A factor graph as a tree of dense fronts: puts together its structure, what is out of date in
+/// it, and the steps that bring it up to date. State: cliques, marks and the waiting queue; all
+/// else is scratch memory of the steps.
+class BayesTree {
+ public:
+  /// A tree of this graph, which must outlive it; empty until eliminate().
+  explicit BayesTree(graph::FactorGraph& graph);
+
+  /// The variable's clique and all above it will be built anew.
+  void mark_structure(int variable);
+  /// The factor's clique and all above it will be computed anew.
+  void mark_numbers(int factor);
+  /// Everything will be built anew.
+  void mark_everything();
+  /// Takes a factor out of its clique, which is marked.
+  void detach(int factor);
+
+  /// Brings the marked part up to date. `fresh`: factors that no clique holds yet. `last`:
+  /// variables to be eliminated as late as possible.
+  TreeStatistics eliminate(std::span<const int> fresh, std::span<const int> last);
+
+  /// Back-substitution from the cliques that eliminate() computed, on as long as something changes.
+  /// Moves the graph's variables.
+  void solve(const MoveLimits& limits);
+  /// Back-substitution through the whole tree; nothing waits. What would move by less than
+  /// `threshold` [own conditional standard deviations] stays.
+  void solve_everything(double threshold);
+  /// Variables that the last solve moved, each once.
+  const std::vector<int>& changed() const { return back_substitution_.moves().variables(); }
+  /// Where each of changed() was before.
+  const std::vector<graph::Delta>& changed_from() const {
+    return back_substitution_.moves().from();
+  }
+
+  /// See Covariance::joint().
+  std::optional<Eigen::MatrixXd> joint_covariance(std::span<const int> variables) {
+    return covariance_.joint(variables);
+  }
+  /// Variables that the measurements leave undetermined. O(cliques) where there are any.
+  std::vector<int> undetermined() const;
+  /// The cliques.
+  const CliqueTree& cliques() const { return cliques_; }
+  /// Floating-point operations of one factorisation of the whole tree.
+  double total_flops() const { return cliques_.total_flops(); }
+
+  /// Makes all changes final.
+  void commit();
+  /// Restores the state of the last commit(), exactly; costs what changed.
+  void rollback();
+
+ private:
+  graph::FactorGraph& graph_;
+  CliqueTree cliques_;
+  Marks marks_;
+  WaitingQueue waiting_;
+  std::vector<int> computed_;  ///< Cliques that the last eliminate() computed, children first.
+  Restructuring restructuring_;
+  Elimination elimination_;
+  BackSubstitution back_substitution_;
+  Covariance covariance_;
+};
+
+}  // namespace understory::factor_graph::bayes_tree
