@@ -1,6 +1,6 @@
 #include "common/factor_graph/bayes_tree/clique_tree.hpp"
 
-#include "common/factor_graph/bayes_tree/clique_plan.hpp"
+#include "common/factor_graph/bayes_tree/elimination_problem.hpp"
 
 namespace understory::factor_graph::bayes_tree {
 

@@ -1,0 +1,159 @@
+#include "common/factor_graph/bayes_tree/clique_drafts.hpp"
+
+#include <algorithm>
+
+namespace understory::factor_graph::bayes_tree {
+namespace {
+
+constexpr int kNone = -1;
+
+/// Time of one front [us], fitted to the kernel: overhead, moving its numbers, eliminating.
+double front_cost(double pivots, double separator) {
+  const double size = pivots + separator + 1.0;
+  return 0.25 + 0.0006 * size * size + 0.00015 * elimination_flops(pivots, separator + 1.0);
+}
+
+}  // namespace
+
+double CliqueDrafts::flops() const {
+  double sum = 0.0;
+  for (const Draft& draft : drafts_) {
+    if (draft.alive) sum += elimination_flops(draft.pivots, draft.separator_size + 1.0);
+  }
+  return sum;
+}
+
+/// Hands every element to the first of its variables.
+void CliqueDrafts::sort_elements(const EliminationProblem& problem, std::span<const int> order) {
+  const auto count = order.size();
+  positions_.resize(count);
+  for (std::size_t p = 0; p < count; ++p) {
+    positions_[static_cast<std::size_t>(order[p])] = static_cast<int>(p);
+  }
+
+  first_element_.assign(count, kNone);
+  plan_.next_element.assign(static_cast<std::size_t>(problem.element_count()), kNone);
+  for (int e = problem.element_count(); e-- > 0;) {
+    int first = problem.size();
+    for (const int v : problem.element(e)) {
+      first = std::min(first, positions_[static_cast<std::size_t>(v)]);
+    }
+    if (first == problem.size()) continue;
+    plan_.next_element[static_cast<std::size_t>(e)] =
+        first_element_[static_cast<std::size_t>(first)];
+    first_element_[static_cast<std::size_t>(first)] = e;
+  }
+}
+
+/// What the variable at `position` is tied to among the later ones.
+void CliqueDrafts::draft(const EliminationProblem& problem, std::span<const int> order,
+                         int position) {
+  const auto at = static_cast<std::size_t>(position);
+  Draft& draft = drafts_[at];
+  draft = {position,
+           position,
+           1,
+           problem.dimension(order[at]),
+           static_cast<int>(separators_.size()),
+           0,
+           0,
+           kNone,
+           true};
+  const auto tie = [&](int other) {
+    if (other <= position || marker_[static_cast<std::size_t>(other)] == position) return;
+    marker_[static_cast<std::size_t>(other)] = position;
+    separators_.push_back(other);
+    draft.separator_size += problem.dimension(order[static_cast<std::size_t>(other)]);
+  };
+
+  for (int e = first_element_[at]; e != kNone;
+       e = plan_.next_element[static_cast<std::size_t>(e)]) {
+    for (const int v : problem.element(e)) tie(positions_[static_cast<std::size_t>(v)]);
+  }
+  for (int c = children_[at]; c != kNone; c = drafts_[static_cast<std::size_t>(c)].next) {
+    const Draft& child = drafts_[static_cast<std::size_t>(c)];
+    // By number: tie() makes the list longer.
+    const auto first = static_cast<std::size_t>(child.first_separator);
+    const auto count = static_cast<std::size_t>(child.separator_count);
+    for (std::size_t i = first; i < first + count; ++i) tie(separators_[i]);
+  }
+
+  draft.separator_count = static_cast<int>(separators_.size()) - draft.first_separator;
+  next_frontal_[at] = kNone;
+}
+
+/// A child joins its parent where both fronts in one cost less time than apart.
+void CliqueDrafts::merge_children(int position, int first_child) {
+  Draft& parent = drafts_[static_cast<std::size_t>(position)];
+  for (int c = first_child; c != kNone;) {
+    Draft& child = drafts_[static_cast<std::size_t>(c)];
+    const int next = child.next;
+    const double apart = front_cost(parent.pivots, parent.separator_size) +
+                         front_cost(child.pivots, child.separator_size);
+    if (front_cost(parent.pivots + child.pivots, parent.separator_size) <= apart) {
+      child.alive = false;
+      next_frontal_[static_cast<std::size_t>(child.last_frontal)] = parent.first_frontal;
+      parent.first_frontal = child.first_frontal;
+      parent.frontal_count += child.frontal_count;
+      parent.pivots += child.pivots;
+    }
+    c = next;
+  }
+}
+
+void CliqueDrafts::draft_all(const EliminationProblem& problem, std::span<const int> order) {
+  sort_elements(problem, order);
+  const auto count = order.size();
+  drafts_.resize(count);
+  children_.assign(count, kNone);
+  next_frontal_.resize(count);
+  marker_.assign(count, kNone);
+  separators_.clear();
+
+  for (int p = 0; p < problem.size(); ++p) {
+    draft(problem, order, p);
+    Draft& done = drafts_[static_cast<std::size_t>(p)];
+    merge_children(p, children_[static_cast<std::size_t>(p)]);
+    if (done.separator_count == 0) continue;
+
+    // The first variable of the separator is eliminated by the parent.
+    const auto begin = separators_.begin() + done.first_separator;
+    const int parent = *std::min_element(begin, begin + done.separator_count);
+    done.next = children_[static_cast<std::size_t>(parent)];
+    children_[static_cast<std::size_t>(parent)] = p;
+  }
+}
+
+void CliqueDrafts::append(const Draft& draft, std::span<const int> order) {
+  CliquePlan::Clique clique;
+  clique.first_row = static_cast<int>(plan_.rows.size());
+  clique.frontal_count = draft.frontal_count;
+  clique.row_count = draft.frontal_count + draft.separator_count;
+
+  // The merged variables' elements in one list.
+  clique.first_element = kNone;
+  int* tail = &clique.first_element;
+  for (int p = draft.first_frontal; p != kNone; p = next_frontal_[static_cast<std::size_t>(p)]) {
+    plan_.rows.push_back(order[static_cast<std::size_t>(p)]);
+    *tail = first_element_[static_cast<std::size_t>(p)];
+    while (*tail != kNone) tail = &plan_.next_element[static_cast<std::size_t>(*tail)];
+  }
+
+  const auto begin = separators_.begin() + draft.first_separator;
+  std::sort(begin, begin + draft.separator_count);
+  for (int i = 0; i < draft.separator_count; ++i) {
+    plan_.rows.push_back(order[static_cast<std::size_t>(begin[i])]);
+  }
+  plan_.cliques.push_back(clique);
+}
+
+const CliquePlan& CliqueDrafts::write(std::span<const int> order) {
+  plan_.cliques.clear();
+  plan_.rows.clear();
+  for (const Draft& draft : drafts_) {
+    if (draft.alive) append(draft, order);
+  }
+  return plan_;
+}
+
+}  // namespace understory::factor_graph::bayes_tree
