@@ -21,89 +21,147 @@ bayes_tree::IncrementalParameters incremental(const SmootherParameters& paramete
   return result;
 }
 
+/// A list that is appended to, with its length at the checkpoint.
+template <typename T>
+class AppendList {
+ public:
+  void push_back(const T& item) { items_.push_back(item); }
+  std::size_t size() const { return items_.size(); }
+  const T& operator[](std::size_t at) const { return items_[at]; }
+  const std::vector<T>& items() const { return items_; }
+  void commit() { saved_size_ = items_.size(); }
+  void rollback() { items_.resize(saved_size_); }
+
+ private:
+  std::vector<T> items_;
+  std::size_t saved_size_ = 0;
+};
+
+/// Observations, which can also be replaced.
+class ObservationList {
+ public:
+  struct Entry {
+    PointObservation measured;
+    graph::FactorId factor = kNoFactor;  ///< None where it does not count.
+  };
+  void push_back(const Entry& entry) { entries_.push_back(entry); }
+  void replace(std::size_t at, const Entry& entry) {
+    changes_.push_back({at, entries_[at]});
+    entries_[at] = entry;
+  }
+  std::size_t size() const { return entries_.size(); }
+  const Entry& operator[](std::size_t at) const { return entries_[at]; }
+  const std::vector<Entry>& entries() const { return entries_; }
+  void commit() {
+    changes_.clear();
+    saved_size_ = entries_.size();
+  }
+  void rollback() {
+    for (std::size_t i = changes_.size(); i-- > 0;) entries_[changes_[i].at] = changes_[i].before;
+    changes_.clear();
+    entries_.resize(saved_size_);
+  }
+
+ private:
+  struct Change {
+    std::size_t at = 0;
+    Entry before;
+  };
+  std::vector<Entry> entries_;
+  std::vector<Change> changes_;  ///< Since the checkpoint.
+  std::size_t saved_size_ = 0;
+};
+
+/// Poses and points that updates moved since the checkpoint, each once.
+class MovedList {
+ public:
+  /// The variable is the pose or the point with this index.
+  void give_role(graph::VariableId name, std::size_t role) {
+    const auto at = static_cast<std::size_t>(index(name));
+    if (roles_.size() <= at) roles_.resize(at + 1);
+    roles_[at] = {static_cast<std::uint32_t>(role), false};
+  }
+  void collect(const bayes_tree::IncrementalSmoother& smoother) {
+    for (const int v : smoother.moved()) {
+      const graph::VariableType type = smoother.graph().type(graph::VariableId(v));
+      if (type == graph::VariableType::kScalar) continue;
+      Role& role = roles_[static_cast<std::size_t>(v)];
+      if (role.is_moved) continue;
+
+      role.is_moved = true;
+      moved_.push_back(v);
+      if (type == graph::VariableType::kPose2) {
+        poses_.push_back(PoseId(role.index));
+      } else {
+        points_.push_back(PointId(role.index));
+      }
+    }
+  }
+  void clear() {
+    for (const int v : moved_) roles_[static_cast<std::size_t>(v)].is_moved = false;
+    moved_.clear();
+    poses_.clear();
+    points_.clear();
+  }
+  const std::vector<PoseId>& poses() const { return poses_; }
+  const std::vector<PointId>& points() const { return points_; }
+
+ private:
+  struct Role {
+    std::uint32_t index = 0;  ///< Among the poses, or among the points.
+    bool is_moved = false;
+  };
+  std::vector<Role> roles_;  ///< Per variable; of scalars unused.
+  std::vector<int> moved_;   ///< Variables.
+  std::vector<PoseId> poses_;
+  std::vector<PointId> points_;
+};
+
 }  // namespace
 
 struct Smoother::State {
-  struct Observation {
-    PointObservation measured;
-    graph::FactorId factor = kNoFactor;
-  };
-  struct Change {
-    std::size_t at = 0;
-    Observation before;
-  };
-  struct Counts {
-    std::size_t poses = 0, points = 0, observations = 0, pose_priors = 0, relative_poses = 0,
-                point_priors = 0, scalars = 0, biased_relative_poses = 0, scalar_priors = 0,
-                scalar_steps = 0;
-  };
-
   explicit State(const SmootherParameters& parameters) : smoother(incremental(parameters)) {}
 
-  Counts counts() const {
-    return {poses.size(),          points.size(),
-            observations.size(),   pose_priors.size(),
-            relative_poses.size(), point_priors.size(),
-            scalars.size(),        biased_relative_poses.size(),
-            scalar_priors.size(),  scalar_steps.size()};
-  }
   graph::VariableId name(PoseId id) const { return poses[index(id)]; }
   graph::VariableId name(PointId id) const { return points[index(id)]; }
   graph::VariableId name(ScalarId id) const { return scalars[index(id)]; }
+
+  /// Adds the observation's factor to the graph; none where its information is zero.
   graph::FactorId give(const PointObservation& factor) {
     if (factor.information.isZero(0.0)) return kNoFactor;
     return smoother.add(graph::observation(name(factor.pose), name(factor.point), factor.position,
                                            factor.information));
   }
 
-  std::uint32_t take_role(graph::VariableId name, std::size_t at) {
-    const auto slot = static_cast<std::size_t>(index(name));
-    if (roles.size() <= slot) roles.resize(slot + 1);
-    roles[slot] = {static_cast<std::uint32_t>(at), false};
-    return roles[slot].index;
+  void checkpoint() {
+    smoother.checkpoint();
+    moved.clear();
+    for_each_list([](auto& list) { list.commit(); });
   }
-  void collect_moved() {
-    for (const int v : smoother.moved()) {
-      const graph::VariableType type = smoother.graph().type(graph::VariableId(v));
-      if (type == graph::VariableType::kScalar) continue;
-      Role& role = roles[static_cast<std::size_t>(v)];
-      if (role.is_moved) continue;
-      role.is_moved = true;
-      if (type == graph::VariableType::kPose2) {
-        moved_poses.push_back(PoseId(role.index));
-      } else {
-        moved_points.push_back(PointId(role.index));
-      }
-    }
+  void rollback() {
+    moved.clear();
+    smoother.rollback();
+    for_each_list([](auto& list) { list.rollback(); });
   }
-  void forget_moved() {
-    for (const PoseId id : moved_poses) roles[slot(name(id))].is_moved = false;
-    for (const PointId id : moved_points) roles[slot(name(id))].is_moved = false;
-    moved_poses.clear();
-    moved_points.clear();
+  template <typename Visit>
+  void for_each_list(Visit&& visit) {
+    visit(poses), visit(points), visit(scalars);
+    visit(pose_priors), visit(relative_poses), visit(point_priors), visit(observations);
+    visit(biased_relative_poses), visit(scalar_priors), visit(scalar_steps);
   }
-  static std::size_t slot(graph::VariableId id) { return static_cast<std::size_t>(index(id)); }
 
   bayes_tree::IncrementalSmoother smoother;
-  std::vector<graph::VariableId> poses;
-  std::vector<graph::VariableId> points;
-  struct Role {
-    std::uint32_t index = 0;  ///< Among the poses, or among the points.
-    bool is_moved = false;
-  };
-  std::vector<Role> roles;  ///< Per variable.
-  std::vector<Observation> observations;
-  std::vector<PosePrior> pose_priors;
-  std::vector<RelativePose> relative_poses;
-  std::vector<PointPrior> point_priors;
-  std::vector<graph::VariableId> scalars;
-  std::vector<BiasedRelativePose> biased_relative_poses;
-  std::vector<ScalarPrior> scalar_priors;
-  std::vector<ScalarStep> scalar_steps;
-  Counts saved;
-  std::vector<Change> changes;  ///< Of observations, since the checkpoint.
-  std::vector<PoseId> moved_poses;
-  std::vector<PointId> moved_points;
+  AppendList<graph::VariableId> poses;
+  AppendList<graph::VariableId> points;
+  AppendList<graph::VariableId> scalars;
+  AppendList<PosePrior> pose_priors;
+  AppendList<RelativePose> relative_poses;
+  AppendList<PointPrior> point_priors;
+  AppendList<BiasedRelativePose> biased_relative_poses;
+  AppendList<ScalarPrior> scalar_priors;
+  AppendList<ScalarStep> scalar_steps;
+  ObservationList observations;
+  MovedList moved;
 };
 
 Smoother::Smoother(const SmootherParameters& parameters)
@@ -114,14 +172,18 @@ Smoother& Smoother::operator=(Smoother&&) noexcept = default;
 
 PoseId Smoother::add_pose(const geometry::SE2& initial) {
   const graph::VariableId name = state_->smoother.add_variable(initial);
+  const std::size_t at = state_->poses.size();
   state_->poses.push_back(name);
-  return PoseId(state_->take_role(name, state_->poses.size() - 1));
+  state_->moved.give_role(name, at);
+  return PoseId(static_cast<std::uint32_t>(at));
 }
 
 PointId Smoother::add_point(const Eigen::Vector2d& initial) {
   const graph::VariableId name = state_->smoother.add_variable(initial);
+  const std::size_t at = state_->points.size();
   state_->points.push_back(name);
-  return PointId(state_->take_role(name, state_->points.size() - 1));
+  state_->moved.give_role(name, at);
+  return PointId(static_cast<std::uint32_t>(at));
 }
 
 ScalarId Smoother::add_scalar(double initial) {
@@ -169,10 +231,9 @@ ObservationId Smoother::add(const PointObservation& factor) {
 }
 
 void Smoother::set(ObservationId id, const PointObservation& factor) {
-  State::Observation& observation = state_->observations[index(id)];
-  state_->changes.push_back({index(id), observation});
-  if (observation.factor != kNoFactor) state_->smoother.remove(observation.factor);
-  observation = {factor, state_->give(factor)};
+  const graph::FactorId before = state_->observations[index(id)].factor;
+  if (before != kNoFactor) state_->smoother.remove(before);
+  state_->observations.replace(index(id), {factor, state_->give(factor)});
 }
 
 geometry::SE2 Smoother::pose(PoseId id) const { return state_->smoother.pose2(state_->name(id)); }
@@ -191,26 +252,30 @@ double Smoother::chi2(ObservationId id) const {
   return factor == kNoFactor ? 0.0 : state_->smoother.graph().chi2(factor);
 }
 
-const std::vector<PointId>& Smoother::moved_points() const { return state_->moved_points; }
-const std::vector<PoseId>& Smoother::moved_poses() const { return state_->moved_poses; }
+const std::vector<PointId>& Smoother::moved_points() const { return state_->moved.points(); }
+const std::vector<PoseId>& Smoother::moved_poses() const { return state_->moved.poses(); }
 
 Graph Smoother::graph() const {
   Graph graph;
-  for (const graph::VariableId name : state_->poses)
-    graph.poses.push_back(state_->smoother.pose2(name));
-  for (const graph::VariableId name : state_->points) {
-    graph.points.push_back(state_->smoother.point2(name));
+  const State& state = *state_;
+
+  for (const graph::VariableId name : state.poses.items()) {
+    graph.poses.push_back(state.smoother.pose2(name));
   }
-  graph.pose_priors = state_->pose_priors;
-  graph.relative_poses = state_->relative_poses;
-  graph.point_priors = state_->point_priors;
-  for (const graph::VariableId name : state_->scalars) {
-    graph.scalars.push_back(state_->smoother.graph().value(name)[0]);
+  for (const graph::VariableId name : state.points.items()) {
+    graph.points.push_back(state.smoother.point2(name));
   }
-  graph.biased_relative_poses = state_->biased_relative_poses;
-  graph.scalar_priors = state_->scalar_priors;
-  graph.scalar_steps = state_->scalar_steps;
-  for (const State::Observation& one : state_->observations) {
+  for (const graph::VariableId name : state.scalars.items()) {
+    graph.scalars.push_back(state.smoother.graph().value(name)[0]);
+  }
+
+  graph.pose_priors = state.pose_priors.items();
+  graph.relative_poses = state.relative_poses.items();
+  graph.point_priors = state.point_priors.items();
+  graph.biased_relative_poses = state.biased_relative_poses.items();
+  graph.scalar_priors = state.scalar_priors.items();
+  graph.scalar_steps = state.scalar_steps.items();
+  for (const ObservationList::Entry& one : state.observations.entries()) {
     graph.observations.push_back(one.measured);
   }
   return graph;
@@ -229,36 +294,13 @@ void Smoother::start_from(const Graph& graph) {
   for (const PointObservation& factor : graph.observations) add(factor);
 }
 
-void Smoother::checkpoint() {
-  state_->smoother.checkpoint();
-  state_->forget_moved();
-  state_->saved = state_->counts();
-  state_->changes.clear();
-}
+void Smoother::checkpoint() { state_->checkpoint(); }
 
-void Smoother::rollback() {
-  State& state = *state_;
-  state.forget_moved();
-  state.smoother.rollback();
-  for (std::size_t i = state.changes.size(); i-- > 0;) {
-    state.observations[state.changes[i].at] = state.changes[i].before;
-  }
-  state.changes.clear();
-  state.poses.resize(state.saved.poses);
-  state.points.resize(state.saved.points);
-  state.observations.resize(state.saved.observations);
-  state.pose_priors.resize(state.saved.pose_priors);
-  state.relative_poses.resize(state.saved.relative_poses);
-  state.point_priors.resize(state.saved.point_priors);
-  state.scalars.resize(state.saved.scalars);
-  state.biased_relative_poses.resize(state.saved.biased_relative_poses);
-  state.scalar_priors.resize(state.saved.scalar_priors);
-  state.scalar_steps.resize(state.saved.scalar_steps);
-}
+void Smoother::rollback() { state_->rollback(); }
 
 SmootherUpdate Smoother::update() {
   const bayes_tree::IncrementalUpdate update = state_->smoother.update();
-  state_->collect_moved();
+  state_->moved.collect(state_->smoother);
   return {update.ok, update.error};
 }
 
