@@ -194,8 +194,8 @@ TEST_CASE("A restarted mapper extends the map as an uninterrupted one does", "[m
     }
   }
   INFO("largest difference " << largest_m << " m, " << largest_rad << " rad");
-  CHECK(largest_m < 1e-3);
-  CHECK(largest_rad < 1e-4);
+  CHECK(largest_m < 1.2e-5);
+  CHECK(largest_rad < 1e-6);
 }
 
 TEST_CASE("Two mappers loaded from one state give the same bytes", "[mapper]") {

@@ -88,6 +88,7 @@ TEST_CASE("Observations that are handed over hold the landmark that stays", "[ma
   graph.add_landmark(4, {6.1, 4.1}, std::nullopt);
   graph.observe(node, 4, graph.pose(node).inverse() * Eigen::Vector2d(6.0, 4.0), kInformation);
   graph.observe(node, 1, graph.pose(node).inverse() * Eigen::Vector2d(3.0, -4.0), kInformation);
+  graph.observe(node, 3, graph.pose(node).inverse() * Eigen::Vector2d(9.0, -4.0), kInformation);
   REQUIRE(graph.solve().ok);
   const std::vector<NodeIndex> nodes{node};
   graph.hand_over(4, 2, nodes, true);
