@@ -94,10 +94,12 @@ class MapperAdapter : public bus::Adapter {
   void subscribe(bus::Node& node) {
     node.subscribe<model::Keyframe>(
         channels_.keyframe, [this](const model::Keyframe& one) { add(one); }, {.queue_size = 200});
+
     // Not in the journal: a scan changes nothing in the map, and the next one is located anew.
     node.subscribe<model::LandmarkScan>(channels_.landmarks,
                                         [this](const model::LandmarkScan& scan) { locate(scan); },
                                         {.journaled = false});
+
     // Small, and each one that is lost breaks the chain of motion: a long queue.
     node.subscribe<model::Odometry>(channels_.odometry,
                                     [this](const model::Odometry& motion) {
@@ -105,6 +107,7 @@ class MapperAdapter : public bus::Adapter {
                                       memory_.odometry.add(motion);
                                     },
                                     {.queue_size = 2000});
+
     // Bias and velocity, and the motion to gate by; no measurement: it was made from the same
     // detections.
     node.subscribe<model::EkfPose>(channels_.ekf_pose,

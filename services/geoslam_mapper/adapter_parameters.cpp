@@ -16,6 +16,7 @@ void describe_baseline(BaselineMapperParameters& p, bus::ParameterTable& table) 
             "[psi] Increment of that distance from attempt to attempt.");
   table.add("baseline.max_descriptor_distance", p.max_descriptor_distance, {0.0, 1000.0}, "m",
             "Largest descriptor distance of all attempts.");
+
   table.add("baseline.min_associations", p.min_associations, {2, 10000}, "",
             "[gamma] Fewest associations with which a pose is tried.");
   table.add("baseline.max_pose_attempts", p.max_pose_attempts, {1, 1000000}, "",
@@ -32,6 +33,7 @@ void describe_baseline(BaselineMapperParameters& p, bus::ParameterTable& table) 
             "[mu] Fewest inliers of a pose.");
   table.add("baseline.early_exit_ratio", p.early_exit_ratio, {0.0, 1.0}, "",
             "[beta] Share of inliers at which no more samples are drawn.");
+
   table.add("baseline.discovery_observations", p.discovery_observations, {1, 1000}, "keyframes",
             "[k] A new landmark must be observed in so many keyframes ...");
   table.add("baseline.discovery_window", p.discovery_window, {1, 1000}, "keyframes",
@@ -57,6 +59,7 @@ void describe_evidence(SmoothingMapperParameters& p, bus::ParameterTable& table)
             "Standard deviation of a pose that was predicted without odometry.");
   table.add("smoothing.predicted_sigma_rad", p.predicted_sigma_rad, {1e-5, 3.2}, "rad",
             "Standard deviation of its heading.");
+
   table.add("smoothing.correlated_share", p.correlated_share, {0.0, 0.9}, "",
             "Share of an observation's variance that is correlated along the path (a trunk is no "
             "cylinder, and looks the same from the same place). 0: white noise.");
@@ -81,6 +84,7 @@ void describe_association(SmoothingMapperParameters& p, bus::ParameterTable& tab
             "predicted pose is not believed, and the whole map is searched.");
   table.add("smoothing.min_matched", p.min_matched, {1, 1000}, "",
             "Fewest matches of a pose that odometry does not support.");
+
   table.add("smoothing.filter_disagreement_m", p.filter_disagreement_m, {0.0, 100.0}, "m",
             "A keyframe with at most two matches is refused where its motion differs from the "
             "filter's by more than this: the trunk may be a pedestrian. 0: no such test.");
@@ -101,6 +105,7 @@ void describe_growth(SmoothingMapperParameters& p, bus::ParameterTable& table) {
             "gyro's bias is unknown) ...");
   table.add("smoothing.start_wait_s", p.start_wait_s, {0.0, 60.0}, "s",
             "... or, after so long, with any keyframe.");
+
   table.add("smoothing.min_observations", p.min_observations, {1, 1000}, "scans",
             "A landmark enters the map when it was detected in so many scans ...");
   table.add("smoothing.min_observation_ratio", p.min_observation_ratio, {0.0, 1.0}, "",

@@ -29,12 +29,14 @@ Eigen::VectorXd residuals(const geoslam_mapper::baseline::Graph& graph, const Ei
   const auto pose = [&](std::uint32_t i) { return Eigen::Vector3d(x.segment<3>(3L * i)); };
   const auto first_landmark = 3 * static_cast<Eigen::Index>(graph.poses.size());
   std::vector<double> all;
+
   for (const geoslam_mapper::baseline::PoseEdge& edge : graph.pose_edges) {
     const auto to_se2 = [](const Eigen::Vector3d& p) { return geometry::SE2(p.x(), p.y(), p.z()); };
     const geometry::SE2 error = to_se2(edge.difference).inverse() *
                                 (to_se2(pose(edge.from)).inverse() * to_se2(pose(edge.to)));
     all.insert(all.end(), {error.x(), error.y(), error.theta()});
   }
+
   for (const geoslam_mapper::baseline::LandmarkEdge& edge : graph.landmark_edges) {
     const Eigen::Vector3d p = pose(edge.pose);
     const Eigen::Vector2d landmark = x.segment<2>(first_landmark + 2L * edge.landmark);
@@ -51,6 +53,7 @@ Eigen::VectorXd dense_step(const geoslam_mapper::baseline::Graph& graph) {
   const Eigen::VectorXd x = flatten(graph);
   const Eigen::VectorXd r = residuals(graph, x);
   Eigen::MatrixXd jacobian(r.size(), x.size());
+
   for (Eigen::Index i = 0; i < x.size(); ++i) {
     const auto at = [&](double change) {
       Eigen::VectorXd y = x;
@@ -60,6 +63,7 @@ Eigen::VectorXd dense_step(const geoslam_mapper::baseline::Graph& graph) {
     const double h = 1e-3;
     jacobian.col(i) = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
   }
+
   Eigen::MatrixXd h = 100.0 * jacobian.transpose() * jacobian;
   h.topLeftCorner<3, 3>() += Eigen::Matrix3d::Identity();
   return h.ldlt().solve(100.0 * jacobian.transpose() * r);
@@ -70,6 +74,7 @@ geoslam_mapper::baseline::Graph random_graph(bool with_double_edges, std::mt1993
   std::uniform_real_distribution<double> chance(0.0, 1.0);
   geoslam_mapper::baseline::Graph graph;
   graph.landmarks_m = test::random_cloud(12, 40.0, random);
+
   for (std::uint32_t p = 0; p < 5; ++p) {
     graph.poses.emplace_back(4.0 * p, 2.0 * p, 0.6 * p);
     if (p > 0) {

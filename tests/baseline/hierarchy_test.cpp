@@ -69,6 +69,7 @@ TEST_CASE("A descriptor does not change with a start moved by whole samples") {
 TEST_CASE("The distance of two descriptors is that over all bins of the DFT") {
   std::mt19937_64 random(2);
   const hierarchy::baseline::DescriptorMaker describe(0.05);
+
   // Regular 20-gons with radii of their own: samples are not the corners, so sample by hand.
   const auto all_bins = [](const std::vector<Eigen::Vector2d>& polygon) {
     Eigen::Vector2d centroid = Eigen::Vector2d::Zero();
@@ -95,6 +96,7 @@ TEST_CASE("The distance of two descriptors is that over all bins of the DFT") {
     }
     return bins;
   };
+
   for (int i = 0; i < 50; ++i) {
     const auto a = star_polygon(5, random);
     const auto b = star_polygon(7, random);
@@ -161,6 +163,7 @@ TEST_CASE("A polygon's boundary encloses exactly its triangles") {
     }
     return points;
   };
+
   for (const hierarchy::baseline::Polygon& polygon : hierarchy.polygons()) {
     CHECK(polygon.vertices.size() == polygon.triangles.size() + 2);
     double area = 0.0;

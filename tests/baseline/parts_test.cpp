@@ -20,6 +20,7 @@ std::set<std::vector<std::uint32_t>> chained(const std::vector<Eigen::Vector2d>&
   for (std::uint32_t i = 0; i < label.size(); ++i) {
     label[i] = i;
   }
+
   for (bool changed = true; changed;) {
     changed = false;
     for (std::size_t i = 0; i < cloud.size(); ++i) {
@@ -31,7 +32,9 @@ std::set<std::vector<std::uint32_t>> chained(const std::vector<Eigen::Vector2d>&
       }
     }
   }
+
   std::set<std::vector<std::uint32_t>> clusters;
+
   for (std::uint32_t root = 0; root < label.size(); ++root) {
     std::vector<std::uint32_t> cluster;
     for (std::uint32_t i = 0; i < label.size(); ++i) {
@@ -108,13 +111,17 @@ TEST_CASE("A pose is found among wrong associations") {
   const auto map = test::random_cloud(120, 60.0, random);
   const geometry::SE2 map_T_base(31.0, 28.0, 2.1);
   std::vector<Eigen::Vector2d> local;
+
   for (std::size_t i = 0; i < 40; ++i) {
     local.push_back(map_T_base.inverse() * map[i]);
   }
+
   std::vector<hierarchy::baseline::PointMatch> matches;
+
   for (std::uint32_t i = 0; i < 20; ++i) {
     matches.push_back({i, i % 3 == 0 ? 100 - i : i});
   }
+
   std::mt19937 samples(10);
   const auto estimate = geoslam_mapper::baseline::estimate_pose(local, map, matches, {}, samples);
   REQUIRE(estimate);

@@ -42,6 +42,7 @@ TEST_CASE("A keyframe comes with every eighth scan, in the frame of its base") {
   const auto keyframes = keyframes_of(drive, *keyframer);
   CHECK(keyframes.size() == drive.size() / 8);
   auto truth = truth_of(drive);
+
   for (const model::Keyframe& keyframe : keyframes) {
     REQUIRE(keyframe.members.size() == 8);
     CHECK(keyframe.utime == keyframe.members.front().utime);
@@ -59,6 +60,7 @@ TEST_CASE("A keyframe comes with every eighth scan, in the frame of its base") {
       CHECK(landmark.observation_count <= 8);
     }
   }
+
   CHECK(keyframer->counters().scans == drive.size());
   CHECK(keyframer->counters().keyframes == keyframes.size());
 }
@@ -79,6 +81,7 @@ TEST_CASE("A keyframer that was saved and loaded continues identically") {
   const sim::Drive drive(small_drive(0.2, 0.8), 2);
   const auto first = keyframer::baseline::make_baseline_keyframer({});
   auto second = keyframer::baseline::make_baseline_keyframer({});
+
   for (std::size_t k = 0; k < drive.size(); ++k) {
     const model::LandmarkScan scan = drive.scan(k).scan;
     const auto a = first->add(scan);
@@ -102,18 +105,22 @@ TEST_CASE("A map of a noise-free drive agrees with the truth") {
   const auto keyframer = keyframer::baseline::make_baseline_keyframer({});
   const auto mapper = geoslam_mapper::baseline::make_baseline_mapper({});
   const auto keyframes = keyframes_of(drive, *keyframer);
+
   for (const model::Keyframe& keyframe : keyframes) {
     const model::MapUpdate update = mapper->add(keyframe);
     CHECK(update.status == (keyframe.sequence == 0 ? model::MapUpdateStatus::kFirstMap
                                                    : model::MapUpdateStatus::kUpdated));
   }
+
   auto truth = truth_of(drive);
   const geometry::SE2 world_T_map = truth.at(keyframes.front().utime);
   REQUIRE(mapper->trajectory().size() == keyframes.size());
+
   for (const model::KeyframePose& pose : mapper->trajectory()) {
     const geometry::SE2 expected = world_T_map.inverse() * truth.at(pose.utime);
     CHECK((expected.inverse() * pose.map_T_vehicle).Log().norm() < 0.15);
   }
+
   for (const model::MapLandmark& landmark : mapper->landmarks()) {
     CHECK(drive.grid().nearest(world_T_map * landmark.position_m)->distance_m < 0.05);
   }
@@ -125,13 +132,16 @@ TEST_CASE("A map of a noisy drive stays within half a metre") {
   const auto mapper = geoslam_mapper::baseline::make_baseline_mapper({});
   const auto keyframes = keyframes_of(drive, *keyframer);
   std::size_t updates = 0;
+
   for (const model::Keyframe& keyframe : keyframes) {
     const model::MapUpdate update = mapper->add(keyframe);
     updates += update.status == model::MapUpdateStatus::kUpdated ? 1 : 0;
   }
+
   CHECK(updates + 3 >= keyframes.size());
   auto truth = truth_of(drive);
   const geometry::SE2 world_T_map = truth.at(keyframes.front().utime);
+
   for (const model::KeyframePose& pose : mapper->trajectory()) {
     const geometry::SE2 expected = world_T_map.inverse() * truth.at(pose.utime);
     CHECK((expected.translation() - pose.map_T_vehicle.translation()).norm() < 0.5);
@@ -147,6 +157,7 @@ TEST_CASE("A rejected keyframe leaves nothing behind") {
   const auto good = geoslam_mapper::baseline::make_baseline_mapper({});
   const auto bad = geoslam_mapper::baseline::make_baseline_mapper(strict);
   int rolled_back = 0;
+
   for (const model::Keyframe& keyframe : keyframes) {
     const std::string before = good->save();
     bad->load(before);
@@ -186,11 +197,13 @@ TEST_CASE("In a given map a landmark counts once it was observed") {
     landmark.position_m = trunk;
     given.push_back(landmark);
   }
+
   const auto keyframer = keyframer::baseline::make_baseline_keyframer({});
   const auto mapper = geoslam_mapper::baseline::make_baseline_mapper({});
   mapper->start_with(given);
   auto truth = truth_of(drive);
   std::size_t updates = 0;
+
   for (const model::Keyframe& keyframe : keyframes_of(drive, *keyframer)) {
     const model::MapUpdate update = mapper->add(keyframe);
     if (update.status == model::MapUpdateStatus::kUpdated) {
@@ -199,8 +212,10 @@ TEST_CASE("In a given map a landmark counts once it was observed") {
             0.5);
     }
   }
+
   CHECK(updates >= 10);
   std::size_t observed = 0;
+
   for (const model::MapLandmark& landmark : mapper->landmarks()) {
     const std::size_t number = landmark.id - 1000;
     if (number >= given.size()) {
@@ -211,6 +226,7 @@ TEST_CASE("In a given map a landmark counts once it was observed") {
       CHECK(landmark.position_m == given[number].position_m);
     }
   }
+
   CHECK(observed > 30);
   CHECK(observed < given.size());
 }

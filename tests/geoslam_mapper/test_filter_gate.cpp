@@ -42,6 +42,7 @@ model::LandmarkScan scan_at(int k, std::mt19937_64& random) {
     detection.radius_m = 0.2;
     scan.detections.push_back(detection);
   };
+
   for (int tree = 0; tree < 8; ++tree) observe(2.9 * tree, tree % 2 == 0 ? 6.0 : -7.0);
   if (x > 60.0) observe(65.0 + 1.2 * kScan_s * k - 0.27 * 60.0, 10.0);
   return scan;
@@ -59,6 +60,7 @@ Outcome drive(bool with_filter) {
   parameters.use_odometry = true;
   SmoothingMapper mapper(parameters);
   Outcome outcome;
+
   for (int k = 0; k < 190; ++k) {
     const model::LandmarkScan scan = scan_at(k, random);
     if (with_filter) mapper.add(filter_pose(scan.utime, kSpeed_mps * kScan_s * k));

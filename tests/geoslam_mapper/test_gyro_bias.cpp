@@ -26,12 +26,15 @@ model::Keyframe keyframe(int number) {
   const model::Utime first = number * kScans * kScan_us;
   result.utime = first;
   result.field_of_view.max_range_m = 30.0;
+
   for (int k = 0; k < kScans; ++k) {
     result.members.push_back({first + k * kScan_us, static_cast<std::uint64_t>(k),
                               geometry::SE2((k - 3.5) * kScan_s * kSpeed_mps, 0.0, 0.0),
                               1e-8 * Eigen::Matrix3d::Identity()});
   }
+
   const double here = (number * kScans + 3.5) * kScan_s * kSpeed_mps;
+
   for (int post = 0; post < 60; ++post) {
     const double x = 10.0 * post;
     if (!has_landmarks(x) || std::abs(x - here) > 25.0) continue;
@@ -86,6 +89,7 @@ Drive drive(double gyro_walk, int saved_at = -1) {
   parameters.relinearise_above = 1e-4;
   SmoothingMapper mapper(parameters);
   Drive result;
+
   for (int number = 0; number < 62; ++number) {
     const model::Keyframe one = keyframe(number);
     for (const model::KeyframeMember& member : one.members) {
@@ -101,6 +105,7 @@ Drive drive(double gyro_walk, int saved_at = -1) {
     mapper = SmoothingMapper(parameters);
     mapper.load(state);
   }
+
   result.trajectory = mapper.trajectory();
   return result;
 }

@@ -156,6 +156,7 @@ TEST_CASE("the odometry frame is the sum of the motions", "[map_publishing]") {
   OdometryFrame frame;
   CHECK(difference(frame.odom_T_vehicle(5), geometry::SE2()) == 0.0);
   std::vector<geometry::SE2> poses{geometry::SE2()};
+
   for (int i = 0; i < 300; ++i) {
     model::Odometry motion;
     motion.from_utime = 1000 + 100 * static_cast<model::Utime>(i);
@@ -164,14 +165,17 @@ TEST_CASE("the odometry frame is the sum of the motions", "[map_publishing]") {
     frame.add(motion);
     poses.push_back(poses.back() * motion.from_T_to);
   }
+
   OdometryFrame loaded;
   load(saved(frame), loaded);
+
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const model::Utime utime = 1000 + 100 * static_cast<model::Utime>(i);
     CHECK(difference(frame.odom_T_vehicle(utime), poses[i]) < 1e-9);
     CHECK(difference(frame.odom_T_vehicle(utime + 99), poses[i]) < 1e-9);
     CHECK(difference(loaded.odom_T_vehicle(utime), frame.odom_T_vehicle(utime)) == 0.0);
   }
+
   CHECK(difference(frame.odom_T_vehicle(0), poses.front()) < 1e-9);
   CHECK(saved(loaded) == saved(frame));
 }
@@ -242,13 +246,16 @@ TEST_CASE("a jump against what was tracked is counted, a tracked motion is none"
     update.status = status;
     watch.add(keyframe, update);
   };
+
   step(geometry::SE2(), geometry::SE2(), model::MapUpdateStatus::kFirstMap);
+
   for (int i = 0; i < 20; ++i)
     step(random_pose(random), {0.1, 0.1, 0.01}, model::MapUpdateStatus::kUpdated);
   CHECK(watch.count() == 0);
   step(random_pose(random), {0.6, 0.0, 0.0}, model::MapUpdateStatus::kUpdated);
   CHECK(watch.count() == 1);
   CHECK(difference(watch.delta(), {0.6, 0.0, 0.0}) < 1e-9);
+
   // Through a keyframe without a place the prediction goes on.
   step(random_pose(random), geometry::SE2(), model::MapUpdateStatus::kNotSure);
   JumpWatch loaded(0.5, 0.05);

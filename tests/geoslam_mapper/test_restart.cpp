@@ -59,6 +59,7 @@ std::vector<Inputs> inputs_of(const sim::Drive& drive, std::uint64_t seed) {
   std::normal_distribution<double> normal;
   keyframer::joint::JointKeyframer keyframer({});
   std::vector<Inputs> result(drive.size());
+
   for (std::size_t k = 0; k < drive.size(); ++k) {
     Inputs& inputs = result[k];
     if (k > 0) inputs.odometry = odometry_between(drive, k, random);

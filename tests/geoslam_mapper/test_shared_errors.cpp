@@ -21,12 +21,14 @@ model::Keyframe keyframe_at(double x, int number, double distance_m) {
   keyframe.sequence = static_cast<std::uint64_t>(number);
   keyframe.utime = number * kKeyframe_us + kScan_us;
   keyframe.field_of_view.max_range_m = 60.0;
+
   for (int k = 0; k < 8; ++k) {
     const double share = (k - 3.5) / 7.0;
     keyframe.members.push_back({keyframe.utime + k * kScan_us, static_cast<std::uint64_t>(k),
                                 geometry::SE2(share * distance_m, 0.0, 0.0),
                                 1e-8 * Eigen::Matrix3d::Identity()});
   }
+
   for (int k = 0; k < 8; ++k) {
     const double bearing = 2.0 * std::numbers::pi * k / 8.0;
     model::KeyframeLandmark landmark;
@@ -96,6 +98,7 @@ TEST_CASE("a map waits for the gyro's bias, but not for ever", "[mapper]") {
     }
     return -1;
   };
+
   CHECK(first_map(0.0, false) == 0);
   CHECK(first_map(0.0, true) == 0);
   CHECK(first_map(0.5, true) == 1);

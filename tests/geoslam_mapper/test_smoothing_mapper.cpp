@@ -102,12 +102,15 @@ TEST_CASE("Keyframes of another forest are not sure, and leave the map as it was
   const sim::Drive there = drive(sim::PathKind::kLine, 30.0, 912);
   SmoothingMapper mapper({});
   model::Utime last = 0;
+
   for (const model::Keyframe& keyframe : keyframes(here)) {
     mapper.add(keyframe);
     last = keyframe.utime;
   }
+
   const std::vector<model::MapLandmark> landmarks = mapper.landmarks();
   const std::vector<model::KeyframePose> poses = mapper.trajectory();
+
   for (model::Keyframe keyframe : keyframes(there)) {
     keyframe.utime += last + 1;
     const model::MapUpdate update = mapper.add(keyframe);
@@ -125,18 +128,23 @@ TEST_CASE("A keyframe that contradicts the map is rolled back exactly", "[mapper
   std::vector<model::Keyframe> made = keyframes(simulated);
   model::Keyframe bent = made.back();
   made.pop_back();
+
   for (const model::Keyframe& keyframe : made) mapper.add(keyframe);
   const std::vector<model::MapLandmark> landmarks = mapper.landmarks();
   const std::vector<model::KeyframePose> poses = mapper.trajectory();
+
   // Everything is found, nothing fits.
   std::mt19937_64 random(1);
   std::normal_distribution<double> normal;
+
   for (model::KeyframeLandmark& landmark : bent.landmarks) {
     landmark.position_m += 0.22 * Eigen::Vector2d(normal(random), normal(random));
   }
+
   const model::MapUpdate update = mapper.add(bent);
   REQUIRE(update.status == model::MapUpdateStatus::kRolledBack);
   REQUIRE(same_map(mapper, landmarks, poses));
+
   // And the drive goes on.
   model::Keyframe good = keyframes(simulated).back();
   good.utime += 1;
@@ -177,6 +185,7 @@ TEST_CASE("Localisation only leaves the given map alone", "[mapper]") {
   const std::vector<model::MapLandmark> given = mapper.landmarks();
   double largest_m = 0.0;
   double largest_nees = 0.0;
+
   for (std::size_t i = 1; i < made.size(); ++i) {
     const model::MapUpdate update = mapper.add(made[i]);
     REQUIRE(update.status == model::MapUpdateStatus::kUpdated);
@@ -186,6 +195,7 @@ TEST_CASE("Localisation only leaves the given map alone", "[mapper]") {
     largest_m = std::max(largest_m, error.head<2>().norm());
     largest_nees = std::max(largest_nees, error.dot(update.covariance.ldlt().solve(error)));
   }
+
   CHECK(largest_m < 0.15);
   CHECK(largest_nees < 21.0);
   REQUIRE(mapper.trajectory().size() == made.size() - 1);
@@ -198,6 +208,7 @@ TEST_CASE("Who follows the changed landmarks has the map", "[mapper]") {
   const sim::Drive simulated = drive(sim::PathKind::kCircle, 100.0, 21);
   SmoothingMapper mapper({});
   std::vector<model::MapLandmark> held;
+
   for (const model::Keyframe& keyframe : keyframes(simulated)) {
     const model::MapUpdate update = mapper.add(keyframe);
     const auto changed = mapper.take_changed_landmarks();
@@ -235,6 +246,7 @@ TEST_CASE("Scans between keyframes are located, and the map is not changed by it
   SmoothingMapper mapper({});
   std::size_t located = 0;
   double largest_m = 0.0;
+
   for (std::size_t k = 0; k < simulated.size(); ++k) {
     const model::LandmarkScan scan = simulated.scan(k).scan;
     const std::size_t before = mapper.landmarks().size();
@@ -246,6 +258,7 @@ TEST_CASE("Scans between keyframes are located, and the map is not changed by it
     REQUIRE(mapper.landmarks().size() == before);
     if (const auto keyframe = keyframer.add(scan)) mapper.add(*keyframe);
   }
+
   REQUIRE(located >= simulated.size() - 12);
   CHECK(largest_m < 0.2);
 }
@@ -270,7 +283,9 @@ TEST_CASE("The covariance of a located scan is that of its pose in the map", "[m
       if (const auto keyframe = keyframer.add(scan)) mapper.add(*keyframe);
     }
   }
+
   REQUIRE(count > 200);
+
   // 3 is exact; the runs' first scans, which are common to all of a run, leave it wide.
   INFO("mean NEES " << nees / count);
   REQUIRE(nees / count > 1.2);
@@ -320,17 +335,21 @@ TEST_CASE("A trunk that bad scans moved and doubled is one landmark in the end",
   REQUIRE(made.size() > 20);
   const geometry::SE2 centre_T_world =
       made[0].centre_T_base() * simulated.world_T_vehicle().front().inverse();
+
   // A trunk beside the path, far from any other.
   std::optional<Eigen::Vector2d> trunk;
+
   for (const Eigen::Vector2d& one : simulated.forest().trunks_m) {
     const Eigen::Vector2d position = centre_T_world * one;
     const auto others = simulated.grid().within(one, 4.0);
     if (others.size() == 1 && (position - Eigen::Vector2d(20.0, 0.0)).norm() < 15.0)
       trunk = position;
   }
+
   REQUIRE(trunk);
   SmoothingMapper mapper({});
   std::size_t doubled = 0;
+
   for (std::size_t k = 0; k < made.size(); ++k) {
     const double driven = 1.6 * static_cast<double>(k);
     model::Keyframe& keyframe = made[k];
@@ -350,10 +369,12 @@ TEST_CASE("A trunk that bad scans moved and doubled is one landmark in the end",
     }
     mapper.add(keyframe);
   }
+
   REQUIRE(doubled == 1);
   std::size_t near = 0;
   const geometry::SE2 map_T_centre =
       mapper.trajectory().front().map_T_vehicle * made[0].centre_T_base().inverse();
+
   for (const model::MapLandmark& landmark : mapper.landmarks()) {
     if ((landmark.position_m - map_T_centre * *trunk).norm() < 1.5) ++near;
   }
