@@ -125,7 +125,7 @@ TEST_CASE("health follows from fresh reasons and recovers") {
   CHECK(monitor.state() == health_t::STATE_DEGRADED);
   monitor.count_reason("", wire::Reason::kStageFailed, "y");
   CHECK(monitor.state() == health_t::STATE_ERROR);
-  now = HealthMonitor::kFreshUs;
+  now = ReasonCounts::kFreshUs;
   CHECK(monitor.state() == health_t::STATE_OK);
 
   for (int i = 0; i < 30; ++i) monitor.count_message(channel, 100 + i);
