@@ -48,9 +48,9 @@ using Meddle = std::function<std::vector<RawMessage>(RawMessage)>;
 struct ChainOptions {
   std::filesystem::path config_dir;
   std::map<std::string, std::string> toml_instead;
-  double end_s = 1e9;  ///< Of the drive.
-  Meddle meddle;       ///< Faults; empty = none.
-  std::function<void(double done)> progress;
+  double end_s = 1e9;                         ///< Of the drive.
+  Meddle meddle;                              ///< Faults; empty = none.
+  std::function<void(double done)> progress;  ///< Called at every sweep; `done` is in [0, 1].
   /// Every sweep before it goes to the chain, with the truth in it.
   std::function<void(const sim::SimulatedSweep&)> on_sweep;
   bool keep_states = false;  ///< Asks for the whole map after each update.

@@ -34,6 +34,7 @@ class MapTruth {
   MapTruth(std::vector<geometry::SE2> world_T_vehicle, std::size_t base,
            std::vector<Eigen::Vector2d> trunks_m, std::vector<std::uint32_t> in_range);
 
+  /// True pose of the vehicle at a scan, frame `map`.
   geometry::SE2 map_T_vehicle(std::size_t scan) const {
     return map_T_world_ * world_T_vehicle_[scan];
   }
