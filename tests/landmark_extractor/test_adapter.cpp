@@ -12,7 +12,7 @@ using namespace understory::test;
 
 namespace {
 
-/// The service on a bus, with everything that it says.
+/// The service on a bus, with everything that it publishes.
 struct Bench {
   explicit Bench(const std::string& toml = "", const LandmarkExtractorChannels& channels = {})
       : bus(bus::MemoryBus::Queues::kUnlimited),
@@ -52,7 +52,7 @@ model::PlanarScan numbered_sweep(std::uint64_t k, std::mt19937_64& random) {
 
 }  // namespace
 
-TEST_CASE("on the bus the extractor says what the stage says", "[extractor]") {
+TEST_CASE("on the bus the extractor publishes what the stage gives", "[extractor]") {
   std::mt19937_64 random(1);
   Bench bench;
   LandmarkExtractor stage;
@@ -62,13 +62,13 @@ TEST_CASE("on the bus the extractor says what the stage says", "[extractor]") {
     CHECK(expected.detections.size() >= 5);
     bench.send(scan);
     REQUIRE(bench.landmarks.size() == k + 1);
-    const model::LandmarkScan& told = bench.landmarks.back();
-    CHECK(told.utime == scan.utime);
-    CHECK(told.sequence == k);
+    const model::LandmarkScan& published = bench.landmarks.back();
+    CHECK(published.utime == scan.utime);
+    CHECK(published.sequence == k);
     // The wire's covariances are symmetric to the last bit.
     const auto on_wire = wire::decode_message<model::LandmarkScan>(wire::encode_message(expected));
     REQUIRE(on_wire);
-    const bool is_the_same = wire::encode_message(told) == wire::encode_message(*on_wire);
+    const bool is_the_same = wire::encode_message(published) == wire::encode_message(*on_wire);
     CHECK(is_the_same);
   }
 }
@@ -107,7 +107,7 @@ TEST_CASE("the extractor's parameters and channels are those it was given", "[ex
   }
 }
 
-TEST_CASE("turns in parts become one scan; lost parts and bad sweeps are counted", "[extractor]") {
+TEST_CASE("sweeps in parts become one scan; lost parts and bad sweeps are counted", "[extractor]") {
   std::mt19937_64 random(4);
   Bench bench;
   test::Space space;

@@ -176,7 +176,7 @@ TEST_CASE("a corner's place and bisector are found, with honest covariances", "[
   }
 }
 
-TEST_CASE("an edge of a house is told once, whatever interrupts its walls", "[extractor]") {
+TEST_CASE("an edge of a house is given once, whatever interrupts its walls", "[extractor]") {
   std::mt19937_64 random(5);
   LandmarkExtractor extractor;
   for (int run = 0; run < 10; ++run) {

@@ -160,7 +160,8 @@ TEST_CASE("the covariance of a lone stem is true, and that of the attitude in it
   CHECK(space_nees / count < 4.0);
 }
 
-TEST_CASE("the way of the sensor during a turn is taken out of its lines of sight", "[extractor]") {
+TEST_CASE("the motion of the sensor during a revolution is taken out of its lines of sight",
+          "[extractor]") {
   // What a sensor at 10 m/s sees: each column of the turn from where it was then.
   std::mt19937_64 random(9);
   const Eigen::Vector2d velocity(10.0, 1.0);
@@ -255,7 +256,7 @@ TEST_CASE("trunks with branches at the height of many beams are found in their p
   }
 }
 
-TEST_CASE("what is seen near the ground alone is a tuft", "[extractor]") {
+TEST_CASE("what is measured near the ground alone is a tuft", "[extractor]") {
   std::mt19937_64 random(12);
   LandmarkExtractor extractor(exact_stems());
   for (const int rings : {16, 32, 64}) {
@@ -277,7 +278,7 @@ TEST_CASE("what is seen near the ground alone is a tuft", "[extractor]") {
   }
 }
 
-TEST_CASE("far people are told from trunks by the next beam above them", "[extractor]") {
+TEST_CASE("far people are distinguished from trunks by the next beam above them", "[extractor]") {
   std::mt19937_64 random(13);
   std::uniform_real_distribution<double> ranges(12.0, 24.0);
   LandmarkExtractor extractor(exact_stems());

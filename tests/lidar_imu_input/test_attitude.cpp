@@ -83,7 +83,7 @@ TEST_CASE("without wheels the calibrated gyro carries roll and pitch", "[attitud
   }
 }
 
-TEST_CASE("standing still is found, and a smooth drive is none", "[attitude][standstill]") {
+TEST_CASE("a standstill is found, and a smooth drive is none", "[attitude][standstill]") {
   std::mt19937_64 random(3);
   test::Drive drive;
   drive.rough_rad = 0.002;
@@ -92,18 +92,18 @@ TEST_CASE("standing still is found, and a smooth drive is none", "[attitude][sta
   errors.force_noise = 4e-3;
   for (const bool has_wheels : {true, false}) {
     MotionEstimator motion(test::parameters_for_drive());
-    int standing_while_driving = 0;
-    int standing_while_standing = 0;
+    int found_while_driving = 0;
+    int found_while_stationary = 0;
     for (model::Utime t = 0; test::seconds(t) < 60.0; t += 10'000) {
       motion.add_imu(motion.to_vehicle(imu_at(drive, t, 100.0, errors, random)), false);
       if (has_wheels) motion.add_wheels(wheels_at(drive, t, errors, random));
       if (test::seconds(t) > 1.0 && test::seconds(t) < 21.0)
-        standing_while_standing += motion.is_stationary();
-      if (drive.speed(test::seconds(t)) > 0.5) standing_while_driving += motion.is_stationary();
+        found_while_stationary += motion.is_stationary();
+      if (drive.speed(test::seconds(t)) > 0.5) found_while_driving += motion.is_stationary();
     }
     CHECK(motion.is_calibrated());
-    CHECK(standing_while_standing > 1950);  // of 2000
-    CHECK(standing_while_driving == 0);
+    CHECK(found_while_stationary > 1950);  // of 2000
+    CHECK(found_while_driving == 0);
   }
 }
 
@@ -112,15 +112,15 @@ TEST_CASE("a start that is no standstill is no calibration", "[attitude][standst
   test::Drive drive;
   drive.stand_s = 0.0;
   LidarImuInput input(test::parameters_for_drive());
-  int told = 0;
+  int reported = 0;
   for (model::Utime t = 0; test::seconds(t) < 30.0; t += 10'000) {
     for (const InputResult& result : input.add(imu_at(drive, t + 1, 100.0, {}, random))) {
       const auto* fault = std::get_if<InputFault>(&result);
-      told += fault != nullptr && fault->kind == InputFaultKind::kNotCalibrated;
+      reported += fault != nullptr && fault->kind == InputFaultKind::kNotCalibrated;
     }
   }
   CHECK_FALSE(input.motion().is_calibrated());
-  CHECK(told == 1);
+  CHECK(reported == 1);
 }
 
 TEST_CASE("the mount of the IMU is taken out", "[attitude]") {

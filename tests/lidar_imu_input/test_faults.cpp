@@ -22,7 +22,7 @@ struct FaultyRun {
   std::map<InputFaultKind, int> faults;
   std::map<std::string, int> channels;  ///< Faults per channel.
   int sweeps = 0;
-  model::Utime largest_gap_us = 0;  ///< Between ends of pieces or sweeps.
+  model::Utime largest_gap_us = 0;  ///< Between ends of increments.
   double position_error_m = 0.0;    ///< Of RAW_POSE at the end, over the drive.
   InputCounters counters;
 
@@ -179,7 +179,7 @@ TEST_CASE("a clock that jumps ahead is followed", "[faults]") {
   CHECK(run.position_error_m < 2.0);
 }
 
-TEST_CASE("values that are no numbers are dropped and counted", "[faults]") {
+TEST_CASE("values that are not finite are dropped and counted", "[faults]") {
   FaultyRun run;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   int count = 0;
@@ -210,7 +210,7 @@ TEST_CASE("a saturated IMU is counted and widens the covariance", "[faults]") {
   CHECK(run.counters.samples_saturated == 30);
 }
 
-TEST_CASE("a frozen IMU is named and not believed", "[faults]") {
+TEST_CASE("a frozen IMU is named and not used", "[faults]") {
   FaultyRun run;
   model::ImuSample frozen;
   run.imu = [&](model::ImuSample& s) {

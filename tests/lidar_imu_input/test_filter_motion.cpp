@@ -96,7 +96,7 @@ TEST_CASE("without any sensor of motion sweeps are de-skewed by the filter's", "
   CHECK(laser.input().counters().sweeps_not_deskewed < 8);
 }
 
-TEST_CASE("a filter that sees nothing, or began anew, tells no motion", "[stage][deskew]") {
+TEST_CASE("a filter without landmarks, or after a reset, gives no motion", "[stage][deskew]") {
   LaserAlone laser;
   for (int k = 0; k < 10; ++k) {
     laser.turn();

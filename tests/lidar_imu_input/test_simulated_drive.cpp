@@ -49,10 +49,10 @@ struct Figures {
   double tilt_squares = 0.0;
   double tilt_nees = 0.0;
   int samples = 0;
-  geometry::SE2WithCovariance driven;  ///< From the first piece that moves.
+  geometry::SE2WithCovariance driven;  ///< From the first increment that moves.
   std::optional<model::Utime> from;
   model::Utime to = 0;
-  double inertial_nees = 0.0;  ///< 5 degrees of freedom, over a piece.
+  double inertial_nees = 0.0;  ///< 5 degrees of freedom, over an increment.
   int increments = 0;
   double before = 0.0;  ///< Of points, squared.
   double after = 0.0;
@@ -140,7 +140,7 @@ Figures run(Drive& scene) {
 
 }  // namespace
 
-TEST_CASE("a simulated drive with wheels: attitude, odometry and its honesty", "[sim]") {
+TEST_CASE("a simulated drive with wheels: attitude, odometry and its consistency", "[sim]") {
   double nees = 0.0;
   constexpr int kRuns = 3;
   for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
@@ -157,7 +157,8 @@ TEST_CASE("a simulated drive with wheels: attitude, odometry and its honesty", "
                  << "; odometry error " << error.transpose() << " NEES " << drive_nees
                  << "; inertial NEES " << figures.inertial_nees / figures.increments);
     CHECK(figures.faults == 0);
-    // What the accelerometer's bias (sigma 0.03 m/s^2) feigns at the start is not to be told apart.
+    // What the accelerometer's bias (sigma 0.03 m/s^2) looks like at the start cannot be
+    // distinguished from tilt.
     CHECK(figures.worst_tilt_rad < 0.35 * kDegree);
     CHECK(rms < 0.15 * kDegree);
     CHECK(figures.tilt_nees / figures.samples < 6.0);

@@ -38,7 +38,7 @@ test::SensorErrors mild_errors() {
   return errors;
 }
 
-/// Everything that the sensors of a drive say, in the order in which it comes.
+/// All messages of the sensors of a drive, in the order in which they come.
 struct Run {
   test::Drive drive;
   double length_s = 40.0;
@@ -77,7 +77,7 @@ std::vector<Eigen::Vector3d> posts() {
 
 }  // namespace
 
-TEST_CASE("a piece of odometry ends at each sweep and comes before it", "[stage]") {
+TEST_CASE("an increment of odometry ends at each sweep and comes before it", "[stage]") {
   Run run;
   run.world = posts();
   run.length_s = 30.0;
@@ -108,7 +108,7 @@ TEST_CASE("a piece of odometry ends at each sweep and comes before it", "[stage]
   CHECK(input.counters().increments_missing == 0);
 }
 
-TEST_CASE("a sweep that comes very late is carried to the end of a piece", "[stage]") {
+TEST_CASE("a sweep that comes very late is carried to the end of an increment", "[stage]") {
   Run run;
   run.world = posts();
   run.length_s = 5.0;
@@ -120,7 +120,7 @@ TEST_CASE("a sweep that comes very late is carried to the end of a piece", "[sta
   CHECK(std::ranges::is_sorted(sweeps, std::ranges::less_equal{}, &model::PointSweep::utime));
 }
 
-TEST_CASE("de-skewing puts points where they are at the end of the turn", "[stage][deskew]") {
+TEST_CASE("de-skewing puts points where they are at the end of the revolution", "[stage][deskew]") {
   Run run;
   run.world = posts();
   run.parameters.lidar.mount = {1.2, 0.1, 1.9, 0.02, -0.03, 0.4};
@@ -194,7 +194,7 @@ double first_sweep_error(model::Utime imu_period_us) {
   return std::sqrt(square_m2 / static_cast<double>(world.size()));
 }
 
-TEST_CASE("a sweep that began before the first sample of a drive on the way is de-skewed, too",
+TEST_CASE("a sweep that began before the first sample of a moving vehicle is de-skewed, too",
           "[stage][deskew]") {
   // The first state knows no velocity; at 7 m/s points of 0.07 s before it would be 0.3 m off.
   CHECK(first_sweep_error(GENERATE(10'000, 100'000)) < 0.08);

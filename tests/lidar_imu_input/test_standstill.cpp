@@ -1,4 +1,4 @@
-// Standing still without wheels: quiet samples do not tell it from a smooth road.
+// Standstills without wheels: quiet samples do not distinguish them from a smooth road.
 #include <random>
 
 #include "services/lidar_imu_input/motion_estimator.hpp"
@@ -24,11 +24,11 @@ double acceleration_at(double time_s) {
 }
 
 struct Stationary {
-  double on_the_road_s = 0.0;  ///< Said to stand while driving evenly.
-  double at_the_end_s = 0.0;   ///< ... and in the last seconds, when it does.
+  double on_the_road_s = 0.0;  ///< Found stationary while driving evenly.
+  double at_the_end_s = 0.0;   ///< The same in the last seconds, when it is.
 };
 
-/// `corrects`: a filter says what the velocity is, as it does ten times a second.
+/// `corrects`: a filter corrects the velocity ten times a second.
 Stationary drive_smoothly(bool corrects) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> noise;

@@ -59,7 +59,7 @@ model::VelocityCorrection correction_at(const test::Drive& drive, model::Utime u
   return correction;
 }
 
-/// Everything that the sensors say in 40 s, the first 22 of which the vehicle stands.
+/// All messages of the sensors in 40 s, in the first 22 of which the vehicle is stationary.
 std::vector<Event> events_of(const DriveWith& with) {
   const test::Drive drive;
   const test::SensorErrors errors = errors_of_drive();
@@ -228,7 +228,8 @@ TEST_CASE("after a pause the calibrated motion goes on, on the sensors' own cloc
   const auto sweeps = all_of<model::PointSweep>(after);
   REQUIRE(sweeps.size() > 50);
   CHECK(std::ranges::all_of(sweeps, [](const auto& s) { return s.attitude.has_value(); }));
-  // The turn per piece: the gyro's bias of 0.23 degrees per second was learned before the cut.
+  // The rotation per increment: the gyro's bias of 0.23 degrees per second was learned before the
+  // cut.
   const test::Drive drive;
   double turned = 0.0;
   double should = 0.0;
@@ -241,7 +242,7 @@ TEST_CASE("after a pause the calibrated motion goes on, on the sensors' own cloc
   CHECK(turned == Approx(should).margin(0.006));
 }
 
-TEST_CASE("a state that is too old is not gone on with", "[state]") {
+TEST_CASE("a state that is too old is not used", "[state]") {
   std::vector<Event> events = events_of({});
   LidarImuInput stage(test::parameters_for_drive());
   InputResults all;
