@@ -31,7 +31,7 @@ TEST_CASE("silence is reported at once, then every second, until a packet comes"
   CHECK(watch.look(300'000) == Due::kReportSilence);
   CHECK(watch.look(400'000) == Due::kNothing);
   CHECK(watch.look(1'300'000) == Due::kReportSilence);
-  CHECK(watch.silent_s(1'300'000) == 1.3);
+  CHECK(watch.silent_s(1'300'000) == Approx(1.3));
   CHECK(watch.hear(1'400'000));
   CHECK_FALSE(watch.hear(2'250'000));
   CHECK(watch.look(2'290'000) == Due::kNothing);

@@ -153,7 +153,7 @@ bool StemFitter::settle(Vector6d& state, double settled_m2) {
   }
   const double reference = z / count;
   // In the first round of a column that of the column before is left: by the taper the start value
-  // of the radius is off by a millimetre or so, which the iteration takes out.
+  // of the radius is off by up to 0.02 m, which the iteration takes out.
   state.head<3>() += (reference - reference_z_m_) * state.tail<3>();
   reference_z_m_ = reference;
 
