@@ -39,7 +39,7 @@ class SweepExtractor {
   /// Landmarks of a de-skewed sweep (frame vehicle), in `vehicle_level`. A malformed sweep gives
   /// none and is counted. Trunks come first, each kind in order of bearing.
   model::LandmarkScan extract(const model::PointSweep& sweep);
-  const SweepCounters& counters() const { return counters_; }
+  const SweepCounters& counters() const { return counters_; }  ///< Since the start.
 
  private:
   void find_runs_of_all_rings();

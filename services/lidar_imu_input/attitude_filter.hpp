@@ -75,6 +75,7 @@ class AttitudeFilter {
   Eigen::Matrix3d velocity_covariance() const { return covariance_.block<3, 3>(3, 3); }
   const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }  ///< [rad/s]
   double wheel_scale() const { return wheel_scale_; }              ///< Measured over true speed.
+  /// Of wheel_scale().
   double wheel_scale_sigma() const { return std::sqrt(covariance_(12, 12)); }
   /// Of gyro_bias() [rad^2/s^2].
   Eigen::Matrix3d gyro_bias_covariance() const { return covariance_.block<3, 3>(6, 6); }

@@ -15,6 +15,7 @@ namespace understory::lidar_imu_input {
 /// episode (saturation and refusals: each time; the receiver limits the rate).
 class InputGuard {
  public:
+  /// `imu`: ranges, beyond which a sample is saturated.
   InputGuard(const FaultParameters& parameters, const ImuParameters& imu);
 
   /// The stamp to use, on the stage's time; none where the sample is to be dropped.

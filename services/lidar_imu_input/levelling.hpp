@@ -13,6 +13,7 @@ namespace understory::lidar_imu_input {
 /// begun there are an attitude, a latest sample, and that sample levelled.
 class Levelling {
  public:
+  /// `imu`: noise and priors of the attitude filter.
   explicit Levelling(const ImuParameters& imu) : imu_(imu) {}
 
   /// The first sample (frame vehicle): tilt from its force.

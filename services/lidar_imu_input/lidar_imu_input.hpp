@@ -59,6 +59,7 @@ struct InputCounters {
 /// without gaps but where no sensor measured motion.
 class LidarImuInput {
  public:
+  /// Starts without any motion known. Precondition: parameters within the ranges of describe().
   explicit LidarImuInput(const LidarImuInputParameters& parameters = {});
 
   InputResults add(const model::ImuSample& raw);    ///< RAW_IMU, frame sensor.
@@ -81,7 +82,7 @@ class LidarImuInput {
   /// After a longer pause the vehicle may be anywhere, and its sensors at any temperature.
   static constexpr double kLongestPause_s = 600.0;
 
-  const InputCounters& counters() const { return counters_; }
+  const InputCounters& counters() const { return counters_; }  ///< Since the first start.
   /// Attitude, dead reckoning, calibration.
   const MotionEstimator& motion() const { return motion_; }
 

@@ -25,6 +25,7 @@ namespace understory::lidar_imu_input {
 /// sees to that. Cost: some microseconds per sample.
 class MotionEstimator {
  public:
+  /// Starts without any motion known.
   explicit MotionEstimator(const LidarImuInputParameters& parameters);
 
   /// The sample in frame vehicle, as if measured at its origin; stamps must advance.
@@ -49,6 +50,7 @@ class MotionEstimator {
   const MotionHistory& history() const { return pose_.history(); }
   /// Pose of the dead reckoning in `odom` with its covariance.
   model::RawPose raw_pose() const { return pose_.raw_pose(parameters_.gnss_aided); }
+  /// Whether the vehicle stands still at the latest IMU sample.
   bool is_stationary() const { return stationary_.is_stationary(); }
   /// Whether the vehicle was stationary long enough for the gyro's bias to be known.
   bool is_calibrated() const { return stationary_.is_calibrated(); }

@@ -25,6 +25,7 @@ struct IncrementSources {
 /// are numbered without gaps.
 class MotionIncrements {
  public:
+  /// Noise of IMU and wheels, and where the axle is.
   explicit MotionIncrements(const LidarImuInputParameters& parameters);
 
   /// Takes a levelled IMU sample. Precondition: stamps advance.

@@ -11,6 +11,7 @@ namespace understory::lidar_imu_input {
 /// Lets poses through that are new, at most one per period. Invariant: their stamps advance.
 class RawPosePacer {
  public:
+  /// `period_s`: `OutputParameters::raw_pose_period_s`.
   explicit RawPosePacer(double period_s);
 
   /// The pose where it is due. `at_once`: without waiting for the period, as at the end of an

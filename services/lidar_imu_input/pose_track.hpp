@@ -15,6 +15,7 @@ namespace understory::lidar_imu_input {
 /// Owns the dead reckoning with its stamp, the height, and their history. The pose is in `odom`.
 class PoseTrack {
  public:
+  /// `imu`: noise and priors of the dead reckoning.
   explicit PoseTrack(const ImuParameters& imu) : reckoning_(imu) {}
 
   /// From one levelled sample to the next, `seconds` later. `climb_mps`: vertical velocity.
@@ -30,7 +31,9 @@ class PoseTrack {
 
   /// To be updated with measurements.
   DeadReckoning& reckoning() { return reckoning_; }
+  /// Pose, velocity and biases as they are.
   const DeadReckoning& reckoning() const { return reckoning_; }
+  /// Motion during the last seconds.
   const MotionHistory& history() const { return history_; }
   /// RAW_POSE. `is_reference`: corrected by GNSS, not for mapping.
   model::RawPose raw_pose(bool is_reference) const;

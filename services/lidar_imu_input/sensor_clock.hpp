@@ -27,6 +27,7 @@ class SensorClock {
     model::Utime utime = 0;  ///< Of the sample, on the stage's time; for kFine and kFollowed.
   };
 
+  /// What counts as a jump, and when it is followed.
   explicit SensorClock(const FaultParameters& parameters) : parameters_(parameters) {}
 
   /// Judges a stamp. `others`: the newest stamp of the other sensors, if there is any.

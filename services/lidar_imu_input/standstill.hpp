@@ -14,6 +14,7 @@ namespace understory::lidar_imu_input {
 /// and demands that later.
 class StandstillDetector {
  public:
+  /// Limits of a quiet window.
   explicit StandstillDetector(const StandstillParameters& parameters) : parameters_(parameters) {}
 
   /// Takes a sample in frame vehicle. `gyro_bias` [rad/s]: none before it is known.
@@ -24,6 +25,7 @@ class StandstillDetector {
   void add_wheel_speed(model::Utime utime, double speed_mps);
   void reset();  ///< Forgets the window, after a gap.
 
+  /// At the latest sample.
   bool is_stationary() const { return is_stationary_; }
   /// For how long without a break, up to the latest sample [s]; 0 while it moves.
   double stationary_s() const;

@@ -28,6 +28,7 @@ struct VelocityEvidence {
 /// it: a smooth road is quiet, too.
 class StationaryMonitor {
  public:
+  /// `imu`: prior and random walk of the gyro's bias.
   StationaryMonitor(const StandstillParameters& standstill, const ImuParameters& imu);
 
   /// Takes an IMU sample (frame vehicle, lever force not taken out), `seconds` after the one
@@ -43,6 +44,7 @@ class StationaryMonitor {
   /// The vehicle may have moved until `utime`: the first sample, or the end of a gap.
   void begin_at(model::Utime utime);
 
+  /// At the latest sample.
   bool is_stationary() const { return detector_.is_stationary(); }
   /// Whether it was stationary long enough in one stretch to calibrate.
   bool is_calibrated() const { return detector_.is_calibrated(); }

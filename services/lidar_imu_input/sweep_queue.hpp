@@ -46,6 +46,7 @@ class SweepQueue {
   /// 0.25 s; a scan is dropped.
   Admission add(WaitingSweep waiting, std::optional<model::Utime> increment_end);
 
+  /// Whether nothing waits.
   bool empty() const { return waiting_.empty(); }
   /// Precondition: not empty.
   const WaitingSweep& front() const { return waiting_.front(); }

@@ -31,6 +31,7 @@ struct WheelScale {
 /// The speeds of the last 5 s, corrected by the wheels' scale. Invariant: in order of time.
 class WheelSpeeds {
  public:
+  /// `wheels`: noise, and how long a sample holds.
   explicit WheelSpeeds(const WheelOdometryParameters& wheels) : wheels_(wheels) {}
 
   /// Takes the axle's speed as the wheels measured it [m/s], corrected by the scale where that is

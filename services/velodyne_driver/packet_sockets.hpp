@@ -44,13 +44,16 @@ class PacketSockets {
 /// and the sockets are emptied in between.
 class SweepOutbox {
  public:
+  /// Without a channel: nothing must be posted.
   SweepOutbox() = default;
+  /// Publishes on `sweeps`.
   explicit SweepOutbox(bus::Publisher<model::PointSweep> sweeps) : sweeps_(std::move(sweeps)) {}
 
   /// False: too many parts wait, and the sweep is left out.
   bool post(const model::PointSweep& sweep);
   /// Publishes one part, if there is any.
   void send_part();
+  /// Whether no part waits.
   bool empty() const { return parts_.empty(); }
 
  private:

@@ -68,7 +68,7 @@ class VelodyneDriver {
   /// The sweep in progress, where it is almost whole.
   std::optional<model::PointSweep> finish();
 
-  const VelodyneDriverCounts& counts() const { return counts_; }
+  const VelodyneDriverCounts& counts() const { return counts_; }  ///< Since the start.
   /// How far the computer's clock is ahead of the sensor's [us].
   std::optional<model::Utime> clock_offset_us() const { return clock_.offset_us(); }
   /// What is wrong with the sensor's clock now, if anything is.

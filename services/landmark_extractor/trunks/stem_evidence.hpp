@@ -70,7 +70,7 @@ class AgreeingEvidence {
   /// Takes hits and edges of the runs at `places`, spread over the height. Precondition: not empty.
   void select(const StemEvidence& evidence, const std::vector<std::uint32_t>& places);
 
-  const std::vector<HitLanes>& hits() const { return hits_; }
+  const std::vector<HitLanes>& hits() const { return hits_; }  ///< A group for each run used.
   const std::vector<EdgeLanes>& edges() const { return edges_; }
   std::size_t edge_count() const { return edge_count_; }  ///< Lanes of edges() that count.
 
