@@ -36,12 +36,12 @@ TEST_CASE("The dense kernel subtracts what Eigen does", "[ekf][kernel]") {
 }
 
 TEST_CASE("Quantiles of the chi-squared distribution agree with its tables", "[ekf]") {
-  REQUIRE(chi_squared_quantile(0.95, 2) == Approx(5.991).epsilon(1e-3));
-  REQUIRE(chi_squared_quantile(0.999, 2) == Approx(13.816).epsilon(1e-3));
-  REQUIRE(chi_squared_quantile(0.95, 4) == Approx(9.488).epsilon(1e-2));
-  REQUIRE(chi_squared_quantile(0.999, 20) == Approx(45.315).epsilon(1e-2));
-  REQUIRE(chi_squared_quantile(0.975, 300) == Approx(349.874).epsilon(1e-3));
-  REQUIRE(chi_squared_quantile(0.025, 300) == Approx(253.912).epsilon(1e-3));
+  REQUIRE(chi_squared_quantile(0.95, 2) == Approx(5.991).epsilon(1e-4));
+  REQUIRE(chi_squared_quantile(0.999, 2) == Approx(13.816).epsilon(1e-4));
+  REQUIRE(chi_squared_quantile(0.95, 4) == Approx(9.488).epsilon(1e-4));
+  REQUIRE(chi_squared_quantile(0.999, 20) == Approx(45.315).epsilon(1e-4));
+  REQUIRE(chi_squared_quantile(0.975, 300) == Approx(349.874).epsilon(1e-5));
+  REQUIRE(chi_squared_quantile(0.025, 300) == Approx(253.912).epsilon(1e-5));
 }
 
 TEST_CASE("A correction and the error that it undoes are one", "[ekf][state]") {

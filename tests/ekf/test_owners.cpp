@@ -155,10 +155,10 @@ TEST_CASE("Gates grow with the number of landmarks", "[ekf][gates]") {
   REQUIRE(gates.set.size() == 41);
   REQUIRE(gates.rejoin.size() == kMaxSearched + 1);
   CHECK(gates.set[0] == 0.0);
-  CHECK(gates.set[1] == Approx(13.816).epsilon(1e-3));
+  CHECK(gates.set[1] == Approx(13.81551).epsilon(1e-5));
   for (std::size_t k = 1; k < gates.set.size(); ++k) CHECK(gates.set[k] > gates.set[k - 1]);
   // Tables: probability 1 - 1e-6 with 2, 3 and 4 degrees of freedom.
-  CHECK(gates.stationary.velocity == Approx(27.631).epsilon(1e-3));
-  CHECK(gates.stationary.common_motion == Approx(30.665).epsilon(0.08));
-  CHECK(gates.stationary.ground_marks == Approx(33.377).epsilon(0.08));
+  CHECK(gates.stationary.velocity == Approx(27.63102).epsilon(1e-5));
+  CHECK(gates.stationary.common_motion == Approx(30.66485).epsilon(1e-5));
+  CHECK(gates.stationary.ground_marks == Approx(33.37684).epsilon(1e-5));
 }
