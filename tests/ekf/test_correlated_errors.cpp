@@ -177,7 +177,7 @@ double level_nees_before_leaning_trunks(std::uint64_t seed) {
     }
     filter.add(scan);
   }
-  const Eigen::Matrix2d spread = filter.state().covariance_block<2, 2>(kLevel, kLevel);
+  const Eigen::Matrix2d spread = filter.state().covariance_block<2, 2>(ekf::kLevel, ekf::kLevel);
   const Eigen::Vector2d& level = filter.state().level;
   return level.dot(spread.llt().solve(level));
 }

@@ -23,9 +23,9 @@ TEST_CASE("Velocity and biases are found", "[ekf]") {
   const model::VelocityCorrection correction = *run.go().correction;
   const Eigen::Vector2d truth =
       run.step.world_T_vehicle.rotation().transpose() * run.step.velocity_mps;
-  REQUIRE((correction.velocity_mps - truth).norm() < 0.1);
-  REQUIRE(std::abs(correction.bias.x() - run.step.bias.x()) < 3e-4);
-  REQUIRE((correction.bias - run.step.bias).tail<2>().norm() < 0.03);
+  REQUIRE((correction.velocity_mps - truth).norm() < 0.02);
+  REQUIRE(std::abs(correction.bias.x() - run.step.bias.x()) < 2.2e-4);
+  REQUIRE((correction.bias - run.step.bias).tail<2>().norm() < 0.015);
   Eigen::Matrix<double, 5, 1> error;
   error << truth - correction.velocity_mps, run.step.bias - correction.bias;
   REQUIRE(error.dot(correction.covariance.llt().solve(error)) < 25.0);

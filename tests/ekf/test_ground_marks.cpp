@@ -168,8 +168,8 @@ TEST_CASE("Landmarks overrule a detector that takes creeping for stationary", "[
   CAPTURE(worst_m, error.transpose(), filter.counters().crept, filter.counters().restarts);
   REQUIRE(filter.counters().crept > 0);
   REQUIRE(filter.counters().restarts == 0);
-  REQUIRE(worst_m < 0.05);
-  REQUIRE(error.head<2>().norm() < 0.01);
+  REQUIRE(worst_m < 0.026);
+  REQUIRE(error.head<2>().norm() < 0.007);
   REQUIRE(nees(pose, truth) < 25.0);
 }
 
