@@ -118,7 +118,9 @@ EkfOutput Ekf::add(const model::TrackedScan& scan) {
 
 void Ekf::begin(model::Utime utime) {
   timeline_.begin(utime);
-  set_prior();
+  set_prior(state_, parameters_.prior);
+  map_.clear();
+  motion_.forget_level();
   set_pose_covariance(state_, kStartVariance * Eigen::Matrix3d::Identity());
   report_.begin(state_, motion_);
 }
@@ -131,23 +133,10 @@ void Ekf::restart(model::Utime utime, const std::string& reason) {
   refused_scans_ = 0;
   stationary_.reset();
   timeline_.move_to(utime);
-  set_prior();
-  place_at(report_.last_sound(), parameters_.restart, state_);
-}
-
-void Ekf::set_prior() {
-  ekf::set_prior(state_, parameters_.prior);
+  set_prior(state_, parameters_.prior);
   map_.clear();
   motion_.forget_level();
-}
-
-/// Scan after scan at odds with the map: the error is larger than the covariance states.
-void Ekf::restart_if_lost(const ScanUpdate& update) {
-  const bool is_at_odds = update.refused >= kFewRefused && update.refused > 2 * update.used;
-  refused_scans_ = is_at_odds ? refused_scans_ + 1 : 0;
-  if (refused_scans_ >= parameters_.restart.after_refused_scans) {
-    restart(timeline_.now(), "most landmarks were refused, scan after scan");
-  }
+  place_at(report_.last_sound(), parameters_.restart, state_);
 }
 
 /// False where the increment is late; a clock that jumped back restarts the filter.
@@ -307,7 +296,13 @@ void Ekf::maintain_map(const model::TrackedScan& scan, const ScanUpdate& update)
   map_.add_new(scan, motion_.distance_m(), update, state_, counters_);
   map_.count_missed(scan.field_of_view, state_);
   map_.remove_stale(scan.field_of_view, state_, counters_);
-  restart_if_lost(update);
+
+  // Scan after scan at odds with the map: the error is larger than the covariance states.
+  const bool is_at_odds = update.refused >= kFewRefused && update.refused > 2 * update.used;
+  refused_scans_ = is_at_odds ? refused_scans_ + 1 : 0;
+  if (refused_scans_ >= parameters_.restart.after_refused_scans) {
+    restart(timeline_.now(), "most landmarks were refused, scan after scan");
+  }
 }
 
 std::string Ekf::save() const {

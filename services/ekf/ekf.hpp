@@ -54,8 +54,6 @@ class Ekf {
   // Beginning and restarts.
   void begin(model::Utime utime);
   void restart(model::Utime utime, const std::string& reason);
-  void set_prior();
-  void restart_if_lost(const ScanUpdate& update);
 
   // Stamps and motion.
   bool accept(const model::Odometry& increment);
