@@ -64,7 +64,7 @@ TEST_CASE("A malformed line is named", "[graph_file]") {
   }
 }
 
-TEST_CASE("An edge from a vertex to itself is left out, and told", "[graph_file]") {
+TEST_CASE("An edge from a vertex to itself is left out, and reported", "[graph_file]") {
   const factor_graph::files::GraphFile graph = require_graph(
       "VERTEX_SE2 3 0 0 0\nVERTEX_SE2 5 1 0 0\nEDGE_SE2 5 5 0 0 0 1 0 0 1 0 1\n"
       "EDGE_SE2 3 5 1 0 0 1 0 0 1 0 1\n");

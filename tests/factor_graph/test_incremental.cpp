@@ -125,7 +125,7 @@ TEST_CASE("In space the smoother ends where the batch solution is", "[incrementa
   }
 }
 
-TEST_CASE("What waits for its turn arrives where the batch solution is", "[incremental]") {
+TEST_CASE("Waiting cliques arrive at the batch solution", "[incremental]") {
   Random random(8);
   factor_graph::bayes_tree::IncrementalParameters parameters = exact();
   parameters.least_move = 1e-7;
@@ -351,7 +351,7 @@ TEST_CASE("The three batch methods agree, also with the smoother, under a robust
   }
 }
 
-TEST_CASE("A landmark seen once by its bearing is named", "[incremental]") {
+TEST_CASE("A landmark observed once by its bearing is named", "[incremental]") {
   factor_graph::bayes_tree::IncrementalSmoother smoother;
   const VariableId pose = smoother.add_variable(geometry::SE2());
   smoother.add(prior(pose, geometry::SE2(), Eigen::Matrix3d(Eigen::Matrix3d::Identity())));

@@ -167,7 +167,7 @@ TEST_CASE("Random use for long: every answer is finite or names what is undeterm
       walk.poses.pop_back();
       walk.forget_dead_loops();
     } else if (choice == 9 || walk.poses.size() > most_poses(k)) {
-      // The oldest go; what they told stays.
+      // The oldest go; their information stays.
       const std::size_t gone =
           std::max<std::size_t>(walk.poses.size(), most_poses(k) + 1) - most_poses(k);
       const auto end = walk.poses.begin() + static_cast<std::ptrdiff_t>(gone);

@@ -165,6 +165,7 @@ BatchReport optimise(graph::FactorGraph& graph, const BatchParameters& parameter
   const bool is_marquardt = parameters.method == BatchMethod::kLevenbergMarquardt;
   double damping = is_marquardt ? parameters.first_damping : 0.0;
   double radius = parameters.first_radius;
+
   bool is_fresh = false;
   Eigen::VectorXd newton;
   const Eigen::VectorXd nothing = Eigen::VectorXd::Zero(equations.hessian().size);
@@ -172,6 +173,7 @@ BatchReport optimise(graph::FactorGraph& graph, const BatchParameters& parameter
     report.ok = report.converged = true;
     return report;
   }
+
   while (report.iterations < parameters.max_iterations && !report.converged) {
     if (!is_fresh) equations.linearise();
     if (!is_fresh || is_marquardt) {
@@ -185,11 +187,13 @@ BatchReport optimise(graph::FactorGraph& graph, const BatchParameters& parameter
       }
       newton = -cholesky.solve(equations.gradient());
     }
+
     is_fresh = true;
     ++report.iterations;
     const Eigen::VectorXd step =
         parameters.method == BatchMethod::kDogleg ? dog_leg(equations, newton, radius) : newton;
     equations.move(step);
+
     const double chi2 = graph.chi2();
     const double decrease = report.chi2 - chi2;
     const bool is_flat =
@@ -202,12 +206,14 @@ BatchReport optimise(graph::FactorGraph& graph, const BatchParameters& parameter
       if (step.norm() > 0.9 * radius) radius *= 3.0;
       continue;
     }
+
     equations.move(nothing);
     report.converged = is_flat;
     damping = std::max(10.0 * damping, parameters.first_damping);
     radius = 0.25 * std::min(radius, step.norm());
     if (is_marquardt ? damping > kMaxDamping : radius < kLeastRadius) break;
   }
+
   report.ok = std::isfinite(report.chi2);
   return report;
 }

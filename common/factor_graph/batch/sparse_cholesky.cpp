@@ -77,6 +77,7 @@ int SparseCholesky::factorise(const SymmetricSparse& matrix) {
     impl.starts = matrix.column_starts;
     impl.rows = matrix.rows;
   }
+
   cholmod_factorize(&sparse, impl.factor, &impl.common);
   if (impl.common.status < CHOLMOD_OK) throw std::runtime_error("CHOLMOD: factorisation failed");
   if (impl.factor->minor < impl.factor->n) {
@@ -95,8 +96,10 @@ Eigen::MatrixXd SparseCholesky::solve(const Eigen::MatrixXd& right) const {
   dense.x = const_cast<double*>(right.data());
   dense.xtype = CHOLMOD_REAL;
   dense.dtype = CHOLMOD_DOUBLE;
+
   cholmod_dense* solution = cholmod_solve(CHOLMOD_A, impl_->factor, &dense, &impl_->common);
   if (solution == nullptr) throw std::runtime_error("CHOLMOD: solve failed");
+
   Eigen::MatrixXd result = Eigen::Map<const Eigen::MatrixXd>(
       static_cast<const double*>(solution->x), right.rows(), right.cols());
   cholmod_free_dense(&solution, &impl_->common);

@@ -1,4 +1,4 @@
-// CHOLMOD behind a header of our own.
+// CHOLMOD, without its headers.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,10 +9,10 @@ namespace understory::factor_graph::batch {
 
 /// A symmetric positive definite matrix in compressed columns, upper triangle.
 struct SymmetricSparse {
-  int size = 0;
+  int size = 0;                    ///< Rows and columns.
   std::vector<int> column_starts;  ///< size + 1
   std::vector<int> rows;           ///< Sorted in each column, row <= column.
-  std::vector<double> values;
+  std::vector<double> values;      ///< Like `rows`.
 };
 
 /// Cholesky factorisation with a fill-reducing ordering. Single-threaded and deterministic.

@@ -47,7 +47,7 @@ double flops_of(const CliqueRecord& clique);
 
 /// Owns the cliques, their parent and child links, and the memory of their rows and numbers. Every
 /// change is journaled: rollback() restores the tree of the last commit() at the cost of what
-/// changed. Does not know what the numbers mean.
+/// changed. Does not interpret the numbers.
 class CliqueTree {
  public:
   /// Parent of all trees of the forest; holds no variables.

@@ -29,6 +29,7 @@ Pattern pattern_of(const ElementLists& elements, std::span<const int> number_of,
       if (number >= 0) elements_of[static_cast<std::size_t>(number)].push_back(e);
     }
   }
+
   Pattern pattern;
   std::vector<int> tied_to(static_cast<std::size_t>(count), -1);
   for (int column = 0; column < count; ++column) {

@@ -9,10 +9,12 @@ namespace understory::factor_graph::bayes_tree {
 /// Variables that are tied together, one set behind the other: element e is
 /// entries[starts[e]] .. entries[starts[e + 1]], the last one ends with `entries`.
 struct ElementLists {
-  std::span<const int> starts;
-  std::span<const int> entries;
+  std::span<const int> starts;   ///< First place of each element.
+  std::span<const int> entries;  ///< Variables.
 
+  /// Variables of one element.
   std::span<const int> operator[](int number) const;
+  /// Number of elements.
   int count() const { return static_cast<int>(starts.size()); }
 };
 

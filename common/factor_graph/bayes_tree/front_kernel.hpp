@@ -3,7 +3,9 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-/// Partial Cholesky factorisation in place. `front`: symmetric, size x size, column-major, lower
+/// Two functions on one front, compiled for one kind of processor.
+///
+/// Factorisation: partial Cholesky in place. `front`: symmetric, size x size, column-major, lower
 /// triangle. The first `pivots` columns become those of L; the rest becomes the Schur complement.
 /// A pivot that is not above least[column] is left out: its column becomes that of the identity.
 /// The last row and column (the right-hand side) is never a pivot. Returns how many were left out;
@@ -20,8 +22,11 @@ struct FrontKernel {
 /// The fastest one that this processor can run.
 FrontKernel front_kernel();
 
+/// For any processor.
 FrontKernel front_kernel_portable();
-FrontKernel front_kernel_avx2();    ///< Empty where the compiler does not know it.
-FrontKernel front_kernel_avx512();  ///< The same.
+/// With AVX2 and FMA; empty where the compiler does not support it.
+FrontKernel front_kernel_avx2();
+/// With AVX-512; empty where the compiler does not support it.
+FrontKernel front_kernel_avx512();
 
 }  // namespace understory::factor_graph::bayes_tree

@@ -52,7 +52,7 @@ IncrementalSmoother::IncrementalSmoother(const IncrementalParameters& parameters
   pending_.unit = saved_pending_.unit = parameters.first_unit;
 }
 
-/// Single updates need not follow the thorough ones all the way down.
+/// The limits of single updates need not be as fine as those of the thorough ones.
 double IncrementalSmoother::usual_unit() const { return std::max(kLeastUsualUnit, pending_.unit); }
 
 void IncrementalSmoother::begin_change() {

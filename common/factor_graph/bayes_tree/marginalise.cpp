@@ -1,4 +1,4 @@
-// Taking variables out of a graph without losing what they tell.
+// Taking variables out of a graph without losing their information.
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -62,6 +62,7 @@ Eigen::MatrixXd information_of(graph::FactorGraph& graph, const Neighbourhood& a
                                                      factor.columns + 1);
     Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(factor.rows, all.columns + 1);
     spread.rightCols(1) = jacobian.rightCols(1);
+
     int column = 0;
     for (const int v : graph.variables_of(f)) {
       const graph::VariableRecord& variable = graph.variable(v);
@@ -72,6 +73,7 @@ Eigen::MatrixXd information_of(graph::FactorGraph& graph, const Neighbourhood& a
       spread.rightCols(1) -= own * Eigen::Map<const Eigen::VectorXd>(variable.delta.data(), size);
       column += size;
     }
+
     sum += spread.transpose() * spread;
   }
   return sum;
@@ -84,12 +86,15 @@ bool IncrementalSmoother::marginalise(std::span<const graph::VariableId> ids) {
   for (const graph::VariableId id : ids) {
     if (!graph_.contains(id)) throw std::invalid_argument("smoother: no such variable");
   }
+
   const Neighbourhood all = neighbourhood_of(graph_, ids);
-  // Poses turn their charts with them: what is kept counts from the present estimates.
+  // A pose's chart rotates with it: the linear factor counts from the present estimates.
   for (const int v : all.variables) {
     if (graph_.variable(v).type == graph::VariableType::kPose3) relinearisation_.rebase(v);
   }
   relinearisation_.run();
+
+  // Schur complement on the neighbours.
   const Eigen::MatrixXd sum = information_of(graph_, all);
   const Eigen::Index gone = all.gone_columns;
   const Eigen::Index kept = all.columns - gone;
@@ -98,17 +103,21 @@ bool IncrementalSmoother::marginalise(std::span<const graph::VariableId> ids) {
   const Eigen::MatrixXd cross = sum.block(gone, 0, kept + 1, gone);
   const Eigen::MatrixXd rest =
       sum.bottomRightCorner(kept + 1, kept + 1) - cross * cholesky.solve(cross.transpose());
+
   for (const graph::VariableId id : ids) remove(id);
   if (kept == 0) return true;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(rest.topLeftCorner(kept, kept));
   const double least = kRounding * std::max(eigen.eigenvalues().maxCoeff(), 0.0);
   const auto rank = (eigen.eigenvalues().array() > least).count();
   if (rank == 0) return true;
+
+  // Its root: rows of the linear factor, whitened.
   const Eigen::VectorXd roots = eigen.eigenvalues().tail(rank).cwiseSqrt();
   const auto vectors = eigen.eigenvectors().rightCols(rank);
   const Eigen::MatrixXd jacobian = roots.asDiagonal() * vectors.transpose();
   const Eigen::VectorXd right =
       roots.cwiseInverse().asDiagonal() * (vectors.transpose() * rest.topRightCorner(kept, 1));
+
   std::vector<graph::VariableId> neighbours;
   for (std::size_t i = ids.size(); i < all.variables.size(); ++i) {
     neighbours.push_back(graph::VariableId(all.variables[i]));

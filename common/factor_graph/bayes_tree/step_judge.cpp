@@ -22,7 +22,7 @@ void StepJudge::compare_factor(int factor, double limit) {
   judged_.push_back(factor);
   judged_at_[static_cast<std::size_t>(factor)] = count_;
   const graph::Deviation deviation = graph_.deviation(factor);
-  factor_rotation_[static_cast<std::size_t>(factor)] = deviation.turned;
+  factor_rotation_[static_cast<std::size_t>(factor)] = deviation.rotated;
   at_end_.loss += deviation.loss;
   at_end_.linearised += deviation.linearised;
   at_end_.left_out += deviation.left_out;
@@ -59,15 +59,15 @@ double StepJudge::compare(double unless_below, double limit) {
 /// The variables' factors were compared where these are now.
 void StepJudge::keep_comparison() {
   for (const int v : judged_variables_) {
-    double turned = 0.0;
+    double rotated = 0.0;
     for (int i = graph_.variable(v).first_incidence; i != graph::kNone;
          i = graph_.incidence(i).next) {
-      turned =
-          std::max(turned, factor_rotation_[static_cast<std::size_t>(graph_.incidence(i).factor)]);
+      rotated =
+          std::max(rotated, factor_rotation_[static_cast<std::size_t>(graph_.incidence(i).factor)]);
     }
     graph::VariableRecord& variable = graph_.edit_variable(v);
     variable.judged = variable.delta;
-    variable.turned = turned;
+    variable.rotated = rotated;
   }
 }
 
@@ -82,7 +82,7 @@ StepJudge::Losses StepJudge::go_back(double limit) {
   stale_before_.clear();
   for (const int f : judged_) {
     const graph::Deviation deviation = graph_.deviation(f);
-    factor_rotation_[static_cast<std::size_t>(f)] = deviation.turned;
+    factor_rotation_[static_cast<std::size_t>(f)] = deviation.rotated;
     change.loss -= deviation.loss;
     change.linearised -= deviation.linearised;
     if (deviation.residual > limit * limit_scale(graph_.factor(f))) stale_before_.push_back(f);

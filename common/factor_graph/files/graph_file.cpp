@@ -169,7 +169,7 @@ class Reader {
         return Eigen::Matrix3d(root.transpose() * root);
       });
     } else if (word == "LANDMARK") {
-      seen(line, [](Line& from) {
+      add_observation(line, [](Line& from) {
         Eigen::Matrix2d root = upper_triangle<2>(from).triangularView<Eigen::Upper>();
         return Eigen::Matrix2d(root.transpose() * root);
       });
@@ -184,7 +184,7 @@ class Reader {
     if (word == "EDGE_SE2") {
       between(line, [](Line& from) { return upper_triangle<3>(from); });
     } else if (word == "EDGE_SE2_XY") {
-      seen(line, [](Line& from) { return upper_triangle<2>(from); });
+      add_observation(line, [](Line& from) { return upper_triangle<2>(from); });
     } else if (word == "EDGE_SE3:QUAT") {
       const graph::VariableId a = name(line.integer(), kPose3);
       const graph::VariableId b = name(line.integer(), kPose3);
@@ -213,7 +213,7 @@ class Reader {
   }
 
   template <typename Information>
-  void seen(Line& line, Information&& information) {
+  void add_observation(Line& line, Information&& information) {
     const graph::VariableId a = name(line.integer(), graph::VariableType::kPose2);
     const graph::VariableId b = name(line.integer(), graph::VariableType::kPoint2);
     const double x = line.number();

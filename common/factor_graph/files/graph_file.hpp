@@ -17,6 +17,7 @@ namespace understory::factor_graph::files {
 
 /// A graph with the numbers that its file gives. Variables of factors are positions in `vertices`.
 struct GraphFile {
+  /// A variable with the number that its file gives.
   struct Vertex {
     std::int64_t number = 0;
     graph::VariableType type = graph::VariableType::kPose2;
@@ -26,16 +27,17 @@ struct GraphFile {
   std::vector<Vertex> vertices;        ///< In order of their numbers; iSAM's landmarks last.
   std::vector<graph::Factor> factors;  ///< In order of the file.
   std::vector<std::int64_t> fixed;     ///< Numbers of vertices that the file holds fast.
-  /// Lines of edges from a vertex to itself: left out, for they tell nothing about it.
+  /// Lines of edges from a vertex to itself: left out, for they hold no information about it.
   std::vector<int> self_edges;
 };
 
 /// What is wrong with a file, and in which line.
 struct GraphFileError {
-  int line = 0;
-  std::string what;
+  int line = 0;      ///< From 1.
+  std::string what;  ///< For messages.
 };
 
+/// Text formats of pose graphs.
 enum class GraphFormat : std::uint8_t {
   kG2o,   ///< VERTEX_SE2, VERTEX_XY, VERTEX_SE3:QUAT, VERTEX_TRACKXYZ and the edges between them;
           ///< information by rows; FIX.
@@ -43,15 +45,16 @@ enum class GraphFormat : std::uint8_t {
   kIsam,  ///< ODOMETRY or EDGE2, LANDMARK; the ROOT of the information by rows.
 };
 
-/// By what the first words say.
+/// Format by the tags that the text contains.
 GraphFormat guess_format(std::string_view text);
-/// Unknown words are passed over. A rotation's information in g2o files is of the vector part of
-/// the quaternion; the factors have it of the rotation vector.
+/// Reads a graph; lines with unknown tags are passed over. The error is of the first malformed
+/// line. A rotation's information in g2o files is of the vector part of the quaternion; the factors
+/// have it of the rotation vector.
 std::variant<GraphFile, GraphFileError> read_graph(std::string_view text, GraphFormat format);
 
 /// g2o text of a graph at its estimates: relative poses and Cartesian observations of points, and
-/// all variables; `skipped` counts the factors that the format has no word for. Losses are not
-/// told.
+/// all variables; `skipped` counts the factors that the format has no tag for. Losses are not
+/// written.
 std::string write_g2o(const graph::FactorGraph& graph, int* skipped = nullptr);
 
 }  // namespace understory::factor_graph::files

@@ -30,7 +30,7 @@ class Text {
   std::string out_;
 };
 
-/// False where g2o has no word for it.
+/// False where g2o has no tag for it.
 bool write_vertex(const graph::FactorGraph& graph, int v, Text& out) {
   const graph::Value& value = graph.value(graph::VariableId(v));
   const graph::VariableType type = graph.type(graph::VariableId(v));
@@ -52,13 +52,14 @@ bool write_vertex(const graph::FactorGraph& graph, int v, Text& out) {
     case graph::VariableType::kScalar:
       return false;
   }
+
   out.integer(v);
   for (std::size_t i = 0; i < numbers; ++i) out.number(value[i]);
   out.end();
   return true;
 }
 
-/// False where g2o has no word for it.
+/// False where g2o has no tag for it.
 bool write_edge(const graph::FactorGraph& graph, int f, Text& out) {
   const graph::FactorKind kind = graph.kind(graph::FactorId(f));
   std::size_t numbers = 0;
@@ -82,10 +83,12 @@ bool write_edge(const graph::FactorGraph& graph, int f, Text& out) {
     default:
       return false;
   }
+
   for (const int v : graph.variables_of(f)) out.integer(v);
   if (kind == graph::FactorKind::kPoint3) out.integer(0);
   const auto measurement = graph.measurement(graph::FactorId(f));
   for (std::size_t i = 0; i < numbers; ++i) out.number(measurement[i]);
+
   Eigen::MatrixXd information = graph.information(graph::FactorId(f));
   if (kind == graph::FactorKind::kRelativePose3) {
     // Of the quaternion's vector part, half the rotation vector.

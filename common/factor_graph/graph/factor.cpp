@@ -85,8 +85,8 @@ Factor relative(VariableId a, VariableId b, const geometry::SE2& a_T_b,
   return factor;
 }
 
-Factor turning(VariableId a, VariableId b, VariableId bias, const geometry::SE2& a_T_b,
-               double seconds, const Eigen::Matrix3d& information) {
+Factor biased_relative(VariableId a, VariableId b, VariableId bias, const geometry::SE2& a_T_b,
+                       double seconds, const Eigen::Matrix3d& information) {
   Factor factor = relative(a, b, a_T_b, information);
   factor.kind = FactorKind::kBiasedRelativePose2;
   factor.variable_count = 3;
@@ -182,9 +182,9 @@ std::span<const VariableType> variable_types(FactorKind kind) {
   using enum VariableType;
   static constexpr std::array<VariableType, 2> kPoses2{kPose2, kPose2};
   static constexpr std::array<VariableType, 2> kPoses3{kPose3, kPose3};
-  static constexpr std::array<VariableType, 2> kSeen2{kPose2, kPoint2};
-  static constexpr std::array<VariableType, 2> kSeen3{kPose3, kPoint3};
-  static constexpr std::array<VariableType, 3> kTurning2{kPose2, kPose2, kScalar};
+  static constexpr std::array<VariableType, 2> kObserved2{kPose2, kPoint2};
+  static constexpr std::array<VariableType, 2> kObserved3{kPose3, kPoint3};
+  static constexpr std::array<VariableType, 3> kBiased2{kPose2, kPose2, kScalar};
   static constexpr std::array<VariableType, 2> kScalars{kScalar, kScalar};
   static constexpr std::array<VariableType, 1> kOnePoint2{kPoint2};
   static constexpr std::array<VariableType, 1> kOnePoint3{kPoint3};
@@ -205,16 +205,16 @@ std::span<const VariableType> variable_types(FactorKind kind) {
     case FactorKind::kRelativePose3:
       return kPoses3;
     case FactorKind::kBiasedRelativePose2:
-      return kTurning2;
+      return kBiased2;
     case FactorKind::kPriorScalar:
       return {kScalars.data(), 1};
     case FactorKind::kStepScalar:
       return kScalars;
     case FactorKind::kPoint2:
     case FactorKind::kRangeBearing2:
-      return kSeen2;
+      return kObserved2;
     case FactorKind::kPoint3:
-      return kSeen3;
+      return kObserved3;
     case FactorKind::kLinear:
     case FactorKind::kUser:
       break;

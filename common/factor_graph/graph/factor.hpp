@@ -10,7 +10,7 @@
 
 namespace understory::factor_graph::graph {
 
-/// What is measured. The residual e is as said; a factor's cost is e' * information * e.
+/// What is measured, with the residual e of each; a factor's cost is e' * information * e.
 /// `t`, `R`, `theta`: of a pose; `p`: a point; `z`: the measurement; vec: of a unit quaternion with
 /// w >= 0.
 enum class FactorKind : std::uint8_t {
@@ -20,16 +20,17 @@ enum class FactorKind : std::uint8_t {
   kPriorPoint3,    ///< p - z
   kRelativePose2,  ///< R_z' (R_a' (t_b - t_a) - t_z), theta_b - theta_a - theta_z
   kRelativePose3,  ///< R_z' (R_a' (t_b - t_a) - t_z), 2 vec(q_z* q_a* q_b)
-  kPoint2,         ///< R' (p - t) - z: a landmark seen from a pose, Cartesian
+  kPoint2,         ///< R' (p - t) - z: a landmark in a pose's frame, Cartesian
   kPoint3,         ///< R' (p - t) - z
   kRangeBearing2,  ///< |R' (p - t)| - z_0 [m], direction of R' (p - t) - z_1 [rad]
   kPosition2,      ///< t + R * antenna - z: GNSS
   kPosition3,      ///< t + R * antenna - z
-  /// As kRelativePose2, of a motion whose turn was measured too large by b * seconds; b: a scalar.
+  /// As kRelativePose2, of a motion whose rotation was measured too large by b * seconds; b: a
+  /// scalar, the bias of the yaw rate [rad/s].
   kBiasedRelativePose2,
   kPriorScalar,  ///< b - z
   kStepScalar,   ///< b_b - b_a
-  kCondensed2,   ///< Several poses and points of the plane as seen from the first variable.
+  kCondensed2,   ///< Several poses and points of the plane in the first variable's frame.
   kLinear,       ///< J (value - base) - b: what a marginalisation leaves.
   kUser,         ///< See UserFactor.
 };
@@ -42,65 +43,82 @@ enum class RobustKernel : std::uint8_t {
   kGemanMcClure,  ///< s / (1 + s / k^2)
 };
 
+/// Loss of a factor.
 struct Loss {
   RobustKernel kernel = RobustKernel::kNone;
-  double width = 1.0;
+  double width = 1.0;  ///< k [sigmas].
 };
 
-/// rho(s) and its derivative, which is the factor's weight.
+/// A loss at one s.
 struct LossValue {
-  double cost = 0.0;
-  double weight = 1.0;
+  double cost = 0.0;    ///< rho(s).
+  double weight = 1.0;  ///< Its derivative, which is the factor's weight.
 };
+/// The loss at s = e' * information * e.
 LossValue evaluate(const Loss& loss, double squared_error);
 
 /// A factor of up to three variables.
 struct Factor {
   FactorKind kind = FactorKind::kPriorPose2;
-  int variable_count = 1;
+  int variable_count = 1;  ///< Used ones of `variables`.
   std::array<VariableId, 3> variables{};
+  /// Numbers of z as in Value [m, rad]; then those that the kind names (antenna, seconds).
   std::array<double, 7> measurement{};
+  /// Inverse covariance of the residual.
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6> information;
   Loss loss;
 };
 
-/// Where a kTurningPose2's measurement has its time; before it: that of a kRelativePose2.
+/// Place of the seconds in a kBiasedRelativePose2's measurement; before it: that of a
+/// kRelativePose2.
 constexpr std::size_t kBiasedSeconds = 5;
 
-// Orders of covariances: as the residuals above. Angles in rad, lengths in m.
+// The rows of an information are those of the residual above. Angles in rad, lengths in m.
+
+/// A pose in the plane that is known.
 Factor prior(VariableId pose, const geometry::SE2& mean, const Eigen::Matrix3d& information);
+/// A pose in space that is known.
 Factor prior(VariableId pose, const Pose3& mean, const Eigen::Matrix<double, 6, 6>& information);
+/// A point in the plane that is known.
 Factor prior(VariableId point, const Eigen::Vector2d& mean, const Eigen::Matrix2d& information);
+/// A point in space that is known.
 Factor prior(VariableId point, const Eigen::Vector3d& mean, const Eigen::Matrix3d& information);
+/// A measured motion in the plane.
 Factor relative(VariableId a, VariableId b, const geometry::SE2& a_T_b,
                 const Eigen::Matrix3d& information);
+/// A measured motion in space.
 Factor relative(VariableId a, VariableId b, const Pose3& a_T_b,
                 const Eigen::Matrix<double, 6, 6>& information);
-/// A motion that took `seconds`, measured with an instrument whose rate of turn [rad/s] is off by
-/// `bias`: the way turned by half of what the heading did.
-Factor turning(VariableId a, VariableId b, VariableId bias, const geometry::SE2& a_T_b,
-               double seconds, const Eigen::Matrix3d& information);
+/// A motion that took `seconds`, measured with an instrument whose yaw rate [rad/s] is too large by
+/// `bias`: the heading is off by bias * seconds, the path is rotated by half of that.
+Factor biased_relative(VariableId a, VariableId b, VariableId bias, const geometry::SE2& a_T_b,
+                       double seconds, const Eigen::Matrix3d& information);
+/// A scalar that is known.
 Factor prior(VariableId scalar, double mean, double information);
-/// Two scalars that differ by chance alone.
+/// Two scalars whose difference is noise with mean zero.
 Factor step(VariableId a, VariableId b, double information);
+/// A point in a pose's frame, in the plane.
 Factor observation(VariableId pose, VariableId point, const Eigen::Vector2d& position,
                    const Eigen::Matrix2d& information);
+/// A point in a pose's frame, in space.
 Factor observation(VariableId pose, VariableId point, const Eigen::Vector3d& position,
                    const Eigen::Matrix3d& information);
+/// Range and bearing of a point from a pose, in the plane.
 Factor range_bearing(VariableId pose, VariableId point, double range_m, double bearing_rad,
                      const Eigen::Matrix2d& information);
-/// Position of an antenna (in the pose's frame) in the world.
+/// Position in the world of an antenna, given in the pose's frame; in the plane.
 Factor position(VariableId pose, const Eigen::Vector2d& antenna, const Eigen::Vector2d& measured,
                 const Eigen::Matrix2d& information);
+/// The same in space.
 Factor position(VariableId pose, const Eigen::Vector3d& antenna, const Eigen::Vector3d& measured,
                 const Eigen::Matrix3d& information);
 
 /// Condensed measurement: where `variables[1..]` (pose2: x, y, theta; point2: x, y) are in the
 /// frame of the pose `variables[0]`, with the joint information of all of them.
 struct CondensedFactor {
-  std::vector<VariableId> variables;
-  Eigen::VectorXd measurement;
-  Eigen::MatrixXd information;
+  std::vector<VariableId> variables;  ///< At least two.
+  Eigen::VectorXd measurement;        ///< Of variables[1..], side by side [m, rad].
+  Eigen::MatrixXd information;        ///< Inverse covariance of `measurement`.
   Loss loss;
 };
 
@@ -121,9 +139,10 @@ class UserFactor {
 /// the measurement. Not for kLinear and kUser.
 void evaluate(FactorKind kind, const double* data, std::span<const Value* const> values,
               std::span<const VariableType> types, double* residual, double* jacobian);
-/// Rows of the residual; none for those whose size the data tell.
+/// Rows of the residual; 0 for kinds whose size depends on the data.
 int residual_dimension(FactorKind kind);
-/// The types that a factor's variables must have; condensed ones only tell the first.
+/// The types that a factor's variables must have; of condensed ones the first alone; none where any
+/// will do.
 std::span<const VariableType> variable_types(FactorKind kind);
 
 }  // namespace understory::factor_graph::graph

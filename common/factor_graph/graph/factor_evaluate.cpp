@@ -26,7 +26,7 @@ struct Plane {
 };
 Plane plane(const Value& v) { return {{v[0], v[1]}, v[2], v[3], v[4]}; }
 
-/// R' of a rotated vector turns back when R turns: d(R' v) = -S (R' v) d theta.
+/// R' v rotates back when R rotates: d(R' v) = -S (R' v) d theta.
 Vector2d turned_right(const Vector2d& v) { return {v.y(), -v.x()}; }
 
 struct Space {
@@ -56,61 +56,62 @@ void prior_pose2(const double* z, const Value& v, double* e, double* j) {
 
 void relative_pose2(const double* z, const Value& va, const Value& vb, double* e, double* j) {
   const Plane a = plane(va);
-  const Vector2d seen = a.back(Vector2d(vb[0], vb[1]) - a.translation);
+  const Vector2d local = a.back(Vector2d(vb[0], vb[1]) - a.translation);
   const Plane measured{{z[0], z[1]}, z[2], z[3], z[4]};
-  Map<Vector2d>(e, 2) = measured.back(seen - measured.translation);
+  Map<Vector2d>(e, 2) = measured.back(local - measured.translation);
   e[2] = geometry::wrap_angle(vb[2] - va[2] - z[2]);
   if (j == nullptr) return;
   // (R_a R_z)'
   const double c = a.c * measured.c - a.s * measured.s;
   const double s = a.s * measured.c + a.c * measured.s;
-  const Vector2d turn = measured.back(turned_right(seen));
-  Jacobian<3, 6>(j) << -c, -s, turn.x(), c, s, 0,  //
-      s, -c, turn.y(), -s, c, 0,                   //
+  const Vector2d by_theta = measured.back(turned_right(local));
+  Jacobian<3, 6>(j) << -c, -s, by_theta.x(), c, s, 0,  //
+      s, -c, by_theta.y(), -s, c, 0,                   //
       0, 0, -1, 0, 0, 1;
 }
 
-/// The measured motion at the true rate: its turn less by b * seconds, its way turned by half of
-/// it.
+/// The measured motion at the true rate: its rotation less by b * seconds, its path rotated by half
+/// of it.
 void biased_relative_pose2(const double* z, const Value& va, const Value& vb, double bias,
                            double* e, double* j) {
   double by_poses[18];
   relative_pose2(z, va, vb, e, j == nullptr ? nullptr : by_poses);
   const Plane measured{{z[0], z[1]}, z[2], z[3], z[4]};
   const double seconds = z[kBiasedSeconds];
-  const Vector2d way = 0.5 * seconds * measured.back(geometry::perpendicular(measured.translation));
-  e[0] += way.x() * bias;
-  e[1] += way.y() * bias;
+  const Vector2d shift =
+      0.5 * seconds * measured.back(geometry::perpendicular(measured.translation));
+  e[0] += shift.x() * bias;
+  e[1] += shift.y() * bias;
   e[2] += seconds * bias;
   if (j == nullptr) return;
   Jacobian<3, 7> out(j);
   out.leftCols<6>() = Jacobian<3, 6>(by_poses);
-  out.col(6) << way, seconds;
+  out.col(6) << shift, seconds;
 }
 
 void point2(const double* z, const Value& pose, const Value& point, double* e, double* j) {
   const Plane a = plane(pose);
-  const Vector2d seen = a.back(point2_of(point) - a.translation);
-  e[0] = seen.x() - z[0];
-  e[1] = seen.y() - z[1];
+  const Vector2d local = a.back(point2_of(point) - a.translation);
+  e[0] = local.x() - z[0];
+  e[1] = local.y() - z[1];
   if (j == nullptr) return;
-  Jacobian<2, 5>(j) << -a.c, -a.s, seen.y(), a.c, a.s, a.s, -a.c, -seen.x(), -a.s, a.c;
+  Jacobian<2, 5>(j) << -a.c, -a.s, local.y(), a.c, a.s, a.s, -a.c, -local.x(), -a.s, a.c;
 }
 
 void range_bearing2(const double* z, const Value& pose, const Value& point, double* e, double* j) {
   constexpr std::array<double, 2> kOrigin{0.0, 0.0};
-  double seen[2];
-  double by_seen[10];
-  point2(kOrigin.data(), pose, point, seen, j == nullptr ? nullptr : by_seen);
-  const double range = std::hypot(seen[0], seen[1]);
+  double local[2];
+  double by_local[10];
+  point2(kOrigin.data(), pose, point, local, j == nullptr ? nullptr : by_local);
+  const double range = std::hypot(local[0], local[1]);
   e[0] = range - z[0];
-  e[1] = geometry::wrap_angle(std::atan2(seen[1], seen[0]) - z[1]);
+  e[1] = geometry::wrap_angle(std::atan2(local[1], local[0]) - z[1]);
   if (j == nullptr) return;
   const double inverse = 1.0 / std::max(range, 1e-9);
   Matrix2d d;
-  d << seen[0] * inverse, seen[1] * inverse, -seen[1] * inverse * inverse,
-      seen[0] * inverse * inverse;
-  Jacobian<2, 5>(j).noalias() = d * Jacobian<2, 5>(by_seen);
+  d << local[0] * inverse, local[1] * inverse, -local[1] * inverse * inverse,
+      local[0] * inverse * inverse;
+  Jacobian<2, 5>(j).noalias() = d * Jacobian<2, 5>(by_local);
 }
 
 void position2(const double* z, const Value& pose, double* e, double* j) {
@@ -140,19 +141,20 @@ void relative_pose3(const double* z, const Value& va, const Value& vb, double* e
   const Space b = space(vb.data());
   const Matrix3d a_back = a.q.conjugate().toRotationMatrix();
   const Matrix3d z_back = measured.q.conjugate().toRotationMatrix();
-  const Eigen::Quaterniond turned = a.q.conjugate() * b.q;
-  Eigen::Quaterniond error = measured.q.conjugate() * turned;
-  const Vector3d seen = a_back * (b.translation - a.translation);
-  Map<Vector3d>(e, 3) = z_back * (seen - measured.translation);
+  const Eigen::Quaterniond a_q_b = a.q.conjugate() * b.q;
+  Eigen::Quaterniond error = measured.q.conjugate() * a_q_b;
+  const Vector3d local = a_back * (b.translation - a.translation);
+  Map<Vector3d>(e, 3) = z_back * (local - measured.translation);
   Map<Vector3d>(e + 3, 3) = twice_vector_part(error);
   if (j == nullptr) return;
+
   Jacobian<6, 12> out(j);
   out.setZero();
   const Matrix3d both = z_back * a_back;
   const Matrix3d d = vector_part_derivative(error);
   out.block<3, 3>(0, 0) = -both;
-  out.block<3, 3>(0, 3).noalias() = z_back * cross_matrix(seen);
-  out.block<3, 3>(3, 3).noalias() = -d * turned.conjugate().toRotationMatrix();
+  out.block<3, 3>(0, 3).noalias() = z_back * cross_matrix(local);
+  out.block<3, 3>(3, 3).noalias() = -d * a_q_b.conjugate().toRotationMatrix();
   out.block<3, 3>(0, 6) = both;
   out.block<3, 3>(3, 9) = d;
 }
@@ -160,11 +162,11 @@ void relative_pose3(const double* z, const Value& va, const Value& vb, double* e
 void point3(const double* z, const Value& pose, const Value& point, double* e, double* j) {
   const Space a = space(pose.data());
   const Matrix3d back = a.q.conjugate().toRotationMatrix();
-  const Vector3d seen = back * (point3_of(point) - a.translation);
-  Map<Vector3d>(e, 3) = seen - Vector3d(z[0], z[1], z[2]);
+  const Vector3d local = back * (point3_of(point) - a.translation);
+  Map<Vector3d>(e, 3) = local - Vector3d(z[0], z[1], z[2]);
   if (j == nullptr) return;
   Jacobian<3, 9> out(j);
-  out << -back, cross_matrix(seen), back;
+  out << -back, cross_matrix(local), back;
 }
 
 void position3(const double* z, const Value& pose, double* e, double* j) {
@@ -177,7 +179,7 @@ void position3(const double* z, const Value& pose, double* e, double* j) {
   out << Matrix3d::Identity(), -rotation * cross_matrix(antenna);
 }
 
-/// The first variable's frame sees all others.
+/// All others in the first variable's frame.
 void condensed2(const double* z, std::span<const Value* const> values,
                 std::span<const VariableType> types, double* e, double* j) {
   int rows = 0;

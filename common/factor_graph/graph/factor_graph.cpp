@@ -86,6 +86,7 @@ void FactorGraph::check_types(FactorKind kind, std::span<const VariableId> varia
       require(variables[k] != variables[i], "a factor names a variable twice");
     }
   }
+
   const std::span<const VariableType> wanted = variable_types(kind);
   if (wanted.empty()) return;
   require(variables.size() == wanted.size() || kind == FactorKind::kCondensed2,
@@ -103,6 +104,7 @@ int FactorGraph::link(FactorKind kind, std::span<const VariableId> variables) {
   record.in_use = true;
   record.made_at = factors_.epoch();
   record.variable_count = static_cast<int>(variables.size());
+
   int* names = record.few_links[0].data();
   int* incidences = record.few_links[1].data();
   if (variables.size() > 2) {
@@ -110,6 +112,7 @@ int FactorGraph::link(FactorKind kind, std::span<const VariableId> variables) {
     names = record.many_links;
     incidences = names + variables.size();
   }
+
   for (std::size_t i = 0; i < variables.size(); ++i) {
     const int name = index(variables[i]);
     const int incidence = incidences_.add();
@@ -150,6 +153,7 @@ FactorId FactorGraph::add(const Factor& factor) {
   for (const double number : factor.measurement) {
     require(std::isfinite(number), "a measurement is not finite");
   }
+
   const Eigen::MatrixXd information = factor.information;
   root_of(information);
   const int id =
@@ -158,6 +162,7 @@ FactorId FactorGraph::add(const Factor& factor) {
   if (factor.kind == FactorKind::kRangeBearing2 || factor.loss.kernel != RobustKernel::kNone) {
     mark_curved(id);
   }
+
   store_data(id, factor.measurement, information);
   linearise(id);
   return FactorId(id);
@@ -177,6 +182,7 @@ FactorId FactorGraph::add(const CondensedFactor& factor) {
               factor.information.cols() == rows && factor.measurement.allFinite(),
           "a condensed measurement of the wrong size");
   root_of(factor.information);
+
   const int id = link(FactorKind::kCondensed2, factor.variables);
   factors_.edit(id).loss = factor.loss;
   if (factor.loss.kernel != RobustKernel::kNone) mark_curved(id);
@@ -196,6 +202,7 @@ FactorId FactorGraph::add(std::shared_ptr<const UserFactor> factor,
     free_users_.push_back(static_cast<int>(users_.size()));
     users_.emplace_back();
   }
+
   record.user = free_users_.back();
   free_users_.pop_back();
   users_[static_cast<std::size_t>(record.user)] = std::move(factor);
@@ -211,6 +218,7 @@ FactorId FactorGraph::add_linear(std::span<const VariableId> variables,
   require(jacobian.rows() > 0 && jacobian.cols() == columns && right.size() == jacobian.rows() &&
               jacobian.allFinite() && right.allFinite(),
           "a linear factor of the wrong size");
+
   const int id = link(FactorKind::kLinear, variables);
   FactorRecord& record = factors_.edit(id);
   record.rows = static_cast<int>(jacobian.rows());
@@ -218,6 +226,7 @@ FactorId FactorGraph::add_linear(std::span<const VariableId> variables,
   record.measurement_size = static_cast<int>(values);
   record.data_size = static_cast<int>(values) + record.rows * (columns + 1);
   record.data = pool_.take(static_cast<std::size_t>(record.data_size));
+
   double* out = record.data;
   for (const VariableId one : variables)
     out = std::copy_n(value(one).data(), value(one).size(), out);
@@ -241,6 +250,7 @@ void FactorGraph::remove(FactorId id) {
     if (record.next != kNone) incidences_.edit(record.next).previous = record.previous;
     incidences_.remove(incidence);
   }
+
   factors_.edit(index(id)).in_use = false;
   factors_.remove(index(id));
 }

@@ -12,29 +12,30 @@
 
 namespace understory::factor_graph::graph {
 
+/// End of a list, or no such number.
 constexpr int kNone = -1;
 
+/// A variable with its estimate. Fields marked (smoother) are kept for the incremental smoother.
 struct VariableRecord {
   VariableType type = VariableType::kPose2;
-  bool in_use = false;
-  int clique = kNone;           ///< Where it is eliminated; for the smoother.
+  bool in_use = false;          ///< False after its removal.
+  int clique = kNone;           ///< Where it is eliminated (smoother).
   int first_incidence = kNone;  ///< List of its factors.
   int degree = 0;               ///< Length of that list.
-  Value base{};                 ///< `delta` counts from here.
+  Value base{};                 ///< Where its chart is; `delta` counts from here.
   Value value{};                ///< The estimate: base moved by delta.
-  Delta delta{};
+  Delta delta{};                ///< The estimate in its chart.
   /// Root of the largest information that one factor gives: of the translation [1/m], of the
-  /// rotation [1/rad]. What pivots and moves are measured against.
+  /// rotation [1/rad]. Pivots and moves are measured against it.
   std::array<double, 2> scale{};
-  /// For the smoother: `delta` when its factors were last compared with their linearisations, and
-  /// how far the one of them that had turned furthest had turned [rad].
-  Delta judged{};
-  double turned = 0.0;
-  /// A factor of its bends otherwise than rigid motions do (a bearing, a robust loss, a user's):
-  /// any move can matter.
+  Delta judged{};        ///< `delta` when its factors were compared last (smoother).
+  double rotated = 0.0;  ///< Largest Deviation::rotated of its factors then [rad] (smoother).
+  /// A factor of its bends otherwise than rigid motions do (a bearing, a robust loss, a
+  /// user-defined one): any move can matter.
   bool is_curved = false;
 };
 
+/// One variable of one factor, in the variable's list.
 struct IncidenceRecord {
   int factor = kNone;
   int variable = kNone;
@@ -42,109 +43,143 @@ struct IncidenceRecord {
   int previous = kNone;
 };
 
+/// A factor with its linearisation.
 struct FactorRecord {
   FactorKind kind = FactorKind::kPriorPose2;
-  bool in_use = false;
-  bool is_pending = false;  ///< Its linearisation is too old; for the smoother.
+  bool in_use = false;      ///< False after its removal.
+  bool is_pending = false;  ///< It waits to be linearised again (smoother).
   Loss loss;
-  int rows = 0;     ///< Of the residual.
-  int columns = 0;  ///< Of the Jacobian.
-  int variable_count = 0;
+  int rows = 0;                          ///< Of the residual.
+  int columns = 0;                       ///< Of the Jacobian.
+  int variable_count = 0;                ///< Number of variables.
   std::array<int, 2> few_links[2] = {};  ///< Variables, incidences; of up to two.
   int* many_links = nullptr;             ///< The same where there are more.
   double* data = nullptr;                ///< Measurement, then the root of the information.
-  int data_size = 0;
-  int measurement_size = 0;
-  double* linear = nullptr;  ///< See FactorGraph::linearise().
-  std::uint64_t linear_epoch = 0;
-  std::uint64_t made_at = 0;
-  int user = kNone;
-  int clique = kNone;  ///< Where it is assembled; for the smoother.
-  int next = kNone;    ///< Next one there.
+  int data_size = 0;                     ///< Length of `data`.
+  int measurement_size = 0;              ///< Length of the measurement in it.
+  double* linear = nullptr;              ///< See FactorGraph::linearise().
+  std::uint64_t linear_epoch = 0;        ///< Journal epoch in which `linear` was taken.
+  std::uint64_t made_at = 0;             ///< Journal epoch in which the factor was added.
+  int user = kNone;                      ///< Number of the user-defined factor.
+  int clique = kNone;                    ///< Where it is assembled (smoother).
+  int next = kNone;                      ///< Next one there (smoother).
 };
 
 /// How far a factor is from its linearisation.
 struct Deviation {
   double residual = 0.0;    ///< Of the residual, and of its derivative times the residual [sigmas].
-  double turned = 0.0;      ///< Its frame since then [rad].
-  double loss = 0.0;        ///< Of the factor, and
-  double linearised = 0.0;  ///< as the linearisation has it, up to a constant.
-  double left_out = 0.0;    ///< By the linearisation, of what the residual's square grew to.
+  double rotated = 0.0;     ///< Rotation of its frame since then [rad].
+  double loss = 0.0;        ///< Loss of the factor.
+  double linearised = 0.0;  ///< The same by the linearisation, up to a constant.
+  double left_out = 0.0;    ///< Part of the squared residual that the linearisation lacks.
 };
 
-/// Graph of variables and factors, with the way back to the last commit().
+/// Variables, factors and their linearisations, with undo to the last commit(). Every change costs
+/// what it touches. Not for use by several threads at a time, not even reading: evaluation shares
+/// scratch memory.
 ///
-/// A factor is linearised at the estimate of the moment, each on its own; all linearisations count
-/// in the charts of the variables, so they can be added up whatever their ages.
+/// More than 20 functions because it is a container: most are overloads and accessors.
 class FactorGraph {
  public:
+  /// An empty graph.
   FactorGraph();
 
+  /// Adds a pose in the plane.
   VariableId add(const geometry::SE2& initial) {
     return add(VariableType::kPose2, value_of(initial));
   }
+  /// Adds a pose in space.
   VariableId add(const Pose3& initial) { return add(VariableType::kPose3, value_of(initial)); }
+  /// Adds a point in the plane [m].
   VariableId add(const Eigen::Vector2d& initial) {
     return add(VariableType::kPoint2, value_of(initial));
   }
+  /// Adds a point in space [m].
   VariableId add(const Eigen::Vector3d& initial) {
     return add(VariableType::kPoint3, value_of(initial));
   }
+  /// Adds a scalar.
   VariableId add(double initial) { return add(VariableType::kScalar, value_of(initial)); }
+  /// Adds a variable at this estimate. Throws std::invalid_argument where it is not finite.
   VariableId add(VariableType type, const Value& initial);
 
-  /// The information must be symmetric and positive semi-definite, everything finite. Throws
-  /// std::invalid_argument where that, or a variable's type, is not so.
+  /// Adds a measurement, linearised at the estimates. The information must be symmetric and
+  /// positive semi-definite, everything finite. Throws std::invalid_argument where that, or a
+  /// variable's type, is not so.
   FactorId add(const Factor& factor);
+  /// Adds a condensed measurement; the same holds.
   FactorId add(const CondensedFactor& factor);
+  /// Adds a user-defined factor of these variables, which the graph keeps alive.
   FactorId add(std::shared_ptr<const UserFactor> factor, std::span<const VariableId> variables);
-  /// e = J (x - x_0) - b at the present estimates x_0, rows of J and b whitened; see kLinear.
+  /// Adds e = J (x - x_0) - b at the present estimates x_0, rows of J and b whitened; see kLinear.
   FactorId add_linear(std::span<const VariableId> variables, const Eigen::MatrixXd& jacobian,
                       const Eigen::VectorXd& right);
+  /// Removes a factor. Throws std::invalid_argument where there is none.
   void remove(FactorId id);
-  /// Only without factors.
+  /// Removes a variable without factors. Throws std::invalid_argument where it has some.
   void remove(VariableId id);
 
+  /// True where the graph has this variable.
   bool contains(VariableId id) const;
+  /// True where the graph has this factor.
   bool contains(FactorId id) const;
+  /// Upper bound of all variables' numbers.
   int variable_capacity() const { return variables_.size(); }
+  /// Upper bound of all factors' numbers.
   int factor_capacity() const { return factors_.size(); }
+  /// Type of a variable.
   VariableType type(VariableId id) const { return variables_[index(id)].type; }
+  /// Estimate of a variable.
   const Value& value(VariableId id) const { return variables_[index(id)].value; }
+  /// Kind of a factor.
   FactorKind kind(FactorId id) const { return factors_[index(id)].kind; }
+  /// Numbers of a factor's variables, in its order.
   std::span<const int> variables_of(int factor) const;
+  /// What was measured, see FactorKind.
   std::span<const double> measurement(FactorId id) const;
+  /// The information as it was given, up to rounding. Not of kLinear and kUser.
   Eigen::MatrixXd information(FactorId id) const;
+  /// The factor's loss.
   Loss loss(FactorId id) const { return factors_[index(id)].loss; }
 
-  /// Loss of one factor, or of all, at the estimate.
+  /// Loss of one factor at the estimate.
   double chi2(FactorId id) const;
+  /// Sum of all factors' losses at the estimate. O(factors).
   double chi2() const;
 
   /// Linearises at the estimate. `linear` then is [J (rows x columns, column-major) | b (rows) |
   /// four numbers to judge its age by], whitened and weighted: cost = |J delta - b|^2.
   void linearise(int factor);
+  /// The factor at the estimate against its linearisation.
   Deviation deviation(int factor) const;
   /// Bound on what the deviation of a factor of this variable grew by, from its moves since the
   /// factors were last looked at [sigmas]. Infinite where there is none.
   double unjudged_deviation(int variable) const;
-  /// Moves the variable in its chart.
+  /// Moves the variable in its chart to `delta`.
   void move(int variable, const double* delta);
   /// Makes the estimate the base of the chart. Its factors must be linearised again.
   void rebase(int variable);
-  /// An estimate from elsewhere; becomes the base, too.
+  /// Sets an estimate from elsewhere, which becomes the base, too.
   void set_value(int variable, const Value& value);
 
+  /// A variable by number.
   const VariableRecord& variable(int id) const { return variables_[id]; }
+  /// A factor by number.
   const FactorRecord& factor(int id) const { return factors_[id]; }
+  /// An incidence by number.
   const IncidenceRecord& incidence(int id) const { return incidences_[id]; }
+  /// A variable for change; journaled.
   VariableRecord& edit_variable(int id) { return variables_.edit(id); }
+  /// A factor for change; journaled.
   FactorRecord& edit_factor(int id) { return factors_.edit(id); }
 
+  /// Makes all changes final.
   void commit();
+  /// Restores the state of the last commit(), exactly; costs what changed.
   void rollback();
-  /// What the next commit() makes final.
+  /// Factors added since the last commit().
   const std::vector<int>& added_factors() const { return factors_.added(); }
+  /// Memory taken from the system for measurements and linearisations [bytes].
   std::size_t bytes() const { return pool_.bytes(); }
 
  private:

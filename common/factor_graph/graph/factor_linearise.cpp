@@ -35,17 +35,17 @@ void with_sizes(int rows, int columns, F&& f) {
   }
 }
 
-/// Out of a pose's chart: its rotation turns with the right Jacobian.
+/// From a pose's own frame into its chart: the right Jacobian of its rotation.
 void into_chart(const VariableRecord& variable, double* columns, int rows) {
   if (variable.type != VariableType::kPose3) return;
-  const Map<const Eigen::Vector3d> turn(variable.delta.data() + 3);
-  if (turn.isZero(0.0)) return;
+  const Map<const Eigen::Vector3d> vector(variable.delta.data() + 3);
+  if (vector.isZero(0.0)) return;
   Map<Matrix<double, Eigen::Dynamic, 3>> rotation(columns + 3 * rows, rows, 3);
-  rotation *= right_jacobian(turn);
+  rotation *= right_jacobian(vector);
 }
 
-/// The first variable's turn in its chart: by what residuals turn with it.
-Eigen::Vector3d turn_of(const VariableRecord& variable) {
+/// The first variable's rotation in its chart [rad]: residuals rotate with it.
+Eigen::Vector3d rotation_of(const VariableRecord& variable) {
   if (variable.type == VariableType::kPose2) return {variable.delta[2], 0.0, 0.0};
   if (variable.type == VariableType::kPose3) return Eigen::Vector3d(variable.delta.data() + 3);
   return Eigen::Vector3d::Zero();
@@ -60,14 +60,15 @@ void residual_of_chart(const Value& from, const VariableRecord& to, double* out,
     }
     return;
   }
+
   const Pose3 a = pose3_of(from);
   const Pose3 b = pose3_of(to.value);
-  const Eigen::Vector3d turn = log_rotation(a.rotation.conjugate() * b.rotation);
+  const Eigen::Vector3d rotation = log_rotation(a.rotation.conjugate() * b.rotation);
   Map<Eigen::Vector3d>(out, 3) = b.translation - a.translation;
-  Map<Eigen::Vector3d>(out + 3, 3) = turn;
+  Map<Eigen::Vector3d>(out + 3, 3) = rotation;
   if (jacobian != nullptr) {
     // Inverse of the right Jacobian: I + [v]x / 2 + ... as the Jacobian of Log.
-    Map<Eigen::Matrix3d>(jacobian, 3, 3) = right_jacobian(turn).inverse();
+    Map<Eigen::Matrix3d>(jacobian, 3, 3) = right_jacobian(rotation).inverse();
   }
 }
 
@@ -88,15 +89,15 @@ void FactorGraph::linear_residual(const FactorRecord& factor, std::span<const in
     base += from.size();
     const int size = dimension(variable.type);
     Delta step{};
-    Eigen::Matrix3d turning;
-    residual_of_chart(from, variable, step.data(), turning.data());
+    Eigen::Matrix3d by_rotation;
+    residual_of_chart(from, variable, step.data(), by_rotation.data());
     const auto first = static_cast<std::ptrdiff_t>(column) * factor.rows;
     const Map<const Eigen::MatrixXd> own(j + first, factor.rows, size);
     e.noalias() += own * Map<const Eigen::VectorXd>(step.data(), size);
     if (jacobian != nullptr) {
       Map<Eigen::MatrixXd> out(jacobian + first, factor.rows, size);
       out = own;
-      if (variable.type == VariableType::kPose3) out.rightCols(3) = own.rightCols(3) * turning;
+      if (variable.type == VariableType::kPose3) out.rightCols(3) = own.rightCols(3) * by_rotation;
     }
     column += size;
   }
@@ -179,6 +180,7 @@ void FactorGraph::linearise(int id) {
         pool_.take(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns + 1) + 4);
     record.linear_epoch = factors_.epoch();
   }
+
   const std::span<const int> variables = variables_of(id);
   double* j = record.linear;
   double* b = j + static_cast<std::ptrdiff_t>(rows) * columns;
@@ -192,6 +194,7 @@ void FactorGraph::linearise(int id) {
     e *= root_weight;
     jacobian *= root_weight;
   }
+
   // b = J delta - e
   e = -e;
   int column = 0;
@@ -202,10 +205,12 @@ void FactorGraph::linearise(int id) {
       e += variable.delta[static_cast<std::size_t>(i)] * jacobian.col(column);
     }
   }
-  const Eigen::Vector3d turn = turn_of(variables_[variables[0]]);
+
+  // What its age is judged by.
+  const Eigen::Vector3d rotation = rotation_of(variables_[variables[0]]);
   double* age = b + rows;
   age[0] = root_weight;
-  std::copy_n(turn.data(), 3, age + 1);
+  std::copy_n(rotation.data(), 3, age + 1);
   keep_scales(record, variables);
 }
 
@@ -225,6 +230,8 @@ Deviation FactorGraph::deviation(int id) const {
   whitened(record, variables, residual, nullptr);
   double* moves = residual + 2 * record.rows;
   copy_moves(variables, moves);
+
+  // Residual, and residual by the linearisation.
   const double* age =
       record.linear + static_cast<std::ptrdiff_t>(record.rows) * (record.columns + 1);
   double squared = 0.0;
@@ -242,6 +249,7 @@ Deviation FactorGraph::deviation(int id) const {
     predicted = linear.squaredNorm();
     off2 = (age[0] * e - linear).squaredNorm();
   });
+
   double reweighted = 0.0;
   double loss = squared;
   if (record.loss.kernel != RobustKernel::kNone) {
@@ -249,11 +257,12 @@ Deviation FactorGraph::deviation(int id) const {
     reweighted = std::sqrt(value.weight) - age[0];
     loss = value.cost;
   }
-  const Eigen::Vector3d turn(age[1], age[2], age[3]);
-  const double turned = (turn_of(variables_[variables[0]]) - turn).norm();
+
+  const Eigen::Vector3d rotation_before(age[1], age[2], age[3]);
+  const double rotated = (rotation_of(variables_[variables[0]]) - rotation_before).norm();
   const double weight2 = age[0] * age[0];
-  return {std::sqrt(off2 + squared * (turned * turned * weight2 + reweighted * reweighted)), turned,
-          loss, predicted, squared * weight2 - predicted};
+  return {std::sqrt(off2 + squared * (rotated * rotated * weight2 + reweighted * reweighted)),
+          rotated, loss, predicted, squared * weight2 - predicted};
 }
 
 double FactorGraph::unjudged_deviation(int id) const {
@@ -261,17 +270,19 @@ double FactorGraph::unjudged_deviation(int id) const {
   if (variable.is_curved) return std::numeric_limits<double>::infinity();
   Delta d;
   for (std::size_t i = 0; i < d.size(); ++i) d[i] = variable.delta[i] - variable.judged[i];
+
   double moved = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-  double turned = 0.0;
+  double rotated = 0.0;
   if (variable.type == VariableType::kPose2) {
     moved = std::sqrt(d[0] * d[0] + d[1] * d[1]);
-    turned = std::abs(d[2]);
+    rotated = std::abs(d[2]);
   } else if (variable.type == VariableType::kPose3) {
-    turned = std::sqrt(d[3] * d[3] + d[4] * d[4] + d[5] * d[5]);
+    rotated = std::sqrt(d[3] * d[3] + d[4] * d[4] + d[5] * d[5]);
   }
-  // Second order in the moves; and the derivative turns the residual, of some sigmas.
-  return variable.scale[1] * turned * (0.5 * turned + variable.turned) +
-         variable.scale[0] * moved * (turned + variable.turned) + 2.0 * turned;
+
+  // Second order in the moves; and the derivative rotates the residual, of some sigmas.
+  return variable.scale[1] * rotated * (0.5 * rotated + variable.rotated) +
+         variable.scale[0] * moved * (rotated + variable.rotated) + 2.0 * rotated;
 }
 
 void FactorGraph::move(int id, const double* delta) {

@@ -9,19 +9,23 @@
 
 namespace understory::factor_graph::graph {
 
-/// Number of a variable or factor in its graph. A removed one's number is given out again.
+/// Number of a variable in its graph. A removed one's number is given out again.
 enum class VariableId : std::int32_t {};
-enum class FactorId : std::int32_t {};
+enum class FactorId : std::int32_t {};  ///< The same of a factor.
+/// The number itself.
 constexpr int index(VariableId id) { return static_cast<int>(id); }
+/// The number itself.
 constexpr int index(FactorId id) { return static_cast<int>(id); }
 
+/// Kinds of variables; see Value for their numbers.
 enum class VariableType : std::uint8_t { kPose2, kPose3, kPoint2, kPoint3, kScalar };
 
-/// Degrees of freedom.
+/// Degrees of freedom of a variable.
 constexpr int dimension(VariableType type) {
   constexpr std::array<int, 5> dimensions{3, 6, 2, 3, 1};
   return dimensions[static_cast<std::size_t>(type)];
 }
+/// Of a pose3.
 constexpr int kMaxVariableDimension = 6;
 
 /// Numbers of a variable's value:
@@ -36,14 +40,23 @@ using Value = std::array<double, 7>;
 /// this chart is flat, so nothing is lost by staying at one base for ever.
 using Delta = std::array<double, kMaxVariableDimension>;
 
+/// Numbers of a pose in the plane.
 Value value_of(const geometry::SE2& pose);
+/// Numbers of a pose in space; the quaternion is normalised.
 Value value_of(const Pose3& pose);
+/// Numbers of a point in the plane [m].
 Value value_of(const Eigen::Vector2d& point);
+/// Numbers of a point in space [m].
 Value value_of(const Eigen::Vector3d& point);
+/// Numbers of a scalar.
 Value value_of(double scalar);
+/// Pose in the plane from its numbers.
 geometry::SE2 pose2_of(const Value& value);
+/// Pose in space from its numbers.
 Pose3 pose3_of(const Value& value);
+/// Point in the plane from its numbers [m].
 inline Eigen::Vector2d point2_of(const Value& value) { return {value[0], value[1]}; }
+/// Point in space from its numbers [m].
 inline Eigen::Vector3d point3_of(const Value& value) { return {value[0], value[1], value[2]}; }
 
 /// The value at `delta` about `base`.

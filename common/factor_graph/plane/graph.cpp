@@ -52,9 +52,9 @@ double chi2(const Graph& graph, const PointObservation& factor) {
 }
 
 geometry::SE2 at_true_rate(const geometry::SE2& measured, double bias, double seconds) {
-  const double turn = bias * seconds;
-  const Eigen::Vector2d& way = measured.translation();
-  return {way - 0.5 * turn * geometry::perpendicular(way), measured.theta() - turn};
+  const double excess_rad = bias * seconds;
+  const Eigen::Vector2d& path = measured.translation();
+  return {path - 0.5 * excess_rad * geometry::perpendicular(path), measured.theta() - excess_rad};
 }
 
 double chi2(const Graph& graph, const BiasedRelativePose& factor) {
@@ -93,10 +93,10 @@ ObservationJacobian linearise(const Graph& graph, const PointObservation& factor
 
 ObservationJacobian linearise(const geometry::SE2& pose, const Eigen::Vector2d& point) {
   const Eigen::Matrix2d to_pose = pose.rotation().transpose();
-  const Eigen::Vector2d seen = to_pose * (point - pose.translation());
+  const Eigen::Vector2d local = to_pose * (point - pose.translation());
   ObservationJacobian result;
-  result.residual = seen;
-  result.pose << -Eigen::Matrix2d::Identity(), -geometry::perpendicular(seen);
+  result.residual = local;
+  result.pose << -Eigen::Matrix2d::Identity(), -geometry::perpendicular(local);
   result.point = to_pose;
   return result;
 }

@@ -9,12 +9,17 @@
 
 namespace understory::factor_graph::plane {
 
-/// Index of a pose, of a point or of a scalar; each kind counts for itself.
+/// Index among the poses of a graph.
 enum class PoseId : std::uint32_t {};
+/// Index among the points of a graph.
 enum class PointId : std::uint32_t {};
-constexpr std::uint32_t index(PoseId id) { return static_cast<std::uint32_t>(id); }
+/// Index among the scalars of a graph.
 enum class ScalarId : std::uint32_t {};
+/// The index itself.
+constexpr std::uint32_t index(PoseId id) { return static_cast<std::uint32_t>(id); }
+/// The index itself.
 constexpr std::uint32_t index(PointId id) { return static_cast<std::uint32_t>(id); }
+/// The index itself.
 constexpr std::uint32_t index(ScalarId id) { return static_cast<std::uint32_t>(id); }
 
 /// Measured pose: (x, y, theta) of mean^-1 * pose ~ N(0, information^-1).
@@ -33,8 +38,8 @@ struct RelativePose {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
 };
 
-/// A RelativePose whose turn was measured with an instrument that is off by a scalar [rad/s], over
-/// `seconds` of it.
+/// A RelativePose whose rotation was measured by an instrument with a bias, a scalar [rad/s], for
+/// `seconds`.
 struct BiasedRelativePose {
   RelativePose motion;
   ScalarId bias{};
@@ -48,7 +53,7 @@ struct ScalarPrior {
   double information = 0.0;
 };
 
-/// A scalar that drifted: b - a ~ N(0, 1 / information).
+/// Drift of a scalar: b - a ~ N(0, 1 / information).
 struct ScalarStep {
   ScalarId a{};
   ScalarId b{};
@@ -62,8 +67,8 @@ struct PointPrior {
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
 };
 
-/// A point seen from a pose, Cartesian: pose^-1 * point - position ~ N(0, information^-1), in the
-/// frame of the pose.
+/// A point observed from a pose, Cartesian: pose^-1 * point - position ~ N(0, information^-1), in
+/// the frame of the pose.
 struct PointObservation {
   PoseId pose{};
   PointId point{};
@@ -79,28 +84,40 @@ struct Graph {
   std::vector<RelativePose> relative_poses;
   std::vector<PointPrior> point_priors;
   std::vector<PointObservation> observations;
-  /// What instruments are off by; BatchSmoother does not take them.
+  /// Biases of instruments, each in a unit of its own.
   std::vector<double> scalars;
   std::vector<BiasedRelativePose> biased_relative_poses;
   std::vector<ScalarPrior> scalar_priors;
   std::vector<ScalarStep> scalar_steps;
 
+  /// Appends a pose.
   PoseId add_pose(const geometry::SE2& initial);
+  /// Appends a point [m].
   PointId add_point(const Eigen::Vector2d& initial);
+  /// Value of a pose.
   const geometry::SE2& operator[](PoseId id) const { return poses[index(id)]; }
+  /// Value of a scalar.
   double operator[](ScalarId id) const { return scalars[index(id)]; }
+  /// Value of a point [m].
   const Eigen::Vector2d& operator[](PointId id) const { return points[index(id)]; }
 };
 
 /// Whitened squared error of one factor at the graph's values.
 double chi2(const Graph& graph, const PosePrior& factor);
+/// Likewise.
 double chi2(const Graph& graph, const RelativePose& factor);
+/// Likewise.
 double chi2(const Graph& graph, const PointPrior& factor);
+/// Likewise.
 double chi2(const Graph& graph, const BiasedRelativePose& factor);
+/// Likewise.
 double chi2(const Graph& graph, const ScalarPrior& factor);
+/// Likewise.
 double chi2(const Graph& graph, const ScalarStep& factor);
+/// Likewise.
 double chi2(const Graph& graph, const PointObservation& factor);
-/// The motion that was measured, had the instrument been off by `bias`.
+/// The measured motion without the bias [rad/s] of the instrument's yaw rate: the heading less by
+/// bias * seconds, the path rotated by half of that.
 geometry::SE2 at_true_rate(const geometry::SE2& measured, double bias, double seconds);
 /// Sum over all factors. O(factors).
 double chi2(const Graph& graph);
@@ -108,20 +125,22 @@ double chi2(const Graph& graph);
 /// d(residual)/d(right perturbation of the pose), d(residual)/d(point): residual = pose^-1 * point
 /// - position.
 struct ObservationJacobian {
-  Eigen::Vector2d residual;
+  Eigen::Vector2d residual;  ///< [m]
   Eigen::Matrix<double, 2, 3> pose;
   Eigen::Matrix2d point;
 };
+/// At the graph's values, not whitened.
 ObservationJacobian linearise(const Graph& graph, const PointObservation& factor);
-/// Of pose^-1 * point.
+/// Of pose^-1 * point, with position zero.
 ObservationJacobian linearise(const geometry::SE2& pose, const Eigen::Vector2d& point);
 
 /// Residual of a relative pose with its Jacobians; 3 x 3 each, right perturbations.
 struct RelativePoseJacobian {
-  Eigen::Vector3d residual;
+  Eigen::Vector3d residual;  ///< x, y [m], theta [rad]
   Eigen::Matrix3d a;
   Eigen::Matrix3d b;
 };
+/// At the graph's values, not whitened.
 RelativePoseJacobian linearise(const Graph& graph, const RelativePose& factor);
 
 }  // namespace understory::factor_graph::plane

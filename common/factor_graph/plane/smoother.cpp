@@ -13,7 +13,7 @@ bayes_tree::IncrementalParameters incremental(const SmootherParameters& paramete
   result.relinearise_above = parameters.relinearise_above;
   result.iterate_above = parameters.iterate_above;
   result.max_iterations = parameters.max_iterations;
-  // The mapper's noise is as it says, and its cost must not follow the map.
+  // The mapper's covariances are right, and its cost must not grow with the map.
   result.first_unit = 1.0;
   result.thorough_every = 0;
   result.wait_below = parameters.wait_below;
@@ -209,9 +209,9 @@ void Smoother::add(const PointPrior& factor) {
 
 void Smoother::add(const BiasedRelativePose& factor) {
   const RelativePose& motion = factor.motion;
-  state_->smoother.add(turning(state_->name(motion.a), state_->name(motion.b),
-                               state_->name(factor.bias), motion.a_T_b, factor.seconds,
-                               motion.information));
+  state_->smoother.add(biased_relative(state_->name(motion.a), state_->name(motion.b),
+                                       state_->name(factor.bias), motion.a_T_b, factor.seconds,
+                                       motion.information));
   state_->biased_relative_poses.push_back(factor);
 }
 

@@ -1,4 +1,4 @@
-// The smoother of the mapper: poses and points of the plane, and what instruments are off by.
+// The smoother of the mapper: poses and points of the plane, and biases of instruments.
 #pragma once
 
 #include <memory>
@@ -11,34 +11,41 @@
 
 namespace understory::factor_graph::plane {
 
+/// When and how exactly the smoother follows. Standard deviations are a variable's own
+/// (conditional) ones, sigmas those of the measurements.
 struct SmootherParameters {
-  /// What moves by less of its own conditional standard deviation stays where it is [sigmas]. At
-  /// 1e-2 one keyframe of twenty was refused on roads.
+  /// A variable that would move by less stays where it is [standard deviations]. At 1e-2 one
+  /// keyframe of twenty was refused on roads.
   double least_move = 1e-3;
-  /// Far from where an update took place, changes of less than so many times that wait for their
-  /// turn, which so many cliques have in an update: its cost does not follow the map.
+  /// Far from where an update took place, changes below so many times least_move wait in a queue:
+  /// so the cost of an update does not grow with the map.
   double wait_below = 100.0;
   int waiting_slots = 100;  ///< Number of waiting cliques that an update serves.
-  /// A measurement is linearised again beyond this [sigmas]. Linearisations of different age leave
-  /// torques that turn all that hangs on them: the prior that holds the map must hold it firmly,
-  /// and at 1e-2 the end of a 5 km road swung by 2 m from update to update.
+  /// A measurement this far from its linearisation is linearised again [sigmas]. Linearisations of
+  /// different ages leave torques that rotate all that hangs on them: the prior that holds the map
+  /// must be firm, and at 1e-2 the end of a 5 km road swung by 2 m from update to update.
   double relinearise_above = 1e-2;
-  /// An update goes on while one is this far from its linearisation [sigmas].
+  /// An update goes on while a measurement is this far from its linearisation [sigmas].
   double iterate_above = 0.1;
-  int max_iterations = 8;
+  int max_iterations = 8;  ///< Of one update.
 };
 
+/// What an update found.
 struct SmootherUpdate {
-  bool ok = false;
+  bool ok = false;    ///< False: variables are undetermined and stay where they are.
   std::string error;  ///< Names the variables that the measurements leave undetermined.
 };
 
 /// Index of a PointObservation in the order in which they were added.
 enum class ObservationId : std::uint32_t {};
+/// The index itself.
 constexpr std::uint32_t index(ObservationId id) { return static_cast<std::uint32_t>(id); }
 
 /// Keeps a graph and its least-squares solution; the incremental smoother does the work. An update
-/// and a rollback cost what changed.
+/// and a rollback cost what changed. Factors must name variables of this smoother; see
+/// graph::FactorGraph::add() for what throws.
+///
+/// More than 20 functions because it is a facade: half of them are overloads and accessors.
 class Smoother {
  public:
   explicit Smoother(const SmootherParameters& parameters = {});
@@ -46,37 +53,55 @@ class Smoother {
   Smoother(Smoother&&) noexcept;
   Smoother& operator=(Smoother&&) noexcept;
 
+  /// Adds a pose at this estimate.
   PoseId add_pose(const geometry::SE2& initial);
+  /// Adds a point at this estimate [m].
   PointId add_point(const Eigen::Vector2d& initial);
+  /// Adds a scalar at this estimate.
   ScalarId add_scalar(double initial);
+  /// Adds a measured pose.
   void add(const PosePrior& factor);
+  /// Adds a measured motion.
   void add(const RelativePose& factor);
+  /// Adds a measured point.
   void add(const PointPrior& factor);
+  /// Adds a motion measured with a bias.
   void add(const BiasedRelativePose& factor);
+  /// Adds a measured scalar.
   void add(const ScalarPrior& factor);
+  /// Adds the drift of a scalar.
   void add(const ScalarStep& factor);
+  /// Adds an observation; one with zero information does not count.
   ObservationId add(const PointObservation& factor);
-  /// Replaces a measurement; one whose information is zero no longer counts.
+  /// Replaces an observation; one with zero information no longer counts.
   void set(ObservationId id, const PointObservation& factor);
 
+  /// Estimate of a pose.
   geometry::SE2 pose(PoseId id) const;
+  /// Estimate of a point [m].
   Eigen::Vector2d point(PointId id) const;
+  /// Estimate of a scalar.
   double scalar(ScalarId id) const;
+  /// The observation as it was given last.
   const PointObservation& observation(ObservationId id) const;
+  /// Squared whitened residual of an observation at the estimates; 0 where it does not count.
   double chi2(ObservationId id) const;
-  /// What updates moved since the checkpoint, each once.
+  /// Points that updates moved since the checkpoint, each once.
   const std::vector<PointId>& moved_points() const;
+  /// Poses that updates moved since the checkpoint, each once.
   const std::vector<PoseId>& moved_poses() const;
 
-  /// Everything that was given, at the present estimates; and from there. O(graph).
+  /// Everything that was given, at the present estimates. O(graph).
   Graph graph() const;
+  /// Adds all of a graph; the smoother must be empty.
   void start_from(const Graph& graph);
 
-  /// Remembers the state as it is; rollback() restores exactly that.
+  /// Remembers the state as it is.
   void checkpoint();
+  /// Restores the state of the last checkpoint(), exactly.
   void rollback();
 
-  /// Variables without any factor are left alone.
+  /// Brings the estimates up to date. Variables without any factor are left alone.
   SmootherUpdate update();
 
   /// Joint covariance of poses (3 each, right perturbation), then points (2 each); none where a

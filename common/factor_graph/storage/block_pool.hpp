@@ -19,6 +19,7 @@ class BlockPool {
   BlockPool(BlockPool&&) noexcept = default;
   BlockPool& operator=(BlockPool&&) noexcept = default;
 
+  /// A block of at least `count` T, not initialised.
   T* take(std::size_t count) {
     const unsigned size_class = class_of(count);
     std::vector<T*>& free = free_[size_class];
@@ -29,9 +30,10 @@ class BlockPool {
     }
     return carve(class_size(size_class));
   }
+  /// Takes back a block of take(count).
   void give_back(T* block, std::size_t count) { free_[class_of(count)].push_back(block); }
 
-  /// Everything ever taken from the system.
+  /// Memory taken from the system so far [bytes]; none is given back before the end.
   std::size_t bytes() const { return bytes_; }
 
  private:

@@ -1,4 +1,4 @@
-// Records by number, with the way back to an earlier state.
+// Records by number, with undo.
 #pragma once
 
 #include <cstdint>
@@ -15,6 +15,7 @@ class JournaledTable {
   static_assert(std::is_trivially_copyable_v<T>);
 
  public:
+  /// A new record, of T{}; returns its number.
   int add() {
     int id = 0;
     if (free_.empty()) {
@@ -30,9 +31,13 @@ class JournaledTable {
     added_.push_back(id);
     return id;
   }
+  /// Its number serves again after the next commit(); until then the record stays.
   void remove(int id) { removed_.push_back(id); }
 
+  /// The record with this number.
   const T& operator[](int id) const { return records_[static_cast<std::size_t>(id)]; }
+  /// The same for change: its first change since the last commit() saves what it was. References
+  /// end with the next add().
   T& edit(int id) {
     const auto at = static_cast<std::size_t>(id);
     if (saved_at_[at] != epoch_) {
@@ -41,9 +46,10 @@ class JournaledTable {
     }
     return records_[at];
   }
-  /// For what is no part of the state.
+  /// The same for what is no part of the state: rollback() may restore it or not.
   T& edit_unsaved(int id) { return records_[static_cast<std::size_t>(id)]; }
 
+  /// Number of records, with those removed.
   int size() const { return static_cast<int>(records_.size()); }
   /// Grows with every commit: what carries it was made since the last one.
   std::uint64_t epoch() const { return epoch_; }
@@ -83,6 +89,7 @@ class JournaledTable {
     forget();
   }
 
+  /// Numbers given out since the last commit().
   const std::vector<int>& added() const { return added_; }
 
  private:

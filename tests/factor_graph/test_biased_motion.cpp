@@ -44,7 +44,7 @@ factor_graph::plane::Graph with_gyro(factor_graph::plane::Graph graph, double ra
 
 }  // namespace
 
-TEST_CASE("A turning pose's derivative equals the numerical one", "[factor_graph]") {
+TEST_CASE("A biased motion's derivative equals the numerical one", "[factor_graph]") {
   std::mt19937_64 random(5);
   const std::array<VariableType, 3> types{VariableType::kPose2, VariableType::kPose2,
                                           VariableType::kScalar};
@@ -54,8 +54,8 @@ TEST_CASE("A turning pose's derivative equals the numerical one", "[factor_graph
     const geometry::SE2 b =
         a * measured * geometry::SE2::Exp(test::random_tangent(random, 0.2, 0.1));
     std::array<Value, 3> values{value_of(a), value_of(b), value_of(0.1 * trial)};
-    const Factor factor = turning(VariableId(0), VariableId(1), VariableId(2), measured, kSeconds,
-                                  Eigen::Matrix3d::Identity());
+    const Factor factor = biased_relative(VariableId(0), VariableId(1), VariableId(2), measured,
+                                          kSeconds, Eigen::Matrix3d::Identity());
     const auto residual = [&](Eigen::Matrix<double, 3, 7>* jacobian) {
       Eigen::Vector3d e;
       const std::array<const Value*, 3> pointers{&values[0], &values[1], &values[2]};
@@ -122,8 +122,9 @@ TEST_CASE("A road with a gyro that is off ends where the batch solution is", "[s
     batch.add(observation(poses[index(f.pose)], points[index(f.point)], f.position, f.information));
   }
   for (const factor_graph::plane::BiasedRelativePose& f : whole.biased_relative_poses) {
-    batch.add(turning(poses[index(f.motion.a)], poses[index(f.motion.b)], scalars[index(f.bias)],
-                      f.motion.a_T_b, f.seconds, f.motion.information));
+    batch.add(biased_relative(poses[index(f.motion.a)], poses[index(f.motion.b)],
+                              scalars[index(f.bias)], f.motion.a_T_b, f.seconds,
+                              f.motion.information));
   }
   for (const factor_graph::plane::ScalarPrior& f : whole.scalar_priors)
     batch.add(prior(scalars[index(f.scalar)], f.mean, f.information));
