@@ -100,8 +100,8 @@ TEST_CASE("Stems of a real plot are found", "[forest_plot][recorded]") {
   options.grid_m = 3.0;
   options.clearance_m = 0.4;
   for (const char* name : {"TLS_Clip", "pine_plot"}) {
-    const eval::experiments::frontend::PlotScore score = score_plot(
-        eval::experiments::frontend::read_forest_plot(plots_folder, name), {}, options);
+    const eval::experiments::frontend::PlotScore score =
+        score_plot(eval::experiments::frontend::read_forest_plot(plots_folder, name), {}, options);
     CHECK(score.should > 20);
     CHECK(score.recall() > 0.5);
     CHECK(score.precision() > 0.7);
