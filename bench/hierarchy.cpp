@@ -59,6 +59,7 @@ bool too_large(benchmark::State& state) {
 void triangulate_from_scratch(benchmark::State& state) {
   const auto& forest = scene(kThesisMap).forest;
   std::vector<Eigen::Vector2d> positions;
+  positions.reserve(forest.size());
   for (const hierarchy::LandmarkPosition& landmark : forest) {
     positions.push_back(landmark.position_m);
   }

@@ -37,7 +37,7 @@ std::string toml_text(const std::string& text) {
   return result + "\"";
 }
 
-std::string with_unit(std::string text, const std::string& unit) {
+std::string with_unit(const std::string& text, const std::string& unit) {
   return unit.empty() ? text : text + " " + unit;
 }
 

@@ -78,6 +78,10 @@ constexpr bool kIsPair = false;
 template <class A, class B>
 constexpr bool kIsPair<std::pair<A, B>> = true;
 
+template <class T>
+constexpr bool kIsContainer =
+    kIsOptional<T> || kIsPair<T> || kIsArray<T> || kIsMap<T> || kIsList<T>;
+
 /// True for `Self` = T and const T: constrains a free archive() to one type.
 template <class Self, class T>
 concept Is = std::same_as<std::remove_const_t<Self>, T>;
@@ -186,7 +190,17 @@ class Reader {
     } else if constexpr (std::same_as<T, geometry::SE2WithCovariance>) {
       get(value.mean);
       get(value.covariance);
-    } else if constexpr (kIsOptional<T>) {
+    } else if constexpr (kIsContainer<T>) {
+      get_container(value);
+    } else if constexpr (requires { T::archive(*this, value); }) {
+      T::archive(*this, value);
+    } else {
+      archive(*this, value);
+    }
+  }
+  template <class T>
+  void get_container(T& value) {
+    if constexpr (kIsOptional<T>) {
       bool is_there = false;
       get(is_there);
       value.reset();
@@ -217,10 +231,6 @@ class Reader {
         get(element);
         value.push_back(std::move(element));
       }
-    } else if constexpr (requires { T::archive(*this, value); }) {
-      T::archive(*this, value);
-    } else {
-      archive(*this, value);
     }
   }
   /// A number of elements of at least so many bytes: a damaged one asks for no memory.
