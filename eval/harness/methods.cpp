@@ -1,4 +1,4 @@
-// make_stages of eval/slam_session.hpp.
+// make_stages of eval/harness/slam_session.hpp.
 #include <stdexcept>
 
 #include "eval/harness/slam_session.hpp"

@@ -1,4 +1,4 @@
-// run_oracle of eval/run.hpp.
+// run_oracle of eval/harness/run.hpp.
 #include <algorithm>
 #include <cmath>
 
