@@ -12,7 +12,7 @@
 namespace understory::sim {
 namespace {
 
-constexpr double kTile = 10.0;
+constexpr double kGridTile_m = 10.0;
 
 Forest forest_that_holds(const DriveParameters& parameters, std::uint64_t seed) {
   ForestParameters forest = parameters.forest;
@@ -110,7 +110,7 @@ Drive::Drive(const DriveParameters& parameters, std::uint64_t seed)
 
 Drive::Drive(const DriveParameters& parameters, Forest forest, std::uint64_t seed)
     : parameters_(parameters), seed_(seed), forest_(std::move(forest)) {
-  grid_ = std::make_unique<PointGrid>(forest_.trunks_m, kTile);
+  grid_ = std::make_unique<PointGrid>(forest_.trunks_m, kGridTile_m);
   place_path();
 }
 
@@ -147,7 +147,7 @@ void Drive::fell_trunks_on(const std::vector<geometry::SE2>& path) {
   }
 
   forest_ = std::move(cleared);
-  grid_ = std::make_unique<PointGrid>(forest_.trunks_m, kTile);
+  grid_ = std::make_unique<PointGrid>(forest_.trunks_m, kGridTile_m);
 }
 
 model::Utime Drive::utime(std::size_t k) const {

@@ -9,7 +9,7 @@
 namespace understory::sim {
 namespace {
 
-constexpr std::array<std::pair<ForestKind, std::string_view>, 3> kNames{
+constexpr std::array<std::pair<ForestKind, std::string_view>, 3> kForestNames{
     {{ForestKind::kDense, "dense"},
      {ForestKind::kIntermediate, "intermediate"},
      {ForestKind::kSparse, "sparse"}}};
@@ -121,14 +121,14 @@ ForestParameters forest_parameters(ForestKind kind) {
 }
 
 std::string_view to_string(ForestKind kind) {
-  for (const auto& [value, name] : kNames) {
+  for (const auto& [value, name] : kForestNames) {
     if (value == kind) return name;
   }
   return "?";
 }
 
 std::optional<ForestKind> forest_kind(std::string_view name) {
-  for (const auto& [value, known] : kNames) {
+  for (const auto& [value, known] : kForestNames) {
     if (known == name) return value;
   }
   return std::nullopt;

@@ -11,7 +11,7 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr std::array<std::pair<PathKind, std::string_view>, 8> kNames{
+constexpr std::array<std::pair<PathKind, std::string_view>, 8> kPathNames{
     {{PathKind::kCircle, "circle"},
      {PathKind::kLine, "line"},
      {PathKind::kFigureEight, "figure-eight"},
@@ -83,14 +83,14 @@ std::vector<Segment> segments_of(const PathParameters& parameters) {
 }  // namespace
 
 std::string_view to_string(PathKind kind) {
-  for (const auto& [value, name] : kNames) {
+  for (const auto& [value, name] : kPathNames) {
     if (value == kind) return name;
   }
   return "?";
 }
 
 std::optional<PathKind> path_kind(std::string_view name) {
-  for (const auto& [value, known] : kNames) {
+  for (const auto& [value, known] : kPathNames) {
     if (known == name) return value;
   }
   return std::nullopt;

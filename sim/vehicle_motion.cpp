@@ -7,9 +7,9 @@
 namespace understory::sim {
 namespace {
 
-constexpr double kStep = 0.02;     ///< [s]
-constexpr double kSpacing = 0.25;  ///< Of the speed limits along the route [m].
-constexpr double kEasing = 0.6;    ///< Over which a change of acceleration is spread [s].
+constexpr double kMotionStep = 0.02;  ///< [s]
+constexpr double kSpacing = 0.25;     ///< Of the speed limits along the route [m].
+constexpr double kEasing = 0.6;       ///< Over which a change of acceleration is spread [s].
 
 /// Greatest speed at every kSpacing of the route, by curvature, by stops and by what the engine
 /// and the brakes allow (forward and backward pass).
@@ -57,7 +57,7 @@ std::vector<double> distances(const Route& route, const SpeedParameters& paramet
   // Time at which each place is left and reached; between places the acceleration is constant.
   std::vector<double> along;
   const auto stand = [&](double seconds, double at_m) {
-    along.insert(along.end(), static_cast<std::size_t>(std::lround(seconds / kStep)), at_m);
+    along.insert(along.end(), static_cast<std::size_t>(std::lround(seconds / kMotionStep)), at_m);
   };
 
   stand(parameters.standstill_s, 0.0);
@@ -68,7 +68,7 @@ std::vector<double> distances(const Route& route, const SpeedParameters& paramet
     const double seconds = 2.0 * kSpacing / std::max(from + to, 1e-3);
     const double acceleration = (to - from) / seconds;
 
-    for (; late < seconds; late += kStep) {
+    for (; late < seconds; late += kMotionStep) {
       along.push_back(static_cast<double>(i) * kSpacing + from * late +
                       0.5 * acceleration * late * late);
     }
@@ -115,8 +115,8 @@ class Suspension {
     }
 
     constexpr int kSubsteps = 4;
-    const double dt = kStep / kSubsteps;
-    const Eigen::Vector3d goal_rate = (goal - goal_) / kStep;
+    const double dt = kMotionStep / kSubsteps;
+    const Eigen::Vector3d goal_rate = (goal - goal_) / kMotionStep;
 
     for (int i = 1; i <= kSubsteps; ++i) {
       const Eigen::Vector3d target = goal_ + static_cast<double>(i) / kSubsteps * (goal - goal_);
@@ -165,7 +165,7 @@ VehicleMotion::VehicleMotion(const Route& route, const Ground& ground,
                              const VehicleParameters& vehicle, const SpeedParameters& speed)
     : vehicle_(vehicle) {
   std::vector<double> along = distances(route, speed);
-  const int half = static_cast<int>(std::lround(0.5 * kEasing / kStep));
+  const int half = static_cast<int>(std::lround(0.5 * kEasing / kMotionStep));
   for (int pass = 0; pass < 3; ++pass) along = box_smoothed(along, half);
   driven_m_ = along.empty() ? 0.0 : along.back();
 
@@ -180,9 +180,9 @@ VehicleMotion::VehicleMotion(const Route& route, const Ground& ground,
   for (std::ptrdiff_t k = 0; k < static_cast<std::ptrdiff_t>(along.size()); ++k) {
     const Route::Place place = route.at(distance(k));
     yaw += geometry::wrap_angle(place.heading_rad - yaw);
-    const double velocity = (distance(k + 1) - distance(k - 1)) / (2.0 * kStep);
+    const double velocity = (distance(k + 1) - distance(k - 1)) / (2.0 * kMotionStep);
     const double acceleration =
-        (distance(k + 1) - 2.0 * distance(k) + distance(k - 1)) / (kStep * kStep);
+        (distance(k + 1) - 2.0 * distance(k) + distance(k - 1)) / (kMotionStep * kMotionStep);
     Eigen::Vector3d goal = on_wheels(ground, {place.position_m, yaw}, vehicle);
     // A curve to the left rolls the body to the right: positive roll (left side up).
     goal.y() += vehicle.roll_per_mps2 * velocity * velocity * place.curvature;
@@ -192,7 +192,7 @@ VehicleMotion::VehicleMotion(const Route& route, const Ground& ground,
     point << place.position_m, body.x(), body.y(), body.z(), yaw;
     points.push_back(point);
   }
-  pose_ = UniformSpline<6>(std::move(points), kStep);
+  pose_ = UniformSpline<6>(std::move(points), kMotionStep);
 }
 
 VehicleState VehicleMotion::at(double time_s) const {

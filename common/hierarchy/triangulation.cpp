@@ -8,30 +8,26 @@
 #include "common/hierarchy/location_hints.hpp"
 
 namespace understory::hierarchy {
-namespace {
-
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using Point = Kernel::Point_2;
-
-struct FaceInfo {
-  std::uint32_t triangle = kNone;
-  std::uint32_t visit = 0;
-};
-
-using Delaunay = CGAL::Delaunay_triangulation_2<
-    Kernel, CGAL::Triangulation_data_structure_2<
-                CGAL::Triangulation_vertex_base_with_info_2<std::uint32_t, Kernel>,
-                CGAL::Triangulation_face_base_with_info_2<FaceInfo, Kernel>>>;
-using Face = Delaunay::Face_handle;
-using Vertex = Delaunay::Vertex_handle;
-
-Point to_cgal(const Eigen::Vector2d& p) { return {p.x(), p.y()}; }
-
-}  // namespace
-
 /// The CGAL side. Its faces carry the index of their Triangle; only the faces around a change are
 /// looked at.
 struct Triangulation::Impl {
+  using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+  using Point = Kernel::Point_2;
+
+  struct FaceInfo {
+    std::uint32_t triangle = kNone;
+    std::uint32_t visit = 0;
+  };
+
+  using Delaunay = CGAL::Delaunay_triangulation_2<
+      Kernel, CGAL::Triangulation_data_structure_2<
+                  CGAL::Triangulation_vertex_base_with_info_2<std::uint32_t, Kernel>,
+                  CGAL::Triangulation_face_base_with_info_2<FaceInfo, Kernel>>>;
+  using Face = Delaunay::Face_handle;
+  using Vertex = Delaunay::Vertex_handle;
+
+  static Point to_cgal(const Eigen::Vector2d& p) { return {p.x(), p.y()}; }
+
   explicit Impl(Triangulation* owner) : self(owner) {}
 
   Triangulation* self;
@@ -303,7 +299,7 @@ Triangulation& Triangulation::operator=(Triangulation&& other) noexcept {
 }
 
 bool Triangulation::is_landmark(std::uint32_t slot) const {
-  return slot < impl_->vertices.size() && impl_->vertices[slot] != Vertex();
+  return slot < impl_->vertices.size() && impl_->vertices[slot] != Impl::Vertex();
 }
 
 std::uint32_t Triangulation::allocate_slot(std::uint64_t id, const Eigen::Vector2d& position_m) {
@@ -323,7 +319,7 @@ std::uint32_t Triangulation::allocate_slot(std::uint64_t id, const Eigen::Vector
 
 void Triangulation::release_slot(std::uint32_t slot) {
   slot_of_id_.erase(ids_[slot]);
-  impl_->vertices[slot] = Vertex();
+  impl_->vertices[slot] = Impl::Vertex();
   free_slots_.push_back(slot);
 }
 
@@ -337,7 +333,7 @@ ChangeStatus Triangulation::insert(std::uint64_t id, const Eigen::Vector2d& posi
   if (place.occupied()) return ChangeStatus::kCoincident;
 
   const std::uint32_t slot = allocate_slot(id, position_m);
-  impl_->vertices[slot] = impl_->insert(slot, to_cgal(position_m), place, change);
+  impl_->vertices[slot] = impl_->insert(slot, Impl::to_cgal(position_m), place, change);
   impl_->hints.remember(position_m, slot);
   impl_->last_slot = slot;
 
@@ -348,7 +344,7 @@ ChangeStatus Triangulation::remove(std::uint64_t id, TriangulationChange& change
   change.clear();
   const auto found = slot(id);
   if (!found) return ChangeStatus::kUnknownId;
-  const Vertex vertex = impl_->vertices[*found];
+  const Impl::Vertex vertex = impl_->vertices[*found];
   const auto neighbour = impl_->some_neighbour(vertex);
   impl_->hints.forget(positions_[*found], *found, neighbour);
   impl_->last_slot = neighbour.value_or(kNone);
@@ -365,13 +361,13 @@ ChangeStatus Triangulation::move(std::uint64_t id, const Eigen::Vector2d& positi
   const auto found = slot(id);
   if (!found) return ChangeStatus::kUnknownId;
 
-  const Point point = to_cgal(position_m);
-  const Vertex vertex = impl_->vertices[*found];
+  const Impl::Point point = Impl::to_cgal(position_m);
+  const Impl::Vertex vertex = impl_->vertices[*found];
   if (vertex->point() == point) return ChangeStatus::kDone;
 
   if (impl_->move_in_place(vertex, point)) {
     positions_[*found] = position_m;
-    for (const Face& face : impl_->scratch_faces) {
+    for (const Impl::Face& face : impl_->scratch_faces) {
       find_longest_edge(triangles_[face->info().triangle]);
       change.made.push_back(face->info().triangle);
     }
@@ -390,9 +386,9 @@ ChangeStatus Triangulation::move(std::uint64_t id, const Eigen::Vector2d& positi
 }
 
 std::optional<std::uint32_t> Triangulation::nearest(const Eigen::Vector2d& position_m) const {
-  const Vertex vertex =
-      impl_->delaunay.nearest_vertex(to_cgal(position_m), impl_->start_near(position_m));
-  return vertex == Vertex() ? std::nullopt : std::optional(vertex->info());
+  const Impl::Vertex vertex =
+      impl_->delaunay.nearest_vertex(Impl::to_cgal(position_m), impl_->start_near(position_m));
+  return vertex == Impl::Vertex() ? std::nullopt : std::optional(vertex->info());
 }
 
 }  // namespace understory::hierarchy

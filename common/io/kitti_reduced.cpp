@@ -13,7 +13,7 @@
 namespace understory::io {
 namespace {
 
-constexpr std::size_t kHeaderBytes = 8;
+constexpr std::size_t kFrameHeaderBytes = 8;
 constexpr std::size_t kPointBytes = 8;
 constexpr double kTurn_s = 0.1;
 constexpr model::Utime kStart_us = 1'000'000;  // the recording has no clock: no stamp is negative
@@ -62,14 +62,14 @@ ReducedKitti::ReducedKitti(const std::filesystem::path& path, std::string_view p
   std::size_t at = 0;
 
   while (at < bytes_.size()) {
-    if (at + kHeaderBytes > bytes_.size())
+    if (at + kFrameHeaderBytes > bytes_.size())
       throw DataError(fmt::format("{}: cut off at byte {}", source_, at));
     const std::size_t count = count_at(bytes_, at + 4);
     if (count_at(bytes_, at) != offsets_.size() ||
-        count > (bytes_.size() - at - kHeaderBytes) / kPointBytes)
+        count > (bytes_.size() - at - kFrameHeaderBytes) / kPointBytes)
       throw DataError(fmt::format("{}: no sweep {} at byte {}", source_, offsets_.size(), at));
     offsets_.push_back(at);
-    at += kHeaderBytes + count * kPointBytes;
+    at += kFrameHeaderBytes + count * kPointBytes;
   }
 
   if (offsets_.size() != poses_.size())
@@ -88,7 +88,7 @@ model::PointSweep ReducedKitti::read_sweep(std::size_t index) const {
 
   sweep.points.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t at = offsets_[index] + kHeaderBytes + i * kPointBytes;
+    const std::size_t at = offsets_[index] + kFrameHeaderBytes + i * kPointBytes;
     model::SweepPoint point;
     point.x_m = metres_at(bytes_, at);
     point.y_m = metres_at(bytes_, at + 2);

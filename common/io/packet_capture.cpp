@@ -21,7 +21,7 @@ constexpr std::size_t kMostTags = 2;
 
 using Frame = std::span<const std::uint8_t>;
 
-std::uint16_t word(Frame frame, std::size_t at) {
+std::uint16_t network_word(Frame frame, std::size_t at) {
   return static_cast<std::uint16_t>((frame[at] << 8U) | frame[at + 1]);
 }
 
@@ -30,7 +30,7 @@ Frame internet_packet(Frame frame) {
   std::size_t type_at = kEthernetBytes - 2;
   for (std::size_t tag = 0; tag <= kMostTags; ++tag) {
     if (type_at + 2 > frame.size()) return {};
-    const std::uint16_t type = word(frame, type_at);
+    const std::uint16_t type = network_word(frame, type_at);
     if (type == kIpv4) return frame.subspan(type_at + 2);
     if (type != kVlan) return {};
     type_at += kTagBytes;
@@ -42,17 +42,17 @@ Frame internet_packet(Frame frame) {
 std::optional<CapturedPacket> udp_payload(Frame packet) {
   if (packet.size() < 20 || packet[0] >> 4U != 4) return std::nullopt;
   const std::size_t header = 4U * (packet[0] & 0x0FU);
-  const bool is_fragment = (word(packet, 6) & 0x3FFFU) != 0;
+  const bool is_fragment = (network_word(packet, 6) & 0x3FFFU) != 0;
   if (header < 20 || packet[9] != kUdp || is_fragment || packet.size() < header + kUdpBytes)
     return std::nullopt;
 
   const Frame datagram = packet.subspan(header);
-  const std::size_t length = word(datagram, 4);
+  const std::size_t length = network_word(datagram, 4);
   if (length < kUdpBytes || length > datagram.size()) return std::nullopt;
 
   const Frame payload = datagram.subspan(kUdpBytes, length - kUdpBytes);
   CapturedPacket result;
-  result.port = word(datagram, 2);
+  result.port = network_word(datagram, 2);
   result.payload.assign(payload.begin(), payload.end());
 
   return result;

@@ -28,7 +28,7 @@ struct Field {
   std::size_t offset = 0;  ///< In a point.
 };
 
-struct Header {
+struct CloudHeader {
   std::vector<Field> fields;
   std::size_t points = 0;
   std::size_t point_bytes = 0;
@@ -48,7 +48,7 @@ void set_column(std::istringstream& line, std::vector<Field>& fields, const std:
   }
 }
 
-void check(Header& header, std::string_view source) {
+void check(CloudHeader& header, std::string_view source) {
   for (Field& field : header.fields) {
     const bool fits =
         (field.type == 'F' && (field.bytes == 4 || field.bytes == 8)) ||
@@ -68,8 +68,8 @@ void check(Header& header, std::string_view source) {
     refuse(source, "no line FIELDS that could be");
 }
 
-Header parse_header(std::string_view bytes, std::string_view source) {
-  Header header;
+CloudHeader parse_header(std::string_view bytes, std::string_view source) {
+  CloudHeader header;
   std::size_t at = 0;
   while (at < bytes.size()) {
     const std::size_t end = std::min(bytes.find('\n', at), bytes.size());
@@ -124,7 +124,8 @@ double value_at(const Field& field, const char* at) {
 /// All values of one field, point by point.
 using Column = std::vector<double>;
 
-std::vector<Column> binary_columns(const Header& header, std::string_view data, bool by_field) {
+std::vector<Column> binary_columns(const CloudHeader& header, std::string_view data,
+                                   bool by_field) {
   std::vector<Column> columns(header.fields.size(), Column(header.points));
   std::size_t start = 0;
   for (std::size_t f = 0; f < header.fields.size(); ++f) {
@@ -138,7 +139,7 @@ std::vector<Column> binary_columns(const Header& header, std::string_view data, 
   return columns;
 }
 
-std::vector<Column> ascii_columns(const Header& header, std::string_view text,
+std::vector<Column> ascii_columns(const CloudHeader& header, std::string_view text,
                                   std::string_view source) {
   std::vector<Column> columns(header.fields.size());
   std::size_t at = 0;
@@ -166,7 +167,7 @@ std::vector<Column> ascii_columns(const Header& header, std::string_view text,
   return columns;
 }
 
-std::vector<Column> columns_of(const Header& header, std::string_view bytes,
+std::vector<Column> columns_of(const CloudHeader& header, std::string_view bytes,
                                std::string_view source) {
   const std::string_view data = bytes.substr(header.end);
   const std::size_t size = header.points * header.point_bytes;
@@ -211,7 +212,7 @@ std::string decompress_lzf(std::string_view compressed, std::size_t size, std::s
 }
 
 model::PointSweep parse_pcd(std::string_view bytes, std::string_view source) {
-  const Header header = parse_header(bytes, source);
+  const CloudHeader header = parse_header(bytes, source);
   const std::vector<Column> columns = columns_of(header, bytes, source);
   const auto column =
       [&](std::initializer_list<std::string_view> names) -> std::optional<std::size_t> {

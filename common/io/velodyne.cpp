@@ -10,22 +10,23 @@ namespace {
 
 constexpr std::size_t kBlocks = 12;
 constexpr std::size_t kBlockBytes = 100;
-constexpr std::size_t kTimeAt = 1200;
+constexpr std::size_t kPacketTimeAt = 1200;
 constexpr std::size_t kProductAt = 1205;
 constexpr std::uint16_t kUpperFlag = 0xEEFF;
 constexpr std::uint16_t kLowerFlag = 0xDDFF;
 constexpr int kTurn = 36000;  // hundredths of a degree
 constexpr double kHour_us = 3.6e9;
-constexpr std::size_t kMostPoints =
+constexpr std::size_t kMostPointsPerSweep =
     2'000'000;  // of a revolution; a packet stream without azimuth zero ends here
 constexpr int kLargestStep = 600;  // of the azimuth from packet to packet
 
-std::uint16_t word(std::span<const std::uint8_t> packet, std::size_t at) {
+std::uint16_t little_endian_word(std::span<const std::uint8_t> packet, std::size_t at) {
   return static_cast<std::uint16_t>(packet[at] | (packet[at + 1] << 8U));
 }
 
-std::uint32_t long_word(std::span<const std::uint8_t> packet, std::size_t at) {
-  return word(packet, at) | (static_cast<std::uint32_t>(word(packet, at + 2)) << 16U);
+std::uint32_t little_endian_long_word(std::span<const std::uint8_t> packet, std::size_t at) {
+  return little_endian_word(packet, at) |
+         (static_cast<std::uint32_t>(little_endian_word(packet, at + 2)) << 16U);
 }
 
 /// How the firings of a model lie in a packet.
@@ -71,9 +72,10 @@ std::optional<VelodynePacketFault> check_velodyne_packet(std::span<const std::ui
   if (packet.size() != kVelodyneDataBytes) return VelodynePacketFault::kWrongSize;
   if (is_other_product(layout, packet[kProductAt])) return VelodynePacketFault::kOtherModel;
   for (std::size_t b = 0; b < kBlocks; ++b) {
-    const std::uint16_t flag = word(packet, b * kBlockBytes);
+    const std::uint16_t flag = little_endian_word(packet, b * kBlockBytes);
     if (flag != kUpperFlag && flag != kLowerFlag) return VelodynePacketFault::kDamaged;
-    if (word(packet, b * kBlockBytes + 2) >= kTurn) return VelodynePacketFault::kDamaged;
+    if (little_endian_word(packet, b * kBlockBytes + 2) >= kTurn)
+      return VelodynePacketFault::kDamaged;
     const bool lower = layout.blocks_per_firing == 2 && b % 2 == 1;
     if (flag != (lower ? kLowerFlag : kUpperFlag)) return VelodynePacketFault::kOtherModel;
   }
@@ -81,7 +83,7 @@ std::optional<VelodynePacketFault> check_velodyne_packet(std::span<const std::ui
 }
 
 std::uint32_t velodyne_packet_time_us(std::span<const std::uint8_t> packet) {
-  return long_word(packet, kTimeAt);
+  return little_endian_long_word(packet, kPacketTimeAt);
 }
 
 /// The blocks of a packet, checked.
@@ -132,7 +134,8 @@ std::optional<model::PointSweep> VelodyneDecoder::add(std::span<const std::uint8
     return std::nullopt;
   }
   Block block;
-  for (std::size_t b = 0; b < kBlocks; ++b) block.azimuth[b] = word(packet, b * kBlockBytes + 2);
+  for (std::size_t b = 0; b < kBlocks; ++b)
+    block.azimuth[b] = little_endian_word(packet, b * kBlockBytes + 2);
   const double past_hour = static_cast<double>(velodyne_packet_time_us(packet));
   const double hours = std::round((static_cast<double>(received) - past_hour) / kHour_us);
   block.packet_us = hours * kHour_us + past_hour;
@@ -144,7 +147,7 @@ std::optional<model::PointSweep> VelodyneDecoder::add(std::span<const std::uint8
   // next.
   std::optional<model::PointSweep> sweep;
   if ((last_azimuth_ > block.azimuth[0] && last_azimuth_ - block.azimuth[0] > kTurn / 2) ||
-      sweep_.points.size() > kMostPoints)
+      sweep_.points.size() > kMostPointsPerSweep)
     sweep = take_revolution();
   add_block(packet, block);
   if (!pending_.points.empty()) {
@@ -184,7 +187,7 @@ void VelodyneDecoder::add_block(std::span<const std::uint8_t> packet, const Bloc
         for (std::size_t r = 0; r < returns; ++r) {
           const std::size_t at =
               (b + r * layout.blocks_per_firing + beam / 32) * kBlockBytes + 4 + 3 * channel;
-          const std::uint16_t distance = word(packet, at);
+          const std::uint16_t distance = little_endian_word(packet, at);
           if (distance == 0 || (r == 1 && distance == first)) continue;
           first = distance;
           add_point(*sweep, {beam, azimuth, distance, packet[at + 2],

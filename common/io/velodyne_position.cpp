@@ -9,7 +9,7 @@
 namespace understory::io {
 namespace {
 
-constexpr std::size_t kTimeAt = 198;
+constexpr std::size_t kPositionTimeAt = 198;
 constexpr std::size_t kSentenceAt = 206;
 constexpr double kKnot_mps = 1852.0 / 3600.0;
 
@@ -88,7 +88,7 @@ std::optional<VelodynePosition> parse_velodyne_position(std::span<const std::uin
   auto position = parse_gprmc(sentence);
   if (!position) return std::nullopt;
   for (std::size_t i = 0; i < 4; ++i)
-    position->past_hour_us |= static_cast<std::uint32_t>(packet[kTimeAt + i]) << (8U * i);
+    position->past_hour_us |= static_cast<std::uint32_t>(packet[kPositionTimeAt + i]) << (8U * i);
   return position;
 }
 

@@ -6,7 +6,6 @@
 namespace understory::wire {
 namespace {
 
-constexpr double kFastestMps = 1000.0;
 constexpr double kLargestBias = 100.0;
 constexpr double kLargestLevel_rad = 1.6;
 

@@ -7,7 +7,6 @@ namespace understory::wire {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
-constexpr double kFastestMps = 1000.0;
 
 model::Detection detection(const detection_t& wire, Checks& checks) {
   check_landmark(wire, checks);

@@ -17,6 +17,8 @@ inline constexpr double kFarthestPositionM = 1e7;
 inline constexpr double kLargestRadiusM = 100.0;
 /// Longest range of a field of view.
 inline constexpr double kLongestRangeM = 1e6;
+/// Largest component of a velocity.
+inline constexpr double kFastestMps = 1000.0;
 
 /// Into the rows of a wire type.
 template <int N>

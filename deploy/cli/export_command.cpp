@@ -14,7 +14,7 @@
 namespace understory::cli {
 namespace {
 
-struct Options {
+struct ExportOptions {
   std::string log;
   std::filesystem::path out;
   std::vector<std::string> formats{"tum", "csv", "g2o"};
@@ -52,7 +52,7 @@ void export_as(const std::string& format, const SlamResults& results,
   }
 }
 
-void run(const Options& options) {
+void run(const ExportOptions& options) {
   terminal::catch_interrupts();
   try {
     const auto results = read_results(options.log);
@@ -70,7 +70,7 @@ void run(const Options& options) {
 
 void add_export_command(CLI::App& parent) {
   auto* command = parent.add_subcommand("export", "Results in formats that other tools read");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ExportOptions>();
   command->add_option("log", options->log, "An LCM log with the mapper's output")->required();
   command->add_option("--out", options->out, "Directory for the files")->required();
   command->add_option("--format", options->formats, "tum, csv, g2o")

@@ -19,7 +19,7 @@
 namespace understory::cli {
 namespace {
 
-struct Options {
+struct VictoriaParkImportOptions {
   std::string path;
   std::string out;
   bool raw = false;
@@ -87,7 +87,7 @@ class Importer {
   std::size_t fix_ = 0;
 };
 
-void import_victoria_park(const Options& options) {
+void import_victoria_park(const VictoriaParkImportOptions& options) {
   terminal::catch_interrupts();
   try {
     const io::VictoriaPark recording = io::read_victoria_park(options.path);
@@ -112,7 +112,7 @@ void add_import_command(CLI::App& parent) {
   command->require_subcommand(1);
   auto* victoria = command->add_subcommand(
       "victoria-park", "The Victoria Park set: laser, wheels and GPS of a car among trees");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<VictoriaParkImportOptions>();
   victoria
       ->add_option("path", options->path,
                    "victoria_park_ascii.zip, or a folder with LASER.txt, DRS.txt and GPS.txt")

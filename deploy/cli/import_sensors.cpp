@@ -26,7 +26,7 @@
 namespace understory::cli {
 namespace {
 
-struct Options {
+struct SensorImportOptions {
   std::string path;
   std::string out;
   bool wheels = false;
@@ -50,7 +50,7 @@ void guarded(const std::function<void()>& import) {
   }
 }
 
-std::string read_file(const std::string& path) {
+std::string read_recorded(const std::string& path) {
   const std::filesystem::path file(path);
   const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
   return io::RecordingFolder(folder).read(file.filename().string());
@@ -107,7 +107,7 @@ void add_sweeps(const Drive& drive, RecordingLog& log) {
   }
 }
 
-void import_kitti(const Options& options) {
+void import_kitti(const SensorImportOptions& options) {
   const io::KittiRaw drive(options.path);
   RecordingLog log(options.out);
   add_oxts(drive, options.wheels, log);
@@ -118,7 +118,7 @@ void import_kitti(const Options& options) {
              options.out);
 }
 
-void import_kitti_reduced(const Options& options) {
+void import_kitti_reduced(const SensorImportOptions& options) {
   const io::ReducedKitti drive(options.path, options.poses);
   RecordingLog log(options.out);
   for (const io::ReducedKittiPose& pose : drive.poses())
@@ -128,14 +128,14 @@ void import_kitti_reduced(const Options& options) {
   fmt::print("{} sweeps with poses ({}) -> {}\n", drive.sweeps(), options.poses, options.out);
 }
 
-io::VelodyneCalibration calibration_of(const Options& options) {
+io::VelodyneCalibration calibration_of(const SensorImportOptions& options) {
   const auto model = io::velodyne_model(options.model);
   if (!model) fail(fmt::format("--model {}: vlp16, vlp32c, hdl32e or hdl64e", options.model));
   if (options.calibration.empty()) return velodyne_calibration(*model);
-  return io::parse_hdl64_calibration(read_file(options.calibration), options.calibration);
+  return io::parse_hdl64_calibration(read_recorded(options.calibration), options.calibration);
 }
 
-void import_pcap(const Options& options) {
+void import_pcap(const SensorImportOptions& options) {
   io::PacketCapture capture(options.path);
   io::VelodyneDecoder decoder(calibration_of(options));
   RecordingLog log(options.out);
@@ -165,20 +165,22 @@ void import_pcap(const Options& options) {
              capture.is_cut_off() ? ", the file is cut off" : "", options.out);
 }
 
-void add_tables(const Options& options, RecordingLog& log) {
+void add_tables(const SensorImportOptions& options, RecordingLog& log) {
   if (!options.imu.empty()) {
-    for (const model::ImuSample& sample : io::parse_imu_table(read_file(options.imu), options.imu))
+    for (const model::ImuSample& sample :
+         io::parse_imu_table(read_recorded(options.imu), options.imu))
       log.add("RAW_IMU", sample);
   }
 
   if (!options.wheel_table.empty()) {
     for (const model::WheelSample& sample :
-         io::parse_wheel_table(read_file(options.wheel_table), options.wheel_table))
+         io::parse_wheel_table(read_recorded(options.wheel_table), options.wheel_table))
       log.add("RAW_WHEELS", sample);
   }
 
   if (!options.gnss.empty()) {
-    for (const model::GnssFix& fix : io::parse_gnss_table(read_file(options.gnss), options.gnss))
+    for (const model::GnssFix& fix :
+         io::parse_gnss_table(read_recorded(options.gnss), options.gnss))
       log.add("RAW_GNSS", fix);
   }
 }
@@ -188,7 +190,7 @@ void report_tables(const RecordingLog& log, std::size_t sweeps, const std::strin
              log.count("RAW_IMU"), log.count("RAW_WHEELS"), log.count("RAW_GNSS"), out);
 }
 
-void import_pcd(const Options& options) {
+void import_pcd(const SensorImportOptions& options) {
   const std::vector<io::PcdFile> files = io::find_pcd_sequence(options.path);
   RecordingLog log(options.out);
   add_tables(options, log);
@@ -197,7 +199,7 @@ void import_pcd(const Options& options) {
   for (std::size_t i = 0; i < files.size(); ++i) {
     terminal::throw_if_interrupted();
     model::PointSweep sweep =
-        io::parse_pcd(read_file(files[i].path.string()), files[i].path.string());
+        io::parse_pcd(read_recorded(files[i].path.string()), files[i].path.string());
     sweep.utime = files[i].utime;
     sweep.turn = i;
     log.add_sweep("RAW_SWEEP", sweep);
@@ -208,7 +210,7 @@ void import_pcd(const Options& options) {
   report_tables(log, files.size(), options.out);
 }
 
-void import_csv(const Options& options) {
+void import_csv(const SensorImportOptions& options) {
   if (options.imu.empty() && options.gnss.empty() && options.wheel_table.empty())
     fail("import csv: none of --imu, --gnss, --wheels is given");
   RecordingLog log(options.out);
@@ -218,8 +220,8 @@ void import_csv(const Options& options) {
 }
 
 CLI::App* add_format(CLI::App& import, const std::string& name, const std::string& what,
-                     const std::string& path, const std::shared_ptr<Options>& options,
-                     void (*run)(const Options&)) {
+                     const std::string& path, const std::shared_ptr<SensorImportOptions>& options,
+                     void (*run)(const SensorImportOptions&)) {
   CLI::App* command = import.add_subcommand(name, what);
   if (!path.empty()) command->add_option("path", options->path, path)->required();
   command->add_option("--out", options->out, "The log to write")->required();
@@ -227,7 +229,7 @@ CLI::App* add_format(CLI::App& import, const std::string& name, const std::strin
   return command;
 }
 
-void add_table_options(CLI::App& command, const std::shared_ptr<Options>& options) {
+void add_table_options(CLI::App& command, const std::shared_ptr<SensorImportOptions>& options) {
   command.add_option("--imu", options->imu, "CSV: t_s,gx,gy,gz,ax,ay,az (rad/s, m/s^2)");
   command.add_option("--gnss", options->gnss,
                      "CSV: t_s, latitude_deg,longitude_deg or east_m,north_m, sigma_m, "
@@ -238,7 +240,7 @@ void add_table_options(CLI::App& command, const std::shared_ptr<Options>& option
 }  // namespace
 
 void add_sensor_imports(CLI::App& import) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<SensorImportOptions>();
   add_format(import, "kitti", "A drive of the KITTI raw data: Velodyne sweeps and OXTS records",
              "Folder of the drive (with velodyne_points and oxts)", options, import_kitti)
       ->add_flag("--speed-as-wheels", options->wheels,

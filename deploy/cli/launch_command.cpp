@@ -23,7 +23,7 @@ namespace {
 
 using launch::Clock;
 
-struct Options {
+struct LaunchOptions {
   std::filesystem::path config = default_config_directory();
   std::filesystem::path state = default_state_directory();
   std::filesystem::path report;
@@ -57,12 +57,12 @@ class StopSignals {
   int descriptor_ = -1;
 };
 
-bool selected(const Options& options, const std::string& name) {
+bool selected(const LaunchOptions& options, const std::string& name) {
   return options.only.empty() ||
          std::find(options.only.begin(), options.only.end(), name) != options.only.end();
 }
 
-std::vector<launch::ProcessSpec> process_specs(const Options& options) {
+std::vector<launch::ProcessSpec> process_specs(const LaunchOptions& options) {
   std::vector<launch::ProcessSpec> specs;
   for (const auto& entry : launch::read_launch_config(options.config).processes) {
     if (!selected(options, entry.name)) continue;
@@ -93,7 +93,7 @@ std::vector<launch::ProcessSpec> process_specs(const Options& options) {
 }
 
 /// A directory for each process's state; only under the lock, since others may be using them.
-void prepare_state(const Options& options, const std::vector<launch::ProcessSpec>& specs) {
+void prepare_state(const LaunchOptions& options, const std::vector<launch::ProcessSpec>& specs) {
   for (const auto& spec : specs) {
     if (options.fresh) std::filesystem::remove_all(options.state / spec.name);
     std::filesystem::create_directories(options.state / spec.name);
@@ -113,7 +113,7 @@ void wait(const launch::Supervisor& supervisor, const StopSignals& signals,
 }
 
 /// Heartbeats distinguish a hang from work; without a bus deaths are still noticed.
-std::unique_ptr<HealthListener> listen(const Options& options, launch::Supervisor& supervisor,
+std::unique_ptr<HealthListener> listen(const LaunchOptions& options, launch::Supervisor& supervisor,
                                        LaunchReport& report) {
   try {
     return std::make_unique<HealthListener>(options.lcm_url, [&](const health_t& message) {
@@ -152,7 +152,7 @@ void run(launch::Supervisor& supervisor, launch::Registry& registry, const StopS
   }
 }
 
-void launch_processes(const Options& options) {
+void launch_processes(const LaunchOptions& options) {
   std::vector<launch::ProcessSpec> specs;
   try {
     specs = process_specs(options);
@@ -187,7 +187,7 @@ void launch_processes(const Options& options) {
 void add_launch_command(CLI::App& parent) {
   auto* command = parent.add_subcommand(
       "launch", "Starts the processes, restarts one that dies, stops them cleanly");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LaunchOptions>();
   command->add_option("--config", options->config, "Directory with launch.toml and one file each")
       ->capture_default_str();
   command->add_option("--state-dir", options->state, "Where the processes keep their state")

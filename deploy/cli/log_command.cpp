@@ -186,7 +186,7 @@ void cut(const std::string& file, const std::string& out, const Cut& wanted) {
   fmt::print("{} events -> {}\n", writer.events(), out);
 }
 
-struct Options {
+struct LogOptions {
   std::string file;
   std::string out;
   bool json = false;
@@ -195,7 +195,7 @@ struct Options {
 
 /// What every part of the command does about a file that cannot be read or written.
 template <class Work>
-auto guarded(std::shared_ptr<Options> options, Work work) {
+auto guarded(std::shared_ptr<LogOptions> options, Work work) {
   return [options = std::move(options), work = std::move(work)] {
     try {
       work(*options);
@@ -212,7 +212,7 @@ auto guarded(std::shared_ptr<Options> options, Work work) {
 void add_log_command(CLI::App& parent) {
   auto* log = parent.add_subcommand("log", "Recorded logs: gaps, damage, clock jumps");
   log->require_subcommand(1);
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LogOptions>();
   const auto add = [&](const char* name, const char* description) {
     auto* command = log->add_subcommand(name, description);
     command->add_option("file", options->file, "An LCM log")->required();
@@ -220,27 +220,27 @@ void add_log_command(CLI::App& parent) {
   };
   auto* info_command = add("info", "What is in it");
   info_command->add_flag("--json", options->json, "As JSON");
-  info_command->callback(guarded(options, [](const Options& o) { info(o.file, o.json); }));
+  info_command->callback(guarded(options, [](const LogOptions& o) { info(o.file, o.json); }));
 
   add("check", "What is wrong with it; exit status 1 when something is")
-      ->callback(guarded(options, [](const Options& o) { check(o.file); }));
+      ->callback(guarded(options, [](const LogOptions& o) { check(o.file); }));
 
   auto* accuracy_command =
       add("accuracy", "How well the run in it agrees with the ground truth in it");
   accuracy_command->add_option("--json", options->out, "Also write it to this file, with series");
   accuracy_command->callback(
-      guarded(options, [](const Options& o) { log_accuracy(o.file, o.out); }));
+      guarded(options, [](const LogOptions& o) { log_accuracy(o.file, o.out); }));
 
   auto* repair_command = add("repair", "Writes what can be read as a log without damage");
   repair_command->add_option("--out", options->out, "The new log")->required();
-  repair_command->callback(guarded(options, [](const Options& o) { repair(o.file, o.out); }));
+  repair_command->callback(guarded(options, [](const LogOptions& o) { repair(o.file, o.out); }));
 
   auto* cut_command = add("cut", "A part of it, by receive time and channel");
   cut_command->add_option("--out", options->out, "The new log")->required();
   cut_command->add_option("--from", options->cut.from_s, "[s] from the first event");
   cut_command->add_option("--to", options->cut.to_s, "[s] from the first event");
   cut_command->add_option("--channels", options->cut.channels, "Regular expression");
-  cut_command->callback(guarded(options, [](const Options& o) { cut(o.file, o.out, o.cut); }));
+  cut_command->callback(guarded(options, [](const LogOptions& o) { cut(o.file, o.out, o.cut); }));
 }
 
 }  // namespace understory::cli

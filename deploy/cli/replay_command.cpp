@@ -19,7 +19,7 @@
 namespace understory::cli {
 namespace {
 
-struct Options {
+struct ReplayOptions {
   std::string log;
   std::string out;
   std::vector<std::string> stages;
@@ -80,7 +80,7 @@ bool interrupted() {
   return false;
 }
 
-void print(const bus::ReplayReport& report, const Options& options) {
+void print(const bus::ReplayReport& report, const ReplayOptions& options) {
   fmt::print("{} events read, {} fed to {} stages, {} messages derived -> {}\n", report.events,
              report.fed, report.health.size(), report.derived, options.out);
   if (report.damaged_places > 0) {
@@ -94,7 +94,7 @@ void print(const bus::ReplayReport& report, const Options& options) {
   }
 }
 
-void run(const Options& options) {
+void run(const ReplayOptions& options) {
   terminal::catch_interrupts();
   bus::ReplayOptions replay_options;
   replay_options.log = options.log;
@@ -126,7 +126,7 @@ void run(const Options& options) {
 void add_replay_command(CLI::App& parent) {
   auto* command = parent.add_subcommand(
       "replay", "Runs stages over a log in one process: the same bytes out every time");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReplayOptions>();
   command->add_option("log", options->log, "An LCM log")->required();
   command->add_option("--out", options->out, "The new log")->required();
   command

@@ -2,10 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
-#include <iterator>
 #include <utility>
 
+#include "common/io/text_file.hpp"
 #include "deploy/cli/failure.hpp"
 #include "sim/point_grid.hpp"
 #include "understory/ground_truth_t.hpp"
@@ -17,12 +16,6 @@ constexpr std::string_view kPoles = "poles:";
 /// Of 10 bytes each: a message stays below the 64 KiB of one datagram.
 constexpr std::size_t kPointsPerMessage = 5900;
 constexpr double kLandmarkReach = 40.0;
-
-std::string read_file(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) fail(fmt::format("{}: cannot be read", path));
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
 
 sim::Scenario forest_scenario(const SensorSimulationOptions& options) {
   sim::ForestScenarioParameters parameters;
@@ -43,8 +36,8 @@ sim::Scenario pole_scenario(const SensorSimulationOptions& options) {
   if (comma == std::string::npos) {
     wrong_usage(fmt::format("{}: poles:POLES.csv,TRAJECTORY.csv is wanted", options.world));
   }
-  const std::string poles = read_file(files.substr(0, comma));
-  const std::string trajectory = read_file(files.substr(comma + 1));
+  const std::string poles = io::read_whole_file(files.substr(0, comma));
+  const std::string trajectory = io::read_whole_file(files.substr(comma + 1));
   auto result = sim::pole_map_scenario(poles, trajectory, options.seed);
   if (!result.scenario) fail(fmt::format("{}: {}", files, result.error));
   return std::move(*result.scenario);

@@ -1,9 +1,7 @@
 // `understory sim`: a simulated drive with ground truth, onto the bus or into a log.
 #include <fmt/format.h>
 
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <memory>
 #include <optional>
 #include <set>
@@ -11,6 +9,7 @@
 
 #include "common/bus/split_bus.hpp"
 #include "common/io/lcm_log.hpp"
+#include "common/io/text_file.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/progress.hpp"
 #include "common/wire/convert.hpp"
@@ -24,7 +23,7 @@
 namespace understory::cli {
 namespace {
 
-struct Options {
+struct SimOptions {
   std::string world;
   std::string out;
   std::string lcm_url;
@@ -35,13 +34,7 @@ struct Options {
   SensorSimulationOptions sensors;
 };
 
-std::string read_file(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) fail(fmt::format("{}: cannot be read", path));
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
-sim::Drive make_drive(Options& options) {
+sim::Drive make_drive(SimOptions& options) {
   const auto path = sim::path_kind(options.path);
   if (!path) wrong_usage(fmt::format("--path {}: no such path", options.path));
   options.drive.path.kind = *path;
@@ -49,7 +42,7 @@ sim::Drive make_drive(Options& options) {
     options.drive.forest = sim::forest_parameters(*kind);
     return {options.drive, options.seed};
   }
-  auto stems = sim::parse_stem_map(read_file(options.world));
+  auto stems = sim::parse_stem_map(io::read_whole_file(options.world));
   if (!stems.error.empty()) fail(fmt::format("{}: {}", options.world, stems.error));
   return {options.drive, std::move(stems.forest), options.seed};
 }
@@ -110,7 +103,7 @@ Publish publish_on(bus::Bus& bus) {
   };
 }
 
-void drive_live(const sim::Drive& drive, const Options& options) {
+void drive_live(const sim::Drive& drive, const SimOptions& options) {
   const auto bus = bus::make_live_bus(options.lcm_url);
   const Publish publish = publish_on(*bus);
   terminal::Progress progress("driving", static_cast<double>(drive.size()),
@@ -157,7 +150,7 @@ void write_sensor_log(sim::SensorDrive& drive, const std::string& file) {
   writer.commit();
 }
 
-void send_sensors_live(sim::SensorDrive& drive, const Options& options) {
+void send_sensors_live(sim::SensorDrive& drive, const SimOptions& options) {
   const auto bus = bus::make_live_bus(options.lcm_url);
   terminal::Progress progress("driving", drive.motion().duration_s(),
                               terminal::Progress::Without::kTenths);
@@ -168,7 +161,7 @@ void send_sensors_live(sim::SensorDrive& drive, const Options& options) {
   });
 }
 
-void simulate_sensors(Options& options) {
+void simulate_sensors(SimOptions& options) {
   options.sensors.world = options.world;
   options.sensors.path = options.path;
   options.sensors.seed = options.seed;
@@ -188,7 +181,7 @@ void simulate_sensors(Options& options) {
              drive.motion().duration_s(), options.out.empty() ? "" : " -> ", options.out);
 }
 
-void simulate(Options& options) {
+void simulate(SimOptions& options) {
   terminal::catch_interrupts();
   if (is_sensor_world(options.world)) {
     simulate_sensors(options);
@@ -231,7 +224,7 @@ void refuse_renamed(CLI::App& command, const std::string& old_name, const std::s
       ->group("");  // not in --help
 }
 
-void add_landmark_options(CLI::App& command, Options& options) {
+void add_landmark_options(CLI::App& command, SimOptions& options) {
   auto& drive = options.drive;
   command.add_option("--length", drive.path.length_m, "Length of the path [m]")
       ->check(CLI::Range(1.0, 1e6))
@@ -260,7 +253,7 @@ void add_landmark_options(CLI::App& command, Options& options) {
       ->capture_default_str();
 }
 
-void add_sensor_options(CLI::App& command, Options& options) {
+void add_sensor_options(CLI::App& command, SimOptions& options) {
   auto& sensors = options.sensors;
   const std::string group = "With sensors";
   command.add_option("--forest", sensors.forest, "forest3d: dense, intermediate, sparse")
@@ -299,7 +292,7 @@ void add_sensor_options(CLI::App& command, Options& options) {
 void add_sim_command(CLI::App& parent) {
   auto* command = parent.add_subcommand(
       "sim", "A simulated drive with ground truth, onto the bus or into a log");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SimOptions>();
   command
       ->add_option("world", options->world,
                    "Ideal landmarks: dense, intermediate, sparse, or a CSV file with "

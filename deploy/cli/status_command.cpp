@@ -18,7 +18,7 @@ namespace {
 
 using Clock = StatusTable::Clock;
 
-struct Options {
+struct StatusOptions {
   std::string lcm_url;
   bool once = false;
   bool json = false;
@@ -38,7 +38,7 @@ void print(const StatusTable& table, bool json) {
   std::fflush(stdout);
 }
 
-void status(const Options& options) {
+void status(const StatusOptions& options) {
   terminal::catch_interrupts();
   StatusTable table;
   HealthListener listener(options.lcm_url,
@@ -68,7 +68,7 @@ void status(const Options& options) {
 
 void add_status_command(CLI::App& parent) {
   auto* command = parent.add_subcommand("status", "A live table of the processes' health");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<StatusOptions>();
   command->add_option("--lcm-url", options->lcm_url, "Bus, e.g. udpm://239.255.76.67:7667?ttl=0");
   command->add_flag("--once", options->once, "Listen for 1.5 s, print, end");
   command->add_flag("--json", options->json, "As JSON");

@@ -13,7 +13,6 @@
 namespace understory::eval::harness {
 namespace {
 
-constexpr std::size_t kScansPerKeyframe = 8;
 constexpr double kWrong = 1.0;        // [m]
 constexpr double kLeastMotion = 0.1;  // [m] between keyframes that count
 constexpr double kRange = 40.0;       // [m] as the ideal scans have

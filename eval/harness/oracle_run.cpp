@@ -9,8 +9,6 @@
 namespace understory::eval::harness {
 namespace {
 
-constexpr std::size_t kScansPerKeyframe = 8;
-
 void add_scan(metrics::BatchOracle& oracle, const sim::SimulatedScan& scan) {
   std::vector<Eigen::Vector2d> positions;
   positions.reserve(scan.scan.detections.size());

@@ -11,7 +11,6 @@
 namespace understory::eval::harness {
 namespace {
 
-constexpr std::size_t kScansPerKeyframe = 8;
 constexpr double kWrong = 1.0;             // [m]
 constexpr double kSnapshotFraction = 0.3;  // of the run: more than a quarter of the circle is done
 

@@ -13,6 +13,9 @@
 
 namespace understory::eval::harness {
 
+/// Scans that make one keyframe (GeoSLAM §5).
+inline constexpr std::size_t kScansPerKeyframe = 8;
+
 /// A drive with all its scans: every method gets the same ones.
 struct RecordedDrive {
   sim::Drive drive;

@@ -9,8 +9,6 @@ namespace understory::associator {
 namespace {
 
 constexpr state::Format kFormat{"associator", 1};
-/// A scan that is so much earlier than the last one means that the clock was set back.
-constexpr model::Utime kClockJump_us = 10'000'000;
 
 }  // namespace
 

@@ -10,9 +10,6 @@
 namespace understory::associator {
 namespace {
 
-/// A young track takes a detection only if that is e^4 times likelier than for an older one.
-constexpr std::uint32_t kYoung = 4;
-constexpr double kReluctance = 8.0;
 constexpr double kGateFloor_m = 0.03;
 constexpr double kBin_m = 4.0;
 constexpr double kNone = std::numeric_limits<double>::infinity();

@@ -1,6 +1,7 @@
 // Pairs the observations of one scan with tracks, at a known pose.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -8,6 +9,12 @@
 #include "services/associator/track_list.hpp"
 
 namespace understory::associator {
+
+/// A track with fewer observations is young: it may be an outlier of its neighbour.
+inline constexpr std::uint32_t kYoung = 4;
+/// A young track is paired last: it takes a detection only if that is e^4 times likelier than for
+/// an older one [squared Mahalanobis distance].
+inline constexpr double kReluctance = 8.0;
 
 /// One-to-one pairs inside the gate at the pose `local_T_vehicle`: likeliest first, then improved
 /// by swaps. A trunk and a corner never pair. A pair is ambiguous where another pairing is not

@@ -11,8 +11,6 @@ constexpr double kMotionFloor = 1e-8;
 constexpr double kMaxPoseAge_s = 1.0;
 /// Kept for the comparison of observations (motion_check.hpp).
 constexpr model::Utime kOdometryKept_us = 2'000'000;
-/// A stamp that is so much earlier means that the clock was set back.
-constexpr model::Utime kClockJump_us = 10'000'000;
 constexpr model::Utime kGapTolerance_us = 1000;
 /// Acceleration [m/s^2] that a constant velocity may have missed.
 constexpr double kUnknownAcceleration_mps2 = 3.0;

@@ -10,6 +10,9 @@
 
 namespace understory::associator {
 
+/// A message that is so much earlier than the last one means that the clock was set back.
+inline constexpr model::Utime kClockJump_us = 10'000'000;
+
 /// A predicted motion between two scans.
 struct PredictedMotion {
   geometry::SE2WithCovariance last_T_now;

@@ -5,13 +5,11 @@
 
 #include "common/geometry/alignment.hpp"
 #include "services/associator/consistent_set.hpp"
+#include "services/associator/match.hpp"
 
 namespace understory::associator {
 namespace {
 
-/// A track with fewer observations may be an outlier of its neighbour: it is paired last.
-constexpr std::uint32_t kYoung = 4;
-constexpr double kReluctance = 8.0;
 /// Least size of a consistent set that is trusted.
 constexpr std::size_t kMinConsistent = 3;
 /// Variance of the heading [rad^2] by a consistent set; the refinement finds the true one.

@@ -11,9 +11,7 @@ namespace understory::lidar_imu_input {
 namespace {
 
 constexpr double kStartTilt_rad = 0.1;  // 1 m/s^2 taken for gravity
-constexpr double kStartSpeed_mps = 10.0;
-constexpr double kBridgeTilt = 0.03;  // rad per square root of a second
-constexpr double kBridgeSpeed = 2.0;  // m/s per square root of a second
+constexpr double kBridgeTilt = 0.03;    // rad per square root of a second
 
 constexpr double kWheelScaleSigma = 0.02;
 constexpr double kWheelScaleWalk = 2e-4;  // per square root of a second

@@ -8,11 +8,6 @@
 namespace understory::lidar_imu_input {
 namespace {
 
-constexpr double kStartSpeed_mps = 10.0;
-constexpr double kBridgeSpeed = 2.0;  // m/s per square root of a second
-
-Eigen::Matrix2d rotation_of(double angle) { return Eigen::Rotation2Dd(angle).toRotationMatrix(); }
-
 /// Rotation by +90 degrees.
 const Eigen::Matrix2d& quarter_rotation() {
   static const Eigen::Matrix2d rotation = (Eigen::Matrix2d() << 0.0, -1.0, 1.0, 0.0).finished();
@@ -31,7 +26,7 @@ void DeadReckoning::propagate(const LevelSample& a, const LevelSample& b) {
 
   // Mean rate and force, both ends rotated to the middle of the step.
   const double rate = 0.5 * (a.yaw_rate_rad_s + b.yaw_rate_rad_s) - bias_(0);
-  const Eigen::Matrix2d back = rotation_of(-0.5 * rate * dt);
+  const Eigen::Matrix2d back = planar_rotation(-0.5 * rate * dt);
   const Eigen::Vector2d force_bias = bias_.tail<2>();
   const Eigen::Vector2d force =
       0.5 * (back * (a.force_mps2 - force_bias) + back.transpose() * (b.force_mps2 - force_bias));
@@ -126,7 +121,7 @@ void DeadReckoning::set_gyro_bias(double bias_rad_s, double sigma_rad_s) {
 
 void DeadReckoning::correct(const model::VelocityCorrection& correction,
                             const Eigen::Vector2d& then_velocity, double then_heading) {
-  const Eigen::Matrix2d turn = rotation_of(then_heading - pose_.theta());
+  const Eigen::Matrix2d turn = planar_rotation(then_heading - pose_.theta());
   velocity_ += turn * (correction.velocity_mps - then_velocity);
   bias_ = correction.bias;
   covariance_.topRightCorner<3, 5>().setZero();

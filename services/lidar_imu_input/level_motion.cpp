@@ -9,8 +9,6 @@
 namespace understory::lidar_imu_input {
 namespace {
 
-Eigen::Matrix2d rotation_of(double angle) { return Eigen::Rotation2Dd(angle).toRotationMatrix(); }
-
 /// Adds one step of constant rate and force to a preintegration.
 void step(model::Preintegration& sum, const LevelSample& a, const LevelSample& b,
           const ImuParameters& imu) {
@@ -18,11 +16,11 @@ void step(model::Preintegration& sum, const LevelSample& a, const LevelSample& b
   const double rate = 0.5 * (a.yaw_rate_rad_s + b.yaw_rate_rad_s) - sum.bias(0);
 
   // Both ends' forces, rotated to the middle of the step.
-  const Eigen::Matrix2d back = rotation_of(-0.5 * rate * dt);
+  const Eigen::Matrix2d back = planar_rotation(-0.5 * rate * dt);
   const Eigen::Vector2d force_bias = sum.bias.tail<2>();
   const Eigen::Vector2d force =
       0.5 * (back * (a.force_mps2 - force_bias) + back.transpose() * (b.force_mps2 - force_bias));
-  const Eigen::Matrix2d middle = rotation_of(sum.yaw_rad + 0.5 * rate * dt);
+  const Eigen::Matrix2d middle = planar_rotation(sum.yaw_rad + 0.5 * rate * dt);
   const Eigen::Vector2d acceleration = middle * force;
   const Eigen::Vector2d turned = geometry::perpendicular(acceleration);
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <deque>
 #include <optional>
 
@@ -10,6 +11,11 @@
 #include "services/lidar_imu_input/wheel_speeds.hpp"
 
 namespace understory::lidar_imu_input {
+
+/// Rotation of the plan by an angle [rad], 2x2.
+inline Eigen::Matrix2d planar_rotation(double angle_rad) {
+  return Eigen::Rotation2Dd(angle_rad).toRotationMatrix();
+}
 
 /// One sample of the IMU after levelling: nothing is subtracted but gravity.
 struct LevelSample {

@@ -1,4 +1,5 @@
-// Differences of stamps, and squares: what every file of this room needs.
+// Differences of stamps, squares, and bounds of a motion that nothing has measured: what every file
+// of this room needs.
 #pragma once
 
 #include <cmath>
@@ -19,5 +20,10 @@ inline model::Utime microseconds(double seconds) {
 
 /// The square of a value: a variance from a standard deviation.
 inline double square(double value) { return value * value; }
+
+/// Standard deviation of each component of an unknown velocity.
+inline constexpr double kStartSpeed_mps = 10.0;
+/// How an unmeasured velocity spreads over a gap [m/s per square root of a second].
+inline constexpr double kBridgeSpeed = 2.0;
 
 }  // namespace understory::lidar_imu_input

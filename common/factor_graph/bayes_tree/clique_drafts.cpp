@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
+#include "common/factor_graph/graph/factor_graph.hpp"
+
 namespace understory::factor_graph::bayes_tree {
 namespace {
-
-constexpr int kNone = -1;
 
 /// Time of one front [us], fitted to the kernel: overhead, moving its numbers, eliminating.
 double front_cost(double pivots, double separator) {
@@ -31,8 +31,8 @@ void CliqueDrafts::sort_elements(const EliminationProblem& problem, std::span<co
     positions_[static_cast<std::size_t>(order[p])] = static_cast<int>(p);
   }
 
-  first_element_.assign(count, kNone);
-  plan_.next_element.assign(static_cast<std::size_t>(problem.element_count()), kNone);
+  first_element_.assign(count, graph::kNone);
+  plan_.next_element.assign(static_cast<std::size_t>(problem.element_count()), graph::kNone);
   for (int e = problem.element_count(); e-- > 0;) {
     int first = problem.size();
     for (const int v : problem.element(e)) {
@@ -57,7 +57,7 @@ void CliqueDrafts::draft(const EliminationProblem& problem, std::span<const int>
            static_cast<int>(separators_.size()),
            0,
            0,
-           kNone,
+           graph::kNone,
            true};
   const auto tie = [&](int other) {
     if (other <= position || marker_[static_cast<std::size_t>(other)] == position) return;
@@ -66,11 +66,11 @@ void CliqueDrafts::draft(const EliminationProblem& problem, std::span<const int>
     draft.separator_size += problem.dimension(order[static_cast<std::size_t>(other)]);
   };
 
-  for (int e = first_element_[at]; e != kNone;
+  for (int e = first_element_[at]; e != graph::kNone;
        e = plan_.next_element[static_cast<std::size_t>(e)]) {
     for (const int v : problem.element(e)) tie(positions_[static_cast<std::size_t>(v)]);
   }
-  for (int c = children_[at]; c != kNone; c = drafts_[static_cast<std::size_t>(c)].next) {
+  for (int c = children_[at]; c != graph::kNone; c = drafts_[static_cast<std::size_t>(c)].next) {
     const Draft& child = drafts_[static_cast<std::size_t>(c)];
     // By number: tie() makes the list longer.
     const auto first = static_cast<std::size_t>(child.first_separator);
@@ -79,13 +79,13 @@ void CliqueDrafts::draft(const EliminationProblem& problem, std::span<const int>
   }
 
   draft.separator_count = static_cast<int>(separators_.size()) - draft.first_separator;
-  next_frontal_[at] = kNone;
+  next_frontal_[at] = graph::kNone;
 }
 
 /// A child joins its parent where both fronts in one cost less time than apart.
 void CliqueDrafts::merge_children(int position, int first_child) {
   Draft& parent = drafts_[static_cast<std::size_t>(position)];
-  for (int c = first_child; c != kNone;) {
+  for (int c = first_child; c != graph::kNone;) {
     Draft& child = drafts_[static_cast<std::size_t>(c)];
     const int next = child.next;
     const double apart = front_cost(parent.pivots, parent.separator_size) +
@@ -105,9 +105,9 @@ void CliqueDrafts::draft_all(const EliminationProblem& problem, std::span<const 
   sort_elements(problem, order);
   const auto count = order.size();
   drafts_.resize(count);
-  children_.assign(count, kNone);
+  children_.assign(count, graph::kNone);
   next_frontal_.resize(count);
-  marker_.assign(count, kNone);
+  marker_.assign(count, graph::kNone);
   separators_.clear();
 
   for (int p = 0; p < problem.size(); ++p) {
@@ -131,12 +131,13 @@ void CliqueDrafts::append(const Draft& draft, std::span<const int> order) {
   clique.row_count = draft.frontal_count + draft.separator_count;
 
   // The merged variables' elements in one list.
-  clique.first_element = kNone;
+  clique.first_element = graph::kNone;
   int* tail = &clique.first_element;
-  for (int p = draft.first_frontal; p != kNone; p = next_frontal_[static_cast<std::size_t>(p)]) {
+  for (int p = draft.first_frontal; p != graph::kNone;
+       p = next_frontal_[static_cast<std::size_t>(p)]) {
     plan_.rows.push_back(order[static_cast<std::size_t>(p)]);
     *tail = first_element_[static_cast<std::size_t>(p)];
-    while (*tail != kNone) tail = &plan_.next_element[static_cast<std::size_t>(*tail)];
+    while (*tail != graph::kNone) tail = &plan_.next_element[static_cast<std::size_t>(*tail)];
   }
 
   const auto begin = separators_.begin() + draft.first_separator;

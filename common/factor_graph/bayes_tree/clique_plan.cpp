@@ -6,10 +6,11 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "common/factor_graph/graph/factor_graph.hpp"
+
 namespace understory::factor_graph::bayes_tree {
 namespace {
 
-constexpr int kNone = -1;
 /// From this much work on a dissection, which takes a millisecond, may pay [flops]; and if the work
 /// is this many times what the largest element alone costs in any order.
 constexpr double kMuchWork = 5e6;
@@ -60,7 +61,7 @@ void CliquePlanner::order() {
 
 /// False where there is none.
 bool CliquePlanner::order_by_dissection() {
-  std::vector<int> number_of(static_cast<std::size_t>(problem_.size()), kNone);
+  std::vector<int> number_of(static_cast<std::size_t>(problem_.size()), graph::kNone);
   std::vector<int> divided;
   for (int v = 0; v < problem_.size(); ++v) {
     if (problem_.group(v) == EliminationProblem::kLast) continue;

@@ -4,8 +4,6 @@
 #include <time.h>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -13,6 +11,7 @@
 #include "common/factor_graph/batch/batch.hpp"
 #include "common/factor_graph/bayes_tree/incremental_smoother.hpp"
 #include "common/factor_graph/files/graph_file.hpp"
+#include "common/io/text_file.hpp"
 #include "eval/tools/memory.hpp"
 #include "eval/tools/thread_clock.hpp"
 
@@ -23,9 +22,7 @@ namespace {
 constexpr double kFixed = 1e8;
 
 factor_graph::files::GraphFile read(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw std::runtime_error(fmt::format("{}: cannot be opened", file.string()));
-  const std::string text((std::istreambuf_iterator<char>(in)), {});
+  const std::string text = io::read_whole_file(file);
   auto graph = read_graph(text, factor_graph::files::guess_format(text));
   if (const auto* error = std::get_if<factor_graph::files::GraphFileError>(&graph)) {
     throw std::runtime_error(

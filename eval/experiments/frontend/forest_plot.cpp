@@ -1,4 +1,5 @@
 #include "eval/experiments/frontend/forest_plot.hpp"
+#include "common/io/text_file.hpp"
 
 #include <fmt/format.h>
 
@@ -6,7 +7,6 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <numbers>
 #include <numeric>
@@ -25,15 +25,9 @@ constexpr double kKnee_m = 0.5;
 constexpr double kPerson_m = 2.2;
 constexpr double kNothing = std::numeric_limits<double>::infinity();
 
-std::string text_of(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw std::runtime_error(file.string() + ": cannot be opened");
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 std::vector<PlotPoint> read_points(const std::filesystem::path& file) {
   static_assert(std::endian::native == std::endian::little);
-  const std::string bytes = text_of(file);
+  const std::string bytes = io::read_whole_file(file);
   constexpr std::size_t kRecord = 4 * sizeof(float);
   if (bytes.size() % kRecord != 0) throw std::runtime_error(file.string() + ": cut short");
 
@@ -52,7 +46,7 @@ std::vector<PlotPoint> read_points(const std::filesystem::path& file) {
 }
 
 std::vector<PlotStem> read_stems(const std::filesystem::path& file) {
-  std::istringstream lines(text_of(file));
+  std::istringstream lines(io::read_whole_file(file));
   std::string line;
   std::getline(lines, line);
   if (!line.starts_with("x_m,y_m,dbh_m")) {

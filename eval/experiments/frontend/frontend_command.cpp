@@ -4,11 +4,11 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdlib>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/io/text_file.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "eval/experiments/experiments.hpp"
 #include "eval/experiments/frontend/frontend.hpp"
@@ -46,11 +46,6 @@ std::vector<ChainDrive> chain_drives(const FrontendOptions& options) {
   };
 }
 
-std::string text_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
-
 /// Real maps of poles with the real ways of a car through them, where the recordings are there.
 void add_pole_drives(const FrontendOptions& options, std::vector<ChainDrive>& drives) {
   for (const char* sequence : {"00", "02"}) {
@@ -60,7 +55,8 @@ void add_pole_drives(const FrontendOptions& options, std::vector<ChainDrive>& dr
     if (!fs::exists(poles) || !fs::exists(way)) continue;
     drives.push_back({fmt::format("poles of KITTI {}", sequence),
                       [=, seed = options.seed] {
-                        auto result = sim::pole_map_scenario(text_of(poles), text_of(way), seed);
+                        auto result = sim::pole_map_scenario(io::read_whole_file(poles),
+                                                             io::read_whole_file(way), seed);
                         if (!result.scenario) throw std::runtime_error(result.error);
                         return *result.scenario;
                       },

@@ -11,16 +11,16 @@
 namespace understory::eval::experiments::frontend {
 namespace {
 
-struct Lidar {
+struct SimulatedLidar {
   const char* name;
   sim::LidarModel model;
   int columns;
 };
-const Lidar kLidars[] = {{"16 beams", sim::LidarModel::kVlp16, 1800},
-                         {"32 beams", sim::LidarModel::kVlp32, 1800},
-                         {"64 beams x 2048", sim::LidarModel::kHdl64, 2048}};
+const SimulatedLidar kSimulatedLidars[] = {{"16 beams", sim::LidarModel::kVlp16, 1800},
+                                           {"32 beams", sim::LidarModel::kVlp32, 1800},
+                                           {"64 beams x 2048", sim::LidarModel::kHdl64, 2048}};
 
-sim::SensorDrive extraction_drive(bool is_urban, const Lidar& lidar, std::uint64_t seed) {
+sim::SensorDrive extraction_drive(bool is_urban, const SimulatedLidar& lidar, std::uint64_t seed) {
   sim::SensorSuite suite;
   suite.lidar->elevations_rad = sim::beam_elevations_rad(lidar.model);
   suite.lidar->columns = lidar.columns;
@@ -36,10 +36,10 @@ sim::SensorDrive extraction_drive(bool is_urban, const Lidar& lidar, std::uint64
 
 void add_extraction_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
                          FrontendRows& rows) {
-  const std::size_t count = 2 * std::size(kLidars);
+  const std::size_t count = 2 * std::size(kSimulatedLidars);
   std::vector<ExtractionScore> scores(count);
   tools::run_in_parallel(count, options.jobs, "extraction", stop, [&](std::size_t i) {
-    sim::SensorDrive drive = extraction_drive(i % 2 == 1, kLidars[i / 2], options.seed);
+    sim::SensorDrive drive = extraction_drive(i % 2 == 1, kSimulatedLidars[i / 2], options.seed);
     ExtractionOptions extraction;
     extraction.sweeps = std::max(20, 6 * options.runs);
     extraction.first_revolution = 30;
@@ -53,7 +53,7 @@ void add_extraction_rows(const FrontendOptions& options, const std::atomic<bool>
     const bool is_urban = i % 2 == 1;
     const KindScore& kind = is_urban ? score.corners : score.trunks;
     rows.in(fmt::format("landmark_extractor, simulated {}: {} ({} sweeps of {:.0f} points)",
-                        is_urban ? "town" : "forest", kLidars[i / 2].name, score.sweeps,
+                        is_urban ? "town" : "forest", kSimulatedLidars[i / 2].name, score.sweeps,
                         score.points));
 
     const char* what = is_urban ? "corners" : "trunks";

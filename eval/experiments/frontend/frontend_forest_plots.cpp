@@ -11,13 +11,13 @@
 namespace understory::eval::experiments::frontend {
 namespace {
 
-struct Lidar {
+struct PlotLidar {
   const char* name;
   sim::LidarModel model;
 };
-const Lidar kLidars[] = {{"16 beams", sim::LidarModel::kVlp16},
-                         {"32 beams", sim::LidarModel::kVlp32},
-                         {"64 beams", sim::LidarModel::kHdl64}};
+const PlotLidar kPlotLidars[] = {{"16 beams", sim::LidarModel::kVlp16},
+                                 {"32 beams", sim::LidarModel::kVlp32},
+                                 {"64 beams", sim::LidarModel::kHdl64}};
 const char* const kPlots[] = {"TLS_Clip", "pine_plot"};
 
 nlohmann::json trace_of(const ForestPlot& plot, const PlotScore& score) {
@@ -97,17 +97,17 @@ void add_forest_plot_rows(const FrontendOptions& options, const std::atomic<bool
   }
   std::vector<ForestPlot> plots;
   for (const char* name : kPlots) plots.push_back(read_forest_plot(folder, name));
-  constexpr std::size_t kBeams = std::size(kLidars);
+  constexpr std::size_t kBeams = std::size(kPlotLidars);
   std::vector<PlotScore> scores(plots.size() * kBeams);
   tools::run_in_parallel(scores.size(), options.jobs, "plots", stop, [&](std::size_t i) {
     PlotScoreOptions score;
-    score.scanner.elevations_rad = sim::beam_elevations_rad(kLidars[i % kBeams].model);
+    score.scanner.elevations_rad = sim::beam_elevations_rad(kPlotLidars[i % kBeams].model);
     score.seed = options.seed;
     scores[i] = score_plot(plots[i / kBeams], {}, score);
   });
   for (std::size_t i = 0; i < scores.size(); ++i) {
     const ForestPlot& plot = plots[i / kBeams];
-    const Lidar& lidar = kLidars[i % kBeams];
+    const PlotLidar& lidar = kPlotLidars[i % kBeams];
     rows.in(fmt::format("landmark_extractor, real plot {}: {} ({} stations, {:.0f} points)",
                         plot.name, lidar.name, scores[i].stations_m.size(), scores[i].points));
     add_rows(scores[i], rows);

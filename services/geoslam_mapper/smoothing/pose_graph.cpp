@@ -10,7 +10,7 @@ namespace {
 namespace plane = factor_graph::plane;
 
 /// Keeps an exactly known pose invertible: a micrometre, a microradian.
-const Eigen::Matrix3d kTiny = 1e-12 * Eigen::Matrix3d::Identity();
+const Eigen::Matrix3d kKnownPose = 1e-12 * Eigen::Matrix3d::Identity();
 
 plane::SmootherParameters limits(const SmoothingMapperParameters& parameters) {
   plane::SmootherParameters result;
@@ -46,7 +46,7 @@ void PoseGraph::rollback() {
 NodeIndex PoseGraph::add_node(const geometry::SE2& map_T_centre, bool is_stationary,
                               bool is_fixed) {
   const plane::PoseId centre = smoother_.add_pose(map_T_centre);
-  if (is_fixed) smoother_.add(plane::PosePrior{centre, map_T_centre, kTiny.inverse()});
+  if (is_fixed) smoother_.add(plane::PosePrior{centre, map_T_centre, kKnownPose.inverse()});
   nodes_.push_back({centre, {}, is_stationary});
   return static_cast<NodeIndex>(nodes_.size() - 1);
 }

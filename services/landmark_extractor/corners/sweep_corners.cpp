@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "services/landmark_extractor/square.hpp"
+
 namespace understory::landmark_extractor::corners {
 namespace {
 
@@ -14,12 +16,6 @@ constexpr double kAside_m = 0.4;
 constexpr double kAbove_m = 0.02;
 /// So many beams on either side do not all drop out.
 constexpr float kBeamsAside = 2.5F;
-
-double square(double value) { return value * value; }
-
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
 
 /// An error of roll and pitch moves each wall by its own height, and the corner with them; its
 /// height goes with the ground.

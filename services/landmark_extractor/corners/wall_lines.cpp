@@ -7,6 +7,8 @@
 #include <limits>
 #include <numeric>
 
+#include "services/landmark_extractor/square.hpp"
+
 namespace understory::landmark_extractor::corners {
 namespace {
 
@@ -21,12 +23,6 @@ constexpr std::size_t kStretches = 8;
 constexpr double kLeastAcross = 0.1;
 /// So many neighbours on a segment are summed.
 constexpr std::size_t kPartPoints = 8;
-
-double square(double value) { return value * value; }
-
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
 
 }  // namespace
 

@@ -10,6 +10,11 @@
 
 namespace understory::landmark_extractor::corners {
 
+/// Area that two vectors of the plan span, positive where b lies to the left of a.
+inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
 /// Sums over points of the plan, relative to an anchor, from which a line follows.
 struct LineSums {
   double count = 0.0;

@@ -4,17 +4,15 @@
 #include <array>
 #include <cmath>
 
+#include "services/landmark_extractor/lanes.hpp"
+
 namespace understory::landmark_extractor::ground {
 namespace {
 
-constexpr std::size_t kLanes = 8;
-
 /// Whole registers: behind the band are zeros, which change nothing.
-constexpr std::size_t padded(std::size_t count) { return (count + kLanes - 1) / kLanes * kLanes; }
-
 [[gnu::always_inline]] inline void finish_column(float* column, std::size_t band) {
   const float scale = 1.0F / std::sqrt(std::max(column[0], 1e-9F));
-  for (std::size_t k = 0; k < padded(band); ++k) column[k] *= scale;
+  for (std::size_t k = 0; k < padded_to_lanes(band); ++k) column[k] *= scale;
 }
 
 /// Two columns at a time update those after them: each is loaded and stored half as often.
@@ -27,7 +25,7 @@ constexpr std::size_t padded(std::size_t count) { return (count + kLanes - 1) / 
     float* const first = matrix + j * stride;
     float* const second = first + stride;
     finish_column(first, band);
-    for (std::size_t t = 0; t < padded(band); ++t) second[t] -= first[1] * first[1 + t];
+    for (std::size_t t = 0; t < padded_to_lanes(band); ++t) second[t] -= first[1] * first[1 + t];
     finish_column(second, band);
     const std::size_t reach = std::min(band + 1, n - j);
     for (std::size_t k = 2; k < reach; ++k) {
@@ -36,7 +34,8 @@ constexpr std::size_t padded(std::size_t count) { return (count + kLanes - 1) / 
       const float* __restrict__ b = second + k - 1;
       const float by_a = a[0];
       const float by_b = b[0];
-      for (std::size_t t = 0; t < padded(band + 1 - k); ++t) other[t] -= by_a * a[t] + by_b * b[t];
+      for (std::size_t t = 0; t < padded_to_lanes(band + 1 - k); ++t)
+        other[t] -= by_a * a[t] + by_b * b[t];
     }
   }
   if (j < n) finish_column(matrix + j * stride, band);
@@ -44,7 +43,7 @@ constexpr std::size_t padded(std::size_t count) { return (count + kLanes - 1) / 
 
 [[gnu::always_inline]] inline void substitute(const BandLayout& layout, const float* matrix,
                                               float* right) {
-  const std::size_t rest = padded(layout.band - 1);
+  const std::size_t rest = padded_to_lanes(layout.band - 1);
   for (std::size_t j = 0; j < layout.size; ++j) {
     const float* __restrict__ column = matrix + j * layout.stride;
     const float value = right[j] / column[0];

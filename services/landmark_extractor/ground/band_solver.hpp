@@ -3,6 +3,8 @@
 
 #include <cstddef>
 
+#include "services/landmark_extractor/lanes.hpp"
+
 namespace understory::landmark_extractor::ground {
 
 /// Layout of the lower band, column by column: column j begins at j * stride with its diagonal
@@ -14,7 +16,7 @@ struct BandLayout {
 
   /// For `size` unknowns with `band` entries per column.
   static BandLayout of(std::size_t size, std::size_t band) {
-    return {size, band, (band + kLanes - 1) / kLanes * kLanes + kLanes};
+    return {size, band, padded_to_lanes(band) + kLanes};
   }
   /// Values of the whole matrix.
   std::size_t entries() const { return size * stride; }
@@ -22,7 +24,6 @@ struct BandLayout {
   std::size_t padded_size() const { return size + stride; }
 
  private:
-  static constexpr std::size_t kLanes = 8;
 };
 
 /// Solves in place (Cholesky without pivoting, vectorised): `matrix` becomes its Cholesky factor,

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 
+#include "services/landmark_extractor/lanes.hpp"
+
 namespace understory::landmark_extractor::ground {
 namespace {
 
 /// So many points are enough for the ground.
 constexpr std::size_t kEnough = 20000;
-constexpr std::size_t kLanes = 8;
 
 }  // namespace
 

@@ -6,6 +6,8 @@
 #include <limits>
 #include <span>
 
+#include "services/landmark_extractor/lanes.hpp"
+
 namespace understory::landmark_extractor::ground {
 namespace {
 
@@ -25,7 +27,6 @@ constexpr double kUnknownSlope = 0.12;
 
 /// A cell without returns.
 constexpr float kNone = std::numeric_limits<float>::infinity();
-constexpr std::size_t kLanes = 8;
 using Lanes = std::array<float, kLanes>;
 
 /// The normal equations of several patches side by side: the upper triangle between their four

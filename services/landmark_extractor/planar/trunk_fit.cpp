@@ -6,14 +6,14 @@
 
 #include "common/geometry/se2.hpp"
 
+#include "services/landmark_extractor/square.hpp"
+
 namespace understory::landmark_extractor::planar {
 namespace {
 
 constexpr int kIterations = 8;
 /// Beams that graze the trunk more than this (part of the radius) say little of its range.
 constexpr double kMaxGraze = 0.9;
-
-double square(double value) { return value * value; }
 
 /// Normal equations over (range, bearing, radius) of the centre.
 struct Normal {

@@ -5,16 +5,13 @@
 #include <cstddef>
 #include <cstring>
 
+#include "services/landmark_extractor/lanes.hpp"
 #include "services/landmark_extractor/points/spin_fit.hpp"
 
 namespace understory::landmark_extractor::points {
 namespace {
 
-constexpr std::size_t kLanes = 8;
 constexpr std::size_t kSize = PointBlock::kSize;
-
-/// Whole registers: what lies beyond the last point is computed and never looked at.
-std::size_t padded(std::size_t count) { return (count + kLanes - 1) / kLanes * kLanes; }
 
 typedef float Four __attribute__((vector_size(16)));
 
@@ -130,7 +127,8 @@ typedef float Four __attribute__((vector_size(16)));
 [[gnu::always_inline]] inline void locate_all(std::span<const model::SweepPoint> points,
                                               const Levelling& by, const GroundGrid& grid,
                                               PointBlock& block) {
-  const std::size_t count = padded(points.size());
+  // What lies beyond the last point is computed and never looked at.
+  const std::size_t count = padded_to_lanes(points.size());
   take_apart(points, block);
   level(by, count, block);
   const GroundGrid at = grid;
@@ -160,7 +158,7 @@ typedef float Four __attribute__((vector_size(16)));
 [[gnu::always_inline]] inline void place_all(std::span<const model::SweepPoint> points,
                                              const Levelling& by, const GroundGrid& grid,
                                              const GroundPatch* patches, PointBlock& block) {
-  const std::size_t count = padded(points.size());
+  const std::size_t count = padded_to_lanes(points.size());
   take_apart(points, block);
   level(by, count, block);
   const Eigen::Vector3f sensor = by.sensor_m;

@@ -9,7 +9,7 @@ namespace understory::landmark_extractor::rings {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
-constexpr float kTurn = 2.0F * kPi;
+constexpr float kFullTurn = 2.0F * kPi;
 /// Where one return is so much nearer or farther than its neighbour, a ring may be cut.
 constexpr float kCut_m = 1.0F;
 /// So many points ahead memory is asked for.
@@ -85,7 +85,7 @@ bool RingSlots::scatter(const model::PointSweep& sweep, const points::Levelling&
       float azimuth = point.azimuth_rad + here.turned_rad;
       const float change = azimuth - here.azimuth_rad;
       if (std::abs(change) > kPi) {
-        const float turn = change > 0.0F ? -kTurn : kTurn;
+        const float turn = change > 0.0F ? -kFullTurn : kFullTurn;
         here.turned_rad += turn;
         azimuth += turn;
       }
@@ -126,7 +126,7 @@ IndexRange RingSlots::cut(std::size_t ring, float lowest_m) {
   // Ascends by less than half a turn where the ends meet.
   const float ascent = is_leftward_ ? points_[from].azimuth_rad - points_[end - 1].azimuth_rad
                                     : points_[begin].azimuth_rad - points_[end - 1].azimuth_rad;
-  const float turn = kTurn * std::round(ascent / kTurn) * (is_leftward_ ? -1.0F : 1.0F);
+  const float turn = kFullTurn * std::round(ascent / kFullTurn) * (is_leftward_ ? -1.0F : 1.0F);
   for (std::size_t i = 0; i < cut; ++i) {
     points_[to + i] = points_[from + i];
     points_[to + i].azimuth_rad += turn;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/landmark_extractor/square.hpp"
 #include "services/landmark_extractor/trunks/column_plane.hpp"
 
 namespace understory::landmark_extractor::trunks {
@@ -17,13 +18,10 @@ constexpr double kNearlySettled_m2 = 1e-5;
 /// A run disagrees whose ranges are so far off in root mean square, or an edge of it [sigma].
 constexpr float kMaxRunResidual = 2.5F;
 constexpr float kMaxEdgeResidual = 3.5F;
-constexpr int kRounds = 4;
+constexpr int kConsensusRounds = 4;
 /// Runs of one stem seem so far apart, and so much more per metre of height.
 constexpr float kConsensus_m = 0.06F;
 constexpr float kConsensusLean = 0.06F;
-
-double square(double value) { return value * value; }
-float square(float value) { return value * value; }
 
 }  // namespace
 
@@ -37,7 +35,7 @@ std::optional<StemFit> StemFitter::fit(const rings::RingCloud& cloud,
   // Fit, leave out what disagrees, and fit again.
   evidence_.take(cloud, runs);
   Vector6d state = Vector6d::Zero();
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kConsensusRounds; ++round) {
     if (!has_enough()) return std::nullopt;
     used_.select(evidence_, agreeing_at_);
     if (round == 0) state = start();

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <span>
 
+#include "services/landmark_extractor/square.hpp"
 #include "services/landmark_extractor/trunks/stem_evidence.hpp"
 
 namespace understory::landmark_extractor::trunks {
@@ -13,8 +14,6 @@ namespace {
 
 /// Points scatter across a plane at least so much, however it is looked at.
 constexpr double kLeastAcross_m = 0.003;
-
-double square(double value) { return value * value; }
 
 }  // namespace
 

@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <array>
 
+#include "services/landmark_extractor/square.hpp"
+
 namespace understory::landmark_extractor::trunks {
 namespace {
 
 constexpr std::size_t kHitsPerRun = 7;
 static_assert(kHitsPerRun <= kLanes);
-
-double square(double value) { return value * value; }
-float square(float value) { return value * value; }
 
 }  // namespace
 

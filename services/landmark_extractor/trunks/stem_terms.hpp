@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <span>
 
+#include "services/landmark_extractor/lanes.hpp"
+
 namespace understory::landmark_extractor::trunks {
 
 /// Of a stem: x, y, radius, and their changes per metre of height.
@@ -13,8 +15,6 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 /// Information or covariance of a Vector6d.
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-/// Numbers that one vector register holds.
-inline constexpr std::size_t kLanes = 8;
 /// One number of each of some beams.
 using Lanes = std::array<float, kLanes>;
 

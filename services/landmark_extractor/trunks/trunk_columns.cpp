@@ -7,7 +7,7 @@ namespace understory::landmark_extractor::trunks {
 namespace {
 
 constexpr float kCell_m = 0.5F;
-constexpr int kRounds = 3;
+constexpr int kMergeRounds = 3;
 /// More points than any run has.
 constexpr std::uint32_t kMostPoints = 0xffffffffU;
 
@@ -105,7 +105,7 @@ const std::vector<Column>& ColumnFinder::find(const std::vector<rings::Run>& run
     // Half hidden runs of a thick trunk are farther apart than whole runs of a thin one.
     const float radius =
         static_cast<float>(parameters.gather_radius_m) + 0.25F * runs[seed].width_m;
-    for (int round = 0; round < kRounds; ++round) {
+    for (int round = 0; round < kMergeRounds; ++round) {
       gather(runs, axis, radius);
       if (gathered_.empty()) break;
       axis = mean_centre(runs, gathered_);

@@ -1,0 +1,130 @@
+// What the smoother keeps beside its graph, each list able to go back to the checkpoint.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "common/factor_graph/bayes_tree/incremental_smoother.hpp"
+#include "common/factor_graph/plane/smoother.hpp"
+
+namespace understory::factor_graph::plane {
+
+/// Stands for a measurement that has no factor in the graph.
+inline constexpr graph::FactorId kNoFactor{graph::kNone};
+
+/// A list that is appended to, with its length at the checkpoint.
+template <typename T>
+class AppendList {
+ public:
+  /// Appends.
+  void push_back(const T& item) { items_.push_back(item); }
+  /// Number of entries.
+  std::size_t size() const { return items_.size(); }
+  /// Entry with this index.
+  const T& operator[](std::size_t at) const { return items_[at]; }
+  /// All entries in their order.
+  const std::vector<T>& items() const { return items_; }
+  /// The checkpoint is now.
+  void commit() { saved_size_ = items_.size(); }
+  /// Back to the checkpoint.
+  void rollback() { items_.resize(saved_size_); }
+
+ private:
+  std::vector<T> items_;
+  std::size_t saved_size_ = 0;
+};
+
+/// Observations, which can also be replaced.
+class ObservationList {
+ public:
+  /// One observation.
+  struct Entry {
+    PointObservation measured;
+    graph::FactorId factor = kNoFactor;  ///< None where it does not count.
+  };
+  /// Appends.
+  void push_back(const Entry& entry) { entries_.push_back(entry); }
+  /// Puts another observation in its place; rollback() brings the old one back.
+  void replace(std::size_t at, const Entry& entry) {
+    changes_.push_back({at, entries_[at]});
+    entries_[at] = entry;
+  }
+  /// Number of entries.
+  std::size_t size() const { return entries_.size(); }
+  /// Entry with this index.
+  const Entry& operator[](std::size_t at) const { return entries_[at]; }
+  /// All entries in their order.
+  const std::vector<Entry>& entries() const { return entries_; }
+  /// The checkpoint is now.
+  void commit() {
+    changes_.clear();
+    saved_size_ = entries_.size();
+  }
+  /// Back to the checkpoint.
+  void rollback() {
+    for (std::size_t i = changes_.size(); i-- > 0;) entries_[changes_[i].at] = changes_[i].before;
+    changes_.clear();
+    entries_.resize(saved_size_);
+  }
+
+ private:
+  struct Change {
+    std::size_t at = 0;
+    Entry before;
+  };
+  std::vector<Entry> entries_;
+  std::vector<Change> changes_;  ///< Since the checkpoint.
+  std::size_t saved_size_ = 0;
+};
+
+/// Poses and points that updates moved since the checkpoint, each once.
+class MovedList {
+ public:
+  /// The variable is the pose or the point with this index.
+  void give_role(graph::VariableId name, std::size_t role) {
+    const auto at = static_cast<std::size_t>(index(name));
+    if (roles_.size() <= at) roles_.resize(at + 1);
+    roles_[at] = {static_cast<std::uint32_t>(role), false};
+  }
+  /// Adds what the last update moved.
+  void collect(const bayes_tree::IncrementalSmoother& smoother) {
+    for (const int v : smoother.moved()) {
+      const graph::VariableType type = smoother.graph().type(graph::VariableId(v));
+      if (type == graph::VariableType::kScalar) continue;
+      Role& role = roles_[static_cast<std::size_t>(v)];
+      if (role.is_moved) continue;
+
+      role.is_moved = true;
+      moved_.push_back(v);
+      if (type == graph::VariableType::kPose2) {
+        poses_.push_back(PoseId(role.index));
+      } else {
+        points_.push_back(PointId(role.index));
+      }
+    }
+  }
+  /// Nothing has moved.
+  void clear() {
+    for (const int v : moved_) roles_[static_cast<std::size_t>(v)].is_moved = false;
+    moved_.clear();
+    poses_.clear();
+    points_.clear();
+  }
+  /// Poses that moved.
+  const std::vector<PoseId>& poses() const { return poses_; }
+  /// Points that moved.
+  const std::vector<PointId>& points() const { return points_; }
+
+ private:
+  struct Role {
+    std::uint32_t index = 0;  ///< Among the poses, or among the points.
+    bool is_moved = false;
+  };
+  std::vector<Role> roles_;  ///< Per variable; of scalars unused.
+  std::vector<int> moved_;   ///< Variables.
+  std::vector<PoseId> poses_;
+  std::vector<PointId> points_;
+};
+
+}  // namespace understory::factor_graph::plane
