@@ -5,15 +5,13 @@
 #include <numbers>
 
 #include "sim/point_grid.hpp"
+#include "sim/random_streams.hpp"
 
 namespace understory::sim {
 namespace {
 
 using std::numbers::pi;
 
-double uniform(std::mt19937_64& random, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(random);
-}
 double normal(std::mt19937_64& random, double sigma) {
   return sigma > 0.0 ? std::normal_distribution<double>(0.0, sigma)(random) : 0.0;
 }

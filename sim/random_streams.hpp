@@ -27,4 +27,9 @@ inline std::mt19937_64 random_stream(std::uint64_t seed, Stream stream, std::uin
   return std::mt19937_64(mix(mix(mix(seed) ^ static_cast<std::uint64_t>(stream)) ^ index));
 }
 
+/// A number that is equally likely anywhere from low to high.
+inline double uniform(std::mt19937_64& random, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(random);
+}
+
 }  // namespace understory::sim

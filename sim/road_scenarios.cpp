@@ -14,10 +14,6 @@ namespace {
 using Points = std::vector<Eigen::Vector2d>;
 constexpr double kRounding = 11.0;
 
-double uniform(std::mt19937_64& random, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(random);
-}
-
 Scenario along_streets(const Route& route, const std::vector<Stretch>& stretches,
                        std::uint64_t seed) {
   std::mt19937_64 random = random_stream(seed, Stream::kScenery);

@@ -1,8 +1,9 @@
 #include "common/model/level.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <cstdlib>
+
+#include "common/geometry/decompositions.hpp"
 
 namespace understory::model {
 namespace {
@@ -18,10 +19,10 @@ Eigen::Matrix2d without_level(const Eigen::Matrix2d& covariance_m2, const Eigen:
                               const Eigen::Matrix2d& level_covariance_rad2) {
   const Eigen::LLT<Eigen::Matrix2d> factor(covariance_m2);
   const Eigen::Matrix2d root = factor.matrixL().solve(arm);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> share(root * level_covariance_rad2 *
-                                                             root.transpose());
-  const Eigen::Matrix2d axes = factor.matrixL() * share.eigenvectors();
-  const Eigen::Vector2d own_share = (1.0 - share.eigenvalues().array()).cwiseMax(kLeastOwnShare);
+  const geometry::PrincipalAxes share =
+      geometry::principal_axes(root * level_covariance_rad2 * root.transpose());
+  const Eigen::Matrix2d axes = factor.matrixL() * share.vectors;
+  const Eigen::Vector2d own_share = (1.0 - share.values.array()).cwiseMax(kLeastOwnShare);
   return axes * own_share.asDiagonal() * axes.transpose();
 }
 

@@ -13,7 +13,6 @@
 namespace understory::eval::harness {
 namespace {
 
-constexpr double kWrong = 1.0;        // [m]
 constexpr double kLeastMotion = 0.1;  // [m] between keyframes that count
 constexpr double kRange = 40.0;       // [m] as the ideal scans have
 constexpr double kStep = 0.2;         // [m] from sweep to sweep, as the ideal scans have
@@ -120,7 +119,7 @@ class ChainScorer {
     result.score.errors += errors;
     const std::size_t before = result.trace.final_map.poses.size();
     for (std::size_t i = before; i < state.poses.size(); ++i) {
-      if (error_m(state.poses[i]) > kWrong) ++result.score.wrong_updates;
+      if (error_m(state.poses[i]) > kWrongPose_m) ++result.score.wrong_updates;
     }
     const double newest_m = error_m(state.poses.back());
     const double scans = travelled_[state.poses.back().scan] / kStep + kScansPerKeyframe;

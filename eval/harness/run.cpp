@@ -1,5 +1,4 @@
 #include "eval/harness/run.hpp"
-#include "common/terminal/interrupt.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -8,10 +7,11 @@
 #include <set>
 #include <utility>
 
+#include "common/terminal/interrupt.hpp"
+
 namespace understory::eval::harness {
 namespace {
 
-constexpr double kWrong = 1.0;             // [m]
 constexpr double kSnapshotFraction = 0.3;  // of the run: more than a quarter of the circle is done
 
 /// Follows one method through one drive.
@@ -70,7 +70,7 @@ class Scorer {
     if (!truth_) truth_.emplace(recorded_.drive, state.poses.front().scan);
 
     for (const metrics::PoseEstimate& pose : state.poses) {
-      if (accepted_.insert(pose.scan).second && error_m(pose) > kWrong) {
+      if (accepted_.insert(pose.scan).second && error_m(pose) > kWrongPose_m) {
         ++result_.score.wrong_updates;
       }
     }

@@ -16,6 +16,9 @@ namespace understory::eval::harness {
 /// Scans that make one keyframe (GeoSLAM §5).
 inline constexpr std::size_t kScansPerKeyframe = 8;
 
+/// An accepted pose that is farther from the true one is wrong.
+inline constexpr double kWrongPose_m = 1.0;
+
 /// A drive with all its scans: every method gets the same ones.
 struct RecordedDrive {
   sim::Drive drive;

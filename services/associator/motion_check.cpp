@@ -1,8 +1,9 @@
 #include "services/associator/motion_check.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
+
+#include "common/geometry/decompositions.hpp"
 
 namespace understory::associator {
 namespace {
@@ -39,10 +40,7 @@ void check_motion(Track& track, const Observation& observation, const MotionChec
   if (track.steadiness != Steadiness::kUnknown) return;
 
   // It is: stationary, if somebody who walks would be outside the gate by now.
-  const double widest =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(spread, Eigen::EigenvaluesOnly)
-          .eigenvalues()
-          .maxCoeff();
+  const double widest = geometry::eigenvalues(spread).maxCoeff();
   const double noticed_m = std::sqrt(kGate * widest);
   const bool is_noticed = parameters.walking_mps * check.seconds > noticed_m;
   // A longer comparison would not decide it either.

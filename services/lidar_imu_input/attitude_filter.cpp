@@ -1,10 +1,10 @@
 #include "services/lidar_imu_input/attitude_filter.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "common/geometry/decompositions.hpp"
 #include "services/lidar_imu_input/stamps.hpp"
 
 namespace understory::lidar_imu_input {
@@ -58,7 +58,7 @@ double pitch_tangent(const Eigen::Quaterniond& world_Q_vehicle) {
 
 AttitudeFilter::AttitudeFilter(const ImuParameters& imu, const Eigen::Vector3d& force)
     : imu_(imu),
-      world_Q_vehicle_(Eigen::Quaterniond::FromTwoVectors(
+      world_Q_vehicle_(geometry::rotation_between(
           force.norm() > 0.1 * kGravity_mps2 ? force : Eigen::Vector3d::UnitZ(),
           Eigen::Vector3d::UnitZ())) {
   covariance_.block<3, 3>(0, 0).diagonal().setConstant(square(kStartTilt_rad));
@@ -189,9 +189,8 @@ model::LevelError AttitudeFilter::level_since_mark() const {
 
   // The added covariance is negative by rounding only.
   const Eigen::Matrix2d added = level.covariance - level.memory * shared.transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> parts(0.5 * (added + added.transpose()));
-  level.added = parts.eigenvectors() * parts.eigenvalues().cwiseMax(0.0).asDiagonal() *
-                parts.eigenvectors().transpose();
+  const geometry::PrincipalAxes parts = geometry::principal_axes(0.5 * (added + added.transpose()));
+  level.added = parts.vectors * parts.values.cwiseMax(0.0).asDiagonal() * parts.vectors.transpose();
   return level;
 }
 

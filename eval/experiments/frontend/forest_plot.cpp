@@ -1,5 +1,4 @@
 #include "eval/experiments/frontend/forest_plot.hpp"
-#include "common/io/text_file.hpp"
 
 #include <fmt/format.h>
 
@@ -12,6 +11,8 @@
 #include <numeric>
 #include <sstream>
 #include <stdexcept>
+
+#include "common/io/text_file.hpp"
 
 namespace understory::eval::experiments::frontend {
 namespace {

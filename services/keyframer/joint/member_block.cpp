@@ -1,8 +1,9 @@
 #include "services/keyframer/joint/member_block.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <map>
+
+#include "common/geometry/decompositions.hpp"
 
 namespace understory::keyframer::joint {
 namespace {
@@ -84,9 +85,7 @@ bool are_covariances(const BlockEstimate& estimate) {
       estimate.centre_T_member, [](const geometry::SE2WithCovariance& member) {
         const Eigen::Matrix3d symmetric = 0.5 * (member.covariance + member.covariance.transpose());
         if (!symmetric.allFinite()) return false;
-        const Eigen::Vector3d eigenvalues =
-            Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(symmetric, Eigen::EigenvaluesOnly)
-                .eigenvalues();
+        const Eigen::Vector3d eigenvalues = geometry::eigenvalues(symmetric);
         return eigenvalues.minCoeff() >= -1e-9 * eigenvalues.maxCoeff();
       });
 }

@@ -1,12 +1,12 @@
 #include "services/landmark_extractor/corners/wall_lines.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
 
+#include "common/geometry/decompositions.hpp"
 #include "services/landmark_extractor/square.hpp"
 
 namespace understory::landmark_extractor::corners {
@@ -224,11 +224,10 @@ void WallFinder::add_wall(const std::vector<std::uint32_t>& members) {
   wall.z_m /= sums.count;
   const Eigen::Matrix2d scatter =
       sums.square / sums.count - wall.centroid_m * wall.centroid_m.transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(scatter);
-  wall.direction = axes.eigenvectors().col(1);
+  const geometry::PrincipalAxes axes = geometry::principal_axes(scatter);
+  wall.direction = axes.vectors.col(1);
   if (wall.direction.dot(segments_[members[0]].direction) < 0.0) wall.direction *= -1.0;
-  const double across2 =
-      std::max(axes.eigenvalues()[0], square(kLeastAcross * sweep_.range_sigma_m));
+  const double across2 = std::max(axes.values[0], square(kLeastAcross * sweep_.range_sigma_m));
   if (std::sqrt(across2) > corner_.line_tolerance_m) return;
 
   // Its extent.
@@ -244,7 +243,7 @@ void WallFinder::add_wall(const std::vector<std::uint32_t>& members) {
   wall.unevenness_m = std::hypot(unevenness(members, wall, across2), corner_.flatness_sigma_m);
   const double of_offset = across2 / sums.count + square(wall.unevenness_m) / kStretches;
   wall.offset_sigma_m = std::sqrt(of_offset);
-  const double length2 = axes.eigenvalues()[1];
+  const double length2 = axes.values[1];
   wall.direction_sigma_rad = std::sqrt(of_offset / length2);
   walls_.push_back(wall);
 }

@@ -1,8 +1,9 @@
 #include "services/landmark_extractor/trunks/sweep_trunks.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "common/geometry/decompositions.hpp"
 
 namespace understory::landmark_extractor::trunks {
 namespace {
@@ -76,10 +77,7 @@ double share_of_lost(const std::vector<rings::Run>& runs, const std::vector<Colu
 }
 
 double largest_sigma(const Eigen::Matrix2d& covariance) {
-  return std::sqrt(
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance, Eigen::EigenvaluesOnly)
-          .eigenvalues()
-          .maxCoeff());
+  return std::sqrt(geometry::eigenvalues(covariance).maxCoeff());
 }
 
 }  // namespace
