@@ -18,9 +18,11 @@ void one_scan(benchmark::State& state) {
   ekf::EkfParameters parameters;
   parameters.map.max_landmarks = 200;
   ekf::Ekf filter(parameters);
+
   const int side = static_cast<int>(std::ceil(std::sqrt(count)));
   model::TrackedScan scan;
   scan.field_of_view.max_range_m = 60.0;
+
   for (int i = 0; i < count; ++i) {
     model::Detection seen;
     const int column = i % side - side / 2;
@@ -30,11 +32,13 @@ void one_scan(benchmark::State& state) {
     scan.landmarks.push_back(
         {static_cast<model::TrackId>(i + 1), static_cast<std::uint32_t>(i), seen});
   }
+
   model::Odometry increment;
   increment.covariance = 1e-6 * Eigen::Matrix3d::Identity();
   increment.inertial.emplace();
   increment.inertial->seconds = 0.1;
   increment.inertial->covariance = 1e-6 * Eigen::Matrix<double, 5, 5>::Identity();
+
   std::vector<double> us;
   for (auto _ : state) {
     const auto begin = std::chrono::steady_clock::now();
@@ -45,6 +49,7 @@ void one_scan(benchmark::State& state) {
     increment.from_utime = scan.utime;
     increment.utime = scan.utime += 100000;
   }
+
   state.counters["used"] = static_cast<double>(filter.counters().landmarks_used) /
                            static_cast<double>(filter.counters().scans);
   const auto at = us.begin() + static_cast<std::ptrdiff_t>(us.size() * 99 / 100);

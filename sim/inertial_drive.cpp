@@ -91,7 +91,7 @@ InertialDrive::Tick InertialDrive::Body::move(double dt, double yaw_rad,
 /// Whether the body sways until the next scan.
 bool InertialDrive::sways() const {
   const InertialDriveParameters& p = parameters_;
-  const bool is_stationary = progress_.time_s + p.scan_interval_s < p.standing_s + 1e-6;
+  const bool is_stationary = progress_.time_s + p.scan_interval_s < p.stationary_s + 1e-6;
   return is_stationary &&
          (p.sway_sigma_m > 0.0 || p.sway_sigma_rad > 0.0 || p.sway_sigma_mps > 0.0);
 }
@@ -137,7 +137,7 @@ InertialDrive::Tick InertialDrive::advance(double dt) {
   progress_.time_s += dt;
 
   // The speed follows the wanted one as far as the acceleration allows.
-  const double moving = progress_.time_s - p.standing_s;
+  const double moving = progress_.time_s - p.stationary_s;
   const double wanted =
       moving <= 0.0 ? 0.0 : p.speed_mps * (1.0 + p.speed_swing * std::sin(0.4 * moving));
   const double change = p.acceleration_mps2 * dt;

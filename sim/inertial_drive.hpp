@@ -32,7 +32,7 @@ enum class OdometryKind {
 
 /// Motion, sensors and their errors.
 struct InertialDriveParameters {
-  double standing_s = 10.0;  ///< At the start.
+  double stationary_s = 10.0;  ///< At the start.
   /// Sway of the stationary vehicle's body (engine, wind), drawn anew for each scan; 0 = none.
   double sway_sigma_m = 0.0;  ///< Per axis.
   double sway_sigma_rad = 0.0;

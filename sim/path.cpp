@@ -19,7 +19,7 @@ constexpr std::array<std::pair<PathKind, std::string_view>, 8> kPathNames{
      {PathKind::kTriangle, "triangle"},
      {PathKind::kDoubleCircle, "double-circle"},
      {PathKind::kMeander, "meander"},
-     {PathKind::kStanding, "standing"}}};
+     {PathKind::kStationary, "stationary"}}};
 
 /// A stretch with constant twist: `effort` is what it costs in metres or radians.
 struct Segment {
@@ -73,7 +73,7 @@ std::vector<Segment> segments_of(const PathParameters& parameters) {
     case PathKind::kMeander:
       return meander(parameters);
 
-    case PathKind::kStanding:
+    case PathKind::kStationary:
       return {{length, Eigen::Vector3d::Zero()}};
   }
 

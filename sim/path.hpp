@@ -18,7 +18,7 @@ enum class PathKind {
   kTriangle,      ///< Rotations to the left on the spot by 120 degrees.
   kDoubleCircle,  ///< Two rounds to the right: what GeoSLAM's code drove as its figure-eight.
   kMeander,       ///< Parallel lanes in alternating directions, for long drives in a small forest.
-  kStanding,      ///< Stationary; an observation at every interval of the length.
+  kStationary,    ///< Stationary; an observation at every interval of the length.
 };
 
 /// Shape, length and spacing of a path.

@@ -139,7 +139,7 @@ SimulatedSweep SpinningLidar::sweep(const PoseAt& world_T_vehicle, std::uint64_t
                                     model::Utime utime_of_start) {
   SimulatedSweep result;
   model::PointSweep& raw = result.raw;
-  raw.sequence = raw.turn = revolution;
+  raw.sequence = raw.revolution = revolution;
   raw.rings = static_cast<std::uint16_t>(beams_.size());
   raw.max_range_m = parameters_.max_range_m;
   const std::size_t most = beams_.size() * static_cast<std::size_t>(parameters_.columns);

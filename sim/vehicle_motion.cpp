@@ -74,9 +74,9 @@ std::vector<double> distances(const Route& route, const SpeedParameters& paramet
     }
 
     late -= seconds;
-    const double standing_s = standing_at(parameters, i + 1, limits.size());
-    if (standing_s > 0.0) {
-      stand(standing_s, static_cast<double>(i + 1) * kSpacing);
+    const double stationary_s = standing_at(parameters, i + 1, limits.size());
+    if (stationary_s > 0.0) {
+      stand(stationary_s, static_cast<double>(i + 1) * kSpacing);
       late = 0.0;
     }
   }

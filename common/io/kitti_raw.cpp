@@ -211,7 +211,7 @@ model::PointSweep KittiRaw::read_sweep(std::size_t index) const {
   model::PointSweep sweep =
       kitti::parse_points(read_whole(files_[index]), revolution_s, files_[index].string());
   sweep.utime = starts_[index];
-  sweep.turn = index;
+  sweep.revolution = index;
   sweep.sequence = index;
   return sweep;
 }

@@ -81,7 +81,7 @@ model::PointSweep ReducedKitti::read_sweep(std::size_t index) const {
   model::PointSweep sweep;
   sweep.rings = 16;
   sweep.max_range_m = kitti::kMaxRange_m;
-  sweep.turn = index;
+  sweep.revolution = index;
   sweep.sequence = index;
   sweep.utime = poses_[index].utime - static_cast<model::Utime>(0.5 * kTurn_s * 1e6);
   const std::size_t count = count_at(bytes_, offsets_[index] + 4);

@@ -112,7 +112,7 @@ std::optional<model::PointSweep> VelodyneDecoder::take_revolution() {
   if (sweep.points.empty()) return std::nullopt;
   sweep.rings = static_cast<std::uint16_t>(calibration_.beams.size());
   sweep.max_range_m = max_range_m_;
-  sweep.turn = revolutions_;
+  sweep.revolution = revolutions_;
   sweep.sequence = revolutions_++;
   // What came before the first passage of azimuth zero is part of a revolution.
   if (!whole) return std::nullopt;

@@ -19,8 +19,6 @@ class LevelCorrection {
   LandmarkScan levelled(LandmarkScan scan) const;
   /// The estimate; none at the start.
   const std::optional<EkfLevel>& latest() const { return level_; }
-  /// Replaces the estimate, or removes it.
-  void restore(const std::optional<EkfLevel>& level) { level_ = level; }
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {

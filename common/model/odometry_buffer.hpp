@@ -89,8 +89,6 @@ class OdometryBuffer {
     if (!bias_ || !velocity_ || !(velocity_->gyro_bias_variance > 0.0)) return std::nullopt;
     return FilterBias{bias_->x(), velocity_->gyro_bias_variance};
   }
-  /// Sets the velocity as velocity() gave it.
-  void restore(const VelocityEstimate& velocity) { velocity_ = velocity; }
   /// Motion of the vehicle (from_T_to), or none where a gap or the end of the buffer is in between.
   /// Inside an increment the twist is constant and the covariance in proportion to time. Cost: the
   /// increments in between, and a binary search.
@@ -101,8 +99,6 @@ class OdometryBuffer {
   void forget_before(Utime utime);
   /// The increments in order of time, as they were corrected.
   const std::deque<Odometry>& increments() const { return increments_; }
-  /// Appends an increment that increments() gave, without correction.
-  void restore(const Odometry& increment) { increments_.push_back(increment); }
   /// Members of a saved state (include common/model/archive.hpp); see common/state. The correlation
   /// time is configuration.
   template <class Archive, class Self>

@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t kLargestReserve = std::size_t{1} << 20;
 
 PointSweep without_points(const PointSweep& sweep) {
-  return {sweep.utime,       sweep.sequence,          sweep.turn,        sweep.part,
+  return {sweep.utime,       sweep.sequence,          sweep.revolution,  sweep.part,
           sweep.parts,       sweep.has_times,         sweep.is_deskewed, sweep.rings,
           sweep.max_range_m, sweep.sensor_position_m, sweep.attitude,    {}};
 }
@@ -38,15 +38,16 @@ std::vector<PointSweep> split_sweep(const PointSweep& sweep, std::size_t max_poi
 }
 
 std::optional<PointSweep> SweepAssembler::add(PointSweep part) {
-  const bool continues = pending_ && pending_->turn == part.turn && pending_->utime == part.utime &&
-                         pending_->parts == part.parts && part.part == next_part_;
+  const bool continues = pending_ && pending_->revolution == part.revolution &&
+                         pending_->utime == part.utime && pending_->parts == part.parts &&
+                         part.part == next_part_;
 
   // The first part of a revolution, or the next one of the pending revolution.
   if (!continues) {
-    if (pending_) count_incomplete(pending_->turn);
+    if (pending_) count_incomplete(pending_->revolution);
     pending_.reset();
     if (part.part != 0) {
-      if (lost_revolution_ != part.turn) count_incomplete(part.turn);
+      if (lost_revolution_ != part.revolution) count_incomplete(part.revolution);
       return std::nullopt;
     }
     const std::size_t expected = part.points.size() * part.parts;

@@ -42,14 +42,14 @@ struct Attitude {
 /// repeated.
 struct PointSweep {
   Utime utime = 0;
-  std::uint64_t sequence = 0;  ///< Counts messages (parts) of the channel.
-  std::uint64_t turn = 0;      ///< Counts revolutions; the same for all parts of one.
-  std::uint16_t part = 0;      ///< Number of this part, from 0.
-  std::uint16_t parts = 1;     ///< Parts of the revolution.
-  bool has_times = true;       ///< False: the points' times are not known (all 0).
-  bool is_deskewed = false;    ///< Frame `vehicle` at utime; else frame `sensor`.
-  std::uint16_t rings = 0;     ///< Number of beams.
-  double max_range_m = 0.0;    ///< Of the sensor.
+  std::uint64_t sequence = 0;    ///< Counts messages (parts) of the channel.
+  std::uint64_t revolution = 0;  ///< Counts revolutions; the same for all parts of one.
+  std::uint16_t part = 0;        ///< Number of this part, from 0.
+  std::uint16_t parts = 1;       ///< Parts of the revolution.
+  bool has_times = true;         ///< False: the points' times are not known (all 0).
+  bool is_deskewed = false;      ///< Frame `vehicle` at utime; else frame `sensor`.
+  std::uint16_t rings = 0;       ///< Number of beams.
+  double max_range_m = 0.0;      ///< Of the sensor.
   Eigen::Vector3d sensor_position_m = Eigen::Vector3d::Zero();  ///< In the frame of the points.
   std::optional<Attitude> attitude;  ///< At utime; none = not known (raw, or before it settled).
   std::vector<SweepPoint> points;

@@ -111,6 +111,7 @@ class Writer {
     } else if constexpr (DynamicMatrix<T>) {
       put(static_cast<std::uint64_t>(value.rows()));
       put(static_cast<std::uint64_t>(value.cols()));
+
       put_bytes(value.data(), sizeof(typename T::Scalar) * static_cast<std::size_t>(value.size()));
     } else if constexpr (std::same_as<T, Eigen::Quaterniond>) {
       put(value.coeffs());
@@ -129,12 +130,14 @@ class Writer {
       for (const auto& element : value) put(element);
     } else if constexpr (kIsMap<T>) {
       put(static_cast<std::uint64_t>(value.size()));
+
       for (const auto& [key, element] : value) {
         put(key);
         put(element);
       }
     } else if constexpr (kIsList<T>) {
       put(static_cast<std::uint64_t>(value.size()));
+
       for (const auto& element : value) put(element);
     } else if constexpr (requires { T::archive(*this, value); }) {
       T::archive(*this, value);
@@ -179,6 +182,7 @@ class Reader {
       const std::uint64_t rows = count(1);
       const std::uint64_t cols = count(1);
       if (rows != 0 && cols > bytes_.size() / sizeof(typename T::Scalar) / rows) fail();
+
       value.resize(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(cols));
       get_bytes(value.data(), sizeof(typename T::Scalar) * static_cast<std::size_t>(value.size()));
     } else if constexpr (std::same_as<T, Eigen::Quaterniond>) {
@@ -212,6 +216,7 @@ class Reader {
       for (auto& element : value) get(element);
     } else if constexpr (kIsMap<T>) {
       value.clear();
+
       for (std::uint64_t left = count(1); left > 0; --left) {
         typename T::key_type key{};
         get(key);
@@ -219,6 +224,7 @@ class Reader {
       }
     } else if constexpr (std::same_as<T, std::vector<bool>>) {
       value.assign(count(1), false);
+
       for (std::size_t i = 0; i < value.size(); ++i) {
         bool bit = false;
         get(bit);
@@ -226,6 +232,7 @@ class Reader {
       }
     } else if constexpr (kIsList<T>) {
       value.clear();
+
       for (std::uint64_t left = count(1); left > 0; --left) {
         typename T::value_type element{};
         get(element);

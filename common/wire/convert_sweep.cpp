@@ -121,7 +121,7 @@ Result<model::PointSweep> from_wire(const lidar_sweep_t& wire) {
   model::PointSweep sweep;
   sweep.utime = wire.utime;
   sweep.sequence = static_cast<std::uint64_t>(wire.seq);
-  sweep.turn = static_cast<std::uint64_t>(wire.turn);
+  sweep.revolution = static_cast<std::uint64_t>(wire.turn);
   sweep.part = static_cast<std::uint16_t>(wire.part);
   sweep.parts = static_cast<std::uint16_t>(wire.parts);
   sweep.has_times = wire.has_times != 0;
@@ -141,7 +141,7 @@ lidar_sweep_t to_wire(const model::PointSweep& sweep) {
   lidar_sweep_t wire{};
   wire.utime = sweep.utime;
   wire.seq = static_cast<std::int64_t>(sweep.sequence);
-  wire.turn = static_cast<std::int64_t>(sweep.turn);
+  wire.turn = static_cast<std::int64_t>(sweep.revolution);
   wire.part = sweep.part;
   wire.parts = sweep.parts;
   wire.has_times = sweep.has_times ? 1 : 0;

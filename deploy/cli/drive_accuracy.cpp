@@ -40,6 +40,7 @@ void DriveAccuracyCollector::add(const io::LogEvent& event) {
   } else if (event.channel == "SLAM_UPDATE") {
     const auto update = wire::decode_message<model::MapUpdate>(event.data);
     if (!update) return;
+
     ++counted_.updates[update->status];
     if (!first_update_ && update->status == model::MapUpdateStatus::kFirstMap)
       first_update_ = *update;

@@ -201,7 +201,7 @@ void import_pcd(const SensorImportOptions& options) {
     model::PointSweep sweep =
         io::parse_pcd(read_recorded(files[i].path.string()), files[i].path.string());
     sweep.utime = files[i].utime;
-    sweep.turn = i;
+    sweep.revolution = i;
     log.add_sweep("RAW_SWEEP", sweep);
     progress.update(static_cast<double>(i + 1));
   }

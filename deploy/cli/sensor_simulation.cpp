@@ -133,7 +133,7 @@ model::Utime complete_at(const sim::SensorReading& reading, const sim::SensorDri
         if constexpr (std::is_same_v<Value, sim::SimulatedSweep>) {
           const double revolution_s = drive.suite().lidar->revolution_s();
           return static_cast<model::Utime>(1e6 * revolution_s *
-                                           static_cast<double>(value.raw.turn + 1));
+                                           static_cast<double>(value.raw.revolution + 1));
         } else if constexpr (std::is_same_v<Value, sim::SimulatedPlanarScan>) {
           return value.scan.utime;
         } else {

@@ -20,6 +20,7 @@ std::map<std::string, RunResult> run_all_methods(const Cell& cell, const Campaig
                                                  int run, const std::atomic<bool>& stop) {
   const RecordedDrive recorded(cell.drive(), run_seed(options.seed, run));
   std::map<std::string, RunResult> results;
+
   for (const std::string& method : options.methods) {
     if (method == "oracle" || method == kLidarFilter) continue;
     if (method == kLidarMethod) {
@@ -31,6 +32,7 @@ std::map<std::string, RunResult> run_all_methods(const Cell& cell, const Campaig
     }
     results[method] = run_slam(recorded, make_stages(method), stop);
   }
+
   if (wanted(options, "oracle")) {
     // The oracle estimates the states of the smoothing method: the ratio compares the same
     // quantities.
@@ -39,6 +41,7 @@ std::map<std::string, RunResult> run_all_methods(const Cell& cell, const Campaig
                             ? run_oracle(recorded, smoothing->second.marks, stop)
                             : run_oracle(recorded, stop);
   }
+
   for (auto& [method, result] : results) {
     result.marks.clear();
     if (run > 0) result.trace.snapshot.reset();

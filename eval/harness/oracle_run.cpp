@@ -40,30 +40,37 @@ RunResult run(const RecordedDrive& recorded, std::span<const std::size_t> scans_
   metrics::BatchOracle oracle;
   std::optional<metrics::MapTruth> truth;
   const double sigma_m = recorded.drive.parameters().sensor.position_sigma_m;
+
   for (std::size_t i = 0; i < scans_of_state.size(); ++i) {
     while (oracle.scans() < scans_of_state[i]) {
       if (stop) throw terminal::Interrupted{};
       add_scan(oracle, recorded.scans[oracle.scans()]);
     }
+
     oracle.solve();
     const StateMark mark = mark_of(i, oracle);
     if (!truth) truth.emplace(recorded.drive, mark.bases.front());
+
     metrics::MapState state = state_of(oracle, mark);
     const metrics::ErrorSums errors = errors_of(state, *truth);
     result.score.errors += errors;
+
     const metrics::PoseEstimate& newest = state.poses.back();
     const geometry::SE2 true_pose = truth->map_T_vehicle(newest.scan);
     result.trace.states.push_back(
         {mark.scans, errors.rpe_m(), errors.lpe_m(),
          (newest.map_T_vehicle.translation() - true_pose.translation()).norm()});
+
     if (sigma_m > 0.0 && mark.bases.front() == 0 && newest.scan > 0) {
       const Eigen::Vector3d error = (newest.map_T_vehicle.inverse() * true_pose).Log();
       result.score.nees.emplace_back(
           newest.scan / kScansPerKeyframe,
           error.dot(oracle.covariance(newest.scan, sigma_m).llt().solve(error)));
     }
+
     result.trace.final_map = std::move(state);
   }
+
   if (!truth) return result;
   result.score.updates = static_cast<int>(result.trace.final_map.poses.size());
   result.score.updates_possible = static_cast<int>(recorded.scans.size() / kScansPerKeyframe);

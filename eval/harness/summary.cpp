@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -48,6 +49,7 @@ Summary summary_of(const Cell& cell, const std::string& method,
   summary.has_ideal_scans = method != kLidarMethod && method != kLidarFilter;
   summary.has_map = method != kLidarFilter;
   summary.runs = static_cast<int>(runs.size());
+
   std::vector<double> roe_deg;
   std::vector<double> ate_cm;
   metrics::MapCompleteness total;
@@ -57,9 +59,11 @@ Summary summary_of(const Cell& cell, const std::string& method,
     summary.lpe_cm_runs.push_back(100.0 * score.errors.lpe_m());
     roe_deg.push_back(180.0 / std::numbers::pi * score.errors.roe_rad());
     ate_cm.push_back(100.0 * score.ate_m);
+
     summary.updates += score.updates / static_cast<double>(runs.size());
     summary.updates_possible = score.updates_possible;
     summary.wrong_updates += score.wrong_updates;
+
     total.well_seen += score.completeness.well_seen;
     total.recalled += score.completeness.recalled;
     total.landmarks += score.completeness.landmarks;
@@ -67,6 +71,7 @@ Summary summary_of(const Cell& cell, const std::string& method,
     summary.landmarks_in_range +=
         static_cast<double>(score.landmarks_in_range) / static_cast<double>(runs.size());
   }
+
   summary.rpe_cm = statistics_of(summary.rpe_cm_runs);
   summary.lpe_cm = statistics_of(summary.lpe_cm_runs);
   summary.roe_deg = statistics_of(roe_deg);
@@ -95,11 +100,8 @@ Statistics statistics_of(const std::vector<double>& values) {
 }
 
 std::pair<double, double> chi2_band_95(double dof) {
-  constexpr double kNormal975 = 1.959963984540054;
-  const double spread = 2.0 / (9.0 * dof);
-  const double low = 1.0 - spread - kNormal975 * std::sqrt(spread);
-  const double high = 1.0 - spread + kNormal975 * std::sqrt(spread);
-  return {dof * std::pow(std::max(0.0, low), 3), dof * high * high * high};
+  const boost::math::chi_squared distribution(dof);
+  return {quantile(distribution, 0.025), quantile(distribution, 0.975)};
 }
 
 std::vector<Summary> summarise(const std::vector<CellResult>& cells,

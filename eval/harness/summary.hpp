@@ -46,7 +46,7 @@ struct Summary {
 std::vector<Summary> summarise(const std::vector<CellResult>& cells,
                                const std::vector<std::string>& methods);
 
-/// The two-sided 95 % band of chi^2 with `dof` degrees of freedom (Wilson & Hilferty 1931).
+/// The two-sided 95 % band of chi^2 with `dof` degrees of freedom by boost::math.
 std::pair<double, double> chi2_band_95(double dof);
 
 /// One object of a result document's "rows"; keys end with the unit.

@@ -141,6 +141,7 @@ json traces_of(const std::vector<CellResult>& cells, const CampaignOptions& opti
   json result = json::array();
   for (const CellResult& cell : cells) {
     const sim::Drive drive(cell.cell.drive(), run_seed(options.seed, 0));
+
     json methods = json::object();
     std::size_t base = 0;
     for (const auto& [method, runs] : cell.runs) {
@@ -149,15 +150,18 @@ json traces_of(const std::vector<CellResult>& cells, const CampaignOptions& opti
       const auto& poses = runs.front().trace.final_map.poses;
       if (!poses.empty()) base = poses.front().scan;
     }
+
     const metrics::MapTruth truth(drive, base);
     json true_path = json::array();
     for (std::size_t scan = 0; scan < drive.size(); scan += 4) {
       true_path.push_back(pose(truth.map_T_vehicle(scan)));
     }
+
     json trunks = json::array();
     for (const std::uint32_t trunk : truth.trunks_in_range()) {
       trunks.push_back(point(truth.trunk_m(trunk)));
     }
+
     result.push_back({{"cell", cell.cell.name()},
                       {"true_path", true_path},
                       {"true_trunks", trunks},

@@ -19,6 +19,7 @@ void run_in_parallel(std::size_t count, int jobs, std::string_view what,
   std::mutex mutex;
   terminal::Progress progress(std::string(what), static_cast<double>(count),
                               terminal::Progress::Without::kSeconds);
+
   const auto work = [&] {
     for (std::size_t i = next++; i < count && !stop && !failed; i = next++) {
       try {
@@ -32,12 +33,15 @@ void run_in_parallel(std::size_t count, int jobs, std::string_view what,
       }
     }
   };
+
+  // The calling thread works too; the block ends when all threads have.
   {
     std::vector<std::jthread> workers;
     const auto extra = std::min(static_cast<std::size_t>(std::max(1, jobs)), count);
     for (std::size_t i = 1; i < extra; ++i) workers.emplace_back(work);
     work();
   }
+
   if (stop) throw terminal::Interrupted{};
   if (failure) std::rethrow_exception(failure);
 }

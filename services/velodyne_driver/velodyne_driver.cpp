@@ -67,8 +67,8 @@ void VelodyneDriver::start_over() {
 std::optional<model::PointSweep> VelodyneDriver::stamped(std::optional<model::PointSweep> sweep) {
   if (!sweep) return sweep;
   ++counts_.sweeps;
-  sweep->turn += next_revolution_;
-  sweep->sequence = sweep->turn;
+  sweep->revolution += next_revolution_;
+  sweep->sequence = sweep->revolution;
   if (parameters_.time.source == "received") sweep->utime += clock_.offset_us().value_or(0);
   return sweep;
 }

@@ -28,7 +28,7 @@ const sim::TrunkField& trunks() {
 
 sim::InertialDriveParameters fast_drive() {
   sim::InertialDriveParameters drive;
-  drive.standing_s = 1.0;
+  drive.stationary_s = 1.0;
   drive.speed_mps = 8.0;
   drive.acceleration_mps2 = 3.0;
   drive.loop_length_m = 800.0;

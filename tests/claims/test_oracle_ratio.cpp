@@ -12,9 +12,9 @@ TEST_CASE("the pose error is within a few percent of the maximum-likelihood orac
   // Circle of 200 m in the intermediate forest, 20 cm noise per axis, 90 % detection.
   const Cell cell;
   CampaignOptions options;
-  options.runs = 3;
-  // Three runs scatter from 0.92 to 1.24 (seeds 1 to 6, mean 1.05); this seed is near the mean.
-  options.seed = 3;
+  // Three runs would scatter from 0.92 to 1.24.
+  options.runs = 10;
+  options.seed = 1;
   options.methods = {"smoothing", "oracle"};
   const std::atomic<bool> stop{false};
 
@@ -25,7 +25,7 @@ TEST_CASE("the pose error is within a few percent of the maximum-likelihood orac
   CAPTURE(smoothing.ratio, smoothing.ratio_lpe, smoothing.rpe_cm.mean, smoothing.lpe_cm.mean);
   CHECK(smoothing.ratio < 1.10);
   CHECK(smoothing.ratio_lpe < 1.15);
-  // Below 1 the comparison itself is wrong: nothing beats the oracle on the average of three runs.
+  // Below 1 the comparison itself is wrong: nothing beats the oracle on the average of ten runs.
   CHECK(smoothing.ratio > 0.98);
   CHECK(smoothing.wrong_updates == 0);
   CHECK(smoothing.updates == smoothing.updates_possible);

@@ -103,22 +103,6 @@ Recording interrupted(const bus::Service& service, const std::string& toml, cons
   return published;
 }
 
-/// The extractor's fit of a stem starts from the height at which the fit of the stem before ended:
-/// after a restart the first one comes out up to 2e-6 m elsewhere.
-constexpr double kStemFit_m = 1e-5;
-
-bool are_same_landmarks(const RecordedMessage& expected, const RecordedMessage& got) {
-  const auto a = wire::decode_message<model::LandmarkScan>(expected.bytes).value();
-  const auto b = wire::decode_message<model::LandmarkScan>(got.bytes).value();
-  return a.utime == b.utime && a.sequence == b.sequence &&
-         std::ranges::equal(a.detections, b.detections,
-                            [](const model::Detection& one, const model::Detection& other) {
-                              return one.kind == other.kind &&
-                                     (one.position_m - other.position_m).norm() < kStemFit_m &&
-                                     std::abs(one.radius_m - other.radius_m) < kStemFit_m;
-                            });
-}
-
 /// The mapper's graph is saved at its estimates and linearised there again: what is decided is the
 /// same to the bit, poses and landmarks differ by what the old linearisations left (seen: nearly
 /// always below 5e-5 m, once above).
@@ -179,7 +163,6 @@ bool are_same_deltas(const RecordedMessage& expected, const RecordedMessage& got
 bool are_same(const RecordedMessage& expected, const RecordedMessage& got) {
   if (expected == got) return true;
   if (expected.channel != got.channel) return false;
-  if (expected.channel == "LANDMARKS") return are_same_landmarks(expected, got);
   if (expected.channel == "SLAM_POSE") return are_same_poses(expected, got);
   if (expected.channel == "SLAM_UPDATE") return are_same_updates(expected, got);
   if (expected.channel == "MAP") return are_same_maps(expected, got);

@@ -23,7 +23,7 @@ inline const sim::TrunkField& trunks() {
 inline sim::InertialDriveParameters short_drive() {
   sim::InertialDriveParameters drive;
   drive.loop_length_m = 500.0;
-  drive.standing_s = 2.0;
+  drive.stationary_s = 2.0;
   drive.range_m = 18.0;
   return drive;
 }
@@ -68,7 +68,7 @@ inline DriveEnd drive_through(const sim::InertialDriveParameters& parameters,
   ekf::Ekf filter(filter_parameters);
   DriveEnd end;
   const int scans = static_cast<int>(seconds / parameters.scan_interval_s);
-  const int still = static_cast<int>(parameters.standing_s / parameters.scan_interval_s) + 20;
+  const int still = static_cast<int>(parameters.stationary_s / parameters.scan_interval_s) + 20;
   geometry::SE2 start;
   for (int k = 0; k < scans; ++k) {
     const sim::DriveStep step = drive.next();

@@ -46,7 +46,7 @@ TEST_CASE("NEES and drift with an IMU, with wheels, with both", "[ekf][consisten
 TEST_CASE("Right invariant errors stay consistent where plain ones do not", "[ekf][consistency]") {
   sim::InertialDriveParameters drive = test::short_drive();
   drive.odometry = sim::OdometryKind::kNone;
-  drive.standing_s = 0.0;
+  drive.stationary_s = 0.0;
   drive.position_sigma_m = 0.5;
   drive.range_m = 15.0;
   drive.loop_length_m = 100.0;

@@ -63,7 +63,7 @@ class WrongLevel {
 
 double mean_nees_with_wrong_level(std::uint64_t seed, bool is_reported) {
   sim::InertialDriveParameters parameters = test::short_drive();
-  parameters.standing_s = 5.0;
+  parameters.stationary_s = 5.0;
   parameters.odometry = sim::OdometryKind::kInertialAndWheels;
   parameters.position_sigma_m = 0.02;
   parameters.range_m = 40.0;
@@ -110,7 +110,7 @@ TEST_CASE("A level whose error is found while driving leaves the filter consiste
 TEST_CASE("Landmarks observed from one place are less certain once it is left",
           "[ekf][stationary]") {
   sim::InertialDriveParameters parameters = test::short_drive();
-  parameters.standing_s = 10.0;
+  parameters.stationary_s = 10.0;
   EkfParameters honest;
   honest.observation.correlated_share = 0.2;
   test::Driven driven(0.0, parameters, honest);

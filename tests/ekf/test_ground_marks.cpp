@@ -175,7 +175,7 @@ TEST_CASE("Landmarks overrule a detector that takes creeping for stationary", "[
 
 TEST_CASE("The pose of a swaying vehicle is consistent", "[ekf][stationary][consistency]") {
   sim::InertialDriveParameters drive = short_drive();
-  drive.standing_s = 12.0;
+  drive.stationary_s = 12.0;
   drive.sway_sigma_m = EkfMotionParameters{}.stationary_sigma_m;
   drive.sway_sigma_rad = EkfMotionParameters{}.stationary_sigma_rad;
   drive.sway_sigma_mps = EkfMotionParameters{}.stationary_sigma_mps;
@@ -194,7 +194,7 @@ TEST_CASE("A full state has room for the ground marks", "[ekf][stationary]") {
   EkfParameters parameters;
   parameters.map.max_landmarks = 4;
   sim::InertialDriveParameters drive = short_drive();
-  drive.standing_s = 5.0;
+  drive.stationary_s = 5.0;
   sim::InertialDrive steps(drive, test::trunks(), 5);
   Ekf filter(parameters);
   for (int k = 0; k < 60; ++k) {

@@ -16,7 +16,7 @@ sim::TrunkField small_forest() {
 
 sim::InertialDriveParameters short_drive() {
   sim::InertialDriveParameters drive;
-  drive.standing_s = 1.0;
+  drive.stationary_s = 1.0;
   drive.loop_length_m = 300.0;
   drive.range_m = 20.0;
   return drive;
@@ -74,7 +74,7 @@ TEST_CASE("A parked vehicle sways about its place, and its samples contain it",
           "[eval][front_end]") {
   const sim::TrunkField forest = small_forest();
   sim::InertialDriveParameters drive = short_drive();
-  drive.standing_s = 60.0;
+  drive.stationary_s = 60.0;
   drive.sway_sigma_m = 2e-4;
   drive.sway_sigma_rad = 3e-5;
   drive.sway_sigma_mps = 0.01;

@@ -225,7 +225,7 @@ TEST_CASE("Who follows the changed landmarks has the map", "[mapper]") {
 }
 
 TEST_CASE("A stationary vehicle does not grow the graph", "[mapper]") {
-  const sim::Drive simulated = drive(sim::PathKind::kStanding, 400.0, 15);
+  const sim::Drive simulated = drive(sim::PathKind::kStationary, 400.0, 15);
   SmoothingMapper mapper({});
   std::size_t after_ten = 0;
   std::size_t count = 0;

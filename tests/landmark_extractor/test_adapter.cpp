@@ -119,7 +119,7 @@ TEST_CASE("sweeps in parts become one scan; lost parts and bad sweeps are counte
   for (std::uint64_t turn = 0; turn < 6; ++turn) {
     model::PointSweep whole = sweep(space, test::spinner_of(16), random);
     whole.utime = 1000000 + 100000 * static_cast<model::Utime>(turn);
-    whole.turn = turn;
+    whole.revolution = turn;
     if (turn == 4) whole.is_deskewed = false;
     if (turn == 5) whole.attitude.reset();
     std::vector<model::PointSweep> parts = split_sweep(whole, 4000);

@@ -93,7 +93,7 @@ void compare_increment(const model::Odometry& increment, const sim::SensorDrive&
 void compare_sweep(const model::PointSweep& sweep, const model::PointSweep& raw,
                    sim::SensorDrive& drive, const SensorMount& mount, Figures& figures) {
   const Eigen::Isometry3d vehicle_T_world = drive.state_at(sweep.utime).world_T_vehicle().inverse();
-  const auto truth = drive.sweep(sweep.turn);
+  const auto truth = drive.sweep(sweep.revolution);
   if (sweep.points.size() != truth.true_m.size()) return;
   for (std::size_t i = 0; i < sweep.points.size(); i += 5) {
     const Eigen::Vector3d is = vehicle_T_world * truth.true_m[i].cast<double>();
@@ -115,7 +115,8 @@ Figures run(Drive& scene) {
       if (const auto* increment = std::get_if<model::Odometry>(&result)) {
         if (!increment->is_stationary) compare_increment(*increment, *scene.drive, figures);
       } else if (const auto* sweep = std::get_if<model::PointSweep>(&result)) {
-        if (raw && sweep->utime > 30'000'000 && sweep->turn % 10 == 0 && raw->turn == sweep->turn)
+        if (raw && sweep->utime > 30'000'000 && sweep->revolution % 10 == 0 &&
+            raw->revolution == sweep->revolution)
           compare_sweep(*sweep, *raw, *scene.drive, scene.parameters.lidar.mount, figures);
       }
     }

@@ -41,7 +41,7 @@ TEST_CASE("A path of 200 m has an observation every 0.2 m and every 0.2 rad", "[
   CHECK(path_of(PathKind::kLine).size() == 1000);
   CHECK(path_of(PathKind::kFigureEight).size() == 1000);
   CHECK(path_of(PathKind::kDoubleCircle).size() == 1000);
-  CHECK(path_of(PathKind::kStanding).size() == 1000);
+  CHECK(path_of(PathKind::kStationary).size() == 1000);
   CHECK(path_of(PathKind::kMeander, 0.2, 2000.0).size() == 10000);
   // 200 m and three rotations by pi/2, two of 2 pi/3: the steps that 1023.6 and 1020.9 begin.
   CHECK(path_of(PathKind::kSquare).size() == 1024);

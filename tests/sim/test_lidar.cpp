@@ -238,8 +238,8 @@ TEST_CASE("A drive's readings come in order and follow from the seed", "[drive]"
       CHECK(imu->specific_force_mps2 == std::get<model::ImuSample>(*b).specific_force_mps2);
     } else if (const auto* sweep = std::get_if<SimulatedSweep>(&*a)) {
       CHECK(same_points(sweep->raw, std::get<SimulatedSweep>(*b).raw));
-      if (sweep->raw.turn == 30) CHECK(same_points(sweep->raw, asked_before));
-      complete = static_cast<model::Utime>(sweep->raw.turn + 1) * 100'000;
+      if (sweep->raw.revolution == 30) CHECK(same_points(sweep->raw, asked_before));
+      complete = static_cast<model::Utime>(sweep->raw.revolution + 1) * 100'000;
     } else if (const auto* pose = std::get_if<TruePose>(&*a)) {
       complete = pose->utime;
     } else if (const auto* scan = std::get_if<SimulatedPlanarScan>(&*a)) {

@@ -69,7 +69,7 @@ class Maker {
   model::PointSweep sweep(double farthest_m) {
     model::PointSweep sweep;
     sweep.utime = 1000;
-    sweep.turn = 7;
+    sweep.revolution = 7;
     sweep.part = static_cast<std::uint16_t>(count());
     sweep.parts = 8;
     sweep.is_deskewed = count() > 2;

@@ -108,15 +108,20 @@ class Equations {
       return (static_cast<std::uint64_t>(std::max(a, b)) << 32U) |
              static_cast<std::uint64_t>(std::min(a, b));
     };
+
+    // Each factor fills the lower triangle of its columns.
     for (const int f : factors_) {
       const std::vector<int>& targets = targets_of(f);
       for (std::size_t a = 0; a < targets.size(); ++a) {
         for (std::size_t c = 0; c <= a; ++c) entries.push_back(key(targets[a], targets[c]));
       }
     }
+
     std::vector<std::uint64_t> pattern = entries;
     std::sort(pattern.begin(), pattern.end());
     pattern.erase(std::unique(pattern.begin(), pattern.end()), pattern.end());
+
+    // The counts per column become the starts of the columns.
     hessian_.column_starts.assign(static_cast<std::size_t>(hessian_.size) + 1, 0);
     for (const std::uint64_t entry : pattern) {
       ++hessian_.column_starts[(entry >> 32U) + 1];
@@ -125,6 +130,8 @@ class Equations {
     for (std::size_t c = 0; c < static_cast<std::size_t>(hessian_.size); ++c) {
       hessian_.column_starts[c + 1] += hessian_.column_starts[c];
     }
+
+    // Each entry remembers where its value goes.
     hessian_.values.resize(pattern.size());
     for (const std::uint64_t entry : entries) {
       slots_.push_back(static_cast<std::size_t>(

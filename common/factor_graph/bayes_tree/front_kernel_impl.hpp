@@ -87,16 +87,21 @@ inline int factorise_columns(double* front, long ld, long j, long count, const d
   for (long c = j; c < j + count; ++c) {
     double* column = front + c * ld;
     const double pivot = column[c];
+
+    // A pivot that is too small leaves its column out.
     if (!(pivot > least[c])) {
       left_out[bad++] = static_cast<int>(c);
       for (long i = c; i < ld; ++i) column[i] = 0.0;
       column[c] = 1.0;
       continue;
     }
+
     const double root = std::sqrt(pivot);
     const double inverse = 1.0 / root;
     column[c] = root;
     for (long i = c + 1; i < ld; ++i) column[i] *= inverse;
+
+    // The column updates those that come after it.
     for (long other = c + 1; other < j + count; ++other) {
       double* to = front + other * ld;
       const double factor = column[other];

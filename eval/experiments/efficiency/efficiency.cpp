@@ -66,7 +66,7 @@ std::vector<Scenario> scenarios(const EfficiencyOptions& options) {
   if (options.stationary_h > 0.0) {
     Scenario scenario;
     scenario.name = fmt::format("stationary-{:g}h", options.stationary_h);
-    scenario.drive.path.kind = sim::PathKind::kStanding;
+    scenario.drive.path.kind = sim::PathKind::kStationary;
     scenario.drive.path.length_m = 3600.0 * options.stationary_h * scenario.drive.speed_mps;
     result.push_back(scenario);
   }
@@ -88,20 +88,24 @@ Timing time_drive(const Scenario& scenario, const std::string& method, std::uint
   terminal::Progress progress(fmt::format("scans, {} {}", scenario.name, method),
                               static_cast<double>(drive.size()),
                               terminal::Progress::Without::kSeconds);
-  const bool is_stationary = scenario.drive.path.kind == sim::PathKind::kStanding;
+
+  const bool is_stationary = scenario.drive.path.kind == sim::PathKind::kStationary;
   for (std::size_t k = 0; k < drive.size(); ++k) {
     if (stop) throw terminal::Interrupted{};
     const auto outcome = session.feed(drive.scan(k).scan);
     progress.advance();
     if (!outcome) continue;
+
     const double driven = static_cast<double>(k + 1) * scenario.drive.path.interval;
     timing.keyframes.push_back({is_stationary ? driven / scenario.drive.speed_mps / 3600.0 : driven,
                                 1e3 * outcome->keyframer_s, 1e3 * outcome->mapper_s});
+
     const model::MapUpdateStatus status = outcome->update.status;
     if (status == model::MapUpdateStatus::kUpdated || status == model::MapUpdateStatus::kFirstMap) {
       ++timing.updates;
     }
   }
+
   timing.landmarks = session.mapper().landmarks().size();
   timing.rss_mb = tools::resident_mb();
   return timing;

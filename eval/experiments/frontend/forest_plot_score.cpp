@@ -20,10 +20,12 @@ void score_sweep(const ForestPlot& plot, const PlotSweep& sweep, const model::La
       ++score.corners;
       continue;
     }
+
     PlotDetection one;
     one.position_m = detection.position_m.head<2>() + station_m;
     one.covariance_m2 = detection.covariance_m2.topLeftCorner<2, 2>();
     one.radius_m = detection.radius_m;
+
     double nearest_m = options.match_m;
     for (std::size_t i = 0; i < plot.stems.size(); ++i) {
       const double distance = (plot.stems[i].position_m - one.position_m).norm();
@@ -31,22 +33,28 @@ void score_sweep(const ForestPlot& plot, const PlotSweep& sweep, const model::La
       nearest_m = distance;
       one.stem = static_cast<int>(i);
     }
+
     if (one.stem >= 0) {
       is_taken[static_cast<std::size_t>(one.stem)] = true;
       one.is_whole = sweep.stems[static_cast<std::size_t>(one.stem)].is_whole;
     }
     score.detections.push_back(one);
   }
+
+  // The station should find the stems that it sees well enough.
   for (std::size_t i = 0; i < plot.stems.size(); ++i) {
     const PlotStem& stem = plot.stems[i];
     if ((stem.position_m - station_m).norm() > options.recall_range_m) continue;
+
     const StemObservation& sight = sweep.stems[i];
     if (sight.returns < options.least_returns ||
         sight.returns < options.least_share * static_cast<double>(sight.beams)) {
       continue;
     }
+
     ++score.should;
     ++score.should_of_stem[i];
+
     if (!is_taken[i]) continue;
     ++score.found;
     ++score.found_of_stem[i];

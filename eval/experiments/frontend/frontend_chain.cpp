@@ -49,6 +49,7 @@ void add_chain_rows(const harness::ChainRun& run, std::optional<double> ate_targ
   const harness::TrajectoryError ekf =
       harness::trajectory_error(harness::poses_of(run.ekf), run.truth);
   const harness::TrajectoryError reckoned = harness::trajectory_error(run.dead_reckoned, run.truth);
+
   rows.state("driven", ekf.driven_m, "m");
   if (ate_target_m) {
     rows.at_most("SLAM_POSE ATE", slam.ate_rms_m, "m", *ate_target_m);
@@ -58,14 +59,17 @@ void add_chain_rows(const harness::ChainRun& run, std::optional<double> ate_targ
   rows.state("SLAM_POSE largest error", slam.largest_m, "m");
   rows.state("map's keyframes at the end, ATE",
              harness::trajectory_error(harness::poses_of(run.keyframes), run.truth).ate_rms_m, "m");
+
   const harness::PoseConsistency said = harness::pose_consistency(run.slam, run.truth);
   rows.state("SLAM_POSE, first pose held: mean NEES (3)", said.mean_nees, "");
   rows.state("SLAM_POSE, first pose held: error at the end", said.end_error_m, "m");
   rows.state("SLAM_POSE, first pose held: standard deviation reported for it", said.end_sigma_m,
              "m");
+
   rows.state("EKF_POSE ATE", ekf.ate_rms_m, "m");
   rows.at_most("EKF_POSE drift", 100.0 * ekf.end_m / std::max(ekf.driven_m, 1.0), "%", 0.5);
   rows.state("RAW_POSE ATE", reckoned.ate_rms_m, "m");
+
   rows.at_most("wrong updates", static_cast<double>(wrong_updates(run)), "", 0.0);
   rows.state("keyframes accepted", static_cast<double>(accepted(run)), "");
   rows.state("keyframes offered", static_cast<double>(run.updates.size()), "");

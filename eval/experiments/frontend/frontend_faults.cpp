@@ -154,6 +154,7 @@ void add_fault_rows(const FrontendOptions& options, const std::atomic<bool>& sto
       {"sweeps of NaN for 1 s", nan_sweeps},
       {"IMU saturated for 5 s", saturated_imu, kLimitAfterImuFault_m},
   };
+
   std::vector<harness::ChainRun> runs(faults.size());
   tools::run_in_parallel(faults.size(), options.jobs, "faults", stop, [&](std::size_t i) {
     sim::SensorDrive drive = fault_drive(options.seed);
@@ -162,6 +163,7 @@ void add_fault_rows(const FrontendOptions& options, const std::atomic<bool>& sto
     chain.meddle = faults[i].make();
     runs[i] = drive_chain(drive, chain);
   });
+
   for (std::size_t i = 0; i < faults.size(); ++i) {
     rows.in(fmt::format("fault: {}; HEALTH counts {}", faults[i].name, reasons_of(runs[i])));
     rows.at_most("SLAM_POSE largest error 5 s after it",

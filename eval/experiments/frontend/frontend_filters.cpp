@@ -60,7 +60,7 @@ constexpr std::size_t kGroup = 50;
 void add_consistency_rows(const EkfDriveOptions& options, std::span<const EkfDriveResult> results,
                           const EkfConsistency& summary, FrontendRows& rows) {
   const auto moving = static_cast<std::size_t>(
-      std::lround(options.drive.standing_s / options.drive.scan_interval_s));
+      std::lround(options.drive.stationary_s / options.drive.scan_interval_s));
   const std::size_t scans = summary.mean_nees.size();
   const ScanRange whole{1, scans};  // The first pose is exact.
   const ScanRange stationary{1, moving};
@@ -87,7 +87,7 @@ void add_form_rows(const FrontendOptions& options, const std::atomic<bool>& stop
     EkfDriveOptions drive;
     drive.filter.error_form = form;
     drive.drive.odometry = sim::OdometryKind::kNone;
-    drive.drive.standing_s = 0.0;
+    drive.drive.stationary_s = 0.0;
     drive.drive.position_sigma_m = 0.5;
     drive.drive.range_m = 15.0;
     drive.duration_s = 120.0;
@@ -110,6 +110,7 @@ void add_tracking_rows(const FrontendOptions& options, const std::atomic<bool>& 
                        FrontendRows& rows) {
   const sim::TrunkField world = field(options.seed);
   const auto runs = static_cast<std::size_t>(std::max(1, options.runs / 10));
+
   for (const TrackingCell& cell : kTrackingCells) {
     TrackingOptions tracking;
     tracking.drive.position_sigma_m = cell.position_sigma_m;
@@ -117,10 +118,12 @@ void add_tracking_rows(const FrontendOptions& options, const std::atomic<bool>& 
     tracking.drive.clutter_share = cell.clutter;
     tracking.drive.speed_mps = cell.speed_mps;
     tracking.drive.odometry = cell.odometry;
+
     std::vector<TrackingResult> results(runs);
     tools::run_in_parallel(runs, options.jobs, "tracking", stop, [&](std::size_t run) {
       results[run] = run_tracking(tracking, world, options.seed * 1000 + run);
     });
+
     double published = 0.0;
     double pure = 0.0;
     double km = 0.0;
@@ -133,6 +136,7 @@ void add_tracking_rows(const FrontendOptions& options, const std::atomic<bool>& 
       switches += static_cast<double>(result.switches);
       p99_s = std::max(p99_s, result.scan_p99_s);
     }
+
     rows.in(fmt::format("associator, simulated detections: {} ({:.1f} km)", cell.name, km));
     rows.at_least("purity of tracks", pure / published, "", 0.999);
     rows.at_most("id switches per km", switches / km, "1/km", 1.0);
@@ -147,13 +151,16 @@ void add_filter_rows(const FrontendOptions& options, const std::atomic<bool>& st
     const char* name;
     sim::OdometryKind odometry;
   };
+
   for (const Cell& cell : {Cell{"IMU alone", sim::OdometryKind::kInertial},
                            Cell{"wheels and IMU", sim::OdometryKind::kInertialAndWheels}}) {
     EkfDriveOptions drive;
     drive.drive.odometry = cell.odometry;
     let_sway(drive.drive);
+
     const std::vector<EkfDriveResult> results = drive_filter(drive, options, stop, world);
     const EkfConsistency summary = summarise(results);
+
     rows.in(fmt::format("ekf, simulated detections: {} ({} runs of {:.0f} m)", cell.name,
                         summary.runs, summary.driven_m));
     add_consistency_rows(drive, results, summary, rows);
@@ -162,6 +169,7 @@ void add_filter_rows(const FrontendOptions& options, const std::atomic<bool>& st
     rows.state("active landmarks", summary.mean_active_landmarks, "");
     rows.state("landmarks refused", 100.0 * summary.refused_share, "%");
   }
+
   add_form_rows(options, stop, world, rows);
   add_lidar_filter_rows(options, stop, rows);
 }

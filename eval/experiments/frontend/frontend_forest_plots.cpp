@@ -95,8 +95,10 @@ void add_forest_plot_rows(const FrontendOptions& options, const std::atomic<bool
                folder.string());
     return;
   }
+
   std::vector<ForestPlot> plots;
   for (const char* name : kPlots) plots.push_back(read_forest_plot(folder, name));
+
   constexpr std::size_t kBeams = std::size(kPlotLidars);
   std::vector<PlotScore> scores(plots.size() * kBeams);
   tools::run_in_parallel(scores.size(), options.jobs, "plots", stop, [&](std::size_t i) {
@@ -105,6 +107,7 @@ void add_forest_plot_rows(const FrontendOptions& options, const std::atomic<bool
     score.seed = options.seed;
     scores[i] = score_plot(plots[i / kBeams], {}, score);
   });
+
   for (std::size_t i = 0; i < scores.size(); ++i) {
     const ForestPlot& plot = plots[i / kBeams];
     const PlotLidar& lidar = kPlotLidars[i % kBeams];

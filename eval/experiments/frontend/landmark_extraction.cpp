@@ -184,31 +184,38 @@ ExtractionScore score_extraction(sim::SensorDrive& drive,
   landmark_extractor::LandmarkExtractor extractor(parameters);
   std::mt19937_64 random(options.seed);
   std::normal_distribution<double> tilt(0.0, options.attitude_sigma_rad);
+
   std::vector<double> times_ms;
   Tally trunks;
   Tally corners;
+
   for (int k = 0; k < options.sweeps; ++k) {
     const std::uint64_t turn =
         options.first_revolution + static_cast<std::uint64_t>(k) * options.stride;
     if (turn >= drive.sweep_count()) break;
+
     const sim::SimulatedSweep sweep = drive.sweep(turn);
     const double roll_error = tilt(random);
     const double pitch_error = tilt(random);
     const model::PointSweep input =
         ideal_input(sweep, drive, {roll_error, pitch_error}, options.attitude_sigma_rad);
+
     const double before = 1e3 * tools::thread_time_s();
     const model::LandmarkScan scan = extractor.extract(input);
     times_ms.push_back(1e3 * tools::thread_time_s() - before);
+
     const sim::VehicleState state = drive.state_at(scan.utime);
     score_kind(scan, model::LandmarkKind::kTrunk, true_trunks(drive.world(), sweep, state, options),
                options, trunks, score.misses);
     score_kind(scan, model::LandmarkKind::kCorner,
                true_corners(drive.world(), sweep, state, options), options, corners, score.misses);
+
     score.beams = input.rings;
     score.points += static_cast<double>(input.points.size());
     ++score.sweeps;
     if (progress) progress(k + 1);
   }
+
   score.points /= std::max<double>(1.0, static_cast<double>(score.sweeps));
   score.trunks = trunks.finish();
   score.corners = corners.finish();

@@ -103,16 +103,20 @@ void add_lidar_filter_rows(const FrontendOptions& options, const std::atomic<boo
     drive.progress = [&] {
       if (stop) throw std::runtime_error("interrupted");
     };
+
     std::vector<EkfDriveResult> results(static_cast<std::size_t>(std::max(6, options.runs / 50)));
     tools::run_in_parallel(
         results.size(), options.jobs, "filter behind the LIDAR", stop,
         [&](std::size_t run) { results[run] = run_lidar_drive(drive, options.seed * 1000 + run); });
+
+    // The shortest drive limits the range of scans.
     std::size_t scans = results.front().nees.size();
     std::uint64_t restarts = 0;
     for (EkfDriveResult& result : results) {
       scans = std::min(scans, result.nees.size());
       restarts += result.restarts;
     }
+
     const auto moving = static_cast<std::size_t>(std::lround(drive.stationary_s / kTurn_s));
     rows.in(fmt::format("ekf behind the simulated LIDAR, forest, {} ({} drives of {:.0f} s)",
                         has_wheels ? "wheels and IMU" : "IMU alone", results.size(),

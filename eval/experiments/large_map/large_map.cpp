@@ -105,9 +105,11 @@ std::vector<PlaceQuestion> questions_of(const Setting& setting, const std::strin
   parameters.sensor.detection_probability = setting.detection;
   parameters.sensor.position_sigma_m = setting.sigma_m;
   const sim::Drive drive(parameters, forest, seed);
+
   const auto keyframer = harness::make_stages(method).keyframer;
   std::mt19937_64 random(seed ^ 0x9E3779B97F4A7C15ULL);
   std::vector<PlaceQuestion> questions;
+
   for (std::size_t k = 0; k < drive.size(); ++k) {
     std::optional<model::Keyframe> keyframe;
     if (!setting.single_scans) {
@@ -116,7 +118,9 @@ std::vector<PlaceQuestion> questions_of(const Setting& setting, const std::strin
       keyframe = keyframe_of(drive.scan(k).scan);
     }
     if (!keyframe) continue;
+
     if (setting.false_share > 0.0) add_false_landmarks(*keyframe, setting.false_share, random);
+
     PlaceQuestion question{std::move(*keyframe), {}};
     for (const model::KeyframeMember& member : question.keyframe.members) {
       question.world_T_member.push_back(true_pose(drive, member.utime));

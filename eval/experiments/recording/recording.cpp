@@ -42,7 +42,7 @@ void watch_pictures(harness::SensorChain& chain, Recording& recording) {
                                  [&recording, assembler, wanted](const model::PointSweep& part) {
                                    constexpr std::uint64_t kStride = 50;
                                    auto whole = assembler->add(part);
-                                   if (!whole || whole->turn % kStride != 5) return;
+                                   if (!whole || whole->revolution % kStride != 5) return;
                                    *wanted = whole->utime;
                                    recording.sweeps.push_back(std::move(*whole));
                                  });

@@ -225,16 +225,19 @@ harness::ChainRun drive_route(const Route& route, const Options& options, std::u
 
 void run(const Options& options) {
   const auto& stop = terminal::catch_interrupts();
+
   const std::vector<Route> routes = {
       {"City to country 1", sim::urban_to_countryside_scenario, options.length_m, 1},
       {"City to country 2", sim::urban_to_countryside_scenario, options.length_m, 2},
       {"Countryside", sim::countryside_scenario, 1.5 * options.length_m, 1},
   };
+
   const auto runs = static_cast<std::size_t>(options.runs);
   struct Driven {
     std::vector<Sample> ekf;
     std::vector<Sample> slam;
   };
+
   std::vector<Driven> driven(routes.size() * runs);
   tools::run_in_parallel(
       driven.size(), options.jobs, "landmarks-vs-error", stop, [&](std::size_t i) {
@@ -246,6 +249,8 @@ void run(const Options& options) {
         driven[i].slam =
             samples_of(steps_of(drive, harness::poses_of(drive.slam)), static_cast<int>(run));
       });
+
+  // A curve takes the samples of all runs of its route.
   std::vector<Curve> curves;
   for (std::size_t route = 0; route < routes.size(); ++route) {
     Curve ekf{routes[route].name, "EKF_POSE", {}};
@@ -258,8 +263,10 @@ void run(const Options& options) {
     curves.push_back(std::move(ekf));
     curves.push_back(std::move(slam));
   }
+
   print(curves);
   if (options.json.empty()) return;
+
   const nlohmann::json config = {{"seed", options.seed},
                                  {"runs", options.runs},
                                  {"length_m", options.length_m},

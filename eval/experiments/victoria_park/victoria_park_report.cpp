@@ -134,17 +134,21 @@ std::vector<metrics::StampedPose> read_batch_solution(
   const std::string text = folder.read(file.filename().string());
   io::NumberReader reader(text, file.string());
   reader.skip_line();
+
   std::vector<metrics::StampedPose> poses;
   while (reader.next()) {
     const double x = reader.require("x [m]");
     const double y = reader.require("y [m]");
     poses.push_back({0, geometry::SE2(x, y, reader.require("the heading [rad]"))});
   }
+
   // Its poses are those of the rear axle.
   const Eigen::Vector2d axle = io::victoria_park::axle_T_vehicle().inverse().translation();
   const std::vector<double> driven = lengths(poses, {0.0, 0.0});
   const std::vector<double> reckoned_path = lengths(dead_reckoned, axle);
   const double scale = driven.back() > 0.0 ? reckoned_path.back() / driven.back() : 1.0;
+
+  // Each pose takes the time at which dead reckoning came as far.
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const auto at = std::ranges::lower_bound(reckoned_path, driven[i] * scale);
     const auto index =

@@ -83,13 +83,13 @@ std::optional<Placement> PlaceRecogniser::track(const model::Keyframe& keyframe,
   const std::size_t possible =
       count_matchable(keyframe, placement.map_T_centre.mean, map.landmarks);
   const std::size_t matched = placement.associations.size();
-  const auto fewest = static_cast<std::size_t>(parameters_.min_matched);
-  const bool is_enough =
-      static_cast<double>(matched) >= parameters_.min_matched_ratio * static_cast<double>(possible);
+  const geometry::MatchQuota quota{static_cast<std::size_t>(parameters_.min_matched),
+                                   parameters_.min_matched_ratio};
 
   // Odometry alone will do where there is next to nothing to match.
-  const bool is_placed =
-      prediction.from_odometry ? is_enough || possible < fewest : is_enough && matched >= fewest;
+  const bool is_placed = prediction.from_odometry
+                             ? quota.share_is_met(matched, possible) || possible < quota.min_matched
+                             : quota.is_met(matched, possible);
   if (!is_placed) return std::nullopt;
   return placement;
 }

@@ -71,10 +71,10 @@ std::optional<geometry::Registration> ScanLocaliser::register_scan(const model::
                        scan.field_of_view.max_range_m + kReachMargin_m, landmarks);
   const auto observed = points_of(scan);
 
+  const geometry::MatchQuota quota{static_cast<std::size_t>(parameters_.min_matched),
+                                   parameters_.min_matched_ratio};
   const auto fits = [&](const geometry::Registration& found) {
-    const double possible = static_cast<double>(std::min(reference.size(), observed.size()));
-    return found.pairs.size() >= static_cast<std::size_t>(parameters_.min_matched) &&
-           static_cast<double>(found.pairs.size()) >= parameters_.min_matched_ratio * possible;
+    return quota.is_met(found.pairs.size(), std::min(reference.size(), observed.size()));
   };
   geometry::RegistrationParameters gating;
   gating.gate_sigmas = parameters_.gate_sigmas;

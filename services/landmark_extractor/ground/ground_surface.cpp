@@ -56,13 +56,17 @@ constexpr std::array<float, 4> share_of(int plane) {
     const float z = is_there ? lowest[l] : 0.0F;
     const float above = z - (share[0] * nodes[0][l] + share[1] * nodes[1][l] +
                              share[2] * nodes[2][l] + share[3] * nodes[3][l]);
+
+    // A cell far from the surface counts for little.
     const float e = above * (above > 0.0F ? per_scale : per_scale * (1.0F / 3.0F));
     const float root = 1.0F / (1.0F + e * e);
     const float w = is_there ? root * root : 0.0F;
+
     const float w0 = w * share[0];
     const float w1 = w * share[1];
     const float w2 = w * share[2];
     const float w3 = w * share[3];
+
     sums.square[0][l] += w0 * share[0];
     sums.square[1][l] += w0 * share[1];
     sums.square[2][l] += w0 * share[2];
@@ -73,6 +77,7 @@ constexpr std::array<float, 4> share_of(int plane) {
     sums.square[7][l] += w2 * share[2];
     sums.square[8][l] += w2 * share[3];
     sums.square[9][l] += w3 * share[3];
+
     sums.right[0][l] += w0 * z;
     sums.right[1][l] += w1 * z;
     sums.right[2][l] += w2 * z;

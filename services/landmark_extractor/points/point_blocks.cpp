@@ -42,19 +42,23 @@ typedef float Four __attribute__((vector_size(16)));
   // x, y, z and the time are the first four numbers of a point.
   static_assert(offsetof(model::SweepPoint, x_m) == 0 && offsetof(model::SweepPoint, y_m) == 4 &&
                 offsetof(model::SweepPoint, z_m) == 8 && offsetof(model::SweepPoint, time_s) == 12);
+
   std::size_t i = 0;
   for (; i + 4 <= points.size(); i += 4) {
     // What comes after this block, while there is something else to do.
     __builtin_prefetch(points.data() + i + kSize);
     __builtin_prefetch(points.data() + i + kSize + 2);
+
     std::array<Four, 4> rows{load(&points[i]), load(&points[i + 1]), load(&points[i + 2]),
                              load(&points[i + 3])};
     transpose(rows);
+
     store(rows[0], &block.x[i]);
     store(rows[1], &block.y[i]);
     store(rows[2], &block.z[i]);
     store(rows[3], &block.time[i]);
   }
+
   for (; i < points.size(); ++i) {
     block.x[i] = points[i].x_m;
     block.y[i] = points[i].y_m;
@@ -101,22 +105,29 @@ typedef float Four __attribute__((vector_size(16)));
                                                     const GroundPatch* patches, float* height) {
   static_assert(sizeof(GroundPatch) == sizeof(Four));
   const GroundGrid at = grid;
+
   std::array<float, kSize> a;
   std::array<float, kSize> b;
   std::array<std::int32_t, kSize> index;
+
+  // Each place falls into one span of the grid, at the shares a and b of it.
   for (std::size_t i = 0; i < count; ++i) {
     const float u = at.place(x[i], at.corner_x_m);
     const float v = at.place(y[i], at.corner_y_m);
     const auto column = static_cast<std::int32_t>(u);
     const auto row = static_cast<std::int32_t>(v);
+
     a[i] = u - static_cast<float>(column);
     b[i] = v - static_cast<float>(row);
     index[i] = row * at.nodes_per_side + column;
   }
+
+  // Four patches at a time give the height of the surface.
   for (std::size_t i = 0; i < count; i += 4) {
     std::array<Four, 4> rows{load(patches + index[i]), load(patches + index[i + 1]),
                              load(patches + index[i + 2]), load(patches + index[i + 3])};
     transpose(rows);
+
     const Four along_x = load(&a[i]);
     const Four along_y = load(&b[i]);
     store(load(z + i) - (rows[0] + along_x * rows[1] + along_y * (rows[2] + along_x * rows[3])),
@@ -131,27 +142,32 @@ typedef float Four __attribute__((vector_size(16)));
   const std::size_t count = padded_to_lanes(points.size());
   take_apart(points, block);
   level(by, count, block);
+
   const GroundGrid at = grid;
   const float x0 = by.sensor_m.x();
   const float y0 = by.sensor_m.y();
   const float nearest2 = by.min_range_m * by.min_range_m;
   const float farthest2 = by.max_range_m * by.max_range_m;
   const std::int32_t nowhere = at.nowhere();
+
   for (std::size_t i = 0; i < count; ++i) {
     const float dx = block.x[i] - x0;
     const float dy = block.y[i] - y0;
     const float range2 = dx * dx + dy * dy;
+
     constexpr auto kCells = static_cast<float>(GroundGrid::kCellsPerSpan);
     const auto u = static_cast<std::int32_t>(kCells * at.place(block.x[i], at.corner_x_m));
     const auto v = static_cast<std::int32_t>(kCells * at.place(block.y[i], at.corner_y_m));
     const std::int32_t cell =
         ((v & 3) * 4 + (u & 3)) * at.plane + (v >> 2) * at.nodes_per_side + (u >> 2);
+
     // A number that is none is in no range.
     const bool counts = static_cast<int>(range2 >= nearest2) &
                         static_cast<int>(range2 <= farthest2) &
                         static_cast<int>(std::abs(block.z[i]) < kHighest_m);
     block.cell[i] = counts ? cell : nowhere;
   }
+
   static_assert(GroundGrid::kCellsPerSpan == 4);
 }
 
@@ -161,22 +177,27 @@ typedef float Four __attribute__((vector_size(16)));
   const std::size_t count = padded_to_lanes(points.size());
   take_apart(points, block);
   level(by, count, block);
+
   const Eigen::Vector3f sensor = by.sensor_m;
   const Eigen::Vector3f velocity = by.velocity_mps;
   const float nearest2 = by.min_range_m * by.min_range_m;
   const float farthest2 = by.max_range_m * by.max_range_m;
+
   for (std::size_t i = 0; i < count; ++i) {
     const float dx = block.x[i] - (sensor.x() + velocity.x() * block.time[i]);
     const float dy = block.y[i] - (sensor.y() + velocity.y() * block.time[i]);
     const float range2 = dx * dx + dy * dy;
+
     block.range[i] = std::sqrt(range2);
     block.azimuth[i] = fast_atan2(dy, dx);
+
     // A number that is none is in no range.
     const bool counts = static_cast<int>(range2 >= nearest2) &
                         static_cast<int>(range2 <= farthest2) &
                         static_cast<int>(std::abs(block.z[i]) < kHighest_m);
     block.in_range[i] = counts ? 1.0F : 0.0F;
   }
+
   subtract_surface(block.x.data(), block.y.data(), block.z.data(), count, grid, patches,
                    block.height.data());
   put_together(count, block);

@@ -38,7 +38,10 @@ std::optional<StemFit> StemFitter::fit(const rings::RingCloud& cloud,
   for (int round = 0; round < kConsensusRounds; ++round) {
     if (!has_enough()) return std::nullopt;
     used_.select(evidence_, agreeing_at_);
-    if (round == 0) state = start();
+    if (round == 0) {
+      state = start();
+      reference_z_m_.reset();
+    }
     if (!settle(state, kNearlySettled_m2)) return std::nullopt;
     if (!sort_out(state)) break;
   }
@@ -118,7 +121,7 @@ StemState StemFitter::stem_of(const Vector6d& state) const {
   for (int i = 0; i < 6; ++i) {
     stem.values[static_cast<std::size_t>(i)] = static_cast<float>(state[i]);
   }
-  stem.reference_z_m = static_cast<float>(reference_z_m_);
+  stem.reference_z_m = static_cast<float>(*reference_z_m_);
   return stem;
 }
 
@@ -150,9 +153,7 @@ bool StemFitter::settle(Vector6d& state, double settled_m2) {
     }
   }
   const double reference = z / count;
-  // In the first round of a column that of the column before is left: by the taper the start value
-  // of the radius is off by up to 0.02 m, which the iteration takes out.
-  state.head<3>() += (reference - reference_z_m_) * state.tail<3>();
+  if (reference_z_m_) state.head<3>() += (reference - *reference_z_m_) * state.tail<3>();
   reference_z_m_ = reference;
 
   // Gauss and Newton.
@@ -218,7 +219,7 @@ void StemFitter::describe(const Vector6d& state, StemFit& fit) const {
 
   fit.state = state;
   fit.state.head<2>() += evidence_.anchor_m();
-  fit.reference_z_m = reference_z_m_;
+  fit.reference_z_m = *reference_z_m_;
 
   double terms = static_cast<double>(used_.edge_count());
   for (const HitLanes& group : used_.hits()) {

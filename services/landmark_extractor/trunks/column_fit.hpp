@@ -73,9 +73,9 @@ class StemFitter {
   SweepParameters sweep_;
   SweepTrunkParameters trunk_;
   BeamNoise noise_;
-  StemEvidence evidence_;  ///< Of all runs of the column.
-  AgreeingEvidence used_;  ///< Of those that agree.
-  double reference_z_m_ = 0.0;
+  StemEvidence evidence_;                   ///< Of all runs of the column.
+  AgreeingEvidence used_;                   ///< Of those that agree.
+  std::optional<double> reference_z_m_;     ///< That a state is for; none before the first.
   std::vector<std::uint32_t> agreeing_at_;  ///< Places among the column's runs.
   std::vector<std::uint32_t> still_agreeing_at_;
   std::vector<float> hit_means_;

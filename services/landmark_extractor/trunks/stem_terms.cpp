@@ -29,24 +29,30 @@ struct Terms {
   for (std::size_t l = 0; l < kLanes; ++l) {
     const float above = hits.z[l] - stem.reference_z_m;
     const float radius = std::max(s[2] + above * s[5], 1e-3F);
+
     const float dx = hits.along_x[l];
     const float dy = hits.along_y[l];
     const float to_x = s[0] + above * s[3] - hits.origin_x[l];
     const float to_y = s[1] + above * s[4] - hits.origin_y[l];
     const float along = dx * to_x + dy * to_y;
     const float miss = dx * to_y - dy * to_x;
+
+    // The clamp keeps the root real where a beam misses the stem.
     const float limit = kMaxGraze * radius;
     const float m = std::min(std::max(miss, -limit), limit);
     const float square = radius * radius - m * m;
     const float inverse = 1.0F / std::sqrt(square);
     const float tangent = m * inverse;
+
     // A footprint of some width on a slanting surface smears the range.
     const float smear = tangent * along * noise.beam_width_rad;
     const float variance = noise.range_variance + smear * smear;
+
     // Residuals count across the bark. Where the range falls off steeply only the edge itself says
     // something; and what jumped in and out with the estimate would pull it inwards.
     const float share = miss / radius;
     const float fade = std::max(1.0F - share * share, 0.0F);
+
     terms.above[l] = above;
     // The half chord is square / its root.
     terms.residual[l] = hits.range[l] - along + square * inverse;
@@ -224,23 +230,30 @@ void square_terms(std::span<const HitLanes> hits, std::span<const EdgeLanes> edg
 bool solve_normal(const Matrix6d& information, const Vector6d& gradient, Vector6d& change) {
   constexpr int kSize = 6;
   Matrix6d factor = Matrix6d::Zero();
+
+  // The diagonal of the factor holds inverses.
   for (int j = 0; j < kSize; ++j) {
     double pivot = information(j, j);
     for (int k = 0; k < j; ++k) pivot -= factor(j, k) * factor(j, k);
     if (!(pivot > 0.0)) return false;
+
     const double inverse = 1.0 / std::sqrt(pivot);
     factor(j, j) = inverse;
+
     for (int i = j + 1; i < kSize; ++i) {
       double value = information(i, j);
       for (int k = 0; k < j; ++k) value -= factor(i, k) * factor(j, k);
       factor(i, j) = value * inverse;
     }
   }
+
+  // The first pass solves with the factor, the second with its transpose.
   change = gradient;
   for (int j = 0; j < kSize; ++j) {
     for (int k = 0; k < j; ++k) change[j] -= factor(j, k) * change[k];
     change[j] *= factor(j, j);
   }
+
   for (int j = kSize - 1; j >= 0; --j) {
     for (int k = j + 1; k < kSize; ++k) change[j] -= factor(k, j) * change[k];
     change[j] *= factor(j, j);
