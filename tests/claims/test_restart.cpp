@@ -2,6 +2,7 @@
 // published without the interruption.
 #include <fmt/format.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -104,14 +105,16 @@ Recording interrupted(const bus::Service& service, const std::string& toml, cons
 }
 
 /// The mapper's graph is saved at its estimates and linearised there again: what is decided is the
-/// same to the bit, poses and landmarks differ by what the old linearisations left (seen: nearly
-/// always below 5e-5 m, once above).
-constexpr double kLinearised_m = 2e-4;
-constexpr double kLinearised_rad = 2e-5;
+/// same to the bit, poses and landmarks differ by what the old linearisations left.
+constexpr double kLargestShare = 0.2;   // of the stated standard deviation; 0.10 at most was seen
+constexpr double kLandmark_m = 2e-4;    // MAP states no covariance
+constexpr double kRounding_m2 = 1e-12;  // the first pose is known exactly
 
-bool is_near(const pose2_t& a, const pose2_t& b) {
-  return std::hypot(a.x - b.x, a.y - b.y) < kLinearised_m &&
-         std::abs(a.theta - b.theta) < kLinearised_rad;
+bool is_near(const pose2_t& a, const pose2_t& b, const double (&covariance)[3][3]) {
+  const Eigen::Vector3d off(b.x - a.x, b.y - a.y, b.theta - a.theta);
+  const Eigen::Matrix3d stated = Eigen::Map<const Eigen::Matrix3d>(&covariance[0][0]) +
+                                 kRounding_m2 * Eigen::Matrix3d::Identity();
+  return off.dot(stated.inverse() * off) < kLargestShare * kLargestShare;
 }
 
 bool are_same_poses(const RecordedMessage& expected, const RecordedMessage& got) {
@@ -119,7 +122,8 @@ bool are_same_poses(const RecordedMessage& expected, const RecordedMessage& got)
   const auto b = wire::decode_bytes<slam_pose_t>(got.bytes).value();
   return a.utime == b.utime && a.seq == b.seq && a.status == b.status &&
          a.keyframe_seq == b.keyframe_seq && a.reset_counter == b.reset_counter &&
-         is_near(a.submap_T_vehicle, b.submap_T_vehicle) && is_near(a.map_T_odom, b.map_T_odom);
+         is_near(a.submap_T_vehicle, b.submap_T_vehicle, a.covariance) &&
+         is_near(a.map_T_odom, b.map_T_odom, a.covariance);
 }
 
 bool are_same_updates(const RecordedMessage& expected, const RecordedMessage& got) {
@@ -131,16 +135,15 @@ bool are_same_updates(const RecordedMessage& expected, const RecordedMessage& go
   return a.utime == b.utime && a.seq == b.seq && a.status == b.status && a.added == b.added &&
          a.removed == b.removed && a.num_merged == b.num_merged && a.used_prior == b.used_prior &&
          a.inliers == b.inliers && a.degrees_of_freedom == b.degrees_of_freedom &&
-         a.reason == b.reason && is_near(a.map_T_vehicle, b.map_T_vehicle) &&
+         a.reason == b.reason && is_near(a.map_T_vehicle, b.map_T_vehicle, a.covariance) &&
          std::ranges::equal(a.associations, b.associations, is_same_pair);
 }
 
 bool are_near_landmarks(const std::vector<map_landmark_t>& a,
                         const std::vector<map_landmark_t>& b) {
   return std::ranges::equal(a, b, [](const map_landmark_t& one, const map_landmark_t& other) {
-    return one.id == other.id &&
-           std::hypot(one.position_m[0] - other.position_m[0],
-                      one.position_m[1] - other.position_m[1]) < kLinearised_m;
+    return one.id == other.id && std::hypot(one.position_m[0] - other.position_m[0],
+                                            one.position_m[1] - other.position_m[1]) < kLandmark_m;
   });
 }
 
