@@ -118,7 +118,7 @@ TEST_CASE("A map of a noise-free drive agrees with the truth") {
 
   for (const model::KeyframePose& pose : mapper->trajectory()) {
     const geometry::SE2 expected = world_T_map.inverse() * truth.at(pose.utime);
-    CHECK((expected.inverse() * pose.map_T_vehicle).Log().norm() < 0.15);
+    CHECK((expected.inverse() * pose.map_T_vehicle).Log().norm() < 0.09);
   }
 
   for (const model::MapLandmark& landmark : mapper->landmarks()) {
@@ -209,7 +209,7 @@ TEST_CASE("In a given map a landmark counts once it was observed") {
     if (update.status == model::MapUpdateStatus::kUpdated) {
       ++updates;
       CHECK((truth.at(keyframe.utime).translation() - update.map_T_vehicle.translation()).norm() <
-            0.5);
+            0.25);
     }
   }
 

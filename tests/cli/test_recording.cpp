@@ -118,7 +118,7 @@ TEST_CASE_METHOD(Fixture, "odometry of exact wheels is the motion", "[cli][recor
   for (const auto& motion : messages<model::Odometry>(events_of(log), "ODOMETRY")) {
     reckoned = reckoned * motion.from_T_to;
     const geometry::SE2 truth = test::RecordedDrive::pose(1e-6 * static_cast<double>(motion.utime));
-    CHECK((reckoned.inverse() * truth).Log().norm() < 1e-3);
+    CHECK((reckoned.inverse() * truth).Log().norm() < 1e-6);
   }
 }
 
@@ -137,7 +137,7 @@ TEST_CASE_METHOD(Fixture, "replay of a recording maps the trunks, the same bytes
   for (const auto& pose : poses) {
     const geometry::SE2 truth = test::RecordedDrive::pose(1e-6 * static_cast<double>(pose.utime));
     CHECK(pose.is_localised());
-    CHECK((pose.map_T_vehicle().translation() - truth.translation()).norm() < 0.3);
+    CHECK((pose.map_T_vehicle().translation() - truth.translation()).norm() < 0.15);
   }
   REQUIRE_FALSE(maps.empty());
   CHECK(maps.back().landmarks.size() > 50);

@@ -128,7 +128,7 @@ TEST_CASE("An observation finds its place, its landmarks and its covariance", "[
       nees += error.dot(result.covariance.ldlt().solve(error)) / n;
     }
 
-    REQUIRE(wrong_pairs < 0.02 * pairs);
+    REQUIRE(wrong_pairs < 0.008 * pairs);
 
     // 3 degrees of freedom, 300 runs: 2.6 to 3.4 is four sigmas; false pairs add a little.
     REQUIRE(nees > 2.4);

@@ -61,7 +61,7 @@ TEST_CASE("The map begins where the vehicle is found to be stationary", "[ekf][b
   const model::EkfPose at_once = found_stationary(hasty);
   for (int axis = 0; axis < 3; ++axis) {
     CAPTURE(axis, waited.covariance(axis, axis), at_once.covariance(axis, axis));
-    CHECK(waited.covariance(axis, axis) < 1e-6);
+    CHECK(waited.covariance(axis, axis) < 1.5e-7);
     CHECK(at_once.covariance(axis, axis) > 4.0 * waited.covariance(axis, axis));
   }
 }

@@ -190,7 +190,7 @@ TEST_CASE("Leaning trunks of uncertain height do not pass for an error of the le
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     mean += level_nees_before_leaning_trunks(seed) / 20.0;
   }
-  CHECK(mean < 3.5);
+  CHECK(mean < 0.02);
 }
 
 TEST_CASE("A scale error of all distances makes the pose less certain far from the origin",

@@ -93,7 +93,7 @@ TEST_CASE("A new landmark's covariance is that of its observation and of the pos
     Eigen::MatrixXd expected = jacobian * full_covariance(state) * jacobian.transpose();
     const Eigen::Matrix2d rotation = rotation_of(state.heading);
     expected.bottomRightCorner<2, 2>() += rotation * noise * rotation.transpose();
-    REQUIRE((full_covariance(added) - expected).norm() < 1e-4 * expected.norm());
+    REQUIRE((full_covariance(added) - expected).norm() < 1e-5 * expected.norm());
   }
 }
 

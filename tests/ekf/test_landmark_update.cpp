@@ -82,7 +82,7 @@ TEST_CASE("Innovations depend on the error by their Jacobian", "[ekf][update]") 
       };
       const Eigen::Vector2d column = (predicted(plus) - predicted(minus)) / (2 * h);
       CAPTURE(static_cast<int>(form), k);
-      REQUIRE((column - rows.col(k)).norm() < 1e-6);
+      REQUIRE((column - rows.col(k)).norm() < 1e-8);
     }
     REQUIRE(innovation(state, 1, observation).norm() < 1e-9);
   }

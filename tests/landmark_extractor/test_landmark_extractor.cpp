@@ -70,8 +70,8 @@ TEST_CASE("a trunk half hidden behind another keeps its centre", "[extractor]") 
     const test::Circle& truth = detection.position_m.x() < 8.0 ? near : far;
     const Eigen::Vector2d error = detection.position_m.head<2>() - truth.centre;
     const Eigen::Matrix2d covariance = detection.covariance_m2.topLeftCorner<2, 2>();
-    CHECK(error.norm() < 0.2);
-    CHECK(error.dot(covariance.inverse() * error) < 16.0);
+    CHECK(error.norm() < 0.035);
+    CHECK(error.dot(covariance.inverse() * error) < 6.0);
   }
 }
 
@@ -100,7 +100,7 @@ TEST_CASE("bushes are no trunks", "[extractor]") {
     }
     false_trunks += extractor.extract(sweep(twigs, {}, 0.02, random)).detections.size();
   }
-  CHECK(false_trunks <= 20);
+  CHECK(false_trunks <= 2);
 }
 
 TEST_CASE("detections are moved into the frame of the vehicle", "[extractor]") {

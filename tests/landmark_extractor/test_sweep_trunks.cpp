@@ -190,7 +190,7 @@ TEST_CASE("the motion of the sensor during a revolution is taken out of its line
   for (const model::Detection& detection : scan.detections) {
     const test::Stem* stem = stem_of(detection, space);
     REQUIRE(stem != nullptr);
-    CHECK((detection.position_m.head<2>() - stem->breast).norm() < 0.08);
+    CHECK((detection.position_m.head<2>() - stem->breast).norm() < 0.025);
   }
   landmark_extractor::rings::RingCloud cloud;
   cloud.look_at(moving, 1.0, 30.0);

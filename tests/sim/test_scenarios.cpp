@@ -76,7 +76,7 @@ TEST_CASE("Around the block is about 700 m, closed, with houses on both sides", 
     nearest = std::min(nearest, (scenario.route.at(s).position_m - again.position_m).norm());
   }
 
-  CHECK(nearest < 0.2);
+  CHECK(nearest < 0.015);
   CHECK(scenario.world->corners().size() > 120);
   CHECK(scenario.world->trunks().size() > 50);
   check_path_is_clear(scenario, 2.0);

@@ -65,14 +65,14 @@ TEST_CASE("Rates and accelerations are the derivatives of the pose", "[motion]")
     const VehicleState before = motion.at(t - h);
     const VehicleState here = motion.at(t);
     const VehicleState after = motion.at(t + h);
-    CHECK(((after.position_m - before.position_m) / (2 * h) - here.velocity_mps).norm() < 1e-5);
+    CHECK(((after.position_m - before.position_m) / (2 * h) - here.velocity_mps).norm() < 1e-7);
     CHECK(((after.velocity_mps - before.velocity_mps) / (2 * h) - here.acceleration_mps2).norm() <
-          1e-4);
+          1e-6);
     const Eigen::AngleAxisd turn(before.world_Q_vehicle.conjugate() * after.world_Q_vehicle);
-    CHECK((turn.angle() * turn.axis() / (2 * h) - here.angular_rate_rad_s).norm() < 1e-5);
+    CHECK((turn.angle() * turn.axis() / (2 * h) - here.angular_rate_rad_s).norm() < 1e-7);
     CHECK(((after.angular_rate_rad_s - before.angular_rate_rad_s) / (2 * h) -
            here.angular_acceleration_rad_s2)
-              .norm() < 1e-4);
+              .norm() < 1e-6);
   }
 }
 
@@ -152,7 +152,7 @@ TEST_CASE("A perfect inertial unit integrates back to the drive", "[imu]") {
         std::max(worst_m, (position - sensor_at(1e-6 * double(sample.utime)).translation()).norm());
   }
 
-  CHECK(worst_m < 0.01);
+  CHECK(worst_m < 0.003);
 }
 
 TEST_CASE("The errors of the inertial unit have the size that was asked for", "[imu]") {

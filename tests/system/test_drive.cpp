@@ -19,7 +19,7 @@ TEST_CASE("processes on the bus localise a vehicle and stop cleanly", "[system]"
       [&] { return stack.updates(model::MapUpdateStatus::kUpdated) >= drive.size() / 8 - 2; }));
   const double error_m = largest_error_m(stack, drive);
   CHECK(error_m >= 0.0);
-  CHECK(error_m < 0.5);
+  CHECK(error_m < 0.25);
   CHECK(stack.refused == 0);
 
   const auto ending = stack.stop();
@@ -50,7 +50,7 @@ TEST_CASE("a killed process comes back with its state", "[system]") {
     CHECK(stack.updates(model::MapUpdateStatus::kFirstMap) == 1);  // The map was not begun anew.
     CHECK(stack.poses.size() > poses_before + half / 2);
 
-    CHECK(largest_error_m(stack, drive, poses_before) < 0.5);
+    CHECK(largest_error_m(stack, drive, poses_before) < 0.25);
     stack.stop();
     CHECK_THAT(test::read_text(stack.report()), Contains("killed by signal 9") &&
                                                     Contains("\"restarts\": 1") &&
