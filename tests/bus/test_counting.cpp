@@ -111,6 +111,28 @@ TEST_CASE("one wrong stamp is not believed, three that agree are") {
   CHECK(clock.now() == 7);
 }
 
+TEST_CASE("a stamp is believed up to the largest jump, and far stamps only where they agree") {
+  constexpr std::int64_t kJump_us = 10'000'000;
+  constexpr std::int64_t kStart = 1'000'000'000;
+  using Verdict = MessageClock::Verdict;
+  MessageClock clock(kJump_us);
+  clock.take(kStart);
+  CHECK(clock.take(kStart - kJump_us) == Verdict::kFine);
+  CHECK(clock.now() == kStart);
+  CHECK(clock.take(kStart - kJump_us - 1) == Verdict::kQuarantined);
+  CHECK(clock.take(kStart + kJump_us) == Verdict::kFine);
+  CHECK(clock.take(kStart + 2 * kJump_us + 1) == Verdict::kQuarantined);
+
+  // Each is farther from the one before than a jump: none proves another.
+  for (int i = 0; i < 10; ++i) {
+    CHECK(clock.take(10 * kStart + i * (kJump_us + 1)) == Verdict::kQuarantined);
+  }
+  // These are just near enough.
+  CHECK(clock.take(20 * kStart) == Verdict::kQuarantined);
+  CHECK(clock.take(20 * kStart + kJump_us) == Verdict::kQuarantined);
+  CHECK(clock.take(20 * kStart + 2 * kJump_us) == Verdict::kJumped);
+}
+
 TEST_CASE("health follows from fresh reasons and recovers") {
   std::int64_t now = 0;
   HealthMonitor monitor("toy", "1", {[&] { return now + 5; }, [&] { return now; }});

@@ -37,7 +37,34 @@ struct Bench {
   std::vector<raw_pose_t> poses;
 };
 
+/// Hands out messages as if they had come at a known time.
+class StampingBus : public MemoryBus {
+ public:
+  explicit StampingBus(std::int64_t received_us)
+      : MemoryBus(MemoryBus::Queues::kUnlimited), received_us_(received_us) {}
+  void subscribe(std::string_view channel, std::size_t queue_size, Handler handler) override {
+    MemoryBus::subscribe(channel, queue_size, [this, handler](const BusMessage& message) {
+      handler({message.channel, message.bytes, received_us_});
+    });
+  }
+
+ private:
+  std::int64_t received_us_;
+};
+
 }  // namespace
+
+TEST_CASE("latency is the time from the arrival of a message to the end of its handler") {
+  StampingBus bus(5'000'000);
+  const Clock clock{[] { return std::int64_t{5'000'700}; }, [] { return std::int64_t{0}; }};
+  HostedService hosted(toy_service(), bus, clock, "", "test.toml");
+  hosted.node().connect();
+  for (int i = 0; i < 3; ++i) {
+    bus.publish("ODOMETRY", wire::encode_message(test::toy_input(i)));
+    bus.drain();
+  }
+  CHECK(hosted.node().monitor().report(0).latency_max_us == 700);
+}
 
 TEST_CASE("values pass through, outputs are numbered from 0, ticks follow message time") {
   Bench bench("[toy]\ngain = 2\nevery = 5\n");
