@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "common/bus/datagram_fault.hpp"
 #include "common/wire/result.hpp"
 
 namespace understory::bus {
@@ -48,6 +49,8 @@ class Bus {
   virtual int file_descriptor() const { return -1; }
   /// The socket buffer of the bus, for HEALTH.
   virtual ReceiveBuffer receive_buffer() const { return {}; }
+  /// What came from the network and was no message, by reason.
+  virtual DatagramFaults refused_datagrams() const { return {}; }
 };
 
 inline constexpr std::size_t kLongestChannelName = 63;

@@ -1,5 +1,6 @@
 #include "common/bus/dispatch_queue.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace understory::bus {
@@ -19,25 +20,50 @@ std::optional<wire::Refusal> check_publishable(std::string_view channel, std::si
 
 void DispatchQueue::subscribe(std::string_view channel, std::size_t queue_size,
                               Bus::Handler handler) {
-  subscriptions_.push_back({std::string(channel), queue_size, std::move(handler), {}, 0});
+  subscriptions_.push_back({std::string(channel), queue_size, std::move(handler)});
+}
+
+void DispatchQueue::subscribe_all(std::size_t queue_size, Bus::Handler handler) {
+  subscriptions_.push_back({{}, queue_size, std::move(handler)});
+}
+
+bool DispatchQueue::wants(std::string_view channel) const {
+  return std::any_of(subscriptions_.begin(), subscriptions_.end(), [&](const auto& subscription) {
+    return subscription.channel.empty() || subscription.channel == channel;
+  });
 }
 
 void DispatchQueue::push(std::string_view channel, std::span<const std::uint8_t> bytes,
                          std::int64_t received_us) {
   for (Subscription& subscription : subscriptions_) {
-    if (subscription.channel != channel) continue;
-    subscription.queue.push_back({next_ticket_++, received_us, {bytes.begin(), bytes.end()}});
+    const bool takes_all = subscription.channel.empty();
+    if (!takes_all && subscription.channel != channel) continue;
+    subscription.queue.push_back({next_ticket_++,
+                                  received_us,
+                                  takes_all ? std::string(channel) : std::string(),
+                                  {bytes.begin(), bytes.end()}});
+    subscription.bytes += bytes.size();
     ++waiting_;
-    if (subscription.queue_size == 0 || subscription.queue.size() <= subscription.queue_size) {
-      continue;
-    }
+    drop_excess(subscription);
+  }
+}
+
+void DispatchQueue::drop_excess(Subscription& subscription) {
+  const auto is_full = [&] {
+    const bool has_many =
+        subscription.queue_size != 0 && subscription.queue.size() > subscription.queue_size;
+    return has_many || (subscription.bytes > most_bytes_ && subscription.queue.size() > 1);
+  };
+
+  while (is_full()) {
+    subscription.bytes -= subscription.queue.front().bytes.size();
     subscription.queue.pop_front();
     --waiting_;
     ++subscription.dropped;
   }
 }
 
-bool DispatchQueue::handle_one() {
+std::optional<DispatchQueue::Delivery> DispatchQueue::take_one() {
   Subscription* oldest = nullptr;
   for (Subscription& subscription : subscriptions_) {
     if (subscription.queue.empty()) continue;
@@ -46,19 +72,36 @@ bool DispatchQueue::handle_one() {
     }
   }
 
-  if (oldest == nullptr) return false;
-  const Waiting message = std::move(oldest->queue.front());
+  if (oldest == nullptr) return std::nullopt;
+  Waiting message = std::move(oldest->queue.front());
   oldest->queue.pop_front();
+  oldest->bytes -= message.bytes.size();
   --waiting_;
-  oldest->handler({oldest->channel, message.bytes, message.received_us});
 
+  if (message.channel.empty()) message.channel = oldest->channel;
+  return Delivery{std::move(message.channel), std::move(message.bytes), message.received_us,
+                  &oldest->handler};
+}
+
+bool DispatchQueue::handle_one() {
+  const auto delivery = take_one();
+  if (!delivery) return false;
+  (*delivery->handler)({delivery->channel, delivery->bytes, delivery->received_us});
   return true;
 }
 
 std::uint64_t DispatchQueue::dropped(std::string_view channel) const {
   std::uint64_t sum = 0;
   for (const Subscription& subscription : subscriptions_) {
-    if (subscription.channel == channel) sum += subscription.dropped;
+    if (!channel.empty() && subscription.channel == channel) sum += subscription.dropped;
+  }
+  return sum;
+}
+
+std::uint64_t DispatchQueue::dropped_of_all() const {
+  std::uint64_t sum = 0;
+  for (const Subscription& subscription : subscriptions_) {
+    if (subscription.channel.empty()) sum += subscription.dropped;
   }
   return sum;
 }

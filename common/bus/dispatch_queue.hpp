@@ -2,6 +2,8 @@
 #pragma once
 
 #include <deque>
+#include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,32 +14,58 @@ namespace understory::bus {
 /// The queues of all subscriptions of one bus.
 class DispatchQueue {
  public:
+  /// A message that was taken out, and who wants it.
+  struct Delivery {
+    std::string channel;
+    std::vector<std::uint8_t> bytes;
+    std::int64_t received_us = 0;
+    const Bus::Handler* handler = nullptr;  ///< Valid as long as the queue is.
+  };
+
+  /// Each subscription holds at most `most_bytes` besides the message that came last.
+  explicit DispatchQueue(std::size_t most_bytes = std::numeric_limits<std::size_t>::max())
+      : most_bytes_(most_bytes) {}
+
   /// Adds a subscription of `channel` (exact name) that holds `queue_size` messages (0 = no limit).
   void subscribe(std::string_view channel, std::size_t queue_size, Bus::Handler handler);
+  /// The same for the messages of all channels.
+  void subscribe_all(std::size_t queue_size, Bus::Handler handler);
+  /// Whether somebody wants this channel.
+  bool wants(std::string_view channel) const;
   /// Copies a message to every subscription of the channel; where one is full, its oldest is
   /// dropped and counted.
   void push(std::string_view channel, std::span<const std::uint8_t> bytes,
             std::int64_t received_us);
+  /// Takes out the message that came first; none = nothing waits.
+  std::optional<Delivery> take_one();
   /// Calls the handler of the message that came first; false = nothing waits.
   bool handle_one();
   /// True when nothing waits.
   bool empty() const { return waiting_ == 0; }
   /// Messages dropped from the full queues of this channel so far.
   std::uint64_t dropped(std::string_view channel) const;
+  /// Messages dropped from the full queues of subscribe_all() so far.
+  std::uint64_t dropped_of_all() const;
 
  private:
   struct Waiting {
     std::uint64_t ticket = 0;  // counts arrivals over all subscriptions
     std::int64_t received_us = 0;
+    std::string channel;  // where the subscription has many; else empty
     std::vector<std::uint8_t> bytes;
   };
   struct Subscription {
-    std::string channel;
+    std::string channel;  // empty: all
     std::size_t queue_size = 0;
     Bus::Handler handler;
-    std::deque<Waiting> queue;
+    std::deque<Waiting> queue = {};
+    std::size_t bytes = 0;  // in the queue
     std::uint64_t dropped = 0;
   };
+
+  void drop_excess(Subscription& subscription);
+
+  std::size_t most_bytes_;
 
   std::deque<Subscription> subscriptions_;  // a deque: handlers may subscribe while one runs
   std::uint64_t next_ticket_ = 0;

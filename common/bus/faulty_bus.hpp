@@ -53,6 +53,7 @@ class FaultyBus : public Bus {
   std::uint64_t dropped(std::string_view channel) const override;
   int file_descriptor() const override { return inner_.file_descriptor(); }
   ReceiveBuffer receive_buffer() const override { return inner_.receive_buffer(); }
+  DatagramFaults refused_datagrams() const override { return inner_.refused_datagrams(); }
 
   /// Sends everything that is held back, in order.
   void flush();

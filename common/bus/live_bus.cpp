@@ -9,7 +9,8 @@
 #include <set>
 #include <utility>
 
-#include "common/bus/dispatch_queue.hpp"
+#include "common/bus/arrival_queue.hpp"
+#include "common/bus/udpm_receiver.hpp"
 
 namespace understory::bus {
 namespace {
@@ -30,11 +31,6 @@ int liblcm_capacity(std::size_t queue_size) { return static_cast<int>(4 * queue_
 
 /// One handle_one() takes in at most this many, so that a flood cannot keep it from its handlers.
 constexpr int kMostTakenAtOnce = 1024;
-
-std::int64_t url_number(const std::string& url, const std::string& key) {
-  const std::size_t at = url.find(key + "=");
-  return at == std::string::npos ? 0 : std::atoll(url.c_str() + at + key.size() + 1);
-}
 
 }  // namespace
 
@@ -71,15 +67,25 @@ class LiveBus::Impl {
   explicit Impl(const std::string& url)
       : url_(complete_lcm_url(url)), lcm_(lcm_create(url_.c_str())) {
     if (lcm_ == nullptr) throw BusError(url_ + ": cannot join this bus");
-    buffer_.wanted_bytes = url_number(url_, "recv_buf_size");
-    buffer_.granted_bytes = granted_receive_buffer(buffer_.wanted_bytes);
+    try {
+      if (is_udpm_url(url_)) udpm_ = parse_udpm_url(url_);
+      buffer_.wanted_bytes = udpm_ ? udpm_->receive_buffer_bytes : 0;
+      buffer_.granted_bytes = udpm_ ? granted_receive_buffer(buffer_.wanted_bytes) : 0;
+    } catch (...) {
+      lcm_destroy(lcm_);
+      throw;
+    }
   }
-  ~Impl() { lcm_destroy(lcm_); }
+  ~Impl() {
+    receiver_.reset();
+    lcm_destroy(lcm_);
+  }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
   void subscribe(std::string_view channel, std::size_t queue_size, Handler handler) {
     queue_.subscribe(channel, queue_size, std::move(handler));
+    if (udpm_) return join();
     if (!channels_.emplace(channel).second) return;
     lcm_subscription_t* subscription =
         lcm_subscribe(lcm_, escaped(channel).c_str(), &Impl::take_in, this);
@@ -88,30 +94,56 @@ class LiveBus::Impl {
     lcm_subscription_set_queue_capacity(subscription, liblcm_capacity(queue_size));
   }
 
-  /// Only copies: handlers run later, outside liblcm's frames, where they may throw.
-  static void take_in(const lcm_recv_buf_t* buffer, const char* channel, void* self) noexcept {
-    auto& impl = *static_cast<Impl*>(self);
-    try {
-      impl.queue_.push(channel, {static_cast<const std::uint8_t*>(buffer->data), buffer->data_size},
-                       buffer->recv_utime);
-    } catch (...) {
-      ++impl.lost_for_memory_;
-    }
+  void subscribe_all(std::size_t queue_size, Handler handler) {
+    if (!udpm_) throw BusError(url_ + ": all channels can be had of udpm:// only");
+    queue_.subscribe_all(queue_size, std::move(handler));
+    join();
   }
 
   bool handle_one(int timeout_ms) {
+    if (udpm_) return queue_.handle_one(timeout_ms);
     for (int i = 0; i < kMostTakenAtOnce && lcm_handle_timeout(lcm_, 0) > 0; ++i) {
     }
     if (queue_.empty() && timeout_ms > 0) lcm_handle_timeout(lcm_, timeout_ms);
-    return queue_.handle_one();
+    return queue_.handle_one(0);
+  }
+
+  int file_descriptor() const {
+    // With udpm:// this call of liblcm's would open its own receiving socket.
+    return udpm_ ? queue_.file_descriptor() : lcm_get_fileno(lcm_);
+  }
+
+  const std::string& url() const { return url_; }
+  lcm_t* lcm() const { return lcm_; }
+  const ArrivalQueue& queue() const { return queue_; }
+  ReceiveBuffer buffer() const { return buffer_; }
+  DatagramFaults faults() const { return receiver_ ? receiver_->faults() : DatagramFaults{}; }
+
+ private:
+  /// Who only sends is not sent everything that others send.
+  void join() {
+    if (receiver_) return;
+    receiver_ = std::make_unique<UdpmReceiver>(
+        *udpm_, url_,
+        [this](std::string_view channel, std::span<const std::uint8_t> bytes,
+               std::int64_t received_us) { queue_.push(channel, bytes, received_us); });
+    buffer_.granted_bytes = receiver_->granted_bytes();
+  }
+
+  /// Only copies: handlers run later, outside liblcm's frames, where they may throw.
+  static void take_in(const lcm_recv_buf_t* buffer, const char* channel, void* self) noexcept {
+    static_cast<Impl*>(self)->queue_.push(
+        channel, {static_cast<const std::uint8_t*>(buffer->data), buffer->data_size},
+        buffer->recv_utime);
   }
 
   std::string url_;
   lcm_t* lcm_;
+  std::optional<UdpmUrl> udpm_;  // none: liblcm receives
   ReceiveBuffer buffer_;
-  DispatchQueue queue_;
-  std::set<std::string, std::less<>> channels_;
-  std::uint64_t lost_for_memory_ = 0;
+  ArrivalQueue queue_;
+  std::unique_ptr<UdpmReceiver> receiver_;       // behind the queue that it fills
+  std::set<std::string, std::less<>> channels_;  // that liblcm was asked for
 };
 
 LiveBus::LiveBus(const std::string& url) : impl_(std::make_unique<Impl>(url)) {}
@@ -120,7 +152,7 @@ LiveBus::~LiveBus() = default;
 std::optional<wire::Refusal> LiveBus::publish(std::string_view channel,
                                               std::span<const std::uint8_t> bytes) {
   if (auto refusal = check_publishable(channel, bytes.size())) return refusal;
-  if (lcm_publish(impl_->lcm_, std::string(channel).c_str(), bytes.data(),
+  if (lcm_publish(impl_->lcm(), std::string(channel).c_str(), bytes.data(),
                   static_cast<unsigned>(bytes.size())) != 0) {
     return wire::Refusal{wire::Reason::kNotSent,
                          "the socket refused " + std::to_string(bytes.size()) + " bytes"};
@@ -132,16 +164,24 @@ void LiveBus::subscribe(std::string_view channel, std::size_t queue_size, Handle
   impl_->subscribe(channel, queue_size, std::move(handler));
 }
 
+void LiveBus::subscribe_all(std::size_t queue_size, Handler handler) {
+  impl_->subscribe_all(queue_size, std::move(handler));
+}
+
 bool LiveBus::handle_one(int timeout_ms) { return impl_->handle_one(timeout_ms); }
 
 std::uint64_t LiveBus::dropped(std::string_view channel) const {
-  return impl_->queue_.dropped(channel) + impl_->lost_for_memory_;
+  return impl_->queue().dropped(channel);
 }
 
-int LiveBus::file_descriptor() const { return lcm_get_fileno(impl_->lcm_); }
+std::uint64_t LiveBus::dropped_of_all() const { return impl_->queue().dropped_of_all(); }
 
-ReceiveBuffer LiveBus::receive_buffer() const { return impl_->buffer_; }
+int LiveBus::file_descriptor() const { return impl_->file_descriptor(); }
 
-const std::string& LiveBus::url() const { return impl_->url_; }
+ReceiveBuffer LiveBus::receive_buffer() const { return impl_->buffer(); }
+
+DatagramFaults LiveBus::refused_datagrams() const { return impl_->faults(); }
+
+const std::string& LiveBus::url() const { return impl_->url(); }
 
 }  // namespace understory::bus

@@ -42,6 +42,7 @@ class PacedBus : public Bus {
   std::uint64_t dropped(std::string_view channel) const override { return bus_->dropped(channel); }
   int file_descriptor() const override { return bus_->file_descriptor(); }
   ReceiveBuffer receive_buffer() const override { return bus_->receive_buffer(); }
+  DatagramFaults refused_datagrams() const override { return bus_->refused_datagrams(); }
 
  private:
   using Time = std::chrono::steady_clock::time_point;
@@ -114,6 +115,12 @@ bool SplitBus::handle_one(int timeout_ms) {
 std::uint64_t SplitBus::dropped(std::string_view channel) const {
   if (!is_bulk_channel(channel)) return main_->dropped(channel);
   return bulk_ ? bulk_->dropped(channel) : 0;
+}
+
+DatagramFaults SplitBus::refused_datagrams() const {
+  DatagramFaults faults = main_->refused_datagrams();
+  if (bulk_) faults.add(bulk_->refused_datagrams());
+  return faults;
 }
 
 std::unique_ptr<Bus> make_live_bus(const std::string& url, double bulk_bytes_per_s) {

@@ -33,6 +33,7 @@ class SplitBus : public Bus {
   std::uint64_t dropped(std::string_view channel) const override;
   int file_descriptor() const override { return epoll_; }
   ReceiveBuffer receive_buffer() const override { return main_->receive_buffer(); }
+  DatagramFaults refused_datagrams() const override;
 
  private:
   Bus& bulk();

@@ -1,0 +1,15 @@
+// A bus that cannot be used.
+#pragma once
+
+#include <stdexcept>
+
+namespace understory::bus {
+
+/// The bus cannot be joined; what() names the URL.
+class BusError : public std::runtime_error {
+ public:
+  /// From the one-line message that what() gives.
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace understory::bus

@@ -1,0 +1,99 @@
+// Whole messages out of LCM's datagrams, whoever sends them and whatever is in them. No socket, no
+// clock, no thread.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/bus/bus.hpp"
+#include "common/bus/datagram_fault.hpp"
+#include "common/bus/partial_message.hpp"
+
+namespace understory::bus {
+
+/// Who sent a datagram: IPv4 address and UDP port. One LCM instance is one sender.
+struct DatagramSender {
+  std::uint32_t address = 0;  ///< Host byte order.
+  std::uint16_t port = 0;
+  /// Order of the table of senders.
+  auto operator<=>(const DatagramSender&) const = default;
+};
+
+/// How much may wait for its other fragments. Bookkeeping counts as well as payload.
+struct ReassemblyLimits {
+  /// One sender: the largest message in 65,535 fragments with 256 bytes of bookkeeping each. An
+  /// honest sender finishes a message before it begins the next.
+  std::size_t sender_bytes = kLargestMessage + (std::size_t{1} << 24U);
+  /// All senders: one message of the largest size beside 64 MiB of others.
+  std::size_t total_bytes = kLargestMessage + (std::size_t{1} << 26U);
+  /// Half messages of one sender: packets that overtake each other need a few, loss leaves some.
+  std::size_t messages_of_sender = 16;
+  /// Senders with half messages: a few processes on a few computers, and spare ones.
+  std::size_t senders = 256;
+  /// Half messages are given up when no fragment has come for so long [us]. Fragments are sent
+  /// without a pause; this covers a sender that lost its processor.
+  std::int64_t stale_us = 2000000;
+};
+
+/// Joins fragments. When room is short the largest holder loses its oldest half message, so nobody
+/// is pushed out who holds less than an equal share; a sender that comes when the table is full
+/// takes the place of one that holds less than the newcomer brings, or is refused.
+class UdpmReassembler {
+ public:
+  /// A message; the views are valid until the next take() and as long as the datagram is.
+  struct Message {
+    std::string_view channel;
+    std::span<const std::uint8_t> bytes;
+  };
+  /// What became of a datagram; neither = it is kept until the others come.
+  struct Taken {
+    std::optional<Message> message;
+    std::optional<DatagramFault> fault;
+  };
+
+  /// Nothing waits.
+  explicit UdpmReassembler(ReassemblyLimits limits = {}) : limits_(limits) {}
+
+  /// Takes one datagram; `now_us` by a clock that goes forward. A fault is counted. Throws
+  /// std::bad_alloc, with nothing changed but what was dropped to make room. O(log fragments +
+  /// bytes); O(senders) more where room is short.
+  Taken take(std::span<const std::uint8_t> datagram, DatagramSender sender, std::int64_t now_us);
+
+  /// What was refused or given up so far.
+  const DatagramFaults& faults() const { return faults_; }
+  /// What waits, with its bookkeeping [bytes].
+  std::size_t held_bytes() const { return held_bytes_; }
+  /// How many half messages wait.
+  std::size_t held_messages() const;
+
+ private:
+  using Messages = std::map<std::uint32_t, PartialMessage>;  // by sequence number
+  struct Sender {
+    Messages messages;
+    std::size_t held_bytes = 0;
+  };
+  using Senders = std::map<DatagramSender, Sender>;
+
+  Taken refuse(DatagramFault fault);
+  Taken take_fragment(const Fragment& fragment, DatagramSender sender, std::int64_t now_us);
+  Taken finish(Sender& sender, Messages::iterator message);
+  bool make_place(const Fragment& fragment, DatagramSender sender);
+  bool make_room(std::size_t bytes, Senders::iterator sender, std::uint32_t sequence);
+  bool drop_oldest(Sender& sender, const std::uint32_t* spared);
+  void drop(Sender& sender, Messages::iterator message);
+  void drop_stale(std::int64_t now_us);
+
+  ReassemblyLimits limits_;
+  Senders senders_;
+  std::size_t held_bytes_ = 0;
+  std::int64_t swept_us_ = 0;
+  std::string channel_;                // of the message given last
+  std::vector<std::uint8_t> payload_;  // its bytes
+  DatagramFaults faults_;
+};
+
+}  // namespace understory::bus
