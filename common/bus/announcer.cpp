@@ -39,6 +39,18 @@ void Announcer::report(std::int64_t utime, wire::Reason reason, std::string_view
   log(utime, is_note ? LogLevel::kInfo : LogLevel::kWarning, to_string(reason), line, channel);
 }
 
+void Announcer::report_refused(std::int64_t utime, const DatagramFaults& faults) {
+  if (is_muted_) return;
+  for (std::size_t i = 0; i < kDatagramFaults; ++i) {
+    const auto fault = static_cast<DatagramFault>(i);
+    const std::uint64_t count = faults.count_of(fault);
+    if (count == 0 || count < 2 * refused_.count_of(fault)) continue;
+    refused_.set(fault, count);
+    log(utime, LogLevel::kWarning, to_string(fault),
+        "a datagram on the bus is no message of LCM (" + std::to_string(count) + " so far)", {});
+  }
+}
+
 void Announcer::config(std::int64_t utime, const std::string& toml) {
   config_t message{};
   message.utime = std::max<std::int64_t>(utime, 0);

@@ -31,6 +31,8 @@ class Announcer {
   /// must not become a flood of LOG.
   void report(std::int64_t utime, wire::Reason reason, std::string_view text,
               std::string_view channel);
+  /// A line of LOG for each kind of datagram that was refused, when its count has doubled.
+  void report_refused(std::int64_t utime, const DatagramFaults& faults);
   /// The configuration in force.
   void config(std::int64_t utime, const std::string& toml);
 
@@ -42,6 +44,7 @@ class Announcer {
   std::int64_t log_sequence_ = 0;
   std::int64_t config_sequence_ = 0;
   std::map<std::pair<std::string, std::string>, std::uint64_t> reported_;  // reason, channel
+  DatagramFaults refused_;                                                 // as last told
 };
 
 }  // namespace understory::bus

@@ -33,6 +33,10 @@ class DatagramFaults {
  public:
   /// Counts one.
   void add(DatagramFault fault) { ++counts_[static_cast<std::size_t>(fault)]; }
+  /// Sets one count.
+  void set(DatagramFault fault, std::uint64_t count) {
+    counts_[static_cast<std::size_t>(fault)] = count;
+  }
   /// Adds all of another's.
   void add(const DatagramFaults& others);
   /// How often this fault came.

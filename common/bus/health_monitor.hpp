@@ -51,6 +51,8 @@ class HealthMonitor {
   void set_sequence(std::size_t channel, const SequenceCounts& counts);
   /// Sets how many messages the bus dropped; an increase degrades the state.
   void set_dropped(std::size_t channel, std::uint64_t dropped);
+  /// Sets what came from the network and was no message; an increase degrades the state.
+  void set_refused(const DatagramFaults& faults) { reasons_.set_refused(faults); }
 
   /// From now on the state follows from the reasons; before it is STARTING.
   void ready() { is_ready_ = true; }

@@ -145,6 +145,9 @@ health_t Node::health() {
   for (const auto& input : inputs_) {
     monitor_.set_dropped(input->health, bus_.dropped(input->channel));
   }
+  const DatagramFaults refused = bus_.refused_datagrams();
+  monitor_.set_refused(refused);
+  announcer_.report_refused(now(), refused);
   health_t report = monitor_.report(now());
 
   const ReceiveBuffer buffer = bus_.receive_buffer();

@@ -53,6 +53,21 @@ void ReasonCounts::add(std::string_view channel, wire::Reason reason, std::strin
   last_text_utime_ = clock_.wall_us();
 }
 
+void ReasonCounts::set_refused(const DatagramFaults& faults) {
+  for (std::size_t i = 0; i < kDatagramFaults; ++i) {
+    const auto fault = static_cast<DatagramFault>(i);
+    const auto count = static_cast<std::int64_t>(faults.count_of(fault));
+    if (count == 0 || faults.count_of(fault) == refused_.count_of(fault)) continue;
+
+    counts_[{std::string(), std::string(to_string(fault))}] = count;
+    last_degraded_us_ = clock_.monotonic_us();
+    last_code_ = to_string(fault);
+    last_text_ = "datagrams that are no message of LCM: " + std::to_string(count) + " so far";
+    last_text_utime_ = clock_.wall_us();
+  }
+  refused_ = faults;
+}
+
 Severity ReasonCounts::fresh() const {
   const std::int64_t now = clock_.monotonic_us();
   if (now - last_error_us_ < kFreshUs) return Severity::kError;

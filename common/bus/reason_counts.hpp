@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/bus/clock.hpp"
+#include "common/bus/datagram_fault.hpp"
 #include "common/wire/result.hpp"
 #include "understory/health_t.hpp"
 
@@ -35,6 +36,8 @@ class ReasonCounts {
 
   /// Counts one; `channel` may be empty, `text` is for a person.
   void add(std::string_view channel, wire::Reason reason, std::string_view text);
+  /// Sets how many datagrams the bus refused so far; an increase is told as the last reason.
+  void set_refused(const DatagramFaults& faults);
   /// Something is missing that has no reason of its own: a gap, a full queue.
   void add_degraded() { last_degraded_us_ = clock_.monotonic_us(); }
 
@@ -47,6 +50,7 @@ class ReasonCounts {
 
  private:
   Clock clock_;
+  DatagramFaults refused_;
   std::map<std::pair<std::string, std::string>, std::int64_t> counts_;  // channel, reason
   std::int64_t last_degraded_us_;
   std::int64_t last_error_us_;

@@ -13,6 +13,7 @@
 #include <memory>
 #include <optional>
 
+#include "common/bus/live_bus.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 
@@ -47,36 +48,29 @@ Finding check_multicast(const std::string& url) {
   Finding finding{Verdict::kBad, "multicast", "",
                   "deploy/setup, or: ip link set lo multicast on; "
                   "ip route add 224.0.0.0/4 dev lo"};
-  std::unique_ptr<lcm_t, decltype(&::lcm_destroy)> lcm(
-      ::lcm_create(url.empty() ? nullptr : url.c_str()), &::lcm_destroy);
-  if (!lcm) {
-    finding.text = "the bus cannot be opened";
-    return finding;
-  }
+  try {
+    bus::LiveBus bus(url);
+    const auto channel = fmt::format("DOCTOR_{}", ::getpid());
+    bool heard = false;
+    bus.subscribe(channel, 1, [&](const bus::BusMessage&) { heard = true; });
+    const auto start = std::chrono::steady_clock::now();
 
-  bool heard = false;
-  const auto channel = fmt::format("DOCTOR_{}", ::getpid());
-  ::lcm_subscribe(
-      lcm.get(), channel.c_str(),
-      [](const lcm_recv_buf_t*, const char*, void* flag) { *static_cast<bool*>(flag) = true; },
-      &heard);
-  const auto start = std::chrono::steady_clock::now();
-  const char text[] = "hello";
+    const std::array<std::uint8_t, 5> text{'h', 'e', 'l', 'l', 'o'};
+    if (bus.publish(channel, text)) {
+      finding.text = "a message cannot be sent";
+      return finding;
+    }
 
-  if (::lcm_publish(lcm.get(), channel.c_str(), text, sizeof text) != 0) {
-    finding.text = "a message cannot be sent";
-    return finding;
-  }
-
-  for (int i = 0; i < 10 && !heard; ++i) ::lcm_handle_timeout(lcm.get(), 100);
-  const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
-  if (!heard) {
+    for (int i = 0; i < 10 && !heard; ++i) bus.handle_one(100);
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
     finding.text = "a message to ourselves does not arrive";
+    if (!heard) return finding;
+    return {Verdict::kGood, "multicast",
+            fmt::format("a message went round in {:.1f} ms", took.count()), ""};
+  } catch (const bus::BusError& error) {
+    finding.text = error.what();
     return finding;
   }
-
-  return {Verdict::kGood, "multicast",
-          fmt::format("a message went round in {:.1f} ms", took.count()), ""};
 }
 
 Finding check_receive_buffer() {

@@ -102,9 +102,8 @@ void prepare_state(const LaunchOptions& options, const std::vector<launch::Proce
 
 /// Sleeps until a process ends, a signal or a message comes, or something is due.
 void wait(const launch::Supervisor& supervisor, const StopSignals& signals,
-          const HealthListener* health) {
-  std::vector<pollfd> polled{{signals.descriptor(), POLLIN, 0}};
-  if (health != nullptr) polled.push_back({health->descriptor(), POLLIN, 0});
+          const HealthListener& health) {
+  std::vector<pollfd> polled{{signals.descriptor(), POLLIN, 0}, {health.descriptor(), POLLIN, 0}};
   for (const int descriptor : supervisor.descriptors()) polled.push_back({descriptor, POLLIN, 0});
   const auto now = Clock::now();
   const auto left =
@@ -112,21 +111,16 @@ void wait(const launch::Supervisor& supervisor, const StopSignals& signals,
   ::poll(polled.data(), polled.size(), static_cast<int>(std::clamp<long>(left, 0, 1000)));
 }
 
-/// Heartbeats distinguish a hang from work; without a bus deaths are still noticed.
-std::unique_ptr<HealthListener> listen(const LaunchOptions& options, launch::Supervisor& supervisor,
-                                       LaunchReport& report) {
-  try {
-    return std::make_unique<HealthListener>(options.lcm_url, [&](const health_t& message) {
-      supervisor.heartbeat(message.process, static_cast<pid_t>(message.pid), Clock::now());
-    });
-  } catch (const std::runtime_error& error) {
-    report.add("launch", fmt::format("{}; hangs will not be noticed", error.what()));
-    return nullptr;
-  }
+/// Heartbeats distinguish a hang from work. Throws BusError: on a bus that cannot be heard no
+/// process would hear anything either.
+HealthListener listen(const LaunchOptions& options, launch::Supervisor& supervisor) {
+  return HealthListener(options.lcm_url, [&](const health_t& message) {
+    supervisor.heartbeat(message.process, static_cast<pid_t>(message.pid), Clock::now());
+  });
 }
 
 void run(launch::Supervisor& supervisor, launch::Registry& registry, const StopSignals& signals,
-         HealthListener* health, LaunchReport& report) {
+         HealthListener& health, LaunchReport& report) {
   std::vector<pid_t> noted;
   while (!supervisor.stopped()) {
     const auto now = Clock::now();
@@ -147,7 +141,7 @@ void run(launch::Supervisor& supervisor, launch::Registry& registry, const StopS
 
     if (supervisor.stopped()) break;  // The note is empty by now: the next launch begins anew.
     wait(supervisor, signals, health);
-    while (health != nullptr && health->handle(std::chrono::milliseconds(0))) {
+    while (health.handle(std::chrono::milliseconds(0))) {
     }
   }
 }
@@ -168,9 +162,9 @@ void launch_processes(const LaunchOptions& options) {
   launch::Supervisor supervisor(
       std::move(specs), {},
       [&](const std::string& process, const std::string& text) { report.add(process, text); });
-  const auto health = listen(options, supervisor, report);
+  HealthListener health = listen(options, supervisor);
   supervisor.start(registry.read(), Clock::now());
-  run(supervisor, registry, signals, health.get(), report);
+  run(supervisor, registry, signals, health, report);
 
   if (!options.report.empty()) report.write(options.report, supervisor.status());
   if (!supervisor.refused().empty()) {
