@@ -69,13 +69,20 @@ class LcmLogReader {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Writes a log whole or not at all: into a temporary file beside `path`, which takes its name in
-/// commit(). Without commit() nothing is left behind. Where `path` is a device or a pipe, it is
-/// written directly.
+/// How a log comes into being. Where the path is a device or a pipe it is written directly.
+enum class LogCreation : std::uint8_t {
+  kWhole,           ///< Under its name only when it is complete; else nothing is left behind.
+  kGrowing,         ///< Under its name from the start; what was written stays. Must be new.
+  kGrowingReplace,  ///< The same; a file of this name is overwritten.
+};
+
+/// Writes a log, by default whole or not at all: into a temporary file beside `path`, which takes
+/// its name in commit(). A recording grows instead: its end cannot be foreseen.
 class LcmLogWriter {
  public:
-  /// Opens the temporary file. Throws LogError when it cannot be created.
-  explicit LcmLogWriter(const std::filesystem::path& path);
+  /// Opens the file. Throws LogError when it cannot be created.
+  explicit LcmLogWriter(const std::filesystem::path& path,
+                        LogCreation creation = LogCreation::kWhole);
   ~LcmLogWriter();
   /// Leaves the other one fit for assignment and destruction only.
   LcmLogWriter(LcmLogWriter&&) noexcept;
@@ -86,6 +93,9 @@ class LcmLogWriter {
   void write(const LogEvent& event);
   /// The same, numbered in order of writing.
   void write(std::int64_t utime, std::string_view channel, std::span<const std::uint8_t> data);
+  /// Hands what was written to the system, so that the death of this process cannot lose it. Throws
+  /// LogError.
+  void flush();
   /// Flushes to the device and gives the file its name; no write() may follow. Throws LogError.
   void commit();
   /// Number of events written.

@@ -15,12 +15,16 @@ namespace understory::io {
 
 class LcmLogWriter::Impl {
  public:
-  explicit Impl(const std::filesystem::path& path) : path_(path) {
+  Impl(const std::filesystem::path& path, LogCreation creation)
+      : path_(path), grows_(creation != LogCreation::kWhole) {
     struct stat status {};
     // A name cannot be given to a device: /dev/full must stay what it is.
     direct_ = ::stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode);
     if (direct_) {
       descriptor_ = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+    } else if (grows_) {
+      const int existing = creation == LogCreation::kGrowing ? O_EXCL : O_TRUNC;
+      descriptor_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | existing, 0666);
     } else {
       open_temporary();
     }
@@ -64,12 +68,23 @@ class LcmLogWriter::Impl {
     if (!direct_ && ::fsync(descriptor_) != 0) fail("cannot write");
     const int descriptor = std::exchange(descriptor_, -1);
     if (::close(descriptor) != 0) fail("cannot write");
-    if (direct_) return;
+    if (direct_ || grows_) return;
     if (::rename(temporary_.c_str(), path_.c_str()) != 0) fail("cannot give the file its name");
     temporary_.clear();
   }
 
   std::uint64_t events() const { return events_; }
+
+  void flush() {
+    std::size_t done = 0;
+    while (done < buffer_.size()) {
+      const ssize_t put = ::write(descriptor_, buffer_.data() + done, buffer_.size() - done);
+      if (put < 0 && errno == EINTR) continue;
+      if (put < 0) fail("cannot write");
+      done += static_cast<std::size_t>(put);
+    }
+    buffer_.clear();
+  }
 
  private:
   void open_temporary() {
@@ -85,17 +100,6 @@ class LcmLogWriter::Impl {
     ::fchmod(descriptor_, 0666U & ~mask);
   }
 
-  void flush() {
-    std::size_t done = 0;
-    while (done < buffer_.size()) {
-      const ssize_t put = ::write(descriptor_, buffer_.data() + done, buffer_.size() - done);
-      if (put < 0 && errno == EINTR) continue;
-      if (put < 0) fail("cannot write");
-      done += static_cast<std::size_t>(put);
-    }
-    buffer_.clear();
-  }
-
   [[noreturn]] void fail(std::string_view what) {
     throw LogError(fmt::format("{}: {}: {}", path_.string(), what, std::strerror(errno)));
   }
@@ -105,13 +109,14 @@ class LcmLogWriter::Impl {
   std::filesystem::path path_;
   std::string temporary_;
   bool direct_ = false;
+  bool grows_ = false;
   int descriptor_ = -1;
   std::uint64_t events_ = 0;
   std::vector<std::uint8_t> buffer_;
 };
 
-LcmLogWriter::LcmLogWriter(const std::filesystem::path& path)
-    : impl_(std::make_unique<Impl>(path)) {}
+LcmLogWriter::LcmLogWriter(const std::filesystem::path& path, LogCreation creation)
+    : impl_(std::make_unique<Impl>(path, creation)) {}
 LcmLogWriter::~LcmLogWriter() = default;
 LcmLogWriter::LcmLogWriter(LcmLogWriter&&) noexcept = default;
 LcmLogWriter& LcmLogWriter::operator=(LcmLogWriter&&) noexcept = default;
@@ -123,6 +128,7 @@ void LcmLogWriter::write(std::int64_t utime, std::string_view channel,
                          std::span<const std::uint8_t> data) {
   impl_->write(static_cast<std::int64_t>(impl_->events()), utime, channel, data);
 }
+void LcmLogWriter::flush() { impl_->flush(); }
 void LcmLogWriter::commit() { impl_->commit(); }
 std::uint64_t LcmLogWriter::events() const { return impl_->events(); }
 

@@ -14,7 +14,7 @@ void add_export_command(CLI::App& parent);
 void add_import_command(CLI::App& parent);
 /// `understory launch`: starts, watches and restarts the processes.
 void add_launch_command(CLI::App& parent);
-/// `understory log`: information, checks, repair and cuts of logs.
+/// `understory log`: recording, information, checks, repair and cuts of logs.
 void add_log_command(CLI::App& parent);
 /// `understory replay`: a log through chosen services.
 void add_replay_command(CLI::App& parent);

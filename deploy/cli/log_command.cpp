@@ -1,4 +1,4 @@
-// `understory log info|check|accuracy|repair|cut`: recorded logs.
+// `understory log record|info|check|accuracy|repair|cut`: recorded logs.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
@@ -191,6 +191,7 @@ struct LogOptions {
   std::string out;
   bool json = false;
   Cut cut;
+  RecordOptions record;
 };
 
 /// What every part of the command does about a file that cannot be read or written.
@@ -210,7 +211,7 @@ auto guarded(std::shared_ptr<LogOptions> options, Work work) {
 }  // namespace
 
 void add_log_command(CLI::App& parent) {
-  auto* log = parent.add_subcommand("log", "Recorded logs: gaps, damage, clock jumps");
+  auto* log = parent.add_subcommand("log", "Logs: recording, gaps, damage, clock jumps");
   log->require_subcommand(1);
   auto options = std::make_shared<LogOptions>();
   const auto add = [&](const char* name, const char* description) {
@@ -218,6 +219,15 @@ void add_log_command(CLI::App& parent) {
     command->add_option("file", options->file, "An LCM log")->required();
     return command;
   };
+  auto* record_command = add("record", "Records the bus until Ctrl-C, as lcm-logger does");
+  record_command->add_option("--lcm-url", options->record.lcm_url,
+                             "Bus, e.g. udpm://239.255.76.67:7667?ttl=0");
+  record_command->add_option("--channels", options->record.channels, "Regular expression");
+  record_command->add_flag("--sweeps", options->record.sweeps, "RAW_SWEEP and LIDAR_SWEEP, too");
+  record_command->add_flag("--force", options->record.force, "Overwrite an existing file");
+  record_command->callback(
+      guarded(options, [](const LogOptions& o) { log_record(o.file, o.record); }));
+
   auto* info_command = add("info", "What is in it");
   info_command->add_flag("--json", options->json, "As JSON");
   info_command->callback(guarded(options, [](const LogOptions& o) { info(o.file, o.json); }));
