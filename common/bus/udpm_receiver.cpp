@@ -78,6 +78,7 @@ void UdpmReceiver::take_batch() {
   for (const ReceivedDatagram& datagram : socket_.receive()) {
     try {
       const auto taken = reassembler_.take(datagram.bytes, datagram.sender, now_us);
+      if (taken.fault) note_faults();  // before what comes behind it is handed out
       if (taken.message) sink_(taken.message->channel, taken.message->bytes, datagram.received_us);
     } catch (const std::bad_alloc&) {
       out_of_memory_.add(DatagramFault::kNoRoom);

@@ -26,7 +26,7 @@ class UdpmReceiver {
   UdpmReceiver(const UdpmReceiver&) = delete;
   UdpmReceiver& operator=(const UdpmReceiver&) = delete;
 
-  /// What was refused so far, with the batch before the current one.
+  /// What was refused so far: all that came before the message given last.
   DatagramFaults faults() const;
   /// The receive buffer that the kernel grants [bytes].
   std::int64_t granted_bytes() const { return socket_.granted_bytes(); }
