@@ -106,8 +106,8 @@ TEST_CASE_METHOD(RecordFixture, "log record names a full disk and a port of othe
   any.sin_family = AF_INET;
   any.sin_port = htons(static_cast<std::uint16_t>(record_port()));
   REQUIRE(::bind(thief, reinterpret_cast<sockaddr*>(&any), sizeof(any)) == 0);
-  for (const std::string command : {"log record " + file, "status --once",
-                                    "launch --state-dir " + (directory / "s").string()}) {
+  for (const std::string& command : {"log record " + file, std::string("status --once"),
+                                     "launch --state-dir " + (directory / "s").string()}) {
     const auto deaf = understory_command(directory, command + " --lcm-url '" + url + "'");
     CAPTURE(command, deaf.error);
     CHECK(deaf.status == 1);
