@@ -4,11 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <sstream>
 
+#include "common/bus/config_file.hpp"
 #include "common/bus/parameter_table.hpp"
 
 namespace understory::bus {
@@ -56,6 +57,17 @@ std::string shown(const toml::node& node) {
   }
 
   return text.str();
+}
+
+/// The number as a double; none for a whole number that no double is equal to. (toml++ itself gives
+/// none for every whole number above 2^53, exact or not.)
+std::optional<double> exact_double(const toml::node& number) {
+  if (const auto* real = number.as_floating_point()) return real->get();
+  const std::int64_t whole = number.as_integer()->get();
+  const auto nearest = static_cast<double>(whole);
+  // 2^63 is a double, but no int64: what rounds up to it is not exact, and must not be cast back.
+  const bool is_exact = nearest < 0x1p63 && static_cast<std::int64_t>(nearest) == whole;
+  return is_exact ? std::optional(nearest) : std::nullopt;
 }
 
 /// A value that passed every check; set when the whole file has.
@@ -133,11 +145,12 @@ class Loader {
   void take(const ParameterTable::Entry& entry, const ParameterTable::Number& target,
             const toml::node& node) {
     if (!node.is_number()) return refuse(entry, node, "is not a number");
-    const double value = *node.value<double>();
-    if (!std::isfinite(value)) return refuse(entry, node, "is not finite");
-    if (value < target.range.lowest) return refuse(entry, node, "is too small");
-    if (value > target.range.highest) return refuse(entry, node, "is too large");
-    settings_.push_back({&entry, value});
+    const std::optional<double> value = exact_double(node);
+    if (!value) return refuse(entry, node, "has more digits than a real number holds");
+    if (!std::isfinite(*value)) return refuse(entry, node, "is not finite");
+    if (*value < target.range.lowest) return refuse(entry, node, "is too small");
+    if (*value > target.range.highest) return refuse(entry, node, "is too large");
+    settings_.push_back({&entry, *value});
   }
   void take(const ParameterTable::Entry& entry, const ParameterTable::Integer& target,
             const toml::node& node) {
@@ -187,16 +200,7 @@ class Loader {
 }  // namespace
 
 void ParameterTable::load(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  if (!stream || !(text << stream.rdbuf())) {
-    // An empty file is a valid configuration, yet leaves the stream without a character.
-    std::error_code error;
-    const bool is_empty = std::filesystem::is_regular_file(file, error) &&
-                          std::filesystem::file_size(file, error) == 0;
-    if (!is_empty) throw ConfigurationError({file.string() + ": cannot be read"});
-  }
-  load_text(text.str(), file.string());
+  load_text(read_config_file(file), file.string());
 }
 
 void ParameterTable::load_text(std::string_view toml, const std::string& name) {

@@ -1,9 +1,9 @@
 #include "common/bus/replay.hpp"
 
-#include <fstream>
 #include <optional>
 #include <set>
 
+#include "common/bus/config_file.hpp"
 #include "common/bus/memory_bus.hpp"
 #include "common/io/lcm_log.hpp"
 #include "understory/config_t.hpp"
@@ -11,11 +11,6 @@
 
 namespace understory::bus {
 namespace {
-
-std::string read_if_there(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 class Replay {
  public:
@@ -57,7 +52,7 @@ class Replay {
     const std::filesystem::path file = options_.config_dir / (service.name + ".toml");
     const bool has_file = !options_.config_dir.empty() && std::filesystem::exists(file);
     hosted_.push_back(std::make_unique<HostedService>(
-        service, bus_, no_clock(), has_file ? read_if_there(file) : "", file.string(),
+        service, bus_, no_clock(), has_file ? read_config_file(file) : "", file.string(),
         [&](RuntimeParameters& runtime) {
           if (!options_.channel_suffix.empty()) runtime.channel_suffix = options_.channel_suffix;
         }));

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <iostream>
 
+#include "common/bus/config_file.hpp"
 #include "common/bus/device.hpp"
 #include "common/bus/process_memory.hpp"
 #include "common/bus/service.hpp"
@@ -120,15 +121,6 @@ std::unique_ptr<HostedService> make_hosted(const Service& service, Bus& bus, con
                                          });
 }
 
-std::string read_config(const std::string& file) {
-  if (file.empty()) return {};
-  // Loading into an empty table would call every key unknown; here only reading can fail.
-  std::ifstream stream(file, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream.good() && !stream.eof()) throw ConfigurationError({file + ": cannot be read"});
-  return text;
-}
-
 /// The parameters, loaded and checked without a bus.
 RuntimeParameters check_config(const Service& service, const std::string& toml,
                                const std::string& name, std::string* printed) {
@@ -169,7 +161,7 @@ void report_small_buffer(Node& node, const ReceiveBuffer& buffer) {
 
 int serve(const Service& service, const Options& options) {
   // A wrong configuration ends the process before anything is opened.
-  const std::string toml = read_config(options.config);
+  const std::string toml = options.config.empty() ? "" : read_config_file(options.config);
   std::string printed;
   const RuntimeParameters runtime = check_config(service, toml, options.config, &printed);
   if (options.prints_config) {

@@ -1,16 +1,16 @@
 #include "eval/harness/sensor_chain.hpp"
 
-#include <fstream>
 #include <stdexcept>
 
+#include "common/bus/config_file.hpp"
 #include "eval/tools/thread_clock.hpp"
 
 namespace understory::eval::harness {
 namespace {
 
-std::string read_if_there(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
+/// The file's text; empty where there is no file: defaults.
+std::string config_in(const std::filesystem::path& file) {
+  return std::filesystem::exists(file) ? bus::read_config_file(file) : std::string();
 }
 
 }  // namespace
@@ -53,7 +53,7 @@ SensorChain::SensorChain(const std::vector<bus::Service>& services,
   for (const bus::Service& service : services) {
     const std::filesystem::path file = config_dir / (service.name + ".toml");
     const auto instead = toml_instead.find(service.name);
-    const std::string toml = instead != toml_instead.end() ? instead->second : read_if_there(file);
+    const std::string toml = instead != toml_instead.end() ? instead->second : config_in(file);
     auto bus = std::make_unique<TimedBus>(bus_);
     auto hosted =
         std::make_unique<bus::HostedService>(service, *bus, bus::no_clock(), toml, file.string());

@@ -1,7 +1,12 @@
 // Configuration: for every parameter, each kind of wrong value is refused by name.
+#include <array>
+#include <string>
+
+#include "common/bus/config_file.hpp"
 #include "tests/bus/toy_service.hpp"
 #include "tests/bus/wrong_values.hpp"
 #include "tests/catch.hpp"
+#include "tests/scratch.hpp"
 
 using namespace understory;
 using namespace understory::bus;
@@ -85,4 +90,36 @@ TEST_CASE("a file with one mistake sets nothing, and all mistakes are named") {
                     Catch::Matchers::StartsWith("toy.toml:"));
   CHECK_THROWS_WITH(described.table.load("/no/such/file.toml"),
                     "/no/such/file.toml: cannot be read");
+}
+
+TEST_CASE("a whole number for a real parameter is taken where a double is equal to it") {
+  double value = 0.0;
+  ParameterTable table;
+  table.add("value", value, {-1e300, 1e300}, "", "Any.");
+  for (const auto& [text, expected] :
+       {std::pair("7", 7.0), std::pair("-3", -3.0), std::pair("9007199254740992", 0x1p53),
+        std::pair("9007199254740994", 0x1p53 + 2.0), std::pair("4611686018427387904", 0x1p62),
+        std::pair("-9223372036854775808", -0x1p63)}) {
+    table.load_text(std::string("value = ") + text + "\n", "x.toml");
+    CHECK(value == expected);
+  }
+  for (const std::string text :
+       {"9007199254740993", "-9007199254740993", "9223372036854775807", "4611686018427387905"}) {
+    CHECK_THROWS_WITH(table.load_text("value = " + text + "\n", "x.toml"),
+                      Catch::Matchers::StartsWith("x.toml:1: value: " + text + " has more digits"));
+  }
+}
+
+TEST_CASE("a folder or a missing file for a configuration is refused by its path") {
+  const test::Scratch scratch("config-folder");
+  const std::string folder = scratch.path().string();
+  const std::string refusal = folder + ": is a folder, not a configuration file";
+  CHECK_THROWS_WITH(read_config_file(folder), refusal);
+  CHECK_THROWS_WITH(Described().table.load(folder), refusal);
+  CHECK_THROWS_WITH(read_config_file(folder + "/none.toml"), folder + "/none.toml: cannot be read");
+
+  std::array<std::string, 4> words{"toy", "--config", folder, "--print-config"};
+  std::array<char*, 4> arguments{};
+  for (std::size_t i = 0; i < words.size(); ++i) arguments[i] = words[i].data();
+  CHECK(run_service(test::toy_service(), 4, arguments.data()) == 2);
 }

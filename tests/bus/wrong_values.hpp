@@ -38,6 +38,9 @@ inline void check_every_wrong_value(const bus::ParameterTable::Entry& entry,
     const double above = number->range.highest * 2.0 + 1.0;
     refused(std::to_string(below), "too small");
     refused(std::to_string(above), "too large");
+    refused("9007199254740993", "more digits than a real number holds");     // 2^53 + 1
+    refused("9223372036854775807", "more digits than a real number holds");  // 2^63 - 1
+    if (number->range.highest < 0x1p53) refused("9007199254740994", "too large");
     refused("nan", "not finite");
     refused("inf", "not finite");
     refused("\"1.0\"", "not a number");

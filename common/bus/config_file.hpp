@@ -1,0 +1,13 @@
+// The bytes of a configuration file.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace understory::bus {
+
+/// All bytes of a configuration file; an empty file is a valid one. Throws ConfigurationError
+/// naming the path where it is missing, a folder, or cannot be read to its end.
+std::string read_config_file(const std::filesystem::path& file);
+
+}  // namespace understory::bus
