@@ -51,7 +51,8 @@ struct StemMapResult {
 };
 /// A surveyed stem map from the text of a CSV file with the header x_m,y_m or x_m,y_m,dbh_m
 /// (diameter at breast height); further columns are ignored, as are empty lines and lines that
-/// start with #.
+/// start with #. Refused with line and column: what is not a number, coordinates beyond 1e8 m or
+/// farther than 200 km from the first row's, diameters beyond 20 m.
 StemMapResult parse_stem_map(std::string_view csv);
 
 }  // namespace understory::sim

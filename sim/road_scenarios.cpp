@@ -11,6 +11,9 @@
 namespace understory::sim {
 namespace {
 
+/// Of a recorded trajectory: a route keeps a point every 0.1 m while it is made, 160 MB of them.
+constexpr double kLongestTrajectoryM = 1e6;
+
 using Points = std::vector<Eigen::Vector2d>;
 constexpr double kRounding = 11.0;
 
@@ -129,9 +132,14 @@ ScenarioResult pole_map_scenario(std::string_view poles_csv, std::string_view tr
 
   // While the car stood, its places scatter.
   Points points{path.forest.trunks_m.front()};
+  double length_m = 0.0;
   for (const Eigen::Vector2d& p : path.forest.trunks_m) {
-    if ((p - points.back()).norm() > 0.7) points.push_back(p);
+    const double step_m = (p - points.back()).norm();
+    if (step_m <= 0.7) continue;
+    points.push_back(p);
+    length_m += step_m;
   }
+  if (length_m > kLongestTrajectoryM) return {std::nullopt, "trajectory: longer than 1000 km"};
 
   if (points.size() < 10) return {std::nullopt, "trajectory: less than 10 places 0.7 m apart"};
   const Route route = Route::through(points, 3.0);

@@ -7,6 +7,13 @@
 namespace understory::sim {
 namespace {
 
+/// No survey's origin is farther away (UTM northings end at 1e7 m), none reaches farther, no trunk
+/// is thicker: what lies beyond is a damaged number, and a grid or a route over it would not fit
+/// into memory.
+constexpr double kFarthestM = 1e8;
+constexpr double kWidestM = 2e5;
+constexpr double kThickestM = 20.0;
+
 std::string_view trimmed(std::string_view text) {
   const auto first = text.find_first_not_of(" \t\r\"");
   if (first == std::string_view::npos) return {};
@@ -46,6 +53,17 @@ Columns columns_of(const std::vector<std::string_view>& header) {
     if (header[i] == "dbh_m") columns.dbh = i;
   }
   return columns;
+}
+
+/// What is wrong with a coordinate, given that of the first row; none if nothing.
+std::optional<std::string> fault_of(std::string_view column, double value_m, double first_m) {
+  if (std::abs(value_m) > kFarthestM) {
+    return std::string(column) + " is farther than 1e8 m from the origin";
+  }
+  if (std::abs(value_m - first_m) > kWidestM) {
+    return std::string(column) + " is farther than 200 km from the first row's";
+  }
+  return std::nullopt;
 }
 
 void set_extent(Forest& forest) {
@@ -89,11 +107,17 @@ StemMapResult parse_stem_map(std::string_view csv) {
     const auto x = cell(columns->x);
     const auto y = cell(columns->y);
     if (!x || !y) return failed("x_m or y_m is not a number");
+    const Eigen::Vector2d at(*x, *y);
+    const Eigen::Vector2d first =
+        result.forest.trunks_m.empty() ? at : result.forest.trunks_m.front();
+    if (const auto fault = fault_of("x_m", at.x(), first.x())) return failed(*fault);
+    if (const auto fault = fault_of("y_m", at.y(), first.y())) return failed(*fault);
 
     const double dbh_m = cell(columns->dbh).value_or(0.0);
     if (dbh_m < 0.0) return failed("dbh_m is negative");
+    if (dbh_m > kThickestM) return failed("dbh_m is thicker than 20 m");
 
-    result.forest.trunks_m.emplace_back(*x, *y);
+    result.forest.trunks_m.push_back(at);
     result.forest.radii_m.push_back(0.5 * dbh_m);
   }
 

@@ -37,6 +37,7 @@ class Replay {
       }
     }
 
+    reader_.refuse_other_files();
     if (has_begun) finish();
     if (writer_) writer_->commit();
     report_.damaged_places = reader_.damage().places;

@@ -1,5 +1,7 @@
 #include "common/io/lcm_log.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 
@@ -10,7 +12,7 @@ namespace understory::io {
 
 class LcmLogReader::Impl {
  public:
-  explicit Impl(const std::filesystem::path& path) : file_(path) {}
+  explicit Impl(const std::filesystem::path& path) : path_(path), file_(path) {}
 
   std::optional<LogEvent> next() {
     while (position_ < file_.size()) {
@@ -20,6 +22,13 @@ class LcmLogReader::Impl {
     }
     close_place();
     return std::nullopt;
+  }
+
+  void refuse_other_files() {
+    if (has_event_ || file_.size() == 0 || position_ < file_.size()) return;
+    if (begins_like_event(0)) return;
+    throw LogError(
+        fmt::format("{}: no LCM log: no event in {} bytes", path_.string(), file_.size()));
   }
 
   const LogDamage& damage() const { return damage_; }
@@ -40,14 +49,18 @@ class LcmLogReader::Impl {
     return header;
   }
 
-  /// Whether another event starts where this one ends: the magic number, or as much of it as a
-  /// file that was cut there (or ends there) still holds.
+  /// Whether there is the magic number, or as much of it as a file that was cut there (or ends
+  /// there) still holds.
+  bool begins_like_event(std::uint64_t offset) {
+    std::array<std::uint8_t, 4> bytes{};
+    const auto left = static_cast<std::size_t>(std::min<std::uint64_t>(4, file_.size() - offset));
+    return file_.read(offset, std::span(bytes).first(left)) &&
+           std::equal(bytes.begin(), bytes.begin() + left, kMagicBytes.begin());
+  }
+
+  /// Whether another event starts where this one ends.
   bool followed_by_event(std::uint64_t offset, const Header& header) {
-    const std::uint64_t end = offset + header.event_bytes();
-    std::array<std::uint8_t, 4> next{};
-    const auto left = static_cast<std::size_t>(std::min<std::uint64_t>(4, file_.size() - end));
-    return file_.read(end, std::span(next).first(left)) &&
-           std::equal(next.begin(), next.begin() + left, kMagicBytes.begin());
+    return begins_like_event(offset + header.event_bytes());
   }
 
   /// When no event follows, either this header's lengths are damaged or the next header is. It is
@@ -127,13 +140,16 @@ class LcmLogReader::Impl {
     }
 
     close_place();
+    has_event_ = true;
     next_number_ = event.number < INT64_MAX ? event.number + 1 : event.number;
     position_ += header.event_bytes();
 
     return event;
   }
 
+  std::filesystem::path path_;
   FileWindow file_;
+  bool has_event_ = false;
   std::uint64_t position_ = 0;
   std::uint64_t confirmed_ = 0;
   std::int64_t next_number_ = 0;
@@ -148,6 +164,7 @@ LcmLogReader::LcmLogReader(LcmLogReader&&) noexcept = default;
 LcmLogReader& LcmLogReader::operator=(LcmLogReader&&) noexcept = default;
 
 std::optional<LogEvent> LcmLogReader::next() { return impl_->next(); }
+void LcmLogReader::refuse_other_files() const { impl_->refuse_other_files(); }
 const LogDamage& LcmLogReader::damage() const { return impl_->damage(); }
 std::uint64_t LcmLogReader::position_bytes() const { return impl_->position(); }
 std::uint64_t LcmLogReader::size_bytes() const { return impl_->size(); }

@@ -61,6 +61,11 @@ class LcmLogReader {
   std::optional<LogEvent> next();
   /// What was skipped so far.
   const LogDamage& damage() const;
+  /// Throws LogError naming the file where next() has come to the end of one that has bytes, but
+  /// neither a whole event nor the beginning of one in front: another kind of file. An empty file
+  /// is the log of a recorder that heard nothing; one that was cut within its first event is
+  /// damaged.
+  void refuse_other_files() const;
   std::uint64_t position_bytes() const;  ///< Behind the event given last.
   std::uint64_t size_bytes() const;      ///< Of the file when it was opened.
 

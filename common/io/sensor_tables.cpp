@@ -15,6 +15,9 @@
 namespace understory::io {
 namespace {
 
+/// In units of SI or degrees no sensor of a vehicle reads more; northings end at 1e7 m.
+constexpr double kGreatest = 1e9;
+
 /// Rows of numbers under a heading of names.
 class Table {
  public:
@@ -34,8 +37,8 @@ class Table {
 
     NumberReader reader(text.substr(end), source_);
     while (const auto first = reader.next()) {
-      values_.push_back(*first);
-      for (std::size_t i = 1; i < names_.size(); ++i) values_.push_back(reader.require(names_[i]));
+      take(0, *first, reader);
+      for (std::size_t i = 1; i < names_.size(); ++i) take(i, reader.require(names_[i]), reader);
     }
   }
 
@@ -73,6 +76,15 @@ class Table {
   }
 
  private:
+  /// Stamps are checked by themselves.
+  void take(std::size_t column, double value, const NumberReader& reader) {
+    if (std::abs(value) > kGreatest && !names_[column].starts_with("t_")) {
+      throw DataError(fmt::format("{}: {} {} is no reading of a sensor", reader.where(),
+                                  names_[column], value));
+    }
+    values_.push_back(value);
+  }
+
   std::string source_;
   std::vector<std::string> names_;
   std::vector<double> values_;

@@ -11,7 +11,7 @@
 namespace understory::io {
 
 /// Columns by name, in any order: t_s (or t_us, t_ns), gx gy gz (rad/s), ax ay az (m/s^2).
-/// Throws DataError.
+/// Throws DataError with file, line and column, also for a value beyond 1e9.
 std::vector<model::ImuSample> parse_imu_table(std::string_view text, std::string_view source);
 /// t_s, and latitude_deg longitude_deg or east_m north_m; where there: sigma_m, ve_mps vn_mps,
 /// velocity_sigma_mps. The first fix is the origin of latitudes. Throws

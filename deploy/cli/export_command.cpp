@@ -29,6 +29,7 @@ SlamResults read_results(const std::string& log) {
     results.add(*event);
     progress.update(static_cast<double>(reader.position_bytes()));
   }
+  reader.refuse_other_files();
   return results;
 }
 

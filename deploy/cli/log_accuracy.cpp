@@ -120,6 +120,7 @@ void log_accuracy(const std::string& file, const std::string& json_file) {
     progress.update(static_cast<double>(reader.position_bytes()));
   }
 
+  reader.refuse_other_files();
   const auto accuracy = collector.finish();
   if (!accuracy) {
     fail(fmt::format("{}: no GROUND_TRUTH, or no SLAM_UPDATE that starts a map, in it", file));

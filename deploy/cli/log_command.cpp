@@ -35,6 +35,7 @@ LogContents walk(const std::string& file, const Visit& visit) {
     visit(*event, reader.damage());
     progress.update(static_cast<double>(reader.position_bytes()));
   }
+  reader.refuse_other_files();
   contents.damage = reader.damage();
   return contents;
 }

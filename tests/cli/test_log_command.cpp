@@ -87,6 +87,31 @@ TEST_CASE_METHOD(Fixture, "log repair saves nothing from a file that is no log",
   CHECK_FALSE(std::filesystem::exists(out));
 }
 
+TEST_CASE_METHOD(Fixture, "a file that is no log ends with 1, a log that was cut does not",
+                 "[cli]") {
+  const auto other = directory / "other.lcm";
+  write_bytes(other, test::Bytes(1000, 'x'));
+  for (const std::string command : {"log info", "log info --json", "log check", "log accuracy",
+                                    "replay --out o.lcm", "export --out o"}) {
+    const auto outcome = run(command + " " + other.string());
+    CAPTURE(command, outcome.error);
+    CHECK(outcome.status == 1);
+    CHECK(test::lines(outcome.error) == 1);
+    CHECK_THAT(outcome.error, Contains("other.lcm: no LCM log: no event in 1000 bytes"));
+  }
+  CHECK_FALSE(std::filesystem::exists("o.lcm"));
+
+  // Cut within its last, its first event, and within the first magic number; empty.
+  const auto bytes = test::read_bytes(whole);
+  for (const std::size_t size :
+       {bytes.size() - 1, std::size_t{40}, std::size_t{2}, std::size_t{0}}) {
+    write_bytes(other, test::Bytes(bytes.begin(), bytes.begin() + static_cast<long>(size)));
+    CAPTURE(size);
+    CHECK(run("log info " + other.string()).status == 0);
+    CHECK(run("replay " + other.string() + " --out " + out).status == 0);
+  }
+}
+
 TEST_CASE_METHOD(Fixture, "log cut takes time and channels", "[cli]") {
   CHECK(
       run("log cut " + whole + " --from 0.95 --to 2.05 --channels 'LAND.*' --out " + out).status ==

@@ -281,6 +281,8 @@ TEST_CASE("tables of sensors are read by the names of their columns", "[csv]") {
   CHECK_THROWS_AS(parse_wheel_table("t_s,speed_mps\n2,1\n1,1\n", "w.csv"), DataError);
   CHECK_THROWS_AS(parse_wheel_table("t_s,speed_mps\n2,nan\n", "w.csv"), DataError);
   CHECK_THROWS_AS(parse_wheel_table("", "w.csv"), DataError);
+  CHECK_THROWS_WITH(parse_wheel_table("t_s,speed_mps\n1,2\n2,1e300\n", "w.csv"),
+                    "w.csv, line 3, token 4: speed_mps 1e+300 is no reading of a sensor");
 }
 
 TEST_CASE("captures that are cut or damaged end, and give whole packets", "[pcap][recorded]") {

@@ -111,6 +111,13 @@ TEST_CASE("Stem maps: columns by name, faults with their line", "[stem_map]") {
   CHECK(sim::parse_stem_map("x_m,y_m\n1,nan\n").error.find("line 2") != std::string::npos);
   CHECK(sim::parse_stem_map("x_m,y_m,dbh_m\n1,2,-0.1\n").error.find("negative") !=
         std::string::npos);
+  CHECK(sim::parse_stem_map("x_m,y_m\n1e300,2\n").error ==
+        "line 2: x_m is farther than 1e8 m from the origin");
+  CHECK(sim::parse_stem_map("x_m,y_m\n1,2\n3,-1e7\n").error ==
+        "line 3: y_m is farther than 200 km from the first row's");
+  CHECK(sim::parse_stem_map("x_m,y_m,dbh_m\n1,2,1e300\n").error ==
+        "line 2: dbh_m is thicker than 20 m");
+  CHECK(sim::parse_stem_map("x_m,y_m\n500000,5400000\n500100,5400100\n").error.empty());
   CHECK_FALSE(sim::parse_stem_map("a,b\n1,2\n").error.empty());
   CHECK_FALSE(sim::parse_stem_map("").error.empty());
 }

@@ -129,6 +129,12 @@ TEST_CASE("A map of poles with a trajectory becomes a world", "[scenario]") {
   CHECK(pole_map_scenario("x_m,y_m\n1,2\n", "x_m,y_m\n1,a\n", 1).error.find("trajectory: line 2") ==
         0);
   CHECK_FALSE(pole_map_scenario("x_m,y_m\n1,2\n", "x_m,y_m\n1,1\n1,1\n", 1).error.empty());
+  CHECK(pole_map_scenario("x_m,y_m\n1,2\n", trajectory + "9,1e300,1,0\n", 1)
+            .error.ends_with("x_m is farther than 1e8 m from the origin"));
+  std::string to_and_fro = "x_m,y_m\n";
+  for (int i = 0; i < 12; ++i) to_and_fro += i % 2 == 0 ? "0,0\n" : "150000,0\n";
+  CHECK(pole_map_scenario("x_m,y_m\n1,2\n", to_and_fro, 1).error ==
+        "trajectory: longer than 1000 km");
 }
 
 TEST_CASE("Scenarios follow from their seed", "[scenario]") {

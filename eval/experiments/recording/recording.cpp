@@ -83,6 +83,7 @@ Recording drive_recording(const Options& options, const std::atomic<bool>& stop)
     position = reader.position_bytes();
   }
 
+  reader.refuse_other_files();
   finish_chain(chain, recording.run);
   recording.run.sweeps = recording.run.detections.size();
   return recording;
