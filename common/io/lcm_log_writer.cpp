@@ -8,15 +8,17 @@
 #include <limits>
 #include <utility>
 
+#include "common/io/data_error.hpp"
 #include "common/io/lcm_log.hpp"
 #include "common/io/lcm_log_format.hpp"
+#include "common/io/output_file.hpp"
 
 namespace understory::io {
 
 class LcmLogWriter::Impl {
  public:
   Impl(const std::filesystem::path& path, LogCreation creation)
-      : path_(path), grows_(creation != LogCreation::kWhole) {
+      : path_(target_of(path)), grows_(creation != LogCreation::kWhole) {
     struct stat status {};
     // A name cannot be given to a device: /dev/full must stay what it is.
     direct_ = ::stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode);
@@ -87,6 +89,15 @@ class LcmLogWriter::Impl {
   }
 
  private:
+  /// A link stays what it is: its target is written.
+  static std::filesystem::path target_of(const std::filesystem::path& path) {
+    try {
+      return behind_links(path);
+    } catch (const DataError& error) {
+      throw LogError(error.what());
+    }
+  }
+
   void open_temporary() {
     temporary_ = path_.string() + ".part-XXXXXX";
     descriptor_ = ::mkostemp(temporary_.data(), O_CLOEXEC);
