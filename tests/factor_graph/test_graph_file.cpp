@@ -64,6 +64,81 @@ TEST_CASE("A malformed line is named", "[graph_file]") {
   }
 }
 
+TEST_CASE("What a graph cannot mean is refused, with line and edge", "[graph_file]") {
+  const std::string se2 = "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\n";
+  const std::string se3 =
+      "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 1 0 0 0 0 0 1\nVERTEX_TRACKXYZ 2 1 1 1\n";
+  const std::string identity = " 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
+  struct Case {
+    std::string text;
+    int line;
+    std::string what;
+  };
+  const Case cases[] = {
+      {se2 + "EDGE_SE2 0 1 1 0 0 1 0 0 -1 0 1\n", 3, "edge 0 - 1: the information is not positive"},
+      {se2 + "EDGE_SE2 0 1 1 0 0 1 2 0 1 0 1\n", 3, "edge 0 - 1: the information is not positive"},
+      {se2 + "EDGE_SE2 0 1 1e200 0 0 1 0 0 1 0 1\n", 3, "beyond 1e30"},
+      {se2 + "EDGE_SE2 0 1 1 0 0 1e200 0 0 1 0 1\n", 3, "beyond 1e30"},
+      {"VERTEX_SE2 0 -1e200 0 0\nEDGE_SE2 0 0 1 0 0 1 0 0 1 0 1\n", 1, "beyond 1e30"},
+      {se2 + "EDGE_SE 0 1 1 0 0 1 0 0 1 0 1\n", 3, "part of a tag"},
+      {se2 + "DGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n", 3, "part of a tag"},
+      {se2 + "EDGE_SE2 0 5 1 0 0 1 0 0 1 0 1\n", 3, "vertex 5, which is not in the file"},
+      {se2 + "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\nFIX 5\n", 4, "vertex 5 is not in the file"},
+      {se3 + "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 0" + identity, 4, "quaternion is zero"},
+      {"VERTEX_SE3:QUAT 0 0 0 0 0 0 0 0\n", 1, "quaternion is zero"},
+      {"PARAMS_SE3OFFSET 0 0 0 1 0 0 0 1\n" + se3, 1, "not the identity"},
+      {"PARAMS_SE2OFFSET 0 0 0 0.5\n" + se2, 1, "not the identity"},
+      {"", 0, "neither a vertex nor an edge"},
+      {std::string("\0\1\2\xFF", 4), 0, "neither a vertex nor an edge"},
+  };
+  for (const auto& [text, line, what] : cases) {
+    const auto result = read_graph(text, factor_graph::files::GraphFormat::kG2o);
+    CAPTURE(text, what);
+    REQUIRE(std::holds_alternative<factor_graph::files::GraphFileError>(result));
+    const auto& error = std::get<factor_graph::files::GraphFileError>(result);
+    CHECK(error.line == line);
+    CHECK(error.what.find(what) != std::string::npos);
+  }
+}
+
+TEST_CASE("Unknown tags are counted, and an offset of none is one", "[graph_file]") {
+  const auto graph = require_graph(
+      "PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\nEQUIV 0 1\nVERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\n"
+      "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\nEQUIV 1 0\nODD\n");
+  REQUIRE(graph.skipped.size() == 2);
+  CHECK(graph.skipped[0].tag == "EQUIV");
+  CHECK(graph.skipped[0].lines == 2);
+  CHECK(graph.skipped[0].first_line == 2);
+  CHECK(graph.factor_lines == std::vector<int>{5});
+}
+
+TEST_CASE("A part that nothing ties to the first pose is found", "[graph_file]") {
+  const std::string two = "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nVERTEX_XY 2 1 1\n";
+  const std::string motion = "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n";
+  const std::string seen = "EDGE_SE2_XY 0 2 1 1 1 0 1\n";
+  CHECK_FALSE(find_untied(require_graph(two + motion + seen)));
+  CHECK(find_untied(require_graph(two + motion))->what.find("vertex 2: no edges") == 0);
+  const auto by_point = find_untied(require_graph(two + seen + "EDGE_SE2_XY 1 2 0 1 1 0 1\n"));
+  REQUIRE(by_point);
+  CHECK(by_point->line == 5);
+  CHECK(by_point->what == "vertex 1: only points tie it to the other poses");
+}
+
+TEST_CASE("The standard graphs are whole", "[graph_file][recorded]") {
+  for (const char* folder : {"pose_graphs", "victoria_park_landmark"}) {
+    for (const auto& entry : std::filesystem::directory_iterator(test::recording(folder))) {
+      const std::string name = entry.path().filename().string();
+      if (name.find("README") == 0 || entry.path().extension() == ".csv") continue;
+      std::ifstream in(entry.path());
+      const std::string text((std::istreambuf_iterator<char>(in)), {});
+      INFO(name);
+      const auto graph = require_graph(text);
+      CHECK_FALSE(find_untied(graph));
+      CHECK(graph.skipped.size() == (name == "w100.graph" ? 1 : 0));
+    }
+  }
+}
+
 TEST_CASE("An edge from a vertex to itself is left out, and reported", "[graph_file]") {
   const factor_graph::files::GraphFile graph = require_graph(
       "VERTEX_SE2 3 0 0 0\nVERTEX_SE2 5 1 0 0\nEDGE_SE2 5 5 0 0 0 1 0 0 1 0 1\n"

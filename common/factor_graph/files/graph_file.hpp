@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -29,6 +30,14 @@ struct GraphFile {
   std::vector<std::int64_t> fixed;     ///< Numbers of vertices that the file holds fast.
   /// Lines of edges from a vertex to itself: left out, for they hold no information about it.
   std::vector<int> self_edges;
+  std::vector<int> factor_lines;  ///< Line of each factor, from 1; empty where there is no file.
+  /// Lines that were passed over, by their tag.
+  struct Skipped {
+    std::string tag;  ///< As it stands in the file, 40 bytes at most: for messages.
+    int first_line = 0;
+    int lines = 0;
+  };
+  std::vector<Skipped> skipped;  ///< The first 20 tags; the last one stands for all others.
 };
 
 /// What is wrong with a file, and in which line.
@@ -47,10 +56,18 @@ enum class GraphFormat : std::uint8_t {
 
 /// Format by the tags that the text contains.
 GraphFormat guess_format(std::string_view text);
-/// Reads a graph; lines with unknown tags are passed over. The error is of the first malformed
-/// line. A rotation's information in g2o files is of the vector part of the quaternion; the factors
-/// have it of the rotation vector.
+/// Reads a graph; lines with unknown tags are passed over and counted. Refused with the line: a
+/// number that is missing or beyond 1e30, a tag that was cut, a vertex given twice or (where the
+/// file gives vertices) not at all, information that is not positive semi-definite, a quaternion of
+/// zero, a sensor's offset that is not the identity, a file with neither vertex nor edge. A
+/// rotation's information in g2o files is of the vector part of the quaternion; the factors have it
+/// of the rotation vector.
 std::variant<GraphFile, GraphFileError> read_graph(std::string_view text, GraphFormat format);
+
+/// The first vertex that the measurements do not tie to the first pose, and why: for solvers that
+/// hold one pose fast and place the others by motions. None where all are tied. Fixed vertices do
+/// not count. Cost: the edges.
+std::optional<GraphFileError> find_untied(const GraphFile& file);
 
 /// g2o text of a graph at its estimates: relative poses and Cartesian observations of points, and
 /// all variables; `skipped` counts the factors that the format has no tag for. Losses are not
