@@ -8,6 +8,7 @@
 #include <ctime>
 #include <nlohmann/json.hpp>
 
+#include "common/terminal/printable.hpp"
 #include "deploy/cli/text_file.hpp"
 
 namespace understory::cli {
@@ -27,7 +28,7 @@ std::string time_of_day() {
 void LaunchReport::add(const std::string& process, const std::string& text) {
   const auto time = time_of_day();
   if (!quiet_) {
-    fmt::print("{} {}: {}\n", time, process, text);
+    fmt::print("{} {}: {}\n", time, terminal::printable(process), terminal::printable(text));
     std::fflush(stdout);
   }
   if (events_.size() < kMaxEvents) events_.push_back({time, process, text});
@@ -51,7 +52,7 @@ void LaunchReport::write(const std::filesystem::path& file,
         {{"time", event.time}, {"process", event.process}, {"text", event.text}});
   }
 
-  write_text_file(file, report.dump(2) + "\n");
+  write_text_file(file, dumped(report, 2) + "\n");
 }
 
 }  // namespace understory::cli

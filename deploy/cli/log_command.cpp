@@ -8,11 +8,13 @@
 
 #include "common/io/lcm_log.hpp"
 #include "common/terminal/interrupt.hpp"
+#include "common/terminal/printable.hpp"
 #include "common/terminal/progress.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/log_commands.hpp"
 #include "deploy/cli/log_statistics.hpp"
+#include "deploy/cli/text_file.hpp"
 
 namespace understory::cli {
 namespace {
@@ -87,7 +89,7 @@ void print_info(const std::string& file, const LogContents& contents) {
 void info(const std::string& file, bool json) {
   const auto contents = walk(file, ignore);
   if (json) {
-    fmt::print("{}\n", to_json(file, contents).dump(2));
+    fmt::print("{}\n", dumped(to_json(file, contents), 2));
   } else {
     print_info(file, contents);
   }
@@ -101,7 +103,8 @@ std::size_t print_channel_findings(const std::string& name, const ChannelStatist
     fmt::print("{}: {} {}\n", name, count, what);
     ++findings;
   };
-  finding(channel.malformed, "malformed messages, the last one " + channel.last_malformed);
+  finding(channel.malformed,
+          "malformed messages, the last one " + terminal::printable(channel.last_malformed));
   finding(channel.lost, "messages missing by their sequence numbers");
   finding(channel.restarts, "times the sequence starts again (its process was restarted)");
   finding(channel.stamps_back, "stamps that go back");

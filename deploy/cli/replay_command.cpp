@@ -9,6 +9,7 @@
 #include "common/bus/replay.hpp"
 #include "common/io/lcm_log.hpp"
 #include "common/terminal/interrupt.hpp"
+#include "common/terminal/printable.hpp"
 #include "common/terminal/progress.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
@@ -89,7 +90,8 @@ void print(const bus::ReplayReport& report, const ReplayOptions& options) {
   }
   for (const auto& health : report.health) {
     for (const auto& reason : health.reasons) {
-      fmt::print("{}: {} {} {}\n", health.process, reason.channel, reason.reason, reason.count);
+      fmt::print("{}: {} {} {}\n", health.process, terminal::printable(reason.channel),
+                 terminal::printable(reason.reason), reason.count);
     }
   }
 }

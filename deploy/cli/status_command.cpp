@@ -12,6 +12,7 @@
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/health_listener.hpp"
 #include "deploy/cli/status_table.hpp"
+#include "deploy/cli/text_file.hpp"
 
 namespace understory::cli {
 namespace {
@@ -34,7 +35,7 @@ void listen_until(HealthListener& listener, Clock::time_point end) {
 
 void print(const StatusTable& table, bool json) {
   const auto now = Clock::now();
-  fmt::print("{}", json ? table.json(now).dump(2) + "\n" : table.text(now));
+  fmt::print("{}", json ? dumped(table.json(now), 2) + "\n" : table.text(now));
   std::fflush(stdout);
 }
 

@@ -5,8 +5,12 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "common/terminal/printable.hpp"
+
 namespace understory::cli {
 namespace {
+
+using terminal::printable;
 
 const char* state_name(std::int8_t state) {
   switch (state) {
@@ -29,7 +33,7 @@ double mebibytes(std::int64_t bytes) { return static_cast<double>(bytes) / (1024
 
 std::string channel_line(const channel_health_t& channel) {
   return fmt::format("  {} {:<24} {:>9} {:>8.1f} {:>7} {:>6} {:>6} {:>9} {:>7}\n",
-                     channel.output ? "->" : "<-", channel.channel, channel.messages,
+                     channel.output ? "->" : "<-", printable(channel.channel), channel.messages,
                      channel.rate_hz, channel.lost, channel.duplicates, channel.late,
                      channel.malformed, channel.dropped);
 }
@@ -61,13 +65,13 @@ std::string StatusTable::text(Clock::time_point now) const {
     fmt::format_to(std::back_inserter(result),
                    "{} {} pid {} up {:.0f} s, {} handled, latency p50 {:.1f} p99 {:.1f} ms, "
                    "{:.0f} MiB\n",
-                   name, entry.silent(now) ? "SILENT" : state_name(health.state), health.pid,
-                   health.uptime_s, health.handled,
+                   printable(name), entry.silent(now) ? "SILENT" : state_name(health.state),
+                   health.pid, health.uptime_s, health.handled,
                    1e-3 * static_cast<double>(health.latency_p50_us),
                    1e-3 * static_cast<double>(health.latency_p99_us), mebibytes(health.rss_bytes));
     if (!health.last_error.empty()) {
       fmt::format_to(std::back_inserter(result), "  last error {}: {}\n", health.last_error_code,
-                     health.last_error);
+                     printable(health.last_error));
     }
 
     result += fmt::format("     {:<24} {:>9} {:>8} {:>7} {:>6} {:>6} {:>9} {:>7}\n", "channel",

@@ -22,7 +22,7 @@ class StatusTable {
   void add(const health_t& health, Clock::time_point now);
   /// True before the first message.
   bool empty() const { return latest_.empty(); }
-  /// The table for a terminal, one process a line.
+  /// The table for a terminal, one process a line; texts of the processes are escaped.
   std::string text(Clock::time_point now) const;
   /// The same for scripts.
   nlohmann::ordered_json json(Clock::time_point now) const;

@@ -1,22 +1,22 @@
 #include "deploy/cli/text_file.hpp"
 
-#include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
-#include <fstream>
-#include <stdexcept>
+#include "common/io/output_file.hpp"
 
 namespace understory::cli {
 
 void write_text_file(const std::filesystem::path& file, const std::string& text) {
-  const std::filesystem::path part = file.string() + ".part";
-  std::ofstream out(part, std::ios::binary);
-  out << text;
-  out.close();
-  std::error_code error;
-  if (out) std::filesystem::rename(part, file, error);
-  if (out && !error) return;
-  std::filesystem::remove(part, error);
-  throw std::runtime_error(fmt::format("{}: cannot be written", file.string()));
+  io::write_whole_file(file, text);
+}
+
+std::string dumped(const nlohmann::ordered_json& json, int indent) {
+  std::string text = json.dump(indent, ' ', true, nlohmann::ordered_json::error_handler_t::replace);
+  // DEL is ASCII and needs no escape in JSON; a terminal erases a character at it.
+  for (std::size_t at = 0; (at = text.find('\x7F', at)) != std::string::npos; at += 6) {
+    text.replace(at, 1, "\\u007f");
+  }
+  return text;
 }
 
 }  // namespace understory::cli
