@@ -1,13 +1,15 @@
 #include "common/bus/state_store.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
-#include <sstream>
+#include <stdexcept>
 #include <system_error>
+#include <utility>
 
 #include "common/bus/state_format.hpp"
 
@@ -16,16 +18,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// A link in place of a state file could lead to anybody's file.
+constexpr int kOwn = O_NOFOLLOW | O_CLOEXEC;
+
 /// A recovery that died this often is not tried again with the journal, then not with the snapshot.
 constexpr int kAttemptsWithJournal = 2;
 constexpr int kAttemptsWithSnapshot = 4;
 
+/// None where there is no file, or a symbolic link: state is never read or written through one.
 std::optional<std::string> read_file(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) return std::nullopt;
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
+  const int in = ::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+  if (in < 0) return std::nullopt;
+  std::string text;
+  std::array<char, 65536> bytes{};
+  ssize_t got = 0;
+  while ((got = ::read(in, bytes.data(), bytes.size())) > 0 || (got < 0 && errno == EINTR)) {
+    if (got > 0) text.append(bytes.data(), static_cast<std::size_t>(got));
+  }
+  ::close(in);
+  return text;
 }
 
 wire::Refusal not_kept(const fs::path& file) {
@@ -46,7 +57,7 @@ bool write_all(int file, std::string_view bytes) {
 /// Whole or not at all: the name points to the old content until the new one is on the device.
 std::optional<wire::Refusal> replace_file(const fs::path& file, std::string_view bytes) {
   const fs::path temporary = file.string() + ".new";
-  const int out = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  const int out = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | kOwn, 0644);
   if (out < 0) return not_kept(temporary);
   const bool is_whole = write_all(out, bytes) && ::fdatasync(out) == 0;
   std::optional<wire::Refusal> refusal;
@@ -64,6 +75,29 @@ StateStore::StateStore(fs::path directory, std::string name)
 
 StateStore::~StateStore() {
   if (journal_ >= 0) ::close(journal_);
+  if (lock_ >= 0) ::close(lock_);
+}
+
+void StateStore::lock() {
+  if (lock_ >= 0) return;
+  std::error_code ignored;
+  fs::create_directories(directory_, ignored);
+  lock_ = ::open(path(".lock").c_str(), O_RDWR | O_CREAT | kOwn, 0644);
+  // Where no file can be made, no journal can be either: open() reports that.
+  if (lock_ < 0) return;
+  if (::flock(lock_, LOCK_EX | LOCK_NB) == 0) return;
+  ::close(std::exchange(lock_, -1));
+  throw std::runtime_error(path(".lock").string() + ": another process keeps its state here");
+}
+
+void StateStore::report_links(Recovered& recovered) const {
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(directory_, ignored)) {
+    const std::string file = entry.path().filename().string();
+    if (!file.starts_with(name_ + ".") || !entry.is_symlink(ignored)) continue;
+    recovered.problems.push_back({wire::Reason::kStateNotKept,
+                                  entry.path().string() + ": is a symbolic link: not followed"});
+  }
 }
 
 fs::path StateStore::path(const std::string& suffix) const { return directory_ / (name_ + suffix); }
@@ -104,8 +138,8 @@ void StateStore::refuse_what_killed_before(Recovered& recovered) {
 
 StateStore::Recovered StateStore::open() {
   Recovered recovered;
-  std::error_code error;
-  fs::create_directories(directory_, error);
+  lock();
+  report_links(recovered);
   refuse_what_killed_before(recovered);
   bool snapshot_is_lost = false;
 
@@ -149,7 +183,7 @@ StateStore::Recovered StateStore::open() {
 std::optional<wire::Refusal> StateStore::open_journal(std::uint64_t valid_bytes) {
   if (journal_ >= 0) ::close(journal_);
   const fs::path file = journal_path(generation_);
-  journal_ = ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  journal_ = ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | kOwn, 0644);
   journal_bytes_ = valid_bytes;
   journal_broken_ = journal_ < 0 || ::ftruncate(journal_, static_cast<off_t>(valid_bytes)) != 0;
   if (journal_broken_) return not_kept(file);
@@ -168,6 +202,7 @@ void StateStore::remove_other_journals() {
 void StateStore::end_recovery() { ::unlink(path(".recovering").c_str()); }
 
 void StateStore::start_over() {
+  lock();
   put_aside(path(".snapshot"));
   put_aside(journal_path(generation_));
   generation_ = 0;

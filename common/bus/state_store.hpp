@@ -20,7 +20,9 @@ struct JournalEvent {
   std::vector<std::uint8_t> bytes;
 };
 
-/// Files NAME.snapshot and NAME.journal.G in one directory, G counting snapshots.
+/// Files NAME.snapshot and NAME.journal.G in one directory, G counting snapshots, and NAME.lock,
+/// which the kernel releases when the process dies, however it does: one process at a time. A
+/// symbolic link in place of one of them is never followed.
 ///
 /// A snapshot is written whole or not at all (temporary file, flushed, renamed), with a checksum.
 /// An event is one write(), so what a killed process leaves behind is whole events and at most one
@@ -41,11 +43,12 @@ class StateStore {
   };
   /// Reads what is there and starts to journal behind it. When earlier recoveries died on the way
   /// (begin_recovery without end_recovery), the journal is put aside, later the snapshot too.
+  /// Throws std::runtime_error naming the lock where another process keeps its state here.
   Recovered open();
   /// The stage has taken what open() gave and lives.
   void end_recovery();
 
-  /// Puts everything aside and starts empty.
+  /// Puts everything aside and starts empty. Throws as open() does.
   void start_over();
 
   /// Writes one input behind the snapshot, in one write(). Refused as kStateNotKept where the
@@ -62,6 +65,8 @@ class StateStore {
   std::uint64_t journal_bytes() const { return journal_bytes_; }
 
  private:
+  void lock();
+  void report_links(Recovered& recovered) const;
   std::filesystem::path path(const std::string& suffix) const;
   std::filesystem::path journal_path(std::uint64_t generation) const;
   void put_aside(const std::filesystem::path& file);
@@ -73,6 +78,7 @@ class StateStore {
   std::string name_;
   std::uint64_t generation_ = 0;
   int journal_ = -1;
+  int lock_ = -1;
   std::uint64_t journal_bytes_ = 0;
   bool journal_broken_ = false;
 };

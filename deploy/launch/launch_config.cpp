@@ -13,6 +13,15 @@ namespace {
 constexpr std::array<std::string_view, 5> kProcessKeys{"name", "executable", "config", "arguments",
                                                        "keeps_state"};
 
+/// A name is also that of the folder of the process's state, which `--fresh` deletes: it must not
+/// lead elsewhere.
+bool is_plain_name(std::string_view name) {
+  return name.size() <= 64 && std::all_of(name.begin(), name.end(), [](char c) {
+           const bool is_letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+           return is_letter || (c >= '0' && c <= '9') || c == '_' || c == '-';
+         });
+}
+
 class Reader {
  public:
   explicit Reader(std::filesystem::path file) : file_(std::move(file)) {}
@@ -66,6 +75,9 @@ class Reader {
 
     ProcessEntry entry;
     entry.name = text(*table, "name", true);
+    if (!is_plain_name(entry.name)) {
+      fail(*table->get("name"), "name: only letters, digits, _ and - are allowed, 64 at most");
+    }
     entry.executable = text(*table, "executable", true);
     const std::filesystem::path config = text(*table, "config", false);
     if (!config.empty()) entry.config = file_.parent_path() / config;

@@ -10,7 +10,7 @@ namespace understory::launch {
 
 /// One [[process]] of the file.
 struct ProcessEntry {
-  std::string name;                    ///< As in its HEALTH messages.
+  std::string name;                    ///< As in its HEALTH messages: letters, digits, _ and -.
   std::string executable;              ///< Beside the understory command, in PATH, or a path.
   std::filesystem::path config;        ///< Beside launch.toml unless absolute; empty = none.
   std::vector<std::string> arguments;  ///< Further ones, unchanged.

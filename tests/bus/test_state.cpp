@@ -1,4 +1,9 @@
 // State over restarts: snapshot and journal, cut and damaged everywhere.
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <random>
@@ -143,13 +148,15 @@ TEST_CASE("a damaged byte anywhere in journal or snapshot is reported, never loa
 TEST_CASE("a state that the stage cannot load is refused and reported") {
   const test::Scratch scratch("state");
   StateStore(scratch.path(), "toy").open();
-  StateStore store(scratch.path(), "toy");
-  store.open();
-  NodeState state;
-  state.now_us = 5;
-  state.timers_due_us = {-1};
-  state.stage = "rubbish";
-  REQUIRE_FALSE(store.save(state::save(NodeState::kFormat, state)));
+  {
+    StateStore store(scratch.path(), "toy");
+    store.open();
+    NodeState state;
+    state.now_us = 5;
+    state.timers_due_us = {-1};
+    state.stage = "rubbish";
+    REQUIRE_FALSE(store.save(state::save(NodeState::kFormat, state)));
+  }
   Life life(scratch.path());
   CHECK_FALSE(life.is_recovered);
   CHECK(life.hosted.node().monitor().count_of("", wire::Reason::kSnapshotDamaged) == 1);
@@ -175,4 +182,67 @@ TEST_CASE("a directory that cannot be written is reported, and the service runs 
   life.run(0, 5);
   CHECK(life.poses.size() == 5);
   CHECK(life.hosted.node().monitor().count_of("", wire::Reason::kStateNotKept) > 0);
+}
+
+TEST_CASE("a symbolic link in place of a state file is not followed") {
+  const std::string file = GENERATE(as<std::string>(), "toy.journal.0", "toy.snapshot",
+                                    "toy.snapshot.new", "toy.recovering", "toy.lock");
+  CAPTURE(file);
+  const test::Scratch scratch("state-link");
+  const test::Scratch elsewhere("state-victim");
+  const fs::path victim = elsewhere.path() / "victim";
+  write(victim, "precious");
+  fs::create_symlink(victim, scratch.path() / file);
+
+  StateStore store(scratch.path(), "toy");
+  const StateStore::Recovered recovered = store.open();
+  REQUIRE_FALSE(recovered.problems.empty());
+  CHECK(recovered.problems.front().reason == wire::Reason::kStateNotKept);
+  CHECK(recovered.problems.front().detail.find(file) != std::string::npos);
+  CHECK_FALSE(recovered.snapshot);
+  CHECK(recovered.events.empty());
+  store.end_recovery();
+
+  // Inputs and a snapshot go nowhere near it either.
+  store.append("ODOMETRY", std::array<std::uint8_t, 3>{1, 2, 3});
+  store.save("state");
+  CHECK(read(victim) == "precious");
+}
+
+TEST_CASE("one process at a time keeps its state in a directory") {
+  const test::Scratch scratch("state-lock");
+  {
+    StateStore first(scratch.path(), "toy");
+    first.open();
+    StateStore second(scratch.path(), "toy");
+    CHECK_THROWS_WITH(second.open(),
+                      Catch::Matchers::EndsWith("another process keeps its state here"));
+    CHECK_THROWS(second.start_over());
+    StateStore other_service(scratch.path(), "other");
+    CHECK_NOTHROW(other_service.open());
+  }
+  CHECK_NOTHROW(StateStore(scratch.path(), "toy").open());
+}
+
+TEST_CASE("a killed process leaves no lock behind") {
+  const test::Scratch scratch("state-killed");
+  std::array<int, 2> ready{};
+  REQUIRE(::pipe(ready.data()) == 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    StateStore store(scratch.path(), "toy");
+    store.open();
+    const char byte = 'x';
+    if (::write(ready[1], &byte, 1) != 1) ::_exit(1);
+    for (;;) ::pause();
+  }
+  char byte = 0;
+  REQUIRE(::read(ready[0], &byte, 1) == 1);
+  CHECK_THROWS(StateStore(scratch.path(), "toy").open());
+
+  ::kill(child, SIGKILL);
+  ::waitpid(child, nullptr, 0);
+  CHECK_NOTHROW(StateStore(scratch.path(), "toy").open());
+  ::close(ready[0]);
+  ::close(ready[1]);
 }

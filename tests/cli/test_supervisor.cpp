@@ -177,4 +177,11 @@ TEST_CASE("launch.toml is refused with file, line and key", "[launch]") {
   CHECK_THAT(refused("[[process]]\nname = 3\nexecutable = \"x\"\n"), Contains(":2"));
   CHECK_THAT(refused("nonsense = 1\n" + good), Contains(":1") && Contains("nonsense"));
   CHECK_THAT(refused("[[process"), Contains(":1"));
+
+  const std::string tail = "\"\nexecutable = \"x\"\n";
+  for (const std::string name : {"../victim", "..", ".", "a/b", "/tmp", "a b", "a\\u001b", "ä"}) {
+    CHECK_THAT(refused("[[process]]\nname = \"" + name + tail),
+               Contains(":2: name: only letters, digits, _ and -"));
+  }
+  CHECK(refused("[[process]]\nname = \"Mapper_2-left" + tail) == "accepted");
 }
