@@ -17,6 +17,18 @@ constexpr double kTileM = 5.0;
 
 }  // namespace
 
+const char* to_string(MapTie tie) {
+  switch (tie) {
+    case MapTie::kFirstMap:
+      return "the update that started it";
+    case MapTie::kFirstKeyframe:
+      return "its oldest keyframe (no update that started it in the log)";
+    case MapTie::kFirstUpdate:
+      return "the first update in the log (neither its start nor a whole MAP in it)";
+  }
+  return "?";
+}
+
 double ComparedPose::position_error_m() const {
   return (world_T_vehicle.translation() - true_world_T_vehicle.translation()).norm();
 }
@@ -42,8 +54,10 @@ void DriveAccuracyCollector::add(const io::LogEvent& event) {
     if (!update) return;
 
     ++counted_.updates[update->status];
-    if (!first_update_ && update->status == model::MapUpdateStatus::kFirstMap)
-      first_update_ = *update;
+    if (!first_map_ && update->status == model::MapUpdateStatus::kFirstMap) first_map_ = *update;
+    // Those after one with its truth can never be needed.
+    const bool is_tied = !updates_.empty() && truth_at(updates_.back().utime);
+    if (!is_tied && update->status == model::MapUpdateStatus::kUpdated) updates_.push_back(*update);
   } else if (event.channel == "MAP") {
     const auto map = wire::decode_message<model::WholeMap>(event.data);
     if (map && map->complete) map_ = *map;
@@ -84,13 +98,34 @@ std::optional<ComparedPose> DriveAccuracyCollector::compare(
   return ComparedPose{utime, world_T_map * map_T_vehicle, *truth};
 }
 
+std::optional<std::pair<geometry::SE2, MapTie>> DriveAccuracyCollector::tie() const {
+  const auto at = [&](const auto& pose) -> std::optional<geometry::SE2> {
+    const auto truth = truth_at(pose.utime);
+    if (!truth) return std::nullopt;
+    return *truth * pose.map_T_vehicle.inverse();
+  };
+
+  if (first_map_) {
+    if (const auto world_T_map = at(*first_map_)) return {{*world_T_map, MapTie::kFirstMap}};
+  }
+  if (map_) {
+    for (const auto& keyframe : map_->keyframes) {
+      if (const auto world_T_map = at(keyframe)) return {{*world_T_map, MapTie::kFirstKeyframe}};
+    }
+  }
+  for (const auto& update : updates_) {
+    if (const auto world_T_map = at(update)) return {{*world_T_map, MapTie::kFirstUpdate}};
+  }
+  return std::nullopt;
+}
+
 std::optional<DriveAccuracy> DriveAccuracyCollector::finish() const {
-  if (!first_update_) return std::nullopt;
-  const auto base = truth_at(first_update_->utime);
-  if (!base) return std::nullopt;
-  const geometry::SE2 world_T_map = *base * first_update_->map_T_vehicle.inverse();
+  const auto tied = tie();
+  if (!tied) return std::nullopt;
+  const geometry::SE2 world_T_map = tied->first;
 
   DriveAccuracy accuracy = counted_;
+  accuracy.tied_at = tied->second;
   for (const auto& pose : poses_) {
     const auto compared = compare(pose.utime, pose.map_T_vehicle(), world_T_map);
     if (compared) accuracy.live.push_back(*compared);

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/io/lcm_log.hpp"
@@ -27,6 +28,15 @@ struct ComparedPose {
   double heading_error_rad() const;
 };
 
+/// Where a map's frame is tied to the world, in order of preference.
+enum class MapTie {
+  kFirstMap,       ///< At the update that started the map.
+  kFirstKeyframe,  ///< At the oldest keyframe of the last MAP: the recorder missed that update.
+  kFirstUpdate,    ///< At the first update recorded: its own error is in every other one.
+};
+/// In words, for the table.
+const char* to_string(MapTie tie);
+
 /// The errors of one run.
 struct DriveAccuracy {
   std::vector<ComparedPose> live;                 ///< Every localised pose of SLAM_POSE.
@@ -38,27 +48,32 @@ struct DriveAccuracy {
   std::map<model::MapUpdateStatus, std::uint64_t> updates;
   std::map<std::string, health_t> last_health;  ///< By process.
   std::uint64_t log_lost = 0;                   ///< LANDMARKS missing in the log itself.
+  MapTie tied_at = MapTie::kFirstMap;
 };
 
-/// Collects a log's events. The map's frame is tied to the world at the base of the first keyframe:
-/// nothing is aligned, so an error in the first heading counts.
+/// Collects a log's events. The map's frame is tied to the world at the base of the first keyframe,
+/// or at the first instant of the map that was recorded with its truth: nothing is aligned, so an
+/// error in that heading counts.
 class DriveAccuracyCollector {
  public:
   /// Takes one event, in the order of the log; channels that do not matter are passed over.
   void add(const io::LogEvent& event);
-  /// None when the log has no ground truth or no first map.
+  /// None when the log has no ground truth at any instant of the map.
   std::optional<DriveAccuracy> finish() const;
 
  private:
   void add_landmarks_event(const io::LogEvent& event);
   /// The true pose at `utime`, interpolated where it was recorded at other instants.
   std::optional<geometry::SE2> truth_at(model::Utime utime) const;
+  /// world_T_map at the best instant there is, and which; none where the log holds none.
+  std::optional<std::pair<geometry::SE2, MapTie>> tie() const;
   std::optional<ComparedPose> compare(model::Utime utime, const geometry::SE2& map_T_vehicle,
                                       const geometry::SE2& world_T_map) const;
 
   std::map<model::Utime, geometry::SE2> truth_;
   std::vector<model::SlamPose> poses_;
-  std::optional<model::MapUpdate> first_update_;
+  std::optional<model::MapUpdate> first_map_;
+  std::vector<model::MapUpdate> updates_;  ///< Localised ones, in the order of the log.
   std::optional<model::WholeMap> map_;
   truth_landmarks_t true_landmarks_{};
   std::optional<std::int64_t> last_scan_;

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "common/io/output_file.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/progress.hpp"
 #include "deploy/cli/drive_accuracy.hpp"
@@ -59,7 +60,8 @@ nlohmann::ordered_json summary(const DriveAccuracy& accuracy) {
           {"lost", drops.lost},
           {"malformed", drops.malformed},
           {"dropped", drops.dropped},
-          {"lost_by_the_log", accuracy.log_lost}};
+          {"lost_by_the_log", accuracy.log_lost},
+          {"map_tied_at", to_string(accuracy.tied_at)}};
 }
 
 nlohmann::ordered_json poses_json(const std::vector<ComparedPose>& poses) {
@@ -92,6 +94,7 @@ void print_table(const nlohmann::ordered_json& s) {
   fmt::print("{:<34} mean {:.1f} cm, of {}\n", "landmarks in the final map", number("lpe_cm"),
              count("landmarks"));
 
+  fmt::print("{:<34} {}\n", "the map is tied to the world at", s["map_tied_at"].get<std::string>());
   fmt::print("{:<34} lost {}, malformed {}, dropped {} (and {} by the recorder)\n",
              "messages that did not arrive", count("lost"), count("malformed"), count("dropped"),
              count("lost_by_the_log"));
@@ -104,12 +107,16 @@ void write_series(const std::string& file, nlohmann::ordered_json json,
   json["map_keyframes"] = poses_json(accuracy.keyframes);
   json["map_landmarks_m"] = points_json(accuracy.landmarks_m);
   json["true_landmarks_m"] = points_json(accuracy.true_landmarks_m);
-  write_text_file(file, json.dump() + "\n");
+  write_text_file(file, dumped(json, -1) + "\n");
 }
 
 }  // namespace
 
 void log_accuracy(const std::string& file, const std::string& json_file) {
+  if (!json_file.empty() && io::is_same_file(file, json_file)) {
+    wrong_usage(fmt::format("--json {}: is the log itself", json_file));
+  }
+
   io::LcmLogReader reader(file);
   DriveAccuracyCollector collector;
   terminal::Progress progress("reading " + file, static_cast<double>(reader.size_bytes()));
@@ -123,7 +130,8 @@ void log_accuracy(const std::string& file, const std::string& json_file) {
   reader.refuse_other_files();
   const auto accuracy = collector.finish();
   if (!accuracy) {
-    fail(fmt::format("{}: no GROUND_TRUTH, or no SLAM_UPDATE that starts a map, in it", file));
+    fail(fmt::format(
+        "{}: no GROUND_TRUTH at the time of a SLAM_UPDATE or of a keyframe of MAP in it", file));
   }
 
   const auto json = summary(*accuracy);

@@ -6,10 +6,9 @@
 #include <unistd.h>
 
 #include <cstdlib>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 
+#include "common/io/output_file.hpp"
 #include "eval/tools/machine.hpp"
 
 namespace understory::eval::harness {
@@ -39,29 +38,12 @@ nlohmann::json result_document(const std::string& experiment, nlohmann::json con
 }
 
 void write_json(const fs::path& file, const nlohmann::json& json) {
-  fs::path partial = file;
-  partial += fmt::format(".{}.partial", getpid());
-  std::error_code error;
-
-  {
-    std::ofstream out(partial);
-    out << json.dump(1) << '\n';
-    out.close();
-    if (!out) {
-      fs::remove(partial, error);
-      throw std::runtime_error(file.string() + ": cannot write");
-    }
-  }
-
-  fs::rename(partial, file, error);
-  if (error) {
-    const std::string why = error.message();
-    fs::remove(partial, error);
-    throw std::runtime_error(file.string() + ": " + why);
-  }
+  io::write_whole_file(file,
+                       json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
 fs::path traces_file(const fs::path& results) {
+  if (io::is_special(results)) return "/dev/null";
   fs::path file = results;
   return file.replace_extension(".traces.json");
 }

@@ -15,13 +15,13 @@ namespace understory::eval::harness {
 nlohmann::json result_document(const std::string& experiment, nlohmann::json config,
                                nlohmann::json rows);
 
-/// Writes the file whole or not at all. Throws std::runtime_error with the file's name.
+/// Writes the file whole or not at all, also behind links. Throws std::runtime_error naming it.
 void write_json(const std::filesystem::path& file, const nlohmann::json& json);
 
 /// Errors along the run, final map, truth and figures of run 0 of every cell, for the plots.
 nlohmann::json traces_of(const std::vector<CellResult>& cells, const CampaignOptions& options);
 
-/// Where the traces of a result file go: results.json -> results.traces.json.
+/// Where the traces of a result file go: results.json -> results.traces.json; device -> /dev/null.
 std::filesystem::path traces_file(const std::filesystem::path& results);
 
 /// Runs eval/plot/SCRIPT with the arguments; false (and a line on stderr) if it failed. Plots are a
