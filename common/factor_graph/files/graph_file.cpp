@@ -341,7 +341,7 @@ class Reader {
 
 GraphFormat guess_format(std::string_view text) {
   const auto has = [&](std::string_view word) { return text.find(word) != std::string_view::npos; };
-  if (has("EDGE_SE")) return GraphFormat::kG2o;
+  if (has("EDGE_SE") || has("VERTEX_")) return GraphFormat::kG2o;
   return has("VERTEX2") ? GraphFormat::kToro : GraphFormat::kIsam;
 }
 

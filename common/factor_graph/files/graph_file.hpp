@@ -42,7 +42,7 @@ struct GraphFile {
 
 /// What is wrong with a file, and in which line.
 struct GraphFileError {
-  int line = 0;      ///< From 1.
+  int line = 0;      ///< From 1; 0 = none.
   std::string what;  ///< For messages.
 };
 

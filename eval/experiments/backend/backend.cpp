@@ -12,6 +12,7 @@
 #include "common/factor_graph/bayes_tree/incremental_smoother.hpp"
 #include "common/factor_graph/files/graph_file.hpp"
 #include "common/io/text_file.hpp"
+#include "common/terminal/printable.hpp"
 #include "eval/tools/memory.hpp"
 #include "eval/tools/thread_clock.hpp"
 
@@ -21,14 +22,26 @@ namespace {
 /// The first pose is held fast by a prior that no other factor comes near.
 constexpr double kFixed = 1e8;
 
+/// The line is 0 where the fault is in none in particular.
+[[noreturn]] void refuse(const std::filesystem::path& file,
+                         const factor_graph::files::GraphFileError& error) {
+  const std::string line = error.line > 0 ? fmt::format(", line {}", error.line) : "";
+  throw std::runtime_error(fmt::format("{}{}: {}", file.string(), line, error.what));
+}
+
 factor_graph::files::GraphFile read(const std::filesystem::path& file) {
   const std::string text = io::read_whole_file(file);
   auto graph = read_graph(text, factor_graph::files::guess_format(text));
   if (const auto* error = std::get_if<factor_graph::files::GraphFileError>(&graph)) {
-    throw std::runtime_error(
-        fmt::format("{}, line {}: {}", file.string(), error->line, error->what));
+    refuse(file, *error);
   }
   auto& read = std::get<factor_graph::files::GraphFile>(graph);
+  if (const auto untied = find_untied(read)) refuse(file, *untied);
+
+  for (const auto& skipped : read.skipped) {
+    fmt::print(stderr, "{}: {} lines \"{}\" passed over, the first is line {}\n", file.string(),
+               skipped.lines, terminal::printable(skipped.tag), skipped.first_line);
+  }
   if (!read.self_edges.empty()) {
     fmt::print(stderr, "{}: {} edges from a vertex to itself left out, the first in line {}\n",
                file.string(), read.self_edges.size(), read.self_edges.front());
@@ -59,17 +72,26 @@ class Feeder {
 
   std::size_t poses() const { return factors_at_.size(); }
 
-  /// Adds pose k: placed by the motion from the pose before it, where there is one.
+  /// Adds pose k: placed by the motion from the pose before it, where there is one. Edges that are
+  /// attached to what is placed come first; those that are not yet wait, for the next poses where
+  /// need be: only one pose is held fast.
   void feed(std::size_t k, factor_graph::bayes_tree::IncrementalSmoother& smoother) {
-    for (const std::size_t f : factors_at_[k]) {
-      factor_graph::graph::Factor factor = file_.factors[f];
-      const auto a = vertex(factor, 0);
-      const auto b = vertex(factor, 1);
-      if (!names_[a] && !names_[b]) start(a, smoother);
-      if (!names_[b]) names_[b] = placed(factor, *names_[a], smoother);
-      if (!names_[a]) names_[a] = placed_backwards(factor, *names_[b], smoother);
-      factor.variables = {*names_[a], *names_[b]};
-      smoother.add(factor);
+    waiting_.insert(waiting_.end(), factors_at_[k].begin(), factors_at_[k].end());
+    if (waiting_.empty()) return;
+    if (!has_started_) start(vertex(file_.factors[waiting_.front()], 0), smoother);
+    has_started_ = true;
+
+    for (bool has_grown = true; has_grown;) {
+      std::vector<std::size_t> left;
+      for (const std::size_t f : waiting_) {
+        if (is_attached(file_.factors[f])) {
+          add(f, smoother);
+        } else {
+          left.push_back(f);
+        }
+      }
+      has_grown = left.size() < waiting_.size();
+      waiting_ = std::move(left);
     }
   }
 
@@ -79,6 +101,20 @@ class Feeder {
   }
   int last_time(const factor_graph::graph::Factor& factor) const {
     return std::max({times_[vertex(factor, 0)], times_[vertex(factor, 1)], 0});
+  }
+  /// Whether the edge's ends are placed, or the one tells where the other is.
+  bool is_attached(const factor_graph::graph::Factor& factor) const {
+    if (names_[vertex(factor, 0)]) return true;
+    return names_[vertex(factor, 1)] && is_pose(file_.vertices[vertex(factor, 1)].type);
+  }
+  void add(std::size_t f, factor_graph::bayes_tree::IncrementalSmoother& smoother) {
+    factor_graph::graph::Factor factor = file_.factors[f];
+    const auto a = vertex(factor, 0);
+    const auto b = vertex(factor, 1);
+    if (!names_[b]) names_[b] = placed(factor, *names_[a], smoother);
+    if (!names_[a]) names_[a] = placed_backwards(factor, *names_[b], smoother);
+    factor.variables = {*names_[a], *names_[b]};
+    smoother.add(factor);
   }
   /// Motions from recent poses first.
   void sort_by_age(int k) {
@@ -138,6 +174,8 @@ class Feeder {
   std::vector<int> times_;  ///< Of each pose; -1 of points.
   std::vector<std::optional<factor_graph::graph::VariableId>> names_;
   std::vector<std::vector<std::size_t>> factors_at_;
+  std::vector<std::size_t> waiting_;
+  bool has_started_ = false;
 };
 
 /// The same graph at the same estimates, solved whole.
@@ -190,6 +228,8 @@ BackendRun run_backend(const factor_graph::files::GraphFile& graph, const std::s
   Feeder feeder(graph);
   run.poses = feeder.poses();
   run.points = graph.vertices.size() - run.poses;
+
+  if (const auto untied = find_untied(graph)) throw std::runtime_error(untied->what);
 
   // Pose by pose; then until all estimates are up to date.
   const auto smoother = std::make_unique<factor_graph::bayes_tree::IncrementalSmoother>();

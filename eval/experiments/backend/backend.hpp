@@ -26,9 +26,12 @@ struct BackendRun {
 };
 
 /// Runs the graph of a file (g2o, TORO or iSAM text) through the smoother and a batch solver.
-/// Throws std::runtime_error where the file cannot be read; what fails later is in `error`.
+/// Throws std::runtime_error naming file and line where it is no graph, or not one that its edges
+/// hold together; what fails later is in `error`. Lines that were passed over are counted on
+/// stderr.
 BackendRun run_backend(const std::filesystem::path& file);
-/// The same for a graph in memory; `dataset` is its name in the table.
+/// The same for a graph in memory (std::runtime_error where its edges do not hold it together);
+/// `dataset` is its name in the table.
 BackendRun run_backend(const factor_graph::files::GraphFile& graph, const std::string& dataset);
 
 }  // namespace understory::eval::experiments::backend
