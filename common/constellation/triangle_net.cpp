@@ -53,7 +53,6 @@ void TriangleNet::insert(Slot slot, LandmarkId id, const Eigen::Vector2d& positi
     neighbours_.resize(slot + 1);
   }
   ids_[slot] = id;
-  neighbours_[slot] = {};
 
   std::vector<Slot> anchors{slot};
   collect_anchors(slot, position_m, anchors);
