@@ -178,10 +178,13 @@ void Supervisor::watch(Entry& entry, Clock::time_point now) {
     return;
   }
 
-  const bool degraded =
-      stopped_for >= parameters_.stopped_degraded || silent_for >= parameters_.silent_degraded;
+  const bool is_never_heard =
+      !entry.last_heartbeat && now - entry.started >= parameters_.never_heard_degraded;
+  const bool degraded = stopped_for >= parameters_.stopped_degraded ||
+                        silent_for >= parameters_.silent_degraded || is_never_heard;
   if (degraded && entry.state == ProcessState::kRunning) {
-    report_(entry.spec.name, "DEGRADED: it does not answer");
+    report_(entry.spec.name, is_never_heard ? "DEGRADED: no HEALTH since its start"
+                                            : "DEGRADED: it does not answer");
   } else if (!degraded && entry.state == ProcessState::kDegraded) {
     report_(entry.spec.name, "answers again");
   }

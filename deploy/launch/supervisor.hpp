@@ -23,14 +23,16 @@ struct ProcessSpec {
 
 /// A process that is stopped (SIGSTOP) is noticed in /proc within a tenth of a second, hence the
 /// short times. Any other hang shows only as missing HEALTH, which comes once a second: three
-/// missed are DEGRADED, five a hang. Fewer would restart healthy processes on a busy computer.
+/// missed are DEGRADED, five a hang. Fewer would restart healthy processes on a busy computer. A
+/// process that was never heard is DEGRADED, but not killed: it may be one that has no HEALTH.
 struct SupervisorParameters {
   RestartPolicyParameters restart;
   milliseconds stopped_degraded{300};
   milliseconds stopped_restart{1000};
   milliseconds silent_degraded{3000};
   milliseconds silent_restart{5000};
-  milliseconds stop_timeout{900};  ///< From SIGTERM to SIGKILL.
+  milliseconds never_heard_degraded{10000};  ///< Since its start.
+  milliseconds stop_timeout{900};            ///< From SIGTERM to SIGKILL.
 };
 
 /// What a process is doing.

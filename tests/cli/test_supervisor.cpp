@@ -112,6 +112,23 @@ TEST_CASE("silence after heartbeats is a hang, silence from the start is not", "
   CHECK_THAT(bench.said, Contains("a: hangs: no HEALTH"));
 }
 
+TEST_CASE("a process that was never heard is degraded, and not killed", "[launch]") {
+  launch::SupervisorParameters parameters;
+  parameters.never_heard_degraded = launch::milliseconds(200);
+  parameters.silent_degraded = launch::milliseconds(5000);
+  Bench bench({shell("a", "exec sleep 1000"), shell("b", "exec sleep 1000")}, parameters);
+  bench.supervisor.start({}, launch::Clock::now());
+  bench.supervisor.heartbeat("b", bench.status(1).pid, launch::Clock::now());
+  REQUIRE(
+      bench.run_until([&] { return bench.status(0).state == launch::ProcessState::kDegraded; }));
+  CHECK(bench.status(1).state == launch::ProcessState::kRunning);
+  CHECK_THAT(bench.said, Contains("a: DEGRADED: no HEALTH since its start"));
+
+  bench.supervisor.heartbeat("a", bench.status(0).pid, launch::Clock::now());
+  REQUIRE(bench.run_until([&] { return bench.status(0).state == launch::ProcessState::kRunning; }));
+  CHECK(bench.status(0).restarts == 0);
+}
+
 TEST_CASE("a process that ignores SIGTERM is killed in time", "[launch]") {
   launch::SupervisorParameters parameters;
   parameters.stop_timeout = launch::milliseconds(100);
