@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/bus/bus.hpp"
@@ -19,8 +20,12 @@ namespace understory::bus {
 struct DatagramSender {
   std::uint32_t address = 0;  ///< Host byte order.
   std::uint16_t port = 0;
+  /// One address and one port.
+  bool operator==(const DatagramSender&) const = default;
   /// Order of the table of senders.
-  auto operator<=>(const DatagramSender&) const = default;
+  bool operator<(const DatagramSender& other) const {
+    return std::pair(address, port) < std::pair(other.address, other.port);
+  }
 };
 
 /// How much may wait for its other fragments. Bookkeeping counts as well as payload.
