@@ -223,7 +223,7 @@ class Reader {
   }
 
   graph::Pose3 pose3_of(GraphLine& line) {
-    const graph::Pose3 pose = pose3(line);
+    graph::Pose3 pose = pose3(line);
     if (pose.rotation.norm() == 0.0) error_ = "the quaternion is zero";
     return pose;
   }
