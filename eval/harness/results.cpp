@@ -58,6 +58,7 @@ bool plot(const std::string& script, const std::vector<std::string>& arguments) 
   std::vector<std::string> words{"/usr/bin/python3", path->string()};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
 
