@@ -44,7 +44,7 @@ class Announcer {
   std::int64_t log_sequence_ = 0;
   std::int64_t config_sequence_ = 0;
   std::map<std::pair<std::string, std::string>, std::uint64_t> reported_;  // reason, channel
-  DatagramFaults refused_;                                                 // as last told
+  DatagramFaults refused_;                                                 // as last reported
 };
 
 }  // namespace understory::bus

@@ -1,6 +1,5 @@
 #include "common/bus/dispatch_queue.hpp"
 
-#include <algorithm>
 #include <utility>
 
 namespace understory::bus {
@@ -25,12 +24,6 @@ void DispatchQueue::subscribe(std::string_view channel, std::size_t queue_size,
 
 void DispatchQueue::subscribe_all(std::size_t queue_size, Bus::Handler handler) {
   subscriptions_.push_back({{}, queue_size, std::move(handler)});
-}
-
-bool DispatchQueue::wants(std::string_view channel) const {
-  return std::any_of(subscriptions_.begin(), subscriptions_.end(), [&](const auto& subscription) {
-    return subscription.channel.empty() || subscription.channel == channel;
-  });
 }
 
 void DispatchQueue::push(std::string_view channel, std::span<const std::uint8_t> bytes,

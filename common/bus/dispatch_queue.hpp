@@ -30,8 +30,6 @@ class DispatchQueue {
   void subscribe(std::string_view channel, std::size_t queue_size, Bus::Handler handler);
   /// The same for the messages of all channels.
   void subscribe_all(std::size_t queue_size, Bus::Handler handler);
-  /// Whether somebody wants this channel.
-  bool wants(std::string_view channel) const;
   /// Copies a message to every subscription of the channel; where one is full, its oldest is
   /// dropped and counted.
   void push(std::string_view channel, std::span<const std::uint8_t> bytes,

@@ -55,11 +55,9 @@ std::int64_t granted_receive_buffer(std::int64_t wanted_bytes) {
   if (socket_fd < 0) return 0;
   const int wanted = static_cast<int>(wanted_bytes);
   ::setsockopt(socket_fd, SOL_SOCKET, SO_RCVBUF, &wanted, sizeof(wanted));
-  int granted = 0;
-  socklen_t size = sizeof(granted);
-  ::getsockopt(socket_fd, SOL_SOCKET, SO_RCVBUF, &granted, &size);
+  const std::int64_t granted = granted_buffer(socket_fd);
   ::close(socket_fd);
-  return granted / 2;  // the kernel reports twice what may be used
+  return granted;
 }
 
 class LiveBus::Impl {

@@ -52,13 +52,6 @@ void join_group(int file, const UdpmUrl& network, const std::string& url) {
   }
 }
 
-std::int64_t granted_buffer(int file) {
-  int granted = 0;
-  socklen_t size = sizeof(granted);
-  ::getsockopt(file, SOL_SOCKET, SO_RCVBUF, &granted, &size);
-  return granted / 2;  // the kernel reports twice what may be used
-}
-
 std::int64_t arrival_time_us(msghdr& message) {
   for (cmsghdr* part = CMSG_FIRSTHDR(&message); part != nullptr;
        part = CMSG_NXTHDR(&message, part)) {
@@ -73,6 +66,13 @@ std::int64_t arrival_time_us(msghdr& message) {
 }
 
 }  // namespace
+
+std::int64_t granted_buffer(int file) {
+  int granted = 0;
+  socklen_t size = sizeof(granted);
+  ::getsockopt(file, SOL_SOCKET, SO_RCVBUF, &granted, &size);
+  return granted / 2;  // the kernel reports twice what may be used
+}
 
 /// The memory of one call of recvmmsg; pages that no datagram reached are never touched.
 class UdpmSocket::Batch {

@@ -11,6 +11,9 @@
 
 namespace understory::bus {
 
+/// The receive buffer that the kernel grants to a socket [bytes].
+std::int64_t granted_buffer(int file);
+
 /// A datagram as it came.
 struct ReceivedDatagram {
   std::span<const std::uint8_t> bytes;

@@ -34,7 +34,7 @@ std::string own_url() {
   return "udpm://239.255.76.68:" + std::to_string(own_port()) + "?ttl=0&recv_buf_size=4194304";
 }
 
-/// A socket that sends whatever it is told to the group.
+/// A socket that sends given bytes to the group, also hostile ones.
 class RawSender {
  public:
   RawSender() : file_(::socket(AF_INET, SOCK_DGRAM, 0)) {
@@ -196,7 +196,8 @@ TEST_CASE("the live bus survives hostile datagrams, counts them, and hears the n
   CHECK(faults.count_of(DatagramFault::kNoTerminator) >= 1);
 }
 
-TEST_CASE("HEALTH tells which datagrams were refused, and LOG when their number doubles") {
+TEST_CASE(
+    "HEALTH counts refused datagrams by reason, and LOG reports it when their number doubles") {
   LiveBus bus(own_url());
   NodeOptions options;
   options.process = "listener";

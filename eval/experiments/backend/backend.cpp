@@ -102,7 +102,7 @@ class Feeder {
   int last_time(const factor_graph::graph::Factor& factor) const {
     return std::max({times_[vertex(factor, 0)], times_[vertex(factor, 1)], 0});
   }
-  /// Whether the edge's ends are placed, or the one tells where the other is.
+  /// Whether the edge's ends are placed, or the edge and one end give the other.
   bool is_attached(const factor_graph::graph::Factor& factor) const {
     if (names_[vertex(factor, 0)]) return true;
     return names_[vertex(factor, 1)] && is_pose(file_.vertices[vertex(factor, 1)].type);
