@@ -1,6 +1,7 @@
 #include "eval/experiments/command.hpp"
 
 #include "eval/experiments/experiments.hpp"
+#include "eval/experiments/laps/laps.hpp"
 #include "eval/experiments/large_map/large_map.hpp"
 
 namespace understory::eval::experiments {
@@ -18,6 +19,7 @@ void add_eval_command(CLI::App& parent) {
   victoria_park::add_victoria_park_experiment(eval);
   frontend::add_frontend_experiment(eval);
   recording::add_recording_experiment(eval);
+  laps::add_laps_experiment(eval);
   roads::add_landmarks_vs_error_experiment(eval);
 }
 

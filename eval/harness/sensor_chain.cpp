@@ -1,6 +1,7 @@
 #include "eval/harness/sensor_chain.hpp"
 
 #include <stdexcept>
+#include <utility>
 
 #include "common/bus/config_file.hpp"
 #include "eval/tools/thread_clock.hpp"
@@ -84,6 +85,13 @@ void SensorChain::finish() {
 const ServiceTime& SensorChain::time_of(std::string_view service) const {
   for (const Hosted& hosted : hosted_) {
     if (hosted.name == service) return hosted.bus->time;
+  }
+  throw std::out_of_range("no service " + std::string(service) + " in the chain");
+}
+
+std::vector<float> SensorChain::take_calls_ms(std::string_view service) {
+  for (const Hosted& hosted : hosted_) {
+    if (hosted.name == service) return std::exchange(hosted.bus->time.calls_ms, {});
   }
   throw std::out_of_range("no service " + std::string(service) + " in the chain");
 }

@@ -55,6 +55,9 @@ class SensorChain {
 
   /// Processor time of a service. Throws std::out_of_range for an unknown name.
   const ServiceTime& time_of(std::string_view service) const;
+  /// The times of the calls since the last time that they were taken; a long drive's would grow.
+  /// Throws std::out_of_range for an unknown name.
+  std::vector<float> take_calls_ms(std::string_view service);
   /// Names of the services, in the order in which they were given.
   std::vector<std::string> services() const;
   /// The service's HEALTH as of now. Throws std::out_of_range for an unknown name.

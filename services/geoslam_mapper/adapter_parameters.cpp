@@ -120,6 +120,10 @@ void describe_growth(SmoothingMapperParameters& p, bus::ParameterTable& table) {
       "A keyframe this near to an earlier one, and with a similar heading, is folded into it.");
   table.add("smoothing.fold_angle_rad", p.fold_angle_rad, {0.0, 3.2}, "rad",
             "Largest difference of their headings.");
+  table.add("smoothing.known_ground_m", p.known_ground_m, {0.0, 100.0}, "m",
+            "What a keyframe observes this near to one of an earlier pass, that knows half of it, "
+            "is added to the earlier one some keyframes later: the map's size follows the ground, "
+            "not the time. 0: every keyframe is kept.");
 }
 
 void describe_renamed(bus::ParameterTable& table) {

@@ -63,6 +63,7 @@ struct SmoothingMapperParameters {
   double merge_distance_m = 1.0;
   double fold_distance_m = 0.05;
   double fold_angle_rad = 0.02;
+  double known_ground_m = 5.0;
 };
 
 /// Which method, and the parameters of each.

@@ -58,7 +58,7 @@ TEST_CASE("A rollback takes back nodes, landmarks, observations and the gyro's b
   const std::string before = saved(graph);
 
   // A new node with a new landmark.
-  graph.checkpoint(std::nullopt);
+  graph.checkpoint();
   const NodeIndex node = graph.add_node({3.0, 0.2, 0.3}, false);
   graph.add_landmark(9, {7.0, 7.0}, Eigen::Matrix2d(0.01 * Eigen::Matrix2d::Identity()));
   graph.observe(node, 9, {4.0, 6.0}, kInformation);
@@ -71,7 +71,7 @@ TEST_CASE("A rollback takes back nodes, landmarks, observations and the gyro's b
   CHECK_FALSE(graph.position(9));
 
   // An old node that observes again, an observation less.
-  graph.checkpoint(1);
+  graph.checkpoint();
   graph.observe(1, 1, {1.5, -4.5}, kInformation);
   graph.ignore(1, 2);
   graph.add_motion(turn_from(1), 1);

@@ -87,6 +87,12 @@ graph::FactorId IncrementalSmoother::keep(graph::FactorId id) {
   return id;
 }
 
+void IncrementalSmoother::restart(graph::VariableId id, const graph::Value& initial) {
+  begin_change();
+  if (!graph_.contains(id)) throw std::invalid_argument("smoother: no such variable");
+  graph_.restart(index(id), initial);
+}
+
 void IncrementalSmoother::remove(graph::FactorId id) {
   begin_change();
   if (!graph_.contains(id)) throw std::invalid_argument("smoother: no such factor");

@@ -74,6 +74,9 @@ class IncrementalSmoother {
     begin_change();
     return graph_.add(initial);
   }
+  /// A new estimate of a variable that has no factor, as if it were a new variable. Throws
+  /// std::invalid_argument where it has one, or where the estimate is not finite.
+  void restart(graph::VariableId id, const graph::Value& initial);
   /// Adds a measurement; see FactorGraph::add() for what it must fulfil.
   graph::FactorId add(const graph::Factor& factor) {
     return begin_change(), keep(graph_.add(factor));

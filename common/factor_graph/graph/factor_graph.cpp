@@ -13,6 +13,11 @@ void require(bool condition, const char* what) {
   if (!condition) throw std::invalid_argument(std::string("factor graph: ") + what);
 }
 
+void require_finite(const Value& initial) {
+  for (const double number : initial)
+    require(std::isfinite(number), "an initial estimate is not finite");
+}
+
 /// R with R' R = information; also of a singular one.
 Eigen::MatrixXd root_of(const Eigen::Ref<const Eigen::MatrixXd>& information) {
   require(information.allFinite(), "an information matrix is not finite");
@@ -33,15 +38,24 @@ Eigen::MatrixXd root_of(const Eigen::Ref<const Eigen::MatrixXd>& information) {
 FactorGraph::FactorGraph() { links_ = storage::BlockPool<int>(); }
 
 VariableId FactorGraph::add(VariableType type, const Value& initial) {
-  for (const double number : initial) {
-    require(std::isfinite(number), "an initial estimate is not finite");
-  }
+  require_finite(initial);
   const int id = variables_.add();
   VariableRecord& record = variables_.edit(id);
   record.type = type;
   record.in_use = true;
   record.base = record.value = initial;
   return VariableId(id);
+}
+
+void FactorGraph::restart(int id, const Value& initial) {
+  require(variables_[id].degree == 0, "a variable that has factors cannot be restarted");
+  require_finite(initial);
+  VariableRecord& record = variables_.edit(id);
+  record.base = record.value = initial;
+  record.delta = record.judged = Delta{};
+  record.scale = {};
+  record.rotated = 0.0;
+  record.is_curved = false;
 }
 
 bool FactorGraph::contains(VariableId id) const {

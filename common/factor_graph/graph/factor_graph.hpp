@@ -161,6 +161,9 @@ class FactorGraph {
   void rebase(int variable);
   /// Sets an estimate from elsewhere, which becomes the base, too.
   void set_value(int variable, const Value& value);
+  /// A new estimate of a variable without factors, as if it had been added now. Throws
+  /// std::invalid_argument where it has factors, or where the estimate is not finite.
+  void restart(int variable, const Value& initial);
 
   /// A variable by number.
   const VariableRecord& variable(int id) const { return variables_[id]; }

@@ -35,17 +35,18 @@ class AppendList {
   std::size_t saved_size_ = 0;
 };
 
-/// Observations, which can also be replaced.
-class ObservationList {
+/// Measurements that can also be replaced.
+template <typename Measured>
+class FactorList {
  public:
-  /// One observation.
+  /// One measurement.
   struct Entry {
-    PointObservation measured;
+    Measured measured;
     graph::FactorId factor = kNoFactor;  ///< None where it does not count.
   };
   /// Appends.
   void push_back(const Entry& entry) { entries_.push_back(entry); }
-  /// Puts another observation in its place; rollback() brings the old one back.
+  /// Puts another measurement in its place; rollback() brings the old one back.
   void replace(std::size_t at, const Entry& entry) {
     changes_.push_back({at, entries_[at]});
     entries_[at] = entry;
@@ -54,8 +55,13 @@ class ObservationList {
   std::size_t size() const { return entries_.size(); }
   /// Entry with this index.
   const Entry& operator[](std::size_t at) const { return entries_[at]; }
-  /// All entries in their order.
-  const std::vector<Entry>& entries() const { return entries_; }
+  /// All measurements in their order.
+  std::vector<Measured> measured() const {
+    std::vector<Measured> all;
+    all.reserve(entries_.size());
+    for (const Entry& one : entries_) all.push_back(one.measured);
+    return all;
+  }
   /// The checkpoint is now.
   void commit() {
     changes_.clear();

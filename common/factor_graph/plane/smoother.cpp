@@ -29,11 +29,43 @@ struct Smoother::State {
   graph::VariableId name(PointId id) const { return points[index(id)]; }
   graph::VariableId name(ScalarId id) const { return scalars[index(id)]; }
 
-  /// Adds the observation's factor to the graph; none where its information is zero.
+  /// Adds the factor to the graph; none where its information is zero.
   graph::FactorId give(const PointObservation& factor) {
     if (factor.information.isZero(0.0)) return kNoFactor;
     return smoother.add(graph::observation(name(factor.pose), name(factor.point), factor.position,
                                            factor.information));
+  }
+  graph::FactorId give(const RelativePose& factor) {
+    if (factor.information.isZero(0.0)) return kNoFactor;
+    return smoother.add(
+        graph::relative(name(factor.a), name(factor.b), factor.a_T_b, factor.information));
+  }
+  graph::FactorId give(const BiasedRelativePose& factor) {
+    const RelativePose& motion = factor.motion;
+    if (motion.information.isZero(0.0)) return kNoFactor;
+    return smoother.add(graph::biased_relative(name(motion.a), name(motion.b), name(factor.bias),
+                                               motion.a_T_b, factor.seconds, motion.information));
+  }
+  graph::FactorId give(const ScalarPrior& factor) {
+    if (factor.information == 0.0) return kNoFactor;
+    return smoother.add(graph::prior(name(factor.scalar), factor.mean, factor.information));
+  }
+  graph::FactorId give(const ScalarStep& factor) {
+    if (factor.information == 0.0) return kNoFactor;
+    return smoother.add(graph::step(name(factor.a), name(factor.b), factor.information));
+  }
+
+  /// Appends the measurement and gives its number.
+  template <typename Id, typename Measured>
+  Id append(FactorList<Measured>& list, const Measured& factor) {
+    list.push_back({factor, give(factor)});
+    return Id(static_cast<std::uint32_t>(list.size() - 1));
+  }
+  template <typename Measured>
+  void replace(FactorList<Measured>& list, std::uint32_t at, const Measured& factor) {
+    const graph::FactorId before = list[at].factor;
+    if (before != kNoFactor) smoother.remove(before);
+    list.replace(at, {factor, give(factor)});
   }
 
   void checkpoint() {
@@ -58,12 +90,12 @@ struct Smoother::State {
   AppendList<graph::VariableId> points;
   AppendList<graph::VariableId> scalars;
   AppendList<PosePrior> pose_priors;
-  AppendList<RelativePose> relative_poses;
   AppendList<PointPrior> point_priors;
-  AppendList<BiasedRelativePose> biased_relative_poses;
-  AppendList<ScalarPrior> scalar_priors;
-  AppendList<ScalarStep> scalar_steps;
-  ObservationList observations;
+  FactorList<RelativePose> relative_poses;
+  FactorList<BiasedRelativePose> biased_relative_poses;
+  FactorList<ScalarPrior> scalar_priors;
+  FactorList<ScalarStep> scalar_steps;
+  FactorList<PointObservation> observations;
   MovedList moved;
 };
 
@@ -94,49 +126,76 @@ ScalarId Smoother::add_scalar(double initial) {
   return ScalarId(static_cast<std::uint32_t>(state_->scalars.size() - 1));
 }
 
+void Smoother::restart(PoseId id, const geometry::SE2& initial) {
+  state_->smoother.restart(state_->name(id), graph::value_of(initial));
+}
+void Smoother::restart(PointId id, const Eigen::Vector2d& initial) {
+  state_->smoother.restart(state_->name(id), graph::value_of(initial));
+}
+void Smoother::restart(ScalarId id, double initial) {
+  state_->smoother.restart(state_->name(id), graph::value_of(initial));
+}
+
+bool Smoother::is_free(PointId id) const {
+  return state_->smoother.graph().variable(index(state_->name(id))).degree == 0;
+}
+
 void Smoother::add(const PosePrior& factor) {
-  state_->smoother.add(prior(state_->name(factor.pose), factor.mean, factor.information));
+  state_->smoother.add(graph::prior(state_->name(factor.pose), factor.mean, factor.information));
   state_->pose_priors.push_back(factor);
 }
 
-void Smoother::add(const RelativePose& factor) {
-  state_->smoother.add(
-      relative(state_->name(factor.a), state_->name(factor.b), factor.a_T_b, factor.information));
-  state_->relative_poses.push_back(factor);
-}
-
 void Smoother::add(const PointPrior& factor) {
-  state_->smoother.add(prior(state_->name(factor.point), factor.mean, factor.information));
+  state_->smoother.add(graph::prior(state_->name(factor.point), factor.mean, factor.information));
   state_->point_priors.push_back(factor);
 }
 
-void Smoother::add(const BiasedRelativePose& factor) {
-  const RelativePose& motion = factor.motion;
-  state_->smoother.add(biased_relative(state_->name(motion.a), state_->name(motion.b),
-                                       state_->name(factor.bias), motion.a_T_b, factor.seconds,
-                                       motion.information));
-  state_->biased_relative_poses.push_back(factor);
+MotionId Smoother::add(const RelativePose& factor) {
+  return state_->append<MotionId>(state_->relative_poses, factor);
 }
-
-void Smoother::add(const ScalarPrior& factor) {
-  state_->smoother.add(prior(state_->name(factor.scalar), factor.mean, factor.information));
-  state_->scalar_priors.push_back(factor);
+BiasedMotionId Smoother::add(const BiasedRelativePose& factor) {
+  return state_->append<BiasedMotionId>(state_->biased_relative_poses, factor);
 }
-
-void Smoother::add(const ScalarStep& factor) {
-  state_->smoother.add(step(state_->name(factor.a), state_->name(factor.b), factor.information));
-  state_->scalar_steps.push_back(factor);
+ScalarPriorId Smoother::add(const ScalarPrior& factor) {
+  return state_->append<ScalarPriorId>(state_->scalar_priors, factor);
 }
-
+ScalarStepId Smoother::add(const ScalarStep& factor) {
+  return state_->append<ScalarStepId>(state_->scalar_steps, factor);
+}
 ObservationId Smoother::add(const PointObservation& factor) {
-  state_->observations.push_back({factor, state_->give(factor)});
-  return ObservationId(static_cast<std::uint32_t>(state_->observations.size() - 1));
+  return state_->append<ObservationId>(state_->observations, factor);
 }
 
+void Smoother::set(MotionId id, const RelativePose& factor) {
+  state_->replace(state_->relative_poses, index(id), factor);
+}
+void Smoother::set(BiasedMotionId id, const BiasedRelativePose& factor) {
+  state_->replace(state_->biased_relative_poses, index(id), factor);
+}
+void Smoother::set(ScalarPriorId id, const ScalarPrior& factor) {
+  state_->replace(state_->scalar_priors, index(id), factor);
+}
+void Smoother::set(ScalarStepId id, const ScalarStep& factor) {
+  state_->replace(state_->scalar_steps, index(id), factor);
+}
 void Smoother::set(ObservationId id, const PointObservation& factor) {
-  const graph::FactorId before = state_->observations[index(id)].factor;
-  if (before != kNoFactor) state_->smoother.remove(before);
-  state_->observations.replace(index(id), {factor, state_->give(factor)});
+  state_->replace(state_->observations, index(id), factor);
+}
+
+const RelativePose& Smoother::motion(MotionId id) const {
+  return state_->relative_poses[index(id)].measured;
+}
+const BiasedRelativePose& Smoother::motion(BiasedMotionId id) const {
+  return state_->biased_relative_poses[index(id)].measured;
+}
+const ScalarPrior& Smoother::prior(ScalarPriorId id) const {
+  return state_->scalar_priors[index(id)].measured;
+}
+const ScalarStep& Smoother::step(ScalarStepId id) const {
+  return state_->scalar_steps[index(id)].measured;
+}
+const PointObservation& Smoother::observation(ObservationId id) const {
+  return state_->observations[index(id)].measured;
 }
 
 geometry::SE2 Smoother::pose(PoseId id) const { return state_->smoother.pose2(state_->name(id)); }
@@ -145,9 +204,6 @@ Eigen::Vector2d Smoother::point(PointId id) const {
 }
 double Smoother::scalar(ScalarId id) const {
   return state_->smoother.graph().value(state_->name(id))[0];
-}
-const PointObservation& Smoother::observation(ObservationId id) const {
-  return state_->observations[index(id)].measured;
 }
 
 double Smoother::chi2(ObservationId id) const {
@@ -173,14 +229,12 @@ Graph Smoother::graph() const {
   }
 
   graph.pose_priors = state.pose_priors.items();
-  graph.relative_poses = state.relative_poses.items();
   graph.point_priors = state.point_priors.items();
-  graph.biased_relative_poses = state.biased_relative_poses.items();
-  graph.scalar_priors = state.scalar_priors.items();
-  graph.scalar_steps = state.scalar_steps.items();
-  for (const ObservationList::Entry& one : state.observations.entries()) {
-    graph.observations.push_back(one.measured);
-  }
+  graph.relative_poses = state.relative_poses.measured();
+  graph.biased_relative_poses = state.biased_relative_poses.measured();
+  graph.scalar_priors = state.scalar_priors.measured();
+  graph.scalar_steps = state.scalar_steps.measured();
+  graph.observations = state.observations.measured();
   return graph;
 }
 
@@ -213,6 +267,13 @@ std::optional<Eigen::MatrixXd> Smoother::joint_marginal(std::span<const PoseId> 
   for (const PoseId id : poses) names.push_back(state_->name(id));
   for (const PointId id : points) names.push_back(state_->name(id));
   return state_->smoother.joint_covariance(names);
+}
+
+std::optional<double> Smoother::variance(ScalarId id) const {
+  const graph::VariableId name = state_->name(id);
+  const auto covariance = state_->smoother.joint_covariance({&name, 1});
+  if (!covariance) return std::nullopt;
+  return (*covariance)(0, 0);
 }
 
 }  // namespace understory::factor_graph::plane

@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "common/factor_graph/plane/graph.hpp"
@@ -38,8 +39,18 @@ struct SmootherUpdate {
 
 /// Index of a PointObservation in the order in which they were added.
 enum class ObservationId : std::uint32_t {};
+/// Index of a RelativePose, likewise.
+enum class MotionId : std::uint32_t {};
+/// Index of a BiasedRelativePose, likewise.
+enum class BiasedMotionId : std::uint32_t {};
+/// Index of a ScalarPrior, likewise.
+enum class ScalarPriorId : std::uint32_t {};
+/// Index of a ScalarStep, likewise.
+enum class ScalarStepId : std::uint32_t {};
 /// The index itself.
-constexpr std::uint32_t index(ObservationId id) { return static_cast<std::uint32_t>(id); }
+template <typename Id>
+requires std::is_enum_v<Id>
+constexpr std::uint32_t index(Id id) { return static_cast<std::uint32_t>(id); }
 
 /// Keeps a graph and its least-squares solution; the incremental smoother does the work. An update
 /// and a rollback cost what changed. Factors must name variables of this smoother; see
@@ -59,22 +70,53 @@ class Smoother {
   PointId add_point(const Eigen::Vector2d& initial);
   /// Adds a scalar at this estimate.
   ScalarId add_scalar(double initial);
+  /// A new estimate of a variable that no factor names: so its number serves another one, and a
+  /// graph whose variables come and go does not grow. Throws std::invalid_argument where a factor
+  /// names it.
+  void restart(PoseId id, const geometry::SE2& initial);
+  /// Likewise.
+  void restart(PointId id, const Eigen::Vector2d& initial);
+  /// Likewise.
+  void restart(ScalarId id, double initial);
+
+  /// Whether no factor names the point.
+  bool is_free(PointId id) const;
+
   /// Adds a measured pose.
   void add(const PosePrior& factor);
-  /// Adds a measured motion.
-  void add(const RelativePose& factor);
   /// Adds a measured point.
   void add(const PointPrior& factor);
+  /// Adds a measured motion. This and the following do not count where their information is zero.
+  MotionId add(const RelativePose& factor);
   /// Adds a motion measured with a bias.
-  void add(const BiasedRelativePose& factor);
+  BiasedMotionId add(const BiasedRelativePose& factor);
   /// Adds a measured scalar.
-  void add(const ScalarPrior& factor);
+  ScalarPriorId add(const ScalarPrior& factor);
   /// Adds the drift of a scalar.
-  void add(const ScalarStep& factor);
-  /// Adds an observation; one with zero information does not count.
+  ScalarStepId add(const ScalarStep& factor);
+  /// Adds an observation.
   ObservationId add(const PointObservation& factor);
-  /// Replaces an observation; one with zero information no longer counts.
+  /// Replaces a measurement by another one, of the same variables or of others.
+  void set(MotionId id, const RelativePose& factor);
+  /// Likewise.
+  void set(BiasedMotionId id, const BiasedRelativePose& factor);
+  /// Likewise.
+  void set(ScalarPriorId id, const ScalarPrior& factor);
+  /// Likewise.
+  void set(ScalarStepId id, const ScalarStep& factor);
+  /// Likewise.
   void set(ObservationId id, const PointObservation& factor);
+
+  /// The measurement as it was given last.
+  const RelativePose& motion(MotionId id) const;
+  /// Likewise.
+  const BiasedRelativePose& motion(BiasedMotionId id) const;
+  /// Likewise.
+  const ScalarPrior& prior(ScalarPriorId id) const;
+  /// Likewise.
+  const ScalarStep& step(ScalarStepId id) const;
+  /// Likewise.
+  const PointObservation& observation(ObservationId id) const;
 
   /// Estimate of a pose.
   geometry::SE2 pose(PoseId id) const;
@@ -82,8 +124,6 @@ class Smoother {
   Eigen::Vector2d point(PointId id) const;
   /// Estimate of a scalar.
   double scalar(ScalarId id) const;
-  /// The observation as it was given last.
-  const PointObservation& observation(ObservationId id) const;
   /// Squared whitened residual of an observation at the estimates; 0 where it does not count.
   double chi2(ObservationId id) const;
   /// Points that updates moved since the checkpoint, each once.
@@ -108,6 +148,8 @@ class Smoother {
   /// variable has no factor or is not determined.
   std::optional<Eigen::MatrixXd> joint_marginal(std::span<const PoseId> poses,
                                                 std::span<const PointId> points) const;
+  /// Variance of a scalar; none likewise.
+  std::optional<double> variance(ScalarId id) const;
 
  private:
   struct State;

@@ -105,13 +105,12 @@ model::LandmarkId Discovery::promote(const Candidate& candidate, GlobalMap& map)
     landmark.information += weight;
     landmark.radius_m +=
         observation.landmark.radius_m / static_cast<double>(candidate.observations.size());
-    landmark.nodes.push_back(observation.node);
+    landmark.observed_from(observation.node);
   }
   landmark.position_m = sum / landmark.information;
   landmark.observation_count = candidate.observation_count;
   landmark.last_keyframe = map.trajectory.size();
   landmark.kind = candidate.kind;
-  std::sort(landmark.nodes.begin(), landmark.nodes.end());
 
   // Into the map, then into the graph with all that was observed of it.
   const model::LandmarkId id = map.landmarks.insert(landmark);
@@ -119,6 +118,20 @@ model::LandmarkId Discovery::promote(const Candidate& candidate, GlobalMap& map)
   for (const Candidate::Observation& observation : candidate.observations)
     observe(observation.landmark, observation.node, id, parameters_, map);
   return id;
+}
+
+void Discovery::hand_over(const Retirement& retirement) {
+  const geometry::SE2& into_T_node = retirement.into_T_node.mean;
+  for (Candidate& candidate : candidates_) {
+    for (Candidate::Observation& observation : candidate.observations) {
+      if (observation.node != retirement.node) continue;
+      observation.node = retirement.into;
+      model::KeyframeLandmark& landmark = observation.landmark;
+      landmark.position_m = into_T_node * landmark.position_m;
+      landmark.covariance_m2 =
+          into_T_node.rotation() * landmark.covariance_m2 * into_T_node.rotation().transpose();
+    }
+  }
 }
 
 void Discovery::forget_stale(std::uint32_t keyframes) {

@@ -24,6 +24,9 @@ class Discovery {
   std::vector<model::Association> update(const model::Keyframe& keyframe, NodeIndex node,
                                          std::span<const model::Association> known, GlobalMap& map);
 
+  /// What a node that is taken out of the graph observed is in the frame of another one now.
+  void hand_over(const Retirement& retirement);
+
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {

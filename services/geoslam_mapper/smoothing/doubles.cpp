@@ -11,10 +11,11 @@ namespace {
 /// Whether nodes observed the two side by side. Two trunks that really are so near to each other
 /// are observed together from almost everywhere; one that a bad scan doubled is so once.
 bool are_observed_together(const StoredLandmark& a, const StoredLandmark& b) {
-  std::vector<NodeIndex> common;
-  std::set_intersection(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(),
-                        std::back_inserter(common));
-  return common.size() > 1 || 4 * common.size() > std::min(a.nodes.size(), b.nodes.size());
+  const auto common =
+      static_cast<std::size_t>(std::count_if(a.nodes.begin(), a.nodes.end(), [&](NodeIndex node) {
+        return std::find(b.nodes.begin(), b.nodes.end(), node) != b.nodes.end();
+      }));
+  return common > 1 || 4 * common > std::min(a.nodes.size(), b.nodes.size());
 }
 
 /// A landmark that is the same as this one.
@@ -44,10 +45,12 @@ void merge(model::LandmarkId old_id, model::LandmarkId new_id,
                      parameters.gate_sigmas * sigma + parameters.gate_floor_m;
   map.graph.hand_over(old_id, new_id, old_one.nodes, agree);
 
-  std::vector<NodeIndex> nodes;
-  std::set_union(old_one.nodes.begin(), old_one.nodes.end(), new_one.nodes.begin(),
-                 new_one.nodes.end(), std::back_inserter(nodes));
-  new_one.nodes = std::move(nodes);
+  // In order of time as far as it is known: the one observed last has the last nodes.
+  const StoredLandmark& older = old_one.last_keyframe < new_one.last_keyframe ? old_one : new_one;
+  StoredLandmark joined = older;
+  for (const NodeIndex node : (&older == &old_one ? new_one : old_one).nodes)
+    joined.observed_from(node);
+  new_one.nodes = std::move(joined.nodes);
   if (agree) new_one.information += old_one.information;
   new_one.observation_count += old_one.observation_count;
   new_one.last_keyframe = std::max(new_one.last_keyframe, old_one.last_keyframe);

@@ -32,7 +32,7 @@ model::Keyframe in_frame_of(const geometry::SE2& node_T_keyframe, model::Keyfram
 FusedKeyframe enter(const model::Keyframe& arrived, const Placement& placement, GlobalMap& map) {
   const geometry::SE2& map_T_centre = placement.map_T_centre.mean;
   const auto revisited = map.trajectory.revisited(map_T_centre * middle_of(arrived), map.graph);
-  map.graph.checkpoint(revisited);
+  map.graph.checkpoint();
 
   FusedKeyframe fused;
   fused.associations = placement.associations;
@@ -117,8 +117,7 @@ void count_observations(const FusedKeyframe& fused, GlobalMap& map) {
     landmark.information += 2.0 / observed.covariance_m2.trace();
     landmark.radius_m +=
         (observed.radius_m - landmark.radius_m) / static_cast<double>(landmark.nodes.size() + 1);
-    if (landmark.nodes.empty() || landmark.nodes.back() != fused.node)
-      landmark.nodes.push_back(fused.node);
+    landmark.observed_from(fused.node);
   }
 }
 

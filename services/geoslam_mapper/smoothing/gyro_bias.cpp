@@ -6,8 +6,15 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
+namespace plane = factor_graph::plane;
+
 /// Validity of one scalar: in this time the bias walks by a third of its smallest uncertainty.
 constexpr model::Utime kValidity_us = 5'000'000;
+/// Scalars that may still lose their motions: those of the last keyframes.
+constexpr std::size_t kChain = 64;
+/// The variance of a prior that repeats part of what the graph still has. The motions taken out are
+/// three quarters and more of those that told it.
+constexpr double kRepeated = 1.3;
 
 double seconds(model::Utime duration) { return 1e-6 * static_cast<double>(duration); }
 
@@ -19,49 +26,179 @@ Eigen::Matrix3d with_heading_variance(Eigen::Matrix3d covariance, double varianc
   return covariance;
 }
 
+/// Adds the factor, in the place of one that is gone where there is such a place.
+template <typename Id, typename Factor>
+Id put(const Factor& factor, FreeNumbers& free, plane::Smoother& smoother) {
+  const auto number = free.take();
+  if (!number) return smoother.add(factor);
+  smoother.set(Id(*number), factor);
+  return Id(*number);
+}
+
 }  // namespace
 
+void GyroBias::checkpoint() {
+  saved_ = now_;
+  free_scalars_.checkpoint();
+  free_priors_.checkpoint();
+  free_steps_.checkpoint();
+}
+
+void GyroBias::rollback() {
+  now_ = saved_;
+  free_scalars_.rollback();
+  free_priors_.rollback();
+  free_steps_.rollback();
+}
+
+void GyroBias::add_link(double initial, model::Utime utime, plane::Smoother& smoother) {
+  Link link;
+  link.since = utime;
+  if (const auto number = free_scalars_.take()) {
+    link.id = plane::ScalarId(*number);
+    smoother.restart(link.id, initial);
+  } else {
+    link.id = smoother.add_scalar(initial);
+  }
+  if (now_.chain.size() >= kChain) now_.chain.erase(now_.chain.begin());
+  now_.chain.push_back(link);
+}
+
+void GyroBias::set_prior(Link& link, double mean, double information, plane::Smoother& smoother) {
+  const plane::ScalarPrior factor{link.id, mean, information};
+  if (link.prior) {
+    smoother.set(*link.prior, factor);
+  } else {
+    link.prior = put<plane::ScalarPriorId>(factor, free_priors_, smoother);
+  }
+}
+
+/// A further one: the two are averaged.
+void GyroBias::add_prior(Link& link, double mean, double information, plane::Smoother& smoother) {
+  if (!link.prior) return set_prior(link, mean, information, smoother);
+  const plane::ScalarPrior& before = smoother.prior(*link.prior);
+  const double sum = before.information + information;
+  set_prior(link, (before.information * before.mean + information * mean) / sum, sum, smoother);
+}
+
+void GyroBias::set_step(Link& link, plane::ScalarId from, double information,
+                        plane::Smoother& smoother) {
+  const plane::ScalarStep factor{from, link.id, information};
+  if (link.step) {
+    smoother.set(*link.step, factor);
+  } else {
+    link.step = put<plane::ScalarStepId>(factor, free_steps_, smoother);
+  }
+}
+
+/// Takes the link's own factors out.
+void GyroBias::clear(Link& link, plane::Smoother& smoother) {
+  if (link.prior) {
+    smoother.set(*link.prior, plane::ScalarPrior{link.id, 0.0, 0.0});
+    free_priors_.give(index(*link.prior));
+    link.prior.reset();
+  }
+  if (link.step) {
+    smoother.set(*link.step, plane::ScalarStep{link.id, link.id, 0.0});
+    free_steps_.give(index(*link.step));
+    link.step.reset();
+  }
+}
+
 void GyroBias::learn_from(const model::FilterBias& filter, model::Utime utime,
-                          factor_graph::plane::Smoother& smoother) {
-  if (!newest_) {
-    reference_ = filter.bias;
-    newest_ = Newest{smoother.add_scalar(0.0), utime};
-    smoother.add(factor_graph::plane::ScalarPrior{newest_->id, 0.0, 1.0 / filter.variance});
+                          plane::Smoother& smoother) {
+  if (now_.chain.empty()) {
+    now_.reference = filter.bias;
+    add_link(0.0, utime, smoother);
+    set_prior(now_.chain.back(), 0.0, 1.0 / filter.variance, smoother);
     return;
   }
 
   // The next scalar of the chain.
-  if (utime - newest_->since > kValidity_us) {
-    const factor_graph::plane::ScalarId next = smoother.add_scalar(smoother.scalar(newest_->id));
-    const double variance = walk_ * walk_ * seconds(utime - newest_->since);
-    smoother.add(factor_graph::plane::ScalarStep{newest_->id, next, 1.0 / variance});
-    newest_ = Newest{next, utime};
+  const Link newest = now_.chain.back();
+  if (utime - newest.since > kValidity_us) {
+    add_link(smoother.scalar(newest.id), utime, smoother);
+    const double variance = walk_ * walk_ * seconds(utime - newest.since);
+    set_step(now_.chain.back(), newest.id, 1.0 / variance, smoother);
   }
 
   // What the filter learned while stationary is the difference of its two estimates.
-  if (!was_stationary_) return;
-  const double before = 1.0 / (before_.variance + walk_ * walk_ * seconds(utime - before_utime_));
+  if (!now_.was_stationary) return;
+  const double before =
+      1.0 / (now_.before.variance + walk_ * walk_ * seconds(utime - now_.before_utime));
   const double gained = 1.0 / filter.variance - before;
   if (gained <= 0.0) return;
-  const double learned = (filter.bias / filter.variance - before_.bias * before) / gained;
-  smoother.add(factor_graph::plane::ScalarPrior{newest_->id, learned - reference_, gained});
+  const double learned = (filter.bias / filter.variance - now_.before.bias * before) / gained;
+  add_prior(now_.chain.back(), learned - now_.reference, gained, smoother);
 }
 
-void GyroBias::add_motion(factor_graph::plane::RelativePose measured, const CentreMotion& motion,
-                          factor_graph::plane::Smoother& smoother) {
+plane::BiasedRelativePose GyroBias::biased(plane::RelativePose measured, const CentreMotion& motion,
+                                           plane::Smoother& smoother) {
   learn_from(*motion.filter_bias, motion.utime, smoother);
-  was_stationary_ = false;
-  before_ = *motion.filter_bias;
-  before_utime_ = motion.utime;
+  now_.was_stationary = false;
+  now_.before = *motion.filter_bias;
+  now_.before_utime = motion.utime;
 
   // As it would have been measured with the reference taken out.
   const model::GyroRotation& gyro = *motion.gyro;
   const geometry::SE2 by_gyro(motion.from_T_to.mean.translation(), gyro.rotation_rad);
-  measured.a_T_b = factor_graph::plane::at_true_rate(
-      by_gyro, reference_ - gyro.bias_rad / gyro.seconds, gyro.seconds);
+  measured.a_T_b =
+      plane::at_true_rate(by_gyro, now_.reference - gyro.bias_rad / gyro.seconds, gyro.seconds);
   measured.information =
       with_heading_variance(motion.from_T_to.covariance, gyro.variance).inverse();
-  smoother.add(factor_graph::plane::BiasedRelativePose{measured, newest_->id, gyro.seconds});
+  ++now_.chain.back().motions;
+  return {measured, now_.chain.back().id, gyro.seconds};
+}
+
+std::optional<GyroBias::Estimate> GyroBias::estimate(const plane::Smoother& smoother) const {
+  if (now_.chain.empty()) return std::nullopt;
+  const plane::ScalarId newest = now_.chain.back().id;
+  const auto variance = smoother.variance(newest);
+  if (!variance || *variance <= 0.0) return std::nullopt;
+  return Estimate{smoother.scalar(newest), *variance};
+}
+
+void GyroBias::forget_motion(plane::ScalarId id) {
+  for (Link& link : now_.chain) {
+    if (link.id == id) --link.motions;
+  }
+}
+
+/// What ties the next link to this one passes it by: variances of random walks add up.
+void GyroBias::take_out(std::size_t at, plane::Smoother& smoother) {
+  Link& link = now_.chain[at];
+  Link& next = now_.chain[at + 1];
+  if (next.step) {
+    const double variance = 1.0 / smoother.step(*next.step).information;
+    if (link.prior) {
+      const plane::ScalarPrior prior = smoother.prior(*link.prior);
+      add_prior(next, prior.mean, 1.0 / (1.0 / prior.information + variance), smoother);
+    }
+    if (link.step) {
+      const plane::ScalarStep step = smoother.step(*link.step);
+      set_step(next, step.a, 1.0 / (1.0 / step.information + variance), smoother);
+    } else {
+      smoother.set(*next.step, plane::ScalarStep{next.id, next.id, 0.0});
+      free_steps_.give(index(*next.step));
+      next.step.reset();
+    }
+  }
+  clear(link, smoother);
+  free_scalars_.give(index(link.id));
+  now_.chain.erase(now_.chain.begin() + static_cast<std::ptrdiff_t>(at));
+}
+
+void GyroBias::keep(const Estimate& before, plane::Smoother& smoother) {
+  for (std::size_t i = 0; i + 1 < now_.chain.size();) {
+    if (now_.chain[i].motions == 0) {
+      take_out(i, smoother);
+    } else {
+      ++i;
+    }
+  }
+  Link& newest = now_.chain.back();
+  clear(newest, smoother);
+  set_prior(newest, before.mean, 1.0 / (kRepeated * before.variance), smoother);
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -2,15 +2,18 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "common/factor_graph/plane/smoother.hpp"
 #include "common/model/odometry_buffer.hpp"
 #include "services/geoslam_mapper/smoothing/centre_motion.hpp"
+#include "services/geoslam_mapper/smoothing/free_numbers.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 
 /// A chain of scalars, one for 5 s each, tied to the one before by the bias's random walk. They
-/// count from the filter's bias at the first motion, so they are small.
+/// count from the filter's bias at the first motion, so they are small. Scalars whose motions are
+/// taken out of the graph again are taken out, too.
 class GyroBias {
  public:
   /// `walk`: random walk of the bias [rad/s/sqrt(s)]; 0 = the bias is not estimated.
@@ -20,40 +23,87 @@ class GyroBias {
   bool is_estimated() const { return walk_ > 0.0; }
 
   /// The vehicle was stationary between two keyframes: the filter has learned the bias meanwhile.
-  void set_stationary() { was_stationary_ = true; }
+  void set_stationary() { now_.was_stationary = true; }
 
-  /// Adds the motion between two poses with the bias as a third variable. `measured` holds the two
-  /// poses; its motion and information are those of `motion`, which must have `gyro` and
-  /// `filter_bias`. The filter's bias is used once at the first motion, and after that only for
-  /// what the filter learned while the vehicle was stationary: the graph has nothing of that.
-  void add_motion(factor_graph::plane::RelativePose measured, const CentreMotion& motion,
-                  factor_graph::plane::Smoother& smoother);
+  /// The motion between two poses with the bias as a third variable, to be added to the graph.
+  /// `measured` holds the two poses; its motion and information are those of `motion`, which must
+  /// have `gyro` and `filter_bias`. The filter's bias is used once at the first motion, and after
+  /// that only for what the filter learned while the vehicle was stationary: the graph has nothing
+  /// of that.
+  factor_graph::plane::BiasedRelativePose biased(factor_graph::plane::RelativePose measured,
+                                                 const CentreMotion& motion,
+                                                 factor_graph::plane::Smoother& smoother);
+
+  /// The bias as known now; none before the first motion.
+  struct Estimate {
+    double mean = 0.0;      ///< As the scalars count [rad/s].
+    double variance = 0.0;  ///< [(rad/s)^2]
+  };
+  /// The newest scalar's marginal.
+  std::optional<Estimate> estimate(const factor_graph::plane::Smoother& smoother) const;
+  /// A motion with this scalar was taken out of the graph.
+  void forget_motion(factor_graph::plane::ScalarId id);
+  /// After motions were taken out: scalars without motion go, and the newest one keeps what had
+  /// been known of it, `before`, as a prior. What the motions that are still there had told is
+  /// counted twice then; the prior is weakened for it.
+  void keep(const Estimate& before, factor_graph::plane::Smoother& smoother);
+
+  /// Undo, as of the graph.
+  void checkpoint();
+  /// Likewise.
+  void rollback();
 
   /// Members of a saved state; see common/state. The walk is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.reference_, self.newest_, self.was_stationary_, self.before_, self.before_utime_);
+    a(self.now_, self.free_scalars_, self.free_priors_, self.free_steps_);
   }
 
  private:
-  void learn_from(const model::FilterBias& filter, model::Utime utime,
-                  factor_graph::plane::Smoother& smoother);
-
-  struct Newest {
+  /// One scalar of the chain.
+  struct Link {
     factor_graph::plane::ScalarId id{};
     model::Utime since = 0;
+    std::uint32_t motions = 0;                                ///< That have it.
+    std::optional<factor_graph::plane::ScalarPriorId> prior;  ///< Its own.
+    std::optional<factor_graph::plane::ScalarStepId> step;    ///< From the link before.
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& s) {
-      a(s.id, s.since);
+      a(s.id, s.since, s.motions, s.prior, s.step);
     }
   };
-  double walk_;             ///< [rad/s/sqrt(s)]
-  double reference_ = 0.0;  ///< From which the scalars count [rad/s].
-  std::optional<Newest> newest_;
-  bool was_stationary_ = false;
-  model::FilterBias before_;  ///< The filter's bias at the last motion.
-  model::Utime before_utime_ = 0;
+  struct State {
+    double reference = 0.0;   ///< From which the scalars count [rad/s].
+    std::vector<Link> chain;  ///< The newest ones; older ones stay in the graph as they are.
+    bool was_stationary = false;
+    model::FilterBias before;  ///< The filter's bias at the last motion.
+    model::Utime before_utime = 0;
+
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& s) {
+      a(s.reference, s.chain, s.was_stationary, s.before, s.before_utime);
+    }
+  };
+
+  void learn_from(const model::FilterBias& filter, model::Utime utime,
+                  factor_graph::plane::Smoother& smoother);
+  void add_link(double initial, model::Utime utime, factor_graph::plane::Smoother& smoother);
+  void set_prior(Link& link, double mean, double information,
+                 factor_graph::plane::Smoother& smoother);
+  void add_prior(Link& link, double mean, double information,
+                 factor_graph::plane::Smoother& smoother);
+  void set_step(Link& link, factor_graph::plane::ScalarId from, double information,
+                factor_graph::plane::Smoother& smoother);
+  void take_out(std::size_t at, factor_graph::plane::Smoother& smoother);
+  void clear(Link& link, factor_graph::plane::Smoother& smoother);
+
+  double walk_;  ///< [rad/s/sqrt(s)]
+  State now_;
+  State saved_;  ///< At the checkpoint.
+  FreeNumbers free_scalars_;
+  FreeNumbers free_priors_;
+  FreeNumbers free_steps_;
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -1,6 +1,7 @@
 // The landmarks of the map and which of them changed.
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <vector>
 
@@ -24,12 +25,28 @@ struct StoredLandmark {
   double radius_m = 0.0;                ///< Mean over its observations; 0 for corners.
   std::uint32_t observation_count = 0;  ///< Scans in which it was detected.
   std::uint32_t last_keyframe = 0;      ///< Number of accepted keyframes at its last observation.
-  std::vector<NodeIndex> nodes;         ///< That observed it, ascending.
+  std::vector<NodeIndex> nodes;         ///< That observed it, each once, the last one at the end.
   model::LandmarkKind kind = model::LandmarkKind::kTrunk;
   bool is_late = false;  ///< Its place in the index is older than its position.
 
   /// Variance [m^2] of the position relative to the keyframes that observed it.
   double local_variance() const { return 1.0 / information; }
+  /// A node observed it, now. O(nodes).
+  void observed_from(NodeIndex node) {
+    if (!nodes.empty() && nodes.back() == node) return;
+    std::erase(nodes, node);
+    nodes.push_back(node);
+  }
+  /// What a node observed is another one's now. O(nodes).
+  void replace(NodeIndex node, NodeIndex by) {
+    const auto found = std::find(nodes.begin(), nodes.end(), node);
+    if (found == nodes.end()) return;
+    if (std::find(nodes.begin(), nodes.end(), by) == nodes.end()) {
+      *found = by;
+    } else {
+      nodes.erase(found);
+    }
+  }
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>

@@ -26,7 +26,7 @@ double variance_factor(const model::KeyframeLandmark& observed, NodeIndex node,
     const Eigen::Vector2d there = map.graph.pose(*other).translation();
     const double correlation = std::exp(-(here - there).norm() / parameters.correlation_m);
     if (correlation < kIndependent) break;
-    views += scans * correlation;
+    views += scans * map.graph.node(*other).keyframes * correlation;
   }
   return 1.0 + 2.0 * parameters.correlated_share * (views - 1.0);
 }

@@ -24,48 +24,95 @@ plane::SmootherParameters limits(const SmoothingMapperParameters& parameters) {
 PoseGraph::PoseGraph(const SmoothingMapperParameters& parameters)
     : smoother_(limits(parameters)), gyro_(parameters.gyro_walk) {}
 
-void PoseGraph::checkpoint(std::optional<NodeIndex> revisited) {
+void PoseGraph::checkpoint() {
   smoother_.checkpoint();
-  before_ = Checkpoint{nodes_.size(), landmark_of_point_.size(), {}, gyro_};
-  if (revisited) before_->revisited.emplace(*revisited, nodes_[*revisited]);
+  before_ = Checkpoint{nodes_.size(), landmark_of_point_.size(), newest_, {}, {}};
+  gyro_.checkpoint();
+  for (FreeNumbers* free :
+       {&free_nodes_, &free_points_, &free_observations_, &free_motions_, &free_biased_})
+    free->checkpoint();
 }
 
 void PoseGraph::rollback() {
   smoother_.rollback();
-  gyro_ = before_->gyro;
+  gyro_.rollback();
+  for (FreeNumbers* free :
+       {&free_nodes_, &free_points_, &free_observations_, &free_motions_, &free_biased_})
+    free->rollback();
 
   for (std::size_t i = before_->points; i < landmark_of_point_.size(); ++i)
     point_of_.erase(landmark_of_point_[i]);
   landmark_of_point_.resize(before_->points);
+  for (const plane::PointId point : before_->restarted) {
+    point_of_.erase(landmark_of_point_[index(point)]);
+    landmark_of_point_[index(point)] = 0;
+  }
 
   nodes_.resize(before_->nodes);
-  if (before_->revisited) nodes_[before_->revisited->first] = std::move(before_->revisited->second);
+  for (auto& [node, was] : before_->changed) nodes_[node] = std::move(was);
+  newest_ = before_->newest;
   before_.reset();
+}
+
+/// The node for change; its first change since the checkpoint keeps what it was.
+Node& PoseGraph::edit(NodeIndex node) {
+  if (before_ && node < before_->nodes) before_->changed.try_emplace(node, nodes_[node]);
+  return nodes_[node];
 }
 
 NodeIndex PoseGraph::add_node(const geometry::SE2& map_T_centre, bool is_stationary,
                               bool is_fixed) {
-  const plane::PoseId centre = smoother_.add_pose(map_T_centre);
-  if (is_fixed) smoother_.add(plane::PosePrior{centre, map_T_centre, kKnownPose.inverse()});
-  nodes_.push_back({centre, {}, is_stationary});
-  return static_cast<NodeIndex>(nodes_.size() - 1);
+  const double driven_m =
+      newest_ ? (map_T_centre.translation() - pose(*newest_).translation()).norm() : 0.0;
+  const double along_m = newest_ ? nodes_[*newest_].along_m + driven_m : 0.0;
+
+  if (const auto number = free_nodes_.take()) {
+    newest_ = *number;
+    Node& node = edit(*newest_);
+    smoother_.restart(node.centre, map_T_centre);
+    node = {node.centre, {}, {}, is_stationary, along_m, 1.0};
+  } else {
+    newest_ = static_cast<NodeIndex>(nodes_.size());
+    nodes_.push_back({smoother_.add_pose(map_T_centre), {}, {}, is_stationary, along_m, 1.0});
+  }
+  if (is_fixed) {
+    smoother_.add(plane::PosePrior{nodes_[*newest_].centre, map_T_centre, kKnownPose.inverse()});
+  }
+  return *newest_;
 }
 
 void PoseGraph::add_landmark(model::LandmarkId id, const Eigen::Vector2d& position_m,
                              const std::optional<Eigen::Matrix2d>& prior_covariance_m2) {
-  const plane::PointId point = smoother_.add_point(position_m);
+  plane::PointId point{};
+  if (const auto number = free_points_.take()) {
+    point = plane::PointId(*number);
+    smoother_.restart(point, position_m);
+    landmark_of_point_[*number] = id;
+    if (before_ && *number < before_->points) before_->restarted.push_back(point);
+  } else {
+    point = smoother_.add_point(position_m);
+    landmark_of_point_.push_back(id);
+  }
   point_of_.emplace(id, point);
-  landmark_of_point_.push_back(id);
   if (prior_covariance_m2)
     smoother_.add(plane::PointPrior{point, position_m, prior_covariance_m2->inverse()});
 }
 
+void PoseGraph::place_observation(NodeIndex node, model::LandmarkId id,
+                                  const plane::PointObservation& factor) {
+  if (const auto number = free_observations_.take()) {
+    smoother_.set(plane::ObservationId(*number), factor);
+    edit(node).observations.emplace(id, plane::ObservationId(*number));
+  } else {
+    edit(node).observations.emplace(id, smoother_.add(factor));
+  }
+}
+
 void PoseGraph::observe(NodeIndex node, model::LandmarkId id, const Eigen::Vector2d& position_m,
                         const Eigen::Matrix2d& information) {
-  const auto [entry, is_new] = nodes_[node].observations.try_emplace(id);
-  if (is_new) {
-    entry->second = smoother_.add(
-        plane::PointObservation{nodes_[node].centre, point_of_.at(id), position_m, information});
+  const auto entry = nodes_[node].observations.find(id);
+  if (entry == nodes_[node].observations.end()) {
+    place_observation(node, id, {nodes_[node].centre, point_of_.at(id), position_m, information});
     return;
   }
 
@@ -78,26 +125,33 @@ void PoseGraph::observe(NodeIndex node, model::LandmarkId id, const Eigen::Vecto
 }
 
 void PoseGraph::ignore(NodeIndex node, model::LandmarkId id) {
-  const auto entry = nodes_[node].observations.find(id);
+  auto& observations = edit(node).observations;
+  const auto entry = observations.find(id);
   plane::PointObservation nothing = smoother_.observation(entry->second);
   nothing.information.setZero();
   smoother_.set(entry->second, nothing);
-  nodes_[node].observations.erase(entry);
+  free_observations_.give(index(entry->second));
+  observations.erase(entry);
 }
 
 void PoseGraph::hand_over(model::LandmarkId old_id, model::LandmarkId new_id,
                           std::span<const NodeIndex> nodes, bool agree) {
   const plane::PointId new_point = point_of_.at(new_id);
   for (const NodeIndex node : nodes) {
-    auto& observations = nodes_[node].observations;
+    auto& observations = edit(node).observations;
     auto handle = observations.extract(old_id);
     if (handle.empty()) continue;
 
     // A node that observed both keeps its observation of the landmark that stays.
     plane::PointObservation factor = smoother_.observation(handle.mapped());
     factor.point = new_point;
-    if (!agree || observations.contains(new_id)) factor.information.setZero();
+    const bool counts = agree && !observations.contains(new_id);
+    if (!counts) factor.information.setZero();
     smoother_.set(handle.mapped(), factor);
+    if (!counts) {
+      free_observations_.give(index(handle.mapped()));
+      continue;
+    }
 
     handle.key() = new_id;
     observations.insert(std::move(handle));
@@ -105,6 +159,7 @@ void PoseGraph::hand_over(model::LandmarkId old_id, model::LandmarkId new_id,
 
   const auto old_point = point_of_.find(old_id);
   landmark_of_point_[index(old_point->second)] = 0;
+  if (smoother_.is_free(old_point->second)) free_points_.give(index(old_point->second));
   point_of_.erase(old_point);
 }
 
@@ -112,10 +167,26 @@ void PoseGraph::add_motion(const CentreMotion& motion, NodeIndex node) {
   if (motion.from == node) return gyro_.set_stationary();
   plane::RelativePose measured{nodes_[motion.from].centre, nodes_[node].centre,
                                motion.from_T_to.mean, Eigen::Matrix3d::Zero()};
-  if (gyro_.is_estimated() && motion.gyro && motion.filter_bias)
-    return gyro_.add_motion(measured, motion, smoother_);
-  measured.information = motion.from_T_to.covariance.inverse();
-  smoother_.add(measured);
+  if (!gyro_.is_estimated() || !motion.gyro || !motion.filter_bias) {
+    measured.information = motion.from_T_to.covariance.inverse();
+    link(measured, motion.from, node);
+    return;
+  }
+
+  const plane::BiasedRelativePose biased = gyro_.biased(measured, motion, smoother_);
+  const auto number = free_biased_.take();
+  if (number) smoother_.set(plane::BiasedMotionId(*number), biased);
+  const MotionRef ref{true, number ? *number : index(smoother_.add(biased))};
+  edit(motion.from).motions.push_back(ref);
+  edit(node).motions.push_back(ref);
+}
+
+void PoseGraph::link(const plane::RelativePose& measured, NodeIndex from, NodeIndex to) {
+  const auto number = free_motions_.take();
+  if (number) smoother_.set(plane::MotionId(*number), measured);
+  const MotionRef ref{false, number ? *number : index(smoother_.add(measured))};
+  edit(from).motions.push_back(ref);
+  edit(to).motions.push_back(ref);
 }
 
 std::optional<Eigen::Vector2d> PoseGraph::position(model::LandmarkId id) const {
@@ -134,6 +205,16 @@ geometry::SE2WithCovariance PoseGraph::marginal(NodeIndex node) const {
   if (const auto covariance = smoother_.joint_marginal({&centre, 1}, {}))
     result.covariance = *covariance;
   return result;
+}
+
+std::optional<geometry::SE2WithCovariance> PoseGraph::relative(NodeIndex a, NodeIndex b) const {
+  const plane::PoseId both[] = {nodes_[a].centre, nodes_[b].centre};
+  const auto joint = smoother_.joint_marginal(both, {});
+  if (!joint) return std::nullopt;
+  const geometry::SE2 a_T_b = pose(a).inverse() * pose(b);
+  Eigen::Matrix<double, 3, 6> jacobian;
+  jacobian << -a_T_b.inverse().Adjoint(), Eigen::Matrix3d::Identity();
+  return geometry::SE2WithCovariance{a_T_b, jacobian * *joint * jacobian.transpose()};
 }
 
 std::vector<double> PoseGraph::relative_variances(NodeIndex node,

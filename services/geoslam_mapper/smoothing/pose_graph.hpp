@@ -12,35 +12,70 @@
 #include "common/factor_graph/plane/smoother.hpp"
 #include "services/geoslam_mapper/parameters.hpp"
 #include "services/geoslam_mapper/smoothing/centre_motion.hpp"
+#include "services/geoslam_mapper/smoothing/free_numbers.hpp"
 #include "services/geoslam_mapper/smoothing/gyro_bias.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
+
+/// A motion measured between two nodes, by its number in the smoother.
+struct MotionRef {
+  bool is_biased = false;  ///< The gyro's bias is one of its variables.
+  std::uint32_t number = 0;
+
+  bool operator==(const MotionRef&) const = default;
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.is_biased, s.number);
+  }
+};
 
 /// A pose of the graph: the centre of one keyframe, or of several that were folded together.
 struct Node {
   factor_graph::plane::PoseId centre{};
   /// Each observed landmark's factor in the graph.
   std::map<model::LandmarkId, factor_graph::plane::ObservationId> observations;
-  bool is_stationary = false;  ///< The vehicle was stationary during the keyframe.
+  std::vector<MotionRef> motions;  ///< That begin or end here.
+  bool is_stationary = false;      ///< The vehicle was stationary during the keyframe.
+  double along_m = 0.0;            ///< Path of the vehicle up to here.
+  double keyframes = 1.0;          ///< Whose observations it has; those of retired nodes, too.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
-    a(s.centre, s.observations, s.is_stationary);
+    a(s.centre, s.observations, s.motions, s.is_stationary, s.along_m, s.keyframes);
   }
 };
 
+/// A node to be taken out, and the node that gets what it observed.
+struct Retirement {
+  NodeIndex node = 0;
+  NodeIndex into = 0;
+  geometry::SE2WithCovariance into_T_node;
+};
+
+/// What adds nothing to the map any more.
+struct Surplus {
+  std::vector<Retirement> nodes;
+  /// Nodes that stay for what they observed; the motions to them go.
+  std::vector<NodeIndex> loose;
+  /// Pairs of nodes that stay; the motions between them go.
+  std::vector<std::pair<NodeIndex, NodeIndex>> motions;
+};
+
 /// Nodes and landmarks as variables, their measurements as factors, solved incrementally. Numbers
-/// of nodes are those of the smoother's poses. Everything that a refused keyframe may have changed
-/// is in here: rollback() takes it back exactly. Frame: `map`.
+/// of nodes are those of the smoother's poses; a new node may get the number of one that was taken
+/// out. Everything that a refused keyframe may have changed is in here: rollback() takes it back
+/// exactly. Frame: `map`.
+///
+/// More than 20 functions because it is the mapper's view of the smoother: a third are accessors.
 class PoseGraph {
  public:
   /// An empty graph.
   explicit PoseGraph(const SmoothingMapperParameters& parameters);
 
-  /// Remembers the state. Until a rollback() only `revisited` (if any) may change among the nodes
-  /// that are there now.
-  void checkpoint(std::optional<NodeIndex> revisited);
+  /// Remembers the state.
+  void checkpoint();
   /// Restores exactly the state of the last checkpoint(). Costs what changed.
   void rollback();
 
@@ -63,11 +98,21 @@ class PoseGraph {
   /// Adds the motion from an earlier node; nothing but "stationary" if it is the same node.
   void add_motion(const CentreMotion& motion, NodeIndex node);
 
+  /// Takes nodes and motions out. What the nodes observed becomes observations of other nodes, in
+  /// whose frames the two agree to within the covariance of `into_T_node`. Motions that begin or
+  /// end at the nodes are lost; one to a later node that stays begins at the other node then. None
+  /// of the other nodes may be taken out, too, nor the newest one. Cost: the factors of the nodes.
+  void take_out(const Surplus& surplus);
+
   /// Updates the estimates. Not `ok` where the measurements leave variables undetermined.
   factor_graph::plane::SmootherUpdate solve() { return smoother_.update(); }
 
   /// A node of the graph. Throws std::out_of_range where there is none.
   const Node& node(NodeIndex node) const { return nodes_.at(node); }
+  /// The node that was added last; none before the first.
+  std::optional<NodeIndex> newest() const { return newest_; }
+  /// Number of nodes.
+  std::size_t node_count() const { return nodes_.size() - free_nodes_.size(); }
   /// map_T_centre of a node.
   geometry::SE2 pose(NodeIndex node) const { return smoother_.pose(nodes_[node].centre); }
   /// Position of a landmark [m]; none while it is not in the graph.
@@ -76,6 +121,8 @@ class PoseGraph {
   double chi2(NodeIndex node, model::LandmarkId id) const;
   /// map_T_centre with its marginal covariance (right perturbation), zero where it is undetermined.
   geometry::SE2WithCovariance marginal(NodeIndex node) const;
+  /// a_T_b with its covariance (right perturbation); none where it is undetermined.
+  std::optional<geometry::SE2WithCovariance> relative(NodeIndex a, NodeIndex b) const;
   /// Variances [m^2] of landmarks of the graph relative to a node, per axis. Empty where a variable
   /// is undetermined.
   std::vector<double> relative_variances(NodeIndex node,
@@ -90,7 +137,8 @@ class PoseGraph {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     factor_graph::plane::Graph graph = self.smoother_.graph();
-    a(graph, self.nodes_, self.landmark_of_point_, self.gyro_);
+    a(graph, self.nodes_, self.landmark_of_point_, self.gyro_, self.newest_, self.free_nodes_,
+      self.free_points_, self.free_observations_, self.free_motions_, self.free_biased_);
     if constexpr (Archive::kReads) self.restore(graph);
   }
 
@@ -98,10 +146,23 @@ class PoseGraph {
   struct Checkpoint {
     std::size_t nodes = 0;
     std::size_t points = 0;
-    std::optional<std::pair<NodeIndex, Node>> revisited;
-    GyroBias gyro;
+    std::optional<NodeIndex> newest;
+    std::map<NodeIndex, Node> changed;                    ///< Of those there were, as they were.
+    std::vector<factor_graph::plane::PointId> restarted;  ///< Points with a landmark again.
   };
+  Node& edit(NodeIndex node);
   void restore(const factor_graph::plane::Graph& graph);
+  void place_observation(NodeIndex node, model::LandmarkId id,
+                         const factor_graph::plane::PointObservation& factor);
+  void link(const factor_graph::plane::RelativePose& measured, NodeIndex from, NodeIndex to);
+  void hand_observations_to(const Retirement& retirement);
+  void take_motions_out(const Retirement& retirement, const Surplus& surplus);
+  void take_motions_out(NodeIndex a, NodeIndex b);
+  void loosen(NodeIndex node, const Surplus& surplus);
+  std::pair<NodeIndex, NodeIndex> ends_of(MotionRef ref) const;
+  void begin_motion_at(const Retirement& retirement, NodeIndex to,
+                       const factor_graph::plane::RelativePose& measured);
+  factor_graph::plane::RelativePose take_motion_out(MotionRef ref);
 
   factor_graph::plane::Smoother smoother_;
   std::vector<Node> nodes_;
@@ -109,6 +170,12 @@ class PoseGraph {
   /// By point of the smoother; 0 where the landmark was merged into another.
   std::vector<model::LandmarkId> landmark_of_point_;
   GyroBias gyro_;
+  std::optional<NodeIndex> newest_;  ///< Added last.
+  FreeNumbers free_nodes_;
+  FreeNumbers free_points_;
+  FreeNumbers free_observations_;
+  FreeNumbers free_motions_;
+  FreeNumbers free_biased_;
   std::optional<Checkpoint> before_;
 };
 

@@ -10,7 +10,7 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-constexpr state::Format kFormat{"geoslam_mapper.smoothing", 5};
+constexpr state::Format kFormat{"geoslam_mapper.smoothing", 6};
 /// Fewest landmarks that start a map without odometry.
 constexpr std::size_t kMinToStart = 3;
 
@@ -40,6 +40,7 @@ SmoothingMapper::SmoothingMapper(const SmoothingMapperParameters& parameters)
       map_(parameters),
       motion_(parameters),
       discovery_(parameters),
+      known_ground_(parameters),
       scan_localiser_(parameters),
       common_error_(parameters.scale_sigma) {}
 
@@ -88,6 +89,7 @@ model::MapUpdate SmoothingMapper::add(const model::Keyframe& keyframe) {
   update.chi2 = fused.chi2;
   update.degrees_of_freedom = fused.degrees_of_freedom;
   if (!fused.ok) return with(kRolledBack, fused.reason, std::move(update));
+  known_ground_.follow(fused.node, discovery_, map_);
   extend(fused, update);
   report(keyframe, update);
   return with(kUpdated, fused.reason, std::move(update));
@@ -157,11 +159,17 @@ std::optional<Placement> SmoothingMapper::place(const model::Keyframe& keyframe,
   return placement;
 }
 
-/// The node has no factor, so nothing moves it.
+/// All bases are tied to one node: the graph is not solved any more, so nothing moves it.
 void SmoothingMapper::keep_pose(const model::Keyframe& keyframe, const Placement& placement) {
-  const NodeIndex node =
-      map_.graph.add_node(placement.map_T_centre.mean, map_.trajectory.is_stationary(keyframe));
-  map_.trajectory.add(base_of(keyframe, node), map_.graph);
+  if (!map_.graph.newest()) map_.graph.add_node({}, false);
+  const NodeIndex node = *map_.graph.newest();
+  geometry::SE2WithCovariance node_T_centre = placement.map_T_centre;
+  node_T_centre.mean = map_.graph.pose(node).inverse() * node_T_centre.mean;
+
+  Base base = base_of(keyframe, node);
+  base.centre_T_base = compound(node_T_centre, base.centre_T_base);
+  base.centre_T_middle = node_T_centre.mean * base.centre_T_middle;
+  map_.trajectory.add_spare(base);
 }
 
 /// New landmarks of a fused keyframe, and landmarks that are merged.

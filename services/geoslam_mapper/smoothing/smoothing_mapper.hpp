@@ -8,6 +8,7 @@
 #include "services/geoslam_mapper/smoothing/discovery.hpp"
 #include "services/geoslam_mapper/smoothing/fusion.hpp"
 #include "services/geoslam_mapper/smoothing/global_map.hpp"
+#include "services/geoslam_mapper/smoothing/known_ground.hpp"
 #include "services/geoslam_mapper/smoothing/motion.hpp"
 #include "services/geoslam_mapper/smoothing/place_recogniser.hpp"
 #include "services/geoslam_mapper/smoothing/scan_localiser.hpp"
@@ -38,8 +39,8 @@ class SmoothingMapper final : public MapperMethod {
   /// Members of a saved state; see common/state. Parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.map_, self.motion_, self.discovery_, self.scan_localiser_, self.common_error_,
-      self.last_utime_, self.first_offered_);
+    a(self.map_, self.motion_, self.discovery_, self.known_ground_, self.scan_localiser_,
+      self.common_error_, self.last_utime_, self.first_offered_);
   }
 
  private:
@@ -58,6 +59,7 @@ class SmoothingMapper final : public MapperMethod {
   GlobalMap map_;
   Motion motion_;
   Discovery discovery_;
+  KnownGround known_ground_;
   ScanLocaliser scan_localiser_;
   CommonError common_error_;
   std::optional<model::Utime> last_utime_;     ///< Of the last well-formed keyframe.

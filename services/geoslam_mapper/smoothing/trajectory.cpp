@@ -1,5 +1,6 @@
 #include "services/geoslam_mapper/smoothing/trajectory.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace understory::geoslam_mapper::smoothing {
@@ -7,6 +8,8 @@ namespace {
 
 /// Two bases of a node are one viewpoint within this share of the folding distance and angle.
 constexpr double kApartShare = 0.25;
+/// Bases that are forgotten at a time.
+constexpr std::size_t kForgotten = 256;
 
 }  // namespace
 
@@ -29,36 +32,84 @@ Base base_of(const model::Keyframe& keyframe, NodeIndex node, bool is_origin) {
 }
 
 void Trajectory::add(const Base& base, const PoseGraph& graph) {
+  if (!add_viewpoint(base, graph)) return add_spare(base);
   bases_.push_back(base);
-  index(size() - 1, graph);
+  ++accepted_;
+}
+
+void Trajectory::add_spare(Base base) {
+  base.is_spare = true;
+  bases_.push_back(base);
+  ++accepted_;
+  ++spare_;
+  if (spare_ >= kMostSpare + kForgotten) forget_oldest();
+}
+
+void Trajectory::forget_oldest() {
+  std::size_t forgotten = 0;
+  std::erase_if(bases_, [&](const Base& base) {
+    return base.is_spare && &base != &bases_.back() && forgotten++ < kForgotten;
+  });
+  spare_ -= std::min(forgotten, kForgotten);
 }
 
 /// Makes the base a viewpoint unless its node has one as near.
-void Trajectory::index(std::uint32_t number, const PoseGraph& graph) {
-  const Base& base = bases_[number];
+bool Trajectory::add_viewpoint(const Base& base, const PoseGraph& graph) {
   if (viewpoints_of_node_.size() <= base.node) viewpoints_of_node_.resize(base.node + 1);
-  std::vector<std::uint32_t>& viewpoints = viewpoints_of_node_[base.node];
 
   const double apart_m = kApartShare * fold_distance_m_;
-  for (const std::uint32_t other : viewpoints) {
+  for (const std::uint32_t other : viewpoints_of_node_[base.node]) {
     const geometry::SE2 between =
-        bases_[viewpoints_[other]].centre_T_middle.inverse() * base.centre_T_middle;
+        viewpoints_[other].centre_T_middle.inverse() * base.centre_T_middle;
     if (between.translation().norm() < apart_m &&
         std::abs(between.theta()) < kApartShare * fold_angle_rad_) {
-      return;
+      return false;
     }
   }
 
-  viewpoints.push_back(static_cast<std::uint32_t>(viewpoints_.size()));
-  viewpoints_.push_back(number);
-  grid_.put(viewpoints.back(), middle(base, graph).translation());
+  const Viewpoint viewpoint{base.node, base.centre_T_middle, false};
+  auto number = static_cast<std::uint32_t>(viewpoints_.size());
+  if (free_viewpoints_.empty()) {
+    viewpoints_.push_back(viewpoint);
+  } else {
+    number = free_viewpoints_.back();
+    free_viewpoints_.pop_back();
+    viewpoints_[number] = viewpoint;
+  }
+  index(number, graph);
+  return true;
+}
+
+void Trajectory::index(std::uint32_t viewpoint, const PoseGraph& graph) {
+  const NodeIndex node = viewpoints_[viewpoint].node;
+  if (viewpoints_of_node_.size() <= node) viewpoints_of_node_.resize(node + 1);
+  viewpoints_of_node_[node].push_back(viewpoint);
+  grid_.put(viewpoint, middle(viewpoints_[viewpoint], graph).translation());
+}
+
+void Trajectory::hand_over(const Retirement& retirement) {
+  for (Base& base : bases_) {
+    if (base.node != retirement.node) continue;
+    base.node = retirement.into;
+    base.centre_T_base = compound(retirement.into_T_node, base.centre_T_base);
+    base.centre_T_middle = retirement.into_T_node.mean * base.centre_T_middle;
+    if (!base.is_spare) ++spare_;
+    base.is_spare = true;
+  }
+
+  for (const std::uint32_t viewpoint : viewpoints_of_node_[retirement.node]) {
+    grid_.remove(viewpoint);
+    viewpoints_[viewpoint].is_free = true;
+    free_viewpoints_.push_back(viewpoint);
+  }
+  viewpoints_of_node_[retirement.node].clear();
 }
 
 void Trajectory::follow(const PoseGraph& graph) {
   for (const NodeIndex node : graph.moved_nodes()) {
     if (node >= viewpoints_of_node_.size()) continue;
     for (const std::uint32_t viewpoint : viewpoints_of_node_[node])
-      grid_.put(viewpoint, middle(bases_[viewpoints_[viewpoint]], graph).translation());
+      grid_.put(viewpoint, middle(viewpoints_[viewpoint], graph).translation());
   }
 }
 
@@ -79,14 +130,14 @@ std::optional<NodeIndex> Trajectory::revisited(const geometry::SE2& map_T_middle
   std::optional<NodeIndex> best;
   double best_distance = fold_distance_m_;
   grid_.for_each_near(map_T_middle.translation(), best_distance, [&](std::uint32_t viewpoint) {
-    const Base& base = bases_[viewpoints_[viewpoint]];
-    const geometry::SE2 between = middle(base, graph).inverse() * map_T_middle;
+    const Viewpoint& there = viewpoints_[viewpoint];
+    const geometry::SE2 between = middle(there, graph).inverse() * map_T_middle;
     const double distance = between.translation().norm();
     const bool is_nearer =
-        distance < best_distance || (distance == best_distance && best < base.node);
+        distance < best_distance || (distance == best_distance && best < there.node);
     if (!is_nearer || std::abs(between.theta()) > fold_angle_rad_) return;
 
-    best = base.node;
+    best = there.node;
     best_distance = distance;
   });
   return best;
@@ -102,11 +153,16 @@ geometry::SE2WithCovariance Trajectory::centre_from_origin(NodeIndex node,
 }
 
 void Trajectory::rebuild_index(const PoseGraph& graph) {
-  viewpoints_.clear();
   viewpoints_of_node_.clear();
   grid_ = {};
-  for (std::uint32_t number = 0; number < size(); ++number) {
-    (void)graph.node(bases_[number].node);  // Throws where the graph has no such node.
+  spare_ = 0;
+  for (const Base& base : bases_) {
+    (void)graph.node(base.node);  // Throws where the graph has no such node.
+    if (base.is_spare) ++spare_;
+  }
+  for (std::uint32_t number = 0; number < viewpoints_.size(); ++number) {
+    if (viewpoints_[number].is_free) continue;
+    (void)graph.node(viewpoints_[number].node);
     index(number, graph);
   }
 }

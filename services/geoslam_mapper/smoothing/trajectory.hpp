@@ -22,11 +22,13 @@ struct Base {
   /// as exact as the base alone.
   geometry::SE2 centre_T_middle;
   bool is_origin = false;  ///< The origin of the map: known exactly.
+  /// Its node has another keyframe's viewpoint: it is kept for a while only.
+  bool is_spare = false;
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
-    a(s.node, s.sequence, s.utime, s.centre_T_base, s.centre_T_middle, s.is_origin);
+    a(s.node, s.sequence, s.utime, s.centre_T_base, s.centre_T_middle, s.is_origin, s.is_spare);
   }
 };
 
@@ -35,24 +37,32 @@ Base base_of(const model::Keyframe& keyframe, NodeIndex node, bool is_origin = f
 /// Mean of the members' poses, in the keyframe's centre frame.
 geometry::SE2 middle_of(const model::Keyframe& keyframe);
 
-/// The bases of all accepted keyframes, and an index of the viewpoints that differ: a keyframe from
-/// a viewpoint that the graph has already is folded into its node, so that a stationary vehicle
-/// does not grow the graph. Poses follow the graph, which is passed in.
+/// The bases of accepted keyframes, and an index of the viewpoints that differ: a keyframe from a
+/// viewpoint that the graph has already is folded into its node, so that a stationary vehicle does
+/// not grow the graph. Where the vehicle goes a known way again, or stands, the oldest bases are
+/// forgotten. Poses follow the graph, which is passed in.
 class Trajectory {
  public:
+  /// Most bases that are kept beside the viewpoints: an hour and more on known ground.
+  static constexpr std::size_t kMostSpare = 4096;
+
   /// `parameters` gives fold_distance_m and fold_angle_rad.
   explicit Trajectory(const SmoothingMapperParameters& parameters)
       : fold_distance_m_(parameters.fold_distance_m), fold_angle_rad_(parameters.fold_angle_rad) {}
 
   /// Adds the base of an accepted keyframe. O(viewpoints of its node).
   void add(const Base& base, const PoseGraph& graph);
+  /// Adds a base that is no viewpoint: where the map stays as it is.
+  void add_spare(Base base);
+  /// Ties the bases of a node that is taken out of the graph to the node that has its place.
+  void hand_over(const Retirement& retirement);
   /// Brings the index of viewpoints to where the graph's last updates moved the nodes.
   void follow(const PoseGraph& graph);
 
-  /// The bases, in order of time.
+  /// The bases that are kept, in order of time.
   std::span<const Base> bases() const { return bases_; }
   /// Number of accepted keyframes.
-  std::uint32_t size() const { return static_cast<std::uint32_t>(bases_.size()); }
+  std::uint32_t size() const { return accepted_; }
   /// The last accepted keyframe's base; there must be one.
   const Base& last() const { return bases_.back(); }
   /// map_T_base at the present estimate.
@@ -63,28 +73,51 @@ class Trajectory {
   /// viewpoint is a new one. `map_T_middle`: see middle_of().
   std::optional<NodeIndex> revisited(const geometry::SE2& map_T_middle,
                                      const PoseGraph& graph) const;
+  /// Calls f(node) for the nodes with a viewpoint within `radius_m` of `position_m`, and for some
+  /// beyond; a node with several may come several times.
+  template <typename F>
+  void for_each_node_near(const Eigen::Vector2d& position_m, double radius_m, F&& f) const {
+    grid_.for_each_near(position_m, radius_m,
+                        [&](std::uint32_t viewpoint) { f(viewpoints_[viewpoint].node); });
+  }
   /// A node's pose with its marginal covariance, which counts from the map's origin.
   geometry::SE2WithCovariance centre_from_origin(NodeIndex node, const PoseGraph& graph) const;
 
-  /// Indexes the viewpoints anew, after a load. Throws std::out_of_range where a base has no node
-  /// in the graph.
+  /// Indexes the viewpoints anew, after a load. Throws std::out_of_range where a base or a
+  /// viewpoint has no node in the graph.
   void rebuild_index(const PoseGraph& graph);
   /// Members of a saved state; see common/state. rebuild_index() makes the rest from them.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.bases_);
+    a(self.bases_, self.accepted_, self.viewpoints_, self.free_viewpoints_);
   }
 
  private:
-  void index(std::uint32_t number, const PoseGraph& graph);
-  geometry::SE2 middle(const Base& base, const PoseGraph& graph) const {
-    return graph.pose(base.node) * base.centre_T_middle;
+  /// A place from which a node's landmarks were observed.
+  struct Viewpoint {
+    NodeIndex node = 0;
+    geometry::SE2 centre_T_middle;
+    bool is_free = false;  ///< Its node is gone.
+
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& s) {
+      a(s.node, s.centre_T_middle, s.is_free);
+    }
+  };
+  bool add_viewpoint(const Base& base, const PoseGraph& graph);
+  void index(std::uint32_t viewpoint, const PoseGraph& graph);
+  void forget_oldest();
+  geometry::SE2 middle(const Viewpoint& viewpoint, const PoseGraph& graph) const {
+    return graph.pose(viewpoint.node) * viewpoint.centre_T_middle;
   }
 
   double fold_distance_m_;
   double fold_angle_rad_;
   std::vector<Base> bases_;
-  std::vector<std::uint32_t> viewpoints_;  ///< Bases apart from the others of their node.
+  std::uint32_t accepted_ = 0;
+  std::size_t spare_ = 0;  ///< Bases that are.
+  std::vector<Viewpoint> viewpoints_;
+  std::vector<std::uint32_t> free_viewpoints_;
   std::vector<std::vector<std::uint32_t>> viewpoints_of_node_;
   ViewpointGrid grid_;  ///< Of the viewpoints.
 };

@@ -17,11 +17,18 @@ class ViewpointGrid {
   void put(std::uint32_t number, const Eigen::Vector2d& position_m) {
     const std::uint64_t cell = cell_of(position_m);
     if (cells_of_.size() <= number) cells_of_.resize(number + 1, kNowhere);
-    std::uint64_t& now = cells_of_[number];
+    const std::uint64_t now = cells_of_[number];
     if (now == cell) return;
-    if (now != kNowhere) std::erase(cells_[now], number);
+    if (now != kNowhere) remove(number);
     cells_[cell].push_back(number);
-    now = cell;
+    cells_of_[number] = cell;
+  }
+
+  /// Takes the point out.
+  void remove(std::uint32_t number) {
+    const auto cell = cells_.find(std::exchange(cells_of_[number], kNowhere));
+    std::erase(cell->second, number);
+    if (cell->second.empty()) cells_.erase(cell);
   }
 
   /// Calls f(number) for every point of the cells within `radius_m` of `centre_m`, and for some

@@ -1,0 +1,230 @@
+#include "eval/experiments/laps/laps.hpp"
+
+#include <fmt/format.h>
+#include <malloc.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "common/bus/config_file.hpp"
+#include "common/model/slam_output.hpp"
+#include "eval/harness/chain_drive.hpp"
+#include "eval/tools/quantile.hpp"
+#include "services/geoslam_mapper/adapter.hpp"
+#include "services/keyframer/adapter.hpp"
+#include "sim/scenarios.hpp"
+
+namespace understory::eval::experiments::laps {
+namespace {
+
+constexpr const char* kMapper = "geoslam_mapper";
+constexpr double kStandstill_s = 22.0;
+/// Time of drive of one row of the repeated lap.
+constexpr double kStretch_h = 0.5;
+
+using Truth = std::function<geometry::SE2(model::Utime)>;
+
+double heap_mib() {
+  const struct mallinfo2 info = ::mallinfo2();
+  return static_cast<double>(info.uordblks + info.hblkhd) / (1024.0 * 1024.0);
+}
+
+/// The mapper's configuration with the radius of known ground that the options ask for.
+std::map<std::string, std::string> toml_instead(const LapsOptions& options) {
+  if (options.known_ground_m < 0.0) return {};
+  const std::filesystem::path file = options.config_dir / fmt::format("{}.toml", kMapper);
+  std::string toml = bus::read_config_file(file);
+  const std::string table = "[smoothing]\n";
+  const auto at = toml.find(table);
+  if (at == std::string::npos) throw std::runtime_error(file.string() + ": no [smoothing]");
+  toml.insert(at + table.size(), fmt::format("known_ground_m = {}\n", options.known_ground_m));
+  return {{kMapper, toml}};
+}
+
+/// Sums up what one lap gives; nothing in it grows.
+class LapCounter {
+ public:
+  LapCounter(harness::SensorChain& chain, Truth truth) : chain_(chain), truth_(std::move(truth)) {
+    chain.watch<model::SlamPose>("SLAM_POSE", [this](const model::SlamPose& pose) { add(pose); });
+    chain.watch<model::MapUpdate>("SLAM_UPDATE", [this](const model::MapUpdate& update) {
+      ++(metrics::localised(update) ? lap_.keyframes : lap_.refused);
+    });
+  }
+
+  /// The sums since the last call.
+  Lap take(int number, double hours) {
+    const auto poses = static_cast<double>(std::max<std::size_t>(lap_.poses, 1));
+    lap_.number = number;
+    lap_.hours = hours;
+    lap_.ate_m = std::sqrt(squared_m2_ / poses);
+    lap_.mean_nees = nees_ / poses;
+
+    std::vector<double> times_ms;
+    for (const float one : chain_.take_calls_ms(kMapper)) times_ms.push_back(one);
+    lap_.mapper_p50_ms = tools::quantile(times_ms, 0.5);
+    lap_.mapper_p99_ms = tools::quantile(times_ms, 0.99);
+    lap_.mapper_largest_ms = tools::quantile(times_ms, 1.0);
+    for (const std::string& service : chain_.services()) (void)chain_.take_calls_ms(service);
+    times_ms = {};
+    lap_.heap_mib = heap_mib();
+
+    squared_m2_ = nees_ = 0.0;
+    return std::exchange(lap_, Lap{});
+  }
+
+ private:
+  void add(const model::SlamPose& pose) {
+    if (!pose.is_localised()) {
+      ++lap_.unsure;
+      return;
+    }
+    const geometry::SE2 map_T_vehicle = pose.map_T_vehicle();
+    const geometry::SE2 truth = truth_(pose.utime);
+    if (!map_T_world_) map_T_world_ = map_T_vehicle * truth.inverse();
+
+    const Eigen::Vector3d error = (map_T_vehicle.inverse() * *map_T_world_ * truth).coordinates();
+    const Eigen::Matrix3d covariance = pose.covariance + 1e-12 * Eigen::Matrix3d::Identity();
+    squared_m2_ += error.head<2>().squaredNorm();
+    nees_ += error.dot(covariance.inverse() * error);
+    ++lap_.poses;
+  }
+
+  harness::SensorChain& chain_;
+  Truth truth_;
+  std::optional<geometry::SE2> map_T_world_;
+  Lap lap_;
+  double squared_m2_ = 0.0;
+  double nees_ = 0.0;
+};
+
+sim::SensorDrive make_drive(const LapsOptions& options) {
+  sim::ForestScenarioParameters forest;
+  forest.length_m = options.length_m;
+  forest.laps = options.laps;
+  sim::SensorSuite suite;
+  suite.gnss.reset();
+  if (options.beams == 16)
+    suite.lidar->elevations_rad = sim::beam_elevations_rad(sim::LidarModel::kVlp16);
+  sim::SpeedParameters speed;
+  speed.standstill_s = kStandstill_s;
+  return {sim::forest_scenario(forest, options.seed), speed, suite, options.seed};
+}
+
+/// Keeps the messages between the two boundaries of the last lap.
+class Recorder {
+ public:
+  Recorder(harness::SensorChain& chain, RecordedLap* to) : to_(to) {
+    if (to == nullptr) return;
+    keep<model::LandmarkScan>(chain, "LANDMARKS");
+    keep<model::Odometry>(chain, "ODOMETRY");
+    keep<model::EkfPose>(chain, "EKF_POSE");
+    keep<model::EkfLevel>(chain, "EKF_LEVEL");
+  }
+  void set_recording(bool on) { is_on_ = on && to_ != nullptr; }
+
+ private:
+  template <class T>
+  void keep(harness::SensorChain& chain, const char* channel) {
+    chain.watch<T>(channel, [this, channel](const T& value) {
+      if (is_on_) to_->messages.push_back({value.utime, channel, wire::encode_message(value)});
+    });
+  }
+  RecordedLap* to_;
+  bool is_on_ = false;
+};
+
+template <class T>
+wire::Bytes later(const wire::Bytes& bytes, model::Utime by_us, std::uint64_t sequence) {
+  T value = *wire::decode_message<T>(bytes);
+  value.utime += by_us;
+  value.sequence = sequence;
+  if constexpr (requires { value.from_utime; }) value.from_utime += by_us;
+  return wire::encode_message(value);
+}
+
+wire::Bytes later(const harness::RawMessage& message, model::Utime by_us, std::uint64_t sequence) {
+  if (message.channel == "LANDMARKS")
+    return later<model::LandmarkScan>(message.bytes, by_us, sequence);
+  if (message.channel == "ODOMETRY") return later<model::Odometry>(message.bytes, by_us, sequence);
+  if (message.channel == "EKF_POSE") return later<model::EkfPose>(message.bytes, by_us, sequence);
+  return later<model::EkfLevel>(message.bytes, by_us, sequence);
+}
+
+}  // namespace
+
+std::vector<Lap> drive_laps(const LapsOptions& options, const std::atomic<bool>& stop,
+                            RecordedLap* record, const std::function<void(const Lap&)>& done) {
+  sim::SensorDrive drive = make_drive(options);
+  harness::SensorChain chain(harness::front_end_services(), options.config_dir,
+                             toml_instead(options));
+  LapCounter counter(chain,
+                     [&](model::Utime utime) { return drive.state_at(utime).world_T_level(); });
+  Recorder recorder(chain, record);
+
+  std::vector<Lap> laps;
+  std::uint64_t sweep_parts = 0;
+  double driven_m = 0.0;
+  std::optional<Eigen::Vector2d> last;
+  double now_s = 0.0;
+  while (const auto reading = drive.next()) {
+    if (stop) throw std::runtime_error("interrupted");
+    if (const auto* truth = std::get_if<sim::TruePose>(&*reading)) {
+      const Eigen::Vector2d here = truth->state.position_m.head<2>();
+      if (last) driven_m += (here - *last).norm();
+      last = here;
+      now_s = 1e-6 * static_cast<double>(truth->utime);
+    }
+    // The last lap but one is whole: none of it is accelerated or braked.
+    const auto lap = static_cast<int>(driven_m / options.length_m);
+    recorder.set_recording(lap == options.laps - 2);
+    for (const harness::RawMessage& message : harness::raw_messages(*reading, sweep_parts))
+      chain.feed(message);
+
+    if (lap > static_cast<int>(laps.size())) {
+      laps.push_back(counter.take(lap, now_s / 3600.0));
+      done(laps.back());
+    }
+  }
+  chain.finish();
+  if (static_cast<int>(laps.size()) < options.laps) {
+    laps.push_back(counter.take(options.laps, now_s / 3600.0));
+    done(laps.back());
+  }
+  if (record != nullptr && !record->messages.empty())
+    record->duration_us = record->messages.back().utime - record->messages.front().utime + 100'000;
+  return laps;
+}
+
+std::vector<Lap> repeat_lap(const LapsOptions& options, const RecordedLap& recorded,
+                            const std::atomic<bool>& stop,
+                            const std::function<void(const Lap&)>& done) {
+  if (recorded.messages.empty()) throw std::runtime_error("three laps or more are needed");
+  const sim::SensorDrive drive = make_drive(options);
+  harness::SensorChain chain(
+      {keyframer::keyframer_service(), geoslam_mapper::geoslam_mapper_service()},
+      options.config_dir, toml_instead(options));
+  LapCounter counter(chain, [&](model::Utime utime) {
+    const model::Utime begin = recorded.messages.front().utime;
+    return drive.state_at(begin + (utime - begin) % recorded.duration_us).world_T_level();
+  });
+
+  std::vector<Lap> stretches;
+  std::map<std::string, std::uint64_t> sequences;
+  for (std::int64_t lap = 0; !stop; ++lap) {
+    const model::Utime shift_us = lap * recorded.duration_us;
+    const double hours = static_cast<double>(shift_us) / 3.6e9;
+    if (hours >= kStretch_h * static_cast<double>(stretches.size() + 1)) {
+      stretches.push_back(counter.take(static_cast<int>(stretches.size()) + 1, hours));
+      done(stretches.back());
+      if (hours >= options.hours) break;
+    }
+    for (const harness::RawMessage& message : recorded.messages)
+      chain.feed(message.channel, later(message, shift_us, sequences[message.channel]++));
+  }
+  return stretches;
+}
+
+}  // namespace understory::eval::experiments::laps

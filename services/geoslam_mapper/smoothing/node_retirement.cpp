@@ -1,0 +1,139 @@
+// Taking nodes out of the graph where another one has their place.
+#include <Eigen/LU>
+#include <algorithm>
+#include <utility>
+
+#include "services/geoslam_mapper/smoothing/pose_graph.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+namespace {
+
+namespace plane = factor_graph::plane;
+
+/// Whether the node stays and is tied to the one before it.
+bool stays_tied(NodeIndex node, const Surplus& surplus) {
+  return std::none_of(surplus.nodes.begin(), surplus.nodes.end(),
+                      [&](const Retirement& one) { return one.node == node; }) &&
+         std::find(surplus.loose.begin(), surplus.loose.end(), node) == surplus.loose.end();
+}
+
+}  // namespace
+
+void PoseGraph::take_out(const Surplus& surplus) {
+  const auto bias = gyro_.estimate(smoother_);
+  const std::size_t biased_before = free_biased_.size();
+
+  for (const Retirement& one : surplus.nodes) hand_observations_to(one);
+  for (const Retirement& one : surplus.nodes) take_motions_out(one, surplus);
+  for (const NodeIndex node : surplus.loose) loosen(node, surplus);
+  for (const auto& [a, b] : surplus.motions) take_motions_out(a, b);
+  for (const Retirement& one : surplus.nodes) free_nodes_.give(one.node);
+
+  if (bias && free_biased_.size() != biased_before) gyro_.keep(*bias, smoother_);
+}
+
+/// Each with the uncertainty of where the two nodes are to each other. The sum of two nodes' whole
+/// information is exact where both observed the same: what told where a node was is not told about
+/// the landmarks, and the other node is loose, too.
+void PoseGraph::hand_observations_to(const Retirement& retirement) {
+  Node& node = edit(retirement.node);
+  const geometry::SE2& into_T_node = retirement.into_T_node.mean;
+  const Eigen::Matrix2d rotation = into_T_node.rotation();
+
+  for (const auto& [id, number] : node.observations) {
+    plane::PointObservation factor = smoother_.observation(number);
+    const Eigen::Vector2d position = factor.position;
+    Eigen::Matrix2d covariance = factor.information.inverse();
+    factor.information.setZero();
+    smoother_.set(number, factor);
+    free_observations_.give(index(number));
+
+    // d(landmark in the frame of `into`) / d(right perturbation of into_T_node)
+    Eigen::Matrix<double, 2, 3> j;
+    j << rotation, rotation * geometry::perpendicular(position);
+    covariance = rotation * covariance * rotation.transpose() +
+                 j * retirement.into_T_node.covariance * j.transpose();
+    observe(retirement.into, id, into_T_node * position, covariance.inverse());
+  }
+  node.observations.clear();
+  edit(retirement.into).keyframes += node.keyframes;
+}
+
+void PoseGraph::take_motions_out(const Retirement& retirement, const Surplus& surplus) {
+  for (const MotionRef ref : std::exchange(edit(retirement.node).motions, {})) {
+    const plane::RelativePose measured = take_motion_out(ref);
+    const NodeIndex from = index(measured.a);
+    const NodeIndex to = index(measured.b);
+    std::erase(edit(from == retirement.node ? to : from).motions, ref);
+    const bool goes_on = from == retirement.node && stays_tied(to, surplus) &&
+                         nodes_[to].along_m > nodes_[retirement.node].along_m;
+    if (goes_on) begin_motion_at(retirement, to, measured);
+  }
+}
+
+/// A motion from the node to a later one that is tied to it stays.
+void PoseGraph::loosen(NodeIndex node, const Surplus& surplus) {
+  const std::vector<MotionRef> motions = nodes_[node].motions;
+  for (const MotionRef ref : motions) {
+    const auto [from, to] = ends_of(ref);
+    const bool goes_on =
+        from == node && stays_tied(to, surplus) && nodes_[to].along_m > nodes_[node].along_m;
+    if (goes_on) continue;
+    std::erase(edit(from).motions, ref);
+    std::erase(edit(to).motions, ref);
+    take_motion_out(ref);
+  }
+}
+
+std::pair<NodeIndex, NodeIndex> PoseGraph::ends_of(MotionRef ref) const {
+  const plane::RelativePose& motion =
+      ref.is_biased ? smoother_.motion(plane::BiasedMotionId(ref.number)).motion
+                    : smoother_.motion(plane::MotionId(ref.number));
+  return {index(motion.a), index(motion.b)};
+}
+
+void PoseGraph::take_motions_out(NodeIndex a, NodeIndex b) {
+  const std::vector<MotionRef> motions = nodes_[a].motions;
+  for (const MotionRef ref : motions) {
+    if (std::find(nodes_[b].motions.begin(), nodes_[b].motions.end(), ref) ==
+        nodes_[b].motions.end()) {
+      continue;
+    }
+    std::erase(edit(a).motions, ref);
+    std::erase(edit(b).motions, ref);
+    take_motion_out(ref);
+  }
+}
+
+/// Takes it out; the motion as it is with the bias as known now.
+plane::RelativePose PoseGraph::take_motion_out(MotionRef ref) {
+  if (!ref.is_biased) {
+    plane::RelativePose measured = smoother_.motion(plane::MotionId(ref.number));
+    plane::RelativePose nothing = measured;
+    nothing.information.setZero();
+    smoother_.set(plane::MotionId(ref.number), nothing);
+    free_motions_.give(ref.number);
+    return measured;
+  }
+
+  plane::BiasedRelativePose biased = smoother_.motion(plane::BiasedMotionId(ref.number));
+  plane::RelativePose measured = biased.motion;
+  measured.a_T_b =
+      plane::at_true_rate(measured.a_T_b, smoother_.scalar(biased.bias), biased.seconds);
+  biased.motion.information.setZero();
+  smoother_.set(plane::BiasedMotionId(ref.number), biased);
+  free_biased_.give(ref.number);
+  gyro_.forget_motion(biased.bias);
+  return measured;
+}
+
+void PoseGraph::begin_motion_at(const Retirement& retirement, NodeIndex to,
+                                const plane::RelativePose& measured) {
+  const geometry::SE2WithCovariance motion{measured.a_T_b, measured.information.inverse()};
+  const geometry::SE2WithCovariance into_T_to = compound(retirement.into_T_node, motion);
+  link({nodes_[retirement.into].centre, nodes_[to].centre, into_T_to.mean,
+        into_T_to.covariance.inverse()},
+       retirement.into, to);
+}
+
+}  // namespace understory::geoslam_mapper::smoothing
