@@ -234,6 +234,26 @@ def landmarks_vs_error(document):
 
 # -------------------------------------------------- rows of figures with targets (frontend, recordings)
 
+def laps(document):
+    """The same way again and again: some of the laps, some of the hours, and the slopes."""
+    lines = []
+    config = document["config"]
+    for part, title in (("laps", f"{config['laps']} laps of {config['length_m']:.0f} m from raw LIDAR, {config['beams']} beams"),
+                        ("hours", f"{config['hours']:.0f} hours from the landmarks and odometry of one lap, repeated")):
+        rows = [row for row in document["rows"] if row["part"] == part]
+        if not rows:
+            continue
+        shown = sorted({min(len(rows), max(1, round(len(rows) * share))) for share in (0.0, 0.02, 0.1, 0.25, 0.5, 0.75, 1.0)})
+        lines += ["", f"{title}; the heap's slope over the last half is **{config[f'slope_{part}_mib_per_h']:.2f} MiB/h**:", ""]
+        lines += table(("lap" if part == "laps" else "half hour", "hours", "heap MiB", "mapper's message p99 ms", "longest ms",
+                        "ATE mm", "NEES (3)", "poses", "not localised", "keyframes refused"),
+                       [(rows[i - 1]["number"], number(rows[i - 1]["hours"]), number(rows[i - 1]["heap_mib"], 1),
+                         number(rows[i - 1]["mapper_p99_ms"], 1), number(rows[i - 1]["mapper_largest_ms"], 1),
+                         number(1e3 * rows[i - 1]["ate_m"], 1), number(rows[i - 1]["mean_nees"]), rows[i - 1]["poses"],
+                         rows[i - 1]["unsure"], rows[i - 1]["refused"]) for i in shown])
+    return lines
+
+
 def _columns(settings):
     """A caption that all settings share, and what is left of each."""
     if len(settings) == 1:

@@ -53,6 +53,7 @@ SECTIONS = (
     ("baseline-paths", "GeoSLAM's method in batches: other paths", f"{GEOSLAM}, Table 5.4", render.batches),
     ("large-map", "One-shot localisation in a square kilometre", f"{GEOSLAM}, §5.4", render.large_map),
     ("efficiency", "Time per keyframe", f"{GEOSLAM}, §5.5 (a figure only)", render.efficiency),
+    ("laps", "Known ground: what must not grow", None, render.laps),
     ("victoria-park", "A real drive: Victoria Park", "stated figures of the batch solution", render.victoria_park),
     ("frontend-chain", "From raw sensors: simulated drives", None, _figures),
     ("recording-victoria-park", "From raw sensors: Victoria Park", None, _figures),

@@ -64,7 +64,6 @@ class LapCounter {
 
     std::vector<double> times_ms;
     for (const float one : chain_.take_calls_ms(kMapper)) times_ms.push_back(one);
-    lap_.mapper_p50_ms = tools::quantile(times_ms, 0.5);
     lap_.mapper_p99_ms = tools::quantile(times_ms, 0.99);
     lap_.mapper_largest_ms = tools::quantile(times_ms, 1.0);
     for (const std::string& service : chain_.services()) (void)chain_.take_calls_ms(service);

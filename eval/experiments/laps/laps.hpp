@@ -32,7 +32,6 @@ struct Lap {
   int number = 0;         ///< From 1.
   double hours = 0.0;     ///< Of driving, at its end.
   double heap_mib = 0.0;  ///< In use at its end, of all stages together.
-  double mapper_p50_ms = 0.0;
   double mapper_p99_ms = 0.0;
   double mapper_largest_ms = 0.0;
   double ate_m = 0.0;      ///< RMS of SLAM_POSE in the frame of the first pose.
