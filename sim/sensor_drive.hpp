@@ -57,6 +57,8 @@ class SensorDrive {
 
   /// The next reading; none at the end of the drive.
   std::optional<SensorReading> next();
+  /// Passes the next reading by, which is quick: no sweep and no scan is made. False at the end.
+  bool skip();
 
   /// The world driven through.
   const World& world() const { return *scenario_.world; }
@@ -85,6 +87,7 @@ class SensorDrive {
   };
   Due next_due() const;
   std::optional<SensorReading> read(Source source);
+  bool skip(Source source);
 
   Scenario scenario_;
   SensorSuite suite_;

@@ -11,6 +11,7 @@
 
 #include "common/bus/config_file.hpp"
 #include "common/model/slam_output.hpp"
+#include "common/terminal/interrupt.hpp"
 #include "eval/harness/chain_drive.hpp"
 #include "eval/tools/quantile.hpp"
 #include "services/geoslam_mapper/adapter.hpp"
@@ -24,6 +25,8 @@ constexpr const char* kMapper = "geoslam_mapper";
 constexpr double kStandstill_s = 22.0;
 /// Time of drive of one row of the repeated lap.
 constexpr double kStretch_h = 0.5;
+/// Between the last scan of a repeated lap and the first of the next.
+constexpr model::Utime kScan_us = 100'000;
 
 using Truth = std::function<geometry::SE2(model::Utime)>;
 
@@ -47,13 +50,16 @@ std::map<std::string, std::string> toml_instead(const LapsOptions& options) {
 /// Sums up what one lap gives; nothing in it grows.
 class LapCounter {
  public:
-  LapCounter(harness::SensorChain& chain, Truth truth) : chain_(chain), truth_(std::move(truth)) {
+  LapCounter(harness::SensorChain& chain, Truth truth, std::optional<geometry::SE2> map_T_world)
+      : chain_(chain), truth_(std::move(truth)), map_T_world_(std::move(map_T_world)) {
     chain.watch<model::SlamPose>("SLAM_POSE", [this](const model::SlamPose& pose) { add(pose); });
     chain.watch<model::MapUpdate>("SLAM_UPDATE", [this](const model::MapUpdate& update) {
       ++(metrics::localised(update) ? lap_.keyframes : lap_.refused);
     });
   }
 
+  /// The first pose's frame; none before it.
+  const std::optional<geometry::SE2>& map_T_world() const { return map_T_world_; }
   /// The sums since the last call.
   Lap take(int number, double hours) {
     const auto poses = static_cast<double>(std::max<std::size_t>(lap_.poses, 1));
@@ -115,23 +121,22 @@ sim::SensorDrive make_drive(const LapsOptions& options) {
 /// Keeps the messages between the two boundaries of the last lap.
 class Recorder {
  public:
-  Recorder(harness::SensorChain& chain, RecordedLap* to) : to_(to) {
-    if (to == nullptr) return;
+  Recorder(harness::SensorChain& chain, RecordedLap& to) : to_(to) {
     keep<model::LandmarkScan>(chain, "LANDMARKS");
     keep<model::Odometry>(chain, "ODOMETRY");
     keep<model::EkfPose>(chain, "EKF_POSE");
     keep<model::EkfLevel>(chain, "EKF_LEVEL");
   }
-  void set_recording(bool on) { is_on_ = on && to_ != nullptr; }
+  void set_recording(bool on) { is_on_ = on; }
 
  private:
   template <class T>
   void keep(harness::SensorChain& chain, const char* channel) {
     chain.watch<T>(channel, [this, channel](const T& value) {
-      if (is_on_) to_->messages.push_back({value.utime, channel, wire::encode_message(value)});
+      if (is_on_) to_.messages.push_back({value.utime, channel, wire::encode_message(value)});
     });
   }
-  RecordedLap* to_;
+  RecordedLap& to_;
   bool is_on_ = false;
 };
 
@@ -154,76 +159,92 @@ wire::Bytes later(const harness::RawMessage& message, model::Utime by_us, std::u
 
 }  // namespace
 
-std::vector<Lap> drive_laps(const LapsOptions& options, const std::atomic<bool>& stop,
-                            RecordedLap* record, const std::function<void(const Lap&)>& done) {
+void drive_laps(const LapsOptions& options, const std::atomic<bool>& stop, Progress& progress,
+                const std::function<void(const Lap&)>& done) {
+  std::vector<Lap>& laps = progress.laps;
+  if (static_cast<int>(laps.size()) >= options.laps) return;
   sim::SensorDrive drive = make_drive(options);
   harness::SensorChain chain(harness::front_end_services(), options.config_dir,
                              toml_instead(options));
-  LapCounter counter(chain,
-                     [&](model::Utime utime) { return drive.state_at(utime).world_T_level(); });
-  Recorder recorder(chain, record);
+  if (!laps.empty()) chain.load(progress.states);
+  for (std::uint64_t i = 0; i < progress.readings; ++i) drive.skip();
 
-  std::vector<Lap> laps;
-  std::uint64_t sweep_parts = 0;
-  double driven_m = 0.0;
+  LapCounter counter(
+      chain, [&](model::Utime utime) { return drive.state_at(utime).world_T_level(); },
+      progress.map_T_world);
+  Recorder recorder(chain, progress.recorded);
+  const auto end_lap = [&](int number, double hours) {
+    laps.push_back(counter.take(number, hours));
+    progress.states = chain.save();
+    progress.map_T_world = counter.map_T_world();
+    store_progress(options, progress);
+    done(laps.back());
+  };
+
   std::optional<Eigen::Vector2d> last;
   double now_s = 0.0;
   while (const auto reading = drive.next()) {
-    if (stop) throw std::runtime_error("interrupted");
+    if (stop) throw terminal::Interrupted();
+    ++progress.readings;
     if (const auto* truth = std::get_if<sim::TruePose>(&*reading)) {
       const Eigen::Vector2d here = truth->state.position_m.head<2>();
-      if (last) driven_m += (here - *last).norm();
+      if (last) progress.driven_m += (here - *last).norm();
       last = here;
       now_s = 1e-6 * static_cast<double>(truth->utime);
     }
     // The last lap but one is whole: none of it is accelerated or braked.
-    const auto lap = static_cast<int>(driven_m / options.length_m);
+    const auto lap = static_cast<int>(progress.driven_m / options.length_m);
     recorder.set_recording(lap == options.laps - 2);
-    for (const harness::RawMessage& message : harness::raw_messages(*reading, sweep_parts))
+    for (const harness::RawMessage& message : harness::raw_messages(*reading, progress.sweep_parts))
       chain.feed(message);
-
-    if (lap > static_cast<int>(laps.size())) {
-      laps.push_back(counter.take(lap, now_s / 3600.0));
-      done(laps.back());
-    }
+    if (lap > static_cast<int>(laps.size())) end_lap(lap, now_s / 3600.0);
   }
   chain.finish();
-  if (static_cast<int>(laps.size()) < options.laps) {
-    laps.push_back(counter.take(options.laps, now_s / 3600.0));
-    done(laps.back());
-  }
-  if (record != nullptr && !record->messages.empty())
-    record->duration_us = record->messages.back().utime - record->messages.front().utime + 100'000;
-  return laps;
+  if (static_cast<int>(laps.size()) < options.laps) end_lap(options.laps, now_s / 3600.0);
 }
 
-std::vector<Lap> repeat_lap(const LapsOptions& options, const RecordedLap& recorded,
-                            const std::atomic<bool>& stop,
-                            const std::function<void(const Lap&)>& done) {
-  if (recorded.messages.empty()) throw std::runtime_error("three laps or more are needed");
+void repeat_lap(const LapsOptions& options, const std::atomic<bool>& stop, Progress& progress,
+                const std::function<void(const Lap&)>& done) {
+  const std::vector<harness::RawMessage>& messages = progress.recorded.messages;
+  if (messages.empty()) throw std::runtime_error("three laps or more are needed");
+  const model::Utime begin_us = messages.front().utime;
+  const model::Utime lap_us = messages.back().utime - begin_us + kScan_us;
   const sim::SensorDrive drive = make_drive(options);
   harness::SensorChain chain(
       {keyframer::keyframer_service(), geoslam_mapper::geoslam_mapper_service()},
       options.config_dir, toml_instead(options));
-  LapCounter counter(chain, [&](model::Utime utime) {
-    const model::Utime begin = recorded.messages.front().utime;
-    return drive.state_at(begin + (utime - begin) % recorded.duration_us).world_T_level();
-  });
-
-  std::vector<Lap> stretches;
-  std::map<std::string, std::uint64_t> sequences;
-  for (std::int64_t lap = 0; !stop; ++lap) {
-    const model::Utime shift_us = lap * recorded.duration_us;
-    const double hours = static_cast<double>(shift_us) / 3.6e9;
-    if (hours >= kStretch_h * static_cast<double>(stretches.size() + 1)) {
-      stretches.push_back(counter.take(static_cast<int>(stretches.size()) + 1, hours));
-      done(stretches.back());
-      if (hours >= options.hours) break;
-    }
-    for (const harness::RawMessage& message : recorded.messages)
-      chain.feed(message.channel, later(message, shift_us, sequences[message.channel]++));
+  if (progress.stretches.empty()) {
+    progress.readings = 0;
+    progress.map_T_world.reset();
+  } else {
+    chain.load(progress.states);
   }
-  return stretches;
+
+  LapCounter counter(
+      chain,
+      [&](model::Utime utime) {
+        return drive.state_at(begin_us + (utime - begin_us) % lap_us).world_T_level();
+      },
+      progress.map_T_world);
+  const auto hours_of = [&](std::uint64_t laps) {
+    return static_cast<double>(laps) * static_cast<double>(lap_us) / 3.6e9;
+  };
+  while (hours_of(progress.readings) < options.hours) {
+    if (stop) throw terminal::Interrupted();
+    const model::Utime shift_us = static_cast<model::Utime>(progress.readings) * lap_us;
+    std::uint64_t sequence = progress.readings * messages.size();
+    for (const harness::RawMessage& message : messages)
+      chain.feed(message.channel, later(message, shift_us, sequence++));
+
+    const double hours = hours_of(++progress.readings);
+    const auto rows = static_cast<int>(progress.stretches.size());
+    if (hours < kStretch_h * (rows + 1) && hours < options.hours) continue;
+    progress.stretches.push_back(counter.take(rows + 1, hours));
+    progress.states = chain.save();
+    progress.map_T_world = counter.map_T_world();
+    store_progress(options, progress);
+    done(progress.stretches.back());
+  }
 }
 
 }  // namespace understory::eval::experiments::laps

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,7 +23,8 @@ struct LapsOptions {
   int beams = 16;            ///< Of the LIDAR: 16 or 32.
   double hours = 0.0;        ///< Further hours from the recorded LANDMARKS and ODOMETRY.
   std::filesystem::path config_dir = "deploy/config/lidar";
-  double known_ground_m = -1.0;  ///< Instead of the mapper's parameter; negative: as configured.
+  double known_ground_m = -1.0;    ///< Instead of the mapper's parameter; negative: as configured.
+  std::filesystem::path progress;  ///< File from which an interrupted run goes on; empty: none.
   std::string json;
   bool plots = true;
 };
@@ -45,18 +47,35 @@ struct Lap {
 /// Messages of the last whole lap, to be repeated.
 struct RecordedLap {
   std::vector<harness::RawMessage> messages;  ///< In order of arrival.
-  model::Utime duration_us = 0;
 };
 
-/// Drives the laps from raw LIDAR. `record` gets the last lap. `done` is called after each lap.
-std::vector<Lap> drive_laps(const LapsOptions& options, const std::atomic<bool>& stop,
-                            RecordedLap* record, const std::function<void(const Lap&)>& done);
+/// How far a run has come: all that it needs to go on.
+struct Progress {
+  std::vector<Lap> laps;
+  std::vector<Lap> stretches;
+  RecordedLap recorded;
+  std::map<std::string, std::string> states;  ///< Of the services, after the last row.
+  std::optional<geometry::SE2> map_T_world;   ///< Likewise.
+  std::uint64_t readings = 0;                 ///< Of the drive; in the hours laps of the record.
+  std::uint64_t sweep_parts = 0;
+  double driven_m = 0.0;
+};
+
+/// The progress of a run with these options, empty where there is no file. Throws
+/// std::runtime_error naming the file where it is of another run.
+Progress load_progress(const LapsOptions& options);
+/// Writes it, where the options name a file.
+void store_progress(const LapsOptions& options, const Progress& progress);
+
+/// Drives the laps from raw LIDAR, or those that are missing. The last lap but one is recorded.
+/// `done` is called after each lap.
+void drive_laps(const LapsOptions& options, const std::atomic<bool>& stop, Progress& progress,
+                const std::function<void(const Lap&)>& done);
 
 /// Repeats what was recorded for `options.hours` through keyframer and mapper, from an empty map.
 /// A row for each half hour.
-std::vector<Lap> repeat_lap(const LapsOptions& options, const RecordedLap& recorded,
-                            const std::atomic<bool>& stop,
-                            const std::function<void(const Lap&)>& done);
+void repeat_lap(const LapsOptions& options, const std::atomic<bool>& stop, Progress& progress,
+                const std::function<void(const Lap&)>& done);
 
 /// Adds `laps`.
 void add_laps_experiment(CLI::App& eval);

@@ -70,17 +70,19 @@ nlohmann::json to_json(const char* part, const std::vector<Lap>& laps) {
 
 void run(const LapsOptions& options) {
   const auto& stop = terminal::catch_interrupts();
-  RecordedLap recorded;
+  Progress progress = load_progress(options);
+  const std::vector<Lap>& laps = progress.laps;
+  const std::vector<Lap>& stretches = progress.stretches;
 
   print_header("lap");
-  const std::vector<Lap> laps =
-      drive_laps(options, stop, options.hours > 0.0 ? &recorded : nullptr, print_row);
+  for (const Lap& lap : laps) print_row(lap);
+  drive_laps(options, stop, progress, print_row);
   fmt::print("slope of the last half: {:.2f} MiB/h\n", slope_mib_per_h(laps));
 
-  std::vector<Lap> stretches;
   if (options.hours > 0.0) {
     print_header("half hour");
-    stretches = repeat_lap(options, recorded, stop, print_row);
+    for (const Lap& stretch : stretches) print_row(stretch);
+    repeat_lap(options, stop, progress, print_row);
     fmt::print("slope of the last half: {:.2f} MiB/h\n", slope_mib_per_h(stretches));
   }
   if (options.json.empty()) return;
@@ -125,6 +127,8 @@ void add_laps_experiment(CLI::App& eval) {
                       "Instead of smoothing.known_ground_m; 0: every keyframe is kept");
   command->add_option("--seed", options->seed, "Seed of everything")->capture_default_str();
   command->add_option("--config", options->config_dir, "Configuration of the chain's services");
+  command->add_option("--progress", options->progress,
+                      "File that keeps how far the run is: the same command goes on from there");
   command->add_option("--json", options->json, "Result file; a plot goes beside it");
   command->add_flag("!--no-plots", options->plots, "No plot");
   command->callback([options] { run_guarded("laps", [options] { run(*options); }); });

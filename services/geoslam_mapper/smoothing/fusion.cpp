@@ -41,6 +41,7 @@ FusedKeyframe enter(const model::Keyframe& arrived, const Placement& placement, 
     fused.keyframe = in_frame_of(map.graph.pose(*revisited).inverse() * map_T_centre, arrived);
   } else {
     fused.node = map.graph.add_node(map_T_centre, map.trajectory.is_stationary(arrived));
+    fused.is_new_node = true;
     fused.keyframe = arrived;
   }
   return fused;

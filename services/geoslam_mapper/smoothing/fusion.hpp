@@ -16,6 +16,7 @@ struct FusedKeyframe {
   bool ok = false;
   std::string reason;  ///< Why it was taken back.
   NodeIndex node = 0;
+  bool is_new_node = false;                      ///< Not one that was there before.
   model::Keyframe keyframe;                      ///< In the frame of `node`.
   std::vector<model::Association> associations;  ///< Without those that do not fit.
   double chi2 = 0.0;                             ///< Of the associations that fit.

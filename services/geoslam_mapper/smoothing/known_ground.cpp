@@ -25,9 +25,9 @@ std::size_t count_common(const Node& a, const Node& b) {
 
 }  // namespace
 
-void KnownGround::follow(NodeIndex node, Discovery& discovery, GlobalMap& map) {
-  if (radius_m_ <= 0.0 || (!recent_.empty() && recent_.back().node == node)) return;
-  recent_.push_back({node, map.graph.newest() == node});
+void KnownGround::follow(const FusedKeyframe& fused, Discovery& discovery, GlobalMap& map) {
+  if (radius_m_ <= 0.0 || (!recent_.empty() && recent_.back().node == fused.node)) return;
+  recent_.push_back({fused.node, fused.is_new_node});
   if (recent_.size() < kTogether + kStay) return;
 
   const Surplus surplus = find_surplus(map);

@@ -89,7 +89,7 @@ model::MapUpdate SmoothingMapper::add(const model::Keyframe& keyframe) {
   update.chi2 = fused.chi2;
   update.degrees_of_freedom = fused.degrees_of_freedom;
   if (!fused.ok) return with(kRolledBack, fused.reason, std::move(update));
-  known_ground_.follow(fused.node, discovery_, map_);
+  known_ground_.follow(fused, discovery_, map_);
   extend(fused, update);
   report(keyframe, update);
   return with(kUpdated, fused.reason, std::move(update));
