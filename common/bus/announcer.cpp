@@ -46,8 +46,13 @@ void Announcer::report_refused(std::int64_t utime, const DatagramFaults& faults)
     const std::uint64_t count = faults.count_of(fault);
     if (count == 0 || count < 2 * refused_.count_of(fault)) continue;
     refused_.set(fault, count);
-    log(utime, LogLevel::kWarning, to_string(fault),
-        "a datagram on the bus is no message of LCM (" + std::to_string(count) + " so far)", {});
+    const std::string so_far = " (" + std::to_string(count) + " so far)";
+    if (is_harmful(fault)) {
+      log(utime, LogLevel::kWarning, to_string(fault),
+          "a datagram on the bus is no message of LCM" + so_far, {});
+    } else {
+      log(utime, LogLevel::kInfo, to_string(fault), "a datagram came twice" + so_far, {});
+    }
   }
 }
 

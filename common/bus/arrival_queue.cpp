@@ -29,6 +29,11 @@ void ArrivalQueue::subscribe_all(std::size_t queue_size, Bus::Handler handler) {
   queue_.subscribe_all(queue_size, std::move(handler));
 }
 
+bool ArrivalQueue::takes(std::string_view channel) const {
+  const std::lock_guard lock(mutex_);
+  return queue_.takes(channel);
+}
+
 void ArrivalQueue::push(std::string_view channel, std::span<const std::uint8_t> bytes,
                         std::int64_t received_us) noexcept {
   const std::lock_guard lock(mutex_);

@@ -22,6 +22,8 @@ class ArrivalQueue {
   void subscribe(std::string_view channel, std::size_t queue_size, Bus::Handler handler);
   /// The same for all channels.
   void subscribe_all(std::size_t queue_size, Bus::Handler handler);
+  /// Whether anybody subscribed this channel, or all; from any thread.
+  bool takes(std::string_view channel) const;
   /// Copies a message to who wants it; from any thread. A message for which there is no memory is
   /// counted as dropped.
   void push(std::string_view channel, std::span<const std::uint8_t> bytes,

@@ -17,8 +17,8 @@ enum class DatagramFault : std::uint8_t {
   kTooLarge,       ///< States a message of more than 2^28 bytes.
   kBadCount,       ///< No fragments, more fragments than bytes, or a number beyond the last.
   kOutOfBounds,    ///< Offset and size reach beyond the stated size, or wrap.
-  kContradictory,  ///< States another size or number of fragments than the ones before.
-  kRepeated,       ///< A fragment that was there already.
+  kContradictory,  ///< States another size, number of fragments or content than the ones before.
+  kRepeated,       ///< A fragment that was there already: harmless, two routes to one group.
   kOverlapping,    ///< Bytes that another fragment has brought.
   kNoRoom,         ///< Reassembly is full: dropped by the rules of UdpmReassembler.
   kIncomplete,     ///< Fragments of a message that did not come in time; counted once a message.
@@ -27,6 +27,9 @@ inline constexpr std::size_t kDatagramFaults = 12;
 
 /// Name of the fault as HEALTH shows it, lower_snake with `datagram_` in front.
 std::string_view to_string(DatagramFault fault);
+
+/// False for what costs nothing and is only counted: a repetition.
+constexpr bool is_harmful(DatagramFault fault) { return fault != DatagramFault::kRepeated; }
 
 /// Counts by fault; a plain value.
 class DatagramFaults {

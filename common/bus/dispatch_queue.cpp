@@ -1,5 +1,6 @@
 #include "common/bus/dispatch_queue.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace understory::bus {
@@ -24,6 +25,12 @@ void DispatchQueue::subscribe(std::string_view channel, std::size_t queue_size,
 
 void DispatchQueue::subscribe_all(std::size_t queue_size, Bus::Handler handler) {
   subscriptions_.push_back({{}, queue_size, std::move(handler)});
+}
+
+bool DispatchQueue::takes(std::string_view channel) const {
+  return std::ranges::any_of(subscriptions_, [&](const Subscription& one) {
+    return one.channel.empty() || one.channel == channel;
+  });
 }
 
 void DispatchQueue::push(std::string_view channel, std::span<const std::uint8_t> bytes,

@@ -30,6 +30,8 @@ class DispatchQueue {
   void subscribe(std::string_view channel, std::size_t queue_size, Bus::Handler handler);
   /// The same for the messages of all channels.
   void subscribe_all(std::size_t queue_size, Bus::Handler handler);
+  /// Whether there is a subscription of this channel, or one of all.
+  bool takes(std::string_view channel) const;
   /// Copies a message to every subscription of the channel; where one is full, its oldest is
   /// dropped and counted.
   void push(std::string_view channel, std::span<const std::uint8_t> bytes,

@@ -122,7 +122,7 @@ class LiveBus::Impl {
   void join() {
     if (receiver_) return;
     receiver_ = std::make_unique<UdpmReceiver>(
-        *udpm_, url_,
+        *udpm_, url_, [this](std::string_view channel) { return queue_.takes(channel); },
         [this](std::string_view channel, std::span<const std::uint8_t> bytes,
                std::int64_t received_us) { queue_.push(channel, bytes, received_us); });
     buffer_.granted_bytes = receiver_->granted_bytes();

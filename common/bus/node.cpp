@@ -50,14 +50,23 @@ bool Node::feed(const BusMessage& message) {
   return false;
 }
 
+std::optional<wire::Refusal> Node::take(Input& input, const BusMessage& message) {
+  if (message.bytes.size() > input.options.most_bytes) {
+    return wire::Refusal{wire::Reason::kTooLarge, std::to_string(message.bytes.size()) +
+                                                      " bytes; the configuration allows " +
+                                                      std::to_string(input.options.most_bytes)};
+  }
+  return input.take(message.bytes, [&] { return admit(input, message); });
+}
+
 void Node::handle(Input& input, const BusMessage& message) {
-  std::optional<wire::Refusal> refusal;
   try {
-    refusal = input.take(message.bytes, [&] { return admit(input, message); });
+    if (const auto refusal = take(input, message)) {
+      report(refusal->reason, refusal->detail, input.channel);
+    }
   } catch (const std::exception& error) {
     report(wire::Reason::kStageFailed, error.what(), input.channel);
   }
-  if (refusal) report(refusal->reason, refusal->detail, input.channel);
 
   if (message.received_us != 0) {
     monitor_.count_latency(computer_clock_.wall_us() - message.received_us);

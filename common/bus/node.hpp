@@ -38,6 +38,9 @@ struct SubscribeOptions {
   /// One sender numbers its messages: duplicates and late comers are dropped. False for requests,
   /// which anybody may send.
   bool sequenced = true;
+  /// A larger message is refused before anything looks at it (`too_large`): what a message may cost
+  /// follows from its size.
+  std::size_t most_bytes = kLargestMessage;
   bool journaled = true;  ///< Part of the state: fed again after a restart.
 };
 
@@ -48,7 +51,9 @@ class Publisher {
   /// Without a channel: publish() must not be called.
   Publisher() = default;
   /// Sends a value. One that is not finite, or that the bus refuses, is counted and not sent.
-  void publish(const T& value) const;
+  /// Returns the bytes of the message, whether it was sent or not: a state that is recovered counts
+  /// as the first run did.
+  std::size_t publish(const T& value) const;
 
  private:
   friend class Node;
@@ -138,9 +143,9 @@ class Node {
   /// Sequence counts of an input. Throws std::logic_error for another channel.
   const SequenceCounts& sequence_counts(std::string_view channel) const;
 
-  /// Sends an encoded message whose `seq` is stamped; for Publisher.
+  /// Sends an encoded message whose `seq` is stamped and returns its bytes; for Publisher.
   template <class Wire>
-  void publish_wire(std::size_t output, Wire message);
+  std::size_t publish_wire(std::size_t output, Wire message);
 
  private:
   /// Takes the message's header to `admit`; calls the handler where that agrees.
@@ -167,6 +172,7 @@ class Node {
   void add_input(const std::string& channel, Take take, SubscribeOptions options);
   std::size_t add_output(const std::string& channel);
   void handle(Input& input, const BusMessage& message);
+  std::optional<wire::Refusal> take(Input& input, const BusMessage& message);
   bool admit(Input& input, const BusMessage& message);
   bool admit_sequence(Input& input, const wire::MessageHeader& header);
   bool admit_time(Input& input, model::Utime utime);
@@ -210,17 +216,19 @@ Publisher<T> Node::advertise(const std::string& channel) {
 }
 
 template <class Wire>
-void Node::publish_wire(std::size_t output, Wire message) {
+std::size_t Node::publish_wire(std::size_t output, Wire message) {
   message.seq = outputs_[output].next_sequence++;
-  send(outputs_[output], message.utime, wire::encode_bytes(message), wire::wire_type_of<Wire>());
+  const wire::Bytes bytes = wire::encode_bytes(message);
+  send(outputs_[output], message.utime, bytes, wire::wire_type_of<Wire>());
+  return bytes.size();
 }
 
 template <class T>
-void Publisher<T>::publish(const T& value) const {
+std::size_t Publisher<T>::publish(const T& value) const {
   if constexpr (std::is_same_v<T, typename wire::WireOf<T>::type>) {
-    node_->publish_wire(output_, value);
+    return node_->publish_wire(output_, value);
   } else {
-    node_->publish_wire(output_, wire::to_wire(value));
+    return node_->publish_wire(output_, wire::to_wire(value));
   }
 }
 

@@ -1,5 +1,6 @@
 #include "common/bus/partial_message.hpp"
 
+#include <algorithm>
 #include <iterator>
 
 namespace understory::bus {
@@ -20,7 +21,9 @@ std::optional<DatagramFault> PartialMessage::check(const Fragment& fragment) con
   if (fragment.message_size != message_size_ || fragment.count != count_) {
     return DatagramFault::kContradictory;
   }
-  if (has_come_[fragment.number]) return DatagramFault::kRepeated;
+  if (has_come_[fragment.number]) {
+    return is_identical(fragment) ? DatagramFault::kRepeated : DatagramFault::kContradictory;
+  }
   if (fragment.payload.empty()) return std::nullopt;
 
   const auto after = parts_.lower_bound(fragment.offset);
@@ -31,6 +34,14 @@ std::optional<DatagramFault> PartialMessage::check(const Fragment& fragment) con
   const auto& [offset, part] = *std::prev(after);
   if (fragment.offset - offset < part.size()) return DatagramFault::kOverlapping;
   return std::nullopt;
+}
+
+/// True where the bytes of the fragment are there already, at its place.
+bool PartialMessage::is_identical(const Fragment& fragment) const {
+  if (fragment.number == 0 && fragment.channel != channel_) return false;
+  if (fragment.payload.empty()) return true;
+  const auto part = parts_.find(fragment.offset);
+  return part != parts_.end() && std::ranges::equal(part->second, fragment.payload);
 }
 
 void PartialMessage::add(const Fragment& fragment, std::int64_t now_us) {

@@ -18,7 +18,8 @@ class PartialMessage {
   /// For the message that `first` is a part of; it is not added yet.
   explicit PartialMessage(const Fragment& first);
 
-  /// Why the fragment does not belong to what is there; none = add() may take it. O(log fragments).
+  /// Why the fragment does not belong to what is there; none = add() may take it. O(log fragments),
+  /// and O(bytes) for one that is there already.
   std::optional<DatagramFault> check(const Fragment& fragment) const;
   /// Adds a fragment that check() let pass; `now_us` on any clock that goes forward.
   void add(const Fragment& fragment, std::int64_t now_us);
@@ -40,6 +41,8 @@ class PartialMessage {
   std::int64_t touched_us() const { return touched_us_; }
 
  private:
+  bool is_identical(const Fragment& fragment) const;
+
   std::uint32_t message_size_;
   std::uint16_t count_;
   std::string channel_;

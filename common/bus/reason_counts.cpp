@@ -60,6 +60,7 @@ void ReasonCounts::set_refused(const DatagramFaults& faults) {
     if (count == 0 || faults.count_of(fault) == refused_.count_of(fault)) continue;
 
     counts_[{std::string(), std::string(to_string(fault))}] = count;
+    if (!is_harmful(fault)) continue;
     last_degraded_us_ = clock_.monotonic_us();
     last_code_ = to_string(fault);
     last_text_ = "datagrams that are no message of LCM: " + std::to_string(count) + " so far";

@@ -36,7 +36,8 @@ class ReasonCounts {
 
   /// Counts one; `channel` may be empty, `text` is for a person.
   void add(std::string_view channel, wire::Reason reason, std::string_view text);
-  /// Sets how many datagrams the bus refused so far; an increase becomes the last reason.
+  /// Sets how many datagrams the bus refused so far; an increase of a harmful one becomes the
+  /// last reason.
   void set_refused(const DatagramFaults& faults);
   /// Something is missing that has no reason of its own: a gap, a full queue.
   void add_degraded() { last_degraded_us_ = clock_.monotonic_us(); }

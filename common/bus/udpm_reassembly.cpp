@@ -43,13 +43,14 @@ UdpmReassembler::Taken UdpmReassembler::take(std::span<const std::uint8_t> datag
 
 UdpmReassembler::Taken UdpmReassembler::take_fragment(const Fragment& fragment, DatagramSender from,
                                                       std::int64_t now_us) {
-  // Does it fit to what is there?
+  // Does it fit to what is there, and does anybody want it?
   const auto known = senders_.find(from);
   if (known != senders_.end()) {
-    const auto half = known->second.messages.find(fragment.sequence);
-    if (half != known->second.messages.end()) {
-      if (const auto fault = half->second.check(fragment)) return refuse(*fault);
-    }
+    if (const auto taken = take_of_known(fragment, known->second)) return *taken;
+  }
+  if (is_unwanted(fragment)) {
+    throw_away(fragment, from, now_us);
+    return {};
   }
 
   // A place in the tables, then memory.
@@ -63,7 +64,7 @@ UdpmReassembler::Taken UdpmReassembler::take_fragment(const Fragment& fragment, 
   const std::size_t bytes = PartialMessage::cost(fragment);
   if (!make_room(bytes, sender, fragment.sequence)) {
     drop(sender->second, half);
-    if (sender->second.messages.empty()) senders_.erase(sender);
+    if (sender->second.is_idle()) senders_.erase(sender);
     return refuse(DatagramFault::kNoRoom);
   }
 
@@ -71,9 +72,52 @@ UdpmReassembler::Taken UdpmReassembler::take_fragment(const Fragment& fragment, 
   sender->second.held_bytes += bytes;
   held_bytes_ += bytes;
   if (!half->second.is_complete()) return {};
-  const Taken taken = finish(sender->second, half);
-  if (sender->second.messages.empty()) senders_.erase(sender);
-  return taken;
+  settle(fragment, sender->second, true, now_us);
+  return finish(sender->second, half);
+}
+
+const UdpmReassembler::Settled* UdpmReassembler::Sender::settled_message(
+    const Fragment& fragment) const {
+  const auto found = std::find_if(settled.rbegin(), settled.rend(), [&](const Settled& one) {
+    return one.sequence == fragment.sequence && one.message_size == fragment.message_size &&
+           one.count == fragment.count;
+  });
+  return found == settled.rend() ? nullptr : &*found;
+}
+
+/// What becomes of a fragment by what is known of its message; none = it may be added.
+std::optional<UdpmReassembler::Taken> UdpmReassembler::take_of_known(const Fragment& fragment,
+                                                                     const Sender& sender) {
+  const auto half = sender.messages.find(fragment.sequence);
+  if (half != sender.messages.end()) {
+    const auto fault = half->second.check(fragment);
+    return fault ? std::optional(refuse(*fault)) : std::nullopt;
+  }
+
+  const Settled* settled = sender.settled_message(fragment);
+  if (settled == nullptr) return std::nullopt;
+  return settled->was_given ? refuse(DatagramFault::kRepeated) : Taken{};
+}
+
+bool UdpmReassembler::is_unwanted(const Fragment& fragment) const {
+  return fragment.number == 0 && wanted_ && !wanted_(fragment.channel);
+}
+
+/// What came of the message goes, and what will come of it is known.
+void UdpmReassembler::throw_away(const Fragment& fragment, DatagramSender from,
+                                 std::int64_t now_us) {
+  if (!senders_.contains(from) && !make_place(fragment, from)) return;
+  Sender& sender = senders_[from];
+  const auto half = sender.messages.find(fragment.sequence);
+  if (half != sender.messages.end()) drop(sender, half);
+  settle(fragment, sender, false, now_us);
+}
+
+void UdpmReassembler::settle(const Fragment& fragment, Sender& sender, bool was_given,
+                             std::int64_t now_us) {
+  sender.settled.push_back(
+      {fragment.sequence, fragment.message_size, fragment.count, was_given, now_us});
+  if (sender.settled.size() > limits_.settled_of_sender) sender.settled.pop_front();
 }
 
 UdpmReassembler::Taken UdpmReassembler::finish(Sender& sender, Messages::iterator message) {
@@ -130,7 +174,7 @@ bool UdpmReassembler::make_room(std::size_t bytes, Senders::iterator sender,
     const bool is_own = largest == sender;
     if (!drop_oldest(largest->second, is_own ? &sequence : nullptr)) return false;
     faults_.add(DatagramFault::kNoRoom);
-    if (largest->second.messages.empty()) senders_.erase(largest);
+    if (largest->second.is_idle()) senders_.erase(largest);
   }
   return true;
 }
@@ -171,7 +215,12 @@ void UdpmReassembler::drop_stale(std::int64_t now_us) {
       }
       one = next;
     }
-    sender = messages.empty() ? senders_.erase(sender) : std::next(sender);
+
+    auto& settled = sender->second.settled;
+    while (!settled.empty() && now_us - settled.front().settled_us > limits_.stale_us) {
+      settled.pop_front();
+    }
+    sender = sender->second.is_idle() ? senders_.erase(sender) : std::next(sender);
   }
 }
 

@@ -3,10 +3,13 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -42,11 +45,16 @@ struct ReassemblyLimits {
   /// Half messages are given up when no fragment has come for so long [us]. Fragments are sent
   /// without a pause; this covers a sender that lost its processor.
   std::int64_t stale_us = 2000000;
+  /// Messages of one sender that were given or thrown away and of which more fragments may come.
+  std::size_t settled_of_sender = 64;
 };
 
-/// Joins fragments. When room is short the largest holder loses its oldest half message, so nobody
-/// is pushed out who holds less than an equal share; a sender that comes when the table is full
-/// takes the place of one that holds less than the newcomer brings, or is refused.
+/// Joins fragments of the channels that somebody wants; the others' are thrown away as soon as
+/// fragment 0 has named the channel. Fragments of a message that was given already (two routes to
+/// one group) are counted, not kept. When room is short the largest holder loses its oldest half
+/// message, so nobody is pushed out who holds less than an equal share; a sender that comes when
+/// the table is full takes the place of one that holds less than the newcomer brings, or is
+/// refused.
 class UdpmReassembler {
  public:
   /// A message; the views are valid until the next take() and as long as the datagram is.
@@ -54,14 +62,17 @@ class UdpmReassembler {
     std::string_view channel;
     std::span<const std::uint8_t> bytes;
   };
-  /// What became of a datagram; neither = it is kept until the others come.
+  /// Whether anybody listens to a channel.
+  using Wanted = std::function<bool(std::string_view channel)>;
+  /// What became of a datagram; neither = it is kept until the others come, or nobody wants it.
   struct Taken {
     std::optional<Message> message;
     std::optional<DatagramFault> fault;
   };
 
-  /// Nothing waits.
-  explicit UdpmReassembler(ReassemblyLimits limits = {}) : limits_(limits) {}
+  /// Nothing waits. `wanted` is asked once for each message in fragments; none = all are wanted.
+  explicit UdpmReassembler(ReassemblyLimits limits = {}, Wanted wanted = {})
+      : limits_(limits), wanted_(std::move(wanted)) {}
 
   /// Takes one datagram; `now_us` by a clock that goes forward. A fault is counted. Throws
   /// std::bad_alloc, with nothing changed but what was dropped to make room. O(log fragments +
@@ -77,14 +88,29 @@ class UdpmReassembler {
 
  private:
   using Messages = std::map<std::uint32_t, PartialMessage>;  // by sequence number
+  struct Settled {
+    std::uint32_t sequence = 0;
+    std::uint32_t message_size = 0;
+    std::uint16_t count = 0;
+    bool was_given = false;  // false: nobody wanted it
+    std::int64_t settled_us = 0;
+  };
   struct Sender {
     Messages messages;
+    std::deque<Settled> settled;  // the oldest first
     std::size_t held_bytes = 0;
+
+    bool is_idle() const { return messages.empty() && settled.empty(); }
+    const Settled* settled_message(const Fragment& fragment) const;
   };
   using Senders = std::map<DatagramSender, Sender>;
 
   Taken refuse(DatagramFault fault);
   Taken take_fragment(const Fragment& fragment, DatagramSender sender, std::int64_t now_us);
+  std::optional<Taken> take_of_known(const Fragment& fragment, const Sender& sender);
+  bool is_unwanted(const Fragment& fragment) const;
+  void throw_away(const Fragment& fragment, DatagramSender sender, std::int64_t now_us);
+  void settle(const Fragment& fragment, Sender& sender, bool was_given, std::int64_t now_us);
   Taken finish(Sender& sender, Messages::iterator message);
   bool make_place(const Fragment& fragment, DatagramSender sender);
   bool make_room(std::size_t bytes, Senders::iterator sender, std::uint32_t sequence);
@@ -93,6 +119,7 @@ class UdpmReassembler {
   void drop_stale(std::int64_t now_us);
 
   ReassemblyLimits limits_;
+  Wanted wanted_;
   Senders senders_;
   std::size_t held_bytes_ = 0;
   std::int64_t swept_us_ = 0;

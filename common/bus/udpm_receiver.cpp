@@ -40,8 +40,12 @@ class SignalsBlocked {
 
 }  // namespace
 
-UdpmReceiver::UdpmReceiver(const UdpmUrl& network, const std::string& url, Sink sink)
-    : socket_(network, url), sink_(std::move(sink)), stop_(::eventfd(0, EFD_CLOEXEC)) {
+UdpmReceiver::UdpmReceiver(const UdpmUrl& network, const std::string& url,
+                           UdpmReassembler::Wanted wanted, Sink sink)
+    : socket_(network, url),
+      sink_(std::move(sink)),
+      reassembler_({}, std::move(wanted)),
+      stop_(::eventfd(0, EFD_CLOEXEC)) {
   if (stop_ < 0) throw BusError(url + ": no descriptor left to receive with");
   try {
     const SignalsBlocked blocked;

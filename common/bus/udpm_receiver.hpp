@@ -10,8 +10,9 @@
 
 namespace understory::bus {
 
-/// Reads the socket, joins fragments, gives away whole messages. The thread is there so that a
-/// handler that takes long costs no datagram: stock Debian's socket buffer holds 208 KiB.
+/// Reads the socket, joins fragments of wanted channels, gives away whole messages. The thread is
+/// there so that a handler that takes long costs no datagram: stock Debian's socket buffer holds
+/// 208 KiB.
 class UdpmReceiver {
  public:
   /// Called with each message, in the receiving thread; the views are valid during the call only.
@@ -19,8 +20,10 @@ class UdpmReceiver {
   using Sink = std::function<void(std::string_view channel, std::span<const std::uint8_t> bytes,
                                   std::int64_t received_us)>;
 
-  /// Joins and begins to receive; signals stay with the other threads. Throws BusError.
-  UdpmReceiver(const UdpmUrl& network, const std::string& url, Sink sink);
+  /// Joins and begins to receive; signals stay with the other threads. `wanted` is called in the
+  /// receiving thread. Throws BusError.
+  UdpmReceiver(const UdpmUrl& network, const std::string& url, UdpmReassembler::Wanted wanted,
+               Sink sink);
   /// Waits for the thread: at most one batch of datagrams.
   ~UdpmReceiver();
   UdpmReceiver(const UdpmReceiver&) = delete;

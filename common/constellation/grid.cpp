@@ -30,7 +30,7 @@ void PointGrid::insert(Slot slot, const Eigen::Vector2d& point) {
   const std::uint32_t cy = cell_of(point.y());
   Tile& tile = tiles_[tile_for(cx, cy)];
   Slot& head = tile.heads[index_in_tile(cx, cy)];
-  points_[slot] = {point.x(), point.y(), head};
+  points_[slot] = {point.x(), point.y(), head, true};
   head = slot;
   ++tile.size;
 }
@@ -43,6 +43,7 @@ void PointGrid::remove(Slot slot) {
   Slot* link = &tile.heads[index_in_tile(cx, cy)];
   while (*link != slot) link = &points_[*link].next;
   *link = points_[slot].next;
+  points_[slot].is_used = false;
   if (--tile.size == 0) {
     directory_.erase(tile_key(cx, cy));
     free_tiles_.push_back(index);

@@ -43,13 +43,24 @@ class PointGrid {
   Eigen::Vector2d position(Slot slot) const { return {points_[slot].x, points_[slot].y}; }
 
   /// Calls f(slot, squared distance [m^2]) for every point within `radius_m` of (x, y), in no
-  /// meaningful order.
+  /// meaningful order. Costs the cells of the square around the circle, or all points where these
+  /// cells are far more.
   template <class F>
   void for_each_within(double x, double y, double radius_m, F&& f) const {
     const double squared = radius_m * radius_m;
     const std::uint32_t x_end = cell_of(x + radius_m);
     const std::uint32_t y_begin = cell_of(y - radius_m);
     const std::uint32_t y_end = cell_of(y + radius_m);
+    if (has_more_cells(x_end - cell_of(x - radius_m), y_end - y_begin)) {
+      for (Slot slot = 0; slot < points_.size(); ++slot) {
+        const double dx = points_[slot].x - x;
+        const double dy = points_[slot].y - y;
+        const double d = dx * dx + dy * dy;
+        if (points_[slot].is_used && d <= squared) f(slot, d);
+      }
+      return;
+    }
+
     std::uint64_t key = ~std::uint64_t{0};
     std::uint32_t tile = IndexTable::kNone;
 
@@ -104,6 +115,7 @@ class PointGrid {
     double x = 0.0;
     double y = 0.0;
     Slot next = kNoSlot;
+    bool is_used = false;
   };
   struct Tile {
     std::array<Slot, std::size_t{1} << (2 * kTileBits)> heads;
@@ -122,6 +134,11 @@ class PointGrid {
       return std::min(in_cell, cell_m_ - in_cell);
     };
     return std::max(0.0, std::min(to_border(x), to_border(y)));
+  }
+  /// Whether so many columns and rows of cells cost more than all points: radii of kilometres.
+  bool has_more_cells(std::uint32_t columns, std::uint32_t rows) const {
+    const std::uint64_t cells = std::uint64_t{columns} * rows;
+    return cells > 65536 + 4 * std::uint64_t{points_.size()};
   }
   static std::uint64_t tile_key(std::uint32_t cx, std::uint32_t cy) {
     return (std::uint64_t{cx >> kTileBits} << 32) | (cy >> kTileBits);

@@ -177,6 +177,9 @@ void TriangleNet::collect_anchors(Slot slot, const Eigen::Vector2d& position,
                           const Slot last = list.slot[list.count - 1];
                           const double farthest =
                               (grid_.position(last) - grid_.position(other)).squaredNorm();
+                          // In one place the lower ids are nearer: thousands of landmarks
+                          // there are not rewired for each that comes.
+                          if (squared == 0.0 && farthest == 0.0 && ids_[last] < ids_[slot]) return;
                           // Generous by rounding: an anchor too many costs time only.
                           if (squared <= farthest * (1.0 + 1e-9)) anchors.push_back(other);
                         });

@@ -3,9 +3,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <optional>
 
-#include "common/geometry/point_bins.hpp"
+#include "common/geometry/gated_points.hpp"
 
 namespace understory::geometry {
 namespace {
@@ -24,30 +24,37 @@ double pose_variance(const Eigen::Matrix3d& covariance, const Eigen::Vector2d& p
   return std::max(covariance(0, 0), covariance(1, 1)) + position.squaredNorm() * covariance(2, 2);
 }
 
+constexpr double kBin_m = 2.0;
+/// Limits of one round, above what any scene needs.
+constexpr std::size_t kMostCandidates = 65536;
+constexpr std::size_t kMostSearchCandidates = 8192;
+constexpr std::size_t kMostSearched = 256;
+
 class Registrar {
  public:
-  Registrar(Points reference, Points observed, const SE2WithCovariance& guess,
-            const RegistrationParameters& parameters)
-      : reference_(reference), observed_(observed), guess_(guess), parameters_(parameters) {
-    std::vector<Eigen::Vector2d> positions;
-    positions.reserve(reference.size());
-    for (const UncertainPoint& point : reference) positions.push_back(point.position_m);
-    bins_ = PointBins(positions, 4.0);
-    information_ = guess.covariance.llt().solve(Eigen::Matrix3d::Identity());
-    for (const UncertainPoint& point : reference) {
-      max_reference_variance_ = std::max(max_reference_variance_, point.variance_m2);
-    }
+  Registrar(Points reference, Points observed, const RegistrationParameters& parameters,
+            std::size_t most_candidates = kMostCandidates)
+      : reference_(reference),
+        observed_(observed),
+        parameters_(parameters),
+        most_candidates_(most_candidates) {
+    const double widest_m = parameters.max_gate_m / parameters.gate_sigmas;
+    gated_ = GatedPoints(kBin_m, widest_m * widest_m);
+    for (const UncertainPoint& point : reference) gated_.add(point.position_m, point.variance_m2);
+    gated_.sort();
   }
 
-  Registration run() {
+  Registration run(const SE2WithCovariance& guess) {
+    if (reference_.empty() || observed_.empty()) return {guess.mean, guess.covariance, {}};
+    guess_ = guess;
+    information_ = guess.covariance.llt().solve(Eigen::Matrix3d::Identity());
     Registration result{guess_.mean, guess_.covariance, {}};
     std::vector<PointPair> previous;
 
     // Pair the unambiguous points and fit the pose to them, until the pairs stay the same.
     for (int round = 0; round < parameters_.max_rounds; ++round) {
       previous = result.pairs;
-      result.pairs = pairs_at(result);
-      std::erase_if(result.pairs, [](const PointPair& pair) { return pair.ambiguous; });
+      result.pairs = unambiguous_pairs_at(result);
       if (result.pairs.empty()) break;
       refine(result);
       if (same(previous, result.pairs)) break;
@@ -74,17 +81,41 @@ class Registrar {
     for (std::uint32_t i = 0; i < observed_.size(); ++i) {
       const Eigen::Vector2d& z = observed_[i].position_m;
       const double base = observed_[i].variance_m2 + pose_variance(at.covariance, z) + floor2;
-      const double reach = parameters_.gate_sigmas * std::sqrt(base + max_reference_variance_);
       if (parameters_.gate_sigmas * std::sqrt(base) > parameters_.max_gate_m) continue;
+      if (candidates_.size() >= most_candidates_) break;
 
       const Eigen::Vector2d p = rotation * z + at.reference_T_observed.translation();
-      bins_.for_each_within(p, reach, [&](std::uint32_t r, double d2) {
+      gated_.for_each_near(p, parameters_.gate_sigmas, base, [&](std::uint32_t r, double d2) {
         const double m2 = d2 / (base + reference_[r].variance_m2);
         if (m2 > k2) return;
         const double spread = 2.0 * std::log(base + reference_[r].variance_m2);
         candidates_.push_back({m2 + spread + reference_[r].reluctance, r, i});
       });
     }
+  }
+
+  void count_candidates() {
+    reference_count_.assign(reference_.size(), 0);
+    observed_count_.assign(observed_.size(), 0);
+    for (const Candidate& c : candidates_) {
+      ++reference_count_[c.reference];
+      ++observed_count_[c.observed];
+    }
+  }
+
+  bool is_ambiguous(const Candidate& c) const {
+    return reference_count_[c.reference] > 1 || observed_count_[c.observed] > 1;
+  }
+
+  /// Those pairs of which neither end has another candidate, in order of `observed`.
+  std::vector<PointPair> unambiguous_pairs_at(const Registration& at) {
+    collect_candidates(at);
+    count_candidates();
+    std::vector<PointPair> pairs;
+    for (const Candidate& c : candidates_) {
+      if (!is_ambiguous(c)) pairs.push_back({c.reference, c.observed, false});
+    }
+    return pairs;
   }
 
   /// One to one, likeliest first. A pair is ambiguous where either end had another candidate.
@@ -96,13 +127,7 @@ class Registrar {
       return a.observed != b.observed ? a.observed < b.observed : a.reference < b.reference;
     });
 
-    // How many candidates each point has.
-    reference_count_.assign(reference_.size(), 0);
-    observed_count_.assign(observed_.size(), 0);
-    for (const Candidate& c : candidates_) {
-      ++reference_count_[c.reference];
-      ++observed_count_[c.observed];
-    }
+    count_candidates();
 
     // Each point is used once.
     reference_used_.assign(reference_.size(), false);
@@ -111,8 +136,7 @@ class Registrar {
     for (const Candidate& c : candidates_) {
       if (reference_used_[c.reference] || observed_used_[c.observed]) continue;
       reference_used_[c.reference] = observed_used_[c.observed] = true;
-      pairs.push_back({c.reference, c.observed,
-                       reference_count_[c.reference] > 1 || observed_count_[c.observed] > 1});
+      pairs.push_back({c.reference, c.observed, is_ambiguous(c)});
     }
 
     std::sort(pairs.begin(), pairs.end(),
@@ -153,20 +177,36 @@ class Registrar {
   Points observed_;
   SE2WithCovariance guess_;
   RegistrationParameters parameters_;
-  PointBins bins_;
-  Eigen::Matrix3d information_;
-  double max_reference_variance_ = 0.0;
+  std::size_t most_candidates_;
+  GatedPoints gated_;
+  Eigen::Matrix3d information_ = Eigen::Matrix3d::Zero();
   std::vector<Candidate> candidates_;
   std::vector<std::uint32_t> reference_count_, observed_count_;
   std::vector<bool> reference_used_, observed_used_;
 };
+
+/// The points nearest to the observer; all of them where they are few. In their order.
+std::vector<UncertainPoint> nearest_points(Points points) {
+  std::vector<UncertainPoint> result(points.begin(), points.end());
+  if (points.size() <= kMostSearched) return result;
+  std::vector<double> distances;
+  for (const UncertainPoint& point : points) distances.push_back(point.position_m.squaredNorm());
+  const auto last = distances.begin() + (kMostSearched - 1);
+  std::nth_element(distances.begin(), last, distances.end());
+  const double limit = *last;
+  std::erase_if(result, [limit](const UncertainPoint& point) {
+    return point.position_m.squaredNorm() > limit;
+  });
+  if (result.size() > kMostSearched) result.resize(kMostSearched);
+  return result;
+}
 
 }  // namespace
 
 Registration register_points(Points reference, Points observed, const SE2WithCovariance& guess,
                              const RegistrationParameters& parameters) {
   if (reference.empty() || observed.empty()) return {guess.mean, guess.covariance, {}};
-  return Registrar(reference, observed, guess, parameters).run();
+  return Registrar(reference, observed, parameters).run(guess);
 }
 
 Registration register_step(Points reference, Points observed, const SE2& last, const SE2& last_step,
@@ -177,18 +217,29 @@ Registration register_step(Points reference, Points observed, const SE2& last, c
   const Eigen::Matrix3d covariance = Eigen::Vector3d(t2, t2, r2).asDiagonal();
 
   // The last step repeats.
-  Registration best =
-      register_points(reference, observed, {last * last_step, covariance}, parameters);
+  Registrar all(reference, observed, parameters);
+  Registration best = all.run({last * last_step, covariance});
   if (fits(best)) return best;
 
-  // It did not: rotations on the spot.
+  // It did not: rotations on the spot, with the nearest points.
+  const std::vector<UncertainPoint> nearest = nearest_points(observed);
+  const bool has_all = nearest.size() == observed.size();
+  Registrar search(reference, nearest, parameters, kMostSearchCandidates);
+  Registration found = has_all ? best : search.run({last * last_step, covariance});
+  std::optional<SE2> best_rotation;
   const int steps = static_cast<int>(std::ceil(model.max_rotation_rad / model.sigma_rad));
   for (int step = -steps; step <= steps; ++step) {
     const SE2 rotated = last * SE2(0.0, 0.0, step * model.sigma_rad);
-    Registration tried = register_points(reference, observed, {rotated, covariance}, parameters);
+    Registration tried = search.run({rotated, covariance});
     if (tried.pairs.size() < model.min_searched_pairs) continue;
-    if (tried.pairs.size() > best.pairs.size()) best = std::move(tried);
+    if (tried.pairs.size() <= found.pairs.size()) continue;
+    found = std::move(tried);
+    best_rotation = rotated;
   }
+
+  // The best one with all points.
+  if (has_all) return found;
+  if (best_rotation) best = all.run({*best_rotation, covariance});
   return best;
 }
 

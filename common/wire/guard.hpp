@@ -47,6 +47,18 @@ const WireType& wire_type_of() {
   return type;
 }
 
+/// Bytes of one T within another message; T has a constant size.
+template <class T>
+std::size_t element_bytes() {
+  return static_cast<std::size_t>(T{}.getEncodedSize()) - sizeof(std::int64_t);
+}
+
+/// Bytes of a Message whose only list has so many Elements of a constant size.
+template <class Message, class Element>
+std::size_t bytes_with(std::size_t elements) {
+  return static_cast<std::size_t>(Message{}.getEncodedSize()) + elements * element_bytes<Element>();
+}
+
 /// Checks the bytes, then decodes them. Time and memory are linear in their number.
 template <class Message>
 Result<Message> decode_bytes(std::span<const std::uint8_t> bytes) {

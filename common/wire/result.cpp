@@ -31,6 +31,8 @@ std::string_view to_string(Reason reason) {
       return "late";
     case Reason::kClockJump:
       return "clock_jump";
+    case Reason::kTooLarge:
+      return "too_large";
     case Reason::kQueueFull:
       return "queue_full";
 

@@ -24,6 +24,7 @@ enum class Reason : std::uint8_t {
   kDuplicate,           ///< Came before.
   kLate,                ///< Came after a later one.
   kClockJump,           ///< A stamp far from the others'.
+  kTooLarge,            ///< More than the configuration allows in one message.
   kQueueFull,           ///< Shed: more came than could be handled.
   kNotSent,             ///< The bus refused it.
   kStageFailed,         ///< The stage threw.

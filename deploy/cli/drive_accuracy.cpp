@@ -53,6 +53,7 @@ void DriveAccuracyCollector::add(const io::LogEvent& event) {
     const auto update = wire::decode_message<model::MapUpdate>(event.data);
     if (!update) return;
 
+    map_.take(*update);
     ++counted_.updates[update->status];
     if (!first_map_ && update->status == model::MapUpdateStatus::kFirstMap) first_map_ = *update;
     // Those after one with its truth can never be needed.
@@ -60,7 +61,10 @@ void DriveAccuracyCollector::add(const io::LogEvent& event) {
     if (!is_tied && update->status == model::MapUpdateStatus::kUpdated) updates_.push_back(*update);
   } else if (event.channel == "MAP") {
     const auto map = wire::decode_message<model::WholeMap>(event.data);
-    if (map && map->complete) map_ = *map;
+    if (map) map_.take(*map);
+  } else if (event.channel == "MAP_DELTA") {
+    const auto delta = wire::decode_message<model::MapDelta>(event.data);
+    if (delta) map_.take(*delta);
   } else if (event.channel == "HEALTH") {
     const auto health = wire::decode_message<health_t>(event.data);
     if (health) counted_.last_health.insert_or_assign(health->process, *health);
@@ -108,8 +112,8 @@ std::optional<std::pair<geometry::SE2, MapTie>> DriveAccuracyCollector::tie() co
   if (first_map_) {
     if (const auto world_T_map = at(*first_map_)) return {{*world_T_map, MapTie::kFirstMap}};
   }
-  if (map_) {
-    for (const auto& keyframe : map_->keyframes) {
+  if (map_.has_whole()) {
+    for (const auto& keyframe : map_.map()->keyframes) {
       if (const auto world_T_map = at(keyframe)) return {{*world_T_map, MapTie::kFirstKeyframe}};
     }
   }
@@ -133,13 +137,13 @@ std::optional<DriveAccuracy> DriveAccuracyCollector::finish() const {
   for (const auto& landmark : true_landmarks_.landmarks) {
     accuracy.true_landmarks_m.emplace_back(landmark.position_m[0], landmark.position_m[1]);
   }
-  if (!map_) return accuracy;
-  for (const auto& keyframe : map_->keyframes) {
+  if (!map_.map()) return accuracy;
+  for (const auto& keyframe : map_.map()->keyframes) {
     const auto compared = compare(keyframe.utime, keyframe.map_T_vehicle, world_T_map);
     if (compared) accuracy.keyframes.push_back(*compared);
   }
   const sim::PointGrid grid(accuracy.true_landmarks_m, kTileM);
-  for (const auto& landmark : map_->landmarks) {
+  for (const auto& landmark : map_.map()->landmarks) {
     accuracy.landmarks_m.push_back(world_T_map * landmark.position_m);
     const auto nearest = grid.nearest(accuracy.landmarks_m.back());
     if (nearest) accuracy.landmark_errors_m.push_back(nearest->distance_m);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/io/lcm_log.hpp"
+#include "common/model/held_map.hpp"
 #include "common/model/map.hpp"
 #include "common/model/slam_output.hpp"
 #include "understory/health_t.hpp"
@@ -40,8 +41,8 @@ const char* to_string(MapTie tie);
 /// The errors of one run.
 struct DriveAccuracy {
   std::vector<ComparedPose> live;                 ///< Every localised pose of SLAM_POSE.
-  std::vector<ComparedPose> keyframes;            ///< Of the last MAP.
-  std::vector<Eigen::Vector2d> landmarks_m;       ///< Of the last MAP, frame world.
+  std::vector<ComparedPose> keyframes;            ///< Of the last MAP, later ones as published.
+  std::vector<Eigen::Vector2d> landmarks_m;       ///< By MAP and MAP_DELTA, frame world.
   std::vector<Eigen::Vector2d> true_landmarks_m;  ///< Frame world.
   std::vector<double> landmark_errors_m;          ///< To the nearest true one.
   std::uint64_t scans = 0;                        ///< Of LANDMARKS in the log.
@@ -74,7 +75,7 @@ class DriveAccuracyCollector {
   std::vector<model::SlamPose> poses_;
   std::optional<model::MapUpdate> first_map_;
   std::vector<model::MapUpdate> updates_;  ///< Localised ones, in the order of the log.
-  std::optional<model::WholeMap> map_;
+  model::HeldMap map_;
   truth_landmarks_t true_landmarks_{};
   std::optional<std::int64_t> last_scan_;
   DriveAccuracy counted_;

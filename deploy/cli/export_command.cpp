@@ -40,7 +40,7 @@ void write(const std::filesystem::path& file, const std::string& text) {
 
 void export_as(const std::string& format, const SlamResults& results,
                const std::filesystem::path& out) {
-  const model::WholeMap& map = *results.map;
+  const model::WholeMap& map = *results.map.map();
   if (format == "tum") {
     write(out / "live.tum", to_tum(live_trajectory(results)));
     write(out / "keyframes.tum", to_tum(keyframe_trajectory(map)));
@@ -57,7 +57,14 @@ void run(const ExportOptions& options) {
   terminal::catch_interrupts();
   try {
     const auto results = read_results(options.log);
-    if (!results.map) fail(fmt::format("{}: no whole MAP in it (run replay first)", options.log));
+    if (!results.map.map()) {
+      fail(fmt::format("{}: neither a whole MAP nor the start of one in it (run replay first)",
+                       options.log));
+    }
+    if (results.map.missed() > 0) {
+      fmt::print(stderr, "{}: {} changes of the map are missing: some landmarks may be old\n",
+                 options.log, results.map.missed());
+    }
     std::filesystem::create_directories(options.out);
     for (const auto& format : options.formats) export_as(format, results, options.out);
   } catch (const io::LogError& error) {

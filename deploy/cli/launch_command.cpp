@@ -92,11 +92,12 @@ std::vector<launch::ProcessSpec> process_specs(const LaunchOptions& options) {
   return specs;
 }
 
-/// A directory for each process's state; only under the lock, since others may be using them.
-void prepare_state(const LaunchOptions& options, const std::vector<launch::ProcessSpec>& specs) {
-  for (const auto& spec : specs) {
-    if (options.fresh) std::filesystem::remove_all(options.state / spec.name);
-    std::filesystem::create_directories(options.state / spec.name);
+/// A directory for each process's state; only under the lock, since others may be using them, and
+/// on a bus that can be heard: a launch that cannot run deletes nothing.
+void prepare_state(const LaunchOptions& options, const launch::Supervisor& supervisor) {
+  for (const auto& process : supervisor.status()) {
+    if (options.fresh) std::filesystem::remove_all(options.state / process.name);
+    std::filesystem::create_directories(options.state / process.name);
   }
 }
 
@@ -157,12 +158,12 @@ void launch_processes(const LaunchOptions& options) {
 
   const StopSignals signals;
   launch::Registry registry(options.state);
-  prepare_state(options, specs);
   LaunchReport report(options.quiet);
   launch::Supervisor supervisor(
       std::move(specs), {},
       [&](const std::string& process, const std::string& text) { report.add(process, text); });
   HealthListener health = listen(options, supervisor);
+  prepare_state(options, supervisor);
   supervisor.start(registry.read(), Clock::now());
   run(supervisor, registry, signals, health, report);
 

@@ -42,12 +42,16 @@ void SlamResults::add(const io::LogEvent& event) {
     if (pose && pose->is_localised()) poses.push_back(*pose);
   } else if (event.channel == "MAP") {
     const auto whole = wire::decode_message<model::WholeMap>(event.data);
-    if (whole && whole->complete) map = *whole;
+    if (whole) map.take(*whole);
+  } else if (event.channel == "MAP_DELTA") {
+    const auto delta = wire::decode_message<model::MapDelta>(event.data);
+    if (delta) map.take(*delta);
   } else if (event.channel == "KEYFRAME") {
     const auto keyframe = wire::decode_message<model::Keyframe>(event.data);
     if (keyframe) keyframes.insert_or_assign(keyframe->sequence, *keyframe);
   } else if (event.channel == "SLAM_UPDATE") {
     const auto update = wire::decode_message<model::MapUpdate>(event.data);
+    if (update) map.take(*update);
     const bool fused = update && (update->status == model::MapUpdateStatus::kFirstMap ||
                                   update->status == model::MapUpdateStatus::kUpdated);
     if (fused) updates.push_back(*update);
@@ -103,23 +107,23 @@ std::string keyframes_csv(const model::WholeMap& map) {
 
 std::string to_g2o(const SlamResults& results) {
   std::string out;
-  if (!results.map) return out;
+  if (!results.map.map()) return out;
+  const model::WholeMap& map = *results.map.map();
 
   std::uint64_t next = 0;
-  for (const auto& one : results.map->keyframes) {
+  for (const auto& one : map.keyframes) {
     fmt::format_to(std::back_inserter(out), "VERTEX_SE2 {} {:.9g} {:.9g} {:.9g}\n",
                    one.keyframe_sequence, one.map_T_vehicle.x(), one.map_T_vehicle.y(),
                    one.map_T_vehicle.theta());
     next = std::max(next, one.keyframe_sequence + 1);
   }
 
-  if (!results.map->keyframes.empty()) {
-    fmt::format_to(std::back_inserter(out), "FIX {}\n",
-                   results.map->keyframes.front().keyframe_sequence);
+  if (!map.keyframes.empty()) {
+    fmt::format_to(std::back_inserter(out), "FIX {}\n", map.keyframes.front().keyframe_sequence);
   }
 
   std::map<model::LandmarkId, std::uint64_t> vertices;
-  for (const auto& one : results.map->landmarks) {
+  for (const auto& one : map.landmarks) {
     vertices[one.id] = next;
     fmt::format_to(std::back_inserter(out), "VERTEX_XY {} {:.9g} {:.9g}\n", next++,
                    one.position_m.x(), one.position_m.y());

@@ -2,11 +2,11 @@
 #pragma once
 
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/io/lcm_log.hpp"
+#include "common/model/held_map.hpp"
 #include "common/model/keyframe.hpp"
 #include "common/model/slam_output.hpp"
 
@@ -15,7 +15,7 @@ namespace understory::cli {
 /// The output of the last mapper run in a log.
 struct SlamResults {
   std::vector<model::SlamPose> poses;  ///< As published live, localised ones.
-  std::optional<model::WholeMap> map;  ///< The last one.
+  model::HeldMap map;                  ///< By MAP and all that came after it.
   std::vector<std::pair<model::Utime, geometry::SE2>>
       truth;                                           ///< world_T_vehicle, where the log has it.
   std::map<std::uint64_t, model::Keyframe> keyframes;  ///< By number.

@@ -23,7 +23,7 @@ class AssociatorAdapter : public bus::Adapter {
                                           if (const auto tracked = stage_->add(scan))
                                             tracked_.publish(*tracked);
                                         },
-                                        {.queue_size = 200});
+                                        {.queue_size = 200, .most_bytes = most_bytes()});
     // A lost increment is a gap in the motion: a long queue.
     node.subscribe<model::Odometry>(
         channels_.odometry, [this](const model::Odometry& increment) { stage_->add(increment); },
@@ -38,6 +38,11 @@ class AssociatorAdapter : public bus::Adapter {
   void load(const std::string& state) override { stage_->load(state); }
 
  private:
+  std::size_t most_bytes() const {
+    return wire::bytes_with<landmarks_t, detection_t>(
+        static_cast<std::size_t>(parameters_.max_detections));
+  }
+
   AssociatorChannels channels_;
   AssociatorParameters parameters_;
   std::optional<Associator> stage_;

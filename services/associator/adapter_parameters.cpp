@@ -43,6 +43,9 @@ void describe(AssociatorParameters& p, bus::ParameterTable& table) {
             "A track that moves against wheels and gyro is not published. Where fewer than three "
             "stationary tracks are in view, a track is published once this speed would have been "
             "noticed. 0: no check.");
+  table.add("input.max_detections", p.max_detections, {1, 1000000}, "",
+            "LANDMARKS with more detections is refused and counted (too_large): what a message may "
+            "cost is bounded. A laser of 2048 columns cannot show 700 trunks.");
 
   table.renamed("max_turn_rad", "max_rotation_rad");
 }

@@ -5,13 +5,17 @@
 #include <cmath>
 #include <limits>
 
-#include "common/geometry/point_bins.hpp"
+#include "common/geometry/gated_points.hpp"
 
 namespace understory::associator {
 namespace {
 
 constexpr double kGateFloor_m = 0.03;
 constexpr double kBin_m = 4.0;
+/// A track with a larger variance is searched by itself.
+constexpr double kVague_m2 = 1.0;
+/// More than any scan needs; observations behind these begin tracks.
+constexpr std::size_t kMostCandidates = 65536;
 constexpr double kNone = std::numeric_limits<double>::infinity();
 
 /// A pair inside the gate.
@@ -32,6 +36,7 @@ class Matcher {
           const geometry::SE2WithCovariance& pose, const AssociatorParameters& parameters)
       : tracks_(tracks),
         by_observation_(observations.size()),
+        by_track_(tracks.size()),
         partner_(observations.size(), kFree),
         owner_(tracks.size(), kFree) {
     collect(observations, pose, parameters.gate_sigmas);
@@ -65,17 +70,13 @@ class Matcher {
   void collect(std::span<const Observation> observations, const geometry::SE2WithCovariance& pose,
                double sigmas) {
     // The tracks, sorted into bins.
-    std::vector<Eigen::Vector2d> positions;
-    double track_variance = 0.0;
-    for (const Track& track : tracks_) {
-      positions.push_back(track.position_m);
-      track_variance = std::max(track_variance, track.variance_m2());
-    }
-    const geometry::PointBins bins(positions, kBin_m);
+    geometry::GatedPoints gated(kBin_m, kVague_m2);
+    for (const Track& track : tracks_) gated.add(track.position_m, track.variance_m2());
+    gated.sort();
 
     // Each observation in the axes of `local`, with the covariance of the pose.
     const Eigen::Matrix2d rotation = pose.mean.rotation();
-    for (std::uint32_t i = 0; i < observations.size(); ++i) {
+    for (std::uint32_t i = 0; i < observations.size() && all_.size() < kMostCandidates; ++i) {
       Eigen::Matrix<double, 2, 3> by_pose;
       by_pose << Eigen::Matrix2d::Identity(), geometry::perpendicular(observations[i].position_m);
       const Eigen::Matrix2d base =
@@ -84,9 +85,8 @@ class Matcher {
               rotation.transpose() +
           kGateFloor_m * kGateFloor_m / (sigmas * sigmas) * Eigen::Matrix2d::Identity();
       const Eigen::Vector2d at = pose.mean * observations[i].position_m;
-      const double reach = sigmas * std::sqrt(base.trace() + track_variance);
 
-      bins.for_each_within(at, reach, [&](std::uint32_t t, double) {
+      gated.for_each_near(at, sigmas, base.trace(), [&](std::uint32_t t, double) {
         const Track& track = tracks_[t];
         if (track.kind != observations[i].kind) return;
         const Eigen::Matrix2d spread = base + track.variance_m2() * Eigen::Matrix2d::Identity();
@@ -98,6 +98,7 @@ class Matcher {
         const Candidate c{distance + std::log(spread.determinant()) + reluctance, i, t};
         all_.push_back(c);
         by_observation_[i].push_back(c);
+        by_track_[t].push_back(c);
       });
     }
   }
@@ -147,14 +148,14 @@ class Matcher {
     }
 
     // Another observation, without a track, may be this track's instead.
-    for (std::uint32_t j = 0; j < partner_.size(); ++j) {
-      if (j != i && partner_[j] == kFree && cost(j, own) - now < margin_) return true;
-    }
-    return false;
+    return std::ranges::any_of(by_track_[own], [&](const Candidate& c) {
+      return c.observation != i && partner_[c.observation] == kFree && c.cost - now < margin_;
+    });
   }
 
   std::span<const Track> tracks_;
   std::vector<std::vector<Candidate>> by_observation_;
+  std::vector<std::vector<Candidate>> by_track_;
   std::vector<Candidate> all_;
   std::vector<std::uint32_t> partner_;  ///< Track of each observation.
   std::vector<std::uint32_t> owner_;    ///< Observation of each track.

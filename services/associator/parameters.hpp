@@ -26,6 +26,7 @@ struct AssociatorParameters {
   double min_likelihood_ratio = 1000.0;
   /// Speed of somebody who walks; 0: no track is checked for motion (motion_check.hpp).
   double walking_mps = 0.8;
+  int max_detections = 2000;  ///< Of one LANDMARKS message.
 };
 
 }  // namespace understory::associator

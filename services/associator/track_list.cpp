@@ -78,6 +78,7 @@ std::vector<model::TrackId> TrackList::update(std::span<const Observation> obser
     if (is_steady(track)) published[i] = track.id;
   }
 
+  drop_excess(matched);
   drop(local_T_vehicle, view);
   return published;
 }
@@ -143,6 +144,19 @@ void TrackList::confirm(Track& track) {
   const auto window = static_cast<unsigned>(std::clamp(parameters_.confirm_window, 1, 63));
   const std::uint64_t recent = track.history & window_mask(window);
   if (std::popcount(recent) >= parameters_.confirm_matches) track.id = next_id_++;
+}
+
+/// Beyond kMostTracks the oldest go that the scan did not match.
+void TrackList::drop_excess(std::span<const std::uint8_t> matched) {
+  if (tracks_.size() <= kMostTracks) return;
+  std::size_t excess = tracks_.size() - kMostTracks;
+  std::size_t next = 0;
+  std::erase_if(tracks_, [&](const Track&) {
+    const std::size_t i = next++;
+    const bool goes = excess > 0 && i < matched.size() && !matched[i];
+    if (goes) --excess;
+    return goes;
+  });
 }
 
 void TrackList::drop(const geometry::SE2& local_T_vehicle, const model::FieldOfView& view) {

@@ -75,9 +75,13 @@ struct Match {
 using MotionSince =
     std::function<std::optional<geometry::SE2WithCovariance>(model::Utime then_utime)>;
 
-/// Owns the tracks and their life: begin, confirmation, end. Bounded by the range of the sensor.
+/// Owns the tracks and their life: begin, confirmation, end. Bounded by the range of the sensor,
+/// and by kMostTracks.
 class TrackList {
  public:
+  /// More than any scene has, with scans of 2,000 false detections each.
+  static constexpr std::size_t kMostTracks = 4096;
+
   /// No tracks; the first id is 1.
   explicit TrackList(const AssociatorParameters& parameters) : parameters_(parameters) {}
 
@@ -116,6 +120,7 @@ class TrackList {
   bool is_steady(const Track& track) const;
   bool stands_in(const Track& track, std::span<const std::uint8_t> matched) const;
   void confirm(Track& track);
+  void drop_excess(std::span<const std::uint8_t> matched);
   void drop(const geometry::SE2& local_T_vehicle, const model::FieldOfView& view);
 
   AssociatorParameters parameters_;

@@ -67,6 +67,7 @@ void ActiveMap::rejoin(const model::TrackedScan& scan, const Pairing& pairing, F
 void ActiveMap::add_new(const model::TrackedScan& scan, double distance_m, const ScanUpdate& update,
                         FilterState& state, EkfCounters& counters) {
   const Eigen::Matrix2d rotation = rotation_of(state.heading);
+  bool is_full = false;
   for (std::size_t k = 0; k < update.observations.size(); ++k) {
     if (update.is_settled[k] || aliases_.landmark_of(state, update.tracks[k])) continue;
 
@@ -74,7 +75,9 @@ void ActiveMap::add_new(const model::TrackedScan& scan, double distance_m, const
     const Eigen::Vector2d displaced = observation.height_m * level_displacement() * state.level;
     const Eigen::Vector2d position =
         state.position + rotation * (observation.position_m - displaced);
-    if (is_near_old(state, position) || !make_room(scan.field_of_view, state, counters)) {
+    const bool is_too_near = is_full || is_near_old(state, position);
+    if (!is_too_near) is_full = !make_room(scan.field_of_view, state, counters);
+    if (is_too_near || is_full) {
       ++counters.landmarks_too_near;
       continue;
     }
@@ -117,7 +120,8 @@ bool ActiveMap::is_near_old(const FilterState& state, const Eigen::Vector2d& pos
   });
 }
 
-/// True if a landmark may be added.
+/// True if a landmark may be added. One that this scan observed does not make room for another one
+/// of it.
 bool ActiveMap::make_room(const model::FieldOfView& view, FilterState& state,
                           EkfCounters& counters) {
   const auto& landmarks = state.landmarks();
@@ -127,7 +131,7 @@ bool ActiveMap::make_room(const model::FieldOfView& view, FilterState& state,
   std::optional<std::size_t> oldest;
   const Eigen::Matrix2d back = rotation_of(state.heading).transpose();
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
-    if (landmarks[i].is_ground_mark()) continue;
+    if (landmarks[i].is_ground_mark() || landmarks[i].last_scan == scan_number_) continue;
     if (view.contains(back * (landmarks[i].position - state.position))) continue;
     if (!oldest || landmarks[i].last_scan < landmarks[*oldest].last_scan) oldest = i;
   }

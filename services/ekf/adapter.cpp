@@ -26,7 +26,7 @@ class EkfAdapter : public bus::Adapter {
     node.subscribe<model::TrackedScan>(
         channels_.tracked_landmarks,
         [this](const model::TrackedScan& scan) { publish(stage_->add(scan)); },
-        {.queue_size = 200});
+        {.queue_size = 200, .most_bytes = most_bytes()});
     poses_ = node.advertise<model::EkfPose>(channels_.pose);
     maps_ = node.advertise<model::EkfMap>(channels_.map);
     levels_ = node.advertise<model::EkfLevel>(channels_.level);
@@ -37,6 +37,11 @@ class EkfAdapter : public bus::Adapter {
   void load(const std::string& state) override { stage_->load(state); }
 
  private:
+  std::size_t most_bytes() const {
+    return wire::bytes_with<tracked_landmarks_t, tracked_landmark_t>(
+        static_cast<std::size_t>(parameters_.max_detections));
+  }
+
   void publish(const EkfOutput& output) {
     const EkfCounters& counters = stage_->counters();
     if (counters.restarts != restarts_) {

@@ -75,7 +75,7 @@ void describe(EkfGateParameters& p, bus::ParameterTable& table) {
   table.add("gate.rejoin_max_gate_m", p.rejoin_max_gate_m, {0.1, 100.0}, "m",
             "A lost landmark whose gate is wider takes no new track.");
   table.add("gate.rejoin_max_nodes", p.rejoin_max_nodes, {1, 1000000}, "",
-            "Nodes of the search for the largest compatible set.");
+            "Nodes of the searches of one scan for the largest compatible set.");
 }
 
 void describe(EkfRestartParameters& p, bus::ParameterTable& table) {
@@ -99,6 +99,9 @@ void describe(EkfParameters& parameters, bus::ParameterTable& table) {
             "How errors are measured; plain becomes too certain of the heading.");
   table.add("max_scan_delay_s", parameters.max_scan_delay_s, {0.0, 10.0}, "s",
             "Longest time that odometry waits for the scan at its end.");
+  table.add("input.max_detections", parameters.max_detections, {1, 1000000}, "",
+            "TRACKED_LANDMARKS with more detections is refused and counted (too_large): what a "
+            "message may cost is bounded. A laser of 2048 columns cannot show 700 trunks.");
   describe(parameters.prior, table);
   describe(parameters.motion, table);
   describe(parameters.map, table);

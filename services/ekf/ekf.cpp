@@ -273,10 +273,12 @@ void Ekf::update_known(const model::TrackedScan& scan, ScanUpdate& update) {
 /// Unknown tracks may be landmarks whose track was lost. Each round makes the pose more certain, so
 /// that the next one finds more.
 void Ekf::rejoin_lost(const model::TrackedScan& scan, ScanUpdate& update) {
-  const RejoinRules rules{parameters_.gate, gates_, parameters_.map.min_separation_m};
+  RejoinRules rules{parameters_.gate, gates_, parameters_.map.min_separation_m,
+                    parameters_.gate.rejoin_max_nodes};
   for (int round = 0; round < kMaxRejoinRounds; ++round) {
     auto proposal = find_rejoining(state_, scan, update, map_.scan_number(), rules);
     if (!proposal) return;
+    rules.max_nodes -= proposal->nodes;
 
     std::vector<Pairing>& pairings = proposal->pairings;
     update.refused +=

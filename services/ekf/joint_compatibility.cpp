@@ -23,9 +23,10 @@ class Search {
     whitened_ = Eigen::VectorXd::Zero(rows);
   }
 
-  std::vector<Pairing> run() {
+  CompatibleSet run() {
+    const int allowed = nodes_;
     visit(0, 0.0);
-    return best_;
+    return {best_, allowed - std::max(nodes_, 0)};
   }
 
  private:
@@ -45,6 +46,7 @@ class Search {
     // With each landmark that is still free.
     for (const std::uint32_t landmark : candidates_[level].landmarks) {
       if (is_taken(landmark)) continue;
+      if (nodes_-- <= 0) break;
       const Pairing pairing{candidates_[level].observation, landmark};
       const double more = extend(pairing);
       if (more < 0.0 || distance + more > limits_[chosen_.size() + 1]) continue;
@@ -116,10 +118,10 @@ class Search {
 
 }  // namespace
 
-std::vector<Pairing> joint_compatibility(const FilterState& state,
-                                         std::span<const Observation> observations,
-                                         std::span<const Candidates> candidates,
-                                         const CompatibilityGates& gates) {
+CompatibleSet joint_compatibility(const FilterState& state,
+                                  std::span<const Observation> observations,
+                                  std::span<const Candidates> candidates,
+                                  const CompatibilityGates& gates) {
   if (candidates.empty()) return {};
   return Search(state, observations, candidates, gates).run();
 }

@@ -15,8 +15,14 @@ struct CompatibilityGates {
   /// Largest squared Mahalanobis distance by number of pairings (set_gates()), for as many as there
   /// are observations.
   std::span<const double> limits;
-  /// Nodes visited at most; after these the best set found so far is taken.
+  /// Nodes visited and pairings tried at most; after these the best set found so far is taken.
   int max_nodes = 2000;
+};
+
+/// What the search found, and what it cost.
+struct CompatibleSet {
+  std::vector<Pairing> pairings;
+  int nodes = 0;  ///< Visited, and pairings tried.
 };
 
 /// An observation and the landmarks that it may be by itself, the most likely first.
@@ -28,9 +34,9 @@ struct Candidates {
 /// The largest set of pairings, one to one, whose innovations are compatible together; among sets
 /// of one size the one with the smallest squared distance. Exponential in the number of candidates
 /// in the worst case, therefore bounded by `max_nodes`.
-std::vector<Pairing> joint_compatibility(const FilterState& state,
-                                         std::span<const Observation> observations,
-                                         std::span<const Candidates> candidates,
-                                         const CompatibilityGates& gates);
+CompatibleSet joint_compatibility(const FilterState& state,
+                                  std::span<const Observation> observations,
+                                  std::span<const Candidates> candidates,
+                                  const CompatibilityGates& gates);
 
 }  // namespace understory::ekf

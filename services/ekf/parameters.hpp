@@ -61,7 +61,7 @@ struct EkfGateParameters {
   int rejoin_after_scans = 3;        ///< Scans without an observation after which a track is lost.
   /// Lost landmarks whose gate is wider are not searched: it would accept anything.
   double rejoin_max_gate_m = 20.0;
-  int rejoin_max_nodes = 20000;  ///< Of the search for the largest compatible set.
+  int rejoin_max_nodes = 20000;  ///< Of the searches of one scan.
 };
 
 /// When and how the filter starts again.
@@ -79,6 +79,7 @@ struct EkfParameters {
   std::string error_form = "right_invariant";
   /// Longest time that odometry waits for the scan at its end.
   double max_scan_delay_s = 0.4;
+  int max_detections = 2000;  ///< Of one TRACKED_LANDMARKS message.
   EkfPriorParameters prior;
   EkfMotionParameters motion;
   EkfMapParameters map;

@@ -9,6 +9,8 @@
 namespace understory::ekf {
 namespace {
 
+/// Of more unsettled observations the nearest ones are searched: what a scan may cost is bounded.
+constexpr std::size_t kMostUnsettled = 256;
 /// Pairings that must agree where the gates are wide.
 constexpr std::size_t kFewAgree = 3;
 
@@ -49,6 +51,23 @@ LostLandmarks lost_landmarks(const FilterState& state, const model::FieldOfView&
   return lost;
 }
 
+/// Those that no landmark explains yet, ascending.
+std::vector<std::uint32_t> unsettled_observations(const ScanUpdate& update) {
+  std::vector<std::uint32_t> unsettled;
+  for (std::uint32_t k = 0; k < update.observations.size(); ++k) {
+    if (!update.is_settled[k]) unsettled.push_back(k);
+  }
+  if (unsettled.size() <= kMostUnsettled) return unsettled;
+
+  const auto distance = [&](std::uint32_t k) {
+    return std::pair(update.observations[k].position_m.squaredNorm(), k);
+  };
+  std::ranges::nth_element(unsettled, unsettled.begin() + kMostUnsettled, {}, distance);
+  unsettled.resize(kMostUnsettled);
+  std::ranges::sort(unsettled);
+  return unsettled;
+}
+
 /// Unsettled observations and the lost landmarks that each may be, those with the fewest choices
 /// first.
 struct Choices {
@@ -59,8 +78,7 @@ struct Choices {
 Choices choices(const FilterState& state, const model::TrackedScan& scan, const ScanUpdate& update,
                 const LostLandmarks& lost, const Gates& gates) {
   Choices choices;
-  for (std::uint32_t k = 0; k < update.observations.size(); ++k) {
-    if (update.is_settled[k]) continue;
+  for (const std::uint32_t k : unsettled_observations(update)) {
     const model::LandmarkKind kind = update.detection(scan, k).kind;
     std::vector<std::pair<double, std::uint32_t>> near;
     for (const LostLandmark& one : lost.landmarks) {
@@ -109,8 +127,10 @@ std::optional<RejoinProposal> find_rejoining(const FilterState& state,
   // The largest set that is compatible together.
   RejoinProposal proposal;
   proposal.observations = with_bend(update.observations, lost.rotation_variance);
-  proposal.pairings = joint_compatibility(state, proposal.observations, found.candidates,
-                                          {rules.gates.rejoin, rules.parameters.rejoin_max_nodes});
+  CompatibleSet set = joint_compatibility(state, proposal.observations, found.candidates,
+                                          {rules.gates.rejoin, rules.max_nodes});
+  proposal.pairings = std::move(set.pairings);
+  proposal.nodes = set.nodes;
 
   // Where the gates are wide, a few agree by chance.
   const bool is_wide = found.widest_gate_m > 2.0 * rules.min_separation_m;

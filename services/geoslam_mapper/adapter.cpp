@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <memory>
 
+#include "common/model/held_map.hpp"
 #include "services/geoslam_mapper/adapter_parameters.hpp"
 #include "services/geoslam_mapper/geoslam_mapper.hpp"
+#include "services/geoslam_mapper/map_budget.hpp"
 #include "services/geoslam_mapper/map_difference.hpp"
 #include "services/geoslam_mapper/pose_publishing.hpp"
 #include "understory/map_request_t.hpp"
@@ -24,7 +26,16 @@ void cut(model::WholeMap& map, const map_request_t& request) {
   map.complete = false;
 }
 
-constexpr state::Format kFormat{"geoslam_mapper", 2};
+/// Members for which a KEYFRAME has room beside its landmarks; usual are 8.
+constexpr std::size_t kMembers = 64;
+
+/// Bytes of a MAP with so many parts.
+std::size_t map_bytes(std::size_t landmarks, std::size_t keyframes) {
+  return wire::bytes_with<map_t, map_landmark_t>(landmarks) +
+         keyframes * wire::element_bytes<keyframe_pose_t>();
+}
+
+constexpr state::Format kFormat{"geoslam_mapper", 3};
 
 /// What a holder of every MAP_DELTA has.
 struct KnownMap {
@@ -44,13 +55,18 @@ struct Memory {
   KnownMap known;
   OdometryFrame odometry;
   JumpWatch jumps;
+  MapBudget budget;
   bool map_is_published = true;
+  bool map_is_due = false;  ///< It started or jumped since it was last published.
+  std::uint64_t keyframes = 0;
   model::Utime newest_pose_utime = -1;
+  model::Utime earned_pose_utime = -1;  ///< Poses up to it are in the budget.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
-    a(s.known, s.odometry, s.jumps, s.map_is_published, s.newest_pose_utime);
+    a(s.known, s.odometry, s.jumps, s.budget, s.map_is_published, s.map_is_due, s.keyframes,
+      s.newest_pose_utime, s.earned_pose_utime);
   }
 };
 
@@ -60,6 +76,7 @@ class MapperAdapter : public bus::Adapter {
 
   void describe(bus::ParameterTable& table) override {
     geoslam_mapper::describe(parameters_, table);
+    geoslam_mapper::describe(input_, table);
     geoslam_mapper::describe(output_, table);
   }
 
@@ -69,10 +86,12 @@ class MapperAdapter : public bus::Adapter {
     subscribe(node);
     advertise(node);
     node.every(static_cast<model::Utime>(output_.map_period_s * 1e6),
-               [this](model::Utime /*now*/) { publish_changed_map(); });
+               [this](model::Utime /*now*/) { publish_map_within_budget(); });
   }
 
-  void finish() override { publish_changed_map(); }
+  void finish() override {
+    if (!memory_.map_is_published) publish_map();
+  }
 
   std::string save() const override { return state::save(kFormat, memory_, stage_->save()); }
 
@@ -88,17 +107,24 @@ class MapperAdapter : public bus::Adapter {
   Memory empty_memory() const {
     Memory memory;
     memory.jumps = JumpWatch(output_.reset_distance_m, output_.reset_angle_rad);
+    memory.budget = MapBudget(output_.map_share);
     return memory;
   }
 
   void subscribe(bus::Node& node) {
+    const auto most_landmarks = static_cast<std::size_t>(input_.max_keyframe_landmarks);
+    const auto most_detections = static_cast<std::size_t>(input_.max_detections);
     node.subscribe<model::Keyframe>(
-        channels_.keyframe, [this](const model::Keyframe& one) { add(one); }, {.queue_size = 200});
+        channels_.keyframe, [this](const model::Keyframe& one) { add(one); },
+        {.queue_size = 200,
+         .most_bytes = wire::bytes_with<keyframe_t, keyframe_landmark_t>(most_landmarks) +
+                       kMembers * wire::element_bytes<keyframe_member_t>()});
 
     // Not in the journal: a scan changes nothing in the map, and the next one is located anew.
-    node.subscribe<model::LandmarkScan>(channels_.landmarks,
-                                        [this](const model::LandmarkScan& scan) { locate(scan); },
-                                        {.journaled = false});
+    node.subscribe<model::LandmarkScan>(
+        channels_.landmarks, [this](const model::LandmarkScan& scan) { locate(scan); },
+        {.most_bytes = wire::bytes_with<landmarks_t, detection_t>(most_detections),
+         .journaled = false});
 
     // Small, and each one that is lost breaks the chain of motion: a long queue.
     node.subscribe<model::Odometry>(channels_.odometry,
@@ -128,7 +154,7 @@ class MapperAdapter : public bus::Adapter {
 
   void add(const model::Keyframe& keyframe) {
     const model::MapUpdate update = stage_->add(keyframe);
-    updates_.publish(update);
+    memory_.budget.earn(updates_.publish(update));
     memory_.jumps.add(keyframe, update);
     publish_poses(keyframe, update);
     publish_delta(update);
@@ -147,10 +173,19 @@ class MapperAdapter : public bus::Adapter {
 
   void publish_poses(const model::Keyframe& keyframe, const model::MapUpdate& update) {
     for (model::SlamPose& pose : poses_of(keyframe, update)) {
+      earn(pose);
       // Keyframes may share scans; the stamp always grows.
       if (pose.utime <= memory_.newest_pose_utime) continue;
       publish(pose);
     }
+  }
+
+  /// Each scan's pose counts once and with its keyframe, whether it was published then or before:
+  /// scans are not in the journal, and the budget shall be the same after a restart.
+  void earn(const model::SlamPose& pose) {
+    if (pose.utime <= memory_.earned_pose_utime) return;
+    memory_.earned_pose_utime = pose.utime;
+    memory_.budget.earn(static_cast<std::size_t>(slam_pose_t{}.getEncodedSize()));
   }
 
   void publish(model::SlamPose& pose) {
@@ -169,15 +204,21 @@ class MapperAdapter : public bus::Adapter {
             : map_difference(memory_.known.landmarks, stage_->landmarks(), update, output_.moved_m);
 
     memory_.known.utime = std::max(memory_.known.utime, update.utime);
+    if (update.status == model::MapUpdateStatus::kFirstMap ||
+        update.status == model::MapUpdateStatus::kUpdated) {
+      ++memory_.keyframes;
+    }
     const bool changes = !delta.added.empty() || !delta.moved.empty() || !delta.removed.empty() ||
                          !delta.merged.empty();
     if (!changes) return;
 
     delta.base_version = memory_.known.version;
     delta.version = ++memory_.known.version;
+    memory_.map_is_due |= delta.base_version == 0 ||
+                          displaces_most(memory_.known.landmarks, delta, output_.reset_distance_m);
     memory_.known.landmarks = with_delta(std::move(memory_.known.landmarks), delta);
     memory_.map_is_published = false;
-    deltas_.publish(delta);
+    memory_.budget.earn(deltas_.publish(delta));
   }
 
   model::WholeMap whole_map() const {
@@ -189,10 +230,17 @@ class MapperAdapter : public bus::Adapter {
     return map;
   }
 
-  void publish_changed_map() {
+  void publish_map_within_budget() {
     if (memory_.map_is_published) return;
+    const bool is_due = memory_.map_is_due && memory_.budget.may_borrow();
+    const std::size_t bytes = map_bytes(memory_.known.landmarks.size(), memory_.keyframes);
+    if (is_due || memory_.budget.affords(bytes)) publish_map();
+  }
+
+  void publish_map() {
+    memory_.budget.spend(maps_.publish(whole_map()));
     memory_.map_is_published = true;
-    maps_.publish(whole_map());
+    memory_.map_is_due = false;
   }
 
   void answer(const map_request_t& request) {
@@ -203,6 +251,7 @@ class MapperAdapter : public bus::Adapter {
 
   MapperChannels channels_;
   MapperParameters parameters_;
+  MapperInputParameters input_;
   MapperOutputParameters output_;
   std::unique_ptr<MapperMethod> stage_;
   Memory memory_;

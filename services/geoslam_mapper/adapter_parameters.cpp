@@ -151,9 +151,22 @@ void describe(MapperParameters& parameters, bus::ParameterTable& table) {
   describe_renamed(table);
 }
 
+void describe(MapperInputParameters& parameters, bus::ParameterTable& table) {
+  table.add("input.max_detections", parameters.max_detections, {1, 1000000}, "",
+            "LANDMARKS with more detections is refused and counted (too_large): what a message may "
+            "cost is bounded. A laser of 2048 columns cannot show 700 trunks.");
+  table.add("input.max_keyframe_landmarks", parameters.max_keyframe_landmarks, {1, 1000000}, "",
+            "The same for the landmarks of a KEYFRAME; more than 64 members take their room.");
+}
+
 void describe(MapperOutputParameters& parameters, bus::ParameterTable& table) {
   table.add("output.map_period_s", parameters.map_period_s, {0.05, 3600.0}, "s",
-            "MAP is published at most this often (message time), where it has changed.");
+            "Without a request MAP is published at most this often (message time), where the map "
+            "has changed ...");
+  table.add("output.map_share", parameters.map_share, {0.0, 0.9}, "",
+            "... and as rarely as keeps its bytes below this share of all that the mapper sends. A "
+            "map that starts, or that jumps by more than output.reset_distance_m, may borrow one "
+            "MAP. 0: then, on request and at the end only.");
   table.add("output.moved_m", parameters.moved_m, {0.0, 10.0}, "m",
             "MAP_DELTA leaves out landmarks that moved less since they were last in it.");
   table.add("output.reset_distance_m", parameters.reset_distance_m, {0.001, 1000.0}, "m",

@@ -6,9 +6,16 @@
 
 namespace understory::geoslam_mapper {
 
+/// How much one message may hold; documented as MapperParameters is.
+struct MapperInputParameters {
+  int max_detections = 2000;
+  int max_keyframe_landmarks = 1000;
+};
+
 /// What the adapter decides itself; documented as MapperParameters is.
 struct MapperOutputParameters {
   double map_period_s = 2.0;
+  double map_share = 0.1;  ///< Of all bytes that the mapper sends.
   double moved_m = 0.001;
   double reset_distance_m = 0.5;
   double reset_angle_rad = 0.05;
@@ -16,6 +23,8 @@ struct MapperOutputParameters {
 
 /// Adds the parameters of the methods to the table, with their older names.
 void describe(MapperParameters& parameters, bus::ParameterTable& table);
+/// Adds the parameters of the inputs to the table.
+void describe(MapperInputParameters& parameters, bus::ParameterTable& table);
 /// Adds the parameters of the outputs to the table.
 void describe(MapperOutputParameters& parameters, bus::ParameterTable& table);
 

@@ -12,7 +12,7 @@ int main(int argc, char** argv) {
           .map_request = "MAP_REQUEST",  // in: asks for MAP now
           .slam_pose = "SLAM_POSE",      // out: the vehicle's pose at each sweep
           .slam_update = "SLAM_UPDATE",  // out: what became of each keyframe
-          .map = "MAP",                  // out: the whole map, on change and on request
+          .map = "MAP",                  // out: the whole map, rarely and on request
           .map_delta = "MAP_DELTA",      // out: what changed, per keyframe
       }),
       argc, argv);

@@ -62,26 +62,14 @@ model::MapDelta map_change(const std::vector<model::MapLandmark>& before,
   return delta;
 }
 
-std::vector<model::MapLandmark> with_delta(std::vector<model::MapLandmark> landmarks,
-                                           const model::MapDelta& delta) {
-  const auto put = [&](const model::MapLandmark& landmark) {
-    const auto place = first_not_below(landmarks, landmark.id);
-    if (place != landmarks.end() && place->id == landmark.id) {
-      *place = landmark;
-    } else {
-      landmarks.insert(place, landmark);
-    }
-  };
-  const auto drop = [&](model::LandmarkId id) {
-    const auto place = first_not_below(landmarks, id);
-    if (place != landmarks.end() && place->id == id) landmarks.erase(place);
-  };
-
-  for (const model::MapLandmark& landmark : delta.added) put(landmark);
-  for (const model::MapLandmark& landmark : delta.moved) put(landmark);
-  for (const model::LandmarkId id : delta.removed) drop(id);
-  for (const auto& [old_id, new_id] : delta.merged) drop(old_id);
-  return landmarks;
+bool displaces_most(const std::vector<model::MapLandmark>& before, const model::MapDelta& delta,
+                    double distance_m) {
+  const auto displaced = std::ranges::count_if(delta.moved, [&](const model::MapLandmark& now) {
+    const auto old = first_not_below(before, now.id);
+    return old != before.end() && old->id == now.id &&
+           (old->position_m - now.position_m).norm() > distance_m;
+  });
+  return 2 * static_cast<std::size_t>(displaced) > before.size();
 }
 
 }  // namespace understory::geoslam_mapper

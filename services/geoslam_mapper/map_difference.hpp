@@ -19,8 +19,9 @@ model::MapDelta map_change(const std::vector<model::MapLandmark>& before,
                            const std::vector<model::MapLandmark>& changed,
                            const model::MapUpdate& update, double moved_m);
 
-/// `landmarks` as a holder has them after `delta`: in order of id.
-std::vector<model::MapLandmark> with_delta(std::vector<model::MapLandmark> landmarks,
-                                           const model::MapDelta& delta);
+/// Whether the change displaces most landmarks of `before` (in order of id) by more than
+/// `distance_m`: the map as a whole has jumped. O(moved * log(map)).
+bool displaces_most(const std::vector<model::MapLandmark>& before, const model::MapDelta& delta,
+                    double distance_m);
 
 }  // namespace understory::geoslam_mapper

@@ -22,7 +22,7 @@ class KeyframerAdapter : public bus::Adapter {
                                           if (const auto keyframe = stage_->add(scan))
                                             keyframes_.publish(*keyframe);
                                         },
-                                        {.queue_size = 200});
+                                        {.queue_size = 200, .most_bytes = most_bytes()});
     // Increments are small, and a lost one breaks the chain of motion: a long queue.
     node.subscribe<model::Odometry>(channels_.odometry,
                                     [this](const model::Odometry& motion) { stage_->add(motion); },
@@ -40,6 +40,11 @@ class KeyframerAdapter : public bus::Adapter {
   void load(const std::string& state) override { stage_->load(state); }
 
  private:
+  std::size_t most_bytes() const {
+    return wire::bytes_with<landmarks_t, detection_t>(
+        static_cast<std::size_t>(parameters_.max_detections));
+  }
+
   KeyframerChannels channels_;
   KeyframerParameters parameters_;
   std::unique_ptr<KeyframerMethod> stage_;

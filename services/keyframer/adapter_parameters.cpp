@@ -56,6 +56,9 @@ void describe(KeyframerParameters& parameters, bus::ParameterTable& table) {
       "method", parameters.method, {"joint", "baseline"},
       "joint: scans and landmarks are estimated together; baseline: the method of the GeoSLAM "
       "thesis (section 4.2).");
+  table.add("input.max_detections", parameters.max_detections, {1, 1000000}, "",
+            "LANDMARKS with more detections is refused and counted (too_large): what a message may "
+            "cost is bounded. A laser of 2048 columns cannot show 700 trunks.");
   describe_joint(parameters.joint, table);
   describe_baseline(parameters.baseline, table);
 

@@ -33,6 +33,7 @@ struct JointKeyframerParameters {
 /// Parameters of the process: the method and the parameters of each method.
 struct KeyframerParameters {
   std::string method = "joint";  ///< "joint" or "baseline".
+  int max_detections = 2000;     ///< Of one LANDMARKS message.
   BaselineKeyframerParameters baseline;
   JointKeyframerParameters joint;
 };

@@ -54,6 +54,33 @@ class StampingBus : public MemoryBus {
 
 }  // namespace
 
+TEST_CASE("a message beyond what the configuration allows is refused unread, and counted") {
+  MemoryBus bus;
+  NodeOptions options;
+  options.process = "bounded";
+  Node node(bus, options, no_clock());
+  int taken = 0;
+  const std::size_t bytes = wire::bytes_with<landmarks_t, detection_t>(3);
+  node.subscribe<landmarks_t>("LANDMARKS", [&](const landmarks_t&) { ++taken; },
+                              {.most_bytes = bytes});
+  node.connect();
+  landmarks_t scan{};
+  for (const std::size_t size : {3, 4, 1000}) {
+    scan.detections.resize(size);
+    scan.num_detections = static_cast<std::int32_t>(size);
+    ++scan.seq;
+    const wire::Bytes encoded = wire::encode_message(scan);
+    CHECK((encoded.size() == bytes) == (size == 3));
+    bus.publish("LANDMARKS", encoded);
+    bus.drain();
+  }
+  CHECK(taken == 1);
+  CHECK(node.monitor().count_of("LANDMARKS", wire::Reason::kTooLarge) == 2);
+  const health_t health = node.health();
+  CHECK(health.last_error_code == "too_large");
+  CHECK(health.state == health_t::STATE_DEGRADED);
+}
+
 TEST_CASE("latency is the time from the arrival of a message to the end of its handler") {
   StampingBus bus(5'000'000);
   const Clock clock{[] { return std::int64_t{5'000'700}; }, [] { return std::int64_t{0}; }};

@@ -133,7 +133,8 @@ TEST_CASE("Joint compatibility finds what trying everything finds", "[ekf][jcbb]
     observations.pop_back();
     std::vector<Candidates> candidates;
     for (std::uint32_t k = 0; k < observations.size(); ++k) candidates.push_back({k, {0, 1, 2, 3}});
-    const auto found = joint_compatibility(state, observations, candidates, {limits, 100000});
+    const auto found =
+        joint_compatibility(state, observations, candidates, {limits, 200000}).pairings;
     // Every assignment: 4 = none.
     std::size_t best = 0;
     double least = std::numeric_limits<double>::infinity();

@@ -5,6 +5,7 @@
 #include <random>
 #include <set>
 
+#include "common/model/held_map.hpp"
 #include "services/geoslam_mapper/map_difference.hpp"
 #include "services/geoslam_mapper/pose_publishing.hpp"
 #include "tests/catch.hpp"

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <random>
 
+#include "common/model/held_map.hpp"
 #include "services/geoslam_mapper/map_difference.hpp"
 #include "services/keyframer/joint/joint_keyframer.hpp"
 #include "sim/drive.hpp"

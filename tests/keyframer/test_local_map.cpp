@@ -1,4 +1,7 @@
 // The life of a track: begun, matched, merged with its double, dropped.
+#include <algorithm>
+#include <random>
+
 #include "services/keyframer/joint/local_map.hpp"
 #include "tests/catch.hpp"
 
@@ -17,6 +20,25 @@ model::LandmarkScan scan_of(const std::vector<Eigen::Vector2d>& places) {
     detection.covariance_m2 = 0.01 * Eigen::Matrix3d::Identity();
   }
   return scan;
+}
+
+/// Those within the noise of an older one and never detected with it, by trying all pairs.
+std::vector<TrackNumber> doubtful_by_force(const LocalMap& map, std::vector<TrackNumber> ids) {
+  std::ranges::sort(ids);
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  std::vector<TrackNumber> doubtful;
+  for (const TrackNumber young : ids) {
+    const Track* b = map.find(young);
+    if (b == nullptr) continue;
+    const bool is_doubtful = std::ranges::any_of(ids, [&](TrackNumber old) {
+      const Track* a = map.find(old);
+      if (a == nullptr || old >= young || (a->detected_bits & b->detected_bits) != 0) return false;
+      const double gate2 = 16.0 * std::max(a->detection_variance_m2, b->detection_variance_m2);
+      return (a->position_m - b->position_m).squaredNorm() <= std::min(gate2, 4.0);
+    });
+    if (is_doubtful) doubtful.push_back(young);
+  }
+  return doubtful;
 }
 
 }  // namespace
@@ -53,8 +75,7 @@ TEST_CASE("Two tracks that are never detected together become one", "[keyframer]
   const auto first = map.add(scan_of({{10.0, 0.0}}), {}, {});
   const auto second = map.add(scan_of({{10.3, 0.0}}), {}, {});
   REQUIRE(map.find(second[0]) != nullptr);
-  CHECK(map.is_doubtful(*map.find(second[0])));
-  CHECK_FALSE(map.is_doubtful(*map.find(first[0])));
+  CHECK(map.doubtful() == second);
 
   // Detected in turns, until both were in view often enough.
   const std::vector<geometry::PointPair> to_first{{0, 0}};
@@ -64,7 +85,7 @@ TEST_CASE("Two tracks that are never detected together become one", "[keyframer]
     if (map.find(second[0]) != nullptr) map.add(scan_of({{10.3, 0.0}}), to_second, {});
   }
   CHECK(map.find(second[0]) == nullptr);
-  CHECK(map.resolved(second[0]) == first[0]);
+  CHECK(map.resolved(second) == first);
   CHECK(map.find(first[0])->observations >= 7);
 }
 
@@ -75,7 +96,7 @@ TEST_CASE("Two tracks that are detected together stay two", "[keyframer][map]") 
   const std::vector<geometry::PointPair> pairs{{0, 0}, {1, 1}};
   for (int k = 0; k < 10; ++k) map.add(scan, pairs, {});
   REQUIRE(map.find(tracks[1]) != nullptr);
-  CHECK_FALSE(map.is_doubtful(*map.find(tracks[1])));
+  CHECK(map.doubtful().empty());
 }
 
 TEST_CASE("A track out of range is dropped, and its number is not used again", "[keyframer][map]") {
@@ -87,4 +108,37 @@ TEST_CASE("A track out of range is dropped, and its number is not used again", "
   CHECK(second[0] > first[0]);
   map.clear();
   CHECK(map.add(scan_of({{10.0, 0.0}}), {}, {})[0] > second[0]);
+}
+
+TEST_CASE("Doubtful tracks are those that trying all pairs finds", "[keyframer][map]") {
+  std::mt19937_64 random(6);
+  std::uniform_real_distribution<double> place(-15.0, 15.0);
+  LocalMap map(4.0);
+  std::vector<TrackNumber> ids;
+  for (int scan = 0; scan < 5; ++scan) {
+    std::vector<Eigen::Vector2d> places;
+    for (int i = 0; i < 200; ++i) places.emplace_back(place(random), place(random));
+    const auto added = map.add(scan_of(places), {}, {});
+    ids.insert(ids.end(), added.begin(), added.end());
+    const auto expected = doubtful_by_force(map, ids);
+    REQUIRE(map.doubtful() == expected);
+    if (scan > 0) CHECK(expected.size() > 10);
+  }
+}
+
+TEST_CASE("The map is bounded, even where nothing is ever in view", "[keyframer][map]") {
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> place(-30.0, 30.0);
+  LocalMap map(4.0);
+  for (int scan = 0; scan < 12; ++scan) {
+    std::vector<Eigen::Vector2d> places;
+    for (int i = 0; i < 2000; ++i) places.emplace_back(place(random), place(random));
+    auto unseen = scan_of(places);
+    unseen.field_of_view.width_rad = 1e-6;
+    const auto added = map.add(unseen, {}, {});
+    CHECK(map.reference_points().size() <= LocalMap::kMostTracks);
+    CHECK(map.find(added.front()) != nullptr);  // The newest stay.
+    CHECK(map.find(added.back()) != nullptr);
+  }
+  CHECK(map.doubtful().size() > 0);
 }

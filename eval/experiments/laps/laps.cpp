@@ -30,6 +30,10 @@ constexpr model::Utime kScan_us = 100'000;
 
 using Truth = std::function<geometry::SE2(model::Utime)>;
 
+double mib_of(const std::string& bytes) {
+  return static_cast<double>(bytes.size()) / (1024.0 * 1024.0);
+}
+
 double heap_mib() {
   const struct mallinfo2 info = ::mallinfo2();
   return static_cast<double>(info.uordblks + info.hblkhd) / (1024.0 * 1024.0);
@@ -176,6 +180,7 @@ void drive_laps(const LapsOptions& options, const std::atomic<bool>& stop, Progr
   const auto end_lap = [&](int number, double hours) {
     laps.push_back(counter.take(number, hours));
     progress.states = chain.save();
+    laps.back().mapper_state_mib = mib_of(progress.states.at(kMapper));
     progress.map_T_world = counter.map_T_world();
     store_progress(options, progress);
     done(laps.back());
@@ -241,6 +246,7 @@ void repeat_lap(const LapsOptions& options, const std::atomic<bool>& stop, Progr
     if (hours < kStretch_h * (rows + 1) && hours < options.hours) continue;
     progress.stretches.push_back(counter.take(rows + 1, hours));
     progress.states = chain.save();
+    progress.stretches.back().mapper_state_mib = mib_of(progress.states.at(kMapper));
     progress.map_T_world = counter.map_T_world();
     store_progress(options, progress);
     done(progress.stretches.back());

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
+
+#include "common/geometry/point_rows.hpp"
 
 namespace understory::keyframer::joint {
 namespace {
@@ -18,6 +21,11 @@ constexpr double kReluctance = 8.0;
 constexpr int kMergeViews = 6;
 constexpr double kMaxMergeDistance2_m2 = 4.0;
 constexpr std::size_t kMaxMergeMemory = 4096;
+/// Merges in one scan; others wait for the next one.
+constexpr std::size_t kMostMerges = 64;
+/// More tracks than this around one within whose noise they may be: nothing tells them apart.
+constexpr std::size_t kCrowd = 64;
+constexpr double kBin_m = 1.0;
 /// A track that was not detected again in so many views was noise.
 constexpr int kNoiseViews = 16;
 /// Tracks are kept up to this multiple of the sensor's range.
@@ -35,6 +43,37 @@ void take(Track& track, const model::Detection& detection, const geometry::SE2& 
   track.detection_variance_m2 += (plane_variance(detection) - track.detection_variance_m2) / weight;
   track.radius_m += (detection.radius_m - track.radius_m) / weight;
 }
+
+/// The tracks around a place that may be within the noise of one there.
+class Neighbourhood {
+ public:
+  Neighbourhood(std::span<const Track> tracks, double gate_sigmas) {
+    std::vector<Eigen::Vector2d> positions;
+    double variance_m2 = 0.0;
+    for (const Track& track : tracks) {
+      positions.push_back(track.position_m);
+      variance_m2 = std::max(variance_m2, track.detection_variance_m2);
+    }
+    rows_ = geometry::PointRows(positions, kBin_m);
+    reach_m_ =
+        std::sqrt(std::min(gate_sigmas * gate_sigmas * variance_m2, kMaxMergeDistance2_m2)) + 1e-9;
+  }
+
+  bool is_crowd(const Eigen::Vector2d& place) const {
+    return rows_.count_around(place, reach_m_) > kCrowd;
+  }
+  /// Indices of the tracks, ascending.
+  std::vector<std::size_t> around(const Eigen::Vector2d& place) const {
+    std::vector<std::size_t> near;
+    rows_.for_each_within(place, reach_m_, [&](std::uint32_t i, double) { near.push_back(i); });
+    std::ranges::sort(near);
+    return near;
+  }
+
+ private:
+  geometry::PointRows rows_;
+  double reach_m_ = 0.0;
+};
 
 }  // namespace
 
@@ -91,6 +130,7 @@ std::vector<TrackNumber> LocalMap::add(const model::LandmarkScan& scan,
   // The map stays clean and bounded.
   merge_doubles();
   drop_distant(scan.field_of_view.max_range_m, local_T_vehicle.translation());
+  drop_excess();
   return track_of;
 }
 
@@ -121,33 +161,54 @@ bool LocalMap::within_noise(const Track& a, const Track& b) const {
   return (a.position_m - b.position_m).squaredNorm() <= std::min(gate2, kMaxMergeDistance2_m2);
 }
 
-bool LocalMap::is_doubtful(const Track& track) const {
-  for (const Track& older : tracks_) {
-    if (older.id >= track.id) break;
-    if (within_noise(older, track) && (older.detected_bits & track.detected_bits) == 0) return true;
+std::vector<TrackNumber> LocalMap::doubtful() const {
+  const Neighbourhood neighbourhood(tracks_, gate_sigmas_);
+  std::vector<TrackNumber> result;
+  for (std::size_t young = 0; young < tracks_.size(); ++young) {
+    const Track& track = tracks_[young];
+    const auto is_perhaps = [&](std::size_t old) {
+      return old < young && within_noise(tracks_[old], track) &&
+             (tracks_[old].detected_bits & track.detected_bits) == 0;
+    };
+    if (neighbourhood.is_crowd(track.position_m) ||
+        std::ranges::any_of(neighbourhood.around(track.position_m), is_perhaps)) {
+      result.push_back(track.id);
+    }
   }
-  return false;
+  return result;
 }
 
-/// Two tracks within the noise of each other that were never detected together, over enough scans
-/// that had both in view, are one landmark.
+/// Within the noise of each other and never detected together, over enough scans that had both in
+/// view.
+bool LocalMap::is_double(const Track& a, const Track& b) const {
+  return within_noise(a, b) && (a.detected_bits & b.detected_bits) == 0 &&
+         std::popcount(a.in_view_bits & b.in_view_bits) >= kMergeViews;
+}
+
+/// Two tracks that are doubles of each other are one landmark: the older one.
 void LocalMap::merge_doubles() {
-  for (std::size_t young = 1; young < tracks_.size(); ++young) {
+  const Neighbourhood neighbourhood(tracks_, gate_sigmas_);
+  std::vector<std::size_t> moved;  // By a merge: they may have left their neighbourhood.
+  std::vector<bool> is_gone(tracks_.size(), false);
+  for (std::size_t young = 1; young < tracks_.size() && moved.size() < kMostMerges; ++young) {
     const Track& b = tracks_[young];
     if (b.observations < 2 || std::popcount(b.in_view_bits) < kMergeViews) continue;
+    if (neighbourhood.is_crowd(b.position_m)) continue;
 
-    for (std::size_t old = 0; old < young; ++old) {
-      Track& a = tracks_[old];
-      if (!within_noise(a, b)) continue;
-      if ((a.detected_bits & b.detected_bits) != 0) continue;
-      if (std::popcount(a.in_view_bits & b.in_view_bits) < kMergeViews) continue;
-      absorb(a, b);
-      tracks_.erase(tracks_.begin() + static_cast<std::ptrdiff_t>(young));
-      --young;
+    std::vector<std::size_t> near = neighbourhood.around(b.position_m);
+    near.insert(near.end(), moved.begin(), moved.end());
+    std::ranges::sort(near);
+    for (const std::size_t old : near) {
+      if (old >= young || is_gone[old] || !is_double(tracks_[old], b)) continue;
+      absorb(tracks_[old], b);
+      is_gone[young] = true;
+      moved.push_back(old);
       break;
     }
   }
 
+  std::size_t index = 0;
+  if (!moved.empty()) std::erase_if(tracks_, [&](const Track&) { return is_gone[index++]; });
   if (merged_.size() > kMaxMergeMemory) {
     merged_.erase(merged_.begin(), merged_.begin() + kMaxMergeMemory / 2);
   }
@@ -172,11 +233,29 @@ void LocalMap::drop_distant(double max_range_m, const Eigen::Vector2d& vehicle_m
   });
 }
 
-TrackNumber LocalMap::resolved(TrackNumber id) const {
-  for (const auto& [from, to] : merged_) {
-    if (from == id) id = to;
+void LocalMap::drop_excess() {
+  if (tracks_.size() <= kMostTracks) return;
+  std::size_t excess = tracks_.size() - kMostTracks;
+  std::erase_if(tracks_, [&](const Track& track) {
+    const bool goes = excess > 0 && (track.detected_bits & 1U) == 0;
+    if (goes) --excess;
+    return goes;
+  });
+}
+
+std::vector<TrackNumber> LocalMap::resolved(std::span<const TrackNumber> ids) const {
+  std::vector<std::pair<TrackNumber, TrackNumber>> by_old = merged_;
+  std::ranges::sort(by_old);
+  std::vector<TrackNumber> result(ids.begin(), ids.end());
+  for (TrackNumber& id : result) {
+    // A track is merged once, into an older one: each step goes on from there.
+    for (auto step = by_old.begin(); step != by_old.end();) {
+      step = std::ranges::lower_bound(by_old, id, {}, [](const auto& one) { return one.first; });
+      if (step == by_old.end() || step->first != id) break;
+      id = step->second;
+    }
   }
-  return id;
+  return result;
 }
 
 const Track* LocalMap::find(TrackNumber id) const {

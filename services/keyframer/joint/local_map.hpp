@@ -34,15 +34,18 @@ struct Track {
 };
 
 /// A rolling map of tracks in the frame `local`, which drifts slowly. Bounded: tracks behind the
-/// vehicle are dropped.
+/// vehicle are dropped, and beyond kMostTracks the oldest of those that the scan did not detect.
 class LocalMap {
  public:
+  /// More than any scene has; a keyframe's worth of scans with 1,000 false detections each.
+  static constexpr std::size_t kMostTracks = 8192;
+
   /// Two tracks within `gate_sigmas` of their noise may be one landmark.
   explicit LocalMap(double gate_sigmas) : gate_sigmas_(gate_sigmas) {}
 
   /// Takes a scan from the pose `local_T_vehicle`. `pairs` (reference = index of a track, observed
   /// = index of a detection) update tracks; each other detection begins one. Returns the track of
-  /// each detection. Cost O(tracks^2) in the worst case, for doubles.
+  /// each detection. Cost O(tracks * log(tracks)), wherever they are.
   std::vector<TrackNumber> add(const model::LandmarkScan& scan,
                                std::span<const geometry::PointPair> pairs,
                                const geometry::SE2& local_T_vehicle);
@@ -55,13 +58,15 @@ class LocalMap {
   /// or more, or all tracks where there is none of these.
   std::size_t matchable(const geometry::SE2& local_T_vehicle, const model::FieldOfView& view) const;
 
-  /// The track that `id` was merged into, or `id` itself.
-  TrackNumber resolved(TrackNumber id) const;
+  /// The tracks that these were merged into, or they themselves, in the same order.
+  /// O((ids + merged) * log(merged)).
+  std::vector<TrackNumber> resolved(std::span<const TrackNumber> ids) const;
   /// The track with this number; null where it was dropped or merged.
   const Track* find(TrackNumber id) const;
-  /// True where the track lies within the noise of an older one and was never detected together
-  /// with it: perhaps they are one landmark.
-  bool is_doubtful(const Track& track) const;
+  /// Those tracks, ascending, that lie within the noise of an older one and were never detected
+  /// together with it: perhaps they are one landmark. So are all in a crowd of which nothing says
+  /// which is which. O(tracks * log(tracks)).
+  std::vector<TrackNumber> doubtful() const;
 
   /// Members of a saved state; see common/state. The gate is configuration.
   template <class Archive, class Self>
@@ -74,7 +79,9 @@ class LocalMap {
   void begin(const model::Detection& detection, const geometry::SE2& local_T_vehicle);
   bool within_noise(const Track& a, const Track& b) const;
   void merge_doubles();
+  bool is_double(const Track& a, const Track& b) const;
   void absorb(Track& a, const Track& b);
+  void drop_excess();
   void drop_distant(double max_range_m, const Eigen::Vector2d& vehicle_m);
 
   double gate_sigmas_;

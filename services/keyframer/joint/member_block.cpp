@@ -1,7 +1,9 @@
 #include "services/keyframer/joint/member_block.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <map>
+#include <set>
 
 #include "common/geometry/decompositions.hpp"
 
@@ -13,23 +15,50 @@ namespace {
 constexpr double kOutlierChi2 = 20.7;
 constexpr int kOutlierRounds = 2;
 
+/// Landmarks of a keyframe at most: what it costs to estimate is bounded. No scene has so many.
+constexpr std::size_t kMostLandmarks = 1000;
+
+/// The members' tracks that may be landmarks, ascending: observed often enough and not doubtful. Of
+/// too many those that were observed most often.
+std::vector<TrackNumber> sure_tracks(std::span<const Member> members, const LocalMap& map,
+                                     std::uint32_t min_observations) {
+  const std::vector<TrackNumber> doubtful = map.doubtful();
+  std::vector<TrackNumber> sure;
+  for (const Member& member : members) {
+    for (const TrackNumber id : map.resolved(member.placed.tracks)) {
+      const Track* track = map.find(id);
+      if (track == nullptr || track->observations < min_observations) continue;
+      if (!std::ranges::binary_search(doubtful, id)) sure.push_back(id);
+    }
+  }
+  std::ranges::sort(sure);
+  sure.erase(std::unique(sure.begin(), sure.end()), sure.end());
+  if (sure.size() <= kMostLandmarks) return sure;
+
+  std::ranges::stable_sort(sure, std::greater(),
+                           [&](TrackNumber id) { return map.find(id)->observations; });
+  sure.resize(kMostLandmarks);
+  std::ranges::sort(sure);
+  return sure;
+}
+
 /// Collects the observations of the members, and gives each track a number as a landmark.
 class BlockBuilder {
  public:
-  BlockBuilder(const LocalMap& map, int min_observations)
-      : map_(map), min_observations_(static_cast<std::uint32_t>(min_observations)) {}
+  BlockBuilder(std::span<const Member> members, const LocalMap& map, int min_observations)
+      : map_(map), sure_(sure_tracks(members, map, static_cast<std::uint32_t>(min_observations))) {}
 
   void add(const Member& member, bool is_first) {
     const auto number = static_cast<std::uint32_t>(block_.problem.local_T_member.size());
     block_.problem.local_T_member.push_back(member.placed.local_T_vehicle);
     if (!is_first) block_.problem.motion.push_back(member.motion);
 
-    std::vector<TrackNumber> used;  // A merged track may have two detections in one scan.
+    const std::vector<TrackNumber> tracks = map_.resolved(member.placed.tracks);
+    std::set<TrackNumber> used;  // A merged track may have two detections in one scan.
     for (std::size_t i = 0; i < member.scan.detections.size(); ++i) {
-      const Track* track = map_.find(map_.resolved(member.placed.tracks[i]));
-      if (track == nullptr || !is_sure(*track)) continue;
-      if (std::find(used.begin(), used.end(), track->id) != used.end()) continue;
-      used.push_back(track->id);
+      if (!std::ranges::binary_search(sure_, tracks[i])) continue;
+      const Track* track = map_.find(tracks[i]);
+      if (!used.insert(track->id).second) continue;
 
       const model::Detection& detection = member.scan.detections[i];
       block_.problem.observations.push_back({number, landmark_of(*track),
@@ -41,10 +70,6 @@ class BlockBuilder {
   MemberBlock take() { return std::move(block_); }
 
  private:
-  bool is_sure(const Track& track) const {
-    return track.observations >= min_observations_ && !map_.is_doubtful(track);
-  }
-
   std::uint32_t landmark_of(const Track& track) {
     const auto next = static_cast<std::uint32_t>(block_.tracks.size());
     const auto [entry, fresh] = landmarks_.try_emplace(track.id, next);
@@ -56,7 +81,7 @@ class BlockBuilder {
   }
 
   const LocalMap& map_;
-  std::uint32_t min_observations_;
+  std::vector<TrackNumber> sure_;  ///< Ascending.
   MemberBlock block_;
   std::map<TrackNumber, std::uint32_t> landmarks_;
 };
@@ -94,7 +119,7 @@ bool are_covariances(const BlockEstimate& estimate) {
 
 MemberBlock adjust_members(std::span<const Member> members, const LocalMap& map,
                            int min_observations) {
-  BlockBuilder builder(map, min_observations);
+  BlockBuilder builder(members, map, min_observations);
   for (std::size_t k = 0; k < members.size(); ++k) builder.add(members[k], k == 0);
 
   MemberBlock block = builder.take();

@@ -34,7 +34,8 @@ struct MemberBlock {
 };
 
 /// Estimates the members' poses and the landmarks of their tracks together. Tracks with fewer than
-/// `min_observations` observations and doubtful ones are left out; so are outliers, by their chi^2,
+/// `min_observations` observations and doubtful ones are left out, and of more than 1000 those that
+/// were observed least; so are outliers, by their chi^2,
 /// in at most two rounds. Precondition: there is a member.
 MemberBlock adjust_members(std::span<const Member> members, const LocalMap& map,
                            int min_observations);

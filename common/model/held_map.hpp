@@ -1,0 +1,44 @@
+// What a listener has of a mapper's map.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/model/slam_output.hpp"
+
+namespace understory::model {
+
+/// `landmarks` (in order of id) as a holder has them after `delta`: in order of id again.
+/// O(changed * log(map)), and O(map) for each that is put in or taken out before the end.
+std::vector<MapLandmark> with_delta(std::vector<MapLandmark> landmarks, const MapDelta& delta);
+
+/// The map by MAP, MAP_DELTA and SLAM_UPDATE, in the order in which they were published. MAP comes
+/// rarely: landmarks follow every MAP_DELTA, keyframes of the time since MAP have the pose of their
+/// SLAM_UPDATE. A map that starts is held from its first MAP_DELTA on, without any MAP.
+class HeldMap {
+ public:
+  /// Takes the whole map; one that is cut to bounds is passed over.
+  void take(const WholeMap& map);
+  /// Takes what changed. One with an older version is passed over; one that builds on a version
+  /// that is not held is counted as missed, and taken.
+  void take(const MapDelta& delta);
+  /// Takes an accepted keyframe's pose; the update that starts a map ends the one before.
+  void take(const MapUpdate& update);
+
+  /// The map; none before the first whole one, or before a map has started.
+  const std::optional<WholeMap>& map() const { return map_; }
+  /// Whether a MAP was taken since the map started: its keyframes are those of the mapper.
+  bool has_whole() const { return has_whole_; }
+  /// How often changes were missing since the last MAP: some landmarks may be old.
+  std::uint64_t missed() const { return missed_; }
+
+ private:
+  void start();
+
+  std::optional<WholeMap> map_;
+  bool has_whole_ = false;
+  std::uint64_t missed_ = 0;
+};
+
+}  // namespace understory::model

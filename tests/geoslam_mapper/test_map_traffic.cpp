@@ -1,0 +1,162 @@
+// How often the mapper sends its map whole: by the bytes on a bus.
+#include <map>
+#include <memory>
+
+#include "common/bus/memory_bus.hpp"
+#include "common/model/held_map.hpp"
+#include "common/wire/convert.hpp"
+#include "services/geoslam_mapper/adapter.hpp"
+#include "services/geoslam_mapper/map_budget.hpp"
+#include "services/keyframer/adapter.hpp"
+#include "sim/drive.hpp"
+#include "tests/catch.hpp"
+#include "understory/map_request_t.hpp"
+
+using namespace understory;
+
+namespace {
+
+/// Keyframer and mapper on one bus, with what a listener hears.
+class MappingOnABus {
+ public:
+  explicit MappingOnABus(const std::string& mapper_toml = "") {
+    host(keyframer::keyframer_service(), "");
+    host(geoslam_mapper::geoslam_mapper_service(), mapper_toml);
+  }
+
+  void feed(const std::string& channel, const wire::Bytes& bytes) {
+    bus_.publish(channel, bytes);
+    bus_.drain();
+  }
+  /// Feeds scans first..last-1.
+  void drive(const sim::Drive& drive, std::size_t first, std::size_t last) {
+    for (std::size_t k = first; k < last; ++k) {
+      feed("LANDMARKS", wire::encode_message(drive.scan(k).scan));
+    }
+  }
+  void request(bool everything) {
+    map_request_t request{};
+    request.everything = everything ? 1 : 0;
+    request.max_m[0] = request.max_m[1] = 1.0;
+    feed("MAP_REQUEST", wire::encode_message(request));
+  }
+  void finish() {
+    for (auto& one : hosted_) one->adapter().finish();
+  }
+
+  /// Share of MAP among all that the mapper has sent.
+  double map_share() const {
+    double sum = 0.0;
+    for (const auto& [_, bytes] : bytes_) sum += bytes;
+    return sum == 0.0 ? 0.0 : bytes_.at("MAP") / sum;
+  }
+  const std::vector<model::WholeMap>& maps() const { return maps_; }
+  const model::HeldMap& held() const { return held_; }
+
+ private:
+  void host(const bus::Service& service, const std::string& toml) {
+    hosted_.push_back(std::make_unique<bus::HostedService>(service, bus_, bus::no_clock(), toml,
+                                                           service.name + ".toml"));
+    hosted_.back()->node().connect();
+  }
+  void hear(const bus::BusMessage& message) {
+    const auto found = bytes_.find(message.channel);
+    if (found == bytes_.end()) return;
+    found->second += static_cast<double>(message.bytes.size());
+    if (message.channel == "MAP") {
+      maps_.push_back(wire::decode_message<model::WholeMap>(message.bytes).value());
+      held_.take(maps_.back());
+    } else if (message.channel == "MAP_DELTA") {
+      held_.take(wire::decode_message<model::MapDelta>(message.bytes).value());
+    } else if (message.channel == "SLAM_UPDATE") {
+      held_.take(wire::decode_message<model::MapUpdate>(message.bytes).value());
+    }
+  }
+
+  std::map<std::string, double, std::less<>> bytes_{
+      {"MAP", 0.0}, {"MAP_DELTA", 0.0}, {"SLAM_POSE", 0.0}, {"SLAM_UPDATE", 0.0}};
+  std::vector<model::WholeMap> maps_;
+  model::HeldMap held_;
+  bus::MemoryBus bus_{bus::MemoryBus::Queues::kUnlimited,
+                      [this](const bus::BusMessage& message) { hear(message); }};
+  std::vector<std::unique_ptr<bus::HostedService>> hosted_;
+};
+
+/// Straight ahead: the map grows all the way.
+sim::Drive growing_drive(double length_m) {
+  sim::DriveParameters parameters;
+  parameters.forest = sim::forest_parameters(sim::ForestKind::kIntermediate);
+  parameters.path.kind = sim::PathKind::kLine;
+  parameters.path.length_m = length_m;
+  parameters.clear_the_path = true;
+  return {parameters, 5};
+}
+
+void check_same_landmarks(const model::HeldMap& held, const model::WholeMap& map) {
+  REQUIRE(held.map());
+  REQUIRE(held.map()->landmarks.size() == map.landmarks.size());
+  for (std::size_t i = 0; i < map.landmarks.size(); ++i) {
+    const auto& one = held.map()->landmarks[i];
+    CHECK(one.id == map.landmarks[i].id);
+    CHECK((one.position_m - map.landmarks[i].position_m).norm() <= 0.0011);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("the map is sent whole within its share of the bytes while it grows", "[map_traffic]") {
+  const sim::Drive drive = growing_drive(300.0);
+  MappingOnABus mapping;
+  mapping.drive(drive, 0, drive.size() / 3);
+  REQUIRE_FALSE(mapping.maps().empty());  // It started.
+
+  for (std::size_t k = drive.size() / 3; k < drive.size(); k += 100) {
+    mapping.drive(drive, k, std::min(k + 100, drive.size()));
+    CHECK(mapping.map_share() <= 0.1);
+  }
+  CHECK(mapping.maps().size() >= 3);  // A late reader finds one.
+  CHECK(mapping.held().missed() == 0);
+
+  // The last one comes at the end: who followed the changes has the same landmarks.
+  const model::HeldMap followed = mapping.held();
+  const std::size_t before = mapping.maps().size();
+  mapping.finish();
+  REQUIRE(mapping.maps().size() == before + 1);
+  check_same_landmarks(followed, mapping.maps().back());
+  CHECK(followed.map()->keyframes.size() == mapping.maps().back().keyframes.size());
+}
+
+TEST_CASE("a request for the map is answered at once, whatever the budget", "[map_traffic]") {
+  const sim::Drive drive = growing_drive(60.0);
+  MappingOnABus mapping("[output]\nmap_share = 0.0\n");
+  mapping.drive(drive, 0, drive.size());
+  REQUIRE(mapping.maps().size() == 1);  // The start.
+
+  for (std::size_t i = 0; i < 5; ++i) {
+    mapping.request(true);
+    REQUIRE(mapping.maps().size() == 2 + i);
+    CHECK(mapping.maps().back().complete);
+  }
+  check_same_landmarks(mapping.held(), mapping.maps().back());
+  mapping.request(false);
+  REQUIRE(mapping.maps().size() == 7);
+  CHECK_FALSE(mapping.maps().back().complete);
+}
+
+TEST_CASE("a budget never spends more than its share and one map", "[map_traffic]") {
+  geoslam_mapper::MapBudget budget(0.2);
+  double others = 0.0;
+  double maps = 0.0;
+  std::size_t map = 1000;
+  for (int i = 0; i < 10000; ++i) {
+    budget.earn(137);
+    others += 137.0;
+    map += 7;
+    const bool is_due = i % 50 == 0;
+    if (!(is_due && budget.may_borrow()) && !budget.affords(map)) continue;
+    budget.spend(map);
+    maps += static_cast<double>(map);
+    CHECK(maps - static_cast<double>(map) <= 0.2 * (maps + others));
+  }
+  CHECK(maps > 0.15 * (maps + others));
+}
