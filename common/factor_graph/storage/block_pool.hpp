@@ -5,13 +5,18 @@
 #include <bit>
 #include <cstddef>
 #include <memory>
+#include <new>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 namespace understory::factor_graph::storage {
 
 /// Blocks of T by size class, from chunks that are kept: once a working set has been reached,
-/// taking and giving back asks the system for nothing. Blocks are aligned to 64 bytes and hold
-/// anything at first.
+/// taking and giving back asks the system for nothing. Of large blocks only a few wait in each
+/// class and the others go back to the system: else a graph that is worked on for hours would come
+/// to hold the most that each class ever needed. Blocks are aligned to 64 bytes and hold anything
+/// at first.
 template <typename T>
 class BlockPool {
  public:
@@ -31,15 +36,27 @@ class BlockPool {
     return carve(class_size(size_class));
   }
   /// Takes back a block of take(count).
-  void give_back(T* block, std::size_t count) { free_[class_of(count)].push_back(block); }
+  void give_back(T* block, std::size_t count) {
+    const unsigned size_class = class_of(count);
+    std::vector<T*>& free = free_[size_class];
+    const std::size_t size = class_size(size_class);
+    if (size > kLarge && free.size() >= kMostLarge) {
+      large_.erase(block);
+      bytes_ -= size * sizeof(T);
+      return;
+    }
+    free.push_back(block);
+  }
 
-  /// Memory taken from the system so far [bytes]; none is given back before the end.
+  /// Memory taken from the system now [bytes].
   std::size_t bytes() const { return bytes_; }
 
  private:
   static constexpr std::size_t kAlignment = 64;
   static constexpr std::size_t kUnit = kAlignment / sizeof(T);
   static constexpr std::size_t kChunk = std::size_t{1} << 15U;
+  static constexpr std::size_t kLarge = kChunk / 4;  ///< Larger ones have chunks of their own.
+  static constexpr std::size_t kMostLarge = 4;       ///< That wait in a class.
   struct Free {
     void operator()(T* chunk) const { ::operator delete (chunk, std::align_val_t{kAlignment}); }
   };
@@ -59,9 +76,15 @@ class BlockPool {
   }
 
   T* carve(std::size_t size) {
-    if (size > kChunk / 4) return new_chunk(size);
+    if (size > kLarge) {
+      std::unique_ptr<T, Free> chunk = new_chunk(size);
+      T* block = chunk.get();
+      large_.emplace(block, std::move(chunk));
+      return block;
+    }
     if (left_ < size) {
-      next_ = new_chunk(kChunk);
+      chunks_.push_back(new_chunk(kChunk));
+      next_ = chunks_.back().get();
       left_ = kChunk;
     }
     T* block = next_;
@@ -69,14 +92,14 @@ class BlockPool {
     left_ -= size;
     return block;
   }
-  T* new_chunk(std::size_t size) {
-    T* chunk = static_cast<T*>(::operator new (size * sizeof(T), std::align_val_t{kAlignment}));
-    chunks_.emplace_back(chunk);
+  std::unique_ptr<T, Free> new_chunk(std::size_t size) {
     bytes_ += size * sizeof(T);
-    return chunk;
+    return std::unique_ptr<T, Free>(
+        static_cast<T*>(::operator new (size * sizeof(T), std::align_val_t{kAlignment})));
   }
 
   std::vector<std::unique_ptr<T, Free>> chunks_;
+  std::unordered_map<const T*, std::unique_ptr<T, Free>> large_;
   std::array<std::vector<T*>, 160> free_;
   T* next_ = nullptr;
   std::size_t left_ = 0;

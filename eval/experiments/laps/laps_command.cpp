@@ -19,7 +19,8 @@ constexpr double kFirstShare = 0.5;
 
 void print_header(const char* what) {
   fmt::print("{:<10} {:>7} {:>9} {:>9} {:>13} {:>8} {:>6} {:>7} {:>7} {:>9}\n", what, "hours",
-             "heap MiB", "p99/max ms", "ATE mm", "NEES", "poses", "unsure", "keyframes");
+             "heap MiB", "state MiB", "p99/max ms", "ATE mm", "NEES", "poses", "unsure",
+             "keyframes");
 }
 
 void print_row(const Lap& lap) {
