@@ -65,12 +65,17 @@ void write_results(const BackendOptions& options, const nlohmann::json& rows,
     names.push_back(std::filesystem::path(file).filename().string());
   }
 
-  harness::write_json(out, harness::result_document("backend",
-                                                    {{"files", names},
-                                                     {"streets", options.world_poses},
-                                                     {"seed", options.seed},
-                                                     {"checkpoints", options.settings.checkpoints}},
-                                                    rows));
+  harness::write_json(out, harness::result_document(
+                               "backend",
+                               {{"files", names},
+                                {"streets", options.world_poses},
+                                {"seed", options.seed},
+                                {"checkpoints", options.settings.checkpoints},
+                                {"relinearise_above", options.settings.smoother.relinearise_above},
+                                {"least_move", options.settings.smoother.least_move},
+                                {"iterate_above", options.settings.smoother.iterate_above},
+                                {"thorough_every", options.settings.smoother.thorough_every}},
+                               rows));
   if (options.plots) harness::plot("backend.py", {out, harness::traces_file(out).string()});
 }
 
@@ -129,6 +134,26 @@ void add_backend_experiment(CLI::App& eval) {
       .add_option("--checkpoints", options->settings.checkpoints,
                   "Moments of each run at which a batch solver looks")
       ->check(CLI::Range(0, 100'000))
+      ->capture_default_str();
+  auto& limits = options->settings.smoother;
+  command
+      .add_option("--relinearise-above", limits.relinearise_above,
+                  "IncrementalParameters: deviation of a factor from its linearisation [sigma]")
+      ->check(CLI::Range(1e-9, 1e3))
+      ->capture_default_str();
+  command
+      .add_option("--least-move", limits.least_move, "IncrementalParameters: of a variable [sigma]")
+      ->check(CLI::Range(0.0, 1e3))
+      ->capture_default_str();
+  command
+      .add_option("--iterate-above", limits.iterate_above,
+                  "IncrementalParameters: deviation from which an update goes on [sigma]")
+      ->check(CLI::Range(1e-9, 1e3))
+      ->capture_default_str();
+  command
+      .add_option("--thorough-every", limits.thorough_every,
+                  "IncrementalParameters: updates from one that compares all factors to the next")
+      ->check(CLI::Range(0, 1'000'000))
       ->capture_default_str();
   command.add_option("--seed", options->seed, "Of the simulated ones")->capture_default_str();
   command.add_option("--json", options->json, "Result file; times per update and plot beside it");
