@@ -196,10 +196,30 @@ def backend(document):
                       number(row["ms_p50"], 3), number(theirs.get("ms_p50"), 2), number(row["ms_p99"]),
                       number(theirs.get("ms_p99"), 1), number(row["ms_max"]), number(theirs.get("ms_max"), 0),
                       number(row["whole_ms"]), figure(row["chi2_final"]), f"{excess:.4f}",
-                      figure(row["chi2_dead_reckoning"]), number(row["rss_mb"], 0)))
+                      figure(row.get("chi2_odometry", row.get("chi2_dead_reckoning"))), number(row["rss_mb"], 0)))
     return table(("graph", "poses", "factors", "total s", "ISAM2 s", "p50 ms", "ISAM2 ms", "p99 ms", "ISAM2 ms", "max ms",
                   "ISAM2 ms", "one fresh factorisation ms", "chi²", "above the batch optimum %",
                   "chi² of a batch from odometry", "RSS MB"), lines)
+
+
+def backend_moments(document):
+    """The runs at their checkpoints beside the batch solutions of those moments, and where batch solvers end."""
+    lines = []
+    for row in document["rows"]:
+        if "moments" not in row:
+            continue
+        moments, theirs = row["moments"], row.get("reference", {})
+        lines.append((row["dataset"], moments["count"] - moments["unverified"], number(100 * moments["excess_p50"], 4),
+                      number(100 * moments["excess_max"], 2), number(moments["sigma_p50"], 3), number(moments["sigma_p99"], 3),
+                      number(moments["newest_m_max"], 3), number(row["ms_max_with_settle"]), number(row["refactorisation_ms"]),
+                      figure(row["chi2_batch"]), figure(row["chi2_odometry"]), figure(row.get("chi2_chordal")),
+                      figure(row.get("chi2_known")), figure(theirs.get("optimum"))))
+    if not lines:
+        return []
+    return ["", *table(("graph", "batch solutions", "chi² above them %, median", "largest", "newest pose and what it sees: sigma, "
+                        "median", "p99", "newest pose m, largest", "largest update or settle ms", "CHOLMOD refactorisation ms",
+                        "chi² of a batch from here", "from odometry", "from chordal initialisation", "stored optimum",
+                        "optimum of ISAM2's file"), lines)]
 
 
 def backend_shares(document):

@@ -68,7 +68,8 @@ SECTIONS = (
     ("landmarks-vs-error", "Error against the number of landmarks", f"{PARTITION}, ch. 4 (figures only)",
      render.landmarks_vs_error),
     ("backend", "The smoother on standard graphs", "stated figures of GTSAM's ISAM2",
-     lambda document: [*render.backend(document), "", *render.backend_shares(document)]),
+     lambda document: [*render.backend(document), *render.backend_moments(document), "",
+                       *render.backend_shares(document)]),
 )
 
 HEADER = f"""# eval/results

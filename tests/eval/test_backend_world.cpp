@@ -62,6 +62,15 @@ TEST_CASE("streets with precise odometry end at the batch optimum, as large as n
         eval::experiments::backend::run_backend(graph, "streets");
     CHECK(run.error.empty());
     CHECK(run.chi2_final < 1.001 * run.chi2_batch);
+    // Batch solvers of every moment converged, and independent starts end at the same optimum.
+    for (const auto& moment : run.moments) {
+      CHECK(moment.is_verified);
+      CHECK(moment.chi2 > (1.0 - 1e-6) * moment.chi2_batch);
+    }
+    CHECK(run.moments.back().poses == static_cast<int>(run.poses));
+    REQUIRE(run.chi2_chordal);
+    CHECK(std::abs(*run.chi2_chordal / run.chi2_batch - 1.0) < 1e-6);
+    CHECK(run.refactorisation_ms > 0.0);
     // chi^2 of 3 rows a factor less 3 a pose, the first of which is held fast.
     const double degrees =
         3.0 * (static_cast<double>(graph.factors.size()) - static_cast<double>(run.poses) + 1.0);

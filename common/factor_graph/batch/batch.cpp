@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/factor_graph/batch/sparse_cholesky.hpp"
 #include "common/factor_graph/bayes_tree/incremental_smoother.hpp"
 
 namespace understory::factor_graph::batch {
@@ -223,6 +222,12 @@ BatchReport optimise(graph::FactorGraph& graph, const BatchParameters& parameter
 
   report.ok = std::isfinite(report.chi2);
   return report;
+}
+
+SymmetricSparse hessian_of(graph::FactorGraph& graph) {
+  Equations equations(graph);
+  equations.linearise();
+  return equations.hessian();
 }
 
 }  // namespace understory::factor_graph::batch

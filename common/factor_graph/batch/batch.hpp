@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "common/factor_graph/batch/sparse_cholesky.hpp"
 #include "common/factor_graph/graph/factor_graph.hpp"
 
 namespace understory::factor_graph::batch {
@@ -34,5 +35,9 @@ struct BatchReport {
 /// Moves the graph's estimates to the optimum that they lead to; variables without factors stay. On
 /// an error the estimates are the last good ones.
 BatchReport optimise(graph::FactorGraph& graph, const BatchParameters& parameters = {});
+
+/// The graph's Hessian, linearised at the estimates: what a factorisation works on. Variables
+/// without factors are left out. O(graph).
+SymmetricSparse hessian_of(graph::FactorGraph& graph);
 
 }  // namespace understory::factor_graph::batch

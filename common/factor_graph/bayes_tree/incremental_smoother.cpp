@@ -14,9 +14,14 @@ constexpr int kSweepParts = 4;
 /// An update that has done more than this part of one factorisation's work leaves further
 /// iterations to the next one.
 constexpr double kMostWork = 0.3;
+constexpr double kEverything = -1.0;  ///< Limit that every factor is beyond.
 constexpr double kAnyWork = 1e9;      ///< Where the whole is asked for.
 constexpr double kLittleWork = 2e5;   ///< Is no reason to [flops].
-constexpr double kSettledPart = 0.2;  ///< Of the thorough updates' limit.
+/// A whole step on fresh linearisations that changes the loss by less than this part of it is the
+/// last one.
+constexpr double kSettledGain = 1e-5;
+/// Losses below this many squared sigmas per row are rounding.
+constexpr double kRounding = 1e-12;
 constexpr double kLeastUnit = 1e-4;
 constexpr double kLeastUsualUnit = 0.02;
 
@@ -127,6 +132,7 @@ void IncrementalSmoother::measure_unit() {
     rows += graph_.factor(f).rows;
   }
   pending_.chi2 = chi2;
+  pending_.rows = rows;
   pending_.unit = std::clamp(std::sqrt(chi2 / rows), kLeastUnit, 1.0);
 }
 
@@ -165,27 +171,30 @@ void IncrementalSmoother::eliminate(IncrementalUpdate& update) {
   update.flops += statistics.flops;
 }
 
-void IncrementalSmoother::solve(bool thorough) {
-  if (pending_.solve_everything || thorough) {
+void IncrementalSmoother::solve(Effort effort) {
+  const double finest = parameters_.least_move * usual_unit();
+  if (effort != Effort::kUsual || pending_.solve_everything) {
     pending_.solve_everything = false;
-    tree_.solve_everything(thorough ? parameters_.thorough_move * pending_.unit
-                                    : parameters_.least_move * usual_unit());
+    // Many small moves that are left out add up to a part of the loss.
+    const double thorough = parameters_.thorough_move * pending_.unit;
+    tree_.solve_everything(effort == Effort::kUsual      ? finest
+                           : effort == Effort::kThorough ? thorough
+                                                         : 0.0);
     return;
   }
-  const double finest = parameters_.least_move * usual_unit();
   tree_.solve({finest, parameters_.wait_below * finest, parameters_.waiting_slots});
 }
 
 /// One step; false where it was taken back.
-bool IncrementalSmoother::iterate(IncrementalUpdate& update, bool thorough) {
+bool IncrementalSmoother::iterate(IncrementalUpdate& update, Effort effort) {
   ++update.iterations;
   update.relinearised_factors += relinearisation_.run();
   eliminate(update);
-  solve(thorough);
+  solve(effort);
 
   const StepVerdict verdict = judge_.judge({parameters_.relinearise_above * usual_unit(),
                                             std::max(pending_.unit * pending_.unit, pending_.chi2),
-                                            thorough, update.iterations > 1});
+                                            effort != Effort::kUsual, update.iterations > 1});
   update.deviation = verdict.largest_deviation;
   if (verdict.is_shortened) pending_.solve_everything = true;
 
@@ -194,15 +203,15 @@ bool IncrementalSmoother::iterate(IncrementalUpdate& update, bool thorough) {
   return verdict.is_accepted;
 }
 
-IncrementalUpdate IncrementalSmoother::run(bool thorough, double most_work) {
+IncrementalUpdate IncrementalSmoother::run(Effort effort, double most_work) {
   IncrementalUpdate update;
   moved_.clear();
   is_moved_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);
-  pending_.since_thorough = thorough ? 0 : pending_.since_thorough + 1;
+  pending_.since_thorough = effort == Effort::kUsual ? pending_.since_thorough + 1 : 0;
 
   bool accepted = true;
   do {
-    accepted = iterate(update, thorough);
+    accepted = iterate(update, effort);
   } while (update.iterations < parameters_.max_iterations &&
            update.flops < std::max(kLittleWork, most_work * tree_.total_flops()) &&
            (!accepted || update.deviation > parameters_.iterate_above));
@@ -213,13 +222,15 @@ IncrementalUpdate IncrementalSmoother::run(bool thorough, double most_work) {
   return update;
 }
 
-IncrementalUpdate IncrementalSmoother::run_thoroughly(double relinearise_above) {
+IncrementalUpdate IncrementalSmoother::run_thoroughly(Effort effort) {
   begin_change();
   measure_unit();
   relinearisation_.end_sweep();
-  const double limit = relinearise_above * pending_.unit;
+  const double limit = effort == Effort::kWhole
+                           ? kEverything
+                           : parameters_.thorough_relinearise_above * pending_.unit;
   for (const int f : stale_factors(graph_, tree_.cliques(), limit)) relinearisation_.add(f);
-  return run(true, kAnyWork);
+  return run(effort, kAnyWork);
 }
 
 IncrementalUpdate IncrementalSmoother::update() {
@@ -230,25 +241,28 @@ IncrementalUpdate IncrementalSmoother::update() {
   } else if (parameters_.thorough_every > 0 &&
              pending_.since_thorough + 1 >= parameters_.thorough_every) {
     begin_sweep();
-    if (!relinearisation_.is_sweeping()) return run(true, kMostWork);
+    if (!relinearisation_.is_sweeping()) return run(Effort::kThorough, kMostWork);
   }
   // The last part of a sweep ends it as a thorough update.
-  return run(is_sweeping && !relinearisation_.is_sweeping(), kMostWork);
+  const bool is_last_part = is_sweeping && !relinearisation_.is_sweeping();
+  return run(is_last_part ? Effort::kThorough : Effort::kUsual, kMostWork);
 }
 
 IncrementalUpdate IncrementalSmoother::update_thoroughly() {
-  return run_thoroughly(parameters_.thorough_relinearise_above);
+  return run_thoroughly(Effort::kThorough);
 }
 
 IncrementalUpdate IncrementalSmoother::settle(int max_updates) {
-  const double limit = kSettledPart * parameters_.thorough_relinearise_above;
-  IncrementalUpdate update = run_thoroughly(limit);
-  const auto is_settled = [&] {
-    return update.relinearised_factors == 0 && !pending_.solve_everything &&
-           relinearisation_.is_empty();
-  };
-  for (int i = 1; i < max_updates && !is_settled(); ++i) {
-    update = run_thoroughly(limit);
+  IncrementalUpdate update;
+  for (int i = 0; i < max_updates && !update.is_settled; ++i) {
+    // What each factor is off its linearisation says nothing about the sum over a long chain: only
+    // a step on fresh linearisations does.
+    update = run_thoroughly(Effort::kWhole);
+    const double before = pending_.chi2;
+    measure_unit();
+    const double change = std::abs(before - pending_.chi2);
+    update.is_settled = !pending_.solve_everything &&
+                        change <= std::max(kSettledGain * before, kRounding * pending_.rows);
   }
   return update;
 }

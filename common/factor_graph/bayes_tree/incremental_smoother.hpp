@@ -51,6 +51,7 @@ struct IncrementalUpdate {
   long moved_variables = 0;       ///< Variables that moved.
   double flops = 0.0;             ///< Floating-point operations of the eliminations.
   double deviation = 0.0;         ///< Largest one left between factor and linearisation [sigmas].
+  bool is_settled = false;        ///< See settle().
 };
 
 /// Incremental smoother. Variables and factors are added and removed at any time; update() brings
@@ -104,7 +105,8 @@ class IncrementalSmoother {
   IncrementalUpdate update();
   /// An update with the limits of the thorough ones, and to the end. O(graph).
   IncrementalUpdate update_thoroughly();
-  /// Thorough updates until nothing has to be linearised again.
+  /// Whole steps, each on linearisations made at its start, until one changes the loss by less than
+  /// 1e-5 of it: then `is_settled`. O(graph) each, as of one factorisation.
   IncrementalUpdate settle(int max_updates = 20);
   /// Orders and factorises everything anew, linearised at the estimates, and iterates.
   IncrementalUpdate update_everything();
@@ -145,18 +147,23 @@ class IncrementalSmoother {
     bool solve_everything = false;
     int since_thorough = 0;  ///< Updates.
     double chi2 = 0.0;       ///< When it was last summed up.
+    double rows = 1.0;       ///< Of all residuals, then.
     double unit = 1.0;       ///< See IncrementalParameters [sigmas].
   };
+
+  /// How much of the graph an update looks at: what changed; all with the limits of the thorough
+  /// updates; or all, linearised anew and solved without limits.
+  enum class Effort : char { kUsual, kThorough, kWhole };
 
   void begin_change();
   void commit();
   graph::FactorId keep(graph::FactorId id);
 
-  IncrementalUpdate run_thoroughly(double relinearise_above);
-  IncrementalUpdate run(bool thorough, double most_work);
-  bool iterate(IncrementalUpdate& update, bool thorough);
+  IncrementalUpdate run_thoroughly(Effort effort);
+  IncrementalUpdate run(Effort effort, double most_work);
+  bool iterate(IncrementalUpdate& update, Effort effort);
   void eliminate(IncrementalUpdate& update);
-  void solve(bool thorough);
+  void solve(Effort effort);
   void collect_moved();
   void finish(IncrementalUpdate& update);
 
