@@ -82,6 +82,19 @@ TEST_CASE("Round stems of a cloud are found in their place", "[forest_plot]") {
   CHECK(score.whole.nees < 2.6);
 }
 
+TEST_CASE("Stations are where a vehicle has room, low shrubs and high branches or not",
+          "[forest_plot]") {
+  eval::experiments::frontend::ForestPlot plot;
+  plot.stems = {{{0.0, 0.0}, 0.15}, {{6.0, 6.0}, 0.15}};
+  plot.points = {{{2.25, 2.25, 0.9}, 0.9}, {{3.75, 3.75, 2.3}, 2.3}};
+  CHECK(plot_stations(plot, {}).size() == 16);
+  plot.points.push_back({{5.25, 0.75, 1.5}, 1.5});
+  const auto stations = plot_stations(plot, {});
+  REQUIRE(stations.size() == 15);
+  for (const Eigen::Vector2d& station : stations)
+    CHECK((station - Eigen::Vector2d(5.25, 0.75)).norm() > 0.6);
+}
+
 TEST_CASE("A stem that a cloud shows from one side only is whole from there", "[forest_plot]") {
   eval::experiments::frontend::ForestPlot plot = round_stems({{0.0, 0.0}});
   std::erase_if(plot.points, [](const eval::experiments::frontend::PlotPoint& point) {
