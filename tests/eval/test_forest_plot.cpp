@@ -105,6 +105,17 @@ TEST_CASE("A stem that a cloud shows from one side only is whole from there", "[
   CHECK(scanner.sweep({5.0, 0.0}, random).stems.front().is_whole);
   CHECK_FALSE(scanner.sweep({0.0, 5.0}, random).stems.front().is_whole);
   CHECK_FALSE(scanner.sweep({-5.0, 0.0}, random).stems.front().is_whole);
+
+  // The other side, where the bearing wraps.
+  eval::experiments::frontend::ForestPlot turned = round_stems({{0.0, 0.0}});
+  std::erase_if(turned.points, [](const eval::experiments::frontend::PlotPoint& point) {
+    return point.position_m.x() > 0.05;
+  });
+  const eval::experiments::frontend::PlotScanner other(turned, {});
+  for (const double y : {-0.1, 0.1}) {
+    CHECK(other.sweep({-5.0, y}, random).stems.front().is_whole);
+    CHECK_FALSE(other.sweep({5.0, y}, random).stems.front().is_whole);
+  }
 }
 
 TEST_CASE("Stems of a real plot are found", "[forest_plot][recorded]") {
