@@ -61,7 +61,6 @@ std::optional<PointSweep> SweepAssembler::add(PointSweep part) {
 
   if (next_part_ < pending_->parts) return std::nullopt;
   std::optional<PointSweep> whole = std::exchange(pending_, std::nullopt);
-  whole->part = 0;
   whole->parts = 1;
   return whole;
 }

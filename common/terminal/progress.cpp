@@ -26,26 +26,29 @@ std::string duration(double seconds) {
 
 }  // namespace
 
-Progress::Progress(std::string what, double total, Without without)
+Progress::Output Progress::standard_error() { return {stderr, ::isatty(STDERR_FILENO) == 1}; }
+
+Progress::Progress(std::string what, double total, Without without, const Output& output,
+                   Clock::time_point start)
     : what_(std::move(what)),
       total_(total),
       without_(without),
-      is_terminal_(::isatty(STDERR_FILENO) == 1),
-      next_(start_ + (is_terminal_ ? std::chrono::milliseconds(kQuiet) : kLine)) {}
+      output_(output),
+      start_(start),
+      next_(start_ + (output_.is_terminal ? std::chrono::milliseconds(kQuiet) : kLine)) {}
 
 Progress::~Progress() {
-  if (is_shown_) fmt::print(stderr, "\r\033[K");
+  if (is_shown_) fmt::print(output_.file, "\r\033[K");
 }
 
-void Progress::update(double done) {
+void Progress::update(double done, Clock::time_point now) {
   if (total_ <= 0.0) return;
   done_ = std::clamp(done, 0.0, total_);
-  if (is_terminal_ || without_ == Without::kSeconds) {
-    const auto now = Clock::now();
+  if (output_.is_terminal || without_ == Without::kSeconds) {
     if (now >= next_) draw(now);
   } else if (without_ == Without::kTenths) {
     const int tenths = static_cast<int>(10.0 * done_ / total_);
-    if (tenths > tenths_) fmt::print(stderr, "{}: {} %\n", what_, 10 * tenths);
+    if (tenths > tenths_) fmt::print(output_.file, "{}: {} %\n", what_, 10 * tenths);
     tenths_ = tenths;
   }
 }
@@ -63,13 +66,13 @@ void Progress::draw(Clock::time_point now) {
   const std::string line = fmt::format("{} [{:#<{}}{:.<{}}] {:3.0f} %{}", what_, "", filled, "",
                                        kWidth - filled, 100.0 * share, time_left(now));
 
-  if (is_terminal_) {
-    fmt::print(stderr, "\r\033[K{}", line);
-    std::fflush(stderr);
+  if (output_.is_terminal) {
+    fmt::print(output_.file, "\r\033[K{}", line);
+    std::fflush(output_.file);
     is_shown_ = true;
     next_ = now + kRedraw;
   } else {
-    fmt::print(stderr, "{}\n", line);
+    fmt::print(output_.file, "{}\n", line);
     next_ = now + kLine;
   }
 }

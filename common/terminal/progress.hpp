@@ -2,7 +2,7 @@
 #pragma once
 
 #include <chrono>
-#include <cstddef>
+#include <cstdio>
 #include <string>
 
 namespace understory::terminal {
@@ -13,20 +13,28 @@ class Progress {
   /// What to do where stderr is no terminal: nothing, one line for every tenth of the work, or one
   /// line every five seconds.
   enum class Without { kSilence, kTenths, kSeconds };
+  using Clock = std::chrono::steady_clock;
+  /// Where it draws; the file stays the caller's.
+  struct Output {
+    std::FILE* file = stderr;
+    bool is_terminal = false;
+  };
+  /// stderr, which may be a terminal.
+  static Output standard_error();
 
   /// `total`: the amount of work in any unit; 0 or less draws nothing.
-  Progress(std::string what, double total, Without without = Without::kSilence);
+  Progress(std::string what, double total, Without without = Without::kSilence,
+           const Output& output = standard_error(), Clock::time_point start = Clock::now());
   ~Progress();  ///< Clears the line.
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
   /// Sets the amount done; draws ten times a second at most.
-  void update(double done);
+  void update(double done, Clock::time_point now = Clock::now());
   /// Adds to the amount done.
   void advance(double steps = 1.0) { update(done_ + steps); }
 
  private:
-  using Clock = std::chrono::steady_clock;
   void draw(Clock::time_point now);
   std::string time_left(Clock::time_point now) const;
 
@@ -34,10 +42,10 @@ class Progress {
   double total_;
   double done_ = 0.0;
   Without without_;
-  bool is_terminal_;
+  Output output_;
   bool is_shown_ = false;
   int tenths_ = 0;
-  Clock::time_point start_ = Clock::now();
+  Clock::time_point start_;
   Clock::time_point next_;
 };
 

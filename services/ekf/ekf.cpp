@@ -17,8 +17,6 @@ constexpr double kStartVariance = 1e-12;
 constexpr int kMaxRejoinRounds = 4;
 /// Time that creeping may have lasted before it was found [s].
 constexpr double kUnnoticed_s = 0.1;
-/// Refused observations from which a scan may be at odds with the map.
-constexpr std::uint32_t kFewRefused = 4;
 
 ErrorForm error_form(const std::string& name) {
   if (name == "right_invariant") return ErrorForm::kRightInvariant;
@@ -300,8 +298,7 @@ void Ekf::maintain_map(const model::TrackedScan& scan, const ScanUpdate& update)
   map_.remove_stale(scan.field_of_view, state_, counters_);
 
   // Scan after scan at odds with the map: the error is larger than the covariance states.
-  const bool is_at_odds = update.refused >= kFewRefused && update.refused > 2 * update.used;
-  refused_scans_ = is_at_odds ? refused_scans_ + 1 : 0;
+  refused_scans_ = is_at_odds(update) ? refused_scans_ + 1 : 0;
   if (refused_scans_ >= parameters_.restart.after_refused_scans) {
     restart(timeline_.now(), "most landmarks were refused, scan after scan");
   }

@@ -13,6 +13,8 @@ namespace {
 constexpr double kLevelled = 0.5;
 /// Gain of a scan's change of height: it is noisy, and slopes are gentle.
 constexpr double kRiseGain = 0.2;
+/// Refused observations from which a scan may be at odds with the map.
+constexpr std::uint32_t kFewRefused = 4;
 
 bool is_usable(const model::Detection& detection) {
   if (!detection.position_m.allFinite() || !detection.covariance_m2.allFinite()) return false;
@@ -66,6 +68,10 @@ ScanUpdate read_scan(const model::TrackedScan& scan,
   }
   update.is_settled.assign(update.observations.size(), false);
   return update;
+}
+
+bool is_at_odds(const ScanUpdate& update) {
+  return update.refused >= kFewRefused && update.refused > 2 * update.used;
 }
 
 void steady_heights(FilterState& state, std::span<const Pairing> known, ScanUpdate& update) {

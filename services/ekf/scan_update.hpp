@@ -32,6 +32,10 @@ struct ScanUpdate {
 ScanUpdate read_scan(const model::TrackedScan& scan,
                      const std::optional<Eigen::Matrix2d>& level_covariance);
 
+/// True where most landmarks of the scan were refused: at least four, and more than twice as many
+/// as updated the state.
+bool is_at_odds(const ScanUpdate& update);
+
 /// Replaces the heights of known landmarks' observations by those that they were first observed at,
 /// corrected for the vehicle's rise and fall, which all landmarks have in common. The level
 /// displaces an observation by its height. Where a trunk leans, noise of the height displaces it

@@ -3,6 +3,7 @@
 #include <random>
 
 #include "services/associator/associator.hpp"
+#include "services/associator/motion_check.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
@@ -59,7 +60,56 @@ std::vector<int> times_published(const std::vector<Thing>& things, double walkin
   return published;
 }
 
+/// A track that was first observed at (20, 5), with these variances.
+Track track_with(double x_variance_m2, double y_variance_m2) {
+  Track track;
+  track.reference.position_m << 20.0, 5.0;
+  track.reference.covariance_m2.diagonal() << x_variance_m2, y_variance_m2;
+  return track;
+}
+
+/// An observation of it 0.1 s later, so far off; the vehicle has turned by `turn_rad`.
+void observe_again(Track& track, const Eigen::Vector2d& off_m, double turn_rad = 0.0) {
+  const MotionCheck check{0.1, {geometry::SE2(0.0, 0.0, turn_rad), Eigen::Matrix3d::Zero()}};
+  Observation observation;
+  observation.position_m = check.then_T_now.mean.inverse() * track.reference.position_m + off_m;
+  observation.covariance_m2.setZero();
+  check_motion(track, observation, check, {});
+}
+
 }  // namespace
+
+TEST_CASE("A contradiction is beyond chi^2 of 23, by the uncertainty along it",
+          "[associator][motion]") {
+  // With the floor of 0.03 m per axis.
+  const double x_variance_m2 = 0.0391 + 9e-4;
+  const double y_variance_m2 = 0.0001 + 9e-4;
+  for (const double chi2 : {22.9, 23.1}) {
+    const bool is_off = chi2 > 23.0;
+    for (const double turn_rad : {0.0, 0.5 * 3.14159265358979}) {
+      Track track = track_with(0.0391, 0.0001);
+      const double x_off_m = std::sqrt(chi2 * (turn_rad == 0.0 ? x_variance_m2 : y_variance_m2));
+      const double y_off_m = std::sqrt(chi2 * (turn_rad == 0.0 ? y_variance_m2 : x_variance_m2));
+      observe_again(track, {x_off_m, 0.0}, turn_rad);
+      CHECK(track.moved_in_a_row == (is_off ? 1 : 0));
+      observe_again(track, {0.0, -y_off_m}, turn_rad);
+      CHECK(track.moved_in_a_row == (is_off ? 2 : 0));
+      CHECK(track.steadiness == (is_off ? Steadiness::kMoves : Steadiness::kUnknown));
+    }
+  }
+}
+
+TEST_CASE("Only contradictions in a row mean that a track moves", "[associator][motion]") {
+  Track track = track_with(0.01, 0.01);
+  for (int k = 0; k < 3; ++k) {
+    observe_again(track, {2.0, 0.0});
+    CHECK(track.steadiness == Steadiness::kUnknown);
+    observe_again(track, {0.0, 0.0});
+  }
+  observe_again(track, {2.0, 0.0});
+  observe_again(track, {2.0, 0.0});
+  CHECK(track.steadiness == Steadiness::kMoves);
+}
 
 TEST_CASE("Somebody who walks, alone in view, is not published", "[associator][motion]") {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {

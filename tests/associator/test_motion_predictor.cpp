@@ -73,6 +73,8 @@ TEST_CASE("Without a measurement the last motion repeats in proportion to time",
   const PredictedMotion two = predictor.predict(kStart_us + 3 * kStep_us);
   CHECK(one.is_extrapolated);
   CHECK(one.last_T_now.mean.x() == Approx(0.8));
+  const Eigen::Vector3d variances = one.last_T_now.covariance.diagonal();
+  CHECK(variances.isApprox(Eigen::Vector3d(0.09, 0.09, 0.0016), 1e-6));
   CHECK(two.last_T_now.mean.x() == Approx(1.6));
   CHECK(two.last_T_now.covariance(0, 0) == Approx(4.0 * one.last_T_now.covariance(0, 0)));
 }

@@ -74,6 +74,15 @@ TEST_CASE_METHOD(Fixture, "log check finds damage and nothing where there is non
   CHECK_THAT(outcome.error, Contains("damaged.lcm"));
 }
 
+TEST_CASE_METHOD(Fixture, "replay tells of damage where there is some", "[cli]") {
+  const auto fine = run("replay " + whole + " --out " + out);
+  CHECK(fine.status == 0);
+  CHECK_THAT(fine.out, Contains("30 events read") && !Contains("damaged"));
+  const auto broken = run("replay " + damaged + " --out " + out);
+  CHECK(broken.status == 0);
+  CHECK_THAT(broken.out, Contains("29 events read") && Contains("in 1 places"));
+}
+
 TEST_CASE_METHOD(Fixture, "log repair gives a log with nothing wrong", "[cli]") {
   CHECK(run("log repair " + damaged + " --out " + out).status == 0);
   CHECK(run("log check " + out).status == 0);

@@ -201,3 +201,13 @@ TEST_CASE_METHOD(Fixture, "the Victoria Park set is imported as it is downloaded
   check_holds(events, io::read_victoria_park(archive));
   check_order(events);
 }
+
+TEST_CASE_METHOD(Fixture, "a KITTI drive is imported, and where its laser sits is told",
+                 "[cli][recording][recorded]") {
+  const fs::path folder = test::recording("kitti_raw_drive0002");
+  const auto outcome = run("import kitti " + folder.string() + " --out " + log);
+  CAPTURE(outcome.error);
+  REQUIRE(outcome.status == 0);
+  // The inverse of calib_imu_to_velo.txt.
+  CHECK_THAT(outcome.out, Contains("x 0.8105 y -0.3071 z 0.8027 m, roll"));
+}

@@ -41,3 +41,15 @@ TEST_CASE("gives up exactly at the fifth death within thirty seconds", "[launch]
     }
   }
 }
+
+TEST_CASE("a death as old as the window counts, an older one does not", "[launch]") {
+  const launch::RestartPolicyParameters parameters;
+  for (const launch::milliseconds beyond : {launch::milliseconds(0), launch::milliseconds(1)}) {
+    launch::RestartPolicy policy(parameters);
+    const launch::Clock::time_point first{};
+    for (int i = 0; i < 4; ++i) REQUIRE(policy.died(first).has_value());
+    const auto wait = policy.died(first + parameters.window + beyond);
+    CHECK(wait.has_value() == (beyond.count() > 0));
+    CHECK(policy.deaths_in_window() == (beyond.count() > 0 ? 1 : 5));
+  }
+}

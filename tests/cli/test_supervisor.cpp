@@ -62,6 +62,21 @@ TEST_CASE("a killed process is started again, the others go on", "[launch]") {
   CHECK(bench.status(0).pid != a);
   CHECK(bench.status(1).pid == b);
   CHECK_THAT(bench.said, Contains("a: killed by signal 9") && Contains("a: started again"));
+  // After the back-off of 10 ms.
+  const std::string ending = " ms after its end was noticed; restart 1";
+  REQUIRE_THAT(bench.said, Contains(ending));
+  const std::size_t end = bench.said.find(ending);
+  CHECK(std::stoi(bench.said.substr(bench.said.rfind(' ', end - 1), end)) >= 10);
+}
+
+TEST_CASE("hangs are looked for ten times a second, and what is due is in time", "[launch]") {
+  Bench bench({shell("a", "exec sleep 1000")});
+  const auto now = launch::Clock::now();
+  bench.supervisor.start({}, now);
+  CHECK(bench.supervisor.wake_up(now) == now + launch::milliseconds(100));
+  bench.supervisor.stop(now);
+  const auto late = now + launch::milliseconds(850);
+  CHECK(bench.supervisor.wake_up(late) == now + launch::milliseconds(900));
 }
 
 TEST_CASE("a process that always dies is given up with the reason", "[launch]") {
@@ -201,4 +216,7 @@ TEST_CASE("launch.toml is refused with file, line and key", "[launch]") {
                Contains(":2: name: only letters, digits, _ and -"));
   }
   CHECK(refused("[[process]]\nname = \"Mapper_2-left" + tail) == "accepted");
+  CHECK(refused("[[process]]\nname = \"" + std::string(64, 'a') + tail) == "accepted");
+  CHECK_THAT(refused("[[process]]\nname = \"" + std::string(65, 'a') + tail),
+             Contains(":2: name:"));
 }

@@ -41,6 +41,7 @@ TEST_CASE("Results do not depend on the number of jobs", "[campaign]") {
   REQUIRE(rows.size() == 2);
   CHECK(rows[1]["method"] == "oracle");
   CHECK(rows[1]["updates"] == 25);
+  CHECK(rows[1]["interval_cm"] == 100.0);
   CHECK(rows[1]["ratio"].get<double>() == 1.0);
   for (const char* key :
        {"path", "forest", "sigma_cm", "detection_pct", "interval_cm", "rpe_cm", "lpe_cm", "ratio",

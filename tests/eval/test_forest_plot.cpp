@@ -82,6 +82,19 @@ TEST_CASE("Round stems of a cloud are found in their place", "[forest_plot]") {
   CHECK(score.whole.nees < 2.6);
 }
 
+TEST_CASE("Stations are where a vehicle has room, low shrubs and high branches or not",
+          "[forest_plot]") {
+  eval::experiments::frontend::ForestPlot plot;
+  plot.stems = {{{0.0, 0.0}, 0.15}, {{6.0, 6.0}, 0.15}};
+  plot.points = {{{2.25, 2.25, 0.9}, 0.9}, {{3.75, 3.75, 2.3}, 2.3}};
+  CHECK(plot_stations(plot, {}).size() == 16);
+  plot.points.push_back({{5.25, 0.75, 1.5}, 1.5});
+  const auto stations = plot_stations(plot, {});
+  REQUIRE(stations.size() == 15);
+  for (const Eigen::Vector2d& station : stations)
+    CHECK((station - Eigen::Vector2d(5.25, 0.75)).norm() > 0.6);
+}
+
 TEST_CASE("A stem that a cloud shows from one side only is whole from there", "[forest_plot]") {
   eval::experiments::frontend::ForestPlot plot = round_stems({{0.0, 0.0}});
   std::erase_if(plot.points, [](const eval::experiments::frontend::PlotPoint& point) {
@@ -92,6 +105,17 @@ TEST_CASE("A stem that a cloud shows from one side only is whole from there", "[
   CHECK(scanner.sweep({5.0, 0.0}, random).stems.front().is_whole);
   CHECK_FALSE(scanner.sweep({0.0, 5.0}, random).stems.front().is_whole);
   CHECK_FALSE(scanner.sweep({-5.0, 0.0}, random).stems.front().is_whole);
+
+  // The other side, where the bearing wraps.
+  eval::experiments::frontend::ForestPlot turned = round_stems({{0.0, 0.0}});
+  std::erase_if(turned.points, [](const eval::experiments::frontend::PlotPoint& point) {
+    return point.position_m.x() > 0.05;
+  });
+  const eval::experiments::frontend::PlotScanner other(turned, {});
+  for (const double y : {-0.1, 0.1}) {
+    CHECK(other.sweep({-5.0, y}, random).stems.front().is_whole);
+    CHECK_FALSE(other.sweep({5.0, y}, random).stems.front().is_whole);
+  }
 }
 
 TEST_CASE("Stems of a real plot are found", "[forest_plot][recorded]") {

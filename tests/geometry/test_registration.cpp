@@ -91,6 +91,23 @@ TEST_CASE("Registration finds the motion and its covariance", "[registration]") 
   REQUIRE(nees == Approx(1.0).margin(0.2));
 }
 
+TEST_CASE("Once the pose is known, only points beside each other are ambiguous", "[registration]") {
+  std::mt19937_64 random(4);
+  std::vector<Eigen::Vector2d> places;
+  for (int i = 0; i < 36; ++i) places.emplace_back(6.0 * (i % 6) - 15.0, 6.0 * (i / 6) - 15.0);
+  std::vector<UncertainPoint> reference = uncertain(places, 0.02);
+  const SE2 truth(0.4, -0.3, 0.05);
+  const auto observed = observed_from(truth, places, 0.02, random);
+  reference.push_back({places.front() + Eigen::Vector2d(0.1, 0.0), 4e-4});
+
+  // At 21 m the guess is so uncertain that far points have to wait for near ones.
+  const SE2WithCovariance guess{SE2(), Eigen::Vector3d(0.09, 0.09, 3e-3).asDiagonal()};
+  const Registration found = register_points(reference, observed, guess);
+  REQUIRE(found.pairs.size() == observed.size());
+  REQUIRE((truth.inverse() * found.reference_T_observed).Log().norm() < 0.02);
+  for (const PointPair& pair : found.pairs) REQUIRE(pair.ambiguous == (pair.observed == 0));
+}
+
 TEST_CASE("Without points the guess comes back", "[registration]") {
   const SE2WithCovariance guess{SE2(1.0, 2.0, 0.3), 0.1 * Eigen::Matrix3d::Identity()};
   const Registration found = register_points({}, {}, guess);

@@ -1,3 +1,5 @@
+#include <cmath>
+#include <numbers>
 #include <random>
 
 #include "common/geometry/alignment.hpp"
@@ -25,6 +27,13 @@ TEST_CASE("Exp and Log are inverse to each other", "[se2]") {
       REQUIRE((SE2::Exp(xi).Log() - xi).norm() < 2e-13);
     }
   }
+}
+
+TEST_CASE("A half turn is +pi", "[se2]") {
+  const double pi = std::numbers::pi;
+  for (const double turned : {pi, -pi, 3.0 * pi, -3.0 * pi}) REQUIRE(wrap_angle(turned) == pi);
+  REQUIRE(wrap_angle(std::nextafter(-pi, 0.0)) == std::nextafter(-pi, 0.0));
+  REQUIRE(wrap_angle(pi + 1.0) == Approx(1.0 - pi));
 }
 
 TEST_CASE("Group laws", "[se2]") {

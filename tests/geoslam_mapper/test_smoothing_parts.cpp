@@ -115,6 +115,13 @@ TEST_CASE("The index of landmarks follows in steps, and changes are reported onc
   CHECK(landmarks.index().position(id)->x() == 1.0);
   landmarks.catch_up();
   CHECK(landmarks.index().position(id)->x() == 1.1);
+  // Then it is off by a centimetre at most.
+  landmarks.move(id, {1.109, 2.0});
+  landmarks.catch_up();
+  CHECK(landmarks.index().position(id)->x() == 1.1);
+  landmarks.move(id, {1.111, 2.0});
+  landmarks.catch_up();
+  CHECK(landmarks.index().position(id)->x() == 1.111);
   landmarks.move(id, {2.0, 2.0});
   CHECK(landmarks.index().position(id)->x() == 2.0);
   CHECK(landmarks.take_changed() == std::vector<model::LandmarkId>{id});

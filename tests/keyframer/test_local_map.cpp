@@ -142,3 +142,14 @@ TEST_CASE("The map is bounded, even where nothing is ever in view", "[keyframer]
   }
   CHECK(map.doubtful().size() > 0);
 }
+
+TEST_CASE("A track that is not detected again in 16 views was noise", "[keyframer][map]") {
+  LocalMap map(4.0);
+  const auto tracks = map.add(scan_of({{10.0, 0.0}, {0.0, 10.0}}), {}, {});
+  const std::vector<geometry::PointPair> to_first{{0, 0}};
+  for (int k = 1; k < 16; ++k) map.add(scan_of({{10.0, 0.0}}), to_first, {});
+  CHECK(map.find(tracks[1]) != nullptr);
+  map.add(scan_of({{10.0, 0.0}}), to_first, {});
+  CHECK(map.find(tracks[1]) == nullptr);
+  CHECK(map.find(tracks[0]) != nullptr);
+}

@@ -82,6 +82,14 @@ TEST_CASE("a state gives back every member bit by bit") {
   CHECK(state::save(kFormat, back) == bytes);
 }
 
+TEST_CASE("nothing is left of what a loaded object held before") {
+  const std::string bytes = state::save(kFormat, Everything{});
+  Everything back = filled();
+  state::load(bytes, kFormat, back);
+  CHECK(!back.something);
+  CHECK(state::save(kFormat, back) == bytes);
+}
+
 TEST_CASE("an odometry increment survives with its preintegration") {
   model::Odometry increment;
   increment.utime = 7;

@@ -59,10 +59,25 @@ TEST_CASE("gaps, disorder and jumps of the sensor's clock are told apart", "[vel
   CHECK(second_step(-400'000, 100) == std::pair(Step::kJump, model::Utime{-400'000}));
   CHECK(second_step(600'000'000, 1300) == std::pair(Step::kJump, model::Utime{600'000'000}));
   CHECK(second_step(-600'000'000, 1300) == std::pair(Step::kJump, model::Utime{-600'000'000}));
+  // A second of difference is what the clocks may have.
+  CHECK(second_step(900'000, 1300) == std::pair(Step::kGap, model::Utime{900'000}));
+  CHECK(second_step(1'500'000, 1300) == std::pair(Step::kJump, model::Utime{1'500'000}));
   // Silent for 40 minutes, and for three hours.
   CHECK(second_step(2'400'000'000, 2'400'000'100) ==
         std::pair(Step::kGap, model::Utime{2'400'000'000}));
   CHECK(second_step(3 * kHour_us, 3 * kHour_us) == std::pair(Step::kGap, 3 * kHour_us));
   // The computer's clock was set by ten seconds: the sensor's goes on.
   CHECK(second_step(1327, 10'000'000) == std::pair(Step::kNext, model::Utime{1327}));
+}
+
+TEST_CASE("a late packet from before the hour is late, no jump", "[velodyne_driver]") {
+  constexpr model::Utime kHour = 1'700'000'000'000'000 / kHour_us * kHour_us;
+  VelodyneClock clock;
+  clock.take(past_hour(kHour + 400), kHour + 500);
+  const auto late = clock.take(past_hour(kHour - 900), kHour + 600);
+  CHECK(late.step == Step::kLate);
+  CHECK(late.utime == kHour - 900);
+  const auto next = clock.take(past_hour(kHour + 1700), kHour + 1800);
+  CHECK(next.step == Step::kNext);
+  CHECK(next.utime == kHour + 1700);
 }

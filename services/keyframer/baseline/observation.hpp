@@ -38,13 +38,14 @@ struct Observation {
 Observation make_observation(const model::LandmarkScan& scan, std::uint64_t number,
                              double descriptor_step);
 
-/// Thresholds of align(); symbols of the thesis (GeoSLAM Table 4.2) in brackets.
+/// Thresholds of align(), from the service's parameters; symbols of the thesis (GeoSLAM Table 4.2)
+/// in brackets.
 struct AlignmentParameters {
-  double max_descriptor_distance = 9.0;   ///< [tau]
-  int max_side_difference = 3;            ///< [Delta_N]
-  double min_triangle_match_ratio = 0.5;  ///< [eta]
-  int min_associations = 7;               ///< [gamma]
-  double max_distance_m = 1.0;            ///< [lambda]
+  double max_descriptor_distance = 0.0;   ///< [tau]
+  int max_side_difference = 0;            ///< [Delta_N]
+  double min_triangle_match_ratio = 0.0;  ///< [eta]
+  int min_associations = 0;               ///< [gamma]
+  double max_distance_m = 0.0;            ///< [lambda]
 };
 
 /// Least-squares similarity to_T_from over landmarks that match and lie within `max_distance_m`

@@ -103,7 +103,6 @@ void WallFinder::add_segment(const rings::RingCloud& cloud, const rings::Run& ru
 
   // Sums of its inner points.
   double z = 0.0;
-  double height = 0.0;
   // The points where segments meet belong to neither for sure.
   segment.first_part = static_cast<std::uint32_t>(parts_.size());
   for (std::size_t i = first + 1; i < last; ++i) {
@@ -112,13 +111,11 @@ void WallFinder::add_segment(const rings::RingCloud& cloud, const rings::Run& ru
     parts_.back().sum += cloud.points()[i].position();
     segment.sums.add(cloud.points()[i].position());
     z += cloud.points()[i].z_m;
-    height += cloud.points()[i].height_m;
   }
 
   segment.parts = static_cast<std::uint32_t>(parts_.size()) - segment.first_part;
   segment.ring = run.ring;
   segment.z_m = z / segment.sums.count;
-  segment.height_m = height / segment.sums.count;
   segment.first = static_cast<std::uint32_t>(first);
   segment.last = static_cast<std::uint32_t>(last);
   segments_.push_back(segment);
@@ -205,7 +202,7 @@ void WallFinder::add_wall(const std::vector<std::uint32_t>& members) {
   LineSums sums;
   WallLine wall;
   wall.low_z_m = std::numeric_limits<double>::infinity();
-  wall.high_z_m = wall.high_height_m = -wall.low_z_m;
+  wall.high_z_m = -wall.low_z_m;
   std::uint16_t ring = 0xffff;
   for (const std::uint32_t i : members) {
     const LineSegment& segment = segments_[i];
@@ -213,7 +210,6 @@ void WallFinder::add_wall(const std::vector<std::uint32_t>& members) {
     wall.z_m += segment.sums.count * segment.z_m;
     wall.low_z_m = std::min(wall.low_z_m, segment.z_m);
     wall.high_z_m = std::max(wall.high_z_m, segment.z_m);
-    wall.high_height_m = std::max(wall.high_height_m, segment.height_m);
     if (segment.ring != ring) ++wall.rings;
     ring = segment.ring;
   }

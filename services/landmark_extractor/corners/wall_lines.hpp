@@ -36,7 +36,6 @@ struct LineSegment {
   std::uint32_t parts = 0;
   std::uint16_t ring = 0;
   double z_m = 0.0;         ///< Mean.
-  double height_m = 0.0;    ///< Above ground, mean.
   std::uint32_t first = 0;  ///< Points of the cloud at either end.
   std::uint32_t last = 0;
   Eigen::Vector2d direction = Eigen::Vector2d::UnitX();  ///< Unit, from end to end.
@@ -55,7 +54,6 @@ struct WallLine {
   double direction_sigma_rad = 0.0;  ///< Of `direction`.
   double low_z_m = 0.0;              ///< Of the lowest ring.
   double high_z_m = 0.0;             ///< Of the highest ring.
-  double high_height_m = 0.0;        ///< The same above ground.
   int rings = 0;                     ///< That measured it.
 
   /// Extent along `direction` [m].
