@@ -266,11 +266,12 @@ def laps(document):
         shown = sorted({min(len(rows), max(1, round(len(rows) * share))) for share in (0.0, 0.02, 0.1, 0.25, 0.5, 0.75, 1.0)})
         lines += ["", f"{title}; the heap's slope over the last half is **{config[f'slope_{part}_mib_per_h']:.2f} MiB/h**:", ""]
         lines += table(("lap" if part == "laps" else "half hour", "hours", "heap MiB", "mapper's state MiB", "mapper's message p99 ms", "longest ms",
-                        "ATE mm", "NEES (3)", "poses", "not localised", "keyframes refused"),
+                        "ATE mm", "NEES (3)", "largest NEES", "poses", "not localised", "keyframes refused"),
                        [(rows[i - 1]["number"], number(rows[i - 1]["hours"]), number(rows[i - 1]["heap_mib"], 1),
                          number(rows[i - 1]["mapper_state_mib"]),
                          number(rows[i - 1]["mapper_p99_ms"], 1), number(rows[i - 1]["mapper_largest_ms"], 1),
-                         number(1e3 * rows[i - 1]["ate_m"], 1), number(rows[i - 1]["mean_nees"]), rows[i - 1]["poses"],
+                         number(1e3 * rows[i - 1]["ate_m"], 1), number(rows[i - 1]["mean_nees"]),
+                         number(rows[i - 1]["largest_nees"], 0), rows[i - 1]["poses"],
                          rows[i - 1]["unsure"], rows[i - 1]["refused"]) for i in shown])
     return lines
 

@@ -97,7 +97,9 @@ class LapCounter {
     const Eigen::Vector3d error = (map_T_vehicle.inverse() * *map_T_world_ * truth).coordinates();
     const Eigen::Matrix3d covariance = pose.covariance + 1e-12 * Eigen::Matrix3d::Identity();
     squared_m2_ += error.head<2>().squaredNorm();
-    nees_ += error.dot(covariance.inverse() * error);
+    const double nees = error.dot(covariance.inverse() * error);
+    nees_ += nees;
+    lap_.largest_nees = std::max(lap_.largest_nees, nees);
     ++lap_.poses;
   }
 

@@ -39,7 +39,8 @@ struct Lap {
   double mapper_largest_ms = 0.0;
   double ate_m = 0.0;      ///< RMS of SLAM_POSE in the frame of the first pose.
   double mean_nees = 0.0;  ///< Of SLAM_POSE; 3 is exact. 0 in the hours that follow.
-  std::size_t poses = 0;   ///< Localised.
+  double largest_nees = 0.0;
+  std::size_t poses = 0;  ///< Localised.
   std::size_t unsure = 0;
   std::size_t keyframes = 0;  ///< Accepted.
   std::size_t refused = 0;

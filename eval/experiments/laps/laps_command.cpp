@@ -18,17 +18,18 @@ namespace {
 constexpr double kFirstShare = 0.5;
 
 void print_header(const char* what) {
-  fmt::print("{:<10} {:>7} {:>9} {:>9} {:>13} {:>8} {:>6} {:>7} {:>7} {:>9}\n", what, "hours",
-             "heap MiB", "state MiB", "p99/max ms", "ATE mm", "NEES", "poses", "unsure",
+  fmt::print("{:<10} {:>7} {:>9} {:>9} {:>13} {:>8} {:>12} {:>7} {:>7} {:>9}\n", what, "hours",
+             "heap MiB", "state MiB", "p99/max ms", "ATE mm", "NEES/max", "poses", "unsure",
              "keyframes");
 }
 
 void print_row(const Lap& lap) {
   fmt::print(
-      "{:<10} {:>7.2f} {:>9.2f} {:>9.3f} {:>7.2f}{:>6.1f} {:>8.1f} {:>6.2f} {:>7} {:>7} {:>9}\n",
+      "{:<10} {:>7.2f} {:>9.2f} {:>9.3f} {:>7.2f}{:>6.1f} {:>8.1f} {:>6.2f}{:>6.0f} {:>7} {:>7} "
+      "{:>9}\n",
       lap.number, lap.hours, lap.heap_mib, lap.mapper_state_mib, lap.mapper_p99_ms,
-      lap.mapper_largest_ms, 1e3 * lap.ate_m, lap.mean_nees, lap.poses, lap.unsure,
-      fmt::format("{}/{}", lap.keyframes, lap.keyframes + lap.refused));
+      lap.mapper_largest_ms, 1e3 * lap.ate_m, lap.mean_nees, lap.largest_nees, lap.poses,
+      lap.unsure, fmt::format("{}/{}", lap.keyframes, lap.keyframes + lap.refused));
   std::fflush(stdout);
 }
 
@@ -63,6 +64,7 @@ nlohmann::json to_json(const char* part, const std::vector<Lap>& laps) {
                     {"mapper_largest_ms", lap.mapper_largest_ms},
                     {"ate_m", lap.ate_m},
                     {"mean_nees", lap.mean_nees},
+                    {"largest_nees", lap.largest_nees},
                     {"poses", lap.poses},
                     {"unsure", lap.unsure},
                     {"keyframes", lap.keyframes},

@@ -26,8 +26,8 @@ json to_json(const std::vector<Lap>& laps) {
   json rows = json::array();
   for (const Lap& l : laps) {
     rows.push_back({l.number, l.hours, l.heap_mib, l.mapper_state_mib, l.mapper_p99_ms,
-                    l.mapper_largest_ms, l.ate_m, l.mean_nees, l.poses, l.unsure, l.keyframes,
-                    l.refused});
+                    l.mapper_largest_ms, l.ate_m, l.mean_nees, l.largest_nees, l.poses, l.unsure,
+                    l.keyframes, l.refused});
   }
   return rows;
 }
@@ -36,7 +36,7 @@ std::vector<Lap> laps_of(const json& rows) {
   std::vector<Lap> laps;
   for (const json& r : rows) {
     laps.push_back({r.at(0), r.at(1), r.at(2), r.at(3), r.at(4), r.at(5), r.at(6), r.at(7), r.at(8),
-                    r.at(9), r.at(10), r.at(11)});
+                    r.at(9), r.at(10), r.at(11), r.at(12)});
   }
   return laps;
 }
