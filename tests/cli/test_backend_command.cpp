@@ -80,5 +80,5 @@ TEST_CASE_METHOD(Backend, "only one pose is held fast, whatever the order of the
   REQUIRE(run(write("awkward.g2o", awkward) + " --json " + json).status == 0);
   const auto row = nlohmann::json::parse(read_text(json))["rows"][0];
   CHECK(row["chi2_final"].get<double>() < 1e-9);
-  CHECK(row["chi2_dead_reckoning"].get<double>() < 1e-9);
+  CHECK(row["chi2_odometry"].get<double>() < 1e-9);
 }
