@@ -1,5 +1,7 @@
 // The parts of the mapper: graph with rollback, landmarks with index, viewpoints.
 #include <Eigen/LU>
+#include <map>
+#include <random>
 
 #include "services/geoslam_mapper/smoothing/global_map.hpp"
 #include "services/geoslam_mapper/smoothing/place_recogniser.hpp"
@@ -155,4 +157,29 @@ TEST_CASE("Only a keyframe from a viewpoint that is known is folded", "[mapper]"
   CHECK_FALSE(revisited(1.1 * parameters.fold_distance_m, 0.0));
   CHECK(revisited(0.0, -0.9 * parameters.fold_angle_rad) == node);
   CHECK_FALSE(revisited(0.0, 1.1 * parameters.fold_angle_rad));
+}
+
+TEST_CASE("The grid of viewpoints has every point near a place, wherever that is", "[mapper]") {
+  std::mt19937_64 random(4);
+  std::uniform_real_distribution<double> place(-4.0, 4.0);
+  ViewpointGrid grid;
+  std::map<std::uint32_t, Eigen::Vector2d> points;
+  for (int step = 0; step < 3000; ++step) {
+    const auto number = static_cast<std::uint32_t>(random() % 60);
+    if (random() % 3 == 0) {
+      grid.remove(number);
+      points.erase(number);
+    } else {
+      points[number] = {place(random), place(random)};
+      grid.put(number, points[number]);
+    }
+
+    const Eigen::Vector2d centre(place(random), place(random));
+    std::map<std::uint32_t, int> found;
+    grid.for_each_near(centre, 1.5, [&](std::uint32_t one) { ++found[one]; });
+    for (const auto& [one, times] : found) REQUIRE((times == 1 && points.contains(one)));
+    for (const auto& [one, position] : points) {
+      if ((position - centre).norm() < 1.5) REQUIRE(found.contains(one));
+    }
+  }
 }

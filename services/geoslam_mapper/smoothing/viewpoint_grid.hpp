@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -16,17 +17,18 @@ class ViewpointGrid {
   /// Adds the point, or moves it.
   void put(std::uint32_t number, const Eigen::Vector2d& position_m) {
     const std::uint64_t cell = cell_of(position_m);
-    if (cells_of_.size() <= number) cells_of_.resize(number + 1, kNowhere);
-    const std::uint64_t now = cells_of_[number];
-    if (now == cell) return;
-    if (now != kNowhere) remove(number);
+    if (cells_of_.size() <= number) cells_of_.resize(number + 1);
+    if (cells_of_[number] == cell) return;
+    remove(number);
     cells_[cell].push_back(number);
     cells_of_[number] = cell;
   }
 
-  /// Takes the point out.
+  /// Takes the point out, if it is there.
   void remove(std::uint32_t number) {
-    const auto cell = cells_.find(std::exchange(cells_of_[number], kNowhere));
+    if (number >= cells_of_.size() || !cells_of_[number]) return;
+    const auto cell = cells_.find(*cells_of_[number]);
+    cells_of_[number].reset();
     std::erase(cell->second, number);
     if (cell->second.empty()) cells_.erase(cell);
   }
@@ -49,7 +51,6 @@ class ViewpointGrid {
 
  private:
   static constexpr double kCell_m = 1.0;
-  static constexpr std::uint64_t kNowhere = ~std::uint64_t{0};
   static std::pair<std::int32_t, std::int32_t> indices_of(const Eigen::Vector2d& p) {
     return {static_cast<std::int32_t>(std::floor(p.x() / kCell_m)),
             static_cast<std::int32_t>(std::floor(p.y() / kCell_m))};
@@ -63,7 +64,7 @@ class ViewpointGrid {
   }
 
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
-  std::vector<std::uint64_t> cells_of_;  ///< By number.
+  std::vector<std::optional<std::uint64_t>> cells_of_;  ///< By number; none: not there.
 };
 
 }  // namespace understory::geoslam_mapper::smoothing
