@@ -209,3 +209,57 @@ TEST_CASE("A graph with a free gauge names its variables and can be mended", "[s
   REQUIRE(smoother.update().ok);
   REQUIRE(smoother.pose(b).coordinates().isApprox(Eigen::Vector3d(1, 0, 0), 1e-9));
 }
+
+TEST_CASE("A pose whose measurements go and that starts anew ends where the batch solution is",
+          "[smoother]") {
+  using namespace factor_graph::plane;
+  std::mt19937_64 random(23);
+  for (int trial = 0; trial < 12; ++trial) {
+    const Graph whole = test::random_graph(random, 20, 20, 0.1);
+    const Graph solution = solved_whole(whole);
+    Smoother smoother(test::exact());
+    smoother.start_from(whole);
+    for (int i = 0; i < 12; ++i) REQUIRE(smoother.update().ok);
+    const auto pose = PoseId(static_cast<std::uint32_t>(1 + random() % 19));
+    CHECK_THROWS_AS(smoother.restart(pose, geometry::SE2()), std::invalid_argument);
+
+    const auto set_measurements = [&](double share) {
+      for (std::uint32_t i = 0; i < whole.relative_poses.size(); ++i) {
+        RelativePose motion = whole.relative_poses[i];
+        if (motion.a != pose && motion.b != pose) continue;
+        motion.information *= share;
+        smoother.set(MotionId(i), motion);
+      }
+      for (std::uint32_t i = 0; i < whole.observations.size(); ++i) {
+        PointObservation seen = whole.observations[i];
+        if (seen.pose != pose) continue;
+        seen.information *= share;
+        smoother.set(ObservationId(i), seen);
+      }
+    };
+    const geometry::SE2 wrong(whole[pose].translation() + Eigen::Vector2d(0.3, -0.2),
+                              whole[pose].theta() + 0.1);
+
+    // Taken back, it is as if nothing had been.
+    const Graph before = smoother.graph();
+    smoother.checkpoint();
+    set_measurements(0.0);
+    REQUIRE(smoother.update().ok);
+    smoother.restart(pose, wrong);
+    CHECK(smoother.pose(pose).coordinates() == wrong.coordinates());
+    set_measurements(1.0);
+    REQUIRE(smoother.update().ok);
+    smoother.rollback();
+    CHECK(difference(smoother.graph(), before) == 0.0);
+
+    // Within one update, or with one in between.
+    smoother.checkpoint();
+    set_measurements(0.0);
+    if (trial % 2 == 0) REQUIRE(smoother.update().ok);
+    smoother.restart(pose, wrong);
+    set_measurements(1.0);
+    for (int i = 0; i < 14; ++i) REQUIRE(smoother.update().ok);
+    CHECK(difference(smoother.graph(), solution) < 1e-7);
+    CHECK(smoother.joint_marginal({&pose, 1}, {}).has_value());
+  }
+}
