@@ -73,7 +73,7 @@ void TriangleIndex::remove(const Triangle& triangle) {
 }
 
 std::size_t TriangleIndex::bytes() const {
-  std::size_t bytes = directory_.bytes() + buckets_.capacity() * sizeof(decltype(buckets_)::value_type);
+  std::size_t bytes = directory_.bytes() + buckets_.capacity() * sizeof(std::vector<Entry>);
   for (const auto& entries : buckets_) bytes += entries.capacity() * sizeof(Entry);
   return bytes;
 }
