@@ -351,6 +351,26 @@ TEST_CASE("The three batch methods agree, also with the smoother, under a robust
   }
 }
 
+TEST_CASE("A range and a bearing are those from the pose to the point", "[incremental]") {
+  std::mt19937_64 random(31);
+  std::uniform_real_distribution<double> place(-20.0, 20.0);
+  for (int trial = 0; trial < 50; ++trial) {
+    const geometry::SE2 pose(place(random), place(random), place(random));
+    const Eigen::Vector2d point(place(random), place(random));
+    const Eigen::Vector2d seen = pose.inverse() * point;
+    factor_graph::graph::FactorGraph graph;
+    const VariableId a = graph.add(pose);
+    const VariableId b = graph.add(point);
+    const Eigen::Matrix2d information = Eigen::Vector2d(25.0, 1e4).asDiagonal();
+    const double bearing_rad = std::atan2(seen.y(), seen.x());
+    const auto exact = graph.add(range_bearing(a, b, seen.norm(), bearing_rad, information));
+    const auto off =
+        graph.add(range_bearing(a, b, seen.norm() + 0.4, bearing_rad - 0.02, information));
+    CHECK(graph.chi2(exact) < 1e-15);
+    CHECK(graph.chi2(off) == Approx(25.0 * 0.16 + 1e4 * 0.0004));
+  }
+}
+
 TEST_CASE("A landmark observed once by its bearing is named", "[incremental]") {
   factor_graph::bayes_tree::IncrementalSmoother smoother;
   const VariableId pose = smoother.add_variable(geometry::SE2());

@@ -72,6 +72,17 @@ TEST_CASE("laser records have no line breaks", "[victoria_park]") {
   CHECK(scans[0].bearing(360) == Approx(1.5707963268));
 }
 
+TEST_CASE("a recording may last eleven days, not longer", "[victoria_park]") {
+  CHECK(victoria_park::parse_gnss("999999.0 0.0 0.0\n", "GPS.txt").front().utime ==
+        999'999'000'000);
+  for (const std::string time : {"1000001.0", "-0.001"}) {
+    const std::string error =
+        error_of([&] { victoria_park::parse_gnss(time + " 0.0 0.0\n", "GPS.txt"); });
+    CHECK(contains(error, "GPS.txt"));
+    CHECK(contains(error, "no time of this recording"));
+  }
+}
+
 TEST_CASE("errors name the file, the line and the token", "[victoria_park]") {
   const auto laser = [](const std::string& text) {
     return error_of([&] { victoria_park::parse_laser(text, "LASER.txt"); });
