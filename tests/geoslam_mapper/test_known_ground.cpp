@@ -313,3 +313,24 @@ TEST_CASE("A vehicle that stands for days keeps the last poses alone", "[mapper]
   }
   CHECK(state::save({"trajectory"}, loaded) == state::save({"trajectory"}, map.trajectory));
 }
+
+TEST_CASE("A vehicle that drives known ground for days keeps the last poses alone", "[mapper]") {
+  SmoothingMapperParameters parameters;
+  GlobalMap map(parameters);
+  const NodeIndex old = map.graph.add_node({}, false, true);
+  const NodeIndex passing = map.graph.add_node({1.0, 0.0, 0.0}, false);
+  const geometry::SE2WithCovariance old_T_passing{{1.0, 0.0, 0.0}, Eigen::Matrix3d::Zero()};
+  model::Keyframe keyframe;
+  keyframe.members.push_back({0, 0, {}, Eigen::Matrix3d::Zero()});
+  map.trajectory.add(base_of(keyframe, old), map.graph);
+  for (std::uint64_t i = 1; i < 2 * Trajectory::kMostSpare; ++i) {
+    keyframe.sequence = i;
+    map.trajectory.add(base_of(keyframe, passing), map.graph);
+    REQUIRE(map.trajectory.pose(map.trajectory.last(), map.graph).x() == Approx(1.0));
+    map.trajectory.hand_over({passing, old, old_T_passing});
+    REQUIRE(map.trajectory.pose(map.trajectory.last(), map.graph).x() == Approx(1.0));
+    REQUIRE(map.trajectory.bases().size() < Trajectory::kMostSpare + 300);
+  }
+  CHECK(map.trajectory.bases().front().sequence == 0);  // the viewpoint
+  CHECK(map.trajectory.size() == 2 * Trajectory::kMostSpare);
+}

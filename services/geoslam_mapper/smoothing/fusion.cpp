@@ -28,15 +28,27 @@ model::Keyframe in_frame_of(const geometry::SE2& node_T_keyframe, model::Keyfram
   return keyframe;
 }
 
+/// A node that many passes added to knows its pose better than a keyframe that passes by knows its
+/// own: that one gets a node for itself, which may go later (KnownGround).
+bool is_of_this_pass(NodeIndex node, const SmoothingMapperParameters& parameters,
+                     const PoseGraph& graph) {
+  if (parameters.known_ground_m <= 0.0) return true;
+  return graph.node(*graph.newest()).along_m - graph.node(node).along_m <=
+         parameters.known_ground_m;
+}
+
 /// The node for the keyframe, an old or a new one, and the keyframe in its frame.
-FusedKeyframe enter(const model::Keyframe& arrived, const Placement& placement, GlobalMap& map) {
+FusedKeyframe enter(const model::Keyframe& arrived, const Placement& placement,
+                    const SmoothingMapperParameters& parameters, GlobalMap& map) {
   const geometry::SE2& map_T_centre = placement.map_T_centre.mean;
   const auto revisited = map.trajectory.revisited(map_T_centre * middle_of(arrived), map.graph);
+  const bool may_fold = revisited && (map.trajectory.is_stationary(arrived) ||
+                                      is_of_this_pass(*revisited, parameters, map.graph));
   map.graph.checkpoint();
 
   FusedKeyframe fused;
   fused.associations = placement.associations;
-  if (revisited) {
+  if (may_fold) {
     fused.node = *revisited;
     fused.keyframe = in_frame_of(map.graph.pose(*revisited).inverse() * map_T_centre, arrived);
   } else {
@@ -126,7 +138,7 @@ void count_observations(const FusedKeyframe& fused, GlobalMap& map) {
 
 FusedKeyframe fuse(const model::Keyframe& arrived, const Placement& placement, const Motion& motion,
                    const SmoothingMapperParameters& parameters, GlobalMap& map) {
-  FusedKeyframe fused = enter(arrived, placement, map);
+  FusedKeyframe fused = enter(arrived, placement, parameters, map);
   add_observations(fused, parameters, map);
   if (const auto driven = motion.since_last_centre(fused.keyframe))
     map.graph.add_motion(*driven, fused.node);

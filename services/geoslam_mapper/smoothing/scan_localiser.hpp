@@ -11,6 +11,20 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
+/// A scan with the pose that was found for it.
+struct LocatedScan {
+  model::Utime utime = 0;
+  geometry::SE2 map_T_vehicle;
+  geometry::SE2 step;                                    ///< From the scan before.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Among the landmarks near by.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.utime, s.map_T_vehicle, s.step, s.covariance);
+  }
+};
+
 /// Registers each scan to the landmarks around the last one. The map is not changed.
 class ScanLocaliser {
  public:
@@ -41,17 +55,6 @@ class ScanLocaliser {
   }
 
  private:
-  struct LocatedScan {
-    model::Utime utime = 0;
-    geometry::SE2 map_T_vehicle;
-    geometry::SE2 step;                                    ///< From the scan before.
-    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Among the landmarks near by.
-
-    template <class Archive, class Self>
-    static void archive(Archive& a, Self& s) {
-      a(s.utime, s.map_T_vehicle, s.step, s.covariance);
-    }
-  };
   std::optional<geometry::Registration> register_scan(const model::LandmarkScan& scan,
                                                       const LandmarkMap& landmarks,
                                                       const Motion& motion) const;

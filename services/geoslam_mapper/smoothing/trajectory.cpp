@@ -42,10 +42,12 @@ void Trajectory::add_spare(Base base) {
   bases_.push_back(base);
   ++accepted_;
   ++spare_;
-  if (spare_ >= kMostSpare + kForgotten) forget_oldest();
+  forget_oldest();
 }
 
+/// Many at a time, where there are too many.
 void Trajectory::forget_oldest() {
+  if (spare_ < kMostSpare + kForgotten) return;
   std::size_t forgotten = 0;
   std::erase_if(bases_, [&](const Base& base) {
     return base.is_spare && &base != &bases_.back() && forgotten++ < kForgotten;
@@ -103,6 +105,7 @@ void Trajectory::hand_over(const Retirement& retirement) {
     free_viewpoints_.push_back(viewpoint);
   }
   viewpoints_of_node_[retirement.node].clear();
+  forget_oldest();
 }
 
 void Trajectory::follow(const PoseGraph& graph) {
@@ -145,7 +148,7 @@ std::optional<NodeIndex> Trajectory::revisited(const geometry::SE2& map_T_middle
 
 geometry::SE2WithCovariance Trajectory::centre_from_origin(NodeIndex node,
                                                            const PoseGraph& graph) const {
-  const geometry::SE2WithCovariance map_T_centre = graph.marginal(node);
+  geometry::SE2WithCovariance map_T_centre = graph.marginal(node);
   if (!bases_.front().is_origin) return map_T_centre;
   const geometry::SE2WithCovariance origin_T_first = inverse(bases_.front().centre_T_base);
   return compound(origin_T_first,
