@@ -14,6 +14,20 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
+/// The last accepted keyframe's last member, in the frame of its node's centre.
+struct LastMember {
+  NodeIndex node = 0;
+  model::Utime utime = 0;
+  geometry::SE2WithCovariance centre_T_vehicle;
+  std::optional<model::GyroRotation> rotation;  ///< From the centre to here, by the gyro.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.node, s.utime, s.centre_T_vehicle, s.rotation);
+  }
+};
+
 /// Odometry since the last accepted keyframe, the filter's recent poses, and the pose from which
 /// both go on. The gyro's bias as a variable is in the graph (GyroBias): a refused keyframe takes
 /// it back together with the graph.
@@ -62,18 +76,6 @@ class Motion {
   }
 
  private:
-  /// The last accepted keyframe's last member, in the frame of its node's centre.
-  struct LastMember {
-    NodeIndex node = 0;
-    model::Utime utime = 0;
-    geometry::SE2WithCovariance centre_T_vehicle;
-    std::optional<model::GyroRotation> rotation;  ///< From the centre to here, by the gyro.
-
-    template <class Archive, class Self>
-    static void archive(Archive& a, Self& s) {
-      a(s.node, s.utime, s.centre_T_vehicle, s.rotation);
-    }
-  };
   std::optional<model::GyroRotation> rotation_to_centre(const model::Keyframe& keyframe) const;
   std::optional<model::GyroRotation> rotation_since_last_centre(
       const model::Keyframe& keyframe) const;
