@@ -21,7 +21,7 @@ constexpr double kLittleWork = 2e5;   ///< Is no reason to [flops].
 /// last one.
 constexpr double kSettledGain = 1e-5;
 /// Losses below this many squared sigmas per row are rounding.
-constexpr double kRounding = 1e-12;
+constexpr double kLossRounding = 1e-12;
 constexpr double kLeastUnit = 1e-4;
 constexpr double kLeastUsualUnit = 0.02;
 
@@ -262,7 +262,7 @@ IncrementalUpdate IncrementalSmoother::settle(int max_updates) {
     measure_unit();
     const double change = std::abs(before - pending_.chi2);
     update.is_settled = !pending_.solve_everything &&
-                        change <= std::max(kSettledGain * before, kRounding * pending_.rows);
+                        change <= std::max(kSettledGain * before, kLossRounding * pending_.rows);
   }
   return update;
 }
