@@ -90,13 +90,17 @@ void Trajectory::index(std::uint32_t viewpoint, const PoseGraph& graph) {
 }
 
 void Trajectory::hand_over(const Retirement& retirement) {
-  for (Base& base : bases_) {
-    if (base.node != retirement.node) continue;
-    base.node = retirement.into;
-    base.centre_T_base = compound(retirement.into_T_node, base.centre_T_base);
-    base.centre_T_middle = retirement.into_T_node.mean * base.centre_T_middle;
-    if (!base.is_spare) ++spare_;
-    base.is_spare = true;
+  // Each viewpoint has a base that is not spare; the node's other bases are later than its first.
+  std::size_t left = viewpoints_of_node_[retirement.node].size();
+  for (auto base = bases_.rbegin(); left > 0 && base != bases_.rend(); ++base) {
+    if (base->node != retirement.node) continue;
+    base->node = retirement.into;
+    base->centre_T_base = compound(retirement.into_T_node, base->centre_T_base);
+    base->centre_T_middle = retirement.into_T_node.mean * base->centre_T_middle;
+    if (base->is_spare) continue;
+    base->is_spare = true;
+    ++spare_;
+    --left;
   }
 
   for (const std::uint32_t viewpoint : viewpoints_of_node_[retirement.node]) {

@@ -55,6 +55,7 @@ class Trajectory {
   /// Adds a base that is no viewpoint: where the map stays as it is.
   void add_spare(Base base);
   /// Ties the bases of a node that is taken out of the graph to the node that has its place.
+  /// O(bases since the node was added).
   void hand_over(const Retirement& retirement);
   /// Brings the index of viewpoints to where the graph's last updates moved the nodes.
   void follow(const PoseGraph& graph);
