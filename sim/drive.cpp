@@ -62,7 +62,8 @@ SimulatedScan observe(const Forest& forest, const PointGrid& grid,
   result.world_T_vehicle = world_T_vehicle;
   result.scan.field_of_view.max_range_m = sensor.range_m;
   const double variance =
-      std::max(sensor.variance_floor_m2, sensor.position_sigma_m * sensor.position_sigma_m);
+      std::max(sensor.variance_floor_m2, sensor.stated_factor * sensor.stated_factor *
+                                             sensor.position_sigma_m * sensor.position_sigma_m);
   model::Detection detection;
   detection.covariance_m2.topLeftCorner<2, 2>() = variance * Eigen::Matrix2d::Identity();
   std::uniform_real_distribution<double> chance(0.0, 1.0);

@@ -20,6 +20,7 @@ struct SensorParameters {
   double range_m = 40.0;
   double detection_probability = 0.9;  ///< [kappa] Of every landmark in range, independently.
   double position_sigma_m = 0.2;       ///< [epsilon] Per axis.
+  double stated_factor = 1.0;  ///< Stated sigma by the true one: no deployment knows the true one.
   /// Least variance that a detection states [m^2]: a noise-free one must not be infinitely sure.
   double variance_floor_m2 = 1e-8;
 };

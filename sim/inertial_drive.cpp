@@ -170,14 +170,16 @@ model::Preintegration InertialDrive::drive_samples(double dt) {
   const bool swaying = sways();
   if (swaying) begin_sway();
 
+  const double gyro_noise = p.true_noise_factor * p.gyro_noise / std::sqrt(dt);
+  const double force_noise = p.true_noise_factor * p.accelerometer_noise / std::sqrt(dt);
   model::Preintegration inertial;
   for (int k = 0; k < p.samples_per_scan; ++k) {
     const model::InertialBias bias = bias_;
     const Tick tick = swaying ? sway(dt, 2 * k < p.samples_per_scan) : advance(dt);
-    const double rate = tick.yaw_rad / dt + bias.x() + p.gyro_noise / std::sqrt(dt) * normal();
+    const double rate = tick.yaw_rad / dt + bias.x() + gyro_noise * normal();
     Eigen::Vector2d force = tick.acceleration_mps2 + bias.tail<2>();
-    force.x() += p.accelerometer_noise / std::sqrt(dt) * normal();
-    force.y() += p.accelerometer_noise / std::sqrt(dt) * normal();
+    force.x() += force_noise * normal();
+    force.y() += force_noise * normal();
     integrate(inertial, rate, force, dt, p.gyro_noise, p.accelerometer_noise);
   }
   return inertial;
@@ -203,7 +205,7 @@ model::Odometry InertialDrive::drive_increment() {
   if (imu) increment.inertial = inertial;
 
   // Its error; stationary wheels measure none.
-  const double moved = increment.is_stationary && wheels ? 0.0 : 1.0;
+  const double moved = increment.is_stationary && wheels ? 0.0 : p.true_noise_factor;
   const Eigen::Vector3d error(sigma * moved * normal(), sigma * moved * normal(),
                               imu ? 0.0 : rotation_sigma * moved * normal());
   increment.from_T_to = truth * geometry::SE2::Exp(error);
@@ -218,6 +220,7 @@ void InertialDrive::observe(DriveStep& step) {
   const geometry::SE2 vehicle_T_world = step.world_T_vehicle.inverse();
   std::bernoulli_distribution detected(p.detection_probability);
   const double variance = p.position_sigma_m * p.position_sigma_m;
+  const double true_sigma_m = p.true_noise_factor * p.position_sigma_m;
 
   const auto add = [&](const Eigen::Vector2d& position, std::int64_t trunk) {
     model::Detection detection;
@@ -232,7 +235,7 @@ void InertialDrive::observe(DriveStep& step) {
   for (const std::uint32_t trunk : near) {
     if (!detected(random_)) continue;
     const Eigen::Vector2d noise(normal(), normal());
-    add(vehicle_T_world * world_.forest.trunks_m[trunk] + p.position_sigma_m * noise, trunk);
+    add(vehicle_T_world * world_.forest.trunks_m[trunk] + true_sigma_m * noise, trunk);
   }
 
   std::poisson_distribution<int> clutter(

@@ -60,6 +60,8 @@ struct InertialDriveParameters {
   double detection_probability = 0.9;  ///< Of every trunk in range, independently.
   double position_sigma_m = 0.1;       ///< Per axis.
   double clutter_share = 0.0;          ///< False detections, as a share of the true ones expected.
+  /// True noise of IMU, wheels and detections, in units of that above, which the messages state.
+  double true_noise_factor = 1.0;
 };
 
 /// Everything between two scans, and the scan.

@@ -47,6 +47,11 @@ class HealthMonitor {
   void count_latency(std::int64_t microseconds) { latencies_.add(microseconds); }
   /// Counts what was wrong with a message of a channel, or with the process (empty channel).
   void count_reason(std::string_view channel, wire::Reason reason, std::string_view text);
+  /// A condition holds, or not (any more); see ReasonCounts. True where that is new.
+  bool set_condition(std::string_view channel, wire::Reason reason, bool holds,
+                     std::string_view text) {
+    return holds ? reasons_.hold(channel, reason, text) : reasons_.release(channel, reason);
+  }
   /// Sets the sequence counts of an input; a new gap degrades the state.
   void set_sequence(std::size_t channel, const SequenceCounts& counts);
   /// Sets how many messages the bus dropped; an increase degrades the state.

@@ -4,12 +4,17 @@
 #include <stdexcept>
 
 namespace understory::bus {
+namespace {
+
+constexpr int kRefusedWindow = 32;  ///< Messages.
+
+}  // namespace
 
 Node::Node(Bus& bus, NodeOptions options, Clock clock)
     : bus_(bus),
       options_(std::move(options)),
       computer_clock_(std::move(clock)),
-      clock_(options_.largest_clock_jump_us),
+      time_(options_.largest_clock_jump_us),
       monitor_(options_.process, options_.version, computer_clock_),
       announcer_(bus, options_.process, options_.version),
       state_(options_.snapshot_every_us, options_.snapshot_every_events) {}
@@ -23,6 +28,8 @@ void Node::add_input(const std::string& channel, Take take, SubscribeOptions opt
   input->take = std::move(take);
   if (takes(input->channel)) throw std::logic_error(channel + " is subscribed twice");
   input->health = monitor_.add_channel(input->channel, false);
+  input->refused = {wire::Reason::kInputRefused, "much of what comes is refused", input->channel,
+                    Condition({kRefusedWindow, options_.refused_of_last_32})};
   inputs_.push_back(std::move(input));
 }
 
@@ -60,29 +67,36 @@ std::optional<wire::Refusal> Node::take(Input& input, const BusMessage& message)
 }
 
 void Node::handle(Input& input, const BusMessage& message) {
+  input.is_late = false;
+  bool is_refused = false;
   try {
     if (const auto refusal = take(input, message)) {
       report(refusal->reason, refusal->detail, input.channel);
+      is_refused = true;
     }
   } catch (const std::exception& error) {
     report(wire::Reason::kStageFailed, error.what(), input.channel);
   }
+  input.refused.condition.add(is_refused || input.is_late);
+  show(input.refused);
 
   if (message.received_us != 0) {
     monitor_.count_latency(computer_clock_.wall_us() - message.received_us);
   }
-  if (!is_recovering_ && state_.is_due(now())) save_snapshot();
+  if (!is_recovering() && state_.is_due(now())) save_snapshot();
 }
 
 bool Node::admit(Input& input, const BusMessage& message) {
   const wire::MessageHeader header = *wire::header_of(message.bytes);
   if (input.options.sequenced) {
-    if (!admit_time(input, header.utime) || !admit_sequence(input, header)) return false;
-    timers_.fire(clock_.now());
+    if (input.options.timed && !admit_time(input, message, header.utime)) return false;
+    if (!admit_sequence(input, header)) return false;
+    timers_.fire(time_.now());
+    if (input.options.timed) input.pace.take(header.utime);
   }
 
   monitor_.count_message(input.health, header.utime);
-  if (!is_recovering_ && input.options.journaled) {
+  if (!is_recovering() && input.options.journaled) {
     if (const auto refusal = state_.append(input.channel, message.bytes)) {
       report(refusal->reason, refusal->detail);
     }
@@ -96,45 +110,60 @@ bool Node::admit_sequence(Input& input, const wire::MessageHeader& header) {
   if (arrival != Arrival::kDuplicate && arrival != Arrival::kLate) return true;
 
   const bool is_late = arrival == Arrival::kLate;
+  if (is_late && input.options.takes_late) return true;
+  input.is_late = is_late;
   report(is_late ? wire::Reason::kLate : wire::Reason::kDuplicate,
          "seq " + std::to_string(header.sequence), input.channel);
   return false;
 }
 
-bool Node::admit_time(Input& input, model::Utime utime) {
-  const MessageClock::Verdict verdict = clock_.take(utime);
-  if (is_recovering_ && verdict == MessageClock::Verdict::kQuarantined) {
-    // Only messages that had been believed are in the journal: this one was a jump's last proof.
-    clock_.resume(utime);
-    return start_at_jump();
+bool Node::admit_time(Input& input, const BusMessage& message, model::Utime utime) {
+  using Verdict = MessageClock::Verdict;
+  const Verdict verdict = time_.take(message, utime, input.pace);
+  for (const HeldMessage& wrong : time_.wrong()) {
+    report(wire::Reason::kClockJump,
+           "utime " + std::to_string(wrong.utime) + " while it is " + std::to_string(now()),
+           wrong.channel);
+    count_wrong(wrong.channel);
   }
-
-  switch (verdict) {
-    case MessageClock::Verdict::kFine:
-      return true;
-    case MessageClock::Verdict::kQuarantined:
-      report(wire::Reason::kClockJump,
-             "utime " + std::to_string(utime) + " while it is " + std::to_string(clock_.now()),
-             input.channel);
-      return false;
-    case MessageClock::Verdict::kJumped:
-      log(Level::kWarning, to_string(wire::Reason::kClockJump),
-          "time goes on at " + std::to_string(utime), input.channel);
-      return start_at_jump();
+  if (verdict == Verdict::kFine) return true;
+  if (source_ != Source::kBus) {
+    // What is proven and what is in the journal had been believed: time jumps with it.
+    start_at_jump(utime);
+    return true;
   }
-  return true;
+  if (verdict == Verdict::kJumped) feed_proven();
+  return false;
 }
 
-bool Node::start_at_jump() {
+/// The messages that waited, and the one that proved them, as they will come from the journal.
+void Node::feed_proven() {
+  const std::vector<HeldMessage> proven = time_.jumped();
+  log(Level::kWarning, to_string(wire::Reason::kClockJump),
+      "time goes on at " + std::to_string(proven.front().utime), proven.front().channel);
+  start_at_jump(proven.front().utime);
+  source_ = Source::kProven;
+  for (const HeldMessage& one : proven) feed(one.view());
+  source_ = Source::kBus;
+}
+
+void Node::count_wrong(std::string_view channel) {
+  for (const auto& input : inputs_) {
+    if (input->channel == channel) input->refused.condition.add(true);
+  }
+}
+
+void Node::start_at_jump(model::Utime utime) {
+  time_.jumped();  // None waits any more.
+  time_.resume(utime);
   // Sequence numbers from before the jump do not bind what comes now.
   for (const auto& one : inputs_) one->sequence.resume(-1, -1);
   timers_.start_over();
-  return true;
 }
 
 void Node::send(Output& output, model::Utime utime, const wire::Bytes& bytes,
                 const wire::WireType& type) {
-  if (is_recovering_) return;
+  if (is_recovering()) return;
 
   // The same checks as for inputs: nothing that is not finite is ever published.
   std::optional<wire::Refusal> refusal = check_bytes(bytes, type);
@@ -148,6 +177,13 @@ void Node::send(Output& output, model::Utime utime, const wire::Bytes& bytes,
 void Node::report(wire::Reason reason, std::string_view text, std::string_view channel) {
   monitor_.count_reason(channel, reason, text);
   announcer_.report(now(), reason, text, channel);
+}
+
+void Node::show(const WatchedCondition& watched) {
+  const bool holds = watched.condition.holds();
+  if (!monitor_.set_condition(watched.channel, watched.reason, holds, watched.text)) return;
+  const std::string text = std::string(watched.text) + (holds ? "" : ": over");
+  log(holds ? Level::kWarning : Level::kInfo, to_string(watched.reason), text, watched.channel);
 }
 
 health_t Node::health() {

@@ -19,13 +19,14 @@
 #include "common/bus/announcer.hpp"
 #include "common/bus/bus.hpp"
 #include "common/bus/clock.hpp"
+#include "common/bus/condition.hpp"
 #include "common/bus/health_monitor.hpp"
-#include "common/bus/message_clock.hpp"
 #include "common/bus/message_timers.hpp"
 #include "common/bus/node_state.hpp"
 #include "common/bus/sequence_tracker.hpp"
 #include "common/bus/state_keeper.hpp"
 #include "common/bus/state_store.hpp"
+#include "common/bus/time_gate.hpp"
 #include "common/wire/convert.hpp"
 
 namespace understory::bus {
@@ -38,6 +39,12 @@ struct SubscribeOptions {
   /// One sender numbers its messages: duplicates and late comers are dropped. False for requests,
   /// which anybody may send.
   bool sequenced = true;
+  /// Late comers are handed on, too: the service puts them in order. Duplicates are dropped.
+  bool takes_late = false;
+  /// Its stamps move the service's time, and one far from it is refused. False for what comes back
+  /// from those who take the service's output: its stamps are on the service's time, which is not
+  /// that of sensors whose clocks have jumped.
+  bool timed = true;
   /// A larger message is refused before anything looks at it (`too_large`): what a message may cost
   /// follows from its size.
   std::size_t most_bytes = kLargestMessage;
@@ -71,7 +78,9 @@ struct NodeOptions {
   std::int64_t largest_clock_jump_us = 10000000;  ///< MessageClock's.
   model::Utime snapshot_every_us = 30000000;      ///< Message time between two snapshots.
   int snapshot_every_events = 1000;               ///< Inputs between two snapshots.
-  bool publishes_health = true;                   ///< HEALTH; LOG and CONFIG are always published.
+  /// Refused messages of the latest 32 of an input with which it is `input_refused`.
+  int refused_of_last_32 = 16;
+  bool publishes_health = true;  ///< HEALTH; LOG and CONFIG are always published.
 };
 
 /// A facade, hence the number of functions: adapters see channels, ticks and messages for people;
@@ -101,7 +110,7 @@ class Node {
     timers_.add(period_us, std::move(handler));
   }
   /// Newest stamp among the inputs; -1 before the first.
-  model::Utime now() const { return clock_.now(); }
+  model::Utime now() const { return time_.now(); }
   /// Something a person should read: LOG.
   void log(Level level, std::string_view code, std::string_view text,
            std::string_view channel = "") {
@@ -109,6 +118,10 @@ class Node {
   }
   /// Something is wrong: counted for HEALTH, and LOG at a limited rate.
   void report(wire::Reason reason, std::string_view text, std::string_view channel = "");
+
+  /// HEALTH is not OK as long as the condition holds; its beginning and its end are in LOG. To be
+  /// called after each event, and after the state was loaded.
+  void show(const WatchedCondition& watched);
 
   // For the drivers.
 
@@ -157,6 +170,9 @@ class Node {
     SubscribeOptions options;
     Take take;
     SequenceTracker sequence;
+    ChannelPace pace{-1, 0};
+    WatchedCondition refused;  ///< Of its latest messages; of this process.
+    bool is_late = false;      ///< The message that is being handled.
     std::size_t health = 0;
   };
   struct Output {
@@ -164,6 +180,8 @@ class Node {
     std::int64_t next_sequence = 0;
     std::size_t health = 0;
   };
+  /// Where a message that is fed comes from.
+  enum class Source : std::uint8_t { kBus, kProven, kJournal };
   struct Stage {
     std::function<std::string()> save;
     std::function<void(const std::string&)> load;
@@ -175,17 +193,20 @@ class Node {
   std::optional<wire::Refusal> take(Input& input, const BusMessage& message);
   bool admit(Input& input, const BusMessage& message);
   bool admit_sequence(Input& input, const wire::MessageHeader& header);
-  bool admit_time(Input& input, model::Utime utime);
-  bool start_at_jump();
+  bool admit_time(Input& input, const BusMessage& message, model::Utime utime);
+  void start_at_jump(model::Utime utime);
+  void feed_proven();
+  void count_wrong(std::string_view channel);
   void send(Output& output, model::Utime utime, const wire::Bytes& bytes,
             const wire::WireType& type);
+  bool is_recovering() const { return source_ == Source::kJournal; }
   std::string save_state() const;
   void load_state(const std::string& bytes);
 
   Bus& bus_;
   NodeOptions options_;
   Clock computer_clock_;
-  MessageClock clock_;
+  TimeGate time_;
   HealthMonitor monitor_;
   Announcer announcer_;
   std::vector<std::unique_ptr<Input>> inputs_;
@@ -193,7 +214,7 @@ class Node {
   MessageTimers timers_;
   Stage stage_;
   StateKeeper state_;
-  bool is_recovering_ = false;
+  Source source_ = Source::kBus;
 };
 
 template <class T, class F>

@@ -14,10 +14,11 @@ void Node::keep_state(std::function<std::string()> save,
 
 std::string Node::save_state() const {
   NodeState state;
-  state.now_us = clock_.now();
+  state.now_us = time_.now();
   for (const auto& input : inputs_) {
     state.inputs[input->channel] = {input->sequence.newest_sequence(),
                                     input->sequence.newest_utime()};
+    state.paces[input->channel] = {input->pace.newest_us, input->pace.interval_us};
   }
   for (const Output& output : outputs_) state.outputs[output.channel] = output.next_sequence;
   state.timers_due_us = timers_.due_us();
@@ -32,11 +33,13 @@ void Node::load_state(const std::string& bytes) {
     throw std::runtime_error("the state is of another version of this service");
   }
 
-  clock_.resume(state.now_us);
+  time_.resume(state.now_us);
   for (const auto& input : inputs_) {
     const auto found = state.inputs.find(input->channel);
     if (found == state.inputs.end()) continue;
     input->sequence.resume(found->second.first, found->second.second);
+    const auto pace = state.paces.find(input->channel);
+    if (pace != state.paces.end()) input->pace = {pace->second.first, pace->second.second};
   }
   for (Output& output : outputs_) {
     const auto found = state.outputs.find(output.channel);
@@ -52,7 +55,7 @@ bool Node::recover(StateStore& store) {
   // Load the snapshot and repeat what came after it.
   StateStore::Recovered recovered = store.open();
   bool is_loaded = true;
-  is_recovering_ = true;
+  source_ = Source::kJournal;
   announcer_.mute(true);
   try {
     if (recovered.snapshot) load_state(*recovered.snapshot);
@@ -61,7 +64,7 @@ bool Node::recover(StateStore& store) {
     recovered.problems.push_back({wire::Reason::kSnapshotDamaged, error.what()});
     is_loaded = false;
   }
-  is_recovering_ = false;
+  source_ = Source::kBus;
   announcer_.mute(false);
   store.end_recovery();
 

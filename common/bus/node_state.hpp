@@ -15,11 +15,13 @@ namespace understory::bus {
 /// not part of it: they are of one process.
 struct NodeState {
   /// The list of members that follows.
-  static constexpr state::Format kFormat{"node", 2};
+  static constexpr state::Format kFormat{"node", 3};
 
-  std::int64_t now_us = -1;  ///< MessageClock::now().
+  std::int64_t now_us = -1;  ///< TimeGate::now().
   /// Newest sequence number and stamp [us] of each input, by channel.
   std::map<std::string, std::pair<std::int64_t, std::int64_t>> inputs;
+  /// Newest believed stamp [us] of each input and the interval before it, by channel.
+  std::map<std::string, std::pair<std::int64_t, std::int64_t>> paces;
   std::map<std::string, std::int64_t> outputs;  ///< Next sequence number, by channel.
   std::vector<std::int64_t> timers_due_us;      ///< MessageTimers::due_us().
   std::string stage;                            ///< Adapter::save().
@@ -27,7 +29,7 @@ struct NodeState {
   /// Lists the members, see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.now_us, self.inputs, self.outputs, self.timers_due_us, self.stage);
+    a(self.now_us, self.inputs, self.paces, self.outputs, self.timers_due_us, self.stage);
   }
 };
 

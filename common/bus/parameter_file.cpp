@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "common/bus/config_file.hpp"
+#include "common/bus/config_layers.hpp"
 #include "common/bus/parameter_table.hpp"
 
 namespace understory::bus {
@@ -79,12 +80,25 @@ struct Setting {
 class Loader {
  public:
   Loader(const std::vector<ParameterTable::Entry>& entries,
-         const std::vector<ParameterTable::Renamed>& renamed, std::string name)
-      : entries_(entries), renamed_(renamed), name_(std::move(name)) {}
+         const std::vector<ParameterTable::Renamed>& renamed)
+      : entries_(entries), renamed_(renamed) {}
 
+  /// Takes a file; what an earlier one stated of the same keys is replaced.
+  void take(const ConfigLayer& layer) {
+    name_ = layer.name;
+    walk(layer.table, "");
+  }
+
+  void finish() {
+    if (!problems_.empty()) throw ConfigurationError(problems_);
+    for (const Setting& setting : settings_) set(setting);
+  }
+
+ private:
   void walk(const toml::table& table, const std::string& prefix) {
     for (const auto& [key, node] : table) {
       const std::string path = prefix + std::string(key.str());
+      if (path == kBaseKey) continue;
       const ParameterTable::Entry* entry = find(path);
       if (entry != nullptr) {
         take(*entry, node);
@@ -98,12 +112,6 @@ class Loader {
     }
   }
 
-  void finish() {
-    if (!problems_.empty()) throw ConfigurationError(problems_);
-    for (const Setting& setting : settings_) set(setting);
-  }
-
- private:
   const ParameterTable::Entry* find(const std::string& path) const {
     const auto found = std::find_if(entries_.begin(), entries_.end(),
                                     [&](const auto& entry) { return entry.key == path; });
@@ -204,15 +212,8 @@ void ParameterTable::load(const std::filesystem::path& file) {
 }
 
 void ParameterTable::load_text(std::string_view toml, const std::string& name) {
-  toml::table table;
-  try {
-    table = toml::parse(toml, name);
-  } catch (const toml::parse_error& error) {
-    throw ConfigurationError(
-        {fmt::format("{}:{}: {}", name, error.source().begin.line, error.description())});
-  }
-  Loader loader(entries_, renamed_, name);
-  loader.walk(table, "");
+  Loader loader(entries_, renamed_);
+  for (const ConfigLayer& layer : config_layers(toml, name)) loader.take(layer);
   loader.finish();
 }
 

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/bus/config_layers.hpp"
+
 namespace understory::bus {
 namespace {
 
@@ -97,6 +99,7 @@ void ParameterTable::renamed_choice(std::string key, std::string old_choice,
 }
 
 void ParameterTable::check_is_new(const std::string& key) const {
+  if (key == kBaseKey) throw std::logic_error("parameter " + key + ": the key has another meaning");
   for (const Entry& entry : entries_) {
     if (entry.key == key) throw std::logic_error("parameter " + key + " is described twice");
   }

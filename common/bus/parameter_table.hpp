@@ -93,10 +93,11 @@ class ParameterTable {
   /// All rules added by renamed() and renamed_choice().
   const std::vector<Renamed>& renames() const { return renamed_; }
 
-  /// Sets what the file states; the rest keeps its default. Throws ConfigurationError with all that
-  /// is wrong; then nothing has been set.
+  /// Sets what the file states, on top of what the file states that its key `base` names; the rest
+  /// keeps its default. Throws ConfigurationError with all that is wrong; then nothing has been
+  /// set.
   void load(const std::filesystem::path& file);
-  /// The same from text; `name` is the file's name in messages.
+  /// The same from text; `name` is the file's name in messages, and a `base` is relative to it.
   void load_text(std::string_view toml, const std::string& name);
 
   /// A configuration file with the values in force, each with its unit, range and meaning.

@@ -1,5 +1,7 @@
 #include "common/bus/reason_counts.hpp"
 
+#include <algorithm>
+
 namespace understory::bus {
 namespace {
 
@@ -32,6 +34,8 @@ Severity severity(wire::Reason reason) {
       return Severity::kNote;
     case wire::Reason::kStageFailed:
     case wire::Reason::kStateNotKept:
+    case wire::Reason::kLost:
+    case wire::Reason::kDiverged:
       return Severity::kError;
     default:
       return Severity::kDegraded;
@@ -53,6 +57,16 @@ void ReasonCounts::add(std::string_view channel, wire::Reason reason, std::strin
   last_text_utime_ = clock_.wall_us();
 }
 
+bool ReasonCounts::hold(std::string_view channel, wire::Reason reason, std::string_view text) {
+  const auto [entry, is_new] = holding_.try_emplace({std::string(channel), reason}, text);
+  if (is_new) add(channel, reason, text);
+  return is_new;
+}
+
+bool ReasonCounts::release(std::string_view channel, wire::Reason reason) {
+  return holding_.erase({std::string(channel), reason}) > 0;
+}
+
 void ReasonCounts::set_refused(const DatagramFaults& faults) {
   for (std::size_t i = 0; i < kDatagramFaults; ++i) {
     const auto fault = static_cast<DatagramFault>(i);
@@ -70,10 +84,13 @@ void ReasonCounts::set_refused(const DatagramFaults& faults) {
 }
 
 Severity ReasonCounts::fresh() const {
+  Severity worst = Severity::kNote;
+  for (const auto& [key, text] : holding_) worst = std::max(worst, severity(key.second));
+
   const std::int64_t now = clock_.monotonic_us();
   if (now - last_error_us_ < kFreshUs) return Severity::kError;
-  if (now - last_degraded_us_ < kFreshUs) return Severity::kDegraded;
-  return Severity::kNote;
+  if (now - last_degraded_us_ < kFreshUs) return std::max(worst, Severity::kDegraded);
+  return worst;
 }
 
 std::int64_t ReasonCounts::count_of(std::string_view channel, wire::Reason reason) const {
@@ -85,6 +102,14 @@ void ReasonCounts::fill(health_t& message) const {
   message.last_error_code = last_code_;
   message.last_error = last_text_;
   message.last_error_utime = last_text_utime_;
+  Severity worst = Severity::kNote;
+  for (const auto& [key, text] : holding_) {
+    if (severity(key.second) <= worst) continue;
+    worst = severity(key.second);
+    message.last_error_code = to_string(key.second);
+    message.last_error = key.first.empty() ? text : key.first + ": " + text;
+    message.last_error_utime = clock_.wall_us();
+  }
 
   for (const auto& [where, count] : counts_) {
     reason_count_t& reason = message.reasons.emplace_back();

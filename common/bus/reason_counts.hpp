@@ -36,23 +36,30 @@ class ReasonCounts {
 
   /// Counts one; `channel` may be empty, `text` is for a person.
   void add(std::string_view channel, wire::Reason reason, std::string_view text);
+  /// A condition holds from now on, and counts towards the state as long as it does; `text` is for
+  /// a person. False where it held already.
+  bool hold(std::string_view channel, wire::Reason reason, std::string_view text);
+  /// A condition does not hold (any more). False where it did not hold before.
+  bool release(std::string_view channel, wire::Reason reason);
   /// Sets how many datagrams the bus refused so far; an increase of a harmful one becomes the
   /// last reason.
   void set_refused(const DatagramFaults& faults);
   /// Something is missing that has no reason of its own: a gap, a full queue.
   void add_degraded() { last_degraded_us_ = clock_.monotonic_us(); }
 
-  /// The worst severity that is fresh; kNote = nothing is.
+  /// The worst severity that is fresh or of a condition that holds; kNote = nothing is.
   Severity fresh() const;
   /// How often this reason came for this channel.
   std::int64_t count_of(std::string_view channel, wire::Reason reason) const;
-  /// Writes the counts and the last reason into the message for HEALTH.
+  /// Writes the counts and the last reason into the message for HEALTH; where conditions hold, the
+  /// worst of them is the last reason.
   void fill(health_t& message) const;
 
  private:
   Clock clock_;
   DatagramFaults refused_;
-  std::map<std::pair<std::string, std::string>, std::int64_t> counts_;  // channel, reason
+  std::map<std::pair<std::string, std::string>, std::int64_t> counts_;   // channel, reason
+  std::map<std::pair<std::string, wire::Reason>, std::string> holding_;  // channel, reason; text
   std::int64_t last_degraded_us_;
   std::int64_t last_error_us_;
   std::string last_code_;

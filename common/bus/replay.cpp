@@ -4,6 +4,7 @@
 #include <set>
 
 #include "common/bus/config_file.hpp"
+#include "common/bus/launch_config.hpp"
 #include "common/bus/memory_bus.hpp"
 #include "common/io/lcm_log.hpp"
 #include "understory/config_t.hpp"
@@ -38,7 +39,8 @@ class Replay {
     }
 
     reader_.refuse_other_files();
-    if (has_begun) finish();
+    if (report_.fed == 0 && report_.events > 0) refuse_unfed();
+    finish();
     if (writer_) writer_->commit();
     report_.damaged_places = reader_.damage().places;
     report_.damaged_bytes = reader_.damage().bytes;
@@ -50,10 +52,9 @@ class Replay {
 
  private:
   void host(const Service& service) {
-    const std::filesystem::path file = options_.config_dir / (service.name + ".toml");
-    const bool has_file = !options_.config_dir.empty() && std::filesystem::exists(file);
+    const std::filesystem::path file = config_file_in(options_.config_dir, service.name);
     hosted_.push_back(std::make_unique<HostedService>(
-        service, bus_, no_clock(), has_file ? read_config_file(file) : "", file.string(),
+        service, bus_, no_clock(), file.empty() ? "" : read_config_file(file), file.string(),
         [&](RuntimeParameters& runtime) {
           if (!options_.channel_suffix.empty()) runtime.channel_suffix = options_.channel_suffix;
         }));
@@ -78,6 +79,7 @@ class Replay {
   }
 
   void take(const io::LogEvent& event) {
+    if (report_.fed == 0) channels_.insert(event.channel);
     if (is_own_output(event)) {
       ++report_.left_out;
       return;
@@ -93,6 +95,17 @@ class Replay {
     bus_.publish(event.channel, event.data);
     is_feeding_ = false;
     bus_.drain();
+  }
+
+  /// Stages that heard nothing would look like a drive on which nothing was found.
+  [[noreturn]] void refuse_unfed() const {
+    std::string channels;
+    for (const std::string& channel : channels_) channels += " " + channel;
+    std::string stages;
+    for (const std::string& name : names_) stages += " " + name;
+    throw io::LogError(options_.log.string() + ": no event of it is an input of the stages" +
+                       stages + "; its channels:" + (channels.empty() ? " none" : channels) +
+                       (report_.left_out == 0 ? "" : "; what these stages publish is left out"));
   }
 
   /// A recorded output of a hosted service, or its HEALTH, LOG or CONFIG.
@@ -127,6 +140,7 @@ class Replay {
   std::vector<std::unique_ptr<HostedService>> hosted_;
   std::set<std::string, std::less<>> outputs_;
   std::set<std::string, std::less<>> names_;
+  std::set<std::string> channels_;  ///< Up to the first event that is fed, for the message.
   std::int64_t log_utime_ = 0;
   bool is_feeding_ = false;
   ReplayReport report_;

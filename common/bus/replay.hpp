@@ -17,7 +17,7 @@ struct ReplayOptions {
   std::filesystem::path log;
   std::filesystem::path out;         ///< Empty = nothing is written.
   std::vector<Service> services;     ///< Hosted, bound in this order.
-  std::filesystem::path config_dir;  ///< NAME.toml for each service that has one; may be empty.
+  std::filesystem::path config_dir;  ///< As config_file_in(); may be empty: defaults.
   std::string channel_suffix;        ///< Of the outputs of every hosted service.
   bool keeps_inputs = true;          ///< The log's own events go into `out` too.
   /// Called every 256 events with the part done, 0..1; true = stop here, write nothing.
@@ -40,7 +40,8 @@ struct ReplayReport {
 /// After each event of the log the messages derived from it are handed out, in the order in which
 /// they were published, until none is left. Recorded outputs of hosted services are not fed.
 /// Derived events carry the log time of the event that caused them. `out` is written whole or not
-/// at all. Throws LogError, ConfigurationError.
+/// at all. Throws LogError, also where no event of the log is an input of a service, and
+/// ConfigurationError.
 ReplayReport replay(const ReplayOptions& options);
 
 }  // namespace understory::bus

@@ -47,6 +47,10 @@ Arrival SequenceTracker::take(std::int64_t sequence, std::int64_t utime) {
 
 Arrival SequenceTracker::begin(std::int64_t sequence, std::int64_t utime) {
   resume(sequence, utime);
+  // Those before it may still come.
+  taken_.reset();
+  taken_.set(slot(sequence));
+  first_sequence_ = sequence;
   return Arrival::kFirst;
 }
 
@@ -58,7 +62,7 @@ Arrival SequenceTracker::take_old(std::int64_t sequence) {
   }
   if (is_in_window) {
     taken_.set(slot(sequence));
-    if (counts_.lost > 0) --counts_.lost;
+    if (sequence > first_sequence_ && counts_.lost > 0) --counts_.lost;
   }
   ++counts_.late;
   return Arrival::kLate;
@@ -67,6 +71,7 @@ Arrival SequenceTracker::take_old(std::int64_t sequence) {
 void SequenceTracker::resume(std::int64_t newest_sequence, std::int64_t newest_utime) {
   newest_sequence_ = newest_sequence;
   newest_utime_ = newest_utime;
+  first_sequence_ = -1;
   taken_.set();
 }
 

@@ -48,6 +48,7 @@ class SequenceTracker {
   Arrival begin(std::int64_t sequence, std::int64_t utime);
   Arrival take_old(std::int64_t sequence);
 
+  std::int64_t first_sequence_ = -1;  // of this sender; those before it are not counted as lost
   std::int64_t newest_sequence_ = -1;
   std::int64_t newest_utime_ = -1;
   std::bitset<kWindow> taken_;  // at sequence modulo kWindow, for the kWindow newest numbers

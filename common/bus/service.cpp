@@ -27,8 +27,14 @@ void describe(RuntimeParameters& parameters, ParameterTable& table) {
             "Message time between two snapshots of the state.");
   table.add("runtime.snapshot_every_events", parameters.snapshot_every_events, {1, 1000000}, "",
             "Inputs between two snapshots of the state.");
-  table.add("runtime.largest_clock_jump_s", parameters.largest_clock_jump_s, {0.1, 86400.0}, "s",
-            "A stamp farther from the others is not believed until three in a row agree.");
+  table.add(
+      "runtime.largest_clock_jump_s", parameters.largest_clock_jump_s, {0.1, 86400.0}, "s",
+      "A message whose stamp is farther from the others waits until three in a row agree, and "
+      "is refused where they do not. Channels that are slower, or behind, need no proof.");
+  table.add(
+      "runtime.refused_of_last_32", parameters.refused_of_last_32, {1, 32}, "messages",
+      "HEALTH says input_refused where so many of an input's last 32 messages were refused or "
+      "came late, until a quarter of that is left.");
 }
 
 #ifndef UNDERSTORY_VERSION
@@ -43,6 +49,7 @@ NodeOptions node_options(const std::string& process, const RuntimeParameters& pa
   options.channel_suffix = parameters.channel_suffix;
   options.suffixed_inputs = split_at_commas(parameters.suffixed_inputs);
   options.largest_clock_jump_us = static_cast<model::Utime>(parameters.largest_clock_jump_s * 1e6);
+  options.refused_of_last_32 = parameters.refused_of_last_32;
   options.snapshot_every_us = static_cast<model::Utime>(parameters.snapshot_every_s * 1e6);
   options.snapshot_every_events = parameters.snapshot_every_events;
   return options;

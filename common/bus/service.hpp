@@ -42,6 +42,7 @@ struct RuntimeParameters {
   double snapshot_every_s = 30.0;      ///< Message time between two snapshots.
   int snapshot_every_events = 1000;    ///< Inputs between two snapshots.
   double largest_clock_jump_s = 10.0;  ///< Of a stamp, without proof.
+  int refused_of_last_32 = 16;         ///< Messages of an input.
 };
 /// Lists them in `table`, bound to `parameters`, which must outlive it.
 void describe(RuntimeParameters& parameters, ParameterTable& table);

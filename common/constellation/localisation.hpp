@@ -49,8 +49,9 @@ struct LocaliseParameters {
   double min_log10_margin = 6.0;
   /// Triangles of the accepted pose that are looked up again for the runner-up.
   int runner_up_probes = 3;
-  /// Gives up ("not sure") after work worth so many hypotheses that fail their test at once.
-  std::uint32_t max_hypotheses = 15000;
+  /// Gives up ("not sure") after so many look-ups of a point in the map: what a search costs, for
+  /// hypotheses that fail at once as for fits on all points.
+  std::uint32_t max_lookups = 600000;
 };
 
 /// Why a search ended as it did. Everything but kFound means "no pose".
@@ -60,7 +61,7 @@ enum class LocaliseOutcome : std::uint8_t {
   kNoMatch = 2,       ///< No hypothesis held.
   kLikelyChance = 3,  ///< The best pose has too few hits to rule out chance.
   kAmbiguous = 4,     ///< A different pose fits nearly as well.
-  kGaveUp = 5,        ///< max_hypotheses tried.
+  kGaveUp = 5,        ///< max_lookups spent.
 };
 /// One line for a person, e.g. "too few points".
 std::string_view describe(LocaliseOutcome outcome);
@@ -81,7 +82,8 @@ struct Localisation {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Tangent order, right perturbation.
   std::vector<PointAssociation> associations;            ///< One to one, by observed index.
   std::uint32_t inliers = 0;                             ///< Associations of the pose.
-  std::uint32_t hypotheses = 0;                          ///< Poses tried, the work done.
+  std::uint32_t hypotheses = 0;                          ///< Poses tried.
+  std::uint32_t lookups = 0;                             ///< Points looked up, the work done.
   /// log10 of an upper bound on the expected number of such good poses by chance.
   double log10_false_alarm = 0.0;
   /// Inliers of the best pose that is another one; 0 if none was found.

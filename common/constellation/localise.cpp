@@ -1,112 +1,123 @@
 // ConstellationMap::localise: the search over triangle hypotheses.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <numeric>
 
+#include "common/constellation/hypothesis.hpp"
 #include "common/constellation/map.hpp"
 #include "common/constellation/observation.hpp"
 #include "common/constellation/pose.hpp"
+#include "common/constellation/settle.hpp"
 
 namespace understory::constellation {
 namespace constellation {
 namespace {
 
-/// Points looked at before a hypothesis is worth a refit on all.
-constexpr std::size_t kTestPoints = 16;
 /// Points whose triangles are tried first; as many again and again until all have been.
 constexpr std::size_t kFirstPoints = 12;
-/// What a refit on all points costs, in hypotheses that fail their test.
-constexpr std::uint32_t kFitCost = 50;
+/// The same for points that stand apart: in a crowd theirs are the only telling triangles.
+constexpr std::size_t kFirstHermits = 96;
+/// Triangles of those are taken among so many nearest ones: some have no counterpart in the map.
+constexpr int kHermitNeighbours = 8;
 /// Wald's thresholds on the log likelihood ratio.
 constexpr double kReject = -1.9;
 constexpr double kAccept = 9.0;
 constexpr double kAcceptAtEnd = 2.5;
 
-/// A rigid motion whose heading is kept as a unit vector: no trigonometry per hypothesis.
-struct Motion {
-  double c = 1.0;
-  double s = 0.0;
-  Eigen::Vector2d t = Eigen::Vector2d::Zero();
-  Eigen::Vector2d operator*(const Eigen::Vector2d& p) const {
-    return {c * p.x() - s * p.y() + t.x(), s * p.x() + c * p.y() + t.y()};
-  }
+/// Triangles of one kind: of all points, or of those that stand apart.
+struct Kind {
+  TriangleSource source;
+  const TriangleIndex* index = nullptr;  ///< Of the map's triangles of that kind.
+  std::size_t first_points = kFirstPoints;
+  std::size_t taken = 0;  ///< Points whose triangles are in use.
 };
 
-/// A point on which hypotheses of one triangle are tested, about that triangle's centroid.
-struct TestPoint {
-  Eigen::Vector2d about_centroid;
-  std::uint32_t point;
-  double gate_m;
-  double hit;   ///< Log likelihood ratio of right against wrong, if a landmark is in the gate...
-  double miss;  ///< ... and if not.
-};
-
-/// One query triangle, with what all its hypotheses share.
-struct Query {
+/// A triangle of the observation and where the map has such.
+struct Candidate {
   Triangle triangle;
-  Eigen::Vector2d centroid;
-  std::array<Eigen::Vector2d, 3> about_centroid;
-  std::vector<TestPoint> tests;
+  const TriangleIndex* index = nullptr;
 };
 
 class Search {
  public:
   Search(const ConstellationMap& map, const PreparedObservation& observation,
-         const LocaliseParameters& parameters, const std::optional<Disc>& where)
-      : map_(map),
-        observation_(observation),
-        parameters_(parameters),
-        where_(where),
-        source_(observation, parameters.neighbours) {}
+         const LocaliseParameters& parameters, const std::optional<Disc>& where);
 
   Localisation run();
 
  private:
-  std::span<const Triangle> more_triangles();
-  bool search(std::span<const Triangle> triangles, double side_sigmas);
+  std::span<const Candidate> more_triangles();
+  bool exhausted() const;
+  bool search(std::span<const Candidate> candidates, double side_sigmas);
   void look_for_runner_up(double side_sigmas);
-  Query make_query(const Triangle& triangle) const;
-  void add_tests(Query& query) const;
   std::array<float, 3> tolerance(const Triangle& triangle, double side_sigmas) const;
-  Motion motion_from(const Query& query, const std::array<Slot, 3>& corners) const;
-  std::optional<FittedPose> try_hypothesis(const Query& query, const std::array<Slot, 3>& corners);
+  std::optional<FittedPose> try_hypothesis(const TriangleQuery& query,
+                                           const std::array<Slot, 3>& corners);
   void consider(FittedPose pose);
+  void settle_best();
   bool accepted() const {
     return best_ && false_alarm(*best_) <= parameters_.max_log10_false_alarm;
   }
   double false_alarm(const FittedPose& pose) const {
     return pose.log10_tail + std::log10(std::max<double>(hypotheses_, 1.0));
   }
-  bool spent() const { return hypotheses_ + kFitCost * fits_ >= parameters_.max_hypotheses; }
-  double margin() const { return (runner_up_ ? runner_up_->log10_tail : 0.0) - best_->log10_tail; }
+  bool spent() const { return lookups_ >= parameters_.max_lookups; }
+  double margin() const;
   bool ambiguous() const { return margin() < parameters_.min_log10_margin; }
+  LocaliseOutcome outcome() const;
   Localisation result() const;
 
   const ConstellationMap& map_;
   const PreparedObservation& observation_;
   const LocaliseParameters& parameters_;
   const std::optional<Disc>& where_;
-  TriangleSource source_;
-  std::vector<Triangle> triangles_;  // taken from the source, in the order of trying
-  std::size_t points_taken_ = 0;
+  std::vector<Kind> kinds_;
+  std::vector<Candidate> candidates_;  // taken from the sources, in the order of trying
   std::optional<FittedPose> best_;
   std::optional<FittedPose> runner_up_;  // at a different pose
+  std::optional<SettledPose> settled_;   // of an accepted best
   std::uint32_t hypotheses_ = 0;
-  std::uint32_t fits_ = 0;
+  std::uint32_t lookups_ = 0;
 };
 
+Search::Search(const ConstellationMap& map, const PreparedObservation& observation,
+               const LocaliseParameters& parameters, const std::optional<Disc>& where)
+    : map_(map), observation_(observation), parameters_(parameters), where_(where) {
+  std::vector<std::uint32_t> all(observation.points.size());
+  std::iota(all.begin(), all.end(), 0U);
+  kinds_.push_back({TriangleSource(observation, all, parameters.neighbours), &map.triangle_index(),
+                    kFirstPoints, 0});
+  for (const Hermits& hermits : map.hermits()) {
+    if (hermits.triangles().size() == 0) continue;
+    const auto apart = points_apart(observation, hermits.apart_m());
+    if (apart.size() < 3) continue;
+    kinds_.push_back({TriangleSource(observation, apart, kHermitNeighbours), &hermits.triangles(),
+                      kFirstHermits, 0});
+  }
+}
+
+bool Search::exhausted() const {
+  return std::all_of(kinds_.begin(), kinds_.end(),
+                     [](const Kind& kind) { return kind.source.exhausted(); });
+}
+
 /// The triangles of some more points, the most telling of them first.
-std::span<const Triangle> Search::more_triangles() {
-  const std::size_t known = triangles_.size();
-  const std::vector<Triangle> fresh = source_.take(std::max(kFirstPoints, points_taken_));
-  points_taken_ += std::max(kFirstPoints, points_taken_);
+std::span<const Candidate> Search::more_triangles() {
+  const std::size_t known = candidates_.size();
+  std::vector<Candidate> fresh;
+  for (Kind& kind : kinds_) {
+    const std::size_t count = std::max(kind.first_points, kind.taken);
+    for (const Triangle& triangle : kind.source.take(count))
+      fresh.push_back({triangle, kind.index});
+    kind.taken += count;
+  }
   std::vector<std::uint64_t> order(fresh.size());
   for (std::size_t i = 0; i < fresh.size(); ++i) {
-    order[i] = (std::uint64_t{map_.triangle_index().crowd(fresh[i])} << 32) | i;
+    order[i] = (std::uint64_t{fresh[i].index->crowd(fresh[i].triangle)} << 32) | i;
   }
   std::sort(order.begin(), order.end());
-  for (const std::uint64_t key : order) triangles_.push_back(fresh[key & 0xFFFFFFFFU]);
-  return std::span(triangles_).subspan(known);
+  for (const std::uint64_t key : order) candidates_.push_back(fresh[key & 0xFFFFFFFFU]);
+  return std::span(candidates_).subspan(known);
 }
 
 std::array<float, 3> Search::tolerance(const Triangle& triangle, double side_sigmas) const {
@@ -119,88 +130,27 @@ std::array<float, 3> Search::tolerance(const Triangle& triangle, double side_sig
   return result;
 }
 
-Query Search::make_query(const Triangle& triangle) const {
-  Query query;
-  query.triangle = triangle;
-  query.centroid = Eigen::Vector2d::Zero();
-  for (const Slot vertex : triangle.vertex) {
-    query.centroid += observation_.points[vertex].position / 3.0;
-  }
-  for (std::size_t i = 0; i < 3; ++i) {
-    query.about_centroid[i] = observation_.points[triangle.vertex[i]].position - query.centroid;
-  }
-  return query;
-}
-
-void Search::add_tests(Query& query) const {
-  const auto& points = observation_.points;
-  std::vector<std::pair<double, std::uint32_t>> order;
-  order.reserve(points.size());
-  for (std::uint32_t i = 0; i < points.size(); ++i) {
-    const auto& vertex = query.triangle.vertex;
-    if (i == vertex[0] || i == vertex[1] || i == vertex[2]) continue;
-    order.emplace_back((points[i].position - query.centroid).squaredNorm(), i);
-  }
-  // The nearest first: there the triangle's own error matters least and the gate is tightest.
-  const std::size_t count = std::min(kTestPoints, order.size());
-  std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end());
-
-  double variance = 0.0;
-  double lever = 0.0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    variance += points[query.triangle.vertex[i]].variance / 3.0;
-    lever += query.about_centroid[i].squaredNorm();
-  }
-  const double right = parameters_.expected_hit_ratio;
-  query.tests.resize(count);
-  for (std::size_t k = 0; k < count; ++k) {
-    const auto [squared, i] = order[k];
-    const double gate_variance = points[i].variance + variance / 3.0 + variance * squared / lever;
-    // Three sigmas: a miss is not final here.
-    const double gate_m = std::min(3.0 * std::sqrt(gate_variance), parameters_.max_gate_m);
-    const double wrong =
-        std::min(0.9 * right, observation_.density_per_m2 * std::numbers::pi * gate_m * gate_m);
-    query.tests[k] = {points[i].position - query.centroid, i, gate_m, std::log(right / wrong),
-                      std::log((1.0 - right) / (1.0 - wrong))};
-  }
-}
-
-Motion Search::motion_from(const Query& query, const std::array<Slot, 3>& corners) const {
-  const std::array<Eigen::Vector2d, 3> landmark{map_.grid().position(corners[0]),
-                                                map_.grid().position(corners[1]),
-                                                map_.grid().position(corners[2])};
-  const Eigen::Vector2d centroid = (landmark[0] + landmark[1] + landmark[2]) / 3.0;
-  double dot = 0.0;
-  double cross = 0.0;
-
-  for (std::size_t i = 0; i < 3; ++i) {
-    const Eigen::Vector2d& p = query.about_centroid[i];
-    const Eigen::Vector2d m = landmark[i] - centroid;
-    dot += p.dot(m);
-    cross += p.x() * m.y() - p.y() * m.x();
-  }
-
-  const double norm = std::sqrt(dot * dot + cross * cross);
-  return {dot / norm, cross / norm, centroid};
-}
-
 /// The pose that the hypothesis leads to, if its sequential test is passed.
-std::optional<FittedPose> Search::try_hypothesis(const Query& query,
+std::optional<FittedPose> Search::try_hypothesis(const TriangleQuery& query,
                                                  const std::array<Slot, 3>& corners) {
-  const Motion map_T_centroid = motion_from(query, corners);
+  const PointGrid& grid = map_.grid();
+  const UnitMotion map_T_centroid = query.motion_to(
+      {grid.position(corners[0]), grid.position(corners[1]), grid.position(corners[2])});
+  ++hypotheses_;
+  ++lookups_;
   if (where_) {
     const Eigen::Vector2d sensor = map_T_centroid * Eigen::Vector2d(-query.centroid);
     if ((sensor - where_->centre_m).norm() > where_->radius_m) return std::nullopt;
   }
-  ++hypotheses_;
-  std::array<Slot, kTestPoints> hit{};
+  std::array<Slot, TriangleQuery::kTestPoints> hit{};
   double ratio = 0.0;
   std::size_t tested = 0;
   for (; tested < query.tests.size() && ratio < kAccept; ++tested) {
     const TestPoint& test = query.tests[tested];
     const Eigen::Vector2d mapped = map_T_centroid * test.about_centroid;
     double squared = 0.0;
-    hit[tested] = nearest_slot(map_.grid(), mapped.x(), mapped.y(), test.gate_m, squared);
+    hit[tested] = nearest_slot(grid, mapped.x(), mapped.y(), test.gate_m, squared);
+    ++lookups_;
     ratio += hit[tested] == kNoSlot ? test.miss : test.hit;
     if (ratio < kReject) return std::nullopt;
   }
@@ -212,8 +162,8 @@ std::optional<FittedPose> Search::try_hypothesis(const Query& query,
   for (std::size_t k = 0; k < tested; ++k) {
     if (hit[k] != kNoSlot) pairs.push_back({query.tests[k].point, hit[k], 0.0});
   }
-  ++fits_;
-  FittedPose pose = fit_pose(observation_, map_.grid(), std::move(pairs), parameters_);
+  FittedPose pose = fit_pose(observation_, grid, pairs, parameters_);
+  lookups_ += pose.lookups;
   if (pose.pairs.size() < 3) return std::nullopt;
   return pose;
 }
@@ -234,16 +184,18 @@ void Search::consider(FittedPose pose) {
 }
 
 /// True as soon as a pose is found that chance does not explain.
-bool Search::search(std::span<const Triangle> triangles, double side_sigmas) {
-  for (const Triangle& triangle : triangles) {
-    Query query = make_query(triangle);
-    map_.triangle_index().for_each_similar(triangle, tolerance(triangle, side_sigmas),
-                                           [&](const TriangleIndex::Entry& entry) {
-                                             if (query.tests.empty()) add_tests(query);
-                                             if (auto pose = try_hypothesis(query, entry.vertex))
-                                               consider(std::move(*pose));
-                                             return !accepted() && !spent();
-                                           });
+bool Search::search(std::span<const Candidate> candidates, double side_sigmas) {
+  for (const Candidate& candidate : candidates) {
+    TriangleQuery query(candidate.triangle, observation_);
+    candidate.index->for_each_similar(candidate.triangle,
+                                      tolerance(candidate.triangle, side_sigmas),
+                                      [&](const TriangleIndex::Entry& entry) {
+                                        if (query.tests.empty())
+                                          query.add_tests(observation_, parameters_);
+                                        if (auto pose = try_hypothesis(query, entry.vertex))
+                                          consider(std::move(*pose));
+                                        return !accepted() && !spent();
+                                      });
     if (accepted()) return true;
     if (spent()) return false;
   }
@@ -259,71 +211,82 @@ void Search::look_for_runner_up(double side_sigmas) {
   for (const Pair& pair : best_->pairs) explained[pair.point] = pair.slot;
   int probes = parameters_.runner_up_probes;
 
-  for (const Triangle& triangle : triangles_) {
+  for (const Candidate& candidate : candidates_) {
     if (probes <= 0 || spent() || ambiguous()) break;
-    const std::array<Slot, 3> own{explained[triangle.vertex[0]], explained[triangle.vertex[1]],
-                                  explained[triangle.vertex[2]]};
+    const auto& vertex = candidate.triangle.vertex;
+    const std::array<Slot, 3> own{explained[vertex[0]], explained[vertex[1]], explained[vertex[2]]};
     if (own[0] == kNoSlot || own[1] == kNoSlot || own[2] == kNoSlot) continue;
 
-    Query query = make_query(triangle);
-    map_.triangle_index().for_each_similar(triangle, tolerance(triangle, side_sigmas),
-                                           [&](const TriangleIndex::Entry& entry) {
-                                             if (entry.vertex == own) {
-                                               --probes;
-                                               return true;
-                                             }
-                                             if (query.tests.empty()) add_tests(query);
-                                             if (auto pose = try_hypothesis(query, entry.vertex))
-                                               consider(std::move(*pose));
-                                             return !spent();
-                                           });
+    TriangleQuery query(candidate.triangle, observation_);
+    candidate.index->for_each_similar(candidate.triangle,
+                                      tolerance(candidate.triangle, side_sigmas),
+                                      [&](const TriangleIndex::Entry& entry) {
+                                        if (entry.vertex == own) {
+                                          --probes;
+                                          return true;
+                                        }
+                                        if (query.tests.empty())
+                                          query.add_tests(observation_, parameters_);
+                                        if (auto pose = try_hypothesis(query, entry.vertex))
+                                          consider(std::move(*pose));
+                                        return !spent();
+                                      });
   }
+}
+
+void Search::settle_best() {
+  settled_ = settle(observation_, map_.grid(), *best_, parameters_);
+  if (!settled_) return;
+  lookups_ += settled_->lookups;
+  best_ = settled_->pose;
+}
+
+double Search::margin() const {
+  const double elsewhere = (runner_up_ ? runner_up_->log10_tail : 0.0) - best_->log10_tail;
+  return settled_ ? std::min(elsewhere, settled_->log10_margin) : elsewhere;
+}
+
+LocaliseOutcome Search::outcome() const {
+  if (!best_) return spent() ? LocaliseOutcome::kGaveUp : LocaliseOutcome::kNoMatch;
+  if (!accepted()) return spent() ? LocaliseOutcome::kGaveUp : LocaliseOutcome::kLikelyChance;
+  return !settled_ || ambiguous() ? LocaliseOutcome::kAmbiguous : LocaliseOutcome::kFound;
 }
 
 Localisation Search::result() const {
   Localisation result;
   result.hypotheses = hypotheses_;
-  if (!best_) {
-    result.outcome = spent() ? LocaliseOutcome::kGaveUp : LocaliseOutcome::kNoMatch;
-    return result;
-  }
+  result.lookups = lookups_;
+  result.outcome = outcome();
+  if (!best_) return result;
 
   result.map_T_sensor = best_->map_T_sensor;
-  result.covariance = pose_covariance(observation_, *best_);
+  if (settled_) result.covariance = settled_->covariance;
   result.inliers = static_cast<std::uint32_t>(best_->pairs.size());
   result.associations.reserve(best_->pairs.size());
-
   for (const Pair& pair : best_->pairs) {
     result.associations.push_back(
         {observation_.observed[pair.point], map_.id_of(pair.slot), std::sqrt(pair.squared_m2)});
   }
-
   result.log10_false_alarm = false_alarm(*best_);
   result.log10_margin = margin();
   if (runner_up_) {
     result.runner_up_inliers = static_cast<std::uint32_t>(runner_up_->pairs.size());
   }
-
-  if (!accepted()) {
-    result.outcome = spent() ? LocaliseOutcome::kGaveUp : LocaliseOutcome::kLikelyChance;
-  } else if (ambiguous()) {
-    result.outcome = LocaliseOutcome::kAmbiguous;
-  } else {
-    result.outcome = LocaliseOutcome::kFound;
-  }
-
   return result;
 }
 
 Localisation Search::run() {
   double side_sigmas = parameters_.narrow_side_sigmas;
   bool found = false;
-  while (!found && !spent() && !source_.exhausted()) found = search(more_triangles(), side_sigmas);
+  while (!found && !spent() && !exhausted()) found = search(more_triangles(), side_sigmas);
   if (!found && !spent()) {
     side_sigmas = parameters_.wide_side_sigmas;
-    found = search(triangles_, side_sigmas);
+    found = search(candidates_, side_sigmas);
   }
-  if (found) look_for_runner_up(side_sigmas);
+  if (found) {
+    settle_best();
+    look_for_runner_up(side_sigmas);
+  }
   return result();
 }
 

@@ -7,6 +7,8 @@ namespace understory::constellation {
 namespace {
 
 constexpr LandmarkId kReservedId = ~LandmarkId{0};
+/// What hermits keep from all others [m]: crowds of 0.08, 0.3 and 1.3 landmarks on a square metre.
+constexpr std::array kApart_m{2.0, 1.0, 0.5};
 
 }  // namespace
 
@@ -23,13 +25,15 @@ std::string_view describe(LocaliseOutcome outcome) {
     case LocaliseOutcome::kAmbiguous:
       return "a different pose fits nearly as well";
     case LocaliseOutcome::kGaveUp:
-      return "gave up after the allowed number of hypotheses";
+      return "gave up after the allowed number of look-ups";
   }
 
   return "unknown";
 }
 
-ConstellationMap::ConstellationMap(const Parameters& parameters) : net_(parameters) {}
+ConstellationMap::ConstellationMap(const Parameters& parameters) : net_(parameters) {
+  for (const double apart_m : kApart_m) hermits_.emplace_back(apart_m, parameters);
+}
 
 bool ConstellationMap::insert(LandmarkId id, const Eigen::Vector2d& position_m) {
   if (id == kReservedId || contains(id) || !PointGrid::representable(position_m)) return false;
@@ -41,13 +45,16 @@ bool ConstellationMap::insert(LandmarkId id, const Eigen::Vector2d& position_m) 
   }
   slots_.insert(id, slot);
   net_.insert(slot, id, position_m);
+  for (Hermits& each : hermits_) each.inserted(slot, id, net_.grid());
   return true;
 }
 
 bool ConstellationMap::remove(LandmarkId id) {
   const Slot slot = slots_.find(id);
   if (slot == kNoSlot) return false;
+  const Eigen::Vector2d position = net_.grid().position(slot);
   net_.remove(slot);
+  for (Hermits& each : hermits_) each.removed(slot, position, net_.grid());
   slots_.erase(id);
   free_slots_.push_back(slot);
   return true;
@@ -56,7 +63,9 @@ bool ConstellationMap::remove(LandmarkId id) {
 bool ConstellationMap::move(LandmarkId id, const Eigen::Vector2d& position_m) {
   const Slot slot = slots_.find(id);
   if (slot == kNoSlot || !PointGrid::representable(position_m)) return false;
+  const Eigen::Vector2d before = net_.grid().position(slot);
   net_.move(slot, position_m);
+  for (Hermits& each : hermits_) each.moved(slot, id, before, net_.grid());
   return true;
 }
 
@@ -98,7 +107,9 @@ std::vector<std::array<LandmarkId, 3>> ConstellationMap::triangles() const {
 }
 
 std::size_t ConstellationMap::bytes() const {
-  return net_.bytes() + slots_.bytes() + free_slots_.capacity() * sizeof(Slot);
+  std::size_t bytes = net_.bytes() + slots_.bytes() + free_slots_.capacity() * sizeof(Slot);
+  for (const Hermits& each : hermits_) bytes += each.bytes();
+  return bytes;
 }
 
 }  // namespace understory::constellation

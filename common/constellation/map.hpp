@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/constellation/grid.hpp"
+#include "common/constellation/hermits.hpp"
 #include "common/constellation/localisation.hpp"
 #include "common/constellation/table.hpp"
 #include "common/constellation/triangle_net.hpp"
@@ -87,11 +88,14 @@ class ConstellationMap {
   const PointGrid& grid() const { return net_.grid(); }
   /// The triangles by side lengths, for the search in localise.cpp. Vertices are slots.
   const TriangleIndex& triangle_index() const { return net_.triangles(); }
+  /// Landmarks that stand alone in a crowd, at several distances from others.
+  std::span<const Hermits> hermits() const { return hermits_; }
   /// Id of the landmark in a slot. Precondition: the slot is in use.
   LandmarkId id_of(Slot slot) const { return net_.id_of(slot); }
 
  private:
   TriangleNet net_;
+  std::vector<Hermits> hermits_;
   IndexTable slots_;  // id -> slot
   std::vector<Slot> free_slots_;
 };

@@ -22,6 +22,21 @@ bool flat(const Triangle& triangle, const std::vector<PreparedPoint>& points) {
 
 }  // namespace
 
+void measure_extent(PreparedObservation& prepared) {
+  if (prepared.points.empty()) return;
+  const auto n = static_cast<double>(prepared.points.size());
+  prepared.centre = Eigen::Vector2d::Zero();
+  for (const auto& point : prepared.points) prepared.centre += point.position;
+  prepared.centre /= n;
+  double moment = 0.0;
+  for (const auto& point : prepared.points) {
+    moment += (point.position - prepared.centre).squaredNorm();
+  }
+  const double area = std::max(1.0, 2.0 * std::numbers::pi * moment / n);
+  prepared.radius_m = std::sqrt(area / std::numbers::pi);
+  prepared.density_per_m2 = n / area;
+}
+
 PreparedObservation prepare(std::span<const ObservedPoint> points,
                             const LocaliseParameters& parameters) {
   PreparedObservation prepared;
@@ -35,22 +50,9 @@ PreparedObservation prepare(std::span<const ObservedPoint> points,
     const double variance = std::max(point.sigma_m * point.sigma_m, map_variance) + map_variance;
     prepared.points.push_back({point.position_m, variance});
     prepared.observed.push_back(i);
-    prepared.centre += point.position_m;
   }
 
-  if (prepared.points.empty()) return prepared;
-  const auto n = static_cast<double>(prepared.points.size());
-  prepared.centre /= n;
-  double moment = 0.0;
-
-  for (const auto& point : prepared.points) {
-    moment += (point.position - prepared.centre).squaredNorm();
-  }
-
-  const double area = std::max(1.0, 2.0 * std::numbers::pi * moment / n);
-  prepared.radius_m = std::sqrt(area / std::numbers::pi);
-  prepared.density_per_m2 = n / area;
-
+  measure_extent(prepared);
   return prepared;
 }
 
@@ -61,12 +63,39 @@ bool TriangleSource::Neighbours::has(std::uint32_t wanted) const {
   return false;
 }
 
-TriangleSource::TriangleSource(const PreparedObservation& observation, int neighbours)
+std::vector<std::uint32_t> points_apart(const PreparedObservation& observation, double apart_m) {
+  const auto& points = observation.points;
+  std::vector<std::uint32_t> by_x(points.size());
+  std::iota(by_x.begin(), by_x.end(), 0U);
+  std::sort(by_x.begin(), by_x.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return points[a].position.x() < points[b].position.x();
+  });
+
+  std::vector<char> is_alone(points.size(), 1);
+  for (std::size_t i = 0; i < by_x.size(); ++i) {
+    const Eigen::Vector2d& own = points[by_x[i]].position;
+    for (std::size_t k = i + 1; k < by_x.size(); ++k) {
+      const Eigen::Vector2d& other = points[by_x[k]].position;
+      if (other.x() - own.x() >= apart_m) break;
+      if ((other - own).squaredNorm() >= apart_m * apart_m) continue;
+      is_alone[by_x[i]] = is_alone[by_x[k]] = 0;
+    }
+  }
+
+  std::vector<std::uint32_t> alone;
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    if (is_alone[i] != 0) alone.push_back(i);
+  }
+  return alone;
+}
+
+TriangleSource::TriangleSource(const PreparedObservation& observation,
+                               std::span<const std::uint32_t> members, int neighbours)
     : observation_(observation), wanted_(std::clamp(neighbours, 2, kMaxNeighbours)) {
-  const std::size_t n = observation.points.size();
-  by_x_.resize(n);
-  for (std::uint32_t i = 0; i < n; ++i) {
-    by_x_[i] = {observation.points[i].position.x(), observation.points[i].position.y(), i};
+  const std::size_t n = members.size();
+  for (const std::uint32_t point : members) {
+    const Eigen::Vector2d& position = observation.points[point].position;
+    by_x_.push_back({position.x(), position.y(), point});
   }
 
   std::sort(by_x_.begin(), by_x_.end(), [](const ByX& a, const ByX& b) {
@@ -78,7 +107,7 @@ TriangleSource::TriangleSource(const PreparedObservation& observation, int neigh
   while (std::gcd(stride, n) != 1) ++stride;
   order_.resize(n);
   for (std::size_t i = 0; i < n; ++i) order_[i] = static_cast<std::uint32_t>((i * stride) % n);
-  neighbours_.resize(n);
+  neighbours_.resize(observation.points.size());
 }
 
 /// Points sorted by x: neighbours are sought to both sides, until x alone is too far.

@@ -28,18 +28,25 @@ struct PreparedObservation {
   double density_per_m2 = 0.0;                       ///< Points in that disc.
 };
 
+/// Sets centre, radius and density by the points.
+void measure_extent(PreparedObservation& prepared);
+
 /// Leaves out points that are not finite. A point's variance is the sum of its own and the map's
 /// (LocaliseParameters::map_sigma_m), the former not below the latter.
 PreparedObservation prepare(std::span<const ObservedPoint> points,
                             const LocaliseParameters& parameters);
 
+/// The points that stand at least `apart_m` from all others, ascending. O(n log n) as a rule.
+std::vector<std::uint32_t> points_apart(const PreparedObservation& observation, double apart_m);
+
 /// Triangles of an observation's points, made a few points at a time: as a rule the first few
 /// points are enough to find the place, and the others' triangles are never made.
 class TriangleSource {
  public:
-  /// Triangles are made among each point's `neighbours` nearest ones. The observation must outlive
-  /// the source.
-  TriangleSource(const PreparedObservation& observation, int neighbours);
+  /// Triangles are made among each point's `neighbours` nearest ones, of `members` (indices of
+  /// prepared points) only. The observation must outlive the source.
+  TriangleSource(const PreparedObservation& observation, std::span<const std::uint32_t> members,
+                 int neighbours);
 
   /// True when every point's triangles were taken.
   bool exhausted() const { return next_ == order_.size(); }

@@ -1,9 +1,9 @@
 #include "common/constellation/pose.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numbers>
+#include <utility>
 
 #include "common/constellation/chance.hpp"
 #include "common/geometry/alignment.hpp"
@@ -12,8 +12,23 @@ namespace understory::constellation {
 namespace {
 
 constexpr int kMaxRounds = 8;
+/// Rounds on the near points only.
+constexpr int kNearRounds = 2;
 /// Corners of the triangle that gave the hypothesis: hits by construction.
 constexpr double kGiven = 3.0;
+
+/// Where a gate holds a landmark by chance more often than this, narrower ones are looked at.
+constexpr double kCrowdedChance = 0.2;
+/// Parts of the gate's half width.
+constexpr std::array kNarrowGates{0.6, 0.35};
+/// What choosing among three counts adds to the bound [decades].
+constexpr double kOneOfThree = 0.48;
+/// From so many points on a pose is fitted to the kNearPoints around its first pairs before all
+/// are asked...
+constexpr std::size_t kManyPoints = 100;
+constexpr std::size_t kNearPoints = 48;
+/// ... and only if these are less likely chance than that (log10).
+constexpr double kPromising = -2.0;
 
 /// How well the motion is known, as far as gates need it.
 struct MotionUncertainty {
@@ -105,7 +120,86 @@ double mean_chance(const PreparedObservation& observation, const PointGrid& grid
     area += radius * radius;
   }
   area /= static_cast<double>(observation.points.size());
-  return std::min(1.0, count * area / (observation.radius_m * observation.radius_m));
+  return count * area / (observation.radius_m * observation.radius_m);
+}
+
+/// What chance has to do with the pairs. In a crowd a gate holds a landmark wherever it lies, and a
+/// narrow one tells more: of a few widths the most telling one counts.
+void rate(FittedPose& fitted, const PreparedObservation& observation, const PointGrid& grid,
+          const MotionUncertainty& motion, const LocaliseParameters& parameters) {
+  if (fitted.pairs.size() < 3) return;
+  fitted.mean_chance = mean_chance(observation, grid, fitted.map_T_sensor, motion, parameters);
+  const double tries = static_cast<double>(observation.points.size()) - kGiven;
+  fitted.log10_tail = log10_binomial_tail_bound(static_cast<double>(fitted.pairs.size()) - kGiven,
+                                                tries, fitted.mean_chance);
+  if (fitted.mean_chance < kCrowdedChance) return;
+
+  for (const double width : kNarrowGates) {
+    const auto hits = std::count_if(fitted.pairs.begin(), fitted.pairs.end(), [&](const Pair& p) {
+      const double gate_m = width * gate(observation.points[p.point], motion, parameters);
+      return p.squared_m2 <= gate_m * gate_m;
+    });
+    const double tail = log10_binomial_tail_bound(static_cast<double>(hits) - kGiven, tries,
+                                                  width * width * fitted.mean_chance);
+    fitted.log10_tail = std::min(fitted.log10_tail, tail + kOneOfThree);
+  }
+}
+
+/// Rounds of fitting and gathering on all points of `observation`.
+FittedPose fit_all(const PreparedObservation& observation, const PointGrid& grid,
+                   std::vector<Pair> pairs, const LocaliseParameters& parameters,
+                   int max_rounds = kMaxRounds) {
+  FittedPose fitted;
+  MotionUncertainty motion;
+  for (int round = 0; round < max_rounds && pairs.size() >= 2; ++round) {
+    fitted.map_T_sensor = align(observation, grid, pairs, motion);
+    std::vector<Pair> next = gather(observation, grid, fitted.map_T_sensor, motion, parameters);
+    fitted.lookups += static_cast<std::uint32_t>(observation.points.size());
+    const bool settled = equal(pairs, next);
+    // Only pairs of this round count: earlier ones were gathered with looser gates than the chance
+    // below is computed for.
+    pairs = std::move(next);
+    if (settled || pairs.size() < 3) break;
+  }
+
+  fitted.pairs = std::move(pairs);
+  rate(fitted, observation, grid, motion, parameters);
+  return fitted;
+}
+
+Eigen::Vector2d centre_of(const PreparedObservation& observation, const std::vector<Pair>& pairs) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (const Pair& pair : pairs) sum += observation.points[pair.point].position;
+  return sum / static_cast<double>(pairs.size());
+}
+
+/// The kNearPoints closest ones as an observation of its own; `observed` are their indices.
+PreparedObservation points_around(const Eigen::Vector2d& centre,
+                                  const PreparedObservation& observation) {
+  std::vector<std::pair<double, std::uint32_t>> order;
+  order.reserve(observation.points.size());
+  for (std::uint32_t i = 0; i < observation.points.size(); ++i)
+    order.emplace_back((observation.points[i].position - centre).squaredNorm(), i);
+  std::nth_element(order.begin(), order.begin() + kNearPoints, order.end());
+
+  PreparedObservation near;
+  for (std::size_t k = 0; k < kNearPoints; ++k) near.observed.push_back(order[k].second);
+  std::sort(near.observed.begin(), near.observed.end());
+  for (const std::uint32_t i : near.observed) near.points.push_back(observation.points[i]);
+  measure_extent(near);
+  return near;
+}
+
+/// Those pairs whose points are among the near ones, by their indices there.
+std::vector<Pair> pairs_of(const PreparedObservation& near, const std::vector<Pair>& pairs) {
+  std::vector<Pair> result;
+  for (const Pair& pair : pairs) {
+    const auto it = std::lower_bound(near.observed.begin(), near.observed.end(), pair.point);
+    if (it == near.observed.end() || *it != pair.point) continue;
+    result.push_back(pair);
+    result.back().point = static_cast<std::uint32_t>(it - near.observed.begin());
+  }
+  return result;
 }
 
 }  // namespace
@@ -122,39 +216,32 @@ Slot nearest_slot(const PointGrid& grid, double x, double y, double gate_m, doub
 }
 
 FittedPose fit_pose(const PreparedObservation& observation, const PointGrid& grid,
-                    std::vector<Pair> pairs, const LocaliseParameters& parameters) {
-  FittedPose fitted;
-  MotionUncertainty motion;
-  for (int round = 0; round < kMaxRounds; ++round) {
-    fitted.map_T_sensor = align(observation, grid, pairs, motion);
-    std::vector<Pair> next = gather(observation, grid, fitted.map_T_sensor, motion, parameters);
-    const bool settled = equal(pairs, next);
-    // Only pairs of this round count: earlier ones were gathered with looser gates than the chance
-    // below is computed for.
-    pairs = std::move(next);
-    if (settled || pairs.size() < 3) break;
+                    const std::vector<Pair>& pairs, const LocaliseParameters& parameters) {
+  if (observation.points.size() < kManyPoints) return fit_all(observation, grid, pairs, parameters);
+
+  const PreparedObservation near = points_around(centre_of(observation, pairs), observation);
+  FittedPose part = fit_all(near, grid, pairs_of(near, pairs), parameters, kNearRounds);
+  for (Pair& pair : part.pairs) pair.point = near.observed[pair.point];
+  if (part.log10_tail > kPromising) {
+    part.pairs.clear();
+    return part;
   }
-
-  fitted.pairs = std::move(pairs);
-  if (fitted.pairs.size() < 3) return fitted;
-
-  fitted.mean_chance = mean_chance(observation, grid, fitted.map_T_sensor, motion, parameters);
-  fitted.log10_tail = log10_binomial_tail_bound(
-      static_cast<double>(fitted.pairs.size()) - kGiven,
-      static_cast<double>(observation.points.size()) - kGiven, fitted.mean_chance);
-
-  return fitted;
+  FittedPose whole = fit_all(observation, grid, part.pairs, parameters);
+  whole.lookups += part.lookups;
+  return whole;
 }
 
-Eigen::Matrix3d pose_covariance(const PreparedObservation& observation, const FittedPose& pose) {
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-  for (const Pair& pair : pose.pairs) {
-    const PreparedPoint& point = observation.points[pair.point];
-    Eigen::Matrix<double, 2, 3> j;
-    j << Eigen::Matrix2d::Identity(), geometry::perpendicular(point.position);
-    information += j.transpose() * j / point.variance;
-  }
-  return information.inverse();
+FittedPose pairs_at(const PreparedObservation& observation, const PointGrid& grid,
+                    const geometry::SE2& map_T_sensor, const std::vector<Pair>& pairs,
+                    const LocaliseParameters& parameters) {
+  FittedPose fitted;
+  fitted.map_T_sensor = map_T_sensor;
+  MotionUncertainty motion;
+  align(observation, grid, pairs, motion);
+  fitted.pairs = gather(observation, grid, map_T_sensor, motion, parameters);
+  fitted.lookups = static_cast<std::uint32_t>(observation.points.size());
+  rate(fitted, observation, grid, motion, parameters);
+  return fitted;
 }
 
 bool same_pose(const FittedPose& a, const FittedPose& b) {

@@ -20,10 +20,12 @@ struct Pair {
 /// A pose with the pairs that it rests on.
 struct FittedPose {
   geometry::SE2 map_T_sensor;
-  std::vector<Pair> pairs;   ///< One to one, by point.
-  double mean_chance = 1.0;  ///< That a point of no landmark hits one, averaged over the points.
+  std::vector<Pair> pairs;  ///< One to one, by point.
+  double mean_chance =
+      1.0;  ///< Landmarks in the gate of a point of none, averaged over the points.
   /// log10 of the bound on the probability of so many hits by chance, for one hypothesis.
   double log10_tail = 0.0;
+  std::uint32_t lookups = 0;  ///< Points looked up in the map, the work done.
 };
 
 /// The landmark closest to (x, y) within the gate; kNoSlot if none. The squared distance is
@@ -31,13 +33,17 @@ struct FittedPose {
 Slot nearest_slot(const PointGrid& grid, double x, double y, double gate_m, double& squared_m2);
 
 /// Refits the motion in closed form and gathers the pairs anew, each point's gate following from
-/// its own noise and the pose's, until the pairs stay the same. Precondition: at least two pairs.
+/// its own noise and the pose's, until the pairs stay the same. Where there are many points, those
+/// around the pairs are asked first; without pairs if they do not agree. Precondition: at least two
+/// pairs.
 FittedPose fit_pose(const PreparedObservation& observation, const PointGrid& grid,
-                    std::vector<Pair> pairs, const LocaliseParameters& parameters);
+                    const std::vector<Pair>& pairs, const LocaliseParameters& parameters);
 
-/// Covariance of the pose from its pairs (tangent order, right perturbation): inverse of the
-/// information sum J^T J / variance with J = R [I | S p].
-Eigen::Matrix3d pose_covariance(const PreparedObservation& observation, const FittedPose& pose);
+/// The pairs of a pose as it is, and what chance has to do with them. `pairs` say how well about
+/// the pose is known. Precondition: at least two pairs.
+FittedPose pairs_at(const PreparedObservation& observation, const PointGrid& grid,
+                    const geometry::SE2& map_T_sensor, const std::vector<Pair>& pairs,
+                    const LocaliseParameters& parameters);
 
 /// True if both rest on largely the same pairs.
 bool same_pose(const FittedPose& a, const FittedPose& b);

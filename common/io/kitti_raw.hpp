@@ -47,6 +47,10 @@ namespace kitti {
 constexpr double kMaxRange_m = 120.0;
 constexpr std::uint16_t kRings = 64;
 
+/// Frame `vehicle` is the OXTS unit's, seen from above. Of 2011_09_26: the inverse of
+/// calib_imu_to_velo.txt in the plane.
+inline geometry::SE2 vehicle_T_laser() { return {0.8105, -0.3072, 0.00076}; }
+
 /// "2011-09-26 13:02:44.335092332" per line (UTC). Throws DataError.
 std::vector<model::Utime> parse_timestamps(std::string_view text, std::string_view source);
 /// Bytes of a .bin file to points with rings and times within `revolution_s`. Throws DataError.

@@ -115,11 +115,15 @@ void archive(Archive& a, Self& s) {
 template <class Archive, class Self>
 requires state::Is<Self, KeyframeMember>
 void archive(Archive& a, Self& s) { a(s.utime, s.sequence, s.centre_T_vehicle, s.covariance); }
+/// Members of a saved KeyframeDetection.
+template <class Archive, class Self>
+requires state::Is<Self, KeyframeDetection>
+void archive(Archive& a, Self& s) { a(s.member, s.detection, s.landmark); }
 /// Members of a saved Keyframe.
 template <class Archive, class Self>
 requires state::Is<Self, Keyframe>
 void archive(Archive& a, Self& s) {
-  a(s.utime, s.sequence, s.field_of_view, s.members, s.landmarks, s.previous_T_base);
+  a(s.utime, s.sequence, s.field_of_view, s.members, s.landmarks, s.previous_T_base, s.detections);
 }
 /// Members of a saved MapLandmark.
 template <class Archive, class Self>

@@ -28,6 +28,13 @@ struct KeyframeMember {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 
+/// A detection that a landmark of a keyframe was made from.
+struct KeyframeDetection {
+  std::uint32_t member = 0;     ///< Index in Keyframe::members.
+  std::uint32_t detection = 0;  ///< Index in LandmarkScan::detections of that scan.
+  std::uint32_t landmark = 0;   ///< Index in Keyframe::landmarks.
+};
+
 /// Channel KEYFRAME.
 ///
 /// The member scans and the local landmarks are estimated together. Landmarks are given in the
@@ -44,6 +51,9 @@ struct Keyframe {
   /// a gap. It is estimated from the same detections: for gating and linearisation, never a
   /// measurement.
   std::optional<geometry::SE2> previous_T_base;
+  /// In order of member and detection, each once. Those of a scan that are not listed made no
+  /// landmark; the baseline keyframer lists none.
+  std::vector<KeyframeDetection> detections;
 
   /// Pose of the base. Precondition: there is a member.
   const geometry::SE2& centre_T_base() const { return members.front().centre_T_vehicle; }

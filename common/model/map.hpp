@@ -12,6 +12,12 @@ namespace understory::model {
 
 /// 64 bit: map id (upper 16), counter (lower 48). Permanent, never used again. 0 = none.
 using LandmarkId = std::uint64_t;
+/// Bits of a landmark id that count within its map.
+inline constexpr unsigned kLandmarkCounterBits = 48;
+/// Number of the map that gave the id; 0 for none.
+constexpr std::uint32_t map_of(LandmarkId id) {
+  return static_cast<std::uint32_t>(id >> kLandmarkCounterBits);
+}
 
 /// One landmark of the map.
 struct MapLandmark {
@@ -34,8 +40,9 @@ struct KeyframePose {
 
 /// What became of a keyframe.
 enum class MapUpdateStatus : std::uint8_t {
-  kFirstMap = 0,  ///< It started the map.
-  kUpdated = 1,   ///< Localised and fused.
+  kFirstMap =
+      0,         ///< It started the map; with a `map_id` above the last one's, a new map beside it.
+  kUpdated = 1,  ///< Localised and fused.
   kNotSure =
       2,  ///< No pose is significantly better than chance or the second best; nothing was changed.
   kRolledBack = 3,  ///< Fused, found inconsistent (chi^2), undone exactly.
@@ -48,11 +55,29 @@ struct Association {
   LandmarkId landmark_id = 0;
 };
 
+/// A scan that went into a keyframe.
+struct ScanReference {
+  Utime utime = 0;
+  std::uint64_t sequence = 0;  ///< Of the LANDMARKS message.
+};
+
+/// A detection and the landmark that it is.
+struct IdentifiedDetection {
+  std::uint32_t scan = 0;       ///< Index in MapUpdate::scans.
+  std::uint32_t detection = 0;  ///< Index in LandmarkScan::detections of that scan.
+  LandmarkId landmark_id = 0;   ///< 0 = none: it is not in the map (yet).
+};
+
 /// Channels SLAM_UPDATE and SLAM_POSE, for one keyframe.
 struct MapUpdate {
   std::uint64_t keyframe_sequence = 0;
   Utime utime = 0;
   MapUpdateStatus status = MapUpdateStatus::kRejected;
+  std::uint32_t map_id = 1;  ///< Of the map in use; upper 16 bit of its landmarks' ids.
+  /// Fewer keyframes than are wanted agree with the map so far: it may be dropped for another one.
+  bool is_provisional = false;
+  /// No pose is certain, and odometry does not reach here from the last certain one.
+  bool is_lost = false;
   geometry::SE2 map_T_vehicle;                           ///< Of the keyframe's base.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Of map_T_vehicle; m, rad.
   geometry::SE2 map_T_latest_vehicle;                    ///< Of the keyframe's last member.
@@ -60,6 +85,12 @@ struct MapUpdate {
   std::vector<LandmarkId> added;                          ///< By this keyframe.
   std::vector<LandmarkId> removed;                        ///< By this keyframe.
   std::vector<std::pair<LandmarkId, LandmarkId>> merged;  ///< old -> new.
+  // What was seen and what was not; empty where the keyframe has no place.
+  std::vector<ScanReference> scans;             ///< Its members.
+  std::vector<IdentifiedDetection> detections;  ///< In order of scan and detection, each once.
+  /// Landmarks in the field of view of every scan that were not seen, ascending; at most 1000, the
+  /// nearest.
+  std::vector<LandmarkId> expected;
   // Diagnostics.
   bool used_prior = false;       ///< Localised by gating around the predicted pose, not by search.
   std::uint32_t candidates = 0;  ///< Hypotheses tried by the search.

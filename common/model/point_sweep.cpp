@@ -8,9 +8,6 @@ namespace understory::model {
 
 namespace {
 
-/// Largest number of points for which memory is reserved by the header alone, which may be wrong.
-constexpr std::size_t kLargestReserve = std::size_t{1} << 20;
-
 PointSweep without_points(const PointSweep& sweep) {
   return {sweep.utime,       sweep.sequence,          sweep.revolution,  sweep.part,
           sweep.parts,       sweep.has_times,         sweep.is_deskewed, sweep.rings,
@@ -37,37 +34,50 @@ std::vector<PointSweep> split_sweep(const PointSweep& sweep, std::size_t max_poi
   return parts;
 }
 
-std::optional<PointSweep> SweepAssembler::add(PointSweep part) {
-  const bool continues = pending_ && pending_->revolution == part.revolution &&
-                         pending_->utime == part.utime && pending_->parts == part.parts &&
-                         part.part == next_part_;
+bool SweepAssembler::Pending::takes(const PointSweep& part) const {
+  const PointSweep& one = parts.front();
+  return one.revolution == part.revolution && one.utime == part.utime && one.parts == part.parts;
+}
 
-  // The first part of a revolution, or the next one of the pending revolution.
-  if (!continues) {
-    if (pending_) count_incomplete(pending_->revolution);
-    pending_.reset();
-    if (part.part != 0) {
-      if (lost_revolution_ != part.revolution) count_incomplete(part.revolution);
-      return std::nullopt;
-    }
-    const std::size_t expected = part.points.size() * part.parts;
-    if (part.parts > 1) part.points.reserve(std::min(expected, kLargestReserve));
-    pending_ = std::move(part);
-    next_part_ = 1;
-  } else {
-    pending_->points.insert(pending_->points.end(), part.points.begin(), part.points.end());
-    ++next_part_;
-  }
-
-  if (next_part_ < pending_->parts) return std::nullopt;
-  std::optional<PointSweep> whole = std::exchange(pending_, std::nullopt);
-  whole->parts = 1;
+PointSweep SweepAssembler::Pending::join() && {
+  std::ranges::sort(parts, {}, &PointSweep::part);
+  PointSweep whole = std::move(parts.front());
+  std::size_t points = whole.points.size();
+  for (std::size_t i = 1; i < parts.size(); ++i) points += parts[i].points.size();
+  whole.points.reserve(points);
+  for (std::size_t i = 1; i < parts.size(); ++i)
+    whole.points.insert(whole.points.end(), parts[i].points.begin(), parts[i].points.end());
+  whole.parts = 1;
   return whole;
 }
 
-void SweepAssembler::count_incomplete(std::uint64_t revolution) {
+std::optional<PointSweep> SweepAssembler::add(PointSweep part) {
+  // Its revolution: one that is pending, or a new one.
+  const auto takes = [&part](const Pending& pending) { return pending.takes(part); };
+  auto pending = std::ranges::find_if(pending_, takes);
+  if (pending == pending_.end()) {
+    if (latest_ == part.utime) return std::nullopt;
+    if (pending_.size() >= kMostPending) drop_oldest();
+    pending = pending_.insert(pending_.end(), Pending{});
+  } else if (std::ranges::count(pending->parts, part.part, &PointSweep::part) > 0) {
+    return std::nullopt;
+  }
+
+  // Whole?
+  const std::size_t wanted = std::max<std::size_t>(1, part.parts);
+  pending->parts.push_back(std::move(part));
+  if (pending->parts.size() < wanted) return std::nullopt;
+  while (pending_.begin() != pending) drop_oldest();
+  PointSweep whole = std::move(*pending).join();
+  pending_.pop_front();
+  latest_ = whole.utime;
+  return whole;
+}
+
+void SweepAssembler::drop_oldest() {
+  latest_ = pending_.front().parts.front().utime;
+  pending_.pop_front();
   ++incomplete_;
-  lost_revolution_ = revolution;
 }
 
 }  // namespace understory::model

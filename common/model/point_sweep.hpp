@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <vector>
 
@@ -59,20 +60,29 @@ struct PointSweep {
 /// std::invalid_argument where `max_points` is 0 or more than 65,535 parts are needed.
 std::vector<PointSweep> split_sweep(const PointSweep& sweep, std::size_t max_points);
 
-/// Joins the parts of a revolution. A revolution without all its parts is dropped and counted.
+/// Joins the parts of a revolution, in whatever order they come; those of two revolutions may be
+/// mixed. A revolution without all its parts is dropped and counted when a later one is whole, or
+/// when the second one after it begins.
 class SweepAssembler {
  public:
-  /// The whole revolution when its last part comes, else none. Parts must come in order.
+  /// The whole revolution when its last part comes, else none.
   std::optional<PointSweep> add(PointSweep part);
   /// Revolutions that were dropped.
   std::uint64_t incomplete_revolutions() const { return incomplete_; }
 
  private:
-  void count_incomplete(std::uint64_t revolution);
+  /// The parts of one revolution that have come.
+  struct Pending {
+    std::vector<PointSweep> parts;
 
-  std::optional<PointSweep> pending_;
-  std::optional<std::uint64_t> lost_revolution_;  ///< Counted already.
-  std::uint16_t next_part_ = 0;
+    bool takes(const PointSweep& part) const;
+    PointSweep join() &&;
+  };
+  static constexpr std::size_t kMostPending = 2;
+  void drop_oldest();
+
+  std::deque<Pending> pending_;  ///< In the order in which they began.
+  std::optional<Utime> latest_;  ///< Of those whole or dropped: late parts begin nothing.
   std::uint64_t incomplete_ = 0;
 };
 

@@ -14,8 +14,9 @@ namespace understory::model {
 struct SlamPose {
   Utime utime = 0;
   std::uint64_t sequence = 0;
-  /// Of the keyframe's update; none = tracked between keyframes.
+  /// Of the keyframe's update; none = of a scan between keyframes.
   std::optional<MapUpdateStatus> status;
+  bool is_coasting = false;  ///< Between keyframes, by odometry alone: too few landmarks match.
   std::optional<std::uint64_t> keyframe_sequence;  ///< The keyframe that decided the pose.
   std::uint64_t submap_id = 0;                     ///< The active submap.
   geometry::SE2 submap_T_vehicle;
@@ -24,11 +25,17 @@ struct SlamPose {
   geometry::SE2 map_T_submap;                            ///< By that correction.
   geometry::SE2 map_T_odom;
   std::uint64_t reset_counter = 0;  ///< Counts jumps of the pose.
-  geometry::SE2 reset_delta;        ///< Latest jump: old_T_new of the vehicle.
+  /// Latest jump: old_T_new of the vehicle; identity where it was a change of `map_id`.
+  geometry::SE2 reset_delta;
+  std::uint32_t map_id = 1;     ///< Of the map that the pose is in; each has its own frame.
+  bool is_provisional = false;  ///< Few keyframes agree with the map yet: it may be dropped.
+  bool is_new_map = false;      ///< kFirstMap beside another map.
+  bool is_lost = false;         ///< kNotSure, and odometry does not reach there either.
 
   /// True where the pose is localised or tracked.
   bool is_localised() const {
-    return !status || *status == MapUpdateStatus::kFirstMap || *status == MapUpdateStatus::kUpdated;
+    if (!status) return !is_coasting;
+    return *status == MapUpdateStatus::kFirstMap || *status == MapUpdateStatus::kUpdated;
   }
   /// The vehicle's pose in the map.
   geometry::SE2 map_T_vehicle() const { return map_T_submap * submap_T_vehicle; }

@@ -15,7 +15,7 @@ using TrackId = std::uint64_t;
 struct TrackedLandmark {
   TrackId track_id = 0;
   std::uint32_t detection = 0;  ///< Index in the LANDMARKS message of the same utime.
-  Detection observed;           ///< A copy of that detection.
+  Detection observed;           ///< That detection; its covariance as learned (decision 045).
 };
 
 /// Channel TRACKED_LANDMARKS: the consistent ones among the detections of one sweep.

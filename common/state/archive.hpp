@@ -14,6 +14,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <concepts>
@@ -179,8 +180,12 @@ class Reader {
     } else if constexpr (FixedMatrix<T>) {
       get_bytes(value.data(), sizeof(typename T::Scalar) * T::SizeAtCompileTime);
     } else if constexpr (DynamicMatrix<T>) {
-      const std::uint64_t rows = count(1);
-      const std::uint64_t cols = count(1);
+      std::uint64_t rows = 0;
+      std::uint64_t cols = 0;
+      get(rows);
+      get(cols);
+      // One side of an empty matrix may be longer than what is left.
+      if (std::max(rows, cols) > kLongestSide) fail();
       if (rows != 0 && cols > bytes_.size() / sizeof(typename T::Scalar) / rows) fail();
 
       value.resize(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(cols));
@@ -253,6 +258,8 @@ class Reader {
     bytes_.remove_prefix(size);
   }
   [[noreturn]] static void fail() { throw std::invalid_argument("state: it is cut off"); }
+
+  static constexpr std::uint64_t kLongestSide = std::uint64_t{1} << 31U;
 
   std::string_view bytes_;
 };

@@ -26,6 +26,7 @@
 #include "understory/ekf_pose_t.hpp"
 #include "understory/gnss_t.hpp"
 #include "understory/imu_t.hpp"
+#include "understory/keyframe2_t.hpp"
 #include "understory/keyframe_t.hpp"
 #include "understory/landmarks_t.hpp"
 #include "understory/lidar_scan_t.hpp"
@@ -35,7 +36,9 @@
 #include "understory/odometry2_t.hpp"
 #include "understory/odometry_t.hpp"
 #include "understory/raw_pose_t.hpp"
+#include "understory/slam_pose2_t.hpp"
 #include "understory/slam_pose_t.hpp"
+#include "understory/slam_update2_t.hpp"
 #include "understory/slam_update_t.hpp"
 #include "understory/tracked_landmarks_t.hpp"
 #include "understory/velocity_correction_t.hpp"
@@ -49,11 +52,17 @@ Result<model::LandmarkScan> from_wire(const landmarks_t& wire);
 Result<model::Odometry> from_wire(const odometry_t& wire);
 /// An odometry increment between two stamps.
 Result<model::Odometry> from_wire(const odometry2_t& wire);
-/// A keyframe with its members and landmarks.
+/// A keyframe with its members, landmarks and detections.
+Result<model::Keyframe> from_wire(const keyframe2_t& wire);
+/// A keyframe of logs written before keyframe2_t: without detections.
 Result<model::Keyframe> from_wire(const keyframe_t& wire);
 /// What a mapper did with one keyframe.
+Result<model::MapUpdate> from_wire(const slam_update2_t& wire);
+/// The same of logs written before slam_update2_t: of map 1, without scans and detections.
 Result<model::MapUpdate> from_wire(const slam_update_t& wire);
 /// A mapper's pose at one scan.
+Result<model::SlamPose> from_wire(const slam_pose2_t& wire);
+/// The same of logs written before slam_pose2_t: in map 1.
 Result<model::SlamPose> from_wire(const slam_pose_t& wire);
 /// A whole map.
 Result<model::WholeMap> from_wire(const map_t& wire);
@@ -87,11 +96,11 @@ landmarks_t to_wire(const model::LandmarkScan& scan);
 /// An odometry increment.
 odometry2_t to_wire(const model::Odometry& odometry);
 /// A keyframe.
-keyframe_t to_wire(const model::Keyframe& keyframe);
+keyframe2_t to_wire(const model::Keyframe& keyframe);
 /// What a mapper did with one keyframe; `seq` is the keyframe's.
-slam_update_t to_wire(const model::MapUpdate& update);
+slam_update2_t to_wire(const model::MapUpdate& update);
 /// A mapper's pose.
-slam_pose_t to_wire(const model::SlamPose& pose);
+slam_pose2_t to_wire(const model::SlamPose& pose);
 /// A whole map.
 map_t to_wire(const model::WholeMap& map);
 /// A change of a map.
@@ -151,15 +160,39 @@ Result<T> decode_message(std::span<const std::uint8_t> bytes) {
   }
 }
 
-/// Odometry: older logs have odometry_t, which lacks the level's error.
+/// Of a value whose wire type had another version, which older logs have.
+template <class T, class Old>
+Result<T> decode_either(std::span<const std::uint8_t> bytes) {
+  const auto wire = decode_bytes<typename WireOf<T>::type>(bytes);
+  if (wire) return from_wire(*wire);
+  const Result<Old> old = decode_bytes<Old>(bytes);
+  if (old) return from_wire(*old);
+  return wire.refusal();
+}
+
+/// Odometry: older logs have odometry_t.
 template <>
 inline Result<model::Odometry> decode_message<model::Odometry>(
     std::span<const std::uint8_t> bytes) {
-  const Result<odometry2_t> wire = decode_bytes<odometry2_t>(bytes);
-  if (wire) return from_wire(*wire);
-  const Result<odometry_t> old = decode_bytes<odometry_t>(bytes);
-  if (old) return from_wire(*old);
-  return wire.refusal();
+  return decode_either<model::Odometry, odometry_t>(bytes);
+}
+/// Keyframes: older logs have keyframe_t.
+template <>
+inline Result<model::Keyframe> decode_message<model::Keyframe>(
+    std::span<const std::uint8_t> bytes) {
+  return decode_either<model::Keyframe, keyframe_t>(bytes);
+}
+/// Updates: older logs have slam_update_t.
+template <>
+inline Result<model::MapUpdate> decode_message<model::MapUpdate>(
+    std::span<const std::uint8_t> bytes) {
+  return decode_either<model::MapUpdate, slam_update_t>(bytes);
+}
+/// Poses: older logs have slam_pose_t.
+template <>
+inline Result<model::SlamPose> decode_message<model::SlamPose>(
+    std::span<const std::uint8_t> bytes) {
+  return decode_either<model::SlamPose, slam_pose_t>(bytes);
 }
 
 /// A value (or a wire type) to bytes.

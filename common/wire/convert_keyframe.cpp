@@ -1,3 +1,5 @@
+#include <tuple>
+
 #include "common/wire/convert.hpp"
 #include "common/wire/convert_shared.hpp"
 
@@ -29,7 +31,8 @@ model::KeyframeLandmark landmark(const keyframe_landmark_t& wire, Checks& checks
 }
 
 /// Members are in order of time and the keyframe carries the first one's stamp.
-void check_order(const keyframe_t& wire, Checks& checks) {
+template <class Wire>
+void check_order(const Wire& wire, Checks& checks) {
   checks.in_message();
   checks.consistent(!wire.members.empty(), "num_members >= 1");
   if (wire.members.empty()) return;
@@ -40,10 +43,9 @@ void check_order(const keyframe_t& wire, Checks& checks) {
   }
 }
 
-}  // namespace
-
-Result<model::Keyframe> from_wire(const keyframe_t& wire) {
-  Checks checks;
+/// What both versions have.
+template <class Wire>
+model::Keyframe keyframe_of(const Wire& wire, Checks& checks) {
   check_order(wire, checks);
   model::Keyframe keyframe;
   keyframe.utime = wire.utime;
@@ -66,13 +68,50 @@ Result<model::Keyframe> from_wire(const keyframe_t& wire) {
     checks.in("landmarks", i);
     keyframe.landmarks.push_back(landmark(wire.landmarks[i], checks));
   }
+  return keyframe;
+}
 
+/// Each of a member's detections is of one landmark.
+std::vector<model::KeyframeDetection> detections(const keyframe2_t& wire, Checks& checks) {
+  std::vector<model::KeyframeDetection> result;
+  result.reserve(wire.detections.size());
+  for (std::size_t i = 0; i < wire.detections.size(); ++i) {
+    const keyframe_detection_t& one = wire.detections[i];
+    checks.in("detections", i);
+    checks.range("member", one.member, 0.0, static_cast<double>(wire.members.size()) - 1.0);
+    checks.range("detection", one.detection, 0.0, kMostDetections);
+    checks.range("landmark", one.landmark, 0.0, static_cast<double>(wire.landmarks.size()) - 1.0);
+    if (i > 0) {
+      const keyframe_detection_t& last = wire.detections[i - 1];
+      checks.consistent(std::tie(last.member, last.detection) < std::tie(one.member, one.detection),
+                        "in order of member and detection");
+    }
+    result.push_back({static_cast<std::uint32_t>(one.member),
+                      static_cast<std::uint32_t>(one.detection),
+                      static_cast<std::uint32_t>(one.landmark)});
+  }
+  return result;
+}
+
+}  // namespace
+
+Result<model::Keyframe> from_wire(const keyframe2_t& wire) {
+  Checks checks;
+  model::Keyframe keyframe = keyframe_of(wire, checks);
+  keyframe.detections = detections(wire, checks);
   if (checks.refusal()) return *checks.refusal();
   return keyframe;
 }
 
-keyframe_t to_wire(const model::Keyframe& keyframe) {
-  keyframe_t wire{};
+Result<model::Keyframe> from_wire(const keyframe_t& wire) {
+  Checks checks;
+  model::Keyframe keyframe = keyframe_of(wire, checks);
+  if (checks.refusal()) return *checks.refusal();
+  return keyframe;
+}
+
+keyframe2_t to_wire(const model::Keyframe& keyframe) {
+  keyframe2_t wire{};
   wire.utime = keyframe.utime;
   wire.seq = static_cast<std::int64_t>(keyframe.sequence);
   copy_field_of_view(keyframe.field_of_view, wire);
@@ -96,6 +135,14 @@ keyframe_t to_wire(const model::Keyframe& keyframe) {
     out.radius_m = landmark.radius_m;
     out.times_seen = landmark.observation_count;
     out.kind = static_cast<std::int8_t>(landmark.kind);
+  }
+
+  wire.num_detections = static_cast<std::int32_t>(keyframe.detections.size());
+  for (const model::KeyframeDetection& one : keyframe.detections) {
+    keyframe_detection_t& out = wire.detections.emplace_back();
+    out.member = static_cast<std::int16_t>(one.member);
+    out.detection = static_cast<std::int32_t>(one.detection);
+    out.landmark = static_cast<std::int32_t>(one.landmark);
   }
 
   return wire;

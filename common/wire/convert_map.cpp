@@ -1,13 +1,9 @@
 #include "common/wire/convert.hpp"
+#include "common/wire/convert_ids.hpp"
 #include "common/wire/convert_shared.hpp"
 
 namespace understory::wire {
 namespace {
-
-model::LandmarkId landmark_id(std::int64_t wire, Checks& checks) {
-  checks.consistent(wire != 0, "landmark id is not 0");
-  return static_cast<model::LandmarkId>(wire);
-}
 
 model::MapLandmark landmark(const map_landmark_t& wire, Checks& checks) {
   check_landmark(wire, checks);
@@ -51,132 +47,7 @@ std::vector<map_landmark_t> to_wire(const std::vector<model::MapLandmark>& landm
   return wire;
 }
 
-std::vector<model::LandmarkId> ids(std::string_view field, const std::vector<std::int64_t>& wire,
-                                   Checks& checks) {
-  std::vector<model::LandmarkId> result;
-  result.reserve(wire.size());
-  for (std::size_t i = 0; i < wire.size(); ++i) {
-    checks.in(field, i);
-    result.push_back(landmark_id(wire[i], checks));
-  }
-  return result;
-}
-
-using Merges = std::vector<std::pair<model::LandmarkId, model::LandmarkId>>;
-
-Merges merges(const std::vector<merge_t>& wire, Checks& checks) {
-  Merges result;
-  result.reserve(wire.size());
-  for (std::size_t i = 0; i < wire.size(); ++i) {
-    checks.in("merged", i);
-    result.emplace_back(landmark_id(wire[i].old_id, checks), landmark_id(wire[i].new_id, checks));
-  }
-  return result;
-}
-
-std::vector<merge_t> to_wire(const Merges& merges) {
-  std::vector<merge_t> wire;
-  wire.reserve(merges.size());
-  for (const auto& [old_id, new_id] : merges) {
-    merge_t& out = wire.emplace_back();
-    out.old_id = static_cast<std::int64_t>(old_id);
-    out.new_id = static_cast<std::int64_t>(new_id);
-  }
-  return wire;
-}
-
-template <class Wire>
-void copy_counts(Wire& wire) {
-  wire.num_added = static_cast<std::int32_t>(wire.added.size());
-  wire.num_removed = static_cast<std::int32_t>(wire.removed.size());
-  wire.num_merged = static_cast<std::int32_t>(wire.merged.size());
-}
-
-std::vector<model::Association> associations(const slam_update_t& wire, Checks& checks) {
-  std::vector<model::Association> result;
-  result.reserve(wire.associations.size());
-  for (std::size_t i = 0; i < wire.associations.size(); ++i) {
-    checks.in("associations", i);
-    const association_t& one = wire.associations[i];
-    checks.range("keyframe_landmark", one.keyframe_landmark, 0, 1e9);
-    result.push_back(
-        {static_cast<std::uint32_t>(one.keyframe_landmark), landmark_id(one.landmark_id, checks)});
-  }
-  return result;
-}
-
-void copy_diagnostics(const slam_update_t& wire, model::MapUpdate& update, Checks& checks) {
-  constexpr double kMost = std::numeric_limits<std::int32_t>::max();
-  checks.in_message();
-  checks.range("candidates", wire.candidates, 0, kMost);
-  checks.range("inliers", wire.inliers, 0, kMost);
-  checks.range("degrees_of_freedom", wire.degrees_of_freedom, 0, kMost);
-  checks.range("chi2", wire.chi2, 0.0, std::numeric_limits<double>::max());
-  update.used_prior = wire.used_prior != 0;
-  update.candidates = static_cast<std::uint32_t>(wire.candidates);
-  update.inliers = static_cast<std::uint32_t>(wire.inliers);
-  update.chi2 = wire.chi2;
-  update.degrees_of_freedom = static_cast<std::uint32_t>(wire.degrees_of_freedom);
-  update.log10_false_alarm = wire.log10_false_alarm;
-  update.reason = wire.reason;
-}
-
 }  // namespace
-
-Result<model::MapUpdate> from_wire(const slam_update_t& wire) {
-  Checks checks;
-  checks.range("keyframe_seq", static_cast<double>(wire.keyframe_seq), 0.0, 9.3e18);
-  checks.range("status", wire.status, slam_update_t::FIRST_MAP, slam_update_t::REJECTED);
-  checks.pose("map_T_vehicle", wire.map_T_vehicle);
-  checks.pose("map_T_latest_vehicle", wire.map_T_latest_vehicle);
-  model::MapUpdate update;
-  update.keyframe_sequence = static_cast<std::uint64_t>(wire.keyframe_seq);
-  update.utime = wire.utime;
-  update.status = static_cast<model::MapUpdateStatus>(wire.status);
-  update.map_T_vehicle = from_wire(wire.map_T_vehicle);
-  update.covariance = checks.covariance("covariance", wire.covariance);
-  update.map_T_latest_vehicle = from_wire(wire.map_T_latest_vehicle);
-  update.associations = associations(wire, checks);
-  update.added = ids("added", wire.added, checks);
-  update.removed = ids("removed", wire.removed, checks);
-  update.merged = merges(wire.merged, checks);
-  copy_diagnostics(wire, update, checks);
-  if (checks.refusal()) return *checks.refusal();
-
-  return update;
-}
-
-slam_update_t to_wire(const model::MapUpdate& update) {
-  slam_update_t wire{};
-  wire.utime = update.utime;
-  wire.seq = static_cast<std::int64_t>(update.keyframe_sequence);
-  wire.keyframe_seq = wire.seq;
-  wire.status = static_cast<std::int8_t>(update.status);
-  wire.map_T_vehicle = to_wire(update.map_T_vehicle);
-  copy_matrix(update.covariance, wire.covariance);
-
-  wire.map_T_latest_vehicle = to_wire(update.map_T_latest_vehicle);
-  wire.num_associations = static_cast<std::int32_t>(update.associations.size());
-  for (const model::Association& one : update.associations) {
-    association_t& out = wire.associations.emplace_back();
-    out.keyframe_landmark = static_cast<std::int32_t>(one.keyframe_landmark);
-    out.landmark_id = static_cast<std::int64_t>(one.landmark_id);
-  }
-
-  wire.added.assign(update.added.begin(), update.added.end());
-  wire.removed.assign(update.removed.begin(), update.removed.end());
-  wire.merged = to_wire(update.merged);
-  copy_counts(wire);
-  wire.used_prior = update.used_prior ? 1 : 0;
-  wire.candidates = static_cast<std::int32_t>(update.candidates);
-  wire.inliers = static_cast<std::int32_t>(update.inliers);
-  wire.chi2 = update.chi2;
-  wire.degrees_of_freedom = static_cast<std::int32_t>(update.degrees_of_freedom);
-  wire.log10_false_alarm = update.log10_false_alarm;
-  wire.reason = update.reason;
-
-  return wire;
-}
 
 Result<model::WholeMap> from_wire(const map_t& wire) {
   Checks checks;

@@ -20,6 +20,11 @@ inline constexpr double kLongestRangeM = 1e6;
 /// Largest component of a velocity.
 inline constexpr double kFastestMps = 1000.0;
 
+/// Largest index of a detection in its scan.
+inline constexpr double kMostDetections = 1e9;
+/// Ids of maps are positive in the 16 bit that a landmark's id has for its map.
+inline constexpr double kMostMaps = 0x7fff;
+
 /// Into the rows of a wire type.
 template <int N>
 void copy_matrix(const Eigen::Matrix<double, N, N>& matrix, SquareArray<N>& rows) {

@@ -57,10 +57,31 @@ std::string_view to_string(Reason reason) {
       return "no_point_times";
     case Reason::kPartsMissing:
       return "parts_missing";
+    case Reason::kNoMotion:
+      return "no_motion";
+    case Reason::kRestarted:
+      return "restarted";
     case Reason::kNotCalibrated:
       return "not_calibrated";
     case Reason::kReceiveBufferSmall:
       return "receive_buffer_small";
+
+    case Reason::kLost:
+      return "lost";
+    case Reason::kRolledBack:
+      return "rolled_back";
+    case Reason::kWithheld:
+      return "withheld";
+    case Reason::kDiverged:
+      return "diverged";
+    case Reason::kInputRefused:
+      return "input_refused";
+    case Reason::kMiscalibrated:
+      return "miscalibrated";
+    case Reason::kNewMap:
+      return "new_map";
+    case Reason::kNoiseMisstated:
+      return "noise_misstated";
   }
 
   return "unknown";

@@ -36,8 +36,18 @@ enum class Reason : std::uint8_t {
   kSaturated,           ///< At the end of the sensor's range.
   kNoPointTimes,        ///< A sweep whose points have no times: not de-skewed.
   kPartsMissing,        ///< A sweep of which parts were lost.
+  kNoMotion,            ///< A sweep for whose time no motion is known: not de-skewed.
+  kRestarted,           ///< Something went on after a pause, or began anew.
   kNotCalibrated,       ///< The vehicle moved before the standstill was long enough.
   kReceiveBufferSmall,  ///< The kernel grants less socket buffer than asked for.
+  kLost,                ///< The stage does not know where the vehicle or its landmarks are.
+  kRolledBack,          ///< Updates contradict the map and are taken back.
+  kWithheld,            ///< Results that are not good enough are not given out.
+  kDiverged,            ///< Errors are far larger than stated.
+  kInputRefused,        ///< Much of what comes in is refused.
+  kMiscalibrated,   ///< Sensors contradict each other: a mounting or a scale is not as configured.
+  kNewMap,          ///< A lost mapper began another map, in a frame of its own.
+  kNoiseMisstated,  ///< What comes in contradicts the noise that it states.
 };
 
 /// Name of the reason, lower_snake.

@@ -51,14 +51,7 @@ void DriveAccuracyCollector::add(const io::LogEvent& event) {
     if (pose && pose->is_localised()) poses_.push_back(*pose);
   } else if (event.channel == "SLAM_UPDATE") {
     const auto update = wire::decode_message<model::MapUpdate>(event.data);
-    if (!update) return;
-
-    map_.take(*update);
-    ++counted_.updates[update->status];
-    if (!first_map_ && update->status == model::MapUpdateStatus::kFirstMap) first_map_ = *update;
-    // Those after one with its truth can never be needed.
-    const bool is_tied = !updates_.empty() && truth_at(updates_.back().utime);
-    if (!is_tied && update->status == model::MapUpdateStatus::kUpdated) updates_.push_back(*update);
+    if (update) add_update(*update);
   } else if (event.channel == "MAP") {
     const auto map = wire::decode_message<model::WholeMap>(event.data);
     if (map) map_.take(*map);
@@ -69,6 +62,17 @@ void DriveAccuracyCollector::add(const io::LogEvent& event) {
     const auto health = wire::decode_message<health_t>(event.data);
     if (health) counted_.last_health.insert_or_assign(health->process, *health);
   }
+}
+
+void DriveAccuracyCollector::add_update(const model::MapUpdate& update) {
+  map_.take(update);
+  ++counted_.updates[update.status];
+  if (update.map_id != map_id_) updates_.clear();
+  map_id_ = update.map_id;
+  if (update.status == model::MapUpdateStatus::kFirstMap) first_.emplace(map_id_, update);
+  // Those after one with its truth can never be needed.
+  const bool is_tied = !updates_.empty() && truth_at(updates_.back().utime);
+  if (!is_tied && update.status == model::MapUpdateStatus::kUpdated) updates_.push_back(update);
 }
 
 void DriveAccuracyCollector::add_landmarks_event(const io::LogEvent& event) {
@@ -102,16 +106,18 @@ std::optional<ComparedPose> DriveAccuracyCollector::compare(
   return ComparedPose{utime, world_T_map * map_T_vehicle, *truth};
 }
 
-std::optional<std::pair<geometry::SE2, MapTie>> DriveAccuracyCollector::tie() const {
+std::optional<std::pair<geometry::SE2, MapTie>> DriveAccuracyCollector::tie(
+    std::uint32_t map_id) const {
   const auto at = [&](const auto& pose) -> std::optional<geometry::SE2> {
     const auto truth = truth_at(pose.utime);
     if (!truth) return std::nullopt;
     return *truth * pose.map_T_vehicle.inverse();
   };
 
-  if (first_map_) {
-    if (const auto world_T_map = at(*first_map_)) return {{*world_T_map, MapTie::kFirstMap}};
+  if (const auto first = first_.find(map_id); first != first_.end()) {
+    if (const auto world_T_map = at(first->second)) return {{*world_T_map, MapTie::kFirstMap}};
   }
+  if (map_id != map_id_) return std::nullopt;
   if (map_.has_whole()) {
     for (const auto& keyframe : map_.map()->keyframes) {
       if (const auto world_T_map = at(keyframe)) return {{*world_T_map, MapTie::kFirstKeyframe}};
@@ -124,14 +130,18 @@ std::optional<std::pair<geometry::SE2, MapTie>> DriveAccuracyCollector::tie() co
 }
 
 std::optional<DriveAccuracy> DriveAccuracyCollector::finish() const {
-  const auto tied = tie();
+  const auto tied = tie(map_id_);
   if (!tied) return std::nullopt;
   const geometry::SE2 world_T_map = tied->first;
 
   DriveAccuracy accuracy = counted_;
   accuracy.tied_at = tied->second;
+  std::map<std::uint32_t, std::optional<std::pair<geometry::SE2, MapTie>>> ties{{map_id_, tied}};
   for (const auto& pose : poses_) {
-    const auto compared = compare(pose.utime, pose.map_T_vehicle(), world_T_map);
+    if (!ties.contains(pose.map_id)) ties.emplace(pose.map_id, tie(pose.map_id));
+    const auto& its_tie = ties.at(pose.map_id);
+    if (!its_tie) continue;
+    const auto compared = compare(pose.utime, pose.map_T_vehicle(), its_tie->first);
     if (compared) accuracy.live.push_back(*compared);
   }
   for (const auto& landmark : true_landmarks_.landmarks) {

@@ -54,7 +54,7 @@ struct DriveAccuracy {
 
 /// Collects a log's events. The map's frame is tied to the world at the base of the first keyframe,
 /// or at the first instant of the map that was recorded with its truth: nothing is aligned, so an
-/// error in that heading counts.
+/// error in that heading counts. Where the mapper began another map, each map is tied by itself.
 class DriveAccuracyCollector {
  public:
   /// Takes one event, in the order of the log; channels that do not matter are passed over.
@@ -64,17 +64,19 @@ class DriveAccuracyCollector {
 
  private:
   void add_landmarks_event(const io::LogEvent& event);
+  void add_update(const model::MapUpdate& update);
   /// The true pose at `utime`, interpolated where it was recorded at other instants.
   std::optional<geometry::SE2> truth_at(model::Utime utime) const;
   /// world_T_map at the best instant there is, and which; none where the log holds none.
-  std::optional<std::pair<geometry::SE2, MapTie>> tie() const;
+  std::optional<std::pair<geometry::SE2, MapTie>> tie(std::uint32_t map_id) const;
   std::optional<ComparedPose> compare(model::Utime utime, const geometry::SE2& map_T_vehicle,
                                       const geometry::SE2& world_T_map) const;
 
   std::map<model::Utime, geometry::SE2> truth_;
   std::vector<model::SlamPose> poses_;
-  std::optional<model::MapUpdate> first_map_;
-  std::vector<model::MapUpdate> updates_;  ///< Localised ones, in the order of the log.
+  std::map<std::uint32_t, model::MapUpdate> first_;  ///< Of each map, that started it.
+  std::vector<model::MapUpdate> updates_;  ///< Localised ones of the last map, in order of the log.
+  std::uint32_t map_id_ = 1;               ///< Of the last update.
   model::HeldMap map_;
   truth_landmarks_t true_landmarks_{};
   std::optional<std::int64_t> last_scan_;

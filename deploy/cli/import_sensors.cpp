@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/io/data_error.hpp"
 #include "common/io/kitti_raw.hpp"
@@ -31,6 +32,7 @@ struct SensorImportOptions {
   std::string out;
   bool wheels = false;
   std::string poses = "icp";
+  std::vector<double> laser;  ///< x_m, y_m, yaw_rad on the vehicle; empty = KITTI's.
   std::string model = "vlp16";
   std::string calibration;
   std::string imu, gnss, wheel_table;
@@ -120,9 +122,14 @@ void import_kitti(const SensorImportOptions& options) {
 
 void import_kitti_reduced(const SensorImportOptions& options) {
   const io::ReducedKitti drive(options.path, options.poses);
+  const geometry::SE2 vehicle_T_laser =
+      options.laser.empty() ? io::kitti::vehicle_T_laser()
+                            : geometry::SE2(options.laser[0], options.laser[1], options.laser[2]);
+  const geometry::SE2 laser_T_vehicle = vehicle_T_laser.inverse();
   RecordingLog log(options.out);
+  // The poses are the laser's; `world` stays where they have it.
   for (const io::ReducedKittiPose& pose : drive.poses())
-    log.add("GROUND_TRUTH", truth(pose.utime, pose.world_T_sensor));
+    log.add("GROUND_TRUTH", truth(pose.utime, pose.world_T_sensor * laser_T_vehicle));
   add_sweeps(drive, log);
   log.commit();
   fmt::print("{} sweeps with poses ({}) -> {}\n", drive.sweeps(), options.poses, options.out);
@@ -245,10 +252,17 @@ void add_sensor_imports(CLI::App& import) {
              "Folder of the drive (with velodyne_points and oxts)", options, import_kitti)
       ->add_flag("--speed-as-wheels", options->wheels,
                  "Write the OXTS forward velocity as RAW_WHEELS (derived from GNSS)");
-  add_format(import, "kitti-reduced", "KITTI drive 0005 with 16 of 64 beams, and its poses",
-             "Folder with sweeps.bin and poses_*.csv", options, import_kitti_reduced)
-      ->add_option("--poses", options->poses, "icp (default) or oxts")
+  CLI::App* reduced =
+      add_format(import, "kitti-reduced", "KITTI drive 0005 with 16 of 64 beams, and its poses",
+                 "Folder with sweeps.bin and poses_*.csv", options, import_kitti_reduced);
+  reduced->add_option("--poses", options->poses, "icp (default) or oxts")
       ->check(CLI::IsMember({"icp", "oxts"}));
+  reduced
+      ->add_option("--laser", options->laser,
+                   "x,y,yaw [m, rad] of the laser, whose poses these are, on the vehicle; default: "
+                   "that of 2011_09_26, as in deploy/config/kitti")
+      ->delimiter(',')
+      ->expected(3);
   CLI::App* pcap = add_format(import, "pcap", "Captured packets of a Velodyne laser",
                               "A pcap or pcapng file", options, import_pcap);
   pcap->add_option("--model", options->model, "vlp16 (default), vlp32c, hdl32e or hdl64e");

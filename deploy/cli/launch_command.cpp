@@ -9,12 +9,13 @@
 #include <csignal>
 #include <memory>
 
+#include "common/bus/launch_config.hpp"
+#include "common/bus/parameter_table.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/health_listener.hpp"
 #include "deploy/cli/launch_report.hpp"
 #include "deploy/cli/paths.hpp"
-#include "deploy/launch/launch_config.hpp"
 #include "deploy/launch/registry.hpp"
 #include "deploy/launch/supervisor.hpp"
 
@@ -64,7 +65,7 @@ bool selected(const LaunchOptions& options, const std::string& name) {
 
 std::vector<launch::ProcessSpec> process_specs(const LaunchOptions& options) {
   std::vector<launch::ProcessSpec> specs;
-  for (const auto& entry : launch::read_launch_config(options.config).processes) {
+  for (const auto& entry : bus::read_launch_config(options.config).processes) {
     if (!selected(options, entry.name)) continue;
     launch::ProcessSpec spec;
     spec.name = entry.name;
@@ -114,8 +115,10 @@ void wait(const launch::Supervisor& supervisor, const StopSignals& signals,
 
 /// Heartbeats distinguish a hang from work. Throws BusError: on a bus that cannot be heard no
 /// process would hear anything either.
-HealthListener listen(const LaunchOptions& options, launch::Supervisor& supervisor) {
+HealthListener listen(const LaunchOptions& options, launch::Supervisor& supervisor,
+                      LaunchReport& report) {
   return HealthListener(options.lcm_url, [&](const health_t& message) {
+    report.add(message);
     supervisor.heartbeat(message.process, static_cast<pid_t>(message.pid), Clock::now());
   });
 }
@@ -151,7 +154,7 @@ void launch_processes(const LaunchOptions& options) {
   std::vector<launch::ProcessSpec> specs;
   try {
     specs = process_specs(options);
-  } catch (const launch::ConfigError& error) {
+  } catch (const bus::ConfigurationError& error) {
     wrong_usage(error.what());
   }
   if (specs.empty()) wrong_usage("launch: --only names none of the processes in launch.toml");
@@ -162,7 +165,7 @@ void launch_processes(const LaunchOptions& options) {
   launch::Supervisor supervisor(
       std::move(specs), {},
       [&](const std::string& process, const std::string& text) { report.add(process, text); });
-  HealthListener health = listen(options, supervisor);
+  HealthListener health = listen(options, supervisor, report);
   prepare_state(options, supervisor);
   supervisor.start(registry.read(), Clock::now());
   run(supervisor, registry, signals, health, report);

@@ -34,6 +34,30 @@ void LaunchReport::add(const std::string& process, const std::string& text) {
   if (events_.size() < kMaxEvents) events_.push_back({time, process, text});
 }
 
+void LaunchReport::add(const health_t& health) {
+  std::string says = "HEALTH OK";
+  switch (health.state) {
+    case health_t::STATE_DEGRADED:
+    case health_t::STATE_ERROR:
+      says =
+          fmt::format("HEALTH {} {}", health.state == health_t::STATE_ERROR ? "ERROR" : "DEGRADED",
+                      health.last_error_code);
+      break;
+    case health_t::STATE_OK:
+      break;
+    default:
+      return;  // It starts or stops: the supervisor reports that.
+  }
+
+  if (latest_.size() >= kMaxProcesses && !latest_.contains(health.process)) return;
+
+  // A process is well until it says otherwise; the words of the first message of a kind are told.
+  std::string& latest = latest_.try_emplace(health.process, "HEALTH OK").first->second;
+  if (says == latest) return;
+  latest = says;
+  add(health.process, health.state == health_t::STATE_OK ? says : says + ": " + health.last_error);
+}
+
 void LaunchReport::write(const std::filesystem::path& file,
                          const std::vector<launch::ProcessStatus>& processes) const {
   nlohmann::ordered_json report;

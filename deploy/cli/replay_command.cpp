@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 
+#include "common/bus/launch_config.hpp"
 #include "common/bus/replay.hpp"
 #include "common/io/lcm_log.hpp"
 #include "common/terminal/interrupt.hpp"
@@ -15,7 +16,6 @@
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/paths.hpp"
 #include "deploy/cli/services.hpp"
-#include "deploy/launch/launch_config.hpp"
 
 namespace understory::cli {
 namespace {
@@ -40,10 +40,10 @@ std::vector<std::string> stages_of(const std::filesystem::path& config) {
   if (!std::filesystem::exists(config / "launch.toml")) return {"keyframer", "geoslam_mapper"};
   std::vector<std::string> names;
   try {
-    for (auto& process : launch::read_launch_config(config).processes) {
+    for (auto& process : bus::read_launch_config(config).processes) {
       if (!reads_a_sensor(process.name)) names.push_back(std::move(process.name));
     }
-  } catch (const launch::ConfigError& error) {
+  } catch (const bus::ConfigurationError& error) {
     wrong_usage(error.what());
   }
   return names;
@@ -135,7 +135,9 @@ void add_replay_command(CLI::App& parent) {
       ->add_option("--stages", options->stages,
                    "Which stages; default: the processes of the configuration's launch.toml")
       ->delimiter(',');
-  command->add_option("--config", options->config, "Directory with NAME.toml for each stage")
+  command
+      ->add_option("--config", options->config,
+                   "Directory with launch.toml and one file for each stage")
       ->capture_default_str();
   command->add_option("--channel-suffix", options->channel_suffix, "Of every output, e.g. _ALT");
 

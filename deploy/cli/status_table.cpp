@@ -58,6 +58,16 @@ void StatusTable::add(const health_t& health, Clock::time_point now) {
   latest_.insert_or_assign(health.process, Entry{health, now});
 }
 
+/// "lost 1, LANDMARKS late 12"; empty where nothing was wrong.
+std::string StatusTable::reason_counts(const health_t& health) {
+  std::string result;
+  for (const auto& reason : health.reasons) {
+    result += fmt::format("{}{}{}{} {}", result.empty() ? "" : ", ", reason.channel,
+                          reason.channel.empty() ? "" : " ", reason.reason, reason.count);
+  }
+  return result;
+}
+
 std::string StatusTable::text(Clock::time_point now) const {
   std::string result;
   for (const auto& [name, entry] : latest_) {
@@ -72,6 +82,9 @@ std::string StatusTable::text(Clock::time_point now) const {
     if (!health.last_error.empty()) {
       fmt::format_to(std::back_inserter(result), "  last error {}: {}\n", health.last_error_code,
                      printable(health.last_error));
+    }
+    if (const std::string counts = reason_counts(health); !counts.empty()) {
+      fmt::format_to(std::back_inserter(result), "  reasons so far: {}\n", printable(counts));
     }
 
     result += fmt::format("     {:<24} {:>9} {:>8} {:>7} {:>6} {:>6} {:>9} {:>7}\n", "channel",

@@ -28,6 +28,8 @@ class StatusTable {
   nlohmann::ordered_json json(Clock::time_point now) const;
 
  private:
+  static std::string reason_counts(const health_t& health);
+
   struct Entry {
     health_t health;
     Clock::time_point received;

@@ -1,8 +1,11 @@
 #include "eval/experiments/command.hpp"
 
 #include "eval/experiments/experiments.hpp"
+#include "eval/experiments/health/health.hpp"
 #include "eval/experiments/laps/laps.hpp"
 #include "eval/experiments/large_map/large_map.hpp"
+#include "eval/experiments/one_shot/one_shot.hpp"
+#include "eval/experiments/returns/returns.hpp"
 
 namespace understory::eval::experiments {
 
@@ -15,12 +18,17 @@ void add_eval_command(CLI::App& parent) {
   accuracy::add_noise_experiment(eval);
   efficiency::add_efficiency_experiment(eval);
   large_map::add_large_map_experiment(eval);
+  one_shot::add_one_shot_experiment(eval);
   backend::add_backend_experiment(eval);
   victoria_park::add_victoria_park_experiment(eval);
   frontend::add_frontend_experiment(eval);
   recording::add_recording_experiment(eval);
   laps::add_laps_experiment(eval);
+  returns::add_returns_experiment(eval);
+  health::add_health_experiment(eval);
   roads::add_landmarks_vs_error_experiment(eval);
+  misstated::add_misstated_experiment(eval);
+  wheels::add_wheels_experiment(eval);
 }
 
 }  // namespace understory::eval::experiments

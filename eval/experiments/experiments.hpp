@@ -55,4 +55,14 @@ namespace roads {
 void add_landmarks_vs_error_experiment(CLI::App& eval);
 }  // namespace roads
 
+namespace misstated {
+/// What becomes of drives whose sensors are not as told.
+void add_misstated_experiment(CLI::App& eval);
+}  // namespace misstated
+
+namespace wheels {
+/// The chain with wheels, with exact ones and without.
+void add_wheels_experiment(CLI::App& eval);
+}  // namespace wheels
+
 }  // namespace understory::eval::experiments

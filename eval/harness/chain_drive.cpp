@@ -3,7 +3,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 
+#include "common/bus/launch_config.hpp"
 #include "common/geometry/alignment.hpp"
 #include "services/associator/adapter.hpp"
 #include "services/ekf/adapter.hpp"
@@ -27,6 +30,9 @@ void keep_states(SensorChain& chain, ChainRun& run) {
   run.states.resize(run.updates.size(), {run.keyframes, run.landmarks});
 }
 
+/// It reads the sensor itself, which only a process can.
+constexpr const char* kSensorDriver = "velodyne_driver";
+
 /// What fits into one packet of the bus: 10 bytes a point.
 constexpr std::size_t kPointsPerPart = 5500;
 
@@ -44,11 +50,26 @@ model::Utime utime_of(const sim::SensorReading& reading) {
                     reading);
 }
 
+/// Stops and starts the services whose pause it is.
+void apply_pauses(SensorChain& chain, const std::vector<ChainPause>& pauses, double now_s) {
+  if (pauses.empty()) return;
+  for (const std::string& service : chain.services()) {
+    chain.pause(service, std::ranges::any_of(pauses, [&](const ChainPause& pause) {
+                  const bool is_meant = pause.service.empty() || pause.service == service;
+                  return is_meant && now_s >= pause.from_s && now_s < pause.to_s;
+                }));
+  }
+}
+
 }  // namespace
 
 void watch_chain(SensorChain& chain, ChainRun& run) {
   chain.watch<model::RawPose>("RAW_POSE", [&run](const model::RawPose& pose) {
     run.dead_reckoned.push_back({pose.utime, pose.odom_T_vehicle});
+  });
+  chain.watch<model::Odometry>("ODOMETRY", [&run](const model::Odometry& motion) {
+    if (run.odometry.empty()) run.odometry.push_back({motion.from_utime, {}});
+    run.odometry.push_back({motion.utime, run.odometry.back().pose * motion.from_T_to});
   });
   chain.watch<model::LandmarkScan>("LANDMARKS", [&run](const model::LandmarkScan& scan) {
     run.detections.push_back(scan.detections.size());
@@ -90,6 +111,23 @@ std::vector<bus::Service> front_end_services() {
           geoslam_mapper::geoslam_mapper_service()};
 }
 
+std::vector<bus::Service> services_of(const std::filesystem::path& config_dir) {
+  std::vector<bus::Service> all = front_end_services();
+  if (config_dir.empty()) return all;
+  std::set<std::string> started;
+  for (const bus::ProcessEntry& entry : bus::read_launch_config(config_dir).processes) {
+    if (entry.name == kSensorDriver) continue;
+    if (std::ranges::find(all, entry.name, &bus::Service::name) == all.end()) {
+      throw bus::ConfigurationError({(config_dir / "launch.toml").string() + ": process \"" +
+                                     entry.name + "\" cannot be hosted here"});
+    }
+    started.insert(entry.name);
+  }
+
+  std::erase_if(all, [&](const bus::Service& one) { return !started.contains(one.name); });
+  return all;
+}
+
 std::vector<RawMessage> raw_messages(const sim::SensorReading& reading,
                                      std::uint64_t& sweep_parts) {
   const auto one = [](const char* channel, const auto& value) {
@@ -114,7 +152,7 @@ std::vector<RawMessage> raw_messages(const sim::SensorReading& reading,
 
 ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options) {
   ChainRun run;
-  SensorChain chain(front_end_services(), options.config_dir, options.toml_instead);
+  SensorChain chain(services_of(options.config_dir), options.config_dir, options.toml_instead);
   watch_chain(chain, run);
 
   const double duration_s = std::min(options.end_s, drive.motion().duration_s());
@@ -126,6 +164,7 @@ ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options) {
     begin = begin.value_or(utime);
     run.simulated_s = 1e-6 * static_cast<double>(utime - *begin);
     if (run.simulated_s > options.end_s) break;
+    apply_pauses(chain, options.pauses, run.simulated_s);
 
     if (const auto* truth = std::get_if<sim::TruePose>(&*reading)) {
       run.truth.push_back({truth->utime, truth->state.world_T_level()});
@@ -178,14 +217,46 @@ TrajectoryError trajectory_error(std::span<const metrics::StampedPose> estimate,
   return error;
 }
 
+namespace {
+
+std::map<std::uint32_t, std::vector<model::SlamPose>> by_map(
+    std::span<const model::SlamPose> poses) {
+  std::map<std::uint32_t, std::vector<model::SlamPose>> maps;
+  for (const model::SlamPose& pose : poses) maps[pose.map_id].push_back(pose);
+  return maps;
+}
+
+}  // namespace
+
+TrajectoryError trajectory_error(std::span<const model::SlamPose> poses,
+                                 std::span<const metrics::StampedPose> truth) {
+  TrajectoryError all;
+  double sum = 0.0;
+  for (const auto& [id, of_map] : by_map(poses)) {
+    const TrajectoryError error = trajectory_error(poses_of(of_map), truth);
+    sum += static_cast<double>(error.poses) * error.ate_rms_m * error.ate_rms_m;
+    all.poses += error.poses;
+    all.driven_m += error.driven_m;
+    all.largest_m = std::max(all.largest_m, error.largest_m);
+    all.end_m = std::max(all.end_m, error.end_m);
+  }
+  if (all.poses > 0) all.ate_rms_m = std::sqrt(sum / static_cast<double>(all.poses));
+  return all;
+}
+
+std::size_t count_maps(std::span<const model::SlamPose> poses) { return by_map(poses).size(); }
+
 PoseConsistency pose_consistency(std::span<const model::SlamPose> poses,
                                  std::span<const metrics::StampedPose> truth) {
   PoseConsistency result;
   std::optional<geometry::SE2> map_T_world;
+  std::uint32_t map_id = 0;
   double count = 0.0;
   for (const model::SlamPose& pose : poses) {
     const auto true_pose = pose_at(truth, pose.utime);
     if (!true_pose) continue;
+    if (pose.map_id != map_id) map_T_world.reset();
+    map_id = pose.map_id;
     const geometry::SE2 map_T_vehicle = pose.map_T_vehicle();
     if (!map_T_world) {
       map_T_world = map_T_vehicle * true_pose->inverse();
@@ -205,18 +276,24 @@ PoseConsistency pose_consistency(std::span<const model::SlamPose> poses,
 }
 
 std::size_t wrong_updates(const ChainRun& run, double limit_m) {
-  std::vector<Eigen::Vector2d> estimated;
-  std::vector<Eigen::Vector2d> real;
+  struct Points {
+    std::vector<Eigen::Vector2d> estimated;
+    std::vector<Eigen::Vector2d> real;
+  };
+  std::map<std::uint32_t, Points> maps;
   for (const model::MapUpdate& update : run.updates) {
     const auto true_pose = pose_at(run.truth, update.utime);
     if (!metrics::localised(update) || !true_pose) continue;
-    estimated.push_back(update.map_T_vehicle.translation());
-    real.push_back(true_pose->translation());
+    maps[update.map_id].estimated.push_back(update.map_T_vehicle.translation());
+    maps[update.map_id].real.push_back(true_pose->translation());
   }
-  const geometry::SE2 world_T_map = geometry::align_rigid(real, estimated);
+
   std::size_t wrong = 0;
-  for (std::size_t i = 0; i < real.size(); ++i) {
-    if ((world_T_map * estimated[i] - real[i]).norm() > limit_m) ++wrong;
+  for (const auto& [id, points] : maps) {
+    const geometry::SE2 world_T_map = geometry::align_rigid(points.real, points.estimated);
+    for (std::size_t i = 0; i < points.real.size(); ++i) {
+      if ((world_T_map * points.estimated[i] - points.real[i]).norm() > limit_m) ++wrong;
+    }
   }
   return wrong;
 }

@@ -25,8 +25,9 @@ struct MapAfterUpdate {
 
 /// What the chain published on a drive, and the truth.
 struct ChainRun {
-  std::vector<metrics::StampedPose> truth;  ///< `world`, at the truth's own rate.
-  std::vector<metrics::StampedPose> dead_reckoned;
+  std::vector<metrics::StampedPose> truth;          ///< `world`, at the truth's own rate.
+  std::vector<metrics::StampedPose> dead_reckoned;  ///< RAW_POSE: the filter corrects its velocity.
+  std::vector<metrics::StampedPose> odometry;  ///< ODOMETRY, summed: no landmark has touched it.
   std::vector<model::EkfPose> ekf;
   std::vector<model::SlamPose> slam;  ///< Those that are localised.
   std::uint64_t slam_unsure = 0;      ///< SLAM_POSE that are not localised.
@@ -44,12 +45,20 @@ struct ChainRun {
 /// A reading before it reaches the chain: may be changed, dropped (empty) or repeated.
 using Meddle = std::function<std::vector<RawMessage>(RawMessage)>;
 
+/// A process that does not run for a while, of the drive's time.
+struct ChainPause {
+  std::string service;  ///< Empty = all of them.
+  double from_s = 0.0;
+  double to_s = 0.0;
+};
+
 /// How a simulated drive goes through the chain.
 struct ChainOptions {
-  std::filesystem::path config_dir;
+  std::filesystem::path config_dir;  ///< Its launch.toml says which services; empty: all.
   std::map<std::string, std::string> toml_instead;
   double end_s = 1e9;                         ///< Of the drive.
   Meddle meddle;                              ///< Faults; empty = none.
+  std::vector<ChainPause> pauses;             ///< Of processes.
   std::function<void(double done)> progress;  ///< Called at every sweep; `done` is in [0, 1].
   /// Every sweep before it goes to the chain, with the truth in it.
   std::function<void(const sim::SimulatedSweep&)> on_sweep;
@@ -65,8 +74,12 @@ void watch_chain(SensorChain& chain, ChainRun& run);
 /// Ends the drive: last outputs of the services, their times and health.
 void finish_chain(SensorChain& chain, ChainRun& run);
 
-/// The services from raw sensors to the map.
+/// The services from raw sensors to the map, in the order in which data runs through them.
 std::vector<bus::Service> front_end_services();
+/// Those of them that the folder's launch.toml starts; a sensor's driver is left out: a log or the
+/// simulation stands for it. All where the path is empty. Throws ConfigurationError, also for a
+/// process that is none of them.
+std::vector<bus::Service> services_of(const std::filesystem::path& config_dir);
 
 /// Drives once through. Throws what a service or `options.progress` throws.
 ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options);
@@ -83,8 +96,14 @@ struct TrajectoryError {
 /// left out.
 TrajectoryError trajectory_error(std::span<const metrics::StampedPose> estimate,
                                  std::span<const metrics::StampedPose> truth);
+/// The same of SLAM_POSE, each map aligned by itself: its frame has no tie to the others'. Of the
+/// end errors the largest one, of `driven_m` the sum.
+TrajectoryError trajectory_error(std::span<const model::SlamPose> poses,
+                                 std::span<const metrics::StampedPose> truth);
+/// Number of maps in which the poses are.
+std::size_t count_maps(std::span<const model::SlamPose> poses);
 
-/// Errors against the reported covariance, with the first pose held: it is the map's frame.
+/// Errors against the reported covariance, with the first pose of each map held: it is its frame.
 struct PoseConsistency {
   double mean_nees = 0.0;  ///< Of the pose; 3 is exact.
   double end_error_m = 0.0;

@@ -4,17 +4,10 @@
 #include <utility>
 
 #include "common/bus/config_file.hpp"
+#include "common/bus/launch_config.hpp"
 #include "eval/tools/thread_clock.hpp"
 
 namespace understory::eval::harness {
-namespace {
-
-/// The file's text; empty where there is no file: defaults.
-std::string config_in(const std::filesystem::path& file) {
-  return std::filesystem::exists(file) ? bus::read_config_file(file) : std::string();
-}
-
-}  // namespace
 
 /// The shared bus, with a stopwatch around one service's handlers.
 class SensorChain::TimedBus : public bus::Bus {
@@ -28,6 +21,7 @@ class SensorChain::TimedBus : public bus::Bus {
   void subscribe(std::string_view channel, std::size_t queue_size, Handler handler) override {
     bus_.subscribe(channel, queue_size,
                    [this, handler = std::move(handler)](const bus::BusMessage& message) {
+                     if (is_paused) return;
                      const double start_s = tools::thread_time_s();
                      handler(message);
                      const double took_s = tools::thread_time_s() - start_s;
@@ -39,6 +33,7 @@ class SensorChain::TimedBus : public bus::Bus {
   std::uint64_t dropped(std::string_view channel) const override { return bus_.dropped(channel); }
 
   ServiceTime time;
+  bool is_paused = false;  ///< The service hears nothing.
 
  private:
   bus::Bus& bus_;
@@ -52,9 +47,11 @@ SensorChain::SensorChain(const std::vector<bus::Service>& services,
   if (!config_dir.empty() && !std::filesystem::is_directory(config_dir))
     throw bus::ConfigurationError({"no such configuration folder: " + config_dir.string()});
   for (const bus::Service& service : services) {
-    const std::filesystem::path file = config_dir / (service.name + ".toml");
+    const std::filesystem::path file = bus::config_file_in(config_dir, service.name);
     const auto instead = toml_instead.find(service.name);
-    const std::string toml = instead != toml_instead.end() ? instead->second : config_in(file);
+    const std::string toml = instead != toml_instead.end() ? instead->second
+                             : file.empty()                ? ""
+                                                           : bus::read_config_file(file);
     auto bus = std::make_unique<TimedBus>(bus_);
     auto hosted =
         std::make_unique<bus::HostedService>(service, *bus, bus::no_clock(), toml, file.string());
@@ -73,6 +70,15 @@ void SensorChain::feed(std::string_view channel, std::span<const std::uint8_t> b
   if (!has_begun_) begin();
   bus_.publish(channel, bytes);
   bus_.drain();
+}
+
+void SensorChain::pause(std::string_view service, bool is_paused) {
+  for (const Hosted& hosted : hosted_) {
+    if (hosted.name != service) continue;
+    hosted.bus->is_paused = is_paused;
+    return;
+  }
+  throw std::out_of_range("no service " + std::string(service) + " in the chain");
 }
 
 void SensorChain::finish() {

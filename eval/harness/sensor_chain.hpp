@@ -31,8 +31,8 @@ struct ServiceTime {
 /// As `understory replay` hosts them: what a message leads to is handed out before the next one.
 class SensorChain {
  public:
-  /// NAME.toml of each service is read from `config_dir` where it exists, unless
-  /// `toml_instead` has its text. Throws ConfigurationError, also where that folder is not there;
+  /// The parameters of each service are read from its file in `config_dir` (config_file_in), unless
+  /// `toml_instead` has their text. Throws ConfigurationError, also where that folder is not there;
   /// an empty path means the defaults.
   SensorChain(const std::vector<bus::Service>& services, const std::filesystem::path& config_dir,
               const std::map<std::string, std::string>& toml_instead = {});
@@ -42,6 +42,9 @@ class SensorChain {
   void feed(std::string_view channel, std::span<const std::uint8_t> bytes);
   /// The same for a message in one value.
   void feed(const RawMessage& message) { feed(message.channel, message.bytes); }
+  /// The service hears nothing until this is called with false: it hangs, or is being started
+  /// again from its state. Throws std::out_of_range for an unknown name.
+  void pause(std::string_view service, bool is_paused);
   /// Ends the drive: the services may publish once more.
   void finish();
 

@@ -49,24 +49,32 @@ struct LocalMap {
   }
 };
 
-/// Figure 4.9: two hierarchies, associations by polygons alone and after localisation. Figure 4.10:
-/// the graph before the optimisation with old, current and new landmarks.
-json snapshot_json(const Snapshot& snapshot) {
+/// Both hierarchies as GeoSLAM builds them, and what their polygons match.
+void add_polygon_matches(const std::vector<Eigen::Vector2d>& local_m,
+                         const std::vector<Eigen::Vector2d>& map_m, json& snapshot) {
+  const hierarchy::baseline::Hierarchy local(local_m, kDescriptorStep);
+  const hierarchy::baseline::Hierarchy map(map_m, kDescriptorStep);
+  json first = json::array();
+  for (const hierarchy::baseline::PointMatch& match :
+       hierarchy::baseline::match_hierarchies(local, map, {})) {
+    first.push_back({match.local, match.other});
+  }
+  snapshot["keyframe_polygons"] = polygons_of(local);
+  snapshot["map_polygons"] = polygons_of(map);
+  snapshot["first_associations"] = first;
+}
+
+/// Figure 4.9: two hierarchies, associations by polygons alone and after localisation; a method
+/// that matches no polygons has its associations only. Figure 4.10: the graph before the
+/// optimisation with old, current and new landmarks.
+json snapshot_json(const Snapshot& snapshot, bool matches_polygons) {
   const geometry::SE2 base_T_centre = snapshot.keyframe.centre_T_base().inverse();
   std::vector<Eigen::Vector2d> local;
   for (const model::KeyframeLandmark& landmark : snapshot.keyframe.landmarks) {
     local.push_back(base_T_centre * landmark.position_m);
   }
 
-  // Both hierarchies as GeoSLAM builds them, and what their polygons match.
   const LocalMap map(snapshot.landmarks_before, snapshot.update.map_T_vehicle.translation());
-  const hierarchy::baseline::Hierarchy local_hierarchy(local, kDescriptorStep);
-  const hierarchy::baseline::Hierarchy map_hierarchy(map.positions_m, kDescriptorStep);
-  json first = json::array();
-  for (const hierarchy::baseline::PointMatch& match :
-       hierarchy::baseline::match_hierarchies(local_hierarchy, map_hierarchy, {})) {
-    first.push_back({match.local, match.other});
-  }
 
   // Associations of the update, as numbers in the local map.
   json filtered = json::array();
@@ -95,22 +103,21 @@ json snapshot_json(const Snapshot& snapshot) {
     poses.push_back(pose(estimate.map_T_vehicle));
   }
 
-  return {{"keyframe", points(local)},
-          {"keyframe_polygons", polygons_of(local_hierarchy)},
-          {"map", points(map.positions_m)},
-          {"map_polygons", polygons_of(map_hierarchy)},
-          {"first_associations", first},
-          {"filtered_associations", filtered},
-          {"current", current},
-          {"old_landmarks", old},
-          {"new_landmarks", added},
-          {"poses", poses},
-          {"pose", pose(snapshot.update.map_T_vehicle)},
-          {"chi2", snapshot.update.chi2},
-          {"degrees_of_freedom", snapshot.update.degrees_of_freedom}};
+  json result = {{"keyframe", points(local)},
+                 {"map", points(map.positions_m)},
+                 {"filtered_associations", filtered},
+                 {"current", current},
+                 {"old_landmarks", old},
+                 {"new_landmarks", added},
+                 {"poses", poses},
+                 {"pose", pose(snapshot.update.map_T_vehicle)},
+                 {"chi2", snapshot.update.chi2},
+                 {"degrees_of_freedom", snapshot.update.degrees_of_freedom}};
+  if (matches_polygons) add_polygon_matches(local, map.positions_m, result);
+  return result;
 }
 
-json trace_json(const RunTrace& trace, double interval_m) {
+json trace_json(const RunTrace& trace, const std::string& method, double interval_m) {
   json result{{"travelled_m", json::array()}, {"rpe_cm", json::array()},
               {"lpe_cm", json::array()},      {"newest_pose_cm", json::array()},
               {"poses", json::array()},       {"landmarks", points(trace.final_map.landmarks_m)}};
@@ -131,7 +138,7 @@ json trace_json(const RunTrace& trace, double interval_m) {
     for (const geometry::SE2& place : trace.true_path) result["true_path"].push_back(pose(place));
     result["true_trunks"] = points(trace.true_trunks_m);
   }
-  if (trace.snapshot) result["snapshot"] = snapshot_json(*trace.snapshot);
+  if (trace.snapshot) result["snapshot"] = snapshot_json(*trace.snapshot, method == "baseline");
   return result;
 }
 
@@ -145,7 +152,7 @@ json traces_of(const std::vector<CellResult>& cells, const CampaignOptions& opti
     json methods = json::object();
     std::size_t base = 0;
     for (const auto& [method, runs] : cell.runs) {
-      methods[method] = trace_json(runs.front().trace, cell.cell.interval_m);
+      methods[method] = trace_json(runs.front().trace, method, cell.cell.interval_m);
       if (!runs.front().trace.true_path.empty()) continue;
       const auto& poses = runs.front().trace.final_map.poses;
       if (!poses.empty()) base = poses.front().scan;

@@ -82,11 +82,14 @@ std::vector<StampedPose> fill_between(std::span<const StampedPose> known,
 }
 
 FixErrors against_fixes(std::span<const StampedPose> trajectory,
-                        std::span<const model::GnssFix> fixes) {
+                        std::span<const model::GnssFix> fixes, const Eigen::Vector2d& antenna_m) {
+  std::vector<StampedPose> antenna(trajectory.begin(), trajectory.end());
+  for (StampedPose& one : antenna) one.pose = one.pose * geometry::SE2(antenna_m, 0.0);
+
   std::vector<Eigen::Vector2d> world;
   std::vector<Eigen::Vector2d> map;
   for (const model::GnssFix& fix : fixes) {
-    const auto pose = pose_at(trajectory, fix.utime);
+    const auto pose = pose_at(antenna, fix.utime);
     if (!pose) continue;
     world.push_back(fix.east_north_m);
     map.push_back(pose->translation());
@@ -98,7 +101,7 @@ FixErrors against_fixes(std::span<const StampedPose> trajectory,
   for (std::size_t i = 0; i < map.size(); ++i) {
     const Eigen::Vector2d fix = map_T_world * world[i];
     errors.at_time_m.push_back((fix - map[i]).norm());
-    errors.to_path_m.push_back(distance_to_path(trajectory, fix));
+    errors.to_path_m.push_back(distance_to_path(antenna, fix));
   }
   errors.at_time_median_m = tools::quantile(errors.at_time_m, 0.5);
   errors.at_time_p90_m = tools::quantile(errors.at_time_m, 0.9);

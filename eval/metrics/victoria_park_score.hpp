@@ -45,9 +45,11 @@ struct FixErrors {
   double to_path_p90_m = 0.0;
 };
 
-/// Errors after one rigid alignment. Fixes outside of the trajectory's time are left out.
+/// Errors of the antenna's place after one rigid alignment; it is at `antenna_m` of the vehicle.
+/// Fixes outside of the trajectory's time are left out.
 FixErrors against_fixes(std::span<const StampedPose> trajectory,
-                        std::span<const model::GnssFix> fixes);
+                        std::span<const model::GnssFix> fixes,
+                        const Eigen::Vector2d& antenna_m = Eigen::Vector2d::Zero());
 
 /// An observation of a tree whose identity is given.
 struct CuratedObservation {

@@ -74,16 +74,18 @@ def draw_hierarchy(axis, points, polygons, shift):
 
 
 def plot_matches(snapshot, file):
-    """The keyframe's hierarchy beside the map's; lines join associated landmarks."""
-    figure, axes = plt.subplots(2, 1, figsize=(13, 15))
+    """The keyframe beside the map; lines join associated landmarks. What polygons match only where the method does so."""
+    panels = [("filtered_associations", "tab:green", "associations of the update")]
+    if "first_associations" in snapshot:
+        panels = [("first_associations", "tab:blue", "first associations, by polygons alone"),
+                  ("filtered_associations", "tab:green", "filtered associations")]
+    figure, axes = plt.subplots(len(panels), 1, figsize=(13, 7.5 * len(panels)), squeeze=False)
     width = (max(p[0] for p in snapshot["keyframe"]) - min(p[0] for p in snapshot["keyframe"]))
     left_of_map = min(p[0] for p in snapshot["map"])
     shift = left_of_map - max(p[0] for p in snapshot["keyframe"]) - 0.2 * width
-    for axis, key, colour, title in [
-            (axes[0], "first_associations", "tab:blue", "first associations, by polygons alone"),
-            (axes[1], "filtered_associations", "tab:green", "filtered associations")]:
-        local = draw_hierarchy(axis, snapshot["keyframe"], snapshot["keyframe_polygons"], shift)
-        whole = draw_hierarchy(axis, snapshot["map"], snapshot["map_polygons"], 0.0)
+    for axis, (key, colour, title) in zip(axes[:, 0], panels):
+        local = draw_hierarchy(axis, snapshot["keyframe"], snapshot.get("keyframe_polygons", []), shift)
+        whole = draw_hierarchy(axis, snapshot["map"], snapshot.get("map_polygons", []), 0.0)
         for i, j in snapshot[key]:
             axis.plot([local[0][i], whole[0][j]], [local[1][i], whole[1][j]], "-", color=colour,
                       linewidth=0.6, alpha=0.7)

@@ -154,6 +154,25 @@ def large_map(document):
          for row in document["rows"]])
 
 
+def one_shot(document):
+    """Single scans in surveyed maps, a line per map and setting, and the six maps together."""
+    rows = document["rows"]
+    six = [row for row in rows if row["map"] != "big-woods-all"]
+    total = {key: sum(row[key] for row in six) for key in ("scans", "found", "wrong", "off_unstated", "beyond_99_9_pct")}
+    lines = table(
+        ("map", "range m", "sigma cm", "detection %", "false %", "scans", "found", "wrong", "0.1-1 m off, unstated",
+         "outside 99.9 %", "gave up, has an answer", "mean NEES", "99.9 % NEES", "median error cm", "largest error cm",
+         "median ms", "max ms", "most look-ups"),
+        [(row["map"], number(row["range_m"], 0), number(row["sigma_cm"], 0), number(row["detection_pct"], 0),
+          number(row["false_pct"], 0), row["scans"], row["found"], row["wrong"], row["off_unstated"],
+          row["beyond_99_9_pct"], row["gave_up_with_answer"], number(row["nees_mean"]), number(row["nees_p99_9"], 1),
+          number(row["error_p50_cm"]), number(row["error_max_cm"], 1), number(row["ms_p50"]), number(row["ms_max"], 1),
+          number(row["lookups_max"], 0))
+         for row in rows])
+    return lines + ["", f"The six maps together: {total['scans']} scans, {total['found']} found, {total['wrong']} wrong, "
+                        f"{total['off_unstated']} unstated, {total['beyond_99_9_pct']} outside their 99.9 % ellipsoid."]
+
+
 def efficiency(document):
     """Time per keyframe by scenario, method and component."""
     lines = table(
@@ -274,6 +293,28 @@ def laps(document):
                          number(rows[i - 1]["largest_nees"], 0), rows[i - 1]["poses"],
                          rows[i - 1]["unsure"], rows[i - 1]["refused"]) for i in shown])
     return lines
+
+
+def health(document):
+    """Drives with and without a fault: how long HEALTH was OK, and which errors it did not name."""
+    return table(("fault from 25 s to 45 s of 60 s", "drives", "OK % of the time", "errors", "not named within 10 s",
+                  "largest error m", "reasons"),
+                 [(row["fault"], row["drives"], number(row["ok_percent"], 1), row["errors"], row["errors_unnoticed"],
+                   number(row["largest_error_m"]),
+                   ", ".join(f"{name} {count}" for name, count in sorted(row["reasons"].items())) or "-")
+                  for row in document["rows"]])
+
+
+def misstated(document):
+    """Drives with something wrong from the first scan on, beside those with nothing wrong."""
+    return table(("drive", "what is wrong", "drives", "keyframes localised", "poses", "over 1 m off", "`SLAM_POSE` m", "to nothing wrong",
+                  "`EKF_POSE` m", "to nothing wrong", "NEES (3)", "named by HEALTH"),
+                 [(row["drive"], row["what"], row["runs"],
+                   f"{row['updates']} of {row['updates_possible']}" if row["drive"] == "circle" else "-", row["poses"], row["wrong"],
+                   number(row["slam_m"], 4), number(row["slam_ratio"]),
+                   *((number(row["filter_m"], 4), number(row["filter_ratio"])) if row["drive"] == "forest" else ("-", "-")),
+                   number(row["nees"]), f"{row['runs_named']} of {row['runs']}" if row["drive"] == "forest" else "-")
+                  for row in document["rows"]])
 
 
 def _columns(settings):

@@ -1,5 +1,7 @@
 #include "services/associator/adapter_parameters.hpp"
 
+#include "common/bus/noise_parameters.hpp"
+
 namespace understory::associator {
 
 void describe(AssociatorParameters& p, bus::ParameterTable& table) {
@@ -46,6 +48,8 @@ void describe(AssociatorParameters& p, bus::ParameterTable& table) {
   table.add("input.max_detections", p.max_detections, {1, 1000000}, "",
             "LANDMARKS with more detections is refused and counted (too_large): what a message may "
             "cost is bounded. A laser of 2048 columns cannot show 700 trunks.");
+
+  describe(p.noise, table);
 
   table.renamed("max_turn_rad", "max_rotation_rad");
 }

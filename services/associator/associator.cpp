@@ -8,12 +8,16 @@
 namespace understory::associator {
 namespace {
 
-constexpr state::Format kFormat{"associator", 1};
+constexpr state::Format kFormat{"associator", 2};
+
+geometry::SE2WithCovariance pose_of(const Localisation& located) {
+  return {located.pose.reference_T_observed, located.pose.covariance};
+}
 
 }  // namespace
 
 Associator::Associator(const AssociatorParameters& parameters)
-    : parameters_(parameters), tracks_(parameters), motion_(parameters) {
+    : parameters_(parameters), tracks_(parameters), noise_(parameters.noise), motion_(parameters) {
   for (const char* name : {"auto", "nearest", "registered", "consistent"}) {
     if (parameters.method == name) return;
   }
@@ -21,16 +25,18 @@ Associator::Associator(const AssociatorParameters& parameters)
                               "' is not one of auto, nearest, registered, consistent");
 }
 
-std::optional<model::TrackedScan> Associator::add(const model::LandmarkScan& scan) {
+std::optional<model::TrackedScan> Associator::add(const model::LandmarkScan& stated) {
   ++counters_.scans;
-  counters_.detections += scan.detections.size();
-  if (!is_in_time(scan)) return std::nullopt;
+  counters_.detections += stated.detections.size();
+  if (!is_in_time(stated)) return std::nullopt;
 
-  const std::vector<Observation> observations = usable_observations(scan);
+  const model::LandmarkScan scan = noise_.corrected(stated);
+  std::vector<Observation> observations = usable_observations(scan);
   counters_.detections_unusable += scan.detections.size() - observations.size();
 
   // Where the vehicle is in the frame of the tracks.
-  const Localisation located = locate(observations, scan);
+  Localisation located = locate(observations, scan);
+  if (!located.fits) locate_rescaled(stated, observations, located);
   if (!located.fits) {
     if (pass_over()) return tracked_scan({}, {}, scan);
     ++counters_.scans_lost;
@@ -39,16 +45,52 @@ std::optional<model::TrackedScan> Associator::add(const model::LandmarkScan& sca
   misfits_ = 0;
 
   // Which observation is which track.
-  const geometry::SE2WithCovariance pose{located.pose.reference_T_observed,
-                                         located.pose.covariance};
+  const geometry::SE2WithCovariance pose = pose_of(located);
   const auto matches = match(tracks_.tracks(), observations, pose, parameters_);
 
-  // The vehicle's motion and the tracks learn from it.
+  // Noise, the vehicle's motion and the tracks learn from it.
+  noise_.add(stated, numbers_of(observations, matches, stated));
   motion_.set_scan(scan.utime, local_T_vehicle_.inverse() * pose.mean);
   local_T_vehicle_ = pose.mean;
   const auto ids = update_tracks(observations, matches, scan);
 
-  return tracked_scan(observations, ids, scan);
+  return tracked_scan(observations, ids, noise_.corrected(stated));
+}
+
+/// Stated covariances that are far too small or large let no scan fit. Takes the place of
+/// observations and result where other noise explains the scan.
+void Associator::locate_rescaled(const model::LandmarkScan& stated,
+                                 std::vector<Observation>& observations, Localisation& located) {
+  for (const double factor : noise_.tries()) {
+    auto rescaled = usable_observations(model::DetectionNoise::rescaled(stated, factor));
+    Localisation tried = locate(rescaled, stated);
+    if (!tried.fits) continue;
+
+    const auto matches = match(tracks_.tracks(), rescaled, pose_of(tried), parameters_);
+    if (!noise_.explains(stated, numbers_of(rescaled, matches, stated), factor)) continue;
+    observations = std::move(rescaled);
+    located = std::move(tried);
+    return;
+  }
+}
+
+/// The number of each detection's track; an unmatched observation will begin one.
+std::vector<std::uint64_t> Associator::numbers_of(const std::vector<Observation>& observations,
+                                                  const std::vector<Match>& matches,
+                                                  const model::LandmarkScan& scan) const {
+  std::vector<std::uint64_t> numbers(scan.detections.size(), 0);
+  std::vector<std::uint8_t> is_matched(observations.size(), 0);
+  for (const Match& match : matches) {
+    is_matched[match.observation] = 1;
+    if (match.ambiguous) continue;
+    numbers[observations[match.observation].detection] = tracks_.tracks()[match.track].number;
+  }
+
+  std::uint64_t next = tracks_.next_number();
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    if (is_matched[i] == 0) numbers[observations[i].detection] = next++;
+  }
+  return numbers;
 }
 
 bool Associator::is_in_time(const model::LandmarkScan& scan) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/model/detection_noise.hpp"
 #include "common/model/ekf_output.hpp"
 #include "common/model/odometry.hpp"
 #include "common/model/tracked.hpp"
@@ -47,13 +48,16 @@ class Associator {
   /// The filter's pose at the last scan: its velocity and biases predict the next motion. It never
   /// changes a track.
   void add(const model::EkfPose& pose) { motion_.add(pose); }
-  /// The consistent landmarks of a scan (perhaps none). Nothing for a late or repeated scan; one
-  /// that is more than 10 s earlier than the last one starts the tracks anew (the clock was set
-  /// back).
+  /// The consistent landmarks of a scan (perhaps none), with covariances as the scans themselves
+  /// show them where they contradict the stated ones (DetectionNoise). Nothing for a late or
+  /// repeated scan; one that is more than 10 s earlier than the last one starts the tracks anew
+  /// (the clock was set back).
   std::optional<model::TrackedScan> add(const model::LandmarkScan& scan);
 
   /// Counts for HEALTH.
   const AssociatorCounters& counters() const { return counters_; }
+  /// True where the scans contradict the covariances of LANDMARKS; they are then replaced.
+  bool is_noise_misstated() const { return noise_.is_misstated(); }
   /// Number of tracks, consistent or not.
   std::size_t track_count() const { return tracks_.tracks().size(); }
 
@@ -66,13 +70,19 @@ class Associator {
   /// are of this process.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.tracks_, self.motion_, self.local_T_vehicle_, self.misfits_, self.next_sequence_);
+    a(self.tracks_, self.noise_, self.motion_, self.local_T_vehicle_, self.misfits_,
+      self.next_sequence_);
   }
 
  private:
   bool is_in_time(const model::LandmarkScan& scan);
   Localisation locate(const std::vector<Observation>& observations,
                       const model::LandmarkScan& scan);
+  void locate_rescaled(const model::LandmarkScan& stated, std::vector<Observation>& observations,
+                       Localisation& located);
+  std::vector<std::uint64_t> numbers_of(const std::vector<Observation>& observations,
+                                        const std::vector<Match>& matches,
+                                        const model::LandmarkScan& scan) const;
   bool pass_over();
   std::vector<model::TrackId> update_tracks(const std::vector<Observation>& observations,
                                             const std::vector<Match>& matches,
@@ -83,6 +93,7 @@ class Associator {
 
   AssociatorParameters parameters_;
   TrackList tracks_;
+  model::DetectionNoise noise_;
   MotionPredictor motion_;
   geometry::SE2 local_T_vehicle_;  ///< At the last scan that was placed.
   int misfits_ = 0;                ///< Scans in a row that fitted no track.

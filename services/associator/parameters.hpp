@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include "common/model/detection_noise.hpp"
+
 namespace understory::associator {
 
 /// Parameters of the stage and of its process.
@@ -27,6 +29,7 @@ struct AssociatorParameters {
   /// Speed of somebody who walks; 0: no track is checked for motion (motion_check.hpp).
   double walking_mps = 0.8;
   int max_detections = 2000;  ///< Of one LANDMARKS message.
+  model::DetectionNoiseParameters noise;
 };
 
 }  // namespace understory::associator

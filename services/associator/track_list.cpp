@@ -109,6 +109,7 @@ void TrackList::take(Track& track, const Observation& observation,
 Track& TrackList::begin(const Observation& observation, const geometry::SE2& local_T_vehicle,
                         model::Utime utime) {
   Track& track = tracks_.emplace_back();
+  track.number = next_number_++;
   track.position_m = local_T_vehicle * observation.position_m;
   track.detection_variance_m2 = observation.variance_m2();
   track.radius_m = observation.radius_m;

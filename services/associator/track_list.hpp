@@ -39,6 +39,7 @@ struct ReferenceObservation {
 /// One landmark that is followed.
 struct Track {
   model::TrackId id = 0;                                 ///< 0 = not consistent yet.
+  std::uint64_t number = 0;                              ///< From its beginning; never used again.
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< Frame `local`.
   double detection_variance_m2 = 0.0;                    ///< Mean over its detections, per axis.
   double radius_m = 0.0;                                 ///< Mean; 0 where unknown.
@@ -57,9 +58,9 @@ struct Track {
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.id, self.position_m, self.detection_variance_m2, self.radius_m, self.observations,
-      self.history, self.age, self.missed, self.kind, self.steadiness, self.moved_in_a_row,
-      self.reference);
+    a(self.id, self.number, self.position_m, self.detection_variance_m2, self.radius_m,
+      self.observations, self.history, self.age, self.missed, self.kind, self.steadiness,
+      self.moved_in_a_row, self.reference);
   }
 };
 
@@ -89,6 +90,8 @@ class TrackList {
   const std::vector<Track>& tracks() const { return tracks_; }
   /// The id of the next track that becomes consistent.
   model::TrackId next_id() const { return next_id_; }
+  /// The number of the next track that begins.
+  std::uint64_t next_number() const { return next_number_; }
   /// Ends all tracks. Ids go on.
   void clear() { tracks_.clear(); }
 
@@ -108,7 +111,7 @@ class TrackList {
   /// Members of a saved state; see common/state. The parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.tracks_, self.next_id_, self.requires_proof_);
+    a(self.tracks_, self.next_id_, self.next_number_, self.requires_proof_);
   }
 
  private:
@@ -126,6 +129,7 @@ class TrackList {
   AssociatorParameters parameters_;
   std::vector<Track> tracks_;
   model::TrackId next_id_ = 1;
+  std::uint64_t next_number_ = 1;
   /// Too few stationary tracks are in view: only tracks that are known to be stationary are
   /// published.
   bool requires_proof_ = false;

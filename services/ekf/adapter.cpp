@@ -5,38 +5,64 @@
 
 #include "services/ekf/adapter_parameters.hpp"
 #include "services/ekf/ekf.hpp"
+#include "services/ekf/health_watch.hpp"
 
 namespace understory::ekf {
 namespace {
+
+constexpr state::Format kServiceFormat{"ekf_service", 1};
 
 class EkfAdapter : public bus::Adapter {
  public:
   explicit EkfAdapter(EkfChannels channels) : channels_(std::move(channels)) {}
 
-  void describe(bus::ParameterTable& table) override { ekf::describe(parameters_, table); }
+  void describe(bus::ParameterTable& table) override {
+    ekf::describe(parameters_, table);
+    ekf::describe(health_, table);
+  }
 
   void bind(bus::Node& node) override {
     node_ = &node;
     stage_.emplace(parameters_);
+    watch_ = HealthWatch(health_);
     // An increment that the queue drops is a gap in the motion: the queue is long.
-    node.subscribe<model::Odometry>(
-        channels_.odometry,
-        [this](const model::Odometry& increment) { publish(stage_->add(increment)); },
-        {.queue_size = 2000});
-    node.subscribe<model::TrackedScan>(
-        channels_.tracked_landmarks,
-        [this](const model::TrackedScan& scan) { publish(stage_->add(scan)); },
-        {.queue_size = 200, .most_bytes = most_bytes()});
+    node.subscribe<model::Odometry>(channels_.odometry,
+                                    [this](const model::Odometry& increment) { add(increment); },
+                                    {.queue_size = 2000});
+    node.subscribe<model::TrackedScan>(channels_.tracked_landmarks,
+                                       [this](const model::TrackedScan& scan) { add(scan); },
+                                       {.queue_size = 200, .most_bytes = most_bytes()});
     poses_ = node.advertise<model::EkfPose>(channels_.pose);
     maps_ = node.advertise<model::EkfMap>(channels_.map);
     levels_ = node.advertise<model::EkfLevel>(channels_.level);
     corrections_ = node.advertise<model::VelocityCorrection>(channels_.velocity_correction);
   }
 
-  std::string save() const override { return stage_->save(); }
-  void load(const std::string& state) override { stage_->load(state); }
+  std::string save() const override { return state::save(kServiceFormat, watch_, stage_->save()); }
+
+  void load(const std::string& state) override {
+    HealthWatch watch(health_);
+    std::string stage;
+    state::load(state, kServiceFormat, watch, stage);
+    stage_->load(stage);
+    watch_ = watch;
+    show_health();
+  }
 
  private:
+  template <class Message>
+  void add(const Message& message) {
+    const EkfCounters before = stage_->counters();
+    const EkfOutput output = stage_->add(message);
+    watch_.add(output, before, stage_->counters());
+    publish(output);
+    show_health();
+  }
+
+  void show_health() {
+    for (const bus::WatchedCondition& one : watch_.conditions()) node_->show(one);
+  }
+
   std::size_t most_bytes() const {
     return wire::bytes_with<tracked_landmarks_t, tracked_landmark_t>(
         static_cast<std::size_t>(parameters_.max_detections));
@@ -46,7 +72,7 @@ class EkfAdapter : public bus::Adapter {
     const EkfCounters& counters = stage_->counters();
     if (counters.restarts != restarts_) {
       restarts_ = counters.restarts;
-      node_->log(bus::Node::Level::kWarning, "ekf_restart", counters.last_reason, channels_.pose);
+      node_->report(wire::Reason::kRestarted, counters.last_reason, channels_.pose);
     }
     if (output.level) levels_.publish(*output.level);
     if (output.pose) poses_.publish(*output.pose);
@@ -56,6 +82,8 @@ class EkfAdapter : public bus::Adapter {
 
   EkfChannels channels_;
   EkfParameters parameters_;
+  HealthParameters health_;
+  HealthWatch watch_;
   bus::Node* node_ = nullptr;
   std::optional<Ekf> stage_;
   std::uint64_t restarts_ = 0;

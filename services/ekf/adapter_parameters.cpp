@@ -88,6 +88,10 @@ void describe(EkfRestartParameters& p, bus::ParameterTable& table) {
             "Added to the standard deviation of the heading at a restart.");
   table.add("restart.max_gap_s", p.max_gap_s, {0.1, 1000.0}, "s",
             "Longest interval without odometry and scans; after a longer one the filter restarts.");
+  table.add(
+      "restart.announced_gap_s", p.announced_gap_s, {0.1, 1000.0}, "s",
+      "A longer interval without odometry and scans is announced as a restart, also where the "
+      "map is kept.");
   table.add("restart.clock_jump_s", p.clock_jump_s, {0.1, 1e6}, "s",
             "A stamp that is earlier than the latest one by more starts the clock anew.");
 }

@@ -10,21 +10,22 @@ constexpr std::size_t kPartRemoved = 20;
 
 }  // namespace
 
-std::uint32_t update_compatible(FilterState& state, std::span<const Observation> observations,
-                                std::vector<Pairing>& pairings, std::span<const double> set_gates,
-                                UpdateScratch& scratch) {
-  if (pairings.empty()) return 0;
+CompatibleUpdate update_compatible(FilterState& state, std::span<const Observation> observations,
+                                   std::vector<Pairing>& pairings,
+                                   std::span<const double> set_gates, UpdateScratch& scratch) {
+  CompatibleUpdate result;
+  if (pairings.empty()) return result;
   scratch.backup.take(state);
   const auto is_better = [&](const Pairing& a, const Pairing& b) {
     return squared_distance(state, a.landmark, observations[a.observation]) <
            squared_distance(state, b.landmark, observations[b.observation]);
   };
 
-  std::uint32_t removed = 0;
   while (!pairings.empty()) {
     const double distance = scratch.joint.apply(state, observations, pairings, scratch.low_rank);
     if (distance >= 0.0 && distance <= set_gates[pairings.size()]) {
       scratch.joint.finish(state, scratch.low_rank);
+      result.distance = distance;
       break;
     }
     scratch.backup.restore(state);
@@ -33,11 +34,11 @@ std::uint32_t update_compatible(FilterState& state, std::span<const Observation>
     for (std::size_t k = 0; k < drop && !pairings.empty(); ++k) {
       const auto worst = std::max_element(pairings.begin(), pairings.end(), is_better);
       ++state.landmark(worst->landmark).refused;
-      ++removed;
+      ++result.removed;
       pairings.erase(worst);
     }
   }
-  return removed;
+  return result;
 }
 
 }  // namespace understory::ekf

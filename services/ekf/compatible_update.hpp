@@ -43,12 +43,17 @@ struct UpdateScratch {
   CovarianceBackup backup;
 };
 
+/// What became of the pairings of an update.
+struct CompatibleUpdate {
+  std::uint32_t removed = 0;  ///< Pairings that did not fit the others.
+  double distance = 0.0;      ///< Squared Mahalanobis distance of those that were used, together.
+};
+
 /// Updates the state by as many `pairings` as pass the gate of their number together: the worst
 /// ones are removed from `pairings` and counted at their landmark until the rest passes.
-/// `set_gates`: limit of the squared Mahalanobis distance by number of pairings. Gives how many
-/// were removed.
-std::uint32_t update_compatible(FilterState& state, std::span<const Observation> observations,
-                                std::vector<Pairing>& pairings, std::span<const double> set_gates,
-                                UpdateScratch& scratch);
+/// `set_gates`: limit of the squared Mahalanobis distance by number of pairings.
+CompatibleUpdate update_compatible(FilterState& state, std::span<const Observation> observations,
+                                   std::vector<Pairing>& pairings,
+                                   std::span<const double> set_gates, UpdateScratch& scratch);
 
 }  // namespace understory::ekf

@@ -1,16 +1,22 @@
 #include "services/ekf/ekf.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <utility>
 
 #include "common/state/archive.hpp"
+#include "services/ekf/gap_alignment.hpp"
+#include "services/ekf/prediction.hpp"
 #include "services/ekf/rejoin.hpp"
 #include "services/ekf/state_covariances.hpp"
 
 namespace understory::ekf {
 namespace {
 
-constexpr state::Format kFormat{"ekf", 5};
+constexpr state::Format kFormat{"ekf", 6};
 /// Variance of the first pose, by definition the map's origin; above zero for the factorisations.
 constexpr double kStartVariance = 1e-12;
 /// Searches for lost landmarks per scan.
@@ -26,8 +32,26 @@ ErrorForm error_form(const std::string& name) {
                               " is not one of right_invariant, first_estimate, plain");
 }
 
-/// Puts the vehicle at `last`, stationary, less certain than it was.
-void place_at(const SoundPose& last, const EkfRestartParameters& grow, FilterState& state) {
+/// After a gap in which the heading became less certain than this the place in the map is found
+/// anew: linear updates are not true any more.
+constexpr double kAdrift_rad = 0.15;
+/// Observations, and landmarks, that show a place.
+constexpr std::size_t kFewShowPlace = 3;
+/// How far from the prediction the place is looked for.
+constexpr double kPlaceSigmas = 3.0;
+constexpr double kPlaceSlack_m = 5.0;
+
+/// Adds to `sigma` (x, y, heading [m, m, rad]) what may have happened in `away_s` at this speed.
+void add_time_away(double away_s, double speed_mps, const EkfMotionParameters& motion,
+                   Eigen::Vector3d& sigma) {
+  const double spread = motion.gap_acceleration * std::sqrt(away_s * away_s * away_s / 3.0);
+  const double moved = std::hypot(speed_mps * away_s, spread);
+  sigma.head<2>() = (sigma.head<2>().array().square() + moved * moved).sqrt();
+  sigma.z() = std::min(std::hypot(sigma.z(), motion.gap_yaw_rate * away_s), kAnyHeading_rad);
+}
+
+/// Puts the vehicle at `last`, stationary; `sigma`: what is added to its uncertainty.
+void place_at(const SoundPose& last, const Eigen::Vector3d& sigma, FilterState& state) {
   state.anchor_m.setZero();
   state.position = last.ekf_map_T_vehicle.translation();
   state.heading = last.ekf_map_T_vehicle.theta();
@@ -37,7 +61,6 @@ void place_at(const SoundPose& last, const EkfRestartParameters& grow, FilterSta
   state.first_position = state.position;
   state.first_velocity = state.velocity;
 
-  const Eigen::Vector3d sigma(grow.sigma_m, grow.sigma_m, grow.sigma_rad);
   const Eigen::Matrix3d added = sigma.cwiseAbs2().asDiagonal();
   set_pose_covariance(state, last.covariance + added);
   state.follow_with_anchor();
@@ -99,6 +122,8 @@ EkfOutput Ekf::add(const model::TrackedScan& scan) {
 
   // Landmarks that move together show a vehicle that is not stationary.
   ScanUpdate update = read(scan);
+  if (doubt_.is_adrift && !find_place(scan, update))
+    return report_.all(state_, motion_, timeline_.now(), update);
   check_stationary(update);
 
   // Update by known landmarks, then by lost ones, for which the pose is now better known.
@@ -111,7 +136,10 @@ EkfOutput Ekf::add(const model::TrackedScan& scan) {
   stationary_.confirm_motion(timeline_.now(), update.used);
   counters_.landmarks_used += update.used;
   counters_.landmarks_refused += update.refused;
-  return report_.all(state_, motion_, timeline_.now(), update);
+  EkfOutput output = report_.all(state_, motion_, timeline_.now(), update);
+  output.scan = {static_cast<std::uint32_t>(update.observations.size()), update.used, update.nis,
+                 update.nis_degrees};
+  return output;
 }
 
 void Ekf::begin(model::Utime utime) {
@@ -123,18 +151,23 @@ void Ekf::begin(model::Utime utime) {
   report_.begin(state_, motion_);
 }
 
-/// Goes on from the last sound pose, without a map.
-void Ekf::restart(model::Utime utime, const std::string& reason) {
+/// Goes on from the last sound pose, without a map. `away_s`: nothing is known of so long.
+void Ekf::restart(model::Utime utime, const std::string& reason, double away_s) {
+  const double speed_mps = is_sound(state_) ? state_.velocity.norm() : 0.0;
   ++counters_.restarts;
   counters_.last_reason = reason;
   report_.count_restart();
-  refused_scans_ = 0;
+  doubt_ = {};
   stationary_.reset();
   timeline_.move_to(utime);
   set_prior(state_, parameters_.prior);
   map_.clear();
   motion_.forget_level();
-  place_at(report_.last_sound(), parameters_.restart, state_);
+
+  const EkfRestartParameters& grow = parameters_.restart;
+  Eigen::Vector3d sigma(grow.sigma_m, grow.sigma_m, grow.sigma_rad);
+  add_time_away(away_s, speed_mps, parameters_.motion, sigma);
+  place_at(report_.last_sound(), sigma, state_);
 }
 
 /// False where the increment is late; a clock that jumped back restarts the filter.
@@ -219,9 +252,17 @@ void Ekf::bridge(model::Utime utime) {
   ++counters_.gaps;
   remove_ground_marks(state_);  // The vehicle may have moved and stopped elsewhere.
   const double duration = seconds(utime - timeline_.now());
-  if (duration > parameters_.restart.max_gap_s) return restart(utime, "too long a gap");
+  const std::string reason = fmt::format("nothing came for {:.2f} s", duration);
+  if (duration > parameters_.restart.max_gap_s) return restart(utime, reason, duration);
   motion_.bridge(duration, state_, scratch_.low_rank);
   timeline_.move_to(utime);
+
+  const bool has_map = state_.landmarks().size() >= kFewShowPlace;
+  if (has_map && parameters_.motion.gap_yaw_rate * duration > kAdrift_rad) doubt_.is_adrift = true;
+  if (duration <= parameters_.restart.announced_gap_s) return;
+  ++counters_.restarts;
+  counters_.last_reason = reason;
+  report_.count_restart();
 }
 
 ScanUpdate Ekf::read(const model::TrackedScan& scan) {
@@ -230,6 +271,37 @@ ScanUpdate Ekf::read(const model::TrackedScan& scan) {
   counters_.landmarks_unusable += scan.landmarks.size() - update.observations.size();
   steady_heights(state_, map_.known(state_, update), update);
   return update;
+}
+
+/// After a gap: moves the vehicle to where the scan shows it, and updates by what shows it. False
+/// where it does not show, and linear updates would mislead.
+bool Ekf::find_place(const model::TrackedScan& scan, ScanUpdate& update) {
+  if (update.observations.size() < kFewShowPlace) return false;
+  const Eigen::Matrix2d spread = state_.covariance_block<2, 2>(kPosition, kPosition);
+  const double radius_m = kPlaceSigmas * std::sqrt(spread.trace()) + kPlaceSlack_m;
+  const std::vector<Pairing> known = map_.known(state_, update);
+  const auto found = align_after_gap(state_, update, known, radius_m);
+  if (!found) {
+    if (++doubt_.adrift_scans >= parameters_.restart.after_refused_scans)
+      restart(timeline_.now(), "its place was not found after a gap");
+    return false;
+  }
+
+  move_vehicle(state_, found->anchor_T_vehicle);
+  std::vector<Pairing> pairings = found->pairings;
+  update.refused +=
+      update_compatible(state_, update.observations, pairings, gates_.set, scratch_).removed;
+  update.used += static_cast<std::uint32_t>(pairings.size());
+  for (const Pairing& pairing : pairings) {
+    const auto is_same = [&pairing](const Pairing& one) {
+      return one.observation == pairing.observation && one.landmark == pairing.landmark;
+    };
+    if (std::ranges::none_of(known, is_same)) ++counters_.rejoined;
+    map_.rejoin(scan, pairing, state_, update);
+  }
+  doubt_.is_adrift = false;
+  doubt_.adrift_scans = 0;
+  return true;
 }
 
 void Ekf::check_stationary(const ScanUpdate& update) {
@@ -247,7 +319,10 @@ void Ekf::check_stationary(const ScanUpdate& update) {
 void Ekf::update_known(const model::TrackedScan& scan, ScanUpdate& update) {
   std::vector<Pairing> pairings;
   std::vector<bool> is_taken(state_.landmarks().size(), false);
+  for (const Pairing& pairing : map_.known(state_, update))
+    if (update.is_settled[pairing.observation]) is_taken[pairing.landmark] = true;
   for (const Pairing& pairing : map_.known(state_, update)) {
+    if (update.is_settled[pairing.observation]) continue;  // It has shown the place after a gap.
     update.is_settled[pairing.observation] = true;
     const Observation& observation = update.observations[pairing.observation];
     if (is_taken[pairing.landmark] ||
@@ -263,8 +338,12 @@ void Ekf::update_known(const model::TrackedScan& scan, ScanUpdate& update) {
   for (const Pairing& pairing : pairings) {
     map_.weaken(pairing, motion_.distance_m(), state_, update);
   }
-  update.refused += update_compatible(state_, update.observations, pairings, gates_.set, scratch_);
+  const CompatibleUpdate updated =
+      update_compatible(state_, update.observations, pairings, gates_.set, scratch_);
+  update.refused += updated.removed;
   update.used += static_cast<std::uint32_t>(pairings.size());
+  update.nis = updated.distance + gates_.landmark * update.refused;
+  update.nis_degrees = 2 * static_cast<int>(update.used + update.refused);
   for (const Pairing& pairing : pairings) map_.count_observed(scan, pairing, state_, update);
 }
 
@@ -280,7 +359,7 @@ void Ekf::rejoin_lost(const model::TrackedScan& scan, ScanUpdate& update) {
 
     std::vector<Pairing>& pairings = proposal->pairings;
     update.refused +=
-        update_compatible(state_, proposal->observations, pairings, gates_.set, scratch_);
+        update_compatible(state_, proposal->observations, pairings, gates_.set, scratch_).removed;
     update.used += static_cast<std::uint32_t>(pairings.size());
     for (const Pairing& pairing : pairings) map_.rejoin(scan, pairing, state_, update);
     counters_.rejoined += pairings.size();
@@ -298,21 +377,21 @@ void Ekf::maintain_map(const model::TrackedScan& scan, const ScanUpdate& update)
   map_.remove_stale(scan.field_of_view, state_, counters_);
 
   // Scan after scan at odds with the map: the error is larger than the covariance states.
-  refused_scans_ = is_at_odds(update) ? refused_scans_ + 1 : 0;
-  if (refused_scans_ >= parameters_.restart.after_refused_scans) {
+  doubt_.refused_scans = is_at_odds(update) ? doubt_.refused_scans + 1 : 0;
+  if (doubt_.refused_scans >= parameters_.restart.after_refused_scans) {
     restart(timeline_.now(), "most landmarks were refused, scan after scan");
   }
 }
 
 std::string Ekf::save() const {
-  return state::save(kFormat, timeline_, queue_, motion_, stationary_, map_, report_,
-                     refused_scans_, state_);
+  return state::save(kFormat, timeline_, queue_, motion_, stationary_, map_, report_, doubt_,
+                     state_);
 }
 
 void Ekf::load(const std::string& state) {
   Ekf loaded(parameters_);
   state::load(state, kFormat, loaded.timeline_, loaded.queue_, loaded.motion_, loaded.stationary_,
-              loaded.map_, loaded.report_, loaded.refused_scans_, loaded.state_);
+              loaded.map_, loaded.report_, loaded.doubt_, loaded.state_);
   loaded.counters_ = counters_;  // Of this process, not of the one that saved.
   *this = std::move(loaded);
 }

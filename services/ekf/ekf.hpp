@@ -51,9 +51,21 @@ class Ekf {
   void load(const std::string& state);
 
  private:
+  /// What speaks against the estimate.
+  struct Doubt {
+    int refused_scans = 0;   ///< Consecutive scans of which most landmarks were refused.
+    bool is_adrift = false;  ///< After a gap: the place in the map is yet to be found.
+    int adrift_scans = 0;    ///< Scans that did not show it.
+
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& self) {
+      a(self.refused_scans, self.is_adrift, self.adrift_scans);
+    }
+  };
+
   // Beginning and restarts.
   void begin(model::Utime utime);
-  void restart(model::Utime utime, const std::string& reason);
+  void restart(model::Utime utime, const std::string& reason, double away_s = 0.0);
 
   // Stamps and motion.
   bool accept(const model::Odometry& increment);
@@ -64,6 +76,7 @@ class Ekf {
 
   // One scan.
   ScanUpdate read(const model::TrackedScan& scan);
+  bool find_place(const model::TrackedScan& scan, ScanUpdate& update);
   void check_stationary(const ScanUpdate& update);
   void update_known(const model::TrackedScan& scan, ScanUpdate& update);
   void rejoin_lost(const model::TrackedScan& scan, ScanUpdate& update);
@@ -79,7 +92,7 @@ class Ekf {
   StationaryMonitor stationary_;
   ActiveMap map_;
   EkfReport report_;
-  int refused_scans_ = 0;  ///< Consecutive scans of which most landmarks were refused.
+  Doubt doubt_;
   EkfCounters counters_;
 };
 

@@ -11,12 +11,21 @@
 
 namespace understory::ekf {
 
-/// What one message to the filter gives; each part has a channel of its own.
+/// How well a scan fitted, for HEALTH; see ScanUpdate.
+struct ScanFit {
+  std::uint32_t observed = 0;  ///< Usable observations.
+  std::uint32_t used = 0;      ///< Observations that updated the state.
+  double nis = 0.0;
+  int nis_degrees = 0;
+};
+
+/// What one message to the filter gives; each part but the last has a channel of its own.
 struct EkfOutput {
   std::optional<model::EkfPose> pose;
   std::optional<model::EkfMap> map;
   std::optional<model::VelocityCorrection> correction;
   std::optional<model::EkfLevel> level;  ///< With each pose, where sweeps are levelled.
+  std::optional<ScanFit> scan;           ///< With a scan.
 };
 
 /// Where the filter starts again when its state is of no use.

@@ -70,7 +70,9 @@ struct EkfRestartParameters {
   double sigma_m = 2.0;          ///< Added to the uncertainty of the position, per axis.
   double sigma_rad = 0.2;        ///< Added to the uncertainty of the heading.
   double max_gap_s = 10.0;       ///< Longest interval without odometry and scans.
-  double clock_jump_s = 10.0;    ///< A stamp that is earlier by more starts the clock anew.
+  /// A longer one is announced as a restart, also where the map is kept.
+  double announced_gap_s = 1.5;
+  double clock_jump_s = 10.0;  ///< A stamp that is earlier by more starts the clock anew.
 };
 
 /// All parameters of the stage.

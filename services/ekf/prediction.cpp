@@ -1,5 +1,6 @@
 #include "services/ekf/prediction.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/model/preintegration.hpp"
@@ -155,7 +156,7 @@ Transition transition_over_gap(const FilterState& state, double seconds,
   nothing.seconds = seconds;
   nothing.bias = state.bias;
   const double q = parameters.gap_acceleration * parameters.gap_acceleration;
-  const double yaw = parameters.gap_yaw_rate * seconds;
+  const double yaw = std::min(parameters.gap_yaw_rate * seconds, kAnyHeading_rad);
   nothing.covariance(0, 0) = yaw * yaw;
   for (int k = 1; k <= 2; ++k) {
     nothing.covariance(k, k) = q * seconds;

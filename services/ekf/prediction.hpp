@@ -8,6 +8,8 @@
 
 namespace understory::ekf {
 
+/// Standard deviation of a heading of which nothing is known.
+inline constexpr double kAnyHeading_rad = 1.8;
 /// Covariance of (yaw, velocity, position).
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
 /// Jacobian of the vehicle's state with respect to (yaw, velocity, position).

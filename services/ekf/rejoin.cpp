@@ -12,7 +12,7 @@ namespace {
 /// Of more unsettled observations the nearest ones are searched: what a scan may cost is bounded.
 constexpr std::size_t kMostUnsettled = 256;
 /// Pairings that must agree where the gates are wide.
-constexpr std::size_t kFewAgree = 3;
+constexpr std::size_t kFewRejoin = 3;
 
 struct LostLandmark {
   std::uint32_t landmark = 0;
@@ -134,7 +134,7 @@ std::optional<RejoinProposal> find_rejoining(const FilterState& state,
 
   // Where the gates are wide, a few agree by chance.
   const bool is_wide = found.widest_gate_m > 2.0 * rules.min_separation_m;
-  const std::size_t least = std::max(kFewAgree, (found.candidates.size() + 1) / 2);
+  const std::size_t least = std::max(kFewRejoin, (found.candidates.size() + 1) / 2);
   if (is_wide && proposal.pairings.size() < least) return std::nullopt;
   return proposal;
 }

@@ -19,6 +19,10 @@ struct ScanUpdate {
   std::vector<bool> is_settled;  ///< Its landmark is known: it was paired or refused.
   std::uint32_t used = 0;        ///< Observations that updated the state.
   std::uint32_t refused = 0;     ///< Observations that a gate refused.
+  /// Squared Mahalanobis distance of the innovations of known landmarks, those that a gate refused
+  /// with the gate's; and their degrees of freedom.
+  double nis = 0.0;
+  int nis_degrees = 0;
 
   /// The detection of observation `k`; `scan` is the one that this was read from.
   const model::Detection& detection(const model::TrackedScan& scan, std::size_t k) const {

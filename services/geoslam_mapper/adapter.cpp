@@ -6,6 +6,7 @@
 #include "common/model/held_map.hpp"
 #include "services/geoslam_mapper/adapter_parameters.hpp"
 #include "services/geoslam_mapper/geoslam_mapper.hpp"
+#include "services/geoslam_mapper/health_watch.hpp"
 #include "services/geoslam_mapper/map_budget.hpp"
 #include "services/geoslam_mapper/map_difference.hpp"
 #include "services/geoslam_mapper/pose_publishing.hpp"
@@ -28,6 +29,8 @@ void cut(model::WholeMap& map, const map_request_t& request) {
 
 /// Members for which a KEYFRAME has room beside its landmarks; usual are 8.
 constexpr std::size_t kMembers = 64;
+/// Members that may have a detection of each of its landmarks.
+constexpr std::size_t kUsualMembers = 16;
 
 /// Bytes of a MAP with so many parts.
 std::size_t map_bytes(std::size_t landmarks, std::size_t keyframes) {
@@ -35,18 +38,19 @@ std::size_t map_bytes(std::size_t landmarks, std::size_t keyframes) {
          keyframes * wire::element_bytes<keyframe_pose_t>();
 }
 
-constexpr state::Format kFormat{"geoslam_mapper", 3};
+constexpr state::Format kFormat{"geoslam_mapper", 5};
 
 /// What a holder of every MAP_DELTA has.
 struct KnownMap {
   model::Utime utime = 0;
   std::uint64_t version = 0;
+  std::uint32_t map_id = 0;                   // 0 before the first keyframe
   std::vector<model::MapLandmark> landmarks;  // in order of id
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
-    a(s.utime, s.version, s.landmarks);
+    a(s.utime, s.version, s.map_id, s.landmarks);
   }
 };
 
@@ -55,9 +59,11 @@ struct Memory {
   KnownMap known;
   OdometryFrame odometry;
   JumpWatch jumps;
+  HealthWatch health;
   MapBudget budget;
   bool map_is_published = true;
-  bool map_is_due = false;  ///< It started or jumped since it was last published.
+  bool map_is_due = false;      ///< It started or jumped since it was last published.
+  bool is_provisional = false;  ///< The map, by its last keyframe.
   std::uint64_t keyframes = 0;
   model::Utime newest_pose_utime = -1;
   model::Utime earned_pose_utime = -1;  ///< Poses up to it are in the budget.
@@ -65,8 +71,8 @@ struct Memory {
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
-    a(s.known, s.odometry, s.jumps, s.budget, s.map_is_published, s.map_is_due, s.keyframes,
-      s.newest_pose_utime, s.earned_pose_utime);
+    a(s.known, s.odometry, s.jumps, s.health, s.budget, s.map_is_published, s.map_is_due,
+      s.is_provisional, s.keyframes, s.newest_pose_utime, s.earned_pose_utime);
   }
 };
 
@@ -78,9 +84,11 @@ class MapperAdapter : public bus::Adapter {
     geoslam_mapper::describe(parameters_, table);
     geoslam_mapper::describe(input_, table);
     geoslam_mapper::describe(output_, table);
+    geoslam_mapper::describe(health_, table);
   }
 
   void bind(bus::Node& node) override {
+    node_ = &node;
     stage_ = make_mapper(parameters_);
     memory_ = empty_memory();
     subscribe(node);
@@ -101,12 +109,14 @@ class MapperAdapter : public bus::Adapter {
     state::load(state, kFormat, memory, stage);
     stage_->load(stage);
     memory_ = std::move(memory);
+    show_health();
   }
 
  private:
   Memory empty_memory() const {
     Memory memory;
     memory.jumps = JumpWatch(output_.reset_distance_m, output_.reset_angle_rad);
+    memory.health = HealthWatch(health_);
     memory.budget = MapBudget(output_.map_share);
     return memory;
   }
@@ -117,8 +127,10 @@ class MapperAdapter : public bus::Adapter {
     node.subscribe<model::Keyframe>(
         channels_.keyframe, [this](const model::Keyframe& one) { add(one); },
         {.queue_size = 200,
-         .most_bytes = wire::bytes_with<keyframe_t, keyframe_landmark_t>(most_landmarks) +
-                       kMembers * wire::element_bytes<keyframe_member_t>()});
+         .most_bytes =
+             wire::bytes_with<keyframe2_t, keyframe_landmark_t>(most_landmarks) +
+             kMembers * wire::element_bytes<keyframe_member_t>() +
+             kUsualMembers * most_landmarks * wire::element_bytes<keyframe_detection_t>()});
 
     // Not in the journal: a scan changes nothing in the map, and the next one is located anew.
     node.subscribe<model::LandmarkScan>(
@@ -136,8 +148,10 @@ class MapperAdapter : public bus::Adapter {
 
     // Bias and velocity, and the motion to gate by; no measurement: it was made from the same
     // detections.
-    node.subscribe<model::EkfPose>(channels_.ekf_pose,
-                                   [this](const model::EkfPose& pose) { stage_->add(pose); });
+    node.subscribe<model::EkfPose>(channels_.ekf_pose, [this](const model::EkfPose& pose) {
+      stage_->add(pose);
+      memory_.health.add(pose);
+    });
     node.subscribe<model::EkfLevel>(channels_.ekf_level,
                                     [this](const model::EkfLevel& level) { stage_->add(level); });
     node.subscribe<map_request_t>(channels_.map_request,
@@ -153,27 +167,44 @@ class MapperAdapter : public bus::Adapter {
   }
 
   void add(const model::Keyframe& keyframe) {
-    const model::MapUpdate update = stage_->add(keyframe);
+    model::MapUpdate update = stage_->add(keyframe);
+    identify_detections(keyframe, update);
+    memory_.is_provisional = update.is_provisional;
     memory_.budget.earn(updates_.publish(update));
     memory_.jumps.add(keyframe, update);
     publish_poses(keyframe, update);
     publish_delta(update);
+    memory_.health.add(update);
+    show_health();
+  }
+
+  void show_health() {
+    for (const bus::WatchedCondition& one : memory_.health.conditions()) node_->show(one);
   }
 
   /// The pose of a scan at once, in the map as it is; its keyframe comes later.
   void locate(const model::LandmarkScan& scan) {
-    const std::optional<geometry::SE2WithCovariance> found = stage_->locate(scan);
+    const std::optional<ScanPose> found = stage_->locate(scan);
     if (!found || scan.utime <= memory_.newest_pose_utime) return;
     model::SlamPose pose;
     pose.utime = scan.utime;
-    pose.submap_T_vehicle = found->mean;
-    pose.covariance = found->covariance;
+    pose.is_coasting = found->is_coasting;
+    pose.map_id = std::max(memory_.known.map_id, 1U);
+    pose.is_provisional = memory_.is_provisional;
+    pose.submap_T_vehicle = found->map_T_vehicle.mean;
+    pose.covariance = found->map_T_vehicle.covariance;
     publish(pose);
+  }
+
+  /// Whether this keyframe began another map than the last one's.
+  bool is_another_map(const model::MapUpdate& update) const {
+    return memory_.known.map_id != 0 && memory_.known.map_id != update.map_id;
   }
 
   void publish_poses(const model::Keyframe& keyframe, const model::MapUpdate& update) {
     for (model::SlamPose& pose : poses_of(keyframe, update)) {
       earn(pose);
+      pose.is_new_map = is_another_map(update);
       // Keyframes may share scans; the stamp always grows.
       if (pose.utime <= memory_.newest_pose_utime) continue;
       publish(pose);
@@ -185,7 +216,7 @@ class MapperAdapter : public bus::Adapter {
   void earn(const model::SlamPose& pose) {
     if (pose.utime <= memory_.earned_pose_utime) return;
     memory_.earned_pose_utime = pose.utime;
-    memory_.budget.earn(static_cast<std::size_t>(slam_pose_t{}.getEncodedSize()));
+    memory_.budget.earn(static_cast<std::size_t>(slam_pose2_t{}.getEncodedSize()));
   }
 
   void publish(model::SlamPose& pose) {
@@ -197,6 +228,9 @@ class MapperAdapter : public bus::Adapter {
   }
 
   void publish_delta(const model::MapUpdate& update) {
+    const bool is_another = is_another_map(update);
+    memory_.known.map_id = update.map_id;
+    if (is_another) memory_.known.landmarks.clear();
     const auto changed = stage_->take_changed_landmarks();
     model::MapDelta delta =
         changed
@@ -204,6 +238,7 @@ class MapperAdapter : public bus::Adapter {
             : map_difference(memory_.known.landmarks, stage_->landmarks(), update, output_.moved_m);
 
     memory_.known.utime = std::max(memory_.known.utime, update.utime);
+    if (is_another) memory_.keyframes = 0;
     if (update.status == model::MapUpdateStatus::kFirstMap ||
         update.status == model::MapUpdateStatus::kUpdated) {
       ++memory_.keyframes;
@@ -212,13 +247,15 @@ class MapperAdapter : public bus::Adapter {
                          !delta.merged.empty();
     if (!changes) return;
 
-    delta.base_version = memory_.known.version;
+    // Another map builds on nothing; versions are never used again.
+    delta.base_version = is_another ? 0 : memory_.known.version;
     delta.version = ++memory_.known.version;
     memory_.map_is_due |= delta.base_version == 0 ||
                           displaces_most(memory_.known.landmarks, delta, output_.reset_distance_m);
     memory_.known.landmarks = with_delta(std::move(memory_.known.landmarks), delta);
     memory_.map_is_published = false;
     memory_.budget.earn(deltas_.publish(delta));
+    if (is_another) publish_map();
   }
 
   model::WholeMap whole_map() const {
@@ -253,7 +290,9 @@ class MapperAdapter : public bus::Adapter {
   MapperParameters parameters_;
   MapperInputParameters input_;
   MapperOutputParameters output_;
+  HealthParameters health_;
   std::unique_ptr<MapperMethod> stage_;
+  bus::Node* node_ = nullptr;
   Memory memory_;
   bus::Publisher<model::SlamPose> poses_;
   bus::Publisher<model::MapUpdate> updates_;

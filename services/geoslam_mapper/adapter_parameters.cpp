@@ -105,6 +105,17 @@ void describe_growth(SmoothingMapperParameters& p, bus::ParameterTable& table) {
             "gyro's bias is unknown) ...");
   table.add("smoothing.start_wait_s", p.start_wait_s, {0.0, 60.0}, "s",
             "... or, after so long, with any keyframe.");
+  table.add("smoothing.new_map_keyframes", p.new_map_keyframes, {0, 1000}, "keyframes",
+            "A map is believed when so many keyframes agree with each other. Until then the first "
+            "map gives way to another one that as many agree with. Who is lost begins a new map "
+            "with so many successive ones, and the old map is kept as it is. 0: the first keyframe "
+            "is believed, and who is lost waits for the map that there is. 1: every keyframe of "
+            "one who is lost begins a map.");
+  table.add("smoothing.lost_sigma_m", p.lost_sigma_m, {0.01, 10000.0}, "m",
+            "A keyframe without a certain pose is lost where odometry since the last certain one "
+            "has a gap, or is less certain than this (standard deviation of the position) ...");
+  table.add("smoothing.lost_sigma_rad", p.lost_sigma_rad, {0.001, 3.2}, "rad",
+            "... or than this (of the heading).");
 
   table.add("smoothing.min_observations", p.min_observations, {1, 1000}, "scans",
             "A landmark enters the map when it was detected in so many scans ...");
@@ -114,7 +125,8 @@ void describe_growth(SmoothingMapperParameters& p, bus::ParameterTable& table) {
             "A candidate for the map is forgotten after so many keyframes.");
   table.add(
       "smoothing.merge_distance_m", p.merge_distance_m, {0.0, 100.0}, "m",
-      "Two landmarks this near to each other that were not observed side by side are merged.");
+      "Doubles are looked for so far around a landmark. They are merged where their joint "
+      "covariance, what was observed side by side and the landmarks around say that they are one.");
   table.add(
       "smoothing.fold_distance_m", p.fold_distance_m, {0.0, 100.0}, "m",
       "A keyframe this near to an earlier one, and with a similar heading, is folded into it.");

@@ -51,6 +51,10 @@ model::MapDelta map_change(const std::vector<model::MapLandmark>& before,
   model::MapDelta delta;
   delta.utime = update.utime;
   delta.merged = update.merged;
+  for (const model::LandmarkId id : update.removed) {
+    const auto old = first_not_below(before, id);
+    if (old != before.end() && old->id == id) delta.removed.push_back(id);
+  }
   for (const model::MapLandmark& landmark : changed) {
     const auto old = first_not_below(before, landmark.id);
     if (old == before.end() || old->id != landmark.id) {

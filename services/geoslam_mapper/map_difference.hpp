@@ -14,7 +14,7 @@ model::MapDelta map_difference(const std::vector<model::MapLandmark>& before,
                                const model::MapUpdate& update, double moved_m);
 
 /// The same from those landmarks alone that are new or have moved, in order of id; those that are
-/// gone must be in `update.merged`. O(changed * log(map)).
+/// gone must be in `update.merged` or `update.removed`. O(changed * log(map)).
 model::MapDelta map_change(const std::vector<model::MapLandmark>& before,
                            const std::vector<model::MapLandmark>& changed,
                            const model::MapUpdate& update, double moved_m);

@@ -14,6 +14,13 @@
 
 namespace understory::geoslam_mapper {
 
+/// Where a single scan was made.
+struct ScanPose {
+  geometry::SE2WithCovariance map_T_vehicle;  ///< Right perturbation.
+  /// By odometry alone, from the last scan or keyframe that was located: landmarks ended.
+  bool is_coasting = false;
+};
+
 /// The global map: localises keyframes in it, grows it and keeps it consistent (GeoSLAM §4.3,
 /// algorithms 3-5). Two methods exist: `baseline` as the thesis describes it, and `smoothing`.
 /// Poses are of `vehicle_level` in the frame `map`.
@@ -26,10 +33,10 @@ class MapperMethod {
   /// kUpdated; for the others `reason` states why. Throws nothing on bad data.
   virtual model::MapUpdate add(const model::Keyframe& keyframe) = 0;
 
-  /// Pose of a single scan between keyframes, with its covariance (right perturbation). The map is
-  /// not changed. None where the method does not offer it, where there is no map yet, or where too
-  /// few detections match.
-  virtual std::optional<geometry::SE2WithCovariance> locate(const model::LandmarkScan& /*scan*/) {
+  /// Pose of a single scan between keyframes. The map is not changed. Where too few detections
+  /// match it is by odometry, as long as there is any. None where the method does not offer it,
+  /// where there is no map yet, or where odometry has a gap.
+  virtual std::optional<ScanPose> locate(const model::LandmarkScan& /*scan*/) {
     return std::nullopt;
   }
 

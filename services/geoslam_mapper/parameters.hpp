@@ -57,6 +57,9 @@ struct SmoothingMapperParameters {
   bool localisation_only = false;
   double start_heading_sigma_rad = 2e-3;
   double start_wait_s = 2.0;
+  int new_map_keyframes = 3;
+  double lost_sigma_m = 5.0;
+  double lost_sigma_rad = 0.2;
   int min_observations = 3;  ///< Scans.
   double min_observation_ratio = 0.5;
   int candidate_keyframes = 12;

@@ -33,6 +33,9 @@ std::vector<model::SlamPose> poses_of(const model::Keyframe& keyframe,
                                       const model::MapUpdate& update) {
   model::SlamPose pose;
   pose.status = update.status;
+  pose.map_id = update.map_id;
+  pose.is_provisional = update.is_provisional;
+  pose.is_lost = update.is_lost;
   pose.keyframe_sequence = keyframe.sequence;
   pose.utime = keyframe.members.back().utime;
   if (!is_localised(update)) return {pose};
@@ -55,7 +58,20 @@ std::vector<model::SlamPose> poses_of(const model::Keyframe& keyframe,
   return poses;
 }
 
+void identify_detections(const model::Keyframe& keyframe, model::MapUpdate& update) {
+  if (!is_localised(update)) return;
+  std::vector<model::LandmarkId> id_of(keyframe.landmarks.size(), 0);
+  for (const model::Association& pair : update.associations)
+    id_of.at(pair.keyframe_landmark) = pair.landmark_id;
+
+  for (const model::KeyframeMember& member : keyframe.members)
+    update.scans.push_back({member.utime, member.sequence});
+  for (const model::KeyframeDetection& one : keyframe.detections)
+    update.detections.push_back({one.member, one.detection, id_of.at(one.landmark)});
+}
+
 void JumpWatch::add(const model::Keyframe& keyframe, const model::MapUpdate& update) {
+  if (update.map_id != map_id_) begin_map(update.map_id);
   if (predicted_ && keyframe.previous_T_base) {
     predicted_ = *predicted_ * *keyframe.previous_T_base;
   } else {
@@ -71,6 +87,16 @@ void JumpWatch::add(const model::Keyframe& keyframe, const model::MapUpdate& upd
     }
   }
   predicted_ = update.map_T_vehicle;
+}
+
+/// No motion leads from one map's frame to the other's.
+void JumpWatch::begin_map(std::uint32_t map_id) {
+  if (map_id_ != 0) {
+    ++count_;
+    delta_ = geometry::SE2();
+  }
+  map_id_ = map_id;
+  predicted_.reset();
 }
 
 }  // namespace understory::geoslam_mapper

@@ -46,7 +46,11 @@ class OdometryFrame {
 std::vector<model::SlamPose> poses_of(const model::Keyframe& keyframe,
                                       const model::MapUpdate& update);
 
-/// Notices jumps of the keyframes' poses against what the keyframer tracked.
+/// Fills in what the keyframe's detections are, where it has a place.
+void identify_detections(const model::Keyframe& keyframe, model::MapUpdate& update);
+
+/// Notices jumps of the keyframes' poses against what the keyframer tracked, and changes of the
+/// map.
 class JumpWatch {
  public:
   /// A pose that differs from the tracked one by more than `distance_m` or `angle_rad` is a jump.
@@ -57,22 +61,26 @@ class JumpWatch {
   void add(const model::Keyframe& keyframe, const model::MapUpdate& update);
   /// Number of jumps so far.
   std::uint64_t count() const { return count_; }
-  /// The last jump: tracked_T_new of the vehicle.
+  /// The last jump: tracked_T_new of the vehicle; identity where it was a change of the map, of
+  /// which nothing is known.
   const geometry::SE2& delta() const { return delta_; }
 
   /// Members of a saved state; see common/state. The limits are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.predicted_, self.count_, self.delta_);
+    a(self.predicted_, self.count_, self.delta_, self.map_id_);
   }
 
  private:
+  void begin_map(std::uint32_t map_id);
+
   double distance_m_;
   double angle_rad_;
   /// map_T_base by tracking; none before the first, and where tracking broke off.
   std::optional<geometry::SE2> predicted_;
   std::uint64_t count_ = 0;
   geometry::SE2 delta_;
+  std::uint32_t map_id_ = 0;  ///< Of the last keyframe; 0 before the first.
 };
 
 }  // namespace understory::geoslam_mapper

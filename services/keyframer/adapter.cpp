@@ -1,27 +1,35 @@
 #include "services/keyframer/adapter.hpp"
 
+#include <fmt/format.h>
+
 #include <memory>
+#include <numbers>
 
 #include "services/keyframer/adapter_parameters.hpp"
+#include "services/keyframer/health_watch.hpp"
 #include "services/keyframer/keyframer.hpp"
 
 namespace understory::keyframer {
 namespace {
 
+constexpr state::Format kServiceFormat{"keyframer_service", 3};
+
 class KeyframerAdapter : public bus::Adapter {
  public:
   explicit KeyframerAdapter(KeyframerChannels channels) : channels_(std::move(channels)) {}
 
-  void describe(bus::ParameterTable& table) override { keyframer::describe(parameters_, table); }
+  void describe(bus::ParameterTable& table) override {
+    keyframer::describe(parameters_, table);
+    keyframer::describe(health_, table);
+  }
 
   void bind(bus::Node& node) override {
+    node_ = &node;
     stage_ = make_keyframer(parameters_);
+    watch_ = HealthWatch(health_);
 
     node.subscribe<model::LandmarkScan>(channels_.landmarks,
-                                        [this](const model::LandmarkScan& scan) {
-                                          if (const auto keyframe = stage_->add(scan))
-                                            keyframes_.publish(*keyframe);
-                                        },
+                                        [this](const model::LandmarkScan& scan) { add(scan); },
                                         {.queue_size = 200, .most_bytes = most_bytes()});
     // Increments are small, and a lost one breaks the chain of motion: a long queue.
     node.subscribe<model::Odometry>(channels_.odometry,
@@ -36,10 +44,50 @@ class KeyframerAdapter : public bus::Adapter {
     keyframes_ = node.advertise<model::Keyframe>(channels_.keyframe);
   }
 
-  std::string save() const override { return stage_->save(); }
-  void load(const std::string& state) override { stage_->load(state); }
+  std::string save() const override { return state::save(kServiceFormat, watch_, stage_->save()); }
+
+  void load(const std::string& state) override {
+    HealthWatch watch(health_);
+    std::string stage;
+    state::load(state, kServiceFormat, watch, stage);
+    stage_->load(stage);
+    watch_ = watch;
+    show_health();
+  }
 
  private:
+  void add(const model::LandmarkScan& scan) {
+    const KeyframerCounters before = stage_->counters();
+    const auto keyframe = stage_->add(scan);
+    const bool was_miscalibrated = watch_.is_miscalibrated();
+    watch_.add(scan, before, stage_->counters(), stage_->input_quality());
+    if (!was_miscalibrated && watch_.is_miscalibrated()) log(stage_->input_quality());
+    if (keyframe) keyframes_.publish(*keyframe);
+    show_health();
+  }
+
+  /// The numbers, for whoever mends the configuration.
+  void log(const InputQuality& quality) {
+    log(quality.calibration, "minutes");
+    log(quality.lately, "seconds");
+  }
+  void log(const CalibrationError& error, std::string_view by) {
+    const double degrees = 180.0 / std::numbers::pi;
+    node_->log(
+        bus::Node::Level::kWarning, "miscalibrated",
+        fmt::format(
+            "landmarks against wheels by the last {}: yaw {:.2f} +- {:.2f} deg, ahead {:.3f} +- "
+            "{:.3f} m, left {:.3f} +- {:.3f} m, way by wheels {:+.2f} +- {:.2f} %",
+            by, degrees * error.yaw_rad, degrees * error.yaw_sigma_rad, error.place_m.x(),
+            error.place_sigma_m.x(), error.place_m.y(), error.place_sigma_m.y(),
+            100.0 * error.scale, 100.0 * error.scale_sigma),
+        channels_.landmarks);
+  }
+
+  void show_health() {
+    for (const bus::WatchedCondition& one : watch_.conditions()) node_->show(one);
+  }
+
   std::size_t most_bytes() const {
     return wire::bytes_with<landmarks_t, detection_t>(
         static_cast<std::size_t>(parameters_.max_detections));
@@ -47,6 +95,9 @@ class KeyframerAdapter : public bus::Adapter {
 
   KeyframerChannels channels_;
   KeyframerParameters parameters_;
+  HealthParameters health_;
+  HealthWatch watch_;
+  bus::Node* node_ = nullptr;
   std::unique_ptr<KeyframerMethod> stage_;
   bus::Publisher<model::Keyframe> keyframes_;
 };

@@ -1,5 +1,7 @@
 #include "services/keyframer/adapter_parameters.hpp"
 
+#include "common/bus/noise_parameters.hpp"
+
 namespace understory::keyframer {
 namespace {
 
@@ -45,8 +47,10 @@ void describe_joint(JointKeyframerParameters& p, bus::ParameterTable& table) {
             "without odometry must match; below it tracking starts anew.");
   table.add("joint.min_matched", p.min_matched, {1, 1000}, "",
             "Least number of matches of a scan without odometry.");
-  table.add("joint.min_observations", p.min_observations, {1, 1000}, "scans",
-            "Least number of scans that detected a landmark of a keyframe.");
+  table.add(
+      "joint.min_observations", p.min_observations, {1, 1000}, "scans",
+      "Least number of scans that detected a landmark of a keyframe (all, where tracking began "
+      "fewer scans ago).");
 }
 
 }  // namespace
@@ -60,6 +64,7 @@ void describe(KeyframerParameters& parameters, bus::ParameterTable& table) {
             "LANDMARKS with more detections is refused and counted (too_large): what a message may "
             "cost is bounded. A laser of 2048 columns cannot show 700 trunks.");
   describe_joint(parameters.joint, table);
+  describe(parameters.joint.noise, table);
   describe_baseline(parameters.baseline, table);
 
   table.renamed("source.", "baseline.");

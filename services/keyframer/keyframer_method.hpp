@@ -15,7 +15,8 @@ namespace understory::keyframer {
 /// What became of scans and keyframes, since the first start (a saved state includes it).
 struct KeyframerCounters {
   std::uint64_t scans = 0;               ///< Received.
-  std::uint64_t scans_unmatched = 0;     ///< Not used for a keyframe.
+  std::uint64_t scans_refused = 0;       ///< Not later than the last one.
+  std::uint64_t scans_unmatched = 0;     ///< Not used for a keyframe, the refused ones included.
   std::uint64_t keyframes = 0;           ///< Given out.
   std::uint64_t keyframes_withheld = 0;  ///< Gathered, but not good enough to give out.
   std::string last_reason;               ///< Why the last scan or keyframe was not used.
@@ -23,8 +24,32 @@ struct KeyframerCounters {
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.scans, self.scans_unmatched, self.keyframes, self.keyframes_withheld, self.last_reason);
+    a(self.scans, self.scans_refused, self.scans_unmatched, self.keyframes, self.keyframes_withheld,
+      self.last_reason);
   }
+};
+
+/// How the landmarks' motion differs from that by wheels, with standard deviations.
+struct CalibrationError {
+  double yaw_rad = 0.0;  ///< The landmarks' frame against the wheels': mounting.
+  double yaw_sigma_rad = 1.0;
+  /// The sensor beside its configured place, ahead and to the left. A clock that is late by s
+  /// seconds looks like a sensor s times the speed further ahead.
+  Eigen::Vector2d place_m = Eigen::Vector2d::Zero();
+  Eigen::Vector2d place_sigma_m = Eigen::Vector2d::Ones();
+  double scale = 0.0;  ///< Share by which wheels measure a longer way.
+  double scale_sigma = 1.0;
+  /// Mean square of the difference of the turns by landmarks and by gyro, by its variance as
+  /// stated. Larger where scans are shaken as a whole, or where the gyro is worse than stated.
+  double turn_chi2 = 1.0;
+};
+
+/// What a keyframer says of its inputs.
+struct InputQuality {
+  bool is_noise_misstated = false;    ///< Covariances of LANDMARKS are replaced by what scans show.
+  CalibrationError calibration;       ///< By the last minutes.
+  CalibrationError lately;            ///< By the last ten seconds: what has just changed.
+  bool contradicts_odometry = false;  ///< The landmarks' last motion is not odometry's.
 };
 
 /// Local bundle adjustment (GeoSLAM §4.2, algorithm 2): n scans become one keyframe.
@@ -45,6 +70,9 @@ class KeyframerMethod {
   /// The error of roll and pitch as the filter estimates it: scans that come later are corrected by
   /// it. Ignored by default.
   virtual void add(const model::EkfLevel& /*level*/) {}
+
+  /// What the scans say of themselves and of odometry; nothing by default.
+  virtual InputQuality input_quality() const { return {}; }
 
   /// Counts for HEALTH.
   virtual const KeyframerCounters& counters() const = 0;

@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include "common/model/detection_noise.hpp"
+
 namespace understory::keyframer {
 
 /// The thesis's method, with the values of GeoSLAM Table 5.2. Symbols of the thesis in brackets.
@@ -28,6 +30,7 @@ struct JointKeyframerParameters {
   double min_matched_ratio = 0.5;     ///< Least share of the landmarks that a scan can match.
   int min_matched = 4;                ///< Least number of matches of a scan without odometry.
   int min_observations = 2;           ///< A landmark with fewer observations is left out.
+  model::DetectionNoiseParameters noise;
 };
 
 /// Parameters of the process: the method and the parameters of each method.

@@ -19,8 +19,11 @@ wire::Reason reason_of(InputFaultKind kind) {
       return wire::Reason::kLate;
     case InputFaultKind::kClockJump:
       return wire::Reason::kClockJump;
-    case InputFaultKind::kSilent:
+    case InputFaultKind::kPaused:
+      return wire::Reason::kRestarted;
     case InputFaultKind::kNoMotion:
+      return wire::Reason::kNoMotion;
+    case InputFaultKind::kSilent:
       return wire::Reason::kSensorSilent;
     case InputFaultKind::kFrozen:
       return wire::Reason::kSensorFrozen;
@@ -86,16 +89,23 @@ class LidarImuInputAdapter : public bus::Adapter {
         geometry::SE2(axle_T_vehicle_.x_m, axle_T_vehicle_.y_m, axle_T_vehicle_.yaw_rad);
     stage_.emplace(parameters_);
 
-    take<model::ImuSample>(channels_.raw_imu, 4000);
-    take<model::WheelSample>(channels_.raw_wheels, 2000);
-    take<model::GnssFix>(channels_.raw_gnss, 200);
-    take<model::PlanarScan>(channels_.raw_scan, 200);
-    take<model::VelocityCorrection>(channels_.velocity_correction, 200);
-    take<model::EkfPose>(channels_.ekf_pose, 200);
+    // The stage puts late ones in order.
+    const auto sensor = [](std::size_t queue_size) {
+      return bus::SubscribeOptions{.queue_size = queue_size, .takes_late = true};
+    };
+    take<model::ImuSample>(channels_.raw_imu, sensor(4000));
+    take<model::WheelSample>(channels_.raw_wheels, sensor(2000));
+    take<model::GnssFix>(channels_.raw_gnss, sensor(200));
+    take<model::PlanarScan>(channels_.raw_scan, sensor(200));
+
+    // What comes back is on the stage's time, also where the sensors' clocks have jumped.
+    const bus::SubscribeOptions feedback{.queue_size = 200, .timed = false};
+    take<model::VelocityCorrection>(channels_.velocity_correction, feedback);
+    take<model::EkfPose>(channels_.ekf_pose, feedback);
     // Bulk is no state: a sweep that arrives in part before a restart is lost.
     node.subscribe<model::PointSweep>(channels_.raw_sweep,
                                       [this](const model::PointSweep& part) { add_part(part); },
-                                      {.queue_size = 1000, .journaled = false});
+                                      {.queue_size = 1000, .takes_late = true, .journaled = false});
   }
 
   void finish() override { publish(stage_->finish()); }
@@ -104,9 +114,9 @@ class LidarImuInputAdapter : public bus::Adapter {
 
  private:
   template <class T>
-  void take(const std::string& channel, std::size_t queue_size) {
-    node_->subscribe<T>(channel, [this](const T& value) { publish(stage_->add(value)); },
-                        {.queue_size = queue_size});
+  void take(const std::string& channel, const bus::SubscribeOptions& options) {
+    node_->subscribe<T>(
+        channel, [this](const T& value) { publish(stage_->add(value)); }, options);
   }
 
   void add_part(const model::PointSweep& part) {

@@ -134,6 +134,8 @@ void describe_fault(FaultParameters& p, bus::ParameterTable& table) {
             "Stamps that go back, or lead the others, by more.");
   table.add("fault.resync_samples", p.resync_samples, {2, 1000}, "samples",
             "Stamps that go on evenly, until a clock that jumped is followed.");
+  table.add("fault.reorder_s", p.reorder_s, {0.0, 0.2}, "s",
+            "How long a sample waits for one before it that is missing.");
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "services/lidar_imu_input/stamps.hpp"
 
@@ -34,42 +35,72 @@ std::string channel_of(Sensor sensor) {
 InputGuard::InputGuard(const FaultParameters& parameters, const ImuParameters& imu)
     : parameters_(parameters), imu_(imu), states_(kSensors, State{SensorClock(parameters)}) {}
 
+/// Of the others but GNSS, with the time at which they go on after a pause.
 std::optional<model::Utime> InputGuard::newest_but(Sensor sensor) const {
-  std::optional<model::Utime> newest;
+  std::optional<model::Utime> newest = resumed_;
   for (std::size_t i = 0; i < states_.size(); ++i) {
     const auto last = states_[i].clock.last();
-    if (i != static_cast<std::size_t>(sensor) && last)
-      newest = std::max(*last, newest.value_or(*last));
+    const auto other = static_cast<Sensor>(i);
+    if (other == sensor || other == Sensor::kGnss || !last) continue;
+    newest = std::max(*last, newest.value_or(*last));
   }
   return newest;
 }
 
 std::optional<model::Utime> InputGuard::now() const {
   std::optional<model::Utime> newest;
-  for (const State& state : states_) {
-    if (const auto last = state.clock.last()) newest = std::max(*last, newest.value_or(*last));
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    if (static_cast<Sensor>(i) == Sensor::kGnss) continue;
+    if (const auto last = states_[i].clock.last()) newest = std::max(*last, newest.value_or(*last));
   }
   return newest;
+}
+
+bool InputGuard::is_believable(model::Utime utime) const {
+  const auto newest = time();
+  return !newest || seconds_between(*newest, utime) <= parameters_.clock_jump_s;
+}
+
+bool InputGuard::has_others(Sensor sensor) const {
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    const auto other = static_cast<Sensor>(i);
+    if (other != sensor && other != Sensor::kGnss && is_live(other)) return true;
+  }
+  return false;
+}
+
+/// Clocks that jumped together stay together: what one sensor's first sample misses of another's
+/// must not become a time offset between them.
+void InputGuard::share_jump(Sensor sensor, model::Utime raw, std::optional<model::Utime> before) {
+  SensorClock& clock = state(sensor).clock;
+  for (const State& other : states_) {
+    const model::Utime offset = other.clock.offset_us();
+    if (&other == &state(sensor) || offset == 0) continue;
+    if (std::abs(seconds_between(offset, clock.offset_us())) > parameters_.clock_jump_s) continue;
+    if (clock.share_offset(raw, offset, before.value_or(raw + offset - 1))) return;
+  }
 }
 
 std::optional<model::Utime> InputGuard::admit(Sensor sensor, model::Utime raw,
                                               std::vector<InputFault>& faults) {
   State& state = this->state(sensor);
-  const SensorClock::Answer answer = state.clock.take(raw, newest_but(sensor));
+  const std::optional<model::Utime> before = state.clock.last();
+  const std::optional<model::Utime> others = newest_but(sensor);
+  const SensorClock::Answer answer = state.clock.take(raw, others);
   const std::string channel = channel_of(sensor);
   switch (answer.verdict) {
     case SensorClock::Verdict::kLate:
       faults.push_back({InputFaultKind::kLate, channel, "a stamp not after the one before"});
       return std::nullopt;
     case SensorClock::Verdict::kJumped:
-      faults.push_back(
-          {InputFaultKind::kClockJump, channel,
-           fmt::format("the clock jumped by {:+.3f} s: samples are left out for now",
-                       seconds_between(*state.clock.last(), raw + state.clock.offset_us()))});
+      faults.push_back({InputFaultKind::kClockJump, channel,
+                        fmt::format("the clock is {:+.3f} s off: samples are left out for now",
+                                    seconds_between(before ? *before : *others, answer.utime))});
       return std::nullopt;
     case SensorClock::Verdict::kQuarantined:
       return std::nullopt;
     case SensorClock::Verdict::kFollowed:
+      share_jump(sensor, raw, before);
       faults.push_back({InputFaultKind::kClockJump, channel,
                         fmt::format("stamps are moved by {:+.3f} s from now on",
                                     static_cast<double>(state.clock.offset_us()) * 1e-6)});
@@ -78,7 +109,7 @@ std::optional<model::Utime> InputGuard::admit(Sensor sensor, model::Utime raw,
       break;
   }
   state.is_silent = false;
-  return answer.utime;
+  return state.clock.last();
 }
 
 bool InputGuard::is_frozen(const model::ImuSample& sample, std::vector<InputFault>& faults) {
@@ -139,7 +170,10 @@ double InputGuard::silent_s(Sensor sensor) const {
 }
 
 bool InputGuard::is_live(Sensor sensor) const {
-  return has_spoken(sensor) && seconds_between(*last(sensor), *now()) <= silent_s(sensor);
+  const auto newest = now();
+  if (!has_spoken(sensor) || !newest) return false;
+  const model::Utime heard = std::max(*last(sensor), resumed_.value_or(*last(sensor)));
+  return seconds_between(heard, *newest) <= silent_s(sensor);
 }
 
 bool InputGuard::has_motion_until(model::Utime utime, double max_wait_s) const {
@@ -155,7 +189,8 @@ bool InputGuard::has_motion_until(model::Utime utime, double max_wait_s) const {
 void InputGuard::find_silent(std::vector<InputFault>& faults) {
   for (std::size_t i = 0; i < states_.size(); ++i) {
     const auto sensor = static_cast<Sensor>(i);
-    if (states_[i].is_silent || !has_spoken(sensor) || is_live(sensor)) continue;
+    if (sensor == Sensor::kGnss || states_[i].is_silent) continue;
+    if (!has_spoken(sensor) || is_live(sensor)) continue;
     states_[i].is_silent = true;
     faults.push_back({InputFaultKind::kSilent, channel_of(sensor),
                       fmt::format("nothing for {:.2f} s", silent_s(sensor))});

@@ -30,8 +30,11 @@ class InputGuard {
   /// Reports sensors that have gone silent by `now()`.
   void find_silent(std::vector<InputFault>& faults);
 
-  /// Newest stamp of all sensors; none before the first one.
+  /// Newest stamp of all sensors but GNSS, whose receivers start with wrong dates; none before the
+  /// first one.
   std::optional<model::Utime> now() const;
+  /// All sensors were silent: they go on at `utime`, as if each had last been heard then.
+  void go_on_at(model::Utime utime) { resumed_ = utime; }
   /// Newest stamp of one sensor.
   std::optional<model::Utime> last(Sensor sensor) const { return state(sensor).clock.last(); }
   /// It has sent something, and has not gone silent.
@@ -45,16 +48,22 @@ class InputGuard {
   model::Utime on_stage_time(Sensor sensor, model::Utime raw) const {
     return raw + state(sensor).clock.offset_us();
   }
+  /// Mean time between two samples of a sensor [us]; 0 = not known yet.
+  double period_us(Sensor sensor) const { return state(sensor).clock.period_us(); }
+  /// A longer step than this [s] is a pause or a jump of the sensor's clock.
+  double longest_step_s(Sensor sensor) const { return state(sensor).clock.longest_step_s(); }
+  /// Where time is: now(), or where it goes on before anything is used. None before the start.
+  std::optional<model::Utime> time() const { return newest_but(Sensor::kGnss); }
+  /// Whether a stamp on the stage's time is not far ahead of all others.
+  bool is_believable(model::Utime utime) const;
+  /// Whether another sensor than this one and GNSS has not gone silent.
+  bool has_others(Sensor sensor) const;
 
-  /// The service was away: no sensor's silence meanwhile is a jump of its clock.
-  void resume() {
-    for (State& state : states_) state.clock.resume();
-  }
   /// For saving and loading: what changes while it runs.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     for (auto& state : self.states_) a(state.clock, state.is_silent);
-    a(self.same_since_, self.is_frozen_, self.first_points_);
+    a(self.same_since_, self.is_frozen_, self.first_points_, self.resumed_);
   }
 
  private:
@@ -66,6 +75,7 @@ class InputGuard {
   State& state(Sensor sensor) { return states_[static_cast<std::size_t>(sensor)]; }
   double silent_s(Sensor sensor) const;
   std::optional<model::Utime> newest_but(Sensor sensor) const;
+  void share_jump(Sensor sensor, model::Utime raw, std::optional<model::Utime> before);
 
   FaultParameters parameters_;
   ImuParameters imu_;
@@ -73,6 +83,7 @@ class InputGuard {
   std::optional<model::ImuSample> same_since_;   ///< First one of those that are the same.
   bool is_frozen_ = false;                       ///< The IMU: reported.
   std::vector<model::SweepPoint> first_points_;  ///< Of the latest sweep.
+  std::optional<model::Utime> resumed_;          ///< Where time went on after the latest pause.
 };
 
 }  // namespace understory::lidar_imu_input

@@ -25,6 +25,10 @@ bool is_finite(const model::VelocityCorrection& c) {
   return c.velocity_mps.allFinite() && c.bias.allFinite() && c.covariance.allFinite();
 }
 
+/// A laser's points are looked at one by one.
+bool is_finite(const model::PointSweep& /*sweep*/) { return true; }
+bool is_finite(const model::PlanarScan& /*scan*/) { return true; }
+
 InputFault not_finite(const std::string& channel) {
   return {InputFaultKind::kNotFinite, channel, "a value that is no number"};
 }
@@ -33,6 +37,24 @@ InputFault not_finite(const std::string& channel) {
 void report(std::vector<InputFault>& faults, InputResults& out) {
   for (InputFault& fault : faults) out.emplace_back(std::move(fault));
   faults.clear();
+}
+
+/// Takes out points that are no points; gives how many they were.
+std::size_t clean(model::PointSweep& sweep, const DeskewParameters& parameters,
+                  std::vector<InputFault>& faults) {
+  const std::size_t came = sweep.points.size();
+  const std::size_t bad = remove_bad_points(sweep, parameters.min_range_m);
+  if (bad > 0)
+    faults.push_back({InputFaultKind::kNotFinite, channel_of(Sensor::kSweep),
+                      fmt::format("{} of {} points are not finite", bad, came)});
+  return bad;
+}
+
+InputFault after_pause(Sensor sensor, double pause_s) {
+  return {InputFaultKind::kPaused, channel_of(sensor),
+          fmt::format("no sensor was heard for {:.2f} s: {}", pause_s,
+                      pause_s > LidarImuInput::kLongestPause_s ? "everything begins anew"
+                                                               : "time goes on")};
 }
 
 /// A sweep without times is not de-skewed, unless its azimuths give them.
@@ -50,124 +72,114 @@ InputFault without_times(model::PointSweep& sweep, const DeskewParameters& param
 
 LidarImuInput::LidarImuInput(const LidarImuInputParameters& parameters)
     : parameters_(parameters),
+      time_base_(parameters.fault),
+      order_(parameters.fault),
       guard_(parameters.fault, parameters.imu),
       motion_(parameters),
       raw_poses_(parameters.output.raw_pose_period_s) {}
 
-InputResults LidarImuInput::add(const model::ImuSample& raw) {
-  if (!is_finite(raw)) return {not_finite(channel_of(Sensor::kImu))};
+InputResults LidarImuInput::add(RawReading raw) {
+  const auto finite = [](const auto& value) { return is_finite(value); };
+  const Sensor sensor = sensor_of(raw);
+  if (!std::visit(finite, raw)) return {not_finite(channel_of(sensor))};
   InputResults out;
-  check_pause(Sensor::kImu, raw.utime, out);
+  std::vector<InputFault> faults;
 
+  // What is wrong with a sweep's points?
+  if (auto* sweep = std::get_if<model::PointSweep>(&raw)) {
+    counters_.points_dropped += clean(*sweep, parameters_.lidar, faults);
+    guard_.is_frozen(*sweep, faults);
+    if (!sweep->has_times) faults.push_back(without_times(*sweep, parameters_.lidar));
+  }
+
+  // Is its stamp to be believed?
+  BelievedReadings believed = time_base_.take(std::move(raw), guard_, faults);
+  report(faults, out);
+  if (believed.pause_s) out.emplace_back(after_pause(sensor, *believed.pause_s));
+  if (believed.pause_s > kLongestPause_s) {
+    const InputCounters counters = counters_;
+    *this = LidarImuInput(parameters_);
+    counters_ = counters;
+  }
+
+  // Use what nothing before it is missing of.
+  for (RawReading& reading : believed.readings) {
+    if (auto fault = order_.add(std::move(reading), guard_)) out.emplace_back(*std::move(fault));
+    while (auto next = order_.next(guard_, false)) {
+      std::visit([&](auto&& value) { use(std::move(value), out); }, *std::move(next));
+      settle(out, false);
+    }
+  }
+  return out;
+}
+
+void LidarImuInput::use(const model::ImuSample& raw, InputResults& out) {
   // What is wrong with it?
   std::vector<InputFault> faults;
   const bool frozen = guard_.is_frozen(raw, faults);
   const bool saturated = guard_.is_saturated(raw, faults);
   const auto utime = frozen ? std::nullopt : guard_.admit(Sensor::kImu, raw.utime, faults);
   report(faults, out);
+  if (!utime) return;
 
-  if (utime && saturated) {
+  if (saturated) {
     // It is a bound, no measurement. Over a bump the samples beside it are joined, with more noise;
     // where it lasts longer the wheels go on alone, as without an IMU.
     ++counters_.samples_saturated;
     was_saturated_ = true;
-  } else if (utime) {
-    model::ImuSample sample = raw;
-    sample.utime = *utime;
-    sample = motion_.to_vehicle(sample);
-    motion_.add_imu(sample, std::exchange(was_saturated_, false));
-    out.emplace_back(sample);
-    if (auto pose = raw_poses_.take(motion_.raw_pose(), false)) out.emplace_back(*pose);
-    if (auto fault = calibration_.check(motion_, guard_.is_live(Sensor::kImu)))
-      out.emplace_back(*std::move(fault));
+    return;
   }
 
-  settle(out, false);
-  return out;
+  model::ImuSample sample = raw;
+  sample.utime = *utime;
+  sample = motion_.to_vehicle(sample);
+  motion_.add_imu(sample, std::exchange(was_saturated_, false));
+  out.emplace_back(sample);
+  if (auto pose = raw_poses_.take(motion_.raw_pose(), false)) out.emplace_back(*pose);
+  if (auto fault = calibration_.check(motion_, guard_.is_live(Sensor::kImu)))
+    out.emplace_back(*std::move(fault));
 }
 
-InputResults LidarImuInput::add(const model::WheelSample& raw) {
-  if (!is_finite(raw)) return {not_finite(channel_of(Sensor::kWheels))};
-  InputResults out;
-  check_pause(Sensor::kWheels, raw.utime, out);
-
+void LidarImuInput::use(const model::WheelSample& raw, InputResults& out) {
   std::vector<InputFault> faults;
   const auto utime = guard_.admit(Sensor::kWheels, raw.utime, faults);
   report(faults, out);
-  if (utime) {
-    model::WheelSample sample = raw;
-    sample.utime = *utime;
-    motion_.add_wheels(sample);
-    out.emplace_back(sample);
-  }
-
-  settle(out, false);
-  return out;
+  if (!utime) return;
+  model::WheelSample sample = raw;
+  sample.utime = *utime;
+  motion_.add_wheels(sample);
+  out.emplace_back(sample);
 }
 
-InputResults LidarImuInput::add(const model::GnssFix& raw) {
-  if (!is_finite(raw)) return {not_finite(channel_of(Sensor::kGnss))};
-  InputResults out;
-  check_pause(Sensor::kGnss, raw.utime, out);
-
+void LidarImuInput::use(const model::GnssFix& raw, InputResults& out) {
   std::vector<InputFault> faults;
   const auto utime = guard_.admit(Sensor::kGnss, raw.utime, faults);
   report(faults, out);
-  if (utime) {
-    model::GnssFix fix = raw;
-    fix.utime = *utime;
-    motion_.add_gnss(fix);
-    out.emplace_back(fix);
-  }
-
-  settle(out, false);
-  return out;
+  if (!utime) return;
+  model::GnssFix fix = raw;
+  fix.utime = *utime;
+  motion_.add_gnss(fix);
+  out.emplace_back(fix);
 }
 
-InputResults LidarImuInput::add(model::PointSweep sweep) {
-  InputResults out;
+void LidarImuInput::use(model::PointSweep sweep, InputResults& out) {
   std::vector<InputFault> faults;
-
-  // What is wrong with its points?
-  const std::size_t came = sweep.points.size();
-  const std::size_t bad = remove_bad_points(sweep, parameters_.lidar.min_range_m);
-  counters_.points_dropped += bad;
-  if (bad > 0)
-    faults.push_back({InputFaultKind::kNotFinite, channel_of(Sensor::kSweep),
-                      fmt::format("{} of {} points are not finite", bad, came)});
-  guard_.is_frozen(sweep, faults);
-  if (!sweep.has_times) faults.push_back(without_times(sweep, parameters_.lidar));
-  report(faults, out);
-
-  // And with its stamp?
-  check_pause(Sensor::kSweep, sweep.utime, out);
   const auto utime = guard_.admit(Sensor::kSweep, sweep.utime, faults);
   report(faults, out);
-
-  if (utime) {
-    sweep.utime = *utime;
-    const model::Utime end = end_of_revolution(sweep);
-    wait({end, std::move(sweep)}, out);
-  }
-  settle(out, false);
-  return out;
+  if (!utime) return;
+  sweep.utime = *utime;
+  const model::Utime end = end_of_revolution(sweep);
+  wait({end, std::move(sweep)}, out);
 }
 
-InputResults LidarImuInput::add(const model::PlanarScan& raw) {
-  InputResults out;
-  check_pause(Sensor::kScan, raw.utime, out);
-
+void LidarImuInput::use(const model::PlanarScan& raw, InputResults& out) {
   std::vector<InputFault> faults;
   const auto utime = guard_.admit(Sensor::kScan, raw.utime, faults);
   report(faults, out);
-  if (utime) {
-    model::PlanarScan scan = raw;
-    scan.utime = *utime;
-    wait({*utime, std::move(scan)}, out);
-  }
-
-  settle(out, false);
-  return out;
+  if (!utime) return;
+  model::PlanarScan scan = raw;
+  scan.utime = *utime;
+  wait({*utime, std::move(scan)}, out);
 }
 
 InputResults LidarImuInput::add(const model::VelocityCorrection& correction) {
@@ -185,6 +197,11 @@ InputResults LidarImuInput::add(const model::EkfPose& pose) {
 
 InputResults LidarImuInput::finish() {
   InputResults out;
+  for (RawReading& reading : time_base_.finish()) order_.add(std::move(reading), guard_);
+  while (auto next = order_.next(guard_, true)) {
+    std::visit([&](auto&& value) { use(std::move(value), out); }, *std::move(next));
+    settle(out, false);
+  }
   settle(out, true);
   return out;
 }

@@ -3,7 +3,8 @@
 // An increment of ODOMETRY ends exactly at the stamp of each published sweep or scan and is
 // published before it; in between, increments end at most `max_increment_s` apart. So a sweep waits
 // until the IMU and the wheels have reached its end, but no longer than `max_wait_s` of the
-// sensors' own time.
+// sensors' own time. Before any of this readings are put in the order of their stamps, and those
+// are held back whose stamps nothing supports (`ArrivalOrder`, `TimeBase`).
 #pragma once
 
 #include <optional>
@@ -18,11 +19,14 @@
 #include "common/model/planar_scan.hpp"
 #include "common/model/point_sweep.hpp"
 #include "common/model/wheels.hpp"
+#include "services/lidar_imu_input/arrival_order.hpp"
 #include "services/lidar_imu_input/filter_motion.hpp"
 #include "services/lidar_imu_input/input_guard.hpp"
 #include "services/lidar_imu_input/motion_estimator.hpp"
 #include "services/lidar_imu_input/output_pacing.hpp"
+#include "services/lidar_imu_input/raw_reading.hpp"
 #include "services/lidar_imu_input/sweep_queue.hpp"
+#include "services/lidar_imu_input/time_base.hpp"
 
 namespace understory::lidar_imu_input {
 
@@ -62,11 +66,8 @@ class LidarImuInput {
   /// Starts without any motion known. Precondition: parameters within the ranges of describe().
   explicit LidarImuInput(const LidarImuInputParameters& parameters = {});
 
-  InputResults add(const model::ImuSample& raw);    ///< RAW_IMU, frame sensor.
-  InputResults add(const model::WheelSample& raw);  ///< RAW_WHEELS.
-  InputResults add(const model::GnssFix& raw);      ///< RAW_GNSS.
-  InputResults add(model::PointSweep sweep);       ///< RAW_SWEEP, a whole revolution, frame sensor.
-  InputResults add(const model::PlanarScan& raw);  ///< RAW_SCAN.
+  /// A reading of a sensor, frame sensor; of a laser that scans in space a whole revolution.
+  InputResults add(RawReading raw);
   InputResults add(const model::VelocityCorrection& correction);  ///< VELOCITY_CORRECTION.
   /// EKF_POSE: where no sensor measures the motion, sweeps are de-skewed by the filter's.
   InputResults add(const model::EkfPose& pose);
@@ -75,33 +76,39 @@ class LidarImuInput {
 
   /// The state as bytes: everything but the points of sweeps that wait.
   std::string save() const;
-  /// Goes on from a saved state. Afterwards sensors may have been silent for as long as the service
-  /// was away; after more than `kLongestPause_s` the stage starts anew. Throws
-  /// std::invalid_argument for what save() did not give, and stays as it was.
+  /// Goes on from a saved state. Throws std::invalid_argument for what save() did not give, and
+  /// stays as it was.
   void load(const std::string& state);
-  /// After a longer pause the vehicle may be anywhere, and its sensors at any temperature.
+  /// After a longer pause of all sensors, or of the service, the vehicle may be anywhere, and its
+  /// sensors at any temperature: the stage starts anew.
   static constexpr double kLongestPause_s = 600.0;
 
   const InputCounters& counters() const { return counters_; }  ///< Since the first start.
   /// Attitude, dead reckoning, calibration.
   const MotionEstimator& motion() const { return motion_; }
 
-  /// For saving and loading: what changes while it runs. `resumed_from_` is set by load().
+  /// For saving and loading: what changes while it runs.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.guard_, self.motion_, self.filter_motion_, self.counters_, self.queue_,
-      self.increment_end_, self.raw_poses_, self.calibration_, self.was_saturated_);
+    a(self.time_base_, self.order_, self.guard_, self.motion_, self.filter_motion_, self.counters_,
+      self.queue_, self.increment_end_, self.raw_poses_, self.calibration_, self.was_saturated_);
   }
 
  private:
+  void use(const model::ImuSample& raw, InputResults& out);
+  void use(const model::WheelSample& raw, InputResults& out);
+  void use(const model::GnssFix& raw, InputResults& out);
+  void use(model::PointSweep sweep, InputResults& out);
+  void use(const model::PlanarScan& raw, InputResults& out);
   void wait(WaitingSweep waiting, InputResults& out);
   void settle(InputResults& out, bool everything);
   void end_increment(model::Utime utime, InputResults& out);
   void release(WaitingSweep waiting, InputResults& out);
   void release_sweep(model::PointSweep raw, model::Utime stamp, InputResults& out);
-  void check_pause(Sensor sensor, model::Utime raw, InputResults& out);
 
   LidarImuInputParameters parameters_;
+  TimeBase time_base_;
+  ArrivalOrder order_;
   InputGuard guard_;
   MotionEstimator motion_;
   FilterMotion filter_motion_;
@@ -110,8 +117,7 @@ class LidarImuInput {
   std::optional<model::Utime> increment_end_;  ///< Of the latest odometry.
   RawPosePacer raw_poses_;
   CalibrationWatch calibration_;
-  std::optional<model::Utime> resumed_from_;  ///< After loading, until a sensor sends something.
-  bool was_saturated_ = false;                ///< The latest sample of the IMU; it was left out.
+  bool was_saturated_ = false;  ///< The latest sample of the IMU; it was left out.
 };
 
 }  // namespace understory::lidar_imu_input

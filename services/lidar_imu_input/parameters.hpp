@@ -97,6 +97,7 @@ struct FaultParameters {
   double frozen_s = 0.5;        ///< The same IMU sample for so long.
   double clock_jump_s = 0.5;    ///< Stamps that go back, or lead the others, by more.
   int resync_samples = 5;       ///< So many stamps that go on evenly: the clock is followed.
+  double reorder_s = 0.025;     ///< How long a sample waits for one before it that is missing.
 };
 
 /// All parameters of the stage.

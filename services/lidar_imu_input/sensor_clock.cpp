@@ -9,13 +9,19 @@ namespace understory::lidar_imu_input {
 namespace {
 
 constexpr model::Utime kSmallOffset_us = 20'000;  // not to be distinguished from jitter
+/// A sensor's first stamp may be so far behind the others'.
+constexpr double kLargestLag_s = 10.0;
 
 }  // namespace
 
 bool SensorClock::is_plausible(model::Utime utime, std::optional<model::Utime> others) const {
+  if (!last_) {
+    const double ahead = others ? seconds_between(*others, utime) : 0.0;
+    return ahead >= -kLargestLag_s && ahead <= parameters_.clock_jump_s;
+  }
   const double step = seconds_between(*last_, utime);
   if (step < -parameters_.clock_jump_s) return false;
-  if (step <= parameters_.clock_jump_s || !others) return true;
+  if (step <= longest_step_s() || !others) return true;
   // A long pause is silence where the others' time has gone on as well, else a jump.
   return seconds_between(*others, utime) <= parameters_.clock_jump_s;
 }
@@ -23,15 +29,15 @@ bool SensorClock::is_plausible(model::Utime utime, std::optional<model::Utime> o
 SensorClock::Answer SensorClock::take(model::Utime raw, std::optional<model::Utime> others) {
   const model::Utime utime = raw + offset_;
   // Once in quarantine, only a stamp that goes on behind the last good one ends it early.
-  const bool suspected = first_candidate_ && utime <= last_.value_or(utime);
-  const bool resumes = is_resumed_ && last_ && utime > *last_;
-  if (resumes) is_resumed_ = false;
-  if (last_ && !resumes && (suspected || !is_plausible(utime, others))) return quarantine(raw);
+  const bool suspected = first_candidate_ && last_ && utime <= *last_;
+  if (suspected || !is_plausible(utime, others)) return quarantine(raw, others);
   first_candidate_.reset();
   if (last_ && utime <= *last_) return {Verdict::kLate, utime};
 
-  // A pause of the service says nothing of the sensor's period.
-  if (last_ && !(resumes && seconds_between(*last_, utime) > parameters_.clock_jump_s)) {
+  // A pause says nothing of the sensor's period.
+  const bool is_pause =
+      last_ && period_us_ > 0.0 && seconds_between(*last_, utime) > longest_step_s();
+  if (last_ && !is_pause) {
     const auto step = static_cast<double>(utime - *last_);
     period_us_ = period_us_ == 0.0 ? step : period_us_ + 0.1 * (step - period_us_);
   }
@@ -39,15 +45,14 @@ SensorClock::Answer SensorClock::take(model::Utime raw, std::optional<model::Uti
   return {Verdict::kFine, utime};
 }
 
-SensorClock::Answer SensorClock::quarantine(model::Utime raw) {
+SensorClock::Answer SensorClock::quarantine(model::Utime raw, std::optional<model::Utime> others) {
   const bool agrees =
-      first_candidate_ && raw > candidate_ &&
-      seconds_between(candidate_, raw) <= parameters_.clock_jump_s + 3e-6 * period_us_;
+      first_candidate_ && raw > candidate_ && seconds_between(candidate_, raw) <= longest_step_s();
   if (!agrees) {
     first_candidate_ = raw;
     candidate_ = raw;
     agreeing_ = 1;
-    return {Verdict::kJumped, 0};
+    return {Verdict::kJumped, raw + offset_};
   }
 
   candidate_ = raw;
@@ -55,12 +60,23 @@ SensorClock::Answer SensorClock::quarantine(model::Utime raw) {
   const bool long_enough = agreeing_ >= 2 && seconds_between(*first_candidate_, raw) >= 1.0;
   if (agreeing_ < parameters_.resync_samples && !long_enough) return {Verdict::kQuarantined, 0};
 
-  // From now on the stamps are moved so that they continue the good ones.
-  offset_ = *last_ + static_cast<model::Utime>(std::llround(period_us_)) - *first_candidate_;
-  if (std::abs(offset_) < kSmallOffset_us && raw > *last_) offset_ = 0;
+  // From now on the stamps are moved so that they continue the good ones, or those of the others.
+  if (last_) {
+    offset_ = *last_ + static_cast<model::Utime>(std::llround(period_us_)) - *first_candidate_;
+    if (std::abs(offset_) < kSmallOffset_us && raw > *last_) offset_ = 0;
+  } else {
+    offset_ = others.value_or(raw) - raw;
+  }
   first_candidate_.reset();
   last_ = raw + offset_;
   return {Verdict::kFollowed, *last_};
+}
+
+bool SensorClock::share_offset(model::Utime raw, model::Utime offset_us, model::Utime before) {
+  if (raw + offset_us <= before) return false;
+  offset_ = offset_us;
+  last_ = raw + offset_us;
+  return true;
 }
 
 }  // namespace understory::lidar_imu_input

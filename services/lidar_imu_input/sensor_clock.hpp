@@ -9,8 +9,9 @@
 
 namespace understory::lidar_imu_input {
 
-/// One sensor's clock. A jump (back, or ahead of all others) is not believed until some samples
-/// agree with each other; from then on their stamps are moved so that time goes on.
+/// One sensor's clock. A jump (back, or ahead of all others), or a first stamp far from all others,
+/// is not believed until some samples agree with each other; from then on their stamps are moved so
+/// that time goes on.
 class SensorClock {
  public:
   /// What was found about one stamp.
@@ -30,14 +31,20 @@ class SensorClock {
   /// What counts as a jump, and when it is followed.
   explicit SensorClock(const FaultParameters& parameters) : parameters_(parameters) {}
 
-  /// Judges a stamp. `others`: the newest stamp of the other sensors, if there is any.
+  /// Judges a stamp. `others`: the newest stamp of the other sensors, if there is any, or the time
+  /// at which all go on after a pause.
   Answer take(model::Utime raw, std::optional<model::Utime> others);
+  /// The clock was found to have jumped with another one: the stamp `raw` that was followed is
+  /// moved by as much as that. False where time would not go on.
+  bool share_offset(model::Utime raw, model::Utime offset_us, model::Utime before);
   /// Newest stamp on the stage's time; none before the first one.
   std::optional<model::Utime> last() const { return last_; }
   /// What is added to the sensor's stamps since its clock jumped.
   model::Utime offset_us() const { return offset_; }
-  /// The service was away: the next stamp may be far ahead of the last one.
-  void resume() { is_resumed_ = true; }
+  /// Mean time between two samples [us]; 0 = not known yet.
+  double period_us() const { return period_us_; }
+  /// A longer step than this [s] is a pause or a jump.
+  double longest_step_s() const { return parameters_.clock_jump_s + 3e-6 * period_us_; }
 
   /// For saving and loading: what changes while it runs.
   template <class Archive, class Self>
@@ -47,7 +54,7 @@ class SensorClock {
   }
 
  private:
-  Answer quarantine(model::Utime raw);
+  Answer quarantine(model::Utime raw, std::optional<model::Utime> others);
   bool is_plausible(model::Utime utime, std::optional<model::Utime> others) const;
 
   FaultParameters parameters_;
@@ -57,7 +64,6 @@ class SensorClock {
   std::optional<model::Utime> first_candidate_;  ///< First stamp in quarantine.
   model::Utime candidate_ = 0;                   ///< Latest stamp in quarantine.
   int agreeing_ = 0;                             ///< Stamps in quarantine that go on evenly.
-  bool is_resumed_ = false;                      ///< Not saved: load() sets it by resume().
 };
 
 }  // namespace understory::lidar_imu_input

@@ -154,5 +154,23 @@ TEST_CASE("Too few associations give no pose") {
   CHECK_FALSE(geoslam_mapper::baseline::estimate_pose(local, map, matches, {}, samples));
 }
 
+TEST_CASE("As many associations as a sample has give a pose") {
+  std::mt19937_64 random(4);
+  const geometry::SE2 map_T_base(30.0, 30.0, 0.4);
+  const auto map = test::random_cloud(50, 60.0, random);
+  std::vector<Eigen::Vector2d> local;
+  for (std::size_t i = 0; i < 12; ++i) local.push_back(map_T_base.inverse() * map[i]);
+  const geoslam_mapper::BaselineMapperParameters parameters;
+  std::vector<hierarchy::baseline::PointMatch> matches;
+  for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(parameters.pose_sample_size); ++i) {
+    matches.push_back({i, i});
+  }
+  std::mt19937 samples(10);
+  const auto estimate =
+      geoslam_mapper::baseline::estimate_pose(local, map, matches, parameters, samples);
+  REQUIRE(estimate);
+  CHECK((map_T_base.inverse() * estimate->map_T_base.pose()).Log().norm() < 1e-6);
+}
+
 }  // namespace
 }  // namespace understory::test

@@ -65,6 +65,31 @@ TEST_CASE("a sender that counts from the start again is no late comer") {
   CHECK(tracker.counts().lost == 0);
 }
 
+TEST_CASE("what was sent before the first message that came is late, and no loss") {
+  SequenceTracker tracker;
+  tracker.take(3, 103);
+  CHECK(tracker.take(1, 101) == Arrival::kLate);
+  CHECK(tracker.take(1, 101) == Arrival::kDuplicate);
+  CHECK(tracker.take(5, 105) == Arrival::kAfterGap);
+  CHECK(tracker.counts().lost == 1);
+  CHECK(tracker.take(2, 102) == Arrival::kLate);
+  CHECK(tracker.counts().lost == 1);
+  CHECK(tracker.take(4, 104) == Arrival::kLate);
+  CHECK(tracker.counts().lost == 0);
+}
+
+TEST_CASE("a step of up to a million is a loss, a larger one another sequence") {
+  for (const std::int64_t step : {2, 1'000, 1'001, 999'999, 1'000'000, 1'000'001, 3'999'999}) {
+    CAPTURE(step);
+    const bool is_loss = step <= 1'000'000;
+    SequenceTracker tracker;
+    tracker.take(7, 100);
+    CHECK(tracker.take(7 + step, 101) == (is_loss ? Arrival::kAfterGap : Arrival::kFirst));
+    CHECK(tracker.counts().lost == (is_loss ? static_cast<std::uint64_t>(step - 1) : 0));
+    CHECK(tracker.counts().restarts == (is_loss ? 0 : 1));
+  }
+}
+
 TEST_CASE("a hostile sequence number does not poison what follows") {
   SequenceTracker tracker;
   tracker.take(5, 100);
@@ -99,15 +124,17 @@ TEST_CASE("percentiles agree with sorting, within a sixteenth") {
 }
 
 TEST_CASE("one wrong stamp is not believed, three that agree are") {
+  using Verdict = MessageClock::Verdict;
   MessageClock clock(10000000);
   const std::int64_t start = 1000000000;
-  CHECK(clock.take(start) == MessageClock::Verdict::kFine);
-  CHECK(clock.take(start * 100) == MessageClock::Verdict::kQuarantined);
-  CHECK(clock.take(start + 100) == MessageClock::Verdict::kFine);
+  CHECK(clock.take(start) == Verdict::kFine);
+  CHECK(clock.take(start * 100) == Verdict::kQuarantined);
+  CHECK(clock.take(start + 100) == Verdict::kFine);
+  CHECK_FALSE(clock.is_waiting());
   CHECK(clock.now() == start + 100);
-  CHECK(clock.take(5) == MessageClock::Verdict::kQuarantined);
-  CHECK(clock.take(6) == MessageClock::Verdict::kQuarantined);
-  CHECK(clock.take(7) == MessageClock::Verdict::kJumped);
+  CHECK(clock.take(5) == Verdict::kQuarantined);
+  CHECK(clock.take(6) == Verdict::kAgrees);
+  CHECK(clock.take(7) == Verdict::kJumped);
   CHECK(clock.now() == 7);
 }
 
@@ -123,14 +150,39 @@ TEST_CASE("a stamp is believed up to the largest jump, and far stamps only where
   CHECK(clock.take(kStart + kJump_us) == Verdict::kFine);
   CHECK(clock.take(kStart + 2 * kJump_us + 1) == Verdict::kQuarantined);
 
-  // Each is farther from the one before than a jump: none proves another.
-  for (int i = 0; i < 10; ++i) {
-    CHECK(clock.take(10 * kStart + i * (kJump_us + 1)) == Verdict::kQuarantined);
-  }
-  // These are just near enough.
+  // Far below and far beyond what the pause before it would explain: none proves another.
+  CHECK(clock.take(10 * kStart) == Verdict::kQuarantined);
+  CHECK(clock.take(9 * kStart) == Verdict::kQuarantined);
+  CHECK(clock.take(9'000 * kStart) == Verdict::kQuarantined);
+  // Time that goes on after a pause.
   CHECK(clock.take(20 * kStart) == Verdict::kQuarantined);
-  CHECK(clock.take(20 * kStart + kJump_us) == Verdict::kQuarantined);
-  CHECK(clock.take(20 * kStart + 2 * kJump_us) == Verdict::kJumped);
+  CHECK(clock.take(25 * kStart) == Verdict::kAgrees);
+  CHECK(clock.take(30 * kStart) == Verdict::kJumped);
+}
+
+TEST_CASE("a slow channel and one that is behind need no proof") {
+  using Verdict = MessageClock::Verdict;
+  constexpr std::int64_t kSecond_us = 1'000'000;
+  MessageClock clock(10 * kSecond_us);
+  ChannelPace slow{-1, 0};
+  clock.take(1000 * kSecond_us, slow);
+  slow = {1000 * kSecond_us, 32 * kSecond_us};
+  CHECK(clock.take(1090 * kSecond_us, slow) == Verdict::kFine);
+  CHECK(clock.take(1190 * kSecond_us, slow) == Verdict::kQuarantined);
+
+  // Behind, in order, and not believed to be the time; out of order it needs proof.
+  CHECK(clock.take(1060 * kSecond_us, {-1, 0}) == Verdict::kFine);
+  CHECK(clock.take(1062 * kSecond_us, {1060 * kSecond_us, 0}) == Verdict::kFine);
+  CHECK(clock.now() == 1090 * kSecond_us);
+  CHECK(clock.take(1061 * kSecond_us, {1062 * kSecond_us, 0}) == Verdict::kQuarantined);
+
+  // Where all are behind the time was wrong.
+  Verdict verdict = Verdict::kFine;
+  for (int i = 0; i < 100 && verdict == Verdict::kFine; ++i) {
+    verdict = clock.take((1063 + i / 10) * kSecond_us, {1062 * kSecond_us, 0});
+  }
+  CHECK(verdict == Verdict::kJumped);
+  CHECK(clock.now() < 1070 * kSecond_us);
 }
 
 TEST_CASE("health follows from fresh reasons and recovers") {

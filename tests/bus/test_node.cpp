@@ -202,3 +202,34 @@ TEST_CASE("a suffix renames outputs, and inputs where asked") {
   CHECK(hosted.node().takes("ODOMETRY_ALT"));
   CHECK_FALSE(hosted.node().takes("ODOMETRY"));
 }
+
+TEST_CASE("what comes after a pause of any length is taken, whole and in order") {
+  for (const model::Utime pause_us : {11'000'000LL, 60'000'000LL, 7'200'000'000LL}) {
+    Bench paused;
+    Bench straight;
+    for (int i = 0; i < 40; ++i) {
+      model::Odometry motion = test::toy_input(i);
+      straight.send(motion);
+      const model::Utime passed_us = i / 10 * pause_us;  // After each tenth message.
+      motion.from_utime += passed_us;
+      motion.utime += passed_us;
+      paused.send(motion);
+    }
+    CHECK(paused.count(wire::Reason::kClockJump) == 0);
+    REQUIRE(paused.poses.size() == straight.poses.size());
+    CHECK(paused.poses.back().odom_T_vehicle.x == straight.poses.back().odom_T_vehicle.x);
+  }
+}
+
+TEST_CASE("a channel with a message a minute is taken whole, a wrong stamp in it is not") {
+  Bench bench;
+  for (int i = 0; i < 30; ++i) {
+    model::Odometry motion = test::toy_input(i);
+    const model::Utime wrong_us = i == 20 ? 1'000'000'000'000'000 : 0;
+    motion.from_utime = 60'000'000LL * i + 1 + wrong_us;
+    motion.utime = motion.from_utime + 100'000;
+    bench.send(motion);
+  }
+  CHECK(bench.count(wire::Reason::kClockJump) == 1);
+  CHECK(bench.poses.size() == 29);
+}

@@ -136,6 +136,7 @@ TEST_CASE("the node's state survives its bytes, and another version is refused")
   NodeState state;
   state.now_us = 42;
   state.inputs["A"] = {7, 41};
+  state.paces["A"] = {41, 100};
   state.outputs["B"] = 9;
   state.timers_due_us = {-1, 50};
   state.stage = std::string("with a zero \0 inside", 20);
@@ -145,11 +146,12 @@ TEST_CASE("the node's state survives its bytes, and another version is refused")
   state::load(bytes, NodeState::kFormat, loaded);
   CHECK(loaded.now_us == 42);
   CHECK(loaded.inputs == state.inputs);
+  CHECK(loaded.paces == state.paces);
   CHECK(loaded.outputs == state.outputs);
   CHECK(loaded.timers_due_us == state.timers_due_us);
   CHECK(loaded.stage == state.stage);
 
-  CHECK_THROWS_AS(state::load(bytes, state::Format{"node", 3}, loaded), std::invalid_argument);
+  CHECK_THROWS_AS(state::load(bytes, state::Format{"node", 4}, loaded), std::invalid_argument);
   CHECK_THROWS_AS(state::load(bytes.substr(0, bytes.size() - 1), NodeState::kFormat, loaded),
                   std::invalid_argument);
 }

@@ -42,7 +42,8 @@ TEST_CASE("one lost message is counted, and one lost event", "[cli]") {
 TEST_CASE("clocks that go back, jumps and restarts are counted", "[cli]") {
   const LogStatistics statistics = statistics_of(
       {scan_event(0, 5'000'000, 4), scan_event(1, 4'000'000, 5), scan_event(2, 14'000'000, 6),
-       scan_event(3, 24'000'001, 0), scan_event(4, 24'000'000, 1), scan_event(5, 25'000'000, 2)});
+       scan_event(3, 24'000'001, 0), scan_event(4, 24'000'000, 1), scan_event(5, 25'000'000, 2),
+       scan_event(6, 25'000'000, 3), scan_event(7, 26'000'000, 4)});
   CHECK(statistics.clock_back() == 2);
   CHECK(statistics.clock_forward() == 1);
   CHECK(statistics.longest_silence_s() == Approx(10.000001));

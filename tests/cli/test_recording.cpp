@@ -7,6 +7,7 @@
 #include "tests/cli/recorded_drive.hpp"
 #include "tests/cli/run_command.hpp"
 #include "tests/data.hpp"
+#include "understory/ground_truth_t.hpp"
 
 using namespace understory;
 using namespace understory::test;
@@ -29,7 +30,9 @@ struct Fixture {
   }
   wire::Bytes replayed(const std::string& name) {
     const auto outcome =
-        run("replay " + log + " --config " UNDERSTORY_SOURCE_CONFIG "/victoria_park --out " +
+        run("replay " + log +
+            " --config " UNDERSTORY_SOURCE_CONFIG
+            "/victoria_park --stages landmark_extractor,keyframer,geoslam_mapper --out " +
             (directory / name).string());
     CAPTURE(outcome.error);
     REQUIRE(outcome.status == 0);
@@ -200,6 +203,65 @@ TEST_CASE_METHOD(Fixture, "the Victoria Park set is imported as it is downloaded
   CHECK(events.size() == 7230 + 7228 + 61'763 + 948);
   check_holds(events, io::read_victoria_park(archive));
   check_order(events);
+}
+
+TEST_CASE_METHOD(Fixture, "what no stage takes is an error, not an empty map", "[cli][recording]") {
+  const test::RecordedDrive drive;
+  import(drive.path());
+  // lidar_imu_input makes ODOMETRY and LIDAR_SCAN itself, of what this log does not have.
+  const auto outcome =
+      run("replay " + log + " --config " UNDERSTORY_SOURCE_CONFIG "/victoria_park --out " +
+          (directory / "out.lcm").string());
+  CHECK(outcome.status == 1);
+  CHECK(test::lines(outcome.error) == 1);
+  CHECK_THAT(outcome.error, Contains("no event of it is an input of the stages") &&
+                                Contains("LIDAR_SCAN") && Contains("left out"));
+  CHECK_FALSE(fs::exists(directory / "out.lcm"));
+}
+
+TEST_CASE_METHOD(Fixture, "raw readings of the recorded car become a map", "[cli][recording]") {
+  const test::RecordedDrive drive;
+  REQUIRE(run("import victoria-park " + drive.path() + " --raw --out " + log).status == 0);
+  const auto outcome =
+      run("replay " + log + " --config " UNDERSTORY_SOURCE_CONFIG "/victoria_park --out " +
+          (directory / "out.lcm").string());
+  CAPTURE(outcome.error);
+  REQUIRE(outcome.status == 0);
+  CHECK_THAT(outcome.out, Contains("6 stages"));
+  const auto maps = messages<model::WholeMap>(events_of(directory / "out.lcm"), "MAP");
+  REQUIRE_FALSE(maps.empty());
+  CHECK(maps.back().landmarks.size() > 50);
+  for (const auto& one : maps.back().landmarks) CHECK(drive.to_trunk_m(one.position_m) < 0.3);
+}
+
+TEST_CASE_METHOD(Fixture, "poses of a laser become poses of the vehicle", "[cli][recording]") {
+  // Two sweeps of no points; the laser turns about itself, so the vehicle moves.
+  std::ofstream(directory / "sweeps.bin", std::ios::binary)
+      << std::string("\0\0\0\0\0\0\0\0\1\0\0\0\0\0\0\0", 16);
+  std::ofstream(directory / "poses_icp.csv") << "frame,t_s,x_m,y_m,z_m,qx,qy,qz,qw\n"
+                                                "0,0.0,0,0,0,0,0,0,1\n"
+                                                "1,0.1,0,0,0,0,0,1,0\n";
+  const auto places = [&](const std::string& options) {
+    const auto outcome =
+        run("import kitti-reduced " + directory.path().string() + options + " --out " + log);
+    CAPTURE(outcome.error);
+    REQUIRE(outcome.status == 0);
+    std::vector<Eigen::Vector2d> result;
+    for (const io::LogEvent& event : events_of(log)) {
+      if (event.channel != "GROUND_TRUTH") continue;
+      const auto pose = wire::decode_message<ground_truth_t>(event.data)->world_T_vehicle;
+      result.emplace_back(pose.x, pose.y);
+    }
+    REQUIRE(result.size() == 2);
+    return result;
+  };
+
+  const auto of_kitti = places("");
+  CHECK((of_kitti[0] - Eigen::Vector2d(-0.8105, 0.3072)).norm() < 2e-3);
+  CHECK((of_kitti[1] - Eigen::Vector2d(0.8105, -0.3072)).norm() < 2e-3);
+  const auto of_options = places(" --laser 2,0.5,0");
+  CHECK((of_options[0] - Eigen::Vector2d(-2.0, -0.5)).norm() < 1e-9);
+  CHECK((of_options[1] - Eigen::Vector2d(2.0, 0.5)).norm() < 1e-9);
 }
 
 TEST_CASE_METHOD(Fixture, "a KITTI drive is imported, and where its laser sits is told",

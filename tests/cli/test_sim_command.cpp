@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <map>
 
 #include "common/wire/convert.hpp"
@@ -86,4 +88,31 @@ TEST_CASE("sim names an unknown value", "[cli]") {
   CHECK(renamed.status == 2);
   CHECK_THAT(renamed.error, Contains("--way is now called --distance"));
   CHECK_FALSE(std::filesystem::exists(directory / "never.lcm"));
+}
+
+TEST_CASE("sim takes every number within its limits and none beyond", "[cli]") {
+  struct Limits {
+    std::string option;
+    double least, most;
+  };
+  const std::vector<Limits> all{
+      {"--length", 1.0, 1e6},       {"--interval", 1e-3, 100.0}, {"--speed", 1e-3, 100.0},
+      {"--sensor-range", 1.0, 1e3}, {"--detection", 0.0, 1.0},   {"--noise", 0.0, 10.0},
+      {"--distance", 20.0, 2e5},    {"--laps", 1, 1000},         {"--cruise", 0.5, 30.0},
+      {"--standstill", 0.0, 3600},  {"--gnss-until", 0.0, 1e6},  {"--rate", 1e-3, 1e3}};
+  const test::TemporaryDirectory directory;
+  // A world that is none: numbers are looked at first, and nothing is driven.
+  const auto error_of = [&](const std::string& option, double value) {
+    const auto outcome =
+        understory_command(directory, fmt::format("sim no-such-world.csv {} {} --out {}", option,
+                                                  value, (directory / "never.lcm").string()));
+    CHECK(outcome.status != 0);
+    return outcome.error;
+  };
+  for (const Limits& one : all) {
+    for (const double within : {one.least, one.most})
+      CHECK_THAT(error_of(one.option, within), Contains("no-such-world.csv"));
+    for (const double beyond : {one.least - std::max(1.0, one.least), one.most + 1.0})
+      CHECK_THAT(error_of(one.option, beyond), Contains(one.option));
+  }
 }

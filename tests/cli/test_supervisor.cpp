@@ -5,7 +5,8 @@
 #include <csignal>
 #include <fstream>
 
-#include "deploy/launch/launch_config.hpp"
+#include "common/bus/launch_config.hpp"
+#include "common/bus/parameter_table.hpp"
 #include "deploy/launch/registry.hpp"
 #include "deploy/launch/supervisor.hpp"
 #include "tests/catch.hpp"
@@ -189,8 +190,8 @@ TEST_CASE("launch.toml is refused with file, line and key", "[launch]") {
   const auto refused = [&](const std::string& text) -> std::string {
     std::ofstream(directory / "launch.toml") << text;
     try {
-      launch::read_launch_config(directory.path());
-    } catch (const launch::ConfigError& error) {
+      bus::read_launch_config(directory.path());
+    } catch (const bus::ConfigurationError& error) {
       return error.what();
     }
     return "accepted";

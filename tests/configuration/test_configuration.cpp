@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "common/bus/launch_config.hpp"
 #include "deploy/cli/services.hpp"
-#include "deploy/launch/launch_config.hpp"
 #include "tests/bus/wrong_values.hpp"
 #include "tests/catch.hpp"
 
@@ -160,7 +160,7 @@ TEST_CASE("the configurations that come with the project start services that the
   for (const auto& entry : fs::recursive_directory_iterator(UNDERSTORY_SOURCE_CONFIG)) {
     if (entry.path().filename() != "launch.toml") continue;
     ++directories;
-    for (const auto& process : launch::read_launch_config(entry.path().parent_path()).processes) {
+    for (const auto& process : bus::read_launch_config(entry.path().parent_path()).processes) {
       CAPTURE(entry.path(), process.name);
       Described described(service_of(process.name));
       CHECK_NOTHROW(described.table.load(process.config));

@@ -199,12 +199,41 @@ TEST_CASE("Nearest and all landmarks within a radius equal brute force", "[const
   }
 }
 
+TEST_CASE("What was removed is not found again, within any radius", "[constellation]") {
+  std::mt19937_64 random(6);
+  Model model = clustered_model(random, 300);
+  ConstellationMap map;
+  for (const auto& [id, position] : model) map.insert(id, position);
+  while (!model.empty()) {
+    REQUIRE(map.remove(model.begin()->first));
+    model.erase(model.begin());
+    if (model.size() % 10 != 0) continue;
+    // Few cells, many, and more than there is time to visit.
+    for (const double radius_m : {30.0, 1e3, 1e6}) {
+      std::vector<LandmarkId> within;
+      for (const auto& [id, position] : model) {
+        if (position.norm() <= radius_m) within.push_back(id);
+      }
+      REQUIRE(map.near({{0.0, 0.0}, radius_m}) == within);
+    }
+  }
+}
+
 TEST_CASE("Positions that cannot be stored are refused", "[constellation]") {
   ConstellationMap map;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   REQUIRE_FALSE(map.insert(1, {nan, 0.0}));
   REQUIRE_FALSE(map.insert(1, {0.0, std::numeric_limits<double>::infinity()}));
   REQUIRE_FALSE(map.insert(1, {0.0, 1e12}));
+  constexpr double kMost = PointGrid::kMaxCoordinate;
+  const double beyond = std::nextafter(kMost, 2.0 * kMost);
+  for (const double side : {-1.0, 1.0}) {
+    REQUIRE_FALSE(map.insert(1, {side * beyond, 0.0}));
+    REQUIRE_FALSE(map.insert(1, {0.0, side * beyond}));
+    REQUIRE(map.insert(1, {side * kMost, side * kMost}));
+    REQUIRE(map.near({{side * kMost, side * kMost}, 1.0}).size() == 1);
+    REQUIRE(map.remove(1));
+  }
   REQUIRE(map.size() == 0);
   REQUIRE(map.insert(1, {1.0, 2.0}));
   REQUIRE_FALSE(map.move(1, {nan, 0.0}));

@@ -123,7 +123,7 @@ TEST_CASE("An update at odds with the map leaves the state as it was", "[ekf][up
     const geometry::SE2 pose(state.position, state.heading);
 
     const std::vector<double> gates = set_gates(0.999, 6);
-    CHECK(update_compatible(state, observations, pairings, gates, scratch) == 6);
+    CHECK(update_compatible(state, observations, pairings, gates, scratch).removed == 6);
     CHECK(pairings.empty());
     CHECK(full_covariance(state) == before);
     CHECK(geometry::SE2(state.position, state.heading).coordinates() == pose.coordinates());
@@ -141,9 +141,9 @@ TEST_CASE("The worst pairing goes, and the rest updates as if it had never been"
 
   FilterState without = state;
   std::vector<Pairing> four{{0, 0}, {1, 1}, {3, 3}, {4, 4}};
-  CHECK(update_compatible(without, observations, four, gates, scratch) == 0);
+  CHECK(update_compatible(without, observations, four, gates, scratch).removed == 0);
   std::vector<Pairing> five{{0, 0}, {1, 1}, {2, 2}, {3, 3}, {4, 4}};
-  CHECK(update_compatible(state, observations, five, gates, scratch) == 1);
+  CHECK(update_compatible(state, observations, five, gates, scratch).removed == 1);
   CHECK(five.size() == 4);
   CHECK(state.landmarks()[2].refused == 1);
   CHECK(full_covariance(state) == full_covariance(without));

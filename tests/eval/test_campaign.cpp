@@ -50,6 +50,29 @@ TEST_CASE("Results do not depend on the number of jobs", "[campaign]") {
   }
 }
 
+TEST_CASE("The figure of matches shows what a method matched, polygons where it matches them",
+          "[campaign]") {
+  eval::harness::Cell cell;
+  cell.forest = sim::ForestKind::kSparse;
+  cell.interval_m = 1.0;
+  eval::harness::CampaignOptions options;
+  options.runs = 1;
+  options.methods = {"baseline", "smoothing"};
+  const std::atomic<bool> stop{false};
+  const auto cells = run_campaign({cell}, options, stop);
+  const nlohmann::json traces = traces_of(cells, options);
+
+  const nlohmann::json& methods = traces.at(0).at("methods");
+  const nlohmann::json& smoothing = methods.at("smoothing").at("snapshot");
+  CHECK_FALSE(smoothing.contains("first_associations"));
+  CHECK_FALSE(smoothing.contains("map_polygons"));
+  CHECK(smoothing.at("filtered_associations").size() > 3);
+  const auto& update = cells.at(0).runs.at("smoothing").front().trace.snapshot->update;
+  CHECK(smoothing.at("filtered_associations").size() <= update.associations.size());
+  if (methods.at("baseline").contains("snapshot"))
+    CHECK(methods.at("baseline").at("snapshot").contains("first_associations"));
+}
+
 TEST_CASE("Every job runs once; exceptions and stops come through", "[parallel]") {
   std::atomic<bool> stop{false};
   std::mutex mutex;

@@ -60,6 +60,9 @@ TEST_CASE("Consistency is scored against the truth", "[eval][front_end]") {
   REQUIRE(summary.band_high > 3.0);
   REQUIRE(summary.overall_nees > 0.5);
   REQUIRE(summary.overall_nees < 6.0);
+  // Five degrees of freedom.
+  REQUIRE(summary.overall_velocity_nees > 1.0);
+  REQUIRE(summary.overall_velocity_nees < 10.0);
   REQUIRE(summary.drift_percent < 0.2);
   REQUIRE(summary.restarts == 0);
 
@@ -68,6 +71,35 @@ TEST_CASE("Consistency is scored against the truth", "[eval][front_end]") {
     for (double& nees : run.nees) nees *= 100.0;
   }
   REQUIRE(share_in_band(runs, {1, 120}, runs.size()) < 0.02);
+}
+
+TEST_CASE("A simulator that errs by twice what it states is noticed", "[eval][front_end]") {
+  const sim::TrunkField forest = small_forest();
+  const auto mean_nees_of = [&](double factor) {
+    eval::experiments::frontend::EkfDriveOptions options;
+    options.drive = short_drive();
+    options.drive.true_noise_factor = factor;
+    options.duration_s = 12.0;
+    std::vector<eval::experiments::frontend::EkfDriveResult> runs;
+    for (std::uint64_t seed = 1; seed <= 4; ++seed)
+      runs.push_back(run_ekf_drive(options, forest, seed));
+    return mean_nees(runs, {1, 120});
+  };
+  const double exact = mean_nees_of(1.0);
+  // The noise of detections is learned from the scans, that of IMU and level is not.
+  CHECK(mean_nees_of(2.0) > 2.0 * exact);
+  CHECK(mean_nees_of(0.5) < 0.9 * exact);
+
+  // What is stated stays.
+  sim::InertialDriveParameters drive = short_drive();
+  sim::InertialDrive stated(drive, forest, 4);
+  drive.true_noise_factor = 2.0;
+  sim::InertialDrive doubled(drive, forest, 4);
+  const auto& a = stated.next().scan.detections;
+  const auto& b = doubled.next().scan.detections;
+  REQUIRE(a.size() == b.size());
+  CHECK(a.front().covariance_m2 == b.front().covariance_m2);
+  CHECK(a.front().position_m != b.front().position_m);
 }
 
 TEST_CASE("A parked vehicle sways about its place, and its samples contain it",

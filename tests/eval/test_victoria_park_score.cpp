@@ -115,6 +115,21 @@ TEST_CASE("fixes on the path, in another frame, have no error", "[victoria_park]
   CHECK(errors.to_path_p90_m < 0.013);  // Straight lines of 2 m on a radius of 40 m.
 }
 
+TEST_CASE("fixes are the antenna's, not the vehicle's", "[victoria_park]") {
+  // Left and right by turns: on one circle an alignment takes the lever arm for a rotation.
+  std::vector<eval::metrics::StampedPose> trajectory{{0, {}}};
+  for (int i = 1; i < 30; ++i) {
+    const Eigen::Vector3d motion(2.0, 0.0, i % 16 < 8 ? 0.3 : -0.3);
+    trajectory.push_back({i * 1000000, trajectory.back().pose * geometry::SE2::Exp(motion)});
+  }
+  const Eigen::Vector2d antenna_m(1.5, 0.4);
+  std::vector<model::GnssFix> fixes;
+  for (model::Utime t = 500000; t < 29000000; t += 1300000)
+    fixes.push_back(fix(t, *eval::metrics::pose_at(trajectory, t) * antenna_m));
+  CHECK(against_fixes(trajectory, fixes, antenna_m).at_time_p90_m < 1e-9);
+  CHECK(against_fixes(trajectory, fixes).at_time_median_m > 0.3);
+}
+
 TEST_CASE("the error of fixes is what was put in", "[victoria_park]") {
   // A straight drive; fixes alternate 1 m left and right, but for every tenth: 5 m, by pairs.
   std::vector<eval::metrics::StampedPose> trajectory;

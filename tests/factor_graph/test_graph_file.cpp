@@ -49,6 +49,9 @@ TEST_CASE("Each format has its own order of the information", "[graph_file]") {
   Eigen::Matrix3d root;
   root << 1, 2, 3, 0, 4, 5, 0, 0, 6;
   REQUIRE(isam.factors.at(0).information.isApprox(root.transpose() * root));
+  Eigen::Matrix2d landmark_root;
+  landmark_root << 7, 8, 0, 9;
+  REQUIRE(isam.factors.at(1).information.isApprox(landmark_root.transpose() * landmark_root));
   REQUIRE(isam.vertices.size() == 3);  // A landmark's number is no pose's.
 }
 

@@ -274,6 +274,29 @@ TEST_CASE("Marginalising a variable of a linear graph leaves the others where th
   }
 }
 
+TEST_CASE("What a variable knew of its neighbour only by itself goes with it", "[incremental]") {
+  // Exact in floating point: nothing at all is left for the neighbour.
+  factor_graph::bayes_tree::IncrementalSmoother smoother(exact());
+  const VariableId gone = smoother.add_variable(Eigen::Vector2d(0.0, 0.0));
+  const VariableId pose = smoother.add_variable(geometry::SE2());
+  const VariableId point = smoother.add_variable(Eigen::Vector2d(2.0, 1.0));
+  smoother.add(prior(pose, geometry::SE2(), Eigen::Matrix3d(Eigen::Matrix3d::Identity())));
+  smoother.add(observation(pose, point, Eigen::Vector2d(2.0, 1.0),
+                           Eigen::Matrix2d(Eigen::Matrix2d::Identity())));
+  const FactorId only = smoother.add(observation(pose, gone, Eigen::Vector2d(0.0, 0.0),
+                                                 Eigen::Matrix2d(Eigen::Matrix2d::Identity())));
+  REQUIRE(smoother.update().ok);
+  const auto before = smoother.joint_covariance({&pose, 1});
+
+  REQUIRE(smoother.marginalise({&gone, 1}));
+  REQUIRE(smoother.update().ok);
+  REQUIRE_FALSE(smoother.graph().contains(only));
+  REQUIRE((smoother.point2(point) - Eigen::Vector2d(2.0, 1.0)).norm() < 1e-12);
+  const auto after = smoother.joint_covariance({&pose, 1});
+  REQUIRE(after);
+  REQUIRE((*after - *before).cwiseAbs().maxCoeff() < 1e-12);
+}
+
 TEST_CASE("With a fixed lag the graph stays small and the covariance what it would be",
           "[incremental]") {
   Random random(4);

@@ -131,3 +131,21 @@ TEST_CASE("A rotation is found with the nearest of many points, and all are pair
   CHECK(scene.error(found) < 1e-3);
   CHECK(found.pairs.size() > 850);
 }
+
+TEST_CASE("A point whose variance is the limit is not vague", "[rows]") {
+  // 200 points in a row, of which a narrow gate meets few; a vague one reaches all of them.
+  GatedPoints gated(2.0, 1.0);
+  for (int i = 0; i < 200; ++i) gated.add({static_cast<double>(i), 0.0}, 1.0);
+  gated.add({0.0, 0.0}, 1e6);
+  gated.sort();
+  for (int i = 0; i < 200; ++i) {
+    bool is_found = false;
+    std::size_t found = 0;
+    gated.for_each_near({static_cast<double>(i), 0.0}, 4.0, 1e-2, [&](std::uint32_t k, double) {
+      is_found = is_found || k == static_cast<std::uint32_t>(i);
+      ++found;
+    });
+    CHECK(is_found);
+    CHECK(found <= 10);
+  }
+}

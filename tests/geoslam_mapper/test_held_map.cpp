@@ -110,6 +110,27 @@ TEST_CASE("a map that starts anew replaces the one before", "[held_map]") {
   CHECK(ids(held) == std::vector<model::LandmarkId>{3});
 }
 
+TEST_CASE("another map of the same mapper replaces the one before, though its versions go on",
+          "[held_map]") {
+  model::HeldMap held;
+  held.take(whole(30, {tree(1, 0.0)}));
+  held.take(accepted(40, true));
+  model::MapDelta delta = change(30, {tree(2, 0.0)});
+  delta.base_version = 0;
+  held.take(delta);
+  CHECK(ids(held) == std::vector<model::LandmarkId>{2});
+  CHECK(held.map()->version == 31);
+  CHECK(held.map()->keyframes.size() == 1);
+  CHECK(held.missed() == 0);
+
+  // Who missed the update has it by the change alone.
+  held.take(whole(40, {tree(1, 0.0)}));
+  delta.version = 41;
+  held.take(delta);
+  CHECK(ids(held) == std::vector<model::LandmarkId>{2});
+  CHECK(held.missed() == 0);
+}
+
 TEST_CASE("a map has jumped where most of its landmarks are displaced", "[held_map]") {
   std::vector<model::MapLandmark> before;
   for (model::LandmarkId id = 1; id <= 10; ++id) before.push_back(tree(id, 0.0));

@@ -275,3 +275,20 @@ TEST_CASE("where tracking broke off there is nothing to jump from", "[map_publis
   }
   CHECK(watch.count() == 0);
 }
+
+TEST_CASE("a change of the map is a jump of which nothing is known", "[map_publishing]") {
+  std::mt19937_64 random(9);
+  JumpWatch watch;
+  geometry::SE2 pose;
+  for (int i = 0; i < 30; ++i) {
+    model::Keyframe keyframe = random_keyframe(random, 2);
+    keyframe.previous_T_base = random_pose(random);
+    pose = i % 10 == 0 ? random_pose(random, 100.0) : pose * *keyframe.previous_T_base;
+    model::MapUpdate update = updated_at(pose);
+    update.map_id = 1 + static_cast<std::uint32_t>(i) / 10;
+    if (i % 10 == 0) update.status = model::MapUpdateStatus::kFirstMap;
+    watch.add(keyframe, update);
+    CHECK(watch.count() == update.map_id - 1);
+    CHECK(difference(watch.delta(), geometry::SE2()) == 0.0);
+  }
+}

@@ -1,6 +1,7 @@
 // How often the mapper sends its map whole: by the bytes on a bus.
 #include <map>
 #include <memory>
+#include <set>
 
 #include "common/bus/memory_bus.hpp"
 #include "common/model/held_map.hpp"
@@ -34,6 +35,16 @@ class MappingOnABus {
       feed("LANDMARKS", wire::encode_message(drive.scan(k).scan));
     }
   }
+  /// The same as the continuation of another drive, a second after it.
+  void drive(const sim::Drive& drive, std::size_t first, std::size_t last,
+             const sim::Drive& before) {
+    for (std::size_t k = first; k < last; ++k) {
+      model::LandmarkScan scan = drive.scan(k).scan;
+      scan.sequence += before.size();
+      scan.utime += before.utime(before.size() - 1) - drive.utime(0) + 1'000'000;
+      feed("LANDMARKS", wire::encode_message(scan));
+    }
+  }
   void request(bool everything) {
     map_request_t request{};
     request.everything = everything ? 1 : 0;
@@ -52,6 +63,9 @@ class MappingOnABus {
   }
   const std::vector<model::WholeMap>& maps() const { return maps_; }
   const model::HeldMap& held() const { return held_; }
+  const std::optional<model::SlamPose>& last_pose() const { return last_pose_; }
+  int lost_poses() const { return lost_poses_; }
+  const std::set<std::uint32_t>& new_maps() const { return new_maps_; }
 
  private:
   void host(const bus::Service& service, const std::string& toml) {
@@ -68,6 +82,10 @@ class MappingOnABus {
       held_.take(maps_.back());
     } else if (message.channel == "MAP_DELTA") {
       held_.take(wire::decode_message<model::MapDelta>(message.bytes).value());
+    } else if (message.channel == "SLAM_POSE") {
+      last_pose_ = wire::decode_message<model::SlamPose>(message.bytes).value();
+      if (last_pose_->is_lost) ++lost_poses_;
+      if (last_pose_->is_new_map) new_maps_.insert(last_pose_->map_id);
     } else if (message.channel == "SLAM_UPDATE") {
       held_.take(wire::decode_message<model::MapUpdate>(message.bytes).value());
     }
@@ -77,19 +95,22 @@ class MappingOnABus {
       {"MAP", 0.0}, {"MAP_DELTA", 0.0}, {"SLAM_POSE", 0.0}, {"SLAM_UPDATE", 0.0}};
   std::vector<model::WholeMap> maps_;
   model::HeldMap held_;
+  std::optional<model::SlamPose> last_pose_;
+  int lost_poses_ = 0;
+  std::set<std::uint32_t> new_maps_;  ///< By poses that say NEW_MAP.
   bus::MemoryBus bus_{bus::MemoryBus::Queues::kUnlimited,
                       [this](const bus::BusMessage& message) { hear(message); }};
   std::vector<std::unique_ptr<bus::HostedService>> hosted_;
 };
 
 /// Straight ahead: the map grows all the way.
-sim::Drive growing_drive(double length_m) {
+sim::Drive growing_drive(double length_m, std::uint64_t seed = 5) {
   sim::DriveParameters parameters;
   parameters.forest = sim::forest_parameters(sim::ForestKind::kIntermediate);
   parameters.path.kind = sim::PathKind::kLine;
   parameters.path.length_m = length_m;
   parameters.clear_the_path = true;
-  return {parameters, 5};
+  return {parameters, seed};
 }
 
 void check_same_landmarks(const model::HeldMap& held, const model::WholeMap& map) {
@@ -141,6 +162,38 @@ TEST_CASE("a request for the map is answered at once, whatever the budget", "[ma
   mapping.request(false);
   REQUIRE(mapping.maps().size() == 7);
   CHECK_FALSE(mapping.maps().back().complete);
+}
+
+TEST_CASE("another map is sent whole at once, and who listens holds it alone", "[map_traffic]") {
+  const sim::Drive here = growing_drive(60.0);
+  const sim::Drive there = growing_drive(60.0, 1005);
+  MappingOnABus mapping("[output]\nmap_share = 0.0\n");
+  mapping.drive(here, 0, here.size());
+  const std::size_t before = mapping.maps().size();
+  const std::uint64_t version = mapping.held().map()->version;
+
+  std::size_t waited = 0;
+  for (; waited < there.size() && mapping.maps().size() == before; ++waited)
+    mapping.drive(there, waited, waited + 1, here);
+  CHECK(waited <= 33);  // Four keyframes: tracking begins anew, and the first of them is shorter.
+  REQUIRE(mapping.maps().size() == before + 1);
+  mapping.drive(there, waited, there.size(), here);
+  CHECK(mapping.held().missed() == 0);
+  CHECK(mapping.held().has_whole());
+  CHECK(mapping.held().map()->version > version);
+  for (const auto& one : mapping.held().map()->landmarks) CHECK(model::map_of(one.id) == 2);
+
+  // A pose of the new map has its number, and the jump is counted though nothing is known of it.
+  REQUIRE(mapping.last_pose());
+  CHECK(mapping.last_pose()->is_localised());
+  CHECK(mapping.last_pose()->map_id == 2);
+  CHECK(mapping.lost_poses() == 2);
+  CHECK(mapping.new_maps() == std::set<std::uint32_t>{2});
+  CHECK(mapping.last_pose()->reset_counter == 1);
+  CHECK(mapping.last_pose()->reset_delta.coordinates().norm() == 0.0);
+
+  mapping.request(true);
+  check_same_landmarks(mapping.held(), mapping.maps().back());
 }
 
 TEST_CASE("a budget never spends more than its share and one map", "[map_traffic]") {

@@ -87,7 +87,8 @@ struct Answers {
 void feed(SmoothingMapper& mapper, const Inputs& inputs, Answers& answers) {
   if (inputs.odometry) mapper.add(*inputs.odometry);
   mapper.add(inputs.pose);
-  answers.located.push_back(mapper.locate(inputs.scan));
+  const std::optional<ScanPose> found = mapper.locate(inputs.scan);
+  answers.located.push_back(found ? std::optional(found->map_T_vehicle) : std::nullopt);
   mapper.add(inputs.level);  // Serves the next scan: a loaded mapper must have it.
   if (inputs.keyframe) answers.updates.push_back(mapper.add(*inputs.keyframe));
 }

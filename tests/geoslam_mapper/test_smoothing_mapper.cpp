@@ -101,7 +101,9 @@ TEST_CASE("A drive round a circle gives a map of trunks, each once", "[mapper]")
 TEST_CASE("Keyframes of another forest are not sure, and leave the map as it was", "[mapper]") {
   const sim::Drive here = drive(sim::PathKind::kLine, 30.0, 12);
   const sim::Drive there = drive(sim::PathKind::kLine, 30.0, 912);
-  SmoothingMapper mapper({});
+  SmoothingMapperParameters parameters;
+  parameters.new_map_keyframes = 0;  // Else they begin another map.
+  SmoothingMapper mapper(parameters);
   model::Utime last = 0;
 
   for (const model::Keyframe& keyframe : keyframes(here)) {
@@ -258,7 +260,7 @@ TEST_CASE("Scans between keyframes are located, and the map is not changed by it
     if (const auto pose = mapper.locate(scan)) {
       ++located;
       const geometry::SE2 truth = map_T_world * simulated.world_T_vehicle()[k];
-      largest_m = std::max(largest_m, distance(pose->mean, truth));
+      largest_m = std::max(largest_m, distance(pose->map_T_vehicle.mean, truth));
     }
     REQUIRE(mapper.landmarks().size() == before);
     if (const auto keyframe = keyframer.add(scan)) mapper.add(*keyframe);
@@ -281,8 +283,9 @@ TEST_CASE("The covariance of a located scan is that of its pose in the map", "[m
       const auto pose = mapper.locate(scan);
       if (pose && k % 20 == 0) {
         const geometry::SE2 error =
-            (map_T_world * simulated.world_T_vehicle()[k]).inverse() * pose->mean;
-        nees += error.coordinates().dot(pose->covariance.inverse() * error.coordinates());
+            (map_T_world * simulated.world_T_vehicle()[k]).inverse() * pose->map_T_vehicle.mean;
+        nees +=
+            error.coordinates().dot(pose->map_T_vehicle.covariance.inverse() * error.coordinates());
         ++count;
       }
       if (const auto keyframe = keyframer.add(scan)) mapper.add(*keyframe);
@@ -384,4 +387,63 @@ TEST_CASE("A trunk that bad scans moved and doubled is one landmark in the end",
     if ((landmark.position_m - map_T_centre * *trunk).norm() < 1.5) ++near;
   }
   CHECK(near == 1);
+}
+
+TEST_CASE(
+    "Where landmarks end a scan's pose is by odometry, as uncertain as that, until they return",
+    "[mapper]") {
+  double nees = 0.0;
+  int coasted = 0;
+  for (std::uint64_t seed = 70; seed < 90; ++seed) {
+    const sim::Drive simulated = drive(sim::PathKind::kLine, 60.0, seed);
+    const geometry::SE2 map_T_world = simulated.world_T_vehicle().front().inverse();
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    keyframer::joint::JointKeyframer keyframer({});
+    SmoothingMapperParameters parameters;
+    parameters.use_odometry = true;
+    SmoothingMapper mapper(parameters);
+    double sigma_m = 0.0;
+
+    for (std::size_t k = 0; k < simulated.size(); ++k) {
+      model::LandmarkScan scan = simulated.scan(k).scan;
+      const bool is_dark = k >= 100 && k < 140;
+      if (is_dark) scan.detections.clear();
+      if (k > 0) {
+        model::Odometry motion;
+        motion.from_utime = simulated.utime(k - 1);
+        motion.utime = simulated.utime(k);
+        motion.from_T_to =
+            simulated.world_T_vehicle()[k - 1].inverse() * simulated.world_T_vehicle()[k] *
+            geometry::SE2(0.01 * normal(random), 0.01 * normal(random), 1e-3 * normal(random));
+        motion.covariance = Eigen::Vector3d(1e-4, 1e-4, 1e-6).asDiagonal();
+        motion.has_wheels = true;
+        mapper.add(motion);
+      }
+
+      const auto pose = mapper.locate(scan);
+      if (k > 20) {
+        REQUIRE(pose);
+        REQUIRE(pose->is_coasting == is_dark);
+      }
+      if (is_dark) {
+        const double now_m =
+            std::sqrt(pose->map_T_vehicle.covariance.topLeftCorner<2, 2>().trace());
+        CHECK(now_m > sigma_m);
+        sigma_m = now_m;
+      }
+      if (k == 139) {
+        const Eigen::Vector3d error =
+            (pose->map_T_vehicle.mean.inverse() * map_T_world * simulated.world_T_vehicle()[k])
+                .Log();
+        nees += error.dot(pose->map_T_vehicle.covariance.inverse() * error);
+        ++coasted;
+      }
+      if (is_dark) continue;
+      if (const auto keyframe = keyframer.add(scan)) mapper.add(*keyframe);
+    }
+  }
+  INFO("mean NEES " << nees / coasted);
+  CHECK(nees / coasted < 5.0);
+  CHECK(nees / coasted > 1.2);
 }

@@ -93,7 +93,7 @@ TEST_CASE("Observations that are handed over hold the landmark that stays", "[ma
   graph.observe(node, 3, graph.pose(node).inverse() * Eigen::Vector2d(9.0, -4.0), kInformation);
   REQUIRE(graph.solve().ok);
   const std::vector<NodeIndex> nodes{node};
-  graph.hand_over(4, 2, nodes, true);
+  graph.hand_over(4, 2, nodes);
   REQUIRE(graph.solve().ok);
   CHECK_FALSE(graph.position(4));
   CHECK(graph.node(node).observations.contains(2));

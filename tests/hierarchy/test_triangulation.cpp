@@ -175,6 +175,45 @@ TEST_CASE("Changes are reported completely", "[hierarchy]") {
   }
 }
 
+TEST_CASE("A move that keeps all triangles touches only those around the landmark", "[hierarchy]") {
+  std::mt19937_64 random(12);
+  std::uniform_real_distribution<double> coordinate(-50.0, 50.0);
+  Triangulation triangulation;
+  TriangulationChange change;
+  for (std::uint64_t id = 0; id < 60; ++id) {
+    triangulation.insert(id, {coordinate(random), coordinate(random)}, change);
+  }
+
+  int kept = 0;
+  for (std::uint64_t id = 0; id < 60; ++id) {
+    const std::set<Ids> before = triangle_ids(triangulation);
+    const std::uint32_t slot = *triangulation.slot(id);
+    std::set<std::uint32_t> around;
+    bool is_on_hull = false;
+    for (std::uint32_t t = 0; t < triangulation.triangles().size(); ++t) {
+      if (!triangulation.is_triangle(t)) continue;
+      const Triangle& triangle = triangulation.triangles()[t];
+      for (int i = 0; i < 3; ++i) {
+        if (triangle.vertices[i] == slot) around.insert(t);
+        is_on_hull =
+            is_on_hull ||
+            (triangle.vertices[i] != slot && triangle.neighbours[i] == kNone &&
+             (triangle.vertices[(i + 1) % 3] == slot || triangle.vertices[(i + 2) % 3] == slot));
+      }
+    }
+
+    const Eigen::Vector2d to = triangulation.position(slot) + Eigen::Vector2d(1e-4, -1e-4);
+    REQUIRE(triangulation.move(id, to, change) == ChangeStatus::kDone);
+    if (is_on_hull || triangle_ids(triangulation) != before) continue;
+    ++kept;
+    REQUIRE(std::set(change.made.begin(), change.made.end()) == around);
+    REQUIRE(std::set(change.removed.begin(), change.removed.end()) == around);
+    REQUIRE(change.rim.empty());
+    REQUIRE(triangulation.slot(id) == slot);
+  }
+  REQUIRE(kept > 40);
+}
+
 TEST_CASE("What cannot be done is refused and changes nothing", "[hierarchy]") {
   Triangulation triangulation;
   TriangulationChange change;

@@ -7,6 +7,7 @@
 #include "common/io/lcm_log.hpp"
 #include "common/io/packet_capture.hpp"
 #include "common/io/velodyne.hpp"
+#include "common/io/velodyne_fixes.hpp"
 #include "tests/catch.hpp"
 #include "tests/data.hpp"
 #include "tests/io/velodyne_packets.hpp"
@@ -55,6 +56,17 @@ TEST_CASE("a revolution of the VLP-16 is where its beams point", "[velodyne]") {
     CHECK(std::abs(std::remainder(p.time_s - expected, 900 * 110.592e-6)) < 4e-5);
     CHECK(p.time_s >= last - 4e-5F);
     last = std::max(last, p.time_s);
+  }
+}
+
+TEST_CASE("points at the limit of the range and beyond are left out", "[velodyne]") {
+  // All at 10 m; the correction of single beams is zero.
+  for (const double limit_m : {2.5, 9.99, 10.0, 10.01, 40.0}) {
+    VelodyneDecoder decoder(velodyne_calibration(VelodyneModel::kVlp16), limit_m);
+    std::size_t points = 0;
+    for (const auto& turn : turns_of(decoder, {.azimuth = 35000}, 230))
+      points += turn.points.size();
+    CHECK((points > 0) == (limit_m > 10.0));
   }
 }
 
@@ -178,6 +190,24 @@ TEST_CASE("NMEA sentences are read when their checksum is right", "[velodyne]") 
     changed[i] = static_cast<char>(changed[i] ^ 1);
     CHECK_FALSE(parse_gprmc(changed));
   }
+}
+
+TEST_CASE("a fix moves where its course points", "[velodyne]") {
+  VelodyneFixes fixes;
+  VelodynePosition position;
+  position.is_valid = true;
+  position.speed_mps = 3.0;
+  for (int degrees = 0; degrees < 360; degrees += 15) {
+    position.day_us += 1'000'000;
+    position.course_rad = degrees * kDegree;
+    const auto fix = fixes.add(position, 5);
+    REQUIRE((fix && fix->velocity_mps));
+    CHECK(fix->velocity_mps->norm() == Approx(3.0));
+    // From north, clockwise: the vector (east, north) as a complex number turns the other way.
+    const double bearing = std::atan2(fix->velocity_mps->y(), fix->velocity_mps->x());
+    CHECK(std::abs(std::remainder(bearing + (degrees - 90) * kDegree, 360 * kDegree)) < 1e-9);
+  }
+  CHECK_FALSE(fixes.add(position, 6));  // The same instant again.
 }
 
 TEST_CASE("a recorded capture of a VLP-16", "[velodyne][recorded]") {

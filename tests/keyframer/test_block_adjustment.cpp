@@ -111,3 +111,28 @@ TEST_CASE("Odometry between members holds a block with few landmarks together", 
       estimate.centre_T_member[0].mean.inverse() * estimate.centre_T_member[5].mean;
   REQUIRE((expected.inverse() * actual).Log().norm() < 1.2e-4);
 }
+
+TEST_CASE("Covariances are exactly symmetric, also of motions that nothing determines", "[block]") {
+  int undetermined = 0;
+  for (unsigned seed = 1; seed <= 100; ++seed) {
+    std::mt19937_64 random(seed);
+    BlockProblem block = problem(world(random, 8, 6), 1e-9, 0.4, random);
+    for (BlockObservation& z : block.observations) {
+      z.covariance_m2 = 0.04 * Eigen::Matrix2d::Identity();
+    }
+
+    const BlockEstimate estimate = adjust_block(block);
+    if (!estimate.determined) ++undetermined;
+    for (const geometry::SE2WithCovariance& member : estimate.centre_T_member) {
+      REQUIRE(member.covariance == member.covariance.transpose());
+      REQUIRE(member.covariance.allFinite());
+    }
+    for (const Eigen::Matrix2d& covariance : estimate.landmark_covariance) {
+      if (covariance.hasNaN()) continue;  // Nobody observed it.
+      REQUIRE(covariance == covariance.transpose());
+      REQUIRE(covariance.determinant() > 0.0);
+    }
+  }
+  CHECK(undetermined > 10);
+  CHECK(undetermined < 90);
+}

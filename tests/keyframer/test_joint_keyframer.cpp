@@ -3,6 +3,7 @@
 #include <random>
 
 #include "common/model/archive.hpp"
+#include "common/wire/convert.hpp"
 #include "sim/drive.hpp"
 #include "tests/catch.hpp"
 
@@ -133,6 +134,29 @@ TEST_CASE("A vehicle that was carried away starts anew", "[keyframer]") {
   REQUIRE(unlinked == 1);
 }
 
+TEST_CASE("What was scanned before a break is in no keyframe of after it", "[keyframer]") {
+  const sim::Drive here = drive(sim::PathKind::kLine, 10.0, 0.9, 0.1, 6);
+  const sim::Drive there = drive(sim::PathKind::kLine, 10.0, 0.9, 0.1, 77);
+  for (std::size_t before = 1; before < 8; ++before) {
+    CAPTURE(before);
+    JointKeyframer keyframer({});
+    for (std::size_t k = 0; k < before; ++k) REQUIRE_FALSE(keyframer.add(here.scan(k).scan));
+
+    // One scan alone is withheld, several are given out at the break.
+    const model::Utime offset = here.utime(before) + 200000;
+    for (std::size_t k = 0; k < 8; ++k) {
+      model::LandmarkScan scan = there.scan(k).scan;
+      scan.utime = offset + there.utime(k);
+      const auto keyframe = keyframer.add(scan);
+      REQUIRE(keyframe.has_value() == (k == 7 || (k == 0 && before > 1)));
+      if (k < 7) continue;
+      REQUIRE(keyframe->members.size() == 8);
+      CHECK(keyframe->members.front().utime == offset + there.utime(0));
+    }
+    CHECK(keyframer.counters().keyframes_withheld == (before == 1 ? 1 : 0));
+  }
+}
+
 TEST_CASE("A scan that is not later than the last one is refused and counted", "[keyframer]") {
   const sim::Drive simulated = drive(sim::PathKind::kLine, 4.0, 0.9, 0.1, 7);
   JointKeyframer keyframer({});
@@ -140,4 +164,72 @@ TEST_CASE("A scan that is not later than the last one is refused and counted", "
   REQUIRE_FALSE(keyframer.add(simulated.scan(0).scan));
   REQUIRE(keyframer.counters().scans_unmatched == 1);
   REQUIRE_FALSE(keyframer.counters().last_reason.empty());
+}
+
+TEST_CASE("Who takes keyframes refuses none, however few landmarks connect their scans",
+          "[keyframer]") {
+  std::size_t made = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const sim::Drive simulated = drive(sim::PathKind::kCircle, 60.0, 0.2, 0.1, seed);
+    JointKeyframer keyframer({});
+    for (const model::Keyframe& keyframe : keyframes(simulated, keyframer)) {
+      REQUIRE(wire::from_wire(wire::to_wire(keyframe)));
+      ++made;
+    }
+  }
+  CHECK(made > 90);
+}
+
+TEST_CASE("Keyframes of one scan each: also where tracking begins anew", "[keyframer]") {
+  JointKeyframerParameters parameters;
+  parameters.observations_per_keyframe = 1;
+  JointKeyframer keyframer(parameters);
+
+  // Each scan is of another forest than the one before.
+  const sim::Drive here = drive(sim::PathKind::kLine, 10.0, 0.9, 0.1, 6);
+  const sim::Drive there = drive(sim::PathKind::kLine, 10.0, 0.9, 0.1, 77);
+  std::size_t made = 0;
+  for (std::size_t k = 0; k < 20; ++k) {
+    const model::LandmarkScan scan = (k % 2 == 0 ? here : there).scan(k).scan;
+    const auto keyframe = keyframer.add(scan);
+    if (!keyframe) continue;
+    ++made;
+    CHECK(keyframe->landmarks.size() == scan.detections.size());
+    CHECK_FALSE(keyframe->previous_T_base);
+    CHECK(wire::from_wire(wire::to_wire(*keyframe)));
+  }
+  CHECK(made == 20);
+}
+
+TEST_CASE("Sigmas stated at a quarter and at four times the true ones give right keyframes",
+          "[keyframer][noise]") {
+  for (const double factor : {0.25, 4.0}) {
+    for (std::uint64_t seed = 31; seed <= 42; ++seed) {
+      sim::DriveParameters parameters;
+      parameters.forest = sim::forest_parameters(sim::ForestKind::kIntermediate);
+      parameters.forest.side_m = 300.0;
+      parameters.path.length_m = 60.0;
+      parameters.sensor.stated_factor = factor;
+      const sim::Drive drive(parameters, seed);
+      keyframer::joint::JointKeyframer keyframer{keyframer::JointKeyframerParameters{}};
+
+      std::optional<geometry::SE2> world_T_last;
+      int right = 0;
+      for (std::size_t k = 0; k < drive.size(); ++k) {
+        const auto keyframe = keyframer.add(drive.scan(k).scan);
+        if (!keyframe) continue;
+        const std::size_t base = k + 1 - keyframe->members.size();
+        const geometry::SE2 world_T_base = drive.world_T_vehicle()[base];
+        if (world_T_last && keyframe->previous_T_base) {
+          const geometry::SE2 error =
+              (world_T_last->inverse() * world_T_base).inverse() * *keyframe->previous_T_base;
+          CAPTURE(factor, seed, k);
+          CHECK(error.translation().norm() < 0.5);
+          ++right;
+        }
+        world_T_last = world_T_base;
+      }
+      CHECK(right + 4 > static_cast<int>(drive.size() / 8));
+    }
+  }
 }

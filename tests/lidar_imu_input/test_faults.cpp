@@ -248,8 +248,11 @@ TEST_CASE("a frozen IMU is named and not used", "[faults]") {
 TEST_CASE("messages that repeat or come out of order are dropped", "[faults]") {
   LidarImuInput input(test::parameters_for_drive());
   std::mt19937_64 random(1);
-  const model::ImuSample sample = imu_at({}, 50'000, 100.0, {}, random);
-  input.add(sample);
+  model::ImuSample sample;
+  for (model::Utime t = 50'000; t <= 100'000; t += 10'000) {
+    sample = imu_at({}, t, 100.0, {}, random);
+    input.add(sample);
+  }
   const InputResults again = input.add(sample);
   REQUIRE(again.size() == 1);
   CHECK(std::get<InputFault>(again[0]).kind == InputFaultKind::kLate);

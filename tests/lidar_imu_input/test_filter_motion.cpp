@@ -24,6 +24,10 @@ class LaserAlone {
       const double x = place(random);
       world_.emplace_back(x, place(random), 0.0);
     }
+    // Its time is not believed before the second revolution.
+    for (int k = 2; k > 0; --k)
+      input_.add(sweep_at(track_, kBegin - k * kRevolution_us,
+                          test::parameters_for_drive().lidar.mount.vehicle_T_sensor(), world_));
   }
 
   /// The next turn; RMS of its points' errors in the plan [m], where they are at its stamp.

@@ -49,10 +49,30 @@ TEST_CASE("A revolution without all its parts is dropped and counted once", "[mo
   const auto third = model::split_sweep(sweep_of(3, 20), 10);
   // The second part of the first is lost, then the first part of the second.
   for (const std::size_t i : {0U, 2U, 3U}) CHECK_FALSE(assembler.add(first[i]));
-  CHECK(assembler.incomplete_revolutions() == 1);
   CHECK_FALSE(assembler.add(second[1]));
-  CHECK(assembler.incomplete_revolutions() == 2);
+  CHECK(assembler.incomplete_revolutions() == 0);
   CHECK_FALSE(assembler.add(third[0]));
+  CHECK(assembler.incomplete_revolutions() == 1);
   CHECK(assembler.add(third[1]));
   CHECK(assembler.incomplete_revolutions() == 2);
+  // What is late by a revolution and more begins nothing.
+  CHECK_FALSE(assembler.add(second[0]));
+  const auto fourth = model::split_sweep(sweep_of(4, 5), 10);
+  CHECK(assembler.add(fourth[0]));
+}
+
+TEST_CASE("Parts out of order join to the same sweep, those of two revolutions mixed", "[model]") {
+  const auto first = model::split_sweep(sweep_of(1, 40), 10);
+  const auto second = model::split_sweep(sweep_of(2, 20), 10);
+  model::SweepAssembler assembler;
+  for (const std::size_t i : {3U, 0U, 2U}) CHECK_FALSE(assembler.add(first[i]));
+  CHECK_FALSE(assembler.add(second[1]));
+  CHECK_FALSE(assembler.add(second[1]));
+  const auto whole = assembler.add(first[1]);
+  REQUIRE(whole);
+  REQUIRE(whole->points.size() == 40);
+  for (std::size_t i = 0; i < 40; ++i) CHECK(whole->points[i].x_m == static_cast<float>(i));
+  CHECK(whole->part == 0);
+  CHECK(assembler.add(second[0]));
+  CHECK(assembler.incomplete_revolutions() == 0);
 }

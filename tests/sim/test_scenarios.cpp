@@ -112,6 +112,30 @@ TEST_CASE("Country roads are as long as asked for and do not meet themselves", "
   CHECK(poor > 10);
 }
 
+TEST_CASE("Every kind of country is on a long road", "[scenario]") {
+  // By trunks within 40 m: 25 and more in a wood, at most 24 elsewhere, next to none in fields.
+  std::size_t wooded = 0;
+  std::size_t bare = 0;
+  std::size_t all = 0;
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    const Scenario scenario = countryside_scenario(4000.0, seed);
+    const PointGrid trunks(trunk_places(*scenario.world), 10.0);
+    for (const Eigen::Vector2d& place : scenario.route.places(10.0)) {
+      const std::size_t near = trunks.within(place, 40.0).size();
+      wooded += near >= 25 ? 1 : 0;
+      bare += near <= 6 ? 1 : 0;
+      ++all;
+    }
+  }
+
+  // By chance and mean length of their stretches: 37 % wood, 21 % field.
+  const auto share = [&](std::size_t part) {
+    return static_cast<double>(part) / static_cast<double>(all);
+  };
+  CHECK(share(wooded) == Approx(0.37).margin(0.15));
+  CHECK(share(bare) == Approx(0.21).margin(0.12));
+}
+
 TEST_CASE("A map of poles with a trajectory becomes a world", "[scenario]") {
   std::string trajectory = "frame,x_m,y_m,yaw_rad\n";
   for (int i = 0; i < 400; ++i) {

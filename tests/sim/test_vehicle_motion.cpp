@@ -111,6 +111,33 @@ TEST_CASE("The car is stationary first, keeps its limits, and stays on the groun
   CHECK(motion.driven_m() == Approx(route_of(PathKind::kSquare, 400.0).length_m()).margin(0.5));
 }
 
+TEST_CASE("The car drives off from a stop as it does from the start", "[motion]") {
+  std::mt19937_64 random(5);
+  const Ground flat(GroundParameters{.slope = {0.0, 0.0}, .relief_m = 0.0, .roughness_m = 0.0},
+                    random);
+  const Route route = route_of(PathKind::kLine, 160.0);
+  for (const double stop_m : {40.0, 57.25, 81.5}) {
+    SpeedParameters speed;
+    speed.stops = {{stop_m, 6.0}};
+    const VehicleMotion motion(route, flat, {}, speed);
+
+    // The step at which the motion behind the stop is that behind the start, moved on.
+    constexpr double kStep_s = 0.02;
+    const double start_s = speed.standstill_s;
+    double least_m = 1.0;
+    for (int step = 0; step * kStep_s < motion.duration_s() - start_s - 15.0; ++step) {
+      double worst_m = 0.0;
+      for (double t = start_s; t < start_s + 6.0 && worst_m < least_m; t += 0.1) {
+        const double before_m = motion.at(t).position_m.x();
+        const double behind_m = motion.at(t + step * kStep_s).position_m.x();
+        worst_m = std::max(worst_m, std::abs(behind_m - before_m - stop_m));
+      }
+      least_m = std::min(least_m, worst_m);
+    }
+    CHECK(least_m < 1e-4);
+  }
+}
+
 TEST_CASE("A perfect inertial unit integrates back to the drive", "[imu]") {
   const VehicleMotion motion = motion_on(PathKind::kFigureEight, 300.0);
   ImuParameters parameters = ImuParameters::perfect();

@@ -90,6 +90,19 @@ TEST_CASE("nothing is left of what a loaded object held before") {
   CHECK(state::save(kFormat, back) == bytes);
 }
 
+TEST_CASE("a matrix may be all that is left of a state, of any shape") {
+  for (Eigen::Index rows = 0; rows <= 5; ++rows) {
+    for (Eigen::Index cols = 0; cols <= 5; ++cols) {
+      const Eigen::MatrixXd matrix = Eigen::MatrixXd::Random(rows, cols);
+      Eigen::MatrixXd back = Eigen::MatrixXd::Random(2, 2);
+      state::load(state::save(kFormat, matrix), kFormat, back);
+      CHECK(back.rows() == rows);
+      CHECK(back.cols() == cols);
+      CHECK(back == matrix);
+    }
+  }
+}
+
 TEST_CASE("an odometry increment survives with its preintegration") {
   model::Odometry increment;
   increment.utime = 7;

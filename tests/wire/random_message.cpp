@@ -9,8 +9,8 @@ namespace {
 class Writer {
  public:
   Writer(std::mt19937_64& random, std::vector<test::RealPlace>* reals,
-         std::vector<std::size_t>* lengths)
-      : random_(random), reals_(reals), lengths_(lengths) {}
+         std::vector<std::size_t>* lengths, std::vector<std::size_t>* booleans)
+      : random_(random), reals_(reals), lengths_(lengths), booleans_(booleans) {}
 
   void integer(std::uint64_t value, std::size_t size) {
     for (std::size_t i = size; i-- > 0;) {
@@ -58,6 +58,9 @@ class Writer {
 
       case wire::FieldKind::kInt16:
         return integer(random_() % 1000, 2);
+      case wire::FieldKind::kBoolean:
+        if (booleans_ != nullptr) booleans_->push_back(bytes_.size());
+        return integer(random_() % 2, 1);
       default:
         return integer(random_() % 2, 1);
     }
@@ -76,14 +79,16 @@ class Writer {
   std::mt19937_64& random_;
   std::vector<test::RealPlace>* reals_;
   std::vector<std::size_t>* lengths_;
+  std::vector<std::size_t>* booleans_;
   wire::Bytes bytes_;
 };
 
 }  // namespace
 
 wire::Bytes random_message(const wire::WireType& type, std::mt19937_64& random,
-                           std::vector<test::RealPlace>* reals, std::vector<std::size_t>* lengths) {
-  Writer writer(random, reals, lengths);
+                           std::vector<test::RealPlace>* reals, std::vector<std::size_t>* lengths,
+                           std::vector<std::size_t>* booleans) {
+  Writer writer(random, reals, lengths, booleans);
   writer.integer(static_cast<std::uint64_t>(type.fingerprint()), 8);
   writer.write(*type.layout);
   return writer.take();

@@ -15,10 +15,11 @@ struct RealPlace {
 };
 
 /// A well-formed message with random values; every array has 0..3 elements. Positions of floats and
-/// doubles, and of counts and string lengths, are given where asked for.
+/// doubles, of counts and string lengths, and of booleans are given where asked for.
 wire::Bytes random_message(const wire::WireType& type, std::mt19937_64& random,
                            std::vector<RealPlace>* reals = nullptr,
-                           std::vector<std::size_t>* lengths = nullptr);
+                           std::vector<std::size_t>* lengths = nullptr,
+                           std::vector<std::size_t>* booleans = nullptr);
 
 /// Overwrites `size` bytes at `offset`, big-endian.
 void put(wire::Bytes& bytes, std::size_t offset, std::uint64_t value, std::size_t size);

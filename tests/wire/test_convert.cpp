@@ -5,118 +5,12 @@
 
 #include "common/wire/checks.hpp"
 #include "tests/catch.hpp"
-#include "tests/wire/all_types.hpp"
+#include "tests/wire/value_maker.hpp"
 
 using namespace understory;
 using namespace understory::wire;
 
 namespace {
-
-class Maker {
- public:
-  explicit Maker(std::uint64_t seed) : random_(seed) {}
-  double real(double scale) {
-    return std::uniform_real_distribution<double>(-scale, scale)(random_);
-  }
-  std::size_t count() { return random_() % 6; }
-  template <int N>
-  Eigen::Matrix<double, N, N> covariance() {
-    Eigen::Matrix<double, N, N> root;
-    for (int i = 0; i < N * N; ++i) root(i) = real(0.3);
-    const Eigen::Matrix<double, N, N> product = root * root.transpose();
-    return 0.5 * (product + product.transpose());
-  }
-  geometry::SE2 pose() { return {real(100.0), real(100.0), real(3.0)}; }
-  model::LandmarkKind kind() { return static_cast<model::LandmarkKind>(random_() % 2); }
-
-  model::LandmarkScan scan() {
-    model::LandmarkScan scan{1000, 7, {40.0, real(1.0), 3.0}, {}};
-    for (std::size_t i = count(); i > 0; --i) {
-      scan.detections.push_back({{real(40.0), real(40.0), real(2.0)},
-                                 covariance<3>(),
-                                 real(0.1) + 0.2,
-                                 kind(),
-                                 real(3.0),
-                                 0.02});
-    }
-    return scan;
-  }
-  template <int N>
-  Eigen::Matrix<double, N, 1> vector(double scale) {
-    Eigen::Matrix<double, N, 1> result;
-    for (int i = 0; i < N; ++i) result[i] = real(scale);
-    return result;
-  }
-  model::Odometry odometry() {
-    model::Odometry odometry{5,           10,         2, pose(), covariance<3>(), std::nullopt,
-                             count() > 2, count() > 2};
-    if (count() < 3) return odometry;
-
-    model::Preintegration inertial;
-    inertial.seconds = 0.1;
-    inertial.yaw_rad = real(1.0);
-    inertial.velocity_mps = vector<2>(3.0);
-    inertial.position_m = vector<2>(1.0);
-    inertial.covariance = covariance<5>();
-    inertial.level = {covariance<2>(), Eigen::Matrix2d::Identity(), covariance<2>(), real(0.1)};
-    inertial.level.memory(0, 1) = real(1.0);
-    for (int i = 0; i < 15; ++i) inertial.bias_jacobian(i) = real(1.0);
-    inertial.bias = vector<3>(0.1);
-    odometry.inertial = inertial;
-
-    return odometry;
-  }
-  model::PointSweep sweep(double farthest_m) {
-    model::PointSweep sweep;
-    sweep.utime = 1000;
-    sweep.revolution = 7;
-    sweep.part = static_cast<std::uint16_t>(count());
-    sweep.parts = 8;
-    sweep.is_deskewed = count() > 2;
-    sweep.rings = 32;
-    sweep.max_range_m = 100.0;
-    sweep.sensor_position_m = vector<3>(2.0);
-    if (count() > 2) {
-      model::Attitude attitude;
-      attitude.level_Q_vehicle = Eigen::AngleAxisd(0.1, vector<3>(1.0).normalized());
-      attitude.covariance_rad2 = covariance<2>();
-      sweep.attitude = attitude;
-    }
-
-    for (int i = 0; i < 40; ++i) {
-      const Eigen::Vector3f p = vector<3>(farthest_m).cast<float>();
-      sweep.points.push_back({p.x(), p.y(), p.z(), static_cast<float>(real(0.1)),
-                              static_cast<std::uint16_t>(random_() % 32),
-                              static_cast<std::uint8_t>(random_() % 256)});
-    }
-
-    return sweep;
-  }
-  model::Keyframe keyframe() {
-    model::Keyframe keyframe{1000, 3, {40.0, 0.0, 2.0 * std::numbers::pi}, {}, {}, std::nullopt};
-    if (count() > 2) keyframe.previous_T_base = pose();
-    for (std::size_t i = 0; i <= count(); ++i) {
-      keyframe.members.push_back(
-          {static_cast<model::Utime>(1000 + 100 * i), 50 + i, pose(), covariance<3>()});
-    }
-    for (std::size_t i = count(); i > 0; --i) {
-      keyframe.landmarks.push_back(
-          {{real(40.0), real(40.0)}, covariance<2>(), 0.2, static_cast<std::uint16_t>(i), kind()});
-    }
-    return keyframe;
-  }
-  model::MapLandmark landmark() {
-    return {random_() | 1U, {real(400.0), real(400.0)}, covariance<2>(), 0.2, 9, kind()};
-  }
-  std::vector<model::MapLandmark> landmarks() {
-    std::vector<model::MapLandmark> result(count());
-    for (model::MapLandmark& one : result) one = landmark();
-    return result;
-  }
-
- private:
-  std::mt19937_64 random_;
-};
 
 /// Sent and received again; the same value encodes to the same bytes.
 template <class T>
@@ -126,28 +20,6 @@ void check_round_trip(const T& value) {
   INFO((back ? "" : back.refusal().detail));
   REQUIRE(back);
   CHECK(encode_message(*back) == bytes);
-}
-
-/// The version of ODOMETRY that older logs have.
-odometry_t old_version(const odometry2_t& wire) {
-  odometry_t old{};
-  old.utime = wire.utime;
-  old.seq = wire.seq;
-  old.from_utime = wire.from_utime;
-  old.from_T_to = wire.from_T_to;
-
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      old.covariance[row][column] = wire.covariance[row][column];
-    }
-  }
-
-  old.has_wheels = wire.has_wheels;
-  old.is_standing = wire.is_standing;
-  old.num_inertial = wire.num_inertial;
-  old.inertial = wire.inertial;
-
-  return old;
 }
 
 Reason reason_of(const landmarks_t& scan) {
@@ -168,18 +40,31 @@ landmarks_t scan_with_one() {
 
 }  // namespace
 
-TEST_CASE("odometry of the version before is read, without the level's error") {
-  Maker values(11);
-  bool had_inertial = false;
-  for (int i = 0; i < 50; ++i) {
-    model::Odometry should = values.odometry();
-    const auto is = decode_message<model::Odometry>(encode_bytes(old_version(to_wire(should))));
-    REQUIRE(is);
-    had_inertial = had_inertial || should.inertial;
-    if (should.inertial) should.inertial->level = model::LevelError{};
-    CHECK(encode_message(*is) == encode_message(should));
-  }
-  CHECK(had_inertial);
+TEST_CASE("detections that are not each of one landmark are refused") {
+  Maker make(5);
+  model::Keyframe keyframe = make.keyframe();
+  while (keyframe.landmarks.size() < 2) keyframe = make.keyframe();
+  REQUIRE(from_wire(to_wire(keyframe)));
+  const auto reason = [&](std::vector<model::KeyframeDetection> detections) {
+    keyframe.detections = std::move(detections);
+    return from_wire(to_wire(keyframe)).refusal().reason;
+  };
+  const auto most = static_cast<std::uint32_t>(keyframe.landmarks.size());
+  CHECK(reason({{0, 1, 0}, {0, 1, 1}}) == Reason::kInconsistent);
+  CHECK(reason({{0, 2, 0}, {0, 1, 1}}) == Reason::kInconsistent);
+  CHECK(reason({{0, 1, most}}) == Reason::kOutOfRange);
+  CHECK(reason({{static_cast<std::uint32_t>(keyframe.members.size()), 1, 0}}) ==
+        Reason::kOutOfRange);
+
+  model::MapUpdate update;
+  update.scans = {{90, 4}};
+  update.detections = {{0, 1, 7}, {0, 1, 7}};
+  CHECK(from_wire(to_wire(update)).refusal().reason == Reason::kInconsistent);
+  update.detections = {{1, 1, 7}};
+  CHECK(from_wire(to_wire(update)).refusal().reason == Reason::kOutOfRange);
+  update.detections.clear();
+  update.map_id = 0;
+  CHECK(from_wire(to_wire(update)).refusal().reason == Reason::kOutOfRange);
 }
 
 TEST_CASE("values survive the wire") {
@@ -188,12 +73,7 @@ TEST_CASE("values survive the wire") {
     check_round_trip(make.scan());
     check_round_trip(make.keyframe());
     check_round_trip(make.odometry());
-    check_round_trip(model::SlamPose{10, 2, model::MapUpdateStatus::kUpdated, 4, 0, make.pose(),
-                                     make.covariance<3>(), 3, make.pose(), make.pose(), 1,
-                                     make.pose()});
-    check_round_trip(model::SlamPose{10, 2, std::nullopt, std::nullopt, 0, make.pose(),
-                                     make.covariance<3>(), 3, make.pose(), make.pose(), 1,
-                                     make.pose()});
+    check_round_trip(make.slam_pose());
     check_round_trip(model::WholeMap{
         10, 1, 5, true, make.landmarks(), {{1, 10, make.pose(), make.covariance<3>()}}});
 
@@ -209,6 +89,12 @@ TEST_CASE("values survive the wire") {
     update.added = {7};
     update.merged = {{5, 6}};
     update.reason = "a runner-up";
+    update.map_id = 3;
+    update.is_provisional = seed % 2 == 0;
+    update.is_lost = seed % 3 == 0;
+    update.scans = {{90, 4}, {99, 5}};
+    update.detections = {{0, 3, 5}, {1, 0, 0}, {1, 2, 6}};
+    update.expected = {8, 9};
     check_round_trip(update);
   }
 }
@@ -299,8 +185,13 @@ TEST_CASE("a sweep in parts is put together again, and one with a hole is droppe
   whole.part = 0;
   whole.parts = 1;
   model::SweepAssembler assembler;
+  const auto turn = [&whole] {
+    ++whole.revolution;
+    whole.utime += 100'000;
+  };
 
   for (std::size_t size = 1; size <= 45; ++size) {
+    turn();
     const std::vector<model::PointSweep> parts = split_sweep(whole, size);
     REQUIRE(parts.size() == (whole.points.size() + size - 1) / size);
     for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -311,16 +202,20 @@ TEST_CASE("a sweep in parts is put together again, and one with a hole is droppe
   }
 
   CHECK(assembler.incomplete_revolutions() == 0);
-  const std::vector<model::PointSweep> parts = split_sweep(whole, 10);
-  for (std::size_t lost = 0; lost < parts.size(); ++lost) {
+  const std::size_t count = split_sweep(whole, 10).size();
+  for (std::size_t lost = 0; lost < count; ++lost) {
+    turn();
+    std::vector<model::PointSweep> parts = split_sweep(whole, 10);
     for (std::size_t i = 0; i < parts.size(); ++i) {
       if (i != lost) CHECK_FALSE(assembler.add(parts[i]));
     }
+    turn();
+    parts = split_sweep(whole, 10);
     for (std::size_t i = 0; i + 1 < parts.size(); ++i) CHECK_FALSE(assembler.add(parts[i]));
     CHECK(assembler.add(parts.back()));
   }
 
-  CHECK(assembler.incomplete_revolutions() == parts.size());
+  CHECK(assembler.incomplete_revolutions() == count);
 }
 
 TEST_CASE("values are carried field by field") {
@@ -368,7 +263,8 @@ TEST_CASE("a keyframe without members, or with members out of order, is refused"
   Maker make(1);
   model::Keyframe keyframe = make.keyframe();
   keyframe.members.resize(1);
-  keyframe_t wire = to_wire(keyframe);
+  keyframe.detections.clear();
+  keyframe2_t wire = to_wire(keyframe);
   REQUIRE(from_wire(wire));
   wire.members.push_back(wire.members[0]);
   wire.num_members = 2;

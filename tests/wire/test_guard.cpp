@@ -111,6 +111,39 @@ TEST_CASE("hostile counts and string lengths are refused wherever they are") {
   CHECK(places > 60);
 }
 
+TEST_CASE("a boolean is 0 or 1 wherever it is") {
+  std::mt19937_64 random(6);
+  std::set<std::string_view> types;
+  for (const WireType& type : wire_types()) {
+    std::vector<std::size_t> booleans;
+    const Bytes bytes = random_message(type, random, nullptr, nullptr, &booleans);
+    for (const std::size_t offset : booleans) {
+      types.insert(type.layout->name);
+      for (unsigned value = 0; value < 256; ++value) {
+        Bytes changed = bytes;
+        put(changed, offset, value, 1);
+        const auto refusal = check_bytes(changed, type);
+        REQUIRE(refusal.has_value() == (value > 1));
+        if (refusal) CHECK(refusal->reason == Reason::kOutOfRange);
+      }
+    }
+  }
+  CHECK(types.size() >= 3);
+}
+
+TEST_CASE("a list adds its elements' bytes to a message") {
+  for (const std::size_t count : {0, 1, 7, 1000}) {
+    landmarks_t scan{};
+    scan.num_detections = static_cast<std::int32_t>(count);
+    scan.detections.resize(count);
+    CHECK(bytes_with<landmarks_t, detection_t>(count) == encode_bytes(scan).size());
+    map_t map{};
+    map.num_landmarks = static_cast<std::int32_t>(count);
+    map.landmarks.resize(count);
+    CHECK(bytes_with<map_t, map_landmark_t>(count) == encode_bytes(map).size());
+  }
+}
+
 TEST_CASE("a string of length zero, without end or with a zero inside is refused") {
   log_t message{};
   message.text = "abc";

@@ -31,6 +31,9 @@ void add_tracking_rows(const FrontendOptions& options, const std::atomic<bool>& 
 /// The filter on simulated detections: consistency, drift, time.
 void add_filter_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
                      FrontendRows& rows);
+/// The filter where sway, walk of the biases and noise are not those that it takes them for.
+void add_mismatch_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
+                       FrontendRows& rows);
 /// Trunks and corners in simulated sweeps: precision, recall, error, covariance, time.
 void add_extraction_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
                          FrontendRows& rows);

@@ -44,11 +44,11 @@ void add_time_rows(const harness::ChainRun& run, FrontendRows& rows) {
 
 void add_chain_rows(const harness::ChainRun& run, std::optional<double> ate_target_m,
                     FrontendRows& rows) {
-  const harness::TrajectoryError slam =
-      harness::trajectory_error(harness::poses_of(run.slam), run.truth);
+  const harness::TrajectoryError slam = harness::trajectory_error(run.slam, run.truth);
   const harness::TrajectoryError ekf =
       harness::trajectory_error(harness::poses_of(run.ekf), run.truth);
   const harness::TrajectoryError reckoned = harness::trajectory_error(run.dead_reckoned, run.truth);
+  const harness::TrajectoryError summed = harness::trajectory_error(run.odometry, run.truth);
 
   rows.state("driven", ekf.driven_m, "m");
   if (ate_target_m) {
@@ -56,7 +56,11 @@ void add_chain_rows(const harness::ChainRun& run, std::optional<double> ate_targ
   } else {
     rows.state("SLAM_POSE ATE", slam.ate_rms_m, "m");
   }
+  if (const std::size_t maps = harness::count_maps(run.slam); maps > 1) {
+    rows.state("SLAM_POSE: maps, each aligned by itself", static_cast<double>(maps), "");
+  }
   rows.state("SLAM_POSE largest error", slam.largest_m, "m");
+  rows.state("SLAM_POSE drift", 100.0 * slam.end_m / std::max(slam.driven_m, 1.0), "%");
   rows.state("map's keyframes at the end, ATE",
              harness::trajectory_error(harness::poses_of(run.keyframes), run.truth).ate_rms_m, "m");
 
@@ -68,7 +72,9 @@ void add_chain_rows(const harness::ChainRun& run, std::optional<double> ate_targ
 
   rows.state("EKF_POSE ATE", ekf.ate_rms_m, "m");
   rows.at_most("EKF_POSE drift", 100.0 * ekf.end_m / std::max(ekf.driven_m, 1.0), "%", 0.5);
-  rows.state("RAW_POSE ATE", reckoned.ate_rms_m, "m");
+  // A laser alone gives neither; no error is not none.
+  if (reckoned.poses > 0) rows.state("RAW_POSE ATE", reckoned.ate_rms_m, "m");
+  if (summed.poses > 0) rows.state("ODOMETRY summed, ATE", summed.ate_rms_m, "m");
 
   rows.at_most("wrong updates", static_cast<double>(wrong_updates(run)), "", 0.0);
   rows.state("keyframes accepted", static_cast<double>(accepted(run)), "");

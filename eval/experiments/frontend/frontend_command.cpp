@@ -100,6 +100,11 @@ bool wants(const FrontendOptions& options, const std::string& section) {
          std::ranges::find(options.sections, section) != options.sections.end();
 }
 
+/// By its name alone: an experiment beside the others.
+bool asks_for(const FrontendOptions& options, const std::string& section) {
+  return !options.sections.empty() && wants(options, section);
+}
+
 void run(const FrontendOptions& options) {
   const auto& stop = terminal::catch_interrupts();
   FrontendRows rows;
@@ -110,6 +115,7 @@ void run(const FrontendOptions& options) {
   if (wants(options, "forest-plots")) add_forest_plot_rows(options, stop, rows, plots);
   if (wants(options, "tracking")) add_tracking_rows(options, stop, rows);
   if (wants(options, "filter")) add_filter_rows(options, stop, rows);
+  if (asks_for(options, "mismatch")) add_mismatch_rows(options, stop, rows);
   add_drive_rows(options, stop, rows, traces);
   if (wants(options, "faults")) add_fault_rows(options, stop, rows);
 
@@ -157,7 +163,8 @@ void add_frontend_experiment(CLI::App& eval) {
   command->add_option(
       "--only", options->sections,
       "extraction, forest-plots, tracking, filter, chain, faults, or the beginning of a chain "
-      "drive's name (forest, urban, country, poles)");
+      "drive's name (forest, urban, country, poles); only where it is named: mismatch (the filter "
+      "on a vehicle that sways, and sensors that err, by 0.5 and 2 times what it takes them for)");
   command->add_flag("!--no-plots", options->plots, "No plots");
 
   command->callback([options] { run_guarded("frontend", [options] { run(*options); }); });

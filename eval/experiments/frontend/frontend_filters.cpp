@@ -80,6 +80,17 @@ void add_consistency_rows(const EkfDriveOptions& options, std::span<const EkfDri
   rows.state("mean NEES of velocity and biases (5)", summary.overall_velocity_nees, "");
 }
 
+/// A vehicle that sways, biases that walk and sensors that err by `factor` times what the filter
+/// and the messages take them for.
+void mismatch(sim::InertialDriveParameters& drive, double factor) {
+  drive.sway_sigma_m *= factor;
+  drive.sway_sigma_rad *= factor;
+  drive.sway_sigma_mps *= factor;
+  drive.gyro_walk *= factor;
+  drive.accelerometer_walk *= factor;
+  drive.true_noise_factor = factor;
+}
+
 /// The three ways to measure errors where they differ: long without odometry, few landmarks.
 void add_form_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
                    const sim::TrunkField& world, FrontendRows& rows) {
@@ -141,6 +152,36 @@ void add_tracking_rows(const FrontendOptions& options, const std::atomic<bool>& 
     rows.at_least("purity of tracks", pure / published, "", 0.999);
     rows.at_most("id switches per km", switches / km, "1/km", 1.0);
     rows.state("scan p99", 1e3 * p99_s, "ms");
+  }
+}
+
+void add_mismatch_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
+                       FrontendRows& rows) {
+  const sim::TrunkField world = field(options.seed);
+  for (const double factor : {0.5, 1.0, 2.0}) {
+    for (const bool has_wheels : {false, true}) {
+      EkfDriveOptions drive;
+      drive.drive.odometry =
+          has_wheels ? sim::OdometryKind::kInertialAndWheels : sim::OdometryKind::kInertial;
+      let_sway(drive.drive);
+      mismatch(drive.drive, factor);
+      const std::vector<EkfDriveResult> results = drive_filter(drive, options, stop, world);
+      const EkfConsistency summary = summarise(results);
+
+      rows.in(fmt::format("ekf, sway, walk and noise {} times as assumed: {} ({} runs of {:.0f} m)",
+                          factor, has_wheels ? "wheels and IMU" : "IMU alone", summary.runs,
+                          summary.driven_m));
+      const auto moving = static_cast<std::size_t>(
+          std::lround(drive.drive.stationary_s / drive.drive.scan_interval_s));
+      rows.state("mean NEES of the pose, stationary (3 is exact)", mean_nees(results, {1, moving}),
+                 "");
+      rows.state("mean NEES of the pose, moving (3)",
+                 mean_nees(results, {moving, summary.mean_nees.size()}), "");
+      rows.state("mean NEES of velocity and biases (5)", summary.overall_velocity_nees, "");
+      rows.state("drift", summary.drift_percent, "%");
+      rows.state("landmarks refused", 100.0 * summary.refused_share, "%");
+      rows.state("restarts", static_cast<double>(summary.restarts), "");
+    }
   }
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/bus/config_file.hpp"
+#include "common/bus/launch_config.hpp"
 #include "common/model/slam_output.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "eval/harness/chain_drive.hpp"
@@ -42,7 +43,7 @@ double heap_mib() {
 /// The mapper's configuration with the radius of known ground that the options ask for.
 std::map<std::string, std::string> toml_instead(const LapsOptions& options) {
   if (options.known_ground_m < 0.0) return {};
-  const std::filesystem::path file = options.config_dir / fmt::format("{}.toml", kMapper);
+  const std::filesystem::path file = bus::config_file_in(options.config_dir, kMapper);
   std::string toml = bus::read_config_file(file);
   const std::string table = "[smoothing]\n";
   const auto at = toml.find(table);
@@ -170,7 +171,7 @@ void drive_laps(const LapsOptions& options, const std::atomic<bool>& stop, Progr
   std::vector<Lap>& laps = progress.laps;
   if (static_cast<int>(laps.size()) >= options.laps) return;
   sim::SensorDrive drive = make_drive(options);
-  harness::SensorChain chain(harness::front_end_services(), options.config_dir,
+  harness::SensorChain chain(harness::services_of(options.config_dir), options.config_dir,
                              toml_instead(options));
   if (!laps.empty()) chain.load(progress.states);
   for (std::uint64_t i = 0; i < progress.readings; ++i) drive.skip();

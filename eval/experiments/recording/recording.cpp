@@ -24,6 +24,9 @@ struct Options {
   std::string name;
   std::string config_dir = "deploy/config/lidar";
   std::string json;
+  std::vector<double> antenna_m = {0.0, 0.0};  ///< Of GNSS, frame `vehicle`.
+  std::vector<double> reference = {0.0, 0.0,
+                                   0.0};  ///< x_m, y_m, yaw_rad of what GROUND_TRUTH is of.
   bool plots = true;
 };
 
@@ -54,7 +57,7 @@ void watch_pictures(harness::SensorChain& chain, Recording& recording) {
 
 Recording drive_recording(const Options& options, const std::atomic<bool>& stop) {
   Recording recording;
-  harness::SensorChain chain(harness::front_end_services(), options.config_dir);
+  harness::SensorChain chain(harness::services_of(options.config_dir), options.config_dir);
   watch_chain(chain, recording.run);
   watch_pictures(chain, recording);
 
@@ -62,6 +65,8 @@ Recording drive_recording(const Options& options, const std::atomic<bool>& stop)
   terminal::Progress progress(options.name, static_cast<double>(reader.size_bytes()),
                               terminal::Progress::Without::kSeconds);
 
+  const geometry::SE2 reference_T_vehicle =
+      geometry::SE2(options.reference[0], options.reference[1], options.reference[2]).inverse();
   std::uint64_t position = 0;
   std::optional<model::Utime> begin;
   while (const auto event = reader.next()) {
@@ -71,7 +76,8 @@ Recording drive_recording(const Options& options, const std::atomic<bool>& stop)
 
     if (event->channel == "GROUND_TRUTH") {
       if (const auto truth = wire::decode_message<ground_truth_t>(event->data)) {
-        recording.run.truth.push_back({truth->utime, wire::from_wire(truth->world_T_vehicle)});
+        recording.run.truth.push_back(
+            {truth->utime, wire::from_wire(truth->world_T_vehicle) * reference_T_vehicle});
       }
     } else if (event->channel == "RAW_GNSS") {
       if (const auto fix = wire::decode_message<model::GnssFix>(event->data))
@@ -89,10 +95,11 @@ Recording drive_recording(const Options& options, const std::atomic<bool>& stop)
   return recording;
 }
 
-void add_gnss_rows(const Recording& recording, frontend::FrontendRows& rows) {
+void add_gnss_rows(const Recording& recording, const Eigen::Vector2d& antenna_m,
+                   frontend::FrontendRows& rows) {
   const auto add = [&](const std::string& name, const std::vector<metrics::StampedPose>& poses) {
     if (poses.size() < 2) return;
-    const metrics::FixErrors errors = against_fixes(poses, recording.fixes);
+    const metrics::FixErrors errors = against_fixes(poses, recording.fixes, antenna_m);
     if (errors.to_path_m.empty()) return;
     rows.state(name + ": GNSS fix to path, median", errors.to_path_median_m, "m");
     rows.state(name + ": GNSS fix to path, 90 %", errors.to_path_p90_m, "m");
@@ -101,6 +108,7 @@ void add_gnss_rows(const Recording& recording, frontend::FrontendRows& rows) {
   add("SLAM_POSE", harness::poses_of(recording.run.slam));
   add("EKF_POSE", harness::poses_of(recording.run.ekf));
   add("RAW_POSE", recording.run.dead_reckoned);
+  add("ODOMETRY summed", recording.run.odometry);
 }
 
 double mean_detections(const harness::ChainRun& run) {
@@ -154,7 +162,9 @@ void run(Options options) {
   } else {
     add_time_rows(recording.run, rows);
   }
-  if (!recording.fixes.empty()) add_gnss_rows(recording, rows);
+  if (!recording.fixes.empty()) {
+    add_gnss_rows(recording, {options.antenna_m[0], options.antenna_m[1]}, rows);
+  }
 
   std::cout << to_table(rows.rows());
   for (const auto& [service, health] : recording.run.health) {
@@ -194,6 +204,18 @@ void add_recording_experiment(CLI::App& eval) {
   command->add_option("--name", options->name, "In tables and pictures; default the file's");
   command->add_option("--config", options->config_dir, "Configuration of the chain's services");
   command->add_option("--json", options->json, "Results; traces and plots go beside it");
+  command
+      ->add_option("--antenna", options->antenna_m,
+                   "x,y [m] of the GNSS antenna on the vehicle (default 0,0)")
+      ->delimiter(',')
+      ->expected(2);
+  command
+      ->add_option(
+          "--reference", options->reference,
+          "x,y,yaw [m, rad] on the vehicle of what GROUND_TRUTH is the pose of, where it is "
+          "not the vehicle's")
+      ->delimiter(',')
+      ->expected(3);
   command->add_flag("!--no-plots", options->plots, "No plots");
   command->callback([options] { run_guarded("recording", [options] { run(*options); }); });
 }

@@ -1,12 +1,26 @@
 #include "services/geoslam_mapper/smoothing/doubles.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <iterator>
+#include <numbers>
 #include <optional>
 
 namespace understory::geoslam_mapper::smoothing {
 namespace {
+
+/// So much likelier must one landmark be than two.
+constexpr double kLeastOdds = 30.0;
+/// Degrees of freedom of the error's distribution (Student's t): real landmarks have heavy tails.
+constexpr double kTail = 4.0;
+/// Observations on one way lie this near together on the vehicle's path [m].
+constexpr double kOneWay_m = 15.0;
+constexpr int kLeastTurns = 2;  ///< So many of either show that both are there on that way.
+/// A landmark or node that was seen last so long ago on the way [m] is of an earlier pass.
+constexpr double kEarlierPass_m = 50.0;
+constexpr double kNeighbourhood_m = 25.0;
+/// No two trunks stand nearer to each other, from centre to centre [m].
+constexpr double kTouching_m = 0.06;
 
 /// Whether nodes observed the two side by side. Two trunks that really are so near to each other
 /// are observed together from almost everywhere; one that a bad scan doubled is so once.
@@ -18,67 +32,137 @@ bool are_observed_together(const StoredLandmark& a, const StoredLandmark& b) {
   return common > 1 || 4 * common > std::min(a.nodes.size(), b.nodes.size());
 }
 
-/// A landmark that is the same as this one.
-std::optional<model::LandmarkId> double_of(const StoredLandmark& landmark, double merge_distance_m,
-                                           const GlobalMap& map) {
+/// Observations of `a` within a short way of one of `b`, from other nodes.
+int count_beside(const StoredLandmark& a, const StoredLandmark& b, const PoseGraph& graph) {
+  return static_cast<int>(std::count_if(a.nodes.begin(), a.nodes.end(), [&](NodeIndex node) {
+    const double along_m = graph.node(node).along_m;
+    return std::any_of(b.nodes.begin(), b.nodes.end(), [&](NodeIndex other) {
+      return other != node && std::abs(graph.node(other).along_m - along_m) < kOneWay_m;
+    });
+  }));
+}
+
+/// Whether both were observed on one way past them.
+bool are_observed_in_turns(const StoredLandmark& a, const StoredLandmark& b,
+                           const PoseGraph& graph) {
+  return count_beside(a, b, graph) >= kLeastTurns && count_beside(b, a, graph) >= kLeastTurns;
+}
+
+/// What the landmarks around tell of two that are near each other.
+struct Neighbourhood {
+  double density_per_m2 = 0.0;
+  /// Odds that of two passes each misses what the other one sees, against both seeing it.
+  double missing_odds = 1.0;
+};
+
+/// From how many landmarks were observed on this pass, on earlier ones, and on both.
+Neighbourhood neighbourhood_of(const Eigen::Vector2d& position_m, const GlobalMap& map) {
+  const double limit_m = map.graph.node(*map.graph.newest()).along_m - kEarlierPass_m;
+  double all = 0.0;
+  double both = 0.0;
+  map.landmarks.index().for_each_within(
+      position_m, kNeighbourhood_m, [&](model::LandmarkId id, const Eigen::Vector2d&, double) {
+        const std::vector<NodeIndex>& nodes = map.landmarks.at(id).nodes;
+        const auto is_earlier = [&](NodeIndex node) {
+          return map.graph.node(node).along_m < limit_m;
+        };
+        const bool some = std::any_of(nodes.begin(), nodes.end(), is_earlier);
+        all += 1.0;
+        both += some && !std::all_of(nodes.begin(), nodes.end(), is_earlier) ? 1.0 : 0.0;
+      });
+
+  // Of passes that see a share q each, q / (2 - q) of what either sees is seen by both.
+  const double shared = (both + 0.5) / (all + 1.0);
+  const double seen = 2.0 * shared / (1.0 + shared);
+  const double missing = (1.0 - seen) / seen;
+  return {all / (std::numbers::pi * kNeighbourhood_m * kNeighbourhood_m), missing * missing};
+}
+
+/// How much likelier it is that two landmarks so far apart are one than that they are two
+/// neighbours, of which each pass missed one.
+double odds_of_one(const Eigen::Vector2d& apart_m, const Eigen::Matrix2d& covariance_m2,
+                   const Neighbourhood& around) {
+  const double squared = apart_m.dot(covariance_m2.inverse() * apart_m);
+  const double density_of_one = std::pow(1.0 + squared / kTail, -0.5 * (kTail + 2.0)) /
+                                (2.0 * std::numbers::pi * std::sqrt(covariance_m2.determinant()));
+  return density_of_one / (around.density_per_m2 * around.missing_odds);
+}
+
+/// Whether a third landmark, that is another one than one of the two, lies where they may be.
+bool has_rival(const StoredLandmark& a, const StoredLandmark& b, double radius_m,
+               const LandmarkMap& landmarks) {
+  bool result = false;
+  landmarks.index().for_each_within(0.5 * (a.position_m + b.position_m), radius_m,
+                                    [&](model::LandmarkId id, const Eigen::Vector2d&, double) {
+                                      if (id == a.id || id == b.id || result) return;
+                                      const StoredLandmark& third = landmarks.at(id);
+                                      result = are_observed_together(third, a) ||
+                                               are_observed_together(third, b);
+                                    });
+  return result;
+}
+
+enum class Sameness { kTwo, kOneByPlace, kOne };
+
+Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
+                  const SmoothingMapperParameters& parameters, const GlobalMap& map) {
+  const Eigen::Vector2d apart = a.position_m - b.position_m;
+  const bool touch = apart.norm() < std::max({kTouching_m, a.radius_m, b.radius_m});
+  if (!touch && are_observed_together(a, b)) return Sameness::kTwo;
+
+  // Where they are, and whether that can tell neighbours apart.
+  const auto covariance = map.graph.difference_covariance(a.id, b.id);
+  if (!covariance) return Sameness::kTwo;
+  const double gate_m =
+      parameters.gate_sigmas * std::sqrt(0.5 * covariance->trace()) + parameters.gate_floor_m;
+  if (gate_m > parameters.merge_distance_m || has_rival(a, b, gate_m, map.landmarks))
+    return Sameness::kTwo;
+
+  // One, whatever the distance, or by the distance.
+  if (touch || are_observed_in_turns(a, b, map.graph)) return Sameness::kOne;
+  const double floor_m = parameters.gate_floor_m / parameters.gate_sigmas;
+  const Eigen::Matrix2d spread = *covariance + floor_m * floor_m * Eigen::Matrix2d::Identity();
+  const Neighbourhood around = neighbourhood_of(a.position_m, map);
+  return odds_of_one(apart, spread, around) >= kLeastOdds ? Sameness::kOneByPlace : Sameness::kTwo;
+}
+
+/// A landmark that is the same as this one, and whether that is final.
+struct Double {
+  model::LandmarkId id = 0;
+  bool is_final = false;
+};
+std::optional<Double> double_of(const StoredLandmark& landmark,
+                                const SmoothingMapperParameters& parameters, const Merges& merges,
+                                const GlobalMap& map) {
+  if (!map.graph.position(landmark.id)) return std::nullopt;
   for (const model::LandmarkId other_id : map.landmarks.index().near(
-           {landmark.position_m, merge_distance_m + 2.0 * LandmarkMap::kStaleness_m})) {
+           {landmark.position_m, parameters.merge_distance_m + 2.0 * LandmarkMap::kStaleness_m})) {
     if (other_id == landmark.id) continue;
     const StoredLandmark& other = map.landmarks.at(other_id);
-    const double distance = (other.position_m - landmark.position_m).norm();
-    if (distance > merge_distance_m || landmark.kind != other.kind ||
-        !map.graph.position(landmark.id) || !map.graph.position(other_id) ||
-        are_observed_together(landmark, other)) {
+    const double distance_m = (other.position_m - landmark.position_m).norm();
+    if (distance_m > parameters.merge_distance_m || landmark.kind != other.kind ||
+        !map.graph.position(other_id) || merges.were_separated(landmark.id, other_id)) {
       continue;
     }
-    return other_id;
+    const Sameness same = sameness(landmark, other, parameters, map);
+    if (same != Sameness::kTwo) return Double{other_id, same == Sameness::kOne};
   }
   return std::nullopt;
 }
 
-void merge(model::LandmarkId old_id, model::LandmarkId new_id,
-           const SmoothingMapperParameters& parameters, GlobalMap& map) {
-  const StoredLandmark& old_one = map.landmarks.at(old_id);
-  StoredLandmark& new_one = map.landmarks.at(new_id);
-  const double sigma = std::sqrt(old_one.local_variance() + new_one.local_variance());
-  const bool agree = (old_one.position_m - new_one.position_m).norm() <=
-                     parameters.gate_sigmas * sigma + parameters.gate_floor_m;
-  map.graph.hand_over(old_id, new_id, old_one.nodes, agree);
-
-  // In order of time as far as it is known: the one observed last has the last nodes.
-  const StoredLandmark& older = old_one.last_keyframe < new_one.last_keyframe ? old_one : new_one;
-  StoredLandmark joined = older;
-  for (const NodeIndex node : (&older == &old_one ? new_one : old_one).nodes)
-    joined.observed_from(node);
-  new_one.nodes = std::move(joined.nodes);
-  if (agree) new_one.information += old_one.information;
-  new_one.observation_count += old_one.observation_count;
-  new_one.last_keyframe = std::max(new_one.last_keyframe, old_one.last_keyframe);
-  map.landmarks.remove(old_id);
-}
-
 }  // namespace
 
-std::vector<std::pair<model::LandmarkId, model::LandmarkId>> merge_doubles(
-    std::span<const model::Association> touched, const SmoothingMapperParameters& parameters,
-    GlobalMap& map) {
-  std::vector<model::LandmarkId> ids;
-  for (const model::Association& pair : touched) ids.push_back(pair.landmark_id);
-  std::sort(ids.begin(), ids.end());
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-
-  std::vector<std::pair<model::LandmarkId, model::LandmarkId>> merged;
+std::vector<MergedPair> merge_doubles(std::span<const model::LandmarkId> ids,
+                                      const SmoothingMapperParameters& parameters, Merges& merges,
+                                      GlobalMap& map) {
+  std::vector<MergedPair> merged;
   for (const model::LandmarkId id : ids) {
     if (!map.landmarks.all().contains(id)) continue;
-    const auto other_id = double_of(map.landmarks.at(id), parameters.merge_distance_m, map);
-    if (!other_id) continue;
+    const auto other = double_of(map.landmarks.at(id), parameters, merges, map);
+    if (!other) continue;
 
-    const bool keep_first = std::pair(map.landmarks.at(id).observation_count, *other_id) >
-                            std::pair(map.landmarks.at(*other_id).observation_count, id);
-    const model::LandmarkId keep = keep_first ? id : *other_id;
-    const model::LandmarkId drop = keep_first ? *other_id : id;
-    merge(drop, keep, parameters, map);
-    merged.emplace_back(drop, keep);
+    merged.push_back(Merges::in_order(id, other->id, map.landmarks));
+    merges.merge(merged.back(), other->is_final, map);
   }
   return merged;
 }

@@ -1,20 +1,24 @@
-// Merging of landmarks that are the same.
+// Landmarks that are the same, found by where they are.
 #pragma once
 
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "services/geoslam_mapper/smoothing/global_map.hpp"
+#include "services/geoslam_mapper/smoothing/merges.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Merges landmarks nearer than `merge_distance_m` to each other that were not observed side by
-/// side: the one with fewer observations into the other. Its observations keep counting where they
-/// agree with the other's position within the noise. Looks only around the landmarks of `touched`.
-/// Returns (old id, new id) of each merged pair.
-std::vector<std::pair<model::LandmarkId, model::LandmarkId>> merge_doubles(
-    std::span<const model::Association> touched, const SmoothingMapperParameters& parameters,
-    GlobalMap& map);
+/// Merges landmarks that are one by all that is known of their distance. The joint covariance must
+/// tell neighbours apart, and the two must not have been observed side by side. Then they are one
+/// where they were observed in turns on one way past them, where two trunks would touch, or where
+/// that is much likelier than two neighbours of which two passes saw one each: by their distance in
+/// its covariance, by how dense landmarks stand around, and by how many of these both passes saw.
+/// Where the covariance is large, only the neighbourhood as a whole can tell: PassJoiner. Looks
+/// around the landmarks of `ids`, up to `merge_distance_m`. The graph is not solved. Returns the
+/// merged pairs.
+std::vector<MergedPair> merge_doubles(std::span<const model::LandmarkId> ids,
+                                      const SmoothingMapperParameters& parameters, Merges& merges,
+                                      GlobalMap& map);
 
 }  // namespace understory::geoslam_mapper::smoothing

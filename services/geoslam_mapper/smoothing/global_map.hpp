@@ -1,6 +1,8 @@
 // The map as one value: landmarks, graph, trajectory.
 #pragma once
 
+#include <vector>
+
 #include "services/geoslam_mapper/smoothing/landmark_map.hpp"
 #include "services/geoslam_mapper/smoothing/pose_graph.hpp"
 #include "services/geoslam_mapper/smoothing/trajectory.hpp"
@@ -13,9 +15,9 @@ struct GlobalMap {
   PoseGraph graph;
   Trajectory trajectory;
 
-  /// An empty map.
-  explicit GlobalMap(const SmoothingMapperParameters& parameters)
-      : graph(parameters), trajectory(parameters) {}
+  /// An empty map. `id`: upper 16 bit of its landmarks' ids.
+  explicit GlobalMap(const SmoothingMapperParameters& parameters, std::uint32_t id = 1)
+      : landmarks(id), graph(parameters), trajectory(parameters) {}
 
   /// Whether there is neither a landmark nor a keyframe.
   bool empty() const { return landmarks.empty() && trajectory.bases().empty(); }
@@ -35,6 +37,42 @@ struct GlobalMap {
     out.observation_count = stored.observation_count;
     out.kind = stored.kind;
     return out;
+  }
+
+  /// Every landmark as other processes get it, in order of id. O(map).
+  std::vector<model::MapLandmark> all_landmarks() const {
+    std::vector<model::MapLandmark> result;
+    result.reserve(landmarks.all().size());
+    for (const auto& [id, stored] : landmarks.all()) result.push_back(landmark(stored));
+    return result;
+  }
+
+  /// The pose of every base at the present estimate, in order of time. O(bases).
+  std::vector<model::KeyframePose> all_poses() const {
+    std::vector<model::KeyframePose> result;
+    result.reserve(trajectory.size());
+    for (const Base& base : trajectory.bases()) {
+      result.push_back(
+          {base.sequence, base.utime, trajectory.pose(base, graph), Eigen::Matrix3d::Zero()});
+    }
+    return result;
+  }
+
+  /// Covariance [m^2] of a landmark's position, frame `map`. The graph has none of a landmark that
+  /// it was not solved with yet: then by the node that observed it.
+  Eigen::Matrix2d covariance_m2(model::LandmarkId id) const {
+    const StoredLandmark& landmark = landmarks.at(id);
+    if (!graph.position(id)) return landmark.prior_covariance;
+    if (const auto marginal = graph.covariance(id)) return *marginal;
+
+    const geometry::SE2WithCovariance map_T_node = graph.marginal(landmark.nodes.back());
+    const Eigen::Vector2d in_node = map_T_node.mean.inverse() * landmark.position_m;
+    Eigen::Matrix<double, 2, 3> jacobian;  // d(position)/d(xi), in the node's frame.
+    jacobian << 1.0, 0.0, -in_node.y(), 0.0, 1.0, in_node.x();
+    const Eigen::Matrix2d rotation = map_T_node.mean.rotation();
+    return rotation * jacobian * map_T_node.covariance * jacobian.transpose() *
+               rotation.transpose() +
+           landmark.local_variance() * Eigen::Matrix2d::Identity();
   }
 
   /// Members of a saved state; see common/state. After a load the graph is solved from its saved

@@ -25,7 +25,8 @@ std::size_t count_common(const Node& a, const Node& b) {
 
 }  // namespace
 
-void KnownGround::follow(const FusedKeyframe& fused, Discovery& discovery, GlobalMap& map) {
+void KnownGround::follow(const FusedKeyframe& fused, Discovery& discovery, Merges& merges,
+                         GlobalMap& map) {
   if (radius_m_ <= 0.0 || (!recent_.empty() && recent_.back().node == fused.node)) return;
   recent_.push_back({fused.node, fused.is_new_node});
   if (recent_.size() < kTogether + kStay) return;
@@ -50,6 +51,7 @@ void KnownGround::follow(const FusedKeyframe& fused, Discovery& discovery, Globa
   for (const auto& [id, one] : handed_over) map.landmarks.at(id).replace(one.node, one.into);
   for (const Retirement& one : surplus.nodes) {
     discovery.hand_over(one);
+    merges.hand_over(one.node);
     map.trajectory.hand_over(one);
   }
   map.adopt_estimates();

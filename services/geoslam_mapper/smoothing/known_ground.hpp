@@ -8,6 +8,7 @@
 #include "services/geoslam_mapper/smoothing/discovery.hpp"
 #include "services/geoslam_mapper/smoothing/fusion.hpp"
 #include "services/geoslam_mapper/smoothing/global_map.hpp"
+#include "services/geoslam_mapper/smoothing/merges.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 
@@ -24,7 +25,7 @@ class KnownGround {
 
   /// To be called after each accepted keyframe. Takes out what can be, several nodes at a time, and
   /// solves; the map is as before where that fails. Cost: what the nodes observed.
-  void follow(const FusedKeyframe& fused, Discovery& discovery, GlobalMap& map);
+  void follow(const FusedKeyframe& fused, Discovery& discovery, Merges& merges, GlobalMap& map);
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>

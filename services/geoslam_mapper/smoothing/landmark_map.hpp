@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "common/constellation/map.hpp"
@@ -62,6 +63,10 @@ class LandmarkMap {
   /// Largest distance [m] between a landmark and its place in the index; see move().
   static constexpr double kStaleness_m = 0.25;
 
+  /// No landmarks yet; new ones get ids of map `map_id`.
+  explicit LandmarkMap(std::uint32_t map_id = 1)
+      : next_id_((model::LandmarkId{map_id} << model::kLandmarkCounterBits) | 1U) {}
+
   /// Adds a landmark of a given map (GeoSLAM §4.3.1). One without id gets the next one; one without
   /// covariance gets `sigma_m` per axis.
   void add_given(const model::MapLandmark& given, double sigma_m);
@@ -86,6 +91,16 @@ class LandmarkMap {
   /// Brings the index to within a centimetre, before a search by descriptors. O(what moved).
   void catch_up();
 
+  /// Number of the map: upper 16 bit of the ids that it gives.
+  std::uint32_t map_id() const { return model::map_of(next_id_); }
+
+  /// Those around the vehicle that may be any of several by where they are, ascending.
+  void set_loose(std::vector<model::LandmarkId> ids) { loose_ = std::move(ids); }
+  /// Whether the landmark is one of them. O(log n).
+  bool is_loose(model::LandmarkId id) const {
+    return std::binary_search(loose_.begin(), loose_.end(), id);
+  }
+
   /// Ids of landmarks that are new or moved since the last call, ascending, without the removed.
   std::vector<model::LandmarkId> take_changed();
   /// Reports all landmarks as changed: after a load, when the graph was solved anew.
@@ -96,7 +111,7 @@ class LandmarkMap {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     std::vector<Eigen::Vector2d> indexed_m = self.indexed_positions();
-    a(self.landmarks_, self.late_, self.next_id_, indexed_m);
+    a(self.landmarks_, self.late_, self.loose_, self.next_id_, indexed_m);
     if constexpr (Archive::kReads) self.rebuild_index(indexed_m);
   }
 
@@ -109,7 +124,8 @@ class LandmarkMap {
   constellation::ConstellationMap index_;
   std::vector<model::LandmarkId> late_;     ///< Those with is_late, and some removed ones.
   std::vector<model::LandmarkId> changed_;  ///< With repetitions.
-  model::LandmarkId next_id_ = (model::LandmarkId{1} << 48U) | 1U;  ///< Map 1, landmark 1.
+  std::vector<model::LandmarkId> loose_;    ///< Ascending.
+  model::LandmarkId next_id_;
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -18,6 +18,13 @@ Motion::Motion(const SmoothingMapperParameters& parameters)
     : parameters_(parameters),
       odometry_(parameters.gyro_walk > 0.0 ? 0.0 : model::OdometryBuffer::kBiasCorrelation_s) {}
 
+Motion Motion::from_nowhere() const {
+  Motion motion(parameters_);
+  motion.odometry_ = odometry_;
+  motion.filter_ = filter_;
+  return motion;
+}
+
 void Motion::add(const model::Odometry& increment) {
   if (parameters_.use_odometry) odometry_.add(increment);
 }

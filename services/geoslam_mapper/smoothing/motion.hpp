@@ -37,6 +37,9 @@ class Motion {
   /// without odometry and `start_heading_sigma_rad`.
   explicit Motion(const SmoothingMapperParameters& parameters);
 
+  /// The same odometry and filter, before any keyframe: for a map that begins now.
+  Motion from_nowhere() const;
+
   /// Adds an odometry increment, if the configuration uses odometry.
   void add(const model::Odometry& increment);
   /// Adds the filter's pose: its bias and velocity correct later increments.

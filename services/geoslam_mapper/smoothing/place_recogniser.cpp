@@ -1,7 +1,10 @@
 #include "services/geoslam_mapper/smoothing/place_recogniser.hpp"
 
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/geometry/registration.hpp"
 #include "services/geoslam_mapper/smoothing/relative_variance.hpp"
@@ -26,32 +29,65 @@ std::vector<model::LandmarkId> landmarks_in_view(const model::Keyframe& keyframe
   return landmarks.index().near({guess.mean.translation(), reach + kViewMargin_m + 3.0 * spread});
 }
 
+/// Gates up to this size [m] tell landmarks apart, also those that the map does not have.
+constexpr double kNarrow_m = 0.3;
+
+/// Whether the gate of a landmark that was not observed lately is so wide that another one may be
+/// meant. All of a pass are off together then.
+bool is_loose(const StoredLandmark& landmark, double gate_m, int recent_keyframes,
+              const GlobalMap& map) {
+  return gate_m > kNarrow_m && !is_recent(landmark, map, recent_keyframes);
+}
+
 /// How many of the keyframe's landmarks could be in the map: not more than the map has in the field
-/// of view.
+/// of view, without those that are loose.
 std::size_t count_matchable(const model::Keyframe& keyframe, const geometry::SE2& map_T_centre,
+                            const std::vector<model::LandmarkId>& loose,
                             const LandmarkMap& landmarks) {
   std::size_t in_view = 0;
   const geometry::SE2 vehicle_T_map = (map_T_centre * keyframe.centre_T_base()).inverse();
   const double range = keyframe.field_of_view.max_range_m;
   landmarks.index().for_each_within(
       map_T_centre.translation(), range + kViewMargin_m,
-      [&](model::LandmarkId, const Eigen::Vector2d& position, double) {
-        if (keyframe.field_of_view.contains(vehicle_T_map * position)) ++in_view;
+      [&](model::LandmarkId id, const Eigen::Vector2d& position, double) {
+        if (keyframe.field_of_view.contains(vehicle_T_map * position) &&
+            !std::binary_search(loose.begin(), loose.end(), id)) {
+          ++in_view;
+        }
       });
   return std::min(in_view, keyframe.landmarks.size());
+}
+
+/// Covariance of a registration without the information of its guess; where that leaves none, the
+/// guess's own.
+Eigen::Matrix3d without_guess(const Eigen::Matrix3d& registered, const Eigen::Matrix3d& guess) {
+  const Eigen::Matrix3d left = registered.inverse() - guess.inverse();
+  const Eigen::LLT<Eigen::Matrix3d> factor(left);
+  if (factor.info() != Eigen::Success) return guess;
+  return left.inverse();
 }
 
 }  // namespace
 
 Placement PlaceRecogniser::associate(const model::Keyframe& keyframe,
-                                     const geometry::SE2WithCovariance& guess,
+                                     const geometry::SE2WithCovariance& guess, bool with_loose,
                                      const GlobalMap& map) const {
   // The map's landmarks around the guess.
-  const std::vector<model::LandmarkId> ids = landmarks_in_view(keyframe, guess, map.landmarks);
+  std::vector<model::LandmarkId> ids = landmarks_in_view(keyframe, guess, map.landmarks);
   const std::vector<double> variances = relative_variances(ids, map, parameters_.recent_keyframes);
   std::vector<geometry::UncertainPoint> reference;
-  for (std::size_t i = 0; i < ids.size(); ++i)
-    reference.push_back({map.landmarks.at(ids[i]).position_m, variances[i]});
+  std::vector<model::LandmarkId> loose;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const StoredLandmark& landmark = map.landmarks.at(ids[i]);
+    const double gate_m =
+        parameters_.gate_sigmas * std::sqrt(variances[i]) + parameters_.gate_floor_m;
+    if (!with_loose && is_loose(landmark, gate_m, parameters_.recent_keyframes, map)) {
+      loose.push_back(ids[i]);
+      continue;
+    }
+    ids[reference.size()] = ids[i];
+    reference.push_back({landmark.position_m, variances[i]});
+  }
 
   // The keyframe's landmarks.
   std::vector<geometry::UncertainPoint> observed;
@@ -67,7 +103,7 @@ Placement PlaceRecogniser::associate(const model::Keyframe& keyframe,
   const geometry::Registration found = register_points(reference, observed, broad, gating);
 
   // Pairs of the same kind.
-  Placement placement{{found.reference_T_observed, found.covariance}, {}, true};
+  Placement placement{{found.reference_T_observed, found.covariance}, {}, true, std::move(loose)};
   for (const geometry::PointPair& pair : found.pairs) {
     const model::LandmarkId id = ids[pair.reference];
     if (keyframe.landmarks[pair.observed].kind != map.landmarks.at(id).kind) continue;
@@ -79,9 +115,9 @@ Placement PlaceRecogniser::associate(const model::Keyframe& keyframe,
 std::optional<Placement> PlaceRecogniser::track(const model::Keyframe& keyframe,
                                                 const Prediction& prediction,
                                                 const GlobalMap& map) const {
-  Placement placement = associate(keyframe, prediction.map_T_centre, map);
+  Placement placement = associate(keyframe, prediction.map_T_centre, false, map);
   const std::size_t possible =
-      count_matchable(keyframe, placement.map_T_centre.mean, map.landmarks);
+      count_matchable(keyframe, placement.map_T_centre.mean, placement.loose, map.landmarks);
   const std::size_t matched = placement.associations.size();
   const geometry::MatchQuota quota{static_cast<std::size_t>(parameters_.min_matched),
                                    parameters_.min_matched_ratio};
@@ -108,9 +144,12 @@ SearchResult PlaceRecogniser::search(const model::Keyframe& keyframe, const Glob
     return result;
   }
 
-  // Association around that pose.
-  result.placement = associate(keyframe, {found.map_T_sensor, found.covariance}, map);
+  // Association around that pose, which rests on the same landmarks: they count once.
+  const geometry::SE2WithCovariance guess{found.map_T_sensor, found.covariance};
+  result.placement = associate(keyframe, guess, true, map);
   result.placement->by_prediction = false;
+  Eigen::Matrix3d& covariance = result.placement->map_T_centre.covariance;
+  covariance = without_guess(covariance, guess.covariance);
   if (result.placement->associations.size() < static_cast<std::size_t>(parameters_.min_matched)) {
     result.placement.reset();
     result.reason = "the place found has too few matching landmarks";

@@ -24,8 +24,9 @@ class PlaceRecogniser {
   /// `parameters` gives the gates and how many matches are enough.
   explicit PlaceRecogniser(const SmoothingMapperParameters& parameters) : parameters_(parameters) {}
 
-  /// Association in gates around a prediction. None where too few landmarks match: less than
-  /// `min_matched_ratio` of those that could, or without odometry fewer than `min_matched`.
+  /// Association in gates around a prediction, with landmarks whose gates tell them apart. None
+  /// where too few landmarks match: less than `min_matched_ratio` of those that could, or without
+  /// odometry fewer than `min_matched`.
   std::optional<Placement> track(const model::Keyframe& keyframe, const Prediction& prediction,
                                  const GlobalMap& map) const;
 
@@ -35,7 +36,7 @@ class PlaceRecogniser {
 
  private:
   Placement associate(const model::Keyframe& keyframe, const geometry::SE2WithCovariance& guess,
-                      const GlobalMap& map) const;
+                      bool with_loose, const GlobalMap& map) const;
 
   SmoothingMapperParameters parameters_;
 };

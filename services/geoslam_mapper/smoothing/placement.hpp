@@ -19,6 +19,8 @@ struct Placement {
   geometry::SE2WithCovariance map_T_centre;
   std::vector<model::Association> associations;
   bool by_prediction = false;  ///< False: by search of the whole map.
+  /// Landmarks around that may be any of several by where they are, ascending: see PassJoiner.
+  std::vector<model::LandmarkId> loose;
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -26,7 +26,7 @@ PoseGraph::PoseGraph(const SmoothingMapperParameters& parameters)
 
 void PoseGraph::checkpoint() {
   smoother_.checkpoint();
-  before_ = Checkpoint{nodes_.size(), landmark_of_point_.size(), newest_, {}, {}};
+  before_ = Checkpoint{nodes_.size(), landmark_of_point_.size(), newest_, {}, {}, {}};
   gyro_.checkpoint();
   for (FreeNumbers* free :
        {&free_nodes_, &free_points_, &free_observations_, &free_motions_, &free_biased_})
@@ -46,6 +46,10 @@ void PoseGraph::rollback() {
   for (const plane::PointId point : before_->restarted) {
     point_of_.erase(landmark_of_point_[index(point)]);
     landmark_of_point_[index(point)] = 0;
+  }
+  for (const auto& [point, id] : before_->dropped) {
+    landmark_of_point_[index(point)] = id;
+    point_of_.emplace(id, point);
   }
 
   nodes_.resize(before_->nodes);
@@ -134,8 +138,9 @@ void PoseGraph::ignore(NodeIndex node, model::LandmarkId id) {
   observations.erase(entry);
 }
 
-void PoseGraph::hand_over(model::LandmarkId old_id, model::LandmarkId new_id,
-                          std::span<const NodeIndex> nodes, bool agree) {
+std::vector<HandedOver> PoseGraph::hand_over(model::LandmarkId old_id, model::LandmarkId new_id,
+                                             std::span<const NodeIndex> nodes) {
+  std::vector<HandedOver> result;
   const plane::PointId new_point = point_of_.at(new_id);
   for (const NodeIndex node : nodes) {
     auto& observations = edit(node).observations;
@@ -144,8 +149,9 @@ void PoseGraph::hand_over(model::LandmarkId old_id, model::LandmarkId new_id,
 
     // A node that observed both keeps its observation of the landmark that stays.
     plane::PointObservation factor = smoother_.observation(handle.mapped());
+    const bool counts = !observations.contains(new_id);
+    result.push_back({node, factor.position, factor.information, counts});
     factor.point = new_point;
-    const bool counts = agree && !observations.contains(new_id);
     if (!counts) factor.information.setZero();
     smoother_.set(handle.mapped(), factor);
     if (!counts) {
@@ -159,8 +165,38 @@ void PoseGraph::hand_over(model::LandmarkId old_id, model::LandmarkId new_id,
 
   const auto old_point = point_of_.find(old_id);
   landmark_of_point_[index(old_point->second)] = 0;
+  if (before_ && index(old_point->second) < before_->points)
+    before_->dropped.emplace_back(old_point->second, old_id);
   if (smoother_.is_free(old_point->second)) free_points_.give(index(old_point->second));
   point_of_.erase(old_point);
+  return result;
+}
+
+std::vector<NodeIndex> PoseGraph::give_back(model::LandmarkId from_id, model::LandmarkId to_id,
+                                            std::span<const HandedOver> handed_over) {
+  std::vector<NodeIndex> nodes;
+  const plane::PointId to_point = point_of_.at(to_id);
+  for (const HandedOver& one : handed_over) {
+    if (!one.counts) {
+      observe(one.node, to_id, one.position_m, one.information);
+      nodes.push_back(one.node);
+      continue;
+    }
+
+    const auto entry = nodes_[one.node].observations.find(from_id);
+    if (entry == nodes_[one.node].observations.end()) continue;
+    plane::PointObservation factor = smoother_.observation(entry->second);
+    if (factor.position != one.position_m || factor.information != one.information) continue;
+    factor.point = to_point;
+    smoother_.set(entry->second, factor);
+
+    auto& observations = edit(one.node).observations;
+    auto handle = observations.extract(from_id);
+    handle.key() = to_id;
+    observations.insert(std::move(handle));
+    nodes.push_back(one.node);
+  }
+  return nodes;
 }
 
 void PoseGraph::add_motion(const CentreMotion& motion, NodeIndex node) {
@@ -240,6 +276,21 @@ std::vector<double> PoseGraph::relative_variances(NodeIndex node,
     variances.push_back(0.5 * covariance.trace());
   }
   return variances;
+}
+
+std::optional<Eigen::Matrix2d> PoseGraph::covariance(model::LandmarkId id) const {
+  const auto marginal = smoother_.joint_marginal({}, {&point_of_.at(id), 1});
+  if (!marginal) return std::nullopt;
+  return Eigen::Matrix2d(*marginal);
+}
+
+std::optional<Eigen::Matrix2d> PoseGraph::difference_covariance(model::LandmarkId a,
+                                                                model::LandmarkId b) const {
+  const plane::PointId both[] = {point_of_.at(a), point_of_.at(b)};
+  const auto joint = smoother_.joint_marginal({}, both);
+  if (!joint) return std::nullopt;
+  return Eigen::Matrix2d(joint->topLeftCorner<2, 2>() + joint->bottomRightCorner<2, 2>() -
+                         joint->topRightCorner<2, 2>() - joint->bottomLeftCorner<2, 2>());
 }
 
 std::vector<std::pair<model::LandmarkId, Eigen::Vector2d>> PoseGraph::moved_landmarks() const {

@@ -47,6 +47,20 @@ struct Node {
   }
 };
 
+/// An observation that became another landmark's, as it was.
+struct HandedOver {
+  NodeIndex node = 0;
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();   ///< In the node's frame.
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();  ///< [1/m^2]
+  bool counts = true;  ///< False: the node observed both, and keeps the other observation alone.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.node, s.position_m, s.information, s.counts);
+  }
+};
+
 /// A node to be taken out, and the node that gets what it observed.
 struct Retirement {
   NodeIndex node = 0;
@@ -92,9 +106,13 @@ class PoseGraph {
   /// Takes an observation out.
   void ignore(NodeIndex node, model::LandmarkId id);
   /// Makes two landmarks one: the observations of `old_id` from `nodes` become those of `new_id`.
-  /// They count only if `agree`, and not where a node observed both.
-  void hand_over(model::LandmarkId old_id, model::LandmarkId new_id,
-                 std::span<const NodeIndex> nodes, bool agree);
+  /// They do not count where a node observed both.
+  std::vector<HandedOver> hand_over(model::LandmarkId old_id, model::LandmarkId new_id,
+                                    std::span<const NodeIndex> nodes);
+  /// Gives observations of `from_id` back to a landmark that is in the graph, those that nothing
+  /// was added to since; returns their nodes.
+  std::vector<NodeIndex> give_back(model::LandmarkId from_id, model::LandmarkId to_id,
+                                   std::span<const HandedOver> handed_over);
   /// Adds the motion from an earlier node; nothing but "stationary" if it is the same node.
   void add_motion(const CentreMotion& motion, NodeIndex node);
 
@@ -119,6 +137,11 @@ class PoseGraph {
   std::optional<Eigen::Vector2d> position(model::LandmarkId id) const;
   /// chi^2 (2 degrees of freedom) of one observation at the present estimate.
   double chi2(NodeIndex node, model::LandmarkId id) const;
+  /// One observation: its position in the node's frame and its information.
+  const factor_graph::plane::PointObservation& observation(NodeIndex node,
+                                                           model::LandmarkId id) const {
+    return smoother_.observation(nodes_[node].observations.at(id));
+  }
   /// map_T_centre with its marginal covariance (right perturbation), zero where it is undetermined.
   geometry::SE2WithCovariance marginal(NodeIndex node) const;
   /// a_T_b with its covariance (right perturbation); none where it is undetermined.
@@ -127,6 +150,12 @@ class PoseGraph {
   /// is undetermined.
   std::vector<double> relative_variances(NodeIndex node,
                                          std::span<const model::LandmarkId> ids) const;
+  /// Covariance [m^2] of a landmark's position, frame `map`; none where it is undetermined.
+  std::optional<Eigen::Matrix2d> covariance(model::LandmarkId id) const;
+  /// Covariance [m^2] of the difference of two landmarks' positions, frame `map`; none where it is
+  /// undetermined.
+  std::optional<Eigen::Matrix2d> difference_covariance(model::LandmarkId a,
+                                                       model::LandmarkId b) const;
   /// Landmarks that updates moved since the checkpoint, with their positions [m], each once.
   std::vector<std::pair<model::LandmarkId, Eigen::Vector2d>> moved_landmarks() const;
   /// Nodes that updates moved since the checkpoint, each once.
@@ -149,6 +178,8 @@ class PoseGraph {
     std::optional<NodeIndex> newest;
     std::map<NodeIndex, Node> changed;                    ///< Of those there were, as they were.
     std::vector<factor_graph::plane::PointId> restarted;  ///< Points with a landmark again.
+    /// Points whose landmark was joined with another one.
+    std::vector<std::pair<factor_graph::plane::PointId, model::LandmarkId>> dropped;
   };
   Node& edit(NodeIndex node);
   void restore(const factor_graph::plane::Graph& graph);

@@ -50,6 +50,11 @@ std::size_t nearest_chosen(const OldLandmarks& old, const std::vector<std::size_
 
 }  // namespace
 
+bool is_recent(const StoredLandmark& landmark, const GlobalMap& map, int recent_keyframes) {
+  return landmark.last_keyframe + static_cast<std::uint32_t>(recent_keyframes) >=
+         map.trajectory.size();
+}
+
 std::vector<double> relative_variances(const std::vector<model::LandmarkId>& ids,
                                        const GlobalMap& map, int recent_keyframes) {
   // The local variance, and which landmarks need more.
@@ -58,9 +63,7 @@ std::vector<double> relative_variances(const std::vector<model::LandmarkId>& ids
   for (const model::LandmarkId id : ids) {
     const StoredLandmark& landmark = map.landmarks.at(id);
     variances.push_back(landmark.local_variance());
-    const bool is_recent = landmark.last_keyframe + static_cast<std::uint32_t>(recent_keyframes) >=
-                           map.trajectory.size();
-    if (is_recent || !map.graph.position(id)) continue;
+    if (is_recent(landmark, map, recent_keyframes) || !map.graph.position(id)) continue;
     old.numbers.push_back(variances.size() - 1);
     old.ids.push_back(id);
     old.positions.push_back(landmark.position_m);

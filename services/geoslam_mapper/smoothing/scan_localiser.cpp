@@ -14,6 +14,7 @@ std::vector<geometry::UncertainPoint> landmarks_around(const Eigen::Vector2d& ce
                                                        const LandmarkMap& landmarks) {
   std::vector<geometry::UncertainPoint> points;
   for (const model::LandmarkId id : landmarks.index().near({centre_m, radius_m})) {
+    if (landmarks.is_loose(id)) continue;
     const StoredLandmark& landmark = landmarks.at(id);
     points.push_back({landmark.position_m, landmark.local_variance()});
   }
@@ -29,36 +30,42 @@ std::vector<geometry::UncertainPoint> points_of(const model::LandmarkScan& scan)
   return points;
 }
 
-/// The pose among the landmarks near by, in the map: those share the error of the last keyframe, so
+/// A pose among the landmarks near by, in the map: those share the error of the last keyframe, so
 /// the covariance is that of both.
 geometry::SE2WithCovariance in_map(
-    const geometry::Registration& found,
+    const geometry::SE2WithCovariance& found,
     const std::optional<geometry::SE2WithCovariance>& map_T_last_base) {
-  if (!map_T_last_base) return {found.reference_T_observed, found.covariance};
+  if (!map_T_last_base) return found;
   return compound(*map_T_last_base,
-                  {map_T_last_base->mean.inverse() * found.reference_T_observed, found.covariance});
+                  {map_T_last_base->mean.inverse() * found.mean, found.covariance});
 }
 
 }  // namespace
 
-void ScanLocaliser::restart_at(model::Utime utime, const geometry::SE2& map_T_vehicle,
-                               const Eigen::Matrix3d& covariance) {
+void ScanLocaliser::restart_at(model::Utime utime, const geometry::SE2WithCovariance& map_T_vehicle,
+                               const geometry::SE2WithCovariance& map_T_base) {
   if (latest_ && latest_->utime > utime) return;
-  latest_ =
-      LocatedScan{utime, map_T_vehicle, latest_ ? latest_->step : geometry::SE2(), covariance};
+  latest_ = LocatedScan{utime, map_T_vehicle.mean, latest_ ? latest_->step : geometry::SE2(),
+                        map_T_vehicle.covariance, in_map(map_T_vehicle, map_T_base).covariance};
 }
 
-std::optional<geometry::SE2WithCovariance> ScanLocaliser::locate(const model::LandmarkScan& raw,
-                                                                 const LandmarkMap& landmarks,
-                                                                 const Motion& motion) {
+std::optional<ScanPose> ScanLocaliser::locate(const model::LandmarkScan& raw,
+                                              const LandmarkMap& landmarks, const Motion& motion) {
   if (!latest_ || raw.utime <= latest_->utime) return std::nullopt;
   const auto found = register_scan(level_.levelled(raw), landmarks, motion);
-  if (!found) return std::nullopt;
 
-  const geometry::SE2& pose = found->reference_T_observed;
-  latest_ =
-      LocatedScan{raw.utime, pose, latest_->map_T_vehicle.inverse() * pose, found->covariance};
-  return in_map(*found, motion.map_T_last_base());
+  // Landmarks end: odometry goes on, and its error with it.
+  if (!found) {
+    const auto step = motion.between(latest_->utime, raw.utime);
+    if (!step) return std::nullopt;
+    return ScanPose{compound({latest_->map_T_vehicle, latest_->map_covariance}, *step), true};
+  }
+
+  const geometry::SE2 pose = found->reference_T_observed;
+  const auto map_T_vehicle = in_map({pose, found->covariance}, motion.map_T_last_base());
+  latest_ = LocatedScan{raw.utime, pose, latest_->map_T_vehicle.inverse() * pose, found->covariance,
+                        map_T_vehicle.covariance};
+  return ScanPose{map_T_vehicle, false};
 }
 
 /// By odometry where it reaches from the last scan, else by the last step and a search of

@@ -6,6 +6,7 @@
 #include "common/geometry/registration.hpp"
 #include "common/model/archive.hpp"
 #include "common/model/level.hpp"
+#include "services/geoslam_mapper/mapper_method.hpp"
 #include "services/geoslam_mapper/smoothing/landmark_map.hpp"
 #include "services/geoslam_mapper/smoothing/motion.hpp"
 
@@ -15,13 +16,14 @@ namespace understory::geoslam_mapper::smoothing {
 struct LocatedScan {
   model::Utime utime = 0;
   geometry::SE2 map_T_vehicle;
-  geometry::SE2 step;                                    ///< From the scan before.
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Among the landmarks near by.
+  geometry::SE2 step;                                        ///< From the scan before.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();      ///< Among the landmarks near by.
+  Eigen::Matrix3d map_covariance = Eigen::Matrix3d::Zero();  ///< In the map.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
-    a(s.utime, s.map_T_vehicle, s.step, s.covariance);
+    a(s.utime, s.map_T_vehicle, s.step, s.covariance, s.map_covariance);
   }
 };
 
@@ -37,16 +39,16 @@ class ScanLocaliser {
   const std::optional<model::EkfLevel>& level() const { return level_.latest(); }
 
   /// The pose of a keyframe's last scan: known better now than when that scan came. Ignored where a
-  /// later scan was located already. `covariance`: among the landmarks near by (right
-  /// perturbation).
-  void restart_at(model::Utime utime, const geometry::SE2& map_T_vehicle,
-                  const Eigen::Matrix3d& covariance);
+  /// later scan was located already. Its covariance is among the landmarks near by (right
+  /// perturbation); these share the error of the keyframe's base.
+  void restart_at(model::Utime utime, const geometry::SE2WithCovariance& map_T_vehicle,
+                  const geometry::SE2WithCovariance& map_T_base);
 
-  /// map_T_vehicle of the scan, with its covariance in the map. None before the first keyframe, for
-  /// a scan not later than the last one, and where too few detections match. O(landmarks in range).
-  std::optional<geometry::SE2WithCovariance> locate(const model::LandmarkScan& scan,
-                                                    const LandmarkMap& landmarks,
-                                                    const Motion& motion);
+  /// map_T_vehicle of the scan, with its covariance in the map. Where too few detections match it
+  /// is by odometry, from the last scan that was located. None before the first keyframe, for a
+  /// scan not later than the last one, and where odometry has a gap. O(landmarks in range).
+  std::optional<ScanPose> locate(const model::LandmarkScan& scan, const LandmarkMap& landmarks,
+                                 const Motion& motion);
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>

@@ -1,37 +1,51 @@
 // The project's mapper: gated association around a prediction, search where that fails, all
-// keyframes and landmarks in one graph.
+// keyframes and landmarks in one graph. Who is lost begins another map.
 #pragma once
 
-#include "services/geoslam_mapper/mapper_method.hpp"
-#include "services/geoslam_mapper/parameters.hpp"
-#include "services/geoslam_mapper/smoothing/common_error.hpp"
-#include "services/geoslam_mapper/smoothing/discovery.hpp"
-#include "services/geoslam_mapper/smoothing/fusion.hpp"
-#include "services/geoslam_mapper/smoothing/global_map.hpp"
-#include "services/geoslam_mapper/smoothing/known_ground.hpp"
-#include "services/geoslam_mapper/smoothing/motion.hpp"
-#include "services/geoslam_mapper/smoothing/place_recogniser.hpp"
-#include "services/geoslam_mapper/smoothing/scan_localiser.hpp"
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "services/geoslam_mapper/smoothing/map_archive.hpp"
+#include "services/geoslam_mapper/smoothing/one_map.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// One keyframe's story, from arrival to answer; the work is done by the parts. See MapperMethod
-/// for the functions.
+/// Which map a keyframe belongs to. One map is in use. Where it cannot place a keyframe, and
+/// odometry does not reach there from the last one that it placed, the vehicle is lost: then a
+/// trial map is begun beside it. Once `new_map_keyframes` successive keyframes agree in the trial,
+/// it is the map in use, and the other one is kept as it is. A map in use with which fewer
+/// keyframes agree is provisional: it gives way to a trial that does better, and is dropped
+/// (GeoSLAM §7.2: one bad scan must not be the map). See MapperMethod for the functions.
 class SmoothingMapper final : public MapperMethod {
  public:
   /// An empty map.
   explicit SmoothingMapper(const SmoothingMapperParameters& parameters);
 
   model::MapUpdate add(const model::Keyframe& keyframe) override;
-  std::optional<geometry::SE2WithCovariance> locate(const model::LandmarkScan& scan) override;
-  void add(const model::Odometry& odometry) override { motion_.add(odometry); }
-  void add(const model::EkfPose& pose) override { motion_.add(pose); }
-  void add(const model::EkfLevel& level) override { scan_localiser_.set(level); }
-  void start_with(std::span<const model::MapLandmark> landmarks) override;
+  std::optional<ScanPose> locate(const model::LandmarkScan& scan) override {
+    return current_.locate(scan);
+  }
+  void add(const model::Odometry& odometry) override { add_to_all(odometry); }
+  void add(const model::EkfPose& pose) override { add_to_all(pose); }
+  void add(const model::EkfLevel& level) override { add_to_all(level); }
+  void start_with(std::span<const model::MapLandmark> landmarks) override {
+    current_.start_with(landmarks);
+  }
 
-  std::vector<model::KeyframePose> trajectory() const override;
-  std::vector<model::MapLandmark> landmarks() const override;
-  std::optional<std::vector<model::MapLandmark>> take_changed_landmarks() override;
+  std::vector<model::KeyframePose> trajectory() const override {
+    return current_.map().all_poses();
+  }
+  std::vector<model::MapLandmark> landmarks() const override {
+    return current_.map().all_landmarks();
+  }
+  std::optional<std::vector<model::MapLandmark>> take_changed_landmarks() override {
+    return current_.take_changed_landmarks();
+  }
+  /// The maps that were left.
+  const MapArchive& kept_maps() const { return kept_maps_; }
 
   std::string save() const override;
   void load(const std::string& state) override;
@@ -39,31 +53,33 @@ class SmoothingMapper final : public MapperMethod {
   /// Members of a saved state; see common/state. Parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.map_, self.motion_, self.discovery_, self.known_ground_, self.scan_localiser_,
-      self.common_error_, self.last_utime_, self.first_offered_);
+    bool has_trial = self.trial_ != nullptr;
+    a(self.current_, self.kept_maps_, self.last_utime_, has_trial);
+    if constexpr (Archive::kReads) {
+      if (has_trial) self.trial_ = std::make_unique<OneMap>(self.parameters_);
+    }
+    if (has_trial) a(*self.trial_);
   }
 
  private:
   std::string malformed(const model::Keyframe& keyframe) const;
-  std::string why_not_start(const model::Keyframe& keyframe);
-  void start_map(const model::Keyframe& keyframe, model::MapUpdate& update);
-  std::optional<Placement> place(const model::Keyframe& keyframe,
-                                 const std::optional<Prediction>& prediction,
-                                 model::MapUpdate& update);
-  void keep_pose(const model::Keyframe& keyframe, const Placement& placement);
-  void extend(const FusedKeyframe& fused, model::MapUpdate& update);
-  void report(const model::Keyframe& keyframe, model::MapUpdate& update);
+  bool may_try_another(const model::MapUpdate& update) const;
+  void try_another(const model::Keyframe& keyframe, model::MapUpdate& update);
+  bool agrees(const model::Keyframe& keyframe, const model::MapUpdate& update,
+              const std::optional<geometry::SE2WithCovariance>& map_T_previous_base) const;
+  void adopt_trial(model::MapUpdate& update);
+  /// What every map needs to know.
+  template <class Message>
+  void add_to_all(const Message& message) {
+    current_.add(message);
+    if (trial_) trial_->add(message);
+  }
 
   SmoothingMapperParameters parameters_;
-  PlaceRecogniser place_recogniser_;
-  GlobalMap map_;
-  Motion motion_;
-  Discovery discovery_;
-  KnownGround known_ground_;
-  ScanLocaliser scan_localiser_;
-  CommonError common_error_;
-  std::optional<model::Utime> last_utime_;     ///< Of the last well-formed keyframe.
-  std::optional<model::Utime> first_offered_;  ///< Keyframe that might have started the map.
+  OneMap current_;
+  std::unique_ptr<OneMap> trial_;  ///< Null where the vehicle is not lost.
+  MapArchive kept_maps_;
+  std::optional<model::Utime> last_utime_;  ///< Of the last well-formed keyframe.
 };
 
 /// A SmoothingMapper with an empty map.

@@ -5,7 +5,7 @@
 namespace understory::keyframer::baseline {
 namespace {
 
-constexpr state::Format kFormat{"keyframer.baseline", 1};
+constexpr state::Format kFormat{"keyframer.baseline", 2};
 
 void build_hierarchies(std::vector<Observation>& observations, double descriptor_step) {
   for (Observation& observation : observations) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 namespace understory::keyframer::joint {
@@ -10,12 +11,32 @@ namespace {
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
 constexpr int kMaxIterations = 8;
 constexpr double kConverged = 1e-9;
+/// Information that is left of a pose's parameter where the others are free, as a share of what its
+/// observations hold: below, it is what rounding left over.
+constexpr double kLeastShare = 1e-10;
+/// Of a pose that nothing observed [1/m^2, 1/rad^2].
+constexpr double kNoInformation = 1e-8;
 
 /// d(centre point)/d(left perturbation of the member's pose).
 Matrix23 point_jacobian(const Eigen::Vector2d& point) {
   Matrix23 jacobian;
   jacobian << Eigen::Matrix2d::Identity(), geometry::perpendicular(point);
   return jacobian;
+}
+
+/// The lower triangle on both sides: exactly symmetric.
+template <int N>
+Eigen::Matrix<double, N, N> mirrored(Eigen::Matrix<double, N, N> matrix) {
+  for (int i = 0; i < N; ++i) {
+    for (int j = 0; j < i; ++j) matrix(j, i) = matrix(i, j);
+  }
+  return matrix;
+}
+
+/// root^T root: exactly symmetric, and positive semidefinite whatever the scales.
+template <int N>
+Eigen::Matrix<double, N, N> covariance_of(const Eigen::Matrix<double, Eigen::Dynamic, N>& root) {
+  return mirrored<N>(root.transpose() * root);
 }
 
 /// One solution of a problem. Poses are perturbed on the left here (in `centre`), which makes a
@@ -59,6 +80,7 @@ class BlockAdjuster {
     for (std::size_t k = 0; k + 1 < members_ && k < problem_.motion.size(); ++k) {
       if (problem_.motion[k]) add_motion(k, *problem_.motion[k]);
     }
+    information_ = reduced_.diagonal();
     for (std::size_t i = 0; i < landmarks_; ++i) eliminate(i);
   }
 
@@ -155,48 +177,58 @@ class BlockAdjuster {
     return delta.cwiseAbs().maxCoeff();
   }
 
-  /// Joint covariance of the poses (left perturbation, in `centre`). The gauge term adds
-  /// 1/(scale n^2) along the common motion; the projection removes it.
-  Eigen::MatrixXd pose_covariance() const {
-    const Eigen::MatrixXd raw =
-        factorised().solve(Eigen::MatrixXd::Identity(dimension(), dimension()));
-    Eigen::MatrixXd projection = Eigen::MatrixXd::Identity(dimension(), dimension());
+  /// Square root of the poses' joint covariance (left perturbation, in `centre`): the covariance
+  /// is root^T root. The gauge term adds 1/(scale n^2) along the common motion; the projection
+  /// removes it. A motion that nothing determines counts with the least information that is told
+  /// from rounding; then `is_determined` becomes false.
+  Eigen::MatrixXd covariance_root(bool& is_determined) const {
+    is_determined = true;
+    if (members_ == 1) return Eigen::MatrixXd::Zero(3, 3);  // It is the gauge.
+
+    const Eigen::LDLT<Eigen::MatrixXd> factor = factorised();
+    const Eigen::VectorXd information = factor.transpositionsP() * information_;
+    Eigen::VectorXd pivots = factor.vectorD();
+    for (Eigen::Index i = 0; i < pivots.size(); ++i) {
+      const double least = std::max(kLeastShare * information(i), kNoInformation);
+      if (pivots(i) > least) continue;
+      is_determined = false;
+      pivots(i) = least;
+    }
+
+    Eigen::MatrixXd root = Eigen::MatrixXd::Identity(dimension(), dimension());
     for (std::size_t a = 0; a < members_; ++a) {
       for (std::size_t b = 0; b < members_; ++b) {
-        projection.block<3, 3>(3 * static_cast<Eigen::Index>(a),
-                               3 * static_cast<Eigen::Index>(b)) -=
+        root.block<3, 3>(3 * static_cast<Eigen::Index>(a), 3 * static_cast<Eigen::Index>(b)) -=
             Eigen::Matrix3d::Identity() / static_cast<double>(members_);
       }
     }
-    return projection * raw * projection.transpose();
+    root = factor.transpositionsP() * root;
+    factor.matrixL().solveInPlace(root);
+    return pivots.cwiseSqrt().cwiseInverse().asDiagonal() * root;
   }
 
   void finish(BlockEstimate& estimate) const {
-    const Eigen::MatrixXd covariance = pose_covariance();
+    const Eigen::MatrixXd root = covariance_root(estimate.determined);
     for (std::size_t k = 0; k < members_; ++k) {
-      const Eigen::Index at = 3 * static_cast<Eigen::Index>(k);
       const Eigen::Matrix3d to_right = poses_[k].inverse().Adjoint();
-      estimate.centre_T_member.push_back(
-          {poses_[k], to_right * covariance.block<3, 3>(at, at) * to_right.transpose()});
+      const Eigen::Matrix<double, Eigen::Dynamic, 3> own =
+          root.middleCols<3>(3 * static_cast<Eigen::Index>(k)) * to_right.transpose();
+      estimate.centre_T_member.push_back({poses_[k], covariance_of<3>(own)});
     }
 
     estimate.landmarks = points_;
     estimate.chi2 = chi2_;
     for (std::size_t i = 0; i < landmarks_; ++i) {
-      estimate.landmark_covariance.push_back(landmark_covariance(i, covariance));
+      estimate.landmark_covariance.push_back(landmark_covariance(i, root));
     }
   }
 
-  Eigen::Matrix2d landmark_covariance(std::size_t i, const Eigen::MatrixXd& pose_covariance) const {
+  Eigen::Matrix2d landmark_covariance(std::size_t i, const Eigen::MatrixXd& root) const {
     if (coupling_[i].empty()) return Eigen::Matrix2d::Constant(std::nan(""));
-    const Eigen::Matrix2d own = landmark_hessian_[i].inverse();
-    Eigen::Matrix2d shared = Eigen::Matrix2d::Zero();
-    for (const Coupling& a : coupling_[i]) {
-      for (const Coupling& b : coupling_[i]) {
-        shared += a.block.transpose() * pose_covariance.block<3, 3>(a.at, b.at) * b.block;
-      }
-    }
-    return own + own * shared * own;
+    const Eigen::Matrix2d own = mirrored<2>(landmark_hessian_[i].inverse());
+    Eigen::Matrix<double, Eigen::Dynamic, 2> shared = Eigen::MatrixXd::Zero(root.rows(), 2);
+    for (const Coupling& a : coupling_[i]) shared += root.middleCols<3>(a.at) * a.block;
+    return own + covariance_of<2>(shared * own);
   }
 
   struct Coupling {
@@ -211,6 +243,7 @@ class BlockAdjuster {
   std::vector<Eigen::Vector2d> points_;
   Eigen::MatrixXd reduced_;
   Eigen::VectorXd gradient_;
+  Eigen::VectorXd information_;  ///< Diagonal before the landmarks are eliminated.
   std::vector<Eigen::Matrix2d> landmark_hessian_;
   std::vector<Eigen::Vector2d> landmark_gradient_;
   std::vector<std::vector<Coupling>> coupling_;

@@ -15,6 +15,7 @@ struct BlockObservation {
   std::uint32_t landmark = 0;                               ///< Index in landmarks.
   Eigen::Vector2d position_m = Eigen::Vector2d::Zero();     ///< Frame of the member's vehicle.
   Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();  ///< Likewise; positive definite.
+  std::uint32_t detection = 0;                              ///< Index in the member's scan.
 };
 
 /// What is to be estimated, and from what.
@@ -32,10 +33,12 @@ struct BlockProblem {
 /// condition that the members' pose errors sum to zero (inner constraint). In this gauge the
 /// landmarks' errors are as independent as they can be.
 struct BlockEstimate {
-  bool converged = false;  ///< Within eight iterations.
+  bool converged = false;   ///< Within eight iterations.
+  bool determined = false;  ///< Each member's motion against the others, by what was observed.
   std::vector<geometry::SE2WithCovariance> centre_T_member;
   std::vector<Eigen::Vector2d> landmarks;  ///< Frame `centre` [m].
-  /// Exact 2 x 2 blocks in that gauge [m^2]; NaN where a landmark has no observation.
+  /// Exact 2 x 2 blocks in that gauge [m^2]; NaN where a landmark has no observation. These and the
+  /// members' covariances are exactly symmetric and positive semidefinite.
   std::vector<Eigen::Matrix2d> landmark_covariance;
   std::vector<double> chi2;  ///< Per observation, 2 degrees of freedom, after the fit.
 };

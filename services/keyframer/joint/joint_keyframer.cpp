@@ -1,5 +1,6 @@
 #include "services/keyframer/joint/joint_keyframer.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "common/model/archive.hpp"
@@ -7,18 +8,34 @@
 namespace understory::keyframer::joint {
 namespace {
 
-constexpr state::Format kFormat{"keyframer.joint", 1};
+/// Detections of two scans in a row from which they contradict odometry where, placed by it, next
+/// to nothing matches.
+constexpr std::size_t kToContradict = 8;
+/// Share of the pairs by stated sigmas that smaller ones must keep to take their place.
+constexpr double kAsMany = 0.8;
+
+constexpr state::Format kFormat{"keyframer.joint", 3};
+
+std::vector<std::uint64_t> numbers_of(const PlacedScan& placed) {
+  return {placed.tracks.begin(), placed.tracks.end()};
+}
 
 }  // namespace
 
 JointKeyframer::JointKeyframer(const JointKeyframerParameters& parameters)
-    : parameters_(parameters), tracker_(parameters) {}
+    : parameters_(parameters), tracker_(parameters), noise_(parameters.noise) {}
 
-void JointKeyframer::add(const model::Odometry& odometry) { odometry_.add(odometry); }
+void JointKeyframer::add(const model::Odometry& odometry) {
+  odometry_.add(odometry);
+  calibration_.add(odometry);
+}
 
 std::optional<model::Keyframe> JointKeyframer::add(const model::LandmarkScan& raw) {
   ++counters_.scans;
-  if (last_utime_ && raw.utime <= *last_utime_) return refuse("scan not later than the last one");
+  if (last_utime_ && raw.utime <= *last_utime_) {
+    ++counters_.scans_refused;
+    return refuse("scan not later than the last one");
+  }
 
   // Detections at the true level, and the motion since the last scan where odometry covers it.
   const model::LandmarkScan scan = level_.levelled(raw);
@@ -26,13 +43,55 @@ std::optional<model::Keyframe> JointKeyframer::add(const model::LandmarkScan& ra
   if (last_utime_) motion = odometry_.between(*last_utime_, scan.utime);
 
   // Where the scan was made, and which detection is which landmark.
-  std::optional<PlacedScan> placed = tracker_.add(scan, motion);
+  std::optional<PlacedScan> placed = place(scan, motion);
   if (!placed) return start_anew(scan);
 
   // Enough scans are one keyframe.
   gather({scan, std::move(*placed), motion});
-  const auto full = static_cast<std::size_t>(parameters_.observations_per_keyframe);
-  return members_.size() < full ? std::nullopt : finish();
+  return is_full() ? finish() : std::nullopt;
+}
+
+std::optional<PlacedScan> JointKeyframer::place(
+    const model::LandmarkScan& stated, const std::optional<geometry::SE2WithCovariance>& motion) {
+  std::optional<PlacedScan> placed = noise_.is_new()
+                                         ? place_by_tries(stated, motion)
+                                         : tracker_.add(noise_.corrected(stated), motion);
+  if (!placed) return std::nullopt;
+
+  // Do the landmarks move as odometry says?
+  const std::size_t in_both = std::min(noise_.seen_last(), stated.detections.size());
+  noise_.add(stated, numbers_of(*placed));
+  const auto step = noise_.step();
+  calibration_.check(step);
+  if (motion && !step && in_both >= kToContradict) calibration_.break_off();
+  if (!calibration_.is_due(stated.utime)) return placed;
+  if (const auto way = noise_.motion()) calibration_.add(*way);
+  return placed;
+}
+
+/// By what is stated, or by larger or smaller noise that explains the scan better.
+std::optional<PlacedScan> JointKeyframer::place_by_tries(
+    const model::LandmarkScan& stated, const std::optional<geometry::SE2WithCovariance>& motion) {
+  const ScanTracker before = tracker_;
+  std::optional<PlacedScan> placed = tracker_.add(noise_.corrected(stated), motion);
+  // In gates that are far too wide nearly everything matches something.
+  const double must_keep =
+      placed ? kAsMany * static_cast<double>(noise_.in_common(stated, numbers_of(*placed))) : 0.0;
+
+  for (const double factor : noise_.tries()) {
+    if (placed && factor > 1.0) continue;
+    ScanTracker tried = before;
+    auto other = tried.add(model::DetectionNoise::rescaled(stated, factor), motion);
+    if (!other || !noise_.explains(stated, numbers_of(*other), factor)) continue;
+    if (static_cast<double>(noise_.in_common(stated, numbers_of(*other))) < must_keep) continue;
+    tracker_ = std::move(tried);
+    return other;
+  }
+  return placed;
+}
+
+bool JointKeyframer::is_full() const {
+  return members_.size() >= static_cast<std::size_t>(parameters_.observations_per_keyframe);
 }
 
 std::optional<model::Keyframe> JointKeyframer::refuse(std::string reason) {
@@ -53,8 +112,11 @@ std::optional<model::Keyframe> JointKeyframer::start_anew(const model::LandmarkS
   }
 
   local_T_previous_base_.reset();
-  gather({scan, tracker_.restart(scan), std::nullopt});
-  return result;
+  noise_.forget_while_new();
+  PlacedScan first = tracker_.restart(noise_.corrected(scan));
+  noise_.add(scan, numbers_of(first));
+  gather({scan, std::move(first), std::nullopt});
+  return is_full() ? finish() : result;  // Full by one scan: then none was gathered before it.
 }
 
 void JointKeyframer::gather(Member member) {
@@ -64,8 +126,14 @@ void JointKeyframer::gather(Member member) {
 }
 
 std::optional<model::Keyframe> JointKeyframer::finish() {
-  const std::vector<Member> members = std::exchange(members_, {});
-  const MemberBlock block = adjust_members(members, tracker_.map(), parameters_.min_observations);
+  std::vector<Member> members = std::exchange(members_, {});
+  for (Member& member : members) member.scan = noise_.corrected(std::move(member.scan));
+  // Where tracking began a scan ago, no landmark can have been observed in two.
+  const auto tracked = static_cast<int>(std::min<std::uint64_t>(tracker_.scans(), 1000));
+  const MemberBlock block =
+      adjust_members(members, tracker_.map(),
+                     {std::min(parameters_.min_observations, tracked), parameters_.motion_sigma_m,
+                      parameters_.motion_sigma_rad});
   if (auto reason = why_unusable(members, block)) {
     ++counters_.keyframes_withheld;
     counters_.last_reason = std::move(*reason);

@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "common/model/detection_noise.hpp"
 #include "common/model/level.hpp"
 #include "common/model/odometry_buffer.hpp"
+#include "services/keyframer/joint/calibration_watch.hpp"
 #include "services/keyframer/joint/member_block.hpp"
 #include "services/keyframer/joint/scan_tracker.hpp"
 #include "services/keyframer/keyframer_method.hpp"
@@ -34,6 +36,10 @@ class JointKeyframer final : public KeyframerMethod {
   /// Valid for scans within 2 s of its utime.
   void add(const model::EkfLevel& level) override { level_.set(level); }
 
+  InputQuality input_quality() const override {
+    return {noise_.is_misstated(), calibration_.error(), calibration_.lately(),
+            calibration_.contradicts()};
+  }
   /// Counts for HEALTH.
   const KeyframerCounters& counters() const override { return counters_; }
 
@@ -45,22 +51,29 @@ class JointKeyframer final : public KeyframerMethod {
   /// Members of a saved state; see common/state. The parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.tracker_, self.odometry_, self.level_, self.members_, self.last_utime_,
-      self.next_sequence_, self.local_T_previous_base_, self.counters_);
+    a(self.tracker_, self.noise_, self.calibration_, self.odometry_, self.level_, self.members_,
+      self.last_utime_, self.next_sequence_, self.local_T_previous_base_, self.counters_);
   }
 
  private:
   std::optional<model::Keyframe> refuse(std::string reason);
   std::optional<model::Keyframe> start_anew(const model::LandmarkScan& scan);
+  std::optional<PlacedScan> place(const model::LandmarkScan& stated,
+                                  const std::optional<geometry::SE2WithCovariance>& motion);
+  std::optional<PlacedScan> place_by_tries(
+      const model::LandmarkScan& stated, const std::optional<geometry::SE2WithCovariance>& motion);
   void gather(Member member);
+  bool is_full() const;
   std::optional<model::Keyframe> finish();
 
   JointKeyframerParameters parameters_;
   ScanTracker tracker_;
+  model::DetectionNoise noise_;
+  CalibrationWatch calibration_;
   /// A keyframe takes less than a second: its scans share the error of the gyro's bias.
   model::OdometryBuffer odometry_{0.8};
   model::LevelCorrection level_;
-  std::vector<Member> members_;  ///< Of the keyframe that is being gathered.
+  std::vector<Member> members_;  ///< Of the keyframe that is being gathered; noise as stated.
   std::optional<model::Utime> last_utime_;
   std::uint64_t next_sequence_ = 0;
   std::optional<geometry::SE2> local_T_previous_base_;  ///< None where tracking began anew.

@@ -14,6 +14,8 @@ namespace {
 /// 30,000.
 constexpr double kOutlierChi2 = 20.7;
 constexpr int kOutlierRounds = 2;
+/// Of an eigenvalue that is zero, relative to the largest.
+constexpr double kRounding = 1e-9;
 
 /// Landmarks of a keyframe at most: what it costs to estimate is bounded. No scene has so many.
 constexpr std::size_t kMostLandmarks = 1000;
@@ -61,9 +63,9 @@ class BlockBuilder {
       if (!used.insert(track->id).second) continue;
 
       const model::Detection& detection = member.scan.detections[i];
-      block_.problem.observations.push_back({number, landmark_of(*track),
-                                             detection.position_m.head<2>(),
-                                             detection.covariance_m2.topLeftCorner<2, 2>()});
+      block_.problem.observations.push_back(
+          {number, landmark_of(*track), detection.position_m.head<2>(),
+           detection.covariance_m2.topLeftCorner<2, 2>(), static_cast<std::uint32_t>(i)});
     }
   }
 
@@ -103,31 +105,63 @@ std::vector<std::uint32_t> observation_counts(const BlockProblem& problem) {
   return count;
 }
 
-/// Scans that few landmarks connect leave motions undetermined. The solver then gives rounding
-/// errors for their covariance, which may be anything.
-bool are_covariances(const BlockEstimate& estimate) {
-  return std::ranges::all_of(
-      estimate.centre_T_member, [](const geometry::SE2WithCovariance& member) {
-        const Eigen::Matrix3d symmetric = 0.5 * (member.covariance + member.covariance.transpose());
-        if (!symmetric.allFinite()) return false;
-        const Eigen::Vector3d eigenvalues = geometry::eigenvalues(symmetric);
-        return eigenvalues.minCoeff() >= -1e-9 * eigenvalues.maxCoeff();
-      });
+template <int N>
+bool is_covariance(const Eigen::Matrix<double, N, N>& matrix) {
+  if (!matrix.allFinite() || matrix != matrix.transpose()) return false;
+  const auto eigenvalues = geometry::eigenvalues(matrix);
+  return eigenvalues.minCoeff() >= -kRounding * eigenvalues.maxCoeff();
 }
 
-}  // namespace
+/// Whether all that the keyframe will state are covariances, as they are.
+bool are_covariances(const MemberBlock& block) {
+  const BlockEstimate& estimate = block.estimate;
+  const auto members = std::ranges::all_of(estimate.centre_T_member, [](const auto& member) {
+    return is_covariance<3>(member.covariance);
+  });
+  const std::vector<std::uint32_t> count = observation_counts(block.problem);
+  for (std::size_t i = 0; i < count.size(); ++i) {
+    if (count[i] > 0 && !is_covariance<2>(estimate.landmark_covariance[i])) return false;
+  }
+  return members;
+}
 
-MemberBlock adjust_members(std::span<const Member> members, const LocalMap& map,
-                           int min_observations) {
-  BlockBuilder builder(members, map, min_observations);
-  for (std::size_t k = 0; k < members.size(); ++k) builder.add(members[k], k == 0);
-
-  MemberBlock block = builder.take();
+/// The solution, and once more without the observations that do not fit it.
+void adjust(MemberBlock& block) {
   block.estimate = adjust_block(block.problem);
   for (int round = 0; round < kOutlierRounds; ++round) {
     if (!remove_outliers(block.problem, block.estimate)) break;
     block.estimate = adjust_block(block.problem);
   }
+}
+
+/// Where odometry measured no motion, the tracked one takes its place.
+void assume_motion(const BlockRules& rules, BlockProblem& problem) {
+  const double m2 = rules.motion_sigma_m * rules.motion_sigma_m;
+  const double rad2 = rules.motion_sigma_rad * rules.motion_sigma_rad;
+  for (std::size_t k = 0; k < problem.motion.size(); ++k) {
+    if (problem.motion[k]) continue;
+    problem.motion[k] = geometry::SE2WithCovariance{
+        problem.local_T_member[k].inverse() * problem.local_T_member[k + 1],
+        Eigen::Vector3d(m2, m2, rad2).asDiagonal()};
+  }
+}
+
+}  // namespace
+
+MemberBlock adjust_members(std::span<const Member> members, const LocalMap& map,
+                           const BlockRules& rules) {
+  BlockBuilder builder(members, map, rules.min_observations);
+  for (std::size_t k = 0; k < members.size(); ++k) builder.add(members[k], k == 0);
+  MemberBlock block = builder.take();
+  const std::vector<BlockObservation> observations = block.problem.observations;
+
+  adjust(block);
+  if (block.estimate.determined || members.size() < 2) return block;
+
+  // Few landmarks connect the scans: what they leave open is as sure as a vehicle's motion is.
+  block.problem.observations = observations;
+  assume_motion(rules, block.problem);
+  adjust(block);
   return block;
 }
 
@@ -136,7 +170,7 @@ std::optional<std::string> why_unusable(std::span<const Member> members, const M
       std::ranges::any_of(members, [](const Member& member) { return member.motion.has_value(); });
   if (!block.estimate.converged) return "joint estimate did not converge";
   if (!has_motion && block.tracks.size() < 3) return "fewer than three landmarks";
-  if (!are_covariances(block.estimate)) return "the scans have too little in common";
+  if (!are_covariances(block)) return "the scans have too little in common";
   return std::nullopt;
 }
 
@@ -154,13 +188,17 @@ model::Keyframe to_keyframe(std::span<const Member> members, const MemberBlock& 
   }
 
   const std::vector<std::uint32_t> count = observation_counts(block.problem);
+  std::vector<std::uint32_t> number_of(block.tracks.size(), 0);  // In the keyframe.
   for (std::size_t i = 0; i < block.tracks.size(); ++i) {
     if (count[i] == 0) continue;
     const Track& track = *map.find(block.tracks[i]);
+    number_of[i] = static_cast<std::uint32_t>(keyframe.landmarks.size());
     keyframe.landmarks.push_back({estimate.landmarks[i], estimate.landmark_covariance[i],
                                   track.radius_m, static_cast<std::uint16_t>(count[i]),
                                   track.kind});
   }
+  for (const BlockObservation& z : block.problem.observations)
+    keyframe.detections.push_back({z.member, z.detection, number_of[z.landmark]});
   return keyframe;
 }
 

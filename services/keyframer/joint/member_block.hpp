@@ -33,12 +33,20 @@ struct MemberBlock {
   BlockEstimate estimate;
 };
 
+/// What an estimate of the members takes beside their observations.
+struct BlockRules {
+  int min_observations = 2;        ///< A track with fewer observations is left out.
+  double motion_sigma_m = 0.3;     ///< Of a member's motion that nothing determines, per axis.
+  double motion_sigma_rad = 0.04;  ///< Of its rotation.
+};
+
 /// Estimates the members' poses and the landmarks of their tracks together. Tracks with fewer than
 /// `min_observations` observations and doubtful ones are left out, and of more than 1000 those that
-/// were observed least; so are outliers, by their chi^2,
-/// in at most two rounds. Precondition: there is a member.
+/// were observed least; so are outliers, by their chi^2, in at most two rounds. Where landmarks and
+/// odometry leave a motion undetermined, the one that was tracked counts with the sigmas of
+/// `rules`. Precondition: there is a member.
 MemberBlock adjust_members(std::span<const Member> members, const LocalMap& map,
-                           int min_observations);
+                           const BlockRules& rules);
 
 /// Why the estimate is not good enough for a keyframe; nothing where it is.
 std::optional<std::string> why_unusable(std::span<const Member> members, const MemberBlock& block);

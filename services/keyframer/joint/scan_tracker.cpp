@@ -21,7 +21,7 @@ std::vector<geometry::UncertainPoint> observed_points(const model::LandmarkScan&
 
 PlacedScan ScanTracker::restart(const model::LandmarkScan& scan) {
   map_.clear();
-  started_ = true;
+  scans_ = 1;
   local_T_vehicle_ = geometry::SE2();
   last_motion_ = geometry::SE2();
   return {local_T_vehicle_, map_.add(scan, {}, local_T_vehicle_)};
@@ -29,11 +29,12 @@ PlacedScan ScanTracker::restart(const model::LandmarkScan& scan) {
 
 std::optional<PlacedScan> ScanTracker::add(
     const model::LandmarkScan& scan, const std::optional<geometry::SE2WithCovariance>& motion) {
-  if (!started_) return restart(scan);
+  if (scans_ == 0) return restart(scan);
 
   const std::optional<geometry::Registration> found = locate(scan, motion);
   if (!found) return std::nullopt;
 
+  ++scans_;
   last_motion_ = local_T_vehicle_.inverse() * found->reference_T_observed;
   local_T_vehicle_ = found->reference_T_observed;
   return PlacedScan{local_T_vehicle_, map_.add(scan, found->pairs, local_T_vehicle_)};

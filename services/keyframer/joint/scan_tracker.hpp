@@ -43,11 +43,13 @@ class ScanTracker {
 
   /// The tracks as they are after the last scan.
   const LocalMap& map() const { return map_; }
+  /// Scans since tracking began (anew), the last one included.
+  std::uint64_t scans() const { return scans_; }
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.map_, self.started_, self.local_T_vehicle_, self.last_motion_);
+    a(self.map_, self.scans_, self.local_T_vehicle_, self.last_motion_);
   }
 
  private:
@@ -58,7 +60,7 @@ class ScanTracker {
 
   JointKeyframerParameters parameters_;
   LocalMap map_;
-  bool started_ = false;
+  std::uint64_t scans_ = 0;
   geometry::SE2 local_T_vehicle_;  ///< At the last scan.
   geometry::SE2 last_motion_;      ///< Between the last two scans.
 };

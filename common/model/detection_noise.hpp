@@ -1,0 +1,166 @@
+// The noise of detections as the scans themselves show it, beside what their sender states.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/geometry/se2.hpp"
+#include "common/model/landmarks.hpp"
+
+namespace understory::model {
+
+/// When stated covariances are replaced.
+struct DetectionNoiseParameters {
+  bool learn = true;           ///< False: covariances stay as stated.
+  double replace_above = 1.5;  ///< Factor of the variance from which understated ones grow.
+  double replace_below = 0.6;  ///< Factor of the variance below which overstated ones shrink.
+};
+
+/// How the vehicle moved between two scans, by landmarks that both observed and nothing else.
+struct ScanMotion {
+  Utime then_utime = 0;
+  Utime now_utime = 0;
+  geometry::SE2WithCovariance then_T_now;
+};
+
+/// Learns by which factor the variance of detections differs from what LANDMARKS states, for each
+/// kind and range.
+///
+/// Two scans a few scans apart that observed the same landmarks differ by a rigid motion and by
+/// noise. What the best motion leaves is the noise alone: no odometry, no map and no filter takes
+/// part, so that their errors do not pass for noise. Errors that both scans have in common are not
+/// seen (an offset of the mounting, a trunk that is no circle); that is why a statement is trusted
+/// as long as the scans do not contradict it clearly.
+class DetectionNoise {
+ public:
+  /// The stated covariances hold.
+  explicit DetectionNoise(const DetectionNoiseParameters& parameters = {})
+      : parameters_(parameters) {}
+
+  /// Takes a scan with its covariances as stated. `tracks`: the landmark of each detection, by any
+  /// number that lasts from scan to scan; 0 = unknown. Cost O(n log n).
+  void add(const LandmarkScan& scan, std::span<const std::uint64_t> tracks);
+  /// The motion over up to 20 scans to the last one; nothing where they have too little in common.
+  /// Cost: a fit, as in add().
+  std::optional<ScanMotion> motion() const { return motion_over(kLongLag); }
+  /// The motion from the scan before the last one to that.
+  std::optional<ScanMotion> step() const { return motion_over(1); }
+  /// Detections of the last scan that can be found again.
+  std::size_t seen_last() const { return recent_.empty() ? 0 : recent_.back().seen.size(); }
+  /// The factor of the variance at this range [m]; 1 where the stated covariance is kept.
+  double factor(LandmarkKind kind, double range_m) const;
+  /// The scan with its covariances in the plane multiplied by their factors.
+  LandmarkScan corrected(LandmarkScan scan) const;
+  /// True until enough scans were compared to contradict what is stated.
+  bool is_new() const;
+  /// Factors of the variance to try where too little is learned: as stated it may be too small to
+  /// find any landmark again, or so large that each fits several. Empty once enough is learned.
+  std::span<const double> tries() const;
+  /// The scan with covariances for such a try.
+  static LandmarkScan rescaled(LandmarkScan scan, double factor);
+  /// Whether noise of that size explains what the scan has in common with the one before it: pairs
+  /// by chance fill a wide gate evenly, noise does not.
+  bool explains(const LandmarkScan& scan, std::span<const std::uint64_t> tracks,
+                double factor) const;
+  /// How many detections of this scan are in the one before it.
+  std::size_t in_common(const LandmarkScan& scan, std::span<const std::uint64_t> tracks) const;
+  /// Tracking broke off: what little was learned may be from wrong pairs.
+  void forget_while_new() {
+    if (is_new()) sums_ = {};
+  }
+  /// True where the factor of any kind and range is not 1.
+  bool is_misstated() const;
+
+  /// Members of a saved state; see common/state. The parameters are configuration.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.sums_, self.recent_);
+  }
+
+ private:
+  /// Scans over which motion() goes: the longer the way, the more it shows.
+  static constexpr std::size_t kLongLag = 20;
+
+  static constexpr std::size_t kKinds = 2;
+  static constexpr std::size_t kRanges = 4;
+
+  /// A detection of an earlier scan.
+  struct Seen {
+    std::uint64_t track = 0;
+    Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
+    Eigen::Matrix2d covariance_m2 = Eigen::Matrix2d::Zero();
+    LandmarkKind kind = LandmarkKind::kTrunk;
+
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& self) {
+      a(self.track, self.position_m, self.covariance_m2, self.kind);
+    }
+  };
+  /// One landmark in two scans.
+  struct Pair {
+    Seen then;
+    Seen now;
+    std::size_t bin = 0;
+  };
+  /// What a motion leaves of a pair, by the noise as learned so far.
+  struct Residual {
+    double chi2 = 0.0;
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< About the motion.
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  };
+  /// The motion between two scans.
+  struct Fit {
+    geometry::SE2 then_T_now;
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  };
+  /// Of the squared residuals by their stated covariances.
+  struct Sums {
+    double chi2 = 0.0;
+    double degrees = 0.0;  ///< Of freedom.
+
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& self) {
+      a(self.chi2, self.degrees);
+    }
+  };
+
+  /// The detections of one scan that can be found again, in order of track.
+  struct SeenScan {
+    Utime utime = 0;
+    std::vector<Seen> seen;
+
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& self) {
+      a(self.utime, self.seen);
+    }
+  };
+
+  /// What a scan has in common with one before it.
+  struct Common {
+    Utime then_utime = 0;
+    std::vector<Pair> pairs;
+    Fit fit;
+  };
+
+  static std::size_t bin_of(LandmarkKind kind, double range_m);
+  static std::vector<Seen> seen_in(const LandmarkScan& scan, std::span<const std::uint64_t> tracks);
+  static std::vector<Pair> in_both(std::span<const Seen> then, std::span<const Seen> now);
+  std::optional<Common> common_with_last(std::size_t most_scans) const;
+  std::optional<ScanMotion> motion_over(std::size_t most_scans) const;
+  void learn(std::span<const Pair> pairs, const Fit& fit);
+  Fit fitted_motion(std::span<const Pair> pairs) const;
+  static Residual residual_of(const Pair& pair, double factor, const geometry::SE2& then_T_now);
+  double estimate(std::size_t bin) const;
+  double factor_of(std::size_t bin) const;
+
+  DetectionNoiseParameters parameters_;
+  std::array<Sums, kKinds * kRanges> sums_{};
+  std::deque<SeenScan> recent_;  ///< The last scans, the newest at the end.
+};
+
+}  // namespace understory::model

@@ -1,0 +1,43 @@
+#include "services/associator/health_watch.hpp"
+
+#include <algorithm>
+
+namespace understory::associator {
+
+void describe(HealthParameters& p, bus::ParameterTable& table) {
+  table.add("health.min_detections", p.min_detections, {1, 10000}, "",
+            "A scan with fewer detections says nothing about the associator.");
+  table.add("health.first_within_scans", p.first_within_scans, {0, 1000000}, "scans",
+            "From the start so many scans with detections are given for the first association.");
+  describe(p.lost, "lost", "scans", "bad are those of which nothing could be associated.", table);
+  describe(p.refused, "refused", "scans", "bad are those that came late or twice.", table);
+  describe(p.misstated, "misstated", "scans",
+           "bad are those whose stated noise is replaced by what the scans show.", table);
+}
+
+HealthWatch::HealthWatch(const HealthParameters& parameters)
+    : parameters_(parameters),
+      lost_{wire::Reason::kLost, "detections come, and none is of a landmark that is tracked", "",
+            bus::Condition(parameters.lost)},
+      refused_{wire::Reason::kInputRefused, "scans are not later than those before", "",
+               bus::Condition(parameters.refused)},
+      misstated_{wire::Reason::kNoiseMisstated,
+                 "the scans contradict the covariances of LANDMARKS; what they show is used", "",
+                 bus::Condition(parameters.misstated)} {}
+
+void HealthWatch::add(const model::LandmarkScan& scan, const AssociatorCounters& before,
+                      const AssociatorCounters& after, bool is_misstated) {
+  const bool is_refused = after.scans_refused > before.scans_refused;
+  refused_.condition.add(is_refused);
+  if (!is_refused) misstated_.condition.add(is_misstated);
+  if (is_refused || scan.detections.size() < static_cast<std::size_t>(parameters_.min_detections)) {
+    return;
+  }
+
+  const bool is_associated = after.published > before.published;
+  first_scans_ = is_associated ? parameters_.first_within_scans
+                               : std::min(first_scans_ + 1, parameters_.first_within_scans);
+  lost_.condition.add(!is_associated && first_scans_ >= parameters_.first_within_scans);
+}
+
+}  // namespace understory::associator

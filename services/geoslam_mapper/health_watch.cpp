@@ -1,0 +1,73 @@
+#include "services/geoslam_mapper/health_watch.hpp"
+
+#include <cmath>
+
+namespace understory::geoslam_mapper {
+
+void describe(HealthParameters& p, bus::ParameterTable& table) {
+  table.add(
+      "health.innovation_sigmas", p.innovation_sigmas, {1.0, 100.0}, "sigma",
+      "A keyframe fits badly where the chi^2 of its associations exceeds its expectation by so "
+      "many standard deviations.");
+  table.add("health.filter_disagreement_m", p.filter_disagreement_m, {0.01, 1000.0}, "m",
+            "Two keyframes contradict the filter where the motion between them differs by more.");
+  describe(p.lost, "lost", "keyframes", "bad are those without a certain pose.", table);
+  describe(p.rolled_back, "rolled_back", "keyframes", "bad are those that were rolled back.",
+           table);
+  describe(p.diverged, "diverged", "keyframes",
+           "bad are those that fit badly; the same for those that contradict the filter.", table);
+  describe(p.refused, "refused", "keyframes", "bad are those that are malformed or late.", table);
+  describe(p.new_map, "new_map", "keyframes", "bad are those that began a map beside another one.",
+           table);
+}
+
+HealthWatch::HealthWatch(const HealthParameters& parameters)
+    : parameters_(parameters),
+      lost_{wire::Reason::kLost, "keyframes come, and none has a certain pose", "",
+            bus::Condition(parameters.lost)},
+      rolled_back_{wire::Reason::kRolledBack, "keyframes contradict the map", "",
+                   bus::Condition(parameters.rolled_back)},
+      diverged_{wire::Reason::kDiverged, "keyframes fit the map worse than is stated", "",
+                bus::Condition(parameters.diverged)},
+      contradicts_{wire::Reason::kDiverged, "the map's motion is not the filter's", "EKF_POSE",
+                   bus::Condition(parameters.diverged)},
+      refused_{wire::Reason::kInputRefused, "keyframes are malformed or late", "",
+               bus::Condition(parameters.refused)},
+      new_map_{wire::Reason::kNewMap, "another map was begun; the one before is not continued", "",
+               bus::Condition(parameters.new_map)} {}
+
+void HealthWatch::add(const model::MapUpdate& update) {
+  using enum model::MapUpdateStatus;
+  refused_.condition.add(update.status == kRejected);
+  if (update.status == kRejected) return;
+
+  const bool is_another = map_id_ != 0 && update.map_id != map_id_;
+  map_id_ = update.map_id;
+  new_map_.condition.add(is_another);
+  if (is_another) last_.reset();
+
+  const bool is_localised = update.status == kFirstMap || update.status == kUpdated;
+  lost_.condition.add(!is_localised);
+  rolled_back_.condition.add(update.status == kRolledBack);
+  if (!is_localised) return;
+
+  if (update.degrees_of_freedom > 0) {
+    const auto degrees = static_cast<double>(update.degrees_of_freedom);
+    diverged_.condition.add((update.chi2 - degrees) / std::sqrt(2.0 * degrees) >
+                            parameters_.innovation_sigmas);
+  }
+  compare(update);
+}
+
+void HealthWatch::compare(const model::MapUpdate& update) {
+  const std::optional<geometry::SE2> filtered =
+      last_ ? filter_.between(last_->utime, update.utime) : std::nullopt;
+  if (filtered) {
+    const geometry::SE2 mapped = last_->map_T_vehicle.inverse() * update.map_T_vehicle;
+    contradicts_.condition.add((filtered->inverse() * mapped).translation().norm() >
+                               parameters_.filter_disagreement_m);
+  }
+  last_ = CertainKeyframe{update.utime, update.map_T_vehicle};
+}
+
+}  // namespace understory::geoslam_mapper

@@ -1,0 +1,80 @@
+// What HEALTH says of the mapper beside faults of single messages.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "common/bus/condition.hpp"
+#include "common/model/archive.hpp"
+#include "common/model/keyframe.hpp"
+#include "common/model/map.hpp"
+#include "services/geoslam_mapper/smoothing/filter_track.hpp"
+
+namespace understory::geoslam_mapper {
+
+/// When the mapper is not well. Ranges and meanings: describe().
+struct HealthParameters {
+  double innovation_sigmas = 4.0;      ///< Of a keyframe's chi^2, as a normal deviate.
+  double filter_disagreement_m = 0.5;  ///< Between two keyframes' motion and the filter's.
+  bus::ConditionLimits lost{8, 4};
+  bus::ConditionLimits rolled_back{8, 2};
+  bus::ConditionLimits diverged{8, 3};
+  bus::ConditionLimits refused{8, 3};
+  bus::ConditionLimits new_map{32, 1};
+};
+/// Adds the parameters to the table.
+void describe(HealthParameters& parameters, bus::ParameterTable& table);
+
+/// The last keyframe with a certain pose.
+struct CertainKeyframe {
+  model::Utime utime = 0;
+  geometry::SE2 map_T_vehicle;
+
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.utime, s.map_T_vehicle);
+  }
+};
+
+/// Judges the mapper by its latest keyframes. `lost`: none has a certain pose. `rolled_back`: they
+/// contradict the map. `diverged`: they fit it worse than is stated (of a map as stated one
+/// keyframe in 1000 by chance, 3 of 8 once in 10^7), or the map moved otherwise than the filter,
+/// which uses the same detections. `input_refused`: they are malformed or late. `new_map`: another
+/// map was begun some keyframes ago.
+class HealthWatch {
+ public:
+  /// All is well so far.
+  explicit HealthWatch(const HealthParameters& parameters = {});
+
+  /// What became of a keyframe.
+  void add(const model::MapUpdate& update);
+  /// The filter's pose, to compare motions.
+  void add(const model::EkfPose& pose) { filter_.add(pose); }
+  /// What to show.
+  std::array<bus::WatchedCondition, 6> conditions() const {
+    return {lost_, rolled_back_, diverged_, contradicts_, refused_, new_map_};
+  }
+
+  /// Members of a saved state; see common/state. The parameters are configuration.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.lost_, self.rolled_back_, self.diverged_, self.contradicts_, self.refused_,
+      self.new_map_, self.filter_, self.last_, self.map_id_);
+  }
+
+ private:
+  void compare(const model::MapUpdate& update);
+
+  HealthParameters parameters_;
+  bus::WatchedCondition lost_;
+  bus::WatchedCondition rolled_back_;
+  bus::WatchedCondition diverged_;
+  bus::WatchedCondition contradicts_;
+  bus::WatchedCondition refused_;
+  bus::WatchedCondition new_map_;
+  smoothing::FilterTrack filter_;
+  std::optional<CertainKeyframe> last_;
+  std::uint32_t map_id_ = 0;  ///< 0 before the first keyframe.
+};
+
+}  // namespace understory::geoslam_mapper

@@ -1,0 +1,229 @@
+#include "services/geoslam_mapper/smoothing/one_map.hpp"
+
+#include <cmath>
+
+#include "services/geoslam_mapper/smoothing/filter_gate.hpp"
+#include "services/geoslam_mapper/smoothing/unseen.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+namespace {
+
+/// Fewest landmarks that start a map without odometry.
+constexpr std::size_t kMinToStart = 3;
+/// Landmarks in common with the map that say that a keyframe agrees with it: two fix a pose.
+constexpr std::uint32_t kInCommon = 2;
+
+model::MapUpdate with(model::MapUpdateStatus status, std::string reason, model::MapUpdate update) {
+  update.status = status;
+  if (!reason.empty()) update.reason = std::move(reason);
+  return update;
+}
+
+/// All bases are tied to one node: the graph is not solved any more, so nothing moves it.
+void keep_pose(const model::Keyframe& keyframe, const Placement& placement, GlobalMap& map) {
+  if (!map.graph.newest()) map.graph.add_node({}, false);
+  const NodeIndex node = *map.graph.newest();
+  geometry::SE2WithCovariance node_T_centre = placement.map_T_centre;
+  node_T_centre.mean = map.graph.pose(node).inverse() * node_T_centre.mean;
+
+  Base base = base_of(keyframe, node);
+  base.centre_T_base = compound(node_T_centre, base.centre_T_base);
+  base.centre_T_middle = node_T_centre.mean * base.centre_T_middle;
+  map.trajectory.add_spare(base);
+}
+
+}  // namespace
+
+OneMap::OneMap(const SmoothingMapperParameters& parameters, std::uint32_t id)
+    : parameters_(parameters),
+      place_recogniser_(parameters),
+      map_(parameters, id),
+      motion_(parameters),
+      discovery_(parameters),
+      merging_(parameters),
+      known_ground_(parameters),
+      scan_localiser_(parameters),
+      common_error_(parameters.scale_sigma) {}
+
+OneMap OneMap::beside(std::uint32_t id) const {
+  OneMap other(parameters_, id);
+  other.motion_ = motion_.from_nowhere();
+  if (const auto& level = scan_localiser_.level()) other.scan_localiser_.set(*level);
+  return other;
+}
+
+model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
+  using enum model::MapUpdateStatus;
+  model::MapUpdate update;
+  update.keyframe_sequence = keyframe.sequence;
+  update.utime = keyframe.utime;
+  update.map_id = map_.landmarks.map_id();
+
+  if (map_.empty()) {
+    if (auto reason = why_not_start(keyframe); !reason.empty())
+      return with(kNotSure, reason, std::move(update));
+    start_map(keyframe, update);
+    agreeing_ = 1;
+    return with(kFirstMap, {}, std::move(update));
+  }
+
+  // Where is it?
+  const auto prediction = motion_.predict(keyframe, map_.graph);
+  const auto placement = place(keyframe, prediction, update);
+  if (!placement) {
+    if (prediction) motion_.assume(keyframe, *prediction);
+    return with(kNotSure, {}, std::move(update));
+  }
+  update.used_prior = placement->by_prediction;
+  update.inliers = static_cast<std::uint32_t>(placement->associations.size());
+  update.associations = placement->associations;
+
+  // A given map stays as it is.
+  if (parameters_.localisation_only) {
+    keep_pose(keyframe, *placement, map_);
+    report(keyframe, update);
+    return with(kUpdated, {}, std::move(update));
+  }
+
+  // What does it add?
+  const FusedKeyframe fused = fuse(keyframe, *placement, motion_, parameters_, map_);
+  update.associations = fused.associations;
+  update.chi2 = fused.chi2;
+  update.degrees_of_freedom = fused.degrees_of_freedom;
+  if (!fused.ok) return with(kRolledBack, fused.reason, std::move(update));
+  known_ground_.follow(fused, discovery_, merging_.merges(), map_);
+  extend(fused, update);
+  confirm(keyframe, update);
+  report(keyframe, update);
+  return with(kUpdated, fused.reason, std::move(update));
+}
+
+/// While the gyro's bias is unknown the first scan's heading is, too, and it would be the map's.
+/// But the map does not wait for it longer than `start_wait_s`.
+std::string OneMap::why_not_start(const model::Keyframe& keyframe) {
+  if (parameters_.localisation_only) return "localisation only, but no map was given";
+  if (!parameters_.use_odometry) {
+    return keyframe.landmarks.size() < kMinToStart ? "too few landmarks to start a map" : "";
+  }
+  if (!first_offered_) first_offered_ = keyframe.utime;
+  const double waited_s = 1e-6 * static_cast<double>(keyframe.utime - *first_offered_);
+  if (waited_s >= parameters_.start_wait_s || motion_.knows_heading(keyframe)) return {};
+  return "the gyro's bias is not known yet";
+}
+
+/// The first keyframe's base is the origin of the map; its centre is fixed relative to it. The
+/// uncertainty of that is added where covariances are reported. As a prior in the graph it would
+/// hold the map by 3 mrad only, and the residues of linearisation would rotate the map.
+void OneMap::start_map(const model::Keyframe& keyframe, model::MapUpdate& update) {
+  const NodeIndex node = map_.graph.add_node(keyframe.centre_T_base().inverse(),
+                                             map_.trajectory.is_stationary(keyframe), true);
+  map_.trajectory.add(base_of(keyframe, node, true), map_.graph);
+  if (const auto& level = scan_localiser_.level()) common_error_.set_start_level(*level);
+
+  for (const model::Association& pair : discovery_.update(keyframe, node, {}, map_)) {
+    update.associations.push_back(pair);
+    update.added.push_back(pair.landmark_id);
+  }
+
+  const factor_graph::plane::SmootherUpdate solved = map_.graph.solve();
+  if (!solved.ok) update.reason = solved.error;
+  map_.adopt_estimates();
+  report(keyframe, update);
+}
+
+/// Around the prediction; where nothing fits there, in the whole map.
+std::optional<Placement> OneMap::place(const model::Keyframe& keyframe,
+                                       const std::optional<Prediction>& prediction,
+                                       model::MapUpdate& update) {
+  std::optional<Placement> placement;
+  if (prediction) placement = place_recogniser_.track(keyframe, *prediction, map_);
+  if (placement) map_.landmarks.set_loose(placement->loose);
+  if (!placement) {
+    map_.landmarks.catch_up();
+    SearchResult searched = place_recogniser_.search(keyframe, map_);
+    update.candidates = searched.hypotheses;
+    update.log10_false_alarm = searched.log10_false_alarm;
+    update.reason = std::move(searched.reason);
+    placement = std::move(searched.placement);
+  }
+
+  if (placement && contradicts_filter(keyframe, *placement, motion_.filter(), map_,
+                                      parameters_.filter_disagreement_m)) {
+    update.reason = "few landmarks, and their motion contradicts the filter's";
+    return std::nullopt;
+  }
+  return placement;
+}
+
+/// New landmarks of a fused keyframe, and landmarks that are merged or separated.
+void OneMap::extend(const FusedKeyframe& fused, model::MapUpdate& update) {
+  for (const model::Association& pair :
+       discovery_.update(fused.keyframe, fused.node, fused.associations, map_)) {
+    update.associations.push_back(pair);
+    update.added.push_back(pair.landmark_id);
+  }
+  MergingResult merging = merging_.follow(fused, update.associations, map_);
+  update.merged = std::move(merging.merged);
+  if (merging.separated) update.added.push_back(*merging.separated);
+}
+
+/// The pose of an accepted keyframe; motion and single scans go on from there.
+void OneMap::report(const model::Keyframe& keyframe, model::MapUpdate& update) {
+  const Base& base = map_.trajectory.last();
+  const auto map_T_centre = map_.trajectory.centre_from_origin(base.node, map_.graph);
+  geometry::SE2WithCovariance map_T_base;
+  if (!base.is_origin) {
+    map_T_base = compound(map_T_centre, base.centre_T_base);
+    map_T_base.covariance += common_error_.covariance_at(map_T_base.mean);
+  }
+  motion_.continue_from(keyframe, base, map_T_base);
+  update.expected = expected_unseen(keyframe, map_T_base.mean * keyframe.centre_T_base().inverse(),
+                                    update.associations, map_.landmarks);
+
+  update.map_T_vehicle = map_T_base.mean;
+  update.covariance = map_T_base.covariance;
+  update.map_T_latest_vehicle = map_T_centre.mean * motion_.centre_T_last_member()->mean;
+
+  const model::KeyframeMember& last = keyframe.members.back();
+  scan_localiser_.restart_at(last.utime, {update.map_T_latest_vehicle, last.covariance},
+                             map_T_base);
+}
+
+std::optional<ScanPose> OneMap::locate(const model::LandmarkScan& scan) {
+  return scan_localiser_.locate(scan, map_.landmarks, motion_);
+}
+
+bool OneMap::reaches(const model::Keyframe& keyframe) const {
+  const auto prediction = motion_.predict(keyframe, map_.graph);
+  if (!prediction || !prediction->from_odometry) return false;
+  const Eigen::Matrix3d& covariance = prediction->map_T_centre.covariance;
+  return std::sqrt(covariance.topLeftCorner<2, 2>().trace()) <= parameters_.lost_sigma_m &&
+         std::sqrt(covariance(2, 2)) <= parameters_.lost_sigma_rad;
+}
+
+bool OneMap::is_provisional() const {
+  return agreeing_ < static_cast<std::uint32_t>(parameters_.new_map_keyframes);
+}
+
+void OneMap::start_with(std::span<const model::MapLandmark> landmarks) {
+  for (const model::MapLandmark& given : landmarks)
+    map_.landmarks.add_given(given, parameters_.given_map_sigma_m);
+  agreeing_ = static_cast<std::uint32_t>(parameters_.new_map_keyframes);
+}
+
+/// What the first keyframe alone saw is no landmark, once enough others are there.
+void OneMap::confirm(const model::Keyframe& keyframe, model::MapUpdate& update) {
+  const bool was_provisional = is_provisional();
+  if (update.inliers >= kInCommon) ++agreeing_;
+  if (was_provisional && !is_provisional())
+    update.removed = drop_unseen(keyframe.field_of_view, map_);
+}
+
+std::vector<model::MapLandmark> OneMap::take_changed_landmarks() {
+  std::vector<model::MapLandmark> result;
+  for (const model::LandmarkId id : map_.landmarks.take_changed())
+    result.push_back(map_.landmark(map_.landmarks.at(id)));
+  return result;
+}
+
+}  // namespace understory::geoslam_mapper::smoothing

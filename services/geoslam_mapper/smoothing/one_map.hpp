@@ -1,0 +1,91 @@
+// One map: a keyframe's story in it, from arrival to answer.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "services/geoslam_mapper/mapper_method.hpp"
+#include "services/geoslam_mapper/parameters.hpp"
+#include "services/geoslam_mapper/smoothing/common_error.hpp"
+#include "services/geoslam_mapper/smoothing/discovery.hpp"
+#include "services/geoslam_mapper/smoothing/fusion.hpp"
+#include "services/geoslam_mapper/smoothing/global_map.hpp"
+#include "services/geoslam_mapper/smoothing/known_ground.hpp"
+#include "services/geoslam_mapper/smoothing/merging.hpp"
+#include "services/geoslam_mapper/smoothing/motion.hpp"
+#include "services/geoslam_mapper/smoothing/place_recogniser.hpp"
+#include "services/geoslam_mapper/smoothing/scan_localiser.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+
+/// A map and the vehicle in it. The work is done by the parts. See MapperMethod for the functions
+/// that it has, too; keyframes must be well-formed and in order of time.
+class OneMap {
+ public:
+  /// An empty map. `id`: upper 16 bit of its landmarks' ids.
+  explicit OneMap(const SmoothingMapperParameters& parameters, std::uint32_t id = 1);
+  /// An empty map beside this one: it has the odometry, and does not know where the vehicle is.
+  OneMap beside(std::uint32_t id) const;
+
+  /// Localises the keyframe and fuses it; the first one starts the map.
+  model::MapUpdate add(const model::Keyframe& keyframe);
+  /// The pose of a single scan.
+  std::optional<ScanPose> locate(const model::LandmarkScan& scan);
+  /// Motion without landmarks.
+  void add(const model::Odometry& odometry) { motion_.add(odometry); }
+  /// The filter's pose, bias and velocity.
+  void add(const model::EkfPose& pose) { motion_.add(pose); }
+  /// The filter's estimate of the level error.
+  void add(const model::EkfLevel& level) { scan_localiser_.set(level); }
+  /// A map to start from. It counts as confirmed.
+  void start_with(std::span<const model::MapLandmark> landmarks);
+
+  /// Landmarks, graph and trajectory.
+  const GlobalMap& map() const { return map_; }
+  /// Whether so few keyframes agree (`new_map_keyframes`) that the first one may have been wrong.
+  bool is_provisional() const;
+  /// Whether odometry reaches the keyframe from the last one that was localised, well enough to
+  /// look for landmarks around the prediction (`lost_sigma_m`, `lost_sigma_rad`).
+  bool reaches(const model::Keyframe& keyframe) const;
+  /// The base of the last keyframe, localised or assumed, frame `map`; none before the first.
+  const std::optional<geometry::SE2WithCovariance>& map_T_last_base() const {
+    return motion_.map_T_last_base();
+  }
+
+  /// Landmarks that are new or have moved since the last call.
+  std::vector<model::MapLandmark> take_changed_landmarks();
+
+  /// Members of a saved state; see common/state. Parameters are configuration.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.map_, self.motion_, self.discovery_, self.merging_, self.known_ground_,
+      self.scan_localiser_, self.common_error_, self.first_offered_, self.agreeing_);
+  }
+
+ private:
+  std::string why_not_start(const model::Keyframe& keyframe);
+  void start_map(const model::Keyframe& keyframe, model::MapUpdate& update);
+  std::optional<Placement> place(const model::Keyframe& keyframe,
+                                 const std::optional<Prediction>& prediction,
+                                 model::MapUpdate& update);
+  void extend(const FusedKeyframe& fused, model::MapUpdate& update);
+  void confirm(const model::Keyframe& keyframe, model::MapUpdate& update);
+  void report(const model::Keyframe& keyframe, model::MapUpdate& update);
+
+  SmoothingMapperParameters parameters_;
+  PlaceRecogniser place_recogniser_;
+  GlobalMap map_;
+  Motion motion_;
+  Discovery discovery_;
+  Merging merging_;
+  KnownGround known_ground_;
+  ScanLocaliser scan_localiser_;
+  CommonError common_error_;
+  std::optional<model::Utime> first_offered_;  ///< Keyframe that might have started the map.
+  /// Keyframes that agree with each other: the first, and those that were localised by landmarks.
+  std::uint32_t agreeing_ = 0;
+};
+
+}  // namespace understory::geoslam_mapper::smoothing

@@ -1,0 +1,72 @@
+// One message of a sensor, as it comes from the bus.
+#pragma once
+
+#include <concepts>
+#include <stdexcept>
+#include <variant>
+
+#include "common/model/archive.hpp"
+#include "services/lidar_imu_input/deskew.hpp"
+#include "services/lidar_imu_input/input_fault.hpp"
+
+namespace understory::lidar_imu_input {
+
+/// RAW_IMU, RAW_WHEELS, RAW_GNSS, RAW_SWEEP (a whole revolution) or RAW_SCAN, frame sensor: in the
+/// order of `Sensor`.
+using RawReading = std::variant<model::ImuSample, model::WheelSample, model::GnssFix,
+                                model::PointSweep, model::PlanarScan>;
+
+/// Which sensor it is of.
+inline Sensor sensor_of(const RawReading& reading) { return static_cast<Sensor>(reading.index()); }
+/// Its stamp on the sensor's own clock.
+inline model::Utime stamp_of(const RawReading& reading) {
+  return std::visit([](const auto& value) { return value.utime; }, reading);
+}
+/// When it was complete: the end of a revolution, else its stamp.
+inline model::Utime end_of(const RawReading& reading) {
+  const auto* sweep = std::get_if<model::PointSweep>(&reading);
+  return sweep != nullptr ? end_of_revolution(*sweep) : stamp_of(reading);
+}
+/// The number that its sender gave it.
+inline std::uint64_t sequence_of(const RawReading& reading) {
+  return std::visit([](const auto& value) { return value.sequence; }, reading);
+}
+
+/// A reading of the sensor with nothing in it. Throws std::invalid_argument for a number that is
+/// none of a sensor.
+inline RawReading empty_reading(Sensor sensor) {
+  switch (sensor) {
+    case Sensor::kImu:
+      return model::ImuSample{};
+    case Sensor::kWheels:
+      return model::WheelSample{};
+    case Sensor::kGnss:
+      return model::GnssFix{};
+    case Sensor::kSweep:
+      return model::PointSweep{};
+    case Sensor::kScan:
+      return model::PlanarScan{};
+    default:
+      throw std::invalid_argument("state: a reading of no known sensor waits");
+  }
+}
+
+/// A reading that waits; saved without the points of sweeps, which are bulk and no state.
+struct HeldReading {
+  RawReading reading;
+
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    auto kind = static_cast<std::uint8_t>(self.reading.index());
+    a(kind);
+    if constexpr (Archive::kReads) self.reading = empty_reading(static_cast<Sensor>(kind));
+    std::visit(
+        [&a](auto& value) {
+          using Value = std::remove_cvref_t<decltype(value)>;
+          if constexpr (!std::same_as<Value, model::PointSweep>) a(value);
+        },
+        self.reading);
+  }
+};
+
+}  // namespace understory::lidar_imu_input

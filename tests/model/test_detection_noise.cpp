@@ -1,0 +1,149 @@
+#include "common/model/detection_noise.hpp"
+
+#include <cmath>
+#include <random>
+
+#include "common/geometry/se2.hpp"
+#include "common/model/archive.hpp"
+#include "tests/catch.hpp"
+
+using namespace understory;
+
+namespace {
+
+/// A vehicle that drives past landmarks, whose detections are as noisy as asked.
+class Drive {
+ public:
+  explicit Drive(std::uint64_t seed, int landmarks = 12) : random_(seed) {
+    for (int i = 0; i < landmarks; ++i) landmarks_.emplace_back(uniform(-15, 25), uniform(-15, 15));
+  }
+
+  /// A scan with noise of `sigma_m` times `factor_at(range)`, stated as `sigma_m`.
+  template <class FactorAt>
+  model::LandmarkScan next(double sigma_m, FactorAt factor_at) {
+    world_T_vehicle_ = world_T_vehicle_ * geometry::SE2(0.1, 0.0, 0.01);
+    model::LandmarkScan scan;
+    scan.utime = utime_ += 100'000;
+    scan.field_of_view.max_range_m = 40.0;
+    tracks.clear();
+    for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+      if (uniform(0, 1) < 0.1) continue;
+      const Eigen::Vector2d true_m = world_T_vehicle_.inverse() * landmarks_[i];
+      const double sigma = sigma_m * factor_at(true_m.norm());
+      model::Detection one;
+      one.position_m << true_m.x() + sigma * normal_(random_),
+          true_m.y() + sigma * normal_(random_), 0.0;
+      one.covariance_m2 = sigma_m * sigma_m * Eigen::Matrix3d::Identity();
+      scan.detections.push_back(one);
+      tracks.push_back(i + 1);
+    }
+    return scan;
+  }
+  double uniform(double from, double to) {
+    return std::uniform_real_distribution<double>(from, to)(random_);
+  }
+
+  std::vector<std::uint64_t> tracks;  ///< Of the last scan.
+
+ private:
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+  std::vector<Eigen::Vector2d> landmarks_;
+  geometry::SE2 world_T_vehicle_;
+  model::Utime utime_ = 0;
+};
+
+constexpr auto kTrunk = model::LandmarkKind::kTrunk;
+
+}  // namespace
+
+TEST_CASE("Noise that is as stated is left as stated", "[noise]") {
+  int replaced = 0;
+  int scans = 0;
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    Drive drive(seed);
+    model::DetectionNoise noise;
+    for (int k = 0; k < 100; ++k, ++scans) {
+      const auto scan = drive.next(0.1, [](double) { return 1.0; });
+      noise.add(scan, drive.tracks);
+      if (noise.is_misstated()) ++replaced;
+    }
+  }
+  INFO(scans << " scans");
+  CHECK(replaced == 0);
+}
+
+TEST_CASE("The factor of misstated noise is learned within a few scans", "[noise]") {
+  for (const double factor : {0.25, 0.5, 2.0, 4.0}) {
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      Drive drive(seed);
+      model::DetectionNoise noise;
+      for (int k = 0; k < 8; ++k) {
+        noise.add(drive.next(0.1, [&](double) { return factor; }), drive.tracks);
+      }
+      CAPTURE(factor, seed);
+      const double early = noise.factor(kTrunk, 8.0) / (factor * factor);
+      CHECK(early > 0.4);
+      CHECK(early < 2.5);
+
+      for (int k = 0; k < 100; ++k) {
+        noise.add(drive.next(0.1, [&](double) { return factor; }), drive.tracks);
+      }
+      const double late = noise.factor(kTrunk, 8.0) / (factor * factor);
+      CHECK(late > 0.75);
+      CHECK(late < 1.35);
+    }
+  }
+}
+
+TEST_CASE("Noise that grows with range is learned for each range", "[noise]") {
+  Drive drive(3, 60);
+  model::DetectionNoise noise;
+  const auto factor_at = [](double range_m) { return range_m < 10.0 ? 1.0 : 3.0; };
+  for (int k = 0; k < 200; ++k) noise.add(drive.next(0.05, factor_at), drive.tracks);
+  CHECK(noise.factor(kTrunk, 5.0) < 1.7);
+  CHECK(noise.factor(kTrunk, 15.0) > 6.0);
+  CHECK(noise.factor(kTrunk, 15.0) < 12.0);
+  CHECK(noise.factor(model::LandmarkKind::kCorner, 15.0) == 1.0);
+}
+
+TEST_CASE("One wrong detection in fifty does not pass for noise", "[noise]") {
+  Drive drive(4, 50);
+  model::DetectionNoise noise;
+  for (int k = 0; k < 200; ++k) {
+    auto scan = drive.next(0.1, [](double) { return 1.0; });
+    if (!scan.detections.empty())
+      scan.detections.front().position_m.x() += drive.uniform(-3.0, 3.0);
+    noise.add(scan, drive.tracks);
+  }
+  CHECK_FALSE(noise.is_misstated());
+}
+
+TEST_CASE("Corrected covariances are symmetric, and learned noise is saved", "[noise]") {
+  Drive drive(5);
+  model::DetectionNoise noise;
+  for (int k = 0; k < 50; ++k) noise.add(drive.next(0.1, [](double) { return 3.0; }), drive.tracks);
+  auto scan = drive.next(0.1, [](double) { return 3.0; });
+  scan.detections.front().covariance_m2(0, 2) = scan.detections.front().covariance_m2(2, 0) = 0.001;
+  const auto corrected = noise.corrected(scan);
+  const Eigen::Matrix3d& covariance = corrected.detections.front().covariance_m2;
+  CHECK(covariance == covariance.transpose());
+  CHECK(covariance(0, 0) > 0.05);
+  CHECK(covariance(2, 2) == scan.detections.front().covariance_m2(2, 2));
+
+  state::Writer out;
+  out(noise);
+  model::DetectionNoise loaded;
+  state::Reader in(out.bytes());
+  in(loaded);
+  CHECK(in.is_at_end());
+  CHECK(loaded.factor(kTrunk, 8.0) == noise.factor(kTrunk, 8.0));
+}
+
+TEST_CASE("Noise is not learned where the configuration says so", "[noise]") {
+  Drive drive(6);
+  model::DetectionNoise noise({.learn = false});
+  for (int k = 0; k < 50; ++k) noise.add(drive.next(0.1, [](double) { return 4.0; }), drive.tracks);
+  CHECK_FALSE(noise.is_misstated());
+  CHECK_FALSE(noise.is_new());
+}

@@ -1,0 +1,124 @@
+// Messages of older versions, as logs have them.
+#include <algorithm>
+#include <span>
+
+#include "tests/catch.hpp"
+#include "tests/wire/value_maker.hpp"
+
+using namespace understory;
+using namespace understory::wire;
+
+namespace {
+
+/// The version of ODOMETRY that older logs have.
+odometry_t old_version(const odometry2_t& wire) {
+  odometry_t old{};
+  old.utime = wire.utime;
+  old.seq = wire.seq;
+  old.from_utime = wire.from_utime;
+  old.from_T_to = wire.from_T_to;
+
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      old.covariance[row][column] = wire.covariance[row][column];
+    }
+  }
+
+  old.has_wheels = wire.has_wheels;
+  old.is_standing = wire.is_standing;
+  old.num_inertial = wire.num_inertial;
+  old.inertial = wire.inertial;
+
+  return old;
+}
+
+keyframe_t old_version(const keyframe2_t& wire) {
+  keyframe_t old{};
+  old.utime = wire.utime;
+  old.seq = wire.seq;
+  old.max_range_m = wire.max_range_m;
+  old.bearing_rad = wire.bearing_rad;
+  old.width_rad = wire.width_rad;
+  old.has_previous = wire.has_previous;
+  old.previous_T_base = wire.previous_T_base;
+  old.num_members = wire.num_members;
+  old.members = wire.members;
+  old.num_landmarks = wire.num_landmarks;
+  old.landmarks = wire.landmarks;
+  return old;
+}
+
+slam_pose_t old_version(const slam_pose2_t& wire) {
+  slam_pose_t old{};
+  old.utime = wire.utime;
+  old.seq = wire.seq;
+  old.status = wire.status;
+  old.keyframe_seq = wire.keyframe_seq;
+  old.submap_id = wire.submap_id;
+  old.submap_T_vehicle = wire.submap_T_vehicle;
+  std::ranges::copy(std::span(&wire.covariance[0][0], 9), &old.covariance[0][0]);
+  old.correction_version = wire.correction_version;
+  old.map_T_submap = wire.map_T_submap;
+  old.map_T_odom = wire.map_T_odom;
+  old.reset_counter = wire.reset_counter;
+  old.reset_delta = wire.reset_delta;
+  return old;
+}
+
+slam_update_t old_version(const slam_update2_t& wire) {
+  slam_update_t old{};
+  old.utime = wire.utime;
+  old.seq = wire.seq;
+  old.keyframe_seq = wire.keyframe_seq;
+  old.status = wire.status;
+  old.map_T_vehicle = wire.map_T_vehicle;
+  std::ranges::copy(std::span(&wire.covariance[0][0], 9), &old.covariance[0][0]);
+  old.map_T_latest_vehicle = wire.map_T_latest_vehicle;
+  old.num_associations = wire.num_associations;
+  old.associations = wire.associations;
+  old.reason = wire.reason;
+  return old;
+}
+
+}  // namespace
+
+TEST_CASE("odometry of the version before is read, without the level's error") {
+  Maker values(11);
+  bool had_inertial = false;
+  for (int i = 0; i < 50; ++i) {
+    model::Odometry should = values.odometry();
+    const auto is = decode_message<model::Odometry>(encode_bytes(old_version(to_wire(should))));
+    REQUIRE(is);
+    had_inertial = had_inertial || should.inertial;
+    if (should.inertial) should.inertial->level = model::LevelError{};
+    CHECK(encode_message(*is) == encode_message(should));
+  }
+  CHECK(had_inertial);
+}
+
+TEST_CASE("keyframes, updates and poses of the versions before are read, as far as they go") {
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    Maker make(seed);
+    model::Keyframe keyframe = make.keyframe();
+    const auto old = decode_message<model::Keyframe>(encode_bytes(old_version(to_wire(keyframe))));
+    REQUIRE(old);
+    keyframe.detections.clear();
+    CHECK(encode_message(*old) == encode_message(keyframe));
+
+    model::SlamPose pose = make.slam_pose();
+    pose.is_lost = pose.is_new_map = pose.is_provisional = false;
+    pose.map_id = 1;
+    const auto old_pose = decode_message<model::SlamPose>(encode_bytes(old_version(to_wire(pose))));
+    REQUIRE(old_pose);
+    CHECK(encode_message(*old_pose) == encode_message(pose));
+
+    model::MapUpdate update;
+    update.map_T_vehicle = make.pose();
+    update.covariance = make.covariance<3>();
+    update.associations = {{0, 5}, {2, 6}};
+    const auto old_update =
+        decode_message<model::MapUpdate>(encode_bytes(old_version(to_wire(update))));
+    REQUIRE(old_update);
+    CHECK(encode_message(*old_update) == encode_message(update));
+  }
+}
