@@ -246,6 +246,8 @@ class MapperAdapter : public bus::Adapter {
     const bool changes = !delta.added.empty() || !delta.moved.empty() || !delta.removed.empty() ||
                          !delta.merged.empty();
     if (!changes) return;
+    stage_->set_covariances(delta.added);
+    stage_->set_covariances(delta.moved);
 
     // Another map builds on nothing; versions are never used again.
     delta.base_version = is_another ? 0 : memory_.known.version;

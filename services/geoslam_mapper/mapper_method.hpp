@@ -55,17 +55,21 @@ class MapperMethod {
   virtual void start_with(std::span<const model::MapLandmark> landmarks) = 0;
 
   /// The pose of every keyframe's base at the present estimate, in order of time; folded keyframes
-  /// are reconstructed. O(keyframes).
+  /// are reconstructed. With covariances, for about one factorisation, where the method has them.
   virtual std::vector<model::KeyframePose> trajectory() const = 0;
 
-  /// Every landmark of the map at the present estimate, in order of id. O(map).
+  /// Every landmark of the map at the present estimate, in order of id. Likewise.
   virtual std::vector<model::MapLandmark> landmarks() const = 0;
 
-  /// Those landmarks that are new or have moved since the last call, in order of id; costs what
-  /// changed. None where the method does not track changes.
+  /// Those landmarks that are new or have moved since the last call, in order of id and without
+  /// covariances; costs what changed. None where the method does not track changes.
   virtual std::optional<std::vector<model::MapLandmark>> take_changed_landmarks() {
     return std::nullopt;
   }
+
+  /// Sets the covariances of these landmarks of the map. Costs the part of the graph between them
+  /// and its root. They stay zero where the method has none.
+  virtual void set_covariances(std::span<model::MapLandmark> /*landmarks*/) const {}
 
   /// The whole state, for a restart. O(state).
   virtual std::string save() const = 0;

@@ -20,7 +20,8 @@ BayesTree::BayesTree(graph::FactorGraph& graph)
       restructuring_(graph_, cliques_),
       elimination_(graph_, cliques_),
       back_substitution_(graph_, cliques_, waiting_),
-      covariance_(graph_, cliques_) {}
+      covariance_(graph_, cliques_),
+      marginals_(graph_, cliques_) {}
 
 void BayesTree::mark_structure(int variable) {
   const int clique = graph_.variable(variable).clique;

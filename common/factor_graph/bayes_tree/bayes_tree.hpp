@@ -10,6 +10,7 @@
 #include "common/factor_graph/bayes_tree/clique_tree.hpp"
 #include "common/factor_graph/bayes_tree/covariance.hpp"
 #include "common/factor_graph/bayes_tree/elimination.hpp"
+#include "common/factor_graph/bayes_tree/marginals.hpp"
 #include "common/factor_graph/bayes_tree/marks.hpp"
 #include "common/factor_graph/bayes_tree/restructuring.hpp"
 #include "common/factor_graph/bayes_tree/waiting_queue.hpp"
@@ -61,6 +62,10 @@ class BayesTree {
   std::optional<Eigen::MatrixXd> joint_covariance(std::span<const int> variables) {
     return covariance_.joint(variables);
   }
+  /// See Marginals::visit().
+  bool visit_marginals(std::span<const int> variables, const Marginals::Visit& found) {
+    return marginals_.visit(variables, found);
+  }
   /// Variables that the measurements leave undetermined. O(cliques) where there are any.
   std::vector<int> undetermined() const;
   /// The cliques.
@@ -83,6 +88,7 @@ class BayesTree {
   Elimination elimination_;
   BackSubstitution back_substitution_;
   Covariance covariance_;
+  Marginals marginals_;
 };
 
 }  // namespace understory::factor_graph::bayes_tree

@@ -40,6 +40,18 @@ void rotate(Eigen::MatrixXd& covariance, Eigen::Index first, const Eigen::Matrix
       covariance.middleCols(first, by.rows()) * by.transpose();
 }
 
+/// From the chart, which is the world's, to the pose's own frame.
+void to_own_frame(const graph::VariableRecord& variable, Eigen::MatrixXd& covariance,
+                  Eigen::Index at) {
+  if (variable.type == graph::VariableType::kPose2) {
+    rotate(covariance, at, graph::pose2_of(variable.value).rotation().transpose());
+  } else if (variable.type == graph::VariableType::kPose3) {
+    rotate(covariance, at, graph::pose3_of(variable.value).rotation.conjugate().toRotationMatrix());
+    rotate(covariance, at + 3,
+           graph::right_jacobian(Eigen::Map<const Eigen::Vector3d>(variable.delta.data() + 3)));
+  }
+}
+
 }  // namespace
 
 std::string name_of(const graph::FactorGraph& graph, graph::VariableId id) {
@@ -303,21 +315,32 @@ std::optional<Eigen::MatrixXd> IncrementalSmoother::joint_covariance(
   std::optional<Eigen::MatrixXd> covariance = tree_.joint_covariance(variables);
   if (!covariance) return covariance;
 
-  // From the charts, which are those of the world, to the poses' own frames.
   Eigen::Index at = 0;
   for (const int v : variables) {
-    const graph::VariableRecord& variable = graph_.variable(v);
-    if (variable.type == graph::VariableType::kPose2) {
-      rotate(*covariance, at, graph::pose2_of(variable.value).rotation().transpose());
-    } else if (variable.type == graph::VariableType::kPose3) {
-      rotate(*covariance, at,
-             graph::pose3_of(variable.value).rotation.conjugate().toRotationMatrix());
-      rotate(*covariance, at + 3,
-             graph::right_jacobian(Eigen::Map<const Eigen::Vector3d>(variable.delta.data() + 3)));
-    }
-    at += dimension(variable.type);
+    to_own_frame(graph_.variable(v), *covariance, at);
+    at += dimension(graph_.variable(v).type);
   }
   return covariance;
+}
+
+std::vector<Eigen::MatrixXd> IncrementalSmoother::covariances(
+    std::span<const graph::VariableId> ids) {
+  std::vector<int> variables;
+  variables.reserve(ids.size());
+  std::vector<std::size_t> place_of(static_cast<std::size_t>(graph_.variable_capacity()));
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (!graph_.contains(ids[i])) continue;
+    variables.push_back(index(ids[i]));
+    place_of[static_cast<std::size_t>(variables.back())] = i;
+  }
+
+  std::vector<Eigen::MatrixXd> result(ids.size());
+  tree_.visit_marginals(variables, [&](int v, const Eigen::Ref<const Eigen::MatrixXd>& in_chart) {
+    Eigen::MatrixXd& covariance = result[place_of[static_cast<std::size_t>(v)]];
+    covariance = in_chart;
+    to_own_frame(graph_.variable(v), covariance, 0);
+  });
+  return result;
 }
 
 }  // namespace understory::factor_graph::bayes_tree

@@ -133,6 +133,10 @@ class IncrementalSmoother {
   /// rad]. None where a variable has no factor or is not determined. Costs what the paths to the
   /// root cost.
   std::optional<Eigen::MatrixXd> joint_covariance(std::span<const graph::VariableId> ids);
+  /// Covariance of each variable by itself, in the order given, poses as in joint_covariance();
+  /// empty (0 x 0) where a variable has no factor or one on its path to the root is not determined.
+  /// Costs one elimination of these paths, whatever the number of variables on them.
+  std::vector<Eigen::MatrixXd> covariances(std::span<const graph::VariableId> ids);
 
   /// The factorised graph.
   const BayesTree& tree() const { return tree_; }

@@ -269,6 +269,23 @@ std::optional<Eigen::MatrixXd> Smoother::joint_marginal(std::span<const PoseId> 
   return state_->smoother.joint_covariance(names);
 }
 
+Marginals Smoother::marginals(std::span<const PoseId> poses,
+                              std::span<const PointId> points) const {
+  std::vector<graph::VariableId> names;
+  names.reserve(poses.size() + points.size());
+  for (const PoseId id : poses) names.push_back(state_->name(id));
+  for (const PointId id : points) names.push_back(state_->name(id));
+  const std::vector<Eigen::MatrixXd> found = state_->smoother.covariances(names);
+
+  Marginals result{std::vector<Eigen::Matrix3d>(poses.size(), Eigen::Matrix3d::Zero()),
+                   std::vector<Eigen::Matrix2d>(points.size(), Eigen::Matrix2d::Zero())};
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    if (found[i].size() > 0) result.poses[i] = found[i];
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (found[poses.size() + i].size() > 0) result.points[i] = found[poses.size() + i];
+  return result;
+}
+
 std::optional<double> Smoother::variance(ScalarId id) const {
   const graph::VariableId name = state_->name(id);
   const auto covariance = state_->smoother.joint_covariance({&name, 1});

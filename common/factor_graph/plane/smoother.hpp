@@ -37,6 +37,12 @@ struct SmootherUpdate {
   std::string error;  ///< Names the variables that the measurements leave undetermined.
 };
 
+/// Covariances of single variables.
+struct Marginals {
+  std::vector<Eigen::Matrix3d> poses;   ///< m, rad; right perturbation.
+  std::vector<Eigen::Matrix2d> points;  ///< [m^2]
+};
+
 /// Index of a PointObservation in the order in which they were added.
 enum class ObservationId : std::uint32_t {};
 /// Index of a RelativePose, likewise.
@@ -148,6 +154,10 @@ class Smoother {
   /// variable has no factor or is not determined.
   std::optional<Eigen::MatrixXd> joint_marginal(std::span<const PoseId> poses,
                                                 std::span<const PointId> points) const;
+  /// Covariances of poses (right perturbation) and of points, each by itself and in the order
+  /// given; zero where joint_marginal() has none. Costs one elimination of the paths to the root,
+  /// of all variables about one factorisation: for one or two joint_marginal() is cheaper.
+  Marginals marginals(std::span<const PoseId> poses, std::span<const PointId> points) const;
   /// Variance of a scalar; none likewise.
   std::optional<double> variance(ScalarId id) const;
 

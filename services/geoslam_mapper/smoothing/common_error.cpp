@@ -17,12 +17,16 @@ void CommonError::set_start_level(const model::EkfLevel& level) {
   start_covariance_m2_ = arm * level.covariance * arm.transpose();
 }
 
+Eigen::Matrix2d CommonError::covariance_of(const Eigen::Vector2d& position_m) const {
+  const Eigen::Vector2d off = scale_sigma_ * position_m;
+  return start_covariance_m2_ + off * off.transpose();
+}
+
 Eigen::Matrix3d CommonError::covariance_at(const geometry::SE2& map_T_vehicle) const {
   const Eigen::Matrix2d back = map_T_vehicle.rotation().transpose();
-  const Eigen::Vector2d off = scale_sigma_ * (back * map_T_vehicle.translation());
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   covariance.topLeftCorner<2, 2>() =
-      back * start_covariance_m2_ * back.transpose() + off * off.transpose();
+      back * covariance_of(map_T_vehicle.translation()) * back.transpose();
   return covariance;
 }
 

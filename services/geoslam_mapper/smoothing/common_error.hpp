@@ -20,6 +20,8 @@ class CommonError {
   void set_start_level(const model::EkfLevel& level);
   /// What it adds to the covariance of a pose (right perturbation).
   Eigen::Matrix3d covariance_at(const geometry::SE2& map_T_vehicle) const;
+  /// What it adds to the covariance [m^2] of a point, frame `map`.
+  Eigen::Matrix2d covariance_of(const Eigen::Vector2d& position_m) const;
 
   /// Members of a saved state; see common/state. The scale is configuration.
   template <class Archive, class Self>

@@ -28,7 +28,7 @@ struct GlobalMap {
     trajectory.follow(graph);
   }
 
-  /// A landmark as other processes get it, at the present estimate.
+  /// A landmark at the present estimate, without covariance; see told_map.
   model::MapLandmark landmark(const StoredLandmark& stored) const {
     model::MapLandmark out;
     out.id = stored.id;
@@ -39,7 +39,7 @@ struct GlobalMap {
     return out;
   }
 
-  /// Every landmark as other processes get it, in order of id. O(map).
+  /// Every landmark likewise, in order of id. O(map).
   std::vector<model::MapLandmark> all_landmarks() const {
     std::vector<model::MapLandmark> result;
     result.reserve(landmarks.all().size());
@@ -47,7 +47,8 @@ struct GlobalMap {
     return result;
   }
 
-  /// The pose of every base at the present estimate, in order of time. O(bases).
+  /// The pose of every base at the present estimate, without covariance, in order of time.
+  /// O(bases).
   std::vector<model::KeyframePose> all_poses() const {
     std::vector<model::KeyframePose> result;
     result.reserve(trajectory.size());
@@ -56,23 +57,6 @@ struct GlobalMap {
           {base.sequence, base.utime, trajectory.pose(base, graph), Eigen::Matrix3d::Zero()});
     }
     return result;
-  }
-
-  /// Covariance [m^2] of a landmark's position, frame `map`. The graph has none of a landmark that
-  /// it was not solved with yet: then by the node that observed it.
-  Eigen::Matrix2d covariance_m2(model::LandmarkId id) const {
-    const StoredLandmark& landmark = landmarks.at(id);
-    if (!graph.position(id)) return landmark.prior_covariance;
-    if (const auto marginal = graph.covariance(id)) return *marginal;
-
-    const geometry::SE2WithCovariance map_T_node = graph.marginal(landmark.nodes.back());
-    const Eigen::Vector2d in_node = map_T_node.mean.inverse() * landmark.position_m;
-    Eigen::Matrix<double, 2, 3> jacobian;  // d(position)/d(xi), in the node's frame.
-    jacobian << 1.0, 0.0, -in_node.y(), 0.0, 1.0, in_node.x();
-    const Eigen::Matrix2d rotation = map_T_node.mean.rotation();
-    return rotation * jacobian * map_T_node.covariance * jacobian.transpose() *
-               rotation.transpose() +
-           landmark.local_variance() * Eigen::Matrix2d::Identity();
   }
 
   /// Members of a saved state; see common/state. After a load the graph is solved from its saved

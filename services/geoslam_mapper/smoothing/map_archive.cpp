@@ -15,13 +15,11 @@ std::size_t parts_of(const std::deque<KeptMap>& maps) {
 
 }  // namespace
 
-KeptMap keep(const GlobalMap& map) {
+KeptMap keep(const GlobalMap& map, const CommonError& common) {
   KeptMap result;
   result.id = map.landmarks.map_id();
-  result.keyframes = map.all_poses();
-  result.landmarks = map.all_landmarks();
-  for (model::MapLandmark& landmark : result.landmarks)
-    landmark.covariance_m2 = map.covariance_m2(landmark.id);
+  result.keyframes = told_poses(map, common);
+  result.landmarks = told_landmarks(map, common);
   result.whole = state::save(kWholeMapFormat, map);
   return result;
 }

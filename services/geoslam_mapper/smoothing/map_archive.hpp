@@ -9,7 +9,7 @@
 
 #include "common/model/archive.hpp"
 #include "common/model/map.hpp"
-#include "services/geoslam_mapper/smoothing/global_map.hpp"
+#include "services/geoslam_mapper/smoothing/told_map.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 
@@ -17,7 +17,7 @@ namespace understory::geoslam_mapper::smoothing {
 struct KeptMap {
   std::uint32_t id = 0;                        ///< Upper 16 bit of its landmarks' ids.
   std::vector<model::MapLandmark> landmarks;   ///< In order of id, with covariances; its own frame.
-  std::vector<model::KeyframePose> keyframes;  ///< In order of time; its own frame.
+  std::vector<model::KeyframePose> keyframes;  ///< In order of time, likewise.
   /// Its graph with all that was observed, as common/state writes it; empty in older ones.
   std::string whole;
 
@@ -28,8 +28,8 @@ struct KeptMap {
   }
 };
 
-/// All that is worth keeping where a map is left. Cost: a marginal covariance per landmark.
-KeptMap keep(const GlobalMap& map);
+/// All that is worth keeping where a map is left. Costs about two factorisations.
+KeptMap keep(const GlobalMap& map, const CommonError& common);
 
 /// The maps that were left, the oldest first. Bounded: a landmark takes 80 bytes, a keyframe 112;
 /// the newest kMostWhole have their graph, too (some 200 bytes per observation). Older ones are

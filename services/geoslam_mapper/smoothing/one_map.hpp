@@ -13,6 +13,7 @@
 #include "services/geoslam_mapper/smoothing/fusion.hpp"
 #include "services/geoslam_mapper/smoothing/global_map.hpp"
 #include "services/geoslam_mapper/smoothing/known_ground.hpp"
+#include "services/geoslam_mapper/smoothing/map_archive.hpp"
 #include "services/geoslam_mapper/smoothing/merging.hpp"
 #include "services/geoslam_mapper/smoothing/motion.hpp"
 #include "services/geoslam_mapper/smoothing/place_recogniser.hpp"
@@ -54,6 +55,20 @@ class OneMap {
     return motion_.map_T_last_base();
   }
 
+  /// The map as other processes get it; see told_map.
+  std::vector<model::MapLandmark> told_landmarks() const {
+    return smoothing::told_landmarks(map_, common_error_);
+  }
+  /// Likewise.
+  std::vector<model::KeyframePose> told_poses() const {
+    return smoothing::told_poses(map_, common_error_);
+  }
+  /// Likewise.
+  void set_covariances(std::span<model::MapLandmark> landmarks) const {
+    smoothing::set_covariances(landmarks, map_, common_error_);
+  }
+  /// All that is worth keeping of it; see map_archive.
+  KeptMap keep() const { return smoothing::keep(map_, common_error_); }
   /// Landmarks that are new or have moved since the last call.
   std::vector<model::MapLandmark> take_changed_landmarks();
 

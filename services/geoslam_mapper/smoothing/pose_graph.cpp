@@ -278,10 +278,38 @@ std::vector<double> PoseGraph::relative_variances(NodeIndex node,
   return variances;
 }
 
-std::optional<Eigen::Matrix2d> PoseGraph::covariance(model::LandmarkId id) const {
-  const auto marginal = smoother_.joint_marginal({}, {&point_of_.at(id), 1});
-  if (!marginal) return std::nullopt;
-  return Eigen::Matrix2d(*marginal);
+std::vector<Eigen::Matrix2d> PoseGraph::covariances(std::span<const model::LandmarkId> ids) const {
+  std::vector<plane::PointId> points;
+  std::vector<std::size_t> place_of;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const auto found = point_of_.find(ids[i]);
+    if (found == point_of_.end()) continue;
+    points.push_back(found->second);
+    place_of.push_back(i);
+  }
+
+  std::vector<Eigen::Matrix2d> result(ids.size(), Eigen::Matrix2d::Zero());
+  const plane::Marginals marginals = smoother_.marginals({}, points);
+  for (std::size_t k = 0; k < points.size(); ++k) result[place_of[k]] = marginals.points[k];
+  return result;
+}
+
+std::vector<Eigen::Matrix3d> PoseGraph::covariances(std::span<const NodeIndex> nodes) const {
+  std::vector<NodeIndex> distinct(nodes.begin(), nodes.end());
+  std::sort(distinct.begin(), distinct.end());
+  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
+  std::vector<plane::PoseId> poses;
+  poses.reserve(distinct.size());
+  for (const NodeIndex node : distinct) poses.push_back(nodes_[node].centre);
+  const plane::Marginals marginals = smoother_.marginals(poses, {});
+
+  std::vector<Eigen::Matrix3d> result;
+  result.reserve(nodes.size());
+  for (const NodeIndex node : nodes) {
+    const auto at = std::lower_bound(distinct.begin(), distinct.end(), node) - distinct.begin();
+    result.push_back(marginals.poses[static_cast<std::size_t>(at)]);
+  }
+  return result;
 }
 
 std::optional<Eigen::Matrix2d> PoseGraph::difference_covariance(model::LandmarkId a,

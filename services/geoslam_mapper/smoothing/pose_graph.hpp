@@ -150,8 +150,11 @@ class PoseGraph {
   /// is undetermined.
   std::vector<double> relative_variances(NodeIndex node,
                                          std::span<const model::LandmarkId> ids) const;
-  /// Covariance [m^2] of a landmark's position, frame `map`; none where it is undetermined.
-  std::optional<Eigen::Matrix2d> covariance(model::LandmarkId id) const;
+  /// Covariances [m^2] of landmarks' positions, frame `map`; zero where a landmark is not in the
+  /// solved graph or undetermined. Costs one elimination of the paths to the root.
+  std::vector<Eigen::Matrix2d> covariances(std::span<const model::LandmarkId> ids) const;
+  /// Covariances of map_T_centre of nodes, which may repeat (right perturbation); zero likewise.
+  std::vector<Eigen::Matrix3d> covariances(std::span<const NodeIndex> nodes) const;
   /// Covariance [m^2] of the difference of two landmarks' positions, frame `map`; none where it is
   /// undetermined.
   std::optional<Eigen::Matrix2d> difference_covariance(model::LandmarkId a,

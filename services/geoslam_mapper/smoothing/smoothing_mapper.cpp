@@ -126,7 +126,7 @@ void SmoothingMapper::adopt_trial(model::MapUpdate& update) {
         "map " + std::to_string(left) + " is dropped: no keyframe agreed with its first";
   } else {
     update.reason = "lost: map " + std::to_string(left) + " is kept as it is";
-    for (const std::uint32_t id : kept_maps_.add(keep(current_.map())))
+    for (const std::uint32_t id : kept_maps_.add(current_.keep()))
       update.reason += ", map " + std::to_string(id) + " is forgotten";
   }
   current_ = std::move(*trial_);
@@ -134,8 +134,7 @@ void SmoothingMapper::adopt_trial(model::MapUpdate& update) {
 
   update.status = model::MapUpdateStatus::kFirstMap;
   update.added.clear();
-  for (const model::MapLandmark& landmark : current_.map().all_landmarks())
-    update.added.push_back(landmark.id);
+  for (const auto& [id, landmark] : current_.map().landmarks.all()) update.added.push_back(id);
 }
 
 std::string SmoothingMapper::save() const { return state::save(kFormat, *this); }

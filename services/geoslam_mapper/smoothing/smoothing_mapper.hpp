@@ -35,14 +35,13 @@ class SmoothingMapper final : public MapperMethod {
     current_.start_with(landmarks);
   }
 
-  std::vector<model::KeyframePose> trajectory() const override {
-    return current_.map().all_poses();
-  }
-  std::vector<model::MapLandmark> landmarks() const override {
-    return current_.map().all_landmarks();
-  }
+  std::vector<model::KeyframePose> trajectory() const override { return current_.told_poses(); }
+  std::vector<model::MapLandmark> landmarks() const override { return current_.told_landmarks(); }
   std::optional<std::vector<model::MapLandmark>> take_changed_landmarks() override {
     return current_.take_changed_landmarks();
+  }
+  void set_covariances(std::span<model::MapLandmark> landmarks) const override {
+    current_.set_covariances(landmarks);
   }
   /// The maps that were left.
   const MapArchive& kept_maps() const { return kept_maps_; }

@@ -150,13 +150,21 @@ std::optional<NodeIndex> Trajectory::revisited(const geometry::SE2& map_T_middle
   return best;
 }
 
+std::optional<geometry::SE2WithCovariance> Trajectory::origin_T_first() const {
+  if (bases_.empty() || !bases_.front().is_origin) return std::nullopt;
+  return inverse(bases_.front().centre_T_base);
+}
+
+geometry::SE2WithCovariance Trajectory::from_origin(
+    const geometry::SE2WithCovariance& map_T_centre) const {
+  const auto first = origin_T_first();
+  if (!first) return map_T_centre;
+  return compound(*first, {first->mean.inverse() * map_T_centre.mean, map_T_centre.covariance});
+}
+
 geometry::SE2WithCovariance Trajectory::centre_from_origin(NodeIndex node,
                                                            const PoseGraph& graph) const {
-  geometry::SE2WithCovariance map_T_centre = graph.marginal(node);
-  if (!bases_.front().is_origin) return map_T_centre;
-  const geometry::SE2WithCovariance origin_T_first = inverse(bases_.front().centre_T_base);
-  return compound(origin_T_first,
-                  {origin_T_first.mean.inverse() * map_T_centre.mean, map_T_centre.covariance});
+  return from_origin(graph.marginal(node));
 }
 
 void Trajectory::rebuild_index(const PoseGraph& graph) {

@@ -81,6 +81,11 @@ class Trajectory {
     grid_.for_each_near(position_m, radius_m,
                         [&](std::uint32_t viewpoint) { f(viewpoints_[viewpoint].node); });
   }
+  /// The first keyframe's base in the frame of its node, turned round, where that base is the map's
+  /// origin; none where the map was given.
+  std::optional<geometry::SE2WithCovariance> origin_T_first() const;
+  /// A node's pose with the covariance that the graph has of it, as it counts from the origin.
+  geometry::SE2WithCovariance from_origin(const geometry::SE2WithCovariance& map_T_centre) const;
   /// A node's pose with its marginal covariance, which counts from the map's origin.
   geometry::SE2WithCovariance centre_from_origin(NodeIndex node, const PoseGraph& graph) const;
 
