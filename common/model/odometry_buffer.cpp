@@ -3,52 +3,13 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "common/model/preintegration.hpp"
-
 namespace understory::model {
 namespace {
 
 /// Rounding of stamps between consecutive increments.
 constexpr Utime kGapTolerance_us = 1000;
 
-/// Correlation time of the error of the filter's velocity: it has the power tau * dt when
-/// increments are compounded.
-constexpr double kVelocityCorrelation_s = 0.5;
 constexpr std::size_t kMaxIncrements = 20000;
-
-bool begins_at(const Odometry& increment, Utime utime) {
-  return std::abs(increment.from_utime - utime) <= kGapTolerance_us;
-}
-
-/// The increment's motion, started at the given velocity.
-geometry::SE2WithCovariance motion_from(const VelocityEstimate& start,
-                                        const Preintegration& inertial) {
-  const double dt = inertial.seconds;
-  geometry::SE2WithCovariance motion;
-  motion.mean = geometry::SE2(start.velocity_mps * dt + inertial.position_m, inertial.yaw_rad);
-
-  // The noise of the IMU and of the starting velocity, in the axes of the end.
-  Eigen::Matrix<double, 3, 5> of_noise = Eigen::Matrix<double, 3, 5>::Zero();
-  const Eigen::Matrix2d back = motion.mean.rotation().transpose();
-  of_noise.topRightCorner<2, 2>() = back;
-  of_noise(2, 0) = 1.0;
-  motion.covariance = of_noise * inertial.covariance * of_noise.transpose();
-  motion.covariance.topLeftCorner<2, 2>() +=
-      dt * std::max(dt, kVelocityCorrelation_s) * back * start.covariance * back.transpose();
-  return motion;
-}
-
-/// The velocity at the increment's end.
-VelocityEstimate carried_over(const VelocityEstimate& start, const Odometry& increment,
-                              const Preintegration& inertial) {
-  const Eigen::Matrix2d back = geometry::SE2(0.0, 0.0, inertial.yaw_rad).rotation().transpose();
-  VelocityEstimate end = start;
-  end.utime = increment.utime;
-  end.velocity_mps = back * (start.velocity_mps + inertial.velocity_mps);
-  end.covariance =
-      back * (start.covariance + inertial.covariance.block<2, 2>(1, 1)) * back.transpose();
-  return end;
-}
 
 geometry::SE2WithCovariance part(const Odometry& increment, Utime from, Utime to) {
   const double fraction =
@@ -58,78 +19,15 @@ geometry::SE2WithCovariance part(const Odometry& increment, Utime from, Utime to
           fraction * increment.covariance};
 }
 
-/// The increment with its samples integrated at `bias`: the rotation alone, spread evenly over the
-/// path. The accelerometer's bias displaces it by less than a millimetre between two scans.
-Odometry at_bias(const Odometry& increment, const InertialBias& bias) {
-  Odometry moved = increment;
-  if (!increment.inertial || increment.is_stationary) return moved;
-  const double gyro = bias.x() - increment.inertial->bias.x();
-  Eigen::Vector3d twist = increment.from_T_to.Log();
-  twist.z() += increment.inertial->bias_jacobian(0, 0) * gyro;
-  moved.from_T_to = geometry::SE2::Exp(twist);
-  moved.inertial = at_bias(*increment.inertial, bias);
-  return moved;
-}
-
-/// Sets the heading's variance; its covariances with the translation change in proportion.
-void set_heading_variance(Eigen::Matrix3d& covariance, double variance) {
-  const double ratio = covariance(2, 2) > 0.0 ? std::sqrt(variance / covariance(2, 2)) : 0.0;
-  covariance.row(2) *= ratio;
-  covariance.col(2) *= ratio;
-  covariance(2, 2) = variance;
-}
-
 }  // namespace
 
 bool OdometryBuffer::add(const Odometry& increment) {
   if (increment.utime <= increment.from_utime) return false;
   if (!increments_.empty() && increment.from_utime < increments_.back().utime - kGapTolerance_us)
     return false;
-  increments_.push_back(bias_ ? at_bias(increment, *bias_) : increment);
-  if (velocity_) start_at_velocity(increments_.back());
+  increments_.push_back(increment);
   if (increments_.size() > kMaxIncrements) increments_.pop_front();
   return true;
-}
-
-void OdometryBuffer::start_at_velocity(Odometry& increment) {
-  if (!increment.inertial || !bias_ || !begins_at(increment, velocity_->utime)) {
-    velocity_.reset();
-    return;
-  }
-
-  // The filter's velocity replaces the wheels where it is more certain.
-  const Preintegration inertial = at_bias(*increment.inertial, *bias_);
-  if (!increment.is_stationary) {
-    const geometry::SE2WithCovariance motion = motion_from(*velocity_, inertial);
-    const auto spread = [](const Eigen::Matrix3d& c) { return c(0, 0) + c(1, 1); };
-    if (spread(motion.covariance) < spread(increment.covariance)) {
-      increment.from_T_to = motion.mean;
-      increment.covariance = motion.covariance;
-      increment.covariance(2, 2) += inertial.seconds *
-                                    std::max(inertial.seconds, bias_correlation_s_) *
-                                    velocity_->gyro_bias_variance;
-    }
-    if (bias_correlation_s_ == 0.0 && inertial.covariance(0, 0) > 0.0)
-      set_heading_variance(increment.covariance, inertial.covariance(0, 0));
-  }
-
-  velocity_ = carried_over(*velocity_, increment, inertial);
-}
-
-void OdometryBuffer::set_filter_pose(const EkfPose& pose) {
-  bias_ = pose.bias;
-  VelocityEstimate known{pose.utime, pose.velocity_mps, pose.velocity_covariance,
-                         pose.bias_covariance(0, 0)};
-
-  // The pose may be older than the latest increments: its velocity is carried over them.
-  auto increment = std::find_if(increments_.begin(), increments_.end(), [&](const Odometry& one) {
-    return one.utime > known.utime + kGapTolerance_us;
-  });
-  for (; increment != increments_.end(); ++increment) {
-    if (!increment->inertial || !begins_at(*increment, known.utime)) return;
-    known = carried_over(known, *increment, at_bias(*increment->inertial, *bias_));
-  }
-  velocity_ = known;
 }
 
 std::optional<geometry::SE2WithCovariance> OdometryBuffer::between(Utime from, Utime to) const {
@@ -165,8 +63,8 @@ std::optional<GyroRotation> OdometryBuffer::gyro_rotation(Utime from, Utime to) 
     const double part =
         static_cast<double>(overlap) / static_cast<double>(increment.utime - increment.from_utime);
     const double seconds = increment.is_stationary ? 0.0 : 1e-6 * static_cast<double>(overlap);
-    sum += {part * increment.from_T_to.theta(), part * increment.covariance(2, 2), seconds,
-            seconds * increment.inertial->bias.x()};
+    sum += {part * increment.from_T_to.theta(), part * increment.inertial->covariance(0, 0),
+            seconds, seconds * increment.inertial->bias.x()};
   }
 
   if (covered + kGapTolerance_us < to - from) return std::nullopt;

@@ -146,8 +146,7 @@ class MapperAdapter : public bus::Adapter {
                                     },
                                     {.queue_size = 2000});
 
-    // Bias and velocity, and the motion to gate by; no measurement: it was made from the same
-    // detections.
+    // To gate by; no measurement: it was made from the same detections.
     node.subscribe<model::EkfPose>(channels_.ekf_pose, [this](const model::EkfPose& pose) {
       stage_->add(pose);
       memory_.health.add(pose);

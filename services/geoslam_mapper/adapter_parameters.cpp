@@ -50,7 +50,10 @@ void describe_evidence(SmoothingMapperParameters& p, bus::ParameterTable& table)
   table.add(
       "smoothing.gyro_walk", p.gyro_walk, {0.0, 1.0}, "rad/s/sqrt(s)",
       "Random walk of the gyro's bias, which is estimated in the graph: what is learned of it "
-      "later straightens the path before. 0: the filter's estimate is used instead.");
+      "later straightens the path before. 0: odometry's own bias is used as it is.");
+  table.add("smoothing.gyro_start_sigma", p.gyro_start_sigma, {1e-6, 1.0}, "rad/s",
+            "Standard deviation of the bias that odometry takes out of the gyro's rate, before the "
+            "mapper has seen a stop.");
   table.add("smoothing.relinearise_above", p.relinearise_above, {1e-6, 1.0}, "sigma",
             "A measurement is linearised again beyond this. Use 1e-6 on long roads, open or in "
             "loops: with 1e-4 the end of a 3 km road jumped by 0.25 m per keyframe, with 1e-2 by "

@@ -43,9 +43,8 @@ class MapperMethod {
   /// Motion without landmarks; becomes a factor between keyframes if the configuration asks for it.
   virtual void add(const model::Odometry& odometry) = 0;
 
-  /// The filter's pose, bias and velocity. Later odometry is corrected by its gyro bias, and a
-  /// keyframe with few landmarks that contradicts its motion is refused. Never a measurement: the
-  /// filter uses the same detections.
+  /// The filter's pose: a keyframe with few landmarks that contradicts its motion is refused. Never
+  /// a measurement: the filter uses the same detections.
   virtual void add(const model::EkfPose& /*pose*/) {}
 
   /// The filter's estimate of the level error; single scans are levelled by it.

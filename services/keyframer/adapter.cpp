@@ -35,9 +35,6 @@ class KeyframerAdapter : public bus::Adapter {
     node.subscribe<model::Odometry>(channels_.odometry,
                                     [this](const model::Odometry& motion) { stage_->add(motion); },
                                     {.queue_size = 2000});
-    // Bias and velocity are used, the pose is not: it was estimated from the same detections.
-    node.subscribe<model::EkfPose>(channels_.ekf_pose,
-                                   [this](const model::EkfPose& pose) { stage_->add(pose); });
     node.subscribe<model::EkfLevel>(channels_.ekf_level,
                                     [this](const model::EkfLevel& level) { stage_->add(level); });
 
@@ -106,8 +103,8 @@ class KeyframerAdapter : public bus::Adapter {
 
 bus::Service keyframer_service(const KeyframerChannels& channels) {
   return {"keyframer",
-          channels.landmarks + ", " + channels.odometry + ", " + channels.ekf_pose + ", " +
-              channels.ekf_level + " -> " + channels.keyframe,
+          channels.landmarks + ", " + channels.odometry + ", " + channels.ekf_level + " -> " +
+              channels.keyframe,
           [channels] { return std::make_unique<KeyframerAdapter>(channels); }};
 }
 

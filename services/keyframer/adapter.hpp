@@ -11,7 +11,6 @@ namespace understory::keyframer {
 struct KeyframerChannels {
   std::string landmarks = "LANDMARKS";
   std::string odometry = "ODOMETRY";
-  std::string ekf_pose = "EKF_POSE";
   std::string ekf_level = "EKF_LEVEL";
   std::string keyframe = "KEYFRAME";
 };

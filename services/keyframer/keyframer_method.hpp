@@ -64,9 +64,6 @@ class KeyframerMethod {
   /// Motion of the vehicle by wheels or IMU, where there is any. It must come before the scan at
   /// its end. It predicts the next scan and bridges scans with few landmarks.
   virtual void add(const model::Odometry& odometry) = 0;
-  /// The filter's pose, of which the inertial bias and the velocity are used: odometry that comes
-  /// later starts from them. Ignored by default.
-  virtual void add(const model::EkfPose& /*pose*/) {}
   /// The error of roll and pitch as the filter estimates it: scans that come later are corrected by
   /// it. Ignored by default.
   virtual void add(const model::EkfLevel& /*level*/) {}

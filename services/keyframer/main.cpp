@@ -6,7 +6,6 @@ int main(int argc, char** argv) {
       understory::keyframer::keyframer_service({
           .landmarks = "LANDMARKS",  // in: detections of one sweep
           .odometry = "ODOMETRY",    // in: motion, where there is any
-          .ekf_pose = "EKF_POSE",    // in: bias and velocity, where a filter runs
           .ekf_level = "EKF_LEVEL",  // in: error of roll and pitch, where a filter runs
           .keyframe = "KEYFRAME",    // out: local landmarks of n sweeps
       }),

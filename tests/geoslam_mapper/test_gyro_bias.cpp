@@ -13,7 +13,7 @@ namespace {
 constexpr model::Utime kScan_us = 100'000;
 constexpr double kScan_s = 0.1;
 constexpr double kSpeed_mps = 8.0;
-constexpr double kBias = 1e-3;       // rad/s, of which the filter knows nothing
+constexpr double kBias = 1e-3;       // rad/s, of which odometry knows nothing
 constexpr double kGyroNoise = 2e-4;  // rad/s/sqrt(Hz)
 constexpr int kScans = 8;
 
@@ -66,16 +66,6 @@ model::Odometry increment_until(model::Utime utime) {
   return increment;
 }
 
-/// A filter that knows where it is, and nothing of velocity and bias.
-model::EkfPose filter_at(model::Utime utime) {
-  model::EkfPose pose;
-  pose.utime = utime;
-  pose.ekf_map_T_vehicle = geometry::SE2(1e-6 * static_cast<double>(utime) * kSpeed_mps, 0.0, 0.0);
-  pose.velocity_covariance = 100.0 * Eigen::Matrix2d::Identity();
-  pose.bias_covariance = 4e-6 * Eigen::Matrix3d::Identity();
-  return pose;
-}
-
 struct Drive {
   model::MapUpdate last;
   std::vector<model::KeyframePose> trajectory;
@@ -95,7 +85,6 @@ Drive drive(double gyro_walk, int saved_at = -1) {
     for (const model::KeyframeMember& member : one.members) {
       if (member.utime == 0) continue;
       mapper.add(increment_until(member.utime));
-      mapper.add(filter_at(member.utime));
     }
     result.last = mapper.add(one);
     INFO(number << " " << result.last.reason);

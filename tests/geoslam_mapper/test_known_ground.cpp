@@ -91,7 +91,6 @@ CentreMotion motion_between(NodeIndex from, NodeIndex to, const PoseGraph& graph
   motion.from_T_to = {graph.pose(from).inverse() * graph.pose(to),
                       1e-4 * Eigen::Matrix3d::Identity()};
   motion.gyro = model::GyroRotation{motion.from_T_to.mean.theta() + bias, 1e-6, 1.0, 0.0};
-  motion.filter_bias = model::FilterBias{0.0, 1e-4};
   return motion;
 }
 

@@ -40,7 +40,7 @@ CentreMotion turn_from(NodeIndex node) {
   motion.utime = 1'000'000;
   motion.from_T_to = {{1.0, 0.0, 0.2}, 1e-4 * Eigen::Matrix3d::Identity()};
   motion.gyro = model::GyroRotation{0.2, 1e-6, 1.0, 0.0};
-  motion.filter_bias = model::FilterBias{1e-3, 1e-6};
+  motion.odometry_bias = 1e-3;
   return motion;
 }
 

@@ -34,16 +34,6 @@ sim::InertialDriveParameters noisy_drive(sim::OdometryKind odometry) {
 }
 
 /// The filter's output one scan behind, as it comes on the bus.
-model::EkfPose filter_pose(const sim::DriveStep& step) {
-  model::EkfPose pose;
-  pose.utime = step.scan.utime;
-  pose.velocity_mps = step.world_T_vehicle.rotation().transpose() * step.velocity_mps;
-  pose.velocity_covariance = 1e-3 * Eigen::Matrix2d::Identity();
-  pose.bias = step.bias;
-  pose.bias_covariance = 1e-6 * Eigen::Matrix3d::Identity();
-  return pose;
-}
-
 model::EkfLevel level(const sim::DriveStep& step) {
   model::EkfLevel level;
   level.utime = step.scan.utime;
@@ -71,7 +61,6 @@ std::vector<std::string> outputs(const KeyframerParameters& parameters, sim::Odo
     for (const model::Odometry& increment : step.odometry) stage->add(increment);
     const auto keyframe = stage->add(step.scan);
     bytes.push_back(state::save({"output", 1}, keyframe));
-    stage->add(filter_pose(step));
     stage->add(level(step));
   }
   bytes.push_back(stage->save());

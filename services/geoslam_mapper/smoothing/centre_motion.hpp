@@ -8,6 +8,12 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
+/// The gyro's bias as a stop shows it.
+struct MeasuredBias {
+  double bias = 0.0;      ///< [rad/s]
+  double variance = 0.0;  ///< [(rad/s)^2]
+};
+
 /// Motion from a node's centre to the centre of a later keyframe.
 struct CentreMotion {
   NodeIndex from = 0;
@@ -16,7 +22,9 @@ struct CentreMotion {
   /// The same rotation by the gyro alone. None without an IMU, and while the vehicle was
   /// stationary.
   std::optional<model::GyroRotation> gyro;
-  std::optional<model::FilterBias> filter_bias;  ///< As the filter knows it at `utime`.
+  double odometry_bias = 0.0;  ///< That odometry takes out of the gyro's rate at present [rad/s].
+  /// By the stops since the last such motion; none where there was none.
+  std::optional<MeasuredBias> at_stops;
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -105,39 +105,27 @@ void GyroBias::clear(Link& link, plane::Smoother& smoother) {
   }
 }
 
-void GyroBias::learn_from(const model::FilterBias& filter, model::Utime utime,
-                          plane::Smoother& smoother) {
+/// To the scalar that holds at this motion.
+void GyroBias::go_on(const CentreMotion& motion, plane::Smoother& smoother) {
   if (now_.chain.empty()) {
-    now_.reference = filter.bias;
-    add_link(0.0, utime, smoother);
-    set_prior(now_.chain.back(), 0.0, 1.0 / filter.variance, smoother);
-    return;
-  }
-
-  // The next scalar of the chain.
-  const Link newest = now_.chain.back();
-  if (utime - newest.since > kValidity_us) {
-    add_link(smoother.scalar(newest.id), utime, smoother);
-    const double variance = walk_ * walk_ * seconds(utime - newest.since);
+    now_.reference = motion.odometry_bias;
+    add_link(0.0, motion.utime, smoother);
+    set_prior(now_.chain.back(), 0.0, 1.0 / (start_sigma_ * start_sigma_), smoother);
+  } else if (const Link newest = now_.chain.back(); motion.utime - newest.since > kValidity_us) {
+    add_link(smoother.scalar(newest.id), motion.utime, smoother);
+    const double variance = walk_ * walk_ * seconds(motion.utime - newest.since);
     set_step(now_.chain.back(), newest.id, 1.0 / variance, smoother);
   }
 
-  // What the filter learned while stationary is the difference of its two estimates.
-  if (!now_.was_stationary) return;
-  const double before =
-      1.0 / (now_.before.variance + walk_ * walk_ * seconds(utime - now_.before_utime));
-  const double gained = 1.0 / filter.variance - before;
-  if (gained <= 0.0) return;
-  const double learned = (filter.bias / filter.variance - now_.before.bias * before) / gained;
-  add_prior(now_.chain.back(), learned - now_.reference, gained, smoother);
+  if (motion.at_stops) {
+    add_prior(now_.chain.back(), motion.at_stops->bias - now_.reference,
+              1.0 / motion.at_stops->variance, smoother);
+  }
 }
 
 plane::BiasedRelativePose GyroBias::biased(plane::RelativePose measured, const CentreMotion& motion,
                                            plane::Smoother& smoother) {
-  learn_from(*motion.filter_bias, motion.utime, smoother);
-  now_.was_stationary = false;
-  now_.before = *motion.filter_bias;
-  now_.before_utime = motion.utime;
+  go_on(motion, smoother);
 
   // As it would have been measured with the reference taken out.
   const model::GyroRotation& gyro = *motion.gyro;

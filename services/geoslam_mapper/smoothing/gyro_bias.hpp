@@ -12,24 +12,21 @@
 namespace understory::geoslam_mapper::smoothing {
 
 /// A chain of scalars, one for 5 s each, tied to the one before by the bias's random walk. They
-/// count from the filter's bias at the first motion, so they are small. Scalars whose motions are
+/// count from odometry's own bias at the first motion, so they are small. Scalars whose motions are
 /// taken out of the graph again are taken out, too.
 class GyroBias {
  public:
   /// `walk`: random walk of the bias [rad/s/sqrt(s)]; 0 = the bias is not estimated.
-  explicit GyroBias(double walk) : walk_(walk) {}
+  /// `start_sigma`: of odometry's bias at the first motion, before any stop [rad/s].
+  GyroBias(double walk, double start_sigma) : walk_(walk), start_sigma_(start_sigma) {}
 
   /// Whether the bias is a variable of the graph.
   bool is_estimated() const { return walk_ > 0.0; }
 
-  /// The vehicle was stationary between two keyframes: the filter has learned the bias meanwhile.
-  void set_stationary() { now_.was_stationary = true; }
-
   /// The motion between two poses with the bias as a third variable, to be added to the graph.
   /// `measured` holds the two poses; its motion and information are those of `motion`, which must
-  /// have `gyro` and `filter_bias`. The filter's bias is used once at the first motion, and after
-  /// that only for what the filter learned while the vehicle was stationary: the graph has nothing
-  /// of that.
+  /// have `gyro`. What the stops before it show is added to what the graph finds by itself; the
+  /// filter's bias is not used, it was learned from the same detections.
   factor_graph::plane::BiasedRelativePose biased(factor_graph::plane::RelativePose measured,
                                                  const CentreMotion& motion,
                                                  factor_graph::plane::Smoother& smoother);
@@ -76,18 +73,14 @@ class GyroBias {
   struct State {
     double reference = 0.0;   ///< From which the scalars count [rad/s].
     std::vector<Link> chain;  ///< The newest ones; older ones stay in the graph as they are.
-    bool was_stationary = false;
-    model::FilterBias before;  ///< The filter's bias at the last motion.
-    model::Utime before_utime = 0;
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& s) {
-      a(s.reference, s.chain, s.was_stationary, s.before, s.before_utime);
+      a(s.reference, s.chain);
     }
   };
 
-  void learn_from(const model::FilterBias& filter, model::Utime utime,
-                  factor_graph::plane::Smoother& smoother);
+  void go_on(const CentreMotion& motion, factor_graph::plane::Smoother& smoother);
   void add_link(double initial, model::Utime utime, factor_graph::plane::Smoother& smoother);
   void set_prior(Link& link, double mean, double information,
                  factor_graph::plane::Smoother& smoother);
@@ -98,7 +91,8 @@ class GyroBias {
   void take_out(std::size_t at, factor_graph::plane::Smoother& smoother);
   void clear(Link& link, factor_graph::plane::Smoother& smoother);
 
-  double walk_;  ///< [rad/s/sqrt(s)]
+  double walk_;         ///< [rad/s/sqrt(s)]
+  double start_sigma_;  ///< [rad/s]
   State now_;
   State saved_;  ///< At the checkpoint.
   FreeNumbers free_scalars_;

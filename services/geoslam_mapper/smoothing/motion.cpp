@@ -14,25 +14,21 @@ geometry::SE2WithCovariance centre_T_base(const model::Keyframe& keyframe) {
 
 }  // namespace
 
-Motion::Motion(const SmoothingMapperParameters& parameters)
-    : parameters_(parameters),
-      odometry_(parameters.gyro_walk > 0.0 ? 0.0 : model::OdometryBuffer::kBiasCorrelation_s) {}
+Motion::Motion(const SmoothingMapperParameters& parameters) : parameters_(parameters) {}
 
 Motion Motion::from_nowhere() const {
   Motion motion(parameters_);
   motion.odometry_ = odometry_;
+  motion.stops_ = stops_;
   motion.filter_ = filter_;
   return motion;
 }
 
 void Motion::add(const model::Odometry& increment) {
-  if (parameters_.use_odometry) odometry_.add(increment);
+  if (parameters_.use_odometry && odometry_.add(increment)) stops_.add(increment);
 }
 
-void Motion::add(const model::EkfPose& pose) {
-  odometry_.set_filter_pose(pose);
-  filter_.add(pose);
-}
+void Motion::add(const model::EkfPose& pose) { filter_.add(pose); }
 
 std::optional<geometry::SE2WithCovariance> Motion::between(model::Utime from,
                                                            model::Utime to) const {
@@ -110,7 +106,9 @@ std::optional<CentreMotion> Motion::since_last_centre(const model::Keyframe& key
       compound(compound(last_member_->centre_T_vehicle, *motion), inverse(centre_T_base(keyframe)));
   result.from_T_to.covariance += kTiny;
   result.gyro = rotation_since_last_centre(keyframe);
-  result.filter_bias = odometry_.filter_bias();
+  if (const auto& inertial = odometry_.increments().back().inertial)
+    result.odometry_bias = inertial->bias.x();
+  result.at_stops = stops_.measured();
   return result;
 }
 
@@ -123,6 +121,10 @@ bool Motion::knows_heading(const model::Keyframe& keyframe) const {
 
 void Motion::continue_from(const model::Keyframe& keyframe, const Base& base,
                            const geometry::SE2WithCovariance& map_T_base) {
+  // What the stops showed is in the graph with the first motion after them.
+  if (last_member_ && base.node != last_member_->node && rotation_since_last_centre(keyframe))
+    stops_.clear();
+
   // A folded keyframe's members are given in its own centre; the base ties that to the node's.
   const model::KeyframeMember& last = keyframe.members.back();
   const geometry::SE2 node_T_keyframe =

@@ -10,6 +10,7 @@
 #include "services/geoslam_mapper/smoothing/centre_motion.hpp"
 #include "services/geoslam_mapper/smoothing/filter_track.hpp"
 #include "services/geoslam_mapper/smoothing/placement.hpp"
+#include "services/geoslam_mapper/smoothing/stop_bias.hpp"
 #include "services/geoslam_mapper/smoothing/trajectory.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
@@ -42,7 +43,7 @@ class Motion {
 
   /// Adds an odometry increment, if the configuration uses odometry.
   void add(const model::Odometry& increment);
-  /// Adds the filter's pose: its bias and velocity correct later increments.
+  /// Adds the filter's pose: a gate, never a measurement.
   void add(const model::EkfPose& pose);
 
   /// Where the keyframe's centre should be: by odometry from the last accepted keyframe, else by
@@ -75,7 +76,7 @@ class Motion {
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.odometry_, self.filter_, self.last_member_, self.map_T_last_base_);
+    a(self.odometry_, self.stops_, self.filter_, self.last_member_, self.map_T_last_base_);
   }
 
  private:
@@ -84,7 +85,8 @@ class Motion {
       const model::Keyframe& keyframe) const;
 
   SmoothingMapperParameters parameters_;
-  model::OdometryBuffer odometry_;  ///< Without the bias, where that is a variable of the graph.
+  model::OdometryBuffer odometry_;
+  StopBias stops_;  ///< Since the last motion of the graph.
   FilterTrack filter_;
   std::optional<LastMember> last_member_;
   std::optional<geometry::SE2WithCovariance> map_T_last_base_;

@@ -36,7 +36,7 @@ class OneMap {
   std::optional<ScanPose> locate(const model::LandmarkScan& scan);
   /// Motion without landmarks.
   void add(const model::Odometry& odometry) { motion_.add(odometry); }
-  /// The filter's pose, bias and velocity.
+  /// The filter's pose, as a gate.
   void add(const model::EkfPose& pose) { motion_.add(pose); }
   /// The filter's estimate of the level error.
   void add(const model::EkfLevel& level) { scan_localiser_.set(level); }

@@ -22,7 +22,7 @@ plane::SmootherParameters limits(const SmoothingMapperParameters& parameters) {
 }  // namespace
 
 PoseGraph::PoseGraph(const SmoothingMapperParameters& parameters)
-    : smoother_(limits(parameters)), gyro_(parameters.gyro_walk) {}
+    : smoother_(limits(parameters)), gyro_(parameters.gyro_walk, parameters.gyro_start_sigma) {}
 
 void PoseGraph::checkpoint() {
   smoother_.checkpoint();
@@ -200,10 +200,10 @@ std::vector<NodeIndex> PoseGraph::give_back(model::LandmarkId from_id, model::La
 }
 
 void PoseGraph::add_motion(const CentreMotion& motion, NodeIndex node) {
-  if (motion.from == node) return gyro_.set_stationary();
+  if (motion.from == node) return;
   plane::RelativePose measured{nodes_[motion.from].centre, nodes_[node].centre,
                                motion.from_T_to.mean, Eigen::Matrix3d::Zero()};
-  if (!gyro_.is_estimated() || !motion.gyro || !motion.filter_bias) {
+  if (!gyro_.is_estimated() || !motion.gyro) {
     measured.information = motion.from_T_to.covariance.inverse();
     link(measured, motion.from, node);
     return;

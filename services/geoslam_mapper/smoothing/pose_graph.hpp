@@ -113,7 +113,7 @@ class PoseGraph {
   /// was added to since; returns their nodes.
   std::vector<NodeIndex> give_back(model::LandmarkId from_id, model::LandmarkId to_id,
                                    std::span<const HandedOver> handed_over);
-  /// Adds the motion from an earlier node; nothing but "stationary" if it is the same node.
+  /// Adds the motion from an earlier node; nothing if it is the same node.
   void add_motion(const CentreMotion& motion, NodeIndex node);
 
   /// Takes nodes and motions out. What the nodes observed becomes observations of other nodes, in

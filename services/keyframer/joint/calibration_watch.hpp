@@ -88,9 +88,9 @@ class CalibrationWatch {
 
   std::optional<Both> both_of(const model::ScanMotion& motion) const;
 
-  model::OdometryBuffer odometry_;  ///< No filter's bias or velocity is ever set.
-  model::Utime wheels_since_ = 0;   ///< Since then each increment has wheels.
-  model::Utime due_utime_ = 0;      ///< Motions that end before it overlap too much.
+  model::OdometryBuffer odometry_;
+  model::Utime wheels_since_ = 0;  ///< Since then each increment has wheels.
+  model::Utime due_utime_ = 0;     ///< Motions that end before it overlap too much.
   Memory minutes_{120.0};
   Memory seconds_{10.0};
   bool contradicts_ = false;

@@ -14,7 +14,7 @@ constexpr std::size_t kToContradict = 8;
 /// Share of the pairs by stated sigmas that smaller ones must keep to take their place.
 constexpr double kAsMany = 0.8;
 
-constexpr state::Format kFormat{"keyframer.joint", 3};
+constexpr state::Format kFormat{"keyframer.joint", 4};
 
 std::vector<std::uint64_t> numbers_of(const PlacedScan& placed) {
   return {placed.tracks.begin(), placed.tracks.end()};

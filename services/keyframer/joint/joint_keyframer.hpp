@@ -31,8 +31,6 @@ class JointKeyframer final : public KeyframerMethod {
   std::optional<model::Keyframe> add(const model::LandmarkScan& scan) override;
   /// Increments that overlap or run backwards are ignored.
   void add(const model::Odometry& odometry) override;
-  /// Sets bias and velocity of the odometry that follows.
-  void add(const model::EkfPose& pose) override { odometry_.set_filter_pose(pose); }
   /// Valid for scans within 2 s of its utime.
   void add(const model::EkfLevel& level) override { level_.set(level); }
 
@@ -70,8 +68,7 @@ class JointKeyframer final : public KeyframerMethod {
   ScanTracker tracker_;
   model::DetectionNoise noise_;
   CalibrationWatch calibration_;
-  /// A keyframe takes less than a second: its scans share the error of the gyro's bias.
-  model::OdometryBuffer odometry_{0.8};
+  model::OdometryBuffer odometry_;
   model::LevelCorrection level_;
   std::vector<Member> members_;  ///< Of the keyframe that is being gathered; noise as stated.
   std::optional<model::Utime> last_utime_;
