@@ -45,4 +45,24 @@ add_library(understory_pcap INTERFACE)
 target_include_directories(understory_pcap INTERFACE "${PCAP_INCLUDE_DIR}")
 target_link_libraries(understory_pcap INTERFACE "${PCAP_LIBRARY}")
 
-install(TARGETS understory_lcm understory_cholmod understory_zip understory_lzf understory_pcap EXPORT understory)
+# With the session extension, as Debian builds it.
+find_path(SQLITE_INCLUDE_DIR sqlite3.h REQUIRED)
+find_library(SQLITE_LIBRARY sqlite3 REQUIRED)
+add_library(understory_sqlite INTERFACE)
+target_include_directories(understory_sqlite INTERFACE "${SQLITE_INCLUDE_DIR}")
+target_link_libraries(understory_sqlite INTERFACE "${SQLITE_LIBRARY}")
+
+find_path(CRYPTO_INCLUDE_DIR openssl/evp.h REQUIRED)
+find_library(CRYPTO_LIBRARY crypto REQUIRED)
+add_library(understory_crypto INTERFACE)
+target_include_directories(understory_crypto INTERFACE "${CRYPTO_INCLUDE_DIR}")
+target_link_libraries(understory_crypto INTERFACE "${CRYPTO_LIBRARY}")
+
+find_path(ZLIB_INCLUDE_DIR zlib.h REQUIRED)
+find_library(ZLIB_LIBRARY z REQUIRED)
+add_library(understory_zlib INTERFACE)
+target_include_directories(understory_zlib INTERFACE "${ZLIB_INCLUDE_DIR}")
+target_link_libraries(understory_zlib INTERFACE "${ZLIB_LIBRARY}")
+
+install(TARGETS understory_lcm understory_cholmod understory_zip understory_lzf understory_pcap understory_sqlite
+        understory_crypto understory_zlib EXPORT understory)

@@ -16,6 +16,8 @@ void add_import_command(CLI::App& parent);
 void add_launch_command(CLI::App& parent);
 /// `understory log`: recording, information, checks, repair and cuts of logs.
 void add_log_command(CLI::App& parent);
+/// `understory map`: stored maps: contents, checks, imports, exports, history.
+void add_map_command(CLI::App& parent);
 /// `understory replay`: a log through chosen services.
 void add_replay_command(CLI::App& parent);
 /// `understory sim`: a simulated drive.

@@ -1,0 +1,38 @@
+// Surveyed landmarks as a table of text (CSV) with a heading.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "common/model/map.hpp"
+
+namespace understory::io {
+
+/// A landmark of a table.
+struct LandmarkRow {
+  model::MapLandmark landmark;  ///< Without id; frame of the survey.
+  std::uint64_t line = 0;       ///< Where it stands, from 1.
+};
+
+/// Two landmarks that stand close together.
+struct ClosePair {
+  std::size_t first = 0;  ///< Index; the lesser one.
+  std::size_t second = 0;
+  double distance_m = 0.0;
+};
+
+/// Rows of the columns x_m, y_m and, where they are there, sigma_m (standard deviation in x and in
+/// y, without correlation), dbh_m (diameter at breast height) and kind (trunk or corner), in any
+/// order. An empty cell is `default_sigma_m`, no diameter, a trunk. Empty lines and lines that
+/// start with # are passed over. Throws DataError with `source` and line for any other column, a
+/// row of another number of cells, what is no finite number, coordinates beyond 1e8 m or farther
+/// than 200 km from the first row's, a sigma that is not within 0 (exclusive) and 1 km, a diameter
+/// that is not within 0 and 20 m, an unknown kind, and where there is no row.
+std::vector<LandmarkRow> parse_landmark_table(std::string_view text, std::string_view source,
+                                              double default_sigma_m);
+
+/// All pairs of landmarks nearer to each other than `distance_m`, in order of their indices.
+std::vector<ClosePair> close_pairs(const std::vector<LandmarkRow>& rows, double distance_m);
+
+}  // namespace understory::io

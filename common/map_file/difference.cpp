@@ -1,0 +1,53 @@
+#include "common/map_file/difference.hpp"
+
+#include <Eigen/LU>
+#include <cmath>
+#include <limits>
+
+namespace understory::map_file {
+namespace {
+
+MovedLandmark move_of(const model::MapLandmark& before, const model::MapLandmark& after) {
+  const Eigen::Vector2d way = after.position_m - before.position_m;
+  const Eigen::Matrix2d covariance = before.covariance_m2 + after.covariance_m2;
+  MovedLandmark move{after.id, way.norm(), 0.0};
+  if (move.distance_m == 0.0) return move;
+
+  const bool is_regular = covariance.determinant() > 0.0;
+  move.chi2 =
+      is_regular ? way.dot(covariance.inverse() * way) : std::numeric_limits<double>::infinity();
+  return move;
+}
+
+}  // namespace
+
+double chi2_of_quantile(double quantile) { return -2.0 * std::log1p(-quantile); }
+
+MapDifference difference(const StoredMap& before, const StoredMap& after, double quantile) {
+  MapDifference result;
+  const double limit = chi2_of_quantile(quantile);
+  auto old = before.landmarks.begin();
+  const auto end = before.landmarks.end();
+
+  for (const StoredLandmark& one : after.landmarks) {
+    for (; old != end && old->landmark.id < one.landmark.id; ++old)
+      result.removed.push_back(old->landmark.id);
+    if (old == end || old->landmark.id != one.landmark.id) {
+      result.added.push_back(one.landmark.id);
+      continue;
+    }
+
+    const MovedLandmark move = move_of(old->landmark, one.landmark);
+    if (move.chi2 > limit) {
+      result.moved.push_back(move);
+    } else {
+      ++result.kept;
+    }
+    ++old;
+  }
+
+  for (; old != end; ++old) result.removed.push_back(old->landmark.id);
+  return result;
+}
+
+}  // namespace understory::map_file

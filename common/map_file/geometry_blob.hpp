@@ -1,0 +1,42 @@
+// Geometries as a GeoPackage stores them: a header, then well-known binary (OGC 12-128, 2.1.3).
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace understory::map_file {
+
+/// The number of the spatial reference system "undefined Cartesian": metres in a frame of our own.
+inline constexpr std::int32_t kCartesian = -1;
+
+/// Kinds of geometry that the layers have, with their numbers in well-known binary.
+enum class GeometryKind : std::uint32_t { kPoint = 1, kLine = 2, kPolygon = 3 };
+
+/// A point, a line, or the one ring of a polygon, whose last corner is not the first again.
+struct Geometry {
+  GeometryKind kind = GeometryKind::kPoint;
+  std::vector<Eigen::Vector2d> points_m;  ///< At least one; frame `map`.
+};
+
+/// The rectangle around a geometry [m].
+struct Box {
+  Eigen::Vector2d low_m = Eigen::Vector2d::Zero();
+  Eigen::Vector2d high_m = Eigen::Vector2d::Zero();
+};
+
+/// Little endian, in kCartesian; with an envelope unless it is a point.
+std::vector<std::uint8_t> geometry_blob(const Geometry& geometry);
+/// The same for a point.
+std::vector<std::uint8_t> point_blob(const Eigen::Vector2d& position_m);
+
+/// What the bytes hold: either order of bytes, any reference system. None where they are damaged,
+/// empty, of another kind or dimension, or a polygon with holes.
+std::optional<Geometry> geometry_of(std::span<const std::uint8_t> blob);
+
+/// Around all points; there is at least one.
+Box box_of(const Geometry& geometry);
+
+}  // namespace understory::map_file

@@ -1,0 +1,82 @@
+// The checksums of map_rows.hpp.
+#include <fmt/format.h>
+#include <sqlite3.h>
+
+#include <array>
+
+#include "common/map_file/digest.hpp"
+#include "common/map_file/map_rows.hpp"
+
+namespace understory::map_file {
+namespace {
+
+struct ContentQuery {
+  std::string_view table;
+  std::string_view sql;
+};
+
+/// Columns are named: one that another program has added to a layer does not count.
+constexpr std::array<ContentQuery, 5> kContentQueries{{
+    {"understory_maps",
+     "SELECT map_id, name, created_utime, origin FROM understory_maps WHERE map_id = ?1"},
+    {"landmarks",
+     "SELECT landmark_id, geom, submap_id, covariance_xx_m2, covariance_xy_m2, covariance_yy_m2, "
+     "diameter_m, kind, times_seen, existence FROM landmarks WHERE map_id = ?1 "
+     "ORDER BY landmark_id"},
+    {"trajectory",
+     "SELECT fid, geom, sequence, utime, heading_rad, covariance_xx_m2, covariance_xy_m2, "
+     "covariance_yy_m2, covariance_xt_m_rad, covariance_yt_m_rad, covariance_tt_rad2 "
+     "FROM trajectory WHERE map_id = ?1 ORDER BY fid"},
+    {"submap_borders",
+     "SELECT fid, geom, submap_id FROM submap_borders WHERE map_id = ?1 ORDER BY fid"},
+    {"loop_closures",
+     "SELECT fid, geom, from_sequence, to_sequence FROM loop_closures WHERE map_id = ?1 "
+     "ORDER BY fid"},
+}};
+
+void add_column(const Statement& row, int column, Digest& digest) {
+  switch (sqlite3_column_type(row.handle(), column)) {
+    case SQLITE_INTEGER:
+      return digest.add(row.integer(column));
+    case SQLITE_FLOAT:
+      return digest.add(row.real(column));
+    case SQLITE_TEXT:
+      return digest.add(row.text(column));
+    case SQLITE_BLOB:
+      return digest.add(row.blob(column));
+    default:
+      return digest.add_null();
+  }
+}
+
+}  // namespace
+
+std::string checksum_of(const Connection& connection, std::uint32_t map_id) {
+  Digest digest;
+  for (const ContentQuery& query : kContentQueries) {
+    Statement row = connection.prepare(query.sql);
+    row.bind(std::int64_t{map_id});
+    digest.add(query.table);
+    while (row.step()) {
+      const int columns = sqlite3_column_count(row.handle());
+      for (int column = 0; column < columns; ++column) add_column(row, column, digest);
+    }
+  }
+  return digest.take();
+}
+
+std::string stated_checksum(const Connection& connection, std::uint32_t map_id) {
+  Statement row = connection.prepare("SELECT checksum FROM understory_maps WHERE map_id = ?1");
+  return row.bind(std::int64_t{map_id}).step() ? row.text(0) : std::string();
+}
+
+void verify_checksum(const Connection& connection, std::uint32_t map_id) {
+  if (checksum_of(connection, map_id) == stated_checksum(connection, map_id)) return;
+  throw MapFileError(
+      Fault::kDamaged,
+      fmt::format(
+          "{}: map {} is not what its checksum says: damaged, or changed by another program",
+          connection.file().string(), map_id));
+}
+
+}  // namespace understory::map_file

@@ -1,0 +1,126 @@
+#include "common/map_file/map_file.hpp"
+
+#include <fmt/format.h>
+
+#include "common/map_file/check.hpp"
+#include "common/map_file/map_rows.hpp"
+#include "common/map_file/opening.hpp"
+#include "common/map_file/schema.hpp"
+
+namespace understory::map_file {
+namespace {
+
+std::uint64_t rows_of(const Connection& connection, std::string_view table, std::uint32_t map_id,
+                      std::string_view condition = "") {
+  Statement count = connection.prepare(
+      fmt::format("SELECT count(*) FROM {} WHERE map_id = ?1 {}", table, condition));
+  count.bind(std::int64_t{map_id}).step();
+  return count.count(0);
+}
+
+MapSummary summary_of(const Connection& connection, std::uint32_t map_id) {
+  Statement row = connection.prepare(
+      "SELECT name, created_utime, origin, checksum FROM understory_maps WHERE map_id = ?1");
+  row.bind(std::int64_t{map_id}).step();
+  return {map_id,
+          row.text(0),
+          row.integer(1),
+          row.text(2),
+          row.text(3),
+          rows_of(connection, "landmarks", map_id, "AND kind = 'trunk'"),
+          rows_of(connection, "landmarks", map_id, "AND kind = 'corner'"),
+          rows_of(connection, "trajectory", map_id),
+          rows_of(connection, "submap_borders", map_id),
+          rows_of(connection, "loop_closures", map_id)};
+}
+
+/// The transaction that a change is: `work` changes rows, which are recorded.
+template <class Work>
+std::uint64_t changed(const Connection& connection, const ChangeNote& note, const Work& work) {
+  Transaction transaction(connection);
+  std::uint64_t number = 0;
+  {
+    Recording recording(connection);
+    work();
+    number = recording.write(note);
+  }
+  refresh_contents(connection, note.utime);
+  transaction.commit();
+  return number;
+}
+
+void replace_maps(const Connection& connection, std::span<const StoredMap> maps) {
+  for (const StoredMap& map : maps) {
+    // What another program changed would be in the history as if it had been ours.
+    if (!stated_checksum(connection, map.map_id).empty()) verify_checksum(connection, map.map_id);
+    delete_map(connection, map.map_id);
+    insert_map(connection, map);
+  }
+}
+
+}  // namespace
+
+MapFile::MapFile(const std::filesystem::path& file, Access access)
+    : connection_(access == Access::kRead ? open_to_read(file) : open_to_write(file)),
+      access_(access) {}
+
+MapFile::MapFile(MapFile&&) noexcept = default;
+
+MapFile::~MapFile() {
+  if (connection_ && access_ == Access::kWrite) leave(*connection_);
+}
+
+const std::filesystem::path& MapFile::file() const { return connection_->file(); }
+
+std::vector<MapSummary> MapFile::maps() const {
+  std::vector<MapSummary> maps;
+  const std::vector<std::uint32_t> ids = map_ids(*connection_);
+  maps.reserve(ids.size());
+  for (const std::uint32_t id : ids) maps.push_back(summary_of(*connection_, id));
+  return maps;
+}
+
+StoredMap MapFile::read(std::uint32_t map_id) const {
+  StoredMap map = select_map(*connection_, map_id);
+  verify_checksum(*connection_, map_id);
+  return map;
+}
+
+std::vector<Change> MapFile::history() const { return changes_in(*connection_); }
+
+std::vector<std::string> MapFile::check() const { return findings_in(*connection_); }
+
+std::uint64_t MapFile::put(std::span<const StoredMap> maps, const ChangeNote& note) {
+  return changed(*connection_, note, [&] { replace_maps(*connection_, maps); });
+}
+
+std::uint64_t MapFile::revert(std::uint64_t to, const ChangeNote& note) {
+  const std::uint64_t latest = latest_change(*connection_);
+  if (to > latest)
+    throw MapFileError(Fault::kRefused, fmt::format("{}: has no change {}, the latest one is {}",
+                                                    file().string(), to, latest));
+
+  return changed(*connection_, note, [&] {
+    for (std::uint64_t number = latest; number > to; --number) undo(*connection_, number);
+    for (const std::uint32_t id : map_ids(*connection_)) verify_checksum(*connection_, id);
+  });
+}
+
+void create_map_file(const std::filesystem::path& file, std::span<const StoredMap> maps,
+                     const ChangeNote& note) {
+  NewFile part(file);
+  {
+    Connection connection(part.path(), Access::kWrite, file);
+    connection.execute("PRAGMA foreign_keys = ON");
+    Transaction transaction(connection);
+    create_schema(connection);
+    Recording recording(connection);
+    replace_maps(connection, maps);
+    recording.write(note);
+    refresh_contents(connection, note.utime);
+    transaction.commit();
+  }
+  part.move_to_its_name();
+}
+
+}  // namespace understory::map_file

@@ -1,0 +1,79 @@
+// A file that holds maps: an SQLite database that is at the same time a GeoPackage.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/map_file/connection.hpp"
+#include "common/map_file/history.hpp"
+#include "common/map_file/stored_map.hpp"
+
+namespace understory::map_file {
+
+/// What a file has of one map, without its rows.
+struct MapSummary {
+  std::uint32_t map_id = 0;
+  std::string name;
+  model::Utime created_utime = 0;
+  std::string origin;
+  std::string
+      checksum;  ///< SHA-256 of its content as the file states it; equal content, equal sum.
+  std::uint64_t trunks = 0;
+  std::uint64_t corners = 0;
+  std::uint64_t keyframes = 0;
+  std::uint64_t submap_borders = 0;
+  std::uint64_t loop_closures = 0;
+};
+
+/// An open map file. Everything throws MapFileError, which names the file.
+///
+/// Open for reading it shows one state, whatever others do. Open for writing nobody else can read
+/// or write it; each change is one transaction, on the device when the call returns, and recorded
+/// with the rows as they were before. Killed at any moment the file has every change that was
+/// finished. Closed it is a single file in SQLite's plain format.
+class MapFile {
+ public:
+  /// Opens what is there. Where a process was killed while it wrote, its last finished change is
+  /// brought into the file first, if that can be written. O(1) but for that.
+  MapFile(const std::filesystem::path& file, Access access);
+  ~MapFile();
+  /// The other one is closed.
+  MapFile(MapFile&&) noexcept;
+  MapFile& operator=(MapFile&&) = delete;
+
+  /// The file as it was given.
+  const std::filesystem::path& file() const;
+  /// All maps, ascending by number. O(size).
+  std::vector<MapSummary> maps() const;
+  /// One map, as it was put in: its checksum is compared (Fault::kDamaged). O(size).
+  StoredMap read(std::uint32_t map_id) const;
+  /// All changes, the oldest first.
+  std::vector<Change> history() const;
+  /// All that is wrong with it, a line each: pages and indexes of SQLite, tables and rows that a
+  /// GeoPackage must have, values, checksums of maps and of changes. O(size).
+  std::vector<std::string> check() const;
+
+  /// Puts maps in as one change and gives its number; a map of the same number is replaced, the
+  /// others stay. All or none of it.
+  std::uint64_t put(std::span<const StoredMap> maps, const ChangeNote& note);
+  /// Brings all maps back to what they were after change `to` (0: before the first one), as a
+  /// change of its own whose number it gives; it can be reverted, too. Fault::kRefused where there
+  /// is no such change, kDamaged where the content is no longer what the history left.
+  std::uint64_t revert(std::uint64_t to, const ChangeNote& note);
+
+ private:
+  std::unique_ptr<Connection> connection_;
+  Access access_;
+};
+
+/// Makes a new file with these maps, as its first change: whole, or not at all. Links are followed.
+/// Fault::kRefused where something is there already. Killed in between, it leaves at most a file
+/// FILE.part-XXXXXX.
+void create_map_file(const std::filesystem::path& file, std::span<const StoredMap> maps,
+                     const ChangeNote& note);
+
+}  // namespace understory::map_file

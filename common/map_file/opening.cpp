@@ -1,0 +1,158 @@
+#include "common/map_file/opening.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sqlite3.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "common/io/data_error.hpp"
+#include "common/io/output_file.hpp"
+#include "common/map_file/schema.hpp"
+
+namespace understory::map_file {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void cannot(Fault fault, const fs::path& file, const std::string& why) {
+  throw MapFileError(fault, fmt::format("{}: {}", file.string(), why));
+}
+
+/// SQLite would take an empty file for a database, and a folder for a failure of the device. The
+/// file is not opened here: closing it would end the locks that this process has on it.
+void require_database(const fs::path& file) {
+  std::error_code ignored;
+  const fs::file_status status = fs::status(file, ignored);
+  if (!fs::exists(status)) cannot(Fault::kUnreadable, file, "there is no such file");
+  if (!fs::is_regular_file(status)) cannot(Fault::kUnreadable, file, "is no regular file");
+  if (fs::file_size(file, ignored) == 0) cannot(Fault::kForeign, file, "no map file: it is empty");
+}
+
+fs::path beside(const fs::path& file, const char* suffix) { return file.string() + suffix; }
+
+/// Whether it is as leave() leaves it; a writer that was killed, or could not end for want of room,
+/// leaves a log, or a file that asks for one.
+bool is_at_rest(const fs::path& file, const fs::path& target) {
+  std::error_code ignored;
+  for (const char* const suffix : {"-wal", "-journal"}) {
+    if (fs::exists(beside(target, suffix), ignored)) return false;
+  }
+  try {
+    return Connection(file, Access::kRead, file).text("PRAGMA journal_mode") != "wal";
+  } catch (const MapFileError& error) {
+    if (error.fault() != Fault::kUnreadable) throw;
+    return false;
+  }
+}
+
+bool can_be_written(const fs::path& file) {
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  return ::faccessat(AT_FDCWD, file.c_str(), W_OK, AT_EACCESS) == 0 &&
+         ::faccessat(AT_FDCWD, folder.c_str(), W_OK, AT_EACCESS) == 0;
+}
+
+void set_keys_and_checks(const Connection& connection) {
+  connection.execute("PRAGMA foreign_keys = ON; PRAGMA cell_size_check = ON");
+}
+
+/// The user's mask decides, as for any other file.
+void give_usual_rights(int descriptor) {
+  const mode_t mask = ::umask(0);
+  ::umask(mask);
+  ::fchmod(descriptor, 0666U & ~mask);
+}
+
+/// Never in place of a file that is there. 0, or the errno.
+int rename_to_new(const fs::path& from, const fs::path& to) {
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
+  // Some file systems cannot.
+  if (errno != EINVAL && errno != ENOSYS) return errno;
+  if (fs::exists(to)) return EEXIST;
+  return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;
+}
+
+/// The name is on the device, too.
+void sync_folder_of(const fs::path& file) {
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
+}
+
+fs::path target_of(const fs::path& file) {
+  try {
+    return io::behind_links(file);
+  } catch (const io::DataError& error) {
+    throw MapFileError(Fault::kUnreadable, error.what());
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<Connection> open_to_read(const fs::path& file) {
+  require_database(file);
+  const fs::path target = target_of(file);
+  if (!is_at_rest(file, target) && can_be_written(target)) leave(*open_to_write(file));
+
+  auto connection = std::make_unique<Connection>(file, Access::kRead, file);
+  set_keys_and_checks(*connection);
+  connection->execute("BEGIN");
+  verify_schema(*connection);
+  return connection;
+}
+
+std::unique_ptr<Connection> open_to_write(const fs::path& file) {
+  require_database(file);
+  auto connection = std::make_unique<Connection>(file, Access::kWrite, file);
+  // Before the first look at it: then the log's index is in memory, and locks stay.
+  connection->execute("PRAGMA locking_mode = EXCLUSIVE");
+  set_keys_and_checks(*connection);
+  // A file that is not ours is not touched.
+  verify_schema(*connection);
+  if (sqlite3_db_readonly(connection->handle(), "main") != 0)
+    cannot(Fault::kReadOnly, connection->file(), "it cannot be written");
+
+  connection->execute("PRAGMA synchronous = FULL");
+  if (connection->text("PRAGMA journal_mode = WAL") != "wal")
+    cannot(Fault::kReadOnly, connection->file(), "no write-ahead log can be kept beside it");
+  // Takes the lock that all others meet.
+  connection->execute("BEGIN EXCLUSIVE; COMMIT");
+  return connection;
+}
+
+void leave(const Connection& connection) noexcept {
+  sqlite3_exec(connection.handle(), "PRAGMA journal_mode = DELETE", nullptr, nullptr, nullptr);
+}
+
+NewFile::NewFile(const fs::path& file) : target_(target_of(file)) {
+  std::error_code ignored;
+  if (fs::exists(fs::symlink_status(target_, ignored)))
+    cannot(Fault::kRefused, file, "is there already");
+  std::string part = target_.string() + ".part-XXXXXX";
+  const int descriptor = ::mkostemp(part.data(), O_CLOEXEC);
+  if (descriptor < 0)
+    cannot(Fault::kUnreadable, file, fmt::format("cannot be made: {}", std::strerror(errno)));
+  give_usual_rights(descriptor);
+  ::close(descriptor);
+  part_ = part;
+}
+
+NewFile::~NewFile() {
+  if (part_.empty()) return;
+  for (const char* const suffix : {"", "-journal", "-wal"}) ::unlink(beside(part_, suffix).c_str());
+}
+
+void NewFile::move_to_its_name() {
+  if (const int error = rename_to_new(part_, target_); error != 0)
+    cannot(error == EEXIST ? Fault::kRefused : Fault::kUnreadable, target_,
+           fmt::format("cannot be made: {}", std::strerror(error)));
+  part_.clear();
+  sync_folder_of(target_);
+}
+
+}  // namespace understory::map_file

@@ -1,0 +1,61 @@
+// Tables, triggers and fixed rows of a map file.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/map_file/connection.hpp"
+#include "common/map_file/stored_map.hpp"
+
+namespace understory::map_file {
+
+/// The version of the schema that is written and read. One that adds or changes a table or a column
+/// gets the next number.
+inline constexpr std::int64_t kSchemaVersion = 1;
+/// PRAGMA application_id of a GeoPackage: "GPKG".
+inline constexpr std::int64_t kGeoPackage = 0x47504B47;
+/// PRAGMA user_version: GeoPackage 1.3.
+inline constexpr std::int64_t kGeoPackageVersion = 10300;
+
+/// A table of features, which other programs show as a layer. Its geometry is in the column `geom`.
+struct Layer {
+  std::string_view table;
+  std::string_view key;       ///< Its primary key: the feature's number.
+  std::string_view geometry;  ///< POINT, LINESTRING, POLYGON.
+  std::string_view text;      ///< What it holds, for people.
+};
+
+/// All layers.
+inline constexpr std::array<Layer, 4> kLayers{{
+    {"landmarks", "landmark_id", "POINT", "Landmarks with covariance [m^2]"},
+    {"trajectory", "fid", "POINT", "Keyframes with heading and covariance [m, rad]"},
+    {"submap_borders", "fid", "POLYGON", "Where each submap lies"},
+    {"loop_closures", "fid", "LINESTRING", "Keyframes between which a loop was closed"},
+}};
+/// The tables whose rows are a map's content, and which the history records.
+inline constexpr std::array<std::string_view, 5> kContentTables{
+    "understory_maps", "landmarks", "trajectory", "submap_borders", "loop_closures"};
+
+/// One object of the schema: its name, and the SQL that makes it.
+struct SchemaObject {
+  std::string name;
+  std::string sql;
+};
+
+/// Everything that a file has, in the order in which it is made.
+std::vector<SchemaObject> schema_objects();
+
+/// Makes everything in an empty database, in one transaction that the caller has begun.
+void create_schema(const Connection& connection);
+
+/// Throws MapFileError where the database is no GeoPackage, none of ours, of another schema
+/// version, or lacks a table. O(1).
+void verify_schema(const Connection& connection);
+
+/// The rectangles and times of change that gpkg_contents states. `utime` [us].
+void refresh_contents(const Connection& connection, model::Utime utime);
+
+}  // namespace understory::map_file

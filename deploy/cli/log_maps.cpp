@@ -1,0 +1,57 @@
+#include "deploy/cli/log_maps.hpp"
+
+#include "common/wire/convert.hpp"
+
+namespace understory::cli {
+namespace {
+
+/// Number of the map that a message is about; 0 where its landmarks do not tell.
+std::uint32_t map_id_of(const std::vector<model::MapLandmark>& landmarks) {
+  return landmarks.empty() ? 0 : model::map_of(landmarks.front().id);
+}
+
+}  // namespace
+
+void LogMaps::add(const io::LogEvent& event) {
+  if (event.channel == "MAP") {
+    const auto whole = wire::decode_message<model::WholeMap>(event.data);
+    if (!whole || !whole->complete) return;
+    go_to(map_id_of(whole->landmarks));
+    held_.take(*whole);
+  } else if (event.channel == "MAP_DELTA") {
+    const auto delta = wire::decode_message<model::MapDelta>(event.data);
+    if (!delta) return;
+    // Only the first change of a map comes before anything else that names it.
+    if (delta->base_version == 0) go_to(map_id_of(delta->added));
+    held_.take(*delta);
+  } else if (event.channel == "SLAM_UPDATE") {
+    const auto update = wire::decode_message<model::MapUpdate>(event.data);
+    if (!update) return;
+    const bool starts = update->status == model::MapUpdateStatus::kFirstMap;
+    if (starts || map_id_ == 0) go_to(update->map_id);
+    held_.take(*update);
+    is_provisional_ = update->is_provisional;
+  }
+}
+
+std::map<std::uint32_t, LogMaps::Found> LogMaps::take() {
+  // The map in use at the end is one, however young it is.
+  is_provisional_ = false;
+  keep();
+  return std::move(left_);
+}
+
+void LogMaps::go_to(std::uint32_t map_id) {
+  if (map_id == 0 || map_id == map_id_) return;
+  keep();
+  held_ = model::HeldMap();
+  is_provisional_ = false;
+  map_id_ = map_id;
+}
+
+void LogMaps::keep() {
+  if (map_id_ == 0 || is_provisional_ || !held_.map()) return;
+  left_.insert_or_assign(map_id_, Found{*held_.map(), held_.missed()});
+}
+
+}  // namespace understory::cli

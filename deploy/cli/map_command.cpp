@@ -1,0 +1,241 @@
+// `understory map info|check|import|export|log|revert|diff`: stored maps.
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "common/io/data_error.hpp"
+#include "common/io/lcm_log.hpp"
+#include "common/map_file/difference.hpp"
+#include "common/terminal/interrupt.hpp"
+#include "common/terminal/printable.hpp"
+#include "deploy/cli/commands.hpp"
+#include "deploy/cli/failure.hpp"
+#include "deploy/cli/map_commands.hpp"
+#include "deploy/cli/text_file.hpp"
+
+namespace understory::cli {
+namespace {
+
+using map_file::Access;
+using map_file::Change;
+using map_file::MapFile;
+using map_file::MapSummary;
+
+struct MapOptions {
+  std::string file;
+  std::string other;
+  bool json = false;
+  std::uint64_t to = 0;
+  double quantile = 0.99;
+};
+
+/// UTC, to the second. Stamps of simulated drives count from 0.
+std::string time_text(model::Utime utime) {
+  // Beyond the year 9999 there are only damaged stamps.
+  constexpr model::Utime kLast = 253'402'300'799'000'000;
+  if (utime < 0 || utime > kLast) return fmt::format("{} us", utime);
+  return fmt::format("{:%Y-%m-%d %H:%M:%S}",
+                     fmt::gmtime(static_cast<std::time_t>(utime / 1'000'000)));
+}
+
+nlohmann::ordered_json summary_json(const MapSummary& map) {
+  return {{"map_id", map.map_id},
+          {"name", map.name},
+          {"created_utime", map.created_utime},
+          {"origin", map.origin},
+          {"trunks", map.trunks},
+          {"corners", map.corners},
+          {"keyframes", map.keyframes},
+          {"submap_borders", map.submap_borders},
+          {"loop_closures", map.loop_closures},
+          {"checksum", map.checksum}};
+}
+
+void map_info(const MapOptions& options) {
+  const MapFile file(options.file, Access::kRead);
+  const std::vector<MapSummary> maps = file.maps();
+  const std::size_t changes = file.history().size();
+  if (options.json) {
+    nlohmann::ordered_json json{
+        {"file", options.file}, {"changes", changes}, {"maps", nlohmann::ordered_json::array()}};
+    for (const MapSummary& map : maps) json["maps"].push_back(summary_json(map));
+    fmt::print("{}\n", dumped(json, 2));
+    return;
+  }
+
+  fmt::print("{}: {} maps, {} changes\n", options.file, maps.size(), changes);
+  fmt::print("{:>5} {:>9} {:>9} {:>9} {:19} {:12} {} (from)\n", "map", "trunks", "corners",
+             "keyframes", "made", "checksum", "name");
+  for (const MapSummary& map : maps) {
+    fmt::print("{:>5} {:>9} {:>9} {:>9} {:19} {:12} {} ({})\n", map.map_id, map.trunks, map.corners,
+               map.keyframes, time_text(map.created_utime),
+               terminal::printable(map.checksum.substr(0, 12)), terminal::printable(map.name),
+               terminal::printable(map.origin));
+  }
+}
+
+void map_check(const MapOptions& options) {
+  const MapFile file(options.file, Access::kRead);
+  const std::vector<std::string> findings = file.check();
+  for (const std::string& finding : findings) fmt::print("{}\n", terminal::printable(finding));
+  if (!findings.empty()) fail(fmt::format("{}: {} findings", options.file, findings.size()));
+  fmt::print("{}: {} maps, {} changes, nothing wrong\n", options.file, file.maps().size(),
+             file.history().size());
+}
+
+void map_log(const MapOptions& options) {
+  const MapFile file(options.file, Access::kRead);
+  nlohmann::ordered_json json{{"file", options.file}, {"changes", nlohmann::ordered_json::array()}};
+  for (const Change& change : file.history()) {
+    const map_file::ChangeNote& note = change.note;
+    json["changes"].push_back({{"number", change.number},
+                               {"utime", note.utime},
+                               {"command", note.command},
+                               {"source", note.source},
+                               {"text", note.text},
+                               {"bytes", change.bytes}});
+    if (options.json) continue;
+    fmt::print("{:>4} {} {} {}: {}\n", change.number, time_text(note.utime),
+               terminal::printable(note.command), terminal::printable(note.source),
+               terminal::printable(note.text));
+  }
+  if (options.json) fmt::print("{}\n", dumped(json, 2));
+}
+
+void map_revert(const MapOptions& options) {
+  MapFile file(options.file, Access::kWrite);
+  const std::uint64_t number = file.revert(
+      options.to, note_now("understory map revert", fmt::format("change {}", options.to),
+                           fmt::format("back to what was after change {}", options.to)));
+  fmt::print("{}: as it was after change {} (change {})\n", options.file, options.to, number);
+}
+
+/// An empty one where the file has none of this number.
+map_file::StoredMap map_or_nothing(const MapFile& file, const std::set<std::uint32_t>& ids,
+                                   std::uint32_t id) {
+  return ids.contains(id) ? file.read(id) : map_file::StoredMap{};
+}
+
+std::set<std::uint32_t> ids_in(const MapFile& file) {
+  std::set<std::uint32_t> ids;
+  for (const MapSummary& map : file.maps()) ids.insert(map.map_id);
+  return ids;
+}
+
+nlohmann::ordered_json difference_json(std::uint32_t map_id,
+                                       const map_file::MapDifference& difference) {
+  nlohmann::ordered_json json{{"map_id", map_id},
+                              {"added", difference.added},
+                              {"removed", difference.removed},
+                              {"moved", nlohmann::ordered_json::array()},
+                              {"kept", difference.kept}};
+  for (const map_file::MovedLandmark& move : difference.moved) {
+    // JSON has no infinity: nothing is known of such a landmark's error.
+    const nlohmann::ordered_json chi2 =
+        std::isfinite(move.chi2) ? nlohmann::ordered_json(move.chi2) : nullptr;
+    json["moved"].push_back({{"id", move.id}, {"distance_m", move.distance_m}, {"chi2", chi2}});
+  }
+  return json;
+}
+
+void print_difference(std::uint32_t map_id, const map_file::MapDifference& difference) {
+  fmt::print("map {}: {} added, {} removed, {} moved, {} kept\n", map_id, difference.added.size(),
+             difference.removed.size(), difference.moved.size(), difference.kept);
+  for (const model::LandmarkId id : difference.added) fmt::print("  added   {}\n", id);
+  for (const model::LandmarkId id : difference.removed) fmt::print("  removed {}\n", id);
+  for (const map_file::MovedLandmark& move : difference.moved)
+    fmt::print("  moved   {} by {:.3f} m, chi2 {:.1f}\n", move.id, move.distance_m, move.chi2);
+}
+
+void map_diff(const MapOptions& options) {
+  const MapFile before(options.file, Access::kRead);
+  const MapFile after(options.other, Access::kRead);
+  const std::set<std::uint32_t> before_ids = ids_in(before);
+  const std::set<std::uint32_t> after_ids = ids_in(after);
+  std::set<std::uint32_t> all = before_ids;
+  all.insert(after_ids.begin(), after_ids.end());
+
+  const double chi2 = map_file::chi2_of_quantile(options.quantile);
+  nlohmann::ordered_json json{{"before", options.file},
+                              {"after", options.other},
+                              {"quantile", options.quantile},
+                              {"chi2", chi2},
+                              {"maps", nlohmann::ordered_json::array()}};
+  for (const std::uint32_t id : all) {
+    const auto difference =
+        map_file::difference(map_or_nothing(before, before_ids, id),
+                             map_or_nothing(after, after_ids, id), options.quantile);
+    json["maps"].push_back(difference_json(id, difference));
+    if (!options.json) print_difference(id, difference);
+  }
+
+  if (options.json) {
+    fmt::print("{}\n", dumped(json, 2));
+  } else {
+    fmt::print(
+        "landmarks by id, frames taken to be the same; moved: beyond the quantile {} "
+        "(chi2 {:.2f}, 2 degrees of freedom)\n",
+        options.quantile, chi2);
+  }
+}
+
+}  // namespace
+
+void guarded_map_work(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const map_file::MapFileError& error) {
+    fail(error.what());
+  } catch (const io::DataError& error) {
+    fail(error.what());
+  } catch (const io::LogError& error) {
+    fail(error.what());
+  } catch (const std::filesystem::filesystem_error& error) {
+    fail(error.what());
+  } catch (const terminal::Interrupted& error) {
+    fail(fmt::format("map: {}", error.what()));
+  }
+}
+
+map_file::ChangeNote note_now(std::string command, std::string source, std::string text) {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return {std::chrono::duration_cast<std::chrono::microseconds>(now).count(), std::move(command),
+          std::move(source), std::move(text)};
+}
+
+void add_map_command(CLI::App& parent) {
+  auto* map = parent.add_subcommand("map", "Stored maps: SQLite files that are GeoPackages");
+  map->require_subcommand(1);
+  const auto options = std::make_shared<MapOptions>();
+  const auto add = [&](const char* name, const char* description, void (*work)(const MapOptions&)) {
+    auto* command = map->add_subcommand(name, description);
+    command->add_option("file", options->file, "A map file")->required();
+    command->callback([options, work] { guarded_map_work([&] { work(*options); }); });
+    return command;
+  };
+
+  add("info", "What is in it", map_info)->add_flag("--json", options->json, "As JSON");
+  add("check", "What is wrong with it; exit status 1 when something is", map_check);
+  add_map_import(*map);
+  add_map_export(*map);
+  add("log", "Its changes, the oldest first", map_log)
+      ->add_flag("--json", options->json, "As JSON");
+
+  add("revert", "All maps as they were after a change; that is a change, too", map_revert)
+      ->add_option("--to", options->to, "Number of the change; 0: before the first one")
+      ->required();
+  auto* diff = add("diff", "Landmarks added, removed and moved from one file to another", map_diff);
+  diff->add_option("other", options->other, "The later map file")->required();
+  diff->add_option("--quantile", options->quantile,
+                   "A landmark has moved where chi2 of its way, by both covariances, is beyond it")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  diff->add_flag("--json", options->json, "As JSON");
+}
+
+}  // namespace understory::cli

@@ -1,0 +1,28 @@
+// Parts of `understory map` that have a file of their own.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/map_file/map_file.hpp"
+
+namespace understory::cli {
+
+/// `understory map import`: a table of surveyed landmarks, or the maps in a log, into a map file.
+void add_map_import(CLI::App& map);
+/// `understory map export`: maps of a file as CSV and GeoJSON.
+void add_map_export(CLI::App& map);
+
+/// Runs `work`; what is wrong with a file ends the command in one line.
+void guarded_map_work(const std::function<void()>& work);
+/// A note for a change that is made now.
+map_file::ChangeNote note_now(std::string command, std::string source, std::string text);
+
+/// The layers of a map as GeoJSON (RFC 7946, but in metres of the frame `map`): for each layer with
+/// its name. Layers without a feature are left out, but for landmarks and trajectory.
+std::vector<std::pair<std::string, std::string>> map_geojson(const map_file::StoredMap& map);
+
+}  // namespace understory::cli

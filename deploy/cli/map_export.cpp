@@ -1,0 +1,166 @@
+// `understory map export`: maps in formats that other tools read.
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "deploy/cli/map_commands.hpp"
+#include "deploy/cli/slam_results.hpp"
+#include "deploy/cli/text_file.hpp"
+
+namespace understory::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+struct MapExportOptions {
+  std::string file;
+  fs::path out;
+  std::vector<std::string> formats{"csv", "geojson"};
+};
+
+Json place(const Eigen::Vector2d& position_m) { return {position_m.x(), position_m.y()}; }
+
+template <class T>
+Json or_null(const std::optional<T>& value) {
+  return value ? Json(*value) : Json();
+}
+
+template <int N>
+Json matrix_json(const Eigen::Matrix<double, N, N>& matrix) {
+  if (matrix.isZero(0.0)) return nullptr;
+  Json rows = Json::array();
+  for (int i = 0; i < N; ++i) {
+    Json row = Json::array();
+    for (int j = 0; j < N; ++j) row.push_back(matrix(i, j));
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+Json feature(const char* kind, Json coordinates, Json properties) {
+  return {{"type", "Feature"},
+          {"geometry", {{"type", kind}, {"coordinates", std::move(coordinates)}}},
+          {"properties", std::move(properties)}};
+}
+
+Json landmark_features(const map_file::StoredMap& map) {
+  Json features = Json::array();
+  for (const map_file::StoredLandmark& one : map.landmarks) {
+    const model::MapLandmark& landmark = one.landmark;
+    const bool is_trunk = landmark.kind == model::LandmarkKind::kTrunk;
+    features.push_back(
+        feature("Point", place(landmark.position_m),
+                {{"landmark_id", landmark.id},
+                 {"submap_id", or_null(one.submap_id)},
+                 {"covariance_m2", matrix_json(landmark.covariance_m2)},
+                 {"diameter_m", landmark.radius_m > 0.0 ? Json(2.0 * landmark.radius_m) : Json()},
+                 {"kind", is_trunk ? "trunk" : "corner"},
+                 {"times_seen", landmark.observation_count},
+                 {"existence", or_null(one.existence)}}));
+  }
+  return features;
+}
+
+Json keyframe_features(const map_file::StoredMap& map) {
+  Json features = Json::array();
+  for (const model::KeyframePose& pose : map.keyframes) {
+    features.push_back(feature("Point", place(pose.map_T_vehicle.translation()),
+                               {{"sequence", pose.keyframe_sequence},
+                                {"utime", pose.utime},
+                                {"heading_rad", pose.map_T_vehicle.theta()},
+                                {"covariance", matrix_json(pose.covariance)}}));
+  }
+  return features;
+}
+
+Json border_features(const map_file::StoredMap& map) {
+  Json features = Json::array();
+  for (const map_file::SubmapBorder& border : map.submap_borders) {
+    Json ring = Json::array();
+    for (const Eigen::Vector2d& corner : border.corners_m) ring.push_back(place(corner));
+    ring.push_back(place(border.corners_m.front()));
+    features.push_back(
+        feature("Polygon", Json::array({std::move(ring)}), {{"submap_id", border.submap_id}}));
+  }
+  return features;
+}
+
+Json loop_features(const map_file::StoredMap& map) {
+  Json features = Json::array();
+  for (const map_file::LoopClosure& loop : map.loop_closures) {
+    features.push_back(
+        feature("LineString", Json::array({place(loop.from_m), place(loop.to_m)}),
+                {{"from_sequence", loop.from_sequence}, {"to_sequence", loop.to_sequence}}));
+  }
+  return features;
+}
+
+model::WholeMap whole_map_of(const map_file::StoredMap& map) {
+  model::WholeMap whole;
+  whole.landmarks.reserve(map.landmarks.size());
+  for (const map_file::StoredLandmark& one : map.landmarks) whole.landmarks.push_back(one.landmark);
+  whole.keyframes = map.keyframes;
+  return whole;
+}
+
+void write_export(const fs::path& file, const std::string& text) {
+  write_text_file(file, text);
+  fmt::print("{}\n", file.string());
+}
+
+void export_map_as(const std::string& format, const map_file::StoredMap& map, const fs::path& out) {
+  if (format == "csv") {
+    const model::WholeMap whole = whole_map_of(map);
+    write_export(out / "landmarks.csv", landmarks_csv(whole));
+    write_export(out / "keyframes.csv", keyframes_csv(whole));
+  } else {
+    for (const auto& [layer, text] : map_geojson(map))
+      write_export(out / (layer + ".geojson"), text);
+  }
+}
+
+void run_map_export(const MapExportOptions& options) {
+  const map_file::MapFile file(options.file, map_file::Access::kRead);
+  for (const map_file::MapSummary& summary : file.maps()) {
+    const map_file::StoredMap map = file.read(summary.map_id);
+    const fs::path folder = options.out / fmt::format("map-{}", summary.map_id);
+    fs::create_directories(folder);
+    for (const std::string& format : options.formats) export_map_as(format, map, folder);
+  }
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::string>> map_geojson(const map_file::StoredMap& map) {
+  std::vector<std::pair<std::string, std::string>> layers;
+  const auto add = [&](const std::string& name, Json features, bool is_always) {
+    if (features.empty() && !is_always) return;
+    const Json collection{{"type", "FeatureCollection"},
+                          {"name", name},
+                          {"frame", "map, undefined Cartesian, metres"},
+                          {"features", std::move(features)}};
+    layers.emplace_back(name, dumped(collection, -1) + "\n");
+  };
+  add("landmarks", landmark_features(map), true);
+  add("trajectory", keyframe_features(map), true);
+  add("submap_borders", border_features(map), false);
+  add("loop_closures", loop_features(map), false);
+  return layers;
+}
+
+void add_map_export(CLI::App& map) {
+  auto* command = map.add_subcommand("export", "Each map in formats that other tools read");
+  const auto options = std::make_shared<MapExportOptions>();
+  command->add_option("file", options->file, "A map file")->required();
+  command->add_option("--out", options->out, "Directory; each map has a folder map-N in it")
+      ->required();
+  command->add_option("--format", options->formats, "csv, geojson")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"csv", "geojson"}))
+      ->capture_default_str();
+  command->callback([options] { guarded_map_work([&] { run_map_export(*options); }); });
+}
+
+}  // namespace understory::cli

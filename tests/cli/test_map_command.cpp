@@ -1,0 +1,206 @@
+// `understory map` as a user calls it.
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "common/map_file/map_file.hpp"
+#include "tests/catch.hpp"
+#include "tests/cli/run_command.hpp"
+
+using namespace understory;
+using namespace understory::test;
+using Catch::Matchers::Contains;
+
+namespace {
+
+struct Maps {
+  TemporaryDirectory directory;
+  std::string table = (directory / "stems.csv").string();
+  std::string file = (directory / "maps.gpkg").string();
+
+  Maps() { write(table, "x_m,y_m,dbh_m,kind\n1,2,0.3,trunk\n5,6,,corner\n9,9,0.2,\n"); }
+
+  static void write(const std::string& path, const std::string& text) {
+    std::ofstream(path, std::ios::binary) << text;
+  }
+  Outcome run(const std::string& arguments) const {
+    return understory_command(directory, "map " + arguments);
+  }
+  Outcome fine(const std::string& arguments) const {
+    const Outcome outcome = run(arguments);
+    CAPTURE(arguments, outcome.error);
+    CHECK(outcome.status == 0);
+    return outcome;
+  }
+  /// Ends with 1 and one line that has all of this.
+  void refused(const std::string& arguments, const std::vector<std::string>& what) const {
+    const Outcome outcome = run(arguments);
+    CAPTURE(arguments, outcome.error);
+    CHECK(outcome.status == 1);
+    CHECK(lines(outcome.error) == 1);
+    for (const std::string& part : what) CHECK_THAT(outcome.error, Contains(part));
+  }
+  nlohmann::json json(const std::string& arguments) const {
+    return nlohmann::json::parse(fine(arguments + " --json").out);
+  }
+};
+
+}  // namespace
+
+TEST_CASE_METHOD(Maps, "a survey becomes a map, with its sigma", "[cli]") {
+  CHECK_THAT(fine("import " + table + " --sigma-m 0.5 --out " + file).out,
+             Contains("map 1 of 3 landmarks and 0 keyframes"));
+  const auto map = map_file::MapFile(file, map_file::Access::kRead).read(1);
+  REQUIRE(map.landmarks.size() == 3);
+  CHECK(map.name == "stems");
+  CHECK(map.origin == "stems.csv");
+  CHECK(map.landmarks[1].landmark.id == map_file::landmark_id(1, 2));
+  CHECK(map.landmarks[1].landmark.position_m == Eigen::Vector2d(5.0, 6.0));
+  CHECK(map.landmarks[1].landmark.kind == model::LandmarkKind::kCorner);
+  CHECK(map.landmarks[0].landmark.radius_m == 0.15);
+  CHECK(map.landmarks[0].landmark.covariance_m2 == 0.25 * Eigen::Matrix2d::Identity());
+
+  CHECK_THAT(fine("check " + file).out, Contains("1 maps, 1 changes, nothing wrong"));
+  CHECK_THAT(fine("info " + file).out, Contains("stems (stems.csv)"));
+  const auto info = json("info " + file);
+  CHECK(info["maps"][0]["trunks"] == 2);
+  CHECK(info["maps"][0]["corners"] == 1);
+  CHECK(info["changes"] == 1);
+}
+
+TEST_CASE_METHOD(Maps, "landmarks that stand close together are reported", "[cli]") {
+  write(table, "x_m,y_m\n0,0\n5,5\n0.03,0\n");
+  CHECK_THAT(fine("import " + table + " --out " + file).error,
+             Contains("stems.csv: lines 2 and 4 are 0.030 m apart") && Contains("1 pairs"));
+  CHECK(fine("import " + table + " --near-m 0.01 --out " + file).error.empty());
+}
+
+TEST_CASE_METHOD(Maps, "a table that is none ends with file and line, and makes nothing", "[cli]") {
+  for (const auto& [text, what] : std::vector<std::pair<std::string, std::string>>{
+           {"", "stems.csv: no heading"},
+           {"x_m,y_m\n1,nan\n", "stems.csv, line 2"},
+           {"x_m,y_m\n1,2\n1e300,2\n", "stems.csv, line 3"},
+           {"x_m,y_m,height\n1,2,3\n", "unknown column 'height'"},
+           {"x_m,y_m,kind\n1,2,bush\n", "stems.csv, line 2: kind 'bush'"}}) {
+    write(table, text);
+    refused("import " + table + " --out " + file, {what});
+  }
+  refused("import " + table + "x --out " + file, {"stems.csvx"});
+  refused("import " + directory.path().string() + " --out " + file, {"cannot be read"});
+  CHECK_FALSE(std::filesystem::exists(file));
+  CHECK(run("import " + table + " --sigma-m 0 --out " + file).status == 2);
+  CHECK(run("import " + table).status == 2);
+  CHECK(run("").status == 2);
+}
+
+TEST_CASE_METHOD(Maps, "maps are added, replaced when asked, and refused otherwise", "[cli]") {
+  fine("import " + table + " --out " + file);
+  CHECK_THAT(fine("import " + table + " --name second --out " + file).out, Contains("map 2"));
+  fine("import " + table + " --map 9 --out " + file);
+  refused("import " + table + " --map 2 --out " + file, {"maps.gpkg: has a map 2", "--replace"});
+  write(table, "x_m,y_m\n1,1\n");
+  fine("import " + table + " --map 2 --replace --out " + file);
+
+  const auto info = json("info " + file);
+  CHECK(info["maps"].size() == 3);
+  CHECK(info["maps"][1]["trunks"] == 1);
+  CHECK(info["maps"][2]["map_id"] == 9);
+  CHECK(info["changes"] == 4);
+}
+
+TEST_CASE_METHOD(Maps, "log lists the changes, revert takes them back", "[cli]") {
+  fine("import " + table + " --out " + file);
+  write(table, "x_m,y_m\n1,1\n");
+  fine("import " + table + " --map 1 --replace --out " + file);
+  CHECK(json("info " + file)["maps"][0]["trunks"] == 1);
+  const auto first = json("log " + file);
+  REQUIRE(first["changes"].size() == 2);
+  CHECK(first["changes"][1]["number"] == 2);
+  CHECK(first["changes"][1]["command"] == "understory map import");
+  CHECK(first["changes"][1]["source"] == "stems.csv");
+
+  CHECK_THAT(fine("revert --to 1 " + file).out, Contains("as it was after change 1 (change 3)"));
+  CHECK(json("info " + file)["maps"][0]["trunks"] == 2);
+  CHECK_THAT(fine("log " + file).out, Contains("back to what was after change 1"));
+  refused("revert --to 17 " + file, {"maps.gpkg: has no change 17, the latest one is 3"});
+  CHECK(run("revert " + file).status == 2);
+  fine("check " + file);
+}
+
+TEST_CASE_METHOD(Maps, "diff tells what was added, removed and moved", "[cli]") {
+  const std::string later = (directory / "later.gpkg").string();
+  fine("import " + table + " --out " + file);
+  write(table, "x_m,y_m\n1.05,2\n6,6\n");
+  fine("import " + table + " --out " + later);
+  const auto text = fine("diff " + file + " " + later).out;
+  CHECK_THAT(text, Contains("map 1: 0 added, 1 removed, 1 moved, 1 kept") &&
+                       Contains("by 1.000 m, chi2 50.0") &&
+                       Contains("frames taken to be the same"));
+  const auto back = json("diff " + later + " " + file + " --quantile 0.05");
+  CHECK(back["maps"][0]["added"].size() == 1);
+  CHECK(back["maps"][0]["moved"].size() == 2);
+  CHECK(back["quantile"] == 0.05);
+  CHECK(run("diff " + file + " " + later + " --quantile 2").status == 2);
+  refused("diff " + file + " " + later + "x", {"later.gpkgx"});
+}
+
+TEST_CASE_METHOD(Maps, "export writes what other tools read", "[cli]") {
+  fine("import " + table + " --out " + file);
+  const auto out = directory / "out";
+  fine("export " + file + " --out " + out.string());
+  CHECK_THAT(read_text(out / "map-1" / "landmarks.csv"),
+             Contains("id,x_m,y_m") && Contains("281474976710658,5,6,"));
+  CHECK_THAT(read_text(out / "map-1" / "keyframes.csv"), Contains("keyframe,utime_us"));
+  const auto layer = nlohmann::json::parse(read_text(out / "map-1" / "landmarks.geojson"));
+  CHECK(layer["type"] == "FeatureCollection");
+  REQUIRE(layer["features"].size() == 3);
+  const auto& one = layer["features"][1];
+  CHECK(one["geometry"]["type"] == "Point");
+  CHECK(one["geometry"]["coordinates"] == nlohmann::json({5.0, 6.0}));
+  CHECK(one["properties"]["kind"] == "corner");
+  CHECK(one["properties"]["diameter_m"].is_null());
+  CHECK(one["properties"]["covariance_m2"][0].size() == 2);
+  CHECK(nlohmann::json::parse(read_text(out / "map-1" / "trajectory.geojson"))["features"].empty());
+  CHECK(run("export " + file + " --out x --format kml").status == 2);
+}
+
+TEST_CASE_METHOD(Maps, "every part names a file that is no map", "[cli]") {
+  for (const char* const command : {"info", "check", "log", "revert --to 0", "export --out o"}) {
+    refused(std::string(command) + " " + table, {"stems.csv: no map file"});
+    refused(std::string(command) + " " + file, {"maps.gpkg: there is no such file"});
+  }
+  refused("import " + table + " --out " + table, {"stems.csv: no map file"});
+  CHECK_THAT(read_text(table), Contains("x_m,y_m,dbh_m,kind"));
+}
+
+TEST_CASE_METHOD(Maps, "check ends with 1 and says what is wrong", "[cli]") {
+  fine("import " + table + " --out " + file);
+  auto bytes = read_bytes(file);
+  // The name of the map in its row.
+  const std::string name = "stemsstems.csv";
+  for (auto at = bytes.begin();
+       (at = std::search(at, bytes.end(), name.begin() + 5, name.end())) != bytes.end(); ++at)
+    *at = 'S';
+  write_bytes(file, bytes);
+  const Outcome outcome = run("check " + file);
+  CHECK(outcome.status == 1);
+  CHECK_THAT(outcome.out, Contains("map 1: is not what its checksum says"));
+  CHECK_THAT(outcome.error, Contains("maps.gpkg: ") && Contains("findings"));
+  refused("export --out o " + file, {"maps.gpkg: map 1 is not what its checksum says"});
+}
+
+TEST_CASE_METHOD(Maps, "without room for it no map file is left", "[cli]") {
+  std::string many = "x_m,y_m\n";
+  for (int i = 0; i < 20'000; ++i) many += fmt::format("{},{}\n", i % 200, i / 200);
+  write(table, many);
+  const std::string limited = "trap '' XFSZ; ulimit -f 400; " + std::string(UNDERSTORY_COMMAND) +
+                              " map import " + table + " --out " + file + " 2> " +
+                              (directory / "e").string();
+  const int status = std::system(limited.c_str());  // NOLINT(cert-env33-c)
+  CHECK(WEXITSTATUS(status) == 1);
+  const std::string error = read_text(directory / "e");
+  CHECK(lines(error) == 1);
+  CHECK_THAT(error, Contains("maps.gpkg: no room"));
+  for (const auto& entry : std::filesystem::directory_iterator(directory.path()))
+    CHECK_THAT(entry.path().filename().string(), !Contains("gpkg"));
+}

@@ -1,0 +1,159 @@
+// Maps out of logs.
+#include <nlohmann/json.hpp>
+
+#include "common/map_file/map_file.hpp"
+#include "common/wire/convert.hpp"
+#include "deploy/cli/log_maps.hpp"
+#include "tests/catch.hpp"
+#include "tests/cli/run_command.hpp"
+
+using namespace understory;
+using namespace understory::test;
+using Catch::Matchers::Contains;
+
+namespace {
+
+model::MapLandmark landmark(std::uint32_t map_id, std::uint64_t counter, double x) {
+  model::MapLandmark one;
+  one.id = map_file::landmark_id(map_id, counter);
+  one.position_m.x() = x;
+  one.covariance_m2 = 0.01 * Eigen::Matrix2d::Identity();
+  return one;
+}
+
+/// A log as a mapper would write it.
+struct MapperLog {
+  std::vector<io::LogEvent> events;
+  model::Utime utime = 0;
+  std::uint64_t version = 0;
+
+  template <class Message>
+  void add(const std::string& channel, Message message) {
+    message.utime = ++utime;
+    io::LogEvent event;
+    event.number = static_cast<std::int64_t>(events.size());
+    event.utime = utime;
+    event.channel = channel;
+    event.data = wire::encode_message(message);
+    events.push_back(event);
+  }
+  void update(std::uint32_t map_id, bool starts, bool is_provisional) {
+    model::MapUpdate update;
+    update.keyframe_sequence = events.size();
+    update.status = starts ? model::MapUpdateStatus::kFirstMap : model::MapUpdateStatus::kUpdated;
+    update.map_id = map_id;
+    update.is_provisional = is_provisional;
+    add("SLAM_UPDATE", update);
+  }
+  void delta(bool is_first, const std::vector<model::MapLandmark>& added) {
+    model::MapDelta delta;
+    delta.base_version = is_first ? 0 : version;
+    delta.version = ++version;
+    delta.added = added;
+    add("MAP_DELTA", delta);
+  }
+  std::map<std::uint32_t, cli::LogMaps::Found> maps() const {
+    cli::LogMaps maps;
+    for (const io::LogEvent& event : events) maps.add(event);
+    return maps.take();
+  }
+};
+
+}  // namespace
+
+TEST_CASE("each map of a log is found as it was last", "[cli]") {
+  MapperLog log;
+  log.update(1, true, true);
+  log.delta(true, {landmark(1, 1, 0.0)});
+  log.update(1, false, false);
+  log.delta(false, {landmark(1, 2, 5.0)});
+  log.update(2, true, false);
+  log.delta(true, {landmark(2, 1, 1.0), landmark(2, 2, 2.0), landmark(2, 3, 3.0)});
+  log.update(2, false, false);
+  const auto maps = log.maps();
+  REQUIRE(maps.size() == 2);
+  CHECK(maps.at(1).map.landmarks.size() == 2);
+  CHECK(maps.at(1).map.keyframes.size() == 2);
+  CHECK(maps.at(2).map.landmarks.size() == 3);
+  CHECK(maps.at(2).map.keyframes.size() == 2);
+  CHECK(maps.at(2).missed == 0);
+}
+
+TEST_CASE("a provisional map that gave way is none, one at the end is", "[cli]") {
+  MapperLog log;
+  log.update(1, true, true);
+  log.delta(true, {landmark(1, 1, 0.0)});
+  log.update(2, true, true);
+  log.delta(true, {landmark(2, 1, 1.0)});
+  const auto maps = log.maps();
+  REQUIRE(maps.size() == 1);
+  CHECK(maps.contains(2));
+}
+
+TEST_CASE("a log that begins in the middle of a map gives it from its first MAP on", "[cli]") {
+  MapperLog log;
+  log.version = 7;
+  log.update(3, false, false);
+  log.delta(false, {landmark(3, 9, 0.0)});
+  CHECK(log.maps().empty());
+  model::WholeMap whole;
+  whole.version = 8;
+  whole.landmarks = {landmark(3, 9, 0.0), landmark(3, 10, 4.0)};
+  log.add("MAP", whole);
+  log.version = 9;
+  log.delta(false, {landmark(3, 11, 8.0)});
+  const auto maps = log.maps();
+  REQUIRE(maps.size() == 1);
+  CHECK(maps.at(3).map.landmarks.size() == 3);
+  CHECK(maps.at(3).missed == 1);
+}
+
+TEST_CASE("a drive becomes a map file", "[cli]") {
+  const TemporaryDirectory directory;
+  const std::string drive = (directory / "drive.lcm").string();
+  const std::string mapped = (directory / "mapped.lcm").string();
+  const std::string file = (directory / "maps.gpkg").string();
+  const auto run = [&](const std::string& arguments) {
+    const Outcome outcome = understory_command(directory, arguments);
+    CAPTURE(arguments, outcome.error);
+    return outcome;
+  };
+  REQUIRE(run("sim intermediate --length 30 --seed 5 --out " + drive).status == 0);
+  REQUIRE(
+      run("replay " + drive + " --config " UNDERSTORY_SOURCE_CONFIG " --out " + mapped).status ==
+      0);
+
+  CHECK_THAT(run("map import " + drive + " --out " + file).error, Contains("run replay first"));
+  CHECK_FALSE(std::filesystem::exists(file));
+  CHECK(run("map import " + mapped + " --map 3 --out " + file).status == 2);
+  REQUIRE(run("map import " + mapped + " --out " + file).status == 0);
+  CHECK(run("map check " + file).status == 0);
+  CHECK_THAT(run("map import " + mapped + " --out " + file).error, Contains("has a map 1 already"));
+
+  // The same map as `export` gives, in the same bytes.
+  REQUIRE(run("export " + mapped + " --format csv --out " + (directory / "a").string()).status ==
+          0);
+  REQUIRE(run("map export " + file + " --out " + (directory / "b").string()).status == 0);
+  for (const std::string name : {"landmarks.csv", "keyframes.csv"}) {
+    const std::string text = read_text(directory / "a" / name);
+    CHECK(lines(text) > 5);
+    CHECK(text == read_text(directory / "b" / "map-1" / name));
+  }
+
+  // Nothing has changed: a change without rows.
+  REQUIRE(run("map import --replace " + mapped + " --out " + file).status == 0);
+  const auto log = nlohmann::json::parse(run("map log --json " + file).out);
+  CHECK(log["changes"][1]["bytes"].get<int>() < 200);
+  CHECK_THAT(run("map diff " + file + " " + file).out, Contains(" 0 added, 0 removed, 0 moved"));
+}
+
+TEST_CASE("what is named as a log and is none ends with 1", "[cli]") {
+  const TemporaryDirectory directory;
+  const auto log = directory / "other.lcm";
+  write_bytes(log, Bytes(1000, 'x'));
+  const auto outcome = understory_command(
+      directory, "map import " + log.string() + " --out " + (directory / "m.gpkg").string());
+  CHECK(outcome.status == 1);
+  CHECK_THAT(outcome.error, Contains("other.lcm: no LCM log"));
+  CHECK_FALSE(std::filesystem::exists(directory / "m.gpkg"));
+}

@@ -1,0 +1,73 @@
+// What moved from one map to another.
+#include "common/map_file/difference.hpp"
+
+#include "tests/map_file/map_fixture.hpp"
+
+using namespace understory;
+using namespace understory::test;
+
+namespace {
+
+StoredMap map_of_points(const std::vector<std::pair<std::uint64_t, double>>& points,
+                        double sigma_m) {
+  StoredMap map;
+  for (const auto& [counter, x] : points) {
+    map_file::StoredLandmark one;
+    one.landmark.id = map_file::landmark_id(1, counter);
+    one.landmark.position_m.x() = x;
+    one.landmark.covariance_m2 = sigma_m * sigma_m * Eigen::Matrix2d::Identity();
+    map.landmarks.push_back(one);
+  }
+  return map;
+}
+
+}  // namespace
+
+TEST_CASE("landmarks are added, removed, moved beyond the quantile, kept", "[map_file]") {
+  // chi2 of the way: 0.2^2 / (2 * 0.1^2) = 2, 0.5^2 / (2 * 0.1^2) = 12.5; the 99 % quantile
+  // is 9.21.
+  const StoredMap before = map_of_points({{1, 0.0}, {2, 10.0}, {3, 20.0}, {5, 30.0}}, 0.1);
+  const StoredMap after = map_of_points({{2, 10.2}, {3, 20.5}, {4, 1.0}, {5, 30.0}}, 0.1);
+  const auto found = map_file::difference(before, after, 0.99);
+  CHECK(found.added == std::vector{map_file::landmark_id(1, 4)});
+  CHECK(found.removed == std::vector{map_file::landmark_id(1, 1)});
+  REQUIRE(found.moved.size() == 1);
+  CHECK(found.moved[0].id == map_file::landmark_id(1, 3));
+  CHECK(found.moved[0].distance_m == Approx(0.5));
+  CHECK(found.moved[0].chi2 == Approx(12.5));
+  CHECK(found.kept == 2);
+
+  CHECK(map_file::difference(before, after, 0.999).moved.empty());
+  CHECK(map_file::difference(before, after, 0.5).moved.size() == 2);
+  CHECK(map_file::chi2_of_quantile(0.99) == Approx(9.2103).margin(1e-3));
+}
+
+TEST_CASE("without covariances any move counts", "[map_file]") {
+  const auto found = map_file::difference(map_of_points({{1, 0.0}, {2, 1.0}}, 0.0),
+                                          map_of_points({{1, 1e-6}, {2, 1.0}}, 0.0), 0.999);
+  REQUIRE(found.moved.size() == 1);
+  CHECK(std::isinf(found.moved[0].chi2));
+  CHECK(found.kept == 1);
+}
+
+TEST_CASE("as many landmarks move as the quantile says, where errors are as stated", "[map_file]") {
+  std::mt19937_64 random(23);
+  std::normal_distribution<double> normal;
+  const std::size_t count = 20'000;
+  StoredMap before;
+  StoredMap after;
+  for (std::size_t i = 1; i <= count; ++i) {
+    for (StoredMap* const map : {&before, &after}) {
+      map_file::StoredLandmark one;
+      one.landmark.id = map_file::landmark_id(1, i);
+      Eigen::Matrix2d root;
+      root << 0.1, 0.0, 0.05, 0.2;
+      const double x = normal(random);
+      one.landmark.position_m = root * Eigen::Vector2d(x, normal(random));
+      one.landmark.covariance_m2 = root * root.transpose();
+      map->landmarks.push_back(one);
+    }
+  }
+  const auto moved = map_file::difference(before, after, 0.95).moved.size();
+  CHECK(static_cast<double>(moved) == Approx(0.05 * count).margin(5.0 * std::sqrt(0.05 * count)));
+}
