@@ -6,6 +6,7 @@
 #include "common/model/held_map.hpp"
 #include "services/geoslam_mapper/adapter_parameters.hpp"
 #include "services/geoslam_mapper/geoslam_mapper.hpp"
+#include "services/geoslam_mapper/given_map.hpp"
 #include "services/geoslam_mapper/health_watch.hpp"
 #include "services/geoslam_mapper/map_budget.hpp"
 #include "services/geoslam_mapper/map_difference.hpp"
@@ -38,7 +39,7 @@ std::size_t map_bytes(std::size_t landmarks, std::size_t keyframes) {
          keyframes * wire::element_bytes<keyframe_pose_t>();
 }
 
-constexpr state::Format kFormat{"geoslam_mapper", 5};
+constexpr state::Format kFormat{"geoslam_mapper", 6};
 
 /// What a holder of every MAP_DELTA has.
 struct KnownMap {
@@ -91,6 +92,7 @@ class MapperAdapter : public bus::Adapter {
     node_ = &node;
     stage_ = make_mapper(parameters_);
     memory_ = empty_memory();
+    if (!input_.map_file.empty()) begin_with(read_given_map(input_.map_file, input_.map_id));
     subscribe(node);
     advertise(node);
     node.every(static_cast<model::Utime>(output_.map_period_s * 1e6),
@@ -156,6 +158,35 @@ class MapperAdapter : public bus::Adapter {
     node.subscribe<map_request_t>(channels_.map_request,
                                   [this](const map_request_t& request) { answer(request); },
                                   {.queue_size = 4, .sequenced = false, .journaled = false});
+
+    // From another time, and not of a sequence.
+    const auto most_given = static_cast<std::size_t>(input_.max_given_landmarks);
+    node.subscribe<model::WholeMap>(channels_.given_map,
+                                    [this](const model::WholeMap& map) { take_given(map); },
+                                    {.queue_size = 2,
+                                     .sequenced = false,
+                                     .timed = false,
+                                     .most_bytes = map_bytes(most_given, most_given)});
+  }
+
+  /// Only in the beginning: a map that exists is not replaced.
+  void take_given(const model::WholeMap& map) {
+    std::string reason = why_not_given(map);
+    if (memory_.known.map_id != 0) reason = "a map is there already";
+    if (reason.empty()) return begin_with(map.landmarks);
+    node_->report(wire::Reason::kInputRefused, "a given map was not taken: " + reason,
+                  channels_.given_map);
+  }
+
+  void begin_with(const std::vector<model::MapLandmark>& landmarks) {
+    stage_->start_with(landmarks);
+    (void)stage_->take_changed_landmarks();
+    memory_.known.map_id = model::map_of(landmarks.front().id);
+    memory_.known.landmarks = stage_->landmarks();
+    ++memory_.known.version;
+    memory_.map_is_published = false;
+    memory_.map_is_due = true;
+    memory_.health.must_find_map();
   }
 
   void advertise(bus::Node& node) {
@@ -306,8 +337,9 @@ class MapperAdapter : public bus::Adapter {
 bus::Service geoslam_mapper_service(const MapperChannels& channels) {
   return {"geoslam_mapper",
           channels.keyframe + ", " + channels.landmarks + ", " + channels.odometry + ", " +
-              channels.ekf_pose + ", " + channels.ekf_level + " -> " + channels.slam_pose + ", " +
-              channels.slam_update + ", " + channels.map + ", " + channels.map_delta,
+              channels.ekf_pose + ", " + channels.ekf_level + ", " + channels.given_map + " -> " +
+              channels.slam_pose + ", " + channels.slam_update + ", " + channels.map + ", " +
+              channels.map_delta,
           [channels] { return std::make_unique<MapperAdapter>(channels); }};
 }
 

@@ -16,6 +16,7 @@ struct MapperChannels {
   std::string ekf_pose = "EKF_POSE";
   std::string ekf_level = "EKF_LEVEL";
   std::string map_request = "MAP_REQUEST";
+  std::string given_map = "GIVEN_MAP";
   // Out.
   std::string slam_pose = "SLAM_POSE";
   std::string slam_update = "SLAM_UPDATE";

@@ -167,11 +167,20 @@ void describe(MapperParameters& parameters, bus::ParameterTable& table) {
 }
 
 void describe(MapperInputParameters& parameters, bus::ParameterTable& table) {
+  table.add(
+      "input.map_file", parameters.map_file, {},
+      "Map file (GeoPackage, see understory map) to begin with; relative to the folder in which "
+      "the process was started. With smoothing.localisation_only it stays as it is; else it "
+      "grows. Empty: a new map. A saved state goes before it.");
+  table.add("input.map_id", parameters.map_id, {0, 32767}, "",
+            "Number of the map in that file. 0: the file has one alone.");
   table.add("input.max_detections", parameters.max_detections, {1, 1000000}, "",
             "LANDMARKS with more detections is refused and counted (too_large): what a message may "
             "cost is bounded. A laser of 2048 columns cannot show 700 trunks.");
   table.add("input.max_keyframe_landmarks", parameters.max_keyframe_landmarks, {1, 1000000}, "",
             "The same for the landmarks of a KEYFRAME; more than 64 members take their room.");
+  table.add("input.max_given_landmarks", parameters.max_given_landmarks, {1, 10000000}, "",
+            "The same for the landmarks of a GIVEN_MAP.");
 }
 
 void describe(MapperOutputParameters& parameters, bus::ParameterTable& table) {

@@ -1,15 +1,20 @@
 // The mapper's parameters as a list: keys, units, ranges, meanings.
 #pragma once
 
+#include <string>
+
 #include "common/bus/parameter_table.hpp"
 #include "services/geoslam_mapper/parameters.hpp"
 
 namespace understory::geoslam_mapper {
 
-/// How much one message may hold; documented as MapperParameters is.
+/// What to begin with, and how much one message may hold; documented as MapperParameters is.
 struct MapperInputParameters {
+  std::string map_file;  ///< Empty: none.
+  int map_id = 0;        ///< 0: the only one in the file.
   int max_detections = 2000;
   int max_keyframe_landmarks = 1000;
+  int max_given_landmarks = 200000;
 };
 
 /// What the adapter decides itself; documented as MapperParameters is.

@@ -47,7 +47,9 @@ void HealthWatch::add(const model::MapUpdate& update) {
   if (is_another) last_.reset();
 
   const bool is_localised = update.status == kFirstMap || update.status == kUpdated;
-  lost_.condition.add(!is_localised);
+  const int weight = must_find_map_ && !is_localised ? parameters_.lost.raise_at : 1;
+  for (int i = 0; i < weight; ++i) lost_.condition.add(!is_localised);
+  must_find_map_ = must_find_map_ && !is_localised;
   rolled_back_.condition.add(update.status == kRolledBack);
   if (!is_localised) return;
 

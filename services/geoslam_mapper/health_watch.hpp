@@ -46,6 +46,9 @@ class HealthWatch {
   /// All is well so far.
   explicit HealthWatch(const HealthParameters& parameters = {});
 
+  /// A map was given: until a keyframe is found in it, the first one without a certain pose is
+  /// enough for `lost`.
+  void must_find_map() { must_find_map_ = true; }
   /// What became of a keyframe.
   void add(const model::MapUpdate& update);
   /// The filter's pose, to compare motions.
@@ -59,7 +62,7 @@ class HealthWatch {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.lost_, self.rolled_back_, self.diverged_, self.contradicts_, self.refused_,
-      self.new_map_, self.filter_, self.last_, self.map_id_);
+      self.new_map_, self.filter_, self.last_, self.map_id_, self.must_find_map_);
   }
 
  private:
@@ -75,6 +78,7 @@ class HealthWatch {
   smoothing::FilterTrack filter_;
   std::optional<CertainKeyframe> last_;
   std::uint32_t map_id_ = 0;  ///< 0 before the first keyframe.
+  bool must_find_map_ = false;
 };
 
 }  // namespace understory::geoslam_mapper

@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
           .ekf_pose = "EKF_POSE",        // in: a gate, where a filter runs
           .ekf_level = "EKF_LEVEL",      // in: error of the sweeps' level, likewise
           .map_request = "MAP_REQUEST",  // in: asks for MAP now
+          .given_map = "GIVEN_MAP",      // in: a map to begin with
           .slam_pose = "SLAM_POSE",      // out: the vehicle's pose at each sweep
           .slam_update = "SLAM_UPDATE",  // out: what became of each keyframe
           .map = "MAP",                  // out: the whole map, rarely and on request

@@ -1,0 +1,262 @@
+// A drive that begins in a map which somebody made before.
+#include <Eigen/Cholesky>
+#include <filesystem>
+#include <memory>
+
+#include "common/bus/memory_bus.hpp"
+#include "common/map_file/map_file.hpp"
+#include "common/model/slam_output.hpp"
+#include "common/wire/convert.hpp"
+#include "services/geoslam_mapper/adapter.hpp"
+#include "services/geoslam_mapper/given_map.hpp"
+#include "services/keyframer/adapter.hpp"
+#include "sim/drive.hpp"
+#include "tests/catch.hpp"
+#include "tests/io/log_fixture.hpp"
+#include "understory/health_t.hpp"
+#include "understory/map_request_t.hpp"
+
+using namespace understory;
+using Catch::Matchers::Contains;
+
+namespace {
+
+constexpr double kSurveySigma_m = 0.02;
+
+sim::Drive drive_through(std::uint64_t seed, double length_m = 60.0) {
+  sim::DriveParameters parameters;
+  parameters.forest = sim::forest_parameters(sim::ForestKind::kIntermediate);
+  parameters.forest.side_m = 300.0;
+  parameters.path.length_m = length_m;
+  return {parameters, seed};
+}
+
+/// Every trunk of the drive's forest, surveyed; frame world, map 7.
+std::vector<model::MapLandmark> survey(const sim::Drive& drive, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> error(0.0, kSurveySigma_m);
+  std::vector<model::MapLandmark> result;
+  for (const Eigen::Vector2d& trunk : drive.forest().trunks_m) {
+    model::MapLandmark one;
+    one.id = map_file::landmark_id(7, result.size() + 1);
+    one.position_m = trunk + Eigen::Vector2d(error(random), error(random));
+    one.covariance_m2 = kSurveySigma_m * kSurveySigma_m * Eigen::Matrix2d::Identity();
+    result.push_back(one);
+  }
+  return result;
+}
+
+/// A file with this map as number 7, and an empty one as number 8 where `has_two`.
+std::filesystem::path file_of(const std::vector<model::MapLandmark>& landmarks,
+                              const test::TemporaryDirectory& folder, bool has_two = false) {
+  map_file::StoredMap map;
+  map.map_id = 7;
+  for (const model::MapLandmark& one : landmarks) map.landmarks.push_back({one, {}, {}});
+  std::vector<map_file::StoredMap> maps{map};
+  if (has_two) maps.emplace_back().map_id = 8;
+  const std::filesystem::path file = folder.path() / "survey.gpkg";
+  map_file::create_map_file(file, maps, {0, "test", "", "surveyed"});
+  return file;
+}
+
+std::string toml_of(const std::filesystem::path& file, bool localisation_only) {
+  return "[input]\nmap_file = \"" + file.string() +
+         "\"\n[smoothing]\nlocalisation_only = " + (localisation_only ? "true" : "false") + "\n";
+}
+
+/// Keyframer and mapper on one bus, and what they say.
+class Stack {
+ public:
+  explicit Stack(const std::string& mapper_toml) {
+    host(keyframer::keyframer_service(), "");
+    host(geoslam_mapper::geoslam_mapper_service(), mapper_toml);
+  }
+
+  template <class Message>
+  void feed(const std::string& channel, const Message& message) {
+    bus_.publish(channel, wire::encode_message(message));
+    bus_.drain();
+    hosted_.back()->node().publish_health();
+    bus_.drain();
+  }
+  void drive(const sim::Drive& drive) {
+    for (std::size_t k = 0; k < drive.size(); ++k) feed("LANDMARKS", drive.scan(k).scan);
+  }
+  model::WholeMap asked() {
+    map_request_t request{};
+    request.everything = 1;
+    feed("MAP_REQUEST", request);
+    return *map;
+  }
+
+  std::vector<model::SlamPose> poses;
+  std::vector<model::MapUpdate> updates;
+  std::optional<model::WholeMap> map;
+  std::optional<model::Utime> lost_since;  ///< First HEALTH of the mapper that says so.
+  int refused_maps = 0;
+
+ private:
+  void host(const bus::Service& service, const std::string& toml) {
+    hosted_.push_back(std::make_unique<bus::HostedService>(service, bus_, bus::no_clock(), toml,
+                                                           service.name + ".toml"));
+    hosted_.back()->node().connect();
+  }
+  void hear(const bus::BusMessage& message) {
+    if (message.channel == "SLAM_POSE") {
+      poses.push_back(wire::decode_message<model::SlamPose>(message.bytes).value());
+    } else if (message.channel == "SLAM_UPDATE") {
+      updates.push_back(wire::decode_message<model::MapUpdate>(message.bytes).value());
+    } else if (message.channel == "MAP") {
+      map = wire::decode_message<model::WholeMap>(message.bytes).value();
+    } else if (message.channel == "HEALTH") {
+      hear_health(message);
+    }
+  }
+  void hear_health(const bus::BusMessage& message) {
+    health_t health;
+    REQUIRE(health.decode(message.bytes.data(), 0, static_cast<int>(message.bytes.size())) > 0);
+    if (health.process != "geoslam_mapper") return;
+    for (const reason_count_t& reason : health.reasons) {
+      if (reason.reason == "lost" && !lost_since) lost_since = health.message_utime;
+      if (reason.reason == "input_refused") refused_maps = 1;
+    }
+  }
+
+  bus::MemoryBus bus_{bus::MemoryBus::Queues::kUnlimited,
+                      [this](const bus::BusMessage& message) { hear(message); }};
+  std::vector<std::unique_ptr<bus::HostedService>> hosted_;
+};
+
+/// RMS of the localised poses [m], and their mean NEES; all must be in map 7.
+std::pair<double, double> errors(const Stack& stack, const sim::Drive& drive) {
+  double squared = 0.0;
+  double nees = 0.0;
+  double count = 0.0;
+  for (const model::SlamPose& pose : stack.poses) {
+    if (!pose.is_localised()) continue;
+    REQUIRE(pose.map_id == 7);
+    std::size_t k = 0;
+    while (drive.utime(k) < pose.utime) ++k;
+    const Eigen::Vector3d error =
+        (drive.world_T_vehicle()[k].inverse() * pose.map_T_vehicle()).Log();
+    squared += error.head<2>().squaredNorm();
+    nees += error.dot(pose.covariance.ldlt().solve(error));
+    count += 1.0;
+  }
+  REQUIRE(count > 0.95 * static_cast<double>(drive.size()));
+  return {std::sqrt(squared / count), nees / count};
+}
+
+}  // namespace
+
+TEST_CASE("A drive begins anywhere in a surveyed map, and leaves it as it is", "[given_map]") {
+  for (std::uint64_t seed = 50; seed < 54; ++seed) {
+    CAPTURE(seed);
+    const test::TemporaryDirectory folder;
+    const sim::Drive drive = drive_through(seed);
+    const std::vector<model::MapLandmark> surveyed = survey(drive, seed);
+    Stack stack(toml_of(file_of(surveyed, folder), true));
+    stack.drive(drive);
+
+    const auto [rms_m, nees] = errors(stack, drive);
+    CHECK(rms_m < 0.15);
+    CHECK(nees < 6.0);
+    CHECK(stack.updates.front().status == model::MapUpdateStatus::kUpdated);
+    CHECK_FALSE(stack.updates.front().used_prior);
+    CHECK_FALSE(stack.lost_since);
+
+    const model::WholeMap after = stack.asked();
+    REQUIRE(after.landmarks.size() == surveyed.size());
+    for (std::size_t i = 0; i < surveyed.size(); ++i) {
+      CHECK(after.landmarks[i].id == surveyed[i].id);
+      CHECK(after.landmarks[i].position_m == surveyed[i].position_m);
+      CHECK(after.landmarks[i].covariance_m2 == surveyed[i].covariance_m2);
+    }
+  }
+}
+
+TEST_CASE("In somebody else's map the mapper says that it is lost, within 2 s", "[given_map]") {
+  for (const bool localisation_only : {true, false}) {
+    for (std::uint64_t seed = 60; seed < 64; ++seed) {
+      CAPTURE(seed, localisation_only);
+      const test::TemporaryDirectory folder;
+      const sim::Drive drive = drive_through(seed);
+      const auto foreign = survey(drive_through(seed + 100, 10.0), seed);
+      Stack stack(toml_of(file_of(foreign, folder), localisation_only));
+      stack.drive(drive);
+
+      for (const model::SlamPose& pose : stack.poses)
+        CHECK((!pose.is_localised() || (pose.map_id == 8 && !localisation_only)));
+      REQUIRE(stack.lost_since);
+      CHECK(*stack.lost_since - drive.utime(0) <= 2'000'000);
+      // Who may map begins another map.
+      CHECK((stack.asked().landmarks.front().id >> model::kLandmarkCounterBits) ==
+            (localisation_only ? 7U : 8U));
+    }
+  }
+}
+
+TEST_CASE("A given map by message is taken in the beginning alone, and grows", "[given_map]") {
+  const sim::Drive drive = drive_through(70);
+  std::vector<model::MapLandmark> half = survey(drive, 70);
+  std::erase_if(half, [](const model::MapLandmark& one) { return one.id % 2 == 0; });
+  model::WholeMap given;
+  given.landmarks = half;
+  given.utime = 5'000'000'000;  // another day
+  Stack stack("");
+
+  SECTION("whole") {
+    stack.feed("GIVEN_MAP", given);
+    stack.drive(drive);
+    const auto [rms_m, nees] = errors(stack, drive);
+    CHECK(rms_m < 0.15);
+    CHECK(nees < 6.0);
+    const model::WholeMap after = stack.asked();
+    CHECK(after.landmarks.size() > half.size());
+    CHECK(after.landmarks.back().id > half.back().id);
+    CHECK(model::map_of(after.landmarks.back().id) == 7);
+    CHECK(stack.refused_maps == 0);
+  }
+  SECTION("when there is one") {
+    for (std::size_t k = 0; k < 20; ++k) stack.feed("LANDMARKS", drive.scan(k).scan);
+    stack.feed("GIVEN_MAP", given);
+    CHECK(stack.refused_maps == 1);
+    CHECK(model::map_of(stack.asked().landmarks.front().id) == 1);
+  }
+}
+
+TEST_CASE("A message that is no map to begin with is refused with the reason", "[given_map]") {
+  model::WholeMap map;
+  map.landmarks = survey(drive_through(71, 10.0), 71);
+  map.landmarks.resize(5);
+  CHECK(geoslam_mapper::why_not_given(map).empty());
+
+  model::WholeMap cut = map;
+  cut.complete = false;
+  CHECK_THAT(geoslam_mapper::why_not_given(cut), Contains("cut"));
+  model::WholeMap empty = map;
+  empty.landmarks.clear();
+  CHECK_THAT(geoslam_mapper::why_not_given(empty), Contains("no landmark"));
+  model::WholeMap mixed = map;
+  mixed.landmarks.back().id = map_file::landmark_id(8, 1);
+  CHECK_THAT(geoslam_mapper::why_not_given(mixed), Contains("one map"));
+  model::WholeMap twice = map;
+  twice.landmarks[1].id = twice.landmarks[0].id;
+  CHECK_THAT(geoslam_mapper::why_not_given(twice), Contains("ascend"));
+  model::WholeMap impossible = map;
+  impossible.landmarks[2].covariance_m2 << 1.0, 2.0, 2.0, 1.0;
+  CHECK_THAT(geoslam_mapper::why_not_given(impossible), Contains("cannot be"));
+  impossible.landmarks[2].covariance_m2.setConstant(std::nan(""));
+  CHECK_THAT(geoslam_mapper::why_not_given(impossible), Contains("cannot be"));
+}
+
+TEST_CASE("A map file that cannot be begun with is named", "[given_map]") {
+  const test::TemporaryDirectory folder;
+  CHECK_THROWS_WITH(geoslam_mapper::read_given_map((folder.path() / "none.gpkg").string(), 0),
+                    Contains("none.gpkg"));
+  const auto file = file_of(survey(drive_through(72, 10.0), 72), folder, true).string();
+  CHECK_THROWS_WITH(geoslam_mapper::read_given_map(file, 0), Contains("map 7, 8; say which one"));
+  CHECK_THROWS_WITH(geoslam_mapper::read_given_map(file, 3), Contains("input.map_id is 3"));
+  CHECK_THROWS_WITH(geoslam_mapper::read_given_map(file, 8), Contains("map 8 has no landmark"));
+  CHECK(geoslam_mapper::read_given_map(file, 7).size() > 100);
+}
