@@ -196,6 +196,33 @@ TEST_CASE("In somebody else's map the mapper says that it is lost, within 2 s", 
   }
 }
 
+TEST_CASE("A map that is wrong and certain of it is left for one that keyframes agree on",
+          "[given_map]") {
+  for (std::uint64_t seed = 80; seed < 84; ++seed) {
+    CAPTURE(seed);
+    const test::TemporaryDirectory folder;
+    const sim::Drive drive = drive_through(seed, 120.0);
+    std::vector<model::MapLandmark> wrong = survey(drive, seed);
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> error(0.0, 0.25);
+    for (model::MapLandmark& one : wrong) {
+      one.position_m += Eigen::Vector2d(error(random), error(random));
+      one.covariance_m2 = 1e-4 * Eigen::Matrix2d::Identity();
+    }
+    Stack stack(toml_of(file_of(wrong, folder), false));
+    stack.drive(drive);
+
+    int in_row = 0;
+    int longest = 0;
+    for (const model::MapUpdate& update : stack.updates) {
+      in_row = update.status == model::MapUpdateStatus::kRolledBack ? in_row + 1 : 0;
+      longest = std::max(longest, in_row);
+    }
+    CHECK(longest <= 12);
+    CHECK(stack.updates.back().status == model::MapUpdateStatus::kUpdated);
+  }
+}
+
 TEST_CASE("A given map by message is taken in the beginning alone, and grows", "[given_map]") {
   const sim::Drive drive = drive_through(70);
   std::vector<model::MapLandmark> half = survey(drive, 70);

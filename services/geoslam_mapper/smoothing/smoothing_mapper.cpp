@@ -9,10 +9,13 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-constexpr state::Format kFormat{"geoslam_mapper.smoothing", 10};
+constexpr state::Format kFormat{"geoslam_mapper.smoothing", 11};
 /// Two keyframes contradict each other where their motion in a trial map differs from the tracked
 /// one by more than so many of its standard deviations.
 constexpr double kTrackSigmas = 4.0;
+/// Keyframes that the map in use contradicts, one after the other, from which on it is not
+/// believed: they may agree with each other.
+constexpr std::uint32_t kContradicted = 8;
 /// Ids of maps stay positive in the 16 bit that landmark ids have for them.
 constexpr std::uint32_t kMostMaps = 0x7fff;
 
@@ -50,8 +53,10 @@ model::MapUpdate SmoothingMapper::add(const model::Keyframe& keyframe) {
   last_utime_ = keyframe.utime;
 
   model::MapUpdate update = current_.add(keyframe);
+  count_contradictions(update);
   update.is_lost =
-      update.status == kNotSure && (current_.map().empty() || !current_.reaches(keyframe));
+      contradictions_ >= kContradicted ||
+      (update.status == kNotSure && (current_.map().empty() || !current_.reaches(keyframe)));
   if (may_try_another(update)) {
     try_another(keyframe, update);
   } else {
@@ -59,6 +64,13 @@ model::MapUpdate SmoothingMapper::add(const model::Keyframe& keyframe) {
   }
   update.is_provisional = current_.is_provisional();
   return update;
+}
+
+/// Keyframes without a place say nothing of the map.
+void SmoothingMapper::count_contradictions(const model::MapUpdate& update) {
+  using enum model::MapUpdateStatus;
+  if (update.status == kRolledBack) ++contradictions_;
+  if (update.status == kUpdated || update.status == kFirstMap) contradictions_ = 0;
 }
 
 std::string SmoothingMapper::malformed(const model::Keyframe& keyframe) const {
@@ -125,12 +137,14 @@ void SmoothingMapper::adopt_trial(model::MapUpdate& update) {
     update.reason =
         "map " + std::to_string(left) + " is dropped: no keyframe agreed with its first";
   } else {
-    update.reason = "lost: map " + std::to_string(left) + " is kept as it is";
+    update.reason = (contradictions_ > 0 ? "contradicted" : "lost") +
+                    (": map " + std::to_string(left)) + " is kept as it is";
     for (const std::uint32_t id : kept_maps_.add(current_.keep()))
       update.reason += ", map " + std::to_string(id) + " is forgotten";
   }
   current_ = std::move(*trial_);
   trial_.reset();
+  contradictions_ = 0;
 
   update.status = model::MapUpdateStatus::kFirstMap;
   update.added.clear();

@@ -53,7 +53,7 @@ class SmoothingMapper final : public MapperMethod {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     bool has_trial = self.trial_ != nullptr;
-    a(self.current_, self.kept_maps_, self.last_utime_, has_trial);
+    a(self.current_, self.kept_maps_, self.last_utime_, self.contradictions_, has_trial);
     if constexpr (Archive::kReads) {
       if (has_trial) self.trial_ = std::make_unique<OneMap>(self.parameters_);
     }
@@ -62,6 +62,7 @@ class SmoothingMapper final : public MapperMethod {
 
  private:
   std::string malformed(const model::Keyframe& keyframe) const;
+  void count_contradictions(const model::MapUpdate& update);
   bool may_try_another(const model::MapUpdate& update) const;
   void try_another(const model::Keyframe& keyframe, model::MapUpdate& update);
   bool agrees(const model::Keyframe& keyframe, const model::MapUpdate& update,
@@ -79,6 +80,7 @@ class SmoothingMapper final : public MapperMethod {
   std::unique_ptr<OneMap> trial_;  ///< Null where the vehicle is not lost.
   MapArchive kept_maps_;
   std::optional<model::Utime> last_utime_;  ///< Of the last well-formed keyframe.
+  std::uint32_t contradictions_ = 0;        ///< Keyframes rolled back since the last one accepted.
 };
 
 /// A SmoothingMapper with an empty map.
