@@ -40,6 +40,15 @@ double heap_mib() {
   return static_cast<double>(info.uordblks + info.hblkhd) / (1024.0 * 1024.0);
 }
 
+/// What the measurement itself keeps: the lap that is recorded.
+double mib_of(const RecordedLap& recorded) {
+  constexpr std::size_t kOfABlock = 16;  // that the allocator adds
+  std::size_t bytes = recorded.messages.capacity() * sizeof(harness::RawMessage) + kOfABlock;
+  for (const harness::RawMessage& message : recorded.messages)
+    bytes += message.bytes.capacity() + kOfABlock;
+  return static_cast<double>(bytes) / (1024.0 * 1024.0);
+}
+
 /// The mapper's configuration with the radius of known ground that the options ask for.
 std::map<std::string, std::string> toml_instead(const LapsOptions& options) {
   if (options.known_ground_m < 0.0) return {};
@@ -182,6 +191,7 @@ void drive_laps(const LapsOptions& options, const std::atomic<bool>& stop, Progr
   Recorder recorder(chain, progress.recorded);
   const auto end_lap = [&](int number, double hours) {
     laps.push_back(counter.take(number, hours));
+    laps.back().heap_mib -= mib_of(progress.recorded);
     progress.states = chain.save();
     laps.back().mapper_state_mib = mib_of(progress.states.at(kMapper));
     progress.map_T_world = counter.map_T_world();
@@ -248,6 +258,7 @@ void repeat_lap(const LapsOptions& options, const std::atomic<bool>& stop, Progr
     const auto rows = static_cast<int>(progress.stretches.size());
     if (hours < kStretch_h * (rows + 1) && hours < options.hours) continue;
     progress.stretches.push_back(counter.take(rows + 1, hours));
+    progress.stretches.back().heap_mib -= mib_of(progress.recorded);
     progress.states = chain.save();
     progress.stretches.back().mapper_state_mib = mib_of(progress.states.at(kMapper));
     progress.map_T_world = counter.map_T_world();

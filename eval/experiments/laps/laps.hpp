@@ -31,9 +31,9 @@ struct LapsOptions {
 
 /// One lap, or one stretch of the hours that follow.
 struct Lap {
-  int number = 0;                 ///< From 1.
-  double hours = 0.0;             ///< Of driving, at its end.
-  double heap_mib = 0.0;          ///< In use at its end, of all stages together.
+  int number = 0;         ///< From 1.
+  double hours = 0.0;     ///< Of driving, at its end.
+  double heap_mib = 0.0;  ///< In use at its end, of all stages together, without the recorded lap.
   double mapper_state_mib = 0.0;  ///< As the mapper saves itself.
   double mapper_p99_ms = 0.0;
   double mapper_largest_ms = 0.0;
