@@ -1,4 +1,4 @@
-// `understory map info|check|import|export|log|revert|diff`: stored maps.
+// `understory map info|check|import|export|log|revert|accept|diff`: stored maps.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
@@ -115,6 +115,13 @@ void map_revert(const MapOptions& options) {
   fmt::print("{}: as it was after change {} (change {})\n", options.file, options.to, number);
 }
 
+void map_accept(const MapOptions& options) {
+  MapFile file(options.file, Access::kWrite);
+  const std::uint64_t number = file.accept(
+      note_now("understory map accept", "another program", "what another program changed"));
+  fmt::print("{}: what another program changed is change {} now\n", options.file, number);
+}
+
 /// An empty one where the file has none of this number.
 map_file::StoredMap map_or_nothing(const MapFile& file, const std::set<std::uint32_t>& ids,
                                    std::uint32_t id) {
@@ -229,6 +236,7 @@ void add_map_command(CLI::App& parent) {
   add("revert", "All maps as they were after a change; that is a change, too", map_revert)
       ->add_option("--to", options->to, "Number of the change; 0: before the first one")
       ->required();
+  add("accept", "Takes what another program changed (QGIS, say) over as a change", map_accept);
   auto* diff = add("diff", "Landmarks added, removed and moved from one file to another", map_diff);
   diff->add_option("other", options->other, "The later map file")->required();
   diff->add_option("--quantile", options->quantile,

@@ -1,5 +1,6 @@
 // `understory map` as a user calls it.
 #include <fmt/format.h>
+#include <sqlite3.h>
 
 #include <nlohmann/json.hpp>
 
@@ -125,6 +126,23 @@ TEST_CASE_METHOD(Maps, "log lists the changes, revert takes them back", "[cli]")
   refused("revert --to 17 " + file, {"maps.gpkg: has no change 17, the latest one is 3"});
   CHECK(run("revert " + file).status == 2);
   fine("check " + file);
+}
+
+TEST_CASE_METHOD(Maps, "edits of another program are accepted when asked", "[cli]") {
+  fine("import " + table + " --out " + file);
+  refused("accept " + file, {"maps.gpkg: its maps are what its history says"});
+  sqlite3* other = nullptr;
+  REQUIRE(sqlite3_open(file.c_str(), &other) == SQLITE_OK);
+  const char* const edit = "UPDATE understory_maps SET name = 'thinned'";
+  CHECK(sqlite3_exec(other, edit, nullptr, nullptr, nullptr) == SQLITE_OK);
+  sqlite3_close(other);
+  CHECK_THAT(run("check " + file).out, Contains("changed by another program"));
+
+  CHECK_THAT(fine("accept " + file).out, Contains("is change 2 now"));
+  fine("check " + file);
+  CHECK(json("info " + file)["maps"][0]["name"] == "thinned");
+  fine("revert --to 1 " + file);
+  CHECK(json("info " + file)["maps"][0]["name"] == "stems");
 }
 
 TEST_CASE_METHOD(Maps, "diff tells what was added, removed and moved", "[cli]") {
