@@ -158,6 +158,7 @@ TEST_CASE_METHOD(Maps, "diff tells what was added, removed and moved", "[cli]") 
   CHECK(back["maps"][0]["added"].size() == 1);
   CHECK(back["maps"][0]["moved"].size() == 2);
   CHECK(back["quantile"] == 0.05);
+  CHECK(back["unknown_sigma_m"] == 0.1);
   CHECK(run("diff " + file + " " + later + " --quantile 2").status == 2);
   refused("diff " + file + " " + later + "x", {"later.gpkgx"});
 }
