@@ -108,6 +108,19 @@ void check_maps(const Connection& connection, Findings& findings) {
   }
 }
 
+/// Maps that are what their checksums say, and not what the history leads to.
+void check_against_history(const Connection& connection, Findings& findings) {
+  const auto recorded = recorded_content(connection);
+  for (const std::uint32_t id : map_ids(*recorded)) {
+    const std::string stated = stated_checksum(connection, id);
+    if (stated.empty()) {
+      findings.push_back(fmt::format("map {}: is gone, and no change says so", id));
+    } else if (stated != checksum_of(*recorded, id) && stated == checksum_of(connection, id)) {
+      findings.push_back(fmt::format("map {}: is not what the history says", id));
+    }
+  }
+}
+
 }  // namespace
 
 Findings findings_in(const Connection& connection) {
@@ -133,6 +146,7 @@ Findings findings_in(const Connection& connection) {
   part([&] {
     const Findings faults = faults_of_history(connection);
     findings.insert(findings.end(), faults.begin(), faults.end());
+    if (faults.empty()) check_against_history(connection, findings);
   });
   return findings;
 }

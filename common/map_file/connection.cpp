@@ -151,16 +151,22 @@ void Statement::put(int index, std::nullopt_t /*nothing*/) {
 Connection::Connection(const std::filesystem::path& place, Access access,
                        std::filesystem::path file)
     : file_(std::move(file)) {
-  sqlite3* handle = nullptr;
-  const int flags = access == Access::kRead ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE;
   // An absolute path: a name that begins with "file:" would be taken for a URI.
-  const std::string path = std::filesystem::absolute(place).string();
+  open(std::filesystem::absolute(place).string(),
+       access == Access::kRead ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE);
+  set_up(handle_.get(), access);
+}
+
+Connection::Connection(std::filesystem::path file) : file_(std::move(file)) {
+  open(":memory:", SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
+}
+
+void Connection::open(const std::string& path, int flags) {
+  sqlite3* handle = nullptr;
   const int result = sqlite3_open_v2(path.c_str(), &handle, flags, nullptr);
   handle_.reset(handle);
   if (handle == nullptr) throw std::bad_alloc();
-
   if (result != SQLITE_OK) fail();
-  set_up(handle, access);
   register_geometry_functions(handle);
 }
 

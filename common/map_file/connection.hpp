@@ -98,6 +98,8 @@ class Connection {
   /// Opens the existing file `place`, which errors call `file`; nothing is read yet. Views and
   /// triggers that a file brings along reach nothing outside of it. Throws MapFileError.
   Connection(const std::filesystem::path& place, Access access, std::filesystem::path file);
+  /// An empty database in memory. Throws MapFileError.
+  explicit Connection(std::filesystem::path file);
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
@@ -120,6 +122,8 @@ class Connection {
   [[noreturn]] void damaged(const std::string& what) const;
 
  private:
+  void open(const std::string& path, int flags);
+
   std::filesystem::path file_;
   std::unique_ptr<sqlite3, ConnectionCloser> handle_;
 };

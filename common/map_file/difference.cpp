@@ -7,9 +7,16 @@
 namespace understory::map_file {
 namespace {
 
-MovedLandmark move_of(const model::MapLandmark& before, const model::MapLandmark& after) {
+Eigen::Matrix2d covariance_of(const model::MapLandmark& landmark, double unknown_sigma_m) {
+  if (!landmark.covariance_m2.isZero(0.0)) return landmark.covariance_m2;
+  return unknown_sigma_m * unknown_sigma_m * Eigen::Matrix2d::Identity();
+}
+
+MovedLandmark move_of(const model::MapLandmark& before, const model::MapLandmark& after,
+                      double unknown_sigma_m) {
   const Eigen::Vector2d way = after.position_m - before.position_m;
-  const Eigen::Matrix2d covariance = before.covariance_m2 + after.covariance_m2;
+  const Eigen::Matrix2d covariance =
+      covariance_of(before, unknown_sigma_m) + covariance_of(after, unknown_sigma_m);
   MovedLandmark move{after.id, way.norm(), 0.0};
   if (move.distance_m == 0.0) return move;
 
@@ -23,9 +30,10 @@ MovedLandmark move_of(const model::MapLandmark& before, const model::MapLandmark
 
 double chi2_of_quantile(double quantile) { return -2.0 * std::log1p(-quantile); }
 
-MapDifference difference(const StoredMap& before, const StoredMap& after, double quantile) {
+MapDifference difference(const StoredMap& before, const StoredMap& after,
+                         const DifferenceLimits& limits) {
   MapDifference result;
-  const double limit = chi2_of_quantile(quantile);
+  const double limit = chi2_of_quantile(limits.quantile);
   auto old = before.landmarks.begin();
   const auto end = before.landmarks.end();
 
@@ -37,7 +45,7 @@ MapDifference difference(const StoredMap& before, const StoredMap& after, double
       continue;
     }
 
-    const MovedLandmark move = move_of(old->landmark, one.landmark);
+    const MovedLandmark move = move_of(old->landmark, one.landmark, limits.unknown_sigma_m);
     if (move.chi2 > limit) {
       result.moved.push_back(move);
     } else {

@@ -24,6 +24,13 @@ struct MapDifference {
   std::size_t kept = 0;              ///< In both, within the quantile.
 };
 
+/// When a landmark has moved.
+struct DifferenceLimits {
+  double quantile = 0.99;  ///< Of chi-squared; what lies beyond it has moved. Within 0 and 1.
+  /// Standard deviation in x and in y of a landmark without covariance [m]; 0: any move counts.
+  double unknown_sigma_m = 0.0;
+};
+
 /// The value that a chi-squared variable with two degrees of freedom exceeds with probability
 /// 1 - `quantile`, which lies within 0 and 1.
 double chi2_of_quantile(double quantile);
@@ -31,6 +38,7 @@ double chi2_of_quantile(double quantile);
 /// What changes from `before` to `after`. A landmark is the same one where it has the same id. The
 /// frames are taken to be the same: nothing is aligned. The errors of both estimates are taken to
 /// be independent; of two states of one map they are not, and moves are then understated. O(size).
-MapDifference difference(const StoredMap& before, const StoredMap& after, double quantile);
+MapDifference difference(const StoredMap& before, const StoredMap& after,
+                         const DifferenceLimits& limits);
 
 }  // namespace understory::map_file

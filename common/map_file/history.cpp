@@ -12,6 +12,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <limits>
 #include <new>
 
 #include "common/map_file/digest.hpp"
@@ -54,7 +55,8 @@ std::vector<std::uint8_t> packed(const Changeset& changeset) {
 
 /// Fault::kDamaged where the bytes are not `size` packed ones.
 std::vector<std::uint8_t> unpacked(const Connection& connection, Blob bytes, std::uint64_t size) {
-  const std::uint64_t most = kMostPacked * (bytes.size() + 1);
+  const std::uint64_t most =
+      std::min<std::uint64_t>(kMostPacked * (bytes.size() + 1), std::numeric_limits<int>::max());
   uLongf length = size;
   std::vector<std::uint8_t> result(size <= most ? size + 1 : 0);
   if (size > most || ::uncompress(result.data(), &length, bytes.data(), bytes.size()) != Z_OK ||
@@ -111,15 +113,20 @@ Changeset inverted(const Connection& connection, std::vector<std::uint8_t> bytes
   return inverse;
 }
 
-void apply(const Connection& connection, const Changeset& changeset, std::uint64_t number) {
-  const int result =
-      sqlite3changeset_apply(connection.handle(), changeset.size, changeset.bytes.get(),
-                             is_content_table, on_conflict, nullptr);
+void apply(const Connection& connection, void* changeset, int size, std::uint64_t number) {
+  const int result = sqlite3changeset_apply(connection.handle(), size, changeset, is_content_table,
+                                            on_conflict, nullptr);
   if (result == SQLITE_OK) return;
   if (result == SQLITE_ABORT)
-    connection.damaged(
-        fmt::format("change {} cannot be taken back: the rows are no longer what it left", number));
+    connection.damaged(fmt::format("the rows are not those that change {} goes with", number));
   connection.fail();
+}
+
+/// Of a row of kSelectChanges. Fault::kDamaged where it is not what was recorded.
+std::vector<std::uint8_t> changeset_in(const Connection& connection, const Statement& row) {
+  if (!is_as_written(row))
+    connection.damaged(fmt::format("change {} is not what was recorded", row.count(0)));
+  return unpacked(connection, row.blob(5), row.count(6));
 }
 
 }  // namespace
@@ -132,6 +139,18 @@ Recording::Recording(const Connection& connection) : connection_(connection) {
   session_.reset(session);
   for (const std::string_view table : kContentTables)
     require_ok(connection, sqlite3session_attach(session, std::string(table).c_str()));
+}
+
+void Recording::add_difference(const std::string& schema) {
+  for (const std::string_view table : kContentTables) {
+    char* message = nullptr;
+    const int result =
+        sqlite3session_diff(session_.get(), schema.c_str(), std::string(table).c_str(), &message);
+    const std::unique_ptr<char, SqliteFree> released(message);
+    if (result == SQLITE_SCHEMA)
+      connection_.damaged(fmt::format("{}: its definition was changed", table));
+    require_ok(connection_, result);
+  }
 }
 
 std::uint64_t Recording::write(const ChangeNote& note) {
@@ -172,11 +191,25 @@ void undo(const Connection& connection, std::uint64_t number) {
   Changeset inverse;
   {
     Statement row = connection.prepare(std::string(kSelectChanges) + "WHERE number = ?1");
-    if (!row.bind(static_cast<std::int64_t>(number)).step() || !is_as_written(row))
-      connection.damaged(fmt::format("change {} is not what was recorded", number));
-    inverse = inverted(connection, unpacked(connection, row.blob(5), row.count(6)));
+    if (!row.bind(static_cast<std::int64_t>(number)).step())
+      connection.damaged(fmt::format("change {} is missing", number));
+    inverse = inverted(connection, changeset_in(connection, row));
   }
-  apply(connection, inverse, number);
+  apply(connection, inverse.bytes.get(), inverse.size, number);
+}
+
+std::unique_ptr<Connection> recorded_content(const Connection& connection) {
+  auto recorded = std::make_unique<Connection>(connection.file());
+  for (const SchemaObject& object : schema_objects()) {
+    if (is_content_table(nullptr, object.name.c_str()) != 0) recorded->execute(object.sql);
+  }
+
+  Statement row = connection.prepare(std::string(kSelectChanges) + "ORDER BY number");
+  while (row.step()) {
+    std::vector<std::uint8_t> changeset = changeset_in(connection, row);
+    apply(*recorded, changeset.data(), static_cast<int>(changeset.size()), row.count(0));
+  }
+  return recorded;
 }
 
 std::vector<std::string> faults_of_history(const Connection& connection) {

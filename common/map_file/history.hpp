@@ -39,6 +39,9 @@ class Recording {
  public:
   /// Begins. The connection's transaction has begun and outlives it.
   explicit Recording(const Connection& connection);
+  /// Takes as changed what makes the content tables of the attached database `schema` those of the
+  /// file. Nothing was changed yet. Fault::kDamaged where tables have not the same columns.
+  void add_difference(const std::string& schema);
   /// Writes the change into the history and gives its number. A change of nothing is one, too.
   std::uint64_t write(const ChangeNote& note);
 
@@ -55,6 +58,9 @@ std::vector<Change> changes_in(const Connection& connection);
 /// taken back. Fault::kDamaged where the rows are not what the change left, or the change is not
 /// what was recorded; the transaction is then to be rolled back.
 void undo(const Connection& connection, std::uint64_t number);
+/// The content tables as the history says that they are, in memory: all changes, one after the
+/// other. Fault::kDamaged where a change is not what was recorded. O(all changes).
+std::unique_ptr<Connection> recorded_content(const Connection& connection);
 /// What is wrong with the record of the changes: numbers missing, one that is not what was written.
 std::vector<std::string> faults_of_history(const Connection& connection);
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "common/map_file/check.hpp"
+#include "common/map_file/foreign_edits.hpp"
 #include "common/map_file/map_rows.hpp"
 #include "common/map_file/opening.hpp"
 #include "common/map_file/schema.hpp"
@@ -95,15 +96,30 @@ std::uint64_t MapFile::put(std::span<const StoredMap> maps, const ChangeNote& no
 }
 
 std::uint64_t MapFile::revert(std::uint64_t to, const ChangeNote& note) {
-  const std::uint64_t latest = latest_change(*connection_);
+  std::uint64_t latest = latest_change(*connection_);
   if (to > latest)
     throw MapFileError(Fault::kRefused, fmt::format("{}: has no change {}, the latest one is {}",
                                                     file().string(), to, latest));
+
+  const auto recorded = recorded_content(*connection_);
+  if (!is_as_recorded(*connection_, *recorded)) {
+    ChangeNote foreign = note;
+    foreign.text = "changed by another program, before " + note.text;
+    latest = record_foreign_edits(*connection_, *recorded, foreign, false);
+  }
 
   return changed(*connection_, note, [&] {
     for (std::uint64_t number = latest; number > to; --number) undo(*connection_, number);
     for (const std::uint32_t id : map_ids(*connection_)) verify_checksum(*connection_, id);
   });
+}
+
+std::uint64_t MapFile::accept(const ChangeNote& note) {
+  const auto recorded = recorded_content(*connection_);
+  if (is_as_recorded(*connection_, *recorded))
+    throw MapFileError(Fault::kRefused,
+                       fmt::format("{}: its maps are what its history says", file().string()));
+  return record_foreign_edits(*connection_, *recorded, note, true);
 }
 
 void create_map_file(const std::filesystem::path& file, std::span<const StoredMap> maps,

@@ -61,9 +61,13 @@ class MapFile {
   /// others stay. All or none of it.
   std::uint64_t put(std::span<const StoredMap> maps, const ChangeNote& note);
   /// Brings all maps back to what they were after change `to` (0: before the first one), as a
-  /// change of its own whose number it gives; it can be reverted, too. Fault::kRefused where there
-  /// is no such change, kDamaged where the content is no longer what the history left.
+  /// change of its own whose number it gives; it can be reverted, too. What other programs changed
+  /// becomes a change before it. Fault::kRefused where there is no change `to`. O(all changes).
   std::uint64_t revert(std::uint64_t to, const ChangeNote& note);
+  /// Takes what other programs changed in maps over as a change and gives its number: from then on
+  /// it is what the checksums say. Fault::kRefused where they changed nothing, kDamaged where a map
+  /// is none any more. O(all changes).
+  std::uint64_t accept(const ChangeNote& note);
 
  private:
   std::unique_ptr<Connection> connection_;

@@ -97,7 +97,10 @@ fs::path target_of(const fs::path& file) {
 std::unique_ptr<Connection> open_to_read(const fs::path& file) {
   require_database(file);
   const fs::path target = target_of(file);
-  if (!is_at_rest(file, target) && can_be_written(target)) leave(*open_to_write(file));
+  if (!is_at_rest(file, target) && can_be_written(target)) {
+    auto writer = open_to_write(file);
+    if (!leave(*writer)) return writer;
+  }
 
   auto connection = std::make_unique<Connection>(file, Access::kRead, file);
   set_keys_and_checks(*connection);
@@ -125,8 +128,9 @@ std::unique_ptr<Connection> open_to_write(const fs::path& file) {
   return connection;
 }
 
-void leave(const Connection& connection) noexcept {
-  sqlite3_exec(connection.handle(), "PRAGMA journal_mode = DELETE", nullptr, nullptr, nullptr);
+bool leave(const Connection& connection) noexcept {
+  return sqlite3_exec(connection.handle(), "PRAGMA journal_mode = DELETE", nullptr, nullptr,
+                      nullptr) == SQLITE_OK;
 }
 
 NewFile::NewFile(const fs::path& file) : target_(target_of(file)) {

@@ -9,7 +9,8 @@
 namespace understory::map_file {
 
 /// Opens a map file for reading: one state of it, held until the connection goes. What a killed
-/// writer left beside it is brought in first. Throws MapFileError.
+/// writer left beside it is brought in first; where there is no room for that, others are locked
+/// out instead. Throws MapFileError.
 std::unique_ptr<Connection> open_to_read(const std::filesystem::path& file);
 
 /// Opens a map file for this process alone: locked against all others until the connection goes,
@@ -17,8 +18,9 @@ std::unique_ptr<Connection> open_to_read(const std::filesystem::path& file);
 std::unique_ptr<Connection> open_to_write(const std::filesystem::path& file);
 
 /// Brings the write-ahead log into a file that was opened to write, which is then a single file
-/// again. Where that fails (a full disk), the log stays beside it for the next one to bring in.
-void leave(const Connection& connection) noexcept;
+/// again. Where that fails (a full disk), the log stays beside it for the next one to bring in;
+/// false.
+bool leave(const Connection& connection) noexcept;
 
 /// A file under way: beside its name, and gone unless it is moved there.
 class NewFile {

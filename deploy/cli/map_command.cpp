@@ -1,4 +1,4 @@
-// `understory map info|check|import|export|log|revert|diff`: stored maps.
+// `understory map info|check|import|export|log|revert|accept|diff`: stored maps.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
@@ -31,7 +31,7 @@ struct MapOptions {
   std::string other;
   bool json = false;
   std::uint64_t to = 0;
-  double quantile = 0.99;
+  map_file::DifferenceLimits limits{.quantile = 0.99, .unknown_sigma_m = 0.1};
 };
 
 /// UTC, to the second. Stamps of simulated drives count from 0.
@@ -115,6 +115,13 @@ void map_revert(const MapOptions& options) {
   fmt::print("{}: as it was after change {} (change {})\n", options.file, options.to, number);
 }
 
+void map_accept(const MapOptions& options) {
+  MapFile file(options.file, Access::kWrite);
+  const std::uint64_t number = file.accept(
+      note_now("understory map accept", "another program", "what another program changed"));
+  fmt::print("{}: what another program changed is change {} now\n", options.file, number);
+}
+
 /// An empty one where the file has none of this number.
 map_file::StoredMap map_or_nothing(const MapFile& file, const std::set<std::uint32_t>& ids,
                                    std::uint32_t id) {
@@ -160,16 +167,17 @@ void map_diff(const MapOptions& options) {
   std::set<std::uint32_t> all = before_ids;
   all.insert(after_ids.begin(), after_ids.end());
 
-  const double chi2 = map_file::chi2_of_quantile(options.quantile);
+  const double chi2 = map_file::chi2_of_quantile(options.limits.quantile);
   nlohmann::ordered_json json{{"before", options.file},
                               {"after", options.other},
-                              {"quantile", options.quantile},
+                              {"quantile", options.limits.quantile},
+                              {"unknown_sigma_m", options.limits.unknown_sigma_m},
                               {"chi2", chi2},
                               {"maps", nlohmann::ordered_json::array()}};
   for (const std::uint32_t id : all) {
     const auto difference =
         map_file::difference(map_or_nothing(before, before_ids, id),
-                             map_or_nothing(after, after_ids, id), options.quantile);
+                             map_or_nothing(after, after_ids, id), options.limits);
     json["maps"].push_back(difference_json(id, difference));
     if (!options.json) print_difference(id, difference);
   }
@@ -178,9 +186,10 @@ void map_diff(const MapOptions& options) {
     fmt::print("{}\n", dumped(json, 2));
   } else {
     fmt::print(
-        "landmarks by id, frames taken to be the same; moved: beyond the quantile {} "
-        "(chi2 {:.2f}, 2 degrees of freedom)\n",
-        options.quantile, chi2);
+        "landmarks by id, frames taken to be the same; moved: beyond the quantile {} (chi2 {:.2f}, "
+        "2 "
+        "degrees of freedom), sigma {} m where there is no covariance\n",
+        options.limits.quantile, chi2, options.limits.unknown_sigma_m);
   }
 }
 
@@ -229,11 +238,16 @@ void add_map_command(CLI::App& parent) {
   add("revert", "All maps as they were after a change; that is a change, too", map_revert)
       ->add_option("--to", options->to, "Number of the change; 0: before the first one")
       ->required();
+  add("accept", "Takes what another program changed (QGIS, say) over as a change", map_accept);
   auto* diff = add("diff", "Landmarks added, removed and moved from one file to another", map_diff);
   diff->add_option("other", options->other, "The later map file")->required();
-  diff->add_option("--quantile", options->quantile,
+  diff->add_option("--quantile", options->limits.quantile,
                    "A landmark has moved where chi2 of its way, by both covariances, is beyond it")
       ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  diff->add_option("--sigma-m", options->limits.unknown_sigma_m,
+                   "[m] Standard deviation in x and in y of landmarks without covariance")
+      ->check(CLI::Range(0.0, 1e3))
       ->capture_default_str();
   diff->add_flag("--json", options->json, "As JSON");
 }

@@ -81,7 +81,6 @@ StoredMap map_of_drive(std::uint32_t map_id, const model::WholeMap& whole) {
 }
 
 std::map<std::uint32_t, LogMaps::Found> read_log_maps(const std::string& log) {
-  terminal::catch_interrupts();
   LogMaps maps;
   io::LcmLogReader reader(log);
   terminal::Progress progress("reading " + log, static_cast<double>(reader.size_bytes()));
@@ -156,16 +155,20 @@ std::string count_text(const std::vector<StoredMap>& maps) {
 }
 
 void run_map_import(const MapImportOptions& options) {
+  // What is half made goes with an interrupt.
+  terminal::catch_interrupts();
   map_file::ChangeNote note =
       note_now("understory map import", fs::path(options.source).filename().string(), "");
   std::vector<StoredMap> maps;
   if (fs::exists(options.out)) {
     map_file::MapFile file(options.out, map_file::Access::kWrite);
     maps = read_maps(options, note, file.maps());
+    terminal::throw_if_interrupted();
     note.text = count_text(maps);
     file.put(maps, note);
   } else {
     maps = read_maps(options, note, {});
+    terminal::throw_if_interrupted();
     note.text = count_text(maps);
     map_file::create_map_file(options.out, maps, note);
   }

@@ -1,5 +1,6 @@
 // `understory map` as a user calls it.
 #include <fmt/format.h>
+#include <sqlite3.h>
 
 #include <nlohmann/json.hpp>
 
@@ -127,6 +128,23 @@ TEST_CASE_METHOD(Maps, "log lists the changes, revert takes them back", "[cli]")
   fine("check " + file);
 }
 
+TEST_CASE_METHOD(Maps, "edits of another program are accepted when asked", "[cli]") {
+  fine("import " + table + " --out " + file);
+  refused("accept " + file, {"maps.gpkg: its maps are what its history says"});
+  sqlite3* other = nullptr;
+  REQUIRE(sqlite3_open(file.c_str(), &other) == SQLITE_OK);
+  const char* const edit = "UPDATE understory_maps SET name = 'thinned'";
+  CHECK(sqlite3_exec(other, edit, nullptr, nullptr, nullptr) == SQLITE_OK);
+  sqlite3_close(other);
+  CHECK_THAT(run("check " + file).out, Contains("changed by another program"));
+
+  CHECK_THAT(fine("accept " + file).out, Contains("is change 2 now"));
+  fine("check " + file);
+  CHECK(json("info " + file)["maps"][0]["name"] == "thinned");
+  fine("revert --to 1 " + file);
+  CHECK(json("info " + file)["maps"][0]["name"] == "stems");
+}
+
 TEST_CASE_METHOD(Maps, "diff tells what was added, removed and moved", "[cli]") {
   const std::string later = (directory / "later.gpkg").string();
   fine("import " + table + " --out " + file);
@@ -140,6 +158,7 @@ TEST_CASE_METHOD(Maps, "diff tells what was added, removed and moved", "[cli]") 
   CHECK(back["maps"][0]["added"].size() == 1);
   CHECK(back["maps"][0]["moved"].size() == 2);
   CHECK(back["quantile"] == 0.05);
+  CHECK(back["unknown_sigma_m"] == 0.1);
   CHECK(run("diff " + file + " " + later + " --quantile 2").status == 2);
   refused("diff " + file + " " + later + "x", {"later.gpkgx"});
 }

@@ -60,10 +60,11 @@ TEST_CASE_METHOD(DamagedFile, "a bit that is turned over is found, or affects no
   CHECK(found > 100);
 }
 
-TEST_CASE_METHOD(DamagedFile, "each byte of a file", "[.long]") {
+TEST_CASE_METHOD(DamagedFile, "a bit of every 31st byte", "[.long]") {
   std::mt19937_64 random(15);
-  for (std::size_t at = 0; at < bytes.size(); ++at) turn_over(at, random() % 8);
-  WARN(fmt::format("{} of {} found", found, bytes.size()));
+  std::size_t turned = 0;
+  for (std::size_t at = 0; at < bytes.size(); at += 31, ++turned) turn_over(at, random() % 8);
+  WARN(fmt::format("{} of {} turned bits found", found, turned));
 }
 
 TEST_CASE_METHOD(DamagedFile, "a file that was cut is noticed", "[map_file]") {

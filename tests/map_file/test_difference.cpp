@@ -28,7 +28,7 @@ TEST_CASE("landmarks are added, removed, moved beyond the quantile, kept", "[map
   // is 9.21.
   const StoredMap before = map_of_points({{1, 0.0}, {2, 10.0}, {3, 20.0}, {5, 30.0}}, 0.1);
   const StoredMap after = map_of_points({{2, 10.2}, {3, 20.5}, {4, 1.0}, {5, 30.0}}, 0.1);
-  const auto found = map_file::difference(before, after, 0.99);
+  const auto found = map_file::difference(before, after, {.quantile = 0.99});
   CHECK(found.added == std::vector{map_file::landmark_id(1, 4)});
   CHECK(found.removed == std::vector{map_file::landmark_id(1, 1)});
   REQUIRE(found.moved.size() == 1);
@@ -37,17 +37,24 @@ TEST_CASE("landmarks are added, removed, moved beyond the quantile, kept", "[map
   CHECK(found.moved[0].chi2 == Approx(12.5));
   CHECK(found.kept == 2);
 
-  CHECK(map_file::difference(before, after, 0.999).moved.empty());
-  CHECK(map_file::difference(before, after, 0.5).moved.size() == 2);
+  CHECK(map_file::difference(before, after, {.quantile = 0.999}).moved.empty());
+  CHECK(map_file::difference(before, after, {.quantile = 0.5}).moved.size() == 2);
   CHECK(map_file::chi2_of_quantile(0.99) == Approx(9.2103).margin(1e-3));
 }
 
 TEST_CASE("without covariances any move counts", "[map_file]") {
-  const auto found = map_file::difference(map_of_points({{1, 0.0}, {2, 1.0}}, 0.0),
-                                          map_of_points({{1, 1e-6}, {2, 1.0}}, 0.0), 0.999);
+  const auto found =
+      map_file::difference(map_of_points({{1, 0.0}, {2, 1.0}}, 0.0),
+                           map_of_points({{1, 1e-6}, {2, 1.0}}, 0.0), {.quantile = 0.999});
   REQUIRE(found.moved.size() == 1);
   CHECK(std::isinf(found.moved[0].chi2));
   CHECK(found.kept == 1);
+
+  // Or one is given for them: here to one of two.
+  const auto given = map_file::difference(map_of_points({{1, 0.0}}, 0.3),
+                                          map_of_points({{1, 1.0}}, 0.0), {0.1, 0.4});
+  REQUIRE(given.moved.size() == 1);
+  CHECK(given.moved[0].chi2 == Approx(4.0));
 }
 
 TEST_CASE("as many landmarks move as the quantile says, where errors are as stated", "[map_file]") {
@@ -68,6 +75,6 @@ TEST_CASE("as many landmarks move as the quantile says, where errors are as stat
       map->landmarks.push_back(one);
     }
   }
-  const auto moved = map_file::difference(before, after, 0.95).moved.size();
+  const auto moved = map_file::difference(before, after, {.quantile = 0.95}).moved.size();
   CHECK(static_cast<double>(moved) == Approx(0.05 * count).margin(5.0 * std::sqrt(0.05 * count)));
 }

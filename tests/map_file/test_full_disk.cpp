@@ -37,6 +37,7 @@ void put_on_failing_disk(int code) {
   FailingDisk disk;
   long last = 0;
   long refused = 0;
+  long read_without_room = 0;
 
   for (long n = 1; n < kMostCalls && last == 0; ++n) {
     CAPTURE(n, code);
@@ -52,6 +53,15 @@ void put_on_failing_disk(int code) {
       ++refused;
     }
     if (!disk.has_failed()) last = n;
+    // It may be read while there is no room; what is read is right.
+    try {
+      const StoredMap read = MapFile(file, Access::kRead).read(1);
+      CHECK((same(read, first) || same(read, second)));
+      if (is_done) CHECK(same(read, second));
+      ++read_without_room;
+    } catch (const MapFileError& error) {
+      check_fault(error.fault(), code);
+    }
     disk.set_whole();
 
     const MapFile opened(file, Access::kRead);
@@ -64,8 +74,10 @@ void put_on_failing_disk(int code) {
   }
   REQUIRE(last > 10);
   CHECK(refused > 5);
-  WARN(fmt::format("code {}: {} writes, syncs and truncations, {} of them ended the change", code,
-                   last - 1, refused));
+  WARN(
+      fmt::format("code {}: {} writes, syncs and truncations, {} of them ended the change; "
+                  "{} times it was read at once",
+                  code, last - 1, refused, read_without_room));
 }
 
 }  // namespace

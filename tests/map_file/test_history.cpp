@@ -52,26 +52,87 @@ TEST_CASE("a change that is not there is none to go back to", "[map_file]") {
   CHECK(opened.history().size() == 3);
 }
 
-TEST_CASE("what another program changed is not reverted over, nor taken for ours", "[map_file]") {
-  ChangedFile changed(9, 0);
-  std::mt19937_64 random(10);
-  StoredMap map = random_map(1, random);
-  map.landmarks = {random_landmark(map_file::landmark_id(1, 1), random)};
-  MapFile(changed.file, Access::kWrite).put({&map, 1}, note("put"));
-  RawFile(changed.file).run("UPDATE landmarks SET times_seen = times_seen + 1");
-  const std::string before = dump(changed.file);
+namespace {
 
+/// A map of three landmarks, which another program then changes.
+struct EditedFile : ChangedFile {
+  StoredMap map;
+  std::string edited;
+
+  EditedFile() : ChangedFile(9, 0) {
+    std::mt19937_64 random(10);
+    map = random_map(1, random);
+    map.landmarks.clear();
+    for (std::uint64_t i = 1; i <= 3; ++i)
+      map.landmarks.push_back(random_landmark(map_file::landmark_id(1, i), random));
+    MapFile(file, Access::kWrite).put({&map, 1}, note("put"));
+    states.push_back(dump(file));
+    edit(
+        "UPDATE landmarks SET times_seen = 17 WHERE landmark_id & 1 = 1; "
+        "DELETE FROM landmarks WHERE landmark_id & 2 = 2");
+  }
+  void edit(const std::string& sql) {
+    RawFile(file).run(sql);
+    edited = dump(file);
+  }
+};
+
+}  // namespace
+
+TEST_CASE_METHOD(EditedFile, "what another program changed is not taken for ours", "[map_file]") {
   {
-    MapFile opened(changed.file, Access::kWrite);
-    CHECK(fault_of_work(changed.file, [&] { opened.revert(1, note("back")); }) == Fault::kDamaged);
-    CHECK(fault_of_work(changed.file, [&] {
-            opened.put({&map, 1}, note("put"));
-          }) == Fault::kDamaged);
-    CHECK(fault_of_work(changed.file, [&] { opened.read(1); }) == Fault::kDamaged);
+    MapFile opened(file, Access::kWrite);
+    CHECK(fault_of_work(file, [&] { opened.put({&map, 1}, note("put")); }) == Fault::kDamaged);
+    CHECK(fault_of_work(file, [&] { opened.read(1); }) == Fault::kDamaged);
     CHECK(opened.check().size() == 1);
     CHECK(opened.history().size() == 2);
   }
-  CHECK(dump(changed.file) == before);
+  CHECK(dump(file) == edited);
+}
+
+TEST_CASE_METHOD(EditedFile, "what another program changed is reverted, and kept as a change",
+                 "[map_file]") {
+  CHECK(MapFile(file, Access::kWrite).revert(2, note("back")) == 4);
+  CHECK(dump(file) == states[2]);
+  CHECK(same(MapFile(file, Access::kRead).read(1), map));
+  CHECK(MapFile(file, Access::kRead).check().empty());
+
+  MapFile(file, Access::kWrite).revert(3, note("to the edits"));
+  CHECK(MapFile(file, Access::kRead).read(1).landmarks.size() == 1);
+  CHECK(MapFile(file, Access::kRead).read(1).landmarks[0].landmark.observation_count == 17);
+  MapFile(file, Access::kWrite).revert(1, note("to nothing"));
+  CHECK(dump(file) == states[1]);
+  CHECK(MapFile(file, Access::kRead).check().empty());
+}
+
+TEST_CASE_METHOD(EditedFile, "what another program changed is accepted as a change", "[map_file]") {
+  CHECK(MapFile(file, Access::kWrite).accept(note("edited by hand")) == 3);
+  CHECK(MapFile(file, Access::kRead).check().empty());
+  CHECK(MapFile(file, Access::kRead).read(1).landmarks.size() == 1);
+  {
+    MapFile opened(file, Access::kWrite);
+    CHECK(fault_of_work(file, [&] { opened.accept(note("again")); }) == Fault::kRefused);
+  }
+  MapFile(file, Access::kWrite).revert(2, note("back"));
+  CHECK(dump(file) == states[2]);
+}
+
+TEST_CASE_METHOD(EditedFile, "what is no map any more is reverted and not accepted", "[map_file]") {
+  for (const char* const sql :
+       {"UPDATE landmarks SET covariance_xx_m2 = -1", "UPDATE landmarks SET kind = 'house'",
+        "DELETE FROM landmarks; DELETE FROM trajectory; DELETE FROM submap_borders; "
+        "DELETE FROM loop_closures; DELETE FROM understory_maps"}) {
+    CAPTURE(sql);
+    edit(sql);
+    CHECK_FALSE(MapFile(file, Access::kRead).check().empty());
+    if (edited.find("house") != std::string::npos || edited.find("|-1.0|") != std::string::npos) {
+      MapFile opened(file, Access::kWrite);
+      CHECK(fault_of_work(file, [&] { opened.accept(note("edited")); }) == Fault::kDamaged);
+    }
+    MapFile(file, Access::kWrite).revert(2, note("back"));
+    CHECK(dump(file) == states[2]);
+    CHECK(MapFile(file, Access::kRead).check().empty());
+  }
 }
 
 TEST_CASE("a record of changes that was changed itself is noticed", "[map_file]") {

@@ -37,22 +37,26 @@ StoredMap map_of_change(std::uint64_t number) {
   }
 }
 
-/// Starts the writer, kills it after the delay; gives how many changes it finished.
-std::uint64_t finished_before_death(const std::filesystem::path& file, int delay_us) {
+/// Starts the writer, lets it finish so many changes, and kills it after the delay; gives how many
+/// it finished.
+std::uint64_t finished_before_death(const std::filesystem::path& file, int changes, int delay_us) {
   int ends[2];
   REQUIRE(::pipe(ends) == 0);
   const pid_t child = ::fork();
   REQUIRE(child >= 0);
   if (child == 0) write_for_ever(file, ends[1]);
   ::close(ends[1]);
+
+  std::uint64_t finished = 0;
+  char c = 0;
+  for (; changes > 0 && ::read(ends[0], &c, 1) == 1; --changes) ++finished;
   ::usleep(static_cast<useconds_t>(delay_us));
   ::kill(child, SIGKILL);
   int status = 0;
   REQUIRE(::waitpid(child, &status, 0) == child);
   REQUIRE(WIFSIGNALED(status));
 
-  std::uint64_t finished = 0;
-  for (char c = 0; ::read(ends[0], &c, 1) == 1;) ++finished;
+  while (::read(ends[0], &c, 1) == 1) ++finished;
   ::close(ends[0]);
   return finished;
 }
@@ -82,8 +86,9 @@ void kill_again_and_again(int times, std::uint64_t seed) {
       file = directory / fmt::format("maps-{}.gpkg", i);
       before = 0;
     }
-    const std::uint64_t finished =
-        finished_before_death(file, static_cast<int>(random() % (i % 10 == 0 ? 15'000 : 60'000)));
+    const int changes = static_cast<int>(random() % 5);
+    const int delay_us = static_cast<int>(random() % 15'000);
+    const std::uint64_t finished = finished_before_death(file, changes, delay_us);
     CAPTURE(i, before, finished);
     if (!std::filesystem::exists(file)) {
       CHECK(finished == 0);

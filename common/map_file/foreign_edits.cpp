@@ -1,0 +1,85 @@
+#include "common/map_file/foreign_edits.hpp"
+
+#include <sqlite3.h>
+
+#include <new>
+
+#include "common/map_file/map_rows.hpp"
+#include "common/map_file/schema.hpp"
+
+namespace understory::map_file {
+namespace {
+
+constexpr const char* kRecorded = "recorded";
+
+/// A copy of a database in memory beside the file's own, while it lives.
+class Attached {
+ public:
+  Attached(const Connection& connection, const Connection& other) : connection_(connection) {
+    connection_.execute(std::string("ATTACH ':memory:' AS ") + kRecorded);
+    sqlite3_int64 size = 0;
+    unsigned char* const bytes = sqlite3_serialize(other.handle(), "main", &size, 0);
+    if (bytes == nullptr) throw std::bad_alloc();
+    // It owns the bytes from here on, also where it fails.
+    const int result = sqlite3_deserialize(connection_.handle(), kRecorded, bytes, size, size,
+                                           SQLITE_DESERIALIZE_FREEONCLOSE);
+    if (result != SQLITE_OK) connection_.fail();
+  }
+  ~Attached() { sqlite3_exec(connection_.handle(), "DETACH recorded", nullptr, nullptr, nullptr); }
+  Attached(const Attached&) = delete;
+  Attached& operator=(const Attached&) = delete;
+
+ private:
+  const Connection& connection_;
+};
+
+bool is_readable(const Connection& connection, std::uint32_t map_id, bool must_be_map) {
+  try {
+    select_map(connection, map_id);
+    return true;
+  } catch (const MapFileError&) {
+    if (must_be_map) throw;
+    return false;
+  }
+}
+
+void renew_checksums(const Connection& connection, bool must_be_maps) {
+  Statement state =
+      connection.prepare("UPDATE understory_maps SET checksum = ?2 WHERE map_id = ?1");
+  for (const std::uint32_t id : map_ids(connection)) {
+    if (!is_readable(connection, id, must_be_maps)) continue;
+    const std::string checksum = checksum_of(connection, id);
+    state.bind(std::int64_t{id}, std::string_view(checksum)).run();
+  }
+}
+
+}  // namespace
+
+bool is_as_recorded(const Connection& connection, const Connection& recorded) {
+  const std::vector<std::uint32_t> ids = map_ids(connection);
+  if (ids != map_ids(recorded)) return false;
+  for (const std::uint32_t id : ids) {
+    const std::string checksum = checksum_of(connection, id);
+    if (checksum != checksum_of(recorded, id) || checksum != stated_checksum(connection, id))
+      return false;
+  }
+  return true;
+}
+
+std::uint64_t record_foreign_edits(const Connection& connection, const Connection& recorded,
+                                   const ChangeNote& note, bool must_be_maps) {
+  const Attached attached(connection, recorded);
+  Transaction transaction(connection);
+  std::uint64_t number = 0;
+  {
+    Recording recording(connection);
+    recording.add_difference(kRecorded);
+    renew_checksums(connection, must_be_maps);
+    number = recording.write(note);
+  }
+  refresh_contents(connection, note.utime);
+  transaction.commit();
+  return number;
+}
+
+}  // namespace understory::map_file
