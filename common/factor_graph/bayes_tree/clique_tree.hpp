@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "common/factor_graph/graph/factor_graph.hpp"
 #include "common/factor_graph/storage/block_pool.hpp"
@@ -29,7 +30,8 @@ struct CliqueRecord {
   /// right-hand side. Behind it, where `keeps_schur`, the lower triangle of the Schur complement on
   /// the separator, column by column.
   double* panel = nullptr;
-  std::uint64_t panel_epoch = 0;  ///< Epoch of the tree's journal in which `panel` was taken.
+  std::uint64_t panel_epoch = 0;  ///< Epoch of the tree's journal in which `panel` was written.
+  std::uint64_t lost_epoch = 0;   ///< Epoch in which the numbers of the last commit were given up.
 
   /// Length of the columns of L in `panel`.
   std::size_t panel_numbers() const {
@@ -47,13 +49,15 @@ double flops_of(const CliqueRecord& clique);
 
 /// Owns the cliques, their parent and child links, and the memory of their rows and numbers. Every
 /// change is journaled: rollback() restores the tree of the last commit() at the cost of what
-/// changed. Does not interpret the numbers.
+/// changed. Numbers of the last commit are kept beside the new ones as far as they fit into
+/// `undo_bytes`: a second set of them all would be half of the memory. What else rollback() needs
+/// is to be computed again. Does not interpret the numbers.
 class CliqueTree {
  public:
   /// Parent of all trees of the forest; holds no variables.
   static constexpr int kRoot = 0;
 
-  CliqueTree();
+  explicit CliqueTree(std::size_t undo_bytes);
   CliqueTree(const CliqueTree&) = delete;
   CliqueTree& operator=(const CliqueTree&) = delete;
 
@@ -72,8 +76,8 @@ class CliqueTree {
   void count_work(int id);
   /// Takes these cliques out of the tree. The parent of each is the root or among them.
   void remove(std::span<const int> ids);
-  /// Memory for the clique's numbers that a rollback can do without: a new block in the first call
-  /// since the last commit. `keeps_schur` is taken over with a new block.
+  /// Memory for the clique's numbers, to be written anew. `keeps_schur` is taken over with the
+  /// clique's first block.
   double* writable_panel(int id, bool keeps_schur);
   /// Number of pivots without information that the last elimination of the clique left out.
   void set_left_out(int id, int count);
@@ -85,12 +89,19 @@ class CliqueTree {
   /// Memory taken from the system [bytes].
   std::size_t bytes() const { return panels_.bytes() + rows_.bytes(); }
 
-  /// Makes all changes final.
-  void commit();
-  /// Restores the state of the last commit().
+  /// Makes all changes final. `is_up_to_date`: every clique's numbers are those of its factors and
+  /// children, so that they can be computed again; if not, all are kept for a rollback.
+  void commit(bool is_up_to_date);
+  /// Restores the state of the last commit(), but for the numbers of the cliques in lost().
   void rollback();
+  /// Cliques whose numbers the last rollback() could not restore; their parents may be among them.
+  std::span<const int> lost() const { return lost_; }
+  /// Where the numbers of one of lost() belong.
+  double* lost_panel(int id) { return cliques_[id].panel; }
 
  private:
+  bool keeps_for_undo(const CliqueRecord& clique);
+  void drop_panel(CliqueRecord& clique);
   void free_blocks(const CliqueRecord& clique);
   void unlink_from_root(int child);
   void count_undetermined(int change);
@@ -100,6 +111,10 @@ class CliqueTree {
   storage::BlockPool<int> rows_;
   double total_flops_ = 0.0;
   double saved_total_flops_ = 0.0;
+  std::size_t undo_bytes_;
+  std::size_t undo_bytes_left_ = 0;  ///< Until the next commit.
+  bool keeps_all_ = false;
+  std::vector<int> lost_;
 };
 
 }  // namespace understory::factor_graph::bayes_tree

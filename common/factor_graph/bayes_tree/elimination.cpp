@@ -19,26 +19,47 @@ bool worth_keeping(const CliqueRecord& clique) {
 
 }  // namespace
 
-void Elimination::list_dirty(const Marks& marks, std::vector<int>& computed) {
-  computed.clear();
+/// Those of `cliques` for which is_listed(), which is false of all others.
+template <typename IsListed>
+void Elimination::list_children_first(std::span<const int> cliques, const IsListed& is_listed,
+                                      std::vector<int>& listed) {
+  listed.clear();
   pending_.resize(static_cast<std::size_t>(cliques_.capacity()), 0);
 
   // How many children each one has to wait for.
-  for (const int c : marks.dirty()) {
+  for (const int c : cliques) {
     const int parent = cliques_[c].parent;
-    if (marks.is_dirty(c) && marks.is_dirty(parent)) ++pending_[static_cast<std::size_t>(parent)];
+    if (is_listed(c) && is_listed(parent)) ++pending_[static_cast<std::size_t>(parent)];
   }
 
   // Those without such children, then each as soon as its last child is listed.
-  for (const int c : marks.dirty()) {
-    if (marks.is_dirty(c) && pending_[static_cast<std::size_t>(c)] == 0) computed.push_back(c);
+  for (const int c : cliques) {
+    if (is_listed(c) && pending_[static_cast<std::size_t>(c)] == 0) listed.push_back(c);
   }
-  for (std::size_t i = 0; i < computed.size(); ++i) {
-    const int parent = cliques_[computed[i]].parent;
-    if (marks.is_dirty(parent) && --pending_[static_cast<std::size_t>(parent)] == 0) {
-      computed.push_back(parent);
+  for (std::size_t i = 0; i < listed.size(); ++i) {
+    const int parent = cliques_[listed[i]].parent;
+    if (is_listed(parent) && --pending_[static_cast<std::size_t>(parent)] == 0) {
+      listed.push_back(parent);
     }
   }
+}
+
+void Elimination::list_dirty(const Marks& marks, std::vector<int>& computed) {
+  list_children_first(
+      marks.dirty(), [&](int c) { return marks.is_dirty(c); }, computed);
+}
+
+void Elimination::restore_lost() {
+  is_lost_.resize(static_cast<std::size_t>(cliques_.capacity()), 0);
+  for (const int c : cliques_.lost()) is_lost_[static_cast<std::size_t>(c)] = 1;
+  const auto is_lost = [&](int c) { return is_lost_[static_cast<std::size_t>(c)] != 0; };
+  list_children_first(cliques_.lost(), is_lost, restored_);
+
+  for (const int c : restored_) {
+    compute(cliques_[c], own_space_);
+    store(cliques_[c], cliques_.lost_panel(c));
+  }
+  for (const int c : restored_) is_lost_[static_cast<std::size_t>(c)] = 0;
 }
 
 void Elimination::place_rows(const CliqueRecord& clique, Workspace& at) const {
@@ -210,11 +231,8 @@ int Elimination::compute(const CliqueRecord& clique, Workspace& at) {
   return kernel_.factorise(at.front, clique.size, clique.pivots, at.least.data(), left_out_.data());
 }
 
-void Elimination::factorise(int id) {
-  const int left_out = compute(cliques_[id], own_space_);
-  double* to = cliques_.writable_panel(id, worth_keeping(cliques_[id]));
-
-  const CliqueRecord& clique = cliques_[id];
+/// What is kept of the front.
+void Elimination::store(const CliqueRecord& clique, double* to) const {
   const double* front = own_space_.front;
   to = std::copy_n(front, clique.panel_numbers(), to);
   const std::ptrdiff_t size = clique.size;
@@ -223,7 +241,12 @@ void Elimination::factorise(int id) {
       to = std::copy_n(front + c * (size + 1), size - c, to);
     }
   }
+}
 
+void Elimination::factorise(int id) {
+  const int left_out = compute(cliques_[id], own_space_);
+  double* to = cliques_.writable_panel(id, worth_keeping(cliques_[id]));
+  store(cliques_[id], to);
   cliques_.set_left_out(id, left_out);
 }
 

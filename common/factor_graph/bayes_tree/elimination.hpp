@@ -1,6 +1,7 @@
 // The numbers of the tree: dense fronts, assembled and factorised.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "common/factor_graph/bayes_tree/clique_tree.hpp"
@@ -23,6 +24,9 @@ class Elimination {
   void list_dirty(const Marks& marks, std::vector<int>& computed);
   /// Computes the clique's columns of L; its children must be up to date.
   void factorise(int id);
+  /// Computes the numbers that a rollback could not restore: from the same factors by the same
+  /// operations, so that they are the same. The graph must be the one of then.
+  void restore_lost();
 
  private:
   /// One front at work: size x size, column-major, lower triangle.
@@ -37,7 +41,11 @@ class Elimination {
     int from, to, length;
   };
 
+  template <typename IsListed>
+  void list_children_first(std::span<const int> cliques, const IsListed& is_listed,
+                           std::vector<int>& listed);
   int compute(const CliqueRecord& clique, Workspace& at);
+  void store(const CliqueRecord& clique, double* to) const;
   void assemble(const CliqueRecord& clique, Workspace& at);
   void place_rows(const CliqueRecord& clique, Workspace& at) const;
   void add_factors(const CliqueRecord& clique, Workspace& at);
@@ -49,7 +57,9 @@ class Elimination {
   const graph::FactorGraph& graph_;
   CliqueTree& cliques_;
   FrontKernel kernel_;
-  std::vector<int> pending_;  ///< Per clique: dirty children not yet listed; zero between calls.
+  std::vector<int> pending_;   ///< Per clique: children to be listed before it; zero between calls.
+  std::vector<char> is_lost_;  ///< Per clique; zero between calls.
+  std::vector<int> restored_;
   Workspace own_space_;
   Workspace leaf_space_;  ///< Of a child that is computed for its parent's sake.
   std::vector<int> left_out_;
