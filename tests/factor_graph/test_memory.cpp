@@ -69,7 +69,9 @@ double needed_bytes(const IncrementalSmoother& smoother) {
   const auto& cliques = smoother.tree().cliques();
   for (int c = 1; c < cliques.capacity(); ++c) {
     const CliqueRecord& clique = cliques[c];
-    if (clique.parent != kNone) numbers += clique.numbers();
+    if (clique.parent == kNone) continue;
+    numbers += clique.panel_numbers();
+    if (cliques.contributions().find(c) != nullptr) numbers += clique.contribution_numbers();
   }
   for (int f = 0; f < smoother.graph().factor_capacity(); ++f) {
     const FactorRecord& factor = smoother.graph().factor(f);

@@ -57,6 +57,7 @@ void CliqueTree::remove(std::span<const int> ids) {
     CliqueRecord& clique = cliques_.edit(c);
     clique.parent = graph::kNone;
     drop_panel(clique);
+    contributions_.drop(c);
     cliques_.remove(c);
   }
   total_flops_ -= flops;
@@ -65,20 +66,19 @@ void CliqueTree::remove(std::span<const int> ids) {
 /// False: the numbers of the last commit are to be given up. Asked once for each clique.
 bool CliqueTree::keeps_for_undo(const CliqueRecord& clique) {
   if (keeps_all_) return true;
-  const std::size_t bytes = clique.numbers() * sizeof(double);
+  const std::size_t bytes = clique.panel_numbers() * sizeof(double);
   if (bytes > undo_bytes_left_) return false;
   undo_bytes_left_ -= bytes;
   return true;
 }
 
-double* CliqueTree::writable_panel(int id, bool keeps_schur) {
+double* CliqueTree::writable_panel(int id) {
   CliqueRecord& clique = cliques_.edit(id);
   if (clique.panel == nullptr) {
-    clique.keeps_schur = keeps_schur;
-    clique.panel = panels_.take(clique.numbers());
+    clique.panel = panels_.take(clique.panel_numbers());
   } else if (clique.panel_epoch != cliques_.epoch()) {
     if (keeps_for_undo(clique)) {
-      clique.panel = panels_.take(clique.numbers());
+      clique.panel = panels_.take(clique.panel_numbers());
     } else {
       clique.lost_epoch = cliques_.epoch();
     }
@@ -94,7 +94,7 @@ void CliqueTree::drop_panel(CliqueRecord& clique) {
     if (keeps_for_undo(clique)) return;
     clique.lost_epoch = cliques_.epoch();
   }
-  panels_.give_back(clique.panel, clique.numbers());
+  panels_.give_back(clique.panel, clique.panel_numbers());
   clique.panel = nullptr;
 }
 
@@ -114,7 +114,7 @@ void CliqueTree::free_blocks(const CliqueRecord& clique) {
   if (clique.rows != nullptr) {
     rows_.give_back(clique.rows, static_cast<std::size_t>(clique.row_count));
   }
-  if (clique.panel != nullptr) panels_.give_back(clique.panel, clique.numbers());
+  if (clique.panel != nullptr) panels_.give_back(clique.panel, clique.panel_numbers());
 }
 
 void CliqueTree::commit(bool is_up_to_date) {
@@ -123,7 +123,7 @@ void CliqueTree::commit(bool is_up_to_date) {
                   [&](const CliqueRecord& before, const CliqueRecord& now) {
                     const bool is_kept = before.panel != nullptr && now.lost_epoch != epoch;
                     if (is_kept && before.panel != now.panel) {
-                      panels_.give_back(before.panel, before.numbers());
+                      panels_.give_back(before.panel, before.panel_numbers());
                     }
                   });
   saved_total_flops_ = total_flops_;
@@ -137,15 +137,19 @@ void CliqueTree::rollback() {
   lost_.clear();
   cliques_.rollback(
       [&](int id, const CliqueRecord& now, const CliqueRecord& before) {
+        if (now.panel_epoch == epoch) contributions_.drop(id);
         if (now.lost_epoch == epoch) lost_.push_back(id);
         const bool is_other = now.panel != before.panel || now.lost_epoch == epoch;
-        if (is_other && now.panel != nullptr) panels_.give_back(now.panel, now.numbers());
+        if (is_other && now.panel != nullptr) panels_.give_back(now.panel, now.panel_numbers());
       },
-      [&](const CliqueRecord& gone) { free_blocks(gone); });
+      [&](int id, const CliqueRecord& gone) {
+        contributions_.drop(id);
+        free_blocks(gone);
+      });
 
   for (const int id : lost_) {
     CliqueRecord& clique = cliques_.edit_unsaved(id);
-    clique.panel = panels_.take(clique.numbers());
+    clique.panel = panels_.take(clique.panel_numbers());
   }
   total_flops_ = saved_total_flops_;
   undo_bytes_left_ = undo_bytes_;

@@ -66,7 +66,7 @@ class JournaledTable {
     forget();
   }
 
-  /// `on_undone(id, now, before)` for every changed record, `on_added(now)` for every one that
+  /// `on_undone(id, now, before)` for every changed record, `on_added(id, now)` for every one that
   /// ceases to be.
   template <typename OnUndone, typename OnAdded>
   void rollback(OnUndone&& on_undone, OnAdded&& on_added) {
@@ -77,7 +77,7 @@ class JournaledTable {
     }
     for (std::size_t i = added_.size(); i-- > 0;) {
       T& record = records_[static_cast<std::size_t>(added_[i])];
-      on_added(record);
+      on_added(added_[i], record);
       record = T{};
       free_.push_back(added_[i]);
     }
