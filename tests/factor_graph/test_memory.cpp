@@ -80,6 +80,20 @@ double needed_bytes(const IncrementalSmoother& smoother) {
   return static_cast<double>(numbers * sizeof(double));
 }
 
+/// Part of the contributions that is there, of all that cliques hand to their parents.
+double kept_part(const IncrementalSmoother& smoother) {
+  double all = 0.0;
+  double kept = 0.0;
+  const auto& cliques = smoother.tree().cliques();
+  for (int c = 1; c < cliques.capacity(); ++c) {
+    if (cliques[c].parent <= 0) continue;
+    const auto numbers = static_cast<double>(cliques[c].contribution_numbers());
+    all += numbers;
+    if (cliques.contributions().find(c) != nullptr) kept += numbers;
+  }
+  return kept / all;
+}
+
 /// Of the memory at its largest, what the numbers in use at that moment do not explain.
 double most_beside(std::size_t undo_bytes) {
   IncrementalParameters parameters;
@@ -93,6 +107,7 @@ double most_beside(std::size_t undo_bytes) {
     REQUIRE(smoother.update().ok);
     most = std::max(most, static_cast<double>(smoother.bytes()) - 1.2 * needed_bytes(smoother));
   }
+  CHECK(kept_part(smoother) < 0.9);
   return most;
 }
 

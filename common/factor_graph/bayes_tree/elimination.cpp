@@ -171,41 +171,11 @@ void Elimination::find_runs(const CliqueRecord& child, int size) {
   }
 }
 
-/// Adds the Schur complement whose `runs_` were found. `column_of(c)` points at its column c's row
-/// 0 (what is above the diagonal is not read).
-template <typename ColumnOf>
-void Elimination::add_contribution(const ColumnOf& column_of, int size) const {
-  for (std::size_t a = 0; a < runs_.size(); ++a) {
-    const Run column = runs_[a];
-    for (int c = 0; c < column.length; ++c) {
-      const double* from = column_of(column.from + c);
-      double* to = front_ + static_cast<std::ptrdiff_t>(column.to + c) * size;
-
-      for (int r = c; r < column.length; ++r) to[column.to + r] += from[column.from + r];
-      for (std::size_t b = a + 1; b < runs_.size(); ++b) {
-        const Run rows = runs_[b];
-        if (rows.to > column.to) {
-          for (int r = 0; r < rows.length; ++r) to[rows.to + r] += from[rows.from + r];
-        } else {
-          // The parent has these in another order: the upper triangle's other half.
-          for (int r = 0; r < rows.length; ++r) {
-            front_[static_cast<std::ptrdiff_t>(rows.to + r) * size + column.to + c] +=
-                from[rows.from + r];
-          }
-        }
-      }
-    }
-  }
-}
-
 void Elimination::add_child(int id, int size) {
   const CliqueRecord& child = cliques_[id];
-  const double* numbers = cliques_.contributions().find(id);
-  const std::ptrdiff_t rest = child.size - child.pivots;
   find_runs(child, size);
-  // Column c begins with its row c, behind rest + (rest - 1) + ... numbers.
-  add_contribution([&](std::ptrdiff_t c) { return numbers + c * rest - c * (c - 1) / 2 - c; },
-                   size);
+  kernel_.add_contribution(front_, size, cliques_.contributions().find(id),
+                           child.size - child.pivots, runs_.data(), static_cast<int>(runs_.size()));
 }
 
 void Elimination::assemble(const CliqueRecord& clique) {

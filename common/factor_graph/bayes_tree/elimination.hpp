@@ -30,11 +30,6 @@ class Elimination {
   void restore_lost();
 
  private:
-  /// Rows of a child that are side by side in the parent, too.
-  struct Run {
-    int from, to, length;
-  };
-
   void order_by_subtrees(std::span<const int> cliques);
   int compute(const CliqueRecord& clique);
   void assemble(const CliqueRecord& clique);
@@ -42,8 +37,6 @@ class Elimination {
   void add_factors(const CliqueRecord& clique);
   void add_child(int id, int size);
   void find_runs(const CliqueRecord& child, int size);
-  template <typename ColumnOf>
-  void add_contribution(const ColumnOf& column_of, int size) const;
   void list_missing_children(int id);
   void rebuild_children(int id);
   void store_contribution(int id);
@@ -60,7 +53,7 @@ class Elimination {
   std::vector<int> offset_;    ///< Per variable of the graph: its first row.
   std::vector<double> least_;  ///< Per pivot: at or below this it has no information.
   std::vector<int> left_out_;
-  std::vector<Run> runs_;
+  std::vector<RowRun> runs_;
   std::vector<int> targets_;  ///< Rows of one factor's columns.
 };
 
