@@ -2,6 +2,7 @@
 #include "common/factor_graph/bayes_tree/front_kernel.hpp"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <limits>
 #include <random>
 #include <vector>
@@ -88,5 +89,43 @@ TEST_CASE("A pivot without information is left out and touches nothing", "[front
       CHECK(front.col(empty).tail(size - empty - 1).isZero(0.0));
       CHECK(front.row(empty).head(empty).isZero(0.0));
     }
+  }
+}
+
+TEST_CASE("A contribution lands where the runs say, in whatever order the parent has its rows",
+          "[front_kernel]") {
+  using factor_graph::bayes_tree::RowRun;
+  // Rows of the child side by side: three, one, nine, twenty, the right-hand side.
+  const std::vector<RowRun> runs{{0, 30, 3}, {3, 7, 1}, {4, 36, 9}, {13, 8, 20}, {33, 49, 1}};
+  constexpr int kRest = 34;
+  constexpr int kSize = 50;
+  std::mt19937_64 random(5);
+  const Eigen::MatrixXd child = random_front(random, kRest);
+  std::vector<double> packed;
+  for (int c = 0; c < kRest; ++c) {
+    for (int r = c; r < kRest; ++r) packed.push_back(child(r, c));
+  }
+
+  const auto row_of = [&](int row) {
+    for (const RowRun& run : runs) {
+      if (row < run.from + run.length) return run.to + row - run.from;
+    }
+    return 0;
+  };
+  const Eigen::MatrixXd before = random_front(random, kSize);
+  Eigen::MatrixXd expected = before;
+  for (int c = 0; c < kRest; ++c) {
+    for (int r = c; r < kRest; ++r) {
+      const int a = row_of(r);
+      const int b = row_of(c);
+      expected(std::max(a, b), std::min(a, b)) += child(r, c);
+    }
+  }
+
+  for (const factor_graph::bayes_tree::FrontKernel& kernel : kernels()) {
+    Eigen::MatrixXd front = before;
+    kernel.add_contribution(front.data(), kSize, packed.data(), kRest, runs.data(),
+                            static_cast<int>(runs.size()));
+    CHECK((front - expected).cwiseAbs().maxCoeff() == 0.0);
   }
 }

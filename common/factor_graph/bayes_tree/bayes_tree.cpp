@@ -15,8 +15,9 @@ bool is_left_out(const CliqueRecord& clique, int column) {
 
 }  // namespace
 
-BayesTree::BayesTree(graph::FactorGraph& graph)
+BayesTree::BayesTree(graph::FactorGraph& graph, std::size_t undo_bytes)
     : graph_(graph),
+      cliques_(undo_bytes),
       restructuring_(graph_, cliques_),
       elimination_(graph_, cliques_),
       back_substitution_(graph_, cliques_, waiting_),
@@ -72,10 +73,8 @@ TreeStatistics BayesTree::eliminate(std::span<const int> fresh, std::span<const 
   // From here on the structure is final.
   marks_.clear();
   marks_.resize(cliques_.capacity());
-  for (const int c : computed_) {
-    elimination_.factorise(c);
-    statistics.flops += flops_of(cliques_[c]);
-  }
+  elimination_.factorise(computed_);
+  for (const int c : computed_) statistics.flops += flops_of(cliques_[c]);
   return statistics;
 }
 
@@ -110,8 +109,8 @@ std::vector<int> BayesTree::undetermined() const {
   return variables;
 }
 
-void BayesTree::commit() {
-  cliques_.commit();
+void BayesTree::commit(bool is_whole) {
+  cliques_.commit(is_whole && marks_.structural().empty() && marks_.dirty().empty());
   marks_.commit();
   waiting_.commit();
 }
@@ -120,6 +119,7 @@ void BayesTree::rollback() {
   cliques_.rollback();
   marks_.rollback(cliques_.capacity());
   waiting_.rollback(cliques_.capacity());
+  elimination_.restore_lost();
 }
 
 }  // namespace understory::factor_graph::bayes_tree

@@ -24,13 +24,17 @@ struct TreeStatistics {
   double flops = 0.0;             ///< Floating-point operations.
 };
 
+/// Memory for numbers that a rollback would need, unless something else is asked for [bytes].
+constexpr std::size_t kUndoBytes = std::size_t{1} << 20U;
+
 /// A factor graph as a tree of dense fronts: puts together its structure, what is out of date in
 /// it, and the steps that bring it up to date. State: cliques, marks and the waiting queue; all
 /// else is scratch memory of the steps.
 class BayesTree {
  public:
-  /// A tree of this graph, which must outlive it; empty until eliminate().
-  explicit BayesTree(graph::FactorGraph& graph);
+  /// A tree of this graph, which must outlive it; empty until eliminate(). `undo_bytes`: see
+  /// CliqueTree.
+  explicit BayesTree(graph::FactorGraph& graph, std::size_t undo_bytes = kUndoBytes);
 
   /// The variable's clique and all above it will be built anew.
   void mark_structure(int variable);
@@ -73,9 +77,10 @@ class BayesTree {
   /// Floating-point operations of one factorisation of the whole tree.
   double total_flops() const { return cliques_.total_flops(); }
 
-  /// Makes all changes final.
-  void commit();
-  /// Restores the state of the last commit(), exactly; costs what changed.
+  /// Makes all changes final. `is_whole`: no factor of the graph waits for eliminate().
+  void commit(bool is_whole);
+  /// Restores the state of the last commit(), exactly; costs what changed. The graph must be the
+  /// one of then already.
   void rollback();
 
  private:

@@ -5,16 +5,6 @@
 #include "common/factor_graph/graph/factor_graph.hpp"
 
 namespace understory::factor_graph::bayes_tree {
-namespace {
-
-/// Time of one front [us], fitted to the kernel: overhead, moving its numbers, eliminating.
-double front_cost(double pivots, double separator) {
-  const double size = pivots + separator + 1.0;
-  return 0.25 + 0.0006 * size * size + 0.00015 * elimination_flops(pivots, separator + 1.0);
-}
-
-}  // namespace
-
 double CliqueDrafts::flops() const {
   double sum = 0.0;
   for (const Draft& draft : drafts_) {
@@ -88,9 +78,9 @@ void CliqueDrafts::merge_children(int position, int first_child) {
   for (int c = first_child; c != graph::kNone;) {
     Draft& child = drafts_[static_cast<std::size_t>(c)];
     const int next = child.next;
-    const double apart = front_cost(parent.pivots, parent.separator_size) +
-                         front_cost(child.pivots, child.separator_size);
-    if (front_cost(parent.pivots + child.pivots, parent.separator_size) <= apart) {
+    const double apart = front_time_us(parent.pivots, parent.separator_size) +
+                         front_time_us(child.pivots, child.separator_size);
+    if (front_time_us(parent.pivots + child.pivots, parent.separator_size) <= apart) {
       child.alive = false;
       next_frontal_[static_cast<std::size_t>(child.last_frontal)] = parent.first_frontal;
       parent.first_frontal = child.first_frontal;

@@ -8,9 +8,9 @@ double flops_of(const CliqueRecord& clique) {
   return elimination_flops(clique.pivots, clique.size - clique.pivots);
 }
 
-CliqueTree::CliqueTree() {
+CliqueTree::CliqueTree(std::size_t undo_bytes) : undo_bytes_(undo_bytes) {
   cliques_.add();
-  commit();
+  commit(true);
 }
 
 int CliqueTree::add(int frontal_count, int row_count) {
@@ -54,20 +54,48 @@ void CliqueTree::remove(std::span<const int> ids) {
     flops += flops_of(cliques_[c]);
     if (cliques_[c].parent == kRoot) unlink_from_root(c);
     count_undetermined(cliques_[c].left_out > 0 ? -1 : 0);
-    cliques_.edit(c).parent = graph::kNone;
+    CliqueRecord& clique = cliques_.edit(c);
+    clique.parent = graph::kNone;
+    drop_panel(clique);
+    contributions_.drop(c);
     cliques_.remove(c);
   }
   total_flops_ -= flops;
 }
 
-double* CliqueTree::writable_panel(int id, bool keeps_schur) {
+/// False: the numbers of the last commit are to be given up. Asked once for each clique.
+bool CliqueTree::keeps_for_undo(const CliqueRecord& clique) {
+  if (keeps_all_) return true;
+  const std::size_t bytes = clique.panel_numbers() * sizeof(double);
+  if (bytes > undo_bytes_left_) return false;
+  undo_bytes_left_ -= bytes;
+  return true;
+}
+
+double* CliqueTree::writable_panel(int id) {
   CliqueRecord& clique = cliques_.edit(id);
-  if (clique.panel == nullptr || clique.panel_epoch != cliques_.epoch()) {
-    clique.keeps_schur = keeps_schur;
-    clique.panel = panels_.take(clique.numbers());
-    clique.panel_epoch = cliques_.epoch();
+  if (clique.panel == nullptr) {
+    clique.panel = panels_.take(clique.panel_numbers());
+  } else if (clique.panel_epoch != cliques_.epoch()) {
+    if (keeps_for_undo(clique)) {
+      clique.panel = panels_.take(clique.panel_numbers());
+    } else {
+      clique.lost_epoch = cliques_.epoch();
+    }
   }
+  clique.panel_epoch = cliques_.epoch();
   return clique.panel;
+}
+
+/// Of a clique that leaves the tree: numbers of before the last commit stay where they fit.
+void CliqueTree::drop_panel(CliqueRecord& clique) {
+  if (clique.panel == nullptr) return;
+  if (clique.panel_epoch != cliques_.epoch()) {
+    if (keeps_for_undo(clique)) return;
+    clique.lost_epoch = cliques_.epoch();
+  }
+  panels_.give_back(clique.panel, clique.panel_numbers());
+  clique.panel = nullptr;
 }
 
 void CliqueTree::set_left_out(int id, int count) {
@@ -86,26 +114,45 @@ void CliqueTree::free_blocks(const CliqueRecord& clique) {
   if (clique.rows != nullptr) {
     rows_.give_back(clique.rows, static_cast<std::size_t>(clique.row_count));
   }
-  if (clique.panel != nullptr) panels_.give_back(clique.panel, clique.numbers());
+  if (clique.panel != nullptr) panels_.give_back(clique.panel, clique.panel_numbers());
 }
 
-void CliqueTree::commit() {
+void CliqueTree::commit(bool is_up_to_date) {
+  const std::uint64_t epoch = cliques_.epoch();
   cliques_.commit([&](const CliqueRecord& gone) { free_blocks(gone); },
                   [&](const CliqueRecord& before, const CliqueRecord& now) {
-                    if (before.panel != nullptr && before.panel != now.panel) {
-                      panels_.give_back(before.panel, before.numbers());
+                    const bool is_kept = before.panel != nullptr && now.lost_epoch != epoch;
+                    if (is_kept && before.panel != now.panel) {
+                      panels_.give_back(before.panel, before.panel_numbers());
                     }
                   });
   saved_total_flops_ = total_flops_;
+  undo_bytes_left_ = undo_bytes_;
+  keeps_all_ = !is_up_to_date;
+  lost_.clear();
 }
 
 void CliqueTree::rollback() {
+  const std::uint64_t epoch = cliques_.epoch();
+  lost_.clear();
   cliques_.rollback(
-      [&](const CliqueRecord& now, const CliqueRecord& before) {
-        if (now.panel != before.panel) panels_.give_back(now.panel, now.numbers());
+      [&](int id, const CliqueRecord& now, const CliqueRecord& before) {
+        if (now.panel_epoch == epoch) contributions_.drop(id);
+        if (now.lost_epoch == epoch) lost_.push_back(id);
+        const bool is_other = now.panel != before.panel || now.lost_epoch == epoch;
+        if (is_other && now.panel != nullptr) panels_.give_back(now.panel, now.panel_numbers());
       },
-      [&](const CliqueRecord& gone) { free_blocks(gone); });
+      [&](int id, const CliqueRecord& gone) {
+        contributions_.drop(id);
+        free_blocks(gone);
+      });
+
+  for (const int id : lost_) {
+    CliqueRecord& clique = cliques_.edit_unsaved(id);
+    clique.panel = panels_.take(clique.panel_numbers());
+  }
   total_flops_ = saved_total_flops_;
+  undo_bytes_left_ = undo_bytes_;
 }
 
 }  // namespace understory::factor_graph::bayes_tree

@@ -4,7 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
+#include "common/factor_graph/bayes_tree/contributions.hpp"
 #include "common/factor_graph/graph/factor_graph.hpp"
 #include "common/factor_graph/storage/block_pool.hpp"
 #include "common/factor_graph/storage/journaled_table.hpp"
@@ -23,22 +25,23 @@ struct CliqueRecord {
   int pivots = 0;                   ///< Degrees of freedom of the frontal variables.
   int size = 0;                     ///< Rows of the front: all degrees of freedom, right-hand side.
   int left_out = 0;                 ///< Pivots without information; in the root: such cliques.
-  bool keeps_schur = true;          ///< False: computed again whenever the parent is.
+  bool keeps_contribution = true;   ///< False: it is dropped as soon as the parent is computed.
+  float rebuild_us = 0.0F;          ///< Modelled time of computing the contribution again.
   int* rows = nullptr;              ///< Names of the `row_count` variables.
   /// size x pivots, column-major: the frontal variables' columns of L; the last row is the
-  /// right-hand side. Behind it, where `keeps_schur`, the lower triangle of the Schur complement on
-  /// the separator, column by column.
+  /// right-hand side.
   double* panel = nullptr;
-  std::uint64_t panel_epoch = 0;  ///< Epoch of the tree's journal in which `panel` was taken.
+  std::uint64_t panel_epoch = 0;  ///< Epoch of the tree's journal in which `panel` was written.
+  std::uint64_t lost_epoch = 0;   ///< Epoch in which the numbers of the last commit were given up.
 
-  /// Length of the columns of L in `panel`.
+  /// Length of `panel`.
   std::size_t panel_numbers() const {
     return static_cast<std::size_t>(size) * static_cast<std::size_t>(pivots);
   }
-  /// Length of `panel`, with the Schur complement where it is kept.
-  std::size_t numbers() const {
+  /// Length of the contribution.
+  std::size_t contribution_numbers() const {
     const auto rest = static_cast<std::size_t>(size - pivots);
-    return panel_numbers() + (keeps_schur ? rest * (rest + 1) / 2 : 0);
+    return rest * (rest + 1) / 2;
   }
 };
 
@@ -47,13 +50,15 @@ double flops_of(const CliqueRecord& clique);
 
 /// Owns the cliques, their parent and child links, and the memory of their rows and numbers. Every
 /// change is journaled: rollback() restores the tree of the last commit() at the cost of what
-/// changed. Does not interpret the numbers.
+/// changed. Numbers of the last commit are kept beside the new ones as far as they fit into
+/// `undo_bytes`: a second set of them all would be half of the memory. What else rollback() needs
+/// is to be computed again. Does not interpret the numbers.
 class CliqueTree {
  public:
   /// Parent of all trees of the forest; holds no variables.
   static constexpr int kRoot = 0;
 
-  CliqueTree();
+  explicit CliqueTree(std::size_t undo_bytes);
   CliqueTree(const CliqueTree&) = delete;
   CliqueTree& operator=(const CliqueTree&) = delete;
 
@@ -72,9 +77,13 @@ class CliqueTree {
   void count_work(int id);
   /// Takes these cliques out of the tree. The parent of each is the root or among them.
   void remove(std::span<const int> ids);
-  /// Memory for the clique's numbers that a rollback can do without: a new block in the first call
-  /// since the last commit. `keeps_schur` is taken over with a new block.
-  double* writable_panel(int id, bool keeps_schur);
+  /// Memory for the clique's columns of L, to be written anew.
+  double* writable_panel(int id);
+  /// What cliques hand to their parents. That of a clique whose numbers change is the caller's to
+  /// write anew; a rollback drops it.
+  Contributions& contributions() { return contributions_; }
+  /// The same, to look at.
+  const Contributions& contributions() const { return contributions_; }
   /// Number of pivots without information that the last elimination of the clique left out.
   void set_left_out(int id, int count);
 
@@ -83,14 +92,21 @@ class CliqueTree {
   /// Floating-point operations of one elimination of the whole tree.
   double total_flops() const { return total_flops_; }
   /// Memory taken from the system [bytes].
-  std::size_t bytes() const { return panels_.bytes() + rows_.bytes(); }
+  std::size_t bytes() const { return panels_.bytes() + rows_.bytes() + contributions_.bytes(); }
 
-  /// Makes all changes final.
-  void commit();
-  /// Restores the state of the last commit().
+  /// Makes all changes final. `is_up_to_date`: every clique's numbers are those of its factors and
+  /// children, so that they can be computed again; if not, all are kept for a rollback.
+  void commit(bool is_up_to_date);
+  /// Restores the state of the last commit(), but for the numbers of the cliques in lost().
   void rollback();
+  /// Cliques whose numbers the last rollback() could not restore; their parents may be among them.
+  std::span<const int> lost() const { return lost_; }
+  /// Where the numbers of one of lost() belong.
+  double* lost_panel(int id) { return cliques_[id].panel; }
 
  private:
+  bool keeps_for_undo(const CliqueRecord& clique);
+  void drop_panel(CliqueRecord& clique);
   void free_blocks(const CliqueRecord& clique);
   void unlink_from_root(int child);
   void count_undetermined(int change);
@@ -98,8 +114,13 @@ class CliqueTree {
   storage::JournaledTable<CliqueRecord> cliques_;
   storage::BlockPool<double> panels_;
   storage::BlockPool<int> rows_;
+  Contributions contributions_;
   double total_flops_ = 0.0;
   double saved_total_flops_ = 0.0;
+  std::size_t undo_bytes_;
+  std::size_t undo_bytes_left_ = 0;  ///< Until the next commit.
+  bool keeps_all_ = false;
+  std::vector<int> lost_;
 };
 
 }  // namespace understory::factor_graph::bayes_tree

@@ -1,6 +1,7 @@
 // The numbers of the tree: dense fronts, assembled and factorised.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "common/factor_graph/bayes_tree/clique_tree.hpp"
@@ -21,39 +22,38 @@ class Elimination {
 
   /// Lists the cliques whose numbers alone are marked, children first.
   void list_dirty(const Marks& marks, std::vector<int>& computed);
-  /// Computes the clique's columns of L; its children must be up to date.
-  void factorise(int id);
+  /// Computes these cliques' columns of L; all below them must be up to date or among them. What a
+  /// clique hands to its parent stays only where computing it again would take long for its size.
+  void factorise(std::span<const int> cliques);
+  /// Computes the numbers that a rollback could not restore: from the same factors by the same
+  /// operations, so that they are the same. The graph must be the one of then.
+  void restore_lost();
 
  private:
-  /// One front at work: size x size, column-major, lower triangle.
-  struct Workspace {
-    std::vector<double> numbers;
-    double* front = nullptr;
-    std::vector<int> offset;    ///< Per variable of the graph: its first row.
-    std::vector<double> least;  ///< Per pivot: at or below this it has no information.
-  };
-  /// Rows of a child that are side by side in the parent, too.
-  struct Run {
-    int from, to, length;
-  };
-
-  int compute(const CliqueRecord& clique, Workspace& at);
-  void assemble(const CliqueRecord& clique, Workspace& at);
-  void place_rows(const CliqueRecord& clique, Workspace& at) const;
-  void add_factors(const CliqueRecord& clique, Workspace& at);
-  void add_child(const CliqueRecord& child, Workspace& at, int size);
-  void find_runs(const CliqueRecord& child, const Workspace& at, int size);
-  template <typename ColumnOf>
-  void add_schur(const ColumnOf& column_of, double* front, int size) const;
+  void order_by_subtrees(std::span<const int> cliques);
+  int compute(const CliqueRecord& clique);
+  void assemble(const CliqueRecord& clique);
+  void place_rows(const CliqueRecord& clique);
+  void add_factors(const CliqueRecord& clique);
+  void add_child(int id, int size);
+  void find_runs(const CliqueRecord& child, int size);
+  void list_missing_children(int id);
+  void rebuild_children(int id);
+  void store_contribution(int id);
+  void judge_contribution(int id);
 
   const graph::FactorGraph& graph_;
   CliqueTree& cliques_;
   FrontKernel kernel_;
-  std::vector<int> pending_;  ///< Per clique: dirty children not yet listed; zero between calls.
-  Workspace own_space_;
-  Workspace leaf_space_;  ///< Of a child that is computed for its parent's sake.
+  std::vector<int> pending_;     ///< Per clique: dirty children not yet listed; zero between calls.
+  std::vector<char> is_listed_;  ///< Per clique; zero between calls.
+  std::vector<int> order_, stack_, missing_;
+  std::vector<double> numbers_;  ///< One front: size x size, column-major, lower triangle.
+  double* front_ = nullptr;
+  std::vector<int> offset_;    ///< Per variable of the graph: its first row.
+  std::vector<double> least_;  ///< Per pivot: at or below this it has no information.
   std::vector<int> left_out_;
-  std::vector<Run> runs_;
+  std::vector<RowRun> runs_;
   std::vector<int> targets_;  ///< Rows of one factor's columns.
 };
 

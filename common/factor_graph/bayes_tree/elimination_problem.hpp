@@ -15,6 +15,12 @@ constexpr double elimination_flops(double pivots, double rest) {
   return pivots * (pivots * pivots / 3.0 + pivots * rest + rest * rest);
 }
 
+/// Time of one front [us], fitted to the kernel: overhead, moving its numbers, eliminating.
+constexpr double front_time_us(double pivots, double separator) {
+  const double size = pivots + separator + 1.0;
+  return 0.25 + 0.0006 * size * size + 0.00015 * elimination_flops(pivots, separator + 1.0);
+}
+
 /// A planner's input: variables by number, and elements (sets of variables that become neighbours).
 class EliminationProblem {
  public:

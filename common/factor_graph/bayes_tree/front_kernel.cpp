@@ -4,7 +4,9 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-FrontKernel front_kernel_portable() { return {&partial_cholesky<2, 4>, &solve_pivots<2>}; }
+FrontKernel front_kernel_portable() {
+  return {&partial_cholesky<2, 4>, &add_runs<2>, &solve_pivots<2>};
+}
 
 FrontKernel front_kernel() {
 #if defined(__x86_64__)

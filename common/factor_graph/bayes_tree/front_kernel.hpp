@@ -3,7 +3,12 @@
 
 namespace understory::factor_graph::bayes_tree {
 
-/// Two functions on one front, compiled for one kind of processor.
+/// Rows of a child's contribution that are side by side in the parent's front, too.
+struct RowRun {
+  int from, to, length;
+};
+
+/// Functions on one front, compiled for one kind of processor.
 ///
 /// Factorisation: partial Cholesky in place. `front`: symmetric, size x size, column-major, lower
 /// triangle. The first `pivots` columns become those of L; the rest becomes the Schur complement.
@@ -11,11 +16,16 @@ namespace understory::factor_graph::bayes_tree {
 /// The last row and column (the right-hand side) is never a pivot. Returns how many were left out;
 /// their numbers go to `left_out`.
 ///
+/// Assembly: adds a child's contribution, `rest` rows, lower triangle column by column, whose rows
+/// go where the runs say; the last run is the right-hand side.
+///
 /// Back-substitution: `step` holds the separator's values behind `pivots` free places, which it
 /// fills.
 struct FrontKernel {
   int (*factorise)(double* front, int size, int pivots, const double* least,
                    int* left_out) = nullptr;
+  void (*add_contribution)(double* front, int size, const double* contribution, int rest,
+                           const RowRun* runs, int run_count) = nullptr;
   void (*back_substitute)(const double* front, int size, int pivots, double* step) = nullptr;
 };
 

@@ -5,7 +5,9 @@
 namespace understory::factor_graph::bayes_tree {
 
 #if defined(__AVX2__) && defined(__FMA__)
-FrontKernel front_kernel_avx2() { return {&partial_cholesky<4, 4>, &solve_pivots<4>}; }
+FrontKernel front_kernel_avx2() {
+  return {&partial_cholesky<4, 4>, &add_runs<4>, &solve_pivots<4>};
+}
 #else
 FrontKernel front_kernel_avx2() { return {}; }
 #endif

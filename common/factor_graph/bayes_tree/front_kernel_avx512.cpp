@@ -17,7 +17,7 @@ int factorise(double* front, int size, int pivots, const double* least, int* lef
 
 }  // namespace
 
-FrontKernel front_kernel_avx512() { return {&factorise, &solve_pivots<4>}; }
+FrontKernel front_kernel_avx512() { return {&factorise, &add_runs<4>, &solve_pivots<4>}; }
 #else
 FrontKernel front_kernel_avx512() { return {}; }
 #endif

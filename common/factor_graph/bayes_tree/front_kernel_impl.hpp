@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "common/factor_graph/bayes_tree/front_kernel.hpp"
+
 namespace understory::factor_graph::bayes_tree {
 namespace {
 
@@ -126,6 +128,42 @@ int partial_cholesky(double* front, int size, int pivots, const double* least, i
     update_some<width, panel>(front, ld, j, ld - j < kColumns ? ld - j : kColumns, pivots);
   }
   return bad;
+}
+
+template <int width>
+inline void add_numbers(double* to, const double* from, int count) {
+  using Vector = typename VectorOf<width>::type;
+  int i = 0;
+  for (; i + width <= count; i += width) {
+    Vector* out = reinterpret_cast<Vector*>(to + i);
+    *out = *out + *reinterpret_cast<const Vector*>(from + i);
+  }
+  for (; i < count; ++i) to[i] += from[i];
+}
+
+template <int width>
+void add_runs(double* front, int size, const double* contribution, int rest, const RowRun* runs,
+              int run_count) {
+  const double* from = contribution;  // the column's row 0; what is above the diagonal is not read
+  const long ld = size;
+  for (int a = 0; a < run_count; ++a) {
+    const RowRun column = runs[a];
+    for (int c = 0; c < column.length; ++c) {
+      double* to = front + (column.to + c) * ld;
+      add_numbers<width>(to + column.to + c, from + column.from + c, column.length - c);
+      for (int b = a + 1; b < run_count; ++b) {
+        const RowRun rows = runs[b];
+        if (rows.to > column.to) {
+          add_numbers<width>(to + rows.to, from + rows.from, rows.length);
+          continue;
+        }
+        // The parent has these in another order: the upper triangle's other half.
+        double* across = front + rows.to * ld + column.to + c;
+        for (int r = 0; r < rows.length; ++r) across[r * ld] += from[rows.from + r];
+      }
+      from += rest - 1 - (column.from + c);
+    }
+  }
 }
 
 template <int width>

@@ -63,7 +63,7 @@ std::string name_of(const graph::FactorGraph& graph, graph::VariableId id) {
 
 IncrementalSmoother::IncrementalSmoother(const IncrementalParameters& parameters)
     : parameters_(parameters),
-      tree_(graph_),
+      tree_(graph_, parameters.undo_bytes),
       relinearisation_(graph_, tree_),
       judge_(graph_, tree_) {
   pending_.unit = saved_pending_.unit = parameters.first_unit;
@@ -78,7 +78,7 @@ void IncrementalSmoother::begin_change() {
 
 void IncrementalSmoother::commit() {
   graph_.commit();
-  tree_.commit();
+  tree_.commit(pending_.fresh.empty());
   relinearisation_.commit();
   saved_pending_ = pending_;
   updated_ = false;
@@ -90,8 +90,8 @@ void IncrementalSmoother::checkpoint() {
 }
 
 void IncrementalSmoother::rollback() {
+  graph_.rollback();  // first: the tree computes numbers of then from it
   tree_.rollback();
-  graph_.rollback();
   relinearisation_.rollback();
   pending_ = saved_pending_;
   has_checkpoint_ = false;

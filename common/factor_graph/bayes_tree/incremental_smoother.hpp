@@ -36,6 +36,9 @@ struct IncrementalParameters {
   double thorough_move = 0.01;               ///< least_move of a thorough update.
   double thorough_relinearise_above = 0.05;  ///< relinearise_above of a thorough update.
   double first_unit = 0.1;                   ///< The unit until it is measured [sigmas].
+  /// Memory for numbers that a rollback would need. What does not fit is computed again by the
+  /// rollback, at the cost of the updates that it takes back.
+  std::size_t undo_bytes = kUndoBytes;
 };
 
 /// What an update found. An update never throws for what was measured; see `undetermined`.

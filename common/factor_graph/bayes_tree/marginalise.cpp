@@ -99,7 +99,11 @@ bool IncrementalSmoother::marginalise(std::span<const graph::VariableId> ids) {
   const Eigen::Index gone = all.gone_columns;
   const Eigen::Index kept = all.columns - gone;
   const Eigen::LLT<Eigen::MatrixXd> cholesky(sum.topLeftCorner(gone, gone));
-  if (gone > 0 && cholesky.info() != Eigen::Success) return false;
+  if (gone > 0 && cholesky.info() != Eigen::Success) {
+    // The factors stay, and are linearised otherwise than the tree has them.
+    for (const int f : all.factors) tree_.mark_numbers(f);
+    return false;
+  }
   const Eigen::MatrixXd cross = sum.block(gone, 0, kept + 1, gone);
   const Eigen::MatrixXd rest =
       sum.bottomRightCorner(kept + 1, kept + 1) - cross * cholesky.solve(cross.transpose());

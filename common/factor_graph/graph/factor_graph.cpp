@@ -312,15 +312,15 @@ void FactorGraph::commit() {
 
 void FactorGraph::rollback() {
   factors_.rollback(
-      [&](const FactorRecord& now, const FactorRecord& before) {
+      [&](int, const FactorRecord& now, const FactorRecord& before) {
         if (now.linear != before.linear) pool_.give_back(now.linear, linear_size(now));
       },
-      [&](const FactorRecord& gone) {
+      [&](int, const FactorRecord& gone) {
         free_blocks(gone);
         if (gone.linear != nullptr) pool_.give_back(gone.linear, linear_size(gone));
       });
-  incidences_.rollback([](const auto&, const auto&) {}, [](const auto&) {});
-  variables_.rollback([](const auto&, const auto&) {}, [](const auto&) {});
+  incidences_.rollback([](int, const auto&, const auto&) {}, [](int, const auto&) {});
+  variables_.rollback([](int, const auto&, const auto&) {}, [](int, const auto&) {});
 }
 
 }  // namespace understory::factor_graph::graph

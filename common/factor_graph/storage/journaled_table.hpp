@@ -66,18 +66,18 @@ class JournaledTable {
     forget();
   }
 
-  /// `on_undone(now, before)` for every changed record, `on_added(now)` for every one that ceases
-  /// to be.
+  /// `on_undone(id, now, before)` for every changed record, `on_added(id, now)` for every one that
+  /// ceases to be.
   template <typename OnUndone, typename OnAdded>
   void rollback(OnUndone&& on_undone, OnAdded&& on_added) {
     for (const Saved& saved : saved_) {
       T& record = records_[static_cast<std::size_t>(saved.id)];
-      on_undone(record, saved.record);
+      on_undone(saved.id, record, saved.record);
       record = saved.record;
     }
     for (std::size_t i = added_.size(); i-- > 0;) {
       T& record = records_[static_cast<std::size_t>(added_[i])];
-      on_added(record);
+      on_added(added_[i], record);
       record = T{};
       free_.push_back(added_[i]);
     }
