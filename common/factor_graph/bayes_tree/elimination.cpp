@@ -10,7 +10,8 @@ namespace {
 /// A pivot below this part of the information that went into it is rounding noise.
 constexpr double kLeastPivot = 1e-13;
 /// A contribution is kept where computing it again takes more time than this per number [us], and
-/// where it is small. Of the fronts of a sphere it saves a sixth of all memory for 1 % of the time.
+/// where it is small: on a sphere of 2500 poses the others are a sixth of all memory and cost 1.5 %
+/// of the fronts' time.
 constexpr double kWorthKeeping = 0.006;
 constexpr int kFewRows = 48;
 

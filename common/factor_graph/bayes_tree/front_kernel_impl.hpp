@@ -138,30 +138,42 @@ inline void add_numbers(double* to, const double* from, int count) {
     Vector* out = reinterpret_cast<Vector*>(to + i);
     *out = *out + *reinterpret_cast<const Vector*>(from + i);
   }
-  for (; i < count; ++i) to[i] += from[i];
+  if constexpr (width > 2) return add_numbers<width / 2>(to + i, from + i, count - i);
+  if (i < count) to[i] += from[i];
+}
+
+/// One run's columns and another run's rows. `from`: the first of these columns, its row 0.
+template <int width>
+inline void add_block(double* front, long ld, const double* from, int rest, const RowRun& columns,
+                      const RowRun& rows) {
+  const bool is_below = rows.to > columns.to;
+  double* to = front + (is_below ? columns.to * ld + rows.to : rows.to * ld + columns.to);
+  from += rows.from;
+  for (int c = 0; c < columns.length; ++c) {
+    if (is_below) {
+      add_numbers<width>(to + c * ld, from, rows.length);
+    } else {
+      // The parent has these in another order: the upper triangle's other half.
+      for (int r = 0; r < rows.length; ++r) to[r * ld + c] += from[r];
+    }
+    from += rest - 1 - (columns.from + c);
+  }
 }
 
 template <int width>
 void add_runs(double* front, int size, const double* contribution, int rest, const RowRun* runs,
               int run_count) {
-  const double* from = contribution;  // the column's row 0; what is above the diagonal is not read
+  const double* from = contribution;  // a column's row 0; what is above the diagonal is not read
   const long ld = size;
   for (int a = 0; a < run_count; ++a) {
-    const RowRun column = runs[a];
-    for (int c = 0; c < column.length; ++c) {
-      double* to = front + (column.to + c) * ld;
-      add_numbers<width>(to + column.to + c, from + column.from + c, column.length - c);
-      for (int b = a + 1; b < run_count; ++b) {
-        const RowRun rows = runs[b];
-        if (rows.to > column.to) {
-          add_numbers<width>(to + rows.to, from + rows.from, rows.length);
-          continue;
-        }
-        // The parent has these in another order: the upper triangle's other half.
-        double* across = front + rows.to * ld + column.to + c;
-        for (int r = 0; r < rows.length; ++r) across[r * ld] += from[rows.from + r];
-      }
-      from += rest - 1 - (column.from + c);
+    const RowRun columns = runs[a];
+    for (int b = a + 1; b < run_count; ++b) {
+      add_block<width>(front, ld, from, rest, columns, runs[b]);
+    }
+    for (int c = 0; c < columns.length; ++c) {
+      add_numbers<width>(front + (columns.to + c) * (ld + 1), from + columns.from + c,
+                         columns.length - c);
+      from += rest - 1 - (columns.from + c);
     }
   }
 }
