@@ -60,7 +60,7 @@ EXPERIMENTS = (
     _eval("forest-plots", "frontend --only forest-plots --data DATA", 8, ("forest_3d_scans",)),
     _eval("frontend-filter", "frontend --runs 1000 --jobs 2 --only filter", 60),
     _eval("frontend-mismatch", "frontend --runs 20 --seed 11 --only mismatch", 6),
-    _eval("wheels", "wheels --seeds 20 --first-seed 100 --jobs 2", 90),
+    _eval("wheels", "wheels --seeds 20 --first-seed 100 --length-m 500 --lidar vlp16 --jobs 2", 30),
     _eval("frontend-filter-lidar", "frontend --runs 150 --seed 7 --jobs 2 --only filter", 20),
     _eval("frontend-faults", "frontend --only faults --config deploy/config/lidar", 6),
     _eval("landmarks-vs-error", "landmarks-vs-error --seed 1 --jobs 2", 10),
