@@ -3,13 +3,59 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "common/model/preintegration.hpp"
+
 namespace understory::model {
 namespace {
 
 /// Rounding of stamps between consecutive increments.
 constexpr Utime kGapTolerance_us = 1000;
 
+/// Correlation time of the error of the filter's velocity: it has the power tau * dt when
+/// increments are compounded.
+constexpr double kVelocityCorrelation_s = 0.5;
 constexpr std::size_t kMaxIncrements = 20000;
+
+bool begins_at(const Odometry& increment, Utime utime) {
+  return std::abs(increment.from_utime - utime) <= kGapTolerance_us;
+}
+
+/// The increment's samples with the filter's bias of the accelerometer; the gyro's stays.
+Preintegration inertial_of(const Odometry& increment, const VelocityEstimate& start) {
+  InertialBias bias = start.bias;
+  bias.x() = increment.inertial->bias.x();
+  return at_bias(*increment.inertial, bias);
+}
+
+/// The increment's translation, started at the given velocity; the rotation stays.
+geometry::SE2WithCovariance motion_from(const VelocityEstimate& start, const Odometry& increment,
+                                        const Preintegration& inertial) {
+  const double dt = inertial.seconds;
+  geometry::SE2WithCovariance motion;
+  motion.mean =
+      geometry::SE2(start.velocity_mps * dt + inertial.position_m, increment.from_T_to.theta());
+
+  // The noise of the IMU and of the starting velocity, in the axes of the end.
+  const Eigen::Matrix2d back = motion.mean.rotation().transpose();
+  const Eigen::Matrix2d of_start =
+      OdometryBuffer::kInflation * dt * std::max(dt, kVelocityCorrelation_s) * start.covariance;
+  motion.covariance(2, 2) = increment.covariance(2, 2);
+  motion.covariance.topLeftCorner<2, 2>() =
+      back * (of_start + inertial.covariance.bottomRightCorner<2, 2>()) * back.transpose();
+  return motion;
+}
+
+/// The velocity at the increment's end.
+VelocityEstimate carried_over(const VelocityEstimate& start, const Odometry& increment) {
+  const Preintegration inertial = inertial_of(increment, start);
+  const Eigen::Matrix2d back = geometry::SE2(0.0, 0.0, inertial.yaw_rad).rotation().transpose();
+  VelocityEstimate end = start;
+  end.utime = increment.utime;
+  end.velocity_mps = back * (start.velocity_mps + inertial.velocity_mps);
+  end.covariance =
+      back * (start.covariance + inertial.covariance.block<2, 2>(1, 1)) * back.transpose();
+  return end;
+}
 
 geometry::SE2WithCovariance part(const Odometry& increment, Utime from, Utime to) {
   const double fraction =
@@ -26,8 +72,40 @@ bool OdometryBuffer::add(const Odometry& increment) {
   if (!increments_.empty() && increment.from_utime < increments_.back().utime - kGapTolerance_us)
     return false;
   increments_.push_back(increment);
+  if (velocity_) start_at_velocity(increments_.back());
   if (increments_.size() > kMaxIncrements) increments_.pop_front();
   return true;
+}
+
+void OdometryBuffer::start_at_velocity(Odometry& increment) {
+  if (!increment.inertial || !begins_at(increment, velocity_->utime)) {
+    velocity_.reset();
+    return;
+  }
+
+  if (!increment.has_wheels && !increment.is_stationary) {
+    const auto motion = motion_from(*velocity_, increment, inertial_of(increment, *velocity_));
+    const auto spread = [](const Eigen::Matrix3d& c) { return c(0, 0) + c(1, 1); };
+    if (spread(motion.covariance) < spread(increment.covariance)) {
+      increment.from_T_to = motion.mean;
+      increment.covariance = motion.covariance;
+    }
+  }
+  velocity_ = carried_over(*velocity_, increment);
+}
+
+void OdometryBuffer::set_filter_velocity(const EkfPose& pose) {
+  VelocityEstimate known{pose.utime, pose.velocity_mps, pose.velocity_covariance, pose.bias};
+
+  // The pose may be older than the latest increments: its velocity is carried over them.
+  auto increment = std::find_if(increments_.begin(), increments_.end(), [&](const Odometry& one) {
+    return one.utime > known.utime + kGapTolerance_us;
+  });
+  for (; increment != increments_.end(); ++increment) {
+    if (!increment->inertial || !begins_at(*increment, known.utime)) return;
+    known = carried_over(known, *increment);
+  }
+  velocity_ = known;
 }
 
 std::optional<geometry::SE2WithCovariance> OdometryBuffer::between(Utime from, Utime to) const {

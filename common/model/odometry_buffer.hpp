@@ -4,9 +4,24 @@
 #include <deque>
 #include <optional>
 
+#include "common/model/ekf_output.hpp"
 #include "common/model/odometry.hpp"
 
 namespace understory::model {
+
+/// The vehicle's velocity by a filter that uses landmarks.
+struct VelocityEstimate {
+  Utime utime = 0;
+  Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Frame `vehicle_level` at utime.
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();    ///< [(m/s)^2]
+  InertialBias bias = InertialBias::Zero();                ///< Of the accelerometer; see there.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.utime, s.velocity_mps, s.covariance, s.bias);
+  }
+};
 
 /// The rotation over an interval by the gyro.
 struct GyroRotation {
@@ -31,10 +46,18 @@ struct GyroRotation {
 };
 
 /// Keeps consecutive increments of odometry as they came, at most 20,000; the oldest are dropped.
+/// Those without wheels may start at a filter's velocity.
 class OdometryBuffer {
  public:
   /// Adds an increment. One that overlaps the last one or runs backwards is refused (false).
   bool add(const Odometry& increment);
+  /// Without wheels the translation of odometry rests on dead reckoning. Increments that are added
+  /// later and have an IMU but no wheels start at the filter's velocity where that is more certain;
+  /// it counts with kInflation times its variance, since the filter used the same detections as who
+  /// asks. Wheels and rotations are never touched.
+  void set_filter_velocity(const EkfPose& pose);
+  /// Of the variance of the filter's velocity.
+  static constexpr double kInflation = 4.0;
   /// Motion of the vehicle (from_T_to), or none where a gap or the end of the buffer is in between.
   /// Inside an increment the twist is constant and the covariance in proportion to time. Cost: the
   /// increments in between, and a binary search.
@@ -48,11 +71,14 @@ class OdometryBuffer {
   /// Members of a saved state (include common/model/archive.hpp); see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.increments_);
+    a(self.increments_, self.velocity_);
   }
 
  private:
+  void start_at_velocity(Odometry& increment);
+
   std::deque<Odometry> increments_;
+  std::optional<VelocityEstimate> velocity_;  ///< At the end of the last increment.
 };
 
 }  // namespace understory::model

@@ -28,7 +28,10 @@ void Motion::add(const model::Odometry& increment) {
   if (parameters_.use_odometry && odometry_.add(increment)) stops_.add(increment);
 }
 
-void Motion::add(const model::EkfPose& pose) { filter_.add(pose); }
+void Motion::add(const model::EkfPose& pose) {
+  odometry_.set_filter_velocity(pose);
+  filter_.add(pose);
+}
 
 std::optional<geometry::SE2WithCovariance> Motion::between(model::Utime from,
                                                            model::Utime to) const {

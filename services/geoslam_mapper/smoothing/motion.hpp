@@ -43,7 +43,7 @@ class Motion {
 
   /// Adds an odometry increment, if the configuration uses odometry.
   void add(const model::Odometry& increment);
-  /// Adds the filter's pose: a gate, never a measurement.
+  /// Adds the filter's pose: a gate. Where there are no wheels, its velocity serves odometry.
   void add(const model::EkfPose& pose);
 
   /// Where the keyframe's centre should be: by odometry from the last accepted keyframe, else by
