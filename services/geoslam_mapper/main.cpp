@@ -7,7 +7,7 @@ int main(int argc, char** argv) {
           .keyframe = "KEYFRAME",        // in: local landmarks of n sweeps
           .landmarks = "LANDMARKS",      // in: every sweep, located at once
           .odometry = "ODOMETRY",        // in: motion, where there is any
-          .ekf_pose = "EKF_POSE",        // in: a gate, where a filter runs
+          .ekf_pose = "EKF_POSE",        // in: a gate; velocity without wheels
           .ekf_level = "EKF_LEVEL",      // in: error of the sweeps' level, likewise
           .map_request = "MAP_REQUEST",  // in: asks for MAP now
           .given_map = "GIVEN_MAP",      // in: a map to begin with
