@@ -348,6 +348,6 @@ def figures(rows):
     lines = []
     for labels, names in groups.items():
         caption, heads = _columns(names)
-        lines += ([""] if lines else []) + [f"*{caption}*", ""]
+        lines += ([""] if lines else []) + ([f"*{caption}*", ""] if caption else [])
         lines += table(("figure", *heads), [_with_target(settings, names, label) for label in labels])
     return lines
