@@ -51,7 +51,7 @@ EXPERIMENTS = (
     _eval("efficiency", "efficiency --drive-km 10 --stationary-h 2", 6),
     _eval("laps", "laps --laps 100 --length-m 317 --hours 24", 45),
     _eval("health", "health --drives 1000 --seed 1", 8),
-    _eval("misstated", "misstated --runs 50 --seed 2001", 4),
+    _eval("misstated", "misstated --runs 10 --seed 2001", 4),
     _eval("victoria-park", "victoria-park --data DATA", 1, ("victoria_park_raw", "victoria_park_landmark")),
     _eval("frontend-chain", "frontend --only chain --config deploy/config/lidar --jobs 2 --data DATA", 25,
           ("pole_maps",)),
