@@ -14,7 +14,7 @@ struct VelocityEstimate {
   Utime utime = 0;
   Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Frame `vehicle_level` at utime.
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();    ///< [(m/s)^2]
-  InertialBias bias = InertialBias::Zero();                ///< Of the accelerometer; see there.
+  InertialBias bias = InertialBias::Zero();  ///< Of it the accelerometer's part is used.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
