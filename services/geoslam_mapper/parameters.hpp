@@ -68,6 +68,8 @@ struct SmoothingMapperParameters {
   double fold_distance_m = 0.05;
   double fold_angle_rad = 0.02;
   double known_ground_m = 5.0;
+  double condense_m = 20.0;
+  double condense_after_m = 50.0;
 };
 
 /// Which method, and the parameters of each.

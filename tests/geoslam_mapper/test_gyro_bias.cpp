@@ -1,4 +1,5 @@
 // What is learned of the gyro's bias after a stretch without landmarks straightens that stretch.
+#include <algorithm>
 #include <cmath>
 
 #include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
@@ -72,8 +73,9 @@ struct Drive {
 };
 
 /// `saved_at`: after this keyframe the mapper is saved and another goes on from there.
-Drive drive(double gyro_walk, int saved_at = -1) {
+Drive drive(double gyro_walk, int saved_at = -1, double condense_m = 0.0) {
   SmoothingMapperParameters parameters;
+  parameters.condense_m = condense_m;
   parameters.use_odometry = true;
   parameters.gyro_walk = gyro_walk;
   parameters.relinearise_above = 1e-4;
@@ -114,6 +116,14 @@ TEST_CASE("a gyro's bias that shows later straightens the path before", "[mapper
   const double sigma = std::sqrt(estimated.last.covariance(2, 2));
   CHECK(std::abs(estimated.last.map_T_vehicle.theta()) < 3.0 * sigma);
   CHECK(sigma < 0.004);
+}
+
+TEST_CASE("what was condensed keeps the bias as it was known then", "[mapper]") {
+  const Drive condensed = drive(1e-6, -1, 20.0);
+  const double sigma = std::sqrt(condensed.last.covariance(2, 2));
+  CHECK(std::abs(condensed.last.map_T_vehicle.theta()) < std::min(3.0 * sigma, 6e-4));
+  for (const model::KeyframePose& pose : condensed.trajectory)
+    CHECK(std::abs(pose.map_T_vehicle.theta()) < 6e-4);
 }
 
 TEST_CASE("a mapper that was saved in between goes on with the same bias", "[mapper]") {

@@ -57,6 +57,7 @@ Laps drive_laps(double known_ground_m, int count_of_laps, std::uint64_t seed) {
   keyframer::joint::JointKeyframer keyframer({});
   SmoothingMapperParameters parameters;
   parameters.known_ground_m = known_ground_m;
+  if (known_ground_m == 0.0) parameters.condense_m = 0.0;
   SmoothingMapper mapper(parameters);
   Laps laps;
   std::vector<geometry::SE2> truth;

@@ -176,7 +176,14 @@ void GyroBias::take_out(std::size_t at, plane::Smoother& smoother) {
   now_.chain.erase(now_.chain.begin() + static_cast<std::ptrdiff_t>(at));
 }
 
-void GyroBias::keep(const Estimate& before, plane::Smoother& smoother) {
+void GyroBias::learned(plane::ScalarId id, double mean, double information,
+                       plane::Smoother& smoother) {
+  for (Link& link : now_.chain) {
+    if (link.id == id) add_prior(link, mean, information, smoother);
+  }
+}
+
+void GyroBias::drop_idle(plane::Smoother& smoother) {
   for (std::size_t i = 0; i + 1 < now_.chain.size();) {
     if (now_.chain[i].motions == 0) {
       take_out(i, smoother);
@@ -184,6 +191,10 @@ void GyroBias::keep(const Estimate& before, plane::Smoother& smoother) {
       ++i;
     }
   }
+}
+
+void GyroBias::keep(const Estimate& before, plane::Smoother& smoother) {
+  drop_idle(smoother);
   Link& newest = now_.chain.back();
   clear(newest, smoother);
   set_prior(newest, before.mean, 1.0 / (kRepeated * before.variance), smoother);

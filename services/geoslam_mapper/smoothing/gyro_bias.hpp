@@ -40,6 +40,12 @@ class GyroBias {
   std::optional<Estimate> estimate(const factor_graph::plane::Smoother& smoother) const;
   /// A motion with this scalar was taken out of the graph.
   void forget_motion(factor_graph::plane::ScalarId id);
+  /// What motions that were taken out had told of a scalar [rad/s, 1/(rad/s)^2] stays as a prior;
+  /// nothing where the scalar is not of the newest ones.
+  void learned(factor_graph::plane::ScalarId id, double mean, double information,
+               factor_graph::plane::Smoother& smoother);
+  /// Scalars without motion, but for the newest, go; what is known of them goes to the next ones.
+  void drop_idle(factor_graph::plane::Smoother& smoother);
   /// After motions were taken out: scalars without motion go, and the newest one keeps what had
   /// been known of it, `before`, as a prior. What the motions that are still there had told is
   /// counted twice then; the prior is weakened for it.

@@ -98,20 +98,20 @@ std::optional<NodeIndex> KnownGround::reference_of(NodeIndex node, const GlobalM
   std::optional<NodeIndex> best;
   std::pair<bool, double> best_rank{true, radius_m_};
 
-  map.trajectory.for_each_node_near(here_m, radius_m_, [&](NodeIndex other) {
-    const Node& there = map.graph.node(other);
-    const std::pair<bool, double> rank{!there.motions.empty(),
-                                       (map.graph.pose(other).translation() - here_m).norm()};
-    if (rank.second >= radius_m_ || rank >= best_rank ||
-        here.along_m - there.along_m < kAnotherPass * radius_m_ || is_recent(other)) {
-      return;
-    }
-    const auto common = static_cast<double>(count_common(here, there));
-    if (common < kKnownShare * static_cast<double>(here.observations.size())) return;
+  map.trajectory.for_each_node_near(
+      here_m, radius_m_, map.graph, [&](NodeIndex other, double distance_m) {
+        const Node& there = map.graph.node(other);
+        const std::pair<bool, double> rank{!there.motions.empty(), distance_m};
+        if (rank >= best_rank || here.along_m - there.along_m < kAnotherPass * radius_m_ ||
+            is_recent(other)) {
+          return;
+        }
+        const auto common = static_cast<double>(count_common(here, there));
+        if (common < kKnownShare * static_cast<double>(here.observations.size())) return;
 
-    best = other;
-    best_rank = rank;
-  });
+        best = other;
+        best_rank = rank;
+      });
   return best;
 }
 

@@ -27,6 +27,9 @@ class KnownGround {
   /// solves; the map is as before where that fails. Cost: what the nodes observed.
   void follow(const FusedKeyframe& fused, Discovery& discovery, Merges& merges, GlobalMap& map);
 
+  /// Whether the node is one of the last ones, which it has not judged yet.
+  bool is_recent(NodeIndex node) const;
+
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
@@ -47,7 +50,6 @@ class KnownGround {
   Surplus find_surplus(const GlobalMap& map) const;
   void judge(NodeIndex node, const GlobalMap& map, Surplus& surplus) const;
   std::optional<NodeIndex> reference_of(NodeIndex node, const GlobalMap& map) const;
-  bool is_recent(NodeIndex node) const;
 
   double radius_m_;
   std::vector<Passed> recent_;  ///< In order of time.

@@ -42,6 +42,7 @@ OneMap::OneMap(const SmoothingMapperParameters& parameters, std::uint32_t id)
       discovery_(parameters),
       merging_(parameters),
       known_ground_(parameters),
+      condensing_(parameters),
       scan_localiser_(parameters),
       common_error_(parameters.scale_sigma) {}
 
@@ -93,6 +94,7 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
   if (!fused.ok) return with(kRolledBack, fused.reason, std::move(update));
   known_ground_.follow(fused, discovery_, merging_.merges(), map_);
   extend(fused, update);
+  condensing_.follow(fused, known_ground_, discovery_, merging_.merges(), map_);
   confirm(keyframe, update);
   report(keyframe, update);
   return with(kUpdated, fused.reason, std::move(update));

@@ -9,6 +9,7 @@
 #include "services/geoslam_mapper/mapper_method.hpp"
 #include "services/geoslam_mapper/parameters.hpp"
 #include "services/geoslam_mapper/smoothing/common_error.hpp"
+#include "services/geoslam_mapper/smoothing/condensing.hpp"
 #include "services/geoslam_mapper/smoothing/discovery.hpp"
 #include "services/geoslam_mapper/smoothing/fusion.hpp"
 #include "services/geoslam_mapper/smoothing/global_map.hpp"
@@ -75,7 +76,7 @@ class OneMap {
   /// Members of a saved state; see common/state. Parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.map_, self.motion_, self.discovery_, self.merging_, self.known_ground_,
+    a(self.map_, self.motion_, self.discovery_, self.merging_, self.known_ground_, self.condensing_,
       self.scan_localiser_, self.common_error_, self.first_offered_, self.agreeing_);
   }
 
@@ -96,6 +97,7 @@ class OneMap {
   Discovery discovery_;
   Merging merging_;
   KnownGround known_ground_;
+  Condensing condensing_;
   ScanLocaliser scan_localiser_;
   CommonError common_error_;
   std::optional<model::Utime> first_offered_;  ///< Keyframe that might have started the map.

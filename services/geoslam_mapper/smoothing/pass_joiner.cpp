@@ -107,12 +107,13 @@ std::optional<PassJoiner::EarlierPass> PassJoiner::earlier_pass(
 
   EarlierPass pass;
   double nearest_m = std::numeric_limits<double>::infinity();
-  map.trajectory.for_each_node_near(here_m, reach_m, [&](NodeIndex node) {
-    const double distance_m = (map.graph.pose(node).translation() - here_m).norm();
-    if (along_m - map.graph.node(node).along_m < kAnotherPass_m || distance_m >= nearest_m) return;
-    nearest_m = distance_m;
-    pass.node = node;
-  });
+  map.trajectory.for_each_node_near(
+      here_m, reach_m, map.graph, [&](NodeIndex node, double distance_m) {
+        if (along_m - map.graph.node(node).along_m < kAnotherPass_m || distance_m >= nearest_m)
+          return;
+        nearest_m = distance_m;
+        pass.node = node;
+      });
   if (nearest_m > reach_m) return std::nullopt;
 
   auto relative = map.graph.relative(pass.node, newest);

@@ -70,19 +70,23 @@ NodeIndex PoseGraph::add_node(const geometry::SE2& map_T_centre, bool is_station
       newest_ ? (map_T_centre.translation() - pose(*newest_).translation()).norm() : 0.0;
   const double along_m = newest_ ? nodes_[*newest_].along_m + driven_m : 0.0;
 
-  if (const auto number = free_nodes_.take()) {
-    newest_ = *number;
-    Node& node = edit(*newest_);
-    smoother_.restart(node.centre, map_T_centre);
-    node = {node.centre, {}, {}, is_stationary, along_m, 1.0};
-  } else {
-    newest_ = static_cast<NodeIndex>(nodes_.size());
-    nodes_.push_back({smoother_.add_pose(map_T_centre), {}, {}, is_stationary, along_m, 1.0});
-  }
+  newest_ = put_node(map_T_centre, is_stationary, along_m);
   if (is_fixed) {
     smoother_.add(plane::PosePrior{nodes_[*newest_].centre, map_T_centre, kKnownPose.inverse()});
   }
   return *newest_;
+}
+
+NodeIndex PoseGraph::put_node(const geometry::SE2& map_T_centre, bool is_stationary,
+                              double along_m) {
+  if (const auto number = free_nodes_.take()) {
+    Node& node = edit(*number);
+    smoother_.restart(node.centre, map_T_centre);
+    node = {node.centre, {}, {}, is_stationary, along_m, 1.0, false};
+    return *number;
+  }
+  nodes_.push_back({smoother_.add_pose(map_T_centre), {}, {}, is_stationary, along_m, 1.0, false});
+  return static_cast<NodeIndex>(nodes_.size() - 1);
 }
 
 void PoseGraph::add_landmark(model::LandmarkId id, const Eigen::Vector2d& position_m,

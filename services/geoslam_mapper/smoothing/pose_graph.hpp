@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/factor_graph/plane/archive.hpp"
+#include "common/factor_graph/plane/condense.hpp"
 #include "common/factor_graph/plane/smoother.hpp"
 #include "services/geoslam_mapper/parameters.hpp"
 #include "services/geoslam_mapper/smoothing/centre_motion.hpp"
@@ -39,11 +40,12 @@ struct Node {
   bool is_stationary = false;      ///< The vehicle was stationary during the keyframe.
   double along_m = 0.0;            ///< Path of the vehicle up to here.
   double keyframes = 1.0;          ///< Whose observations it has; those of retired nodes, too.
+  bool is_condensed = false;       ///< The nodes of a stretch of the path in one.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
-    a(s.centre, s.observations, s.motions, s.is_stationary, s.along_m, s.keyframes);
+    a(s.centre, s.observations, s.motions, s.is_stationary, s.along_m, s.keyframes, s.is_condensed);
   }
 };
 
@@ -122,6 +124,13 @@ class PoseGraph {
   /// of the other nodes may be taken out, too, nor the newest one. Cost: the factors of the nodes.
   void take_out(const Surplus& surplus);
 
+  /// Puts one node in the place of these, all of which there are: what they observed and how they
+  /// moved becomes one condensed measurement (plane::condense). The newest node and the one that
+  /// holds the map must not be among them. The retirements tell where each node was relative to
+  /// the new one; empty, and nothing changed, where their own factors leave a node undetermined.
+  /// Cost: the factors of the nodes.
+  std::vector<Retirement> condense(std::span<const NodeIndex> nodes);
+
   /// Updates the estimates. Not `ok` where the measurements leave variables undetermined.
   factor_graph::plane::SmootherUpdate solve() { return smoother_.update(); }
 
@@ -185,6 +194,28 @@ class PoseGraph {
     std::vector<std::pair<factor_graph::plane::PointId, model::LandmarkId>> dropped;
   };
   Node& edit(NodeIndex node);
+  NodeIndex put_node(const geometry::SE2& map_T_centre, bool is_stationary, double along_m);
+  /// Nodes as a graph of their own, and what its numbers are here.
+  struct Part {
+    /// A motion to another node.
+    struct Outer {
+      NodeIndex node = 0;
+      NodeIndex inner = 0;  ///< Its end in the part.
+      MotionRef motion;
+    };
+    factor_graph::plane::Graph graph;
+    std::vector<NodeIndex> inner;
+    std::vector<Outer> outer;
+    std::vector<model::LandmarkId> landmarks;
+    std::vector<factor_graph::plane::ScalarId> scalars;  ///< May repeat.
+  };
+  Part part_of(std::span<const NodeIndex> nodes) const;
+  void add_motions_of(NodeIndex node, Part& part) const;
+  void add_motion(MotionRef ref, factor_graph::plane::PoseId a, factor_graph::plane::PoseId b,
+                  Part& part) const;
+  void begin_motion_at(NodeIndex into, const Part::Outer& outer,
+                       const factor_graph::plane::CondensedMotion& condensed);
+  void take_out(NodeIndex node);
   void restore(const factor_graph::plane::Graph& graph);
   void place_observation(NodeIndex node, model::LandmarkId id,
                          const factor_graph::plane::PointObservation& factor);

@@ -9,7 +9,7 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-constexpr state::Format kFormat{"geoslam_mapper.smoothing", 12};
+constexpr state::Format kFormat{"geoslam_mapper.smoothing", 13};
 /// Two keyframes contradict each other where their motion in a trial map differs from the tracked
 /// one by more than so many of its standard deviations.
 constexpr double kTrackSigmas = 4.0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace understory::geoslam_mapper::smoothing {
 namespace {
@@ -112,6 +113,32 @@ void Trajectory::hand_over(const Retirement& retirement) {
   forget_oldest();
 }
 
+void Trajectory::tie(std::span<const Retirement> retired, const PoseGraph& graph) {
+  const auto retirement_of = [&](NodeIndex node) {
+    return std::find_if(retired.begin(), retired.end(),
+                        [&](const Retirement& one) { return one.node == node; });
+  };
+  std::size_t left = 0;
+  for (const Retirement& one : retired) left += viewpoints_of_node_[one.node].size();
+  for (auto base = bases_.rbegin(); left > 0 && base != bases_.rend(); ++base) {
+    const auto one = retirement_of(base->node);
+    if (one == retired.end()) continue;
+    base->node = one->into;
+    base->centre_T_base = compound(one->into_T_node, base->centre_T_base);
+    base->centre_T_middle = one->into_T_node.mean * base->centre_T_middle;
+    if (!base->is_spare) --left;
+  }
+
+  for (const Retirement& one : retired) {
+    for (const std::uint32_t number : std::exchange(viewpoints_of_node_[one.node], {})) {
+      Viewpoint& viewpoint = viewpoints_[number];
+      viewpoint.node = one.into;
+      viewpoint.centre_T_middle = one.into_T_node.mean * viewpoint.centre_T_middle;
+      index(number, graph);
+    }
+  }
+}
+
 void Trajectory::follow(const PoseGraph& graph) {
   for (const NodeIndex node : graph.moved_nodes()) {
     if (node >= viewpoints_of_node_.size()) continue;
@@ -138,6 +165,7 @@ std::optional<NodeIndex> Trajectory::revisited(const geometry::SE2& map_T_middle
   double best_distance = fold_distance_m_;
   grid_.for_each_near(map_T_middle.translation(), best_distance, [&](std::uint32_t viewpoint) {
     const Viewpoint& there = viewpoints_[viewpoint];
+    if (graph.node(there.node).is_condensed) return;
     const geometry::SE2 between = middle(there, graph).inverse() * map_T_middle;
     const double distance = between.translation().norm();
     const bool is_nearer =

@@ -57,6 +57,9 @@ class Trajectory {
   /// Ties the bases of a node that is taken out of the graph to the node that has its place.
   /// O(bases since the node was added).
   void hand_over(const Retirement& retirement);
+  /// Ties bases and viewpoints of nodes that became one to that one. O(bases since the nodes were
+  /// added).
+  void tie(std::span<const Retirement> retired, const PoseGraph& graph);
   /// Brings the index of viewpoints to where the graph's last updates moved the nodes.
   void follow(const PoseGraph& graph);
 
@@ -71,15 +74,19 @@ class Trajectory {
   /// Whether the vehicle stayed within the folding distance and angle during the keyframe.
   bool is_stationary(const model::Keyframe& keyframe) const;
   /// The node of the nearest viewpoint within the folding distance and angle; none where the
-  /// viewpoint is a new one. `map_T_middle`: see middle_of().
+  /// viewpoint is a new one, or a condensed node's. `map_T_middle`: see middle_of().
   std::optional<NodeIndex> revisited(const geometry::SE2& map_T_middle,
                                      const PoseGraph& graph) const;
-  /// Calls f(node) for the nodes with a viewpoint within `radius_m` of `position_m`, and for some
-  /// beyond; a node with several may come several times.
+  /// Calls f(node, distance [m]) for the nodes with a viewpoint within `radius_m` of `position_m`;
+  /// a node with several may come several times.
   template <typename F>
-  void for_each_node_near(const Eigen::Vector2d& position_m, double radius_m, F&& f) const {
-    grid_.for_each_near(position_m, radius_m,
-                        [&](std::uint32_t viewpoint) { f(viewpoints_[viewpoint].node); });
+  void for_each_node_near(const Eigen::Vector2d& position_m, double radius_m,
+                          const PoseGraph& graph, F&& f) const {
+    grid_.for_each_near(position_m, radius_m, [&](std::uint32_t number) {
+      const Viewpoint& viewpoint = viewpoints_[number];
+      const double distance_m = (middle(viewpoint, graph).translation() - position_m).norm();
+      if (distance_m < radius_m) f(viewpoint.node, distance_m);
+    });
   }
   /// The first keyframe's base in the frame of its node, turned round, where that base is the map's
   /// origin; none where the map was given.

@@ -1,0 +1,298 @@
+#include "common/factor_graph/plane/condense.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <span>
+
+namespace understory::factor_graph::plane {
+namespace {
+
+using Index = Eigen::Index;
+using Block = Eigen::Matrix<double, 3, 2>;
+
+/// Least pivot of a determined system [1/m^2, 1/rad^2].
+constexpr double kLeastPivot = 1e-4;
+/// Least information on a bias that is one [1/(rad/s)^2].
+constexpr double kLeastBiasInformation = 1.0;
+/// Fewest points that have a motion in common.
+constexpr std::size_t kLeastPoints = 3;
+
+/// An observation's share of the normal equations: pose' * point.
+struct Cross {
+  std::uint32_t pose = 0;
+  Block block = Block::Zero();
+};
+
+/// A point of the normal equations.
+struct PointBlock {
+  Eigen::Matrix2d inverse = Eigen::Matrix2d::Zero();  ///< Of its own block.
+  Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
+  std::vector<Cross> observed;
+};
+
+/// The normal equations of the part with the middle inner pose fixed, points eliminated.
+class PartSystem {
+ public:
+  PartSystem(const Graph& part, std::size_t inner)
+      : part_(part), fixed_(inner / 2), points_(part.points.size()) {
+    const auto size = 3 * static_cast<Index>(part.poses.size() - 1);
+    information_.setZero(size, size);
+    gradient_.setZero(size);
+    bias_cross_.setZero(size);
+  }
+
+  /// False where a pose or a point is not determined.
+  bool solve() {
+    for (const RelativePose& factor : part_.relative_poses) add(factor, linearise(part_, factor));
+    for (const BiasedRelativePose& factor : part_.biased_relative_poses) add(factor);
+    if (!add_points()) return false;
+
+    const Eigen::LLT<Eigen::MatrixXd> factorised(information_);
+    if (factorised.info() != Eigen::Success) return false;
+    const Eigen::MatrixXd& l = factorised.matrixLLT();
+    if (l.diagonal().cwiseAbs2().minCoeff() < kLeastPivot) return false;
+    covariance_ = factorised.solve(Eigen::MatrixXd::Identity(l.rows(), l.cols()));
+    step_ = factorised.solve(-gradient_);
+
+    // The bias, with the poses eliminated.
+    by_bias_ = factorised.solve(-bias_cross_);
+    bias_information_ += bias_cross_.dot(by_bias_);
+    bias_gradient_ += bias_cross_.dot(step_);
+    return true;
+  }
+
+  std::size_t fixed() const { return fixed_; }
+  /// Joint covariance of the poses' moves but for the fixed one's.
+  const Eigen::MatrixXd& covariance() const { return covariance_; }
+  /// The poses' moves to the optimum.
+  const Eigen::VectorXd& step() const { return step_; }
+  /// The poses' moves per bias.
+  const Eigen::VectorXd& by_bias() const { return by_bias_; }
+  /// What is told of the bias.
+  double bias_information() const { return bias_information_; }
+  /// Its move to the optimum, where something is told.
+  double bias_step() const { return -bias_gradient_ / bias_information_; }
+  const PointBlock& point(std::size_t i) const { return points_[i]; }
+  /// Row of a pose in the system; none of the fixed one.
+  std::optional<Index> row(std::size_t pose) const {
+    if (pose == fixed_) return std::nullopt;
+    return 3 * static_cast<Index>(pose < fixed_ ? pose : pose - 1);
+  }
+  /// How a point follows a pose that observed it: d(point)/d(pose).
+  Eigen::Matrix<double, 2, 3> follows(std::size_t point, const Cross& cross) const {
+    return -points_[point].inverse * cross.block.transpose();
+  }
+
+ private:
+  template <typename Derived>
+  void add_block(std::size_t a, std::size_t b, const Eigen::MatrixBase<Derived>& block) {
+    const auto row_a = row(a);
+    const auto row_b = row(b);
+    if (row_a && row_b) information_.block<3, 3>(*row_a, *row_b) += block;
+  }
+  void add_gradient(std::size_t pose, const Eigen::Vector3d& gradient) {
+    if (const auto at = row(pose)) gradient_.segment<3>(*at) += gradient;
+  }
+
+  void add(const RelativePose& factor, const RelativePoseJacobian& j) {
+    const Eigen::Matrix3d weighted_a = factor.information * j.a;
+    const Eigen::Matrix3d weighted_b = factor.information * j.b;
+    const std::size_t a = index(factor.a);
+    const std::size_t b = index(factor.b);
+    add_block(a, a, j.a.transpose() * weighted_a);
+    add_block(a, b, j.a.transpose() * weighted_b);
+    add_block(b, a, j.b.transpose() * weighted_a);
+    add_block(b, b, j.b.transpose() * weighted_b);
+    add_gradient(a, weighted_a.transpose() * j.residual);
+    add_gradient(b, weighted_b.transpose() * j.residual);
+  }
+
+  /// The motion at the bias's value, and how its residual follows the bias.
+  void add(const BiasedRelativePose& factor) {
+    const RelativePose& motion = factor.motion;
+    const double bias = part_[factor.bias];
+    const geometry::SE2& measured = motion.a_T_b;
+    const geometry::SE2 shift = measured.inverse() * at_true_rate(measured, bias, factor.seconds);
+    RelativePoseJacobian j = linearise(part_, motion);
+    j.residual -= shift.coordinates();
+    add(motion, j);
+
+    Eigen::Vector3d by_bias;
+    by_bias << 0.5 * factor.seconds * measured.rotation().transpose() *
+                   geometry::perpendicular(measured.translation()),
+        factor.seconds;
+    const Eigen::Vector3d weighted = motion.information * by_bias;
+    if (const auto at = row(index(motion.a)))
+      bias_cross_.segment<3>(*at) += j.a.transpose() * weighted;
+    if (const auto at = row(index(motion.b)))
+      bias_cross_.segment<3>(*at) += j.b.transpose() * weighted;
+    bias_information_ += by_bias.dot(weighted);
+    bias_gradient_ += weighted.dot(j.residual);
+  }
+
+  /// Schur's complement of the points.
+  bool add_points() {
+    for (const PointObservation& factor : part_.observations) {
+      const ObservationJacobian j = linearise(part_, factor);
+      const Eigen::Matrix<double, 2, 3> weighted_pose = factor.information * j.pose;
+      const std::size_t pose = index(factor.pose);
+      PointBlock& point = points_[index(factor.point)];
+      point.inverse += j.point.transpose() * factor.information * j.point;
+      point.gradient += j.point.transpose() * factor.information * j.residual;
+      point.observed.push_back({index(factor.pose), weighted_pose.transpose() * j.point});
+      add_block(pose, pose, j.pose.transpose() * weighted_pose);
+      add_gradient(pose, weighted_pose.transpose() * j.residual);
+    }
+
+    for (PointBlock& point : points_) {
+      if (point.inverse.determinant() <= 0.0) return false;
+      point.inverse = point.inverse.inverse().eval();
+      for (const Cross& one : point.observed) {
+        const Block gain = one.block * point.inverse;
+        add_gradient(one.pose, -gain * point.gradient);
+        for (const Cross& other : point.observed)
+          add_block(one.pose, other.pose, -gain * other.block.transpose());
+      }
+    }
+    return true;
+  }
+
+  const Graph& part_;
+  std::size_t fixed_;
+  std::vector<PointBlock> points_;
+  Eigen::MatrixXd information_;
+  Eigen::VectorXd gradient_;
+  Eigen::VectorXd bias_cross_;  ///< pose' * bias
+  double bias_information_ = 0.0;
+  double bias_gradient_ = 0.0;
+  Eigen::MatrixXd covariance_;
+  Eigen::VectorXd step_;
+  Eigen::VectorXd by_bias_;
+};
+
+/// d(point in the frame) / d(right perturbation of the frame), negative.
+Eigen::Matrix<double, 2, 3> rigid(const Eigen::Vector2d& in_frame) {
+  Eigen::Matrix<double, 2, 3> j;
+  j << Eigen::Matrix2d::Identity(), geometry::perpendicular(in_frame);
+  return j;
+}
+
+/// How the frame that the points have in common follows the poses: the fit of a rigid motion to the
+/// points' moves, weighted by what is known of each when the poses are given.
+Eigen::MatrixXd common_motion(const Graph& part, const PartSystem& system) {
+  const geometry::SE2& middle = part.poses[system.fixed()];
+  const geometry::SE2 middle_T_map = middle.inverse();
+  const Eigen::Matrix2d to_middle = middle_T_map.rotation();
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::MatrixXd motion = Eigen::MatrixXd::Zero(3, system.step().size());
+
+  for (std::size_t i = 0; i < part.points.size(); ++i) {
+    const PointBlock& point = system.point(i);
+    const Eigen::Matrix2d weight = (to_middle * point.inverse * to_middle.transpose()).inverse();
+    const Eigen::Matrix<double, 2, 3> j = rigid(middle_T_map * part.points[i]);
+    normal += j.transpose() * weight * j;
+    const Eigen::Matrix<double, 3, 2> gain = j.transpose() * weight * to_middle;
+    for (const Cross& cross : point.observed) {
+      if (const auto at = system.row(cross.pose))
+        motion.middleCols<3>(*at) += gain * system.follows(i, cross);
+    }
+  }
+  if (part.points.size() < kLeastPoints) return Eigen::MatrixXd::Zero(3, system.step().size());
+  const Eigen::LLT<Eigen::Matrix3d> solver(normal);
+  if (solver.info() != Eigen::Success) return Eigen::MatrixXd::Zero(3, system.step().size());
+  return solver.solve(motion);
+}
+
+/// A pose relative to the origin: `common` is how the origin follows the poses, `spread` common *
+/// covariance.
+geometry::SE2WithCovariance relative(const Graph& part, const PartSystem& system,
+                                     const Eigen::MatrixXd& common, const Eigen::MatrixXd& spread,
+                                     const geometry::SE2& map_T_origin, std::size_t pose) {
+  geometry::SE2 map_T_pose = part.poses[pose];
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d cross = Eigen::Matrix3d::Zero();  // pose with origin
+  if (const auto at = system.row(pose)) {
+    map_T_pose = map_T_pose * geometry::SE2::Exp(system.step().segment<3>(*at));
+    covariance = system.covariance().block<3, 3>(*at, *at);
+    cross = spread.middleCols<3>(*at).transpose();
+  }
+
+  geometry::SE2WithCovariance result{map_T_origin.inverse() * map_T_pose, {}};
+  const Eigen::Matrix3d adjoint = result.mean.inverse().Adjoint();
+  const Eigen::Matrix3d mixed = cross * adjoint.transpose();
+  result.covariance = covariance - mixed - mixed.transpose() +
+                      adjoint * spread * common.transpose() * adjoint.transpose();
+  result.covariance = 0.5 * (result.covariance + result.covariance.transpose()).eval();
+  return result;
+}
+
+/// An outer pose, and how it follows the bias.
+CondensedMotion motion_of(const Graph& part, const PartSystem& system,
+                          const Eigen::MatrixXd& common, const Eigen::MatrixXd& spread,
+                          const geometry::SE2& map_T_origin, std::size_t pose) {
+  CondensedMotion result;
+  result.origin_T_outer = relative(part, system, common, spread, map_T_origin, pose);
+  const auto at = system.row(pose);
+  if (at) result.seconds = common.row(2).dot(system.by_bias()) - system.by_bias()(*at + 2);
+  return result;
+}
+
+/// A point relative to the origin: its own error, and what the poses' errors bend.
+CondensedPoint point_of(const Graph& part, const PartSystem& system, const Eigen::MatrixXd& common,
+                        const geometry::SE2& map_T_origin, std::size_t i) {
+  const PointBlock& point = system.point(i);
+  const geometry::SE2 origin_T_map = map_T_origin.inverse();
+  const Eigen::Matrix2d to_origin = origin_T_map.rotation();
+
+  // Where the part's own factors have it.
+  Eigen::Vector2d position = part.points[i] - point.inverse * point.gradient;
+  Eigen::MatrixXd bend = -rigid(origin_T_map * part.points[i]) * common;
+  for (const Cross& cross : point.observed) {
+    const auto at = system.row(cross.pose);
+    if (!at) continue;
+    const Eigen::Matrix<double, 2, 3> follows = system.follows(i, cross);
+    position += follows * system.step().segment<3>(*at);
+    bend.middleCols<3>(*at) += to_origin * follows;
+  }
+
+  CondensedPoint result;
+  result.position = origin_T_map * position;
+  result.covariance = to_origin * point.inverse * to_origin.transpose() +
+                      bend * system.covariance() * bend.transpose();
+  return result;
+}
+
+}  // namespace
+
+std::optional<CondensedPart> condense(const Graph& part, std::size_t inner) {
+  if (inner == 0) return std::nullopt;
+  PartSystem system(part, inner);
+  if (!system.solve()) return std::nullopt;
+
+  CondensedPart result;
+  const Eigen::MatrixXd common = common_motion(part, system);
+  const Eigen::MatrixXd spread = common * system.covariance();
+  const geometry::SE2& map_T_middle = part.poses[system.fixed()];
+  const geometry::SE2 shifted =
+      map_T_middle * geometry::SE2::Exp(Eigen::Vector3d(common * system.step()));
+
+  result.origin_T_inner.reserve(inner);
+  for (std::size_t pose = 0; pose < inner; ++pose)
+    result.origin_T_inner.push_back(relative(part, system, common, spread, shifted, pose));
+  result.outer.reserve(part.poses.size() - inner);
+  for (std::size_t pose = inner; pose < part.poses.size(); ++pose)
+    result.outer.push_back(motion_of(part, system, common, spread, shifted, pose));
+  result.points.reserve(part.points.size());
+  for (std::size_t i = 0; i < part.points.size(); ++i)
+    result.points.push_back(point_of(part, system, common, shifted, i));
+
+  result.map_T_origin = map_T_middle;
+  if (system.bias_information() > kLeastBiasInformation) {
+    result.bias_step = system.bias_step();
+    result.bias_information = system.bias_information();
+  }
+  return result;
+}
+
+}  // namespace understory::factor_graph::plane
