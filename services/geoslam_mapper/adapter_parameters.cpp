@@ -139,11 +139,12 @@ void describe_growth(SmoothingMapperParameters& p, bus::ParameterTable& table) {
             "What a keyframe observes this near to one of an earlier pass, that knows half of it, "
             "is added to the earlier one some keyframes later: the map's size follows the ground, "
             "not the time. 0: every keyframe is kept.");
-  table.add("smoothing.condense_m", p.condense_m, {0.0, 1000.0}, "m",
-            "The keyframes of so much path become one condensed measurement. At most half of the "
-            "sensor's range: what bends within it is lost. 0: none.");
+  table.add(
+      "smoothing.condense_m", p.condense_m, {0.0, 1000.0}, "m",
+      "The keyframes of so much path, at least four, become one condensed measurement; at most "
+      "half of the sensor's range, since what bends within it is lost. 0: none.");
   table.add("smoothing.condense_after_m", p.condense_after_m, {0.0, 10000.0}, "m",
-            "... once the vehicle is so far beyond it: further than it sees.");
+            "... once the vehicle is so far beyond it, and beyond the sensor's range.");
 }
 
 void describe_renamed(bus::ParameterTable& table) {

@@ -5,8 +5,10 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Fewest nodes that are worth one.
-constexpr std::size_t kLeastNodes = 3;
+/// Fewest nodes of a stretch.
+constexpr std::ptrdiff_t kLeastNodes = 4;
+/// A stretch by the sensor's range, at most.
+constexpr double kMostOfRange = 0.5;
 
 }  // namespace
 
@@ -15,8 +17,11 @@ void Condensing::follow(const FusedKeyframe& fused, const KnownGround& known_gro
   if (length_m_ <= 0.0) return;
   const double now_m = map.graph.node(fused.node).along_m;
   if (fused.is_new_node) waiting_.push_back({fused.node, now_m});
-  const std::vector<NodeIndex> stretch = take_stretch(now_m, known_ground, map.graph);
-  if (stretch.size() < kLeastNodes) return;
+  const double range_m = fused.keyframe.field_of_view.max_range_m;
+  const double length_m = std::min(length_m_, kMostOfRange * range_m);
+  const double end_m = now_m - std::max(after_m_, range_m);
+  const std::vector<NodeIndex> stretch = take_stretch(length_m, end_m, known_ground, map.graph);
+  if (stretch.size() < 2) return;
 
   std::vector<model::LandmarkId> observed;
   for (const NodeIndex node : stretch) {
@@ -44,9 +49,10 @@ void Condensing::follow(const FusedKeyframe& fused, const KnownGround& known_gro
   map.adopt_estimates();
 }
 
-/// The nodes of the oldest stretch, once it is complete and lies far enough back; those that were
+/// The nodes of the oldest stretch, once it is complete and ends before `end_m`; those that were
 /// taken out of the graph since are not among them.
-std::vector<NodeIndex> Condensing::take_stretch(double now_m, const KnownGround& known_ground,
+std::vector<NodeIndex> Condensing::take_stretch(double length_m, double end_m,
+                                                const KnownGround& known_ground,
                                                 const PoseGraph& graph) {
   const auto is_there = [&](const Passed& passed) {
     const Node& node = graph.node(passed.node);
@@ -55,11 +61,11 @@ std::vector<NodeIndex> Condensing::take_stretch(double now_m, const KnownGround&
   };
   while (!waiting_.empty() && !is_there(waiting_.front())) waiting_.pop_front();
   if (waiting_.empty()) return {};
-  const double end_m = waiting_.front().along_m + length_m_;
-  if (now_m < end_m + after_m_) return {};
-
-  const auto end = std::find_if(waiting_.begin(), waiting_.end(),
-                                [&](const Passed& passed) { return passed.along_m >= end_m; });
+  const double last_m = waiting_.front().along_m + length_m;
+  auto end = std::find_if(waiting_.begin(), waiting_.end(),
+                          [&](const Passed& passed) { return passed.along_m >= last_m; });
+  end = std::max(end, waiting_.begin() + std::min(kLeastNodes, std::ssize(waiting_)));
+  if (end == waiting_.end() || end->along_m > end_m) return {};
   if (std::any_of(waiting_.begin(), end,
                   [&](const Passed& passed) { return known_ground.is_recent(passed.node); })) {
     return {};

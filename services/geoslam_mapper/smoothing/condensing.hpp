@@ -45,8 +45,8 @@ class Condensing {
       a(s.node, s.along_m);
     }
   };
-  std::vector<NodeIndex> take_stretch(double now_m, const KnownGround& known_ground,
-                                      const PoseGraph& graph);
+  std::vector<NodeIndex> take_stretch(double length_m, double end_m,
+                                      const KnownGround& known_ground, const PoseGraph& graph);
 
   double length_m_;
   double after_m_;

@@ -1,6 +1,8 @@
 // The map as one value: landmarks, graph, trajectory.
 #pragma once
 
+#include <algorithm>
+#include <span>
 #include <vector>
 
 #include "services/geoslam_mapper/smoothing/landmark_map.hpp"
@@ -22,17 +24,34 @@ struct GlobalMap {
   /// Whether there is neither a landmark nor a keyframe.
   bool empty() const { return landmarks.empty() && trajectory.bases().empty(); }
 
-  /// Takes over what the graph's updates moved since its checkpoint. Costs what moved.
-  void adopt_estimates() {
-    for (const auto& [id, position_m] : graph.moved_landmarks()) landmarks.move(id, position_m);
+  /// Takes over what the graph's updates moved since its checkpoint; returns the landmarks. Costs
+  /// what moved.
+  std::vector<model::LandmarkId> adopt_estimates() {
+    std::vector<model::LandmarkId> moved;
+    for (const auto& [id, position_m] : graph.take_moved_landmarks()) {
+      landmarks.move(id, position_m);
+      moved.push_back(id);
+    }
     trajectory.follow(graph);
+    return moved;
+  }
+
+  /// Takes these landmarks into the solved graph, where they are dormant. Ends a checkpoint.
+  void wake(std::span<const model::LandmarkId> ids) {
+    if (std::ranges::none_of(ids, [&](auto id) { return graph.is_dormant(id); })) return;
+    graph.checkpoint();
+    graph.wake(ids);
+    (void)graph.solve();  // What they tell was in the graph already.
+    adopt_estimates();
   }
 
   /// A landmark at the present estimate, without covariance; see told_map.
   model::MapLandmark landmark(const StoredLandmark& stored) const {
     model::MapLandmark out;
     out.id = stored.id;
-    out.position_m = graph.position(stored.id).value_or(stored.position_m);
+    out.position_m = graph.is_dormant(stored.id)
+                         ? graph.dormant_position(stored.id)
+                         : graph.position(stored.id).value_or(stored.position_m);
     out.radius_m = stored.radius_m;
     out.observation_count = stored.observation_count;
     out.kind = stored.kind;

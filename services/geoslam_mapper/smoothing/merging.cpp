@@ -11,6 +11,19 @@ namespace {
 /// Landmarks, beside those that it observed, around which a keyframe looks for doubles.
 constexpr std::size_t kWaitingPerKeyframe = 32;
 
+/// The dormant ones of these landmarks, and what may be the same as they are.
+std::vector<model::LandmarkId> with_neighbours(std::span<const model::LandmarkId> ids,
+                                               double distance_m, const GlobalMap& map) {
+  std::vector<model::LandmarkId> result;
+  for (const model::LandmarkId id : ids) {
+    if (!map.graph.is_dormant(id)) continue;
+    const auto near = map.landmarks.index().near(
+        {map.landmarks.at(id).position_m, distance_m + 2.0 * LandmarkMap::kStaleness_m});
+    result.insert(result.end(), near.begin(), near.end());
+  }
+  return result;
+}
+
 }  // namespace
 
 MergingResult Merging::follow(const FusedKeyframe& fused,
@@ -21,13 +34,14 @@ MergingResult Merging::follow(const FusedKeyframe& fused,
   if (result.separated && map.graph.solve().ok) map.adopt_estimates();
 
   // An earlier pass.
-  result.merged = pass_joiner_.follow(fused.keyframe.field_of_view, fused.node, merges_, map);
-  if (!result.merged.empty()) {
-    for (const auto& [id, position_m] : map.graph.moved_landmarks()) waiting_.push_back(id);
-  }
+  JoinedPasses joined = pass_joiner_.follow(fused.keyframe.field_of_view, fused.node, merges_, map);
+  result.merged = std::move(joined.pairs);
+  waiting_.insert(waiting_.end(), joined.moved.begin(), joined.moved.end());
 
   // Single doubles.
-  for (const MergedPair& pair : merge_doubles(to_look_at(touched), parameters_, merges_, map))
+  const std::vector<model::LandmarkId> ids = to_look_at(touched);
+  map.wake(with_neighbours(ids, parameters_.merge_distance_m, map));
+  for (const MergedPair& pair : merge_doubles(ids, parameters_, merges_, map))
     result.merged.push_back(pair);
   return result;
 }

@@ -19,6 +19,13 @@ model::MapUpdate with(model::MapUpdateStatus status, std::string reason, model::
   return update;
 }
 
+std::vector<model::LandmarkId> ids_of(std::span<const model::Association> pairs) {
+  std::vector<model::LandmarkId> ids;
+  ids.reserve(pairs.size());
+  for (const model::Association& pair : pairs) ids.push_back(pair.landmark_id);
+  return ids;
+}
+
 /// All bases are tied to one node: the graph is not solved any more, so nothing moves it.
 void keep_pose(const model::Keyframe& keyframe, const Placement& placement, GlobalMap& map) {
   if (!map.graph.newest()) map.graph.add_node({}, false);
@@ -43,6 +50,7 @@ OneMap::OneMap(const SmoothingMapperParameters& parameters, std::uint32_t id)
       merging_(parameters),
       known_ground_(parameters),
       condensing_(parameters),
+      dormancy_(parameters),
       scan_localiser_(parameters),
       common_error_(parameters.scale_sigma) {}
 
@@ -87,6 +95,7 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
   }
 
   // What does it add?
+  map_.wake(ids_of(placement->associations));
   const FusedKeyframe fused = fuse(keyframe, *placement, motion_, parameters_, map_);
   update.associations = fused.associations;
   update.chi2 = fused.chi2;
@@ -95,6 +104,7 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
   known_ground_.follow(fused, discovery_, merging_.merges(), map_);
   extend(fused, update);
   condensing_.follow(fused, known_ground_, discovery_, merging_.merges(), map_);
+  dormancy_.follow(keyframe.field_of_view, fused.node, map_);
   confirm(keyframe, update);
   report(keyframe, update);
   return with(kUpdated, fused.reason, std::move(update));

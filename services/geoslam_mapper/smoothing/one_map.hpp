@@ -11,6 +11,7 @@
 #include "services/geoslam_mapper/smoothing/common_error.hpp"
 #include "services/geoslam_mapper/smoothing/condensing.hpp"
 #include "services/geoslam_mapper/smoothing/discovery.hpp"
+#include "services/geoslam_mapper/smoothing/dormancy.hpp"
 #include "services/geoslam_mapper/smoothing/fusion.hpp"
 #include "services/geoslam_mapper/smoothing/global_map.hpp"
 #include "services/geoslam_mapper/smoothing/known_ground.hpp"
@@ -77,7 +78,8 @@ class OneMap {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.map_, self.motion_, self.discovery_, self.merging_, self.known_ground_, self.condensing_,
-      self.scan_localiser_, self.common_error_, self.first_offered_, self.agreeing_);
+      self.dormancy_, self.scan_localiser_, self.common_error_, self.first_offered_,
+      self.agreeing_);
   }
 
  private:
@@ -98,6 +100,7 @@ class OneMap {
   Merging merging_;
   KnownGround known_ground_;
   Condensing condensing_;
+  Dormancy dormancy_;
   ScanLocaliser scan_localiser_;
   CommonError common_error_;
   std::optional<model::Utime> first_offered_;  ///< Keyframe that might have started the map.

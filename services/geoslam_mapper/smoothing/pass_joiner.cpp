@@ -82,8 +82,8 @@ double misfit(const std::vector<MergedPair>& pairs, const GlobalMap& map, bool j
 
 }  // namespace
 
-std::vector<MergedPair> PassJoiner::follow(const model::FieldOfView& field_of_view,
-                                           NodeIndex newest, Merges& merges, GlobalMap& map) {
+JoinedPasses PassJoiner::follow(const model::FieldOfView& field_of_view, NodeIndex newest,
+                                Merges& merges, GlobalMap& map) {
   const double along_m = map.graph.node(newest).along_m;
   if (!parameters_.use_odometry || along_m - tried_m_ < kBetweenSearches_m) return {};
   tried_m_ = along_m;
@@ -93,8 +93,8 @@ std::vector<MergedPair> PassJoiner::follow(const model::FieldOfView& field_of_vi
   const Scene scene = scene_around(field_of_view, newest, *pass, map);
   if (scene.ours.size() < kLeast || scene.theirs.size() < kLeast) return {};
   std::vector<MergedPair> pairs = find(scene, newest, *pass, map);
-  if (pairs.size() < kLeast || !join(pairs, merges, map)) return {};
-  return pairs;
+  if (pairs.size() < kLeast) return {};
+  return join(std::move(pairs), merges, map);
 }
 
 /// The node of another pass that is nearest to where the vehicle seems to be.
@@ -136,7 +136,7 @@ PassJoiner::Scene PassJoiner::scene_around(const model::FieldOfView& field_of_vi
   std::vector<std::pair<double, model::LandmarkId>> ours;
   for (const model::LandmarkId id : map.landmarks.index().near({here_m, scene.reach_m})) {
     const StoredLandmark& landmark = map.landmarks.at(id);
-    if (!map.graph.position(id)) continue;
+    if (!map.graph.position(id) && !map.graph.is_dormant(id)) continue;
     const double distance_m = (landmark.position_m - here_m).norm();
     if (path_at_last_sight(landmark, map.graph) < limit_m) {
       scene.theirs.push_back(id);
@@ -250,7 +250,10 @@ std::optional<PassJoiner::Match> PassJoiner::match_by_constellation(const Scene&
 }
 
 /// All or none.
-bool PassJoiner::join(const std::vector<MergedPair>& pairs, Merges& merges, GlobalMap& map) const {
+JoinedPasses PassJoiner::join(std::vector<MergedPair> pairs, Merges& merges, GlobalMap& map) const {
+  std::vector<model::LandmarkId> ids;
+  for (const auto& [old_id, new_id] : pairs) ids.insert(ids.end(), {old_id, new_id});
+  map.wake(ids);
   const double before = misfit(pairs, map, false);
   std::vector<std::vector<HandedOver>> handed_over;
   handed_over.reserve(pairs.size());
@@ -269,13 +272,12 @@ bool PassJoiner::join(const std::vector<MergedPair>& pairs, Merges& merges, Glob
   }
   if (!fits) {
     map.graph.rollback();
-    return false;
+    return {};
   }
 
   for (std::size_t i = 0; i < pairs.size(); ++i)
     merges.adopt(pairs[i], std::move(handed_over[i]), map);
-  map.adopt_estimates();
-  return true;
+  return {std::move(pairs), map.adopt_estimates()};
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -10,6 +10,12 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
+/// Passes that were joined.
+struct JoinedPasses {
+  std::vector<MergedPair> pairs;         ///< Landmarks that became one.
+  std::vector<model::LandmarkId> moved;  ///< What moved with them.
+};
+
 /// Looks for the landmarks of this pass among those of earlier ones, while tracking goes on. After
 /// a way on which the pose drifted, what comes into view again lies metres beside what the map has:
 /// each landmark may be any of several, but all together have one place only. Found is it by the
@@ -21,11 +27,11 @@ class PassJoiner {
   /// `parameters` gives the gates.
   explicit PassJoiner(const SmoothingMapperParameters& parameters) : parameters_(parameters) {}
 
-  /// To be called after each accepted keyframe. Returns the pairs that were made one; the graph is
-  /// solved then. Cost: nothing where no other pass is near or its landmarks are bound to the
-  /// vehicle's pose; else, every few metres, one search among the landmarks around.
-  std::vector<MergedPair> follow(const model::FieldOfView& field_of_view, NodeIndex newest,
-                                 Merges& merges, GlobalMap& map);
+  /// To be called after each accepted keyframe. The graph is solved where passes were joined. Cost:
+  /// nothing where no other pass is near or its landmarks are bound to the vehicle's pose; else,
+  /// every few metres, one search among the landmarks around.
+  JoinedPasses follow(const model::FieldOfView& field_of_view, NodeIndex newest, Merges& merges,
+                      GlobalMap& map);
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
@@ -61,7 +67,7 @@ class PassJoiner {
                                       const GlobalMap& map) const;
   std::optional<Match> match_by_constellation(const Scene& scene, NodeIndex newest,
                                               const EarlierPass& pass, const GlobalMap& map) const;
-  bool join(const std::vector<MergedPair>& pairs, Merges& merges, GlobalMap& map) const;
+  JoinedPasses join(std::vector<MergedPair> pairs, Merges& merges, GlobalMap& map) const;
 
   SmoothingMapperParameters parameters_;
   double tried_m_ = 0.0;  ///< Path of the vehicle at the last search.

@@ -325,13 +325,24 @@ std::optional<Eigen::Matrix2d> PoseGraph::difference_covariance(model::LandmarkI
                          joint->topRightCorner<2, 2>() - joint->bottomLeftCorner<2, 2>());
 }
 
-std::vector<std::pair<model::LandmarkId, Eigen::Vector2d>> PoseGraph::moved_landmarks() const {
+std::vector<std::pair<model::LandmarkId, Eigen::Vector2d>> PoseGraph::take_moved_landmarks() {
   std::vector<std::pair<model::LandmarkId, Eigen::Vector2d>> result;
   result.reserve(smoother_.moved_points().size());
   for (const plane::PointId point : smoother_.moved_points()) {
     const model::LandmarkId id = landmark_of_point_[index(point)];
     if (id != 0) result.emplace_back(id, smoother_.point(point));
   }
+
+  // Dormant ones follow their nodes.
+  std::vector<model::LandmarkId> dormant;
+  for (const NodeIndex node : moved_nodes()) {
+    if (!has_left(node)) continue;
+    const std::vector<model::LandmarkId>& ids = dormant_of_node_[node].landmarks;
+    dormant.insert(dormant.end(), ids.begin(), ids.end());
+  }
+  std::sort(dormant.begin(), dormant.end());
+  dormant.erase(std::unique(dormant.begin(), dormant.end()), dormant.end());
+  for (const model::LandmarkId id : dormant) result.emplace_back(id, dormant_position(id));
   return result;
 }
 
@@ -350,6 +361,11 @@ void PoseGraph::restore(const plane::Graph& graph) {
   for (std::size_t i = 0; i < landmark_of_point_.size(); ++i) {
     if (landmark_of_point_[i] != 0)
       point_of_.emplace(landmark_of_point_[i], plane::PointId(static_cast<std::uint32_t>(i)));
+  }
+  dormant_of_node_.assign(nodes_.size(), {});
+  for (const auto& [id, observed] : dormant_) {
+    for (const DormantObservation& one : observed)
+      dormant_of_node_.at(one.node).landmarks.push_back(id);
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <unordered_map>
 #include <utility>
@@ -60,6 +61,19 @@ struct HandedOver {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
     a(s.node, s.position_m, s.information, s.counts);
+  }
+};
+
+/// What a node observed of a landmark that is not in the solved graph.
+struct DormantObservation {
+  NodeIndex node = 0;
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();   ///< In the node's frame.
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();  ///< [1/m^2]
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.node, s.position_m, s.information);
   }
 };
 
@@ -131,6 +145,22 @@ class PoseGraph {
   /// Cost: the factors of the nodes.
   std::vector<Retirement> condense(std::span<const NodeIndex> nodes);
 
+  /// Takes landmarks out of the solved graph: what they tell of the nodes that observed them, all
+  /// of which must be condensed, becomes motions between these. Exact but for the linearisation,
+  /// and undone by wake(). Landmarks with a prior must not be among them. Cost: the landmarks that
+  /// the nodes have in common.
+  void make_dormant(std::span<const model::LandmarkId> ids,
+                    const std::map<model::LandmarkId, StoredLandmark>& landmarks);
+  /// Takes landmarks into the solved graph again, where they are dormant.
+  void wake(std::span<const model::LandmarkId> ids);
+  /// Whether the landmark was taken out of the solved graph.
+  bool is_dormant(model::LandmarkId id) const { return dormant_.contains(id); }
+  /// Position of a dormant landmark [m] at the nodes' estimates. Throws std::out_of_range where it
+  /// is not dormant.
+  Eigen::Vector2d dormant_position(model::LandmarkId id) const;
+  /// Ids of all landmarks in the solved graph, ascending. O(landmarks in it).
+  std::vector<model::LandmarkId> awake() const;
+
   /// Updates the estimates. Not `ok` where the measurements leave variables undetermined.
   factor_graph::plane::SmootherUpdate solve() { return smoother_.update(); }
 
@@ -142,6 +172,9 @@ class PoseGraph {
   std::size_t node_count() const { return nodes_.size() - free_nodes_.size(); }
   /// map_T_centre of a node.
   geometry::SE2 pose(NodeIndex node) const { return smoother_.pose(nodes_[node].centre); }
+  /// Largest move of a node [m] that its dormant landmarks do not follow at once.
+  static constexpr double kDormantMove_m = 0.02;
+
   /// Position of a landmark [m]; none while it is not in the graph.
   std::optional<Eigen::Vector2d> position(model::LandmarkId id) const;
   /// chi^2 (2 degrees of freedom) of one observation at the present estimate.
@@ -169,7 +202,9 @@ class PoseGraph {
   std::optional<Eigen::Matrix2d> difference_covariance(model::LandmarkId a,
                                                        model::LandmarkId b) const;
   /// Landmarks that updates moved since the checkpoint, with their positions [m], each once.
-  std::vector<std::pair<model::LandmarkId, Eigen::Vector2d>> moved_landmarks() const;
+  /// Dormant ones are among them where a node of theirs has moved by kDormantMove_m since they
+  /// were.
+  std::vector<std::pair<model::LandmarkId, Eigen::Vector2d>> take_moved_landmarks();
   /// Nodes that updates moved since the checkpoint, each once.
   std::vector<NodeIndex> moved_nodes() const;
 
@@ -179,7 +214,8 @@ class PoseGraph {
   static void archive(Archive& a, Self& self) {
     factor_graph::plane::Graph graph = self.smoother_.graph();
     a(graph, self.nodes_, self.landmark_of_point_, self.gyro_, self.newest_, self.free_nodes_,
-      self.free_points_, self.free_observations_, self.free_motions_, self.free_biased_);
+      self.free_points_, self.free_observations_, self.free_motions_, self.free_biased_,
+      self.dormant_, self.ties_);
     if constexpr (Archive::kReads) self.restore(graph);
   }
 
@@ -209,6 +245,23 @@ class PoseGraph {
     std::vector<model::LandmarkId> landmarks;
     std::vector<factor_graph::plane::ScalarId> scalars;  ///< May repeat.
   };
+  /// What two nodes have in common, smaller number first.
+  using TiedNodes = std::pair<NodeIndex, NodeIndex>;
+  /// The dormant landmarks that two nodes observed, as one motion between the nodes.
+  struct Tie {
+    std::optional<factor_graph::plane::MotionId> motion;
+    std::vector<model::LandmarkId> landmarks;
+
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& s) {
+      a(s.motion, s.landmarks);
+    }
+  };
+  std::vector<TiedNodes> tied_by(model::LandmarkId id) const;
+  void renew(const std::set<TiedNodes>& ties);
+  factor_graph::plane::RelativePose tie(const TiedNodes& nodes,
+                                        std::span<const model::LandmarkId> ids) const;
+  bool has_left(NodeIndex node);
   Part part_of(std::span<const NodeIndex> nodes) const;
   void add_motions_of(NodeIndex node, Part& part) const;
   void add_motion(MotionRef ref, factor_graph::plane::PoseId a, factor_graph::plane::PoseId b,
@@ -235,7 +288,15 @@ class PoseGraph {
   /// By point of the smoother; 0 where the landmark was merged into another.
   std::vector<model::LandmarkId> landmark_of_point_;
   GyroBias gyro_;
-  std::optional<NodeIndex> newest_;  ///< Added last.
+  std::map<model::LandmarkId, std::vector<DormantObservation>> dormant_;
+  std::map<TiedNodes, Tie> ties_;
+  /// What is dormant of a node's landmarks, and where the node was when they last followed it.
+  struct DormantOfNode {
+    std::vector<model::LandmarkId> landmarks;
+    geometry::SE2 followed;
+  };
+  std::vector<DormantOfNode> dormant_of_node_;  ///< By node; from dormant_.
+  std::optional<NodeIndex> newest_;             ///< Added last.
   FreeNumbers free_nodes_;
   FreeNumbers free_points_;
   FreeNumbers free_observations_;

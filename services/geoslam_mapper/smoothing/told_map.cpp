@@ -12,11 +12,30 @@ Eigen::Matrix2d point_covariance(const geometry::SE2WithCovariance& a_T_b,
   return rotation * jacobian * a_T_b.covariance * jacobian.transpose() * rotation.transpose();
 }
 
-/// Of a landmark that the graph was not solved with yet: by the node that observed it.
-Eigen::Matrix2d by_its_node(const StoredLandmark& landmark, const GlobalMap& map) {
-  const geometry::SE2WithCovariance map_T_node = map.graph.marginal(landmark.nodes.back());
-  return point_covariance(map_T_node, map_T_node.mean.inverse() * landmark.position_m) +
-         landmark.local_variance() * Eigen::Matrix2d::Identity();
+/// Of landmarks that are not in the solved graph: by the nodes that observed them last. Zero for
+/// the others.
+std::vector<Eigen::Matrix2d> by_their_nodes(std::span<const model::LandmarkId> ids,
+                                            std::span<const Eigen::Matrix2d> marginals,
+                                            const GlobalMap& map) {
+  std::vector<std::size_t> unsolved;
+  std::vector<NodeIndex> nodes;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const StoredLandmark& landmark = map.landmarks.at(ids[i]);
+    if (!marginals[i].isZero(0.0) || landmark.nodes.empty()) continue;
+    unsolved.push_back(i);
+    nodes.push_back(landmark.nodes.back());
+  }
+
+  std::vector<Eigen::Matrix2d> result(ids.size(), Eigen::Matrix2d::Zero());
+  const std::vector<Eigen::Matrix3d> of_nodes = map.graph.covariances(nodes);
+  for (std::size_t k = 0; k < unsolved.size(); ++k) {
+    const StoredLandmark& landmark = map.landmarks.at(ids[unsolved[k]]);
+    const geometry::SE2WithCovariance map_T_node{map.graph.pose(nodes[k]), of_nodes[k]};
+    result[unsolved[k]] =
+        point_covariance(map_T_node, map_T_node.mean.inverse() * landmark.position_m) +
+        landmark.local_variance() * Eigen::Matrix2d::Identity();
+  }
+  return result;
 }
 
 }  // namespace
@@ -27,6 +46,7 @@ void set_covariances(std::span<model::MapLandmark> landmarks, const GlobalMap& m
   ids.reserve(landmarks.size());
   for (const model::MapLandmark& landmark : landmarks) ids.push_back(landmark.id);
   const std::vector<Eigen::Matrix2d> marginals = map.graph.covariances(ids);
+  const std::vector<Eigen::Matrix2d> others = by_their_nodes(ids, marginals, map);
 
   const auto origin_T_first = map.trajectory.origin_T_first();
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
@@ -38,7 +58,7 @@ void set_covariances(std::span<model::MapLandmark> landmarks, const GlobalMap& m
       told.covariance_m2 = stored.prior_covariance;
       continue;
     }
-    told.covariance_m2 = is_solved ? marginals[i] : by_its_node(stored, map);
+    told.covariance_m2 = is_solved ? marginals[i] : others[i];
 
     // A given map has its own origin and scale.
     if (is_given) continue;

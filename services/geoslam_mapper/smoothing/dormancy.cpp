@@ -1,0 +1,48 @@
+#include "services/geoslam_mapper/smoothing/dormancy.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace understory::geoslam_mapper::smoothing {
+namespace {
+
+/// The vehicle drives so far [m] from one look around to the next.
+constexpr double kBetween_m = 10.0;
+/// Landmarks are awake so far [m] beyond the sensor's range, and become dormant so much further.
+constexpr double kAwakeBeyond_m = 30.0;
+constexpr double kDormantBeyond_m = 20.0;
+
+}  // namespace
+
+void Dormancy::follow(const model::FieldOfView& field_of_view, NodeIndex newest, GlobalMap& map) {
+  const double along_m = map.graph.node(newest).along_m;
+  if (!is_on_ || std::abs(along_m - looked_m_) < kBetween_m) return;
+  looked_m_ = along_m;
+  const Eigen::Vector2d here_m = map.graph.pose(newest).translation();
+  const double awake_m = field_of_view.max_range_m + kAwakeBeyond_m;
+
+  // Only what condensed nodes observed, and no prior holds.
+  std::vector<model::LandmarkId> left;
+  for (const model::LandmarkId id : map.graph.awake()) {
+    const StoredLandmark& landmark = map.landmarks.at(id);
+    const bool is_far = (landmark.position_m - here_m).norm() > awake_m + kDormantBeyond_m;
+    if (!is_far || landmark.nodes.empty() || !landmark.prior_covariance.isZero(0.0)) continue;
+    if (std::ranges::all_of(landmark.nodes,
+                            [&](NodeIndex node) { return map.graph.node(node).is_condensed; })) {
+      left.push_back(id);
+    }
+  }
+  std::vector<model::LandmarkId> met;
+  for (const model::LandmarkId id : map.landmarks.index().near({here_m, awake_m}))
+    if (map.graph.is_dormant(id)) met.push_back(id);
+  if (left.empty() && met.empty()) return;
+
+  map.graph.checkpoint();
+  map.graph.wake(met);
+  map.graph.make_dormant(left, map.landmarks.all());
+  (void)map.graph.solve();  // What they tell is in the graph as before.
+  map.adopt_estimates();
+}
+
+}  // namespace understory::geoslam_mapper::smoothing

@@ -1,0 +1,32 @@
+// Which landmarks are in the solved graph.
+#pragma once
+
+#include "services/geoslam_mapper/parameters.hpp"
+#include "services/geoslam_mapper/smoothing/global_map.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+
+/// Keeps the solved graph to the ground around the vehicle: of what lies further away only
+/// condensed nodes and motions between them are in it.
+class Dormancy {
+ public:
+  /// `parameters` gives `condense_m`: without condensed nodes no landmark is dormant.
+  explicit Dormancy(const SmoothingMapperParameters& parameters)
+      : is_on_(parameters.condense_m > 0.0) {}
+
+  /// To be called after each accepted keyframe. Looks around every few metres; costs the landmarks
+  /// in the solved graph then, and what is changed.
+  void follow(const model::FieldOfView& field_of_view, NodeIndex newest, GlobalMap& map);
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.looked_m_);
+  }
+
+ private:
+  bool is_on_;
+  double looked_m_ = 0.0;  ///< Path of the vehicle when it looked around.
+};
+
+}  // namespace understory::geoslam_mapper::smoothing

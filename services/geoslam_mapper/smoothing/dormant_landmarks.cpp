@@ -1,0 +1,209 @@
+// Landmarks out of the solved graph: what they tell of the nodes, as motions between these.
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "services/geoslam_mapper/smoothing/pose_graph.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+namespace {
+
+namespace plane = factor_graph::plane;
+
+/// Steps of Gauss-Newton for a motion that starts at the present estimate.
+constexpr int kSteps = 2;
+/// Share of the information that is added where landmarks leave a motion undetermined.
+constexpr double kDamping = 1e-9;
+/// Distance [m] of landmarks from their node.
+constexpr double kLever_m = 40.0;
+
+/// The nearest matrix that is positive semi-definite.
+Eigen::Matrix3d positive(const Eigen::Matrix3d& symmetric) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(symmetric);
+  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).asDiagonal() *
+         solver.eigenvectors().transpose();
+}
+
+/// One landmark's say on the motion between two nodes, all in the first one's frame but `z_b`.
+struct Shared {
+  Eigen::Vector2d z_a = Eigen::Vector2d::Zero();
+  Eigen::Vector2d z_b = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d weight = Eigen::Matrix2d::Zero();
+};
+
+}  // namespace
+
+void PoseGraph::make_dormant(std::span<const model::LandmarkId> ids,
+                             const std::map<model::LandmarkId, StoredLandmark>& landmarks) {
+  std::set<TiedNodes> changed;
+  for (const model::LandmarkId id : ids) {
+    // Its observations go.
+    std::vector<DormantObservation>& observed = dormant_[id];
+    for (const NodeIndex node : landmarks.at(id).nodes) {
+      const auto entry = nodes_[node].observations.find(id);
+      if (entry == nodes_[node].observations.end()) continue;
+      const plane::PointObservation& factor = smoother_.observation(entry->second);
+      observed.push_back({node, factor.position, factor.information});
+      ignore(node, id);
+      if (dormant_of_node_.size() <= node) dormant_of_node_.resize(node + 1);
+      dormant_of_node_[node].landmarks.push_back(id);
+    }
+
+    // It goes itself.
+    const auto point = point_of_.find(id);
+    landmark_of_point_[index(point->second)] = 0;
+    if (smoother_.is_free(point->second)) free_points_.give(index(point->second));
+    point_of_.erase(point);
+    for (const TiedNodes& nodes : tied_by(id)) {
+      ties_[nodes].landmarks.push_back(id);
+      changed.insert(nodes);
+    }
+  }
+  renew(changed);
+}
+
+void PoseGraph::wake(std::span<const model::LandmarkId> ids) {
+  std::set<TiedNodes> changed;
+  for (const model::LandmarkId id : ids) {
+    const auto found = dormant_.find(id);
+    if (found == dormant_.end()) continue;
+    for (const TiedNodes& nodes : tied_by(id)) {
+      std::erase(ties_.at(nodes).landmarks, id);
+      changed.insert(nodes);
+    }
+    add_landmark(id, dormant_position(id), std::nullopt);
+    for (const DormantObservation& one : found->second) {
+      place_observation(
+          one.node, id,
+          {nodes_[one.node].centre, point_of_.at(id), one.position_m, one.information});
+      std::erase(dormant_of_node_[one.node].landmarks, id);
+    }
+    dormant_.erase(found);
+  }
+  renew(changed);
+}
+
+std::vector<model::LandmarkId> PoseGraph::awake() const {
+  std::vector<model::LandmarkId> ids;
+  ids.reserve(point_of_.size());
+  for (const auto& [id, point] : point_of_) ids.push_back(id);
+  std::sort(ids.begin(), ids.end());
+  return ids;
+}
+
+std::vector<PoseGraph::TiedNodes> PoseGraph::tied_by(model::LandmarkId id) const {
+  const std::vector<DormantObservation>& observed = dormant_.at(id);
+  std::vector<TiedNodes> result;
+  result.reserve(observed.size() * observed.size() / 2);
+  for (std::size_t i = 0; i < observed.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k)
+      result.push_back(std::minmax(observed[i].node, observed[k].node));
+  }
+  return result;
+}
+
+/// The motions of these ties after their landmarks changed.
+void PoseGraph::renew(const std::set<TiedNodes>& ties) {
+  for (const TiedNodes& nodes : ties) {
+    const auto entry = ties_.find(nodes);
+    Tie& one = entry->second;
+    if (one.landmarks.empty()) {
+      if (one.motion) {
+        plane::RelativePose nothing = smoother_.motion(*one.motion);
+        nothing.information.setZero();
+        smoother_.set(*one.motion, nothing);
+        free_motions_.give(index(*one.motion));
+      }
+      ties_.erase(entry);
+      continue;
+    }
+
+    const plane::RelativePose factor = tie(nodes, one.landmarks);
+    if (one.motion) {
+      smoother_.set(*one.motion, factor);
+    } else if (const auto number = free_motions_.take()) {
+      one.motion = plane::MotionId(*number);
+      smoother_.set(*one.motion, factor);
+    } else {
+      one.motion = smoother_.add(factor);
+    }
+  }
+}
+
+/// Eliminating a point that nodes observed with information L leaves, between each two of them, the
+/// difference of what they observed with the weight L_a (sum of L)^-1 L_b. It is exact where the
+/// informations commute, as isotropic ones do; its symmetric part counts.
+plane::RelativePose PoseGraph::tie(const TiedNodes& nodes,
+                                   std::span<const model::LandmarkId> ids) const {
+  const auto& [a, b] = nodes;
+  const geometry::SE2 a_T_map = pose(a).inverse();
+  std::vector<Shared> shared;
+  shared.reserve(ids.size());
+  for (const model::LandmarkId id : ids) {
+    Shared one;
+    Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
+    Eigen::Matrix2d of_a = Eigen::Matrix2d::Zero();
+    Eigen::Matrix2d of_b = Eigen::Matrix2d::Zero();
+    for (const DormantObservation& observed : dormant_.at(id)) {
+      const Eigen::Matrix2d to_a = (a_T_map * pose(observed.node)).rotation();
+      const Eigen::Matrix2d information = to_a * observed.information * to_a.transpose();
+      sum += information;
+      if (observed.node == a) {
+        of_a = information;
+        one.z_a = observed.position_m;
+      } else if (observed.node == b) {
+        of_b = information;
+        one.z_b = observed.position_m;
+      }
+    }
+    const Eigen::Matrix2d weight = of_a * sum.inverse() * of_b;
+    one.weight = 0.5 * (weight + weight.transpose());
+    shared.push_back(one);
+  }
+
+  plane::RelativePose result{nodes_[a].centre, nodes_[b].centre, a_T_map * pose(b),
+                             Eigen::Matrix3d::Zero()};
+  for (int step = 0; step < kSteps; ++step) {
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+    const Eigen::Matrix2d rotation = result.a_T_b.rotation();
+    for (const Shared& one : shared) {
+      Eigen::Matrix<double, 2, 3> j;
+      j << rotation, rotation * geometry::perpendicular(one.z_b);
+      normal += j.transpose() * one.weight * j;
+      gradient += j.transpose() * one.weight * (one.z_a - result.a_T_b * one.z_b);
+    }
+    result.information = positive(normal);
+    const Eigen::Matrix3d damped =
+        result.information + kDamping * result.information.trace() * Eigen::Matrix3d::Identity();
+    result.a_T_b = result.a_T_b * geometry::SE2::Exp(damped.inverse() * gradient);
+  }
+  return result;
+}
+
+/// Whether the node's landmarks must follow it; they do then.
+bool PoseGraph::has_left(NodeIndex node) {
+  if (node >= dormant_of_node_.size() || dormant_of_node_[node].landmarks.empty()) return false;
+  const geometry::SE2 now = pose(node);
+  const geometry::SE2 move = dormant_of_node_[node].followed.inverse() * now;
+  if (move.translation().norm() + kLever_m * std::abs(move.theta()) < kDormantMove_m) return false;
+  dormant_of_node_[node].followed = now;
+  return true;
+}
+
+/// Where the nodes that observed it have it.
+Eigen::Vector2d PoseGraph::dormant_position(model::LandmarkId id) const {
+  Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d weighted = Eigen::Vector2d::Zero();
+  for (const DormantObservation& one : dormant_.at(id)) {
+    const geometry::SE2 map_T_node = pose(one.node);
+    const Eigen::Matrix2d rotation = map_T_node.rotation();
+    const Eigen::Matrix2d information = rotation * one.information * rotation.transpose();
+    sum += information;
+    weighted += information * (map_T_node * one.position_m);
+  }
+  return sum.inverse() * weighted;
+}
+
+}  // namespace understory::geoslam_mapper::smoothing
