@@ -5,6 +5,7 @@
 #include "eval/experiments/laps/laps.hpp"
 #include "eval/experiments/large_map/large_map.hpp"
 #include "eval/experiments/one_shot/one_shot.hpp"
+#include "eval/experiments/partition/partition.hpp"
 #include "eval/experiments/returns/returns.hpp"
 
 namespace understory::eval::experiments {
@@ -29,6 +30,7 @@ void add_eval_command(CLI::App& parent) {
   roads::add_landmarks_vs_error_experiment(eval);
   misstated::add_misstated_experiment(eval);
   wheels::add_wheels_experiment(eval);
+  partition::add_partition_experiments(eval);
 }
 
 }  // namespace understory::eval::experiments

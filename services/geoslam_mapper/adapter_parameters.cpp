@@ -141,8 +141,9 @@ void describe_growth(SmoothingMapperParameters& p, bus::ParameterTable& table) {
             "not the time. 0: every keyframe is kept.");
   table.add(
       "smoothing.condense_m", p.condense_m, {0.0, 1000.0}, "m",
-      "The keyframes of so much path, at least four, become one condensed measurement; at most "
-      "half of the sensor's range, since what bends within it is lost. 0: none.");
+      "The keyframes of so much path, at least four, become one condensed measurement. 0: none.");
+  table.add("smoothing.condense_of_range", p.condense_of_range, {0.0, 1000.0}, "",
+            "... but of no more than this by the sensor's range: what bends within it is lost.");
   table.add("smoothing.condense_after_m", p.condense_after_m, {0.0, 10000.0}, "m",
             "... once the vehicle is so far beyond it, and beyond the sensor's range.");
 }

@@ -69,6 +69,7 @@ struct SmoothingMapperParameters {
   double fold_angle_rad = 0.02;
   double known_ground_m = 5.0;
   double condense_m = 20.0;
+  double condense_of_range = 0.5;
   double condense_after_m = 50.0;
 };
 

@@ -309,15 +309,6 @@ ReturnScore drive(const ReturnDrive& drive, const sim::Forest& surveyed, std::ui
     identities.follow(update, trunks, score);
     score.revoked += Identities::count_separated(update);
     const geometry::SE2 truth = simulation.map_T_vehicle(first, k);
-    if (getenv("DBG")) {
-      const Eigen::Vector3d e = (update.map_T_vehicle.inverse() * truth).Log();
-      fprintf(
-          stderr,
-          "k %zu err %.2f %.4f sig %.3f prior %d inl %u lm %zu merged %zu chi2 %.1f/%u fa %.1f\n",
-          k, e.head<2>().norm(), e.z(), std::sqrt(update.covariance(0, 0)), update.used_prior,
-          update.inliers, keyframe->landmarks.size(), update.merged.size(), update.chi2,
-          update.degrees_of_freedom, update.log10_false_alarm);
-    }
     const Eigen::Vector3d error = (update.map_T_vehicle.inverse() * truth).Log();
     if (k < simulation.lap_size()) {
       score.drift_m = error.head<2>().norm();

@@ -7,8 +7,6 @@ namespace {
 
 /// Fewest nodes of a stretch.
 constexpr std::ptrdiff_t kLeastNodes = 4;
-/// A stretch by the sensor's range, at most.
-constexpr double kMostOfRange = 0.5;
 
 }  // namespace
 
@@ -18,7 +16,7 @@ void Condensing::follow(const FusedKeyframe& fused, const KnownGround& known_gro
   const double now_m = map.graph.node(fused.node).along_m;
   if (fused.is_new_node) waiting_.push_back({fused.node, now_m});
   const double range_m = fused.keyframe.field_of_view.max_range_m;
-  const double length_m = std::min(length_m_, kMostOfRange * range_m);
+  const double length_m = std::min(length_m_, of_range_ * range_m);
   const double end_m = now_m - std::max(after_m_, range_m);
   const std::vector<NodeIndex> stretch = take_stretch(length_m, end_m, known_ground, map.graph);
   if (stretch.size() < 2) return;

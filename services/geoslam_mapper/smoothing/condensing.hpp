@@ -18,9 +18,11 @@ namespace understory::geoslam_mapper::smoothing {
 /// condensed yet stays exact.
 class Condensing {
  public:
-  /// `parameters` gives `condense_m` and `condense_after_m`.
+  /// `parameters` gives `condense_m`, `condense_of_range` and `condense_after_m`.
   explicit Condensing(const SmoothingMapperParameters& parameters)
-      : length_m_(parameters.condense_m), after_m_(parameters.condense_after_m) {}
+      : length_m_(parameters.condense_m),
+        of_range_(parameters.condense_of_range),
+        after_m_(parameters.condense_after_m) {}
 
   /// To be called after each accepted keyframe. Condenses at most one stretch, and solves; the map
   /// is as before where that fails. Cost: what the nodes of the stretch observed.
@@ -49,6 +51,7 @@ class Condensing {
                                       const KnownGround& known_ground, const PoseGraph& graph);
 
   double length_m_;
+  double of_range_;
   double after_m_;
   std::deque<Passed> waiting_;  ///< In order of time.
 };

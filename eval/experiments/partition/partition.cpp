@@ -1,0 +1,91 @@
+#include "eval/experiments/partition/partition.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "common/terminal/interrupt.hpp"
+#include "eval/tools/memory.hpp"
+#include "eval/tools/quantile.hpp"
+#include "eval/tools/thread_clock.hpp"
+#include "services/geoslam_mapper/geoslam_mapper.hpp"
+
+namespace understory::eval::experiments::partition {
+namespace {
+
+geoslam_mapper::MapperParameters mapper_parameters(double size_m) {
+  geoslam_mapper::MapperParameters parameters;
+  parameters.smoothing.use_odometry = true;
+  parameters.smoothing.gyro_walk = 0.0;
+  parameters.smoothing.start_wait_s = 0.0;
+  parameters.smoothing.relinearise_above = 1e-4;
+  parameters.smoothing.condense_m = size_m;
+  parameters.smoothing.condense_of_range = 1000.0;
+  return parameters;
+}
+
+Section section_of(double end_m, const std::vector<double>& ms) {
+  Section section;
+  section.end_m = end_m;
+  section.ms_p50 = tools::quantile(ms, 0.5);
+  section.ms_p99 = tools::quantile(ms, 0.99);
+  section.ms_max = tools::quantile(ms, 1.0);
+  section.resident_mb = tools::resident_mb();
+  return section;
+}
+
+}  // namespace
+
+DriveResult drive(const RouteParameters& parameters, std::uint64_t seed, double size_m,
+                  std::size_t sections) {
+  Route route(parameters, seed);
+  const auto mapper = geoslam_mapper::make_mapper(mapper_parameters(size_m));
+  DriveResult result;
+  std::vector<double> ms;
+  double nees = 0.0;
+  std::size_t told = 0;
+  const std::size_t per_section = std::max<std::size_t>(1, route.size() / sections);
+
+  for (std::size_t k = 0; k < route.size(); ++k) {
+    terminal::throw_if_interrupted();
+    if (k > 0) mapper->add(route.odometry(k));
+    const model::Keyframe keyframe = route.keyframe(k);
+    const double begin_s = tools::thread_time_s();
+    const model::MapUpdate update = mapper->add(keyframe);
+    ms.push_back(1e3 * (tools::thread_time_s() - begin_s));
+    (void)mapper->take_changed_landmarks();
+    if (!update.merged.empty()) result.closure_ms = std::max(result.closure_ms, ms.back());
+
+    if (update.status == model::MapUpdateStatus::kUpdated) {
+      const Eigen::Vector3d error = (update.map_T_vehicle.inverse() * route.pose(k)).Log();
+      nees += error.dot(update.covariance.inverse() * error);
+      ++told;
+    } else if (k > 0) {
+      ++result.refused;
+    }
+    if ((k + 1) % per_section == 0) {
+      result.sections.push_back(section_of(Route::along_m(k), ms));
+      ms.clear();
+    }
+  }
+
+  std::vector<geometry::SE2> truth;
+  for (const model::KeyframePose& pose : mapper->trajectory()) {
+    result.trajectory.push_back(pose.map_T_vehicle);
+    truth.push_back(route.pose(Route::number_of(pose.utime)));
+  }
+  result.rmse_to_truth_m = rmse_m(result.trajectory, truth);
+  result.landmarks = mapper->landmarks().size();
+  if (told > 0) result.mean_nees = nees / static_cast<double>(told);
+  return result;
+}
+
+double rmse_m(const std::vector<geometry::SE2>& a, const std::vector<geometry::SE2>& b) {
+  const std::size_t count = std::min(a.size(), b.size());
+  double squared = 0.0;
+  for (std::size_t i = 0; i < count; ++i)
+    squared += (a[i].translation() - b[i].translation()).squaredNorm();
+  return count > 0 ? std::sqrt(squared / static_cast<double>(count)) : 0.0;
+}
+
+}  // namespace understory::eval::experiments::partition
