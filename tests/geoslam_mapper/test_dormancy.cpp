@@ -118,6 +118,21 @@ TEST_CASE("Dormant landmarks leave the nodes where they were, and as sure", "[ma
   }
 }
 
+TEST_CASE("Where rays tell little, dormant landmarks tell less, not more", "[mapper]") {
+  for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6, 7, 8}) {
+    World one = world(seed, 100.0);
+    PoseGraph& graph = one.map.graph;
+    const auto before = poses(one);
+    const Eigen::Matrix3d covariance = graph.marginal(one.nodes.back()).covariance;
+    graph.make_dormant(one.ids, one.map.landmarks.all());
+    for (int i = 0; i < 3; ++i) REQUIRE(graph.solve().ok);
+    const Eigen::Matrix3d dormant = graph.marginal(one.nodes.back()).covariance;
+    CHECK(apart_m(before, poses(one)) < 1.5 * std::sqrt(dormant.topLeftCorner<2, 2>().trace()));
+    CHECK(dormant.trace() > 0.8 * covariance.trace());
+    CHECK(dormant.trace() < 4.0 * covariance.trace());
+  }
+}
+
 TEST_CASE("Dormant landmarks follow their nodes", "[mapper]") {
   World one = world(7, 0.0);
   GlobalMap& map = one.map;

@@ -39,7 +39,7 @@ void Dormancy::follow(const model::FieldOfView& field_of_view, NodeIndex newest,
   if (left.empty() && met.empty()) return;
 
   map.graph.checkpoint();
-  map.graph.wake(met);
+  map.wake_unsolved(met);
   map.graph.make_dormant(left, map.landmarks.all());
   (void)map.graph.solve();  // What they tell is in the graph as before.
   map.adopt_estimates();

@@ -13,16 +13,21 @@ namespace plane = factor_graph::plane;
 
 /// Steps of Gauss-Newton for a motion that starts at the present estimate.
 constexpr int kSteps = 2;
-/// Share of the information that is added where landmarks leave a motion undetermined.
-constexpr double kDamping = 1e-9;
+/// Directions with less than this share of the largest information are undetermined.
+constexpr double kUndetermined = 1e-6;
 /// Distance [m] of landmarks from their node.
 constexpr double kLever_m = 40.0;
 
-/// The nearest matrix that is positive semi-definite.
-Eigen::Matrix3d positive(const Eigen::Matrix3d& symmetric) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(symmetric);
-  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).asDiagonal() *
-         solver.eigenvectors().transpose();
+/// The least solution where the information leaves directions undetermined.
+Eigen::Vector3d solution(const Eigen::Matrix3d& information, const Eigen::Vector3d& gradient) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(information);
+  Eigen::Vector3d inverse = Eigen::Vector3d::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const double value = solver.eigenvalues()[k];
+    if (value > kUndetermined * solver.eigenvalues()[2]) inverse[k] = 1.0 / value;
+  }
+  return solver.eigenvectors() * inverse.asDiagonal() * solver.eigenvectors().transpose() *
+         gradient;
 }
 
 /// One landmark's say on the motion between two nodes, all in the first one's frame but `z_b`.
@@ -131,9 +136,10 @@ void PoseGraph::renew(const std::set<TiedNodes>& ties) {
   }
 }
 
-/// Eliminating a point that nodes observed with information L leaves, between each two of them, the
-/// difference of what they observed with the weight L_a (sum of L)^-1 L_b. It is exact where the
-/// informations commute, as isotropic ones do; its symmetric part counts.
+/// Eliminating a point that two nodes observed with information A and B leaves the difference of
+/// what they observed, with the weight A (A + B)^-1 B. Of a point that others observed, too, it
+/// counts with the share that A and B have in the sum of all: exact where informations are
+/// isotropic.
 plane::RelativePose PoseGraph::tie(const TiedNodes& nodes,
                                    std::span<const model::LandmarkId> ids) const {
   const auto& [a, b] = nodes;
@@ -157,7 +163,8 @@ plane::RelativePose PoseGraph::tie(const TiedNodes& nodes,
         one.z_b = observed.position_m;
       }
     }
-    const Eigen::Matrix2d weight = of_a * sum.inverse() * of_b;
+    const double share = (of_a + of_b).trace() / sum.trace();
+    const Eigen::Matrix2d weight = share * of_a * (of_a + of_b).inverse() * of_b;
     one.weight = 0.5 * (weight + weight.transpose());
     shared.push_back(one);
   }
@@ -174,10 +181,8 @@ plane::RelativePose PoseGraph::tie(const TiedNodes& nodes,
       normal += j.transpose() * one.weight * j;
       gradient += j.transpose() * one.weight * (one.z_a - result.a_T_b * one.z_b);
     }
-    result.information = positive(normal);
-    const Eigen::Matrix3d damped =
-        result.information + kDamping * result.information.trace() * Eigen::Matrix3d::Identity();
-    result.a_T_b = result.a_T_b * geometry::SE2::Exp(damped.inverse() * gradient);
+    result.information = 0.5 * (normal + normal.transpose());
+    result.a_T_b = result.a_T_b * geometry::SE2::Exp(solution(result.information, gradient));
   }
   return result;
 }

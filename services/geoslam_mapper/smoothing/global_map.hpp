@@ -40,9 +40,15 @@ struct GlobalMap {
   void wake(std::span<const model::LandmarkId> ids) {
     if (std::ranges::none_of(ids, [&](auto id) { return graph.is_dormant(id); })) return;
     graph.checkpoint();
-    graph.wake(ids);
+    wake_unsolved(ids);
     (void)graph.solve();  // What they tell was in the graph already.
     adopt_estimates();
+  }
+  /// Likewise, without solving.
+  void wake_unsolved(std::span<const model::LandmarkId> ids) {
+    for (const model::LandmarkId id : ids)
+      if (graph.is_dormant(id)) landmarks.move(id, graph.dormant_position(id));
+    graph.wake(ids);
   }
 
   /// A landmark at the present estimate, without covariance; see told_map.
