@@ -100,7 +100,7 @@ TEST_CASE_METHOD(GivenMap, "a replay goes on in the map of an earlier drive", "[
   CHECK(only.poses > 100);
   CHECK(only.deltas == 0);
   CHECK(only.farthest_m < 0.5);
-  CHECK(read_bytes(map) == before);
+  CHECK((read_bytes(map) == before));
 
   // The configuration in force is in the log, the layer's values in it.
   std::string config;
@@ -113,7 +113,7 @@ TEST_CASE_METHOD(GivenMap, "a replay goes on in the map of an earlier drive", "[
   // Without the flag the map grows.
   fine("replay " + drive + kConfig + " --map " + map + " --out " + path("grown.lcm"));
   CHECK(said_in(path("grown.lcm")).deltas > 0);
-  CHECK(read_bytes(map) == before);
+  CHECK((read_bytes(map) == before));
 }
 
 TEST_CASE_METHOD(GivenMap, "a given map replaces what the configuration names", "[cli]") {
