@@ -220,6 +220,7 @@ class AlignmentSearch {
     alignment.covariance = best_->fit.covariance;
     alignment.first_in_overlap = best_->pairing.first_in_overlap;
     alignment.second_in_overlap = best_->pairing.second_in_overlap;
+    alignment.pairs_in_overlap = best_->pairing.pairs_in_overlap;
     alignment.log10_false_alarm = false_alarm();
     alignment.log10_margin = margin();
     alignment.pairs = best_->pairing.pairs;
@@ -270,7 +271,7 @@ std::string_view describe(AlignmentOutcome outcome) {
 double Alignment::share() const {
   const std::size_t possible = std::min(first_in_overlap, second_in_overlap);
   if (possible == 0) return 0.0;
-  return std::min(1.0, static_cast<double>(pairs.size()) / static_cast<double>(possible));
+  return std::min(1.0, static_cast<double>(pairs_in_overlap) / static_cast<double>(possible));
 }
 
 std::string Alignment::reason(const AlignmentParameters& parameters) const {

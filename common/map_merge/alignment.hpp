@@ -62,6 +62,7 @@ struct Alignment {
   std::vector<LandmarkPair> pairs;                       ///< One to one, by `second`.
   std::size_t first_in_overlap = 0;   ///< Landmarks of the first map where the second has some.
   std::size_t second_in_overlap = 0;  ///< And the other way round.
+  std::size_t pairs_in_overlap = 0;
   /// log10 of an upper bound on the expected number of so good motions by chance.
   double log10_false_alarm = 0.0;
   double log10_margin = 0.0;   ///< Decades to the best different motion.

@@ -20,15 +20,20 @@ constexpr double kPairsOfMotion = 3.0;
 
 double covering_radius(const LandmarkSet& set) { return kCoveringSpacings * set.spacing_m(); }
 
-/// Landmarks of `set`, moved into the frame of `other`, that lie in it.
-std::vector<std::uint32_t> inside(const LandmarkSet& set, const geometry::SE2& other_T_set,
-                                  const LandmarkSet& other) {
-  std::vector<std::uint32_t> result;
-  for (std::uint32_t i = 0; i < set.all().size(); ++i) {
-    const Eigen::Vector2d there = other_T_set * set.all()[i].position_m;
-    if (other.count_within(there, covering_radius(other)) >= kCovering) result.push_back(i);
+/// Which landmarks of `set`, moved into the frame of `other`, lie in it.
+std::vector<bool> inside(const LandmarkSet& set, const geometry::SE2& other_T_set,
+                         const LandmarkSet& other) {
+  std::vector<bool> result;
+  result.reserve(set.all().size());
+  for (const UncertainLandmark& one : set.all()) {
+    const Eigen::Vector2d there = other_T_set * one.position_m;
+    result.push_back(other.count_within(there, covering_radius(other)) >= kCovering);
   }
   return result;
+}
+
+std::size_t number_of(const std::vector<bool>& flags) {
+  return static_cast<std::size_t>(std::ranges::count(flags, true));
 }
 
 /// Landmarks of both maps that may be one.
@@ -122,7 +127,7 @@ std::vector<LandmarkPair> one_to_one(std::vector<Candidate> candidates, const La
 double Pairing::share() const {
   const std::size_t possible = std::min(first_in_overlap, second_in_overlap);
   if (possible == 0) return 0.0;
-  return std::min(1.0, static_cast<double>(pairs.size()) / static_cast<double>(possible));
+  return std::min(1.0, static_cast<double>(pairs_in_overlap) / static_cast<double>(possible));
 }
 
 Eigen::Matrix<double, 2, 3> DifferenceModel::jacobian(const UncertainLandmark& second) const {
@@ -151,17 +156,23 @@ Eigen::Matrix2d DifferenceModel::independent(const UncertainLandmark& first,
 Pairing pair_up(const LandmarkSet& first, const LandmarkSet& second, const DifferenceModel& model,
                 const AlignmentParameters& parameters) {
   const PairSearch search(first, second, model, parameters);
-  const std::vector<std::uint32_t> shared = inside(second, model.first_T_second, first);
+  const std::vector<bool> is_shared = inside(second, model.first_T_second, first);
   std::vector<Candidate> candidates;
   double chance = 0.0;
-  for (const std::uint32_t one : shared) chance += std::min(1.0, search.collect(one, candidates));
+  for (std::uint32_t i = 0; i < is_shared.size(); ++i) {
+    // In a sparse corner there may be a pair, too; it says nothing about the motion.
+    const double expected = search.collect(i, candidates);
+    if (is_shared[i]) chance += std::min(1.0, expected);
+  }
 
   Pairing pairing;
   pairing.pairs = one_to_one(std::move(candidates), first, second);
-  pairing.second_in_overlap = shared.size();
-  pairing.first_in_overlap = inside(first, model.first_T_second.inverse(), second).size();
-  const auto tries = static_cast<double>(shared.size());
-  const double hits = static_cast<double>(pairing.pairs.size()) - kPairsOfMotion;
+  pairing.second_in_overlap = number_of(is_shared);
+  pairing.first_in_overlap = number_of(inside(first, model.first_T_second.inverse(), second));
+  pairing.pairs_in_overlap = static_cast<std::size_t>(std::ranges::count_if(
+      pairing.pairs, [&](const LandmarkPair& pair) { return is_shared[pair.second]; }));
+  const auto tries = static_cast<double>(pairing.second_in_overlap);
+  const double hits = static_cast<double>(pairing.pairs_in_overlap) - kPairsOfMotion;
   if (hits <= 0.0) return pairing;
   pairing.log10_tail =
       constellation::log10_binomial_tail_bound(hits, tries - kPairsOfMotion, chance / tries);

@@ -13,6 +13,7 @@ struct Pairing {
   std::vector<LandmarkPair> pairs;  ///< One to one, by `second`; indices in LandmarkSet::all().
   std::size_t first_in_overlap = 0;
   std::size_t second_in_overlap = 0;
+  std::size_t pairs_in_overlap = 0;
   /// log10 of a bound on the probability that chance gives so many pairs to one motion.
   double log10_tail = 0.0;
 

@@ -48,6 +48,8 @@ EXPERIMENTS = (
           25),
     _eval("large-map", "large-map --runs 10 --seed 1 --method smoothing", 4),
     _eval("one-shot", "one-shot --scans 1500 --seed 12 --jobs 2 --data DATA", 10, ("tree_maps", "stem_censuses")),
+    _eval("map-merge", "map-merge --trials 100 --drives 40 --seed 1 --jobs 2 --data DATA", 5,
+          ("tree_maps", "stem_censuses")),
     _eval("efficiency", "efficiency --drive-km 10 --stationary-h 2", 6),
     _eval("laps", "laps --laps 100 --length-m 317 --hours 24", 45),
     _eval("health", "health --drives 1000 --seed 1", 8),
