@@ -56,10 +56,12 @@ bool has_same_pairs(const Pairing& a, const Pairing& b) {
 class AlignmentSearch {
  public:
   AlignmentSearch(const LandmarkSet& first, const LandmarkSet& second,
-                  const AlignmentParameters& parameters)
+                  const AlignmentParameters& parameters,
+                  const std::function<void(double)>& progress)
       : first_(first),
         second_(second),
         parameters_(parameters),
+        progress_(progress),
         first_points_(points_of(first)),
         second_points_(points_of(second)) {
     const LandmarkSet& larger = searches_second() ? first_ : second_;
@@ -72,10 +74,12 @@ class AlignmentSearch {
       return result(AlignmentOutcome::kTooFewLandmarks);
 
     WindowSize last;
-    for (const WindowSize& size : kWindows) {
-      if (finds_the_same(last, size)) continue;
-      last = size;
-      take_windows(size);
+    for (std::size_t i = 0; i < kWindows.size(); ++i) {
+      if (finds_the_same(last, kWindows[i])) continue;
+      last = kWindows[i];
+      take_windows(last, [&](double part) {
+        progress_((static_cast<double>(i) + part) / static_cast<double>(kWindows.size()));
+      });
       if (outcome() == AlignmentOutcome::kAligned) break;
     }
     if (outcome() == AlignmentOutcome::kAligned) look_beside();
@@ -96,8 +100,8 @@ class AlignmentSearch {
     return has_all && (is_as_sure || last.most_sigma_m >= size.most_sigma_m);
   }
 
-  void take_windows(const WindowSize& size) {
-    const WindowSearch search = search_windows(map_, smaller(), size);
+  void take_windows(const WindowSize& size, const std::function<void(double)>& progress) {
+    const WindowSearch search = search_windows(map_, smaller(), size, progress);
     windows_ += search.windows;
     hypotheses_ += search.tried;
     for (const Hypothesis& one : search.hypotheses) {
@@ -239,6 +243,7 @@ class AlignmentSearch {
   const LandmarkSet& first_;
   const LandmarkSet& second_;
   const AlignmentParameters& parameters_;
+  const std::function<void(double)>& progress_;
   std::vector<geometry::UncertainPoint> first_points_;
   std::vector<geometry::UncertainPoint> second_points_;
   constellation::ConstellationMap map_;  ///< Of the larger one; ids are places in all(), plus 1.
@@ -286,10 +291,11 @@ std::string Alignment::reason(const AlignmentParameters& parameters) const {
 }
 
 Alignment align(std::span<const model::MapLandmark> first,
-                std::span<const model::MapLandmark> second, const AlignmentParameters& parameters) {
+                std::span<const model::MapLandmark> second, const AlignmentParameters& parameters,
+                const std::function<void(double)>& progress) {
   const LandmarkSet first_set(first, parameters.unknown_sigma_m);
   const LandmarkSet second_set(second, parameters.unknown_sigma_m);
-  return AlignmentSearch(first_set, second_set, parameters).run();
+  return AlignmentSearch(first_set, second_set, parameters, progress).run();
 }
 
 }  // namespace understory::map_merge

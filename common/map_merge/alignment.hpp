@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -80,13 +81,17 @@ struct Alignment {
 /// Looks for the overlap with no prior. Windows of the smaller map are searched in the larger one
 /// (common/constellation), small windows first; each motion that comes of one is verified and
 /// refined on all landmarks of the overlap, with both maps' covariances. What is not finite is left
-/// out. The same maps give the same result. Cost: about linear in the landmarks, seconds for
-/// 10,000.
+/// out. The same maps give the same result. Cost: about linear in the landmarks of the smaller map;
+/// 12 s where two maps of 10,000 have a tenth in common, 31 s where they have nothing.
 ///
 /// The covariance takes what the pairs leave as independent from landmark to landmark, and the rest
 /// of the stated covariances as a rigid motion that is common to all landmarks of a map.
-Alignment align(std::span<const model::MapLandmark> first,
-                std::span<const model::MapLandmark> second,
-                const AlignmentParameters& parameters = {});
+///
+/// `progress` is called now and then with the part of the search that is done, 0 to 1; what it
+/// throws ends the search.
+Alignment align(
+    std::span<const model::MapLandmark> first, std::span<const model::MapLandmark> second,
+    const AlignmentParameters& parameters = {},
+    const std::function<void(double)>& progress = [](double /*part*/) {});
 
 }  // namespace understory::map_merge

@@ -97,7 +97,7 @@ std::vector<Hypothesis> different_ones(std::vector<Hypothesis> all, const Landma
 }  // namespace
 
 WindowSearch search_windows(const constellation::ConstellationMap& map, const LandmarkSet& searched,
-                            const WindowSize& size) {
+                            const WindowSize& size, const std::function<void(double)>& progress) {
   const constellation::LocaliseParameters parameters = search_parameters();
   WindowSearch search;
   std::vector<Hypothesis> all;
@@ -113,6 +113,7 @@ WindowSearch search_windows(const constellation::ConstellationMap& map, const La
     const constellation::Localisation found = map.localise(window.points, parameters);
     ++search.windows;
     search.tried += found.hypotheses;
+    progress(static_cast<double>(i) / static_cast<double>(searched.all().size()));
     if (found.associations.size() < kFewestInliers) continue;
     all.push_back(hypothesis_of(map, window, found));
   }

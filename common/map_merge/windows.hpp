@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "common/constellation/map.hpp"
@@ -34,8 +35,9 @@ struct WindowSize {
 
 /// Covers `searched` with windows of so many neighbouring landmarks, each half over the next ones,
 /// and looks for each in `map`. Motions that no window alone is sure of are kept, too: whoever asks
-/// verifies them on all landmarks.
+/// verifies them on all landmarks. `progress` is called after each window with the part of
+/// `searched` that is covered; what it throws ends the search.
 WindowSearch search_windows(const constellation::ConstellationMap& map, const LandmarkSet& searched,
-                            const WindowSize& size);
+                            const WindowSize& size, const std::function<void(double)>& progress);
 
 }  // namespace understory::map_merge

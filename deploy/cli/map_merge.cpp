@@ -10,6 +10,7 @@
 #include "common/map_file/opening.hpp"
 #include "common/map_merge/fusion.hpp"
 #include "common/terminal/interrupt.hpp"
+#include "common/terminal/progress.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/map_commands.hpp"
 #include "deploy/cli/text_file.hpp"
@@ -175,12 +176,20 @@ std::string write_merged(const MapMergeOptions& options, const MapsToMerge& read
   return options.out.string();
 }
 
+Alignment align_shown(const MapsToMerge& maps, const map_merge::AlignmentParameters& parameters) {
+  terminal::Progress progress("looking for the overlap", 1.0);
+  return map_merge::align(map_merge::landmarks_of(maps.first), map_merge::landmarks_of(maps.second),
+                          parameters, [&](double part) {
+                            terminal::throw_if_interrupted();
+                            progress.update(part);
+                          });
+}
+
 void run_map_merge(const MapMergeOptions& options) {
   terminal::catch_interrupts();
   const MapsToMerge maps = read_maps_to_merge(options);
   const map_merge::AlignmentParameters parameters{.unknown_sigma_m = options.sigma_m};
-  const Alignment alignment = map_merge::align(map_merge::landmarks_of(maps.first),
-                                               map_merge::landmarks_of(maps.second), parameters);
+  const Alignment alignment = align_shown(maps, parameters);
   if (!alignment.found())
     fail(fmt::format("{} map {}, {} map {}: not merged: {}", options.first.string(),
                      maps.first.map_id, options.second.string(), maps.second_id,
