@@ -310,6 +310,9 @@ def laps(document):
                          number(1e3 * rows[i - 1]["ate_m"], 1), number(rows[i - 1]["mean_nees"]),
                          number(rows[i - 1]["largest_nees"], 0), rows[i - 1]["poses"],
                          rows[i - 1]["unsure"], rows[i - 1]["refused"]) for i in shown])
+    if config.get("localisation_only"):
+        lines += ["", "The hours are localisation only in the map of a lap. Its file afterwards: "
+                      + ("the same bytes, and no change was told." if config["map_unchanged"] else "**changed**.")]
     return lines
 
 

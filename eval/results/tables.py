@@ -56,6 +56,7 @@ SECTIONS = (
     ("map-merge", "Two maps become one", None, render.map_merge),
     ("efficiency", "Time per keyframe", f"{GEOSLAM}, §5.5 (a figure only)", render.efficiency),
     ("laps", "Known ground: what must not grow", None, render.laps),
+    ("laps-held", "Localisation only: what must not change", None, render.laps),
     ("health", "What HEALTH says of wrong poses", None, render.health),
     ("misstated", "Sensors that are not as stated", None, render.misstated),
     ("victoria-park", "A real drive: Victoria Park", "stated figures of the batch solution", render.victoria_park),
