@@ -60,16 +60,19 @@ struct Said {
   std::size_t poses = 0;
   std::size_t lost = 0;
   std::size_t deltas = 0;
-  double farthest_m = 0.0;  ///< Of a pose from the truth, in the frame of the first pose.
+  double first_lost_s = -1.0;  ///< After the first scan; negative: never.
+  double farthest_m = 0.0;     ///< Of a pose from the truth, in the frame of the first pose.
 };
 
 Said said_in(const std::string& log) {
   Said said;
   std::map<model::Utime, geometry::SE2> truth;
   std::optional<geometry::SE2> map_T_world;
+  std::optional<std::int64_t> first_utime;
   io::LcmLogReader reader(log);
   while (const auto event = reader.next()) {
     if (event->channel == "MAP_DELTA") ++said.deltas;
+    if (event->channel == "LANDMARKS" && !first_utime) first_utime = event->utime;
     if (event->channel == "GROUND_TRUTH") {
       const auto one = wire::decode_message<ground_truth_t>(event->data);
       truth[one->utime] = wire::from_wire(one->world_T_vehicle);
@@ -77,7 +80,8 @@ Said said_in(const std::string& log) {
     if (event->channel != "SLAM_POSE") continue;
     const auto pose = wire::decode_message<model::SlamPose>(event->data);
     if (!pose->is_localised()) {
-      ++said.lost;
+      if (++said.lost == 1)
+        said.first_lost_s = 1e-6 * static_cast<double>(event->utime - *first_utime);
       continue;
     }
     ++said.poses;
@@ -114,6 +118,20 @@ TEST_CASE_METHOD(GivenMap, "a replay goes on in the map of an earlier drive", "[
   fine("replay " + drive + kConfig + " --map " + map + " --out " + path("grown.lcm"));
   CHECK(said_in(path("grown.lcm")).deltas > 0);
   CHECK((read_bytes(map) == before));
+}
+
+TEST_CASE_METHOD(GivenMap, "in somebody else's map the vehicle is lost at once and has no pose",
+                 "[cli]") {
+  fine("sim intermediate --length 40 --seed 9 --out " + path("other.lcm"));
+  fine("replay " + path("other.lcm") + kConfig + " --out " + path("mapped.lcm"));
+  fine("map import " + path("mapped.lcm") + " --out " + map);
+  fine(kDrive + drive);
+  fine("replay " + drive + kConfig + " --map " + map + " --localisation-only --out " + again);
+  const Said said = said_in(again);
+  CHECK(said.poses == 0);
+  CHECK(said.lost > 20);
+  CHECK(said.first_lost_s <= 2.0);
+  CHECK(said.deltas == 0);
 }
 
 TEST_CASE_METHOD(GivenMap, "a given map replaces what the configuration names", "[cli]") {

@@ -199,3 +199,20 @@ TEST_CASE("which map is the first one makes no difference", "[map_merge]") {
     CHECK(back.pairs.size() + 2 > there.pairs.size());
   }
 }
+
+TEST_CASE("the search tells how far it is, and ends where it is told to", "[map_merge]") {
+  std::mt19937_64 random(9);
+  const Scene scene = random_scene({.width_m = 60.0, .overlap = -0.5}, random);
+  double last = 0.0;
+  std::size_t calls = 0;
+  align(scene.first.landmarks, scene.second.landmarks, {}, [&](double part) {
+    CHECK(part >= last);
+    CHECK(part <= 1.0);
+    last = part;
+    ++calls;
+  });
+  CHECK(calls > 10);
+  CHECK_THROWS_AS(align(scene.first.landmarks, scene.second.landmarks, {},
+                        [](double /*part*/) { throw std::runtime_error("enough"); }),
+                  std::runtime_error);
+}
