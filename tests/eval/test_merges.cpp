@@ -1,4 +1,5 @@
 // eval map-merge: what it counts.
+#include <algorithm>
 #include <random>
 
 #include "eval/experiments/merges/pairs.hpp"
@@ -21,7 +22,7 @@ std::vector<Eigen::Vector2d> forest() {
 }  // namespace
 
 TEST_CASE("map-merge cuts maps whose trees it knows", "[eval]") {
-  const auto trees = forest();
+  const auto trees = merges::unchanged(forest());
   for (const double overlap : {0.5, -0.1}) {
     const auto pair = merges::cut_maps(trees, {.overlap = overlap, .sigma_m = 0.01}, 5);
     CHECK(pair.overlaps == (overlap > 0.0));
@@ -40,7 +41,7 @@ TEST_CASE("map-merge cuts maps whose trees it knows", "[eval]") {
 }
 
 TEST_CASE("map-merge scores merges", "[eval]") {
-  const auto trees = forest();
+  const auto trees = merges::unchanged(forest());
   auto pair = merges::cut_maps(trees, {.overlap = 0.6}, 6);
   const auto right = merges::merge_trial(pair);
   CHECK(right.merged);
@@ -69,4 +70,15 @@ TEST_CASE("map-merge merges the maps of two drives", "[eval]") {
   CHECK(trial.merged);
   CHECK_FALSE(trial.wrong);
   CHECK(100 * trial.doubled <= trial.landmarks);
+}
+
+TEST_CASE("map-merge knows the trees of two censuses apart", "[eval]") {
+  const auto visits =
+      merges::visits_of({{0.0, 0.0}, {1.0, 0.0}, {2.0, 2.0}}, {{1.0, 0.0}, {3.0, 1.0}});
+  CHECK(visits.trees_m.size() == 4);
+  CHECK(std::count(visits.at_first.begin(), visits.at_first.end(), true) == 3);
+  CHECK(std::count(visits.at_second.begin(), visits.at_second.end(), true) == 2);
+  const auto pair = merges::cut_maps(visits, {.overlap = 1.0, .common = 1.0, .width_m = 10.0}, 1);
+  CHECK(pair.first.trees.size() <= 3);
+  for (const std::size_t tree : pair.second.trees) CHECK(visits.at_second[tree]);
 }

@@ -49,6 +49,8 @@ constexpr std::array kForests{
     ForestSource{"longleaf", "tree_maps/longleaf.csv"},
     ForestSource{"lansing", "tree_maps/lansing.csv"}, ForestSource{"bei", "tree_maps/bei.csv"},
     ForestSource{"big-woods", "stem_censuses/big_woods.csv", "dbh_2008_cm", 10.0}};
+/// The last one of them, six years later.
+constexpr ForestSource kLater{"big-woods", "stem_censuses/big_woods.csv", "dbh_2014_cm", 10.0};
 /// As shares of a map's width; the last one is a gap.
 constexpr std::array kOverlaps{1.0, 0.5, 0.25, -0.1};
 /// Two visits of a forest share 62-64 % of their stems in the median, 34 % at worst.
@@ -150,14 +152,14 @@ class MergesTable {
     print_merges_heading();
   }
 
-  void add_forest(const std::string& name, const std::vector<Eigen::Vector2d>& trees) {
+  void add_forest(const std::string& name, const Visits& visits) {
     for (const double overlap : kOverlaps) {
       for (const double common : kShares) {
         CutSetting setting;
         setting.overlap = overlap;
         setting.common = common;
         add(name, overlap, common, options_.trials,
-            [&](std::uint64_t seed) { return cut_maps(trees, setting, seed); });
+            [&](std::uint64_t seed) { return cut_maps(visits, setting, seed); });
       }
     }
   }
@@ -198,9 +200,11 @@ void run_map_merges(const MergesOptions& options) {
       !options.data.empty() ? options.data : std::string(set != nullptr ? set : "../shared/data");
   MergesTable table(options, stop);
   for (const NamedDrives& drives : kDrives) table.add_drives(drives);
-  table.add_forest("simulated", simulated_forest(options.seed));
+  table.add_forest("simulated", unchanged(simulated_forest(options.seed)));
   for (const ForestSource& source : kForests)
-    table.add_forest(source.name, load_forest(source, data));
+    table.add_forest(source.name, unchanged(load_forest(source, data)));
+  table.add_forest("big-woods, 2008 and 2014",
+                   visits_of(load_forest(kForests.back(), data), load_forest(kLater, data)));
 
   int apart = 0;
   int wrong = 0;

@@ -48,15 +48,15 @@ Rectangle bounds_of(const std::vector<Eigen::Vector2d>& trees) {
   return bounds;
 }
 
-KnownMap observed(const std::vector<Eigen::Vector2d>& trees, const Rectangle& part,
-                  std::uint32_t map_id, const geometry::SE2& map_T_world, const CutSetting& setting,
-                  std::mt19937_64& random) {
+KnownMap observed(const std::vector<Eigen::Vector2d>& trees, const std::vector<bool>& stands,
+                  const Rectangle& part, std::uint32_t map_id, const geometry::SE2& map_T_world,
+                  const CutSetting& setting, std::mt19937_64& random) {
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   std::normal_distribution<double> noise(0.0, setting.sigma_m);
   KnownMap known;
   known.map.map_id = map_id;
   for (std::size_t i = 0; i < trees.size(); ++i) {
-    if (!part.contains(trees[i]) || unit(random) >= setting.common) continue;
+    if (!stands[i] || !part.contains(trees[i]) || unit(random) >= setting.common) continue;
     map_file::StoredLandmark one;
     one.landmark.id = map_file::landmark_id(map_id, known.trees.size() + 1);
     const double x = noise(random);
@@ -202,11 +202,29 @@ void score_motion(const MapPair& pair, const map_merge::Alignment& found, MergeT
 
 }  // namespace
 
-MapPair cut_maps(const std::vector<Eigen::Vector2d>& trees, const CutSetting& setting,
-                 std::uint64_t seed) {
+Visits unchanged(std::vector<Eigen::Vector2d> trees_m) {
+  const std::vector<bool> all(trees_m.size(), true);
+  return {std::move(trees_m), all, all};
+}
+
+Visits visits_of(const std::vector<Eigen::Vector2d>& first_m,
+                 const std::vector<Eigen::Vector2d>& second_m) {
+  std::map<std::pair<double, double>, std::pair<bool, bool>> stands;
+  for (const Eigen::Vector2d& tree : first_m) stands[{tree.x(), tree.y()}].first = true;
+  for (const Eigen::Vector2d& tree : second_m) stands[{tree.x(), tree.y()}].second = true;
+  Visits visits;
+  for (const auto& [place, when] : stands) {
+    visits.trees_m.emplace_back(place.first, place.second);
+    visits.at_first.push_back(when.first);
+    visits.at_second.push_back(when.second);
+  }
+  return visits;
+}
+
+MapPair cut_maps(const Visits& visits, const CutSetting& setting, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
-  const Rectangle bounds = bounds_of(trees);
+  const Rectangle bounds = bounds_of(visits.trees_m);
   const Eigen::Vector2d extent = bounds.high_m - bounds.low_m;
   const double width_m = std::min(setting.width_m, extent.x() / (2.0 - setting.overlap));
   const double height_m = std::min(setting.width_m, extent.y());
@@ -220,8 +238,9 @@ MapPair cut_maps(const std::vector<Eigen::Vector2d>& trees, const CutSetting& se
   const geometry::SE2 first_T_world = random_motion(random);
   const geometry::SE2 second_T_world = random_motion(random);
   MapPair pair;
-  pair.first = observed(trees, first, 1, first_T_world, setting, random);
-  pair.second = observed(trees, second, 2, second_T_world, setting, random);
+  pair.first = observed(visits.trees_m, visits.at_first, first, 1, first_T_world, setting, random);
+  pair.second =
+      observed(visits.trees_m, visits.at_second, second, 2, second_T_world, setting, random);
   pair.first_T_second = first_T_world * second_T_world.inverse();
   pair.overlaps = setting.overlap > 0.0;
   return pair;

@@ -29,17 +29,28 @@ struct MapPair {
   bool overlaps = true;
 };
 
+/// A forest at two visits.
+struct Visits {
+  std::vector<Eigen::Vector2d> trees_m;
+  std::vector<bool> at_first;   ///< Whether a tree stands at the first visit; as many as trees.
+  std::vector<bool> at_second;  ///< Likewise.
+};
+/// All trees stand at both.
+Visits unchanged(std::vector<Eigen::Vector2d> trees_m);
+/// Trees with the same coordinates are one.
+Visits visits_of(const std::vector<Eigen::Vector2d>& first_m,
+                 const std::vector<Eigen::Vector2d>& second_m);
+
 /// How two maps are cut out of a forest.
 struct CutSetting {
   double overlap = 0.5;    ///< Share of each map's width; negative: a gap of that share.
-  double common = 0.64;    ///< Probability that a map has a tree.
+  double common = 0.64;    ///< Probability that a map has a tree that stands.
   double sigma_m = 0.1;    ///< Of a landmark, per axis.
   double width_m = 120.0;  ///< Of a map and its height, at most what the forest gives.
 };
 
 /// Two rectangles beside each other, somewhere in the forest; the same seed gives the same pair.
-MapPair cut_maps(const std::vector<Eigen::Vector2d>& trees, const CutSetting& setting,
-                 std::uint64_t seed);
+MapPair cut_maps(const Visits& visits, const CutSetting& setting, std::uint64_t seed);
 
 /// How two drives go through one forest.
 struct DriveSetting {
