@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <sstream>
 #include <utility>
 
 #include "common/bus/config_file.hpp"
@@ -69,6 +70,14 @@ std::vector<ConfigLayer> config_layers(std::string_view toml, const std::string&
 
   std::reverse(layers.begin(), layers.end());
   return layers;
+}
+
+std::string layer_over(const std::filesystem::path& base, const toml::table& values) {
+  toml::table layer = values;
+  if (!base.empty()) layer.insert_or_assign(kBaseKey, std::filesystem::absolute(base).string());
+  std::ostringstream text;
+  text << layer << '\n';
+  return text.str();
 }
 
 }  // namespace understory::bus

@@ -36,4 +36,8 @@ toml::table parse_config(std::string_view toml, const std::string& name);
 /// leads back.
 std::vector<ConfigLayer> config_layers(std::string_view toml, const std::string& name);
 
+/// The text of a layer with these values on top of the file `base` and what that builds on; where
+/// `base` is empty, of these values alone. It may be kept in any folder.
+std::string layer_over(const std::filesystem::path& base, const toml::table& values);
+
 }  // namespace understory::bus

@@ -53,9 +53,15 @@ class Replay {
  private:
   void host(const Service& service) {
     const std::filesystem::path file = config_file_in(options_.config_dir, service.name);
+    std::string name = file.string();
+    std::string toml = file.empty() ? "" : read_config_file(file);
+    if (const auto layer = options_.layers.find(service.name); layer != options_.layers.end()) {
+      name = layer->second.name;
+      toml = layer_over(file, layer->second.table);
+    }
+
     hosted_.push_back(std::make_unique<HostedService>(
-        service, bus_, no_clock(), file.empty() ? "" : read_config_file(file), file.string(),
-        [&](RuntimeParameters& runtime) {
+        service, bus_, no_clock(), toml, name, [&](RuntimeParameters& runtime) {
           if (!options_.channel_suffix.empty()) runtime.channel_suffix = options_.channel_suffix;
         }));
     Node& node = hosted_.back()->node();

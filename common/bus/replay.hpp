@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/bus/config_layers.hpp"
 #include "common/bus/service.hpp"
 #include "understory/health_t.hpp"
 
@@ -18,8 +19,10 @@ struct ReplayOptions {
   std::filesystem::path out;         ///< Empty = nothing is written.
   std::vector<Service> services;     ///< Hosted, bound in this order.
   std::filesystem::path config_dir;  ///< As config_file_in(); may be empty: defaults.
-  std::string channel_suffix;        ///< Of the outputs of every hosted service.
-  bool keeps_inputs = true;          ///< The log's own events go into `out` too.
+  /// By service: values that replace those of its file, and what they come from, for messages.
+  std::map<std::string, ConfigLayer> layers;
+  std::string channel_suffix;  ///< Of the outputs of every hosted service.
+  bool keeps_inputs = true;    ///< The log's own events go into `out` too.
   /// Called every 256 events with the part done, 0..1; true = stop here, write nothing.
   std::function<bool(double)> progress;
 };

@@ -8,11 +8,13 @@
 #include <cerrno>
 #include <csignal>
 #include <memory>
+#include <optional>
 
 #include "common/bus/launch_config.hpp"
 #include "common/bus/parameter_table.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/given_map_option.hpp"
 #include "deploy/cli/health_listener.hpp"
 #include "deploy/cli/launch_report.hpp"
 #include "deploy/cli/paths.hpp"
@@ -32,6 +34,7 @@ struct LaunchOptions {
   std::vector<std::string> only;
   bool fresh = false;
   bool quiet = false;
+  GivenMapOptions map;
 };
 
 /// SIGTERM, SIGINT and SIGHUP as a descriptor, so that they are handled between two steps.
@@ -63,17 +66,30 @@ bool selected(const LaunchOptions& options, const std::string& name) {
          std::find(options.only.begin(), options.only.end(), name) != options.only.end();
 }
 
-std::vector<launch::ProcessSpec> process_specs(const LaunchOptions& options) {
+/// The processes that are to run.
+std::vector<bus::ProcessEntry> chosen_processes(const LaunchOptions& options) {
+  auto entries = bus::read_launch_config(options.config).processes;
+  std::erase_if(entries, [&](const auto& entry) { return !selected(options, entry.name); });
+  if (entries.empty()) wrong_usage("launch: --only names none of the processes in launch.toml");
+  return entries;
+}
+
+/// The file of a process's parameters; empty = defaults.
+std::filesystem::path config_of(const LaunchOptions& options, const bus::ProcessEntry& entry) {
+  const bool has_layer = options.map.is_given() && entry.name == kMapperProcess;
+  return has_layer ? layer_file(options.state / entry.name) : entry.config;
+}
+
+std::vector<launch::ProcessSpec> process_specs(const LaunchOptions& options,
+                                               const std::vector<bus::ProcessEntry>& entries) {
   std::vector<launch::ProcessSpec> specs;
-  for (const auto& entry : bus::read_launch_config(options.config).processes) {
-    if (!selected(options, entry.name)) continue;
+  for (const auto& entry : entries) {
     launch::ProcessSpec spec;
     spec.name = entry.name;
     spec.command.executable = find_executable(entry.executable);
 
-    if (!entry.config.empty()) {
-      spec.command.arguments.insert(spec.command.arguments.end(),
-                                    {"--config", entry.config.string()});
+    if (const auto config = config_of(options, entry); !config.empty()) {
+      spec.command.arguments.insert(spec.command.arguments.end(), {"--config", config.string()});
     }
 
     if (entry.keeps_state) {
@@ -100,6 +116,27 @@ void prepare_state(const LaunchOptions& options, const launch::Supervisor& super
     if (options.fresh) std::filesystem::remove_all(options.state / process.name);
     std::filesystem::create_directories(options.state / process.name);
   }
+}
+
+/// The mapper's file with the given map in it, or none of an earlier launch.
+void prepare_map(const LaunchOptions& options, const std::vector<bus::ProcessEntry>& entries,
+                 const std::optional<GivenMapLayer>& layer) {
+  const std::filesystem::path folder = options.state / kMapperProcess;
+  if (!layer) {
+    std::filesystem::remove(layer_file(folder));
+    return;
+  }
+  const auto mapper = std::ranges::find(entries, kMapperProcess, &bus::ProcessEntry::name);
+  keep_layer(folder, mapper->config, *layer);
+}
+
+/// With the map's path as every process can use it; none where no map is given.
+std::optional<GivenMapLayer> map_layer(const LaunchOptions& options,
+                                       const std::vector<bus::ProcessEntry>& entries) {
+  if (!options.map.is_given()) return std::nullopt;
+  std::vector<std::string> names;
+  for (const bus::ProcessEntry& entry : entries) names.push_back(entry.name);
+  return given_map_layer(options.map, std::filesystem::absolute(options.map.file), names);
 }
 
 /// Sleeps until a process ends, a signal or a message comes, or something is due.
@@ -151,22 +188,23 @@ void run(launch::Supervisor& supervisor, launch::Registry& registry, const StopS
 }
 
 void launch_processes(const LaunchOptions& options) {
-  std::vector<launch::ProcessSpec> specs;
+  std::vector<bus::ProcessEntry> entries;
   try {
-    specs = process_specs(options);
+    entries = chosen_processes(options);
   } catch (const bus::ConfigurationError& error) {
     wrong_usage(error.what());
   }
-  if (specs.empty()) wrong_usage("launch: --only names none of the processes in launch.toml");
 
+  const std::optional<GivenMapLayer> layer = map_layer(options, entries);
   const StopSignals signals;
   launch::Registry registry(options.state);
   LaunchReport report(options.quiet);
   launch::Supervisor supervisor(
-      std::move(specs), {},
+      process_specs(options, entries), {},
       [&](const std::string& process, const std::string& text) { report.add(process, text); });
   HealthListener health = listen(options, supervisor, report);
   prepare_state(options, supervisor);
+  prepare_map(options, entries, layer);
   supervisor.start(registry.read(), Clock::now());
   run(supervisor, registry, signals, health, report);
 
@@ -194,6 +232,7 @@ void add_launch_command(CLI::App& parent) {
   command->add_option("--report", options->report, "Write what happened to this JSON file");
   command->add_option("--only", options->only, "Only these processes")->delimiter(',');
 
+  add_given_map_options(*command, options->map);
   command->add_flag("--fresh", options->fresh, "Forget the state of earlier runs first");
   command->add_flag("--quiet", options->quiet, "Print nothing but errors");
   command->callback([options] { launch_processes(*options); });

@@ -1,4 +1,4 @@
-// `understory map info|check|import|export|log|revert|accept|diff`: stored maps.
+// `understory map info|check|import|export|merge|log|revert|accept|diff`: stored maps.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
@@ -54,6 +54,25 @@ nlohmann::ordered_json summary_json(const MapSummary& map) {
           {"submap_borders", map.submap_borders},
           {"loop_closures", map.loop_closures},
           {"checksum", map.checksum}};
+}
+
+/// What follows --json is no file.
+CLI::Validator no_dash() {
+  return {
+      [](const std::string& value) { return value == "-" ? "- is no map file" : std::string(); },
+      "", "no dash"};
+}
+
+/// --json, also as `--json -`, which names standard output.
+void add_json_flag(CLI::App& command, bool& is_json) {
+  auto* const flag = command.add_flag("--json", is_json, "As JSON, on standard output");
+  command
+      .add_option_function<std::string>(
+          "stdout", [](const std::string& /*dash*/) {}, "")
+      ->check(CLI::IsMember({"-"}))
+      ->needs(flag)
+      ->group("");
+  command.validate_positionals();
 }
 
 void map_info(const MapOptions& options) {
@@ -223,24 +242,24 @@ void add_map_command(CLI::App& parent) {
   const auto options = std::make_shared<MapOptions>();
   const auto add = [&](const char* name, const char* description, void (*work)(const MapOptions&)) {
     auto* command = map->add_subcommand(name, description);
-    command->add_option("file", options->file, "A map file")->required();
+    command->add_option("file", options->file, "A map file")->required()->check(no_dash());
     command->callback([options, work] { guarded_map_work([&] { work(*options); }); });
     return command;
   };
 
-  add("info", "What is in it", map_info)->add_flag("--json", options->json, "As JSON");
+  add_json_flag(*add("info", "What is in it", map_info), options->json);
   add("check", "What is wrong with it; exit status 1 when something is", map_check);
   add_map_import(*map);
   add_map_export(*map);
-  add("log", "Its changes, the oldest first", map_log)
-      ->add_flag("--json", options->json, "As JSON");
+  add_map_merge(*map);
+  add_json_flag(*add("log", "Its changes, the oldest first", map_log), options->json);
 
   add("revert", "All maps as they were after a change; that is a change, too", map_revert)
       ->add_option("--to", options->to, "Number of the change; 0: before the first one")
       ->required();
   add("accept", "Takes what another program changed (QGIS, say) over as a change", map_accept);
   auto* diff = add("diff", "Landmarks added, removed and moved from one file to another", map_diff);
-  diff->add_option("other", options->other, "The later map file")->required();
+  diff->add_option("other", options->other, "The later map file")->required()->check(no_dash());
   diff->add_option("--quantile", options->limits.quantile,
                    "A landmark has moved where chi2 of its way, by both covariances, is beyond it")
       ->check(CLI::Range(0.0, 1.0))
@@ -249,7 +268,7 @@ void add_map_command(CLI::App& parent) {
                    "[m] Standard deviation in x and in y of landmarks without covariance")
       ->check(CLI::Range(0.0, 1e3))
       ->capture_default_str();
-  diff->add_flag("--json", options->json, "As JSON");
+  add_json_flag(*diff, options->json);
 }
 
 }  // namespace understory::cli

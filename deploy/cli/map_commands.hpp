@@ -16,6 +16,9 @@ void add_map_import(CLI::App& map);
 /// `understory map export`: maps of a file as CSV and GeoJSON.
 void add_map_export(CLI::App& map);
 
+/// `understory map merge`: two maps that overlap become one.
+void add_map_merge(CLI::App& map);
+
 /// Runs `work`; what is wrong with a file ends the command in one line.
 void guarded_map_work(const std::function<void()>& work);
 /// A note for a change that is made now.

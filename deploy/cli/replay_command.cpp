@@ -14,6 +14,7 @@
 #include "common/terminal/progress.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/given_map_option.hpp"
 #include "deploy/cli/paths.hpp"
 #include "deploy/cli/services.hpp"
 
@@ -27,6 +28,7 @@ struct ReplayOptions {
   std::filesystem::path config = default_config_directory();
   std::string channel_suffix;
   bool outputs_only = false;
+  GivenMapOptions map;
 };
 
 bool reads_a_sensor(const std::string& name) {
@@ -96,6 +98,14 @@ void print(const bus::ReplayReport& report, const ReplayOptions& options) {
   }
 }
 
+/// The path stays as it was given: a log then has the same bytes on every computer.
+void lay_map_over(const ReplayOptions& options, bus::ReplayOptions& replay) {
+  if (!options.map.is_given()) return;
+  std::vector<std::string> names;
+  for (const bus::Service& service : replay.services) names.push_back(service.name);
+  replay.layers[kMapperProcess] = given_map_layer(options.map, options.map.file, names).layer;
+}
+
 void run(const ReplayOptions& options) {
   terminal::catch_interrupts();
   bus::ReplayOptions replay_options;
@@ -106,6 +116,7 @@ void run(const ReplayOptions& options) {
   replay_options.config_dir = options.config;
   replay_options.channel_suffix = options.channel_suffix;
   replay_options.keeps_inputs = !options.outputs_only;
+  lay_map_over(options, replay_options);
   terminal::Progress progress("replaying " + options.log, 1.0);
   replay_options.progress = [&](double part) {
     progress.update(part);
@@ -141,6 +152,7 @@ void add_replay_command(CLI::App& parent) {
       ->capture_default_str();
   command->add_option("--channel-suffix", options->channel_suffix, "Of every output, e.g. _ALT");
 
+  add_given_map_options(*command, options->map);
   command->add_flag("--outputs-only", options->outputs_only, "Leave the log's own events out");
   command->callback([options] { run(*options); });
 }

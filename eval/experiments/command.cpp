@@ -4,6 +4,7 @@
 #include "eval/experiments/health/health.hpp"
 #include "eval/experiments/laps/laps.hpp"
 #include "eval/experiments/large_map/large_map.hpp"
+#include "eval/experiments/merges/merges.hpp"
 #include "eval/experiments/one_shot/one_shot.hpp"
 #include "eval/experiments/partition/partition.hpp"
 #include "eval/experiments/returns/returns.hpp"
@@ -20,6 +21,7 @@ void add_eval_command(CLI::App& parent) {
   efficiency::add_efficiency_experiment(eval);
   large_map::add_large_map_experiment(eval);
   one_shot::add_one_shot_experiment(eval);
+  merges::add_map_merge_experiment(eval);
   backend::add_backend_experiment(eval);
   victoria_park::add_victoria_park_experiment(eval);
   frontend::add_frontend_experiment(eval);

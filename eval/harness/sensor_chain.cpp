@@ -52,9 +52,12 @@ SensorChain::SensorChain(const std::vector<bus::Service>& services,
     const std::string toml = instead != toml_instead.end() ? instead->second
                              : file.empty()                ? ""
                                                            : bus::read_config_file(file);
+    // A text in place of a file may build on that file; what is relative in it stays so.
+    const std::filesystem::path name =
+        instead == toml_instead.end() ? file : file.parent_path() / (service.name + " (instead)");
     auto bus = std::make_unique<TimedBus>(bus_);
     auto hosted =
-        std::make_unique<bus::HostedService>(service, *bus, bus::no_clock(), toml, file.string());
+        std::make_unique<bus::HostedService>(service, *bus, bus::no_clock(), toml, name.string());
     hosted_.push_back({service.name, std::move(bus), std::move(hosted)});
   }
 }

@@ -173,6 +173,24 @@ def one_shot(document):
                         f"{total['off_unstated']} unstated, {total['beyond_99_9_pct']} outside their 99.9 % ellipsoid."]
 
 
+def map_merge(document):
+    """Pairs of maps, a line per forest and setting."""
+    rows = document["rows"]
+    apart = sum(row["trials"] for row in rows if row["overlap_pct"] == 0)
+    wrong = sum(row["wrong_merges"] for row in rows)
+    lines = table(
+        ("maps", "overlap %", "trees seen %", "trials", "merged", "wrong merges", "doubled %", "doubled before %",
+         "median offset error cm", "largest cm", "median stated sigma cm", "mean NEES", "median ms", "max ms"),
+        [(row["maps"], "drawn" if row["overlap_pct"] is None else number(row["overlap_pct"], 0),
+          number(row["common_pct"], 0), row["trials"], row["merged"], row["wrong_merges"], number(row["doubled_pct"]),
+          number(row["doubled_before_pct"]), number(100 * row["offset_p50_m"], 1), number(100 * row["offset_max_m"], 1),
+          number(100 * row["stated_sigma_p50_m"], 1), number(row["nees_mean"]), number(row["ms_p50"], 0),
+          number(row["ms_max"], 0))
+         for row in rows])
+    return lines + ["", f"{wrong} wrong merges in all; {apart} pairs of maps had no overlap "
+                        f"(95 % bound: {number(300 / apart)} %)."]
+
+
 def efficiency(document):
     """Time per keyframe by scenario, method and component."""
     lines = table(
@@ -292,6 +310,9 @@ def laps(document):
                          number(1e3 * rows[i - 1]["ate_m"], 1), number(rows[i - 1]["mean_nees"]),
                          number(rows[i - 1]["largest_nees"], 0), rows[i - 1]["poses"],
                          rows[i - 1]["unsure"], rows[i - 1]["refused"]) for i in shown])
+    if config.get("localisation_only"):
+        lines += ["", "The hours are localisation only in the map of a lap. Its file afterwards: "
+                      + ("the same bytes, and no change was told." if config["map_unchanged"] else "**changed**.")]
     return lines
 
 

@@ -180,7 +180,7 @@ void describe(MapperInputParameters& parameters, bus::ParameterTable& table) {
       "the process was started. With smoothing.localisation_only it stays as it is; else it "
       "grows. Empty: a new map. A saved state goes before it.");
   table.add("input.map_id", parameters.map_id, {0, 32767}, "",
-            "Number of the map in that file. 0: the file has one alone.");
+            "Number of the map in that file. 0: the only one that has landmarks.");
   table.add("input.max_detections", parameters.max_detections, {1, 1000000}, "",
             "LANDMARKS with more detections is refused and counted (too_large): what a message may "
             "cost is bounded. A laser of 2048 columns cannot show 700 trunks.");

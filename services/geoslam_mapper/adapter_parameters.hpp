@@ -11,7 +11,7 @@ namespace understory::geoslam_mapper {
 /// What to begin with, and how much one message may hold; documented as MapperParameters is.
 struct MapperInputParameters {
   std::string map_file;  ///< Empty: none.
-  int map_id = 0;        ///< 0: the only one in the file.
+  int map_id = 0;        ///< 0: the only one in the file with landmarks.
   int max_detections = 2000;
   int max_keyframe_landmarks = 1000;
   int max_given_landmarks = 200000;

@@ -1,6 +1,7 @@
 #include "services/geoslam_mapper/given_map.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <stdexcept>
 
 #include "common/map_file/map_file.hpp"
@@ -18,7 +19,12 @@ std::string numbers_of(const std::vector<map_file::MapSummary>& maps) {
 /// The one that is asked for, where it can be told.
 std::uint32_t chosen_map(const std::string& file, const map_file::MapFile& maps, int map_id) {
   const std::vector<map_file::MapSummary> all = maps.maps();
+  // Merged maps leave trajectories of their own behind: maps without landmarks.
+  const auto has_landmarks = [](const auto& map) { return map.trunks + map.corners > 0; };
+  const auto only = std::ranges::find_if(all, has_landmarks);
+  if (map_id == 0 && std::ranges::count_if(all, has_landmarks) == 1) return only->map_id;
   if (map_id == 0 && all.size() == 1) return all.front().map_id;
+
   for (const map_file::MapSummary& map : all)
     if (map_id > 0 && map.map_id == static_cast<std::uint32_t>(map_id)) return map.map_id;
 

@@ -9,9 +9,9 @@
 
 namespace understory::geoslam_mapper {
 
-/// The landmarks of one map of a map file, in order of id. `map_id` 0: the file has one map alone.
-/// Throws map_file::MapFileError, or std::runtime_error that names the file where that map is not
-/// in it or has no landmark.
+/// The landmarks of one map of a map file, in order of id. `map_id` 0: the only one in the file
+/// that has landmarks. Throws map_file::MapFileError, or std::runtime_error that names the file
+/// where that map is not in it or has no landmark.
 std::vector<model::MapLandmark> read_given_map(const std::string& file, int map_id);
 
 /// Why a message's map cannot be begun with; empty where it can: it is whole, has landmarks, and

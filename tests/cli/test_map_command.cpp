@@ -67,6 +67,16 @@ TEST_CASE_METHOD(Maps, "a survey becomes a map, with its sigma", "[cli]") {
   CHECK(info["maps"][0]["trunks"] == 2);
   CHECK(info["maps"][0]["corners"] == 1);
   CHECK(info["changes"] == 1);
+
+  // Scripts name standard output; the option may stand anywhere.
+  const std::string text = fine("info --json " + file).out;
+  for (const char* const order : {"{} --json -", "--json - {}", "--json {} -"}) {
+    CAPTURE(order);
+    CHECK(fine("info " + fmt::format(fmt::runtime(order), file)).out == text);
+  }
+  CHECK(run("info - " + file).status == 2);
+  CHECK(run("info --json -").status == 2);
+  CHECK(run("info " + file + " -").status == 2);
 }
 
 TEST_CASE_METHOD(Maps, "landmarks that stand close together are reported", "[cli]") {

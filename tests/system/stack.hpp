@@ -44,14 +44,17 @@ inline std::string private_url() {
 
 class Stack {
  public:
-  Stack() : bus_(url_) {
+  /// `options`: further ones of `understory launch`.
+  explicit Stack(const std::vector<std::string>& options = {}) : bus_(url_) {
     write_config(directory_, "");
     listen();
-    launch_ = launch::ChildProcess::start(
-        {UNDERSTORY_COMMAND,
-         {"launch", "--config", directory_.path(), "--state-dir", directory_ / "state", "--lcm-url",
-          url_, "--report", report(), "--quiet"},
-         {}});
+    launch::Command command{
+        UNDERSTORY_COMMAND,
+        {"launch", "--config", directory_.path(), "--state-dir", directory_ / "state", "--lcm-url",
+         url_, "--report", report(), "--quiet"},
+        {}};
+    command.arguments.insert(command.arguments.end(), options.begin(), options.end());
+    launch_ = launch::ChildProcess::start(command);
   }
   ~Stack() { stop(); }
 

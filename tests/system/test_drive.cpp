@@ -1,3 +1,4 @@
+#include "common/map_file/map_file.hpp"
 #include "tests/catch.hpp"
 #include "tests/cli/run_command.hpp"
 #include "tests/system/stack.hpp"
@@ -56,4 +57,43 @@ TEST_CASE("a killed process comes back with its state", "[system]") {
                                                     Contains("\"restarts\": 1") &&
                                                     !Contains("given up"));
   }
+}
+
+TEST_CASE("launch --map --localisation-only keeps to the map, through a kill as well", "[system]") {
+  const auto drive = test::short_drive(13);
+  const TemporaryDirectory directory;
+  const std::string file = directory / "survey.gpkg";
+  map_file::StoredMap survey;
+  for (const Eigen::Vector2d& trunk : drive.forest().trunks_m) {
+    map_file::StoredLandmark one;
+    one.landmark.id = map_file::landmark_id(1, survey.landmarks.size() + 1);
+    one.landmark.position_m = trunk;
+    one.landmark.covariance_m2 = 1e-4 * Eigen::Matrix2d::Identity();
+    survey.landmarks.push_back(one);
+  }
+  map_file::create_map_file(file, {&survey, 1}, {});
+  const Bytes before = read_bytes(file);
+
+  test::Stack stack({"--map", file, "--localisation-only"});
+  REQUIRE(stack.wait_for_processes());
+  const std::size_t half = drive.size() / 2;
+  stack.drive(drive, 0, half);
+  REQUIRE(stack.wait_until([&] { return stack.newest_pose() >= drive.utime(half - 12); }));
+  const pid_t killed = stack.pid("geoslam_mapper");
+  ::kill(killed, SIGKILL);
+  stack.drive(drive, half, drive.size());
+  CHECK(stack.wait_until([&] { return stack.newest_pose() >= drive.utime(drive.size() - 12); }));
+  CHECK(stack.pid("geoslam_mapper") != killed);
+  stack.stop();
+
+  // The map's frame is the world, from the first pose on.
+  std::map<model::Utime, geometry::SE2> truth;
+  for (std::size_t k = 0; k < drive.size(); ++k) truth[drive.utime(k)] = drive.world_T_vehicle()[k];
+  for (const model::SlamPose& pose : stack.poses) {
+    CHECK(pose.map_id == 1);
+    const Eigen::Vector2d at = pose.map_T_vehicle().translation();
+    CHECK((at - truth.at(pose.utime).translation()).norm() < 0.25);
+  }
+  CHECK(stack.updates(model::MapUpdateStatus::kFirstMap) == 0);
+  CHECK((read_bytes(file) == before));
 }

@@ -9,8 +9,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "common/bus/config_file.hpp"
+#include "common/bus/config_layers.hpp"
 #include "common/bus/launch_config.hpp"
+#include "common/map_file/map_file.hpp"
 #include "common/model/slam_output.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "eval/harness/chain_drive.hpp"
@@ -49,16 +50,22 @@ double mib_of(const RecordedLap& recorded) {
   return static_cast<double>(bytes) / (1024.0 * 1024.0);
 }
 
-/// The mapper's configuration with the radius of known ground that the options ask for.
-std::map<std::string, std::string> toml_instead(const LapsOptions& options) {
-  if (options.known_ground_m < 0.0) return {};
-  const std::filesystem::path file = bus::config_file_in(options.config_dir, kMapper);
-  std::string toml = bus::read_config_file(file);
-  const std::string table = "[smoothing]\n";
-  const auto at = toml.find(table);
-  if (at == std::string::npos) throw std::runtime_error(file.string() + ": no [smoothing]");
-  toml.insert(at + table.size(), fmt::format("known_ground_m = {}\n", options.known_ground_m));
-  return {{kMapper, toml}};
+/// The mapper's configuration with what the options ask for; `localises`: only in their map.
+std::map<std::string, std::string> toml_instead(const LapsOptions& options, bool localises) {
+  toml::table values;
+  toml::table smoothing;
+  if (options.known_ground_m >= 0.0) smoothing.insert("known_ground_m", options.known_ground_m);
+  if (localises) {
+    smoothing.insert("localisation_only", true);
+    values.insert("input", toml::table{{"map_file", options.localise_in.string()}});
+  }
+  if (smoothing.empty()) return {};
+  values.insert("smoothing", std::move(smoothing));
+  return {{kMapper, bus::layer_over(bus::config_file_in(options.config_dir, kMapper), values)}};
+}
+
+std::vector<bus::Service> mapping_services() {
+  return {keyframer::keyframer_service(), geoslam_mapper::geoslam_mapper_service()};
 }
 
 /// Sums up what one lap gives; nothing in it grows.
@@ -181,7 +188,7 @@ void drive_laps(const LapsOptions& options, const std::atomic<bool>& stop, Progr
   if (static_cast<int>(laps.size()) >= options.laps) return;
   sim::SensorDrive drive = make_drive(options);
   harness::SensorChain chain(harness::services_of(options.config_dir), options.config_dir,
-                             toml_instead(options));
+                             toml_instead(options, false));
   if (!laps.empty()) chain.load(progress.states);
   for (std::uint64_t i = 0; i < progress.readings; ++i) drive.skip();
 
@@ -221,6 +228,26 @@ void drive_laps(const LapsOptions& options, const std::atomic<bool>& stop, Progr
   if (static_cast<int>(laps.size()) < options.laps) end_lap(options.laps, now_s / 3600.0);
 }
 
+void write_lap_map(const LapsOptions& options, const RecordedLap& recorded) {
+  if (std::filesystem::exists(options.localise_in)) return;
+  harness::SensorChain chain(mapping_services(), options.config_dir, toml_instead(options, false));
+  model::WholeMap whole;
+  chain.watch<model::WholeMap>("MAP", [&](const model::WholeMap& map) { whole = map; });
+  for (const harness::RawMessage& message : recorded.messages) chain.feed(message);
+  chain.finish();
+  if (whole.landmarks.empty()) throw std::runtime_error("the recorded lap gave no map");
+
+  map_file::StoredMap map;
+  map.map_id = model::map_of(whole.landmarks.front().id);
+  map.name = "lap";
+  map.created_utime = whole.utime;
+  map.keyframes = whole.keyframes;
+  for (const model::MapLandmark& landmark : whole.landmarks)
+    map.landmarks.push_back({landmark, std::nullopt, std::nullopt});
+  map_file::create_map_file(options.localise_in, {&map, 1},
+                            {whole.utime, "understory eval laps", "a recorded lap", "its map"});
+}
+
 void repeat_lap(const LapsOptions& options, const std::atomic<bool>& stop, Progress& progress,
                 const std::function<void(const Lap&)>& done) {
   const std::vector<harness::RawMessage>& messages = progress.recorded.messages;
@@ -228,9 +255,10 @@ void repeat_lap(const LapsOptions& options, const std::atomic<bool>& stop, Progr
   const model::Utime begin_us = messages.front().utime;
   const model::Utime lap_us = messages.back().utime - begin_us + kScan_us;
   const sim::SensorDrive drive = make_drive(options);
-  harness::SensorChain chain(
-      {keyframer::keyframer_service(), geoslam_mapper::geoslam_mapper_service()},
-      options.config_dir, toml_instead(options));
+  harness::SensorChain chain(mapping_services(), options.config_dir,
+                             toml_instead(options, !options.localise_in.empty()));
+  chain.watch<model::MapDelta>("MAP_DELTA",
+                               [&](const model::MapDelta& /*delta*/) { ++progress.map_changes; });
   if (progress.stretches.empty()) {
     progress.readings = 0;
     progress.map_T_world.reset();

@@ -23,6 +23,9 @@ struct LapsOptions {
   int beams = 16;            ///< Of the LIDAR: 16 or 32.
   double hours = 0.0;        ///< Further hours from the recorded LANDMARKS and ODOMETRY.
   std::filesystem::path config_dir = "deploy/config/lidar";
+  /// The map of the recorded lap is written to this file, and in the hours nothing but localising
+  /// in it is done; empty: the hours map from nothing.
+  std::filesystem::path localise_in;
   double known_ground_m = -1.0;    ///< Instead of the mapper's parameter; negative: as configured.
   std::filesystem::path progress;  ///< File from which an interrupted run goes on; empty: none.
   std::string json;
@@ -61,6 +64,7 @@ struct Progress {
   std::uint64_t readings = 0;                 ///< Of the drive; in the hours laps of the record.
   std::uint64_t sweep_parts = 0;
   double driven_m = 0.0;
+  std::uint64_t map_changes = 0;  ///< MAP_DELTA in the hours, of this process.
 };
 
 /// The progress of a run with these options, empty where there is no file. Throws
@@ -74,8 +78,12 @@ void store_progress(const LapsOptions& options, const Progress& progress);
 void drive_laps(const LapsOptions& options, const std::atomic<bool>& stop, Progress& progress,
                 const std::function<void(const Lap&)>& done);
 
-/// Repeats what was recorded for `options.hours` through keyframer and mapper, from an empty map.
-/// A row for each half hour.
+/// Makes the map of the recorded lap and writes it to `options.localise_in`, unless it is there.
+/// Throws std::runtime_error where a lap gives no map, map_file::MapFileError.
+void write_lap_map(const LapsOptions& options, const RecordedLap& recorded);
+
+/// Repeats what was recorded for `options.hours` through keyframer and mapper, from an empty map or
+/// in the one of `options.localise_in`. A row for each half hour.
 void repeat_lap(const LapsOptions& options, const std::atomic<bool>& stop, Progress& progress,
                 const std::function<void(const Lap&)>& done);
 

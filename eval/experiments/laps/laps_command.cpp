@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/io/text_file.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "eval/experiments/experiments.hpp"
 #include "eval/experiments/laps/laps.hpp"
@@ -73,6 +74,11 @@ nlohmann::json to_json(const char* part, const std::vector<Lap>& laps) {
   return rows;
 }
 
+/// Of the map that is localised in; empty where there is none.
+std::string map_bytes(const LapsOptions& options) {
+  return options.localise_in.empty() ? std::string() : io::read_whole_file(options.localise_in);
+}
+
 void run(const LapsOptions& options) {
   const auto& stop = terminal::catch_interrupts();
   Progress progress = load_progress(options);
@@ -84,11 +90,18 @@ void run(const LapsOptions& options) {
   drive_laps(options, stop, progress, print_row);
   fmt::print("slope of the last half: {:.2f} MiB/h\n", slope_mib_per_h(laps));
 
+  bool is_map_as_it_was = false;
   if (options.hours > 0.0) {
+    if (!options.localise_in.empty()) write_lap_map(options, progress.recorded);
+    const std::string map = map_bytes(options);
     print_header("half hour");
     for (const Lap& stretch : stretches) print_row(stretch);
     repeat_lap(options, stop, progress, print_row);
     fmt::print("slope of the last half: {:.2f} MiB/h\n", slope_mib_per_h(stretches));
+    is_map_as_it_was = map == map_bytes(options) && progress.map_changes == 0;
+    if (!options.localise_in.empty())
+      fmt::print("{}: {}, {} changes told\n", options.localise_in.string(),
+                 is_map_as_it_was ? "the same bytes" : "CHANGED", progress.map_changes);
   }
   if (options.json.empty()) return;
 
@@ -101,6 +114,8 @@ void run(const LapsOptions& options) {
                                  {"hours", options.hours},
                                  {"config", options.config_dir.string()},
                                  {"known_ground_m", options.known_ground_m},
+                                 {"localisation_only", !options.localise_in.empty()},
+                                 {"map_unchanged", is_map_as_it_was},
                                  {"slope_laps_mib_per_h", slope_mib_per_h(laps)},
                                  {"slope_hours_mib_per_h", slope_mib_per_h(stretches)}};
   harness::write_json(options.json, harness::result_document("laps", config, rows));
@@ -128,6 +143,9 @@ void add_laps_experiment(CLI::App& eval) {
                    "Then so many hours of keyframer and mapper alone, from an empty map, with "
                    "the LANDMARKS and ODOMETRY of the last lap but one again and again")
       ->check(CLI::Range(0.0, 10000.0));
+  command->add_option("--localise-in", options->localise_in,
+                      "A map file: the map of the recorded lap is written to it, where it is not "
+                      "there, and the hours are localisation only in it");
   command->add_option("--known-ground-m", options->known_ground_m,
                       "Instead of smoothing.known_ground_m; 0: every keyframe is kept");
   command->add_option("--seed", options->seed, "Seed of everything")->capture_default_str();

@@ -43,9 +43,10 @@ std::vector<Lap> laps_of(const json& rows) {
 
 /// What must be the same for a run to go on. The hours may be more.
 std::string run_of(const LapsOptions& options) {
-  return fmt::format("version {}, seed {}, {} laps of {} m, {} beams, {}, known ground {} m",
-                     tools::version(), options.seed, options.laps, options.length_m, options.beams,
-                     options.config_dir.string(), options.known_ground_m);
+  return fmt::format(
+      "version {}, seed {}, {} laps of {} m, {} beams, {}, known ground {} m, in '{}'",
+      tools::version(), options.seed, options.laps, options.length_m, options.beams,
+      options.config_dir.string(), options.known_ground_m, options.localise_in.string());
 }
 
 }  // namespace

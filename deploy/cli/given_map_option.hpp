@@ -1,0 +1,49 @@
+// `--map` of the commands that run the mapper: a map to begin with.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/bus/config_layers.hpp"
+
+namespace understory::cli {
+
+/// The process that is given the map, as in launch.toml and in HEALTH.
+inline constexpr const char* kMapperProcess = "geoslam_mapper";
+
+/// What the options say.
+struct GivenMapOptions {
+  std::string file;          ///< A map file; empty: none is given.
+  std::uint32_t map_id = 0;  ///< 0: the only one in the file.
+  bool localisation_only = false;
+
+  /// Whether a map is given.
+  bool is_given() const { return !file.empty(); }
+};
+
+/// What the options mean for the mapper.
+struct GivenMapLayer {
+  bus::ConfigLayer layer;  ///< Its parameters.
+  std::string checksum;    ///< SHA-256 of the map's content.
+};
+
+/// Adds --map, --map-id and --localisation-only.
+void add_given_map_options(CLI::App& command, GivenMapOptions& options);
+
+/// The mapper's parameters that follow, with `file` as the map's path. The map is read once, so
+/// that a wrong one ends the command before anything runs. Ends it with status 2 where `processes`
+/// has no mapper. Throws map_file::MapFileError or std::runtime_error, which name the file.
+GivenMapLayer given_map_layer(const GivenMapOptions& options, const std::filesystem::path& file,
+                              const std::vector<std::string>& processes);
+
+/// Where the layer is kept: beside the mapper's saved state.
+std::filesystem::path layer_file(const std::filesystem::path& state_folder);
+/// Writes that file, over the mapper's file `base` (empty: defaults). A state goes before a given
+/// map: the command ends with status 1 where there is one that did not begin with this layer.
+void keep_layer(const std::filesystem::path& state_folder, const std::filesystem::path& base,
+                const GivenMapLayer& layer);
+
+}  // namespace understory::cli

@@ -1,0 +1,248 @@
+// `understory map merge`: two maps that overlap become one.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "common/map_file/opening.hpp"
+#include "common/map_merge/fusion.hpp"
+#include "common/terminal/interrupt.hpp"
+#include "common/terminal/progress.hpp"
+#include "deploy/cli/failure.hpp"
+#include "deploy/cli/map_commands.hpp"
+#include "deploy/cli/text_file.hpp"
+
+namespace understory::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using map_file::MapFile;
+using map_file::StoredMap;
+using map_merge::Alignment;
+using map_merge::MergedMaps;
+
+struct MapMergeOptions {
+  fs::path first;
+  fs::path second;
+  std::uint32_t first_map = 0;  ///< 0: the only one with landmarks.
+  std::uint32_t second_map = 0;
+  fs::path into;
+  fs::path out;
+  double sigma_m = 0.1;
+  bool json = false;
+
+  /// One file, two of its maps.
+  bool is_one_file() const {
+    std::error_code ignored;
+    return fs::equivalent(first, second, ignored);
+  }
+};
+
+/// What is merged, as it was read. Nothing stays locked while the overlap is looked for.
+struct MapsToMerge {
+  StoredMap first;
+  StoredMap second;
+  std::uint32_t second_id = 0;              ///< As its file has it.
+  std::vector<map_file::MapSummary> known;  ///< All maps of the first one's file.
+};
+
+/// The one that is asked for, or the only one that has landmarks.
+StoredMap chosen_of(const MapFile& file, std::uint32_t map_id, const char* option) {
+  if (map_id != 0) return file.read(map_id);
+  std::vector<std::uint32_t> with_landmarks;
+  for (const map_file::MapSummary& map : file.maps())
+    if (map.trunks + map.corners > 0) with_landmarks.push_back(map.map_id);
+  if (with_landmarks.size() != 1)
+    fail(fmt::format("{}: {} maps with landmarks are in it: say which one by {}",
+                     file.file().string(), with_landmarks.size(), option));
+  return file.read(with_landmarks.front());
+}
+
+/// In one file the second map keeps its number; in another one's file it may be taken.
+std::uint32_t number_for_second(const MapMergeOptions& options,
+                                const std::vector<map_file::MapSummary>& known,
+                                std::uint32_t map_id) {
+  if (options.is_one_file()) return map_id;
+  if (std::ranges::find(known, map_id, &map_file::MapSummary::map_id) == known.end()) return map_id;
+  const std::uint32_t next = known.back().map_id + 1;
+  if (next > map_file::kLastMapId)
+    fail(fmt::format("{}: no number is left for a map", options.first.string()));
+  return next;
+}
+
+MapsToMerge read_maps_to_merge(const MapMergeOptions& options) {
+  const MapFile file(options.first, map_file::Access::kRead);
+  std::optional<MapFile> other;
+  if (!options.is_one_file()) other.emplace(options.second, map_file::Access::kRead);
+
+  MapsToMerge maps;
+  maps.known = file.maps();
+  maps.first = chosen_of(file, options.first_map, "--first-map");
+  maps.second = chosen_of(other ? *other : file, options.second_map, "--second-map");
+  maps.second_id = maps.second.map_id;
+  if (!other && maps.first.map_id == maps.second_id)
+    wrong_usage("map merge: both are one map; --first-map and --second-map say which ones");
+  maps.second.map_id = number_for_second(options, maps.known, maps.second_id);
+  return maps;
+}
+
+/// Standard deviations of x, y [m] and heading [rad], along the first frame's axes.
+Eigen::Vector3d sigmas_of(const Alignment& alignment) {
+  const Eigen::Matrix2d rotation = alignment.first_T_second.rotation();
+  const Eigen::Matrix2d place =
+      rotation * alignment.covariance.topLeftCorner<2, 2>() * rotation.transpose();
+  return Eigen::Vector3d(place(0, 0), place(1, 1), alignment.covariance(2, 2)).cwiseSqrt();
+}
+
+/// Of all landmarks of the merged map.
+double doubled_pct(const MergedMaps& merged) {
+  const std::size_t all = std::max<std::size_t>(1, merged.map.landmarks.size());
+  return 100.0 * static_cast<double>(merged.suspected_doubles) / static_cast<double>(all);
+}
+
+std::string offset_text(const Alignment& alignment) {
+  const geometry::SE2& motion = alignment.first_T_second;
+  const Eigen::Vector3d sigma = sigmas_of(alignment);
+  return fmt::format("{:.3f}, {:.3f} m, {:.5f} rad (sigma {:.3f}, {:.3f} m, {:.5f} rad)",
+                     motion.x(), motion.y(), motion.theta(), sigma.x(), sigma.y(), sigma.z());
+}
+
+void print_merge(const Alignment& alignment, const MergedMaps& merged, const std::string& where) {
+  fmt::print("offset of the second frame in the first: {}\n", offset_text(alignment));
+  fmt::print(
+      "{} landmarks in both maps, {:.0f} % of those in the overlap; expected by chance: "
+      "10^{:.0f}\n",
+      merged.fused, 100.0 * alignment.share(), alignment.log10_false_alarm);
+  fmt::print("{} landmarks, {} of them of the second map alone; doubled, it seems: {} ({:.2f} %)\n",
+             merged.map.landmarks.size(), merged.added, merged.suspected_doubles,
+             doubled_pct(merged));
+  fmt::print("{}\n", where.empty() ? "nothing was written (--into or --out)" : "-> " + where);
+}
+
+nlohmann::ordered_json merge_json(const MapMergeOptions& options, const Alignment& alignment,
+                                  const MergedMaps& merged, const std::string& where) {
+  nlohmann::ordered_json covariance = nlohmann::ordered_json::array();
+  for (const auto& row : alignment.covariance.rowwise())
+    covariance.push_back({row(0), row(1), row(2)});
+  const geometry::SE2& motion = alignment.first_T_second;
+  return {{"first", options.first.string()},
+          {"second", options.second.string()},
+          {"offset", {{"x_m", motion.x()}, {"y_m", motion.y()}, {"heading_rad", motion.theta()}}},
+          {"covariance", covariance},
+          {"pairs", merged.fused},
+          {"share", alignment.share()},
+          {"log10_false_alarm", alignment.log10_false_alarm},
+          {"landmarks", merged.map.landmarks.size()},
+          {"added", merged.added},
+          {"suspected_doubles", merged.suspected_doubles},
+          {"doubled_pct", doubled_pct(merged)},
+          {"written", where.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(where)}};
+}
+
+/// As a change of `file`, unless its maps are no longer those that were read.
+void put_merged(const fs::path& file, const MapsToMerge& read, const MergedMaps& merged,
+                const map_file::ChangeNote& note) {
+  MapFile opened(file, map_file::Access::kWrite);
+  const bool is_same =
+      std::ranges::equal(opened.maps(), read.known, {}, &map_file::MapSummary::checksum,
+                         &map_file::MapSummary::checksum);
+  if (!is_same) fail(fmt::format("{}: was changed while its map was merged", file.string()));
+  terminal::throw_if_interrupted();
+  opened.put(std::vector<StoredMap>{merged.map, merged.trajectory}, note);
+}
+
+/// Where the merged map is now; empty = nowhere. A new file is a copy of the first one, its history
+/// included, with one more change.
+std::string write_merged(const MapMergeOptions& options, const MapsToMerge& read,
+                         const Alignment& alignment, const MergedMaps& merged) {
+  if (options.into.empty() && options.out.empty()) return {};
+  const std::string source =
+      fmt::format("{} map {}", options.second.filename().string(), read.second_id);
+  const map_file::ChangeNote note = note_now(
+      "understory map merge", source,
+      fmt::format("{} into map {}: {} landmarks fused, {} added; its frame lies at {}", source,
+                  merged.map.map_id, merged.fused, merged.added, offset_text(alignment)));
+  if (options.out.empty()) {
+    put_merged(options.first, read, merged, note);
+    return options.first.string();
+  }
+  map_file::NewFile copy(options.out);
+  fs::copy_file(options.first, copy.path(), fs::copy_options::overwrite_existing);
+  put_merged(copy.path(), read, merged, note);
+  copy.move_to_its_name();
+  return options.out.string();
+}
+
+Alignment align_shown(const MapsToMerge& maps, const map_merge::AlignmentParameters& parameters) {
+  terminal::Progress progress("looking for the overlap", 1.0);
+  return map_merge::align(map_merge::landmarks_of(maps.first), map_merge::landmarks_of(maps.second),
+                          parameters, [&](double part) {
+                            terminal::throw_if_interrupted();
+                            progress.update(part);
+                          });
+}
+
+void run_map_merge(const MapMergeOptions& options) {
+  terminal::catch_interrupts();
+  const MapsToMerge maps = read_maps_to_merge(options);
+  const map_merge::AlignmentParameters parameters{.unknown_sigma_m = options.sigma_m};
+  const Alignment alignment = align_shown(maps, parameters);
+  if (!alignment.found())
+    fail(fmt::format("{} map {}, {} map {}: not merged: {}", options.first.string(),
+                     maps.first.map_id, options.second.string(), maps.second_id,
+                     alignment.reason(parameters)));
+
+  const MergedMaps merged =
+      map_merge::fuse(maps.first, maps.second, alignment, {.unknown_sigma_m = options.sigma_m});
+  const std::string where = write_merged(options, maps, alignment, merged);
+  if (options.json) {
+    fmt::print("{}\n", dumped(merge_json(options, alignment, merged, where), 2));
+  } else {
+    print_merge(alignment, merged, where);
+  }
+}
+
+/// The map that is merged into is the first one, whichever was named first.
+MapMergeOptions settled(MapMergeOptions options) {
+  if (options.into.empty()) return options;
+  std::error_code ignored;
+  if (fs::equivalent(options.into, options.first, ignored)) return options;
+  if (!fs::equivalent(options.into, options.second, ignored))
+    wrong_usage(fmt::format("--into {}: neither of the two files", options.into.string()));
+  std::swap(options.first, options.second);
+  std::swap(options.first_map, options.second_map);
+  return options;
+}
+
+}  // namespace
+
+void add_map_merge(CLI::App& map) {
+  auto* command = map.add_subcommand(
+      "merge", "Two maps that overlap become one; without --into and --out it only says how");
+  const auto options = std::make_shared<MapMergeOptions>();
+  const auto number = CLI::Range(std::uint32_t{1}, map_file::kLastMapId);
+  command->add_option("first", options->first, "A map file; its frame and ids stay")->required();
+  command->add_option("second", options->second, "A map file; may be the same one")->required();
+  command->add_option("--first-map", options->first_map, "Its map, where it has several")
+      ->check(number);
+  command->add_option("--second-map", options->second_map, "Likewise")->check(number);
+
+  auto* into = command->add_option("--into", options->into,
+                                   "One of the two: it gets the merged map, in its frame");
+  command
+      ->add_option("--out", options->out,
+                   "A new file: the first one with its history, and the merged map")
+      ->excludes(into);
+  command
+      ->add_option("--sigma-m", options->sigma_m,
+                   "[m] Standard deviation in x and in y of landmarks without covariance")
+      ->check(CLI::Range(1e-6, 1e3))
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "As JSON, on standard output");
+  command->callback([options] { guarded_map_work([&] { run_map_merge(settled(*options)); }); });
+}
+
+}  // namespace understory::cli
