@@ -1,5 +1,6 @@
 // A folder of stem frames through the command: the log, its noise, and one line for each fault.
 #include <cmath>
+#include <random>
 
 #include "common/io/stem_frames.hpp"
 #include "common/wire/convert.hpp"
@@ -136,4 +137,43 @@ TEST_CASE("What is wrong with stem frames is one line on stderr, and no log", "[
     std::filesystem::create_directory(fixture.folder);
     refuse("no frame_<n>.csv in the folder");
   }
+}
+
+TEST_CASE("A simulated drive of stem frames is imported and scored", "[import]") {
+  const TemporaryDirectory directory;
+  std::ofstream map(directory / "stems.csv");
+  map << "x_m,y_m,dbh_m\n";
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> place(0.0, 120.0);
+  for (int i = 0; i < 350; ++i) {
+    const double x = place(random);
+    map << x << ',' << place(random) << ",0.3\n";
+  }
+  map.close();
+
+  const std::string drive = (directory / "drive").string();
+  const Outcome made =
+      understory_command(directory, "sim stem-frames " + (directory / "stems.csv").string() +
+                                        " --out " + drive + " --length 300 --seed 2");
+  CAPTURE(made.error);
+  REQUIRE(made.status == 0);
+  CHECK(io::read_stem_frames(drive).size() > 100);
+  CHECK(understory_command(directory, "import stem-frames " + drive + " --out " +
+                                          (directory / "drive.lcm").string())
+            .status == 0);
+  const Outcome scored = understory_command(
+      directory, "eval place-recognition " + drive + " --json " + (directory / "s.json").string());
+  REQUIRE(scored.status == 0);
+  const std::string json = read_text(directory / "s.json");
+  for (const char* key :
+       {R"("queries")", R"("recall_at_1")", R"("max_f1")", R"("recall_zero_wrong")",
+        R"("wrong_accepted")", R"("error_m_p50")", R"("stem_residual_m_p50")",
+        R"("with_diameters")", R"("ms_p50")", R"("bytes_per_frame")"})
+    CHECK_THAT(json, Contains(key));
+
+  const Outcome again = understory_command(
+      directory, "sim stem-frames " + (directory / "stems.csv").string() + " --out " + drive);
+  CHECK(again.status == 1);
+  CHECK_THAT(again.error, Contains("has frames already"));
+  CHECK(understory_command(directory, "sim").status == 2);
 }
