@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <charconv>
 #include <memory>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -18,6 +21,7 @@ namespace {
 
 struct StemSimulationOptions {
   std::string map;
+  std::string dbh_cm;
   std::string out;
   std::string path = "laps";
   double length_m = 1000.0;
@@ -25,9 +29,50 @@ struct StemSimulationOptions {
   std::uint64_t seed = 1;
 };
 
-sim::Forest stem_map_of(const std::string& file) {
-  sim::StemMapResult result = sim::parse_stem_map(io::read_whole_file(file));
-  if (!result.error.empty()) fail(fmt::format("{}: {}", file, result.error));
+std::vector<std::string> split_by_comma(const std::string& line) {
+  std::vector<std::string> cells;
+  std::stringstream stream(line);
+  for (std::string cell; std::getline(stream, cell, ',');) {
+    while (!cell.empty() && (cell.back() == '\r' || cell.back() == ' ')) cell.pop_back();
+    cells.push_back(cell);
+  }
+  return cells;
+}
+
+/// A census with diameters in cm under another name as a table with dbh_m; rows without a diameter
+/// are left out.
+std::string with_diameters_in_m(const std::string& text, const StemSimulationOptions& options) {
+  std::stringstream lines(text);
+  std::string line;
+  std::getline(lines, line);
+  const auto names = split_by_comma(line);
+  const auto column = [&](const std::string& name) {
+    const auto found = std::ranges::find(names, name);
+    if (found == names.end()) fail(fmt::format("{}: no column {}", options.map, name));
+    return static_cast<std::size_t>(found - names.begin());
+  };
+  const std::size_t x = column("x_m"), y = column("y_m"), dbh = column(options.dbh_cm);
+
+  std::string table = "x_m,y_m,dbh_m\n";
+  for (int number = 2; std::getline(lines, line); ++number) {
+    const auto cells = split_by_comma(line);
+    if (cells.size() <= dbh || cells[dbh].empty()) continue;
+    double cm = 0.0;
+    const char* const end = cells[dbh].data() + cells[dbh].size();
+    const auto read = std::from_chars(cells[dbh].data(), end, cm);
+    if (read.ec != std::errc{} || read.ptr != end || cells.size() <= std::max(x, y))
+      fail(fmt::format("{}, line {}: {} '{}' is no number", options.map, number, options.dbh_cm,
+                       cells[dbh].substr(0, 40)));
+    table += fmt::format("{},{},{}\n", cells[x], cells[y], 0.01 * cm);
+  }
+  return table;
+}
+
+sim::Forest stem_map_of(const StemSimulationOptions& options) {
+  const std::string text = io::read_whole_file(options.map);
+  sim::StemMapResult result =
+      sim::parse_stem_map(options.dbh_cm.empty() ? text : with_diameters_in_m(text, options));
+  if (!result.error.empty()) fail(fmt::format("{}: {}", options.map, result.error));
   return std::move(result.forest);
 }
 
@@ -54,7 +99,7 @@ sim::Route way_of(const StemSimulationOptions& options, const sim::Forest& fores
 
 void simulate_stem_frames(const StemSimulationOptions& options) {
   try {
-    const sim::Forest forest = stem_map_of(options.map);
+    const sim::Forest forest = stem_map_of(options);
     const sim::Route way = way_of(options, forest);
     const auto frames = sim::drive_stem_frames(forest, way, options.drive, options.seed);
     io::write_stem_frames(options.out, frames);
@@ -95,6 +140,9 @@ void add_stem_frames_simulation(CLI::App& sim) {
       "stem-frames", "A drive through a surveyed forest as a folder of detected stems");
   auto options = std::make_shared<StemSimulationOptions>();
   command->add_option("map", options->map, "CSV file with x_m,y_m[,dbh_m]")->required();
+  command->add_option("--dbh-cm", options->dbh_cm,
+                      "Column with diameters in cm, where there is no dbh_m; rows without are left "
+                      "out");
   command->add_option("--out", options->out, "The folder to write")->required();
   command
       ->add_option("--path", options->path,

@@ -36,6 +36,27 @@ def _recording(name, source, title, config, minutes, needs):
                  before=(f"understory import {source} --out OUT/{name}.lcm",))
 
 
+def _stem_frames():
+    """Drives of stem frames through surveyed forests, of which none was looked at while the recogniser was made, and
+    their scores: each within itself, and all in one drive of another day."""
+    woods = "DATA/stem_censuses/big_woods.csv --dbh-cm"
+    drives = (
+        ("longleaf-day-1", "DATA/tree_maps/longleaf.csv --path wander --length 1500 --seed 201"),
+        ("longleaf-day-2", "DATA/tree_maps/longleaf.csv --path wander --length 1500 --seed 201 --visit 1"),
+        ("waka-laps", "DATA/tree_maps/waka.csv --path laps --length 800 --seed 203"),
+        ("big-woods-2008", f"{woods} dbh_2008_cm --path there-and-back --length 2000 --seed 204"),
+        ("big-woods-2014", f"{woods} dbh_2014_cm --path there-and-back --length 2000 --seed 204 --visit 1"),
+        ("kitti-00-way", f"{woods} dbh_2008_cm --path DATA/pole_maps/seq00_traj.csv --spacing 3 --seed 205"),
+        ("longleaf-third", "DATA/tree_maps/longleaf.csv --path laps --length 1500 --seed 206 --seen 0.34"),
+    )
+    made = tuple(f"understory sim stem-frames {what} --out OUT/stem-frames/{name}" for name, what in drives)
+    folders = " ".join(f"OUT/stem-frames/{name}" for name, _ in drives)
+    maps = "OUT/stem-frames/longleaf-day-1 OUT/stem-frames/big-woods-2008"
+    protocols = "within-50-frames between-3-m between-5-m"
+    return _eval("place-recognition", f"place-recognition {folders} --map {maps} --protocol {protocols} --jobs 2", 12,
+                 ("tree_maps", "stem_censuses", "pole_maps"), before=made)
+
+
 EXPERIMENTS = (
     _eval("paths", "paths --runs 10 --seed 1 --jobs 2", 12),
     _eval("paths-lidar", "paths --method lidar --runs 3 --seed 1", 15),
@@ -48,6 +69,7 @@ EXPERIMENTS = (
           25),
     _eval("large-map", "large-map --runs 10 --seed 1 --method smoothing", 4),
     _eval("one-shot", "one-shot --scans 1500 --seed 12 --jobs 2 --data DATA", 10, ("tree_maps", "stem_censuses")),
+    _stem_frames(),
     _eval("efficiency", "efficiency --drive-km 10 --stationary-h 2", 6),
     _eval("laps", "laps --laps 100 --length-m 317 --hours 24", 45),
     _eval("health", "health --drives 1000 --seed 1", 8),

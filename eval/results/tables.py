@@ -53,6 +53,7 @@ SECTIONS = (
     ("baseline-paths", "GeoSLAM's method in batches: other paths", f"{GEOSLAM}, Table 5.4", render.batches),
     ("large-map", "One-shot localisation in a square kilometre", f"{GEOSLAM}, §5.4", render.large_map),
     ("one-shot", "One-shot localisation in surveyed forests", None, render.one_shot),
+    ("place-recognition", "Frames of stems found again", None, render.place_recognition),
     ("efficiency", "Time per keyframe", f"{GEOSLAM}, §5.5 (a figure only)", render.efficiency),
     ("laps", "Known ground: what must not grow", None, render.laps),
     ("health", "What HEALTH says of wrong poses", None, render.health),

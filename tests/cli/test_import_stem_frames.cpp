@@ -176,4 +176,14 @@ TEST_CASE("A simulated drive of stem frames is imported and scored", "[import]")
   CHECK(again.status == 1);
   CHECK_THAT(again.error, Contains("has frames already"));
   CHECK(understory_command(directory, "sim").status == 2);
+
+  std::ofstream(directory / "census.csv") << "x_m,y_m,dbh\n1,2,30\n3,4,\n5,6,thick\n";
+  const std::string census = "sim stem-frames " + (directory / "census.csv").string() + " --out " +
+                             (directory / "other").string();
+  const Outcome unknown = understory_command(directory, census + " --dbh-cm girth");
+  CHECK(unknown.status == 1);
+  CHECK_THAT(unknown.error, Contains("census.csv: no column girth"));
+  const Outcome damaged = understory_command(directory, census + " --dbh-cm dbh");
+  CHECK(damaged.status == 1);
+  CHECK_THAT(damaged.error, Contains("census.csv, line 4: dbh 'thick' is no number"));
 }

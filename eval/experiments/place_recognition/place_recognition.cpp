@@ -27,7 +27,7 @@ namespace {
 using StemParameters = understory::place_recognition::StemRecogniserParameters;
 
 struct PlaceOptions {
-  std::string drive;
+  std::vector<std::string> drives;
   std::vector<std::string> maps;
   std::vector<std::string> protocols;
   std::size_t window = 6;
@@ -65,6 +65,13 @@ StemDrive load_drive(const std::string& folder) {
   std::filesystem::path path(folder);
   if (path.filename().empty()) path = path.parent_path();
   return levelled(path.filename().string(), io::read_stem_frames(folder));
+}
+
+std::vector<StemDrive> load_drives(const std::vector<std::string>& folders) {
+  std::vector<StemDrive> drives;
+  drives.reserve(folders.size());
+  for (const std::string& folder : folders) drives.push_back(load_drive(folder));
+  return drives;
 }
 
 /// What the rows share: which protocol on which drives, with what.
@@ -168,18 +175,18 @@ void run_pair(const NamedProtocol& protocol, const StemDrive& queries, const Ste
 void run_places(const PlaceOptions& options) {
   const std::atomic<bool>& stop = terminal::catch_interrupts();
   const auto protocols = protocols_of(options);
-  const StemDrive queries = load_drive(options.drive);
-  std::vector<StemDrive> maps;
-  maps.reserve(options.maps.size());
-  for (const std::string& folder : options.maps) maps.push_back(load_drive(folder));
+  const std::vector<StemDrive> drives = load_drives(options.drives);
+  const std::vector<StemDrive> maps = load_drives(options.maps);
 
   nlohmann::json rows = nlohmann::json::array();
   print_place_heading();
   for (const NamedProtocol& protocol : protocols) {
     for (const std::size_t window : std::set<std::size_t>{1, options.window}) {
-      if (!protocol.is_between) run_pair(protocol, queries, queries, window, options, stop, rows);
-      for (std::size_t i = 0; protocol.is_between && i < maps.size(); ++i)
-        run_pair(protocol, queries, maps[i], window, options, stop, rows);
+      for (const StemDrive& queries : drives) {
+        if (!protocol.is_between) run_pair(protocol, queries, queries, window, options, stop, rows);
+        for (std::size_t i = 0; protocol.is_between && i < maps.size(); ++i)
+          run_pair(protocol, queries, maps[i], window, options, stop, rows);
+      }
     }
   }
   fmt::print(
@@ -187,7 +194,7 @@ void run_places(const PlaceOptions& options) {
       "({} decades), of the former; wrong: accepted, of all.\n",
       kAcceptDecades);
   if (options.json.empty()) return;
-  const nlohmann::json config{{"drive", options.drive},
+  const nlohmann::json config{{"drives", options.drives},
                               {"maps", options.maps},
                               {"window", options.window},
                               {"accept_decades", kAcceptDecades}};
@@ -201,7 +208,8 @@ void add_place_recognition_experiment(CLI::App& eval) {
       "place-recognition", "Frames of stems found again, within a drive and between drives");
   const auto options = std::make_shared<PlaceOptions>();
   command
-      .add_option("drive", options->drive, "Folder with frame_<n>.csv and trajectory.txt: queries")
+      .add_option("drives", options->drives,
+                  "Folders with frame_<n>.csv and trajectory.txt: the queries")
       ->required();
   command.add_option("--map", options->maps,
                      "Folders of other drives: the queries are looked for in each of them");
