@@ -57,33 +57,56 @@ void StemChains::add(const PackedStems& stems, const DiameterSpread& diameters) 
   Frame frame;
   frame.stems = stems;
   frame.radius_m = static_cast<float>(extent_of(own).radius_m);
-  const auto last_T_frame = aligned(own, diameters);
-  frame.chain = last_T_frame ? chains_ : ++chains_;
-  if (last_T_frame) frame.chain_T_frame = frames_.back().chain_T_frame * *last_T_frame;
+  for (std::size_t back = 1; back <= std::min(parameters_.gap, frames_.size()); ++back) {
+    const Frame& earlier = frames_[frames_.size() - back];
+    const auto earlier_T_frame = aligned(own, frames_.size() - back, diameters);
+    if (!earlier_T_frame) continue;
+    frame.chain = earlier.chain;
+    frame.chain_T_frame = earlier.chain_T_frame * *earlier_T_frame;
+    frame.step = geometry::SE2::Exp(earlier_T_frame->Log() / static_cast<double>(back));
+    frames_.push_back(std::move(frame));
+    return;
+  }
+  frame.chain = ++chains_;
   frames_.push_back(std::move(frame));
 }
 
-/// In the frame of the last one.
+double StemChains::needed_log_ratio(const geometry::SE2& pose,
+                                    const std::optional<geometry::SE2>& expected) const {
+  if (!expected) return parameters_.least_log_ratio;
+  const Eigen::Vector3d off = (expected->inverse() * pose).Log();
+  const bool is_ahead =
+      off.head<2>().norm() < parameters_.ahead_m && std::abs(off.z()) < parameters_.ahead_rad;
+  return is_ahead ? parameters_.least_log_ratio_ahead : parameters_.least_log_ratio;
+}
+
 std::optional<geometry::SE2> StemChains::aligned(std::span<const LevelStem> stems,
+                                                 std::size_t earlier,
                                                  const DiameterSpread& diameters) const {
-  if (frames_.empty() || stems.size() < 3) return std::nullopt;
-  const std::vector<LevelStem> last = frames_.back().stems.unpacked();
+  if (stems.size() < 3) return std::nullopt;
+  const std::vector<LevelStem> known = frames_[earlier].stems.unpacked();
   TripletIndex index(parameters_.side_tolerance_m);
-  index.add(last, stem_triangles(last, triangles_));
+  index.add(known, stem_triangles(known, triangles_));
   HypothesisFilter filter;
   filter.side_tolerance_m = parameters_.side_tolerance_m;
   filter.max_distance_m = parameters_.max_step_m;
-  const auto hypotheses = index.hypotheses(stems, stem_triangles(stems, triangles_), filter);
+  std::vector<PlaceCluster> starts;
+  collect_clusters(index.hypotheses(stems, stem_triangles(stems, triangles_), filter), starts);
 
-  std::vector<PlaceCluster> clusters;
-  collect_clusters(hypotheses, clusters);
-  const StemLikelihood seen(view(frames_.size() - 1, frames_.size()), noise_, diameters);
+  std::optional<geometry::SE2> expected;
+  if (frames_[earlier].step) {
+    const auto steps = static_cast<double>(frames_.size() - earlier);
+    expected = geometry::SE2::Exp(steps * frames_[earlier].step->Log());
+    starts.push_back({0, 0, *expected});
+  }
+
+  const StemLikelihood seen(view(earlier, frames_.size()), noise_, diameters);
   std::optional<geometry::SE2> best;
-  double best_ratio = parameters_.least_log_ratio;
-  for (const PlaceCluster& cluster : clusters) {
-    const geometry::SE2 pose = seen.refined(stems, cluster.frame_T_query);
+  double best_ratio = 0.0;
+  for (const PlaceCluster& start : starts) {
+    const geometry::SE2 pose = seen.refined(stems, start.frame_T_query);
     const double ratio = seen.log_ratio(stems, pose);
-    if (ratio < best_ratio) continue;
+    if (ratio < std::max(best_ratio, needed_log_ratio(pose, expected))) continue;
     best = pose;
     best_ratio = ratio;
   }

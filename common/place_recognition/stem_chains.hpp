@@ -21,7 +21,13 @@ struct StemChainParameters {
   double merge_m = 0.35;  ///< Stems of several frames nearer to each other are one.
   double side_tolerance_m = 0.25;
   double max_step_m = 20.0;       ///< Between frames of a chain.
-  double least_log_ratio = 30.0;  ///< A link is likelier than chance by this (natural logarithm).
+  double least_log_ratio = 30.0;  ///< A link is likelier than chance by this (natural logarithm)...
+  /// ... or by this, where the frame lies as the last motion goes on: there are far fewer such
+  /// poses.
+  double least_log_ratio_ahead = 18.0;
+  double ahead_m = 1.5;  ///< As the last motion goes on, within this ...
+  double ahead_rad = 0.3;
+  std::size_t gap = 3;  ///< Links reach over frames that were not aligned, at most so many back.
 };
 
 /// The frames in the order of a drive. Each one is aligned with what the last ones saw, without
@@ -55,9 +61,13 @@ class StemChains {
     float radius_m = 1.0F;
     std::uint32_t chain = 0;
     geometry::SE2 chain_T_frame;
+    std::optional<geometry::SE2> step;  ///< The last motion, by a frame.
   };
-  std::optional<geometry::SE2> aligned(std::span<const LevelStem> stems,
+  /// How a new frame lies to an earlier one; none where that is not sure.
+  std::optional<geometry::SE2> aligned(std::span<const LevelStem> stems, std::size_t earlier,
                                        const DiameterSpread& diameters) const;
+  double needed_log_ratio(const geometry::SE2& pose,
+                          const std::optional<geometry::SE2>& expected) const;
 
   StemChainParameters parameters_;
   StemTriangleParameters triangles_;

@@ -171,7 +171,7 @@ void add_stem_frames_simulation(CLI::App& sim) {
   command
       ->add_option("--truth-offset", drive.truth_offset_m,
                    "Offset of the trajectory's frame, in x and in y [m]")
-      ->check(CLI::Range(-100.0, 100.0))
+      ->check(CLI::Range(-1e6, 1e6))
       ->capture_default_str();
   add_detector_options(*command, drive.detector);
   command->add_option("--seed", options->seed, "Seed of path, detector and noise")
