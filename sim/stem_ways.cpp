@@ -54,7 +54,7 @@ class WayBox {
   Eigen::Vector2d draw(std::mt19937_64& random) const {
     for (int i = 0; i < kTries; ++i) {
       const double x = uniform(random, low_m_.x(), high_m_.x());
-      const Eigen::Vector2d place(x, uniform(random, low_m_.y(), high_m_.y()));
+      Eigen::Vector2d place(x, uniform(random, low_m_.y(), high_m_.y()));
       if (has_stems(place)) return place;
     }
     throw std::runtime_error("no place for a way among the stems was found");
@@ -89,6 +89,7 @@ class WayBox {
 /// Corners of a closed way round the middle: a star-shaped polygon that fits the box.
 WayPoints star_polygon(const WayBox& box, double length_m, std::mt19937_64& random) {
   WayPoints corners;
+  corners.reserve(kCorners);
   for (int i = 0; i < kCorners; ++i) {
     const double angle = 2.0 * std::numbers::pi * (i + uniform(random, -0.25, 0.25)) / kCorners;
     const double reach = uniform(random, 0.15, 1.0);

@@ -107,7 +107,8 @@ void collect_clusters(std::span<const Hypothesis> of_one_frame,
   std::ranges::sort(by_votes);
 
   std::vector<std::uint32_t> taken;
-  for (const auto& [votes, i] : by_votes) {
+  for (const auto& entry : by_votes) {
+    const std::uint32_t i = entry.second;
     if (taken.size() == kClustersPerFrame) break;
     if (std::ranges::any_of(taken, [&](std::uint32_t k) { return same_place(all[k], all[i]); }))
       continue;

@@ -32,8 +32,10 @@ void sort_candidates(std::vector<PlaceCandidate>& candidates) {
   std::ranges::sort(candidates, [](const PlaceCandidate& a, const PlaceCandidate& b) {
     return std::tuple(a.frame, -a.log_ratio) < std::tuple(b.frame, -b.log_ratio);
   });
-  const auto same = std::ranges::unique(candidates, {}, &PlaceCandidate::frame);
-  candidates.erase(same.begin(), same.end());
+  const auto same = std::unique(
+      candidates.begin(), candidates.end(),
+      [](const PlaceCandidate& a, const PlaceCandidate& b) { return a.frame == b.frame; });
+  candidates.erase(same, candidates.end());
   std::ranges::sort(candidates, [](const PlaceCandidate& a, const PlaceCandidate& b) {
     return std::tuple(-a.log_ratio, a.frame) < std::tuple(-b.log_ratio, b.frame);
   });

@@ -8,6 +8,8 @@
 namespace understory::place_recognition {
 namespace {
 
+/// What the index of a corner can hold.
+constexpr std::size_t kMostStems = 65535;
 /// Of two neighbours within the longest side, so many are as near to each other (in a disc, by
 /// integration: 0.587).
 constexpr double kNearEachOther = 0.587;
@@ -71,6 +73,7 @@ double height_m(std::span<const LevelStem> stems, const StemTriangle& triangle) 
 std::vector<StemTriangle> stem_triangles(std::span<const LevelStem> stems,
                                          const StemTriangleParameters& parameters) {
   std::vector<StemTriangle> triangles;
+  stems = stems.first(std::min<std::size_t>(stems.size(), kMostStems));
   if (stems.size() < 3) return triangles;
   const double longest_m = longest_side_m(stems, parameters);
 

@@ -30,7 +30,8 @@ struct StemTriangleParameters {
 
 /// Triangles whose sides are no longer than a length that follows from how densely the stems stand.
 /// Whether three stems form one does not depend on which others were detected, unlike among nearest
-/// neighbours: what both frames detect is in both lists. O(n^2 + triangles).
+/// neighbours: what both frames detect is in both lists. Of the first 65,535 stems. O(n^2 +
+/// triangles).
 std::vector<StemTriangle> stem_triangles(std::span<const LevelStem> stems,
                                          const StemTriangleParameters& parameters);
 

@@ -85,8 +85,10 @@ std::vector<Eigen::Vector2d> recorded_way(const std::string& file) {
     return std::move(table.forest.trunks_m);
   }
 
+  const auto poses = io::parse_stem_trajectory(text, file);
   std::vector<Eigen::Vector2d> points;
-  for (const model::StemFrame& pose : io::parse_stem_trajectory(text, file))
+  points.reserve(poses.size());
+  for (const model::StemFrame& pose : poses)
     points.emplace_back(pose.world_T_sensor.translation().head<2>());
   return points;
 }

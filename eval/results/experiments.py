@@ -37,8 +37,8 @@ def _recording(name, source, title, config, minutes, needs):
 
 
 def _stem_frames():
-    """Drives of stem frames through surveyed forests, of which none was looked at while the recogniser was made, and
-    their scores: each within itself, and all in one drive of another day. Forests lie 100 km apart, so a drive of one has
+    """Drives of stem frames through surveyed forests, on which the recogniser was not tuned, and their scores: each
+    within itself, and all in one drive of another day. Forests lie 100 km apart, so a drive of one has
     no match in another."""
     woods = "DATA/stem_censuses/big_woods.csv --truth-offset 100000 --dbh-cm"
     longleaf = "DATA/tree_maps/longleaf.csv"

@@ -214,6 +214,7 @@ void add_place_recognition_experiment(CLI::App& eval) {
   command.add_option("--map", options->maps,
                      "Folders of other drives: the queries are looked for in each of them");
   std::vector<std::string> names;
+  names.reserve(kProtocols.size());
   for (const NamedProtocol& one : kProtocols) names.emplace_back(one.name);
   command
       .add_option("--protocol", options->protocols,
