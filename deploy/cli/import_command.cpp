@@ -14,6 +14,7 @@
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/import_sensors.hpp"
+#include "deploy/cli/import_stem_frames.hpp"
 #include "services/lidar_imu_input/wheel_odometry.hpp"
 
 namespace understory::cli {
@@ -123,6 +124,7 @@ void add_import_command(CLI::App& parent) {
 
   victoria->callback([options] { import_victoria_park(*options); });
   add_sensor_imports(*command);
+  add_stem_frames_import(*command);
 }
 
 }  // namespace understory::cli

@@ -16,6 +16,7 @@
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/sensor_simulation.hpp"
+#include "deploy/cli/sim_stem_frames.hpp"
 #include "sim/drive.hpp"
 #include "understory/ground_truth_t.hpp"
 #include "understory/truth_landmarks_t.hpp"
@@ -293,12 +294,10 @@ void add_sim_command(CLI::App& parent) {
   auto* command = parent.add_subcommand(
       "sim", "A simulated drive with ground truth, onto the bus or into a log");
   auto options = std::make_shared<SimOptions>();
-  command
-      ->add_option("world", options->world,
-                   "Ideal landmarks: dense, intermediate, sparse, or a CSV file with "
-                   "x_m,y_m[,dbh_m]. Sensors: forest3d, urban, urban-countryside, countryside, "
-                   "poles:POLES.csv,TRAJECTORY.csv")
-      ->required();
+  command->add_option("world", options->world,
+                      "Ideal landmarks: dense, intermediate, sparse, or a CSV file with "
+                      "x_m,y_m[,dbh_m]. Sensors: forest3d, urban, urban-countryside, countryside, "
+                      "poles:POLES.csv,TRAJECTORY.csv");
   command->add_option("--out", options->out, "Write this log instead of sending on the bus");
   command->add_option("--lcm-url", options->lcm_url,
                       "LCM URL of the bus, e.g. udpm://239.255.76.67:7667?ttl=0");
@@ -315,7 +314,12 @@ void add_sim_command(CLI::App& parent) {
       ->add_option("--rate", options->rate, "Live: factor by which it runs faster than the clock")
       ->check(CLI::Range(1e-3, 1e3))
       ->capture_default_str();
-  command->callback([options] { simulate(*options); });
+  add_stem_frames_simulation(*command);
+  command->callback([command, options] {
+    if (!command->get_subcommands().empty()) return;
+    if (options->world.empty()) throw CLI::RequiredError("world");
+    simulate(*options);
+  });
 }
 
 }  // namespace understory::cli

@@ -7,6 +7,7 @@
 #include "eval/experiments/merges/merges.hpp"
 #include "eval/experiments/one_shot/one_shot.hpp"
 #include "eval/experiments/partition/partition.hpp"
+#include "eval/experiments/place_recognition/place_recognition.hpp"
 #include "eval/experiments/returns/returns.hpp"
 
 namespace understory::eval::experiments {
@@ -28,6 +29,7 @@ void add_eval_command(CLI::App& parent) {
   recording::add_recording_experiment(eval);
   laps::add_laps_experiment(eval);
   returns::add_returns_experiment(eval);
+  place_recognition::add_place_recognition_experiment(eval);
   health::add_health_experiment(eval);
   roads::add_landmarks_vs_error_experiment(eval);
   misstated::add_misstated_experiment(eval);

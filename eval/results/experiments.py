@@ -36,6 +36,29 @@ def _recording(name, source, title, config, minutes, needs):
                  before=(f"understory import {source} --out OUT/{name}.lcm",))
 
 
+def _stem_frames():
+    """Drives of stem frames through surveyed forests, on which the recogniser was not tuned, and their scores: each
+    within itself, and all in one drive of another day. Forests lie 100 km apart, so a drive of one has
+    no match in another."""
+    woods = "DATA/stem_censuses/big_woods.csv --truth-offset 100000 --dbh-cm"
+    longleaf = "DATA/tree_maps/longleaf.csv"
+    drives = (
+        ("longleaf-day-1", f"{longleaf} --path wander --length 1000 --seed 201"),
+        ("longleaf-day-2", f"{longleaf} --path wander --length 1000 --seed 201 --visit 1"),
+        ("waka-laps", "DATA/tree_maps/waka.csv --truth-offset 200000 --path laps --length 600 --seed 203"),
+        ("big-woods-2008", f"{woods} dbh_2008_cm --path there-and-back --length 800 --seed 204"),
+        ("big-woods-2014", f"{woods} dbh_2014_cm --path there-and-back --length 800 --seed 204 --visit 1"),
+        ("kitti-00-way", f"{woods} dbh_2008_cm --path DATA/pole_maps/seq00_traj.csv --spacing 6 --seed 205"),
+        ("longleaf-third", f"{longleaf} --path laps --length 1000 --seed 206 --seen 0.34"),
+    )
+    made = tuple(f"understory sim stem-frames {what} --out OUT/stem-frames/{name}" for name, what in drives)
+    folders = " ".join(f"OUT/stem-frames/{name}" for name, _ in drives)
+    maps = "OUT/stem-frames/longleaf-day-1 OUT/stem-frames/big-woods-2008"
+    return _eval("place-recognition",
+                 f"place-recognition {folders} --map {maps} --protocol within-50-frames between-5-m --jobs 2", 10,
+                 ("tree_maps", "stem_censuses", "pole_maps"), before=made)
+
+
 EXPERIMENTS = (
     _eval("paths", "paths --runs 10 --seed 1 --jobs 2", 12),
     _eval("paths-lidar", "paths --method lidar --runs 3 --seed 1", 15),
@@ -50,6 +73,7 @@ EXPERIMENTS = (
     _eval("one-shot", "one-shot --scans 1500 --seed 12 --jobs 2 --data DATA", 10, ("tree_maps", "stem_censuses")),
     _eval("map-merge", "map-merge --trials 100 --drives 40 --seed 1 --jobs 2 --data DATA", 5,
           ("tree_maps", "stem_censuses")),
+    _stem_frames(),
     _eval("efficiency", "efficiency --drive-km 10 --stationary-h 2", 6),
     _eval("laps", "laps --laps 100 --length-m 317 --hours 24", 45),
     _eval("laps-held", "laps --laps 3 --length-m 100 --hours 2 --localise-in OUT/laps-held.gpkg --no-plots", 6),

@@ -191,6 +191,27 @@ def map_merge(document):
                         f"(95 % bound: {number(300 / apart)} %)."]
 
 
+def place_recognition(document):
+    """Frames of stems found again: a line per protocol, drive and map; then what no query has a match for."""
+    rows = [row for row in document["rows"] if row["queries"] > 0]
+    lines = table(
+        ("protocol", "drive", "map", "frames", "diameters", "queries", "recall@1", "max F1", "recall at 0 wrong", "accepted",
+         "wrong accepted", "pose m", "stems m", "median ms", "bytes/frame"),
+        [(row["protocol"], row["drive"], row["map"], row["frames_per_query"], "yes" if row["with_diameters"] else "no",
+          row["queries"], number(row["recall_at_1"], 3), number(row["max_f1"], 3), number(row["recall_zero_wrong"], 3),
+          number(row["recall_accepted"], 3), row["wrong_accepted"], number(row["error_m_p50"], 3),
+          number(row["stem_residual_m_p50"], 3), number(row["ms_p50"], 1), number(row["bytes_per_frame"], 0))
+         for row in rows])
+    single = [row for row in document["rows"] if row["frames_per_query"] == 1 and row["protocol"] != "between-3-m"]
+    for with_diameters in (True, False):
+        some = [row for row in single if row["with_diameters"] == with_diameters]
+        none = sum(row["queries_without_match"] for row in some)
+        wrong = sum(row["wrong_accepted_no_match"] for row in some)
+        lines += ["", f"Queries that have no match, {'with' if with_diameters else 'without'} diameters: {none}, of them "
+                      f"accepted {wrong}" + (f" (95 % bound {3 / none:.1e})." if none and not wrong else ".")]
+    return lines
+
+
 def efficiency(document):
     """Time per keyframe by scenario, method and component."""
     lines = table(

@@ -54,6 +54,7 @@ SECTIONS = (
     ("large-map", "One-shot localisation in a square kilometre", f"{GEOSLAM}, §5.4", render.large_map),
     ("one-shot", "One-shot localisation in surveyed forests", None, render.one_shot),
     ("map-merge", "Two maps become one", None, render.map_merge),
+    ("place-recognition", "Frames of stems found again", None, render.place_recognition),
     ("efficiency", "Time per keyframe", f"{GEOSLAM}, §5.5 (a figure only)", render.efficiency),
     ("laps", "Known ground: what must not grow", None, render.laps),
     ("laps-held", "Localisation only: what must not change", None, render.laps),

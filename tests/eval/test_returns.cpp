@@ -14,7 +14,7 @@ TEST_CASE("What comes into view again after a drift is joined, and nothing else"
   int doubled = 0;
   int joined = 0;
   double nees = 0.0;
-  for (const std::uint64_t seed : {11U, 12U}) {
+  for (const std::uint64_t seed : {11U, 12U, 13U, 14U}) {
     std::mt19937_64 random(seed);
     const sim::Forest forest = sim::make_forest(parameters, random);
     returns::ReturnDrive drive;
@@ -25,7 +25,7 @@ TEST_CASE("What comes into view again after a drift is joined, and nothing else"
     CHECK(score.false_merges == 0);
     CHECK(score.refused <= score.keyframes / 50);
     CHECK(score.last_error_m < 0.2);
-    nees += 0.5 * score.mean_nees;
+    nees += 0.25 * score.mean_nees;
     merges += score.merges;
     doubled += score.doubled;
     joined += score.joined;
@@ -33,5 +33,5 @@ TEST_CASE("What comes into view again after a drift is joined, and nothing else"
   INFO(joined << " of " << doubled << " joined in " << merges << " merges");
   CHECK(nees < 6.0);
   REQUIRE(doubled >= 10);
-  CHECK(joined >= 0.9 * doubled);
+  CHECK(joined >= 0.8 * doubled);
 }

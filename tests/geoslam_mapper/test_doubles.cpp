@@ -47,6 +47,7 @@ struct TwoLandmarks {
     StoredLandmark& landmark = map.landmarks.at(id);
     map.graph.observe(node, id, map.graph.pose(node).inverse() * landmark.position_m, kInformation);
     landmark.observed_from(node);
+    landmark.viewed_at(map.graph.node(node).along_m);
     ++landmark.observation_count;
   }
 

@@ -38,6 +38,7 @@ struct TwoPasses {
     map.graph.observe(node, id, map_T_true.inverse() * position_m + noise,
                       Eigen::Matrix2d::Identity() / (kSigma_m * kSigma_m));
     map.landmarks.at(id).observed_from(node);
+    map.landmarks.at(id).viewed_at(map.graph.node(node).along_m);
     map.landmarks.at(id).information += 1.0 / (kSigma_m * kSigma_m);
   }
 

@@ -106,6 +106,7 @@ model::LandmarkId Discovery::promote(const Candidate& candidate, GlobalMap& map)
     landmark.radius_m +=
         observation.landmark.radius_m / static_cast<double>(candidate.observations.size());
     landmark.observed_from(observation.node);
+    landmark.viewed_at(map.graph.node(observation.node).along_m);
   }
   landmark.position_m = sum / landmark.information;
   landmark.observation_count = candidate.observation_count;

@@ -13,13 +13,29 @@ constexpr double kBetween_m = 10.0;
 constexpr double kAwakeBeyond_m = 30.0;
 constexpr double kDormantBeyond_m = 20.0;
 
+/// The dormant ones around a place.
+std::vector<model::LandmarkId> dormant_around(const Eigen::Vector2d& here_m, double radius_m,
+                                              const GlobalMap& map) {
+  std::vector<model::LandmarkId> ids;
+  for (const model::LandmarkId id : map.landmarks.index().near({here_m, radius_m}))
+    if (map.graph.is_dormant(id)) ids.push_back(id);
+  return ids;
+}
+
 }  // namespace
+
+void Dormancy::prepare(const model::FieldOfView& field_of_view, const Eigen::Vector2d& expected_m,
+                       GlobalMap& map) const {
+  if (!is_on_ || (expected_m - here_m_).norm() < 0.5 * kAwakeBeyond_m) return;
+  map.wake(dormant_around(expected_m, field_of_view.max_range_m + kAwakeBeyond_m, map));
+}
 
 void Dormancy::follow(const model::FieldOfView& field_of_view, NodeIndex newest, GlobalMap& map) {
   const double along_m = map.graph.node(newest).along_m;
   if (!is_on_ || std::abs(along_m - looked_m_) < kBetween_m) return;
   looked_m_ = along_m;
   const Eigen::Vector2d here_m = map.graph.pose(newest).translation();
+  here_m_ = here_m;
   const double awake_m = field_of_view.max_range_m + kAwakeBeyond_m;
 
   // Only what condensed nodes observed, and no prior holds.
@@ -33,9 +49,7 @@ void Dormancy::follow(const model::FieldOfView& field_of_view, NodeIndex newest,
       left.push_back(id);
     }
   }
-  std::vector<model::LandmarkId> met;
-  for (const model::LandmarkId id : map.landmarks.index().near({here_m, awake_m}))
-    if (map.graph.is_dormant(id)) met.push_back(id);
+  const std::vector<model::LandmarkId> met = dormant_around(here_m, awake_m, map);
   if (left.empty() && met.empty()) return;
 
   map.graph.checkpoint();

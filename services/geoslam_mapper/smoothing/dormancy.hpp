@@ -18,15 +18,21 @@ class Dormancy {
   /// in the solved graph then, and what is changed.
   void follow(const model::FieldOfView& field_of_view, NodeIndex newest, GlobalMap& map);
 
+  /// To be called before a keyframe is placed: what lies around a place far from where the vehicle
+  /// was seen last is awake then, so that its uncertainty is known.
+  void prepare(const model::FieldOfView& field_of_view, const Eigen::Vector2d& expected_m,
+               GlobalMap& map) const;
+
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.looked_m_);
+    a(self.looked_m_, self.here_m_);
   }
 
  private:
   bool is_on_;
   double looked_m_ = 0.0;  ///< Path of the vehicle when it looked around.
+  Eigen::Vector2d here_m_ = Eigen::Vector2d::Zero();  ///< Where that was, frame `map`.
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

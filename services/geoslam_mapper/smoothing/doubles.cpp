@@ -26,26 +26,24 @@ constexpr double kTouching_m = 0.06;
 /// are observed together from almost everywhere; one that a bad scan doubled is so once.
 bool are_observed_together(const StoredLandmark& a, const StoredLandmark& b) {
   const auto common =
-      static_cast<std::size_t>(std::count_if(a.nodes.begin(), a.nodes.end(), [&](NodeIndex node) {
-        return std::find(b.nodes.begin(), b.nodes.end(), node) != b.nodes.end();
+      static_cast<std::size_t>(std::count_if(a.views_m.begin(), a.views_m.end(), [&](float view_m) {
+        return std::find(b.views_m.begin(), b.views_m.end(), view_m) != b.views_m.end();
       }));
-  return common > 1 || 4 * common > std::min(a.nodes.size(), b.nodes.size());
+  return common > 1 || 4 * common > std::min(a.views_m.size(), b.views_m.size());
 }
 
 /// Observations of `a` within a short way of one of `b`, from other nodes.
-int count_beside(const StoredLandmark& a, const StoredLandmark& b, const PoseGraph& graph) {
-  return static_cast<int>(std::count_if(a.nodes.begin(), a.nodes.end(), [&](NodeIndex node) {
-    const double along_m = graph.node(node).along_m;
-    return std::any_of(b.nodes.begin(), b.nodes.end(), [&](NodeIndex other) {
-      return other != node && std::abs(graph.node(other).along_m - along_m) < kOneWay_m;
+int count_beside(const StoredLandmark& a, const StoredLandmark& b) {
+  return static_cast<int>(std::count_if(a.views_m.begin(), a.views_m.end(), [&](double view_m) {
+    return std::any_of(b.views_m.begin(), b.views_m.end(), [&](double other_m) {
+      return other_m != view_m && std::abs(other_m - view_m) < kOneWay_m;
     });
   }));
 }
 
 /// Whether both were observed on one way past them.
-bool are_observed_in_turns(const StoredLandmark& a, const StoredLandmark& b,
-                           const PoseGraph& graph) {
-  return count_beside(a, b, graph) >= kLeastTurns && count_beside(b, a, graph) >= kLeastTurns;
+bool are_observed_in_turns(const StoredLandmark& a, const StoredLandmark& b) {
+  return count_beside(a, b) >= kLeastTurns && count_beside(b, a) >= kLeastTurns;
 }
 
 /// What the landmarks around tell of two that are near each other.
@@ -119,7 +117,7 @@ Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
     return Sameness::kTwo;
 
   // One, whatever the distance, or by the distance.
-  if (touch || are_observed_in_turns(a, b, map.graph)) return Sameness::kOne;
+  if (touch || are_observed_in_turns(a, b)) return Sameness::kOne;
   const double floor_m = parameters.gate_floor_m / parameters.gate_sigmas;
   const Eigen::Matrix2d spread = *covariance + floor_m * floor_m * Eigen::Matrix2d::Identity();
   const Neighbourhood around = neighbourhood_of(a.position_m, map);

@@ -131,6 +131,7 @@ void count_observations(const FusedKeyframe& fused, GlobalMap& map) {
     landmark.radius_m +=
         (observed.radius_m - landmark.radius_m) / static_cast<double>(landmark.nodes.size() + 1);
     landmark.observed_from(fused.node);
+    landmark.viewed_at(map.graph.node(fused.node).along_m);
   }
 }
 

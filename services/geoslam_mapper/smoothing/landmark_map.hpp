@@ -27,11 +27,22 @@ struct StoredLandmark {
   std::uint32_t observation_count = 0;  ///< Scans in which it was detected.
   std::uint32_t last_keyframe = 0;      ///< Number of accepted keyframes at its last observation.
   std::vector<NodeIndex> nodes;         ///< That observed it, each once, the last one at the end.
+  /// Path of the vehicle [m] at the nodes that observed it, before these were condensed; the latest
+  /// kMostViews.
+  std::vector<float> views_m;
   model::LandmarkKind kind = model::LandmarkKind::kTrunk;
   bool is_late = false;  ///< Its place in the index is older than its position.
 
   /// Variance [m^2] of the position relative to the keyframes that observed it.
   double local_variance() const { return 1.0 / information; }
+  static constexpr std::size_t kMostViews = 64;
+  /// A node at this path observed it, now.
+  void viewed_at(double along_m) {
+    const auto view_m = static_cast<float>(along_m);
+    if (!views_m.empty() && views_m.back() == view_m) return;
+    if (views_m.size() == kMostViews) views_m.erase(views_m.begin());
+    views_m.push_back(view_m);
+  }
   /// A node observed it, now. O(nodes).
   void observed_from(NodeIndex node) {
     if (!nodes.empty() && nodes.back() == node) return;
@@ -53,7 +64,7 @@ struct StoredLandmark {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
     a(s.id, s.position_m, s.prior_covariance, s.information, s.radius_m, s.observation_count,
-      s.last_keyframe, s.nodes, s.kind, s.is_late);
+      s.last_keyframe, s.nodes, s.views_m, s.kind, s.is_late);
   }
 };
 

@@ -78,6 +78,9 @@ void Merges::join(const MergedPair& pair, GlobalMap& map) {
   for (const NodeIndex node : (&older == &old_one ? new_one : old_one).nodes)
     joined.observed_from(node);
   new_one.nodes = std::move(joined.nodes);
+  for (const float view_m : (&older == &old_one ? new_one : old_one).views_m)
+    joined.viewed_at(view_m);
+  new_one.views_m = std::move(joined.views_m);
   new_one.information += old_one.information;
   new_one.observation_count += old_one.observation_count;
   new_one.last_keyframe = std::max(new_one.last_keyframe, old_one.last_keyframe);

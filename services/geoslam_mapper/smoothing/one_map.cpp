@@ -78,6 +78,8 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
 
   // Where is it?
   const auto prediction = motion_.predict(keyframe, map_.graph);
+  if (prediction)
+    dormancy_.prepare(keyframe.field_of_view, prediction->map_T_centre.mean.translation(), map_);
   const auto placement = place(keyframe, prediction, update);
   if (!placement) {
     if (prediction) motion_.assume(keyframe, *prediction);

@@ -1,0 +1,120 @@
+#include "common/place_recognition/hypotheses.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "common/geometry/alignment.hpp"
+
+namespace understory::place_recognition {
+namespace {
+
+/// Hypotheses of one frame within this of each other are one [m], [rad].
+constexpr double kSamePlaceM = 0.8;
+constexpr double kSameHeadingRad = 0.08;
+constexpr int kClustersPerFrame = 2;
+constexpr std::size_t kMostHypotheses = 400;
+
+constellation::Triangle indexed(const StemTriangle& triangle, constellation::Slot first) {
+  constellation::Triangle result;
+  result.side_m = triangle.side_m;
+  result.left = triangle.is_left;
+  for (std::size_t i = 0; i < 3; ++i) result.vertex[i] = first + triangle.corner[i];
+  return result;
+}
+
+bool diameters_agree(double a_m, double b_m, double log_tolerance) {
+  if (!(a_m > 0.0) || !(b_m > 0.0)) return true;
+  return std::abs(std::log(a_m / b_m)) <= log_tolerance;
+}
+
+float heading_between(const Hypothesis& a, const Hypothesis& b) {
+  return std::abs(std::remainder(a.heading_rad - b.heading_rad, 2.0F * std::numbers::pi_v<float>));
+}
+
+bool same_place(const Hypothesis& a, const Hypothesis& b) {
+  const float dx = a.x_m - b.x_m;
+  const float dy = a.y_m - b.y_m;
+  return dx * dx + dy * dy < kSamePlaceM * kSamePlaceM && heading_between(a, b) < kSameHeadingRad;
+}
+
+/// The mean of those that agree with `seed`.
+PlaceCluster cluster_around(const Hypothesis& seed, std::span<const Hypothesis> all) {
+  PlaceCluster cluster{seed.frame, 0, {}};
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  double turned = 0.0;
+  for (const Hypothesis& one : all) {
+    if (!same_place(seed, one)) continue;
+    ++cluster.votes;
+    sum += Eigen::Vector2d(one.x_m, one.y_m);
+    turned += geometry::wrap_angle(one.heading_rad - seed.heading_rad);
+  }
+  const double n = cluster.votes;
+  cluster.frame_T_query = {sum / n, seed.heading_rad + turned / n};
+  return cluster;
+}
+
+}  // namespace
+
+void TripletIndex::add(std::span<const LevelStem> stems, std::span<const StemTriangle> triangles) {
+  const auto first = static_cast<constellation::Slot>(stems_.size());
+  for (const LevelStem& stem : stems)
+    stems_.push_back({stem.position_m.cast<float>(), static_cast<float>(stem.diameter_m), frames_});
+  for (const StemTriangle& triangle : triangles) triangles_.add(indexed(triangle, first));
+  ++frames_;
+}
+
+std::vector<Hypothesis> TripletIndex::hypotheses(std::span<const LevelStem> stems,
+                                                 std::span<const StemTriangle> triangles,
+                                                 const HypothesisFilter& filter) const {
+  const auto tolerance = static_cast<float>(filter.side_tolerance_m);
+  const double reach_m2 = filter.max_distance_m * filter.max_distance_m;
+  std::vector<Hypothesis> found;
+  for (const StemTriangle& triangle : triangles) {
+    const auto consider = [&](const constellation::TriangleIndex::Entry& entry) {
+      const std::uint32_t frame = stems_[entry.vertex[0]].frame;
+      if (frame >= filter.end) return true;
+      geometry::RigidAlignment2 sums;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const LevelStem& own = stems[triangle.corner[i]];
+        const IndexedStem& other = stems_[entry.vertex[i]];
+        if (!diameters_agree(own.diameter_m, other.diameter_m, filter.diameter_log_tolerance))
+          return true;
+        sums.add(other.position_m.cast<double>(), own.position_m);
+      }
+      const geometry::SE2 pose = sums.a_T_b();
+      if (pose.translation().squaredNorm() <= reach_m2)
+        found.push_back({frame, static_cast<float>(pose.x()), static_cast<float>(pose.y()),
+                         static_cast<float>(pose.theta())});
+      return true;
+    };
+    triangles_.for_each_similar(indexed(triangle, 0), {tolerance, tolerance, tolerance}, consider);
+  }
+  std::ranges::stable_sort(found, {}, &Hypothesis::frame);
+  return found;
+}
+
+void collect_clusters(std::span<const Hypothesis> of_one_frame,
+                      std::vector<PlaceCluster>& clusters) {
+  const auto all = of_one_frame.first(std::min(of_one_frame.size(), kMostHypotheses));
+  std::vector<std::pair<std::int64_t, std::uint32_t>> by_votes(all.size());
+  for (std::uint32_t i = 0; i < all.size(); ++i) {
+    const std::int64_t votes = std::ranges::count_if(
+        all, [&](const Hypothesis& other) { return same_place(all[i], other); });
+    by_votes[i] = {-votes, i};
+  }
+  std::ranges::sort(by_votes);
+
+  std::vector<std::uint32_t> taken;
+  for (const auto& entry : by_votes) {
+    const std::uint32_t i = entry.second;
+    if (taken.size() == kClustersPerFrame) break;
+    if (std::ranges::any_of(taken, [&](std::uint32_t k) { return same_place(all[k], all[i]); }))
+      continue;
+    taken.push_back(i);
+    clusters.push_back(cluster_around(all[i], all));
+  }
+}
+
+}  // namespace understory::place_recognition

@@ -1,0 +1,70 @@
+// Triangles of stems that are alike, the poses that they mean, and where many mean the same.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/constellation/triangles.hpp"
+#include "common/geometry/se2.hpp"
+#include "common/place_recognition/level_stems.hpp"
+#include "common/place_recognition/stem_triangles.hpp"
+
+namespace understory::place_recognition {
+
+/// A triangle of a query that is like one of a frame, and the pose that this means.
+struct Hypothesis {
+  std::uint32_t frame = 0;  ///< In the order of adding.
+  float x_m = 0.0F;         ///< Of the query in the frame.
+  float y_m = 0.0F;
+  float heading_rad = 0.0F;
+};
+
+/// Which triangles are alike.
+struct HypothesisFilter {
+  double side_tolerance_m = 0.25;
+  double diameter_log_tolerance = 1e9;    ///< Between the logarithms of a corner's diameters.
+  double max_distance_m = 12.0;           ///< Between the sensors.
+  std::uint32_t end = ~std::uint32_t{0};  ///< Frames from this one on are not looked for.
+};
+
+/// Triangles of many frames by their side lengths.
+class TripletIndex {
+ public:
+  /// Without frames. Look-ups are fastest with about that tolerance [m].
+  explicit TripletIndex(double side_tolerance_m) : triangles_(2.0 * side_tolerance_m) {}
+
+  /// Adds the next frame and its triangles.
+  void add(std::span<const LevelStem> stems, std::span<const StemTriangle> triangles);
+  /// Poses by frame. O(triangles of the query * those alike).
+  std::vector<Hypothesis> hypotheses(std::span<const LevelStem> stems,
+                                     std::span<const StemTriangle> triangles,
+                                     const HypothesisFilter& filter) const;
+  /// Memory held [bytes].
+  std::size_t bytes() const { return triangles_.bytes() + stems_.capacity() * sizeof(IndexedStem); }
+
+ private:
+  struct IndexedStem {
+    Eigen::Vector2f position_m;
+    float diameter_m = 0.0F;
+    std::uint32_t frame = 0;
+  };
+
+  constellation::TriangleIndex triangles_;
+  std::vector<IndexedStem> stems_;  // by slot
+  std::uint32_t frames_ = 0;
+};
+
+/// A pose to begin the verification from, and how many triangles lead to it.
+struct PlaceCluster {
+  std::uint32_t frame = 0;
+  std::uint32_t votes = 0;
+  geometry::SE2 frame_T_query;
+};
+
+/// Adds the largest clusters of one frame's hypotheses. O(n^2) of the first 400.
+void collect_clusters(std::span<const Hypothesis> of_one_frame,
+                      std::vector<PlaceCluster>& clusters);
+
+}  // namespace understory::place_recognition

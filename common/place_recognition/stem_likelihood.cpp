@@ -1,0 +1,211 @@
+#include "common/place_recognition/stem_likelihood.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "common/geometry/alignment.hpp"
+
+namespace understory::place_recognition {
+namespace {
+
+/// Radius in which the density around a stem is counted [m].
+constexpr double kCrowdRadiusM = 4.0;
+/// What the pose leaves uncertain while it is refined, round by round: on the spot [m], and for
+/// each metre of distance.
+struct RefineSpread {
+  double on_the_spot_m;
+  double per_metre;
+};
+constexpr std::array kSpreads{RefineSpread{0.20, 0.015}, RefineSpread{0.10, 0.006},
+                              RefineSpread{0.03, 0.002}, RefineSpread{0.0, 0.0},
+                              RefineSpread{0.0, 0.0},    RefineSpread{0.0, 0.0}};
+/// Stems farther than this many wide sigmas say nothing.
+constexpr double kFarSigmas = 4.0;
+constexpr double kUnknownVariance = 1e4;
+/// Fewer diameters tell no spread; a narrower one would make every diameter telling.
+constexpr double kLeastDiameters = 20.0;
+constexpr double kLeastSpread = 0.1;
+
+double normal(double off, double sigma) {
+  return std::exp(-0.5 * off * off / (sigma * sigma)) / (sigma * std::sqrt(2.0 * std::numbers::pi));
+}
+
+}  // namespace
+
+void DiameterStatistics::add(double diameter_m) {
+  if (!(diameter_m > 0.0)) return;
+  const double value = std::log(diameter_m);
+  count_ += 1.0;
+  const double off = value - mean_;
+  mean_ += off / count_;
+  squares_ += off * (value - mean_);
+}
+
+DiameterSpread DiameterStatistics::spread() const {
+  if (count_ < kLeastDiameters) return {};
+  return {mean_, std::max(kLeastSpread, std::sqrt(squares_ / count_))};
+}
+
+StemView view_of(std::vector<LevelStem> stems) {
+  StemView view;
+  view.radius_m = extent_of(stems).radius_m;
+  view.weight.assign(stems.size(), 1.0);
+  view.stems = std::move(stems);
+  return view;
+}
+
+StemLikelihood::StemLikelihood(StemView frame, const StemNoise& noise,
+                               const DiameterSpread& diameters)
+    : noise_(noise), diameters_(diameters), radius_m_(frame.radius_m) {
+  double inside = 0.0;
+  for (std::size_t i = 0; i < frame.stems.size(); ++i) {
+    if (frame.stems[i].position_m.norm() <= radius_m_) inside += frame.weight[i];
+  }
+  const double density = inside / (std::numbers::pi * radius_m_ * radius_m_);
+  const double crowd_area = std::numbers::pi * kCrowdRadiusM * kCrowdRadiusM;
+
+  prepared_.reserve(frame.stems.size());
+  for (std::size_t i = 0; i < frame.stems.size(); ++i) {
+    const LevelStem& stem = frame.stems[i];
+    double around = 0.0;
+    for (std::size_t k = 0; k < frame.stems.size(); ++k) {
+      const double squared = (frame.stems[k].position_m - stem.position_m).squaredNorm();
+      if (squared < kCrowdRadiusM * kCrowdRadiusM) around += frame.weight[k];
+    }
+    const bool has_diameter = stem.diameter_m > 0.0;
+    prepared_.push_back({stem.position_m, has_diameter ? std::log(stem.diameter_m) : 0.0,
+                         has_diameter, frame.weight[i], std::max(density, around / crowd_area)});
+  }
+}
+
+double StemLikelihood::diameter_ratio(double query_m, const FrameStem& stem) const {
+  if (!noise_.use_diameters || !stem.has_diameter || !(query_m > 0.0)) return 1.0;
+  const double query = std::log(query_m);
+  const double off = query - stem.log_diameter;
+  const double right = (1.0 - noise_.wide_diameter_share) * normal(off, noise_.diameter_log_sigma) +
+                       noise_.wide_diameter_share * normal(off, noise_.wide_diameter_log_sigma);
+  const double anywhere = 0.95 * normal(query - diameters_.mean, diameters_.sigma) +
+                          0.05 * normal(query - diameters_.mean, 2.0 * diameters_.sigma + 0.5);
+  return right / anywhere;
+}
+
+Eigen::Vector2d StemLikelihood::weight(const LevelStem& query, const FrameStem& stem,
+                                       double squared_m2, const Kernel& kernel) const {
+  const double scale = noise_.matched_share * stem.weight * diameter_ratio(query.diameter_m, stem) /
+                       (stem.density_per_m2 * 2.0 * std::numbers::pi);
+  return {scale * (1.0 - noise_.wide_share) / kernel.narrow_variance *
+              std::exp(-0.5 * squared_m2 / kernel.narrow_variance),
+          scale * noise_.wide_share / kernel.wide_variance *
+              std::exp(-0.5 * squared_m2 / kernel.wide_variance)};
+}
+
+double StemLikelihood::log_ratio(std::span<const LevelStem> query,
+                                 const geometry::SE2& frame_T_query) const {
+  const Kernel kernel{noise_.sigma_m * noise_.sigma_m, noise_.wide_sigma_m * noise_.wide_sigma_m};
+  const double far_m2 = kFarSigmas * kFarSigmas * kernel.wide_variance;
+  const Eigen::Matrix2d rotation = frame_T_query.rotation();
+  const double inside_m2 = radius_m_ * radius_m_;
+
+  double sum = 0.0;
+  for (const LevelStem& stem : query) {
+    const Eigen::Vector2d mapped = rotation * stem.position_m + frame_T_query.translation();
+    if (mapped.squaredNorm() > inside_m2) continue;
+    double ratio = 1.0 - noise_.matched_share;
+    for (const FrameStem& other : prepared_) {
+      const double squared = (other.position_m - mapped).squaredNorm();
+      if (squared < far_m2) ratio += weight(stem, other, squared, kernel).sum();
+    }
+    sum += std::log(ratio);
+  }
+  return sum;
+}
+
+geometry::SE2 StemLikelihood::refined(std::span<const LevelStem> query,
+                                      const geometry::SE2& start) const {
+  geometry::SE2 pose = start;
+  for (const RefineSpread& spread : kSpreads) {
+    const Eigen::Matrix2d rotation = pose.rotation();
+    geometry::RigidAlignment2 sums;
+    for (const LevelStem& stem : query) {
+      const Eigen::Vector2d mapped = rotation * stem.position_m + pose.translation();
+      const double lever = spread.per_metre * stem.position_m.norm();
+      const double added = spread.on_the_spot_m * spread.on_the_spot_m + lever * lever;
+      const Kernel kernel{noise_.sigma_m * noise_.sigma_m + added,
+                          noise_.wide_sigma_m * noise_.wide_sigma_m + added};
+      const double far_m2 = kFarSigmas * kFarSigmas * kernel.wide_variance;
+
+      double ratio = 1.0 - noise_.matched_share;
+      std::array<std::pair<const FrameStem*, Eigen::Vector2d>, 8> near{};
+      std::size_t count = 0;
+      for (const FrameStem& other : prepared_) {
+        const double squared = (other.position_m - mapped).squaredNorm();
+        if (squared > far_m2 || count == near.size()) continue;
+        near[count] = {&other, weight(stem, other, squared, kernel)};
+        ratio += near[count++].second.sum();
+      }
+      for (std::size_t i = 0; i < count; ++i) {
+        const Eigen::Vector2d share = near[i].second / ratio;
+        sums.add(near[i].first->position_m, stem.position_m,
+                 share.x() / kernel.narrow_variance + share.y() / kernel.wide_variance);
+      }
+    }
+    if (!(sums.weight() > 0.0)) return pose;
+    pose = sums.a_T_b();
+  }
+  return pose;
+}
+
+std::vector<StemPair> StemLikelihood::pairs(std::span<const LevelStem> query,
+                                            const geometry::SE2& frame_T_query,
+                                            double gate_m) const {
+  const Eigen::Matrix2d rotation = frame_T_query.rotation();
+  std::vector<std::uint32_t> nearest_query(prepared_.size(), 0);
+  std::vector<double> nearest_m2(prepared_.size(), gate_m * gate_m);
+  std::vector<StemPair> found;
+  found.reserve(query.size());
+  for (std::uint32_t i = 0; i < query.size(); ++i) {
+    const Eigen::Vector2d mapped = rotation * query[i].position_m + frame_T_query.translation();
+    StemPair pair{i, 0, std::numeric_limits<double>::infinity()};
+    for (std::uint32_t j = 0; j < prepared_.size(); ++j) {
+      const double squared = (prepared_[j].position_m - mapped).squaredNorm();
+      if (squared < nearest_m2[j]) {
+        nearest_m2[j] = squared;
+        nearest_query[j] = i;
+      }
+      if (squared < pair.distance_m) pair = {i, j, squared};
+    }
+    if (pair.distance_m < gate_m * gate_m) found.push_back(pair);
+  }
+
+  std::erase_if(found,
+                [&](const StemPair& pair) { return nearest_query[pair.frame] != pair.query; });
+  for (StemPair& pair : found) pair.distance_m = std::sqrt(pair.distance_m);
+  return found;
+}
+
+Eigen::Matrix3d StemLikelihood::covariance(std::span<const LevelStem> query,
+                                           const geometry::SE2& pose,
+                                           std::span<const StemPair> pairs) const {
+  if (pairs.size() < 2) return kUnknownVariance * Eigen::Matrix3d::Identity();
+  double squared = 0.0;
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (const StemPair& pair : pairs) {
+    Eigen::Matrix<double, 2, 3> j;
+    j << pose.rotation(), pose.rotation() * geometry::perpendicular(query[pair.query].position_m);
+    sum += j.transpose() * j;
+    squared += pair.distance_m * pair.distance_m;
+  }
+  const double seen =
+      pairs.size() > 2 ? squared / (2.0 * static_cast<double>(pairs.size()) - 3.0) : 0.0;
+  const double variance = std::max(seen, noise_.sigma_m * noise_.sigma_m);
+  const Eigen::FullPivLU<Eigen::Matrix3d> solver(sum);
+  if (!solver.isInvertible()) return kUnknownVariance * Eigen::Matrix3d::Identity();
+  return variance * solver.inverse();
+}
+
+}  // namespace understory::place_recognition
