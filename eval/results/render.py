@@ -212,6 +212,17 @@ def place_recognition(document):
     return lines
 
 
+def partition(document):
+    """Drives with stretches condensed, a line per length of a stretch; one section each."""
+    return table(
+        ("stretch m", "runs", "to uncut m", "worst m", "to truth m", "uncut to truth m", "mean NEES", "joining ms", "median ms",
+         "p99 ms", "max ms"),
+        [(number(row["size_m"], 0), row["runs"], number(row["rmse_to_uncut_m"], 4), number(row["worst_rmse_to_uncut_m"], 4),
+          number(row["rmse_to_reference_m"], 4), number(row["uncut_rmse_to_reference_m"], 4), number(row["mean_nees"]),
+          number(1e3 * row["closure_s"], 1), *(number(row["sections"][-1][key]) for key in ("ms_p50", "ms_p99", "ms_max")))
+         for row in document["rows"]])
+
+
 def efficiency(document):
     """Time per keyframe by scenario, method and component."""
     lines = table(
