@@ -135,6 +135,7 @@ std::optional<GivenMapLayer> map_layer(const LaunchOptions& options,
                                        const std::vector<bus::ProcessEntry>& entries) {
   if (!options.map.is_given()) return std::nullopt;
   std::vector<std::string> names;
+  names.reserve(entries.size());
   for (const bus::ProcessEntry& entry : entries) names.push_back(entry.name);
   return given_map_layer(options.map, std::filesystem::absolute(options.map.file), names);
 }
