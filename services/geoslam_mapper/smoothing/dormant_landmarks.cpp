@@ -103,7 +103,7 @@ std::vector<PoseGraph::TiedNodes> PoseGraph::tied_by(model::LandmarkId id) const
   result.reserve(observed.size() * observed.size() / 2);
   for (std::size_t i = 0; i < observed.size(); ++i) {
     for (std::size_t k = 0; k < i; ++k)
-      result.push_back(std::minmax(observed[i].node, observed[k].node));
+      result.emplace_back(std::minmax(observed[i].node, observed[k].node));
   }
   return result;
 }
