@@ -172,6 +172,14 @@ void run_pair(const NamedProtocol& protocol, const StemDrive& queries, const Ste
   }
 }
 
+/// Their names, without where this machine has them.
+std::vector<std::string> names_of(const std::vector<StemDrive>& drives) {
+  std::vector<std::string> names;
+  names.reserve(drives.size());
+  for (const StemDrive& drive : drives) names.push_back(drive.name);
+  return names;
+}
+
 void run_places(const PlaceOptions& options) {
   const std::atomic<bool>& stop = terminal::catch_interrupts();
   const auto protocols = protocols_of(options);
@@ -194,8 +202,8 @@ void run_places(const PlaceOptions& options) {
       "({} decades), of the former; wrong: accepted, of all.\n",
       kAcceptDecades);
   if (options.json.empty()) return;
-  const nlohmann::json config{{"drives", options.drives},
-                              {"maps", options.maps},
+  const nlohmann::json config{{"drives", names_of(drives)},
+                              {"maps", names_of(maps)},
                               {"window", options.window},
                               {"accept_decades", kAcceptDecades}};
   harness::write_json(options.json, harness::result_document("place-recognition", config, rows));
