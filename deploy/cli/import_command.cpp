@@ -12,7 +12,7 @@
 #include "common/terminal/progress.hpp"
 #include "common/wire/convert.hpp"
 #include "deploy/cli/commands.hpp"
-#include "deploy/cli/failure.hpp"
+#include "deploy/cli/guarded_import.hpp"
 #include "deploy/cli/import_sensors.hpp"
 #include "deploy/cli/import_stem_frames.hpp"
 #include "services/lidar_imu_input/wheel_odometry.hpp"
@@ -89,21 +89,14 @@ class Importer {
 };
 
 void import_victoria_park(const VictoriaParkImportOptions& options) {
-  terminal::catch_interrupts();
-  try {
+  guarded_import([&] {
     const io::VictoriaPark recording = io::read_victoria_park(options.path);
     io::LcmLogWriter writer(options.out);
     Importer(recording, writer, options.raw).run();
     writer.commit();
     fmt::print("{} sweeps, {} wheel samples, {} fixes -> {}\n", recording.scans.size(),
                recording.wheels.size(), recording.gnss.size(), options.out);
-  } catch (const io::DataError& error) {
-    fail(error.what());
-  } catch (const io::LogError& error) {
-    fail(error.what());
-  } catch (const terminal::Interrupted& error) {
-    fail(fmt::format("import: {}", error.what()));
-  }
+  });
 }
 
 }  // namespace

@@ -21,6 +21,7 @@
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/progress.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/guarded_import.hpp"
 #include "deploy/cli/recording_log.hpp"
 #include "understory/ground_truth_t.hpp"
 
@@ -37,20 +38,6 @@ struct SensorImportOptions {
   std::string calibration;
   std::string imu, gnss, wheel_table;
 };
-
-/// Runs an import; what is wrong with the data or the log ends the command in one line.
-void guarded(const std::function<void()>& import) {
-  terminal::catch_interrupts();
-  try {
-    import();
-  } catch (const io::DataError& error) {
-    fail(error.what());
-  } catch (const io::LogError& error) {
-    fail(error.what());
-  } catch (const terminal::Interrupted& error) {
-    fail(fmt::format("import: {}", error.what()));
-  }
-}
 
 std::string read_recorded(const std::string& path) {
   const std::filesystem::path file(path);
@@ -232,7 +219,7 @@ CLI::App* add_format(CLI::App& import, const std::string& name, const std::strin
   CLI::App* command = import.add_subcommand(name, what);
   if (!path.empty()) command->add_option("path", options->path, path)->required();
   command->add_option("--out", options->out, "The log to write")->required();
-  command->callback([options, run] { guarded([&] { run(*options); }); });
+  command->callback([options, run] { guarded_import([&] { run(*options); }); });
   return command;
 }
 

@@ -13,7 +13,7 @@
 #include "common/io/data_error.hpp"
 #include "common/io/stem_frames.hpp"
 #include "common/terminal/interrupt.hpp"
-#include "deploy/cli/failure.hpp"
+#include "deploy/cli/guarded_import.hpp"
 #include "deploy/cli/recording_log.hpp"
 #include "understory/ground_truth_t.hpp"
 
@@ -94,20 +94,13 @@ void write_frames(const std::vector<model::StemFrame>& frames, const StemFramesO
 }
 
 void import_stem_frames(const StemFramesOptions& options) {
-  terminal::catch_interrupts();
-  try {
+  guarded_import([&] {
     const std::vector<model::StemFrame> frames = io::read_stem_frames(options.folder);
     write_frames(frames, options);
     std::size_t stems = 0;
     for (const model::StemFrame& frame : frames) stems += frame.stems.size();
     fmt::print("{} frames, {} stems -> {}\n", frames.size(), stems, options.out);
-  } catch (const io::DataError& error) {
-    fail(error.what());
-  } catch (const io::LogError& error) {
-    fail(error.what());
-  } catch (const terminal::Interrupted& error) {
-    fail(fmt::format("import: {}", error.what()));
-  }
+  });
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
-#include <span>
+#include <vector>
 
 namespace understory::factor_graph::plane {
 namespace {
@@ -26,7 +26,8 @@ struct Cross {
 
 /// A point of the normal equations.
 struct PointBlock {
-  Eigen::Matrix2d inverse = Eigen::Matrix2d::Zero();  ///< Of its own block.
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< With the poses given [m^2].
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
   Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
   std::vector<Cross> observed;
 };
@@ -69,9 +70,9 @@ class PartSystem {
   const Eigen::VectorXd& step() const { return step_; }
   /// The poses' moves per bias.
   const Eigen::VectorXd& by_bias() const { return by_bias_; }
-  /// What is told of the bias.
+  /// Information on the bias.
   double bias_information() const { return bias_information_; }
-  /// Its move to the optimum, where something is told.
+  /// Its move to the optimum, where there is information on it.
   double bias_step() const { return -bias_gradient_ / bias_information_; }
   const PointBlock& point(std::size_t i) const { return points_[i]; }
   /// Row of a pose in the system; none of the fixed one.
@@ -81,7 +82,7 @@ class PartSystem {
   }
   /// How a point follows a pose that observed it: d(point)/d(pose).
   Eigen::Matrix<double, 2, 3> follows(std::size_t point, const Cross& cross) const {
-    return -points_[point].inverse * cross.block.transpose();
+    return -points_[point].covariance * cross.block.transpose();
   }
 
  private:
@@ -138,7 +139,7 @@ class PartSystem {
       const Eigen::Matrix<double, 2, 3> weighted_pose = factor.information * j.pose;
       const std::size_t pose = index(factor.pose);
       PointBlock& point = points_[index(factor.point)];
-      point.inverse += j.point.transpose() * factor.information * j.point;
+      point.information += j.point.transpose() * factor.information * j.point;
       point.gradient += j.point.transpose() * factor.information * j.residual;
       point.observed.push_back({index(factor.pose), weighted_pose.transpose() * j.point});
       add_block(pose, pose, j.pose.transpose() * weighted_pose);
@@ -146,10 +147,10 @@ class PartSystem {
     }
 
     for (PointBlock& point : points_) {
-      if (point.inverse.determinant() <= 0.0) return false;
-      point.inverse = point.inverse.inverse().eval();
+      if (point.information.determinant() <= 0.0) return false;
+      point.covariance = point.information.inverse();
       for (const Cross& one : point.observed) {
-        const Block gain = one.block * point.inverse;
+        const Block gain = one.block * point.covariance;
         add_gradient(one.pose, -gain * point.gradient);
         for (const Cross& other : point.observed)
           add_block(one.pose, other.pose, -gain * other.block.transpose());
@@ -181,15 +182,15 @@ Eigen::Matrix<double, 2, 3> rigid(const Eigen::Vector2d& in_frame) {
 /// How the frame that the points have in common follows the poses: the fit of a rigid motion to the
 /// points' moves, weighted by what is known of each when the poses are given.
 Eigen::MatrixXd common_motion(const Graph& part, const PartSystem& system) {
-  const geometry::SE2& middle = part.poses[system.fixed()];
-  const geometry::SE2 middle_T_map = middle.inverse();
+  if (part.points.size() < kLeastPoints) return Eigen::MatrixXd::Zero(3, system.step().size());
+  const geometry::SE2 middle_T_map = part.poses[system.fixed()].inverse();
   const Eigen::Matrix2d to_middle = middle_T_map.rotation();
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::MatrixXd motion = Eigen::MatrixXd::Zero(3, system.step().size());
 
   for (std::size_t i = 0; i < part.points.size(); ++i) {
     const PointBlock& point = system.point(i);
-    const Eigen::Matrix2d weight = (to_middle * point.inverse * to_middle.transpose()).inverse();
+    const Eigen::Matrix2d weight = to_middle * point.information * to_middle.transpose();
     const Eigen::Matrix<double, 2, 3> j = rigid(middle_T_map * part.points[i]);
     normal += j.transpose() * weight * j;
     const Eigen::Matrix<double, 3, 2> gain = j.transpose() * weight * to_middle;
@@ -198,7 +199,7 @@ Eigen::MatrixXd common_motion(const Graph& part, const PartSystem& system) {
         motion.middleCols<3>(*at) += gain * system.follows(i, cross);
     }
   }
-  if (part.points.size() < kLeastPoints) return Eigen::MatrixXd::Zero(3, system.step().size());
+
   const Eigen::LLT<Eigen::Matrix3d> solver(normal);
   if (solver.info() != Eigen::Success) return Eigen::MatrixXd::Zero(3, system.step().size());
   return solver.solve(motion);
@@ -246,7 +247,7 @@ CondensedPoint point_of(const Graph& part, const PartSystem& system, const Eigen
   const Eigen::Matrix2d to_origin = origin_T_map.rotation();
 
   // Where the part's own factors have it.
-  Eigen::Vector2d position = part.points[i] - point.inverse * point.gradient;
+  Eigen::Vector2d position = part.points[i] - point.covariance * point.gradient;
   Eigen::MatrixXd bend = -rigid(origin_T_map * part.points[i]) * common;
   for (const Cross& cross : point.observed) {
     const auto at = system.row(cross.pose);
@@ -258,7 +259,7 @@ CondensedPoint point_of(const Graph& part, const PartSystem& system, const Eigen
 
   CondensedPoint result;
   result.position = origin_T_map * position;
-  result.covariance = to_origin * point.inverse * to_origin.transpose() +
+  result.covariance = to_origin * point.covariance * to_origin.transpose() +
                       bend * system.covariance() * bend.transpose();
   return result;
 }

@@ -29,7 +29,8 @@ struct CondensedPart {
   std::vector<geometry::SE2WithCovariance> origin_T_inner;
   std::vector<CondensedMotion> outer;
   std::vector<CondensedPoint> points;
-  /// What the part tells of the bias: its move from the graph's values, and the information on it.
+  /// What the part measures of the bias: its move from the graph's values, and the information on
+  /// it.
   double bias_step = 0.0;
   double bias_information = 0.0;  ///< [1/(rad/s)^2]; 0: nothing.
 };

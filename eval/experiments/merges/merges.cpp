@@ -15,7 +15,6 @@
 #include <span>
 #include <string>
 
-#include "common/io/text_file.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "eval/experiments/experiments.hpp"
 #include "eval/experiments/merges/pairs.hpp"
@@ -37,20 +36,14 @@ struct MergesOptions {
   std::string json;
 };
 
-/// Where a surveyed forest is, below the folder of recordings.
-struct ForestSource {
-  const char* name;
-  const char* file;
-  const char* diameter = "";
-  double least_diameter = 0.0;
-};
-
 constexpr std::array kForests{
-    ForestSource{"longleaf", "tree_maps/longleaf.csv"},
-    ForestSource{"lansing", "tree_maps/lansing.csv"}, ForestSource{"bei", "tree_maps/bei.csv"},
-    ForestSource{"big-woods", "stem_censuses/big_woods.csv", "dbh_2008_cm", 10.0}};
+    one_shot::MapSource{"longleaf", "tree_maps/longleaf.csv"},
+    one_shot::MapSource{"lansing", "tree_maps/lansing.csv"},
+    one_shot::MapSource{"bei", "tree_maps/bei.csv"},
+    one_shot::MapSource{"big-woods", "stem_censuses/big_woods.csv", "dbh_2008_cm", 10.0}};
 /// The last one of them, six years later.
-constexpr ForestSource kLater{"big-woods", "stem_censuses/big_woods.csv", "dbh_2014_cm", 10.0};
+constexpr one_shot::MapSource kLater{"big-woods", "stem_censuses/big_woods.csv", "dbh_2014_cm",
+                                     10.0};
 /// As shares of a map's width; the last one is a gap.
 constexpr std::array kOverlaps{1.0, 0.5, 0.25, -0.1};
 /// Two visits of a forest share 62-64 % of their stems in the median, 34 % at worst.
@@ -63,12 +56,6 @@ struct NamedDrives {
 constexpr std::array kDrives{
     NamedDrives{"two drives, 64 % of the stems each", DriveSetting{}},
     NamedDrives{"two vehicles on one day", DriveSetting{.side_m = 300.0, .seen = 1.0}}};
-
-std::vector<Eigen::Vector2d> load_forest(const ForestSource& source,
-                                         const std::filesystem::path& data) {
-  const std::string text = io::read_whole_file(data / source.file);
-  return one_shot::make_stem_map(source.name, text, source.diameter, source.least_diameter).stems_m;
-}
 
 nlohmann::json row_of_merges(std::span<const MergeTrial> trials) {
   std::vector<double> offset_m;
@@ -201,10 +188,11 @@ void run_map_merges(const MergesOptions& options) {
   MergesTable table(options, stop);
   for (const NamedDrives& drives : kDrives) table.add_drives(drives);
   table.add_forest("simulated", unchanged(simulated_forest(options.seed)));
-  for (const ForestSource& source : kForests)
-    table.add_forest(source.name, unchanged(load_forest(source, data)));
+  for (const one_shot::MapSource& source : kForests)
+    table.add_forest(source.name, unchanged(one_shot::load_map(source, data).stems_m));
   table.add_forest("big-woods, 2008 and 2014",
-                   visits_of(load_forest(kForests.back(), data), load_forest(kLater, data)));
+                   visits_of(one_shot::load_map(kForests.back(), data).stems_m,
+                             one_shot::load_map(kLater, data).stems_m));
 
   int apart = 0;
   int wrong = 0;

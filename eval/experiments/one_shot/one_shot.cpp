@@ -13,7 +13,6 @@
 #include <span>
 #include <stdexcept>
 
-#include "common/io/text_file.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "eval/experiments/experiments.hpp"
 #include "eval/experiments/one_shot/trials.hpp"
@@ -40,14 +39,6 @@ struct OneShotOptions {
   std::string json;
 };
 
-/// Where a map is, below the folder of recordings.
-struct MapSource {
-  const char* name;
-  const char* file;
-  const char* diameter = "";
-  double least_diameter = 0.0;
-};
-
 constexpr std::array kMaps{
     MapSource{"longleaf", "tree_maps/longleaf.csv"},
     MapSource{"lansing", "tree_maps/lansing.csv"},
@@ -60,16 +51,6 @@ constexpr std::array kMaps{
 constexpr std::array kScanSettings{
     ScanSetting{40.0, 0.2, 0.9, 0.0}, ScanSetting{20.0, 0.2, 0.9, 0.0},
     ScanSetting{40.0, 0.05, 0.9, 0.0}, ScanSetting{40.0, 0.2, 0.6, 0.3}};
-
-StemMap load_map(const MapSource& source, const std::filesystem::path& data) {
-  const std::filesystem::path file = data / source.file;
-  const std::string text = io::read_whole_file(file);
-  try {
-    return make_stem_map(source.name, text, source.diameter, source.least_diameter);
-  } catch (const std::runtime_error& error) {
-    throw std::runtime_error(file.string() + ": " + error.what());
-  }
-}
 
 /// Scans that gave up although there is an answer: with more work they are found, and right.
 int count_missed(const StemMap& map, const ScanSetting& setting, std::span<const Trial> trials,

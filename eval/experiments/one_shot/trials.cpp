@@ -11,6 +11,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "common/io/text_file.hpp"
 #include "eval/tools/thread_clock.hpp"
 
 namespace understory::eval::experiments::one_shot {
@@ -76,6 +77,16 @@ StemMap make_stem_map(std::string name, std::string_view csv, std::string_view d
   }
   if (result.stems_m.empty()) throw std::runtime_error("no stems");
   return result;
+}
+
+StemMap load_map(const MapSource& source, const std::filesystem::path& data) {
+  const std::filesystem::path file = data / source.file;
+  const std::string text = io::read_whole_file(file);
+  try {
+    return make_stem_map(source.name, text, source.diameter, source.least_diameter);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(file.string() + ": " + error.what());
+  }
 }
 
 Scan make_scan(const StemMap& map, const ScanSetting& setting, std::uint64_t seed) {

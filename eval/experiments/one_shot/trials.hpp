@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,6 +24,16 @@ struct StemMap {
 /// Throws std::runtime_error where a column is missing.
 StemMap make_stem_map(std::string name, std::string_view csv, std::string_view diameter = {},
                       double least_diameter = 0.0);
+
+/// Where a surveyed map is, below the folder of recordings.
+struct MapSource {
+  const char* name;
+  const char* file;
+  const char* diameter = "";  ///< See make_stem_map().
+  double least_diameter = 0.0;
+};
+/// The map of a source. Throws std::runtime_error naming the file.
+StemMap load_map(const MapSource& source, const std::filesystem::path& data);
 
 /// How a scan is made.
 struct ScanSetting {

@@ -63,11 +63,13 @@ nlohmann::json json_of(const Cell& cell, const PartitionOptions& options) {
                      {"mean_nees", cell.nees},
                      {"closure_s", 1e-3 * cell.closure_ms},
                      {"refused", cell.refused}};
+
   if (options.has_uncut) {
     row["rmse_to_uncut_m"] = rms(cell.to_uncut_m);
     row["worst_rmse_to_uncut_m"] = largest(cell.to_uncut_m);
     row["uncut_rmse_to_reference_m"] = rms(cell.uncut_to_truth_m);
   }
+
   for (const Section& section : cell.sections) {
     row["sections"].push_back({{"end_m", section.end_m},
                                {"ms_p50", section.ms_p50},
@@ -149,6 +151,7 @@ void add_experiment(CLI::App& eval, const std::string& name, const std::string& 
     options->route.block_m = 700.0;
     options->route.length_m = 1000.0;
   }
+
   command->add_option("--runs", options->runs, "Drives per size")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
@@ -174,6 +177,7 @@ void add_experiment(CLI::App& eval, const std::string& name, const std::string& 
   command->add_option("--sections", options->sections, "Parts of the drive, timed by themselves")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
+
   command->add_flag("!--no-uncut", options->has_uncut, "Without the same drives uncut");
   command->add_option("--json", options->json, "Result file");
   command->callback([options] { run_guarded(options->experiment, [options] { run(*options); }); });

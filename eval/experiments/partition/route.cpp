@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "eval/harness/block.hpp"
+
 namespace understory::eval::experiments::partition {
 namespace {
 
@@ -41,7 +43,7 @@ Route::Route(const RouteParameters& parameters, std::uint64_t seed)
   for (std::size_t i = 0; i < kWaves.size(); ++i) phases_.push_back(phase(random_));
 
   // The road's heading is integrated.
-  geometry::SE2 road(0.0, 0.0, on_road(0.0).theta());
+  geometry::SE2 road(0.0, 0.0, heading_of_road(0.0));
   const geometry::SE2 start = road.inverse();
   poses_.reserve(size_);
   for (std::size_t k = 0; k < size_; ++k) {
@@ -50,7 +52,7 @@ Route::Route(const RouteParameters& parameters, std::uint64_t seed)
       continue;
     }
     poses_.push_back(start * road);
-    const double turn = on_road(along_m(k + 1)).theta() - road.theta();
+    const double turn = heading_of_road(along_m(k + 1)) - road.theta();
     road = road * geometry::SE2::Exp({kStep_m, 0.0, geometry::wrap_angle(turn)});
   }
 }
@@ -63,33 +65,20 @@ std::size_t Route::number_of(model::Utime utime) {
 
 geometry::SE2 Route::pose(std::size_t k) const { return poses_[k]; }
 
-/// Its heading alone.
-geometry::SE2 Route::on_road(double along_m) const {
+double Route::heading_of_road(double along_m) const {
   double heading = 0.0;
   for (std::size_t i = 0; i < kWaves.size(); ++i) {
     const auto& [amplitude, wave_m] = kWaves[i];
     heading += amplitude * std::sin(2.0 * std::numbers::pi * along_m / wave_m + phases_[i]);
   }
-  return {0.0, 0.0, heading};
+  return heading;
 }
 
 /// A rectangle, twice as long as wide, with round corners.
 geometry::SE2 Route::on_block(double along_m) const {
   const double arcs_m = 2.0 * std::numbers::pi * kCorner_m;
   const double straight_m = (parameters_.block_m - arcs_m) / 6.0;
-  const double quarter_m = 0.25 * arcs_m;
-  geometry::SE2 pose;
-  double left_m = std::fmod(along_m, parameters_.block_m);
-  for (int side = 0;; side = (side + 1) % 4) {
-    const double side_m = side % 2 == 0 ? 2.0 * straight_m : straight_m;
-    if (left_m <= side_m) return pose * geometry::SE2(left_m, 0.0, 0.0);
-    left_m -= side_m;
-    const double arc_m = std::min(left_m, quarter_m);
-    pose = pose * geometry::SE2(side_m, 0.0, 0.0) *
-           geometry::SE2::Exp({arc_m, 0.0, arc_m / kCorner_m});
-    if (left_m <= quarter_m) return pose;
-    left_m -= quarter_m;
-  }
+  return harness::on_block(along_m, {2.0 * straight_m, straight_m}, kCorner_m);
 }
 
 std::vector<Eigen::Vector2d> Route::tile(int x, int y) const {

@@ -3,9 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <random>
-#include <string>
 #include <vector>
 
 #include "common/model/keyframe.hpp"
@@ -47,7 +45,7 @@ class Route {
   static std::size_t number_of(model::Utime utime);
 
  private:
-  geometry::SE2 on_road(double along_m) const;
+  double heading_of_road(double along_m) const;
   geometry::SE2 on_block(double along_m) const;
   std::vector<Eigen::Vector2d> tile(int x, int y) const;
   double unit() { return normal_(random_); }
@@ -58,8 +56,6 @@ class Route {
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_{0.0, 1.0};
   std::vector<double> phases_;
-  geometry::SE2 last_;  ///< Of the road, where it was integrated to.
-  double last_m_ = 0.0;
   std::vector<geometry::SE2> poses_;  ///< Of every keyframe.
 };
 

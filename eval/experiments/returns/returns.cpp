@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <random>
 #include <set>
 #include <stdexcept>
 #include <unordered_map>
 
+#include "eval/harness/block.hpp"
 #include "eval/tools/quantile.hpp"
 #include "eval/tools/thread_clock.hpp"
 #include "services/geoslam_mapper/geoslam_mapper.hpp"
@@ -57,25 +57,12 @@ class Way {
     straight_ = size_ - 2.0 * Eigen::Vector2d::Constant(kCorner_m);
   }
 
-  double length_m() const { return 2.0 * straight_.sum() + 2.0 * std::numbers::pi * kCorner_m; }
+  double length_m() const { return harness::block_length_m(straight_, kCorner_m); }
 
   /// From the middle of the lower side, to the left.
   geometry::SE2 at(double along_m) const {
-    geometry::SE2 pose(low_.x() + kCorner_m, low_.y(), 0.0);
-    double left = std::fmod(along_m, length_m());
-    const double quarter = 0.5 * std::numbers::pi * kCorner_m;
-    for (int side = 0;; side = (side + 1) % 4) {
-      const double straight = side % 2 == 0 ? straight_.x() : straight_.y();
-      if (left <= straight) return pose * geometry::SE2(left, 0.0, 0.0);
-      pose = pose * geometry::SE2(straight, 0.0, 0.0);
-      left -= straight;
-      const double angle = std::min(left, quarter) / kCorner_m;
-      const geometry::SE2 arc(kCorner_m * std::sin(angle), kCorner_m * (1.0 - std::cos(angle)),
-                              angle);
-      pose = pose * arc;
-      if (left <= quarter) return pose;
-      left -= quarter;
-    }
+    const geometry::SE2 start(low_.x() + kCorner_m, low_.y(), 0.0);
+    return start * harness::on_block(along_m, straight_, kCorner_m);
   }
 
  private:

@@ -1,4 +1,4 @@
-// Landmarks out of the solved graph: what they tell of the nodes, as motions between these.
+// Landmarks out of the solved graph: what they measure of the nodes, as motions between these.
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
@@ -143,34 +143,32 @@ void PoseGraph::renew(const std::set<TiedNodes>& ties) {
 plane::RelativePose PoseGraph::tie(const TiedNodes& nodes,
                                    std::span<const model::LandmarkId> ids) const {
   const auto& [a, b] = nodes;
-  const geometry::SE2 a_T_map = pose(a).inverse();
+  const geometry::SE2 a_T_b = pose(a).inverse() * pose(b);
+  const Eigen::Matrix2d to_a = a_T_b.rotation();
   std::vector<Shared> shared;
   shared.reserve(ids.size());
   for (const model::LandmarkId id : ids) {
     Shared one;
-    Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
+    double sum = 0.0;
     Eigen::Matrix2d of_a = Eigen::Matrix2d::Zero();
     Eigen::Matrix2d of_b = Eigen::Matrix2d::Zero();
     for (const DormantObservation& observed : dormant_.at(id)) {
-      const Eigen::Matrix2d to_a = (a_T_map * pose(observed.node)).rotation();
-      const Eigen::Matrix2d information = to_a * observed.information * to_a.transpose();
-      sum += information;
+      sum += observed.information.trace();
       if (observed.node == a) {
-        of_a = information;
+        of_a = observed.information;
         one.z_a = observed.position_m;
       } else if (observed.node == b) {
-        of_b = information;
+        of_b = to_a * observed.information * to_a.transpose();
         one.z_b = observed.position_m;
       }
     }
-    const double share = (of_a + of_b).trace() / sum.trace();
+    const double share = (of_a + of_b).trace() / sum;
     const Eigen::Matrix2d weight = share * of_a * (of_a + of_b).inverse() * of_b;
     one.weight = 0.5 * (weight + weight.transpose());
     shared.push_back(one);
   }
 
-  plane::RelativePose result{nodes_[a].centre, nodes_[b].centre, a_T_map * pose(b),
-                             Eigen::Matrix3d::Zero()};
+  plane::RelativePose result{nodes_[a].centre, nodes_[b].centre, a_T_b, Eigen::Matrix3d::Zero()};
   for (int step = 0; step < kSteps; ++step) {
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d gradient = Eigen::Vector3d::Zero();

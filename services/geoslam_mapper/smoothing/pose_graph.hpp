@@ -145,10 +145,11 @@ class PoseGraph {
   /// Cost: the factors of the nodes.
   std::vector<Retirement> condense(std::span<const NodeIndex> nodes);
 
-  /// Takes landmarks out of the solved graph: what they tell of the nodes that observed them, all
-  /// of which must be condensed, becomes motions between these. Exact but for the linearisation,
-  /// and undone by wake(). Landmarks with a prior must not be among them. Cost: the landmarks that
-  /// the nodes have in common.
+  /// Takes landmarks out of the solved graph: what they measure of the nodes that observed them,
+  /// all of which must be condensed, becomes motions between these. Exact but for the linearisation
+  /// where two nodes observed a landmark or informations are isotropic, else a little less is kept;
+  /// undone by wake(). Landmarks with a prior must not be among them. Cost: the landmarks that the
+  /// nodes have in common.
   void make_dormant(std::span<const model::LandmarkId> ids,
                     const std::map<model::LandmarkId, StoredLandmark>& landmarks);
   /// Takes landmarks into the solved graph again, where they are dormant.
