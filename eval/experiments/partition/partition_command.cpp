@@ -28,6 +28,7 @@ struct PartitionOptions {
   std::uint64_t seed = 1;
   std::size_t sections = 1;
   bool has_uncut = true;
+  bool plots = true;
   std::string json;
 };
 
@@ -141,6 +142,7 @@ void run(const PartitionOptions& options) {
                                  {"odometry_share", options.route.odometry_share},
                                  {"odometry_heading_deg", options.route.odometry_heading_deg}};
   harness::write_json(options.json, harness::result_document(options.experiment, config, rows));
+  if (options.plots) harness::plot("partition.py", {options.json});
 }
 
 void add_experiment(CLI::App& eval, const std::string& name, const std::string& description) {
@@ -179,7 +181,8 @@ void add_experiment(CLI::App& eval, const std::string& name, const std::string& 
       ->capture_default_str();
 
   command->add_flag("!--no-uncut", options->has_uncut, "Without the same drives uncut");
-  command->add_option("--json", options->json, "Result file");
+  command->add_option("--json", options->json, "Result file; a plot goes beside it");
+  command->add_flag("!--no-plots", options->plots, "Write JSON only");
   command->callback([options] { run_guarded(options->experiment, [options] { run(*options); }); });
 }
 
