@@ -10,6 +10,7 @@
 #include "common/model/odometry.hpp"
 #include "common/model/planar_scan.hpp"
 #include "common/model/point_sweep.hpp"
+#include "common/model/submap.hpp"
 #include "common/model/tracked.hpp"
 #include "common/model/wheels.hpp"
 #include "common/state/archive.hpp"
@@ -131,6 +132,17 @@ requires state::Is<Self, MapLandmark>
 void archive(Archive& a, Self& s) {
   a(s.id, s.position_m, s.covariance_m2, s.radius_m, s.observation_count, s.kind);
 }
+/// Members of a saved Submap.
+template <class Archive, class Self>
+requires state::Is<Self, Submap>
+void archive(Archive& a, Self& s) {
+  a(s.utime, s.sequence, s.map_id, s.id, s.content_hash, s.map_T_submap, s.landmarks, s.keyframes,
+    s.replaced, s.payload);
+}
+/// Members of a saved SubmapPose.
+template <class Archive, class Self>
+requires state::Is<Self, SubmapPose>
+void archive(Archive& a, Self& s) { a(s.id, s.map_T_submap); }
 /// Members of a saved KeyframePose.
 template <class Archive, class Self>
 requires state::Is<Self, KeyframePose>

@@ -17,6 +17,7 @@
 #include "common/model/planar_scan.hpp"
 #include "common/model/point_sweep.hpp"
 #include "common/model/slam_output.hpp"
+#include "common/model/submap.hpp"
 #include "common/model/tracked.hpp"
 #include "common/model/wheels.hpp"
 #include "common/wire/guard.hpp"
@@ -31,6 +32,9 @@
 #include "understory/landmarks_t.hpp"
 #include "understory/lidar_scan_t.hpp"
 #include "understory/lidar_sweep_t.hpp"
+#include "understory/loop_closure_t.hpp"
+#include "understory/loop_result_t.hpp"
+#include "understory/map_correction_t.hpp"
 #include "understory/map_delta_t.hpp"
 #include "understory/map_t.hpp"
 #include "understory/odometry2_t.hpp"
@@ -40,6 +44,9 @@
 #include "understory/slam_pose_t.hpp"
 #include "understory/slam_update2_t.hpp"
 #include "understory/slam_update_t.hpp"
+#include "understory/submap_query_t.hpp"
+#include "understory/submap_stored_t.hpp"
+#include "understory/submap_t.hpp"
 #include "understory/tracked_landmarks_t.hpp"
 #include "understory/velocity_correction_t.hpp"
 #include "understory/wheels_t.hpp"
@@ -68,6 +75,18 @@ Result<model::SlamPose> from_wire(const slam_pose_t& wire);
 Result<model::WholeMap> from_wire(const map_t& wire);
 /// A change of a map.
 Result<model::MapDelta> from_wire(const map_delta_t& wire);
+/// A part of a map; refused where the hash is not the payload's.
+Result<model::Submap> from_wire(const submap_t& wire);
+/// That a submap is on the disk.
+Result<model::SubmapStored> from_wire(const submap_stored_t& wire);
+/// A question for submaps.
+Result<model::SubmapQuery> from_wire(const submap_query_t& wire);
+/// Where the submaps are.
+Result<model::MapCorrection> from_wire(const map_correction_t& wire);
+/// A loop closure, or that one is taken back.
+Result<model::LoopClosure> from_wire(const loop_closure_t& wire);
+/// What became of a loop closure.
+Result<model::LoopResult> from_wire(const loop_result_t& wire);
 /// A scan of one plane; where the laser sits and the intensities are left out.
 Result<model::PlanarScan> from_wire(const lidar_scan_t& wire);
 /// A reading of wheel encoder and steering sensor.
@@ -105,6 +124,18 @@ slam_pose2_t to_wire(const model::SlamPose& pose);
 map_t to_wire(const model::WholeMap& map);
 /// A change of a map.
 map_delta_t to_wire(const model::MapDelta& delta);
+/// A part of a map.
+submap_t to_wire(const model::Submap& submap);
+/// That a submap is on the disk.
+submap_stored_t to_wire(const model::SubmapStored& stored);
+/// A question for submaps.
+submap_query_t to_wire(const model::SubmapQuery& query);
+/// Where the submaps are.
+map_correction_t to_wire(const model::MapCorrection& correction);
+/// A loop closure.
+loop_closure_t to_wire(const model::LoopClosure& closure);
+/// What became of a loop closure.
+loop_result_t to_wire(const model::LoopResult& result);
 /// A scan of one plane.
 lidar_scan_t to_wire(const model::PlanarScan& scan);
 /// A reading of wheel encoder and steering sensor.

@@ -1,54 +1,8 @@
 #include "common/wire/convert.hpp"
 #include "common/wire/convert_ids.hpp"
-#include "common/wire/convert_shared.hpp"
+#include "common/wire/convert_map_parts.hpp"
 
 namespace understory::wire {
-namespace {
-
-model::MapLandmark landmark(const map_landmark_t& wire, Checks& checks) {
-  check_landmark(wire, checks);
-  checks.range("times_seen", wire.times_seen, 0, std::numeric_limits<std::int32_t>::max());
-  model::MapLandmark result;
-  result.id = landmark_id(wire.id, checks);
-  result.position_m = Eigen::Map<const Eigen::Vector2d>(wire.position_m);
-  result.covariance_m2 = checks.covariance("covariance_m2", wire.covariance_m2);
-  result.radius_m = wire.radius_m;
-  result.observation_count = static_cast<std::uint32_t>(wire.times_seen);
-  result.kind = static_cast<model::LandmarkKind>(wire.kind);
-  return result;
-}
-
-map_landmark_t to_wire(const model::MapLandmark& landmark) {
-  map_landmark_t wire{};
-  wire.id = static_cast<std::int64_t>(landmark.id);
-  copy_vector(landmark.position_m, wire.position_m);
-  copy_matrix(landmark.covariance_m2, wire.covariance_m2);
-  wire.radius_m = landmark.radius_m;
-  wire.times_seen = static_cast<std::int32_t>(landmark.observation_count);
-  wire.kind = static_cast<std::int8_t>(landmark.kind);
-  return wire;
-}
-
-std::vector<model::MapLandmark> landmarks(std::string_view field,
-                                          const std::vector<map_landmark_t>& wire, Checks& checks) {
-  std::vector<model::MapLandmark> result;
-  result.reserve(wire.size());
-  for (std::size_t i = 0; i < wire.size(); ++i) {
-    checks.in(field, i);
-    result.push_back(landmark(wire[i], checks));
-  }
-  return result;
-}
-
-std::vector<map_landmark_t> to_wire(const std::vector<model::MapLandmark>& landmarks) {
-  std::vector<map_landmark_t> wire;
-  wire.reserve(landmarks.size());
-  for (const model::MapLandmark& landmark : landmarks) wire.push_back(to_wire(landmark));
-  return wire;
-}
-
-}  // namespace
-
 Result<model::WholeMap> from_wire(const map_t& wire) {
   Checks checks;
   checks.range("version", static_cast<double>(wire.version), 0.0, 9.3e18);
@@ -58,17 +12,7 @@ Result<model::WholeMap> from_wire(const map_t& wire) {
   map.version = static_cast<std::uint64_t>(wire.version);
   map.complete = wire.complete != 0;
   map.landmarks = landmarks("landmarks", wire.landmarks, checks);
-  map.keyframes.reserve(wire.keyframes.size());
-  for (std::size_t i = 0; i < wire.keyframes.size(); ++i) {
-    const keyframe_pose_t& one = wire.keyframes[i];
-    checks.in("keyframes", i);
-    checks.range("keyframe_seq", static_cast<double>(one.keyframe_seq), 0.0, 9.3e18);
-    checks.pose("map_T_vehicle", one.map_T_vehicle);
-    map.keyframes.push_back({static_cast<std::uint64_t>(one.keyframe_seq), one.utime,
-                             from_wire(one.map_T_vehicle),
-                             checks.covariance("covariance", one.covariance)});
-  }
-
+  map.keyframes = keyframe_poses(wire.keyframes, checks);
   if (checks.refusal()) return *checks.refusal();
   return map;
 }
@@ -81,15 +25,7 @@ map_t to_wire(const model::WholeMap& map) {
   wire.complete = map.complete ? 1 : 0;
   wire.landmarks = to_wire(map.landmarks);
   wire.num_landmarks = static_cast<std::int32_t>(wire.landmarks.size());
-  wire.keyframes.reserve(map.keyframes.size());
-  for (const model::KeyframePose& pose : map.keyframes) {
-    keyframe_pose_t& out = wire.keyframes.emplace_back();
-    out.utime = pose.utime;
-    out.keyframe_seq = static_cast<std::int64_t>(pose.keyframe_sequence);
-    out.map_T_vehicle = to_wire(pose.map_T_vehicle);
-    copy_matrix(pose.covariance, out.covariance);
-  }
-
+  wire.keyframes = to_wire(map.keyframes);
   wire.num_keyframes = static_cast<std::int32_t>(wire.keyframes.size());
   return wire;
 }

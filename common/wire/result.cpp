@@ -82,6 +82,8 @@ std::string_view to_string(Reason reason) {
       return "new_map";
     case Reason::kNoiseMisstated:
       return "noise_misstated";
+    case Reason::kNotStored:
+      return "not_stored";
   }
 
   return "unknown";

@@ -48,6 +48,7 @@ enum class Reason : std::uint8_t {
   kMiscalibrated,   ///< Sensors contradict each other: a mounting or a scale is not as configured.
   kNewMap,          ///< A lost mapper began another map, in a frame of its own.
   kNoiseMisstated,  ///< What comes in contradicts the noise that it states.
+  kNotStored,       ///< What was handed over has not been confirmed by who keeps it.
 };
 
 /// Name of the reason, lower_snake.

@@ -99,6 +99,46 @@ TEST_CASE("values survive the wire") {
   }
 }
 
+TEST_CASE("submaps and closures survive the wire") {
+  Maker make(8);
+  for (int round = 0; round < 20; ++round) {
+    model::Submap submap;
+    submap.utime = 40;
+    submap.map_id = 3;
+    submap.id = 1 + make.count();
+    submap.map_T_submap = make.pose();
+    submap.landmarks = make.landmarks();
+    submap.keyframes = {{4, 20, make.pose(), make.covariance<3>()}};
+    submap.replaced.assign(make.count(), 7);
+    submap.payload = std::string("\0\xff payload", 10);
+    submap.content_hash = model::fnv1a(submap.payload);
+    check_round_trip(submap);
+    submap.payload[2] = 'x';
+    CHECK(from_wire(to_wire(submap)).refusal().reason == Reason::kInconsistent);
+
+    check_round_trip(model::SubmapStored{40, 2, 3, 9, submap.content_hash});
+    check_round_trip(model::SubmapQuery{40, 2, 3, {1, 5, 2}});
+    check_round_trip(model::MapCorrection{40, 2, 3, 8, {{1, make.pose()}, {4, make.pose()}}});
+    CHECK_FALSE(from_wire(to_wire(model::MapCorrection{40, 2, 3, 8, {{4, {}}, {4, {}}}})));
+
+    model::LoopClosure closure;
+    closure.id = 12;
+    closure.source = "manual";
+    closure.from = {3, 0};
+    closure.to = {0, 812};
+    closure.from_T_to = {make.pose(), make.covariance<3>() + Eigen::Matrix3d::Identity()};
+    closure.log10_false_alarm = -7.0;
+    check_round_trip(closure);
+    closure.is_revoked = true;
+    CHECK(from_wire(to_wire(closure))->is_revoked);
+    closure.is_revoked = false;
+    closure.from_T_to.covariance.setZero();
+    CHECK(from_wire(to_wire(closure)).refusal().reason == Reason::kInconsistent);
+    check_round_trip(model::LoopResult{40, 2, 3, 12, model::LoopResult::Status::kRefused,
+                                       "far from consistent"});
+  }
+}
+
 TEST_CASE("sensor values survive the wire") {
   model::PlanarScan scan{100, 5, -1.5, 0.01, 80.0, {1.0F, 0.0F, 90.0F, 80.5F}};
   const auto back = decode_message<model::PlanarScan>(encode_message(scan));
