@@ -7,6 +7,7 @@
 #include "services/geoslam_mapper/adapter_parameters.hpp"
 #include "services/geoslam_mapper/geoslam_mapper.hpp"
 #include "services/geoslam_mapper/given_map.hpp"
+#include "services/geoslam_mapper/hand_over.hpp"
 #include "services/geoslam_mapper/health_watch.hpp"
 #include "services/geoslam_mapper/map_budget.hpp"
 #include "services/geoslam_mapper/map_difference.hpp"
@@ -39,7 +40,14 @@ std::size_t map_bytes(std::size_t landmarks, std::size_t keyframes) {
          keyframes * wire::element_bytes<keyframe_pose_t>();
 }
 
-constexpr state::Format kFormat{"geoslam_mapper", 6};
+/// Bytes of a SUBMAP with so many landmarks: its keyframes and its payload take as much again.
+std::size_t submap_bytes(std::size_t landmarks) {
+  return 8 * wire::bytes_with<submap_t, map_landmark_t>(landmarks);
+}
+/// Most landmarks of one stretch of the path.
+constexpr std::size_t kSubmapLandmarks = 2000;
+
+constexpr state::Format kFormat{"geoslam_mapper", 7};
 
 /// What a holder of every MAP_DELTA has.
 struct KnownMap {
@@ -62,6 +70,8 @@ struct Memory {
   JumpWatch jumps;
   HealthWatch health;
   MapBudget budget;
+  HandOver hand_over;
+  CorrectionWatch corrections;
   bool map_is_published = true;
   bool map_is_due = false;      ///< It started or jumped since it was last published.
   bool is_provisional = false;  ///< The map, by its last keyframe.
@@ -72,8 +82,9 @@ struct Memory {
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
-    a(s.known, s.odometry, s.jumps, s.health, s.budget, s.map_is_published, s.map_is_due,
-      s.is_provisional, s.keyframes, s.newest_pose_utime, s.earned_pose_utime);
+    a(s.known, s.odometry, s.jumps, s.health, s.budget, s.hand_over, s.corrections,
+      s.map_is_published, s.map_is_due, s.is_provisional, s.keyframes, s.newest_pose_utime,
+      s.earned_pose_utime);
   }
 };
 
@@ -101,6 +112,7 @@ class MapperAdapter : public bus::Adapter {
 
   void finish() override {
     if (!memory_.map_is_published) publish_map();
+    publish_correction(true);
   }
 
   std::string save() const override { return state::save(kFormat, memory_, stage_->save()); }
@@ -167,6 +179,69 @@ class MapperAdapter : public bus::Adapter {
                                      .sequenced = false,
                                      .timed = false,
                                      .most_bytes = map_bytes(most_given, most_given)});
+    subscribe_to_store(node);
+  }
+
+  void subscribe_to_store(bus::Node& node) {
+    node.subscribe<model::SubmapStored>(channels_.submap_stored,
+                                        [this](const model::SubmapStored& stored) {
+                                          memory_.hand_over.confirm(stored);
+                                          stage_->may_hand_over(memory_.hand_over.may_hand_over());
+                                        },
+                                        {.queue_size = 200});
+    node.subscribe<model::Submap>(channels_.submap_reply,
+                                  [this](const model::Submap& submap) { bring_back(submap); },
+                                  {.queue_size = 50, .most_bytes = submap_bytes(kSubmapLandmarks)});
+  }
+
+  /// An answer may come twice: then the submap is not away any more.
+  void bring_back(const model::Submap& submap) {
+    const std::vector<model::SubmapId> wanted = stage_->wanted();
+    if (std::ranges::find(wanted, submap.id) == wanted.end()) return;
+    const std::string refused = stage_->bring_back(submap);
+    if (!refused.empty())
+      node_->report(wire::Reason::kInputRefused, refused, channels_.submap_reply);
+    if (refused.empty()) memory_.keyframes += submap.keyframes.size();
+  }
+
+  /// What the mapper gave away goes to the store until that has it; what it wants back it asks for.
+  void exchange_submaps(model::Utime now) {
+    for (model::Submap& submap : stage_->take_given_away()) {
+      forget(submap);
+      memory_.hand_over.add(std::move(submap));
+    }
+    for (const model::Submap& submap : memory_.hand_over.due(now))
+      memory_.budget.earn(submaps_.publish(submap));
+
+    std::vector<model::SubmapId> away;
+    for (const model::SubmapId id : stage_->wanted()) {
+      if (const auto submap = memory_.hand_over.take(memory_.known.map_id, id)) {
+        bring_back(*submap);
+      } else {
+        away.push_back(id);
+      }
+    }
+    model::SubmapQuery query{now, 0, memory_.known.map_id, memory_.hand_over.to_ask(away, now)};
+    if (!query.ids.empty()) queries_.publish(query);
+    stage_->may_hand_over(memory_.hand_over.may_hand_over());
+    memory_.health.keeps_up(memory_.hand_over.may_hand_over());
+  }
+
+  /// It changes no more: nobody is to be told that it went.
+  void forget(const model::Submap& submap) {
+    if (submap.map_id != memory_.known.map_id) return;
+    const auto is_in = [&](const model::MapLandmark& known) {
+      return std::ranges::binary_search(submap.landmarks, known.id, {}, &model::MapLandmark::id);
+    };
+    std::erase_if(memory_.known.landmarks, is_in);
+    memory_.keyframes -= std::min<std::uint64_t>(memory_.keyframes, submap.keyframes.size());
+  }
+
+  void publish_correction(bool is_last) {
+    if (auto correction = memory_.corrections.next(memory_.known.utime, memory_.known.map_id,
+                                                   stage_->submap_poses(), is_last)) {
+      memory_.budget.earn(corrections_.publish(*correction));
+    }
   }
 
   /// Only in the beginning: a map that exists is not replaced.
@@ -194,6 +269,9 @@ class MapperAdapter : public bus::Adapter {
     updates_ = node.advertise<model::MapUpdate>(channels_.slam_update);
     maps_ = node.advertise<model::WholeMap>(channels_.map);
     deltas_ = node.advertise<model::MapDelta>(channels_.map_delta);
+    submaps_ = node.advertise<model::Submap>(channels_.submap);
+    queries_ = node.advertise<model::SubmapQuery>(channels_.submap_query);
+    corrections_ = node.advertise<model::MapCorrection>(channels_.map_correction);
   }
 
   void add(const model::Keyframe& keyframe) {
@@ -204,6 +282,8 @@ class MapperAdapter : public bus::Adapter {
     memory_.jumps.add(keyframe, update);
     publish_poses(keyframe, update);
     publish_delta(update);
+    exchange_submaps(keyframe.utime);
+    if (memory_.corrections.is_due(keyframe.utime)) publish_correction(false);
     memory_.health.add(update);
     show_health();
   }
@@ -330,6 +410,9 @@ class MapperAdapter : public bus::Adapter {
   bus::Publisher<model::MapUpdate> updates_;
   bus::Publisher<model::WholeMap> maps_;
   bus::Publisher<model::MapDelta> deltas_;
+  bus::Publisher<model::Submap> submaps_;
+  bus::Publisher<model::SubmapQuery> queries_;
+  bus::Publisher<model::MapCorrection> corrections_;
 };
 
 }  // namespace
@@ -337,9 +420,10 @@ class MapperAdapter : public bus::Adapter {
 bus::Service geoslam_mapper_service(const MapperChannels& channels) {
   return {"geoslam_mapper",
           channels.keyframe + ", " + channels.landmarks + ", " + channels.odometry + ", " +
-              channels.ekf_pose + ", " + channels.ekf_level + ", " + channels.given_map + " -> " +
-              channels.slam_pose + ", " + channels.slam_update + ", " + channels.map + ", " +
-              channels.map_delta,
+              channels.ekf_pose + ", " + channels.ekf_level + ", " + channels.given_map + ", " +
+              channels.submap_stored + ", " + channels.submap_reply + " -> " + channels.slam_pose +
+              ", " + channels.slam_update + ", " + channels.map + ", " + channels.map_delta + ", " +
+              channels.submap + ", " + channels.submap_query + ", " + channels.map_correction,
           [channels] { return std::make_unique<MapperAdapter>(channels); }};
 }
 

@@ -17,11 +17,16 @@ struct MapperChannels {
   std::string ekf_level = "EKF_LEVEL";
   std::string map_request = "MAP_REQUEST";
   std::string given_map = "GIVEN_MAP";
+  std::string submap_stored = "SUBMAP_STORED";
+  std::string submap_reply = "SUBMAP_REPLY";
   // Out.
   std::string slam_pose = "SLAM_POSE";
   std::string slam_update = "SLAM_UPDATE";
   std::string map = "MAP";
   std::string map_delta = "MAP_DELTA";
+  std::string submap = "SUBMAP";
+  std::string submap_query = "SUBMAP_QUERY";
+  std::string map_correction = "MAP_CORRECTION";
 };
 
 /// The mapper as a service: name, channels and what makes its adapter.

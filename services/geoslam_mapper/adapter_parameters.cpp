@@ -146,6 +146,11 @@ void describe_growth(SmoothingMapperParameters& p, bus::ParameterTable& table) {
             "... but of no more than this by the sensor's range: what bends within it is lost.");
   table.add("smoothing.condense_after_m", p.condense_after_m, {0.0, 10000.0}, "m",
             "... once the vehicle is so far beyond it, and beyond the sensor's range.");
+  table.add("smoothing.hand_over_m", p.hand_over_m, {0.0, 100000.0}, "m",
+            "Condensed measurements farther from the vehicle than this are handed over to "
+            "submap_store with their landmarks and keyframes, and come back before the vehicle is "
+            "near: memory follows the ground around the vehicle. More is kept where the pose is "
+            "uncertain. 0: the whole map is kept.");
 }
 
 void describe_renamed(bus::ParameterTable& table) {

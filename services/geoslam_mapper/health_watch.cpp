@@ -34,7 +34,10 @@ HealthWatch::HealthWatch(const HealthParameters& parameters)
       refused_{wire::Reason::kInputRefused, "keyframes are malformed or late", "",
                bus::Condition(parameters.refused)},
       new_map_{wire::Reason::kNewMap, "another map was begun; the one before is not continued", "",
-               bus::Condition(parameters.new_map)} {}
+               bus::Condition(parameters.new_map)},
+      not_stored_{wire::Reason::kNotStored,
+                  "nobody confirms SUBMAP: the map stays in memory and grows", "SUBMAP",
+                  bus::Condition({1, 1})} {}
 
 void HealthWatch::add(const model::MapUpdate& update) {
   using enum model::MapUpdateStatus;

@@ -40,7 +40,8 @@ struct CertainKeyframe {
 /// contradict the map. `diverged`: they fit it worse than is stated (of a map as stated one
 /// keyframe in 1000 by chance, 3 of 8 once in 10^7), or the map moved otherwise than the filter,
 /// which uses the same detections. `input_refused`: they are malformed or late. `new_map`: another
-/// map was begun some keyframes ago.
+/// map was begun some keyframes ago. `not_stored`: no store has confirmed what the mapper gave
+/// away.
 class HealthWatch {
  public:
   /// All is well so far.
@@ -53,16 +54,18 @@ class HealthWatch {
   void add(const model::MapUpdate& update);
   /// The filter's pose, to compare motions.
   void add(const model::EkfPose& pose) { filter_.add(pose); }
+  /// Whether what the mapper gave away is kept by a store; to be called after each keyframe.
+  void keeps_up(bool does) { not_stored_.condition.add(!does); }
   /// What to show.
-  std::array<bus::WatchedCondition, 6> conditions() const {
-    return {lost_, rolled_back_, diverged_, contradicts_, refused_, new_map_};
+  std::array<bus::WatchedCondition, 7> conditions() const {
+    return {lost_, rolled_back_, diverged_, contradicts_, refused_, new_map_, not_stored_};
   }
 
   /// Members of a saved state; see common/state. The parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.lost_, self.rolled_back_, self.diverged_, self.contradicts_, self.refused_,
-      self.new_map_, self.filter_, self.last_, self.map_id_, self.must_find_map_);
+      self.new_map_, self.not_stored_, self.filter_, self.last_, self.map_id_, self.must_find_map_);
   }
 
  private:
@@ -75,6 +78,7 @@ class HealthWatch {
   bus::WatchedCondition contradicts_;
   bus::WatchedCondition refused_;
   bus::WatchedCondition new_map_;
+  bus::WatchedCondition not_stored_;
   smoothing::FilterTrack filter_;
   std::optional<CertainKeyframe> last_;
   std::uint32_t map_id_ = 0;  ///< 0 before the first keyframe.

@@ -4,17 +4,22 @@
 int main(int argc, char** argv) {
   return understory::bus::run_service(
       understory::geoslam_mapper::geoslam_mapper_service({
-          .keyframe = "KEYFRAME",        // in: local landmarks of n sweeps
-          .landmarks = "LANDMARKS",      // in: every sweep, located at once
-          .odometry = "ODOMETRY",        // in: motion, where there is any
-          .ekf_pose = "EKF_POSE",        // in: a gate; velocity without wheels
-          .ekf_level = "EKF_LEVEL",      // in: error of the sweeps' level, likewise
-          .map_request = "MAP_REQUEST",  // in: asks for MAP now
-          .given_map = "GIVEN_MAP",      // in: a map to begin with
-          .slam_pose = "SLAM_POSE",      // out: the vehicle's pose at each sweep
-          .slam_update = "SLAM_UPDATE",  // out: what became of each keyframe
-          .map = "MAP",                  // out: the whole map, rarely and on request
-          .map_delta = "MAP_DELTA",      // out: what changed, per keyframe
+          .keyframe = "KEYFRAME",              // in: local landmarks of n sweeps
+          .landmarks = "LANDMARKS",            // in: every sweep, located at once
+          .odometry = "ODOMETRY",              // in: motion, where there is any
+          .ekf_pose = "EKF_POSE",              // in: a gate; velocity without wheels
+          .ekf_level = "EKF_LEVEL",            // in: error of the sweeps' level, likewise
+          .map_request = "MAP_REQUEST",        // in: asks for MAP now
+          .given_map = "GIVEN_MAP",            // in: a map to begin with
+          .submap_stored = "SUBMAP_STORED",    // in: the store has what was handed over
+          .submap_reply = "SUBMAP_REPLY",      // in: a submap that was asked for
+          .slam_pose = "SLAM_POSE",            // out: the vehicle's pose at each sweep
+          .slam_update = "SLAM_UPDATE",        // out: what became of each keyframe
+          .map = "MAP",                        // out: the whole map, rarely and on request
+          .map_delta = "MAP_DELTA",            // out: what changed, per keyframe
+          .submap = "SUBMAP",                  // out: what lies far away, to be kept
+          .submap_query = "SUBMAP_QUERY",      // out: asks for what comes near again
+          .map_correction = "MAP_CORRECTION",  // out: where the submaps are
       }),
       argc, argv);
 }

@@ -11,6 +11,7 @@
 #include "common/model/keyframe.hpp"
 #include "common/model/map.hpp"
 #include "common/model/odometry.hpp"
+#include "common/model/submap.hpp"
 
 namespace understory::geoslam_mapper {
 
@@ -69,6 +70,23 @@ class MapperMethod {
   /// Sets the covariances of these landmarks of the map. Costs the part of the graph between them
   /// and its root. They stay zero where the method has none.
   virtual void set_covariances(std::span<model::MapLandmark> /*landmarks*/) const {}
+
+  /// Whether parts of the map may be given away; without a call they may, where the configuration
+  /// says so.
+  virtual void may_hand_over(bool /*may*/) {}
+
+  /// Parts of maps that were given away since the last call: the caller keeps them. Their
+  /// landmarks and keyframes are in landmarks(), trajectory() and changes no more.
+  virtual std::vector<model::Submap> take_given_away() { return {}; }
+
+  /// Submaps that are wanted back: the vehicle comes near them.
+  virtual std::vector<model::SubmapId> wanted() const { return {}; }
+
+  /// Puts a submap back. Returns why not, where it is not away or not as it was; empty otherwise.
+  virtual std::string bring_back(const model::Submap& /*submap*/) { return "no submap is away"; }
+
+  /// Where the submaps are that were ever given away, in order of id. O(submaps).
+  virtual std::vector<model::SubmapPose> submap_poses() const { return {}; }
 
   /// The whole state, for a restart. O(state).
   virtual std::string save() const = 0;

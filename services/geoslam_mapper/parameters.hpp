@@ -71,6 +71,7 @@ struct SmoothingMapperParameters {
   double condense_m = 20.0;
   double condense_of_range = 0.5;
   double condense_after_m = 50.0;
+  double hand_over_m = 0.0;
 };
 
 /// Which method, and the parameters of each.

@@ -114,12 +114,7 @@ void PoseGraph::renew(const std::set<TiedNodes>& ties) {
     const auto entry = ties_.find(nodes);
     Tie& one = entry->second;
     if (one.landmarks.empty()) {
-      if (one.motion) {
-        plane::RelativePose nothing = smoother_.motion(*one.motion);
-        nothing.information.setZero();
-        smoother_.set(*one.motion, nothing);
-        free_motions_.give(index(*one.motion));
-      }
+      if (one.motion) take_out(*one.motion);
       ties_.erase(entry);
       continue;
     }
@@ -127,13 +122,24 @@ void PoseGraph::renew(const std::set<TiedNodes>& ties) {
     const plane::RelativePose factor = tie(nodes, one.landmarks);
     if (one.motion) {
       smoother_.set(*one.motion, factor);
-    } else if (const auto number = free_motions_.take()) {
-      one.motion = plane::MotionId(*number);
-      smoother_.set(*one.motion, factor);
     } else {
-      one.motion = smoother_.add(factor);
+      one.motion = put(factor);
     }
   }
+}
+
+plane::MotionId PoseGraph::put(const plane::RelativePose& motion) {
+  const auto number = free_motions_.take();
+  if (!number) return smoother_.add(motion);
+  smoother_.set(plane::MotionId(*number), motion);
+  return plane::MotionId(*number);
+}
+
+void PoseGraph::take_out(plane::MotionId motion) {
+  plane::RelativePose nothing = smoother_.motion(motion);
+  nothing.information.setZero();
+  smoother_.set(motion, nothing);
+  free_motions_.give(index(motion));
 }
 
 /// Eliminating a point that two nodes observed with information A and B leaves the difference of

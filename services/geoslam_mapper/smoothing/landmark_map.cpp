@@ -52,6 +52,17 @@ void LandmarkMap::remove(model::LandmarkId id) {
   index_.remove(id);
 }
 
+StoredLandmark LandmarkMap::put_away(model::LandmarkId id) {
+  StoredLandmark landmark = std::move(landmarks_.at(id));
+  remove(id);
+  return landmark;
+}
+
+void LandmarkMap::bring_back(StoredLandmark landmark) {
+  landmark.is_late = false;
+  put(landmark);
+}
+
 void LandmarkMap::move(model::LandmarkId id, const Eigen::Vector2d& position_m) {
   StoredLandmark& landmark = landmarks_.at(id);
   landmark.position_m = position_m;

@@ -85,6 +85,11 @@ class LandmarkMap {
   model::LandmarkId insert(StoredLandmark landmark);
   /// Removes a landmark; its id is never used again.
   void remove(model::LandmarkId id);
+  /// Takes a landmark out that is kept elsewhere from now on. Throws std::out_of_range where there
+  /// is none.
+  StoredLandmark put_away(model::LandmarkId id);
+  /// Adds a landmark that was put away.
+  void bring_back(StoredLandmark landmark);
   /// Moves a landmark (frame `map`). The index follows at once where it is off by kStaleness_m,
   /// otherwise with the next catch_up().
   void move(model::LandmarkId id, const Eigen::Vector2d& position_m);

@@ -51,6 +51,7 @@ OneMap::OneMap(const SmoothingMapperParameters& parameters, std::uint32_t id)
       known_ground_(parameters),
       condensing_(parameters),
       dormancy_(parameters),
+      submaps_(parameters),
       scan_localiser_(parameters),
       common_error_(parameters.scale_sigma) {}
 
@@ -105,8 +106,12 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
   if (!fused.ok) return with(kRolledBack, fused.reason, std::move(update));
   known_ground_.follow(fused, discovery_, merging_.merges(), map_);
   extend(fused, update);
-  condensing_.follow(fused, known_ground_, discovery_, merging_.merges(), map_);
+  if (const auto node =
+          condensing_.follow(fused, known_ground_, discovery_, merging_.merges(), map_)) {
+    submaps_.condensed(*node);
+  }
   dormancy_.follow(keyframe.field_of_view, fused.node, map_);
+  submaps_.follow(keyframe.field_of_view, fused.node, keyframe.utime, map_);
   confirm(keyframe, update);
   report(keyframe, update);
   return with(kUpdated, fused.reason, std::move(update));

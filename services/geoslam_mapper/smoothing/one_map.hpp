@@ -20,6 +20,7 @@
 #include "services/geoslam_mapper/smoothing/motion.hpp"
 #include "services/geoslam_mapper/smoothing/place_recogniser.hpp"
 #include "services/geoslam_mapper/smoothing/scan_localiser.hpp"
+#include "services/geoslam_mapper/smoothing/submaps.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 
@@ -71,6 +72,14 @@ class OneMap {
   }
   /// All that is worth keeping of it; see map_archive.
   KeptMap keep() const { return smoothing::keep(map_, common_error_); }
+  /// Parts of it that are kept elsewhere.
+  const Submaps& submaps() const { return submaps_; }
+  /// See Submaps::may_hand_over().
+  void may_hand_over(bool may) { submaps_.may_hand_over(may); }
+  /// See Submaps::take_given_away().
+  std::vector<model::Submap> take_given_away() { return submaps_.take_given_away(); }
+  /// See Submaps::bring_back().
+  std::string bring_back(const model::Submap& submap) { return submaps_.bring_back(submap, map_); }
   /// Landmarks that are new or have moved since the last call.
   std::vector<model::MapLandmark> take_changed_landmarks();
 
@@ -78,7 +87,7 @@ class OneMap {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.map_, self.motion_, self.discovery_, self.merging_, self.known_ground_, self.condensing_,
-      self.dormancy_, self.scan_localiser_, self.common_error_, self.first_offered_,
+      self.dormancy_, self.submaps_, self.scan_localiser_, self.common_error_, self.first_offered_,
       self.agreeing_);
   }
 
@@ -101,6 +110,7 @@ class OneMap {
   KnownGround known_ground_;
   Condensing condensing_;
   Dormancy dormancy_;
+  Submaps submaps_;
   ScanLocaliser scan_localiser_;
   CommonError common_error_;
   std::optional<model::Utime> first_offered_;  ///< Keyframe that might have started the map.

@@ -17,9 +17,6 @@ namespace {
 constexpr double kAnotherPass_m = 50.0;
 /// The vehicle drives so far [m] from one search to the next.
 constexpr double kBetweenSearches_m = 4.0;
-/// Sigmas of the distance of two passes within which they are looked for, and the furthest [m].
-constexpr double kReach_sigmas = 4.0;
-constexpr double kFurthest_m = 300.0;
 /// Where the vehicle's distance to the earlier pass is known this well [m], gates find its
 /// landmarks.
 constexpr double kKnown_m = 0.1;

@@ -24,6 +24,10 @@ struct JoinedPasses {
 /// become one landmark each, and where the graph contradicts that, all of it is taken back exactly.
 class PassJoiner {
  public:
+  /// Sigmas of the distance of two passes within which they are looked for, and the furthest [m].
+  static constexpr double kReach_sigmas = 4.0;
+  static constexpr double kFurthest_m = 300.0;
+
   /// `parameters` gives the gates.
   explicit PassJoiner(const SmoothingMapperParameters& parameters) : parameters_(parameters) {}
 

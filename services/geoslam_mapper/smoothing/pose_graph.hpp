@@ -77,6 +77,12 @@ struct DormantObservation {
   }
 };
 
+/// Landmarks that are kept elsewhere, and what stands for them in the graph.
+struct AwayLandmarks {
+  std::vector<std::vector<DormantObservation>> observed;  ///< In the order of the ids.
+  std::vector<factor_graph::plane::MotionId> ties;
+};
+
 /// A node to be taken out, and the node that gets what it observed.
 struct Retirement {
   NodeIndex node = 0;
@@ -154,6 +160,17 @@ class PoseGraph {
                     const std::map<model::LandmarkId, StoredLandmark>& landmarks);
   /// Takes landmarks into the solved graph again, where they are dormant.
   void wake(std::span<const model::LandmarkId> ids);
+  /// Takes dormant landmarks out of the graph altogether. What they measure of the nodes stays as
+  /// motions of their own. Exact; bring_back() undoes it. Throws std::out_of_range where one is not
+  /// dormant. Cost: the landmarks, and those that their nodes have in common.
+  AwayLandmarks put_away(std::span<const model::LandmarkId> ids);
+  /// Makes them dormant landmarks of the graph again. Throws std::invalid_argument where an
+  /// observation is of a node that is not condensed or has no information; nothing is changed then.
+  void bring_back(std::span<const model::LandmarkId> ids, const AwayLandmarks& away);
+  /// Ids of a node's dormant landmarks.
+  std::span<const model::LandmarkId> dormant_of(NodeIndex node) const;
+  /// The node that observed a dormant landmark first. Throws std::out_of_range likewise.
+  NodeIndex home_of(model::LandmarkId id) const { return dormant_.at(id).front().node; }
   /// Whether the landmark was taken out of the solved graph.
   bool is_dormant(model::LandmarkId id) const { return dormant_.contains(id); }
   /// Position of a dormant landmark [m] at the nodes' estimates. Throws std::out_of_range where it
@@ -260,6 +277,8 @@ class PoseGraph {
   };
   std::vector<TiedNodes> tied_by(model::LandmarkId id) const;
   void renew(const std::set<TiedNodes>& ties);
+  factor_graph::plane::MotionId put(const factor_graph::plane::RelativePose& motion);
+  void take_out(factor_graph::plane::MotionId motion);
   factor_graph::plane::RelativePose tie(const TiedNodes& nodes,
                                         std::span<const model::LandmarkId> ids) const;
   bool has_left(NodeIndex node);

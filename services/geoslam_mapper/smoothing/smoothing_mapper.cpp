@@ -3,13 +3,14 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-constexpr state::Format kFormat{"geoslam_mapper.smoothing", 13};
+constexpr state::Format kFormat{"geoslam_mapper.smoothing", 14};
 /// Two keyframes contradict each other where their motion in a trial map differs from the tracked
 /// one by more than so many of its standard deviations.
 constexpr double kTrackSigmas = 4.0;
@@ -52,7 +53,9 @@ model::MapUpdate SmoothingMapper::add(const model::Keyframe& keyframe) {
   }
   last_utime_ = keyframe.utime;
 
+  current_.may_hand_over(may_hand_over_);
   model::MapUpdate update = current_.add(keyframe);
+  std::ranges::move(current_.take_given_away(), std::back_inserter(given_away_));
   count_contradictions(update);
   update.is_lost =
       contradictions_ >= kContradicted ||

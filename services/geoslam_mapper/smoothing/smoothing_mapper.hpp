@@ -43,6 +43,15 @@ class SmoothingMapper final : public MapperMethod {
   void set_covariances(std::span<model::MapLandmark> landmarks) const override {
     current_.set_covariances(landmarks);
   }
+  void may_hand_over(bool may) override { may_hand_over_ = may; }
+  std::vector<model::Submap> take_given_away() override { return std::exchange(given_away_, {}); }
+  std::vector<model::SubmapId> wanted() const override { return current_.submaps().wanted(); }
+  std::string bring_back(const model::Submap& submap) override {
+    return current_.bring_back(submap);
+  }
+  std::vector<model::SubmapPose> submap_poses() const override {
+    return current_.submaps().poses(current_.map().graph);
+  }
   /// The maps that were left.
   const MapArchive& kept_maps() const { return kept_maps_; }
 
@@ -81,6 +90,8 @@ class SmoothingMapper final : public MapperMethod {
   MapArchive kept_maps_;
   std::optional<model::Utime> last_utime_;  ///< Of the last well-formed keyframe.
   std::uint32_t contradictions_ = 0;        ///< Keyframes rolled back since the last one accepted.
+  bool may_hand_over_ = true;
+  std::vector<model::Submap> given_away_;  ///< Since they were taken.
 };
 
 /// A SmoothingMapper with an empty map.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 namespace understory::geoslam_mapper::smoothing {
@@ -70,7 +71,11 @@ bool Trajectory::add_viewpoint(const Base& base, const PoseGraph& graph) {
     }
   }
 
-  const Viewpoint viewpoint{base.node, base.centre_T_middle, false};
+  put({base.node, base.centre_T_middle, false}, graph);
+  return true;
+}
+
+void Trajectory::put(const Viewpoint& viewpoint, const PoseGraph& graph) {
   auto number = static_cast<std::uint32_t>(viewpoints_.size());
   if (free_viewpoints_.empty()) {
     viewpoints_.push_back(viewpoint);
@@ -80,7 +85,43 @@ bool Trajectory::add_viewpoint(const Base& base, const PoseGraph& graph) {
     viewpoints_[number] = viewpoint;
   }
   index(number, graph);
-  return true;
+}
+
+/// Their numbers serve others.
+void Trajectory::drop_viewpoints(NodeIndex node) {
+  for (const std::uint32_t viewpoint : std::exchange(viewpoints_of_node_[node], {})) {
+    grid_.remove(viewpoint);
+    viewpoints_[viewpoint].is_free = true;
+    free_viewpoints_.push_back(viewpoint);
+  }
+}
+
+AwayBases Trajectory::put_away(NodeIndex node) {
+  AwayBases away;
+  const auto goes = [&](const Base& base) {
+    return base.node == node && !base.is_origin && &base != &bases_.back();
+  };
+  std::copy_if(bases_.begin(), bases_.end(), std::back_inserter(away.bases), goes);
+  std::erase_if(bases_, goes);
+  spare_ -= static_cast<std::size_t>(
+      std::ranges::count_if(away.bases, [](const Base& base) { return base.is_spare; }));
+
+  if (node >= viewpoints_of_node_.size()) return away;
+  for (const std::uint32_t number : viewpoints_of_node_[node])
+    away.centre_T_viewpoints.push_back(viewpoints_[number].centre_T_middle);
+  drop_viewpoints(node);
+  return away;
+}
+
+void Trajectory::bring_back(NodeIndex node, AwayBases away, const PoseGraph& graph) {
+  spare_ += static_cast<std::size_t>(
+      std::ranges::count_if(away.bases, [](const Base& base) { return base.is_spare; }));
+  const auto were = static_cast<std::ptrdiff_t>(bases_.size());
+  bases_.insert(bases_.end(), away.bases.begin(), away.bases.end());
+  std::inplace_merge(bases_.begin(), bases_.begin() + were, bases_.end(),
+                     [](const Base& a, const Base& b) { return a.utime < b.utime; });
+  for (const geometry::SE2& centre_T_viewpoint : away.centre_T_viewpoints)
+    put({node, centre_T_viewpoint, false}, graph);
 }
 
 void Trajectory::index(std::uint32_t viewpoint, const PoseGraph& graph) {
@@ -104,12 +145,7 @@ void Trajectory::hand_over(const Retirement& retirement) {
     --left;
   }
 
-  for (const std::uint32_t viewpoint : viewpoints_of_node_[retirement.node]) {
-    grid_.remove(viewpoint);
-    viewpoints_[viewpoint].is_free = true;
-    free_viewpoints_.push_back(viewpoint);
-  }
-  viewpoints_of_node_[retirement.node].clear();
+  drop_viewpoints(retirement.node);
   forget_oldest();
 }
 

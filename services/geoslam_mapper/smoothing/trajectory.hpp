@@ -37,6 +37,18 @@ Base base_of(const model::Keyframe& keyframe, NodeIndex node, bool is_origin = f
 /// Mean of the members' poses, in the keyframe's centre frame.
 geometry::SE2 middle_of(const model::Keyframe& keyframe);
 
+/// Bases and viewpoints of a node that are kept elsewhere.
+struct AwayBases {
+  std::vector<Base> bases;  ///< In order of time.
+  std::vector<geometry::SE2> centre_T_viewpoints;
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.bases, s.centre_T_viewpoints);
+  }
+};
+
 /// The bases of accepted keyframes, and an index of the viewpoints that differ: a keyframe from a
 /// viewpoint that the graph has already is folded into its node, so that a stationary vehicle does
 /// not grow the graph. Where the vehicle goes a known way again, or stands, the oldest bases are
@@ -60,6 +72,10 @@ class Trajectory {
   /// Ties bases and viewpoints of nodes that became one to that one. O(bases since the nodes were
   /// added).
   void tie(std::span<const Retirement> retired, const PoseGraph& graph);
+  /// Takes out bases and viewpoints of a node, but for the map's origin and the last one. O(bases).
+  AwayBases put_away(NodeIndex node);
+  /// Adds them again. O(bases).
+  void bring_back(NodeIndex node, AwayBases away, const PoseGraph& graph);
   /// Brings the index of viewpoints to where the graph's last updates moved the nodes.
   void follow(const PoseGraph& graph);
 
@@ -118,6 +134,8 @@ class Trajectory {
     }
   };
   bool add_viewpoint(const Base& base, const PoseGraph& graph);
+  void put(const Viewpoint& viewpoint, const PoseGraph& graph);
+  void drop_viewpoints(NodeIndex node);
   void index(std::uint32_t viewpoint, const PoseGraph& graph);
   void forget_oldest();
   geometry::SE2 middle(const Viewpoint& viewpoint, const PoseGraph& graph) const {

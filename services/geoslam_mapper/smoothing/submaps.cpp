@@ -1,0 +1,193 @@
+#include "services/geoslam_mapper/smoothing/submaps.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "common/state/archive.hpp"
+#include "services/geoslam_mapper/smoothing/pass_joiner.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+namespace {
+
+constexpr state::Format kSubmapFormat{"geoslam_mapper.smoothing.submap", 1};
+/// The vehicle drives so far [m] from one look around to the next.
+constexpr double kBetween_m = 10.0;
+/// A submap's landmarks may lie so far [m] from its node, beside the sensor's range.
+constexpr double kExtent_m = 40.0;
+/// What comes back is not given away before it is so much further [m].
+constexpr double kHysteresis_m = 60.0;
+/// Most submaps that go at one look around, and that are wanted at a time.
+constexpr std::size_t kMostAtOnce = 4;
+
+/// What is needed to put a submap back; written into its payload.
+struct Content {
+  NodeIndex node = 0;
+  std::vector<StoredLandmark> landmarks;
+  std::vector<std::vector<DormantObservation>> observed;
+  AwayBases bases;
+
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.node, s.landmarks, s.observed, s.bases);
+  }
+};
+
+/// Information that all observers together have, in the frame of a node.
+Eigen::Matrix2d information_in(NodeIndex node, std::span<const DormantObservation> observed,
+                               const PoseGraph& graph) {
+  Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
+  const geometry::SE2 node_T_map = graph.pose(node).inverse();
+  for (const DormantObservation& one : observed) {
+    const Eigen::Matrix2d rotation = (node_T_map * graph.pose(one.node)).rotation();
+    sum += rotation * one.information * rotation.transpose();
+  }
+  return sum;
+}
+
+double sigma_of(NodeIndex node, const PoseGraph& graph) {
+  const Eigen::Matrix2d covariance = graph.marginal(node).covariance.topLeftCorner<2, 2>();
+  return std::sqrt(std::max(0.0, covariance.trace()));
+}
+
+}  // namespace
+
+void Submaps::follow(const model::FieldOfView& field_of_view, NodeIndex newest, model::Utime utime,
+                     GlobalMap& map) {
+  const double along_m = map.graph.node(newest).along_m;
+  if (hand_over_m_ <= 0.0 || std::abs(along_m - looked_m_) < kBetween_m) return;
+  looked_m_ = along_m;
+
+  const Eigen::Vector2d vehicle_m = map.graph.pose(newest).translation();
+  const auto distance_of = [&](NodeIndex node) {
+    return (map.graph.pose(node).translation() - vehicle_m).norm();
+  };
+  // As far as PassJoiner looks for an earlier pass, and what was seen from there.
+  const double range_m = field_of_view.max_range_m;
+  const double reach_m =
+      std::min(PassJoiner::kFurthest_m, PassJoiner::kReach_sigmas * sigma_of(newest, map.graph)) +
+      2.0 * range_m + kExtent_m;
+  const double far_m = std::max(hand_over_m_, reach_m + kHysteresis_m);
+
+  std::vector<std::pair<double, model::SubmapId>> near;
+  for (const Away& away : away_) {
+    const double distance_m = distance_of(away.node);
+    if (distance_m < reach_m) near.emplace_back(distance_m, away.id);
+  }
+  std::sort(near.begin(), near.end());
+  if (near.size() > kMostAtOnce) near.resize(kMostAtOnce);
+  wanted_.clear();
+  for (const auto& [distance_m, id] : near) wanted_.push_back(id);
+  if (!may_hand_over_) return;
+
+  // Whole submaps only: where none of what the node observed is in the solved graph.
+  std::vector<Here> left;
+  for (const Here& here : here_) {
+    if (left.size() == kMostAtOnce) break;
+    if (distance_of(here.node) > far_m && map.graph.node(here.node).observations.empty())
+      left.push_back(here);
+  }
+  if (left.empty()) return;
+  map.graph.checkpoint();
+  for (const Here& here : left) give_away(here, utime, map);
+  (void)map.graph.solve();  // What they tell is in the graph as before.
+  map.adopt_estimates();
+}
+
+void Submaps::give_away(const Here& here, model::Utime utime, GlobalMap& map) {
+  model::Submap submap;
+  submap.utime = utime;
+  submap.map_id = map.landmarks.map_id();
+  submap.id = next_id_++;
+  submap.map_T_submap = map.graph.pose(here.node);
+  if (here.was) submap.replaced.push_back(*here.was);
+
+  // What others read.
+  const geometry::SE2 submap_T_map = submap.map_T_submap.inverse();
+  std::vector<model::LandmarkId> ids;
+  for (const model::LandmarkId id : map.graph.dormant_of(here.node))
+    if (map.graph.home_of(id) == here.node) ids.push_back(id);
+  std::sort(ids.begin(), ids.end());
+  for (const model::LandmarkId id : ids) {
+    model::MapLandmark& out = submap.landmarks.emplace_back(map.landmark(map.landmarks.at(id)));
+    out.position_m = submap_T_map * out.position_m;
+  }
+
+  // Out of the map.
+  Content content;
+  content.node = here.node;
+  AwayLandmarks away = map.graph.put_away(ids);
+  content.observed = std::move(away.observed);
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    content.landmarks.push_back(map.landmarks.put_away(ids[i]));
+    submap.landmarks[i].covariance_m2 =
+        information_in(here.node, content.observed[i], map.graph).inverse();
+  }
+  content.bases = map.trajectory.put_away(here.node);
+  for (const Base& base : content.bases.bases) {
+    submap.keyframes.push_back(
+        {base.sequence, base.utime, base.centre_T_base.mean, base.centre_T_base.covariance});
+  }
+
+  submap.payload = state::save(kSubmapFormat, content);
+  submap.content_hash = model::fnv1a(submap.payload);
+  away_.push_back({here.node, submap.id, submap.content_hash, std::move(away.ties)});
+  std::erase_if(here_, [&](const Here& one) { return one.node == here.node; });
+  given_away_.push_back(std::move(submap));
+}
+
+std::string Submaps::bring_back(const model::Submap& submap, GlobalMap& map) {
+  const std::string name = "submap " + std::to_string(submap.id);
+  if (submap.map_id != map.landmarks.map_id()) return name + " is of another map";
+  const auto away = std::ranges::find(away_, submap.id, &Away::id);
+  if (away == away_.end()) return name + " is not away";
+  if (submap.content_hash != away->content_hash ||
+      model::fnv1a(submap.payload) != away->content_hash)
+    return name + " is not as it was given away";
+
+  Content content;
+  std::vector<model::LandmarkId> ids;
+  try {
+    state::load(submap.payload, kSubmapFormat, content);
+    for (const StoredLandmark& landmark : content.landmarks) ids.push_back(landmark.id);
+    if (content.node != away->node) return name + " is of another node";
+    map.graph.checkpoint();
+    map.graph.bring_back(ids, {content.observed, away->ties});
+  } catch (const std::invalid_argument& error) {
+    return name + ": " + error.what();
+  }
+
+  for (StoredLandmark& landmark : content.landmarks) {
+    landmark.position_m = map.graph.dormant_position(landmark.id);
+    map.landmarks.bring_back(std::move(landmark));
+  }
+  map.trajectory.bring_back(away->node, std::move(content.bases), map.graph);
+  here_.push_back({away->node, away->id});
+  std::erase(wanted_, away->id);
+  away_.erase(away);
+  (void)map.graph.solve();  // What they tell is in the graph as before.
+  map.adopt_estimates();
+  return {};
+}
+
+std::vector<model::SubmapPose> Submaps::poses(const PoseGraph& graph) const {
+  std::vector<model::SubmapPose> result;
+  result.reserve(away_.size() + here_.size());
+  for (const Away& away : away_) result.push_back({away.id, graph.pose(away.node)});
+  for (const Here& here : here_)
+    if (here.was) result.push_back({*here.was, graph.pose(here.node)});
+  std::ranges::sort(result, {}, &model::SubmapPose::id);
+  return result;
+}
+
+std::optional<NodeIndex> Submaps::node_of(model::SubmapId id) const {
+  for (const Away& away : away_)
+    if (away.id == id) return away.node;
+  for (const Here& here : here_)
+    if (here.was == id) return here.node;
+  return std::nullopt;
+}
+
+}  // namespace understory::geoslam_mapper::smoothing
