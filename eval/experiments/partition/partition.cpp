@@ -3,8 +3,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "common/terminal/interrupt.hpp"
+#include "eval/harness/submap_shelf.hpp"
 #include "eval/tools/memory.hpp"
 #include "eval/tools/quantile.hpp"
 #include "eval/tools/thread_clock.hpp"
@@ -13,13 +15,14 @@
 namespace understory::eval::experiments::partition {
 namespace {
 
-geoslam_mapper::MapperParameters mapper_parameters(double size_m) {
+geoslam_mapper::MapperParameters mapper_parameters(const Keeping& keeping) {
   geoslam_mapper::MapperParameters parameters;
   parameters.smoothing.use_odometry = true;
   parameters.smoothing.gyro_walk = 0.0;
   parameters.smoothing.start_wait_s = 0.0;
   parameters.smoothing.relinearise_above = 1e-4;
-  parameters.smoothing.condense_m = size_m;
+  parameters.smoothing.condense_m = keeping.size_m;
+  parameters.smoothing.hand_over_m = keeping.hand_over_m;
   parameters.smoothing.condense_of_range = 1000.0;
   return parameters;
 }
@@ -36,10 +39,11 @@ Section section_of(double end_m, const std::vector<double>& ms) {
 
 }  // namespace
 
-DriveResult drive(const RouteParameters& parameters, std::uint64_t seed, double size_m,
+DriveResult drive(const RouteParameters& parameters, std::uint64_t seed, const Keeping& keeping,
                   std::size_t sections) {
   Route route(parameters, seed);
-  const auto mapper = geoslam_mapper::make_mapper(mapper_parameters(size_m));
+  const auto mapper = geoslam_mapper::make_mapper(mapper_parameters(keeping));
+  harness::SubmapShelf shelf;
   DriveResult result;
   std::vector<double> ms;
   double nees = 0.0;
@@ -52,6 +56,7 @@ DriveResult drive(const RouteParameters& parameters, std::uint64_t seed, double 
     const model::Keyframe keyframe = route.keyframe(k);
     const double begin_s = tools::thread_time_s();
     const model::MapUpdate update = mapper->add(keyframe);
+    shelf.serve(*mapper);
     ms.push_back(1e3 * (tools::thread_time_s() - begin_s));
     (void)mapper->take_changed_landmarks();
     if (!update.merged.empty()) result.closure_ms = std::max(result.closure_ms, ms.back());
@@ -69,13 +74,18 @@ DriveResult drive(const RouteParameters& parameters, std::uint64_t seed, double 
     }
   }
 
+  std::vector<model::KeyframePose> keyframes = mapper->trajectory();
+  std::ranges::copy(shelf.keyframes(*mapper), std::back_inserter(keyframes));
+  std::ranges::sort(keyframes, {}, &model::KeyframePose::utime);
   std::vector<geometry::SE2> truth;
-  for (const model::KeyframePose& pose : mapper->trajectory()) {
+  for (const model::KeyframePose& pose : keyframes) {
     result.trajectory.push_back(pose.map_T_vehicle);
     truth.push_back(route.pose(Route::number_of(pose.utime)));
   }
   result.rmse_to_truth_m = rmse_m(result.trajectory, truth);
-  result.landmarks = mapper->landmarks().size();
+  result.landmarks = mapper->landmarks().size() + shelf.landmarks();
+  result.disk_bytes = shelf.bytes();
+  result.brought_back = shelf.brought_back();
   if (told > 0) result.mean_nees = nees / static_cast<double>(told);
   return result;
 }

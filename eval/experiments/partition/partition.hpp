@@ -19,6 +19,12 @@ struct Section {
   double resident_mb = 0.0;  ///< Of the whole process, at the section's end.
 };
 
+/// How the mapper keeps what lies behind.
+struct Keeping {
+  double size_m = 0.0;       ///< Stretches that are condensed; 0: none.
+  double hand_over_m = 0.0;  ///< What is farther away goes to the disk; 0: nothing.
+};
+
 /// What a drive gave.
 struct DriveResult {
   std::vector<geometry::SE2> trajectory;  ///< At the end; by keyframe.
@@ -26,13 +32,14 @@ struct DriveResult {
   double mean_nees = 0.0;                 ///< Of the keyframes as they were told at once.
   std::size_t refused = 0;                ///< Keyframes that were not fused.
   std::size_t landmarks = 0;
-  double closure_ms = 0.0;  ///< The slowest keyframe that joined two passes.
+  double closure_ms = 0.0;       ///< The slowest keyframe that joined two passes.
+  std::size_t disk_bytes = 0;    ///< Of the submaps on the disk at the end.
+  std::size_t brought_back = 0;  ///< Submaps, from the disk.
   std::vector<Section> sections;
 };
 
-/// Drives the route with stretches of `size_m` condensed; 0: uncut. `sections` parts of it are
-/// timed by themselves. Throws terminal::Interrupted.
-DriveResult drive(const RouteParameters& route, std::uint64_t seed, double size_m,
+/// Drives the route. `sections` parts of it are timed by themselves. Throws terminal::Interrupted.
+DriveResult drive(const RouteParameters& route, std::uint64_t seed, const Keeping& keeping,
                   std::size_t sections);
 
 /// RMS distance of two trajectories, first pose held [m].

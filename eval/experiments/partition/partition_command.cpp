@@ -24,6 +24,7 @@ struct PartitionOptions {
   std::string experiment;
   RouteParameters route;
   std::vector<double> sizes_m{5.0, 10.0, 20.0, 40.0, 100.0, 200.0, 500.0};
+  double hand_over_m = 0.0;
   int runs = 3;
   std::uint64_t seed = 1;
   std::size_t sections = 1;
@@ -41,6 +42,8 @@ struct Cell {
   double nees = 0.0;
   double closure_ms = 0.0;
   std::size_t refused = 0;
+  std::size_t disk_bytes = 0;     ///< Of the last run.
+  std::size_t brought_back = 0;   ///< Likewise.
   std::vector<Section> sections;  ///< Of the last run.
 };
 
@@ -63,6 +66,9 @@ nlohmann::json json_of(const Cell& cell, const PartitionOptions& options) {
                      {"worst_rmse_to_reference_m", largest(cell.to_truth_m)},
                      {"mean_nees", cell.nees},
                      {"closure_s", 1e-3 * cell.closure_ms},
+                     {"disk_mb_per_km", 1e-6 * static_cast<double>(cell.disk_bytes) /
+                                            (1e-3 * options.route.length_m)},
+                     {"brought_back", cell.brought_back},
                      {"refused", cell.refused}};
 
   if (options.has_uncut) {
@@ -107,7 +113,7 @@ void run(const PartitionOptions& options) {
   std::vector<DriveResult> uncut;
   const auto seed_of = [&](int run) { return harness::run_seed(options.seed, run); };
   for (int run = 0; run < options.runs && options.has_uncut; ++run)
-    uncut.push_back(drive(options.route, seed_of(run), 0.0, options.sections));
+    uncut.push_back(drive(options.route, seed_of(run), {}, options.sections));
 
   nlohmann::json rows = nlohmann::json::array();
   print_header(options);
@@ -115,7 +121,8 @@ void run(const PartitionOptions& options) {
     Cell cell;
     cell.size_m = size_m;
     for (int run = 0; run < options.runs; ++run) {
-      const DriveResult one = drive(options.route, seed_of(run), size_m, options.sections);
+      const DriveResult one =
+          drive(options.route, seed_of(run), {size_m, options.hand_over_m}, options.sections);
       if (options.has_uncut) {
         const DriveResult& whole = uncut[static_cast<std::size_t>(run)];
         cell.to_uncut_m.push_back(rmse_m(one.trajectory, whole.trajectory));
@@ -125,6 +132,8 @@ void run(const PartitionOptions& options) {
       cell.nees += one.mean_nees / options.runs;
       cell.closure_ms = std::max(cell.closure_ms, one.closure_ms);
       cell.refused += one.refused;
+      cell.disk_bytes = one.disk_bytes;
+      cell.brought_back = one.brought_back;
       cell.sections = one.sections;
     }
     print_cell(cell);
@@ -137,6 +146,7 @@ void run(const PartitionOptions& options) {
                                  {"length_m", options.route.length_m},
                                  {"block_m", options.route.block_m},
                                  {"landmarks_per_km2", options.route.landmarks_per_km2},
+                                 {"hand_over_m", options.hand_over_m},
                                  {"range_m", options.route.range_m},
                                  {"sigma_m", options.route.sigma_m},
                                  {"odometry_share", options.route.odometry_share},
@@ -169,6 +179,11 @@ void add_experiment(CLI::App& eval, const std::string& name, const std::string& 
   command->add_option("--size-m", options->sizes_m, "Path that is condensed to one node [m]")
       ->delimiter(',')
       ->check(CLI::Range(1.0, 1e4))
+      ->capture_default_str();
+  command
+      ->add_option("--hand-over-m", options->hand_over_m,
+                   "What is farther from the vehicle goes to the disk [m]; 0 = nothing")
+      ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
   command->add_option("--density", options->route.landmarks_per_km2, "Landmarks per km^2")
       ->check(CLI::Range(100.0, 1e6))
