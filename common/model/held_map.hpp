@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <vector>
 
 #include "common/model/slam_output.hpp"
+#include "common/model/submap.hpp"
 
 namespace understory::model {
 
@@ -26,7 +28,15 @@ class HeldMap {
   /// Takes an accepted keyframe's pose; the update that starts a map ends the one before.
   void take(const MapUpdate& update);
 
-  /// The map; none before the first whole one, or before a map has started.
+  /// Takes what the mapper handed over: it is in MAP and MAP_DELTA no more, unless it comes back.
+  void take(const Submap& submap);
+  /// Takes where the submaps are.
+  void take(const MapCorrection& correction);
+
+  /// What the mapper holds of the map and what it handed over; a landmark's covariance in a submap
+  /// is relative to that. O(map).
+  std::optional<WholeMap> whole() const;
+  /// What the mapper holds itself; none before the first whole one, or before a map has started.
   const std::optional<WholeMap>& map() const { return map_; }
   /// Whether a MAP was taken since the map started: its keyframes are those of the mapper.
   bool has_whole() const { return has_whole_; }
@@ -34,11 +44,20 @@ class HeldMap {
   std::uint64_t missed() const { return missed_; }
 
  private:
+  /// A submap at its latest pose.
+  struct Away {
+    geometry::SE2 map_T_submap;
+    std::vector<MapLandmark> landmarks;  ///< Frame submap.
+    std::vector<KeyframePose> keyframes;
+  };
   void start();
+  void comes_back(LandmarkId id);
 
   std::optional<WholeMap> map_;
   bool has_whole_ = false;
   std::uint64_t missed_ = 0;
+  std::map<SubmapId, Away> away_;
+  std::map<LandmarkId, SubmapId> away_of_;  ///< Those in `away_`.
 };
 
 }  // namespace understory::model

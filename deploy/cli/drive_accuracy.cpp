@@ -58,6 +58,12 @@ void DriveAccuracyCollector::add(const io::LogEvent& event) {
   } else if (event.channel == "MAP_DELTA") {
     const auto delta = wire::decode_message<model::MapDelta>(event.data);
     if (delta) map_.take(*delta);
+  } else if (event.channel == "SUBMAP") {
+    const auto submap = wire::decode_message<model::Submap>(event.data);
+    if (submap) map_.take(*submap);
+  } else if (event.channel == "MAP_CORRECTION") {
+    const auto correction = wire::decode_message<model::MapCorrection>(event.data);
+    if (correction) map_.take(*correction);
   } else if (event.channel == "HEALTH") {
     const auto health = wire::decode_message<health_t>(event.data);
     if (health) counted_.last_health.insert_or_assign(health->process, *health);
@@ -119,7 +125,8 @@ std::optional<std::pair<geometry::SE2, MapTie>> DriveAccuracyCollector::tie(
   }
   if (map_id != map_id_) return std::nullopt;
   if (map_.has_whole()) {
-    for (const auto& keyframe : map_.map()->keyframes) {
+    const auto whole = map_.whole();
+    for (const auto& keyframe : whole->keyframes) {
       if (const auto world_T_map = at(keyframe)) return {{*world_T_map, MapTie::kFirstKeyframe}};
     }
   }
@@ -147,13 +154,14 @@ std::optional<DriveAccuracy> DriveAccuracyCollector::finish() const {
   for (const auto& landmark : true_landmarks_.landmarks) {
     accuracy.true_landmarks_m.emplace_back(landmark.position_m[0], landmark.position_m[1]);
   }
-  if (!map_.map()) return accuracy;
-  for (const auto& keyframe : map_.map()->keyframes) {
+  const auto whole = map_.whole();
+  if (!whole) return accuracy;
+  for (const auto& keyframe : whole->keyframes) {
     const auto compared = compare(keyframe.utime, keyframe.map_T_vehicle, world_T_map);
     if (compared) accuracy.keyframes.push_back(*compared);
   }
   const sim::PointGrid grid(accuracy.true_landmarks_m, kTileM);
-  for (const auto& landmark : map_.map()->landmarks) {
+  for (const auto& landmark : whole->landmarks) {
     accuracy.landmarks_m.push_back(world_T_map * landmark.position_m);
     const auto nearest = grid.nearest(accuracy.landmarks_m.back());
     if (nearest) accuracy.landmark_errors_m.push_back(nearest->distance_m);

@@ -40,7 +40,7 @@ void write(const std::filesystem::path& file, const std::string& text) {
 
 void export_as(const std::string& format, const SlamResults& results,
                const std::filesystem::path& out) {
-  const model::WholeMap& map = *results.map.map();
+  const model::WholeMap map = results.map.whole().value();
   if (format == "tum") {
     write(out / "live.tum", to_tum(live_trajectory(results)));
     write(out / "keyframes.tum", to_tum(keyframe_trajectory(map)));

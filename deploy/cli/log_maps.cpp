@@ -24,6 +24,12 @@ void LogMaps::add(const io::LogEvent& event) {
     // Only the first change of a map comes before anything else that names it.
     if (delta->base_version == 0) go_to(map_id_of(delta->added));
     held_.take(*delta);
+  } else if (event.channel == "SUBMAP") {
+    const auto submap = wire::decode_message<model::Submap>(event.data);
+    if (submap && submap->map_id == map_id_) held_.take(*submap);
+  } else if (event.channel == "MAP_CORRECTION") {
+    const auto correction = wire::decode_message<model::MapCorrection>(event.data);
+    if (correction && correction->map_id == map_id_) held_.take(*correction);
   } else if (event.channel == "SLAM_UPDATE") {
     const auto update = wire::decode_message<model::MapUpdate>(event.data);
     if (!update) return;
@@ -51,7 +57,7 @@ void LogMaps::go_to(std::uint32_t map_id) {
 
 void LogMaps::keep() {
   if (map_id_ == 0 || is_provisional_ || !held_.map()) return;
-  left_.insert_or_assign(map_id_, Found{*held_.map(), held_.missed()});
+  left_.insert_or_assign(map_id_, Found{*held_.whole(), held_.missed()});
 }
 
 }  // namespace understory::cli

@@ -46,6 +46,12 @@ void SlamResults::add(const io::LogEvent& event) {
   } else if (event.channel == "MAP_DELTA") {
     const auto delta = wire::decode_message<model::MapDelta>(event.data);
     if (delta) map.take(*delta);
+  } else if (event.channel == "SUBMAP") {
+    const auto submap = wire::decode_message<model::Submap>(event.data);
+    if (submap) map.take(*submap);
+  } else if (event.channel == "MAP_CORRECTION") {
+    const auto correction = wire::decode_message<model::MapCorrection>(event.data);
+    if (correction) map.take(*correction);
   } else if (event.channel == "KEYFRAME") {
     const auto keyframe = wire::decode_message<model::Keyframe>(event.data);
     if (keyframe) keyframes.insert_or_assign(keyframe->sequence, *keyframe);
@@ -107,8 +113,9 @@ std::string keyframes_csv(const model::WholeMap& map) {
 
 std::string to_g2o(const SlamResults& results) {
   std::string out;
-  if (!results.map.map()) return out;
-  const model::WholeMap& map = *results.map.map();
+  const std::optional<model::WholeMap> whole = results.map.whole();
+  if (!whole) return out;
+  const model::WholeMap& map = *whole;
 
   std::uint64_t next = 0;
   for (const auto& one : map.keyframes) {
