@@ -423,7 +423,8 @@ bus::Service geoslam_mapper_service(const MapperChannels& channels) {
               channels.ekf_pose + ", " + channels.ekf_level + ", " + channels.given_map + ", " +
               channels.submap_stored + ", " + channels.submap_reply + " -> " + channels.slam_pose +
               ", " + channels.slam_update + ", " + channels.map + ", " + channels.map_delta + ", " +
-              channels.submap + ", " + channels.submap_query + ", " + channels.map_correction,
+              channels.submap + ", " + channels.submap_query + ", " + channels.map_correction +
+              ", " + channels.loop_result,
           [channels] { return std::make_unique<MapperAdapter>(channels); }};
 }
 

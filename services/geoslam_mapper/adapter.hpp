@@ -19,6 +19,7 @@ struct MapperChannels {
   std::string given_map = "GIVEN_MAP";
   std::string submap_stored = "SUBMAP_STORED";
   std::string submap_reply = "SUBMAP_REPLY";
+  std::string loop_closure = "LOOP_CLOSURE";
   // Out.
   std::string slam_pose = "SLAM_POSE";
   std::string slam_update = "SLAM_UPDATE";
@@ -27,6 +28,7 @@ struct MapperChannels {
   std::string submap = "SUBMAP";
   std::string submap_query = "SUBMAP_QUERY";
   std::string map_correction = "MAP_CORRECTION";
+  std::string loop_result = "LOOP_RESULT";
 };
 
 /// The mapper as a service: name, channels and what makes its adapter.

@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
           .given_map = "GIVEN_MAP",            // in: a map to begin with
           .submap_stored = "SUBMAP_STORED",    // in: the store has what was handed over
           .submap_reply = "SUBMAP_REPLY",      // in: a submap that was asked for
+          .loop_closure = "LOOP_CLOSURE",      // in: two places and how one lies to the other
           .slam_pose = "SLAM_POSE",            // out: the vehicle's pose at each sweep
           .slam_update = "SLAM_UPDATE",        // out: what became of each keyframe
           .map = "MAP",                        // out: the whole map, rarely and on request
@@ -20,6 +21,7 @@ int main(int argc, char** argv) {
           .submap = "SUBMAP",                  // out: what lies far away, to be kept
           .submap_query = "SUBMAP_QUERY",      // out: asks for what comes near again
           .map_correction = "MAP_CORRECTION",  // out: where the submaps are
+          .loop_result = "LOOP_RESULT",        // out: what became of a closure
       }),
       argc, argv);
 }

@@ -88,6 +88,15 @@ class MapperMethod {
   /// Where the submaps are that were ever given away, in order of id. O(submaps).
   virtual std::vector<model::SubmapPose> submap_poses() const { return {}; }
 
+  /// Takes a loop closure of the map in use, or takes one back; the answer says what became of it.
+  virtual model::LoopResult take(const model::LoopClosure& closure) {
+    model::LoopResult result;
+    result.map_id = closure.map_id;
+    result.closure_id = closure.id;
+    result.reason = "this method takes no loop closures";
+    return result;
+  }
+
   /// The whole state, for a restart. O(state).
   virtual std::string save() const = 0;
 

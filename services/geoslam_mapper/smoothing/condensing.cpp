@@ -10,17 +10,17 @@ constexpr std::ptrdiff_t kLeastNodes = 4;
 
 }  // namespace
 
-std::optional<NodeIndex> Condensing::follow(const FusedKeyframe& fused,
-                                            const KnownGround& known_ground, Discovery& discovery,
-                                            Merges& merges, GlobalMap& map) {
-  if (length_m_ <= 0.0) return std::nullopt;
+std::vector<Retirement> Condensing::follow(const FusedKeyframe& fused,
+                                           const KnownGround& known_ground, Discovery& discovery,
+                                           Merges& merges, GlobalMap& map) {
+  if (length_m_ <= 0.0) return {};
   const double now_m = map.graph.node(fused.node).along_m;
   if (fused.is_new_node) waiting_.push_back({fused.node, now_m});
   const double range_m = fused.keyframe.field_of_view.max_range_m;
   const double length_m = std::min(length_m_, of_range_ * range_m);
   const double end_m = now_m - std::max(after_m_, range_m);
   const std::vector<NodeIndex> stretch = take_stretch(length_m, end_m, known_ground, map.graph);
-  if (stretch.size() < 2) return std::nullopt;
+  if (stretch.size() < 2) return {};
 
   std::vector<model::LandmarkId> observed;
   for (const NodeIndex node : stretch) {
@@ -30,10 +30,10 @@ std::optional<NodeIndex> Condensing::follow(const FusedKeyframe& fused,
   observed.erase(std::unique(observed.begin(), observed.end()), observed.end());
 
   map.graph.checkpoint();
-  const std::vector<Retirement> retired = map.graph.condense(stretch);
+  std::vector<Retirement> retired = map.graph.condense(stretch);
   if (retired.empty() || !map.graph.solve().ok) {
     map.graph.rollback();
-    return std::nullopt;
+    return {};
   }
 
   for (const model::LandmarkId id : observed) {
@@ -46,7 +46,7 @@ std::optional<NodeIndex> Condensing::follow(const FusedKeyframe& fused,
   }
   map.trajectory.tie(retired, map.graph);
   map.adopt_estimates();
-  return retired.front().into;
+  return retired;
 }
 
 /// The nodes of the oldest stretch, once it is complete and ends before `end_m`; those that were

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <deque>
-#include <optional>
+#include <vector>
 
 #include "services/geoslam_mapper/parameters.hpp"
 #include "services/geoslam_mapper/smoothing/discovery.hpp"
@@ -27,9 +27,10 @@ class Condensing {
 
   /// To be called after each accepted keyframe. Condenses at most one stretch, and solves; the map
   /// is as before where that fails. Cost: what the nodes of the stretch observed.
-  /// `known_ground`: what it has not judged yet waits. Returns the node that a stretch became.
-  std::optional<NodeIndex> follow(const FusedKeyframe& fused, const KnownGround& known_ground,
-                                  Discovery& discovery, Merges& merges, GlobalMap& map);
+  /// `known_ground`: what it has not judged yet waits. Returns the nodes of a stretch that became
+  /// one.
+  std::vector<Retirement> follow(const FusedKeyframe& fused, const KnownGround& known_ground,
+                                 Discovery& discovery, Merges& merges, GlobalMap& map);
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>

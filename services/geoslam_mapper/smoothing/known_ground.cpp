@@ -25,15 +25,15 @@ std::size_t count_common(const Node& a, const Node& b) {
 
 }  // namespace
 
-void KnownGround::follow(const FusedKeyframe& fused, Discovery& discovery, Merges& merges,
-                         GlobalMap& map) {
-  if (radius_m_ <= 0.0 || (!recent_.empty() && recent_.back().node == fused.node)) return;
+std::vector<Retirement> KnownGround::follow(const FusedKeyframe& fused, Discovery& discovery,
+                                            Merges& merges, GlobalMap& map) {
+  if (radius_m_ <= 0.0 || (!recent_.empty() && recent_.back().node == fused.node)) return {};
   recent_.push_back({fused.node, fused.is_new_node});
-  if (recent_.size() < kTogether + kStay) return;
+  if (recent_.size() < kTogether + kStay) return {};
 
-  const Surplus surplus = find_surplus(map);
+  Surplus surplus = find_surplus(map);
   recent_.erase(recent_.begin(), recent_.begin() + kTogether);
-  if (surplus.nodes.empty() && surplus.loose.empty() && surplus.motions.empty()) return;
+  if (surplus.nodes.empty() && surplus.loose.empty() && surplus.motions.empty()) return {};
 
   std::vector<std::pair<model::LandmarkId, Retirement>> handed_over;
   for (const Retirement& one : surplus.nodes) {
@@ -45,7 +45,7 @@ void KnownGround::follow(const FusedKeyframe& fused, Discovery& discovery, Merge
   map.graph.take_out(surplus);
   if (!map.graph.solve().ok) {
     map.graph.rollback();
-    return;
+    return {};
   }
 
   for (const auto& [id, one] : handed_over) map.landmarks.at(id).replace(one.node, one.into);
@@ -55,6 +55,7 @@ void KnownGround::follow(const FusedKeyframe& fused, Discovery& discovery, Merge
     map.trajectory.hand_over(one);
   }
   map.adopt_estimates();
+  return std::move(surplus.nodes);
 }
 
 /// Among the oldest of the recent nodes, without those where the vehicle was again since.

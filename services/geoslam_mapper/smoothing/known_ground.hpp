@@ -25,7 +25,9 @@ class KnownGround {
 
   /// To be called after each accepted keyframe. Takes out what can be, several nodes at a time, and
   /// solves; the map is as before where that fails. Cost: what the nodes observed.
-  void follow(const FusedKeyframe& fused, Discovery& discovery, Merges& merges, GlobalMap& map);
+  /// Returns the nodes that were taken out.
+  std::vector<Retirement> follow(const FusedKeyframe& fused, Discovery& discovery, Merges& merges,
+                                 GlobalMap& map);
 
   /// Whether the node is one of the last ones, which it has not judged yet.
   bool is_recent(NodeIndex node) const;

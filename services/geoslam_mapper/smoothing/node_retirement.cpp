@@ -113,6 +113,7 @@ plane::RelativePose PoseGraph::take_motion_out(MotionRef ref) {
     nothing.information.setZero();
     smoother_.set(plane::MotionId(ref.number), nothing);
     free_motions_.give(ref.number);
+    closures_.erase(ref.number);
     return measured;
   }
 

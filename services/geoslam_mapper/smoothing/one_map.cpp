@@ -104,12 +104,12 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
   update.chi2 = fused.chi2;
   update.degrees_of_freedom = fused.degrees_of_freedom;
   if (!fused.ok) return with(kRolledBack, fused.reason, std::move(update));
-  known_ground_.follow(fused, discovery_, merging_.merges(), map_);
+  closures_.hand_over(known_ground_.follow(fused, discovery_, merging_.merges(), map_));
   extend(fused, update);
-  if (const auto node =
-          condensing_.follow(fused, known_ground_, discovery_, merging_.merges(), map_)) {
-    submaps_.condensed(*node);
-  }
+  const std::vector<Retirement> condensed =
+      condensing_.follow(fused, known_ground_, discovery_, merging_.merges(), map_);
+  closures_.hand_over(condensed);
+  if (!condensed.empty()) submaps_.condensed(condensed.front().into);
   dormancy_.follow(keyframe.field_of_view, fused.node, map_);
   submaps_.follow(keyframe.field_of_view, fused.node, keyframe.utime, map_);
   confirm(keyframe, update);
@@ -210,6 +210,31 @@ void OneMap::report(const model::Keyframe& keyframe, model::MapUpdate& update) {
 
 std::optional<ScanPose> OneMap::locate(const model::LandmarkScan& scan) {
   return scan_localiser_.locate(scan, map_.landmarks, motion_);
+}
+
+Closures::Decision OneMap::take(const model::LoopClosure& closure) {
+  if (closure.is_revoked) return closures_.revoke(closure.id, map_);
+  const auto from = end_of(closure.from);
+  const auto to = end_of(closure.to);
+  if (!from || !to) {
+    const model::LoopEnd& missing = from ? closure.to : closure.from;
+    const std::string what = missing.submap != 0 ? "submap " + std::to_string(missing.submap)
+                                                 : "keyframe " + std::to_string(missing.keyframe);
+    return {model::LoopResult::Status::kRefused, what + " is not in the graph"};
+  }
+  return closures_.take(closure, *from, *to, map_);
+}
+
+std::optional<ClosureEnd> OneMap::end_of(const model::LoopEnd& end) const {
+  if (end.submap != 0) {
+    const auto node = submaps_.node_of(end.submap);
+    if (!node) return std::nullopt;
+    return ClosureEnd{*node, {}};
+  }
+  const auto bases = map_.trajectory.bases();
+  const auto base = std::ranges::find(bases, end.keyframe, &Base::sequence);
+  if (base == bases.end()) return std::nullopt;
+  return ClosureEnd{base->node, base->centre_T_base};
 }
 
 bool OneMap::reaches(const model::Keyframe& keyframe) const {

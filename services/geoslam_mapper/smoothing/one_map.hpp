@@ -8,6 +8,7 @@
 
 #include "services/geoslam_mapper/mapper_method.hpp"
 #include "services/geoslam_mapper/parameters.hpp"
+#include "services/geoslam_mapper/smoothing/closures.hpp"
 #include "services/geoslam_mapper/smoothing/common_error.hpp"
 #include "services/geoslam_mapper/smoothing/condensing.hpp"
 #include "services/geoslam_mapper/smoothing/discovery.hpp"
@@ -80,6 +81,9 @@ class OneMap {
   std::vector<model::Submap> take_given_away() { return submaps_.take_given_away(); }
   /// See Submaps::bring_back().
   std::string bring_back(const model::Submap& submap) { return submaps_.bring_back(submap, map_); }
+  /// Takes a loop closure, or takes one back; see Closures. A keyframe that was handed over is an
+  /// end by its submap only.
+  Closures::Decision take(const model::LoopClosure& closure);
   /// Landmarks that are new or have moved since the last call.
   std::vector<model::MapLandmark> take_changed_landmarks();
 
@@ -87,8 +91,8 @@ class OneMap {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.map_, self.motion_, self.discovery_, self.merging_, self.known_ground_, self.condensing_,
-      self.dormancy_, self.submaps_, self.scan_localiser_, self.common_error_, self.first_offered_,
-      self.agreeing_);
+      self.dormancy_, self.submaps_, self.closures_, self.scan_localiser_, self.common_error_,
+      self.first_offered_, self.agreeing_);
   }
 
  private:
@@ -98,6 +102,7 @@ class OneMap {
                                  const std::optional<Prediction>& prediction,
                                  model::MapUpdate& update);
   void extend(const FusedKeyframe& fused, model::MapUpdate& update);
+  std::optional<ClosureEnd> end_of(const model::LoopEnd& end) const;
   void confirm(const model::Keyframe& keyframe, model::MapUpdate& update);
   void report(const model::Keyframe& keyframe, model::MapUpdate& update);
 
@@ -111,6 +116,7 @@ class OneMap {
   Condensing condensing_;
   Dormancy dormancy_;
   Submaps submaps_;
+  Closures closures_;
   ScanLocaliser scan_localiser_;
   CommonError common_error_;
   std::optional<model::Utime> first_offered_;  ///< Keyframe that might have started the map.

@@ -26,7 +26,7 @@ PoseGraph::PoseGraph(const SmoothingMapperParameters& parameters)
 
 void PoseGraph::checkpoint() {
   smoother_.checkpoint();
-  before_ = Checkpoint{nodes_.size(), landmark_of_point_.size(), newest_, {}, {}, {}};
+  before_ = Checkpoint{nodes_.size(), landmark_of_point_.size(), newest_, {}, closures_, {}, {}};
   gyro_.checkpoint();
   for (FreeNumbers* free :
        {&free_nodes_, &free_points_, &free_observations_, &free_motions_, &free_biased_})
@@ -55,6 +55,7 @@ void PoseGraph::rollback() {
   nodes_.resize(before_->nodes);
   for (auto& [node, was] : before_->changed) nodes_[node] = std::move(was);
   newest_ = before_->newest;
+  closures_ = std::move(before_->closures);
   before_.reset();
 }
 
@@ -221,12 +222,44 @@ void PoseGraph::add_motion(const CentreMotion& motion, NodeIndex node) {
   edit(node).motions.push_back(ref);
 }
 
-void PoseGraph::link(const plane::RelativePose& measured, NodeIndex from, NodeIndex to) {
+MotionRef PoseGraph::link(const plane::RelativePose& measured, NodeIndex from, NodeIndex to) {
   const auto number = free_motions_.take();
   if (number) smoother_.set(plane::MotionId(*number), measured);
   const MotionRef ref{false, number ? *number : index(smoother_.add(measured))};
   edit(from).motions.push_back(ref);
   edit(to).motions.push_back(ref);
+  return ref;
+}
+
+void PoseGraph::add_closure(std::uint64_t id, NodeIndex a, NodeIndex b,
+                            const geometry::SE2WithCovariance& a_T_b) {
+  const MotionRef ref =
+      link({nodes_[a].centre, nodes_[b].centre, a_T_b.mean, a_T_b.covariance.inverse()}, a, b);
+  closures_.emplace(ref.number, id);
+}
+
+void PoseGraph::take_closure_out(std::uint64_t id) {
+  const MotionRef ref{false, motion_of(id)};
+  const auto [a, b] = ends_of(ref);
+  std::erase(edit(a).motions, ref);
+  std::erase(edit(b).motions, ref);
+  take_motion_out(ref);
+}
+
+bool PoseGraph::has_closure(std::uint64_t id) const {
+  return std::ranges::any_of(closures_, [&](const auto& one) { return one.second == id; });
+}
+
+std::uint32_t PoseGraph::motion_of(std::uint64_t closure) const {
+  return std::ranges::find_if(closures_, [&](const auto& one) { return one.second == closure; })
+      ->first;
+}
+
+double PoseGraph::closure_chi2(std::uint64_t id) const {
+  const plane::RelativePose& measured = smoother_.motion(plane::MotionId(motion_of(id)));
+  const geometry::SE2 a_T_b = smoother_.pose(measured.a).inverse() * smoother_.pose(measured.b);
+  const Eigen::Vector3d off = (measured.a_T_b.inverse() * a_T_b).coordinates();
+  return off.dot(measured.information * off);
 }
 
 std::optional<Eigen::Vector2d> PoseGraph::position(model::LandmarkId id) const {

@@ -138,6 +138,16 @@ class PoseGraph {
   /// Adds the motion from an earlier node; nothing if it is the same node.
   void add_motion(const CentreMotion& motion, NodeIndex node);
 
+  /// Adds a loop closure between two nodes. Its number must be new.
+  void add_closure(std::uint64_t id, NodeIndex a, NodeIndex b,
+                   const geometry::SE2WithCovariance& a_T_b);
+  /// Takes it out again; there must be one.
+  void take_closure_out(std::uint64_t id);
+  /// Whether it counts. It does no more where a node was taken out with which it went.
+  bool has_closure(std::uint64_t id) const;
+  /// chi^2 (3 degrees of freedom) of a closure at the present estimate; there must be one.
+  double closure_chi2(std::uint64_t id) const;
+
   /// Takes nodes and motions out. What the nodes observed becomes observations of other nodes, in
   /// whose frames the two agree to within the covariance of `into_T_node`. Motions that begin or
   /// end at the nodes are lost; one to a later node that stays begins at the other node then. None
@@ -233,7 +243,7 @@ class PoseGraph {
     factor_graph::plane::Graph graph = self.smoother_.graph();
     a(graph, self.nodes_, self.landmark_of_point_, self.gyro_, self.newest_, self.free_nodes_,
       self.free_points_, self.free_observations_, self.free_motions_, self.free_biased_,
-      self.dormant_, self.ties_);
+      self.dormant_, self.ties_, self.closures_);
     if constexpr (Archive::kReads) self.restore(graph);
   }
 
@@ -242,7 +252,8 @@ class PoseGraph {
     std::size_t nodes = 0;
     std::size_t points = 0;
     std::optional<NodeIndex> newest;
-    std::map<NodeIndex, Node> changed;                    ///< Of those there were, as they were.
+    std::map<NodeIndex, Node> changed;  ///< Of those there were, as they were.
+    std::map<std::uint32_t, std::uint64_t> closures;
     std::vector<factor_graph::plane::PointId> restarted;  ///< Points with a landmark again.
     /// Points whose landmark was joined with another one.
     std::vector<std::pair<factor_graph::plane::PointId, model::LandmarkId>> dropped;
@@ -292,7 +303,8 @@ class PoseGraph {
   void restore(const factor_graph::plane::Graph& graph);
   void place_observation(NodeIndex node, model::LandmarkId id,
                          const factor_graph::plane::PointObservation& factor);
-  void link(const factor_graph::plane::RelativePose& measured, NodeIndex from, NodeIndex to);
+  MotionRef link(const factor_graph::plane::RelativePose& measured, NodeIndex from, NodeIndex to);
+  std::uint32_t motion_of(std::uint64_t closure) const;
   void hand_observations_to(const Retirement& retirement);
   void take_motions_out(const Retirement& retirement, const Surplus& surplus);
   void take_motions_out(NodeIndex a, NodeIndex b);
@@ -310,6 +322,7 @@ class PoseGraph {
   GyroBias gyro_;
   std::map<model::LandmarkId, std::vector<DormantObservation>> dormant_;
   std::map<TiedNodes, Tie> ties_;
+  std::map<std::uint32_t, std::uint64_t> closures_;  ///< Closures by the number of their motion.
   /// What is dormant of a node's landmarks, and where the node was when they last followed it.
   struct DormantOfNode {
     std::vector<model::LandmarkId> landmarks;

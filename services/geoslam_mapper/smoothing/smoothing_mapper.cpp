@@ -154,6 +154,26 @@ void SmoothingMapper::adopt_trial(model::MapUpdate& update) {
   for (const auto& [id, landmark] : current_.map().landmarks.all()) update.added.push_back(id);
 }
 
+model::LoopResult SmoothingMapper::take(const model::LoopClosure& closure) {
+  model::LoopResult result;
+  result.utime = last_utime_.value_or(0);
+  result.map_id = closure.map_id;
+  result.closure_id = closure.id;
+  if (closure.map_id != current_.map().landmarks.map_id()) {
+    result.reason = "it is of another map than the one in use";
+    return result;
+  }
+  if (parameters_.localisation_only) {
+    result.reason = "localisation only: the map stays as it is";
+    return result;
+  }
+
+  Closures::Decision decision = current_.take(closure);
+  result.status = decision.status;
+  result.reason = std::move(decision.reason);
+  return result;
+}
+
 std::string SmoothingMapper::save() const { return state::save(kFormat, *this); }
 
 void SmoothingMapper::load(const std::string& state) {

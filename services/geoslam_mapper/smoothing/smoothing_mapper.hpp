@@ -52,6 +52,7 @@ class SmoothingMapper final : public MapperMethod {
   std::vector<model::SubmapPose> submap_poses() const override {
     return current_.submaps().poses(current_.map().graph);
   }
+  model::LoopResult take(const model::LoopClosure& closure) override;
   /// The maps that were left.
   const MapArchive& kept_maps() const { return kept_maps_; }
 
