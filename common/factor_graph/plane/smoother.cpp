@@ -70,12 +70,14 @@ struct Smoother::State {
 
   void checkpoint() {
     smoother.checkpoint();
+    saved_condensed = condensed;
     moved.clear();
     for_each_list([](auto& list) { list.commit(); });
   }
   void rollback() {
     moved.clear();
     smoother.rollback();
+    condensed = saved_condensed;
     for_each_list([](auto& list) { list.rollback(); });
   }
   template <typename Visit>
@@ -96,6 +98,8 @@ struct Smoother::State {
   FactorList<ScalarPrior> scalar_priors;
   FactorList<ScalarStep> scalar_steps;
   FactorList<PointObservation> observations;
+  std::vector<graph::FactorId> condensed;
+  std::vector<graph::FactorId> saved_condensed;  ///< At the checkpoint.
   MovedList moved;
 };
 
@@ -180,6 +184,21 @@ void Smoother::set(ScalarStepId id, const ScalarStep& factor) {
 }
 void Smoother::set(ObservationId id, const PointObservation& factor) {
   state_->replace(state_->observations, index(id), factor);
+}
+
+void Smoother::set_condensed(std::span<const CondensedPoses> measured) {
+  for (const graph::FactorId id : state_->condensed) state_->smoother.remove(id);
+  state_->condensed.clear();
+  for (const CondensedPoses& one : measured) {
+    graph::CondensedFactor factor;
+    for (const PoseId pose : one.poses) factor.variables.push_back(state_->name(pose));
+    factor.measurement.resize(3 * static_cast<Eigen::Index>(one.first_T_other.size()));
+    for (std::size_t i = 0; i < one.first_T_other.size(); ++i)
+      factor.measurement.segment<3>(3 * static_cast<Eigen::Index>(i)) =
+          one.first_T_other[i].coordinates();
+    factor.information = one.information;
+    state_->condensed.push_back(state_->smoother.add(factor));
+  }
 }
 
 const RelativePose& Smoother::motion(MotionId id) const {

@@ -31,6 +31,14 @@ struct SmootherParameters {
   int max_iterations = 8;  ///< Of one update.
 };
 
+/// Where poses are in the frame of the first of them, measured together.
+struct CondensedPoses {
+  std::vector<PoseId> poses;                 ///< At least two.
+  std::vector<geometry::SE2> first_T_other;  ///< Of poses[1..].
+  /// Of first_T_other, side by side: right perturbations, x, y, theta each [m, rad].
+  Eigen::MatrixXd information;
+};
+
 /// What an update found.
 struct SmootherUpdate {
   bool ok = false;    ///< False: variables are undetermined and stay where they are.
@@ -112,6 +120,9 @@ class Smoother {
   void set(ScalarStepId id, const ScalarStep& factor);
   /// Likewise.
   void set(ObservationId id, const PointObservation& factor);
+
+  /// Puts these measurements in the place of those that were set before. They are not in graph().
+  void set_condensed(std::span<const CondensedPoses> measured);
 
   /// The measurement as it was given last.
   const RelativePose& motion(MotionId id) const;

@@ -18,7 +18,13 @@ AwayLandmarks PoseGraph::put_away(std::span<const model::LandmarkId> ids) {
   std::set<TiedNodes> changed;
   away.ties.reserve(tied.size());
   for (const auto& [nodes, theirs] : tied) {
-    away.ties.push_back(put(tie(nodes, theirs)));
+    if (free_away_ties_.empty()) {
+      free_away_ties_.push_back(static_cast<AwayTieId>(away_ties_.size()));
+      away_ties_.emplace_back();
+    }
+    away.ties.push_back(free_away_ties_.back());
+    away_ties_[free_away_ties_.back()] = put(tie(nodes, theirs));
+    free_away_ties_.pop_back();
     std::vector<model::LandmarkId>& all = ties_.at(nodes).landmarks;
     std::erase_if(all, [&](auto id) { return std::ranges::find(theirs, id) != theirs.end(); });
     changed.insert(nodes);
@@ -48,7 +54,7 @@ void PoseGraph::bring_back(std::span<const model::LandmarkId> ids, const AwayLan
   if (!fits || std::ranges::any_of(ids, [&](auto id) { return dormant_.contains(id); }))
     throw std::invalid_argument("submap: its landmarks do not fit the graph");
 
-  for (const auto motion : away.ties) take_out(motion);
+  for (const AwayTieId tie : away.ties) take_away_tie_out(tie);
   std::set<TiedNodes> changed;
   for (std::size_t i = 0; i < ids.size(); ++i) {
     dormant_.emplace(ids[i], away.observed[i]);

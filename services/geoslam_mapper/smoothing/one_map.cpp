@@ -222,7 +222,16 @@ Closures::Decision OneMap::take(const model::LoopClosure& closure) {
                                                  : "keyframe " + std::to_string(missing.keyframe);
     return {model::LoopResult::Status::kRefused, what + " is not in the graph"};
   }
-  return closures_.take(closure, *from, *to, map_);
+
+  // Their covariances are asked for, and those of the ones that wait.
+  std::vector<NodeIndex> ends = closures_.ends();
+  ends.insert(ends.end(), {from->node, to->node});
+  map_.graph.checkpoint();
+  map_.graph.thaw(ends);
+  (void)map_.graph.solve();
+  const Closures::Decision decision = closures_.take(closure, *from, *to, map_);
+  map_.graph.settle_frozen();
+  return decision;
 }
 
 std::optional<ClosureEnd> OneMap::end_of(const model::LoopEnd& end) const {

@@ -247,7 +247,8 @@ void PoseGraph::take_closure_out(std::uint64_t id) {
 }
 
 bool PoseGraph::has_closure(std::uint64_t id) const {
-  return std::ranges::any_of(closures_, [&](const auto& one) { return one.second == id; });
+  return std::ranges::any_of(closures_, [&](const auto& one) { return one.second == id; }) ||
+         std::ranges::any_of(frozen_motions_, [&](const auto& one) { return one.closure == id; });
 }
 
 std::uint32_t PoseGraph::motion_of(std::uint64_t closure) const {
@@ -395,6 +396,7 @@ void PoseGraph::restore(const plane::Graph& graph) {
     if (landmark_of_point_[i] != 0)
       point_of_.emplace(landmark_of_point_[i], plane::PointId(static_cast<std::uint32_t>(i)));
   }
+  condense_frozen(parts_of(frozen_motions_, frozen_));
   dormant_of_node_.assign(nodes_.size(), {});
   for (const auto& [id, observed] : dormant_) {
     for (const DormantObservation& one : observed)

@@ -15,6 +15,7 @@
 #include "services/geoslam_mapper/parameters.hpp"
 #include "services/geoslam_mapper/smoothing/centre_motion.hpp"
 #include "services/geoslam_mapper/smoothing/free_numbers.hpp"
+#include "services/geoslam_mapper/smoothing/frozen_part.hpp"
 #include "services/geoslam_mapper/smoothing/gyro_bias.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
@@ -77,10 +78,13 @@ struct DormantObservation {
   }
 };
 
+/// Number of a motion that stands for landmarks that are kept elsewhere.
+using AwayTieId = std::uint32_t;
+
 /// Landmarks that are kept elsewhere, and what stands for them in the graph.
 struct AwayLandmarks {
   std::vector<std::vector<DormantObservation>> observed;  ///< In the order of the ids.
-  std::vector<factor_graph::plane::MotionId> ties;
+  std::vector<AwayTieId> ties;
 };
 
 /// A node to be taken out, and the node that gets what it observed.
@@ -181,6 +185,20 @@ class PoseGraph {
   std::span<const model::LandmarkId> dormant_of(NodeIndex node) const;
   /// The node that observed a dormant landmark first. Throws std::out_of_range likewise.
   NodeIndex home_of(model::LandmarkId id) const { return dormant_.at(id).front().node; }
+  /// Takes nodes out of the solved graph: all that was measured of them becomes one condensed
+  /// measurement of the nodes around them (frozen_part). They must be condensed ones with nothing
+  /// in the graph but motions; others among them are passed over. False, and nothing is changed,
+  /// where what is left would be tied at too many nodes. Undone by thaw(). Cost: one factorisation
+  /// of all that is frozen.
+  bool freeze(std::span<const NodeIndex> nodes);
+  /// Takes nodes into the solved graph again, where they are frozen. The same cost.
+  void thaw(std::span<const NodeIndex> nodes);
+  /// Moves what is frozen to where the nodes around it are now.
+  void settle_frozen();
+  /// Whether the node is out of the solved graph.
+  bool is_frozen(NodeIndex node) const { return frozen_.contains(node); }
+  /// Number of nodes out of the solved graph.
+  std::size_t frozen_count() const { return frozen_.size(); }
   /// Whether the landmark was taken out of the solved graph.
   bool is_dormant(model::LandmarkId id) const { return dormant_.contains(id); }
   /// Position of a dormant landmark [m] at the nodes' estimates. Throws std::out_of_range where it
@@ -243,7 +261,11 @@ class PoseGraph {
     factor_graph::plane::Graph graph = self.smoother_.graph();
     a(graph, self.nodes_, self.landmark_of_point_, self.gyro_, self.newest_, self.free_nodes_,
       self.free_points_, self.free_observations_, self.free_motions_, self.free_biased_,
-      self.dormant_, self.ties_, self.closures_);
+      self.dormant_, self.ties_, self.closures_, self.away_ties_, self.free_away_ties_,
+      self.frozen_motions_);
+    std::vector<NodeIndex> frozen(self.frozen_.begin(), self.frozen_.end());
+    a(frozen);
+    if constexpr (Archive::kReads) self.frozen_.insert(frozen.begin(), frozen.end());
     if constexpr (Archive::kReads) self.restore(graph);
   }
 
@@ -290,6 +312,11 @@ class PoseGraph {
   void renew(const std::set<TiedNodes>& ties);
   factor_graph::plane::MotionId put(const factor_graph::plane::RelativePose& motion);
   void take_out(factor_graph::plane::MotionId motion);
+  void take_away_tie_out(AwayTieId tie);
+  bool may_freeze(NodeIndex node) const;
+  void freeze_motions(const std::set<NodeIndex>& nodes);
+  void thaw_motions();
+  void condense_frozen(const std::vector<FrozenPart>& parts);
   factor_graph::plane::RelativePose tie(const TiedNodes& nodes,
                                         std::span<const model::LandmarkId> ids) const;
   bool has_left(NodeIndex node);
@@ -323,6 +350,11 @@ class PoseGraph {
   std::map<model::LandmarkId, std::vector<DormantObservation>> dormant_;
   std::map<TiedNodes, Tie> ties_;
   std::map<std::uint32_t, std::uint64_t> closures_;  ///< Closures by the number of their motion.
+  /// Each the motion that it is; none while it is frozen, or free.
+  std::vector<std::optional<factor_graph::plane::MotionId>> away_ties_;
+  std::vector<AwayTieId> free_away_ties_;
+  std::set<NodeIndex> frozen_;
+  std::vector<FrozenMotion> frozen_motions_;  ///< With an end that is frozen.
   /// What is dormant of a node's landmarks, and where the node was when they last followed it.
   struct DormantOfNode {
     std::vector<model::LandmarkId> landmarks;

@@ -19,6 +19,11 @@ constexpr double kBetween_m = 10.0;
 constexpr double kExtent_m = 40.0;
 /// What comes back is not given away before it is so much further [m].
 constexpr double kHysteresis_m = 60.0;
+/// What is so much further [m] than what comes back leaves the solved graph, so many at a time; it
+/// is in it again before it comes nearer than so much beyond that.
+constexpr double kFrozenBeyond_m = 500.0;
+constexpr double kThawedBeyond_m = 150.0;
+constexpr std::size_t kFrozenTogether = 20;
 /// Most submaps that go at one look around, and that are wanted at a time.
 constexpr std::size_t kMostAtOnce = 4;
 
@@ -80,6 +85,7 @@ void Submaps::follow(const model::FieldOfView& field_of_view, NodeIndex newest, 
   if (near.size() > kMostAtOnce) near.resize(kMostAtOnce);
   wanted_.clear();
   for (const auto& [distance_m, id] : near) wanted_.push_back(id);
+  freeze(reach_m, vehicle_m, map);
   if (!may_hand_over_) return;
 
   // Whole submaps only: where none of what the node observed is in the solved graph.
@@ -92,6 +98,33 @@ void Submaps::follow(const model::FieldOfView& field_of_view, NodeIndex newest, 
   if (left.empty()) return;
   map.graph.checkpoint();
   for (const Here& here : left) give_away(here, utime, map);
+  (void)map.graph.solve();  // What they tell is in the graph as before.
+  map.adopt_estimates();
+}
+
+/// The solved graph is that of the ground around the vehicle: its cost does not grow with the way.
+void Submaps::freeze(double reach_m, const Eigen::Vector2d& vehicle_m, GlobalMap& map) {
+  std::vector<NodeIndex> far;
+  std::vector<NodeIndex> near;
+  for (const Away& away : away_) {
+    const double distance_m = (map.graph.pose(away.node).translation() - vehicle_m).norm();
+    const bool is_frozen = map.graph.is_frozen(away.node);
+    if (is_frozen && distance_m < reach_m + kThawedBeyond_m) near.push_back(away.node);
+    if (!is_frozen && distance_m > reach_m + kFrozenBeyond_m) far.push_back(away.node);
+  }
+  if (near.empty() && far.size() < kFrozenTogether + unfreezable_) return;
+
+  map.graph.checkpoint();
+  if (!near.empty()) {
+    // And what is about to come near.
+    for (const Away& away : away_) {
+      const double distance_m = (map.graph.pose(away.node).translation() - vehicle_m).norm();
+      if (distance_m < reach_m + 2.0 * kThawedBeyond_m) near.push_back(away.node);
+    }
+    map.graph.thaw(near);
+  } else {
+    unfreezable_ = map.graph.freeze(far) ? 0 : far.size();
+  }
   (void)map.graph.solve();  // What they tell is in the graph as before.
   map.adopt_estimates();
 }
@@ -154,6 +187,10 @@ std::string Submaps::bring_back(const model::Submap& submap, GlobalMap& map) {
     for (const StoredLandmark& landmark : content.landmarks) ids.push_back(landmark.id);
     if (content.node != away->node) return name + " is of another node";
     map.graph.checkpoint();
+    std::vector<NodeIndex> nodes{away->node};
+    for (const auto& observed : content.observed)
+      for (const DormantObservation& one : observed) nodes.push_back(one.node);
+    map.graph.thaw(nodes);
     map.graph.bring_back(ids, {content.observed, away->ties});
   } catch (const std::invalid_argument& error) {
     return name + ": " + error.what();

@@ -49,7 +49,7 @@ class Submaps {
   /// Members of a saved state; see common/state. Parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.here_, self.away_, self.wanted_, self.next_id_, self.looked_m_);
+    a(self.here_, self.away_, self.wanted_, self.next_id_, self.unfreezable_, self.looked_m_);
   }
 
  private:
@@ -68,7 +68,7 @@ class Submaps {
     NodeIndex node = 0;
     model::SubmapId id = 0;
     std::uint64_t content_hash = 0;
-    std::vector<factor_graph::plane::MotionId> ties;
+    std::vector<AwayTieId> ties;
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& s) {
@@ -76,6 +76,7 @@ class Submaps {
     }
   };
   void give_away(const Here& here, model::Utime utime, GlobalMap& map);
+  void freeze(double reach_m, const Eigen::Vector2d& vehicle_m, GlobalMap& map);
 
   double hand_over_m_;
   bool may_hand_over_ = true;
@@ -84,7 +85,8 @@ class Submaps {
   std::vector<model::SubmapId> wanted_;
   std::vector<model::Submap> given_away_;
   model::SubmapId next_id_ = 1;
-  double looked_m_ = 0.0;  ///< Path of the vehicle when it looked around.
+  std::size_t unfreezable_ = 0;  ///< Submaps that could not leave the solved graph.
+  double looked_m_ = 0.0;        ///< Path of the vehicle when it looked around.
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -1,0 +1,57 @@
+// A part of the graph that is solved by itself.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <set>
+#include <span>
+#include <vector>
+
+#include "common/factor_graph/plane/smoother.hpp"
+#include "services/geoslam_mapper/smoothing/landmark_map.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+
+/// A motion between two nodes, at least one of which is frozen.
+struct FrozenMotion {
+  NodeIndex a = 0;
+  NodeIndex b = 0;
+  geometry::SE2 a_T_b;
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  std::optional<std::uint32_t> away_tie;  ///< Its number; none: a motion of the two nodes.
+  std::uint64_t closure = 0;              ///< Its number; 0: none.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.a, s.b, s.a_T_b, s.information, s.away_tie, s.closure);
+  }
+};
+
+/// Frozen nodes that hang together, and the nodes of the solved graph that they are tied to.
+struct FrozenPart {
+  std::vector<NodeIndex> inner;
+  std::vector<NodeIndex> outer;  ///< The first on the path first.
+  std::vector<FrozenMotion> motions;
+};
+
+/// The parts that motions make of frozen nodes. O(motions log motions).
+std::vector<FrozenPart> parts_of(std::span<const FrozenMotion> motions,
+                                 const std::set<NodeIndex>& frozen);
+
+/// Pose of a node.
+using PoseOf = std::function<geometry::SE2(NodeIndex)>;
+
+/// What a part measures of its outer nodes: it is optimised on its own, and the outer nodes have
+/// their joint marginal in the frame of the first (thesis on submaps §2.3.3, §3.4.2, with a node of
+/// the solved graph as origin). `pose_of` gives where to start. None where there is one outer node,
+/// or where the motions leave a node undetermined. Exact for Gaussian noise but for the
+/// linearisation at the part's own optimum. Cost: one factorisation of the part.
+std::optional<factor_graph::plane::CondensedPoses> condensed(const FrozenPart& part,
+                                                             const PoseOf& pose_of);
+
+/// Where the inner nodes are, in their order, given the outer ones. The same cost.
+std::vector<geometry::SE2> inner_poses(const FrozenPart& part, const PoseOf& pose_of);
+
+}  // namespace understory::geoslam_mapper::smoothing

@@ -1,0 +1,161 @@
+// Nodes out of the solved graph.
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "common/state/archive.hpp"
+#include "services/geoslam_mapper/smoothing/pose_graph.hpp"
+#include "tests/catch.hpp"
+
+using namespace understory;
+using namespace understory::geoslam_mapper;
+using namespace understory::geoslam_mapper::smoothing;
+
+namespace {
+
+constexpr int kStretches = 40;
+constexpr int kPerStretch = 4;
+
+/// A way of condensed nodes from a fixed one to an uncondensed one, with ties to the second next,
+/// and crossed by itself where `crossings` says so.
+struct Way {
+  PoseGraph graph{SmoothingMapperParameters{}};
+  std::vector<NodeIndex> nodes;  ///< Condensed ones.
+  NodeIndex last = 0;
+  std::mt19937_64 random;
+
+  Way(std::uint64_t seed, bool crosses) : random(seed) {
+    const geometry::SE2 step = geometry::SE2::Exp({5.0, 0.0, 0.03});
+    const Eigen::Matrix3d covariance = Eigen::Vector3d(1e-3, 4e-4, 1e-6).asDiagonal();
+    std::vector<NodeIndex> fine{graph.add_node({}, false, true)};
+    for (int i = 1; i < kStretches * kPerStretch + 8; ++i) {
+      const geometry::SE2 measured = step * noise(covariance);
+      fine.push_back(graph.add_node(graph.pose(fine.back()) * measured, false));
+      add(fine[fine.size() - 2], fine.back(), {measured, covariance});
+      if (fine.size() > 3)
+        add(fine[fine.size() - 3], fine.back(), {step * step * noise(covariance), covariance});
+      const auto back = static_cast<std::size_t>(60);
+      if (crosses && i % 20 == 0 && fine.size() > back) {
+        geometry::SE2 far;
+        for (std::size_t k = 0; k < back; ++k) far = far * step;
+        add(fine[fine.size() - 1 - back], fine.back(), {far * noise(covariance), covariance});
+      }
+    }
+    settle();
+    for (int s = 0; s < kStretches; ++s) {
+      const auto first = fine.begin() + 2 + s * kPerStretch;
+      const std::vector<NodeIndex> stretch(first, first + kPerStretch);
+      const auto retired = graph.condense(stretch);
+      REQUIRE_FALSE(retired.empty());
+      nodes.push_back(retired.front().into);
+    }
+    last = fine.back();
+    settle();
+  }
+  geometry::SE2 noise(const Eigen::Matrix3d& covariance) {
+    std::normal_distribution<double> normal;
+    const Eigen::Vector3d unit(normal(random), normal(random), normal(random));
+    return geometry::SE2::Exp(covariance.llt().matrixL() * unit);
+  }
+  void add(NodeIndex from, NodeIndex to, const geometry::SE2WithCovariance& motion) {
+    CentreMotion one;
+    one.from = from;
+    one.from_T_to = motion;
+    graph.add_motion(one, to);
+  }
+  void settle() {
+    for (int i = 0; i < 6; ++i) REQUIRE(graph.solve().ok);
+  }
+  std::vector<geometry::SE2> poses() const {
+    std::vector<geometry::SE2> result;
+    for (const NodeIndex node : nodes) result.push_back(graph.pose(node));
+    result.push_back(graph.pose(last));
+    return result;
+  }
+};
+
+double apart(const std::vector<geometry::SE2>& a, const std::vector<geometry::SE2>& b) {
+  double worst_m = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    worst_m = std::max(worst_m, (a[i].translation() - b[i].translation()).norm());
+  return worst_m;
+}
+
+}  // namespace
+
+TEST_CASE("Frozen nodes leave the rest where it was, and as sure", "[freezing]") {
+  for (const bool crosses : {false, true}) {
+    for (const std::uint64_t seed : {1, 2, 3, 4}) {
+      Way way(seed, crosses);
+      INFO("crosses " << crosses << ", seed " << seed);
+      const auto before = way.poses();
+      const Eigen::Matrix3d covariance = way.graph.marginal(way.last).covariance;
+      const double sigma_m = std::sqrt(covariance.topLeftCorner<2, 2>().trace());
+
+      const std::vector<NodeIndex> middle(way.nodes.begin() + 8, way.nodes.begin() + 32);
+      way.graph.checkpoint();
+      REQUIRE(way.graph.freeze(middle));
+      CHECK(way.graph.frozen_count() == middle.size());
+      way.settle();
+      CHECK(apart(before, way.poses()) < 0.02 * sigma_m);
+      CHECK(way.graph.marginal(way.last).covariance.isApprox(covariance, 0.01));
+
+      // In two steps, and all back.
+      const std::vector<NodeIndex> more(way.nodes.begin() + 5, way.nodes.begin() + 8);
+      REQUIRE(way.graph.freeze(more));
+      way.settle();
+      CHECK(way.graph.marginal(way.last).covariance.isApprox(covariance, 0.01));
+      way.graph.thaw(std::vector<NodeIndex>(way.nodes.begin() + 12, way.nodes.begin() + 16));
+      way.settle();
+      CHECK(apart(before, way.poses()) < 0.02 * sigma_m);
+      CHECK(way.graph.marginal(way.nodes[14]).covariance.trace() > 0.0);
+      way.graph.thaw(way.nodes);
+      CHECK(way.graph.frozen_count() == 0);
+      way.settle();
+      CHECK(apart(before, way.poses()) < 0.01 * sigma_m);
+      CHECK(way.graph.marginal(way.last).covariance.isApprox(covariance, 0.01));
+    }
+  }
+}
+
+TEST_CASE("A closure moves what is frozen as if it was not", "[freezing]") {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    Way frozen(seed, false);
+    Way free(seed, false);
+    const std::vector<NodeIndex> middle(frozen.nodes.begin() + 8, frozen.nodes.begin() + 32);
+    REQUIRE(frozen.graph.freeze(middle));
+    frozen.settle();
+    geometry::SE2WithCovariance closure;
+    closure.mean = frozen.graph.pose(frozen.nodes[2]).inverse() * frozen.graph.pose(frozen.last) *
+                   geometry::SE2(1.5, -1.0, 0.04);
+    closure.covariance = Eigen::Vector3d(1e-4, 1e-4, 1e-6).asDiagonal();
+    for (Way* way : {&frozen, &free}) {
+      way->graph.add_closure(1, way->nodes[2], way->last, closure);
+      way->settle();
+    }
+    frozen.graph.settle_frozen();
+    CHECK(apart(frozen.poses(), free.poses()) < 0.05);
+
+    frozen.graph.thaw(frozen.nodes);
+    frozen.settle();
+    free.settle();
+    CHECK(apart(frozen.poses(), free.poses()) < 0.02);
+  }
+}
+
+TEST_CASE("A frozen graph is the same after a load", "[freezing]") {
+  Way way(5, true);
+  const std::vector<NodeIndex> middle(way.nodes.begin() + 8, way.nodes.begin() + 32);
+  REQUIRE(way.graph.freeze(middle));
+  way.settle();
+  constexpr state::Format kFormat{"test", 1};
+  PoseGraph loaded{SmoothingMapperParameters{}};
+  state::load(state::save(kFormat, way.graph), kFormat, loaded);
+  for (int i = 0; i < 6; ++i) REQUIRE(loaded.solve().ok);
+  CHECK(loaded.frozen_count() == middle.size());
+  for (const NodeIndex node : way.nodes)
+    CHECK((loaded.pose(node).translation() - way.graph.pose(node).translation()).norm() < 1e-3);
+  CHECK(
+      loaded.marginal(way.last).covariance.isApprox(way.graph.marginal(way.last).covariance, 0.01));
+}
