@@ -89,8 +89,7 @@ std::vector<FrozenPart> parts_of(std::span<const FrozenMotion> motions,
   std::vector<FrozenPart> result;
   for (auto& [root, part] : parts) {
     std::ranges::sort(part.outer);
-    const auto twice = std::ranges::unique(part.outer);
-    part.outer.erase(twice.begin(), twice.end());
+    part.outer.erase(std::unique(part.outer.begin(), part.outer.end()), part.outer.end());
     result.push_back(std::move(part));
   }
   return result;
