@@ -94,6 +94,8 @@ struct Retirement {
   geometry::SE2WithCovariance into_T_node;
 };
 
+struct LooseGraph;
+
 /// What adds nothing to the map any more.
 struct Surplus {
   std::vector<Retirement> nodes;
@@ -207,6 +209,13 @@ class PoseGraph {
   /// Ids of all landmarks in the solved graph, ascending. O(landmarks in it).
   std::vector<model::LandmarkId> awake() const;
 
+  /// All that was measured, for another graph to absorb. O(graph).
+  LooseGraph loosened();
+  /// Adds all of another graph, moved to `map_T_other`; its paths count from `further_m` [m] on.
+  /// What held it is not among it: a measurement between the two must follow before the graph is
+  /// solved. Returns the number of its first node: the others follow. Cost: the other graph.
+  NodeIndex absorb(const LooseGraph& other, const geometry::SE2& map_T_other, double further_m);
+
   /// Updates the estimates. Not `ok` where the measurements leave variables undetermined.
   factor_graph::plane::SmootherUpdate solve() { return smoother_.update(); }
 
@@ -317,6 +326,8 @@ class PoseGraph {
   void freeze_motions(const std::set<NodeIndex>& nodes);
   void thaw_motions();
   void condense_frozen(const std::vector<FrozenPart>& parts);
+  std::vector<FrozenMotion> loose_motions() const;
+  void absorb(const FrozenMotion& motion, NodeIndex first);
   factor_graph::plane::RelativePose tie(const TiedNodes& nodes,
                                         std::span<const model::LandmarkId> ids) const;
   bool has_left(NodeIndex node);
