@@ -256,7 +256,7 @@ class MapperAdapter : public bus::Adapter {
   void begin_with(const std::vector<model::MapLandmark>& landmarks) {
     stage_->start_with(landmarks);
     (void)stage_->take_changed_landmarks();
-    memory_.known.map_id = model::map_of(landmarks.front().id);
+    memory_.known.map_id = model::map_of(landmarks.back().id);
     memory_.known.landmarks = stage_->landmarks();
     ++memory_.known.version;
     memory_.map_is_published = false;

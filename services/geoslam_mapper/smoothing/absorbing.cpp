@@ -10,7 +10,7 @@ namespace understory::geoslam_mapper::smoothing {
 namespace plane = factor_graph::plane;
 
 LooseGraph PoseGraph::loosened() {
-  settle_frozen();
+  unfreeze();
   LooseGraph loose;
   for (const Node& node : nodes_) {
     LooseGraph::LooseNode& one = loose.nodes.emplace_back();

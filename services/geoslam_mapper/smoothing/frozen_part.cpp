@@ -1,5 +1,6 @@
 #include "services/geoslam_mapper/smoothing/frozen_part.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <map>
@@ -12,6 +13,12 @@ namespace plane = factor_graph::plane;
 
 /// Keeps a pose where it is: a micrometre, a microradian.
 const Eigen::Matrix3d kHeld = 1e12 * Eigen::Matrix3d::Identity();
+/// What an outer node is held with where it is, while a part is solved: a tie of few landmarks may
+/// leave it open, and the far end of a long chain is all but open [1/m^2, 1/rad^2]. It is taken out
+/// of the result exactly, and keeps what is inverted well conditioned.
+constexpr double kLeash = 1e-2;
+/// Share of the largest eigenvalue of an information that is rounding.
+constexpr double kRounding = 1e-15;
 /// Updates of a part; a chain that is bent by metres takes some.
 constexpr int kUpdates = 12;
 /// They end where no pose moves by more [m].
@@ -23,7 +30,7 @@ struct Solved {
   std::map<NodeIndex, plane::PoseId> pose_of;
 };
 
-/// `held`: how many of the outer nodes stay where they are.
+/// `held`: how many of the outer nodes stay where they are; the others are on a leash.
 std::optional<Solved> solve(const FrozenPart& part, const PoseOf& pose_of, std::size_t held) {
   plane::SmootherParameters parameters;
   parameters.relinearise_above = 1e-4;
@@ -34,13 +41,23 @@ std::optional<Solved> solve(const FrozenPart& part, const PoseOf& pose_of, std::
   };
   for (std::size_t i = 0; i < part.outer.size(); ++i) {
     const plane::PoseId pose = add(part.outer[i]);
-    if (i < held) solved.smoother.add(plane::PosePrior{pose, pose_of(part.outer[i]), kHeld});
+    const Eigen::Matrix3d information =
+        i < held ? kHeld : Eigen::Matrix3d(kLeash * Eigen::Matrix3d::Identity());
+    solved.smoother.add(plane::PosePrior{pose, pose_of(part.outer[i]), information});
   }
   for (const NodeIndex node : part.inner) add(node);
   for (const FrozenMotion& one : part.motions) {
     solved.smoother.add(plane::RelativePose{solved.pose_of.at(one.a), solved.pose_of.at(one.b),
                                             one.a_T_b, one.information});
   }
+
+  std::vector<plane::CondensedPoses> earlier;
+  for (const FrozenFactor& one : part.factors) {
+    plane::CondensedPoses& factor = earlier.emplace_back(one.measured);
+    factor.poses.clear();
+    for (const NodeIndex node : one.nodes) factor.poses.push_back(solved.pose_of.at(node));
+  }
+  solved.smoother.set_condensed(earlier);
 
   std::vector<geometry::SE2> before;
   for (const auto& [node, pose] : solved.pose_of) before.push_back(solved.smoother.pose(pose));
@@ -69,21 +86,42 @@ NodeIndex root_of(NodeIndex node, std::map<NodeIndex, NodeIndex>& parent) {
 }  // namespace
 
 std::vector<FrozenPart> parts_of(std::span<const FrozenMotion> motions,
-                                 const std::set<NodeIndex>& frozen) {
+                                 std::span<const FrozenFactor> factors,
+                                 const std::set<NodeIndex>& nodes) {
   std::map<NodeIndex, NodeIndex> parent;
-  for (const NodeIndex node : frozen) parent.emplace(node, node);
+  for (const NodeIndex node : nodes) parent.emplace(node, node);
+  const auto is_inner = [&](NodeIndex node) { return nodes.contains(node); };
+  const auto first_inner = [&](const FrozenFactor& factor) {
+    return std::find_if(factor.nodes.begin(), factor.nodes.end(), is_inner);
+  };
+
+  // What hangs together.
   for (const FrozenMotion& one : motions) {
-    if (frozen.contains(one.a) && frozen.contains(one.b))
-      parent[root_of(one.a, parent)] = root_of(one.b, parent);
+    if (is_inner(one.a) && is_inner(one.b)) parent[root_of(one.a, parent)] = root_of(one.b, parent);
+  }
+  for (const FrozenFactor& factor : factors) {
+    const auto first = first_inner(factor);
+    for (auto node = first; node != factor.nodes.end(); ++node)
+      if (is_inner(*node)) parent[root_of(*node, parent)] = root_of(*first, parent);
   }
 
+  // The parts, and what they are tied to.
   std::map<NodeIndex, FrozenPart> parts;
-  for (const NodeIndex node : frozen) parts[root_of(node, parent)].inner.push_back(node);
+  for (const NodeIndex node : nodes) parts[root_of(node, parent)].inner.push_back(node);
   for (const FrozenMotion& one : motions) {
-    FrozenPart& part = parts.at(root_of(frozen.contains(one.a) ? one.a : one.b, parent));
+    if (!is_inner(one.a) && !is_inner(one.b)) continue;
+    FrozenPart& part = parts.at(root_of(is_inner(one.a) ? one.a : one.b, parent));
     part.motions.push_back(one);
     for (const NodeIndex end : {one.a, one.b})
-      if (!frozen.contains(end)) part.outer.push_back(end);
+      if (!is_inner(end)) part.outer.push_back(end);
+  }
+  for (const FrozenFactor& factor : factors) {
+    const auto first = first_inner(factor);
+    if (first == factor.nodes.end()) continue;
+    FrozenPart& part = parts.at(root_of(*first, parent));
+    part.factors.push_back(factor);
+    for (const NodeIndex node : factor.nodes)
+      if (!is_inner(node)) part.outer.push_back(node);
   }
 
   std::vector<FrozenPart> result;
@@ -95,7 +133,7 @@ std::vector<FrozenPart> parts_of(std::span<const FrozenMotion> motions,
   return result;
 }
 
-std::optional<plane::CondensedPoses> condensed(const FrozenPart& part, const PoseOf& pose_of) {
+std::optional<FrozenFactor> condensed(const FrozenPart& part, const PoseOf& pose_of) {
   if (part.outer.size() < 2) return std::nullopt;
   const auto solved = solve(part, pose_of, 1);
   if (!solved) return std::nullopt;
@@ -105,25 +143,41 @@ std::optional<plane::CondensedPoses> condensed(const FrozenPart& part, const Pos
     others.push_back(solved->pose_of.at(part.outer[i]));
   const auto joint = solved->smoother.joint_marginal(others, {});
   if (!joint) return std::nullopt;
+  const Eigen::MatrixXd leashed = joint->inverse();
+  if (!leashed.allFinite()) return std::nullopt;
 
-  plane::CondensedPoses result;
+  // Without the leash: what is left is positive semidefinite but for rounding.
+  const Eigen::MatrixXd leash = kLeash * Eigen::MatrixXd::Identity(leashed.rows(), leashed.cols());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(
+      0.5 * (leashed + leashed.transpose()) - leash);
+  const Eigen::VectorXd values = solver.eigenvalues().cwiseMax(0.0);
+  const double least = kRounding * values.maxCoeff();
+  const Eigen::VectorXd inverse_values =
+      values.unaryExpr([&](double value) { return value > least ? 1.0 / value : 0.0; });
+
+  // Where it leaves the nodes: the leash pulled them towards where they were.
+  Eigen::VectorXd pulled(leashed.rows());
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    const geometry::SE2 was_T_now =
+        pose_of(part.outer[i + 1]).inverse() * solved->smoother.pose(others[i]);
+    pulled.segment<3>(3 * static_cast<Eigen::Index>(i)) = was_T_now.Log();
+  }
+  const Eigen::VectorXd further = solver.eigenvectors() * inverse_values.asDiagonal() *
+                                  solver.eigenvectors().transpose() * (leash * pulled);
+
+  FrozenFactor factor{part.outer, {}};
+  plane::CondensedPoses& result = factor.measured;
   const geometry::SE2 first_T_map =
       solved->smoother.pose(solved->pose_of.at(part.outer.front())).inverse();
-  for (const plane::PoseId other : others)
-    result.first_T_other.push_back(first_T_map * solved->smoother.pose(other));
-  const Eigen::MatrixXd information = joint->inverse();
-  result.information = 0.5 * (information + information.transpose());
-  if (!result.information.allFinite()) return std::nullopt;
-  return result;
-}
-
-std::vector<geometry::SE2> inner_poses(const FrozenPart& part, const PoseOf& pose_of) {
-  std::vector<geometry::SE2> result;
-  result.reserve(part.inner.size());
-  const auto solved = solve(part, pose_of, part.outer.size());
-  for (const NodeIndex node : part.inner)
-    result.push_back(solved ? solved->smoother.pose(solved->pose_of.at(node)) : pose_of(node));
-  return result;
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    const Eigen::Vector3d one = further.segment<3>(3 * static_cast<Eigen::Index>(i));
+    result.first_T_other.push_back(first_T_map * solved->smoother.pose(others[i]) *
+                                   geometry::SE2::Exp(one));
+  }
+  result.information =
+      solver.eigenvectors() * values.asDiagonal() * solver.eigenvectors().transpose();
+  result.information = 0.5 * (result.information + result.information.transpose()).eval();
+  return factor;
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -226,15 +226,9 @@ Closures::Decision OneMap::take(const model::LoopClosure& closure) {
     return {model::LoopResult::Status::kRefused, what + " is not in the graph"};
   }
 
-  // Their covariances are asked for, and those of the ones that wait.
-  std::vector<NodeIndex> ends = closures_.ends();
-  ends.insert(ends.end(), {from->node, to->node});
-  map_.graph.checkpoint();
-  map_.graph.thaw(ends);
-  (void)map_.graph.solve();
-  Closures::Decision decision = closures_.take(closure, *from, *to, map_);
-  map_.graph.settle_frozen();
-  return decision;
+  // It may move all between its ends, and covariances across the whole map are asked for.
+  map_.unfreeze();
+  return closures_.take(closure, *from, *to, map_);
 }
 
 std::optional<ClosureEnd> OneMap::end_of(const model::LoopEnd& end) const {

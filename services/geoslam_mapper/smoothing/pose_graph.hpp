@@ -191,12 +191,20 @@ class PoseGraph {
   /// measurement of the nodes around them (frozen_part). They must be condensed ones with nothing
   /// in the graph but motions; others among them are passed over. False, and nothing is changed,
   /// where what is left would be tied at too many nodes. Undone by thaw(). Cost: one factorisation
-  /// of all that is frozen.
+  /// of these nodes, however many were frozen before. Another node holds the solved graph from then
+  /// on, where it is, so that what far linearisations leave does not move the ground around the
+  /// vehicle; the origin stays as a variable, and covariances count from it.
   bool freeze(std::span<const NodeIndex> nodes);
   /// Takes nodes into the solved graph again, where they are frozen. The same cost.
   void thaw(std::span<const NodeIndex> nodes);
-  /// Moves what is frozen to where the nodes around it are now.
-  void settle_frozen();
+  /// Takes all frozen nodes into the solved graph again, and holds it at the origin of the map:
+  /// what is to be joined with it may move all of them. The same cost.
+  void unfreeze();
+  /// The node that carries the origin of the map; none where the map was given.
+  std::optional<NodeIndex> origin() const;
+  /// From now on the node counts as a condensed one: it gets nothing more. For the origin, which is
+  /// in no stretch, once it is far behind.
+  void close(NodeIndex node) { edit(node).is_condensed = true; }
   /// Whether the node is out of the solved graph.
   bool is_frozen(NodeIndex node) const { return frozen_.contains(node); }
   /// Number of nodes out of the solved graph.
@@ -271,7 +279,7 @@ class PoseGraph {
     a(graph, self.nodes_, self.landmark_of_point_, self.gyro_, self.newest_, self.free_nodes_,
       self.free_points_, self.free_observations_, self.free_motions_, self.free_biased_,
       self.dormant_, self.ties_, self.closures_, self.away_ties_, self.free_away_ties_,
-      self.frozen_motions_);
+      self.frozen_motions_, self.origin_, self.anchor_);
     std::vector<NodeIndex> frozen(self.frozen_.begin(), self.frozen_.end());
     a(frozen);
     if constexpr (Archive::kReads) self.frozen_.insert(frozen.begin(), frozen.end());
@@ -279,12 +287,24 @@ class PoseGraph {
   }
 
  private:
+  /// A node that holds the solved graph.
+  struct Anchor {
+    NodeIndex node = 0;
+    geometry::SE2 map_T_node;  ///< As it was when it began to hold the graph.
+
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& s) {
+      a(s.node, s.map_T_node);
+    }
+  };
   struct Checkpoint {
     std::size_t nodes = 0;
     std::size_t points = 0;
     std::optional<NodeIndex> newest;
     std::map<NodeIndex, Node> changed;  ///< Of those there were, as they were.
     std::map<std::uint32_t, std::uint64_t> closures;
+    std::optional<Anchor> origin;
+    std::optional<Anchor> anchor;
     std::vector<factor_graph::plane::PointId> restarted;  ///< Points with a landmark again.
     /// Points whose landmark was joined with another one.
     std::vector<std::pair<factor_graph::plane::PointId, model::LandmarkId>> dropped;
@@ -323,9 +343,19 @@ class PoseGraph {
   void take_out(factor_graph::plane::MotionId motion);
   void take_away_tie_out(AwayTieId tie);
   bool may_freeze(NodeIndex node) const;
+  void hold(const Anchor& anchor);
+  std::optional<Anchor> anchor_beyond(const std::set<NodeIndex>& going) const;
+  /// The origin is a variable like others then.
+  bool is_held_elsewhere() const { return origin_ && anchor_->node != origin_->node; }
+  Eigen::Matrix3d anchor_covariance() const;
+  Eigen::Matrix3d of_anchor(const geometry::SE2& map_T_node, const Eigen::Matrix3d& anchor) const;
+  Eigen::Matrix2d of_anchor(const Eigen::Vector2d& position_m, const Eigen::Matrix3d& anchor) const;
   void freeze_motions(const std::set<NodeIndex>& nodes);
   void thaw_motions();
-  void condense_frozen(const std::vector<FrozenPart>& parts);
+  std::optional<std::vector<FrozenFactor>> condense_parts(
+      const std::vector<FrozenPart>& parts) const;
+  void set_frozen_factors();
+  void recondense_frozen();
   std::vector<FrozenMotion> loose_motions() const;
   void absorb(const FrozenMotion& motion, NodeIndex first);
   factor_graph::plane::RelativePose tie(const TiedNodes& nodes,
@@ -366,6 +396,7 @@ class PoseGraph {
   std::vector<AwayTieId> free_away_ties_;
   std::set<NodeIndex> frozen_;
   std::vector<FrozenMotion> frozen_motions_;  ///< With an end that is frozen.
+  std::vector<FrozenFactor> frozen_factors_;  ///< In the solved graph; from the motions.
   /// What is dormant of a node's landmarks, and where the node was when they last followed it.
   struct DormantOfNode {
     std::vector<model::LandmarkId> landmarks;
@@ -373,6 +404,8 @@ class PoseGraph {
   };
   std::vector<DormantOfNode> dormant_of_node_;  ///< By node; from dormant_.
   std::optional<NodeIndex> newest_;             ///< Added last.
+  std::optional<Anchor> origin_;                ///< The first keyframe's.
+  std::optional<Anchor> anchor_;                ///< What holds the solved graph now.
   FreeNumbers free_nodes_;
   FreeNumbers free_points_;
   FreeNumbers free_observations_;
