@@ -194,7 +194,13 @@ void Smoother::set(ObservationId id, const PointObservation& factor) {
 }
 
 void Smoother::hold(PoseId id, const geometry::SE2& mean) {
-  if (state_->held) state_->smoother.remove(*state_->held);
+  if (state_->held) {
+    const graph::FactorId before = *state_->held;
+    const auto released =
+        static_cast<graph::VariableId>(state_->smoother.graph().variables_of(index(before))[0]);
+    state_->smoother.remove(before);
+    state_->smoother.renew_scale(released);
+  }
   state_->held = state_->smoother.add(graph::prior(state_->name(id), mean, kHeld));
 }
 
@@ -203,7 +209,10 @@ void Smoother::set_condensed(std::span<const CondensedPoses> measured) {
   state_->condensed.clear();
   for (const CondensedPoses& one : measured) {
     graph::CondensedFactor factor;
-    for (const PoseId pose : one.poses) factor.variables.push_back(state_->name(pose));
+    for (const PoseId pose : one.poses) {
+      factor.variables.push_back(state_->name(pose));
+      state_->smoother.renew_scale(state_->name(pose));
+    }
     factor.measurement.resize(3 * static_cast<Eigen::Index>(one.first_T_other.size()));
     for (std::size_t i = 0; i < one.first_T_other.size(); ++i)
       factor.measurement.segment<3>(3 * static_cast<Eigen::Index>(i)) =

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <utility>
 
@@ -126,7 +127,9 @@ std::vector<FrozenPart> parts_of(std::span<const FrozenMotion> motions,
 
   std::vector<FrozenPart> result;
   for (auto& [root, part] : parts) {
-    std::ranges::sort(part.outer);
+    // The origin of the map, node 0, last: seen from there all others are one far away, and what
+    // they measure of it drowns in rounding.
+    std::ranges::sort(part.outer, std::greater{});
     part.outer.erase(std::unique(part.outer.begin(), part.outer.end()), part.outer.end());
     result.push_back(std::move(part));
   }

@@ -38,7 +38,7 @@ struct FrozenFactor {
 /// Nodes to be frozen that hang together, and the nodes that they are tied to.
 struct FrozenPart {
   std::vector<NodeIndex> inner;
-  std::vector<NodeIndex> outer;  ///< The first on the path first.
+  std::vector<NodeIndex> outer;  ///< The origin of the map last.
   std::vector<FrozenMotion> motions;
   std::vector<FrozenFactor> factors;  ///< Of nodes that were frozen before.
 };
