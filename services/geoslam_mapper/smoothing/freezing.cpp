@@ -157,7 +157,7 @@ void PoseGraph::hold(const Anchor& anchor) {
 }
 
 /// The condensed node that stays in the solved graph and is nearest on the path to those that go.
-std::optional<PoseGraph::Anchor> PoseGraph::anchor_beyond(const std::set<NodeIndex>& going) const {
+std::optional<Anchor> PoseGraph::anchor_beyond(const std::set<NodeIndex>& going) const {
   double last_m = -std::numeric_limits<double>::infinity();
   for (const NodeIndex node : going) last_m = std::max(last_m, nodes_[node].along_m);
   const std::set<std::uint32_t> free(free_nodes_.numbers().begin(), free_nodes_.numbers().end());

@@ -3,7 +3,9 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -76,12 +78,41 @@ std::optional<Solved> solve(const FrozenPart& part, const PoseOf& pose_of, std::
   return solved;
 }
 
-/// The one that stands for a set of nodes.
-NodeIndex root_of(NodeIndex node, std::map<NodeIndex, NodeIndex>& parent) {
-  NodeIndex root = node;
-  while (parent.at(root) != root) root = parent.at(root);
-  while (parent.at(node) != root) node = std::exchange(parent.at(node), root);
-  return root;
+/// Sets of nodes that hang together (union-find).
+class Bundles {
+ public:
+  explicit Bundles(const std::set<NodeIndex>& nodes) {
+    for (const NodeIndex node : nodes) parent_.emplace(node, node);
+  }
+
+  bool contains(NodeIndex node) const { return parent_.contains(node); }
+  void tie(NodeIndex a, NodeIndex b) { parent_[root_of(a)] = root_of(b); }
+  /// The one that stands for all of a bundle.
+  NodeIndex root_of(NodeIndex node) {
+    NodeIndex root = node;
+    while (parent_.at(root) != root) root = parent_.at(root);
+    while (parent_.at(node) != root) node = std::exchange(parent_.at(node), root);
+    return root;
+  }
+
+ private:
+  std::map<NodeIndex, NodeIndex> parent_;
+};
+
+/// Ties those of these nodes that are among the bundles; one of them, none where there is none.
+std::optional<NodeIndex> tie_all(std::span<const NodeIndex> nodes, Bundles& bundles) {
+  std::optional<NodeIndex> first;
+  for (const NodeIndex node : nodes) {
+    if (!bundles.contains(node)) continue;
+    if (first) bundles.tie(node, *first);
+    first = node;
+  }
+  return first;
+}
+
+void add_outer(std::span<const NodeIndex> nodes, const Bundles& bundles, FrozenPart& part) {
+  std::copy_if(nodes.begin(), nodes.end(), std::back_inserter(part.outer),
+               [&](NodeIndex node) { return !bundles.contains(node); });
 }
 
 }  // namespace
@@ -89,46 +120,35 @@ NodeIndex root_of(NodeIndex node, std::map<NodeIndex, NodeIndex>& parent) {
 std::vector<FrozenPart> parts_of(std::span<const FrozenMotion> motions,
                                  std::span<const FrozenFactor> factors,
                                  const std::set<NodeIndex>& nodes) {
-  std::map<NodeIndex, NodeIndex> parent;
-  for (const NodeIndex node : nodes) parent.emplace(node, node);
-  const auto is_inner = [&](NodeIndex node) { return nodes.contains(node); };
-  const auto first_inner = [&](const FrozenFactor& factor) {
-    return std::find_if(factor.nodes.begin(), factor.nodes.end(), is_inner);
-  };
-
   // What hangs together.
+  Bundles bundles(nodes);
+  std::vector<std::pair<NodeIndex, const FrozenMotion*>> of_motions;
   for (const FrozenMotion& one : motions) {
-    if (is_inner(one.a) && is_inner(one.b)) parent[root_of(one.a, parent)] = root_of(one.b, parent);
+    if (const auto node = tie_all(std::array{one.a, one.b}, bundles))
+      of_motions.emplace_back(*node, &one);
   }
-  for (const FrozenFactor& factor : factors) {
-    const auto first = first_inner(factor);
-    for (auto node = first; node != factor.nodes.end(); ++node)
-      if (is_inner(*node)) parent[root_of(*node, parent)] = root_of(*first, parent);
-  }
+  std::vector<std::pair<NodeIndex, const FrozenFactor*>> of_factors;
+  for (const FrozenFactor& one : factors)
+    if (const auto node = tie_all(one.nodes, bundles)) of_factors.emplace_back(*node, &one);
 
   // The parts, and what they are tied to.
   std::map<NodeIndex, FrozenPart> parts;
-  for (const NodeIndex node : nodes) parts[root_of(node, parent)].inner.push_back(node);
-  for (const FrozenMotion& one : motions) {
-    if (!is_inner(one.a) && !is_inner(one.b)) continue;
-    FrozenPart& part = parts.at(root_of(is_inner(one.a) ? one.a : one.b, parent));
-    part.motions.push_back(one);
-    for (const NodeIndex end : {one.a, one.b})
-      if (!is_inner(end)) part.outer.push_back(end);
+  for (const NodeIndex node : nodes) parts[bundles.root_of(node)].inner.push_back(node);
+  for (const auto& [node, one] : of_motions) {
+    FrozenPart& part = parts.at(bundles.root_of(node));
+    part.motions.push_back(*one);
+    add_outer(std::array{one->a, one->b}, bundles, part);
   }
-  for (const FrozenFactor& factor : factors) {
-    const auto first = first_inner(factor);
-    if (first == factor.nodes.end()) continue;
-    FrozenPart& part = parts.at(root_of(*first, parent));
-    part.factors.push_back(factor);
-    for (const NodeIndex node : factor.nodes)
-      if (!is_inner(node)) part.outer.push_back(node);
+  for (const auto& [node, one] : of_factors) {
+    FrozenPart& part = parts.at(bundles.root_of(node));
+    part.factors.push_back(*one);
+    add_outer(one->nodes, bundles, part);
   }
 
+  // The origin of the map, node 0, last: seen from there all others are one far away, and what they
+  // measure of it drowns in rounding.
   std::vector<FrozenPart> result;
   for (auto& [root, part] : parts) {
-    // The origin of the map, node 0, last: seen from there all others are one far away, and what
-    // they measure of it drowns in rounding.
     std::ranges::sort(part.outer, std::greater{});
     part.outer.erase(std::unique(part.outer.begin(), part.outer.end()), part.outer.end());
     result.push_back(std::move(part));

@@ -87,6 +87,18 @@ struct AwayLandmarks {
   std::vector<AwayTieId> ties;
 };
 
+/// A node that holds the solved graph.
+struct Anchor {
+  NodeIndex node = 0;
+  geometry::SE2 map_T_node;  ///< As it was when it began to hold the graph.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.node, s.map_T_node);
+  }
+};
+
 /// A node to be taken out, and the node that gets what it observed.
 struct Retirement {
   NodeIndex node = 0;
@@ -287,16 +299,6 @@ class PoseGraph {
   }
 
  private:
-  /// A node that holds the solved graph.
-  struct Anchor {
-    NodeIndex node = 0;
-    geometry::SE2 map_T_node;  ///< As it was when it began to hold the graph.
-
-    template <class Archive, class Self>
-    static void archive(Archive& a, Self& s) {
-      a(s.node, s.map_T_node);
-    }
-  };
   struct Checkpoint {
     std::size_t nodes = 0;
     std::size_t points = 0;
