@@ -30,7 +30,7 @@ class Stack {
       map_ = wire::decode_message<model::WholeMap>(message.bytes).value();
     });
     bus_.subscribe("LOOP_CLOSURE", 0, [this](const bus::BusMessage& message) {
-      bytes_.push_back(message.bytes);
+      bytes_.emplace_back(message.bytes.begin(), message.bytes.end());
       closures.push_back(wire::decode_message<model::LoopClosure>(message.bytes).value());
     });
     bus_.subscribe("LOOP_RESULT", 0, [this](const bus::BusMessage& message) {

@@ -9,8 +9,8 @@
 namespace understory::eval::experiments::loops {
 
 /// Poses of all frames, first_T_vehicle, by least squares on all odometry and all detections with
-/// their true trees, as their covariances state them; from the true poses on. Throws
-/// std::runtime_error where it does not converge.
+/// their true trees, from the true poses on. Detections count by the noise that their residuals
+/// show, whatever is stated. Throws std::runtime_error where it does not converge.
 std::vector<geometry::SE2> batch_poses(const LoopDrive& drive);
 
 }  // namespace understory::eval::experiments::loops

@@ -11,8 +11,8 @@
 namespace understory::eval::experiments::loops {
 namespace {
 
-/// Detections of one tree are nearer to its mean.
-constexpr double kSameTreeM = 0.25;
+/// Detections of one tree are nearer to the mean of those before.
+constexpr double kSameTreeM = 0.15;
 /// An odometry that states no error at all could not be told from a truth [m], [rad].
 constexpr double kLeastSigmaM = 1e-4;
 constexpr double kLeastSigmaRad = 1e-5;
@@ -38,8 +38,16 @@ class Trees {
         }
       }
     }
-    if (nearest >= 0) return nearest;
+    if (nearest >= 0) {
+      // Its cell stays that of its first detection.
+      Eigen::Vector2d& mean_m = trees_[static_cast<std::size_t>(nearest)];
+      double& count = counts_[static_cast<std::size_t>(nearest)];
+      count += 1.0;
+      mean_m += (place_m - mean_m) / count;
+      return nearest;
+    }
     trees_.push_back(place_m);
+    counts_.push_back(1.0);
     cells_[{x, y}].push_back(static_cast<int>(trees_.size()) - 1);
     return static_cast<int>(trees_.size()) - 1;
   }
@@ -50,7 +58,8 @@ class Trees {
     return {static_cast<int>(std::floor(place_m.x() / kSameTreeM)),
             static_cast<int>(std::floor(place_m.y() / kSameTreeM))};
   }
-  std::vector<Eigen::Vector2d> trees_;
+  std::vector<Eigen::Vector2d> trees_;  ///< Mean place of each.
+  std::vector<double> counts_;
   std::map<std::pair<int, int>, std::vector<int>> cells_;
 };
 
