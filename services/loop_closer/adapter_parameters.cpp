@@ -21,6 +21,10 @@ void describe(PlaceParameters& p, bus::ParameterTable& table) {
   table.add("places.known_share", p.known_share, {0.0, 1.0}, "",
             "Share of a keyframe's landmarks that are of earlier passes with which the mapper is "
             "on known ground: nothing is kept, nothing looked for.");
+  table.add("places.error_m", p.error_m, {0.0, 10.0}, "m",
+            "Standard deviation per axis that the pose of a closure has beside what its stems "
+            "show: the keyframes of a place lie to each other as the mapper has them.");
+  table.add("places.error_rad", p.error_rad, {0.0, 1.0}, "rad", "The same of its heading.");
 }
 
 void describe(AcceptanceParameters& p, bus::ParameterTable& table) {

@@ -122,6 +122,9 @@ std::optional<model::LoopClosure> LoopCloser::look_for(const Place& place) {
   closure.from = end_at(from, end_T_base);
   closure.to.keyframe = place.keyframe;
   closure.from_T_to = compound(end_T_base, best.place_T_query);
+  const double error_m = parameters_.places.error_m;
+  const Eigen::Vector3d error(error_m, error_m, parameters_.places.error_rad);
+  closure.from_T_to.covariance += Eigen::Matrix3d(error.array().square().matrix().asDiagonal());
   closure.log10_false_alarm = verdict.log10_false_alarm;
   sent_.add(closure.id, paths);
   ++counters_.sent;

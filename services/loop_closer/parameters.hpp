@@ -13,7 +13,9 @@ struct PlaceParameters {
   int min_stems = 5;
   int most_stems = 80;
   double min_loop_m = 100.0;  ///< Path.
-  double known_share = 0.5;   ///< Of a keyframe's associations.
+  double known_share = 0.3;   ///< Of a keyframe's associations.
+  double error_m = 0.05;
+  double error_rad = 0.003;
 };
 
 /// What a found place must show.
