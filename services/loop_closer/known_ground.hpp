@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <utility>
 
 #include "common/model/archive.hpp"
 #include "common/model/map.hpp"
@@ -30,22 +31,31 @@ class KnownGround {
     const auto is_old = [&](const model::Association& pair) {
       return is_back && pair.landmark_id <= newest_.front().newest;
     };
-    all_ = update.associations.size();
-    old_ = static_cast<std::size_t>(std::ranges::count_if(update.associations, is_old));
+    const auto old = std::ranges::count_if(update.associations, is_old);
+    counts_.push_back({update.associations.size(), static_cast<std::size_t>(old)});
+    if (counts_.size() > kKeyframes) counts_.pop_front();
   }
-  /// Whether at least this share of the last keyframe's landmarks is of earlier passes, and three.
+  /// Whether at least this share of the landmarks of the last keyframes is of earlier passes, and
+  /// three.
   bool is_known(double share) const {
-    return old_ >= 3 && static_cast<double>(old_) >= share * static_cast<double>(all_);
+    std::size_t all = 0;
+    std::size_t old = 0;
+    for (const auto& [all_of_one, old_of_one] : counts_) {
+      all += all_of_one;
+      old += old_of_one;
+    }
+    return old >= 3 && static_cast<double>(old) >= share * static_cast<double>(all);
   }
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.newest_, self.all_, self.old_);
+    a(self.newest_, self.counts_);
   }
 
  private:
   static constexpr double kStepM = 2.0;  ///< Who stands still needs no memory.
+  static constexpr std::size_t kKeyframes = 5;
   struct Newest {
     double along_m = 0.0;
     model::LandmarkId newest = 0;
@@ -57,8 +67,7 @@ class KnownGround {
   };
   double back_m_;
   std::deque<Newest> newest_;
-  std::size_t all_ = 0;
-  std::size_t old_ = 0;
+  std::deque<std::pair<std::size_t, std::size_t>> counts_;  ///< All, old; of the last keyframes.
 };
 
 }  // namespace understory::loop_closer
