@@ -40,21 +40,92 @@ loop_closer::LoopCloserParameters closer_parameters(const std::filesystem::path&
   return parameters;
 }
 
+/// What the loop closer asks and says, against the truth.
+class ClosureScore {
+ public:
+  explicit ClosureScore(const LoopDrive& drive) : drive_(drive) {
+    double along_m = 0.0;
+    for (std::size_t i = 0; i < drive.truth.size(); ++i) {
+      if (i > 0)
+        along_m += (drive.truth[i].translation() - drive.truth[i - 1].translation()).norm();
+      along_m_.push_back(along_m);
+    }
+  }
+
+  void count_query(std::size_t frame, double ms, LoopScore& score) {
+    double nearest_m = 1e9;
+    for (std::size_t i = 0; i < frame && along_m_[i] <= along_m_[frame] - kEarlierM; ++i)
+      nearest_m = std::min(
+          nearest_m, (drive_.truth[i].translation() - drive_.truth[frame].translation()).norm());
+    ++score.queries;
+    if (nearest_m > kNoMatchM) ++score.without_match;
+    if (nearest_m < kMatchM) ++score.with_match;
+    search_ms_.push_back(ms);
+  }
+
+  /// `from`, `to`: frames of its ends.
+  void judge(const model::LoopClosure& closure, std::size_t from, std::size_t to,
+             LoopScore& score) {
+    const geometry::SE2 truth = drive_.truth[from].inverse() * drive_.truth[to];
+    const Eigen::Vector3d off = (closure.from_T_to.mean.inverse() * truth).Log();
+    const double squared = off.dot(closure.from_T_to.covariance.llt().solve(off));
+    const double off_m = off.head<2>().norm();
+    const bool is_wrong = off_m > kWrongM && squared > kWrongSigmas * kWrongSigmas;
+    sent_[closure.id] = {along_m_[to], is_wrong};
+    ++score.sent;
+    if (is_wrong) ++score.sent_wrong;
+    score.mean_nees += squared;
+    score.largest_off_m = std::max(score.largest_off_m, off_m);
+  }
+
+  void accept(std::uint64_t id, LoopScore& score) {
+    if (score.first_accepted_m < 0.0) score.first_accepted_m = sent_.at(id).along_m;
+    accepted_.insert(id);
+  }
+
+  void sum_up(const loop_closer::LoopCloser& closer, LoopScore& score) const {
+    if (score.sent > 0) score.mean_nees /= static_cast<double>(score.sent);
+    score.accepted = accepted_.size();
+    for (const std::uint64_t id : accepted_) score.accepted_wrong += sent_.at(id).is_wrong;
+    score.search_ms_p50 = tools::quantile(search_ms_, 0.5);
+    score.search_ms_p99 = tools::quantile(search_ms_, 0.99);
+    score.unexpected = closer.counters().unexpected;
+  }
+
+ private:
+  struct Sent {
+    double along_m = 0.0;
+    bool is_wrong = false;
+  };
+  const LoopDrive& drive_;
+  std::vector<double> along_m_;
+  std::map<std::uint64_t, Sent> sent_;
+  std::set<std::uint64_t> accepted_;
+  std::vector<double> search_ms_;
+};
+
+/// Asks the loop closer, and notes what it does.
+std::optional<model::LoopClosure> ask(const model::MapUpdate& update, std::size_t frame,
+                                      loop_closer::LoopCloser& closer, ClosureScore& closures,
+                                      LoopScore& score) {
+  const std::uint64_t before = closer.counters().queries;
+  const double start_s = tools::thread_time_s();
+  auto closure = closer.add(update);
+  if (closer.counters().queries > before)
+    closures.count_query(frame, 1e3 * (tools::thread_time_s() - start_s), score);
+  return closure;
+}
+
 /// One drive through the stages.
 class LoopRun {
  public:
   LoopRun(const LoopDrive& drive, const std::filesystem::path& config_dir, bool with_loop_closer)
       : drive_(drive),
         chain_({keyframer::keyframer_service(), geoslam_mapper::geoslam_mapper_service()},
-               config_dir) {
+               config_dir),
+        scores_(drive) {
     if (with_loop_closer) closer_.emplace(closer_parameters(config_dir));
-    double along_m = 0.0;
-    for (std::size_t i = 0; i < drive.truth.size(); ++i) {
-      frame_at_[drive.scans[i].utime] = i;
-      if (i > 0)
-        along_m += (drive.truth[i].translation() - drive.truth[i - 1].translation()).norm();
-      along_m_.push_back(along_m);
-    }
+    for (std::size_t i = 0; i < drive.scans.size(); ++i) frame_at_[drive.scans[i].utime] = i;
     watch();
   }
 
@@ -79,9 +150,6 @@ class LoopRun {
     });
     chain_.watch<model::MapUpdate>("SLAM_UPDATE",
                                    [this](const model::MapUpdate& update) { follow(update); });
-    chain_.watch<model::Submap>("SUBMAP", [this](const model::Submap& submap) {
-      if (closer_) closer_->add(submap);
-    });
     chain_.watch<model::LoopResult>("LOOP_RESULT",
                                     [this](const model::LoopResult& result) { follow(result); });
     chain_.watch<model::WholeMap>("MAP", [this](const model::WholeMap& map) { last_map_ = map; });
@@ -100,15 +168,8 @@ class LoopRun {
       score_.online_m = (update.map_T_vehicle.translation() - truth.translation()).norm();
     }
     if (!closer_) return;
-
-    const std::uint64_t before = closer_->counters().queries;
-    const double start_s = tools::thread_time_s();
-    auto closure = closer_->add(update);
-    if (closer_->counters().queries > before) {
-      search_ms_.push_back(1e3 * (tools::thread_time_s() - start_s));
-      count_query(frame);
-    }
-    if (closure) closures_.push_back(std::move(*closure));
+    if (auto closure = ask(update, frame, *closer_, scores_, score_))
+      closures_.push_back(std::move(*closure));
   }
 
   void follow(const model::LoopResult& result) {
@@ -116,26 +177,14 @@ class LoopRun {
     using enum model::LoopResult::Status;
     if (result.status == kRefused) ++score_.refused;
     if (result.status == kWaiting) ++score_.waiting;
-    if (result.status != kAccepted) return;
-    if (score_.first_accepted_m < 0.0)
-      score_.first_accepted_m = along_m_[sent_.at(result.closure_id).frame];
-    accepted_.insert(result.closure_id);
-  }
-
-  void count_query(std::size_t frame) {
-    double nearest_m = 1e9;
-    for (std::size_t i = 0; i < frame && along_m_[i] <= along_m_[frame] - kEarlierM; ++i)
-      nearest_m = std::min(
-          nearest_m, (drive_.truth[i].translation() - drive_.truth[frame].translation()).norm());
-    ++score_.queries;
-    if (nearest_m > kNoMatchM) ++score_.without_match;
-    if (nearest_m < kMatchM) ++score_.with_match;
+    if (result.status == kAccepted) scores_.accept(result.closure_id, score_);
   }
 
   /// What was found leaves after the scan that showed it, as on a bus.
   void send_closures() {
     for (const model::LoopClosure& closure : closures_) {
-      judge(closure);
+      scores_.judge(closure, frame_of_.at(closure.from.keyframe), frame_of_.at(closure.to.keyframe),
+                    score_);
       const double before_s = chain_.time_of("geoslam_mapper").total_s;
       chain_.feed("LOOP_CLOSURE", wire::encode_message(closure));
       const double took_ms = 1e3 * (chain_.time_of("geoslam_mapper").total_s - before_s);
@@ -144,29 +193,8 @@ class LoopRun {
     closures_.clear();
   }
 
-  void judge(const model::LoopClosure& closure) {
-    const std::size_t from = frame_of_.at(closure.from.keyframe);
-    const std::size_t to = frame_of_.at(closure.to.keyframe);
-    const geometry::SE2 truth = drive_.truth[from].inverse() * drive_.truth[to];
-    const Eigen::Vector3d off = (closure.from_T_to.mean.inverse() * truth).Log();
-    const double squared = off.dot(closure.from_T_to.covariance.llt().solve(off));
-    const double off_m = off.head<2>().norm();
-    const bool is_wrong = off_m > kWrongM && squared > kWrongSigmas * kWrongSigmas;
-    sent_[closure.id] = {to, is_wrong};
-    ++score_.sent;
-    if (is_wrong) ++score_.sent_wrong;
-    score_.mean_nees += squared;
-    score_.largest_off_m = std::max(score_.largest_off_m, off_m);
-  }
-
   void sum_up() {
-    if (score_.sent > 0) score_.mean_nees /= static_cast<double>(score_.sent);
-    score_.accepted = accepted_.size();
-    for (const std::uint64_t id : accepted_) score_.accepted_wrong += sent_.at(id).is_wrong;
-    score_.search_ms_p50 = tools::quantile(search_ms_, 0.5);
-    score_.search_ms_p99 = tools::quantile(search_ms_, 0.99);
-    if (closer_) score_.unexpected = closer_->counters().unexpected;
-
+    if (closer_) scores_.sum_up(*closer_, score_);
     std::vector<double> calls;
     for (const float ms : chain_.time_of("geoslam_mapper").calls_ms) calls.push_back(ms);
     score_.mapper_ms_p99 = tools::quantile(calls, 0.99);
@@ -185,25 +213,35 @@ class LoopRun {
     score_.end_m = errors.end_m;
   }
 
-  struct Sent {
-    std::size_t frame = 0;
-    bool is_wrong = false;
-  };
-
   const LoopDrive& drive_;
   harness::SensorChain chain_;
+  ClosureScore scores_;
   std::optional<loop_closer::LoopCloser> closer_;
   std::map<model::Utime, std::size_t> frame_at_;
   std::map<std::uint64_t, std::size_t> frame_of_;  ///< By sequence of the keyframe.
-  std::vector<double> along_m_;
-  std::vector<model::LoopClosure> closures_;  ///< Not sent yet.
-  std::map<std::uint64_t, Sent> sent_;
-  std::set<std::uint64_t> accepted_;
-  std::vector<double> search_ms_;
+  std::vector<model::LoopClosure> closures_;       ///< Not sent yet.
   std::optional<model::WholeMap> last_map_;
   geometry::SE2 map_T_first_;
   LoopScore score_;
 };
+
+/// A scan as a keyframe of its own.
+model::Keyframe keyframe_of(const model::LandmarkScan& scan, std::uint64_t sequence) {
+  model::Keyframe keyframe;
+  keyframe.utime = scan.utime;
+  keyframe.sequence = sequence;
+  keyframe.field_of_view = scan.field_of_view;
+  keyframe.members.push_back({scan.utime, scan.sequence, {}, Eigen::Matrix3d::Zero()});
+  for (const model::Detection& detection : scan.detections) {
+    model::KeyframeLandmark landmark;
+    landmark.position_m = detection.position_m.head<2>();
+    landmark.covariance_m2 = detection.covariance_m2.topLeftCorner<2, 2>();
+    landmark.radius_m = detection.radius_m;
+    landmark.kind = detection.kind;
+    keyframe.landmarks.push_back(landmark);
+  }
+  return keyframe;
+}
 
 }  // namespace
 
@@ -226,6 +264,31 @@ PathErrors path_errors(const LoopDrive& drive, const std::vector<std::size_t>& f
     squared += (truth_T_path * path_m[i] - truth_m[i]).squaredNorm();
   errors.ate_m = std::sqrt(squared / static_cast<double>(frames.size()));
   return errors;
+}
+
+LoopScore reckon_drive(const LoopDrive& drive, const std::filesystem::path& config_dir) {
+  loop_closer::LoopCloser closer(closer_parameters(config_dir));
+  ClosureScore closures(drive);
+  LoopScore score;
+  score.maps = 1;
+  geometry::SE2WithCovariance pose;
+  for (std::size_t i = 0; i < drive.scans.size(); ++i) {
+    terminal::throw_if_interrupted();
+    if (i > 0)
+      pose = compound(pose, {drive.odometry[i - 1].from_T_to, drive.odometry[i - 1].covariance});
+    closer.add(keyframe_of(drive.scans[i], i));
+    ++score.keyframes;
+    model::MapUpdate update;
+    update.keyframe_sequence = i;
+    update.utime = drive.scans[i].utime;
+    update.status = model::MapUpdateStatus::kUpdated;
+    update.map_T_vehicle = pose.mean;
+    update.covariance = pose.covariance;
+    if (const auto closure = ask(update, i, closer, closures, score))
+      closures.judge(*closure, closure->from.keyframe, i, score);
+  }
+  closures.sum_up(closer, score);
+  return score;
 }
 
 LoopScore run_drive(const LoopDrive& drive, const std::filesystem::path& config_dir,

@@ -44,6 +44,10 @@ struct LoopScore {
 LoopScore run_drive(const LoopDrive& drive, const std::filesystem::path& config_dir,
                     bool with_loop_closer);
 
+/// The loop closer alone, beside a mapper that only reckons by odometry and finds no landmark
+/// again: many queries in short time. Nothing is accepted.
+LoopScore reckon_drive(const LoopDrive& drive, const std::filesystem::path& config_dir);
+
 /// Mean error [m], error after alignment [m] and error of the last one of poses that are given for
 /// some frames.
 struct PathErrors {
