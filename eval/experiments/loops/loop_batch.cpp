@@ -101,10 +101,8 @@ std::vector<geometry::SE2> batch_poses(const LoopDrive& drive) {
   constexpr double kFirstSigmaM = 0.1;
   Batch batch(drive);
   batch.solve(kFirstSigmaM);
-  if (getenv("DBG")) fprintf(stderr, "shown %f\n", batch.shown_sigma_m());
-  if (!getenv("DBG1"))
-    for (int round = 0; round < kNoiseRounds; ++round)
-      batch.solve(std::max(1e-3, batch.shown_sigma_m()));
+  for (int round = 0; round < kNoiseRounds; ++round)
+    batch.solve(std::max(1e-3, batch.shown_sigma_m()));
   std::vector<geometry::SE2> result;
   for (std::size_t i = 0; i < drive.truth.size(); ++i) result.push_back(batch.pose(i));
   return result;
