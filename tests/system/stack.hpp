@@ -120,6 +120,7 @@ class Stack {
     return ending_;
   }
   std::string report() const { return directory_ / "report.json"; }
+  const std::string& url() const { return url_; }
 
   std::map<std::string, health_t> health;  ///< Latest of each process.
   std::vector<model::SlamPose> poses;      ///< Localised ones.
