@@ -30,11 +30,11 @@ TEST_CASE("a person closes a loop in the running mapper, and takes it back", "[s
   const Outcome closed = understory_command(directory, "loop close --id 7" + right + bus);
   CAPTURE(closed.error);
   CHECK(closed.status == 0);
-  CHECK_THAT(closed.output, Contains("closure 7 of map 1: accepted"));
+  CHECK_THAT(closed.out, Contains("closure 7 of map 1: accepted"));
 
   const Outcome revoked = understory_command(directory, "loop revoke 7" + bus);
   CHECK(revoked.status == 0);
-  CHECK_THAT(revoked.output, Contains("closure 7 of map 1: revoked"));
+  CHECK_THAT(revoked.out, Contains("closure 7 of map 1: revoked"));
   const Outcome again = understory_command(directory, "loop revoke 7" + bus);
   CHECK(again.status == 1);
   CHECK_THAT(again.error, Contains("there is no such closure"));
