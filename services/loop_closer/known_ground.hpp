@@ -32,7 +32,7 @@ class KnownGround {
       return is_back && pair.landmark_id <= newest_.front().newest;
     };
     const auto old = std::ranges::count_if(update.associations, is_old);
-    counts_.push_back({update.associations.size(), static_cast<std::size_t>(old)});
+    counts_.emplace_back(update.associations.size(), static_cast<std::size_t>(old));
     if (counts_.size() > kKeyframes) counts_.pop_front();
   }
   /// Whether at least this share of the landmarks of the last keyframes is of earlier passes, and
