@@ -39,7 +39,7 @@ void PlaceWindow::add(const model::Keyframe& keyframe, const model::MapUpdate& u
     if (was_corrected(keyframe, last_T_base)) restart();
     along_m_ += std::min(kLongestStepM, last_T_base.translation().norm());
   }
-  last_ = Last{keyframe.sequence, update.map_T_vehicle};
+  last_ = WindowEnd{keyframe.sequence, update.map_T_vehicle};
 
   Seen seen;
   seen.along_m = along_m_;

@@ -15,6 +15,17 @@ namespace understory::loop_closer {
 
 using place_recognition::LevelStem;
 
+/// The keyframe that a window ends with.
+struct WindowEnd {
+  std::uint64_t sequence = 0;  ///< Of the keyframe.
+  geometry::SE2 map_T_base;
+
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.sequence, s.map_T_base);
+  }
+};
+
 /// Joins what several keyframes detected of each stem. A single frame may show three stems; what
 /// was seen along the last metres shows enough to tell a place. The mapper says which detections
 /// are one landmark, and how the keyframes lie to each other.
@@ -63,21 +74,11 @@ class PlaceWindow {
       a(s.along_m, s.stems);
     }
   };
-  /// The last keyframe.
-  struct Last {
-    std::uint64_t sequence = 0;
-    geometry::SE2 map_T_base;
-
-    template <class Archive, class Self>
-    static void archive(Archive& a, Self& s) {
-      a(s.sequence, s.map_T_base);
-    }
-  };
   bool was_corrected(const model::Keyframe& keyframe, const geometry::SE2& last_T_base) const;
 
   PlaceParameters parameters_;
   std::deque<Seen> seen_;  ///< In order of time.
-  std::optional<Last> last_;
+  std::optional<WindowEnd> last_;
   double along_m_ = 0.0;
 };
 
