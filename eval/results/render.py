@@ -212,6 +212,32 @@ def place_recognition(document):
     return lines
 
 
+def loops(document):
+    """Drives that come back: a line each, the mean of its runs."""
+    rows = document["rows"]
+    lines = []
+    for drive in dict.fromkeys(row["drive"] for row in rows):
+        some = [row for row in rows if row["drive"] == drive]
+        mean = lambda key: sum(row[key] for row in some) / len(some)
+        total = lambda key: sum(row[key] for row in some)
+        lines.append((drive, len(some), number(mean("length_m"), 0), number(mean("odometry_end_m"), 1),
+                      number(mean("error_without_m"), 3), number(mean("error_m"), 3), number(mean("error_batch_m"), 3),
+                      number(mean("error_m") / mean("error_batch_m"), 2), total("queries"), total("sent"), total("accepted"),
+                      total("wrong_accepted"), number(mean("search_ms_p50"), 1), number(max(row["largest_closure_ms"] for row in some), 0)))
+    return table(("drive", "runs", "length m", "odometry, end m", "without m", "with loop closer m", "batch m", "ratio", "queries",
+                  "sent", "accepted", "wrong", "search, median ms", "closing, most ms"), lines)
+
+
+def loop_queries(document):
+    """What the loop closer sent on drives beside a mapper that only reckons."""
+    rows = document["rows"]
+    total = lambda key: sum(row[key] for row in rows)
+    none, wrong = total("queries_without_match"), total("sent_wrong")
+    return table(("drives", "queries", "have a match", "have none", "sent", "wrong", "95 % bound"),
+                 [(len(rows), total("queries"), total("queries_with_match"), none, total("sent"), wrong,
+                   f"{3 / none:.1e}" if none and not wrong else "")])
+
+
 def partition(document):
     """Drives with stretches condensed, a line per length of a stretch; one section each."""
     return table(

@@ -1,4 +1,4 @@
-// All six processes from raw sensors to the map, driven by lcm-logplayer.
+// All seven processes from raw sensors to the map, driven by lcm-logplayer.
 #pragma once
 
 #include <fmt/format.h>
@@ -15,7 +15,8 @@
 namespace understory::test {
 
 inline const std::vector<std::string> kChainProcesses = {
-    "lidar_imu_input", "landmark_extractor", "associator", "ekf", "keyframer", "geoslam_mapper"};
+    "lidar_imu_input", "landmark_extractor", "associator", "ekf",
+    "keyframer",       "geoslam_mapper",     "loop_closer"};
 
 /// A recorded drive of the simulated vehicle through a forest, and where it really was.
 class RecordedSensors {
