@@ -58,5 +58,9 @@ constexpr model::LandmarkId landmark_id(std::uint32_t map_id, std::uint64_t coun
 /// covariance that is not positive semidefinite, an id of another map, ids that do not ascend);
 /// empty where nothing is wrong. O(size).
 std::string fault_of(const StoredMap& map);
+/// The same of one landmark of the map.
+std::string fault_of(const StoredLandmark& landmark, std::uint32_t map_id);
+/// The same of one keyframe.
+std::string fault_of(const model::KeyframePose& pose);
 
 }  // namespace understory::map_file
