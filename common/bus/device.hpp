@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <vector>
 
 namespace understory::bus {
@@ -12,6 +13,9 @@ namespace understory::bus {
 class Device {
  public:
   virtual ~Device() = default;
+  /// Before open(), where the process keeps its state in a directory: what the device writes may be
+  /// there, too.
+  virtual void set_state_directory(const std::filesystem::path& /*directory*/) {}
   /// Before the process connects to the bus. Throws where the device cannot be opened; what()
   /// names it.
   virtual void open() = 0;
