@@ -18,11 +18,12 @@ Entry entry(const Matrix& matrix, int row, int column) {
 
 }  // namespace
 
-LandmarkRows::LandmarkRows(const Connection& connection)
+LandmarkRows::LandmarkRows(const Connection& connection, SameLandmark same)
     : insert_(connection.prepare(
-          "INSERT OR REPLACE INTO landmarks (landmark_id, geom, map_id, submap_id, "
-          "covariance_xx_m2, covariance_xy_m2, covariance_yy_m2, diameter_m, kind, times_seen, "
-          "existence) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)")) {}
+          std::string(same == SameLandmark::kReplaced ? "INSERT OR REPLACE" : "INSERT") +
+          " INTO landmarks (landmark_id, geom, map_id, submap_id, covariance_xx_m2, "
+          "covariance_xy_m2, covariance_yy_m2, diameter_m, kind, times_seen, existence) "
+          "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)")) {}
 
 void LandmarkRows::put(std::uint32_t map_id, const StoredLandmark& one) {
   const model::MapLandmark& landmark = one.landmark;

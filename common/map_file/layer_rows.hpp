@@ -13,12 +13,15 @@ namespace understory::map_file {
 inline constexpr std::string_view kTrunkText = "trunk";
 inline constexpr std::string_view kCornerText = "corner";
 
-/// Writes landmarks; one of the same id is replaced.
+/// What happens where a landmark of the same id is there, whatever map it is of.
+enum class SameLandmark : std::uint8_t { kRefused, kReplaced };
+
+/// Writes landmarks.
 class LandmarkRows {
  public:
   /// `connection` outlives it.
-  explicit LandmarkRows(const Connection& connection);
-  /// The map's row is there.
+  LandmarkRows(const Connection& connection, SameLandmark same);
+  /// The map's row is there. Fault::kRefused where the landmark is and may not be replaced.
   void put(std::uint32_t map_id, const StoredLandmark& landmark);
 
  private:

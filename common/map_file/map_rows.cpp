@@ -135,7 +135,7 @@ void insert_map(const Connection& connection, const StoredMap& map) {
       .bind(std::int64_t{map.map_id}, std::string_view(map.name), std::int64_t{map.created_utime},
             std::string_view(map.origin))
       .run();
-  LandmarkRows landmarks(connection);
+  LandmarkRows landmarks(connection, SameLandmark::kRefused);
   for (const StoredLandmark& one : map.landmarks) landmarks.put(map.map_id, one);
   insert_all(KeyframeRows(connection), map.map_id, map.keyframes);
   insert_all(BorderRows(connection), map.map_id, map.submap_borders);

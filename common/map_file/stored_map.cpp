@@ -73,8 +73,9 @@ std::string fault_of_landmarks(const StoredMap& map) {
 
 std::string fault_of(const StoredLandmark& one, std::uint32_t map_id) {
   const model::MapLandmark& landmark = one.landmark;
+  const std::uint32_t given_by = model::map_of(landmark.id);
   const bool is_of_map =
-      model::map_of(landmark.id) == map_id && landmark.id != landmark_id(map_id, 0);
+      given_by >= 1 && given_by <= map_id && landmark.id != landmark_id(given_by, 0);
   if (!is_of_map) return fmt::format("its id is none of map {}", map_id);
   if (!is_place(landmark.position_m)) return "its position is not finite or too far away";
   if (!is_covariance<2>(landmark.covariance_m2))

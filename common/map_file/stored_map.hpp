@@ -15,7 +15,8 @@ inline constexpr std::uint32_t kLastMapId = 32767;
 /// Coordinates lie within this distance of the frame's origin, in x and in y [m].
 inline constexpr double kFarthestM = 1e9;
 
-/// A landmark with what the map's keepers know of it.
+/// A landmark with what the map's keepers know of it. The map number in its id is its map's, or
+/// that of an earlier map which became part of it.
 struct StoredLandmark {
   model::MapLandmark landmark;             ///< Frame `map`.
   std::optional<std::uint64_t> submap_id;  ///< The submap that holds it.
@@ -39,7 +40,7 @@ struct LoopClosure {
 /// One map. Stored and read again it is equal to the bit, but that covariances come back symmetric
 /// and -0.0 as 0.0.
 struct StoredMap {
-  std::uint32_t map_id = 1;               ///< 1 to kLastMapId; upper 16 bit of its landmarks' ids.
+  std::uint32_t map_id = 1;               ///< 1 to kLastMapId.
   std::string name;                       ///< For people; may be empty.
   model::Utime created_utime = 0;         ///< Of what it was made from, or when it was made [us].
   std::string origin;                     ///< What it was made from, e.g. the name of a log.

@@ -93,7 +93,7 @@ std::int64_t keyframe_number(std::uint32_t map_id, model::Utime utime) {
 void show_submap(const Connection& connection, const model::Submap& submap,
                  const geometry::SE2& map_T_submap) {
   require_content(connection, submap, map_T_submap);
-  LandmarkRows landmarks(connection);
+  LandmarkRows landmarks(connection, SameLandmark::kReplaced);
   for (const model::MapLandmark& one : submap.landmarks)
     landmarks.put(submap.map_id, placed_landmark(one, map_T_submap, submap.id));
   KeyframeRows keyframes(connection);
@@ -110,7 +110,7 @@ void redraw_submap(const Connection& connection, const PlacedSubmap& placed) {
   const auto submap = select_submap(connection, placed.key);
   Statement owned =
       connection.prepare("SELECT 1 FROM landmarks WHERE landmark_id = ?1 AND submap_id = ?2");
-  LandmarkRows landmarks(connection);
+  LandmarkRows landmarks(connection, SameLandmark::kReplaced);
   for (const model::MapLandmark& one : submap->landmarks) {
     const bool is_own =
         owned.bind(static_cast<std::int64_t>(one.id), static_cast<std::int64_t>(placed.key.id))
@@ -143,7 +143,7 @@ void hide_submap(const Connection& connection, const SubmapKey& key) {
 std::size_t show_ground(const Connection& connection, const GroundChange& change) {
   note_back(connection, change);
   std::size_t left_out = 0;
-  LandmarkRows landmarks(connection);
+  LandmarkRows landmarks(connection, SameLandmark::kReplaced);
   for (const model::MapLandmark& one : change.landmarks) {
     const StoredLandmark stored{one, std::nullopt, std::nullopt};
     if (fault_of(stored, change.map_id).empty()) {

@@ -99,9 +99,10 @@ class StoreOnBus {
 
   /// Sends a message as its process does, numbered.
   template <class T>
-  void send(const std::string& channel, T message) {
-    message.sequence = sequences_[channel]++;
-    bus_.publish(channel, wire::encode_message(message));
+  void send(const std::string& channel, const T& message) {
+    auto sent = wire::to_wire(message);
+    sent.seq = sequences_[channel]++;
+    bus_.publish(channel, wire::encode_bytes(sent));
     bus_.drain();
   }
   void finish() { hosted_.adapter().finish(); }
@@ -134,7 +135,7 @@ class StoreOnBus {
   }
 
   std::int64_t computer_us_ = 1'000'000'000;
-  std::map<std::string, std::uint64_t> sequences_;
+  std::map<std::string, std::int64_t> sequences_;
   bus::MemoryBus bus_;
   bus::HostedService hosted_;
 };

@@ -1,6 +1,11 @@
 // A drive's file: what goes in, what the layers show, and how it enters the history.
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+
 #include "common/map_file/drive_file.hpp"
 #include "tests/map_file/map_fixture.hpp"
+#include "tests/skip.hpp"
 #include "tests/submap_store/store_fixture.hpp"
 
 using namespace understory;
@@ -110,7 +115,7 @@ TEST_CASE_METHOD(Drive, "who opens a file that was left open seals it", "[submap
   {
     DriveFile file(path);
     file.put(first, first.map_T_submap);
-    file.put({3'000'000, 0, 1, 1, {{1, {50.0, 60.0, 1.0}}}});
+    file.put(model::MapCorrection{3'000'000, 0, 1, 1, {{1, {50.0, 60.0, 1.0}}}});
   }
   {
     const MapFile opened(path, Access::kRead);
@@ -147,7 +152,7 @@ TEST_CASE_METHOD(Drive, "a submap that came back is where the mapper says", "[su
     file.put(submap, submap.map_T_submap);
     map_file::GroundChange change{1, 2'000'000, {moved}, {submap.landmarks[4].id}, {}, false};
     CHECK(file.put(change) == 0);
-    file.put({3'000'000, 0, 1, 1, {{1, {50.0, 60.0, 1.0}}}});
+    file.put(model::MapCorrection{3'000'000, 0, 1, 1, {{1, {50.0, 60.0, 1.0}}}});
     file.seal();
   }
   {
@@ -186,7 +191,7 @@ TEST_CASE_METHOD(Drive, "the ground is what the mapper holds", "[submap_store]")
   const model::Submap other = random_submap(1, 2, random);
   {
     DriveFile file(path);
-    file.put({1, 1'000'000, other.landmarks, {}, other.keyframes, false});
+    file.put(map_file::GroundChange{1, 1'000'000, other.landmarks, {}, other.keyframes, false});
     file.put(submap, submap.map_T_submap);
     // All of it; what is not in it is gone, but for submaps.
     map_file::GroundChange whole{1, 2'000'000, {other.landmarks[0]}, {}, {}, true};
@@ -195,7 +200,7 @@ TEST_CASE_METHOD(Drive, "the ground is what the mapper holds", "[submap_store]")
     whole.landmarks.push_back(wrong);
     CHECK(file.put(whole) == 1);
     file.drop(7);
-    file.put({2, 2'000'000, {}, {}, {}, true});
+    file.put(map_file::GroundChange{2, 2'000'000, {}, {}, {}, true});
     file.drop(2);
     CHECK(file.highest_map() == 1);
   }
@@ -223,7 +228,7 @@ TEST_CASE_METHOD(Drive, "closures are drawn between their ends, wherever those g
     closure.id = 5;
     file.put(closure);
     file.put(b, b.map_T_submap);
-    file.put({9'000'000, 0, 1, 1, {{1, {-7.0, -8.0, 1.0}}}});
+    file.put(model::MapCorrection{9'000'000, 0, 1, 1, {{1, {-7.0, -8.0, 1.0}}}});
     file.take_back(1, 5);
     file.take_back(1, 6);
     file.seal();
@@ -236,4 +241,30 @@ TEST_CASE_METHOD(Drive, "closures are drawn between their ends, wherever those g
   CHECK(map.loop_closures[0].to_sequence == b.keyframes[2].keyframe_sequence);
   CHECK((map.loop_closures[0].to_m - (b.map_T_submap * b.keyframes[2].map_T_vehicle).translation())
             .norm() < 1e-9);
+}
+
+TEST_CASE_METHOD(Drive, "ogrinfo lists the layers of a drive, with the features where they are",
+                 "[submap_store]") {
+  const model::Submap submap = random_submap(1, 1, random);
+  {
+    DriveFile file(path);
+    file.put(submap, submap.map_T_submap);
+    file.put(model::MapCorrection{3'000'000, 0, 1, 1, {{1, {5000.0, 60.0, 1.0}}}});
+    file.seal();
+  }
+  if (std::system("command -v ogrinfo > /dev/null") != 0)  // NOLINT(cert-env33-c)
+    skip("ogrinfo is not installed (gdal-bin)");
+  const auto out = directory / "ogrinfo.txt";
+  const std::string line = fmt::format("ogrinfo -so -al {} -spat 4900 -40 5100 160 > {} 2>&1",
+                                       path.string(), out.string());
+  CHECK(std::system(line.c_str()) == 0);  // NOLINT(cert-env33-c)
+  std::ifstream stream(out);
+  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  using Catch::Matchers::Contains;
+  CHECK_THAT(text, !Contains("Warning") && !Contains("ERROR"));
+  for (const std::string layer : {"landmarks", "trajectory", "submap_borders", "loop_closures"})
+    CHECK_THAT(text, Contains("Layer name: " + layer + "\n"));
+  CHECK_THAT(text, Contains("Feature Count: 40\n") && Contains("Feature Count: 5\n") &&
+                       Contains("Feature Count: 1\n"));
+  CHECK_THAT(text, !Contains("Layer name: understory_submaps"));
 }
