@@ -7,6 +7,10 @@
 
 namespace understory::bus {
 
+/// Folder in a process's state directory with what people keep, which no program deletes with the
+/// state.
+inline constexpr const char* kKeptFolder = "maps";
+
 /// An adapter that is a Device too is opened and attended by run_service, in the one thread that
 /// also handles the bus: no lock, no queue between threads. Replay and experiments host adapters
 /// without opening them.

@@ -66,7 +66,7 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
   }
   void open() override {
     std::filesystem::path folder = parameters_.file.folder;
-    if (folder.empty() && !state_directory_.empty()) folder = state_directory_ / "maps";
+    if (folder.empty() && !state_directory_.empty()) folder = state_directory_ / bus::kKeptFolder;
     if (folder.empty())
       throw std::runtime_error("file.folder: name a folder for the maps, or give --state-dir");
     folder_ = std::make_unique<DriveFolder>(folder, parameters_.file);
