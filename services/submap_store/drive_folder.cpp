@@ -102,8 +102,7 @@ bool DriveFolder::may_go_on_at(model::Utime utime) const {
 }
 
 void DriveFolder::begin_drive() {
-  if (file_) file_->seal();
-  file_.reset();
+  (void)finish();
   number_ = last_number() + 1;
 }
 

@@ -28,7 +28,7 @@ class DriveFolder {
   map_file::DriveFile& at(model::Utime utime);
   /// The file that is open; null where none is.
   map_file::DriveFile* current() { return file_.get(); }
-  /// Seals the file; the next at() makes another one.
+  /// Ends the drive of the file as finish() does; the next at() makes another one.
   void begin_drive();
   /// Something is wrong with the file: closes it; the next at() opens it anew.
   void close() { file_.reset(); }
