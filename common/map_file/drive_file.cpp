@@ -96,7 +96,10 @@ void DriveFile::make(const std::filesystem::path& file) {
   part.move_to_its_name();
 }
 
-DriveFile::DriveFile(const std::filesystem::path& file) : connection_(open_to_write(file)) {}
+DriveFile::DriveFile(const std::filesystem::path& file, bool is_lasting)
+    : connection_(open_to_write(file)) {
+  if (!is_lasting) connection_->execute("PRAGMA synchronous = OFF");
+}
 
 DriveFile::~DriveFile() { leave(*connection_); }
 

@@ -30,8 +30,9 @@ class DriveFile {
  public:
   /// Makes an empty one. Fault::kRefused where something is there already.
   static void make(const std::filesystem::path& file);
-  /// Opens one, or any other map file.
-  explicit DriveFile(const std::filesystem::path& file);
+  /// Opens one, or any other map file. Without `is_lasting`, a file that nobody needs after this
+  /// process: its calls do not wait for the device.
+  explicit DriveFile(const std::filesystem::path& file, bool is_lasting = true);
   /// What is open stays so; in SQLite's plain format, where there is room for that.
   ~DriveFile();
   DriveFile(const DriveFile&) = delete;

@@ -25,7 +25,7 @@ std::vector<std::uint8_t> packed(std::string_view bytes);
 std::optional<std::string> unpacked(Blob bytes);
 
 /// All that localisation needs of a submap: id, position, covariance, radius, number of
-/// observations and kind of each landmark, about 15 bytes. Rounded to the steps above; a covariance
+/// observations and kind of each landmark, about 17 bytes. Rounded to the steps above; a covariance
 /// stays positive semidefinite. Values are such as fault_of() passes.
 std::vector<std::uint8_t> landmark_bytes(std::span<const model::MapLandmark> landmarks);
 /// Back; none where the bytes are damaged.

@@ -61,6 +61,7 @@ constexpr std::array<Table, 3> kTables{{{"understory_submaps", kSubmaps},
 
 std::vector<SchemaObject> submap_objects() {
   std::vector<SchemaObject> objects;
+  objects.reserve(kTables.size() + 1);
   for (const Table& table : kTables)
     objects.push_back({std::string(table.name), std::string(table.sql)});
   objects.push_back({"understory_submaps_to_draw", std::string(kToDraw)});

@@ -80,13 +80,13 @@ DriveFile& DriveFolder::at(model::Utime utime) {
   const bool is_same_drive = number_.has_value();
   const int last = is_same_drive ? *number_ : last_number();
   if (last > 0 && fs::exists(name_of(last))) {
-    file_ = std::make_unique<DriveFile>(name_of(last));
+    file_ = std::make_unique<DriveFile>(name_of(last), !is_temporary_);
     if (!is_same_drive && !may_go_on_at(utime)) begin_drive();
   }
   if (!file_) {
     const int number = is_same_drive ? last : last_number() + 1;
     DriveFile::make(name_of(number));
-    file_ = std::make_unique<DriveFile>(name_of(number));
+    file_ = std::make_unique<DriveFile>(name_of(number), !is_temporary_);
     number_ = number;
   }
   number_ = number_in(file_->file());
