@@ -2,9 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <vector>
 
 namespace understory::bus {
+
+/// Folder in a process's state directory with what people keep, which no program deletes with the
+/// state.
+inline constexpr const char* kKeptFolder = "maps";
 
 /// An adapter that is a Device too is opened and attended by run_service, in the one thread that
 /// also handles the bus: no lock, no queue between threads. Replay and experiments host adapters
@@ -12,6 +17,9 @@ namespace understory::bus {
 class Device {
  public:
   virtual ~Device() = default;
+  /// Before open(), where the process keeps its state in a directory: what the device writes may be
+  /// there, too.
+  virtual void set_state_directory(const std::filesystem::path& /*directory*/) {}
   /// Before the process connects to the bus. Throws where the device cannot be opened; what()
   /// names it.
   virtual void open() = 0;

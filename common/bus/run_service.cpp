@@ -179,7 +179,10 @@ int serve(const Service& service, const Options& options) {
   report_small_buffer(hosted->node(), bus->receive_buffer());
 
   // Begin: from here on messages come.
-  if (auto* const device = dynamic_cast<Device*>(&hosted->adapter())) device->open();
+  if (auto* const device = dynamic_cast<Device*>(&hosted->adapter())) {
+    if (!options.state_dir.empty()) device->set_state_directory(options.state_dir);
+    device->open();
+  }
   hosted->node().connect();
   hosted->node().publish_config(hosted->table().to_toml());
   run_until_stopped(*hosted, *bus, stop, clock);

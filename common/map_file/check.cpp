@@ -8,6 +8,7 @@
 #include "common/map_file/history.hpp"
 #include "common/map_file/map_rows.hpp"
 #include "common/map_file/schema.hpp"
+#include "common/map_file/submap_rows.hpp"
 
 namespace understory::map_file {
 namespace {
@@ -30,7 +31,7 @@ void check_database(const Connection& connection, Findings& findings) {
 
 void check_schema(const Connection& connection, Findings& findings) {
   Statement find = connection.prepare("SELECT sql FROM sqlite_schema WHERE name = ?1");
-  for (const SchemaObject& object : schema_objects()) {
+  for (const SchemaObject& object : schema_objects(schema_version(connection))) {
     const bool is_there = find.bind(std::string_view(object.name)).step();
     if (!is_there || find.text(0) != object.sql)
       findings.push_back(fmt::format("{}: {}", object.name,
@@ -143,6 +144,11 @@ Findings findings_in(const Connection& connection) {
   }
 
   part([&] { check_maps(connection, findings); });
+  part([&] {
+    if (schema_version(connection) < 2) return;
+    const Findings faults = faults_of_submaps(connection);
+    findings.insert(findings.end(), faults.begin(), faults.end());
+  });
   part([&] {
     const Findings faults = faults_of_history(connection);
     findings.insert(findings.end(), faults.begin(), faults.end());

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "common/map_file/check.hpp"
+#include "common/map_file/drive_file.hpp"
 #include "common/map_file/foreign_edits.hpp"
 #include "common/map_file/map_rows.hpp"
 #include "common/map_file/opening.hpp"
@@ -59,11 +60,24 @@ void replace_maps(const Connection& connection, std::span<const StoredMap> maps)
   }
 }
 
+/// A drive whose store was killed is brought to its end first.
+std::unique_ptr<Connection> opened(const std::filesystem::path& file, Access access) {
+  if (access == Access::kRead) {
+    auto connection = open_to_read(file);
+    if (!is_open_drive(*connection)) return connection;
+  }
+  auto writer = open_to_write(file);
+  if (is_open_drive(*writer)) seal_drive(*writer);
+  if (access == Access::kWrite) return writer;
+  leave(*writer);
+  writer.reset();
+  return open_to_read(file);
+}
+
 }  // namespace
 
 MapFile::MapFile(const std::filesystem::path& file, Access access)
-    : connection_(access == Access::kRead ? open_to_read(file) : open_to_write(file)),
-      access_(access) {}
+    : connection_(opened(file, access)), access_(access) {}
 
 MapFile::MapFile(MapFile&&) noexcept = default;
 

@@ -38,7 +38,8 @@ struct MapSummary {
 class MapFile {
  public:
   /// Opens what is there. Where a process was killed while it wrote, its last finished change is
-  /// brought into the file first, if that can be written. O(1) but for that.
+  /// brought into the file first, if that can be written. A drive's file (drive_file.hpp) whose
+  /// store was killed is sealed first. O(1) but for that.
   MapFile(const std::filesystem::path& file, Access access);
   ~MapFile();
   /// The other one is closed.

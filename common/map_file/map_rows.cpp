@@ -3,95 +3,22 @@
 #include <fmt/format.h>
 
 #include "common/map_file/geometry_blob.hpp"
+#include "common/map_file/layer_rows.hpp"
 #include "common/map_file/schema.hpp"
 
 namespace understory::map_file {
 namespace {
 
-constexpr std::string_view kTrunk = "trunk";
-constexpr std::string_view kCorner = "corner";
-/// A variance or covariance; none where the whole matrix was not computed.
-using Entry = std::optional<double>;
-
-std::int64_t signed_of(std::uint64_t value) { return static_cast<std::int64_t>(value); }
-
-template <class Matrix>
-Entry entry(const Matrix& matrix, int row, int column) {
-  if (matrix.isZero(0.0)) return std::nullopt;
-  return 0.5 * (matrix(row, column) + matrix(column, row));
-}
-
 /// Number of the i-th row of a map in a layer without numbers of its own.
 std::int64_t row_number(std::uint32_t map_id, std::size_t i) {
-  return signed_of(landmark_id(map_id, i + 1));
+  return static_cast<std::int64_t>(landmark_id(map_id, i + 1));
 }
 
-void insert_landmarks(const Connection& connection, const StoredMap& map) {
-  Statement insert = connection.prepare(
-      "INSERT INTO landmarks (landmark_id, geom, map_id, submap_id, covariance_xx_m2, "
-      "covariance_xy_m2, covariance_yy_m2, diameter_m, kind, times_seen, existence) "
-      "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)");
-  for (const StoredLandmark& one : map.landmarks) {
-    const model::MapLandmark& landmark = one.landmark;
-    const auto point = point_blob(landmark.position_m);
-    const auto& covariance = landmark.covariance_m2;
-    std::optional<std::int64_t> submap;
-    if (one.submap_id) submap = signed_of(*one.submap_id);
-    Entry diameter;
-    if (landmark.radius_m > 0.0) diameter = 2.0 * landmark.radius_m;
-    const bool is_trunk = landmark.kind == model::LandmarkKind::kTrunk;
-    insert
-        .bind(signed_of(landmark.id), Blob(point), std::int64_t{map.map_id}, submap,
-              entry(covariance, 0, 0), entry(covariance, 0, 1), entry(covariance, 1, 1), diameter,
-              is_trunk ? kTrunk : kCorner, std::int64_t{landmark.observation_count}, one.existence)
-        .run();
-  }
-}
-
-void insert_keyframes(const Connection& connection, const StoredMap& map) {
-  Statement insert = connection.prepare(
-      "INSERT INTO trajectory (fid, geom, map_id, sequence, utime, heading_rad, covariance_xx_m2, "
-      "covariance_xy_m2, covariance_yy_m2, covariance_xt_m_rad, covariance_yt_m_rad, "
-      "covariance_tt_rad2) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)");
-  for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
-    const model::KeyframePose& pose = map.keyframes[i];
-    const auto point = point_blob(pose.map_T_vehicle.translation());
-    const auto& covariance = pose.covariance;
-    insert
-        .bind(row_number(map.map_id, i), Blob(point), std::int64_t{map.map_id},
-              signed_of(pose.keyframe_sequence), std::int64_t{pose.utime},
-              pose.map_T_vehicle.theta(), entry(covariance, 0, 0), entry(covariance, 0, 1),
-              entry(covariance, 1, 1), entry(covariance, 0, 2), entry(covariance, 1, 2),
-              entry(covariance, 2, 2))
-        .run();
-  }
-}
-
-void insert_borders(const Connection& connection, const StoredMap& map) {
-  Statement insert = connection.prepare(
-      "INSERT INTO submap_borders (fid, geom, map_id, submap_id) VALUES (?1, ?2, ?3, ?4)");
-  for (std::size_t i = 0; i < map.submap_borders.size(); ++i) {
-    const SubmapBorder& border = map.submap_borders[i];
-    const auto polygon = geometry_blob({GeometryKind::kPolygon, border.corners_m});
-    insert
-        .bind(row_number(map.map_id, i), Blob(polygon), std::int64_t{map.map_id},
-              signed_of(border.submap_id))
-        .run();
-  }
-}
-
-void insert_loops(const Connection& connection, const StoredMap& map) {
-  Statement insert = connection.prepare(
-      "INSERT INTO loop_closures (fid, geom, map_id, from_sequence, to_sequence) "
-      "VALUES (?1, ?2, ?3, ?4, ?5)");
-  for (std::size_t i = 0; i < map.loop_closures.size(); ++i) {
-    const LoopClosure& loop = map.loop_closures[i];
-    const auto line = geometry_blob({GeometryKind::kLine, {loop.from_m, loop.to_m}});
-    insert
-        .bind(row_number(map.map_id, i), Blob(line), std::int64_t{map.map_id},
-              signed_of(loop.from_sequence), signed_of(loop.to_sequence))
-        .run();
-  }
+/// Each row behind the one before.
+template <class Rows, class Values>
+void insert_all(Rows rows, std::uint32_t map_id, const Values& values) {
+  for (std::size_t i = 0; i < values.size(); ++i)
+    rows.put(row_number(map_id, i), map_id, values[i]);
 }
 
 /// A column of a geometry of this kind, with so many points at least.
@@ -118,8 +45,9 @@ Eigen::Matrix<double, N, N> covariance_in(const Statement& row, const std::array
 
 model::LandmarkKind kind_in(const Connection& connection, const Statement& row, int column) {
   const std::string kind = row.text(column);
-  if (kind != kTrunk && kind != kCorner) connection.damaged("a landmark is of no known kind");
-  return kind == kTrunk ? model::LandmarkKind::kTrunk : model::LandmarkKind::kCorner;
+  if (kind != kTrunkText && kind != kCornerText)
+    connection.damaged("a landmark is of no known kind");
+  return kind == kTrunkText ? model::LandmarkKind::kTrunk : model::LandmarkKind::kCorner;
 }
 
 StoredLandmark landmark_in(const Connection& connection, const Statement& row) {
@@ -207,10 +135,11 @@ void insert_map(const Connection& connection, const StoredMap& map) {
       .bind(std::int64_t{map.map_id}, std::string_view(map.name), std::int64_t{map.created_utime},
             std::string_view(map.origin))
       .run();
-  insert_landmarks(connection, map);
-  insert_keyframes(connection, map);
-  insert_borders(connection, map);
-  insert_loops(connection, map);
+  LandmarkRows landmarks(connection, SameLandmark::kRefused);
+  for (const StoredLandmark& one : map.landmarks) landmarks.put(map.map_id, one);
+  insert_all(KeyframeRows(connection), map.map_id, map.keyframes);
+  insert_all(BorderRows(connection), map.map_id, map.submap_borders);
+  insert_all(LoopRows(connection), map.map_id, map.loop_closures);
 
   const std::string checksum = checksum_of(connection, map.map_id);
   connection.prepare("UPDATE understory_maps SET checksum = ?2 WHERE map_id = ?1")

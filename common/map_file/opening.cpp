@@ -125,6 +125,7 @@ std::unique_ptr<Connection> open_to_write(const fs::path& file) {
     cannot(Fault::kReadOnly, connection->file(), "no write-ahead log can be kept beside it");
   // Takes the lock that all others meet.
   connection->execute("BEGIN EXCLUSIVE; COMMIT");
+  upgrade_schema(*connection);
   return connection;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "common/map_file/geometry_blob.hpp"
+#include "common/map_file/submap_tables.hpp"
 
 namespace understory::map_file {
 namespace {
@@ -238,6 +239,12 @@ void insert_layers(const Connection& connection) {
   }
 }
 
+void state_version(const Connection& connection) {
+  connection.prepare("INSERT OR REPLACE INTO understory_meta VALUES ('schema_version', ?1)")
+      .bind(std::string_view(std::to_string(kSchemaVersion)))
+      .run();
+}
+
 [[noreturn]] void refuse_file(const Connection& connection, Fault fault, const std::string& why) {
   throw MapFileError(fault, fmt::format("{}: {}", connection.file().string(), why));
 }
@@ -245,20 +252,22 @@ void insert_layers(const Connection& connection) {
 void verify_version(const Connection& connection) {
   const std::string version =
       connection.text("SELECT value FROM understory_meta WHERE key = 'schema_version'");
-  if (version == std::to_string(kSchemaVersion)) return;
+  for (std::int64_t known = kOldestSchemaVersion; known <= kSchemaVersion; ++known) {
+    if (version == std::to_string(known)) return;
+  }
 
   const bool is_newer = version.size() <= 9 && !version.empty() &&
                         version.find_first_not_of("0123456789") == std::string::npos &&
                         std::stoll(version) > kSchemaVersion;
-  refuse_file(
-      connection, Fault::kOtherVersion,
-      fmt::format("its schema has the version '{}', this program reads {}{}", version.substr(0, 20),
-                  kSchemaVersion, is_newer ? ": a newer Understory wrote it" : ""));
+  refuse_file(connection, Fault::kOtherVersion,
+              fmt::format("its schema has the version '{}', this program reads {} to {}{}",
+                          version.substr(0, 20), kOldestSchemaVersion, kSchemaVersion,
+                          is_newer ? ": a newer Understory wrote it" : ""));
 }
 
 }  // namespace
 
-std::vector<SchemaObject> schema_objects() {
+std::vector<SchemaObject> schema_objects(std::int64_t version) {
   std::vector<SchemaObject> objects;
   const auto table = [&](std::string_view name, std::string_view sql) {
     objects.push_back({std::string(name), std::string(sql)});
@@ -279,6 +288,8 @@ std::vector<SchemaObject> schema_objects() {
   for (const Layer& layer : kLayers) {
     for (SchemaObject& object : index_of(layer)) objects.push_back(std::move(object));
   }
+  if (version < 2) return objects;
+  for (SchemaObject& object : submap_objects()) objects.push_back(std::move(object));
   return objects;
 }
 
@@ -288,9 +299,22 @@ void create_schema(const Connection& connection) {
   for (const SchemaObject& object : schema_objects()) connection.execute(object.sql);
   insert_reference_systems(connection);
   insert_layers(connection);
-  connection.prepare("INSERT INTO understory_meta VALUES ('schema_version', ?1)")
-      .bind(std::string_view(std::to_string(kSchemaVersion)))
-      .run();
+  register_submap_tables(connection);
+  state_version(connection);
+}
+
+std::int64_t schema_version(const Connection& connection) {
+  return std::stoll(
+      connection.text("SELECT value FROM understory_meta WHERE key = 'schema_version'"));
+}
+
+void upgrade_schema(const Connection& connection) {
+  if (schema_version(connection) == kSchemaVersion) return;
+  Transaction transaction(connection);
+  for (const SchemaObject& object : submap_objects()) connection.execute(object.sql);
+  register_submap_tables(connection);
+  state_version(connection);
+  transaction.commit();
 }
 
 void verify_schema(const Connection& connection) {
@@ -305,7 +329,7 @@ void verify_schema(const Connection& connection) {
 
   verify_version(connection);
   Statement find = connection.prepare("SELECT count(*) FROM sqlite_schema WHERE name = ?1");
-  for (const SchemaObject& object : schema_objects()) {
+  for (const SchemaObject& object : schema_objects(schema_version(connection))) {
     find.bind(std::string_view(object.name)).step();
     if (find.integer(0) == 0) connection.damaged(fmt::format("{} is missing", object.name));
   }

@@ -12,9 +12,12 @@
 
 namespace understory::map_file {
 
-/// The version of the schema that is written and read. One that adds or changes a table or a column
-/// gets the next number.
-inline constexpr std::int64_t kSchemaVersion = 1;
+/// The version of the schema that is written. One that adds or changes a table or a column gets the
+/// next number.
+inline constexpr std::int64_t kSchemaVersion = 2;
+/// The oldest version that is read. Version 1 has no submaps (submap_tables.hpp); who opens such a
+/// file to write makes it one of the version that is written, and changes nothing else.
+inline constexpr std::int64_t kOldestSchemaVersion = 1;
 /// PRAGMA application_id of a GeoPackage: "GPKG".
 inline constexpr std::int64_t kGeoPackage = 0x47504B47;
 /// PRAGMA user_version: GeoPackage 1.3.
@@ -45,15 +48,20 @@ struct SchemaObject {
   std::string sql;
 };
 
-/// Everything that a file has, in the order in which it is made.
-std::vector<SchemaObject> schema_objects();
+/// Everything that a file of a version has, in the order in which it is made.
+std::vector<SchemaObject> schema_objects(std::int64_t version = kSchemaVersion);
 
 /// Makes everything in an empty database, in one transaction that the caller has begun.
 void create_schema(const Connection& connection);
 
-/// Throws MapFileError where the database is no GeoPackage, none of ours, of another schema
-/// version, or lacks a table. O(1).
+/// Throws MapFileError where the database is no GeoPackage, none of ours, of a schema version that
+/// is not read, or lacks a table. O(1).
 void verify_schema(const Connection& connection);
+/// The version that a file states which verify_schema() has passed.
+std::int64_t schema_version(const Connection& connection);
+/// Makes a file of an older version one of kSchemaVersion, in a transaction of its own; nothing
+/// where it is one.
+void upgrade_schema(const Connection& connection);
 
 /// The rectangles and times of change that gpkg_contents states. `utime` [us].
 void refresh_contents(const Connection& connection, model::Utime utime);

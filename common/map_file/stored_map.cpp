@@ -30,33 +30,6 @@ bool is_covariance(const Eigen::Matrix<double, N, N>& matrix) {
   return solver.eigenvalues().minCoeff() >= -kRounding * scale;
 }
 
-std::string fault_of_one(const StoredLandmark& one, std::uint32_t map_id) {
-  const model::MapLandmark& landmark = one.landmark;
-  // Or of a map before that became part of this one.
-  const std::uint32_t given_by = model::map_of(landmark.id);
-  const bool is_of_map =
-      given_by >= 1 && given_by <= map_id && landmark.id != landmark_id(given_by, 0);
-  if (!is_of_map) return fmt::format("its id is none of map {}", map_id);
-  if (!is_place(landmark.position_m)) return "its position is not finite or too far away";
-  if (!is_covariance<2>(landmark.covariance_m2))
-    return "its covariance is not positive semidefinite";
-  if (!(landmark.radius_m >= 0.0 && landmark.radius_m <= kMostRadiusM))
-    return "its radius is negative or too large";
-  if (one.submap_id.value_or(0) > kMostSequence) return "its submap's number is too large";
-  const double existence = one.existence.value_or(0.0);
-  if (!(existence >= 0.0 && existence <= 1.0)) return "its existence is no probability";
-  return {};
-}
-
-std::string fault_of_one(const model::KeyframePose& pose) {
-  if (pose.keyframe_sequence > kMostSequence) return "its number is too large";
-  if (!is_place(pose.map_T_vehicle.translation()))
-    return "its position is not finite or too far away";
-  if (!std::isfinite(pose.map_T_vehicle.theta())) return "its heading is not finite";
-  if (!is_covariance<3>(pose.covariance)) return "its covariance is not positive semidefinite";
-  return {};
-}
-
 std::string fault_of_one(const SubmapBorder& border) {
   if (border.submap_id > kMostSequence) return "its number is too large";
   if (border.corners_m.size() < 3) return "it has fewer than three corners";
@@ -73,6 +46,8 @@ std::string fault_of_one(const LoopClosure& loop) {
   return {};
 }
 
+std::string fault_of_one(const model::KeyframePose& pose) { return fault_of(pose); }
+
 template <class Rows>
 std::string fault_of_all(const Rows& rows, std::string_view what) {
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -86,7 +61,7 @@ std::string fault_of_landmarks(const StoredMap& map) {
   model::LandmarkId last = 0;
   for (const StoredLandmark& one : map.landmarks) {
     const model::LandmarkId id = one.landmark.id;
-    std::string fault = fault_of_one(one, map.map_id);
+    std::string fault = fault_of(one, map.map_id);
     if (fault.empty() && id <= last) fault = "ids do not ascend";
     if (!fault.empty()) return fmt::format("landmark {}: {}", id, fault);
     last = id;
@@ -95,6 +70,32 @@ std::string fault_of_landmarks(const StoredMap& map) {
 }
 
 }  // namespace
+
+std::string fault_of(const StoredLandmark& one, std::uint32_t map_id) {
+  const model::MapLandmark& landmark = one.landmark;
+  const std::uint32_t given_by = model::map_of(landmark.id);
+  const bool is_of_map =
+      given_by >= 1 && given_by <= map_id && landmark.id != landmark_id(given_by, 0);
+  if (!is_of_map) return fmt::format("its id is none of map {}", map_id);
+  if (!is_place(landmark.position_m)) return "its position is not finite or too far away";
+  if (!is_covariance<2>(landmark.covariance_m2))
+    return "its covariance is not positive semidefinite";
+  if (!(landmark.radius_m >= 0.0 && landmark.radius_m <= kMostRadiusM))
+    return "its radius is negative or too large";
+  if (one.submap_id.value_or(0) > kMostSequence) return "its submap's number is too large";
+  const double existence = one.existence.value_or(0.0);
+  if (!(existence >= 0.0 && existence <= 1.0)) return "its existence is no probability";
+  return {};
+}
+
+std::string fault_of(const model::KeyframePose& pose) {
+  if (pose.keyframe_sequence > kMostSequence) return "its number is too large";
+  if (!is_place(pose.map_T_vehicle.translation()))
+    return "its position is not finite or too far away";
+  if (!std::isfinite(pose.map_T_vehicle.theta())) return "its heading is not finite";
+  if (!is_covariance<3>(pose.covariance)) return "its covariance is not positive semidefinite";
+  return {};
+}
 
 std::string fault_of(const StoredMap& map) {
   if (map.map_id < 1 || map.map_id > kLastMapId)

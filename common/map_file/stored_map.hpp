@@ -15,7 +15,8 @@ inline constexpr std::uint32_t kLastMapId = 32767;
 /// Coordinates lie within this distance of the frame's origin, in x and in y [m].
 inline constexpr double kFarthestM = 1e9;
 
-/// A landmark with what the map's keepers know of it.
+/// A landmark with what the map's keepers know of it. The map number in its id is its map's, or
+/// that of an earlier map which became part of it.
 struct StoredLandmark {
   model::MapLandmark landmark;             ///< Frame `map`.
   std::optional<std::uint64_t> submap_id;  ///< The submap that holds it.
@@ -60,5 +61,9 @@ constexpr model::LandmarkId landmark_id(std::uint32_t map_id, std::uint64_t coun
 /// covariance that is not positive semidefinite, an id of another map, ids that do not ascend);
 /// empty where nothing is wrong. O(size).
 std::string fault_of(const StoredMap& map);
+/// The same of one landmark of the map.
+std::string fault_of(const StoredLandmark& landmark, std::uint32_t map_id);
+/// The same of one keyframe.
+std::string fault_of(const model::KeyframePose& pose);
 
 }  // namespace understory::map_file

@@ -139,6 +139,21 @@ void archive(Archive& a, Self& s) {
   a(s.utime, s.sequence, s.map_id, s.id, s.content_hash, s.map_T_submap, s.landmarks, s.keyframes,
     s.replaced, s.payload);
 }
+/// Members of a saved LoopEnd.
+template <class Archive, class Self>
+requires state::Is<Self, LoopEnd>
+void archive(Archive& a, Self& s) { a(s.submap, s.keyframe); }
+/// Members of a saved LoopClosure.
+template <class Archive, class Self>
+requires state::Is<Self, LoopClosure>
+void archive(Archive& a, Self& s) {
+  a(s.utime, s.sequence, s.map_id, s.id, s.source, s.is_revoked, s.from, s.to, s.from_T_to,
+    s.log10_false_alarm);
+}
+/// Members of a saved MapCorrection.
+template <class Archive, class Self>
+requires state::Is<Self, MapCorrection>
+void archive(Archive& a, Self& s) { a(s.utime, s.sequence, s.map_id, s.version, s.submaps); }
 /// Members of a saved SubmapPose.
 template <class Archive, class Self>
 requires state::Is<Self, SubmapPose>

@@ -84,6 +84,18 @@ std::string_view to_string(Reason reason) {
       return "noise_misstated";
     case Reason::kNotStored:
       return "not_stored";
+    case Reason::kDiskFull:
+      return "disk_full";
+    case Reason::kFileReadOnly:
+      return "file_read_only";
+    case Reason::kFileDamaged:
+      return "file_damaged";
+    case Reason::kFileForeign:
+      return "file_foreign";
+    case Reason::kFileInUse:
+      return "file_in_use";
+    case Reason::kFileUnusable:
+      return "file_unusable";
   }
 
   return "unknown";

@@ -49,6 +49,12 @@ enum class Reason : std::uint8_t {
   kNewMap,          ///< A lost mapper began another map, in a frame of its own.
   kNoiseMisstated,  ///< What comes in contradicts the noise that it states.
   kNotStored,       ///< What was handed over has not been confirmed by who keeps it.
+  kDiskFull,        ///< There is no room for the file that is written.
+  kFileReadOnly,    ///< The file, or its folder, cannot be written.
+  kFileDamaged,     ///< The file's content is not what was written.
+  kFileForeign,     ///< The file is something else.
+  kFileInUse,       ///< Another process has the file open.
+  kFileUnusable,    ///< The file cannot be opened or read, or is of another version.
 };
 
 /// Name of the reason, lower_snake.

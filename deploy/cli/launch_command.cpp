@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 
+#include "common/bus/device.hpp"
 #include "common/bus/launch_config.hpp"
 #include "common/bus/parameter_table.hpp"
 #include "deploy/cli/commands.hpp"
@@ -109,11 +110,20 @@ std::vector<launch::ProcessSpec> process_specs(const LaunchOptions& options,
   return specs;
 }
 
+/// Everything but what people keep.
+void forget_state(const std::filesystem::path& folder) {
+  if (!std::filesystem::exists(folder)) return;
+  std::vector<std::filesystem::path> gone;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    if (entry.path().filename() != bus::kKeptFolder) gone.push_back(entry.path());
+  for (const auto& one : gone) std::filesystem::remove_all(one);
+}
+
 /// A directory for each process's state; only under the lock, since others may be using them, and
 /// on a bus that can be heard: a launch that cannot run deletes nothing.
 void prepare_state(const LaunchOptions& options, const launch::Supervisor& supervisor) {
   for (const auto& process : supervisor.status()) {
-    if (options.fresh) std::filesystem::remove_all(options.state / process.name);
+    if (options.fresh) forget_state(options.state / process.name);
     std::filesystem::create_directories(options.state / process.name);
   }
 }
@@ -234,7 +244,8 @@ void add_launch_command(CLI::App& parent) {
   command->add_option("--only", options->only, "Only these processes")->delimiter(',');
 
   add_given_map_options(*command, options->map);
-  command->add_flag("--fresh", options->fresh, "Forget the state of earlier runs first");
+  command->add_flag("--fresh", options->fresh,
+                    "Forget the state of earlier runs first; maps of drives stay");
   command->add_flag("--quiet", options->quiet, "Print nothing but errors");
   command->callback([options] { launch_processes(*options); });
 }

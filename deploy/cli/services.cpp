@@ -7,6 +7,7 @@
 #include "services/landmark_extractor/adapter.hpp"
 #include "services/lidar_imu_input/adapter.hpp"
 #include "services/loop_closer/adapter.hpp"
+#include "services/submap_store/adapter.hpp"
 #include "services/velodyne_driver/adapter.hpp"
 
 namespace understory::cli {
@@ -18,6 +19,7 @@ std::vector<bus::Service> all_services() {
           ekf::ekf_service(),
           keyframer::keyframer_service(),
           geoslam_mapper::geoslam_mapper_service(),
+          submap_store::submap_store_service(),
           loop_closer::loop_closer_service()};
 }
 

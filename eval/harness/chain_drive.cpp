@@ -32,6 +32,8 @@ void keep_states(SensorChain& chain, ChainRun& run) {
 
 /// It reads the sensor itself, which only a process can.
 constexpr const char* kSensorDriver = "velodyne_driver";
+/// Keeps files; experiments read what is on the bus.
+constexpr std::string_view kStore = "submap_store";
 
 /// What fits into one packet of the bus: 10 bytes a point.
 constexpr std::size_t kPointsPerPart = 5500;
@@ -116,7 +118,7 @@ std::vector<bus::Service> services_of(const std::filesystem::path& config_dir) {
   if (config_dir.empty()) return all;
   std::set<std::string> started;
   for (const bus::ProcessEntry& entry : bus::read_launch_config(config_dir).processes) {
-    if (entry.name == kSensorDriver) continue;
+    if (entry.name == kSensorDriver || entry.name == kStore) continue;
     if (std::ranges::find(all, entry.name, &bus::Service::name) == all.end()) {
       throw bus::ConfigurationError({(config_dir / "launch.toml").string() + ": process \"" +
                                      entry.name + "\" cannot be hosted here"});

@@ -1,4 +1,4 @@
-// All seven processes from raw sensors to the map, driven by lcm-logplayer.
+// All processes from raw sensors to the map, driven by lcm-logplayer.
 #pragma once
 
 #include <fmt/format.h>
@@ -15,8 +15,8 @@
 namespace understory::test {
 
 inline const std::vector<std::string> kChainProcesses = {
-    "lidar_imu_input", "landmark_extractor", "associator", "ekf",
-    "keyframer",       "geoslam_mapper",     "loop_closer"};
+    "lidar_imu_input", "landmark_extractor", "associator",   "ekf",
+    "keyframer",       "geoslam_mapper",     "submap_store", "loop_closer"};
 
 /// A recorded drive of the simulated vehicle through a forest, and where it really was.
 class RecordedSensors {
@@ -133,6 +133,10 @@ class ChainStack {
     return ending_;
   }
   std::string report() const { return directory_ / "report.json"; }
+  /// The map of the first drive.
+  std::filesystem::path map_file() const {
+    return directory_.path() / "state" / "submap_store" / "maps" / "drive-0001.gpkg";
+  }
 
   std::map<std::string, health_t> health;              ///< Latest of each process.
   std::map<std::string, std::set<std::int64_t>> pids;  ///< All that each process has had.

@@ -1,5 +1,6 @@
 // The processes of the LIDAR chain: started, killed, hung and stopped, with lcm-logplayer as
 // driver.
+#include "common/map_file/map_file.hpp"
 #include "tests/catch.hpp"
 #include "tests/system/chain_stack.hpp"
 
@@ -65,6 +66,13 @@ TEST_CASE("lcm-logplayer drives the processes from raw sensors to the map", "[sy
   CHECK(ending.signal == 0);
   CHECK_THAT(read_text(stack.report()),
              Contains("\"text\": \"ended\"") && !Contains("does not end"));
+
+  // What the drive leaves is a map.
+  const map_file::MapFile map(stack.map_file(), map_file::Access::kRead);
+  CHECK(map.check().empty());
+  REQUIRE(map.maps().size() == 1);
+  CHECK(map.maps()[0].trunks > 20);
+  CHECK(map.maps()[0].keyframes > 10);
 }
 
 TEST_CASE("a killed process of the chain comes back, and the pose with it", "[system][chain]") {

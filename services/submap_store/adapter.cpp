@@ -1,0 +1,263 @@
+#include "services/submap_store/adapter.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+#include "common/bus/device.hpp"
+#include "services/submap_store/adapter_parameters.hpp"
+#include "services/submap_store/drive_folder.hpp"
+#include "services/submap_store/storage_watch.hpp"
+#include "services/submap_store/submap_store.hpp"
+#include "understory/map_request_t.hpp"
+
+namespace understory::submap_store {
+namespace {
+
+using map_file::DriveFile;
+using map_file::Fault;
+using map_file::MapFileError;
+
+constexpr model::Utime kSecond_us = 1'000'000;
+/// Message time from one question for the whole map to the next, and after a fault of the file
+/// until it is tried again.
+constexpr model::Utime kAskAgain_us = 5 * kSecond_us;
+constexpr model::Utime kTryAgain_us = kSecond_us;
+constexpr int kWait_ms = 1000;
+/// A SUBMAP's keyframes and payload take so many times the room of its landmarks.
+constexpr std::size_t kSubmapParts = 8;
+
+class StoreAdapter : public bus::Adapter, public bus::Device {
+ public:
+  explicit StoreAdapter(StoreChannels channels) : channels_(std::move(channels)) {}
+
+  void describe(bus::ParameterTable& table) override { submap_store::describe(parameters_, table); }
+
+  void bind(bus::Node& node) override {
+    node_ = &node;
+    subscribe_to_submaps(node);
+    subscribe_to_ground(node);
+    stored_ = node.advertise<model::SubmapStored>(channels_.submap_stored);
+    replies_ = node.advertise<model::Submap>(channels_.submap_reply);
+    requests_ = node.advertise<map_request_t>(channels_.map_request);
+    node.every(static_cast<model::Utime>(parameters_.writing.ground_period_s * 1e6),
+               [this](model::Utime now) { write_ground(now); });
+    node.every(kSecond_us, [this](model::Utime now) { tick(now); });
+  }
+
+  // The state that counts is the file's; this is what is not in it yet.
+  std::string save() const override { return stage_.save(); }
+  void load(const std::string& state) override { stage_.load(state); }
+
+  void finish() override {
+    next_try_ = -1;
+    write_ground(node_->now());
+    if (folder_ && !folder_->finish())
+      node_->log(bus::Node::Level::kInfo, "not_sealed",
+                 "the map's file is completed by who opens it next", channels_.submap);
+  }
+
+  // Device: the files.
+
+  void set_state_directory(const std::filesystem::path& directory) override {
+    state_directory_ = directory;
+  }
+  void open() override {
+    std::filesystem::path folder = parameters_.file.folder;
+    if (folder.empty() && !state_directory_.empty()) folder = state_directory_ / bus::kKeptFolder;
+    if (folder.empty())
+      throw std::runtime_error("file.folder: name a folder for the maps, or give --state-dir");
+    folder_ = std::make_unique<DriveFolder>(folder, parameters_.file);
+  }
+  std::vector<int> file_descriptors() const override { return {}; }
+  void attend(std::int64_t /*monotonic_us*/) override {}
+  int wait_ms() const override { return kWait_ms; }
+
+ private:
+  // Nothing is journaled: what was missed comes with the next MAP, which is asked for.
+
+  void subscribe_to_submaps(bus::Node& node) {
+    const auto landmarks = static_cast<std::size_t>(parameters_.input.max_landmarks);
+    node.subscribe<model::Submap>(
+        channels_.submap, [this](const model::Submap& submap) { keep(submap); },
+        {.queue_size = 200,
+         .most_bytes = kSubmapParts * wire::bytes_with<submap_t, map_landmark_t>(landmarks),
+         .journaled = false});
+    node.subscribe<model::SubmapQuery>(channels_.submap_query,
+                                       [this](const model::SubmapQuery& query) { answer(query); },
+                                       {.queue_size = 50, .journaled = false});
+    node.subscribe<model::MapCorrection>(
+        channels_.map_correction,
+        [this](const model::MapCorrection& correction) { correct(correction); },
+        {.journaled = false});
+    // Anybody may send one, with a stamp of another time.
+    node.subscribe<model::LoopClosure>(channels_.loop_closure,
+                                       [this](const model::LoopClosure& one) { stage_.take(one); },
+                                       {.sequenced = false, .timed = false, .journaled = false});
+    node.subscribe<model::LoopResult>(channels_.loop_result,
+                                      [this](const model::LoopResult& one) { stage_.take(one); },
+                                      {.journaled = false});
+  }
+
+  void subscribe_to_ground(bus::Node& node) {
+    const auto landmarks = static_cast<std::size_t>(parameters_.input.max_map_landmarks);
+    const bus::SubscribeOptions options{
+        .queue_size = 100,
+        .most_bytes = wire::bytes_with<map_t, map_landmark_t>(landmarks) * 2,
+        .journaled = false};
+    node.subscribe<model::WholeMap>(
+        channels_.map, [this](const model::WholeMap& map) { stage_.take(map); }, options);
+    node.subscribe<model::MapDelta>(
+        channels_.map_delta, [this](const model::MapDelta& delta) { stage_.take(delta); }, options);
+    node.subscribe<model::MapUpdate>(channels_.slam_update,
+                                     [this](const model::MapUpdate& update) { follow(update); },
+                                     {.queue_size = 200, .journaled = false});
+  }
+
+  /// Works on the drive's file. What is wrong with it is told once, in HEALTH as long as it lasts,
+  /// and the drive goes on; false.
+  template <class Work>
+  bool with_file(model::Utime now, const std::string& channel, const Work& work) {
+    if (next_try_ >= 0 && now >= 0 && now < next_try_ && now >= next_try_ - kTryAgain_us)
+      return false;
+    try {
+      if (!folder_) folder_ = std::make_unique<DriveFolder>(parameters_.file);
+      work(folder_->at(now));
+      next_try_ = -1;
+      watch_.succeeded();
+    } catch (const MapFileError& error) {
+      fail(error, now, channel);
+    }
+    for (const bus::WatchedCondition& one : watch_.conditions()) node_->show(one);
+    return next_try_ < 0;
+  }
+
+  void fail(const MapFileError& error, model::Utime now, const std::string& channel) {
+    node_->report(reason_of(error.fault()), error.what(), channel);
+    // What is wrong with one message is nothing wrong with the file.
+    if (error.fault() == Fault::kRefused) return;
+    watch_.failed(error.fault());
+    folder_->close();
+    next_try_ = now + kTryAgain_us;
+  }
+
+  /// Confirmed when it is on the device, and again whenever it comes again.
+  void keep(const model::Submap& submap) {
+    bool is_kept = false;
+    with_file(submap.utime, channels_.submap, [&](DriveFile& file) {
+      map_file::Keeping kept = file.put(submap, stage_.pose_of(submap));
+      if (kept == map_file::Keeping::kOther) {
+        // Another mapper's, or of one that was started anew.
+        folder_->begin_drive();
+        stage_.begin_drive();
+        kept = folder_->at(submap.utime).put(submap, submap.map_T_submap);
+      }
+      if (kept == map_file::Keeping::kNew) stage_.stored(submap);
+      is_kept = true;
+    });
+    if (is_kept) stored_.publish({submap.utime, 0, submap.map_id, submap.id, submap.content_hash});
+  }
+
+  void answer(const model::SubmapQuery& query) {
+    for (const model::SubmapId id : query.ids) {
+      std::optional<model::Submap> found;
+      const bool could_look = with_file(query.utime, channels_.submap_query, [&](DriveFile& file) {
+        found = file.get({query.map_id, id});
+      });
+      if (found) {
+        found->utime = query.utime;
+        replies_.publish(*found);
+      } else if (could_look) {
+        node_->report(wire::Reason::kInputRefused,
+                      fmt::format("submap {} of map {} was never stored here", id, query.map_id),
+                      channels_.submap_query);
+      }
+    }
+  }
+
+  void correct(const model::MapCorrection& correction) {
+    stage_.take(correction);
+    with_file(correction.utime, channels_.map_correction,
+              [&](DriveFile& file) { file.put(correction); });
+  }
+
+  void follow(const model::MapUpdate& update) {
+    if (update.status == model::MapUpdateStatus::kFirstMap) {
+      with_file(update.utime, channels_.slam_update, [&](DriveFile& file) {
+        if (!SubmapStore::begins_drive(update, file.highest_map())) return;
+        write(stage_.due(), file);
+        folder_->begin_drive();
+        stage_ = SubmapStore();
+      });
+    }
+    stage_.take(update);
+  }
+
+  void write_ground(model::Utime now) {
+    const Writes due = stage_.due();
+    if (due.empty()) return;
+    const bool is_written =
+        with_file(now, channels_.map_delta, [&](DriveFile& file) { write(due, file); });
+    if (is_written) stage_.written();
+  }
+
+  void write(const Writes& writes, DriveFile& file) {
+    for (const std::uint32_t map_id : writes.dropped_maps) file.drop(map_id);
+    std::size_t left_out = 0;
+    for (const map_file::GroundChange& one : writes.ground) left_out += file.put(one);
+    for (const model::LoopClosure& one : writes.closures) {
+      if (one.is_revoked) {
+        file.take_back(one.map_id, one.id);
+      } else {
+        file.put(one);
+      }
+    }
+    if (left_out > 0)
+      node_->report(wire::Reason::kInputRefused,
+                    fmt::format("{} landmarks or keyframes cannot be stored", left_out),
+                    channels_.map_delta);
+  }
+
+  void tick(model::Utime now) {
+    if (folder_ && folder_->current() != nullptr) {
+      with_file(now, channels_.map_correction, [&](DriveFile& file) {
+        file.draw(static_cast<std::size_t>(parameters_.writing.submaps_per_s));
+      });
+    }
+    if (!stage_.wants_whole() || (asked_ >= 0 && now - asked_ < kAskAgain_us && now >= asked_))
+      return;
+    asked_ = now;
+    map_request_t request{};
+    request.utime = now;
+    request.everything = 1;
+    requests_.publish(request);
+  }
+
+  StoreChannels channels_;
+  StoreParameters parameters_;
+  bus::Node* node_ = nullptr;
+  SubmapStore stage_;
+  StorageWatch watch_;
+  std::filesystem::path state_directory_;
+  std::unique_ptr<DriveFolder> folder_;
+  model::Utime next_try_ = -1;  ///< After a fault of the file; -1 = there was none.
+  model::Utime asked_ = -1;     ///< When the whole map was asked for.
+  bus::Publisher<model::SubmapStored> stored_;
+  bus::Publisher<model::Submap> replies_;
+  bus::Publisher<map_request_t> requests_;
+};
+
+}  // namespace
+
+bus::Service submap_store_service(const StoreChannels& channels) {
+  return {"submap_store",
+          channels.submap + ", " + channels.submap_query + ", " + channels.map_correction + ", " +
+              channels.map + ", " + channels.map_delta + ", " + channels.slam_update + ", " +
+              channels.loop_closure + ", " + channels.loop_result + " -> " +
+              channels.submap_stored + ", " + channels.submap_reply + ", " + channels.map_request,
+          [channels] { return std::make_unique<StoreAdapter>(channels); }};
+}
+
+}  // namespace understory::submap_store

@@ -1,0 +1,76 @@
+// The map that the mapper holds itself, as far as it is not written yet.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+
+#include "common/map_file/submap_layers.hpp"
+#include "common/model/archive.hpp"
+#include "common/model/slam_output.hpp"
+#include "common/model/submap.hpp"
+
+namespace understory::map_file {
+
+/// Members of a saved GroundChange; see common/state.
+template <class Archive, class Self>
+requires state::Is<Self, GroundChange>
+void archive(Archive& a, Self& s) {
+  a(s.map_id, s.utime, s.landmarks, s.gone, s.keyframes, s.is_whole);
+}
+
+}  // namespace understory::map_file
+
+namespace understory::submap_store {
+
+/// What MAP, MAP_DELTA and SLAM_UPDATE of one map say that is not written yet. Memory: O(what
+/// changed).
+class Ground {
+ public:
+  /// Of no map.
+  Ground() = default;
+  /// Of the map with this number, from its beginning on.
+  explicit Ground(std::uint32_t map_id) : map_id_(map_id) {}
+
+  /// Number of the map; 0 = none yet.
+  std::uint32_t map_id() const { return map_id_; }
+  /// Takes all that the mapper holds.
+  void take(const model::WholeMap& map);
+  /// Takes what changed. One with an older version is passed over.
+  void take(const model::MapDelta& delta);
+  /// Takes a keyframe that the map has accepted.
+  void take(const model::MapUpdate& update);
+  /// Its landmarks and keyframes are kept elsewhere.
+  void hand_over(const model::Submap& submap);
+
+  /// What is not written yet; none where there is nothing.
+  std::optional<map_file::GroundChange> change() const;
+  /// All of it is written.
+  void written();
+  /// Changes were missed, or the map began before this did.
+  bool wants_whole() const { return map_id_ != 0 && wants_whole_; }
+  /// From now on changes may have been missed.
+  void want_whole() { wants_whole_ = true; }
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.map_id_, self.utime_, self.version_, self.landmarks_, self.gone_, self.keyframes_,
+      self.is_whole_, self.wants_whole_);
+  }
+
+ private:
+  void put(const model::MapLandmark& landmark);
+  void remove(model::LandmarkId id);
+
+  std::uint32_t map_id_ = 0;
+  model::Utime utime_ = 0;
+  std::uint64_t version_ = 0;
+  std::map<model::LandmarkId, model::MapLandmark> landmarks_;
+  std::map<model::LandmarkId, bool> gone_;
+  std::map<model::Utime, model::KeyframePose> keyframes_;
+  bool is_whole_ = false;  ///< `landmarks_` are all that the mapper holds.
+  bool wants_whole_ = false;
+};
+
+}  // namespace understory::submap_store

@@ -1,0 +1,54 @@
+#include "services/submap_store/storage_watch.hpp"
+
+namespace understory::submap_store {
+namespace {
+
+bus::WatchedCondition watched(wire::Reason reason, std::string_view text) {
+  return {reason, text, "SUBMAP", bus::Condition({1, 1})};
+}
+
+}  // namespace
+
+wire::Reason reason_of(map_file::Fault fault) {
+  using enum map_file::Fault;
+  switch (fault) {
+    case kFull:
+      return wire::Reason::kDiskFull;
+    case kReadOnly:
+      return wire::Reason::kFileReadOnly;
+    case kDamaged:
+      return wire::Reason::kFileDamaged;
+    case kForeign:
+      return wire::Reason::kFileForeign;
+    case kInUse:
+      return wire::Reason::kFileInUse;
+    case kRefused:
+      return wire::Reason::kInputRefused;
+    case kUnreadable:
+    case kOtherVersion:
+      break;
+  }
+  return wire::Reason::kFileUnusable;
+}
+
+StorageWatch::StorageWatch()
+    : conditions_{
+          watched(wire::Reason::kDiskFull, "no room for the map: nothing is stored"),
+          watched(wire::Reason::kFileReadOnly, "the map cannot be written: nothing is stored"),
+          watched(wire::Reason::kFileDamaged, "the map's file is damaged: nothing is stored"),
+          watched(wire::Reason::kFileForeign,
+                  "another program's file has the map's name: nothing is stored"),
+          watched(wire::Reason::kFileInUse, "another process has the map open: nothing is stored"),
+          watched(wire::Reason::kFileUnusable,
+                  "the map's file cannot be used: nothing is stored")} {}
+
+void StorageWatch::failed(map_file::Fault fault) {
+  const wire::Reason reason = reason_of(fault);
+  for (bus::WatchedCondition& one : conditions_) one.condition.add(one.reason == reason);
+}
+
+void StorageWatch::succeeded() {
+  for (bus::WatchedCondition& one : conditions_) one.condition.add(false);
+}
+
+}  // namespace understory::submap_store

@@ -1,0 +1,32 @@
+// What HEALTH says of the store's file.
+#pragma once
+
+#include <array>
+
+#include "common/bus/condition.hpp"
+#include "common/map_file/map_file_error.hpp"
+
+namespace understory::submap_store {
+
+/// The reason that HEALTH and LOG have for a fault of a file.
+wire::Reason reason_of(map_file::Fault fault);
+
+/// One condition for each thing that can be wrong with a file. It holds from the first call that
+/// fails so until a call succeeds. It is no part of a saved state: the file is looked at anew.
+class StorageWatch {
+ public:
+  /// All is well.
+  StorageWatch();
+
+  /// A call failed.
+  void failed(map_file::Fault fault);
+  /// A call succeeded.
+  void succeeded();
+  /// What to show.
+  const std::array<bus::WatchedCondition, 6>& conditions() const { return conditions_; }
+
+ private:
+  std::array<bus::WatchedCondition, 6> conditions_;
+};
+
+}  // namespace understory::submap_store
