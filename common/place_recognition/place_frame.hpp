@@ -19,8 +19,8 @@ struct PlaceLandmark {
 };
 
 /// What a detector or a verifier may look at: a keyframe, or a whole submap in the frame of its
-/// origin. Every coordinate is in `vehicle_level` [m] (z = 0 at the sensor). What is not finite is
-/// left out by who reads it.
+/// origin. Every coordinate is in `vehicle_level` [m]. What is not finite or farther than
+/// kMostDistantM is left out by who reads it.
 struct PlaceFrame {
   FrameId id = 0;
   std::vector<PlaceLandmark> landmarks;
@@ -28,10 +28,16 @@ struct PlaceFrame {
   std::vector<Eigen::Vector3f> cloud;
 };
 
-/// The landmarks that are finite, in the plane, in the order of the frame.
+/// Nothing that belongs to a frame is farther away, on any axis.
+inline constexpr double kMostDistantM = 1000.0;
+
+/// The landmarks that count, in the order of the frame.
+std::vector<PlaceLandmark> landmarks_of(const PlaceFrame& frame);
+
+/// The same in the plane.
 std::vector<LevelStem> level_stems(const PlaceFrame& frame);
 
-/// The points of the cloud that are finite; of a frame without a cloud, the landmarks as points.
+/// The points of the cloud that count; of a frame without a cloud, the landmarks as points.
 std::vector<Eigen::Vector3f> points_of(const PlaceFrame& frame);
 
 }  // namespace understory::place_recognition

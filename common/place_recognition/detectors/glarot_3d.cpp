@@ -81,12 +81,13 @@ Eigen::Vector3d Glarot3dSignature::middle_of(std::size_t cell) const {
 }
 
 bool Glarot3dSignature::describe(const PlaceFrame& frame, std::span<float> row) const {
+  const std::vector<PlaceLandmark> landmarks = landmarks_of(frame);
   std::vector<double> count(length(), 0.0);
   double pairs = 0.0;
-  for (const PlaceLandmark& from : frame.landmarks) {
-    for (const PlaceLandmark& to : frame.landmarks) {
+  for (const PlaceLandmark& from : landmarks) {
+    for (const PlaceLandmark& to : landmarks) {
       const Eigen::Vector3d along = to.position_m - from.position_m;
-      if (&from == &to || !along.allFinite() || along.isZero(0.0)) continue;
+      if (&from == &to || along.isZero(0.0)) continue;
       const double range = along.norm() / parameters_.range_step_m;
       if (range >= static_cast<double>(parameters_.range_bins)) continue;
       count[cell_of(along) * parameters_.range_bins + static_cast<std::size_t>(range)] += 1.0;
