@@ -48,6 +48,7 @@ struct HierarchyDetectorParameters {
   double max_descriptor_distance = 2.0;  ///< [tau]
   std::size_t most_frames = 30;          ///< With most votes, whose landmarks are matched.
   double gate_m = 0.5;                   ///< Pairs of landmarks that agree on a motion are nearer.
+  double max_distance_m = 12.0;          ///< Frames taken farther away are not looked for.
 };
 
 /// One-shot search among identical landmarks (common/constellation), all frames in one map.
@@ -55,6 +56,8 @@ struct ConstellationDetectorParameters {
   double sigma_m = 0.05;         ///< Of a landmark's position, per axis, standard deviation.
   double max_range_m = 80.0;     ///< Landmarks farther away are left out.
   double max_distance_m = 12.0;  ///< Frames taken farther away are not looked for.
+  /// Frames before and after the one that is found, which are compared with the query by themselves.
+  std::size_t reach = 8;
 };
 
 /// Of all detectors: make_detector() takes the part that it needs.

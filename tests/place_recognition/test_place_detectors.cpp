@@ -1,6 +1,7 @@
 // What every detector behind the interface must do.
 #include "common/place_recognition/place_detector.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -119,10 +119,10 @@ TEST_CASE("Verifiers take frames that say nothing", "[verifiers]") {
   broken.cloud.assign(9, Eigen::Vector3f(std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.0F));
   alike.landmarks.assign(9, {{3.0, 3.0, 0.0}, 0.2});
   for (int i = 0; i < 9; ++i) line.landmarks.push_back({{i - 4.0, 0.0, 0.0}, 0.2});
-  for (const PlaceFrame* bad : {&empty, &one, &broken}) {
-    CHECK_FALSE(verifier->verify(*bad, *bad).has_value() && bad != &one);
-    CHECK_FALSE(verifier->verify(*bad, pair.frame).has_value() && bad != &one);
-    CHECK_FALSE(verifier->verify(pair.query, *bad).has_value() && bad != &one);
+  for (const PlaceFrame* bad : {&empty, &broken}) {
+    CHECK_FALSE(verifier->verify(*bad, *bad));
+    CHECK_FALSE(verifier->verify(*bad, pair.frame));
+    CHECK_FALSE(verifier->verify(pair.query, *bad));
   }
   for (const PlaceFrame* odd : {&one, &alike, &line}) {
     for (const PlaceFrame* other : {odd, &pair.frame}) {
@@ -168,6 +168,7 @@ TEST_CASE("Scan Context's covariance holds for frames within its place", "[verif
   std::mt19937_64 random(5);
   std::normal_distribution<double> off(0.0, 1.0);
   double heading = 0.0, place = 0.0;
+  int wrong = 0;
   const int trials = 60;
   for (int trial = 0; trial < trials; ++trial) {
     const double x = off(random);
@@ -176,11 +177,15 @@ TEST_CASE("Scan Context's covariance holds for frames within its place", "[verif
     const auto found = verifier->verify(pair.query, pair.frame);
     REQUIRE(found);
     const Eigen::Vector3d error = (found->frame_T_query.inverse() * pair.frame_T_query).Log();
-    heading += error.z() * error.z() / found->covariance(2, 2) / trials;
     place += error.head<2>().squaredNorm() / found->covariance(0, 0) / trials;
+    // Another shift fits by chance: no covariance says that.
+    if (std::abs(error.z()) > 0.7) ++wrong;
+    if (std::abs(error.z()) <= 0.7)
+      heading += error.z() * error.z() / found->covariance(2, 2) / trials;
   }
   CHECK(place < 2.5);
-  CHECK(heading < 4.0);
+  CHECK(heading < 1.5);
+  CHECK(wrong <= 6);
 }
 
 TEST_CASE("The correspondence graph has the edges of equation 2.33", "[verifiers]") {
@@ -233,8 +238,8 @@ TEST_CASE("Hough cells have the votes of all pairs and headings", "[verifiers]")
   parameters.cell_m = 1.0;
   parameters.max_distance_m = 8.0;
   for (int trial = 0; trial < 10; ++trial) {
-    const auto query = level_stems(test::random_frame(random, 15));
-    const auto frame = level_stems(test::random_frame(random, 12));
+    const auto query = level_stems(test::random_frame(random, 35));
+    const auto frame = level_stems(test::random_frame(random, 30));
     std::map<std::tuple<int, int, int>, std::size_t> votes;
     for (int k = 0; k < 24; ++k) {
       const double theta = 2.0 * std::numbers::pi * k / 24.0;
@@ -251,11 +256,14 @@ TEST_CASE("Hough cells have the votes of all pairs and headings", "[verifiers]")
       }
     }
     std::vector<std::size_t> slow;
-    for (const auto& cell : votes) slow.push_back(cell.second);
+    for (const auto& cell : votes) {
+      if (cell.second >= 2) slow.push_back(cell.second);
+    }
     std::sort(slow.rbegin(), slow.rend());
 
     const auto cells = hough_cells({query, frame}, parameters);
-    REQUIRE(cells.size() == parameters.most_cells);
+    REQUIRE(cells.size() == std::min(slow.size(), parameters.most_cells));
+    REQUIRE(cells.size() > 5);
     for (std::size_t i = 0; i < cells.size(); ++i) {
       CHECK(cells[i].votes == slow[i]);
       const geometry::SE2& at = cells[i].frame_T_query;

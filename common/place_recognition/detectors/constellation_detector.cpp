@@ -5,6 +5,7 @@
 #include <numbers>
 #include <utility>
 
+#include "common/place_recognition/detectors/linear_detector.hpp"
 #include "common/place_recognition/landmark_pairs.hpp"
 
 namespace understory::place_recognition::detectors {
@@ -14,6 +15,15 @@ namespace {
 constexpr std::size_t kMostLandmarks = 4096;
 /// 2 pi (1 - 1/golden ratio): each frame lies where the spiral has most room.
 const double kGoldenAngleRad = std::numbers::pi * (3.0 - std::sqrt(5.0));
+
+std::vector<constellation::ObservedPoint> observed(
+    const std::vector<LevelStem>& landmarks, const ConstellationDetectorParameters& parameters) {
+  std::vector<constellation::ObservedPoint> points;
+  points.reserve(landmarks.size());
+  for (const LevelStem& landmark : landmarks)
+    points.push_back({landmark.position_m, parameters.sigma_m});
+  return points;
+}
 
 }  // namespace
 
@@ -42,21 +52,29 @@ void ConstellationDetector::add(const PlaceFrame& frame) {
   frames_.push_back(std::move(kept));
 }
 
-ScoredPlace ConstellationDetector::answered(const std::vector<LevelStem>& query,
-                                            const constellation::Localisation& found,
-                                            std::size_t frame) const {
-  const LandmarkSets sets{query, frames_[frame].landmarks};
-  PairedPose pose{{found.map_T_sensor.translation() - centre_m(frame), found.map_T_sensor.theta()},
-                  {}};
-  for (const constellation::PointAssociation& one : found.associations) {
-    if (one.landmark_id / kMostLandmarks != frame) continue;
-    pose.pairs.push_back(
-        {one.observed, static_cast<std::uint32_t>(one.landmark_id % kMostLandmarks)});
-  }
-  const double sigma_m = std::sqrt(2.0) * parameters_.sigma_m;
-  return {frames_[frame].id,
-          -found.log10_false_alarm,
-          {{pose.frame_T_query, paired_covariance(sets, pose, sigma_m)}}};
+constellation::LocaliseParameters ConstellationDetector::search() const {
+  constellation::LocaliseParameters parameters;
+  parameters.map_sigma_m = parameters_.sigma_m;
+  return parameters;
+}
+
+/// The query in a map of one frame alone; none where nothing fits or the pose is too far away.
+std::optional<ScoredPlace> ConstellationDetector::compared(const std::vector<LevelStem>& query,
+                                                           std::size_t frame) const {
+  constellation::ConstellationMap map;
+  for (std::size_t i = 0; i < frames_[frame].landmarks.size(); ++i)
+    map.insert(i, frames_[frame].landmarks[i].position_m);
+  const constellation::Localisation found = map.localise(observed(query, parameters_), search());
+  if (found.associations.empty()) return std::nullopt;
+  if (found.map_T_sensor.translation().norm() > parameters_.max_distance_m) return std::nullopt;
+
+  PairedPose pose{found.map_T_sensor, {}};
+  for (const constellation::PointAssociation& one : found.associations)
+    pose.pairs.push_back({one.observed, static_cast<std::uint32_t>(one.landmark_id)});
+  const Eigen::Matrix3d covariance = paired_covariance({query, frames_[frame].landmarks}, pose,
+                                                       std::sqrt(2.0) * parameters_.sigma_m);
+  return ScoredPlace{
+      frames_[frame].id, -found.log10_false_alarm, {{pose.frame_T_query, covariance}}};
 }
 
 std::vector<ScoredPlace> ConstellationDetector::query(const PlaceFrame& frame,
@@ -64,25 +82,22 @@ std::vector<ScoredPlace> ConstellationDetector::query(const PlaceFrame& frame,
   std::size_t end = 0;
   while (end < frames_.size() && frames_[end].id <= limits.newest) ++end;
   const std::vector<LevelStem> landmarks = in_range(frame);
-  if (end == 0 || limits.most == 0) return {};
+  if (end == 0) return {};
 
-  std::vector<constellation::ObservedPoint> points;
-  points.reserve(landmarks.size());
-  for (const LevelStem& landmark : landmarks)
-    points.push_back({landmark.position_m, parameters_.sigma_m});
-  constellation::LocaliseParameters parameters;
-  parameters.map_sigma_m = parameters_.sigma_m;
   const constellation::Disc where{Eigen::Vector2d::Zero(),
                                   centre_m(end - 1).norm() + parameters_.max_distance_m};
-  const constellation::Localisation found = map_.localise(points, parameters, where);
+  const constellation::Localisation found =
+      map_.localise(observed(landmarks, parameters_), search(), where);
   if (found.associations.empty()) return {};
 
   const std::size_t at = found.associations.front().landmark_id / kMostLandmarks;
-  if (at >= end) return {};
-  ScoredPlace place = answered(landmarks, found, at);
-  const geometry::SE2& pose = place.guesses.front().mean;
-  if (pose.translation().norm() > parameters_.max_distance_m) return {};
-  return {std::move(place)};
+  std::vector<ScoredPlace> places;
+  for (std::size_t i = at - std::min(at, parameters_.reach);
+       i < std::min(end, at + parameters_.reach + 1); ++i) {
+    if (auto place = compared(landmarks, i)) places.push_back(std::move(*place));
+  }
+  keep_best(places, limits.most);
+  return places;
 }
 
 std::size_t ConstellationDetector::descriptor_bytes() const {

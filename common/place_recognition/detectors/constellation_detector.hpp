@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "common/constellation/map.hpp"
@@ -12,9 +13,10 @@
 namespace understory::place_recognition::detectors {
 
 /// Every frame lies in one map at a place of its own, far from all others, on a spiral: frames up
-/// to one are those within a disc. A query is localised in that map (common/constellation). Its
-/// best pose lies at one frame, which is the only candidate; the score is minus log10 of the bound
-/// on chance.
+/// to one are those within a disc. A query is localised in that map (common/constellation): its
+/// best pose lies at one frame. That frame and those before and after it are then each searched by
+/// itself, so that the nearest of a passage are found and not only the first. The score is minus
+/// log10 of the bound on chance.
 class ConstellationDetector final : public PlaceDetector {
  public:
   /// Precondition: sigma and ranges > 0.
@@ -33,8 +35,8 @@ class ConstellationDetector final : public PlaceDetector {
   };
   Eigen::Vector2d centre_m(std::size_t frame) const;
   std::vector<LevelStem> in_range(const PlaceFrame& frame) const;
-  ScoredPlace answered(const std::vector<LevelStem>& query,
-                       const constellation::Localisation& found, std::size_t frame) const;
+  constellation::LocaliseParameters search() const;
+  std::optional<ScoredPlace> compared(const std::vector<LevelStem>& query, std::size_t frame) const;
 
   ConstellationDetectorParameters parameters_;
   std::vector<Frame> frames_;

@@ -80,6 +80,8 @@ ScoredPlace HierarchyDetector::compared(const PlaceFrame& query, std::size_t fra
   ScoredPlace place{frames_[frame].id, votes / (1.0 + votes), {}};
   const auto agreed = most_agreed(sets, pairs, parameters_.gate_m);
   if (!agreed) return place;
+  // The likeliest motion says that the frame is not the place that is asked for.
+  if (agreed->frame_T_query.translation().norm() > parameters_.max_distance_m) return place;
   place.score += static_cast<double>(agreed->pairs.size());
   place.guesses.push_back({agreed->frame_T_query, paired_covariance(sets, *agreed, sigma_m_)});
   return place;

@@ -105,6 +105,11 @@ double ScanContextMaker::heading_rad(std::size_t shift) const {
                               static_cast<double>(parameters_.sectors));
 }
 
+double ScanContextMaker::heading_sigma_rad(double place_sigma_m) const {
+  return std::hypot(2.0 * std::numbers::pi / static_cast<double>(parameters_.sectors),
+                    place_sigma_m / (0.5 * parameters_.max_range_m));
+}
+
 std::vector<ShiftedContext> shifted_contexts(const ScanContextMaker& maker,
                                              const PlaceFrame& frame) {
   const std::vector<Eigen::Vector3f> points = points_of(frame);
@@ -167,11 +172,11 @@ std::vector<ScoredPlace> ScanContextDetector::query(const PlaceFrame& frame,
 
   const auto end = static_cast<std::size_t>(
       std::upper_bound(ids_.begin(), ids_.end(), limits.newest) - ids_.begin());
-  const double step_rad = 2.0 * std::numbers::pi / static_cast<double>(maker_.parameters().sectors);
+  const double sigma_rad = maker_.heading_sigma_rad(place_sigma_m_);
   for (const std::size_t i : nearest_keys(query, end)) {
     const BestContext best = best_context(maker_, query, *contexts_[i]);
     places.push_back(
-        {ids_[i], -best.distance, {heading_guess(best.frame_T_query, place_sigma_m_, step_rad)}});
+        {ids_[i], -best.distance, {heading_guess(best.frame_T_query, place_sigma_m_, sigma_rad)}});
   }
   keep_best(places, limits.most);
   return places;

@@ -49,6 +49,9 @@ class ScanContextMaker {
 
   /// The heading [rad] that a shift means, of the query in the frame.
   double heading_rad(std::size_t shift) const;
+  /// Standard deviation of a heading [rad] of a query that lies `place_sigma_m` beside the frame: a
+  /// sector, and by how much points at half of the range lie elsewhere.
+  double heading_sigma_rad(double place_sigma_m) const;
   /// As given to the constructor.
   const ScanContextParameters& parameters() const { return parameters_; }
 

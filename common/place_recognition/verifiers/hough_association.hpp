@@ -19,8 +19,8 @@ struct HoughCell {
 
 /// Every pair of a query's and a frame's landmark votes, for each quantised heading theta, for the
 /// translation t = p_frame - R(theta) p_query (thesis 002 eq. 2.34) if it lies within the bounds.
-/// The cells of most votes, at most `most_cells`, ties in order of heading, x, y. Memory and time
-/// O(cells + headings * pairs).
+/// The cells of most votes (two or more), at most `most_cells`, ties in order of heading, x, y.
+/// Memory and time O(cells + headings * pairs).
 std::vector<HoughCell> hough_cells(const LandmarkSets& landmarks,
                                    const HoughParameters& parameters);
 

@@ -4,12 +4,22 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
+#include <optional>
 
 namespace understory::place_recognition::verifiers {
 namespace {
 
 using Jacobian = Eigen::Matrix<double, 3, 4>;
+using Cube = std::array<int, 3>;
+
+/// The cube of a point; its coordinates are within some km.
+Cube cube_of(const Eigen::Vector3d& point, double side_m) {
+  const Eigen::Vector3d cell = (point / side_m).array().floor();
+  return {static_cast<int>(cell.x()), static_cast<int>(cell.y()), static_cast<int>(cell.z())};
+}
 
 constexpr std::size_t kLeastNeighbours = 5;
 constexpr std::size_t kLeastPairs = 4;
@@ -24,6 +34,12 @@ std::vector<Eigen::Vector3d> thinned(std::span<const Eigen::Vector3f> points, st
   std::vector<Eigen::Vector3d> kept;
   for (std::size_t i = 0; i < points.size(); i += step) kept.push_back(points[i].cast<double>());
   return kept;
+}
+
+/// By how much a covariance is larger since partners change with the motion.
+double re_association(IcpMetric metric) {
+  if (metric == IcpMetric::kPointToPoint) return 6.0;
+  return metric == IcpMetric::kPointToPlane ? 3.0 : 1.0;
 }
 
 /// Direction across the surface through some points; zero where they are too few.
@@ -42,15 +58,24 @@ Eigen::Vector3d normal_of(std::span<const Eigen::Vector3d> points,
 struct NormalEquations {
   Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
   Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
-  Eigen::Matrix4d scatter = Eigen::Matrix4d::Zero();  ///< Of the gradients.
+  std::map<Cube, Eigen::Vector4d> of_cubes;  ///< The gradient of the pairs in each.
   std::size_t pairs = 0;
 
-  void add(const Jacobian& jacobian, const Eigen::Matrix3d& weight, const Eigen::Vector3d& off) {
+  void add(const Jacobian& jacobian, const Eigen::Matrix3d& weight, const Eigen::Vector3d& off,
+           const std::optional<Cube>& cube) {
     const Eigen::Vector4d slope = jacobian.transpose() * weight * off;
     information += jacobian.transpose() * weight * jacobian;
     gradient += slope;
-    scatter += slope * slope.transpose();
     ++pairs;
+    if (cube) of_cubes.try_emplace(*cube, Eigen::Vector4d::Zero()).first->second += slope;
+  }
+
+  /// Of the sum of all gradients, cubes taken as independent.
+  Eigen::Matrix4d scatter() const {
+    Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
+    for (const auto& one : of_cubes) sum += one.second * one.second.transpose();
+    const auto cubes = static_cast<double>(of_cubes.size());
+    return cubes > 4.0 ? Eigen::Matrix4d(cubes / (cubes - 4.0) * sum) : sum;
   }
 };
 
@@ -64,7 +89,7 @@ class IcpRun {
 
   /// One round; false where too few points have a partner.
   bool step(double distance_m) {
-    const NormalEquations sums = equations(distance_m);
+    const NormalEquations sums = equations(distance_m, std::nullopt);
     if (sums.pairs < kLeastPairs) return false;
     Eigen::Matrix4d information = sums.information;
     information.diagonal().array() += kPriorInformation;
@@ -79,14 +104,12 @@ class IcpRun {
   }
   const LevelMotion& motion() const { return motion_; }
 
-  Eigen::Matrix3d covariance(double distance_m) const {
-    const NormalEquations sums = equations(distance_m);
+  Eigen::Matrix3d covariance(double distance_m, double cube_m) const {
+    const NormalEquations sums = equations(distance_m, cube_m);
     Eigen::Matrix4d information = sums.information;
     information.diagonal().array() += kPriorInformation;
     const Eigen::Matrix4d inverse = information.ldlt().solve(Eigen::Matrix4d::Identity());
-    const auto pairs = static_cast<double>(sums.pairs);
-    const double few = pairs > 4.0 ? pairs / (pairs - 4.0) : 1.0;
-    const Eigen::Matrix4d all = few * inverse * sums.scatter * inverse;
+    const Eigen::Matrix4d all = re_association(metric_) * inverse * sums.scatter() * inverse;
     return all.topLeftCorner<3, 3>();
   }
   std::size_t inliers(double distance_m) const {
@@ -106,7 +129,7 @@ class IcpRun {
     return both.inverse();
   }
 
-  NormalEquations equations(double distance_m) const {
+  NormalEquations equations(double distance_m, std::optional<double> cube_m) const {
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
     rotation.topLeftCorner<2, 2>() = motion_.plane.rotation();
     const auto of_query = query_.points().points_m();
@@ -121,7 +144,8 @@ class IcpRun {
       jacobian.col(2).head<2>() =
           rotation.topLeftCorner<2, 2>() * geometry::perpendicular(of_query[i].head<2>());
       jacobian(2, 3) = 1.0;
-      sums.add(jacobian, weight(i, *partner, rotation), moved - of_frame[*partner]);
+      sums.add(jacobian, weight(i, *partner, rotation), moved - of_frame[*partner],
+               cube_m ? std::optional(cube_of(of_frame[*partner], *cube_m)) : std::nullopt);
     }
     return sums;
   }
@@ -170,7 +194,7 @@ IcpResult icp(const IcpCloud& query, const IcpCloud& frame, IcpMetric metric,
   }
 
   result.frame_T_query = run.motion();
-  result.covariance = run.covariance(distance_m);
+  result.covariance = run.covariance(distance_m, parameters.neighbour_radius_m);
   result.inliers = run.inliers(parameters.inlier_m);
   return result;
 }

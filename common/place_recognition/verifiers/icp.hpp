@@ -61,9 +61,13 @@ struct IcpResult {
 };
 
 /// Closest partners and the motion of the least sum of d^T M d, in turn; the greatest distance of
-/// partners (d_max) starts wide and is halved when the motion settles. The covariance is that of
-/// the estimating equations at the end (H^-1 sum g g^T H^-1), as if points erred independently.
-/// Precondition: neither cloud is empty.
+/// partners (d_max) starts wide and is halved when the motion settles.
+/// The covariance is that of the estimating equations at the end, H^-1 (sum over cubes of G G^T)
+/// H^-1, G the sum of the gradients of the pairs in a cube of neighbour_radius_m: points of one
+/// surface err together, those of two do not. Partners change with the motion, so the sum is
+/// flatter than H says where a point's partner is not the point itself: covariances of point to
+/// point are 6 times, of point to plane 3 times that (from Monte Carlo on clouds that were sampled
+/// twice; the tests), of Generalised ICP once. Precondition: neither cloud is empty.
 IcpResult icp(const IcpCloud& query, const IcpCloud& frame, IcpMetric metric,
               const geometry::SE2& start, const IcpParameters& parameters);
 

@@ -1,7 +1,5 @@
 #include "common/place_recognition/verifiers/scan_context_verifier.hpp"
 
-#include <numbers>
-
 #include "common/place_recognition/detectors/linear_detector.hpp"
 
 namespace understory::place_recognition::verifiers {
@@ -14,8 +12,8 @@ std::optional<VerifiedPlace> ScanContextVerifier::verify(
   if (contexts.empty() || !context) return std::nullopt;
 
   const detectors::BestContext best = detectors::best_context(maker_, contexts, *context);
-  const double step_rad = 2.0 * std::numbers::pi / static_cast<double>(maker_.parameters().sectors);
-  const auto guess = detectors::heading_guess(best.frame_T_query, place_sigma_m_, step_rad);
+  const auto guess = detectors::heading_guess(best.frame_T_query, place_sigma_m_,
+                                              maker_.heading_sigma_rad(place_sigma_m_));
   return VerifiedPlace{guess.mean, guess.covariance, 1.0 - best.distance, 0};
 }
 

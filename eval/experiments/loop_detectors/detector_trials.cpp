@@ -16,6 +16,23 @@ namespace places = understory::place_recognition;
 /// Thresholds of a curve that are kept, at most about so many.
 constexpr std::size_t kCurvePoints = 60;
 
+/// A frame farther away than the radius is not asked for; what truths leave open of it [m].
+constexpr double kTruthSigmaM = 0.25;
+
+places::DetectorParameters detector_parameters(const TrialOptions& options) {
+  places::DetectorParameters parameters;
+  parameters.hierarchy.max_distance_m = options.radius_m - kTruthSigmaM;
+  parameters.constellation.max_distance_m = options.radius_m - kTruthSigmaM;
+  parameters.stems.radius_m = options.radius_m;
+  return parameters;
+}
+
+places::VerifierParameters verifier_parameters(const TrialOptions& options) {
+  places::VerifierParameters parameters;
+  parameters.max_distance_m = options.radius_m - kTruthSigmaM;
+  return parameters;
+}
+
 /// One set with its queries.
 class Trials {
  public:
@@ -25,7 +42,7 @@ class Trials {
   /// The detector alone first, then with each verifier.
   void add(const std::string& name, const std::vector<std::string>& verifiers,
            std::vector<Answers>& results) {
-    const auto detector = places::make_detector(name);
+    const auto detector = places::make_detector(name, detector_parameters(options_));
     for (const places::PlaceFrame& frame : set_.frames) detector->add(frame);
     const double bytes = static_cast<double>(detector->descriptor_bytes()) /
                          static_cast<double>(std::max<std::size_t>(1, set_.frames.size()));
@@ -55,7 +72,7 @@ class Trials {
   Answers verified(const std::string& detector, const std::string& name,
                    const std::vector<std::vector<places::ScoredPlace>>& candidates,
                    const std::vector<double>& query_ms, double bytes) const {
-    const auto verifier = places::make_verifier(name);
+    const auto verifier = places::make_verifier(name, verifier_parameters(options_));
     Answers result{detector, name, std::vector<Answer>(queries_.size()), bytes};
     tools::run_in_parallel(queries_.size(), options_.jobs, set_.name + " " + detector + " " + name,
                            stop_, [&](std::size_t q) {
