@@ -39,7 +39,7 @@ struct IcpParameters {
   double neighbour_radius_m = 1.5;  ///< Points with fewer than five of them nearer count as round.
   double plane_epsilon = 1e-3;      ///< Of Generalised ICP: variance along the normal, over 1.
   double inlier_m = 0.3;            ///< Partners of the final pose are nearer.
-  std::size_t most_points = 3000;   ///< Of each frame; of more every n-th is taken.
+  std::size_t most_points = 1000;   ///< Of each frame; of more every n-th is taken.
 };
 
 /// Of all verifiers: make_verifier() takes the part that it needs.

@@ -16,11 +16,12 @@ namespace understory::eval::experiments::loop_detectors {
 /// What counts as a revisit, and what is asked.
 struct TrialOptions {
   double radius_m = 5.0;
-  std::size_t frames_earlier = 50;  ///< At least so many.
-  std::size_t most_queries = 400;   ///< Of a set, spread evenly over it.
-  std::size_t candidates = 3;       ///< That a verifier compares; the best by its score is taken.
-  double pose_m = 1.0;              ///< A pose of a right answer that is farther off is wrong ...
-  double pose_rad = 0.1;            ///< ... or turned by more.
+  std::size_t frames_earlier = 50;      ///< At least so many.
+  std::size_t most_queries = 400;       ///< Of a set, spread evenly over it.
+  std::size_t most_cloud_queries = 80;  ///< Of a set with clouds, which cost a hundred times more.
+  std::size_t candidates = 3;  ///< That a verifier compares; the best by its score is taken.
+  double pose_m = 1.0;         ///< A pose of a right answer that is farther off is wrong ...
+  double pose_rad = 0.1;       ///< ... or turned by more.
   int jobs = 1;
 };
 

@@ -25,12 +25,12 @@ struct FrameSet {
 /// How a set is made.
 struct SetOptions {
   std::uint64_t seed = 1;
-  double length_m = 1200.0;  ///< Of simulated ways; recorded ones are as long as they are.
+  double length_m = 1000.0;  ///< Of simulated ways; recorded ones are as long as they are.
   int jobs = 1;
 };
 
 /// A simulated forest, a way that wanders through it and crosses itself; a sweep of 32 beams every
-/// 2.5 m through the landmark extractor. Throws terminal::Interrupted when `stop` turns true.
+/// 3 m through the landmark extractor. Throws terminal::Interrupted when `stop` turns true.
 FrameSet forest_set(const SetOptions& options, const std::atomic<bool>& stop);
 /// The simulated residential block (thesis 002 §3.1), driven round twice; likewise.
 FrameSet town_set(const SetOptions& options, const std::atomic<bool>& stop);

@@ -36,6 +36,7 @@ struct LoopOptions {
   std::vector<std::string> verifiers = places::verifier_names();
   TrialOptions trial;
   SetOptions set;
+  std::uint64_t drives = 1;  ///< Through each stem map.
   std::string data;
   std::string json;
   bool plots = true;
@@ -51,52 +52,38 @@ fs::path data_folder(const LoopOptions& options) {
 struct NamedSet {
   const char* name;
   bool is_tuning;        ///< Thresholds are taken from it.
+  bool repeats;          ///< Other drives cost little.
   const char* recorded;  ///< Below the folder of recordings; empty = nothing.
-  std::function<FrameSet(const LoopOptions&, const fs::path&, const std::atomic<bool>&)> make;
+  std::function<FrameSet(const SetOptions&, const fs::path&, const std::atomic<bool>&)> make;
 };
 
-SetOptions with_seed(const LoopOptions& options, std::uint64_t more) {
-  SetOptions set = options.set;
-  set.seed += more;
-  set.jobs = options.trial.jobs;
-  return set;
-}
-
 NamedSet stem_set(const char* name, bool is_tuning, const char* file, const char* diameter_cm) {
-  const std::uint64_t more = is_tuning ? kTuningSeed : 0;
-  return {name, is_tuning, file,
-          [=](const LoopOptions& options, const fs::path& path, const std::atomic<bool>&) {
-            return stem_map_set(path, diameter_cm, with_seed(options, more));
+  return {name, is_tuning, true, file,
+          [=](const SetOptions& options, const fs::path& path, const std::atomic<bool>&) {
+            return stem_map_set(path, diameter_cm, options);
           }};
 }
 
 const std::vector<NamedSet>& all_sets() {
+  const auto forest = [](const SetOptions& options, const fs::path&,
+                         const std::atomic<bool>& stop) { return forest_set(options, stop); };
+  const auto town = [](const SetOptions& options, const fs::path&, const std::atomic<bool>& stop) {
+    return town_set(options, stop);
+  };
+  const auto park = [](const SetOptions&, const fs::path& path, const std::atomic<bool>& stop) {
+    return victoria_park_set(path, stop);
+  };
+  const auto kitti = [](const SetOptions& options, const fs::path& path, const std::atomic<bool>&) {
+    return kitti_poles_set(path, options);
+  };
   static const std::vector<NamedSet> sets{
-      {"tuning-forest", true, "",
-       [](const LoopOptions& options, const fs::path&, const std::atomic<bool>& stop) {
-         return forest_set(with_seed(options, kTuningSeed), stop);
-       }},
-      {"tuning-town", true, "",
-       [](const LoopOptions& options, const fs::path&, const std::atomic<bool>& stop) {
-         return town_set(with_seed(options, kTuningSeed), stop);
-       }},
+      {"tuning-forest", true, false, "", forest},
+      {"tuning-town", true, false, "", town},
       stem_set("tuning-lansing", true, "tree_maps/lansing.csv", ""),
-      {"forest", false, "",
-       [](const LoopOptions& options, const fs::path&, const std::atomic<bool>& stop) {
-         return forest_set(with_seed(options, 0), stop);
-       }},
-      {"town", false, "",
-       [](const LoopOptions& options, const fs::path&, const std::atomic<bool>& stop) {
-         return town_set(with_seed(options, 0), stop);
-       }},
-      {"victoria-park", false, "victoria_park_raw/victoria_park_ascii.zip",
-       [](const LoopOptions&, const fs::path& path, const std::atomic<bool>& stop) {
-         return victoria_park_set(path, stop);
-       }},
-      {"kitti-00-poles", false, "pole_maps",
-       [](const LoopOptions& options, const fs::path& path, const std::atomic<bool>&) {
-         return kitti_poles_set(path, with_seed(options, 0));
-       }},
+      {"forest", false, false, "", forest},
+      {"town", false, false, "", town},
+      {"victoria-park", false, false, "victoria_park_raw/victoria_park_ascii.zip", park},
+      {"kitti-00-poles", false, true, "pole_maps", kitti},
       stem_set("longleaf", false, "tree_maps/longleaf.csv", ""),
       stem_set("waka", false, "tree_maps/waka.csv", ""),
       stem_set("big-woods", false, "stem_censuses/big_woods.csv", "dbh_2008_cm")};
@@ -157,11 +144,31 @@ void print_row(const nlohmann::json& row) {
   std::fflush(stdout);
 }
 
+/// The answers of all drives of a set, one after another.
+std::vector<Answers> answers_of(const NamedSet& named, const fs::path& path,
+                                const LoopOptions& options, const std::atomic<bool>& stop) {
+  std::vector<Answers> all;
+  for (std::uint64_t drive = 0; drive < (named.repeats ? options.drives : 1); ++drive) {
+    SetOptions set = options.set;
+    set.seed += drive + (named.is_tuning ? kTuningSeed : 0);
+    set.jobs = options.trial.jobs;
+    auto results = run_trials(named.make(set, path, stop), options.detectors, options.verifiers,
+                              options.trial, stop);
+    if (all.empty()) {
+      all = std::move(results);
+      continue;
+    }
+    for (std::size_t i = 0; i < all.size(); ++i)
+      all[i].answers.insert(all[i].answers.end(), results[i].answers.begin(),
+                            results[i].answers.end());
+  }
+  return all;
+}
+
 /// Rows of one set; where it is for tuning, thresholds rise to its wrong answers.
-void run_set(const NamedSet& named, const FrameSet& set, const LoopOptions& options,
+void run_set(const NamedSet& named, const fs::path& path, const LoopOptions& options,
              const std::atomic<bool>& stop, Thresholds& thresholds, nlohmann::json& rows) {
-  const auto results = run_trials(set, options.detectors, options.verifiers, options.trial, stop);
-  for (const Answers& answers : results) {
+  for (const Answers& answers : answers_of(named, path, options, stop)) {
     double& threshold = thresholds
                             .try_emplace({answers.detector, answers.verifier},
                                          -std::numeric_limits<double>::infinity())
@@ -178,7 +185,14 @@ nlohmann::json config_of(const LoopOptions& options) {
           {"radius_m", options.trial.radius_m},
           {"frames_earlier", options.trial.frames_earlier},
           {"most_queries", options.trial.most_queries},
+          {"most_cloud_queries", options.trial.most_cloud_queries},
+          {"drives", options.drives},
           {"candidates", options.trial.candidates}};
+}
+
+void write_results(const LoopOptions& options, const nlohmann::json& rows) {
+  harness::write_json(options.json,
+                      harness::result_document("loop-detectors", config_of(options), rows));
 }
 
 void run_loop_detectors(const LoopOptions& options) {
@@ -196,7 +210,9 @@ void run_loop_detectors(const LoopOptions& options) {
       fmt::print("{:<15} skipped: there is no {}\n", named.name, path.string());
       continue;
     }
-    run_set(named, named.make(options, path, stop), options, stop, thresholds, rows);
+    run_set(named, path, options, stop, thresholds, rows);
+    // After each set: what is done is not lost.
+    if (!options.json.empty()) write_results(options, rows);
   }
   fmt::print(
       "match: queries with a frame within {:.0f} m, {} frames or more earlier; none: all others. "
@@ -206,10 +222,7 @@ void run_loop_detectors(const LoopOptions& options) {
       options.trial.radius_m, options.trial.frames_earlier, options.trial.pose_m,
       options.trial.pose_rad);
 
-  if (options.json.empty()) return;
-  harness::write_json(options.json,
-                      harness::result_document("loop-detectors", config_of(options), rows));
-  if (options.plots) harness::plot("loop_detectors.py", {options.json});
+  if (!options.json.empty() && options.plots) harness::plot("loop_detectors.py", {options.json});
 }
 
 }  // namespace
@@ -236,6 +249,14 @@ void add_loop_detectors_experiment(CLI::App& eval) {
       "--detectors-only", [options](std::int64_t) { options->verifiers.clear(); }, "No verifier");
   command.add_option("--queries", options->trial.most_queries, "Of a set, at most")
       ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  command
+      .add_option("--cloud-queries", options->trial.most_cloud_queries,
+                  "The same of a set with clouds of points")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  command.add_option("--drives", options->drives, "Drives through each stem map, by seed")
+      ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   command
       .add_option("--candidates", options->trial.candidates,

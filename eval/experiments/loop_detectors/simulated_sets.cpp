@@ -19,7 +19,7 @@ namespace {
 
 namespace places = understory::place_recognition;
 
-constexpr double kFrameSpacingM = 2.5;
+constexpr double kFrameSpacingM = 3.0;
 constexpr double kCubeM = 0.6;
 constexpr double kCloudRangeM = 40.0;
 /// Of roll and pitch as an IMU gives them.
