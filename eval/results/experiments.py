@@ -74,6 +74,8 @@ EXPERIMENTS = (
     _eval("map-merge", "map-merge --trials 100 --drives 40 --seed 1 --jobs 2 --data DATA", 5,
           ("tree_maps", "stem_censuses")),
     _stem_frames(),
+    _eval("loop-detectors", "loop-detectors --queries 250 --cloud-queries 60 --length-m 900 --seed 1 --jobs 2 --data DATA",
+          25, ("tree_maps", "stem_censuses", "pole_maps", "victoria_park_raw")),
     _eval("partition", "partition --runs 20 --seed 1 --length-m 1000 --size-m 5,10,20,40,100", 6),
     _eval("partition-loop", "partition-loop --runs 20 --seed 1 --size-m 5,10,20,40,100", 7),
     _eval("efficiency", "efficiency --drive-km 10 --stationary-h 2", 6),

@@ -55,6 +55,8 @@ SECTIONS = (
     ("one-shot", "One-shot localisation in surveyed forests", None, render.one_shot),
     ("map-merge", "Two maps become one", None, render.map_merge),
     ("place-recognition", "Frames of stems found again", None, render.place_recognition),
+    ("loop-detectors", "Loop detectors and verifiers", "named in the thesis on submaps, §2.4, without figures",
+     render.loop_detectors),
     ("partition", "A road with its path condensed behind the vehicle", "thesis on submaps, Tables 5.1, 5.2 (open routes)", render.partition),
     ("partition-loop", "The same round a block of 700 m", "thesis on submaps, Table 5.3 (closed route)", render.partition),
     ("efficiency", "Time per keyframe", f"{GEOSLAM}, §5.5 (a figure only)", render.efficiency),
