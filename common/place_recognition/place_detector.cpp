@@ -82,6 +82,7 @@ const DetectorKind& detector_kind(std::string_view name) {
 
 std::vector<std::string> detector_names() {
   std::vector<std::string> names;
+  names.reserve(kDetectors.size());
   for (const DetectorKind& kind : kDetectors) names.emplace_back(kind.name);
   return names;
 }

@@ -41,6 +41,7 @@ constexpr std::array kVerifiers{
 
 std::vector<std::string> verifier_names() {
   std::vector<std::string> names;
+  names.reserve(kVerifiers.size());
   for (const VerifierKind& kind : kVerifiers) names.emplace_back(kind.name);
   return names;
 }

@@ -47,6 +47,7 @@ class Accumulator {
                         return std::tuple(votes_[b], a) < std::tuple(votes_[a], b);
                       });
     std::vector<HoughCell> found;
+    found.reserve(kept);
     for (std::size_t i = 0; i < kept; ++i) found.push_back({middle(cells[i]), votes_[cells[i]]});
     return found;
   }

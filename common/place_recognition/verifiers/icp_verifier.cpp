@@ -20,6 +20,7 @@ std::optional<VerifiedPlace> IcpVerifier::verify(
   const IcpCloud moving(of_query, parameters_.icp);
   const IcpCloud fixed(of_frame, parameters_.icp);
   std::vector<geometry::SE2> starts;
+  starts.reserve(guesses.size() + 1);
   for (const geometry::SE2WithCovariance& guess : guesses) starts.push_back(guess.mean);
   if (starts.empty()) starts.emplace_back();
 

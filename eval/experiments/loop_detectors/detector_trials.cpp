@@ -144,6 +144,7 @@ std::vector<std::size_t> queries_of(const FrameSet& set, const TrialOptions& opt
   const std::size_t possible = set.frames.size() - options.frames_earlier;
   const std::size_t count =
       std::min(possible, set.has_clouds ? options.most_cloud_queries : options.most_queries);
+  queries.reserve(count);
   for (std::size_t i = 0; i < count; ++i)
     queries.push_back(options.frames_earlier + i * possible / count);
   return queries;

@@ -13,6 +13,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "common/terminal/interrupt.hpp"
 #include "eval/experiments/experiments.hpp"
@@ -36,7 +37,8 @@ struct LoopOptions {
   std::vector<std::string> verifiers = places::verifier_names();
   TrialOptions trial;
   SetOptions set;
-  std::uint64_t drives = 1;  ///< Through each stem map.
+  std::uint64_t drives = 1;         ///< Through each stem map.
+  std::optional<double> threshold;  ///< Instead of those from the sets for tuning.
   std::string data;
   std::string json;
   bool plots = true;
@@ -119,6 +121,8 @@ nlohmann::json row_of(const NamedSet& set, const Answers& answers, double thresh
                      {"bytes_per_frame", answers.bytes_per_frame},
                      {"curve", score.curve}};
   if (std::isfinite(threshold)) row["threshold"] = threshold;
+  const double highest_wrong = highest_wrong_score(answers.answers);
+  if (std::isfinite(highest_wrong)) row["highest_wrong_score"] = highest_wrong;
   if (score.queries_without_match > 0)
     row["wrong_bound_95_pct"] = 300.0 / static_cast<double>(score.queries_without_match);
   return row;
@@ -174,6 +178,7 @@ void run_set(const NamedSet& named, const fs::path& path, const LoopOptions& opt
                                          -std::numeric_limits<double>::infinity())
                             .first->second;
     if (named.is_tuning) threshold = std::max(threshold, highest_wrong_score(answers.answers));
+    if (options.threshold) threshold = *options.threshold;
     rows.push_back(row_of(named, answers, threshold));
     print_row(rows.back());
   }
@@ -233,6 +238,7 @@ void add_loop_detectors_experiment(CLI::App& eval) {
       "Loop detectors and verifiers of the thesis on submaps, on the same queries");
   const auto options = std::make_shared<LoopOptions>();
   std::vector<std::string> names;
+  names.reserve(all_sets().size());
   for (const NamedSet& set : all_sets()) names.emplace_back(set.name);
   command.add_option("--set", options->sets, "Sets; default all, those for tuning first")
       ->delimiter(',')
@@ -258,6 +264,8 @@ void add_loop_detectors_experiment(CLI::App& eval) {
   command.add_option("--drives", options->drives, "Drives through each stem map, by seed")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
+  command.add_option("--threshold", options->threshold,
+                     "Scores above it are accepted, whatever the tuning sets say");
   command
       .add_option("--candidates", options->trial.candidates,
                   "Of a detector, that a verifier compares")
