@@ -36,7 +36,7 @@ std::vector<Eigen::Vector3f> points_of(const PlaceFrame& frame) {
   if (!frame.cloud.empty()) return points;
 
   for (const PlaceLandmark& landmark : landmarks_of(frame))
-    points.push_back(landmark.position_m.cast<float>());
+    points.emplace_back(landmark.position_m.cast<float>());
   return points;
 }
 

@@ -32,7 +32,7 @@ constexpr double kPriorInformation = 1e-6;
 std::vector<Eigen::Vector3d> thinned(std::span<const Eigen::Vector3f> points, std::size_t most) {
   const std::size_t step = std::max<std::size_t>(1, (points.size() + most - 1) / most);
   std::vector<Eigen::Vector3d> kept;
-  for (std::size_t i = 0; i < points.size(); i += step) kept.push_back(points[i].cast<double>());
+  for (std::size_t i = 0; i < points.size(); i += step) kept.emplace_back(points[i].cast<double>());
   return kept;
 }
 
@@ -169,7 +169,8 @@ IcpCloud::IcpCloud(std::span<const Eigen::Vector3f> points, const IcpParameters&
     const Eigen::Matrix3d across = normal * normal.transpose();
     const bool is_round = normal.isZero(0.0);
     across_.push_back(is_round ? Eigen::Matrix3d(Eigen::Matrix3d::Identity()) : across);
-    covariance_.push_back(Eigen::Matrix3d::Identity() - (1.0 - parameters.plane_epsilon) * across);
+    covariance_.emplace_back(Eigen::Matrix3d::Identity() -
+                             (1.0 - parameters.plane_epsilon) * across);
   }
 }
 

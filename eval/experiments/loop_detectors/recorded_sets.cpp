@@ -94,7 +94,7 @@ places::PlaceFrame laser_frame(const model::PlanarScan& scan,
     if (!scan.is_return(beam)) continue;
     const double angle = scan.bearing(beam);
     const double range = static_cast<double>(scan.ranges_m[beam]);
-    frame.cloud.push_back(
+    frame.cloud.emplace_back(
         Eigen::Vector3d(range * std::cos(angle), range * std::sin(angle), 0.0).cast<float>());
   }
   return frame;
