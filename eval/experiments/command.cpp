@@ -4,6 +4,7 @@
 #include "eval/experiments/health/health.hpp"
 #include "eval/experiments/laps/laps.hpp"
 #include "eval/experiments/large_map/large_map.hpp"
+#include "eval/experiments/loop_detectors/loop_detectors.hpp"
 #include "eval/experiments/loops/loops_command.hpp"
 #include "eval/experiments/merges/merges.hpp"
 #include "eval/experiments/one_shot/one_shot.hpp"
@@ -32,6 +33,7 @@ void add_eval_command(CLI::App& parent) {
   returns::add_returns_experiment(eval);
   loops::add_loops_experiment(eval);
   place_recognition::add_place_recognition_experiment(eval);
+  loop_detectors::add_loop_detectors_experiment(eval);
   health::add_health_experiment(eval);
   roads::add_landmarks_vs_error_experiment(eval);
   misstated::add_misstated_experiment(eval);

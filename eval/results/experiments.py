@@ -103,6 +103,8 @@ EXPERIMENTS = (
     _loops("loops", _LOOP_DRIVES, "--runs 3 --seed 301", 5),
     _loops("loops-blind", _LOOP_DRIVES, "--runs 3 --seed 301 --blind 0.1-0.45", 5),
     _loops("loops-strangers", _STRANGE_DRIVES, "--reckon --seed 401", 5),
+    _eval("loop-detectors", "loop-detectors --queries 250 --cloud-queries 60 --length-m 900 --seed 1 --jobs 2 --data DATA",
+          25, ("tree_maps", "stem_censuses", "pole_maps", "victoria_park_raw")),
     _eval("partition", "partition --runs 20 --seed 1 --length-m 1000 --size-m 5,10,20,40,100", 6),
     _eval("partition-loop", "partition-loop --runs 20 --seed 1 --size-m 5,10,20,40,100", 7),
     _eval("efficiency", "efficiency --drive-km 10 --stationary-h 2", 6),

@@ -238,6 +238,30 @@ def loop_queries(document):
                    f"{3 / none:.1e}" if none and not wrong else "")])
 
 
+def loop_detectors(document):
+    """Detectors alone, and behind each verifier: recall before the first wrong answer in every set; then all rows."""
+    rows = [row for row in document["rows"] if not row["is_tuning"]]
+    sets = list(dict.fromkeys(row["set"] for row in rows))
+    by_pair = {}
+    for row in rows:
+        by_pair.setdefault((row["detector"], row["verifier"]), {})[row["set"]] = row
+    lines = ["Recall at zero wrong acceptances:", ""]
+    lines += table(
+        ("detector", "verifier", *sets, "wrong accepted", "median ms", "bytes/frame"),
+        [(detector, verifier,
+          *(number(of[name]["recall_zero_wrong"], 3) if name in of and of[name]["queries"] else "" for name in sets),
+          sum(row["wrong_accepted"] for row in of.values()),
+          " to ".join(number(pick(row["ms_p50"] for row in of.values()), 1) for pick in (min, max)),
+          number(max(row["bytes_per_frame"] for row in of.values()), 0))
+         for (detector, verifier), of in by_pair.items()])
+    queries = {row["set"]: (row["queries"], row["queries_without_match"]) for row in rows}
+    none = sum(count for _, count in queries.values())
+    lines += ["", "Queries with a match, without one: "
+              + ", ".join(f"{name} {count}, {others}" for name, (count, others) in queries.items())
+              + f". Nothing accepted of {none} without a match bounds the probability at {3 / none:.1e} (95 %)."]
+    return lines
+
+
 def partition(document):
     """Drives with stretches condensed, a line per length of a stretch; one section each."""
     return table(

@@ -58,6 +58,8 @@ SECTIONS = (
     ("loops", "Loops found while tracking goes on", None, render.loops),
     ("loops-blind", "The same where no stem is seen on a third of the way", None, render.loops),
     ("loops-strangers", "Queries that have no match", None, render.loop_queries),
+    ("loop-detectors", "Loop detectors and verifiers", "named in the thesis on submaps, §2.4, without figures",
+     render.loop_detectors),
     ("partition", "A road with its path condensed behind the vehicle", "thesis on submaps, Tables 5.1, 5.2 (open routes)", render.partition),
     ("partition-loop", "The same round a block of 700 m", "thesis on submaps, Table 5.3 (closed route)", render.partition),
     ("efficiency", "Time per keyframe", f"{GEOSLAM}, §5.5 (a figure only)", render.efficiency),
