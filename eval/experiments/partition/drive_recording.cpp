@@ -17,11 +17,11 @@ namespace {
 
 /// Ideal keyframes: distance between them [m], scans that each stands for, least returns and walls
 /// of a landmark, range [m].
-constexpr double kStep_m = 1.6;
-constexpr std::uint16_t kScans = 8;
+constexpr double kIdealStep_m = 1.6;
+constexpr std::uint16_t kIdealScans = 8;
 constexpr std::uint32_t kLeastReturns = 8;
 constexpr std::uint32_t kLeastWallReturns = 10;
-constexpr double kRange_m = 40.0;
+constexpr double kIdealRange_m = 40.0;
 constexpr double kDetection = 0.9;
 /// Their noise: of a landmark [m], of odometry by its path, and of its heading [rad].
 constexpr double kLandmarkSigma_m = 0.07;
@@ -46,8 +46,8 @@ sim::SensorDrive sensors_of(const NamedRoute& route, std::uint64_t seed) {
 }
 
 /// Everything behind the sensors but the mapper.
-RecordedDrive from_lidar(const NamedRoute& route, std::uint64_t seed,
-                         const RecordingOptions& options, const std::atomic<bool>& stop) {
+RecordedDrive record_lidar(const NamedRoute& route, std::uint64_t seed,
+                           const RecordingOptions& options, const std::atomic<bool>& stop) {
   sim::SensorDrive sensors = sensors_of(route, seed);
   std::vector<bus::Service> services = harness::services_of(options.config_dir);
   std::erase_if(services, [](const bus::Service& one) { return one.name == "geoslam_mapper"; });
@@ -87,7 +87,7 @@ class IdealDrive {
       const sim::VehicleState state = sensors_.state_at(utime);
       const geometry::SE2 here = state.world_T_level();
       drive_.truth.push_back({utime, here});
-      if (last && (here.translation() - last->translation()).norm() < kStep_m) continue;
+      if (last && (here.translation() - last->translation()).norm() < kIdealStep_m) continue;
 
       if (last) add_odometry(last->inverse() * here, utime);
       add_keyframe(sensors_.sweep(revolution), state, utime);
@@ -119,7 +119,7 @@ class IdealDrive {
     model::Keyframe out;
     out.utime = utime;
     out.sequence = ++sequence_;
-    out.field_of_view.max_range_m = kRange_m;
+    out.field_of_view.max_range_m = kIdealRange_m;
     out.members.push_back({utime, sequence_, {}, 1e-10 * Eigen::Matrix3d::Identity()});
     for (const sim::VisibleTrunk& trunk :
          visible_trunks(sensors_.world(), sweep, state, kLeastReturns)) {
@@ -136,7 +136,7 @@ class IdealDrive {
 
   void add_landmark(const Eigen::Vector2d& truth_m, double radius_m, model::LandmarkKind kind,
                     model::Keyframe& keyframe) {
-    const bool is_seen = chance_(random_) <= kDetection && truth_m.norm() <= kRange_m;
+    const bool is_seen = chance_(random_) <= kDetection && truth_m.norm() <= kIdealRange_m;
     const Eigen::Vector2d noise(unit(), unit());
     if (!is_seen) return;
     model::KeyframeLandmark& out = keyframe.landmarks.emplace_back();
@@ -144,7 +144,7 @@ class IdealDrive {
     out.covariance_m2 = kLandmarkSigma_m * kLandmarkSigma_m * Eigen::Matrix2d::Identity();
     out.radius_m = radius_m;
     out.kind = kind;
-    out.observation_count = kScans;
+    out.observation_count = kIdealScans;
   }
 
   sim::SensorDrive sensors_;
@@ -168,7 +168,7 @@ RecordedDrive record(const NamedRoute& route, FrontEnd front_end, std::uint64_t 
   if (!file.empty() && std::filesystem::exists(file)) return load(file);
 
   RecordedDrive drive = front_end == FrontEnd::kIdeal ? IdealDrive(route, seed).run(stop)
-                                                      : from_lidar(route, seed, options, stop);
+                                                      : record_lidar(route, seed, options, stop);
   if (!file.empty()) {
     std::filesystem::create_directories(options.folder);
     save(drive, file);

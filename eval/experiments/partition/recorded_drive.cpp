@@ -57,6 +57,17 @@ RecordedDrive RecordedDrive::first(double along_m) const {
   return result;
 }
 
+RecordedDrive record(Route& route) {
+  RecordedDrive drive;
+  for (std::size_t k = 0; k < route.size(); ++k) {
+    if (k > 0) drive.inputs.emplace_back(route.odometry(k));
+    model::Keyframe keyframe = route.keyframe(k);
+    drive.truth.push_back({keyframe.utime, route.pose(k)});
+    drive.inputs.emplace_back(std::move(keyframe));
+  }
+  return drive;
+}
+
 void save(const RecordedDrive& drive, const std::filesystem::path& log) {
   io::LcmLogWriter writer(log);
   std::int64_t sequence = 0;

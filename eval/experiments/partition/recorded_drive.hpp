@@ -8,6 +8,7 @@
 #include "common/model/ekf_output.hpp"
 #include "common/model/keyframe.hpp"
 #include "common/model/odometry.hpp"
+#include "eval/experiments/partition/route.hpp"
 #include "eval/metrics/victoria_park_score.hpp"
 #include "services/geoslam_mapper/mapper_method.hpp"
 
@@ -27,6 +28,8 @@ struct RecordedDrive {
   RecordedDrive first(double along_m) const;
 };
 
+/// All keyframes and odometry of a route that has not been asked for any.
+RecordedDrive record(Route& route);
 /// Writes the drive as an LCM log (KEYFRAME, ODOMETRY, EKF_POSE, EKF_LEVEL, GROUND_TRUTH), whole or
 /// not at all. Throws io::LogError.
 void save(const RecordedDrive& drive, const std::filesystem::path& log);

@@ -12,7 +12,7 @@ namespace {
 namespace plane = factor_graph::plane;
 
 /// The pose that holds the map is known to a micrometre.
-constexpr double kKnownPose = 1e12;
+constexpr double kHeldInformation = 1e12;
 /// Part of chi^2 by which a step lowers it that is the last.
 constexpr double kLastDecrease = 1e-11;
 
@@ -55,9 +55,10 @@ class Expansion {
     const plane::PoseId id = result_.graph.add_pose(map_T_node);
     poses_[pose.number] = id;
     result_.stretch_of_pose.push_back(stretch);
+    result_.scans_of_pose.push_back(pose.scans);
     if (pose.number == StretchNumber(0)) {
       result_.graph.pose_priors.push_back(
-          {id, map_T_node, kKnownPose * Eigen::Matrix3d::Identity()});
+          {id, map_T_node, kHeldInformation * Eigen::Matrix3d::Identity()});
     }
     for (const Stretch::Keyframe& keyframe : pose.keyframes) {
       result_.keyframes.push_back({keyframe.sequence, keyframe.utime, id, keyframe.node_T_base});

@@ -41,9 +41,10 @@ struct ExpandedDrive {
     factor_graph::plane::PoseId pose{};
     geometry::SE2 pose_T_base;
   };
-  factor_graph::plane::Graph graph;          ///< Poses in order of their numbers.
+  factor_graph::plane::Graph graph;          ///< Poses in the order given.
   std::vector<Keyframe> keyframes;           ///< In order of time.
   std::vector<std::size_t> stretch_of_pose;  ///< Index in the stretches given.
+  std::vector<std::uint32_t> scans_of_pose;  ///< Of its first keyframe.
 
   /// map_T_base of each keyframe at the graph's values.
   std::vector<model::KeyframePose> trajectory() const;

@@ -37,12 +37,13 @@ struct Stretch {
   /// A node.
   struct Pose {
     StretchNumber number{};
+    std::uint32_t scans = 0;      ///< Of its first keyframe.
     geometry::SE2 origin_T_node;  ///< As estimated when it was condensed.
     std::vector<Keyframe> keyframes;
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& s) {
-      a(s.number, s.origin_T_node, s.keyframes);
+      a(s.number, s.scans, s.origin_T_node, s.keyframes);
     }
   };
   /// A landmark, likewise.

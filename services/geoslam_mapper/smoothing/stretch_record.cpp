@@ -1,6 +1,8 @@
 // The factors of a stretch as they are in the graph.
 #include <algorithm>
+#include <limits>
 #include <map>
+#include <stdexcept>
 
 #include "services/geoslam_mapper/smoothing/condensing.hpp"
 
@@ -21,6 +23,9 @@ std::vector<Stretch::Keyframe> keyframes_of(NodeIndex node, const Trajectory& tr
 
 void add_observations(const plane::Graph& graph, std::span<const model::LandmarkId> landmarks,
                       Stretch& stretch) {
+  constexpr std::size_t kMost = std::numeric_limits<std::uint16_t>::max();
+  if (graph.poses.size() > kMost || landmarks.size() > kMost)
+    throw std::length_error("a stretch of more than 65535 nodes or landmarks");
   for (std::size_t i = 0; i < landmarks.size(); ++i)
     stretch.landmarks.push_back({landmarks[i], graph.points[i].cast<float>()});
   for (const plane::PointObservation& factor : graph.observations) {
@@ -48,7 +53,7 @@ Stretch Condensing::stretch_of(std::span<const Passed> passed, const GlobalMap& 
   for (const Passed& one : passed) {
     nodes.push_back(one.node);
     stretch.poses.push_back(
-        {one.number, map.graph.pose(one.node), keyframes_of(one.node, map.trajectory)});
+        {one.number, one.scans, map.graph.pose(one.node), keyframes_of(one.node, map.trajectory)});
   }
   const PoseGraph::Part part = map.graph.part_of(nodes);
   add_observations(part.graph, part.landmarks, stretch);
