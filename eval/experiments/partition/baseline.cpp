@@ -130,9 +130,10 @@ class CondensedGraph {
       row += 3;
     }
     for (std::size_t i = 3; i < variables.size(); ++i, row += 2) {
-      const Eigen::Matrix2d information = relations.covariance.block<2, 2>(row, row).inverse();
-      graph_.add(graph::observation(variables[0], variables[i], relations.mean.segment<2>(row),
-                                    0.5 * (information + information.transpose())));
+      const Eigen::Matrix2d inverse = relations.covariance.block<2, 2>(row, row).inverse();
+      const Eigen::Matrix2d information = 0.5 * (inverse + inverse.transpose());
+      const Eigen::Vector2d position = relations.mean.segment<2>(row);
+      graph_.add(graph::observation(variables[0], variables[i], position, information));
     }
   }
   static Eigen::Matrix3d inverse_of(const Eigen::Matrix3d& covariance) {
@@ -220,7 +221,7 @@ std::vector<double> mean_landmarks(const DriveGraph& drive) {
 BaselineSolution solve_by_submaps(const DriveGraph& drive, const BaselineOptions& options) {
   BaselineSolution solution;
   solution.cuts = cuts_of(drive, options.policy);
-  std::vector<BaselineSubmap> submaps = submaps_of(drive, solution.cuts);
+  std::vector<BaselineSubmap> submaps = submaps_of(drive, solution.cuts, options.shared);
   CondensedGraph condensed(drive, submaps, options.condensed);
   const auto count = static_cast<double>(submaps.size());
   for (std::size_t i = 0; i < submaps.size(); ++i) {

@@ -23,11 +23,18 @@ enum class Condensed : std::uint8_t {
   kJointly,  ///< One measurement of all of them, with their joint covariance.
 };
 
+/// Which landmarks two submaps share. The poses at the cuts are always shared.
+enum class Shared : std::uint8_t {
+  kAtCut,  ///< Those observed from the pose at the cut and from the next one (§3.4.1).
+  kAll,    ///< All that both observed: what was missed once is not lost.
+};
+
 /// One way to do it.
 struct BaselineOptions {
   geoslam_mapper::smoothing::CutPolicy policy;
   Propagation propagation = Propagation::kCompounding;
   Condensed condensed = Condensed::kSingly;
+  Shared shared = Shared::kAtCut;
   /// Manual loop closure (§3.4.3): where the last pose is, in the frame of the first one.
   std::optional<geometry::SE2> first_T_last;
   bool also_full = false;  ///< Optimises the full graph from the expanded one.

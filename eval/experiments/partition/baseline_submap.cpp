@@ -52,7 +52,7 @@ class SubmapCutter {
     own_.resize(submaps_.size());
   }
 
-  std::vector<BaselineSubmap> take(const std::vector<std::size_t>& cuts) {
+  std::vector<BaselineSubmap> take(const std::vector<std::size_t>& cuts, Shared shared) {
     for (const plane::PointObservation& one : drive_.graph.observations) add(one);
     for (const plane::RelativePose& one : drive_.graph.relative_poses) add(one);
     // As known when the drive was over.
@@ -61,7 +61,11 @@ class SubmapCutter {
       motion.a_T_b = plane::at_true_rate(motion.a_T_b, drive_.graph[one.bias], one.seconds);
       add(motion);
     }
-    share(cuts);
+    if (shared == Shared::kAll) {
+      share_all();
+    } else {
+      share(cuts);
+    }
     return std::move(submaps_);
   }
 
@@ -116,6 +120,16 @@ class SubmapCutter {
     }
   }
 
+  void share_all() {
+    std::map<plane::PointId, int> submaps;
+    for (const auto& own : own_)
+      for (const auto& [point, number] : own) ++submaps[point];
+    for (std::size_t i = 0; i < submaps_.size(); ++i) {
+      for (const auto& [point, number] : own_[i])
+        if (submaps.at(point) > 1) submaps_[i].shared_points.push_back(number);
+    }
+  }
+
   const DriveGraph& drive_;
   std::vector<BaselineSubmap> submaps_;
   std::vector<std::map<plane::PointId, std::size_t>> own_;  ///< By submap: own number of a point.
@@ -133,8 +147,8 @@ Eigen::MatrixXd of_numbers(const Eigen::MatrixXd& joint, const std::vector<geome
 }  // namespace
 
 std::vector<BaselineSubmap> submaps_of(const DriveGraph& drive,
-                                       const std::vector<std::size_t>& cuts) {
-  return SubmapCutter(drive, cuts).take(cuts);
+                                       const std::vector<std::size_t>& cuts, Shared shared) {
+  return SubmapCutter(drive, cuts).take(cuts, shared);
 }
 
 void optimise(BaselineSubmap& submap) {

@@ -16,7 +16,7 @@ struct BaselineSubmap {
   /// Its own graph, first pose held where the drive has it.
   factor_graph::plane::Graph graph;
   std::vector<factor_graph::plane::PointId> points;  ///< Their numbers in the drive, by own number.
-  /// Own numbers of the landmarks that it shares: observed from a cut pose and from the next one.
+  /// Own numbers of the landmarks that it shares.
   std::vector<std::size_t> shared_points;
 
   /// The pose in the middle of the track (§2.3.3); never a shared one.
@@ -26,7 +26,7 @@ struct BaselineSubmap {
 /// Cuts the drive at these poses. Throws std::runtime_error where a submap would have less than
 /// three poses.
 std::vector<BaselineSubmap> submaps_of(const DriveGraph& drive,
-                                       const std::vector<std::size_t>& cuts);
+                                       const std::vector<std::size_t>& cuts, Shared shared);
 /// Optimises it by itself. Throws std::runtime_error naming it where it is not determined.
 void optimise(BaselineSubmap& submap);
 /// Entrance, exit and shared landmarks in the frame of the origin, at the submap's optimum; the

@@ -19,13 +19,17 @@ struct Design {
   const char* method;
   Propagation propagation;
   Condensed condensed;
+  Shared shared;
   bool is_full;
 };
+constexpr auto kCompounding = Propagation::kCompounding;
 constexpr Design kDesigns[] = {
-    {"baseline", Propagation::kCompounding, Condensed::kSingly, false},
-    {"baseline-unscented", Propagation::kUnscented, Condensed::kSingly, false},
-    {"baseline-joint", Propagation::kCompounding, Condensed::kJointly, false},
-    {"baseline-full", Propagation::kCompounding, Condensed::kSingly, true}};
+    {"baseline", kCompounding, Condensed::kSingly, Shared::kAtCut, false},
+    {"baseline-condensed", kCompounding, Condensed::kSingly, Shared::kAtCut, false},
+    {"baseline-unscented", Propagation::kUnscented, Condensed::kSingly, Shared::kAtCut, false},
+    {"baseline-joint", kCompounding, Condensed::kJointly, Shared::kAtCut, false},
+    {"baseline-joint-all", kCompounding, Condensed::kJointly, Shared::kAll, false},
+    {"baseline-full", kCompounding, Condensed::kSingly, Shared::kAtCut, true}};
 
 /// Compares on one drive.
 class Comparison {
@@ -53,6 +57,7 @@ class Comparison {
   }
 
   std::vector<Outcome> all() {
+    add("truth", {"truth", 0.0, 0.0}, reference_, {});
     add_mapper({"uncut", 0.0, 0.0}, run_);
     for (const Policy& policy : options_.policies) {
       if (policy.size_m <= options_.largest_m)
@@ -107,6 +112,7 @@ class Comparison {
     options.policy = policy.cuts();
     options.propagation = design.propagation;
     options.condensed = design.condensed;
+    options.shared = design.shared;
     options.also_full = design.is_full;
     if (options_.is_closed) options.first_T_last = manual_closure();
     BaselineSolution solution;

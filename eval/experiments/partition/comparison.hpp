@@ -16,10 +16,11 @@ struct ComparisonOptions {
   double largest_m = 1000.0;  ///< Stretches that are longer are left out of the mapper's rows.
 };
 
-/// The outcomes, "uncut" first. Methods: "baseline" as the thesis has it, and with all designs
-/// "baseline-unscented", "baseline-joint" and "baseline-full"; "smoothing-condensed" is the mapper
-/// at the end of the drive, "smoothing" the same after its stretches were put together again.
-/// Throws where the uncut drive has no solution.
+/// The outcomes, "truth" and "uncut" first. Methods: "baseline" as the thesis has it, and with all
+/// designs "baseline-condensed" (the condensed graph, also on an open route), "baseline-unscented",
+/// "baseline-joint", "baseline-joint-all" (all that two submaps share) and "baseline-full";
+/// "smoothing-condensed" is the mapper at the end of the drive, "smoothing" the same after its
+/// stretches were put together again. Throws where the uncut drive has no solution.
 std::vector<Outcome> compare(const RecordedDrive& drive,
                              const geoslam_mapper::SmoothingMapperParameters& parameters,
                              const ComparisonOptions& options);

@@ -21,7 +21,7 @@ std::vector<Stretch::Keyframe> keyframes_of(NodeIndex node, const Trajectory& tr
   return keyframes;
 }
 
-void add_observations(const plane::Graph& graph, std::span<const model::LandmarkId> landmarks,
+void add_stretch_observations(const plane::Graph& graph, std::span<const model::LandmarkId> landmarks,
                       Stretch& stretch) {
   constexpr std::size_t kMost = std::numeric_limits<std::uint16_t>::max();
   if (graph.poses.size() > kMost || landmarks.size() > kMost)
@@ -56,7 +56,7 @@ Stretch Condensing::stretch_of(std::span<const Passed> passed, const GlobalMap& 
         {one.number, one.scans, map.graph.pose(one.node), keyframes_of(one.node, map.trajectory)});
   }
   const PoseGraph::Part part = map.graph.part_of(nodes);
-  add_observations(part.graph, part.landmarks, stretch);
+  add_stretch_observations(part.graph, part.landmarks, stretch);
 
   const auto number_of = [&](plane::PoseId id) -> std::optional<StretchNumber> {
     if (index(id) < nodes.size()) return passed[index(id)].number;
