@@ -14,6 +14,13 @@ Trajectory stamped(const std::vector<model::KeyframePose>& poses) {
   return result;
 }
 
+/// Every keyframe is kept, with its motions.
+PolicyRun map_uncut(const RecordedDrive& drive,
+                    geoslam_mapper::SmoothingMapperParameters parameters) {
+  parameters.known_ground_m = 0.0;
+  return map_drive(drive, {"uncut", 0.0, 0.0}, parameters);
+}
+
 /// A way of the thesis's method.
 struct Design {
   const char* method;
@@ -41,7 +48,7 @@ class Comparison {
         parameters_(parameters),
         options_(options),
         length_m_(drive.length_m()),
-        run_(map_drive(drive, {"uncut", 0.0, 0.0}, parameters)) {
+        run_(map_uncut(drive, parameters)) {
     uncut_ = stamped(run_.settled);
     if (uncut_.empty()) throw std::runtime_error("no keyframe of the drive is in a map");
     const auto truth_of = [&](model::Utime utime) {

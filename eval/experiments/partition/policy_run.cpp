@@ -112,11 +112,11 @@ class PolicyDrive {
     find_cuts();
   }
 
-  /// The first keyframe is tied to the pose that holds the map, which is of the last stretch.
+  /// The pose that holds the map is of the last stretch.
   void find_cuts() {
     std::size_t latest = 0;
-    for (std::size_t i = 1; i < result_.graph.keyframes.size(); ++i) {
-      const auto& keyframe = result_.graph.keyframes[i];
+    for (const auto& keyframe : result_.graph.keyframes) {
+      if (keyframe.pose == result_.graph.keyframes.front().pose) continue;
       const std::size_t owner = result_.graph.stretch_of_pose[index(keyframe.pose)];
       if (owner > latest) result_.cuts.push_back(keyframe.utime);
       latest = std::max(latest, owner);

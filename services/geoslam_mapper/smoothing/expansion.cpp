@@ -13,6 +13,8 @@ namespace plane = factor_graph::plane;
 
 /// The pose that holds the map is known to a micrometre.
 constexpr double kHeldInformation = 1e12;
+/// Path's time [s] for which one bias of the gyro stands; as in GyroBias.
+constexpr double kBias_s = 5.0;
 /// Part of chi^2 by which a step lowers it that is the last.
 constexpr double kLastDecrease = 1e-11;
 
@@ -24,7 +26,6 @@ class Expansion {
 
   void add(const PlacedStretch& placed, std::size_t number) {
     const Stretch& stretch = *placed.stretch;
-    bias_.reset();
     for (const Stretch::Pose& pose : stretch.poses) add(pose, placed.map_T_origin, number);
     std::vector<plane::PointId> points;
     for (const Stretch::Landmark& landmark : stretch.landmarks)
@@ -39,11 +40,14 @@ class Expansion {
                                             {one.position_m[0], one.position_m[1]},
                                             information});
     }
-    for (const Stretch::Motion& motion : stretch.motions) motions_.push_back({motion, number});
+    motions_.insert(motions_.end(), stretch.motions.begin(), stretch.motions.end());
   }
 
   ExpandedDrive take() {
-    for (const auto& [motion, stretch] : motions_) add(motion, stretch);
+    // In order of time, whatever stretch they are of.
+    std::sort(motions_.begin(), motions_.end(),
+              [](const auto& a, const auto& b) { return std::max(a.a, a.b) < std::max(b.a, b.b); });
+    for (const Stretch::Motion& motion : motions_) add(motion);
     std::sort(result_.keyframes.begin(), result_.keyframes.end(),
               [](const auto& a, const auto& b) { return a.utime < b.utime; });
     return std::move(result_);
@@ -74,7 +78,7 @@ class Expansion {
     return entry->second;
   }
 
-  void add(const Stretch::Motion& motion, std::size_t stretch) {
+  void add(const Stretch::Motion& motion) {
     const auto a = poses_.find(motion.a);
     const auto b = poses_.find(motion.b);
     if (a == poses_.end() || b == poses_.end()) return;
@@ -83,14 +87,13 @@ class Expansion {
       result_.graph.relative_poses.push_back(measured);
       return;
     }
-    result_.graph.biased_relative_poses.push_back(
-        {measured, bias_of(stretch, motion), motion.seconds});
+    result_.graph.biased_relative_poses.push_back({measured, bias_of(motion), motion.seconds});
     seconds_ += motion.seconds;
   }
 
-  /// One for each stretch; a random walk between them.
-  plane::ScalarId bias_of(std::size_t stretch, const Stretch::Motion& motion) {
-    if (bias_ && stretch_of_bias_ == stretch) return *bias_;
+  /// One for each kBias_s of motion; a random walk between them.
+  plane::ScalarId bias_of(const Stretch::Motion& motion) {
+    if (bias_ && seconds_ < kBias_s) return *bias_;
     plane::Graph& graph = result_.graph;
     graph.scalars.push_back(motion.bias_rad_s);
     const auto id = plane::ScalarId(static_cast<std::uint32_t>(graph.scalars.size() - 1));
@@ -102,7 +105,6 @@ class Expansion {
       graph.scalar_priors.push_back({id, 0.0, 1.0 / (sigma * sigma)});
     }
     bias_ = id;
-    stretch_of_bias_ = stretch;
     seconds_ = 0.0;
     return id;
   }
@@ -112,9 +114,8 @@ class Expansion {
   ExpandedDrive result_;
   std::map<StretchNumber, plane::PoseId> poses_;
   std::map<model::LandmarkId, plane::PointId> points_;
-  std::vector<std::pair<Stretch::Motion, std::size_t>> motions_;
+  std::vector<Stretch::Motion> motions_;
   std::optional<plane::ScalarId> bias_;
-  std::size_t stretch_of_bias_ = 0;
   double seconds_ = 0.0;  ///< Of the motions since that bias began.
 };
 
