@@ -18,6 +18,9 @@ struct Names {
 
 Names add_variables(const Graph& from, graph::FactorGraph& to) {
   Names names;
+  names.poses.reserve(from.poses.size());
+  names.points.reserve(from.points.size());
+  names.scalars.reserve(from.scalars.size());
   for (const geometry::SE2& pose : from.poses) names.poses.push_back(to.add(pose));
   for (const Eigen::Vector2d& point : from.points) names.points.push_back(to.add(point));
   for (const double scalar : from.scalars) names.scalars.push_back(to.add(scalar));

@@ -33,6 +33,7 @@ std::vector<std::vector<plane::PointId>> observed_by_pose(const DriveGraph& driv
 std::vector<CutNode> cut_nodes(const DriveGraph& drive) {
   const auto observed = observed_by_pose(drive);
   std::vector<CutNode> nodes;
+  nodes.reserve(drive.graph.poses.size());
   double along_m = 0.0;
   for (std::size_t i = 0; i < drive.graph.poses.size(); ++i) {
     const geometry::SE2& pose = drive.graph.poses[i];
@@ -104,6 +105,7 @@ class CondensedGraph {
   }
   std::vector<Eigen::Vector2d> shared_points(std::size_t submap) const {
     std::vector<Eigen::Vector2d> positions;
+    positions.reserve(submaps_[submap].shared_points.size());
     for (const std::size_t point : submaps_[submap].shared_points)
       positions.push_back(
           graph::point2_of(graph_.value(points_.at(submaps_[submap].points[point]))));
@@ -205,6 +207,7 @@ std::vector<std::size_t> cuts_of(const DriveGraph& drive, const CutPolicy& polic
 std::vector<double> mean_landmarks(const DriveGraph& drive) {
   const std::vector<CutNode> nodes = cut_nodes(drive);
   std::vector<double> means;
+  means.reserve(nodes.size());
   for (std::size_t pose = 0; pose < nodes.size(); ++pose) {
     double sum = 0.0;
     std::uint32_t scans = 0;

@@ -164,17 +164,21 @@ Relations condense(const BaselineSubmap& submap, Propagation propagation) {
   const std::vector<plane::PoseId> poses{pose_id(submap.origin()), pose_id(0),
                                          pose_id(submap.last - submap.first)};
   std::vector<plane::PointId> points;
+  points.reserve(submap.shared_points.size());
   for (const std::size_t own : submap.shared_points) points.push_back(point_id(own));
   const auto joint = smoother.joint_marginal(poses, points);
   if (!joint) fail_submap(submap, "what it shares is not determined");
 
   std::vector<geometry::SE2> estimates;
+  estimates.reserve(poses.size());
   std::vector<Eigen::Vector3d> numbers;
+  numbers.reserve(poses.size());
   for (const plane::PoseId id : poses) {
     estimates.push_back(submap.graph[id]);
     numbers.push_back(submap.graph[id].coordinates());
   }
   std::vector<Eigen::Vector2d> positions;
+  positions.reserve(points.size());
   for (const plane::PointId id : points) positions.push_back(submap.graph[id]);
   return relations(numbers[0], {numbers[1], numbers[2]}, positions, of_numbers(*joint, estimates),
                    propagation);

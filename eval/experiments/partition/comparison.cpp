@@ -10,6 +10,7 @@ namespace {
 
 Trajectory stamped(const std::vector<model::KeyframePose>& poses) {
   Trajectory result;
+  result.reserve(poses.size());
   for (const model::KeyframePose& one : poses) result.push_back({one.utime, one.map_T_vehicle});
   return result;
 }
@@ -56,6 +57,7 @@ class Comparison {
     };
     const geometry::SE2 map_T_world =
         uncut_.front().pose * truth_of(uncut_.front().utime).inverse();
+    reference_.reserve(uncut_.size());
     for (const metrics::StampedPose& one : uncut_)
       reference_.push_back({one.utime, map_T_world * truth_of(one.utime)});
     landmarks_ = mean_landmarks(run_.graph);
@@ -89,6 +91,7 @@ class Comparison {
     out.to_reference = distances(trajectory, reference_, cuts);
     out.uncut_to_reference = distances(uncut_, reference_, cuts);
     std::vector<double> landmarks;
+    landmarks.reserve(cuts.size());
     for (const model::Utime cut : cuts) {
       const auto found = pose_of_.find(cut);
       landmarks.push_back(found == pose_of_.end() ? 0.0 : landmarks_[found->second]);
@@ -156,6 +159,7 @@ class Comparison {
 
   Trajectory trajectory_of(const std::vector<geometry::SE2>& poses) const {
     Trajectory result;
+    result.reserve(run_.graph.keyframes.size());
     for (const auto& keyframe : run_.graph.keyframes)
       result.push_back({keyframe.utime, poses[index(keyframe.pose)] * keyframe.pose_T_base});
     return result;

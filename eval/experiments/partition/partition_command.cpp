@@ -141,9 +141,9 @@ void add_partition(CLI::App& eval, const std::string& name, const std::string& d
   options->experiment = name;
   options->is_closed = is_closed;
   options->is_dynamic = is_dynamic;
-  options->routes =
-      is_closed ? std::vector<std::string>{"urban", "block"}
-                : std::vector<std::string>{"urban", "urban-countryside", "countryside", "road"};
+  options->routes = {"urban"};
+  if (!is_closed)
+    options->routes.insert(options->routes.end(), {"urban-countryside", "countryside"});
 
   command->add_option("--runs", options->runs, "Drives per route with ideal landmarks")
       ->check(CLI::Range(1, 100000))

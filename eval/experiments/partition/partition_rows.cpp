@@ -77,6 +77,7 @@ std::vector<PartitionCell> cells_of(const std::vector<RouteRun>& runs) {
 template <class F>
 std::vector<double> values_of(const PartitionCell& cell, F value) {
   std::vector<double> values;
+  values.reserve(cell.outcomes.size());
   for (const Outcome* outcome : cell.outcomes) values.push_back(value(*outcome));
   return values;
 }

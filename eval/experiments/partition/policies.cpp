@@ -96,12 +96,14 @@ void Policy::set(geoslam_mapper::SmoothingMapperParameters& parameters) const {
 
 std::vector<Policy> static_policies(const std::vector<double>& sizes_m) {
   std::vector<Policy> policies;
+  policies.reserve(sizes_m.size());
   for (const double size_m : sizes_m) policies.push_back({"distance", size_m, size_m});
   return policies;
 }
 
 std::vector<Policy> dynamic_policies() {
   std::vector<Policy> policies;
+  policies.reserve(9);
   for (const double least : {1.0, 2.0, 3.0}) policies.push_back({"sparse", kDynamic_m, least});
   for (const double most : {4.0, 5.0, 6.0}) policies.push_back({"dense", kDynamic_m, most});
   policies.push_back({"turn", kDynamic_m, kTurn_deg});

@@ -100,6 +100,7 @@ class PolicyDrive {
     const double begin_s = tools::thread_time_s();
     stretches_.push_back(mapper_.current().rest());
     std::vector<smoothing::PlacedStretch> placed;
+    placed.reserve(stretches_.size());
     for (const smoothing::Stretch& one : stretches_) {
       placed.push_back(
           {&one, one.node ? mapper_.current().map().graph.pose(*one.node) : geometry::SE2()});

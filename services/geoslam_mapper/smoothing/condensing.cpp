@@ -27,6 +27,7 @@ std::vector<Retirement> Condensing::follow(const FusedKeyframe& fused,
   if (stretch.size() < 2) return {};
 
   std::vector<NodeIndex> nodes;
+  nodes.reserve(stretch.size());
   for (const Passed& passed : stretch) nodes.push_back(passed.node);
   std::vector<Retirement> retired = condense(nodes, discovery, merges, map);
   if (keeps_stretches_ && !retired.empty()) stretches_.back().turn_to(retired);

@@ -28,6 +28,7 @@ class Expansion {
     const Stretch& stretch = *placed.stretch;
     for (const Stretch::Pose& pose : stretch.poses) add(pose, placed.map_T_origin, number);
     std::vector<plane::PointId> points;
+    points.reserve(stretch.landmarks.size());
     for (const Stretch::Landmark& landmark : stretch.landmarks)
       points.push_back(point_of(landmark, placed.map_T_origin));
 

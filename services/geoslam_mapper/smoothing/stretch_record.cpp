@@ -21,8 +21,8 @@ std::vector<Stretch::Keyframe> keyframes_of(NodeIndex node, const Trajectory& tr
   return keyframes;
 }
 
-void add_stretch_observations(const plane::Graph& graph, std::span<const model::LandmarkId> landmarks,
-                      Stretch& stretch) {
+void add_stretch_observations(const plane::Graph& graph,
+                              std::span<const model::LandmarkId> landmarks, Stretch& stretch) {
   constexpr std::size_t kMost = std::numeric_limits<std::uint16_t>::max();
   if (graph.poses.size() > kMost || landmarks.size() > kMost)
     throw std::length_error("a stretch of more than 65535 nodes or landmarks");
@@ -49,6 +49,7 @@ Stretch Condensing::stretch_of(std::span<const Passed> passed, const GlobalMap& 
   if (!bases.empty() && bases.front().is_origin) numbers[bases.front().node] = StretchNumber(0);
 
   std::vector<NodeIndex> nodes;
+  nodes.reserve(passed.size());
   Stretch stretch;
   for (const Passed& one : passed) {
     nodes.push_back(one.node);
