@@ -17,6 +17,8 @@ import matplotlib.pyplot as plt  # noqa: E402
 
 METHODS = {"baseline": ("thesis's method", "tab:red"), "smoothing-condensed": ("ours, as driven", "tab:blue"),
            "smoothing": ("ours, settled at the end", "tab:green")}
+# What is less is drawn there: a tenth of a millimetre.
+LEAST_CM = 1e-2
 DRAWN = ("100 m", "300 m", "500 m", "sparse < 2", "dense > 5", "turn of 45 deg")
 
 
@@ -35,8 +37,8 @@ def sizes(document, file):
             points = [row for row in own if row["method"] == method]
             if points:
                 axis.errorbar([labels.index(row["label"]) for row in points],
-                              [max(1e-4, 100 * row[key]) for row in points],
-                              yerr=[min(100 * row[key + "_ci95"], 99.99 * row[key]) for row in points],
+                              [max(LEAST_CM, 100 * row[key]) for row in points],
+                              yerr=[min(100 * row[key + "_ci95"], max(0.0, 100 * row[key] - LEAST_CM)) for row in points],
                               fmt="o", capsize=3, color=colour, label=name, markersize=4)
         thesis = [row for row in own if row["method"] == "baseline" and "thesis_rmse_m" in row]
         if thesis:
@@ -45,6 +47,7 @@ def sizes(document, file):
         if not closed:
             axis.axhline(1.0, color="grey", linewidth=0.7, linestyle=":")
         axis.set_yscale("log")
+        axis.set_ylim(bottom=0.8 * LEAST_CM)
         axis.set_xticks(range(len(labels)), labels, rotation=60, ha="right", fontsize=7)
         axis.set_title(f"{route}, {front_end}", fontsize=9)
         axis.grid(alpha=0.3)
@@ -88,7 +91,7 @@ def route(traces, closed, file):
             if trace is None:
                 continue
             times, metres = distance(trace, reference)
-            error.plot(times, [max(1e-3, 100 * one) for one in metres], style, color=colour, linewidth=0.9,
+            error.plot(times, [max(LEAST_CM, 100 * one) for one in metres], style, color=colour, linewidth=0.9,
                        label=f"{label}, {METHODS[method][0]}")
             if method == "baseline":
                 plan.plot([p[1] for p in trace["poses"]], [p[2] for p in trace["poses"]], "-", color=colour,
