@@ -39,6 +39,7 @@ void add_eval_command(CLI::App& parent) {
   misstated::add_misstated_experiment(eval);
   wheels::add_wheels_experiment(eval);
   partition::add_partition_experiments(eval);
+  partition::add_long_drive_experiments(eval);
 }
 
 }  // namespace understory::eval::experiments

@@ -10,6 +10,10 @@ GRAPHS = ([f"DATA/pose_graphs/{name}" for name in FOREST_GRAPHS]
 tinyGrid3D.g2o smallGrid3D.g2o sphere2500.g2o torus3D.g2o rrr_NewCollege.g2o""".split()])
 
 
+# Drives are made once for all four experiments.
+PARTITION = "--runs 20 --lidar-runs 3 --seed 1 --jobs 2 --front-end ideal,lidar --recordings OUT/partition-drives"
+
+
 @dataclass(frozen=True)
 class Experiment:
     """One result file `NAME.json`.
@@ -105,8 +109,13 @@ EXPERIMENTS = (
     _loops("loops-strangers", _STRANGE_DRIVES, "--reckon --seed 401", 5),
     _eval("loop-detectors", "loop-detectors --queries 250 --cloud-queries 60 --length-m 900 --seed 1 --jobs 2 --data DATA",
           25, ("tree_maps", "stem_censuses", "pole_maps", "victoria_park_raw")),
-    _eval("partition", "partition --runs 20 --seed 1 --length-m 1000 --size-m 5,10,20,40,100", 6),
-    _eval("partition-loop", "partition-loop --runs 20 --seed 1 --size-m 5,10,20,40,100", 7),
+    _eval("partition", f"partition {PARTITION} --size-m 20,100,200,300,400,500", 20),
+    _eval("partition-loop", f"partition-loop {PARTITION} --size-m 20,100,200,300,400,500", 5),
+    _eval("partition-dynamic", f"partition-dynamic {PARTITION}", 6),
+    _eval("partition-dynamic-loop", f"partition-dynamic-loop {PARTITION}", 3),
+    _eval("partition-designs", "partition --runs 20 --seed 1 --jobs 2 --routes road --size-m 5,20,100,500 --all-designs", 15),
+    _eval("long-drive", "long-drive --runs 20 --seed 1 --length-m 1000 --size-m 5,10,20,40,100", 6),
+    _eval("long-drive-loop", "long-drive-loop --runs 20 --seed 1 --size-m 5,10,20,40,100", 7),
     _eval("efficiency", "efficiency --drive-km 10 --stationary-h 2", 6),
     _eval("laps", "laps --laps 100 --length-m 317 --hours 24", 45),
     _eval("laps-held", "laps --laps 3 --length-m 100 --hours 2 --localise-in OUT/laps-held.gpkg --no-plots", 6),

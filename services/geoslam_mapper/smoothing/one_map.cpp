@@ -61,6 +61,7 @@ OneMap::OneMap(const SmoothingMapperParameters& parameters, std::uint32_t id)
 OneMap OneMap::beside(std::uint32_t id) const {
   OneMap other(parameters_, id);
   other.motion_ = motion_.from_nowhere();
+  if (condensing_.keeps_stretches()) other.keep_stretches();
   if (const auto& level = scan_localiser_.level()) other.scan_localiser_.set(*level);
   return other;
 }

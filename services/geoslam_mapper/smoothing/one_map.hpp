@@ -82,6 +82,12 @@ class OneMap {
   std::vector<model::Submap> take_given_away() { return submaps_.take_given_away(); }
   /// See Submaps::bring_back().
   std::string bring_back(const model::Submap& submap) { return submaps_.bring_back(submap, map_); }
+  /// See Condensing::keep_stretches().
+  void keep_stretches() { condensing_.keep_stretches(); }
+  /// See Condensing::take_stretches().
+  std::vector<Stretch> take_stretches() { return condensing_.take_stretches(); }
+  /// See Condensing::rest().
+  Stretch rest() const { return condensing_.rest(map_); }
   /// Takes a loop closure, or takes one back; see Closures. A keyframe that was handed over is an
   /// end by its submap only.
   Closures::Decision take(const model::LoopClosure& closure);

@@ -172,6 +172,22 @@ class PoseGraph {
   /// of the other nodes may be taken out, too, nor the newest one. Cost: the factors of the nodes.
   void take_out(const Surplus& surplus);
 
+  /// Nodes as a graph of their own, and what its numbers are here. Poses: `inner`, then `outer`.
+  struct Part {
+    /// A motion to another node.
+    struct Outer {
+      NodeIndex node = 0;
+      NodeIndex inner = 0;  ///< Its end in the part.
+      MotionRef motion;
+    };
+    factor_graph::plane::Graph graph;
+    std::vector<NodeIndex> inner;
+    std::vector<Outer> outer;
+    std::vector<model::LandmarkId> landmarks;
+    std::vector<factor_graph::plane::ScalarId> scalars;  ///< May repeat.
+  };
+  /// What these nodes observed and how they moved, also to others. Cost: their factors.
+  Part part_of(std::span<const NodeIndex> nodes) const;
   /// Puts one node in the place of these, all of which there are: what they observed and how they
   /// moved becomes one condensed measurement (plane::condense). The newest node and the one that
   /// holds the map must not be among them. The retirements tell where each node was relative to
@@ -313,20 +329,6 @@ class PoseGraph {
   };
   Node& edit(NodeIndex node);
   NodeIndex put_node(const geometry::SE2& map_T_centre, bool is_stationary, double along_m);
-  /// Nodes as a graph of their own, and what its numbers are here.
-  struct Part {
-    /// A motion to another node.
-    struct Outer {
-      NodeIndex node = 0;
-      NodeIndex inner = 0;  ///< Its end in the part.
-      MotionRef motion;
-    };
-    factor_graph::plane::Graph graph;
-    std::vector<NodeIndex> inner;
-    std::vector<Outer> outer;
-    std::vector<model::LandmarkId> landmarks;
-    std::vector<factor_graph::plane::ScalarId> scalars;  ///< May repeat.
-  };
   /// What two nodes have in common, smaller number first.
   using TiedNodes = std::pair<NodeIndex, NodeIndex>;
   /// The dormant landmarks that two nodes observed, as one motion between the nodes.
@@ -363,7 +365,6 @@ class PoseGraph {
   factor_graph::plane::RelativePose tie(const TiedNodes& nodes,
                                         std::span<const model::LandmarkId> ids) const;
   bool has_left(NodeIndex node);
-  Part part_of(std::span<const NodeIndex> nodes) const;
   void add_motions_of(NodeIndex node, Part& part) const;
   void add_motion(MotionRef ref, factor_graph::plane::PoseId a, factor_graph::plane::PoseId b,
                   Part& part) const;

@@ -54,6 +54,13 @@ class SmoothingMapper final : public MapperMethod {
     return current_.submaps().poses(current_.map().graph);
   }
   model::LoopResult take(const model::LoopClosure& closure) override;
+  /// From now on the factors of each stretch of the path that is condensed are kept until they are
+  /// taken: an expand() of them is the drive uncut. See Condensing.
+  void keep_stretches() { current_.keep_stretches(); }
+  /// Those of the map in use since the last call.
+  std::vector<Stretch> take_stretches() { return current_.take_stretches(); }
+  /// The map in use.
+  const OneMap& current() const { return current_; }
   /// The maps that were left.
   const MapArchive& kept_maps() const { return kept_maps_; }
 
