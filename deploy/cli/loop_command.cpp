@@ -18,7 +18,7 @@
 namespace understory::cli {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using WaitClock = std::chrono::steady_clock;
 using Status = model::LoopResult::Status;
 
 /// The closure is sent again this often until the mapper answers: messages may be lost.
@@ -91,11 +91,11 @@ model::LoopResult answer_to(const model::LoopClosure& closure, const LoopOptions
       answer = *result;
   });
 
-  const auto end = Clock::now() + std::chrono::duration<double>(options.timeout_s);
-  auto again = Clock::now();
-  while (!answer && Clock::now() < end) {
+  const auto end = WaitClock::now() + std::chrono::duration<double>(options.timeout_s);
+  auto again = WaitClock::now();
+  while (!answer && WaitClock::now() < end) {
     terminal::throw_if_interrupted();
-    if (Clock::now() >= again) {
+    if (WaitClock::now() >= again) {
       if (const auto refusal = bus.publish("LOOP_CLOSURE", wire::encode_message(closure)))
         fail("loop: LOOP_CLOSURE: not sent: " + refusal->detail);
       again += kAgain;

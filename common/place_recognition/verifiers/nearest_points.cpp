@@ -4,28 +4,24 @@
 #include <utility>
 
 namespace understory::place_recognition::verifiers {
-namespace {
-
-/// What nanoflann asks of a set of points; names are its own.
-struct Cloud {
-  std::vector<Eigen::Vector3d> points;
-
-  std::size_t kdtree_get_point_count() const { return points.size(); }
-  double kdtree_get_pt(std::size_t index, std::size_t axis) const {
-    return points[index][static_cast<Eigen::Index>(axis)];
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box& /*box*/) const {
-    return false;
-  }
-};
-
-using Index = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud>,
-                                                  Cloud, 3, std::uint32_t>;
-
-}  // namespace
 
 struct NearestPoints::Tree {
+  /// What nanoflann asks of a set of points; names are its own.
+  struct Cloud {
+    std::vector<Eigen::Vector3d> points;
+
+    std::size_t kdtree_get_point_count() const { return points.size(); }
+    double kdtree_get_pt(std::size_t index, std::size_t axis) const {
+      return points[index][static_cast<Eigen::Index>(axis)];
+    }
+    template <class Box>
+    bool kdtree_get_bbox(Box& /*box*/) const {
+      return false;
+    }
+  };
+  using Index = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud>,
+                                                    Cloud, 3, std::uint32_t>;
+
   explicit Tree(std::vector<Eigen::Vector3d> points)
       : cloud{std::move(points)}, index(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(10)) {
     index.buildIndex();

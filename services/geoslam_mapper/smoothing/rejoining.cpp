@@ -7,7 +7,7 @@ namespace understory::geoslam_mapper::smoothing {
 namespace {
 
 /// The vehicle drives so far [m] from one search to the next.
-constexpr double kBetweenSearches_m = 3.0;
+constexpr double kBetweenTries_m = 3.0;
 /// Two keyframes agree where the maps lie to each other as near as this, around the vehicle.
 constexpr double kAgree_m = 0.5;
 constexpr double kAgree_rad = 0.03;
@@ -29,7 +29,7 @@ std::optional<Overlap> Rejoining::follow(const model::Keyframe& keyframe,
                                          const GlobalMap& map, const MapArchive& left) {
   if (left.maps().empty() || !map.graph.newest()) return std::nullopt;
   const double along_m = map.graph.node(*map.graph.newest()).along_m;
-  if (std::abs(along_m - tried_m_) < kBetweenSearches_m) return std::nullopt;
+  if (std::abs(along_m - tried_m_) < kBetweenTries_m) return std::nullopt;
   tried_m_ = along_m;
 
   const geometry::SE2 map_T_centre =

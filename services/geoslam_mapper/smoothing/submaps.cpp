@@ -14,7 +14,7 @@ namespace {
 
 constexpr state::Format kSubmapFormat{"geoslam_mapper.smoothing.submap", 1};
 /// The vehicle drives so far [m] from one look around to the next.
-constexpr double kBetween_m = 10.0;
+constexpr double kBetweenLooks_m = 10.0;
 /// A submap's landmarks may lie so far [m] from its node, beside the sensor's range.
 constexpr double kExtent_m = 40.0;
 /// What comes back is not given away before it is so much further [m].
@@ -62,7 +62,7 @@ double sigma_of(NodeIndex node, const PoseGraph& graph) {
 void Submaps::follow(const model::FieldOfView& field_of_view, NodeIndex newest, model::Utime utime,
                      GlobalMap& map) {
   const double along_m = map.graph.node(newest).along_m;
-  if (hand_over_m_ <= 0.0 || std::abs(along_m - looked_m_) < kBetween_m) return;
+  if (hand_over_m_ <= 0.0 || std::abs(along_m - looked_m_) < kBetweenLooks_m) return;
   looked_m_ = along_m;
 
   const Eigen::Vector2d vehicle_m = map.graph.pose(newest).translation();
