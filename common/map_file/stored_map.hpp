@@ -40,7 +40,9 @@ struct LoopClosure {
 /// One map. Stored and read again it is equal to the bit, but that covariances come back symmetric
 /// and -0.0 as 0.0.
 struct StoredMap {
-  std::uint32_t map_id = 1;               ///< 1 to kLastMapId.
+  /// 1 to kLastMapId; upper 16 bit of its landmarks' ids. Those of maps that became part of it have
+  /// the smaller numbers of these.
+  std::uint32_t map_id = 1;
   std::string name;                       ///< For people; may be empty.
   model::Utime created_utime = 0;         ///< Of what it was made from, or when it was made [us].
   std::string origin;                     ///< What it was made from, e.g. the name of a log.

@@ -123,8 +123,10 @@ std::optional<WholeMap> HeldMap::whole() const {
   // Keyframes that came back may be in both.
   std::ranges::sort(whole.landmarks, {}, &MapLandmark::id);
   std::ranges::stable_sort(whole.keyframes, {}, &KeyframePose::utime);
-  const auto twice = std::ranges::unique(whole.keyframes, {}, &KeyframePose::keyframe_sequence);
-  whole.keyframes.erase(twice.begin(), twice.end());
+  const auto twice = std::unique(
+      whole.keyframes.begin(), whole.keyframes.end(),
+      [](const auto& a, const auto& b) { return a.keyframe_sequence == b.keyframe_sequence; });
+  whole.keyframes.erase(twice, whole.keyframes.end());
   return whole;
 }
 

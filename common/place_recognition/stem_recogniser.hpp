@@ -12,14 +12,12 @@
 
 #include "common/geometry/se2.hpp"
 #include "common/place_recognition/level_stems.hpp"
+#include "common/place_recognition/place_frame.hpp"
 #include "common/place_recognition/stem_chains.hpp"
 #include "common/place_recognition/stem_likelihood.hpp"
 #include "common/place_recognition/stem_triangles.hpp"
 
 namespace understory::place_recognition {
-
-/// Name of a frame, given by the caller; grows from frame to frame.
-using FrameId = std::int64_t;
 
 /// What is looked for, and how hard.
 struct StemRecogniserParameters {

@@ -16,6 +16,8 @@ void add_import_command(CLI::App& parent);
 void add_launch_command(CLI::App& parent);
 /// `understory log`: recording, information, checks, repair and cuts of logs.
 void add_log_command(CLI::App& parent);
+/// `understory loop`: loop closures set and taken back by a person.
+void add_loop_command(CLI::App& parent);
 /// `understory map`: stored maps: contents, checks, imports, exports, history.
 void add_map_command(CLI::App& parent);
 /// `understory replay`: a log through chosen services.

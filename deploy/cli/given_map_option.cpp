@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 std::uint32_t number_of_given(const GivenMapOptions& options) {
   const auto landmarks =
       geoslam_mapper::read_given_map(options.file, static_cast<int>(options.map_id));
-  return model::map_of(landmarks.front().id);
+  return model::map_of(landmarks.back().id);
 }
 
 std::string checksum_in_file(const std::string& file, std::uint32_t map_id) {

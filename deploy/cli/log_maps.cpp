@@ -5,9 +5,10 @@
 namespace understory::cli {
 namespace {
 
-/// Number of the map that a message is about; 0 where its landmarks do not tell.
+/// Number of the map that a message is about; 0 where its landmarks do not tell. Maps that became
+/// part of it have smaller numbers.
 std::uint32_t map_id_of(const std::vector<model::MapLandmark>& landmarks) {
-  return landmarks.empty() ? 0 : model::map_of(landmarks.front().id);
+  return landmarks.empty() ? 0 : model::map_of(landmarks.back().id);
 }
 
 }  // namespace

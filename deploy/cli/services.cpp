@@ -6,6 +6,7 @@
 #include "services/keyframer/adapter.hpp"
 #include "services/landmark_extractor/adapter.hpp"
 #include "services/lidar_imu_input/adapter.hpp"
+#include "services/loop_closer/adapter.hpp"
 #include "services/submap_store/adapter.hpp"
 #include "services/velodyne_driver/adapter.hpp"
 
@@ -18,7 +19,8 @@ std::vector<bus::Service> all_services() {
           ekf::ekf_service(),
           keyframer::keyframer_service(),
           geoslam_mapper::geoslam_mapper_service(),
-          submap_store::submap_store_service()};
+          submap_store::submap_store_service(),
+          loop_closer::loop_closer_service()};
 }
 
 std::vector<bus::Service> sensor_services() { return {velodyne_driver::velodyne_driver_service()}; }

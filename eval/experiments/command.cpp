@@ -4,6 +4,8 @@
 #include "eval/experiments/health/health.hpp"
 #include "eval/experiments/laps/laps.hpp"
 #include "eval/experiments/large_map/large_map.hpp"
+#include "eval/experiments/loop_detectors/loop_detectors.hpp"
+#include "eval/experiments/loops/loops_command.hpp"
 #include "eval/experiments/merges/merges.hpp"
 #include "eval/experiments/one_shot/one_shot.hpp"
 #include "eval/experiments/partition/partition.hpp"
@@ -29,12 +31,15 @@ void add_eval_command(CLI::App& parent) {
   recording::add_recording_experiment(eval);
   laps::add_laps_experiment(eval);
   returns::add_returns_experiment(eval);
+  loops::add_loops_experiment(eval);
   place_recognition::add_place_recognition_experiment(eval);
+  loop_detectors::add_loop_detectors_experiment(eval);
   health::add_health_experiment(eval);
   roads::add_landmarks_vs_error_experiment(eval);
   misstated::add_misstated_experiment(eval);
   wheels::add_wheels_experiment(eval);
   partition::add_partition_experiments(eval);
+  partition::add_long_drive_experiments(eval);
 }
 
 }  // namespace understory::eval::experiments

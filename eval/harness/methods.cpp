@@ -10,7 +10,7 @@ const std::vector<std::string>& method_names() {
   return names;
 }
 
-Stages make_stages(std::string_view method) {
+Stages make_stages(std::string_view method, double hand_over_m) {
   keyframer::KeyframerParameters keyframer;
   geoslam_mapper::MapperParameters mapper;
   if (method == "baseline") {
@@ -19,6 +19,7 @@ Stages make_stages(std::string_view method) {
   } else if (method == "smoothing") {
     keyframer.method = "joint";
     mapper.method = "smoothing";
+    mapper.smoothing.hand_over_m = hand_over_m;
   } else {
     throw std::invalid_argument("unknown method '" + std::string(method) + "'");
   }

@@ -20,9 +20,10 @@ struct Stages {
 
 /// Names of the methods that make_stages() takes: "baseline", "smoothing".
 const std::vector<std::string>& method_names();
-/// New stages of a method with its parameters as published. Throws std::invalid_argument for an
+/// New stages of a method with its parameters as published. What is farther than `hand_over_m` from
+/// the vehicle leaves the mapper of "smoothing"; 0: nothing. Throws std::invalid_argument for an
 /// unknown name.
-Stages make_stages(std::string_view method);
+Stages make_stages(std::string_view method, double hand_over_m = 0.0);
 
 /// What became of a scan that completed a keyframe.
 struct KeyframeOutcome {
@@ -43,6 +44,8 @@ class SlamSession {
   /// True if the last scan completed a keyframe that the keyframer withheld.
   bool withheld_one() const { return withheld_one_; }
 
+  /// The mapper, to take what it gives away.
+  geoslam_mapper::MapperMethod& mapper() { return *stages_.mapper; }
   /// The mapper, to ask for its map.
   const geoslam_mapper::MapperMethod& mapper() const { return *stages_.mapper; }
   /// The keyframer, to ask for its counters.

@@ -10,6 +10,10 @@ GRAPHS = ([f"DATA/pose_graphs/{name}" for name in FOREST_GRAPHS]
 tinyGrid3D.g2o smallGrid3D.g2o sphere2500.g2o torus3D.g2o rrr_NewCollege.g2o""".split()])
 
 
+# Drives are made once for all four experiments.
+PARTITION = "--runs 20 --lidar-runs 3 --seed 1 --jobs 2 --front-end ideal,lidar --recordings OUT/partition-drives"
+
+
 @dataclass(frozen=True)
 class Experiment:
     """One result file `NAME.json`.
@@ -59,6 +63,32 @@ def _stem_frames():
                  ("tree_maps", "stem_censuses", "pole_maps"), before=made)
 
 
+_BIG_WOODS = "DATA/stem_censuses/big_woods.csv --dbh-cm dbh_2014_cm --least-diameter 0.12"
+_KITTI_00 = "--path DATA/pole_maps/seq00_traj.csv"
+_KITTI_02 = "--path DATA/pole_maps/seq02_traj.csv"
+_LOOP_DRIVES = (
+    ("longleaf-laps", "DATA/tree_maps/longleaf.csv --length 1600 --seed 201"),
+    ("lansing-wander", "DATA/tree_maps/lansing.csv --path wander --length 2500 --seed 202"),
+    ("lansing-34", "DATA/tree_maps/lansing.csv --path laps --length 1800 --seed 203 --seen 0.34"),
+    ("bigwoods-kitti00", f"{_BIG_WOODS} {_KITTI_00} --seed 205 --seen 0.5 --spacing 4 --range 15"),
+    ("bigwoods-kitti02", f"{_BIG_WOODS} {_KITTI_02} --seed 206 --range 18"),
+    ("bei-kitti00", f"DATA/tree_maps/bei.csv {_KITTI_00} --seed 207"),
+)
+_STRANGE_DRIVES = tuple(
+    (f"{wood}-{way}-{seed}", f"{stems} {path} --seed {seed} --seen {0.34 if seed % 2 else 0.64}")
+    for seed in range(220, 230)
+    for wood, stems in (("bei", "DATA/tree_maps/bei.csv"), ("bigwoods", f"{_BIG_WOODS} --range 18"))
+    for way, path in (("kitti00", _KITTI_00), ("kitti02", _KITTI_02)))
+
+
+def _loops(name, drives, options, minutes):
+    """Drives of stem frames that come back, with the loop closer and without, and the batch solution. Nothing was tuned on
+    these seeds."""
+    made = tuple(f"understory sim stem-frames {what} --out OUT/loop-frames/{drive}" for drive, what in drives)
+    folders = " ".join(f"OUT/loop-frames/{drive}" for drive, _ in drives)
+    return _eval(name, f"loops {folders} {options} --jobs 2", minutes, ("tree_maps", "stem_censuses", "pole_maps"), before=made)
+
+
 EXPERIMENTS = (
     _eval("paths", "paths --runs 10 --seed 1 --jobs 2", 12),
     _eval("paths-lidar", "paths --method lidar --runs 3 --seed 1", 15),
@@ -74,8 +104,18 @@ EXPERIMENTS = (
     _eval("map-merge", "map-merge --trials 100 --drives 40 --seed 1 --jobs 2 --data DATA", 5,
           ("tree_maps", "stem_censuses")),
     _stem_frames(),
-    _eval("partition", "partition --runs 20 --seed 1 --length-m 1000 --size-m 5,10,20,40,100", 6),
-    _eval("partition-loop", "partition-loop --runs 20 --seed 1 --size-m 5,10,20,40,100", 7),
+    _loops("loops", _LOOP_DRIVES, "--runs 3 --seed 301", 5),
+    _loops("loops-blind", _LOOP_DRIVES, "--runs 3 --seed 301 --blind 0.1-0.45", 5),
+    _loops("loops-strangers", _STRANGE_DRIVES, "--reckon --seed 401", 5),
+    _eval("loop-detectors", "loop-detectors --queries 250 --cloud-queries 60 --length-m 900 --seed 1 --jobs 2 --data DATA",
+          25, ("tree_maps", "stem_censuses", "pole_maps", "victoria_park_raw")),
+    _eval("partition", f"partition {PARTITION} --size-m 20,100,200,300,400,500", 20),
+    _eval("partition-loop", f"partition-loop {PARTITION} --size-m 20,100,200,300,400,500", 5),
+    _eval("partition-dynamic", f"partition-dynamic {PARTITION}", 6),
+    _eval("partition-dynamic-loop", f"partition-dynamic-loop {PARTITION}", 3),
+    _eval("partition-designs", "partition --runs 20 --seed 1 --jobs 2 --routes road --size-m 5,20,100,500 --all-designs", 15),
+    _eval("long-drive", "long-drive --runs 20 --seed 1 --length-m 1000 --size-m 5,10,20,40,100", 6),
+    _eval("long-drive-loop", "long-drive-loop --runs 20 --seed 1 --size-m 5,10,20,40,100", 7),
     _eval("efficiency", "efficiency --drive-km 10 --stationary-h 2", 6),
     _eval("laps", "laps --laps 100 --length-m 317 --hours 24", 45),
     _eval("laps-held", "laps --laps 3 --length-m 100 --hours 2 --localise-in OUT/laps-held.gpkg --no-plots", 6),

@@ -212,7 +212,57 @@ def place_recognition(document):
     return lines
 
 
-def partition(document):
+def loops(document):
+    """Drives that come back: a line each, the mean of its runs."""
+    rows = document["rows"]
+    lines = []
+    for drive in dict.fromkeys(row["drive"] for row in rows):
+        some = [row for row in rows if row["drive"] == drive]
+        mean = lambda key: sum(row[key] for row in some) / len(some)
+        total = lambda key: sum(row[key] for row in some)
+        lines.append((drive, len(some), number(mean("length_m"), 0), number(mean("odometry_end_m"), 1),
+                      number(mean("error_without_m"), 3), number(mean("error_m"), 3), number(mean("error_batch_m"), 3),
+                      number(mean("error_m") / mean("error_batch_m"), 2), total("queries"), total("sent"), total("accepted"),
+                      total("wrong_accepted"), number(mean("search_ms_p50"), 1), number(max(row["largest_closure_ms"] for row in some), 0)))
+    return table(("drive", "runs", "length m", "odometry, end m", "without m", "with loop closer m", "batch m", "ratio", "queries",
+                  "sent", "accepted", "wrong", "search, median ms", "closing, most ms"), lines)
+
+
+def loop_queries(document):
+    """What the loop closer sent on drives beside a mapper that only reckons."""
+    rows = document["rows"]
+    total = lambda key: sum(row[key] for row in rows)
+    none, wrong = total("queries_without_match"), total("sent_wrong")
+    return table(("drives", "queries", "have a match", "have none", "sent", "wrong", "95 % bound"),
+                 [(len(rows), total("queries"), total("queries_with_match"), none, total("sent"), wrong,
+                   f"{3 / none:.1e}" if none and not wrong else "")])
+
+
+def loop_detectors(document):
+    """Detectors alone, and behind each verifier: recall before the first wrong answer in every set; then all rows."""
+    rows = [row for row in document["rows"] if not row["is_tuning"]]
+    sets = list(dict.fromkeys(row["set"] for row in rows))
+    by_pair = {}
+    for row in rows:
+        by_pair.setdefault((row["detector"], row["verifier"]), {})[row["set"]] = row
+    lines = ["Recall at zero wrong acceptances:", ""]
+    lines += table(
+        ("detector", "verifier", *sets, "wrong accepted", "median ms", "bytes/frame"),
+        [(detector, verifier,
+          *(number(of[name]["recall_zero_wrong"], 3) if name in of and of[name]["queries"] else "" for name in sets),
+          sum(row["wrong_accepted"] for row in of.values()),
+          " to ".join(number(pick(row["ms_p50"] for row in of.values()), 1) for pick in (min, max)),
+          number(max(row["bytes_per_frame"] for row in of.values()), 0))
+         for (detector, verifier), of in by_pair.items()])
+    queries = {row["set"]: (row["queries"], row["queries_without_match"]) for row in rows}
+    none = sum(count for _, count in queries.values())
+    lines += ["", "Queries with a match, without one: "
+              + ", ".join(f"{name} {count}, {others}" for name, (count, others) in queries.items())
+              + f". Nothing accepted of {none} without a match bounds the probability at {3 / none:.1e} (95 %)."]
+    return lines
+
+
+def long_drive(document):
     """Drives with stretches condensed, a line per length of a stretch; one section each."""
     return table(
         ("stretch m", "runs", "to uncut m", "worst m", "to truth m", "uncut to truth m", "mean NEES", "joining ms", "median ms",
@@ -221,6 +271,80 @@ def partition(document):
           number(row["rmse_to_reference_m"], 4), number(row["uncut_rmse_to_reference_m"], 4), number(row["mean_nees"]),
           number(1e3 * row["closure_s"], 1), *(number(row["sections"][-1][key]) for key in ("ms_p50", "ms_p99", "ms_max")))
          for row in document["rows"]])
+
+
+def _interval(row, key, factor=100.0, digits=2):
+    """A mean with the half width of its 95 % interval; "-" for no row."""
+    if row is None or row["runs"] == 0:
+        return "-"
+    return f"{factor * row[key]:.{digits}f} ± {factor * row[key + '_ci95']:.{digits}f}"
+
+
+def _partition_cells(document):
+    """Rows by route, front end and policy: {key: {method: row}}."""
+    cells = {}
+    for row in document["rows"]:
+        if row["policy"] not in ("truth",):
+            cells.setdefault((row["route"], row["front_end"], row["label"]), {})[row["method"]] = row
+    return cells
+
+
+def partition(document):
+    """The thesis's tables, its method and ours, a line per route and policy; all lengths in cm."""
+    key = "rmse_to_reference_m" if document["config"]["is_closed"] else "rmse_to_uncut_m"
+    head = ("route", "landmarks", "policy", "drives", "submaps", "mean m", "published cm", "thesis's method cm",
+            "ours as driven cm", "ours settled cm", "uncut to truth cm", "settled to truth cm",
+            "cut ms: published, thesis's, ours", "update ms: published, thesis's, ours", "closing s", "MB / km")
+    lines = []
+    for (route, front_end, label), methods in _partition_cells(document).items():
+        thesis, driven, settled = (methods.get(name) for name in ("baseline", "smoothing-condensed", "smoothing"))
+        row = settled or thesis
+        published = (thesis or row).get
+        times = (f"{figure(published('thesis_' + name))}, {figure(thesis and thesis[name])}, "
+                 f"{figure(driven and driven[name])}" for name in ("partition_ms", "iteration_ms"))
+        rmse = published("thesis_rmse_m")
+        lines.append((route, front_end, label, row["runs"], number(row["submaps"], 1), number(row["mean_submap_m"], 0),
+                      "-" if rmse is None else number(100 * rmse), _interval(thesis, key), _interval(driven, key),
+                      _interval(settled, key), _interval(row, "uncut_rmse_to_reference_m"),
+                      _interval(settled, "rmse_to_reference_m"), *times, figure(settled and settled["closure_s"]),
+                      figure(settled and settled["disk_mb_per_km"])))
+    return table(head, lines)
+
+
+def partition_cut_points(document):
+    """Errors at the cuts and between them, against the truth, as shares of the uncut solution's there."""
+    rows = [row for row in document["rows"] if row["policy"] not in ("truth", "uncut") and row["runs"] > 0]
+    return table(("route", "landmarks", "policy", "method", "at cuts cm", "between cm", "at cuts / uncut", "between / uncut"),
+                 [(row["route"], row["front_end"], row["label"], row["method"],
+                   _interval(row, "rmse_at_cuts_to_reference_m"), _interval(row, "rmse_between_to_reference_m"),
+                   _interval(row, "at_cuts_of_uncut", 1.0), _interval(row, "between_of_uncut", 1.0)) for row in rows])
+
+
+def partition_effects(document):
+    """What a cut does to the motion across it, by size of submaps and landmarks at the cut."""
+    rows = [row for row in document["effects"] if row["method"] in ("baseline", "smoothing-condensed")]
+    top = [row for row in rows if row["cuts"] >= 5]
+    return table(("landmarks from", "method", "size m", "landmarks at the cut", "drives", "cuts", "step cm", "step mrad"),
+                 [(row["front_end"], row["method"], number(row["size_m"], 0),
+                   f"{row['landmarks_from']:g} to {row['landmarks_below']:g}" if row["landmarks_below"] < 1e6
+                   else f"from {row['landmarks_from']:g}", row["drives"], number(row["cuts"], 0),
+                   *(f"{factor * row[key]:.3f} ± {factor * row[key + '_ci95']:.3f}"
+                     for key, factor in (("step_m", 100.0), ("step_mrad", 1.0)))) for row in top])
+
+
+def partition_designs(document):
+    """Ways to condense, a line per size, distance from the uncut solution in cm."""
+    methods = ("baseline", "baseline-condensed", "baseline-unscented", "baseline-joint", "baseline-joint-all",
+               "baseline-full", "smoothing-condensed", "smoothing")
+    return table(("route", "policy", *methods),
+                 [(route, label, *(_interval(rows.get(name), "rmse_to_uncut_m") for name in methods))
+                  for (route, _, label), rows in _partition_cells(document).items() if label != "uncut"])
+
+
+def partition_all(document):
+    """All tables of a partition experiment."""
+    return [*partition(document), "", *folded("errors at the cuts and between them", partition_cut_points(document)), "",
+            *folded("what a cut does, by size and landmarks", partition_effects(document))]
 
 
 def efficiency(document):

@@ -192,7 +192,14 @@ class MapperAdapter : public bus::Adapter {
     node.subscribe<model::Submap>(channels_.submap_reply,
                                   [this](const model::Submap& submap) { bring_back(submap); },
                                   {.queue_size = 50, .most_bytes = submap_bytes(kSubmapLandmarks)});
+
+    // From whoever finds one or sets one; each numbers its own. Part of the map: journaled.
+    node.subscribe<model::LoopClosure>(channels_.loop_closure,
+                                       [this](const model::LoopClosure& closure) { take(closure); },
+                                       {.queue_size = 200, .sequenced = false, .timed = false});
   }
+
+  void take(const model::LoopClosure& closure) { results_.publish(stage_->take(closure)); }
 
   /// An answer may come twice: then the submap is not away any more.
   void bring_back(const model::Submap& submap) {
@@ -256,7 +263,7 @@ class MapperAdapter : public bus::Adapter {
   void begin_with(const std::vector<model::MapLandmark>& landmarks) {
     stage_->start_with(landmarks);
     (void)stage_->take_changed_landmarks();
-    memory_.known.map_id = model::map_of(landmarks.front().id);
+    memory_.known.map_id = model::map_of(landmarks.back().id);
     memory_.known.landmarks = stage_->landmarks();
     ++memory_.known.version;
     memory_.map_is_published = false;
@@ -272,6 +279,7 @@ class MapperAdapter : public bus::Adapter {
     submaps_ = node.advertise<model::Submap>(channels_.submap);
     queries_ = node.advertise<model::SubmapQuery>(channels_.submap_query);
     corrections_ = node.advertise<model::MapCorrection>(channels_.map_correction);
+    results_ = node.advertise<model::LoopResult>(channels_.loop_result);
   }
 
   void add(const model::Keyframe& keyframe) {
@@ -413,6 +421,7 @@ class MapperAdapter : public bus::Adapter {
   bus::Publisher<model::Submap> submaps_;
   bus::Publisher<model::SubmapQuery> queries_;
   bus::Publisher<model::MapCorrection> corrections_;
+  bus::Publisher<model::LoopResult> results_;
 };
 
 }  // namespace
@@ -421,10 +430,10 @@ bus::Service geoslam_mapper_service(const MapperChannels& channels) {
   return {"geoslam_mapper",
           channels.keyframe + ", " + channels.landmarks + ", " + channels.odometry + ", " +
               channels.ekf_pose + ", " + channels.ekf_level + ", " + channels.given_map + ", " +
-              channels.submap_stored + ", " + channels.submap_reply + " -> " + channels.slam_pose +
-              ", " + channels.slam_update + ", " + channels.map + ", " + channels.map_delta + ", " +
-              channels.submap + ", " + channels.submap_query + ", " + channels.map_correction +
-              ", " + channels.loop_result,
+              channels.submap_stored + ", " + channels.submap_reply + ", " + channels.loop_closure +
+              " -> " + channels.slam_pose + ", " + channels.slam_update + ", " + channels.map +
+              ", " + channels.map_delta + ", " + channels.submap + ", " + channels.submap_query +
+              ", " + channels.map_correction + ", " + channels.loop_result,
           [channels] { return std::make_unique<MapperAdapter>(channels); }};
 }
 

@@ -100,6 +100,22 @@ void describe_association(SmoothingMapperParameters& p, bus::ParameterTable& tab
             "chi^2 of all associations as a normal deviate: beyond, the update is rolled back.");
 }
 
+void describe_cuts(SmoothingMapperParameters& p, bus::ParameterTable& table) {
+  table.add(
+      "smoothing.cut_sparse", p.cut_sparse, {0.0, 1000.0}, "landmarks",
+      "A stretch that has condense_m goes on until fewer landmarks than this are observed, on "
+      "the average of 16 scans. 0: no such rule. Of several rules any one ends it.");
+  table.add("smoothing.cut_dense", p.cut_dense, {0.0, 1000.0}, "landmarks",
+            "... or until more than this are observed. 0: no such rule.");
+  table.add("smoothing.cut_turn_rad", p.cut_turn_rad, {0.0, 3.1}, "rad",
+            "... or until the heading has changed by so much within 15 m. 0: no such rule.");
+  table.add("smoothing.cut_longest_m", p.cut_longest_m, {1.0, 100000.0}, "m",
+            "... but not longer than this, or condense_m if that is more.");
+  table.add("smoothing.cut_size", p.cut_size, {0, 100000}, "",
+            "A stretch ends, whatever its length, with so many nodes and landmarks together. 0: no "
+            "such rule.");
+}
+
 void describe_growth(SmoothingMapperParameters& p, bus::ParameterTable& table) {
   table.add("smoothing.localisation_only", p.localisation_only,
             "Never change the map that was given.");
@@ -146,6 +162,7 @@ void describe_growth(SmoothingMapperParameters& p, bus::ParameterTable& table) {
             "... but of no more than this by the sensor's range: what bends within it is lost.");
   table.add("smoothing.condense_after_m", p.condense_after_m, {0.0, 10000.0}, "m",
             "... once the vehicle is so far beyond it, and beyond the sensor's range.");
+  describe_cuts(p, table);
   table.add("smoothing.hand_over_m", p.hand_over_m, {0.0, 100000.0}, "m",
             "Condensed measurements farther from the vehicle than this are handed over to "
             "submap_store with their landmarks and keyframes, and come back before the vehicle is "

@@ -61,9 +61,8 @@ std::string why_not_given(const model::WholeMap& map) {
 
   model::LandmarkId last = 0;
   for (const model::MapLandmark& landmark : map.landmarks) {
-    if (landmark.id <= last || model::map_of(landmark.id) == 0 ||
-        model::map_of(landmark.id) != model::map_of(map.landmarks.front().id))
-      return "ids of landmarks must ascend within one map";
+    if (landmark.id <= last || model::map_of(landmark.id) == 0)
+      return "ids of landmarks must ascend and have the number of a map";
     if (!is_sound(landmark))
       return "landmark " + std::to_string(landmark.id) + " has a value that cannot be";
     last = landmark.id;

@@ -15,7 +15,7 @@ namespace understory::geoslam_mapper {
 std::vector<model::MapLandmark> read_given_map(const std::string& file, int map_id);
 
 /// Why a message's map cannot be begun with; empty where it can: it is whole, has landmarks, and
-/// all of them are finite, of one map and in order of id.
+/// all of them are finite and in order of id.
 std::string why_not_given(const model::WholeMap& map);
 
 }  // namespace understory::geoslam_mapper

@@ -71,6 +71,11 @@ struct SmoothingMapperParameters {
   double condense_m = 20.0;
   double condense_of_range = 0.5;
   double condense_after_m = 50.0;
+  double cut_sparse = 0.0;  ///< Landmarks.
+  double cut_dense = 0.0;   ///< Landmarks.
+  double cut_turn_rad = 0.0;
+  double cut_longest_m = 500.0;
+  int cut_size = 0;  ///< Nodes and landmarks.
   double hand_over_m = 0.0;
 };
 

@@ -134,14 +134,91 @@ TEST_CASE("A closure moves what is frozen as if it was not", "[freezing]") {
       way->graph.add_closure(1, way->nodes[2], way->last, closure);
       way->settle();
     }
-    frozen.graph.settle_frozen();
-    CHECK(apart(frozen.poses(), free.poses()) < 0.05);
+    // Another node holds the frozen graph: what lies between is the same.
+    const auto between = [](const Way& way) {
+      return way.graph.pose(way.nodes[2]).inverse() * way.graph.pose(way.last);
+    };
+    CHECK((between(frozen).translation() - between(free).translation()).norm() < 0.05);
 
-    frozen.graph.thaw(frozen.nodes);
+    frozen.graph.unfreeze();
     frozen.settle();
     free.settle();
     CHECK(apart(frozen.poses(), free.poses()) < 0.02);
   }
+}
+
+/// The origin, and what is beside it, closed; with the first stretches.
+std::vector<NodeIndex> from_origin(Way& way, std::ptrdiff_t stretches) {
+  const NodeIndex origin = *way.graph.origin();
+  std::vector<NodeIndex> going{origin, origin + 1};
+  for (const NodeIndex node : going) way.graph.close(node);
+  going.insert(going.end(), way.nodes.begin(), way.nodes.begin() + stretches);
+  return going;
+}
+
+TEST_CASE("Where all behind is frozen, another node holds the graph", "[freezing]") {
+  for (const bool crosses : {false, true}) {
+    Way way(9, crosses);
+    INFO("crosses " << crosses);
+    const auto before = way.poses();
+    const Eigen::Matrix3d exact = way.graph.marginal(way.last).covariance;
+    const auto going = from_origin(way, 20);
+    way.graph.checkpoint();
+    REQUIRE(way.graph.freeze(going));
+    way.settle();
+    CHECK(way.graph.is_frozen(*way.graph.origin() + 1));
+    CHECK_FALSE(way.graph.is_frozen(*way.graph.origin()));
+    CHECK(apart(before, way.poses()) < 1e-3);
+    const Eigen::Matrix3d covariance = way.graph.marginal(way.last).covariance;
+    CHECK(covariance.isApprox(exact, 0.02));
+    // Of many at once: what crosses may make it larger, never less.
+    const Eigen::Matrix3d at_once = way.graph.covariances(std::vector<NodeIndex>{way.last})[0];
+    CHECK(at_once.trace() > 0.999 * covariance.trace());
+    CHECK(at_once.trace() < (crosses ? 2.5 : 1.001) * covariance.trace());
+
+    // It goes on from there, and once more; then all of it is there again.
+    const std::vector<NodeIndex> more(way.nodes.begin() + 20, way.nodes.begin() + 30);
+    REQUIRE(way.graph.freeze(more));
+    way.settle();
+    CHECK(apart(before, way.poses()) < 1e-3);
+    CHECK(way.graph.marginal(way.last).covariance.isApprox(exact, 0.02));
+    way.graph.unfreeze();
+    way.settle();
+    CHECK(way.graph.frozen_count() == 0);
+    CHECK(apart(before, way.poses()) < 2e-3);
+    CHECK(way.graph.marginal(way.last).covariance.isApprox(exact, 0.01));
+  }
+}
+
+TEST_CASE("Undone, freezing all behind leaves the graph as it was", "[freezing]") {
+  Way way(11, false);
+  const auto before = way.poses();
+  const Eigen::Matrix3d exact = way.graph.marginal(way.last).covariance;
+  REQUIRE(way.graph.freeze(from_origin(way, 20)));
+  way.graph.unfreeze();
+  way.settle();
+  CHECK(apart(before, way.poses()) < 2e-3);
+  CHECK(way.graph.marginal(way.last).covariance.isApprox(exact, 0.01));
+  CHECK(way.graph.marginal(*way.graph.origin()).covariance.trace() < 1e-9);
+}
+
+TEST_CASE("A node that is tied by next to nothing does not cut the graph where others are frozen",
+          "[freezing]") {
+  Way way(10, false);
+  // A motion of which only one direction is known.
+  geometry::SE2WithCovariance weak;
+  weak.mean = way.graph.pose(way.nodes[36]).inverse() * way.graph.pose(way.nodes[15]);
+  weak.covariance = Eigen::Vector3d(1e-2, 1e12, 1e12).asDiagonal();
+  way.add(way.nodes[36], way.nodes[15], weak);
+  way.settle();
+  const Eigen::Matrix3d covariance = way.graph.marginal(way.last).covariance;
+  REQUIRE(way.graph.freeze(std::vector<NodeIndex>(way.nodes.begin() + 8, way.nodes.begin() + 32)));
+  for (int i = 0; i < 3; ++i) {
+    const auto solved = way.graph.solve();
+    INFO(solved.error);
+    REQUIRE(solved.ok);
+  }
+  CHECK(way.graph.marginal(way.last).covariance.isApprox(covariance, 0.05));
 }
 
 TEST_CASE("A frozen graph is the same after a load", "[freezing]") {

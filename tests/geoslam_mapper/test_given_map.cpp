@@ -266,7 +266,7 @@ TEST_CASE("A message that is no map to begin with is refused with the reason", "
   CHECK_THAT(geoslam_mapper::why_not_given(empty), Contains("no landmark"));
   model::WholeMap mixed = map;
   mixed.landmarks.back().id = map_file::landmark_id(8, 1);
-  CHECK_THAT(geoslam_mapper::why_not_given(mixed), Contains("one map"));
+  CHECK(geoslam_mapper::why_not_given(mixed).empty());  // A map that another one became part of.
   model::WholeMap twice = map;
   twice.landmarks[1].id = twice.landmarks[0].id;
   CHECK_THAT(geoslam_mapper::why_not_given(twice), Contains("ascend"));

@@ -24,15 +24,18 @@ namespace understory::test {
 using Seconds = std::chrono::duration<double>;
 using SteadyClock = std::chrono::steady_clock;
 
-/// A configuration directory with both processes, each with the given parameters.
+/// A configuration directory with three processes, each with the given parameters.
 inline void write_config(const TemporaryDirectory& directory, const std::string& keyframer_toml) {
   std::ofstream(directory / "keyframer.toml") << keyframer_toml;
   std::ofstream(directory / "geoslam_mapper.toml") << "";
+  std::ofstream(directory / "loop_closer.toml") << "";
   std::ofstream(directory / "launch.toml")
       << "[[process]]\nname = \"keyframer\"\nexecutable = \"understory-keyframer\"\n"
          "config = \"keyframer.toml\"\n"
          "[[process]]\nname = \"geoslam_mapper\"\nexecutable = \"understory-geoslam-mapper\"\n"
-         "config = \"geoslam_mapper.toml\"\n";
+         "config = \"geoslam_mapper.toml\"\n"
+         "[[process]]\nname = \"loop_closer\"\nexecutable = \"understory-loop-closer\"\n"
+         "config = \"loop_closer.toml\"\n";
 }
 
 /// Another port for every test that may run beside this one.
@@ -70,7 +73,9 @@ class Stack {
     return true;
   }
   bool wait_for_processes() {
-    return wait_until([&] { return pid("keyframer") > 0 && pid("geoslam_mapper") > 0; });
+    return wait_until([&] {
+      return pid("keyframer") > 0 && pid("geoslam_mapper") > 0 && pid("loop_closer") > 0;
+    });
   }
   /// Sends scans first..last-1 with pauses that let everybody keep up, and listens meanwhile.
   void drive(const sim::Drive& drive, std::size_t first, std::size_t last) {
@@ -115,6 +120,7 @@ class Stack {
     return ending_;
   }
   std::string report() const { return directory_ / "report.json"; }
+  const std::string& url() const { return url_; }
 
   std::map<std::string, health_t> health;  ///< Latest of each process.
   std::vector<model::SlamPose> poses;      ///< Localised ones.

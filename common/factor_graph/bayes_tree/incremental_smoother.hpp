@@ -81,6 +81,9 @@ class IncrementalSmoother {
   /// A new estimate of a variable that has no factor, as if it were a new variable. Throws
   /// std::invalid_argument where it has one, or where the estimate is not finite.
   void restart(graph::VariableId id, const graph::Value& initial);
+  /// To be called where a far stronger factor of a variable was removed than it has now: it may be
+  /// determined by much less then.
+  void renew_scale(graph::VariableId id) { begin_change(), graph_.renew_scale(index(id)); }
   /// Adds a measurement; see FactorGraph::add() for what it must fulfil.
   graph::FactorId add(const graph::Factor& factor) {
     return begin_change(), keep(graph_.add(factor));

@@ -58,6 +58,14 @@ void FactorGraph::restart(int id, const Value& initial) {
   record.is_curved = false;
 }
 
+void FactorGraph::renew_scale(int id) {
+  variables_.edit(id).scale = {};
+  for (int i = variables_[id].first_incidence; i != kNone; i = incidences_[i].next) {
+    const int factor = incidences_[i].factor;
+    if (factors_[factor].linear != nullptr) keep_scales(factors_[factor], variables_of(factor));
+  }
+}
+
 bool FactorGraph::contains(VariableId id) const {
   return index(id) >= 0 && index(id) < variables_.size() && variables_[index(id)].in_use;
 }

@@ -164,6 +164,9 @@ class FactorGraph {
   /// A new estimate of a variable without factors, as if it had been added now. Throws
   /// std::invalid_argument where it has factors, or where the estimate is not finite.
   void restart(int variable, const Value& initial);
+  /// Measures a variable's pivots against the factors that it has now: far stronger ones were
+  /// removed. O(its factors).
+  void renew_scale(int variable);
 
   /// A variable by number.
   const VariableRecord& variable(int id) const { return variables_[id]; }

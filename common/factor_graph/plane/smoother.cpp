@@ -6,6 +6,9 @@
 namespace understory::factor_graph::plane {
 namespace {
 
+/// Keeps a held pose invertible: a micrometre, a microradian.
+const Eigen::Matrix3d kHeld = 1e12 * Eigen::Matrix3d::Identity();
+
 bayes_tree::IncrementalParameters incremental(const SmootherParameters& parameters) {
   bayes_tree::IncrementalParameters result;
   result.least_move = parameters.least_move;
@@ -71,6 +74,7 @@ struct Smoother::State {
   void checkpoint() {
     smoother.checkpoint();
     saved_condensed = condensed;
+    saved_held = held;
     moved.clear();
     for_each_list([](auto& list) { list.commit(); });
   }
@@ -78,6 +82,7 @@ struct Smoother::State {
     moved.clear();
     smoother.rollback();
     condensed = saved_condensed;
+    held = saved_held;
     for_each_list([](auto& list) { list.rollback(); });
   }
   template <typename Visit>
@@ -100,6 +105,8 @@ struct Smoother::State {
   FactorList<PointObservation> observations;
   std::vector<graph::FactorId> condensed;
   std::vector<graph::FactorId> saved_condensed;  ///< At the checkpoint.
+  std::optional<graph::FactorId> held;
+  std::optional<graph::FactorId> saved_held;  ///< At the checkpoint.
   MovedList moved;
 };
 
@@ -186,12 +193,26 @@ void Smoother::set(ObservationId id, const PointObservation& factor) {
   state_->replace(state_->observations, index(id), factor);
 }
 
+void Smoother::hold(PoseId id, const geometry::SE2& mean) {
+  if (state_->held) {
+    const graph::FactorId before = *state_->held;
+    const auto released =
+        static_cast<graph::VariableId>(state_->smoother.graph().variables_of(index(before))[0]);
+    state_->smoother.remove(before);
+    state_->smoother.renew_scale(released);
+  }
+  state_->held = state_->smoother.add(graph::prior(state_->name(id), mean, kHeld));
+}
+
 void Smoother::set_condensed(std::span<const CondensedPoses> measured) {
   for (const graph::FactorId id : state_->condensed) state_->smoother.remove(id);
   state_->condensed.clear();
   for (const CondensedPoses& one : measured) {
     graph::CondensedFactor factor;
-    for (const PoseId pose : one.poses) factor.variables.push_back(state_->name(pose));
+    for (const PoseId pose : one.poses) {
+      factor.variables.push_back(state_->name(pose));
+      state_->smoother.renew_scale(state_->name(pose));
+    }
     factor.measurement.resize(3 * static_cast<Eigen::Index>(one.first_T_other.size()));
     for (std::size_t i = 0; i < one.first_T_other.size(); ++i)
       factor.measurement.segment<3>(3 * static_cast<Eigen::Index>(i)) =

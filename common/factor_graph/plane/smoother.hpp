@@ -121,6 +121,9 @@ class Smoother {
   /// Likewise.
   void set(ObservationId id, const PointObservation& factor);
 
+  /// Holds this pose where it is said to be, to a micrometre and a microradian, in the place of the
+  /// one that was held before: the gauge. It is not in graph().
+  void hold(PoseId id, const geometry::SE2& mean);
   /// Puts these measurements in the place of those that were set before. They are not in graph().
   void set_condensed(std::span<const CondensedPoses> measured);
 

@@ -13,8 +13,10 @@
 #include "eval/experiments/experiments.hpp"
 #include "eval/harness/results.hpp"
 #include "eval/harness/slam_session.hpp"
+#include "eval/harness/submap_shelf.hpp"
 #include "eval/tools/memory.hpp"
 #include "eval/tools/quantile.hpp"
+#include "eval/tools/thread_clock.hpp"
 #include "eval/tools/yardstick.hpp"
 
 namespace understory::eval::experiments::efficiency {
@@ -24,6 +26,7 @@ struct EfficiencyOptions {
   harness::CampaignOptions campaign;
   double drive_km = 10.0;
   double stationary_h = 2.0;
+  double hand_over_m = 0.0;
 };
 
 /// One drive that is timed.
@@ -80,10 +83,11 @@ std::vector<Scenario> scenarios(const EfficiencyOptions& options) {
   return result;
 }
 
-Timing time_drive(const Scenario& scenario, const std::string& method, std::uint64_t seed,
-                  const std::atomic<bool>& stop) {
-  const sim::Drive drive(scenario.drive, seed);
-  harness::SlamSession session(harness::make_stages(method));
+Timing time_drive(const Scenario& scenario, const std::string& method,
+                  const EfficiencyOptions& options, const std::atomic<bool>& stop) {
+  const sim::Drive drive(scenario.drive, harness::run_seed(options.campaign.seed, 0));
+  harness::SlamSession session(harness::make_stages(method, options.hand_over_m));
+  harness::SubmapShelf shelf;
   Timing timing{scenario.name, method, {}, 0, 0, 0.0};
   terminal::Progress progress(fmt::format("scans, {} {}", scenario.name, method),
                               static_cast<double>(drive.size()),
@@ -96,9 +100,13 @@ Timing time_drive(const Scenario& scenario, const std::string& method, std::uint
     progress.advance();
     if (!outcome) continue;
 
+    const double begin_s = tools::thread_time_s();
+    shelf.serve(session.mapper());
+    const double mapper_s = outcome->mapper_s + tools::thread_time_s() - begin_s;
+
     const double driven = static_cast<double>(k + 1) * scenario.drive.path.interval;
     timing.keyframes.push_back({is_stationary ? driven / scenario.drive.speed_mps / 3600.0 : driven,
-                                1e3 * outcome->keyframer_s, 1e3 * outcome->mapper_s});
+                                1e3 * outcome->keyframer_s, 1e3 * mapper_s});
 
     const model::MapUpdateStatus status = outcome->update.status;
     if (status == model::MapUpdateStatus::kUpdated || status == model::MapUpdateStatus::kFirstMap) {
@@ -106,7 +114,7 @@ Timing time_drive(const Scenario& scenario, const std::string& method, std::uint
     }
   }
 
-  timing.landmarks = session.mapper().landmarks().size();
+  timing.landmarks = session.mapper().landmarks().size() + shelf.landmarks();
   timing.rss_mb = tools::resident_mb();
   return timing;
 }
@@ -179,8 +187,7 @@ void run_efficiency(const EfficiencyOptions& options) {
   for (const Scenario& scenario : scenarios(options)) {
     for (const std::string& method : scenario.methods) {
       if (method == "oracle") continue;
-      const Timing timing =
-          time_drive(scenario, method, harness::run_seed(options.campaign.seed, 0), stop);
+      const Timing timing = time_drive(scenario, method, options, stop);
       for (const nlohmann::json& row : rows_of(timing, yardstick_s)) rows.push_back(row);
       traces.push_back(trace_of(timing));
     }
@@ -193,6 +200,7 @@ void run_efficiency(const EfficiencyOptions& options) {
   const nlohmann::json config{{"seed", options.campaign.seed},
                               {"drive_km", options.drive_km},
                               {"stationary_h", options.stationary_h},
+                              {"hand_over_m", options.hand_over_m},
                               {"yardstick_ms", 1e3 * yardstick_s}};
   harness::write_json(harness::traces_file(file), traces);
   harness::write_json(file, harness::result_document("efficiency", config, rows));
@@ -212,6 +220,11 @@ void add_efficiency_experiment(CLI::App& eval) {
       ->capture_default_str();
   command.add_option("--stationary-h", options->stationary_h, "Hours stationary; 0 = none")
       ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  command
+      .add_option("--hand-over-m", options->hand_over_m,
+                  "What is farther from the vehicle goes to the disk [m]; 0 = nothing")
+      ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
   command.callback([options] { run_guarded("efficiency", [&] { run_efficiency(*options); }); });
 }

@@ -238,7 +238,7 @@ void write_lap_map(const LapsOptions& options, const RecordedLap& recorded) {
   if (whole.landmarks.empty()) throw std::runtime_error("the recorded lap gave no map");
 
   map_file::StoredMap map;
-  map.map_id = model::map_of(whole.landmarks.front().id);
+  map.map_id = model::map_of(whole.landmarks.back().id);
   map.name = "lap";
   map.created_utime = whole.utime;
   map.keyframes = whole.keyframes;

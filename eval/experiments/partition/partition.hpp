@@ -45,7 +45,9 @@ DriveResult drive(const RouteParameters& route, std::uint64_t seed, const Keepin
 /// RMS distance of two trajectories, first pose held [m].
 double rmse_m(const std::vector<geometry::SE2>& a, const std::vector<geometry::SE2>& b);
 
-/// Adds `partition` and `partition-loop`.
+/// Adds `long-drive` and `long-drive-loop`.
+void add_long_drive_experiments(CLI::App& eval);
+/// Adds `partition`, `partition-loop`, `partition-dynamic` and `partition-dynamic-loop`.
 void add_partition_experiments(CLI::App& eval);
 
 }  // namespace understory::eval::experiments::partition

@@ -1,212 +1,201 @@
-// The command lines of `eval partition` and `eval partition-loop`.
+// The command lines of `eval partition`, `partition-loop`, `partition-dynamic` and
+// `partition-dynamic-loop` (thesis on submaps, chapter 5).
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cmath>
+#include <atomic>
+#include <iostream>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "common/terminal/interrupt.hpp"
 #include "eval/experiments/experiments.hpp"
+#include "eval/experiments/partition/comparison.hpp"
+#include "eval/experiments/partition/drive_recording.hpp"
 #include "eval/experiments/partition/partition.hpp"
+#include "eval/experiments/partition/partition_rows.hpp"
 #include "eval/harness/campaign.hpp"
 #include "eval/harness/results.hpp"
+#include "eval/tools/parallel.hpp"
 
 namespace understory::eval::experiments::partition {
 namespace {
 
-constexpr const char* kOpen = "partition";
-constexpr const char* kClosed = "partition-loop";
+using nlohmann::json;
+
+/// Of the closed urban drive, which the open one is the beginning of: its end is that far from its
+/// start [m].
+constexpr double kClosedUrban_m = 770.0;
+constexpr double kOpenUrban_m = 600.0;
+constexpr double kCountry_m = 1000.0;
+constexpr double kForest_m = 1000.0;
+constexpr double kForestBlock_m = 700.0;
 
 struct PartitionOptions {
   std::string experiment;
-  RouteParameters route;
-  std::vector<double> sizes_m{5.0, 10.0, 20.0, 40.0, 100.0, 200.0, 500.0};
-  double hand_over_m = 0.0;
-  int runs = 3;
+  bool is_closed = false;
+  bool is_dynamic = false;
+  bool all_designs = false;
+  std::vector<std::string> routes;
+  std::vector<std::string> front_ends{"ideal"};
+  std::vector<double> sizes_m{5.0, 10.0, 20.0, 40.0, 100.0, 200.0, 300.0, 400.0, 500.0};
+  int runs = 20;
+  int lidar_runs = 3;
   std::uint64_t seed = 1;
-  std::size_t sections = 1;
-  bool has_uncut = true;
+  int jobs = 1;
+  RecordingOptions recording;
   bool plots = true;
   std::string json;
 };
 
-/// Sums over the runs of one size.
-struct Cell {
-  double size_m = 0.0;
-  std::vector<double> to_uncut_m;
-  std::vector<double> to_truth_m;
-  std::vector<double> uncut_to_truth_m;
-  double nees = 0.0;
-  double closure_ms = 0.0;
-  std::size_t refused = 0;
-  std::size_t disk_bytes = 0;     ///< Of the last run.
-  std::size_t brought_back = 0;   ///< Likewise.
-  std::vector<Section> sections;  ///< Of the last run.
+/// One drive of the experiment.
+struct PartitionJob {
+  std::string route;
+  std::string front_end;
+  int run = 0;
 };
 
-double rms(const std::vector<double>& values) {
-  double squared = 0.0;
-  for (const double value : values) squared += value * value;
-  return values.empty() ? 0.0 : std::sqrt(squared / static_cast<double>(values.size()));
-}
-
-double largest(const std::vector<double>& values) {
-  return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
-}
-
-nlohmann::json json_of(const Cell& cell, const PartitionOptions& options) {
-  nlohmann::json row{{"route", options.experiment == kOpen ? "open" : "closed"},
-                     {"policy", cell.size_m > 0.0 ? "distance" : "uncut"},
-                     {"size_m", cell.size_m},
-                     {"runs", cell.to_truth_m.size()},
-                     {"rmse_to_reference_m", rms(cell.to_truth_m)},
-                     {"worst_rmse_to_reference_m", largest(cell.to_truth_m)},
-                     {"mean_nees", cell.nees},
-                     {"closure_s", 1e-3 * cell.closure_ms},
-                     {"disk_mb_per_km", 1e-6 * static_cast<double>(cell.disk_bytes) /
-                                            (1e-3 * options.route.length_m)},
-                     {"brought_back", cell.brought_back},
-                     {"refused", cell.refused}};
-
-  if (options.has_uncut) {
-    row["rmse_to_uncut_m"] = rms(cell.to_uncut_m);
-    row["worst_rmse_to_uncut_m"] = largest(cell.to_uncut_m);
-    row["uncut_rmse_to_reference_m"] = rms(cell.uncut_to_truth_m);
-  }
-
-  for (const Section& section : cell.sections) {
-    row["sections"].push_back({{"end_m", section.end_m},
-                               {"ms_p50", section.ms_p50},
-                               {"ms_p99", section.ms_p99},
-                               {"ms_max", section.ms_max},
-                               {"rss_mb", section.resident_mb}});
-  }
-  return row;
-}
-
-void print_header(const PartitionOptions& options) {
-  fmt::print("{}: {} run(s) of {:.0f} m from seed {}, {:.0f} landmarks per km^2\n",
-             options.experiment, options.runs, options.route.length_m, options.seed,
-             options.route.landmarks_per_km2);
-  fmt::print("{:>8} {:>12} {:>10} {:>12} {:>10} {:>6} {:>10} {:>8} {:>8} {:>8} {:>8}\n", "size m",
-             "to uncut m", "worst m", "to truth m", "uncut m", "NEES", "closure ms", "p50 ms",
-             "p99 ms", "max ms", "RSS MB");
-}
-
-void print_cell(const Cell& cell) {
-  for (const Section& section : cell.sections) {
-    fmt::print(
-        "{:>8.0f} {:>12.4f} {:>10.4f} {:>12.4f} {:>10.4f} {:>6.2f} {:>10.1f} {:>8.2f} {:>8.2f} "
-        "{:>8.2f} {:>8.0f}\n",
-        cell.size_m, rms(cell.to_uncut_m), largest(cell.to_uncut_m), rms(cell.to_truth_m),
-        rms(cell.uncut_to_truth_m), cell.nees, cell.closure_ms, section.ms_p50, section.ms_p99,
-        section.ms_max, section.resident_mb);
-  }
-  std::fflush(stdout);
-}
-
-void run(const PartitionOptions& options) {
-  terminal::catch_interrupts();
-  std::vector<DriveResult> uncut;
-  const auto seed_of = [&](int run) { return harness::run_seed(options.seed, run); };
-  for (int run = 0; run < options.runs && options.has_uncut; ++run)
-    uncut.push_back(drive(options.route, seed_of(run), {}, options.sections));
-
-  nlohmann::json rows = nlohmann::json::array();
-  print_header(options);
-  for (const double size_m : options.sizes_m) {
-    Cell cell;
-    cell.size_m = size_m;
-    for (int run = 0; run < options.runs; ++run) {
-      const DriveResult one =
-          drive(options.route, seed_of(run), {size_m, options.hand_over_m}, options.sections);
-      if (options.has_uncut) {
-        const DriveResult& whole = uncut[static_cast<std::size_t>(run)];
-        cell.to_uncut_m.push_back(rmse_m(one.trajectory, whole.trajectory));
-        cell.uncut_to_truth_m.push_back(whole.rmse_to_truth_m);
-      }
-      cell.to_truth_m.push_back(one.rmse_to_truth_m);
-      cell.nees += one.mean_nees / options.runs;
-      cell.closure_ms = std::max(cell.closure_ms, one.closure_ms);
-      cell.refused += one.refused;
-      cell.disk_bytes = one.disk_bytes;
-      cell.brought_back = one.brought_back;
-      cell.sections = one.sections;
+std::vector<PartitionJob> jobs_of(const PartitionOptions& options) {
+  std::vector<PartitionJob> jobs;
+  for (const std::string& front_end : options.front_ends) {
+    for (const std::string& route : options.routes) {
+      const bool is_drawn = route == "road" || route == "block";
+      if (front_end == "lidar" && is_drawn) continue;
+      const int runs = front_end == "lidar" ? options.lidar_runs : options.runs;
+      for (int run = 0; run < runs; ++run) jobs.push_back({route, front_end, run});
     }
-    print_cell(cell);
-    rows.push_back(json_of(cell, options));
+  }
+  return jobs;
+}
+
+RecordedDrive drive_of(const PartitionJob& job, const PartitionOptions& options,
+                       const std::atomic<bool>& stop) {
+  const std::uint64_t seed = harness::run_seed(options.seed, job.run);
+  if (job.route == "road" || job.route == "block") {
+    RouteParameters parameters;
+    parameters.length_m = kForest_m;
+    if (job.route == "block") parameters.block_m = kForestBlock_m;
+    Route route(parameters, seed);
+    return record(route);
   }
 
+  const bool is_urban = job.route == "urban";
+  const FrontEnd front_end = job.front_end == "lidar" ? FrontEnd::kLidar : FrontEnd::kIdeal;
+  const RecordedDrive drive = record({job.route, is_urban ? kClosedUrban_m : kCountry_m}, front_end,
+                                     seed, options.recording, stop);
+  return is_urban && !options.is_closed ? drive.first(kOpenUrban_m) : drive;
+}
+
+RouteRun run_job(const PartitionJob& job, const PartitionOptions& options,
+                 const std::atomic<bool>& stop) {
+  ComparisonOptions comparison;
+  comparison.policies = options.is_dynamic ? dynamic_policies() : static_policies(options.sizes_m);
+  comparison.is_closed = options.is_closed;
+  comparison.all_designs = options.all_designs;
+  const RecordedDrive drive = drive_of(job, options, stop);
+  const auto parameters = job.front_end == "lidar"
+                              ? configured_parameters(options.recording.config_dir)
+                              : ideal_parameters();
+  RouteRun result{job.route, job.front_end, job.run, compare(drive, parameters, comparison)};
+  // Only run 0 is drawn.
+  if (job.run > 0)
+    for (Outcome& outcome : result.outcomes) outcome.trajectory = {};
+  return result;
+}
+
+json config_of(const PartitionOptions& options) {
+  return {{"seed", options.seed},
+          {"runs", options.runs},
+          {"lidar_runs", options.lidar_runs},
+          {"routes", options.routes},
+          {"front_ends", options.front_ends},
+          {"is_closed", options.is_closed},
+          {"config", options.recording.config_dir.string()}};
+}
+
+void run_partition(const PartitionOptions& options) {
+  const auto& stop = terminal::catch_interrupts();
+  const std::vector<PartitionJob> jobs = jobs_of(options);
+  std::vector<RouteRun> runs(jobs.size());
+  tools::run_in_parallel(jobs.size(), options.jobs, options.experiment, stop,
+                         [&](std::size_t i) { runs[i] = run_job(jobs[i], options, stop); });
+
+  const json rows = rows_of(runs, options.is_closed);
+  std::cout << table_of(rows);
   if (options.json.empty()) return;
-  const nlohmann::json config = {{"seed", options.seed},
-                                 {"runs", options.runs},
-                                 {"length_m", options.route.length_m},
-                                 {"block_m", options.route.block_m},
-                                 {"landmarks_per_km2", options.route.landmarks_per_km2},
-                                 {"hand_over_m", options.hand_over_m},
-                                 {"range_m", options.route.range_m},
-                                 {"sigma_m", options.route.sigma_m},
-                                 {"odometry_share", options.route.odometry_share},
-                                 {"odometry_heading_deg", options.route.odometry_heading_deg}};
-  harness::write_json(options.json, harness::result_document(options.experiment, config, rows));
+
+  json document = harness::result_document(options.experiment, config_of(options), rows);
+  document["effects"] = effects_of(runs);
+  harness::write_json(options.json, document);
+  harness::write_json(harness::traces_file(options.json), traces_of(runs));
   if (options.plots) harness::plot("partition.py", {options.json});
 }
 
-void add_experiment(CLI::App& eval, const std::string& name, const std::string& description) {
+void add_partition(CLI::App& eval, const std::string& name, const std::string& description,
+                   bool is_closed, bool is_dynamic) {
   auto* command = eval.add_subcommand(name, description);
   auto options = std::make_shared<PartitionOptions>();
   options->experiment = name;
-  if (name == kClosed) {
-    options->route.block_m = 700.0;
-    options->route.length_m = 1000.0;
-  }
+  options->is_closed = is_closed;
+  options->is_dynamic = is_dynamic;
+  options->routes = {"urban"};
+  if (!is_closed)
+    options->routes.insert(options->routes.end(), {"urban-countryside", "countryside"});
 
-  command->add_option("--runs", options->runs, "Drives per size")
+  command->add_option("--runs", options->runs, "Drives per route with ideal landmarks")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  command->add_option("--lidar-runs", options->lidar_runs, "Drives per route with the LIDAR chain")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   command->add_option("--seed", options->seed, "Seed of all randomness")->capture_default_str();
-  command->add_option("--length-m", options->route.length_m, "Of the drive [m]")
-      ->check(CLI::Range(50.0, 1e6))
+  command->add_option("--jobs", options->jobs, "Drives side by side")
+      ->check(CLI::Range(1, 256))
       ->capture_default_str();
-  if (name == kClosed) {
-    command->add_option("--block-m", options->route.block_m, "Circumference of the block [m]")
-        ->check(CLI::Range(200.0, 1e6))
+  command->add_option("--routes", options->routes, "Of the thesis; road and block are of forest")
+      ->delimiter(',')
+      ->check(CLI::IsMember(is_closed ? std::vector<std::string>{"urban", "block"}
+                                      : std::vector<std::string>{"urban", "urban-countryside",
+                                                                 "countryside", "road"}))
+      ->capture_default_str();
+  command->add_option("--front-end", options->front_ends, "ideal, lidar or both")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"ideal", "lidar"}))
+      ->capture_default_str();
+  if (!is_dynamic) {
+    command->add_option("--size-m", options->sizes_m, "Path of a submap [m]")
+        ->delimiter(',')
+        ->check(CLI::Range(5.0, 1000.0))
         ->capture_default_str();
   }
-  command->add_option("--size-m", options->sizes_m, "Path that is condensed to one node [m]")
-      ->delimiter(',')
-      ->check(CLI::Range(1.0, 1e4))
+  command->add_flag("--all-designs", options->all_designs,
+                    "Variants of the baseline: unscented, joint covariance, full solution");
+  command->add_option("--recordings", options->recording.folder,
+                      "Folder where the drives are kept, so that they are made once");
+  command->add_option("--config", options->recording.config_dir, "Configuration of the chain")
       ->capture_default_str();
-  command
-      ->add_option("--hand-over-m", options->hand_over_m,
-                   "What is farther from the vehicle goes to the disk [m]; 0 = nothing")
-      ->check(CLI::Range(0.0, 1e6))
-      ->capture_default_str();
-  command->add_option("--density", options->route.landmarks_per_km2, "Landmarks per km^2")
-      ->check(CLI::Range(100.0, 1e6))
-      ->capture_default_str();
-  command->add_option("--range", options->route.range_m, "Of the sensor [m]")
-      ->check(CLI::Range(5.0, 200.0))
-      ->capture_default_str();
-  command->add_option("--sections", options->sections, "Parts of the drive, timed by themselves")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-
-  command->add_flag("!--no-uncut", options->has_uncut, "Without the same drives uncut");
-  command->add_option("--json", options->json, "Result file; a plot goes beside it");
+  command->add_option("--json", options->json, "Result file; plots go beside it");
   command->add_flag("!--no-plots", options->plots, "Write JSON only");
-  command->callback([options] { run_guarded(options->experiment, [options] { run(*options); }); });
+  command->callback(
+      [options] { run_guarded(options->experiment, [options] { run_partition(*options); }); });
 }
 
 }  // namespace
 
 void add_partition_experiments(CLI::App& eval) {
-  add_experiment(eval, kOpen,
-                 "A road with stretches condensed beside the same road uncut: error, time, memory");
-  add_experiment(eval, kClosed, "The same round a block that is closed");
+  add_partition(eval, "partition",
+                "The map cut after a distance, against the uncut map (thesis on submaps 5.1)",
+                false, false);
+  add_partition(eval, "partition-loop", "The same round a block, with loop closure (5.2)", true,
+                false);
+  add_partition(eval, "partition-dynamic",
+                "The map cut where landmarks are few or many, at turns or at a size (5.3)", false,
+                true);
+  add_partition(eval, "partition-dynamic-loop", "The same round a block, with loop closure (5.4)",
+                true, true);
 }
 
 }  // namespace understory::eval::experiments::partition

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "common/place_recognition/place_confidence.hpp"
 #include "eval/tools/parallel.hpp"
 #include "eval/tools/thread_clock.hpp"
 
@@ -13,9 +14,6 @@ namespace understory::eval::experiments::place_recognition {
 namespace {
 
 namespace places = understory::place_recognition;
-
-/// What the truths of two frames leave open of their distance [m].
-constexpr double kTruthSigmaM = 0.15;
 
 /// Of a window: stems that too few of its frames saw are false ones, as a rule.
 constexpr double kLeastSeenWeight = 0.6;
@@ -128,22 +126,7 @@ StemDrive windowed(const StemDrive& drive, std::size_t frames,
 }
 
 double confidence_of(const places::PlaceAnswer& answer, double radius_m) {
-  const places::PlaceCandidate* best = answer.best();
-  if (best == nullptr) return 0.0;
-  const Eigen::Vector2d offset = best->frame_T_query.translation();
-  const Eigen::Matrix2d rotation = best->frame_T_query.rotation();
-  const Eigen::Matrix2d covariance =
-      rotation * best->covariance.topLeftCorner<2, 2>() * rotation.transpose();
-  const double distance = offset.norm();
-  const Eigen::Vector2d along =
-      distance > 1e-9 ? Eigen::Vector2d(offset / distance) : Eigen::Vector2d(1.0, 0.0);
-  const double sigma = std::sqrt(along.dot(covariance * along) + 2.0 * kTruthSigmaM * kTruthSigmaM);
-  const double outside = 0.5 * std::erfc((radius_m - distance) / sigma / std::sqrt(2.0));
-
-  // The likeliest candidate carries the evidence; the answer agrees with it.
-  const double chance = std::pow(10.0, answer.candidates.front().log10_false_alarm);
-  const double elsewhere = std::pow(10.0, -answer.log10_margin);
-  return -std::log10(std::max(chance + elsewhere + outside, 1e-300));
+  return places::decades_of(answer, radius_m);
 }
 
 Trials within_drive(const StemDrive& drive, const Protocol& protocol,

@@ -17,7 +17,8 @@ AwayLandmarks PoseGraph::put_away(std::span<const model::LandmarkId> ids) {
   AwayLandmarks away;
   std::set<TiedNodes> changed;
   away.ties.reserve(tied.size());
-  for (const auto& [nodes, theirs] : tied) {
+  for (const auto& [nodes, tied_ids] : tied) {
+    const std::vector<model::LandmarkId>& theirs = tied_ids;
     if (free_away_ties_.empty()) {
       free_away_ties_.push_back(static_cast<AwayTieId>(away_ties_.size()));
       away_ties_.emplace_back();

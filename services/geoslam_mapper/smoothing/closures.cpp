@@ -113,12 +113,6 @@ Closures::Decision Closures::revoke(std::uint64_t id, GlobalMap& map) {
   return {kRevoked, {}};
 }
 
-std::vector<NodeIndex> Closures::ends() const {
-  std::vector<NodeIndex> nodes;
-  for (const Waiting& one : waiting_) nodes.insert(nodes.end(), {one.a, one.b});
-  return nodes;
-}
-
 void Closures::hand_over(std::span<const Retirement> retired) {
   for (Waiting& one : waiting_) {
     for (const Retirement& retirement : retired) {

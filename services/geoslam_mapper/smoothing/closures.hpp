@@ -40,8 +40,6 @@ class Closures {
                 GlobalMap& map);
   /// Takes a closure back.
   Decision revoke(std::uint64_t id, GlobalMap& map);
-  /// The nodes that the waiting ones are between.
-  std::vector<NodeIndex> ends() const;
   /// Nodes are parts of others now: what waits follows them.
   void hand_over(std::span<const Retirement> retired);
 

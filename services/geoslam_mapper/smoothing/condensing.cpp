@@ -1,36 +1,50 @@
 #include "services/geoslam_mapper/smoothing/condensing.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <set>
 
 namespace understory::geoslam_mapper::smoothing {
-namespace {
-
-/// Fewest nodes of a stretch.
-constexpr std::ptrdiff_t kLeastNodes = 4;
-
-}  // namespace
 
 std::vector<Retirement> Condensing::follow(const FusedKeyframe& fused,
                                            const KnownGround& known_ground, Discovery& discovery,
                                            Merges& merges, GlobalMap& map) {
-  if (length_m_ <= 0.0) return {};
+  const bool condenses = parameters_.condense_m > 0.0;
+  if (!condenses && !keeps_stretches_) return {};
   const double now_m = map.graph.node(fused.node).along_m;
-  if (fused.is_new_node) waiting_.push_back({fused.node, now_m});
+  if (fused.is_new_node) {
+    const auto scans = static_cast<std::uint32_t>(fused.keyframe.members.size());
+    waiting_.push_back({fused.node, now_m, scans, next_number_});
+    next_number_ = StretchNumber(index(next_number_) + 1);
+  }
+  if (!condenses) return {};
+
   const double range_m = fused.keyframe.field_of_view.max_range_m;
-  const double length_m = std::min(length_m_, of_range_ * range_m);
-  const double end_m = now_m - std::max(after_m_, range_m);
-  const std::vector<NodeIndex> stretch = take_stretch(length_m, end_m, known_ground, map.graph);
+  const double end_m = now_m - std::max(parameters_.condense_after_m, range_m);
+  const std::vector<Passed> stretch =
+      take_stretch(cut_policy(parameters_, range_m), end_m, known_ground, map.graph);
+  if (keeps_stretches_ && !stretch.empty()) stretches_.push_back(stretch_of(stretch, map));
   if (stretch.size() < 2) return {};
 
+  std::vector<NodeIndex> nodes;
+  nodes.reserve(stretch.size());
+  for (const Passed& passed : stretch) nodes.push_back(passed.node);
+  std::vector<Retirement> retired = condense(nodes, discovery, merges, map);
+  if (keeps_stretches_ && !retired.empty()) stretches_.back().turn_to(retired);
+  return retired;
+}
+
+std::vector<Retirement> Condensing::condense(std::span<const NodeIndex> nodes, Discovery& discovery,
+                                             Merges& merges, GlobalMap& map) {
   std::vector<model::LandmarkId> observed;
-  for (const NodeIndex node : stretch) {
+  for (const NodeIndex node : nodes) {
     for (const auto& [id, factor] : map.graph.node(node).observations) observed.push_back(id);
   }
   std::sort(observed.begin(), observed.end());
   observed.erase(std::unique(observed.begin(), observed.end()), observed.end());
 
   map.graph.checkpoint();
-  std::vector<Retirement> retired = map.graph.condense(stretch);
+  std::vector<Retirement> retired = map.graph.condense(nodes);
   if (retired.empty() || !map.graph.solve().ok) {
     map.graph.rollback();
     return {};
@@ -51,32 +65,51 @@ std::vector<Retirement> Condensing::follow(const FusedKeyframe& fused,
 
 /// The nodes of the oldest stretch, once it is complete and ends before `end_m`; those that were
 /// taken out of the graph since are not among them.
-std::vector<NodeIndex> Condensing::take_stretch(double length_m, double end_m,
-                                                const KnownGround& known_ground,
-                                                const PoseGraph& graph) {
-  const auto is_there = [&](const Passed& passed) {
-    const Node& node = graph.node(passed.node);
-    return node.along_m == passed.along_m && !node.is_condensed &&
-           !(node.observations.empty() && node.motions.empty());
-  };
-  while (!waiting_.empty() && !is_there(waiting_.front())) waiting_.pop_front();
-  if (waiting_.empty()) return {};
-  const double last_m = waiting_.front().along_m + length_m;
-  auto end = std::find_if(waiting_.begin(), waiting_.end(),
-                          [&](const Passed& passed) { return passed.along_m >= last_m; });
-  end = std::max(end, waiting_.begin() + std::min(kLeastNodes, std::ssize(waiting_)));
-  if (end == waiting_.end() || end->along_m > end_m) return {};
+std::vector<Condensing::Passed> Condensing::take_stretch(const CutPolicy& policy, double end_m,
+                                                         const KnownGround& known_ground,
+                                                         const PoseGraph& graph) {
+  while (!waiting_.empty() && !is_there(waiting_.front(), graph)) waiting_.pop_front();
+  const auto size = first_stretch(cut_nodes(policy, end_m, graph), policy);
+  if (!size) return {};
+  const auto end = waiting_.begin() + static_cast<std::ptrdiff_t>(*size);
   if (std::any_of(waiting_.begin(), end,
                   [&](const Passed& passed) { return known_ground.is_recent(passed.node); })) {
     return {};
   }
 
-  std::vector<NodeIndex> nodes;
-  for (auto passed = waiting_.begin(); passed != end; ++passed) {
-    if (is_there(*passed)) nodes.push_back(passed->node);
-  }
+  std::vector<Passed> stretch;
+  std::copy_if(waiting_.begin(), end, std::back_inserter(stretch),
+               [&](const Passed& passed) { return is_there(passed, graph); });
   waiting_.erase(waiting_.begin(), end);
+  return stretch;
+}
+
+/// The nodes that wait and lie before `end_m`.
+std::vector<CutNode> Condensing::cut_nodes(const CutPolicy& policy, double end_m,
+                                           const PoseGraph& graph) const {
+  std::vector<CutNode> nodes;
+  std::set<model::LandmarkId> observed;
+  for (const Passed& passed : waiting_) {
+    if (passed.along_m > end_m) break;
+    CutNode& node = nodes.emplace_back();
+    node.along_m = passed.along_m;
+    if (!is_there(passed, graph)) continue;
+
+    node.heading_rad = graph.pose(passed.node).theta();
+    node.scans = passed.scans;
+    const auto& observations = graph.node(passed.node).observations;
+    node.landmarks = static_cast<std::uint32_t>(observations.size());
+    if (policy.size == 0) continue;
+    for (const auto& [id, factor] : observations)
+      if (observed.insert(id).second) ++node.new_landmarks;
+  }
   return nodes;
+}
+
+bool Condensing::is_there(const Passed& passed, const PoseGraph& graph) {
+  const Node& node = graph.node(passed.node);
+  return node.along_m == passed.along_m && !node.is_condensed &&
+         !(node.observations.empty() && node.motions.empty());
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -2,28 +2,29 @@
 #pragma once
 
 #include <deque>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "services/geoslam_mapper/parameters.hpp"
+#include "services/geoslam_mapper/smoothing/cutting.hpp"
 #include "services/geoslam_mapper/smoothing/discovery.hpp"
 #include "services/geoslam_mapper/smoothing/fusion.hpp"
 #include "services/geoslam_mapper/smoothing/global_map.hpp"
 #include "services/geoslam_mapper/smoothing/known_ground.hpp"
 #include "services/geoslam_mapper/smoothing/merges.hpp"
+#include "services/geoslam_mapper/smoothing/stretch.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 
 /// Keeps the graph's cost to that of the ground around the vehicle: the nodes of each stretch of
 /// the path become one, with one condensed measurement of each landmark (thesis on submaps §3.4.2),
 /// once the vehicle is so far on that it does not see from there any more. All that is not
-/// condensed yet stays exact.
+/// condensed yet stays exact. Where a stretch ends: see CutPolicy.
 class Condensing {
  public:
-  /// `parameters` gives `condense_m`, `condense_of_range` and `condense_after_m`.
-  explicit Condensing(const SmoothingMapperParameters& parameters)
-      : length_m_(parameters.condense_m),
-        of_range_(parameters.condense_of_range),
-        after_m_(parameters.condense_after_m) {}
+  /// `parameters` gives `condense_*` and `cut_*`.
+  explicit Condensing(const SmoothingMapperParameters& parameters) : parameters_(parameters) {}
 
   /// To be called after each accepted keyframe. Condenses at most one stretch, and solves; the map
   /// is as before where that fails. Cost: what the nodes of the stretch observed.
@@ -32,30 +33,51 @@ class Condensing {
   std::vector<Retirement> follow(const FusedKeyframe& fused, const KnownGround& known_ground,
                                  Discovery& discovery, Merges& merges, GlobalMap& map);
 
-  /// Members of a saved state; see common/state.
+  /// From now on the factors of each stretch are kept for take_stretches(); who asks for them must
+  /// take them, or they grow with the drive. Ask before the first keyframe: of a stretch that was
+  /// condensed before, they are gone.
+  void keep_stretches() { keeps_stretches_ = true; }
+  /// Whether they are kept.
+  bool keeps_stretches() const { return keeps_stretches_; }
+  /// The factors of the stretches that were condensed since the last call.
+  std::vector<Stretch> take_stretches() { return std::exchange(stretches_, {}); }
+  /// The factors of all nodes that are not condensed, with the node that holds the map, frame
+  /// `map`. Cost: what they observed.
+  Stretch rest(const GlobalMap& map) const;
+
+  /// Members of a saved state; see common/state. Stretches that were not taken are not among them.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.waiting_);
+    a(self.waiting_, self.next_number_);
   }
 
  private:
   /// A node that is not condensed yet.
   struct Passed {
     NodeIndex node = 0;
-    double along_m = 0.0;  ///< Path of the vehicle up to it.
+    double along_m = 0.0;     ///< Path of the vehicle up to it.
+    std::uint32_t scans = 0;  ///< Of its keyframe.
+    StretchNumber number{};   ///< Which is not given to another node.
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& s) {
-      a(s.node, s.along_m);
+      a(s.node, s.along_m, s.scans, s.number);
     }
   };
-  std::vector<NodeIndex> take_stretch(double length_m, double end_m,
-                                      const KnownGround& known_ground, const PoseGraph& graph);
+  static bool is_there(const Passed& passed, const PoseGraph& graph);
+  std::vector<Passed> take_stretch(const CutPolicy& policy, double end_m,
+                                   const KnownGround& known_ground, const PoseGraph& graph);
+  std::vector<CutNode> cut_nodes(const CutPolicy& policy, double end_m,
+                                 const PoseGraph& graph) const;
+  static std::vector<Retirement> condense(std::span<const NodeIndex> nodes, Discovery& discovery,
+                                          Merges& merges, GlobalMap& map);
+  Stretch stretch_of(std::span<const Passed> passed, const GlobalMap& map) const;
 
-  double length_m_;
-  double of_range_;
-  double after_m_;
-  std::deque<Passed> waiting_;  ///< In order of time.
+  SmoothingMapperParameters parameters_;
+  bool keeps_stretches_ = false;
+  std::vector<Stretch> stretches_;  ///< Since they were taken.
+  std::deque<Passed> waiting_;      ///< In order of time.
+  StretchNumber next_number_{1};    ///< 0 is the node that holds the map.
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

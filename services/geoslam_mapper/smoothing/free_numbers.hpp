@@ -25,6 +25,8 @@ class FreeNumbers {
     free_.push_back(number);
     changes_.emplace_back(false, number);
   }
+  /// Those that are free.
+  const std::vector<std::uint32_t>& numbers() const { return free_; }
   /// How many are free.
   std::size_t size() const { return free_.size(); }
 

@@ -1,5 +1,7 @@
 // Nodes out of the solved graph, and what they measure of those that stay.
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "services/geoslam_mapper/smoothing/pose_graph.hpp"
@@ -16,7 +18,8 @@ constexpr std::size_t kMostOuter = 24;
 
 bool PoseGraph::may_freeze(NodeIndex node) const {
   return nodes_[node].is_condensed && nodes_[node].observations.empty() &&
-         dormant_of(node).empty() && !frozen_.contains(node) && node != newest_;
+         dormant_of(node).empty() && !frozen_.contains(node) && node != newest_ &&
+         !(origin_ && node == origin_->node);
 }
 
 bool PoseGraph::freeze(std::span<const NodeIndex> nodes) {
@@ -24,18 +27,30 @@ bool PoseGraph::freeze(std::span<const NodeIndex> nodes) {
   for (const NodeIndex node : nodes)
     if (may_freeze(node)) going.insert(node);
   if (going.empty()) return false;
+  std::optional<Anchor> next;
+  if (origin_ && (!is_held_elsewhere() || going.contains(anchor_->node))) {
+    next = anchor_beyond(going);
+    if (!next) return false;
+  }
 
-  const std::set<NodeIndex> frozen_before = frozen_;
-  frozen_.insert(going.begin(), going.end());
+  // What they are tied to; what was frozen before is part of it as one measurement.
+  const auto before = static_cast<std::ptrdiff_t>(frozen_motions_.size());
   freeze_motions(going);
-  const std::vector<FrozenPart> parts = parts_of(frozen_motions_, frozen_);
-  if (std::ranges::any_of(parts, [](const auto& one) { return one.outer.size() > kMostOuter; })) {
-    frozen_ = frozen_before;
+  const std::vector<FrozenMotion> theirs(frozen_motions_.begin() + before, frozen_motions_.end());
+  const auto fresh = condense_parts(parts_of(theirs, frozen_factors_, going));
+  if (!fresh) {
     thaw_motions();
     return false;
   }
+
+  frozen_.insert(going.begin(), going.end());
+  std::erase_if(frozen_factors_, [&](const FrozenFactor& factor) {
+    return std::ranges::any_of(factor.nodes, [&](NodeIndex node) { return going.contains(node); });
+  });
+  frozen_factors_.insert(frozen_factors_.end(), fresh->begin(), fresh->end());
+  set_frozen_factors();
   gyro_.drop_idle(smoother_);
-  condense_frozen(parts);
+  if (next) hold(*next);
   return true;
 }
 
@@ -66,10 +81,21 @@ void PoseGraph::freeze_motions(const std::set<NodeIndex>& nodes) {
 
 void PoseGraph::thaw(std::span<const NodeIndex> nodes) {
   if (std::ranges::none_of(nodes, [&](NodeIndex node) { return frozen_.contains(node); })) return;
-  settle_frozen();
   for (const NodeIndex node : nodes) frozen_.erase(node);
   thaw_motions();
-  condense_frozen(parts_of(frozen_motions_, frozen_));
+  recondense_frozen();
+}
+
+/// Nothing that was measured may be lost: what cannot be condensed is solved with the rest.
+void PoseGraph::recondense_frozen() {
+  auto factors = condense_parts(parts_of(frozen_motions_, {}, frozen_));
+  if (!factors) {
+    frozen_.clear();
+    thaw_motions();
+    factors.emplace();
+  }
+  frozen_factors_ = *std::move(factors);
+  set_frozen_factors();
 }
 
 /// Motions of which no end is frozen any more are in the solved graph again.
@@ -92,23 +118,62 @@ void PoseGraph::thaw_motions() {
   frozen_motions_ = std::move(stay);
 }
 
-void PoseGraph::condense_frozen(const std::vector<FrozenPart>& parts) {
-  std::vector<plane::CondensedPoses> measured;
+/// None where a part does not determine its nodes, or is tied to too many.
+std::optional<std::vector<FrozenFactor>> PoseGraph::condense_parts(
+    const std::vector<FrozenPart>& parts) const {
+  std::vector<FrozenFactor> factors;
   for (const FrozenPart& part : parts) {
+    if (part.outer.size() > kMostOuter) return std::nullopt;
+    if (part.outer.size() < 2) continue;
     auto one = condensed(part, [&](NodeIndex node) { return pose(node); });
-    if (!one) continue;
-    for (const NodeIndex node : part.outer) one->poses.push_back(nodes_[node].centre);
-    measured.push_back(*std::move(one));
+    if (!one) return std::nullopt;
+    factors.push_back(*std::move(one));
+  }
+  return factors;
+}
+
+void PoseGraph::set_frozen_factors() {
+  std::vector<plane::CondensedPoses> measured;
+  for (const FrozenFactor& factor : frozen_factors_) {
+    plane::CondensedPoses& one = measured.emplace_back(factor.measured);
+    for (const NodeIndex node : factor.nodes) one.poses.push_back(nodes_[node].centre);
   }
   smoother_.set_condensed(measured);
 }
 
-void PoseGraph::settle_frozen() {
-  for (const FrozenPart& part : parts_of(frozen_motions_, frozen_)) {
-    const auto poses = inner_poses(part, [&](NodeIndex node) { return pose(node); });
-    for (std::size_t i = 0; i < poses.size(); ++i)
-      smoother_.restart(nodes_[part.inner[i]].centre, poses[i]);
+void PoseGraph::unfreeze() {
+  const std::vector<NodeIndex> all(frozen_.begin(), frozen_.end());
+  thaw(all);
+  if (origin_ && anchor_->node != origin_->node) hold(*origin_);
+}
+
+std::optional<NodeIndex> PoseGraph::origin() const {
+  return origin_ ? std::optional(origin_->node) : std::nullopt;
+}
+
+void PoseGraph::hold(const Anchor& anchor) {
+  anchor_ = anchor;
+  smoother_.hold(nodes_[anchor.node].centre, anchor.map_T_node);
+}
+
+/// The condensed node that stays in the solved graph and is nearest on the path to those that go.
+std::optional<Anchor> PoseGraph::anchor_beyond(const std::set<NodeIndex>& going) const {
+  double last_m = -std::numeric_limits<double>::infinity();
+  for (const NodeIndex node : going) last_m = std::max(last_m, nodes_[node].along_m);
+  const std::set<std::uint32_t> free(free_nodes_.numbers().begin(), free_nodes_.numbers().end());
+
+  std::optional<NodeIndex> nearest;
+  double least_m = std::numeric_limits<double>::infinity();
+  for (NodeIndex node = 0; node < nodes_.size(); ++node) {
+    const double distance_m = std::abs(nodes_[node].along_m - last_m);
+    const bool stays = nodes_[node].is_condensed && !going.contains(node) &&
+                       !frozen_.contains(node) && !free.contains(node);
+    if (!stays || distance_m >= least_m) continue;
+    least_m = distance_m;
+    nearest = node;
   }
+  if (!nearest) return std::nullopt;
+  return Anchor{*nearest, pose(*nearest)};
 }
 
 void PoseGraph::take_away_tie_out(AwayTieId tie) {
@@ -116,7 +181,7 @@ void PoseGraph::take_away_tie_out(AwayTieId tie) {
     take_out(*std::exchange(away_ties_[tie], std::nullopt));
   } else {
     std::erase_if(frozen_motions_, [&](const FrozenMotion& one) { return one.away_tie == tie; });
-    condense_frozen(parts_of(frozen_motions_, frozen_));
+    recondense_frozen();
   }
   free_away_ties_.push_back(tie);
 }

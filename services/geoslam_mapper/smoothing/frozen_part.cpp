@@ -1,7 +1,11 @@
 #include "services/geoslam_mapper/smoothing/frozen_part.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
+#include <functional>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -12,6 +16,12 @@ namespace plane = factor_graph::plane;
 
 /// Keeps a pose where it is: a micrometre, a microradian.
 const Eigen::Matrix3d kHeld = 1e12 * Eigen::Matrix3d::Identity();
+/// What an outer node is held with where it is, while a part is solved: a tie of few landmarks may
+/// leave it open, and the far end of a long chain is all but open [1/m^2, 1/rad^2]. It is taken out
+/// of the result exactly, and keeps what is inverted well conditioned.
+constexpr double kLeash = 1e-2;
+/// Share of the largest eigenvalue of an information that is rounding.
+constexpr double kRounding = 1e-15;
 /// Updates of a part; a chain that is bent by metres takes some.
 constexpr int kUpdates = 12;
 /// They end where no pose moves by more [m].
@@ -23,7 +33,7 @@ struct Solved {
   std::map<NodeIndex, plane::PoseId> pose_of;
 };
 
-/// `held`: how many of the outer nodes stay where they are.
+/// `held`: how many of the outer nodes stay where they are; the others are on a leash.
 std::optional<Solved> solve(const FrozenPart& part, const PoseOf& pose_of, std::size_t held) {
   plane::SmootherParameters parameters;
   parameters.relinearise_above = 1e-4;
@@ -34,13 +44,23 @@ std::optional<Solved> solve(const FrozenPart& part, const PoseOf& pose_of, std::
   };
   for (std::size_t i = 0; i < part.outer.size(); ++i) {
     const plane::PoseId pose = add(part.outer[i]);
-    if (i < held) solved.smoother.add(plane::PosePrior{pose, pose_of(part.outer[i]), kHeld});
+    const Eigen::Matrix3d information =
+        i < held ? kHeld : Eigen::Matrix3d(kLeash * Eigen::Matrix3d::Identity());
+    solved.smoother.add(plane::PosePrior{pose, pose_of(part.outer[i]), information});
   }
   for (const NodeIndex node : part.inner) add(node);
   for (const FrozenMotion& one : part.motions) {
     solved.smoother.add(plane::RelativePose{solved.pose_of.at(one.a), solved.pose_of.at(one.b),
                                             one.a_T_b, one.information});
   }
+
+  std::vector<plane::CondensedPoses> earlier;
+  for (const FrozenFactor& one : part.factors) {
+    plane::CondensedPoses& factor = earlier.emplace_back(one.measured);
+    factor.poses.clear();
+    for (const NodeIndex node : one.nodes) factor.poses.push_back(solved.pose_of.at(node));
+  }
+  solved.smoother.set_condensed(earlier);
 
   std::vector<geometry::SE2> before;
   for (const auto& [node, pose] : solved.pose_of) before.push_back(solved.smoother.pose(pose));
@@ -58,45 +78,85 @@ std::optional<Solved> solve(const FrozenPart& part, const PoseOf& pose_of, std::
   return solved;
 }
 
-/// The one that stands for a set of nodes.
-NodeIndex root_of(NodeIndex node, std::map<NodeIndex, NodeIndex>& parent) {
-  NodeIndex root = node;
-  while (parent.at(root) != root) root = parent.at(root);
-  while (parent.at(node) != root) node = std::exchange(parent.at(node), root);
-  return root;
+/// Sets of nodes that hang together (union-find).
+class Bundles {
+ public:
+  explicit Bundles(const std::set<NodeIndex>& nodes) {
+    for (const NodeIndex node : nodes) parent_.emplace(node, node);
+  }
+
+  bool contains(NodeIndex node) const { return parent_.contains(node); }
+  void tie(NodeIndex a, NodeIndex b) { parent_[root_of(a)] = root_of(b); }
+  /// The one that stands for all of a bundle.
+  NodeIndex root_of(NodeIndex node) {
+    NodeIndex root = node;
+    while (parent_.at(root) != root) root = parent_.at(root);
+    while (parent_.at(node) != root) node = std::exchange(parent_.at(node), root);
+    return root;
+  }
+
+ private:
+  std::map<NodeIndex, NodeIndex> parent_;
+};
+
+/// Ties those of these nodes that are among the bundles; one of them, none where there is none.
+std::optional<NodeIndex> tie_all(std::span<const NodeIndex> nodes, Bundles& bundles) {
+  std::optional<NodeIndex> first;
+  for (const NodeIndex node : nodes) {
+    if (!bundles.contains(node)) continue;
+    if (first) bundles.tie(node, *first);
+    first = node;
+  }
+  return first;
+}
+
+void add_outer(std::span<const NodeIndex> nodes, const Bundles& bundles, FrozenPart& part) {
+  std::copy_if(nodes.begin(), nodes.end(), std::back_inserter(part.outer),
+               [&](NodeIndex node) { return !bundles.contains(node); });
 }
 
 }  // namespace
 
 std::vector<FrozenPart> parts_of(std::span<const FrozenMotion> motions,
-                                 const std::set<NodeIndex>& frozen) {
-  std::map<NodeIndex, NodeIndex> parent;
-  for (const NodeIndex node : frozen) parent.emplace(node, node);
+                                 std::span<const FrozenFactor> factors,
+                                 const std::set<NodeIndex>& nodes) {
+  // What hangs together.
+  Bundles bundles(nodes);
+  std::vector<std::pair<NodeIndex, const FrozenMotion*>> of_motions;
   for (const FrozenMotion& one : motions) {
-    if (frozen.contains(one.a) && frozen.contains(one.b))
-      parent[root_of(one.a, parent)] = root_of(one.b, parent);
+    if (const auto node = tie_all(std::array{one.a, one.b}, bundles))
+      of_motions.emplace_back(*node, &one);
   }
+  std::vector<std::pair<NodeIndex, const FrozenFactor*>> of_factors;
+  for (const FrozenFactor& one : factors)
+    if (const auto node = tie_all(one.nodes, bundles)) of_factors.emplace_back(*node, &one);
 
+  // The parts, and what they are tied to.
   std::map<NodeIndex, FrozenPart> parts;
-  for (const NodeIndex node : frozen) parts[root_of(node, parent)].inner.push_back(node);
-  for (const FrozenMotion& one : motions) {
-    FrozenPart& part = parts.at(root_of(frozen.contains(one.a) ? one.a : one.b, parent));
-    part.motions.push_back(one);
-    for (const NodeIndex end : {one.a, one.b})
-      if (!frozen.contains(end)) part.outer.push_back(end);
+  for (const NodeIndex node : nodes) parts[bundles.root_of(node)].inner.push_back(node);
+  for (const auto& [node, one] : of_motions) {
+    FrozenPart& part = parts.at(bundles.root_of(node));
+    part.motions.push_back(*one);
+    add_outer(std::array{one->a, one->b}, bundles, part);
+  }
+  for (const auto& [node, one] : of_factors) {
+    FrozenPart& part = parts.at(bundles.root_of(node));
+    part.factors.push_back(*one);
+    add_outer(one->nodes, bundles, part);
   }
 
+  // The origin of the map, node 0, last: seen from there all others are one far away, and what they
+  // measure of it drowns in rounding.
   std::vector<FrozenPart> result;
   for (auto& [root, part] : parts) {
-    std::ranges::sort(part.outer);
-    const auto twice = std::ranges::unique(part.outer);
-    part.outer.erase(twice.begin(), twice.end());
+    std::ranges::sort(part.outer, std::greater{});
+    part.outer.erase(std::unique(part.outer.begin(), part.outer.end()), part.outer.end());
     result.push_back(std::move(part));
   }
   return result;
 }
 
-std::optional<plane::CondensedPoses> condensed(const FrozenPart& part, const PoseOf& pose_of) {
+std::optional<FrozenFactor> condensed(const FrozenPart& part, const PoseOf& pose_of) {
   if (part.outer.size() < 2) return std::nullopt;
   const auto solved = solve(part, pose_of, 1);
   if (!solved) return std::nullopt;
@@ -106,25 +166,41 @@ std::optional<plane::CondensedPoses> condensed(const FrozenPart& part, const Pos
     others.push_back(solved->pose_of.at(part.outer[i]));
   const auto joint = solved->smoother.joint_marginal(others, {});
   if (!joint) return std::nullopt;
+  const Eigen::MatrixXd leashed = joint->inverse();
+  if (!leashed.allFinite()) return std::nullopt;
 
-  plane::CondensedPoses result;
+  // Without the leash: what is left is positive semidefinite but for rounding.
+  const Eigen::MatrixXd leash = kLeash * Eigen::MatrixXd::Identity(leashed.rows(), leashed.cols());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(
+      0.5 * (leashed + leashed.transpose()) - leash);
+  const Eigen::VectorXd values = solver.eigenvalues().cwiseMax(0.0);
+  const double least = kRounding * values.maxCoeff();
+  const Eigen::VectorXd inverse_values =
+      values.unaryExpr([&](double value) { return value > least ? 1.0 / value : 0.0; });
+
+  // Where it leaves the nodes: the leash pulled them towards where they were.
+  Eigen::VectorXd pulled(leashed.rows());
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    const geometry::SE2 was_T_now =
+        pose_of(part.outer[i + 1]).inverse() * solved->smoother.pose(others[i]);
+    pulled.segment<3>(3 * static_cast<Eigen::Index>(i)) = was_T_now.Log();
+  }
+  const Eigen::VectorXd further = solver.eigenvectors() * inverse_values.asDiagonal() *
+                                  solver.eigenvectors().transpose() * (leash * pulled);
+
+  FrozenFactor factor{part.outer, {}};
+  plane::CondensedPoses& result = factor.measured;
   const geometry::SE2 first_T_map =
       solved->smoother.pose(solved->pose_of.at(part.outer.front())).inverse();
-  for (const plane::PoseId other : others)
-    result.first_T_other.push_back(first_T_map * solved->smoother.pose(other));
-  const Eigen::MatrixXd information = joint->inverse();
-  result.information = 0.5 * (information + information.transpose());
-  if (!result.information.allFinite()) return std::nullopt;
-  return result;
-}
-
-std::vector<geometry::SE2> inner_poses(const FrozenPart& part, const PoseOf& pose_of) {
-  std::vector<geometry::SE2> result;
-  result.reserve(part.inner.size());
-  const auto solved = solve(part, pose_of, part.outer.size());
-  for (const NodeIndex node : part.inner)
-    result.push_back(solved ? solved->smoother.pose(solved->pose_of.at(node)) : pose_of(node));
-  return result;
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    const Eigen::Vector3d one = further.segment<3>(3 * static_cast<Eigen::Index>(i));
+    result.first_T_other.push_back(first_T_map * solved->smoother.pose(others[i]) *
+                                   geometry::SE2::Exp(one));
+  }
+  result.information =
+      solver.eigenvectors() * values.asDiagonal() * solver.eigenvectors().transpose();
+  result.information = 0.5 * (result.information + result.information.transpose()).eval();
+  return factor;
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -29,16 +29,25 @@ struct FrozenMotion {
   }
 };
 
-/// Frozen nodes that hang together, and the nodes of the solved graph that they are tied to.
-struct FrozenPart {
-  std::vector<NodeIndex> inner;
-  std::vector<NodeIndex> outer;  ///< The first on the path first.
-  std::vector<FrozenMotion> motions;
+/// What frozen nodes measure of others.
+struct FrozenFactor {
+  std::vector<NodeIndex> nodes;  ///< The first is the one in whose frame the others are.
+  factor_graph::plane::CondensedPoses measured;  ///< Its `poses` mean nothing.
 };
 
-/// The parts that motions make of frozen nodes. O(motions log motions).
+/// Nodes to be frozen that hang together, and the nodes that they are tied to.
+struct FrozenPart {
+  std::vector<NodeIndex> inner;
+  std::vector<NodeIndex> outer;  ///< The origin of the map last.
+  std::vector<FrozenMotion> motions;
+  std::vector<FrozenFactor> factors;  ///< Of nodes that were frozen before.
+};
+
+/// The parts that motions and earlier parts make of nodes to be frozen; those that touch none are
+/// passed over. O(n log n).
 std::vector<FrozenPart> parts_of(std::span<const FrozenMotion> motions,
-                                 const std::set<NodeIndex>& frozen);
+                                 std::span<const FrozenFactor> factors,
+                                 const std::set<NodeIndex>& nodes);
 
 /// Pose of a node.
 using PoseOf = std::function<geometry::SE2(NodeIndex)>;
@@ -46,12 +55,8 @@ using PoseOf = std::function<geometry::SE2(NodeIndex)>;
 /// What a part measures of its outer nodes: it is optimised on its own, and the outer nodes have
 /// their joint marginal in the frame of the first (thesis on submaps §2.3.3, §3.4.2, with a node of
 /// the solved graph as origin). `pose_of` gives where to start. None where there is one outer node,
-/// or where the motions leave a node undetermined. Exact for Gaussian noise but for the
+/// or where the motions leave an inner node undetermined. Exact for Gaussian noise but for the
 /// linearisation at the part's own optimum. Cost: one factorisation of the part.
-std::optional<factor_graph::plane::CondensedPoses> condensed(const FrozenPart& part,
-                                                             const PoseOf& pose_of);
-
-/// Where the inner nodes are, in their order, given the outer ones. The same cost.
-std::vector<geometry::SE2> inner_poses(const FrozenPart& part, const PoseOf& pose_of);
+std::optional<FrozenFactor> condensed(const FrozenPart& part, const PoseOf& pose_of);
 
 }  // namespace understory::geoslam_mapper::smoothing

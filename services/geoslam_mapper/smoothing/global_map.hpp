@@ -51,6 +51,16 @@ struct GlobalMap {
     graph.wake(ids);
   }
 
+  /// Takes all nodes into the solved graph, before something is joined that may move all of them.
+  /// Ends a checkpoint.
+  void unfreeze() {
+    if (graph.frozen_count() == 0) return;
+    graph.checkpoint();
+    graph.unfreeze();
+    (void)graph.solve();
+    adopt_estimates();
+  }
+
   /// A landmark at the present estimate, without covariance; see told_map.
   model::MapLandmark landmark(const StoredLandmark& stored) const {
     model::MapLandmark out;

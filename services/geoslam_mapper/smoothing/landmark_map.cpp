@@ -63,6 +63,16 @@ void LandmarkMap::bring_back(StoredLandmark landmark) {
   put(landmark);
 }
 
+std::vector<StoredLandmark> LandmarkMap::release() {
+  std::vector<StoredLandmark> released;
+  released.reserve(landmarks_.size());
+  for (auto& [id, landmark] : landmarks_) released.push_back(std::move(landmark));
+  landmarks_.clear();
+  index_ = {};
+  late_.clear();
+  return released;
+}
+
 void LandmarkMap::move(model::LandmarkId id, const Eigen::Vector2d& position_m) {
   StoredLandmark& landmark = landmarks_.at(id);
   landmark.position_m = position_m;

@@ -90,6 +90,8 @@ class LandmarkMap {
   StoredLandmark put_away(model::LandmarkId id);
   /// Adds a landmark that was put away.
   void bring_back(StoredLandmark landmark);
+  /// Takes all landmarks out, in order of id.
+  std::vector<StoredLandmark> release();
   /// Moves a landmark (frame `map`). The index follows at once where it is off by kStaleness_m,
   /// otherwise with the next catch_up().
   void move(model::LandmarkId id, const Eigen::Vector2d& position_m);

@@ -24,6 +24,12 @@ KeptMap keep(const GlobalMap& map, const CommonError& common) {
   return result;
 }
 
+GlobalMap opened(const KeptMap& kept, const SmoothingMapperParameters& parameters) {
+  GlobalMap map(parameters, kept.id);
+  state::load(kept.whole, kWholeMapFormat, map);
+  return map;
+}
+
 std::vector<std::uint32_t> MapArchive::add(KeptMap map) {
   maps_.push_back(std::move(map));
   if (maps_.size() > kMostWhole) {

@@ -30,6 +30,8 @@ struct KeptMap {
 
 /// All that is worth keeping where a map is left. Costs about two factorisations.
 KeptMap keep(const GlobalMap& map, const CommonError& common);
+/// The map as it was kept, with its graph, which it must have. Costs about one factorisation.
+GlobalMap opened(const KeptMap& kept, const SmoothingMapperParameters& parameters);
 
 /// The maps that were left, the oldest first. Bounded: a landmark takes 80 bytes, a keyframe 112;
 /// the newest kMostWhole have their graph, too (some 200 bytes per observation). Older ones are
@@ -43,6 +45,10 @@ class MapArchive {
   /// Adds the newest. Returns the maps that were forgotten for it, ascending: their ids are to be
   /// announced.
   std::vector<std::uint32_t> add(KeptMap map);
+  /// The map is kept no more: it is part of another one.
+  void remove(std::uint32_t id) {
+    std::erase_if(maps_, [&](const KeptMap& map) { return map.id == id; });
+  }
   /// What is kept, in order of id.
   const std::deque<KeptMap>& maps() const { return maps_; }
 

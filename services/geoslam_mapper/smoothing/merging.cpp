@@ -46,6 +46,12 @@ MergingResult Merging::follow(const FusedKeyframe& fused,
   return result;
 }
 
+std::vector<MergedPair> Merging::join(std::vector<MergedPair> pairs, GlobalMap& map) {
+  JoinedPasses joined = pass_joiner_.join(std::move(pairs), merges_, map);
+  waiting_.insert(waiting_.end(), joined.moved.begin(), joined.moved.end());
+  return std::move(joined.pairs);
+}
+
 std::vector<model::LandmarkId> Merging::to_look_at(std::span<const model::Association> touched) {
   std::vector<model::LandmarkId> ids;
   for (const model::Association& pair : touched) ids.push_back(pair.landmark_id);

@@ -30,6 +30,9 @@ class Merging {
   MergingResult follow(const FusedKeyframe& fused, std::span<const model::Association> touched,
                        GlobalMap& map);
 
+  /// Makes the pairs one, all or none; see PassJoiner::join(). What moves is looked at later.
+  std::vector<MergedPair> join(std::vector<MergedPair> pairs, GlobalMap& map);
+
   /// What was merged so far, for nodes that are taken out.
   Merges& merges() { return merges_; }
 

@@ -1,7 +1,10 @@
 #include "services/geoslam_mapper/smoothing/one_map.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 
+#include "services/geoslam_mapper/smoothing/absorbed_map.hpp"
 #include "services/geoslam_mapper/smoothing/filter_gate.hpp"
 #include "services/geoslam_mapper/smoothing/unseen.hpp"
 
@@ -58,6 +61,7 @@ OneMap::OneMap(const SmoothingMapperParameters& parameters, std::uint32_t id)
 OneMap OneMap::beside(std::uint32_t id) const {
   OneMap other(parameters_, id);
   other.motion_ = motion_.from_nowhere();
+  if (condensing_.keeps_stretches()) other.keep_stretches();
   if (const auto& level = scan_localiser_.level()) other.scan_localiser_.set(*level);
   return other;
 }
@@ -223,15 +227,9 @@ Closures::Decision OneMap::take(const model::LoopClosure& closure) {
     return {model::LoopResult::Status::kRefused, what + " is not in the graph"};
   }
 
-  // Their covariances are asked for, and those of the ones that wait.
-  std::vector<NodeIndex> ends = closures_.ends();
-  ends.insert(ends.end(), {from->node, to->node});
-  map_.graph.checkpoint();
-  map_.graph.thaw(ends);
-  (void)map_.graph.solve();
-  const Closures::Decision decision = closures_.take(closure, *from, *to, map_);
-  map_.graph.settle_frozen();
-  return decision;
+  // It may move all between its ends, and covariances across the whole map are asked for.
+  map_.unfreeze();
+  return closures_.take(closure, *from, *to, map_);
 }
 
 std::optional<ClosureEnd> OneMap::end_of(const model::LoopEnd& end) const {
@@ -244,6 +242,29 @@ std::optional<ClosureEnd> OneMap::end_of(const model::LoopEnd& end) const {
   const auto base = std::ranges::find(bases, end.keyframe, &Base::sequence);
   if (base == bases.end()) return std::nullopt;
   return ClosureEnd{base->node, base->centre_T_base};
+}
+
+bool OneMap::rejoin(GlobalMap left, const Overlap& overlap, model::MapUpdate& update) {
+  std::vector<model::LandmarkId> added = absorb(std::move(left), overlap.map_T_left, map_);
+  const auto is_there = [&](model::LandmarkId id) { return map_.landmarks.all().contains(id); };
+  std::vector<MergedPair> pairs;
+  for (const auto& [ours, theirs] : overlap.pairs) {
+    if (is_there(ours) && is_there(theirs))
+      pairs.push_back(Merges::in_order(ours, theirs, map_.landmarks));
+  }
+  pairs = merging_.join(std::move(pairs), map_);
+  if (pairs.empty()) return false;
+
+  // The landmarks tie the two now.
+  map_.graph.checkpoint();
+  map_.graph.take_closure_out(kAbsorbing);
+  if (!map_.graph.solve().ok) return false;
+  map_.adopt_estimates();
+
+  std::ranges::move(added, std::back_inserter(update.added));
+  std::ranges::move(pairs, std::back_inserter(update.merged));
+  update.reason = "map " + std::to_string(overlap.map_id) + " is part of this one";
+  return true;
 }
 
 bool OneMap::reaches(const model::Keyframe& keyframe) const {

@@ -20,6 +20,7 @@
 #include "services/geoslam_mapper/smoothing/merging.hpp"
 #include "services/geoslam_mapper/smoothing/motion.hpp"
 #include "services/geoslam_mapper/smoothing/place_recogniser.hpp"
+#include "services/geoslam_mapper/smoothing/rejoining.hpp"
 #include "services/geoslam_mapper/smoothing/scan_localiser.hpp"
 #include "services/geoslam_mapper/smoothing/submaps.hpp"
 
@@ -81,9 +82,19 @@ class OneMap {
   std::vector<model::Submap> take_given_away() { return submaps_.take_given_away(); }
   /// See Submaps::bring_back().
   std::string bring_back(const model::Submap& submap) { return submaps_.bring_back(submap, map_); }
+  /// See Condensing::keep_stretches().
+  void keep_stretches() { condensing_.keep_stretches(); }
+  /// See Condensing::take_stretches().
+  std::vector<Stretch> take_stretches() { return condensing_.take_stretches(); }
+  /// See Condensing::rest().
+  Stretch rest() const { return condensing_.rest(map_); }
   /// Takes a loop closure, or takes one back; see Closures. A keyframe that was handed over is an
   /// end by its submap only.
   Closures::Decision take(const model::LoopClosure& closure);
+  /// Makes a map that was left part of this one, where the landmarks that are in both are the same.
+  /// `update` lists what came and what became one. False where the two contradict each other: this
+  /// map is broken then. Cost: the other map, and an update of all between the two.
+  bool rejoin(GlobalMap left, const Overlap& overlap, model::MapUpdate& update);
   /// Landmarks that are new or have moved since the last call.
   std::vector<model::MapLandmark> take_changed_landmarks();
 

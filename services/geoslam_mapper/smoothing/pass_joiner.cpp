@@ -250,6 +250,7 @@ std::optional<PassJoiner::Match> PassJoiner::match_by_constellation(const Scene&
 JoinedPasses PassJoiner::join(std::vector<MergedPair> pairs, Merges& merges, GlobalMap& map) const {
   std::vector<model::LandmarkId> ids;
   for (const auto& [old_id, new_id] : pairs) ids.insert(ids.end(), {old_id, new_id});
+  map.unfreeze();
   map.wake(ids);
   const double before = misfit(pairs, map, false);
   std::vector<std::vector<HandedOver>> handed_over;

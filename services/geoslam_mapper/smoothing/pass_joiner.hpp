@@ -37,6 +37,10 @@ class PassJoiner {
   JoinedPasses follow(const model::FieldOfView& field_of_view, NodeIndex newest, Merges& merges,
                       GlobalMap& map);
 
+  /// Makes each pair one landmark and solves: all pairs, or none where the graph contradicts them.
+  /// The landmarks that count as one come first and second as Merges::in_order() gives them.
+  JoinedPasses join(std::vector<MergedPair> pairs, Merges& merges, GlobalMap& map) const;
+
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
@@ -71,8 +75,6 @@ class PassJoiner {
                                       const GlobalMap& map) const;
   std::optional<Match> match_by_constellation(const Scene& scene, NodeIndex newest,
                                               const EarlierPass& pass, const GlobalMap& map) const;
-  JoinedPasses join(std::vector<MergedPair> pairs, Merges& merges, GlobalMap& map) const;
-
   SmoothingMapperParameters parameters_;
   double tried_m_ = 0.0;  ///< Path of the vehicle at the last search.
 };

@@ -9,9 +9,6 @@ namespace {
 
 namespace plane = factor_graph::plane;
 
-/// Keeps an exactly known pose invertible: a micrometre, a microradian.
-const Eigen::Matrix3d kKnownPose = 1e-12 * Eigen::Matrix3d::Identity();
-
 plane::SmootherParameters limits(const SmoothingMapperParameters& parameters) {
   plane::SmootherParameters result;
   result.relinearise_above = parameters.relinearise_above;
@@ -26,7 +23,8 @@ PoseGraph::PoseGraph(const SmoothingMapperParameters& parameters)
 
 void PoseGraph::checkpoint() {
   smoother_.checkpoint();
-  before_ = Checkpoint{nodes_.size(), landmark_of_point_.size(), newest_, {}, closures_, {}, {}};
+  before_ = Checkpoint{
+      nodes_.size(), landmark_of_point_.size(), newest_, {}, closures_, origin_, anchor_, {}, {}};
   gyro_.checkpoint();
   for (FreeNumbers* free :
        {&free_nodes_, &free_points_, &free_observations_, &free_motions_, &free_biased_})
@@ -56,6 +54,8 @@ void PoseGraph::rollback() {
   for (auto& [node, was] : before_->changed) nodes_[node] = std::move(was);
   newest_ = before_->newest;
   closures_ = std::move(before_->closures);
+  origin_ = before_->origin;
+  anchor_ = before_->anchor;
   before_.reset();
 }
 
@@ -73,7 +73,8 @@ NodeIndex PoseGraph::add_node(const geometry::SE2& map_T_centre, bool is_station
 
   newest_ = put_node(map_T_centre, is_stationary, along_m);
   if (is_fixed) {
-    smoother_.add(plane::PosePrior{nodes_[*newest_].centre, map_T_centre, kKnownPose.inverse()});
+    origin_ = Anchor{*newest_, map_T_centre};
+    hold(*origin_);
   }
   return *newest_;
 }
@@ -274,8 +275,15 @@ double PoseGraph::chi2(NodeIndex node, model::LandmarkId id) const {
 }
 
 geometry::SE2WithCovariance PoseGraph::marginal(NodeIndex node) const {
+  geometry::SE2WithCovariance result{pose(node), Eigen::Matrix3d::Zero()};
+  if (is_held_elsewhere()) {
+    if (node == origin_->node) return result;
+    if (const auto from_origin = relative(origin_->node, node))
+      result.covariance = from_origin->covariance;
+    return result;
+  }
+
   const plane::PoseId centre = nodes_[node].centre;
-  geometry::SE2WithCovariance result{smoother_.pose(centre), Eigen::Matrix3d::Zero()};
   if (const auto covariance = smoother_.joint_marginal({&centre, 1}, {}))
     result.covariance = *covariance;
   return result;
@@ -314,40 +322,6 @@ std::vector<double> PoseGraph::relative_variances(NodeIndex node,
     variances.push_back(0.5 * covariance.trace());
   }
   return variances;
-}
-
-std::vector<Eigen::Matrix2d> PoseGraph::covariances(std::span<const model::LandmarkId> ids) const {
-  std::vector<plane::PointId> points;
-  std::vector<std::size_t> place_of;
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    const auto found = point_of_.find(ids[i]);
-    if (found == point_of_.end()) continue;
-    points.push_back(found->second);
-    place_of.push_back(i);
-  }
-
-  std::vector<Eigen::Matrix2d> result(ids.size(), Eigen::Matrix2d::Zero());
-  const plane::Marginals marginals = smoother_.marginals({}, points);
-  for (std::size_t k = 0; k < points.size(); ++k) result[place_of[k]] = marginals.points[k];
-  return result;
-}
-
-std::vector<Eigen::Matrix3d> PoseGraph::covariances(std::span<const NodeIndex> nodes) const {
-  std::vector<NodeIndex> distinct(nodes.begin(), nodes.end());
-  std::sort(distinct.begin(), distinct.end());
-  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
-  std::vector<plane::PoseId> poses;
-  poses.reserve(distinct.size());
-  for (const NodeIndex node : distinct) poses.push_back(nodes_[node].centre);
-  const plane::Marginals marginals = smoother_.marginals(poses, {});
-
-  std::vector<Eigen::Matrix3d> result;
-  result.reserve(nodes.size());
-  for (const NodeIndex node : nodes) {
-    const auto at = std::lower_bound(distinct.begin(), distinct.end(), node) - distinct.begin();
-    result.push_back(marginals.poses[static_cast<std::size_t>(at)]);
-  }
-  return result;
 }
 
 std::optional<Eigen::Matrix2d> PoseGraph::difference_covariance(model::LandmarkId a,
@@ -391,12 +365,13 @@ void PoseGraph::restore(const plane::Graph& graph) {
   if (graph.poses.size() != nodes_.size() || graph.points.size() != landmark_of_point_.size())
     throw std::invalid_argument("mapper state: its graph does not fit its nodes");
   smoother_.start_from(graph);
+  if (anchor_) hold(*anchor_);
 
   for (std::size_t i = 0; i < landmark_of_point_.size(); ++i) {
     if (landmark_of_point_[i] != 0)
       point_of_.emplace(landmark_of_point_[i], plane::PointId(static_cast<std::uint32_t>(i)));
   }
-  condense_frozen(parts_of(frozen_motions_, frozen_));
+  recondense_frozen();
   dormant_of_node_.assign(nodes_.size(), {});
   for (const auto& [id, observed] : dormant_) {
     for (const DormantObservation& one : observed)

@@ -87,12 +87,26 @@ struct AwayLandmarks {
   std::vector<AwayTieId> ties;
 };
 
+/// A node that holds the solved graph.
+struct Anchor {
+  NodeIndex node = 0;
+  geometry::SE2 map_T_node;  ///< As it was when it began to hold the graph.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.node, s.map_T_node);
+  }
+};
+
 /// A node to be taken out, and the node that gets what it observed.
 struct Retirement {
   NodeIndex node = 0;
   NodeIndex into = 0;
   geometry::SE2WithCovariance into_T_node;
 };
+
+struct LooseGraph;
 
 /// What adds nothing to the map any more.
 struct Surplus {
@@ -158,6 +172,22 @@ class PoseGraph {
   /// of the other nodes may be taken out, too, nor the newest one. Cost: the factors of the nodes.
   void take_out(const Surplus& surplus);
 
+  /// Nodes as a graph of their own, and what its numbers are here. Poses: `inner`, then `outer`.
+  struct Part {
+    /// A motion to another node.
+    struct Outer {
+      NodeIndex node = 0;
+      NodeIndex inner = 0;  ///< Its end in the part.
+      MotionRef motion;
+    };
+    factor_graph::plane::Graph graph;
+    std::vector<NodeIndex> inner;
+    std::vector<Outer> outer;
+    std::vector<model::LandmarkId> landmarks;
+    std::vector<factor_graph::plane::ScalarId> scalars;  ///< May repeat.
+  };
+  /// What these nodes observed and how they moved, also to others. Cost: their factors.
+  Part part_of(std::span<const NodeIndex> nodes) const;
   /// Puts one node in the place of these, all of which there are: what they observed and how they
   /// moved becomes one condensed measurement (plane::condense). The newest node and the one that
   /// holds the map must not be among them. The retirements tell where each node was relative to
@@ -189,12 +219,20 @@ class PoseGraph {
   /// measurement of the nodes around them (frozen_part). They must be condensed ones with nothing
   /// in the graph but motions; others among them are passed over. False, and nothing is changed,
   /// where what is left would be tied at too many nodes. Undone by thaw(). Cost: one factorisation
-  /// of all that is frozen.
+  /// of these nodes, however many were frozen before. Another node holds the solved graph from then
+  /// on, where it is, so that what far linearisations leave does not move the ground around the
+  /// vehicle; the origin stays as a variable, and covariances count from it.
   bool freeze(std::span<const NodeIndex> nodes);
   /// Takes nodes into the solved graph again, where they are frozen. The same cost.
   void thaw(std::span<const NodeIndex> nodes);
-  /// Moves what is frozen to where the nodes around it are now.
-  void settle_frozen();
+  /// Takes all frozen nodes into the solved graph again, and holds it at the origin of the map:
+  /// what is to be joined with it may move all of them. The same cost.
+  void unfreeze();
+  /// The node that carries the origin of the map; none where the map was given.
+  std::optional<NodeIndex> origin() const;
+  /// From now on the node counts as a condensed one: it gets nothing more. For the origin, which is
+  /// in no stretch, once it is far behind.
+  void close(NodeIndex node) { edit(node).is_condensed = true; }
   /// Whether the node is out of the solved graph.
   bool is_frozen(NodeIndex node) const { return frozen_.contains(node); }
   /// Number of nodes out of the solved graph.
@@ -206,6 +244,13 @@ class PoseGraph {
   Eigen::Vector2d dormant_position(model::LandmarkId id) const;
   /// Ids of all landmarks in the solved graph, ascending. O(landmarks in it).
   std::vector<model::LandmarkId> awake() const;
+
+  /// All that was measured, for another graph to absorb. O(graph).
+  LooseGraph loosened();
+  /// Adds all of another graph, moved to `map_T_other`; its paths count from `further_m` [m] on.
+  /// What held it is not among it: a measurement between the two must follow before the graph is
+  /// solved. Returns the number of its first node: the others follow. Cost: the other graph.
+  NodeIndex absorb(const LooseGraph& other, const geometry::SE2& map_T_other, double further_m);
 
   /// Updates the estimates. Not `ok` where the measurements leave variables undetermined.
   factor_graph::plane::SmootherUpdate solve() { return smoother_.update(); }
@@ -262,7 +307,7 @@ class PoseGraph {
     a(graph, self.nodes_, self.landmark_of_point_, self.gyro_, self.newest_, self.free_nodes_,
       self.free_points_, self.free_observations_, self.free_motions_, self.free_biased_,
       self.dormant_, self.ties_, self.closures_, self.away_ties_, self.free_away_ties_,
-      self.frozen_motions_);
+      self.frozen_motions_, self.origin_, self.anchor_);
     std::vector<NodeIndex> frozen(self.frozen_.begin(), self.frozen_.end());
     a(frozen);
     if constexpr (Archive::kReads) self.frozen_.insert(frozen.begin(), frozen.end());
@@ -276,26 +321,14 @@ class PoseGraph {
     std::optional<NodeIndex> newest;
     std::map<NodeIndex, Node> changed;  ///< Of those there were, as they were.
     std::map<std::uint32_t, std::uint64_t> closures;
+    std::optional<Anchor> origin;
+    std::optional<Anchor> anchor;
     std::vector<factor_graph::plane::PointId> restarted;  ///< Points with a landmark again.
     /// Points whose landmark was joined with another one.
     std::vector<std::pair<factor_graph::plane::PointId, model::LandmarkId>> dropped;
   };
   Node& edit(NodeIndex node);
   NodeIndex put_node(const geometry::SE2& map_T_centre, bool is_stationary, double along_m);
-  /// Nodes as a graph of their own, and what its numbers are here.
-  struct Part {
-    /// A motion to another node.
-    struct Outer {
-      NodeIndex node = 0;
-      NodeIndex inner = 0;  ///< Its end in the part.
-      MotionRef motion;
-    };
-    factor_graph::plane::Graph graph;
-    std::vector<NodeIndex> inner;
-    std::vector<Outer> outer;
-    std::vector<model::LandmarkId> landmarks;
-    std::vector<factor_graph::plane::ScalarId> scalars;  ///< May repeat.
-  };
   /// What two nodes have in common, smaller number first.
   using TiedNodes = std::pair<NodeIndex, NodeIndex>;
   /// The dormant landmarks that two nodes observed, as one motion between the nodes.
@@ -314,13 +347,24 @@ class PoseGraph {
   void take_out(factor_graph::plane::MotionId motion);
   void take_away_tie_out(AwayTieId tie);
   bool may_freeze(NodeIndex node) const;
+  void hold(const Anchor& anchor);
+  std::optional<Anchor> anchor_beyond(const std::set<NodeIndex>& going) const;
+  /// The origin is a variable like others then.
+  bool is_held_elsewhere() const { return origin_ && anchor_->node != origin_->node; }
+  Eigen::Matrix3d anchor_covariance() const;
+  Eigen::Matrix3d of_anchor(const geometry::SE2& map_T_node, const Eigen::Matrix3d& anchor) const;
+  Eigen::Matrix2d of_anchor(const Eigen::Vector2d& position_m, const Eigen::Matrix3d& anchor) const;
   void freeze_motions(const std::set<NodeIndex>& nodes);
   void thaw_motions();
-  void condense_frozen(const std::vector<FrozenPart>& parts);
+  std::optional<std::vector<FrozenFactor>> condense_parts(
+      const std::vector<FrozenPart>& parts) const;
+  void set_frozen_factors();
+  void recondense_frozen();
+  std::vector<FrozenMotion> loose_motions() const;
+  void absorb(const FrozenMotion& motion, NodeIndex first);
   factor_graph::plane::RelativePose tie(const TiedNodes& nodes,
                                         std::span<const model::LandmarkId> ids) const;
   bool has_left(NodeIndex node);
-  Part part_of(std::span<const NodeIndex> nodes) const;
   void add_motions_of(NodeIndex node, Part& part) const;
   void add_motion(MotionRef ref, factor_graph::plane::PoseId a, factor_graph::plane::PoseId b,
                   Part& part) const;
@@ -355,6 +399,7 @@ class PoseGraph {
   std::vector<AwayTieId> free_away_ties_;
   std::set<NodeIndex> frozen_;
   std::vector<FrozenMotion> frozen_motions_;  ///< With an end that is frozen.
+  std::vector<FrozenFactor> frozen_factors_;  ///< In the solved graph; from the motions.
   /// What is dormant of a node's landmarks, and where the node was when they last followed it.
   struct DormantOfNode {
     std::vector<model::LandmarkId> landmarks;
@@ -362,6 +407,8 @@ class PoseGraph {
   };
   std::vector<DormantOfNode> dormant_of_node_;  ///< By node; from dormant_.
   std::optional<NodeIndex> newest_;             ///< Added last.
+  std::optional<Anchor> origin_;                ///< The first keyframe's.
+  std::optional<Anchor> anchor_;                ///< What holds the solved graph now.
   FreeNumbers free_nodes_;
   FreeNumbers free_points_;
   FreeNumbers free_observations_;

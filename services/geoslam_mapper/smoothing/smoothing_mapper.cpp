@@ -10,7 +10,8 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-constexpr state::Format kFormat{"geoslam_mapper.smoothing", 14};
+constexpr state::Format kFormat{"geoslam_mapper.smoothing", 15};
+constexpr state::Format kCopyFormat{"geoslam_mapper.smoothing.copy", 1};
 /// Two keyframes contradict each other where their motion in a trial map differs from the tracked
 /// one by more than so many of its standard deviations.
 constexpr double kTrackSigmas = 4.0;
@@ -66,6 +67,8 @@ model::MapUpdate SmoothingMapper::add(const model::Keyframe& keyframe) {
     trial_.reset();
   }
   update.is_provisional = current_.is_provisional();
+  if (update.status == kUpdated && !update.is_provisional && !parameters_.localisation_only)
+    rejoin_left_maps(keyframe, update);
   return update;
 }
 
@@ -147,11 +150,26 @@ void SmoothingMapper::adopt_trial(model::MapUpdate& update) {
   }
   current_ = std::move(*trial_);
   trial_.reset();
+  rejoining_.reset();
   contradictions_ = 0;
 
   update.status = model::MapUpdateStatus::kFirstMap;
   update.added.clear();
   for (const auto& [id, landmark] : current_.map().landmarks.all()) update.added.push_back(id);
+}
+
+/// On a copy: where the two maps contradict each other, nothing has happened.
+void SmoothingMapper::rejoin_left_maps(const model::Keyframe& keyframe, model::MapUpdate& update) {
+  const auto overlap = rejoining_.follow(keyframe, update.associations, current_.map(), kept_maps_);
+  if (!overlap) return;
+  rejoining_.reset();
+
+  const auto left = std::ranges::find(kept_maps_.maps(), overlap->map_id, &KeptMap::id);
+  OneMap joined(parameters_);
+  state::load(state::save(kCopyFormat, current_), kCopyFormat, joined);
+  if (!joined.rejoin(opened(*left, parameters_), *overlap, update)) return;
+  current_ = std::move(joined);
+  kept_maps_.remove(overlap->map_id);
 }
 
 model::LoopResult SmoothingMapper::take(const model::LoopClosure& closure) {

@@ -16,8 +16,9 @@ namespace understory::geoslam_mapper::smoothing {
 /// Which map a keyframe belongs to. One map is in use. Where it cannot place a keyframe, and
 /// odometry does not reach there from the last one that it placed, the vehicle is lost: then a
 /// trial map is begun beside it. Once `new_map_keyframes` successive keyframes agree in the trial,
-/// it is the map in use, and the other one is kept as it is. A map in use with which fewer
-/// keyframes agree is provisional: it gives way to a trial that does better, and is dropped
+/// it is the map in use, and the other one is kept as it is, until keyframes are found in it again:
+/// then it becomes part of the map in use, in its frame (GeoSLAM §7.2.3). A map in use with which
+/// fewer keyframes agree is provisional: it gives way to a trial that does better, and is dropped
 /// (GeoSLAM §7.2: one bad scan must not be the map). See MapperMethod for the functions.
 class SmoothingMapper final : public MapperMethod {
  public:
@@ -53,6 +54,13 @@ class SmoothingMapper final : public MapperMethod {
     return current_.submaps().poses(current_.map().graph);
   }
   model::LoopResult take(const model::LoopClosure& closure) override;
+  /// From now on the factors of each stretch of the path that is condensed are kept until they are
+  /// taken: an expand() of them is the drive uncut. See Condensing.
+  void keep_stretches() { current_.keep_stretches(); }
+  /// Those of the map in use since the last call.
+  std::vector<Stretch> take_stretches() { return current_.take_stretches(); }
+  /// The map in use.
+  const OneMap& current() const { return current_; }
   /// The maps that were left.
   const MapArchive& kept_maps() const { return kept_maps_; }
 
@@ -63,7 +71,8 @@ class SmoothingMapper final : public MapperMethod {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     bool has_trial = self.trial_ != nullptr;
-    a(self.current_, self.kept_maps_, self.last_utime_, self.contradictions_, has_trial);
+    a(self.current_, self.kept_maps_, self.rejoining_, self.last_utime_, self.contradictions_,
+      has_trial);
     if constexpr (Archive::kReads) {
       if (has_trial) self.trial_ = std::make_unique<OneMap>(self.parameters_);
     }
@@ -78,6 +87,7 @@ class SmoothingMapper final : public MapperMethod {
   bool agrees(const model::Keyframe& keyframe, const model::MapUpdate& update,
               const std::optional<geometry::SE2WithCovariance>& map_T_previous_base) const;
   void adopt_trial(model::MapUpdate& update);
+  void rejoin_left_maps(const model::Keyframe& keyframe, model::MapUpdate& update);
   /// What every map needs to know.
   template <class Message>
   void add_to_all(const Message& message) {
@@ -89,6 +99,7 @@ class SmoothingMapper final : public MapperMethod {
   OneMap current_;
   std::unique_ptr<OneMap> trial_;  ///< Null where the vehicle is not lost.
   MapArchive kept_maps_;
+  Rejoining rejoining_;
   std::optional<model::Utime> last_utime_;  ///< Of the last well-formed keyframe.
   std::uint32_t contradictions_ = 0;        ///< Keyframes rolled back since the last one accepted.
   bool may_hand_over_ = true;

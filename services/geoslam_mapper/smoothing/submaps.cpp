@@ -87,6 +87,7 @@ void Submaps::follow(const model::FieldOfView& field_of_view, NodeIndex newest, 
   for (const auto& [distance_m, id] : near) wanted_.push_back(id);
   freeze(reach_m, vehicle_m, map);
   if (!may_hand_over_) return;
+  close_origin(far_m, vehicle_m, map);
 
   // Whole submaps only: where none of what the node observed is in the solved graph.
   std::vector<Here> left;
@@ -100,6 +101,15 @@ void Submaps::follow(const model::FieldOfView& field_of_view, NodeIndex newest, 
   for (const Here& here : left) give_away(here, utime, map);
   (void)map.graph.solve();  // What they tell is in the graph as before.
   map.adopt_estimates();
+}
+
+/// The first node is in no stretch: far behind it is a submap of its own.
+void Submaps::close_origin(double far_m, const Eigen::Vector2d& vehicle_m, GlobalMap& map) {
+  const auto origin = map.graph.origin();
+  if (!origin || map.graph.node(*origin).is_condensed) return;
+  if ((map.graph.pose(*origin).translation() - vehicle_m).norm() < far_m) return;
+  map.graph.close(*origin);
+  here_.push_back({*origin, std::nullopt});
 }
 
 /// The solved graph is that of the ground around the vehicle: its cost does not grow with the way.

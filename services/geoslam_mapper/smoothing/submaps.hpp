@@ -76,6 +76,7 @@ class Submaps {
     }
   };
   void give_away(const Here& here, model::Utime utime, GlobalMap& map);
+  void close_origin(double far_m, const Eigen::Vector2d& vehicle_m, GlobalMap& map);
   void freeze(double reach_m, const Eigen::Vector2d& vehicle_m, GlobalMap& map);
 
   double hand_over_m_;

@@ -124,6 +124,21 @@ void Trajectory::bring_back(NodeIndex node, AwayBases away, const PoseGraph& gra
     put({node, centre_T_viewpoint, false}, graph);
 }
 
+void Trajectory::absorb(Trajectory other, NodeIndex first, const PoseGraph& graph) {
+  for (Base& base : other.bases_) {
+    base.node += first;
+    base.is_origin = false;
+  }
+  const auto were = static_cast<std::ptrdiff_t>(bases_.size());
+  bases_.insert(bases_.end(), other.bases_.begin(), other.bases_.end());
+  std::inplace_merge(bases_.begin(), bases_.begin() + were, bases_.end(),
+                     [](const Base& a, const Base& b) { return a.utime < b.utime; });
+  spare_ += other.spare_;
+
+  for (const Viewpoint& viewpoint : other.viewpoints_)
+    if (!viewpoint.is_free) put({viewpoint.node + first, viewpoint.centre_T_middle, false}, graph);
+}
+
 void Trajectory::index(std::uint32_t viewpoint, const PoseGraph& graph) {
   const NodeIndex node = viewpoints_[viewpoint].node;
   if (viewpoints_of_node_.size() <= node) viewpoints_of_node_.resize(node + 1);
@@ -215,8 +230,10 @@ std::optional<NodeIndex> Trajectory::revisited(const geometry::SE2& map_T_middle
 }
 
 std::optional<geometry::SE2WithCovariance> Trajectory::origin_T_first() const {
-  if (bases_.empty() || !bases_.front().is_origin) return std::nullopt;
-  return inverse(bases_.front().centre_T_base);
+  const auto origin =
+      std::find_if(bases_.begin(), bases_.end(), [](const Base& base) { return base.is_origin; });
+  if (origin == bases_.end()) return std::nullopt;
+  return inverse(origin->centre_T_base);
 }
 
 geometry::SE2WithCovariance Trajectory::from_origin(

@@ -76,6 +76,9 @@ class Trajectory {
   AwayBases put_away(NodeIndex node);
   /// Adds them again. O(bases).
   void bring_back(NodeIndex node, AwayBases away, const PoseGraph& graph);
+  /// Adds all of another trajectory, whose nodes have numbers from `first` on in `graph` now. Its
+  /// origin is a base like the others. O(bases).
+  void absorb(Trajectory other, NodeIndex first, const PoseGraph& graph);
   /// Brings the index of viewpoints to where the graph's last updates moved the nodes.
   void follow(const PoseGraph& graph);
 

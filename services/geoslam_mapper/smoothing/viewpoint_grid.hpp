@@ -11,7 +11,8 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Numbered points in square cells of 1 m. Every change costs what it touches.
+/// Numbered points in square cells of 10 m: small moves of many points change no cell. Every change
+/// costs what it touches.
 class ViewpointGrid {
  public:
   /// Adds the point, or moves it.
@@ -50,7 +51,7 @@ class ViewpointGrid {
   }
 
  private:
-  static constexpr double kCell_m = 1.0;
+  static constexpr double kCell_m = 10.0;
   static std::pair<std::int32_t, std::int32_t> indices_of(const Eigen::Vector2d& p) {
     return {static_cast<std::int32_t>(std::floor(p.x() / kCell_m)),
             static_cast<std::int32_t>(std::floor(p.y() / kCell_m))};

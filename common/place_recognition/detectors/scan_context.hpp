@@ -1,0 +1,101 @@
+// Scan Context: the greatest heights around a sensor, in rings and sectors.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/geometry/se2.hpp"
+#include "common/place_recognition/detector_parameters.hpp"
+#include "common/place_recognition/place_detector.hpp"
+
+namespace understory::place_recognition::detectors {
+
+/// What is kept of a frame.
+struct ScanContext {
+  /// Sector by sector, in each ring by ring: the heights, each sector of norm 1 or all zero.
+  std::vector<float> columns;
+  std::vector<float> ring_key;  ///< Of each ring the share of sectors that have a point.
+};
+
+/// The smallest distance of two contexts and the shift that gives it.
+struct ContextDistance {
+  double distance = 1.0;  ///< 0 = equal, 1 = nothing in common.
+  std::size_t shift = 0;  ///< Sectors from the query's to the frame's.
+};
+
+/// Kim & Kim 2018 (thesis 002 §2.4.1). The value of a bin is the greatest height in it above the
+/// ground (height + lift_m; points below count as 0, as empty bins do). Of a frame without a cloud,
+/// the landmarks are points of height z.
+class ScanContextMaker {
+ public:
+  /// Precondition: at least one ring and one sector, a range > 0.
+  explicit ScanContextMaker(const ScanContextParameters& parameters) : parameters_(parameters) {}
+
+  /// Context of points (frame `vehicle_level`) as seen from `origin_m`. None without a point in
+  /// range.
+  std::optional<ScanContext> describe(std::span<const Eigen::Vector3f> points,
+                                      const Eigen::Vector2d& origin_m) const;
+
+  /// Eqs. 2.31 and 2.32: the mean of 1 - cosine over the sectors, least under all shifts. A sector
+  /// that is empty in both is not counted, one that is empty in one of them counts as 1. O(rings *
+  /// sectors^2).
+  ContextDistance distance(const ScanContext& query, const ScanContext& frame) const;
+
+  /// Euclidean distance of the ring keys (eq. 2.30 by the paper, which counts occupied sectors).
+  double key_distance(const ScanContext& a, const ScanContext& b) const;
+
+  /// The heading [rad] that a shift means, of the query in the frame.
+  double heading_rad(std::size_t shift) const;
+  /// Standard deviation of a heading [rad] of a query that lies `place_sigma_m` beside the frame: a
+  /// sector, and by how much points at half of the range lie elsewhere.
+  double heading_sigma_rad(double place_sigma_m) const;
+  /// As given to the constructor.
+  const ScanContextParameters& parameters() const { return parameters_; }
+
+ private:
+  ScanContextParameters parameters_;
+};
+
+/// A query as seen from where it was taken and from places to its sides (root shifting).
+struct ShiftedContext {
+  ScanContext context;
+  double left_m = 0.0;  ///< Where it was seen from.
+};
+/// All of a query's; empty where it has no point in range.
+std::vector<ShiftedContext> shifted_contexts(const ScanContextMaker& maker,
+                                             const PlaceFrame& frame);
+
+/// The least distance of any of the query's contexts to a frame's, and the pose that it means.
+struct BestContext {
+  double distance = 1.0;
+  geometry::SE2 frame_T_query;
+};
+/// Precondition: `query` is not empty.
+BestContext best_context(const ScanContextMaker& maker, std::span<const ShiftedContext> query,
+                         const ScanContext& frame);
+
+/// Frames of the nearest ring keys, compared in full. The score is minus the distance.
+class ScanContextDetector final : public PlaceDetector {
+ public:
+  /// `place_sigma_m`: where a query may lie around a frame alike.
+  ScanContextDetector(const ScanContextParameters& parameters, double place_sigma_m);
+
+  void add(const PlaceFrame& frame) override;
+  std::vector<ScoredPlace> query(const PlaceFrame& frame, const PlaceQuery& limits) const override;
+  std::size_t size() const override { return ids_.size(); }
+  std::size_t descriptor_bytes() const override;
+
+ private:
+  std::vector<std::size_t> nearest_keys(std::span<const ShiftedContext> query,
+                                        std::size_t end) const;
+
+  ScanContextMaker maker_;
+  double place_sigma_m_;
+  std::vector<FrameId> ids_;
+  std::vector<std::optional<ScanContext>> contexts_;
+};
+
+}  // namespace understory::place_recognition::detectors

@@ -1,0 +1,51 @@
+// The one interface of all verifiers: do two frames show one place, and how do they lie.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/geometry/se2.hpp"
+#include "common/place_recognition/place_frame.hpp"
+#include "common/place_recognition/verifier_parameters.hpp"
+
+namespace understory::place_recognition {
+
+/// How a query lies in a frame, if both show one place.
+struct VerifiedPlace {
+  geometry::SE2 frame_T_query;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< Tangent order, right perturbation.
+  /// The higher, the surer; finite. Scores of two verifiers cannot be compared.
+  double score = 0.0;
+  std::size_t inliers = 0;  ///< Landmarks or points of the query that have a partner.
+};
+
+/// Compares two frames in detail (thesis 002 §2.4.2). Without state: safe to share.
+class PlaceVerifier {
+ public:
+  PlaceVerifier() = default;
+  virtual ~PlaceVerifier() = default;
+  PlaceVerifier(const PlaceVerifier&) = delete;
+  PlaceVerifier& operator=(const PlaceVerifier&) = delete;
+
+  /// The likeliest relative pose; none where nothing fits or either frame says too little. Who asks
+  /// decides by the score. `guesses` (frame_T_query) are where a search that is local begins, the
+  /// identity where there are none; one that is global does not need them.
+  virtual std::optional<VerifiedPlace> verify(
+      const PlaceFrame& query, const PlaceFrame& frame,
+      std::span<const geometry::SE2WithCovariance> guesses = {}) const = 0;
+};
+
+/// The verifiers' names, as a configuration gives them, in the order of the decision's table.
+std::vector<std::string> verifier_names();
+
+/// Throws std::invalid_argument that names `name` and those allowed.
+std::unique_ptr<PlaceVerifier> make_verifier(std::string_view name,
+                                             const VerifierParameters& parameters = {});
+
+}  // namespace understory::place_recognition

@@ -1,0 +1,107 @@
+#include "services/loop_closer/adapter.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "services/loop_closer/adapter_parameters.hpp"
+#include "services/loop_closer/health_watch.hpp"
+#include "services/loop_closer/loop_closer.hpp"
+
+namespace understory::loop_closer {
+namespace {
+
+constexpr state::Format kServiceFormat{"loop_closer_service", 1};
+
+class LoopCloserAdapter : public bus::Adapter {
+ public:
+  explicit LoopCloserAdapter(LoopCloserChannels channels) : channels_(std::move(channels)) {}
+
+  void describe(bus::ParameterTable& table) override {
+    loop_closer::describe(parameters_, table);
+    loop_closer::describe(health_, table);
+  }
+
+  void bind(bus::Node& node) override {
+    node_ = &node;
+    stage_ = std::make_unique<LoopCloser>(parameters_);
+    watch_ = HealthWatch(health_);
+
+    // A search takes longer than a keyframe, now and then: long queues.
+    node.subscribe<model::Keyframe>(
+        channels_.keyframe, [this](const model::Keyframe& keyframe) { stage_->add(keyframe); },
+        {.queue_size = 500});
+    node.subscribe<model::MapUpdate>(channels_.slam_update,
+                                     [this](const model::MapUpdate& update) { add(update); },
+                                     {.queue_size = 500});
+    // Sent again until a store has it: it may come twice.
+    node.subscribe<model::Submap>(channels_.submap,
+                                  [this](const model::Submap& submap) { stage_->add(submap); },
+                                  {.queue_size = 200, .timed = false});
+    node.subscribe<model::LoopResult>(channels_.loop_result,
+                                      [this](const model::LoopResult& result) { add(result); },
+                                      {.queue_size = 200, .timed = false});
+    closures_ = node.advertise<model::LoopClosure>(channels_.loop_closure);
+  }
+
+  std::string save() const override { return state::save(kServiceFormat, watch_, stage_->save()); }
+
+  void load(const std::string& state) override {
+    HealthWatch watch(health_);
+    std::string stage;
+    state::load(state, kServiceFormat, watch, stage);
+    stage_->load(stage);
+    watch_ = watch;
+    show_health();
+  }
+
+ private:
+  void add(const model::MapUpdate& update) {
+    const LoopCounters before = stage_->counters();
+    if (const auto closure = stage_->add(update)) {
+      closures_.publish(*closure);
+      log(*closure);
+    }
+    watch_.add(before, stage_->counters());
+    show_health();
+  }
+
+  void add(const model::LoopResult& result) {
+    if (!stage_->add(result)) return;
+    watch_.add(result);
+    show_health();
+  }
+
+  void log(const model::LoopClosure& closure) {
+    const std::string from = closure.from.submap != 0
+                                 ? fmt::format("submap {}", closure.from.submap)
+                                 : fmt::format("keyframe {}", closure.from.keyframe);
+    node_->log(bus::Node::Level::kInfo, "loop",
+               fmt::format("closure {}: keyframe {} is at {}, by chance with 10^{:.0f}", closure.id,
+                           closure.to.keyframe, from, closure.log10_false_alarm),
+               channels_.loop_closure);
+  }
+
+  void show_health() {
+    for (const bus::WatchedCondition& one : watch_.conditions()) node_->show(one);
+  }
+
+  LoopCloserChannels channels_;
+  LoopCloserParameters parameters_;
+  HealthParameters health_;
+  HealthWatch watch_;
+  bus::Node* node_ = nullptr;
+  std::unique_ptr<LoopCloser> stage_;
+  bus::Publisher<model::LoopClosure> closures_;
+};
+
+}  // namespace
+
+bus::Service loop_closer_service(const LoopCloserChannels& channels) {
+  return {"loop_closer",
+          channels.keyframe + ", " + channels.slam_update + ", " + channels.submap + ", " +
+              channels.loop_result + " -> " + channels.loop_closure,
+          [channels] { return std::make_unique<LoopCloserAdapter>(channels); }};
+}
+
+}  // namespace understory::loop_closer

@@ -1,0 +1,50 @@
+// What HEALTH says of the loop closer beside faults of single messages.
+#pragma once
+
+#include <array>
+
+#include "common/bus/condition.hpp"
+#include "common/model/submap.hpp"
+#include "services/loop_closer/loop_closer.hpp"
+
+namespace understory::loop_closer {
+
+/// When the loop closer is not well. Ranges and meanings: describe().
+struct HealthParameters {
+  bus::ConditionLimits refused{8, 4};
+  bus::ConditionLimits diverged{16, 12};
+  bus::ConditionLimits missing{20, 10};
+};
+/// Adds the parameters to the table.
+void describe(HealthParameters& parameters, bus::ParameterTable& table);
+
+/// Judges the loop closer by what becomes of its closures. `input_refused`: the mapper refuses
+/// them. `diverged`: they contradict its map, and still wait for others that agree.
+/// `parts_missing`: keyframes do not come that the mapper has.
+class HealthWatch {
+ public:
+  /// All is well so far.
+  explicit HealthWatch(const HealthParameters& parameters = {});
+
+  /// What the mapper did with one of ours.
+  void add(const model::LoopResult& result);
+  /// An update of a keyframe, with the counts before and after it.
+  void add(const LoopCounters& before, const LoopCounters& after);
+  /// What to show.
+  std::array<bus::WatchedCondition, 3> conditions() const {
+    return {refused_, diverged_, missing_};
+  }
+
+  /// Members of a saved state; see common/state. The parameters are configuration.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.refused_, self.diverged_, self.missing_);
+  }
+
+ private:
+  bus::WatchedCondition refused_;
+  bus::WatchedCondition diverged_;
+  bus::WatchedCondition missing_;
+};
+
+}  // namespace understory::loop_closer

@@ -1,0 +1,183 @@
+#include "services/loop_closer/loop_closer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "common/state/archive.hpp"
+#include "services/loop_closer/expectation.hpp"
+
+namespace understory::loop_closer {
+namespace {
+
+constexpr state::Format kFormat{"loop_closer", 1};
+/// Numbers of our closures begin here: those of persons are below.
+constexpr std::uint64_t kFirstId = std::uint64_t{1} << 40;
+/// Name of the detector, as LOOP_CLOSURE tells it.
+constexpr const char* kSource = "stems";
+
+bool is_placed(const model::MapUpdate& update) {
+  return update.status == model::MapUpdateStatus::kFirstMap ||
+         update.status == model::MapUpdateStatus::kUpdated;
+}
+
+/// What the state keeps is what the search gets: a restart gives the same answers.
+std::vector<LevelStem> as_kept(std::span<const LevelStem> stems) {
+  return place_recognition::PackedStems(stems).unpacked();
+}
+
+/// An end at a place, and how its base lies to it.
+model::LoopEnd end_at(const Place& place, geometry::SE2WithCovariance& end_T_base) {
+  model::LoopEnd end;
+  if (place.in_submap) {
+    end.submap = place.in_submap->id;
+    end_T_base = place.in_submap->submap_T_base;
+  } else {
+    end.keyframe = place.keyframe;
+  }
+  return end;
+}
+
+}  // namespace
+
+LoopCloser::LoopCloser(const LoopCloserParameters& parameters)
+    : parameters_(parameters),
+      window_(parameters.places),
+      known_ground_(parameters.places.min_loop_m),
+      search_(parameters.stems) {}
+
+void LoopCloser::add(const model::Keyframe& keyframe) {
+  pending_.push_back(keyframe);
+  if (pending_.size() > kMostPending) pending_.pop_front();
+}
+
+std::optional<model::Keyframe> LoopCloser::take_pending(std::uint64_t sequence) {
+  while (!pending_.empty() && pending_.front().sequence < sequence) pending_.pop_front();
+  if (pending_.empty() || pending_.front().sequence != sequence) return std::nullopt;
+  model::Keyframe keyframe = std::move(pending_.front());
+  pending_.pop_front();
+  return keyframe;
+}
+
+std::optional<model::LoopClosure> LoopCloser::add(const model::MapUpdate& update) {
+  const auto keyframe = take_pending(update.keyframe_sequence);
+  if (!keyframe) ++counters_.keyframes_missing;
+  if (!keyframe || !is_placed(update)) return std::nullopt;
+  ++counters_.keyframes;
+
+  if (update.map_id != map_id_) {
+    map_id_ = update.map_id;
+    window_.restart();
+    known_ground_.restart();
+  }
+  window_.add(*keyframe, update);
+  known_ground_.add(update, window_.along_m());
+  if (window_.along_m() < place_at_m_) return std::nullopt;
+  place_at_m_ = window_.along_m() + parameters_.places.every_m;
+  if (known_ground_.is_known(parameters_.places.known_share)) return std::nullopt;
+
+  Place place;
+  place.keyframe = update.keyframe_sequence;
+  place.utime = update.utime;
+  place.map_id = update.map_id;
+  place.along_m = window_.along_m();
+  place.map_T_base = {update.map_T_vehicle, update.covariance};
+  place.stems = as_kept(window_.stems());
+  if (place.stems.size() < static_cast<std::size_t>(parameters_.places.min_stems))
+    return std::nullopt;
+
+  std::optional<model::LoopClosure> closure = look_for(place);
+  search_.add(place);
+  memory_.add(std::move(place));
+  ++counters_.places;
+  return closure;
+}
+
+/// The likeliest place, where nothing else can explain what is seen.
+std::optional<model::LoopClosure> LoopCloser::look_for(const Place& place) {
+  const std::size_t searched = memory_.count_until(place.along_m - parameters_.places.min_loop_m);
+  if (searched == 0 || place.along_m < sent_.accepted_at_m() + parameters_.accept.closed_m)
+    return std::nullopt;
+  ++counters_.queries;
+  const std::uint64_t newest = memory_.places()[searched - 1].keyframe;
+  const SearchAnswer answer = search_.find(place.stems, newest);
+  if (answer.found.empty()) return std::nullopt;
+
+  const FoundPlace& best = answer.found.front();
+  const Place& from = *memory_.of_keyframe(best.keyframe);
+  const Verdict verdict = judge(answer, from, place, searched);
+  const ClosurePaths paths{from.along_m, place.along_m};
+  if (!verdict.is_sure || sent_.was_revoked(paths)) return std::nullopt;
+  if (from.map_id != place.map_id) {
+    ++counters_.other_map;
+    return std::nullopt;
+  }
+
+  model::LoopClosure closure;
+  closure.utime = place.utime;
+  closure.map_id = place.map_id;
+  closure.id = kFirstId + place.keyframe;
+  closure.source = kSource;
+  geometry::SE2WithCovariance end_T_base;
+  closure.from = end_at(from, end_T_base);
+  closure.to.keyframe = place.keyframe;
+  closure.from_T_to = compound(end_T_base, best.place_T_query);
+  const double error_m = parameters_.places.error_m;
+  const Eigen::Vector3d error(error_m, error_m, parameters_.places.error_rad);
+  closure.from_T_to.covariance += Eigen::Matrix3d(error.array().square().matrix().asDiagonal());
+  closure.log10_false_alarm = verdict.log10_false_alarm;
+  sent_.add(closure.id, paths);
+  ++counters_.sent;
+  if (!verdict.is_expected) ++counters_.unexpected;
+  return closure;
+}
+
+/// Fewer poses have to be told from chance where the mapper's poses allow few. What they do not
+/// allow must be surer by itself; the mapper waits for others that agree, then.
+LoopCloser::Verdict LoopCloser::judge(const SearchAnswer& answer, const Place& from,
+                                      const Place& place, std::size_t searched) const {
+  const AcceptanceParameters& accept = parameters_.accept;
+  const FoundPlace& best = answer.found.front();
+  Verdict verdict;
+  verdict.is_expected =
+      from.map_id == place.map_id && squared_distance(expected(from, place), best.place_T_query) <=
+                                         accept.gate_sigmas * accept.gate_sigmas;
+  double poses = static_cast<double>(searched) * search_.poses_per_place();
+  if (verdict.is_expected) {
+    poses = std::min(poses, allowed_poses(memory_.places().first(searched), place,
+                                          accept.gate_sigmas, search_.reach_m()));
+  }
+
+  verdict.log10_false_alarm =
+      std::log10(std::max(1.0, poses)) - best.log_ratio / std::numbers::ln10;
+  const double decades =
+      verdict.is_expected ? accept.chance_decades_expected : accept.chance_decades;
+  verdict.is_sure = verdict.log10_false_alarm <= -decades &&
+                    answer.margin_decades >= accept.margin_decades &&
+                    best.pairs >= static_cast<std::size_t>(accept.min_pairs);
+  return verdict;
+}
+
+bool LoopCloser::add(const model::LoopResult& result) {
+  using enum model::LoopResult::Status;
+  if (!sent_.note(result)) return false;
+  if (result.status == kAccepted) {
+    ++counters_.accepted;
+    window_.restart();
+  }
+  if (result.status == kWaiting) ++counters_.waiting;
+  if (result.status == kRefused) ++counters_.refused;
+  if (result.status == kRevoked) ++counters_.revoked;
+  return true;
+}
+
+std::string LoopCloser::save() const { return state::save(kFormat, *this); }
+
+void LoopCloser::load(const std::string& state) {
+  LoopCloser loaded(parameters_);
+  state::load(state, kFormat, loaded);
+  for (const Place& place : loaded.memory_.places()) loaded.search_.add(place);
+  *this = std::move(loaded);
+}
+
+}  // namespace understory::loop_closer

@@ -1,0 +1,47 @@
+// Parameters of the loop closer. What each one does, with range and default, is documented once: in
+// adapter_parameters.cpp, which `understory-loop-closer --help` prints. Here stand the units that a
+// name does not give.
+#pragma once
+
+namespace understory::loop_closer {
+
+/// What is a place, and where one is looked for again.
+struct PlaceParameters {
+  double every_m = 4.0;    ///< Path.
+  double window_m = 12.0;  ///< Path.
+  double merge_m = 0.35;
+  int min_stems = 5;
+  int most_stems = 80;
+  double min_loop_m = 100.0;  ///< Path.
+  double known_share = 0.3;   ///< Of a keyframe's associations.
+  double error_m = 0.05;
+  double error_rad = 0.003;
+};
+
+/// What a found place must show.
+struct AcceptanceParameters {
+  double chance_decades = 6.0;           ///< -log10 of a number of poses.
+  double chance_decades_expected = 3.0;  ///< Likewise.
+  double margin_decades = 4.0;           ///< log10 of a likelihood ratio.
+  int min_pairs = 5;
+  double gate_sigmas = 4.0;
+  double closed_m = 15.0;  ///< Path.
+};
+
+/// How the stems that a vehicle detects differ from visit to visit.
+struct StemParameters {
+  double sigma_m = 0.07;
+  double matched_share = 0.6;
+  bool use_diameters = true;
+  double diameter_sigma = 0.16;  ///< Of its logarithm.
+  double triangles = 300.0;
+};
+
+/// All of them.
+struct LoopCloserParameters {
+  PlaceParameters places;
+  AcceptanceParameters accept;
+  StemParameters stems;
+};
+
+}  // namespace understory::loop_closer
