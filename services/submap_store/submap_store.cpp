@@ -12,8 +12,8 @@ constexpr state::Format kFormat{"submap_store", 1};
 /// Closures that wait for the mapper's word.
 constexpr std::size_t kMostProposed = 1000;
 
-/// Number of the map that landmarks are of; 0 where there are none. Earlier maps, with lower numbers, may
-/// have become part of it.
+/// Number of the map that landmarks are of; 0 where there are none. Earlier maps, with lower
+/// numbers, may have become part of it.
 std::uint32_t map_of(const std::vector<model::MapLandmark>& landmarks) {
   std::uint32_t result = 0;
   for (const model::MapLandmark& one : landmarks) result = std::max(result, model::map_of(one.id));
