@@ -97,7 +97,6 @@ EXPERIMENTS = (
     _eval("map-merge", "map-merge --trials 100 --drives 40 --seed 1 --jobs 2 --data DATA", 5,
           ("tree_maps", "stem_censuses")),
     _stem_frames(),
-    _loops("loops", _LOOP_DRIVES, "--runs 2 --seed 301", 5),
     _loops("loops-blind", _LOOP_DRIVES, "--runs 2 --seed 301 --blind 0.1-0.45", 5),
     _loops("loops-strangers", _STRANGE_DRIVES, "--reckon --seed 401", 5),
     _eval("partition", "partition --runs 20 --seed 1 --length-m 1000 --size-m 5,10,20,40,100", 6),
