@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include "tests/catch.hpp"
 #include "tests/cli/run_command.hpp"
 #include "tests/system/stack.hpp"
