@@ -10,8 +10,11 @@ GRAPHS = ([f"DATA/pose_graphs/{name}" for name in FOREST_GRAPHS]
 tinyGrid3D.g2o smallGrid3D.g2o sphere2500.g2o torus3D.g2o rrr_NewCollege.g2o""".split()])
 
 
-# Drives are made once for all four experiments.
-PARTITION = "--runs 20 --lidar-runs 3 --seed 1 --jobs 2 --front-end ideal,lidar --recordings OUT/partition-drives"
+# Drives are made once for all partition experiments.
+PARTITION = "--seed 1 --jobs 2 --front-end ideal,lidar --recordings OUT/partition-drives"
+TOWN = f"{PARTITION} --runs 20 --lidar-runs 2 --routes urban"
+COUNTRY = f"{PARTITION} --runs 8 --lidar-runs 1 --routes urban-countryside"
+SUBMAP_SIZES = "--size-m 20,100,200,300,400,500"
 
 
 @dataclass(frozen=True)
@@ -105,11 +108,13 @@ EXPERIMENTS = (
     _loops("loops-strangers", _STRANGE_DRIVES, "--reckon --seed 401", 5),
     _eval("loop-detectors", "loop-detectors --queries 250 --cloud-queries 60 --length-m 900 --seed 1 --jobs 2 --data DATA",
           25, ("tree_maps", "stem_censuses", "pole_maps", "victoria_park_raw")),
-    _eval("partition", f"partition {PARTITION} --size-m 20,100,200,300,400,500", 20),
-    _eval("partition-loop", f"partition-loop {PARTITION} --size-m 20,100,200,300,400,500", 5),
-    _eval("partition-dynamic", f"partition-dynamic {PARTITION}", 6),
-    _eval("partition-dynamic-loop", f"partition-dynamic-loop {PARTITION}", 3),
-    _eval("partition-designs", "partition --runs 20 --seed 1 --jobs 2 --routes road --size-m 5,20,100,500 --all-designs", 15),
+    _eval("partition", f"partition {TOWN} {SUBMAP_SIZES}", 6),
+    _eval("partition-dynamic", f"partition-dynamic {TOWN}", 3),
+    _eval("partition-loop", f"partition-loop {TOWN} {SUBMAP_SIZES}", 3),
+    _eval("partition-dynamic-loop", f"partition-dynamic-loop {TOWN}", 3),
+    _eval("partition-country", f"partition {COUNTRY} {SUBMAP_SIZES}", 5),
+    _eval("partition-dynamic-country", f"partition-dynamic {COUNTRY}", 3),
+    _eval("partition-designs", "partition --runs 3 --seed 1 --jobs 2 --routes road --size-m 5,20,100 --all-designs", 3),
     _eval("long-drive", "long-drive --runs 20 --seed 1 --length-m 1000 --size-m 5,10,20,40,100", 6),
     _eval("long-drive-loop", "long-drive-loop --runs 20 --seed 1 --size-m 5,10,20,40,100", 7),
     _eval("efficiency", "efficiency --drive-km 10 --stationary-h 2", 6),
