@@ -50,7 +50,7 @@ DetectorPointer constellation_search(const DetectorParameters& parameters) {
   return std::make_unique<detectors::ConstellationDetector>(parameters.constellation);
 }
 
-DetectorPointer stems(const DetectorParameters& parameters) {
+DetectorPointer stem_recogniser(const DetectorParameters& parameters) {
   return std::make_unique<detectors::StemDetector>(parameters.stems);
 }
 
@@ -67,7 +67,7 @@ constexpr std::array kDetectors{
     DetectorKind{"scan_context", true, scan_context},
     DetectorKind{"geometric_hierarchy", false, geometric_hierarchy},
     DetectorKind{"constellation", false, constellation_search},
-    DetectorKind{"stems", false, stems}};
+    DetectorKind{"stems", false, stem_recogniser}};
 
 const DetectorKind& detector_kind(std::string_view name) {
   std::string allowed;

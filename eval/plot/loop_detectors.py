@@ -1,4 +1,4 @@
-"""Plot of eval loop-detectors: python3 loop_detectors.py RESULTS.json
+"""Plot of eval loop-detectors: python3 loop_detectors.py RESULTS.json TRACES.json
 
 RESULTS.curves.png: precision over recall in each set; above the detectors alone, below every verifier behind the
 detector with which verifiers find most.
@@ -20,6 +20,7 @@ def draw(axis, rows, key):
         if row["curve"]:
             recall, precision = zip(*row["curve"])
             axis.plot(recall, precision, "-", color=colours(index % 10), linewidth=1.2, label=row[key])
+            axis.plot(recall[-1], precision[-1], "o", color=colours(index % 10), markersize=4)
         else:
             axis.plot([], [], color=colours(index % 10), label=row[key])
     axis.set_xlim(-0.02, 1.02)
@@ -39,8 +40,12 @@ def widest(rows):
 def main():
     file = pathlib.Path(sys.argv[1])
     rows = json.loads(file.read_text())["rows"]
+    curves = json.loads(pathlib.Path(sys.argv[2]).read_text())
+    for row, drawn in zip(rows, curves):
+        row["curve"] = drawn["curve"]
     sets = list(dict.fromkeys(row["set"] for row in rows if not row["is_tuning"])) or list(
         dict.fromkeys(row["set"] for row in rows))
+    sets = [name for name in sets if any(row["set"] == name and row["queries"] > 0 for row in rows)]
     chosen = widest(rows)
     figure, axes = plt.subplots(2 if chosen else 1, len(sets), figsize=(2.6 * len(sets) + 1.5, 5.6 if chosen else 3.2),
                                 squeeze=False, sharex=True, sharey=True)

@@ -241,7 +241,7 @@ def loop_queries(document):
 def loop_detectors(document):
     """Detectors alone, and behind each verifier: recall before the first wrong answer in every set; then all rows."""
     rows = [row for row in document["rows"] if not row["is_tuning"]]
-    sets = list(dict.fromkeys(row["set"] for row in rows))
+    sets = list(dict.fromkeys(row["set"] for row in rows if row["queries"] > 0))
     by_pair = {}
     for row in rows:
         by_pair.setdefault((row["detector"], row["verifier"]), {})[row["set"]] = row

@@ -22,7 +22,7 @@ Cube cube_of(const Eigen::Vector3d& point, double side_m) {
 }
 
 constexpr std::size_t kLeastNeighbours = 5;
-constexpr std::size_t kLeastIcpPairs = 4;
+constexpr std::size_t kLeastPartners = 4;
 /// Steps below these count as settled [m], [rad].
 constexpr double kSettledM = 1e-4;
 constexpr double kSettledRad = 1e-5;
@@ -90,7 +90,7 @@ class IcpRun {
   /// One round; false where too few points have a partner.
   bool step(double distance_m) {
     const NormalEquations sums = equations(distance_m, std::nullopt);
-    if (sums.pairs < kLeastIcpPairs) return false;
+    if (sums.pairs < kLeastPartners) return false;
     Eigen::Matrix4d information = sums.information;
     information.diagonal().array() += kPriorInformation;
     last_step_ = -information.ldlt().solve(sums.gradient);

@@ -118,14 +118,21 @@ nlohmann::json row_of(const NamedSet& set, const Answers& answers, double thresh
                      {"error_m_p50", tools::quantile(error_m, 0.5)},
                      {"ms_p50", tools::quantile(ms, 0.5)},
                      {"ms_p99", tools::quantile(ms, 0.99)},
-                     {"bytes_per_frame", answers.bytes_per_frame},
-                     {"curve", score.curve}};
+                     {"bytes_per_frame", answers.bytes_per_frame}};
   if (std::isfinite(threshold)) row["threshold"] = threshold;
   const double highest_wrong = highest_wrong_score(answers.answers);
   if (std::isfinite(highest_wrong)) row["highest_wrong_score"] = highest_wrong;
   if (score.queries_without_match > 0)
     row["wrong_bound_95_pct"] = 300.0 / static_cast<double>(score.queries_without_match);
   return row;
+}
+
+/// Recall and precision of a row, for the plot.
+nlohmann::json curve_of(const NamedSet& set, const Answers& answers) {
+  return {{"set", set.name},
+          {"detector", answers.detector},
+          {"verifier", answers.verifier},
+          {"curve", score_of(answers.answers, 0.0).curve}};
 }
 
 void print_heading() {
@@ -171,7 +178,8 @@ std::vector<Answers> answers_of(const NamedSet& named, const fs::path& path,
 
 /// Rows of one set; where it is for tuning, thresholds rise to its wrong answers.
 void run_set(const NamedSet& named, const fs::path& path, const LoopOptions& options,
-             const std::atomic<bool>& stop, Thresholds& thresholds, nlohmann::json& rows) {
+             const std::atomic<bool>& stop, Thresholds& thresholds, nlohmann::json& rows,
+             nlohmann::json& curves) {
   for (const Answers& answers : answers_of(named, path, options, stop)) {
     double& threshold = thresholds
                             .try_emplace({answers.detector, answers.verifier},
@@ -180,6 +188,7 @@ void run_set(const NamedSet& named, const fs::path& path, const LoopOptions& opt
     if (named.is_tuning) threshold = std::max(threshold, highest_wrong_score(answers.answers));
     if (options.threshold) threshold = *options.threshold;
     rows.push_back(row_of(named, answers, threshold));
+    curves.push_back(curve_of(named, answers));
     print_row(rows.back());
   }
 }
@@ -195,14 +204,17 @@ nlohmann::json config_of(const LoopOptions& options) {
           {"candidates", options.trial.candidates}};
 }
 
-void write_results(const LoopOptions& options, const nlohmann::json& rows) {
+void write_results(const LoopOptions& options, const nlohmann::json& rows,
+                   const nlohmann::json& curves) {
   harness::write_json(options.json,
                       harness::result_document("loop-detectors", config_of(options), rows));
+  harness::write_json(harness::traces_file(options.json), curves);
 }
 
 void run_loop_detectors(const LoopOptions& options) {
   const std::atomic<bool>& stop = terminal::catch_interrupts();
   nlohmann::json rows = nlohmann::json::array();
+  nlohmann::json curves = nlohmann::json::array();
   Thresholds thresholds;
   print_heading();
   for (const NamedSet& named : all_sets()) {
@@ -215,9 +227,9 @@ void run_loop_detectors(const LoopOptions& options) {
       fmt::print("{:<15} skipped: there is no {}\n", named.name, path.string());
       continue;
     }
-    run_set(named, path, options, stop, thresholds, rows);
+    run_set(named, path, options, stop, thresholds, rows, curves);
     // After each set: what is done is not lost.
-    if (!options.json.empty()) write_results(options, rows);
+    if (!options.json.empty()) write_results(options, rows, curves);
   }
   fmt::print(
       "match: queries with a frame within {:.0f} m, {} frames or more earlier; none: all others. "
@@ -227,7 +239,8 @@ void run_loop_detectors(const LoopOptions& options) {
       options.trial.radius_m, options.trial.frames_earlier, options.trial.pose_m,
       options.trial.pose_rad);
 
-  if (!options.json.empty() && options.plots) harness::plot("loop_detectors.py", {options.json});
+  if (!options.json.empty() && options.plots)
+    harness::plot("loop_detectors.py", {options.json, harness::traces_file(options.json).string()});
 }
 
 }  // namespace
