@@ -14,6 +14,7 @@
 #include "services/keyframer/adapter.hpp"
 #include "services/landmark_extractor/adapter.hpp"
 #include "services/lidar_imu_input/adapter.hpp"
+#include "services/loop_closer/adapter.hpp"
 #include "understory/map_request_t.hpp"
 
 namespace understory::eval::harness {
@@ -116,6 +117,7 @@ std::vector<bus::Service> front_end_services() {
 std::vector<bus::Service> services_of(const std::filesystem::path& config_dir) {
   std::vector<bus::Service> all = front_end_services();
   if (config_dir.empty()) return all;
+  all.push_back(loop_closer::loop_closer_service());
   std::set<std::string> started;
   for (const bus::ProcessEntry& entry : bus::read_launch_config(config_dir).processes) {
     if (entry.name == kSensorDriver || entry.name == kStore) continue;
