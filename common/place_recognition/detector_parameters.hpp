@@ -56,7 +56,8 @@ struct ConstellationDetectorParameters {
   double sigma_m = 0.05;         ///< Of a landmark's position, per axis, standard deviation.
   double max_range_m = 80.0;     ///< Landmarks farther away are left out.
   double max_distance_m = 12.0;  ///< Frames taken farther away are not looked for.
-  /// Frames before and after the one that is found, which are compared with the query by themselves.
+  /// Frames before and after the one that is found, which are compared with the query by
+  /// themselves.
   std::size_t reach = 8;
 };
 
