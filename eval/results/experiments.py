@@ -116,6 +116,7 @@ EXPERIMENTS = (
     _eval("partition-dynamic-country", f"partition-dynamic {COUNTRY}", 3),
     _eval("partition-designs", "partition --runs 3 --seed 1 --jobs 2 --routes road --size-m 5,20,100 --all-designs", 3),
     _eval("long-drive", "long-drive --runs 20 --seed 1 --length-m 1000 --size-m 5,10,20,40,100", 6),
+    _eval("long-drive-100km", "long-drive --runs 1 --seed 6 --length-m 100000 --size-m 20 --hand-over-m 300 --no-uncut --sections 10 --no-plots", 3),
     _eval("long-drive-loop", "long-drive-loop --runs 20 --seed 1 --size-m 5,10,20,40,100", 7),
     _eval("efficiency", "efficiency --drive-km 10 --stationary-h 2", 6),
     _eval("laps", "laps --laps 100 --length-m 317 --hours 24", 45),

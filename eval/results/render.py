@@ -273,6 +273,15 @@ def long_drive(document):
          for row in document["rows"]])
 
 
+def long_drive_sections(document):
+    """One drive, a line for each tenth of it."""
+    row = document["rows"][0]
+    lines = table(("up to km", "median ms", "p99 ms", "max ms", "resident MB"),
+                  [(number(1e-3 * one["end_m"], 0), *(number(one[key]) for key in ("ms_p50", "ms_p99", "ms_max")), number(one["rss_mb"], 0))
+                   for one in row["sections"]])
+    return lines + ["", f"Refused keyframes: {row['refused']}; mean NEES {number(row['mean_nees'])}; on the disk {number(row['disk_mb_per_km'])} MB per km."]
+
+
 def _interval(row, key, factor=100.0, digits=2):
     """A mean with the half width of its 95 % interval; "-" for no row."""
     if row is None or row["runs"] == 0:

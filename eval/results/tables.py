@@ -69,6 +69,7 @@ SECTIONS = (
      render.partition_all),
     ("partition-designs", "Ways to condense a submap", None, render.partition_designs),
     ("long-drive", "A road with its path condensed behind the vehicle", None, render.long_drive),
+    ("long-drive-100km", "100 km of road with submaps on the disk", None, render.long_drive_sections),
     ("long-drive-loop", "The same round a block of 700 m", None, render.long_drive),
     ("efficiency", "Time per keyframe", f"{GEOSLAM}, §5.5 (a figure only)", render.efficiency),
     ("laps", "Known ground: what must not grow", None, render.laps),
