@@ -71,8 +71,11 @@ _KITTI_00 = "--path DATA/pole_maps/seq00_traj.csv"
 _KITTI_02 = "--path DATA/pole_maps/seq02_traj.csv"
 _LOOP_DRIVES = (
     ("longleaf-laps", "DATA/tree_maps/longleaf.csv --length 1600 --seed 201"),
+    ("lansing-wander", "DATA/tree_maps/lansing.csv --path wander --length 2500 --seed 202"),
     ("lansing-34", "DATA/tree_maps/lansing.csv --path laps --length 1800 --seed 203 --seen 0.34"),
     ("bigwoods-kitti00", f"{_BIG_WOODS} {_KITTI_00} --seed 205 --seen 0.5 --spacing 4 --range 15"),
+    ("bigwoods-kitti02", f"{_BIG_WOODS} {_KITTI_02} --seed 206 --range 18"),
+    ("bei-kitti00", f"DATA/tree_maps/bei.csv {_KITTI_00} --seed 207"),
 )
 _STRANGE_DRIVES = tuple(
     (f"{wood}-{way}-{seed}", f"{stems} {path} --seed {seed} --seen {0.34 if seed % 2 else 0.64}")
@@ -104,7 +107,8 @@ EXPERIMENTS = (
     _eval("map-merge", "map-merge --trials 100 --drives 40 --seed 1 --jobs 2 --data DATA", 5,
           ("tree_maps", "stem_censuses")),
     _stem_frames(),
-    _loops("loops-blind", _LOOP_DRIVES, "--runs 2 --seed 301 --blind 0.1-0.45", 5),
+    _loops("loops", _LOOP_DRIVES, "--runs 3 --seed 301", 3),
+    _loops("loops-blind", _LOOP_DRIVES, "--runs 3 --seed 301 --blind 0.1-0.45", 3),
     _loops("loops-strangers", _STRANGE_DRIVES, "--reckon --seed 401", 5),
     _eval("loop-detectors", "loop-detectors --queries 250 --cloud-queries 60 --length-m 900 --seed 1 --jobs 2 --data DATA",
           25, ("tree_maps", "stem_censuses", "pole_maps", "victoria_park_raw")),

@@ -221,11 +221,15 @@ def loops(document):
         mean = lambda key: sum(row[key] for row in some) / len(some)
         total = lambda key: sum(row[key] for row in some)
         lines.append((drive, len(some), number(mean("length_m"), 0), number(mean("odometry_end_m"), 1),
-                      number(mean("error_without_m"), 3), number(mean("error_m"), 3), number(mean("error_batch_m"), 3),
-                      number(mean("error_m") / mean("error_batch_m"), 2), total("queries"), total("sent"), total("accepted"),
-                      total("wrong_accepted"), number(mean("search_ms_p50"), 1), number(max(row["largest_closure_ms"] for row in some), 0)))
-    return table(("drive", "runs", "length m", "odometry, end m", "without m", "with loop closer m", "batch m", "ratio", "queries",
-                  "sent", "accepted", "wrong", "search, median ms", "closing, most ms"), lines)
+                      number(mean("error_without_m"), 3), number(mean("error_m"), 3),
+                      number(mean("error_recognisable_m"), 3), number(mean("error_batch_m"), 3),
+                      number(mean("ate_m"), 3), number(mean("ate_recognisable_m"), 3), number(mean("ate_batch_m"), 3),
+                      number(mean("ate_m") / mean("ate_recognisable_m"), 2),
+                      total("queries"), total("sent"), total("accepted"), total("wrong_accepted"),
+                      number(mean("search_ms_p50"), 1), number(max(row["largest_closure_ms"] for row in some), 0)))
+    return table(("drive", "runs", "length m", "odometry, end m", "without m", "with loop closer m", "recognisable m", "batch m",
+                  "ATE m", "recognisable", "batch", "ATE ratio", "queries", "sent", "accepted", "wrong",
+                  "search, median ms", "closing, most ms"), lines)
 
 
 def loop_queries(document):

@@ -55,6 +55,7 @@ SECTIONS = (
     ("one-shot", "One-shot localisation in surveyed forests", None, render.one_shot),
     ("map-merge", "Two maps become one", None, render.map_merge),
     ("place-recognition", "Frames of stems found again", None, render.place_recognition),
+    ("loops", "Loops found while tracking goes on", None, render.loops),
     ("loops-blind", "Loops found while tracking goes on, no stem seen on a third of the way", None, render.loops),
     ("loops-strangers", "Queries that have no match", None, render.loop_queries),
     ("loop-detectors", "Loop detectors and verifiers", "named in the thesis on submaps, §2.4, without figures",

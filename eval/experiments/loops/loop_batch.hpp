@@ -8,9 +8,16 @@
 
 namespace understory::eval::experiments::loops {
 
+/// Which detections show one tree.
+enum class Association {
+  kTrue,         ///< All of them, as it is.
+  kRecognisable  ///< A tree that comes back into sight (100 m of path) is the one before only where
+                 ///< five trees of the last 40 m were there before: fewer could be anywhere.
+};
+
 /// Poses of all frames, first_T_vehicle, by least squares on all odometry and all detections with
-/// their true trees, from the true poses on. Detections count by the noise that their residuals
-/// show, whatever is stated. Throws std::runtime_error where it does not converge.
-std::vector<geometry::SE2> batch_poses(const LoopDrive& drive);
+/// their trees, from the true poses on. Detections count by the noise that their residuals show,
+/// whatever is stated. Throws std::runtime_error where it does not converge.
+std::vector<geometry::SE2> batch_poses(const LoopDrive& drive, Association association);
 
 }  // namespace understory::eval::experiments::loops

@@ -160,6 +160,7 @@ class LoopRun {
     const std::size_t frame = frame_of_.at(update.keyframe_sequence);
     if (update.status == kFirstMap) {
       ++score_.maps;
+      score_.first_frame = frame;
       map_T_first_ = update.map_T_vehicle * drive_.truth[frame].inverse();
     }
     if (update.status == kFirstMap || update.status == kUpdated) {

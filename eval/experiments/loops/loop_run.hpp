@@ -11,6 +11,7 @@ namespace understory::eval::experiments::loops {
 
 /// What became of a drive.
 struct LoopScore {
+  std::size_t first_frame = 0;  ///< The map begins there.
   std::size_t keyframes = 0;
   std::size_t placed = 0;  ///< By the mapper.
   std::size_t maps = 0;    ///< That it began.

@@ -37,13 +37,24 @@ bool is_of_this_pass(NodeIndex node, const SmoothingMapperParameters& parameters
          parameters.known_ground_m;
 }
 
+/// Whether landmarks tie the keyframe to the node. Without them the keyframe is only predicted to
+/// be there, and the motion that leads to the node would close a loop that nobody observed.
+bool holds(const Node& node, const Placement& placement) {
+  const auto common = std::count_if(
+      placement.associations.begin(), placement.associations.end(),
+      [&](const model::Association& pair) { return node.observations.contains(pair.landmark_id); });
+  return static_cast<std::size_t>(common) >= kHold;
+}
+
 /// The node for the keyframe, an old or a new one, and the keyframe in its frame.
 FusedKeyframe enter(const model::Keyframe& arrived, const Placement& placement,
                     const SmoothingMapperParameters& parameters, GlobalMap& map) {
   const geometry::SE2& map_T_centre = placement.map_T_centre.mean;
   const auto revisited = map.trajectory.revisited(map_T_centre * middle_of(arrived), map.graph);
-  const bool may_fold = revisited && (map.trajectory.is_stationary(arrived) ||
-                                      is_of_this_pass(*revisited, parameters, map.graph));
+  const bool may_fold =
+      revisited &&
+      (is_of_this_pass(*revisited, parameters, map.graph) ||
+       (map.trajectory.is_stationary(arrived) && holds(map.graph.node(*revisited), placement)));
   map.graph.checkpoint();
 
   FusedKeyframe fused;

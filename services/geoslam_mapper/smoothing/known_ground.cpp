@@ -1,6 +1,7 @@
 #include "services/geoslam_mapper/smoothing/known_ground.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace understory::geoslam_mapper::smoothing {
@@ -14,13 +15,17 @@ constexpr std::size_t kStay = 4;
 constexpr double kAnotherPass = 10.0;
 /// So much of what the node observed must be known from there.
 constexpr double kKnownShare = 0.5;
-/// So many landmarks in common hold a node that no motion ties to others.
-constexpr std::size_t kHold = 3;
-
 std::size_t count_common(const Node& a, const Node& b) {
   return static_cast<std::size_t>(
       std::count_if(a.observations.begin(), a.observations.end(),
                     [&](const auto& entry) { return b.observations.contains(entry.first); }));
+}
+
+/// Landmarks in common that the older node must have: half of them, and enough to hold the node.
+/// One that observed little hangs on its motions, and these are the only ties of the path there.
+std::size_t least_common(const Node& here) {
+  const double half = kKnownShare * static_cast<double>(here.observations.size());
+  return std::max(kHold, static_cast<std::size_t>(std::ceil(half)));
 }
 
 }  // namespace
@@ -84,7 +89,7 @@ void KnownGround::judge(NodeIndex node, const GlobalMap& map, Surplus& surplus) 
   const auto reference = reference_of(node, map);
   if (!reference) return;
   const Node& there = map.graph.node(*reference);
-  if (!there.motions.empty() && count_common(map.graph.node(node), there) >= kHold) {
+  if (!there.motions.empty()) {
     surplus.loose.push_back(node);
   } else if (auto into_T_node = map.graph.relative(*reference, node)) {
     surplus.nodes.push_back({node, *reference, *std::move(into_T_node)});
@@ -95,6 +100,7 @@ void KnownGround::judge(NodeIndex node, const GlobalMap& map, Surplus& surplus) 
 /// is one.
 std::optional<NodeIndex> KnownGround::reference_of(NodeIndex node, const GlobalMap& map) const {
   const Node& here = map.graph.node(node);
+  const std::size_t least = least_common(here);
   const Eigen::Vector2d here_m = map.graph.pose(node).translation();
   std::optional<NodeIndex> best;
   std::pair<bool, double> best_rank{true, radius_m_};
@@ -107,8 +113,7 @@ std::optional<NodeIndex> KnownGround::reference_of(NodeIndex node, const GlobalM
             is_recent(other)) {
           return;
         }
-        const auto common = static_cast<double>(count_common(here, there));
-        if (common < kKnownShare * static_cast<double>(here.observations.size())) return;
+        if (count_common(here, there) < least) return;
 
         best = other;
         best_rank = rank;

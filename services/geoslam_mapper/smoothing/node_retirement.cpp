@@ -65,21 +65,40 @@ void PoseGraph::take_motions_out(const Retirement& retirement, const Surplus& su
     const NodeIndex from = index(measured.a);
     const NodeIndex to = index(measured.b);
     std::erase(edit(from == retirement.node ? to : from).motions, ref);
-    const bool goes_on = from == retirement.node && stays_tied(to, surplus) &&
-                         nodes_[to].along_m > nodes_[retirement.node].along_m;
-    if (goes_on) begin_motion_at(retirement, to, measured);
+    if (leads_away(retirement.node, from, to, surplus)) {
+      begin_motion_at(retirement, to, measured);
+    } else if (leads_in(retirement.node, from, to, surplus)) {
+      end_motion_at(retirement, from, measured);
+    }
   }
 }
 
-/// A motion from the node to a later one that is tied to it stays.
+/// Whether the motion goes from the node to a later one that stays tied.
+bool PoseGraph::leads_away(NodeIndex node, NodeIndex from, NodeIndex to,
+                           const Surplus& surplus) const {
+  return from == node && stays_tied(to, surplus) && nodes_[to].along_m > nodes_[node].along_m;
+}
+
+/// Whether the motion, taken out of `from`, comes from an earlier node that hangs on its motions:
+/// where the vehicle comes back from unknown ground, this one closes the loop. A node that other
+/// motions no more lead to was made loose itself.
+bool PoseGraph::leads_in(NodeIndex node, NodeIndex from, NodeIndex to,
+                         const Surplus& surplus) const {
+  return to == node && stays_tied(from, surplus) && !nodes_[from].motions.empty() &&
+         nodes_[from].along_m < nodes_[node].along_m;
+}
+
+/// Motions between the node and those that stay tied are kept.
 void PoseGraph::loosen(NodeIndex node, const Surplus& surplus) {
   const std::vector<MotionRef> motions = nodes_[node].motions;
   for (const MotionRef ref : motions) {
     const auto [from, to] = ends_of(ref);
-    const bool goes_on =
-        from == node && stays_tied(to, surplus) && nodes_[to].along_m > nodes_[node].along_m;
-    if (goes_on) continue;
+    if (leads_away(node, from, to, surplus)) continue;
     std::erase(edit(from).motions, ref);
+    if (leads_in(node, from, to, surplus)) {
+      edit(from).motions.push_back(ref);
+      continue;
+    }
     std::erase(edit(to).motions, ref);
     take_motion_out(ref);
   }
@@ -135,6 +154,15 @@ void PoseGraph::begin_motion_at(const Retirement& retirement, NodeIndex to,
   link({nodes_[retirement.into].centre, nodes_[to].centre, into_T_to.mean,
         into_T_to.covariance.inverse()},
        retirement.into, to);
+}
+
+void PoseGraph::end_motion_at(const Retirement& retirement, NodeIndex from,
+                              const plane::RelativePose& measured) {
+  const geometry::SE2WithCovariance motion{measured.a_T_b, measured.information.inverse()};
+  const geometry::SE2WithCovariance from_T_into = compound(motion, inverse(retirement.into_T_node));
+  link({nodes_[from].centre, nodes_[retirement.into].centre, from_T_into.mean,
+        from_T_into.covariance.inverse()},
+       from, retirement.into);
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -33,6 +33,9 @@ struct MotionRef {
   }
 };
 
+/// So many landmarks that both observed hold a node to another one without a motion between them.
+inline constexpr std::size_t kHold = 3;
+
 /// A pose of the graph: the centre of one keyframe, or of several that were folded together.
 struct Node {
   factor_graph::plane::PoseId centre{};
@@ -368,6 +371,10 @@ class PoseGraph {
   void add_motions_of(NodeIndex node, Part& part) const;
   void add_motion(MotionRef ref, factor_graph::plane::PoseId a, factor_graph::plane::PoseId b,
                   Part& part) const;
+  bool leads_away(NodeIndex node, NodeIndex from, NodeIndex to, const Surplus& surplus) const;
+  bool leads_in(NodeIndex node, NodeIndex from, NodeIndex to, const Surplus& surplus) const;
+  void end_motion_at(const Retirement& retirement, NodeIndex from,
+                     const factor_graph::plane::RelativePose& measured);
   void begin_motion_at(NodeIndex into, const Part::Outer& outer,
                        const factor_graph::plane::CondensedMotion& condensed);
   void take_out(NodeIndex node);
