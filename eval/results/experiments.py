@@ -87,8 +87,8 @@ _STRANGE_DRIVES = tuple(
 def _loops(name, drives, options, minutes):
     """Drives of stem frames that come back, with the loop closer and without, and the batch solution. Nothing was tuned on
     these seeds."""
-    made = tuple(f"understory sim stem-frames {what} --out OUT/loop-frames/{drive}" for drive, what in drives)
-    folders = " ".join(f"OUT/loop-frames/{drive}" for drive, _ in drives)
+    made = tuple(f"understory sim stem-frames {what} --out OUT/{name}-frames/{drive}" for drive, what in drives)
+    folders = " ".join(f"OUT/{name}-frames/{drive}" for drive, _ in drives)
     return _eval(name, f"loops {folders} {options} --jobs 2", minutes, ("tree_maps", "stem_censuses", "pole_maps"), before=made)
 
 
