@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/model/ekf_output.hpp"
+#include "common/model/existence.hpp"
 #include "common/model/gnss.hpp"
 #include "common/model/imu.hpp"
 #include "common/model/keyframe.hpp"
@@ -25,6 +26,8 @@
 #include "understory/ekf_level_t.hpp"
 #include "understory/ekf_map_t.hpp"
 #include "understory/ekf_pose_t.hpp"
+#include "understory/existence_state_t.hpp"
+#include "understory/existence_t.hpp"
 #include "understory/gnss_t.hpp"
 #include "understory/imu_t.hpp"
 #include "understory/keyframe2_t.hpp"
@@ -87,6 +90,10 @@ Result<model::MapCorrection> from_wire(const map_correction_t& wire);
 Result<model::LoopClosure> from_wire(const loop_closure_t& wire);
 /// What became of a loop closure.
 Result<model::LoopResult> from_wire(const loop_result_t& wire);
+/// Whether landmarks are still there.
+Result<model::Existence> from_wire(const existence_t& wire);
+/// What the existence tracker goes on with; refused where the hash is not that of its bytes.
+Result<model::ExistenceState> from_wire(const existence_state_t& wire);
 /// A scan of one plane; where the laser sits and the intensities are left out.
 Result<model::PlanarScan> from_wire(const lidar_scan_t& wire);
 /// A reading of wheel encoder and steering sensor.
@@ -136,6 +143,10 @@ map_correction_t to_wire(const model::MapCorrection& correction);
 loop_closure_t to_wire(const model::LoopClosure& closure);
 /// What became of a loop closure.
 loop_result_t to_wire(const model::LoopResult& result);
+/// Whether landmarks are still there.
+existence_t to_wire(const model::Existence& existence);
+/// What the existence tracker goes on with.
+existence_state_t to_wire(const model::ExistenceState& state);
 /// A scan of one plane.
 lidar_scan_t to_wire(const model::PlanarScan& scan);
 /// A reading of wheel encoder and steering sensor.

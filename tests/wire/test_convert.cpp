@@ -139,6 +139,29 @@ TEST_CASE("submaps and closures survive the wire") {
   }
 }
 
+TEST_CASE("existence survives the wire") {
+  Maker make(9);
+  for (int round = 0; round < 20; ++round) {
+    model::Existence existence{40, 2, 3, round % 2 == 0, {}, 9, 2, 0.25, 0.5, round % 3 == 0};
+    model::ExistenceState state{40, 2, 3, {}, std::string("\0model\xff", 7), {}};
+    for (std::size_t i = 0; i < make.count(); ++i) {
+      existence.landmarks.push_back({10 + 3 * i, 0.5, i % 2 == 0});
+      state.landmarks.push_back(existence.landmarks.back());
+      state.states += std::string("\0\x01\xff", 3);
+    }
+    check_round_trip(existence);
+    check_round_trip(state);
+
+    auto damaged = to_wire(state);
+    damaged.model.front() = 7;
+    CHECK(from_wire(damaged).refusal().reason == Reason::kInconsistent);
+    existence.landmarks = {{5, 0.5, true}, {5, 0.5, true}};
+    CHECK(from_wire(to_wire(existence)).refusal().reason == Reason::kInconsistent);
+    existence.landmarks = {{5, 1.5, true}};
+    CHECK_FALSE(from_wire(to_wire(existence)));
+  }
+}
+
 TEST_CASE("sensor values survive the wire") {
   model::PlanarScan scan{100, 5, -1.5, 0.01, 80.0, {1.0F, 0.0F, 90.0F, 80.5F}};
   const auto back = decode_message<model::PlanarScan>(encode_message(scan));
