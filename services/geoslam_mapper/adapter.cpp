@@ -197,6 +197,9 @@ class MapperAdapter : public bus::Adapter {
     node.subscribe<model::LoopClosure>(channels_.loop_closure,
                                        [this](const model::LoopClosure& closure) { take(closure); },
                                        {.queue_size = 200, .sequenced = false, .timed = false});
+    node.subscribe<model::Existence>(channels_.existence,
+                                     [this](const model::Existence& one) { stage_->take(one); },
+                                     {.queue_size = 200});
   }
 
   void take(const model::LoopClosure& closure) { results_.publish(stage_->take(closure)); }
@@ -431,9 +434,10 @@ bus::Service geoslam_mapper_service(const MapperChannels& channels) {
           channels.keyframe + ", " + channels.landmarks + ", " + channels.odometry + ", " +
               channels.ekf_pose + ", " + channels.ekf_level + ", " + channels.given_map + ", " +
               channels.submap_stored + ", " + channels.submap_reply + ", " + channels.loop_closure +
-              " -> " + channels.slam_pose + ", " + channels.slam_update + ", " + channels.map +
-              ", " + channels.map_delta + ", " + channels.submap + ", " + channels.submap_query +
-              ", " + channels.map_correction + ", " + channels.loop_result,
+              ", " + channels.existence + " -> " + channels.slam_pose + ", " +
+              channels.slam_update + ", " + channels.map + ", " + channels.map_delta + ", " +
+              channels.submap + ", " + channels.submap_query + ", " + channels.map_correction +
+              ", " + channels.loop_result,
           [channels] { return std::make_unique<MapperAdapter>(channels); }};
 }
 

@@ -20,6 +20,7 @@ struct MapperChannels {
   std::string submap_stored = "SUBMAP_STORED";
   std::string submap_reply = "SUBMAP_REPLY";
   std::string loop_closure = "LOOP_CLOSURE";
+  std::string existence = "EXISTENCE";
   // Out.
   std::string slam_pose = "SLAM_POSE";
   std::string slam_update = "SLAM_UPDATE";

@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
           .submap_stored = "SUBMAP_STORED",    // in: the store has what was handed over
           .submap_reply = "SUBMAP_REPLY",      // in: a submap that was asked for
           .loop_closure = "LOOP_CLOSURE",      // in: two places and how one lies to the other
+          .existence = "EXISTENCE",            // in: landmarks that are taken for gone
           .slam_pose = "SLAM_POSE",            // out: the vehicle's pose at each sweep
           .slam_update = "SLAM_UPDATE",        // out: what became of each keyframe
           .map = "MAP",                        // out: the whole map, rarely and on request

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/model/ekf_output.hpp"
+#include "common/model/existence.hpp"
 #include "common/model/keyframe.hpp"
 #include "common/model/map.hpp"
 #include "common/model/odometry.hpp"
@@ -87,6 +88,10 @@ class MapperMethod {
 
   /// Where the submaps are that were ever given away, in order of id. O(submaps).
   virtual std::vector<model::SubmapPose> submap_poses() const { return {}; }
+
+  /// Which landmarks are taken for gone: they are kept, but nothing is placed by them. Those that
+  /// the map does not have are passed over.
+  virtual void take(const model::Existence& /*existence*/) {}
 
   /// Takes a loop closure of the map in use, or takes one back; the answer says what became of it.
   virtual model::LoopResult take(const model::LoopClosure& closure) {

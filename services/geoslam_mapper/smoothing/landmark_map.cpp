@@ -43,13 +43,24 @@ model::LandmarkId LandmarkMap::insert(StoredLandmark landmark) {
 
 void LandmarkMap::put(const StoredLandmark& landmark) {
   landmarks_[landmark.id] = landmark;
-  index_.insert(landmark.id, landmark.position_m);
+  index_of(landmark).insert(landmark.id, landmark.position_m);
   changed_.push_back(landmark.id);
 }
 
 void LandmarkMap::remove(model::LandmarkId id) {
   landmarks_.erase(id);
   index_.remove(id);
+  unused_index_.remove(id);
+}
+
+void LandmarkMap::set_in_use(model::LandmarkId id, bool is_in_use) {
+  const auto found = landmarks_.find(id);
+  if (found == landmarks_.end() || found->second.is_unused != is_in_use) return;
+  StoredLandmark& landmark = found->second;
+  index_of(landmark).remove(id);
+  landmark.is_unused = !is_in_use;
+  landmark.is_late = false;
+  index_of(landmark).insert(id, landmark.position_m);
 }
 
 StoredLandmark LandmarkMap::put_away(model::LandmarkId id) {
@@ -69,6 +80,7 @@ std::vector<StoredLandmark> LandmarkMap::release() {
   for (auto& [id, landmark] : landmarks_) released.push_back(std::move(landmark));
   landmarks_.clear();
   index_ = {};
+  unused_index_ = {};
   late_.clear();
   return released;
 }
@@ -78,11 +90,12 @@ void LandmarkMap::move(model::LandmarkId id, const Eigen::Vector2d& position_m) 
   landmark.position_m = position_m;
   changed_.push_back(id);
 
-  const std::optional<Eigen::Vector2d> indexed = index_.position(id);
+  constellation::ConstellationMap& index = index_of(landmark);
+  const std::optional<Eigen::Vector2d> indexed = index.position(id);
   if (!indexed) return;
   const double distance = (*indexed - position_m).norm();
   if (distance > kStaleness_m) {
-    index_.move(id, position_m);
+    index.move(id, position_m);
   } else if (distance > kIndexTolerance_m && !landmark.is_late) {
     landmark.is_late = true;
     late_.push_back(id);
@@ -95,9 +108,10 @@ void LandmarkMap::catch_up() {
     if (found == landmarks_.end()) continue;
 
     found->second.is_late = false;
-    const std::optional<Eigen::Vector2d> indexed = index_.position(id);
+    constellation::ConstellationMap& index = index_of(found->second);
+    const std::optional<Eigen::Vector2d> indexed = index.position(id);
     if (indexed && (*indexed - found->second.position_m).norm() > kIndexTolerance_m)
-      index_.move(id, found->second.position_m);
+      index.move(id, found->second.position_m);
   }
   late_.clear();
 }
@@ -116,8 +130,10 @@ void LandmarkMap::mark_all_changed() {
 std::vector<Eigen::Vector2d> LandmarkMap::indexed_positions() const {
   std::vector<Eigen::Vector2d> result;
   result.reserve(landmarks_.size());
-  for (const auto& [id, landmark] : landmarks_)
-    result.push_back(index_.position(id).value_or(landmark.position_m));
+  for (const auto& [id, landmark] : landmarks_) {
+    const constellation::ConstellationMap& index = landmark.is_unused ? unused_index_ : index_;
+    result.push_back(index.position(id).value_or(landmark.position_m));
+  }
   return result;
 }
 
@@ -125,8 +141,9 @@ void LandmarkMap::rebuild_index(const std::vector<Eigen::Vector2d>& indexed_m) {
   if (indexed_m.size() != landmarks_.size())
     throw std::invalid_argument("mapper state: its index does not fit its landmarks");
   index_ = {};
+  unused_index_ = {};
   auto position = indexed_m.begin();
-  for (const auto& [id, landmark] : landmarks_) index_.insert(id, *position++);
+  for (const auto& [id, landmark] : landmarks_) index_of(landmark).insert(id, *position++);
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -31,7 +31,8 @@ struct StoredLandmark {
   /// kMostViews.
   std::vector<float> views_m;
   model::LandmarkKind kind = model::LandmarkKind::kTrunk;
-  bool is_late = false;  ///< Its place in the index is older than its position.
+  bool is_late = false;    ///< Its place in the index is older than its position.
+  bool is_unused = false;  ///< Taken for gone: it has a place in the index of those alone.
 
   /// Variance [m^2] of the position relative to the keyframes that observed it.
   double local_variance() const { return 1.0 / information; }
@@ -64,7 +65,7 @@ struct StoredLandmark {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
     a(s.id, s.position_m, s.prior_covariance, s.information, s.radius_m, s.observation_count,
-      s.last_keyframe, s.nodes, s.views_m, s.kind, s.is_late);
+      s.last_keyframe, s.nodes, s.views_m, s.kind, s.is_late, s.is_unused);
   }
 };
 
@@ -104,8 +105,13 @@ class LandmarkMap {
   /// Whether there is no landmark.
   bool empty() const { return landmarks_.empty(); }
 
-  /// Index over all landmarks; positions in it may be off by kStaleness_m.
+  /// Index over the landmarks in use; positions in it may be off by kStaleness_m.
   const constellation::ConstellationMap& index() const { return index_; }
+  /// Index over those that are taken for gone: nothing is placed by them, but who sees one again
+  /// names it.
+  const constellation::ConstellationMap& unused_index() const { return unused_index_; }
+  /// Whether the landmark is to be used. Passed over where there is no such landmark.
+  void set_in_use(model::LandmarkId id, bool is_in_use);
   /// Brings the index to within a centimetre, before a search by descriptors. O(what moved).
   void catch_up();
 
@@ -135,11 +141,15 @@ class LandmarkMap {
 
  private:
   void put(const StoredLandmark& landmark);
+  constellation::ConstellationMap& index_of(const StoredLandmark& landmark) {
+    return landmark.is_unused ? unused_index_ : index_;
+  }
   std::vector<Eigen::Vector2d> indexed_positions() const;
   void rebuild_index(const std::vector<Eigen::Vector2d>& indexed_m);
 
   std::map<model::LandmarkId, StoredLandmark> landmarks_;
   constellation::ConstellationMap index_;
+  constellation::ConstellationMap unused_index_;
   std::vector<model::LandmarkId> late_;     ///< Those with is_late, and some removed ones.
   std::vector<model::LandmarkId> changed_;  ///< With repetitions.
   std::vector<model::LandmarkId> loose_;    ///< Ascending.

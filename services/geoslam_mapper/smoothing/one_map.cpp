@@ -6,6 +6,7 @@
 
 #include "services/geoslam_mapper/smoothing/absorbed_map.hpp"
 #include "services/geoslam_mapper/smoothing/filter_gate.hpp"
+#include "services/geoslam_mapper/smoothing/gone_landmarks.hpp"
 #include "services/geoslam_mapper/smoothing/unseen.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
@@ -27,6 +28,13 @@ std::vector<model::LandmarkId> ids_of(std::span<const model::Association> pairs)
   ids.reserve(pairs.size());
   for (const model::Association& pair : pairs) ids.push_back(pair.landmark_id);
   return ids;
+}
+
+/// What is named and not used, in order of the keyframe's landmarks.
+void add_gone(std::span<const model::Association> gone, model::MapUpdate& update) {
+  if (gone.empty()) return;
+  update.associations.insert(update.associations.end(), gone.begin(), gone.end());
+  std::ranges::stable_sort(update.associations, {}, &model::Association::keyframe_landmark);
 }
 
 /// All bases are tied to one node: the graph is not solved any more, so nothing moves it.
@@ -96,6 +104,9 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
 
   // A given map stays as it is.
   if (parameters_.localisation_only) {
+    add_gone(name_gone(keyframe, placement->map_T_centre.mean, update.associations, parameters_,
+                       map_.landmarks),
+             update);
     keep_pose(keyframe, *placement, map_);
     report(keyframe, update);
     return with(kUpdated, {}, std::move(update));
@@ -109,7 +120,9 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
   update.degrees_of_freedom = fused.degrees_of_freedom;
   if (!fused.ok) return with(kRolledBack, fused.reason, std::move(update));
   closures_.hand_over(known_ground_.follow(fused, discovery_, merging_.merges(), map_));
-  extend(fused, update);
+  const std::vector<model::Association> gone = name_gone(
+      fused.keyframe, map_.graph.pose(fused.node), fused.associations, parameters_, map_.landmarks);
+  extend(fused, gone, update);
   const std::vector<Retirement> condensed =
       condensing_.follow(fused, known_ground_, discovery_, merging_.merges(), map_);
   closures_.hand_over(condensed);
@@ -178,16 +191,21 @@ std::optional<Placement> OneMap::place(const model::Keyframe& keyframe,
   return placement;
 }
 
-/// New landmarks of a fused keyframe, and landmarks that are merged or separated.
-void OneMap::extend(const FusedKeyframe& fused, model::MapUpdate& update) {
+/// New landmarks of a fused keyframe, and landmarks that are merged or separated. `gone`: what was
+/// seen where a landmark stands that is not in use; it is none of the new ones.
+void OneMap::extend(const FusedKeyframe& fused, std::span<const model::Association> gone,
+                    model::MapUpdate& update) {
+  std::vector<model::Association> known = fused.associations;
+  known.insert(known.end(), gone.begin(), gone.end());
   for (const model::Association& pair :
-       discovery_.update(fused.keyframe, fused.node, fused.associations, map_)) {
+       discovery_.update(fused.keyframe, fused.node, known, map_)) {
     update.associations.push_back(pair);
     update.added.push_back(pair.landmark_id);
   }
   MergingResult merging = merging_.follow(fused, update.associations, map_);
   update.merged = std::move(merging.merged);
   if (merging.separated) update.added.push_back(*merging.separated);
+  add_gone(gone, update);
 }
 
 /// The pose of an accepted keyframe; motion and single scans go on from there.
@@ -265,6 +283,11 @@ bool OneMap::rejoin(GlobalMap left, const Overlap& overlap, model::MapUpdate& up
   std::ranges::move(pairs, std::back_inserter(update.merged));
   update.reason = "map " + std::to_string(overlap.map_id) + " is part of this one";
   return true;
+}
+
+void OneMap::take(const model::Existence& existence) {
+  for (const model::LandmarkExistence& one : existence.landmarks)
+    map_.landmarks.set_in_use(one.id, one.is_in_use);
 }
 
 bool OneMap::reaches(const model::Keyframe& keyframe) const {

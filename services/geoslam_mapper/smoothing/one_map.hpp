@@ -91,6 +91,8 @@ class OneMap {
   /// Takes a loop closure, or takes one back; see Closures. A keyframe that was handed over is an
   /// end by its submap only.
   Closures::Decision take(const model::LoopClosure& closure);
+  /// Which landmarks are to be used from now on; those that are not in the map are passed over.
+  void take(const model::Existence& existence);
   /// Makes a map that was left part of this one, where the landmarks that are in both are the same.
   /// `update` lists what came and what became one. False where the two contradict each other: this
   /// map is broken then. Cost: the other map, and an update of all between the two.
@@ -112,7 +114,8 @@ class OneMap {
   std::optional<Placement> place(const model::Keyframe& keyframe,
                                  const std::optional<Prediction>& prediction,
                                  model::MapUpdate& update);
-  void extend(const FusedKeyframe& fused, model::MapUpdate& update);
+  void extend(const FusedKeyframe& fused, std::span<const model::Association> gone,
+              model::MapUpdate& update);
   std::optional<ClosureEnd> end_of(const model::LoopEnd& end) const;
   void confirm(const model::Keyframe& keyframe, model::MapUpdate& update);
   void report(const model::Keyframe& keyframe, model::MapUpdate& update);

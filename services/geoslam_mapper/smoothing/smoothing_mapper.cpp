@@ -10,7 +10,7 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-constexpr state::Format kFormat{"geoslam_mapper.smoothing", 15};
+constexpr state::Format kFormat{"geoslam_mapper.smoothing", 16};
 constexpr state::Format kCopyFormat{"geoslam_mapper.smoothing.copy", 1};
 /// Two keyframes contradict each other where their motion in a trial map differs from the tracked
 /// one by more than so many of its standard deviations.
@@ -190,6 +190,11 @@ model::LoopResult SmoothingMapper::take(const model::LoopClosure& closure) {
   result.status = decision.status;
   result.reason = std::move(decision.reason);
   return result;
+}
+
+/// Of another map than the one in use there is nothing to place.
+void SmoothingMapper::take(const model::Existence& existence) {
+  if (existence.map_id == current_.map().landmarks.map_id()) current_.take(existence);
 }
 
 std::string SmoothingMapper::save() const { return state::save(kFormat, *this); }

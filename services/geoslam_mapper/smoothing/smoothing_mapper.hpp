@@ -54,6 +54,7 @@ class SmoothingMapper final : public MapperMethod {
     return current_.submaps().poses(current_.map().graph);
   }
   model::LoopResult take(const model::LoopClosure& closure) override;
+  void take(const model::Existence& existence) override;
   /// From now on the factors of each stretch of the path that is condensed are kept until they are
   /// taken: an expand() of them is the drive uncut. See Condensing.
   void keep_stretches() { current_.keep_stretches(); }

@@ -12,7 +12,7 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-constexpr state::Format kSubmapFormat{"geoslam_mapper.smoothing.submap", 1};
+constexpr state::Format kSubmapFormat{"geoslam_mapper.smoothing.submap", 2};
 /// The vehicle drives so far [m] from one look around to the next.
 constexpr double kBetweenLooks_m = 10.0;
 /// A submap's landmarks may lie so far [m] from its node, beside the sensor's range.

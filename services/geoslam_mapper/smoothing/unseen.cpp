@@ -39,13 +39,14 @@ std::vector<model::LandmarkId> expected_unseen(const model::Keyframe& keyframe,
       return keyframe.field_of_view.contains(member.centre_T_vehicle.inverse() * position_m);
     });
   };
-  landmarks.index().for_each_within(
-      map_T_centre.translation(), keyframe.field_of_view.max_range_m + kViewSlack_m,
-      [&](model::LandmarkId id, const Eigen::Vector2d&, double) {
-        if (std::ranges::binary_search(seen, id) || landmarks.is_loose(id)) return;
-        const Eigen::Vector2d in_centre = centre_T_map * landmarks.at(id).position_m;
-        if (is_in_view(in_centre)) missed.emplace_back(in_centre.norm(), id);
-      });
+  const auto look_for = [&](model::LandmarkId id, const Eigen::Vector2d&, double) {
+    if (std::ranges::binary_search(seen, id) || landmarks.is_loose(id)) return;
+    const Eigen::Vector2d in_centre = centre_T_map * landmarks.at(id).position_m;
+    if (is_in_view(in_centre)) missed.emplace_back(in_centre.norm(), id);
+  };
+  const double reach_m = keyframe.field_of_view.max_range_m + kViewSlack_m;
+  landmarks.index().for_each_within(map_T_centre.translation(), reach_m, look_for);
+  landmarks.unused_index().for_each_within(map_T_centre.translation(), reach_m, look_for);
 
   if (missed.size() > kMostExpected) {
     std::ranges::sort(missed);

@@ -13,8 +13,9 @@ namespace understory::geoslam_mapper::smoothing {
 inline constexpr std::size_t kMostExpected = 1000;
 
 /// Landmarks in the field of view of every scan of the keyframe with none of the `associations`,
-/// ascending; of too many the nearest. Without those that are loose: what was seen may be one of
-/// them. `map_T_centre`: where the keyframe is. O(landmarks in range).
+/// ascending; of too many the nearest. Those that are not in use are among them. Without those that
+/// are loose: what was seen may be one of them. `map_T_centre`: where the keyframe is. O(landmarks
+/// in range).
 std::vector<model::LandmarkId> expected_unseen(const model::Keyframe& keyframe,
                                                const geometry::SE2& map_T_centre,
                                                std::span<const model::Association> associations,
