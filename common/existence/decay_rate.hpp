@@ -3,9 +3,15 @@
 
 namespace understory::existence {
 
-/// Gamma posterior over lambda: points that went, over the time that points were there. Counts are
-/// expected ones, so a point that may have gone counts for what it may (one step of EM per
-/// interval).
+/// What a point adds to the counts since it was last surely seen.
+struct DecayEvidence {
+  float went = 0.0F;     ///< Probability that it went since then: 1 - P.
+  float since_s = 0.0F;  ///< How long ago that was.
+};
+
+/// Gamma posterior over lambda: points that went, over the time that points were there. A point
+/// that may have gone counts for what it may, until more is known: then what it counted is taken
+/// back (EM, one point at a time, with the posterior of now and not of then).
 class DecayRate {
  public:
   /// `weight`: what the start value counts for, in points that went; 0: it stays as it is.
@@ -16,9 +22,9 @@ class DecayRate {
   /// Its standard deviation [1/s]; 0 where the rate is not learned.
   double sigma_per_s() const;
 
-  /// An interval of one point: P before the looks at its end (time already passed), P after them,
-  /// how long it was [s].
-  void record(double before, double after, double dt_s);
+  /// What a point's evidence was and is. When it is surely seen, `is` is {0, since} and its next
+  /// `was` is {}.
+  void replace(const DecayEvidence& was, const DecayEvidence& is);
 
   double went() const { return went_; }              ///< Expected points.
   double exposure_s() const { return exposure_s_; }  ///< Point seconds.

@@ -50,8 +50,8 @@ class ExistenceModel {
 
   /// P of a point at its first sighting: the share of earlier new points that were real.
   double birth() const { return births_.mean(); }
-  /// What became of a new point.
-  void record_birth(bool is_real) { births_.add(is_real ? 1.0 : 0.0, is_real ? 0.0 : 1.0); }
+  /// What a new point seems to be after its first pass: the probability that it is real.
+  void record_birth(double is_real) { births_.add(is_real, 1.0 - is_real); }
 
   float rest_odds() const { return rest_odds_; }  ///< Of the visibility.
   double false_rate() const { return parameters_.false_rate; }

@@ -9,6 +9,22 @@
 #include "common/existence/odds.hpp"
 
 namespace understory::existence {
+namespace {
+
+void check_odds(double odds) {
+  if (!std::isfinite(odds) || odds <= 0.0)
+    throw std::invalid_argument("existence: odds of a patch's member, allowed: finite, above 0");
+}
+
+std::array<double, 3> normalised(std::array<double, 3> logs) {
+  const double most = *std::max_element(logs.begin(), logs.end());
+  double sum = 0.0;
+  for (double& log : logs) sum += log = std::exp(log - most);
+  for (double& weight : logs) weight /= sum;
+  return logs;
+}
+
+}  // namespace
 
 Patch::Patch(const PatchParameters& parameters) : parameters_(parameters) {
   for (const double share : {parameters.cleared, parameters.gone_in_it, parameters.occluded,
@@ -17,60 +33,50 @@ Patch::Patch(const PatchParameters& parameters) : parameters_(parameters) {
       throw std::invalid_argument("existence: parameters of a patch, allowed: above 0, below 1");
 }
 
-PatchMember Patch::join(double odds_before) {
-  if (!std::isfinite(odds_before) || odds_before <= 0.0)
-    throw std::invalid_argument("existence: odds of a patch's member, allowed: finite, above 0");
-  return {.odds_before = odds_before};
+PatchMember Patch::join(double odds_before) const {
+  check_odds(odds_before);
+  PatchMember member;
+  member.before = probability_of(odds_before);
+  // The clearing is part of what P fell by: before = (1 - cleared) alone + cleared kept.
+  member.alone =
+      std::min(1.0 - 1e-6, member.before / (1.0 - parameters_.cleared * parameters_.gone_in_it));
+  member.kept = member.alone * (1.0 - parameters_.gone_in_it);
+  return member;
 }
 
 void Patch::update(PatchMember& member, double odds, std::uint32_t missed_from) {
-  if (!std::isfinite(odds) || odds <= 0.0)
-    throw std::invalid_argument("existence: odds of a patch's member, allowed: finite, above 0");
+  check_odds(odds);
   sum_cleared_ -= member.cleared;
   sum_occluded_ -= member.occluded;
 
   // Likelihoods of the member's looks, over that of "it is gone".
-  const double before = probability_of(member.odds_before);
-  const double kept = before * (1.0 - parameters_.gone_in_it);
-  member.ratio = odds / member.odds_before;
-  const double alone = before * member.ratio + 1.0 - before;
-  member.cleared = std::log((kept * member.ratio + 1.0 - kept) / alone);
+  member.ratio = odds / odds_of(member.before);
+  const double alone = member.alone * member.ratio + 1.0 - member.alone;
+  member.cleared = std::log((member.kept * member.ratio + 1.0 - member.kept) / alone);
   member.occluded = -std::log(alone);
   sum_cleared_ += member.cleared;
   sum_occluded_ += member.occluded;
   missed_from_ |= missed_from;
 }
 
-double Patch::log_occluded() const {
+std::array<double, 3> Patch::log_weights(double cleared, double occluded) const {
   const int further = std::max(0, std::popcount(missed_from_) - 1);
-  return std::log(parameters_.occluded) + further * std::log(parameters_.also_from);
+  return {std::log(1.0 - parameters_.cleared - parameters_.occluded),
+          std::log(parameters_.cleared) + cleared,
+          std::log(parameters_.occluded) + further * std::log(parameters_.also_from) + occluded};
 }
 
 double Patch::probability(const PatchMember& member) const {
-  // Hypotheses by the others' looks: log of prior times likelihood.
-  std::array<double, 3> weights{std::log(1.0 - parameters_.cleared - parameters_.occluded),
-                                std::log(parameters_.cleared) + sum_cleared_ - member.cleared,
-                                log_occluded() + sum_occluded_ - member.occluded};
-  const double most = *std::max_element(weights.begin(), weights.end());
-  for (double& weight : weights) weight = std::exp(weight - most);
-
-  const double before = probability_of(member.odds_before);
-  const double kept = before * (1.0 - parameters_.gone_in_it);
+  // Hypotheses by the others' looks.
+  const auto [alone, cleared, occluded] =
+      normalised(log_weights(sum_cleared_ - member.cleared, sum_occluded_ - member.occluded));
   const double there =
-      (weights[0] * before + weights[1] * kept) * member.ratio + weights[2] * before;
-  const double gone =
-      weights[0] * (1.0 - before) + weights[1] * (1.0 - kept) + weights[2] * (1.0 - before);
+      (alone * member.alone + cleared * member.kept) * member.ratio + occluded * member.alone;
+  const double gone = alone * (1.0 - member.alone) + cleared * (1.0 - member.kept) +
+                      occluded * (1.0 - member.alone);
   return there / (there + gone);
 }
 
-double Patch::cleared() const {
-  const std::array<double, 3> logs{std::log(1.0 - parameters_.cleared - parameters_.occluded),
-                                   std::log(parameters_.cleared) + sum_cleared_,
-                                   log_occluded() + sum_occluded_};
-  const double most = *std::max_element(logs.begin(), logs.end());
-  double sum = 0.0;
-  for (const double log : logs) sum += std::exp(log - most);
-  return std::exp(logs[1] - most) / sum;
-}
+double Patch::cleared() const { return normalised(log_weights(sum_cleared_, sum_occluded_))[1]; }
 
 }  // namespace understory::existence

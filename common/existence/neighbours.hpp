@@ -1,6 +1,7 @@
 // Evidence that neighbours share: the world changes in patches, and occluders hide patches.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 namespace understory::existence {
@@ -8,15 +9,17 @@ namespace understory::existence {
 /// What may have come over a patch between two passes.
 struct PatchParameters {
   double cleared = 0.02;     ///< Probability that the patch was cleared (clear-cut, row that left).
-  double gone_in_it = 0.95;  ///< Share of a cleared patch's points that went.
+  double gone_in_it = 0.97;  ///< Share of a cleared patch's points that went.
   double occluded = 0.05;    ///< Probability that something hides the patch from one direction.
-  double also_from = 0.3;    ///< The same for each further direction, if it does from one.
+  double also_from = 0.2;    ///< The same for each further direction, if it does from one.
 };
 
 /// A patch's point: what the patch must forget of it when more is known.
 struct PatchMember {
-  double odds_before = 1.0;  ///< Of the point, before the looks of this pass.
-  double ratio = 1.0;        ///< Likelihood ratio of its looks: odds now / odds before.
+  double before = 0.5;   ///< P of the point before the looks of this pass,
+  double alone = 0.5;    ///< if nothing common came over the patch,
+  double kept = 0.5;     ///< and if it was cleared.
+  double ratio = 1.0;    ///< Likelihood ratio of its looks: odds now / odds before.
   double cleared = 0.0;  ///< Its log likelihood ratios of "cleared" and "occluded" to "neither".
   double occluded = 0.0;
 };
@@ -31,7 +34,7 @@ class Patch {
   explicit Patch(const PatchParameters& parameters = {});
 
   /// A point joins with its odds before the pass.
-  static PatchMember join(double odds_before);
+  PatchMember join(double odds_before) const;
 
   /// A member's odds by its own looks alone are now `odds`; `missed_from`: its sectors with misses.
   void update(PatchMember& member, double odds, std::uint32_t missed_from);
@@ -42,7 +45,7 @@ class Patch {
   double cleared() const;
 
  private:
-  double log_occluded() const;
+  std::array<double, 3> log_weights(double cleared, double occluded) const;
 
   PatchParameters parameters_;
   double sum_cleared_ = 0.0;

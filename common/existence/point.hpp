@@ -43,7 +43,7 @@ struct SavedPoint {
   std::uint32_t shell_kind = S::kKind;
   double log_odds = 0.0;
   std::array<std::uint32_t, 3> pass{};  ///< Number, sectors and flags.
-  std::array<float, 7> numbers{};       ///< Of the pass; see PointExistence.
+  std::array<float, 8> numbers{};       ///< Of the pass; see PointExistence.
   std::array<float, S::kNumbers> shell{};
 };
 
@@ -65,7 +65,9 @@ class PointExistence {
  public:
   /// A point that is known from elsewhere: P is the model's prior.
   static PointExistence known(const ExistenceModel& model) {
-    return PointExistence(model, odds_of(model.parameters().prior));
+    PointExistence point(model, odds_of(model.parameters().prior));
+    point.flags_ = kWasSure;
+    return point;
   }
   /// A point at its first sighting: P is the model's share of real births, and if it is one, the
   /// pass and the line of sight are good. Throws std::invalid_argument as hit() does.
@@ -95,7 +97,6 @@ class PointExistence {
     learn_recall(model, view, true);
     apply_hit(model, view);
     last_hit_ = sector_of(view);
-    settle_birth(model);
   }
 
   /// Expected and not seen. What was blocked says nothing of the point: P, d and w stay.
@@ -107,13 +108,12 @@ class PointExistence {
     apply_miss(model, view, look.ray == Ray::kPassed);
     last_hit_ = kNowhere;
     missed_from_ |= 1U << sector_of(view);
-    settle_birth(model);
   }
 
   /// Time without looks. Only how much matters, not in how many parts (but for rounding).
   void elapse(const ExistenceModel& model, const Elapsed& time) {
     odds_ = bounded(survived(odds_, time.lost));
-    shell_.relax(model.rest_odds(), time.moved);
+    shell_.relax(static_cast<float>(model.parameters().visibility), time.moved);
     gap_s_ += time.dt_s;
   }
 
@@ -135,8 +135,14 @@ class PointExistence {
     saved.log_odds = log_odds();
     saved.pass = {pass_, rays_passed_ | (std::uint32_t{flags_} << 24),
                   missed_from_ | (std::uint32_t{last_hit_} << 24)};
-    saved.numbers = {unseen_,     chance_missed_, pending_seen_, pending_missed_,
-                     start_odds_, start_gap_s_,   gap_s_};
+    saved.numbers = {unseen_,
+                     chance_missed_,
+                     static_cast<float>(pending_seen_),
+                     static_cast<float>(pending_missed_),
+                     evidence_.went,
+                     evidence_.since_s,
+                     start_gap_s_,
+                     gap_s_};
     shell_.store(saved.shell);
     return saved;
   }
@@ -156,11 +162,11 @@ class PointExistence {
     point.last_hit_ = saved.pass[2] >> 24;
     point.unseen_ = saved.numbers[0];
     point.chance_missed_ = saved.numbers[1];
-    point.pending_seen_ = saved.numbers[2];
-    point.pending_missed_ = saved.numbers[3];
-    point.start_odds_ = saved.numbers[4];
-    point.start_gap_s_ = saved.numbers[5];
-    point.gap_s_ = saved.numbers[6];
+    point.pending_seen_ = static_cast<std::uint16_t>(std::min(65535.0F, saved.numbers[2]));
+    point.pending_missed_ = static_cast<std::uint16_t>(std::min(65535.0F, saved.numbers[3]));
+    point.evidence_ = {saved.numbers[4], saved.numbers[5]};
+    point.start_gap_s_ = saved.numbers[6];
+    point.gap_s_ = saved.numbers[7];
     return point;
   }
 
@@ -176,7 +182,9 @@ class PointExistence {
   static constexpr std::uint32_t kSectors = 0xFFFFFF;
   static constexpr std::uint32_t kIsNew = 1;  ///< What became of the birth is open.
   static constexpr std::uint32_t kInFirstPass =
-      2;  ///< The pass that found it does not count for v.
+      2;                                        ///< The pass that found it does not count for v.
+  static constexpr std::uint32_t kWasSure = 4;  ///< Surely seen in some pass: it was real.
+  static constexpr double kUnit = 256.0;        ///< Of pending passes.
 
   PointExistence(const ExistenceModel& model, double odds)
       : odds_(bounded(odds)),
@@ -217,7 +225,7 @@ class PointExistence {
     const double d = pass_visibility();
     odds_ = bounded(odds_ * (d * q + (1.0 - d) * eps) / eps);
     scale_unseen(eps / q);
-    chance_missed_ *= static_cast<float>(1.0 - q);
+    count_look(1.0 - q);
     if (model.parameters().learn_visibility)
       shell_.multiply(view.place, static_cast<float>(q1 / eps), model.rest_odds());
     shell_.extend(view.place, view.distance_m);
@@ -232,7 +240,7 @@ class PointExistence {
     const double d = pass_visibility();
     odds_ = bounded(odds_ * (1.0 - d * visible * recall));
     scale_unseen(1.0 / unlike);
-    chance_missed_ *= static_cast<float>(unlike * (1.0 - eps));
+    count_look(unlike * (1.0 - eps));
     if (ray_passed)
       count_ray(model, view);
     else if (model.parameters().learn_visibility)
@@ -247,6 +255,10 @@ class PointExistence {
     odds_ = bounded(odds_ * model.parameters().passed_by);
   }
 
+  void count_look(double missed) {
+    chance_missed_ = std::max(1e-6F, chance_missed_ * static_cast<float>(missed));
+  }
+
   void scale_unseen(double ratio) {
     if (unseen_ > 0.0F) unseen_ = std::clamp(static_cast<float>(unseen_ * ratio), 1e-6F, 1e4F);
   }
@@ -257,30 +269,43 @@ class PointExistence {
     if (is_sure) model.recall().record_look(view.distance_m, is_hit);
   }
 
-  void settle_birth(ExistenceModel& model) {
-    if ((flags_ & kIsNew) == 0 || (odds_ > 0.01 && odds_ < 1e4)) return;
-    model.record_birth(odds_ > 1.0);
-    flags_ &= ~kIsNew & 0xFFU;
-  }
-
   void change_pass(ExistenceModel& model) {
-    const double d = pass_visibility();
-    shell_.end_pass(static_cast<float>(d));
-    if (odds_ > 9.0 && unseen_ < 1e-3F) {
-      // Seen in this pass: what passes before it saw or missed was there.
-      model.recall().record_passes(pending_seen_, pending_missed_);
-      pending_seen_ = pending_missed_ = 0.0F;
+    shell_.end_pass(static_cast<float>(pass_visibility()));
+    // P as it was after the looks: time has lowered it since.
+    const double lost = lost_share(model.decay().mean_per_s(), gap_s_);
+    const double after = std::min(1.0, probability() / (1.0 - lost));
+    const bool was_looked_for = chance_missed_ < 0.2F;
+    if ((flags_ & kIsNew) != 0 && was_looked_for) {
+      model.record_birth(after);
+      flags_ &= ~kIsNew & 0xFFU;
     }
-    if (chance_missed_ < 0.2F && (flags_ & kInFirstPass) == 0) {
-      pending_seen_ += static_cast<float>(d);
-      pending_missed_ += static_cast<float>(1.0 - d);
-    }
-    const double since = lost_share(model.decay().mean_per_s(), gap_s_);
-    const double after = std::min(1.0, probability() / (1.0 - since));
-    model.decay().record(probability_of(start_odds_), after, start_gap_s_);
+    learn_from_pass(model, after, was_looked_for);
     flags_ &= ~kInFirstPass & 0xFFU;
     pass_ = model.pass();
     start_pass(model);
+  }
+
+  /// Recall of passes and decay: what was open since the point was last surely seen.
+  void learn_from_pass(ExistenceModel& model, double after, bool was_looked_for) {
+    const bool is_sure = after > 0.9 && unseen_ < 1e-3F;
+    if (is_sure) {
+      model.recall().record_passes(pending_seen_ / kUnit, pending_missed_ / kUnit);
+      pending_seen_ = pending_missed_ = 0;
+    }
+    if (was_looked_for && (flags_ & kInFirstPass) == 0) {
+      add_pending(pending_seen_, pass_visibility());
+      add_pending(pending_missed_, 1.0 - pass_visibility());
+    }
+
+    const DecayEvidence is{is_sure ? 0.0F : static_cast<float>(1.0 - after),
+                           evidence_.since_s + start_gap_s_};
+    if ((flags_ & kWasSure) != 0) model.decay().replace(evidence_, is);
+    if (is_sure) flags_ |= kWasSure;
+    evidence_ = is_sure ? DecayEvidence{} : is;
+  }
+
+  static void add_pending(std::uint16_t& count, double passes) {
+    count = static_cast<std::uint16_t>(std::min(65535.0, std::round(count + kUnit * passes)));
   }
 
   void start_pass(const ExistenceModel& model) {
@@ -293,7 +318,6 @@ class PointExistence {
     start_gap_s_ = gap_s_;
     gap_s_ = 0.0F;
     odds_ = std::min(odds_, kMostOdds);
-    start_odds_ = static_cast<float>(odds_);
     shell_.begin_pass();
   }
 
@@ -310,11 +334,11 @@ class PointExistence {
   std::uint32_t last_hit_ : 8 = kNowhere;  ///< Sector of the pass's last look, if it was a hit.
   float unseen_ = 0.0F;                    ///< (1 - d) / d.
   float chance_missed_ = 1.0F;             ///< Of a pass that can see it, up to now.
-  float pending_seen_ = 0.0F;              ///< Passes since the last that surely saw the point.
-  float pending_missed_ = 0.0F;
-  float start_odds_ = 0.0F;   ///< When the pass began.
-  float start_gap_s_ = 0.0F;  ///< From the pass before to this one.
-  float gap_s_ = 0.0F;        ///< Since this pass began, without looks.
+  std::uint16_t pending_seen_ = 0;         ///< Passes since the last that surely saw the point,
+  std::uint16_t pending_missed_ = 0;       ///< in parts of 1 / 256.
+  DecayEvidence evidence_;                 ///< Up to the pass before this one.
+  float start_gap_s_ = 0.0F;               ///< From the pass before to this one.
+  float gap_s_ = 0.0F;                     ///< Since this pass began, without looks.
 };
 
 }  // namespace understory::existence

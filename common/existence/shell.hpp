@@ -27,7 +27,7 @@ concept Shell = requires(S shell, const S& constant, const Eigen::Vector3f& dire
   shell.multiply(place, number, number);
   /// Raises the reach at a place to at least a distance.
   shell.extend(place, number);
-  /// Visibility moves by a share towards a rest value: w <- w + (rest - w) share.
+  /// Visibility moves by a share towards a rest probability: w <- w + (rest - w) share.
   shell.relax(number, number);
   /// What was learned since begin_pass() counts with weight `share`, what was before with the rest.
   shell.begin_pass();

@@ -27,7 +27,7 @@ requires(K > 0 && K < 24) class VonMisesFisherShell {
     Eigen::Vector3f direction;
     bool is_new = false;  ///< No lobe is near: the next multiply() begins one.
   };
-  static constexpr std::size_t kNumbers = 7 * K + 4;  // the last one is spare
+  static constexpr std::size_t kNumbers = 7 * K + 3;
   static constexpr std::uint32_t kKind = 0x100 + K;
 
   VonMisesFisherShell(float visibility_odds, float reach_m)
@@ -118,7 +118,6 @@ requires(K > 0 && K < 24) class VonMisesFisherShell {
       for (const float number : {lobe.sum.x(), lobe.sum.y(), lobe.sum.z(), lobe.looks,
                                  lobe.log_odds, lobe.before, lobe.reach_m})
         *out++ = number;
-    *out = 0.0F;
   }
   bool restore(std::span<const float> numbers) {
     const auto is_finite = [](float number) { return std::isfinite(number); };
