@@ -80,7 +80,7 @@ requires(K > 0 && K < 24) class VonMisesFisherShell {
     nearest.looks += weight;
 
     const float most = std::log(most_odds);
-    const float step = std::log(ratio) / std::max(place.squares, 1e-6F);
+    const float step = std::log(ratio) / std::max(place.squares, kLeastSquares);
     for (std::size_t k = 0; k < used(); ++k)
       lobes_[k].log_odds =
           std::clamp(lobes_[k].log_odds + step * place.shares[k], kLeastLogOdds, most);
@@ -146,8 +146,9 @@ requires(K > 0 && K < 24) class VonMisesFisherShell {
   };
   static constexpr float kFarShare =
       0.05F;  ///< Density of "no lobe"; a lobe's own is 1 at its mean.
-  static constexpr float kNearDensity = 0.25F;  ///< Below it a direction is another lobe's.
-  static constexpr float kMostLooks = 1e4F;     ///< The mean stays where 1e4 looks put it.
+  static constexpr float kNearDensity = 0.25F;   ///< Below it a direction is another lobe's.
+  static constexpr float kLeastSquares = 0.04F;  ///< Farther from all lobes they learn less.
+  static constexpr float kMostLooks = 1e4F;      ///< The mean stays where 1e4 looks put it.
   static constexpr float kLeastLogOdds = -39.0F;
 
   std::size_t used() const { return used_; }
