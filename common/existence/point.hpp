@@ -285,23 +285,27 @@ class PointExistence {
     start_pass(model);
   }
 
-  /// Recall of passes and decay: what was open since the point was last surely seen.
+  /// Recall of passes and decay. What is open since the point was last surely seen counts with the
+  /// probability that it is still there, and what it counted before is taken back.
   void learn_from_pass(ExistenceModel& model, double after, bool was_looked_for) {
     const bool is_sure = after > 0.9 && unseen_ < 1e-3F;
-    if (is_sure) {
-      model.recall().record_passes(pending_seen_ / kUnit, pending_missed_ / kUnit);
-      pending_seen_ = pending_missed_ = 0;
-    }
+    const double weight_before = (1.0 - evidence_.went) / kUnit;
+    const double seen_before = weight_before * pending_seen_;
+    const double missed_before = weight_before * pending_missed_;
     if (was_looked_for && (flags_ & kInFirstPass) == 0) {
       add_pending(pending_seen_, pass_visibility());
       add_pending(pending_missed_, 1.0 - pass_visibility());
     }
-
     const DecayEvidence is{is_sure ? 0.0F : static_cast<float>(1.0 - after),
                            evidence_.since_s + start_gap_s_};
     if ((flags_ & kWasSure) != 0) model.decay().replace(evidence_, is);
     if (is_sure) flags_ |= kWasSure;
     evidence_ = is_sure ? DecayEvidence{} : is;
+
+    const double weight = (1.0 - evidence_.went) / kUnit;
+    model.recall().record_passes(weight * pending_seen_ - seen_before,
+                                 weight * pending_missed_ - missed_before);
+    if (is_sure) pending_seen_ = pending_missed_ = 0;
   }
 
   static void add_pending(std::uint16_t& count, double passes) {

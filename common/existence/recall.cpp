@@ -1,5 +1,6 @@
 #include "common/existence/recall.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -7,6 +8,7 @@ namespace understory::existence {
 namespace {
 
 constexpr double kMostCounts = 1e5;
+constexpr double kLeastCount = 1e-3;
 /// A look sees what is there at most so often: nothing is certain by one miss.
 constexpr double kMostRecall = 0.999;
 
@@ -26,7 +28,8 @@ DetectorRecall::DetectorRecall(const Parameters& parameters)
       false_rate_(parameters.false_rate),
       inverse_(1.0 / (1.0 - parameters.false_rate)),
       least_q1_(parameters.false_rate + kLeast * (1.0 - parameters.false_rate)),
-      learns_(parameters.learn_recall) {
+      learns_(parameters.learn_recall),
+      learns_passes_(parameters.learn_recall && parameters.pass_recall < 1.0) {
   // Hits are of points and of nothing: q1 = eps + (1 - eps) p_d is what is counted.
   const double q1 = false_rate_ + (1.0 - false_rate_) * parameters.recall;
   all_ = {parameters.recall_weight * q1, parameters.recall_weight * (1.0 - q1)};
@@ -44,8 +47,10 @@ void DetectorRecall::record_look(double distance_m, bool is_hit) {
 }
 
 void DetectorRecall::record_passes(double seen, double missed) {
-  if (!learns_) return;
+  if (!learns_passes_) return;
   passes_.add(seen, missed);
+  passes_.hits = std::max(passes_.hits, kLeastCount);
+  passes_.misses = std::max(passes_.misses, kLeastCount);
   refresh();
 }
 

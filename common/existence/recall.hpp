@@ -23,9 +23,9 @@ struct BetaCounts {
 /// point at all with v only. Both are learned without the bias of looking at survivors alone:
 ///   - a look counts for p_d where the previous look from the same viewpoint in the same pass was a
 ///     hit: chosen before its outcome is known;
-///   - a pass counts for v once a later pass has surely seen the point, so that it existed then.
-///   The
-///     pass that found the point does not count.
+///   - a pass counts for v with the probability that the point existed then: at first what is known
+///     after the pass, later 1 where another pass has surely seen the point, 0 where it went. What
+///     was counted too early is taken back (EM). The pass that found the point does not count.
 class DetectorRecall {
  public:
   static constexpr std::size_t kBins = 8;  ///< Of the range, the last one open.
@@ -42,6 +42,7 @@ class DetectorRecall {
   double of_pass() const { return pass_mean_; }
 
   void record_look(double distance_m, bool is_hit);
+  /// Changes of the counts of passes; below 0 where something is taken back.
   void record_passes(double seen, double missed);
 
   /// For save and load: looks of all ranges, passes, then looks by range; see
@@ -71,6 +72,7 @@ class DetectorRecall {
   double inverse_;
   double least_q1_;
   bool learns_;
+  bool learns_passes_;
 };
 
 }  // namespace understory::existence
