@@ -10,6 +10,9 @@
 namespace understory::eval::experiments::existence {
 namespace {
 
+/// A point is in the map from so many sightings on: false ones are not.
+constexpr int kMappedFrom = 5;
+
 using Grid = std::vector<std::vector<double>>;
 
 /// All combinations.
@@ -52,7 +55,7 @@ std::vector<bool> mapped_points(const History& history) {
     for (const LookEvent& event : history.drives[k].looks)
       if (event.is_seen) ++seen[event.point];
   std::vector<bool> mapped;
-  for (const int times : seen) mapped.push_back(times >= 2);
+  for (const int times : seen) mapped.push_back(times >= kMappedFrom);
   return mapped;
 }
 

@@ -123,7 +123,7 @@ double removed_share(const std::vector<ScoredPoint>& points, bool exists) {
   for (const ScoredPoint& point : points) {
     if (point.exists != exists) continue;
     ++all;
-    removed += point.probability < 0.5 ? 1 : 0;
+    removed += point.probability < kRemovedBelow ? 1 : 0;
   }
   return all == 0 ? 0.0 : static_cast<double>(removed) / static_cast<double>(all);
 }

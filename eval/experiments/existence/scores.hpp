@@ -34,7 +34,10 @@ double found_at(std::vector<ScoredPoint> points, double wrongly_removed);
 std::vector<std::pair<double, double>> roc_curve(std::vector<ScoredPoint> points);
 /// Ten bins of equal width.
 std::array<ReliabilityBin, 10> reliability(const std::vector<ScoredPoint>& points);
-/// Share of those with a truth whose P is below 0.5.
+/// A point is removed (not used, and not forgotten) below this P: to lose what is there costs four
+/// times as much as to keep what is gone.
+inline constexpr double kRemovedBelow = 0.2;
+/// Share of those with a truth whose P is below kRemovedBelow.
 double removed_share(const std::vector<ScoredPoint>& points, bool exists);
 
 }  // namespace understory::eval::experiments::existence

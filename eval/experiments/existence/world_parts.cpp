@@ -100,7 +100,7 @@ void run_world(ExistenceRun& run, const WorldSetting& setting, bool is_drawn) {
 }
 
 nlohmann::json trap_row(const TunedMethod& method, const std::vector<History>& histories,
-                        bool has_ranges, const char* part) {
+                        const WorldSetting& setting, const char* part) {
   std::vector<ScoredPoint> hidden, all;
   for (const AfterDrive& after : pooled(method, histories)) {
     append(hidden, after.hidden);
@@ -109,7 +109,8 @@ nlohmann::json trap_row(const TunedMethod& method, const std::vector<History>& h
   }
   return {{"part", part},
           {"method", method.name},
-          {"has_ranges", has_ranges},
+          {"has_ranges", setting.has_ranges},
+          {"gap_days", setting.gap_days},
           {"points", all.size()},
           {"hidden_points", hidden.size()},
           {"hidden_removed_pct", 100.0 * removed_share(hidden, true)},
@@ -118,15 +119,16 @@ nlohmann::json trap_row(const TunedMethod& method, const std::vector<History>& h
 }
 
 template <typename Make>
-void run_trap(ExistenceRun& run, const char* part, const Make& make) {
+void run_trap(ExistenceRun& run, const char* part, double gap_days, const Make& make) {
   for (const bool has_ranges : {false, true}) {
     WorldSetting setting;
     setting.has_ranges = has_ranges;
+    setting.gap_days = gap_days;
     const std::vector<History> histories = make_histories(run, setting, make);
     for (const TunedMethod& method : run.methods) {
-      nlohmann::json row = trap_row(method, histories, has_ranges, part);
-      fmt::print("{:<15} {:<36} {:<9} hidden removed {:>6} %, gone removed {:>6} %\n", part,
-                 method.name, has_ranges ? "ranges" : "no ranges",
+      nlohmann::json row = trap_row(method, histories, setting, part);
+      fmt::print("{:<15} {:>2.0f} days {:<9} {:<36} hidden removed {:>6} %, gone removed {:>6} %\n",
+                 part, gap_days, has_ranges ? "ranges" : "no ranges", method.name,
                  shown(row, "hidden_removed_pct", 2), shown(row, "gone_removed_pct", 1));
       run.rows.push_back(std::move(row));
     }
@@ -189,10 +191,13 @@ void run_worlds(ExistenceRun& run) {
   fmt::print("{:<36} {:>5} {:>5} {:>3} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7}\n", "method",
              "gone%", "miss%", "dr", "AUC", "AP", "Brier", "found@1", "wrong%", "found%",
              "hidden%");
-  for (const double changed : {0.05, 0.1, 0.2, 0.3, 0.5}) {
-    WorldSetting setting;
-    setting.changed = changed;
-    run_world(run, setting, changed == 0.2);
+  for (const double missed : {0.0, 0.05}) {
+    for (const double changed : {0.05, 0.1, 0.2, 0.3, 0.5}) {
+      WorldSetting setting;
+      setting.changed = changed;
+      setting.pass_missed = missed;
+      run_world(run, setting, changed == 0.2 && missed == 0.05);
+    }
   }
   WorldSetting setting;
   setting.pass_missed = 0.36;
@@ -200,8 +205,9 @@ void run_worlds(ExistenceRun& run) {
 }
 
 void run_traps(ExistenceRun& run) {
-  run_trap(run, "occlusion-trap", make_occlusion_trap);
-  run_trap(run, "clear-cut", make_clear_cut);
+  for (const double gap_days : {1.0, 30.0})
+    run_trap(run, "occlusion-trap", gap_days, make_occlusion_trap);
+  run_trap(run, "clear-cut", 30.0, make_clear_cut);
 }
 
 void run_false_sightings(ExistenceRun& run) {

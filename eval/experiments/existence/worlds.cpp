@@ -11,7 +11,6 @@ namespace understory::eval::experiments::existence {
 namespace {
 
 constexpr double kDay_s = 86400.0;
-constexpr double kMonth_s = 30.0 * kDay_s;
 
 double unit_of(std::mt19937_64& random) {
   return std::uniform_real_distribution<double>(0.0, 1.0)(random);
@@ -105,7 +104,7 @@ History make_history(const WorldSetting& setting, std::uint64_t seed) {
   for (std::size_t k = 0; k < history.mapping_drives; ++k, time_s += kDay_s)
     history.drives.push_back(observer.drive(time_s, random_loop(setting, random), walls, exists));
 
-  time_s += kMonth_s;
+  time_s += setting.gap_days * kDay_s;
   for (std::size_t i = 0; i < exists.size(); ++i) exists[i] = unit_of(random) >= setting.changed;
   for (int k = 0; k < setting.changed_drives; ++k, time_s += kDay_s) {
     std::vector<Segment> occluders = walls;
@@ -130,7 +129,7 @@ History make_occlusion_trap(const WorldSetting& setting, std::uint64_t seed) {
 
   const std::vector<Eigen::Vector3f> standing(3600, Eigen::Vector3f(0.0F, 0.0F, 1.5F));
   const std::vector<Segment> van{{{5.0F, -3.0F}, {5.0F, 3.0F}}};
-  history.drives.push_back(observer.drive(kDay_s + kMonth_s, standing, van, all));
+  history.drives.push_back(observer.drive((1.0 + setting.gap_days) * kDay_s, standing, van, all));
   return history;
 }
 
@@ -150,7 +149,7 @@ History make_clear_cut(const WorldSetting& setting, std::uint64_t seed) {
   std::fill_n(exists.begin(), 50, false);
   const auto past = line({-45.0F, 0.0F, 1.5F}, {60.0F, 0.0F, 1.5F}, setting.scan_every_m);
   const std::vector<Segment> lorry{{{24.5F, 2.5F}, {45.5F, 2.5F}}};
-  history.drives.push_back(observer.drive(kDay_s + kMonth_s, past, lorry, exists));
+  history.drives.push_back(observer.drive((1.0 + setting.gap_days) * kDay_s, past, lorry, exists));
   return history;
 }
 

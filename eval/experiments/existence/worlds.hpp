@@ -22,10 +22,11 @@ struct WorldSetting {
   int walls = 6;  ///< Stand from the beginning.
   int vans = 8;   ///< Parked anew at each drive after the change.
   int changed_drives = 3;
+  double gap_days = 30.0;   ///< From the mapping drives to the others.
   bool has_ranges = false;  ///< The sensor measures along the rays (LIDAR).
 };
 
-/// Two mapping drives a day apart; a month later the changed world, driven through a day apart.
+/// Two mapping drives a day apart; `gap_days` later the changed world, driven through a day apart.
 History make_history(const WorldSetting& setting, std::uint64_t seed);
 
 /// The sensor stands for an hour, a look a second, beside a van that hides 20 of 40 points; mapped
