@@ -26,36 +26,43 @@ model::Parameters parameters_of(const std::vector<double>& tuned) {
   return parameters;
 }
 
-/// A point is born at its first hit; before it, it is not in the map and has the prior.
+/// A point is born at its first sighting; misses before it are no evidence of a point of the map.
 template <typename S>
 class OwnMethod : public Method {
  public:
   OwnMethod(const History& history, const model::Parameters& parameters)
       : model_(parameters),
-        points_(history.points_m.size(), model::PointExistence<S>::known(model_)) {}
+        points_(history.points_m.size(), model::PointExistence<S>::known(model_)),
+        is_born_(history.points_m.size(), false) {}
 
   void begin_drive(double time_s) override {
     const model::Elapsed time = model_.elapsed(time_s - time_s_);
-    for (auto& point : points_) point.elapse(model_, time);
     if (drives_++ > 0) model_.begin_pass();
-    for (auto& point : points_) point.enter_pass(model_);
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      if (!is_born_[i]) continue;
+      points_[i].elapse(model_, time);
+      points_[i].enter_pass(model_);
+    }
     time_s_ = time_s;
   }
   void look(const LookEvent& event) override {
-    if (event.is_seen)
-      points_[event.point].hit(model_, event.look);
-    else
-      points_[event.point].miss(model_, event.look);
+    auto& point = points_[event.point];
+    if (is_born_[event.point]) {
+      event.is_seen ? point.hit(model_, event.look) : point.miss(model_, event.look);
+    } else if (event.is_seen) {
+      point = model::PointExistence<S>::born(model_, event.look);
+      is_born_[event.point] = true;
+    }
   }
   double probability(std::size_t point) const override { return points_[point].probability(); }
 
  protected:
-  model::ExistenceModel& model() { return model_; }
   std::vector<model::PointExistence<S>>& points() { return points_; }
 
  private:
   model::ExistenceModel model_;
   std::vector<model::PointExistence<S>> points_;
+  std::vector<bool> is_born_;
   double time_s_ = 0.0;
   int drives_ = 0;
 };
