@@ -122,6 +122,19 @@ class PointExistence {
     if (pass_ != model.pass()) change_pass(model);
   }
 
+  /// Between enter_pass() and the first look of a pass: P anew by what all points have taught about
+  /// v and lambda, and what this one teaches by its new P (a step of EM). A few rounds over all
+  /// points of a map settle; none are needed. Does nothing once the pass has looked.
+  void reconsider(ExistenceModel& model) {
+    if (pass_ != model.pass() || chance_missed_ < 1.0F || (flags_ & kInFirstPass) != 0) return;
+    const std::uint32_t missed_code = missed_code_;
+    const float decay_per_s = decay_per_s_;
+    expect_pass(model);
+    correct_odds(model, missed_code, decay_per_s);
+    const bool is_open = pending_missed_ > 0;
+    if (is_open) weigh(model, {static_cast<float>(1.0 - probability()), evidence_.since_s});
+  }
+
   /// P after evidence from elsewhere (neighbours, other sensors): a factor on its odds. Throws
   /// std::invalid_argument where it is not finite or below 0.
   void multiply_odds(double ratio) {
@@ -133,15 +146,16 @@ class PointExistence {
   SavedPoint<S> save() const {
     SavedPoint<S> saved;
     saved.log_odds = log_odds();
-    saved.pass = {pass_, rays_passed_ | (std::uint32_t{flags_} << 24),
-                  missed_from_ | (std::uint32_t{last_hit_} << 24)};
+    saved.pass = {pass_,
+                  rays_passed_ | (std::uint32_t{last_hit_} << 24) | (std::uint32_t{flags_} << 29),
+                  missed_from_ | (std::uint32_t{missed_code_} << 24)};
     saved.numbers = {unseen_,
                      chance_missed_,
                      static_cast<float>(pending_seen_),
                      static_cast<float>(pending_missed_),
                      evidence_.went,
                      evidence_.since_s,
-                     start_gap_s_,
+                     decay_per_s_,
                      gap_s_};
     shell_.store(saved.shell);
     return saved;
@@ -157,15 +171,16 @@ class PointExistence {
     point.odds_ = bounded(std::exp(saved.log_odds));
     point.pass_ = saved.pass[0];
     point.rays_passed_ = saved.pass[1] & kSectors;
-    point.flags_ = saved.pass[1] >> 24;
+    point.last_hit_ = (saved.pass[1] >> 24U) & 31U;
+    point.flags_ = (saved.pass[1] >> 29U) & 7U;
     point.missed_from_ = saved.pass[2] & kSectors;
-    point.last_hit_ = saved.pass[2] >> 24;
+    point.missed_code_ = (saved.pass[2] >> 24U) & 0xFFU;
     point.unseen_ = saved.numbers[0];
     point.chance_missed_ = saved.numbers[1];
     point.pending_seen_ = static_cast<std::uint16_t>(std::min(65535.0F, saved.numbers[2]));
     point.pending_missed_ = static_cast<std::uint16_t>(std::min(65535.0F, saved.numbers[3]));
     point.evidence_ = {saved.numbers[4], saved.numbers[5]};
-    point.start_gap_s_ = saved.numbers[6];
+    point.decay_per_s_ = saved.numbers[6];
     point.gap_s_ = saved.numbers[7];
     return point;
   }
@@ -178,7 +193,7 @@ class PointExistence {
     double recall = 0.0;   ///< p_d s.
     double visible = 0.0;  ///< w.
   };
-  static constexpr std::uint32_t kNowhere = 255;
+  static constexpr std::uint32_t kNowhere = 31;
   static constexpr std::uint32_t kSectors = 0xFFFFFF;
   static constexpr std::uint32_t kIsNew = 1;  ///< What became of the birth is open.
   static constexpr std::uint32_t kInFirstPass =
@@ -277,50 +292,89 @@ class PointExistence {
     const bool was_looked_for = chance_missed_ < 0.2F;
     if ((flags_ & kIsNew) != 0 && was_looked_for) {
       model.record_birth(after);
-      flags_ &= ~kIsNew & 0xFFU;
+      flags_ &= ~kIsNew & 7U;
     }
     learn_from_pass(model, after, was_looked_for);
-    flags_ &= ~kInFirstPass & 0xFFU;
-    pass_ = model.pass();
+    flags_ &= ~kInFirstPass & 7U;
+
+    const double still = (1.0 - static_cast<double>(evidence_.went)) * (1.0 - lost);
+    weigh(model, {static_cast<float>(1.0 - still), evidence_.since_s + gap_s_});
+    const std::uint32_t missed_code = missed_code_;
+    const float decay_per_s = decay_per_s_;
     start_pass(model);
+    correct_odds(model, missed_code, decay_per_s);
   }
 
   /// Recall of passes and decay. What is open since the point was last surely seen counts with the
-  /// probability that it is still there, and what it counted before is taken back.
+  /// probability that it is still there.
   void learn_from_pass(ExistenceModel& model, double after, bool was_looked_for) {
-    const bool is_sure = after > 0.9 && unseen_ < 1e-3F;
-    const double weight_before = (1.0 - evidence_.went) / kUnit;
-    const double seen_before = weight_before * pending_seen_;
-    const double missed_before = weight_before * pending_missed_;
     if (was_looked_for && (flags_ & kInFirstPass) == 0) {
+      const std::uint16_t seen = pending_seen_, missed = pending_missed_;
       add_pending(pending_seen_, pass_visibility());
       add_pending(pending_missed_, 1.0 - pass_visibility());
+      const double weight = (1.0 - static_cast<double>(evidence_.went)) / kUnit;
+      model.recall().record_passes(weight * (pending_seen_ - seen),
+                                   weight * (pending_missed_ - missed));
     }
-    const DecayEvidence is{is_sure ? 0.0F : static_cast<float>(1.0 - after),
-                           evidence_.since_s + start_gap_s_};
-    if ((flags_ & kWasSure) != 0) model.decay().replace(evidence_, is);
-    if (is_sure) flags_ |= kWasSure;
-    evidence_ = is_sure ? DecayEvidence{} : is;
+    const bool is_sure = after > 0.9 && unseen_ < 1e-3F;
+    weigh(model, {is_sure ? 0.0F : static_cast<float>(1.0 - after), evidence_.since_s});
+    if (!is_sure) return;
+    flags_ |= kWasSure;
+    pending_seen_ = pending_missed_ = 0;
+    evidence_ = {};
+  }
 
-    const double weight = (1.0 - evidence_.went) / kUnit;
-    model.recall().record_passes(weight * pending_seen_ - seen_before,
-                                 weight * pending_missed_ - missed_before);
-    if (is_sure) pending_seen_ = pending_missed_ = 0;
+  /// What the point counts for is taken back and counted anew.
+  void weigh(ExistenceModel& model, const DecayEvidence& is) {
+    if ((flags_ & kWasSure) != 0) model.decay().replace(evidence_, is);
+    const double more =
+        (static_cast<double>(evidence_.went) - static_cast<double>(is.went)) / kUnit;
+    if (pending_seen_ + pending_missed_ > 0)
+      model.recall().record_passes(more * pending_seen_, more * pending_missed_);
+    evidence_ = is;
   }
 
   static void add_pending(std::uint16_t& count, double passes) {
     count = static_cast<std::uint16_t>(std::min(65535.0, std::round(count + kUnit * passes)));
   }
 
-  void start_pass(const ExistenceModel& model) {
+  /// P by what is known of v and lambda now, since the point was last surely seen: each missed pass
+  /// weighs 1 - v, and the odds of having survived are those of lambda.
+  void correct_odds(const ExistenceModel& model, std::uint32_t missed_code, float decay_per_s) {
+    if ((flags_ & kWasSure) == 0 || pending_missed_ == 0) return;
+    const double missed = decoded(missed_code_) / decoded(missed_code);
+    odds_ *= std::pow(missed, pending_missed_ / kUnit);
+    const auto odds_of_survival = [&](double rate_per_s) {
+      return odds_of(1.0 - std::max(1e-9, lost_share(rate_per_s, evidence_.since_s)));
+    };
+    if (decay_per_s > 0.0F)
+      odds_ *= odds_of_survival(model.decay().mean_per_s()) / odds_of_survival(decay_per_s);
+    odds_ = bounded(std::min(odds_, kMostOdds));
+  }
+
+  static double missed_of(double pass_recall) { return std::max(0.005, 1.0 - pass_recall); }
+  /// A share of missed passes as a byte, to 1 %.
+  static std::uint32_t code_of(double missed) {
+    return static_cast<std::uint32_t>(std::round(-32.0 * std::log2(missed)));
+  }
+  static double decoded(std::uint32_t code) { return std::exp2(-static_cast<double>(code) / 32.0); }
+
+  /// d and lambda of the pass that begins.
+  void expect_pass(const ExistenceModel& model) {
     const double v = model.recall().of_pass();
     unseen_ = static_cast<float>((1.0 - v) / v);
+    missed_code_ = code_of(missed_of(v)) & 0xFFU;
+    decay_per_s_ = static_cast<float>(model.decay().mean_per_s());
+  }
+
+  void start_pass(const ExistenceModel& model) {
+    expect_pass(model);
     chance_missed_ = 1.0F;
     rays_passed_ = 0;
     missed_from_ = 0;
     last_hit_ = kNowhere;
-    start_gap_s_ = gap_s_;
     gap_s_ = 0.0F;
+    pass_ = model.pass();
     odds_ = std::min(odds_, kMostOdds);
     shell_.begin_pass();
   }
@@ -332,17 +386,18 @@ class PointExistence {
   double odds_;  ///< P / (1 - P).
   S shell_;
   std::uint32_t pass_;
-  std::uint32_t rays_passed_ : 24 = 0;  ///< Sectors whose rays passed the point in this pass.
-  std::uint32_t flags_ : 8 = 0;
-  std::uint32_t missed_from_ : 24 = 0;     ///< Sectors of this pass with misses.
-  std::uint32_t last_hit_ : 8 = kNowhere;  ///< Sector of the pass's last look, if it was a hit.
-  float unseen_ = 0.0F;                    ///< (1 - d) / d.
-  float chance_missed_ = 1.0F;             ///< Of a pass that can see it, up to now.
-  std::uint16_t pending_seen_ = 0;         ///< Passes since the last that surely saw the point,
-  std::uint16_t pending_missed_ = 0;       ///< in parts of 1 / 256.
-  DecayEvidence evidence_;                 ///< Up to the pass before this one.
-  float start_gap_s_ = 0.0F;               ///< From the pass before to this one.
-  float gap_s_ = 0.0F;                     ///< Since this pass began, without looks.
+  std::uint32_t rays_passed_ : 24 = 0;     ///< Sectors whose rays passed the point in this pass.
+  std::uint32_t last_hit_ : 5 = kNowhere;  ///< Sector of the pass's last look, if it was a hit.
+  std::uint32_t flags_ : 3 = 0;
+  std::uint32_t missed_from_ : 24 = 0;  ///< Sectors of this pass with misses.
+  std::uint32_t missed_code_ : 8 = 0;   ///< 1 - v as it was when the pass began; see code_of().
+  float unseen_ = 0.0F;                 ///< (1 - d) / d.
+  float chance_missed_ = 1.0F;          ///< Of a pass that can see it, up to now.
+  std::uint16_t pending_seen_ = 0;      ///< Passes since the last that surely saw the point,
+  std::uint16_t pending_missed_ = 0;    ///< in parts of 1 / 256.
+  DecayEvidence evidence_;              ///< Up to the begin of this pass.
+  float decay_per_s_ = 0.0F;            ///< lambda as it was when the pass began.
+  float gap_s_ = 0.0F;                  ///< Since this pass began, without looks.
 };
 
 }  // namespace understory::existence

@@ -17,6 +17,8 @@ namespace model = understory::existence;
 
 constexpr double kOwnMonth_s = 30.0 * 86400.0;
 constexpr float kPatch_m = 12.0F;
+/// Of EM after each drive.
+constexpr int kRounds = 10;
 
 model::Parameters parameters_of(const std::vector<double>& tuned) {
   model::Parameters parameters;
@@ -43,6 +45,9 @@ class OwnMethod : public Method {
       points_[i].elapse(model_, time);
       points_[i].enter_pass(model_);
     }
+    for (int round = 0; round < kRounds; ++round)
+      for (std::size_t i = 0; i < points_.size(); ++i)
+        if (is_born_[i]) points_[i].reconsider(model_);
     time_s_ = time_s;
   }
   void look(const LookEvent& event) override {
