@@ -61,8 +61,8 @@ def draw_shell(file, shell):
         axis.set_zlim(-most, most)
         axis.set_title(f"drive {index + 1}, P = {stage['probability']:.3f}", fontsize=8)
         axis.tick_params(labelsize=6)
-    figure.suptitle("visibility: red 0, green 0.95; size: reach [m]", fontsize=8)
-    figure.tight_layout()
+    figure.text(0.5, 0.01, "visibility of a face: red 0, green 0.95; size: reach [m]", fontsize=8, ha="center")
+    figure.tight_layout(rect=(0, 0.04, 1, 1))
     figure.savefig(file.with_suffix(".shell.png"), dpi=110)
 
 

@@ -172,6 +172,33 @@ std::optional<double> day_of(std::string_view date) {
   return static_cast<double>(std::chrono::sys_days(when).time_since_epoch().count());
 }
 
+/// A census of one tree.
+struct Visit {
+  double day;
+  std::string_view status;
+};
+
+/// Its intervals from the first "alive" to "dead" or the last census; "missing" says nothing.
+void count_tree(const std::vector<Visit>& visits, Mortality& mortality) {
+  std::optional<double> alive_day;
+  for (const Visit& visit : visits) {
+    const bool is_alive = visit.status == "alive";
+    if (!is_alive && (visit.status != "dead" || !alive_day)) continue;
+    if (!alive_day) {
+      ++mortality.trees;
+      alive_day = visit.day;
+      continue;
+    }
+    const double dt_s = (visit.day - *alive_day) * kForestDay_s;
+    mortality.rate.replace({}, {is_alive ? 0.0F : 1.0F, static_cast<float>(dt_s)});
+    if (!is_alive) mortality.rate.replace({}, {0.0F, static_cast<float>(0.5 * dt_s)});
+    mortality.tree_years += (is_alive ? 1.0 : 0.5) * dt_s / kYear_s;
+    mortality.died += is_alive ? 0 : 1;
+    if (!is_alive) return;
+    alive_day = visit.day;
+  }
+}
+
 }  // namespace
 
 std::string read_text(const std::filesystem::path& file) {
@@ -190,7 +217,7 @@ std::vector<CensusStem> read_census(std::string_view csv) {
   while (rows.next()) {
     const auto diameter_cm = rows.number(first);
     const auto x_m = rows.number(x), y_m = rows.number(y);
-    if (!diameter_cm || !x_m || !y_m || *diameter_cm < kLeastDiameter_cm) continue;
+    if (!diameter_cm || !x_m || !y_m || *diameter_cm <= kLeastDiameter_cm) continue;
     stems.push_back({{static_cast<float>(*x_m), static_cast<float>(*y_m)},
                      static_cast<float>(0.005 * *diameter_cm),
                      !rows.number(second).has_value()});
@@ -232,23 +259,12 @@ Mortality read_mortality(std::string_view csv) {
 
   Mortality mortality;
   while (rows.next()) {
-    std::optional<double> alive_day;
+    std::vector<Visit> visits;
     for (const auto& [date, status] : columns) {
       const auto day = day_of(rows.text(date));
-      if (!day) continue;
-      const bool is_alive = rows.text(status) == "alive";
-      if (!is_alive && (rows.text(status) != "dead" || !alive_day)) continue;
-      if (alive_day) {
-        const double dt_s = (*day - *alive_day) * kForestDay_s;
-        mortality.rate.replace({}, {is_alive ? 0.0F : 1.0F, static_cast<float>(dt_s)});
-        mortality.tree_years += (is_alive ? 1.0 : 0.5) * dt_s / kYear_s;
-        mortality.died += is_alive ? 0 : 1;
-      } else {
-        ++mortality.trees;
-      }
-      if (!is_alive) break;
-      alive_day = day;
+      if (day) visits.push_back({*day, rows.text(status)});
     }
+    count_tree(visits, mortality);
   }
   return mortality;
 }

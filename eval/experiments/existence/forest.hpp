@@ -12,7 +12,7 @@
 
 namespace understory::eval::experiments::existence {
 
-/// A stem of 10 cm and more at the first census.
+/// A stem above 10 cm at the first census.
 struct CensusStem {
   Eigen::Vector2f place_m;
   float radius_m = 0.0F;

@@ -55,6 +55,7 @@ std::vector<bool> mapped_points(const History& history) {
     for (const LookEvent& event : history.drives[k].looks)
       if (event.is_seen) ++seen[event.point];
   std::vector<bool> mapped;
+  mapped.reserve(seen.size());
   for (const int times : seen) mapped.push_back(times >= kMappedFrom);
   return mapped;
 }

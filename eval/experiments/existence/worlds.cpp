@@ -96,6 +96,7 @@ History make_history(const WorldSetting& setting, std::uint64_t seed) {
   for (int i = 0; i < setting.points; ++i)
     history.points_m.push_back(random_place(setting, random));
   std::vector<Segment> walls;
+  walls.reserve(static_cast<std::size_t>(setting.walls));
   for (int i = 0; i < setting.walls; ++i) walls.push_back(random_segment(setting, 15.0, random));
 
   Observer observer(setting, history.points_m, random);

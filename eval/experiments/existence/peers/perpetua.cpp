@@ -48,6 +48,7 @@ RateMixture em_step(const RateMixture& mixture,
   std::vector<double> members(components, 0.0), time_s(components, 0.0);
   for (const auto& drives : features) {
     std::vector<double> times;
+    times.reserve(drives.size());
     for (const SightingsOfDrive& drive : drives)
       times.push_back(drive.time_s - drives.front().time_s);
     const std::vector<double> likelihoods = likelihoods_of(drives);
