@@ -191,6 +191,43 @@ def map_merge(document):
                         f"(95 % bound: {number(300 / apart)} %)."]
 
 
+def existence(document):
+    """Which points still exist: worlds, occluders, births, Big Woods; all rows of the worlds folded."""
+    rows = document["rows"]
+    of = lambda part: [row for row in rows if row["part"] == part]
+    world = lambda row: (row["method"], number(row["missed_pct"], 0), number(row["changed_pct"], 0), row["drives"], row["points"],
+                         number(row["auc"], 4), number(row["average_precision"], 3), number(row["brier"], 4),
+                         number(row["found_at_1_pct"], 1), number(row["wrongly_removed_pct"]), number(row["gone_removed_pct"], 1),
+                         number(row["rest_auc"], 3))
+    head = ("method", "missed per drive %", "gone %", "drives", "points", "AUC", "average precision", "Brier",
+            "found at 1 % wrongly removed", "wrongly removed %", "gone removed %", "AUC of the rest")
+    lines = table(head, [world(row) for row in of("worlds") if row["changed_pct"] == 20])
+    lines += ["", *folded("all shares changed", table(head, [world(row) for row in of("worlds")]))]
+    lines += ["", *table(("occluder", "days since mapping", "ranges", "method", "hidden", "hidden removed %", "gone removed %"),
+                         [(part, number(row["gap_days"], 0), "yes" if row["has_ranges"] else "no", row["method"],
+                           row["hidden_points"], number(row["hidden_removed_pct"], 1), number(row["gone_removed_pct"], 1))
+                          for part in ("occlusion-trap", "clear-cut") for row in of(part)])]
+    lines += ["", *table(("Big Woods", "missed per drive %", "drives", "points", "AUC", "found at 1 % wrongly removed",
+                          "wrongly removed %", "gone removed %", "Brier"),
+                         [(row["method"], number(row["missed_pct"], 0), row["drives"], row["points"], number(row["auc"], 4),
+                           number(row["found_at_1_pct"], 1), number(row["wrongly_removed_pct"]), number(row["gone_removed_pct"], 1),
+                           number(row["brier"], 4)) for row in of("forest")])]
+    lines += ["", *table(("Big Woods without change", "missed per drive %", "drives", "wrongly removed %"),
+                         [(row["method"], number(row["missed_pct"], 0), row["drives"], number(row["wrongly_removed_pct"]))
+                          for row in of("forest-control") if row["drives"] == 5])]
+    lines += ["", *table(("false sightings % of looks", "method", "AUC", "gone removed %"),
+                         [(number(row["false_rate_pct"], 1), row["method"], number(row["auc"], 4), number(row["gone_removed_pct"], 1))
+                          for row in of("false-sightings")])]
+    lines += ["", *table(("births that are false %", "false in the map %", "real kept %"),
+                         [(number(row["false_pct"], 0), number(row["false_in_map_pct"]), number(row["real_kept_pct"], 1))
+                          for row in of("births")])]
+    for row in of("mortality"):
+        lines += ["", f"Mortality of {row['trees']} trees of Barro Colorado, {row['died']} of which died: "
+                      f"{number(row['rate_pct_per_year'])} +- {number(row['sigma_pct_per_year'])} % a year; deaths over tree years: "
+                      f"{number(row['plain_pct_per_year'])} %."]
+    return lines
+
+
 def place_recognition(document):
     """Frames of stems found again: a line per protocol, drive and map; then what no query has a match for."""
     rows = [row for row in document["rows"] if row["queries"] > 0]

@@ -60,6 +60,7 @@ SECTIONS = (
     ("loops-strangers", "Queries that have no match", None, render.loop_queries),
     ("loop-detectors", "Loop detectors and verifiers", "named in the thesis on submaps, §2.4, without figures",
      render.loop_detectors),
+    ("existence", "What is still there", None, render.existence),
     ("partition", "The map cut after a distance: town", f"{PARTITION}, Table 5.1", render.partition_all),
     ("partition-country", "The map cut after a distance: town to country", f"{PARTITION}, Table 5.2", render.partition_all),
     ("partition-loop", "The map cut after a distance, closed", f"{PARTITION}, Table 5.3", render.partition_all),

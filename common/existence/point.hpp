@@ -1,0 +1,403 @@
+// The probability that one map point still exists, and the shell from which it can be seen.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <stdexcept>
+
+#include "common/existence/model.hpp"
+#include "common/existence/odds.hpp"
+#include "common/existence/shell.hpp"
+
+namespace understory::existence {
+
+/// What the sensor measured along the ray to the point, where it has ranges.
+enum class Ray : std::uint8_t {
+  kUnknown,  ///< No range, or one at the point itself.
+  kBlocked,  ///< A return clearly in front of the point: hidden by something.
+  kPassed,   ///< A return clearly behind it: nothing on the ray.
+};
+
+/// One look at a point that is expected in view: within the field of view and the sensor's range.
+struct Look {
+  Eigen::Vector3f from_point_m;  ///< Sensor minus point, frame of the map.
+  Ray ray = Ray::kUnknown;       ///< Read by miss() only.
+};
+
+/// Range along the ray against the point's distance, both [m]; `tolerance_m`: what both may be off.
+inline Ray ray_of(double range_m, double distance_m, double tolerance_m) {
+  if (range_m < distance_m - tolerance_m) return Ray::kBlocked;
+  if (range_m > distance_m + tolerance_m) return Ray::kPassed;
+  return Ray::kUnknown;
+}
+
+/// All that is kept of a point, as plain numbers: the same bytes for the same point.
+template <Shell S>
+struct SavedPoint {
+  static constexpr std::uint32_t kVersion = 1;
+  std::uint32_t version = kVersion;
+  std::uint32_t shell_kind = S::kKind;
+  double log_odds = 0.0;
+  std::array<std::uint32_t, 3> pass{};  ///< Number, sectors and flags.
+  std::array<float, 8> numbers{};       ///< Of the pass; see PointExistence.
+  std::array<float, S::kNumbers> shell{};
+};
+
+/// Hidden variables: E (the point exists), D (this pass can see it, given E), V_f (the line of
+/// sight from direction f is free, given E). A look sees the point with q1 = eps + (1 - eps) p_d s
+/// where E, D and V_f hold, else with eps. Kept are P = p(E), d = p(D | E) and w_f = p(V_f | E, D);
+/// given E and D the V_f stay independent, so within a pass the recursion is Bayes' rule itself
+/// (thesis 003, Implementation 1 and 2, without its "seen means exists"):
+///
+///     q = w q1 + (1 - w) eps          qe = d q + (1 - d) eps
+///     miss:  P : 1-P  times  1-qe : 1-eps    d : 1-d  times  1-q : 1-eps    w : 1-w  times  1-q1 :
+///     1-eps hit:   P : 1-P  times  qe : eps        d : 1-d  times  q : eps        w : 1-w  times
+///     q1 : eps
+///
+/// At the end of a pass w <- d w + (1 - d) w(begin of the pass), and d <- v. Constant cost: no
+/// logarithm, no exponential, odds instead of log-odds.
+template <Shell S>
+class PointExistence {
+ public:
+  /// A point that is known from elsewhere: P is the model's prior.
+  static PointExistence known(const ExistenceModel& model) {
+    PointExistence point(model, odds_of(model.parameters().prior));
+    point.flags_ = kWasSure;
+    return point;
+  }
+  /// A point at its first sighting: P is the model's share of real births, and if it is one, the
+  /// pass and the line of sight are good. Throws std::invalid_argument as hit() does.
+  static PointExistence born(const ExistenceModel& model, const Look& look) {
+    PointExistence point(model, odds_of(model.birth()));
+    point.flags_ = kIsNew | kInFirstPass;
+    const double odds = point.odds_;
+    point.apply_hit(model, point.view_of(model, look));
+    point.odds_ = odds;
+    return point;
+  }
+
+  double probability() const { return probability_of(std::min(odds_, kMostOdds)); }
+  /// Of the pass that is open: up to 12 decades, so that a new pass begins at what probability()
+  /// gives.
+  double log_odds() const { return std::log(odds_); }
+  /// p(D | E): whether this pass can see the point.
+  double pass_visibility() const { return 1.0 / (1.0 + unseen_); }
+  /// Sectors of the shell (bits) from which this pass missed the point.
+  std::uint32_t missed_from() const { return missed_from_; }
+  const S& shell() const { return shell_; }
+
+  /// Expected and seen. Throws std::invalid_argument where the look is not finite or has no length.
+  void hit(ExistenceModel& model, const Look& look) {
+    enter_pass(model);
+    const View view = view_of(model, look);
+    learn_recall(model, view, true);
+    apply_hit(model, view);
+    last_hit_ = sector_of(view);
+  }
+
+  /// Expected and not seen. What was blocked says nothing of the point: P, d and w stay.
+  void miss(ExistenceModel& model, const Look& look) {
+    enter_pass(model);
+    const View view = view_of(model, look);
+    if (look.ray == Ray::kBlocked) return;
+    learn_recall(model, view, false);
+    apply_miss(model, view, look.ray == Ray::kPassed);
+    last_hit_ = kNowhere;
+    missed_from_ |= 1U << sector_of(view);
+  }
+
+  /// Time without looks. Only how much matters, not in how many parts (but for rounding).
+  void elapse(const ExistenceModel& model, const Elapsed& time) {
+    odds_ = bounded(survived(odds_, time.lost));
+    shell_.relax(static_cast<float>(model.parameters().visibility), time.moved);
+    gap_s_ += time.dt_s;
+  }
+
+  /// Ends the pass of this point, when nothing else will: before its state is read for good.
+  void enter_pass(ExistenceModel& model) {
+    if (pass_ != model.pass()) change_pass(model);
+  }
+
+  /// Between enter_pass() and the first look of a pass: P anew by what all points have taught about
+  /// v and lambda, and what this one teaches by its new P (a step of EM). A few rounds over all
+  /// points of a map settle; none are needed. Does nothing once the pass has looked.
+  void reconsider(ExistenceModel& model) {
+    if (pass_ != model.pass() || chance_missed_ < 1.0F || (flags_ & kInFirstPass) != 0) return;
+    const std::uint32_t missed_code = missed_code_;
+    const float decay_per_s = decay_per_s_;
+    expect_pass(model);
+    correct_odds(model, missed_code, decay_per_s);
+    const bool is_open = pending_missed_ > 0;
+    if (is_open) weigh(model, {static_cast<float>(1.0 - probability()), evidence_.since_s});
+  }
+
+  /// P after evidence from elsewhere (neighbours, other sensors): a factor on its odds. Throws
+  /// std::invalid_argument where it is not finite or below 0.
+  void multiply_odds(double ratio) {
+    if (!std::isfinite(ratio) || ratio < 0.0)
+      throw std::invalid_argument("existence: a likelihood ratio is not finite or below 0");
+    odds_ = bounded(odds_ * ratio);
+  }
+
+  SavedPoint<S> save() const {
+    SavedPoint<S> saved;
+    saved.log_odds = log_odds();
+    saved.pass = {pass_,
+                  rays_passed_ | (std::uint32_t{last_hit_} << 24) | (std::uint32_t{flags_} << 29),
+                  missed_from_ | (std::uint32_t{missed_code_} << 24)};
+    saved.numbers = {unseen_,
+                     chance_missed_,
+                     static_cast<float>(pending_seen_),
+                     static_cast<float>(pending_missed_),
+                     evidence_.went,
+                     evidence_.since_s,
+                     decay_per_s_,
+                     gap_s_};
+    shell_.store(saved.shell);
+    return saved;
+  }
+  /// Throws std::invalid_argument where the state is of another version or shell, or cannot be.
+  static PointExistence load(const ExistenceModel& model, const SavedPoint<S>& saved) {
+    PointExistence point(model, odds_of(model.parameters().prior));
+    bool is_good = saved.version == SavedPoint<S>::kVersion && saved.shell_kind == S::kKind &&
+                   std::isfinite(saved.log_odds) && point.shell_.restore(saved.shell);
+    for (const float number : saved.numbers)
+      is_good = is_good && std::isfinite(number) && number >= 0;
+    if (!is_good) throw std::invalid_argument("existence: a saved point that cannot be");
+    point.odds_ = bounded(std::exp(saved.log_odds));
+    point.pass_ = saved.pass[0];
+    point.rays_passed_ = saved.pass[1] & kSectors;
+    point.last_hit_ = (saved.pass[1] >> 24U) & 31U;
+    point.flags_ = (saved.pass[1] >> 29U) & 7U;
+    point.missed_from_ = saved.pass[2] & kSectors;
+    point.missed_code_ = (saved.pass[2] >> 24U) & 0xFFU;
+    point.unseen_ = saved.numbers[0];
+    point.chance_missed_ = saved.numbers[1];
+    point.pending_seen_ = static_cast<std::uint16_t>(std::min(65535.0F, saved.numbers[2]));
+    point.pending_missed_ = static_cast<std::uint16_t>(std::min(65535.0F, saved.numbers[3]));
+    point.evidence_ = {saved.numbers[4], saved.numbers[5]};
+    point.decay_per_s_ = saved.numbers[6];
+    point.gap_s_ = saved.numbers[7];
+    return point;
+  }
+
+ private:
+  /// A look, measured against the shell.
+  struct View {
+    typename S::Place place;
+    float distance_m = 0.0F;
+    double recall = 0.0;   ///< p_d s.
+    double visible = 0.0;  ///< w.
+  };
+  static constexpr std::uint32_t kNowhere = 31;
+  static constexpr std::uint32_t kSectors = 0xFFFFFF;
+  static constexpr std::uint32_t kIsNew = 1;  ///< What became of the birth is open.
+  static constexpr std::uint32_t kInFirstPass =
+      2;                                        ///< The pass that found it does not count for v.
+  static constexpr std::uint32_t kWasSure = 4;  ///< Surely seen in some pass: it was real.
+  static constexpr double kUnit = 256.0;        ///< Of pending passes.
+
+  PointExistence(const ExistenceModel& model, double odds)
+      : odds_(bounded(odds)),
+        shell_(model.rest_odds(), static_cast<float>(model.parameters().range_m)),
+        pass_(model.pass()) {
+    start_pass(model);
+  }
+
+  static double bounded(double odds) { return std::clamp(odds, kLeastOdds, kMostOddsInPass); }
+
+  /// 1 up to the reach, 0 from 1.25 times it on, smooth between.
+  static double within_reach(float distance_m, float reach_m) {
+    const float excess = std::clamp((distance_m / reach_m - 1.0F) * 4.0F, 0.0F, 1.0F);
+    return 1.0F - excess * excess * (3.0F - 2.0F * excess);
+  }
+
+  View view_of(const ExistenceModel& model, const Look& look) const {
+    const float squared = look.from_point_m.squaredNorm();
+    if (!(squared > 0.0F && squared < 1e12F))
+      throw std::invalid_argument("existence: a look without a finite distance");
+    View view;
+    view.distance_m = std::sqrt(squared);
+    view.place = shell_.locate(look.from_point_m / view.distance_m);
+    view.recall = model.recall().at(view.distance_m);
+    view.visible = probability_of(shell_.visibility_odds(view.place));
+    return view;
+  }
+
+  void apply_hit(const ExistenceModel& model, View view) {
+    const double eps = model.false_rate();
+    const float odds = shell_.visibility_odds(view.place);
+    if (odds < kOpenedOdds) {
+      shell_.multiply(view.place, kOpenedOdds / odds, model.rest_odds());
+      view.visible = probability_of(kOpenedOdds);
+    }
+    const double q1 = eps + (1.0 - eps) * view.recall;
+    const double q = view.visible * q1 + (1.0 - view.visible) * eps;
+    const double d = pass_visibility();
+    odds_ = bounded(odds_ * (d * q + (1.0 - d) * eps) / eps);
+    scale_unseen(eps / q);
+    count_look(1.0 - q);
+    if (model.parameters().learn_visibility)
+      shell_.multiply(view.place, static_cast<float>(q1 / eps), model.rest_odds());
+    shell_.extend(view.place, view.distance_m);
+  }
+
+  void apply_miss(const ExistenceModel& model, View view, bool ray_passed) {
+    const double eps = model.false_rate();
+    const double recall = view.recall * within_reach(view.distance_m, shell_.reach_m(view.place));
+    // A ray that went on behind the point shows that the line of sight is free.
+    const double visible = ray_passed ? 1.0 : view.visible;
+    const double unlike = 1.0 - visible * recall;  // (1 - q) / (1 - eps)
+    const double d = pass_visibility();
+    odds_ = bounded(odds_ * (1.0 - d * visible * recall));
+    scale_unseen(1.0 / unlike);
+    count_look(unlike * (1.0 - eps));
+    if (ray_passed)
+      count_ray(model, view);
+    else if (model.parameters().learn_visibility)
+      shell_.multiply(view.place, static_cast<float>(1.0 - recall), model.rest_odds());
+  }
+
+  /// Rays of one viewpoint in one pass pass a point for one reason: they count once.
+  void count_ray(const ExistenceModel& model, const View& view) {
+    const std::uint32_t bit = 1U << sector_of(view);
+    if ((rays_passed_ & bit) != 0) return;
+    rays_passed_ |= bit;
+    odds_ = bounded(odds_ * model.parameters().passed_by);
+  }
+
+  void count_look(double missed) {
+    chance_missed_ = std::max(1e-6F, chance_missed_ * static_cast<float>(missed));
+  }
+
+  void scale_unseen(double ratio) {
+    if (unseen_ > 0.0F) unseen_ = std::clamp(static_cast<float>(unseen_ * ratio), 1e-6F, 1e4F);
+  }
+
+  void learn_recall(ExistenceModel& model, const View& view, bool is_hit) {
+    const bool is_sure = last_hit_ == sector_of(view) && odds_ > 19.0 && unseen_ < 0.05F &&
+                         view.distance_m <= shell_.reach_m(view.place);
+    if (is_sure) model.recall().record_look(view.distance_m, is_hit);
+  }
+
+  void change_pass(ExistenceModel& model) {
+    shell_.end_pass(static_cast<float>(pass_visibility()));
+    // P as it was after the looks: time has lowered it since.
+    const double lost = lost_share(model.decay().mean_per_s(), gap_s_);
+    const double after = std::min(1.0, probability() / (1.0 - lost));
+    const bool was_looked_for = chance_missed_ < 0.2F;
+    if ((flags_ & kIsNew) != 0 && was_looked_for) {
+      model.record_birth(after);
+      flags_ &= ~kIsNew & 7U;
+    }
+    learn_from_pass(model, after, was_looked_for);
+    flags_ &= ~kInFirstPass & 7U;
+
+    const double still = (1.0 - static_cast<double>(evidence_.went)) * (1.0 - lost);
+    weigh(model, {static_cast<float>(1.0 - still), evidence_.since_s + gap_s_});
+    const std::uint32_t missed_code = missed_code_;
+    const float decay_per_s = decay_per_s_;
+    start_pass(model);
+    correct_odds(model, missed_code, decay_per_s);
+  }
+
+  /// Recall of passes and decay. What is open since the point was last surely seen counts with the
+  /// probability that it is still there.
+  void learn_from_pass(ExistenceModel& model, double after, bool was_looked_for) {
+    if (was_looked_for && (flags_ & kInFirstPass) == 0) {
+      const std::uint16_t seen = pending_seen_, missed = pending_missed_;
+      add_pending(pending_seen_, pass_visibility());
+      add_pending(pending_missed_, 1.0 - pass_visibility());
+      const double weight = (1.0 - static_cast<double>(evidence_.went)) / kUnit;
+      model.recall().record_passes(weight * (pending_seen_ - seen),
+                                   weight * (pending_missed_ - missed));
+    }
+    const bool is_sure = after > 0.9 && unseen_ < 1e-3F;
+    weigh(model, {is_sure ? 0.0F : static_cast<float>(1.0 - after), evidence_.since_s});
+    if (!is_sure) return;
+    flags_ |= kWasSure;
+    pending_seen_ = pending_missed_ = 0;
+    evidence_ = {};
+  }
+
+  /// What the point counts for is taken back and counted anew.
+  void weigh(ExistenceModel& model, const DecayEvidence& is) {
+    if ((flags_ & kWasSure) != 0) model.decay().replace(evidence_, is);
+    const double more =
+        (static_cast<double>(evidence_.went) - static_cast<double>(is.went)) / kUnit;
+    if (pending_seen_ + pending_missed_ > 0)
+      model.recall().record_passes(more * pending_seen_, more * pending_missed_);
+    evidence_ = is;
+  }
+
+  static void add_pending(std::uint16_t& count, double passes) {
+    count = static_cast<std::uint16_t>(std::min(65535.0, std::round(count + kUnit * passes)));
+  }
+
+  /// P by what is known of v and lambda now, since the point was last surely seen: each missed pass
+  /// weighs 1 - v, and the odds of having survived are those of lambda.
+  void correct_odds(const ExistenceModel& model, std::uint32_t missed_code, float decay_per_s) {
+    if ((flags_ & kWasSure) == 0 || pending_missed_ == 0) return;
+    const double missed = decoded(missed_code_) / decoded(missed_code);
+    odds_ *= std::pow(missed, pending_missed_ / kUnit);
+    const auto odds_of_survival = [&](double rate_per_s) {
+      return odds_of(1.0 - std::max(1e-9, lost_share(rate_per_s, evidence_.since_s)));
+    };
+    if (decay_per_s > 0.0F)
+      odds_ *= odds_of_survival(model.decay().mean_per_s()) / odds_of_survival(decay_per_s);
+    odds_ = bounded(std::min(odds_, kMostOdds));
+  }
+
+  static double missed_of(double pass_recall) { return std::max(0.005, 1.0 - pass_recall); }
+  /// A share of missed passes as a byte, to 1 %.
+  static std::uint32_t code_of(double missed) {
+    return static_cast<std::uint32_t>(std::round(-32.0 * std::log2(missed)));
+  }
+  static double decoded(std::uint32_t code) { return std::exp2(-static_cast<double>(code) / 32.0); }
+
+  /// d and lambda of the pass that begins.
+  void expect_pass(const ExistenceModel& model) {
+    const double v = model.recall().of_pass();
+    unseen_ = static_cast<float>((1.0 - v) / v);
+    missed_code_ = code_of(missed_of(v)) & 0xFFU;
+    decay_per_s_ = static_cast<float>(model.decay().mean_per_s());
+  }
+
+  void start_pass(const ExistenceModel& model) {
+    expect_pass(model);
+    chance_missed_ = 1.0F;
+    rays_passed_ = 0;
+    missed_from_ = 0;
+    last_hit_ = kNowhere;
+    gap_s_ = 0.0F;
+    pass_ = model.pass();
+    odds_ = std::min(odds_, kMostOdds);
+    shell_.begin_pass();
+  }
+
+  std::uint32_t sector_of(const View& view) const {
+    return static_cast<std::uint32_t>(shell_.sector(view.place));
+  }
+
+  double odds_;  ///< P / (1 - P).
+  S shell_;
+  std::uint32_t pass_;
+  std::uint32_t rays_passed_ : 24 = 0;     ///< Sectors whose rays passed the point in this pass.
+  std::uint32_t last_hit_ : 5 = kNowhere;  ///< Sector of the pass's last look, if it was a hit.
+  std::uint32_t flags_ : 3 = 0;
+  std::uint32_t missed_from_ : 24 = 0;  ///< Sectors of this pass with misses.
+  std::uint32_t missed_code_ : 8 = 0;   ///< 1 - v as it was when the pass began; see code_of().
+  float unseen_ = 0.0F;                 ///< (1 - d) / d.
+  float chance_missed_ = 1.0F;          ///< Of a pass that can see it, up to now.
+  std::uint16_t pending_seen_ = 0;      ///< Passes since the last that surely saw the point,
+  std::uint16_t pending_missed_ = 0;    ///< in parts of 1 / 256.
+  DecayEvidence evidence_;              ///< Up to the begin of this pass.
+  float decay_per_s_ = 0.0F;            ///< lambda as it was when the pass began.
+  float gap_s_ = 0.0F;                  ///< Since this pass began, without looks.
+};
+
+}  // namespace understory::existence
