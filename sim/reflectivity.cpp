@@ -31,6 +31,8 @@ Surface surface_of(ObjectClass kind) {
       return {0.25, 0.05};
     case ObjectClass::kPerson:
       return {0.35, 0.2};
+    case ObjectClass::kFurniture:
+      return {0.40, 0.1};
   }
 
   return {0.3, 0.1};

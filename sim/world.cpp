@@ -119,6 +119,11 @@ ObjectClass World::kind(ObjectId object) const {
   return object == kGroundObject ? ObjectClass::kGround : objects_[object].kind;
 }
 
+const Stem* World::stem(ObjectId object) const {
+  const Object& entry = objects_[object];
+  return entry.shape == Shape::kStem ? &stems_[entry.index] : nullptr;
+}
+
 std::optional<SurfaceHit> World::meet_object(const Ray& ray, ObjectId object, double time_s,
                                              std::uint64_t luck) const {
   const Object& entry = objects_[object];

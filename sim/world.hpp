@@ -24,6 +24,7 @@ enum class ObjectClass : std::uint8_t {
   kWall,  ///< Of a house; two of them meet in a corner.
   kCar,
   kPerson,
+  kFurniture,  ///< Desks, racks, boxes, tanks: what stands in a room or lies in a wood.
 };
 
 /// Index of an object in its world; the ground has none of its own.
@@ -97,6 +98,8 @@ class World {
   const Bounds& bounds(ObjectId object) const { return objects_[object].bounds; }
   /// Whether the object is a walker.
   bool moves(ObjectId object) const { return objects_[object].shape == Shape::kWalker; }
+  /// The shape of a trunk, pole, branch or tank; null where the object has another one.
+  const Stem* stem(ObjectId object) const;
 
   /// The trunks and poles added by add_trunk(), in order.
   std::span<const TrueTrunk> trunks() const { return trunks_; }
