@@ -42,7 +42,7 @@ Surface surface_of(ObjectClass kind) {
 
 Reflection reflection_of(const World& world, const RayHit& hit) {
   const Surface surface = surface_of(world.kind(hit.object));
-  const double shade = 0.6 + 0.8 * uniform_of(mixed(hit.object));
+  const double shade = 0.6 + 0.8 * uniform_of(mixed(world.key(hit.object)));
   return {std::min(1.0, surface.reflectivity * shade), std::max(hit.cosine, surface.least_cosine)};
 }
 

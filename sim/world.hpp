@@ -98,6 +98,13 @@ class World {
   const Bounds& bounds(ObjectId object) const { return objects_[object].bounds; }
   /// Whether the object is a walker.
   bool moves(ObjectId object) const { return objects_[object].shape == Shape::kWalker; }
+  /// What chance goes by where rays meet the object: which leaf stops one, how bright it is. Its
+  /// id, unless set_key() gave another one.
+  std::uint64_t key(ObjectId object) const {
+    return object == kGroundObject ? kGroundObject : objects_[object].key;
+  }
+  /// Gives the object a key that outlasts its id, so that it looks the same in another world.
+  void set_key(ObjectId object, std::uint64_t key) { objects_[object].key = key; }
   /// The shape of a trunk, pole, branch or tank; null where the object has another one.
   const Stem* stem(ObjectId object) const;
 
@@ -120,6 +127,7 @@ class World {
     ObjectClass kind = ObjectClass::kTrunk;
     Shape shape = Shape::kStem;
     std::uint32_t index = 0;  ///< Among the objects of its shape.
+    std::uint64_t key = 0;
   };
   ObjectId add_object(ObjectClass kind, Shape shape, std::size_t index, const Bounds& bounds);
 

@@ -24,6 +24,7 @@ struct ChangesOptions {
   std::string world = "office";
   std::string out;
   bool no_lidar = false;
+  int clear_cut = 0;  ///< Trees; 0: changes by lot instead.
   int copies = 3;
   std::uint64_t seed = 1;
   changes::CourseParameters course;
@@ -49,10 +50,13 @@ changes::CameraParameters camera_of(const ChangesOptions& options, changes::Scen
 changes::Diff diff_of(const changes::Course& course, const ChangesOptions& options, int copy) {
   constexpr changes::ThingId kIdsPerCopy = 10'000;
   if (copy == 0) return {};
-  const auto number = static_cast<std::uint64_t>(copy);
-  return changes::make_diff(
-      course, options.diff, sim::mixed(options.seed, number),
-      course.scene.next_id + static_cast<changes::ThingId>(copy - 1) * kIdsPerCopy);
+  const std::uint64_t seed = sim::mixed(options.seed, static_cast<std::uint64_t>(copy));
+  const changes::ThingId first_id =
+      course.scene.next_id + static_cast<changes::ThingId>(copy - 1) * kIdsPerCopy;
+  if (options.clear_cut == 0) return changes::make_diff(course, options.diff, seed, first_id);
+  changes::ClearCutParameters patch;
+  patch.felled = options.clear_cut;
+  return changes::make_clear_cut(course, patch, seed, first_id);
 }
 
 void write_log(const changes::Replay& replay, const ChangesOptions& options,
@@ -67,6 +71,8 @@ void write_log(const changes::Replay& replay, const ChangesOptions& options,
 
 void write_data_set(const ChangesOptions& options) {
   const changes::SceneKind kind = scene_of(options);
+  if (options.clear_cut > 0 && kind != changes::SceneKind::kForest)
+    wrong_usage(fmt::format("--clear-cut: there are no trees in --world {}", options.world));
   const changes::CameraParameters camera = camera_of(options, kind);
   const changes::Course course = changes::make_course(kind, options.course, options.seed);
   changes::DataSetWriter writer(
@@ -121,6 +127,12 @@ void add_diff_options(CLI::App& command, ChangesOptions& options) {
       ->capture_default_str();
   command.add_option("--added", options.diff.added_share, "New objects per removed one")
       ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str();
+  command
+      .add_option("--clear-cut", options.clear_cut,
+                  "forest: instead of all these, fell so many neighbours and park a lorry that "
+                  "hides about 20 others")
+      ->check(CLI::Range(0, 100'000))
       ->capture_default_str();
   command.add_option("--hiding", options.diff.occluders, "Lorries or carts parked beside the path")
       ->check(CLI::Range(0, 100))

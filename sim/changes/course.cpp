@@ -34,11 +34,22 @@ void furnish(Scene& scene, FreeSpace& space, std::span<const Furnishing> furnish
   }
 }
 
-Thing structure_of(std::vector<Part> parts) {
+Thing structure_of(const Part& part, const Box& extent) {
   Thing thing;
   thing.kind = ThingKind::kStructure;
-  thing.parts = std::move(parts);
+  thing.parts = {part};
+  thing.extent = extent;
   return thing;
+}
+
+Thing wall_of(const Wall& wall) {
+  const Eigen::Vector2d side = wall.to_m - wall.from_m;
+  const Eigen::Vector2d middle = wall.from_m + 0.5 * side;
+  Box extent;
+  extent.centre_m << middle, 0.5 * (wall.low_m + wall.high_m);
+  extent.half_size_m << 0.5 * side.norm(), 0.0, 0.5 * (wall.high_m - wall.low_m);
+  extent.heading_rad = std::atan2(side.y(), side.x());
+  return structure_of(wall, extent);
 }
 
 /// Four walls, each with its outside towards the room, and a ceiling. The floor is the ground.
@@ -48,7 +59,7 @@ void add_room(Scene& scene) {
   const std::vector<Eigen::Vector2d> corners{
       low.head<2>(), {low.x(), high.y()}, high.head<2>(), {high.x(), low.y()}};
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    scene.add(structure_of({Wall{corners[i], corners[(i + 1) % 4], low.z(), high.z()}}));
+    scene.add(wall_of({corners[i], corners[(i + 1) % 4], low.z(), high.z()}));
   }
 
   Box ceiling;
@@ -56,7 +67,7 @@ void add_room(Scene& scene) {
   ceiling.half_size_m = 0.5 * (high - low) + Eigen::Vector3d(0.1, 0.1, 0.0);
   ceiling.half_size_m.z() = 0.05;
   ceiling.centre_m.z() = high.z() + 0.05;
-  scene.add(structure_of({ceiling}));
+  scene.add(structure_of(ceiling, ceiling));
 }
 
 /// Evens out jumps of speed at the ends: from 0 to 1 with no speed and no acceleration there.

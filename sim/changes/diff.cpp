@@ -190,9 +190,9 @@ Diff make_diff(const Course& course, const DiffParameters& parameters, std::uint
   return maker.take();
 }
 
-Diff make_clear_cut(const Course& course, const ClearCutParameters& parameters,
-                    std::uint64_t seed) {
-  DiffMaker maker(course, seed, 0);
+Diff make_clear_cut(const Course& course, const ClearCutParameters& parameters, std::uint64_t seed,
+                    ThingId first_id) {
+  DiffMaker maker(course, seed, first_id);
   const auto path = maker.path_m();
   const Eigen::Vector2d middle_of_all = 0.5 * (course.scene.low_m + course.scene.high_m).head<2>();
   std::uniform_int_distribution<std::size_t> draw(0, path.size() - 1);

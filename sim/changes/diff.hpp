@@ -53,7 +53,8 @@ struct ClearCutParameters {
 /// Fells neighbours and parks the lorry between the path and other trees, of which it is placed to
 /// hide as many as it can up to `hidden`. Throws std::runtime_error where there are not as many
 /// trees or no room for a lorry.
-Diff make_clear_cut(const Course& course, const ClearCutParameters& parameters, std::uint64_t seed);
+Diff make_clear_cut(const Course& course, const ClearCutParameters& parameters, std::uint64_t seed,
+                    ThingId first_id = 0);
 
 /// The changed copy. What the diff names and is not there is passed over.
 Scene changed(const Scene& scene, const Diff& diff);

@@ -114,7 +114,12 @@ BuiltScene build(const Scene& scene) {
   for (const Thing& thing : scene.things) {
     PartBuilder builder(world, thing, random_of_thing(scene, thing.id, kShapePurpose));
     for (const Part& part : thing.parts) std::visit(builder, part);
+    const std::size_t first = built.thing_of_object.size();
     built.thing_of_object.resize(world.object_count(), thing.id);
+    for (std::size_t i = first; i < world.object_count(); ++i) {
+      const std::uint64_t key = (std::uint64_t{thing.id} << 32) + (i - first);
+      world.set_key(static_cast<ObjectId>(i), key);
+    }
   }
   built.world = std::make_shared<const World>(std::move(world));
   return built;

@@ -100,8 +100,8 @@ struct BuiltScene {
     return object == kGroundObject ? kGroundThing : thing_of_object[object];
   }
 };
-/// Builds the world. A thing has the same shape in every copy of the scene; only the leaves that a
-/// single ray meets are drawn anew.
+/// Builds the world. A thing has the same shape, and stops the same rays with its leaves, in every
+/// copy of the scene.
 BuiltScene build(const Scene& scene);
 
 /// Generator of the random numbers of one thing for one purpose.
