@@ -59,8 +59,8 @@ changes::Diff diff_of(const changes::Course& course, const ChangesOptions& optio
   return changes::make_clear_cut(course, patch, seed, first_id);
 }
 
-void write_log(const changes::Replay& replay, const ChangesOptions& options,
-               changes::SceneKind kind, std::uint64_t seed, changes::DataSetWriter& writer) {
+void write_copy_log(const changes::Replay& replay, const ChangesOptions& options,
+                    changes::SceneKind kind, std::uint64_t seed, changes::DataSetWriter& writer) {
   if (options.no_lidar) return;
   sim::SensorDrive drive = replay.sensors(changes::suite_for(kind), seed);
   terminal::Progress progress("LIDAR and IMU", drive.motion().duration_s());
@@ -91,7 +91,7 @@ void write_data_set(const ChangesOptions& options) {
       });
     }
     writer.add(drive, replay.copy());
-    write_log(replay, options, kind, seed, writer);
+    write_copy_log(replay, options, kind, seed, writer);
     fmt::print("copy_{}: {} frames, {} removed, {} moved, {} new, {} that hide\n", copy,
                drive.frames.size(), diff.removed.size(), diff.moved.size(), diff.added.size(),
                diff.occluders.size());

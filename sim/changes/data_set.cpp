@@ -231,7 +231,7 @@ std::filesystem::path DataSetReader::whole_file(int copy, std::string_view name)
                                   [&](const DataSetFile& file) { return file.name == full; });
   if (entry == files_.end())
     throw io::DataError(fmt::format("{}: has no {}", (folder_ / kManifestName).string(), full));
-  const std::filesystem::path path = folder_ / full;
+  std::filesystem::path path = folder_ / full;
   const std::uint64_t bytes = size_of(path);
   if (bytes != entry->bytes)
     throw io::DataError(
