@@ -35,7 +35,8 @@ struct AbsolutePose {
   bool is_found = false;
   Eigen::Isometry3d camera_T_map = Eigen::Isometry3d::Identity();
   /// Order (rotation, translation) [rad, m], left perturbation: exp(rotation) and translation in
-  /// `camera`. From sigma_rad and the inliers.
+  /// `camera`, so the second block is also that of the camera's place in the map, in its own axes.
+  /// From sigma_rad and the inliers.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   std::vector<std::uint32_t> inliers;  ///< Indices of pairs, ascending.
   double rms_rad = 0.0;                ///< Of the inliers' angles, per axis.

@@ -78,7 +78,9 @@ Relocalisation relocalise(const changes::CameraFrame& frame,
   result.position_error_m = (map_T_camera.translation() - truth.translation()).norm();
   const Eigen::Matrix3d turn = map_T_camera.linear().transpose() * truth.linear();
   result.rotation_error_rad = Eigen::AngleAxisd(turn).angle();
-  result.is_success = result.position_error_m <= parameters.success_m &&
+  const double variance_m2 = result.pose.covariance.bottomRightCorner<3, 3>().trace();
+  result.is_accepted = variance_m2 <= parameters.max_sigma_m * parameters.max_sigma_m;
+  result.is_success = result.is_accepted && result.position_error_m <= parameters.success_m &&
                       result.rotation_error_rad <= parameters.success_rad;
   return result;
 }

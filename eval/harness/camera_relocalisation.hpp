@@ -22,6 +22,7 @@ struct RelocalisationParameters {
   int max_distance = 70;  ///< Bits of 256.
   double ratio = 0.85;    ///< The best distance is at most this share of the second best one.
   geometry::AbsolutePoseParameters pose{.threshold_rad = 0.006, .sigma_rad = 0.0015};
+  double max_sigma_m = 0.15;  ///< Of the place, all axes together: less certain is not found.
   double success_m = 0.25;
   double success_rad = 0.035;
 };
@@ -44,7 +45,8 @@ struct Relocalisation {
   std::size_t matches = 0;
   double position_error_m = 0.0;  ///< Of the camera's place; 0 where no pose was found.
   double rotation_error_rad = 0.0;
-  bool is_success = false;  ///< Found, and within the limits.
+  bool is_accepted = false;  ///< Found, and certain enough by its own covariance.
+  bool is_success = false;   ///< Accepted, and within the limits.
 };
 
 /// Descriptors, then P3P in RANSAC with the pixels of the left image. The frame's true pose (its

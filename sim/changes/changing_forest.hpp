@@ -13,7 +13,7 @@ namespace understory::sim::changes {
 /// The forest, and how fast it changes.
 struct ChangingForestParameters {
   /// The forest around the path reaches farther than a trunk can be found.
-  CourseParameters course{.length_m = 300.0, .margin_m = 60.0};
+  CourseParameters course{.length_m = 300.0, .margin_m = 60.0, .forest = ForestKind::kIntermediate};
   int drives = 6;            ///< The first one maps.
   double share = 0.1;        ///< Of the trees are felled between two drives.
   double added_share = 1.0;  ///< New trees per felled one.

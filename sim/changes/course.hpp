@@ -38,11 +38,11 @@ struct Course {
 /// Size of a course. What is 0 has a value of its own in each scene.
 struct CourseParameters {
   int laps = 1;
-  double speed_mps = 0.0;     ///< 0: 0.5 m/s in rooms, 2 m/s in the forest.
-  double standstill_s = 3.0;  ///< At the start, where an IMU is calibrated.
-  double length_m = 150.0;    ///< Forest: circumference of the circle that is driven.
-  double margin_m = 40.0;     ///< Forest around it.
-  ForestKind forest = ForestKind::kIntermediate;
+  double speed_mps = 0.0;                  ///< 0: 0.5 m/s in rooms, 2 m/s in the forest.
+  double standstill_s = 3.0;               ///< At the start, where an IMU is calibrated.
+  double length_m = 150.0;                 ///< Forest: circumference of the circle that is driven.
+  double margin_m = 40.0;                  ///< Forest around it.
+  ForestKind forest = ForestKind::kDense;  ///< Where a camera has several trunks in view.
 };
 
 /// A forest with parked cars and piles of logs, an office, or a module of a space station, and a

@@ -16,6 +16,7 @@ namespace {
 using std::numbers::pi;
 
 constexpr double kDiffSpacing = 0.25;  ///< Of the path, where room is looked for [m].
+constexpr int kTriesForOccluder = 4000;
 constexpr std::array<std::string_view, 4> kStateNames{"present", "gone", "moved", "new"};
 
 /// Draws one diff, step by step.
@@ -63,7 +64,7 @@ class DiffMaker {
 
   void add_occluders(int count) {
     for (int i = 0; i < count; ++i) {
-      auto thing = place(scene_, ThingKind::kLorry, space_, random_);
+      auto thing = place(scene_, ThingKind::kLorry, space_, random_, kTriesForOccluder);
       if (thing) take_in(*thing, diff_.occluders);
     }
   }
@@ -185,8 +186,9 @@ Diff make_diff(const Course& course, const DiffParameters& parameters, std::uint
                ThingId first_id) {
   DiffMaker maker(course, seed, first_id);
   maker.change(parameters);
-  maker.add(parameters.added_share);
+  // They need more room than anything else.
   maker.add_occluders(parameters.occluders);
+  maker.add(parameters.added_share);
   return maker.take();
 }
 
@@ -227,6 +229,8 @@ Scene changed(const Scene& scene, const Diff& diff) {
   }
   copy.things.insert(copy.things.end(), diff.added.begin(), diff.added.end());
   copy.things.insert(copy.things.end(), diff.occluders.begin(), diff.occluders.end());
+  std::sort(copy.things.begin(), copy.things.end(),
+            [](const Thing& a, const Thing& b) { return a.id < b.id; });
   copy.next_id = std::max(copy.next_id, diff.next_id);
   return copy;
 }

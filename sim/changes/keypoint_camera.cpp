@@ -99,7 +99,7 @@ bool CameraParameters::sees(const Eigen::Vector3d& camera_point_m) const {
 CameraParameters camera_for(SceneKind kind) {
   CameraParameters camera;
   if (kind != SceneKind::kForest) return camera;
-  camera.far_m = 20.0;
+  camera.far_m = 25.0;
   camera.baseline_m = 0.3;
   camera.body_T_camera = CameraParameters::looking_ahead({1.6, 0.0, 1.5});
   return camera;

@@ -48,7 +48,7 @@ struct CameraParameters {
   /// Whether a point in `camera` is in the frustum: within the left image, between near and far.
   bool sees(const Eigen::Vector3d& camera_point_m) const;
 };
-/// The camera that suits a scene: on the roof of the car with a far limit of 20 m in a forest.
+/// The camera that suits a scene: on the roof of the car with a far limit of 25 m in a forest.
 CameraParameters camera_for(SceneKind kind);
 
 /// What the detector gives. The last two fields are truth: `thing` is what a segmentation camera

@@ -22,7 +22,7 @@ Rate relocalise_all(const ChangedDrive& drive, const std::vector<MappedKeypoint>
     const Relocalisation result = relocalise(frame, drive.camera, map, {}, frame.number);
     ++rate.frames;
     rate.found += result.is_success ? 1 : 0;
-    rate.wrong += result.pose.is_found && !result.is_success ? 1 : 0;
+    rate.wrong += result.is_accepted && !result.is_success ? 1 : 0;
     rate.iterations += result.pose.iterations;
   }
   return rate;
