@@ -108,7 +108,7 @@ void simulate_changes(const ChangesOptions& options) {
   } catch (const io::LogError& error) {
     fail(error.what());
   } catch (const terminal::Interrupted& error) {
-    fail(fmt::format("sim changes: {}; {} is not complete", error.what(), options.out));
+    fail(fmt::format("sim changes: {}; {} was not written", error.what(), options.out));
   } catch (const std::runtime_error& error) {
     if (dynamic_cast<const CLI::Error*>(&error) != nullptr) throw;
     fail(fmt::format("sim changes --world {}: {}", options.world, error.what()));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <span>
+#include <stdexcept>
 
 #include "sim/changes/placing.hpp"
 #include "sim/forest_world.hpp"
@@ -118,13 +119,12 @@ RecordedPath round_the_room(const Scene& scene, const CourseParameters& paramete
     const double angle = 2.0 * pi * along_m / lap_m;
     const Eigen::Vector2d at =
         middle + half.cwiseProduct(Eigen::Vector2d(std::cos(angle), std::sin(angle)));
-    const double lap = std::floor(angle / (2.0 * pi));
     const Eigen::Vector2d ahead(-half.x() * std::sin(angle), half.y() * std::cos(angle));
     double heading = std::atan2(ahead.y(), ahead.x());
     // Unwrapped: it begins at pi/2 and rises by 2 pi a lap.
     const double wanted = 0.5 * pi + angle;
     heading += 2.0 * pi * std::round((wanted - heading) / (2.0 * pi));
-    const double z = 1.35 + 0.2 * std::sin(2.0 * pi * along_m / 6.1 + lap);
+    const double z = 1.35 + 0.2 * std::sin(2.0 * pi * along_m / 6.1);
     return gazing({at.x(), at.y(), z}, heading, along_m);
   });
 }
@@ -270,6 +270,8 @@ std::vector<Eigen::Vector3d> RecordedPath::places_m(double spacing_m) const {
 }
 
 Course make_course(SceneKind kind, const CourseParameters& parameters, std::uint64_t seed) {
+  if (parameters.laps < 1 || !(parameters.length_m > 0.0))
+    throw std::runtime_error("a course has a lap at least, and a length");
   return kind == SceneKind::kForest ? forest_course(parameters, seed)
                                     : furnished_room(kind, parameters, seed);
 }

@@ -21,6 +21,7 @@ using Json = nlohmann::ordered_json;
 constexpr std::string_view kFormatName = "understory changed drives";
 constexpr int kFormatVersion = 1;
 constexpr std::string_view kManifestName = "manifest.json";
+constexpr std::string_view kReadMeName = "README.txt";
 constexpr double kSurfacePerM2 = 100.0;
 
 constexpr std::string_view kReadMe =
@@ -154,6 +155,14 @@ DataSetWriter::DataSetWriter(std::filesystem::path folder, DataSetInfo info)
     throw io::DataError(fmt::format("{}: is not an empty folder", folder_.string()));
 }
 
+DataSetWriter::~DataSetWriter() {
+  if (is_whole_) return;
+  std::error_code ignored;  // a destructor has nobody to tell
+  for (int copy = 0; copy < copies_; ++copy)
+    std::filesystem::remove_all(folder_ / copy_name(copy), ignored);
+  std::filesystem::remove(folder_ / kReadMeName, ignored);
+}
+
 void DataSetWriter::write(std::string_view name, std::string_view text) {
   io::write_whole_file(path_in_copy(name), text);
   add_file(name);
@@ -180,7 +189,7 @@ void DataSetWriter::add(const ChangedDrive& drive, const Stage& copy) {
 }
 
 void DataSetWriter::commit() {
-  io::write_whole_file(folder_ / "README.txt", kReadMe);
+  io::write_whole_file(folder_ / kReadMeName, kReadMe);
   Json files = Json::array();
   for (const DataSetFile& file : files_)
     files.push_back({{"name", file.name}, {"bytes", file.bytes}});
@@ -196,6 +205,7 @@ void DataSetWriter::commit() {
                       {"camera", json_of(info_.camera)},
                       {"files", files}};
   io::write_whole_file(folder_ / kManifestName, manifest.dump(2) + "\n");
+  is_whole_ = true;
 }
 
 DataSetReader::DataSetReader(std::filesystem::path folder) : folder_(std::move(folder)) {

@@ -26,11 +26,15 @@ struct DataSetFile {
   std::uint64_t bytes = 0;  ///< Its size.
 };
 
-/// Writes a data set. manifest.json comes last: a folder without it is not complete.
+/// Writes a data set, whole or not at all: manifest.json comes last, and without commit() the
+/// copies are removed again.
 class DataSetWriter {
  public:
   /// Makes the folder. Throws io::DataError where it cannot be made or is not empty.
   DataSetWriter(std::filesystem::path folder, DataSetInfo info);
+  ~DataSetWriter();
+  DataSetWriter(const DataSetWriter&) = delete;
+  DataSetWriter& operator=(const DataSetWriter&) = delete;
 
   /// Writes the tables and the cloud of the next copy; the first one is the unchanged one. Throws
   /// io::DataError.
@@ -49,6 +53,7 @@ class DataSetWriter {
   DataSetInfo info_;
   int copies_ = 0;
   std::vector<DataSetFile> files_;
+  bool is_whole_ = false;
 };
 
 /// Reads a data set.

@@ -164,6 +164,17 @@ TEST_CASE("a table that is cut at the end of a line disagrees with the others") 
   CHECK_THROWS_WITH(parse_drive(cut, data.camera), Contains("poses, line 1"));
 }
 
+TEST_CASE("without commit nothing is left behind") {
+  const Written data;
+  const Scratch scratch("data-set-half");
+  {
+    DataSetWriter writer(scratch.path(), {SceneKind::kOffice, 7, 0.2, 0.5, data.camera});
+    writer.add(data.before, data.unchanged.copy());
+    CHECK_FALSE(std::filesystem::is_empty(scratch.path()));
+  }
+  CHECK(std::filesystem::is_empty(scratch.path()));
+}
+
 TEST_CASE("no data set where there is no manifest, another file, or something already") {
   const Written data;
   const Scratch scratch("data-set-folder");

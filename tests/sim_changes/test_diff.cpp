@@ -54,7 +54,9 @@ TEST_CASE("a course is furnished, its path is free, and the seed decides all of 
 
 TEST_CASE("the body has five degrees of freedom in rooms: it never rolls") {
   for (const SceneKind kind : {SceneKind::kOffice, SceneKind::kStation}) {
-    const Course course = course_of(kind);
+    CourseParameters parameters;
+    parameters.laps = 2;
+    const Course course = make_course(kind, parameters, 1);
     double least_pitch = 0.0, most_pitch = 0.0, least_z = 1e9, most_z = 0.0;
     for (const auto& pose : course.path.poses) {
       REQUIRE(pose[3] == 0.0);
@@ -72,6 +74,16 @@ TEST_CASE("the body has five degrees of freedom in rooms: it never rolls") {
       REQUIRE(std::abs(step[5]) / course.path.step_s < 2.0);
     }
   }
+}
+
+TEST_CASE("no course without a lap or a length") {
+  CourseParameters parameters;
+  parameters.laps = 0;
+  for (const SceneKind kind : kAllScenes)
+    CHECK_THROWS_AS(make_course(kind, parameters, 1), std::runtime_error);
+  parameters = {};
+  parameters.length_m = 0.0;
+  CHECK_THROWS_AS(make_course(SceneKind::kForest, parameters, 1), std::runtime_error);
 }
 
 TEST_CASE("a recorded path is replayed: velocity and rates are the derivatives of the pose") {
