@@ -31,6 +31,8 @@ Surface surface_of(ObjectClass kind) {
       return {0.25, 0.05};
     case ObjectClass::kPerson:
       return {0.35, 0.2};
+    case ObjectClass::kFurniture:
+      return {0.40, 0.1};
   }
 
   return {0.3, 0.1};
@@ -40,7 +42,7 @@ Surface surface_of(ObjectClass kind) {
 
 Reflection reflection_of(const World& world, const RayHit& hit) {
   const Surface surface = surface_of(world.kind(hit.object));
-  const double shade = 0.6 + 0.8 * uniform_of(mixed(hit.object));
+  const double shade = 0.6 + 0.8 * uniform_of(mixed(world.key(hit.object)));
   return {std::min(1.0, surface.reflectivity * shade), std::max(hit.cosine, surface.least_cosine)};
 }
 

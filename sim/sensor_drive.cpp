@@ -9,10 +9,15 @@ namespace understory::sim {
 SensorDrive::SensorDrive(Scenario scenario, const VehicleParameters& vehicle,
                          const SpeedParameters& speed, SensorSuite suite, std::uint64_t seed,
                          model::Utime utime_of_start)
+    : SensorDrive(scenario, VehicleMotion(scenario.route, scenario.world->ground(), vehicle, speed),
+                  std::move(suite), seed, utime_of_start) {}
+
+SensorDrive::SensorDrive(Scenario scenario, VehicleMotion motion, SensorSuite suite,
+                         std::uint64_t seed, model::Utime utime_of_start)
     : scenario_(std::move(scenario)),
       suite_(std::move(suite)),
       utime_of_start_(utime_of_start),
-      motion_(scenario_.route, scenario_.world->ground(), vehicle, speed) {
+      motion_(std::move(motion)) {
   if (suite_.imu) imu_.emplace(*suite_.imu, seed);
   if (suite_.wheels) wheels_.emplace(*suite_.wheels, seed);
   if (suite_.gnss) gnss_.emplace(*suite_.gnss, seed);

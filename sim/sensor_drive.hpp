@@ -55,6 +55,11 @@ class SensorDrive {
               std::uint64_t seed)
       : SensorDrive(std::move(scenario), VehicleParameters{}, speed, std::move(suite), seed) {}
 
+  /// The same along a motion that was recorded before; the scenario's route only says where that
+  /// leads in the plan.
+  SensorDrive(Scenario scenario, VehicleMotion motion, SensorSuite suite, std::uint64_t seed,
+              model::Utime utime_of_start = 0);
+
   /// The next reading; none at the end of the drive.
   std::optional<SensorReading> next();
   /// Passes the next reading by, which is quick: no sweep and no scan is made. False at the end.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace understory::sim {
 namespace {
@@ -193,6 +194,15 @@ VehicleMotion::VehicleMotion(const Route& route, const Ground& ground,
     points.push_back(point);
   }
   pose_ = UniformSpline<6>(std::move(points), kMotionStep);
+}
+
+VehicleMotion VehicleMotion::replayed(std::vector<UniformSpline<6>::Vector> poses, double step_s) {
+  VehicleMotion motion;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    motion.driven_m_ += (poses[i] - poses[i - 1]).head<3>().norm();
+  }
+  motion.pose_ = UniformSpline<6>(std::move(poses), step_s);
+  return motion;
 }
 
 VehicleState VehicleMotion::at(double time_s) const {

@@ -66,6 +66,10 @@ class VehicleMotion {
   /// Simulates the drive along `route` on `ground`.
   VehicleMotion(const Route& route, const Ground& ground, const VehicleParameters& vehicle,
                 const SpeedParameters& speed);
+  /// A recorded motion, whatever made it (a body that flies, say): `poses` are (x, y, z, roll,
+  /// pitch, yaw) in `world`, yaw unwrapped, every `step_s` [s] from time 0; at least one. The
+  /// motion is the smooth curve that UniformSpline draws through them.
+  static VehicleMotion replayed(std::vector<UniformSpline<6>::Vector> poses, double step_s);
 
   /// From the first to the last instant, both stationary.
   double duration_s() const { return pose_.end(); }
@@ -77,6 +81,8 @@ class VehicleMotion {
   const VehicleParameters& parameters() const { return vehicle_; }
 
  private:
+  VehicleMotion() = default;
+
   VehicleParameters vehicle_;
   UniformSpline<6> pose_;  ///< x, y, z, roll, pitch, yaw (unwrapped).
   double driven_m_ = 0.0;

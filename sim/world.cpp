@@ -36,7 +36,7 @@ Stem Walker::at(double time_s) const {
 }
 
 ObjectId World::add_object(ObjectClass kind, Shape shape, std::size_t index, const Bounds& bounds) {
-  objects_.push_back({bounds, kind, shape, static_cast<std::uint32_t>(index)});
+  objects_.push_back({bounds, kind, shape, static_cast<std::uint32_t>(index), objects_.size()});
   return static_cast<ObjectId>(objects_.size() - 1);
 }
 
@@ -119,6 +119,11 @@ ObjectClass World::kind(ObjectId object) const {
   return object == kGroundObject ? ObjectClass::kGround : objects_[object].kind;
 }
 
+const Stem* World::stem(ObjectId object) const {
+  const Object& entry = objects_[object];
+  return entry.shape == Shape::kStem ? &stems_[entry.index] : nullptr;
+}
+
 std::optional<SurfaceHit> World::meet_object(const Ray& ray, ObjectId object, double time_s,
                                              std::uint64_t luck) const {
   const Object& entry = objects_[object];
@@ -126,7 +131,7 @@ std::optional<SurfaceHit> World::meet_object(const Ray& ray, ObjectId object, do
     case Shape::kStem:
       return meet(ray, stems_[entry.index]);
     case Shape::kFoliage:
-      return meet(ray, foliages_[entry.index], exponential_of(mixed(luck, object)));
+      return meet(ray, foliages_[entry.index], exponential_of(mixed(luck, entry.key)));
     case Shape::kWall:
       return meet(ray, walls_[entry.index]);
     case Shape::kBox:

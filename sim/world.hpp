@@ -24,6 +24,7 @@ enum class ObjectClass : std::uint8_t {
   kWall,  ///< Of a house; two of them meet in a corner.
   kCar,
   kPerson,
+  kFurniture,  ///< Desks, racks, boxes, tanks: what stands in a room or lies in a wood.
 };
 
 /// Index of an object in its world; the ground has none of its own.
@@ -97,6 +98,15 @@ class World {
   const Bounds& bounds(ObjectId object) const { return objects_[object].bounds; }
   /// Whether the object is a walker.
   bool moves(ObjectId object) const { return objects_[object].shape == Shape::kWalker; }
+  /// What chance goes by where rays meet the object: which leaf stops one, how bright it is. Its
+  /// id, unless set_key() gave another one.
+  std::uint64_t key(ObjectId object) const {
+    return object == kGroundObject ? kGroundObject : objects_[object].key;
+  }
+  /// Gives the object a key that outlasts its id, so that it looks the same in another world.
+  void set_key(ObjectId object, std::uint64_t key) { objects_[object].key = key; }
+  /// The shape of a trunk, pole, branch or tank; null where the object has another one.
+  const Stem* stem(ObjectId object) const;
 
   /// The trunks and poles added by add_trunk(), in order.
   std::span<const TrueTrunk> trunks() const { return trunks_; }
@@ -117,6 +127,7 @@ class World {
     ObjectClass kind = ObjectClass::kTrunk;
     Shape shape = Shape::kStem;
     std::uint32_t index = 0;  ///< Among the objects of its shape.
+    std::uint64_t key = 0;
   };
   ObjectId add_object(ObjectClass kind, Shape shape, std::size_t index, const Bounds& bounds);
 

@@ -4,7 +4,9 @@
 
 #include <utility>
 
+#include "common/io/lcm_log.hpp"
 #include "common/io/text_file.hpp"
+#include "common/terminal/interrupt.hpp"
 #include "deploy/cli/failure.hpp"
 #include "sim/point_grid.hpp"
 #include "understory/ground_truth_t.hpp"
@@ -164,6 +166,35 @@ truth_landmarks_t true_landmarks_on_path(const sim::SensorDrive& drive) {
 
   message.num_landmarks = static_cast<std::int32_t>(message.landmarks.size());
   return message;
+}
+
+void send_readings(sim::SensorDrive& drive, const Publish& publish,
+                   const std::function<void(model::Utime)>& wait_until) {
+  const truth_landmarks_t landmarks = true_landmarks_on_path(drive);
+  publish("TRUTH_LANDMARKS", landmarks.utime, wire::encode_message(landmarks));
+  SensorPublisher publisher(publish);
+  while (const auto reading = drive.next()) {
+    terminal::throw_if_interrupted();
+    wait_until(complete_at(*reading, drive));
+    publisher.publish(*reading);
+  }
+}
+
+void write_sensor_log(sim::SensorDrive& drive, const std::string& file,
+                      const std::function<void(double)>& progress) {
+  io::LcmLogWriter writer(file);
+  // A log's events are in the order of their stamps: those of sweeps begin before they are sent.
+  model::Utime now = 0;
+  send_readings(
+      drive,
+      [&](const std::string& channel, model::Utime /*utime*/, const wire::Bytes& bytes) {
+        writer.write(now, channel, bytes);
+      },
+      [&](model::Utime complete) {
+        now = complete;
+        progress(1e-6 * static_cast<double>(complete));
+      });
+  writer.commit();
 }
 
 }  // namespace understory::cli

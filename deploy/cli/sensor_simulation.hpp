@@ -57,6 +57,16 @@ class SensorPublisher {
 /// When a reading is complete and can be sent [us].
 model::Utime complete_at(const sim::SensorReading& reading, const sim::SensorDrive& drive);
 
+/// Sends every reading in the order in which real sensors would give it, true landmarks first.
+/// `wait_until` is called before each with the time at which it is complete. Throws
+/// terminal::Interrupted.
+void send_readings(sim::SensorDrive& drive, const Publish& publish,
+                   const std::function<void(model::Utime)>& wait_until);
+/// The whole drive as a log, written whole or not at all. `progress` gets the simulated time [s].
+/// Throws io::LogError, terminal::Interrupted.
+void write_sensor_log(sim::SensorDrive& drive, const std::string& file,
+                      const std::function<void(double)>& progress);
+
 /// Trunks, poles and corners within 40 m of the path: what a map can hold. Ids count trunks first.
 truth_landmarks_t true_landmarks_on_path(const sim::SensorDrive& drive);
 

@@ -16,6 +16,7 @@
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/sensor_simulation.hpp"
+#include "deploy/cli/sim_changes.hpp"
 #include "deploy/cli/sim_stem_frames.hpp"
 #include "sim/drive.hpp"
 #include "understory/ground_truth_t.hpp"
@@ -122,41 +123,13 @@ void drive_live(const sim::Drive& drive, const SimOptions& options) {
   }
 }
 
-/// Sends every reading in the order in which real sensors would give it.
-void send_readings(sim::SensorDrive& drive, const Publish& publish, terminal::Progress& progress,
-                   const std::function<void(model::Utime)>& wait_until) {
-  const truth_landmarks_t landmarks = true_landmarks_on_path(drive);
-  publish("TRUTH_LANDMARKS", landmarks.utime, wire::encode_message(landmarks));
-  SensorPublisher publisher(publish);
-  while (const auto reading = drive.next()) {
-    terminal::throw_if_interrupted();
-    const model::Utime complete = complete_at(*reading, drive);
-    wait_until(complete);
-    publisher.publish(*reading);
-    progress.update(1e-6 * static_cast<double>(complete));
-  }
-}
-
-void write_sensor_log(sim::SensorDrive& drive, const std::string& file) {
-  io::LcmLogWriter writer(file);
-  terminal::Progress progress("simulating", drive.motion().duration_s());
-  // A log's events are in the order of their stamps: those of sweeps begin before they are sent.
-  model::Utime now = 0;
-  send_readings(
-      drive,
-      [&](const std::string& channel, model::Utime /*utime*/, const wire::Bytes& bytes) {
-        writer.write(now, channel, bytes);
-      },
-      progress, [&](model::Utime complete) { now = complete; });
-  writer.commit();
-}
-
 void send_sensors_live(sim::SensorDrive& drive, const SimOptions& options) {
   const auto bus = bus::make_live_bus(options.lcm_url);
   terminal::Progress progress("driving", drive.motion().duration_s(),
                               terminal::Progress::Without::kTenths);
   const auto start = std::chrono::steady_clock::now();
-  send_readings(drive, publish_on(*bus), progress, [&](model::Utime complete) {
+  send_readings(drive, publish_on(*bus), [&](model::Utime complete) {
+    progress.update(1e-6 * static_cast<double>(complete));
     const auto elapsed_us = static_cast<std::int64_t>(static_cast<double>(complete) / options.rate);
     std::this_thread::sleep_until(start + std::chrono::microseconds(elapsed_us));
   });
@@ -172,7 +145,8 @@ void simulate_sensors(SimOptions& options) {
     if (options.out.empty()) {
       send_sensors_live(drive, options);
     } else {
-      write_sensor_log(drive, options.out);
+      terminal::Progress progress("simulating", drive.motion().duration_s());
+      write_sensor_log(drive, options.out, [&](double done_s) { progress.update(done_s); });
     }
   } catch (const terminal::Interrupted& error) {
     fail(fmt::format("sim: {}", error.what()));
@@ -315,6 +289,7 @@ void add_sim_command(CLI::App& parent) {
       ->check(CLI::Range(1e-3, 1e3))
       ->capture_default_str();
   add_stem_frames_simulation(*command);
+  add_changes_simulation(*command);
   command->callback([command, options] {
     if (!command->get_subcommands().empty()) return;
     if (options->world.empty()) throw CLI::RequiredError("world");

@@ -1,0 +1,57 @@
+// The pose of a calibrated camera from points of a map that it sees, many of them wrongly paired.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace understory::geometry {
+
+/// A point of a map and the direction in which the camera sees it.
+struct PointSighting {
+  Eigen::Vector3d bearing = Eigen::Vector3d::UnitZ();  ///< Unit, frame `camera`.
+  Eigen::Vector3d point_m = Eigen::Vector3d::Zero();   ///< Frame `map`.
+};
+
+/// All poses camera_T_map from which three points are seen as stated: at most four, exact to
+/// rounding; none where the points or the bearings are (nearly) in one line. Lambda Twist (Persson
+/// & Nordberg, ECCV 2018).
+std::vector<Eigen::Isometry3d> solve_three_points(const std::array<PointSighting, 3>& sightings);
+
+/// Limits of the search.
+struct AbsolutePoseParameters {
+  double threshold_rad = 0.006;  ///< Largest angle between a bearing and the point as predicted.
+  double sigma_rad = 0.0015;     ///< Standard deviation of a bearing, per axis.
+  double confidence = 0.999;     ///< That a sample without a wrong pair was drawn.
+  int max_iterations = 2000;     ///< Samples of three pairs.
+  std::size_t min_inliers = 12;  ///< Fewer pairs that agree are no pose.
+};
+
+/// What the search found.
+struct AbsolutePose {
+  bool is_found = false;
+  Eigen::Isometry3d camera_T_map = Eigen::Isometry3d::Identity();
+  /// Order (rotation, translation) [rad, m], left perturbation: exp(rotation) and translation in
+  /// `camera`, so the second block is also that of the camera's place in the map, in its own axes.
+  /// From sigma_rad and the inliers.
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  std::vector<std::uint32_t> inliers;  ///< Indices of pairs, ascending.
+  double rms_rad = 0.0;                ///< Of the inliers' angles, per axis.
+  int iterations = 0;                  ///< Samples drawn, also where nothing was found.
+};
+
+/// The pose by RANSAC: samples of three pairs, the truncated sum of squares as score (MSAC, Torr &
+/// Zisserman 2000), as many samples as the best share of inliers asks for, then least squares over
+/// the inliers. The same seed gives the same result. Cost O(iterations * pairs).
+AbsolutePose find_absolute_pose(std::span<const PointSighting> pairs,
+                                const AbsolutePoseParameters& parameters, std::uint64_t seed);
+
+/// Least squares over the pairs named, from `guess`. Without convergence the best pose so far.
+Eigen::Isometry3d refine_absolute_pose(std::span<const PointSighting> pairs,
+                                       std::span<const std::uint32_t> used,
+                                       const Eigen::Isometry3d& guess);
+
+}  // namespace understory::geometry

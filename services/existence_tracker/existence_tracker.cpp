@@ -1,0 +1,312 @@
+#include "services/existence_tracker/existence_tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+#include "common/model/archive.hpp"
+
+namespace understory::existence_tracker {
+namespace {
+
+constexpr state::Format kFormat{"existence_tracker", 1};
+constexpr std::size_t kStatesPerMessage = 200;
+/// A step that no vehicle drives between two keyframes is a correction of the map [m].
+constexpr double kLongestStepM = 50.0;
+/// Looks from nearer or farther are none: the map is wrong there [m].
+constexpr float kNearestM = 0.05F;
+constexpr float kFarthestM = 1e4F;
+
+std::optional<existence::Look> look_from(const Eigen::Vector2d& vehicle_m,
+                                         const Eigen::Vector2d& landmark_m) {
+  const Eigen::Vector2f from_m = (vehicle_m - landmark_m).cast<float>();
+  const float distance_m = from_m.norm();
+  if (!(distance_m > kNearestM && distance_m < kFarthestM)) return std::nullopt;
+  return existence::Look{Eigen::Vector3f(from_m.x(), from_m.y(), 0.0F),
+                         existence::Ray::kUnknown};
+}
+
+bool has_place(const model::MapUpdate& update) {
+  using enum model::MapUpdateStatus;
+  return update.status == kFirstMap || update.status == kUpdated;
+}
+
+}  // namespace
+
+ExistenceTracker::ExistenceTracker(const TrackerParameters& parameters)
+    : parameters_(parameters), model_(parameters.model), need_(parameters.need) {}
+
+void ExistenceTracker::begin_with(std::span<const model::ExistenceState> states) {
+  existence::ExistenceModel model = model_;
+  if (!states.empty()) decode(states.back().model, model);
+  std::map<model::LandmarkId, TrackedPoint> points;
+  std::uint32_t unused = 0;
+  for (const model::ExistenceState& state : states) {
+    for (std::size_t i = 0; i < state.landmarks.size(); ++i) {
+      const model::LandmarkExistence& one = state.landmarks[i];
+      TrackedPoint tracked = decode(model, state.state_of(i), one.is_in_use);
+      tracked.told_probability = one.probability;
+      points.insert_or_assign(one.id, std::move(tracked));
+    }
+  }
+
+  // Who holds the map does not know yet which are not in use.
+  touched_.clear();
+  for (const auto& [id, tracked] : points) {
+    if (tracked.is_in_use) continue;
+    touched_.push_back(id);
+    ++unused;
+  }
+  model.begin_pass();
+  model_ = model;
+  points_ = std::move(points);
+  unused_ = unused;
+  pass_began_m_ = along_m_;
+}
+
+void ExistenceTracker::take(const model::WholeMap& map) {
+  places_.take(map);
+  wants_map_ = wants_map_ && !map.complete;
+  give_birth();
+}
+
+void ExistenceTracker::take(const model::MapDelta& delta) {
+  places_.take(delta);
+  give_birth();
+}
+
+std::optional<model::Existence> ExistenceTracker::add(const model::MapUpdate& update) {
+  if (!has_place(update)) return std::nullopt;
+  utime_ = update.utime;
+  map_id_ = update.map_id;
+  drive_to(update);
+  forget(update);
+
+  // What was seen, and what was not. New landmarks wait until it is known where they are.
+  const Eigen::Vector2d vehicle_m = update.map_T_vehicle.translation();
+  std::vector<model::LandmarkId> added = update.added;
+  std::ranges::sort(added);
+  for (const model::LandmarkId id : added) births_.push_back({id, vehicle_m, update.utime});
+  for (const model::Association& pair : update.associations)
+    if (!std::ranges::binary_search(added, pair.landmark_id)) look(pair.landmark_id, true, update);
+
+  const bool knows_where = update.inliers >= static_cast<std::uint32_t>(parameters_.looks.min_inliers);
+  if (knows_where && !update.is_lost)
+    for (const model::LandmarkId id : update.expected) look(id, false, update);
+  return tell(update);
+}
+
+/// A pass is a way through a place: after so much path the next one begins.
+void ExistenceTracker::drive_to(const model::MapUpdate& update) {
+  const Eigen::Vector2d now_m = update.map_T_vehicle.translation();
+  if (last_m_) along_m_ += std::min(kLongestStepM, (now_m - *last_m_).norm());
+  last_m_ = now_m;
+  need_.drive_to(along_m_);
+  if (along_m_ - pass_began_m_ < parameters_.looks.pass_m) return;
+  model_.begin_pass();
+  pass_began_m_ = along_m_;
+}
+
+void ExistenceTracker::look(model::LandmarkId id, bool is_hit, const model::MapUpdate& update) {
+  const auto place_m = places_.at(id);
+  if (!place_m) {
+    ++counters_.without_place;
+    wants_map_ = true;
+    return;
+  }
+  const auto look = look_from(update.map_T_vehicle.translation(), *place_m);
+  if (!look) return;
+
+  TrackedPoint& tracked = *known(id, update.utime);
+  const bool is_old = tracked.told_probability >= 0.0 && tracked.is_in_use;
+  const double seconds = 1e-6 * static_cast<double>(update.utime - tracked.looked_utime);
+  if (seconds > 0.0) tracked.point.elapse(model_, model_.elapsed(seconds));
+  tracked.looked_utime = std::max(tracked.looked_utime, update.utime);
+  if (is_hit) {
+    tracked.point.hit(model_, *look);
+    ++counters_.hits;
+  } else {
+    tracked.point.miss(model_, *look);
+    ++counters_.misses;
+  }
+  tracked.state_is_due = true;
+  if (is_hit || is_old) need_.look(id, is_hit, is_old, along_m_);
+  decide(tracked);
+  touched_.push_back(id);
+}
+
+/// The landmark's point; of a given map it is new here.
+TrackedPoint* ExistenceTracker::known(model::LandmarkId id, model::Utime utime) {
+  const auto [found, is_new] =
+      points_.try_emplace(id, TrackedPoint{Point::known(model_), utime, true, -1.0, true, true});
+  // It was in the map before this drive.
+  if (is_new) found->second.told_probability = found->second.point.probability();
+  return &found->second;
+}
+
+/// Landmarks whose first sighting is some keyframes old get their probability now.
+void ExistenceTracker::give_birth() {
+  std::erase_if(births_, [&](const Birth& birth) {
+    const auto place_m = places_.at(birth.id);
+    if (!place_m) return false;
+    const auto look = look_from(birth.vehicle_m, *place_m);
+    if (look)
+      points_.try_emplace(
+          birth.id, TrackedPoint{Point::born(model_, *look), birth.utime, true, -1.0, true, true});
+    return true;
+  });
+}
+
+void ExistenceTracker::forget(const model::MapUpdate& update) {
+  const auto erase = [&](model::LandmarkId id) {
+    const auto found = points_.find(id);
+    if (found == points_.end()) return;
+    if (!found->second.is_in_use) --unused_;
+    points_.erase(found);
+  };
+  for (const model::LandmarkId id : update.removed) erase(id);
+
+  // Two names of one thing: what speaks for it counts.
+  for (const auto& [old_id, new_id] : update.merged) {
+    const auto before = points_.find(old_id);
+    if (before == points_.end()) continue;
+    const auto after = points_.find(new_id);
+    if (after == points_.end()) {
+      TrackedPoint moved = before->second;
+      erase(old_id);
+      if (!moved.is_in_use) ++unused_;
+      moved.state_is_due = true;
+      points_.emplace(new_id, std::move(moved));
+      continue;
+    }
+    if (before->second.point.log_odds() > after->second.point.log_odds()) {
+      after->second.point = before->second.point;
+      after->second.state_is_due = true;
+      decide(after->second);
+    }
+    erase(old_id);
+  }
+}
+
+void ExistenceTracker::decide(TrackedPoint& tracked) {
+  const double probability = tracked.point.probability();
+  if (tracked.is_in_use && probability < parameters_.use.drop_below) {
+    tracked.is_in_use = false;
+    ++unused_;
+    ++counters_.dropped;
+  } else if (!tracked.is_in_use && probability > parameters_.use.readmit_above) {
+    tracked.is_in_use = true;
+    --unused_;
+    ++counters_.readmitted;
+  }
+}
+
+model::Existence ExistenceTracker::tell(const model::MapUpdate& update) {
+  model::Existence existence;
+  existence.utime = update.utime;
+  existence.map_id = update.map_id;
+  existence.known = static_cast<std::uint32_t>(points_.size());
+  existence.unused = unused_;
+  existence.missing_share = need_.missing_share(model_.recall().of_pass());
+  existence.new_share = need_.new_share();
+  existence.is_mapping_needed = existence.missing_share > parameters_.need.missing_above ||
+                                existence.new_share > parameters_.need.new_above;
+
+  for (const model::LandmarkId id : ids_to_tell()) {
+    TrackedPoint& tracked = points_.at(id);
+    tracked.told_probability = tracked.point.probability();
+    tracked.was_told_in_use = tracked.is_in_use;
+    existence.landmarks.push_back({id, tracked.told_probability, tracked.is_in_use});
+  }
+  existence.is_whole = existence.landmarks.size() == points_.size();
+  return existence;
+}
+
+/// What changed, and some of the others: who missed a message has all of them in the end.
+std::set<model::LandmarkId> ExistenceTracker::ids_to_tell() {
+  std::set<model::LandmarkId> ids;
+  for (const model::LandmarkId id : std::exchange(touched_, {})) {
+    const TrackedPoint& tracked = points_.at(id);
+    const double change = std::abs(tracked.point.probability() - tracked.told_probability);
+    if (change > parameters_.output.told_change || tracked.is_in_use != tracked.was_told_in_use)
+      ids.insert(id);
+  }
+
+  auto next = points_.upper_bound(repeated_);
+  for (int i = 0; i < parameters_.output.repeated && !points_.empty(); ++i, ++next) {
+    if (next == points_.end()) next = points_.begin();
+    ids.insert(next->first);
+    repeated_ = next->first;
+  }
+  return ids;
+}
+
+std::vector<model::ExistenceState> ExistenceTracker::take_states() {
+  std::vector<model::ExistenceState> messages;
+  for (auto& [id, tracked] : points_) {
+    if (!std::exchange(tracked.state_is_due, false)) continue;
+    if (messages.empty() || messages.back().landmarks.size() == kStatesPerMessage) {
+      messages.push_back({utime_, 0, map_id_, {}, encode(model_), {}});
+      messages.back().landmarks.reserve(kStatesPerMessage);
+    }
+    messages.back().landmarks.push_back({id, tracked.point.probability(), tracked.is_in_use});
+    messages.back().states += encode(tracked.point, tracked.looked_utime);
+  }
+  return messages;
+}
+
+std::optional<model::LandmarkExistence> ExistenceTracker::of(model::LandmarkId id) const {
+  const auto found = points_.find(id);
+  if (found == points_.end()) return std::nullopt;
+  return model::LandmarkExistence{id, found->second.point.probability(), found->second.is_in_use};
+}
+
+std::string ExistenceTracker::save() const {
+  std::string learned = encode(model_);
+  std::vector<model::LandmarkId> ids;
+  std::vector<std::uint8_t> flags;
+  std::vector<double> told;
+  std::string points;
+  for (const auto& [id, tracked] : points_) {
+    ids.push_back(id);
+    flags.push_back(static_cast<std::uint8_t>((tracked.is_in_use ? 1 : 0) |
+                                              (tracked.was_told_in_use ? 2 : 0) |
+                                              (tracked.state_is_due ? 4 : 0)));
+    told.push_back(tracked.told_probability);
+    points += encode(tracked.point, tracked.looked_utime);
+  }
+  return state::save(kFormat, learned, ids, flags, told, points, places_, need_, births_,
+                     counters_, last_m_, utime_, map_id_, along_m_, pass_began_m_, repeated_,
+                     wants_map_);
+}
+
+void ExistenceTracker::load(const std::string& state) {
+  ExistenceTracker loaded(parameters_);
+  std::string learned;
+  std::vector<model::LandmarkId> ids;
+  std::vector<std::uint8_t> flags;
+  std::vector<double> told;
+  std::string points;
+  state::load(state, kFormat, learned, ids, flags, told, points, loaded.places_, loaded.need_,
+              loaded.births_, loaded.counters_, loaded.last_m_, loaded.utime_, loaded.map_id_,
+              loaded.along_m_, loaded.pass_began_m_, loaded.repeated_, loaded.wants_map_);
+  if (flags.size() != ids.size() || told.size() != ids.size() ||
+      points.size() != ids.size() * point_bytes())
+    throw std::invalid_argument("existence tracker state: its points do not fit their numbers");
+
+  decode(learned, loaded.model_);
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const std::string_view bytes = std::string_view(points).substr(i * point_bytes(), point_bytes());
+    TrackedPoint tracked = decode(loaded.model_, bytes, (flags[i] & 1U) != 0);
+    tracked.was_told_in_use = (flags[i] & 2U) != 0;
+    tracked.state_is_due = (flags[i] & 4U) != 0;
+    tracked.told_probability = told[i];
+    loaded.unused_ += tracked.is_in_use ? 0 : 1;
+    loaded.points_.emplace(ids[i], std::move(tracked));
+  }
+  *this = std::move(loaded);
+}
+
+}  // namespace understory::existence_tracker

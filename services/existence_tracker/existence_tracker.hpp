@@ -1,0 +1,111 @@
+// The existence tracker without its process: which landmarks of the map are still there.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/model/existence.hpp"
+#include "common/model/slam_output.hpp"
+#include "services/existence_tracker/landmark_places.hpp"
+#include "services/existence_tracker/mapping_need.hpp"
+#include "services/existence_tracker/parameters.hpp"
+#include "services/existence_tracker/tracked_point.hpp"
+
+namespace understory::existence_tracker {
+
+/// What the tracker has done so far.
+struct TrackerCounters {
+  std::uint64_t hits = 0;
+  std::uint64_t misses = 0;
+  std::uint64_t without_place = 0;  ///< Looks at landmarks of which no message said where they are.
+  std::uint64_t dropped = 0;        ///< Landmarks taken out of use ...
+  std::uint64_t readmitted = 0;     ///< ... and into use again.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.hits, s.misses, s.without_place, s.dropped, s.readmitted);
+  }
+};
+
+/// Follows the mapper: each keyframe says which landmarks it saw, and which it should have seen and
+/// did not. For every landmark it keeps the probability that it exists, and the shell from which it
+/// can be seen (common/existence; thesis 003). A landmark that is improbable is not to be used; it
+/// is kept and looked for, and in use again when it is seen. It never associates by itself.
+///
+/// Memory: some 250 bytes per landmark. Time: what a keyframe looks at.
+class ExistenceTracker {
+ public:
+  /// Without landmarks. Throws std::invalid_argument where a parameter of the model cannot be.
+  explicit ExistenceTracker(const TrackerParameters& parameters = {});
+
+  /// Goes on with landmarks of an earlier drive; a new pass begins. Throws std::invalid_argument
+  /// where a state is none of this version: nothing is changed then.
+  void begin_with(std::span<const model::ExistenceState> states);
+
+  /// MAP, MAP_DELTA: where the landmarks are. New ones get their probability now.
+  void take(const model::WholeMap& map);
+  void take(const model::MapDelta& delta);
+
+  /// SLAM_UPDATE. None where the keyframe has no place.
+  std::optional<model::Existence> add(const model::MapUpdate& update);
+
+  /// What has changed since it was told last, up to 200 landmarks each: for a store. O(landmarks).
+  std::vector<model::ExistenceState> take_states();
+
+  /// The probability of a landmark that is known.
+  std::optional<model::LandmarkExistence> of(model::LandmarkId id) const;
+  /// What was done so far.
+  const TrackerCounters& counters() const { return counters_; }
+  /// Landmarks are looked at of which no message said where they are: the whole map is wanted.
+  bool wants_map() const { return wants_map_; }
+
+  /// The state as bytes; load() goes on with it. Throws std::invalid_argument.
+  std::string save() const;
+  void load(const std::string& state);
+
+ private:
+  /// A landmark that was added, before it is known where.
+  struct Birth {
+    model::LandmarkId id = 0;
+    Eigen::Vector2d vehicle_m = Eigen::Vector2d::Zero();  ///< Frame map.
+    model::Utime utime = 0;
+
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& s) {
+      a(s.id, s.vehicle_m, s.utime);
+    }
+  };
+  void drive_to(const model::MapUpdate& update);
+  void look(model::LandmarkId id, bool is_hit, const model::MapUpdate& update);
+  TrackedPoint* known(model::LandmarkId id, model::Utime utime);
+  void give_birth();
+  void forget(const model::MapUpdate& update);
+  void decide(TrackedPoint& tracked);
+  model::Existence tell(const model::MapUpdate& update);
+  std::set<model::LandmarkId> ids_to_tell();
+
+  TrackerParameters parameters_;
+  existence::ExistenceModel model_;
+  LandmarkPlaces places_;
+  MappingNeed need_;
+  std::map<model::LandmarkId, TrackedPoint> points_;
+  std::vector<Birth> births_;
+  std::vector<model::LandmarkId> touched_;  ///< Since the last message.
+  TrackerCounters counters_;
+  std::optional<Eigen::Vector2d> last_m_;  ///< Of the vehicle, frame map.
+  model::Utime utime_ = 0;                 ///< Of the last keyframe.
+  std::uint32_t map_id_ = 1;               ///< Likewise.
+  std::uint32_t unused_ = 0;
+  double along_m_ = 0.0;
+  double pass_began_m_ = 0.0;
+  model::LandmarkId repeated_ = 0;  ///< The last one that was told again.
+  bool wants_map_ = false;
+};
+
+}  // namespace understory::existence_tracker

@@ -1,0 +1,54 @@
+// Whether the map still tells where the vehicle is.
+#pragma once
+
+#include <map>
+
+#include "common/model/archive.hpp"
+#include "common/model/map.hpp"
+#include "services/existence_tracker/parameters.hpp"
+
+namespace understory::existence_tracker {
+
+/// What a drive shows of its map on the last metres of path. The question of the thesis (003 §1.7,
+/// when mapping should be switched on again) has two sides: landmarks that should have been seen
+/// and were not, beyond what the detector misses anyhow, and what is seen and is not in the map.
+class MappingNeed {
+ public:
+  /// Nothing was driven. `parameters` gives all but the thresholds.
+  explicit MappingNeed(const NeedParameters& parameters = {}) : parameters_(parameters) {}
+
+  /// A look at a landmark of the map at this path of the vehicle [m]. `is_old`: it was in the map
+  /// before the window began to see it.
+  void look(model::LandmarkId id, bool is_hit, bool is_old, double along_m);
+  /// Forgets what lies behind. O(landmarks around).
+  void drive_to(double along_m);
+
+  /// Of the old landmarks that were looked for, those that were not seen once, beyond the share of
+  /// `recall` that a pass sees at all; 0 to 1. 0 with fewer than `min_landmarks`.
+  double missing_share(double recall) const;
+  /// Of the landmarks that were seen, those that are new to the map; 0 to 1. Likewise.
+  double new_share() const;
+
+  /// Members of a saved state; see common/state. Parameters are configuration.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.seen_);
+  }
+
+ private:
+  struct Looked {
+    double along_m = 0.0;  ///< At the last look.
+    int looks = 0;
+    bool was_hit = false;
+    bool is_old = false;
+
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& s) {
+      a(s.along_m, s.looks, s.was_hit, s.is_old);
+    }
+  };
+  NeedParameters parameters_;
+  std::map<model::LandmarkId, Looked> seen_;
+};
+
+}  // namespace understory::existence_tracker

@@ -1,0 +1,46 @@
+// Parameters of the existence tracker. What each one does, with range and default, is documented
+// once: in adapter_parameters.cpp, which `understory-existence-tracker --help` prints. Here stand
+// the units that a name does not give.
+#pragma once
+
+#include "common/existence/parameters.hpp"
+
+namespace understory::existence_tracker {
+
+/// When a landmark is not used any more, and when it is again.
+struct UseParameters {
+  double drop_below = 0.05;    ///< Probability.
+  double readmit_above = 0.5;  ///< Probability.
+};
+
+/// What is one pass, and which looks count.
+struct LookParameters {
+  double pass_m = 500.0;  ///< Path.
+  int min_inliers = 3;
+};
+
+/// When the map does not tell any more where the vehicle is.
+struct NeedParameters {
+  double window_m = 60.0;  ///< Path.
+  int min_landmarks = 10;
+  double missing_above = 0.4;  ///< Share.
+  double new_above = 0.4;      ///< Share.
+};
+
+/// What is told, and how often.
+struct OutputParameters {
+  double told_change = 0.02;  ///< Probability.
+  int repeated = 20;          ///< Landmarks per message.
+  double state_period_s = 30.0;
+};
+
+/// The stage's parameters.
+struct TrackerParameters {
+  existence::Parameters model;
+  UseParameters use;
+  LookParameters looks;
+  NeedParameters need;
+  OutputParameters output;
+};
+
+}  // namespace understory::existence_tracker

@@ -1,0 +1,87 @@
+// Changed drives as a folder of files that others can read: README.txt in it explains each.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "sim/changes/changed_drive.hpp"
+
+namespace understory::sim::changes {
+
+/// What a data set says of itself.
+struct DataSetInfo {
+  SceneKind scene = SceneKind::kOffice;
+  std::uint64_t seed = 0;
+  double share = 0.0;  ///< Of the things that were changed in each copy but the first.
+  double move_m = 0.0;
+  CameraParameters camera;
+};
+
+/// A file of the data set.
+struct DataSetFile {
+  std::string name;         ///< Relative to the folder, e.g. "copy_1/points.csv".
+  std::uint64_t bytes = 0;  ///< Its size.
+};
+
+/// Writes a data set, whole or not at all: manifest.json comes last, and without commit() the
+/// copies are removed again.
+class DataSetWriter {
+ public:
+  /// Makes the folder. Throws io::DataError where it cannot be made or is not empty.
+  DataSetWriter(std::filesystem::path folder, DataSetInfo info);
+  ~DataSetWriter();
+  DataSetWriter(const DataSetWriter&) = delete;
+  DataSetWriter& operator=(const DataSetWriter&) = delete;
+
+  /// Writes the tables and the cloud of the next copy; the first one is the unchanged one. Throws
+  /// io::DataError.
+  void add(const ChangedDrive& drive, const Stage& copy);
+  /// Where a further file of the copy added last goes, e.g. "drive.lcm".
+  std::filesystem::path path_in_copy(std::string_view name) const;
+  /// Notes a further file of the copy added last, which has been written.
+  void add_file(std::string_view name);
+  /// Writes README.txt and the manifest. Throws io::DataError.
+  void commit();
+
+ private:
+  void write(std::string_view name, std::string_view text);
+
+  std::filesystem::path folder_;
+  DataSetInfo info_;
+  int copies_ = 0;
+  std::vector<DataSetFile> files_;
+  bool is_whole_ = false;
+};
+
+/// Reads a data set.
+class DataSetReader {
+ public:
+  /// Reads the manifest. Throws io::DataError where there is none, or where it is not one.
+  explicit DataSetReader(std::filesystem::path folder);
+
+  /// What it says of itself.
+  const DataSetInfo& info() const { return info_; }
+  /// Number of copies, the unchanged one included.
+  int copies() const { return copies_; }
+  /// All files but the manifest.
+  const std::vector<DataSetFile>& files() const { return files_; }
+  /// The drive of a copy. Throws io::DataError naming file and line; a file whose size is not that
+  /// of the manifest is refused by its name.
+  ChangedDrive drive(int copy) const;
+  /// A file of a copy, by the size in the manifest whole. Throws io::DataError.
+  std::filesystem::path whole_file(int copy, std::string_view name) const;
+
+ private:
+  std::filesystem::path folder_;
+  DataSetInfo info_;
+  int copies_ = 0;
+  std::vector<DataSetFile> files_;
+};
+
+/// A PCD file (0.7, binary) with fields x, y, z and label, the id of the object.
+std::string pcd_of(const std::vector<MappedPoint>& cloud);
+
+}  // namespace understory::sim::changes
