@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "common/map_file/existence_rows.hpp"
 #include "common/map_file/foreign_edits.hpp"
 #include "common/map_file/map_rows.hpp"
 #include "common/map_file/opening.hpp"
@@ -71,6 +72,7 @@ void seal_drive(const Connection& connection) {
   {
     Transaction transaction(connection);
     redraw_closures(connection);
+    settle_existence(connection);
     transaction.commit();
   }
 
@@ -174,6 +176,26 @@ std::size_t DriveFile::put(const GroundChange& change) {
   return left_out;
 }
 
+void DriveFile::put(std::uint32_t map_id, const StoredExistence& existence) {
+  if (!std::ranges::binary_search(map_ids(*connection_), map_id)) return;
+  model::Utime newest = existence.utime;
+  for (const ExistenceRow& row : existence.landmarks) newest = std::max(newest, row.utime);
+
+  Transaction transaction(*connection_);
+  begin(map_id, newest);
+  put_existence(*connection_, map_id, existence);
+  transaction.commit();
+}
+
+void DriveFile::put(const model::ExistenceState& state) {
+  const std::string fault = fault_of(state);
+  if (!fault.empty())
+    throw MapFileError(Fault::kRefused, fmt::format("{}: {}", file().string(), fault));
+  NewestExistence existence;
+  existence.take(state);
+  put(state.map_id, existence.stored());
+}
+
 void DriveFile::put(const model::LoopClosure& closure) {
   Transaction transaction(*connection_);
   begin(closure.map_id, closure.utime);
@@ -205,7 +227,8 @@ std::size_t DriveFile::draw(std::size_t most) { return draw_some(*connection_, m
 
 std::uint64_t DriveFile::size() const {
   return static_cast<std::uint64_t>(connection_->number(
-      "SELECT (SELECT count(*) FROM landmarks) + (SELECT count(*) FROM trajectory)"));
+      "SELECT (SELECT count(*) FROM landmarks) + (SELECT count(*) FROM trajectory) + "
+      "(SELECT count(*) FROM existence_states)"));
 }
 
 void DriveFile::seal() {

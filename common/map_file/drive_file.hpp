@@ -12,6 +12,7 @@
 #include <string>
 
 #include "common/map_file/history.hpp"
+#include "common/map_file/stored_existence.hpp"
 #include "common/map_file/submap_layers.hpp"
 #include "common/map_file/submap_rows.hpp"
 
@@ -56,6 +57,12 @@ class DriveFile {
   /// Takes over what changed in the map that the mapper holds. Gives how many landmarks and
   /// keyframes were left out, because no map can have them.
   std::size_t put(const GroundChange& change);
+  /// Takes over states of existence; one that is older than what the file has is passed over.
+  /// Nothing where the file has no such map. States of landmarks that are in no map when the drive
+  /// is sealed go then.
+  void put(std::uint32_t map_id, const StoredExistence& existence);
+  /// The same of a message as it comes. Fault::kRefused where fault_of() finds something in it.
+  void put(const model::ExistenceState& state);
   /// A loop closure counts.
   void put(const model::LoopClosure& closure);
   /// A loop closure does not count any more.

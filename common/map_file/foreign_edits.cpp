@@ -4,6 +4,7 @@
 
 #include <new>
 
+#include "common/map_file/existence_rows.hpp"
 #include "common/map_file/map_rows.hpp"
 #include "common/map_file/schema.hpp"
 
@@ -70,6 +71,8 @@ std::uint64_t record_foreign_edits(const Connection& connection, const Connectio
                                    const ChangeNote& note, bool must_be_maps) {
   const Attached attached(connection, recorded);
   Transaction transaction(connection);
+  // Who deletes a landmark knows nothing of its state.
+  drop_lost_states(connection);
   std::uint64_t number = 0;
   {
     Recording recording(connection);

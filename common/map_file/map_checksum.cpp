@@ -5,6 +5,7 @@
 #include <array>
 
 #include "common/map_file/digest.hpp"
+#include "common/map_file/existence_tables.hpp"
 #include "common/map_file/map_rows.hpp"
 
 namespace understory::map_file {
@@ -33,6 +34,13 @@ constexpr std::array<ContentQuery, 5> kContentQueries{{
      "SELECT fid, geom, from_sequence, to_sequence FROM loop_closures WHERE map_id = ?1 "
      "ORDER BY fid"},
 }};
+/// A table that has nothing of the map is not counted: sums from before these tables stay valid.
+constexpr std::array<ContentQuery, 2> kExistenceQueries{{
+    {"existence_models", "SELECT utime, model FROM existence_models WHERE map_id = ?1"},
+    {"existence_states",
+     "SELECT landmark_id, utime, probability, in_use, state FROM existence_states "
+     "WHERE map_id = ?1 ORDER BY landmark_id"},
+}};
 
 void add_column(const Statement& row, int column, Digest& digest) {
   switch (sqlite3_column_type(row.handle(), column)) {
@@ -49,6 +57,23 @@ void add_column(const Statement& row, int column, Digest& digest) {
   }
 }
 
+void add_row(const Statement& row, Digest& digest) {
+  const int columns = sqlite3_column_count(row.handle());
+  for (int column = 0; column < columns; ++column) add_column(row, column, digest);
+}
+
+void add_existence(const Connection& connection, std::uint32_t map_id, Digest& digest) {
+  if (!has_existence_tables(connection)) return;
+  for (const ContentQuery& query : kExistenceQueries) {
+    Statement row = connection.prepare(query.sql);
+    row.bind(std::int64_t{map_id});
+    for (bool is_first = true; row.step(); is_first = false) {
+      if (is_first) digest.add(query.table);
+      add_row(row, digest);
+    }
+  }
+}
+
 }  // namespace
 
 std::string checksum_of(const Connection& connection, std::uint32_t map_id) {
@@ -57,11 +82,9 @@ std::string checksum_of(const Connection& connection, std::uint32_t map_id) {
     Statement row = connection.prepare(query.sql);
     row.bind(std::int64_t{map_id});
     digest.add(query.table);
-    while (row.step()) {
-      const int columns = sqlite3_column_count(row.handle());
-      for (int column = 0; column < columns; ++column) add_column(row, column, digest);
-    }
+    while (row.step()) add_row(row, digest);
   }
+  add_existence(connection, map_id, digest);
   return digest.take();
 }
 

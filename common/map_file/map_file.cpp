@@ -4,6 +4,7 @@
 
 #include "common/map_file/check.hpp"
 #include "common/map_file/drive_file.hpp"
+#include "common/map_file/existence_rows.hpp"
 #include "common/map_file/foreign_edits.hpp"
 #include "common/map_file/map_rows.hpp"
 #include "common/map_file/opening.hpp"
@@ -24,6 +25,7 @@ MapSummary summary_of(const Connection& connection, std::uint32_t map_id) {
   Statement row = connection.prepare(
       "SELECT name, created_utime, origin, checksum FROM understory_maps WHERE map_id = ?1");
   row.bind(std::int64_t{map_id}).step();
+  const ExistenceCounts existence = count_existence(connection, map_id);
   return {map_id,
           row.text(0),
           row.integer(1),
@@ -33,7 +35,9 @@ MapSummary summary_of(const Connection& connection, std::uint32_t map_id) {
           rows_of(connection, "landmarks", map_id, "AND kind = 'corner'"),
           rows_of(connection, "trajectory", map_id),
           rows_of(connection, "submap_borders", map_id),
-          rows_of(connection, "loop_closures", map_id)};
+          rows_of(connection, "loop_closures", map_id),
+          existence.states,
+          existence.unused};
 }
 
 /// The transaction that a change is: `work` changes rows, which are recorded.

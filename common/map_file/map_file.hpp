@@ -27,6 +27,8 @@ struct MapSummary {
   std::uint64_t keyframes = 0;
   std::uint64_t submap_borders = 0;
   std::uint64_t loop_closures = 0;
+  std::uint64_t existence_states = 0;  ///< Landmarks with a state of existence ...
+  std::uint64_t not_in_use = 0;        ///< ... and those of them that are taken for gone.
 };
 
 /// An open map file. Everything throws MapFileError, which names the file.

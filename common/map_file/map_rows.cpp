@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "common/map_file/existence_rows.hpp"
 #include "common/map_file/geometry_blob.hpp"
 #include "common/map_file/layer_rows.hpp"
 #include "common/map_file/schema.hpp"
@@ -115,6 +116,7 @@ void select_loops(const Connection& connection, StoredMap& map) {
 }  // namespace
 
 void delete_map(const Connection& connection, std::uint32_t map_id) {
+  delete_existence(connection, map_id);
   for (const Layer& layer : kLayers) {
     connection.prepare(fmt::format("DELETE FROM {} WHERE map_id = ?1", layer.table))
         .bind(std::int64_t{map_id})
@@ -140,6 +142,7 @@ void insert_map(const Connection& connection, const StoredMap& map) {
   insert_all(KeyframeRows(connection), map.map_id, map.keyframes);
   insert_all(BorderRows(connection), map.map_id, map.submap_borders);
   insert_all(LoopRows(connection), map.map_id, map.loop_closures);
+  if (map.existence) put_existence(connection, map.map_id, *map.existence);
 
   const std::string checksum = checksum_of(connection, map.map_id);
   connection.prepare("UPDATE understory_maps SET checksum = ?2 WHERE map_id = ?1")
@@ -153,12 +156,13 @@ StoredMap select_map(const Connection& connection, std::uint32_t map_id) {
   if (!row.bind(std::int64_t{map_id}).step())
     throw MapFileError(Fault::kRefused,
                        fmt::format("{}: has no map {}", connection.file().string(), map_id));
-  StoredMap map{map_id, row.text(0), row.integer(1), row.text(2), {}, {}, {}, {}};
+  StoredMap map{map_id, row.text(0), row.integer(1), row.text(2), {}, {}, {}, {}, {}};
 
   select_landmarks(connection, map);
   select_keyframes(connection, map);
   select_borders(connection, map);
   select_loops(connection, map);
+  map.existence = select_existence(connection, map_id);
   const std::string fault = fault_of(map);
   if (!fault.empty()) connection.damaged(fmt::format("map {}: {}", map_id, fault));
   return map;

@@ -20,8 +20,9 @@ StoredMap select_map(const Connection& connection, std::uint32_t map_id);
 /// Numbers of all maps, ascending. Fault::kDamaged where one can be none.
 std::vector<std::uint32_t> map_ids(const Connection& connection);
 
-/// SHA-256 over all content of a map: its row but for the checksum, and its rows in every layer,
-/// each value with its type, in the order of keys. In hexadecimal digits.
+/// SHA-256 over all content of a map: its row but for the checksum, its rows in every layer and its
+/// states of existence, each value with its type, in the order of keys. A map without states has
+/// the sum that it had before there were any. In hexadecimal digits.
 std::string checksum_of(const Connection& connection, std::uint32_t map_id);
 /// The checksum that the map's row states.
 std::string stated_checksum(const Connection& connection, std::uint32_t map_id);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "common/map_file/existence_tables.hpp"
 #include "common/map_file/geometry_blob.hpp"
 #include "common/map_file/submap_tables.hpp"
 
@@ -290,6 +291,8 @@ std::vector<SchemaObject> schema_objects(std::int64_t version) {
   }
   if (version < 2) return objects;
   for (SchemaObject& object : submap_objects()) objects.push_back(std::move(object));
+  if (version < 3) return objects;
+  for (SchemaObject& object : existence_objects()) objects.push_back(std::move(object));
   return objects;
 }
 
@@ -300,6 +303,7 @@ void create_schema(const Connection& connection) {
   insert_reference_systems(connection);
   insert_layers(connection);
   register_submap_tables(connection);
+  register_existence_tables(connection);
   state_version(connection);
 }
 
@@ -309,10 +313,15 @@ std::int64_t schema_version(const Connection& connection) {
 }
 
 void upgrade_schema(const Connection& connection) {
-  if (schema_version(connection) == kSchemaVersion) return;
+  const std::int64_t version = schema_version(connection);
+  if (version == kSchemaVersion) return;
   Transaction transaction(connection);
-  for (const SchemaObject& object : submap_objects()) connection.execute(object.sql);
-  register_submap_tables(connection);
+  if (version < 2) {
+    for (const SchemaObject& object : submap_objects()) connection.execute(object.sql);
+    register_submap_tables(connection);
+  }
+  for (const SchemaObject& object : existence_objects()) connection.execute(object.sql);
+  register_existence_tables(connection);
   state_version(connection);
   transaction.commit();
 }

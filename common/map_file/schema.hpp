@@ -14,9 +14,10 @@ namespace understory::map_file {
 
 /// The version of the schema that is written. One that adds or changes a table or a column gets the
 /// next number.
-inline constexpr std::int64_t kSchemaVersion = 2;
-/// The oldest version that is read. Version 1 has no submaps (submap_tables.hpp); who opens such a
-/// file to write makes it one of the version that is written, and changes nothing else.
+inline constexpr std::int64_t kSchemaVersion = 3;
+/// The oldest version that is read. Version 1 has no submaps (submap_tables.hpp), versions 1
+/// and 2 no states of existence (existence_tables.hpp); who opens such a file to write makes it one
+/// of the version that is written, and changes nothing else.
 inline constexpr std::int64_t kOldestSchemaVersion = 1;
 /// PRAGMA application_id of a GeoPackage: "GPKG".
 inline constexpr std::int64_t kGeoPackage = 0x47504B47;
@@ -39,8 +40,9 @@ inline constexpr std::array<Layer, 4> kLayers{{
     {"loop_closures", "fid", "LINESTRING", "Keyframes between which a loop was closed"},
 }};
 /// The tables whose rows are a map's content, and which the history records.
-inline constexpr std::array<std::string_view, 5> kContentTables{
-    "understory_maps", "landmarks", "trajectory", "submap_borders", "loop_closures"};
+inline constexpr std::array<std::string_view, 7> kContentTables{
+    "understory_maps", "landmarks",        "trajectory",      "submap_borders",
+    "loop_closures",   "existence_states", "existence_models"};
 
 /// One object of the schema: its name, and the SQL that makes it.
 struct SchemaObject {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -69,14 +70,36 @@ std::string fault_of_landmarks(const StoredMap& map) {
   return {};
 }
 
+std::string fault_of_states(const StoredMap& map) {
+  if (!map.existence) return {};
+  std::vector<model::LandmarkId> ids;
+  ids.reserve(map.landmarks.size());
+  for (const StoredLandmark& one : map.landmarks) ids.push_back(one.landmark.id);
+  return fault_of(*map.existence, ids);
+}
+
 }  // namespace
+
+bool is_id_of(model::LandmarkId id, std::uint32_t map_id) {
+  const std::uint32_t given_by = model::map_of(id);
+  return given_by >= 1 && given_by <= map_id && id != landmark_id(given_by, 0);
+}
+
+void give_existence(StoredMap& map, const StoredExistence& existence) {
+  map.existence = StoredExistence{existence.utime, existence.learned, {}};
+  for (const ExistenceRow& row : existence.landmarks) {
+    const auto found =
+        std::ranges::lower_bound(map.landmarks, row.existence.id, {},
+                                 [](const StoredLandmark& one) { return one.landmark.id; });
+    if (found == map.landmarks.end() || found->landmark.id != row.existence.id) continue;
+    found->existence = row.existence.probability;
+    map.existence->landmarks.push_back(row);
+  }
+}
 
 std::string fault_of(const StoredLandmark& one, std::uint32_t map_id) {
   const model::MapLandmark& landmark = one.landmark;
-  const std::uint32_t given_by = model::map_of(landmark.id);
-  const bool is_of_map =
-      given_by >= 1 && given_by <= map_id && landmark.id != landmark_id(given_by, 0);
-  if (!is_of_map) return fmt::format("its id is none of map {}", map_id);
+  if (!is_id_of(landmark.id, map_id)) return fmt::format("its id is none of map {}", map_id);
   if (!is_place(landmark.position_m)) return "its position is not finite or too far away";
   if (!is_covariance<2>(landmark.covariance_m2))
     return "its covariance is not positive semidefinite";
@@ -105,6 +128,7 @@ std::string fault_of(const StoredMap& map) {
   if (fault.empty()) fault = fault_of_all(map.keyframes, "keyframe");
   if (fault.empty()) fault = fault_of_all(map.submap_borders, "submap border");
   if (fault.empty()) fault = fault_of_all(map.loop_closures, "loop closure");
+  if (fault.empty()) fault = fault_of_states(map);
   return fault;
 }
 

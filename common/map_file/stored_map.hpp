@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/map_file/stored_existence.hpp"
 #include "common/model/map.hpp"
 
 namespace understory::map_file {
@@ -50,12 +51,21 @@ struct StoredMap {
   std::vector<model::KeyframePose> keyframes;  ///< In order of time.
   std::vector<SubmapBorder> submap_borders;
   std::vector<LoopClosure> loop_closures;
+  /// What the existence tracker goes on with; none where it never said.
+  std::optional<StoredExistence> existence;
 };
 
 /// The id of a map's landmark number `counter`, from 1.
 constexpr model::LandmarkId landmark_id(std::uint32_t map_id, std::uint64_t counter) {
   return (model::LandmarkId{map_id} << model::kLandmarkCounterBits) | counter;
 }
+
+/// Whether an id is one that a landmark of the map can have: given by it, or by an earlier map.
+bool is_id_of(model::LandmarkId id, std::uint32_t map_id);
+
+/// Gives a map what is known of its landmarks' existence, their probabilities too; what is of other
+/// landmarks is left out.
+void give_existence(StoredMap& map, const StoredExistence& existence);
 
 /// What a map cannot have in it, with the landmark or keyframe (a number that is not finite, a
 /// covariance that is not positive semidefinite, an id of another map, ids that do not ascend);

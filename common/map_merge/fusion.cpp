@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <stdexcept>
 
 #include "common/constellation/grid.hpp"
@@ -102,6 +103,7 @@ StoredLandmark fused_landmark(const StoredLandmark& a, const StoredLandmark& b, 
 StoredMap moved_trajectory(const StoredMap& second, const Mover& mover) {
   StoredMap moved = second;
   moved.landmarks.clear();
+  moved.existence.reset();
   for (model::KeyframePose& pose : moved.keyframes) pose = mover.moved(pose);
   for (map_file::SubmapBorder& border : moved.submap_borders) {
     for (Eigen::Vector2d& corner : border.corners_m) corner = mover.position(corner);
@@ -158,6 +160,47 @@ class Adder {
   std::uint64_t last_counter_ = 0;
 };
 
+using ExistenceRows = std::map<model::LandmarkId, map_file::ExistenceRow>;
+
+/// States of the second map under the ids that its landmarks have now; `renamed` is in order.
+ExistenceRows renamed_states(
+    const map_file::StoredExistence& second,
+    const std::vector<std::pair<model::LandmarkId, model::LandmarkId>>& renamed) {
+  ExistenceRows rows;
+  auto next = renamed.begin();
+  for (map_file::ExistenceRow row : second.landmarks) {
+    while (next != renamed.end() && next->first < row.existence.id) ++next;
+    if (next == renamed.end() || next->first != row.existence.id) continue;
+    row.existence.id = next->second;
+    rows[row.existence.id] = row;
+  }
+  return rows;
+}
+
+/// `merged.map` has the states of the first map, `merged.renamed` is complete and in order.
+void fuse_existence(MergedMaps& merged, const StoredMap& second) {
+  const auto& first = merged.map.existence;
+  if (!first && !second.existence) return;
+  map_file::StoredExistence fused = first ? *first : *second.existence;
+  ExistenceRows rows;
+  if (second.existence) {
+    rows = renamed_states(*second.existence, merged.renamed);
+    if (second.existence->utime > fused.utime) fused.learned = second.existence->learned;
+    fused.utime = std::max(fused.utime, second.existence->utime);
+  }
+
+  if (first) {
+    for (const map_file::ExistenceRow& row : first->landmarks) {
+      const auto [at, is_new] = rows.try_emplace(row.existence.id, row);
+      if (!is_new && at->second.utime <= row.utime) at->second = row;
+    }
+  }
+
+  fused.landmarks.clear();
+  for (const auto& [id, row] : rows) fused.landmarks.push_back(row);
+  map_file::give_existence(merged.map, fused);
+}
+
 }  // namespace
 
 MergedMaps fuse(const StoredMap& first, const StoredMap& second, const Alignment& alignment,
@@ -185,6 +228,7 @@ MergedMaps fuse(const StoredMap& first, const StoredMap& second, const Alignment
     if (!is_fused[i]) adder.add(second.landmarks[i]);
   }
   std::ranges::sort(merged.renamed);
+  fuse_existence(merged, second);
   return merged;
 }
 

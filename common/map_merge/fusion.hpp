@@ -32,7 +32,9 @@ struct FusionParameters {
 
 /// Fuses what `alignment` has in pairs and adds the rest of the second map. A fused landmark keeps
 /// the first map's id and has both positions by their information, the counts of both, the radius
-/// by them, the existence that the younger map states. What of the covariances is common to all
+/// by them, the existence that the younger map states. States of existence follow their landmarks;
+/// of a pair the one with the later stamp stays, and its probability is the landmark's; what was
+/// learned for all is that of the later stamp. What of the covariances is common to all
 /// landmarks (`LandmarkPair::independent_share`) is not made smaller. Ids of added ones go on
 /// behind the first map's last. Precondition: the alignment is of these landmarks, in this order,
 /// and found; the maps' numbers differ.

@@ -33,18 +33,30 @@ void LogMaps::add(const io::LogEvent& event) {
     if (correction && correction->map_id == map_id_) held_.take(*correction);
   } else if (event.channel == "SLAM_UPDATE") {
     const auto update = wire::decode_message<model::MapUpdate>(event.data);
-    if (!update) return;
-    const bool starts = update->status == model::MapUpdateStatus::kFirstMap;
-    if (starts || map_id_ == 0) go_to(update->map_id);
-    held_.take(*update);
-    is_provisional_ = update->is_provisional;
+    if (update) follow(*update);
+  } else if (event.channel == "EXISTENCE_STATE") {
+    const auto state = wire::decode_message<model::ExistenceState>(event.data);
+    if (state && map_file::fault_of(*state).empty()) existence_[state->map_id].take(*state);
   }
+}
+
+void LogMaps::follow(const model::MapUpdate& update) {
+  const bool starts = update.status == model::MapUpdateStatus::kFirstMap;
+  // Of a mapper that began anew, the landmarks of this number are others.
+  if (starts) existence_.erase(update.map_id);
+  if (starts || map_id_ == 0) go_to(update.map_id);
+  held_.take(update);
+  is_provisional_ = update.is_provisional;
 }
 
 std::map<std::uint32_t, LogMaps::Found> LogMaps::take() {
   // The map in use at the end is one, however young it is.
   is_provisional_ = false;
   keep();
+  for (auto& [map_id, found] : left_) {
+    const auto existence = existence_.find(map_id);
+    if (existence != existence_.end()) found.existence = existence->second.stored();
+  }
   return std::move(left_);
 }
 
@@ -58,7 +70,7 @@ void LogMaps::go_to(std::uint32_t map_id) {
 
 void LogMaps::keep() {
   if (map_id_ == 0 || is_provisional_ || !held_.map()) return;
-  left_.insert_or_assign(map_id_, Found{*held_.whole(), held_.missed()});
+  left_.insert_or_assign(map_id_, Found{*held_.whole(), held_.missed(), std::nullopt});
 }
 
 }  // namespace understory::cli

@@ -6,19 +6,22 @@
 #include <optional>
 
 #include "common/io/lcm_log.hpp"
+#include "common/map_file/stored_existence.hpp"
 #include "common/model/held_map.hpp"
 
 namespace understory::cli {
 
-/// Follows MAP, MAP_DELTA and SLAM_UPDATE through a log in which a mapper may begin further maps:
-/// each as it was last. A provisional map that gave way to another one is dropped, as the mapper
-/// drops it.
+/// Follows MAP, MAP_DELTA, SLAM_UPDATE and EXISTENCE_STATE through a log in which a mapper may
+/// begin further maps: each as it was last. A provisional map that gave way to another one is
+/// dropped, as the mapper drops it.
 class LogMaps {
  public:
   /// One map, and how many of its changes are missing in the log.
   struct Found {
     model::WholeMap map;
     std::uint64_t missed = 0;
+    /// The last EXISTENCE_STATE of each landmark, gone ones too; none where there was none.
+    std::optional<map_file::StoredExistence> existence;
   };
 
   /// Takes one event; channels that do not matter are passed over.
@@ -29,11 +32,13 @@ class LogMaps {
  private:
   void go_to(std::uint32_t map_id);
   void keep();
+  void follow(const model::MapUpdate& update);
 
   std::uint32_t map_id_ = 0;  ///< Of the map that is held; 0 = none yet.
   bool is_provisional_ = false;
   model::HeldMap held_;
   std::map<std::uint32_t, Found> left_;
+  std::map<std::uint32_t, map_file::NewestExistence> existence_;
 };
 
 }  // namespace understory::cli

@@ -53,6 +53,8 @@ nlohmann::ordered_json summary_json(const MapSummary& map) {
           {"keyframes", map.keyframes},
           {"submap_borders", map.submap_borders},
           {"loop_closures", map.loop_closures},
+          {"existence_states", map.existence_states},
+          {"not_in_use", map.not_in_use},
           {"checksum", map.checksum}};
 }
 
@@ -95,6 +97,11 @@ void map_info(const MapOptions& options) {
                map.keyframes, time_text(map.created_utime),
                terminal::printable(map.checksum.substr(0, 12)), terminal::printable(map.name),
                terminal::printable(map.origin));
+  }
+  for (const MapSummary& map : maps) {
+    if (map.existence_states > 0)
+      fmt::print("map {}: {} landmarks have a state of existence, {} of them are not in use\n",
+                 map.map_id, map.existence_states, map.not_in_use);
   }
 }
 

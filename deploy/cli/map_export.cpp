@@ -1,6 +1,7 @@
 // `understory map export`: maps in formats that other tools read.
 #include <fmt/format.h>
 
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -45,11 +46,22 @@ Json feature(const char* kind, Json coordinates, Json properties) {
           {"properties", std::move(properties)}};
 }
 
+/// Whether each landmark with a state of existence is in use.
+std::map<model::LandmarkId, bool> uses_of(const map_file::StoredMap& map) {
+  std::map<model::LandmarkId, bool> uses;
+  if (!map.existence) return uses;
+  for (const map_file::ExistenceRow& row : map.existence->landmarks)
+    uses[row.existence.id] = row.existence.is_in_use;
+  return uses;
+}
+
 Json landmark_features(const map_file::StoredMap& map) {
+  const std::map<model::LandmarkId, bool> uses = uses_of(map);
   Json features = Json::array();
   for (const map_file::StoredLandmark& one : map.landmarks) {
     const model::MapLandmark& landmark = one.landmark;
     const bool is_trunk = landmark.kind == model::LandmarkKind::kTrunk;
+    const auto use = uses.find(landmark.id);
     features.push_back(
         feature("Point", place(landmark.position_m),
                 {{"landmark_id", landmark.id},
@@ -58,7 +70,8 @@ Json landmark_features(const map_file::StoredMap& map) {
                  {"diameter_m", landmark.radius_m > 0.0 ? Json(2.0 * landmark.radius_m) : Json()},
                  {"kind", is_trunk ? "trunk" : "corner"},
                  {"times_seen", landmark.observation_count},
-                 {"existence", or_null(one.existence)}}));
+                 {"existence", or_null(one.existence)},
+                 {"in_use", use == uses.end() ? Json() : Json(use->second)}}));
   }
   return features;
 }

@@ -69,7 +69,8 @@ StoredMap map_of_table(const MapImportOptions& options) {
   return map;
 }
 
-StoredMap map_of_drive(std::uint32_t map_id, const model::WholeMap& whole) {
+StoredMap map_of_drive(std::uint32_t map_id, const LogMaps::Found& found) {
+  const model::WholeMap& whole = found.map;
   StoredMap map;
   map.map_id = map_id;
   map.created_utime = whole.utime;
@@ -77,6 +78,7 @@ StoredMap map_of_drive(std::uint32_t map_id, const model::WholeMap& whole) {
   for (const model::MapLandmark& landmark : whole.landmarks)
     map.landmarks.push_back({landmark, std::nullopt, std::nullopt});
   map.keyframes = whole.keyframes;
+  if (found.existence) map_file::give_existence(map, *found.existence);
   return map;
 }
 
@@ -100,7 +102,7 @@ std::vector<StoredMap> maps_of_log(const MapImportOptions& options) {
     if (found.missed > 0)
       fmt::print(stderr, "{}: map {}: {} changes are missing: some landmarks may be old\n",
                  options.source, id, found.missed);
-    maps.push_back(map_of_drive(id, found.map));
+    maps.push_back(map_of_drive(id, found));
   }
 
   if (maps.empty())
@@ -150,6 +152,8 @@ std::string count_text(const std::vector<StoredMap>& maps) {
   for (const StoredMap& map : maps) {
     text += fmt::format("{}map {} of {} landmarks and {} keyframes", text.empty() ? "" : ", ",
                         map.map_id, map.landmarks.size(), map.keyframes.size());
+    if (map.existence)
+      text += fmt::format(" ({} with a state of existence)", map.existence->landmarks.size());
   }
   return text;
 }

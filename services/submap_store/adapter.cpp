@@ -114,6 +114,20 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
     node.subscribe<model::MapUpdate>(channels_.slam_update,
                                      [this](const model::MapUpdate& update) { follow(update); },
                                      {.queue_size = 200, .journaled = false});
+    node.subscribe<model::ExistenceState>(
+        channels_.existence_state,
+        [this](const model::ExistenceState& state) { take_existence(state); },
+        {.queue_size = 500, .journaled = false});
+  }
+
+  /// A message that no map can have must not keep the others from being written.
+  void take_existence(const model::ExistenceState& state) {
+    const std::string fault = map_file::fault_of(state);
+    if (fault.empty()) {
+      stage_.take(state);
+    } else {
+      node_->report(wire::Reason::kInputRefused, fault, channels_.existence_state);
+    }
   }
 
   /// Works on the drive's file. What is wrong with it is told once, in HEALTH as long as it lasts,
@@ -214,6 +228,7 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
         file.put(one);
       }
     }
+    for (const auto& [map_id, existence] : writes.existence) file.put(map_id, existence);
     if (left_out > 0)
       node_->report(wire::Reason::kInputRefused,
                     fmt::format("{} landmarks or keyframes cannot be stored", left_out),
@@ -255,8 +270,9 @@ bus::Service submap_store_service(const StoreChannels& channels) {
   return {"submap_store",
           channels.submap + ", " + channels.submap_query + ", " + channels.map_correction + ", " +
               channels.map + ", " + channels.map_delta + ", " + channels.slam_update + ", " +
-              channels.loop_closure + ", " + channels.loop_result + " -> " +
-              channels.submap_stored + ", " + channels.submap_reply + ", " + channels.map_request,
+              channels.loop_closure + ", " + channels.loop_result + ", " +
+              channels.existence_state + " -> " + channels.submap_stored + ", " +
+              channels.submap_reply + ", " + channels.map_request,
           [channels] { return std::make_unique<StoreAdapter>(channels); }};
 }
 

@@ -18,6 +18,7 @@ struct StoreChannels {
   std::string slam_update = "SLAM_UPDATE";
   std::string loop_closure = "LOOP_CLOSURE";
   std::string loop_result = "LOOP_RESULT";
+  std::string existence_state = "EXISTENCE_STATE";
   // Out.
   std::string submap_stored = "SUBMAP_STORED";
   std::string submap_reply = "SUBMAP_REPLY";

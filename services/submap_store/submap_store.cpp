@@ -8,7 +8,7 @@
 namespace understory::submap_store {
 namespace {
 
-constexpr state::Format kFormat{"submap_store", 1};
+constexpr state::Format kFormat{"submap_store", 2};
 /// Closures that wait for the mapper's word.
 constexpr std::size_t kMostProposed = 1000;
 
@@ -35,7 +35,9 @@ void SubmapStore::take(const model::WholeMap& map) {
 void SubmapStore::take(const model::MapDelta& delta) {
   // Only the first change of a map may come before anything else that names it.
   if (delta.base_version == 0) go_to(map_of(delta.added));
-  if (ground_.map_id() != 0) ground_.take(delta);
+  if (ground_.map_id() == 0) return;
+  ground_.take(delta);
+  forget(delta);
 }
 
 void SubmapStore::take(const model::MapUpdate& update) {
@@ -80,6 +82,8 @@ void SubmapStore::take(const model::LoopResult& result) {
   proposed_.erase(found);
 }
 
+void SubmapStore::take(const model::ExistenceState& state) { existence_[state.map_id].take(state); }
+
 geometry::SE2 SubmapStore::pose_of(const model::Submap& submap) const {
   if (!correction_ || correction_->map_id != submap.map_id || correction_->utime < submap.utime)
     return submap.map_T_submap;
@@ -104,22 +108,26 @@ void SubmapStore::begin_drive() {
 Writes SubmapStore::due() const {
   Writes result = left_;
   if (auto change = ground_.change()) result.ground.push_back(*std::move(change));
+  for (const auto& [map_id, newest] : existence_) {
+    if (map_id <= ground_.map_id()) result.existence.emplace_back(map_id, newest.stored());
+  }
   return result;
 }
 
 void SubmapStore::written() {
   left_ = {};
   ground_.written();
+  existence_.erase(existence_.begin(), existence_.upper_bound(ground_.map_id()));
 }
 
 std::string SubmapStore::save() const {
-  return state::save(kFormat, ground_, is_provisional_, left_, correction_, proposed_);
+  return state::save(kFormat, ground_, is_provisional_, left_, correction_, proposed_, existence_);
 }
 
 void SubmapStore::load(const std::string& state) {
   SubmapStore loaded;
   state::load(state, kFormat, loaded.ground_, loaded.is_provisional_, loaded.left_,
-              loaded.correction_, loaded.proposed_);
+              loaded.correction_, loaded.proposed_, loaded.existence_);
   *this = std::move(loaded);
   ground_.want_whole();
 }
@@ -130,12 +138,21 @@ void SubmapStore::go_to(std::uint32_t map_id) {
   if (map_id == 0 || map_id == ground_.map_id()) return;
   if (is_provisional_) {
     left_.dropped_maps.push_back(ground_.map_id());
+    existence_.erase(ground_.map_id());
   } else if (auto change = ground_.change()) {
     left_.ground.push_back(*std::move(change));
   }
   ground_ = Ground(map_id);
   is_provisional_ = false;
   proposed_.clear();
+}
+
+/// Landmarks that are no more, and those that are another one now: the tracker has fused the two.
+void SubmapStore::forget(const model::MapDelta& delta) {
+  const auto found = existence_.find(ground_.map_id());
+  if (found == existence_.end()) return;
+  for (const model::LandmarkId id : delta.removed) found->second.drop(id);
+  for (const auto& [old_id, new_id] : delta.merged) found->second.drop(old_id);
 }
 
 }  // namespace understory::submap_store

@@ -5,8 +5,10 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "common/map_file/stored_existence.hpp"
 #include "common/map_file/submap_layers.hpp"
 #include "common/model/slam_output.hpp"
 #include "common/model/submap.hpp"
@@ -19,21 +21,25 @@ struct Writes {
   std::vector<std::uint32_t> dropped_maps;     ///< Young maps that were given up.
   std::vector<map_file::GroundChange> ground;  ///< Of maps that are not in use any more, and of it.
   std::vector<model::LoopClosure> closures;    ///< They count; or they were taken back.
+  /// What the existence tracker goes on with, by map.
+  std::vector<std::pair<std::uint32_t, map_file::StoredExistence>> existence;
 
   /// Whether there is nothing.
-  bool empty() const { return dropped_maps.empty() && ground.empty() && closures.empty(); }
+  bool empty() const {
+    return dropped_maps.empty() && ground.empty() && closures.empty() && existence.empty();
+  }
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
-    a(s.dropped_maps, s.ground, s.closures);
+    a(s.dropped_maps, s.ground, s.closures, s.existence);
   }
 };
 
 /// Follows the mapper. Submaps go to the file at once and are no business of this class, but for
 /// what they take out of the ground: the map that the mapper holds itself. The ground is written
 /// now and then, so that the file has all of a drive. Memory: what has changed since it was written
-/// last, and a pose for each submap.
+/// last (of existence: one state for each landmark), and a pose for each submap.
 class SubmapStore {
  public:
   /// Whether this keyframe begins a map that a file with maps up to `highest_map` has already: the
@@ -52,6 +58,9 @@ class SubmapStore {
   void take(const model::LoopClosure& closure);
   /// LOOP_RESULT.
   void take(const model::LoopResult& result);
+  /// EXISTENCE_STATE, in which map_file::fault_of() finds nothing. That of a map which the mapper
+  /// has not begun yet waits until it has.
+  void take(const model::ExistenceState& state);
 
   /// Where a submap is: its own pose, or that of a later correction.
   geometry::SE2 pose_of(const model::Submap& submap) const;
@@ -76,12 +85,14 @@ class SubmapStore {
 
  private:
   void go_to(std::uint32_t map_id);
+  void forget(const model::MapDelta& delta);
 
   Ground ground_;
   bool is_provisional_ = false;                           ///< The map in use, by its last keyframe.
   Writes left_;                                           ///< But for the map in use.
   std::optional<model::MapCorrection> correction_;        ///< The newest one.
   std::map<std::uint64_t, model::LoopClosure> proposed_;  ///< By id; of the map in use.
+  std::map<std::uint32_t, map_file::NewestExistence> existence_;  ///< Not written yet, by map.
 };
 
 }  // namespace understory::submap_store

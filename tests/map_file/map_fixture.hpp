@@ -56,6 +56,25 @@ inline map_file::StoredLandmark random_landmark(model::LandmarkId id, std::mt199
   return one;
 }
 
+/// States of some of its landmarks; the tracker's bytes, zeros among them.
+inline void give_random_existence(StoredMap& map, std::mt19937_64& random) {
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  const auto bytes = [&] {
+    std::string text;
+    for (std::size_t i = 1 + random() % 12; i > 0; --i)
+      text += static_cast<char>(random() % 5 == 0 ? 0U : random() & 0xFFU);
+    return text;
+  };
+  map_file::StoredExistence existence{static_cast<model::Utime>(random() >> 2U), bytes(), {}};
+  for (const map_file::StoredLandmark& one : map.landmarks) {
+    if (unit(random) < 0.3) continue;
+    existence.landmarks.push_back({{one.landmark.id, unit(random), random() % 3 != 0},
+                                   static_cast<model::Utime>(random() >> 2U),
+                                   bytes()});
+  }
+  map_file::give_existence(map, existence);
+}
+
 inline StoredMap random_map(std::uint32_t map_id, std::mt19937_64& random,
                             std::size_t most_landmarks = 60) {
   const auto count = [&](std::size_t most) {
@@ -85,6 +104,7 @@ inline StoredMap random_map(std::uint32_t map_id, std::mt19937_64& random,
   for (std::size_t i = count(3); i > 0; --i)
     map.loop_closures.push_back(
         {random() >> 1U, random() >> 1U, random_place(random), random_place(random)});
+  if (count(3) > 0) give_random_existence(map, random);
   return map;
 }
 
@@ -120,7 +140,8 @@ inline bool same(const StoredMap& a, const StoredMap& b) {
   };
   return a.map_id == b.map_id && a.name == b.name && a.created_utime == b.created_utime &&
          a.origin == b.origin && all(a.landmarks, b.landmarks) && all(a.keyframes, b.keyframes) &&
-         all(a.submap_borders, b.submap_borders) && all(a.loop_closures, b.loop_closures);
+         all(a.submap_borders, b.submap_borders) && all(a.loop_closures, b.loop_closures) &&
+         a.existence == b.existence;
 }
 
 inline ChangeNote note(const std::string& text) {
@@ -175,8 +196,8 @@ inline std::string dump_of(const std::filesystem::path& path,
 
 /// All that maps consist of.
 inline std::string dump_of_maps(const std::filesystem::path& path) {
-  return dump_of(path,
-                 {"understory_maps", "landmarks", "trajectory", "submap_borders", "loop_closures"});
+  return dump_of(path, {"understory_maps", "landmarks", "trajectory", "submap_borders",
+                        "loop_closures", "existence_states", "existence_models"});
 }
 
 /// The same with the indexes.
@@ -184,6 +205,20 @@ inline std::string dump(const std::filesystem::path& path) {
   return dump_of_maps(path) +
          dump_of(path, {"rtree_landmarks_geom", "rtree_trajectory_geom",
                         "rtree_submap_borders_geom", "rtree_loop_closures_geom"});
+}
+
+/// Makes a file what a program of an earlier version would have written: its maps have no states.
+inline void make_older(const std::filesystem::path& path, int version) {
+  RawFile(path).run(
+      "DROP TABLE existence_states; DROP TABLE existence_models; "
+      "DELETE FROM gpkg_extensions WHERE definition LIKE '%/111-%'");
+  if (version < 2)
+    RawFile(path).run(
+        "DROP TABLE understory_submaps; DROP TABLE understory_submap_poses; "
+        "DROP TABLE understory_closures; "
+        "DELETE FROM gpkg_extensions WHERE definition LIKE '%/092-%'");
+  RawFile(path).run(
+      fmt::format("UPDATE understory_meta SET value = '{}' WHERE key = 'schema_version'", version));
 }
 
 /// The fault that `work` ends with, whose line names the file.

@@ -22,6 +22,7 @@ struct Package {
     map = random_map(1, random, 60);
     map.landmarks = {random_landmark(map_file::landmark_id(1, 7), random),
                      random_landmark(map_file::landmark_id(1, 9), random)};
+    map.existence.reset();
     map_file::create_map_file(file, {&map, 1}, note("made"));
   }
 

@@ -79,6 +79,8 @@ TEST_CASE("what a map cannot have is refused, and nothing is changed", "[map_fil
   StoredMap good = random_map(1, random);
   good.landmarks = {random_landmark(map_file::landmark_id(1, 1), random),
                     random_landmark(map_file::landmark_id(1, 2), random)};
+  good.existence = {
+      {5, "model", {{{map_file::landmark_id(1, 2), 0.5, true}, 7, std::string("\0x", 2)}}}};
   good.keyframes = {{1, 2, geometry::SE2(1.0, 2.0, 3.0), Eigen::Matrix3d::Identity()}};
   map_file::create_map_file(file, {&good, 1}, note("good"));
   const std::string before = dump(file);
@@ -95,6 +97,13 @@ TEST_CASE("what a map cannot have is refused, and nothing is changed", "[map_fil
       [](StoredMap& map) { map.landmarks[0].landmark.id = map_file::landmark_id(1, 0); },
       [](StoredMap& map) { std::swap(map.landmarks[0], map.landmarks[1]); },
       [](StoredMap& map) { map.landmarks[0].existence = 1.1; },
+      [](StoredMap& map) {
+        map.existence->landmarks[0].existence.id = map_file::landmark_id(1, 3);
+      },
+      [](StoredMap& map) { map.existence->landmarks[0].existence.probability = -0.1; },
+      [&](StoredMap& map) { map.existence->landmarks[0].existence.probability = nan; },
+      [](StoredMap& map) { map.existence->landmarks[0].state.clear(); },
+      [](StoredMap& map) { map.existence->landmarks.push_back(map.existence->landmarks[0]); },
       [&](StoredMap& map) { map.keyframes[0].covariance(2, 2) = nan; },
       [](StoredMap& map) { map.keyframes[0].keyframe_sequence = ~0ULL; },
       [](StoredMap& map) {

@@ -108,7 +108,7 @@ TEST_CASE_METHOD(Faulty, "files that are something else, damaged, or of another 
   RawFile(file).run("DROP TABLE understory_submaps");
   refused("file_damaged");
   write_bytes(file, good);
-  RawFile(file).run("UPDATE understory_meta SET value = '3' WHERE key = 'schema_version'");
+  RawFile(file).run("UPDATE understory_meta SET value = '4' WHERE key = 'schema_version'");
   refused("file_unusable");
 }
 
@@ -152,13 +152,10 @@ TEST_CASE_METHOD(Faulty, "a folder that cannot be written", "[submap_store]") {
 
 TEST_CASE_METHOD(Faulty, "a file of the schema before is taken over", "[submap_store]") {
   std::filesystem::create_directories(directory / "maps");
-  const StoredMap map = random_map(1, random);
+  StoredMap map = random_map(1, random);
+  map.existence.reset();
   map_file::create_map_file(file, {&map, 1}, note("made"));
-  // What version 1 had; the rest of its schema is the same.
-  RawFile(file).run(
-      "DROP TABLE understory_submaps; DROP TABLE understory_submap_poses; "
-      "DROP TABLE understory_closures; DELETE FROM gpkg_extensions WHERE definition LIKE '%092%'; "
-      "UPDATE understory_meta SET value = '1' WHERE key = 'schema_version'");
+  make_older(file, 1);
   CHECK(MapFile(file, Access::kRead).check().empty());
   const Bytes before = read_bytes(file);
   CHECK(same(MapFile(file, Access::kRead).read(1), map));
