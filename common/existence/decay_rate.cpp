@@ -15,6 +15,7 @@ DecayRate::DecayRate(double rate_per_s, double weight) : mean_per_s_(rate_per_s)
   if (weight <= 0.0 || rate_per_s <= 0.0) return;
   went_ = weight;
   exposure_s_ = weight / rate_per_s;
+  mean_per_s_ = went_ / exposure_s_;  // as restore() gives it, to the bit
 }
 
 double DecayRate::sigma_per_s() const { return went_ > 0.0 ? std::sqrt(went_) / exposure_s_ : 0.0; }

@@ -1,7 +1,6 @@
 // The probability that one map point still exists, and the shell from which it can be seen.
 #pragma once
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,41 +8,25 @@
 #include <span>
 #include <stdexcept>
 
+#include "common/existence/look.hpp"
 #include "common/existence/model.hpp"
 #include "common/existence/odds.hpp"
 #include "common/existence/shell.hpp"
 
 namespace understory::existence {
 
-/// What the sensor measured along the ray to the point, where it has ranges.
-enum class Ray : std::uint8_t {
-  kUnknown,  ///< No range, or one at the point itself.
-  kBlocked,  ///< A return clearly in front of the point: hidden by something.
-  kPassed,   ///< A return clearly behind it: nothing on the ray.
-};
-
-/// One look at a point that is expected in view: within the field of view and the sensor's range.
-struct Look {
-  Eigen::Vector3f from_point_m;  ///< Sensor minus point, frame of the map.
-  Ray ray = Ray::kUnknown;       ///< Read by miss() only.
-};
-
-/// Range along the ray against the point's distance, both [m]; `tolerance_m`: what both may be off.
-inline Ray ray_of(double range_m, double distance_m, double tolerance_m) {
-  if (range_m < distance_m - tolerance_m) return Ray::kBlocked;
-  if (range_m > distance_m + tolerance_m) return Ray::kPassed;
-  return Ray::kUnknown;
-}
-
-/// All that is kept of a point, as plain numbers: the same bytes for the same point.
+/// All that is kept of a point, as plain numbers without padding: the same bytes for the same
+/// point, and a point that goes on bit by bit as if nothing had been.
 template <Shell S>
 struct SavedPoint {
   static constexpr std::uint32_t kVersion = 1;
+  static constexpr std::size_t kFloats = 8;
   std::uint32_t version = kVersion;
   std::uint32_t shell_kind = S::kKind;
-  double log_odds = 0.0;
-  std::array<std::uint32_t, 3> pass{};  ///< Number, sectors and flags.
-  std::array<float, 8> numbers{};       ///< Of the pass; see PointExistence.
+  double odds = 0.0;  ///< P / (1 - P), of the pass that is open.
+  /// Number of the pass, sectors and flags; a fourth one, 0, where the size would not divide by 8.
+  std::array<std::uint32_t, 3 + (3 + kFloats + S::kNumbers) % 2> pass{};
+  std::array<float, kFloats> numbers{};  ///< Of the pass; see PointExistence.
   std::array<float, S::kNumbers> shell{};
 };
 
@@ -145,7 +128,9 @@ class PointExistence {
 
   SavedPoint<S> save() const {
     SavedPoint<S> saved;
-    saved.log_odds = log_odds();
+    static_assert(sizeof(saved) ==
+                  16 + sizeof(saved.pass) + sizeof(saved.numbers) + sizeof(saved.shell));
+    saved.odds = odds_;
     saved.pass = {pass_,
                   rays_passed_ | (std::uint32_t{last_hit_} << 24) | (std::uint32_t{flags_} << 29),
                   missed_from_ | (std::uint32_t{missed_code_} << 24)};
@@ -164,11 +149,12 @@ class PointExistence {
   static PointExistence load(const ExistenceModel& model, const SavedPoint<S>& saved) {
     PointExistence point(model, odds_of(model.parameters().prior));
     bool is_good = saved.version == SavedPoint<S>::kVersion && saved.shell_kind == S::kKind &&
-                   std::isfinite(saved.log_odds) && point.shell_.restore(saved.shell);
+                   std::isfinite(saved.odds) && saved.odds >= 0.0 &&
+                   point.shell_.restore(saved.shell);
     for (const float number : saved.numbers)
       is_good = is_good && std::isfinite(number) && number >= 0;
     if (!is_good) throw std::invalid_argument("existence: a saved point that cannot be");
-    point.odds_ = bounded(std::exp(saved.log_odds));
+    point.odds_ = bounded(saved.odds);
     point.pass_ = saved.pass[0];
     point.rays_passed_ = saved.pass[1] & kSectors;
     point.last_hit_ = (saved.pass[1] >> 24U) & 31U;

@@ -45,6 +45,6 @@ concept Shell = requires(S shell, const S& constant, const Eigen::Vector3f& dire
 inline constexpr float kLeastVisibilityOdds = 1e-17F;
 /// A hit finds at least these odds: a line of sight may have opened since the last look. Misses do
 /// not use it: who waits behind an occluder would be told by each of them that it may have left.
-inline constexpr float kOpenedOdds = 1e-4F;
+inline constexpr float kOpenedOdds = 1e-5F;
 
 }  // namespace understory::existence

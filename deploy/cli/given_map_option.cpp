@@ -55,27 +55,33 @@ void add_given_map_options(CLI::App& command, GivenMapOptions& options) {
       ->needs(map);
 }
 
-GivenMapLayer given_map_layer(const GivenMapOptions& options, const fs::path& file,
-                              const std::vector<std::string>& processes) {
+GivenMapLayers given_map_layers(const GivenMapOptions& options, const fs::path& file,
+                                const std::vector<std::string>& processes) {
   if (std::ranges::find(processes, kMapperProcess) == processes.end())
     wrong_usage(fmt::format("--map {}: no {} runs, only: {}", options.file, kMapperProcess,
                             fmt::join(processes, ", ")));
 
   const std::uint32_t map_id = number_of_given(options);
   toml::table input{{"map_file", file.string()}, {"map_id", static_cast<std::int64_t>(map_id)}};
+  GivenMapLayers given{{}, checksum_in_file(options.file, map_id)};
+  if (std::ranges::find(processes, kTrackerProcess) != processes.end())
+    given.layers[kTrackerProcess] = {"--map", toml::table{{"input", input}}};
+
   toml::table values;
   values.insert("input", std::move(input));
   if (options.localisation_only)
     values.insert("smoothing", toml::table{{"localisation_only", true}});
-  return {{"--map", std::move(values)}, checksum_in_file(options.file, map_id)};
+  given.layers[kMapperProcess] = {"--map", std::move(values)};
+  return given;
 }
 
 fs::path layer_file(const fs::path& state_folder) { return state_folder / "given_map.toml"; }
 
-void keep_layer(const fs::path& state_folder, const fs::path& base, const GivenMapLayer& layer) {
+void keep_layer(const fs::path& state_folder, const fs::path& base, const bus::ConfigLayer& layer,
+                const std::string& checksum) {
   const fs::path file = layer_file(state_folder);
-  const std::string text = fmt::format("# Map with checksum {}\n{}", layer.checksum,
-                                       bus::layer_over(base, layer.layer.table));
+  const std::string text =
+      fmt::format("# Map with checksum {}\n{}", checksum, bus::layer_over(base, layer.table));
   const bool is_same = fs::exists(file) && io::read_whole_file(file) == text;
   if (is_same) return;
 

@@ -77,7 +77,8 @@ std::vector<bus::ProcessEntry> chosen_processes(const LaunchOptions& options) {
 
 /// The file of a process's parameters; empty = defaults.
 std::filesystem::path config_of(const LaunchOptions& options, const bus::ProcessEntry& entry) {
-  const bool has_layer = options.map.is_given() && entry.name == kMapperProcess;
+  const bool has_layer =
+      options.map.is_given() && (entry.name == kMapperProcess || entry.name == kTrackerProcess);
   return has_layer ? layer_file(options.state / entry.name) : entry.config;
 }
 
@@ -128,26 +129,28 @@ void prepare_state(const LaunchOptions& options, const launch::Supervisor& super
   }
 }
 
-/// The mapper's file with the given map in it, or none of an earlier launch.
+/// Files of the processes that are given the map, with it; or none of an earlier launch.
 void prepare_map(const LaunchOptions& options, const std::vector<bus::ProcessEntry>& entries,
-                 const std::optional<GivenMapLayer>& layer) {
-  const std::filesystem::path folder = options.state / kMapperProcess;
-  if (!layer) {
-    std::filesystem::remove(layer_file(folder));
-    return;
+                 const std::optional<GivenMapLayers>& given) {
+  for (const bus::ProcessEntry& entry : entries) {
+    if (entry.name != kMapperProcess && entry.name != kTrackerProcess) continue;
+    const std::filesystem::path folder = options.state / entry.name;
+    if (given) {
+      keep_layer(folder, entry.config, given->layers.at(entry.name), given->checksum);
+    } else {
+      std::filesystem::remove(layer_file(folder));
+    }
   }
-  const auto mapper = std::ranges::find(entries, kMapperProcess, &bus::ProcessEntry::name);
-  keep_layer(folder, mapper->config, *layer);
 }
 
 /// With the map's path as every process can use it; none where no map is given.
-std::optional<GivenMapLayer> map_layer(const LaunchOptions& options,
-                                       const std::vector<bus::ProcessEntry>& entries) {
+std::optional<GivenMapLayers> map_layer(const LaunchOptions& options,
+                                        const std::vector<bus::ProcessEntry>& entries) {
   if (!options.map.is_given()) return std::nullopt;
   std::vector<std::string> names;
   names.reserve(entries.size());
   for (const bus::ProcessEntry& entry : entries) names.push_back(entry.name);
-  return given_map_layer(options.map, std::filesystem::absolute(options.map.file), names);
+  return given_map_layers(options.map, std::filesystem::absolute(options.map.file), names);
 }
 
 /// Sleeps until a process ends, a signal or a message comes, or something is due.
@@ -206,7 +209,7 @@ void launch_processes(const LaunchOptions& options) {
     wrong_usage(error.what());
   }
 
-  const std::optional<GivenMapLayer> layer = map_layer(options, entries);
+  const std::optional<GivenMapLayers> layer = map_layer(options, entries);
   const StopSignals signals;
   launch::Registry registry(options.state);
   LaunchReport report(options.quiet);

@@ -103,7 +103,8 @@ void lay_map_over(const ReplayOptions& options, bus::ReplayOptions& replay) {
   if (!options.map.is_given()) return;
   std::vector<std::string> names;
   for (const bus::Service& service : replay.services) names.push_back(service.name);
-  replay.layers[kMapperProcess] = given_map_layer(options.map, options.map.file, names).layer;
+  for (auto& [process, layer] : given_map_layers(options.map, options.map.file, names).layers)
+    replay.layers[process] = std::move(layer);
 }
 
 void run(const ReplayOptions& options) {

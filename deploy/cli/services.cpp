@@ -2,6 +2,7 @@
 
 #include "services/associator/adapter.hpp"
 #include "services/ekf/adapter.hpp"
+#include "services/existence_tracker/adapter.hpp"
 #include "services/geoslam_mapper/adapter.hpp"
 #include "services/keyframer/adapter.hpp"
 #include "services/landmark_extractor/adapter.hpp"
@@ -20,7 +21,8 @@ std::vector<bus::Service> all_services() {
           keyframer::keyframer_service(),
           geoslam_mapper::geoslam_mapper_service(),
           submap_store::submap_store_service(),
-          loop_closer::loop_closer_service()};
+          loop_closer::loop_closer_service(),
+          existence_tracker::existence_tracker_service()};
 }
 
 std::vector<bus::Service> sensor_services() { return {velodyne_driver::velodyne_driver_service()}; }

@@ -10,6 +10,7 @@
 #include "common/geometry/alignment.hpp"
 #include "services/associator/adapter.hpp"
 #include "services/ekf/adapter.hpp"
+#include "services/existence_tracker/adapter.hpp"
 #include "services/geoslam_mapper/adapter.hpp"
 #include "services/keyframer/adapter.hpp"
 #include "services/landmark_extractor/adapter.hpp"
@@ -118,6 +119,7 @@ std::vector<bus::Service> services_of(const std::filesystem::path& config_dir) {
   std::vector<bus::Service> all = front_end_services();
   if (config_dir.empty()) return all;
   all.push_back(loop_closer::loop_closer_service());
+  all.push_back(existence_tracker::existence_tracker_service());
   std::set<std::string> started;
   for (const bus::ProcessEntry& entry : bus::read_launch_config(config_dir).processes) {
     if (entry.name == kSensorDriver || entry.name == kStore) continue;

@@ -5,9 +5,9 @@
 #include <memory>
 #include <stdexcept>
 
-#include "common/map_file/existence_of.hpp"
 #include "services/existence_tracker/adapter_parameters.hpp"
 #include "services/existence_tracker/existence_tracker.hpp"
+#include "services/existence_tracker/start_states.hpp"
 #include "understory/map_request_t.hpp"
 
 namespace understory::existence_tracker {
@@ -33,8 +33,7 @@ class TrackerAdapter : public bus::Adapter {
     table.add("input.map_file", input_.map_file, {},
               "Map file to begin with, the mapper's (see understory map); what its landmarks' "
               "existence states say goes on.");
-    table.add("input.map_id", input_.map_id, {0, 32767}, "",
-              "Which of its maps; 0: the only one.");
+    table.add("input.map_id", input_.map_id, {0, 32767}, "", "Which of its maps; 0: the only one.");
     table.add("input.max_map_landmarks", input_.max_map_landmarks, {1, 10'000'000}, "",
               "Larger maps are refused.");
     bus::describe(limits_, "missing", "keyframes",
@@ -46,7 +45,7 @@ class TrackerAdapter : public bus::Adapter {
     stage_ = std::make_unique<ExistenceTracker>(parameters_);
     missing_.condition = bus::Condition(limits_);
     if (!input_.map_file.empty())
-      stage_->begin_with(map_file::existence_of(input_.map_file, input_.map_id));
+      stage_->begin_with(read_start_states(input_.map_file, input_.map_id));
     subscribe(node);
     existence_ = node.advertise<model::Existence>(channels_.existence);
     states_ = node.advertise<model::ExistenceState>(channels_.existence_state);
@@ -73,8 +72,7 @@ class TrackerAdapter : public bus::Adapter {
   void subscribe(bus::Node& node) {
     const auto landmarks = static_cast<std::size_t>(input_.max_map_landmarks);
     const bus::SubscribeOptions options{
-        .queue_size = 200,
-        .most_bytes = 2 * wire::bytes_with<map_t, map_landmark_t>(landmarks)};
+        .queue_size = 200, .most_bytes = 2 * wire::bytes_with<map_t, map_landmark_t>(landmarks)};
     node.subscribe<model::WholeMap>(
         channels_.map, [this](const model::WholeMap& map) { stage_->take(map); }, options);
     node.subscribe<model::MapDelta>(
@@ -108,10 +106,11 @@ class TrackerAdapter : public bus::Adapter {
     if (existence.is_mapping_needed == is_mapping_needed_) return;
     is_mapping_needed_ = existence.is_mapping_needed;
     if (is_mapping_needed_)
-      node_->log(bus::Node::Level::kInfo, "mapping_needed",
-                 fmt::format("{:.0f} % of the landmarks are missing, {:.0f} % of what is seen is new",
-                             100.0 * existence.missing_share, 100.0 * existence.new_share),
-                 channels_.existence);
+      node_->log(
+          bus::Node::Level::kInfo, "mapping_needed",
+          fmt::format("{:.0f} % of the landmarks are missing, {:.0f} % of what is seen is new",
+                      100.0 * existence.missing_share, 100.0 * existence.new_share),
+          channels_.existence);
   }
 
   void ask(model::Utime now) {

@@ -30,7 +30,8 @@ void describe(existence::Parameters& p, bus::ParameterTable& table) {
             "[mu] Rate at which it is forgotten from where a landmark can be seen.");
   table.add("model.passed_by", p.passed_by, {1e-6, 0.999}, "",
             "Share of viewpoints whose rays pass beside a landmark that is there.");
-  table.add("model.learn_recall", p.learn_recall, "Learn both shares from surely existing landmarks.");
+  table.add("model.learn_recall", p.learn_recall,
+            "Learn both shares from surely existing landmarks.");
   table.add("model.learn_visibility", p.learn_visibility,
             "Learn from where each landmark can be seen. Without it misses from one place count "
             "again and again.");

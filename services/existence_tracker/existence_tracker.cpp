@@ -24,8 +24,7 @@ std::optional<existence::Look> look_from(const Eigen::Vector2d& vehicle_m,
   const Eigen::Vector2f from_m = (vehicle_m - landmark_m).cast<float>();
   const float distance_m = from_m.norm();
   if (!(distance_m > kNearestM && distance_m < kFarthestM)) return std::nullopt;
-  return existence::Look{Eigen::Vector3f(from_m.x(), from_m.y(), 0.0F),
-                         existence::Ray::kUnknown};
+  return existence::Look{Eigen::Vector3f(from_m.x(), from_m.y(), 0.0F), existence::Ray::kUnknown};
 }
 
 bool has_place(const model::MapUpdate& update) {
@@ -92,7 +91,8 @@ std::optional<model::Existence> ExistenceTracker::add(const model::MapUpdate& up
   for (const model::Association& pair : update.associations)
     if (!std::ranges::binary_search(added, pair.landmark_id)) look(pair.landmark_id, true, update);
 
-  const bool knows_where = update.inliers >= static_cast<std::uint32_t>(parameters_.looks.min_inliers);
+  const bool knows_where =
+      update.inliers >= static_cast<std::uint32_t>(parameters_.looks.min_inliers);
   if (knows_where && !update.is_lost)
     for (const model::LandmarkId id : update.expected) look(id, false, update);
   return tell(update);
@@ -277,9 +277,8 @@ std::string ExistenceTracker::save() const {
     told.push_back(tracked.told_probability);
     points += encode(tracked.point, tracked.looked_utime);
   }
-  return state::save(kFormat, learned, ids, flags, told, points, places_, need_, births_,
-                     counters_, last_m_, utime_, map_id_, along_m_, pass_began_m_, repeated_,
-                     wants_map_);
+  return state::save(kFormat, learned, ids, flags, told, points, places_, need_, births_, counters_,
+                     last_m_, utime_, map_id_, along_m_, pass_began_m_, repeated_, wants_map_);
 }
 
 void ExistenceTracker::load(const std::string& state) {
@@ -298,7 +297,8 @@ void ExistenceTracker::load(const std::string& state) {
 
   decode(learned, loaded.model_);
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    const std::string_view bytes = std::string_view(points).substr(i * point_bytes(), point_bytes());
+    const std::string_view bytes =
+        std::string_view(points).substr(i * point_bytes(), point_bytes());
     TrackedPoint tracked = decode(loaded.model_, bytes, (flags[i] & 1U) != 0);
     tracked.was_told_in_use = (flags[i] & 2U) != 0;
     tracked.state_is_due = (flags[i] & 4U) != 0;

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
 #include <map>
+#include <optional>
 
 #include "common/model/archive.hpp"
 #include "common/model/slam_output.hpp"

@@ -1,4 +1,5 @@
-// The existence tracker as a process: every channel that it touches, besides HEALTH, LOG and CONFIG.
+// The existence tracker as a process: every channel that it touches, besides HEALTH, LOG and
+// CONFIG.
 #include "services/existence_tracker/adapter.hpp"
 
 int main(int argc, char** argv) {

@@ -7,6 +7,16 @@
 
 namespace understory::existence_tracker {
 
+/// The model's parameters for landmarks of maps that are driven in again: a rate at which things go
+/// (half of them in a year) that is soon learned. With none, what was once seen well exists for
+/// ever.
+constexpr existence::Parameters for_maps() {
+  existence::Parameters parameters;
+  parameters.decay_per_s = 2e-8;
+  parameters.decay_weight = 2.0;
+  return parameters;
+}
+
 /// When a landmark is not used any more, and when it is again.
 struct UseParameters {
   double drop_below = 0.05;    ///< Probability.
@@ -36,7 +46,7 @@ struct OutputParameters {
 
 /// The stage's parameters.
 struct TrackerParameters {
-  existence::Parameters model;
+  existence::Parameters model = for_maps();
   UseParameters use;
   LookParameters looks;
   NeedParameters need;

@@ -30,8 +30,7 @@ class Unpacker {
   explicit Unpacker(std::string_view bytes) : bytes_(bytes) {}
   template <class T>
   void operator()(T& value) {
-    if (bytes_.size() < sizeof(T))
-      throw std::invalid_argument("state of an existence is cut off");
+    if (bytes_.size() < sizeof(T)) throw std::invalid_argument("state of an existence is cut off");
     std::memcpy(&value, bytes_.data(), sizeof(T));
     bytes_.remove_prefix(sizeof(T));
   }
@@ -47,7 +46,7 @@ template <class Pack, class S>
 void go_through(Pack& pack, S& saved) {
   pack(saved.version);
   pack(saved.shell_kind);
-  pack(saved.log_odds);
+  pack(saved.odds);
   pack(saved.pass);
   pack(saved.numbers);
   pack(saved.shell);
@@ -66,9 +65,8 @@ void go_through_model(Pack& pack, S& saved) {
 
 std::size_t point_bytes() {
   constexpr Saved kSaved{};
-  return sizeof(kSaved.version) + sizeof(kSaved.shell_kind) + sizeof(kSaved.log_odds) +
-         sizeof(kSaved.pass) + sizeof(kSaved.numbers) + sizeof(kSaved.shell) +
-         sizeof(model::Utime);
+  return sizeof(kSaved.version) + sizeof(kSaved.shell_kind) + sizeof(kSaved.odds) +
+         sizeof(kSaved.pass) + sizeof(kSaved.numbers) + sizeof(kSaved.shell) + sizeof(model::Utime);
 }
 
 std::string encode(const Point& point, model::Utime looked_utime) {

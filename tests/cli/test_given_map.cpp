@@ -188,18 +188,23 @@ TEST_CASE_METHOD(GivenMap, "launch gives the map for good, and a state of anothe
   const auto folder = directory / "state" / "geoslam_mapper";
   std::filesystem::create_directories(folder);
   const auto layer = [&] {
-    return cli::given_map_layer({.file = map, .localisation_only = true}, map, {"geoslam_mapper"});
+    return cli::given_map_layers({.file = map, .localisation_only = true}, map,
+                                 {"geoslam_mapper", "existence_tracker"});
   };
   // As in a process of its own: fail() ends the command.
   const auto keeps = [&] {
     try {
-      cli::keep_layer(folder, {}, layer());
+      const cli::GivenMapLayers given = layer();
+      cli::keep_layer(folder, {}, given.layers.at("geoslam_mapper"), given.checksum);
       return true;
     } catch (const CLI::RuntimeError& error) {
       CHECK(error.get_exit_code() == 1);
       return false;
     }
   };
+
+  // The existence tracker goes on with the map's states, and needs no more than the file.
+  CHECK(layer().layers.at("existence_tracker").table.size() == 1);
 
   CHECK(keeps());
   const std::string text = read_text(cli::layer_file(folder));

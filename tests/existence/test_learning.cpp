@@ -49,12 +49,16 @@ class PassRun {
       points_.push_back({IcosahedralPoint::born(model_, look_from_face(i % kFaces))});
     look(true);
   }
-  void pass() {
+  /// `rounds` of reconsider() before the looks.
+  void pass(int rounds = 0) {
     for (PassPoint& one : points_) {
       if (unit() < world_.gone_per_pass) one.exists = false;
       one.point.elapse(model_, model_.elapsed(world_.gap_s));
     }
     model_.begin_pass();
+    for (PassPoint& one : points_) one.point.enter_pass(model_);
+    for (int round = 0; round < rounds; ++round)
+      for (PassPoint& one : points_) one.point.reconsider(model_);
     look(false);
   }
   double brier() const {
@@ -118,6 +122,25 @@ TEST_CASE("Recall of looks and of passes is learned, whatever it was thought to 
   CHECK(run.model().recall().at(10.0) == Approx(world.recall).margin(0.03));
   CHECK(run.model().recall().of_pass() == Approx(world.pass_recall).margin(0.05));
   CHECK(run.brier() <= run.ideal_brier() + 0.01);
+}
+
+TEST_CASE("What a pass has taught is applied to the passes before it", "[existence]") {
+  PassWorld world;
+  world.pass_recall = 0.5;
+  world.gone_per_pass = 0.02;
+  Parameters parameters;
+  parameters.pass_recall = 0.9;  // far off: a missed pass is taken for a lost point
+  parameters.decay_per_s = 5e-8;
+  parameters.decay_weight = 2.0;
+  PassRun plain(world, parameters, 1500, 26);
+  PassRun settled(world, parameters, 1500, 26);
+  for (int pass = 0; pass < 4; ++pass) {
+    plain.pass();
+    settled.pass(10);
+  }
+  CHECK(settled.model().recall().of_pass() == Approx(0.5).margin(0.05));
+  CHECK(settled.brier() < plain.brier());
+  CHECK(settled.brier() <= settled.ideal_brier() + 0.01);
 }
 
 TEST_CASE("Calibration holds with the recall thought 0.2 off", "[existence]") {

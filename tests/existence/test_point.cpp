@@ -264,11 +264,10 @@ TEMPLATE_TEST_CASE("A saved point goes on as if nothing had been", "[existence]"
   auto loaded = Point::load(other, saved);
   look_on(model, point, 6);
   look_on(other, loaded, 6);
-  CHECK(loaded.probability() == Approx(point.probability()).epsilon(1e-9));
+  CHECK(loaded.probability() == point.probability());
   const auto a = loaded.save();
   const auto b = point.save();
-  CHECK(a.shell == b.shell);
-  CHECK(a.pass == b.pass);
+  CHECK(std::memcmp(&a, &b, sizeof a) == 0);
 }
 
 TEST_CASE("Damaged and foreign states are refused", "[existence]") {
@@ -278,7 +277,7 @@ TEST_CASE("Damaged and foreign states are refused", "[existence]") {
   bad.version = 7;
   CHECK_THROWS_AS(IcosahedralPoint::load(model, bad), std::invalid_argument);
   bad = good;
-  bad.log_odds = kNaN;
+  bad.odds = kNaN;
   CHECK_THROWS_AS(IcosahedralPoint::load(model, bad), std::invalid_argument);
   bad = good;
   bad.shell[3] = -1.0F;
@@ -286,9 +285,9 @@ TEST_CASE("Damaged and foreign states are refused", "[existence]") {
   bad = good;
   bad.numbers[0] = std::numeric_limits<float>::infinity();
   CHECK_THROWS_AS(IcosahedralPoint::load(model, bad), std::invalid_argument);
-  for (const double limit : {-1e6, 1e6}) {
+  for (const double limit : {0.0, 1e-300, 1e300}) {
     bad = good;
-    bad.log_odds = limit;
+    bad.odds = limit;
     const double p = IcosahedralPoint::load(model, bad).probability();
     CHECK((p >= 1e-6 && p <= 1.0 - 1e-6 + 1e-12));
   }

@@ -24,18 +24,21 @@ namespace understory::test {
 using Seconds = std::chrono::duration<double>;
 using SteadyClock = std::chrono::steady_clock;
 
-/// A configuration directory with three processes, each with the given parameters.
+/// A configuration directory with four processes, each with the given parameters.
 inline void write_config(const TemporaryDirectory& directory, const std::string& keyframer_toml) {
   std::ofstream(directory / "keyframer.toml") << keyframer_toml;
   std::ofstream(directory / "geoslam_mapper.toml") << "";
   std::ofstream(directory / "loop_closer.toml") << "";
+  std::ofstream(directory / "existence_tracker.toml") << "";
   std::ofstream(directory / "launch.toml")
       << "[[process]]\nname = \"keyframer\"\nexecutable = \"understory-keyframer\"\n"
          "config = \"keyframer.toml\"\n"
          "[[process]]\nname = \"geoslam_mapper\"\nexecutable = \"understory-geoslam-mapper\"\n"
          "config = \"geoslam_mapper.toml\"\n"
          "[[process]]\nname = \"loop_closer\"\nexecutable = \"understory-loop-closer\"\n"
-         "config = \"loop_closer.toml\"\n";
+         "config = \"loop_closer.toml\"\n"
+         "[[process]]\nname = \"existence_tracker\"\n"
+         "executable = \"understory-existence-tracker\"\nconfig = \"existence_tracker.toml\"\n";
 }
 
 /// Another port for every test that may run beside this one.
@@ -74,7 +77,8 @@ class Stack {
   }
   bool wait_for_processes() {
     return wait_until([&] {
-      return pid("keyframer") > 0 && pid("geoslam_mapper") > 0 && pid("loop_closer") > 0;
+      return pid("keyframer") > 0 && pid("geoslam_mapper") > 0 && pid("loop_closer") > 0 &&
+             pid("existence_tracker") > 0;
     });
   }
   /// Sends scans first..last-1 with pauses that let everybody keep up, and listens meanwhile.

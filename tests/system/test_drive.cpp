@@ -34,7 +34,8 @@ TEST_CASE("processes on the bus localise a vehicle and stop cleanly", "[system]"
 
 TEST_CASE("a killed process comes back with its state", "[system]") {
   const auto drive = test::short_drive(12);
-  for (const std::string victim : {"keyframer", "geoslam_mapper", "loop_closer"}) {
+  for (const std::string victim :
+       {"keyframer", "geoslam_mapper", "loop_closer", "existence_tracker"}) {
     test::Stack stack;
     REQUIRE(stack.wait_for_processes());
     const std::size_t half = drive.size() / 2;

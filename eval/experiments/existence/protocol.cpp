@@ -10,8 +10,10 @@
 namespace understory::eval::experiments::existence {
 namespace {
 
-/// A point is in the map from so many sightings on: false ones are not.
+/// A point is in the map from so many sightings in one drive on, a tenth of its looks: what false
+/// sightings alone make is not.
 constexpr int kMappedFrom = 5;
+constexpr int kMappedShare = 10;
 
 using Grid = std::vector<std::vector<double>>;
 
@@ -50,13 +52,16 @@ void feed(Method& method, const History& history, std::size_t first, std::size_t
 }
 
 std::vector<bool> mapped_points(const History& history) {
-  std::vector<int> seen(history.points_m.size(), 0);
-  for (std::size_t k = 0; k < history.mapping_drives; ++k)
-    for (const LookEvent& event : history.drives[k].looks)
-      if (event.is_seen) ++seen[event.point];
-  std::vector<bool> mapped;
-  mapped.reserve(seen.size());
-  for (const int times : seen) mapped.push_back(times >= kMappedFrom);
+  std::vector<bool> mapped(history.points_m.size(), false);
+  for (std::size_t k = 0; k < history.mapping_drives; ++k) {
+    std::vector<int> looks(mapped.size(), 0), seen(mapped.size(), 0);
+    for (const LookEvent& event : history.drives[k].looks) {
+      ++looks[event.point];
+      seen[event.point] += event.is_seen ? 1 : 0;
+    }
+    for (std::size_t i = 0; i < mapped.size(); ++i)
+      if (seen[i] >= kMappedFrom && kMappedShare * seen[i] >= looks[i]) mapped[i] = true;
+  }
   return mapped;
 }
 

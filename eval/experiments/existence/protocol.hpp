@@ -17,7 +17,7 @@ struct TunedMethod {
   std::vector<double> tuned;
 };
 
-/// Points of the map: seen five times and more in the mapping drives.
+/// Points of the map: seen five times and more in a mapping drive, and in a tenth of its looks.
 std::vector<bool> mapped_points(const History& history);
 
 /// What a method says after each changed drive.

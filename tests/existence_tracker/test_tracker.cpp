@@ -1,0 +1,252 @@
+// The tracker alone: what goes, what stays, what comes back.
+#include "common/wire/convert.hpp"
+#include "services/existence_tracker/existence_tracker.hpp"
+#include "tests/catch.hpp"
+#include "tests/existence_tracker/past_landmarks.hpp"
+
+using namespace understory;
+using existence_tracker::ExistenceTracker;
+using existence_tracker::TrackerParameters;
+using test::Road;
+
+namespace {
+
+constexpr model::Utime kDay_us = 86'400'000'000;
+
+TrackerParameters for_road() {
+  TrackerParameters parameters;
+  parameters.model.range_m = Road::kRangeM;
+  return parameters;
+}
+
+/// Another drive of another day: the tracker begins with what it knew.
+ExistenceTracker next_day(ExistenceTracker& tracker, const Road& road) {
+  ExistenceTracker next(for_road());
+  next.begin_with(tracker.take_states());
+  next.take(road.map());
+  return next;
+}
+
+model::Existence drive(const std::vector<model::MapUpdate>& updates, ExistenceTracker& tracker) {
+  std::optional<model::Existence> last;
+  for (const model::MapUpdate& update : updates) last = tracker.add(update);
+  return last.value();
+}
+
+std::size_t unused_of(const std::set<model::LandmarkId>& ids, const ExistenceTracker& tracker) {
+  return static_cast<std::size_t>(std::count_if(ids.begin(), ids.end(), [&](model::LandmarkId id) {
+    const auto one = tracker.of(id);
+    return one && !one->is_in_use;
+  }));
+}
+
+}  // namespace
+
+TEST_CASE("What is gone leaves use, what is missed by chance stays", "[existence]") {
+  std::size_t gone_all = 0, gone_unused = 0, there_all = 0, there_unused = 0;
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    Road road(seed);
+    const auto all_seen = [&](model::LandmarkId) { return road.chance(0.85); };
+    ExistenceTracker tracker(for_road());
+    tracker.take(road.map());
+    drive(road.drive(0, all_seen), tracker);
+
+    // A fifth is felled; of the others each drive misses a fifth altogether.
+    const auto felled = road.draw(0.2);
+    for (int day = 1; day <= 4; ++day) {
+      tracker = next_day(tracker, road);
+      const auto missed = road.draw(0.2);
+      drive(road.drive(day * kDay_us,
+                       [&](model::LandmarkId id) {
+                         return !felled.contains(id) && !missed.contains(id) && road.chance(0.85);
+                       }),
+            tracker);
+    }
+    std::set<model::LandmarkId> there;
+    for (model::LandmarkId id = 1; id <= road.size(); ++id)
+      if (!felled.contains(id)) there.insert(id);
+    gone_all += felled.size();
+    gone_unused += unused_of(felled, tracker);
+    there_all += there.size();
+    there_unused += unused_of(there, tracker);
+  }
+  CAPTURE(gone_unused, gone_all, there_unused, there_all);
+  CHECK(gone_unused > 0.9 * static_cast<double>(gone_all));
+  CHECK(there_unused <= 0.01 * static_cast<double>(there_all));
+}
+
+TEST_CASE("A landmark that was missed on two drives is in use after one good pass", "[existence]") {
+  for (const std::uint64_t seed : {4, 5, 6}) {
+    Road road(seed);
+    ExistenceTracker tracker(for_road());
+    tracker.take(road.map());
+    drive(road.drive(0, [&](model::LandmarkId) { return true; }), tracker);
+    const auto missed = road.draw(0.1);
+    for (int day = 1; day <= 2; ++day) {
+      tracker = next_day(tracker, road);
+      drive(road.drive(day * kDay_us, [&](model::LandmarkId id) { return !missed.contains(id); }),
+            tracker);
+    }
+    const std::size_t dropped = unused_of(missed, tracker);
+    tracker = next_day(tracker, road);
+    drive(road.drive(3 * kDay_us, [&](model::LandmarkId) { return true; }), tracker);
+    CAPTURE(seed, dropped, missed.size());
+    CHECK(unused_of(missed, tracker) == 0);
+  }
+}
+
+TEST_CASE("Without a change next to nothing is removed", "[existence]") {
+  std::size_t unused = 0, all = 0;
+  for (const std::uint64_t seed : {7, 8, 9}) {
+    Road road(seed);
+    ExistenceTracker tracker(for_road());
+    tracker.take(road.map());
+    for (int day = 0; day < 6; ++day) {
+      if (day > 0) tracker = next_day(tracker, road);
+      const auto missed = road.draw(0.36);
+      drive(road.drive(
+                day * kDay_us,
+                [&](model::LandmarkId id) { return !missed.contains(id) && road.chance(0.9); }),
+            tracker);
+    }
+    std::set<model::LandmarkId> everything = road.draw(1.0);
+    unused += unused_of(everything, tracker);
+    all += everything.size();
+  }
+  CAPTURE(unused, all);
+  CHECK(unused <= 0.01 * static_cast<double>(all));
+}
+
+TEST_CASE("A mapping-needed signal where half of the map is another one", "[existence]") {
+  Road road(10);
+  ExistenceTracker tracker(for_road());
+  tracker.take(road.map());
+  drive(road.drive(0, [&](model::LandmarkId) { return road.chance(0.9); }), tracker);
+  for (int day = 1; day <= 3; ++day) {
+    tracker = next_day(tracker, road);
+    const auto same = drive(
+        road.drive(day * kDay_us, [&](model::LandmarkId) { return road.chance(0.9); }), tracker);
+    CHECK_FALSE(same.is_mapping_needed);
+  }
+
+  tracker = next_day(tracker, road);
+  const auto gone = road.draw(0.6);
+  const auto changed = drive(
+      road.drive(4 * kDay_us,
+                 [&](model::LandmarkId id) { return !gone.contains(id) && road.chance(0.9); }),
+      tracker);
+  CHECK(changed.missing_share > 0.45);
+  CHECK(changed.is_mapping_needed);
+}
+
+TEST_CASE("All who listen know every landmark in the end, and each message is sound",
+          "[existence]") {
+  Road road(11);
+  ExistenceTracker tracker(for_road());
+  tracker.take(road.map());
+  std::map<model::LandmarkId, model::LandmarkExistence> held;
+  for (const model::MapUpdate& update :
+       road.drive(0, [&](model::LandmarkId) { return road.chance(0.7); })) {
+    const auto existence = tracker.add(update);
+    REQUIRE(existence);
+    const auto back = wire::decode_message<model::Existence>(wire::encode_message(*existence));
+    REQUIRE(back);
+    CHECK(back->landmarks == existence->landmarks);
+    // Some messages are lost.
+    if (road.chance(0.3)) continue;
+    for (const model::LandmarkExistence& one : existence->landmarks) held[one.id] = one;
+  }
+  CHECK(held.size() > 0.95 * static_cast<double>(road.size()));
+  for (const auto& [id, one] : held)
+    CHECK(std::abs(one.probability - tracker.of(id)->probability) < 0.05);
+}
+
+TEST_CASE("A saved tracker goes on as the other one, and states are the points", "[existence]") {
+  Road road(12);
+  ExistenceTracker tracker(for_road());
+  tracker.take(road.map());
+  const auto updates = road.drive(0, [&](model::LandmarkId) { return road.chance(0.6); });
+  const std::size_t half = updates.size() / 2;
+  for (std::size_t i = 0; i < half; ++i) tracker.add(updates[i]);
+
+  ExistenceTracker loaded(for_road());
+  loaded.load(tracker.save());
+  CHECK(loaded.save() == tracker.save());
+  for (std::size_t i = half; i < updates.size(); ++i) {
+    const auto a = tracker.add(updates[i]);
+    const auto b = loaded.add(updates[i]);
+    REQUIRE(wire::encode_message(*a) == wire::encode_message(*b));
+  }
+
+  const auto states = tracker.take_states();
+  std::size_t told = 0;
+  for (const model::ExistenceState& state : states) {
+    told += state.landmarks.size();
+    CHECK(wire::decode_message<model::ExistenceState>(wire::encode_message(state)));
+  }
+  CHECK(told == road.size());
+  CHECK(tracker.take_states().empty());
+  ExistenceTracker next(for_road());
+  next.begin_with(states);
+  for (model::LandmarkId id = 1; id <= road.size(); ++id)
+    CHECK(next.of(id)->probability == Approx(tracker.of(id)->probability));
+
+  auto cut = states;
+  cut.front().states.pop_back();
+  CHECK_THROWS_AS(next.begin_with(cut), std::invalid_argument);
+  CHECK(next.of(1));  // As it was.
+  CHECK_THROWS_AS(next.load("nonsense"), std::invalid_argument);
+}
+
+TEST_CASE("Merged, removed and unknown landmarks", "[existence]") {
+  Road road(13, 20);
+  ExistenceTracker tracker(for_road());
+  auto updates = road.drive(0, [&](model::LandmarkId) { return true; });
+  CHECK_FALSE(tracker.wants_map());
+  tracker.add(updates.front());
+  CHECK(tracker.wants_map());
+  CHECK(tracker.counters().without_place > 0);
+  tracker.take(road.map());
+  CHECK_FALSE(tracker.wants_map());
+  for (const model::MapUpdate& update : updates) tracker.add(update);
+  REQUIRE(tracker.of(3));
+
+  model::MapUpdate update = updates.back();
+  update.associations.clear();
+  update.expected.clear();
+  update.merged = {{3, 4}};
+  update.removed = {5};
+  tracker.add(update);
+  CHECK_FALSE(tracker.of(3));
+  CHECK_FALSE(tracker.of(5));
+  CHECK(tracker.of(4)->probability > 0.9);
+
+  // Without a place nothing counts.
+  update.status = model::MapUpdateStatus::kNotSure;
+  CHECK_FALSE(tracker.add(update));
+}
+
+TEST_CASE("A false landmark of this drive leaves use when nobody sees it again", "[existence]") {
+  Road road(14);
+  ExistenceTracker tracker(for_road());
+  tracker.take(road.map());
+  drive(road.drive(0, [&](model::LandmarkId) { return road.chance(0.9); }), tracker);
+  // A pedestrian stood there.
+  const model::LandmarkId pedestrian = road.add({150.0, 6.0});
+  auto updates = road.drive(
+      kDay_us, [&](model::LandmarkId id) { return id != pedestrian && road.chance(0.9); });
+  bool is_born = false;
+  tracker = next_day(tracker, road);
+  for (model::MapUpdate& update : updates) {
+    if (!is_born && std::ranges::binary_search(update.expected, pedestrian)) {
+      update.added.push_back(pedestrian);
+      std::erase(update.expected, pedestrian);
+      is_born = true;
+    }
+    tracker.add(update);
+    tracker.take(model::MapDelta{});
+  }
+  REQUIRE(is_born);
+  REQUIRE(tracker.of(pedestrian));
+  CHECK(tracker.of(pedestrian)->probability < 0.3);
+}
