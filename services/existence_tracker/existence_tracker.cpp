@@ -13,6 +13,8 @@ namespace {
 
 constexpr state::Format kFormat{"existence_tracker", 1};
 constexpr std::size_t kStatesPerMessage = 200;
+/// As often is what was learned applied where a drive begins.
+constexpr int kRoundsOfLearning = 10;
 /// A step that no vehicle drives between two keyframes is a correction of the map [m].
 constexpr double kLongestStepM = 50.0;
 /// Looks from nearer or farther are none: the map is wrong there [m].
@@ -58,11 +60,33 @@ void ExistenceTracker::begin_with(std::span<const model::ExistenceState> states)
     touched_.push_back(id);
     ++unused;
   }
-  model.begin_pass();
   model_ = model;
   points_ = std::move(points);
   unused_ = unused;
+  begins_drive_ = true;
+}
+
+/// The time since the landmarks were looked at has passed for all of them, and what their passes
+/// taught of the detector and of the world is applied to the passes before. O(landmarks).
+void ExistenceTracker::begin_drive(model::Utime utime) {
+  model_.begin_pass();
+  for (auto& [id, tracked] : points_) {
+    pass_time(utime, tracked);
+    tracked.point.enter_pass(model_);
+  }
+  for (int round = 0; round < kRoundsOfLearning; ++round)
+    for (auto& [id, tracked] : points_) tracked.point.reconsider(model_);
+  for (auto& [id, tracked] : points_) {
+    decide(tracked);
+    touched_.push_back(id);
+  }
   pass_began_m_ = along_m_;
+}
+
+void ExistenceTracker::pass_time(model::Utime utime, TrackedPoint& tracked) const {
+  const double seconds = 1e-6 * static_cast<double>(utime - tracked.looked_utime);
+  if (seconds > 0.0) tracked.point.elapse(model_, model_.elapsed(seconds));
+  tracked.looked_utime = std::max(tracked.looked_utime, utime);
 }
 
 void ExistenceTracker::take(const model::WholeMap& map) {
@@ -80,6 +104,7 @@ std::optional<model::Existence> ExistenceTracker::add(const model::MapUpdate& up
   if (!has_place(update)) return std::nullopt;
   utime_ = update.utime;
   map_id_ = update.map_id;
+  if (std::exchange(begins_drive_, false)) begin_drive(update.utime);
   drive_to(update);
   forget(update);
 
@@ -121,9 +146,7 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, const model::MapU
 
   TrackedPoint& tracked = *known(id, update.utime);
   const bool is_old = tracked.told_probability >= 0.0 && tracked.is_in_use;
-  const double seconds = 1e-6 * static_cast<double>(update.utime - tracked.looked_utime);
-  if (seconds > 0.0) tracked.point.elapse(model_, model_.elapsed(seconds));
-  tracked.looked_utime = std::max(tracked.looked_utime, update.utime);
+  pass_time(update.utime, tracked);
   if (is_hit) {
     tracked.point.hit(model_, *look);
     ++counters_.hits;
@@ -278,7 +301,8 @@ std::string ExistenceTracker::save() const {
     points += encode(tracked.point, tracked.looked_utime);
   }
   return state::save(kFormat, learned, ids, flags, told, points, places_, need_, births_, counters_,
-                     last_m_, utime_, map_id_, along_m_, pass_began_m_, repeated_, wants_map_);
+                     last_m_, utime_, map_id_, along_m_, pass_began_m_, repeated_, wants_map_,
+                     begins_drive_);
 }
 
 void ExistenceTracker::load(const std::string& state) {
@@ -290,7 +314,8 @@ void ExistenceTracker::load(const std::string& state) {
   std::string points;
   state::load(state, kFormat, learned, ids, flags, told, points, loaded.places_, loaded.need_,
               loaded.births_, loaded.counters_, loaded.last_m_, loaded.utime_, loaded.map_id_,
-              loaded.along_m_, loaded.pass_began_m_, loaded.repeated_, loaded.wants_map_);
+              loaded.along_m_, loaded.pass_began_m_, loaded.repeated_, loaded.wants_map_,
+              loaded.begins_drive_);
   if (flags.size() != ids.size() || told.size() != ids.size() ||
       points.size() != ids.size() * point_bytes())
     throw std::invalid_argument("existence tracker state: its points do not fit their numbers");

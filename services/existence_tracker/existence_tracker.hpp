@@ -81,6 +81,8 @@ class ExistenceTracker {
       a(s.id, s.vehicle_m, s.utime);
     }
   };
+  void begin_drive(model::Utime utime);
+  void pass_time(model::Utime utime, TrackedPoint& tracked) const;
   void drive_to(const model::MapUpdate& update);
   void look(model::LandmarkId id, bool is_hit, const model::MapUpdate& update);
   TrackedPoint* known(model::LandmarkId id, model::Utime utime);
@@ -106,6 +108,7 @@ class ExistenceTracker {
   double pass_began_m_ = 0.0;
   model::LandmarkId repeated_ = 0;  ///< The last one that was told again.
   bool wants_map_ = false;
+  bool begins_drive_ = false;  ///< The next keyframe is the first one with these landmarks.
 };
 
 }  // namespace understory::existence_tracker

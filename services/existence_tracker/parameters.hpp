@@ -19,7 +19,7 @@ constexpr existence::Parameters for_maps() {
 
 /// When a landmark is not used any more, and when it is again.
 struct UseParameters {
-  double drop_below = 0.05;    ///< Probability.
+  double drop_below = 0.1;     ///< Probability.
   double readmit_above = 0.5;  ///< Probability.
 };
 
