@@ -119,7 +119,7 @@ TEST_CASE("a log that begins in the middle of a map gives it from its first MAP 
   CHECK(maps.at(3).missed == 1);
 }
 
-TEST_CASE("the last state of existence of each landmark of a log is found", "[cli]") {
+TEST_CASE("states of existence of what is no map, and empty ones, are passed over", "[cli]") {
   MapperLog log;
   log.update(1, true, false);
   log.existence(1, {1, 2}, "first");
@@ -166,7 +166,7 @@ TEST_CASE("what is imported has the states of its landmarks, and says so", "[cli
   {
     io::LcmLogWriter writer(directory / "drive.lcm");
     for (const io::LogEvent& event : log.events) writer.write(event);
-    writer.close();
+    writer.commit();
   }
   const auto run = [&](const std::string& arguments) {
     const Outcome outcome = understory_command(directory, arguments);
