@@ -91,6 +91,14 @@ void watch_chain(SensorChain& chain, ChainRun& run) {
 
   chain.watch<model::MapUpdate>(
       "SLAM_UPDATE", [&run](const model::MapUpdate& update) { run.updates.push_back(update); });
+  chain.watch<model::Existence>("EXISTENCE", [&run](const model::Existence& existence) {
+    for (const model::LandmarkExistence& one : existence.landmarks) run.existence[one.id] = one;
+    run.missing_share = existence.missing_share;
+    run.is_mapping_needed = existence.is_mapping_needed;
+  });
+  chain.watch<model::ExistenceState>("EXISTENCE_STATE", [&run](const model::ExistenceState& state) {
+    run.existence_states.push_back(state);
+  });
   chain.watch<model::WholeMap>("MAP", [&run](const model::WholeMap& map) {
     if (!map.complete) return;
     run.landmarks = map.landmarks;
@@ -158,7 +166,9 @@ std::vector<RawMessage> raw_messages(const sim::SensorReading& reading,
 
 ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options) {
   ChainRun run;
-  SensorChain chain(services_of(options.config_dir), options.config_dir, options.toml_instead);
+  std::vector<bus::Service> services = services_of(options.config_dir);
+  std::erase_if(services, [&](const auto& one) { return options.without.contains(one.name); });
+  SensorChain chain(services, options.config_dir, options.toml_instead);
   watch_chain(chain, run);
 
   const double duration_s = std::min(options.end_s, drive.motion().duration_s());

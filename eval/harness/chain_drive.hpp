@@ -5,10 +5,12 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "common/model/ekf_output.hpp"
+#include "common/model/existence.hpp"
 #include "common/model/map.hpp"
 #include "common/model/slam_output.hpp"
 #include "eval/harness/sensor_chain.hpp"
@@ -38,6 +40,10 @@ struct ChainRun {
   std::vector<std::size_t> detections;         ///< Of each sweep.
   std::uint64_t sweeps = 0;
   double simulated_s = 0.0;
+  std::map<model::LandmarkId, model::LandmarkExistence> existence;  ///< As told last.
+  std::vector<model::ExistenceState> existence_states;
+  double missing_share = 0.0;  ///< Of the last EXISTENCE.
+  bool is_mapping_needed = false;
   std::map<std::string, ServiceTime> times;
   std::map<std::string, health_t> health;
 };
@@ -56,9 +62,10 @@ struct ChainPause {
 struct ChainOptions {
   std::filesystem::path config_dir;  ///< Its launch.toml says which services; empty: all.
   std::map<std::string, std::string> toml_instead;
-  double end_s = 1e9;                         ///< Of the drive.
-  Meddle meddle;                              ///< Faults; empty = none.
-  std::vector<ChainPause> pauses;             ///< Of processes.
+  std::set<std::string> without;   ///< Services that launch.toml has, and this drive not.
+  double end_s = 1e9;              ///< Of the drive.
+  Meddle meddle;                   ///< Faults; empty = none.
+  std::vector<ChainPause> pauses;  ///< Of processes.
   std::function<void(double done)> progress;  ///< Called at every sweep; `done` is in [0, 1].
   /// Every sweep before it goes to the chain, with the truth in it.
   std::function<void(const sim::SimulatedSweep&)> on_sweep;

@@ -52,6 +52,17 @@ struct MapperLog {
     delta.added = added;
     add("MAP_DELTA", delta);
   }
+  void existence(std::uint32_t map_id, const std::vector<std::uint64_t>& counters,
+                 const std::string& state) {
+    model::ExistenceState message;
+    message.map_id = map_id;
+    message.model = "model " + state;
+    for (const std::uint64_t counter : counters) {
+      message.landmarks.push_back({map_file::landmark_id(map_id, counter), 0.25, false});
+      message.states += state;
+    }
+    add("EXISTENCE_STATE", message);
+  }
   std::map<std::uint32_t, cli::LogMaps::Found> maps() const {
     cli::LogMaps maps;
     for (const io::LogEvent& event : events) maps.add(event);
@@ -106,6 +117,83 @@ TEST_CASE("a log that begins in the middle of a map gives it from its first MAP 
   REQUIRE(maps.size() == 1);
   CHECK(maps.at(3).map.landmarks.size() == 3);
   CHECK(maps.at(3).missed == 1);
+}
+
+TEST_CASE("states of existence of what is no map, and empty ones, are passed over", "[cli]") {
+  MapperLog log;
+  log.update(1, true, false);
+  log.existence(1, {1, 2}, "first");
+  log.update(1, false, false);
+  log.existence(1, {2, 3}, "second");
+  log.update(2, true, false);
+  log.delta(true, {landmark(2, 1, 1.0)});
+  log.existence(1, {3}, "late");
+  log.existence(2, {}, "");
+  log.existence(2, {1}, "");  // No state: passed over.
+  const auto maps = log.maps();
+  REQUIRE_FALSE(maps.contains(1));  // Without any landmark it is no map.
+  REQUIRE(maps.at(2).existence);
+  CHECK(maps.at(2).existence->landmarks.empty());
+}
+
+TEST_CASE("states of existence of a log's maps, those of a mapper that began anew", "[cli]") {
+  MapperLog log;
+  log.update(1, true, false);
+  log.delta(true, {landmark(1, 1, 0.0), landmark(1, 2, 0.0), landmark(1, 3, 0.0)});
+  log.existence(1, {1, 2}, "first");
+  log.existence(1, {2, 3}, "second");
+  const auto states = [&] {
+    std::string text;
+    for (const auto& row : log.maps().at(1).existence->landmarks) text += row.state + " ";
+    return text;
+  };
+  CHECK(states() == "first second second ");
+  CHECK(log.maps().at(1).existence->learned == "model second");
+  log.update(1, true, false);
+  log.delta(true, {landmark(1, 1, 0.0)});
+  CHECK_FALSE(log.maps().at(1).existence);
+  log.existence(1, {1}, "anew");
+  CHECK(states() == "anew ");
+}
+
+TEST_CASE("what is imported has the states of its landmarks, and says so", "[cli]") {
+  const TemporaryDirectory directory;
+  const std::string file = (directory / "maps.gpkg").string();
+  MapperLog log;
+  log.update(1, true, false);
+  log.delta(true, {landmark(1, 1, 0.0), landmark(1, 2, 5.0)});
+  log.existence(1, {2, 9}, "state");
+  {
+    io::LcmLogWriter writer(directory / "drive.lcm");
+    for (const io::LogEvent& event : log.events) writer.write(event);
+    writer.commit();
+  }
+  const auto run = [&](const std::string& arguments) {
+    const Outcome outcome = understory_command(directory, arguments);
+    CAPTURE(arguments, outcome.error);
+    REQUIRE(outcome.status == 0);
+    return outcome.out;
+  };
+  CHECK_THAT(run("map import " + (directory / "drive.lcm").string() + " --out " + file),
+             Contains("map 1 of 2 landmarks and 1 keyframes (1 with a state of existence)"));
+  run("map check " + file);
+  CHECK_THAT(run("map info " + file),
+             Contains("map 1: 1 landmarks have a state of existence, 1 of them are not in use"));
+  const auto info = nlohmann::json::parse(run("map info --json " + file));
+  CHECK(info["maps"][0]["existence_states"] == 1);
+  CHECK(info["maps"][0]["not_in_use"] == 1);
+
+  run("map export " + file + " --format geojson --out " + (directory / "out").string());
+  const auto layer =
+      nlohmann::json::parse(read_text(directory / "out" / "map-1" / "landmarks.geojson"));
+  CHECK(layer["features"][0]["properties"]["existence"].is_null());
+  CHECK(layer["features"][0]["properties"]["in_use"].is_null());
+  CHECK(layer["features"][1]["properties"]["existence"] == 0.25);
+  CHECK(layer["features"][1]["properties"]["in_use"] == false);
+
+  const auto messages = map_file::existence_of(map_file::MapFile(file, map_file::Access::kRead), 1);
+  REQUIRE(messages.size() == 1);
+  CHECK(messages[0].states == "state");
 }
 
 TEST_CASE("a drive becomes a map file", "[cli]") {

@@ -1,8 +1,10 @@
 // Two maps as one: what becomes of each landmark.
 #include <Eigen/LU>
+#include <algorithm>
 #include <limits>
 #include <map>
 #include <set>
+#include <string>
 
 #include "tests/catch.hpp"
 #include "tests/map_merge/merge_fixture.hpp"
@@ -154,6 +156,56 @@ TEST_CASE("counts are added, radii averaged by them, the younger map knows what 
   CHECK(fused().landmark.observation_count == std::numeric_limits<std::uint32_t>::max());
   a.landmark.covariance_m2.setZero();  // Not computed: taken as the parameters say.
   CHECK(fused().landmark.covariance_m2.trace() > 0.0);
+}
+
+TEST_CASE("states of existence follow their landmarks, of a pair the later one stays",
+          "[map_merge]") {
+  Merge one({.width_m = 80.0}, 45);
+  const map_merge::LandmarkPair early = one.alignment.pairs[0];
+  const map_merge::LandmarkPair late = one.alignment.pairs[1];
+  const auto row = [](const map_file::StoredLandmark& of, model::Utime utime, double probability) {
+    return map_file::ExistenceRow{
+        {of.landmark.id, probability, true}, utime, std::to_string(of.landmark.id)};
+  };
+  map_file::StoredExistence first{10, "first", {}};
+  map_file::StoredExistence second{20, "second", {}};
+  for (std::size_t i = 0; i < one.first.landmarks.size(); ++i)
+    first.landmarks.push_back(row(one.first.landmarks[i], i == late.first ? 30 : 5, 0.25));
+  for (const auto& landmark : one.second.landmarks)
+    second.landmarks.push_back(row(landmark, 15, 0.75));
+  map_file::give_existence(one.first, first);
+  map_file::give_existence(one.second, second);
+  one.merge();
+
+  const StoredMap& map = one.merged.map;
+  CHECK(map_file::fault_of(map).empty());
+  CHECK_FALSE(one.merged.trajectory.existence);
+  REQUIRE(map.existence);
+  CHECK(map.existence->learned == "second");
+  CHECK(map.existence->utime == 20);
+  REQUIRE(map.existence->landmarks.size() == map.landmarks.size());
+  const auto& states = map.existence->landmarks;
+  CHECK(states[early.first].state ==
+        std::to_string(one.second.landmarks[early.second].landmark.id));
+  CHECK(map.landmarks[early.first].existence == 0.75);
+  CHECK(states[late.first].state == std::to_string(one.first.landmarks[late.first].landmark.id));
+  CHECK(map.landmarks[late.first].existence == 0.25);
+  for (const auto& [old_id, new_id] : one.merged.renamed) {
+    const auto at = std::ranges::lower_bound(states, new_id, {},
+                                             [](const auto& state) { return state.existence.id; });
+    REQUIRE(at != states.end());
+    CHECK(at->existence.id == new_id);
+    if (new_id != one.first.landmarks[late.first].landmark.id)
+      CHECK(at->state == std::to_string(old_id));
+  }
+
+  // One side alone.
+  one.first.existence.reset();
+  one.merge();
+  CHECK(one.merged.map.existence->landmarks.size() == one.second.landmarks.size());
+  one.second.existence.reset();
+  one.merge();
+  CHECK_FALSE(one.merged.map.existence);
 }
 
 TEST_CASE("trajectories are kept apart, each under its number, in one frame", "[map_merge]") {

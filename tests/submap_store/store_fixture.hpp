@@ -80,6 +80,22 @@ inline void check_same(const model::Submap& a, const model::Submap& b) {
   }
 }
 
+/// What the existence tracker says of these landmarks of a map, ids ascending: each has `state`,
+/// and a probability that follows from the stamp.
+inline model::ExistenceState existence_state(std::uint32_t map_id, model::Utime utime,
+                                             const std::vector<model::LandmarkId>& ids,
+                                             const std::string& state) {
+  model::ExistenceState message;
+  message.utime = utime;
+  message.map_id = map_id;
+  message.model = "model " + state;
+  for (const model::LandmarkId id : ids) {
+    message.landmarks.push_back({id, static_cast<double>(utime % 1000) / 1000.0, utime % 2 == 0});
+    message.states += state;
+  }
+  return message;
+}
+
 /// The store on a bus, with its files in `folder` (empty: as in a replay), and what it says.
 class StoreOnBus {
  public:
@@ -113,6 +129,11 @@ class StoreOnBus {
     computer_us_ += 10'000'000;  // What was only counted is not fresh any more.
     const health_t health = hosted_.node().health();
     return health.state == health_t::STATE_OK ? "" : health.last_error_code;
+  }
+
+  /// How many messages of a channel were refused.
+  std::uint64_t refused(const std::string& channel) {
+    return hosted_.node().monitor().count_of(channel, wire::Reason::kInputRefused);
   }
 
   std::vector<model::SubmapStored> stored;

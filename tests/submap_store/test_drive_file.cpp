@@ -268,3 +268,100 @@ TEST_CASE_METHOD(Drive, "ogrinfo lists the layers of a drive, with the features 
                        Contains("Feature Count: 1\n"));
   CHECK_THAT(text, !Contains("Layer name: understory_submaps"));
 }
+
+TEST_CASE_METHOD(Drive, "states of existence are kept, the newest of each landmark",
+                 "[submap_store]") {
+  const model::Submap submap = random_submap(1, 1, random);
+  const auto id = [&](std::size_t i) { return submap.landmarks[i].id; };
+  {
+    DriveFile file(path);
+    // Of a map that the file has not: nothing.
+    file.put(existence_state(1, 100, {id(0)}, "none"));
+    CHECK(file.highest_map() == 0);
+    file.put(submap, submap.map_T_submap);
+    file.put(existence_state(1, 2'000'101, {id(0), id(1), id(2)}, "first"));
+    file.put(existence_state(1, 3'000'202, {id(1), id(2)}, "second"));
+    file.put(existence_state(1, 1'000'303, {id(2), id(3)}, "older"));
+    file.put(existence_state(1, 3'000'202, {id(1), id(2)}, "second"));
+    file.seal();
+  }
+  {
+    const MapFile opened(path, Access::kRead);
+    CHECK(opened.check().empty());
+    CHECK(opened.history().size() == 1);
+    const StoredMap map = opened.read(1);
+    REQUIRE(map.existence);
+    CHECK(map.existence->learned == "model second");
+    REQUIRE(map.existence->landmarks.size() == 4);
+    CHECK(map.existence->landmarks[0].state == "first");
+    CHECK(map.existence->landmarks[1].state == "second");
+    CHECK(map.existence->landmarks[2].utime == 3'000'202);
+    CHECK(map.existence->landmarks[3].state == "older");
+    CHECK(map.landmarks[0].existence == 0.101);
+    CHECK(map.landmarks[2].existence == 0.202);
+    CHECK_FALSE(map.landmarks[4].existence);
+  }
+  const std::string sealed = dump_of_maps(path);
+  {
+    // On it goes: corrected, drawn anew, and a state more. It is a change of its own.
+    DriveFile file(path);
+    file.put(model::MapCorrection{4'000'000, 0, 1, 1, {{1, {50.0, 60.0, 1.0}}}});
+    file.put(existence_state(1, 5'000'404, {id(5)}, "third"));
+  }
+  MapFile opened(path, Access::kWrite);
+  CHECK(opened.check().empty());
+  CHECK(opened.history().size() == 2);
+  CHECK(opened.read(1).existence->landmarks.size() == 5);
+  CHECK(opened.read(1).landmarks[0].existence == 0.101);
+  opened.revert(1, note("back"));
+  CHECK(opened.check().empty());
+  CHECK(opened.read(1).existence->landmarks.size() == 4);
+}
+
+TEST_CASE_METHOD(Drive, "states follow their landmarks", "[submap_store]") {
+  const model::Submap submap = random_submap(1, 1, random);
+  const auto id = [&](std::size_t i) { return submap.landmarks[i].id; };
+  model::Submap again = submap;
+  again.id = 2;
+  again.replaced = {1};
+  again.landmarks.erase(again.landmarks.begin() + 4);
+  {
+    DriveFile file(path);
+    file.put(submap, submap.map_T_submap);
+    file.put(existence_state(1, 2'000'500, {id(0), id(1), id(2), id(4)}, "state"));
+    // One is gone, one goes over to another map, one is not handed over again.
+    file.put(map_file::GroundChange{1, 3'000'000, {submap.landmarks[1]}, {}, {}, false});
+    file.put(again, again.map_T_submap);
+    file.put(map_file::GroundChange{1, 3'000'000, {}, {id(1)}, {}, false});
+    file.put(map_file::GroundChange{2, 4'000'000, {submap.landmarks[2]}, {}, {}, false});
+  }
+  const MapFile opened(path, Access::kRead);
+  const auto findings = opened.check();
+  CAPTURE(findings);
+  CHECK(findings.empty());
+  const StoredMap first = opened.read(1);
+  REQUIRE(first.existence->landmarks.size() == 1);
+  CHECK(first.existence->landmarks[0].existence.id == id(0));
+  CHECK(first.landmarks[0].existence == 0.5);
+  const StoredMap second = opened.read(2);
+  REQUIRE(second.existence);
+  CHECK(second.existence->learned == "model state");
+  REQUIRE(second.existence->landmarks.size() == 1);
+  CHECK(second.existence->landmarks[0].existence.id == id(2));
+}
+
+TEST_CASE_METHOD(Drive, "states that no map can have are refused by name", "[submap_store]") {
+  const model::Submap submap = random_submap(1, 1, random);
+  {
+    DriveFile file(path);
+    file.put(submap, submap.map_T_submap);
+    const auto foreign = existence_state(1, 2'000'000, {map_file::landmark_id(2, 1)}, "state");
+    const auto empty = existence_state(1, 2'000'000, {submap.landmarks[0].id}, "");
+    for (const auto& wrong : {foreign, empty})
+      CHECK(fault_of_work(path, [&] { file.put(wrong); }) == Fault::kRefused);
+    CHECK_THROWS_WITH(file.put(foreign),
+                      Catch::Matchers::Contains(
+                          "existence of landmark 562949953421313: its id is none of map 1"));
+  }
+  CHECK_FALSE(MapFile(path, Access::kRead).read(1).existence);
+}

@@ -50,6 +50,7 @@ geometry::SE2 corrected(model::SubmapId id, model::SubmapId newest) {
         live.id = map_file::landmark_id(1, 1);
         live.position_m.x() = static_cast<double>(next);
         file.put(map_file::GroundChange{1, numbered(next).utime, {live}, {}, {}, true});
+        file.put(existence_state(1, numbered(next).utime, {live.id}, std::to_string(next)));
         file.draw(3);
       }
       // Sealing and closing are moments of their own.
@@ -104,6 +105,16 @@ void check_submaps(const std::filesystem::path& path, model::SubmapId newest) {
   std::size_t of_submaps = 0;
   for (const auto& one : map.landmarks) of_submaps += one.submap_id ? 1 : 0;
   CHECK(of_submaps == kept * kLandmarks);
+
+  // The state of the one landmark beside them: of the newest round or of the one before, and whole.
+  if (newest < 2) return;
+  REQUIRE(map.existence);
+  REQUIRE(map.existence->landmarks.size() == 1);
+  const auto& row = map.existence->landmarks[0];
+  const auto round = static_cast<model::SubmapId>(std::stoull(row.state));
+  CHECK((round == newest || round == newest - 1));
+  CHECK(row.utime == numbered(round).utime);
+  CHECK(map.existence->learned == "model " + row.state);
 }
 
 void kill_stores(int times, std::uint64_t seed) {

@@ -1,4 +1,6 @@
 // The store on the bus, with a file and without.
+#include <map>
+
 #include "services/submap_store/submap_store.hpp"
 #include "tests/map_file/map_fixture.hpp"
 #include "tests/submap_store/store_fixture.hpp"
@@ -213,6 +215,80 @@ TEST_CASE_METHOD(Folder, "all maps of a drive are kept, but those that were give
   CHECK(opened.read(3).landmarks.size() == 1);
 }
 
+TEST_CASE_METHOD(Folder, "what the existence tracker knows is in the file of the drive",
+                 "[submap_store]") {
+  StoreOnBus store(directory.path());
+  const auto id = [](std::uint64_t counter) { return map_file::landmark_id(1, counter); };
+  // Before anything else is known of the map: it waits.
+  store.send("EXISTENCE_STATE", existence_state(1, 900'900, {id(1), id(2)}, "early"));
+  store.send("SLAM_UPDATE", update(1, 1, model::MapUpdateStatus::kFirstMap));
+  model::MapDelta delta;
+  delta.utime = 1'000'000;
+  delta.version = 1;
+  for (std::uint64_t i = 1; i <= 6; ++i) delta.added.push_back(landmark(1, i, 1.0));
+  store.send("MAP_DELTA", delta);
+  store.send("EXISTENCE_STATE", existence_state(1, 2'000'300, {id(2), id(3), id(4)}, "later"));
+  for (std::uint64_t k = 3; k <= 20; ++k) store.send("SLAM_UPDATE", update(k, 1));
+
+  // Written by now. One landmark is another one's, before its last state is written; one is gone.
+  store.send("EXISTENCE_STATE", existence_state(1, 20'000'400, {id(4), id(5)}, "merged"));
+  store.send("MAP_DELTA", model::MapDelta{21'000'000, 0, 1, 2, {}, {}, {id(3)}, {{id(4), id(5)}}});
+  store.send("EXISTENCE_STATE", existence_state(1, 22'000'500, {id(6)}, "end"));
+  CHECK(store.shown().empty());
+  store.finish();
+
+  const MapFile opened(file(1), Access::kRead);
+  CHECK(opened.check().empty());
+  const StoredMap map = opened.read(1);
+  REQUIRE(map.existence);
+  CHECK(map.existence->learned == "model end");
+  std::map<model::LandmarkId, std::string> states;
+  for (const auto& row : map.existence->landmarks) states[row.existence.id] = row.state;
+  CHECK(states == std::map<model::LandmarkId, std::string>{
+                      {id(1), "early"}, {id(2), "later"}, {id(5), "merged"}, {id(6), "end"}});
+  CHECK(map.landmarks[0].existence == 0.9);
+  CHECK(map_file::existence_of(opened, 1).front().landmarks.size() == 2);
+}
+
+TEST_CASE_METHOD(Folder, "states that no map can have keep nothing else from being stored",
+                 "[submap_store]") {
+  StoreOnBus store(directory.path());
+  store.send("SLAM_UPDATE", update(1, 1, model::MapUpdateStatus::kFirstMap));
+  store.send("EXISTENCE_STATE",
+             existence_state(1, 1'000'000, {map_file::landmark_id(7, 1)}, "foreign"));
+  store.send("EXISTENCE_STATE", existence_state(1, 1'000'000, {map_file::landmark_id(1, 1)}, ""));
+  CHECK(store.refused("EXISTENCE_STATE") == 2);
+  store.send("MAP_DELTA", model::MapDelta{2'000'000, 0, 0, 1, {landmark(1, 1, 1.0)}, {}, {}, {}});
+  store.send("EXISTENCE_STATE",
+             existence_state(1, 2'000'000, {map_file::landmark_id(1, 1)}, "good"));
+  store.finish();
+  const MapFile opened(file(1), Access::kRead);
+  CHECK(opened.check().empty());
+  CHECK(opened.read(1).existence->landmarks.size() == 1);
+}
+
+TEST_CASE_METHOD(Folder, "states of a map that was given up go with it", "[submap_store]") {
+  StoreOnBus store(directory.path());
+  model::MapUpdate first = update(1, 1, model::MapUpdateStatus::kFirstMap);
+  first.is_provisional = true;
+  store.send("SLAM_UPDATE", first);
+  store.send("EXISTENCE_STATE",
+             existence_state(1, 2'000'000, {map_file::landmark_id(1, 1)}, "young"));
+  store.send("SLAM_UPDATE", update(3, 2, model::MapUpdateStatus::kFirstMap));
+  // The tracker has heard of the next map later than the store.
+  store.send("EXISTENCE_STATE",
+             existence_state(1, 3'000'000, {map_file::landmark_id(1, 1)}, "late"));
+  store.send("EXISTENCE_STATE",
+             existence_state(2, 4'000'000, {map_file::landmark_id(2, 1)}, "second"));
+  store.finish();
+  const MapFile opened(file(1), Access::kRead);
+  CHECK(opened.check().empty());
+  REQUIRE(opened.maps().size() == 1);
+  CHECK(opened.maps()[0].map_id == 2);
+  // Nobody has told of its landmark.
+  CHECK(opened.read(2).existence->landmarks.empty());
+}
+
 TEST_CASE("in a replay the same comes out every time", "[submap_store]") {
   std::vector<std::uint8_t> first;
   for (int run = 0; run < 2; ++run) {
@@ -241,6 +317,7 @@ TEST_CASE("a state that is saved and loaded writes what the first would have wri
   closure.map_id = 5;
   closure.id = 12;
   store.take(closure);
+  store.take(existence_state(5, 2'000'000, {map_file::landmark_id(5, 1)}, "state"));
   submap_store::SubmapStore loaded;
   loaded.load(store.save());
   CHECK(loaded.wants_whole());
@@ -254,6 +331,9 @@ TEST_CASE("a state that is saved and loaded writes what the first would have wri
     CHECK(due.ground[1].keyframes.size() == 1);
     REQUIRE(due.closures.size() == 1);
     CHECK(due.closures[0].id == 12);
+    REQUIRE(due.existence.size() == 1);
+    CHECK(due.existence[0].first == 5);
+    CHECK(due.existence[0].second.landmarks[0].state == "state");
     one->written();
     CHECK(one->due().empty());
   }

@@ -1,0 +1,158 @@
+#include "eval/experiments/changing_forest/changing_forest.hpp"
+
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "common/bus/config_layers.hpp"
+#include "common/bus/launch_config.hpp"
+#include "common/map_file/map_file.hpp"
+#include "common/map_file/stored_existence.hpp"
+
+namespace understory::eval::experiments::changing_forest {
+namespace {
+
+namespace changes = sim::changes;
+
+constexpr const char* kMapper = "geoslam_mapper";
+constexpr const char* kTracker = "existence_tracker";
+/// A landmark is a tree's when it is nearer to it than this [m].
+constexpr double kSameM = 0.5;
+
+/// Parameter files of the processes that begin with the map, by process.
+std::map<std::string, std::string> with_map(const std::filesystem::path& config_dir,
+                                            const std::filesystem::path& file) {
+  std::map<std::string, std::string> result;
+  for (const char* const process : {kMapper, kTracker}) {
+    toml::table values;
+    values.insert("input", toml::table{{"map_file", file.string()}});
+    result[process] = bus::layer_over(bus::config_file_in(config_dir, process), values);
+  }
+  return result;
+}
+
+/// The map of a drive with what its tracker knows, for the next one.
+void store(const harness::ChainRun& run, const std::filesystem::path& file) {
+  map_file::StoredMap map;
+  map.map_id = model::map_of(run.landmarks.back().id);
+  map.name = "forest";
+  map.created_utime = run.updates.back().utime;
+  map.keyframes = run.keyframes;
+  for (const model::MapLandmark& landmark : run.landmarks)
+    map.landmarks.push_back({landmark, std::nullopt, std::nullopt});
+  map_file::NewestExistence newest;
+  for (const model::ExistenceState& state : run.existence_states) newest.take(state);
+  if (!newest.empty()) map_file::give_existence(map, newest.stored());
+  map_file::create_map_file(file, {&map, 1}, {map.created_utime, "eval", "a drive", "its map"});
+}
+
+/// World from map, by the truth along the drive.
+geometry::SE2 world_T_map(const harness::ChainRun& run) {
+  const model::SlamPose& last = run.slam.back();
+  return *metrics::pose_at(run.truth, last.utime) * last.map_T_vehicle().inverse();
+}
+
+double distance_to_path(const Eigen::Vector2d& at_m, const harness::ChainRun& run) {
+  double nearest_m = 1e9;
+  for (const metrics::StampedPose& pose : run.truth)
+    nearest_m = std::min(nearest_m, (pose.pose.translation() - at_m).norm());
+  return nearest_m;
+}
+
+/// A landmark of the map in the world.
+struct PlacedLandmark {
+  Eigen::Vector2d world_m;
+  bool is_in_use = true;
+};
+
+std::vector<PlacedLandmark> placed_landmarks(const harness::ChainRun& run, double beside_m) {
+  std::vector<PlacedLandmark> result;
+  const geometry::SE2 to_world = world_T_map(run);
+  for (const model::MapLandmark& landmark : run.landmarks) {
+    const Eigen::Vector2d world_m = to_world * landmark.position_m;
+    if (distance_to_path(world_m, run) > beside_m) continue;
+    const auto existence = run.existence.find(landmark.id);
+    result.push_back({world_m, existence == run.existence.end() || existence->second.is_in_use});
+  }
+  return result;
+}
+
+bool is_at(const Eigen::Vector2d& a_m, const Eigen::Vector2d& b_m) {
+  return (a_m - b_m).norm() < kSameM;
+}
+
+DriveScore score_of(const harness::ChainRun& run, const changes::ChangingForest& forest, int drive,
+                    double beside_m) {
+  DriveScore score;
+  score.drive = drive;
+  score.stored = run.landmarks.size();
+  score.ate_m = harness::trajectory_error(run.slam, run.truth).ate_rms_m;
+  score.missing_share = run.missing_share;
+  score.mapping_needed = run.is_mapping_needed;
+  const std::vector<PlacedLandmark> landmarks = placed_landmarks(run, beside_m);
+  const auto at = [&](const Eigen::Vector2d& tree_m, bool in_use) {
+    return std::ranges::any_of(landmarks, [&](const PlacedLandmark& one) {
+      return one.is_in_use == in_use && is_at(one.world_m, tree_m);
+    });
+  };
+
+  // The trees.
+  for (const changes::TreeTruth& tree : forest.trees) {
+    if (tree.first_drive > drive || distance_to_path(tree.position_m, run) > beside_m) continue;
+    const bool is_used = at(tree.position_m, true);
+    const bool is_unused = at(tree.position_m, false);
+    if (tree.stands_in(drive)) {
+      ++score.standing;
+      score.found += is_used ? 1 : 0;
+      score.wrongly_unused += is_unused && !is_used ? 1 : 0;
+    } else if (is_used || is_unused) {
+      ++score.felled;
+      score.felled_unused += is_used ? 0 : 1;
+    }
+  }
+
+  // The landmarks.
+  for (const PlacedLandmark& one : landmarks) {
+    if (!one.is_in_use) continue;
+    ++score.in_use;
+    score.right += std::ranges::any_of(forest.trees, [&](const changes::TreeTruth& tree) {
+      return tree.stands_in(drive) && is_at(tree.position_m, one.world_m);
+    });
+  }
+  return score;
+}
+
+}  // namespace
+
+std::vector<DriveScore> drive_forest(const changes::ChangingForest& forest,
+                                     const DrivesOptions& options, Keeping keeping,
+                                     std::uint64_t seed, const std::filesystem::path& scratch,
+                                     const std::function<void(double)>& progress) {
+  std::vector<DriveScore> scores;
+  std::filesystem::path map;
+  const auto drives = static_cast<double>(forest.drives.size());
+  for (std::size_t i = 0; i < forest.drives.size(); ++i) {
+    sim::SensorSuite suite;
+    suite.gnss.reset();
+    suite.lidar->elevations_rad = sim::beam_elevations_rad(sim::LidarModel::kVlp16);
+    suite.lidar->columns = options.columns;
+    sim::SensorDrive sensors = forest.drives[i].sensors(suite, {}, seed + i);
+
+    harness::ChainOptions chain;
+    chain.config_dir = options.config_dir;
+    if (!map.empty()) chain.toml_instead = with_map(options.config_dir, map);
+    if (keeping == Keeping::kNothing) chain.without = {kTracker};
+    chain.progress = [&](double done) { progress((static_cast<double>(i) + done) / drives); };
+    const harness::ChainRun run = harness::drive_chain(sensors, chain);
+
+    scores.push_back(score_of(run, forest, static_cast<int>(i), options.beside_m));
+    map = scratch / ("drive-" + std::to_string(i) + ".gpkg");
+    store(run, map);
+  }
+  return scores;
+}
+
+}  // namespace understory::eval::experiments::changing_forest

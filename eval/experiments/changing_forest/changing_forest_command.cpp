@@ -1,0 +1,144 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/terminal/interrupt.hpp"
+#include "eval/experiments/changing_forest/changing_forest.hpp"
+#include "eval/experiments/experiments.hpp"
+#include "eval/harness/campaign.hpp"
+#include "eval/harness/results.hpp"
+#include "eval/tools/parallel.hpp"
+
+namespace understory::eval::experiments::changing_forest {
+namespace {
+
+struct DrivesCommand {
+  DrivesOptions drives;
+  int runs = 2;
+  std::uint64_t seed = 1;
+  int jobs = 1;
+  std::string json;
+};
+
+/// A folder for the map files of a run, gone with it.
+class MapFolder {
+ public:
+  explicit MapFolder(std::size_t run)
+      : path_(std::filesystem::temp_directory_path() /
+              fmt::format("understory-existence-drives-{}-{}", ::getpid(), run)) {
+    std::filesystem::create_directories(path_);
+  }
+  ~MapFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  MapFolder(const MapFolder&) = delete;
+  MapFolder& operator=(const MapFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+const char* name_of(Keeping keeping) {
+  return keeping == Keeping::kTracker ? "existence tracker" : "nothing removed";
+}
+
+nlohmann::json row_of(std::uint64_t seed, Keeping keeping, const DriveScore& score) {
+  return {{"run_seed", seed},
+          {"keeping", name_of(keeping)},
+          {"drive", score.drive},
+          {"standing", score.standing},
+          {"found", score.found},
+          {"in_use", score.in_use},
+          {"right", score.right},
+          {"stored", score.stored},
+          {"felled", score.felled},
+          {"felled_unused", score.felled_unused},
+          {"wrongly_unused", score.wrongly_unused},
+          {"ate_m", score.ate_m},
+          {"missing_share", score.missing_share},
+          {"mapping_needed", score.mapping_needed}};
+}
+
+void print_drives(const nlohmann::json& rows) {
+  fmt::print("{:<18} {:>5} {:>9} {:>7} {:>7} {:>14} {:>14} {:>7} {:>8}\n", "keeping", "drive",
+             "precision", "recall", "stored", "felled unused", "wrongly unused", "ATE mm",
+             "missing");
+  for (const nlohmann::json& row : rows) {
+    const auto n = [&](const char* key) { return row[key].get<double>(); };
+    fmt::print(
+        "{:<18} {:>5.0f} {:>9.3f} {:>7.3f} {:>7.0f} {:>8.0f} of {:<3.0f} {:>14.0f} {:>7.1f} "
+        "{:>8.2f}\n",
+        row["keeping"].get<std::string>(), n("drive"), n("right") / std::max(1.0, n("in_use")),
+        n("found") / std::max(1.0, n("standing")), n("stored"), n("felled_unused"), n("felled"),
+        n("wrongly_unused"), 1e3 * n("ate_m"), n("missing_share"));
+  }
+}
+
+void run_drives(const DrivesCommand& options) {
+  const auto& stop = terminal::catch_interrupts();
+  constexpr std::array kBoth{Keeping::kTracker, Keeping::kNothing};
+  std::vector<nlohmann::json> results(2 * static_cast<std::size_t>(options.runs));
+  tools::run_in_parallel(results.size(), options.jobs, "drives", stop, [&](std::size_t i) {
+    const std::uint64_t seed = harness::run_seed(options.seed, static_cast<int>(i / 2));
+    const auto forest = sim::changes::make_changing_forest(options.drives.forest, seed);
+    const MapFolder folder(i);
+    nlohmann::json rows = nlohmann::json::array();
+    for (const DriveScore& score :
+         drive_forest(forest, options.drives, kBoth[i % 2], seed, folder.path(),
+                      [](double) { terminal::throw_if_interrupted(); }))
+      rows.push_back(row_of(seed, kBoth[i % 2], score));
+    results[i] = std::move(rows);
+  });
+
+  nlohmann::json rows = nlohmann::json::array();
+  for (const nlohmann::json& one : results)
+    for (const nlohmann::json& row : one) rows.push_back(row);
+  print_drives(rows);
+  if (options.json.empty()) return;
+  const nlohmann::json config{{"seed", options.seed},
+                              {"runs", options.runs},
+                              {"drives", options.drives.forest.drives},
+                              {"share", options.drives.forest.share},
+                              {"length_m", options.drives.forest.course.length_m}};
+  harness::write_json(options.json, harness::result_document("existence-drives", config, rows));
+}
+
+}  // namespace
+
+void add_changing_forest_experiment(CLI::App& eval) {
+  CLI::App& command = *eval.add_subcommand(
+      "existence-drives",
+      "A forest mapped once and driven again while trees go and come, from raw LIDAR");
+  const auto options = std::make_shared<DrivesCommand>();
+  options->drives.forest.course.length_m = 150.0;
+  command.add_option("--runs", options->runs, "Forests, each with the tracker and without")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command.add_option("--seed", options->seed, "Seed of the first forest")->capture_default_str();
+  command.add_option("--jobs", options->jobs, "Runs side by side")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  command.add_option("--drives", options->drives.forest.drives, "Drives; the first one maps")
+      ->check(CLI::Range(2, 100))
+      ->capture_default_str();
+  command.add_option("--share", options->drives.forest.share, "Of the trees felled between two")
+      ->check(CLI::Range(0.0, 0.9))
+      ->capture_default_str();
+  command.add_option("--length-m", options->drives.forest.course.length_m, "Of the path [m]")
+      ->check(CLI::Range(30.0, 10000.0))
+      ->capture_default_str();
+  command.add_option("--config", options->drives.config_dir, "Configuration folder of the chain")
+      ->capture_default_str();
+  command.add_option("--json", options->json, "Result document");
+  command.callback([options] { run_guarded("existence-drives", [&] { run_drives(*options); }); });
+}
+
+}  // namespace understory::eval::experiments::changing_forest
