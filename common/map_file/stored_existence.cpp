@@ -40,6 +40,11 @@ void NewestExistence::take(const model::ExistenceState& state) {
   }
 }
 
+void NewestExistence::drop_given_by(std::uint32_t map_id) {
+  rows_.erase(rows_.lower_bound(landmark_id(map_id, 0)),
+              rows_.lower_bound(landmark_id(map_id + 1, 0)));
+}
+
 StoredExistence NewestExistence::stored() const {
   StoredExistence result{utime_, learned_, {}};
   result.landmarks.reserve(rows_.size());

@@ -45,7 +45,7 @@ struct StoredExistence {
   }
 };
 
-/// The newest state of each landmark of one map, from EXISTENCE_STATE as it comes. Of two with one
+/// The newest state of each landmark, from EXISTENCE_STATE as it comes. Of two with one
 /// stamp the later message counts. Memory: O(landmarks).
 class NewestExistence {
  public:
@@ -53,6 +53,8 @@ class NewestExistence {
   void take(const model::ExistenceState& state);
   /// Forgets a landmark that is no more. O(log).
   void drop(model::LandmarkId id) { rows_.erase(id); }
+  /// Forgets all landmarks that a map has given ids to. O(landmarks of it).
+  void drop_given_by(std::uint32_t map_id);
   /// Whether nothing was taken.
   bool empty() const { return !has_learned_ && rows_.empty(); }
   /// All of it. O(landmarks).

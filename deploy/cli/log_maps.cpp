@@ -1,5 +1,7 @@
 #include "deploy/cli/log_maps.hpp"
 
+#include <algorithm>
+
 #include "common/wire/convert.hpp"
 
 namespace understory::cli {
@@ -9,6 +11,18 @@ namespace {
 /// part of it have smaller numbers.
 std::uint32_t map_id_of(const std::vector<model::MapLandmark>& landmarks) {
   return landmarks.empty() ? 0 : model::map_of(landmarks.back().id);
+}
+
+/// What is known of these landmarks, ids ascending.
+std::optional<map_file::StoredExistence> states_of(const std::vector<model::MapLandmark>& landmarks,
+                                                   const map_file::StoredExistence& all) {
+  map_file::StoredExistence result{all.utime, all.learned, {}};
+  for (const map_file::ExistenceRow& row : all.landmarks) {
+    if (std::ranges::binary_search(landmarks, row.existence.id, {}, &model::MapLandmark::id))
+      result.landmarks.push_back(row);
+  }
+  if (result.landmarks.empty()) return std::nullopt;
+  return result;
 }
 
 }  // namespace
@@ -36,14 +50,14 @@ void LogMaps::add(const io::LogEvent& event) {
     if (update) follow(*update);
   } else if (event.channel == "EXISTENCE_STATE") {
     const auto state = wire::decode_message<model::ExistenceState>(event.data);
-    if (state && map_file::fault_of(*state).empty()) existence_[state->map_id].take(*state);
+    if (state && map_file::fault_of(*state).empty()) existence_.take(*state);
   }
 }
 
 void LogMaps::follow(const model::MapUpdate& update) {
   const bool starts = update.status == model::MapUpdateStatus::kFirstMap;
   // Of a mapper that began anew, the landmarks of this number are others.
-  if (starts) existence_.erase(update.map_id);
+  if (starts) existence_.drop_given_by(update.map_id);
   if (starts || map_id_ == 0) go_to(update.map_id);
   held_.take(update);
   is_provisional_ = update.is_provisional;
@@ -53,10 +67,8 @@ std::map<std::uint32_t, LogMaps::Found> LogMaps::take() {
   // The map in use at the end is one, however young it is.
   is_provisional_ = false;
   keep();
-  for (auto& [map_id, found] : left_) {
-    const auto existence = existence_.find(map_id);
-    if (existence != existence_.end()) found.existence = existence->second.stored();
-  }
+  const map_file::StoredExistence all = existence_.stored();
+  for (auto& [map_id, found] : left_) found.existence = states_of(found.map.landmarks, all);
   return std::move(left_);
 }
 

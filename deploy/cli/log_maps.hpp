@@ -20,7 +20,8 @@ class LogMaps {
   struct Found {
     model::WholeMap map;
     std::uint64_t missed = 0;
-    /// The last EXISTENCE_STATE of each landmark, gone ones too; none where there was none.
+    /// The last EXISTENCE_STATE of each of its landmarks, whatever map the message was of: a map
+    /// may have become part of this one. None where no landmark has any.
     std::optional<map_file::StoredExistence> existence;
   };
 
@@ -38,7 +39,7 @@ class LogMaps {
   bool is_provisional_ = false;
   model::HeldMap held_;
   std::map<std::uint32_t, Found> left_;
-  std::map<std::uint32_t, map_file::NewestExistence> existence_;
+  map_file::NewestExistence existence_;  ///< Of all maps.
 };
 
 }  // namespace understory::cli

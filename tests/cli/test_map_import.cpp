@@ -119,21 +119,26 @@ TEST_CASE("a log that begins in the middle of a map gives it from its first MAP 
   CHECK(maps.at(3).missed == 1);
 }
 
-TEST_CASE("states of existence of what is no map, and empty ones, are passed over", "[cli]") {
+TEST_CASE("states of existence are those of a map's landmarks; empty ones are passed over",
+          "[cli]") {
   MapperLog log;
   log.update(1, true, false);
-  log.existence(1, {1, 2}, "first");
-  log.update(1, false, false);
-  log.existence(1, {2, 3}, "second");
+  log.delta(true, {landmark(1, 1, 0.0), landmark(1, 2, 0.0)});
+  log.existence(1, {1}, "first");
   log.update(2, true, false);
-  log.delta(true, {landmark(2, 1, 1.0)});
-  log.existence(1, {3}, "late");
-  log.existence(2, {}, "");
-  log.existence(2, {1}, "");  // No state: passed over.
+  log.existence(1, {2}, "late");
+  // The map that was left becomes part of the next one, as far as the log tells.
+  log.delta(true, {landmark(1, 2, 3.0), landmark(2, 1, 1.0), landmark(2, 2, 1.0)});
+  log.existence(2, {1}, "second");
+  log.existence(2, {2}, "");
   const auto maps = log.maps();
-  REQUIRE_FALSE(maps.contains(1));  // Without any landmark it is no map.
+  REQUIRE(maps.at(1).existence);
+  CHECK(maps.at(1).existence->landmarks.size() == 2);
   REQUIRE(maps.at(2).existence);
-  CHECK(maps.at(2).existence->landmarks.empty());
+  REQUIRE(maps.at(2).existence->landmarks.size() == 2);
+  CHECK(maps.at(2).existence->landmarks[0].state == "late");
+  CHECK(maps.at(2).existence->landmarks[1].state == "second");
+  CHECK(maps.at(2).existence->learned == "model second");
 }
 
 TEST_CASE("states of existence of a log's maps, those of a mapper that began anew", "[cli]") {
