@@ -191,6 +191,23 @@ def map_merge(document):
                         f"(95 % bound: {number(300 / apart)} %)."]
 
 
+def existence_drives(document):
+    """A line for each drive and way of keeping the map: all forests together."""
+    rows = document["rows"]
+    lines = []
+    for keeping in dict.fromkeys(row["keeping"] for row in rows):
+        for drive in sorted({row["drive"] for row in rows}):
+            some = [row for row in rows if row["keeping"] == keeping and row["drive"] == drive]
+            total = lambda key: sum(row[key] for row in some)
+            lines.append((keeping, drive, len(some), total("standing"), total("in_use"), total("stored"),
+                          number(total("right") / max(1, total("in_use")), 3), number(total("found") / max(1, total("standing")), 3),
+                          f'{total("felled_unused")} of {total("felled")}', total("wrongly_unused"),
+                          number(1e3 * (sum(row["ate_m"] ** 2 for row in some) / len(some)) ** 0.5, 1),
+                          f'{sum(row["mapping_needed"] for row in some)} of {len(some)}'))
+    return table(("map", "drive", "forests", "trees", "landmarks in use", "stored", "precision", "recall", "felled and unused",
+                  "wrongly unused", "ATE mm", "mapping needed"), lines)
+
+
 def existence(document):
     """Which points still exist: worlds, occluders, births, Big Woods; all rows of the worlds folded."""
     rows = document["rows"]

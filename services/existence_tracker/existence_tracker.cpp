@@ -144,7 +144,7 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, const model::MapU
   const auto look = look_from(update.map_T_vehicle.translation(), *place_m);
   if (!look) return;
 
-  TrackedPoint& tracked = *known(id, update.utime);
+  TrackedPoint& tracked = known(id, update.utime);
   const bool is_old = tracked.told_probability >= 0.0 && tracked.is_in_use;
   pass_time(update.utime, tracked);
   if (is_hit) {
@@ -161,12 +161,12 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, const model::MapU
 }
 
 /// The landmark's point; of a given map it is new here.
-TrackedPoint* ExistenceTracker::known(model::LandmarkId id, model::Utime utime) {
+TrackedPoint& ExistenceTracker::known(model::LandmarkId id, model::Utime utime) {
   const auto [found, is_new] =
       points_.try_emplace(id, TrackedPoint{Point::known(model_), utime, true, -1.0, true, true});
   // It was in the map before this drive.
   if (is_new) found->second.told_probability = found->second.point.probability();
-  return &found->second;
+  return found->second;
 }
 
 /// Landmarks whose first sighting is some keyframes old get their probability now.

@@ -85,7 +85,7 @@ class ExistenceTracker {
   void pass_time(model::Utime utime, TrackedPoint& tracked) const;
   void drive_to(const model::MapUpdate& update);
   void look(model::LandmarkId id, bool is_hit, const model::MapUpdate& update);
-  TrackedPoint* known(model::LandmarkId id, model::Utime utime);
+  TrackedPoint& known(model::LandmarkId id, model::Utime utime);
   void give_birth();
   void forget(const model::MapUpdate& update);
   void decide(TrackedPoint& tracked);

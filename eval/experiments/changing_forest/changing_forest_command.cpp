@@ -109,6 +109,7 @@ void run_drives(const DrivesCommand& options) {
                               {"share", options.drives.forest.share},
                               {"length_m", options.drives.forest.course.length_m}};
   harness::write_json(options.json, harness::result_document("existence-drives", config, rows));
+  harness::plot("existence_drives.py", {options.json});
 }
 
 }  // namespace
