@@ -14,8 +14,8 @@
 namespace understory::bus {
 namespace {
 
-constexpr std::array<std::string_view, 5> kProcessKeys{"name", "executable", "config", "arguments",
-                                                       "keeps_state"};
+constexpr std::array<std::string_view, 6> kProcessKeys{"name",      "executable",  "config",
+                                                       "arguments", "keeps_state", "ends_last"};
 
 /// A name is also that of the folder of the process's state, which `--fresh` deletes: it must not
 /// lead elsewhere.
@@ -130,10 +130,8 @@ class LaunchReader {
     }
 
     entry.arguments = texts(*table, "arguments");
-    if (const toml::node* keeps = table->get("keeps_state")) {
-      if (!keeps->is_boolean()) fail(*keeps, "keeps_state: must be true or false");
-      entry.keeps_state = *keeps->value<bool>();
-    }
+    entry.keeps_state = flag(*table, "keeps_state", entry.keeps_state);
+    entry.ends_last = flag(*table, "ends_last", entry.ends_last);
 
     for (const auto& other : before.processes) {
       if (other.name == entry.name)
@@ -151,6 +149,13 @@ class LaunchReader {
       fail(*node, fmt::format("{}: must be a text that is not empty", key));
     }
     return node->as_string()->get();
+  }
+
+  bool flag(const toml::table& table, const char* key, bool otherwise) const {
+    const toml::node* const node = table.get(key);
+    if (node == nullptr) return otherwise;
+    if (!node->is_boolean()) fail(*node, fmt::format("{}: must be true or false", key));
+    return *node->value<bool>();
   }
 
   std::vector<std::string> texts(const toml::table& table, std::string_view key) const {

@@ -14,6 +14,7 @@ struct ProcessEntry {
   std::filesystem::path config;        ///< Beside launch.toml unless absolute; empty = none.
   std::vector<std::string> arguments;  ///< Further ones, unchanged.
   bool keeps_state = true;             ///< Whether it is given --state-dir.
+  bool ends_last = false;  ///< Asked to end when all others have: it keeps their last words.
 };
 
 /// The content of launch.toml.

@@ -88,6 +88,7 @@ std::vector<launch::ProcessSpec> process_specs(const LaunchOptions& options,
   for (const auto& entry : entries) {
     launch::ProcessSpec spec;
     spec.name = entry.name;
+    spec.ends_last = entry.ends_last;
     spec.command.executable = find_executable(entry.executable);
 
     if (const auto config = config_of(options, entry); !config.empty()) {

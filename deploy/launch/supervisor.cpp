@@ -110,10 +110,16 @@ void Supervisor::step(Clock::time_point now) {
     if (entry.start_due && now >= *entry.start_due) launch(entry, now);
   }
 
-  if (!stopping() || killed_ || now - *stop_time_ < parameters_.stop_timeout) return;
+  if (!stopping()) return;
+  kill_late(now);
+  if (!last_are_asked_ && !others_run()) ask_to_end(true, now);
+}
+
+void Supervisor::kill_late(Clock::time_point now) {
+  if (killed_ || now - *stop_time_ < parameters_.stop_timeout) return;
   killed_ = true;
   for (auto& entry : entries_) {
-    if (!entry.child) continue;
+    if (!entry.child || (entry.spec.ends_last && !last_are_asked_)) continue;
     report_(entry.spec.name,
             fmt::format("does not end within {} ms: killed", parameters_.stop_timeout.count()));
     entry.child->signal(SIGKILL);
@@ -194,14 +200,28 @@ void Supervisor::watch(Entry& entry, Clock::time_point now) {
 
 void Supervisor::stop(Clock::time_point now) {
   if (stopping()) return;
+  for (auto& entry : entries_) entry.start_due.reset();
+  ask_to_end(false, now);
+  if (!others_run()) ask_to_end(true, now);
+}
+
+/// Those that end last, or the others.
+void Supervisor::ask_to_end(bool last, Clock::time_point now) {
   stop_time_ = now;
+  last_are_asked_ = last;
+  killed_ = false;
   for (auto& entry : entries_) {
-    entry.start_due.reset();
-    if (!entry.child) continue;
+    if (!entry.child || entry.spec.ends_last != last) continue;
     // A stopped process takes no SIGTERM before it goes on.
     entry.child->signal(SIGTERM);
     entry.child->signal(SIGCONT);
   }
+}
+
+/// Whether one runs that does not end last.
+bool Supervisor::others_run() const {
+  return std::ranges::any_of(
+      entries_, [](const Entry& entry) { return entry.child && !entry.spec.ends_last; });
 }
 
 bool Supervisor::stopped() const {

@@ -19,6 +19,7 @@ namespace understory::launch {
 struct ProcessSpec {
   std::string name;  ///< As in its HEALTH messages.
   Command command;
+  bool ends_last = false;  ///< It is asked to end when all others have: it keeps their last words.
 };
 
 /// A process that is stopped (SIGSTOP) is noticed in /proc within a tenth of a second, hence the
@@ -66,7 +67,8 @@ class Supervisor {
   /// Notices deaths and hangs, starts what is due. Cheap; to be called whenever a descriptor is
   /// ready and at the latest at wake_up().
   void step(Clock::time_point now);
-  /// Asks every process to end; step() goes on until stopped().
+  /// Asks every process to end, those that end last when the others have; step() goes on until
+  /// stopped().
   void stop(Clock::time_point now);
 
   /// True after stop().
@@ -97,6 +99,9 @@ class Supervisor {
   };
 
   void launch(Entry& entry, Clock::time_point now);
+  void ask_to_end(bool last, Clock::time_point now);
+  void kill_late(Clock::time_point now);
+  bool others_run() const;
   void bury(Entry& entry, const Ending& ending, Clock::time_point now);
   void schedule_restart(Entry& entry, Clock::time_point now);
   void watch(Entry& entry, Clock::time_point now);
@@ -104,8 +109,10 @@ class Supervisor {
   std::vector<Entry> entries_;
   SupervisorParameters parameters_;
   Report report_;
-  std::optional<Clock::time_point> stop_time_;
-  bool killed_ = false;
+  std::optional<Clock::time_point>
+      stop_time_;                ///< When processes were asked to end, the last time.
+  bool last_are_asked_ = false;  ///< Those that end last, too.
+  bool killed_ = false;          ///< Of those that were asked, who was late.
   std::vector<std::string> refused_;
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <csignal>
 #include <fstream>
+#include <iterator>
 
 #include "common/bus/launch_config.hpp"
 #include "common/bus/parameter_table.hpp"
@@ -21,6 +22,11 @@ namespace {
 
 launch::ProcessSpec shell(const std::string& name, const std::string& script) {
   return {name, {"/bin/sh", {"-c", script}, {}}};
+}
+
+std::string text_of(const std::string& file) {
+  std::ifstream in(file);
+  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 /// Runs a supervisor until a condition holds; generous in time, since other tests run beside it.
@@ -159,6 +165,29 @@ TEST_CASE("a process that ignores SIGTERM is killed in time", "[launch]") {
   CHECK_THAT(bench.said, Contains("a: does not end") && !Contains("b: does not end"));
 }
 
+TEST_CASE("who ends last is asked when all others have ended, also those that are late",
+          "[launch]") {
+  const TemporaryDirectory directory;
+  const std::string file = directory / "order";
+  // The last one's trap would end it at once; the first one takes its time, another never ends.
+  const auto ends = [&](const std::string& name, const std::string& after) {
+    return shell(name, "trap '" + after + "echo " + name + " >> " + file +
+                           "; exit 0' TERM; while true; do sleep 0.02; done");
+  };
+  std::vector<launch::ProcessSpec> specs{
+      ends("store", ""), ends("mapper", "sleep 0.2; "),
+      shell("deaf", "trap '' TERM; while true; do sleep 1; done")};
+  specs.front().ends_last = true;
+  Bench bench(specs);
+  bench.supervisor.start({}, launch::Clock::now());
+  ::poll(nullptr, 0, 300);  // The traps are set.
+
+  bench.supervisor.stop(launch::Clock::now());
+  REQUIRE(bench.run_until([&] { return bench.supervisor.stopped(); }));
+  CHECK(text_of(file) == "mapper\nstore\n");
+  CHECK_THAT(bench.said, Contains("deaf: does not end within") && !Contains("store: does not"));
+}
+
 TEST_CASE("the next supervisor adopts what still runs", "[launch]") {
   TemporaryDirectory directory;
   pid_t pid = -1;
@@ -204,6 +233,7 @@ TEST_CASE("launch.toml is refused with file, line and key", "[launch]") {
   CHECK_THAT(refused(good + "config = \"none.toml\"\n"), Contains(":4") && Contains("none.toml"));
   CHECK_THAT(refused(good + "arguments = [1]\n"), Contains(":4") && Contains("arguments"));
   CHECK_THAT(refused(good + "keeps_state = 1\n"), Contains(":4") && Contains("keeps_state"));
+  CHECK_THAT(refused(good + "ends_last = \"yes\"\n"), Contains(":4") && Contains("ends_last"));
 
   CHECK_THAT(refused(good + good), Contains("twice"));
   CHECK_THAT(refused("[[process]]\nname = \"a\"\n"), Contains("executable"));
