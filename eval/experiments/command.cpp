@@ -1,5 +1,6 @@
 #include "eval/experiments/command.hpp"
 
+#include "eval/experiments/existence/camera/existence_camera.hpp"
 #include "eval/experiments/existence/existence.hpp"
 #include "eval/experiments/experiments.hpp"
 #include "eval/experiments/health/health.hpp"
@@ -40,6 +41,7 @@ void add_eval_command(CLI::App& parent) {
   misstated::add_misstated_experiment(eval);
   wheels::add_wheels_experiment(eval);
   existence::add_existence_experiment(eval);
+  existence::camera::add_existence_camera_experiment(eval);
   partition::add_partition_experiments(eval);
   partition::add_long_drive_experiments(eval);
 }
