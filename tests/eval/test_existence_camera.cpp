@@ -80,7 +80,9 @@ TEST_CASE("a disparity beside the line of sight tells hidden from gone", "[exist
   CHECK(ray(2.0, 5.0) == Ray::kBlocked);
   CHECK(ray(7.0, 5.0) == Ray::kPassed);
   CHECK(ray(4.1, 5.0) == Ray::kUnknown);
-  CHECK(ray(2.0, 15.0) == Ray::kUnknown);
+  CHECK(ray(2.0, 15.0) == Ray::kBlocked);
+  CHECK(ray(7.0, 15.0) == Ray::kUnknown);
+  CHECK(ray(2.0, 40.0) == Ray::kUnknown);
 }
 
 TEST_CASE("a camera's map has its points where they are, and each once", "[existence]") {

@@ -1,9 +1,7 @@
 #include "eval/experiments/existence/camera/camera_case.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <numbers>
 #include <unordered_map>
 #include <utility>
 
@@ -18,9 +16,14 @@ namespace {
 namespace changes = sim::changes;
 
 constexpr double kCaseDay_s = 86400.0;
-/// A point is scored from so many clear looks on, from so many of eight directions in the plan.
+constexpr int kOccludersAlone = 4;
+/// Of the texture of walls, where they are bare.
+constexpr double kBareShare = 0.1;
+/// A point is scored from so many clear looks on, from so many directions that differ by this
+/// much: the camera passes a point once in a drive.
 constexpr int kClearLooks = 10;
-constexpr int kClearDirections = 3;
+constexpr std::size_t kClearDirections = 3;
+constexpr float kCosineApart = 0.985F;  // 10 degrees
 
 changes::Course course_of(const CaseSetting& setting, std::uint64_t seed) {
   changes::CourseParameters parameters;
@@ -31,10 +34,17 @@ changes::Course course_of(const CaseSetting& setting, std::uint64_t seed) {
 
 changes::Diff diff_of(const CaseSetting& setting, const changes::Course& course,
                       std::uint64_t seed) {
-  if (setting.changed == 0.0) return {};
+  if (setting.changed == 0.0 && !setting.has_occluders_alone) return {};
   changes::DiffParameters parameters;
+  if (setting.has_occluders_alone) parameters.occluders = kOccludersAlone;
   parameters.share = setting.changed;
   return changes::make_diff(course, parameters, seed);
+}
+
+changes::TextureParameters textures_of(const CaseSetting& setting) {
+  changes::TextureParameters textures;
+  if (setting.has_bare_walls) textures.structure_per_m2 *= kBareShare;
+  return textures;
 }
 
 /// The frames of one drive: each begins at a moment of its own, so no two see from the same places.
@@ -74,7 +84,7 @@ class Observing {
       : result_(result),
         things_(changes::compare(replay.unchanged().scene, replay.copy().scene)),
         clear_(result.map.size(), 0),
-        directions_(result.map.size(), 0),
+        directions_(result.map.size()),
         seed_(seed) {}
 
   void mapping_drive(const std::vector<changes::CameraFrame>& frames) {
@@ -100,9 +110,9 @@ class Observing {
 
   CameraCase& result_;
   std::vector<changes::TrueThing> things_;
-  std::vector<int> clear_;  ///< Looks since the change, by point.
-  std::vector<std::uint32_t> directions_;
-  std::vector<int> looked_;  ///< In this drive.
+  std::vector<int> clear_;                                ///< Looks since the change, by point.
+  std::vector<std::vector<Eigen::Vector3f>> directions_;  ///< Of those, each apart from the others.
+  std::vector<int> looked_;                               ///< In this drive.
   std::vector<int> clear_this_drive_;
   std::uint64_t seed_;
 };
@@ -131,9 +141,12 @@ void Observing::look(const Expected& expected, const changes::CameraFrame& frame
   if (!event.is_clear) return;
   ++clear_this_drive_[event.point];
   ++clear_[event.point];
-  const double turn =
-      std::atan2(event.look.from_point_m.y(), event.look.from_point_m.x()) / std::numbers::pi + 1.0;
-  directions_[event.point] |= 1U << (static_cast<unsigned>(turn * 4.0) % 8U);
+  const Eigen::Vector3f direction = event.look.from_point_m.normalized();
+  std::vector<Eigen::Vector3f>& known = directions_[event.point];
+  const bool is_new = std::none_of(
+      known.begin(), known.end(),
+      [&direction](const Eigen::Vector3f& other) { return direction.dot(other) > kCosineApart; });
+  if (is_new && known.size() < kClearDirections) known.push_back(direction);
 }
 
 void Observing::add(const changes::CameraFrame& frame, const Eigen::Isometry3d& world_T_camera) {
@@ -163,21 +176,27 @@ void Observing::end(bool is_changed) {
   for (std::size_t i = 0; i < result_.map.size(); ++i) {
     const bool is_there = !is_changed || exists(result_.map[i]);
     const bool is_scored =
-        is_changed && clear_[i] >= kClearLooks && std::popcount(directions_[i]) >= kClearDirections;
+        is_changed && clear_[i] >= kClearLooks && directions_[i].size() >= kClearDirections;
     drive.truth.push_back(
         {is_there, is_scored, is_there && looked_[i] > 0 && clear_this_drive_[i] == 0});
   }
   if (is_changed) return;
   clear_.assign(clear_.size(), 0);
-  directions_.assign(directions_.size(), 0);
+  directions_.assign(directions_.size(), {});
 }
 
 }  // namespace
 
+std::string name_of_world(const CaseSetting& setting) {
+  return std::string(changes::to_string(setting.scene)) +
+         (setting.has_bare_walls ? ", bare walls" : "");
+}
+
 CameraCase make_case(const CaseSetting& setting, std::uint64_t seed, bool has_held_out) {
   const changes::Course course = course_of(setting, seed);
-  const changes::Replay before(course, {});
-  const changes::Replay after(course, diff_of(setting, course, sim::mixed(seed, 2)));
+  const changes::Replay before(course, {}, textures_of(setting));
+  const changes::Replay after(course, diff_of(setting, course, sim::mixed(seed, 2)),
+                              textures_of(setting));
   CameraCase result;
   result.camera = changes::camera_for(setting.scene);
   const auto drive = [&](const changes::Replay& replay, std::uint64_t number) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "eval/experiments/existence/camera/keypoint_map.hpp"
@@ -13,6 +14,9 @@ namespace understory::eval::experiments::existence::camera {
 /// What is driven.
 struct CaseSetting {
   sim::changes::SceneKind scene = sim::changes::SceneKind::kOffice;
+  bool has_bare_walls = false;  ///< A tenth of the texture on walls and ceilings.
+  /// Nothing is gone or new but carts or lorries beside the path, which hide what stays.
+  bool has_occluders_alone = false;
   double changed = 0.2;       ///< Share of the things that can change; 0: nothing differs.
   int changed_drives = 3;     ///< Before the one that is held out.
   double frames_per_s = 4.0;  ///< Of mapping, updates and tracking.
@@ -21,6 +25,9 @@ struct CaseSetting {
   double forest_circle_m = 80.0;
   double forest_margin_m = 30.0;
 };
+
+/// "office", "office, bare walls".
+std::string name_of_world(const CaseSetting& setting);
 
 /// What a drive says of keypoints that are no point of the map.
 struct DriveKeypoints {

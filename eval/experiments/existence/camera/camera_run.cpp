@@ -61,6 +61,7 @@ void score(const CameraCase& of, const std::vector<double>& probability, MethodO
     if (of.map[i].truth == sim::changes::kNoPoint) continue;
     auto& points = truth[i].is_scored ? result.scored : result.rest;
     points.push_back({probability[i], truth[i].exists});
+    if (truth[i].is_hidden) result.hidden.push_back(points.back());
   }
 }
 

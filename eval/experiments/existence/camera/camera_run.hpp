@@ -28,10 +28,11 @@ struct Query {
 struct MethodOnCase {
   std::vector<ScoredPoint> scored;  ///< After the last drive: in clear view 10 times, 3 directions.
   std::vector<ScoredPoint> rest;
-  std::size_t map_points = 0;  ///< That are left.
-  std::vector<Query> queries;  ///< The same frames for all methods.
-  double ate_m = 0.0;          ///< RMS of the tracked places, in the map's frame.
-  int lost = 0;                ///< Tracked frames by odometry alone.
+  std::vector<ScoredPoint> hidden;  ///< Of both: there, and in no clear view in the last drive.
+  std::size_t map_points = 0;       ///< That are left.
+  std::vector<Query> queries;       ///< The same frames for all methods.
+  double ate_m = 0.0;               ///< RMS of the tracked places, in the map's frame.
+  int lost = 0;                     ///< Tracked frames by odometry alone.
 };
 
 /// What a drive says of the map: does it have to be made anew?

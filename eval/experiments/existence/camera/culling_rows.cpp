@@ -26,8 +26,8 @@ MeanOf mean_of(const std::vector<double>& values) {
 
 /// One method over all runs.
 struct Pool {
-  std::vector<ScoredPoint> scored, rest;
-  std::vector<double> samples, errors_m, ate_m, map_points, gone_points;
+  std::vector<ScoredPoint> scored, rest, hidden;
+  std::vector<double> samples, errors_m, ate_m, map_points;
   std::size_t frames = 0, successes = 0, wrong = 0, tracked = 0, lost = 0;
   std::size_t gained = 0, given_up = 0;  ///< Frames found here alone, found without removal alone.
 };
@@ -52,6 +52,7 @@ Pool pool_of(const std::vector<const CaseResult*>& runs, std::size_t method) {
     add_queries(one, run->methods.front(), pool);
     pool.scored.insert(pool.scored.end(), one.scored.begin(), one.scored.end());
     pool.rest.insert(pool.rest.end(), one.rest.begin(), one.rest.end());
+    pool.hidden.insert(pool.hidden.end(), one.hidden.begin(), one.hidden.end());
     pool.ate_m.push_back(one.ate_m);
     pool.map_points.push_back(static_cast<double>(one.map_points));
     pool.tracked += run->tracked_frames;
@@ -99,6 +100,8 @@ nlohmann::json points_part(const Pool& pool) {
           {"wrongly_removed_pct", 100.0 * removed_share(pool.scored, true)},
           {"auc", roc_area(pool.scored)},
           {"brier", brier_score(pool.scored)},
+          {"hidden_points", pool.hidden.size()},
+          {"hidden_removed_pct", 100.0 * removed_share(pool.hidden, true)},
           {"all_points", all.size()},
           {"gone_of_all_pct", gone_pct(all)},
           {"all_gone_removed_pct", 100.0 * removed_share(all, false)},
@@ -127,7 +130,8 @@ nlohmann::json culling_rows(const std::vector<const CaseResult*>& runs,
   for (std::size_t m = 0; m < methods.size(); ++m) {
     const Pool pool = pool_of(runs, m);
     nlohmann::json row{{"part", "culling"},
-                       {"world", sim::changes::to_string(setting.scene)},
+                       {"world", name_of_world(setting)},
+                       {"occluders_alone", setting.has_occluders_alone},
                        {"changed_pct", 100.0 * setting.changed},
                        {"method", methods[m].tuned.name},
                        {"runs", runs.size()}};

@@ -74,13 +74,26 @@ std::vector<CameraMethod> tuned_for_cameras(const CameraOptions& options,
   return methods;
 }
 
+/// All shares of change in one world, and occluders alone.
+void add_settings(CaseSetting setting, std::vector<CaseSetting>& all) {
+  for (const double share : kShares) {
+    all.push_back(setting);
+    all.back().changed = share;
+  }
+  setting.changed = 0.0;
+  setting.has_occluders_alone = true;
+  all.push_back(setting);
+}
+
 std::vector<CaseSetting> camera_settings() {
   std::vector<CaseSetting> all;
   for (const SceneKind scene : kScenes) {
-    for (const double share : kShares) {
-      all.emplace_back();
-      all.back().scene = scene;
-      all.back().changed = share;
+    for (const bool has_bare_walls : {false, true}) {
+      if (scene == SceneKind::kForest && has_bare_walls) continue;
+      CaseSetting setting;
+      setting.scene = scene;
+      setting.has_bare_walls = has_bare_walls;
+      add_settings(setting, all);
     }
   }
   return all;
@@ -103,26 +116,29 @@ std::vector<CaseResult> run_cases(const CameraOptions& options,
 void print_culling(const nlohmann::json& row) {
   const auto shown = [&row](const char* key) { return row[key].get<double>(); };
   fmt::print(
-      "{:<8} {:>4.0f} {:<26} {:>5.0f} {:>6.1f} [{:>5.1f} {:>5.1f}] {:>3.0f} {:>7.1f} {:>5.1f} "
+      "{:<19} {:>4.0f}{} {:<26} {:>5.0f} {:>6.1f} [{:>5.1f} {:>5.1f}] {:>3.0f} {:>7.1f} {:>5.1f} "
       "{:>6.2f} {:>5.1f} {:>6.0f} | {:>6.0f} {:>5.1f} {:>6.1f} {:>6.2f} {:>7.4f} {:>7.4f} | "
+      "{:>5.1f} | "
       "{:>6.1f} {:>6.2f} {:>7.4f}\n",
-      row["world"].get<std::string>(), shown("changed_pct"), row["method"].get<std::string>(),
+      row["world"].get<std::string>(), shown("changed_pct"),
+      row["occluders_alone"].get<bool>() ? "o" : " ", row["method"].get<std::string>(),
       shown("frames"), shown("success_pct"), shown("success_low_pct"), shown("success_high_pct"),
       shown("wrong_accepted"), shown("samples_mean"), shown("error_p50_cm"), shown("ate_cm"),
       shown("lost_pct"), shown("map_points"), shown("scored_points"), shown("gone_of_scored_pct"),
       shown("gone_removed_pct"), shown("wrongly_removed_pct"), shown("auc"), shown("brier"),
-      shown("all_gone_removed_pct"), shown("all_wrongly_removed_pct"), shown("all_auc"));
+      shown("hidden_removed_pct"), shown("all_gone_removed_pct"), shown("all_wrongly_removed_pct"),
+      shown("all_auc"));
 }
 
 void print_needed(const nlohmann::json& row) {
   fmt::print(
-      "mapping needed: {:<8} {:>3.0f}-{:>3.0f} % {:<5} {:<26} AUC {:.4f} +- {:.4f} ({} / {} "
+      "mapping needed: {:<19} {:<9} {:>3.0f}-{:>3.0f} % {:<5} {:<26} AUC {:.4f} +- {:.4f} ({} / {} "
       "drives), mean {:.3f} / {:.3f}\n",
-      row["world"].get<std::string>(), row["from_pct"].get<double>(), row["to_pct"].get<double>(),
-      row["drives"].get<std::string>(), row["signal"].get<std::string>(), row["auc"].get<double>(),
-      row["auc_half95"].get<double>(), row["changed_drives"].get<double>(),
-      row["unchanged_drives"].get<double>(), row["mean_changed"].get<double>(),
-      row["mean_unchanged"].get<double>());
+      row["world"].get<std::string>(), row["with_occluded"].get<bool>() ? "occluded" : "plain",
+      row["from_pct"].get<double>(), row["to_pct"].get<double>(), row["drives"].get<std::string>(),
+      row["signal"].get<std::string>(), row["auc"].get<double>(), row["auc_half95"].get<double>(),
+      row["changed_drives"].get<double>(), row["unchanged_drives"].get<double>(),
+      row["mean_changed"].get<double>(), row["mean_unchanged"].get<double>());
 }
 
 nlohmann::json rows_of(const std::vector<CaseResult>& cases, std::size_t runs,

@@ -1,6 +1,6 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <optional>
 #include <set>
 
@@ -26,10 +26,11 @@ const std::array<SignalKind, 4> kSignals{
 
 /// Which drives are compared with those through unchanged worlds.
 struct Selection {
-  std::optional<sim::changes::SceneKind> scene;  ///< None: all.
-  double from = 0.2;                             ///< Shares of change.
+  std::string world;  ///< Empty: all.
+  double from = 0.2;  ///< Shares of change.
   double to = 1.0;
   bool is_first_alone = true;  ///< The first drive after the change.
+  bool has_occluded = true;    ///< Those that new occluders alone stand in are unchanged, too.
 };
 
 /// A drive without change "exists"; P is the signal's opposite.
@@ -39,7 +40,8 @@ std::vector<ScoredPoint> drives_of(const std::vector<CaseResult>& cases, const S
   for (const CaseResult& one : cases) {
     const double changed = one.setting.changed;
     const bool is_changed = changed > 0.0;
-    if (selection.scene && one.setting.scene != *selection.scene) continue;
+    if (!selection.world.empty() && name_of_world(one.setting) != selection.world) continue;
+    if (one.setting.has_occluders_alone && !selection.has_occluded) continue;
     if (is_changed && (changed < selection.from - 1e-9 || changed > selection.to + 1e-9)) continue;
     for (std::size_t k = 0; k < one.signals.size(); ++k)
       if (k == 0 || !is_changed || !selection.is_first_alone)
@@ -74,33 +76,33 @@ std::optional<nlohmann::json> area_row(const std::vector<CaseResult>& cases, con
   }
   if (changed.count == 0.0 || unchanged.count == 0.0) return std::nullopt;
   const double area = roc_area(drives);
-  return nlohmann::json{
-      {"part", "mapping-needed"},
-      {"world", selection.scene ? sim::changes::to_string(*selection.scene) : "all"},
-      {"signal", kind.name},
-      {"from_pct", 100.0 * selection.from},
-      {"to_pct", 100.0 * selection.to},
-      {"drives", selection.is_first_alone ? "first" : "all"},
-      {"changed_drives", changed.count},
-      {"unchanged_drives", unchanged.count},
-      {"auc", area},
-      {"auc_half95", 1.96 * sigma_of_area(area, changed.count, unchanged.count)},
-      {"mean_changed", changed.mean()},
-      {"mean_unchanged", unchanged.mean()}};
+  return nlohmann::json{{"part", "mapping-needed"},
+                        {"world", selection.world.empty() ? "all" : selection.world},
+                        {"with_occluded", selection.has_occluded},
+                        {"signal", kind.name},
+                        {"from_pct", 100.0 * selection.from},
+                        {"to_pct", 100.0 * selection.to},
+                        {"drives", selection.is_first_alone ? "first" : "all"},
+                        {"changed_drives", changed.count},
+                        {"unchanged_drives", unchanged.count},
+                        {"auc", area},
+                        {"auc_half95", 1.96 * sigma_of_area(area, changed.count, unchanged.count)},
+                        {"mean_changed", changed.mean()},
+                        {"mean_unchanged", unchanged.mean()}};
 }
 
 std::vector<Selection> selections(const std::vector<CaseResult>& cases) {
-  std::set<sim::changes::SceneKind> scenes;
+  std::set<std::string> worlds;
   std::set<double> shares;
   for (const CaseResult& one : cases) {
-    scenes.insert(one.setting.scene);
+    worlds.insert(name_of_world(one.setting));
     if (one.setting.changed > 0.0) shares.insert(one.setting.changed);
   }
-  std::vector<Selection> all{{std::nullopt, kMuchChanged, 1.0, true},
-                             {std::nullopt, kMuchChanged, 1.0, false}};
-  for (const sim::changes::SceneKind scene : scenes)
-    all.push_back({scene, kMuchChanged, 1.0, true});
-  for (const double share : shares) all.push_back({std::nullopt, share, share, true});
+  std::vector<Selection> all{{"", kMuchChanged, 1.0, true, false},
+                             {"", kMuchChanged, 1.0, true, true},
+                             {"", kMuchChanged, 1.0, false, true}};
+  for (const std::string& world : worlds) all.push_back({world, kMuchChanged, 1.0, true, true});
+  for (const double share : shares) all.push_back({"", share, share, true, true});
   return all;
 }
 
@@ -117,9 +119,10 @@ nlohmann::json mapping_needed_rows(const std::vector<CaseResult>& cases) {
 nlohmann::json mapping_needed_curves(const std::vector<CaseResult>& cases) {
   nlohmann::json curves;
   for (const SignalKind& kind : kSignals) {
-    curves[kind.name]["much"] = roc_curve(drives_of(cases, kind, {std::nullopt, 0.2, 1.0, true}));
+    curves[kind.name]["much"] =
+        roc_curve(drives_of(cases, kind, {"", kMuchChanged, 1.0, true, true}));
     curves[kind.name]["little"] =
-        roc_curve(drives_of(cases, kind, {std::nullopt, 0.0, 0.19, true}));
+        roc_curve(drives_of(cases, kind, {"", 0.0, kMuchChanged - 0.01, true, true}));
   }
   return curves;
 }

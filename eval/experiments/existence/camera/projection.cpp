@@ -11,8 +11,10 @@ namespace changes = sim::changes;
 constexpr double kCosineOfView = 0.5;
 constexpr double kNearer = 0.8;
 constexpr double kFarther = 1.25;
-/// A keypoint so near to the line of sight tells what is on it [px].
-constexpr double kBeside = 10.0;
+/// A keypoint so near to the line of sight tells what is on it [px]: of what is in front, which is
+/// a surface, less nearness is asked than of what is behind.
+constexpr double kBesideInFront = 30.0;
+constexpr double kBesideBehind = 10.0;
 /// Disparities differ by chance up to so many standard deviations.
 constexpr double kDisparitySigmas = 4.0;
 
@@ -79,7 +81,7 @@ understory::existence::Ray ray_beside(const Expected& expected,
                                       std::span<const changes::Keypoint> keypoints,
                                       const changes::CameraParameters& camera) {
   const changes::Keypoint* nearest = nullptr;
-  double least = kBeside * kBeside;
+  double least = kBesideInFront * kBesideInFront;
   for (const changes::Keypoint& keypoint : keypoints) {
     const double distance = (keypoint.pixel - expected.pixel).squaredNorm();
     if (distance >= least || keypoint.disparity_px <= 0.0) continue;
@@ -92,7 +94,8 @@ understory::existence::Ray ray_beside(const Expected& expected,
   const double nearer_px = nearest->disparity_px - expected.disparity_px;
   const double tolerance_px = kDisparitySigmas * camera.disparity_sigma;
   if (nearer_px > tolerance_px) return understory::existence::Ray::kBlocked;
-  if (nearer_px < -tolerance_px) return understory::existence::Ray::kPassed;
+  const bool is_close = least <= kBesideBehind * kBesideBehind;
+  if (is_close && nearer_px < -tolerance_px) return understory::existence::Ray::kPassed;
   return understory::existence::Ray::kUnknown;
 }
 

@@ -41,8 +41,8 @@ std::vector<Expected> points_in_view(std::span<const CameraPoint> map,
 void associate(std::span<Expected> expected, std::span<const CameraPoint> map,
                std::span<const sim::changes::Keypoint> keypoints, const Gate& gate);
 
-/// What the disparity of the keypoint nearest to the line of sight says about it; kUnknown where
-/// none is within 10 px.
+/// What the disparity of the keypoint nearest to the line of sight says about it: in front within
+/// 30 px, behind within 10 px; kUnknown where none is.
 understory::existence::Ray ray_beside(const Expected& expected,
                                       std::span<const sim::changes::Keypoint> keypoints,
                                       const sim::changes::CameraParameters& camera);
