@@ -30,6 +30,7 @@ def draw_success(file, rows):
             for axis, (key, _) in zip(axes[:, column], FIGURES):
                 axis.plot([row["changed_pct"] for row in some], [row[key] for row in some], **style)
         axes[0][column].set_title(world, fontsize=9)
+        axes[0][column].set_ylim(50, 101)
         axes[-1][column].set_xlabel("things removed or moved [%]")
     for axis, (_, name) in zip(axes[:, 0], FIGURES):
         axis.set_ylabel(name)
@@ -60,7 +61,7 @@ def main():
     file = pathlib.Path(sys.argv[1])
     rows = json.loads(file.read_text())["rows"]
     traces = json.loads(pathlib.Path(sys.argv[2]).read_text())
-    draw_success(file, [row for row in rows if row["part"] == "culling"])
+    draw_success(file, [row for row in rows if row["part"] == "culling" and not row["occluders_alone"]])
     draw_needed(file, traces["mapping_needed"])
 
 
