@@ -105,9 +105,9 @@ TEST_CASE("a camera's map has its points where they are, and each once", "[exist
   CHECK(static_cast<double>(near) > 0.97 * static_cast<double>(one.map.size()));
   std::sort(ids.begin(), ids.end());
   const auto last = std::unique(ids.begin(), ids.end());
-  CHECK(static_cast<double>(ids.end() - last) < 0.03 * static_cast<double>(ids.size()));
-  // What is there is seen again on the next drive.
-  CHECK(one.keypoints.back().without_point < one.keypoints.back().all / 4);
+  CHECK(static_cast<double>(ids.end() - last) < 0.06 * static_cast<double>(ids.size()));
+  // What is there is seen again on the next drive; what was seen less than five times is no point.
+  CHECK(one.keypoints.back().without_point < one.keypoints.back().all / 2);
 }
 
 TEST_CASE("a changed office: what is gone is removed, and the camera is found", "[existence]") {

@@ -14,7 +14,7 @@ namespace changes = sim::changes;
 /// A point is in the map from so many sightings on: what false keypoints alone make is not.
 constexpr std::uint32_t kLeastSightings = 5;
 /// Points of one texture that are nearer than this share of their distance are one point.
-constexpr double kSamePlace = 0.03;
+constexpr double kSamePlace = 0.06;
 constexpr int kSameBits = 40;
 
 /// Pixel, disparity; and how they change with the point.
