@@ -1,6 +1,7 @@
 #include "eval/experiments/command.hpp"
 
 #include "eval/experiments/changing_forest/changing_forest.hpp"
+#include "eval/experiments/existence/camera/existence_camera.hpp"
 #include "eval/experiments/existence/existence.hpp"
 #include "eval/experiments/experiments.hpp"
 #include "eval/experiments/health/health.hpp"
@@ -42,6 +43,7 @@ void add_eval_command(CLI::App& parent) {
   wheels::add_wheels_experiment(eval);
   existence::add_existence_experiment(eval);
   changing_forest::add_changing_forest_experiment(eval);
+  existence::camera::add_existence_camera_experiment(eval);
   partition::add_partition_experiments(eval);
   partition::add_long_drive_experiments(eval);
 }

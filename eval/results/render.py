@@ -245,6 +245,41 @@ def existence(document):
     return lines
 
 
+def existence_camera(document):
+    """A camera in culled maps: the references and our methods in short, all rows folded; signals that mapping is needed."""
+    rows = [row for row in document["rows"] if row["part"] == "culling"]
+    change = lambda row: "occluders alone" if row["occluders_alone"] else number(row["changed_pct"], 0)
+    camera = lambda row: (row["world"], change(row), row["method"], row["frames"],
+                          f"{number(row['success_pct'], 1)} ({number(row['success_low_pct'], 1)}-{number(row['success_high_pct'], 1)})",
+                          f"{row['gained_frames']} / {row['given_up_frames']}", row["wrong_accepted"],
+                          f"{number(row['samples_mean'], 1)} +- {number(row['samples_half95'], 1)}", number(row["error_p50_cm"]),
+                          f"{number(row['ate_cm'])} +- {number(row['ate_half95_cm'])}", number(row["lost_pct"], 1),
+                          number(row["map_points"], 0))
+    head = ("world", "changed %", "method", "frames", "relocalised % (95 %)", "gained / given up", "wrong accepted", "RANSAC samples",
+            "pose cm", "ATE cm", "lost %", "points left")
+    short = [row for row in rows if row["method"] in ("no removal", "icosahedral", "ideal")]
+    lines = [*table(head, [camera(row) for row in short]), "", *folded("all methods", table(head, [camera(row) for row in rows]))]
+    points = lambda row: (row["world"], change(row), row["method"], row["scored_points"], number(row["gone_of_scored_pct"], 1),
+                          number(row["gone_removed_pct"], 1), number(row["wrongly_removed_pct"]), number(row["auc"], 4),
+                          number(row["brier"], 4), row["hidden_points"], number(row["hidden_removed_pct"], 1), row["all_points"],
+                          number(row["all_gone_removed_pct"], 1), number(row["all_wrongly_removed_pct"], 1),
+                          number(row["all_auc"], 4), number(row["all_brier"], 4))
+    point_head = ("world", "changed %", "method", "points scored", "gone %", "gone removed %", "wrongly removed %", "AUC", "Brier",
+                  "hidden", "hidden removed %", "all points", "gone removed %, all", "wrongly removed %, all", "AUC, all", "Brier, all")
+    twenty = [row for row in rows if row["changed_pct"] == 20]
+    lines += ["", *table(point_head, [points(row) for row in twenty]), "",
+              *folded("points at all shares", table(point_head, [points(row) for row in rows]))]
+    signals = [row for row in document["rows"] if row["part"] == "mapping-needed"]
+    return lines + ["", *table(
+        ("is mapping needed: world", "changed %", "unchanged drives with new occluders", "drives after the change", "signal", "AUC",
+         "changed / unchanged drives", "mean, changed", "mean, unchanged"),
+        [(row["world"], number(row["from_pct"], 0) + ("" if row["from_pct"] == row["to_pct"] else " and more"),
+          "yes" if row["with_occluded"] else "no", row["drives"], row["signal"],
+          f"{number(row['auc'], 3)} +- {number(row['auc_half95'], 3)}",
+          f"{row['changed_drives']:.0f} / {row['unchanged_drives']:.0f}", number(row["mean_changed"], 3),
+          number(row["mean_unchanged"], 3)) for row in signals])]
+
+
 def place_recognition(document):
     """Frames of stems found again: a line per protocol, drive and map; then what no query has a match for."""
     rows = [row for row in document["rows"] if row["queries"] > 0]

@@ -62,6 +62,7 @@ SECTIONS = (
      render.loop_detectors),
     ("existence", "What is still there", None, render.existence),
     ("existence-drives", "A forest that changes, from raw LIDAR", None, render.existence_drives),
+    ("existence-camera", "A camera that comes back to an old map", None, render.existence_camera),
     ("partition", "The map cut after a distance: town", f"{PARTITION}, Table 5.1", render.partition_all),
     ("partition-country", "The map cut after a distance: town to country", f"{PARTITION}, Table 5.2", render.partition_all),
     ("partition-loop", "The map cut after a distance, closed", f"{PARTITION}, Table 5.3", render.partition_all),
