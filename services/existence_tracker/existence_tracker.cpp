@@ -49,7 +49,7 @@ void ExistenceTracker::begin_with(std::span<const model::ExistenceState> states)
       const model::LandmarkExistence& one = state.landmarks[i];
       TrackedPoint tracked = decode(model, state.state_of(i), one.is_in_use);
       tracked.told_probability = one.probability;
-      points.insert_or_assign(one.id, std::move(tracked));
+      points.insert_or_assign(one.id, tracked);
     }
   }
 
@@ -201,7 +201,7 @@ void ExistenceTracker::forget(const model::MapUpdate& update) {
       erase(old_id);
       if (!moved.is_in_use) ++unused_;
       moved.state_is_due = true;
-      points_.emplace(new_id, std::move(moved));
+      points_.emplace(new_id, moved);
       continue;
     }
     if (before->second.point.log_odds() > after->second.point.log_odds()) {
@@ -329,7 +329,7 @@ void ExistenceTracker::load(const std::string& state) {
     tracked.state_is_due = (flags[i] & 4U) != 0;
     tracked.told_probability = told[i];
     loaded.unused_ += tracked.is_in_use ? 0 : 1;
-    loaded.points_.emplace(ids[i], std::move(tracked));
+    loaded.points_.emplace(ids[i], tracked);
   }
   *this = std::move(loaded);
 }

@@ -63,6 +63,7 @@ std::vector<model::Association> name_gone(const model::Keyframe& keyframe,
   }
 
   std::vector<model::Association> named;
+  named.reserve(best.size());
   for (const auto& [id, one] : best) named.push_back({one.second, id});
   std::ranges::sort(named, {}, &model::Association::keyframe_landmark);
   return named;
