@@ -175,6 +175,25 @@ TEST_CASE("A drive begins anywhere in a surveyed map, and leaves it as it is", "
   }
 }
 
+TEST_CASE("The map of an earlier drive is driven in without doubling its landmarks",
+          "[given_map]") {
+  for (std::uint64_t seed = 54; seed < 57; ++seed) {
+    CAPTURE(seed);
+    const test::TemporaryDirectory folder;
+    const sim::Drive drive = drive_through(seed, 200.0);
+    // Far from its origin all of a drive's landmarks are uncertain, mostly by the same.
+    std::vector<model::MapLandmark> landmarks = survey(drive, seed);
+    for (model::MapLandmark& one : landmarks)
+      one.covariance_m2 = 0.1 * 0.1 * Eigen::Matrix2d::Identity();
+    Stack stack(toml_of(file_of(landmarks, folder), false));
+    stack.drive(drive);
+
+    const auto [rms_m, nees] = errors(stack, drive);
+    CHECK(rms_m < 0.15);
+    CHECK(stack.asked().landmarks.size() <= landmarks.size() + landmarks.size() / 100);
+  }
+}
+
 TEST_CASE("In somebody else's map the mapper says that it is lost, within 2 s", "[given_map]") {
   for (const bool localisation_only : {true, false}) {
     for (std::uint64_t seed = 60; seed < 64; ++seed) {

@@ -31,12 +31,16 @@ std::vector<model::LandmarkId> landmarks_in_view(const model::Keyframe& keyframe
 
 /// Gates up to this size [m] tell landmarks apart, also those that the map does not have.
 constexpr double kNarrow_m = 0.3;
+/// The same of landmarks of a given map, before this drive has seen them: most of what their
+/// covariances say is common to all around, and the vehicle was placed among these.
+constexpr double kNarrowGiven_m = 1.0;
 
 /// Whether the gate of a landmark that was not observed lately is so wide that another one may be
 /// meant. All of a pass are off together then.
 bool is_loose(const StoredLandmark& landmark, double gate_m, int recent_keyframes,
               const GlobalMap& map) {
-  return gate_m > kNarrow_m && !is_recent(landmark, map, recent_keyframes);
+  const double narrow_m = landmark.nodes.empty() ? kNarrowGiven_m : kNarrow_m;
+  return gate_m > narrow_m && !is_recent(landmark, map, recent_keyframes);
 }
 
 /// How many of the keyframe's landmarks could be in the map: not more than the map has in the field
