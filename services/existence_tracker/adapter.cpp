@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <stdexcept>
 
 #include "services/existence_tracker/adapter_parameters.hpp"
 #include "services/existence_tracker/existence_tracker.hpp"

@@ -1,64 +1,27 @@
 #include "services/existence_tracker/tracked_point.hpp"
 
-#include <bit>
-#include <cstdint>
-#include <cstring>
 #include <stdexcept>
+
+#include "common/state/archive.hpp"
 
 namespace understory::existence_tracker {
 namespace {
 
 using Saved = existence::SavedPoint<existence::IcosahedralShell>;
 
-static_assert(std::endian::native == std::endian::little, "states are stored little endian");
-
-/// Numbers one after the other, without the gaps that a struct has between its members.
-class Packer {
- public:
-  template <class T>
-  void operator()(const T& value) {
-    bytes_.append(reinterpret_cast<const char*>(&value), sizeof(T));
-  }
-  std::string take() { return std::move(bytes_); }
-
- private:
-  std::string bytes_;
-};
-
-class Unpacker {
- public:
-  explicit Unpacker(std::string_view bytes) : bytes_(bytes) {}
-  template <class T>
-  void operator()(T& value) {
-    if (bytes_.size() < sizeof(T)) throw std::invalid_argument("state of an existence is cut off");
-    std::memcpy(&value, bytes_.data(), sizeof(T));
-    bytes_.remove_prefix(sizeof(T));
-  }
-  void end() const {
-    if (!bytes_.empty()) throw std::invalid_argument("state of an existence is too long");
-  }
-
- private:
-  std::string_view bytes_;
-};
-
-template <class Pack, class S>
-void go_through(Pack& pack, S& saved) {
-  pack(saved.version);
-  pack(saved.shell_kind);
-  pack(saved.odds);
-  pack(saved.pass);
-  pack(saved.numbers);
-  pack(saved.shell);
+/// Throws where bytes are left over.
+void end(const state::Reader& read) {
+  if (!read.is_at_end()) throw std::invalid_argument("state of an existence is too long");
 }
 
-template <class Pack, class S>
-void go_through_model(Pack& pack, S& saved) {
-  pack(saved.version);
-  pack(saved.pass);
-  pack(saved.recall);
-  pack(saved.births);
-  pack(saved.decay);
+template <class Archive, class S>
+void archive_point(Archive& a, S& saved) {
+  a(saved.version, saved.shell_kind, saved.odds, saved.pass, saved.numbers, saved.shell);
+}
+
+template <class Archive, class S>
+void archive_model(Archive& a, S& saved) {
+  a(saved.version, saved.pass, saved.recall, saved.births, saved.decay);
 }
 
 }  // namespace
@@ -70,36 +33,36 @@ std::size_t point_bytes() {
 }
 
 std::string encode(const Point& point, model::Utime looked_utime) {
-  Packer pack;
+  state::Writer write;
   const Saved saved = point.save();
-  go_through(pack, saved);
-  pack(looked_utime);
-  return pack.take();
+  archive_point(write, saved);
+  write(looked_utime);
+  return write.take();
 }
 
 TrackedPoint decode(const existence::ExistenceModel& model, std::string_view bytes,
                     bool is_in_use) {
-  Unpacker unpack(bytes);
+  state::Reader read(bytes);
   Saved saved;
-  go_through(unpack, saved);
+  archive_point(read, saved);
   model::Utime looked_utime = 0;
-  unpack(looked_utime);
-  unpack.end();
+  read(looked_utime);
+  end(read);
   return {Point::load(model, saved), looked_utime, is_in_use, -1.0, true, false};
 }
 
 std::string encode(const existence::ExistenceModel& model) {
-  Packer pack;
+  state::Writer write;
   const existence::SavedModel saved = model.save();
-  go_through_model(pack, saved);
-  return pack.take();
+  archive_model(write, saved);
+  return write.take();
 }
 
 void decode(std::string_view bytes, existence::ExistenceModel& model) {
-  Unpacker unpack(bytes);
+  state::Reader read(bytes);
   existence::SavedModel saved;
-  go_through_model(unpack, saved);
-  unpack.end();
+  archive_model(read, saved);
+  end(read);
   model.load(saved);
 }
 
