@@ -1,0 +1,106 @@
+#include "services/viewer/adapter.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "common/bus/device.hpp"
+#include "services/viewer/adapter_parameters.hpp"
+#include "services/viewer/page_bundle.hpp"
+#include "services/viewer/page_host.hpp"
+#include "services/viewer/process_watch.hpp"
+#include "services/viewer/scene.hpp"
+#include "services/viewer/scene_channels.hpp"
+
+namespace understory::viewer {
+namespace {
+
+constexpr int kWait_ms = 20;
+constexpr std::int64_t kWatchEvery_us = 200'000;
+
+class ViewerAdapter : public bus::Adapter, public bus::Device {
+ public:
+  void describe(bus::ParameterTable& table) override { viewer::describe(parameters_, table); }
+
+  void bind(bus::Node& node) override {
+    node_ = &node;
+    for_each_channel([this]<class T>(const char* channel, const ChannelTraits& traits, auto take) {
+      if (traits.is_bulk && !parameters_.hears_sweeps) return;
+      node_->subscribe<T>(channel,
+                          [this, take](const T& value) { take(scene_, value, clock_.wall_us()); },
+                          {.queue_size = traits.is_bulk ? std::size_t{400} : std::size_t{100},
+                           .sequenced = !traits.is_from_many,
+                           .timed = traits.is_on_message_time,
+                           .journaled = false});
+    });
+  }
+
+  void open() override {
+    PageRequests requests;
+    host_.emplace(parameters_.page, std::vector<const Scene*>{&scene_}, std::move(requests),
+                  nlohmann::ordered_json{{"version", bus::program_version()},
+                                         {"mode", "live"},
+                                         {"runs", {{{"name", "live"}, {"colour_index", 0}}}}});
+    node_->log(bus::Node::Level::kInfo, "page",
+               host_->url() + (has_page() ? "" : " (the page was not built: no npm)"));
+  }
+
+  std::vector<int> file_descriptors() const override { return {host_->file_descriptor()}; }
+  int wait_ms() const override { return kWait_ms; }
+
+  void attend(std::int64_t monotonic_us) override {
+    if (monotonic_us - attended_us_ < kAttendEvery_us) return;
+    attended_us_ = monotonic_us;
+    const std::int64_t wall_us = clock_.wall_us();
+    if (parameters_.watches_processes && monotonic_us - watched_us_ >= kWatchEvery_us) {
+      watched_us_ = monotonic_us;
+      watch(wall_us);
+    }
+    scene_.look(wall_us);
+    host_->attend(monotonic_us);
+    report_refused();
+  }
+
+ private:
+  static constexpr std::int64_t kAttendEvery_us = 5'000;
+
+  void watch(std::int64_t wall_us) {
+    // The board is changed meanwhile: names first.
+    std::vector<std::pair<std::string, std::int64_t>> processes;
+    for (const auto& [name, entry] : scene_.processes().entries())
+      processes.emplace_back(name, entry.health.pid);
+    for (const auto& [name, pid] : processes)
+      scene_.processes().take(name, look_at_process(pid), wall_us);
+  }
+
+  void report_refused() {
+    const std::uint64_t refused = host_->counts().refused();
+    if (refused == refused_) return;
+    node_->log(
+        bus::Node::Level::kWarning, "client_refused",
+        fmt::format(
+            "{} connections or messages of web clients were refused so far (see {}health.json)",
+            refused, host_->url()));
+    refused_ = refused;
+  }
+
+  ViewerParameters parameters_;
+  bus::Clock clock_ = bus::system_clock();
+  bus::Node* node_ = nullptr;
+  Scene scene_;
+  std::optional<PageHost> host_;
+  std::int64_t attended_us_ = 0;
+  std::int64_t watched_us_ = 0;
+  std::uint64_t refused_ = 0;
+};
+
+}  // namespace
+
+bus::Service viewer_service() {
+  return {"viewer", "all channels that people look at -> a web page",
+          [] { return std::make_unique<ViewerAdapter>(); }};
+}
+
+}  // namespace understory::viewer

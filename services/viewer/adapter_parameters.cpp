@@ -1,0 +1,26 @@
+#include "services/viewer/adapter_parameters.hpp"
+
+namespace understory::viewer {
+
+void describe(ViewerParameters& parameters, bus::ParameterTable& table) {
+  PageParameters& page = parameters.page;
+  table.add("page.address", page.address, {}, "Address to listen on, in numbers.");
+  table.add("page.port", page.port, {0, 65535}, "", "Port; 0: any free one, which LOG names.");
+  table.add("page.beyond_loopback", page.beyond_loopback,
+            "Allow an address that other computers reach. There is no password and no encryption.");
+  table.add("page.host_names", page.host_names, {},
+            "Comma-separated names of this computer by which browsers call it, beside localhost "
+            "and numbers.");
+  table.add("page.rate_hz", page.rate_hz, {0.1, 100.0}, "Hz", "Pictures for one page, at most.");
+  table.add("page.most_clients", page.most_clients, {1, 1000}, "", "Connections at a time.");
+  table.add("page.foxglove_origins", page.foxglove_origins, {},
+            "Comma-separated origins of the pages of other viewers that may connect.");
+  table.add("input.sweeps", parameters.hears_sweeps,
+            "Listen to LIDAR_SWEEP too, to draw its points: 20 MB/s of a large laser.");
+  table.add(
+      "input.watch_processes", parameters.watches_processes,
+      "Ask this computer's kernel whether each process still runs: a dead one is red at once. "
+      "False where processes run on other computers.");
+}
+
+}  // namespace understory::viewer

@@ -1,0 +1,123 @@
+#include "services/viewer/page_host.hpp"
+
+#include <sstream>
+
+#include "services/viewer/page_bundle.hpp"
+
+namespace understory::viewer {
+namespace {
+
+constexpr const char* kPagePath = "/live";
+
+std::vector<std::string> parts_of(const std::string& list) {
+  std::vector<std::string> parts;
+  std::istringstream stream(list);
+  for (std::string part; std::getline(stream, part, ',');) {
+    const auto first = part.find_first_not_of(' ');
+    if (first == std::string::npos) continue;
+    parts.push_back(part.substr(first, part.find_last_not_of(' ') - first + 1));
+  }
+  return parts;
+}
+
+web::ServerOptions server_options(const PageParameters& parameters) {
+  web::ServerOptions options;
+  options.address = parameters.address;
+  options.port = static_cast<std::uint16_t>(parameters.port);
+  options.beyond_loopback = parameters.beyond_loopback;
+  options.host_names = parts_of(parameters.host_names);
+  options.most_connections = static_cast<std::size_t>(parameters.most_clients);
+  options.sockets = {{.path = kPagePath, .subprotocols = {}, .allowed_origins = {}}};
+  return options;
+}
+
+nlohmann::ordered_json counts_json(const web::ServerCounts& counts) {
+  return {{"connections", counts.connections},
+          {"requests", counts.requests},
+          {"sockets", counts.sockets},
+          {"refused_host", counts.refused_host},
+          {"refused_origin", counts.refused_origin},
+          {"malformed", counts.malformed},
+          {"too_large", counts.too_large},
+          {"too_slow", counts.too_slow},
+          {"too_many", counts.too_many},
+          {"overrun", counts.overrun}};
+}
+
+}  // namespace
+
+PageHost::PageHost(const PageParameters& parameters, std::vector<const Scene*> runs,
+                   PageRequests requests, nlohmann::ordered_json hello)
+    : parameters_(parameters),
+      hello_(std::move(hello)),
+      pages_(std::move(runs), std::move(requests),
+             static_cast<std::int64_t>(1e6 / parameters.rate_hz)),
+      server_(server_options(parameters)) {
+  hello_["kind"] = "hello";
+  for (const PageFile& file : page_files())
+    server_.set_document(file.path, {file.content_type, std::string(file.content)});
+}
+
+std::string PageHost::url() const {
+  return "http://" + parameters_.address + ":" + std::to_string(server_.port()) + "/";
+}
+
+void PageHost::attend(std::int64_t now_us, const nlohmann::ordered_json& extra) {
+  take_events();
+  if (pages_.size() == 0) return;
+  nlohmann::ordered_json header = extra;
+  header["page"] = figures();
+  for (PageMessage& message : pages_.frames(now_us, header))
+    server_.send_binary(message.client, std::move(message.bytes));
+}
+
+nlohmann::ordered_json PageHost::figures() const {
+  const bus::LatencyHistogram& to_screen = pages_.to_screen();
+  nlohmann::ordered_json figures = {{"clients", pages_.size()},
+                                    {"skipped_by_all", pages_.skipped()},
+                                    {"refused", server_.counts().refused()}};
+  if (to_screen.count() > 0) {
+    figures["page_ms"] = 1e-3 * static_cast<double>(to_screen.quantile(0.5));
+    figures["page_p99_ms"] = 1e-3 * static_cast<double>(to_screen.quantile(0.99));
+  }
+  return figures;
+}
+
+void PageHost::take_events() {
+  const std::vector<web::Event> events = server_.take_events();
+  for (const web::Event& event : events) {
+    switch (event.kind) {
+      case web::Event::Kind::kOpened: {
+        PageMessage hello = pages_.opened(event.client, hello_);
+        server_.send_binary(hello.client, std::move(hello.bytes));
+        break;
+      }
+      case web::Event::Kind::kText: {
+        std::optional<std::string> refusal;
+        for (PageMessage& answer : pages_.take(event.client, event.data, refusal))
+          server_.send_binary(answer.client, std::move(answer.bytes));
+        if (refusal) server_.close(event.client, *refusal);
+        break;
+      }
+      case web::Event::Kind::kBinary:
+        server_.close(event.client, "not a message of the protocol");
+        break;
+      case web::Event::Kind::kClosed:
+        pages_.closed(event.client);
+        break;
+      case web::Event::Kind::kSent:
+        break;
+    }
+  }
+  if (!events.empty() || !has_told_counts_) tell_counts();
+}
+
+void PageHost::tell_counts() {
+  nlohmann::ordered_json body = counts_json(server_.counts());
+  body["pages"] = pages_.size();
+  body["skipped"] = pages_.skipped();
+  server_.set_document("/health.json", {"application/json", body.dump(2) + "\n"});
+  has_told_counts_ = true;
+}
+
+}  // namespace understory::viewer

@@ -1,0 +1,409 @@
+#include "services/viewer/scene.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace understory::viewer {
+namespace {
+
+constexpr std::size_t kMostLogLines = 500;
+constexpr std::size_t kMostClosures = 20'000;
+constexpr std::size_t kMostScanPoints = 20'000;
+constexpr std::int64_t kSilentPose_us = 1'000'000;
+constexpr std::int64_t kAgePeriod_us = 10'000'000;
+constexpr double kUnsure_m = 1.0;  ///< A standard deviation above it is said to be unsure.
+constexpr double kTruthEvery_m = 0.2;
+constexpr double kRedraw_m = 0.05;
+
+double largest_sigma_m(const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(
+      Eigen::Matrix2d(covariance.topLeftCorner<2, 2>()), Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, solver.eigenvalues()(1)));
+}
+
+bool has_place(const model::SlamPose& pose) { return pose.is_localised() || pose.is_coasting; }
+
+const char* result_text(model::LoopResult::Status status) {
+  switch (status) {
+    case model::LoopResult::Status::kAccepted:
+      return "accepted";
+    case model::LoopResult::Status::kWaiting:
+      return "waiting";
+    case model::LoopResult::Status::kRefused:
+      return "refused";
+    case model::LoopResult::Status::kRevoked:
+      return "revoked";
+  }
+  return "sent";
+}
+
+}  // namespace
+
+Scene::Scene() { changed(verdict_) = {}; }
+
+void Scene::note_time(model::Utime utime, std::int64_t wall_us) {
+  utime_ = std::max(utime_, utime);
+  newest_wall_us_ = std::max(newest_wall_us_, wall_us);
+}
+
+void Scene::reset() {
+  start_map(0);
+  map_version_ = 0;
+  changed(pose_).reset();
+  changed(scan_) = {};
+  changed(numbers_) = {};
+  closures_.clear();
+  closures_change_ = ++change_;
+  processes_.clear();
+  log_.clear();
+  world_truth_.clear();
+  utime_ = -1;
+  newest_wall_us_ = pose_wall_us_ = 0;
+  pose_times_us_.clear();
+  least_age_us_ = {};
+  age_period_us_ = 0;
+  set_verdict(Verdict::State::kWaiting, "no pose yet", 0);
+}
+
+/// Another map has another frame: nothing of the one before means anything in it.
+void Scene::start_map(std::uint32_t map_id) {
+  map_id_ = map_id;
+  landmarks_.clear();
+  driven_.clear();
+  keyframes_.clear();
+  truth_.clear();
+  submaps_.clear();
+  handed_over_keyframes_.clear();
+  submaps_change_ = ++change_;
+  closures_.clear();
+  closures_change_ = ++change_;
+  changed(matches_) = {};
+  changed(true_pose_).reset();
+  alignment_.clear();
+  reset_change_ = ++change_;
+}
+
+void Scene::take(const model::SlamPose& pose, std::int64_t wall_us) {
+  note_time(pose.utime, wall_us);
+  if (has_place(pose) && pose.map_id != map_id_) {
+    if (map_id_ != 0) start_map(pose.map_id);
+    map_id_ = pose.map_id;
+  }
+  changed(pose_) = pose;
+  pose_wall_us_ = wall_us;
+
+  if (has_place(pose)) {
+    const geometry::SE2 map_T_vehicle = pose.map_T_vehicle();
+    driven_.append({pose.utime, static_cast<float>(map_T_vehicle.x()),
+                    static_cast<float>(map_T_vehicle.y()),
+                    static_cast<float>(map_T_vehicle.theta()),
+                    static_cast<float>(largest_sigma_m(pose.covariance)),
+                    static_cast<std::uint8_t>(pose.is_coasting ? 6
+                                              : pose.status    ? static_cast<int>(*pose.status)
+                                                               : 5)});
+    compare_with_truth(pose);
+  }
+  judge(pose);
+
+  // How often poses come, and how late.
+  SceneNumbers& numbers = changed(numbers_);
+  pose_times_us_.push_back(wall_us);
+  while (pose_times_us_.size() > 2 && wall_us - pose_times_us_.front() > 3'000'000)
+    pose_times_us_.pop_front();
+  const double span_s = 1e-6 * static_cast<double>(wall_us - pose_times_us_.front());
+  if (span_s > 0.0) numbers.rate_hz = static_cast<double>(pose_times_us_.size() - 1) / span_s;
+  std::optional<std::int64_t> least;
+  for (const auto& age : least_age_us_) {
+    if (age && (!least || *age < *least)) least = age;
+  }
+  if (least) numbers.latency_ms = 1e-3 * static_cast<double>(wall_us - pose.utime - *least);
+}
+
+void Scene::take_stamp(model::Utime utime, std::int64_t wall_us) {
+  note_time(utime, wall_us);
+  if (wall_us - age_period_us_ > kAgePeriod_us) {
+    least_age_us_ = {std::nullopt, least_age_us_[0]};
+    age_period_us_ = wall_us;
+  }
+  const std::int64_t age = wall_us - utime;
+  if (!least_age_us_[0] || age < *least_age_us_[0]) least_age_us_[0] = age;
+}
+
+void Scene::set_verdict(Verdict::State state, std::string text, model::Utime utime) {
+  if (verdict_.value.state == state && verdict_.value.text == text) return;
+  Verdict& verdict = changed(verdict_);
+  if (verdict.state != state) verdict.since_utime = utime;
+  verdict.state = state;
+  verdict.text = std::move(text);
+}
+
+void Scene::judge(const model::SlamPose& pose) {
+  const double sigma_m = largest_sigma_m(pose.covariance);
+  using State = Verdict::State;
+  if (pose.is_lost) {
+    set_verdict(State::kLost, "lost: no pose is certain, and odometry does not reach here",
+                pose.utime);
+  } else if (!has_place(pose)) {
+    set_verdict(State::kUnsure, "no certain pose for this keyframe", pose.utime);
+  } else if (pose.is_coasting) {
+    set_verdict(State::kUnsure,
+                fmt::format("coasting by odometry alone, +-{:.2f} m", 2.0 * sigma_m), pose.utime);
+  } else if (pose.is_provisional) {
+    set_verdict(State::kUnsure, "few keyframes agree with the map yet", pose.utime);
+  } else if (sigma_m > kUnsure_m) {
+    set_verdict(State::kUnsure, fmt::format("localised, but only to +-{:.1f} m", 2.0 * sigma_m),
+                pose.utime);
+  } else {
+    set_verdict(State::kOk, fmt::format("localised, +-{:.2f} m", 2.0 * sigma_m), pose.utime);
+  }
+}
+
+void Scene::look(std::int64_t wall_us) {
+  processes_.look(wall_us);
+  if (pose_wall_us_ == 0 || wall_us - pose_wall_us_ <= kSilentPose_us) return;
+  set_verdict(Verdict::State::kSilent, "no pose comes any more", utime_);
+  if (numbers_.value.rate_hz) changed(numbers_).rate_hz.reset();
+}
+
+void Scene::take(const model::MapUpdate& update) {
+  utime_ = std::max(utime_, update.utime);
+  const bool starts = update.status == model::MapUpdateStatus::kFirstMap;
+  if (starts && map_id_ != 0 && update.map_id != map_id_) start_map(update.map_id);
+  if (starts || map_id_ == 0) map_id_ = update.map_id;
+  changed(matches_).update = update;
+
+  if (starts || update.status == model::MapUpdateStatus::kUpdated) {
+    const model::KeyframePose keyframe{update.keyframe_sequence, update.utime, update.map_T_vehicle,
+                                       update.covariance};
+    keyframes_.take({&keyframe, 1});
+  }
+  if (update.degrees_of_freedom > 0) {
+    SceneNumbers& numbers = changed(numbers_);
+    numbers.nis = update.chi2;
+    numbers.nis_dof = update.degrees_of_freedom;
+  }
+}
+
+void Scene::take(const model::WholeMap& map) {
+  utime_ = std::max(utime_, map.utime);
+  if (!map.complete) return;
+  map_version_ = map.version;
+  // What it does not list, and was not handed over, is gone.
+  std::vector<model::LandmarkId> gone;
+  for (const SceneLandmark& one : landmarks_.slots()) {
+    if ((one.flags & SceneLandmark::kThere) == 0 || submaps_.holds(one.id)) continue;
+    if (!std::ranges::binary_search(map.landmarks, one.id, {}, &model::MapLandmark::id))
+      gone.push_back(one.id);
+  }
+  for (const model::LandmarkId id : gone) landmarks_.remove(id);
+  for (const model::MapLandmark& landmark : map.landmarks) {
+    submaps_.comes_back(landmark.id);
+    landmarks_.set(landmark);
+  }
+  keyframes_.take(map.keyframes);
+}
+
+void Scene::take(const model::MapDelta& delta) {
+  utime_ = std::max(utime_, delta.utime);
+  if (delta.base_version == 0 && map_version_ != 0) start_map(map_id_);
+  if (delta.base_version != 0 && delta.version <= map_version_) return;
+  map_version_ = delta.version;
+
+  for (const auto* list : {&delta.added, &delta.moved}) {
+    for (const model::MapLandmark& landmark : *list) {
+      submaps_.comes_back(landmark.id);
+      landmarks_.set(landmark);
+    }
+  }
+  for (const model::LandmarkId id : delta.removed) {
+    submaps_.comes_back(id);
+    landmarks_.remove(id);
+  }
+  for (const auto& [old_id, new_id] : delta.merged) {
+    submaps_.comes_back(old_id);
+    landmarks_.remove(old_id);
+  }
+}
+
+void Scene::take(const model::Existence& existence) {
+  utime_ = std::max(utime_, existence.utime);
+  for (const model::LandmarkExistence& one : existence.landmarks) landmarks_.set_existence(one);
+  SceneNumbers& numbers = changed(numbers_);
+  numbers.missing_share = existence.missing_share;
+  numbers.new_share = existence.new_share;
+  numbers.is_mapping_needed = existence.is_mapping_needed;
+}
+
+void Scene::take(const model::Submap& submap) {
+  for (const model::MapLandmark& landmark : submaps_.take(submap)) landmarks_.set(landmark);
+  for (const model::SubmapId id : submap.replaced) handed_over_keyframes_.erase(id);
+  handed_over_keyframes_[submap.id] = submap.keyframes;
+  submaps_change_ = ++change_;
+}
+
+void Scene::take(const model::MapCorrection& correction) {
+  const auto moved = submaps_.take(correction);
+  if (moved.empty()) return;
+  for (const model::MapLandmark& landmark : moved) landmarks_.set(landmark);
+  move_keyframes(correction);
+  submaps_change_ = ++change_;
+}
+
+void Scene::move_keyframes(const model::MapCorrection& correction) {
+  std::vector<model::KeyframePose> moved;
+  for (const model::SubmapPose& pose : correction.submaps) {
+    const auto found = handed_over_keyframes_.find(pose.id);
+    if (found == handed_over_keyframes_.end()) continue;
+    for (model::KeyframePose keyframe : found->second) {
+      keyframe.map_T_vehicle = pose.map_T_submap * keyframe.map_T_vehicle;
+      moved.push_back(keyframe);
+    }
+  }
+  keyframes_.take(moved);
+}
+
+void Scene::take(const model::LoopClosure& closure) {
+  if (!closures_.contains(closure.id) && closures_.size() >= kMostClosures)
+    closures_.erase(closures_.begin());
+  SceneClosure& one = closures_[closure.id];
+  if (closure.is_revoked) {
+    one.closure.id = closure.id;
+    one.status = "revoked";
+  } else {
+    one.closure = closure;
+  }
+  closures_change_ = ++change_;
+}
+
+void Scene::take(const model::LoopResult& result) {
+  const auto found = closures_.find(result.closure_id);
+  if (found == closures_.end()) return;
+  found->second.status = result_text(result.status);
+  found->second.reason = result.reason;
+  closures_change_ = ++change_;
+}
+
+void Scene::take(const model::LandmarkScan& scan, std::int64_t wall_us) {
+  note_time(scan.utime, wall_us);
+  SceneScan& now = changed(scan_);
+  now.utime = scan.utime;
+  now.detections = scan.detections;
+}
+
+void Scene::take(const model::PlanarScan& scan, const geometry::SE2& vehicle_T_sensor) {
+  SceneScan& now = changed(scan_);
+  now.utime = scan.utime;
+  now.points_m.clear();
+  for (std::size_t beam = 0; beam < scan.ranges_m.size(); ++beam) {
+    if (!scan.is_return(beam)) continue;
+    const double range_m = scan.ranges_m[beam];
+    const Eigen::Vector2d point =
+        vehicle_T_sensor * Eigen::Vector2d(range_m * std::cos(scan.bearing(beam)),
+                                           range_m * std::sin(scan.bearing(beam)));
+    now.points_m.push_back({static_cast<float>(point.x()), static_cast<float>(point.y()), 0.0F});
+  }
+}
+
+void Scene::take(const model::PointSweep& part) {
+  SceneScan& now = changed(scan_);
+  if (part.revolution != revolution_) now.points_m.clear();
+  revolution_ = part.revolution;
+  now.utime = part.utime;
+  // Of many points every n-th: a page shows the shape.
+  const std::size_t step =
+      1 + part.points.size() * std::max<std::size_t>(1, part.parts) / kMostScanPoints;
+  for (std::size_t i = 0; i < part.points.size(); i += step)
+    now.points_m.push_back({part.points[i].x_m, part.points[i].y_m, part.points[i].z_m});
+}
+
+void Scene::take(const log_t& line) {
+  if (log_.size() >= kMostLogLines) log_.pop_front();
+  log_.push_back({line, ++change_});
+}
+
+void Scene::take_stored(std::span<const model::MapLandmark> landmarks,
+                        std::span<const model::LandmarkExistence> existence) {
+  for (const model::MapLandmark& landmark : landmarks) landmarks_.set(landmark, true);
+  for (const model::LandmarkExistence& one : existence) landmarks_.set_existence(one);
+}
+
+std::optional<Eigen::Vector2d> Scene::place_of(const model::LoopEnd& end) const {
+  if (end.submap != 0) {
+    const auto found = submaps_.places().find(end.submap);
+    if (found == submaps_.places().end()) return std::nullopt;
+    return found->second.map_T_submap.translation();
+  }
+  const auto pose = keyframes_.find(end.keyframe);
+  if (!pose) return std::nullopt;
+  return pose->translation();
+}
+
+void Scene::take_truth(model::Utime utime, const geometry::SE2& world_T_vehicle) {
+  // The newest one is kept whole, since poses are compared with it; of the others one in so much.
+  const std::size_t size = world_truth_.size();
+  if (size > 1 &&
+      (world_truth_[size - 2].second.translation() - world_T_vehicle.translation()).norm() <
+          kTruthEvery_m) {
+    world_truth_.back() = {utime, world_T_vehicle};
+    return;
+  }
+  if (size >= Track::kMostPoints)
+    world_truth_.erase(world_truth_.begin(), world_truth_.begin() + Track::kMostPoints / 2);
+  world_truth_.emplace_back(utime, world_T_vehicle);
+}
+
+/// The true pose at a stamp: the newest ones are close enough for it to be interpolated.
+void Scene::compare_with_truth(const model::SlamPose& pose) {
+  if (world_truth_.size() < 2) return;
+  const auto after = std::ranges::lower_bound(world_truth_, pose.utime, {},
+                                              &std::pair<model::Utime, geometry::SE2>::first);
+  if (after == world_truth_.end() || after == world_truth_.begin()) return;
+  const auto before = std::prev(after);
+  const double part = static_cast<double>(pose.utime - before->first) /
+                      static_cast<double>(after->first - before->first);
+  const geometry::SE2 world_T_vehicle =
+      before->second * geometry::SE2::Exp(part * (before->second.inverse() * after->second).Log());
+  const geometry::SE2 map_T_vehicle = pose.map_T_vehicle();
+  if (pose.is_localised())
+    alignment_.add(map_T_vehicle.translation(), world_T_vehicle.translation());
+  const auto world_T_map = alignment_.world_T_map();
+  if (!world_T_map) return;
+
+  const geometry::SE2 map_T_truth = world_T_map->inverse() * world_T_vehicle;
+  changed(true_pose_) = map_T_truth;
+  const Eigen::Vector3d error = (map_T_vehicle.inverse() * map_T_truth).Log();
+  SceneNumbers& numbers = changed(numbers_);
+  numbers.error_m = error.head<2>().norm();
+  numbers.error_rad = std::abs(error.z());
+  const Eigen::LLT<Eigen::Matrix3d> factor(pose.covariance);
+  if (factor.info() == Eigen::Success) numbers.nees = error.dot(factor.solve(error));
+
+  // The path so far: drawn anew when the alignment has moved it by more than is seen.
+  const auto in_map = [&](const std::pair<model::Utime, geometry::SE2>& one) {
+    const geometry::SE2 at = world_T_map->inverse() * one.second;
+    return TrackPoint{one.first,
+                      static_cast<float>(at.x()),
+                      static_cast<float>(at.y()),
+                      static_cast<float>(at.theta()),
+                      0.0F,
+                      0};
+  };
+  const geometry::SE2 shift = drawn_world_T_map_.inverse() * *world_T_map;
+  const double reach_m = map_T_vehicle.translation().norm();
+  const bool is_off = shift.translation().norm() + std::abs(shift.theta()) * reach_m > kRedraw_m;
+  if (is_off || truth_.points().empty()) {
+    drawn_world_T_map_ = *world_T_map;
+    std::vector<TrackPoint> points;
+    points.reserve(world_truth_.size());
+    for (const auto& one : world_truth_) points.push_back(in_map(one));
+    truth_.replace_from(0, points);
+  } else if (world_truth_.back().first > truth_.points().back().utime) {
+    truth_.append(in_map(world_truth_.back()));
+  }
+}
+
+}  // namespace understory::viewer
