@@ -26,5 +26,7 @@ void add_replay_command(CLI::App& parent);
 void add_sim_command(CLI::App& parent);
 /// `understory status`: HEALTH of all processes.
 void add_status_command(CLI::App& parent);
+/// `understory view`: the viewer's page over logs and stored maps.
+void add_view_command(CLI::App& parent);
 
 }  // namespace understory::cli

@@ -26,6 +26,7 @@ int run(int argc, char** argv) {
   understory::cli::add_log_command(app);
   understory::cli::add_map_command(app);
   understory::cli::add_loop_command(app);
+  understory::cli::add_view_command(app);
 
   try {
     app.parse(argc, argv);

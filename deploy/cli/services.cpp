@@ -10,6 +10,7 @@
 #include "services/loop_closer/adapter.hpp"
 #include "services/submap_store/adapter.hpp"
 #include "services/velodyne_driver/adapter.hpp"
+#include "services/viewer/adapter.hpp"
 
 namespace understory::cli {
 
@@ -22,7 +23,8 @@ std::vector<bus::Service> all_services() {
           geoslam_mapper::geoslam_mapper_service(),
           submap_store::submap_store_service(),
           loop_closer::loop_closer_service(),
-          existence_tracker::existence_tracker_service()};
+          existence_tracker::existence_tracker_service(),
+          viewer::viewer_service()};
 }
 
 std::vector<bus::Service> sensor_services() { return {velodyne_driver::velodyne_driver_service()}; }

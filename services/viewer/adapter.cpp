@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -43,8 +44,10 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
                   nlohmann::ordered_json{{"version", bus::program_version()},
                                          {"mode", "live"},
                                          {"runs", {{{"name", "live"}, {"colour_index", 0}}}}});
-    node_->log(bus::Node::Level::kInfo, "page",
-               host_->url() + (has_page() ? "" : " (the page was not built: no npm)"));
+    const std::string page =
+        host_->url() + (has_page() ? "" : " (the page was not built: see the build's output)");
+    node_->log(bus::Node::Level::kInfo, "page", page);
+    std::cerr << "viewer: " << page << '\n';
   }
 
   std::vector<int> file_descriptors() const override { return {host_->file_descriptor()}; }

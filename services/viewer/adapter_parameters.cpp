@@ -5,7 +5,8 @@ namespace understory::viewer {
 void describe(ViewerParameters& parameters, bus::ParameterTable& table) {
   PageParameters& page = parameters.page;
   table.add("page.address", page.address, {}, "Address to listen on, in numbers.");
-  table.add("page.port", page.port, {0, 65535}, "", "Port; 0: any free one, which LOG names.");
+  table.add("page.port", page.port, {0, 65535}, "",
+            "Port; where it is taken one of the nine above it. 0: any free one. LOG names it.");
   table.add("page.beyond_loopback", page.beyond_loopback,
             "Allow an address that other computers reach. There is no password and no encryption.");
   table.add("page.host_names", page.host_names, {},

@@ -8,6 +8,7 @@ namespace understory::viewer {
 namespace {
 
 constexpr const char* kPagePath = "/live";
+constexpr int kPorts = 10;
 
 std::vector<std::string> parts_of(const std::string& list) {
   std::vector<std::string> parts;
@@ -44,6 +45,18 @@ nlohmann::ordered_json counts_json(const web::ServerCounts& counts) {
           {"overrun", counts.overrun}};
 }
 
+/// Where the port is taken, by another run on this computer, the next ones are tried.
+std::unique_ptr<web::Server> make_server(const PageParameters& parameters) {
+  web::ServerOptions options = server_options(parameters);
+  for (int tries_left = parameters.port == 0 ? 1 : kPorts;; --tries_left, ++options.port) {
+    try {
+      return std::make_unique<web::Server>(options);
+    } catch (const web::ServerError&) {
+      if (tries_left == 1 || options.port == 65535) throw;
+    }
+  }
+}
+
 }  // namespace
 
 PageHost::PageHost(const PageParameters& parameters, std::vector<const Scene*> runs,
@@ -52,14 +65,14 @@ PageHost::PageHost(const PageParameters& parameters, std::vector<const Scene*> r
       hello_(std::move(hello)),
       pages_(std::move(runs), std::move(requests),
              static_cast<std::int64_t>(1e6 / parameters.rate_hz)),
-      server_(server_options(parameters)) {
+      server_(make_server(parameters)) {
   hello_["kind"] = "hello";
   for (const PageFile& file : page_files())
-    server_.set_document(file.path, {file.content_type, std::string(file.content)});
+    server_->set_document(file.path, {file.content_type, std::string(file.content)});
 }
 
 std::string PageHost::url() const {
-  return "http://" + parameters_.address + ":" + std::to_string(server_.port()) + "/";
+  return "http://" + parameters_.address + ":" + std::to_string(server_->port()) + "/";
 }
 
 void PageHost::attend(std::int64_t now_us, const nlohmann::ordered_json& extra) {
@@ -68,14 +81,14 @@ void PageHost::attend(std::int64_t now_us, const nlohmann::ordered_json& extra) 
   nlohmann::ordered_json header = extra;
   header["page"] = figures();
   for (PageMessage& message : pages_.frames(now_us, header))
-    server_.send_binary(message.client, std::move(message.bytes));
+    server_->send_binary(message.client, std::move(message.bytes));
 }
 
 nlohmann::ordered_json PageHost::figures() const {
   const bus::LatencyHistogram& to_screen = pages_.to_screen();
   nlohmann::ordered_json figures = {{"clients", pages_.size()},
                                     {"skipped_by_all", pages_.skipped()},
-                                    {"refused", server_.counts().refused()}};
+                                    {"refused", server_->counts().refused()}};
   if (to_screen.count() > 0) {
     figures["page_ms"] = 1e-3 * static_cast<double>(to_screen.quantile(0.5));
     figures["page_p99_ms"] = 1e-3 * static_cast<double>(to_screen.quantile(0.99));
@@ -84,23 +97,23 @@ nlohmann::ordered_json PageHost::figures() const {
 }
 
 void PageHost::take_events() {
-  const std::vector<web::Event> events = server_.take_events();
+  const std::vector<web::Event> events = server_->take_events();
   for (const web::Event& event : events) {
     switch (event.kind) {
       case web::Event::Kind::kOpened: {
         PageMessage hello = pages_.opened(event.client, hello_);
-        server_.send_binary(hello.client, std::move(hello.bytes));
+        server_->send_binary(hello.client, std::move(hello.bytes));
         break;
       }
       case web::Event::Kind::kText: {
         std::optional<std::string> refusal;
         for (PageMessage& answer : pages_.take(event.client, event.data, refusal))
-          server_.send_binary(answer.client, std::move(answer.bytes));
-        if (refusal) server_.close(event.client, *refusal);
+          server_->send_binary(answer.client, std::move(answer.bytes));
+        if (refusal) server_->close(event.client, *refusal);
         break;
       }
       case web::Event::Kind::kBinary:
-        server_.close(event.client, "not a message of the protocol");
+        server_->close(event.client, "not a message of the protocol");
         break;
       case web::Event::Kind::kClosed:
         pages_.closed(event.client);
@@ -113,10 +126,10 @@ void PageHost::take_events() {
 }
 
 void PageHost::tell_counts() {
-  nlohmann::ordered_json body = counts_json(server_.counts());
+  nlohmann::ordered_json body = counts_json(server_->counts());
   body["pages"] = pages_.size();
   body["skipped"] = pages_.skipped();
-  server_.set_document("/health.json", {"application/json", body.dump(2) + "\n"});
+  server_->set_document("/health.json", {"application/json", body.dump(2) + "\n"});
   has_told_counts_ = true;
 }
 

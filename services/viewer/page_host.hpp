@@ -15,7 +15,7 @@ namespace understory::viewer {
 /// Where the page is served.
 struct PageParameters {
   std::string address = "127.0.0.1";  ///< To listen on.
-  int port = 7680;                    ///< 0: any free one.
+  int port = 7680;                    ///< Or one of the nine above it. 0: any free one.
   bool beyond_loopback = false;       ///< Other computers may connect.
   std::string host_names;             ///< Comma-separated names of this computer.
   std::string foxglove_origins = "https://app.foxglove.dev";  ///< Comma-separated.
@@ -31,13 +31,13 @@ class PageHost {
            nlohmann::ordered_json hello);
 
   /// Readable when there is something to take in.
-  int file_descriptor() const { return server_.file_descriptor(); }
+  int file_descriptor() const { return server_->file_descriptor(); }
   /// Takes what pages said and sends what is due. `wall_us` by the clock of the scenes' messages.
   void attend(std::int64_t now_us, const nlohmann::ordered_json& extra = {});
   /// Where the page is.
   std::string url() const;
   /// Counts of the server.
-  web::ServerCounts counts() const { return server_.counts(); }
+  web::ServerCounts counts() const { return server_->counts(); }
   /// Pages that look, and what they miss.
   const PageClients& pages() const { return pages_; }
 
@@ -49,7 +49,7 @@ class PageHost {
   PageParameters parameters_;
   nlohmann::ordered_json hello_;
   PageClients pages_;
-  web::Server server_;
+  std::unique_ptr<web::Server> server_;
   bool has_told_counts_ = false;
 };
 

@@ -326,7 +326,9 @@ void Scene::take(const log_t& line) {
 }
 
 void Scene::take_stored(std::span<const model::MapLandmark> landmarks,
-                        std::span<const model::LandmarkExistence> existence) {
+                        std::span<const model::LandmarkExistence> existence,
+                        std::span<const model::KeyframePose> keyframes) {
+  keyframes_.take(keyframes);
   for (const model::MapLandmark& landmark : landmarks) landmarks_.set(landmark, true);
   for (const model::LandmarkExistence& one : existence) landmarks_.set_existence(one);
 }

@@ -103,7 +103,8 @@ class Scene {
   void take(const log_t& line);
   /// Landmarks of a stored map, without a mapper.
   void take_stored(std::span<const model::MapLandmark> landmarks,
-                   std::span<const model::LandmarkExistence> existence);
+                   std::span<const model::LandmarkExistence> existence,
+                   std::span<const model::KeyframePose> keyframes);
   /// Time passes: what is silent.
   void look(std::int64_t wall_us);
   /// As before the first message; readers are told.

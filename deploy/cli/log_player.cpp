@@ -1,0 +1,67 @@
+#include "deploy/cli/log_player.hpp"
+
+#include <chrono>
+
+#include "services/viewer/scene_channels.hpp"
+
+namespace understory::cli {
+namespace {
+
+constexpr int kEventsPerLook = 64;
+
+}  // namespace
+
+LogSpan span_of_log(const std::filesystem::path& log, const std::function<void(double)>& progress) {
+  io::LcmLogReader reader(log);
+  std::optional<LogSpan> span;
+  std::uint64_t events = 0;
+  while (const auto event = reader.next()) {
+    if (!span) span = {event->utime, event->utime};
+    span->from_us = std::min(span->from_us, event->utime);
+    span->to_us = std::max(span->to_us, event->utime);
+    if (++events % 1024 == 0 && progress)
+      progress(static_cast<double>(reader.position_bytes()) /
+               static_cast<double>(reader.size_bytes()));
+  }
+  reader.refuse_other_files();
+  if (!span) throw io::LogError(log.string() + ": no events");
+  return *span;
+}
+
+LogPlayer::LogPlayer(std::filesystem::path log, viewer::Scene& scene)
+    : path_(std::move(log)), scene_(scene) {
+  viewer::for_each_channel(
+      [this]<class T>(const char* channel, const viewer::ChannelTraits& /*traits*/, auto take) {
+        takes_[channel] = [this, take](std::span<const std::uint8_t> bytes, std::int64_t wall_us) {
+          const auto value = wire::decode_message<T>(bytes);
+          if (!value) return false;
+          take(scene_, *value, wall_us);
+          return true;
+        };
+      });
+  restart();
+}
+
+void LogPlayer::restart() {
+  scene_.reset();
+  reader_.emplace(path_);
+  next_ = reader_->next();
+  refused_ = 0;
+}
+
+bool LogPlayer::go_to(std::int64_t utime_us, std::int64_t most_us) {
+  if (utime_us < at_us_) restart();
+  at_us_ = utime_us;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::microseconds(most_us);
+  for (int events = 1; next_ && next_->utime <= utime_us; ++events) {
+    const auto take = takes_.find(next_->channel);
+    if (take != takes_.end() && !take->second(next_->data, next_->utime)) ++refused_;
+    next_ = reader_->next();
+    if (events % kEventsPerLook == 0 && std::chrono::steady_clock::now() > end) return false;
+  }
+  // In a log nobody is silent because the log ended: time stands where the scrubber stands.
+  scene_.look(utime_us);
+  return true;
+}
+
+}  // namespace understory::cli
