@@ -47,7 +47,7 @@ void serve(PageHost& host, Step step) {
   try {
     while (true) {
       terminal::throw_if_interrupted();
-      host.attend(monotonic_us(), step());
+      host.attend(monotonic_us(), step(), bus::system_clock().wall_us());
       ::poll(&file, 1, kTick_ms);
     }
   } catch (const terminal::Interrupted&) {

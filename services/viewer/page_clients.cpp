@@ -21,12 +21,14 @@ std::optional<std::uint64_t> unsigned_in(const PageJson& message, const char* ke
 }
 
 std::shared_ptr<const std::string> answer(const PageRequests& requests, const PageJson& question) {
-  nlohmann::ordered_json header = {{"kind", "story"}, {"request", question.value("request", 0)}};
+  nlohmann::ordered_json header = {{"kind", "story"},
+                                   {"request", unsigned_in(question, "request").value_or(0)}};
   try {
     if (!requests.story) throw std::runtime_error("no stories are kept here");
     header["story"] = requests.story(question);
     header["ok"] = true;
-  } catch (const std::runtime_error& error) {
+  } catch (const std::exception& error) {
+    // Also a question whose fields have other types.
     header["ok"] = false;
     header["error"] = error.what();
   }
@@ -101,7 +103,8 @@ std::optional<std::size_t> PageClients::run_with_news(const Client& client) cons
 }
 
 std::vector<PageMessage> PageClients::frames(std::int64_t now_us,
-                                             const nlohmann::ordered_json& extra) {
+                                             const nlohmann::ordered_json& extra,
+                                             std::optional<std::int64_t> wall_us) {
   std::vector<PageMessage> messages;
   for (auto& [id, client] : clients_) {
     if (now_us - client.last_us < period_us_ && now_us >= client.last_us) continue;
@@ -118,9 +121,10 @@ std::vector<PageMessage> PageClients::frames(std::int64_t now_us,
     request.run = *run;
     request.sequence = ++client.sequence;
     request.skipped = client.skipped;
+    request.wall_us = wall_us.value_or(runs_[*run]->newest_wall_us());
     request.overlays = client.overlays;
     messages.push_back({id, make_frame(*runs_[*run], request, extra, client.cursors[*run])});
-    client.on_the_way[request.sequence] = 1e-3 * static_cast<double>(runs_[*run]->newest_wall_us());
+    client.on_the_way[request.sequence] = 1e-3 * static_cast<double>(request.wall_us);
     client.next_run = *run + 1;
     // A map that is sent in pieces: the next one as soon as this one is acknowledged.
     if (run_with_news(client)) client.last_us = now_us - period_us_ / 2;

@@ -45,8 +45,10 @@ class PageClients {
   /// the client is to be closed.
   std::vector<PageMessage> take(web::ClientId client, const std::string& text,
                                 std::optional<std::string>& refusal);
-  /// The frames that are due. `extra` is added to the header of each.
-  std::vector<PageMessage> frames(std::int64_t now_us, const nlohmann::ordered_json& extra);
+  /// The frames that are due. `extra` is added to the header of each. `wall_us`: now, where the
+  /// runs are of logs; none: each run's newest message came when the run says.
+  std::vector<PageMessage> frames(std::int64_t now_us, const nlohmann::ordered_json& extra,
+                                  std::optional<std::int64_t> wall_us = std::nullopt);
 
   /// Pages that look.
   std::size_t size() const { return clients_.size(); }

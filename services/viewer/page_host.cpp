@@ -75,12 +75,13 @@ std::string PageHost::url() const {
   return "http://" + parameters_.address + ":" + std::to_string(server_->port()) + "/";
 }
 
-void PageHost::attend(std::int64_t now_us, const nlohmann::ordered_json& extra) {
+void PageHost::attend(std::int64_t now_us, const nlohmann::ordered_json& extra,
+                      std::optional<std::int64_t> wall_us) {
   take_events();
   if (pages_.size() == 0) return;
   nlohmann::ordered_json header = extra;
-  header["page"] = figures();
-  for (PageMessage& message : pages_.frames(now_us, header))
+  header["numbers"] = figures();
+  for (PageMessage& message : pages_.frames(now_us, header, wall_us))
     server_->send_binary(message.client, std::move(message.bytes));
 }
 

@@ -32,8 +32,9 @@ class PageHost {
 
   /// Readable when there is something to take in.
   int file_descriptor() const { return server_->file_descriptor(); }
-  /// Takes what pages said and sends what is due. `wall_us` by the clock of the scenes' messages.
-  void attend(std::int64_t now_us, const nlohmann::ordered_json& extra = {});
+  /// Takes what pages said and sends what is due; see PageClients::frames().
+  void attend(std::int64_t now_us, const nlohmann::ordered_json& extra = {},
+              std::optional<std::int64_t> wall_us = std::nullopt);
   /// Where the page is.
   std::string url() const;
   /// Counts of the server.

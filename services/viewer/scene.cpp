@@ -15,6 +15,7 @@ constexpr std::size_t kMostClosures = 20'000;
 constexpr std::size_t kMostScanPoints = 20'000;
 constexpr std::int64_t kSilentPose_us = 1'000'000;
 constexpr std::int64_t kAgePeriod_us = 10'000'000;
+constexpr double kSigmas = 3.0;    ///< Of what is told to people.
 constexpr double kUnsure_m = 1.0;  ///< A standard deviation above it is said to be unsure.
 constexpr double kTruthEvery_m = 0.2;
 constexpr double kRedraw_m = 0.05;
@@ -151,14 +152,17 @@ void Scene::judge(const model::SlamPose& pose) {
     set_verdict(State::kUnsure, "no certain pose for this keyframe", pose.utime);
   } else if (pose.is_coasting) {
     set_verdict(State::kUnsure,
-                fmt::format("coasting by odometry alone, +-{:.2f} m", 2.0 * sigma_m), pose.utime);
+                fmt::format("coasting by odometry alone, \u00b1{:.2f} m", kSigmas * sigma_m),
+                pose.utime);
   } else if (pose.is_provisional) {
     set_verdict(State::kUnsure, "few keyframes agree with the map yet", pose.utime);
   } else if (sigma_m > kUnsure_m) {
-    set_verdict(State::kUnsure, fmt::format("localised, but only to +-{:.1f} m", 2.0 * sigma_m),
+    set_verdict(State::kUnsure,
+                fmt::format("localised, but only to \u00b1{:.1f} m", kSigmas * sigma_m),
                 pose.utime);
   } else {
-    set_verdict(State::kOk, fmt::format("localised, +-{:.2f} m", 2.0 * sigma_m), pose.utime);
+    set_verdict(State::kOk, fmt::format("localised, \u00b1{:.2f} m", kSigmas * sigma_m),
+                pose.utime);
   }
 }
 

@@ -161,7 +161,7 @@ std::shared_ptr<const std::string> make_frame(const Scene& scene, const FrameReq
   nlohmann::ordered_json header = {{"kind", "frame"},
                                    {"run", request.run},
                                    {"seq", request.sequence},
-                                   {"wall_ms", 1e-3 * static_cast<double>(scene.newest_wall_us())},
+                                   {"wall_ms", 1e-3 * static_cast<double>(request.wall_us)},
                                    {"skipped", request.skipped},
                                    {"utime", scene.utime()}};
   if (cursor.change < scene.reset_change()) {
@@ -188,7 +188,13 @@ std::shared_ptr<const std::string> make_frame(const Scene& scene, const FrameReq
   }
   add_parts(scene, before, header);
   cursor.change = now;
-  header.update(extra);
+  for (const auto& [key, value] : extra.items()) {
+    if (key == "numbers" && header.contains(key)) {
+      header[key].update(value);
+    } else {
+      header[key] = value;
+    }
+  }
   return writer.message(std::move(header));
 }
 

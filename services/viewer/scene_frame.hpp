@@ -24,6 +24,7 @@ struct FrameRequest {
   std::size_t run = 0;
   std::uint64_t sequence = 0;
   std::uint64_t skipped = 0;            ///< Pictures that this page missed.
+  std::int64_t wall_us = 0;             ///< When the newest of it came.
   std::set<std::string> overlays;       ///< That the page asked for.
   std::size_t most_landmarks = 20'000;  ///< A frame has at most so many; the next one goes on.
   std::size_t most_points = 40'000;     ///< The same of paths.

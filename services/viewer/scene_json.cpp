@@ -211,7 +211,7 @@ void add_parts(const Scene& scene, Change since, nlohmann::ordered_json& header)
       list.push_back(process_json(name, entry, scene.processes().looked_us()));
     header["processes"] = std::move(list);
   }
-  if (scene.numbers().change > since) header["numbers"] = numbers_json(scene.numbers().value);
+  header["numbers"] = numbers_json(scene.numbers().value);
   if (!scene.log().empty() && scene.log().back().change > since)
     header["log"] = log_json(scene, since);
 }
