@@ -85,7 +85,7 @@ export class App {
   private picture(): void {
     this.isScheduled = false;
     this.meter.charge(() => {
-      this.map.draw();
+      if (this.map.draw()) this.redraw();
       this.tools.update();
       this.verdict.update();
     });
@@ -172,7 +172,7 @@ export class App {
       this.redraw();
     }).observe(canvas);
     this.theme.onChange(() => this.redraw());
-    setInterval(() => this.meter.charge(() => this.panels()), panelPause);
+    setInterval(() => this.meter.panelTurn(() => this.panels()), panelPause);
     addEventListener("keydown", (e) => {
       const isTyping = e.target instanceof HTMLInputElement && e.target.type !== "range" || e.target instanceof HTMLSelectElement;
       if (isTyping || e.ctrlKey || e.metaKey || e.altKey) return;

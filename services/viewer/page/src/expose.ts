@@ -39,6 +39,7 @@ function state(app: App) {
 function stats(app: App) {
   const [p50, p95] = app.meter.script.quantiles(0.5, 0.95), [m50, m99] = app.meter.pixel.quantiles(0.5, 0.99);
   return {
+    panelMs: { p95: app.meter.panels.quantiles(0.95)[0] },
     drawCalls: app.map.drawCalls, scriptMs: { p50, p95, max: app.meter.longest }, pixelMs: { p50: m50, p99: m99 },
     landmarks: app.store.runs.reduce((n, r) => n + r.landmarks.used, 0), pathPoints: app.store.runs.reduce((n, r) => n + r.path.length, 0),
     pictures: app.meter.pictures, heap: heapBytes(), bytes: app.connection.bytes, refused: app.connection.refused,

@@ -2,7 +2,8 @@
 import { Ring } from "./store/ring";
 
 export class Meter {
-  readonly script = new Ring(2048); // [ms] of the main thread per picture: messages, drawing, panels
+  readonly script = new Ring(2048); // [ms] of the main thread per picture: its messages and its drawing
+  readonly panels = new Ring(512); // [ms] of the main thread per update of the panels, five a second
   readonly pixel = new Ring(512); // [ms] from a message's arrival at the viewer to the screen
   longest = 0;
   pictures = 0;
@@ -16,6 +17,12 @@ export class Meter {
     return result;
   }
 
+  panelTurn(work: () => void): void {
+    const begin = performance.now();
+    work();
+    this.panels.push(performance.now() - begin);
+  }
+
   picture(): void {
     this.script.push(this.carried);
     this.longest = Math.max(this.longest, this.carried);
@@ -25,6 +32,7 @@ export class Meter {
 
   reset(): void {
     this.script.clear();
+    this.panels.clear();
     this.pixel.clear();
     this.longest = this.pictures = this.carried = 0;
   }

@@ -41,6 +41,7 @@ export function quad(): THREE.InstancedBufferGeometry {
 export function addMesh(scene: THREE.Scene, object: THREE.Object3D, order: number): void {
   object.frustumCulled = false;
   object.matrixAutoUpdate = false;
+  object.visible = false;
   object.renderOrder = order;
   scene.add(object);
 }

@@ -7,7 +7,8 @@ import { contains, type Camera, type Rect } from "./camera";
 import type { Ellipses } from "./ellipses";
 import { addMesh, material, uColour } from "./gl";
 
-const nearCapacity = 20000;
+const nearCapacity = 20000, ellipseCapacity = 6000;
+const perPicture = 96;
 
 const vertex = `
 in vec4 landmark;
@@ -57,6 +58,9 @@ export class LandmarkLayer {
   private area: Rect | null = null;
   private count = -1; // in `near`; -1: too many, all are drawn
   private chosenScale = 0;
+  private nextBlock = 0;
+  /** Not all of what changed is on the GPU yet: another picture is needed. */
+  isBehind = false;
   private palette!: Palette;
   private tint: Rgb | null = null;
 
@@ -87,7 +91,7 @@ export class LandmarkLayer {
     if (!isShown || landmarks.slots === 0) return;
     if (landmarks !== this.owner || landmarks.capacity * 4 !== this.attribute?.array.length) this.take(landmarks);
     const hasChanged = landmarks.version !== this.version;
-    if (hasChanged) this.upload(landmarks);
+    if (hasChanged || this.isBehind) this.upload(landmarks);
     // Zoomed in far enough, fewer are in view and more ellipses are large enough to be seen.
     const isNearer = camera.scale > 2 * this.chosenScale;
     if (hasChanged || isNearer || !this.area || !contains(this.area, camera.seen())) this.choose(landmarks, camera);
@@ -114,18 +118,23 @@ export class LandmarkLayer {
     this.owner = landmarks;
     this.version = -1;
     this.area = null;
+    // The new buffer is uploaded whole.
+    landmarks.dirty.fill(0);
   }
 
+  /** At most `perPicture` blocks: a change of the whole map comes over some pictures and holds up none. */
   private upload(landmarks: Landmarks): void {
     const blocks = Math.ceil(landmarks.slots / blockSize);
-    for (let b = 0; b < blocks; b++) {
-      if (!landmarks.dirty[b]) continue;
-      let end = b;
-      while (end < blocks && landmarks.dirty[end]) landmarks.dirty[end++] = 0;
-      this.attribute!.addUpdateRange(4 * b * blockSize, 4 * Math.min((end - b) * blockSize, landmarks.capacity - b * blockSize));
-      b = end;
+    let left = perPicture;
+    for (let k = 0; k < blocks && left > 0; k++, this.nextBlock++) {
+      if (this.nextBlock >= blocks) this.nextBlock = 0;
+      if (!landmarks.dirty[this.nextBlock]) continue;
+      landmarks.dirty[this.nextBlock] = 0;
+      left--;
+      this.attribute!.addUpdateRange(4 * this.nextBlock * blockSize, 4 * Math.min(blockSize, landmarks.capacity - this.nextBlock * blockSize));
     }
     this.attribute!.needsUpdate = true;
+    this.isBehind = left === 0;
     this.version = landmarks.version;
   }
 
@@ -141,14 +150,14 @@ export class LandmarkLayer {
     this.index.addUpdateRange(0, Math.max(1, this.count));
     this.index.needsUpdate = true;
     this.ellipses.begin();
-    for (let i = 0; i < this.count; i++) this.addEllipse(landmarks, slots[i], camera.scale);
+    for (let i = 0; i < this.count && this.ellipses.count < ellipseCapacity; i++) this.addEllipse(landmarks, slots[i], camera.scale);
     this.ellipses.end();
   }
 
   private addEllipse(l: Landmarks, s: number, scale: number): void {
     const xx = l.covariance[3 * s], xy = l.covariance[3 * s + 1], yy = l.covariance[3 * s + 2];
-    // Below a pixel at twice this scale it would not be seen before the next choice.
-    if (!(l.flags[s] & there) || !(Math.max(xx, yy) * scale * scale > 0.06)) return;
+    // Smaller than this it has faded out at twice the scale, too, when the next choice is made.
+    if (!(l.flags[s] & there) || !(Math.max(xx, yy) * scale * scale > 0.25)) return;
     const p = l.probability[s], q = this.palette;
     const c = this.tint ?? (Number.isNaN(p) ? q.unknown : p < 0.35 ? q.unlikely : p < 0.75 ? q.doubtful : q.likely);
     this.ellipses.ellipse(l.drawn[4 * s], l.drawn[4 * s + 1], xx, xy, yy, c, l.flags[s] & outOfUse ? 0.4 : 0.75);

@@ -37,7 +37,8 @@ export class MapView {
 
   constructor(readonly canvas: HTMLCanvasElement, private readonly store: Store, private readonly theme: Theme) {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: false, powerPreference: "high-performance" });
-    this.renderer.info.autoReset = true;
+    // The check waits for each program to be linked, one after the other, before anything is seen.
+    this.renderer.debug.checkShaderErrors = false;
     this.scene.matrixWorldAutoUpdate = false;
     theme.onChange(() => this.paint());
     this.paint();
@@ -71,7 +72,8 @@ export class MapView {
     this.paint();
   }
 
-  draw(): void {
+  /** Returns whether another picture is needed for what did not fit into this one. */
+  draw(): boolean {
     const runs = this.shownRuns(), c = this.camera, l = this.layers;
     this.aim();
     setView(c);
@@ -85,6 +87,7 @@ export class MapView {
     this.overlays.rebuild(runs, l, this.theme.palette, this.selection, this.ruler);
     this.renderer.render(this.scene, this.unused);
     this.drawCalls = this.renderer.info.render.calls;
+    return this.landmarks.some((l) => l.isBehind);
   }
 
   shownRuns(): Run[] { return this.layers.second ? this.store.runs.slice(0, 2) : this.store.runs.slice(0, 1); }

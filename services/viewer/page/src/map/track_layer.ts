@@ -4,33 +4,34 @@ import * as THREE from "three";
 import type { Palette, Rgb } from "../theme";
 import type { Chunk, Track } from "../store/track";
 import { contains, type Camera, type Rect } from "./camera";
-import { addMesh, material, quad, uColour } from "./gl";
+import { addMesh, material, uColour } from "./gl";
 
 const capacity = 32768;
-const stride = 5; // x, y, sigma, status, length so far
+const stride = 6; // x, y, sigma, status, length so far, side
+const perPoint = 2 * stride;
+const sides = [[0, -1], [stride, 1]];
 
-// `before` and `after` are the neighbours of the segment: with them the ribbon has no gaps at its joints.
+// Two corners a point; `before` and `after` are its neighbours in the same buffer: with them the ribbon has no gaps at its joints.
+// Not instanced: a rasteriser in software takes as long for an instance as for a hundred corners.
 const vertex = `
-in vec2 corner; in vec4 before; in vec4 a; in vec4 b; in vec4 after; in float far;
+in vec4 before; in vec4 at; in vec4 after; in vec2 extra;
 uniform float uWidth; uniform float uSigmas; uniform float uDepth;
-flat out float vStatus; out float vAcross; out float vAlong; flat out float vHalf;
-vec2 unit(vec2 v) { float l = length(v); return l > 0.0 ? v / l : vec2(1.0, 0.0); }
+flat out float vStatus; out float vAcross; out float vAlong; out float vHalf;
 void main() {
-  vec4 p = corner.x < 0.5 ? a : b;
-  bool isBroken = a.w < 0.0 || b.w < 0.0;
-  vec2 from = corner.x < 0.5 ? (before.w < 0.0 ? a.xy : before.xy) : a.xy, to = corner.x < 0.5 ? b.xy : (after.w < 0.0 ? b.xy : after.xy);
-  vec2 along = unit(to - from);
-  float half_ = uSigmas > 0.0 ? min(uSigmas * p.z * uScreen.z, 4000.0) : 0.5 * uWidth * uScreen.w;
-  float reach = half_ + (uSigmas > 0.0 ? 0.0 : 1.0);
-  vStatus = b.w; vHalf = half_; vAcross = corner.y * reach;
-  vAlong = far * uScreen.z + corner.x * length(b.xy - a.xy) * uScreen.z;
-  gl_Position = isBroken || reach < 0.75 ? vec4(2.0, 2.0, 2.0, 1.0) : fromPixel(toPixel(p.xy) + vec2(-along.y, along.x) * vAcross);
+  vec2 from = before.w < 0.0 ? at.xy : before.xy, to = after.w < 0.0 ? at.xy : after.xy, d = to - from;
+  float len = length(d);
+  vec2 along = len > 0.0 ? d / len : vec2(1.0, 0.0);
+  vHalf = uSigmas > 0.0 ? min(uSigmas * at.z * uScreen.z, 4000.0) : 0.5 * uWidth * uScreen.w;
+  vStatus = at.w; vAcross = extra.y * (vHalf + (uSigmas > 0.0 ? 0.0 : 1.0));
+  vAlong = extra.x * uScreen.z;
+  gl_Position = fromPixel(toPixel(at.xy) + vec2(-along.y, along.x) * vAcross);
   gl_Position.z = uDepth;
 }`;
 const fragment = `
-flat in float vStatus; in float vAcross; in float vAlong; flat in float vHalf;
+flat in float vStatus; in float vAcross; in float vAlong; in float vHalf;
 uniform vec3 uLine; uniform vec3 uWarn; uniform vec3 uBad; uniform float uAlpha; uniform float uSigmas; uniform float uDash;
 void main() {
+  if (vStatus < 0.0) discard;
   int status = int(vStatus + 0.5);
   bool isCoasting = status == 6, isLost = status == 2 || status == 3 || status == 4 || status == 7;
   vec3 c = isLost ? uBad : isCoasting ? uWarn : uLine;
@@ -43,12 +44,18 @@ void main() {
   colour = vec4(c, alpha);
 }`;
 
+/** Two triangles between neighbours; the last corner of each is of the later point, whose status colours the piece. */
+const strip = new THREE.BufferAttribute(new Uint32Array(6 * capacity).map((_, k) => {
+  const i = 2 * Math.floor(k / 6);
+  return i + [0, 1, 2, 1, 3, 2][k % 6];
+}), 1);
+
 interface Style { colour: Rgb; alpha: number; width: number; dash: number }
 
 export class TrackLayer {
-  private readonly data = new Float32Array((capacity + 4) * stride);
-  private readonly buffer = new THREE.InstancedInterleavedBuffer(this.data, stride);
-  private readonly geometry = quad();
+  private readonly data = new Float32Array((capacity + 4) * perPoint);
+  private readonly buffer = new THREE.InterleavedBuffer(this.data, stride);
+  private readonly geometry = new THREE.BufferGeometry();
   private readonly line: THREE.Mesh;
   private readonly band: THREE.Mesh;
   private readonly uniforms;
@@ -66,10 +73,10 @@ export class TrackLayer {
     const field = (name: string, size: number, offset: number) =>
       this.geometry.setAttribute(name, new THREE.InterleavedBufferAttribute(this.buffer, size, offset));
     field("before", 4, 0);
-    field("a", 4, stride);
-    field("far", 1, stride + 4);
-    field("b", 4, 2 * stride);
-    field("after", 4, 3 * stride);
+    field("at", 4, perPoint);
+    field("extra", 2, perPoint + 4);
+    field("after", 4, 2 * perPoint);
+    this.geometry.setIndex(strip);
     const shared = { uLine: uColour(), uWarn: uColour(), uBad: uColour(), uDepth: { value: depth } };
     const line = { ...shared, uAlpha: { value: 1 }, uSigmas: { value: 0 }, uWidth: { value: 2.5 }, uDash: { value: 0 } };
     const band = { ...shared, uAlpha: { value: 0.16 }, uSigmas: { value: 3 }, uWidth: { value: 0 }, uDash: { value: 0 } };
@@ -128,7 +135,7 @@ export class TrackLayer {
     this.hasSigma = false;
     let end = -1;
     for (const c of chunks) {
-      if (end >= 0 && c.start !== end) this.breakHere();
+      if (end >= 0 && c.start !== end) this.put(c.data[0], c.data[1], 0, -1);
       this.take(c, 0);
       end = c.end;
     }
@@ -154,30 +161,29 @@ export class TrackLayer {
     }
   }
 
-  private breakHere(): void {
-    if (this.points) this.put(this.data[this.points * stride], this.data[this.points * stride + 1], 0, -1);
-  }
-
+  /** A status below 0 breaks the line before the point; the next one is to be at the same place. */
   private put(x: number, y: number, sigma: number, status: number): void {
-    const at = (this.points + 1) * stride, d = this.data;
-    if (this.points) this.far = (this.far + Math.hypot(x - d[at - stride], y - d[at - stride + 1])) % 4096;
-    d[at] = x;
-    d[at + 1] = y;
-    d[at + 2] = sigma;
-    d[at + 3] = status;
-    d[at + 4] = this.far;
+    const d = this.data, at = (this.points + 1) * perPoint;
+    if (this.points) this.far += Math.hypot(x - d[at - perPoint], y - d[at - perPoint + 1]);
+    for (const [k, side] of sides) {
+      const o = at + k;
+      d[o] = x;
+      d[o + 1] = y;
+      d[o + 2] = sigma;
+      d[o + 3] = status;
+      d[o + 4] = this.far;
+      d[o + 5] = side;
+    }
     if (sigma > 0) this.hasSigma = true;
     this.points++;
   }
 
   private upload(first: number): void {
-    const d = this.data;
     // The ends have no neighbour: a broken point stands for it.
-    d[3] = -1;
-    d[(this.points + 1) * stride + 3] = -1;
-    this.geometry.instanceCount = Math.max(0, this.points - 1);
-    const begin = first * stride;
-    this.buffer.addUpdateRange(begin, (this.points + 2) * stride - begin);
+    for (const [k] of sides) this.data[k + 3] = this.data[(this.points + 1) * perPoint + k + 3] = -1;
+    this.geometry.setDrawRange(0, 6 * Math.max(0, this.points - 1));
+    const begin = first * perPoint;
+    this.buffer.addUpdateRange(begin, (this.points + 2) * perPoint - begin);
     this.buffer.needsUpdate = true;
   }
 }
