@@ -26,5 +26,7 @@ void add_replay_command(CLI::App& parent);
 void add_sim_command(CLI::App& parent);
 /// `understory status`: HEALTH of all processes.
 void add_status_command(CLI::App& parent);
+/// `understory why`: how a landmark or a pose of a log came about.
+void add_why_command(CLI::App& parent);
 
 }  // namespace understory::cli
