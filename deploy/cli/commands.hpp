@@ -28,5 +28,7 @@ void add_sim_command(CLI::App& parent);
 void add_status_command(CLI::App& parent);
 /// `understory view`: the viewer's page over logs and stored maps.
 void add_view_command(CLI::App& parent);
+/// `understory why`: how a landmark or a pose of a log came about.
+void add_why_command(CLI::App& parent);
 
 }  // namespace understory::cli

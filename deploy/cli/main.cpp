@@ -24,6 +24,7 @@ int run(int argc, char** argv) {
   understory::cli::add_import_command(app);
   understory::cli::add_export_command(app);
   understory::cli::add_log_command(app);
+  understory::cli::add_why_command(app);
   understory::cli::add_map_command(app);
   understory::cli::add_loop_command(app);
   understory::cli::add_view_command(app);
