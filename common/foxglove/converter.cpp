@@ -246,6 +246,15 @@ void Converter::Impl::on(const ground_truth_t& truth) {
 }
 
 void Converter::Impl::on(const truth_landmarks_t& truth) {
+  wire::Checks checks;
+  for (const truth_landmark_t& one : truth.landmarks) {
+    checks.pose("position_m", {one.position_m[0], one.position_m[1], 0.0});
+    checks.range("radius_m", one.radius_m, 0.0, 1e3);
+  }
+  if (checks.refusal()) {
+    ++refused_;
+    return;
+  }
   give(TopicId::kTruthLandmarks, truth.utime, [&] { return truth_scene(truth); });
 }
 

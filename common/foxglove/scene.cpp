@@ -13,6 +13,8 @@ constexpr double kHeight_m = 2.0;
 constexpr double kUnknownRadius_m = 0.15;
 
 double hundredths(double value) { return std::round(value * 1e2) / 1e2; }
+/// Of a unit quaternion: 1e-6 is 2e-6 rad.
+double millionths(double value) { return std::round(value * 1e6) / 1e6; }
 
 }  // namespace
 
@@ -44,10 +46,10 @@ void vector_field(JsonText& out, std::string_view name, const Eigen::Vector3d& v
 void quaternion_field(JsonText& out, std::string_view name, const Eigen::Quaterniond& value) {
   out.key(name);
   out.begin_object();
-  out.field("x", value.x());
-  out.field("y", value.y());
-  out.field("z", value.z());
-  out.field("w", value.w());
+  out.field("x", millionths(value.x()));
+  out.field("y", millionths(value.y()));
+  out.field("z", millionths(value.z()));
+  out.field("w", millionths(value.w()));
   out.end_object();
 }
 

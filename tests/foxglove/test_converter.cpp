@@ -1,3 +1,6 @@
+#include <array>
+#include <bit>
+#include <random>
 #include <set>
 
 #include "common/foxglove/converter.hpp"
@@ -6,6 +9,7 @@
 #include "tests/foxglove/schema_check.hpp"
 #include "tests/foxglove/shown_scene.hpp"
 #include "tests/foxglove/synthetic_drive.hpp"
+#include "tests/wire/random_message.hpp"
 
 namespace understory::foxglove {
 namespace {
@@ -79,6 +83,59 @@ TEST_CASE("what is no message of its channel is counted and gives nothing") {
   REQUIRE(converter.take("SOMETHING_ELSE", {}, 0).empty());
   REQUIRE_FALSE(Converter::takes("SOMETHING_ELSE"));
   REQUIRE(Converter::takes("SLAM_POSE"));
+}
+
+/// Random messages of a type, with values at the ends of what numbers hold.
+wire::Bytes wild_message(const wire::WireType& type, std::mt19937_64& random) {
+  constexpr std::array<double, 6> kWild{1e308, -1e308, 1e300, 5e-324, 0.0, -3.4e38};
+  std::vector<test::RealPlace> reals;
+  wire::Bytes bytes = test::random_message(type, random, &reals);
+  for (const test::RealPlace& place : reals) {
+    if (random() % 4 != 0 || place.kind != wire::FieldKind::kDouble) continue;
+    const double value = kWild[random() % kWild.size()];
+    test::put(bytes, place.offset, std::bit_cast<std::uint64_t>(value), 8);
+  }
+  return bytes;
+}
+
+TEST_CASE("whatever passes the checks of the wire agrees with its schema") {
+  std::mt19937_64 random(9);
+  Converter converter;
+  std::size_t given = 0;
+  for (const auto& [channel, type] : std::initializer_list<std::pair<const char*, const char*>>{
+           {"SLAM_POSE", "slam_pose2_t"},
+           {"SLAM_UPDATE", "slam_update2_t"},
+           {"MAP", "map_t"},
+           {"MAP_DELTA", "map_delta_t"},
+           {"SUBMAP", "submap_t"},
+           {"MAP_CORRECTION", "map_correction_t"},
+           {"EXISTENCE", "existence_t"},
+           {"LANDMARKS", "landmarks_t"},
+           {"LIDAR_SCAN", "lidar_scan_t"},
+           {"LIDAR_SWEEP", "lidar_sweep_t"},
+           {"EKF_POSE", "ekf_pose_t"},
+           {"RAW_POSE", "raw_pose_t"},
+           {"GROUND_TRUTH", "ground_truth_t"},
+           {"TRUTH_LANDMARKS", "truth_landmarks_t"},
+           {"GNSS", "gnss_t"},
+           {"LOG", "log_t"},
+           {"HEALTH", "health_t"},
+           {"LOOP_CLOSURE", "loop_closure_t"},
+           {"LOOP_RESULT", "loop_result_t"},
+           {"IMU", "imu_t"}}) {
+    for (int i = 0; i < 300; ++i) {
+      const wire::WireType& layout = *wire::find_wire_type(type);
+      const wire::Bytes bytes =
+          i % 2 == 0 ? wild_message(layout, random) : test::random_message(layout, random);
+      for (const Converted& one : converter.take(channel, bytes, 1)) {
+        ++given;
+        INFO(topic(one.topic).name << " " << one.json->substr(0, 1000));
+        const Json schema = Json::parse(schema_of(one.topic));
+        REQUIRE(test::disagreement(Json::parse(*one.json), schema) == "");
+      }
+    }
+  }
+  REQUIRE(given > 1000);
 }
 
 TEST_CASE("frames hang together: vehicle, odom, the filter's map and the world in the map") {
