@@ -64,8 +64,14 @@ add_library(understory_zlib INTERFACE)
 target_include_directories(understory_zlib INTERFACE "${ZLIB_INCLUDE_DIR}")
 target_link_libraries(understory_zlib INTERFACE "${ZLIB_LIBRARY}")
 
+find_path(ZSTD_INCLUDE_DIR zstd.h REQUIRED)
+find_library(ZSTD_LIBRARY zstd REQUIRED)
+add_library(understory_zstd INTERFACE)
+target_include_directories(understory_zstd INTERFACE "${ZSTD_INCLUDE_DIR}")
+target_link_libraries(understory_zstd INTERFACE "${ZSTD_LIBRARY}")
+
 # Headers alone, for common/place_recognition's sources.
 find_path(NANOFLANN_INCLUDE_DIR nanoflann.hpp REQUIRED)
 
 install(TARGETS understory_lcm understory_cholmod understory_zip understory_lzf understory_pcap understory_sqlite
-        understory_crypto understory_zlib EXPORT understory)
+        understory_crypto understory_zlib understory_zstd EXPORT understory)

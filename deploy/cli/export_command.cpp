@@ -1,13 +1,16 @@
 // `understory export`: the results in a log in formats that other tools read.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
+#include "common/io/data_error.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/progress.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/mcap_export.hpp"
 #include "deploy/cli/slam_results.hpp"
 #include "deploy/cli/text_file.hpp"
 
@@ -53,22 +56,55 @@ void export_as(const std::string& format, const SlamResults& results,
   }
 }
 
+void export_results(const std::string& log, const std::vector<std::string>& formats,
+                    const std::filesystem::path& out) {
+  const auto results = read_results(log);
+  if (!results.map.map()) {
+    fail(fmt::format("{}: neither a whole MAP nor the start of one in it (run replay first)", log));
+  }
+  if (results.map.missed() > 0) {
+    fmt::print(stderr, "{}: {} changes of the map are missing: some landmarks may be old\n", log,
+               results.map.missed());
+  }
+  std::filesystem::create_directories(out);
+  for (const auto& format : formats) export_as(format, results, out);
+}
+
+/// Streams the log: it needs no map in it, and may be of any length.
+void export_messages(const std::string& log, const std::filesystem::path& out) {
+  const std::filesystem::path file = mcap_path(log, out);
+  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path());
+  const McapSummary summary = export_mcap(log, file);
+  if (summary.refused > 0) {
+    fmt::print(stderr, "{}: {} messages are not what their channel says and were left out\n", log,
+               summary.refused);
+  }
+  if (summary.landmarks_left_out > 0) {
+    fmt::print(stderr, "{}: {} landmarks beyond the first 200,000 were left out\n", log,
+               summary.landmarks_left_out);
+  }
+  fmt::print("{}\n", file.string());
+}
+
+void export_all(ExportOptions options) {
+  const bool has_messages = std::erase(options.formats, "mcap") > 0;
+  if (options.out.extension() == ".mcap" && !options.formats.empty()) {
+    wrong_usage("--out: several formats need a directory");
+  }
+  if (has_messages) export_messages(options.log, options.out);
+  if (!options.formats.empty()) export_results(options.log, options.formats, options.out);
+}
+
 void run(const ExportOptions& options) {
   terminal::catch_interrupts();
   try {
-    const auto results = read_results(options.log);
-    if (!results.map.map()) {
-      fail(fmt::format("{}: neither a whole MAP nor the start of one in it (run replay first)",
-                       options.log));
-    }
-    if (results.map.missed() > 0) {
-      fmt::print(stderr, "{}: {} changes of the map are missing: some landmarks may be old\n",
-                 options.log, results.map.missed());
-    }
-    std::filesystem::create_directories(options.out);
-    for (const auto& format : options.formats) export_as(format, results, options.out);
+    export_all(options);
   } catch (const io::LogError& error) {
     fail(error.what());
+  } catch (const io::DataError& error) {
+    fail(error.what());
+  } catch (const std::filesystem::filesystem_error& error) {
+    fail(fmt::format("{}: {}", options.out.string(), error.code().message()));
   } catch (const terminal::Interrupted& error) {
     fail(fmt::format("{}: {}", options.log, error.what()));
   }
@@ -80,10 +116,14 @@ void add_export_command(CLI::App& parent) {
   auto* command = parent.add_subcommand("export", "Results in formats that other tools read");
   auto options = std::make_shared<ExportOptions>();
   command->add_option("log", options->log, "An LCM log with the mapper's output")->required();
-  command->add_option("--out", options->out, "Directory for the files")->required();
-  command->add_option("--format", options->formats, "tum, csv, g2o")
+  command
+      ->add_option("--out", options->out, "Directory for the files; of mcap also a file NAME.mcap")
+      ->required();
+  command
+      ->add_option("--format", options->formats,
+                   "tum, csv, g2o: results; mcap: all messages, for Foxglove and Lichtblick")
       ->delimiter(',')
-      ->check(CLI::IsMember({"tum", "csv", "g2o"}))
+      ->check(CLI::IsMember({"tum", "csv", "g2o", "mcap"}))
       ->capture_default_str();
   command->callback([options] { run(*options); });
 }

@@ -1,0 +1,132 @@
+// One client of the Foxglove WebSocket protocol, without the socket.
+//
+// The protocol is the one of github.com/foxglove/ws-protocol (docs/spec.md); subprotocols
+// foxglove.websocket.v1 and foxglove.sdk.v1 have the same messages. A session reads what the client
+// sent and says what to send next; whoever owns the socket carries both:
+//
+//   session.take_text(text) or session.take_binary(bytes)  for what comes in,
+//   session.offer(converted)                               for every message of a Converter,
+//   bring_up_to_date(session, converter)                   after each of these,
+//   while the socket can be written: session.next().
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/foxglove/converter.hpp"
+
+namespace understory::foxglove {
+
+/// The subprotocol to answer with, of the list that a client offers in Sec-WebSocket-Protocol;
+/// none: refuse the handshake.
+std::optional<std::string_view> chosen_subprotocol(std::string_view offered);
+
+/// One WebSocket message to the client.
+struct Outgoing {
+  bool is_binary = false;
+  std::string bytes;
+};
+
+/// What a session says of its server, and its bounds.
+struct SessionOptions {
+  std::string name = "understory";
+  std::string session_id = {};  ///< Tells runs of the server apart; empty = none.
+  bool sends_time = false;      ///< offer_time() is used: the client's clock follows the log's.
+  std::size_t most_text_bytes = 64 * 1024;           ///< Of one message of the client.
+  std::size_t most_messages = 256;                   ///< That wait, of one topic.
+  std::size_t most_waiting_bytes = 8 * 1024 * 1024;  ///< That wait, of one topic (or one message).
+  std::size_t most_replies = 64;                     ///< Status messages that wait.
+  std::uint64_t most_refused = 100;                  ///< Then the client should go.
+};
+
+/// What became of a client's message.
+enum class Taken : std::uint8_t {
+  kDone,
+  kNotSupported,  ///< Of the protocol, but not offered here; the client gets a status.
+  kMalformed,     ///< Not of the protocol, or against its rules; likewise.
+};
+
+/// What a session counted.
+struct SessionCounts {
+  std::uint64_t sent = 0;     ///< Messages of topics that next() gave.
+  std::uint64_t dropped = 0;  ///< Messages of topics that the client was too slow for.
+  std::uint64_t resent = 0;   ///< How often the whole was asked for after a loss.
+  std::uint64_t malformed = 0;
+  std::uint64_t not_supported = 0;
+};
+
+/// Bounded memory: of each topic what `SessionOptions` allows. Nothing that a client sends throws.
+class Session {
+ public:
+  /// With serverInfo and the list of all topics ready to be sent.
+  explicit Session(SessionOptions options = {});
+
+  /// Takes a text message of the client.
+  Taken take_text(std::string_view text);
+  /// Takes a binary message of the client: it may publish nothing, so it is refused.
+  Taken take_binary(std::span<const std::uint8_t> bytes);
+  /// Queues a message where the client subscribed to its topic; O(1) but for dropping.
+  void offer(const Converted& message);
+  /// Queues the time of the log [us]; the newest counts.
+  void offer_time(std::int64_t utime);
+  /// The next message to send: replies first, then topics in the order in which they came.
+  std::optional<Outgoing> next();
+
+  /// Topics whose state (`Converter::state_of`) this client needs now, each once; offer it next.
+  std::vector<TopicId> take_wanted();
+  /// Whether the client wants messages of the topic.
+  bool is_subscribed(TopicId id) const { return line(id).subscription.has_value(); }
+  /// Whether it sent so much that is refused that the connection should be closed.
+  bool should_close() const;
+  /// Whether next() has something.
+  bool has_next() const;
+  /// Bytes of messages that wait.
+  std::size_t waiting_bytes() const;
+  /// So far.
+  const SessionCounts& counts() const { return counts_; }
+
+ private:
+  struct Waiting {
+    std::uint64_t turn = 0;  ///< Counts arrivals.
+    Converted message;
+  };
+  /// One topic's messages for this client.
+  struct Line {
+    std::optional<std::uint32_t> subscription;  ///< The client's id.
+    std::deque<Waiting> queue;
+    std::size_t bytes = 0;
+    bool needs_state = false;
+    bool is_after_loss = false;
+  };
+  struct Request;
+
+  Line& line(TopicId id) { return lines_[static_cast<std::size_t>(id)]; }
+  const Line& line(TopicId id) const { return lines_[static_cast<std::size_t>(id)]; }
+  Taken act(const Request& request);
+  Taken refuse(Taken why, std::string_view text);
+  Taken subscribe(const Request& request);
+  Taken unsubscribe(const Request& request);
+  void reply(std::string text);
+  void drop_oldest(Line& line);
+  void make_room(Line& line, Delivery delivery, std::size_t bytes);
+
+  SessionOptions options_;
+  std::deque<std::string> replies_;
+  std::array<Line, kTopics> lines_;
+  std::map<std::uint32_t, TopicId> subscriptions_;  ///< By the client's id.
+  std::optional<std::int64_t> time_;
+  std::uint64_t turns_ = 0;
+  SessionCounts counts_;
+};
+
+/// Offers the state of the topics that the client needs it of.
+void bring_up_to_date(Session& session, const Converter& converter);
+
+}  // namespace understory::foxglove

@@ -1,0 +1,74 @@
+// Values as MCAP serialises them.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace understory::mcap {
+
+/// The records of the specification that are written here.
+enum class Opcode : std::uint8_t {
+  kHeader = 0x01,
+  kFooter = 0x02,
+  kSchema = 0x03,
+  kChannel = 0x04,
+  kMessage = 0x05,
+  kChunk = 0x06,
+  kMessageIndex = 0x07,
+  kChunkIndex = 0x08,
+  kStatistics = 0x0B,
+  kSummaryOffset = 0x0E,
+  kDataEnd = 0x0F,
+};
+
+/// First and last bytes of a file ("Magic"): version 0.
+inline constexpr std::string_view kMagic{"\x89MCAP0\r\n", 8};
+/// Opcode and length in front of a record's content [bytes].
+inline constexpr std::size_t kRecordHead = 9;
+
+/// Appends values to bytes ("Serialization"): integers little-endian, text behind its length.
+class Encoder {
+ public:
+  /// One byte.
+  void u8(std::uint8_t value) { bytes_.push_back(static_cast<char>(value)); }
+  /// Two bytes.
+  void u16(std::uint16_t value) { integer(value, 2); }
+  /// Four bytes.
+  void u32(std::uint32_t value) { integer(value, 4); }
+  /// Eight bytes; also a Timestamp [ns].
+  void u64(std::uint64_t value) { integer(value, 8); }
+  /// A String, or Bytes with a length of 32 bits in front.
+  void text(std::string_view value) {
+    u32(static_cast<std::uint32_t>(value.size()));
+    raw(value);
+  }
+  /// The bytes alone.
+  void raw(std::string_view value) { bytes_.append(value); }
+  /// Opcode and length of a record whose content of `size` bytes follows.
+  void head(Opcode opcode, std::uint64_t size) {
+    u8(static_cast<std::uint8_t>(opcode));
+    u64(size);
+  }
+  /// A whole record.
+  void record(Opcode opcode, std::string_view content) {
+    head(opcode, content.size());
+    raw(content);
+  }
+
+  /// All so far.
+  const std::string& bytes() const { return bytes_; }
+  /// Forgets all, keeps the memory.
+  void clear() { bytes_.clear(); }
+
+ private:
+  void integer(std::uint64_t value, unsigned bytes) {
+    for (unsigned i = 0; i < bytes; ++i) {
+      bytes_.push_back(static_cast<char>(static_cast<std::uint8_t>(value >> (8U * i))));
+    }
+  }
+
+  std::string bytes_;
+};
+
+}  // namespace understory::mcap

@@ -1,0 +1,125 @@
+// For the checks with the makers' own packages (tests/foxglove/node): a log, and a server of it.
+//   foxglove_test_peer log OUT.lcm       a synthetic drive
+//   foxglove_test_peer serve IN.lcm      serves it on a free port of loopback, prints the port,
+//   gives
+//                                        the log again and again to one client and ends with it
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+#include <iostream>
+#include <string>
+
+#include "common/foxglove/session.hpp"
+#include "common/io/lcm_log.hpp"
+#include "tests/foxglove/synthetic_drive.hpp"
+
+namespace understory::test {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+using Socket = beast::websocket::stream<asio::ip::tcp::socket>;
+
+void write_log(const std::string& path) {
+  io::LcmLogWriter writer(path);
+  for (const io::LogEvent& event : synthetic_drive(150)) writer.write(event);
+  writer.commit();
+}
+
+/// The WebSocket of one client whose handshake names the protocol.
+Socket accepted(asio::io_context& context, asio::ip::tcp::acceptor& acceptor) {
+  Socket socket(acceptor.accept(context));
+  beast::flat_buffer buffer;
+  beast::http::request<beast::http::string_body> request;
+  beast::http::read(socket.next_layer(), buffer, request);
+  const auto offered = request[beast::http::field::sec_websocket_protocol];
+  const auto chosen = foxglove::chosen_subprotocol({offered.data(), offered.size()});
+  if (!chosen) throw std::runtime_error("no subprotocol of ours");
+  socket.set_option(
+      beast::websocket::stream_base::decorator([chosen](beast::websocket::response_type& response) {
+        response.set(beast::http::field::sec_websocket_protocol,
+                     boost::string_view(chosen->data(), chosen->size()));
+      }));
+  socket.accept(request);
+  return socket;
+}
+
+void send_waiting(Socket& socket, foxglove::Session& session) {
+  while (const auto out = session.next()) {
+    socket.binary(out->is_binary);
+    socket.write(asio::buffer(out->bytes));
+  }
+}
+
+/// Takes one message where one has come (or waits for it).
+void take_message(Socket& socket, foxglove::Session& session, bool waits) {
+  if (!waits && socket.next_layer().available() == 0) return;
+  beast::flat_buffer buffer;
+  socket.read(buffer);
+  const auto text = beast::buffers_to_string(buffer.data());
+  if (socket.got_text()) {
+    session.take_text(text);
+  } else {
+    session.take_binary({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  }
+}
+
+bool has_subscription(const foxglove::Session& session) {
+  for (const auto& topic : foxglove::topics()) {
+    if (session.is_subscribed(topic.id)) return true;
+  }
+  return false;
+}
+
+void serve(const std::string& log) {
+  asio::io_context context;
+  asio::ip::tcp::acceptor acceptor(context, {asio::ip::make_address("127.0.0.1"), 0});
+  std::cout << acceptor.local_endpoint().port() << std::endl;
+  Socket socket = accepted(context, acceptor);
+
+  foxglove::SessionOptions options;
+  options.sends_time = true;
+  foxglove::Session session(options);
+  while (!has_subscription(session)) {
+    send_waiting(socket, session);
+    take_message(socket, session, true);
+  }
+  // Until the client goes; never for ever.
+  for (int round = 0; round < 1000; ++round) {
+    foxglove::Converter converter;
+    io::LcmLogReader reader(log);
+    while (const auto event = reader.next()) {
+      take_message(socket, session, false);
+      for (const auto& one : converter.take(event->channel, event->data, event->utime)) {
+        session.offer(one);
+      }
+      bring_up_to_date(session, converter);
+      session.offer_time(event->utime);
+      send_waiting(socket, session);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace understory::test
+
+int main(int count, char** arguments) {
+  const std::string task = count == 3 ? arguments[1] : "";
+  try {
+    if (task == "log") {
+      understory::test::write_log(arguments[2]);
+    } else if (task == "serve") {
+      understory::test::serve(arguments[2]);
+    } else {
+      std::cerr << "foxglove_test_peer log OUT.lcm | serve IN.lcm\n";
+      return 2;
+    }
+  } catch (const boost::system::system_error&) {
+    return 0;  // The client has gone.
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << '\n';
+    return 1;
+  }
+  return 0;
+}
