@@ -2,8 +2,6 @@
 
 #include <chrono>
 
-#include "services/viewer/scene_channels.hpp"
-
 namespace understory::cli {
 namespace {
 
@@ -28,14 +26,14 @@ LogSpan span_of_log(const std::filesystem::path& log, const std::function<void(d
   return *span;
 }
 
-LogPlayer::LogPlayer(std::filesystem::path log, viewer::Scene& scene)
-    : path_(std::move(log)), scene_(scene) {
+LogPlayer::LogPlayer(std::filesystem::path log, viewer::Run& run)
+    : path_(std::move(log)), run_(run) {
   viewer::for_each_channel(
       [this]<class T>(const char* channel, const viewer::ChannelTraits& /*traits*/, auto take) {
         takes_[channel] = [this, take](std::span<const std::uint8_t> bytes, std::int64_t wall_us) {
           const auto value = wire::decode_message<T>(bytes);
           if (!value) return false;
-          take(scene_, *value, wall_us);
+          run_.take(*value, take, wall_us);
           return true;
         };
       });
@@ -43,7 +41,7 @@ LogPlayer::LogPlayer(std::filesystem::path log, viewer::Scene& scene)
 }
 
 void LogPlayer::restart() {
-  scene_.reset();
+  run_.reset();
   reader_.emplace(path_);
   next_ = reader_->next();
   refused_ = 0;
@@ -60,7 +58,7 @@ bool LogPlayer::go_to(std::int64_t utime_us, std::int64_t most_us) {
     if (events % kEventsPerLook == 0 && std::chrono::steady_clock::now() > end) return false;
   }
   // In a log nobody is silent because the log ended: time stands where the scrubber stands.
-  scene_.look(utime_us);
+  run_.scene().look(utime_us);
   return true;
 }
 

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "common/io/lcm_log.hpp"
-#include "services/viewer/scene.hpp"
+#include "services/viewer/run.hpp"
 
 namespace understory::cli {
 
@@ -23,11 +23,11 @@ struct LogSpan {
 /// io::LogError, also where the log has no events.
 LogSpan span_of_log(const std::filesystem::path& log, const std::function<void(double)>& progress);
 
-/// Feeds a scene with a log's events up to a time. Forward it reads on; back it begins anew.
+/// Feeds a run with a log's events up to a time. Forward it reads on; back it begins anew.
 class LogPlayer {
  public:
-  /// `scene` must outlive it. Throws io::LogError.
-  LogPlayer(std::filesystem::path log, viewer::Scene& scene);
+  /// `run` must outlive it. Throws io::LogError.
+  LogPlayer(std::filesystem::path log, viewer::Run& run);
 
   /// Feeds what was recorded up to `utime_us`, for at most `most_us` of work. True when it is
   /// there.
@@ -40,7 +40,7 @@ class LogPlayer {
   void restart();
 
   std::filesystem::path path_;
-  viewer::Scene& scene_;
+  viewer::Run& run_;
   std::map<std::string, Take, std::less<>> takes_;
   std::optional<io::LcmLogReader> reader_;
   std::optional<io::LogEvent> next_;

@@ -13,6 +13,7 @@
 #include "deploy/cli/log_player.hpp"
 #include "deploy/cli/map_revisions.hpp"
 #include "services/viewer/page_host.hpp"
+#include "services/viewer/run.hpp"
 
 namespace understory::cli {
 namespace {
@@ -114,20 +115,23 @@ LogSpan span_of_logs(const std::vector<std::string>& logs) {
 
 void view_logs(const ViewOptions& options) {
   const LogSpan span = span_of_logs(options.logs);
-  std::vector<std::unique_ptr<Scene>> scenes;
+  std::vector<std::unique_ptr<viewer::Run>> hosted;
   std::vector<std::unique_ptr<LogPlayer>> players;
   std::vector<const Scene*> runs;
   nlohmann::ordered_json names = nlohmann::ordered_json::array();
   for (std::size_t i = 0; i < options.logs.size(); ++i) {
-    scenes.push_back(std::make_unique<Scene>());
-    players.push_back(std::make_unique<LogPlayer>(options.logs[i], *scenes.back()));
-    runs.push_back(scenes.back().get());
+    hosted.push_back(std::make_unique<viewer::Run>());
+    players.push_back(std::make_unique<LogPlayer>(options.logs[i], *hosted.back()));
+    runs.push_back(&hosted.back()->scene());
     names.push_back({{"name", options.logs[i]}, {"colour_index", i}});
   }
 
   Playback playback(span, options.rate, !options.is_paused);
   viewer::PageRequests requests;
   requests.control = [&](const nlohmann::json& control) { playback.take(control); };
+  requests.story = [&](const nlohmann::json& question) {
+    return hosted.at(question.value("run", std::size_t{0}))->answer(question);
+  };
   PageHost host(options.page, runs, std::move(requests),
                 {{"version", bus::program_version()},
                  {"mode", "log"},

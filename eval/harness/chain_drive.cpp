@@ -36,6 +36,7 @@ void keep_states(SensorChain& chain, ChainRun& run) {
 constexpr const char* kSensorDriver = "velodyne_driver";
 /// Keeps files; experiments read what is on the bus.
 constexpr std::string_view kStore = "submap_store";
+constexpr const char* kViewer = "viewer";  ///< Nobody looks.
 
 /// What fits into one packet of the bus: 10 bytes a point.
 constexpr std::size_t kPointsPerPart = 5500;
@@ -130,7 +131,7 @@ std::vector<bus::Service> services_of(const std::filesystem::path& config_dir) {
   all.push_back(existence_tracker::existence_tracker_service());
   std::set<std::string> started;
   for (const bus::ProcessEntry& entry : bus::read_launch_config(config_dir).processes) {
-    if (entry.name == kSensorDriver || entry.name == kStore) continue;
+    if (entry.name == kSensorDriver || entry.name == kStore || entry.name == kViewer) continue;
     if (std::ranges::find(all, entry.name, &bus::Service::name) == all.end()) {
       throw bus::ConfigurationError({(config_dir / "launch.toml").string() + ": process \"" +
                                      entry.name + "\" cannot be hosted here"});

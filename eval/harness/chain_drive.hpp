@@ -83,9 +83,9 @@ void finish_chain(SensorChain& chain, ChainRun& run);
 
 /// The services from raw sensors to the map, in the order in which data runs through them.
 std::vector<bus::Service> front_end_services();
-/// Those of them that the folder's launch.toml starts; a sensor's driver is left out: a log or the
-/// simulation stands for it. All where the path is empty. Throws ConfigurationError, also for a
-/// process that is none of them.
+/// Those of them that the folder's launch.toml starts; a sensor's driver and the viewer are left
+/// out: a log or the simulation stands for it. All where the path is empty. Throws
+/// ConfigurationError, also for a process that is none of them.
 std::vector<bus::Service> services_of(const std::filesystem::path& config_dir);
 
 /// Drives once through. Throws what a service or `options.progress` throws.

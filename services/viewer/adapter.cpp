@@ -12,8 +12,7 @@
 #include "services/viewer/page_bundle.hpp"
 #include "services/viewer/page_host.hpp"
 #include "services/viewer/process_watch.hpp"
-#include "services/viewer/scene.hpp"
-#include "services/viewer/scene_channels.hpp"
+#include "services/viewer/run.hpp"
 
 namespace understory::viewer {
 namespace {
@@ -29,18 +28,19 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
     node_ = &node;
     for_each_channel([this]<class T>(const char* channel, const ChannelTraits& traits, auto take) {
       if (traits.is_bulk && !parameters_.hears_sweeps) return;
-      node_->subscribe<T>(channel,
-                          [this, take](const T& value) { take(scene_, value, clock_.wall_us()); },
-                          {.queue_size = traits.is_bulk ? std::size_t{400} : std::size_t{100},
-                           .sequenced = !traits.is_from_many,
-                           .timed = traits.is_on_message_time,
-                           .journaled = false});
+      node_->subscribe<T>(
+          channel, [this, channel, take](const T& value) { hear(channel, value, take); },
+          {.queue_size = traits.is_bulk ? std::size_t{400} : std::size_t{100},
+           .sequenced = !traits.is_from_many,
+           .timed = traits.is_on_message_time,
+           .journaled = false});
     });
   }
 
   void open() override {
     PageRequests requests;
-    host_.emplace(parameters_.page, std::vector<const Scene*>{&scene_}, std::move(requests),
+    requests.story = [this](const nlohmann::json& question) { return run_.answer(question); };
+    host_.emplace(parameters_.page, std::vector<const Scene*>{&run_.scene()}, std::move(requests),
                   nlohmann::ordered_json{{"version", bus::program_version()},
                                          {"mode", "live"},
                                          {"runs", {{{"name", "live"}, {"colour_index", 0}}}}});
@@ -61,7 +61,7 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
       watched_us_ = monotonic_us;
       watch(wall_us);
     }
-    scene_.look(wall_us);
+    run_.scene().look(wall_us);
     host_->attend(monotonic_us);
     report_refused();
   }
@@ -69,13 +69,21 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
  private:
   static constexpr std::int64_t kAttendEvery_us = 5'000;
 
+  template <class T, class Take>
+  void hear(const char* channel, const T& value, const Take& take) {
+    const std::int64_t wall_us = clock_.wall_us();
+    run_.take(value, take, wall_us);
+    if (host_->foxglove().wants(channel))
+      host_->foxglove().hear(channel, wire::encode_message(value), wall_us);
+  }
+
   void watch(std::int64_t wall_us) {
     // The board is changed meanwhile: names first.
     std::vector<std::pair<std::string, std::int64_t>> processes;
-    for (const auto& [name, entry] : scene_.processes().entries())
+    for (const auto& [name, entry] : run_.scene().processes().entries())
       processes.emplace_back(name, entry.health.pid);
     for (const auto& [name, pid] : processes)
-      scene_.processes().take(name, look_at_process(pid), wall_us);
+      run_.scene().processes().take(name, look_at_process(pid), wall_us);
   }
 
   void report_refused() {
@@ -92,7 +100,7 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
   ViewerParameters parameters_;
   bus::Clock clock_ = bus::system_clock();
   bus::Node* node_ = nullptr;
-  Scene scene_;
+  Run run_;
   std::optional<PageHost> host_;
   std::int64_t attended_us_ = 0;
   std::int64_t watched_us_ = 0;

@@ -28,7 +28,8 @@ web::ServerOptions server_options(const PageParameters& parameters) {
   options.beyond_loopback = parameters.beyond_loopback;
   options.host_names = parts_of(parameters.host_names);
   options.most_connections = static_cast<std::size_t>(parameters.most_clients);
-  options.sockets = {{.path = kPagePath, .subprotocols = {}, .allowed_origins = {}}};
+  options.sockets = {{.path = kPagePath, .subprotocols = {}, .allowed_origins = {}},
+                     FoxgloveClients::socket_path(parts_of(parameters.foxglove_origins))};
   return options;
 }
 
@@ -78,6 +79,14 @@ std::string PageHost::url() const {
 void PageHost::attend(std::int64_t now_us, const nlohmann::ordered_json& extra,
                       std::optional<std::int64_t> wall_us) {
   take_events();
+  for (FoxgloveClients::Message& message : foxglove_.due()) {
+    auto bytes = std::make_shared<const std::string>(std::move(message.outgoing.bytes));
+    if (message.outgoing.is_binary) {
+      server_->send_binary(message.client, std::move(bytes));
+    } else {
+      server_->send_text(message.client, std::move(bytes));
+    }
+  }
   if (pages_.size() == 0) return;
   nlohmann::ordered_json header = extra;
   header["numbers"] = figures();
@@ -100,36 +109,48 @@ nlohmann::ordered_json PageHost::figures() const {
 void PageHost::take_events() {
   const std::vector<web::Event> events = server_->take_events();
   for (const web::Event& event : events) {
-    switch (event.kind) {
-      case web::Event::Kind::kOpened: {
-        PageMessage hello = pages_.opened(event.client, hello_);
-        server_->send_binary(hello.client, std::move(hello.bytes));
-        break;
-      }
-      case web::Event::Kind::kText: {
-        std::optional<std::string> refusal;
-        for (PageMessage& answer : pages_.take(event.client, event.data, refusal))
-          server_->send_binary(answer.client, std::move(answer.bytes));
-        if (refusal) server_->close(event.client, *refusal);
-        break;
-      }
-      case web::Event::Kind::kBinary:
-        server_->close(event.client, "not a message of the protocol");
-        break;
-      case web::Event::Kind::kClosed:
-        pages_.closed(event.client);
-        break;
-      case web::Event::Kind::kSent:
-        break;
+    const bool is_page = event.kind == web::Event::Kind::kOpened ? event.path == kPagePath
+                                                                 : !foxglove_.has(event.client);
+    if (is_page) {
+      take_page_event(event);
+    } else if (const auto refusal = foxglove_.take(event)) {
+      server_->close(event.client, *refusal);
     }
   }
   if (!events.empty() || !has_told_counts_) tell_counts();
+}
+
+void PageHost::take_page_event(const web::Event& event) {
+  switch (event.kind) {
+    case web::Event::Kind::kOpened: {
+      PageMessage hello = pages_.opened(event.client, hello_);
+      server_->send_binary(hello.client, std::move(hello.bytes));
+      break;
+    }
+    case web::Event::Kind::kText: {
+      std::optional<std::string> refusal;
+      for (PageMessage& answer : pages_.take(event.client, event.data, refusal))
+        server_->send_binary(answer.client, std::move(answer.bytes));
+      if (refusal) server_->close(event.client, *refusal);
+      break;
+    }
+    case web::Event::Kind::kBinary:
+      server_->close(event.client, "not a message of the protocol");
+      break;
+    case web::Event::Kind::kClosed:
+      pages_.closed(event.client);
+      break;
+    case web::Event::Kind::kSent:
+      break;
+  }
 }
 
 void PageHost::tell_counts() {
   nlohmann::ordered_json body = counts_json(server_->counts());
   body["pages"] = pages_.size();
   body["skipped"] = pages_.skipped();
+  body["foxglove_clients"] = foxglove_.size();
+  body["foxglove_dropped"] = foxglove_.dropped();
   server_->set_document("/health.json", {"application/json", body.dump(2) + "\n"});
   has_told_counts_ = true;
 }

@@ -1,4 +1,4 @@
-// The web server and what goes through it: pages, and later viewers of others.
+// The web server and what goes through it: our pages, and viewers of others.
 #pragma once
 
 #include <map>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/web/server.hpp"
+#include "services/viewer/foxglove_clients.hpp"
 #include "services/viewer/page_clients.hpp"
 
 namespace understory::viewer {
@@ -35,6 +36,8 @@ class PageHost {
   /// Takes what pages said and sends what is due; see PageClients::frames().
   void attend(std::int64_t now_us, const nlohmann::ordered_json& extra = {},
               std::optional<std::int64_t> wall_us = std::nullopt);
+  /// For viewers of others: what the run hears.
+  FoxgloveClients& foxglove() { return foxglove_; }
   /// Where the page is.
   std::string url() const;
   /// Counts of the server.
@@ -44,12 +47,14 @@ class PageHost {
 
  private:
   void take_events();
+  void take_page_event(const web::Event& event);
   void tell_counts();
   nlohmann::ordered_json figures() const;
 
   PageParameters parameters_;
   nlohmann::ordered_json hello_;
   PageClients pages_;
+  FoxgloveClients foxglove_;
   std::unique_ptr<web::Server> server_;
   bool has_told_counts_ = false;
 };

@@ -6,6 +6,7 @@
 #include "common/wire/convert.hpp"
 #include "services/viewer/scene.hpp"
 #include "understory/ground_truth_t.hpp"
+#include "understory/truth_landmarks_t.hpp"
 
 namespace understory::viewer {
 
@@ -56,6 +57,15 @@ void for_each_channel(Visit&& visit) {
   visit.template operator()<model::Odometry>(
       "ODOMETRY", {},
       [](Scene& scene, const auto& one, int64_t us) { scene.take_stamp(one.utime, us); });
+
+  // For stories and for viewers of others; the scene has no use for them.
+  const auto pass_over = [](Scene& /*scene*/, const auto& /*one*/, int64_t) {};
+  visit.template operator()<model::Keyframe>("KEYFRAME", {}, pass_over);
+  visit.template operator()<model::TrackedScan>("TRACKED_LANDMARKS", {}, pass_over);
+  visit.template operator()<model::EkfPose>("EKF_POSE", {}, pass_over);
+  visit.template operator()<model::RawPose>("RAW_POSE", {}, pass_over);
+  visit.template operator()<gnss_t>("GNSS", {}, pass_over);
+  visit.template operator()<truth_landmarks_t>("TRUTH_LANDMARKS", {}, pass_over);
 
   // Ground truth, and how the processes are.
   visit.template operator()<ground_truth_t>(
