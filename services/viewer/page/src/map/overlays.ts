@@ -96,7 +96,7 @@ export class Overlays {
     const pose = run.pose!, c = Math.cos(pose.theta), s = Math.sin(pose.theta), d = run.detections;
     for (let i = 0; i < d.x.length; i++) {
       const x = pose.x + c * d.x[i] - s * d.y[i], y = pose.y + s * d.x[i] + c * d.y[i];
-      this.marks.mark(d.kind[i] ? shape.square : shape.ring, x, y, 5, d.radius[i] || 0, p.detection, 0.7);
+      this.marks.mark(d.kind[i] ? shape.square : shape.ring, x, y, 5, d.radius[i] || 0, p.detection, 0.5);
     }
   }
 
