@@ -34,6 +34,7 @@ export class App {
   readonly verdict: VerdictBanner;
   readonly story: StoryPanel;
   readonly connection: Connection;
+  private readonly revisions: RevisionsPanel;
   private readonly layout: Layout;
   private readonly player: PlayerBar;
   private isScheduled = false;
@@ -48,10 +49,11 @@ export class App {
     this.verdict = new VerdictBanner(store, () => this.connection?.state === "open");
     this.story = new StoryPanel(theme, () => this.closeStory());
     this.player = new PlayerBar(store, send);
+    this.revisions = new RevisionsPanel(store, send, () => this.comparison);
     const pixel = () => meter.pixel.quantiles(0.5, 0.99) as [number, number];
     this.layout = new Layout(this.verdict.element, {
       numbers: new NumbersPanel(store, () => store.main?.skipped ?? 0, pixel), health: new HealthPanel(store), plots: new PlotsPanel(store, theme),
-      log: new LogPanel(store), story: this.story, revisions: new RevisionsPanel(store, send, () => this.comparison),
+      log: new LogPanel(store), story: this.story, revisions: this.revisions,
     }, () => store.hello?.mode === "map");
     this.tools = new MapTools(this.map, store, theme, {
       redraw: () => this.redraw(), layersChanged: () => this.layersChanged(), screenshot: () => screenshot(this.map, store, theme, this.verdict.shown),
@@ -102,6 +104,7 @@ export class App {
       this.store.greet(header);
       this.map.restart();
       this.layout.arrange();
+      if (header.mode === "map") this.layout.show(this.revisions);
       this.connection.send({ overlays: wantedOverlays(this.map.layers) });
     } else if (header.kind === "frame") {
       this.store.apply(header, arrays);
@@ -174,8 +177,7 @@ export class App {
     this.theme.onChange(() => this.redraw());
     setInterval(() => this.meter.panelTurn(() => this.panels()), panelPause);
     addEventListener("keydown", (e) => {
-      const isTyping = e.target instanceof HTMLInputElement && e.target.type !== "range" || e.target instanceof HTMLSelectElement;
-      if (isTyping || e.ctrlKey || e.metaKey || e.altKey) return;
+      if (isForControl(e) || e.ctrlKey || e.metaKey || e.altKey) return;
       if (e.key === "Escape") this.escape();
       else if (!this.player.key(e) && !this.tools.key(e.key)) return;
       e.preventDefault();
@@ -193,4 +195,12 @@ export class App {
     this.player.update();
     this.layout.update();
   }
+}
+
+/** Whether the key means something to the control that has the focus. */
+function isForControl(e: KeyboardEvent): boolean {
+  const t = e.target;
+  if (t instanceof HTMLSelectElement) return true;
+  if (!(t instanceof HTMLInputElement) || t.type === "range") return false;
+  return t.type === "search" || e.key === " " || e.key.startsWith("Arrow");
 }

@@ -13,18 +13,19 @@ function rgb(hex: string): Rgb {
 }
 export function css([r, g, b]: Rgb): string { return `rgb(${Math.round(r * 255)} ${Math.round(g * 255)} ${Math.round(b * 255)})`; }
 
-// Existence goes from vermilion over yellow to blue: told apart with each of the common colour deficiencies.
+// Existence goes from amber over magenta to blue: told apart with each of the common colour deficiencies, and never grey, which is
+// for what is unknown.
 const dark: Palette = {
-  background: rgb("#0e1311"), gridMinor: rgb("#161d1a"), gridMajor: rgb("#222c27"), ink: rgb("#e8eeea"), muted: rgb("#87958d"),
-  accent: rgb("#3fd0a0"), runs: [rgb("#3fd0a0"), rgb("#e889d0")], truth: rgb("#d7dedA"), unknown: rgb("#8a948e"),
-  unlikely: rgb("#f0652f"), doubtful: rgb("#f2cf5b"), likely: rgb("#5fb0f5"), warn: rgb("#f5b942"), bad: rgb("#ff5d55"),
+  background: rgb("#0e1311"), gridMinor: rgb("#171e1b"), gridMajor: rgb("#232c28"), ink: rgb("#e8eeea"), muted: rgb("#87958d"),
+  accent: rgb("#3fd0a0"), runs: [rgb("#3fd0a0"), rgb("#c8a6ff")], truth: rgb("#d7dedA"), unknown: rgb("#8a948e"),
+  unlikely: rgb("#ffb000"), doubtful: rgb("#e8478c"), likely: rgb("#6a9bff"), warn: rgb("#f5b942"), bad: rgb("#ff5d55"),
   added: rgb("#4fb3ff"), removed: rgb("#ff8a4c"), scan: rgb("#b6c4bc"), hierarchy: [rgb("#3a4f6b"), rgb("#8f7bd6")],
   submap: rgb("#6f8a7c"), detection: rgb("#ffffff"),
 };
 const light: Palette = {
   background: rgb("#f8f9f6"), gridMinor: rgb("#eff1ec"), gridMajor: rgb("#dfe3dc"), ink: rgb("#17201b"), muted: rgb("#6a766f"),
-  accent: rgb("#07795a"), runs: [rgb("#07795a"), rgb("#b0308f")], truth: rgb("#2a332e"), unknown: rgb("#98a19b"),
-  unlikely: rgb("#d1440c"), doubtful: rgb("#c99700"), likely: rgb("#1565b3"), warn: rgb("#b87400"), bad: rgb("#c8201b"),
+  accent: rgb("#07795a"), runs: [rgb("#07795a"), rgb("#7a3fd0")], truth: rgb("#2a332e"), unknown: rgb("#98a19b"),
+  unlikely: rgb("#e68a00"), doubtful: rgb("#c9246b"), likely: rgb("#2458c9"), warn: rgb("#b87400"), bad: rgb("#c8201b"),
   added: rgb("#0b66c3"), removed: rgb("#d2500f"), scan: rgb("#5c6a62"), hierarchy: [rgb("#b9c8dc"), rgb("#7a62c9")],
   submap: rgb("#7f9488"), detection: rgb("#17201b"),
 };

@@ -33,6 +33,8 @@ export class Ellipses extends Batch {
   }
 
   ellipse(x: number, y: number, xx: number, xy: number, yy: number, c: Colour, alpha = 1): void {
-    this.push(x, y, xx, xy, yy, c[0], c[1], c[2], alpha);
+    const o = this.place(), d = this.data;
+    d[o] = x; d[o + 1] = y; d[o + 2] = xx; d[o + 3] = xy; d[o + 4] = yy;
+    d[o + 5] = c[0]; d[o + 6] = c[1]; d[o + 7] = c[2]; d[o + 8] = alpha;
   }
 }

@@ -50,7 +50,7 @@ export function addMesh(scene: THREE.Scene, object: THREE.Object3D, order: numbe
 export class Batch {
   readonly mesh: THREE.Mesh<THREE.InstancedBufferGeometry, THREE.RawShaderMaterial>;
   private readonly stride: number;
-  private data!: Float32Array;
+  protected data!: Float32Array;
   private buffer!: THREE.InstancedInterleavedBuffer;
   private at = 0;
 
@@ -64,9 +64,10 @@ export class Batch {
 
   begin(): void { this.at = 0; }
 
-  push(...values: number[]): void {
+  /** Where the floats of one more instance go in `data`. */
+  protected place(): number {
     if ((this.at + 1) * this.stride > this.data.length) this.double();
-    this.data.set(values, this.at++ * this.stride);
+    return this.at++ * this.stride;
   }
 
   end(): void {

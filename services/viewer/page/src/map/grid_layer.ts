@@ -29,6 +29,7 @@ export class GridLayer {
   constructor(scene: THREE.Scene) {
     const g = new THREE.BufferGeometry();
     g.setAttribute("corner", new THREE.BufferAttribute(new Float32Array([-1, -1, 3, -1, -1, 3]), 2));
+    g.setDrawRange(0, 3);
     this.mesh = new THREE.Mesh(g, material(vertex, fragment, this.uniforms));
     addMesh(scene, this.mesh, 0);
   }

@@ -38,7 +38,7 @@ export class MapView {
   constructor(readonly canvas: HTMLCanvasElement, private readonly store: Store, private readonly theme: Theme) {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: false, powerPreference: "high-performance" });
     // The check waits for each program to be linked, one after the other, before anything is seen.
-    this.renderer.debug.checkShaderErrors = false;
+    this.renderer.debug.checkShaderErrors = new URLSearchParams(location.search).has("check");
     this.scene.matrixWorldAutoUpdate = false;
     theme.onChange(() => this.paint());
     this.paint();

@@ -47,6 +47,8 @@ export class Marks extends Batch {
 
   /** Radius = `px` CSS pixels + `m` metres. */
   mark(kind: number, x: number, y: number, px: number, m: number, c: Colour, alpha = 1, theta = 0, opening = 0): void {
-    this.push(x, y, Math.cos(theta), Math.sin(theta), px, m, c[0], c[1], c[2], alpha, kind, opening);
+    const o = this.place(), d = this.data;
+    d[o] = x; d[o + 1] = y; d[o + 2] = Math.cos(theta); d[o + 3] = Math.sin(theta); d[o + 4] = px; d[o + 5] = m;
+    d[o + 6] = c[0]; d[o + 7] = c[1]; d[o + 8] = c[2]; d[o + 9] = alpha; d[o + 10] = kind; d[o + 11] = opening;
   }
 }

@@ -51,7 +51,7 @@ export class Overlays {
       const isActive = s.id === active;
       for (let i = 0; i < s.outline.length; i++) {
         const a = s.outline[i], b = s.outline[(i + 1) % s.outline.length];
-        this.below.line(a[0], a[1], b[0], b[1], isActive ? p.runs[run.index % 2] : p.submap, isActive ? 0.9 : 0.6, isActive ? 2 : 1.2, isActive ? 0 : 5);
+        this.below.line(a[0], a[1], b[0], b[1], p.submap, isActive ? 0.9 : 0.6, isActive ? 1.8 : 1.2, isActive ? 0 : 5);
       }
       this.marks.mark(shape.square, s.x, s.y, 3, 0, p.submap, 0.8, s.theta);
     }
@@ -59,11 +59,11 @@ export class Overlays {
 
   private closures(run: Run, p: Palette): void {
     const colours: Record<string, [Rgb, number]> = {
-      accepted: [p.accent, 0], waiting: [p.warn, 4], refused: [p.bad, 3], revoked: [p.muted, 3], sent: [p.warn, 0],
+      accepted: [p.likely, 0], waiting: [p.warn, 4], refused: [p.bad, 3], revoked: [p.muted, 3], sent: [p.warn, 0],
     };
     for (const c of run.closures) {
       const [colour, dash] = colours[c.status] ?? [p.muted, 3];
-      this.above.line(c.from[0], c.from[1], c.to[0], c.to[1], colour, 0.9, 2, dash);
+      this.above.line(c.from[0], c.from[1], c.to[0], c.to[1], colour, 0.75, 1.6, dash);
       this.marks.mark(shape.diamond, c.from[0], c.from[1], 5, 0, colour);
       this.marks.mark(shape.diamond, c.to[0], c.to[1], 5, 0, colour);
     }
@@ -96,7 +96,7 @@ export class Overlays {
     const pose = run.pose!, c = Math.cos(pose.theta), s = Math.sin(pose.theta), d = run.detections;
     for (let i = 0; i < d.x.length; i++) {
       const x = pose.x + c * d.x[i] - s * d.y[i], y = pose.y + s * d.x[i] + c * d.y[i];
-      this.marks.mark(d.kind[i] ? shape.square : shape.ring, x, y, 5, d.radius[i] || 0, p.detection, 0.7);
+      this.marks.mark(d.kind[i] ? shape.square : shape.ring, x, y, 5, d.radius[i] || 0, p.detection, 0.5);
     }
   }
 

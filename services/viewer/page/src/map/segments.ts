@@ -26,6 +26,9 @@ export class Segments extends Batch {
   }
 
   line(ax: number, ay: number, bx: number, by: number, c: Colour, alpha = 1, width = 1.5, dash = 0): void {
-    this.push(ax, ay, bx, by, c[0], c[1], c[2], alpha, width, dash);
+    const o = this.place(), d = this.data;
+    d[o] = ax; d[o + 1] = ay; d[o + 2] = bx; d[o + 3] = by;
+    d[o + 4] = c[0]; d[o + 5] = c[1]; d[o + 6] = c[2]; d[o + 7] = alpha;
+    d[o + 8] = width; d[o + 9] = dash;
   }
 }

@@ -1,5 +1,5 @@
 // Buttons, scale bar, legend and readouts that lie on the map.
-import { fixed, h, icon, metres, setText } from "../dom";
+import { clock, fixed, h, icon, metres, setText } from "../dom";
 import { largestSigma } from "../store/run";
 import type { Store } from "../store/store";
 import type { Theme } from "../theme";
@@ -18,6 +18,7 @@ export class MapTools {
   private readonly scaleBar = h("div", { class: "scale-bar" }, h("span"));
   private readonly readout = h("div", { class: "readout", "data-test": "readout", hidden: true });
   private readonly difference = h("div", { class: "readout second", "data-test": "difference", hidden: true });
+  private readonly about = h("span", { "data-test": "about" });
   private readonly legend = h("div", { class: "legend" });
   private legendOf = "";
 
@@ -30,7 +31,7 @@ export class MapTools {
       this.button("shot", "Screenshot (s)", () => actions.screenshot()),
       this.button("theme", "Light or dark (t)", () => theme.toggle()));
     this.fillMenu();
-    this.element.append(bar, this.menu, h("div", { class: "readouts" }, this.readout, this.difference), h("div", { class: "map-foot" }, this.legend, this.scaleBar));
+    this.element.append(h("div", { class: "title" }, h("b", {}, "Understory"), this.about), bar, this.menu, h("div", { class: "readouts" }, this.readout, this.difference), h("div", { class: "map-foot" }, this.legend, this.scaleBar));
     this.follow(map.isFollowing);
   }
 
@@ -79,6 +80,8 @@ export class MapTools {
     const c = this.map.camera, step = niceStep(70 / c.scale);
     this.scaleBar.style.width = `${(step * c.scale).toFixed(1)}px`;
     setText(this.scaleBar.firstElementChild!, step < 1 ? `${+(step * 100).toPrecision(3)} cm` : step < 1000 ? `${step} m` : `${step / 1000} km`);
+    const run = this.store.main, hello = this.store.hello;
+    setText(this.about, run && hello ? [run.name, hello.mode === "map" ? "" : clock(run.utime)].filter(Boolean).join("  \u00b7  ") : "");
     this.updateReadouts();
     this.updateLegend();
   }

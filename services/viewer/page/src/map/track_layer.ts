@@ -88,7 +88,8 @@ export class TrackLayer {
     bandMaterial.depthFunc = THREE.LessDepth;
     this.band = new THREE.Mesh(this.geometry, bandMaterial);
     addMesh(scene, this.band, order);
-    addMesh(scene, this.line, order + 5);
+    // The line lies over the landmarks, which may hide all of the ground.
+    addMesh(scene, this.line, order + 40);
   }
 
   paint(p: Palette, style: Style): void {
@@ -103,8 +104,7 @@ export class TrackLayer {
 
   /** Returns the number of points drawn. */
   update(track: Track, camera: Camera, isShown: boolean, isBandShown: boolean): number {
-    this.line.visible = isShown && this.points > 1;
-    this.band.visible = this.line.visible && isBandShown && this.withBand && this.hasSigma;
+    this.line.visible = this.band.visible = false;
     if (!isShown) return 0;
     if (this.isStale(track, camera)) this.choose(track, camera);
     else if (track.total !== this.total) this.append(track, camera);

@@ -8,7 +8,7 @@ export function chart(theme: Theme, lines: Line[], width: number, height: number
   const muted = () => css(theme.palette.muted), grid = () => css(theme.palette.gridMajor);
   const axis = { stroke: muted, grid: { stroke: grid, width: 1 }, ticks: { show: false }, font: "11px system-ui, sans-serif", gap: 4 };
   return new uPlot({
-    width, height, padding: [8, 8, 0, 0],
+    width, height, padding: [8, 26, 0, 0],
     legend: { show: false },
     cursor: { points: { size: 5 }, drag: { x: false, y: false }, y: false, sync: { key: "time" } },
     scales: { y: { range: (_u, min, max) => room(min, max, leastRange) } },

@@ -13,6 +13,7 @@ export class HealthPanel implements Panel {
   private readonly body = h("tbody");
   private readonly empty = h("p", { class: "empty" }, "No process was heard yet.");
   private readonly rows = new Map<string, Row>();
+  private order = "";
   private readonly opened = new Map<string, boolean>();
 
   constructor(private readonly store: Store) {
@@ -36,6 +37,17 @@ export class HealthPanel implements Panel {
       this.rows.delete(name);
     }
     for (const p of processes) this.updateRow(this.rows.get(p.name) ?? this.add(p.name), p);
+    this.sort(processes);
+  }
+
+  /** What needs a person stands first; the others in the order of the viewer. */
+  private sort(processes: Process[]): void {
+    const order = processes.map((p) => p.name);
+    order.sort((a, b) => urgency(processes, a) - urgency(processes, b));
+    const key = order.join();
+    if (key === this.order) return;
+    this.order = key;
+    for (const name of order) this.body.append(this.rows.get(name)!.line, this.rows.get(name)!.more);
   }
 
   private add(name: string): Row {
@@ -70,6 +82,11 @@ export class HealthPanel implements Panel {
     if (key !== row.shown) row.body.replaceChildren(...details(p));
     row.shown = key;
   }
+}
+
+function urgency(processes: Process[], name: string): number {
+  const at = ["silent", "error", "degraded"].indexOf(processes.find((p) => p.name === name)!.state);
+  return at < 0 ? 3 : at;
 }
 
 function details(p: Process): Node[] {

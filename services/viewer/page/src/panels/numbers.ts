@@ -17,7 +17,7 @@ export class NumbersPanel implements Panel {
     const share = (v: unknown) => (typeof v === "number" ? `${(100 * v).toFixed(0)} %` : dash);
     this.rows = [
       ["landmarks", "Landmarks in use", () => (store.main ? count(store.main.landmarks.used - store.main.landmarks.unused) : dash)],
-      ["unused", "out of use", () => (store.main ? count(store.main.landmarks.unused) : dash)],
+      ["unused", "Out of use", () => (store.main ? count(store.main.landmarks.unused) : dash)],
       ["error", "Error", () => `${metres(n().error_m as number)}`],
       ["error-deg", "Error of heading", () => (typeof n().error_deg === "number" ? `${fixed(n().error_deg, 2)}\u00b0` : dash)],
       ["missing", "Expected, not seen", () => share(n().missing_share)],

@@ -1,6 +1,6 @@
 // The landmarks of one run, by slot, in typed arrays that double when they are full. What the GPU draws (`drawn`: x, y, radius,
 // code) is the same memory that the page computes with; blocks of slots that changed are marked, so that only these are uploaded.
-import type { Arrays } from "../protocol";
+import type { Arrays, Numbers } from "../protocol";
 import { CellGrid } from "./cell_grid";
 
 export const there = 1, isCorner = 2, outOfUse = 4, ofGivenMap = 8;
@@ -39,8 +39,7 @@ export class Landmarks {
     this.slots = Math.max(this.slots, head.slots);
     this.used = head.used;
     this.unused = head.unused;
-    const slots = arrays.slot as Uint32Array | undefined;
-    if (slots) for (let i = 0; i < slots.length; i++) this.set(slots[i], i, arrays);
+    if (arrays.slot) this.setAll(arrays.slot as Uint32Array, arrays);
     this.version++;
   }
 
@@ -64,23 +63,26 @@ export class Landmarks {
     this.encode(slot);
   }
 
-  private set(slot: number, i: number, arrays: Arrays): void {
-    if (slot >= this.capacity) return;
-    const x = arrays.x![i], y = arrays.y![i];
-    this.flags[slot] = arrays.flags![i];
-    this.drawn[4 * slot] = x;
-    this.drawn[4 * slot + 1] = y;
-    this.drawn[4 * slot + 2] = arrays.radius![i];
-    this.covariance[3 * slot] = arrays.cxx![i];
-    this.covariance[3 * slot + 1] = arrays.cxy![i];
-    this.covariance[3 * slot + 2] = arrays.cyy![i];
-    this.probability[slot] = arrays.probability![i];
-    this.idLow[slot] = arrays.id_low![i];
-    this.idHigh[slot] = arrays.id_high![i];
-    this.seen[slot] = arrays.seen![i];
-    this.encode(slot);
-    if (this.flags[slot] & there) this.grid.put(slot, x, y);
-    else this.grid.remove(slot);
+  private setAll(slots: Uint32Array, arrays: Arrays): void {
+    const { x, y, cxx, cxy, cyy, radius, probability, seen, flags, id_low, id_high } = arrays as Record<string, Numbers>;
+    for (let i = 0; i < slots.length; i++) {
+      const s = slots[i];
+      if (s >= this.capacity) continue;
+      this.flags[s] = flags[i];
+      this.drawn[4 * s] = x[i];
+      this.drawn[4 * s + 1] = y[i];
+      this.drawn[4 * s + 2] = radius[i];
+      this.covariance[3 * s] = cxx[i];
+      this.covariance[3 * s + 1] = cxy[i];
+      this.covariance[3 * s + 2] = cyy[i];
+      this.probability[s] = probability[i];
+      this.idLow[s] = id_low[i];
+      this.idHigh[s] = id_high[i];
+      this.seen[s] = seen[i];
+      this.encode(s);
+      if (this.flags[s] & there) this.grid.put(s, x[i], y[i]);
+      else this.grid.remove(s);
+    }
   }
 
   private encode(slot: number): void {

@@ -37,6 +37,11 @@ const words: Record<Shown["state"], string> = {
 /** In a live drive health comes once a second: without any frame for longer, what is shown is old, whatever it says. */
 const staleMs = 3000;
 
+function describe(store: Store): string {
+  const shown = store.main?.revision?.version, revision = store.hello?.revisions?.find((r) => r.version === shown);
+  return revision ? `Version ${revision.version}: ${revision.text}` : "Nothing drives here.";
+}
+
 /** The verdict as a driver is to see it: what is old or cut off is never shown as fine. */
 export function shownVerdict(store: Store, isOpen: boolean, now: number): Shown {
   const verdict = store.main?.verdict;
@@ -46,6 +51,7 @@ export function shownVerdict(store: Store, isOpen: boolean, now: number): Shown 
   if (store.hello.mode === "live" && now - store.heard > staleMs && document.visibilityState === "visible") {
     return make("silent", `Nothing from the viewer for ${Math.round((now - store.heard) / 1000)} s.`);
   }
-  if (!verdict) return make("waiting", store.hello.mode === "map" ? "A stored map." : "No verdict yet.");
+  if (!verdict && store.hello.mode === "map") return { state: "waiting", word: "STORED MAP", text: describe(store) };
+  if (!verdict) return make("waiting", "No verdict yet.");
   return make(verdict.state, verdict.text);
 }

@@ -36,6 +36,8 @@ export class MockServer {
   }
 
   async close() {
+    if (this.isClosed) return;
+    this.isClosed = true;
     clearInterval(this.timer);
     for (const c of this.clients) c.socket.terminate();
     this.sockets.close();
