@@ -83,8 +83,8 @@ void finish_chain(SensorChain& chain, ChainRun& run);
 
 /// The services from raw sensors to the map, in the order in which data runs through them.
 std::vector<bus::Service> front_end_services();
-/// Those of them that the folder's launch.toml starts; a sensor's driver and the viewer are left
-/// out: a log or the simulation stands for it. All where the path is empty. Throws
+/// Those of them that the folder's launch.toml starts, but for the viewer, the store and a sensor's
+/// driver: a log or the simulation stands for that. All where the path is empty. Throws
 /// ConfigurationError, also for a process that is none of them.
 std::vector<bus::Service> services_of(const std::filesystem::path& config_dir);
 

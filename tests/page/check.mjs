@@ -1,0 +1,137 @@
+// node check.mjs BIN ROOT [--pictures DIR]: status 0 all hold, 1 not.
+import { mkdirSync } from "node:fs";
+import { join } from "node:path";
+import WebSocket from "ws";
+import { launch, open, state } from "../test/browser.mjs";
+import { Stack, sleep, until } from "./stack.mjs";
+
+const [bin, root] = process.argv.slice(2);
+const at = process.argv.indexOf("--pictures");
+const pictures = at < 0 ? null : process.argv[at + 1];
+const must = (holds, what) => { if (!holds) throw new Error(what); };
+
+const browser = await launch();
+const stack = new Stack(bin, root);
+const ended = [];
+let failed = 0;
+async function check(name, body) {
+  const begin = Date.now();
+  try {
+    console.log(`ok    ${name}: ${await body()} [${((Date.now() - begin) / 1000).toFixed(1)} s]`);
+  } catch (error) {
+    console.log(`FAIL  ${name}: ${error.message}`);
+    failed++;
+  }
+}
+
+const process_of = async (page, name) => (await state(page)).processes.find((p) => p.name === name);
+const landmarks = async (page) => (await state(page)).runs[0]?.landmarks ?? 0;
+
+try {
+  const address = await stack.page();
+  const page = await open(browser, address);
+  await check("the page opens and hears the processes", async () => {
+    await until("six processes that are ok", async () => (await state(page)).processes.filter((p) => p.state === "ok").length >= 6);
+    must((await state(page)).verdict.state === "waiting", "no pose has come, and the page does not say so");
+    return `${(await state(page)).processes.length} processes`;
+  });
+
+  const drive = stack.sim("intermediate", "--path", "circle", "--seed", "7", "--rate", "3");
+  await check("the map appears and numbers move", async () => {
+    await until("50 landmarks and a pose", async () => (await landmarks(page)) >= 50 && (await state(page)).verdict.state === "ok");
+    const before = (await state(page)).pose.utime;
+    await until("another pose", async () => (await state(page)).pose.utime > before + 1e6);
+    return `${await landmarks(page)} landmarks, ${(await state(page)).verdict.text}`;
+  });
+
+  await check("a landmark tells its story", async () => {
+    // Number 1 of map 1.
+    await page.evaluate(() => window.understory.select(String((1n << 48n) + 1n)));
+    const [title] = await until("the story", async () => (await state(page)).story);
+    await page.evaluate(() => window.understory.clearSelection());
+    return title;
+  });
+
+  await check("a killed process turns red within 1 s and comes back", async () => {
+    process.kill(stack.pid("loop_closer"), "SIGKILL");
+    const [, ms] = await until("red", async () => (await process_of(page, "loop_closer")).state === "silent", 5000);
+    must(ms <= 1000, `red only after ${ms} ms`);
+    await until("ok again", async () => (await process_of(page, "loop_closer")).state === "ok");
+    return `red after ${ms} ms`;
+  });
+
+  await check("a process that hangs turns red within 1 s", async () => {
+    const pid = stack.pid("existence_tracker");
+    process.kill(pid, "SIGSTOP");
+    const [, ms] = await until("red", async () => (await process_of(page, "existence_tracker")).state === "silent", 5000);
+    process.kill(pid, "SIGCONT");
+    must(ms <= 1000, `red only after ${ms} ms`);
+    await until("ok again", async () => (await process_of(page, "existence_tracker")).state === "ok");
+    return `red after ${ms} ms`;
+  });
+
+  await check("ten stalled browsers change nothing on the bus", async () => {
+    const stalled = [];
+    for (let i = 0; i < 10; i++) {
+      const socket = new WebSocket(address.replace("http", "ws") + "live");
+      await new Promise((done) => socket.on("open", done));
+      socket.pause();
+      stalled.push(socket);
+    }
+    const before = (await state(page)).pose.utime;
+    await sleep(3000);
+    const after = (await state(page)).pose.utime;
+    const listed = await stack.status();
+    for (const socket of stalled) socket.terminate();
+    must(after > before + 5e6, "poses stopped");
+    const mapper = listed.find((p) => p.process === "geoslam_mapper");
+    const lost = mapper.channels.reduce((sum, c) => sum + c.lost + c.dropped, 0);
+    must(lost === 0, `the mapper lost ${lost} messages`);
+    return `${((after - before) / 1e6).toFixed(0)} s of drive, the mapper lost nothing`;
+  });
+
+  await check("a page of elsewhere is refused", async () => {
+    const refused = await new Promise((done) => {
+      const socket = new WebSocket(address.replace("http", "ws") + "live", { origin: "http://evil.example" });
+      socket.on("unexpected-response", (_, response) => done(response.statusCode));
+      socket.on("open", () => done("opened"));
+      socket.on("error", () => {});
+    });
+    must(refused === 403, `${refused}`);
+    const counts = await (await fetch(address + "health.json")).json();
+    must(counts.refused_origin >= 1, "not counted");
+    return "403, counted";
+  });
+
+  if (pictures) {
+    mkdirSync(pictures, { recursive: true });
+    for (const theme of ["dark", "light"]) {
+      const one = await open(browser, `${address}?theme=${theme}`, { width: 1600, height: 900 });
+      await sleep(5000);
+      await one.screenshot({ path: join(pictures, `page-${theme}.png`) });
+      await one.close();
+    }
+  }
+
+  await check("a vehicle whose poses stop is shown as silent, one that is elsewhere as not sure", async () => {
+    await until("the end of the drive", () => drive.exitCode !== null, 120_000);
+    await until("silent", async () => (await state(page)).verdict.state === "silent", 5000);
+    // Another forest: nothing of it is in the map.
+    ended.push(stack.sim("intermediate", "--path", "circle", "--seed", "99", "--rate", "5"));
+    const [verdict] = await until("unsure or lost", async () => {
+      const { state: now, text } = (await state(page)).verdict;
+      return now === "lost" || now === "unsure" ? `${now}: ${text}` : null;
+    });
+    return verdict;
+  });
+  must(page.faults.length === 0, page.faults.join("\n"));
+} catch (error) {
+  console.log(`FAIL  ${error.message}\n${stack.output.slice(-2000)}`);
+  failed++;
+} finally {
+  for (const child of ended) child.kill();
+  await browser.close();
+  await stack.stop();
+}
+console.log(failed ? `${failed} failed` : "all hold");
+process.exit(failed ? 1 : 0);
