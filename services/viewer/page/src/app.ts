@@ -93,7 +93,6 @@ export class App {
     });
     this.meter.picture();
     const shown = performance.timeOrigin + performance.now();
-    if (this.newest) this.store.main?.pixelMs.push(shown - this.newest);
     if (this.newest) this.meter.pixel.push(shown - this.newest);
     this.newest = 0;
     this.connection.acknowledge(Math.round(shown));
@@ -101,8 +100,9 @@ export class App {
 
   private take({ header, arrays }: Message): void {
     if (header.kind === "hello") {
+      const isSame = JSON.stringify(this.store.hello?.runs) === JSON.stringify(header.runs);
       this.store.greet(header);
-      this.map.restart();
+      this.map.restart(isSame);
       this.layout.arrange();
       if (header.mode === "map") this.layout.show(this.revisions);
       this.connection.send({ overlays: wantedOverlays(this.map.layers) });

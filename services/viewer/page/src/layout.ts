@@ -23,11 +23,12 @@ export class Layout {
     this.strip.hidden = this.narrow.matches;
     if (this.narrow.matches) {
       this.lower.set([]);
-      this.upper.set([...versions, health, numbers, plots, log, story]);
+      this.upper.set(versions.length ? [...versions, numbers, story] : [health, numbers, plots, log, story]);
     } else {
       this.strip.replaceChildren(numbers.element);
-      this.upper.set([...versions, health, story]);
-      this.lower.set([plots, log]);
+      this.upper.set(versions.length ? [...versions, story] : [health, story]);
+      // Of a stored map there is nothing to plot.
+      this.lower.set(versions.length ? [] : [plots, log]);
     }
   }
 

@@ -41,7 +41,9 @@ export const pictures = (page, n) => until(`${n} pictures`, async () => (await s
 export async function colours(page) {
   const png = await page.locator('[data-test="map"]').screenshot();
   return page.evaluate(async (data) => {
-    const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${data}`)).blob());
+    const image = new Image();
+    image.src = `data:image/png;base64,${data}`;
+    await image.decode();
     const g = new OffscreenCanvas(image.width, image.height).getContext("2d");
     g.drawImage(image, 0, 0);
     const pixels = new Uint32Array(g.getImageData(0, 0, image.width, image.height).data.buffer), counts = new Map();

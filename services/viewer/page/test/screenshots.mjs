@@ -7,6 +7,7 @@ const sizes = { wide: { width: 1600, height: 900 }, narrow: { width: 420, height
 const views = [
   ["200", "drive", null], ["100000", "medium", null], ["100000-all", "medium", () => window.understory.fit()], ["log", "log", null], ["map", "map", null],
   ["lost", "drive", null, (scene) => scene.setLost(true)],
+  ["silent", "drive", null, (scene) => scene.setIll("ekf", "silent")],
   ["story", "drive", () => [...Array(200).keys()].some((i) => window.understory.select(String(281474976710657n + BigInt(i))))],
 ];
 

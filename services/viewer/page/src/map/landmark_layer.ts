@@ -8,7 +8,7 @@ import type { Ellipses } from "./ellipses";
 import { addMesh, material, uColour } from "./gl";
 
 const nearCapacity = 20000, ellipseCapacity = 6000;
-const perPicture = 96;
+const perPicture = 48;
 
 const vertex = `
 in vec4 landmark;
@@ -94,7 +94,8 @@ export class LandmarkLayer {
     if (hasChanged || this.isBehind) this.upload(landmarks);
     // Zoomed in far enough, fewer are in view and more ellipses are large enough to be seen.
     const isNearer = camera.scale > 2 * this.chosenScale;
-    if (hasChanged || isNearer || !this.area || !contains(this.area, camera.seen())) this.choose(landmarks, camera);
+    const areNearChanged = hasChanged && this.count >= 0;
+    if (areNearChanged || isNearer || !this.area || !contains(this.area, camera.seen())) this.choose(landmarks, camera);
 
     const shown = this.count < 0 ? landmarks.used : Math.max(1, this.count / 2.5);
     const spacing = Math.sqrt((camera.width * camera.height) / Math.max(1, shown));

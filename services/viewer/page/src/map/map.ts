@@ -64,9 +64,9 @@ export class MapView {
     this.renderer.setSize(width, height, false);
   }
 
-  /** Another run set begins: the first picture shows all of it. */
-  restart(): void {
-    this.needsFit = true;
+  /** Everything comes anew: of other runs the first picture shows all; of the same ones the view stays as it was. */
+  restart(isSame: boolean): void {
+    this.needsFit ||= !isSame;
     this.selection = null;
     this.ruler = [];
     this.paint();

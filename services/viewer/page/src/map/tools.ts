@@ -81,6 +81,7 @@ export class MapTools {
     this.scaleBar.style.width = `${(step * c.scale).toFixed(1)}px`;
     setText(this.scaleBar.firstElementChild!, step < 1 ? `${+(step * 100).toPrecision(3)} cm` : step < 1000 ? `${step} m` : `${step / 1000} km`);
     const run = this.store.main, hello = this.store.hello;
+    this.buttons.follow.hidden = hello?.mode === "map";
     setText(this.about, run && hello ? [run.name, hello.mode === "map" ? "" : clock(run.utime)].filter(Boolean).join("  \u00b7  ") : "");
     this.updateReadouts();
     this.updateLegend();

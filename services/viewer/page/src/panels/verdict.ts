@@ -49,6 +49,7 @@ export class VerdictBanner {
     if (pose?.is_provisional) details.push("provisional");
     if (age >= 1 && this.shown.state === verdict?.state) details.push(`for ${duration(age)}`);
     setText(this.since, details.join(" \u00b7 "));
+    this.element.classList.toggle("without-figures", !pose);
     const values: [string, string][] = [
       [pose ? metres(3 * largestSigma(pose)) : "\u2013", "3 sigma"],
       [pose ? `${fixed((3 * 180 / Math.PI) * Math.sqrt(Math.max(0, pose.covariance[8])), 1)}\u00b0` : "\u2013", "heading, 3 sigma"],

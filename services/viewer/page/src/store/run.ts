@@ -1,7 +1,7 @@
 // What the page knows of one run: a frame replaces the fields that it has.
 import type * as P from "../protocol";
 import { Landmarks } from "./landmarks";
-import { Ring, TimeTable } from "./ring";
+import { TimeTable } from "./ring";
 import { Track } from "./track";
 
 export interface Scan { x: Float32Array; y: Float32Array; z: Float32Array }
@@ -40,7 +40,6 @@ export class Run {
   logVersion = 0;
   revision: { version: number; base: number } | null = null;
   readonly history = new TimeTable(1200, 1 + plotted.length);
-  readonly pixelMs = new Ring(512);
   /** Counts of changes of what the map draws, each compared by its layer. */
   readonly version = { pose: 0, scan: 0, matches: 0, hierarchy: 0, overlays: 0 };
 
@@ -120,10 +119,8 @@ export class Run {
     }
     if (!frame.numbers) return;
     this.numbers = { ...this.numbers, ...frame.numbers };
-    const page = this.pixelMs.length ? this.pixelMs.values[(this.frames + 511) % 512] : null;
     const row = plotted.map((name) => {
       if (name === "sigma_m") return this.pose ? largestSigma(this.pose) : null;
-      if (name === "page_ms") return this.numbers.page_ms === undefined ? page : asNumber(this.numbers.page_ms);
       return asNumber(this.numbers[name]);
     });
     this.history.push([this.utime / 1e6, ...row]);

@@ -19,6 +19,9 @@ export const scenes = {
 
 const files = { "/": ["index.html", "text/html; charset=utf-8"], "/app.js": ["app.js", "text/javascript"], "/app.css": ["app.css", "text/css"] };
 
+/** The strictest that the page works with. */
+const policy = "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'";
+
 export class MockServer {
   constructor(dist, scene, { pause = 50 } = {}) {
     Object.assign(this, { dist, scene, clients: new Set(), seq: 0, messages: [], broken: 0 });
@@ -47,7 +50,7 @@ export class MockServer {
   serve(request, response) {
     const [file, type] = files[request.url.split("?")[0]] ?? [];
     if (!file) return response.writeHead(404).end();
-    response.writeHead(200, { "content-type": type, "cache-control": "no-store" }).end(readFileSync(join(this.dist, file)));
+    response.writeHead(200, { "content-type": type, "cache-control": "no-store", "content-security-policy": policy }).end(readFileSync(join(this.dist, file)));
   }
 
   connect(socket) {
