@@ -13,6 +13,7 @@
 #include "services/viewer/page_host.hpp"
 #include "services/viewer/process_watch.hpp"
 #include "services/viewer/run.hpp"
+#include "understory/map_request_t.hpp"
 
 namespace understory::viewer {
 namespace {
@@ -22,18 +23,21 @@ constexpr std::int64_t kWatchEvery_us = 200'000;
 
 class ViewerAdapter : public bus::Adapter, public bus::Device {
  public:
+  explicit ViewerAdapter(ViewerChannels channels) : channels_(std::move(channels)) {}
+
   void describe(bus::ParameterTable& table) override { viewer::describe(parameters_, table); }
 
   void bind(bus::Node& node) override {
     node_ = &node;
+    requests_ = node.advertise<map_request_t>(channels_.map_request);
     for_each_channel([this]<class T>(const char* channel, const ChannelTraits& traits, auto take) {
       if (traits.is_bulk && !parameters_.hears_sweeps) return;
-      node_->subscribe<T>(
-          channel, [this, channel, take](const T& value) { hear(channel, value, take); },
-          {.queue_size = traits.is_bulk ? std::size_t{400} : std::size_t{100},
-           .sequenced = !traits.is_from_many,
-           .timed = traits.is_on_message_time,
-           .journaled = false});
+      node_->subscribe<T>(channel,
+                          [this, channel, take](const T& value) { hear(channel, value, take); },
+                          {.queue_size = traits.is_bulk ? std::size_t{400} : std::size_t{100},
+                           .sequenced = !traits.is_from_many,
+                           .timed = traits.is_on_message_time,
+                           .journaled = false});
     });
   }
 
@@ -63,11 +67,14 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
     }
     run_.scene().look(wall_us);
     host_->attend(monotonic_us);
+    if (run_.scene().wants_map() && !run_.scene().processes().entries().empty())
+      ask_for_map(monotonic_us);
     report_refused();
   }
 
  private:
   static constexpr std::int64_t kAttendEvery_us = 5'000;
+  static constexpr std::int64_t kAskAgain_us = 5'000'000;
 
   template <class T, class Take>
   void hear(const char* channel, const T& value, const Take& take) {
@@ -86,6 +93,16 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
       run_.scene().processes().take(name, look_at_process(pid), wall_us);
   }
 
+  /// Who comes late has heard no MAP.
+  void ask_for_map(std::int64_t monotonic_us) {
+    if (monotonic_us - asked_us_ < kAskAgain_us) return;
+    asked_us_ = monotonic_us;
+    map_request_t request{};
+    request.utime = std::max<model::Utime>(0, node_->now());
+    request.everything = 1;
+    requests_.publish(request);
+  }
+
   void report_refused() {
     const std::uint64_t refused = host_->counts().refused();
     if (refused == refused_) return;
@@ -97,21 +114,24 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
     refused_ = refused;
   }
 
+  ViewerChannels channels_;
   ViewerParameters parameters_;
+  bus::Publisher<map_request_t> requests_;
   bus::Clock clock_ = bus::system_clock();
   bus::Node* node_ = nullptr;
   Run run_;
   std::optional<PageHost> host_;
   std::int64_t attended_us_ = 0;
+  std::int64_t asked_us_ = -kAskAgain_us;
   std::int64_t watched_us_ = 0;
   std::uint64_t refused_ = 0;
 };
 
 }  // namespace
 
-bus::Service viewer_service() {
-  return {"viewer", "all channels that people look at -> a web page",
-          [] { return std::make_unique<ViewerAdapter>(); }};
+bus::Service viewer_service(const ViewerChannels& channels) {
+  return {"viewer", "all channels that people look at -> a web page, " + channels.map_request,
+          [channels] { return std::make_unique<ViewerAdapter>(channels); }};
 }
 
 }  // namespace understory::viewer

@@ -117,7 +117,7 @@ void PageHost::take_events() {
       server_->close(event.client, *refusal);
     }
   }
-  if (!events.empty() || !has_told_counts_) tell_counts();
+  if (!events.empty() || !(server_->counts() == told_counts_)) tell_counts();
 }
 
 void PageHost::take_page_event(const web::Event& event) {
@@ -146,13 +146,13 @@ void PageHost::take_page_event(const web::Event& event) {
 }
 
 void PageHost::tell_counts() {
-  nlohmann::ordered_json body = counts_json(server_->counts());
+  told_counts_ = server_->counts();
+  nlohmann::ordered_json body = counts_json(told_counts_);
   body["pages"] = pages_.size();
   body["skipped"] = pages_.skipped();
   body["foxglove_clients"] = foxglove_.size();
   body["foxglove_dropped"] = foxglove_.dropped();
   server_->set_document("/health.json", {"application/json", body.dump(2) + "\n"});
-  has_told_counts_ = true;
 }
 
 }  // namespace understory::viewer

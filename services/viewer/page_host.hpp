@@ -56,7 +56,7 @@ class PageHost {
   PageClients pages_;
   FoxgloveClients foxglove_;
   std::unique_ptr<web::Server> server_;
-  bool has_told_counts_ = false;
+  web::ServerCounts told_counts_{.connections = ~std::uint64_t{0}};  ///< Never told yet.
 };
 
 }  // namespace understory::viewer

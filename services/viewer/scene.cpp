@@ -54,6 +54,7 @@ void Scene::note_time(model::Utime utime, std::int64_t wall_us) {
 void Scene::reset() {
   start_map(0);
   map_version_ = 0;
+  wants_map_ = true;
   changed(pose_).reset();
   changed(scan_) = {};
   changed(numbers_) = {};
@@ -196,6 +197,7 @@ void Scene::take(const model::WholeMap& map) {
   utime_ = std::max(utime_, map.utime);
   if (!map.complete) return;
   map_version_ = map.version;
+  wants_map_ = false;
   // What it does not list, and was not handed over, is gone.
   std::vector<model::LandmarkId> gone;
   for (const SceneLandmark& one : landmarks_.slots()) {
@@ -215,6 +217,7 @@ void Scene::take(const model::MapDelta& delta) {
   utime_ = std::max(utime_, delta.utime);
   if (delta.base_version == 0 && map_version_ != 0) start_map(map_id_);
   if (delta.base_version != 0 && delta.version <= map_version_) return;
+  wants_map_ = delta.base_version != 0 && (wants_map_ || delta.base_version != map_version_);
   map_version_ = delta.version;
 
   for (const auto* list : {&delta.added, &delta.moved}) {

@@ -105,6 +105,8 @@ class Scene {
   void take_stored(std::span<const model::MapLandmark> landmarks,
                    std::span<const model::LandmarkExistence> existence,
                    std::span<const model::KeyframePose> keyframes);
+  /// Whether the whole map should be asked for: none was heard, or changes were missed.
+  bool wants_map() const { return wants_map_; }
   /// Time passes: what is silent.
   void look(std::int64_t wall_us);
   /// As before the first message; readers are told.
@@ -157,6 +159,7 @@ class Scene {
   Change reset_change_ = 0;
   std::uint32_t map_id_ = 0;
   std::uint64_t map_version_ = 0;
+  bool wants_map_ = true;
   LandmarkTable landmarks_{change_};
   Track driven_{change_};
   KeyframePath keyframes_{change_};

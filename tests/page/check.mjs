@@ -1,5 +1,7 @@
 // node check.mjs BIN ROOT [--pictures DIR]: status 0 all hold, 1 not.
-import { mkdirSync } from "node:fs";
+import { spawnSync } from "node:child_process";
+import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
 import { join } from "node:path";
 import WebSocket from "ws";
 import { launch, open, state } from "../test/browser.mjs";
@@ -12,7 +14,8 @@ const must = (holds, what) => { if (!holds) throw new Error(what); };
 
 const browser = await launch();
 const stack = new Stack(bin, root);
-const ended = [];
+const scratch = mkdtempSync(join(tmpdir(), "understory-elsewhere-"));
+let elsewhere = null;
 let failed = 0;
 async function check(name, body) {
   const begin = Date.now();
@@ -53,8 +56,11 @@ try {
   });
 
   await check("a killed process turns red within 1 s and comes back", async () => {
+    // It would be back before anybody sees that it was gone.
+    process.kill(stack.launch.pid, "SIGSTOP");
     process.kill(stack.pid("loop_closer"), "SIGKILL");
     const [, ms] = await until("red", async () => (await process_of(page, "loop_closer")).state === "silent", 5000);
+    process.kill(stack.launch.pid, "SIGCONT");
     must(ms <= 1000, `red only after ${ms} ms`);
     await until("ok again", async () => (await process_of(page, "loop_closer")).state === "ok");
     return `red after ${ms} ms`;
@@ -98,40 +104,56 @@ try {
       socket.on("error", () => {});
     });
     must(refused === 403, `${refused}`);
-    const counts = await (await fetch(address + "health.json")).json();
-    must(counts.refused_origin >= 1, "not counted");
+    await until("counted", async () => (await (await fetch(address + "health.json")).json()).refused_origin >= 1, 2000);
     return "403, counted";
   });
 
   if (pictures) {
     mkdirSync(pictures, { recursive: true });
     for (const theme of ["dark", "light"]) {
-      const one = await open(browser, `${address}?theme=${theme}`, { width: 1600, height: 900 });
+      const one = await open(browser, address, { width: 1600, height: 900, theme });
       await sleep(5000);
       await one.screenshot({ path: join(pictures, `page-${theme}.png`) });
       await one.close();
     }
   }
 
-  await check("a vehicle whose poses stop is shown as silent, one that is elsewhere as not sure", async () => {
-    await until("the end of the drive", () => drive.exitCode !== null, 120_000);
-    await until("silent", async () => (await state(page)).verdict.state === "silent", 5000);
-    // Another forest: nothing of it is in the map.
-    ended.push(stack.sim("intermediate", "--path", "circle", "--seed", "99", "--rate", "5"));
-    const [verdict] = await until("unsure or lost", async () => {
-      const { state: now, text } = (await state(page)).verdict;
-      return now === "lost" || now === "unsure" ? `${now}: ${text}` : null;
-    });
-    return verdict;
+  await check("a vehicle whose poses stop is shown as silent", async () => {
+    drive.kill("SIGINT");
+    const [, ms] = await until("silent", async () => (await state(page)).verdict.state === "silent", 5000);
+    return `after ${ms} ms`;
   });
   must(page.faults.length === 0, page.faults.join("\n"));
+
+  // A map of another forest, of which nothing is here.
+  await stack.stop();
+  const log = join(scratch, "elsewhere.lcm"), run = join(scratch, "run.lcm"), map = join(scratch, "elsewhere.gpkg");
+  for (const parameters of [
+    ["sim", "intermediate", "--path", "circle", "--seed", "99", "--out", log],
+    ["replay", log, "--out", run, "--stages", "keyframer,geoslam_mapper"],
+    ["map", "import", run, "--out", map],
+  ]) must(spawnSync(join(bin, "understory"), parameters).status === 0, `understory ${parameters.join(" ")}`);
+  elsewhere = new Stack(bin, root, ["--map", map, "--localisation-only"]);
+  const lost = await open(browser, await elsewhere.page());
+  elsewhere.sim("intermediate", "--path", "circle", "--seed", "7", "--rate", "3");
+  await check("a vehicle that is nowhere in its map is shown as lost", async () => {
+    const [text] = await until("lost", async () => {
+      const { state: now, text } = (await state(lost)).verdict;
+      must(now !== "ok", `the verdict is ok: ${text}`);
+      return now === "lost" && text;
+    });
+    await until("the given map on the page", async () => (await landmarks(lost)) > 50);
+    await until("LOST, for the driver", async () => (await lost.locator('[data-test="verdict-word"]').textContent()) === "LOST");
+    return text;
+  });
 } catch (error) {
   console.log(`FAIL  ${error.message}\n${stack.output.slice(-2000)}`);
   failed++;
 } finally {
-  for (const child of ended) child.kill();
   await browser.close();
   await stack.stop();
+  await elsewhere?.stop();
+  rmSync(scratch, { recursive: true, force: true });
 }
 console.log(failed ? `${failed} failed` : "all hold");
 process.exit(failed ? 1 : 0);

@@ -29,15 +29,15 @@ function children(pid) {
 }
 
 export class Stack {
-  constructor(bin, root, config = "deploy/config") {
+  constructor(bin, root, options = []) {
     this.bin = bin;
     this.directory = mkdtempSync(join(tmpdir(), "understory-live-"));
-    cpSync(join(root, config), join(this.directory, "config"), { recursive: true });
-    // A folder that builds on another one names it relative to itself: the flat one does not.
+    cpSync(join(root, "deploy/config"), join(this.directory, "config"), { recursive: true });
     writeFileSync(join(this.directory, "config", "viewer.toml"), "[page]\nport = 0\n");
     this.url = `udpm://239.255.76.67:${20_000 + Math.floor(Math.random() * 10_000)}?ttl=0`;
     this.output = "";
-    this.launch = this.start(["launch", "--config", join(this.directory, "config"), "--state-dir", join(this.directory, "state"), "--lcm-url", this.url]);
+    this.children = [];
+    this.launch = this.start(["launch", "--config", join(this.directory, "config"), "--state-dir", join(this.directory, "state"), "--lcm-url", this.url, ...options]);
   }
   start(parameters) {
     const child = spawn(join(this.bin, "understory"), parameters);
@@ -49,7 +49,10 @@ export class Stack {
     return address;
   }
   pid(name) { return children(this.launch.pid)[name]; }
-  sim(...parameters) { return this.start(["sim", ...parameters, "--lcm-url", this.url]); }
+  sim(...parameters) {
+    this.children.push(this.start(["sim", ...parameters, "--lcm-url", this.url]));
+    return this.children.at(-1);
+  }
   /** HEALTH of all processes, as `understory status` has it. */
   async status() {
     const child = spawn(join(this.bin, "understory"), ["status", "--once", "--json", "--lcm-url", this.url]);
@@ -60,6 +63,9 @@ export class Stack {
     return parsed.processes ?? parsed;
   }
   async stop() {
+    if (this.launch.exitCode !== null || this.launch.signalCode !== null) return;
+    for (const child of this.children) child.kill("SIGINT");
+    this.launch.kill("SIGCONT");
     this.launch.kill("SIGTERM");
     await until("the end of launch", () => this.launch.exitCode !== null || this.launch.signalCode !== null, 20_000).catch(() => this.launch.kill("SIGKILL"));
     rmSync(this.directory, { recursive: true, force: true });
