@@ -5,6 +5,9 @@ import type { Panel } from "./panel";
 
 type Row = [id: string, label: string, value: () => string, isBad?: () => boolean];
 
+/** What means something of a map that nothing drives in. */
+const ofMap = ["landmarks", "unused"];
+
 export class NumbersPanel implements Panel {
   readonly id = "numbers";
   readonly title = "Numbers";
@@ -12,7 +15,7 @@ export class NumbersPanel implements Panel {
   private readonly cells: HTMLElement[];
   private readonly rows: Row[];
 
-  constructor(store: Store, skipped: () => number, pixel: () => [number, number]) {
+  constructor(private readonly store: Store, skipped: () => number, pixel: () => [number, number]) {
     const n = () => store.main?.numbers ?? {};
     const share = (v: unknown) => (typeof v === "number" ? `${(100 * v).toFixed(0)} %` : dash);
     this.rows = [
@@ -38,7 +41,9 @@ export class NumbersPanel implements Panel {
   }
 
   update(): void {
-    this.rows.forEach(([, , value, isBad], i) => {
+    const isMap = this.store.hello?.mode === "map";
+    this.rows.forEach(([id, , value, isBad], i) => {
+      this.cells[i].parentElement!.hidden = isMap && !ofMap.includes(id);
       setText(this.cells[i], value());
       this.cells[i].classList.toggle("warn", isBad?.() ?? false);
     });
