@@ -157,9 +157,14 @@ void PoseBook::take(const model::PointSweep& part, bool is_raw, std::int64_t rec
 }
 
 const ScanRecord* PoseBook::scan_of(const PoseRecord& pose) const {
-  return scans_.newest([&](const ScanRecord& one) {
-    return one.utime == pose.pose.utime && one.arrival.order < pose.arrival.order;
-  });
+  // The scan comes shortly before its pose.
+  auto one = std::ranges::partition_point(
+      scans_, [&](const ScanRecord& scan) { return scan.arrival.order < pose.arrival.order; });
+  while (one != scans_.begin()) {
+    --one;
+    if (one->utime == pose.pose.utime) return &*one;
+  }
+  return nullptr;
 }
 
 std::optional<double> PoseBook::latency_ms(const PoseRecord& pose) const {
