@@ -22,7 +22,7 @@ LandmarkBook::LandmarkBook(const Limits& limits, std::size_t bytes)
     : limits_(limits), moments_(limits.moments), records_(limits.landmarks, bytes) {}
 
 std::size_t LandmarkBook::fixed_bytes(const Limits& limits) {
-  return limits.moments * sizeof(Moment) + limits.submaps * kBytesOfSubmap;
+  return History<Moment>::bytes_of(limits.moments) + limits.submaps * kBytesOfSubmap;
 }
 
 void LandmarkBook::take(const model::MapUpdate& update) {

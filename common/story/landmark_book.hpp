@@ -47,8 +47,9 @@ class LandmarkBook {
   /// The map of the last placed keyframe; 0 before any.
   std::uint32_t map_in_use() const { return map_in_use_; }
   const LandmarkRecords& records() const { return records_; }  ///< All.
-  std::size_t bytes() const { return records_.bytes(); }       ///< Of the records.
-  static std::size_t fixed_bytes(const Limits& limits);        ///< Of moments and submaps, at most.
+  /// Held, without the submaps.
+  std::size_t bytes() const { return records_.bytes() + moments_.bytes(); }
+  static std::size_t fixed_bytes(const Limits& limits);  ///< Of moments and submaps, at most.
 
  private:
   void born(model::LandmarkId id, bool with_its_map, model::Utime utime, MomentNumber moment);

@@ -36,8 +36,8 @@ class LandmarkRecords {
 
  private:
   static constexpr std::uint32_t kNone = 0xFFFFFFFF;
-  /// With its place in the index.
-  static constexpr std::size_t kRecordBytes = sizeof(LandmarkRecord) + 48;
+  /// With its place in the index, and what the allocator adds.
+  static constexpr std::size_t kRecordBytes = sizeof(LandmarkRecord) + 80;
   std::uint32_t place_for(model::LandmarkId id);
   void make_room();
   void make_newest(std::uint32_t place);

@@ -14,7 +14,7 @@ struct Limits {
   std::uint32_t looks = 1024;         ///< Of one landmark: keyframes that saw or missed it.
   std::uint32_t probabilities = 512;  ///< Of one landmark.
   std::uint32_t events = 64;          ///< Of one landmark: births, merges, ...
-  std::size_t moments = 50'000;       ///< Keyframes to which looks and events refer.
+  std::size_t moments = 40'000;       ///< Keyframes to which looks and events refer.
   std::size_t submaps = 10'000;       ///< Submaps that were handed over.
   std::size_t poses = 6000;           ///< SLAM_POSE, and of every channel of one message a scan.
   std::size_t keyframes = 3000;       ///< KEYFRAME and SLAM_UPDATE.

@@ -33,6 +33,8 @@ class Moments {
   /// The moment of this number; null where it had to go.
   const Moment* find(std::uint32_t number) const;
 
+  std::size_t bytes() const { return moments_.bytes(); }  ///< Held.
+
  private:
   std::uint32_t latest() const { return static_cast<std::uint32_t>(moments_.heard() - 1); }
 

@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::size_t kReasonBytes = 200;
 constexpr std::size_t kScansNamed = 64;
+constexpr std::size_t kAllocated = 16;  // What the allocator adds [bytes].
 
 /// Parts of a revolution come within a few others.
 LaserRecord* begun(History<LaserRecord>& channel, const model::PointSweep& part) {
@@ -49,22 +50,24 @@ PoseBook::PoseBook(const Limits& limits)
       lasers_(kLasers, History<LaserRecord>(limits.poses)) {}
 
 std::size_t PoseBook::fixed_bytes(const Limits& limits) {
-  return limits.poses * (sizeof(PoseRecord) + 2 * sizeof(ScanRecord) + sizeof(FilterRecord) +
-                         kLasers * sizeof(LaserRecord)) +
-         limits.keyframes * (sizeof(UpdateRecord) + kReasonBytes + sizeof(KeyframeRecord) +
-                             kScansNamed * sizeof(model::Utime) + sizeof(CorrectionRecord)) +
-         limits.odometry * sizeof(MotionRecord);
+  return History<PoseRecord>::bytes_of(limits.poses) +
+         2 * History<ScanRecord>::bytes_of(limits.poses) +
+         History<FilterRecord>::bytes_of(limits.poses) +
+         kLasers * History<LaserRecord>::bytes_of(limits.poses) +
+         History<UpdateRecord>::bytes_of(limits.keyframes) +
+         History<KeyframeRecord>::bytes_of(limits.keyframes) +
+         History<CorrectionRecord>::bytes_of(limits.keyframes) +
+         limits.keyframes * (kReasonBytes + kScansNamed * sizeof(model::Utime) + 2 * kAllocated) +
+         History<MotionRecord>::bytes_of(limits.odometry);
 }
 
 std::size_t PoseBook::bytes() const {
-  std::size_t sum =
-      poses_.size() * sizeof(PoseRecord) + (scans_.size() + tracked_.size()) * sizeof(ScanRecord) +
-      filter_poses_.size() * sizeof(FilterRecord) + corrections_.size() * sizeof(CorrectionRecord) +
-      motions_.size() * sizeof(MotionRecord);
-  for (const auto& laser : lasers_) sum += laser.size() * sizeof(LaserRecord);
-  for (const UpdateRecord& one : updates_) sum += sizeof one + one.reason.capacity();
+  std::size_t sum = poses_.bytes() + scans_.bytes() + tracked_.bytes() + filter_poses_.bytes() +
+                    corrections_.bytes() + motions_.bytes() + updates_.bytes() + keyframes_.bytes();
+  for (const auto& laser : lasers_) sum += laser.bytes();
+  for (const UpdateRecord& one : updates_) sum += one.reason.capacity() + kAllocated;
   for (const KeyframeRecord& one : keyframes_)
-    sum += sizeof one + one.scans.capacity() * sizeof(model::Utime);
+    sum += one.scans.capacity() * sizeof(model::Utime) + kAllocated;
   return sum;
 }
 
@@ -154,9 +157,14 @@ void PoseBook::take(const model::PointSweep& part, bool is_raw, std::int64_t rec
 }
 
 const ScanRecord* PoseBook::scan_of(const PoseRecord& pose) const {
-  return scans_.newest([&](const ScanRecord& one) {
-    return one.utime == pose.pose.utime && one.arrival.order < pose.arrival.order;
-  });
+  // The scan comes shortly before its pose.
+  auto one = std::ranges::partition_point(
+      scans_, [&](const ScanRecord& scan) { return scan.arrival.order < pose.arrival.order; });
+  while (one != scans_.begin()) {
+    --one;
+    if (one->utime == pose.pose.utime) return &*one;
+  }
+  return nullptr;
 }
 
 std::optional<double> PoseBook::latency_ms(const PoseRecord& pose) const {

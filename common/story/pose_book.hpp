@@ -142,10 +142,11 @@ class PoseBook {
     return lasers_[static_cast<std::size_t>(channel)];
   }
 
-  /// The scan that a pose is of; null where it was not heard, or had to go. O(held).
+  /// The scan that a pose is of; null where it was not heard, or had to go.
+  /// O(log(held)) where it came shortly before, else O(held).
   const ScanRecord* scan_of(const PoseRecord& pose) const;
   /// From the sensor's stamp to the pose where their clocks agree, else from LANDMARKS to the pose
-  /// [ms]; none where times are not known. O(scans held).
+  /// [ms]; none where times are not known. O(log(scans held)) as a rule.
   std::optional<double> latency_ms(const PoseRecord& pose) const;
   /// Whether receive times tell nothing: a replay gives all that comes of one input the same one.
   bool is_replayed() const;

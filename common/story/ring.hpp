@@ -138,6 +138,15 @@ class History {
     const auto found = std::find_if(values_.rbegin(), values_.rend(), is_it);
     return found == values_.rend() ? nullptr : &*found;
   }
+  /// What so many messages take in memory, with the blocks of a deque; what they point to apart.
+  static constexpr std::size_t bytes_of(std::size_t messages) {
+    constexpr std::size_t kBlock = 512;
+    constexpr std::size_t kOfBlock = 24;  // For the allocator, and for the list of blocks.
+    constexpr std::size_t kInBlock = std::max<std::size_t>(1, kBlock / sizeof(T));
+    return (messages + kInBlock - 1) / kInBlock * (kInBlock * sizeof(T) + kOfBlock);
+  }
+  std::size_t bytes() const { return bytes_of(size()); }  ///< Likewise, of those held.
+
   auto begin() const { return values_.begin(); }  ///< Oldest first.
   auto end() const { return values_.end(); }      ///< Behind the newest one.
 

@@ -57,7 +57,7 @@ class StoryBook {
   std::uint64_t malformed() const { return malformed_; }
   const LandmarkBook& landmarks() const { return landmarks_; }  ///< For those who count.
   const PoseBook& poses() const { return poses_; }              ///< For those who count.
-  /// Held, about: all but what the allocator adds to moments and histories.
+  /// Held [bytes], with what the allocator adds. O(messages held).
   std::size_t bytes() const { return landmarks_.bytes() + poses_.bytes(); }
 
  private:

@@ -24,7 +24,7 @@ struct PoseQuestion {
 /// times in words. O(its events); O(all landmarks) for an id that is not known.
 Answer tell_landmark(const LandmarkBook& book, model::LandmarkId id, model::Utime start);
 
-/// How a pose was made. O(messages held), `kSlowest` O(poses * scans).
+/// How a pose was made. O(messages held), `kSlowest` with a logarithm.
 Answer tell_pose(const PoseBook& book, const PoseQuestion& question, model::Utime start);
 
 /// The messages from the sensor to a pose, in order; `ms` where it is known. O(messages held).

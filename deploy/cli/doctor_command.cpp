@@ -1,177 +1,152 @@
-// `understory doctor`: checks this computer and lists what to do.
+// `understory doctor`: checks this computer and the processes on it, and lists what to do.
 #include <fmt/format.h>
-#include <lcm/lcm.h>
-#include <sys/socket.h>
-#include <sys/timex.h>
-#include <unistd.h>
 
-#include <array>
 #include <chrono>
-#include <cstdio>
-#include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <memory>
-#include <optional>
+#include <nlohmann/json.hpp>
 
-#include "common/bus/live_bus.hpp"
+#include "common/bus/launch_config.hpp"
+#include "common/bus/service.hpp"
+#include "common/terminal/interrupt.hpp"
+#include "common/terminal/printable.hpp"
 #include "deploy/cli/commands.hpp"
+#include "deploy/cli/doctor_findings.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/health_listener.hpp"
+#include "deploy/cli/paths.hpp"
+#include "deploy/cli/text_file.hpp"
 
 namespace understory::cli {
 namespace {
 
-enum class Verdict { kGood, kAdvice, kBad };
+using DoctorClock = std::chrono::steady_clock;
 
-struct Finding {
-  Verdict verdict = Verdict::kGood;
-  std::string subject;
-  std::string text;
-  std::string advice;  ///< What to do; empty where nothing.
+struct DoctorOptions {
+  std::string lcm_url;
+  std::filesystem::path state = default_state_directory();
+  bool json = false;
 };
 
-constexpr int kWantedBufferBytes = 4'194'304;
-
-/// First line that a shell command prints; empty when it fails.
-std::string first_line_of(const char* command) {
-  std::FILE* pipe = ::popen(command, "r");  // NOLINT(cert-env33-c): fixed texts only.
-  if (pipe == nullptr) return {};
-  std::array<char, 256> line{};
-  const bool got = std::fgets(line.data(), line.size(), pipe) != nullptr;
-  const bool succeeded = ::pclose(pipe) == 0;
-  std::string result = got && succeeded ? line.data() : "";
-  while (!result.empty() && (result.back() == '\n' || result.back() == ' ')) result.pop_back();
-  return result;
+const char* verdict_name(Verdict verdict) {
+  return verdict == Verdict::kGood ? "ok" : verdict == Verdict::kAdvice ? "advice" : "bad";
 }
 
-/// A message of our own, sent and received over the real socket.
-Finding check_multicast(const std::string& url) {
-  Finding finding{Verdict::kBad, "multicast", "",
-                  "deploy/setup, or: ip link set lo multicast on; "
-                  "ip route add 224.0.0.0/4 dev lo"};
+std::size_t bad_ones(const std::vector<Finding>& findings) {
+  return static_cast<std::size_t>(std::ranges::count(findings, Verdict::kBad, &Finding::verdict));
+}
+
+std::string whole_text(const char* path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+/// The programs that the configuration launches.
+std::vector<std::string> launched_programs() {
+  std::vector<std::string> names;
   try {
-    bus::LiveBus bus(url);
-    const auto channel = fmt::format("DOCTOR_{}", ::getpid());
-    bool heard = false;
-    bus.subscribe(channel, 1, [&](const bus::BusMessage&) { heard = true; });
-    const auto start = std::chrono::steady_clock::now();
-
-    const std::array<std::uint8_t, 5> text{'h', 'e', 'l', 'l', 'o'};
-    if (bus.publish(channel, text)) {
-      finding.text = "a message cannot be sent";
-      return finding;
+    for (const auto& process : bus::read_launch_config(default_config_directory()).processes) {
+      std::string name = "understory-" + process.name;
+      std::ranges::replace(name, '_', '-');
+      names.push_back(std::move(name));
     }
-
-    for (int i = 0; i < 10 && !heard; ++i) bus.handle_one(100);
-    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
-    finding.text = "a message to ourselves does not arrive";
-    if (!heard) return finding;
-    return {Verdict::kGood, "multicast",
-            fmt::format("a message went round in {:.1f} ms", took.count()), ""};
-  } catch (const bus::BusError& error) {
-    finding.text = error.what();
-    return finding;
+  } catch (const bus::ConfigurationError&) {
+    // A directory without launch.toml: nothing is launched from it.
   }
+  return names;
 }
 
-Finding check_receive_buffer() {
-  const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  int granted = 0;
-  socklen_t size = sizeof granted;
-  ::setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &kWantedBufferBytes, sizeof kWantedBufferBytes);
-  ::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &granted, &size);
-  ::close(socket);
-  granted /= 2;  // The kernel reports twice what it gives to data.
-
-  if (granted >= kWantedBufferBytes) {
-    return {Verdict::kGood, "receive buffer", fmt::format("{} bytes", granted), ""};
+/// HEALTH of three seconds: it comes once a second.
+std::vector<health_t> heard_health(const std::string& url) {
+  std::vector<health_t> heard;
+  HealthListener listener(url, [&](const health_t& health) { heard.push_back(health); });
+  const auto end = DoctorClock::now() + std::chrono::milliseconds(2500);
+  while (DoctorClock::now() < end) {
+    terminal::throw_if_interrupted();
+    listener.handle(std::chrono::milliseconds(100));
   }
-
-  return {Verdict::kAdvice, "receive buffer",
-          fmt::format("{} of {} bytes: bursts may be lost", granted, kWantedBufferBytes),
-          "deploy/setup --tune"};
+  return heard;
 }
 
-Finding check_clock() {
-  timex clock{};
-  const int state = ::adjtimex(&clock);
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  // 2020-01-01: a machine that starts without a battery-backed clock believes it is 1970.
-  if (now < std::chrono::seconds(1'577'836'800)) {
-    return {Verdict::kAdvice, "clock", "before 2020", "set it: timedatectl set-ntp true"};
-  }
-  if (state == TIME_ERROR) {
-    return {Verdict::kAdvice, "clock", "not synchronised (matters only between several computers)",
-            "timedatectl set-ntp true"};
-  }
-  return {Verdict::kGood, "clock", "synchronised", ""};
+std::int64_t microseconds(auto duration) {
+  return std::chrono::duration_cast<std::chrono::microseconds>(duration).count();
 }
 
-Finding check_lcm() {
-  return {Verdict::kGood, "lcm",
-          fmt::format("{}.{}.{}", LCM_MAJOR_VERSION, LCM_MINOR_VERSION, LCM_MICRO_VERSION), ""};
-}
-
-Finding check_tool(const char* subject, const char* command, const char* advice) {
-  const auto line = first_line_of(command);
-  if (!line.empty()) return {Verdict::kGood, subject, line, ""};
-  return {Verdict::kAdvice, subject, "not found", advice};
-}
-
-Finding check_jar() {
-  const char* const jar = "/usr/share/java/lcm.jar";
-  if (std::filesystem::exists(jar)) return {Verdict::kGood, "lcm.jar", jar, ""};
-  return {Verdict::kAdvice, "lcm.jar", "not found (lcm-spy needs it)",
-          "apt-get install liblcm-java"};
-}
-
-Finding check_processors() {
-  const auto count = ::sysconf(_SC_NPROCESSORS_ONLN);
-  const auto memory =
-      static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
-  return {
-      Verdict::kGood, "computer",
-      fmt::format("{} processors, {:.1f} GiB of memory", count, memory / (1024.0 * 1024 * 1024)),
-      ""};
-}
-
-void doctor(const std::string& url) {
-  const Finding findings[] = {
-      check_processors(),
-      check_multicast(url),
-      check_receive_buffer(),
-      check_clock(),
-      check_lcm(),
-      check_tool("lcm-logger", "command -v lcm-logger", "apt-get install liblcm-bin"),
-      check_tool("java", "java -version 2>&1", "apt-get install default-jdk (for deploy/spy only)"),
-      check_tool("javac", "javac -version 2>&1",
-                 "apt-get install default-jdk (for deploy/spy only)"),
-      check_jar(),
-      check_tool(
-          "matplotlib",
-          "/usr/bin/python3 -c 'import matplotlib; print(matplotlib.__version__)' 2>/dev/null",
-          "apt-get install python3-matplotlib (for pictures only)"),
+void look_at_bus(const std::string& url, std::vector<Finding>& findings) {
+  const auto add = [&](std::vector<Finding> more) {
+    findings.insert(findings.end(), std::make_move_iterator(more.begin()),
+                    std::make_move_iterator(more.end()));
   };
+  add(url_findings(url));
+  if (bad_ones(findings) > 0) return;
+  const std::string complete = bus::complete_lcm_url(url);
+  add(route_findings(bus::parse_udpm_url(complete), whole_text("/proc/net/route"),
+                     whole_text("/sys/class/net/lo/flags")));
+  findings.push_back(multicast_finding(url));
+  if (findings.back().verdict == Verdict::kBad) return;
 
-  bool bad = false;
-  for (const auto& finding : findings) {
-    const char* const mark = finding.verdict == Verdict::kGood     ? "ok    "
-                             : finding.verdict == Verdict::kAdvice ? "advice"
-                                                                   : "BAD   ";
-    fmt::print("{} {:<15} {}\n", mark, finding.subject, finding.text);
-    if (!finding.advice.empty()) fmt::print("       {:<15} -> {}\n", "", finding.advice);
-    bad = bad || finding.verdict == Verdict::kBad;
-  }
+  const auto start = DoctorClock::now();
+  const auto start_by_clock = std::chrono::system_clock::now();
+  const std::vector<health_t> heard = heard_health(url);
+  findings.push_back(
+      clock_jump_finding(microseconds(DoctorClock::now() - start),
+                         microseconds(std::chrono::system_clock::now() - start_by_clock)));
+  add(process_findings(heard, local_processes(), bus::program_version()));
+}
 
-  if (bad) fail("doctor: processes on this computer cannot hear each other");
+void doctor(const DoctorOptions& options) {
+  terminal::catch_interrupts();
+  std::vector<Finding> findings = computer_findings();
+  findings.push_back(receive_buffer_finding());
+  findings.push_back(clock_finding());
+  findings.push_back(state_finding(options.state.string()));
+  for (Finding& one : program_findings(launched_programs(), bus::program_version()))
+    findings.push_back(std::move(one));
+  for (Finding& one : tool_findings()) findings.push_back(std::move(one));
+  std::vector<Finding> bus;
+  look_at_bus(options.lcm_url, bus);
+  findings.insert(findings.begin(), bus.begin(), bus.end());
+
+  fmt::print("{}",
+             options.json ? dumped(findings_json(findings), 2) + "\n" : findings_text(findings));
+  const std::size_t bad = bad_ones(findings);
+  if (bad > 0) fail(fmt::format("doctor: {} to be mended", bad));
 }
 
 }  // namespace
 
+std::string findings_text(const std::vector<Finding>& findings) {
+  std::string text;
+  for (const Finding& one : findings) {
+    const char* const mark = one.verdict == Verdict::kBad ? "BAD" : verdict_name(one.verdict);
+    fmt::format_to(std::back_inserter(text), "{:<6} {:<15} {}\n", mark, one.subject,
+                   terminal::printable(one.text));
+    if (!one.advice.empty())
+      fmt::format_to(std::back_inserter(text), "       {:<15} -> {}\n", "", one.advice);
+  }
+  return text;
+}
+
+nlohmann::ordered_json findings_json(const std::vector<Finding>& findings) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const Finding& one : findings) {
+    list.push_back({{"verdict", verdict_name(one.verdict)},
+                    {"subject", one.subject},
+                    {"text", one.text},
+                    {"advice", one.advice}});
+  }
+  return {{"ok", bad_ones(findings) == 0}, {"findings", list}};
+}
+
 void add_doctor_command(CLI::App& parent) {
   auto* command = parent.add_subcommand("doctor", "Checks this computer and lists what to do");
-  auto url = std::make_shared<std::string>();
-  command->add_option("--lcm-url", *url, "Bus, e.g. udpm://239.255.76.67:7667?ttl=0");
-  command->callback([url] { doctor(*url); });
+  auto options = std::make_shared<DoctorOptions>();
+  command->add_option("--lcm-url", options->lcm_url, "Bus, e.g. udpm://239.255.76.67:7667?ttl=0");
+  command->add_option("--state-dir", options->state, "Directory of the processes' state")
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "As JSON");
+  command->callback([options] { doctor(*options); });
 }
 
 }  // namespace understory::cli

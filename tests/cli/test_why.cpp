@@ -206,7 +206,8 @@ TEST_CASE_METHOD(SimulatedWhy, "why says what is wrong in one line", "[cli]") {
 TEST_CASE_METHOD(SimulatedWhy, "of a damaged log why tells the rest, and that there was more",
                  "[cli]") {
   auto bytes = test::read_bytes(log);
-  for (std::size_t i = bytes.size() / 2; i < bytes.size() / 2 + 3000; ++i) bytes[i] = 0x55;
+  const auto starts = test::offsets(events());
+  for (std::size_t i = starts.size() / 2; i < starts.size() / 2 + 5; ++i) bytes[starts[i]] ^= 0xFFU;
   const auto damaged = (directory / "damaged.lcm").string();
   write_bytes(damaged, bytes);
   const auto landmark = run("why landmark 1:1 " + damaged);
