@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <tuple>
 #include <unordered_map>
 #include <vector>
 
@@ -65,7 +66,9 @@ class LandmarkScene {
   struct BlockId {
     std::uint64_t submap = 0;
     std::uint64_t number = 0;
-    auto operator<=>(const BlockId&) const = default;
+    bool operator<(const BlockId& other) const {
+      return std::tie(submap, number) < std::tie(other.submap, other.number);
+    }
   };
   using Block = std::map<model::LandmarkId, Shown>;
 

@@ -158,10 +158,10 @@ void append_fields(FieldSink& to, const model::Existence& existence) {
   to.flag("is_mapping_needed", existence.is_mapping_needed);
 }
 
-std::string_view health_text(std::int8_t state) {
+std::string_view health_text(int state) {
   constexpr std::array<std::string_view, 5> kTexts{"starting", "ok", "degraded", "error",
                                                    "stopping"};
-  const bool is_known = state >= 0 && static_cast<std::size_t>(state) < kTexts.size();
+  const bool is_known = state >= 0 && state < static_cast<int>(kTexts.size());
   return is_known ? kTexts[static_cast<std::size_t>(state)] : "unknown";
 }
 

@@ -207,9 +207,7 @@ Taken Session::subscribe(const Request& request) {
       continue;
     }
     subscriptions_[id] = topic_id;
-    to = {};
-    to.subscription = id;
-    to.needs_state = topic(topic_id).has_state;
+    to = {id, WaitingLine(topic(topic_id).has_state)};
   }
   return result;
 }
@@ -235,42 +233,7 @@ void Session::reply(std::string text) {
 void Session::offer(const Converted& message) {
   Line& to = line(message.topic);
   if (!to.subscription) return;
-  const Delivery delivery = topic(message.topic).delivery;
-  // The whole, which comes later, has it in it.
-  if (delivery == Delivery::kIncrement && to.needs_state) return;
-
-  std::uint64_t turn = turns_++;
-  if (delivery == Delivery::kLatest && !to.queue.empty()) {
-    turn = to.queue.front().turn;  // It waited for that long.
-    drop_oldest(to);
-  }
-  make_room(to, delivery, message.json->size());
-  if (to.needs_state && delivery == Delivery::kIncrement) return;
-  to.bytes += message.json->size();
-  to.queue.push_back({turn, message});
-}
-
-/// One message always fits, however large it is.
-void Session::make_room(Line& line, Delivery delivery, std::size_t bytes) {
-  const auto is_full = [&] {
-    return !line.queue.empty() && (line.queue.size() >= options_.most_messages ||
-                                   line.bytes + bytes > options_.most_waiting_bytes);
-  };
-  if (!is_full()) return;
-  if (delivery != Delivery::kIncrement) {
-    while (is_full()) drop_oldest(line);
-    return;
-  }
-  while (!line.queue.empty()) drop_oldest(line);
-  ++counts_.dropped;  // The message in hand.
-  line.needs_state = true;
-  line.is_after_loss = true;
-}
-
-void Session::drop_oldest(Line& line) {
-  line.bytes -= line.queue.front().message.json->size();
-  line.queue.pop_front();
-  ++counts_.dropped;
+  counts_.dropped += to.waiting.offer(message, turns_++, options_.line);
 }
 
 void Session::offer_time(std::int64_t utime) {
@@ -292,13 +255,11 @@ std::optional<Outgoing> Session::next() {
 
   Line* first = nullptr;
   for (Line& one : lines_) {
-    if (one.queue.empty()) continue;
-    if (first == nullptr || one.queue.front().turn < first->queue.front().turn) first = &one;
+    if (!one.waiting.turn()) continue;
+    if (first == nullptr || *one.waiting.turn() < *first->waiting.turn()) first = &one;
   }
   if (first == nullptr) return std::nullopt;
-  const Converted message = std::move(first->queue.front().message);
-  first->queue.pop_front();
-  first->bytes -= message.json->size();
+  const Converted message = first->waiting.pop();
   ++counts_.sent;
 
   Outgoing out{true, std::string(1, kMessageData)};
@@ -310,16 +271,13 @@ std::optional<Outgoing> Session::next() {
 }
 
 std::vector<TopicId> Session::take_wanted() {
-  // After a loss the client first takes what still waits: else one loss would follow another.
   const bool is_slow = waiting_bytes() > 0;
   std::vector<TopicId> wanted;
-  for (std::size_t i = 0; i < kTopics; ++i) {
-    Line& one = lines_[i];
-    if (!one.needs_state || (one.is_after_loss && is_slow)) continue;
-    if (one.is_after_loss) ++counts_.resent;
-    one.needs_state = false;
-    one.is_after_loss = false;
-    wanted.push_back(static_cast<TopicId>(i));
+  for (const Topic& one : topics()) {
+    WaitingLine& waiting = line(one.id).waiting;
+    if (!waiting.wants_state(is_slow)) continue;
+    if (waiting.expect_state()) ++counts_.resent;
+    wanted.push_back(one.id);
   }
   return wanted;
 }
@@ -329,13 +287,14 @@ bool Session::should_close() const {
 }
 
 bool Session::has_next() const {
-  return !replies_.empty() || time_ ||
-         std::ranges::any_of(lines_, [](const Line& one) { return !one.queue.empty(); });
+  return !replies_.empty() || time_ || std::ranges::any_of(lines_, [](const Line& one) {
+    return one.waiting.turn().has_value();
+  });
 }
 
 std::size_t Session::waiting_bytes() const {
   std::size_t bytes = 0;
-  for (const Line& one : lines_) bytes += one.bytes;
+  for (const Line& one : lines_) bytes += one.waiting.bytes();
   return bytes;
 }
 

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "common/foxglove/converter.hpp"
+#include "common/foxglove/waiting_line.hpp"
 
 namespace understory::foxglove {
 
@@ -39,11 +40,10 @@ struct SessionOptions {
   std::string name = "understory";
   std::string session_id = {};  ///< Tells runs of the server apart; empty = none.
   bool sends_time = false;      ///< offer_time() is used: the client's clock follows the log's.
-  std::size_t most_text_bytes = 64 * 1024;           ///< Of one message of the client.
-  std::size_t most_messages = 256;                   ///< That wait, of one topic.
-  std::size_t most_waiting_bytes = 8 * 1024 * 1024;  ///< That wait, of one topic (or one message).
-  std::size_t most_replies = 64;                     ///< Status messages that wait.
-  std::uint64_t most_refused = 100;                  ///< Then the client should go.
+  std::size_t most_text_bytes = 64 * 1024;   ///< Of one message of the client.
+  LineBounds line = {256, 8 * 1024 * 1024};  ///< Of each topic, what may wait.
+  std::size_t most_replies = 64;             ///< Status messages that wait.
+  std::uint64_t most_refused = 100;          ///< Then the client should go.
 };
 
 /// What became of a client's message.
@@ -93,17 +93,10 @@ class Session {
   const SessionCounts& counts() const { return counts_; }
 
  private:
-  struct Waiting {
-    std::uint64_t turn = 0;  ///< Counts arrivals.
-    Converted message;
-  };
-  /// One topic's messages for this client.
+  /// One topic, for this client.
   struct Line {
     std::optional<std::uint32_t> subscription;  ///< The client's id.
-    std::deque<Waiting> queue;
-    std::size_t bytes = 0;
-    bool needs_state = false;
-    bool is_after_loss = false;
+    WaitingLine waiting;
   };
   struct Request;
 
@@ -114,8 +107,6 @@ class Session {
   Taken subscribe(const Request& request);
   Taken unsubscribe(const Request& request);
   void reply(std::string text);
-  void drop_oldest(Line& line);
-  void make_room(Line& line, Delivery delivery, std::size_t bytes);
 
   SessionOptions options_;
   std::deque<std::string> replies_;

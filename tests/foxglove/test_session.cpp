@@ -146,16 +146,16 @@ TEST_CASE("a slow client gets the newest of a topic, and it is counted what it m
     session.offer(message_of(TopicId::kLog, 1, std::to_string(i)));
   }
   const auto out = drained(session);
-  REQUIRE(out.size() == 1 + SessionOptions{}.most_messages);
+  REQUIRE(out.size() == 1 + SessionOptions{}.line.messages);
   REQUIRE(out[0].bytes.substr(13) == "999");
   REQUIRE(out.back().bytes.substr(13) == "999");
-  REQUIRE(session.counts().dropped == 999 + 1000 - SessionOptions{}.most_messages);
+  REQUIRE(session.counts().dropped == 999 + 1000 - SessionOptions{}.line.messages);
   REQUIRE(session.counts().sent == out.size());
 }
 
 TEST_CASE("waiting messages are bounded in bytes") {
   SessionOptions options;
-  options.most_waiting_bytes = 1000;
+  options.line.bytes = 1000;
   Session session(options);
   drained(session);
   session.take_text(subscribe_text(1, TopicId::kLog));
@@ -170,7 +170,7 @@ TEST_CASE("waiting messages are bounded in bytes") {
 /// A client that reads only now and then, of a whole drive.
 TEST_CASE("a slow client's scene is that of the converter once it has caught up") {
   SessionOptions options;
-  options.most_messages = 3;
+  options.line.messages = 3;
   Session session(options);
   drained(session);
   Converter converter;

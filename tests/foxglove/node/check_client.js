@@ -10,7 +10,8 @@ const WebSocket = require("ws");
 const { validate } = require("./schemas");
 
 const [peer, log] = process.argv.slice(2);
-const wanted = 3000;
+const wantedMessages = 3000;
+const wantedTopics = 23; // All but the pose of a reference system.
 
 function receive(client, socket) {
   const channels = new Map();
@@ -39,7 +40,7 @@ function receive(client, socket) {
       }
       seen.messages += 1;
       seen.topics.add(channel.topic);
-      if (seen.messages === wanted) resolve({ ...seen, channels: channels.size });
+      if (seen.messages >= wantedMessages && seen.topics.size === wantedTopics) resolve({ ...seen, channels: channels.size });
     });
     socket.on("unexpected-response", (_, response) => reject(new Error(`status ${response.statusCode}`)));
   });
@@ -54,7 +55,6 @@ async function check(subprotocol) {
     const seen = await receive(client, socket);
     assert.equal(socket.protocol, subprotocol);
     assert.equal(seen.channels, 24);
-    assert.ok(seen.topics.size >= 20, `${seen.topics.size} topics`);
     assert.ok(seen.times > 10);
     assert.equal(seen.statuses.length, 1);
     console.log(`${subprotocol}: ${seen.messages} messages of ${seen.topics.size} topics`);

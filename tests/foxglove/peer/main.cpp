@@ -52,18 +52,33 @@ void send_waiting(Socket& socket, foxglove::Session& session) {
   }
 }
 
-/// Takes one message where one has come (or waits for it).
-void take_message(Socket& socket, foxglove::Session& session, bool waits) {
-  if (!waits && socket.next_layer().available() == 0) return;
-  beast::flat_buffer buffer;
-  socket.read(buffer);
-  const auto text = beast::buffers_to_string(buffer.data());
-  if (socket.got_text()) {
-    session.take_text(text);
-  } else {
-    session.take_binary({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+/// Takes messages as they come, whenever the context is run or polled. (How much the system holds
+/// does not tell: Beast reads ahead.)
+class Receiver {
+ public:
+  Receiver(Socket& socket, foxglove::Session& session) : socket_(socket), session_(session) {
+    start();
   }
-}
+
+ private:
+  void start() {
+    socket_.async_read(buffer_, [this](const boost::system::error_code& error, std::size_t) {
+      if (error) throw boost::system::system_error(error);
+      const auto text = beast::buffers_to_string(buffer_.data());
+      buffer_.consume(buffer_.size());
+      if (socket_.got_text()) {
+        session_.take_text(text);
+      } else {
+        session_.take_binary({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+      }
+      start();
+    });
+  }
+
+  Socket& socket_;
+  foxglove::Session& session_;
+  beast::flat_buffer buffer_;
+};
 
 bool has_subscription(const foxglove::Session& session) {
   for (const auto& topic : foxglove::topics()) {
@@ -81,16 +96,17 @@ void serve(const std::string& log) {
   foxglove::SessionOptions options;
   options.sends_time = true;
   foxglove::Session session(options);
+  Receiver receiver(socket, session);
   while (!has_subscription(session)) {
     send_waiting(socket, session);
-    take_message(socket, session, true);
+    context.run_one();
   }
   // Until the client goes; never for ever.
   for (int round = 0; round < 1000; ++round) {
     foxglove::Converter converter;
     io::LcmLogReader reader(log);
     while (const auto event = reader.next()) {
-      take_message(socket, session, false);
+      context.poll();
       for (const auto& one : converter.take(event->channel, event->data, event->utime)) {
         session.offer(one);
       }
