@@ -113,8 +113,7 @@ HttpSession::Response HttpSession::response_to(const SocketSession::Request& req
   response.set(http::field::cache_control, "no-cache");
   response.set("X-Content-Type-Options", "nosniff");
   response.set("Content-Security-Policy",
-               "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
-               "connect-src 'self' ws: wss: data:; frame-ancestors 'none'");
+               "default-src 'self'; img-src 'self' data: blob:; frame-ancestors 'none'");
   response.body() = document->body;
   response.keep_alive(request.keep_alive());
   response.prepare_payload();
