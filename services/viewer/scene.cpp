@@ -17,6 +17,9 @@ constexpr std::int64_t kSilentPose_us = 1'000'000;
 constexpr std::int64_t kAgePeriod_us = 10'000'000;
 constexpr double kSigmas = 3.0;    ///< Of what is told to people.
 constexpr double kUnsure_m = 1.0;  ///< A standard deviation above it is said to be unsure.
+constexpr float kDrawEvery_m = 1.0F;
+constexpr double kDrawEvery_rad = 0.05;
+constexpr std::int64_t kDrawEvery_us = 1'000'000;
 constexpr double kTruthEvery_m = 0.2;
 constexpr double kRedraw_m = 0.05;
 
@@ -27,6 +30,9 @@ double largest_sigma_m(const Eigen::Matrix3d& covariance) {
 }
 
 bool has_place(const model::SlamPose& pose) { return pose.is_localised() || pose.is_coasting; }
+
+/// Of the numbers of slam_pose2_t: whether a path is drawn the same at both.
+bool is_same_line(std::uint8_t a, std::uint8_t b) { return (a == 6) == (b == 6); }
 
 const char* result_text(model::LoopResult::Status status) {
   switch (status) {
@@ -99,14 +105,7 @@ void Scene::take(const model::SlamPose& pose, std::int64_t wall_us) {
   pose_wall_us_ = wall_us;
 
   if (has_place(pose)) {
-    const geometry::SE2 map_T_vehicle = pose.map_T_vehicle();
-    driven_.append({pose.utime, static_cast<float>(map_T_vehicle.x()),
-                    static_cast<float>(map_T_vehicle.y()),
-                    static_cast<float>(map_T_vehicle.theta()),
-                    static_cast<float>(largest_sigma_m(pose.covariance)),
-                    static_cast<std::uint8_t>(pose.is_coasting ? 6
-                                              : pose.status    ? static_cast<int>(*pose.status)
-                                                               : 5)});
+    draw(pose);
     compare_with_truth(pose);
   }
   judge(pose);
@@ -123,6 +122,33 @@ void Scene::take(const model::SlamPose& pose, std::int64_t wall_us) {
     if (age && (!least || *age < *least)) least = age;
   }
   if (least) numbers.latency_ms = 1e-3 * static_cast<double>(wall_us - pose.utime - *least);
+}
+
+/// The newest pose is always the last point; of those behind it as many as the eye can tell apart.
+void Scene::draw(const model::SlamPose& pose) {
+  const geometry::SE2 map_T_vehicle = pose.map_T_vehicle();
+  const int status = pose.is_coasting ? 6 : pose.status ? static_cast<int>(*pose.status) : 5;
+  const TrackPoint point{pose.utime,
+                         static_cast<float>(map_T_vehicle.x()),
+                         static_cast<float>(map_T_vehicle.y()),
+                         static_cast<float>(map_T_vehicle.theta()),
+                         static_cast<float>(largest_sigma_m(pose.covariance)),
+                         static_cast<std::uint8_t>(status)};
+
+  const auto points = driven_.points();
+  if (points.size() > 1) {
+    const TrackPoint& before = points[points.size() - 2];
+    const bool is_near =
+        std::hypot(before.x_m - point.x_m, before.y_m - point.y_m) < kDrawEvery_m &&
+        std::abs(geometry::wrap_angle(before.theta_rad - point.theta_rad)) < kDrawEvery_rad &&
+        point.utime - before.utime < kDrawEvery_us;
+    if (is_near && is_same_line(points.back().status, point.status) &&
+        is_same_line(before.status, point.status)) {
+      driven_.replace_last(point);
+      return;
+    }
+  }
+  driven_.append(point);
 }
 
 void Scene::take_stamp(model::Utime utime, std::int64_t wall_us) {

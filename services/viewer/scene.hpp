@@ -145,6 +145,7 @@ class Scene {
  private:
   void start_map(std::uint32_t map_id);
   void set_verdict(Verdict::State state, std::string text, model::Utime utime);
+  void draw(const model::SlamPose& pose);
   void judge(const model::SlamPose& pose);
   void compare_with_truth(const model::SlamPose& pose);
   void move_keyframes(const model::MapCorrection& correction);

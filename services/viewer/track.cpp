@@ -22,6 +22,9 @@ void Track::replace_from(std::size_t kept, std::span<const TrackPoint> points) {
   points_.insert(points_.end(), points.begin(), points.end());
   while (!rewrites_.empty() && rewrites_.back().first >= kept) rewrites_.pop_back();
   rewrites_.push_back({change_, kept});
+  if (rewrites_.size() <= kMostRewrites) return;
+  rewrites_[1].first = rewrites_[0].first;
+  rewrites_.pop_front();
 }
 
 std::size_t Track::first_unread(const TrackCursor& cursor) const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <span>
 #include <vector>
 
@@ -28,6 +29,7 @@ struct TrackCursor {
 /// At most kMostPoints: then every second point of it is left out, and it is told anew.
 class Track {
  public:
+  static constexpr std::size_t kMostRewrites = 1024;
   static constexpr std::size_t kMostPoints = std::size_t{1} << 20U;
 
   /// `changes` is the scene's counter and must outlive it.
@@ -35,6 +37,8 @@ class Track {
 
   /// Adds a point at the end.
   void append(const TrackPoint& point);
+  /// Gives the last point a new value; there is one.
+  void replace_last(const TrackPoint& point) { replace_from(points_.size() - 1, {&point, 1}); }
   /// Keeps the first `kept` points (at most those there are), and takes these behind them.
   void replace_from(std::size_t kept, std::span<const TrackPoint> points);
   /// Empty again.
@@ -61,8 +65,9 @@ class Track {
   Change* changes_;
   Change change_ = 0;
   std::vector<TrackPoint> points_;
-  /// Both members ascending: one that reaches further back replaces those before it.
-  std::vector<Rewrite> rewrites_;
+  /// Both members ascending: one that reaches further back replaces those before it. The oldest two
+  /// become one where there are too many: who has not read for so long gets more than it lacks.
+  std::deque<Rewrite> rewrites_;
 };
 
 }  // namespace understory::viewer

@@ -100,7 +100,7 @@ TEST_CASE("the verdict is what the pose says, and silence", "[viewer]") {
   one.is_lost = true;
   scene.take(one, 1'300'000);
   CHECK(scene.verdict().value.state == Verdict::State::kLost);
-  CHECK(scene.driven().points().size() == 3);  // A pose without meaning is not drawn.
+  CHECK(scene.driven().points().back().utime == 300);  // A pose without meaning is not drawn.
 
   scene.look(2'200'000);
   CHECK(scene.verdict().value.state == Verdict::State::kLost);
@@ -221,6 +221,34 @@ TEST_CASE("a closure is where its ends are, and what became of it", "[viewer]") 
   closure.is_revoked = true;
   scene.take(closure);
   CHECK(scene.closures().at(1).status == "revoked");
+}
+
+TEST_CASE("a path has the newest pose, and behind it no more points than are seen", "[viewer]") {
+  Scene scene;
+  // 10 Hz: a minute at 0.5 m/s, a minute at a stand.
+  for (int i = 1; i <= 1200; ++i) {
+    scene.take(pose(100'000 * i, std::min(30.0, 0.05 * i)), 100'000 * i);
+    REQUIRE(scene.driven().points().back().utime == 100'000 * i);
+  }
+  CHECK(scene.driven().points().size() > 100);
+  CHECK(scene.driven().points().size() < 150);
+  const std::size_t before = scene.driven().points().size();
+  for (int i = 1201; i <= 1300; ++i) scene.take(pose(100'000 * i, 1.5 * i), 100'000 * i);
+  CHECK(scene.driven().points().size() == before + 100);
+}
+
+TEST_CASE("a reader who is far behind gets more than it lacks, never less", "[viewer]") {
+  viewer::Change changes = 0;
+  viewer::Track track(changes);
+  track.append({});
+  const viewer::TrackCursor behind{changes, 1};
+  for (int i = 0; i < 5000; ++i) {
+    track.replace_last({i, 1.0F, 0, 0, 0, 0});
+    track.append({i, 2.0F, 0, 0, 0, 0});
+  }
+  CHECK(track.first_unread(behind) == 0);
+  CHECK(track.first_unread({changes, track.points().size()}) == track.points().size());
+  CHECK(track.first_unread({changes - 2, track.points().size() - 1}) == track.points().size() - 2);
 }
 
 TEST_CASE("a long path is thinned, not forgotten", "[viewer]") {
