@@ -7,6 +7,7 @@
 #include <string>
 
 #include "common/bus/live_bus.hpp"
+#include "common/model/slam_output.hpp"
 #include "understory/health_t.hpp"
 
 namespace understory::cli {
@@ -18,6 +19,9 @@ class HealthListener {
   using Handler = std::function<void(const health_t&)>;
   /// Throws BusError naming the URL when the bus cannot be joined.
   HealthListener(const std::string& lcm_url, Handler handler);
+
+  /// Hears SLAM_POSE, too; `handler` is called with each that decodes.
+  void hear_poses(std::function<void(const model::SlamPose&)> handler);
 
   int descriptor() const { return bus_.file_descriptor(); }  ///< Readable when a message waits.
   /// Waits up to `timeout` for one message and handles it; false when none came.

@@ -13,6 +13,7 @@
 #include "deploy/cli/health_listener.hpp"
 #include "deploy/cli/status_table.hpp"
 #include "deploy/cli/text_file.hpp"
+#include "services/viewer/scene.hpp"
 
 namespace understory::cli {
 namespace {
@@ -33,9 +34,18 @@ void listen_until(HealthListener& listener, Clock::time_point end) {
   }
 }
 
-void print(const StatusTable& table, bool json) {
+/// What a driver must know comes first, in the words of the viewer's page.
+void print(const StatusTable& table, const viewer::Scene& scene, bool json) {
   const auto now = Clock::now();
-  fmt::print("{}", json ? dumped(table.json(now), 2) + "\n" : table.text(now));
+  const viewer::Verdict& verdict = scene.verdict().value;
+  if (json) {
+    nlohmann::ordered_json document = table.json(now);
+    document["pose"] = {{"state", viewer::state_name(verdict.state)}, {"text", verdict.text}};
+    fmt::print("{}\n", dumped(document, 2));
+  } else {
+    fmt::print("pose: {} ({})\n{}", viewer::state_name(verdict.state), verdict.text,
+               table.text(now));
+  }
   std::fflush(stdout);
 }
 
@@ -45,10 +55,15 @@ void status(const StatusOptions& options) {
   HealthListener listener(options.lcm_url,
                           [&](const health_t& health) { table.add(health, Clock::now()); });
 
+  viewer::Scene scene;
+  const bus::Clock clock = bus::system_clock();
+  listener.hear_poses([&](const model::SlamPose& pose) { scene.take(pose, clock.wall_us()); });
+
   if (options.once) {
     // HEALTH comes once a second: everybody who answers has spoken by then.
     listen_until(listener, Clock::now() + std::chrono::milliseconds(1500));
-    print(table, options.json);
+    scene.look(clock.wall_us());
+    print(table, scene, options.json);
     if (table.empty()) fail("status: no process is heard on HEALTH");
     return;
   }
@@ -58,7 +73,8 @@ void status(const StatusOptions& options) {
     while (true) {
       listen_until(listener, Clock::now() + std::chrono::seconds(1));
       if (terminal) fmt::print("\033[H\033[2J");
-      print(table, options.json);
+      scene.look(clock.wall_us());
+      print(table, scene, options.json);
     }
   } catch (const terminal::Interrupted&) {
     return;  // Ctrl-C is how this command ends.

@@ -305,6 +305,7 @@ class MapperAdapter : public bus::Adapter {
 
   /// The pose of a scan at once, in the map as it is; its keyframe comes later.
   void locate(const model::LandmarkScan& scan) {
+    newest_scan_utime_ = std::max(newest_scan_utime_, scan.utime);
     const std::optional<ScanPose> found = stage_->locate(scan);
     if (!found || scan.utime <= memory_.newest_pose_utime) return;
     model::SlamPose pose;
@@ -327,9 +328,16 @@ class MapperAdapter : public bus::Adapter {
       earn(pose);
       pose.is_new_map = is_another_map(update);
       // Keyframes may share scans; the stamp always grows.
-      if (pose.utime <= memory_.newest_pose_utime) continue;
+      if (pose.utime <= memory_.newest_pose_utime || is_stale(pose)) continue;
       publish(pose);
     }
+  }
+
+  /// Where scans are located as they come, those of a keyframe that began a map, or found a lost
+  /// vehicle, are the past.
+  bool is_stale(const model::SlamPose& pose) const {
+    const auto oldest = static_cast<model::Utime>(1e6 * output_.oldest_pose_s);
+    return stage_->locates_scans() && newest_scan_utime_ - pose.utime > oldest;
   }
 
   /// Each scan's pose counts once and with its keyframe, whether it was published then or before:
@@ -417,6 +425,7 @@ class MapperAdapter : public bus::Adapter {
   std::unique_ptr<MapperMethod> stage_;
   bus::Node* node_ = nullptr;
   Memory memory_;
+  model::Utime newest_scan_utime_ = -1;  ///< Not saved: scans are not in the journal.
   bus::Publisher<model::SlamPose> poses_;
   bus::Publisher<model::MapUpdate> updates_;
   bus::Publisher<model::WholeMap> maps_;

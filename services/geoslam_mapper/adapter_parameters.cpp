@@ -226,6 +226,9 @@ void describe(MapperOutputParameters& parameters, bus::ParameterTable& table) {
             "SLAM_POSE counts a reset where the pose jumps farther ...");
   table.add("output.reset_angle_rad", parameters.reset_angle_rad, {0.001, 3.2}, "rad",
             "... or rotates more than this against its prediction.");
+  table.add("output.oldest_pose_s", parameters.oldest_pose_s, {0.0, 3600.0}, "s",
+            "A scan that got its pose from its keyframe alone, when a scan so much newer had come, "
+            "has no SLAM_POSE: who steers by it would take it for the present.");
 }
 
 }  // namespace understory::geoslam_mapper

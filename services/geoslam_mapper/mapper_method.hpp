@@ -35,6 +35,8 @@ class MapperMethod {
   /// kUpdated; for the others `reason` states why. Throws nothing on bad data.
   virtual model::MapUpdate add(const model::Keyframe& keyframe) = 0;
 
+  /// Whether locate() gives poses.
+  virtual bool locates_scans() const { return false; }
   /// Pose of a single scan between keyframes. The map is not changed. Where too few detections
   /// match it is by odometry, as long as there is any. None where the method does not offer it,
   /// where there is no map yet, or where odometry has a gap.

@@ -50,6 +50,22 @@ const char* result_text(model::LoopResult::Status status) {
 
 }  // namespace
 
+const char* state_name(Verdict::State state) {
+  switch (state) {
+    case Verdict::State::kWaiting:
+      return "waiting";
+    case Verdict::State::kOk:
+      return "ok";
+    case Verdict::State::kUnsure:
+      return "unsure";
+    case Verdict::State::kLost:
+      return "lost";
+    case Verdict::State::kSilent:
+      return "silent";
+  }
+  return "waiting";
+}
+
 Scene::Scene() { changed(verdict_) = {}; }
 
 void Scene::note_time(model::Utime utime, std::int64_t wall_us) {

@@ -39,6 +39,9 @@ struct Verdict {
   std::int64_t since_utime = 0;  ///< [us] since when it is so.
 };
 
+/// As pages and scripts have it: waiting, ok, unsure, lost, silent.
+const char* state_name(Verdict::State state);
+
 /// What the sensor sees now.
 struct SceneScan {
   std::int64_t utime = 0;

@@ -37,22 +37,6 @@ const char* pose_text(const model::SlamPose& pose) {
   return pose.status ? update_text(*pose.status) : "tracked";
 }
 
-const char* verdict_text(Verdict::State state) {
-  switch (state) {
-    case Verdict::State::kWaiting:
-      return "waiting";
-    case Verdict::State::kOk:
-      return "ok";
-    case Verdict::State::kUnsure:
-      return "unsure";
-    case Verdict::State::kLost:
-      return "lost";
-    case Verdict::State::kSilent:
-      return "silent";
-  }
-  return "waiting";
-}
-
 Json pose_json(const model::SlamPose& pose) {
   const geometry::SE2 map_T_vehicle = pose.map_T_vehicle();
   Json covariance = Json::array();
@@ -126,8 +110,14 @@ Json process_json(const std::string& name, const ProcessBoard::Entry& entry, std
   for (const auto& one : health.reasons) reasons.push_back({one.channel, one.reason, one.count});
   Json channels = Json::array();
   for (const auto& one : health.channels) {
-    channels.push_back({one.channel, one.output != 0, one.rate_hz, one.messages, one.lost,
-                        one.malformed, one.dropped, one.last_utime});
+    channels.push_back({{"channel", one.channel},
+                        {"is_output", one.output != 0},
+                        {"rate_hz", one.rate_hz},
+                        {"messages", one.messages},
+                        {"lost", one.lost},
+                        {"malformed", one.malformed},
+                        {"dropped", one.dropped},
+                        {"last_utime", one.last_utime}});
   }
   return {
       {"name", name},
@@ -196,7 +186,7 @@ void add_parts(const Scene& scene, Change since, nlohmann::ordered_json& header)
   if (scene.pose().change > since && scene.pose().value)
     header["pose"] = pose_json(*scene.pose().value);
   if (scene.verdict().change > since)
-    header["verdict"] = {{"state", verdict_text(scene.verdict().value.state)},
+    header["verdict"] = {{"state", state_name(scene.verdict().value.state)},
                          {"text", scene.verdict().value.text},
                          {"since_utime", scene.verdict().value.since_utime}};
   if (scene.true_pose().change > since && scene.true_pose().value) {

@@ -95,6 +95,10 @@ TEST_CASE("messages on the bus come out of the WebSocket", "[viewer]") {
   health.process = "ghost";
   health.state = health_t::STATE_OK;
   health.pid = 0x7fffffff;  // No such process.
+  health.channels.resize(1);
+  health.channels[0].channel = "HAUNT";
+  health.channels[0].rate_hz = 5.0;
+  health.num_channels = 1;
   process.publish("HEALTH", health);
 
   CHECK(exchange_until([&] {
@@ -105,6 +109,7 @@ TEST_CASE("messages on the bus come out of the WebSocket", "[viewer]") {
     return page.parts.contains("processes") && page.parts["processes"].size() == 1 &&
            page.parts["processes"][0]["state"] == "silent";
   }));
+  CHECK(page.parts["processes"][0]["channels"][0]["rate_hz"] == 5.0);
   CHECK(page.landmarks.at(0).id == delta.added[0].id);
   CHECK_THAT(test::get(process.port(), "/health.json"), Contains("\"pages\": 1"));
 }

@@ -26,6 +26,7 @@ class SmoothingMapper final : public MapperMethod {
   explicit SmoothingMapper(const SmoothingMapperParameters& parameters);
 
   model::MapUpdate add(const model::Keyframe& keyframe) override;
+  bool locates_scans() const override { return true; }
   std::optional<ScanPose> locate(const model::LandmarkScan& scan) override {
     return current_.locate(scan);
   }
