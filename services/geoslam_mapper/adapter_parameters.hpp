@@ -24,7 +24,7 @@ struct MapperOutputParameters {
   double moved_m = 0.001;
   double reset_distance_m = 0.5;
   double reset_angle_rad = 0.05;
-  double oldest_pose_s = 0.15;
+  double oldest_pose_s = 0.05;
 };
 
 /// Adds the parameters of the methods to the table, with their older names.

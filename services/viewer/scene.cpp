@@ -108,6 +108,7 @@ void Scene::start_map(std::uint32_t map_id) {
   changed(matches_) = {};
   changed(true_pose_).reset();
   alignment_.clear();
+  world_T_map_.reset();
   reset_change_ = ++change_;
 }
 
@@ -221,6 +222,7 @@ void Scene::take(const model::MapUpdate& update) {
   const bool starts = update.status == model::MapUpdateStatus::kFirstMap;
   if (starts && map_id_ != 0 && update.map_id != map_id_) start_map(update.map_id);
   if (starts || map_id_ == 0) map_id_ = update.map_id;
+  if (starts) tie_to_truth(update);
   changed(matches_).update = update;
 
   if (starts || update.status == model::MapUpdateStatus::kUpdated) {
@@ -407,21 +409,34 @@ void Scene::take_truth(model::Utime utime, const geometry::SE2& world_T_vehicle)
   world_truth_.emplace_back(utime, world_T_vehicle);
 }
 
-/// The true pose at a stamp: the newest ones are close enough for it to be interpolated.
-void Scene::compare_with_truth(const model::SlamPose& pose) {
-  if (world_truth_.size() < 2) return;
-  const auto after = std::ranges::lower_bound(world_truth_, pose.utime, {},
+/// Between two that are near each other; none outside of what was heard.
+std::optional<geometry::SE2> Scene::truth_at(model::Utime utime) const {
+  const auto after = std::ranges::lower_bound(world_truth_, utime, {},
                                               &std::pair<model::Utime, geometry::SE2>::first);
-  if (after == world_truth_.end() || after == world_truth_.begin()) return;
+  if (after == world_truth_.end()) return std::nullopt;
+  if (after->first == utime) return after->second;
+  if (after == world_truth_.begin()) return std::nullopt;
   const auto before = std::prev(after);
-  const double part = static_cast<double>(pose.utime - before->first) /
+  const double part = static_cast<double>(utime - before->first) /
                       static_cast<double>(after->first - before->first);
-  const geometry::SE2 world_T_vehicle =
-      before->second * geometry::SE2::Exp(part * (before->second.inverse() * after->second).Log());
+  return before->second *
+         geometry::SE2::Exp(part * (before->second.inverse() * after->second).Log());
+}
+
+void Scene::tie_to_truth(const model::MapUpdate& first) {
+  const auto world_T_vehicle = truth_at(first.utime);
+  world_T_map_.reset();
+  if (world_T_vehicle) world_T_map_ = *world_T_vehicle * first.map_T_vehicle.inverse();
+}
+
+void Scene::compare_with_truth(const model::SlamPose& pose) {
+  const auto true_pose = truth_at(pose.utime);
+  if (!true_pose) return;
+  const geometry::SE2& world_T_vehicle = *true_pose;
   const geometry::SE2 map_T_vehicle = pose.map_T_vehicle();
   if (pose.is_localised())
     alignment_.add(map_T_vehicle.translation(), world_T_vehicle.translation());
-  const auto world_T_map = alignment_.world_T_map();
+  const auto world_T_map = world_T_map_ ? world_T_map_ : alignment_.world_T_map();
   if (!world_T_map) return;
 
   const geometry::SE2 map_T_truth = world_T_map->inverse() * world_T_vehicle;

@@ -150,6 +150,8 @@ class Scene {
   void set_verdict(Verdict::State state, std::string text, model::Utime utime);
   void draw(const model::SlamPose& pose);
   void judge(const model::SlamPose& pose);
+  std::optional<geometry::SE2> truth_at(model::Utime utime) const;
+  void tie_to_truth(const model::MapUpdate& first);
   void compare_with_truth(const model::SlamPose& pose);
   void move_keyframes(const model::MapCorrection& correction);
   void note_time(model::Utime utime, std::int64_t wall_us);
@@ -190,6 +192,9 @@ class Scene {
   /// Least difference of wall clock to stamp in this period and the one before [us].
   std::array<std::optional<std::int64_t>, 2> least_age_us_;
   std::int64_t age_period_us_ = 0;
+  /// By the keyframe that began the map, whose pose defines its frame; where it is not known, by
+  /// the alignment of all poses.
+  std::optional<geometry::SE2> world_T_map_;
   TruthAlignment alignment_;
   geometry::SE2 drawn_world_T_map_;
   std::vector<std::pair<model::Utime, geometry::SE2>> world_truth_;

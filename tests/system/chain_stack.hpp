@@ -14,10 +14,11 @@
 
 namespace understory::test {
 
-inline const std::vector<std::string> kChainProcesses = {
-    "lidar_imu_input",  "landmark_extractor", "associator",   "ekf",
-    "keyframer",        "geoslam_mapper",     "submap_store", "loop_closer",
-    "existence_tracker"};
+inline const std::vector<std::string> kChainProcesses = {"lidar_imu_input",   "landmark_extractor",
+                                                         "associator",        "ekf",
+                                                         "keyframer",         "geoslam_mapper",
+                                                         "submap_store",      "loop_closer",
+                                                         "existence_tracker", "viewer"};
 
 /// A recorded drive of the simulated vehicle through a forest, and where it really was.
 class RecordedSensors {

@@ -181,6 +181,27 @@ TEST_CASE("the error to ground truth does not depend on the world's frame", "[vi
   CHECK(scene.truth().points()[100].x_m == Approx(30.0).margin(0.5));
 }
 
+TEST_CASE("truth is tied where the map begins", "[viewer]") {
+  const geometry::SE2 world_T_map(50.0, 20.0, 1.0);
+  Scene scene;
+  for (int i = 0; i <= 20; ++i)
+    scene.take_truth(100'000 * i, world_T_map * geometry::SE2(0.05 * i, 0.0, 0.0));
+  model::MapUpdate first;
+  first.status = model::MapUpdateStatus::kFirstMap;
+  first.utime = 1'000'000;
+  first.map_T_vehicle = {0.5, 0.0, 0.0};
+  scene.take(first);
+  // A heading that is wrong from there on is an error; the best alignment would hide it.
+  for (int i = 21; i <= 400; ++i) {
+    scene.take_truth(100'000 * i, world_T_map * geometry::SE2(0.05 * i, 0.0, 0.0));
+    model::SlamPose one = pose(100'000 * i);
+    one.submap_T_vehicle = {0.05 * i, 0.001 * 0.05 * i, 0.001};
+    scene.take(one, 100'000 * i);
+  }
+  CHECK(*scene.numbers().value.error_m == Approx(0.02).margin(0.002));
+  CHECK(*scene.numbers().value.error_rad == Approx(0.001).margin(1e-4));
+}
+
 TEST_CASE("latency is told from the youngest stamps, whatever the clock of the stamps",
           "[viewer]") {
   Scene scene;
