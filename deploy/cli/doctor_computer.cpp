@@ -13,6 +13,7 @@
 
 #include "deploy/cli/doctor_findings.hpp"
 #include "deploy/cli/paths.hpp"
+#include "services/viewer/page_bundle.hpp"
 
 namespace understory::cli {
 namespace {
@@ -181,6 +182,9 @@ std::vector<Finding> tool_findings() {
           "matplotlib",
           "/usr/bin/python3 -c 'import matplotlib; print(matplotlib.__version__)' 2>/dev/null",
           "apt-get install python3-matplotlib (for pictures only)"),
+      {viewer::has_page() ? Verdict::kGood : Verdict::kAdvice, "page",
+       viewer::has_page() ? "part of the program" : "the viewer's page was not built",
+       viewer::has_page() ? "" : "deploy/setup (node, npm), then build again with a network"},
   };
 }
 

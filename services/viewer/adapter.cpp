@@ -78,6 +78,7 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
 
   template <class T, class Take>
   void hear(const char* channel, const T& value, const Take& take) {
+    if (!host_) return;  // In a replay nobody looks.
     const std::int64_t wall_us = clock_.wall_us();
     run_.take(value, take, wall_us);
     if (host_->foxglove().wants(channel))

@@ -108,6 +108,27 @@ try {
     return "403, counted";
   });
 
+  await check("other viewers are served by the Foxglove protocol", async () => {
+    const heard = [];
+    for (const protocol of ["foxglove.sdk.v1", "foxglove.websocket.v1"]) {
+      const socket = new WebSocket(address.replace("http", "ws") + "foxglove", [protocol]);
+      let channels = null, messages = 0;
+      socket.on("message", (data, isBinary) => {
+        if (isBinary) { messages++; return; }
+        const text = JSON.parse(data.toString());
+        if (text.op === "advertise") channels = text.channels;
+      });
+      await until("the list of topics", () => channels);
+      const topic = channels.find((one) => one.topic === "/pose");
+      socket.send(JSON.stringify({ op: "subscribe", subscriptions: [{ id: 1, channelId: topic.id }] }));
+      await until("ten poses", () => messages >= 10);
+      must(socket.protocol === protocol, `${socket.protocol} instead of ${protocol}`);
+      socket.terminate();
+      heard.push(`${channels.length} topics`);
+    }
+    return heard.join(", ");
+  });
+
   if (pictures) {
     mkdirSync(pictures, { recursive: true });
     for (const theme of ["dark", "light"]) {

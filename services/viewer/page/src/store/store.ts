@@ -51,7 +51,7 @@ export function shownVerdict(store: Store, isOpen: boolean, now: number): Shown 
   if (store.hello.mode === "live" && now - store.heard > staleMs && document.visibilityState === "visible") {
     return make("silent", `Nothing from the viewer for ${Math.round((now - store.heard) / 1000)} s.`);
   }
-  if (!verdict && store.hello.mode === "map") return { state: "waiting", word: "STORED MAP", text: describe(store) };
+  if (store.hello.mode === "map") return { state: "waiting", word: "STORED MAP", text: describe(store) };
   if (!verdict) return make("waiting", "No verdict yet.");
   return make(verdict.state, verdict.text);
 }
