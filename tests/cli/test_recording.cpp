@@ -227,7 +227,7 @@ TEST_CASE_METHOD(Fixture, "raw readings of the recorded car become a map", "[cli
           (directory / "out.lcm").string());
   CAPTURE(outcome.error);
   REQUIRE(outcome.status == 0);
-  CHECK_THAT(outcome.out, Contains("9 stages"));
+  CHECK_THAT(outcome.out, Contains("10 stages"));
   const auto maps = messages<model::WholeMap>(events_of(directory / "out.lcm"), "MAP");
   REQUIRE_FALSE(maps.empty());
   CHECK(maps.back().landmarks.size() > 50);
