@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The pipeline in README.md shows the channels that services/*/main.cpp binds: every arrow, and no other.
+"""The pipeline in services/README.md shows the channels that services/*/main.cpp binds: every arrow, and no other.
 
 A channel stands in main.cpp as `.name = "CHANNEL",  // in: ...` or `// out: ...`. An input that no service publishes comes from a
 node that is no service; an output that no service takes goes to one. Labels that are not in capitals are no channels.
@@ -38,9 +38,9 @@ def wanted(bound):
 
 def drawn(services):
     """The arrows of the diagram; a node that is no service is outside."""
-    diagram = re.search(r"```mermaid\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    diagram = re.search(r"```mermaid\n(.*?)```", (ROOT / "services" / "README.md").read_text(), re.DOTALL)
     if not diagram:
-        raise SystemExit("README.md: no mermaid diagram")
+        raise SystemExit("services/README.md: no mermaid diagram")
     arrows = set()
     for source, label, sink in ARROW.findall(diagram.group(1)):
         ends = [node if node in services else OUTSIDE for node in (source, sink)]
@@ -53,9 +53,9 @@ def main():
     bound = list(bindings())
     expected, found = wanted(bound), drawn({service for service, *_ in bound})
     for arrow in sorted(expected - found):
-        print("README.md: the diagram lacks {} --{}--> {}".format(*arrow))
+        print("services/README.md: the diagram lacks {} --{}--> {}".format(*arrow))
     for arrow in sorted(found - expected):
-        print("README.md: no service has {} --{}--> {}".format(*arrow))
+        print("services/README.md: no service has {} --{}--> {}".format(*arrow))
     if expected == found:
         print(f"{len(found)} arrows, as the services bind them")
     return 0 if expected == found and found else 1
