@@ -19,7 +19,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
  public:
   /// Takes over a connection that asks for a WebSocket and may have it.
   using Upgrade =
-      std::function<void(boost::beast::tcp_stream stream, SocketSession::Request request,
+      std::function<void(boost::beast::tcp_stream stream, const SocketSession::Request& request,
                          const SocketPath& path, std::string subprotocol)>;
 
   /// `options` must outlive it. `ended` is called once, also where the connection was handed on.

@@ -120,7 +120,7 @@ class Server::Impl {
     ++connections_;
     std::make_shared<HttpSession>(
         std::move(socket), options_, shared_,
-        [this](boost::beast::tcp_stream stream, SocketSession::Request request,
+        [this](boost::beast::tcp_stream stream, const SocketSession::Request& request,
                const SocketPath& path, std::string subprotocol) {
           open_socket(std::move(stream), request, path, std::move(subprotocol));
         },

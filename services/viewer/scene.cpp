@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -11,7 +10,6 @@ namespace understory::viewer {
 namespace {
 
 constexpr std::size_t kMostLogLines = 500;
-constexpr std::size_t kMostClosures = 20'000;
 constexpr std::size_t kMostScanPoints = 20'000;
 constexpr std::int64_t kSilentPose_us = 1'000'000;
 constexpr std::int64_t kAgePeriod_us = 10'000'000;
@@ -20,8 +18,6 @@ constexpr double kUnsure_m = 1.0;  ///< A standard deviation above it is said to
 constexpr float kDrawEvery_m = 1.0F;
 constexpr double kDrawEvery_rad = 0.05;
 constexpr std::int64_t kDrawEvery_us = 1'000'000;
-constexpr double kTruthEvery_m = 0.2;
-constexpr double kRedraw_m = 0.05;
 
 double largest_sigma_m(const Eigen::Matrix3d& covariance) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(
@@ -33,20 +29,6 @@ bool has_place(const model::SlamPose& pose) { return pose.is_localised() || pose
 
 /// Of the numbers of slam_pose2_t: whether a path is drawn the same at both.
 bool is_same_line(std::uint8_t a, std::uint8_t b) { return (a == 6) == (b == 6); }
-
-const char* result_text(model::LoopResult::Status status) {
-  switch (status) {
-    case model::LoopResult::Status::kAccepted:
-      return "accepted";
-    case model::LoopResult::Status::kWaiting:
-      return "waiting";
-    case model::LoopResult::Status::kRefused:
-      return "refused";
-    case model::LoopResult::Status::kRevoked:
-      return "revoked";
-  }
-  return "sent";
-}
 
 }  // namespace
 
@@ -237,107 +219,6 @@ void Scene::take(const model::MapUpdate& update) {
   }
 }
 
-void Scene::take(const model::WholeMap& map) {
-  utime_ = std::max(utime_, map.utime);
-  if (!map.complete) return;
-  map_version_ = map.version;
-  wants_map_ = false;
-  // What it does not list, and was not handed over, is gone.
-  std::vector<model::LandmarkId> gone;
-  for (const SceneLandmark& one : landmarks_.slots()) {
-    if ((one.flags & SceneLandmark::kThere) == 0 || submaps_.holds(one.id)) continue;
-    if (!std::ranges::binary_search(map.landmarks, one.id, {}, &model::MapLandmark::id))
-      gone.push_back(one.id);
-  }
-  for (const model::LandmarkId id : gone) landmarks_.remove(id);
-  for (const model::MapLandmark& landmark : map.landmarks) {
-    submaps_.comes_back(landmark.id);
-    landmarks_.set(landmark);
-  }
-  keyframes_.take(map.keyframes);
-}
-
-void Scene::take(const model::MapDelta& delta) {
-  utime_ = std::max(utime_, delta.utime);
-  if (delta.base_version == 0 && map_version_ != 0) start_map(map_id_);
-  if (delta.base_version != 0 && delta.version <= map_version_) return;
-  wants_map_ = delta.base_version != 0 && (wants_map_ || delta.base_version != map_version_);
-  map_version_ = delta.version;
-
-  for (const auto* list : {&delta.added, &delta.moved}) {
-    for (const model::MapLandmark& landmark : *list) {
-      submaps_.comes_back(landmark.id);
-      landmarks_.set(landmark);
-    }
-  }
-  for (const model::LandmarkId id : delta.removed) {
-    submaps_.comes_back(id);
-    landmarks_.remove(id);
-  }
-  for (const auto& [old_id, new_id] : delta.merged) {
-    submaps_.comes_back(old_id);
-    landmarks_.remove(old_id);
-  }
-}
-
-void Scene::take(const model::Existence& existence) {
-  utime_ = std::max(utime_, existence.utime);
-  for (const model::LandmarkExistence& one : existence.landmarks) landmarks_.set_existence(one);
-  SceneNumbers& numbers = changed(numbers_);
-  numbers.missing_share = existence.missing_share;
-  numbers.new_share = existence.new_share;
-  numbers.is_mapping_needed = existence.is_mapping_needed;
-}
-
-void Scene::take(const model::Submap& submap) {
-  for (const model::MapLandmark& landmark : submaps_.take(submap)) landmarks_.set(landmark);
-  for (const model::SubmapId id : submap.replaced) handed_over_keyframes_.erase(id);
-  handed_over_keyframes_[submap.id] = submap.keyframes;
-  submaps_change_ = ++change_;
-}
-
-void Scene::take(const model::MapCorrection& correction) {
-  const auto moved = submaps_.take(correction);
-  if (moved.empty()) return;
-  for (const model::MapLandmark& landmark : moved) landmarks_.set(landmark);
-  move_keyframes(correction);
-  submaps_change_ = ++change_;
-}
-
-void Scene::move_keyframes(const model::MapCorrection& correction) {
-  std::vector<model::KeyframePose> moved;
-  for (const model::SubmapPose& pose : correction.submaps) {
-    const auto found = handed_over_keyframes_.find(pose.id);
-    if (found == handed_over_keyframes_.end()) continue;
-    for (model::KeyframePose keyframe : found->second) {
-      keyframe.map_T_vehicle = pose.map_T_submap * keyframe.map_T_vehicle;
-      moved.push_back(keyframe);
-    }
-  }
-  keyframes_.take(moved);
-}
-
-void Scene::take(const model::LoopClosure& closure) {
-  if (!closures_.contains(closure.id) && closures_.size() >= kMostClosures)
-    closures_.erase(closures_.begin());
-  SceneClosure& one = closures_[closure.id];
-  if (closure.is_revoked) {
-    one.closure.id = closure.id;
-    one.status = "revoked";
-  } else {
-    one.closure = closure;
-  }
-  closures_change_ = ++change_;
-}
-
-void Scene::take(const model::LoopResult& result) {
-  const auto found = closures_.find(result.closure_id);
-  if (found == closures_.end()) return;
-  found->second.status = result_text(result.status);
-  found->second.reason = result.reason;
-  closures_change_ = ++change_;
-}
-
 void Scene::take(const model::LandmarkScan& scan, std::int64_t wall_us) {
   note_time(scan.utime, wall_us);
   SceneScan& now = changed(scan_);
@@ -374,102 +255,6 @@ void Scene::take(const model::PointSweep& part) {
 void Scene::take(const log_t& line) {
   if (log_.size() >= kMostLogLines) log_.pop_front();
   log_.push_back({line, ++change_});
-}
-
-void Scene::take_stored(std::span<const model::MapLandmark> landmarks,
-                        std::span<const model::LandmarkExistence> existence,
-                        std::span<const model::KeyframePose> keyframes) {
-  keyframes_.take(keyframes);
-  for (const model::MapLandmark& landmark : landmarks) landmarks_.set(landmark, true);
-  for (const model::LandmarkExistence& one : existence) landmarks_.set_existence(one);
-}
-
-std::optional<Eigen::Vector2d> Scene::place_of(const model::LoopEnd& end) const {
-  if (end.submap != 0) {
-    const auto found = submaps_.places().find(end.submap);
-    if (found == submaps_.places().end()) return std::nullopt;
-    return found->second.map_T_submap.translation();
-  }
-  const auto pose = keyframes_.find(end.keyframe);
-  if (!pose) return std::nullopt;
-  return pose->translation();
-}
-
-void Scene::take_truth(model::Utime utime, const geometry::SE2& world_T_vehicle) {
-  // The newest one is kept whole, since poses are compared with it; of the others one in so much.
-  const std::size_t size = world_truth_.size();
-  if (size > 1 &&
-      (world_truth_[size - 2].second.translation() - world_T_vehicle.translation()).norm() <
-          kTruthEvery_m) {
-    world_truth_.back() = {utime, world_T_vehicle};
-    return;
-  }
-  if (size >= Track::kMostPoints)
-    world_truth_.erase(world_truth_.begin(), world_truth_.begin() + Track::kMostPoints / 2);
-  world_truth_.emplace_back(utime, world_T_vehicle);
-}
-
-/// Between two that are near each other; none outside of what was heard.
-std::optional<geometry::SE2> Scene::truth_at(model::Utime utime) const {
-  const auto after = std::ranges::lower_bound(world_truth_, utime, {},
-                                              &std::pair<model::Utime, geometry::SE2>::first);
-  if (after == world_truth_.end()) return std::nullopt;
-  if (after->first == utime) return after->second;
-  if (after == world_truth_.begin()) return std::nullopt;
-  const auto before = std::prev(after);
-  const double part = static_cast<double>(utime - before->first) /
-                      static_cast<double>(after->first - before->first);
-  return before->second *
-         geometry::SE2::Exp(part * (before->second.inverse() * after->second).Log());
-}
-
-void Scene::tie_to_truth(const model::MapUpdate& first) {
-  const auto world_T_vehicle = truth_at(first.utime);
-  world_T_map_.reset();
-  if (world_T_vehicle) world_T_map_ = *world_T_vehicle * first.map_T_vehicle.inverse();
-}
-
-void Scene::compare_with_truth(const model::SlamPose& pose) {
-  const auto true_pose = truth_at(pose.utime);
-  if (!true_pose) return;
-  const geometry::SE2& world_T_vehicle = *true_pose;
-  const geometry::SE2 map_T_vehicle = pose.map_T_vehicle();
-  if (pose.is_localised())
-    alignment_.add(map_T_vehicle.translation(), world_T_vehicle.translation());
-  const auto world_T_map = world_T_map_ ? world_T_map_ : alignment_.world_T_map();
-  if (!world_T_map) return;
-
-  const geometry::SE2 map_T_truth = world_T_map->inverse() * world_T_vehicle;
-  changed(true_pose_) = map_T_truth;
-  const Eigen::Vector3d error = (map_T_vehicle.inverse() * map_T_truth).Log();
-  SceneNumbers& numbers = changed(numbers_);
-  numbers.error_m = error.head<2>().norm();
-  numbers.error_rad = std::abs(error.z());
-  const Eigen::LLT<Eigen::Matrix3d> factor(pose.covariance);
-  if (factor.info() == Eigen::Success) numbers.nees = error.dot(factor.solve(error));
-
-  // The path so far: drawn anew when the alignment has moved it by more than is seen.
-  const auto in_map = [&](const std::pair<model::Utime, geometry::SE2>& one) {
-    const geometry::SE2 at = world_T_map->inverse() * one.second;
-    return TrackPoint{one.first,
-                      static_cast<float>(at.x()),
-                      static_cast<float>(at.y()),
-                      static_cast<float>(at.theta()),
-                      0.0F,
-                      0};
-  };
-  const geometry::SE2 shift = drawn_world_T_map_.inverse() * *world_T_map;
-  const double reach_m = map_T_vehicle.translation().norm();
-  const bool is_off = shift.translation().norm() + std::abs(shift.theta()) * reach_m > kRedraw_m;
-  if (is_off || truth_.points().empty()) {
-    drawn_world_T_map_ = *world_T_map;
-    std::vector<TrackPoint> points;
-    points.reserve(world_truth_.size());
-    for (const auto& one : world_truth_) points.push_back(in_map(one));
-    truth_.replace_from(0, points);
-  } else if (world_truth_.back().first > truth_.points().back().utime) {
-    truth_.append(in_map(world_truth_.back()));
-  }
 }
 
 }  // namespace understory::viewer

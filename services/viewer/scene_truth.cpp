@@ -1,0 +1,92 @@
+#include "services/viewer/scene.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace understory::viewer {
+namespace {
+
+constexpr double kTruthEvery_m = 0.2;
+constexpr double kRedraw_m = 0.05;
+
+}  // namespace
+
+void Scene::take_truth(model::Utime utime, const geometry::SE2& world_T_vehicle) {
+  // The newest one is kept whole, since poses are compared with it; of the others one in so much.
+  const std::size_t size = world_truth_.size();
+  if (size > 1 &&
+      (world_truth_[size - 2].second.translation() - world_T_vehicle.translation()).norm() <
+          kTruthEvery_m) {
+    world_truth_.back() = {utime, world_T_vehicle};
+    return;
+  }
+  if (size >= Track::kMostPoints)
+    world_truth_.erase(world_truth_.begin(), world_truth_.begin() + Track::kMostPoints / 2);
+  world_truth_.emplace_back(utime, world_T_vehicle);
+}
+
+/// Between two that are near each other; none outside of what was heard.
+std::optional<geometry::SE2> Scene::truth_at(model::Utime utime) const {
+  const auto after = std::ranges::lower_bound(world_truth_, utime, {},
+                                              &std::pair<model::Utime, geometry::SE2>::first);
+  if (after == world_truth_.end()) return std::nullopt;
+  if (after->first == utime) return after->second;
+  if (after == world_truth_.begin()) return std::nullopt;
+  const auto before = std::prev(after);
+  const double part = static_cast<double>(utime - before->first) /
+                      static_cast<double>(after->first - before->first);
+  return before->second *
+         geometry::SE2::Exp(part * (before->second.inverse() * after->second).Log());
+}
+
+void Scene::tie_to_truth(const model::MapUpdate& first) {
+  const auto world_T_vehicle = truth_at(first.utime);
+  world_T_map_.reset();
+  if (world_T_vehicle) world_T_map_ = *world_T_vehicle * first.map_T_vehicle.inverse();
+}
+
+void Scene::compare_with_truth(const model::SlamPose& pose) {
+  const auto true_pose = truth_at(pose.utime);
+  if (!true_pose) return;
+  const geometry::SE2& world_T_vehicle = *true_pose;
+  const geometry::SE2 map_T_vehicle = pose.map_T_vehicle();
+  if (pose.is_localised())
+    alignment_.add(map_T_vehicle.translation(), world_T_vehicle.translation());
+  const auto world_T_map = world_T_map_ ? world_T_map_ : alignment_.world_T_map();
+  if (!world_T_map) return;
+
+  const geometry::SE2 map_T_truth = world_T_map->inverse() * world_T_vehicle;
+  changed(true_pose_) = map_T_truth;
+  const Eigen::Vector3d error = (map_T_vehicle.inverse() * map_T_truth).Log();
+  SceneNumbers& numbers = changed(numbers_);
+  numbers.error_m = error.head<2>().norm();
+  numbers.error_rad = std::abs(error.z());
+  const Eigen::LLT<Eigen::Matrix3d> factor(pose.covariance);
+  if (factor.info() == Eigen::Success) numbers.nees = error.dot(factor.solve(error));
+
+  // The path so far: drawn anew when the alignment has moved it by more than is seen.
+  const auto in_map = [&](const std::pair<model::Utime, geometry::SE2>& one) {
+    const geometry::SE2 at = world_T_map->inverse() * one.second;
+    return TrackPoint{one.first,
+                      static_cast<float>(at.x()),
+                      static_cast<float>(at.y()),
+                      static_cast<float>(at.theta()),
+                      0.0F,
+                      0};
+  };
+  const geometry::SE2 shift = drawn_world_T_map_.inverse() * *world_T_map;
+  const double reach_m = map_T_vehicle.translation().norm();
+  const bool is_off = shift.translation().norm() + std::abs(shift.theta()) * reach_m > kRedraw_m;
+  if (is_off || truth_.points().empty()) {
+    drawn_world_T_map_ = *world_T_map;
+    std::vector<TrackPoint> points;
+    points.reserve(world_truth_.size());
+    for (const auto& one : world_truth_) points.push_back(in_map(one));
+    truth_.replace_from(0, points);
+  } else if (world_truth_.back().first > truth_.points().back().utime) {
+    truth_.append(in_map(world_truth_.back()));
+  }
+}
+
+}  // namespace understory::viewer
