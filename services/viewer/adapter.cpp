@@ -1,6 +1,7 @@
 #include "services/viewer/adapter.hpp"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <iostream>
 #include <memory>
@@ -42,6 +43,7 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
   }
 
   void open() override {
+    ::setpriority(PRIO_PROCESS, 0, parameters_.niceness);
     PageRequests requests;
     requests.story = [this](const nlohmann::json& question) { return run_.answer(question); };
     host_.emplace(parameters_.page, std::vector<const Scene*>{&run_.scene()}, std::move(requests),

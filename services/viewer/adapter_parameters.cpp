@@ -16,6 +16,8 @@ void describe(ViewerParameters& parameters, bus::ParameterTable& table) {
   table.add("page.most_clients", page.most_clients, {1, 1000}, "", "Connections at a time.");
   table.add("page.foxglove_origins", page.foxglove_origins, {},
             "Comma-separated origins of the pages of other viewers that may connect.");
+  table.add("page.niceness", parameters.niceness, {0, 19}, "",
+            "Priority that the process gives up in favour of those that steer: 0 none, 19 most.");
   table.add("input.sweeps", parameters.hears_sweeps,
             "Listen to LIDAR_SWEEP too, to draw its points: 20 MB/s of a large laser.");
   table.add(
