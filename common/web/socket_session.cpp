@@ -95,25 +95,32 @@ void SocketSession::send(std::shared_ptr<const std::string> message, bool is_bin
 }
 
 void SocketSession::write() {
-  if (is_writing_ || !is_open_ || is_over_ || outbox_.empty()) return;
+  if (is_writing_ || !is_open_ || is_over_) return;
+  if (is_closing_) {
+    say_goodbye();
+    return;
+  }
+  if (outbox_.empty()) return;
   is_writing_ = true;
-  const Outgoing& first = outbox_.front();
+  Outgoing first = std::move(outbox_.front());
+  outbox_.pop_front();
   socket_.binary(first.is_binary);
-  socket_.async_write(
-      boost::asio::buffer(*first.bytes),
-      [self = shared_from_this()](const beast::error_code& error, std::size_t /*bytes*/) {
-        self->is_writing_ = false;
-        self->on_written(error);
-      });
+  const auto buffer = boost::asio::buffer(*first.bytes);
+  // The handler keeps the bytes: the session may be over before they are written.
+  socket_.async_write(buffer, [self = shared_from_this(), bytes = std::move(first.bytes)](
+                                  const beast::error_code& error, std::size_t /*written*/) {
+    self->is_writing_ = false;
+    self->unsent_bytes_ -= bytes->size();
+    self->on_written(error);
+  });
 }
 
 void SocketSession::on_written(const beast::error_code& error) {
+  if (is_over_) return;
   if (error) {
     end();
     return;
   }
-  unsent_bytes_ -= outbox_.front().bytes->size();
-  outbox_.pop_front();
   if (outbox_.empty()) place_.shared->push({Event::Kind::kSent, place_.id, {}, {}, {}});
   write();
 }
@@ -121,13 +128,18 @@ void SocketSession::on_written(const beast::error_code& error) {
 void SocketSession::close(const std::string& reason) {
   if (is_over_ || is_closing_) return;
   is_closing_ = true;
-  // A message that is half written goes first or never: the connection then ends without a word.
-  if (!is_open_ || is_writing_) {
+  goodbye_ = reason.substr(0, 120);
+  if (!is_open_) {
     end();
-    return;
+  } else {
+    write();  // Behind the message that is being written, if there is one.
   }
+}
+
+void SocketSession::say_goodbye() {
+  is_writing_ = true;
   websocket::close_reason words(websocket::close_code::policy_error);
-  words.reason = reason.substr(0, 120);
+  words.reason = goodbye_;
   socket_.async_close(
       words, [self = shared_from_this()](const beast::error_code& /*error*/) { self->end(); });
 }

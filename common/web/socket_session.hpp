@@ -50,6 +50,7 @@ class SocketSession : public std::enable_shared_from_this<SocketSession> {
   void read();
   void on_read(const boost::beast::error_code& error);
   void write();
+  void say_goodbye();
   void on_written(const boost::beast::error_code& error);
   void count_failure(const boost::beast::error_code& error);
   void end();
@@ -58,6 +59,7 @@ class SocketSession : public std::enable_shared_from_this<SocketSession> {
   Place place_;
   boost::beast::flat_buffer buffer_;
   std::deque<Outgoing> outbox_;
+  std::string goodbye_;
   std::size_t unsent_bytes_ = 0;
   std::size_t waiting_messages_ = 0;  ///< With the owner.
   bool is_reading_ = false;

@@ -199,6 +199,32 @@ TEST_CASE("a client that takes nothing is closed, and holds up nobody", "[web]")
   }));
 }
 
+TEST_CASE("clients that go while much is sent to them do no harm", "[web]") {
+  web::Server server(options());
+  const auto megabyte = shared(std::string(1 << 20, 'x'));
+  for (int i = 0; i < 20; ++i) {
+    test::SocketClient client(server.port(), "/live");
+    // Among them are the last words of those before.
+    web::ClientId id = 0;
+    REQUIRE(test::holds_soon([&] {
+      for (const Event& event : server.take_events()) {
+        if (event.kind == Event::Kind::kOpened) id = event.client;
+      }
+      return id != 0;
+    }));
+    for (int k = 0; k < 4; ++k) server.send_binary(id, megabyte);
+    // By itself, by a frame that is none, or sent away in the middle of a message.
+    if (i % 3 == 0) client.send_raw("\xff\xff\xff");
+    if (i % 3 != 1) continue;
+    server.close(id, "in the middle");
+    while (client.receive()) {
+    }
+    CHECK(client.close_reason() == "in the middle");
+  }
+  test::SocketClient client(server.port(), "/live");
+  CHECK(test::holds_soon([&] { return server.counts().sockets == 21; }));
+}
+
 TEST_CASE("connections above the limit are closed at once", "[web]") {
   web::ServerOptions few = options();
   few.most_connections = 3;
