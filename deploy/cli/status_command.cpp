@@ -7,6 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "common/bus/clock.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
