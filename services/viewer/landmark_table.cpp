@@ -1,6 +1,6 @@
 #include "services/viewer/landmark_table.hpp"
 
-#include <cstring>
+#include <bit>
 #include <limits>
 
 namespace understory::viewer {
@@ -11,8 +11,9 @@ bool is_same(const SceneLandmark& a, const SceneLandmark& b) {
   return a.id == b.id && a.x_m == b.x_m && a.y_m == b.y_m &&
          a.covariance_xx_m2 == b.covariance_xx_m2 && a.covariance_xy_m2 == b.covariance_xy_m2 &&
          a.covariance_yy_m2 == b.covariance_yy_m2 && a.radius_m == b.radius_m &&
-         std::memcmp(&a.probability, &b.probability, sizeof(float)) == 0 && a.seen == b.seen &&
-         a.flags == b.flags;
+         std::bit_cast<std::uint32_t>(a.probability) ==
+             std::bit_cast<std::uint32_t>(b.probability) &&
+         a.seen == b.seen && a.flags == b.flags;
 }
 
 }  // namespace
