@@ -15,7 +15,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::array<std::string_view, 2> kSubprotocols{"foxglove.sdk.v1", "foxglove.websocket.v1"};
 constexpr char kMessageData = 0x01;  // Opcodes of the server's binary messages.
 constexpr char kTime = 0x02;
 /// What clients may ask of servers that offer it.
@@ -93,12 +92,6 @@ std::optional<std::uint32_t> number_in(const Json& object, const char* name) {
   if (!object.is_object()) return std::nullopt;
   const auto found = object.find(name);
   return found == object.end() ? std::nullopt : number_of(*found);
-}
-
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
 }  // namespace
@@ -296,16 +289,6 @@ std::size_t Session::waiting_bytes() const {
   std::size_t bytes = 0;
   for (const Line& one : lines_) bytes += one.waiting.bytes();
   return bytes;
-}
-
-std::optional<std::string_view> chosen_subprotocol(std::string_view offered) {
-  while (!offered.empty()) {
-    const std::size_t comma = std::min(offered.find(','), offered.size());
-    const auto* const known = std::ranges::find(kSubprotocols, trimmed(offered.substr(0, comma)));
-    if (known != kSubprotocols.end()) return *known;
-    offered.remove_prefix(std::min(comma + 1, offered.size()));
-  }
-  return std::nullopt;
 }
 
 void bring_up_to_date(Session& session, const Converter& converter) {

@@ -25,9 +25,9 @@
 
 namespace understory::foxglove {
 
-/// The subprotocol to answer with, of the list that a client offers in Sec-WebSocket-Protocol;
-/// none: refuse the handshake.
-std::optional<std::string_view> chosen_subprotocol(std::string_view offered);
+/// Names of the protocol in Sec-WebSocket-Protocol; a client that offers none of them is refused.
+inline constexpr std::array<std::string_view, 2> kSubprotocols{"foxglove.sdk.v1",
+                                                               "foxglove.websocket.v1"};
 
 /// One WebSocket message to the client.
 struct Outgoing {

@@ -33,6 +33,7 @@ void SocketSession::start(const Request& request) {
           response.set(beast::http::field::sec_websocket_protocol, protocol);
         }));
   }
+
   socket_.async_accept(request, [self = shared_from_this()](const beast::error_code& error) {
     if (error) {
       self->count_failure(error);

@@ -12,6 +12,7 @@
 #include "common/terminal/progress.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/guarded_log.hpp"
 #include "deploy/cli/log_commands.hpp"
 #include "deploy/cli/log_statistics.hpp"
 #include "deploy/cli/text_file.hpp"
@@ -197,20 +198,6 @@ struct LogOptions {
   Cut cut;
   RecordOptions record;
 };
-
-/// What every part of the command does about a file that cannot be read or written.
-template <class Work>
-auto guarded(std::shared_ptr<LogOptions> options, Work work) {
-  return [options = std::move(options), work = std::move(work)] {
-    try {
-      work(*options);
-    } catch (const io::LogError& error) {
-      fail(error.what());
-    } catch (const terminal::Interrupted& error) {
-      fail(options->file + ": " + error.what());
-    }
-  };
-}
 
 }  // namespace
 

@@ -14,6 +14,7 @@
 #include "common/terminal/progress.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/guarded_log.hpp"
 #include "deploy/cli/story_page.hpp"
 #include "deploy/cli/text_file.hpp"
 
@@ -143,15 +144,7 @@ void add_why(CLI::App& why, const char* name, const char* description, const cha
   command->add_option(subject, options->subject, subject_text)->required();
   command->add_option("file", options->file, "An LCM log")->required();
   command->add_flag("--json", options->json, "As JSON");
-  command->callback([options, work] {
-    try {
-      work(*options);
-    } catch (const io::LogError& error) {
-      fail(error.what());
-    } catch (const terminal::Interrupted& error) {
-      fail(options->file + ": " + error.what());
-    }
-  });
+  command->callback(guarded(options, work));
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ std::span<const std::uint8_t> bytes_of(const std::string& text) {
 
 web::SocketPath FoxgloveClients::socket_path(std::vector<std::string> allowed_origins) {
   return {.path = "/foxglove",
-          .subprotocols = {"foxglove.sdk.v1", "foxglove.websocket.v1"},
+          .subprotocols = {foxglove::kSubprotocols.begin(), foxglove::kSubprotocols.end()},
           .allowed_origins = std::move(allowed_origins),
           .most_message_bytes = foxglove::SessionOptions{}.most_text_bytes};
 }
@@ -63,6 +63,7 @@ std::optional<std::string> FoxgloveClients::take(const web::Event& event) {
     case web::Event::Kind::kOpened:
       break;
   }
+
   foxglove::bring_up_to_date(client.session, converter_);
   if (client.session.should_close()) return "too much that is not of the protocol";
   return std::nullopt;

@@ -9,6 +9,7 @@ namespace {
 
 constexpr const char* kPagePath = "/live";
 constexpr int kPorts = 10;
+constexpr std::int64_t kTellEvery_us = 500'000;
 
 std::vector<std::string> parts_of(const std::string& list) {
   std::vector<std::string> parts;
@@ -79,6 +80,7 @@ std::string PageHost::url() const {
 void PageHost::attend(std::int64_t now_us, const nlohmann::ordered_json& extra,
                       std::optional<std::int64_t> wall_us) {
   take_events();
+  if (now_us - told_us_ >= kTellEvery_us) tell_counts(now_us);
   for (FoxgloveClients::Message& message : foxglove_.due()) {
     auto bytes = std::make_shared<const std::string>(std::move(message.outgoing.bytes));
     if (message.outgoing.is_binary) {
@@ -117,7 +119,6 @@ void PageHost::take_events() {
       server_->close(event.client, *refusal);
     }
   }
-  if (!events.empty() || !(server_->counts() == told_counts_)) tell_counts();
 }
 
 void PageHost::take_page_event(const web::Event& event) {
@@ -145,9 +146,9 @@ void PageHost::take_page_event(const web::Event& event) {
   }
 }
 
-void PageHost::tell_counts() {
-  told_counts_ = server_->counts();
-  nlohmann::ordered_json body = counts_json(told_counts_);
+void PageHost::tell_counts(std::int64_t now_us) {
+  told_us_ = now_us;
+  nlohmann::ordered_json body = counts_json(server_->counts());
   body["pages"] = pages_.size();
   body["skipped"] = pages_.skipped();
   body["foxglove_clients"] = foxglove_.size();

@@ -48,7 +48,7 @@ class PageHost {
  private:
   void take_events();
   void take_page_event(const web::Event& event);
-  void tell_counts();
+  void tell_counts(std::int64_t now_us);
   nlohmann::ordered_json figures() const;
 
   PageParameters parameters_;
@@ -56,7 +56,7 @@ class PageHost {
   PageClients pages_;
   FoxgloveClients foxglove_;
   std::unique_ptr<web::Server> server_;
-  web::ServerCounts told_counts_{.connections = ~std::uint64_t{0}};  ///< Never told yet.
+  std::int64_t told_us_ = -1'000'000;  ///< When /health.json was made.
 };
 
 }  // namespace understory::viewer

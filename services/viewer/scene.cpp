@@ -57,7 +57,6 @@ void Scene::note_time(model::Utime utime, std::int64_t wall_us) {
 
 void Scene::reset() {
   start_map(0);
-  map_version_ = 0;
   wants_map_ = true;
   changed(pose_).reset();
   changed(scan_) = {};
@@ -78,6 +77,7 @@ void Scene::reset() {
 /// Another map has another frame: nothing of the one before means anything in it.
 void Scene::start_map(std::uint32_t map_id) {
   map_id_ = map_id;
+  map_version_ = 0;
   landmarks_.clear();
   driven_.clear();
   keyframes_.clear();
@@ -171,6 +171,7 @@ void Scene::set_verdict(Verdict::State state, std::string text, model::Utime uti
 void Scene::judge(const model::SlamPose& pose) {
   const double sigma_m = largest_sigma_m(pose.covariance);
   using State = Verdict::State;
+
   if (pose.is_lost) {
     set_verdict(State::kLost, "lost: no pose is certain, and odometry does not reach here",
                 pose.utime);
@@ -202,7 +203,7 @@ void Scene::look(std::int64_t wall_us) {
 void Scene::take(const model::MapUpdate& update) {
   utime_ = std::max(utime_, update.utime);
   const bool starts = update.status == model::MapUpdateStatus::kFirstMap;
-  if (starts && map_id_ != 0 && update.map_id != map_id_) start_map(update.map_id);
+  if (starts && map_id_ != 0) start_map(update.map_id);
   if (starts || map_id_ == 0) map_id_ = update.map_id;
   if (starts) tie_to_truth(update);
   changed(matches_).update = update;

@@ -193,6 +193,7 @@ void add_parts(const Scene& scene, Change since, nlohmann::ordered_json& header)
     const geometry::SE2& truth = *scene.true_pose().value;
     header["truth"] = {{"x", truth.x()}, {"y", truth.y()}, {"theta", truth.theta()}};
   }
+
   if (scene.submaps_change() > since) header["submaps"] = submaps_json(scene.submaps());
   if (scene.closures_change() > since) header["closures"] = closures_json(scene);
   if (scene.processes().change() > since) {

@@ -85,7 +85,16 @@ void Scene::compare_with_truth(const model::SlamPose& pose) {
     for (const auto& one : world_truth_) points.push_back(in_map(one));
     truth_.replace_from(0, points);
   } else if (world_truth_.back().first > truth_.points().back().utime) {
-    truth_.append(in_map(world_truth_.back()));
+    const TrackPoint newest = in_map(world_truth_.back());
+    const auto points = truth_.points();
+    const bool is_near =
+        points.size() > 1 && std::hypot(points[points.size() - 2].x_m - newest.x_m,
+                                        points[points.size() - 2].y_m - newest.y_m) < kTruthEvery_m;
+    if (is_near) {
+      truth_.replace_last(newest);
+    } else {
+      truth_.append(newest);
+    }
   }
 }
 

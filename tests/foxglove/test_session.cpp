@@ -35,14 +35,6 @@ Integer integer_at(const std::string& bytes, std::size_t offset) {
   return value;
 }
 
-TEST_CASE("the handshake takes both names of the protocol, and no other") {
-  REQUIRE(chosen_subprotocol("foxglove.sdk.v1") == "foxglove.sdk.v1");
-  REQUIRE(chosen_subprotocol("foxglove.websocket.v1") == "foxglove.websocket.v1");
-  REQUIRE(chosen_subprotocol("mqtt,  foxglove.websocket.v1 , x") == "foxglove.websocket.v1");
-  REQUIRE_FALSE(chosen_subprotocol(""));
-  REQUIRE_FALSE(chosen_subprotocol("foxglove.websocket.v2,,"));
-}
-
 TEST_CASE("a client is told what there is") {
   SessionOptions options;
   options.name = "a \"name\"";

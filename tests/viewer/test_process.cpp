@@ -111,7 +111,10 @@ TEST_CASE("messages on the bus come out of the WebSocket", "[viewer]") {
   }));
   CHECK(page.parts["processes"][0]["channels"][0]["rate_hz"] == 5.0);
   CHECK(page.landmarks.at(0).id == delta.added[0].id);
-  CHECK_THAT(test::get(process.port(), "/health.json"), Contains("\"pages\": 1"));
+  CHECK(test::holds_soon([&] {
+    process.work();
+    return test::get(process.port(), "/health.json").find("\"pages\": 1") != std::string::npos;
+  }));
 }
 
 TEST_CASE("what is malformed on the bus is refused and the page lives", "[viewer]") {

@@ -202,6 +202,34 @@ TEST_CASE("truth is tied where the map begins", "[viewer]") {
   CHECK(*scene.numbers().value.error_rad == Approx(0.001).margin(1e-4));
 }
 
+TEST_CASE("a map that begins is drawn from its first pose on, whatever its number", "[viewer]") {
+  const std::uint32_t second = GENERATE(1U, 2U);
+  Scene scene;
+  for (int i = 0; i <= 40; ++i)
+    scene.take_truth(100'000 * i, geometry::SE2(5.0 + 0.3 * i, 7.0, 0.0));
+  const auto start = [&](std::uint32_t map_id, model::Utime utime) {
+    model::MapUpdate first;
+    first.status = model::MapUpdateStatus::kFirstMap;
+    first.map_id = map_id;
+    first.utime = utime;
+    scene.take(first);
+    model::SlamPose one = pose(utime);
+    one.map_id = map_id;
+    scene.take(one, utime);
+    model::MapDelta delta;
+    delta.version = 100 + static_cast<std::uint64_t>(utime);
+    delta.added = {landmark(map_id, 1.0, 1.0)};
+    scene.take(delta);
+  };
+  start(1, 1'000'000);
+  start(second, 2'000'000);
+  CHECK(scene.landmarks().size() == 1);
+  CHECK(scene.driven().points().size() == 1);
+  REQUIRE(scene.numbers().value.error_m);
+  CHECK(*scene.numbers().value.error_m < 1e-9);
+  CHECK(scene.keyframes().points().size() == 1);
+}
+
 TEST_CASE("latency is told from the youngest stamps, whatever the clock of the stamps",
           "[viewer]") {
   Scene scene;

@@ -45,7 +45,9 @@ TEST_CASE("which hosts, origins and subprotocols are taken", "[web]") {
 
   CHECK(web::chosen_subprotocol("b, a", {"a", "b"}) == "a");
   CHECK(web::chosen_subprotocol("c ,b", {"a", "b"}) == "b");
+  CHECK(web::chosen_subprotocol("x,  b , y", {"a", "b"}) == "b");
   CHECK_FALSE(web::chosen_subprotocol("", {"a"}));
+  CHECK_FALSE(web::chosen_subprotocol("a.v2,,", {"a"}));
   CHECK(web::path_of("/x?y=1") == "/x");
 }
 

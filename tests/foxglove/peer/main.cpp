@@ -12,6 +12,7 @@
 
 #include "common/foxglove/session.hpp"
 #include "common/io/lcm_log.hpp"
+#include "common/web/request_checks.hpp"
 #include "tests/foxglove/synthetic_drive.hpp"
 
 namespace understory::test {
@@ -34,12 +35,13 @@ Socket accepted(asio::io_context& context, asio::ip::tcp::acceptor& acceptor) {
   beast::http::request<beast::http::string_body> request;
   beast::http::read(socket.next_layer(), buffer, request);
   const auto offered = request[beast::http::field::sec_websocket_protocol];
-  const auto chosen = foxglove::chosen_subprotocol({offered.data(), offered.size()});
+  const auto chosen =
+      web::chosen_subprotocol({offered.data(), offered.size()},
+                              {foxglove::kSubprotocols.begin(), foxglove::kSubprotocols.end()});
   if (!chosen) throw std::runtime_error("no subprotocol of ours");
   socket.set_option(
       beast::websocket::stream_base::decorator([chosen](beast::websocket::response_type& response) {
-        response.set(beast::http::field::sec_websocket_protocol,
-                     boost::string_view(chosen->data(), chosen->size()));
+        response.set(beast::http::field::sec_websocket_protocol, *chosen);
       }));
   socket.accept(request);
   return socket;
