@@ -154,7 +154,7 @@ try {
     ["replay", log, "--out", run, "--stages", "keyframer,geoslam_mapper"],
     ["map", "import", run, "--out", map],
   ]) must(spawnSync(join(bin, "understory"), parameters).status === 0, `understory ${parameters.join(" ")}`);
-  elsewhere = new Stack(bin, root, ["--map", map, "--localisation-only"]);
+  elsewhere = new Stack(bin, root, { options: ["--map", map, "--localisation-only"] });
   const lost = await open(browser, await elsewhere.page());
   elsewhere.sim("intermediate", "--path", "circle", "--seed", "7", "--rate", "3");
   await check("a vehicle that is nowhere in its map is shown as lost", async () => {

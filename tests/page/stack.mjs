@@ -29,15 +29,17 @@ function children(pid) {
 }
 
 export class Stack {
-  constructor(bin, root, options = []) {
+  /** `folder` below deploy/config; `options` of launch. */
+  constructor(bin, root, { folder = "", options = [] } = {}) {
     this.bin = bin;
     this.directory = mkdtempSync(join(tmpdir(), "understory-live-"));
     cpSync(join(root, "deploy/config"), join(this.directory, "config"), { recursive: true });
-    writeFileSync(join(this.directory, "config", "viewer.toml"), "[page]\nport = 0\n");
+    const config = join(this.directory, "config", folder);
+    writeFileSync(join(config, "viewer.toml"), "[page]\nport = 0\n");
     this.url = `udpm://239.255.76.67:${20_000 + Math.floor(Math.random() * 10_000)}?ttl=0`;
     this.output = "";
     this.children = [];
-    this.launch = this.start(["launch", "--config", join(this.directory, "config"), "--state-dir", join(this.directory, "state"), "--lcm-url", this.url, ...options]);
+    this.launch = this.start(["launch", "--config", config, "--state-dir", join(this.directory, "state"), "--lcm-url", this.url, ...options]);
   }
   start(parameters) {
     const child = spawn(join(this.bin, "understory"), parameters);
