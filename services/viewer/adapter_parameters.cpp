@@ -12,7 +12,8 @@ void describe(ViewerParameters& parameters, bus::ParameterTable& table) {
   table.add("page.host_names", page.host_names, {},
             "Comma-separated names of this computer by which browsers call it, beside localhost "
             "and numbers.");
-  table.add("page.rate_hz", page.rate_hz, {0.1, 100.0}, "Hz", "Pictures for one page, at most.");
+  table.add("page.rate_hz", page.rate_hz, {0.1, 100.0}, "Hz",
+            "Pictures for one page, at most; without a new pose a third of it.");
   table.add("page.most_clients", page.most_clients, {1, 1000}, "", "Connections at a time.");
   table.add("page.foxglove_origins", page.foxglove_origins, {},
             "Comma-separated origins of the pages of other viewers that may connect.");

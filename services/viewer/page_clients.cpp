@@ -11,6 +11,8 @@ namespace {
 using PageJson = nlohmann::json;
 
 constexpr std::size_t kMostOnTheWay = 2;
+/// Without a pose, a frame comes every so many periods.
+constexpr std::int64_t kPeriodsWithoutPose = 3;
 constexpr double kLongestToScreen_ms = 60'000.0;
 
 /// Numbers, texts and truths of a message; what is of another type counts as missing.
@@ -102,12 +104,23 @@ std::optional<std::size_t> PageClients::run_with_news(const Client& client) cons
   return std::nullopt;
 }
 
+bool PageClients::is_due(const Client& client, std::int64_t now_us) const {
+  const std::int64_t since_us = now_us - client.last_us;
+  if (since_us < 0 || since_us >= kPeriodsWithoutPose * period_us_) return true;
+  if (since_us < period_us_) return client.has_more && since_us >= period_us_ / 2;
+  if (client.has_more) return true;
+  for (std::size_t run = 0; run < runs_.size(); ++run) {
+    if (has_moved(*runs_[run], client.cursors[run])) return true;
+  }
+  return false;
+}
+
 std::vector<PageMessage> PageClients::frames(std::int64_t now_us,
                                              const nlohmann::ordered_json& extra,
                                              std::optional<std::int64_t> wall_us) {
   std::vector<PageMessage> messages;
   for (auto& [id, client] : clients_) {
-    if (now_us - client.last_us < period_us_ && now_us >= client.last_us) continue;
+    if (!is_due(client, now_us)) continue;
     const auto run = run_with_news(client);
     if (!run) continue;
     client.last_us = now_us;
@@ -126,8 +139,7 @@ std::vector<PageMessage> PageClients::frames(std::int64_t now_us,
     messages.push_back({id, make_frame(*runs_[*run], request, extra, client.cursors[*run])});
     client.on_the_way[request.sequence] = 1e-3 * static_cast<double>(request.wall_us);
     client.next_run = *run + 1;
-    // A map that is sent in pieces: the next one as soon as this one is acknowledged.
-    if (run_with_news(client)) client.last_us = now_us - period_us_ / 2;
+    client.has_more = run_with_news(client).has_value();
   }
   return messages;
 }

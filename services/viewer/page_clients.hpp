@@ -31,7 +31,9 @@ struct PageMessage {
 };
 
 /// Flow control of all pages (protocol.md): two frames on their way at most, and the next one has
-/// what changed since. Pure: the caller has the sockets and the clock.
+/// what changed since. Poses set the pace: what else changed goes along with the next one, or after
+/// three periods, since each picture costs the browser the whole window. Pure: the caller has the
+/// sockets and the clock.
 class PageClients {
  public:
   /// `runs` must outlive it. `period_us`: least time between two frames of a client.
@@ -65,10 +67,12 @@ class PageClients {
     std::uint64_t sequence = 0;
     std::uint64_t skipped = 0;
     std::int64_t last_us = 0;  ///< When it last got a frame, or missed one.
+    bool has_more = false;     ///< The last frame was a piece.
     std::size_t next_run = 0;
   };
   void acknowledge(Client& client, const nlohmann::json& message);
   std::optional<std::size_t> run_with_news(const Client& client) const;
+  bool is_due(const Client& client, std::int64_t now_us) const;
 
   std::vector<const Scene*> runs_;
   PageRequests requests_;

@@ -154,6 +154,11 @@ bool has_news(const Scene& scene, const SceneCursor& cursor) {
          scene.truth().has_changed_since(cursor.truth);
 }
 
+bool has_moved(const Scene& scene, const SceneCursor& cursor) {
+  return std::max({scene.reset_change(), scene.pose().change, scene.verdict().change}) >
+         cursor.change;
+}
+
 std::shared_ptr<const std::string> make_frame(const Scene& scene, const FrameRequest& request,
                                               const nlohmann::ordered_json& extra,
                                               SceneCursor& cursor) {

@@ -32,6 +32,8 @@ struct FrameRequest {
 
 /// Whether the page lacks anything. O(1).
 bool has_news(const Scene& scene, const SceneCursor& cursor);
+/// Whether the page lacks a pose of the vehicle, a verdict or everything. O(1).
+bool has_moved(const Scene& scene, const SceneCursor& cursor);
 
 /// The frame, and in `cursor` what the page has when it has taken it. `extra` is merged into the
 /// header. Costs what changed.

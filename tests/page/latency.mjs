@@ -18,7 +18,7 @@ export function receipts(log, wanted) {
 }
 
 export function summary(values_us) {
-  const sorted = values_us.toSorted ? values_us.toSorted((a, b) => a - b) : [...values_us].sort((a, b) => a - b);
+  const sorted = [...values_us].sort((a, b) => a - b);
   const at = (share) => +(sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))] / 1000).toFixed(1);
   return sorted.length ? { count: sorted.length, p50_ms: at(0.5), p90_ms: at(0.9), p99_ms: at(0.99), worst_ms: at(1) } : { count: 0 };
 }

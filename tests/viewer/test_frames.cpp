@@ -19,6 +19,15 @@ model::MapLandmark landmark(model::LandmarkId id, double x, double y) {
   return one;
 }
 
+/// The change number `i` of a map, a landmark each.
+model::MapDelta one_more(int i) {
+  model::MapDelta delta;
+  delta.base_version = static_cast<std::uint64_t>(i);
+  delta.version = delta.base_version + 1;
+  delta.added.push_back(landmark(delta.version, 0.1 * i, 0.0));
+  return delta;
+}
+
 /// Feeds a scene with random changes of a map and a path.
 class RandomDrive {
  public:
@@ -224,6 +233,50 @@ TEST_CASE("frames come no faster than the period", "[viewer]") {
   }
   CHECK(frames >= 95);
   CHECK(frames <= 101);
+}
+
+TEST_CASE("poses set the pace of the frames, other news go along", "[viewer]") {
+  Scene scene;
+  viewer::PageClients pages({&scene}, {}, 50'000);
+  pages.opened(1, {});
+  std::size_t frames = 0;
+  const auto exchange = [&](std::int64_t now_us) {
+    bool is_due = false;
+    for (const viewer::PageMessage& message : pages.frames(now_us, {})) {
+      ++frames;
+      is_due = true;
+      std::optional<std::string> refusal;
+      const auto sequence = test::PageFrame(*message.bytes).header.at("seq");
+      pages.take(1, nlohmann::json{{"ack", sequence}}.dump(), refusal);
+    }
+    return is_due;
+  };
+
+  // Ten poses a second, and every 10 ms something else: no picture but those of the poses.
+  std::int64_t now_us = 1'000'000;
+  for (int i = 0; i < 1000; ++i, now_us += 10'000) {
+    scene.take(one_more(i));
+    const bool has_pose = i % 10 == 5;
+    if (has_pose) {
+      model::SlamPose pose;
+      pose.utime = now_us;
+      pose.submap_T_vehicle = geometry::SE2(0.01 * i, 0.0, 0.0);
+      pose.covariance = 1e-4 * Eigen::Matrix3d::Identity();
+      pose.map_id = 1;
+      scene.take(pose, now_us);
+    }
+    const bool is_sent = exchange(now_us);
+    if (i > 5) CHECK(is_sent == has_pose);
+  }
+
+  // Poses have ended: the rest comes three times slower than the period allows.
+  frames = 0;
+  for (int i = 1000; i < 2000; ++i, now_us += 10'000) {
+    scene.take(one_more(i));
+    exchange(now_us);
+  }
+  CHECK(frames >= 65);
+  CHECK(frames <= 67);
 }
 
 TEST_CASE("what pages say and is not of the protocol is refused", "[viewer]") {

@@ -1,50 +1,39 @@
-// Lines every 1, 2 or 5 times a power of ten metres; computed per pixel, so no lines are stored.
-import * as THREE from "three";
-import type { Palette } from "../theme";
+// Lines every 1, 2 or 5 times a power of ten metres, those of the view alone: a shader over every pixel would cost a browser that
+// rasterises in software a fifth of its time.
+import type * as THREE from "three";
+import type { Palette, Rgb } from "../theme";
 import type { Camera } from "./camera";
-import { addMesh, material } from "./gl";
+import { Segments } from "./segments";
 
-const vertex = `in vec2 corner; void main() { gl_Position = vec4(corner, 0.0, 1.0); }`;
-const fragment = `
-uniform float uSpacing; uniform vec3 uMinor; uniform vec3 uMajor; uniform vec2 uOrigin;
-float near(vec2 p, float step_) {
-  vec2 d = abs(p - step_ * round(p / step_)) * uScreen.z;
-  return 1.0 - smoothstep(0.5, 1.0, min(d.x, d.y));
-}
-void main() {
-  vec2 p = uOrigin + (gl_FragCoord.xy - 0.5 * uScreen.xy) / uScreen.z;
-  float major = near(p, 5.0 * uSpacing), minor = near(p, uSpacing);
-  float alpha = max(major, minor);
-  if (alpha < 0.01) discard;
-  colour = vec4(major > 0.0 ? uMajor : uMinor, alpha);
-}`;
+const majorEvery = 5;
 
 export class GridLayer {
-  private readonly mesh: THREE.Mesh;
-  private readonly uniforms = {
-    uSpacing: { value: 1 }, uOrigin: { value: new THREE.Vector2() },
-    uMinor: { value: new THREE.Vector3() }, uMajor: { value: new THREE.Vector3() },
-  };
+  private readonly lines: Segments;
+  private minor: Rgb = [0, 0, 0];
+  private major: Rgb = [0, 0, 0];
 
-  constructor(scene: THREE.Scene) {
-    const g = new THREE.BufferGeometry();
-    g.setAttribute("corner", new THREE.BufferAttribute(new Float32Array([-1, -1, 3, -1, -1, 3]), 2));
-    g.setDrawRange(0, 3);
-    this.mesh = new THREE.Mesh(g, material(vertex, fragment, this.uniforms));
-    addMesh(scene, this.mesh, 0);
-  }
+  constructor(scene: THREE.Scene) { this.lines = new Segments(scene, 0); }
 
   paint(p: Palette): void {
-    this.uniforms.uMinor.value.set(...p.gridMinor);
-    this.uniforms.uMajor.value.set(...p.gridMajor);
+    this.minor = p.gridMinor;
+    this.major = p.gridMajor;
   }
 
   update(camera: Camera, isShown: boolean): void {
-    this.mesh.visible = isShown;
-    this.uniforms.uSpacing.value = niceStep(24 / camera.scale);
-    // The origin is brought near zero, where a float has digits left for the lines.
-    const period = 5 * this.uniforms.uSpacing.value;
-    this.uniforms.uOrigin.value.set(camera.x % period, camera.y % period);
+    this.lines.begin();
+    if (isShown) {
+      const spacing = niceStep(24 / camera.scale);
+      // Across the minor lines the major ones are seen whole.
+      this.rule(camera, spacing, false);
+      this.rule(camera, spacing, true);
+    }
+    this.lines.end();
+  }
+
+  private rule(camera: Camera, spacing: number, isMajor: boolean): void {
+    const { x0, y0, x1, y1 } = camera.seen(), colour = isMajor ? this.major : this.minor;
+    for (let k = Math.ceil(x0 / spacing); k * spacing <= x1; k++) if ((k % majorEvery === 0) === isMajor) this.lines.line(k * spacing, y0, k * spacing, y1, colour, 1, 1);
+    for (let k = Math.ceil(y0 / spacing); k * spacing <= y1; k++) if ((k % majorEvery === 0) === isMajor) this.lines.line(x0, k * spacing, x1, k * spacing, colour, 1, 1);
   }
 }
 
