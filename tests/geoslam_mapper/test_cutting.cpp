@@ -32,6 +32,7 @@ std::vector<CutNode> random_path(std::mt19937_64& random) {
     node.scans = 1 + static_cast<std::uint32_t>(count(random));
     node.landmarks = static_cast<std::uint32_t>(2.0 * density * chance(random));
     node.new_landmarks = node.landmarks / 2;
+    node.is_tied = chance(random) > 0.02;
   }
   return nodes;
 }
@@ -71,10 +72,13 @@ std::size_t size_of(const std::vector<CutNode>& nodes, std::size_t end) {
   return size;
 }
 
-/// The definition: the first number of nodes, at least four, with which the stretch may end.
+/// The definition: the first number of nodes, at least four, with which the stretch may end, or
+/// after which there is a gap.
 std::optional<std::size_t> by_definition(const std::vector<CutNode>& nodes,
                                          const CutPolicy& policy) {
-  for (std::size_t end = 4; end < nodes.size(); ++end) {
+  for (std::size_t end = 1; end < nodes.size(); ++end) {
+    if (!nodes[end].is_tied) return end;
+    if (end < 4) continue;
     const double length_m = nodes[end].along_m - nodes[0].along_m;
     const bool is_full = policy.size > 0 && size_of(nodes, end) >= policy.size;
     const bool is_long = length_m >= policy.distance_m;

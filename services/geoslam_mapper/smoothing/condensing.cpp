@@ -2,9 +2,19 @@
 
 #include <algorithm>
 #include <iterator>
+#include <optional>
 #include <set>
 
 namespace understory::geoslam_mapper::smoothing {
+namespace {
+
+/// So many common landmarks tie two nodes, or a distance that is known as well as these tell it
+/// (standard deviations).
+constexpr std::size_t kTyingLandmarks = 2;
+constexpr double kTied_m = 0.1;
+constexpr double kTied_rad = 5e-3;
+
+}  // namespace
 
 std::vector<Retirement> Condensing::follow(const FusedKeyframe& fused,
                                            const KnownGround& known_ground, Discovery& discovery,
@@ -89,6 +99,7 @@ std::vector<CutNode> Condensing::cut_nodes(const CutPolicy& policy, double end_m
                                            const PoseGraph& graph) const {
   std::vector<CutNode> nodes;
   std::set<model::LandmarkId> observed;
+  std::optional<NodeIndex> before;
   for (const Passed& passed : waiting_) {
     if (passed.along_m > end_m) break;
     CutNode& node = nodes.emplace_back();
@@ -98,12 +109,31 @@ std::vector<CutNode> Condensing::cut_nodes(const CutPolicy& policy, double end_m
     node.heading_rad = graph.pose(passed.node).theta();
     node.scans = passed.scans;
     const auto& observations = graph.node(passed.node).observations;
+    if (!observations.empty()) {
+      node.is_tied = !before || are_tied(*before, passed.node, graph);
+      before = passed.node;
+    }
     node.landmarks = static_cast<std::uint32_t>(observations.size());
     if (policy.size == 0) continue;
     for (const auto& [id, factor] : observations)
       if (observed.insert(id).second) ++node.new_landmarks;
   }
   return nodes;
+}
+
+/// Whether neither a way without landmarks nor one without odometry lies between the two.
+bool Condensing::are_tied(NodeIndex before, NodeIndex node, const PoseGraph& graph) {
+  const auto& earlier = graph.node(before).observations;
+  std::size_t common = 0;
+  for (const auto& [id, factor] : graph.node(node).observations) {
+    common += earlier.contains(id) ? 1 : 0;
+    if (common == kTyingLandmarks) return true;
+  }
+  const auto relative = graph.relative(before, node);
+  if (!relative) return false;
+  const Eigen::Matrix3d& covariance = relative->covariance;
+  return covariance.topLeftCorner<2, 2>().trace() < kTied_m * kTied_m &&
+         covariance(2, 2) < kTied_rad * kTied_rad;
 }
 
 bool Condensing::is_there(const Passed& passed, const PoseGraph& graph) {

@@ -65,6 +65,7 @@ class Condensing {
     }
   };
   static bool is_there(const Passed& passed, const PoseGraph& graph);
+  static bool are_tied(NodeIndex before, NodeIndex node, const PoseGraph& graph);
   std::vector<Passed> take_stretch(const CutPolicy& policy, double end_m,
                                    const KnownGround& known_ground, const PoseGraph& graph);
   std::vector<CutNode> cut_nodes(const CutPolicy& policy, double end_m,

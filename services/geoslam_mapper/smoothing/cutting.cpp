@@ -57,6 +57,7 @@ std::optional<std::size_t> first_stretch(std::span<const CutNode> nodes, const C
   std::size_t size = 0;
   for (std::size_t end = 1; end < nodes.size(); ++end) {
     size += 1 + nodes[end - 1].new_landmarks;
+    if (!nodes[end].is_tied) return end;
     if (end < CutPolicy::kLeastNodes) continue;
     if (policy.size > 0 && size >= policy.size) return end;
     const double length_m = nodes[end].along_m - nodes.front().along_m;

@@ -19,6 +19,10 @@ struct CutNode {
   std::uint32_t scans = 0;
   std::uint32_t landmarks = 0;      ///< That it observed.
   std::uint32_t new_landmarks = 0;  ///< Of these, those that no earlier node of the stretch did.
+  /// Whether it observed nothing, or is known where it is relative to the last node that observed
+  /// something. Else a stretch ends before it, by whatever policy: an error that all landmarks
+  /// behind the gap have in common would count as one of each.
+  bool is_tied = true;
 };
 
 /// Where a stretch of the path ends (thesis on submaps §3.4.1, §5.3, §6.1). Zero: no such rule.
@@ -34,7 +38,7 @@ struct CutPolicy {
   static constexpr std::uint32_t kSamples = 16;
   /// Path within which a turn is sharp [m].
   static constexpr double kTurn_m = 15.0;
-  /// Fewest nodes of a stretch.
+  /// Fewest nodes of a stretch that does not end at a gap.
   static constexpr std::size_t kLeastNodes = 4;
 };
 

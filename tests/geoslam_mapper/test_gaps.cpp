@@ -1,0 +1,131 @@
+// A way without landmarks, bridged by odometry: what lies behind it is off as a whole, and the map
+// must go on saying so when the path behind the vehicle is condensed.
+#include <Eigen/LU>
+#include <random>
+
+#include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
+#include "tests/catch.hpp"
+
+using namespace understory;
+using namespace understory::geoslam_mapper;
+using namespace understory::geoslam_mapper::smoothing;
+
+namespace {
+
+constexpr double kStep_m = 2.0;
+constexpr double kRange_m = 20.0;
+constexpr double kSigma_m = 0.05;
+constexpr int kBehind = 60;  ///< Keyframes behind the gap.
+
+struct GapDrive {
+  int before = 20;              ///< Keyframes before the gap.
+  int gap = 40;                 ///< Steps without landmarks.
+  bool has_empty_ones = false;  ///< Whether keyframes without landmarks come on these.
+};
+
+/// Straight on among trees.
+class GapWorld {
+ public:
+  GapWorld(const GapDrive& drive, std::uint64_t seed) : drive_(drive), random_(seed) {
+    const double length_m = kStep_m * (drive.before + drive.gap + kBehind) + 2.0 * kRange_m;
+    std::uniform_real_distribution<double> along(-kRange_m, length_m);
+    std::uniform_real_distribution<double> across(-15.0, 15.0);
+    const int count = static_cast<int>(length_m / 4.0);
+    for (int i = 0; i < count; ++i) trees_m_.emplace_back(along(random_), across(random_));
+  }
+  int size() const { return drive_.before + drive_.gap + kBehind; }
+  static geometry::SE2 pose(int i) { return {kStep_m * i, 0.0, 0.0}; }
+
+  model::Odometry odometry(int i) {
+    const Eigen::Vector3d sigma(0.02, 0.01, 5e-3);
+    const Eigen::Vector3d noise = sigma.cwiseProduct(Eigen::Vector3d(draw(), draw(), draw()));
+    model::Odometry motion;
+    motion.sequence = static_cast<std::uint64_t>(i);
+    motion.from_utime = utime(i - 1);
+    motion.utime = utime(i);
+    motion.from_T_to = geometry::SE2(kStep_m, 0.0, 0.0) * geometry::SE2::Exp(noise);
+    motion.covariance = sigma.array().square().matrix().asDiagonal();
+    motion.has_wheels = true;
+    return motion;
+  }
+
+  std::optional<model::Keyframe> keyframe(int i) {
+    model::Keyframe keyframe;
+    keyframe.utime = utime(i);
+    keyframe.sequence = static_cast<std::uint64_t>(i);
+    keyframe.field_of_view.max_range_m = kRange_m;
+    keyframe.members.push_back({utime(i), keyframe.sequence, {}, Eigen::Matrix3d::Zero()});
+    const bool is_blind = i >= drive_.before && i < drive_.before + drive_.gap;
+    if (is_blind) return drive_.has_empty_ones ? std::optional(keyframe) : std::nullopt;
+    for (const Eigen::Vector2d& tree_m : trees_m_) {
+      const Eigen::Vector2d seen_m = pose(i).inverse() * tree_m;
+      if (seen_m.norm() > kRange_m) continue;
+      model::KeyframeLandmark landmark;
+      landmark.position_m = seen_m + kSigma_m * Eigen::Vector2d(draw(), draw());
+      landmark.covariance_m2 = kSigma_m * kSigma_m * Eigen::Matrix2d::Identity();
+      landmark.radius_m = 0.2;
+      landmark.observation_count = 4;
+      keyframe.landmarks.push_back(landmark);
+    }
+    return keyframe;
+  }
+
+ private:
+  static model::Utime utime(int i) { return 1'000'000 * (static_cast<model::Utime>(i) + 1); }
+  double draw() { return normal_(random_); }
+
+  GapDrive drive_;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+  std::vector<Eigen::Vector2d> trees_m_;
+};
+
+/// Of the last pose: [m], [rad].
+struct LastPose {
+  Eigen::Vector3d error = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+};
+
+LastPose last_pose(const GapDrive& drive, std::uint64_t seed, double condense_m) {
+  GapWorld world(drive, seed);
+  SmoothingMapperParameters parameters;
+  parameters.use_odometry = true;
+  parameters.gyro_walk = 0.0;
+  parameters.relinearise_above = 1e-6;
+  parameters.condense_m = condense_m;
+  SmoothingMapper mapper(parameters);
+  LastPose last;
+  for (int i = 0; i < world.size(); ++i) {
+    if (i > 0) mapper.add(world.odometry(i));
+    const auto keyframe = world.keyframe(i);
+    if (!keyframe) continue;
+    const model::MapUpdate update = mapper.add(*keyframe);
+    INFO("keyframe " << i << ": " << update.reason);
+    REQUIRE((update.status == model::MapUpdateStatus::kUpdated ||
+             update.status == model::MapUpdateStatus::kFirstMap));
+    last.error = (update.map_T_vehicle.inverse() * GapWorld::pose(i)).Log();
+    last.covariance = update.covariance;
+  }
+  return last;
+}
+
+}  // namespace
+
+TEST_CASE("Behind a way without landmarks the pose stays as unsure as it is", "[mapper]") {
+  for (const bool has_empty_ones : {false, true}) {
+    double nees = 0.0;
+    int drives = 0;
+    // Wherever the gap lies within a stretch.
+    for (int before = 20; before < 30; ++before) {
+      const GapDrive drive{before, 40, has_empty_ones};
+      const auto seed = static_cast<std::uint64_t>(100 + before);
+      const LastPose condensed = last_pose(drive, seed, 20.0);
+      const LastPose uncut = last_pose(drive, seed, 0.0);
+      CAPTURE(before, has_empty_ones);
+      for (int k = 0; k < 3; ++k) CHECK(condensed.covariance(k, k) > 0.8 * uncut.covariance(k, k));
+      nees += condensed.error.dot(condensed.covariance.inverse() * condensed.error);
+      ++drives;
+    }
+    CHECK(nees / drives < 6.0);  // 3 is exact; of ten drives, 5.3 is exceeded by one in a hundred.
+  }
+}
