@@ -13,7 +13,8 @@ namespace understory::eval::experiments::frontend {
 
 /// Solves a drive's LANDMARKS and ODOMETRY whole. Detections have their stated covariances, scaled
 /// per kind by what their residuals show; the gyro's bias is a random walk. A scan counts where the
-/// vehicle moved since the one before: what a stationary laser errs does not average out.
+/// vehicle moved since the one before: what a stationary laser errs does not average out. Errors of
+/// detections count as white: where they last from scan to scan, as in a forest, it is no limit.
 class ChainLimit {
  public:
   /// `run` with its measurements (`ChainOptions::keep_measurements`); a detection is of the true
