@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "eval/experiments/frontend/frontend.hpp"
