@@ -12,16 +12,18 @@ PlanarLaser::PlanarLaser(const World& world, const PlanarLaserParameters& parame
 
 SimulatedPlanarScan PlanarLaser::scan(const VehicleMotion& motion, std::uint64_t k,
                                       model::Utime utime_of_start) {
-  const double at_s = time_s(k);
-  const Eigen::Isometry3d world_T_sensor =
-      motion.at(at_s).world_T_vehicle() * parameters_.vehicle_T_sensor;
+  const double begin_s = time_s(k);
   SimulatedPlanarScan result;
-  result.scan.utime = utime_of_start + static_cast<model::Utime>(std::llround(at_s * 1e6));
+  result.scan.utime = utime_of_start + static_cast<model::Utime>(std::llround(begin_s * 1e6));
   result.scan.sequence = k;
   result.scan.first_bearing_rad = parameters_.first_bearing_rad;
   result.scan.bearing_step_rad = parameters_.bearing_step_rad;
   result.scan.max_range_m = parameters_.max_range_m;
+  result.scan.beam_interval_s = parameters_.beam_interval_s();
   for (int beam = 0; beam < parameters_.beams; ++beam) {
+    const double at_s = begin_s + beam * parameters_.beam_interval_s();
+    const Eigen::Isometry3d world_T_sensor =
+        motion.at(at_s).world_T_vehicle() * parameters_.vehicle_T_sensor;
     const double bearing = parameters_.first_bearing_rad + beam * parameters_.bearing_step_rad;
     const Eigen::Vector3d direction =
         world_T_sensor.linear() * Eigen::Vector3d(std::cos(bearing), std::sin(bearing), 0.0);

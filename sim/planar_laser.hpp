@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <cstdint>
 #include <numbers>
 #include <vector>
@@ -12,17 +13,26 @@
 
 namespace understory::sim {
 
-/// As the SICK LMS of Victoria Park, if a little faster. Its mirror takes 13 ms for a revolution,
-/// in which the car moves by centimetres: a scan is taken at one instant.
+/// Beams of the SICK LMS of Victoria Park, on a head that turns as slowly as it scans: half a turn
+/// takes 50 ms, in which a car at 5 m/s moves by 25 cm. The SICK's own mirror takes 13 ms for a
+/// turn.
 struct PlanarLaserParameters {
   int beams = 361;  ///< From the right to the left.
   double first_bearing_rad = -0.5 * std::numbers::pi;
   double bearing_step_rad = std::numbers::pi / 360.0;
   double rate_hz = 10.0;
+  double revolution_s = 0.1;  ///< For all around; 0 = all beams at one instant.
   double range_sigma_m = 0.02;
   double max_range_m = 80.0;
   double drop_out = 0.005;  ///< Share of returns lost by chance.
   Eigen::Isometry3d vehicle_T_sensor = Eigen::Isometry3d(Eigen::Translation3d(3.6, 0.0, 0.8));
+
+  /// From beam to beam.
+  double beam_interval_s() const {
+    return revolution_s * std::abs(bearing_step_rad) / (2.0 * std::numbers::pi);
+  }
+  /// From the first beam to the last one.
+  double scan_s() const { return beam_interval_s() * (beams - 1); }
 };
 
 /// A scan as the sensor gives it, with the truth.
@@ -38,9 +48,11 @@ class PlanarLaser {
   /// `world` must outlive the sensor and stay as it is.
   PlanarLaser(const World& world, const PlanarLaserParameters& parameters, std::uint64_t seed);
 
-  /// Time of scan k in the drive.
+  /// Time of the first beam of scan k in the drive.
   double time_s(std::uint64_t k) const { return static_cast<double>(k) / parameters_.rate_hz; }
-  /// Scan number k, at time_s(k) of the drive. Depends on nothing that was asked before.
+  /// Of its last one.
+  double end_s(std::uint64_t k) const { return time_s(k) + parameters_.scan_s(); }
+  /// Scan number k, from time_s(k) of the drive on. Depends on nothing that was asked before.
   SimulatedPlanarScan scan(const VehicleMotion& motion, std::uint64_t k,
                            model::Utime utime_of_start = 0);
 

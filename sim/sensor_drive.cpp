@@ -50,7 +50,7 @@ SensorDrive::Due SensorDrive::next_due() const {
   if (imu_) offer(imu_->next_time_s(), Source::kImu);
   if (wheels_) offer(wheels_->next_time_s(), Source::kWheels);
   if (gnss_) offer(gnss_->next_time_s(), Source::kGnss);
-  if (planar_laser_) offer(planar_laser_->time_s(scans_), Source::kPlanarLaser);
+  if (planar_laser_) offer(planar_laser_->end_s(scans_), Source::kPlanarLaser);
 
   if (lidar_) {
     offer(static_cast<double>(revolutions_ + 1) * lidar_->parameters().revolution_s(),

@@ -43,7 +43,8 @@ void archive(Archive& a, Self& s) { a(s.utime, s.sequence, s.velocity_mps, s.bia
 template <class Archive, class Self>
 requires state::Is<Self, PlanarScan>
 void archive(Archive& a, Self& s) {
-  a(s.utime, s.sequence, s.first_bearing_rad, s.bearing_step_rad, s.max_range_m, s.ranges_m);
+  a(s.utime, s.sequence, s.first_bearing_rad, s.bearing_step_rad, s.max_range_m, s.ranges_m,
+    s.beam_interval_s, s.vehicle_T_sensor);
 }
 /// Members of a saved SweepPoint.
 template <class Archive, class Self>

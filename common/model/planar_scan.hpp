@@ -1,15 +1,19 @@
 // One revolution of a laser that sweeps a plane.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
+#include "common/geometry/se2.hpp"
 #include "common/model/landmarks.hpp"
 
 namespace understory::model {
 
-/// Channel LIDAR_SCAN from a one-plane laser: beam k points at `first_bearing_rad` + k *
-/// `bearing_step_rad` (frame `sensor`: 0 = straight ahead, left positive).
+/// Channels RAW_SCAN and LIDAR_SCAN, of a one-plane laser: beam k points at `first_bearing_rad` + k
+/// * `bearing_step_rad` (frame `sensor`: 0 = straight ahead, left positive). A scan whose beams
+/// come one after another is de-skewed, which makes it a LIDAR_SWEEP of one ring; LIDAR_SCAN has
+/// those that are taken at once.
 struct PlanarScan {
   Utime utime = 0;
   std::uint64_t sequence = 0;
@@ -18,11 +22,20 @@ struct PlanarScan {
   /// A range at or beyond this, or one that is not a positive number, is no return [m].
   double max_range_m = 0.0;
   std::vector<float> ranges_m;  ///< Per beam.
+  double beam_interval_s =
+      0.0;  ///< Beam k is measured so many times k after utime; 0 = all at once.
+  geometry::SE2 vehicle_T_sensor;  ///< Where the laser sits in the plan; not known of RAW_SCAN.
 
   /// Direction of a beam [rad], frame `sensor`.
   double bearing(std::size_t beam) const {
     return first_bearing_rad + static_cast<double>(beam) * bearing_step_rad;
   }
+  /// From the first beam to the last one [s].
+  double duration_s() const {
+    return ranges_m.empty() ? 0.0 : beam_interval_s * static_cast<double>(ranges_m.size() - 1);
+  }
+  /// When the last beam was measured.
+  Utime end() const { return utime + static_cast<Utime>(std::llround(duration_s() * 1e6)); }
   /// True where the beam hit something.
   bool is_return(std::size_t beam) const {
     return ranges_m[beam] > 0.0F && ranges_m[beam] < max_range_m;

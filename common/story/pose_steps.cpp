@@ -70,10 +70,13 @@ class WayToPose {
       return one.utime == pose_.pose.utime && before(one.arrival);
     });
   }
-  /// A sweep's stamp is that of its end, the raw one's that of its begin: the revolution tells.
+  /// A sweep's stamp is that of its end, the raw one's that of its begin: the revolution tells. A
+  /// scan of a plane that was de-skewed is a sweep, too.
   void raw_laser(bool in_plane) {
     using enum PoseBook::Laser;
-    const auto& raw = book_.laser(in_plane ? kRawScan : kRawSweep);
+    const bool is_scan =
+        in_plane || (book_.laser(kRawSweep).heard() == 0 && book_.laser(kRawScan).heard() > 0);
+    const auto& raw = book_.laser(is_scan ? kRawScan : kRawSweep);
     const LaserRecord* found = at_stamp(raw);
     if (!in_plane) {
       const LaserRecord* const sweep = at_stamp(book_.laser(kSweep));
@@ -82,7 +85,7 @@ class WayToPose {
                one.utime <= pose_.pose.utime;
       });
     }
-    laser(in_plane ? kRawScan : kRawSweep, in_plane ? "RAW_SCAN" : "RAW_SWEEP", found);
+    laser(is_scan ? kRawScan : kRawSweep, is_scan ? "RAW_SCAN" : "RAW_SWEEP", found);
   }
   void laser(PoseBook::Laser channel, const char* name, const LaserRecord* found) {
     if (found == nullptr) return aside(name, missing(book_.laser(channel), "of this revolution"));

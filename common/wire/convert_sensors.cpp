@@ -205,6 +205,8 @@ Result<model::PlanarScan> from_wire(const lidar_scan_t& wire) {
   scan.bearing_step_rad = wire.angle_step_rad;
   scan.max_range_m = wire.max_range_m;
   scan.ranges_m = wire.ranges_m;
+  scan.beam_interval_s = wire.beam_interval_s;
+  scan.vehicle_T_sensor = from_wire(wire.vehicle_T_sensor);
   return scan;
 }
 
@@ -215,6 +217,8 @@ lidar_scan_t to_wire(const model::PlanarScan& scan) {
   wire.start_angle_rad = scan.first_bearing_rad;
   wire.angle_step_rad = scan.bearing_step_rad;
   wire.max_range_m = scan.max_range_m;
+  wire.beam_interval_s = scan.beam_interval_s;
+  wire.vehicle_T_sensor = to_wire(scan.vehicle_T_sensor);
   wire.num_ranges = static_cast<std::int32_t>(scan.ranges_m.size());
   wire.ranges_m.reserve(scan.ranges_m.size());
   for (std::size_t beam = 0; beam < scan.ranges_m.size(); ++beam) {

@@ -93,7 +93,10 @@ bool is_sensor_world(std::string_view world) {
 sim::SensorDrive make_sensor_drive(const SensorSimulationOptions& options) {
   sim::SensorSuite suite;
   suite.lidar = lidar_of(options.lidar);
-  if (options.planar_laser) suite.planar_laser = sim::PlanarLaserParameters{};
+  if (options.planar_laser) {
+    suite.planar_laser.emplace();
+    suite.planar_laser->revolution_s = options.planar_revolution_s;
+  }
   if (options.gnss_outage_from_s) suite.gnss->outages = {{*options.gnss_outage_from_s, 1e9}};
   sim::SpeedParameters speed;
   speed.cruise_mps = options.speed_mps;
@@ -137,7 +140,7 @@ model::Utime complete_at(const sim::SensorReading& reading, const sim::SensorDri
           return static_cast<model::Utime>(1e6 * revolution_s *
                                            static_cast<double>(value.raw.revolution + 1));
         } else if constexpr (std::is_same_v<Value, sim::SimulatedPlanarScan>) {
-          return value.scan.utime;
+          return value.scan.end();
         } else {
           return value.utime;
         }

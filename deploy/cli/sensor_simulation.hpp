@@ -22,6 +22,7 @@ struct SensorSimulationOptions {
   int laps = 1;              ///< Forest and block.
   std::string lidar = "vlp32";
   bool planar_laser = false;
+  double planar_revolution_s = 0.1;  ///< 0 = all its beams at one instant.
   double speed_mps = 5.0;
   double standstill_s = 22.0;
   std::optional<double> gnss_outage_from_s;  ///< Until the end of the drive.

@@ -257,6 +257,12 @@ void add_sensor_options(CLI::App& command, SimOptions& options) {
       ->capture_default_str();
   command.add_flag("--planar-laser", sensors.planar_laser, "A one-plane laser as well")
       ->group(group);
+  command
+      .add_option("--planar-revolution", sensors.planar_revolution_s,
+                  "How long it turns for all around [s]; 0 = all beams at once")
+      ->group(group)
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
   command.add_option("--gnss-until", sensors.gnss_outage_from_s, "No GNSS after this time [s]")
       ->group(group)
       ->check(CLI::Range(0.0, 1e6));

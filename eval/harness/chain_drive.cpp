@@ -107,6 +107,17 @@ void watch_chain(SensorChain& chain, ChainRun& run) {
   });
 }
 
+namespace {
+
+void watch_measurements(SensorChain& chain, ChainRun& run) {
+  chain.watch<model::Odometry>(
+      "ODOMETRY", [&run](const model::Odometry& motion) { run.motions.push_back(motion); });
+  chain.watch<model::LandmarkScan>(
+      "LANDMARKS", [&run](const model::LandmarkScan& scan) { run.scans.push_back(scan); });
+}
+
+}  // namespace
+
 void finish_chain(SensorChain& chain, ChainRun& run) {
   chain.finish();
   for (const std::string& service : chain.services()) {
@@ -171,6 +182,7 @@ ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options) {
   std::erase_if(services, [&](const auto& one) { return options.without.contains(one.name); });
   SensorChain chain(services, options.config_dir, options.toml_instead);
   watch_chain(chain, run);
+  if (options.keep_measurements) watch_measurements(chain, run);
 
   const double duration_s = std::min(options.end_s, drive.motion().duration_s());
   std::uint64_t sweep_parts = 0;

@@ -38,6 +38,8 @@ struct ChainRun {
   std::vector<model::KeyframePose> keyframes;  ///< As estimated at the end.
   std::vector<model::MapLandmark> landmarks;   ///< Of the last map.
   std::vector<std::size_t> detections;         ///< Of each sweep.
+  std::vector<model::LandmarkScan> scans;      ///< LANDMARKS, where they were asked for.
+  std::vector<model::Odometry> motions;        ///< ODOMETRY, likewise.
   std::uint64_t sweeps = 0;
   double simulated_s = 0.0;
   std::map<model::LandmarkId, model::LandmarkExistence> existence;  ///< As told last.
@@ -69,7 +71,8 @@ struct ChainOptions {
   std::function<void(double done)> progress;  ///< Called at every sweep; `done` is in [0, 1].
   /// Every sweep before it goes to the chain, with the truth in it.
   std::function<void(const sim::SimulatedSweep&)> on_sweep;
-  bool keep_states = false;  ///< Asks for the whole map after each update.
+  bool keep_measurements = false;  ///< LANDMARKS and ODOMETRY as a whole.
+  bool keep_states = false;        ///< Asks for the whole map after each update.
 };
 
 /// The messages of a reading: one, but sweeps come in parts, and truth gives none. `sweep_parts`

@@ -134,6 +134,8 @@ EXPERIMENTS = (
     _eval("frontend-chain", "frontend --only chain --config deploy/config/lidar --jobs 2 --data DATA", 25,
           ("pole_maps",)),
     _eval("frontend-forest", "frontend --only forest --config deploy/config/lidar --no-plots", 3),
+    _eval("frontend-planar", "frontend --runs 20 --seed 1 --only planar --no-plots", 1),
+    _eval("frontend-limit", "frontend --only limit --config deploy/config/lidar --seed 1 --jobs 2 --no-plots", 12),
     _eval("frontend-parts", "frontend --runs 20 --jobs 1 --only extraction tracking", 10),
     _eval("forest-plots", "frontend --only forest-plots --data DATA", 8, ("forest_3d_scans",)),
     _eval("frontend-filter", "frontend --runs 1000 --jobs 2 --only filter", 60),

@@ -87,6 +87,8 @@ SECTIONS = (
     ("recording-kitti-0002", "From raw sensors: KITTI 0002", None, _figures),
     ("recording-kitti-0005", "From raw sensors: KITTI 0005", None, _figures),
     ("recording-vlp16", "From raw sensors: VLP-16 packets", None, _figures),
+    ("frontend-limit", "The limit of the whole chain", None, _figures),
+    ("frontend-planar", "A laser with one plane while the vehicle turns", None, _figures),
     ("frontend-parts", "Extraction and tracks", None, _figures),
     ("forest-plots", "Trunks in real forest plots", None, _figures),
     ("frontend-filter", "The filter's consistency", None, _figures),

@@ -107,21 +107,26 @@ void describe_trunk_selection(SweepTrunkParameters& p, bus::ParameterTable& tabl
   table.add("trunk.min_rings", p.min_rings, {1, 100}, "", "Fewest rings that measure it.");
 }
 
-void describe_corner(CornerParameters& p, bus::ParameterTable& table) {
-  table.add("corner.line_tolerance_m", p.line_tolerance_m, {0.001, 1.0}, "m",
+/// What one plane shows of walls, too.
+void describe_walls(CornerParameters& p, const std::string& name, bus::ParameterTable& table) {
+  table.add(name + ".line_tolerance_m", p.line_tolerance_m, {0.001, 1.0}, "m",
             "What is so near a line is on it.");
-  table.add("corner.min_length_m", p.min_length_m, {0.05, 100.0}, "m",
+  table.add(name + ".min_length_m", p.min_length_m, {0.05, 100.0}, "m",
             "Of a wall, as far as it is measured.");
+  table.add(name + ".max_gap_m", p.max_gap_m, {0.0, 10.0}, "m",
+            "From the end of a wall's returns to the corner.");
+  table.add(name + ".max_gap_per_range", p.max_gap_per_range, {0.0, 1.0}, "m per m",
+            "Added to that for each metre of range.");
+  table.add(name + ".max_skew_rad", p.max_skew_rad, {0.0, 1.5}, "rad",
+            "Deviation of the angle between the walls from a right one.");
+  table.add(name + ".flatness_sigma_m", p.flatness_sigma_m, {1e-4, 1.0}, "m",
+            "Of a wall, besides the unevenness that its points show.");
+}
+
+void describe_corner(CornerParameters& p, bus::ParameterTable& table) {
+  describe_walls(p, "corner", table);
   table.add("corner.min_extent_m", p.min_extent_m, {0.0, 10.0}, "m",
             "In height, of the returns on a wall.");
-  table.add("corner.max_gap_m", p.max_gap_m, {0.0, 10.0}, "m",
-            "From the end of a wall's returns to the corner.");
-  table.add("corner.max_gap_per_range", p.max_gap_per_range, {0.0, 1.0}, "m per m",
-            "Added to that for each metre of range.");
-  table.add("corner.max_skew_rad", p.max_skew_rad, {0.0, 1.5}, "rad",
-            "Deviation of the angle between the walls from a right one.");
-  table.add("corner.flatness_sigma_m", p.flatness_sigma_m, {1e-4, 1.0}, "m",
-            "Of a wall, besides the unevenness that its points show.");
   table.add("corner.min_rings", p.min_rings, {1, 100}, "", "Fewest rings that measure a wall.");
 }
 
@@ -135,6 +140,7 @@ void describe(LandmarkExtractorParameters& parameters, bus::ParameterTable& tabl
   describe_trunk_shape(parameters.trunk, table);
   describe_trunk_selection(parameters.trunk, table);
   describe_corner(parameters.corner, table);
+  describe_walls(parameters.planar_corner, "planar_corner", table);
 }
 
 }  // namespace understory::landmark_extractor

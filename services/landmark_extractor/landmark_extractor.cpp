@@ -5,14 +5,13 @@
 #include <numbers>
 #include <optional>
 
+#include "common/geometry/se2.hpp"
 #include "services/landmark_extractor/planar/segments.hpp"
 #include "services/landmark_extractor/planar/trunk_fit.hpp"
+#include "services/landmark_extractor/square.hpp"
 
 namespace understory::landmark_extractor {
 namespace {
-
-/// Sigma of a trunk's height against the sensor's plane [m]: a planar laser does not measure it.
-constexpr double kHeightSigma_m = 0.5;
 
 bool well_formed(const model::PlanarScan& scan) {
   const double width = scan.bearing_step_rad *
@@ -22,13 +21,22 @@ bool well_formed(const model::PlanarScan& scan) {
          scan.max_range_m > 0.0;
 }
 
-model::FieldOfView field_of_view(const model::PlanarScan& scan,
+/// A sweep of one ring tells its beams apart, and says in which frame they are.
+bool is_of_one_plane(const model::PointSweep& sweep) {
+  return sweep.rings == 1 && sweep.is_deskewed && sweep.sensor_position_m.allFinite() &&
+         (!sweep.attitude || (std::abs(sweep.attitude->level_Q_vehicle.norm() - 1.0) < 1e-3 &&
+                              sweep.attitude->covariance_rad2.allFinite()));
+}
+
+/// From the first beam to the last one; of a sweep, from return to return.
+model::FieldOfView field_of_view(const planar::Beams& scan,
                                  const PlanarTrunkParameters& parameters) {
   model::FieldOfView view;
   view.max_range_m = std::min(scan.max_range_m, parameters.max_range_m);
-  view.width_rad = scan.bearing_step_rad * static_cast<double>(scan.ranges_m.size() - 1);
-  view.bearing_rad = geometry::wrap_angle(scan.first_bearing_rad + 0.5 * view.width_rad +
-                                          parameters.vehicle_T_sensor.theta());
+  view.width_rad =
+      scan.beams.empty() ? 0.0 : scan.beams.back().bearing_rad - scan.beams.front().bearing_rad;
+  if (!scan.beams.empty())
+    view.bearing_rad = geometry::wrap_angle(scan.beams.front().bearing_rad + 0.5 * view.width_rad);
   return view;
 }
 
@@ -42,21 +50,25 @@ bool stands_alone(const planar::Segment& segment) {
 
 model::Detection to_detection(const planar::TrunkFit& fit,
                               const PlanarTrunkParameters& parameters) {
-  const geometry::SE2& vehicle_T_sensor = parameters.vehicle_T_sensor;
-  const Eigen::Matrix2d rotation = vehicle_T_sensor.rotation();
   model::Detection detection;
-  detection.position_m.head<2>() = vehicle_T_sensor * fit.centre();
+  detection.position_m.head<2>() = fit.centre();
   detection.covariance_m2.topLeftCorner<2, 2>() =
-      rotation * fit.centre_covariance() * rotation.transpose() +
-      parameters.shape_correlation_scans * parameters.shape_sigma_m * parameters.shape_sigma_m *
-          Eigen::Matrix2d::Identity();
-  detection.covariance_m2(2, 2) = kHeightSigma_m * kHeightSigma_m;
+      fit.centre_covariance() + parameters.shape_correlation_scans * parameters.shape_sigma_m *
+                                    parameters.shape_sigma_m * Eigen::Matrix2d::Identity();
+  detection.covariance_m2(2, 2) = planar::kHeightSigma_m * planar::kHeightSigma_m;
   detection.radius_m = fit.radius_m;
   detection.kind = model::LandmarkKind::kTrunk;
   return detection;
 }
 
-bool apart_from_others(const model::PlanarScan& scan, const std::vector<planar::Segment>& segments,
+/// An error of roll and pitch moves what is at height z by z (pitch, -roll).
+Eigen::Matrix2d level_error(double z_m, const Eigen::Matrix2d& level_covariance_rad2) {
+  Eigen::Matrix2d moved;
+  moved << 0.0, z_m, -z_m, 0.0;
+  return moved * level_covariance_rad2 * moved.transpose();
+}
+
+bool apart_from_others(const planar::Beams& scan, const std::vector<planar::Segment>& segments,
                        std::size_t index, const PlanarTrunkParameters& parameters) {
   return stands_alone(segments[index]) &&
          !continues_a_line(scan, segments[index], parameters.line_tolerance_m) &&
@@ -70,7 +82,7 @@ bool trunk_sized(const planar::TrunkFit& fit, const PlanarTrunkParameters& param
          fit.radius_m <= parameters.max_radius_m;
 }
 
-std::optional<model::Detection> to_trunk(const model::PlanarScan& scan,
+std::optional<model::Detection> to_trunk(const planar::Beams& scan,
                                          const std::vector<planar::Segment>& segments,
                                          std::size_t index, const PlanarTrunkParameters& parameters,
                                          ExtractorCounters& counters) {
@@ -105,23 +117,51 @@ model::LandmarkScan LandmarkExtractor::extract(const model::PlanarScan& scan) {
   model::LandmarkScan result;
   result.utime = scan.utime;
   result.sequence = scan.sequence;
-  ++counters_.scans;
   if (!well_formed(scan)) {
+    ++counters_.scans;
     ++counters_.scans_malformed;
     return result;
   }
+  find(planar::beams_of(scan), {}, result);
+  return result;
+}
 
+model::LandmarkScan LandmarkExtractor::extract(const model::PointSweep& sweep) {
+  // What is malformed is counted there.
+  if (!is_of_one_plane(sweep)) return sweeps_.extract(sweep);
+  model::LandmarkScan result;
+  result.utime = sweep.utime;
+  result.sequence = sweep.sequence;
+
+  points::Spin spin;
+  spin_fitter_.fit(sweep, sweep.max_range_m, spin);
+  PlaneLevel level;
+  level.landmark_z_m = parameters_.sweep.breast_height_m;
+  level.covariance_rad2 = sweep.attitude
+                              ? sweep.attitude->covariance_rad2
+                              : Eigen::Matrix2d(square(parameters_.sweep.level_sigma_rad) *
+                                                Eigen::Matrix2d::Identity());
+  find(planar::beams_of(sweep, spin), level, result);
+  return result;
+}
+
+void LandmarkExtractor::find(const planar::Beams& scan, const PlaneLevel& level,
+                             model::LandmarkScan& result) {
+  ++counters_.scans;
   result.field_of_view = field_of_view(scan, parameters_.planar);
   const std::vector<planar::Segment> segments = planar::split(scan, parameters_.planar);
   counters_.objects += segments.size();
 
   for (std::size_t i = 0; i < segments.size(); ++i) {
-    if (const auto trunk = to_trunk(scan, segments, i, parameters_.planar, counters_)) {
-      result.detections.push_back(*trunk);
-    }
+    auto trunk = to_trunk(scan, segments, i, parameters_.planar, counters_);
+    if (!trunk) continue;
+    trunk->position_m.z() = level.landmark_z_m;
+    trunk->covariance_m2.topLeftCorner<2, 2>() +=
+        level_error(scan.beams[segments[i].first].z_m, level.covariance_rad2);
+    result.detections.push_back(*trunk);
   }
   counters_.landmarks += result.detections.size();
-  return result;
+  corners_.find(scan, level.landmark_z_m, level.covariance_rad2, result.detections);
 }
 
 }  // namespace understory::landmark_extractor

@@ -1,13 +1,10 @@
 // Parameters of the extractor. What each is for, and how sensitive results are: README.md.
 #pragma once
 
-#include "common/geometry/se2.hpp"
-
 namespace understory::landmark_extractor {
 
 /// Trunks from lasers that sweep one plane. Noise figures: SICK LMS 2xx at 0.5 degrees.
 struct PlanarTrunkParameters {
-  geometry::SE2 vehicle_T_sensor;   ///< Where the laser is in frame `vehicle`.
   double min_range_m = 1.5;         ///< Nearer returns are of the car itself.
   double max_range_m = 40.0;        ///< Trunks farther than this are not reported.
   double range_sigma_m = 0.03;      ///< Of one beam.
@@ -83,12 +80,24 @@ struct CornerParameters {
   int min_rings = 3;                 ///< Fewest rings that measure a wall.
 };
 
+/// Corners of houses from lasers that sweep one plane: both faces longer than a car is wide.
+inline CornerParameters planar_corner() {
+  CornerParameters corner;
+  corner.line_tolerance_m = 0.1;
+  corner.min_length_m = 2.2;
+  corner.flatness_sigma_m = 0.01;
+  corner.min_rings = 1;
+  corner.min_extent_m = 0.0;
+  return corner;
+}
+
 /// All parameters of the stage.
 struct LandmarkExtractorParameters {
   PlanarTrunkParameters planar;
   SweepParameters sweep;
   SweepTrunkParameters trunk;
   CornerParameters corner;
+  CornerParameters planar_corner = landmark_extractor::planar_corner();
 };
 
 }  // namespace understory::landmark_extractor

@@ -152,6 +152,7 @@ void describe(LidarImuInputParameters& parameters, AxlePlace& axle_T_vehicle,
             "Time of one revolution, for these.");
   table.add("lidar.min_range_m", parameters.lidar.min_range_m, {0.0, 100.0}, "m",
             "Nearer points are on the vehicle itself.");
+  describe_mount(parameters.planar.mount, "planar.mount", table);
   describe_imu(parameters.imu, table);
   describe_wheels(parameters.wheels, axle_T_vehicle, table);
   describe_standstill(parameters.standstill, table);

@@ -77,6 +77,30 @@ void times_from_azimuth(model::PointSweep& sweep, double revolution_s, bool cloc
   sweep.has_times = true;
 }
 
+bool has_beam_times(const model::PlanarScan& scan) {
+  const double duration_s = scan.duration_s();
+  return duration_s > 0.0 && duration_s <= static_cast<double>(kLongestRevolution_s);
+}
+
+model::PointSweep sweep_of(const model::PlanarScan& scan) {
+  model::PointSweep sweep;
+  sweep.utime = scan.utime;
+  sweep.sequence = scan.sequence;
+  sweep.revolution = scan.sequence;
+  sweep.rings = 1;
+  sweep.max_range_m = scan.max_range_m;
+  for (std::size_t beam = 0; beam < scan.ranges_m.size(); ++beam) {
+    if (!scan.is_return(beam)) continue;
+    const double range_m = scan.ranges_m[beam];
+    model::SweepPoint point;
+    point.x_m = static_cast<float>(range_m * std::cos(scan.bearing(beam)));
+    point.y_m = static_cast<float>(range_m * std::sin(scan.bearing(beam)));
+    point.time_s = static_cast<float>(static_cast<double>(beam) * scan.beam_interval_s);
+    sweep.points.push_back(point);
+  }
+  return sweep;
+}
+
 namespace {
 
 /// Moves each point between the two steps that its time lies between.

@@ -1,6 +1,7 @@
 // A revolution of the laser as if it had been measured in one instant.
 #pragma once
 
+#include "common/model/planar_scan.hpp"
 #include "common/model/point_sweep.hpp"
 #include "services/lidar_imu_input/motion_history.hpp"
 #include "services/lidar_imu_input/parameters.hpp"
@@ -17,6 +18,11 @@ std::size_t remove_bad_points(model::PointSweep& sweep, double min_range_m);
 /// Times of a sweep that has none, from the azimuth of each point: the laser turns evenly, from the
 /// azimuth of the first point on, once in `revolution_s`. Points are then in order of time.
 void times_from_azimuth(model::PointSweep& sweep, double revolution_s, bool clockwise);
+
+/// Whether the beams come one after another, over a time that a revolution can have.
+bool has_beam_times(const model::PlanarScan& scan);
+/// The returns of a scan in one plane, each with its time, as a sweep of one ring; frame sensor.
+model::PointSweep sweep_of(const model::PlanarScan& scan);
 
 /// A sweep in frame vehicle.
 struct DeskewedSweep {

@@ -68,6 +68,15 @@ InputFault without_times(model::PointSweep& sweep, const DeskewParameters& param
           "points without times: taken from the azimuth"};
 }
 
+/// Beams that come over longer than a revolution can last have no times.
+std::optional<InputFault> without_impossible_times(model::PlanarScan& scan) {
+  if (scan.beam_interval_s == 0.0 || scan.ranges_m.size() < 2 || has_beam_times(scan))
+    return std::nullopt;
+  scan.beam_interval_s = 0.0;
+  return InputFault{InputFaultKind::kNoPointTimes, channel_of(Sensor::kScan),
+                    "beams of a scan over more than a revolution: taken as one instant"};
+}
+
 }  // namespace
 
 LidarImuInput::LidarImuInput(const LidarImuInputParameters& parameters)
@@ -90,6 +99,9 @@ InputResults LidarImuInput::add(RawReading raw) {
     counters_.points_dropped += clean(*sweep, parameters_.lidar, faults);
     guard_.is_frozen(*sweep, faults);
     if (!sweep->has_times) faults.push_back(without_times(*sweep, parameters_.lidar));
+  }
+  if (auto* scan = std::get_if<model::PlanarScan>(&raw)) {
+    if (auto fault = without_impossible_times(*scan)) faults.push_back(*std::move(fault));
   }
 
   // Is its stamp to be believed?
@@ -179,7 +191,8 @@ void LidarImuInput::use(const model::PlanarScan& raw, InputResults& out) {
   if (!utime) return;
   model::PlanarScan scan = raw;
   scan.utime = *utime;
-  wait({*utime, std::move(scan)}, out);
+  const model::Utime end = scan.end();
+  wait({end, std::move(scan)}, out);
 }
 
 InputResults LidarImuInput::add(const model::VelocityCorrection& correction) {
@@ -274,13 +287,26 @@ void LidarImuInput::release(WaitingSweep waiting, InputResults& out) {
   if (!queue_.release(waiting)) {
     ++counters_.sweeps_dropped;
   } else if (auto* scan = std::get_if<model::PlanarScan>(&waiting.item)) {
-    out.emplace_back(std::move(*scan));
+    release_scan(std::move(*scan), waiting.end, out);
   } else {
-    release_sweep(std::get<model::PointSweep>(std::move(waiting.item)), waiting.end, out);
+    release_sweep(std::get<model::PointSweep>(std::move(waiting.item)), Sensor::kSweep, waiting.end,
+                  out);
   }
 }
 
-void LidarImuInput::release_sweep(model::PointSweep raw, model::Utime stamp, InputResults& out) {
+/// Beams that come one after another are de-skewed as those of a laser that scans in space.
+void LidarImuInput::release_scan(model::PlanarScan scan, model::Utime stamp, InputResults& out) {
+  if (has_beam_times(scan)) {
+    release_sweep(sweep_of(scan), Sensor::kScan, stamp, out);
+    return;
+  }
+  const SensorMount& mount = parameters_.planar.mount;
+  scan.vehicle_T_sensor = geometry::SE2(mount.x_m, mount.y_m, mount.yaw_rad);
+  out.emplace_back(std::move(scan));
+}
+
+void LidarImuInput::release_sweep(model::PointSweep raw, Sensor sensor, model::Utime stamp,
+                                  InputResults& out) {
   // Where no sensor measures the motion, the filter's is taken.
   MotionHistory by_filter;
   if (!motion_.history().at(stamp)) {
@@ -289,7 +315,9 @@ void LidarImuInput::release_sweep(model::PointSweep raw, model::Utime stamp, Inp
   const MotionHistory& history = by_filter.empty() ? motion_.history() : by_filter;
 
   const bool has_times = raw.has_times;
-  DeskewedSweep result = deskew(std::move(raw), stamp, history, parameters_.lidar.mount);
+  const SensorMount& mount =
+      sensor == Sensor::kScan ? parameters_.planar.mount : parameters_.lidar.mount;
+  DeskewedSweep result = deskew(std::move(raw), stamp, history, mount);
   // Without an IMU the attitude is not known.
   if (!motion_.attitude()) result.sweep.attitude.reset();
 
@@ -298,7 +326,7 @@ void LidarImuInput::release_sweep(model::PointSweep raw, model::Utime stamp, Inp
   if (!result.had_motion) {
     ++counters_.sweeps_not_deskewed;
     if (has_times)
-      out.emplace_back(InputFault{InputFaultKind::kNoMotion, channel_of(Sensor::kSweep),
+      out.emplace_back(InputFault{InputFaultKind::kNoMotion, channel_of(sensor),
                                   "no motion is known for the revolution: not de-skewed"});
   }
   out.emplace_back(std::move(result.sweep));

@@ -104,7 +104,8 @@ class LidarImuInput {
   void settle(InputResults& out, bool everything);
   void end_increment(model::Utime utime, InputResults& out);
   void release(WaitingSweep waiting, InputResults& out);
-  void release_sweep(model::PointSweep raw, model::Utime stamp, InputResults& out);
+  void release_scan(model::PlanarScan scan, model::Utime stamp, InputResults& out);
+  void release_sweep(model::PointSweep raw, Sensor sensor, model::Utime stamp, InputResults& out);
 
   LidarImuInputParameters parameters_;
   TimeBase time_base_;

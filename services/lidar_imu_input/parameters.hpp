@@ -80,6 +80,11 @@ struct DeskewParameters {
   double min_range_m = 0.0;  ///< Nearer points are on the vehicle itself.
 };
 
+/// The laser that scans one plane.
+struct PlanarLaserParameters {
+  SensorMount mount;
+};
+
 /// When results go out.
 struct OutputParameters {
   double max_increment_s = 0.1;         ///< Longest increment of odometry.
@@ -107,6 +112,7 @@ struct LidarImuInputParameters {
   StandstillParameters standstill;
   ConstraintParameters constraint;
   DeskewParameters lidar;
+  PlanarLaserParameters planar;
   OutputParameters output;
   FaultParameters fault;
   bool gnss_aided = false;  ///< RAW_POSE takes velocity from GNSS: a reference, not for mapping.

@@ -24,8 +24,10 @@ inline model::Utime stamp_of(const RawReading& reading) {
 }
 /// When it was complete: the end of a revolution, else its stamp.
 inline model::Utime end_of(const RawReading& reading) {
-  const auto* sweep = std::get_if<model::PointSweep>(&reading);
-  return sweep != nullptr ? end_of_revolution(*sweep) : stamp_of(reading);
+  if (const auto* sweep = std::get_if<model::PointSweep>(&reading))
+    return end_of_revolution(*sweep);
+  if (const auto* scan = std::get_if<model::PlanarScan>(&reading)) return scan->end();
+  return stamp_of(reading);
 }
 /// The number that its sender gave it.
 inline std::uint64_t sequence_of(const RawReading& reading) {

@@ -3,12 +3,20 @@
 #include <algorithm>
 #include <utility>
 
+#include "services/lidar_imu_input/deskew.hpp"
+
 namespace understory::lidar_imu_input {
 namespace {
 
 constexpr std::size_t kMostWaiting = 20;
 /// A sweep may be carried so far ahead of its own end.
 constexpr model::Utime kLongestCarry_us = 250'000;
+
+/// A scan taken at once is published with its own stamp.
+bool can_be_carried(const WaitingSweep& waiting) {
+  const auto* scan = std::get_if<model::PlanarScan>(&waiting.item);
+  return scan == nullptr || has_beam_times(*scan);
+}
 
 }  // namespace
 
@@ -19,14 +27,14 @@ Admission SweepQueue::add(WaitingSweep waiting, std::optional<model::Utime> incr
     waiting_.pop_front();
   }
 
-  const bool is_sweep = std::holds_alternative<model::PointSweep>(waiting.item);
+  const bool is_scan = std::holds_alternative<model::PlanarScan>(waiting.item);
   if (increment_end && waiting.end < *increment_end) {
-    const std::optional<model::Utime>& last = is_sweep ? sweep_stamp_ : scan_stamp_;
+    const std::optional<model::Utime>& last = is_scan ? scan_stamp_ : sweep_stamp_;
     const bool too_late =
         *increment_end - waiting.end > kLongestCarry_us || (last && *last >= *increment_end);
-    if (too_late || !is_sweep) {
+    if (too_late || !can_be_carried(waiting)) {
       admission.fault =
-          InputFault{InputFaultKind::kLate, channel_of(is_sweep ? Sensor::kSweep : Sensor::kScan),
+          InputFault{InputFaultKind::kLate, channel_of(is_scan ? Sensor::kScan : Sensor::kSweep),
                      "came after the odometry of its time was published"};
       return admission;
     }
@@ -47,12 +55,10 @@ WaitingSweep SweepQueue::take() {
 
 bool SweepQueue::release(const WaitingSweep& waiting) {
   if (std::holds_alternative<LostSweep>(waiting.item)) return false;
-  if (std::holds_alternative<model::PlanarScan>(waiting.item)) {
-    scan_stamp_ = waiting.end;
-    return true;
-  }
-  if (sweep_stamp_ && waiting.end <= *sweep_stamp_) return false;
-  sweep_stamp_ = waiting.end;
+  std::optional<model::Utime>& last =
+      std::holds_alternative<model::PlanarScan>(waiting.item) ? scan_stamp_ : sweep_stamp_;
+  if (last && waiting.end <= *last) return false;
+  last = waiting.end;
   return true;
 }
 

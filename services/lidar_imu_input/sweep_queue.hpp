@@ -42,8 +42,8 @@ struct Admission {
 class SweepQueue {
  public:
   /// Puts an item in its place. `increment_end`: where the latest odometry ended. An increment that
-  /// was published is not taken back: a sweep that ends before it is carried to it, by at most
-  /// 0.25 s; a scan is dropped.
+  /// was published is not taken back: what is to be de-skewed and ends before it is carried to it,
+  /// by at most 0.25 s; a scan taken at once is dropped.
   Admission add(WaitingSweep waiting, std::optional<model::Utime> increment_end);
 
   /// Whether nothing waits.

@@ -107,14 +107,14 @@ TEST_CASE("detections are moved into the frame of the vehicle", "[extractor]") {
   std::mt19937_64 random(5);
   LandmarkExtractorParameters parameters = exact_world(0.01);
   const test::Circle trunk = test::circle_at(8.0, 0.5, 0.15);
-  const model::PlanarScan scan = sweep({trunk}, {}, 0.01, random);
+  model::PlanarScan scan = sweep({trunk}, {}, 0.01, random);
   const auto at_sensor = LandmarkExtractor(parameters).extract(scan);
-  parameters.planar.vehicle_T_sensor = geometry::SE2(3.0, 0.5, 0.3);
+  scan.vehicle_T_sensor = geometry::SE2(3.0, 0.5, 0.3);
   const auto moved = LandmarkExtractor(parameters).extract(scan);
   REQUIRE(at_sensor.detections.size() == 1);
   REQUIRE(moved.detections.size() == 1);
-  const Eigen::Vector2d expected = parameters.planar.vehicle_T_sensor *
-                                   Eigen::Vector2d(at_sensor.detections[0].position_m.head<2>());
+  const Eigen::Vector2d expected =
+      scan.vehicle_T_sensor * Eigen::Vector2d(at_sensor.detections[0].position_m.head<2>());
   CHECK((moved.detections[0].position_m.head<2>() - expected).norm() < 1e-12);
   CHECK(moved.field_of_view.bearing_rad == Approx(0.3));
   CHECK(moved.detections[0].covariance_m2.trace() ==

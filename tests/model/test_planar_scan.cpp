@@ -19,6 +19,16 @@ TEST_CASE("Beams are evenly apart, from the first one on, to either side", "[mod
   }
 }
 
+TEST_CASE("A scan ends with its last beam", "[model]") {
+  model::PlanarScan scan;
+  scan.utime = 7'000'000;
+  scan.beam_interval_s = 1e-4;
+  CHECK(scan.end() == 7'000'000);
+  scan.ranges_m.assign(361, 5.0F);
+  CHECK(scan.duration_s() == Approx(0.036));
+  CHECK(scan.end() == 7'036'000);
+}
+
 TEST_CASE("A return is a positive range below the largest", "[model]") {
   model::PlanarScan scan;
   scan.max_range_m = 80.0;

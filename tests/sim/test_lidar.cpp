@@ -243,7 +243,7 @@ TEST_CASE("A drive's readings come in order and follow from the seed", "[drive]"
     } else if (const auto* pose = std::get_if<TruePose>(&*a)) {
       complete = pose->utime;
     } else if (const auto* scan = std::get_if<SimulatedPlanarScan>(&*a)) {
-      complete = scan->scan.utime;
+      complete = scan->scan.end();
       CHECK(scan->scan.ranges_m == std::get<SimulatedPlanarScan>(*b).scan.ranges_m);
     } else {
       continue;

@@ -163,11 +163,15 @@ TEST_CASE("existence survives the wire") {
 }
 
 TEST_CASE("sensor values survive the wire") {
-  model::PlanarScan scan{100, 5, -1.5, 0.01, 80.0, {1.0F, 0.0F, 90.0F, 80.5F}};
+  const geometry::SE2 vehicle_T_sensor(3.6, -0.2, 0.1);
+  model::PlanarScan scan{
+      100, 5, -1.5, 0.01, 80.0, {1.0F, 0.0F, 90.0F, 80.5F}, 1e-4, vehicle_T_sensor};
   const auto back = decode_message<model::PlanarScan>(encode_message(scan));
   REQUIRE(back);
   CHECK(back->ranges_m == std::vector<float>{1.0F, 0.0F, 0.0F, 0.0F});
   CHECK(back->bearing(1) == Approx(scan.bearing(1)));
+  CHECK(back->end() == 400);
+  CHECK(back->vehicle_T_sensor.coordinates().isApprox(vehicle_T_sensor.coordinates()));
   check_round_trip(model::WheelSample{3, 4, 1.5, -0.2});
   check_round_trip(model::GnssFix{3, 4, {10.0, -20.0}, 0.0, std::nullopt, 0.0});
   check_round_trip(model::GnssFix{3, 4, {10.0, -20.0}, 2.0, Eigen::Vector2d(1.0, 2.0), 0.1});

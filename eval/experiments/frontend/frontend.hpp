@@ -37,6 +37,13 @@ void add_mismatch_rows(const FrontendOptions& options, const std::atomic<bool>& 
 /// Trunks and corners in simulated sweeps: precision, recall, error, covariance, time.
 void add_extraction_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
                          FrontendRows& rows);
+/// Trunks and corners of a laser with one plane while the vehicle turns: scans taken as they are,
+/// de-skewed, and taken at once.
+void add_planar_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
+                     FrontendRows& rows);
+/// The chain beside the batch solution of its own measurements with true association.
+void add_limit_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
+                    FrontendRows& rows);
 /// Trunks in registered clouds of real forest plots, where the data are there; for the plots too.
 void add_forest_plot_rows(const FrontendOptions& options, const std::atomic<bool>& stop,
                           FrontendRows& rows, nlohmann::json& traces);

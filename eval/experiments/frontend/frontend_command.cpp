@@ -115,6 +115,8 @@ void run(const FrontendOptions& options) {
   if (wants(options, "forest-plots")) add_forest_plot_rows(options, stop, rows, plots);
   if (wants(options, "tracking")) add_tracking_rows(options, stop, rows);
   if (wants(options, "filter")) add_filter_rows(options, stop, rows);
+  if (asks_for(options, "planar")) add_planar_rows(options, stop, rows);
+  if (asks_for(options, "limit")) add_limit_rows(options, stop, rows);
   if (asks_for(options, "mismatch")) add_mismatch_rows(options, stop, rows);
   add_drive_rows(options, stop, rows, traces);
   if (wants(options, "faults")) add_fault_rows(options, stop, rows);

@@ -1,10 +1,7 @@
 #include "eval/experiments/frontend/landmark_extraction.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
-#include <optional>
 #include <random>
 
 #include "eval/tools/thread_clock.hpp"
@@ -16,18 +13,10 @@ namespace {
 using sim::VisibleCorner;
 using sim::VisibleTrunk;
 
-/// A true landmark, 1.3 m above the ground.
-struct Truth {
-  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
-  std::optional<double> bisector_rad;
-  std::uint32_t returns = 0;
-  bool should = false;
-  bool is_taken = false;
-};
-
-std::vector<Truth> true_trunks(const sim::World& world, const sim::SimulatedSweep& sweep,
-                               const sim::VehicleState& state, const ExtractionOptions& options) {
-  std::vector<Truth> result;
+std::vector<TrueLandmark> true_trunks(const sim::World& world, const sim::SimulatedSweep& sweep,
+                                      const sim::VehicleState& state,
+                                      const ExtractionOptions& options) {
+  std::vector<TrueLandmark> result;
   for (const VisibleTrunk& trunk : sim::visible_trunks(world, sweep, state)) {
     const bool should =
         trunk.range_m <= options.recall_range_m && trunk.returns >= options.least_returns;
@@ -36,9 +25,10 @@ std::vector<Truth> true_trunks(const sim::World& world, const sim::SimulatedSwee
   return result;
 }
 
-std::vector<Truth> true_corners(const sim::World& world, const sim::SimulatedSweep& sweep,
-                                const sim::VehicleState& state, const ExtractionOptions& options) {
-  std::vector<Truth> result;
+std::vector<TrueLandmark> true_corners(const sim::World& world, const sim::SimulatedSweep& sweep,
+                                       const sim::VehicleState& state,
+                                       const ExtractionOptions& options) {
+  std::vector<TrueLandmark> result;
   for (const VisibleCorner& corner : sim::visible_corners(world, sweep, state)) {
     const std::uint32_t least = std::min(corner.returns_before, corner.returns_after);
     const bool should =
@@ -47,89 +37,6 @@ std::vector<Truth> true_corners(const sim::World& world, const sim::SimulatedSwe
     result.push_back({breast, corner.bisector_rad, least, should, false});
   }
   return result;
-}
-
-/// Sums of one kind until the means are taken.
-struct Tally {
-  KindScore score;
-  double square_m2 = 0.0;
-  double square_rad2 = 0.0;
-  std::uint64_t near = 0;
-
-  void match(const model::Detection& detection, const Truth& truth, double error_range_m) {
-    const Eigen::Vector3d error = detection.position_m - truth.position_m;
-    const Eigen::Matrix2d plan = detection.covariance_m2.topLeftCorner<2, 2>();
-    score.nees_plan += error.head<2>().dot(plan.inverse() * error.head<2>());
-    score.nees_space += error.dot(detection.covariance_m2.inverse() * error);
-
-    if (truth.position_m.head<2>().norm() <= error_range_m) {
-      square_m2 += error.head<2>().squaredNorm();
-      const Eigen::Vector2d ray = truth.position_m.head<2>().normalized();
-      score.bias_along_m += ray.dot(error.head<2>());
-      score.bias_across_m += ray.x() * error.y() - ray.y() * error.x();
-      ++near;
-    }
-
-    if (truth.bisector_rad) {
-      const double turned =
-          std::remainder(detection.bearing_rad - *truth.bisector_rad, 2.0 * std::numbers::pi);
-      square_rad2 += turned * turned;
-      score.nees_bearing +=
-          turned * turned / (detection.bearing_sigma_rad * detection.bearing_sigma_rad);
-    }
-  }
-
-  KindScore finish() {
-    const double matched = std::max<double>(1.0, static_cast<double>(score.right));
-    score.nees_plan /= matched;
-    score.nees_space /= matched;
-    score.nees_bearing /= matched;
-    score.bearing_rms_rad = std::sqrt(square_rad2 / matched);
-    const double counted = std::max<double>(1.0, static_cast<double>(near));
-    score.rms_m = std::sqrt(square_m2 / counted);
-    score.bias_along_m /= counted;
-    score.bias_across_m /= counted;
-    return score;
-  }
-};
-
-/// Each detection takes the nearest true landmark that is free; nearest pairs of a sweep would
-/// differ only where two trunks are within half a metre.
-void score_kind(const model::LandmarkScan& scan, model::LandmarkKind kind,
-                std::vector<Truth> truths, const ExtractionOptions& options, Tally& tally,
-                std::vector<ExtractionMiss>& misses) {
-  for (const model::Detection& detection : scan.detections) {
-    if (detection.kind != kind) continue;
-    ++tally.score.detections;
-    Truth* nearest = nullptr;
-    double least = options.match_m;
-    for (Truth& truth : truths) {
-      const double distance = (detection.position_m - truth.position_m).head<2>().norm();
-      if (!truth.is_taken && distance < least) {
-        least = distance;
-        nearest = &truth;
-      }
-    }
-    if (nearest == nullptr) {
-      misses.push_back({scan.utime, true, detection, 0});
-      continue;
-    }
-    nearest->is_taken = true;
-    ++tally.score.right;
-    tally.match(detection, *nearest, options.error_range_m);
-  }
-  for (const Truth& truth : truths) {
-    if (!truth.should) continue;
-    ++tally.score.should;
-    if (truth.is_taken) {
-      ++tally.score.found;
-      continue;
-    }
-    model::Detection missed;
-    missed.kind = kind;
-    missed.position_m = truth.position_m;
-    misses.push_back({scan.utime, false, missed, truth.returns});
-  }
 }
 
 double part_of(std::vector<double> values, double part) {
@@ -186,8 +93,8 @@ ExtractionScore score_extraction(sim::SensorDrive& drive,
   std::normal_distribution<double> tilt(0.0, options.attitude_sigma_rad);
 
   std::vector<double> times_ms;
-  Tally trunks;
-  Tally corners;
+  KindTally trunks(options.match_m, options.error_range_m);
+  KindTally corners(options.match_m, options.error_range_m);
 
   for (int k = 0; k < options.sweeps; ++k) {
     const std::uint64_t turn =
@@ -205,10 +112,10 @@ ExtractionScore score_extraction(sim::SensorDrive& drive,
     times_ms.push_back(1e3 * tools::thread_time_s() - before);
 
     const sim::VehicleState state = drive.state_at(scan.utime);
-    score_kind(scan, model::LandmarkKind::kTrunk, true_trunks(drive.world(), sweep, state, options),
-               options, trunks, score.misses);
-    score_kind(scan, model::LandmarkKind::kCorner,
-               true_corners(drive.world(), sweep, state, options), options, corners, score.misses);
+    trunks.add(scan, model::LandmarkKind::kTrunk, true_trunks(drive.world(), sweep, state, options),
+               score.misses);
+    corners.add(scan, model::LandmarkKind::kCorner,
+                true_corners(drive.world(), sweep, state, options), score.misses);
 
     score.beams = input.rings;
     score.points += static_cast<double>(input.points.size());
@@ -217,8 +124,8 @@ ExtractionScore score_extraction(sim::SensorDrive& drive,
   }
 
   score.points /= std::max<double>(1.0, static_cast<double>(score.sweeps));
-  score.trunks = trunks.finish();
-  score.corners = corners.finish();
+  score.trunks = trunks.score();
+  score.corners = corners.score();
   score.time_p50_ms = part_of(times_ms, 0.5);
   score.time_p99_ms = part_of(times_ms, 0.99);
   return score;

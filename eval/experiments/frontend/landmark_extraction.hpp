@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/model/point_sweep.hpp"
+#include "eval/experiments/frontend/kind_tally.hpp"
 #include "services/landmark_extractor/landmark_extractor.hpp"
 #include "sim/sensor_drive.hpp"
 
@@ -23,36 +24,6 @@ struct ExtractionOptions {
   double match_m = 0.5;                   ///< A detection farther from every true one is false.
   double attitude_sigma_rad = 0.003;      ///< Error of roll and of pitch that the sweep comes with.
   std::uint64_t seed = 1;
-};
-
-/// One kind of landmark, over all sweeps.
-struct KindScore {
-  std::uint64_t should = 0;  ///< True landmarks that had to be found.
-  std::uint64_t found = 0;   ///< Of those.
-  std::uint64_t detections = 0;
-  std::uint64_t right = 0;       ///< Detections of a true landmark, the first for each.
-  double rms_m = 0.0;            ///< In the plan, within the range for errors.
-  double bias_along_m = 0.0;     ///< Mean error along the ray, away from the vehicle, and to its
-  double bias_across_m = 0.0;    ///< left; within the same range. It does not average out.
-  double nees_plan = 0.0;        ///< Mean, all matched; 2 is exact.
-  double nees_space = 0.0;       ///< With the height; 3 is exact.
-  double bearing_rms_rad = 0.0;  ///< Corners: of the bisector.
-  double nees_bearing = 0.0;     ///< Corners; 1 is exact.
-
-  /// Share of the detections that are right; 1 where there are none.
-  double precision() const {
-    return detections > 0 ? static_cast<double>(right) / detections : 1.0;
-  }
-  /// Share of the landmarks that had to be found; 1 where there are none.
-  double recall() const { return should > 0 ? static_cast<double>(found) / should : 1.0; }
-};
-
-/// A false detection, or a landmark that was not found: for inspection.
-struct ExtractionMiss {
-  model::Utime utime = 0;
-  bool is_false = false;       ///< Else not found.
-  model::Detection detection;  ///< Of a landmark not found: its true place.
-  std::uint32_t returns = 0;
 };
 
 /// What the extractor found on a drive.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/model/landmarks.hpp"
+#include "services/landmark_extractor/corners/corner_pair.hpp"
 #include "services/landmark_extractor/corners/wall_lines.hpp"
 #include "services/landmark_extractor/ground/ground_surface.hpp"
 
@@ -38,23 +39,10 @@ class SweepCorners {
   const std::vector<WallLine>& walls() const { return found_; }
 
  private:
-  /// Where two walls meet, from the corner along each.
-  struct Meeting {
-    Eigen::Vector2d place_m = Eigen::Vector2d::Zero();
-    Eigen::Vector2d along_a = Eigen::Vector2d::Zero();
-    Eigen::Vector2d along_b = Eigen::Vector2d::Zero();
-    double reach_a_m = 0.0;  ///< From the centroid of wall a.
-    double reach_b_m = 0.0;
-  };
-  /// Where the lines meet, if both walls are measured up to there.
-  std::optional<Meeting> meet(const WallLine& a, const WallLine& b,
-                              const Eigen::Vector2d& sensor) const;
   /// The corner of two walls, or none and a count why.
   std::optional<model::Detection> judge(const rings::RingCloud& cloud, const WallLine& a,
                                         const WallLine& b, const ground::GroundSurface& ground,
                                         const Eigen::Matrix2d& level_covariance_rad2);
-  void add(const model::Detection& corner, std::size_t first,
-           std::vector<model::Detection>& detections) const;
   bool is_tall(const rings::RingCloud& cloud, const WallLine& wall, const Eigen::Vector2d& corner,
                const Eigen::Vector2d& along, double ground_z) const;
 

@@ -21,6 +21,8 @@ constexpr std::size_t kRingReach = 4;
 constexpr std::size_t kStretches = 8;
 /// Points scatter across a wall at least by this part of their range's noise.
 constexpr double kLeastAcross = 0.1;
+/// Of one ring the stated noise counts as that of so many points.
+constexpr double kStatedPoints = 6.0;
 /// So many neighbours on a segment are summed.
 constexpr std::size_t kPartPoints = 8;
 
@@ -39,21 +41,23 @@ LineSums& LineSums::operator+=(const LineSums& other) {
   return *this;
 }
 
-const std::vector<WallLine>& WallFinder::find(const rings::RingCloud& cloud,
+const std::vector<WallLine>& WallFinder::find(const WallPoints& all,
                                               const std::vector<rings::Run>& runs) {
   segments_.clear();
   parts_.clear();
   walls_.clear();
-  ring_begins_.assign(cloud.rings() + 1, 0);
+  sensor_m_ = all.sensor_m;
+  is_one_ring_ = all.rings == 1;
+  ring_begins_.assign(all.rings + 1, 0);
 
   for (const rings::Run& run : runs) {
     if (run.size() >= rings::kLeastOfWall && run.width_m > 0.5 * corner_.min_length_m) {
-      split(cloud, run, run.first, run.last);
+      split(all, run, run.first, run.last);
     }
     ring_begins_[run.ring + std::size_t{1}] = segments_.size();
   }
   // Rings without a segment.
-  for (std::size_t ring = 0; ring < cloud.rings(); ++ring) {
+  for (std::size_t ring = 0; ring < all.rings; ++ring) {
     ring_begins_[ring + 1] = std::max(ring_begins_[ring], ring_begins_[ring + 1]);
   }
   join();
@@ -61,18 +65,18 @@ const std::vector<WallLine>& WallFinder::find(const rings::RingCloud& cloud,
 }
 
 /// Douglas and Peucker: cuts at the point that is farthest from the chord.
-void WallFinder::split(const rings::RingCloud& cloud, const rings::Run& run, std::size_t first,
+void WallFinder::split(const WallPoints& all, const rings::Run& run, std::size_t first,
                        std::size_t last) {
   if (last - first + 1 < rings::kLeastOfWall) return;
-  const Eigen::Vector2f from(cloud.points()[first].x_m, cloud.points()[first].y_m);
-  const Eigen::Vector2f to(cloud.points()[last].x_m, cloud.points()[last].y_m);
+  const Eigen::Vector2f from(all.points[first].x_m, all.points[first].y_m);
+  const Eigen::Vector2f to(all.points[last].x_m, all.points[last].y_m);
   const Eigen::Vector2f along = (to - from).normalized();
   const auto tolerance = static_cast<float>(corner_.line_tolerance_m);
 
   float farthest = 0.0F;
   std::size_t cut = first;
   for (std::size_t i = first + 1; i < last; ++i) {
-    const points::RingPoint& point = cloud.points()[i];
+    const points::RingPoint& point = all.points[i];
     const float off =
         std::abs(along.x() * (point.y_m - from.y()) - along.y() * (point.x_m - from.x()));
     if (off > farthest) {
@@ -82,23 +86,23 @@ void WallFinder::split(const rings::RingCloud& cloud, const rings::Run& run, std
   }
 
   if (farthest > tolerance) {
-    split(cloud, run, first, cut);
-    split(cloud, run, cut, last);
+    split(all, run, first, cut);
+    split(all, run, cut, last);
   } else {
-    add_segment(cloud, run, first, last);
+    add_segment(all, run, first, last);
   }
 }
 
-void WallFinder::add_segment(const rings::RingCloud& cloud, const rings::Run& run,
-                             std::size_t first, std::size_t last) {
+void WallFinder::add_segment(const WallPoints& all, const rings::Run& run, std::size_t first,
+                             std::size_t last) {
   LineSegment segment;
-  segment.from_m = cloud.points()[first].position();
-  segment.to_m = cloud.points()[last].position();
+  segment.from_m = all.points[first].position();
+  segment.to_m = all.points[last].position();
   segment.length_m = (segment.to_m - segment.from_m).norm();
   if (segment.length_m < 0.5 * corner_.min_length_m) return;
   segment.direction = (segment.to_m - segment.from_m) / segment.length_m;
   // A segment along the beams is a row of edges, not a wall.
-  const Eigen::Vector2d beam = segment.from_m - cloud.sensor_m().head<2>().cast<double>();
+  const Eigen::Vector2d beam = segment.from_m - all.sensor_m;
   if (std::abs(cross(beam.normalized(), segment.direction)) < 0.05) return;
 
   // Sums of its inner points.
@@ -108,9 +112,9 @@ void WallFinder::add_segment(const rings::RingCloud& cloud, const rings::Run& ru
   for (std::size_t i = first + 1; i < last; ++i) {
     if ((i - first - 1) % kPartPoints == 0) parts_.emplace_back();
     parts_.back().count += 1.0;
-    parts_.back().sum += cloud.points()[i].position();
-    segment.sums.add(cloud.points()[i].position());
-    z += cloud.points()[i].z_m;
+    parts_.back().sum += all.points[i].position();
+    segment.sums.add(all.points[i].position());
+    z += all.points[i].z_m;
   }
 
   segment.parts = static_cast<std::uint32_t>(parts_.size()) - segment.first_part;
@@ -134,9 +138,11 @@ bool WallFinder::same_wall(const LineSegment& a, const LineSegment& b) const {
   const double along = direction.dot(middle);
   const double lever = std::max(length, 2.0 * half);
   const double across = std::abs(cross(direction, middle));
+  // Segments of one ring lie beside each other, cut by noise or by a thing before the wall.
+  const double gap = is_one_ring_ ? corner_.max_gap_m : 0.0;
   // The directions of two short segments are uncertain, but not their neighbourhood.
   return across < corner_.line_tolerance_m * (1.0 + std::abs(along - 0.5 * length) / lever) &&
-         along + half > 0.0 && along - half < length;
+         along + half > -gap && along - half < length + gap;
 }
 
 std::uint32_t WallFinder::root(std::uint32_t segment) {
@@ -154,8 +160,8 @@ void WallFinder::join() {
     const std::size_t last_ring =
         std::min<std::size_t>(ring_begins_.size() - 2, segments_[i].ring + kRingReach);
     const std::size_t end = ring_begins_[last_ring + 1];
-    for (auto j = static_cast<std::uint32_t>(ring_begins_[segments_[i].ring + std::size_t{1}]);
-         j < end; ++j) {
+    const std::size_t next_ring = ring_begins_[segments_[i].ring + std::size_t{1}];
+    for (auto j = is_one_ring_ ? i + 1 : static_cast<std::uint32_t>(next_ring); j < end; ++j) {
       if (same_wall(segments_[i], segments_[j])) parents_[root(j)] = root(i);
     }
   }
@@ -198,6 +204,17 @@ double WallFinder::unevenness(const std::vector<std::uint32_t>& members, const W
   return stretches > 3.0 ? std::sqrt(std::max(0.0, excess / (stretches - 2.0))) : 0.0;
 }
 
+/// The few points of one ring may lie on their line by chance: the noise stated for a beam counts
+/// beside their scatter.
+double WallFinder::variance_across(const LineSums& sums, const WallLine& wall,
+                                   double axis2_m2) const {
+  if (wall.rings > 1) return std::max(axis2_m2, square(kLeastAcross * sweep_.range_sigma_m));
+  const Eigen::Vector2d beam = (wall.centroid_m - sensor_m_).normalized();
+  const double stated = std::max(std::abs(wall.normal().dot(beam)), kLeastAcross);
+  return (sums.count * axis2_m2 + kStatedPoints * square(stated * sweep_.range_sigma_m)) /
+         (sums.count - 2.0 + kStatedPoints);
+}
+
 void WallFinder::add_wall(const std::vector<std::uint32_t>& members) {
   LineSums sums;
   WallLine wall;
@@ -223,7 +240,7 @@ void WallFinder::add_wall(const std::vector<std::uint32_t>& members) {
   const geometry::PrincipalAxes axes = geometry::principal_axes(scatter);
   wall.direction = axes.vectors.col(1);
   if (wall.direction.dot(segments_[members[0]].direction) < 0.0) wall.direction *= -1.0;
-  const double across2 = std::max(axes.values[0], square(kLeastAcross * sweep_.range_sigma_m));
+  const double across2 = variance_across(sums, wall, axes.values[0]);
   if (std::sqrt(across2) > corner_.line_tolerance_m) return;
 
   // Its extent.

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "services/landmark_extractor/parameters.hpp"
@@ -62,9 +63,16 @@ struct WallLine {
   Eigen::Vector2d normal() const { return {-direction.y(), direction.x()}; }
 };
 
+/// The points that runs are of, and where the sensor was at utime; frame `vehicle_level`.
+struct WallPoints {
+  std::span<const points::RingPoint> points;
+  std::size_t rings = 0;
+  Eigen::Vector2d sensor_m = Eigen::Vector2d::Zero();
+};
+
 /// Cuts runs into straight segments (Douglas and Peucker), joins those of neighbouring rings in one
-/// upright plane, and fits a line to each group. Keeps its memory from sweep to sweep, but no
-/// state.
+/// upright plane (of a laser with one ring: those in one line), and fits a line to each group.
+/// Keeps its memory from sweep to sweep, but no state.
 class WallFinder {
  public:
   /// Noise and limits are taken from the parameters.
@@ -72,16 +80,16 @@ class WallFinder {
       : sweep_(sweep), corner_(corner) {}
 
   /// The walls of one sweep; they are valid until the next call.
-  const std::vector<WallLine>& find(const rings::RingCloud& cloud,
-                                    const std::vector<rings::Run>& runs);
+  const std::vector<WallLine>& find(const WallPoints& all, const std::vector<rings::Run>& runs);
 
  private:
-  void split(const rings::RingCloud& cloud, const rings::Run& run, std::size_t first,
-             std::size_t last);
-  void add_segment(const rings::RingCloud& cloud, const rings::Run& run, std::size_t first,
+  void split(const WallPoints& all, const rings::Run& run, std::size_t first, std::size_t last);
+  void add_segment(const WallPoints& all, const rings::Run& run, std::size_t first,
                    std::size_t last);
   void join();
   bool same_wall(const LineSegment& a, const LineSegment& b) const;
+  /// Across, of each point [m^2]; `axis2_m2` is their mean square deviation from the line.
+  double variance_across(const LineSums& sums, const WallLine& wall, double axis2_m2) const;
   std::uint32_t root(std::uint32_t segment);
   void add_wall(const std::vector<std::uint32_t>& members);
   double unevenness(const std::vector<std::uint32_t>& members, const WallLine& wall,
@@ -95,6 +103,8 @@ class WallFinder {
 
   SweepParameters sweep_;
   CornerParameters corner_;
+  Eigen::Vector2d sensor_m_ = Eigen::Vector2d::Zero();
+  bool is_one_ring_ = false;
   std::vector<LineSegment> segments_;
   std::vector<SegmentPart> parts_;
   std::vector<std::size_t> ring_begins_;             ///< Among the segments.

@@ -9,43 +9,34 @@
 namespace understory::landmark_extractor::planar {
 namespace {
 
-/// Distance between the returns of two beams [m] (law of cosines).
-double distance(const model::PlanarScan& scan, std::size_t a, std::size_t b) {
-  const double ra = scan.ranges_m[a];
-  const double rb = scan.ranges_m[b];
-  return std::sqrt(std::max(
-      0.0, ra * ra + rb * rb - 2.0 * ra * rb * std::cos(scan.bearing(b) - scan.bearing(a))));
+/// Distance between the returns of two beams [m].
+double distance(const Beams& scan, std::size_t a, std::size_t b) {
+  return (scan.beams[a].point_m - scan.beams[b].point_m).norm();
 }
 
-bool same_object(const model::PlanarScan& scan, std::size_t a, std::size_t b,
+bool same_object(const Beams& scan, std::size_t a, std::size_t b,
                  const PlanarTrunkParameters& parameters) {
-  const double nearer = std::min(scan.ranges_m[a], scan.ranges_m[b]);
+  const double nearer = std::min(scan.beams[a].range_m, scan.beams[b].range_m);
   return distance(scan, a, b) <= parameters.break_distance_m + parameters.break_per_range * nearer;
 }
 
 /// What lies beyond the beam `edge` of an object, at the beam `beyond`.
-Border border(const model::PlanarScan& scan, std::size_t edge, std::size_t beyond,
+Border border(const Beams& scan, std::size_t edge, std::size_t beyond,
               const PlanarTrunkParameters& parameters) {
-  if (!scan.is_return(beyond)) return Border::kClear;
-  const double behind = scan.ranges_m[beyond] - scan.ranges_m[edge];
+  if (!scan.beams[beyond].is_return()) return Border::kClear;
+  const double behind = scan.beams[beyond].range_m - scan.beams[edge].range_m;
   if (behind > parameters.clearance_m) return Border::kClear;
   return behind < -parameters.clearance_m ? Border::kOccluded : Border::kCrowded;
 }
 
-void find_borders(const model::PlanarScan& scan, const PlanarTrunkParameters& parameters,
-                  Segment& segment) {
+void find_borders(const Beams& scan, const PlanarTrunkParameters& parameters, Segment& segment) {
   if (segment.first > 0) segment.right = border(scan, segment.first, segment.first - 1, parameters);
-  if (segment.last + 1 < scan.ranges_m.size()) {
+  if (segment.last + 1 < scan.beams.size()) {
     segment.left = border(scan, segment.last, segment.last + 1, parameters);
   }
 }
 
-Eigen::Vector2d point(const model::PlanarScan& scan, std::size_t beam) {
-  const double bearing = scan.bearing(beam);
-  return scan.ranges_m[beam] * Eigen::Vector2d(std::cos(bearing), std::sin(bearing));
-}
-
-double distance(const model::PlanarScan& scan, const Segment& a, const Segment& b) {
+double distance(const Beams& scan, const Segment& a, const Segment& b) {
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = a.first; i <= a.last; ++i) {
     for (std::size_t j = b.first; j <= b.last; ++j) least = std::min(least, distance(scan, i, j));
@@ -54,14 +45,14 @@ double distance(const model::PlanarScan& scan, const Segment& a, const Segment& 
 }
 
 /// Whether the bearing between two beams is so wide that nothing at `range` is within `radius`.
-bool too_wide(const model::PlanarScan& scan, std::size_t a, std::size_t b, double range,
-              double radius) {
-  return range * std::sin(std::min(1.5, scan.bearing(b) - scan.bearing(a))) > radius;
+bool too_wide(const Beams& scan, std::size_t a, std::size_t b, double range, double radius) {
+  return range * std::sin(std::min(1.5, scan.beams[b].bearing_rad - scan.beams[a].bearing_rad)) >
+         radius;
 }
 
 }  // namespace
 
-std::vector<Segment> split(const model::PlanarScan& scan, const PlanarTrunkParameters& parameters) {
+std::vector<Segment> split(const Beams& scan, const PlanarTrunkParameters& parameters) {
   std::vector<Segment> segments;
   std::optional<Segment> open;
   const auto close = [&] {
@@ -70,8 +61,8 @@ std::vector<Segment> split(const model::PlanarScan& scan, const PlanarTrunkParam
     segments.push_back(*open);
     open.reset();
   };
-  for (std::size_t beam = 0; beam < scan.ranges_m.size(); ++beam) {
-    if (!scan.is_return(beam)) {
+  for (std::size_t beam = 0; beam < scan.beams.size(); ++beam) {
+    if (!scan.beams[beam].is_return()) {
       close();
       continue;
     }
@@ -83,26 +74,26 @@ std::vector<Segment> split(const model::PlanarScan& scan, const PlanarTrunkParam
   return segments;
 }
 
-bool continues_a_line(const model::PlanarScan& scan, const Segment& segment, double tolerance_m) {
-  if (segment.first == 0 || segment.last + 1 >= scan.ranges_m.size()) return false;
+bool continues_a_line(const Beams& scan, const Segment& segment, double tolerance_m) {
+  if (segment.first == 0 || segment.last + 1 >= scan.beams.size()) return false;
   const std::size_t before = segment.first - 1;
   const std::size_t after = segment.last + 1;
-  if (!scan.is_return(before) || !scan.is_return(after)) return false;
-  const Eigen::Vector2d start = point(scan, before);
-  const Eigen::Vector2d along = (point(scan, after) - start).normalized();
+  if (!scan.beams[before].is_return() || !scan.beams[after].is_return()) return false;
+  const Eigen::Vector2d start = scan.beams[before].point_m;
+  const Eigen::Vector2d along = (scan.beams[after].point_m - start).normalized();
   for (std::size_t beam = segment.first; beam <= segment.last; ++beam) {
-    const Eigen::Vector2d offset = point(scan, beam) - start;
+    const Eigen::Vector2d offset = scan.beams[beam].point_m - start;
     if (std::abs(along.x() * offset.y() - along.y() * offset.x()) > tolerance_m) return false;
   }
   return true;
 }
 
-double nearest_object(const model::PlanarScan& scan, const std::vector<Segment>& segments,
-                      std::size_t index, double radius_m) {
+double nearest_object(const Beams& scan, const std::vector<Segment>& segments, std::size_t index,
+                      double radius_m) {
   const Segment& own = segments[index];
-  const double range =
-      *std::min_element(scan.ranges_m.begin() + static_cast<std::ptrdiff_t>(own.first),
-                        scan.ranges_m.begin() + static_cast<std::ptrdiff_t>(own.last) + 1);
+  double range = scan.beams[own.first].range_m;
+  for (std::size_t i = own.first; i <= own.last; ++i)
+    range = std::min(range, scan.beams[i].range_m);
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = index; i-- > 0;) {
     if (too_wide(scan, segments[i].last, own.first, range, radius_m)) break;

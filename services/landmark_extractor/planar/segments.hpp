@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/model/planar_scan.hpp"
 #include "services/landmark_extractor/parameters.hpp"
+#include "services/landmark_extractor/planar/beams.hpp"
 
 namespace understory::landmark_extractor::planar {
 
@@ -30,16 +30,16 @@ struct Segment {
 };
 
 /// All objects of a scan, in order of bearing.
-std::vector<Segment> split(const model::PlanarScan& scan, const PlanarTrunkParameters& parameters);
+std::vector<Segment> split(const Beams& scan, const PlanarTrunkParameters& parameters);
 
 /// Whether the object lies on the straight line between the returns of the beams beside it. So does
 /// every part of a wall or fence at a grazing angle and falls apart into single
 /// beams.
-bool continues_a_line(const model::PlanarScan& scan, const Segment& segment, double tolerance_m);
+bool continues_a_line(const Beams& scan, const Segment& segment, double tolerance_m);
 
 /// Distance from segments[index] to the nearest other object [m], over their returns; infinity
 /// where nothing else is within `radius_m`.
-double nearest_object(const model::PlanarScan& scan, const std::vector<Segment>& segments,
-                      std::size_t index, double radius_m);
+double nearest_object(const Beams& scan, const std::vector<Segment>& segments, std::size_t index,
+                      double radius_m);
 
 }  // namespace understory::landmark_extractor::planar

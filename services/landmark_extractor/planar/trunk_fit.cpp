@@ -3,9 +3,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "common/geometry/se2.hpp"
-
 #include "services/landmark_extractor/square.hpp"
 
 namespace understory::landmark_extractor::planar {
@@ -14,6 +14,31 @@ namespace {
 constexpr int kIterations = 8;
 /// Beams that graze the trunk more than this (part of the radius) say little of its range.
 constexpr double kMaxGraze = 0.9;
+
+/// The returns of one object as seen from one place: where the laser was in their middle. It moves
+/// by a centimetre while it passes over a trunk.
+struct Returns {
+  std::vector<double> bearings_rad;
+  std::vector<double> ranges_m;
+  double step_rad = 0.0;
+  bool is_right_seen = false;  ///< Its own edge.
+  bool is_left_seen = false;
+};
+
+Returns returns_of(const Beams& scan, const Segment& segment, const Eigen::Vector2d& origin_m) {
+  Returns result;
+  result.step_rad = scan.step_rad;
+  result.is_right_seen = segment.right == Border::kClear;
+  result.is_left_seen = segment.left == Border::kClear;
+  for (std::size_t i = segment.first; i <= segment.last; ++i) {
+    const Beam& beam = scan.beams[i];
+    const Eigen::Vector2d offset = beam.point_m - origin_m;
+    const double turned = std::atan2(offset.y(), offset.x()) - beam.bearing_rad;
+    result.bearings_rad.push_back(beam.bearing_rad + geometry::wrap_angle(turned));
+    result.ranges_m.push_back(offset.norm());
+  }
+  return result;
+}
 
 /// Normal equations over (range, bearing, radius) of the centre.
 struct Normal {
@@ -67,69 +92,65 @@ void add_edge(const Eigen::Vector3d& x, double side, double last_bearing, double
   normal.add(jacobian, seen - predicted, sigma);
 }
 
-Normal linearise(const Eigen::Vector3d& x, const model::PlanarScan& scan, const Segment& segment,
+Normal linearise(const Eigen::Vector3d& x, const Returns& seen,
                  const PlanarTrunkParameters& parameters) {
   Normal normal;
-  for (std::size_t beam = segment.first; beam <= segment.last; ++beam) {
-    const RangeTerm term = beam_on_circle(x, scan.bearing(beam), parameters);
-    normal.add(term.jacobian, scan.ranges_m[beam] - term.predicted, term.sigma);
+  for (std::size_t i = 0; i < seen.ranges_m.size(); ++i) {
+    const RangeTerm term = beam_on_circle(x, seen.bearings_rad[i], parameters);
+    normal.add(term.jacobian, seen.ranges_m[i] - term.predicted, term.sigma);
   }
-  const double step = scan.bearing_step_rad;
-  if (segment.right == Border::kClear) {
-    add_edge(x, -1.0, scan.bearing(segment.first), step, parameters, normal);
-  }
-  if (segment.left == Border::kClear) {
-    add_edge(x, 1.0, scan.bearing(segment.last), step, parameters, normal);
-  }
+  const double step = seen.step_rad;
+  if (seen.is_right_seen) add_edge(x, -1.0, seen.bearings_rad.front(), step, parameters, normal);
+  if (seen.is_left_seen) add_edge(x, 1.0, seen.bearings_rad.back(), step, parameters, normal);
   normal.add({0.0, 0.0, 1.0}, parameters.prior_radius_m - x[2], parameters.prior_radius_sigma_m);
   return normal;
 }
 
-Eigen::Vector3d start(const model::PlanarScan& scan, const Segment& segment,
-                      const PlanarTrunkParameters& parameters) {
-  const auto* ranges = scan.ranges_m.data();
-  const double nearest = *std::min_element(ranges + segment.first, ranges + segment.last + 1);
-  const double width = static_cast<double>(segment.size()) * scan.bearing_step_rad;
+Eigen::Vector3d start(const Returns& seen, const PlanarTrunkParameters& parameters) {
+  const double nearest = *std::ranges::min_element(seen.ranges_m);
+  const double width = static_cast<double>(seen.ranges_m.size()) * seen.step_rad;
   const double half = std::max(0.0, 0.5 * width - parameters.beam_width_rad);
   const double sine = std::min(0.9, std::sin(std::min(half, 1.5)));
   const double radius =
       std::clamp(nearest * sine / (1.0 - sine), parameters.min_radius_m, parameters.max_radius_m);
-  const double bearing = 0.5 * (scan.bearing(segment.first) + scan.bearing(segment.last));
+  const double bearing = 0.5 * (seen.bearings_rad.front() + seen.bearings_rad.back());
   return {nearest + radius, bearing, radius};
 }
 
 /// Against what the fit leaves uncertain, too: edges are uniform within a step, not Gaussian, and a
 /// beam near one feels that.
 double mean_square_residual(const Eigen::Vector3d& x, const Eigen::Matrix3d& covariance,
-                            const model::PlanarScan& scan, const Segment& segment,
-                            const PlanarTrunkParameters& parameters) {
+                            const Returns& seen, const PlanarTrunkParameters& parameters) {
   double sum = 0.0;
-  for (std::size_t beam = segment.first; beam <= segment.last; ++beam) {
-    const RangeTerm term = beam_on_circle(x, scan.bearing(beam), parameters);
+  for (std::size_t i = 0; i < seen.ranges_m.size(); ++i) {
+    const RangeTerm term = beam_on_circle(x, seen.bearings_rad[i], parameters);
     const double variance = square(term.sigma) + term.jacobian.dot(covariance * term.jacobian);
-    sum += square(scan.ranges_m[beam] - term.predicted) / variance;
+    sum += square(seen.ranges_m[i] - term.predicted) / variance;
   }
-  return sum / static_cast<double>(segment.size());
+  return sum / static_cast<double>(seen.ranges_m.size());
 }
 
 }  // namespace
 
 Eigen::Vector2d TrunkFit::centre() const {
-  return {range_m * std::cos(bearing_rad), range_m * std::sin(bearing_rad)};
+  return origin_m + range_m * Eigen::Vector2d(std::cos(bearing_rad), std::sin(bearing_rad));
 }
 
 Eigen::Matrix2d TrunkFit::centre_covariance() const {
   Eigen::Matrix2d jacobian;
-  jacobian.col(0) = centre() / range_m;
-  jacobian.col(1) = geometry::perpendicular(centre());
+  const Eigen::Vector2d offset = centre() - origin_m;
+  jacobian.col(0) = offset / range_m;
+  jacobian.col(1) = geometry::perpendicular(offset);
   return jacobian * covariance.topLeftCorner<2, 2>() * jacobian.transpose();
 }
 
-std::optional<TrunkFit> fit_trunk(const model::PlanarScan& scan, const Segment& segment,
+std::optional<TrunkFit> fit_trunk(const Beams& scan, const Segment& segment,
                                   const PlanarTrunkParameters& parameters) {
-  Eigen::Vector3d x = start(scan, segment, parameters);
+  const Eigen::Vector2d origin_m = scan.beams[(segment.first + segment.last) / 2].origin_m;
+  const Returns seen = returns_of(scan, segment, origin_m);
+  Eigen::Vector3d x = start(seen, parameters);
   for (int i = 0; i < kIterations; ++i) {
-    const Normal normal = linearise(x, scan, segment, parameters);
+    const Normal normal = linearise(x, seen, parameters);
     const Eigen::Vector3d change = normal.information.inverse() * normal.gradient;
     x += change;
     x[2] = std::clamp(x[2], 0.5 * parameters.min_radius_m, 2.0 * parameters.max_radius_m);
@@ -137,11 +158,12 @@ std::optional<TrunkFit> fit_trunk(const model::PlanarScan& scan, const Segment& 
     if (change.norm() < 1e-5) break;
   }
   TrunkFit fit;
+  fit.origin_m = origin_m;
   fit.range_m = x[0];
   fit.bearing_rad = x[1];
   fit.radius_m = x[2];
-  fit.covariance = linearise(x, scan, segment, parameters).information.inverse();
-  fit.mean_square_residual = mean_square_residual(x, fit.covariance, scan, segment, parameters);
+  fit.covariance = linearise(x, seen, parameters).information.inverse();
+  fit.mean_square_residual = mean_square_residual(x, fit.covariance, seen, parameters);
   return fit;
 }
 

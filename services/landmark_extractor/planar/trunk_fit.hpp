@@ -4,23 +4,23 @@
 #include <Eigen/Core>
 #include <optional>
 
-#include "common/model/planar_scan.hpp"
 #include "services/landmark_extractor/parameters.hpp"
 #include "services/landmark_extractor/planar/segments.hpp"
 
 namespace understory::landmark_extractor::planar {
 
-/// A trunk in the polar coordinates of the sensor.
+/// A trunk in polar coordinates about where the laser was when it looked at it.
 struct TrunkFit {
-  double range_m = 0.0;      ///< Of the centre.
-  double bearing_rad = 0.0;  ///< Of the centre.
+  Eigen::Vector2d origin_m = Eigen::Vector2d::Zero();  ///< Of the laser, frame of the beams.
+  double range_m = 0.0;                                ///< Of the centre.
+  double bearing_rad = 0.0;                            ///< Of the centre.
   double radius_m = 0.0;
   /// Of (range, bearing, radius) [m, rad, m].
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   /// Mean square of the ranges' residuals, in their standard deviations.
   double mean_square_residual = 0.0;
 
-  /// Centre in frame `sensor` [m].
+  /// Centre in the frame of the beams [m].
   Eigen::Vector2d centre() const;
   /// Its covariance [m^2].
   Eigen::Matrix2d centre_covariance() const;
@@ -30,7 +30,7 @@ struct TrunkFit {
 /// bearings of those edges that are seen (`Border::kClear`), and the prior of the radius, which
 /// decides where a trunk is so far away that its width is within one beam. None when the
 /// estimate does not settle on a circle before the sensor.
-std::optional<TrunkFit> fit_trunk(const model::PlanarScan& scan, const Segment& segment,
+std::optional<TrunkFit> fit_trunk(const Beams& scan, const Segment& segment,
                                   const PlanarTrunkParameters& parameters);
 
 }  // namespace understory::landmark_extractor::planar
