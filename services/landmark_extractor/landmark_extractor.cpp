@@ -7,12 +7,15 @@
 
 #include "services/landmark_extractor/planar/segments.hpp"
 #include "services/landmark_extractor/planar/trunk_fit.hpp"
+#include "services/landmark_extractor/view/view_profile.hpp"
 
 namespace understory::landmark_extractor {
 namespace {
 
 /// Sigma of a trunk's height against the sensor's plane [m]: a planar laser does not measure it.
 constexpr double kHeightSigma_m = 0.5;
+/// How far one sees is told so far beyond the range of trunks [m].
+constexpr double kBeyond_m = 2.0;
 
 bool well_formed(const model::PlanarScan& scan) {
   const double width = scan.bearing_step_rad *
@@ -106,12 +109,15 @@ model::LandmarkScan LandmarkExtractor::extract(const model::PlanarScan& scan) {
   result.utime = scan.utime;
   result.sequence = scan.sequence;
   ++counters_.scans;
+  view_ = {};
   if (!well_formed(scan)) {
     ++counters_.scans_malformed;
     return result;
   }
 
   result.field_of_view = field_of_view(scan, parameters_.planar);
+  view_ = view::planar_view(scan, parameters_.planar.vehicle_T_sensor,
+                            parameters_.planar.max_range_m + kBeyond_m);
   const std::vector<planar::Segment> segments = planar::split(scan, parameters_.planar);
   counters_.objects += segments.size();
 
@@ -121,6 +127,12 @@ model::LandmarkScan LandmarkExtractor::extract(const model::PlanarScan& scan) {
     }
   }
   counters_.landmarks += result.detections.size();
+  return result;
+}
+
+model::LandmarkScan LandmarkExtractor::extract(const model::PointSweep& sweep) {
+  model::LandmarkScan result = sweeps_.extract(sweep);
+  view_ = sweeps_.view();
   return result;
 }
 

@@ -34,7 +34,10 @@ class LandmarkExtractor {
   /// round, and have a trunk's size. A malformed scan gives none. They are in order of bearing.
   model::LandmarkScan extract(const model::PlanarScan& scan);
   /// Trunks and corners of a laser that scans in space; see SweepExtractor.
-  model::LandmarkScan extract(const model::PointSweep& sweep) { return sweeps_.extract(sweep); }
+  model::LandmarkScan extract(const model::PointSweep& sweep);
+  /// How far one can see at the height of trunks: of the last sweep or scan that was extracted; no
+  /// bins where that was malformed.
+  const model::ViewRanges& view() const { return view_; }
   /// Of planar scans.
   const ExtractorCounters& counters() const { return counters_; }
   /// Of sweeps in space.
@@ -44,6 +47,7 @@ class LandmarkExtractor {
   LandmarkExtractorParameters parameters_;
   ExtractorCounters counters_;
   SweepExtractor sweeps_;
+  model::ViewRanges view_;
 };
 
 }  // namespace understory::landmark_extractor
