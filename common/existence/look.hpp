@@ -17,6 +17,8 @@ enum class Ray : std::uint8_t {
 struct Look {
   Eigen::Vector3f from_point_m;  ///< Sensor minus point, frame of the map.
   Ray ray = Ray::kUnknown;       ///< Read by miss() only.
+  /// The point's pass goes on, though the model has begun another one: it has been in view since.
+  bool goes_on = false;
 };
 
 /// Range along the ray against the point's distance, both [m]; `tolerance_m`: what both may be off.

@@ -75,7 +75,7 @@ class PointExistence {
 
   /// Expected and seen. Throws std::invalid_argument where the look is not finite or has no length.
   void hit(ExistenceModel& model, const Look& look) {
-    enter_pass(model);
+    if (!look.goes_on) enter_pass(model);
     const View view = view_of(model, look);
     learn_recall(model, view, true);
     apply_hit(model, view);
@@ -84,7 +84,7 @@ class PointExistence {
 
   /// Expected and not seen. What was blocked says nothing of the point: P, d and w stay.
   void miss(ExistenceModel& model, const Look& look) {
-    enter_pass(model);
+    if (!look.goes_on) enter_pass(model);
     const View view = view_of(model, look);
     if (look.ray == Ray::kBlocked) return;
     learn_recall(model, view, false);

@@ -12,6 +12,7 @@
 #include "common/model/point_sweep.hpp"
 #include "common/model/submap.hpp"
 #include "common/model/tracked.hpp"
+#include "common/model/view_ranges.hpp"
 #include "common/model/wheels.hpp"
 #include "common/state/archive.hpp"
 
@@ -65,6 +66,13 @@ void archive(Archive& a, Self& s) { a(s.max_range_m, s.bearing_rad, s.width_rad)
 template <class Archive, class Self>
 requires state::Is<Self, LandmarkScan>
 void archive(Archive& a, Self& s) { a(s.utime, s.sequence, s.field_of_view, s.detections); }
+/// Members of saved ViewRanges.
+template <class Archive, class Self>
+requires state::Is<Self, ViewRanges>
+void archive(Archive& a, Self& s) {
+  a(s.utime, s.sequence, s.sensor_m, s.turn_m, s.first_bearing_rad, s.step_rad, s.beam_step_rad,
+    s.range_step_m, s.free, s.hidden);
+}
 /// Members of a saved TrackedLandmark.
 template <class Archive, class Self>
 requires state::Is<Self, TrackedLandmark>

@@ -68,6 +68,21 @@ struct IdentifiedDetection {
   LandmarkId landmark_id = 0;   ///< 0 = none: it is not in the map (yet).
 };
 
+/// What the sensor measured along the ray to a landmark that was not detected.
+enum class LineOfSight : std::uint8_t {
+  kUnknown = 0,  ///< Neither of both is certain, or there were no ranges.
+  kBlocked = 1,  ///< Something stands in front of it, or there.
+  kClear = 2,    ///< Beams went on behind its place.
+};
+
+/// A landmark that should have been seen and was not.
+struct ExpectedLandmark {
+  LandmarkId id = 0;
+  LineOfSight sight = LineOfSight::kUnknown;
+
+  friend bool operator==(const ExpectedLandmark&, const ExpectedLandmark&) = default;
+};
+
 /// Channels SLAM_UPDATE and SLAM_POSE, for one keyframe.
 struct MapUpdate {
   std::uint64_t keyframe_sequence = 0;
@@ -88,9 +103,9 @@ struct MapUpdate {
   // What was seen and what was not; empty where the keyframe has no place.
   std::vector<ScanReference> scans;             ///< Its members.
   std::vector<IdentifiedDetection> detections;  ///< In order of scan and detection, each once.
-  /// Landmarks in the field of view of every scan that were not seen, ascending; at most 1000, the
-  /// nearest.
-  std::vector<LandmarkId> expected;
+  /// Landmarks in the field of view of every scan that were not seen, in order of id; at most 1000,
+  /// the nearest.
+  std::vector<ExpectedLandmark> expected;
   // Diagnostics.
   bool used_prior = false;       ///< Localised by gating around the predicted pose, not by search.
   std::uint32_t candidates = 0;  ///< Hypotheses tried by the search.

@@ -33,7 +33,7 @@ void LandmarkBook::take(const model::MapUpdate& update) {
   const bool starts = update.status == model::MapUpdateStatus::kFirstMap;
   for (const model::LandmarkId id : update.added) born(id, starts, update.utime, moment);
   for (const model::Association& one : update.associations) seen(one.landmark_id, sight, moment);
-  for (const model::LandmarkId id : update.expected) missed(id, moment);
+  for (const model::ExpectedLandmark& one : update.expected) missed(one.id, moment);
   for (const auto& [old_id, new_id] : update.merged) merged(old_id, new_id, moment);
   for (const model::LandmarkId id : update.removed) removed(id, moment);
 }

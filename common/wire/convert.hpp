@@ -20,6 +20,7 @@
 #include "common/model/slam_output.hpp"
 #include "common/model/submap.hpp"
 #include "common/model/tracked.hpp"
+#include "common/model/view_ranges.hpp"
 #include "common/model/wheels.hpp"
 #include "common/wire/guard.hpp"
 #include "common/wire/result.hpp"
@@ -46,12 +47,14 @@
 #include "understory/slam_pose2_t.hpp"
 #include "understory/slam_pose_t.hpp"
 #include "understory/slam_update2_t.hpp"
+#include "understory/slam_update3_t.hpp"
 #include "understory/slam_update_t.hpp"
 #include "understory/submap_query_t.hpp"
 #include "understory/submap_stored_t.hpp"
 #include "understory/submap_t.hpp"
 #include "understory/tracked_landmarks_t.hpp"
 #include "understory/velocity_correction_t.hpp"
+#include "understory/view_ranges_t.hpp"
 #include "understory/wheels_t.hpp"
 
 namespace understory::wire {
@@ -66,7 +69,11 @@ Result<model::Odometry> from_wire(const odometry2_t& wire);
 Result<model::Keyframe> from_wire(const keyframe2_t& wire);
 /// A keyframe of logs written before keyframe2_t: without detections.
 Result<model::Keyframe> from_wire(const keyframe_t& wire);
+/// How far the sensor saw.
+Result<model::ViewRanges> from_wire(const view_ranges_t& wire);
 /// What a mapper did with one keyframe.
+Result<model::MapUpdate> from_wire(const slam_update3_t& wire);
+/// The same of logs written before slam_update3_t: nothing is known of lines of sight.
 Result<model::MapUpdate> from_wire(const slam_update2_t& wire);
 /// The same of logs written before slam_update2_t: of map 1, without scans and detections.
 Result<model::MapUpdate> from_wire(const slam_update_t& wire);
@@ -124,7 +131,9 @@ odometry2_t to_wire(const model::Odometry& odometry);
 /// A keyframe.
 keyframe2_t to_wire(const model::Keyframe& keyframe);
 /// What a mapper did with one keyframe; `seq` is the keyframe's.
-slam_update2_t to_wire(const model::MapUpdate& update);
+slam_update3_t to_wire(const model::MapUpdate& update);
+/// How far the sensor saw.
+view_ranges_t to_wire(const model::ViewRanges& ranges);
 /// A mapper's pose.
 slam_pose2_t to_wire(const model::SlamPose& pose);
 /// A whole map.
@@ -202,14 +211,19 @@ Result<T> decode_message(std::span<const std::uint8_t> bytes) {
   }
 }
 
-/// Of a value whose wire type had another version, which older logs have.
-template <class T, class Old>
+/// Of a value whose wire type had other versions, which older logs have; the newest first.
+template <class T, class... Old>
 Result<T> decode_either(std::span<const std::uint8_t> bytes) {
   const auto wire = decode_bytes<typename WireOf<T>::type>(bytes);
   if (wire) return from_wire(*wire);
-  const Result<Old> old = decode_bytes<Old>(bytes);
-  if (old) return from_wire(*old);
-  return wire.refusal();
+  Result<T> result = wire.refusal();
+  const auto is_of = [&]<class Version>(const Version* /*type*/) {
+    const Result<Version> old = decode_bytes<Version>(bytes);
+    if (old) result = from_wire(*old);
+    return static_cast<bool>(old);
+  };
+  (void)(is_of(static_cast<const Old*>(nullptr)) || ...);
+  return result;
 }
 
 /// Odometry: older logs have odometry_t.
@@ -224,11 +238,11 @@ inline Result<model::Keyframe> decode_message<model::Keyframe>(
     std::span<const std::uint8_t> bytes) {
   return decode_either<model::Keyframe, keyframe_t>(bytes);
 }
-/// Updates: older logs have slam_update_t.
+/// Updates: older logs have slam_update2_t or slam_update_t.
 template <>
 inline Result<model::MapUpdate> decode_message<model::MapUpdate>(
     std::span<const std::uint8_t> bytes) {
-  return decode_either<model::MapUpdate, slam_update_t>(bytes);
+  return decode_either<model::MapUpdate, slam_update2_t, slam_update_t>(bytes);
 }
 /// Poses: older logs have slam_pose_t.
 template <>

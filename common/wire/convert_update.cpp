@@ -38,11 +38,11 @@ void copy_diagnostics(const Wire& wire, model::MapUpdate& update, Checks& checks
   update.reason = wire.reason;
 }
 
-/// What both versions have.
+/// What all versions have.
 template <class Wire>
 model::MapUpdate map_update(const Wire& wire, Checks& checks) {
   checks.range("keyframe_seq", static_cast<double>(wire.keyframe_seq), 0.0, 9.3e18);
-  checks.range("status", wire.status, slam_update2_t::FIRST_MAP, slam_update2_t::REJECTED);
+  checks.range("status", wire.status, slam_update3_t::FIRST_MAP, slam_update3_t::REJECTED);
   checks.pose("map_T_vehicle", wire.map_T_vehicle);
   checks.pose("map_T_latest_vehicle", wire.map_T_latest_vehicle);
   model::MapUpdate update;
@@ -60,7 +60,8 @@ model::MapUpdate map_update(const Wire& wire, Checks& checks) {
   return update;
 }
 
-std::vector<model::ScanReference> scans(const slam_update2_t& wire, Checks& checks) {
+template <class Wire>
+std::vector<model::ScanReference> scans(const Wire& wire, Checks& checks) {
   std::vector<model::ScanReference> result;
   result.reserve(wire.scans.size());
   for (std::size_t i = 0; i < wire.scans.size(); ++i) {
@@ -73,7 +74,8 @@ std::vector<model::ScanReference> scans(const slam_update2_t& wire, Checks& chec
 }
 
 /// Each detection is one landmark or none.
-std::vector<model::IdentifiedDetection> identified(const slam_update2_t& wire, Checks& checks) {
+template <class Wire>
+std::vector<model::IdentifiedDetection> identified(const Wire& wire, Checks& checks) {
   std::vector<model::IdentifiedDetection> result;
   result.reserve(wire.detections.size());
   for (std::size_t i = 0; i < wire.detections.size(); ++i) {
@@ -93,7 +95,7 @@ std::vector<model::IdentifiedDetection> identified(const slam_update2_t& wire, C
   return result;
 }
 
-void copy_seen(const model::MapUpdate& update, slam_update2_t& wire) {
+void copy_seen(const model::MapUpdate& update, slam_update3_t& wire) {
   wire.num_scans = static_cast<std::int32_t>(update.scans.size());
   for (const model::ScanReference& one : update.scans) {
     scan_reference_t& out = wire.scans.emplace_back();
@@ -109,12 +111,36 @@ void copy_seen(const model::MapUpdate& update, slam_update2_t& wire) {
     out.landmark_id = static_cast<std::int64_t>(one.landmark_id);
   }
   wire.num_expected = static_cast<std::int32_t>(update.expected.size());
-  wire.expected.assign(update.expected.begin(), update.expected.end());
+  for (const model::ExpectedLandmark& one : update.expected) {
+    expected_landmark_t& out = wire.expected.emplace_back();
+    out.landmark_id = static_cast<std::int64_t>(one.id);
+    out.sight = static_cast<std::int8_t>(one.sight);
+  }
 }
 
-}  // namespace
+std::vector<model::ExpectedLandmark> expected(const slam_update3_t& wire, Checks& checks) {
+  std::vector<model::ExpectedLandmark> result;
+  result.reserve(wire.expected.size());
+  for (std::size_t i = 0; i < wire.expected.size(); ++i) {
+    const expected_landmark_t& one = wire.expected[i];
+    checks.in("expected", i);
+    checks.range("sight", one.sight, expected_landmark_t::UNKNOWN, expected_landmark_t::CLEAR);
+    result.push_back(
+        {landmark_id(one.landmark_id, checks), static_cast<model::LineOfSight>(one.sight)});
+    checks.consistent(i == 0 || result[i - 1].id < result[i].id, "in order of landmark_id");
+  }
+  return result;
+}
 
-Result<model::MapUpdate> from_wire(const slam_update2_t& wire) {
+std::vector<model::ExpectedLandmark> expected(const slam_update2_t& wire, Checks& checks) {
+  std::vector<model::ExpectedLandmark> result;
+  for (const model::LandmarkId id : ids("expected", wire.expected, checks)) result.push_back({id});
+  return result;
+}
+
+/// Both versions that say what was seen.
+template <class Wire>
+Result<model::MapUpdate> update_with_detections(const Wire& wire) {
   Checks checks;
   checks.range("map_id", wire.map_id, 1, kMostMaps);
   model::MapUpdate update = map_update(wire, checks);
@@ -123,9 +149,19 @@ Result<model::MapUpdate> from_wire(const slam_update2_t& wire) {
   update.is_lost = wire.lost != 0;
   update.scans = scans(wire, checks);
   update.detections = identified(wire, checks);
-  update.expected = ids("expected", wire.expected, checks);
+  update.expected = expected(wire, checks);
   if (checks.refusal()) return *checks.refusal();
   return update;
+}
+
+}  // namespace
+
+Result<model::MapUpdate> from_wire(const slam_update3_t& wire) {
+  return update_with_detections(wire);
+}
+
+Result<model::MapUpdate> from_wire(const slam_update2_t& wire) {
+  return update_with_detections(wire);
 }
 
 Result<model::MapUpdate> from_wire(const slam_update_t& wire) {
@@ -135,8 +171,8 @@ Result<model::MapUpdate> from_wire(const slam_update_t& wire) {
   return update;
 }
 
-slam_update2_t to_wire(const model::MapUpdate& update) {
-  slam_update2_t wire{};
+slam_update3_t to_wire(const model::MapUpdate& update) {
+  slam_update3_t wire{};
   wire.utime = update.utime;
   wire.seq = static_cast<std::int64_t>(update.keyframe_sequence);
   wire.keyframe_seq = wire.seq;

@@ -96,6 +96,8 @@ std::string_view to_string(Reason reason) {
       return "file_in_use";
     case Reason::kFileUnusable:
       return "file_unusable";
+    case Reason::kClientRefused:
+      return "client_refused";
   }
 
   return "unknown";

@@ -55,6 +55,7 @@ enum class Reason : std::uint8_t {
   kFileForeign,     ///< The file is something else.
   kFileInUse,       ///< Another process has the file open.
   kFileUnusable,    ///< The file cannot be opened or read, or is of another version.
+  kClientRefused,   ///< More web clients, or commands of theirs, than are let in.
 };
 
 /// Name of the reason, lower_snake.

@@ -176,10 +176,30 @@ std::vector<RawMessage> raw_messages(const sim::SensorReading& reading,
       reading);
 }
 
+namespace {
+
+/// The extractor gives to the service that puts false detections among its own.
+void put_in(const FalseDetectionOptions& options, const sim::SensorDrive& drive,
+            const std::shared_ptr<FalseDetectionCounts>& counts,
+            std::vector<bus::Service>& services) {
+  constexpr const char* kFound = "LANDMARKS_FOUND";
+  const auto extractor = std::ranges::find(services, "landmark_extractor", &bus::Service::name);
+  if (extractor == services.end()) return;
+  *extractor = landmark_extractor::landmark_extractor_service({.landmarks = kFound});
+  const auto truth = [&drive](model::Utime utime) { return drive.state_at(utime).world_T_level(); };
+  services.insert(std::next(extractor),
+                  false_detection_service(options, truth, counts, kFound, "LANDMARKS"));
+}
+
+}  // namespace
+
 ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options) {
   ChainRun run;
   std::vector<bus::Service> services = services_of(options.config_dir);
   std::erase_if(services, [&](const auto& one) { return options.without.contains(one.name); });
+  const auto false_counts = std::make_shared<FalseDetectionCounts>();
+  if (options.false_detections.share > 0.0)
+    put_in(options.false_detections, drive, false_counts, services);
   SensorChain chain(services, options.config_dir, options.toml_instead);
   watch_chain(chain, run);
   if (options.keep_measurements) watch_measurements(chain, run);
@@ -215,6 +235,7 @@ ChainRun drive_chain(sim::SensorDrive& drive, const ChainOptions& options) {
   }
 
   finish_chain(chain, run);
+  run.false_detections = *false_counts;
   return run;
 }
 

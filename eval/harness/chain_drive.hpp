@@ -13,6 +13,7 @@
 #include "common/model/existence.hpp"
 #include "common/model/map.hpp"
 #include "common/model/slam_output.hpp"
+#include "eval/harness/false_detections.hpp"
 #include "eval/harness/sensor_chain.hpp"
 #include "eval/metrics/victoria_park_score.hpp"
 #include "sim/sensor_drive.hpp"
@@ -46,6 +47,7 @@ struct ChainRun {
   std::vector<model::ExistenceState> existence_states;
   double missing_share = 0.0;  ///< Of the last EXISTENCE.
   bool is_mapping_needed = false;
+  FalseDetectionCounts false_detections;  ///< Where the options put some in.
   std::map<std::string, ServiceTime> times;
   std::map<std::string, health_t> health;
 };
@@ -64,10 +66,11 @@ struct ChainPause {
 struct ChainOptions {
   std::filesystem::path config_dir;  ///< Its launch.toml says which services; empty: all.
   std::map<std::string, std::string> toml_instead;
-  std::set<std::string> without;   ///< Services that launch.toml has, and this drive not.
-  double end_s = 1e9;              ///< Of the drive.
-  Meddle meddle;                   ///< Faults; empty = none.
-  std::vector<ChainPause> pauses;  ///< Of processes.
+  std::set<std::string> without;           ///< Services that launch.toml has, and this drive not.
+  double end_s = 1e9;                      ///< Of the drive.
+  Meddle meddle;                           ///< Faults; empty = none.
+  std::vector<ChainPause> pauses;          ///< Of processes.
+  FalseDetectionOptions false_detections;  ///< Put among the extractor's.
   std::function<void(double done)> progress;  ///< Called at every sweep; `done` is in [0, 1].
   /// Every sweep before it goes to the chain, with the truth in it.
   std::function<void(const sim::SimulatedSweep&)> on_sweep;

@@ -24,7 +24,7 @@ def draw_curves(file, curves):
     for index, name in enumerate(name for name in SHOWN if name in curves):
         colour = plt.get_cmap("tab10")(index)
         wrongly, found = zip(*curves[name]["roc"])
-        roc.plot(wrongly, found, "-", color=colour, linewidth=1.2, label=name)
+        roc.plot(wrongly, found, "-", drawstyle="steps-post", color=colour, linewidth=1.2, label=name)
         filled = [one for one in curves[name]["reliability"] if one["count"] >= 20]
         bins.plot([one["stated"] for one in filled], [one["frequency"] for one in filled], "o-", color=colour,
                   markersize=3, linewidth=1)

@@ -20,7 +20,7 @@ def shares(rows, keeping, part, whole):
 
 
 def main(file):
-    rows = json.loads(pathlib.Path(file).read_text())["rows"]
+    rows = [row for row in json.loads(pathlib.Path(file).read_text())["rows"] if row.get("part", "changes") == "changes"]
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.6), sharey=True)
     for keeping, colour in (("existence tracker", "tab:green"), ("nothing removed", "tab:red")):
         for axis, part, whole in ((axes[0], "right", "in_use"), (axes[1], "found", "standing")):

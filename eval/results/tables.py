@@ -12,6 +12,7 @@ from pathlib import Path
 
 sys.dont_write_bytecode = True
 import render  # noqa: E402
+import render_existence  # noqa: E402
 from experiments import EXPERIMENTS, printed  # noqa: E402
 
 HERE = Path(__file__).resolve().parent
@@ -60,9 +61,9 @@ SECTIONS = (
     ("loops-strangers", "Queries that have no match", None, render.loop_queries),
     ("loop-detectors", "Loop detectors and verifiers", "named in the thesis on submaps, §2.4, without figures",
      render.loop_detectors),
-    ("existence", "What is still there", None, render.existence),
-    ("existence-drives", "A forest that changes, from raw LIDAR", None, render.existence_drives),
-    ("existence-camera", "A camera that comes back to an old map", None, render.existence_camera),
+    ("existence", "What is still there", None, render_existence.existence),
+    ("existence-drives", "A forest that changes, from raw LIDAR", None, render_existence.existence_drives),
+    ("existence-camera", "A camera that comes back to an old map", None, render_existence.existence_camera),
     ("partition", "The map cut after a distance: town", f"{PARTITION}, Table 5.1", render.partition_all),
     ("partition-country", "The map cut after a distance: town to country", f"{PARTITION}, Table 5.2", render.partition_all),
     ("partition-loop", "The map cut after a distance, closed", f"{PARTITION}, Table 5.3", render.partition_all),

@@ -47,8 +47,14 @@ void describe(UseParameters& p, bus::ParameterTable& table) {
 void describe(LookParameters& p, bus::ParameterTable& table) {
   table.add("looks.pass_m", p.pass_m, {1.0, 1e6}, "m",
             "Path after which another pass begins: what hid a landmark then may be gone.");
+  table.add(
+      "looks.same_pass_m", p.same_pass_m, {0.0, 1e6}, "m",
+      "What was looked at within so much path is still in the same pass, up to pass_m of it.");
   table.add("looks.min_inliers", p.min_inliers, {0, 10000}, "",
             "Landmarks by which a keyframe must be placed, for what it did not see to count.");
+  table.add(
+      "looks.use_ranges", p.use_ranges,
+      "Whether what the sensor measured along the ray counts: hidden things say nothing then.");
 }
 
 void describe(NeedParameters& p, bus::ParameterTable& table) {

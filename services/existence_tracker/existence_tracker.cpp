@@ -2,16 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string_view>
 #include <utility>
-
-#include "common/model/archive.hpp"
 
 namespace understory::existence_tracker {
 namespace {
 
-constexpr state::Format kFormat{"existence_tracker", 1};
 constexpr std::size_t kStatesPerMessage = 200;
 /// As often is what was learned applied where a drive begins.
 constexpr int kRoundsOfLearning = 10;
@@ -20,13 +15,26 @@ constexpr double kLongestStepM = 50.0;
 /// Looks from nearer or farther are none: the map is wrong there [m].
 constexpr float kNearestM = 0.05F;
 constexpr float kFarthestM = 1e4F;
+/// Share of what is new that must have been real for it to be used at once.
+constexpr double kMostAreReal = 0.5;
 
 std::optional<existence::Look> look_from(const Eigen::Vector2d& vehicle_m,
-                                         const Eigen::Vector2d& landmark_m) {
+                                         const Eigen::Vector2d& landmark_m, existence::Ray ray) {
   const Eigen::Vector2f from_m = (vehicle_m - landmark_m).cast<float>();
   const float distance_m = from_m.norm();
   if (!(distance_m > kNearestM && distance_m < kFarthestM)) return std::nullopt;
-  return existence::Look{Eigen::Vector3f(from_m.x(), from_m.y(), 0.0F), existence::Ray::kUnknown};
+  return existence::Look{Eigen::Vector3f(from_m.x(), from_m.y(), 0.0F), ray};
+}
+
+existence::Ray ray_of(model::LineOfSight sight) {
+  switch (sight) {
+    case model::LineOfSight::kBlocked:
+      return existence::Ray::kBlocked;
+    case model::LineOfSight::kClear:
+      return existence::Ray::kPassed;
+    default:
+      return existence::Ray::kUnknown;
+  }
 }
 
 bool has_place(const model::MapUpdate& update) {
@@ -41,7 +49,8 @@ ExistenceTracker::ExistenceTracker(const TrackerParameters& parameters)
 
 void ExistenceTracker::begin_with(std::span<const model::ExistenceState> states) {
   existence::ExistenceModel model = model_;
-  if (!states.empty()) decode(states.back().model, model);
+  BirthCounts births_so_far;
+  if (!states.empty()) decode(states.back().model, model, births_so_far);
   std::map<model::LandmarkId, TrackedPoint> points;
   std::uint32_t unused = 0;
   for (const model::ExistenceState& state : states) {
@@ -61,6 +70,7 @@ void ExistenceTracker::begin_with(std::span<const model::ExistenceState> states)
     ++unused;
   }
   model_ = model;
+  births_so_far_ = births_so_far;
   points_ = std::move(points);
   unused_ = unused;
   begins_drive_ = true;
@@ -71,6 +81,8 @@ void ExistenceTracker::begin_with(std::span<const model::ExistenceState> states)
 void ExistenceTracker::begin_drive(model::Utime utime) {
   model_.begin_pass();
   for (auto& [id, tracked] : points_) {
+    tracked.looked_m = tracked.pass_began_m = -1e9;
+    tracked.is_first_pass = false;
     pass_time(utime, tracked);
     tracked.point.enter_pass(model_);
   }
@@ -114,12 +126,15 @@ std::optional<model::Existence> ExistenceTracker::add(const model::MapUpdate& up
   std::ranges::sort(added);
   for (const model::LandmarkId id : added) births_.push_back({id, vehicle_m, update.utime});
   for (const model::Association& pair : update.associations)
-    if (!std::ranges::binary_search(added, pair.landmark_id)) look(pair.landmark_id, true, update);
+    if (!std::ranges::binary_search(added, pair.landmark_id))
+      look(pair.landmark_id, true, existence::Ray::kUnknown, update);
 
   const bool knows_where =
       update.inliers >= static_cast<std::uint32_t>(parameters_.looks.min_inliers);
   if (knows_where && !update.is_lost)
-    for (const model::LandmarkId id : update.expected) look(id, false, update);
+    for (const model::ExpectedLandmark& one : update.expected)
+      look(one.id, false,
+           parameters_.looks.use_ranges ? ray_of(one.sight) : existence::Ray::kUnknown, update);
   return tell(update);
 }
 
@@ -134,39 +149,78 @@ void ExistenceTracker::drive_to(const model::MapUpdate& update) {
   pass_began_m_ = along_m_;
 }
 
-void ExistenceTracker::look(model::LandmarkId id, bool is_hit, const model::MapUpdate& update) {
+void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ray,
+                            const model::MapUpdate& update) {
   const auto place_m = places_.at(id);
   if (!place_m) {
     ++counters_.without_place;
     wants_map_ = true;
     return;
   }
-  const auto look = look_from(update.map_T_vehicle.translation(), *place_m);
+  auto look = look_from(update.map_T_vehicle.translation(), *place_m, ray);
   if (!look) return;
 
   TrackedPoint& tracked = known(id, update.utime);
   const bool is_old = tracked.told_probability >= 0.0 && tracked.is_in_use;
   pass_time(update.utime, tracked);
+  look->goes_on = goes_on(tracked);
+  if (!look->goes_on) tracked.is_first_pass = false;
   if (is_hit) {
+    confirm(tracked);
     tracked.point.hit(model_, *look);
     ++counters_.hits;
   } else {
     tracked.point.miss(model_, *look);
     ++counters_.misses;
+    counters_.blocked += ray == existence::Ray::kBlocked ? 1 : 0;
+    counters_.clear += ray == existence::Ray::kPassed ? 1 : 0;
   }
   tracked.state_is_due = true;
-  if (is_hit || is_old) need_.look(id, is_hit, is_old, along_m_);
+  const bool could_see = ray != existence::Ray::kBlocked;
+  if (is_hit || (is_old && could_see)) need_.look(id, is_hit, is_old, along_m_);
+  if (!is_hit) count_false(tracked);
   decide(tracked);
   touched_.push_back(id);
 }
 
+/// Whether the landmark's pass goes on: one in view where the vehicle's pass ends is not looked at
+/// in two of them.
+bool ExistenceTracker::goes_on(TrackedPoint& tracked) const {
+  const LookParameters& looks = parameters_.looks;
+  const bool result = along_m_ - tracked.looked_m < looks.same_pass_m &&
+                      along_m_ - tracked.pass_began_m < looks.pass_m;
+  if (!result) tracked.pass_began_m = along_m_;
+  tracked.looked_m = along_m_;
+  return result;
+}
+
 /// The landmark's point; of a given map it is new here.
 TrackedPoint& ExistenceTracker::known(model::LandmarkId id, model::Utime utime) {
-  const auto [found, is_new] =
-      points_.try_emplace(id, TrackedPoint{Point::known(model_), utime, true, -1.0, true, true});
+  const auto [found, is_new] = points_.try_emplace(id, TrackedPoint{Point::known(model_), utime});
   // It was in the map before this drive.
   if (is_new) found->second.told_probability = found->second.point.probability();
   return found->second;
+}
+
+/// Seen by another pass than the one that found it.
+void ExistenceTracker::confirm(TrackedPoint& tracked) {
+  if (tracked.is_confirmed || tracked.is_first_pass) return;
+  tracked.is_confirmed = true;
+  births_so_far_.confirmed += 1.0;
+}
+
+/// Looked for by another pass, and improbable. In its first pass nothing counts: nothing can be
+/// confirmed there either.
+void ExistenceTracker::count_false(TrackedPoint& tracked) {
+  if (tracked.is_confirmed || tracked.is_first_pass || tracked.is_counted) return;
+  if (tracked.point.probability() >= parameters_.use.drop_below) return;
+  tracked.is_counted = true;
+  births_so_far_.false_ones += 1.0;
+}
+
+/// While most of what is new turns out to be false, it is not used before another pass saw it.
+bool ExistenceTracker::may_be_used(const TrackedPoint& tracked) const {
+  return tracked.is_confirmed || births_so_far_.share(parameters_.model.birth) >= kMostAreReal;
 }
 
 /// Landmarks whose first sighting is some keyframes old get their probability now.
@@ -174,10 +228,15 @@ void ExistenceTracker::give_birth() {
   std::erase_if(births_, [&](const Birth& birth) {
     const auto place_m = places_.at(birth.id);
     if (!place_m) return false;
-    const auto look = look_from(birth.vehicle_m, *place_m);
-    if (look)
-      points_.try_emplace(
-          birth.id, TrackedPoint{Point::born(model_, *look), birth.utime, true, -1.0, true, true});
+    const auto look = look_from(birth.vehicle_m, *place_m, existence::Ray::kUnknown);
+    if (!look) return true;
+    TrackedPoint born{Point::born(model_, *look), birth.utime};
+    born.is_first_pass = true;
+    born.is_confirmed = false;
+    born.looked_m = born.pass_began_m = along_m_;
+    const auto [found, is_new] = points_.try_emplace(birth.id, born);
+    if (is_new) decide(found->second);
+    touched_.push_back(birth.id);
     return true;
   });
 }
@@ -215,11 +274,13 @@ void ExistenceTracker::forget(const model::MapUpdate& update) {
 
 void ExistenceTracker::decide(TrackedPoint& tracked) {
   const double probability = tracked.point.probability();
-  if (tracked.is_in_use && probability < parameters_.use.drop_below) {
+  const bool is_gone = probability < parameters_.use.drop_below;
+  if (tracked.is_in_use && (is_gone || !may_be_used(tracked))) {
     tracked.is_in_use = false;
     ++unused_;
     ++counters_.dropped;
-  } else if (!tracked.is_in_use && probability > parameters_.use.readmit_above) {
+  } else if (!tracked.is_in_use && probability > parameters_.use.readmit_above &&
+             may_be_used(tracked)) {
     tracked.is_in_use = true;
     --unused_;
     ++counters_.readmitted;
@@ -271,11 +332,11 @@ std::vector<model::ExistenceState> ExistenceTracker::take_states() {
   for (auto& [id, tracked] : points_) {
     if (!std::exchange(tracked.state_is_due, false)) continue;
     if (messages.empty() || messages.back().landmarks.size() == kStatesPerMessage) {
-      messages.push_back({utime_, 0, map_id_, {}, encode(model_), {}});
+      messages.push_back({utime_, 0, map_id_, {}, encode(model_, births_so_far_), {}});
       messages.back().landmarks.reserve(kStatesPerMessage);
     }
     messages.back().landmarks.push_back({id, tracked.point.probability(), tracked.is_in_use});
-    messages.back().states += encode(tracked.point, tracked.looked_utime);
+    messages.back().states += encode(tracked);
   }
   return messages;
 }
@@ -284,54 +345,6 @@ std::optional<model::LandmarkExistence> ExistenceTracker::of(model::LandmarkId i
   const auto found = points_.find(id);
   if (found == points_.end()) return std::nullopt;
   return model::LandmarkExistence{id, found->second.point.probability(), found->second.is_in_use};
-}
-
-std::string ExistenceTracker::save() const {
-  std::string learned = encode(model_);
-  std::vector<model::LandmarkId> ids;
-  std::vector<std::uint8_t> flags;
-  std::vector<double> told;
-  std::string points;
-  for (const auto& [id, tracked] : points_) {
-    ids.push_back(id);
-    flags.push_back(static_cast<std::uint8_t>((tracked.is_in_use ? 1 : 0) |
-                                              (tracked.was_told_in_use ? 2 : 0) |
-                                              (tracked.state_is_due ? 4 : 0)));
-    told.push_back(tracked.told_probability);
-    points += encode(tracked.point, tracked.looked_utime);
-  }
-  return state::save(kFormat, learned, ids, flags, told, points, places_, need_, births_, counters_,
-                     last_m_, utime_, map_id_, along_m_, pass_began_m_, repeated_, wants_map_,
-                     begins_drive_);
-}
-
-void ExistenceTracker::load(const std::string& state) {
-  ExistenceTracker loaded(parameters_);
-  std::string learned;
-  std::vector<model::LandmarkId> ids;
-  std::vector<std::uint8_t> flags;
-  std::vector<double> told;
-  std::string points;
-  state::load(state, kFormat, learned, ids, flags, told, points, loaded.places_, loaded.need_,
-              loaded.births_, loaded.counters_, loaded.last_m_, loaded.utime_, loaded.map_id_,
-              loaded.along_m_, loaded.pass_began_m_, loaded.repeated_, loaded.wants_map_,
-              loaded.begins_drive_);
-  if (flags.size() != ids.size() || told.size() != ids.size() ||
-      points.size() != ids.size() * point_bytes())
-    throw std::invalid_argument("existence tracker state: its points do not fit their numbers");
-
-  decode(learned, loaded.model_);
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    const std::string_view bytes =
-        std::string_view(points).substr(i * point_bytes(), point_bytes());
-    TrackedPoint tracked = decode(loaded.model_, bytes, (flags[i] & 1U) != 0);
-    tracked.was_told_in_use = (flags[i] & 2U) != 0;
-    tracked.state_is_due = (flags[i] & 4U) != 0;
-    tracked.told_probability = told[i];
-    loaded.unused_ += tracked.is_in_use ? 0 : 1;
-    loaded.points_.emplace(ids[i], tracked);
-  }
-  *this = std::move(loaded);
 }
 
 }  // namespace understory::existence_tracker

@@ -22,6 +22,8 @@ namespace understory::existence_tracker {
 struct TrackerCounters {
   std::uint64_t hits = 0;
   std::uint64_t misses = 0;
+  std::uint64_t blocked = 0;        ///< Of the misses: hidden behind something.
+  std::uint64_t clear = 0;          ///< Of the misses: the beams went on behind the place.
   std::uint64_t without_place = 0;  ///< Looks at landmarks of which no message said where they are.
   std::uint64_t dropped = 0;        ///< Landmarks taken out of use ...
   std::uint64_t readmitted = 0;     ///< ... and into use again.
@@ -29,14 +31,16 @@ struct TrackerCounters {
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
-    a(s.hits, s.misses, s.without_place, s.dropped, s.readmitted);
+    a(s.hits, s.misses, s.blocked, s.clear, s.without_place, s.dropped, s.readmitted);
   }
 };
 
 /// Follows the mapper: each keyframe says which landmarks it saw, and which it should have seen and
-/// did not. For every landmark it keeps the probability that it exists, and the shell from which it
-/// can be seen (common/existence; thesis 003). A landmark that is improbable is not to be used; it
-/// is kept and looked for, and in use again when it is seen. It never associates by itself.
+/// did not, with what the sensor measured along the ray. What was hidden says nothing of the
+/// landmark; what was in clear view and not seen says more than a mere miss. For every landmark it
+/// keeps the probability that it exists, and the shell from which it can be seen (common/existence;
+/// thesis 003). A landmark that is improbable is not to be used; it is kept and looked for, and in
+/// use again when it is seen. It never associates by itself.
 ///
 /// Memory: some 250 bytes per landmark. Time: what a keyframe looks at.
 class ExistenceTracker {
@@ -84,10 +88,14 @@ class ExistenceTracker {
   void begin_drive(model::Utime utime);
   void pass_time(model::Utime utime, TrackedPoint& tracked) const;
   void drive_to(const model::MapUpdate& update);
-  void look(model::LandmarkId id, bool is_hit, const model::MapUpdate& update);
+  void look(model::LandmarkId id, bool is_hit, existence::Ray ray, const model::MapUpdate& update);
+  bool goes_on(TrackedPoint& tracked) const;
   TrackedPoint& known(model::LandmarkId id, model::Utime utime);
   void give_birth();
   void forget(const model::MapUpdate& update);
+  void confirm(TrackedPoint& tracked);
+  void count_false(TrackedPoint& tracked);
+  bool may_be_used(const TrackedPoint& tracked) const;
   void decide(TrackedPoint& tracked);
   model::Existence tell(const model::MapUpdate& update);
   std::set<model::LandmarkId> ids_to_tell();
@@ -98,6 +106,7 @@ class ExistenceTracker {
   MappingNeed need_;
   std::map<model::LandmarkId, TrackedPoint> points_;
   std::vector<Birth> births_;
+  BirthCounts births_so_far_;
   std::vector<model::LandmarkId> touched_;  ///< Since the last message.
   TrackerCounters counters_;
   std::optional<Eigen::Vector2d> last_m_;  ///< Of the vehicle, frame map.

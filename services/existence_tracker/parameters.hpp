@@ -25,8 +25,10 @@ struct UseParameters {
 
 /// What is one pass, and which looks count.
 struct LookParameters {
-  double pass_m = 500.0;  ///< Path.
+  double pass_m = 500.0;      ///< Path.
+  double same_pass_m = 50.0;  ///< Path.
   int min_inliers = 3;
+  bool use_ranges = true;
 };
 
 /// When the map does not tell any more where the vehicle is.

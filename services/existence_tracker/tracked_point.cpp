@@ -29,14 +29,16 @@ void archive_model(Archive& a, S& saved) {
 std::size_t point_bytes() {
   constexpr Saved kSaved{};
   return sizeof(kSaved.version) + sizeof(kSaved.shell_kind) + sizeof(kSaved.odds) +
-         sizeof(kSaved.pass) + sizeof(kSaved.numbers) + sizeof(kSaved.shell) + sizeof(model::Utime);
+         sizeof(kSaved.pass) + sizeof(kSaved.numbers) + sizeof(kSaved.shell) +
+         sizeof(model::Utime) + sizeof(std::uint8_t);
 }
 
-std::string encode(const Point& point, model::Utime looked_utime) {
+std::string encode(const TrackedPoint& tracked) {
   state::Writer write;
-  const Saved saved = point.save();
+  const Saved saved = tracked.point.save();
   archive_point(write, saved);
-  write(looked_utime);
+  write(tracked.looked_utime);
+  write(static_cast<std::uint8_t>(tracked.is_confirmed ? 1 : 0));
   return write.take();
 }
 
@@ -47,23 +49,42 @@ TrackedPoint decode(const existence::ExistenceModel& model, std::string_view byt
   archive_point(read, saved);
   model::Utime looked_utime = 0;
   read(looked_utime);
+  // States of older maps end here: what they know was confirmed or left use.
+  std::uint8_t is_confirmed = 1;
+  if (!read.is_at_end()) read(is_confirmed);
   end(read);
-  return {Point::load(model, saved), looked_utime, is_in_use, -1.0, true, false};
+  return {.point = Point::load(model, saved),
+          .looked_utime = looked_utime,
+          .is_in_use = is_in_use,
+          .state_is_due = false,
+          .is_confirmed = is_confirmed != 0};
 }
 
-std::string encode(const existence::ExistenceModel& model) {
+std::string encode(const existence::ExistenceModel& model, const BirthCounts& births) {
   state::Writer write;
   const existence::SavedModel saved = model.save();
   archive_model(write, saved);
+  write(births.confirmed);
+  write(births.false_ones);
   return write.take();
 }
 
-void decode(std::string_view bytes, existence::ExistenceModel& model) {
+void decode(std::string_view bytes, existence::ExistenceModel& model, BirthCounts& births) {
   state::Reader read(bytes);
   existence::SavedModel saved;
   archive_model(read, saved);
+  // Likewise.
+  BirthCounts counts;
+  if (!read.is_at_end()) {
+    read(counts.confirmed);
+    read(counts.false_ones);
+  }
   end(read);
+  if (!(counts.confirmed >= 0.0 && counts.confirmed < 1e15 && counts.false_ones >= 0.0 &&
+        counts.false_ones < 1e15))
+    throw std::invalid_argument("existence: numbers of births that cannot be");
   model.load(saved);
+  births = counts;
 }
 
 }  // namespace understory::existence_tracker

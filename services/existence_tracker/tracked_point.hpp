@@ -22,18 +22,35 @@ struct TrackedPoint {
   double told_probability = -1.0;  ///< As it was last told; -1: never.
   bool was_told_in_use = true;     ///< Likewise.
   bool state_is_due = true;        ///< It changed since its state was told.
+  bool is_first_pass = false;      ///< Nobody but the pass that found it has looked.
+  bool is_confirmed = true;        ///< Another pass than the one that found it saw it.
+  double looked_m = -1e9;          ///< Path of the drive at the last look.
+  double pass_began_m = -1e9;      ///< Likewise at the first look of its pass.
+  bool is_counted = false;         ///< Among the births that were false.
+};
+
+/// How many of the landmarks that were new turned out to be there when another pass came.
+struct BirthCounts {
+  double confirmed = 0.0;
+  double false_ones = 0.0;
+
+  /// Share of those that are confirmed; before any came, that of `expected`.
+  double share(double expected) const {
+    constexpr double kWeight = 10.0;
+    return (confirmed + kWeight * expected) / (confirmed + false_ones + kWeight);
+  }
 };
 
 /// Bytes of a point's state: the same for each.
 std::size_t point_bytes();
 /// State of a point as plain numbers, little endian: of the same point the same bytes.
-std::string encode(const Point& point, model::Utime looked_utime);
-/// The point of a state. Throws std::invalid_argument where the bytes are none.
+std::string encode(const TrackedPoint& tracked);
+/// The point of a state, of a later drive. Throws std::invalid_argument where the bytes are none.
 TrackedPoint decode(const existence::ExistenceModel& model, std::string_view bytes, bool is_in_use);
 
 /// What was learned of detector and world, likewise.
-std::string encode(const existence::ExistenceModel& model);
-/// Throws std::invalid_argument; the model is then as it was.
-void decode(std::string_view bytes, existence::ExistenceModel& model);
+std::string encode(const existence::ExistenceModel& model, const BirthCounts& births);
+/// Throws std::invalid_argument; both are then as they were.
+void decode(std::string_view bytes, existence::ExistenceModel& model, BirthCounts& births);
 
 }  // namespace understory::existence_tracker

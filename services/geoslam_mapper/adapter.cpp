@@ -9,6 +9,7 @@
 #include "services/geoslam_mapper/given_map.hpp"
 #include "services/geoslam_mapper/hand_over.hpp"
 #include "services/geoslam_mapper/health_watch.hpp"
+#include "services/geoslam_mapper/lines_of_sight.hpp"
 #include "services/geoslam_mapper/map_budget.hpp"
 #include "services/geoslam_mapper/map_difference.hpp"
 #include "services/geoslam_mapper/pose_publishing.hpp"
@@ -47,7 +48,7 @@ std::size_t submap_bytes(std::size_t landmarks) {
 /// Most landmarks of one stretch of the path.
 constexpr std::size_t kSubmapLandmarks = 2000;
 
-constexpr state::Format kFormat{"geoslam_mapper", 7};
+constexpr state::Format kFormat{"geoslam_mapper", 8};
 
 /// What a holder of every MAP_DELTA has.
 struct KnownMap {
@@ -72,6 +73,7 @@ struct Memory {
   MapBudget budget;
   HandOver hand_over;
   CorrectionWatch corrections;
+  LinesOfSight sights;
   bool map_is_published = true;
   bool map_is_due = false;      ///< It started or jumped since it was last published.
   bool is_provisional = false;  ///< The map, by its last keyframe.
@@ -82,7 +84,7 @@ struct Memory {
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
-    a(s.known, s.odometry, s.jumps, s.health, s.budget, s.hand_over, s.corrections,
+    a(s.known, s.odometry, s.jumps, s.health, s.budget, s.hand_over, s.corrections, s.sights,
       s.map_is_published, s.map_is_due, s.is_provisional, s.keyframes, s.newest_pose_utime,
       s.earned_pose_utime);
   }
@@ -151,6 +153,12 @@ class MapperAdapter : public bus::Adapter {
         channels_.landmarks, [this](const model::LandmarkScan& scan) { locate(scan); },
         {.most_bytes = wire::bytes_with<landmarks_t, detection_t>(most_detections),
          .journaled = false});
+
+    // Part of what is told of a keyframe: journaled.
+    node.subscribe<model::ViewRanges>(
+        channels_.view_ranges,
+        [this](const model::ViewRanges& ranges) { memory_.sights.add(ranges); },
+        {.queue_size = 100});
 
     // Small, and each one that is lost breaks the chain of motion: a long queue.
     node.subscribe<model::Odometry>(channels_.odometry,
@@ -288,6 +296,7 @@ class MapperAdapter : public bus::Adapter {
   void add(const model::Keyframe& keyframe) {
     model::MapUpdate update = stage_->add(keyframe);
     identify_detections(keyframe, update);
+    memory_.sights.fill(keyframe, memory_.known.landmarks, update);
     memory_.is_provisional = update.is_provisional;
     memory_.budget.earn(updates_.publish(update));
     memory_.jumps.add(keyframe, update);
@@ -440,13 +449,13 @@ class MapperAdapter : public bus::Adapter {
 
 bus::Service geoslam_mapper_service(const MapperChannels& channels) {
   return {"geoslam_mapper",
-          channels.keyframe + ", " + channels.landmarks + ", " + channels.odometry + ", " +
-              channels.ekf_pose + ", " + channels.ekf_level + ", " + channels.given_map + ", " +
-              channels.submap_stored + ", " + channels.submap_reply + ", " + channels.loop_closure +
-              ", " + channels.existence + " -> " + channels.slam_pose + ", " +
-              channels.slam_update + ", " + channels.map + ", " + channels.map_delta + ", " +
-              channels.submap + ", " + channels.submap_query + ", " + channels.map_correction +
-              ", " + channels.loop_result,
+          channels.keyframe + ", " + channels.landmarks + ", " + channels.view_ranges + ", " +
+              channels.odometry + ", " + channels.ekf_pose + ", " + channels.ekf_level + ", " +
+              channels.given_map + ", " + channels.submap_stored + ", " + channels.submap_reply +
+              ", " + channels.loop_closure + ", " + channels.existence + " -> " +
+              channels.slam_pose + ", " + channels.slam_update + ", " + channels.map + ", " +
+              channels.map_delta + ", " + channels.submap + ", " + channels.submap_query + ", " +
+              channels.map_correction + ", " + channels.loop_result,
           [channels] { return std::make_unique<MapperAdapter>(channels); }};
 }
 

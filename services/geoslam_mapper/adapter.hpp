@@ -12,6 +12,7 @@ struct MapperChannels {
   // In.
   std::string keyframe = "KEYFRAME";
   std::string landmarks = "LANDMARKS";
+  std::string view_ranges = "VIEW_RANGES";
   std::string odometry = "ODOMETRY";
   std::string ekf_pose = "EKF_POSE";
   std::string ekf_level = "EKF_LEVEL";

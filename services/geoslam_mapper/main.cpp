@@ -6,6 +6,7 @@ int main(int argc, char** argv) {
       understory::geoslam_mapper::geoslam_mapper_service({
           .keyframe = "KEYFRAME",              // in: local landmarks of n sweeps
           .landmarks = "LANDMARKS",            // in: every sweep, located at once
+          .view_ranges = "VIEW_RANGES",        // in: how far each sweep saw
           .odometry = "ODOMETRY",              // in: motion, where there is any
           .ekf_pose = "EKF_POSE",              // in: a gate; velocity without wheels
           .ekf_level = "EKF_LEVEL",            // in: error of the sweeps' level, likewise

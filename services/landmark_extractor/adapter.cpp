@@ -61,7 +61,7 @@ class LandmarkExtractorAdapter : public bus::Adapter {
     stage_.emplace(parameters_);
     node.subscribe<model::PlanarScan>(
         channels_.lidar_scan,
-        [this](const model::PlanarScan& scan) { landmarks_.publish(stage_->extract(scan)); },
+        [this](const model::PlanarScan& scan) { publish(stage_->extract(scan)); },
         {.queue_size = 200});
     // Each sweep is judged by itself: there is no state to save but counters, which begin anew. A
     // sweep that arrives in part before a restart is lost, and counted when its next part comes.
@@ -69,6 +69,7 @@ class LandmarkExtractorAdapter : public bus::Adapter {
                                       [this](const model::PointSweep& part) { add_part(part); },
                                       {.queue_size = 1000, .journaled = false});
     landmarks_ = node.advertise<model::LandmarkScan>(channels_.landmarks);
+    view_ranges_ = node.advertise<model::ViewRanges>(channels_.view_ranges);
     node.every(kSummaryPeriod_us, [this](model::Utime /*now*/) { log_summary(); });
   }
 
@@ -84,7 +85,13 @@ class LandmarkExtractorAdapter : public bus::Adapter {
     const SweepCounters before = stage_->sweep_counters();
     const model::LandmarkScan landmarks = stage_->extract(*sweep);
     report_faults(before, stage_->sweep_counters());
-    if (stage_->sweep_counters().malformed == before.malformed) landmarks_.publish(landmarks);
+    if (stage_->sweep_counters().malformed == before.malformed) publish(landmarks);
+  }
+
+  /// Ranges first: what is made of the landmarks may ask for them.
+  void publish(const model::LandmarkScan& landmarks) {
+    if (!stage_->view().free.empty()) view_ranges_.publish(stage_->view());
+    landmarks_.publish(landmarks);
   }
 
   void report_faults(const SweepCounters& before, const SweepCounters& now) {
@@ -122,13 +129,15 @@ class LandmarkExtractorAdapter : public bus::Adapter {
   std::uint64_t incomplete_ = 0;
   SweepCounters reported_;
   bus::Publisher<model::LandmarkScan> landmarks_;
+  bus::Publisher<model::ViewRanges> view_ranges_;
 };
 
 }  // namespace
 
 bus::Service landmark_extractor_service(const LandmarkExtractorChannels& channels) {
   return {"landmark_extractor",
-          channels.lidar_scan + ", " + channels.lidar_sweep + " -> " + channels.landmarks,
+          channels.lidar_scan + ", " + channels.lidar_sweep + " -> " + channels.landmarks + ", " +
+              channels.view_ranges,
           [channels] { return std::make_unique<LandmarkExtractorAdapter>(channels); }};
 }
 

@@ -12,6 +12,7 @@ struct LandmarkExtractorChannels {
   std::string lidar_scan = "LIDAR_SCAN";
   std::string lidar_sweep = "LIDAR_SWEEP";
   std::string landmarks = "LANDMARKS";
+  std::string view_ranges = "VIEW_RANGES";
 };
 
 /// The service, for run_service() and replay.

@@ -9,9 +9,13 @@
 #include "services/landmark_extractor/planar/segments.hpp"
 #include "services/landmark_extractor/planar/trunk_fit.hpp"
 #include "services/landmark_extractor/square.hpp"
+#include "services/landmark_extractor/view/view_profile.hpp"
 
 namespace understory::landmark_extractor {
 namespace {
+
+/// How far one sees is told so far beyond the range of trunks [m].
+constexpr double kBeyond_m = 2.0;
 
 bool well_formed(const model::PlanarScan& scan) {
   const double width = scan.bearing_step_rad *
@@ -117,18 +121,26 @@ model::LandmarkScan LandmarkExtractor::extract(const model::PlanarScan& scan) {
   model::LandmarkScan result;
   result.utime = scan.utime;
   result.sequence = scan.sequence;
+  view_ = {};
   if (!well_formed(scan)) {
     ++counters_.scans;
     ++counters_.scans_malformed;
     return result;
   }
+  view_ = view::planar_view(scan, parameters_.planar.vehicle_T_sensor,
+                            parameters_.planar.max_range_m + kBeyond_m);
   find(planar::beams_of(scan), {}, result);
   return result;
 }
 
 model::LandmarkScan LandmarkExtractor::extract(const model::PointSweep& sweep) {
-  // What is malformed is counted there.
-  if (!is_of_one_plane(sweep)) return sweeps_.extract(sweep);
+  view_ = {};
+  if (!is_of_one_plane(sweep)) {
+    // What is malformed is counted there.
+    model::LandmarkScan of_sweep = sweeps_.extract(sweep);
+    view_ = sweeps_.view();
+    return of_sweep;
+  }
   model::LandmarkScan result;
   result.utime = sweep.utime;
   result.sequence = sweep.sequence;

@@ -39,6 +39,9 @@ class LandmarkExtractor {
   /// The same of a laser that scans in space, see SweepExtractor, or of a de-skewed scan in one
   /// plane (one ring), in `vehicle_level`.
   model::LandmarkScan extract(const model::PointSweep& sweep);
+  /// How far one can see at the height of trunks: of the last sweep or scan that was extracted; no
+  /// bins where that was malformed, or a de-skewed scan in one plane.
+  const model::ViewRanges& view() const { return view_; }
   /// Of planar scans.
   const ExtractorCounters& counters() const { return counters_; }
   /// Walls and corners of planar scans.
@@ -59,6 +62,7 @@ class LandmarkExtractor {
   points::SpinFitter spin_fitter_;
   planar::ScanCorners corners_;
   SweepExtractor sweeps_;
+  model::ViewRanges view_;
 };
 
 }  // namespace understory::landmark_extractor

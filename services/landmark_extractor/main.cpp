@@ -7,6 +7,7 @@ int main(int argc, char** argv) {
           .lidar_scan = "LIDAR_SCAN",    // in: scans of a planar laser
           .lidar_sweep = "LIDAR_SWEEP",  // in: sweeps in space, in parts
           .landmarks = "LANDMARKS",      // out: trunks and corners of each sweep
+          .view_ranges = "VIEW_RANGES",  // out: how far each sweep saw at the height of trunks
       }),
       argc, argv);
 }

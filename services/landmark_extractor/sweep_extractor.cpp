@@ -56,6 +56,7 @@ model::LandmarkScan SweepExtractor::extract(const model::PointSweep& sweep) {
   result.utime = sweep.utime;
   result.sequence = sweep.sequence;
   ++counters_.sweeps;
+  view_ = {};
   if (!well_formed(sweep)) {
     ++counters_.malformed;
     return result;
@@ -65,14 +66,15 @@ model::LandmarkScan SweepExtractor::extract(const model::PointSweep& sweep) {
   const Eigen::Matrix2d level_covariance = level_covariance_of(sweep, sweep_);
 
   // Ground below the vehicle's surroundings.
-  const points::Levelling& levelling =
-      cloud_.look_at(sweep, sweep_.min_range_m, sweep_.max_range_m + kMargin_m);
+  const double range_m = sweep_.max_range_m + kMargin_m;
+  const points::Levelling& levelling = cloud_.look_at(sweep, sweep_.min_range_m, range_m);
   sample_.take(sweep, levelling);
   ground_.fit(sample_);
 
   // Objects above it, ring by ring.
   cloud_.fill(sweep, ground_, counters_.points);
   find_runs_of_all_rings();
+  view_ = profile_.measure(sweep, cloud_, levelling, ground_, sweep_, range_m);
 
   // Landmarks.
   trunks_.find(cloud_, runs_, ground_, level_covariance, result.detections);

@@ -11,6 +11,7 @@
 #include "services/landmark_extractor/parameters.hpp"
 #include "services/landmark_extractor/rings/ring_runs.hpp"
 #include "services/landmark_extractor/trunks/sweep_trunks.hpp"
+#include "services/landmark_extractor/view/view_profile.hpp"
 
 namespace understory::landmark_extractor {
 
@@ -39,6 +40,8 @@ class SweepExtractor {
   /// Landmarks of a de-skewed sweep (frame vehicle), in `vehicle_level`. A malformed sweep gives
   /// none and is counted. Trunks come first, each kind in order of bearing.
   model::LandmarkScan extract(const model::PointSweep& sweep);
+  /// How far the last sweep saw; no bins where it was malformed.
+  const model::ViewRanges& view() const { return view_; }
   const SweepCounters& counters() const { return counters_; }  ///< Since the start.
 
  private:
@@ -53,6 +56,8 @@ class SweepExtractor {
   std::vector<rings::Run> runs_;
   trunks::SweepTrunks trunks_;
   corners::SweepCorners corners_;
+  view::ViewProfile profile_;
+  model::ViewRanges view_;
   SweepCounters counters_;
 };
 

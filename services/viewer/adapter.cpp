@@ -108,10 +108,10 @@ class ViewerAdapter : public bus::Adapter, public bus::Device {
 
   void report_refused() {
     const std::uint64_t refused = host_->counts().refused();
-    // A line when the count has doubled: who floods does not fill LOG.
+    // Told when the count has doubled: who floods does not fill LOG.
     if (refused == 0 || refused < 2 * refused_) return;
-    node_->log(
-        bus::Node::Level::kWarning, "client_refused",
+    node_->report(
+        wire::Reason::kClientRefused,
         fmt::format(
             "{} connections or messages of web clients were refused so far (see {}health.json)",
             refused, host_->url()));

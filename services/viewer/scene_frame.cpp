@@ -130,8 +130,8 @@ void add_matches(const Scene& scene, nlohmann::ordered_json& header, FrameWriter
   for (const model::Association& one : update.associations) {
     if (const auto slot = scene.landmarks().slot_of(one.landmark_id)) matched.push_back(*slot);
   }
-  for (const model::LandmarkId id : update.expected) {
-    if (const auto slot = scene.landmarks().slot_of(id)) expected.push_back(*slot);
+  for (const model::ExpectedLandmark& one : update.expected) {
+    if (const auto slot = scene.landmarks().slot_of(one.id)) expected.push_back(*slot);
   }
   writer.add("match_slot", std::span<const std::uint32_t>(matched));
   writer.add("expected_slot", std::span<const std::uint32_t>(expected));

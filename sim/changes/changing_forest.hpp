@@ -7,6 +7,7 @@
 
 #include "sim/changes/diff.hpp"
 #include "sim/sensor_drive.hpp"
+#include "sim/shapes.hpp"
 
 namespace understory::sim::changes {
 
@@ -18,6 +19,9 @@ struct ChangingForestParameters {
   double share = 0.1;        ///< Of the trees are felled between two drives.
   double added_share = 1.0;  ///< New trees per felled one.
   int vehicles = 0;          ///< New lorries beside the path in each drive but the first.
+  /// Of a stack of timber, as high as a lorry, close along the outer side of the path in all drives
+  /// but the first; 0 = none.
+  double stack_m = 0.0;
   double days_between = 30.0;
 };
 
@@ -36,6 +40,7 @@ struct ForestDrive {
   Scenario scenario;
   model::Utime utime_of_start = 0;
   std::vector<ThingId> thing_of_object;  ///< By ObjectId of the scenario's world.
+  std::vector<Box> stack;                ///< The stack of timber, piece by piece.
 
   /// The sensors on the way; `seed` of their noise: another one for each drive.
   SensorDrive sensors(const SensorSuite& suite, const SpeedParameters& speed,

@@ -21,7 +21,7 @@
 #include "understory/map_delta_t.hpp"
 #include "understory/map_t.hpp"
 #include "understory/slam_pose2_t.hpp"
-#include "understory/slam_update2_t.hpp"
+#include "understory/slam_update3_t.hpp"
 
 using namespace understory;
 using namespace understory::test;
@@ -127,16 +127,19 @@ bool are_same_poses(const RecordedMessage& expected, const RecordedMessage& got)
 }
 
 bool are_same_updates(const RecordedMessage& expected, const RecordedMessage& got) {
-  const auto a = wire::decode_bytes<slam_update2_t>(expected.bytes).value();
-  const auto b = wire::decode_bytes<slam_update2_t>(got.bytes).value();
+  const auto a = wire::decode_bytes<slam_update3_t>(expected.bytes).value();
+  const auto b = wire::decode_bytes<slam_update3_t>(got.bytes).value();
   const auto is_same_pair = [](const association_t& one, const association_t& other) {
     return one.keyframe_landmark == other.keyframe_landmark && one.landmark_id == other.landmark_id;
+  };
+  const auto is_same_look = [](const expected_landmark_t& one, const expected_landmark_t& other) {
+    return one.landmark_id == other.landmark_id && one.sight == other.sight;
   };
   return a.utime == b.utime && a.seq == b.seq && a.status == b.status && a.added == b.added &&
          a.removed == b.removed && a.num_merged == b.num_merged && a.used_prior == b.used_prior &&
          a.inliers == b.inliers && a.degrees_of_freedom == b.degrees_of_freedom &&
          a.reason == b.reason && a.map_id == b.map_id && a.provisional == b.provisional &&
-         a.lost == b.lost && a.expected == b.expected &&
+         a.lost == b.lost && std::ranges::equal(a.expected, b.expected, is_same_look) &&
          is_near(a.map_T_vehicle, b.map_T_vehicle, a.covariance) &&
          std::ranges::equal(a.associations, b.associations, is_same_pair);
 }

@@ -62,7 +62,7 @@ class Road {
           update.associations.push_back(
               {static_cast<std::uint32_t>(update.associations.size()), id});
         } else {
-          update.expected.push_back(id);
+          update.expected.push_back({id});
         }
       }
       update.inliers = static_cast<std::uint32_t>(update.associations.size());

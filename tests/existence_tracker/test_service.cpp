@@ -1,154 +1,10 @@
-// Mapper and tracker on one bus: a given map of which some trees are gone.
-#include <cmath>
-#include <map>
-#include <memory>
-#include <random>
-#include <set>
-
-#include "common/bus/memory_bus.hpp"
-#include "common/wire/convert.hpp"
-#include "services/existence_tracker/adapter.hpp"
-#include "services/geoslam_mapper/adapter.hpp"
+// Mapper and tracker on one bus: a map of which some trees are gone, hidden, missed or false.
 #include "tests/catch.hpp"
+#include "tests/existence_tracker/ring_road.hpp"
 #include "understory/health_t.hpp"
 
 using namespace understory;
-
-namespace {
-
-constexpr double kRangeM = 18.0;
-constexpr const char* kMapperToml =
-    "[smoothing]\nuse_odometry = true\nmin_observations = 1\nmin_observation_ratio = 0.0\n";
-constexpr const char* kTrackerToml = "[model]\nrange_m = 18.0\n[looks]\npass_m = 180.0\n";
-constexpr int kLap = 95;
-
-/// A ring road of 188 m among trees, driven lap after lap.
-class Forest {
- public:
-  explicit Forest(std::uint64_t seed) : random_(seed) {
-    std::uniform_real_distribution<double> across(-50.0, 50.0);
-    while (trees_m_.size() < 160) {
-      const Eigen::Vector2d tree_m(across(random_), across(random_));
-      if (std::abs(tree_m.norm() - 30.0) > 3.0) trees_m_.push_back(tree_m);
-    }
-  }
-  geometry::SE2 pose(int k) const {
-    const double angle = k * 2.0 / 30.0;
-    return {30.0 * std::cos(angle), 30.0 * std::sin(angle), angle + 0.5 * M_PI};
-  }
-  /// A lap a day: what was seen a minute ago is not gone.
-  static model::Utime utime(int k) {
-    return 1'000'000 * (static_cast<model::Utime>(k) + 1 + 86'400 * (k / kLap));
-  }
-
-  model::Odometry odometry_to(int k) {
-    model::Odometry motion;
-    motion.from_utime = utime(k - 1);
-    motion.utime = utime(k);
-    motion.sequence = static_cast<std::uint64_t>(k);
-    motion.from_T_to = pose(k - 1).inverse() * pose(k) *
-                       geometry::SE2::Exp({0.01 * draw(), 0.01 * draw(), 0.002 * draw()});
-    motion.covariance = Eigen::Vector3d(1e-4, 1e-4, 4e-6).asDiagonal();
-    motion.has_wheels = true;
-    return motion;
-  }
-  model::Keyframe keyframe_at(int k, const std::set<std::size_t>& gone) {
-    model::Keyframe keyframe;
-    keyframe.utime = utime(k);
-    keyframe.sequence = static_cast<std::uint64_t>(k);
-    keyframe.field_of_view.max_range_m = kRangeM;
-    keyframe.members.push_back({keyframe.utime, keyframe.sequence, {}, Eigen::Matrix3d::Zero()});
-    for (std::size_t i = 0; i < trees_m_.size(); ++i) {
-      const Eigen::Vector2d seen_m = pose(k).inverse() * trees_m_[i];
-      if (gone.contains(i) || seen_m.norm() > kRangeM) continue;
-      model::KeyframeLandmark landmark;
-      landmark.position_m = seen_m + 0.03 * Eigen::Vector2d(draw(), draw());
-      landmark.covariance_m2 = 9e-4 * Eigen::Matrix2d::Identity();
-      landmark.radius_m = 0.2;
-      landmark.observation_count = 1;
-      keyframe.landmarks.push_back(landmark);
-    }
-    return keyframe;
-  }
-  std::set<std::size_t> felled(double share) {
-    std::set<std::size_t> ids;
-    std::bernoulli_distribution falls(share);
-    for (std::size_t i = 0; i < trees_m_.size(); ++i)
-      if (falls(random_)) ids.insert(i);
-    return ids;
-  }
-  /// The tree of a place in the world.
-  std::optional<std::size_t> tree_at(const Eigen::Vector2d& world_m) const {
-    for (std::size_t i = 0; i < trees_m_.size(); ++i)
-      if ((trees_m_[i] - world_m).norm() < 0.4) return i;
-    return std::nullopt;
-  }
-
- private:
-  double draw() { return normal_(random_); }
-  std::mt19937_64 random_;
-  std::normal_distribution<double> normal_;
-  std::vector<Eigen::Vector2d> trees_m_;
-};
-
-class Stack {
- public:
-  Stack() {
-    host(geoslam_mapper::geoslam_mapper_service(), kMapperToml);
-    host(existence_tracker::existence_tracker_service(), kTrackerToml);
-    bus_.subscribe("SLAM_UPDATE", 0, [this](const bus::BusMessage& message) {
-      updates.push_back(wire::decode_message<model::MapUpdate>(message.bytes).value());
-    });
-    bus_.subscribe("MAP", 0, [this](const bus::BusMessage& message) {
-      map = wire::decode_message<model::WholeMap>(message.bytes).value();
-    });
-    bus_.subscribe("EXISTENCE", 0, [this](const bus::BusMessage& message) {
-      const auto one = wire::decode_message<model::Existence>(message.bytes).value();
-      for (const model::LandmarkExistence& landmark : one.landmarks) held[landmark.id] = landmark;
-      last = one;
-    });
-    bus_.subscribe("EXISTENCE_STATE", 0, [this](const bus::BusMessage& message) {
-      const auto one = wire::decode_message<model::ExistenceState>(message.bytes).value();
-      states += one.landmarks.size();
-    });
-  }
-  void drive(Forest& forest, int first, int end, const std::set<std::size_t>& gone) {
-    for (int k = first; k < end; ++k) {
-      if (k > 0) publish("ODOMETRY", wire::encode_message(forest.odometry_to(k)));
-      publish("KEYFRAME", wire::encode_message(forest.keyframe_at(k, gone)));
-    }
-  }
-  void finish() {
-    for (auto& one : hosted_) one->adapter().finish();
-    bus_.drain();
-  }
-  /// The tracker goes on with what it saved, as after a restart.
-  void restart_tracker() {
-    const std::string state = hosted_.back()->adapter().save();
-    hosted_.back()->adapter().load(state);
-  }
-
-  std::vector<model::MapUpdate> updates;
-  model::WholeMap map;
-  std::map<model::LandmarkId, model::LandmarkExistence> held;
-  model::Existence last;
-  std::size_t states = 0;
-
- private:
-  void host(const bus::Service& service, const std::string& toml) {
-    hosted_.push_back(std::make_unique<bus::HostedService>(service, bus_, bus::no_clock(), toml,
-                                                           service.name + ".toml"));
-    hosted_.back()->node().connect();
-  }
-  void publish(const std::string& channel, const wire::Bytes& bytes) {
-    bus_.publish(channel, bytes);
-    bus_.drain();
-  }
-  bus::MemoryBus bus_;
-  std::vector<std::unique_ptr<bus::HostedService>> hosted_;
-};
-
-}  // namespace
+using namespace understory::test;
 
 TEST_CASE("The mapper does not use what is gone, and uses it again when it is back",
           "[existence]") {
@@ -156,9 +12,9 @@ TEST_CASE("The mapper does not use what is gone, and uses it again when it is ba
   Stack stack;
   stack.drive(forest, 0, 2 * kLap, {});
   const std::set<std::size_t> gone = forest.felled(0.15);
-  stack.drive(forest, 2 * kLap, 3 * kLap, gone);
+  stack.drive(forest, 2 * kLap, 3 * kLap, {.gone = gone});
   stack.restart_tracker();
-  stack.drive(forest, 3 * kLap, 7 * kLap, gone);
+  stack.drive(forest, 3 * kLap, 7 * kLap, {.gone = gone});
   stack.finish();
   CHECK(stack.states > 100);
 
@@ -182,8 +38,8 @@ TEST_CASE("The mapper does not use what is gone, and uses it again when it is ba
   const model::MapUpdate& update = stack.updates.back();
   CHECK(update.status == model::MapUpdateStatus::kUpdated);
   std::size_t expected_unused = 0;
-  for (const model::LandmarkId id : update.expected)
-    expected_unused += stack.held.at(id).is_in_use ? 0 : 1;
+  for (const model::ExpectedLandmark& one : update.expected)
+    expected_unused += stack.held.at(one.id).is_in_use ? 0 : 1;
   CHECK(expected_unused > 0);
 
   // They come back: named with their ids at once, and in use after the lap.
@@ -192,4 +48,129 @@ TEST_CASE("The mapper does not use what is gone, and uses it again when it is ba
   stack.finish();
   CHECK(stack.last.unused == 0);
   CHECK(stack.map.landmarks.size() <= landmarks + 1);
+}
+
+TEST_CASE("What lorries hide stays where the sensor has ranges, what is gone leaves use",
+          "[existence]") {
+  Forest forest(5);
+  const std::set<std::size_t> felled = forest.felled(0.15);
+  std::set<std::size_t> hidden;
+  for (std::size_t i = 0; i < forest.size(); ++i)
+    if (forest.is_hidden(i) && !felled.contains(i)) hidden.insert(i);
+  REQUIRE(hidden.size() >= 4);
+
+  const auto hidden_in_use = [&](bool has_ranges, const std::string& toml) {
+    Forest same = forest;
+    Stack stack(toml);
+    stack.drive_laps(same, 0, 2, {.has_ranges = has_ranges});
+    stack.drive_laps(same, 2, 8, {.gone = felled, .has_lorries = true, .has_ranges = has_ranges});
+    stack.finish();
+    const Stack::Count count = stack.count(forest);
+    std::size_t in_use = 0, gone = 0, gone_in_use = 0;
+    for (const std::size_t i : hidden) in_use += count.in_use.contains(i) ? 1 : 0;
+    for (const std::size_t i : felled) gone += count.ids.contains(i) ? 1 : 0;
+    for (const std::size_t i : felled) gone_in_use += count.in_use.contains(i) ? 1 : 0;
+    CAPTURE(has_ranges, toml, in_use, hidden.size(), gone_in_use, gone);
+    CHECK(gone > 5);
+    CHECK(static_cast<double>(gone_in_use) <= 0.2 * static_cast<double>(gone));
+    return in_use;
+  };
+  CHECK(hidden_in_use(true, "") == hidden.size());
+  // Without them six laps past the lorries take them for gone.
+  CHECK(hidden_in_use(false, "") < hidden.size() / 2);
+  CHECK(hidden_in_use(true, "use_ranges = false\n") < hidden.size() / 2);
+}
+
+TEST_CASE("SLAM_UPDATE says what was hidden and what was in clear view", "[existence]") {
+  Forest forest(5);
+  Stack stack;
+  stack.drive_laps(forest, 0, 1, {});
+  const std::set<std::size_t> felled = forest.felled(0.15);
+  stack.drive_laps(forest, 1, 2, {.gone = felled, .has_lorries = true});
+  stack.finish();
+  const Stack::Count count = stack.count(forest);
+  std::map<model::LandmarkId, std::size_t> tree_of;
+  for (const auto& [tree, id] : count.ids) tree_of[id] = tree;
+  std::size_t blocked = 0, clear = 0, wrong = 0;
+  for (const model::MapUpdate& update : stack.updates) {
+    for (const model::ExpectedLandmark& one : update.expected) {
+      if (!tree_of.contains(one.id) || one.sight == model::LineOfSight::kUnknown) continue;
+      const bool is_felled = felled.contains(tree_of.at(one.id));
+      if (one.sight == model::LineOfSight::kClear) {
+        ++clear;
+        wrong += is_felled ? 0 : 1;
+      } else {
+        ++blocked;
+      }
+    }
+  }
+  CAPTURE(blocked, clear, wrong);
+  CHECK(blocked > 80);
+  CHECK(clear > 100);
+  CHECK(wrong == 0);
+}
+
+TEST_CASE("A tree that was missed on two laps is in use after the third one, with its id",
+          "[existence]") {
+  for (const std::uint64_t seed : {6, 7}) {
+    Forest forest(seed);
+    Stack stack;
+    stack.drive_laps(forest, 0, 2, {});
+    const std::set<std::size_t> missed = forest.felled(0.15);
+    stack.drive_laps(forest, 2, 4, {.missed = missed});
+    stack.finish();
+    const Stack::Count before = stack.count(forest);
+    stack.drive_laps(forest, 4, 5, {});
+    stack.finish();
+    const Stack::Count after = stack.count(forest);
+    std::size_t left = 0;
+    for (const std::size_t i : missed) {
+      if (!before.ids.contains(i)) continue;
+      CAPTURE(seed, i);
+      left += before.unused.contains(i) ? 1 : 0;
+      CHECK(after.in_use.contains(i));
+      CHECK(after.ids.at(i) == before.ids.at(i));
+    }
+    CAPTURE(seed, left);
+    CHECK(after.unused.empty());
+  }
+}
+
+TEST_CASE("A forest that does not change keeps its trees, a third of them missed on each lap",
+          "[existence]") {
+  std::size_t unused = 0, all = 0;
+  for (const std::uint64_t seed : {8, 9}) {
+    Forest forest(seed);
+    Stack stack;
+    stack.drive_laps(forest, 0, 1, {});
+    for (int lap = 1; lap < 7; ++lap)
+      stack.drive_laps(forest, lap, lap + 1, {.missed = forest.felled(0.36), .has_ranges = false});
+    stack.finish();
+    const Stack::Count count = stack.count(forest);
+    unused += count.unused.size();
+    all += count.ids.size();
+  }
+  CAPTURE(unused, all);
+  CHECK(all > 150);
+  CHECK(static_cast<double>(unused) <= 0.01 * static_cast<double>(all));
+}
+
+TEST_CASE("Of false detections next to nothing is in the map at the end", "[existence]") {
+  for (const double share : {0.1, 0.3}) {
+    Forest forest(10);
+    Stack stack;
+    stack.drive_laps(forest, 0, 5, {.false_share = share});
+    stack.finish();
+    const Stack::Count count = stack.count(forest);
+    std::size_t beside = 0, in_use = 0;
+    for (std::size_t i = 0; i < forest.size(); ++i) {
+      if (!forest.is_beside_road(i)) continue;
+      ++beside;
+      in_use += count.in_use.contains(i) ? 1 : 0;
+    }
+    CAPTURE(share, stack.map.landmarks.size(), count.false_in_use, count.in_use.size(), beside);
+    CHECK(static_cast<double>(count.false_in_use) <=
+          0.01 * static_cast<double>(count.in_use.size()));
+    CHECK(static_cast<double>(in_use) >= 0.97 * static_cast<double>(beside));
+  }
 }

@@ -104,7 +104,7 @@ TEST_CASE("whatever passes the checks of the wire agrees with its schema") {
   std::size_t given = 0;
   for (const auto& [channel, type] : std::initializer_list<std::pair<const char*, const char*>>{
            {"SLAM_POSE", "slam_pose2_t"},
-           {"SLAM_UPDATE", "slam_update2_t"},
+           {"SLAM_UPDATE", "slam_update3_t"},
            {"MAP", "map_t"},
            {"MAP_DELTA", "map_delta_t"},
            {"SUBMAP", "submap_t"},

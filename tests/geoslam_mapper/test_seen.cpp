@@ -112,11 +112,11 @@ TEST_CASE("A trunk that is gone is expected and not seen; hardly any other is", 
     std::size_t others = 0;
     std::size_t chances = 0;
     for (const model::MapUpdate& update : updates) {
-      CHECK(std::ranges::is_sorted(update.expected));
+      CHECK(std::ranges::is_sorted(update.expected, {}, &model::ExpectedLandmark::id));
       const bool is_after = update.scans.front().sequence >= half;
       std::size_t expected_gone = 0;
-      for (const model::LandmarkId id : update.expected)
-        (gone.contains(id) ? expected_gone : others) += 1;
+      for (const model::ExpectedLandmark& one : update.expected)
+        (gone.contains(one.id) ? expected_gone : others) += 1;
       chances += update.associations.size();
       if (is_after) CHECK(expected_gone + 2 >= felled.size());
       if (update.scans.back().sequence < half) CHECK(expected_gone == 0);

@@ -76,7 +76,7 @@ class RandomDrive {
         said.update.associations.push_back({index, id});
         if (chance(0.05)) said.update.associations.push_back({index + 1, id});
       } else if (chance(0.3)) {
-        said.update.expected.push_back(id);
+        said.update.expected.push_back({id});
       }
       if (chance(0.1)) said.delta.moved.push_back(landmark(id));
     }
@@ -158,7 +158,7 @@ class NaiveReader {
     std::set<model::LandmarkId> seen;
     for (const auto& pair : update.associations) seen.insert(pair.landmark_id);
     for (const auto id : seen) notes_[id].seen.push_back(keyframe);
-    for (const auto id : update.expected) notes_[id].missed.push_back(keyframe);
+    for (const auto& one : update.expected) notes_[one.id].missed.push_back(keyframe);
     for (const auto id : update.added) notes_[id].born.push_back(keyframe);
     for (const auto id : update.removed) notes_[id].removed.push_back(keyframe);
     for (const auto& [old_id, new_id] : update.merged) {

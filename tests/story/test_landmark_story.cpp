@@ -131,7 +131,7 @@ TEST_CASE("a story is told in order of time and names what happened", "[story]")
   update.keyframe_sequence = 8;
   update.added.clear();
   update.associations = {{0, id_of(1, 2)}};
-  update.expected = {id_of(1, 1)};
+  update.expected = {{id_of(1, 1)}};
   book.take(update, 0);
   auto existence = stamped<model::Existence>(update.utime);
   existence.landmarks = {{id_of(1, 1), 0.1, false}};

@@ -37,7 +37,7 @@ void drive_over(story::StoryBook& book, std::uint64_t landmarks, int rounds) {
       for (std::uint64_t i = from; i < from + kInView; ++i) {
         if (round == 0) update.added.push_back(id_of(1, i));
         if (round % 2 == 0) update.associations.push_back({0, id_of(1, i)});
-        if (round % 2 == 1) update.expected.push_back(id_of(1, i));
+        if (round % 2 == 1) update.expected.push_back({id_of(1, i)});
         existence.landmarks.push_back({id_of(1, i), 0.5, round % 3 != 0});
       }
       book.take(update, update.utime);

@@ -53,7 +53,8 @@ TEST_CASE("hostile bytes and numbers are counted and stop nobody", "[system]") {
   auto scan = drive.scan(half).scan;
   const auto bad = hostile_messages(wire::encode_message(scan), random);
   for (const auto& message : bad) {
-    for (const char* channel : {"LANDMARKS", "KEYFRAME", "ODOMETRY", "MAP_REQUEST"}) {
+    for (const char* channel :
+         {"LANDMARKS", "KEYFRAME", "VIEW_RANGES", "ODOMETRY", "MAP_REQUEST"}) {
       stack.publish(channel, message);
     }
     stack.wait_until([n = 0]() mutable { return n++ > 0; });  // One message's time to breathe.
@@ -77,6 +78,8 @@ TEST_CASE("hostile bytes and numbers are counted and stop nobody", "[system]") {
       stack.wait_until([&] { return stack.malformed("keyframer", "LANDMARKS") >= sent * 3 / 4; }));
   CHECK(stack.wait_until(
       [&] { return stack.malformed("geoslam_mapper", "KEYFRAME") >= sent * 3 / 4; }));
+  CHECK(stack.wait_until(
+      [&] { return stack.malformed("geoslam_mapper", "VIEW_RANGES") >= sent * 3 / 4; }));
   CHECK(stack.pid("keyframer") == keyframer);
   CHECK(stack.pid("geoslam_mapper") == mapper);
   CHECK(stack.poses.size() > poses_before);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <memory>
 #include <thread>
 
@@ -8,6 +9,7 @@
 #include "tests/catch.hpp"
 #include "tests/viewer/page_replica.hpp"
 #include "tests/web/socket_client.hpp"
+#include "understory/health_t.hpp"
 #include "understory/log_t.hpp"
 
 namespace understory {
@@ -131,6 +133,21 @@ TEST_CASE("what is malformed on the bus is refused and the page lives", "[viewer
   }
   CHECK(client.close_reason() == "not a JSON object");
   CHECK_THAT(test::get(process.port(), "/"), Contains("200 OK") && Contains("Understory"));
+}
+
+TEST_CASE("web clients that are refused are told of in HEALTH", "[viewer]") {
+  LiveViewer process;
+  const auto is_told = [&] {
+    process.work();
+    const health_t health = process.hosted().node().health();
+    return std::ranges::any_of(health.reasons, [](const reason_count_t& one) {
+      return one.reason == "client_refused" && one.count > 0;
+    });
+  };
+  CHECK_FALSE(is_told());
+  test::RawClient client(process.port());
+  client.send("GET / HTTP/1.1\r\nHost: elsewhere.example\r\n\r\n");
+  CHECK(test::holds_soon(is_told));
 }
 
 }  // namespace understory

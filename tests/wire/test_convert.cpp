@@ -74,6 +74,7 @@ TEST_CASE("values survive the wire") {
     check_round_trip(make.keyframe());
     check_round_trip(make.odometry());
     check_round_trip(make.slam_pose());
+    check_round_trip(make.view_ranges());
     check_round_trip(model::WholeMap{
         10, 1, 5, true, make.landmarks(), {{1, 10, make.pose(), make.covariance<3>()}}});
 
@@ -94,7 +95,7 @@ TEST_CASE("values survive the wire") {
     update.is_lost = seed % 3 == 0;
     update.scans = {{90, 4}, {99, 5}};
     update.detections = {{0, 3, 5}, {1, 0, 0}, {1, 2, 6}};
-    update.expected = {8, 9};
+    update.expected = {{8, model::LineOfSight::kClear}, {9}, {12, model::LineOfSight::kBlocked}};
     check_round_trip(update);
   }
 }

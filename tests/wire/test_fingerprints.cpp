@@ -24,6 +24,7 @@ constexpr Pin kPins[] = {
     {"ekf_pose_t", 0x6b017bfb16cf0817ULL},
     {"existence_state_t", 0xc0fee520adb31792ULL},
     {"existence_t", 0x1aa56d94d6d12366ULL},
+    {"expected_landmark_t", 0x2df12eb9df769deeULL},
     {"gnss_t", 0xd96d0af0ca3d759aULL},
     {"ground_truth_t", 0x81e9a5473725f184ULL},
     {"health_t", 0xb8f9eafd7c1dc8b5ULL},
@@ -60,6 +61,7 @@ constexpr Pin kPins[] = {
     {"slam_pose2_t", 0xa9cc46a8f28379a8ULL},
     {"slam_pose_t", 0x0d82fef5d885f004ULL},
     {"slam_update2_t", 0x963157b97a369989ULL},
+    {"slam_update3_t", 0x18e29fb29477a936ULL},
     {"slam_update_t", 0xef389e966858b506ULL},
     {"submap_pose_t", 0xeef2ae8092a154d8ULL},
     {"submap_query_t", 0xb22a151df660a77eULL},
@@ -70,6 +72,7 @@ constexpr Pin kPins[] = {
     {"truth_landmark_t", 0x72d0574c8bff17aeULL},
     {"truth_landmarks_t", 0x76fd9441e3de1147ULL},
     {"velocity_correction_t", 0x9c8e5db4bd067455ULL},
+    {"view_ranges_t", 0x44e7264eaf281411ULL},
     {"wheels_t", 0xa9d9fa96c53d6adfULL},
 };
 

@@ -65,7 +65,31 @@ slam_pose_t old_version(const slam_pose2_t& wire) {
   return old;
 }
 
-slam_update_t old_version(const slam_update2_t& wire) {
+slam_update2_t version_2(const slam_update3_t& wire) {
+  slam_update2_t old{};
+  old.utime = wire.utime;
+  old.seq = wire.seq;
+  old.keyframe_seq = wire.keyframe_seq;
+  old.status = wire.status;
+  old.map_id = wire.map_id;
+  old.provisional = wire.provisional;
+  old.lost = wire.lost;
+  old.map_T_vehicle = wire.map_T_vehicle;
+  std::ranges::copy(std::span(&wire.covariance[0][0], 9), &old.covariance[0][0]);
+  old.map_T_latest_vehicle = wire.map_T_latest_vehicle;
+  old.num_associations = wire.num_associations;
+  old.associations = wire.associations;
+  old.num_scans = wire.num_scans;
+  old.scans = wire.scans;
+  old.num_detections = wire.num_detections;
+  old.detections = wire.detections;
+  old.num_expected = wire.num_expected;
+  for (const expected_landmark_t& one : wire.expected) old.expected.push_back(one.landmark_id);
+  old.reason = wire.reason;
+  return old;
+}
+
+slam_update_t old_version(const slam_update3_t& wire) {
   slam_update_t old{};
   old.utime = wire.utime;
   old.seq = wire.seq;
@@ -120,5 +144,17 @@ TEST_CASE("keyframes, updates and poses of the versions before are read, as far 
         decode_message<model::MapUpdate>(encode_bytes(old_version(to_wire(update))));
     REQUIRE(old_update);
     CHECK(encode_message(*old_update) == encode_message(update));
+
+    update.map_id = 3;
+    update.is_provisional = true;
+    update.scans = {{90, 4}};
+    update.detections = {{0, 3, 5}};
+    update.expected = {{8}, {9}};
+    model::MapUpdate with_sights = update;
+    with_sights.expected[1].sight = model::LineOfSight::kClear;
+    const auto version_2_update =
+        decode_message<model::MapUpdate>(encode_bytes(version_2(to_wire(with_sights))));
+    REQUIRE(version_2_update);
+    CHECK(encode_message(*version_2_update) == encode_message(update));
   }
 }

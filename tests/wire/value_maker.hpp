@@ -38,6 +38,16 @@ class Maker {
     }
     return scan;
   }
+  model::ViewRanges view_ranges() {
+    model::ViewRanges ranges{10, 2, vector<2>(2.0), vector<2>(1.0), real(3.0), 0.01, 0.005, 0.25,
+                             {}, {}};
+    if (count() > 2) ranges.step_rad = -0.01;
+    for (std::size_t i = 100 * count(); i > 0; --i) {
+      ranges.free.push_back(static_cast<std::uint8_t>(random_() % 256));
+      ranges.hidden.push_back(static_cast<std::uint8_t>(random_() % 256));
+    }
+    return ranges;
+  }
   template <int N>
   Eigen::Matrix<double, N, 1> vector(double scale) {
     Eigen::Matrix<double, N, 1> result;

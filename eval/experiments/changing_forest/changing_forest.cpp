@@ -22,16 +22,49 @@ constexpr const char* kTracker = "existence_tracker";
 /// A landmark is a tree's when it is nearer to it than this [m].
 constexpr double kSameM = 0.5;
 
-/// Parameter files of the processes that begin with the map, by process.
-std::map<std::string, std::string> with_map(const std::filesystem::path& config_dir,
-                                            const std::filesystem::path& file) {
+/// Nearer than this to the vehicle, what nothing hides is seen [m].
+constexpr double kSurelySeenM = 15.0;
+/// Above the ground, of the rays to trunks [m].
+constexpr double kEyeM = 1.5;
+
+/// Parameter files of the processes that begin with the map (none where the path is empty), by
+/// process.
+std::map<std::string, std::string> parameters_for(const DrivesOptions& options, Keeping keeping,
+                                                  const std::filesystem::path& map) {
   std::map<std::string, std::string> result;
   for (const char* const process : {kMapper, kTracker}) {
     toml::table values;
-    values.insert("input", toml::table{{"map_file", file.string()}});
-    result[process] = bus::layer_over(bus::config_file_in(config_dir, process), values);
+    if (!map.empty()) values.insert("input", toml::table{{"map_file", map.string()}});
+    if (process == kTracker && keeping == Keeping::kWithoutRanges)
+      values.insert("looks", toml::table{{"use_ranges", false}});
+    result[process] = bus::layer_over(bus::config_file_in(options.config_dir, process), values);
   }
   return result;
+}
+
+bool is_behind(const sim::Box& box, const Eigen::Vector2d& from_m, const Eigen::Vector2d& to_m) {
+  const double eye_m = box.centre_m.z() - box.half_size_m.z() + kEyeM;
+  const Eigen::Vector2d way_m = to_m - from_m;
+  const sim::Ray ray{{from_m.x(), from_m.y(), eye_m},
+                     Eigen::Vector3d(way_m.x(), way_m.y(), 0.0).normalized()};
+  const auto hit = sim::meet(ray, box);
+  return hit && hit->range_m < way_m.norm();
+}
+
+/// Whether the stack hides a tree from wherever the drive came near it.
+bool is_hidden(const std::vector<sim::Box>& stack, const Eigen::Vector2d& tree_m,
+               const harness::ChainRun& run) {
+  bool came_near = false;
+  for (const metrics::StampedPose& pose : run.truth) {
+    const Eigen::Vector2d from_m = pose.pose.translation();
+    if ((from_m - tree_m).norm() > kSurelySeenM) continue;
+    came_near = true;
+    if (std::ranges::none_of(stack,
+                             [&](const sim::Box& box) { return is_behind(box, from_m, tree_m); })) {
+      return false;
+    }
+  }
+  return came_near;
 }
 
 /// The map of a drive with what its tracker knows, for the next one.
@@ -92,6 +125,11 @@ DriveScore score_of(const harness::ChainRun& run, const changes::ChangingForest&
   score.ate_m = harness::trajectory_error(run.slam, run.truth).ate_rms_m;
   score.missing_share = run.missing_share;
   score.mapping_needed = run.is_mapping_needed;
+  const harness::FalseDetectionCounts& counts = run.false_detections;
+  if (counts.detections > 0)
+    score.false_share = static_cast<double>(counts.clutter + counts.of_things) /
+                        static_cast<double>(counts.detections);
+  const std::vector<sim::Box>& stack = forest.drives[static_cast<std::size_t>(drive)].stack;
   const std::vector<PlacedLandmark> landmarks = placed_landmarks(run, beside_m);
   const auto at = [&](const Eigen::Vector2d& tree_m, bool in_use) {
     return std::ranges::any_of(landmarks, [&](const PlacedLandmark& one) {
@@ -104,6 +142,10 @@ DriveScore score_of(const harness::ChainRun& run, const changes::ChangingForest&
     if (tree.first_drive > drive || distance_to_path(tree.position_m, run) > beside_m) continue;
     const bool is_used = at(tree.position_m, true);
     const bool is_unused = at(tree.position_m, false);
+    if ((is_used || is_unused) && tree.stands_in(drive) && is_hidden(stack, tree.position_m, run)) {
+      ++score.hidden;
+      score.hidden_unused += is_used ? 0 : 1;
+    }
     if (tree.stands_in(drive)) {
       ++score.standing;
       score.found += is_used ? 1 : 0;
@@ -127,8 +169,15 @@ DriveScore score_of(const harness::ChainRun& run, const changes::ChangingForest&
 
 }  // namespace
 
+changes::ChangingForest forest_for(Part part, const DrivesOptions& options, std::uint64_t seed) {
+  changes::ChangingForestParameters parameters = options.forest;
+  if (part == Part::kStack) parameters.stack_m = options.stack_m;
+  if (part == Part::kFalseDetections) parameters.share = 0.0;
+  return changes::make_changing_forest(parameters, seed);
+}
+
 std::vector<DriveScore> drive_forest(const changes::ChangingForest& forest,
-                                     const DrivesOptions& options, Keeping keeping,
+                                     const DrivesOptions& options, const Variant& variant,
                                      std::uint64_t seed, const std::filesystem::path& scratch,
                                      const std::function<void(double)>& progress) {
   std::vector<DriveScore> scores;
@@ -143,8 +192,10 @@ std::vector<DriveScore> drive_forest(const changes::ChangingForest& forest,
 
     harness::ChainOptions chain;
     chain.config_dir = options.config_dir;
-    if (!map.empty()) chain.toml_instead = with_map(options.config_dir, map);
-    if (keeping == Keeping::kNothing) chain.without = {kTracker};
+    chain.toml_instead = parameters_for(options, variant.keeping, map);
+    if (variant.keeping == Keeping::kNothing) chain.without = {kTracker};
+    chain.false_detections.share = variant.false_share;
+    chain.false_detections.seed = seed + i;
     chain.progress = [&](double done) { progress((static_cast<double>(i) + done) / drives); };
     const harness::ChainRun run = harness::drive_chain(sensors, chain);
 

@@ -13,10 +13,25 @@
 
 namespace understory::eval::experiments::changing_forest {
 
+/// What happens between drives and on them.
+enum class Part : std::uint8_t {
+  kChanges,          ///< Trees are felled, and others grow.
+  kStack,            ///< A stack of timber hides trees besides, from the second drive on.
+  kFalseDetections,  ///< Nothing changes; some of the detections are of no landmark.
+};
+
 /// How the map goes from drive to drive.
-enum class Keeping {
-  kTracker,  ///< With the existence tracker and its states.
-  kNothing,  ///< Without: the map only grows.
+enum class Keeping : std::uint8_t {
+  kTracker,        ///< With the existence tracker and its states.
+  kWithoutRanges,  ///< The same, but it does not hear what the sensor measured along the rays.
+  kNothing,        ///< Without: the map only grows.
+};
+
+/// One way through all drives of a forest.
+struct Variant {
+  Part part = Part::kChanges;
+  Keeping keeping = Keeping::kTracker;
+  double false_share = 0.0;  ///< Of all detections.
 };
 
 /// One drive against the truth.
@@ -30,6 +45,9 @@ struct DriveScore {
   std::size_t felled = 0;          ///< Trees that were mapped and do not stand any more ...
   std::size_t felled_unused = 0;   ///< ... and are out of use.
   std::size_t wrongly_unused = 0;  ///< Landmarks out of use where a tree stands.
+  std::size_t hidden = 0;          ///< Standing trees of the map that the stack hides ...
+  std::size_t hidden_unused = 0;   ///< ... and are out of use.
+  double false_share = 0.0;        ///< Of the detections of the drive.
   double ate_m = 0.0;
   double missing_share = 0.0;  ///< As EXISTENCE states at the end.
   bool mapping_needed = false;
@@ -41,12 +59,17 @@ struct DrivesOptions {
   sim::changes::ChangingForestParameters forest;
   double beside_m = 15.0;  ///< Trees and landmarks within this of the path count.
   int columns = 1200;      ///< Of the LIDAR.
+  double stack_m = 40.0;   ///< Of timber, in kStack.
 };
+
+/// The forest of a part.
+sim::changes::ChangingForest forest_for(Part part, const DrivesOptions& options,
+                                        std::uint64_t seed);
 
 /// All drives of one forest, the map of each given to the next as a map file in `scratch`.
 /// `progress` is told how much is done, 0 to 1. Throws as drive_chain() and map files do.
 std::vector<DriveScore> drive_forest(const sim::changes::ChangingForest& forest,
-                                     const DrivesOptions& options, Keeping keeping,
+                                     const DrivesOptions& options, const Variant& variant,
                                      std::uint64_t seed, const std::filesystem::path& scratch,
                                      const std::function<void(double)>& progress);
 

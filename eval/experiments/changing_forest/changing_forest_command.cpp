@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -20,6 +19,7 @@ namespace {
 
 struct DrivesCommand {
   DrivesOptions drives;
+  std::string part = "all";
   int runs = 2;
   std::uint64_t seed = 1;
   int jobs = 1;
@@ -47,12 +47,50 @@ class MapFolder {
 };
 
 const char* name_of(Keeping keeping) {
-  return keeping == Keeping::kTracker ? "existence tracker" : "nothing removed";
+  switch (keeping) {
+    case Keeping::kTracker:
+      return "existence tracker";
+    case Keeping::kWithoutRanges:
+      return "without ranges";
+    default:
+      return "nothing removed";
+  }
 }
 
-nlohmann::json row_of(std::uint64_t seed, Keeping keeping, const DriveScore& score) {
+const char* name_of(Part part) {
+  switch (part) {
+    case Part::kChanges:
+      return "changes";
+    case Part::kStack:
+      return "stack";
+    default:
+      return "false detections";
+  }
+}
+
+/// All, or those of one part.
+std::vector<Variant> variants_of(const std::string& part) {
+  std::vector<Variant> variants{{Part::kChanges, Keeping::kTracker, 0.0},
+                                {Part::kChanges, Keeping::kNothing, 0.0},
+                                {Part::kStack, Keeping::kTracker, 0.0},
+                                {Part::kStack, Keeping::kWithoutRanges, 0.0},
+                                {Part::kFalseDetections, Keeping::kTracker, 0.1},
+                                {Part::kFalseDetections, Keeping::kNothing, 0.1},
+                                {Part::kFalseDetections, Keeping::kTracker, 0.3},
+                                {Part::kFalseDetections, Keeping::kNothing, 0.3}};
+  std::erase_if(variants,
+                [&](const Variant& one) { return part != "all" && part != name_of(one.part); });
+  return variants;
+}
+
+nlohmann::json row_of(std::uint64_t seed, const Variant& variant, const DriveScore& score) {
   return {{"run_seed", seed},
-          {"keeping", name_of(keeping)},
+          {"part", name_of(variant.part)},
+          {"keeping", name_of(variant.keeping)},
+          {"false_wanted", variant.false_share},
+          {"false_share", score.false_share},
+          {"hidden", score.hidden},
+          {"hidden_unused", score.hidden_unused},
           {"drive", score.drive},
           {"standing", score.standing},
           {"found", score.found},
@@ -68,33 +106,36 @@ nlohmann::json row_of(std::uint64_t seed, Keeping keeping, const DriveScore& sco
 }
 
 void print_drives(const nlohmann::json& rows) {
-  fmt::print("{:<18} {:>5} {:>9} {:>7} {:>7} {:>14} {:>14} {:>7} {:>8}\n", "keeping", "drive",
-             "precision", "recall", "stored", "felled unused", "wrongly unused", "ATE mm",
-             "missing");
+  fmt::print("{:<16} {:<18} {:>6} {:>5} {:>9} {:>7} {:>7} {:>14} {:>13} {:>14} {:>7} {:>8}\n",
+             "part", "keeping", "false", "drive", "precision", "recall", "stored", "felled unused",
+             "hidden unused", "wrongly unused", "ATE mm", "missing");
   for (const nlohmann::json& row : rows) {
     const auto n = [&](const char* key) { return row[key].get<double>(); };
     fmt::print(
-        "{:<18} {:>5.0f} {:>9.3f} {:>7.3f} {:>7.0f} {:>8.0f} of {:<3.0f} {:>14.0f} {:>7.1f} "
-        "{:>8.2f}\n",
-        row["keeping"].get<std::string>(), n("drive"), n("right") / std::max(1.0, n("in_use")),
+        "{:<16} {:<18} {:>6.2f} {:>5.0f} {:>9.3f} {:>7.3f} {:>7.0f} {:>8.0f} of {:<3.0f} "
+        "{:>6.0f} of {:<3.0f} {:>14.0f} {:>7.1f} {:>8.2f}\n",
+        row["part"].get<std::string>(), row["keeping"].get<std::string>(), n("false_share"),
+        n("drive"), n("right") / std::max(1.0, n("in_use")),
         n("found") / std::max(1.0, n("standing")), n("stored"), n("felled_unused"), n("felled"),
-        n("wrongly_unused"), 1e3 * n("ate_m"), n("missing_share"));
+        n("hidden_unused"), n("hidden"), n("wrongly_unused"), 1e3 * n("ate_m"), n("missing_share"));
   }
 }
 
 void run_drives(const DrivesCommand& options) {
   const auto& stop = terminal::catch_interrupts();
-  constexpr std::array kBoth{Keeping::kTracker, Keeping::kNothing};
-  std::vector<nlohmann::json> results(2 * static_cast<std::size_t>(options.runs));
+  const std::vector<Variant> variants = variants_of(options.part);
+  std::vector<nlohmann::json> results(variants.size() * static_cast<std::size_t>(options.runs));
   tools::run_in_parallel(results.size(), options.jobs, "drives", stop, [&](std::size_t i) {
-    const std::uint64_t seed = harness::run_seed(options.seed, static_cast<int>(i / 2));
-    const auto forest = sim::changes::make_changing_forest(options.drives.forest, seed);
+    const Variant& variant = variants[i % variants.size()];
+    const std::uint64_t seed =
+        harness::run_seed(options.seed, static_cast<int>(i / variants.size()));
+    const auto forest = forest_for(variant.part, options.drives, seed);
     const MapFolder folder(i);
     nlohmann::json rows = nlohmann::json::array();
     for (const DriveScore& score :
-         drive_forest(forest, options.drives, kBoth[i % 2], seed, folder.path(),
+         drive_forest(forest, options.drives, variant, seed, folder.path(),
                       [](double) { terminal::throw_if_interrupted(); }))
-      rows.push_back(row_of(seed, kBoth[i % 2], score));
+      rows.push_back(row_of(seed, variant, score));
     results[i] = std::move(rows);
   });
 
@@ -107,7 +148,8 @@ void run_drives(const DrivesCommand& options) {
                               {"runs", options.runs},
                               {"drives", options.drives.forest.drives},
                               {"share", options.drives.forest.share},
-                              {"length_m", options.drives.forest.course.length_m}};
+                              {"length_m", options.drives.forest.course.length_m},
+                              {"stack_m", options.drives.stack_m}};
   harness::write_json(options.json, harness::result_document("existence-drives", config, rows));
   harness::plot("existence_drives.py", {options.json});
 }
@@ -120,7 +162,10 @@ void add_changing_forest_experiment(CLI::App& eval) {
       "A forest mapped once and driven again while trees go and come, from raw LIDAR");
   const auto options = std::make_shared<DrivesCommand>();
   options->drives.forest.course.length_m = 150.0;
-  command.add_option("--runs", options->runs, "Forests, each with the tracker and without")
+  command.add_option("--part", options->part, "What happens: one part, or all")
+      ->check(CLI::IsMember({"all", "changes", "stack", "false detections"}))
+      ->capture_default_str();
+  command.add_option("--runs", options->runs, "Forests, each driven in every way")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   command.add_option("--seed", options->seed, "Seed of the first forest")->capture_default_str();

@@ -22,10 +22,9 @@ std::optional<model::LandmarkId> lasting_of(NodeIndex node, const GlobalMap& map
 
 }  // namespace
 
-std::vector<model::LandmarkId> expected_unseen(const model::Keyframe& keyframe,
-                                               const geometry::SE2& map_T_centre,
-                                               std::span<const model::Association> associations,
-                                               const LandmarkMap& landmarks) {
+std::vector<model::ExpectedLandmark> expected_unseen(
+    const model::Keyframe& keyframe, const geometry::SE2& map_T_centre,
+    std::span<const model::Association> associations, const LandmarkMap& landmarks) {
   std::vector<model::LandmarkId> seen;
   seen.reserve(associations.size());
   for (const model::Association& pair : associations) seen.push_back(pair.landmark_id);
@@ -52,10 +51,10 @@ std::vector<model::LandmarkId> expected_unseen(const model::Keyframe& keyframe,
     std::ranges::sort(missed);
     missed.resize(kMostExpected);
   }
-  std::vector<model::LandmarkId> result;
+  std::vector<model::ExpectedLandmark> result;
   result.reserve(missed.size());
-  for (const auto& [distance_m, id] : missed) result.push_back(id);
-  std::ranges::sort(result);
+  for (const auto& [distance_m, id] : missed) result.push_back({id});
+  std::ranges::sort(result, {}, &model::ExpectedLandmark::id);
   return result;
 }
 

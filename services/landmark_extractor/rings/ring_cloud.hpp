@@ -71,6 +71,8 @@ class RingCloud {
   float step_rad(std::size_t ring) const { return rings_[ring].step_rad; }
   /// Of the sensor at utime, frame `vehicle_level`.
   const Eigen::Vector3f& sensor_m() const { return levelling_.sensor_m; }
+  /// How fast the sensor turns, left positive; 0 = not known.
+  float spin_radps() const { return spin_.rate_radps; }
   /// Of the sensor during the revolution, frame `vehicle_level`.
   const Eigen::Vector3f& level_velocity_mps() const { return levelling_.velocity_mps; }
   /// The same in frame `vehicle`, in the plan.
