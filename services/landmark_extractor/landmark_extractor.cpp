@@ -127,8 +127,7 @@ model::LandmarkScan LandmarkExtractor::extract(const model::PlanarScan& scan) {
     ++counters_.scans_malformed;
     return result;
   }
-  view_ = view::planar_view(scan, parameters_.planar.vehicle_T_sensor,
-                            parameters_.planar.max_range_m + kBeyond_m);
+  view_ = view::planar_view(scan, parameters_.planar.max_range_m + kBeyond_m);
   find(planar::beams_of(scan), {}, result);
   return result;
 }

@@ -173,14 +173,13 @@ void ViewProfile::write() {
   }
 }
 
-model::ViewRanges planar_view(const model::PlanarScan& scan, const geometry::SE2& vehicle_T_sensor,
-                              double range_m) {
+model::ViewRanges planar_view(const model::PlanarScan& scan, double range_m) {
   model::ViewRanges ranges;
   ranges.utime = scan.utime;
   ranges.sequence = scan.sequence;
-  ranges.sensor_m = vehicle_T_sensor.translation();
+  ranges.sensor_m = scan.vehicle_T_sensor.translation();
   ranges.first_bearing_rad = geometry::wrap_angle(
-      scan.first_bearing_rad - 0.5 * scan.bearing_step_rad + vehicle_T_sensor.theta());
+      scan.first_bearing_rad - 0.5 * scan.bearing_step_rad + scan.vehicle_T_sensor.theta());
   ranges.step_rad = scan.bearing_step_rad;
   ranges.beam_step_rad = std::abs(scan.bearing_step_rad);
   ranges.range_step_m = range_m / (kMostSteps - 1.0);

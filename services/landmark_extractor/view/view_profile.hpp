@@ -67,7 +67,6 @@ class ViewProfile {
 
 /// The same of a laser that scans one plane: a bin for each beam; told up to `range_m` and a little
 /// more.
-model::ViewRanges planar_view(const model::PlanarScan& scan, const geometry::SE2& vehicle_T_sensor,
-                              double range_m);
+model::ViewRanges planar_view(const model::PlanarScan& scan, double range_m);
 
 }  // namespace understory::landmark_extractor::view
