@@ -22,8 +22,8 @@ struct PlanarScan {
   /// A range at or beyond this, or one that is not a positive number, is no return [m].
   double max_range_m = 0.0;
   std::vector<float> ranges_m;  ///< Per beam.
-  double beam_interval_s =
-      0.0;  ///< Beam k is measured so many times k after utime; 0 = all at once.
+  /// Beam k is measured so many times k after utime; 0 = all at once.
+  double beam_interval_s = 0.0;
   geometry::SE2 vehicle_T_sensor;  ///< Where the laser sits in the plan; not known of RAW_SCAN.
 
   /// Direction of a beam [rad], frame `sensor`.

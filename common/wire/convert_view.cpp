@@ -1,4 +1,5 @@
 #include <cmath>
+#include <numbers>
 
 #include "common/wire/convert.hpp"
 #include "common/wire/convert_shared.hpp"

@@ -154,7 +154,7 @@ class MapperAdapter : public bus::Adapter {
         {.most_bytes = wire::bytes_with<landmarks_t, detection_t>(most_detections),
          .journaled = false});
 
-    // Part of what is told of a keyframe: journaled.
+    // SLAM_UPDATE depends on them: journaled.
     node.subscribe<model::ViewRanges>(
         channels_.view_ranges,
         [this](const model::ViewRanges& ranges) { memory_.sights.add(ranges); },

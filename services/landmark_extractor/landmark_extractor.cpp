@@ -14,7 +14,7 @@
 namespace understory::landmark_extractor {
 namespace {
 
-/// How far one sees is told so far beyond the range of trunks [m].
+/// VIEW_RANGES go so far beyond the range of trunks [m].
 constexpr double kBeyond_m = 2.0;
 
 bool well_formed(const model::PlanarScan& scan) {
@@ -133,13 +133,13 @@ model::LandmarkScan LandmarkExtractor::extract(const model::PlanarScan& scan) {
 }
 
 model::LandmarkScan LandmarkExtractor::extract(const model::PointSweep& sweep) {
-  view_ = {};
   if (!is_of_one_plane(sweep)) {
     // What is malformed is counted there.
     model::LandmarkScan of_sweep = sweeps_.extract(sweep);
     view_ = sweeps_.view();
     return of_sweep;
   }
+  view_ = {};
   model::LandmarkScan result;
   result.utime = sweep.utime;
   result.sequence = sweep.sequence;

@@ -107,8 +107,8 @@ std::optional<std::size_t> PageClients::run_with_news(const Client& client) cons
 bool PageClients::is_due(const Client& client, std::int64_t now_us) const {
   const std::int64_t since_us = now_us - client.last_us;
   if (since_us < 0 || since_us >= kPeriodsWithoutPose * period_us_) return true;
-  if (since_us < period_us_) return client.has_more && since_us >= period_us_ / 2;
-  if (client.has_more) return true;
+  if (client.has_more) return since_us >= period_us_ / 2;
+  if (since_us < period_us_) return false;
   for (std::size_t run = 0; run < runs_.size(); ++run) {
     if (has_moved(*runs_[run], client.cursors[run])) return true;
   }

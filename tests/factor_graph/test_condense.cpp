@@ -209,6 +209,30 @@ TEST_CASE("What a part tells of its points is as exact as it says", "[plane]") {
   CHECK(nees < 1.07);
 }
 
+TEST_CASE("A pose alone keeps what it observed", "[plane]") {
+  plane::Graph part;
+  const auto pose = part.add_pose(geometry::SE2(3.0, -1.0, 0.7));
+  Eigen::Matrix2d covariance;
+  covariance << 0.04, 0.01, 0.01, 0.09;
+  std::vector<Eigen::Vector2d> seen;
+  for (const Eigen::Vector2d& place :
+       {Eigen::Vector2d(4.0, 1.0), Eigen::Vector2d(-2.0, 6.0), Eigen::Vector2d(0.5, -3.0)}) {
+    seen.push_back(place);
+    const auto point = part.add_point(part[pose] * place);
+    part.observations.push_back({pose, point, place, covariance.inverse()});
+  }
+
+  const auto condensed = plane::condense(part, 1);
+  REQUIRE(condensed);
+  CHECK((part[pose].inverse() * condensed->map_T_origin).Log().norm() < 1e-12);
+  CHECK(condensed->origin_T_inner.at(0).covariance.norm() < 1e-12);
+  CHECK(condensed->outer.empty());
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    CHECK((condensed->points[i].position - seen[i]).norm() < 1e-12);
+    CHECK(condensed->points[i].covariance.isApprox(covariance, 1e-9));
+  }
+}
+
 TEST_CASE("The motions of a part without points are compounded", "[plane]") {
   plane::Graph chain;
   const Eigen::Matrix3d information = Eigen::Vector3d(400.0, 900.0, 1e4).asDiagonal();

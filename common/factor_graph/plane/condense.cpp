@@ -48,6 +48,7 @@ class PartSystem {
     for (const RelativePose& factor : part_.relative_poses) add(factor, linearise(part_, factor));
     for (const BiasedRelativePose& factor : part_.biased_relative_poses) add(factor);
     if (!add_points()) return false;
+    if (information_.size() == 0) return true;  // The fixed pose is the only one.
 
     const Eigen::LLT<Eigen::MatrixXd> factorised(information_);
     if (factorised.info() != Eigen::Success) return false;

@@ -34,7 +34,7 @@ std::vector<Retirement> Condensing::follow(const FusedKeyframe& fused,
   const std::vector<Passed> stretch =
       take_stretch(cut_policy(parameters_, range_m), end_m, known_ground, map.graph);
   if (keeps_stretches_ && !stretch.empty()) stretches_.push_back(stretch_of(stretch, map));
-  if (stretch.size() < 2) return {};
+  if (stretch.empty()) return {};
 
   std::vector<NodeIndex> nodes;
   nodes.reserve(stretch.size());

@@ -25,7 +25,7 @@ std::uint8_t rounded_down(double range_m, double step_m) {
   return static_cast<std::uint8_t>(std::min(kMostSteps, std::floor(range_m / step_m)));
 }
 
-/// Never nearer than it is; 0 where it is too far to be told.
+/// Never nearer than it is; 0 where it does not fit into a byte.
 std::uint8_t rounded_up(double range_m, double step_m) {
   const double steps = std::max(1.0, std::ceil(range_m / step_m));
   return steps > kMostSteps ? 0 : static_cast<std::uint8_t>(steps);

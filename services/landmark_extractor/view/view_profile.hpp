@@ -65,7 +65,7 @@ class ViewProfile {
   model::ViewRanges ranges_;
 };
 
-/// The same of a laser that scans one plane: a bin for each beam; told up to `range_m` and a little
+/// The same of a laser that scans one plane: a bin for each beam, up to `range_m` and a little
 /// more.
 model::ViewRanges planar_view(const model::PlanarScan& scan, double range_m);
 
