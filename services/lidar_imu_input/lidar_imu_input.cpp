@@ -117,10 +117,7 @@ InputResults LidarImuInput::add(RawReading raw) {
   // Use what nothing before it is missing of.
   for (RawReading& reading : believed.readings) {
     if (auto fault = order_.add(std::move(reading), guard_)) out.emplace_back(*std::move(fault));
-    while (auto next = order_.next(guard_, false)) {
-      std::visit([&](auto&& value) { use(std::move(value), out); }, *std::move(next));
-      settle(out, false);
-    }
+    use_ready(out, false);
   }
   return out;
 }
@@ -211,12 +208,18 @@ InputResults LidarImuInput::add(const model::EkfPose& pose) {
 InputResults LidarImuInput::finish() {
   InputResults out;
   for (RawReading& reading : time_base_.finish()) order_.add(std::move(reading), guard_);
-  while (auto next = order_.next(guard_, true)) {
-    std::visit([&](auto&& value) { use(std::move(value), out); }, *std::move(next));
-    settle(out, false);
-  }
+  use_ready(out, true);
   settle(out, true);
   return out;
+}
+
+/// Readings that nothing before them is missing of (or `everything`).
+void LidarImuInput::use_ready(InputResults& out, bool everything) {
+  while (auto next = order_.next(guard_, everything)) {
+    std::visit([&](auto&& value) { use(std::forward<decltype(value)>(value), out); },
+               *std::move(next));
+    settle(out, false);
+  }
 }
 
 void LidarImuInput::wait(WaitingSweep waiting, InputResults& out) {

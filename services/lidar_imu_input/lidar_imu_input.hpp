@@ -101,6 +101,7 @@ class LidarImuInput {
   void use(model::PointSweep sweep, InputResults& out);
   void use(const model::PlanarScan& raw, InputResults& out);
   void wait(WaitingSweep waiting, InputResults& out);
+  void use_ready(InputResults& out, bool everything);
   void settle(InputResults& out, bool everything);
   void end_increment(model::Utime utime, InputResults& out);
   void release(WaitingSweep waiting, InputResults& out);

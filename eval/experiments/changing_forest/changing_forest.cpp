@@ -117,6 +117,29 @@ bool is_at(const Eigen::Vector2d& a_m, const Eigen::Vector2d& b_m) {
   return (a_m - b_m).norm() < kSameM;
 }
 
+/// One tree: whether landmarks that are in use, and out of use, stand there.
+struct TreeInMap {
+  bool is_used = false;
+  bool is_unused = false;
+  bool is_hidden = false;  ///< Behind the stack.
+};
+
+void count(const TreeInMap& tree, bool is_standing, DriveScore& score) {
+  const bool is_there = tree.is_used || tree.is_unused;
+  if (is_standing) {
+    ++score.standing;
+    score.found += tree.is_used ? 1 : 0;
+    score.wrongly_unused += tree.is_unused && !tree.is_used ? 1 : 0;
+  } else if (is_there) {
+    ++score.felled;
+    score.felled_unused += tree.is_used ? 0 : 1;
+  }
+  if (is_standing && is_there && tree.is_hidden) {
+    ++score.hidden;
+    score.hidden_unused += tree.is_used ? 0 : 1;
+  }
+}
+
 DriveScore score_of(const harness::ChainRun& run, const changes::ChangingForest& forest, int drive,
                     double beside_m) {
   DriveScore score;
@@ -140,20 +163,9 @@ DriveScore score_of(const harness::ChainRun& run, const changes::ChangingForest&
   // The trees.
   for (const changes::TreeTruth& tree : forest.trees) {
     if (tree.first_drive > drive || distance_to_path(tree.position_m, run) > beside_m) continue;
-    const bool is_used = at(tree.position_m, true);
-    const bool is_unused = at(tree.position_m, false);
-    if ((is_used || is_unused) && tree.stands_in(drive) && is_hidden(stack, tree.position_m, run)) {
-      ++score.hidden;
-      score.hidden_unused += is_used ? 0 : 1;
-    }
-    if (tree.stands_in(drive)) {
-      ++score.standing;
-      score.found += is_used ? 1 : 0;
-      score.wrongly_unused += is_unused && !is_used ? 1 : 0;
-    } else if (is_used || is_unused) {
-      ++score.felled;
-      score.felled_unused += is_used ? 0 : 1;
-    }
+    count({at(tree.position_m, true), at(tree.position_m, false),
+           is_hidden(stack, tree.position_m, run)},
+          tree.stands_in(drive), score);
   }
 
   // The landmarks.
