@@ -183,11 +183,12 @@ Eigen::Matrix<double, 2, 3> rigid(const Eigen::Vector2d& in_frame) {
 /// How the frame that the points have in common follows the poses: the fit of a rigid motion to the
 /// points' moves, weighted by what is known of each when the poses are given.
 Eigen::MatrixXd common_motion(const Graph& part, const PartSystem& system) {
-  if (part.points.size() < kLeastPoints) return Eigen::MatrixXd::Zero(3, system.step().size());
+  const Eigen::Index size = system.step().size();  // 0 where the middle pose is the only one.
+  if (size == 0 || part.points.size() < kLeastPoints) return Eigen::MatrixXd::Zero(3, size);
   const geometry::SE2 middle_T_map = part.poses[system.fixed()].inverse();
   const Eigen::Matrix2d to_middle = middle_T_map.rotation();
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::MatrixXd motion = Eigen::MatrixXd::Zero(3, system.step().size());
+  Eigen::MatrixXd motion = Eigen::MatrixXd::Zero(3, size);
 
   for (std::size_t i = 0; i < part.points.size(); ++i) {
     const PointBlock& point = system.point(i);
@@ -202,7 +203,7 @@ Eigen::MatrixXd common_motion(const Graph& part, const PartSystem& system) {
   }
 
   const Eigen::LLT<Eigen::Matrix3d> solver(normal);
-  if (solver.info() != Eigen::Success) return Eigen::MatrixXd::Zero(3, system.step().size());
+  if (solver.info() != Eigen::Success) return Eigen::MatrixXd::Zero(3, size);
   return solver.solve(motion);
 }
 
