@@ -243,6 +243,7 @@ void ExistenceTracker::give_birth() {
 
 void ExistenceTracker::forget(const model::MapUpdate& update) {
   const auto erase = [&](model::LandmarkId id) {
+    std::erase_if(births_, [&](const Birth& birth) { return birth.id == id; });
     const auto found = points_.find(id);
     if (found == points_.end()) return;
     if (!found->second.is_in_use) --unused_;
@@ -253,7 +254,10 @@ void ExistenceTracker::forget(const model::MapUpdate& update) {
   // Two names of one thing: what speaks for it counts.
   for (const auto& [old_id, new_id] : update.merged) {
     const auto before = points_.find(old_id);
-    if (before == points_.end()) continue;
+    if (before == points_.end()) {
+      erase(old_id);  // It was not born yet.
+      continue;
+    }
     const auto after = points_.find(new_id);
     if (after == points_.end()) {
       TrackedPoint moved = before->second;
@@ -312,7 +316,9 @@ model::Existence ExistenceTracker::tell(const model::MapUpdate& update) {
 std::set<model::LandmarkId> ExistenceTracker::ids_to_tell() {
   std::set<model::LandmarkId> ids;
   for (const model::LandmarkId id : std::exchange(touched_, {})) {
-    const TrackedPoint& tracked = points_.at(id);
+    const auto found = points_.find(id);
+    if (found == points_.end()) continue;  // Born since the last keyframe, and merged by this one.
+    const TrackedPoint& tracked = found->second;
     const double change = std::abs(tracked.point.probability() - tracked.told_probability);
     if (change > parameters_.output.told_change || tracked.is_in_use != tracked.was_told_in_use)
       ids.insert(id);

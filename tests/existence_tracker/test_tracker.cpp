@@ -236,6 +236,23 @@ TEST_CASE("Merged, removed and unknown landmarks", "[existence]") {
   CHECK_FALSE(tracker.of(5));
   CHECK(tracker.of(4)->probability > 0.9);
 
+  // New, and merged by the next keyframe: before its place is known, and after.
+  for (const bool is_placed : {false, true}) {
+    const model::LandmarkId id = road.add({150.0, 6.0});
+    update.added = {id};
+    update.merged.clear();
+    update.removed.clear();
+    tracker.add(update);
+    if (is_placed) tracker.take(road.map());
+    update.added.clear();
+    update.merged = {{id, 4}};
+    REQUIRE(tracker.add(update));
+    tracker.take(road.map());
+    CHECK_FALSE(tracker.of(id));
+    const auto told = tracker.add(updates.back());
+    CHECK(std::ranges::none_of(told->landmarks, [&](const auto& one) { return one.id == id; }));
+  }
+
   // Without a place nothing counts.
   update.status = model::MapUpdateStatus::kNotSure;
   CHECK_FALSE(tracker.add(update));
