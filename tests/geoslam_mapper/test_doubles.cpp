@@ -61,7 +61,7 @@ struct TwoLandmarks {
 
 TEST_CASE("Landmarks that are side by side more than once are two", "[mapper]") {
   const double near_m = 0.5 * SmoothingMapperParameters{}.merge_distance_m;
-  for (const int apart : {4, 10, 30}) {
+  for (const int apart : {10, 30}) {
     CAPTURE(apart);
     CHECK(TwoLandmarks(0, apart, near_m).merges());
     CHECK(TwoLandmarks(1, apart, near_m).merges());
@@ -70,8 +70,12 @@ TEST_CASE("Landmarks that are side by side more than once are two", "[mapper]") 
       CHECK_FALSE(TwoLandmarks(together, apart, near_m).merges());
     }
   }
-  // Once, of hardly more.
-  CHECK_FALSE(TwoLandmarks(1, 1, near_m).merges());
+  // A few sightings in turns happen by chance.
+  for (const int apart : {1, 2, 3}) {
+    CAPTURE(apart);
+    CHECK_FALSE(TwoLandmarks(0, apart, near_m).merges());
+    CHECK_FALSE(TwoLandmarks(1, apart, near_m).merges());
+  }
 }
 
 TEST_CASE("Landmarks farther apart than the merging distance are two", "[mapper]") {

@@ -13,22 +13,29 @@ namespace {
 constexpr double kLeastOdds = 30.0;
 /// Degrees of freedom of the error's distribution (Student's t): real landmarks have heavy tails.
 constexpr double kTail = 4.0;
+/// Share of the landmarks that bad scans put somewhere else for a while.
+constexpr double kMoved = 0.03;
+/// Trunks stand in clumps: least density of others beside one [1/m^2].
+constexpr double kLeastDensity = 0.01;
 /// Observations on one way lie this near together on the vehicle's path [m].
 constexpr double kOneWay_m = 15.0;
-constexpr int kLeastTurns = 2;  ///< So many of either show that both are there on that way.
 /// A landmark or node that was seen last so long ago on the way [m] is of an earlier pass.
 constexpr double kEarlierPass_m = 50.0;
 constexpr double kNeighbourhood_m = 25.0;
 /// No two trunks stand nearer to each other, from centre to centre [m].
 constexpr double kTouching_m = 0.06;
 
+/// Nodes that observed both.
+std::ptrdiff_t count_together(const StoredLandmark& a, const StoredLandmark& b) {
+  return std::count_if(a.views_m.begin(), a.views_m.end(), [&](float view_m) {
+    return std::find(b.views_m.begin(), b.views_m.end(), view_m) != b.views_m.end();
+  });
+}
+
 /// Whether nodes observed the two side by side. Two trunks that really are so near to each other
 /// are observed together from almost everywhere; one that a bad scan doubled is so once.
 bool are_observed_together(const StoredLandmark& a, const StoredLandmark& b) {
-  const auto common =
-      static_cast<std::size_t>(std::count_if(a.views_m.begin(), a.views_m.end(), [&](float view_m) {
-        return std::find(b.views_m.begin(), b.views_m.end(), view_m) != b.views_m.end();
-      }));
+  const auto common = static_cast<std::size_t>(count_together(a, b));
   return common > 1 || 4 * common > std::min(a.views_m.size(), b.views_m.size());
 }
 
@@ -41,9 +48,16 @@ int count_beside(const StoredLandmark& a, const StoredLandmark& b) {
   }));
 }
 
-/// Whether both were observed on one way past them.
-bool are_observed_in_turns(const StoredLandmark& a, const StoredLandmark& b) {
-  return count_beside(a, b) >= kLeastTurns && count_beside(b, a) >= kLeastTurns;
+/// Odds of one trunk against two from who saw which on one way past them; none where no way saw
+/// both. Two trunks are seen together by one in three nodes that see either where each is seen by
+/// half of them; one trunk is seen twice by one in twenty (a scan that doubles it). A few sightings
+/// in turns happen by chance.
+std::optional<double> odds_by_turns(const StoredLandmark& a, const StoredLandmark& b) {
+  constexpr double kAlone = (1.0 - 0.05) / (1.0 - 1.0 / 3.0);
+  constexpr double kTogether = 0.05 / (1.0 / 3.0);
+  const int alone = count_beside(a, b) + count_beside(b, a);
+  if (alone == 0) return std::nullopt;
+  return std::pow(kAlone, alone) * std::pow(kTogether, count_together(a, b));
 }
 
 /// What the landmarks around tell of two that are near each other.
@@ -76,14 +90,19 @@ Neighbourhood neighbourhood_of(const Eigen::Vector2d& position_m, const GlobalMa
   return {all / (std::numbers::pi * kNeighbourhood_m * kNeighbourhood_m), missing * missing};
 }
 
-/// How much likelier it is that two landmarks so far apart are one than that they are two
-/// neighbours, of which each pass missed one.
-double odds_of_one(const Eigen::Vector2d& apart_m, const Eigen::Matrix2d& covariance_m2,
-                   const Neighbourhood& around) {
+/// Density [1/m^2] of the distance of two landmarks that are one.
+double density_of_one(const Eigen::Vector2d& apart_m, const Eigen::Matrix2d& covariance_m2) {
   const double squared = apart_m.dot(covariance_m2.inverse() * apart_m);
-  const double density_of_one = std::pow(1.0 + squared / kTail, -0.5 * (kTail + 2.0)) /
-                                (2.0 * std::numbers::pi * std::sqrt(covariance_m2.determinant()));
-  return density_of_one / (around.density_per_m2 * around.missing_odds);
+  return std::pow(1.0 + squared / kTail, -0.5 * (kTail + 2.0)) /
+         (2.0 * std::numbers::pi * std::sqrt(covariance_m2.determinant()));
+}
+
+/// The same where one of them may have been moved by bad scans, to anywhere within the distance
+/// within which doubles are looked for.
+double density_of_moved(const Eigen::Vector2d& apart_m, const Eigen::Matrix2d& covariance_m2,
+                        double merge_distance_m) {
+  return density_of_one(apart_m, covariance_m2) +
+         kMoved / (std::numbers::pi * merge_distance_m * merge_distance_m);
 }
 
 /// Whether a third landmark, that is another one than one of the two, lies where they may be.
@@ -116,12 +135,21 @@ Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
   if (gate_m > parameters.merge_distance_m || has_rival(a, b, gate_m, map.landmarks))
     return Sameness::kTwo;
 
-  // One, whatever the distance, or by the distance.
-  if (touch || are_observed_in_turns(a, b)) return Sameness::kOne;
+  // Of two that were never seen on one way each pass missed one.
+  if (touch) return Sameness::kOne;
   const double floor_m = parameters.gate_floor_m / parameters.gate_sigmas;
   const Eigen::Matrix2d spread = *covariance + floor_m * floor_m * Eigen::Matrix2d::Identity();
   const Neighbourhood around = neighbourhood_of(a.position_m, map);
-  return odds_of_one(apart, spread, around) >= kLeastOdds ? Sameness::kOneByPlace : Sameness::kTwo;
+  const double two_by_place = around.density_per_m2 * around.missing_odds;
+  if (apart.norm() <= gate_m && density_of_one(apart, spread) >= kLeastOdds * two_by_place)
+    return Sameness::kOneByPlace;
+
+  // Of two that were, none was missed.
+  const auto turns = odds_by_turns(a, b);
+  if (!turns) return Sameness::kTwo;
+  const double one = *turns * density_of_moved(apart, spread, parameters.merge_distance_m);
+  const double two = std::max(kLeastDensity, around.density_per_m2);
+  return one >= kLeastOdds * two ? Sameness::kOne : Sameness::kTwo;
 }
 
 /// A landmark that is the same as this one, and whether that is final.

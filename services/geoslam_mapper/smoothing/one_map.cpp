@@ -173,7 +173,6 @@ std::optional<Placement> OneMap::place(const model::Keyframe& keyframe,
                                        model::MapUpdate& update) {
   std::optional<Placement> placement;
   if (prediction) placement = place_recogniser_.track(keyframe, *prediction, map_);
-  if (placement) map_.landmarks.set_loose(placement->loose);
   if (!placement) {
     map_.landmarks.catch_up();
     SearchResult searched = place_recogniser_.search(keyframe, map_);
@@ -182,6 +181,7 @@ std::optional<Placement> OneMap::place(const model::Keyframe& keyframe,
     update.reason = std::move(searched.reason);
     placement = std::move(searched.placement);
   }
+  if (placement) map_.landmarks.set_loose(placement->loose);
 
   if (placement && contradicts_filter(keyframe, *placement, motion_.filter(), map_,
                                       parameters_.filter_disagreement_m)) {

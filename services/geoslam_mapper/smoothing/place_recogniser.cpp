@@ -4,10 +4,11 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "common/geometry/registration.hpp"
-#include "services/geoslam_mapper/smoothing/relative_variance.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 namespace {
@@ -35,12 +36,35 @@ constexpr double kNarrow_m = 0.3;
 /// covariances say is common to all around, and the vehicle was placed among these.
 constexpr double kNarrowGiven_m = 1.0;
 
-/// Whether the gate of a landmark that was not observed lately is so wide that another one may be
-/// meant. All of a pass are off together then.
-bool is_loose(const StoredLandmark& landmark, double gate_m, int recent_keyframes,
-              const GlobalMap& map) {
+/// Whether the gate of a landmark that does not share the reference's error is so wide that another
+/// one may be meant. All of a pass are off together then.
+bool is_loose(const StoredLandmark& landmark, double gate_m,
+              const std::optional<Reference>& reference, int recent_keyframes) {
   const double narrow_m = landmark.nodes.empty() ? kNarrowGiven_m : kNarrow_m;
-  return gate_m > narrow_m && !is_recent(landmark, map, recent_keyframes);
+  return gate_m > narrow_m && !(reference && is_recent(landmark, *reference, recent_keyframes));
+}
+
+/// The last keyframe; none where the map has none.
+std::optional<Reference> last_keyframe(const GlobalMap& map) {
+  if (map.trajectory.bases().empty()) return std::nullopt;
+  return Reference{map.trajectory.last().node, map.trajectory.size()};
+}
+
+/// What saw the landmarks among which the vehicle was found: the middle one of those that the
+/// graph has, in the order in which they were seen last.
+std::optional<Reference> seen_from(std::span<const constellation::PointAssociation> found,
+                                   const GlobalMap& map) {
+  std::vector<const StoredLandmark*> seen;
+  for (const constellation::PointAssociation& one : found) {
+    const StoredLandmark& landmark = map.landmarks.at(one.landmark_id);
+    if (!landmark.nodes.empty() && map.graph.position(landmark.id)) seen.push_back(&landmark);
+  }
+  if (seen.empty()) return last_keyframe(map);
+  const auto middle = seen.begin() + static_cast<std::ptrdiff_t>(seen.size() / 2);
+  std::nth_element(seen.begin(), middle, seen.end(), [](const auto* a, const auto* b) {
+    return std::pair(a->last_keyframe, a->id) < std::pair(b->last_keyframe, b->id);
+  });
+  return Reference{(*middle)->nodes.back(), (*middle)->last_keyframe};
 }
 
 /// How many of the keyframe's landmarks could be in the map: not more than the map has in the field
@@ -74,18 +98,20 @@ Eigen::Matrix3d without_guess(const Eigen::Matrix3d& registered, const Eigen::Ma
 }  // namespace
 
 Placement PlaceRecogniser::associate(const model::Keyframe& keyframe,
-                                     const geometry::SE2WithCovariance& guess, bool with_loose,
+                                     const geometry::SE2WithCovariance& guess,
+                                     const std::optional<Reference>& relative_to,
                                      const GlobalMap& map) const {
   // The map's landmarks around the guess.
   std::vector<model::LandmarkId> ids = landmarks_in_view(keyframe, guess, map.landmarks);
-  const std::vector<double> variances = relative_variances(ids, map, parameters_.recent_keyframes);
+  const std::vector<double> variances =
+      relative_variances(ids, relative_to, parameters_.recent_keyframes, map);
   std::vector<geometry::UncertainPoint> reference;
   std::vector<model::LandmarkId> loose;
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const StoredLandmark& landmark = map.landmarks.at(ids[i]);
     const double gate_m =
         parameters_.gate_sigmas * std::sqrt(variances[i]) + parameters_.gate_floor_m;
-    if (!with_loose && is_loose(landmark, gate_m, parameters_.recent_keyframes, map)) {
+    if (is_loose(landmark, gate_m, relative_to, parameters_.recent_keyframes)) {
       loose.push_back(ids[i]);
       continue;
     }
@@ -119,7 +145,7 @@ Placement PlaceRecogniser::associate(const model::Keyframe& keyframe,
 std::optional<Placement> PlaceRecogniser::track(const model::Keyframe& keyframe,
                                                 const Prediction& prediction,
                                                 const GlobalMap& map) const {
-  Placement placement = associate(keyframe, prediction.map_T_centre, false, map);
+  Placement placement = associate(keyframe, prediction.map_T_centre, last_keyframe(map), map);
   const std::size_t possible =
       count_matchable(keyframe, placement.map_T_centre.mean, placement.loose, map.landmarks);
   const std::size_t matched = placement.associations.size();
@@ -150,7 +176,7 @@ SearchResult PlaceRecogniser::search(const model::Keyframe& keyframe, const Glob
 
   // Association around that pose, which rests on the same landmarks: they count once.
   const geometry::SE2WithCovariance guess{found.map_T_sensor, found.covariance};
-  result.placement = associate(keyframe, guess, true, map);
+  result.placement = associate(keyframe, guess, seen_from(found.associations, map), map);
   result.placement->by_prediction = false;
   Eigen::Matrix3d& covariance = result.placement->map_T_centre.covariance;
   covariance = without_guess(covariance, guess.covariance);

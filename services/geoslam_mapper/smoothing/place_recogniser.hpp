@@ -7,6 +7,7 @@
 #include "common/model/keyframe.hpp"
 #include "services/geoslam_mapper/smoothing/global_map.hpp"
 #include "services/geoslam_mapper/smoothing/placement.hpp"
+#include "services/geoslam_mapper/smoothing/relative_variance.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 
@@ -30,13 +31,14 @@ class PlaceRecogniser {
   std::optional<Placement> track(const model::Keyframe& keyframe, const Prediction& prediction,
                                  const GlobalMap& map) const;
 
-  /// Search of the whole map without any prior (constellation::ConstellationMap). Its index must be
-  /// up to date: LandmarkMap::catch_up().
+  /// Search of the whole map without any prior (constellation::ConstellationMap). Landmarks count
+  /// whose gates tell them apart from where the vehicle was found, not from where it comes from.
+  /// The index must be up to date: LandmarkMap::catch_up().
   SearchResult search(const model::Keyframe& keyframe, const GlobalMap& map) const;
 
  private:
   Placement associate(const model::Keyframe& keyframe, const geometry::SE2WithCovariance& guess,
-                      bool with_loose, const GlobalMap& map) const;
+                      const std::optional<Reference>& relative_to, const GlobalMap& map) const;
 
   SmoothingMapperParameters parameters_;
 };

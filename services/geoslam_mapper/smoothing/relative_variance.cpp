@@ -10,13 +10,23 @@ namespace {
 /// Most landmarks whose exact covariance is computed. It varies slowly over a part of the map that
 /// was observed at one time.
 constexpr std::size_t kMaxExact = 8;
+/// Path of landmarks that no drive of this map has seen [m]: away from all others.
+constexpr double kBeforeAll_m = -1e6;
 
-double squared_distance(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return (a - b).squaredNorm();
+/// Where a landmark is, and the vehicle's path when it was seen last [m]. Two passes by one place
+/// are far from each other there: what is known of one says nothing of the other.
+using Place = Eigen::Vector3d;
+
+Place place_of(const StoredLandmark& landmark, const PoseGraph& graph) {
+  const double along_m =
+      landmark.nodes.empty() ? kBeforeAll_m : graph.node(landmark.nodes.back()).along_m;
+  return {landmark.position_m.x(), landmark.position_m.y(), along_m};
 }
 
+double squared_distance(const Place& a, const Place& b) { return (a - b).squaredNorm(); }
+
 /// Up to `most` of the points, each the one furthest from those before it.
-std::vector<std::size_t> spread(std::span<const Eigen::Vector2d> points, std::size_t most) {
+std::vector<std::size_t> spread(std::span<const Place> points, std::size_t most) {
   std::vector<std::size_t> chosen;
   std::vector<double> nearest(points.size(), std::numeric_limits<double>::infinity());
   while (chosen.size() < std::min(most, points.size())) {
@@ -32,7 +42,7 @@ std::vector<std::size_t> spread(std::span<const Eigen::Vector2d> points, std::si
 struct OldLandmarks {
   std::vector<std::size_t> numbers;  ///< Among the landmarks asked for.
   std::vector<model::LandmarkId> ids;
-  std::vector<Eigen::Vector2d> positions;
+  std::vector<Place> places;
 };
 
 /// Of the landmarks `chosen` among the old ones, the one nearest to old landmark `i`.
@@ -40,8 +50,8 @@ std::size_t nearest_chosen(const OldLandmarks& old, const std::vector<std::size_
                            std::size_t i) {
   std::size_t nearest = 0;
   for (std::size_t k = 1; k < chosen.size(); ++k) {
-    if (squared_distance(old.positions[i], old.positions[chosen[k]]) <
-        squared_distance(old.positions[i], old.positions[chosen[nearest]])) {
+    if (squared_distance(old.places[i], old.places[chosen[k]]) <
+        squared_distance(old.places[i], old.places[chosen[nearest]])) {
       nearest = k;
     }
   }
@@ -50,33 +60,35 @@ std::size_t nearest_chosen(const OldLandmarks& old, const std::vector<std::size_
 
 }  // namespace
 
-bool is_recent(const StoredLandmark& landmark, const GlobalMap& map, int recent_keyframes) {
-  return landmark.last_keyframe + static_cast<std::uint32_t>(recent_keyframes) >=
-         map.trajectory.size();
+bool is_recent(const StoredLandmark& landmark, const Reference& reference, int recent_keyframes) {
+  const auto recent = static_cast<std::uint32_t>(recent_keyframes);
+  return landmark.last_keyframe + recent >= reference.keyframe &&
+         landmark.last_keyframe <= reference.keyframe + recent;
 }
 
 std::vector<double> relative_variances(const std::vector<model::LandmarkId>& ids,
-                                       const GlobalMap& map, int recent_keyframes) {
+                                       const std::optional<Reference>& reference,
+                                       int recent_keyframes, const GlobalMap& map) {
   // The local variance, and which landmarks need more.
   std::vector<double> variances;
   OldLandmarks old;
   for (const model::LandmarkId id : ids) {
     const StoredLandmark& landmark = map.landmarks.at(id);
     variances.push_back(landmark.local_variance());
-    if (is_recent(landmark, map, recent_keyframes) || !map.graph.position(id)) continue;
+    if (!reference || is_recent(landmark, *reference, recent_keyframes) || !map.graph.position(id))
+      continue;
     old.numbers.push_back(variances.size() - 1);
     old.ids.push_back(id);
-    old.positions.push_back(landmark.position_m);
+    old.places.push_back(place_of(landmark, map.graph));
   }
-  if (old.ids.empty() || map.trajectory.bases().empty()) return variances;
+  if (old.ids.empty()) return variances;
 
   // The exact variance of a few.
-  const std::vector<std::size_t> chosen = spread(old.positions, kMaxExact);
+  const std::vector<std::size_t> chosen = spread(old.places, kMaxExact);
   std::vector<model::LandmarkId> chosen_ids;
   chosen_ids.reserve(chosen.size());
   for (const std::size_t i : chosen) chosen_ids.push_back(old.ids[i]);
-  const std::vector<double> exact =
-      map.graph.relative_variances(map.trajectory.last().node, chosen_ids);
+  const std::vector<double> exact = map.graph.relative_variances(reference->node, chosen_ids);
   if (exact.empty()) return variances;
 
   // The others take that of the nearest of them.

@@ -1,21 +1,31 @@
 // Uncertainty of landmarks relative to the vehicle.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "services/geoslam_mapper/smoothing/global_map.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// Whether the landmark was observed within the last `recent_keyframes`: it shares the vehicle's
-/// error.
-bool is_recent(const StoredLandmark& landmark, const GlobalMap& map, int recent_keyframes);
+/// What landmarks' errors are relative to: a node, and the number of keyframes when it was new.
+struct Reference {
+  NodeIndex node = 0;
+  std::uint32_t keyframe = 0;
+};
 
-/// Variance [m^2, per axis] of each landmark's position relative to the last accepted keyframe.
-/// Landmarks observed within `recent_keyframes` share the vehicle's error: theirs is the local one.
-/// For the others (a loop is closing) the graph's joint covariance is asked, exactly for at most
-/// eight that are spread out; the rest take that of their nearest one.
+/// Whether the landmark was observed last within `recent_keyframes` of the reference: it shares the
+/// error of that node.
+bool is_recent(const StoredLandmark& landmark, const Reference& reference, int recent_keyframes);
+
+/// Variance [m^2, per axis] of each landmark's position relative to the reference. Landmarks
+/// observed within `recent_keyframes` of it share its error: theirs is the local one. For the
+/// others (a loop is closing) the graph's joint covariance is asked, exactly for at most eight that
+/// are spread out; the rest take that of their nearest one, in place and in the path of the vehicle
+/// that saw them last. All local without a reference.
 std::vector<double> relative_variances(const std::vector<model::LandmarkId>& ids,
-                                       const GlobalMap& map, int recent_keyframes);
+                                       const std::optional<Reference>& reference,
+                                       int recent_keyframes, const GlobalMap& map);
 
 }  // namespace understory::geoslam_mapper::smoothing
