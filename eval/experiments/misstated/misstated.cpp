@@ -110,11 +110,7 @@ std::vector<health::Fault> wrong_statements() {
       {"mounted 5 cm ahead", each_detection([](auto& one) { one.position_m.x() += 0.05; })});
   result.push_back(
       {"mounted 5 cm to the left", each_detection([](auto& one) { one.position_m.y() += 0.05; })});
-  result.push_back({"scans stamped 20 ms late", [](sim::DriveStep& step, std::mt19937_64&) {
-                      for (model::Detection& one : step.scan.detections) {
-                        one.position_m.x() += 0.02 * step.velocity_mps.norm();
-                      }
-                    }});
+  result.push_back({"scans stamped 20 ms late", health::late_by(0.02)});
 
   // Shaken: each scan is turned as a whole, which no covariance of a single detection states.
   result.push_back({"vibration of 0.3 degrees", [](sim::DriveStep& step, std::mt19937_64& random) {
