@@ -12,7 +12,7 @@ namespace {
 const CalibrationNumbers kPrior_sigma =
     (CalibrationNumbers() << 0.2, 1.0, 1.0, 0.2, 0.5, 0.01).finished();
 /// Error of the turn of a step that its covariances do not have [rad]: levelling, the bias's walk.
-constexpr double kTurnModel_rad = 5e-4;
+constexpr double kStepModel_rad = 5e-4;
 /// Residual of a turn [sigma] beyond which its weight falls: a wrong pair must not decide.
 constexpr double kRobustTurn = 2.5;
 /// chi^2 of the turn of a step that counts at most, for the same reason.
@@ -126,7 +126,7 @@ double CalibrationWatch::Memory::contradiction(const TwoMotions& motions) const 
 void CalibrationWatch::Memory::compare_steps(const TwoMotions& motions) {
   const double turn = (motions.by_odometry.mean.inverse() * motions.by_landmarks.mean).theta();
   const double variance = motions.by_landmarks.covariance(2, 2) +
-                          motions.by_odometry.covariance(2, 2) + kTurnModel_rad * kTurnModel_rad;
+                          motions.by_odometry.covariance(2, 2) + kStepModel_rad * kStepModel_rad;
   const double by_bias = turned_rad_ / (turned_s_ + kNoBias_s) * motions.seconds;
   const double chi2 = (turn - by_bias) * (turn - by_bias) / variance;
   if (!std::isfinite(chi2)) return;
