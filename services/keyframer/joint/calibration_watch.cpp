@@ -95,12 +95,15 @@ void CalibrationWatch::compare(const model::ScanMotion& motion) {
   if (!motions) return;
   const double passed_s = seconds_between(last_utime_, motion.now_utime);
   last_utime_ = motion.now_utime;
+  // Motions from one scan share its noise.
+  const bool is_other_start = motion.then_utime > last_start_utime_;
+  last_start_utime_ = motion.then_utime;
   const bool is_due = motions->has_wheels && motion.now_utime >= due_utime_;
   if (is_due) due_utime_ = motion.now_utime + (motion.now_utime - motion.then_utime) / 2;
 
   for (Memory* memory : {&minutes_, &seconds_}) {
     memory->forget(passed_s);
-    memory->compare_turns(*motions, std::max(1.0, motions->seconds / passed_s));
+    if (is_other_start) memory->compare_turns(*motions, std::max(1.0, motions->seconds / passed_s));
     if (is_due) memory->compare_ways(*motions);
   }
 }

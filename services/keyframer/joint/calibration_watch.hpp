@@ -52,7 +52,7 @@ class CalibrationWatch {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.odometry_, self.waiting_, self.wheels_since_, self.due_utime_, self.last_utime_,
-      self.minutes_, self.seconds_, self.contradicts_);
+      self.last_start_utime_, self.minutes_, self.seconds_, self.contradicts_);
   }
 
  private:
@@ -98,6 +98,7 @@ class CalibrationWatch {
   model::Utime wheels_since_ = 0;          ///< Since then each increment has wheels.
   model::Utime due_utime_ = 0;             ///< Ways that end before it overlap too much.
   model::Utime last_utime_ = 0;            ///< End of the last motion.
+  model::Utime last_start_utime_ = 0;
   Memory minutes_{120.0};
   Memory seconds_{10.0};
   bool contradicts_ = false;
