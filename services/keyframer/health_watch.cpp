@@ -72,9 +72,8 @@ HealthWatch::HealthWatch(const HealthParameters& parameters)
                 "landmarks are turned or shifted against the way by wheels: the sensor's mounting",
                 "LANDMARKS", bus::Condition(parameters.misstated)},
       late_{wire::Reason::kMiscalibrated,
-            "landmarks moved as odometry did some time before or after: stamps of scans are late "
-            "or early by a constant",
-            "LANDMARKS", bus::Condition(parameters.misstated)},
+            "scans are stamped late or early by a constant against odometry: a clock", "",
+            bus::Condition(parameters.misstated)},
       scale_{wire::Reason::kMiscalibrated,
              "the way by wheels is longer or shorter than by landmarks: wheel scale", "ODOMETRY",
              bus::Condition(parameters.misstated)} {}

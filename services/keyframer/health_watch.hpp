@@ -35,8 +35,8 @@ void describe(HealthParameters& parameters, bus::ParameterTable& table);
 /// a whole against the gyro by far more than is stated.
 /// `diverged`: landmarks moved otherwise than odometry says, as after a jump or where wheels slip.
 /// `miscalibrated`: landmarks and odometry contradict each other by more than chance, in the yaw
-/// or the place of the mounting, in the stamps of scans (channel LANDMARKS), or in the length of
-/// the way (channel ODOMETRY).
+/// or the place of the mounting (channel LANDMARKS), in the length of the way (channel ODOMETRY),
+/// or in their stamps (no channel: either clock may be wrong).
 class HealthWatch {
  public:
   /// All is well so far.
@@ -45,7 +45,7 @@ class HealthWatch {
   /// A scan, with the keyframer's counts before and after it.
   void add(const model::LandmarkScan& scan, const KeyframerCounters& before,
            const KeyframerCounters& after, const InputQuality& quality = {});
-  /// What to show.
+  /// What to show; no two have channel and reason in common.
   std::array<bus::WatchedCondition, 9> conditions() const {
     return {lost_, withheld_, refused_, misstated_, shaken_, jumped_, mounting_, late_, scale_};
   }

@@ -1,4 +1,8 @@
 // What HEALTH says of the keyframer, by faults of its input.
+#include <set>
+#include <string>
+#include <utility>
+
 #include "services/keyframer/health_watch.hpp"
 #include "services/keyframer/joint/joint_keyframer.hpp"
 #include "sim/drive.hpp"
@@ -147,14 +151,14 @@ TEST_CASE("What landmarks and odometry contradict each other in is named", "[hea
   late.late_sigma_s = 0.001;
   CHECK_FALSE(after(late).is_miscalibrated());
   late.late_s = -0.02;
-  CHECK(shows(after(late), wire::Reason::kMiscalibrated, "LANDMARKS"));
+  CHECK(shows(after(late), wire::Reason::kMiscalibrated, ""));
   late.late_sigma_s = 0.01;
   CHECK_FALSE(after(late).is_miscalibrated());
   auto turning = none;
   turning.rate_rad_s = 1.0;
   turning.late_s = 0.02;
   turning.late_sigma_s = 0.001;
-  CHECK(shows(after(turning), wire::Reason::kMiscalibrated, "LANDMARKS"));
+  CHECK(shows(after(turning), wire::Reason::kMiscalibrated, ""));
   auto longer = none;
   longer.scale = 0.03;
   CHECK(shows(after(longer), wire::Reason::kMiscalibrated, "ODOMETRY"));
@@ -203,6 +207,14 @@ bool named_after(double seconds, double late_s, std::uint64_t seed) {
 }
 
 }  // namespace
+
+TEST_CASE("Each condition has a name of its own", "[health]") {
+  std::set<std::pair<wire::Reason, std::string>> names;
+  const HealthWatch watch;
+  for (const bus::WatchedCondition& one : watch.conditions()) {
+    CHECK(names.emplace(one.reason, one.channel).second);
+  }
+}
 
 TEST_CASE("Scans that are late or early by a constant are named", "[health]") {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
