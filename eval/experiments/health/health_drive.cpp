@@ -234,6 +234,7 @@ std::vector<Fault> faults() {
          one.position_m.template head<2>() = mounted * one.position_m.template head<2>();
        })},
       {"scans stamped 0.2 s late", late_by(0.2)},
+      {"scans stamped 50 ms late", late_by(0.05)},
       {"carried away", {}, 30.0},
   };
 }
