@@ -85,6 +85,7 @@ InertialDrive::Tick InertialDrive::Body::move(double dt, double yaw_rad,
   tick.acceleration_mps2 = rotation(-mid) * (velocity_mps_after - velocity_mps) / dt;
   position_m += 0.5 * (velocity_mps_after + velocity_mps) * dt;
   velocity_mps = velocity_mps_after;
+  rate_rad_s = yaw_rad / dt;
   return tick;
 }
 
@@ -266,6 +267,7 @@ DriveStep InertialDrive::next() {
 
   step.world_T_vehicle = body_.pose();
   step.velocity_mps = body_.velocity_mps;
+  step.rate_rad_s = body_.rate_rad_s;
   step.bias = bias_;
   step.driven_m = progress_.driven_m;
   step.scan.utime = utime;

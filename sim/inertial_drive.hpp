@@ -71,6 +71,7 @@ struct DriveStep {
   std::vector<std::int64_t> trunks;  ///< Behind each detection; -1 = clutter.
   geometry::SE2 world_T_vehicle;
   Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Frame world.
+  double rate_rad_s = 0.0;
   model::InertialBias bias = model::InertialBias::Zero();
   double driven_m = 0.0;
 };
@@ -97,6 +98,7 @@ class InertialDrive {
     Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
     double theta_rad = 0.0;
     Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();
+    double rate_rad_s = 0.0;
 
     geometry::SE2 pose() const { return {position_m, theta_rad}; }
     /// Rotates by `yaw_rad` within `dt`, at the end of which it has this velocity.

@@ -26,6 +26,12 @@ struct ScanMotion {
   Utime then_utime = 0;
   Utime now_utime = 0;
   geometry::SE2WithCovariance then_T_now;
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.then_utime, s.now_utime, s.then_T_now);
+  }
 };
 
 /// Learns by which factor the variance of detections differs from what LANDMARKS states, for each

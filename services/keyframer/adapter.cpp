@@ -12,7 +12,7 @@
 namespace understory::keyframer {
 namespace {
 
-constexpr state::Format kServiceFormat{"keyframer_service", 3};
+constexpr state::Format kServiceFormat{"keyframer_service", 4};
 
 class KeyframerAdapter : public bus::Adapter {
  public:
@@ -74,10 +74,12 @@ class KeyframerAdapter : public bus::Adapter {
         bus::Node::Level::kWarning, "miscalibrated",
         fmt::format(
             "landmarks against wheels by the last {}: yaw {:.2f} +- {:.2f} deg, ahead {:.3f} +- "
-            "{:.3f} m, left {:.3f} +- {:.3f} m, way by wheels {:+.2f} +- {:.2f} %",
+            "{:.3f} m, left {:.3f} +- {:.3f} m, way by wheels {:+.2f} +- {:.2f} %, scans late by "
+            "{:.1f} +- {:.1f} ms",
             by, degrees * error.yaw_rad, degrees * error.yaw_sigma_rad, error.place_m.x(),
             error.place_sigma_m.x(), error.place_m.y(), error.place_sigma_m.y(),
-            100.0 * error.scale, 100.0 * error.scale_sigma),
+            100.0 * error.scale, 100.0 * error.scale_sigma, 1e3 * error.late_s,
+            1e3 * error.late_sigma_s),
         channels_.landmarks);
   }
 

@@ -38,7 +38,8 @@ void describe(HealthParameters& p, bus::ParameterTable& table) {
             "called wrong.");
   table.add("health.max_place_error_m", p.max_place_error_m, {0.001, 100.0}, "m",
             "Place of the landmarks' frame against the way by wheels, along either axis, from "
-            "which the mounting (or the clock) is called wrong.");
+            "which the mounting is called wrong. Scans are called late or early if they are so by "
+            "the time in which the vehicle moves so far, or turns by the largest yaw error.");
   table.add("health.max_scale_error", p.max_scale_error, {0.001, 1.0}, "",
             "Share by which the way by wheels differs from that by landmarks from which the wheel "
             "scale is called wrong.");
@@ -68,9 +69,11 @@ HealthWatch::HealthWatch(const HealthParameters& parameters)
               "landmarks moved otherwise than odometry says: a jump, a clock, or wheels that slip",
               "", bus::Condition(parameters.jumped)},
       mounting_{wire::Reason::kMiscalibrated,
-                "landmarks are turned or shifted against the way by wheels: the sensor's mounting, "
-                "or its clock",
+                "landmarks are turned or shifted against the way by wheels: the sensor's mounting",
                 "LANDMARKS", bus::Condition(parameters.misstated)},
+      late_{wire::Reason::kMiscalibrated,
+            "scans are stamped late or early by a constant against odometry: a clock", "",
+            bus::Condition(parameters.misstated)},
       scale_{wire::Reason::kMiscalibrated,
              "the way by wheels is longer or shorter than by landmarks: wheel scale", "ODOMETRY",
              bus::Condition(parameters.misstated)} {}
@@ -89,6 +92,13 @@ void HealthWatch::judge(const InputQuality& quality) {
     return is_off(error.yaw_rad, error.yaw_sigma_rad, parameters_.max_yaw_error_rad) ||
            is_off(error.place_m.x(), error.place_sigma_m.x(), most_m) ||
            is_off(error.place_m.y(), error.place_sigma_m.y(), most_m);
+  }));
+  late_.condition.add(either(quality, [&](const CalibrationError& error) {
+    const auto moves = [&](double speed, double most) {
+      return is_off(speed * error.late_s, speed * error.late_sigma_s, most);
+    };
+    return moves(error.speed_mps, parameters_.max_place_error_m) ||
+           moves(error.rate_rad_s, parameters_.max_yaw_error_rad);
   }));
   scale_.condition.add(either(quality, [&](const CalibrationError& error) {
     return is_off(error.scale, error.scale_sigma, parameters_.max_scale_error);

@@ -20,7 +20,7 @@ struct HealthParameters {
   bus::ConditionLimits misstated{20, 10};
   bus::ConditionLimits jumped{50, 1};
   double max_yaw_error_rad = 0.0175;  ///< Of landmarks against wheels.
-  double max_place_error_m = 0.04;    ///< Of the sensor, along either axis.
+  double max_place_error_m = 0.04;    ///< Of the sensor, along either axis, or by lateness.
   double max_scale_error = 0.025;     ///< Of wheels against landmarks.
   double max_turn_chi2 = 4.0;         ///< Of landmarks' turns against the gyro's, on average.
   double calibration_sigmas = 5.0;    ///< From which such an error counts.
@@ -34,8 +34,9 @@ void describe(HealthParameters& parameters, bus::ParameterTable& table);
 /// LANDMARKS states, and those that they show are used; or (channel LANDMARKS) scans are turned as
 /// a whole against the gyro by far more than is stated.
 /// `diverged`: landmarks moved otherwise than odometry says, as after a jump or where wheels slip.
-/// `miscalibrated`: landmarks and wheels contradict each other by more than chance, in the yaw of
-/// or the place of the mounting (channel LANDMARKS) or in the length of the way (channel ODOMETRY).
+/// `miscalibrated`: landmarks and odometry contradict each other by more than chance, in the yaw
+/// or the place of the mounting (channel LANDMARKS), in the length of the way (channel ODOMETRY),
+/// or in their stamps (no channel: either clock may be wrong).
 class HealthWatch {
  public:
   /// All is well so far.
@@ -44,18 +45,20 @@ class HealthWatch {
   /// A scan, with the keyframer's counts before and after it.
   void add(const model::LandmarkScan& scan, const KeyframerCounters& before,
            const KeyframerCounters& after, const InputQuality& quality = {});
-  /// What to show.
-  std::array<bus::WatchedCondition, 8> conditions() const {
-    return {lost_, withheld_, refused_, misstated_, shaken_, jumped_, mounting_, scale_};
+  /// What to show; no two have channel and reason in common.
+  std::array<bus::WatchedCondition, 9> conditions() const {
+    return {lost_, withheld_, refused_, misstated_, shaken_, jumped_, mounting_, late_, scale_};
   }
   /// True while landmarks and wheels contradict each other.
-  bool is_miscalibrated() const { return mounting_.condition.holds() || scale_.condition.holds(); }
+  bool is_miscalibrated() const {
+    return mounting_.condition.holds() || late_.condition.holds() || scale_.condition.holds();
+  }
 
   /// Members of a saved state; see common/state. The parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.lost_, self.withheld_, self.refused_, self.misstated_, self.shaken_, self.jumped_,
-      self.mounting_, self.scale_, self.scans_without_keyframe_);
+      self.mounting_, self.late_, self.scale_, self.scans_without_keyframe_);
   }
 
  private:
@@ -69,6 +72,7 @@ class HealthWatch {
   bus::WatchedCondition shaken_;
   bus::WatchedCondition jumped_;
   bus::WatchedCondition mounting_;
+  bus::WatchedCondition late_;
   bus::WatchedCondition scale_;
   int scans_without_keyframe_ = 0;
 };

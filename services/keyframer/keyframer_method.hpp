@@ -33,12 +33,18 @@ struct KeyframerCounters {
 struct CalibrationError {
   double yaw_rad = 0.0;  ///< The landmarks' frame against the wheels': mounting.
   double yaw_sigma_rad = 1.0;
-  /// The sensor beside its configured place, ahead and to the left. A clock that is late by s
-  /// seconds looks like a sensor s times the speed further ahead.
+  /// The sensor beside its configured place, ahead and to the left.
   Eigen::Vector2d place_m = Eigen::Vector2d::Zero();
   Eigen::Vector2d place_sigma_m = Eigen::Vector2d::Ones();
   double scale = 0.0;  ///< Share by which wheels measure a longer way.
   double scale_sigma = 1.0;
+  /// Stamps of scans after the time at which odometry says that they were made; where rate and
+  /// speed are constant it cannot be told from the place.
+  double late_s = 0.0;
+  double late_sigma_s = 1.0;
+  /// Root mean squares of how the vehicle moved: what such a lateness does to a pose.
+  double speed_mps = 0.0;
+  double rate_rad_s = 0.0;
   /// Mean square of the difference of the turns by landmarks and by gyro, by its variance as
   /// stated. Larger where scans are shaken as a whole, or where the gyro is worse than stated.
   double turn_chi2 = 1.0;

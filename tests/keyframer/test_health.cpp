@@ -1,7 +1,12 @@
 // What HEALTH says of the keyframer, by faults of its input.
+#include <set>
+#include <string>
+#include <utility>
+
 #include "services/keyframer/health_watch.hpp"
 #include "services/keyframer/joint/joint_keyframer.hpp"
 #include "sim/drive.hpp"
+#include "sim/inertial_drive.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
@@ -140,6 +145,20 @@ TEST_CASE("What landmarks and odometry contradict each other in is named", "[hea
   auto displaced = none;
   displaced.place_m.y() = 0.05;
   CHECK(shows(after(displaced), wire::Reason::kMiscalibrated, "LANDMARKS"));
+  auto late = none;  // By less than moves the pose, by more, and by more but not sure.
+  late.speed_mps = 3.0;
+  late.late_s = 0.01;
+  late.late_sigma_s = 0.001;
+  CHECK_FALSE(after(late).is_miscalibrated());
+  late.late_s = -0.02;
+  CHECK(shows(after(late), wire::Reason::kMiscalibrated, ""));
+  late.late_sigma_s = 0.01;
+  CHECK_FALSE(after(late).is_miscalibrated());
+  auto turning = none;
+  turning.rate_rad_s = 1.0;
+  turning.late_s = 0.02;
+  turning.late_sigma_s = 0.001;
+  CHECK(shows(after(turning), wire::Reason::kMiscalibrated, ""));
   auto longer = none;
   longer.scale = 0.03;
   CHECK(shows(after(longer), wire::Reason::kMiscalibrated, "ODOMETRY"));
@@ -150,4 +169,58 @@ TEST_CASE("What landmarks and odometry contradict each other in is named", "[hea
   shaken.turn_chi2 = 6.0;
   CHECK(shows(after(shaken), wire::Reason::kNoiseMisstated, "LANDMARKS"));
   CHECK_FALSE(after(shaken).is_miscalibrated());
+}
+
+namespace {
+
+/// Whether scans that are late by so much are called so after a minute or two in gentle bends.
+bool named_after(double seconds, double late_s, std::uint64_t seed) {
+  sim::ForestParameters forest = sim::forest_parameters(sim::ForestKind::kIntermediate);
+  forest.side_m = 300.0;
+  const sim::TrunkField field = sim::make_trunk_field(forest, seed);
+  sim::InertialDriveParameters parameters;
+  parameters.stationary_s = 2.0;
+  parameters.loop_length_m = 400.0;
+  parameters.range_m = 20.0;
+  parameters.position_sigma_m = 0.03;
+  parameters.odometry = sim::OdometryKind::kInertialAndWheels;
+  sim::InertialDrive drive(parameters, field, seed);
+
+  joint::JointKeyframer keyframer{JointKeyframerParameters{}};
+  HealthWatch watch;
+  for (int k = 0; k < static_cast<int>(10.0 * seconds); ++k) {
+    sim::DriveStep step = drive.next();
+    const Eigen::Vector2d velocity_mps =
+        step.world_T_vehicle.rotation().transpose() * step.velocity_mps;
+    const geometry::SE2 then_T_now = geometry::SE2::Exp(
+        late_s * Eigen::Vector3d(velocity_mps.x(), velocity_mps.y(), step.rate_rad_s));
+    for (model::Detection& one : step.scan.detections) {
+      one.position_m.head<2>() = then_T_now * Eigen::Vector2d(one.position_m.head<2>());
+    }
+    for (const model::Odometry& increment : step.odometry) keyframer.add(increment);
+    const KeyframerCounters before = keyframer.counters();
+    keyframer.add(step.scan);
+    watch.add(step.scan, before, keyframer.counters(), keyframer.input_quality());
+    if (late_s == 0.0 && watch.is_miscalibrated()) return true;
+  }
+  return watch.is_miscalibrated();
+}
+
+}  // namespace
+
+TEST_CASE("Each condition has a name of its own", "[health]") {
+  std::set<std::pair<wire::Reason, std::string>> names;
+  const HealthWatch watch;
+  for (const bus::WatchedCondition& one : watch.conditions()) {
+    CHECK(names.emplace(one.reason, one.channel).second);
+  }
+}
+
+TEST_CASE("Scans that are late or early by a constant are named", "[health]") {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    CHECK(named_after(30.0, 0.2, seed));
+    CHECK(named_after(60.0, -0.1, seed));
+    CHECK(named_after(60.0, 0.02, seed));
+    CHECK_FALSE(named_after(60.0, 0.0, seed));
+  }
 }

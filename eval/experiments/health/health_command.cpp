@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "common/terminal/interrupt.hpp"
 #include "eval/experiments/experiments.hpp"
@@ -20,6 +21,7 @@ struct HealthOptions {
   int drives = 20;
   std::uint64_t seed = 1;
   int jobs = 1;
+  std::string only;
   std::filesystem::path json;
 };
 
@@ -54,9 +56,19 @@ nlohmann::json to_json(const Row& row) {
           {"reasons", row.sum.reasons}};
 }
 
+/// No fault, and those whose name has `only` in it.
+std::vector<Fault> faults_with(const std::string& only) {
+  std::vector<Fault> kinds = faults();
+  std::erase_if(kinds, [&](const Fault& kind) {
+    return kind.name != "none" && kind.name.find(only) == std::string::npos;
+  });
+  if (kinds.size() < 2) throw std::invalid_argument("--only: no fault has this in its name");
+  return kinds;
+}
+
 /// As many drives without a fault as with one; the faults take turns.
 void run(const HealthOptions& options) {
-  const std::vector<Fault> kinds = faults();
+  const std::vector<Fault> kinds = faults_with(options.only);
   const auto drives = static_cast<std::size_t>(options.drives);
   std::vector<DriveVerdict> verdicts(2 * drives);
   const auto kind_of = [&](std::size_t i) { return i < drives ? 0 : 1 + i % (kinds.size() - 1); };
@@ -79,7 +91,8 @@ void run(const HealthOptions& options) {
     table.push_back(to_json(row));
   }
   if (options.json.empty()) return;
-  const nlohmann::json config = {{"drives", options.drives}, {"seed", options.seed}};
+  nlohmann::json config = {{"drives", options.drives}, {"seed", options.seed}};
+  if (!options.only.empty()) config["only"] = options.only;
   harness::write_json(options.json, harness::result_document("health", config, table));
 }
 
@@ -93,6 +106,7 @@ void add_health_experiment(CLI::App& eval) {
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   command->add_option("--seed", options->seed, "Seed of all randomness")->capture_default_str();
+  command->add_option("--only", options->only, "Only faults whose name has this in it");
   command->add_option("--jobs", options->jobs, "Drives side by side")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();

@@ -190,6 +190,18 @@ void judge(Stages& stages, const sim::DriveStep& step, double now_s, FirstError&
 
 }  // namespace
 
+Meddle late_by(double seconds) {
+  return [seconds](sim::DriveStep& step, std::mt19937_64&) {
+    const Eigen::Vector2d velocity_mps =
+        step.world_T_vehicle.rotation().transpose() * step.velocity_mps;
+    const geometry::SE2 then_T_now = geometry::SE2::Exp(
+        seconds * Eigen::Vector3d(velocity_mps.x(), velocity_mps.y(), step.rate_rad_s));
+    for (model::Detection& one : step.scan.detections) {
+      one.position_m.head<2>() = then_T_now * Eigen::Vector2d(one.position_m.head<2>());
+    }
+  };
+}
+
 std::vector<Fault> faults() {
   const auto for_each = [](const std::function<void(model::Detection&)>& change) {
     return [change](sim::DriveStep& step, std::mt19937_64&) {
@@ -221,11 +233,8 @@ std::vector<Fault> faults() {
       {"mounted 5 degrees off", for_each([mounted](auto& one) {
          one.position_m.template head<2>() = mounted * one.position_m.template head<2>();
        })},
-      {"scans stamped 0.2 s late",
-       [](sim::DriveStep& step, std::mt19937_64&) {
-         const double moved_m = 0.2 * step.velocity_mps.norm();
-         for (model::Detection& one : step.scan.detections) one.position_m.x() += moved_m;
-       }},
+      {"scans stamped 0.2 s late", late_by(0.2)},
+      {"scans stamped 50 ms late", late_by(0.05)},
       {"carried away", {}, 30.0},
   };
 }

@@ -20,6 +20,9 @@ struct Fault {
   Meddle meddle;           ///< Empty = none.
   double skipped_s = 0.0;  ///< The vehicle is carried away: so much of the drive is cut out.
 };
+/// Scans that are so much older than their stamps [s]: what they show is still further ahead, and
+/// not yet turned.
+Meddle late_by(double seconds);
 /// Those of the experiment; the first one is no fault.
 std::vector<Fault> faults();
 

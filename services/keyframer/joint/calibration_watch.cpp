@@ -1,18 +1,21 @@
 #include "services/keyframer/joint/calibration_watch.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 namespace understory::keyframer::joint {
 namespace {
 
-/// What is known before the first comparison: yaw [rad], place [m], scale.
-const Eigen::Vector4d kPrior_sigma(0.2, 1.0, 1.0, 0.2);
-/// Error of a comparison that neither covariance has, as a share of the way: slip, levelling.
-constexpr double kModelShare = 0.01;
-/// The same of a turn [rad]: levelling, the bias's walk.
-constexpr double kTurnModel_rad = 5e-4;
-/// chi^2 of a turn that counts at most: a wrong pair must not decide.
+/// What is known before the first comparison, in the order of the numbers.
+const CalibrationNumbers kPrior_sigma =
+    (CalibrationNumbers() << 0.2, 1.0, 1.0, 0.2, 0.5, 0.01).finished();
+/// Error of the turn of a step that its covariances do not have [rad]: levelling, the bias's walk.
+constexpr double kStepModel_rad = 5e-4;
+/// Residual of a turn [sigma] beyond which its weight falls: a wrong pair must not decide.
+constexpr double kRobustTurn = 2.5;
+/// chi^2 of the turn of a step that counts at most, for the same reason.
 constexpr double kMostTurnChi2 = 25.0;
 /// Weight of the statement against what the turns show.
 constexpr double kStatedTurns = 50.0;
@@ -23,28 +26,16 @@ constexpr double kNoBias_s = 2.0;
 constexpr double kContradiction = 36.0;
 /// Odometry that no scan has asked for is kept so long [us].
 constexpr model::Utime kKept_us = 10'000'000;
+/// Time before and after a motion over which a twist is taken [us]. None of it is within the
+/// motion: the error of its wheels would pass for lateness.
+constexpr model::Utime kTwist_us = 200'000;
+/// Motions that wait for odometry.
+constexpr std::size_t kMostWaiting = 50;
 
-Eigen::Matrix4d prior() { return kPrior_sigma.cwiseAbs2().cwiseInverse().asDiagonal(); }
+CalibrationMatrix prior() { return kPrior_sigma.cwiseAbs2().cwiseInverse().asDiagonal(); }
 
-/// The difference of two ways, and what (psi, e, s) would make of it.
-struct Difference {
-  Eigen::Vector2d value_m;
-  Eigen::Matrix2d covariance_m2;
-  Eigen::Matrix<double, 2, 4> jacobian;
-};
-
-Difference difference_of(const geometry::SE2WithCovariance& by_landmarks,
-                         const geometry::SE2WithCovariance& by_odometry) {
-  const Eigen::Vector2d way = by_odometry.mean.translation();
-  const Eigen::Matrix2d rotation = by_odometry.mean.rotation();
-  const Eigen::Matrix3d sum = by_landmarks.covariance + by_odometry.covariance;
-  Difference result;
-  result.value_m = by_landmarks.mean.translation() - way;
-  result.covariance_m2 =
-      rotation * sum.topLeftCorner<2, 2>() * rotation.transpose() +
-      kModelShare * kModelShare * way.squaredNorm() * Eigen::Matrix2d::Identity();
-  result.jacobian << geometry::perpendicular(way), Eigen::Matrix2d::Identity() - rotation, -way;
-  return result;
+double seconds_between(model::Utime from, model::Utime to) {
+  return 1e-6 * static_cast<double>(to - from);
 }
 
 }  // namespace
@@ -55,77 +46,150 @@ void CalibrationWatch::add(const model::Odometry& increment) {
   if (!increment.has_wheels) wheels_since_ = increment.utime;
 }
 
-std::optional<CalibrationWatch::Both> CalibrationWatch::both_of(
-    const model::ScanMotion& motion) const {
-  const auto by_odometry = odometry_.between(motion.then_utime, motion.now_utime);
+std::optional<Eigen::Vector3d> CalibrationWatch::twist_over(model::Utime from,
+                                                            model::Utime to) const {
+  const auto motion = odometry_.between(from, to);
+  if (!motion) return std::nullopt;
+  return motion->mean.Log() / seconds_between(from, to);
+}
+
+std::optional<TwoMotions> CalibrationWatch::two_motions(const model::ScanMotion& motion) const {
+  const model::Utime then = motion.then_utime;
+  const model::Utime now = motion.now_utime;
+  const auto by_odometry = odometry_.between(then, now);
   if (!by_odometry) return std::nullopt;
-  return Both{motion.then_T_now, *by_odometry,
-              1e-6 * static_cast<double>(motion.now_utime - motion.then_utime),
-              motion.then_utime >= wheels_since_};
+
+  // The twists at both stamps, as if they changed evenly between the middles of two windows. A
+  // constant one says nothing of lateness: so it is where the one or the other is unknown.
+  const auto before = twist_over(then - kTwist_us, then);
+  const auto after = twist_over(now, now + kTwist_us);
+  const double seconds = seconds_between(then, now);
+  const double window_s = seconds_between(0, kTwist_us);
+  const Eigen::Vector3d mean = by_odometry->mean.Log() / seconds;
+  const Eigen::Vector3d change =
+      before && after ? Eigen::Vector3d(*after - *before) : Eigen::Vector3d::Zero();
+  const Eigen::Vector3d to_stamp = 0.5 * window_s / (seconds + window_s) * change;
+  const auto gyro = odometry_.gyro_rotation(then, now);
+  return TwoMotions{.by_landmarks = motion.then_T_now,
+                    .by_odometry = *by_odometry,
+                    .then_twist = before && after ? Eigen::Vector3d(*before + to_stamp) : mean,
+                    .now_twist = before && after ? Eigen::Vector3d(*after - to_stamp) : mean,
+                    .gyro_variance = gyro ? gyro->variance : by_odometry->covariance(2, 2),
+                    .seconds = seconds,
+                    .has_wheels = then >= wheels_since_};
 }
 
 void CalibrationWatch::add(const model::ScanMotion& motion) {
-  const auto both = both_of(motion);
-  if (!both) return;
-  due_utime_ = motion.now_utime + (motion.now_utime - motion.then_utime) / 2;
-  if (!both->has_wheels) return;
-  for (Memory* memory : {&minutes_, &seconds_}) memory->compare_ways(*both);
+  waiting_.push_back(motion);
+  if (waiting_.size() > kMostWaiting) waiting_.pop_front();
+  const auto& increments = odometry_.increments();
+  while (!increments.empty() && !waiting_.empty() &&
+         waiting_.front().now_utime + kTwist_us <= increments.back().utime) {
+    compare(waiting_.front());
+    waiting_.pop_front();
+  }
+}
+
+void CalibrationWatch::compare(const model::ScanMotion& motion) {
+  const auto motions = two_motions(motion);
+  if (!motions) return;
+  const double passed_s = seconds_between(last_utime_, motion.now_utime);
+  last_utime_ = motion.now_utime;
+  // Motions from one scan share its noise.
+  const bool is_other_start = motion.then_utime > last_start_utime_;
+  last_start_utime_ = motion.then_utime;
+  const bool is_due = motions->has_wheels && motion.now_utime >= due_utime_;
+  if (is_due) due_utime_ = motion.now_utime + (motion.now_utime - motion.then_utime) / 2;
+
+  for (Memory* memory : {&minutes_, &seconds_}) {
+    memory->forget(passed_s);
+    if (is_other_start) memory->compare_turns(*motions, std::max(1.0, motions->seconds / passed_s));
+    if (is_due) memory->compare_ways(*motions);
+  }
 }
 
 void CalibrationWatch::check(const std::optional<model::ScanMotion>& step) {
   contradicts_ = false;
   if (!step) return;
-  const auto both = both_of(*step);
-  if (!both) return;
-  for (Memory* memory : {&minutes_, &seconds_}) memory->compare_turns(*both);
-  contradicts_ = both->has_wheels && minutes_.contradiction(*both) > kContradiction;
+  const auto motions = two_motions(*step);
+  if (!motions) return;
+  for (Memory* memory : {&minutes_, &seconds_}) memory->compare_steps(*motions);
+  contradicts_ = motions->has_wheels && minutes_.contradiction(*motions) > kContradiction;
 }
 
-double CalibrationWatch::Memory::contradiction(const Both& both) const {
-  const Difference difference = difference_of(both.by_landmarks, both.by_odometry);
-  const Eigen::Matrix4d covariance = (information_ + prior()).inverse();
+double CalibrationWatch::Memory::contradiction(const TwoMotions& motions) const {
+  const WayDifference difference = way_difference(motions);
+  const CalibrationMatrix covariance = (information_ + prior()).inverse();
   const Eigen::Vector2d error = difference.value_m - difference.jacobian * (covariance * gradient_);
   const Eigen::Matrix2d uncertain =
       difference.covariance_m2 + difference.jacobian * covariance * difference.jacobian.transpose();
   return error.dot(uncertain.inverse() * error);
 }
 
-void CalibrationWatch::Memory::compare_turns(const Both& both) {
-  const double turn = (both.by_odometry.mean.inverse() * both.by_landmarks.mean).theta();
-  const double variance = both.by_landmarks.covariance(2, 2) + both.by_odometry.covariance(2, 2) +
-                          kTurnModel_rad * kTurnModel_rad;
-  const double by_bias = turned_rad_ / (turned_s_ + kNoBias_s) * both.seconds;
+void CalibrationWatch::Memory::compare_steps(const TwoMotions& motions) {
+  const double turn = (motions.by_odometry.mean.inverse() * motions.by_landmarks.mean).theta();
+  const double variance = motions.by_landmarks.covariance(2, 2) +
+                          motions.by_odometry.covariance(2, 2) + kStepModel_rad * kStepModel_rad;
+  const double by_bias = turned_rad_ / (turned_s_ + kNoBias_s) * motions.seconds;
   const double chi2 = (turn - by_bias) * (turn - by_bias) / variance;
   if (!std::isfinite(chi2)) return;
 
-  const double kept = std::exp(-both.seconds / memory_s_);
+  const double kept = std::exp(-motions.seconds / memory_s_);
   turn_chi2_ = kept * turn_chi2_ + std::min(chi2, kMostTurnChi2);
   turns_ = kept * turns_ + 1.0;
   turned_rad_ = kept * turned_rad_ + turn;
-  turned_s_ = kept * turned_s_ + both.seconds;
+  turned_s_ = kept * turned_s_ + motions.seconds;
+  const Eigen::Vector3d squared = motions.now_twist.cwiseAbs2();
+  moved_m2ps_ = kept * moved_m2ps_ + motions.seconds * squared.head<2>().sum();
+  moved_rad2ps_ = kept * moved_rad2ps_ + motions.seconds * squared.z();
 }
 
-void CalibrationWatch::Memory::compare_ways(const Both& both) {
-  const Difference difference = difference_of(both.by_landmarks, both.by_odometry);
+void CalibrationWatch::Memory::forget(double passed_s) {
+  const double kept = std::exp(-passed_s / memory_s_);
+  information_ *= kept;
+  gradient_ *= kept;
+}
+
+void CalibrationWatch::Memory::compare_turns(const TwoMotions& motions, double overlapping) {
+  const TurnDifference difference = turn_difference(motions, overlapping);
+  const CalibrationNumbers estimate = (information_ + prior()).llt().solve(gradient_);
+  const double sigmas = std::abs(difference.value_rad - difference.jacobian.dot(estimate)) /
+                        std::sqrt(difference.variance_rad2);
+  if (!std::isfinite(sigmas)) return;
+  const double weight = 1.0 / (difference.variance_rad2 * std::max(1.0, sigmas / kRobustTurn));
+  information_ += weight * difference.jacobian.transpose() * difference.jacobian;
+  gradient_ += weight * difference.value_rad * difference.jacobian.transpose();
+}
+
+void CalibrationWatch::Memory::compare_ways(const TwoMotions& motions) {
+  const WayDifference difference = way_difference(motions);
   const Eigen::Matrix2d weight = difference.covariance_m2.inverse();
   if (!weight.allFinite() || !difference.value_m.allFinite()) return;
-  const double kept = std::exp(-0.5 * both.seconds / memory_s_);
-  const Eigen::Matrix<double, 4, 2> weighted = difference.jacobian.transpose() * weight;
-  information_ = kept * information_ + weighted * difference.jacobian;
-  gradient_ = kept * gradient_ + weighted * difference.value_m;
+  const Eigen::Matrix<double, kCalibrationNumbers, 2> weighted =
+      difference.jacobian.transpose() * weight;
+  information_ += weighted * difference.jacobian;
+  gradient_ += weighted * difference.value_m;
 }
 
 CalibrationError CalibrationWatch::Memory::error() const {
-  const Eigen::Matrix4d covariance = (information_ + prior()).inverse();
-  const Eigen::Vector4d estimate = covariance * gradient_;
-  const Eigen::Vector4d sigma = covariance.diagonal().cwiseSqrt();
-  return {estimate(0),
-          sigma(0),
-          estimate.segment<2>(1),
-          sigma.segment<2>(1),
-          estimate(3),
-          sigma(3),
-          (turn_chi2_ + kStatedTurns) / (turns_ + kStatedTurns)};
+  const CalibrationMatrix covariance = (information_ + prior()).inverse();
+  const CalibrationNumbers estimate = covariance * gradient_;
+  const CalibrationNumbers sigma = covariance.diagonal().cwiseSqrt();
+  const double seconds = turned_s_ + kNoBias_s;
+  CalibrationError error;
+  error.yaw_rad = estimate(kYaw);
+  error.yaw_sigma_rad = sigma(kYaw);
+  error.place_m = estimate.segment<2>(kPlace);
+  error.place_sigma_m = sigma.segment<2>(kPlace);
+  error.scale = estimate(kScale);
+  error.scale_sigma = sigma(kScale);
+  error.turn_chi2 = (turn_chi2_ + kStatedTurns) / (turns_ + kStatedTurns);
+  // Turns that scatter by more than is stated show it so much less.
+  error.late_s = estimate(kLate);
+  error.late_sigma_s = sigma(kLate) * std::sqrt(std::max(1.0, error.turn_chi2));
+  error.speed_mps = std::sqrt(moved_m2ps_ / seconds);
+  error.rate_rad_s = std::sqrt(moved_rad2ps_ / seconds);
+  return error;
 }
 
 }  // namespace understory::keyframer::joint

@@ -2,31 +2,35 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <deque>
 #include <optional>
 
 #include "common/model/detection_noise.hpp"
 #include "common/model/odometry_buffer.hpp"
+#include "services/keyframer/joint/motion_difference.hpp"
 #include "services/keyframer/keyframer_method.hpp"
 
 namespace understory::keyframer::joint {
 
-/// Compares the motion between scans by landmarks alone with that by wheels.
+/// Compares the motion between scans by landmarks alone with that by wheels and gyro.
 ///
 /// A sensor that is mounted at another yaw than configured (by psi) and at another place (by e)
-/// sees the motion T of the vehicle as E T E^-1, E = (e, psi). Wheels of another size measure a
-/// longer or shorter way (by the share s). To first order the translations differ by
-///   t_landmarks - t_wheels = psi J t + (I - R) e - s t,
-/// a linear model of four numbers, estimated by least squares over the last minutes and over the
-/// last seconds. Where the way does not show one of them, its sigma stays large and it is not
-/// named. Turns differ by the gyro's bias, which is taken out, and by what shakes a scan. Odometry
-/// without wheels is compared by its turn alone: its velocity comes from landmarks.
+/// sees the motion T = (R, t) of the vehicle as E T E^-1, E = (e, psi). Wheels of another size
+/// measure a longer or shorter way (by the share s). Scans that are stamped late by tau show
+/// Exp(tau xi_a) T Exp(-tau xi_b), with the twists xi = (v, w) at the two stamps. To first order
+///   t_landmarks - t_wheels = psi J t + (I - R) e - s t + tau (v_a + w_a J t - R v_b),
+///   turn_landmarks - turn_gyro = tau (w_a - w_b) - b seconds,
+/// where b is the gyro's bias: a linear model of six numbers, estimated by least squares over the
+/// last minutes and over the last seconds. Where the way does not show one of them, its sigma stays
+/// large and it is not named. Odometry without wheels is compared by its turn alone: its velocity
+/// comes from landmarks.
 class CalibrationWatch {
  public:
   /// Takes odometry as it comes, which no landmark has corrected.
   void add(const model::Odometry& increment);
-  /// Whether a motion that ends now overlaps with the last one by no more than half.
-  bool is_due(model::Utime now) const { return now >= due_utime_; }
-  /// Takes the motion between two scans by landmarks alone.
+  /// Takes the motion between two scans by landmarks alone. Motions may overlap: their turns are
+  /// all compared, their ways where they overlap with the last one by no more than half, since
+  /// the error of wheels grows with the way.
   void add(const model::ScanMotion& motion);
   /// Takes the motion by landmarks alone since the scan before the last one, or that there is none.
   void check(const std::optional<model::ScanMotion>& step);
@@ -34,7 +38,7 @@ class CalibrationWatch {
   /// Takes that no motion explains what two scans in a row observed.
   void break_off() { contradicts_ = true; }
 
-  /// What differs by the last two minutes; zeros with large sigmas at the start. Cost: one 4 x 4
+  /// What differs by the last two minutes; zeros with large sigmas at the start. Cost: one 6 x 6
   /// inverse.
   CalibrationError error() const { return minutes_.error(); }
   /// The same by the last ten seconds.
@@ -47,50 +51,54 @@ class CalibrationWatch {
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.odometry_, self.wheels_since_, self.due_utime_, self.minutes_, self.seconds_,
-      self.contradicts_);
+    a(self.odometry_, self.waiting_, self.wheels_since_, self.due_utime_, self.last_utime_,
+      self.last_start_utime_, self.minutes_, self.seconds_, self.contradicts_);
   }
 
  private:
-  /// Both motions between the same two scans.
-  struct Both {
-    geometry::SE2WithCovariance by_landmarks;
-    geometry::SE2WithCovariance by_odometry;
-    double seconds = 0.0;
-    bool has_wheels = false;
-  };
-
   /// Sums over a time; what is older counts less and less.
   class Memory {
    public:
     explicit Memory(double memory_s) : memory_s_(memory_s) {}
     /// chi^2 of 2 degrees of freedom: the two ways, by what is known of the sensor and the wheels.
-    double contradiction(const Both& both) const;
-    void compare_turns(const Both& both);
-    void compare_ways(const Both& both);
+    double contradiction(const TwoMotions& motions) const;
+    /// Of two scans in a row.
+    void compare_steps(const TwoMotions& motions);
+    /// So many motions in a row share each part of odometry.
+    void compare_turns(const TwoMotions& motions, double overlapping);
+    void compare_ways(const TwoMotions& motions);
+    /// What is older than a time that has passed counts less.
+    void forget(double passed_s);
     CalibrationError error() const;
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& self) {
       a(self.information_, self.gradient_, self.turn_chi2_, self.turns_, self.turned_rad_,
-        self.turned_s_);
+        self.turned_s_, self.moved_m2ps_, self.moved_rad2ps_);
     }
 
    private:
     double memory_s_;
-    Eigen::Matrix4d information_ = Eigen::Matrix4d::Zero();  ///< Of (psi, e, s).
-    Eigen::Vector4d gradient_ = Eigen::Vector4d::Zero();
+    CalibrationMatrix information_ = CalibrationMatrix::Zero();
+    CalibrationNumbers gradient_ = CalibrationNumbers::Zero();
     double turn_chi2_ = 0.0;
-    double turns_ = 0.0;       ///< Number of turns in the sum.
+    double turns_ = 0.0;       ///< Number of steps in the sum.
     double turned_rad_ = 0.0;  ///< Difference of the turns: the gyro's bias times turned_s_.
     double turned_s_ = 0.0;
+    double moved_m2ps_ = 0.0;    ///< Squared speed times turned_s_.
+    double moved_rad2ps_ = 0.0;  ///< Squared rate times turned_s_.
   };
 
-  std::optional<Both> both_of(const model::ScanMotion& motion) const;
+  std::optional<TwoMotions> two_motions(const model::ScanMotion& motion) const;
+  std::optional<Eigen::Vector3d> twist_over(model::Utime from, model::Utime to) const;
+  void compare(const model::ScanMotion& motion);
 
   model::OdometryBuffer odometry_;
-  model::Utime wheels_since_ = 0;  ///< Since then each increment has wheels.
-  model::Utime due_utime_ = 0;     ///< Motions that end before it overlap too much.
+  std::deque<model::ScanMotion> waiting_;  ///< For the odometry after them.
+  model::Utime wheels_since_ = 0;          ///< Since then each increment has wheels.
+  model::Utime due_utime_ = 0;             ///< Ways that end before it overlap too much.
+  model::Utime last_utime_ = 0;            ///< End of the last motion.
+  model::Utime last_start_utime_ = 0;
   Memory minutes_{120.0};
   Memory seconds_{10.0};
   bool contradicts_ = false;

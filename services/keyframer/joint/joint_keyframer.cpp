@@ -14,7 +14,7 @@ constexpr std::size_t kToContradict = 8;
 /// Share of the pairs by stated sigmas that smaller ones must keep to take their place.
 constexpr double kAsMany = 0.8;
 
-constexpr state::Format kFormat{"keyframer.joint", 4};
+constexpr state::Format kFormat{"keyframer.joint", 5};
 
 std::vector<std::uint64_t> numbers_of(const PlacedScan& placed) {
   return {placed.tracks.begin(), placed.tracks.end()};
@@ -64,7 +64,6 @@ std::optional<PlacedScan> JointKeyframer::place(
   const auto step = noise_.step();
   calibration_.check(step);
   if (motion && !step && in_both >= kToContradict) calibration_.break_off();
-  if (!calibration_.is_due(stated.utime)) return placed;
   if (const auto way = noise_.motion()) calibration_.add(*way);
   return placed;
 }
