@@ -14,9 +14,9 @@ namespace understory::existence {
 /// Hidden variable H of a pass: something stands in front of the point from wherever it is looked
 /// at. It is as likely for a point that is there as for one that is gone. Looks of a hidden pass
 /// measure a return in front with kInFront, else nothing, as at the edge of what hides the point;
-/// those of another pass with kBeside, past single things. A pass that saw the point, or had its
-/// line of sight free once, is not hidden; neither is one that never measured anything in front:
-/// what hides a point there is known by directions alone. 8 bits.
+/// those of another pass with kBeside, past single things. A pass whose line of sight was free once
+/// is not hidden; neither is one that never measured anything in front: what hides a point there is
+/// known by directions alone. Hits do not count: they speak for themselves. 8 bits.
 class PassOccluder {
  public:
   /// After a look that did not see the point, by what was measured along its ray.
@@ -28,7 +28,7 @@ class PassOccluder {
     const unsigned code = counted == kMostCounted ? (code_ >> 1U) & 0x77U : code_;
     return of(static_cast<std::uint8_t>(code + one));
   }
-  /// The point was seen, or a return came from behind it: not hidden on this pass.
+  /// A return came from behind the point, or the pass found it: not hidden.
   static PassOccluder refuted() { return of(kRefuted); }
 
   /// p(H); 0 without a return in front.

@@ -68,7 +68,6 @@ class PointExistence {
   void hit(ExistenceModel& model, const Look& look) {
     if (!look.goes_on) enter_pass(model);
     const View view = view_of(model, look);
-    observe(PassOccluder::refuted());
     learn_recall(model, view, true);
     apply_hit(model, view);
     last_hit_ = sector_of(view);
