@@ -71,7 +71,8 @@ def draw_maps(file, traces, rows, drives):
     for axis in axes[:, 0]:
         axis.set_ylabel("y [m]", fontsize=8)
     figure.colorbar(drawn, ax=axes, label="probability that the landmark exists", shrink=0.7, pad=0.01)
-    figure.get_layout_engine().set(rect=(0, 0.05, 1, 0.95))
+    legend = 0.1 / len(rows)
+    figure.get_layout_engine().set(rect=(0, legend, 1, 1 - legend))
     figure.legend(labels.values(), labels.keys(), loc="lower center", ncols=len(labels), fontsize=8)
     figure.savefig(file, dpi=110)
     plt.close(figure)
