@@ -341,7 +341,7 @@ class PointExistence {
   /// weighs 1 - v, and the odds of having survived are those of lambda.
   void correct_odds(const ExistenceModel& model, MissedShare before, float decay_per_s) {
     if ((flags_ & kWasSure) == 0 || pending_missed_ == 0) return;
-    const double missed = missed_share_.bounded() / before.bounded();
+    const double missed = missed_share_.stepped() / before.stepped();
     odds_ *= std::pow(missed, pending_missed_ / kUnit);
     const auto odds_of_survival = [&](double rate_per_s) {
       return odds_of(1.0 - std::max(1e-9, lost_share(rate_per_s, evidence_.since_s)));
