@@ -2,33 +2,20 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <span>
 #include <stdexcept>
 
 #include "common/existence/look.hpp"
+#include "common/existence/missed_share.hpp"
 #include "common/existence/model.hpp"
 #include "common/existence/odds.hpp"
+#include "common/existence/pass_occluder.hpp"
+#include "common/existence/saved_point.hpp"
 #include "common/existence/shell.hpp"
 
 namespace understory::existence {
-
-/// All that is kept of a point, as plain numbers without padding: the same bytes for the same
-/// point, and a point that goes on bit by bit as if nothing had been.
-template <Shell S>
-struct SavedPoint {
-  static constexpr std::uint32_t kVersion = 1;
-  static constexpr std::size_t kFloats = 8;
-  std::uint32_t version = kVersion;
-  std::uint32_t shell_kind = S::kKind;
-  double odds = 0.0;  ///< P / (1 - P), of the pass that is open.
-  /// Number of the pass, sectors and flags; a fourth one, 0, where the size would not divide by 8.
-  std::array<std::uint32_t, 3 + (3 + kFloats + S::kNumbers) % 2> pass{};
-  std::array<float, kFloats> numbers{};  ///< Of the pass; see PointExistence.
-  std::array<float, S::kNumbers> shell{};
-};
 
 /// Hidden variables: E (the point exists), D (this pass can see it, given E), V_f (the line of
 /// sight from direction f is free, given E). A look sees the point with q1 = eps + (1 - eps) p_d s
@@ -41,8 +28,11 @@ struct SavedPoint {
 ///     1-eps hit:   P : 1-P  times  qe : eps        d : 1-d  times  q : eps        w : 1-w  times
 ///     q1 : eps
 ///
-/// At the end of a pass w <- d w + (1 - d) w(begin of the pass), and d <- v. Constant cost: no
-/// logarithm, no exponential, odds instead of log-odds.
+/// At the end of a pass w <- d w + (1 - d) w(begin of the pass), and d <- v. Where the sensor
+/// measured something in front of the point, the pass may be hidden (PassOccluder): before its
+/// looks d was v (1 - h), not v. The mass of E and not D does not depend on the looks, so that the
+/// looks that came before are weighed anew with any change of h, exactly and in any order. Constant
+/// cost: no logarithm, no exponential, odds instead of log-odds.
 template <Shell S>
 class PointExistence {
  public:
@@ -60,6 +50,7 @@ class PointExistence {
     const double odds = point.odds_;
     point.apply_hit(model, point.view_of(model, look));
     point.odds_ = odds;
+    point.occluder_ = PassOccluder::refuted();
     return point;
   }
 
@@ -82,10 +73,12 @@ class PointExistence {
     last_hit_ = sector_of(view);
   }
 
-  /// Expected and not seen. What was blocked says nothing of the point: P, d and w stay.
+  /// Expected and not seen. What was blocked says nothing of the point, but of the pass: misses
+  /// without a range, earlier ones as well, count for less then.
   void miss(ExistenceModel& model, const Look& look) {
     if (!look.goes_on) enter_pass(model);
     const View view = view_of(model, look);
+    observe(occluder_.after(look.ray));
     if (look.ray == Ray::kBlocked) return;
     learn_recall(model, view, false);
     apply_miss(model, view, look.ray == Ray::kPassed);
@@ -102,18 +95,19 @@ class PointExistence {
 
   /// Ends the pass of this point, when nothing else will: before its state is read for good.
   void enter_pass(ExistenceModel& model) {
-    if (pass_ != model.pass()) change_pass(model);
+    if (pass_ != number_of(model)) change_pass(model);
   }
 
   /// Between enter_pass() and the first look of a pass: P anew by what all points have taught about
   /// v and lambda, and what this one teaches by its new P (a step of EM). A few rounds over all
   /// points of a map settle; none are needed. Does nothing once the pass has looked.
   void reconsider(ExistenceModel& model) {
-    if (pass_ != model.pass() || chance_missed_ < 1.0F || (flags_ & kInFirstPass) != 0) return;
-    const std::uint32_t missed_code = missed_code_;
+    const bool has_looked = chance_missed_ < 1.0F || !occluder_.is_new();
+    if (pass_ != number_of(model) || has_looked || (flags_ & kInFirstPass) != 0) return;
+    const MissedShare missed_share = missed_share_;
     const float decay_per_s = decay_per_s_;
     expect_pass(model);
-    correct_odds(model, missed_code, decay_per_s);
+    correct_odds(model, missed_share, decay_per_s);
     const bool is_open = pending_missed_ > 0;
     if (is_open) weigh(model, {static_cast<float>(1.0 - probability()), evidence_.since_s});
   }
@@ -131,9 +125,9 @@ class PointExistence {
     static_assert(sizeof(saved) ==
                   16 + sizeof(saved.pass) + sizeof(saved.numbers) + sizeof(saved.shell));
     saved.odds = odds_;
-    saved.pass = {pass_,
+    saved.pass = {pass_ | (std::uint32_t{missed_share_.code()} << 16),
                   rays_passed_ | (std::uint32_t{last_hit_} << 24) | (std::uint32_t{flags_} << 29),
-                  missed_from_ | (std::uint32_t{missed_code_} << 24)};
+                  missed_from_ | (std::uint32_t{occluder_.code()} << 24)};
     saved.numbers = {unseen_,
                      chance_missed_,
                      static_cast<float>(pending_seen_),
@@ -148,19 +142,16 @@ class PointExistence {
   /// Throws std::invalid_argument where the state is of another version or shell, or cannot be.
   static PointExistence load(const ExistenceModel& model, const SavedPoint<S>& saved) {
     PointExistence point(model, odds_of(model.parameters().prior));
-    bool is_good = saved.version == SavedPoint<S>::kVersion && saved.shell_kind == S::kKind &&
-                   std::isfinite(saved.odds) && saved.odds >= 0.0 &&
-                   point.shell_.restore(saved.shell);
-    for (const float number : saved.numbers)
-      is_good = is_good && std::isfinite(number) && number >= 0;
-    if (!is_good) throw std::invalid_argument("existence: a saved point that cannot be");
+    if (!saved.can_be() || !point.shell_.restore(saved.shell))
+      throw std::invalid_argument("existence: a saved point that cannot be");
     point.odds_ = bounded(saved.odds);
-    point.pass_ = saved.pass[0];
+    point.pass_ = static_cast<std::uint16_t>(saved.pass[0]);
+    point.missed_share_ = saved.missed_share();
+    point.occluder_ = saved.occluder();
     point.rays_passed_ = saved.pass[1] & kSectors;
     point.last_hit_ = (saved.pass[1] >> 24U) & 31U;
     point.flags_ = (saved.pass[1] >> 29U) & 7U;
     point.missed_from_ = saved.pass[2] & kSectors;
-    point.missed_code_ = (saved.pass[2] >> 24U) & 0xFFU;
     point.unseen_ = saved.numbers[0];
     point.chance_missed_ = saved.numbers[1];
     point.pending_seen_ = static_cast<std::uint16_t>(std::min(65535.0F, saved.numbers[2]));
@@ -190,8 +181,13 @@ class PointExistence {
   PointExistence(const ExistenceModel& model, double odds)
       : odds_(bounded(odds)),
         shell_(model.rest_odds(), static_cast<float>(model.parameters().range_m)),
-        pass_(model.pass()) {
+        pass_(number_of(model)) {
     start_pass(model);
+  }
+
+  /// Of the pass, in 16 bits: a point that slept through 65536 passes goes on with its last one.
+  static std::uint16_t number_of(const ExistenceModel& model) {
+    return static_cast<std::uint16_t>(model.pass());
   }
 
   static double bounded(double odds) { return std::clamp(odds, kLeastOdds, kMostOddsInPass); }
@@ -256,6 +252,20 @@ class PointExistence {
     odds_ = bounded(odds_ * model.parameters().passed_by);
   }
 
+  /// What a look says of an occluder; if that changes p(H), the pass so far is weighed anew: d
+  /// began with v (1 - h). With v = 1 there is no such pass.
+  void observe(PassOccluder occluder) {
+    const double was = occluder_.chance(), is = occluder.chance();
+    occluder_ = occluder;
+    if (was == is || unseen_ <= 0.0F) return;
+    const double blind = missed_share_.odds();
+    const double seeing = (1.0 - is) / (1.0 - was);
+    const double not_seeing = (blind + is) / (blind + was);
+    const double d = pass_visibility();
+    odds_ = bounded(odds_ * (d * seeing + (1.0 - d) * not_seeing));
+    scale_unseen(not_seeing / seeing);
+  }
+
   void count_look(double missed) {
     chance_missed_ = std::max(1e-6F, chance_missed_ * static_cast<float>(missed));
   }
@@ -285,10 +295,10 @@ class PointExistence {
 
     const double still = (1.0 - static_cast<double>(evidence_.went)) * (1.0 - lost);
     weigh(model, {static_cast<float>(1.0 - still), evidence_.since_s + gap_s_});
-    const std::uint32_t missed_code = missed_code_;
+    const MissedShare missed_share = missed_share_;
     const float decay_per_s = decay_per_s_;
     start_pass(model);
-    correct_odds(model, missed_code, decay_per_s);
+    correct_odds(model, missed_share, decay_per_s);
   }
 
   /// Recall of passes and decay. What is open since the point was last surely seen counts with the
@@ -297,7 +307,10 @@ class PointExistence {
     if (was_looked_for && (flags_ & kInFirstPass) == 0) {
       const std::uint16_t seen = pending_seen_, missed = pending_missed_;
       add_pending(pending_seen_, pass_visibility());
-      add_pending(pending_missed_, 1.0 - pass_visibility());
+      // What was hidden says nothing of the detector.
+      const double blind = missed_share_.odds(), hidden = occluder_.chance();
+      add_pending(pending_missed_,
+                  (1.0 - pass_visibility()) * (1.0 - hidden) * blind / (blind + hidden));
       const double weight = (1.0 - static_cast<double>(evidence_.went)) / kUnit;
       model.recall().record_passes(weight * (pending_seen_ - seen),
                                    weight * (pending_missed_ - missed));
@@ -326,9 +339,9 @@ class PointExistence {
 
   /// P by what is known of v and lambda now, since the point was last surely seen: each missed pass
   /// weighs 1 - v, and the odds of having survived are those of lambda.
-  void correct_odds(const ExistenceModel& model, std::uint32_t missed_code, float decay_per_s) {
+  void correct_odds(const ExistenceModel& model, MissedShare before, float decay_per_s) {
     if ((flags_ & kWasSure) == 0 || pending_missed_ == 0) return;
-    const double missed = decoded(missed_code_) / decoded(missed_code);
+    const double missed = missed_share_.stepped() / before.stepped();
     odds_ *= std::pow(missed, pending_missed_ / kUnit);
     const auto odds_of_survival = [&](double rate_per_s) {
       return odds_of(1.0 - std::max(1e-9, lost_share(rate_per_s, evidence_.since_s)));
@@ -338,18 +351,11 @@ class PointExistence {
     odds_ = bounded(std::min(odds_, kMostOdds));
   }
 
-  static double missed_of(double pass_recall) { return std::max(0.005, 1.0 - pass_recall); }
-  /// A share of missed passes as a byte, to 1 %.
-  static std::uint32_t code_of(double missed) {
-    return static_cast<std::uint32_t>(std::round(-32.0 * std::log2(missed)));
-  }
-  static double decoded(std::uint32_t code) { return std::exp2(-static_cast<double>(code) / 32.0); }
-
   /// d and lambda of the pass that begins.
   void expect_pass(const ExistenceModel& model) {
     const double v = model.recall().of_pass();
     unseen_ = static_cast<float>((1.0 - v) / v);
-    missed_code_ = code_of(missed_of(v)) & 0xFFU;
+    missed_share_ = MissedShare(1.0 - v);
     decay_per_s_ = static_cast<float>(model.decay().mean_per_s());
   }
 
@@ -360,7 +366,8 @@ class PointExistence {
     missed_from_ = 0;
     last_hit_ = kNowhere;
     gap_s_ = 0.0F;
-    pass_ = model.pass();
+    occluder_ = {};
+    pass_ = number_of(model);
     odds_ = std::min(odds_, kMostOdds);
     shell_.begin_pass();
   }
@@ -371,12 +378,13 @@ class PointExistence {
 
   double odds_;  ///< P / (1 - P).
   S shell_;
-  std::uint32_t pass_;
+  std::uint16_t pass_;
+  MissedShare missed_share_;               ///< 1 - v as it was when the pass began.
   std::uint32_t rays_passed_ : 24 = 0;     ///< Sectors whose rays passed the point in this pass.
   std::uint32_t last_hit_ : 5 = kNowhere;  ///< Sector of the pass's last look, if it was a hit.
   std::uint32_t flags_ : 3 = 0;
   std::uint32_t missed_from_ : 24 = 0;  ///< Sectors of this pass with misses.
-  std::uint32_t missed_code_ : 8 = 0;   ///< 1 - v as it was when the pass began; see code_of().
+  PassOccluder occluder_;               ///< Of this pass, in the last byte of the sectors' word.
   float unseen_ = 0.0F;                 ///< (1 - d) / d.
   float chance_missed_ = 1.0F;          ///< Of a pass that can see it, up to now.
   std::uint16_t pending_seen_ = 0;      ///< Passes since the last that surely saw the point,

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <limits>
+#include <map>
 
 namespace understory::map_file {
 namespace {
@@ -26,6 +27,28 @@ MovedLandmark move_of(const model::MapLandmark& before, const model::MapLandmark
   return move;
 }
 
+using LandmarkUse = std::map<model::LandmarkId, bool>;
+
+/// Whether each landmark with a state of existence is in use.
+LandmarkUse use_in(const StoredMap& map) {
+  LandmarkUse use;
+  if (!map.existence) return use;
+  for (const ExistenceRow& row : map.existence->landmarks)
+    use.emplace_hint(use.end(), row.existence.id, row.existence.is_in_use);
+  return use;
+}
+
+bool is_in_use(const LandmarkUse& use, model::LandmarkId id) {
+  const auto found = use.find(id);
+  return found == use.end() || found->second;
+}
+
+bool is_told(const ExistenceChange& change, double least_change) {
+  if (change.was_in_use != change.is_in_use) return true;
+  return change.probability_before && change.probability_after &&
+         std::abs(*change.probability_after - *change.probability_before) > least_change;
+}
+
 }  // namespace
 
 double chi2_of_quantile(double quantile) { return -2.0 * std::log1p(-quantile); }
@@ -34,6 +57,8 @@ MapDifference difference(const StoredMap& before, const StoredMap& after,
                          const DifferenceLimits& limits) {
   MapDifference result;
   const double limit = chi2_of_quantile(limits.quantile);
+  const LandmarkUse used_before = use_in(before);
+  const LandmarkUse used_after = use_in(after);
   auto old = before.landmarks.begin();
   const auto end = before.landmarks.end();
 
@@ -51,6 +76,10 @@ MapDifference difference(const StoredMap& before, const StoredMap& after,
     } else {
       ++result.kept;
     }
+    const model::LandmarkId id = one.landmark.id;
+    const ExistenceChange change{id, is_in_use(used_before, id), is_in_use(used_after, id),
+                                 old->existence, one.existence};
+    if (is_told(change, limits.probability_change)) result.existence.push_back(change);
     ++old;
   }
 

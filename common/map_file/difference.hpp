@@ -1,6 +1,7 @@
 // What two maps of one frame have not in common.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "common/map_file/stored_map.hpp"
@@ -16,19 +17,32 @@ struct MovedLandmark {
   double chi2 = 0.0;
 };
 
+/// A landmark that both maps have, which left use or came back to it, or of which another
+/// probability is known. Without a state of existence it is in use.
+struct ExistenceChange {
+  model::LandmarkId id = 0;
+  bool was_in_use = true;
+  bool is_in_use = true;
+  std::optional<double> probability_before;  ///< That it exists; none where the map does not say.
+  std::optional<double> probability_after;
+};
+
 /// From one map to another.
 struct MapDifference {
   std::vector<model::LandmarkId> added;
   std::vector<model::LandmarkId> removed;
-  std::vector<MovedLandmark> moved;  ///< Those beyond the quantile, in order of id.
-  std::size_t kept = 0;              ///< In both, within the quantile.
+  std::vector<MovedLandmark> moved;        ///< Those beyond the quantile, in order of id.
+  std::size_t kept = 0;                    ///< In both, within the quantile.
+  std::vector<ExistenceChange> existence;  ///< In order of id.
 };
 
-/// When a landmark has moved.
+/// When a landmark has moved, and when its existence has changed.
 struct DifferenceLimits {
   double quantile = 0.99;  ///< Of chi-squared; what lies beyond it has moved. Within 0 and 1.
   /// Standard deviation in x and in y of a landmark without covariance [m]; 0: any move counts.
   double unknown_sigma_m = 0.0;
+  /// Of the probability that a landmark exists, where both maps know it: a larger one is told.
+  double probability_change = 0.1;
 };
 
 /// The value that a chi-squared variable with two degrees of freedom exceeds with probability

@@ -2,10 +2,12 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 
 #include "common/io/data_error.hpp"
@@ -160,20 +162,52 @@ std::set<std::uint32_t> ids_in(const MapFile& file) {
   return ids;
 }
 
+nlohmann::ordered_json number_or_null(const std::optional<double>& number) {
+  return number ? nlohmann::ordered_json(*number) : nlohmann::ordered_json(nullptr);
+}
+
 nlohmann::ordered_json difference_json(std::uint32_t map_id,
                                        const map_file::MapDifference& difference) {
   nlohmann::ordered_json json{{"map_id", map_id},
                               {"added", difference.added},
                               {"removed", difference.removed},
                               {"moved", nlohmann::ordered_json::array()},
-                              {"kept", difference.kept}};
+                              {"kept", difference.kept},
+                              {"existence", nlohmann::ordered_json::array()}};
   for (const map_file::MovedLandmark& move : difference.moved) {
     // JSON has no infinity: nothing is known of such a landmark's error.
     const nlohmann::ordered_json chi2 =
         std::isfinite(move.chi2) ? nlohmann::ordered_json(move.chi2) : nullptr;
     json["moved"].push_back({{"id", move.id}, {"distance_m", move.distance_m}, {"chi2", chi2}});
   }
+  for (const map_file::ExistenceChange& change : difference.existence)
+    json["existence"].push_back({{"id", change.id},
+                                 {"was_in_use", change.was_in_use},
+                                 {"is_in_use", change.is_in_use},
+                                 {"probability_before", number_or_null(change.probability_before)},
+                                 {"probability_after", number_or_null(change.probability_after)}});
   return json;
+}
+
+const char* change_of_use(const map_file::ExistenceChange& change) {
+  if (change.was_in_use == change.is_in_use) return change.is_in_use ? "in use" : "unused";
+  return change.is_in_use ? "used again" : "left use";
+}
+
+void print_existence(const std::vector<map_file::ExistenceChange>& changes) {
+  if (changes.empty()) return;
+  const auto text = [](const std::optional<double>& probability) {
+    return probability ? fmt::format("{:.3f}", *probability) : std::string("unknown");
+  };
+  const auto left = std::ranges::count_if(
+      changes, [](const auto& one) { return one.was_in_use && !one.is_in_use; });
+  const auto back = std::ranges::count_if(
+      changes, [](const auto& one) { return !one.was_in_use && one.is_in_use; });
+  fmt::print("  existence: {} left use, {} used again, {} more probabilities changed\n", left, back,
+             static_cast<std::ptrdiff_t>(changes.size()) - left - back);
+  for (const map_file::ExistenceChange& change : changes)
+    fmt::print("  {:10} {} probability {} -> {}\n", change_of_use(change), change.id,
+               text(change.probability_before), text(change.probability_after));
 }
 
 void print_difference(std::uint32_t map_id, const map_file::MapDifference& difference) {
@@ -183,6 +217,7 @@ void print_difference(std::uint32_t map_id, const map_file::MapDifference& diffe
   for (const model::LandmarkId id : difference.removed) fmt::print("  removed {}\n", id);
   for (const map_file::MovedLandmark& move : difference.moved)
     fmt::print("  moved   {} by {:.3f} m, chi2 {:.1f}\n", move.id, move.distance_m, move.chi2);
+  print_existence(difference.existence);
 }
 
 void map_diff(const MapOptions& options) {
@@ -198,6 +233,7 @@ void map_diff(const MapOptions& options) {
                               {"after", options.other},
                               {"quantile", options.limits.quantile},
                               {"unknown_sigma_m", options.limits.unknown_sigma_m},
+                              {"probability_change", options.limits.probability_change},
                               {"chi2", chi2},
                               {"maps", nlohmann::ordered_json::array()}};
   for (const std::uint32_t id : all) {
@@ -265,7 +301,9 @@ void add_map_command(CLI::App& parent) {
       ->add_option("--to", options->to, "Number of the change; 0: before the first one")
       ->required();
   add("accept", "Takes what another program changed (QGIS, say) over as a change", map_accept);
-  auto* diff = add("diff", "Landmarks added, removed and moved from one file to another", map_diff);
+  auto* diff =
+      add("diff", "Landmarks added, removed, moved, out of use and back from one file to another",
+          map_diff);
   diff->add_option("other", options->other, "The later map file")->required()->check(no_dash());
   diff->add_option("--quantile", options->limits.quantile,
                    "A landmark has moved where chi2 of its way, by both covariances, is beyond it")
@@ -274,6 +312,11 @@ void add_map_command(CLI::App& parent) {
   diff->add_option("--sigma-m", options->limits.unknown_sigma_m,
                    "[m] Standard deviation in x and in y of landmarks without covariance")
       ->check(CLI::Range(0.0, 1e3))
+      ->capture_default_str();
+  diff->add_option("--probability-change", options->limits.probability_change,
+                   "Of a landmark's probability of existence: a larger change is told, as is "
+                   "every landmark that left use or is used again")
+      ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   add_json_flag(*diff, options->json);
 }

@@ -30,10 +30,11 @@ def existence_drives(document):
                    for (keeping,), drive, some, total in _of_drive(of("changes"), ("keeping",))])
     if of("stack"):
         lines += ["", *table(("a stack of timber", "drive", "forests", "trees that it hides", "of them out of use",
-                              "felled and unused", "wrongly unused", "precision", "recall", "ATE mm"),
+                              "felled and unused", "of them behind it", "wrongly unused", "precision", "recall", "ATE mm"),
                              [(keeping, drive, len(some), total("hidden"), total("hidden_unused"),
-                               f'{total("felled_unused")} of {total("felled")}', total("wrongly_unused"), precision(total),
-                               recall(total), _ate_mm(some))
+                               f'{total("felled_unused")} of {total("felled")}',
+                               f'{total("felled_hidden_unused")} of {total("felled_hidden")}', total("wrongly_unused"),
+                               precision(total), recall(total), _ate_mm(some))
                               for (keeping,), drive, some, total in _of_drive(of("stack"), ("keeping",))])]
     if of("false detections"):
         lines += ["", *table(("false detections", "map", "drive", "forests", "landmarks in use", "of them false", "false %",

@@ -82,7 +82,7 @@ void ExistenceTracker::begin_drive(model::Utime utime) {
   model_.begin_pass();
   for (auto& [id, tracked] : points_) {
     tracked.looked_m = tracked.pass_began_m = -1e9;
-    tracked.is_first_pass = false;
+    tracked.is_first_pass = tracked.has_just_left = false;
     pass_time(utime, tracked);
     tracked.point.enter_pass(model_);
   }
@@ -164,7 +164,7 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
   const bool is_old = tracked.told_probability >= 0.0 && tracked.is_in_use;
   pass_time(update.utime, tracked);
   look->goes_on = goes_on(tracked);
-  if (!look->goes_on) tracked.is_first_pass = false;
+  if (!look->goes_on) tracked.is_first_pass = tracked.has_just_left = false;
   if (is_hit) {
     confirm(tracked);
     tracked.point.hit(model_, *look);
@@ -179,6 +179,7 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
   const bool could_see = ray != existence::Ray::kBlocked;
   if (is_hit || (is_old && could_see)) need_.look(id, is_hit, is_old, along_m_);
   if (!is_hit) count_false(tracked);
+  if (ray == existence::Ray::kBlocked) take_back(tracked);
   decide(tracked);
   touched_.push_back(id);
 }
@@ -276,18 +277,31 @@ void ExistenceTracker::forget(const model::MapUpdate& update) {
   }
 }
 
+/// What left use by looks of this pass that turn out to have been hidden never left.
+void ExistenceTracker::take_back(TrackedPoint& tracked) {
+  const bool is_probable = tracked.point.probability() >= parameters_.use.drop_below;
+  if (!tracked.has_just_left || tracked.is_in_use || !is_probable || !may_be_used(tracked)) return;
+  tracked.has_just_left = false;
+  readmit(tracked);
+}
+
+void ExistenceTracker::readmit(TrackedPoint& tracked) {
+  tracked.is_in_use = true;
+  --unused_;
+  ++counters_.readmitted;
+}
+
 void ExistenceTracker::decide(TrackedPoint& tracked) {
   const double probability = tracked.point.probability();
   const bool is_gone = probability < parameters_.use.drop_below;
   if (tracked.is_in_use && (is_gone || !may_be_used(tracked))) {
     tracked.is_in_use = false;
+    tracked.has_just_left = true;
     ++unused_;
     ++counters_.dropped;
   } else if (!tracked.is_in_use && probability > parameters_.use.readmit_above &&
              may_be_used(tracked)) {
-    tracked.is_in_use = true;
-    --unused_;
-    ++counters_.readmitted;
+    readmit(tracked);
   }
 }
 

@@ -96,6 +96,8 @@ class ExistenceTracker {
   void confirm(TrackedPoint& tracked);
   void count_false(TrackedPoint& tracked);
   bool may_be_used(const TrackedPoint& tracked) const;
+  void take_back(TrackedPoint& tracked);
+  void readmit(TrackedPoint& tracked);
   void decide(TrackedPoint& tracked);
   model::Existence tell(const model::MapUpdate& update);
   std::set<model::LandmarkId> ids_to_tell();

@@ -27,6 +27,7 @@ struct TrackedPoint {
   double looked_m = -1e9;          ///< Path of the drive at the last look.
   double pass_began_m = -1e9;      ///< Likewise at the first look of its pass.
   bool is_counted = false;         ///< Among the births that were false.
+  bool has_just_left = false;      ///< It left use in the pass that is open.
 };
 
 /// How many of the landmarks that were new turned out to be there when another pass came.

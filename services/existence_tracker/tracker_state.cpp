@@ -23,10 +23,10 @@ std::string ExistenceTracker::save() const {
   std::string points;
   for (const auto& [id, tracked] : points_) {
     ids.push_back(id);
-    flags.push_back(
-        static_cast<std::uint8_t>((tracked.is_in_use ? 1 : 0) | (tracked.was_told_in_use ? 2 : 0) |
-                                  (tracked.state_is_due ? 4 : 0) | (tracked.is_first_pass ? 8 : 0) |
-                                  (tracked.is_counted ? 16 : 0)));
+    flags.push_back(static_cast<std::uint8_t>(
+        (tracked.is_in_use ? 1 : 0) | (tracked.was_told_in_use ? 2 : 0) |
+        (tracked.state_is_due ? 4 : 0) | (tracked.is_first_pass ? 8 : 0) |
+        (tracked.is_counted ? 16 : 0) | (tracked.has_just_left ? 32 : 0)));
     told.push_back(tracked.told_probability);
     looked_m.push_back(tracked.looked_m);
     began_m.push_back(tracked.pass_began_m);
@@ -63,6 +63,7 @@ void ExistenceTracker::load(const std::string& state) {
     tracked.state_is_due = (flags[i] & 4U) != 0;
     tracked.is_first_pass = (flags[i] & 8U) != 0;
     tracked.is_counted = (flags[i] & 16U) != 0;
+    tracked.has_just_left = (flags[i] & 32U) != 0;
     tracked.told_probability = told[i];
     tracked.looked_m = looked_m[i];
     tracked.pass_began_m = began_m[i];

@@ -173,6 +173,41 @@ TEST_CASE_METHOD(Maps, "diff tells what was added, removed and moved", "[cli]") 
   refused("diff " + file + " " + later + "x", {"later.gpkgx"});
 }
 
+TEST_CASE_METHOD(Maps, "diff tells what left use and what came back between two states of a file",
+                 "[cli]") {
+  fine("import " + table + " --out " + file);
+  map_file::StoredMap map = map_file::MapFile(file, map_file::Access::kRead).read(1);
+  const auto drive = [&](double first, double second) {
+    map_file::StoredExistence existence{1, "learned", {}};
+    existence.landmarks = {{{map_file::landmark_id(1, 1), first, first > 0.5}, 1, "state"},
+                           {{map_file::landmark_id(1, 2), second, second > 0.5}, 1, "state"},
+                           {{map_file::landmark_id(1, 3), 0.5 + 0.1 * first, true}, 1, "state"}};
+    map_file::give_existence(map, existence);
+    map_file::MapFile(file, map_file::Access::kWrite).put({&map, 1}, {1, "a test", "", "a drive"});
+  };
+  drive(0.9, 0.05);
+  const std::string earlier = (directory / "earlier.gpkg").string();
+  std::filesystem::copy_file(file, earlier);
+  drive(0.02, 0.95);
+
+  const auto text = fine("diff " + earlier + " " + file).out;
+  CHECK_THAT(text, Contains("existence: 1 left use, 1 used again, 0 more probabilities changed"));
+  CHECK_THAT(text, Contains("probability 0.900 -> 0.020") && Contains("left use"));
+  CHECK_THAT(text, Contains("probability 0.050 -> 0.950") && Contains("used again"));
+  const auto json_text = json("diff " + earlier + " " + file + " --probability-change 0.05");
+  const auto& changes = json_text["maps"][0]["existence"];
+  REQUIRE(changes.size() == 3);
+  CHECK(changes[0]["was_in_use"] == true);
+  CHECK(changes[0]["is_in_use"] == false);
+  CHECK(changes[2]["probability_before"] == 0.59);
+  CHECK_FALSE(Contains("existence").match(fine("diff " + file + " " + file).out));
+
+  // The same of a revision of the file itself.
+  fine("revert --to 1 " + earlier);
+  CHECK_THAT(fine("diff " + earlier + " " + file).out, Contains("unknown -> 0.020"));
+  CHECK(run("diff " + file + " " + file + " --probability-change 2").status == 2);
+}
+
 TEST_CASE_METHOD(Maps, "export writes what other tools read", "[cli]") {
   fine("import " + table + " --out " + file);
   const auto out = directory / "out";

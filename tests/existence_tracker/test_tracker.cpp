@@ -281,3 +281,70 @@ TEST_CASE("A false landmark of this drive leaves use when nobody sees it again",
   REQUIRE(tracker.of(pedestrian));
   CHECK(tracker.of(pedestrian)->probability < 0.3);
 }
+
+namespace {
+
+/// What the mapper says of landmarks behind a stack: blocked, but for looks past its edges.
+void hide(const std::set<model::LandmarkId>& hidden, const Road& road,
+          std::vector<model::MapUpdate>& updates) {
+  const model::WholeMap map = road.map();
+  for (model::MapUpdate& update : updates) {
+    for (model::ExpectedLandmark& one : update.expected) {
+      if (!hidden.contains(one.id)) continue;
+      const double ahead_m =
+          map.landmarks[one.id - 1].position_m.x() - update.map_T_vehicle.translation().x();
+      const bool is_at_edge = std::abs(ahead_m) > 0.6 * Road::kRangeM;
+      one.sight = is_at_edge ? model::LineOfSight::kUnknown : model::LineOfSight::kBlocked;
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("What is hidden but for unknown edges stays in use, what is gone leaves it",
+          "[existence]") {
+  for (const std::uint64_t seed : {21, 22}) {
+    Road road(seed);
+    ExistenceTracker tracker(for_road());
+    tracker.take(road.map());
+    std::set<model::LandmarkId> left_by_mistake;
+    const auto drive_without = [&](int day, const std::set<model::LandmarkId>& unseen,
+                                   const std::set<model::LandmarkId>& hidden) {
+      auto updates =
+          road.drive(day * kDay_us, [&](model::LandmarkId id) { return !unseen.contains(id); });
+      hide(hidden, road, updates);
+      // The process ends in the middle of the passes, and goes on with what it saved.
+      for (std::size_t i = 0; i < updates.size(); ++i) {
+        tracker.add(updates[i]);
+        for (const model::ExpectedLandmark& one : updates[i].expected)
+          if (one.sight == model::LineOfSight::kBlocked && !tracker.of(one.id)->is_in_use)
+            left_by_mistake.insert(one.id);
+        if (i != updates.size() / 2) continue;
+        ExistenceTracker loaded(for_road());
+        loaded.load(tracker.save());
+        REQUIRE(loaded.save() == tracker.save());
+        tracker = loaded;
+      }
+      tracker = next_day(tracker, road);
+    };
+    for (int day = 0; day < 4; ++day) drive_without(day, {}, {});
+
+    const auto felled = road.draw(0.1);
+    std::set<model::LandmarkId> hidden = road.draw(0.1);
+    for (const model::LandmarkId id : felled) hidden.erase(id);
+    std::set<model::LandmarkId> unseen = felled;
+    unseen.insert(hidden.begin(), hidden.end());
+    for (int day = 4; day < 9; ++day) drive_without(day, unseen, hidden);
+    CAPTURE(seed, felled.size(), hidden.size());
+    CHECK(unused_of(felled, tracker) >= felled.size() - 1);
+    CHECK(unused_of(hidden, tracker) == 0);
+    CHECK(left_by_mistake.empty());
+
+    // The stack leaves, and some of what stood behind it is gone.
+    const model::LandmarkId taken = *hidden.begin();
+    std::set<model::LandmarkId> still_gone = felled;
+    still_gone.insert(taken);
+    for (int day = 9; day < 12; ++day) drive_without(day, still_gone, {});
+    CHECK(unused_of({taken}, tracker) == 1);
+  }
+}

@@ -95,12 +95,6 @@ double distance_to_path(const Eigen::Vector2d& at_m, const harness::ChainRun& ru
   return nearest_m;
 }
 
-/// A landmark of the map in the world.
-struct PlacedLandmark {
-  Eigen::Vector2d world_m;
-  bool is_in_use = true;
-};
-
 std::vector<PlacedLandmark> placed_landmarks(const harness::ChainRun& run, double beside_m) {
   std::vector<PlacedLandmark> result;
   const geometry::SE2 to_world = world_T_map(run);
@@ -108,7 +102,11 @@ std::vector<PlacedLandmark> placed_landmarks(const harness::ChainRun& run, doubl
     const Eigen::Vector2d world_m = to_world * landmark.position_m;
     if (distance_to_path(world_m, run) > beside_m) continue;
     const auto existence = run.existence.find(landmark.id);
-    result.push_back({world_m, existence == run.existence.end() || existence->second.is_in_use});
+    if (existence == run.existence.end()) {
+      result.push_back({world_m});
+    } else {
+      result.push_back({world_m, existence->second.probability, existence->second.is_in_use});
+    }
   }
   return result;
 }
@@ -117,26 +115,57 @@ bool is_at(const Eigen::Vector2d& a_m, const Eigen::Vector2d& b_m) {
   return (a_m - b_m).norm() < kSameM;
 }
 
-/// One tree: whether landmarks that are in use, and out of use, stand there.
-struct TreeInMap {
-  bool is_used = false;
-  bool is_unused = false;
-  bool is_hidden = false;  ///< Behind the stack.
-};
+DriveMap map_of(const harness::ChainRun& run, const changes::ChangingForest& forest, int drive,
+                double beside_m) {
+  DriveMap map;
+  map.stack = forest.drives[static_cast<std::size_t>(drive)].stack;
+  map.landmarks = placed_landmarks(run, beside_m);
+  for (const metrics::StampedPose& pose : run.truth) map.path_m.push_back(pose.pose.translation());
+  for (const changes::TreeTruth& tree : forest.trees) {
+    const double aside_m = distance_to_path(tree.position_m, run);
+    if (tree.first_drive > drive || aside_m > beside_m + kSameM) continue;
+    map.trees.push_back({tree.position_m, tree.stands_in(drive),
+                         is_hidden(map.stack, tree.position_m, run), aside_m <= beside_m});
+  }
+  return map;
+}
 
-void count(const TreeInMap& tree, bool is_standing, DriveScore& score) {
-  const bool is_there = tree.is_used || tree.is_unused;
-  if (is_standing) {
+/// `is_used`, `is_unused`: landmarks that are in use, and out of use, stand where the tree does.
+void count(const PlacedTree& tree, bool is_used, bool is_unused, DriveScore& score) {
+  const bool is_there = is_used || is_unused;
+  if (tree.stands) {
     ++score.standing;
-    score.found += tree.is_used ? 1 : 0;
-    score.wrongly_unused += tree.is_unused && !tree.is_used ? 1 : 0;
+    score.found += is_used ? 1 : 0;
+    score.wrongly_unused += is_unused && !is_used ? 1 : 0;
   } else if (is_there) {
     ++score.felled;
-    score.felled_unused += tree.is_used ? 0 : 1;
+    score.felled_unused += is_used ? 0 : 1;
+    score.felled_hidden += tree.is_hidden ? 1 : 0;
+    score.felled_hidden_unused += tree.is_hidden && !is_used ? 1 : 0;
   }
-  if (is_standing && is_there && tree.is_hidden) {
+  if (tree.stands && is_there && tree.is_hidden) {
     ++score.hidden;
-    score.hidden_unused += tree.is_used ? 0 : 1;
+    score.hidden_unused += is_used ? 0 : 1;
+  }
+}
+
+void count_map(const DriveMap& map, DriveScore& score) {
+  for (const PlacedTree& tree : map.trees) {
+    if (!tree.counts) continue;
+    const auto has = [&](bool in_use) {
+      return std::ranges::any_of(map.landmarks, [&](const PlacedLandmark& one) {
+        return one.is_in_use == in_use && is_at(one.world_m, tree.world_m);
+      });
+    };
+    count(tree, has(true), has(false), score);
+  }
+
+  for (const PlacedLandmark& one : map.landmarks) {
+    if (!one.is_in_use) continue;
+    ++score.in_use;
+    score.right += std::ranges::any_of(map.trees, [&](const PlacedTree& tree) {
+      return tree.stands && is_at(tree.world_m, one.world_m);
+    });
   }
 }
 
@@ -152,30 +181,8 @@ DriveScore score_of(const harness::ChainRun& run, const changes::ChangingForest&
   if (counts.detections > 0)
     score.false_share = static_cast<double>(counts.clutter + counts.of_things) /
                         static_cast<double>(counts.detections);
-  const std::vector<sim::Box>& stack = forest.drives[static_cast<std::size_t>(drive)].stack;
-  const std::vector<PlacedLandmark> landmarks = placed_landmarks(run, beside_m);
-  const auto at = [&](const Eigen::Vector2d& tree_m, bool in_use) {
-    return std::ranges::any_of(landmarks, [&](const PlacedLandmark& one) {
-      return one.is_in_use == in_use && is_at(one.world_m, tree_m);
-    });
-  };
-
-  // The trees.
-  for (const changes::TreeTruth& tree : forest.trees) {
-    if (tree.first_drive > drive || distance_to_path(tree.position_m, run) > beside_m) continue;
-    count({at(tree.position_m, true), at(tree.position_m, false),
-           is_hidden(stack, tree.position_m, run)},
-          tree.stands_in(drive), score);
-  }
-
-  // The landmarks.
-  for (const PlacedLandmark& one : landmarks) {
-    if (!one.is_in_use) continue;
-    ++score.in_use;
-    score.right += std::ranges::any_of(forest.trees, [&](const changes::TreeTruth& tree) {
-      return tree.stands_in(drive) && is_at(tree.position_m, one.world_m);
-    });
-  }
+  score.map = map_of(run, forest, drive, beside_m);
+  count_map(score.map, score);
   return score;
 }
 

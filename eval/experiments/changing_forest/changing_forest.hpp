@@ -34,23 +34,49 @@ struct Variant {
   double false_share = 0.0;  ///< Of all detections.
 };
 
+/// A landmark of the map, where it is in the world.
+struct PlacedLandmark {
+  Eigen::Vector2d world_m;
+  double probability = 1.0;  ///< As EXISTENCE states; 1 where it says nothing.
+  bool is_in_use = true;
+};
+
+/// A tree as it is on a drive.
+struct PlacedTree {
+  Eigen::Vector2d world_m;
+  bool stands = true;      ///< Else it was felled.
+  bool is_hidden = false;  ///< Behind the stack, from wherever the drive came near it.
+  bool counts = true;      ///< Else it stands just outside: a landmark beside the path may be its.
+};
+
+/// The map after a drive and what is really there, beside the path.
+struct DriveMap {
+  std::vector<Eigen::Vector2d> path_m;
+  std::vector<PlacedLandmark> landmarks;
+  std::vector<PlacedTree> trees;  ///< Those that stand or stood.
+  std::vector<sim::Box> stack;
+};
+
 /// One drive against the truth.
 struct DriveScore {
   int drive = 0;
-  std::size_t standing = 0;        ///< Trees beside the path that stand.
-  std::size_t found = 0;           ///< Those that the map in use has.
-  std::size_t in_use = 0;          ///< Landmarks in use beside the path ...
-  std::size_t right = 0;           ///< ... and those of them where a tree stands.
-  std::size_t stored = 0;          ///< Landmarks of the map, in use or not.
-  std::size_t felled = 0;          ///< Trees that were mapped and do not stand any more ...
-  std::size_t felled_unused = 0;   ///< ... and are out of use.
-  std::size_t wrongly_unused = 0;  ///< Landmarks out of use where a tree stands.
-  std::size_t hidden = 0;          ///< Standing trees of the map that the stack hides ...
-  std::size_t hidden_unused = 0;   ///< ... and are out of use.
-  double false_share = 0.0;        ///< Of the detections of the drive.
+  std::size_t standing = 0;              ///< Trees beside the path that stand.
+  std::size_t found = 0;                 ///< Those that the map in use has.
+  std::size_t in_use = 0;                ///< Landmarks in use beside the path ...
+  std::size_t right = 0;                 ///< ... and those of them where a tree stands.
+  std::size_t stored = 0;                ///< Landmarks of the map, in use or not.
+  std::size_t felled = 0;                ///< Trees that were mapped and do not stand any more ...
+  std::size_t felled_unused = 0;         ///< ... and are out of use.
+  std::size_t wrongly_unused = 0;        ///< Landmarks out of use where a tree stands.
+  std::size_t hidden = 0;                ///< Standing trees of the map that the stack hides ...
+  std::size_t hidden_unused = 0;         ///< ... and are out of use.
+  std::size_t felled_hidden = 0;         ///< Of `felled`, those that the stack would hide ...
+  std::size_t felled_hidden_unused = 0;  ///< ... and that are out of use all the same.
+  double false_share = 0.0;              ///< Of the detections of the drive.
   double ate_m = 0.0;
   double missing_share = 0.0;  ///< As EXISTENCE states at the end.
   bool mapping_needed = false;
+  DriveMap map;
 };
 
 /// What a run of drives is.

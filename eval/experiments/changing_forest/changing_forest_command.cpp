@@ -99,10 +99,46 @@ nlohmann::json row_of(std::uint64_t seed, const Variant& variant, const DriveSco
           {"stored", score.stored},
           {"felled", score.felled},
           {"felled_unused", score.felled_unused},
+          {"felled_hidden", score.felled_hidden},
+          {"felled_hidden_unused", score.felled_hidden_unused},
           {"wrongly_unused", score.wrongly_unused},
           {"ate_m", score.ate_m},
           {"missing_share", score.missing_share},
           {"mapping_needed", score.mapping_needed}};
+}
+
+nlohmann::json point_of(const Eigen::Vector2d& point_m) {
+  return nlohmann::json::array({point_m.x(), point_m.y()});
+}
+
+/// What the picture of a map needs.
+nlohmann::json trace_of(const Variant& variant, const DriveScore& score) {
+  nlohmann::json trace{{"part", name_of(variant.part)},
+                       {"keeping", name_of(variant.keeping)},
+                       {"drive", score.drive},
+                       {"path_m", nlohmann::json::array()},
+                       {"landmarks", nlohmann::json::array()},
+                       {"trees", nlohmann::json::array()},
+                       {"stack", nlohmann::json::array()}};
+  for (const Eigen::Vector2d& place_m : score.map.path_m)
+    trace["path_m"].push_back(point_of(place_m));
+  for (const PlacedLandmark& one : score.map.landmarks)
+    trace["landmarks"].push_back({{"at_m", point_of(one.world_m)},
+                                  {"probability", one.probability},
+                                  {"is_in_use", one.is_in_use}});
+  for (const PlacedTree& tree : score.map.trees)
+    trace["trees"].push_back(
+        {{"at_m", point_of(tree.world_m)}, {"stands", tree.stands}, {"is_hidden", tree.is_hidden}});
+  for (const sim::Box& box : score.map.stack)
+    trace["stack"].push_back({{"at_m", point_of(box.centre_m.head<2>())},
+                              {"half_size_m", point_of(box.half_size_m.head<2>())},
+                              {"heading_rad", box.heading_rad}});
+  return trace;
+}
+
+/// Whether the maps of a variant are drawn, of the first forest.
+bool is_drawn(const Variant& variant) {
+  return variant.part != Part::kFalseDetections && variant.keeping != Keeping::kNothing;
 }
 
 void print_drives(const nlohmann::json& rows) {
@@ -121,10 +157,25 @@ void print_drives(const nlohmann::json& rows) {
   }
 }
 
+void write_drives(const DrivesCommand& options, const nlohmann::json& rows,
+                  const nlohmann::json& traces) {
+  const nlohmann::json config{{"seed", options.seed},
+                              {"runs", options.runs},
+                              {"drives", options.drives.forest.drives},
+                              {"share", options.drives.forest.share},
+                              {"length_m", options.drives.forest.course.length_m},
+                              {"stack_m", options.drives.stack_m}};
+  harness::write_json(options.json, harness::result_document("existence-drives", config, rows));
+  const std::filesystem::path maps = harness::traces_file(options.json);
+  harness::write_json(maps, traces);
+  harness::plot("existence_drives.py", {options.json, maps.string()});
+}
+
 void run_drives(const DrivesCommand& options) {
   const auto& stop = terminal::catch_interrupts();
   const std::vector<Variant> variants = variants_of(options.part);
   std::vector<nlohmann::json> results(variants.size() * static_cast<std::size_t>(options.runs));
+  std::vector<nlohmann::json> traces(variants.size(), nlohmann::json::array());
   tools::run_in_parallel(results.size(), options.jobs, "drives", stop, [&](std::size_t i) {
     const Variant& variant = variants[i % variants.size()];
     const std::uint64_t seed =
@@ -134,8 +185,10 @@ void run_drives(const DrivesCommand& options) {
     nlohmann::json rows = nlohmann::json::array();
     for (const DriveScore& score :
          drive_forest(forest, options.drives, variant, seed, folder.path(),
-                      [](double) { terminal::throw_if_interrupted(); }))
+                      [](double) { terminal::throw_if_interrupted(); })) {
       rows.push_back(row_of(seed, variant, score));
+      if (i < variants.size() && is_drawn(variant)) traces[i].push_back(trace_of(variant, score));
+    }
     results[i] = std::move(rows);
   });
 
@@ -144,14 +197,10 @@ void run_drives(const DrivesCommand& options) {
     for (const nlohmann::json& row : one) rows.push_back(row);
   print_drives(rows);
   if (options.json.empty()) return;
-  const nlohmann::json config{{"seed", options.seed},
-                              {"runs", options.runs},
-                              {"drives", options.drives.forest.drives},
-                              {"share", options.drives.forest.share},
-                              {"length_m", options.drives.forest.course.length_m},
-                              {"stack_m", options.drives.stack_m}};
-  harness::write_json(options.json, harness::result_document("existence-drives", config, rows));
-  harness::plot("existence_drives.py", {options.json});
+  nlohmann::json maps = nlohmann::json::array();
+  for (const nlohmann::json& one : traces)
+    for (const nlohmann::json& map : one) maps.push_back(map);
+  write_drives(options, rows, maps);
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ constexpr double kLeastOdds = 30.0;
 /// Degrees of freedom of the error's distribution (Student's t): real landmarks have heavy tails.
 constexpr double kTail = 4.0;
 /// Share of the landmarks that bad scans put somewhere else for a while.
-constexpr double kMoved = 0.03;
+constexpr double kMoved = 0.05;
 /// Trunks stand in clumps: least density of others beside one [1/m^2].
 constexpr double kLeastDensity = 0.01;
 /// Observations on one way lie this near together on the vehicle's path [m].
@@ -97,12 +97,14 @@ double density_of_one(const Eigen::Vector2d& apart_m, const Eigen::Matrix2d& cov
          (2.0 * std::numbers::pi * std::sqrt(covariance_m2.determinant()));
 }
 
-/// The same where one of them may have been moved by bad scans, to anywhere within the distance
-/// within which doubles are looked for.
+/// The same on one way, where bad scans may have put one of them anywhere within the distance
+/// within which doubles are looked for, and the others have the errors that are stated.
 double density_of_moved(const Eigen::Vector2d& apart_m, const Eigen::Matrix2d& covariance_m2,
                         double merge_distance_m) {
-  return density_of_one(apart_m, covariance_m2) +
-         kMoved / (std::numbers::pi * merge_distance_m * merge_distance_m);
+  const double squared = apart_m.dot(covariance_m2.inverse() * apart_m);
+  const double stated =
+      std::exp(-0.5 * squared) / (2.0 * std::numbers::pi * std::sqrt(covariance_m2.determinant()));
+  return stated + kMoved / (std::numbers::pi * merge_distance_m * merge_distance_m);
 }
 
 /// Whether a third landmark, that is another one than one of the two, lies where they may be.

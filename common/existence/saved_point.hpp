@@ -1,0 +1,46 @@
+// A point as plain numbers.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "common/existence/missed_share.hpp"
+#include "common/existence/pass_occluder.hpp"
+#include "common/existence/shell.hpp"
+
+namespace understory::existence {
+
+/// All that is kept of a point, as plain numbers without padding: the same bytes for the same
+/// point, and a point that goes on bit by bit as if nothing had been.
+template <Shell S>
+struct SavedPoint {
+  /// Version 1 had a coarser 1 - v, and nothing of what was measured in front of the point.
+  static constexpr std::uint32_t kVersion = 2;
+  static constexpr std::size_t kFloats = 8;
+  std::uint32_t version = kVersion;
+  std::uint32_t shell_kind = S::kKind;
+  double odds = 0.0;  ///< P / (1 - P), of the pass that is open.
+  /// Number of the pass, sectors and flags; a fourth one, 0, where the size would not divide by 8.
+  std::array<std::uint32_t, 3 + (3 + kFloats + S::kNumbers) % 2> pass{};
+  std::array<float, kFloats> numbers{};  ///< Of the pass; see PointExistence.
+  std::array<float, S::kNumbers> shell{};
+
+  /// Whether it is of a version and a shell that are known, and its numbers are possible.
+  bool can_be() const {
+    const auto is_possible = [](double number) { return std::isfinite(number) && number >= 0.0; };
+    return (version == 1 || version == kVersion) && shell_kind == S::kKind && is_possible(odds) &&
+           std::all_of(numbers.begin(), numbers.end(), is_possible);
+  }
+  MissedShare missed_share() const {
+    constexpr std::uint32_t kFiner = MissedShare::kCodesPerOctave / 32;
+    return MissedShare::of(version == 1 ? kFiner * (pass[2] >> 24U) : pass[0] >> 16U);
+  }
+  PassOccluder occluder() const {
+    return PassOccluder::of(version == 1 ? 0 : static_cast<std::uint8_t>(pass[2] >> 24U));
+  }
+};
+
+}  // namespace understory::existence
