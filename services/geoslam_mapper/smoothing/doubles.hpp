@@ -11,9 +11,10 @@ namespace understory::geoslam_mapper::smoothing {
 
 /// Merges landmarks that are one by all that is known of their distance. The joint covariance must
 /// tell neighbours apart, and the two must not have been observed side by side. Then they are one
-/// where they were observed in turns on one way past them, where two trunks would touch, or where
-/// that is much likelier than two neighbours of which two passes saw one each: by their distance in
-/// its covariance, by how dense landmarks stand around, and by how many of these both passes saw.
+/// where two trunks would touch, or where that is much likelier than two neighbours: of which two
+/// passes saw one each, by their distance in its covariance, by how dense landmarks stand around,
+/// and by how many of these both passes saw; or that were seen on one way past them, by who saw
+/// which and by their distance, which bad scans may have moved.
 /// Where the covariance is large, only the neighbourhood as a whole can tell: PassJoiner. Looks
 /// around the landmarks of `ids`, up to `merge_distance_m`. The graph is not solved. Returns the
 /// merged pairs.
