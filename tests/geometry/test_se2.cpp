@@ -1,9 +1,11 @@
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <numbers>
 #include <random>
 
 #include "common/geometry/alignment.hpp"
 #include "common/geometry/se2.hpp"
+#include "common/geometry/symmetric_inverse.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
@@ -105,4 +107,28 @@ TEST_CASE("Rigid alignment finds the motion, and pairs can be taken away", "[ali
     sums.add(wrong, wrong, -1.0);
     REQUIRE((truth.inverse() * sums.a_T_b()).Log().norm() < 2e-13);
   }
+}
+
+TEST_CASE("The inverse of a covariance is symmetric and positive definite at all scales", "[se2]") {
+  std::mt19937_64 random(6);
+  std::uniform_real_distribution<double> exponent(-4.0, 3.0);
+  for (int i = 0; i < 1000; ++i) {
+    // A motion over a long way behind an exact one, or before it.
+    SE2WithCovariance first{SE2::Exp(random_tangent(random, 20.0, 3.1))};
+    SE2WithCovariance second{SE2::Exp(random_tangent(random, 20.0, 3.1))};
+    for (SE2WithCovariance* one : {&first, &second})
+      for (int k = 0; k < 3; ++k) one->covariance(k, k) = std::pow(10.0, exponent(random));
+    const Eigen::Matrix3d covariance = compound(first, second).covariance;
+    const Eigen::Matrix3d information = symmetric_inverse(covariance);
+
+    REQUIRE(information == information.transpose());
+    REQUIRE(information.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff() >=
+            -1e-15 * information.norm());
+    const double bound = 1e-15 * covariance.norm() * information.norm();
+    REQUIRE((covariance * information - Eigen::Matrix3d::Identity()).norm() < 1e-12 + 10 * bound);
+  }
+
+  // Singular, by rounding not even semi-definite: nothing is infinite.
+  Eigen::Matrix3d flat = Eigen::Vector3d(1.0, 1.0, -1e-18).asDiagonal();
+  CHECK(symmetric_inverse(flat).allFinite());
 }

@@ -1,7 +1,8 @@
 #include "services/geoslam_mapper/smoothing/gyro_bias.hpp"
 
-#include <Eigen/LU>
 #include <cmath>
+
+#include "common/geometry/symmetric_inverse.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 namespace {
@@ -132,8 +133,8 @@ plane::BiasedRelativePose GyroBias::biased(plane::RelativePose measured, const C
   const geometry::SE2 by_gyro(motion.from_T_to.mean.translation(), gyro.rotation_rad);
   measured.a_T_b =
       plane::at_true_rate(by_gyro, now_.reference - gyro.bias_rad / gyro.seconds, gyro.seconds);
-  measured.information =
-      with_heading_variance(motion.from_T_to.covariance, gyro.variance).inverse();
+  measured.information = geometry::symmetric_inverse(
+      with_heading_variance(motion.from_T_to.covariance, gyro.variance));
   ++now_.chain.back().motions;
   return {measured, now_.chain.back().id, gyro.seconds};
 }

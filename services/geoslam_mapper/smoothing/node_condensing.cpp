@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/factor_graph/plane/condense.hpp"
+#include "common/geometry/symmetric_inverse.hpp"
 #include "services/geoslam_mapper/smoothing/pose_graph.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
@@ -120,7 +121,7 @@ void PoseGraph::begin_motion_at(NodeIndex into, const Part::Outer& outer,
   const geometry::SE2WithCovariance motion =
       is_forward ? condensed.origin_T_outer : inverse(condensed.origin_T_outer);
   plane::RelativePose measured{nodes_[into].centre, nodes_[outer.node].centre, motion.mean,
-                               motion.covariance.inverse()};
+                               geometry::symmetric_inverse(motion.covariance)};
   if (!is_forward) std::swap(measured.a, measured.b);
 
   if (outer.motion.is_biased) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/geometry/symmetric_inverse.hpp"
 #include "services/geoslam_mapper/smoothing/pose_graph.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
@@ -149,19 +150,19 @@ plane::RelativePose PoseGraph::take_motion_out(MotionRef ref) {
 
 void PoseGraph::begin_motion_at(const Retirement& retirement, NodeIndex to,
                                 const plane::RelativePose& measured) {
-  const geometry::SE2WithCovariance motion{measured.a_T_b, measured.information.inverse()};
+  const geometry::SE2WithCovariance motion{measured.a_T_b, geometry::symmetric_inverse(measured.information)};
   const geometry::SE2WithCovariance into_T_to = compound(retirement.into_T_node, motion);
   link({nodes_[retirement.into].centre, nodes_[to].centre, into_T_to.mean,
-        into_T_to.covariance.inverse()},
+        geometry::symmetric_inverse(into_T_to.covariance)},
        retirement.into, to);
 }
 
 void PoseGraph::end_motion_at(const Retirement& retirement, NodeIndex from,
                               const plane::RelativePose& measured) {
-  const geometry::SE2WithCovariance motion{measured.a_T_b, measured.information.inverse()};
+  const geometry::SE2WithCovariance motion{measured.a_T_b, geometry::symmetric_inverse(measured.information)};
   const geometry::SE2WithCovariance from_T_into = compound(motion, inverse(retirement.into_T_node));
   link({nodes_[from].centre, nodes_[retirement.into].centre, from_T_into.mean,
-        from_T_into.covariance.inverse()},
+        geometry::symmetric_inverse(from_T_into.covariance)},
        from, retirement.into);
 }
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "common/geometry/symmetric_inverse.hpp"
+
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
@@ -210,7 +212,7 @@ void PoseGraph::add_motion(const CentreMotion& motion, NodeIndex node) {
   plane::RelativePose measured{nodes_[motion.from].centre, nodes_[node].centre,
                                motion.from_T_to.mean, Eigen::Matrix3d::Zero()};
   if (!gyro_.is_estimated() || !motion.gyro) {
-    measured.information = motion.from_T_to.covariance.inverse();
+    measured.information = geometry::symmetric_inverse(motion.from_T_to.covariance);
     link(measured, motion.from, node);
     return;
   }
@@ -234,8 +236,9 @@ MotionRef PoseGraph::link(const plane::RelativePose& measured, NodeIndex from, N
 
 void PoseGraph::add_closure(std::uint64_t id, NodeIndex a, NodeIndex b,
                             const geometry::SE2WithCovariance& a_T_b) {
-  const MotionRef ref =
-      link({nodes_[a].centre, nodes_[b].centre, a_T_b.mean, a_T_b.covariance.inverse()}, a, b);
+  const MotionRef ref = link({nodes_[a].centre, nodes_[b].centre, a_T_b.mean,
+                              geometry::symmetric_inverse(a_T_b.covariance)},
+                             a, b);
   closures_.emplace(ref.number, id);
 }
 
