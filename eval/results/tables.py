@@ -13,6 +13,7 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 import render  # noqa: E402
 import render_existence  # noqa: E402
+import render_returns  # noqa: E402
 from experiments import EXPERIMENTS, printed  # noqa: E402
 
 HERE = Path(__file__).resolve().parent
@@ -59,6 +60,7 @@ SECTIONS = (
     ("loops", "Loops found while tracking goes on", None, render.loops),
     ("loops-blind", "Loops found while tracking goes on, no stem seen on a third of the way", None, render.loops),
     ("loops-strangers", "Queries that have no match", None, render.loop_queries),
+    ("returns", "Drives that drift and come back near themselves", None, render_returns.returns),
     ("loop-detectors", "Loop detectors and verifiers", "named in the thesis on submaps, §2.4, without figures",
      render.loop_detectors),
     ("existence", "What is still there", None, render_existence.existence),
