@@ -150,7 +150,8 @@ plane::RelativePose PoseGraph::take_motion_out(MotionRef ref) {
 
 void PoseGraph::begin_motion_at(const Retirement& retirement, NodeIndex to,
                                 const plane::RelativePose& measured) {
-  const geometry::SE2WithCovariance motion{measured.a_T_b, geometry::symmetric_inverse(measured.information)};
+  const geometry::SE2WithCovariance motion{measured.a_T_b,
+                                           geometry::symmetric_inverse(measured.information)};
   const geometry::SE2WithCovariance into_T_to = compound(retirement.into_T_node, motion);
   link({nodes_[retirement.into].centre, nodes_[to].centre, into_T_to.mean,
         geometry::symmetric_inverse(into_T_to.covariance)},
@@ -159,7 +160,8 @@ void PoseGraph::begin_motion_at(const Retirement& retirement, NodeIndex to,
 
 void PoseGraph::end_motion_at(const Retirement& retirement, NodeIndex from,
                               const plane::RelativePose& measured) {
-  const geometry::SE2WithCovariance motion{measured.a_T_b, geometry::symmetric_inverse(measured.information)};
+  const geometry::SE2WithCovariance motion{measured.a_T_b,
+                                           geometry::symmetric_inverse(measured.information)};
   const geometry::SE2WithCovariance from_T_into = compound(motion, inverse(retirement.into_T_node));
   link({nodes_[from].centre, nodes_[retirement.into].centre, from_T_into.mean,
         geometry::symmetric_inverse(from_T_into.covariance)},
