@@ -18,6 +18,11 @@ PrincipalAxes principal_axes(const Eigen::Matrix2d& symmetric);
 Eigen::Vector2d eigenvalues(const Eigen::Matrix2d& symmetric);
 /// Eigenvalues of a symmetric 3x3 matrix, ascending.
 Eigen::Vector3d eigenvalues(const Eigen::Matrix3d& symmetric);
+/// Inverse of a covariance or of an information: exactly symmetric and positive definite whatever
+/// its scales. A motion over a blind way is known to millimetres along one direction and to tens of
+/// metres along another: cofactors leave such an inverse asymmetric, or indefinite. Of a singular
+/// matrix what is nothing counts as 1e-15 of the largest eigenvalue.
+Eigen::Matrix3d symmetric_inverse(const Eigen::Matrix3d& matrix);
 
 /// The shortest rotation that takes the direction `from` to the direction `to`; neither may be
 /// zero.

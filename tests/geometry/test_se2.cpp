@@ -4,8 +4,8 @@
 #include <random>
 
 #include "common/geometry/alignment.hpp"
+#include "common/geometry/decompositions.hpp"
 #include "common/geometry/se2.hpp"
-#include "common/geometry/symmetric_inverse.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;

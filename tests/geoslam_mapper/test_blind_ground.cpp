@@ -6,6 +6,7 @@
 
 #include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
 #include "tests/catch.hpp"
+#include "tests/geoslam_mapper/simple_keyframe.hpp"
 
 using namespace understory;
 using namespace understory::geoslam_mapper;
@@ -35,8 +36,8 @@ class BlindLap {
     const Eigen::Vector3d sigma(0.02, 0.02, 5e-3);
     model::Odometry motion;
     motion.sequence = k;
-    motion.from_utime = utime(i);
-    motion.utime = utime(i + 1);
+    motion.from_utime = test::utime_of(i);
+    motion.utime = test::utime_of(i + 1);
     motion.from_T_to =
         truth_[k].inverse() * truth_[k + 1] *
         geometry::SE2::Exp({sigma.x() * draw(), sigma.y() * draw(), sigma.z() * draw()});
@@ -46,21 +47,13 @@ class BlindLap {
   }
 
   model::Keyframe keyframe(int i) {
-    model::Keyframe keyframe;
-    keyframe.utime = utime(i);
-    keyframe.sequence = static_cast<std::uint64_t>(i);
-    keyframe.field_of_view.max_range_m = kRangeM;
-    keyframe.members.push_back({utime(i), keyframe.sequence, {}, Eigen::Matrix3d::Zero()});
+    model::Keyframe keyframe = test::simple_keyframe(i, kRangeM);
     if (i >= kBlindFrom && i < kBlindTo) return keyframe;
     for (const Eigen::Vector2d& tree_m : trees_m_) {
       const Eigen::Vector2d seen_m = truth_[static_cast<std::size_t>(i)].inverse() * tree_m;
       if (seen_m.norm() > kRangeM) continue;
-      model::KeyframeLandmark landmark;
-      landmark.position_m = seen_m + kSigmaM * Eigen::Vector2d(draw(), draw());
-      landmark.covariance_m2 = kSigmaM * kSigmaM * Eigen::Matrix2d::Identity();
-      landmark.radius_m = 0.2;
-      landmark.observation_count = 1;
-      keyframe.landmarks.push_back(landmark);
+      keyframe.landmarks.push_back(
+          test::simple_tree(seen_m + kSigmaM * Eigen::Vector2d(draw(), draw()), kSigmaM, 1));
     }
     return keyframe;
   }
@@ -72,7 +65,6 @@ class BlindLap {
     const double angle = 2.0 * std::numbers::pi * i / kLap;
     return {radius_m * std::sin(angle), radius_m * (1.0 - std::cos(angle)), angle};
   }
-  static model::Utime utime(int i) { return 1'000'000 * (static_cast<model::Utime>(i) + 1); }
   double draw() { return normal_(random_); }
 
   std::mt19937_64 random_;

@@ -5,6 +5,7 @@
 
 #include "services/geoslam_mapper/smoothing/one_map.hpp"
 #include "tests/catch.hpp"
+#include "tests/geoslam_mapper/simple_keyframe.hpp"
 
 using namespace understory;
 using namespace understory::geoslam_mapper;
@@ -44,8 +45,8 @@ class GapWorld {
     const Eigen::Vector3d noise = sigma.cwiseProduct(Eigen::Vector3d(draw(), draw(), draw()));
     model::Odometry motion;
     motion.sequence = static_cast<std::uint64_t>(i);
-    motion.from_utime = utime(i - 1);
-    motion.utime = utime(i);
+    motion.from_utime = test::utime_of(i - 1);
+    motion.utime = test::utime_of(i);
     motion.from_T_to = geometry::SE2(kStep_m, 0.0, 0.0) * geometry::SE2::Exp(noise);
     motion.covariance = sigma.array().square().matrix().asDiagonal();
     motion.has_wheels = true;
@@ -53,27 +54,18 @@ class GapWorld {
   }
 
   std::optional<model::Keyframe> keyframe(int i) {
-    model::Keyframe keyframe;
-    keyframe.utime = utime(i);
-    keyframe.sequence = static_cast<std::uint64_t>(i);
-    keyframe.field_of_view.max_range_m = kRange_m;
-    keyframe.members.push_back({utime(i), keyframe.sequence, {}, Eigen::Matrix3d::Zero()});
+    model::Keyframe keyframe = test::simple_keyframe(i, kRange_m);
     if (drive_.is_blind(i)) return drive_.has_empty_ones ? std::optional(keyframe) : std::nullopt;
     for (const Eigen::Vector2d& tree_m : trees_m_) {
       const Eigen::Vector2d seen_m = pose(i).inverse() * tree_m;
       if (seen_m.norm() > kRange_m) continue;
-      model::KeyframeLandmark landmark;
-      landmark.position_m = seen_m + kSigma_m * Eigen::Vector2d(draw(), draw());
-      landmark.covariance_m2 = kSigma_m * kSigma_m * Eigen::Matrix2d::Identity();
-      landmark.radius_m = 0.2;
-      landmark.observation_count = 4;
-      keyframe.landmarks.push_back(landmark);
+      keyframe.landmarks.push_back(
+          test::simple_tree(seen_m + kSigma_m * Eigen::Vector2d(draw(), draw()), kSigma_m));
     }
     return keyframe;
   }
 
  private:
-  static model::Utime utime(int i) { return 1'000'000 * (static_cast<model::Utime>(i) + 1); }
   double draw() { return normal_(random_); }
 
   GapDrive drive_;

@@ -6,6 +6,7 @@
 
 #include "services/geoslam_mapper/smoothing/one_map.hpp"
 #include "tests/catch.hpp"
+#include "tests/geoslam_mapper/simple_keyframe.hpp"
 
 using namespace understory;
 using namespace understory::geoslam_mapper;
@@ -19,8 +20,6 @@ constexpr double kStep_m = 2.0;
 constexpr double kRange_m = 20.0;
 constexpr double kSigma_m = 0.05;
 constexpr double kApart_m = 30.0;  // 1 sigma of the way between the passes
-
-model::Utime utime(int i) { return 1'000'000 * (static_cast<model::Utime>(i) + 1); }
 
 /// Trees of one pass along the same stretch of the map; those of the other are really elsewhere.
 class TwoPasses {
@@ -44,8 +43,8 @@ class TwoPasses {
     if (is_searched(i)) sigma << 5.0, 5.0, 0.3;
     model::Odometry motion;
     motion.sequence = static_cast<std::uint64_t>(i);
-    motion.from_utime = utime(i - 1);
-    motion.utime = utime(i);
+    motion.from_utime = test::utime_of(i - 1);
+    motion.utime = test::utime_of(i);
     motion.from_T_to = pose(i - 1).inverse() * pose(i);
     motion.covariance = sigma.array().square().matrix().asDiagonal();
     motion.has_wheels = true;
@@ -53,20 +52,12 @@ class TwoPasses {
   }
 
   model::Keyframe keyframe(int i) {
-    model::Keyframe keyframe;
-    keyframe.utime = utime(i);
-    keyframe.sequence = static_cast<std::uint64_t>(i);
-    keyframe.field_of_view.max_range_m = kRange_m;
-    keyframe.members.push_back({utime(i), keyframe.sequence, {}, Eigen::Matrix3d::Zero()});
+    model::Keyframe keyframe = test::simple_keyframe(i, kRange_m);
     for (const Eigen::Vector2d& tree_m : trees_m_[i < kPass ? 0 : 1]) {
       const Eigen::Vector2d seen_m = pose(i).inverse() * tree_m;
       if (seen_m.norm() > kRange_m) continue;
-      model::KeyframeLandmark landmark;
-      landmark.position_m = seen_m + kSigma_m * Eigen::Vector2d(normal_(random_), normal_(random_));
-      landmark.covariance_m2 = kSigma_m * kSigma_m * Eigen::Matrix2d::Identity();
-      landmark.radius_m = 0.2;
-      landmark.observation_count = 4;
-      keyframe.landmarks.push_back(landmark);
+      keyframe.landmarks.push_back(test::simple_tree(
+          seen_m + kSigma_m * Eigen::Vector2d(normal_(random_), normal_(random_)), kSigma_m));
     }
     return keyframe;
   }

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "common/geometry/symmetric_inverse.hpp"
+#include "common/geometry/decompositions.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 namespace {

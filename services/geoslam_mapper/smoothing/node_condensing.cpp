@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "common/factor_graph/plane/condense.hpp"
-#include "common/geometry/symmetric_inverse.hpp"
+#include "common/geometry/decompositions.hpp"
 #include "services/geoslam_mapper/smoothing/pose_graph.hpp"
 
 namespace understory::geoslam_mapper::smoothing {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/geometry/symmetric_inverse.hpp"
+#include "common/geometry/decompositions.hpp"
 #include "services/geoslam_mapper/smoothing/pose_graph.hpp"
 
 namespace understory::geoslam_mapper::smoothing {

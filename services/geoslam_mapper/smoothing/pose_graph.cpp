@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "common/geometry/symmetric_inverse.hpp"
+#include "common/geometry/decompositions.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 namespace {
