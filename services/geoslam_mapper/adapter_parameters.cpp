@@ -54,10 +54,6 @@ void describe_evidence(SmoothingMapperParameters& p, bus::ParameterTable& table)
   table.add("smoothing.gyro_start_sigma", p.gyro_start_sigma, {1e-6, 1.0}, "rad/s",
             "Standard deviation of the bias that odometry takes out of the gyro's rate, before the "
             "mapper has seen a stop.");
-  table.add("smoothing.relinearise_above", p.relinearise_above, {1e-6, 1.0}, "sigma",
-            "A measurement is linearised again beyond this. Use 1e-6 on long roads, open or in "
-            "loops: with 1e-4 the end of a 3 km road jumped by 0.25 m per keyframe, with 1e-2 by "
-            "metres. In a forest 1e-6 takes six times as long and gains nothing.");
   table.add("smoothing.predicted_sigma_m", p.predicted_sigma_m, {1e-4, 100.0}, "m",
             "Standard deviation of a pose that was predicted without odometry.");
   table.add("smoothing.predicted_sigma_rad", p.predicted_sigma_rad, {1e-5, 3.2}, "rad",

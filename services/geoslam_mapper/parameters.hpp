@@ -33,9 +33,8 @@ struct BaselineMapperParameters {
 struct SmoothingMapperParameters {
   // Evidence.
   bool use_odometry = false;
-  double gyro_walk = 1e-5;          ///< rad/s/sqrt(s)
-  double gyro_start_sigma = 5e-3;   ///< rad/s
-  double relinearise_above = 1e-2;  ///< Standard deviations.
+  double gyro_walk = 1e-5;         ///< rad/s/sqrt(s)
+  double gyro_start_sigma = 5e-3;  ///< rad/s
   double predicted_sigma_m = 0.25;
   double predicted_sigma_rad = 0.015;
   double correlated_share = 0.0;  ///< Of a variance.

@@ -1,6 +1,8 @@
 // A simulated street grid has the stated noise, and the smoother solves it as well as a batch
 // solver.
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "eval/experiments/backend/backend.hpp"
 #include "eval/experiments/backend/backend_world.hpp"
@@ -76,4 +78,23 @@ TEST_CASE("streets with precise odometry end at the batch optimum, as large as n
         3.0 * (static_cast<double>(graph.factors.size()) - static_cast<double>(run.poses) + 1.0);
     CHECK(std::abs(run.chi2_final - degrees) < 5.0 * std::sqrt(2.0 * degrees));
   }
+}
+
+TEST_CASE("with the setting that ships the smoother is at every moment where the batch solver is",
+          "[backend]") {
+  std::vector<double> sigmas;
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
+    const eval::experiments::backend::BackendRun run =
+        eval::experiments::backend::run_backend(make_world(small_world(), seed), "streets");
+    for (const auto& moment : run.moments) {
+      REQUIRE(moment.is_verified);
+      // Of each moment, with the few residuals of its beginning as well.
+      CHECK(moment.chi2 < 1.001 * moment.chi2_batch + 1e-2);
+      sigmas.push_back(moment.newest.sigma);
+      for (const auto& seen : moment.seen) sigmas.push_back(seen.sigma);
+    }
+  }
+  REQUIRE(sigmas.size() > 300);
+  std::sort(sigmas.begin(), sigmas.end());
+  CHECK(sigmas[sigmas.size() * 99 / 100] < 0.05);
 }

@@ -9,8 +9,8 @@
 namespace understory::test {
 
 /// Converges as far as numbers go.
-inline factor_graph::plane::SmootherParameters exact() {
-  factor_graph::plane::SmootherParameters parameters;
+inline factor_graph::bayes_tree::IncrementalParameters exact() {
+  factor_graph::bayes_tree::IncrementalParameters parameters;
   parameters.least_move = 0.0;
   parameters.relinearise_above = 0.0;
   parameters.max_iterations = 1;

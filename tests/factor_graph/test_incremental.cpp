@@ -54,7 +54,6 @@ factor_graph::bayes_tree::IncrementalParameters exact() {
   parameters.least_move = 0.0;
   parameters.relinearise_above = 0.0;
   parameters.max_iterations = 1;
-  parameters.thorough_every = 0;
   return parameters;
 }
 
@@ -125,37 +124,6 @@ TEST_CASE("In space the smoother ends where the batch solution is", "[incrementa
   }
 }
 
-TEST_CASE("Waiting cliques arrive at the batch solution", "[incremental]") {
-  Random random(8);
-  factor_graph::bayes_tree::IncrementalParameters parameters = exact();
-  parameters.least_move = 1e-7;
-  parameters.wait_below = 1e6;  // a tenth of a deviation
-  parameters.waiting_slots = 2;
-  factor_graph::bayes_tree::IncrementalSmoother smoother(parameters);
-  std::vector<VariableId> poses;
-  long moved = 0;
-  for (int k = 0; k < 120; ++k) {
-    grow(smoother, poses, random);
-    const factor_graph::bayes_tree::IncrementalUpdate update = smoother.update();
-    REQUIRE(update.ok);
-    moved += update.moved_variables;
-    if (k % 10 == 0) {
-      // Taken back and done again: the queue is part of the state.
-      smoother.rollback();
-      poses.pop_back();
-      grow(smoother, poses, random);
-      REQUIRE(smoother.update().ok);
-    }
-  }
-  CHECK(moved < 120L * 60);
-  double before = 1.0;
-  for (int i = 0; i < 400 && before > 0.0; ++i) {
-    before = static_cast<double>(smoother.update().moved_variables);
-  }
-  CHECK(before == 0.0);
-  CHECK(distance_to_batch(smoother.graph()) < 1e-6);
-}
-
 TEST_CASE("On a torus of noisy poses the steps do not swing for ever", "[incremental]") {
   Random random(5);
   constexpr int kAround = 12;
@@ -199,7 +167,8 @@ TEST_CASE("On a torus of noisy poses the steps do not swing for ever", "[increme
     REQUIRE(update.ok);
     relinearised += update.relinearised_factors;
   }
-  CHECK(relinearised < 250L * kPoses);
+  // Less than once each per update: half of the 3 kPoses factors are there in the mean.
+  CHECK(relinearised < 3L * kPoses * kPoses / 2);
   const factor_graph::bayes_tree::IncrementalUpdate last = smoother.settle();
   CHECK(last.is_settled);
   test::GraphCopy copy(smoother.graph());

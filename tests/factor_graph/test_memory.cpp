@@ -98,7 +98,6 @@ double kept_part(const IncrementalSmoother& smoother) {
 double most_beside(std::size_t undo_bytes) {
   IncrementalParameters parameters;
   parameters.undo_bytes = undo_bytes;
-  parameters.thorough_every = 50;
   IncrementalSmoother smoother(parameters);
   Spiral spiral;
   double most = 0.0;

@@ -16,8 +16,7 @@ namespace {
 
 class Walk {
  public:
-  Walk(std::uint64_t seed, const factor_graph::bayes_tree::IncrementalParameters& parameters)
-      : smoother(parameters), engine_(seed) {
+  explicit Walk(std::uint64_t seed) : engine_(seed) {
     poses.push_back(smoother.add_variable(Pose3{}));
     smoother.add(prior(poses[0], Pose3{}, Matrix6(1e4 * Matrix6::Identity())));
   }
@@ -116,10 +115,8 @@ long operations() {
 }  // namespace
 
 TEST_CASE("In space joint covariances equal the dense inverse", "[incremental]") {
-  factor_graph::bayes_tree::IncrementalParameters parameters;
-  parameters.thorough_every = 0;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    Walk walk(seed, parameters);
+    Walk walk(seed);
     for (int k = 0; k < 30; ++k) {
       walk.step();
       if (k % 3 == 2) walk.close_loop();
@@ -144,9 +141,7 @@ TEST_CASE("In space joint covariances equal the dense inverse", "[incremental]")
 // UNDERSTORY_OPERATIONS=1000000 under the sanitizers is the long run.
 TEST_CASE("Random use for long: every answer is finite or names what is undetermined",
           "[incremental]") {
-  factor_graph::bayes_tree::IncrementalParameters parameters;
-  parameters.thorough_every = 50;
-  Walk walk(7, parameters);
+  Walk walk(7);
   long undetermined = 0;
   for (long k = 0; k < operations(); ++k) {
     const auto poses = walk.poses;

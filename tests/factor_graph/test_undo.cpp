@@ -18,7 +18,6 @@ constexpr std::size_t kKeepsEverything = std::size_t{1} << 40U;
 
 IncrementalParameters with_undo(std::size_t bytes) {
   IncrementalParameters parameters;
-  parameters.thorough_every = 7;
   parameters.undo_bytes = bytes;
   return parameters;
 }

@@ -87,7 +87,6 @@ void drive(std::uint64_t seed, bool bounded, BlindErrors& errors) {
   BlindLap lap(seed);
   SmoothingMapperParameters parameters;
   parameters.use_odometry = true;
-  parameters.relinearise_above = 1e-6;
   parameters.condense_m = 0.0;
   if (!bounded) parameters.known_ground_m = parameters.fold_distance_m = 0.0;
   SmoothingMapper mapper(parameters);

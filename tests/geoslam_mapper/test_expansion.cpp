@@ -55,7 +55,6 @@ Driven drive(double condense_m, std::uint64_t seed, double sparse = 0.0) {
   result.parameters.use_odometry = true;
   result.parameters.gyro_walk = 0.0;
   result.parameters.start_wait_s = 0.0;
-  result.parameters.relinearise_above = 1e-4;
   result.parameters.condense_m = condense_m;
   result.parameters.condense_of_range = 100.0;
   result.parameters.cut_sparse = sparse;

@@ -86,7 +86,6 @@ GapMap driven(const GapDrive& drive, std::uint64_t seed, double condense_m) {
   SmoothingMapperParameters parameters;
   parameters.use_odometry = true;
   parameters.gyro_walk = 0.0;
-  parameters.relinearise_above = 1e-6;
   parameters.condense_m = condense_m;
   parameters.lost_sigma_m = parameters.lost_sigma_rad = 1e9;
   GapMap result{OneMap(parameters)};

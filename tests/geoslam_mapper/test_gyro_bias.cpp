@@ -78,7 +78,6 @@ Drive drive(double gyro_walk, int saved_at = -1, double condense_m = 0.0) {
   parameters.condense_m = condense_m;
   parameters.use_odometry = true;
   parameters.gyro_walk = gyro_walk;
-  parameters.relinearise_above = 1e-4;
   SmoothingMapper mapper(parameters);
   Drive result;
 

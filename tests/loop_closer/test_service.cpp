@@ -17,7 +17,7 @@ using test::RingOptions;
 namespace {
 
 constexpr const char* kMapperToml =
-    "[smoothing]\nuse_odometry = true\nrelinearise_above = 1e-6\nlost_sigma_m = 100.0\n"
+    "[smoothing]\nuse_odometry = true\nlost_sigma_m = 100.0\n"
     "lost_sigma_rad = 3.0\n";
 
 /// Mapper, and the loop closer where it is wanted, on one bus.

@@ -31,7 +31,7 @@ double whitened_distance(const CliqueRecord& clique, int first, int size, const 
 
 }  // namespace
 
-void BackSubstitution::move_variables(const CliqueRecord& clique, double finest) {
+void BackSubstitution::move_variables(const CliqueRecord& clique, double threshold) {
   int first = 0;
   for (int i = 0; i < clique.frontal_count; ++i) {
     const int name = clique.rows[i];
@@ -39,7 +39,7 @@ void BackSubstitution::move_variables(const CliqueRecord& clique, double finest)
     const int size = dimension(variable.type);
     const double* to = step_.data() + first;
     const double distance = whitened_distance(clique, first, size, to, variable.delta);
-    if (distance > finest) {
+    if (distance > threshold) {
       moves_.note(name, variable.delta, distance);
       graph_.move(name, to);
     }
@@ -47,7 +47,7 @@ void BackSubstitution::move_variables(const CliqueRecord& clique, double finest)
   }
 }
 
-void BackSubstitution::solve_clique(int id, double finest) {
+void BackSubstitution::solve_clique(int id, double threshold) {
   const CliqueRecord& clique = cliques_[id];
   step_.resize(static_cast<std::size_t>(clique.size));
 
@@ -60,44 +60,36 @@ void BackSubstitution::solve_clique(int id, double finest) {
   }
 
   kernel_.back_substitute(clique.panel, clique.size, clique.pivots, step_.data());
-  move_variables(clique, finest);
+  move_variables(clique, threshold);
 }
 
-/// Children whose separator moved far are solved now, those where it moved a little later.
-void BackSubstitution::push_children(int id, const MoveLimits& limits) {
-  const bool any = limits.is_whole || moves_.largest(rows_of(cliques_[id])) > 0.0;
-  if (!any) return;
+/// Children whose separator moved.
+void BackSubstitution::push_children(int id, bool is_whole) {
+  if (!is_whole && moves_.largest(rows_of(cliques_[id])) == 0.0) return;
 
   for (int c = cliques_[id].first_child; c != graph::kNone; c = cliques_[c].next_sibling) {
     if (is_computed_[static_cast<std::size_t>(c)] != 0) continue;
-    const double change = moves_.largest(separator_of(cliques_[c]));
-    if (limits.is_whole || change > limits.at_once) {
-      stack_.push_back(c);
-    } else if (change > 0.0) {
-      waiting_.add(c, cliques_.capacity());
-    }
+    if (is_whole || moves_.largest(separator_of(cliques_[c])) > 0.0) stack_.push_back(c);
   }
 }
 
-void BackSubstitution::solve_from(int id, const MoveLimits& limits) {
+void BackSubstitution::solve_from(int id, double threshold, bool is_whole) {
   stack_.assign(1, id);
   while (!stack_.empty()) {
     const int c = stack_.back();
     stack_.pop_back();
-    solve_clique(c, limits.finest);
-    push_children(c, limits);
+    solve_clique(c, threshold);
+    push_children(c, is_whole);
   }
 }
 
-void BackSubstitution::solve(std::span<const int> computed, const MoveLimits& limits) {
+void BackSubstitution::solve(std::span<const int> computed, double threshold, bool is_whole) {
   moves_.begin(graph_.variable_capacity());
   is_computed_.resize(static_cast<std::size_t>(cliques_.capacity()), 0);
 
   for (const int c : computed) is_computed_[static_cast<std::size_t>(c)] = 1;
-  for (std::size_t i = computed.size(); i-- > 0;) solve_from(computed[i], limits);
+  for (std::size_t i = computed.size(); i-- > 0;) solve_from(computed[i], threshold, is_whole);
   for (const int c : computed) is_computed_[static_cast<std::size_t>(c)] = 0;
-
-  waiting_.serve(limits.slots, [&](int clique) { solve_from(clique, limits); });
 }
 
 }  // namespace understory::factor_graph::bayes_tree

@@ -20,7 +20,7 @@ BayesTree::BayesTree(graph::FactorGraph& graph, std::size_t undo_bytes)
       cliques_(undo_bytes),
       restructuring_(graph_, cliques_),
       elimination_(graph_, cliques_),
-      back_substitution_(graph_, cliques_, waiting_),
+      back_substitution_(graph_, cliques_),
       covariance_(graph_, cliques_),
       marginals_(graph_, cliques_) {}
 
@@ -67,7 +67,6 @@ TreeStatistics BayesTree::eliminate(std::span<const int> fresh, std::span<const 
   // First the cliques that keep their structure, then the new ones above them.
   elimination_.list_dirty(marks_, computed_);
   statistics.refreshed_cliques = static_cast<long>(computed_.size());
-  for (const int c : marks_.structural()) waiting_.drop(c);
   statistics.eliminated_variables = restructuring_.rebuild(fresh, last, marks_, computed_);
 
   // From here on the structure is final.
@@ -78,16 +77,13 @@ TreeStatistics BayesTree::eliminate(std::span<const int> fresh, std::span<const 
   return statistics;
 }
 
-void BayesTree::solve(const MoveLimits& limits) { back_substitution_.solve(computed_, limits); }
-
 void BayesTree::solve_everything(double threshold) {
-  waiting_.clear();
   computed_.clear();
   for (int c = cliques_[CliqueTree::kRoot].first_child; c != graph::kNone;
        c = cliques_[c].next_sibling) {
     computed_.push_back(c);
   }
-  solve({threshold, threshold, 0, true});
+  back_substitution_.solve(computed_, threshold, true);
 }
 
 std::vector<int> BayesTree::undetermined() const {
@@ -112,13 +108,11 @@ std::vector<int> BayesTree::undetermined() const {
 void BayesTree::commit(bool is_whole) {
   cliques_.commit(is_whole && marks_.structural().empty() && marks_.dirty().empty());
   marks_.commit();
-  waiting_.commit();
 }
 
 void BayesTree::rollback() {
   cliques_.rollback();
   marks_.rollback(cliques_.capacity());
-  waiting_.rollback(cliques_.capacity());
   elimination_.restore_lost();
 }
 

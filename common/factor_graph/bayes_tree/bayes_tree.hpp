@@ -10,10 +10,10 @@
 #include "common/factor_graph/bayes_tree/clique_tree.hpp"
 #include "common/factor_graph/bayes_tree/covariance.hpp"
 #include "common/factor_graph/bayes_tree/elimination.hpp"
+#include "common/factor_graph/bayes_tree/incremental_parameters.hpp"
 #include "common/factor_graph/bayes_tree/marginals.hpp"
 #include "common/factor_graph/bayes_tree/marks.hpp"
 #include "common/factor_graph/bayes_tree/restructuring.hpp"
-#include "common/factor_graph/bayes_tree/waiting_queue.hpp"
 
 namespace understory::factor_graph::bayes_tree {
 
@@ -24,12 +24,9 @@ struct TreeStatistics {
   double flops = 0.0;             ///< Floating-point operations.
 };
 
-/// Memory for numbers that a rollback would need, unless something else is asked for [bytes].
-constexpr std::size_t kUndoBytes = std::size_t{1} << 20U;
-
 /// A factor graph as a tree of dense fronts: puts together its structure, what is out of date in
-/// it, and the steps that bring it up to date. State: cliques, marks and the waiting queue; all
-/// else is scratch memory of the steps.
+/// it, and the steps that bring it up to date. State: cliques and marks; all else is
+/// scratch memory of the steps.
 class BayesTree {
  public:
   /// A tree of this graph, which must outlive it; empty until eliminate(). `undo_bytes`: see
@@ -50,10 +47,10 @@ class BayesTree {
   TreeStatistics eliminate(std::span<const int> fresh, std::span<const int> last);
 
   /// Back-substitution from the cliques that eliminate() computed, on as long as something changes.
-  /// Moves the graph's variables.
-  void solve(const MoveLimits& limits);
-  /// Back-substitution through the whole tree; nothing waits. What would move by less than
-  /// `threshold` [own conditional standard deviations] stays.
+  /// Moves the graph's variables; what would move by less than `threshold` [own conditional
+  /// standard deviations] stays.
+  void solve(double threshold) { back_substitution_.solve(computed_, threshold, false); }
+  /// Likewise, through the whole tree.
   void solve_everything(double threshold);
   /// Variables that the last solve moved, each once.
   const std::vector<int>& changed() const { return back_substitution_.moves().variables(); }
@@ -87,7 +84,6 @@ class BayesTree {
   graph::FactorGraph& graph_;
   CliqueTree cliques_;
   Marks marks_;
-  WaitingQueue waiting_;
   std::vector<int> computed_;  ///< Cliques that the last eliminate() computed, children first.
   Restructuring restructuring_;
   Elimination elimination_;

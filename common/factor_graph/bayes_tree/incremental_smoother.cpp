@@ -9,29 +9,18 @@ namespace {
 
 /// A pose3's chart is left before its rotation gets far from the base [rad].
 constexpr double kFarRotation = 0.6;
-/// Updates that share the work of a thorough one.
-constexpr int kSweepParts = 4;
 /// An update that has done more than this part of one factorisation's work leaves further
 /// iterations to the next one.
 constexpr double kMostWork = 0.3;
-constexpr double kEverything = -1.0;  ///< Limit that every factor is beyond.
-constexpr double kAnyWork = 1e9;      ///< Where the whole is asked for.
-constexpr double kLittleWork = 2e5;   ///< Is no reason to [flops].
+constexpr double kAnyWork = 1e9;     ///< Where the whole is asked for.
+constexpr double kLittleWork = 2e5;  ///< Is no reason to [flops].
 /// A whole step on fresh linearisations that changes the loss by less than this part of it is the
 /// last one.
 constexpr double kSettledGain = 1e-5;
 /// Losses below this many squared sigmas per row are rounding.
 constexpr double kLossRounding = 1e-12;
-constexpr double kLeastUnit = 1e-4;
-constexpr double kLeastUsualUnit = 0.02;
-
-bool has_curved_charts(const graph::FactorGraph& graph) {
-  for (int v = 0; v < graph.variable_capacity(); ++v) {
-    if (graph.variable(v).in_use && graph.variable(v).type == graph::VariableType::kPose3)
-      return true;
-  }
-  return false;
-}
+/// A single update notices changes of the loss from a part of this on [sigma^2].
+constexpr double kUsualLoss = 1.0;
 
 /// The diagonal block at `first` in another frame: rows and columns are rotated by `by`.
 void rotate(Eigen::MatrixXd& covariance, Eigen::Index first, const Eigen::MatrixXd& by) {
@@ -65,12 +54,7 @@ IncrementalSmoother::IncrementalSmoother(const IncrementalParameters& parameters
     : parameters_(parameters),
       tree_(graph_, parameters.undo_bytes),
       relinearisation_(graph_, tree_),
-      judge_(graph_, tree_) {
-  pending_.unit = saved_pending_.unit = parameters.first_unit;
-}
-
-/// The limits of single updates need not be as fine as those of the thorough ones.
-double IncrementalSmoother::usual_unit() const { return std::max(kLeastUsualUnit, pending_.unit); }
+      judge_(graph_, tree_) {}
 
 void IncrementalSmoother::begin_change() {
   if (updated_ && !has_checkpoint_) commit();
@@ -135,25 +119,14 @@ void IncrementalSmoother::remove(graph::VariableId id) {
   pending_.doomed.push_back(index(id));
 }
 
-void IncrementalSmoother::measure_unit() {
-  double chi2 = 0.0;
-  double rows = 1.0;
+IncrementalSmoother::Loss IncrementalSmoother::loss() const {
+  Loss loss;
   for (int f = 0; f < graph_.factor_capacity(); ++f) {
     if (!graph_.factor(f).in_use) continue;
-    chi2 += graph_.chi2(graph::FactorId(f));
-    rows += graph_.factor(f).rows;
+    loss.chi2 += graph_.chi2(graph::FactorId(f));
+    loss.rows += graph_.factor(f).rows;
   }
-  pending_.chi2 = chi2;
-  pending_.rows = rows;
-  pending_.unit = std::clamp(std::sqrt(chi2 / rows), kLeastUnit, 1.0);
-}
-
-void IncrementalSmoother::begin_sweep() {
-  measure_unit();
-  const double limit = parameters_.thorough_relinearise_above * pending_.unit;
-  // In space charts are curved: linearisations of different ages push their neighbours to and fro.
-  const int parts = has_curved_charts(graph_) ? 1 : kSweepParts;
-  relinearisation_.begin_sweep(stale_factors(graph_, tree_.cliques(), limit), parts);
+  return loss;
 }
 
 void IncrementalSmoother::collect_moved() {
@@ -183,30 +156,24 @@ void IncrementalSmoother::eliminate(IncrementalUpdate& update) {
   update.flops += statistics.flops;
 }
 
-void IncrementalSmoother::solve(Effort effort) {
-  const double finest = parameters_.least_move * usual_unit();
-  if (effort != Effort::kUsual || pending_.solve_everything) {
-    pending_.solve_everything = false;
-    // Many small moves that are left out add up to a part of the loss.
-    const double thorough = parameters_.thorough_move * pending_.unit;
-    tree_.solve_everything(effort == Effort::kUsual      ? finest
-                           : effort == Effort::kThorough ? thorough
-                                                         : 0.0);
-    return;
-  }
-  tree_.solve({finest, parameters_.wait_below * finest, parameters_.waiting_slots});
-}
-
-/// One step; false where it was taken back.
-bool IncrementalSmoother::iterate(IncrementalUpdate& update, Effort effort) {
+/// One step; false where it was taken back. `whole_loss`: of a step of the whole graph, the loss
+/// that changes are compared with.
+bool IncrementalSmoother::iterate(IncrementalUpdate& update, std::optional<double> whole_loss) {
   ++update.iterations;
   update.relinearised_factors += relinearisation_.run();
   eliminate(update);
-  solve(effort);
 
-  const StepVerdict verdict = judge_.judge({parameters_.relinearise_above * usual_unit(),
-                                            std::max(pending_.unit * pending_.unit, pending_.chi2),
-                                            effort != Effort::kUsual, update.iterations > 1});
+  if (whole_loss || pending_.solve_everything) {
+    // Many small moves that are left out add up to a part of the loss.
+    tree_.solve_everything(whole_loss ? 0.0 : parameters_.least_move);
+    pending_.solve_everything = false;
+  } else {
+    tree_.solve(parameters_.least_move);
+  }
+
+  const StepVerdict verdict =
+      judge_.judge({parameters_.relinearise_above, whole_loss.value_or(kUsualLoss),
+                    whole_loss.has_value(), update.iterations > 1});
   update.deviation = verdict.largest_deviation;
   if (verdict.is_shortened) pending_.solve_everything = true;
 
@@ -215,15 +182,14 @@ bool IncrementalSmoother::iterate(IncrementalUpdate& update, Effort effort) {
   return verdict.is_accepted;
 }
 
-IncrementalUpdate IncrementalSmoother::run(Effort effort, double most_work) {
+IncrementalUpdate IncrementalSmoother::run(std::optional<double> whole_loss, double most_work) {
   IncrementalUpdate update;
   moved_.clear();
   is_moved_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);
-  pending_.since_thorough = effort == Effort::kUsual ? pending_.since_thorough + 1 : 0;
 
   bool accepted = true;
   do {
-    accepted = iterate(update, effort);
+    accepted = iterate(update, whole_loss);
   } while (update.iterations < parameters_.max_iterations &&
            update.flops < std::max(kLittleWork, most_work * tree_.total_flops()) &&
            (!accepted || update.deviation > parameters_.iterate_above));
@@ -234,47 +200,27 @@ IncrementalUpdate IncrementalSmoother::run(Effort effort, double most_work) {
   return update;
 }
 
-IncrementalUpdate IncrementalSmoother::run_thoroughly(Effort effort) {
-  begin_change();
-  measure_unit();
-  relinearisation_.end_sweep();
-  const double limit = effort == Effort::kWhole
-                           ? kEverything
-                           : parameters_.thorough_relinearise_above * pending_.unit;
-  for (const int f : stale_factors(graph_, tree_.cliques(), limit)) relinearisation_.add(f);
-  return run(effort, kAnyWork);
-}
-
 IncrementalUpdate IncrementalSmoother::update() {
   begin_change();
-  const bool is_sweeping = relinearisation_.is_sweeping();
-  if (is_sweeping) {
-    relinearisation_.take_part_of_sweep();
-  } else if (parameters_.thorough_every > 0 &&
-             pending_.since_thorough + 1 >= parameters_.thorough_every) {
-    begin_sweep();
-    if (!relinearisation_.is_sweeping()) return run(Effort::kThorough, kMostWork);
-  }
-  // The last part of a sweep ends it as a thorough update.
-  const bool is_last_part = is_sweeping && !relinearisation_.is_sweeping();
-  return run(is_last_part ? Effort::kThorough : Effort::kUsual, kMostWork);
+  return run(std::nullopt, kMostWork);
 }
 
-IncrementalUpdate IncrementalSmoother::update_thoroughly() {
-  return run_thoroughly(Effort::kThorough);
+/// What each factor is off its linearisation says nothing about the sum over a long chain: only a
+/// step on fresh linearisations does.
+IncrementalUpdate IncrementalSmoother::whole_step(const Loss& before) {
+  begin_change();
+  for (const int f : factors_of_tree(graph_, tree_.cliques())) relinearisation_.add(f);
+  return run(std::max(kLossRounding * before.rows, before.chi2), kAnyWork);
 }
 
 IncrementalUpdate IncrementalSmoother::settle(int max_updates) {
   IncrementalUpdate update;
   for (int i = 0; i < max_updates && !update.is_settled; ++i) {
-    // What each factor is off its linearisation says nothing about the sum over a long chain: only
-    // a step on fresh linearisations does.
-    update = run_thoroughly(Effort::kWhole);
-    const double before = pending_.chi2;
-    measure_unit();
-    const double change = std::abs(before - pending_.chi2);
+    const Loss before = loss();
+    update = whole_step(before);
+    const double change = std::abs(before.chi2 - loss().chi2);
     update.is_settled = !pending_.solve_everything &&
-                        change <= std::max(kSettledGain * before, kLossRounding * pending_.rows);
+                        change <= std::max(kSettledGain * before.chi2, kLossRounding * before.rows);
   }
   return update;
 }
@@ -285,7 +231,7 @@ IncrementalUpdate IncrementalSmoother::update_everything() {
   for (int v = 0; v < graph_.variable_capacity(); ++v) {
     if (graph_.variable(v).in_use) relinearisation_.rebase(v);
   }
-  return update_thoroughly();
+  return whole_step(loss());
 }
 
 void IncrementalSmoother::finish(IncrementalUpdate& update) {

@@ -6,40 +6,12 @@
 #include <vector>
 
 #include "common/factor_graph/bayes_tree/bayes_tree.hpp"
+#include "common/factor_graph/bayes_tree/incremental_parameters.hpp"
 #include "common/factor_graph/bayes_tree/relinearisation.hpp"
 #include "common/factor_graph/bayes_tree/step_judge.hpp"
 #include "common/factor_graph/graph/factor_graph.hpp"
 
 namespace understory::factor_graph::bayes_tree {
-
-/// When and how exactly the smoother follows. Limits are in parts of the residuals' own root mean
-/// square (the `unit`), which the thorough updates measure: information that is stated a thousand
-/// times too small needs no less precision.
-struct IncrementalParameters {
-  /// A variable that would move by less of its conditional standard deviation stays.
-  double least_move = 0.2;
-  /// Cliques below changes that are all smaller than this many times least_move wait in a queue.
-  /// 1: nothing waits.
-  double wait_below = 1.0;
-  int waiting_slots = 100;  ///< Number of waiting cliques that an update serves.
-  /// A factor whose residual is this far from its linearisation is linearised again with the next
-  /// update. Of a relative pose in the plane; in space by the root of its rows more.
-  double relinearise_above = 0.5;
-  /// An update goes on (up to max_iterations) while a factor is this far from its linearisation
-  /// [sigmas].
-  double iterate_above = 1.0;
-  int max_iterations = 5;  ///< Of one update.
-  /// Number of updates from one thorough update, which compares all factors with finer limits, to
-  /// the next: deviations below the usual limits add up. The updates that follow share the work
-  /// that it finds. 0: none is thorough.
-  int thorough_every = 200;
-  double thorough_move = 0.01;               ///< least_move of a thorough update.
-  double thorough_relinearise_above = 0.05;  ///< relinearise_above of a thorough update.
-  double first_unit = 0.1;                   ///< The unit until it is measured [sigmas].
-  /// Memory for numbers that a rollback would need. What does not fit is computed again by the
-  /// rollback, at the cost of the updates that it takes back.
-  std::size_t undo_bytes = kUndoBytes;
-};
 
 /// What an update found. An update never throws for what was measured; see `undetermined`.
 struct IncrementalUpdate {
@@ -109,8 +81,6 @@ class IncrementalSmoother {
   /// Takes the changes in. At most about one factorisation's work: what is left over is done by the
   /// next updates.
   IncrementalUpdate update();
-  /// An update with the limits of the thorough ones, and to the end. O(graph).
-  IncrementalUpdate update_thoroughly();
   /// Whole steps, each on linearisations made at its start, until one changes the loss by less than
   /// 1e-5 of it: then `is_settled`. O(graph) each, as of one factorisation.
   IncrementalUpdate settle(int max_updates = 20);
@@ -155,31 +125,25 @@ class IncrementalSmoother {
     std::vector<int> fresh;   ///< Factors that the tree does not hold yet.
     std::vector<int> doomed;  ///< Variables to be removed.
     bool solve_everything = false;
-    int since_thorough = 0;  ///< Updates.
-    double chi2 = 0.0;       ///< When it was last summed up.
-    double rows = 1.0;       ///< Of all residuals, then.
-    double unit = 1.0;       ///< See IncrementalParameters [sigmas].
   };
 
-  /// How much of the graph an update looks at: what changed; all with the limits of the thorough
-  /// updates; or all, linearised anew and solved without limits.
-  enum class Effort : char { kUsual, kThorough, kWhole };
+  /// Squared residuals of all factors.
+  struct Loss {
+    double chi2 = 0.0;
+    double rows = 1.0;  ///< Of the residuals.
+  };
 
   void begin_change();
   void commit();
   graph::FactorId keep(graph::FactorId id);
 
-  IncrementalUpdate run_thoroughly(Effort effort);
-  IncrementalUpdate run(Effort effort, double most_work);
-  bool iterate(IncrementalUpdate& update, Effort effort);
+  IncrementalUpdate run(std::optional<double> whole_loss, double most_work);
+  bool iterate(IncrementalUpdate& update, std::optional<double> whole_loss);
   void eliminate(IncrementalUpdate& update);
-  void solve(Effort effort);
   void collect_moved();
   void finish(IncrementalUpdate& update);
-
-  void begin_sweep();
-  void measure_unit();
-  double usual_unit() const;
+  IncrementalUpdate whole_step(const Loss& before);
+  Loss loss() const;
 
   IncrementalParameters parameters_;
   graph::FactorGraph graph_;

@@ -16,24 +16,21 @@ double limit_scale(const graph::FactorRecord& factor) {
   return std::sqrt(std::clamp<double>(factor.rows, kPlanarRows, kMostRows) / kPlanarRows);
 }
 
-std::vector<int> stale_factors(const graph::FactorGraph& graph, const CliqueTree& cliques,
-                               double limit) {
-  std::vector<int> stale;
+std::vector<int> factors_of_tree(const graph::FactorGraph& graph, const CliqueTree& cliques) {
+  std::vector<int> factors;
   std::vector<int> stack{CliqueTree::kRoot};
   while (!stack.empty()) {
     const CliqueRecord& clique = cliques[stack.back()];
     stack.pop_back();
 
     for (int f = clique.first_factor; f != graph::kNone; f = graph.factor(f).next) {
-      const graph::FactorRecord& factor = graph.factor(f);
-      if (factor.is_pending) continue;
-      if (graph.deviation(f).residual > limit * limit_scale(factor)) stale.push_back(f);
+      factors.push_back(f);
     }
     for (int c = clique.first_child; c != graph::kNone; c = cliques[c].next_sibling) {
       stack.push_back(c);
     }
   }
-  return stale;
+  return factors;
 }
 
 void Relinearisation::add(int factor) {
@@ -65,21 +62,6 @@ long Relinearisation::run() {
   const auto count = static_cast<long>(now_.stale.size());
   now_.stale.clear();
   return count;
-}
-
-void Relinearisation::begin_sweep(std::vector<int> factors, int parts) {
-  now_.sweep = std::move(factors);
-  now_.sweep_part = 1 + static_cast<int>(now_.sweep.size()) / parts;
-}
-
-void Relinearisation::take_part_of_sweep() {
-  for (int i = 0; i < now_.sweep_part && !now_.sweep.empty(); ++i) {
-    const int f = now_.sweep.back();
-    now_.sweep.pop_back();
-    // It may have been removed, and its number given to another, since.
-    if (f >= graph_.factor_capacity()) continue;
-    if (graph_.factor(f).in_use && graph_.factor(f).clique != graph::kNone) add(f);
-  }
 }
 
 }  // namespace understory::factor_graph::bayes_tree

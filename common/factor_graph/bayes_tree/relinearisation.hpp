@@ -12,10 +12,8 @@ namespace understory::factor_graph::bayes_tree {
 /// residuals in space are larger by the root of their number of rows.
 double limit_scale(const graph::FactorRecord& factor);
 
-/// Factors whose linearisations are off by more than `limit` [sigmas] times limit_scale(),
-/// neighbours in the tree side by side. O(graph).
-std::vector<int> stale_factors(const graph::FactorGraph& graph, const CliqueTree& cliques,
-                               double limit);
+/// All factors that the tree holds, neighbours in it side by side. O(graph).
+std::vector<int> factors_of_tree(const graph::FactorGraph& graph, const CliqueTree& cliques);
 
 /// Factors that wait to be linearised again, and variables that wait for a new base of their
 /// charts. commit() saves the lists, rollback() restores the saved ones.
@@ -34,18 +32,6 @@ class Relinearisation {
   void forget_variable(int variable) { std::erase(now_.rebase, variable); }
   /// Linearises what is due and marks it in the tree; returns the number of factors.
   long run();
-  /// True where no factor is due.
-  bool is_empty() const { return now_.stale.empty(); }
-
-  /// Shares these factors (in the tree's order) out among `parts` updates.
-  void begin_sweep(std::vector<int> factors, int parts);
-  /// The next part becomes due. Its factors are neighbours in the tree, so that each part computes
-  /// subtrees of its own anew.
-  void take_part_of_sweep();
-  /// True while parts are left.
-  bool is_sweeping() const { return !now_.sweep.empty(); }
-  /// Forgets the parts that are left.
-  void end_sweep() { now_.sweep.clear(); }
 
   /// Saves the lists as they are.
   void commit() { saved_ = now_; }
@@ -56,8 +42,6 @@ class Relinearisation {
   struct Lists {
     std::vector<int> stale;   ///< Factors.
     std::vector<int> rebase;  ///< Variables.
-    std::vector<int> sweep;   ///< Factors, the next part behind.
-    int sweep_part = 0;       ///< Number of factors per part.
   };
 
   graph::FactorGraph& graph_;

@@ -9,24 +9,10 @@ namespace {
 /// Keeps a held pose invertible: a micrometre, a microradian.
 const Eigen::Matrix3d kHeld = 1e12 * Eigen::Matrix3d::Identity();
 
-bayes_tree::IncrementalParameters incremental(const SmootherParameters& parameters) {
-  bayes_tree::IncrementalParameters result;
-  result.least_move = parameters.least_move;
-  result.relinearise_above = parameters.relinearise_above;
-  result.iterate_above = parameters.iterate_above;
-  result.max_iterations = parameters.max_iterations;
-  // The mapper's covariances are right, and its cost must not grow with the map.
-  result.first_unit = 1.0;
-  result.thorough_every = 0;
-  result.wait_below = parameters.wait_below;
-  result.waiting_slots = parameters.waiting_slots;
-  return result;
-}
-
 }  // namespace
 
 struct Smoother::State {
-  explicit State(const SmootherParameters& parameters) : smoother(incremental(parameters)) {}
+  explicit State(const bayes_tree::IncrementalParameters& parameters) : smoother(parameters) {}
 
   graph::VariableId name(PoseId id) const { return poses[index(id)]; }
   graph::VariableId name(PointId id) const { return points[index(id)]; }
@@ -110,7 +96,7 @@ struct Smoother::State {
   MovedList moved;
 };
 
-Smoother::Smoother(const SmootherParameters& parameters)
+Smoother::Smoother(const bayes_tree::IncrementalParameters& parameters)
     : state_(std::make_unique<State>(parameters)) {}
 Smoother::~Smoother() = default;
 Smoother::Smoother(Smoother&&) noexcept = default;

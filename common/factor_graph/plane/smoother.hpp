@@ -8,28 +8,10 @@
 #include <type_traits>
 #include <vector>
 
+#include "common/factor_graph/bayes_tree/incremental_parameters.hpp"
 #include "common/factor_graph/plane/graph.hpp"
 
 namespace understory::factor_graph::plane {
-
-/// When and how exactly the smoother follows. Standard deviations are a variable's own
-/// (conditional) ones, sigmas those of the measurements.
-struct SmootherParameters {
-  /// A variable that would move by less stays where it is [standard deviations]. At 1e-2 one
-  /// keyframe of twenty was refused on roads.
-  double least_move = 1e-3;
-  /// Far from where an update took place, changes below so many times least_move wait in a queue:
-  /// so the cost of an update does not grow with the map.
-  double wait_below = 100.0;
-  int waiting_slots = 100;  ///< Number of waiting cliques that an update serves.
-  /// A measurement this far from its linearisation is linearised again [sigmas]. Linearisations of
-  /// different ages leave torques that rotate all that hangs on them: the prior that holds the map
-  /// must be firm, and at 1e-2 the end of a 5 km road swung by 2 m from update to update.
-  double relinearise_above = 1e-2;
-  /// An update goes on while a measurement is this far from its linearisation [sigmas].
-  double iterate_above = 0.1;
-  int max_iterations = 8;  ///< Of one update.
-};
 
 /// Where poses are in the frame of the first of them, measured together.
 struct CondensedPoses {
@@ -73,7 +55,7 @@ constexpr std::uint32_t index(Id id) { return static_cast<std::uint32_t>(id); }
 /// More than 20 functions because it is a facade: half of them are overloads and accessors.
 class Smoother {
  public:
-  explicit Smoother(const SmootherParameters& parameters = {});
+  explicit Smoother(const bayes_tree::IncrementalParameters& parameters = {});
   ~Smoother();
   Smoother(Smoother&&) noexcept;
   Smoother& operator=(Smoother&&) noexcept;

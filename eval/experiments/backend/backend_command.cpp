@@ -73,8 +73,7 @@ void write_results(const BackendOptions& options, const nlohmann::json& rows,
                                 {"checkpoints", options.settings.checkpoints},
                                 {"relinearise_above", options.settings.smoother.relinearise_above},
                                 {"least_move", options.settings.smoother.least_move},
-                                {"iterate_above", options.settings.smoother.iterate_above},
-                                {"thorough_every", options.settings.smoother.thorough_every}},
+                                {"iterate_above", options.settings.smoother.iterate_above}},
                                rows));
   if (options.plots) harness::plot("backend.py", {out, harness::traces_file(out).string()});
 }
@@ -149,11 +148,6 @@ void add_backend_experiment(CLI::App& eval) {
       .add_option("--iterate-above", limits.iterate_above,
                   "IncrementalParameters: deviation from which an update goes on [sigma]")
       ->check(CLI::Range(1e-9, 1e3))
-      ->capture_default_str();
-  command
-      .add_option("--thorough-every", limits.thorough_every,
-                  "IncrementalParameters: updates from one that compares all factors to the next")
-      ->check(CLI::Range(0, 1'000'000))
       ->capture_default_str();
   command.add_option("--seed", options->seed, "Of the simulated ones")->capture_default_str();
   command.add_option("--json", options->json, "Result file; times per update and plot beside it");

@@ -20,7 +20,6 @@ geoslam_mapper::MapperParameters mapper_parameters(const Keeping& keeping) {
   parameters.smoothing.use_odometry = true;
   parameters.smoothing.gyro_walk = 0.0;
   parameters.smoothing.start_wait_s = 0.0;
-  parameters.smoothing.relinearise_above = keeping.hand_over_m > 0.0 ? 1e-2 : 1e-4;
   parameters.smoothing.condense_m = keeping.size_m;
   parameters.smoothing.hand_over_m = keeping.hand_over_m;
   parameters.smoothing.condense_of_range = 1000.0;

@@ -143,7 +143,6 @@ geoslam_mapper::SmoothingMapperParameters ideal_parameters() {
   parameters.use_odometry = true;
   parameters.gyro_walk = 0.0;
   parameters.start_wait_s = 0.0;
-  parameters.relinearise_above = 1e-4;
   return parameters;
 }
 

@@ -244,7 +244,6 @@ geoslam_mapper::MapperParameters mapper_parameters() {
   geoslam_mapper::MapperParameters parameters;
   parameters.smoothing.use_odometry = true;
   parameters.smoothing.gyro_walk = 0.0;
-  parameters.smoothing.relinearise_above = 1e-6;
   return parameters;
 }
 

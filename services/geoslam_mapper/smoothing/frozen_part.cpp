@@ -35,10 +35,7 @@ struct Solved {
 
 /// `held`: how many of the outer nodes stay where they are; the others are on a leash.
 std::optional<Solved> solve(const FrozenPart& part, const PoseOf& pose_of, std::size_t held) {
-  plane::SmootherParameters parameters;
-  parameters.relinearise_above = 1e-4;
-  parameters.least_move = 1e-4;
-  Solved solved{plane::Smoother(parameters), {}};
+  Solved solved;
   const auto add = [&](NodeIndex node) {
     return solved.pose_of.emplace(node, solved.smoother.add_pose(pose_of(node))).first->second;
   };

@@ -7,21 +7,10 @@
 #include "common/geometry/decompositions.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
-namespace {
-
 namespace plane = factor_graph::plane;
 
-plane::SmootherParameters limits(const SmoothingMapperParameters& parameters) {
-  plane::SmootherParameters result;
-  result.relinearise_above = parameters.relinearise_above;
-  result.least_move = std::clamp(0.1 * parameters.relinearise_above, 1e-4, 1e-3);
-  return result;
-}
-
-}  // namespace
-
 PoseGraph::PoseGraph(const SmoothingMapperParameters& parameters)
-    : smoother_(limits(parameters)), gyro_(parameters.gyro_walk, parameters.gyro_start_sigma) {}
+    : gyro_(parameters.gyro_walk, parameters.gyro_start_sigma) {}
 
 void PoseGraph::checkpoint() {
   smoother_.checkpoint();
