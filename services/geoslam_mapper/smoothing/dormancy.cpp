@@ -30,9 +30,9 @@ void Dormancy::prepare(const model::FieldOfView& field_of_view, const Eigen::Vec
   map.wake(dormant_around(expected_m, field_of_view.max_range_m + kAwakeBeyond_m, map));
 }
 
-void Dormancy::follow(const model::FieldOfView& field_of_view, NodeIndex newest, GlobalMap& map) {
+bool Dormancy::follow(const model::FieldOfView& field_of_view, NodeIndex newest, GlobalMap& map) {
   const double along_m = map.graph.node(newest).along_m;
-  if (!is_on_ || std::abs(along_m - looked_m_) < kBetween_m) return;
+  if (!is_on_ || std::abs(along_m - looked_m_) < kBetween_m) return false;
   looked_m_ = along_m;
   const Eigen::Vector2d here_m = map.graph.pose(newest).translation();
   here_m_ = here_m;
@@ -50,13 +50,14 @@ void Dormancy::follow(const model::FieldOfView& field_of_view, NodeIndex newest,
     }
   }
   const std::vector<model::LandmarkId> met = dormant_around(here_m, awake_m, map);
-  if (left.empty() && met.empty()) return;
+  if (left.empty() && met.empty()) return false;
 
   map.graph.checkpoint();
   map.wake_unsolved(met);
   map.graph.make_dormant(left, map.landmarks.all());
   (void)map.graph.solve();  // What they tell is in the graph as before.
   map.adopt_estimates();
+  return true;
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

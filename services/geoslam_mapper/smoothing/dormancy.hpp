@@ -14,9 +14,9 @@ class Dormancy {
   explicit Dormancy(const SmoothingMapperParameters& parameters)
       : is_on_(parameters.condense_m > 0.0) {}
 
-  /// To be called after each accepted keyframe. Looks around every few metres; costs the landmarks
-  /// in the solved graph then, and what is changed.
-  void follow(const model::FieldOfView& field_of_view, NodeIndex newest, GlobalMap& map);
+  /// To be called after accepted keyframes. Looks around every few metres; costs the landmarks in
+  /// the solved graph then, and what is changed. True where it solved.
+  bool follow(const model::FieldOfView& field_of_view, NodeIndex newest, GlobalMap& map);
 
   /// To be called before a keyframe is placed: what lies around a place far from where the vehicle
   /// was seen last is awake then, so that its uncertainty is known.

@@ -126,9 +126,12 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
   const std::vector<Retirement> condensed =
       condensing_.follow(fused, known_ground_, discovery_, merging_.merges(), map_);
   closures_.hand_over(condensed);
-  if (!condensed.empty()) submaps_.condensed(condensed.front().into);
-  dormancy_.follow(keyframe.field_of_view, fused.node, map_);
-  submaps_.follow(keyframe.field_of_view, fused.node, keyframe.utime, map_);
+  // Each of these solves where it does something: one for each keyframe bounds the keyframe's time.
+  if (!condensed.empty()) {
+    submaps_.condensed(condensed.front().into);
+  } else if (!dormancy_.follow(keyframe.field_of_view, fused.node, map_)) {
+    submaps_.follow(keyframe.field_of_view, fused.node, keyframe.utime, map_);
+  }
   confirm(keyframe, update);
   report(keyframe, update);
   return with(kUpdated, fused.reason, std::move(update));

@@ -85,7 +85,11 @@ void Submaps::follow(const model::FieldOfView& field_of_view, NodeIndex newest, 
   if (near.size() > kMostAtOnce) near.resize(kMostAtOnce);
   wanted_.clear();
   for (const auto& [distance_m, id] : near) wanted_.push_back(id);
-  freeze(reach_m, vehicle_m, map);
+  if (freeze(reach_m, vehicle_m, map)) {
+    // One solution for each keyframe: what is to be given away is looked for at the next.
+    looked_m_ -= kBetweenLooks_m;
+    return;
+  }
   if (!may_hand_over_) return;
   close_origin(far_m, vehicle_m, map);
 
@@ -113,7 +117,8 @@ void Submaps::close_origin(double far_m, const Eigen::Vector2d& vehicle_m, Globa
 }
 
 /// The solved graph is that of the ground around the vehicle: its cost does not grow with the way.
-void Submaps::freeze(double reach_m, const Eigen::Vector2d& vehicle_m, GlobalMap& map) {
+/// True where it solved.
+bool Submaps::freeze(double reach_m, const Eigen::Vector2d& vehicle_m, GlobalMap& map) {
   std::vector<NodeIndex> far;
   std::vector<NodeIndex> near;
   for (const Away& away : away_) {
@@ -122,7 +127,7 @@ void Submaps::freeze(double reach_m, const Eigen::Vector2d& vehicle_m, GlobalMap
     if (is_frozen && distance_m < reach_m + kThawedBeyond_m) near.push_back(away.node);
     if (!is_frozen && distance_m > reach_m + kFrozenBeyond_m) far.push_back(away.node);
   }
-  if (near.empty() && far.size() < kFrozenTogether + unfreezable_) return;
+  if (near.empty() && far.size() < kFrozenTogether + unfreezable_) return false;
 
   map.graph.checkpoint();
   if (!near.empty()) {
@@ -137,6 +142,7 @@ void Submaps::freeze(double reach_m, const Eigen::Vector2d& vehicle_m, GlobalMap
   }
   (void)map.graph.solve();  // What they tell is in the graph as before.
   map.adopt_estimates();
+  return true;
 }
 
 void Submaps::give_away(const Here& here, model::Utime utime, GlobalMap& map) {

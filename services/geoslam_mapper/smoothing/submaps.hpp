@@ -28,9 +28,9 @@ class Submaps {
   void may_hand_over(bool may) { may_hand_over_ = may; }
   /// A stretch of the path became this node.
   void condensed(NodeIndex node) { here_.push_back({node, std::nullopt}); }
-  /// To be called after each accepted keyframe. Looks around every few metres: gives away what is
-  /// far, and names what is wanted back. Solves where something goes. Cost: one distance for each
-  /// submap, and what goes.
+  /// To be called after accepted keyframes. Looks around every few metres: gives away what is
+  /// far, and names what is wanted back. Solves once where something goes. Cost: one distance for
+  /// each submap, and what goes.
   void follow(const model::FieldOfView& field_of_view, NodeIndex newest, model::Utime utime,
               GlobalMap& map);
 
@@ -77,7 +77,7 @@ class Submaps {
   };
   void give_away(const Here& here, model::Utime utime, GlobalMap& map);
   void close_origin(double far_m, const Eigen::Vector2d& vehicle_m, GlobalMap& map);
-  void freeze(double reach_m, const Eigen::Vector2d& vehicle_m, GlobalMap& map);
+  bool freeze(double reach_m, const Eigen::Vector2d& vehicle_m, GlobalMap& map);
 
   double hand_over_m_;
   bool may_hand_over_ = true;
