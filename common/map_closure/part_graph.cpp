@@ -193,8 +193,7 @@ class Builder {
     variable_of_[from ? motion.to : motion.from] = out_.graph.poses.size();
     out_.graph.add_pose(pose);
     const std::size_t node = groups_.add();
-    if (const auto piece = ground_beside(part, pose))
-      tie(*piece, node, kFast.asDiagonal());
+    if (const auto piece = ground_beside(part, pose)) tie(*piece, node, kFast.asDiagonal());
   }
   /// The piece of the ground before or behind the part in time that the pose is in, if there is
   /// one.

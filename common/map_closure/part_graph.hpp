@@ -63,13 +63,12 @@ struct PartGraph {
 PartGraph part_graph(const map_file::StoredMap& map, std::span<const model::Submap> submaps,
                      const Ties& ties, std::span<const model::LoopClosure> closures);
 
-/// The place of an end's part, and the end in its frame. Throws ClosureError, with `option` in
-/// front, where the map has no such end.
+/// Where an end of a closure is.
 struct PlacedEnd {
-  std::size_t part = 0;
+  std::size_t part = 0;  ///< Place in PartGraph::parts.
   geometry::SE2 part_T_end;
 };
-/// Likewise.
+/// Throws ClosureError, with `option` in front, where the map has no such end.
 PlacedEnd placed_end(const map_file::StoredMap& map, const PartGraph& graph,
                      const model::LoopEnd& end, const std::string& option);
 
