@@ -19,8 +19,7 @@ model::LoopEnd loop_end_of(const std::string& option, const std::string& text) {
   const bool is_number =
       colon != std::string::npos && begin != end && read.ec == std::errc{} && read.ptr == end;
   if (!is_number || (kind != "keyframe" && kind != "submap") || (kind == "submap" && number == 0))
-    wrong_usage(
-        fmt::format("loop: {} {}: keyframe:N or submap:N (from 1) is wanted", option, text));
+    wrong_usage(fmt::format("{} {}: keyframe:N or submap:N (from 1) is wanted", option, text));
 
   model::LoopEnd result;
   (kind == "submap" ? result.submap : result.keyframe) = number;

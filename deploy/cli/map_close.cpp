@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -14,6 +13,7 @@
 #include "deploy/cli/loop_end.hpp"
 #include "deploy/cli/map_closing.hpp"
 #include "deploy/cli/map_commands.hpp"
+#include "deploy/cli/said_pose.hpp"
 #include "deploy/cli/text_file.hpp"
 
 namespace understory::cli {
@@ -26,11 +26,7 @@ struct MapCloseOptions {
   std::string from;
   std::string to;
   std::uint32_t map_id = 0;
-  std::optional<double> x_m;
-  std::optional<double> y_m;
-  std::optional<double> theta_deg;
-  double sigma_m = 0.1;
-  double sigma_deg = 0.5;
+  SaidPose pose;
   bool force = false;
   bool dry_run = false;
   bool json = false;
@@ -39,10 +35,7 @@ struct MapCloseOptions {
 SaidClosure said_by(const MapCloseOptions& options) {
   SaidClosure said{loop_end_of("--from", options.from), loop_end_of("--to", options.to),
                    options.from, options.to, std::nullopt};
-  if (!options.x_m) return said;
-  const Eigen::Vector3d sigma(options.sigma_m, options.sigma_m, options.sigma_deg / kInDegrees);
-  said.from_T_to = {geometry::SE2(*options.x_m, *options.y_m, *options.theta_deg / kInDegrees),
-                    sigma.array().square().matrix().asDiagonal()};
+  if (options.pose.is_given()) said.from_T_to = options.pose.pose();
   return said;
 }
 
@@ -148,38 +141,6 @@ void run_map_close(const MapCloseOptions& options) {
   }
 }
 
-/// CLI::Range lets NaN pass.
-CLI::Validator finite() {
-  return {[](const std::string& text) {
-            double value = 0.0;
-            const bool is_good = CLI::detail::lexical_cast(text, value) && std::isfinite(value);
-            return is_good ? std::string() : text + " is no finite number";
-          },
-          "", "finite"};
-}
-
-void add_pose_options(CLI::App& command, MapCloseOptions& options) {
-  auto* const x =
-      command.add_option("--x-m", options.x_m, "[m] Where --to is in the frame of --from: ahead");
-  auto* const y = command.add_option("--y-m", options.y_m, "[m] To the left");
-  auto* const theta = command.add_option("--theta-deg", options.theta_deg, "[deg] Turned left");
-  for (auto* const one : {x, y, theta}) {
-    one->check(finite());
-    for (auto* const other : {x, y, theta})
-      if (one != other) one->needs(other);
-  }
-  command.add_option("--sigma-m", options.sigma_m, "[m] Standard deviation of x and of y")
-      ->check(finite())
-      ->check(CLI::Range(1e-4, 1e3))
-      ->capture_default_str()
-      ->needs(x);
-  command.add_option("--sigma-deg", options.sigma_deg, "[deg] Standard deviation of the turn")
-      ->check(finite())
-      ->check(CLI::Range(1e-3, 180.0))
-      ->capture_default_str()
-      ->needs(x);
-}
-
 }  // namespace
 
 void add_map_close(CLI::App& map) {
@@ -194,7 +155,7 @@ void add_map_close(CLI::App& map) {
   command->add_option("--to", options->to, "The other end")->required();
   command->add_option("--map", options->map_id, "The map, where several have submaps")
       ->check(CLI::Range(std::uint32_t{1}, map_file::kLastMapId));
-  add_pose_options(*command, *options);
+  add_said_pose(*command, options->pose, "--to is in the frame of --from");
   command->add_flag("--force", options->force, "Also where it contradicts the map beyond chance");
   command->add_flag("--dry-run", options->dry_run, "Says what it would do, and writes nothing");
   command->add_flag("--json", options->json, "As JSON, on standard output");
