@@ -22,9 +22,10 @@ namespace plane = factor_graph::plane;
 
 /// Holds the first part to a micrometre.
 constexpr double kHeld = 1e12;
-/// Holds a node of the ground to its piece, to 1 cm and 1 mrad: what is stiffer makes the optimiser
-/// creep.
-const Eigen::Vector3d kFast(1e4, 1e4, 1e6);
+/// Holds a node of the ground to its piece, to 1 cm and 1 mrad (informations): what is stiffer
+/// makes the optimiser creep.
+constexpr double kFast_m = 1e4;
+constexpr double kFast_rad = 1e6;
 /// Of a closure that the file keeps without its covariance.
 constexpr double kClosureSigma_m = 0.1;
 constexpr double kClosureSigma_rad = 0.5 * std::numbers::pi / 180.0;
@@ -193,7 +194,8 @@ class Builder {
     variable_of_[from ? motion.to : motion.from] = out_.graph.poses.size();
     out_.graph.add_pose(pose);
     const std::size_t node = groups_.add();
-    if (const auto piece = ground_beside(part, pose)) tie(*piece, node, kFast.asDiagonal());
+    if (const auto piece = ground_beside(part, pose))
+      tie(*piece, node, Eigen::Vector3d(kFast_m, kFast_m, kFast_rad).asDiagonal());
   }
   /// The piece of the ground before or behind the part in time that the pose is in, if there is
   /// one.

@@ -88,6 +88,7 @@ std::vector<FoundPlace> PlaceSearch::find(std::span<const LevelStem> stems, std:
   if (verification_) return verification_->verified(query, scored, memory);
 
   std::vector<FoundPlace> found;
+  found.reserve(scored.size());
   for (const place_recognition::ScoredPlace& one : scored) {
     found.push_back({static_cast<std::uint64_t>(one.frame), one.guesses.front(),
                      one.evidence->pairs, 0, one.evidence});

@@ -8,7 +8,6 @@ namespace {
 
 using place_recognition::PlaceFrame;
 using place_recognition::ScoredPlace;
-using place_recognition::VerifiedPlace;
 
 constexpr const char* kGraph = "correspondence_graph";
 /// Two who look at the same landmarks agree on the pose so well [m], [rad] ...
