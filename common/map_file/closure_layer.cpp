@@ -45,8 +45,7 @@ std::optional<ClosureEnd> end_of(const Connection& connection, std::uint32_t map
 
 }  // namespace
 
-void put_closure(const Connection& connection, const model::LoopClosure& closure) {
-  remove_closure(connection, closure.map_id, closure.id);
+void insert_closure(const Connection& connection, const model::LoopClosure& closure) {
   const geometry::SE2& pose = closure.from_T_to.mean;
   connection
       .prepare(
@@ -59,7 +58,31 @@ void put_closure(const Connection& connection, const model::LoopClosure& closure
             static_cast<std::int64_t>(closure.to.submap),
             static_cast<std::int64_t>(closure.to.keyframe), pose.x(), pose.y(), pose.theta())
       .run();
+}
+
+void put_closure(const Connection& connection, const model::LoopClosure& closure) {
+  remove_closure(connection, closure.map_id, closure.id);
+  insert_closure(connection, closure);
   redraw_closures(connection);
+}
+
+std::vector<model::LoopClosure> select_closures(const Connection& connection,
+                                                std::uint32_t map_id) {
+  std::vector<model::LoopClosure> closures;
+  Statement row = connection.prepare(
+      "SELECT closure_id, source, from_submap, from_sequence, to_submap, to_sequence, x_m, y_m, "
+      "heading_rad FROM understory_closures WHERE map_id = ?1 ORDER BY number");
+  row.bind(std::int64_t{map_id});
+  while (row.step()) {
+    model::LoopClosure& one = closures.emplace_back();
+    one.map_id = map_id;
+    one.id = row.count(0);
+    one.source = row.text(1);
+    one.from = {row.count(2), static_cast<std::uint64_t>(row.integer(3))};
+    one.to = {row.count(4), static_cast<std::uint64_t>(row.integer(5))};
+    one.from_T_to.mean = geometry::SE2(row.real(6), row.real(7), row.real(8));
+  }
+  return closures;
 }
 
 void remove_closure(const Connection& connection, std::uint32_t map_id, std::uint64_t closure_id) {

@@ -17,6 +17,7 @@
 
 #include "common/map_file/digest.hpp"
 #include "common/map_file/schema.hpp"
+#include "common/map_file/submap_tables.hpp"
 
 namespace understory::map_file {
 namespace {
@@ -93,9 +94,17 @@ bool is_as_written(const Statement& row) {
   return digest_of(change.number, change.note, row.blob(5), row.count(6)) == row.text(7);
 }
 
+bool is_content(std::string_view table) {
+  return std::ranges::find(kContentTables, table) != kContentTables.end();
+}
+
+/// Which tables a change is applied to.
+using TableFilter = int (*)(void* context, const char* table);
+int is_content_table(void* /*context*/, const char* table) { return is_content(table) ? 1 : 0; }
 /// Another program's tables are not touched, whatever a change lists.
-int is_content_table(void* /*context*/, const char* table) {
-  return std::ranges::find(kContentTables, std::string_view(table)) != kContentTables.end() ? 1 : 0;
+int is_recorded_table(void* /*context*/, const char* table) {
+  const bool is_placement = std::ranges::find(kPlacementTables, table) != kPlacementTables.end();
+  return is_placement || is_content(table) ? 1 : 0;
 }
 
 /// The rows must be what the change left.
@@ -113,9 +122,10 @@ Changeset inverted(const Connection& connection, std::vector<std::uint8_t> bytes
   return inverse;
 }
 
-void apply(const Connection& connection, void* changeset, int size, std::uint64_t number) {
-  const int result = sqlite3changeset_apply(connection.handle(), size, changeset, is_content_table,
-                                            on_conflict, nullptr);
+void apply(const Connection& connection, void* changeset, int size, std::uint64_t number,
+           TableFilter is_wanted) {
+  const int result =
+      sqlite3changeset_apply(connection.handle(), size, changeset, is_wanted, on_conflict, nullptr);
   if (result == SQLITE_OK) return;
   if (result == SQLITE_ABORT)
     connection.damaged(fmt::format("the rows are not those that change {} goes with", number));
@@ -138,6 +148,8 @@ Recording::Recording(const Connection& connection) : connection_(connection) {
   require_ok(connection, sqlite3session_create(connection.handle(), kMain, &session));
   session_.reset(session);
   for (const std::string_view table : kContentTables)
+    require_ok(connection, sqlite3session_attach(session, std::string(table).c_str()));
+  for (const std::string_view table : kPlacementTables)
     require_ok(connection, sqlite3session_attach(session, std::string(table).c_str()));
 }
 
@@ -195,19 +207,20 @@ void undo(const Connection& connection, std::uint64_t number) {
       connection.damaged(fmt::format("change {} is missing", number));
     inverse = inverted(connection, changeset_in(connection, row));
   }
-  apply(connection, inverse.bytes.get(), inverse.size, number);
+  apply(connection, inverse.bytes.get(), inverse.size, number, is_recorded_table);
 }
 
 std::unique_ptr<Connection> recorded_content(const Connection& connection) {
   auto recorded = std::make_unique<Connection>(connection.file());
   for (const SchemaObject& object : schema_objects()) {
-    if (is_content_table(nullptr, object.name.c_str()) != 0) recorded->execute(object.sql);
+    if (is_content(object.name)) recorded->execute(object.sql);
   }
 
   Statement row = connection.prepare(std::string(kSelectChanges) + "ORDER BY number");
   while (row.step()) {
     std::vector<std::uint8_t> changeset = changeset_in(connection, row);
-    apply(*recorded, changeset.data(), static_cast<int>(changeset.size()), row.count(0));
+    apply(*recorded, changeset.data(), static_cast<int>(changeset.size()), row.count(0),
+          is_content_table);
   }
   return recorded;
 }

@@ -34,7 +34,8 @@ struct SessionCloser {
   void operator()(sqlite3_session* session) const;
 };
 
-/// Records what is changed in the content tables from its making on, by SQLite's session extension.
+/// Records what is changed in the content tables, and of where submaps are (submap_tables.hpp),
+/// from its making on, by SQLite's session extension.
 class Recording {
  public:
   /// Begins. The connection's transaction has begun and outlives it.
@@ -54,9 +55,9 @@ class Recording {
 std::uint64_t latest_change(const Connection& connection);
 /// All changes, in order of number.
 std::vector<Change> changes_in(const Connection& connection);
-/// Takes one change back: its rows become what they were before it. All later ones must have been
-/// taken back. Fault::kDamaged where the rows are not what the change left, or the change is not
-/// what was recorded; the transaction is then to be rolled back.
+/// Takes one change back: its rows become what they were before it, where submaps are among them.
+/// All later ones must have been taken back. Fault::kDamaged where the rows are not what the change
+/// left, or the change is not what was recorded; the transaction is then to be rolled back.
 void undo(const Connection& connection, std::uint64_t number);
 /// The content tables as the history says that they are, in memory: all changes, one after the
 /// other. Fault::kDamaged where a change is not what was recorded. O(all changes).

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "common/map_file/check.hpp"
 #include "common/map_file/drive_file.hpp"
 #include "common/map_file/existence_rows.hpp"
@@ -9,6 +11,7 @@
 #include "common/map_file/map_rows.hpp"
 #include "common/map_file/opening.hpp"
 #include "common/map_file/schema.hpp"
+#include "common/map_file/submap_layers.hpp"
 
 namespace understory::map_file {
 namespace {
@@ -64,6 +67,24 @@ void replace_maps(const Connection& connection, std::span<const StoredMap> maps)
   }
 }
 
+void place(const Connection& connection, std::uint32_t map_id, const Placement& placement) {
+  for (const model::SubmapPose& one : placement.submaps)
+    place_submap(connection, {{map_id, one.id}, one.map_T_submap});
+  std::vector<model::LoopClosure> known = select_closures(connection, map_id);
+  for (model::LoopClosure closure : placement.closures) {
+    if (std::ranges::find(known, closure.id, &model::LoopClosure::id) != known.end())
+      throw MapFileError(Fault::kRefused,
+                         fmt::format("{}: map {} has a closure {} already",
+                                     connection.file().string(), map_id, closure.id));
+    closure.map_id = map_id;
+    insert_closure(connection, closure);
+    known.push_back(closure);
+  }
+}
+
+/// Files of version 1 have no submaps.
+bool has_submaps(const Connection& connection) { return schema_version(connection) >= 2; }
+
 /// A drive whose store was killed is brought to its end first.
 std::unique_ptr<Connection> opened(const std::filesystem::path& file, Access access) {
   if (access == Access::kRead) {
@@ -105,12 +126,33 @@ StoredMap MapFile::read(std::uint32_t map_id) const {
   return map;
 }
 
+std::vector<model::Submap> MapFile::submaps(std::uint32_t map_id) const {
+  std::vector<model::Submap> submaps;
+  if (!has_submaps(*connection_)) return submaps;
+  for (const SubmapKey& key : stored_submaps(*connection_))
+    if (key.map_id == map_id) submaps.push_back(select_submap(*connection_, key).value());
+  return submaps;
+}
+
+std::vector<model::LoopClosure> MapFile::closures(std::uint32_t map_id) const {
+  if (!has_submaps(*connection_)) return {};
+  return select_closures(*connection_, map_id);
+}
+
 std::vector<Change> MapFile::history() const { return changes_in(*connection_); }
 
 std::vector<std::string> MapFile::check() const { return findings_in(*connection_); }
 
 std::uint64_t MapFile::put(std::span<const StoredMap> maps, const ChangeNote& note) {
   return changed(*connection_, note, [&] { replace_maps(*connection_, maps); });
+}
+
+std::uint64_t MapFile::put(const StoredMap& map, const Placement& placement,
+                           const ChangeNote& note) {
+  return changed(*connection_, note, [&] {
+    replace_maps(*connection_, {&map, 1});
+    place(*connection_, map.map_id, placement);
+  });
 }
 
 std::uint64_t MapFile::revert(std::uint64_t to, const ChangeNote& note) {

@@ -11,6 +11,7 @@
 #include "common/map_file/connection.hpp"
 #include "common/map_file/history.hpp"
 #include "common/map_file/stored_map.hpp"
+#include "common/model/submap.hpp"
 
 namespace understory::map_file {
 
@@ -29,6 +30,12 @@ struct MapSummary {
   std::uint64_t loop_closures = 0;
   std::uint64_t existence_states = 0;  ///< Landmarks with a state of existence ...
   std::uint64_t not_in_use = 0;        ///< ... and those of them that are taken for gone.
+};
+
+/// Where submaps of one map are, and closures that are new in it.
+struct Placement {
+  std::vector<model::SubmapPose> submaps;
+  std::vector<model::LoopClosure> closures;  ///< Each with a number that the map does not have.
 };
 
 /// An open map file. Everything throws MapFileError, which names the file.
@@ -54,6 +61,11 @@ class MapFile {
   std::vector<MapSummary> maps() const;
   /// One map, as it was put in: its checksum is compared (Fault::kDamaged). O(size).
   StoredMap read(std::uint32_t map_id) const;
+  /// The submaps of a map that a drive left, in order of id, where they are; those whose content is
+  /// in others are not among them, and none in a file without submaps. O(size).
+  std::vector<model::Submap> submaps(std::uint32_t map_id) const;
+  /// Its loop closures that count, in the order in which they came, without covariances.
+  std::vector<model::LoopClosure> closures(std::uint32_t map_id) const;
   /// All changes, the oldest first.
   std::vector<Change> history() const;
   /// All that is wrong with it, a line each: pages and indexes of SQLite, tables and rows that a
@@ -63,6 +75,9 @@ class MapFile {
   /// Puts maps in as one change and gives its number; a map of the same number is replaced, the
   /// others stay. All or none of it.
   std::uint64_t put(std::span<const StoredMap> maps, const ChangeNote& note);
+  /// Likewise one map, with where its submaps are now: as one change, which revert() takes back
+  /// whole. Fault::kRefused where a submap is none of the map's, or a closure's number is taken.
+  std::uint64_t put(const StoredMap& map, const Placement& placement, const ChangeNote& note);
   /// Brings all maps back to what they were after change `to` (0: before the first one), as a
   /// change of its own whose number it gives; it can be reverted, too. What other programs changed
   /// becomes a change before it. Fault::kRefused where there is no change `to`. O(all changes).

@@ -47,6 +47,11 @@ std::size_t show_ground(const Connection& connection, const GroundChange& change
 /// The file keeps a loop closure that counts, and the layer shows it. One with the same id is
 /// replaced.
 void put_closure(const Connection& connection, const model::LoopClosure& closure);
+/// The file keeps it, where the layer shows it already.
+void insert_closure(const Connection& connection, const model::LoopClosure& closure);
+/// All closures of a map that count, in the order in which they came; without covariances, which
+/// the file does not have.
+std::vector<model::LoopClosure> select_closures(const Connection& connection, std::uint32_t map_id);
 /// It does not count any more; nothing where the file has none.
 void remove_closure(const Connection& connection, std::uint32_t map_id, std::uint64_t closure_id);
 /// Shows all closures where their ends are now. O(closures).

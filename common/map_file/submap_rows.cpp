@@ -176,6 +176,20 @@ std::vector<PlacedSubmap> update_poses(const Connection& connection,
   return moved;
 }
 
+void place_submap(const Connection& connection, const PlacedSubmap& placed) {
+  const geometry::SE2& pose = placed.map_T_submap;
+  Statement update = connection.prepare(
+      "UPDATE understory_submap_poses SET x_m = ?3, y_m = ?4, heading_rad = ?5 "
+      "WHERE map_id = ?1 AND submap_id = ?2 RETURNING submap_id");
+  const bool is_there =
+      update.bind(map_of(placed.key), as_integer(placed.key.id), pose.x(), pose.y(), pose.theta())
+          .step();
+  if (!is_there)
+    throw MapFileError(Fault::kRefused,
+                       fmt::format("{}: map {} has no submap {}", connection.file().string(),
+                                   placed.key.map_id, placed.key.id));
+}
+
 std::vector<PlacedSubmap> to_draw(const Connection& connection, std::size_t most) {
   std::vector<PlacedSubmap> result;
   Statement row = connection.prepare(

@@ -51,6 +51,9 @@ std::optional<geometry::SE2> pose_of(const Connection& connection, const SubmapK
 /// what moved. Submaps that the file has not are passed over.
 std::vector<PlacedSubmap> update_poses(const Connection& connection,
                                        const model::MapCorrection& correction);
+/// Puts a submap that the file has at a pose which the layers show already. Fault::kRefused where
+/// the file has none.
+void place_submap(const Connection& connection, const PlacedSubmap& placed);
 /// At most so many submaps that the layers do not show where they are.
 std::vector<PlacedSubmap> to_draw(const Connection& connection, std::size_t most);
 /// The layers show it where it is.

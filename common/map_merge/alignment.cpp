@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <optional>
 
 #include "common/constellation/map.hpp"
+#include "common/geometry/decompositions.hpp"
 #include "common/geometry/registration.hpp"
 #include "common/map_merge/fit.hpp"
 #include "common/map_merge/landmark_set.hpp"
@@ -30,6 +32,13 @@ constexpr std::array<WindowSize, 6> kWindows{{{30, kLocalSigma_m},
                                               {150, kAnySigma_m},
                                               {400, kAnySigma_m}}};
 constexpr int kMostRounds = 10;
+/// A guess allows motions within so many of its standard deviations; these are told apart by [m],
+/// [rad].
+constexpr double kGuessSigmas = 4.0;
+constexpr std::size_t kGuessPairs = 5;
+constexpr double kGuessDecades = 4.0;
+constexpr double kToldApart_m = 0.1;
+constexpr double kToldApart_rad = 0.01;
 /// Landmarks around one that the best motion is moved to, itself included.
 constexpr std::size_t kNeighboursBeside = 13;
 
@@ -67,6 +76,15 @@ class AlignmentSearch {
     const LandmarkSet& larger = searches_second() ? first_ : second_;
     for (std::uint32_t i = 0; i < larger.all().size(); ++i)
       map_.insert(i + 1, larger.all()[i].position_m);
+  }
+
+  /// Only motions that a guess allows are looked at, and chance has only those.
+  void take(const geometry::SE2WithCovariance& guess) {
+    guess_ = guess;
+    allowed_ = std::max(1.0, std::pow(2.0 * kGuessSigmas, 3) *
+                                 std::sqrt(std::max(0.0, guess.covariance.determinant())) /
+                                 (kToldApart_m * kToldApart_m * kToldApart_rad));
+    if (auto verified = verify(guess)) consider(std::move(*verified));
   }
 
   Alignment run() {
@@ -158,7 +176,15 @@ class AlignmentSearch {
     }
   }
 
+  bool is_allowed(const geometry::SE2& first_T_second) const {
+    if (!guess_) return true;
+    const Eigen::Vector3d off = (guess_->mean.inverse() * first_T_second).Log();
+    return off.dot(geometry::symmetric_inverse(guess_->covariance) * off) <=
+           kGuessSigmas * kGuessSigmas;
+  }
+
   void consider_beside(const geometry::SE2& first_T_second) {
+    if (!is_allowed(first_T_second)) return;
     Verified one;
     one.fit.model = best_->fit.model;
     one.fit.model.first_T_second = first_T_second;
@@ -180,6 +206,7 @@ class AlignmentSearch {
   }
 
   void consider(Verified one) {
+    if (!is_allowed(one.fit.model.first_T_second)) return;
     if (best_ && is_same(*best_, one)) {
       if (one.pairing.log10_tail < best_->pairing.log10_tail) best_ = std::move(one);
       return;
@@ -194,8 +221,8 @@ class AlignmentSearch {
   void keep_runner_up(double log10_tail) { runner_up_ = std::min(runner_up_, log10_tail); }
 
   double false_alarm() const {
-    return best_->pairing.log10_tail +
-           std::log10(static_cast<double>(std::max<std::size_t>(hypotheses_, 1)));
+    const double tried = static_cast<double>(std::max<std::size_t>(hypotheses_, 1));
+    return best_->pairing.log10_tail + std::log10(std::min(tried, allowed_));
   }
   double margin() const { return runner_up_ - best_->pairing.log10_tail; }
   double least_margin() const {
@@ -247,6 +274,9 @@ class AlignmentSearch {
   std::vector<geometry::UncertainPoint> first_points_;
   std::vector<geometry::UncertainPoint> second_points_;
   constellation::ConstellationMap map_;  ///< Of the larger one; ids are places in all(), plus 1.
+  std::optional<geometry::SE2WithCovariance> guess_;  ///< Where somebody says one.
+  /// Motions that it allows, of those that can be told apart.
+  double allowed_ = std::numeric_limits<double>::infinity();
   std::optional<Verified> best_;
   double runner_up_ = 0.0;  ///< log10_tail of the best different motion.
   std::size_t windows_ = 0;
@@ -296,6 +326,26 @@ Alignment align(std::span<const model::MapLandmark> first,
   const LandmarkSet first_set(first, parameters.unknown_sigma_m);
   const LandmarkSet second_set(second, parameters.unknown_sigma_m);
   return AlignmentSearch(first_set, second_set, parameters, progress).run();
+}
+
+AlignmentParameters with_guess(AlignmentParameters parameters) {
+  parameters.min_pairs = std::min(parameters.min_pairs, kGuessPairs);
+  parameters.max_log10_false_alarm = std::max(parameters.max_log10_false_alarm, -kGuessDecades);
+  parameters.min_log10_margin = std::min(parameters.min_log10_margin, kGuessDecades);
+  return parameters;
+}
+
+Alignment align_near(const geometry::SE2WithCovariance& guess,
+                     std::span<const model::MapLandmark> first,
+                     std::span<const model::MapLandmark> second,
+                     const AlignmentParameters& parameters) {
+  const LandmarkSet first_set(first, parameters.unknown_sigma_m);
+  const LandmarkSet second_set(second, parameters.unknown_sigma_m);
+  const std::function<void(double)> nothing = [](double /*part*/) {};
+  const AlignmentParameters eased = with_guess(parameters);
+  AlignmentSearch search(first_set, second_set, eased, nothing);
+  search.take(guess);
+  return search.run();
 }
 
 }  // namespace understory::map_merge

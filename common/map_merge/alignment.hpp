@@ -94,4 +94,16 @@ Alignment align(
     const AlignmentParameters& parameters = {},
     const std::function<void(double)>& progress = [](double /*part*/) {});
 
+/// What is asked of landmarks where somebody says how the maps lie: 5 pairs, and 4 decades instead
+/// of 9 against chance and of 6 to a different motion (a guess is evidence, too; compare
+/// docs/decisions/093).
+AlignmentParameters with_guess(AlignmentParameters parameters);
+
+/// Likewise where somebody says it: first_T_second with its covariance (right perturbation). Only
+/// motions within four standard deviations of it count, by with_guess(parameters). The same cost.
+Alignment align_near(const geometry::SE2WithCovariance& guess,
+                     std::span<const model::MapLandmark> first,
+                     std::span<const model::MapLandmark> second,
+                     const AlignmentParameters& parameters = {});
+
 }  // namespace understory::map_merge

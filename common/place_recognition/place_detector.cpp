@@ -57,17 +57,18 @@ DetectorPointer stem_recogniser(const DetectorParameters& parameters) {
 struct DetectorKind {
   const char* name;
   bool wants_cloud;
+  bool gives_evidence;
   DetectorPointer (*make)(const DetectorParameters&);
 };
 constexpr std::array kDetectors{
-    DetectorKind{"range_histogram", true, range_histogram},
-    DetectorKind{"glare", false, glare<detectors::BearingInvariance::kNone>},
-    DetectorKind{"glarot", false, glare<detectors::BearingInvariance::kShifted>},
-    DetectorKind{"glarot_3d", false, glarot_3d},
-    DetectorKind{"scan_context", true, scan_context},
-    DetectorKind{"geometric_hierarchy", false, geometric_hierarchy},
-    DetectorKind{"constellation", false, constellation_search},
-    DetectorKind{"stems", false, stem_recogniser}};
+    DetectorKind{"range_histogram", true, false, range_histogram},
+    DetectorKind{"glare", false, false, glare<detectors::BearingInvariance::kNone>},
+    DetectorKind{"glarot", false, false, glare<detectors::BearingInvariance::kShifted>},
+    DetectorKind{"glarot_3d", false, false, glarot_3d},
+    DetectorKind{"scan_context", true, false, scan_context},
+    DetectorKind{"geometric_hierarchy", false, false, geometric_hierarchy},
+    DetectorKind{"constellation", false, false, constellation_search},
+    DetectorKind{"stems", false, true, stem_recogniser}};
 
 const DetectorKind& detector_kind(std::string_view name) {
   std::string allowed;
@@ -93,5 +94,7 @@ std::unique_ptr<PlaceDetector> make_detector(std::string_view name,
 }
 
 bool wants_cloud(std::string_view detector) { return detector_kind(detector).wants_cloud; }
+
+bool gives_evidence(std::string_view detector) { return detector_kind(detector).gives_evidence; }
 
 }  // namespace understory::place_recognition

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,6 +15,16 @@
 
 namespace understory::place_recognition {
 
+/// What a detector knows of a place whose score is a probability: whoever asks may set it against
+/// all that chance has.
+struct PlaceEvidence {
+  double log_ratio = 0.0;  ///< Log likelihood (natural) over that of landmarks that lie anywhere.
+  std::size_t pairs = 0;   ///< Landmarks of the query that the frame has.
+  /// Of the answer: decades between the likeliest frame and the likeliest of those that put the
+  /// query elsewhere.
+  double margin_decades = 0.0;
+};
+
 /// A frame that may show the place of a query.
 struct ScoredPlace {
   FrameId frame = 0;
@@ -23,6 +34,8 @@ struct ScoredPlace {
   /// where it leaves them open (a heading modulo pi). What a detector does not know has a wide
   /// covariance (tangent order, right perturbation, m and rad).
   std::vector<geometry::SE2WithCovariance> guesses;
+  /// None of detectors whose score is no probability.
+  std::optional<PlaceEvidence> evidence = std::nullopt;
 };
 
 /// Which frames are asked for.
@@ -64,5 +77,7 @@ std::unique_ptr<PlaceDetector> make_detector(std::string_view name,
 /// Whether the detector compares clouds of points (of a frame without one, its landmarks as
 /// points). Throws likewise.
 bool wants_cloud(std::string_view detector);
+/// Whether the detector's places come with PlaceEvidence. Throws likewise.
+bool gives_evidence(std::string_view detector);
 
 }  // namespace understory::place_recognition

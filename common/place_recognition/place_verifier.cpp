@@ -26,16 +26,26 @@ VerifierPointer made(const VerifierParameters& parameters) {
 
 struct VerifierKind {
   const char* name;
+  bool wants_cloud;
   VerifierPointer (*make)(const VerifierParameters&);
 };
 constexpr std::array kVerifiers{
-    VerifierKind{"correspondence_graph", made<verifiers::CorrespondenceGraphVerifier>},
-    VerifierKind{"hough", made<verifiers::HoughVerifier>},
-    VerifierKind{"icp_point_to_point", icp<verifiers::IcpMetric::kPointToPoint>},
-    VerifierKind{"icp_point_to_plane", icp<verifiers::IcpMetric::kPointToPlane>},
-    VerifierKind{"generalised_icp", icp<verifiers::IcpMetric::kGeneralised>},
-    VerifierKind{"scan_context", made<verifiers::ScanContextVerifier>},
-    VerifierKind{"stem_likelihood", made<verifiers::StemVerifier>}};
+    VerifierKind{"correspondence_graph", false, made<verifiers::CorrespondenceGraphVerifier>},
+    VerifierKind{"hough", false, made<verifiers::HoughVerifier>},
+    VerifierKind{"icp_point_to_point", true, icp<verifiers::IcpMetric::kPointToPoint>},
+    VerifierKind{"icp_point_to_plane", true, icp<verifiers::IcpMetric::kPointToPlane>},
+    VerifierKind{"generalised_icp", true, icp<verifiers::IcpMetric::kGeneralised>},
+    VerifierKind{"scan_context", true, made<verifiers::ScanContextVerifier>},
+    VerifierKind{"stem_likelihood", false, made<verifiers::StemVerifier>}};
+
+const VerifierKind& verifier_kind(std::string_view name) {
+  std::string allowed;
+  for (const VerifierKind& kind : kVerifiers) {
+    if (kind.name == name) return kind;
+    allowed += std::string(allowed.empty() ? "" : ", ") + kind.name;
+  }
+  throw std::invalid_argument("verifier \"" + std::string(name) + "\": not one of " + allowed);
+}
 
 }  // namespace
 
@@ -48,12 +58,9 @@ std::vector<std::string> verifier_names() {
 
 std::unique_ptr<PlaceVerifier> make_verifier(std::string_view name,
                                              const VerifierParameters& parameters) {
-  std::string allowed;
-  for (const VerifierKind& kind : kVerifiers) {
-    if (kind.name == name) return kind.make(parameters);
-    allowed += std::string(allowed.empty() ? "" : ", ") + kind.name;
-  }
-  throw std::invalid_argument("verifier \"" + std::string(name) + "\": not one of " + allowed);
+  return verifier_kind(name).make(parameters);
 }
+
+bool verifier_wants_cloud(std::string_view name) { return verifier_kind(name).wants_cloud; }
 
 }  // namespace understory::place_recognition

@@ -48,4 +48,8 @@ std::vector<std::string> verifier_names();
 std::unique_ptr<PlaceVerifier> make_verifier(std::string_view name,
                                              const VerifierParameters& parameters = {});
 
+/// Whether the verifier compares clouds of points (of a frame without one, its landmarks as
+/// points). Throws likewise.
+bool verifier_wants_cloud(std::string_view name);
+
 }  // namespace understory::place_recognition

@@ -1,7 +1,6 @@
 // `understory loop`: loop closures set and taken back by a person, live.
 #include <fmt/format.h>
 
-#include <charconv>
 #include <chrono>
 #include <memory>
 #include <numbers>
@@ -14,6 +13,7 @@
 #include "common/wire/convert.hpp"
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/loop_end.hpp"
 
 namespace understory::cli {
 namespace {
@@ -23,8 +23,6 @@ using Status = model::LoopResult::Status;
 
 /// The closure is sent again this often until the mapper answers: messages may be lost.
 constexpr std::chrono::milliseconds kAgain{500};
-/// Numbers that are made here are below; those of loop_closer begin there.
-constexpr std::uint64_t kIds = std::uint64_t{1} << 40;
 
 struct LoopOptions {
   std::string from;
@@ -40,31 +38,12 @@ struct LoopOptions {
   std::string lcm_url;
 };
 
-/// keyframe:N or submap:N.
-model::LoopEnd end_of(const std::string& option, const std::string& text) {
-  const auto colon = text.find(':');
-  const std::string kind = text.substr(0, colon);
-  std::uint64_t number = 0;
-  const char* const begin = text.data() + std::min(text.size(), colon + 1);
-  const char* const end = text.data() + text.size();
-  const auto read = std::from_chars(begin, end, number);
-  const bool is_number =
-      colon != std::string::npos && begin != end && read.ec == std::errc{} && read.ptr == end;
-  if (!is_number || (kind != "keyframe" && kind != "submap") || (kind == "submap" && number == 0))
-    wrong_usage(
-        fmt::format("loop: {} {}: keyframe:N or submap:N (from 1) is wanted", option, text));
-
-  model::LoopEnd result;
-  (kind == "submap" ? result.submap : result.keyframe) = number;
-  return result;
-}
-
 /// The same closure has the same number: to say it twice does no harm.
 std::uint64_t id_of(const LoopOptions& options) {
   if (options.id != 0) return options.id;
   const std::string text = fmt::format("{} {} {} {} {}", options.from, options.to, options.x_m,
                                        options.y_m, options.theta_deg);
-  return 1 + model::fnv1a(text) % (kIds - 1);
+  return manual_closure_id(text);
 }
 
 model::LoopClosure closure_of(const LoopOptions& options) {
@@ -72,8 +51,8 @@ model::LoopClosure closure_of(const LoopOptions& options) {
   closure.map_id = options.map_id;
   closure.id = id_of(options);
   closure.source = "manual";
-  closure.from = end_of("--from", options.from);
-  closure.to = end_of("--to", options.to);
+  closure.from = loop_end_of("--from", options.from);
+  closure.to = loop_end_of("--to", options.to);
   const double degree = std::numbers::pi / 180.0;
   closure.from_T_to.mean = geometry::SE2(options.x_m, options.y_m, options.theta_deg * degree);
   const Eigen::Vector3d sigma(options.sigma_m, options.sigma_m, options.sigma_deg * degree);
@@ -167,7 +146,7 @@ void add_close(CLI::App& parent) {
       ->add_option("--id", options->id,
                    "Number of the closure; without it one that follows from "
                    "the rest")
-      ->check(CLI::Range(std::uint64_t{1}, kIds - 1));
+      ->check(CLI::Range(std::uint64_t{1}, kManualClosures - 1));
   add_common_options(*command, *options);
   command->callback([options] { close_loop(*options); });
 }

@@ -1,4 +1,4 @@
-// `understory map info|check|import|export|merge|log|revert|accept|diff`: stored maps.
+// `understory map info|check|import|export|merge|close|log|revert|accept|diff`: stored maps.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
@@ -295,6 +295,7 @@ void add_map_command(CLI::App& parent) {
   add_map_import(*map);
   add_map_export(*map);
   add_map_merge(*map);
+  add_map_close(*map);
   add_json_flag(*add("log", "Its changes, the oldest first", map_log), options->json);
 
   add("revert", "All maps as they were after a change; that is a change, too", map_revert)

@@ -18,6 +18,8 @@ void add_map_export(CLI::App& map);
 
 /// `understory map merge`: two maps that overlap become one.
 void add_map_merge(CLI::App& map);
+/// `understory map close`: a loop closed in a stored map by a person.
+void add_map_close(CLI::App& map);
 
 /// Runs `work`; what is wrong with a file ends the command in one line.
 void guarded_map_work(const std::function<void()>& work);

@@ -12,7 +12,9 @@
 #include "common/terminal/interrupt.hpp"
 #include "common/terminal/progress.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/loop_end.hpp"
 #include "deploy/cli/map_commands.hpp"
+#include "deploy/cli/said_pose.hpp"
 #include "deploy/cli/text_file.hpp"
 
 namespace understory::cli {
@@ -32,6 +34,10 @@ struct MapMergeOptions {
   fs::path into;
   fs::path out;
   double sigma_m = 0.1;
+  std::string first_at;  ///< An end of the first map; empty: its frame.
+  std::string second_at;
+  SaidPose pose;  ///< Of second_at in first_at.
+  bool force = false;
   bool json = false;
 
   /// One file, two of its maps.
@@ -45,7 +51,9 @@ struct MapMergeOptions {
 struct MapsToMerge {
   StoredMap first;
   StoredMap second;
-  std::uint32_t second_id = 0;              ///< As its file has it.
+  std::uint32_t second_id = 0;  ///< As its file has it.
+  geometry::SE2 first_T_at;     ///< See MapMergeOptions::first_at.
+  geometry::SE2 second_T_at;
   std::vector<map_file::MapSummary> known;  ///< All maps of the first one's file.
 };
 
@@ -73,6 +81,21 @@ std::uint32_t number_for_second(const MapMergeOptions& options,
   return next;
 }
 
+/// Where an end lies in its map; the map's frame itself where none is named.
+geometry::SE2 end_in(const MapFile& file, const StoredMap& map, const char* option,
+                     const std::string& text) {
+  if (text.empty()) return {};
+  const model::LoopEnd end = loop_end_of(option, text);
+  if (end.submap != 0) {
+    for (const model::Submap& one : file.submaps(map.map_id))
+      if (one.id == end.submap) return one.map_T_submap;
+  } else {
+    for (const model::KeyframePose& one : map.keyframes)
+      if (one.keyframe_sequence == end.keyframe) return one.map_T_vehicle;
+  }
+  fail(fmt::format("{}: {} {}: map {} has none", file.file().string(), option, text, map.map_id));
+}
+
 MapsToMerge read_maps_to_merge(const MapMergeOptions& options) {
   const MapFile file(options.first, map_file::Access::kRead);
   std::optional<MapFile> other;
@@ -85,6 +108,8 @@ MapsToMerge read_maps_to_merge(const MapMergeOptions& options) {
   maps.second_id = maps.second.map_id;
   if (!other && maps.first.map_id == maps.second_id)
     wrong_usage("map merge: both are one map; --first-map and --second-map say which ones");
+  maps.first_T_at = end_in(file, maps.first, "--first-at", options.first_at);
+  maps.second_T_at = end_in(other ? *other : file, maps.second, "--second-at", options.second_at);
   maps.second.map_id = number_for_second(options, maps.known, maps.second_id);
   return maps;
 }
@@ -176,6 +201,24 @@ std::string write_merged(const MapMergeOptions& options, const MapsToMerge& read
   return options.out.string();
 }
 
+/// From what a person says. Forced, it counts as it was said where landmarks do not show it: none
+/// is then in both maps.
+Alignment align_as_said(const MapMergeOptions& options, const MapsToMerge& maps,
+                        const map_merge::AlignmentParameters& parameters) {
+  const geometry::SE2WithCovariance first_T_at{maps.first_T_at, Eigen::Matrix3d::Zero()};
+  const geometry::SE2WithCovariance at_T_second{maps.second_T_at.inverse(),
+                                                Eigen::Matrix3d::Zero()};
+  const auto guess = compound(compound(first_T_at, options.pose.pose()), at_T_second);
+  Alignment alignment = map_merge::align_near(guess, map_merge::landmarks_of(maps.first),
+                                              map_merge::landmarks_of(maps.second), parameters);
+  if (alignment.found() || !options.force) return alignment;
+  alignment = {};
+  alignment.outcome = map_merge::AlignmentOutcome::kAligned;
+  alignment.first_T_second = guess.mean;
+  alignment.covariance = guess.covariance;
+  return alignment;
+}
+
 Alignment align_shown(const MapsToMerge& maps, const map_merge::AlignmentParameters& parameters) {
   terminal::Progress progress("looking for the overlap", 1.0);
   return map_merge::align(map_merge::landmarks_of(maps.first), map_merge::landmarks_of(maps.second),
@@ -189,11 +232,13 @@ void run_map_merge(const MapMergeOptions& options) {
   terminal::catch_interrupts();
   const MapsToMerge maps = read_maps_to_merge(options);
   const map_merge::AlignmentParameters parameters{.unknown_sigma_m = options.sigma_m};
-  const Alignment alignment = align_shown(maps, parameters);
+  const Alignment alignment = options.pose.is_given() ? align_as_said(options, maps, parameters)
+                                                      : align_shown(maps, parameters);
   if (!alignment.found())
-    fail(fmt::format("{} map {}, {} map {}: not merged: {}", options.first.string(),
-                     maps.first.map_id, options.second.string(), maps.second_id,
-                     alignment.reason(parameters)));
+    fail(fmt::format(
+        "{} map {}, {} map {}: not merged: {}", options.first.string(), maps.first.map_id,
+        options.second.string(), maps.second_id,
+        alignment.reason(options.pose.is_given() ? with_guess(parameters) : parameters)));
 
   const MergedMaps merged =
       map_merge::fuse(maps.first, maps.second, alignment, {.unknown_sigma_m = options.sigma_m});
@@ -207,6 +252,9 @@ void run_map_merge(const MapMergeOptions& options) {
 
 /// The map that is merged into is the first one, whichever was named first.
 MapMergeOptions settled(MapMergeOptions options) {
+  const bool has_ends = !options.first_at.empty() || !options.second_at.empty();
+  if ((has_ends || options.force) && !options.pose.is_given())
+    wrong_usage("map merge: --first-at, --second-at and --force are of a pose: --x-m is missing");
   if (options.into.empty()) return options;
   std::error_code ignored;
   if (fs::equivalent(options.into, options.first, ignored)) return options;
@@ -214,6 +262,8 @@ MapMergeOptions settled(MapMergeOptions options) {
     wrong_usage(fmt::format("--into {}: neither of the two files", options.into.string()));
   std::swap(options.first, options.second);
   std::swap(options.first_map, options.second_map);
+  if (options.pose.is_given())
+    wrong_usage("--into: with a pose the file that is merged into is the first one");
   return options;
 }
 
@@ -241,6 +291,14 @@ void add_map_merge(CLI::App& map) {
                    "[m] Standard deviation in x and in y of landmarks without covariance")
       ->check(CLI::Range(1e-6, 1e3))
       ->capture_default_str();
+  command->add_option("--first-at", options->first_at,
+                      "submap:N or keyframe:N of the first map, or its frame: where the pose is");
+  command->add_option("--second-at", options->second_at,
+                      "Likewise of the second: whose pose it is");
+  add_said_pose(*command, options->pose,
+                "--second-at is in the frame of --first-at, if it is known", "pose-");
+  command->add_flag("--force", options->force,
+                    "Takes the pose as it was said where the landmarks do not show it");
   command->add_flag("--json", options->json, "As JSON, on standard output");
   command->callback([options] { guarded_map_work([&] { run_map_merge(settled(*options)); }); });
 }

@@ -7,6 +7,7 @@
 #include "services/loop_closer/adapter_parameters.hpp"
 #include "services/loop_closer/health_watch.hpp"
 #include "services/loop_closer/loop_closer.hpp"
+#include "services/loop_closer/place_search.hpp"
 
 namespace understory::loop_closer {
 namespace {
@@ -24,6 +25,8 @@ class LoopCloserAdapter : public bus::Adapter {
 
   void bind(bus::Node& node) override {
     node_ = &node;
+    if (const std::string fault = fault_of(parameters_.search); !fault.empty())
+      throw bus::ConfigurationError({fault});
     stage_ = std::make_unique<LoopCloser>(parameters_);
     watch_ = HealthWatch(health_);
 
@@ -76,9 +79,13 @@ class LoopCloserAdapter : public bus::Adapter {
     const std::string from = closure.from.submap != 0
                                  ? fmt::format("submap {}", closure.from.submap)
                                  : fmt::format("keyframe {}", closure.from.keyframe);
+    const std::string chance =
+        closure.log10_false_alarm < 0.0
+            ? fmt::format("by chance with 10^{:.0f}", closure.log10_false_alarm)
+            : fmt::format("by {}", closure.source);
     node_->log(bus::Node::Level::kInfo, "loop",
-               fmt::format("closure {}: keyframe {} is at {}, by chance with 10^{:.0f}", closure.id,
-                           closure.to.keyframe, from, closure.log10_false_alarm),
+               fmt::format("closure {}: keyframe {} is at {}, {}", closure.id, closure.to.keyframe,
+                           from, chance),
                channels_.loop_closure);
   }
 

@@ -1,5 +1,8 @@
 #include "services/loop_closer/adapter_parameters.hpp"
 
+#include "common/place_recognition/place_detector.hpp"
+#include "common/place_recognition/place_verifier.hpp"
+
 namespace understory::loop_closer {
 namespace {
 
@@ -25,6 +28,29 @@ void describe(PlaceParameters& p, bus::ParameterTable& table) {
             "Standard deviation per axis that the pose of a closure has beside what its stems "
             "show: the keyframes of a place lie to each other as the mapper has them.");
   table.add("places.error_rad", p.error_rad, {0.0, 1.0}, "rad", "The same of its heading.");
+}
+
+std::vector<std::string> verifiers() {
+  std::vector<std::string> names{"none"};
+  for (std::string& name : place_recognition::verifier_names()) names.push_back(std::move(name));
+  return names;
+}
+
+void describe(SearchParameters& p, bus::ParameterTable& table) {
+  table.add("search.detector", p.detector, place_recognition::detector_names(),
+            "Who finds places. stems: its score is a probability, set against what chance has; the "
+            "others only name candidates and need a verifier. Those for clouds of points "
+            "(range_histogram, scan_context) are refused: this process has landmarks alone.");
+  table.add(
+      "search.verifier", p.verifier, verifiers(),
+      "Who compares a found place in detail, and gives the pose. none: only with stems. hough "
+      "and stem_likelihood need the correspondence graph to agree where the detector is not "
+      "stems. Those for clouds (ICP, scan_context) are refused.");
+  table.add("search.candidates", p.candidates, {1, 50}, "",
+            "So many candidates, the most alike, are verified.");
+  table.add("search.verified_pairs", p.verified_pairs, {3, 10000}, "",
+            "Least number of landmarks in common that a verifier must find. A count does not say "
+            "what chance gives: where stems stand denser, more.");
 }
 
 void describe(AcceptanceParameters& p, bus::ParameterTable& table) {
@@ -60,6 +86,7 @@ void describe(StemParameters& p, bus::ParameterTable& table) {
 
 void describe(LoopCloserParameters& parameters, bus::ParameterTable& table) {
   describe(parameters.places, table);
+  describe(parameters.search, table);
   describe(parameters.accept, table);
   describe(parameters.stems, table);
 }

@@ -13,8 +13,8 @@ namespace {
 constexpr state::Format kFormat{"loop_closer", 1};
 /// Numbers of our closures begin here: those of persons are below.
 constexpr std::uint64_t kFirstId = std::uint64_t{1} << 40;
-/// Name of the detector, as LOOP_CLOSURE tells it.
-constexpr const char* kSource = "stems";
+/// Where pairs are all that speaks for a place, it has so many more than one elsewhere.
+constexpr std::size_t kAheadOfRivals = 2;
 
 bool is_placed(const model::MapUpdate& update) {
   return update.status == model::MapUpdateStatus::kFirstMap ||
@@ -44,7 +44,7 @@ LoopCloser::LoopCloser(const LoopCloserParameters& parameters)
     : parameters_(parameters),
       window_(parameters.places),
       known_ground_(parameters.places.min_loop_m),
-      search_(parameters.stems) {}
+      search_(parameters.search, parameters.stems) {}
 
 void LoopCloser::add(const model::Keyframe& keyframe) {
   pending_.push_back(keyframe);
@@ -100,12 +100,12 @@ std::optional<model::LoopClosure> LoopCloser::look_for(const Place& place) {
     return std::nullopt;
   ++counters_.queries;
   const std::uint64_t newest = memory_.places()[searched - 1].keyframe;
-  const SearchAnswer answer = search_.find(place.stems, newest);
-  if (answer.found.empty()) return std::nullopt;
+  const std::vector<FoundPlace> found = search_.find(place.stems, newest, memory_);
+  if (found.empty()) return std::nullopt;
 
-  const FoundPlace& best = answer.found.front();
+  const FoundPlace& best = found.front();
   const Place& from = *memory_.of_keyframe(best.keyframe);
-  const Verdict verdict = judge(answer, from, place, searched);
+  const Verdict verdict = judge(best, from, place, searched);
   const ClosurePaths paths{from.along_m, place.along_m};
   if (!verdict.is_sure || sent_.was_revoked(paths)) return std::nullopt;
   if (from.map_id != place.map_id) {
@@ -117,7 +117,7 @@ std::optional<model::LoopClosure> LoopCloser::look_for(const Place& place) {
   closure.utime = place.utime;
   closure.map_id = place.map_id;
   closure.id = kFirstId + place.keyframe;
-  closure.source = kSource;
+  closure.source = search_.source();
   geometry::SE2WithCovariance end_T_base;
   closure.from = end_at(from, end_T_base);
   closure.to.keyframe = place.keyframe;
@@ -133,15 +133,22 @@ std::optional<model::LoopClosure> LoopCloser::look_for(const Place& place) {
 }
 
 /// Fewer poses have to be told from chance where the mapper's poses allow few. What they do not
-/// allow must be surer by itself; the mapper waits for others that agree, then.
-LoopCloser::Verdict LoopCloser::judge(const SearchAnswer& answer, const Place& from,
-                                      const Place& place, std::size_t searched) const {
+/// allow must be surer by itself; the mapper waits for others that agree, then. Of a place without
+/// evidence nobody says what chance gives: verified pairs and no rival are all, and the rest is the
+/// mapper's word.
+LoopCloser::Verdict LoopCloser::judge(const FoundPlace& best, const Place& from, const Place& place,
+                                      std::size_t searched) const {
   const AcceptanceParameters& accept = parameters_.accept;
-  const FoundPlace& best = answer.found.front();
   Verdict verdict;
   verdict.is_expected =
       from.map_id == place.map_id && squared_distance(expected(from, place), best.place_T_query) <=
                                          accept.gate_sigmas * accept.gate_sigmas;
+  const bool has_pairs = best.pairs >= static_cast<std::size_t>(accept.min_pairs);
+  if (!best.evidence) {
+    verdict.is_sure = has_pairs && best.pairs >= best.rival_pairs + kAheadOfRivals;
+    return verdict;
+  }
+
   double poses = static_cast<double>(searched) * search_.poses_per_place();
   if (verdict.is_expected) {
     poses = std::min(poses, allowed_poses(memory_.places().first(searched), place,
@@ -149,12 +156,11 @@ LoopCloser::Verdict LoopCloser::judge(const SearchAnswer& answer, const Place& f
   }
 
   verdict.log10_false_alarm =
-      std::log10(std::max(1.0, poses)) - best.log_ratio / std::numbers::ln10;
+      std::log10(std::max(1.0, poses)) - best.evidence->log_ratio / std::numbers::ln10;
   const double decades =
       verdict.is_expected ? accept.chance_decades_expected : accept.chance_decades;
   verdict.is_sure = verdict.log10_false_alarm <= -decades &&
-                    answer.margin_decades >= accept.margin_decades &&
-                    best.pairs >= static_cast<std::size_t>(accept.min_pairs);
+                    best.evidence->margin_decades >= accept.margin_decades && has_pairs;
   return verdict;
 }
 

@@ -89,7 +89,7 @@ class LoopCloser {
     bool is_expected = false;  ///< The mapper's poses allow it.
     double log10_false_alarm = 0.0;
   };
-  Verdict judge(const SearchAnswer& answer, const Place& from, const Place& place,
+  Verdict judge(const FoundPlace& best, const Place& from, const Place& place,
                 std::size_t searched) const;
 
   LoopCloserParameters parameters_;

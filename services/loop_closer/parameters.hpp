@@ -3,6 +3,8 @@
 // name does not give.
 #pragma once
 
+#include <string>
+
 namespace understory::loop_closer {
 
 /// What is a place, and where one is looked for again.
@@ -37,9 +39,18 @@ struct StemParameters {
   double triangles = 300.0;
 };
 
+/// Who looks for places, and who verifies what is found (common/place_recognition), by name.
+struct SearchParameters {
+  std::string detector = "stems";
+  std::string verifier = "none";
+  int candidates = 3;
+  int verified_pairs = 6;
+};
+
 /// All of them.
 struct LoopCloserParameters {
   PlaceParameters places;
+  SearchParameters search;
   AcceptanceParameters accept;
   StemParameters stems;
 };

@@ -1,50 +1,103 @@
 #include "services/loop_closer/place_search.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
+
+#include "common/place_recognition/place_verifier.hpp"
 
 namespace understory::loop_closer {
 namespace {
 
-place_recognition::StemRecogniserParameters recogniser_parameters(const StemParameters& stems) {
-  place_recognition::StemRecogniserParameters result;
-  result.noise.sigma_m = stems.sigma_m;
-  result.noise.matched_share = stems.matched_share;
-  result.noise.use_diameters = stems.use_diameters;
-  result.noise.diameter_log_sigma = stems.diameter_sigma;
-  result.triangles.triangles = stems.triangles;
-  result.most_frames = 200;
-  result.most_views = 20;
+constexpr const char* kNone = "none";
+
+place_recognition::DetectorParameters detector_parameters(const StemParameters& stems) {
+  place_recognition::DetectorParameters result;
+  result.stems.noise.sigma_m = stems.sigma_m;
+  result.stems.noise.matched_share = stems.matched_share;
+  result.stems.noise.use_diameters = stems.use_diameters;
+  result.stems.noise.diameter_log_sigma = stems.diameter_sigma;
+  result.stems.triangles.triangles = stems.triangles;
+  result.stems.most_frames = 200;
+  result.stems.most_views = 20;
+  result.constellation.sigma_m = stems.sigma_m / std::numbers::sqrt2;
   return result;
+}
+
+place_recognition::VerifierParameters verifier_parameters(const StemParameters& stems) {
+  const place_recognition::DetectorParameters same = detector_parameters(stems);
+  place_recognition::VerifierParameters result;
+  result.sigma_m = stems.sigma_m;
+  result.stems = same.stems.noise;
+  result.triangles = same.stems.triangles;
+  return result;
+}
+
+SearchParameters checked(const SearchParameters& search) {
+  const std::string fault = fault_of(search);
+  if (!fault.empty()) throw std::invalid_argument(fault);
+  return search;
+}
+
+std::unique_ptr<PlaceVerification> verification_of(const SearchParameters& search,
+                                                   const StemParameters& stems) {
+  if (search.verifier == kNone) return nullptr;
+  return std::make_unique<PlaceVerification>(
+      search, place_recognition::gives_evidence(search.detector), verifier_parameters(stems));
 }
 
 }  // namespace
 
-PlaceSearch::PlaceSearch(const StemParameters& parameters)
-    : parameters_(recogniser_parameters(parameters)), recogniser_(parameters_) {}
-
-void PlaceSearch::add(const Place& place) {
-  recogniser_.add(static_cast<place_recognition::FrameId>(place.keyframe), place.stems);
+std::string fault_of(const SearchParameters& search) {
+  const auto no_cloud = [](const char* key, const std::string& name) {
+    return std::string(key) + " = \"" + name +
+           "\": it compares clouds of points, and this process has landmarks alone";
+  };
+  try {
+    if (place_recognition::wants_cloud(search.detector))
+      return no_cloud("search.detector", search.detector);
+    const bool is_sure = place_recognition::gives_evidence(search.detector);
+    if (search.verifier == kNone)
+      return is_sure ? std::string()
+                     : "search.verifier = \"none\": the score of detector \"" + search.detector +
+                           "\" is no probability; correspondence_graph verifies it";
+    if (place_recognition::verifier_wants_cloud(search.verifier))
+      return no_cloud("search.verifier", search.verifier);
+  } catch (const std::invalid_argument& error) {
+    return std::string("search: ") + error.what();
+  }
+  return {};
 }
 
-SearchAnswer PlaceSearch::find(std::span<const LevelStem> stems, std::uint64_t newest) const {
-  const place_recognition::PlaceAnswer answer =
-      recogniser_.query(stems, static_cast<place_recognition::FrameId>(newest));
-  SearchAnswer result;
-  result.margin_decades = answer.log10_margin;
-  for (const place_recognition::PlaceCandidate& one : answer.candidates) {
-    result.found.push_back({static_cast<std::uint64_t>(one.frame),
-                            {one.frame_T_query, one.covariance},
-                            one.log_ratio,
-                            one.pairs.size()});
+PlaceSearch::PlaceSearch(const SearchParameters& search, const StemParameters& stems)
+    : reach_m_(detector_parameters(stems).stems.max_distance_m),
+      source_(search.verifier == kNone ? search.detector
+                                       : search.detector + ", " + search.verifier),
+      detector_(
+          place_recognition::make_detector(checked(search).detector, detector_parameters(stems))),
+      verification_(verification_of(search, stems)) {}
+
+void PlaceSearch::add(const Place& place) { detector_->add(frame_of(place.keyframe, place.stems)); }
+
+std::vector<FoundPlace> PlaceSearch::find(std::span<const LevelStem> stems, std::uint64_t newest,
+                                          const PlaceMemory& memory) const {
+  const place_recognition::PlaceFrame query = frame_of(newest + 1, stems);
+  const std::size_t most = verification_ ? verification_->candidates() : 1;
+  const auto scored =
+      detector_->query(query, {static_cast<place_recognition::FrameId>(newest), most});
+  if (verification_) return verification_->verified(query, scored, memory);
+
+  std::vector<FoundPlace> found;
+  found.reserve(scored.size());
+  for (const place_recognition::ScoredPlace& one : scored) {
+    found.push_back({static_cast<std::uint64_t>(one.frame), one.guesses.front(),
+                     one.evidence->pairs, 0, one.evidence});
   }
-  if (!result.found.empty()) std::swap(result.found.front(), result.found[answer.nearest]);
-  return result;
+  return found;
 }
 
 double PlaceSearch::poses_per_place() const {
-  const double reach = parameters_.max_distance_m / kPoseCellM;
+  const double reach = reach_m_ / kPoseCellM;
   return std::numbers::pi * reach * reach * 2.0 * std::numbers::pi / kPoseCellRad;
 }
 

@@ -4,48 +4,46 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "common/geometry/se2.hpp"
-#include "common/place_recognition/stem_recogniser.hpp"
+#include "common/place_recognition/place_detector.hpp"
 #include "services/loop_closer/parameters.hpp"
 #include "services/loop_closer/place_memory.hpp"
+#include "services/loop_closer/place_verification.hpp"
 
 namespace understory::loop_closer {
 
-/// A place that may be where the query is.
-struct FoundPlace {
-  std::uint64_t keyframe = 0;  ///< Of the place.
-  geometry::SE2WithCovariance place_T_query;
-  double log_ratio = 0.0;  ///< Natural logarithm of the likelihood over that of chance.
-  std::size_t pairs = 0;   ///< Stems of the query that the place has.
-};
+/// What is wrong with the choice of detector and verifier, with the key in front; empty where
+/// nothing is.
+std::string fault_of(const SearchParameters& search);
 
-/// What a search gives.
-struct SearchAnswer {
-  std::vector<FoundPlace> found;  ///< The one that answers first.
-  /// Decades between the likeliest and the likeliest of those that put the query elsewhere.
-  double margin_decades = 0.0;
-};
-
-/// Detector and verifier in one. The places are its only state, so it is made again from them.
+/// Detector and verifier, of those that `common/place_recognition` has for landmarks. The places
+/// are its only state, so it is made again from them.
 class PlaceSearch {
  public:
-  /// Without places.
-  explicit PlaceSearch(const StemParameters& parameters);
+  /// Without places. Throws std::invalid_argument where fault_of() finds something.
+  PlaceSearch(const SearchParameters& search, const StemParameters& stems);
 
   /// Adds a place. Precondition: its keyframe is later than those before.
   void add(const Place& place);
-  /// Looks among the places of keyframes up to `newest`. The same places give the same answer.
-  SearchAnswer find(std::span<const LevelStem> stems, std::uint64_t newest) const;
+  /// Looks among the places of keyframes up to `newest`; the one that answers first. `memory` has
+  /// them all. The same places give the same answer.
+  std::vector<FoundPlace> find(std::span<const LevelStem> stems, std::uint64_t newest,
+                               const PlaceMemory& memory) const;
   /// Most poses that chance has around one place, of those that can be told apart.
   double poses_per_place() const;
   /// Distance of two places that are found [m].
-  double reach_m() const { return parameters_.max_distance_m; }
+  double reach_m() const { return reach_m_; }
+  /// Who finds and verifies, as LOOP_CLOSURE tells it.
+  const std::string& source() const { return source_; }
 
  private:
-  place_recognition::StemRecogniserParameters parameters_;
-  place_recognition::StemRecogniser recogniser_;
+  double reach_m_;
+  std::string source_;
+  std::unique_ptr<place_recognition::PlaceDetector> detector_;
+  std::unique_ptr<PlaceVerification> verification_;  ///< None: the detector's evidence is enough.
 };
 
 /// Poses that are told apart [m], [rad]: by these chance has so many.

@@ -204,6 +204,29 @@ TEST_CASE_METHOD(Forest, "what does not overlap is not merged, with the reason",
   refused("map merge " + a + " " + b + " --into " + a, 1, "a.gpkg");
 }
 
+TEST_CASE_METHOD(Forest, "maps that only a person can tell apart are merged by the pose they give",
+                 "[cli]") {
+  survey(a, 0.0, 52.0, {});
+  survey(b, 48.0, 100.0, geometry::SE2(0.4, -0.3, 0.01).inverse());
+  const Bytes before = read_bytes(a);
+  refused("map merge " + a + " " + b + " --into " + a, 1, "not merged: ");
+  const std::string said = "map merge " + a + " " + b + " --into " + a;
+  const std::string pose = " --x-m 0.5 --y-m -0.2 --theta-deg 0.5 --pose-sigma-deg 0.3";
+  refused(said + " --x-m 9 --y-m 9 --theta-deg 40", 1, "not merged: ");
+  refused(said + " --force", 2, "--x-m is missing");
+  refused(said + " --first-at submap:3" + pose, 1, "--first-at submap:3: map 1 has none");
+  refused(said + " --first-at 3" + pose, 2, "--first-at 3: keyframe:N or submap:N");
+  CHECK(run(said + " --x-m nan --y-m 0 --theta-deg 0").status != 0);
+  CHECK((read_bytes(a) == before));
+
+  const auto forced = json(said + pose + " --force");
+  CHECK(forced["offset"]["x_m"].get<double>() == Approx(0.4).margin(0.2));
+  CHECK(forced["landmarks"].get<int>() > 100);
+  fine("map check " + a);
+  fine("map revert --to 1 " + a);
+  CHECK(map_file::MapFile(a, Access::kRead).maps().size() == 1);
+}
+
 TEST_CASE_METHOD(Forest, "two drives of one place on different days become one map", "[cli]") {
   sim::ForestParameters larger;
   larger.side_m = 220.0;

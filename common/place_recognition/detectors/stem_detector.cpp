@@ -18,9 +18,11 @@ std::vector<ScoredPlace> StemDetector::query(const PlaceFrame& frame,
   places.reserve(answer.candidates.size());
   for (const PlaceCandidate& candidate : answer.candidates) {
     const double below = std::min(decades - 1e-6, -candidate.log10_false_alarm);
-    places.push_back({candidate.frame,
-                      &candidate == best ? decades : below,
-                      {{candidate.frame_T_query, candidate.covariance}}});
+    places.push_back(
+        {candidate.frame,
+         &candidate == best ? decades : below,
+         {{candidate.frame_T_query, candidate.covariance}},
+         PlaceEvidence{candidate.log_ratio, candidate.pairs.size(), answer.log10_margin}});
   }
   keep_best(places, limits.most);
   return places;

@@ -9,6 +9,14 @@ namespace understory::geoslam_mapper::smoothing {
 
 namespace plane = factor_graph::plane;
 
+namespace {
+
+FrozenMotion frozen_motion(const plane::RelativePose& motion) {
+  return {index(motion.a), index(motion.b), motion.a_T_b, motion.information, std::nullopt, 0};
+}
+
+}  // namespace
+
 LooseGraph PoseGraph::loosened() {
   unfreeze();
   LooseGraph loose;
@@ -38,31 +46,40 @@ LooseGraph PoseGraph::loosened() {
   return loose;
 }
 
+/// As a motion of its two nodes alone.
+FrozenMotion PoseGraph::loose_motion(MotionRef ref) const {
+  if (ref.is_biased) {
+    const plane::BiasedRelativePose& biased = smoother_.motion(plane::BiasedMotionId(ref.number));
+    FrozenMotion motion = frozen_motion(biased.motion);
+    motion.a_T_b = plane::at_true_rate(motion.a_T_b, smoother_.scalar(biased.bias), biased.seconds);
+    return motion;
+  }
+  FrozenMotion motion = frozen_motion(smoother_.motion(plane::MotionId(ref.number)));
+  const auto closure = closures_.find(ref.number);
+  if (closure != closures_.end()) motion.closure = closure->second;
+  return motion;
+}
+
+std::vector<FrozenMotion> PoseGraph::motions_of(NodeIndex node) const {
+  std::vector<FrozenMotion> motions;
+  motions.reserve(nodes_[node].motions.size());
+  for (const MotionRef ref : nodes_[node].motions) motions.push_back(loose_motion(ref));
+  return motions;
+}
+
 /// Each once; those that are frozen, too.
 std::vector<FrozenMotion> PoseGraph::loose_motions() const {
   std::vector<FrozenMotion> motions = frozen_motions_;
-  const auto add = [&](const plane::RelativePose& motion) -> FrozenMotion& {
-    return motions.emplace_back(FrozenMotion{index(motion.a), index(motion.b), motion.a_T_b,
-                                             motion.information, std::nullopt, 0});
-  };
   for (NodeIndex node = 0; node < nodes_.size(); ++node) {
-    for (const MotionRef ref : nodes_[node].motions) {
-      if (ends_of(ref).first != node) continue;
-      if (ref.is_biased) {
-        plane::BiasedRelativePose biased = smoother_.motion(plane::BiasedMotionId(ref.number));
-        biased.motion.a_T_b =
-            plane::at_true_rate(biased.motion.a_T_b, smoother_.scalar(biased.bias), biased.seconds);
-        add(biased.motion);
-        continue;
-      }
-      const auto closure = closures_.find(ref.number);
-      add(smoother_.motion(plane::MotionId(ref.number))).closure =
-          closure == closures_.end() ? 0 : closure->second;
-    }
+    for (const MotionRef ref : nodes_[node].motions)
+      if (ends_of(ref).first == node) motions.push_back(loose_motion(ref));
   }
 
-  for (AwayTieId tie = 0; tie < away_ties_.size(); ++tie)
-    if (away_ties_[tie]) add(smoother_.motion(*away_ties_[tie])).away_tie = tie;
+  for (AwayTieId tie = 0; tie < away_ties_.size(); ++tie) {
+    if (!away_ties_[tie]) continue;
+    motions.push_back(frozen_motion(smoother_.motion(*away_ties_[tie])));
+    motions.back().away_tie = tie;
+  }
   return motions;
 }
 

@@ -214,6 +214,9 @@ class PoseGraph {
   /// Makes them dormant landmarks of the graph again. Throws std::invalid_argument where an
   /// observation is of a node that is not condensed or has no information; nothing is changed then.
   void bring_back(std::span<const model::LandmarkId> ids, const AwayLandmarks& away);
+  /// How a node lies to others that are not frozen, closures among it, with the gyro's bias as it
+  /// is known now; without what landmarks tell.
+  std::vector<FrozenMotion> motions_of(NodeIndex node) const;
   /// Ids of a node's dormant landmarks.
   std::span<const model::LandmarkId> dormant_of(NodeIndex node) const;
   /// The node that observed a dormant landmark first. Throws std::out_of_range likewise.
@@ -363,6 +366,7 @@ class PoseGraph {
       const std::vector<FrozenPart>& parts) const;
   void set_frozen_factors();
   void recondense_frozen();
+  FrozenMotion loose_motion(MotionRef ref) const;
   std::vector<FrozenMotion> loose_motions() const;
   void absorb(const FrozenMotion& motion, NodeIndex first);
   factor_graph::plane::RelativePose tie(const TiedNodes& nodes,

@@ -6,13 +6,12 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "common/state/archive.hpp"
 #include "services/geoslam_mapper/smoothing/pass_joiner.hpp"
+#include "services/geoslam_mapper/smoothing/submap_content.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-constexpr state::Format kSubmapFormat{"geoslam_mapper.smoothing.submap", 2};
 /// The vehicle drives so far [m] from one look around to the next.
 constexpr double kBetweenLooks_m = 10.0;
 /// A submap's landmarks may lie so far [m] from its node, beside the sensor's range.
@@ -26,19 +25,6 @@ constexpr double kThawedBeyond_m = 150.0;
 constexpr std::size_t kFrozenTogether = 20;
 /// Most submaps that go at one look around, and that are wanted at a time.
 constexpr std::size_t kMostAtOnce = 4;
-
-/// What is needed to put a submap back; written into its payload.
-struct Content {
-  NodeIndex node = 0;
-  std::vector<StoredLandmark> landmarks;
-  std::vector<std::vector<DormantObservation>> observed;
-  AwayBases bases;
-
-  template <class Archive, class Self>
-  static void archive(Archive& a, Self& s) {
-    a(s.node, s.landmarks, s.observed, s.bases);
-  }
-};
 
 /// Information that all observers together have, in the frame of a node.
 Eigen::Matrix2d information_in(NodeIndex node, std::span<const DormantObservation> observed,
@@ -165,8 +151,9 @@ void Submaps::give_away(const Here& here, model::Utime utime, GlobalMap& map) {
   }
 
   // Out of the map.
-  Content content;
+  SubmapContent content;
   content.node = here.node;
+  content.motions = map.graph.motions_of(here.node);
   AwayLandmarks away = map.graph.put_away(ids);
   content.observed = std::move(away.observed);
   for (std::size_t i = 0; i < ids.size(); ++i) {
@@ -180,7 +167,7 @@ void Submaps::give_away(const Here& here, model::Utime utime, GlobalMap& map) {
         {base.sequence, base.utime, base.centre_T_base.mean, base.centre_T_base.covariance});
   }
 
-  submap.payload = state::save(kSubmapFormat, content);
+  submap.payload = submap_payload(content);
   submap.content_hash = model::fnv1a(submap.payload);
   away_.push_back({here.node, submap.id, submap.content_hash, std::move(away.ties)});
   std::erase_if(here_, [&](const Here& one) { return one.node == here.node; });
@@ -196,10 +183,10 @@ std::string Submaps::bring_back(const model::Submap& submap, GlobalMap& map) {
       model::fnv1a(submap.payload) != away->content_hash)
     return name + " is not as it was given away";
 
-  Content content;
+  SubmapContent content;
   std::vector<model::LandmarkId> ids;
   try {
-    state::load(submap.payload, kSubmapFormat, content);
+    content = submap_content(submap.payload);
     for (const StoredLandmark& landmark : content.landmarks) ids.push_back(landmark.id);
     if (content.node != away->node) return name + " is of another node";
     map.graph.checkpoint();
