@@ -101,8 +101,8 @@ TEST_CASE("a landmark is the stem of most of its detections, also when two becom
 TEST_CASE("stems that went leave use by drives through the processes, those that stand stay",
           "[existence]") {
   const std::vector<CensusStem> stems = small_plot();
-  const harness::MapFolder folder("test-census");
   for (const bool use_ranges : {false, true}) {
+    const harness::MapFolder folder("test-census");
     CensusOptions options = small_options();
     options.use_ranges = use_ranges;
     const CensusRun run = run_census(stems, options, 7, folder.path(), [](double) {});
