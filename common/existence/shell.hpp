@@ -43,8 +43,9 @@ concept Shell = requires(S shell, const S& constant, const Eigen::Vector3f& dire
 
 /// Odds of a visibility stay above this: no bound that matters (1e9 misses there move P by 1e-8).
 inline constexpr float kLeastVisibilityOdds = 1e-17F;
-/// A hit finds at least these odds: a line of sight may have opened since the last look. Misses do
-/// not use it: who waits behind an occluder would be told by each of them that it may have left.
-inline constexpr float kOpenedOdds = 1e-5F;
+/// A hit finds at least these odds: of a hundred lines of sight that were blocked one has opened by
+/// the next look, so that two hits from there are believed. Misses do not use it: who waits behind
+/// an occluder would be told by each of them that it may have left.
+inline constexpr float kOpenedOdds = 1e-2F;
 
 }  // namespace understory::existence

@@ -49,7 +49,7 @@ void export_as(const std::string& format, const SlamResults& results,
     write(out / "keyframes.tum", to_tum(keyframe_trajectory(map)));
     if (!results.truth.empty()) write(out / "truth.tum", to_tum(results.truth));
   } else if (format == "csv") {
-    write(out / "landmarks.csv", landmarks_csv(map));
+    write(out / "landmarks.csv", landmarks_csv(map, results.existence));
     write(out / "keyframes.csv", keyframes_csv(map));
   } else {
     write(out / "graph.g2o", to_g2o(results));

@@ -46,22 +46,22 @@ Json feature(const char* kind, Json coordinates, Json properties) {
           {"properties", std::move(properties)}};
 }
 
-/// Whether each landmark with a state of existence is in use.
-std::map<model::LandmarkId, bool> uses_of(const map_file::StoredMap& map) {
-  std::map<model::LandmarkId, bool> uses;
-  if (!map.existence) return uses;
+/// What the states of existence say, by landmark.
+ExistenceById existence_of(const map_file::StoredMap& map) {
+  ExistenceById existence;
+  if (!map.existence) return existence;
   for (const map_file::ExistenceRow& row : map.existence->landmarks)
-    uses[row.existence.id] = row.existence.is_in_use;
-  return uses;
+    existence[row.existence.id] = row.existence;
+  return existence;
 }
 
 Json landmark_features(const map_file::StoredMap& map) {
-  const std::map<model::LandmarkId, bool> uses = uses_of(map);
+  const ExistenceById existence = existence_of(map);
   Json features = Json::array();
   for (const map_file::StoredLandmark& one : map.landmarks) {
     const model::MapLandmark& landmark = one.landmark;
     const bool is_trunk = landmark.kind == model::LandmarkKind::kTrunk;
-    const auto use = uses.find(landmark.id);
+    const auto told = existence.find(landmark.id);
     features.push_back(
         feature("Point", place(landmark.position_m),
                 {{"landmark_id", landmark.id},
@@ -71,7 +71,7 @@ Json landmark_features(const map_file::StoredMap& map) {
                  {"kind", is_trunk ? "trunk" : "corner"},
                  {"times_seen", landmark.observation_count},
                  {"existence", or_null(one.existence)},
-                 {"in_use", use == uses.end() ? Json() : Json(use->second)}}));
+                 {"in_use", told == existence.end() ? Json() : Json(told->second.is_in_use)}}));
   }
   return features;
 }
@@ -126,7 +126,7 @@ void write_export(const fs::path& file, const std::string& text) {
 void export_map_as(const std::string& format, const map_file::StoredMap& map, const fs::path& out) {
   if (format == "csv") {
     const model::WholeMap whole = whole_map_of(map);
-    write_export(out / "landmarks.csv", landmarks_csv(whole));
+    write_export(out / "landmarks.csv", landmarks_csv(whole, existence_of(map)));
     write_export(out / "keyframes.csv", keyframes_csv(whole));
   } else {
     for (const auto& [layer, text] : map_geojson(map))

@@ -34,6 +34,10 @@ void append_edge(std::string& out, const model::Keyframe& keyframe, std::size_t 
                  information(0, 1), information(1, 1));
 }
 
+void keep(const std::vector<model::LandmarkExistence>& told, ExistenceById& existence) {
+  for (const model::LandmarkExistence& one : told) existence[one.id] = one;
+}
+
 }  // namespace
 
 void SlamResults::add(const io::LogEvent& event) {
@@ -61,6 +65,12 @@ void SlamResults::add(const io::LogEvent& event) {
     const bool fused = update && (update->status == model::MapUpdateStatus::kFirstMap ||
                                   update->status == model::MapUpdateStatus::kUpdated);
     if (fused) updates.push_back(*update);
+  } else if (event.channel == "EXISTENCE") {
+    const auto told = wire::decode_message<model::Existence>(event.data);
+    if (told) keep(told->landmarks, existence);
+  } else if (event.channel == "EXISTENCE_STATE") {
+    const auto state = wire::decode_message<model::ExistenceState>(event.data);
+    if (state) keep(state->landmarks, existence);
   } else if (event.channel == "GROUND_TRUTH") {
     const auto one = wire::decode_message<ground_truth_t>(event.data);
     if (one) truth.emplace_back(one->utime, wire::from_wire(one->world_T_vehicle));
@@ -90,13 +100,21 @@ std::vector<std::pair<model::Utime, geometry::SE2>> keyframe_trajectory(
   return trajectory;
 }
 
-std::string landmarks_csv(const model::WholeMap& map) {
-  std::string out = "id,x_m,y_m,cov_xx_m2,cov_xy_m2,cov_yy_m2,radius_m,times_seen\n";
+std::string landmarks_csv(const model::WholeMap& map, const ExistenceById& existence) {
+  std::string out =
+      "id,x_m,y_m,cov_xx_m2,cov_xy_m2,cov_yy_m2,radius_m,times_seen,existence,in_use\n";
   for (const auto& one : map.landmarks) {
-    fmt::format_to(std::back_inserter(out), "{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{}\n",
+    fmt::format_to(std::back_inserter(out), "{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{},",
                    one.id, one.position_m.x(), one.position_m.y(), one.covariance_m2(0, 0),
                    one.covariance_m2(0, 1), one.covariance_m2(1, 1), one.radius_m,
                    one.observation_count);
+    const auto told = existence.find(one.id);
+    if (told == existence.end()) {
+      out += ",\n";
+    } else {
+      fmt::format_to(std::back_inserter(out), "{:.6g},{}\n", told->second.probability,
+                     told->second.is_in_use ? 1 : 0);
+    }
   }
   return out;
 }

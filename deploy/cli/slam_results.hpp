@@ -6,11 +6,15 @@
 #include <vector>
 
 #include "common/io/lcm_log.hpp"
+#include "common/model/existence.hpp"
 #include "common/model/held_map.hpp"
 #include "common/model/keyframe.hpp"
 #include "common/model/slam_output.hpp"
 
 namespace understory::cli {
+
+/// What was said of landmarks' existence, by id.
+using ExistenceById = std::map<model::LandmarkId, model::LandmarkExistence>;
 
 /// The output of the last mapper run in a log.
 struct SlamResults {
@@ -20,6 +24,7 @@ struct SlamResults {
       truth;                                           ///< world_T_vehicle, where the log has it.
   std::map<std::uint64_t, model::Keyframe> keyframes;  ///< By number.
   std::vector<model::MapUpdate> updates;               ///< Those that were fused.
+  ExistenceById existence;                             ///< As told last.
 
   /// Takes one event; channels that do not matter are passed over.
   void add(const io::LogEvent& event);
@@ -32,8 +37,9 @@ std::vector<std::pair<model::Utime, geometry::SE2>> live_trajectory(const SlamRe
 /// map_T_base of the map's keyframes, by stamp.
 std::vector<std::pair<model::Utime, geometry::SE2>> keyframe_trajectory(const model::WholeMap& map);
 
-/// One landmark a line, with a heading: id, position, covariance, radius, kind.
-std::string landmarks_csv(const model::WholeMap& map);
+/// One landmark a line, with a heading: id, position, covariance, radius, times seen, probability
+/// that it exists and whether it is in use (1 or 0); the last two are empty where nothing was said.
+std::string landmarks_csv(const model::WholeMap& map, const ExistenceById& existence);
 /// One keyframe a line, with a heading: number, stamp, pose, covariance.
 std::string keyframes_csv(const model::WholeMap& map);
 

@@ -2,6 +2,7 @@
 
 #include "eval/experiments/changing_forest/changing_forest.hpp"
 #include "eval/experiments/existence/camera/existence_camera.hpp"
+#include "eval/experiments/existence/census/existence_census.hpp"
 #include "eval/experiments/existence/existence.hpp"
 #include "eval/experiments/experiments.hpp"
 #include "eval/experiments/health/health.hpp"
@@ -44,6 +45,7 @@ void add_eval_command(CLI::App& parent) {
   existence::add_existence_experiment(eval);
   changing_forest::add_changing_forest_experiment(eval);
   existence::camera::add_existence_camera_experiment(eval);
+  existence::census::add_existence_census_experiment(eval);
   partition::add_partition_experiments(eval);
   partition::add_long_drive_experiments(eval);
 }

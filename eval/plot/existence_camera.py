@@ -61,7 +61,8 @@ def main():
     file = pathlib.Path(sys.argv[1])
     rows = json.loads(file.read_text())["rows"]
     traces = json.loads(pathlib.Path(sys.argv[2]).read_text())
-    draw_success(file, [row for row in rows if row["part"] == "culling" and not row["occluders_alone"]])
+    # Ablations have no frames.
+    draw_success(file, [row for row in rows if row["part"] == "culling" and not row["occluders_alone"] and "frames" in row])
     draw_needed(file, traces["mapping_needed"])
 
 

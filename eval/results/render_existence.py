@@ -85,6 +85,62 @@ def existence(document):
     return lines
 
 
+def existence_census(document):
+    """The processes beside the library and the true rates, drive by drive; then the same forest without a change."""
+    rows = [row for row in document["rows"] if row["drives"] in (1, 2, 3, 5)]
+    lines = []
+    for part, columns in (("change", _census_change), ("control", _census_control)):
+        groups = {}
+        for row in rows:
+            if row["part"] == part:
+                groups.setdefault((row["missed_pct"], row["has_ranges"], row["drives"]), {}).setdefault(row["method"], []).append(row)
+        if groups:
+            lines += ["", *table(*columns(groups))] if lines else table(*columns(groups))
+    return lines
+
+
+def _of_runs(methods, method, key, digits):
+    """Mean over the runs of a setting."""
+    some = [row[key] for row in methods[method]]
+    return number(sum(some) / len(some), digits)
+
+
+_CENSUS_METHODS = ("existence tracker", "icosahedral", "true rates")
+
+
+def _census_change(groups):
+    head = ("missed per drive %", "VIEW_RANGES", "drives", "stems of the map", "gone",
+            *(f"AUC: {method}" for method in _CENSUS_METHODS),
+            *(f"found at 1 % wrongly removed: {method}" for method in _CENSUS_METHODS), "Brier: existence tracker", "Brier: true rates",
+            "gone and out of use", "standing and out of use", "landmarks in use where nothing stands", "doubles in use", "placed", "ATE m")
+
+    def line(key, methods):
+        missed, ranges, drives = key
+        total = lambda name: sum(row[name] for row in methods["existence tracker"])
+        return (number(missed, 0), "yes" if ranges else "no", drives, total("points"), total("gone"),
+                *(_of_runs(methods, method, "auc", 4) for method in _CENSUS_METHODS),
+                *(_of_runs(methods, method, "found_at_1_pct", 1) for method in _CENSUS_METHODS),
+                _of_runs(methods, "existence tracker", "brier", 4), _of_runs(methods, "true rates", "brier", 4),
+                f'{total("gone_unused")} of {total("gone")}', f'{total("there_unused")} of {total("there")}', total("ghosts_in_use"),
+                total("doubles_in_use"), f'{total("placed")} of {total("updates")}', _of_runs(methods, "existence tracker", "ate_m", 2))
+
+    return head, [line(key, methods) for key, methods in groups.items()]
+
+
+def _census_control(groups):
+    head = ("without change: missed per drive %", "VIEW_RANGES", "drives", "stems of the map", "out of use", "out of use %",
+            "P below 0.2 %: existence tracker", "P below 0.2 %: icosahedral")
+
+    def line(key, methods):
+        missed, ranges, drives = key
+        total = lambda name: sum(row[name] for row in methods["existence tracker"])
+        return (number(missed, 0), "yes" if ranges else "no", drives, total("there"), total("there_unused"),
+                number(100 * total("there_unused") / max(1, total("there"))),
+                *(_of_runs(methods, method, "wrongly_removed_pct", 2) for method in ("existence tracker", "icosahedral")))
+
+    return head, [line(key, methods) for key, methods in groups.items()]
+
+
 def existence_camera(document):
     """A camera in culled maps: the references and our methods in short, all rows folded; signals that mapping is needed."""
     rows = [row for row in document["rows"] if row["part"] == "culling"]
@@ -97,8 +153,9 @@ def existence_camera(document):
                           number(row["map_points"], 0))
     head = ("world", "changed %", "method", "frames", "relocalised % (95 %)", "gained / given up", "wrong accepted", "RANSAC samples",
             "pose cm", "ATE cm", "lost %", "points left")
-    short = [row for row in rows if row["method"] in ("no removal", "icosahedral", "ideal")]
-    lines = [*table(head, [camera(row) for row in short]), "", *folded("all methods", table(head, [camera(row) for row in rows]))]
+    looked_for = [row for row in rows if "frames" in row]  # Of ablations only the points are scored.
+    short = [row for row in looked_for if row["method"] in ("no removal", "icosahedral", "ideal")]
+    lines = [*table(head, [camera(row) for row in short]), "", *folded("all methods", table(head, [camera(row) for row in looked_for]))]
     points = lambda row: (row["world"], change(row), row["method"], row["scored_points"], number(row["gone_of_scored_pct"], 1),
                           number(row["gone_removed_pct"], 1), number(row["wrongly_removed_pct"]), number(row["auc"], 4),
                           number(row["brier"], 4), row["hidden_points"], number(row["hidden_removed_pct"], 1), row["all_points"],

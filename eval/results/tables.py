@@ -65,6 +65,7 @@ SECTIONS = (
      render.loop_detectors),
     ("existence", "What is still there", None, render_existence.existence),
     ("existence-drives", "A forest that changes, from raw LIDAR", None, render_existence.existence_drives),
+    ("existence-census", "Big Woods at both censuses, through the processes", None, render_existence.existence_census),
     ("existence-camera", "A camera that comes back to an old map", None, render_existence.existence_camera),
     ("partition", "The map cut after a distance: town", f"{PARTITION}, Table 5.1", render.partition_all),
     ("partition-country", "The map cut after a distance: town to country", f"{PARTITION}, Table 5.2", render.partition_all),

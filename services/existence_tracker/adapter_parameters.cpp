@@ -45,8 +45,12 @@ void describe(UseParameters& p, bus::ParameterTable& table) {
 }
 
 void describe(LookParameters& p, bus::ParameterTable& table) {
+  table.add(
+      "looks.pass_s", p.pass_s, {0.0, 1e9}, "s",
+      "A drive's pass of a landmark lasts so long at least: what makes a detector miss it, or "
+      "see it, is the same from lane to lane.");
   table.add("looks.pass_m", p.pass_m, {1.0, 1e6}, "m",
-            "Path after which another pass begins: what hid a landmark then may be gone.");
+            "Path after which another pass may begin then: what hid a landmark may be gone.");
   table.add(
       "looks.same_pass_m", p.same_pass_m, {0.0, 1e6}, "m",
       "What was looked at within so much path is still in the same pass, up to pass_m of it.");

@@ -82,6 +82,7 @@ void ExistenceTracker::begin_drive(model::Utime utime) {
   model_.begin_pass();
   for (auto& [id, tracked] : points_) {
     tracked.looked_m = tracked.pass_began_m = -1e9;
+    tracked.pass_began_utime = kNever;
     tracked.is_first_pass = tracked.has_just_left = false;
     pass_time(utime, tracked);
     tracked.point.enter_pass(model_);
@@ -163,7 +164,7 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
   TrackedPoint& tracked = known(id, update.utime);
   const bool is_old = tracked.told_probability >= 0.0 && tracked.is_in_use;
   pass_time(update.utime, tracked);
-  look->goes_on = goes_on(tracked);
+  look->goes_on = goes_on(tracked, update.utime);
   if (!look->goes_on) tracked.is_first_pass = tracked.has_just_left = false;
   if (is_hit) {
     confirm(tracked);
@@ -185,14 +186,19 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
 }
 
 /// Whether the landmark's pass goes on: one in view where the vehicle's pass ends is not looked at
-/// in two of them.
-bool ExistenceTracker::goes_on(TrackedPoint& tracked) const {
+/// in two of them, nor is one that a drive comes back to: lanes side by side see it or miss it for
+/// one reason, and say nothing of how often another drive does.
+bool ExistenceTracker::goes_on(TrackedPoint& tracked, model::Utime utime) const {
   const LookParameters& looks = parameters_.looks;
-  const bool result = along_m_ - tracked.looked_m < looks.same_pass_m &&
-                      along_m_ - tracked.pass_began_m < looks.pass_m;
-  if (!result) tracked.pass_began_m = along_m_;
+  const bool is_in_view = along_m_ - tracked.looked_m < looks.same_pass_m &&
+                          along_m_ - tracked.pass_began_m < looks.pass_m;
+  const double since_s =
+      1e-6 * (static_cast<double>(utime) - static_cast<double>(tracked.pass_began_utime));
   tracked.looked_m = along_m_;
-  return result;
+  if (is_in_view || since_s < looks.pass_s) return true;
+  tracked.pass_began_m = along_m_;
+  tracked.pass_began_utime = utime;
+  return false;
 }
 
 /// The landmark's point; of a given map it is new here.
@@ -235,6 +241,7 @@ void ExistenceTracker::give_birth() {
     born.is_first_pass = true;
     born.is_confirmed = false;
     born.looked_m = born.pass_began_m = along_m_;
+    born.pass_began_utime = birth.utime;
     const auto [found, is_new] = points_.try_emplace(birth.id, born);
     if (is_new) decide(found->second);
     touched_.push_back(birth.id);

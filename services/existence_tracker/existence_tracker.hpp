@@ -89,7 +89,7 @@ class ExistenceTracker {
   void pass_time(model::Utime utime, TrackedPoint& tracked) const;
   void drive_to(const model::MapUpdate& update);
   void look(model::LandmarkId id, bool is_hit, existence::Ray ray, const model::MapUpdate& update);
-  bool goes_on(TrackedPoint& tracked) const;
+  bool goes_on(TrackedPoint& tracked, model::Utime utime) const;
   TrackedPoint& known(model::LandmarkId id, model::Utime utime);
   void give_birth();
   void forget(const model::MapUpdate& update);

@@ -25,6 +25,7 @@ struct UseParameters {
 
 /// What is one pass, and which looks count.
 struct LookParameters {
+  double pass_s = 14400.0;
   double pass_m = 500.0;      ///< Path.
   double same_pass_m = 50.0;  ///< Path.
   int min_inliers = 3;

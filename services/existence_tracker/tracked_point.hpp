@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 
@@ -14,20 +16,24 @@ namespace understory::existence_tracker {
 /// The model's point with the shell that the tracker uses.
 using Point = existence::PointExistence<existence::IcosahedralShell>;
 
+/// Before any time that a drive has [us].
+inline constexpr model::Utime kNever = std::numeric_limits<model::Utime>::min() / 2;
+
 /// A landmark of the map.
 struct TrackedPoint {
   Point point;
   model::Utime looked_utime = 0;  ///< Of the keyframe that last looked at it.
   bool is_in_use = true;
-  double told_probability = -1.0;  ///< As it was last told; -1: never.
-  bool was_told_in_use = true;     ///< Likewise.
-  bool state_is_due = true;        ///< It changed since its state was told.
-  bool is_first_pass = false;      ///< Nobody but the pass that found it has looked.
-  bool is_confirmed = true;        ///< Another pass than the one that found it saw it.
-  double looked_m = -1e9;          ///< Path of the drive at the last look.
-  double pass_began_m = -1e9;      ///< Likewise at the first look of its pass.
-  bool is_counted = false;         ///< Among the births that were false.
-  bool has_just_left = false;      ///< It left use in the pass that is open.
+  double told_probability = -1.0;          ///< As it was last told; -1: never.
+  bool was_told_in_use = true;             ///< Likewise.
+  bool state_is_due = true;                ///< It changed since its state was told.
+  bool is_first_pass = false;              ///< Nobody but the pass that found it has looked.
+  bool is_confirmed = true;                ///< Another pass than the one that found it saw it.
+  double looked_m = -1e9;                  ///< Path of the drive at the last look.
+  double pass_began_m = -1e9;              ///< Likewise at the first look of its pass.
+  model::Utime pass_began_utime = kNever;  ///< Of that look.
+  bool is_counted = false;                 ///< Among the births that were false.
+  bool has_just_left = false;              ///< It left use in the pass that is open.
 };
 
 /// How many of the landmarks that were new turned out to be there when another pass came.

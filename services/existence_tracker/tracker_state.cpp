@@ -9,7 +9,7 @@
 namespace understory::existence_tracker {
 namespace {
 
-constexpr state::Format kFormat{"existence_tracker", 2};
+constexpr state::Format kFormat{"existence_tracker", 3};
 
 }  // namespace
 
@@ -20,6 +20,7 @@ std::string ExistenceTracker::save() const {
   std::vector<double> told;
   std::vector<double> looked_m;
   std::vector<double> began_m;
+  std::vector<model::Utime> began;
   std::string points;
   for (const auto& [id, tracked] : points_) {
     ids.push_back(id);
@@ -30,10 +31,11 @@ std::string ExistenceTracker::save() const {
     told.push_back(tracked.told_probability);
     looked_m.push_back(tracked.looked_m);
     began_m.push_back(tracked.pass_began_m);
+    began.push_back(tracked.pass_began_utime);
     points += encode(tracked);
   }
-  return state::save(kFormat, learned, ids, flags, told, looked_m, began_m, points, places_, need_,
-                     births_, counters_, last_m_, utime_, map_id_, along_m_, pass_began_m_,
+  return state::save(kFormat, learned, ids, flags, told, looked_m, began_m, began, points, places_,
+                     need_, births_, counters_, last_m_, utime_, map_id_, along_m_, pass_began_m_,
                      repeated_, wants_map_, begins_drive_);
 }
 
@@ -45,13 +47,15 @@ void ExistenceTracker::load(const std::string& state) {
   std::vector<double> told;
   std::vector<double> looked_m;
   std::vector<double> began_m;
+  std::vector<model::Utime> began;
   std::string points;
-  state::load(state, kFormat, learned, ids, flags, told, looked_m, began_m, points, loaded.places_,
-              loaded.need_, loaded.births_, loaded.counters_, loaded.last_m_, loaded.utime_,
-              loaded.map_id_, loaded.along_m_, loaded.pass_began_m_, loaded.repeated_,
-              loaded.wants_map_, loaded.begins_drive_);
+  state::load(state, kFormat, learned, ids, flags, told, looked_m, began_m, began, points,
+              loaded.places_, loaded.need_, loaded.births_, loaded.counters_, loaded.last_m_,
+              loaded.utime_, loaded.map_id_, loaded.along_m_, loaded.pass_began_m_,
+              loaded.repeated_, loaded.wants_map_, loaded.begins_drive_);
   if (flags.size() != ids.size() || told.size() != ids.size() || looked_m.size() != ids.size() ||
-      began_m.size() != ids.size() || points.size() != ids.size() * point_bytes())
+      began_m.size() != ids.size() || began.size() != ids.size() ||
+      points.size() != ids.size() * point_bytes())
     throw std::invalid_argument("existence tracker state: its points do not fit their numbers");
 
   decode(learned, loaded.model_, loaded.births_so_far_);
@@ -67,6 +71,7 @@ void ExistenceTracker::load(const std::string& state) {
     tracked.told_probability = told[i];
     tracked.looked_m = looked_m[i];
     tracked.pass_began_m = began_m[i];
+    tracked.pass_began_utime = began[i];
     loaded.unused_ += tracked.is_in_use ? 0 : 1;
     loaded.points_.emplace(ids[i], tracked);
   }

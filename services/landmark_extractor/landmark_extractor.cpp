@@ -9,7 +9,7 @@
 #include "services/landmark_extractor/planar/segments.hpp"
 #include "services/landmark_extractor/planar/trunk_fit.hpp"
 #include "services/landmark_extractor/square.hpp"
-#include "services/landmark_extractor/view/view_profile.hpp"
+#include "services/landmark_extractor/view/planar_view.hpp"
 
 namespace understory::landmark_extractor {
 namespace {
@@ -127,7 +127,6 @@ model::LandmarkScan LandmarkExtractor::extract(const model::PlanarScan& scan) {
     ++counters_.scans_malformed;
     return result;
   }
-  view_ = view::planar_view(scan, parameters_.planar.max_range_m + kBeyond_m);
   find(planar::beams_of(scan), {}, result);
   return result;
 }
@@ -159,6 +158,9 @@ model::LandmarkScan LandmarkExtractor::extract(const model::PointSweep& sweep) {
 void LandmarkExtractor::find(const planar::Beams& scan, const PlaneLevel& level,
                              model::LandmarkScan& result) {
   ++counters_.scans;
+  view_ = view::planar_view(scan, parameters_.planar.max_range_m + kBeyond_m);
+  view_.utime = result.utime;
+  view_.sequence = result.sequence;
   result.field_of_view = field_of_view(scan, parameters_.planar);
   const std::vector<planar::Segment> segments = planar::split(scan, parameters_.planar);
   counters_.objects += segments.size();

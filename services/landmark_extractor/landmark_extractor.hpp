@@ -39,8 +39,8 @@ class LandmarkExtractor {
   /// The same of a laser that scans in space, see SweepExtractor, or of a de-skewed scan in one
   /// plane (one ring), in `vehicle_level`.
   model::LandmarkScan extract(const model::PointSweep& sweep);
-  /// How far one can see at the height of trunks: of the last sweep or scan that was extracted; no
-  /// bins where that was malformed, or a de-skewed scan in one plane.
+  /// How far one can see at the height of trunks (of one plane: in it): of the last sweep or scan
+  /// that was extracted; no bins where that was malformed.
   const model::ViewRanges& view() const { return view_; }
   /// Of planar scans.
   const ExtractorCounters& counters() const { return counters_; }

@@ -73,8 +73,9 @@ model::LandmarkScan SweepExtractor::extract(const model::PointSweep& sweep) {
 
   // Objects above it, ring by ring.
   cloud_.fill(sweep, ground_, counters_.points);
+  profile_.begin(levelling, ground_, sweep_);
   find_runs_of_all_rings();
-  view_ = profile_.measure(sweep, cloud_, levelling, ground_, sweep_, range_m);
+  view_ = profile_.finish(sweep, cloud_, levelling, ground_);
 
   // Landmarks.
   trunks_.find(cloud_, runs_, ground_, level_covariance, result.detections);
@@ -93,6 +94,7 @@ void SweepExtractor::find_runs_of_all_rings() {
   for (std::size_t ring = 0; ring < cloud_.rings(); ++ring) {
     cloud_.order(ring, lowest);
     find_runs(cloud_, sweep_, ring, runs_);
+    profile_.take_ring(cloud_, ring);
   }
 }
 

@@ -202,6 +202,11 @@ TEST_CASE_METHOD(Maps, "diff tells what left use and what came back between two 
   CHECK(changes[2]["probability_before"] == 0.59);
   CHECK_FALSE(Contains("existence").match(fine("diff " + file + " " + file).out));
 
+  const auto out = directory / "out";
+  fine("export " + file + " --out " + out.string());
+  CHECK_THAT(read_text(out / "map-1" / "landmarks.csv"),
+             Contains(",0.02,0\n") && Contains(",0.95,1\n"));
+
   // The same of a revision of the file itself.
   fine("revert --to 1 " + earlier);
   CHECK_THAT(fine("diff " + earlier + " " + file).out, Contains("unknown -> 0.020"));
@@ -213,7 +218,7 @@ TEST_CASE_METHOD(Maps, "export writes what other tools read", "[cli]") {
   const auto out = directory / "out";
   fine("export " + file + " --out " + out.string());
   CHECK_THAT(read_text(out / "map-1" / "landmarks.csv"),
-             Contains("id,x_m,y_m") && Contains("281474976710658,5,6,"));
+             Contains("id,x_m,y_m") && Contains("281474976710658,5,6,") && Contains(",,\n"));
   CHECK_THAT(read_text(out / "map-1" / "keyframes.csv"), Contains("keyframe,utime_us"));
   const auto layer = nlohmann::json::parse(read_text(out / "map-1" / "landmarks.geojson"));
   CHECK(layer["type"] == "FeatureCollection");

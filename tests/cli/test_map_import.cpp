@@ -4,6 +4,7 @@
 #include "common/map_file/map_file.hpp"
 #include "common/wire/convert.hpp"
 #include "deploy/cli/log_maps.hpp"
+#include "deploy/cli/slam_results.hpp"
 #include "tests/catch.hpp"
 #include "tests/cli/run_command.hpp"
 
@@ -139,6 +140,25 @@ TEST_CASE("states of existence are those of a map's landmarks; empty ones are pa
   CHECK(maps.at(2).existence->landmarks[0].state == "late");
   CHECK(maps.at(2).existence->landmarks[1].state == "second");
   CHECK(maps.at(2).existence->learned == "model second");
+}
+
+TEST_CASE("landmarks of a log come with what was told of their existence last", "[cli]") {
+  MapperLog log;
+  log.update(1, true, false);
+  log.delta(true, {landmark(1, 1, 0.0), landmark(1, 2, 5.0), landmark(1, 3, 9.0)});
+  model::Existence told;
+  told.landmarks = {{map_file::landmark_id(1, 1), 0.875, true},
+                    {map_file::landmark_id(1, 2), 0.75, true}};
+  log.add("EXISTENCE", told);
+  log.existence(1, {2}, "state");
+
+  cli::SlamResults results;
+  for (const io::LogEvent& event : log.events) results.add(event);
+  const std::string csv = cli::landmarks_csv(results.map.whole().value(), results.existence);
+  CHECK_THAT(csv, Contains("times_seen,existence,in_use\n"));
+  CHECK_THAT(csv, Contains("281474976710657,0,0,0.01,0,0.01,0,0,0.875,1\n"));
+  CHECK_THAT(csv, Contains("281474976710658,5,0,0.01,0,0.01,0,0,0.25,0\n"));
+  CHECK_THAT(csv, Contains("281474976710659,9,0,0.01,0,0.01,0,0,,\n"));
 }
 
 TEST_CASE("states of existence of a log's maps, those of a mapper that began anew", "[cli]") {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <string_view>
 #include <vector>
 
 #include "common/existence/von_mises_fisher_shell.hpp"
@@ -56,6 +57,31 @@ TEST_CASE("What is hidden on pass after pass stays, though its edges are unknown
   CHECK(hidden.probability() > 0.98);
   // The same unknown looks without a return in front.
   CHECK(in_the_open.probability() < 1e-3);
+}
+
+TEST_CASE("A point that comes out from behind something is there after two hits more",
+          "[existence]") {
+  // Seen, hidden and unknown by turns, nearly from one side.
+  const auto after = [](std::string_view looks) {
+    ExistenceModel model(sharp_detector());
+    auto point = IcosahedralPoint::known(model);
+    model.begin_pass();
+    point.enter_pass(model);
+    point.multiply_odds(odds_of(0.6) / odds_of(point.probability()));
+    for (const char one : looks) {
+      if (one == 'h')
+        point.hit(model, look(3, Ray::kUnknown));
+      else
+        point.miss(model, look(3, one == 'B' ? Ray::kBlocked : Ray::kUnknown));
+    }
+    return point.probability();
+  };
+  CHECK(after("uuuuBBBBu") < 0.5);
+  CHECK(after("uuuuBBBBuhh") > 0.5);
+  CHECK(after("uuuuBBBBuhhuh") > 0.9);
+  // What is gone does not come back by a detection that is false, nor by two.
+  CHECK(after("uuuuuuhuuuuuu") < 0.15);
+  CHECK(after("uuuuuuhuuuhuuu") < 0.35);
 }
 
 TEST_CASE("What is gone is found where single things stood in front, as if there were none",

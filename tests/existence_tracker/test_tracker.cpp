@@ -1,4 +1,6 @@
 // The tracker alone: what goes, what stays, what comes back.
+#include <memory>
+
 #include "common/wire/convert.hpp"
 #include "services/existence_tracker/existence_tracker.hpp"
 #include "tests/catch.hpp"
@@ -115,6 +117,44 @@ TEST_CASE("Without a change next to nothing is removed", "[existence]") {
   }
   CAPTURE(unused, all);
   CHECK(unused <= 0.01 * static_cast<double>(all));
+}
+
+TEST_CASE("Lanes of one drive see a landmark or miss it for one reason", "[existence]") {
+  constexpr model::Utime kLane_us = 600'000'000;
+  const auto unused_after_lanes = [](double pass_s, int lanes_before, int lanes_after) {
+    TrackerParameters parameters = for_road();
+    parameters.looks.pass_m = 100.0;
+    parameters.looks.pass_s = pass_s;
+    std::size_t unused = 0;
+    for (const std::uint64_t seed : {21, 22, 23}) {
+      Road road(seed);
+      auto tracker = std::make_unique<ExistenceTracker>(parameters);
+      tracker->take(road.map());
+      const auto lane = [&](model::Utime utime, const std::set<model::LandmarkId>& missed) {
+        drive(road.drive(utime, [&](model::LandmarkId id) { return !missed.contains(id); }),
+              *tracker);
+        const std::string saved = tracker->save();  // It is killed and goes on.
+        tracker = std::make_unique<ExistenceTracker>(parameters);
+        tracker->load(saved);
+      };
+      for (int k = 0; k < lanes_before; ++k) lane(k * kLane_us, {});
+      const auto states = tracker->take_states();
+      tracker = std::make_unique<ExistenceTracker>(parameters);
+      tracker->begin_with(states);
+      tracker->take(road.map());
+
+      const auto missed = road.draw(0.36);
+      for (int k = 0; k < lanes_after; ++k) lane(30 * kDay_us + k * kLane_us, missed);
+      unused += unused_of(missed, *tracker);
+    }
+    return unused;
+  };
+  // Five lanes that see all of them do not show that another drive misses none.
+  CHECK(unused_after_lanes(14'400.0, 5, 1) == 0);
+  CHECK(unused_after_lanes(0.0, 5, 1) > 50);
+  // Five lanes that miss a third of them have missed it once.
+  CHECK(unused_after_lanes(14'400.0, 1, 5) == 0);
+  CHECK(unused_after_lanes(0.0, 1, 5) > 50);
 }
 
 TEST_CASE("A mapping-needed signal where half of the map is another one", "[existence]") {

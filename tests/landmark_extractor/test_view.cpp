@@ -1,7 +1,10 @@
 // How far a sweep saw: what is hidden, what is in clear view, and never a standing tree for gone.
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <numbers>
 #include <random>
+#include <vector>
 
 #include "common/bus/memory_bus.hpp"
 #include "services/landmark_extractor/adapter.hpp"
@@ -50,6 +53,39 @@ struct Counts {
   int hidden = 0, hidden_blocked = 0;
   int felled = 0, felled_clear = 0;
 };
+
+/// A de-skewed scan in one plane, in half a turn from the vehicle's right to its left or back while
+/// it drives; sensor and vehicle are one.
+model::PointSweep ring_while_driving(const std::vector<test::Circle>& trunks,
+                                     const std::vector<test::Wall>& walls, bool is_leftward,
+                                     const Eigen::Vector2d& velocity_mps, std::mt19937_64& random) {
+  constexpr double kBeamTime_s = 1.4e-4;
+  constexpr int kBeams = 361;
+  std::normal_distribution<double> noise(0.0, 0.01);
+  model::PointSweep ring;
+  ring.rings = 1;
+  ring.max_range_m = 80.0;
+  ring.is_deskewed = true;
+  for (int k = 0; k < kBeams; ++k) {
+    const double time_s = kBeamTime_s * (k + 1 - kBeams);
+    const Eigen::Vector2d from = time_s * velocity_mps;
+    const double bearing = (is_leftward ? 1.0 : -1.0) * (k - 180) * std::numbers::pi / 360.0;
+    const Eigen::Vector2d direction(std::cos(bearing), std::sin(bearing));
+    double range_m = 100.0;
+    for (const test::Circle& trunk : trunks)
+      range_m = std::min(range_m, test::hit({trunk.centre - from, trunk.radius}, direction));
+    for (const test::Wall& wall : walls)
+      range_m = std::min(range_m, test::hit({wall.from - from, wall.to - from}, direction));
+    if (range_m >= ring.max_range_m) continue;
+    const Eigen::Vector2d at = from + (range_m + noise(random)) * direction;
+    model::SweepPoint point;
+    point.x_m = static_cast<float>(at.x());
+    point.y_m = static_cast<float>(at.y());
+    point.time_s = static_cast<float>(time_s);
+    ring.points.push_back(point);
+  }
+  return ring;
+}
 
 void look_at_wood(int rings, std::uint64_t seed, Counts& counts) {
   std::mt19937_64 random(seed);
@@ -138,6 +174,56 @@ TEST_CASE("a laser that scans one plane says how far it saw; what is malformed s
   extractor.extract(model::PointSweep{});
   CHECK(extractor.view().free.empty());
   CHECK(at(10.0, -0.2) == model::LineOfSight::kUnknown);
+}
+
+TEST_CASE("a laser whose beams come one after another says how far it saw while it drives",
+          "[extractor]") {
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> across(-12.0, 12.0);
+  // A wall of stacked timber at one side, a front ahead; what is farther to the left gives nothing.
+  const std::vector<test::Wall> walls{{{6.0, -9.0}, {11.0, -3.0}}, {{25.0, -30.0}, {25.0, 6.0}}};
+  int gone = 0, clear = 0, behind = 0, blocked = 0;
+  for (int run = 0; run < 80; ++run) {
+    const bool is_leftward = run % 2 == 0;
+    // Half a metre to a metre during the scan: more than a trunk is wide.
+    const Eigen::Vector2d velocity_mps(10.0 + 0.125 * run, run % 4 < 2 ? 2.0 : -2.0);
+    std::vector<test::Circle> trunks;
+    while (trunks.size() < 10) {
+      const Eigen::Vector2d at(9.0 + 0.5 * across(random), across(random));
+      if (at.norm() > 3.0) trunks.push_back({at, 0.15});
+    }
+    const std::vector<test::Circle> left(trunks.begin() + 5, trunks.end());
+    LandmarkExtractor extractor;
+    extractor.extract(ring_while_driving(left, walls, is_leftward, velocity_mps, random));
+    const model::ViewRanges& view = extractor.view();
+    REQUIRE(view.free.size() > 100);
+    REQUIRE(std::abs(view.step_rad) * static_cast<double>(view.free.size()) < 3.2);
+
+    for (std::size_t i = 0; i < trunks.size(); ++i) {
+      const model::LineOfSight sight = line_of_sight(view, trunks[i].centre, 0.15);
+      CAPTURE(run, i, trunks[i].centre.transpose());
+      if (i >= 5) CHECK(sight != model::LineOfSight::kClear);
+      const double bearing = std::atan2(trunks[i].centre.y(), trunks[i].centre.x());
+      const bool has_front_behind = bearing > -0.22 && bearing < 0.2;
+      const bool is_alone = std::ranges::none_of(left, [&](const test::Circle& other) {
+        return std::abs(std::remainder(std::atan2(other.centre.y(), other.centre.x()) - bearing,
+                                       2.0 * std::numbers::pi)) < 0.12;
+      });
+      gone += i < 5 && has_front_behind && is_alone ? 1 : 0;
+      clear += i < 5 && has_front_behind && is_alone && sight == model::LineOfSight::kClear ? 1 : 0;
+    }
+    for (const double further : {1.5, 4.0}) {
+      const Eigen::Vector2d at = (1.0 + further / 10.5) * Eigen::Vector2d(8.5, -6.0);
+      ++behind;
+      blocked += line_of_sight(view, at, 0.15) == model::LineOfSight::kBlocked ? 1 : 0;
+    }
+    // Where no beam came back nothing is known, nor behind the vehicle.
+    CHECK(line_of_sight(view, {-8.0, 1.0}, 0.15) == model::LineOfSight::kUnknown);
+  }
+  CAPTURE(gone, clear, behind, blocked);
+  CHECK(gone >= 15);
+  CHECK(clear >= 0.9 * gone);
+  CHECK(blocked >= 0.95 * behind);
 }
 
 TEST_CASE("ranges go out before the landmarks of the same sweep", "[extractor]") {

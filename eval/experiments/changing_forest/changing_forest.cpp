@@ -9,8 +9,7 @@
 
 #include "common/bus/config_layers.hpp"
 #include "common/bus/launch_config.hpp"
-#include "common/map_file/map_file.hpp"
-#include "common/map_file/stored_existence.hpp"
+#include "eval/harness/drive_map.hpp"
 
 namespace understory::eval::experiments::changing_forest {
 namespace {
@@ -65,21 +64,6 @@ bool is_hidden(const std::vector<sim::Box>& stack, const Eigen::Vector2d& tree_m
     }
   }
   return came_near;
-}
-
-/// The map of a drive with what its tracker knows, for the next one.
-void store(const harness::ChainRun& run, const std::filesystem::path& file) {
-  map_file::StoredMap map;
-  map.map_id = model::map_of(run.landmarks.back().id);
-  map.name = "forest";
-  map.created_utime = run.updates.back().utime;
-  map.keyframes = run.keyframes;
-  for (const model::MapLandmark& landmark : run.landmarks)
-    map.landmarks.push_back({landmark, std::nullopt, std::nullopt});
-  map_file::NewestExistence newest;
-  for (const model::ExistenceState& state : run.existence_states) newest.take(state);
-  if (!newest.empty()) map_file::give_existence(map, newest.stored());
-  map_file::create_map_file(file, {&map, 1}, {map.created_utime, "eval", "a drive", "its map"});
 }
 
 /// World from map, by the truth along the drive.
@@ -220,7 +204,7 @@ std::vector<DriveScore> drive_forest(const changes::ChangingForest& forest,
 
     scores.push_back(score_of(run, forest, static_cast<int>(i), options.beside_m));
     map = scratch / ("drive-" + std::to_string(i) + ".gpkg");
-    store(run, map);
+    harness::write_drive_map(run, "forest", map);
   }
   return scores;
 }

@@ -1,9 +1,7 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -11,6 +9,7 @@
 #include "eval/experiments/changing_forest/changing_forest.hpp"
 #include "eval/experiments/experiments.hpp"
 #include "eval/harness/campaign.hpp"
+#include "eval/harness/drive_map.hpp"
 #include "eval/harness/results.hpp"
 #include "eval/tools/parallel.hpp"
 
@@ -24,26 +23,6 @@ struct DrivesCommand {
   std::uint64_t seed = 1;
   int jobs = 1;
   std::string json;
-};
-
-/// A folder for the map files of a run, gone with it.
-class MapFolder {
- public:
-  explicit MapFolder(std::size_t run)
-      : path_(std::filesystem::temp_directory_path() /
-              fmt::format("understory-existence-drives-{}-{}", ::getpid(), run)) {
-    std::filesystem::create_directories(path_);
-  }
-  ~MapFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  MapFolder(const MapFolder&) = delete;
-  MapFolder& operator=(const MapFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
 };
 
 const char* name_of(Keeping keeping) {
@@ -181,7 +160,7 @@ void run_drives(const DrivesCommand& options) {
     const std::uint64_t seed =
         harness::run_seed(options.seed, static_cast<int>(i / variants.size()));
     const auto forest = forest_for(variant.part, options.drives, seed);
-    const MapFolder folder(i);
+    const harness::MapFolder folder(fmt::format("existence-drives-{}", i));
     nlohmann::json rows = nlohmann::json::array();
     for (const DriveScore& score :
          drive_forest(forest, options.drives, variant, seed, folder.path(),

@@ -1,13 +1,9 @@
 #include "eval/experiments/existence/forest.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <charconv>
 #include <chrono>
-#include <cmath>
 #include <fstream>
-#include <map>
-#include <numbers>
 #include <optional>
 #include <random>
 #include <sstream>
@@ -16,6 +12,7 @@
 #include <utility>
 
 #include "eval/experiments/existence/csv.hpp"
+#include "eval/experiments/existence/forest_drive.hpp"
 
 namespace understory::eval::experiments::existence {
 namespace {
@@ -23,34 +20,6 @@ namespace {
 constexpr double kForestDay_s = 86400.0;
 constexpr double kYear_s = 365.25 * kForestDay_s;
 constexpr double kLeastDiameter_cm = 10.0;
-
-/// Stems by squares as wide as the sensor's range.
-class StemGrid {
- public:
-  StemGrid(const std::vector<CensusStem>& stems, double range_m) : range_m_(range_m) {
-    for (std::uint32_t i = 0; i < stems.size(); ++i) cells_[cell_of(stems[i].place_m)].push_back(i);
-  }
-  std::vector<std::uint32_t> near(const Eigen::Vector2f& place_m) const {
-    std::vector<std::uint32_t> found;
-    const auto [column, row] = cell_of(place_m);
-    for (int x = column - 1; x <= column + 1; ++x) {
-      for (int y = row - 1; y <= row + 1; ++y) {
-        const auto cell = cells_.find({x, y});
-        if (cell == cells_.end()) continue;
-        found.insert(found.end(), cell->second.begin(), cell->second.end());
-      }
-    }
-    return found;
-  }
-
- private:
-  std::pair<int, int> cell_of(const Eigen::Vector2f& place_m) const {
-    return {static_cast<int>(std::floor(place_m.x() / range_m_)),
-            static_cast<int>(std::floor(place_m.y() / range_m_))};
-  }
-  double range_m_;
-  std::map<std::pair<int, int>, std::vector<std::uint32_t>> cells_;
-};
 
 /// Lanes there and back over the whole plot; the first one is shifted by chance.
 std::vector<Eigen::Vector2f> lanes(const std::vector<CensusStem>& stems,
@@ -68,95 +37,6 @@ std::vector<Eigen::Vector2f> lanes(const std::vector<CensusStem>& stems,
     for (float x = low.x(); x < high.x(); x += every_m) places.emplace_back(x, y);
   return places;
 }
-
-/// One drive through the forest.
-class ForestDrive {
- public:
-  ForestDrive(const std::vector<CensusStem>& stems, const StemGrid& grid,
-              const ForestSetting& setting, bool is_later, std::mt19937_64& random)
-      : stems_(stems), grid_(grid), setting_(setting), is_later_(is_later), random_(random) {
-    for (std::size_t i = 0; i < stems.size(); ++i)
-      can_be_seen_.push_back(unit() >= setting.pass_missed);
-    clear_.assign(stems.size(), 0);
-    directions_.assign(stems.size(), 0);
-  }
-
-  DriveLooks run(double time_s) {
-    DriveLooks drive;
-    drive.time_s = time_s;
-    for (const Eigen::Vector2f& place_m : lanes(stems_, setting_, random_)) scan(place_m, drive);
-    for (std::size_t i = 0; i < stems_.size(); ++i)
-      drive.truth.push_back({exists(i), clear_[i] >= 10 && std::popcount(directions_[i]) >= 3,
-                             exists(i) && clear_[i] == 0});
-    return drive;
-  }
-
- private:
-  struct InView {
-    std::uint32_t stem;
-    float distance_m;
-    float bearing;
-    float half_width;  ///< Angle [rad].
-  };
-
-  bool exists(std::size_t stem) const { return !(is_later_ && stems_[stem].is_gone); }
-  double unit() { return std::uniform_real_distribution<double>(0.0, 1.0)(random_); }
-
-  std::vector<InView> in_view(const Eigen::Vector2f& place_m) const {
-    std::vector<InView> view;
-    for (const std::uint32_t i : grid_.near(place_m)) {
-      const Eigen::Vector2f way = stems_[i].place_m - place_m;
-      const float distance_m = way.norm();
-      if (distance_m > setting_.range_m || distance_m < 0.7F) continue;
-      view.push_back({i, distance_m, std::atan2(way.y(), way.x()),
-                      std::asin(std::min(1.0F, stems_[i].radius_m / distance_m))});
-    }
-    std::sort(view.begin(), view.end(),
-              [](const InView& a, const InView& b) { return a.distance_m < b.distance_m; });
-    return view;
-  }
-
-  bool is_hidden(const std::vector<InView>& view, std::size_t index) const {
-    for (std::size_t k = 0; k < index; ++k) {
-      const float apart =
-          std::remainder(view[k].bearing - view[index].bearing, 2.0F * std::numbers::pi_v<float>);
-      if (std::abs(apart) < view[k].half_width && exists(view[k].stem)) return true;
-    }
-    return false;
-  }
-
-  void scan(const Eigen::Vector2f& place_m, DriveLooks& drive) {
-    const std::vector<InView> view = in_view(place_m);
-    for (std::size_t k = 0; k < view.size(); ++k) {
-      const InView& one = view[k];
-      LookEvent event;
-      event.point = one.stem;
-      event.look.from_point_m << place_m - stems_[one.stem].place_m, 0.5F;
-      event.is_clear = !is_hidden(view, k);
-      event.recall = setting_.recall_near + one.distance_m / setting_.range_m *
-                                                (setting_.recall_far - setting_.recall_near);
-      const bool is_false = unit() < setting_.false_rate;
-      const bool is_detected = unit() < event.recall;
-      event.is_seen =
-          is_false || (exists(one.stem) && can_be_seen_[one.stem] && event.is_clear && is_detected);
-      if (!event.is_clear) event.look.ray = understory::existence::Ray::kBlocked;
-      drive.looks.push_back(event);
-      if (!event.is_clear) continue;
-      ++clear_[one.stem];
-      const float turn = one.bearing / std::numbers::pi_v<float> + 1.0F;
-      directions_[one.stem] |= 1U << (static_cast<unsigned>(turn * 4.0F) % 8U);
-    }
-  }
-
-  const std::vector<CensusStem>& stems_;
-  const StemGrid& grid_;
-  const ForestSetting& setting_;
-  bool is_later_;
-  std::mt19937_64& random_;
-  std::vector<bool> can_be_seen_;
-  std::vector<int> clear_;
-  std::vector<std::uint32_t> directions_;
-};
 
 /// Days since 1970 of YYYY-MM-DD.
 std::optional<double> day_of(std::string_view date) {
@@ -210,17 +90,26 @@ std::string read_text(const std::filesystem::path& file) {
 }
 
 std::vector<CensusStem> read_census(std::string_view csv) {
+  std::vector<CensusStem> stems = read_both_censuses(csv);
+  std::erase_if(stems, [](const CensusStem& stem) { return stem.is_new; });
+  return stems;
+}
+
+std::vector<CensusStem> read_both_censuses(std::string_view csv) {
   CsvRows rows(csv);
   const std::size_t x = rows.column("x_m"), y = rows.column("y_m");
   const std::size_t first = rows.column("dbh_2008_cm"), second = rows.column("dbh_2014_cm");
   std::vector<CensusStem> stems;
   while (rows.next()) {
-    const auto diameter_cm = rows.number(first);
+    const auto before_cm = rows.number(first), after_cm = rows.number(second);
     const auto x_m = rows.number(x), y_m = rows.number(y);
-    if (!diameter_cm || !x_m || !y_m || *diameter_cm <= kLeastDiameter_cm) continue;
-    stems.push_back({{static_cast<float>(*x_m), static_cast<float>(*y_m)},
-                     static_cast<float>(0.005 * *diameter_cm),
-                     !rows.number(second).has_value()});
+    const bool was = before_cm && *before_cm > kLeastDiameter_cm;
+    const bool is = after_cm && *after_cm > kLeastDiameter_cm;
+    if (!x_m || !y_m || (!was && !is)) continue;
+    stems.push_back({.place_m = {static_cast<float>(*x_m), static_cast<float>(*y_m)},
+                     .radius_m = static_cast<float>(0.005 * (was ? *before_cm : *after_cm)),
+                     .is_gone = was && !after_cm,
+                     .is_new = !was});
   }
   return stems;
 }
@@ -240,11 +129,15 @@ History drive_forest(const std::vector<CensusStem>& stems, const ForestSetting& 
   }
   history.gone_share = gone / static_cast<double>(stems.size());
 
-  history.drives.push_back(ForestDrive(stems, grid, setting, false, random).run(0.0));
+  const auto drive_at = [&](double time_s, bool is_later) {
+    ForestDrive drive(stems, grid, setting, is_later, random);
+    for (const Eigen::Vector2f& place_m : lanes(stems, setting, random)) drive.scan(place_m);
+    history.drives.push_back(drive.finish(time_s));
+  };
+  drive_at(0.0, false);
   for (int k = 0; k < setting.drives; ++k)
-    history.drives.push_back(
-        ForestDrive(stems, grid, setting, setting.is_changed, random)
-            .run((setting.is_changed ? 6.0 * kYear_s : kForestDay_s) + k * kForestDay_s));
+    drive_at((setting.is_changed ? 6.0 * kYear_s : kForestDay_s) + k * kForestDay_s,
+             setting.is_changed);
   return history;
 }
 

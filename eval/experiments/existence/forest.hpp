@@ -12,16 +12,21 @@
 
 namespace understory::eval::experiments::existence {
 
-/// A stem above 10 cm at the first census.
+/// A stem above 10 cm at one of the censuses.
 struct CensusStem {
   Eigen::Vector2f place_m;
   float radius_m = 0.0F;
   bool is_gone = false;  ///< Not in the second census.
+  bool is_new = false;   ///< Above 10 cm in the second census alone.
+
+  bool stands(bool is_later) const { return is_later ? !is_gone : !is_new; }
 };
 
 /// Stems of the first census in a CSV text with x_m, y_m, dbh_2008_cm, dbh_2014_cm. Throws
 /// std::runtime_error where a column is missing.
 std::vector<CensusStem> read_census(std::string_view csv);
+/// The same, and those that are new in the second one.
+std::vector<CensusStem> read_both_censuses(std::string_view csv);
 
 /// How the forest is driven through.
 struct ForestSetting {

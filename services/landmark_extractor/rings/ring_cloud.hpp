@@ -65,6 +65,8 @@ class RingCloud {
   std::size_t rings() const { return rings_.size(); }  ///< As many as the sensor has.
   /// Of all rings, by index; between the rings are gaps, which mean nothing.
   std::span<const points::RingPoint> points() const { return slots_.points(); }
+  /// Returns beyond the range, of all rings, levelled; they have no height above ground.
+  std::span<const points::RingPoint> far_points() const { return slots_.far_points(); }
   std::size_t ring_begin(std::size_t ring) const { return rings_[ring].begin; }  ///< Into points().
   std::size_t ring_end(std::size_t ring) const { return rings_[ring].end; }  ///< Behind its last.
   /// Azimuth from beam to beam [rad]; 0 for a ring with too few points to measure it.

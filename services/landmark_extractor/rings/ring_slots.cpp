@@ -61,6 +61,7 @@ bool RingSlots::scatter(const model::PointSweep& sweep, const points::Levelling&
   const std::uint16_t rings = sweep.rings;
   Filling* const filling = filling_.data();
   points::PointBlock& block = block_;
+  far_.clear();
 
   for (std::size_t first = 0; first < sweep.points.size(); first += points::PointBlock::kSize) {
     const std::size_t count = std::min(points::PointBlock::kSize, sweep.points.size() - first);
@@ -74,6 +75,8 @@ bool RingSlots::scatter(const model::PointSweep& sweep, const points::Levelling&
           ++counters.bad_ring;
         } else if (!points[i].position().allFinite()) {
           ++counters.not_finite;
+        } else if (point.range_m > levelling.max_range_m) {
+          far_.push_back(point);
         }
         continue;
       }

@@ -30,7 +30,7 @@ struct IndexRange {
 class RingSlots {
  public:
   /// Levels the points and puts each into its ring's slot. `is_leftward`: how the sensor rotates,
-  /// seen from above. Points out of range are left out; what is wrong is counted.
+  /// seen from above. Points out of range are in no ring; what is wrong is counted.
   void fill(const model::PointSweep& sweep, const points::Levelling& levelling, bool is_leftward,
             const ground::GroundSurface& ground, PointCounters& counters);
   /// Moves the ring's first points behind its last so that no object lies on both of its ends, and
@@ -40,6 +40,9 @@ class RingSlots {
 
   /// Of all slots.
   std::span<const points::RingPoint> points() const { return {points_.get(), capacity_}; }
+  /// Those that are farther than the range, in the order of the sweep; their height above ground
+  /// means nothing.
+  std::span<const points::RingPoint> far_points() const { return far_; }
 
  private:
   /// One ring while its points come in.
@@ -60,6 +63,7 @@ class RingSlots {
   std::size_t capacity_ = 0;
   std::size_t slot_ = 0;  ///< Points from slot to slot.
   std::vector<Filling> filling_;
+  std::vector<points::RingPoint> far_;
   bool is_leftward_ = true;
 };
 

@@ -5,31 +5,20 @@
 #include <cmath>
 #include <numbers>
 
+#include "services/landmark_extractor/view/range_bytes.hpp"
+
 namespace understory::landmark_extractor::view {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
 /// Sectors all around: 0.5 degrees each.
 constexpr int kBins = 720;
-/// Of the unit of ranges, as one byte has.
-constexpr double kMostSteps = 255.0;
 /// From here upwards a trunk must be seen where nothing hides it [m].
 constexpr double kFoot_m = 0.5;
 /// Beams that went so little farther than the last return did not pass it [m].
 constexpr float kPassed_m = 0.5F;
 /// No sensor looks so far [m].
 constexpr float kFarthest_m = 1e4F;
-
-/// Never farther than it is.
-std::uint8_t rounded_down(double range_m, double step_m) {
-  return static_cast<std::uint8_t>(std::min(kMostSteps, std::floor(range_m / step_m)));
-}
-
-/// Never nearer than it is; 0 where it does not fit into a byte.
-std::uint8_t rounded_up(double range_m, double step_m) {
-  const double steps = std::max(1.0, std::ceil(range_m / step_m));
-  return steps > kMostSteps ? 0 : static_cast<std::uint8_t>(steps);
-}
 
 /// Median of what the rings measured; 0 where none did.
 float beam_step(const rings::RingCloud& cloud, std::vector<float>& steps) {
@@ -42,64 +31,27 @@ float beam_step(const rings::RingCloud& cloud, std::vector<float>& steps) {
   return *middle;
 }
 
-/// Where the revolution ended [rad]; 0 where times are not known.
-float last_azimuth(const rings::RingCloud& cloud) {
+/// Where the revolution ended [rad], by a point of it; 0 where times are not known.
+float last_azimuth(const rings::RingCloud& cloud, const points::RingPoint& point) {
   if (cloud.spin_radps() == 0.0F) return 0.0F;
-  for (std::size_t ring = 0; ring < cloud.rings(); ++ring) {
-    if (cloud.ring_begin(ring) == cloud.ring_end(ring)) continue;
-    const points::RingPoint& point = cloud.points()[cloud.ring_begin(ring)];
-    return points::wrap_angle_f(point.azimuth_rad - cloud.spin_radps() * point.time_s);
-  }
-  return 0.0F;
+  return points::wrap_angle_f(point.azimuth_rad - cloud.spin_radps() * point.time_s);
 }
 
 }  // namespace
 
-const model::ViewRanges& ViewProfile::measure(const model::PointSweep& sweep,
-                                              const rings::RingCloud& cloud,
-                                              const points::Levelling& levelling,
-                                              const ground::GroundSurface& ground,
-                                              const SweepParameters& parameters, double range_m) {
-  lay_bins(sweep, cloud);
-  if (bins_.count == 0) return ranges_;
+void ViewProfile::begin(const points::Levelling& levelling, const ground::GroundSurface& ground,
+                        const SweepParameters& parameters) {
   const Eigen::Vector3f& sensor = levelling.sensor_m;
   lowest_m_ = static_cast<float>(kFoot_m);
   highest_m_ = static_cast<float>(parameters.standing_height_m);
   sensor_m_ =
       sensor.z() - static_cast<float>(ground.below(sensor.head<2>().cast<double>()).height_m);
-  range_m_ = static_cast<float>(range_m);
-  ranges_.range_step_m = range_m / (kMostSteps - 1.0);
-
-  sectors_.assign(static_cast<std::size_t>(bins_.count), {});
-  take_rings(cloud);
-  find_far_ground(levelling, ground);
-  take_far(sweep, levelling);
-  write();
-  return ranges_;
-}
-
-/// In order of time, where times are known.
-void ViewProfile::lay_bins(const model::PointSweep& sweep, const rings::RingCloud& cloud) {
-  ranges_ = {};
-  ranges_.utime = sweep.utime;
-  ranges_.sequence = sweep.sequence;
+  range_m_ = levelling.max_range_m;
   bins_ = {};
-  const float step = beam_step(cloud, steps_);
-  if (step == 0.0F) return;
-  const float spin = cloud.spin_radps();
-  const double direction = spin < 0.0F ? -1.0 : 1.0;
-  bins_ = {last_azimuth(cloud), static_cast<float>(direction / kTurn), kBins};
-  ranges_.sensor_m = cloud.sensor_m().head<2>().cast<double>();
-  if (spin != 0.0F)
-    ranges_.turn_m = cloud.level_velocity_mps().head<2>().cast<double>() *
-                     (kTurn / std::abs(static_cast<double>(spin)));
-  ranges_.first_bearing_rad = bins_.first_rad;
-  ranges_.step_rad = direction * kTurn / kBins;
-  ranges_.beam_step_rad = step;
 }
 
 /// How far a beam with this return was between the heights: from where it leaves them [m].
-float ViewProfile::way_in_band(float range_m, float height_m) const {
+inline float ViewProfile::way_in_band(float range_m, float height_m) const {
   if (height_m > highest_m_) {
     if (sensor_m_ >= highest_m_) return 0.0F;
     return range_m * (highest_m_ - sensor_m_) / (height_m - sensor_m_);
@@ -109,19 +61,55 @@ float ViewProfile::way_in_band(float range_m, float height_m) const {
   return range_m * (sensor_m_ - lowest_m_) / (sensor_m_ - height_m);
 }
 
-void ViewProfile::take_rings(const rings::RingCloud& cloud) {
-  const std::span points = cloud.points();
-  for (std::size_t ring = 0; ring < cloud.rings(); ++ring) {
-    for (std::size_t i = cloud.ring_begin(ring); i < cloud.ring_end(ring); ++i) {
-      const points::RingPoint& point = points[i];
-      Sector& sector = sectors_[static_cast<std::size_t>(bins_.of(point.azimuth_rad))];
-      sector.seen_m = std::max(sector.seen_m, way_in_band(point.range_m, point.height_m));
-      if (point.height_m < lowest_m_ || point.height_m > highest_m_) continue;
-      sector.farthest_m = std::max(sector.farthest_m, point.range_m);
-      if (sector.nearest_m == 0.0F || point.range_m < sector.nearest_m)
-        sector.nearest_m = point.range_m;
-    }
+void ViewProfile::take_ring(const rings::RingCloud& cloud, std::size_t ring) {
+  const std::size_t begin = cloud.ring_begin(ring);
+  const std::size_t end = cloud.ring_end(ring);
+  if (begin == end) return;
+  if (bins_.count == 0) lay_bins(cloud, cloud.points()[begin]);
+
+  for (const points::RingPoint& point : cloud.points().subspan(begin, end - begin)) {
+    Sector& sector = sectors_[static_cast<std::size_t>(bins_.of(point.azimuth_rad))];
+    sector.seen_m = std::max(sector.seen_m, way_in_band(point.range_m, point.height_m));
+    if (point.height_m < lowest_m_ || point.height_m > highest_m_) continue;
+    sector.farthest_m = std::max(sector.farthest_m, point.range_m);
+    if (sector.nearest_m == 0.0F || point.range_m < sector.nearest_m)
+      sector.nearest_m = point.range_m;
   }
+}
+
+const model::ViewRanges& ViewProfile::finish(const model::PointSweep& sweep,
+                                             const rings::RingCloud& cloud,
+                                             const points::Levelling& levelling,
+                                             const ground::GroundSurface& ground) {
+  ranges_ = {};
+  ranges_.utime = sweep.utime;
+  ranges_.sequence = sweep.sequence;
+  const float step = beam_step(cloud, steps_);
+  if (bins_.count == 0 || step == 0.0F) return ranges_;
+  describe_bins(cloud);
+  ranges_.beam_step_rad = step;
+  find_far_ground(levelling, ground);
+  take_far(cloud, levelling);
+  write();
+  return ranges_;
+}
+
+/// In order of time, where times are known.
+void ViewProfile::lay_bins(const rings::RingCloud& cloud, const points::RingPoint& point) {
+  const double direction = cloud.spin_radps() < 0.0F ? -1.0 : 1.0;
+  bins_ = {last_azimuth(cloud, point), static_cast<float>(direction / kTurn), kBins};
+  sectors_.assign(kBins, {});
+}
+
+void ViewProfile::describe_bins(const rings::RingCloud& cloud) {
+  const float spin = cloud.spin_radps();
+  ranges_.sensor_m = cloud.sensor_m().head<2>().cast<double>();
+  if (spin != 0.0F)
+    ranges_.turn_m = cloud.level_velocity_mps().head<2>().cast<double>() *
+                     (kTurn / std::abs(static_cast<double>(spin)));
+  ranges_.first_bearing_rad = bins_.first_rad;
+  ranges_.step_rad = (spin < 0.0F ? -kTurn : kTurn) / kBins;
+  ranges_.range_step_m = step_for(static_cast<double>(range_m_));
 }
 
 /// The ground under where beams leave the range.
@@ -146,16 +134,15 @@ void ViewProfile::find_far_ground(const points::Levelling& levelling,
 }
 
 /// Returns beyond the range, which the rings do not have: how far their beams were free.
-void ViewProfile::take_far(const model::PointSweep& sweep, const points::Levelling& levelling) {
-  const Eigen::Vector3f& sensor = levelling.sensor_m;
-  for (const model::SweepPoint& point : sweep.points) {
-    const Eigen::Vector3f offset = levelling.level_R_vehicle * point.position() - sensor -
-                                   point.time_s * levelling.velocity_mps;
-    const float distance = offset.head<2>().norm();
-    if (!(distance > range_m_ && distance < kFarthest_m)) continue;
-    const int bin = bins_.of(points::fast_atan2(offset.y(), offset.x()));
-    const float height = sensor.z() + range_m_ * offset.z() / distance -
-                         far_ground_m_[static_cast<std::size_t>(bin)];
+void ViewProfile::take_far(const rings::RingCloud& cloud, const points::Levelling& levelling) {
+  const float sensor = levelling.sensor_m.z();
+  const float climb = levelling.velocity_mps.z();
+  for (const points::RingPoint& point : cloud.far_points()) {
+    if (!(point.range_m < kFarthest_m)) continue;
+    const int bin = bins_.of(point.azimuth_rad);
+    const float rise = point.z_m - sensor - point.time_s * climb;
+    const float height =
+        sensor + range_m_ * rise / point.range_m - far_ground_m_[static_cast<std::size_t>(bin)];
     Sector& sector = sectors_[static_cast<std::size_t>(bin)];
     sector.seen_m = std::max(sector.seen_m, way_in_band(range_m_, height));
   }
@@ -171,26 +158,6 @@ void ViewProfile::write() {
     ranges_.free.push_back(rounded_down(is_stopped ? sector.nearest_m : sector.seen_m, step));
     ranges_.hidden.push_back(is_hidden ? rounded_up(sector.farthest_m, step) : 0);
   }
-}
-
-model::ViewRanges planar_view(const model::PlanarScan& scan, double range_m) {
-  model::ViewRanges ranges;
-  ranges.utime = scan.utime;
-  ranges.sequence = scan.sequence;
-  ranges.sensor_m = scan.vehicle_T_sensor.translation();
-  ranges.first_bearing_rad = geometry::wrap_angle(
-      scan.first_bearing_rad - 0.5 * scan.bearing_step_rad + scan.vehicle_T_sensor.theta());
-  ranges.step_rad = scan.bearing_step_rad;
-  ranges.beam_step_rad = std::abs(scan.bearing_step_rad);
-  ranges.range_step_m = range_m / (kMostSteps - 1.0);
-  // The first beam may come again as the last.
-  const auto turn = static_cast<std::size_t>(kTurn / std::abs(scan.bearing_step_rad) + 1e-6);
-  for (std::size_t beam = 0; beam < std::min(turn, scan.ranges_m.size()); ++beam) {
-    const double beam_m = scan.is_return(beam) ? scan.ranges_m[beam] : 0.0;
-    ranges.free.push_back(rounded_down(beam_m, ranges.range_step_m));
-    ranges.hidden.push_back(beam_m > 0.0 ? rounded_up(beam_m, ranges.range_step_m) : 0);
-  }
-  return ranges;
 }
 
 }  // namespace understory::landmark_extractor::view

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/model/planar_scan.hpp"
+#include "common/model/point_sweep.hpp"
 #include "common/model/view_ranges.hpp"
 #include "services/landmark_extractor/ground/ground_surface.hpp"
 #include "services/landmark_extractor/parameters.hpp"
@@ -15,15 +15,20 @@ namespace understory::landmark_extractor::view {
 /// Beams at heights where every trunk must be (knee height to above a person's) say how far one can
 /// see there. A beam is followed at the height above ground that lies between the sensor's and its
 /// return's in proportion to the range: exact over ground that is a plane from here to there. A
-/// beam without a return says nothing. Keeps its memory from sweep to sweep, but no state.
+/// beam without a return says nothing. Keeps its memory from sweep to sweep, but no state. Call
+/// begin(), take_ring() for each ring, finish().
 class ViewProfile {
  public:
-  /// Ranges of a sweep whose rings are in order; no bins where it has no rings to measure by.
-  /// `range_m`: as far as `cloud` goes.
-  const model::ViewRanges& measure(const model::PointSweep& sweep, const rings::RingCloud& cloud,
-                                   const points::Levelling& levelling,
-                                   const ground::GroundSurface& ground,
-                                   const SweepParameters& parameters, double range_m);
+  /// A sweep. `levelling.max_range_m`: as far as its rings go.
+  void begin(const points::Levelling& levelling, const ground::GroundSurface& ground,
+             const SweepParameters& parameters);
+  /// One ring of it that is in order: while its points are in the cache.
+  void take_ring(const rings::RingCloud& cloud, std::size_t ring);
+  /// Ranges by all rings, and by what is farther; no bins where the sweep has no rings to measure
+  /// by.
+  const model::ViewRanges& finish(const model::PointSweep& sweep, const rings::RingCloud& cloud,
+                                  const points::Levelling& levelling,
+                                  const ground::GroundSurface& ground);
 
  private:
   /// A sector of bearings while returns come in [m].
@@ -47,9 +52,9 @@ class ViewProfile {
     }
   };
 
-  void lay_bins(const model::PointSweep& sweep, const rings::RingCloud& cloud);
-  void take_rings(const rings::RingCloud& cloud);
-  void take_far(const model::PointSweep& sweep, const points::Levelling& levelling);
+  void lay_bins(const rings::RingCloud& cloud, const points::RingPoint& point);
+  void describe_bins(const rings::RingCloud& cloud);
+  void take_far(const rings::RingCloud& cloud, const points::Levelling& levelling);
   void find_far_ground(const points::Levelling& levelling, const ground::GroundSurface& ground);
   float way_in_band(float range_m, float height_m) const;
   void write();
@@ -64,9 +69,5 @@ class ViewProfile {
   std::vector<float> steps_;
   model::ViewRanges ranges_;
 };
-
-/// The same of a laser that scans one plane: a bin for each beam, up to `range_m` and a little
-/// more.
-model::ViewRanges planar_view(const model::PlanarScan& scan, double range_m);
 
 }  // namespace understory::landmark_extractor::view

@@ -17,7 +17,7 @@ struct Interval {
 Interval wilson_pct(std::size_t hits, std::size_t all);
 
 /// A row per method: all runs of one world and share of change together. `runs` must not be empty;
-/// the first method is the one that removes nothing.
+/// the first method is the one that removes nothing. An ablation's row has its points alone.
 nlohmann::json culling_rows(const std::vector<const CaseResult*>& runs,
                             const std::vector<CameraMethod>& methods);
 

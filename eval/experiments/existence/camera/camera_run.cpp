@@ -130,6 +130,7 @@ CaseResult run_case(const CaseSetting& setting, std::uint64_t seed,
     MethodOnCase& made = result.methods.emplace_back();
     made.map_points = map.size();
     score(of, probability, made);
+    if (methods[m].is_ablation) continue;
     made.queries = relocalise_all(of, setting, map, seed);
     track_all(of, map, sim::mixed(seed, 7), made);
   }

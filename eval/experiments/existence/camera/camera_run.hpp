@@ -14,6 +14,7 @@ namespace understory::eval::experiments::existence::camera {
 struct CameraMethod {
   TunedMethod tuned;
   bool has_rays = false;
+  bool is_ablation = false;  ///< What it says of the points is scored, and no camera looks for it.
 };
 
 /// One frame that was looked for in a culled map.

@@ -135,7 +135,7 @@ nlohmann::json culling_rows(const std::vector<const CaseResult*>& runs,
                        {"changed_pct", 100.0 * setting.changed},
                        {"method", methods[m].tuned.name},
                        {"runs", runs.size()}};
-    row.update(camera_part(pool));
+    if (!methods[m].is_ablation) row.update(camera_part(pool));
     row.update(points_part(pool));
     rows.push_back(std::move(row));
   }

@@ -30,6 +30,10 @@ constexpr std::array<std::string_view, 9> kCompared{
     "ideal"};
 /// The one whose P says which points are in use, and that is also given the rays.
 constexpr std::string_view kOurs = "icosahedral";
+/// The same without one of its parts, or with one more: only their points are scored.
+constexpr std::array<std::string_view, 5> kAblations{
+    "icosahedral, neighbours", "icosahedral, no decay", "icosahedral, no redundancy control",
+    "icosahedral, looks alone", "icosahedral, recall as told"};
 
 struct CameraOptions {
   int runs = 3;
@@ -57,11 +61,14 @@ std::vector<CameraMethod> tuned_for_cameras(const CameraOptions& options,
                                             const std::atomic<bool>& stop) {
   const std::vector<History> training = training_of(options, stop);
   const std::vector<MethodKind> kinds = method_kinds(training);
-  std::vector<CameraMethod> methods(kCompared.size());
+  std::vector<std::string_view> names(kCompared.begin(), kCompared.end());
+  names.insert(names.end(), kAblations.begin(), kAblations.end());
+  std::vector<CameraMethod> methods(names.size());
   tools::run_in_parallel(methods.size(), options.jobs, "tuning", stop, [&](std::size_t i) {
     const auto kind = std::find_if(kinds.begin(), kinds.end(),
-                                   [&](const MethodKind& one) { return one.name == kCompared[i]; });
+                                   [&](const MethodKind& one) { return one.name == names[i]; });
     methods[i].tuned = tune(*kind, training);
+    methods[i].is_ablation = i >= kCompared.size();
   });
 
   const auto ours = std::find_if(methods.begin(), methods.end(), [](const CameraMethod& method) {
@@ -113,10 +120,11 @@ std::vector<CaseResult> run_cases(const CameraOptions& options,
   return cases;
 }
 
+/// An ablation has no frames.
 void print_culling(const nlohmann::json& row) {
-  const auto shown = [&row](const char* key) { return row[key].get<double>(); };
+  const auto shown = [&row](const char* key) { return row.value(key, 0.0); };
   fmt::print(
-      "{:<19} {:>4.0f}{} {:<26} {:>5.0f} {:>6.1f} [{:>5.1f} {:>5.1f}] {:>3.0f} {:>7.1f} {:>5.1f} "
+      "{:<19} {:>4.0f}{} {:<34} {:>5.0f} {:>6.1f} [{:>5.1f} {:>5.1f}] {:>3.0f} {:>7.1f} {:>5.1f} "
       "{:>6.2f} {:>5.1f} {:>6.0f} | {:>6.0f} {:>5.1f} {:>6.1f} {:>6.2f} {:>7.4f} {:>7.4f} | "
       "{:>5.1f} | "
       "{:>6.1f} {:>6.2f} {:>7.4f}\n",
@@ -144,7 +152,8 @@ void print_needed(const nlohmann::json& row) {
 nlohmann::json rows_of(const std::vector<CaseResult>& cases, std::size_t runs,
                        const std::vector<CameraMethod>& methods) {
   fmt::print(
-      "world   changed method                   frames success [95 %]    wrong samples  cm   "
+      "world   changed method                           frames success [95 %]    wrong samples  cm "
+      "  "
       "ATE cm  lost  points | scored gone% removed wrong%  AUC    Brier | all: removed, "
       "wrong, AUC\n");
   nlohmann::json rows = nlohmann::json::array();
