@@ -19,9 +19,9 @@ namespace fs = std::filesystem;
 
 /// The number of the map that the mapper will begin with. Reads it as the mapper does.
 std::uint32_t number_of_given(const GivenMapOptions& options) {
-  const auto landmarks =
+  const model::WholeMap map =
       geoslam_mapper::read_given_map(options.file, static_cast<int>(options.map_id));
-  return model::map_of(landmarks.back().id);
+  return model::map_of(map.landmarks.back().id);
 }
 
 std::string checksum_in_file(const std::string& file, std::uint32_t map_id) {

@@ -266,12 +266,14 @@ class MapperAdapter : public bus::Adapter {
   void take_given(const model::WholeMap& map) {
     std::string reason = why_not_given(map);
     if (memory_.known.map_id != 0) reason = "a map is there already";
-    if (reason.empty()) return begin_with(map.landmarks);
+    if (reason.empty()) return begin_with(map);
     node_->report(wire::Reason::kInputRefused, "a given map was not taken: " + reason,
                   channels_.given_map);
   }
 
-  void begin_with(const std::vector<model::MapLandmark>& landmarks) {
+  void begin_with(const model::WholeMap& map) {
+    const std::vector<model::MapLandmark> landmarks =
+        apart_from_keyframes(map, parameters_.smoothing.given_map_sigma_m);
     stage_->start_with(landmarks);
     (void)stage_->take_changed_landmarks();
     memory_.known.map_id = model::map_of(landmarks.back().id);

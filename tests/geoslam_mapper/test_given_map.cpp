@@ -9,6 +9,7 @@
 #include "common/wire/convert.hpp"
 #include "services/geoslam_mapper/adapter.hpp"
 #include "services/geoslam_mapper/given_map.hpp"
+#include "services/geoslam_mapper/point_covariance.hpp"
 #include "services/keyframer/adapter.hpp"
 #include "sim/drive.hpp"
 #include "tests/catch.hpp"
@@ -48,9 +49,11 @@ std::vector<model::MapLandmark> survey(const sim::Drive& drive, std::uint64_t se
 
 /// A file with this map as number 7, and an empty one as number 8 where `has_two`.
 std::filesystem::path file_of(const std::vector<model::MapLandmark>& landmarks,
-                              const test::TemporaryDirectory& folder, bool has_two = false) {
+                              const test::TemporaryDirectory& folder, bool has_two = false,
+                              std::vector<model::KeyframePose> keyframes = {}) {
   map_file::StoredMap map;
   map.map_id = 7;
+  map.keyframes = std::move(keyframes);
   for (const model::MapLandmark& one : landmarks) map.landmarks.push_back({one, {}, {}});
   std::vector<map_file::StoredMap> maps{map};
   if (has_two) maps.emplace_back().map_id = 8;
@@ -194,6 +197,49 @@ TEST_CASE("The map of an earlier drive is driven in without doubling its landmar
   }
 }
 
+TEST_CASE("What a map's landmarks share far from its first keyframe is no error of each",
+          "[given_map]") {
+  const test::TemporaryDirectory folder;
+  const sim::Drive drive = drive_through(58, 200.0);
+  // As after 200 m: a heading of the whole map that is known to 4 mrad, 200 m before the drive.
+  const geometry::SE2WithCovariance world_T_first{
+      geometry::SE2({-200.0, 0.0}, 0.0),
+      Eigen::Vector3d(1e-4, 1e-4, 4e-3 * 4e-3).asDiagonal().toDenseMatrix()};
+  std::vector<model::MapLandmark> landmarks = survey(drive, 58);
+  for (model::MapLandmark& one : landmarks) {
+    one.covariance_m2 += geoslam_mapper::point_covariance(
+        world_T_first, world_T_first.mean.inverse() * one.position_m);
+  }
+  std::vector<model::KeyframePose> keyframes;
+  for (std::size_t k = 0; k < drive.size(); k += 10) {
+    const geometry::SE2 pose = drive.world_T_vehicle()[k];
+    const geometry::SE2WithCovariance first_T_vehicle{world_T_first.mean.inverse() * pose,
+                                                      Eigen::Matrix3d::Zero()};
+    const auto stated = compound(world_T_first, first_T_vehicle);
+    keyframes.push_back({k + 1, drive.utime(k), pose, stated.covariance});
+  }
+
+  SECTION("alone, they are as the survey left them") {
+    const model::WholeMap map{0, 0, 0, true, landmarks, keyframes};
+    for (const model::MapLandmark& one : geoslam_mapper::apart_from_keyframes(map, 0.01)) {
+      CHECK(one.covariance_m2(0, 0) < 1.1 * kSurveySigma_m * kSurveySigma_m);
+      CHECK(one.covariance_m2(1, 1) < 1.1 * kSurveySigma_m * kSurveySigma_m);
+      CHECK(one.covariance_m2.determinant() > 0.0);
+    }
+    // Without keyframes nobody knows what is shared.
+    const model::WholeMap surveyed{0, 0, 0, true, landmarks, {}};
+    CHECK(geoslam_mapper::apart_from_keyframes(surveyed, 0.01)[0].covariance_m2 ==
+          landmarks[0].covariance_m2);
+  }
+  SECTION("driven in, none is doubled") {
+    Stack stack(toml_of(file_of(landmarks, folder, false, keyframes), false));
+    stack.drive(drive);
+    const auto [rms_m, nees] = errors(stack, drive);
+    CHECK(rms_m < 0.05);
+    CHECK(stack.asked().landmarks.size() <= landmarks.size() + landmarks.size() / 100);
+  }
+}
+
 TEST_CASE("In somebody else's map the mapper says that it is lost, within 2 s", "[given_map]") {
   for (const bool localisation_only : {true, false}) {
     for (std::uint64_t seed = 60; seed < 64; ++seed) {
@@ -302,10 +348,10 @@ TEST_CASE("A map file that cannot be begun with is named", "[given_map]") {
                     Contains("none.gpkg"));
   const auto file = file_of(survey(drive_through(72, 10.0), 72), folder, true).string();
   // Map 8 has no landmark, as the trajectory of a merged map.
-  CHECK(geoslam_mapper::read_given_map(file, 0).size() > 100);
+  CHECK(geoslam_mapper::read_given_map(file, 0).landmarks.size() > 100);
   CHECK_THROWS_WITH(geoslam_mapper::read_given_map(file, 3), Contains("input.map_id is 3"));
   CHECK_THROWS_WITH(geoslam_mapper::read_given_map(file, 8), Contains("map 8 has no landmark"));
-  CHECK(geoslam_mapper::read_given_map(file, 7).size() > 100);
+  CHECK(geoslam_mapper::read_given_map(file, 7).landmarks.size() > 100);
 
   map_file::MapFile opened(file, map_file::Access::kWrite);
   map_file::StoredMap second = opened.read(8);

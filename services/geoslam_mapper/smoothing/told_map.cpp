@@ -1,16 +1,9 @@
 #include "services/geoslam_mapper/smoothing/told_map.hpp"
 
+#include "services/geoslam_mapper/point_covariance.hpp"
+
 namespace understory::geoslam_mapper::smoothing {
 namespace {
-
-/// Covariance of a point of frame b in the axes of frame a.
-Eigen::Matrix2d point_covariance(const geometry::SE2WithCovariance& a_T_b,
-                                 const Eigen::Vector2d& in_b) {
-  Eigen::Matrix<double, 2, 3> jacobian;  // d(point)/d(xi), in the axes of b
-  jacobian << 1.0, 0.0, -in_b.y(), 0.0, 1.0, in_b.x();
-  const Eigen::Matrix2d rotation = a_T_b.mean.rotation();
-  return rotation * jacobian * a_T_b.covariance * jacobian.transpose() * rotation.transpose();
-}
 
 /// Of landmarks that are not in the solved graph: by the nodes that observed them last. Zero for
 /// the others.
