@@ -126,15 +126,30 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
   const std::vector<Retirement> condensed =
       condensing_.follow(fused, known_ground_, discovery_, merging_.merges(), map_);
   closures_.hand_over(condensed);
-  // Each of these solves where it does something: one for each keyframe bounds the keyframe's time.
-  if (!condensed.empty()) {
-    submaps_.condensed(condensed.front().into);
-  } else if (!dormancy_.follow(keyframe.field_of_view, fused.node, map_)) {
-    submaps_.follow(keyframe.field_of_view, fused.node, keyframe.utime, map_);
-  }
+  if (!condensed.empty()) submaps_.condensed(condensed.front().into);
+  lighten(keyframe, fused.node, !condensed.empty());
   confirm(keyframe, update);
   report(keyframe, update);
   return with(kUpdated, fused.reason, std::move(update));
+}
+
+/// What is far leaves the solved graph. Condensing, dormancy and submaps each solve where they do
+/// something: one of them for each keyframe bounds its time. Who waited goes first at the next.
+void OneMap::lighten(const model::Keyframe& keyframe, NodeIndex newest, bool has_condensed) {
+  const bool may_wait = has_condensed && !lightening_.has_waited;
+  lightening_.has_waited = may_wait;
+  if (may_wait) return;
+
+  const auto give_away = [&] {
+    return submaps_.follow(keyframe.field_of_view, newest, keyframe.utime, map_);
+  };
+  if (lightening_.submaps_first && give_away()) {
+    lightening_.submaps_first = false;
+  } else if (dormancy_.follow(keyframe.field_of_view, newest, map_)) {
+    lightening_.submaps_first = true;
+  } else if (!lightening_.submaps_first) {
+    (void)give_away();
+  }
 }
 
 /// While the gyro's bias is unknown the first scan's heading is, too, and it would be the map's.

@@ -45,10 +45,10 @@ double sigma_of(NodeIndex node, const PoseGraph& graph) {
 
 }  // namespace
 
-void Submaps::follow(const model::FieldOfView& field_of_view, NodeIndex newest, model::Utime utime,
+bool Submaps::follow(const model::FieldOfView& field_of_view, NodeIndex newest, model::Utime utime,
                      GlobalMap& map) {
   const double along_m = map.graph.node(newest).along_m;
-  if (hand_over_m_ <= 0.0 || std::abs(along_m - looked_m_) < kBetweenLooks_m) return;
+  if (hand_over_m_ <= 0.0 || std::abs(along_m - looked_m_) < kBetweenLooks_m) return false;
   looked_m_ = along_m;
 
   const Eigen::Vector2d vehicle_m = map.graph.pose(newest).translation();
@@ -74,9 +74,9 @@ void Submaps::follow(const model::FieldOfView& field_of_view, NodeIndex newest, 
   if (freeze(reach_m, vehicle_m, map)) {
     // One solution for each keyframe: what is to be given away is looked for at the next.
     looked_m_ -= kBetweenLooks_m;
-    return;
+    return true;
   }
-  if (!may_hand_over_) return;
+  if (!may_hand_over_) return false;
   close_origin(far_m, vehicle_m, map);
 
   // Whole submaps only: where none of what the node observed is in the solved graph.
@@ -86,11 +86,12 @@ void Submaps::follow(const model::FieldOfView& field_of_view, NodeIndex newest, 
     if (distance_of(here.node) > far_m && map.graph.node(here.node).observations.empty())
       left.push_back(here);
   }
-  if (left.empty()) return;
+  if (left.empty()) return false;
   map.graph.checkpoint();
   for (const Here& here : left) give_away(here, utime, map);
   (void)map.graph.solve();  // What they tell is in the graph as before.
   map.adopt_estimates();
+  return true;
 }
 
 /// The first node is in no stretch: far behind it is a submap of its own.
