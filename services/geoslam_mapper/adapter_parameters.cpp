@@ -69,9 +69,10 @@ void describe_evidence(SmoothingMapperParameters& p, bus::ParameterTable& table)
   table.add("smoothing.scale_sigma", p.scale_sigma, {0.0, 0.1}, "",
             "Standard deviation of the scale of distances, a common-mode error of all landmarks. "
             "It is not estimated, but reported in the covariances of poses.");
-  table.add("smoothing.given_map_sigma_m", p.given_map_sigma_m, {1e-4, 100.0}, "m",
-            "Standard deviation of the landmarks of a given map that states no covariance; the least one "
-            "beside its keyframes of a map that was driven.");
+  table.add(
+      "smoothing.given_map_sigma_m", p.given_map_sigma_m, {1e-4, 100.0}, "m",
+      "Standard deviation of the landmarks of a given map that states no covariance; the least one "
+      "beside its keyframes of a map that was driven.");
 }
 
 void describe_association(SmoothingMapperParameters& p, bus::ParameterTable& table) {
