@@ -34,8 +34,18 @@ void append_edge(std::string& out, const model::Keyframe& keyframe, std::size_t 
                  information(0, 1), information(1, 1));
 }
 
-void keep(const std::vector<model::LandmarkExistence>& told, ExistenceById& existence) {
-  for (const model::LandmarkExistence& one : told) existence[one.id] = one;
+/// A message of either channel of the existence tracker.
+template <class Message>
+void keep(const io::LogEvent& event, ExistenceById& existence) {
+  const auto told = wire::decode_message<Message>(event.data);
+  if (!told) return;
+  for (const model::LandmarkExistence& one : told->landmarks) existence[one.id] = one;
+}
+
+/// A message that changes the map.
+template <class Message>
+void take(const io::LogEvent& event, model::HeldMap& map) {
+  if (const auto message = wire::decode_message<Message>(event.data)) map.take(*message);
 }
 
 }  // namespace
@@ -45,17 +55,13 @@ void SlamResults::add(const io::LogEvent& event) {
     const auto pose = wire::decode_message<model::SlamPose>(event.data);
     if (pose && pose->is_localised()) poses.push_back(*pose);
   } else if (event.channel == "MAP") {
-    const auto whole = wire::decode_message<model::WholeMap>(event.data);
-    if (whole) map.take(*whole);
+    take<model::WholeMap>(event, map);
   } else if (event.channel == "MAP_DELTA") {
-    const auto delta = wire::decode_message<model::MapDelta>(event.data);
-    if (delta) map.take(*delta);
+    take<model::MapDelta>(event, map);
   } else if (event.channel == "SUBMAP") {
-    const auto submap = wire::decode_message<model::Submap>(event.data);
-    if (submap) map.take(*submap);
+    take<model::Submap>(event, map);
   } else if (event.channel == "MAP_CORRECTION") {
-    const auto correction = wire::decode_message<model::MapCorrection>(event.data);
-    if (correction) map.take(*correction);
+    take<model::MapCorrection>(event, map);
   } else if (event.channel == "KEYFRAME") {
     const auto keyframe = wire::decode_message<model::Keyframe>(event.data);
     if (keyframe) keyframes.insert_or_assign(keyframe->sequence, *keyframe);
@@ -66,11 +72,9 @@ void SlamResults::add(const io::LogEvent& event) {
                                   update->status == model::MapUpdateStatus::kUpdated);
     if (fused) updates.push_back(*update);
   } else if (event.channel == "EXISTENCE") {
-    const auto told = wire::decode_message<model::Existence>(event.data);
-    if (told) keep(told->landmarks, existence);
+    keep<model::Existence>(event, existence);
   } else if (event.channel == "EXISTENCE_STATE") {
-    const auto state = wire::decode_message<model::ExistenceState>(event.data);
-    if (state) keep(state->landmarks, existence);
+    keep<model::ExistenceState>(event, existence);
   } else if (event.channel == "GROUND_TRUTH") {
     const auto one = wire::decode_message<ground_truth_t>(event.data);
     if (one) truth.emplace_back(one->utime, wire::from_wire(one->world_T_vehicle));
