@@ -2,40 +2,74 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <span>
 #include <stdexcept>
 #include <utility>
 
+#include "common/constellation/grid.hpp"
 #include "common/map_file/chosen_map.hpp"
 #include "services/geoslam_mapper/point_covariance.hpp"
 
 namespace understory::geoslam_mapper {
 namespace {
 
-bool is_sound(const model::MapLandmark& landmark) {
-  if (!landmark.position_m.allFinite() || !landmark.covariance_m2.allFinite()) return false;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(landmark.covariance_m2,
-                                                              Eigen::EigenvaluesOnly);
+template <int N>
+bool is_covariance(const Eigen::Matrix<double, N, N>& matrix) {
+  if (!matrix.allFinite()) return false;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, N, N>> solver(matrix,
+                                                                          Eigen::EigenvaluesOnly);
   return solver.eigenvalues().minCoeff() >= 0.0;
 }
 
-/// None without keyframes whose covariance is known.
-const model::KeyframePose* nearest_to(const Eigen::Vector2d& position_m,
-                                      std::span<const model::KeyframePose> keyframes) {
-  const model::KeyframePose* nearest = nullptr;
-  double least_m2 = std::numeric_limits<double>::infinity();
-  for (const model::KeyframePose& one : keyframes) {
-    const double m2 = (one.map_T_vehicle.translation() - position_m).squaredNorm();
-    if (m2 >= least_m2 || one.covariance.isZero(0.0)) continue;
-    least_m2 = m2;
-    nearest = &one;
-  }
-  return nearest;
+bool is_sound(const model::MapLandmark& landmark) {
+  return landmark.position_m.allFinite() && is_covariance<2>(landmark.covariance_m2);
 }
 
-/// What is left of a covariance without its shared part, no less than `least_sigma_m` and no more
-/// than there was. Pose and landmark are correlated otherwise as well, so nothing may be left.
+/// Keyframes whose covariance is known, by place.
+class KnownKeyframes {
+ public:
+  explicit KnownKeyframes(std::span<const model::KeyframePose> keyframes) {
+    for (const model::KeyframePose& one : keyframes) {
+      const Eigen::Vector2d at_m = one.map_T_vehicle.translation();
+      if (!constellation::PointGrid::representable(at_m) ||
+          !std::isfinite(one.map_T_vehicle.theta()))
+        continue;
+      if (one.covariance.isZero(0.0) || !is_covariance<3>(one.covariance)) continue;
+      grid_.insert(static_cast<constellation::Slot>(known_.size()), at_m);
+      known_.push_back({one.map_T_vehicle, one.covariance});
+    }
+  }
+
+  /// The nearest one, map_T_vehicle; none where there is none. Looks further and further.
+  const geometry::SE2WithCovariance* nearest_to(const Eigen::Vector2d& at_m) const {
+    for (double radius_m = kCell_m; radius_m <= kAround_m; radius_m *= 4.0) {
+      const geometry::SE2WithCovariance* nearest = nullptr;
+      double least_m2 = std::numeric_limits<double>::infinity();
+      grid_.for_each_within(at_m.x(), at_m.y(), radius_m, [&](constellation::Slot slot, double m2) {
+        if (m2 >= least_m2) return;
+        least_m2 = m2;
+        nearest = &known_[slot];
+      });
+      if (nearest != nullptr) return nearest;
+    }
+
+    const auto nearest = std::ranges::min_element(
+        known_, {}, [&](const auto& one) { return (one.mean.translation() - at_m).squaredNorm(); });
+    return nearest == known_.end() ? nullptr : &*nearest;
+  }
+
+ private:
+  static constexpr double kCell_m = 10.0;
+  static constexpr double kAround_m = 640.0;  ///< Beyond, all of them are looked at.
+
+  constellation::PointGrid grid_{kCell_m};
+  std::vector<geometry::SE2WithCovariance> known_;
+};
+
+/// What is left of a covariance without its shared part, no less than `least_sigma_m`. Pose and
+/// landmark are correlated otherwise as well, so nothing may be left.
 Eigen::Matrix2d without(const Eigen::Matrix2d& covariance, const Eigen::Matrix2d& shared,
                         double least_sigma_m) {
   const double least_m2 = least_sigma_m * least_sigma_m;
@@ -63,14 +97,15 @@ model::WholeMap read_given_map(const std::string& file, int map_id) {
 
 std::vector<model::MapLandmark> apart_from_keyframes(const model::WholeMap& map,
                                                      double least_sigma_m) {
+  const KnownKeyframes keyframes(map.keyframes);
   std::vector<model::MapLandmark> result = map.landmarks;
   for (model::MapLandmark& landmark : result) {
-    const model::KeyframePose* nearest = nearest_to(landmark.position_m, map.keyframes);
+    if (!constellation::PointGrid::representable(landmark.position_m)) continue;
+    const geometry::SE2WithCovariance* const nearest = keyframes.nearest_to(landmark.position_m);
     if (nearest == nullptr) continue;
 
-    const geometry::SE2WithCovariance map_T_vehicle{nearest->map_T_vehicle, nearest->covariance};
     const Eigen::Matrix2d shared =
-        point_covariance(map_T_vehicle, map_T_vehicle.mean.inverse() * landmark.position_m);
+        point_covariance(*nearest, nearest->mean.inverse() * landmark.position_m);
     landmark.covariance_m2 = without(landmark.covariance_m2, shared, least_sigma_m);
   }
   return result;

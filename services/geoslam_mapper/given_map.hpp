@@ -22,8 +22,8 @@ std::string why_not_given(const model::WholeMap& map);
 /// least `least_sigma_m`. A map that was driven states covariances relative to its first keyframe;
 /// far from there they are large, and nearly all of it neighbours share. Taken for an error of each
 /// landmark it would hide which of them a detection is. Landmarks of a map without keyframes (a
-/// survey), and those that are stated to be better than `least_sigma_m`, stay as they are. Cost:
-/// landmarks times keyframes.
+/// survey), and those that are stated to be better than `least_sigma_m`, stay as they are.
+/// Keyframes with values that cannot be are passed over. Cost: each landmark looks around it.
 std::vector<model::MapLandmark> apart_from_keyframes(const model::WholeMap& map,
                                                      double least_sigma_m);
 

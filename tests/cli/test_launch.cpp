@@ -17,7 +17,7 @@ namespace {
 /// A UDP port that this process has and does not share.
 class TakenPort {
  public:
-  TakenPort() : file_(::socket(AF_INET, SOCK_DGRAM, 0)) {
+  TakenPort() : file_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
     sockaddr_in any{};
     any.sin_family = AF_INET;
     REQUIRE(::bind(file_, reinterpret_cast<sockaddr*>(&any), sizeof(any)) == 0);

@@ -101,7 +101,7 @@ TEST_CASE_METHOD(RecordFixture, "log record names a full disk and a port of othe
                                           " --lcm-url '" + url + "'")
             .status == 1);
 
-  const int thief = ::socket(AF_INET, SOCK_DGRAM, 0);
+  const int thief = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   sockaddr_in any{};
   any.sin_family = AF_INET;
   any.sin_port = htons(static_cast<std::uint16_t>(record_port()));

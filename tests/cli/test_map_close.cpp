@@ -3,8 +3,8 @@
 #include <numbers>
 
 #include "tests/catch.hpp"
+#include "tests/cli/command_folder.hpp"
 #include "tests/cli/driven_file.hpp"
-#include "tests/cli/run_command.hpp"
 
 using namespace understory;
 using namespace understory::test;
@@ -33,8 +33,7 @@ RingOptions twice_mapped(std::uint64_t seed) {
   return options;
 }
 
-struct Closing {
-  TemporaryDirectory directory;
+struct Closing : CommandFolder {
   RingDrive drive;
   std::filesystem::path file;
   std::vector<model::Submap> submaps;
@@ -46,21 +45,6 @@ struct Closing {
     REQUIRE(submaps.size() > 10);
   }
 
-  Outcome run(const std::string& arguments) const {
-    return understory_command(directory, arguments);
-  }
-  std::string fine(const std::string& arguments) const {
-    const Outcome outcome = run(arguments);
-    CAPTURE(arguments, outcome.error);
-    REQUIRE(outcome.status == 0);
-    return outcome.out;
-  }
-  void refused(const std::string& arguments, int status, const std::string& what) const {
-    const Outcome outcome = run(arguments);
-    CAPTURE(arguments, outcome.out, outcome.error);
-    CHECK(outcome.status == status);
-    CHECK_THAT(outcome.error, Contains(what));
-  }
   /// Two submaps, the first ones of the drive and the last ones that were handed over.
   std::string ends(std::size_t from, std::size_t from_last) const {
     return fmt::format("map close {} --from submap:{} --to submap:{}", file.string(),

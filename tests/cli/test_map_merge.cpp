@@ -5,7 +5,7 @@
 #include "common/wire/convert.hpp"
 #include "sim/forest.hpp"
 #include "tests/catch.hpp"
-#include "tests/cli/run_command.hpp"
+#include "tests/cli/command_folder.hpp"
 #include "tests/map_file/map_fixture.hpp"
 #include "understory/ground_truth_t.hpp"
 
@@ -16,8 +16,7 @@ using Catch::Matchers::Contains;
 namespace {
 
 /// One forest, surveyed or driven through again and again; each time other trees are missed.
-struct Forest {
-  TemporaryDirectory directory;
+struct Forest : CommandFolder {
   std::mt19937_64 random{3};
   std::vector<Eigen::Vector2d> trees;
   std::string a = path("a.gpkg");
@@ -32,22 +31,6 @@ struct Forest {
   }
 
   std::string path(const std::string& name) const { return (directory / name).string(); }
-  Outcome run(const std::string& arguments) const {
-    return understory_command(directory, arguments);
-  }
-  std::string fine(const std::string& arguments) const {
-    const Outcome outcome = run(arguments);
-    CAPTURE(arguments, outcome.error);
-    REQUIRE(outcome.status == 0);
-    return outcome.out;
-  }
-  void refused(const std::string& arguments, int status, const std::string& what) const {
-    const Outcome outcome = run(arguments);
-    CAPTURE(arguments, outcome.error);
-    CHECK(outcome.status == status);
-    CHECK(lines(outcome.error) == 1);
-    CHECK_THAT(outcome.error, Contains(what));
-  }
   nlohmann::json json(const std::string& arguments) const {
     return nlohmann::json::parse(fine(arguments + " --json"));
   }

@@ -226,7 +226,15 @@ TEST_CASE("What a map's landmarks share far from its first keyframe is no error 
       CHECK(one.covariance_m2(1, 1) < 1.1 * kSurveySigma_m * kSurveySigma_m);
       CHECK(one.covariance_m2.determinant() > 0.0);
     }
-    // Without keyframes nobody knows what is shared.
+    // Keyframes that cannot be tell nothing.
+    model::WholeMap spoiled = map;
+    for (std::size_t i = 0; i < keyframes.size(); ++i)
+      spoiled.keyframes[i].covariance *= i % 2 == 0 ? std::nan("") : -1.0;
+    spoiled.keyframes.front() = {1, 0, geometry::SE2({std::nan(""), 0.0}, 0.0),
+                                 Eigen::Matrix3d::Identity()};
+    CHECK(geoslam_mapper::apart_from_keyframes(spoiled, 0.01)[0].covariance_m2 ==
+          landmarks[0].covariance_m2);
+    // Nor does anybody know without keyframes what is shared.
     const model::WholeMap surveyed{0, 0, 0, true, landmarks, {}};
     CHECK(geoslam_mapper::apart_from_keyframes(surveyed, 0.01)[0].covariance_m2 ==
           landmarks[0].covariance_m2);

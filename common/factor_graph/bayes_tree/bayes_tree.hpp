@@ -25,8 +25,8 @@ struct TreeStatistics {
 };
 
 /// A factor graph as a tree of dense fronts: puts together its structure, what is out of date in
-/// it, and the steps that bring it up to date. State: cliques and marks; all else is
-/// scratch memory of the steps.
+/// it, and the steps that bring it up to date. State: cliques and marks; all else is scratch
+/// memory of the steps.
 class BayesTree {
  public:
   /// A tree of this graph, which must outlive it; empty until eliminate(). `undo_bytes`: see

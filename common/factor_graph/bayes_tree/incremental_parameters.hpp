@@ -9,9 +9,9 @@ namespace understory::factor_graph::bayes_tree {
 constexpr std::size_t kUndoBytes = std::size_t{1} << 20U;
 
 /// When and how exactly the smoother follows. With these defaults the newest pose and what it sees
-/// are within 0.05 sigma of the batch solution of the moment (p99), and chi^2 is within 0.1 % of
-/// it; measured in docs/decisions/127. `sigma`: of the measurement, or of the variable given those
-/// above it in the tree.
+/// are within 0.05 sigma of the batch solution of the moment (p99), and chi^2 within 0.1 % of it,
+/// but for single moments behind a large closure; docs/decisions/127 has graphs that are further
+/// off. `sigma`: of the measurement, or of the variable given those above it in the tree.
 struct IncrementalParameters {
   /// A variable that would move by less stays [sigma].
   double least_move = 1e-3;

@@ -182,7 +182,8 @@ bool IncrementalSmoother::iterate(IncrementalUpdate& update, std::optional<doubl
   return verdict.is_accepted;
 }
 
-IncrementalUpdate IncrementalSmoother::run(std::optional<double> whole_loss, double most_work) {
+IncrementalUpdate IncrementalSmoother::run(std::optional<double> whole_loss) {
+  const double most_work = whole_loss ? kAnyWork : kMostWork;
   IncrementalUpdate update;
   moved_.clear();
   is_moved_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);
@@ -202,7 +203,7 @@ IncrementalUpdate IncrementalSmoother::run(std::optional<double> whole_loss, dou
 
 IncrementalUpdate IncrementalSmoother::update() {
   begin_change();
-  return run(std::nullopt, kMostWork);
+  return run(std::nullopt);
 }
 
 /// What each factor is off its linearisation says nothing about the sum over a long chain: only a
@@ -210,7 +211,7 @@ IncrementalUpdate IncrementalSmoother::update() {
 IncrementalUpdate IncrementalSmoother::whole_step(const Loss& before) {
   begin_change();
   for (const int f : factors_of_tree(graph_, tree_.cliques())) relinearisation_.add(f);
-  return run(std::max(kLossRounding * before.rows, before.chi2), kAnyWork);
+  return run(std::max(kLossRounding * before.rows, before.chi2));
 }
 
 IncrementalUpdate IncrementalSmoother::settle(int max_updates) {

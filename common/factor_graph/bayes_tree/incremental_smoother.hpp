@@ -137,7 +137,7 @@ class IncrementalSmoother {
   void commit();
   graph::FactorId keep(graph::FactorId id);
 
-  IncrementalUpdate run(std::optional<double> whole_loss, double most_work);
+  IncrementalUpdate run(std::optional<double> whole_loss);
   bool iterate(IncrementalUpdate& update, std::optional<double> whole_loss);
   void eliminate(IncrementalUpdate& update);
   void collect_moved();

@@ -28,9 +28,9 @@ class Submaps {
   void may_hand_over(bool may) { may_hand_over_ = may; }
   /// A stretch of the path became this node.
   void condensed(NodeIndex node) { here_.push_back({node, std::nullopt}); }
-  /// To be called after accepted keyframes. Looks around every few metres: gives away what is
-  /// far, and names what is wanted back. Solves once where something goes, and is
-  /// true then. Cost: one distance for each submap, and what goes.
+  /// To be called after accepted keyframes. Looks around every few metres: gives away what is far,
+  /// and names what is wanted back. Solves once where something goes, and is true then. Cost: one
+  /// distance for each submap, and what goes.
   bool follow(const model::FieldOfView& field_of_view, NodeIndex newest, model::Utime utime,
               GlobalMap& map);
 
