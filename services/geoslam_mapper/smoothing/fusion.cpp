@@ -9,6 +9,9 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
+/// So many landmarks that the map had before tie a keyframe to it: two points are a pose.
+constexpr std::size_t kTie = 2;
+
 /// chi^2 as a standard normal deviate (Wilson & Hilferty 1931).
 double chi2_deviate(double chi2, double degrees_of_freedom) {
   const double spread = 2.0 / (9.0 * degrees_of_freedom);
@@ -162,6 +165,7 @@ FusedKeyframe fuse(const model::Keyframe& arrived, const Placement& placement, c
     return fused;
   }
 
+  if (fused.associations.size() < kTie) map.trajectory.tear();
   map.trajectory.add(base_of(fused.keyframe, fused.node), map.graph);
   count_observations(fused, map);
   map.adopt_estimates();
