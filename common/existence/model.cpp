@@ -61,17 +61,27 @@ Elapsed ExistenceModel::elapsed(double dt_s) const {
           static_cast<float>(lost_share(parameters_.relax_per_s, dt_s))};
 }
 
+void ExistenceModel::learn(const PassHistories& histories) {
+  const BetaCounts& passes = recall_.passes();
+  const LearnedRates rates = histories.rates(
+      {passes.hits, passes.misses, decay_.went(), decay_.exposure_s()},
+      {recall_.of_pass(), decay_.mean_per_s()}, recall_.learns_passes(), decay_.is_learned());
+  if (recall_.learns_passes()) recall_.hold(rates.pass_recall);
+  if (decay_.is_learned()) decay_.hold(rates.decay_per_s);
+}
+
 SavedModel ExistenceModel::save() const {
   SavedModel saved;
   saved.pass = pass_;
   saved.recall = recall_.store();
   saved.births = {births_.hits, births_.misses};
   saved.decay = {decay_.went(), decay_.exposure_s()};
+  saved.learned = {recall_.learned(), decay_.learned()};
   return saved;
 }
 
 void ExistenceModel::load(const SavedModel& saved) {
-  if (saved.version != SavedModel::kVersion ||
+  if (saved.version < 1 || saved.version > SavedModel::kVersion ||
       saved.pass > std::numeric_limits<std::uint32_t>::max())
     throw std::invalid_argument("existence: a saved model of another version");
   for (const double count : saved.births) require_count(count, "births", 0.0);
@@ -79,6 +89,11 @@ void ExistenceModel::load(const SavedModel& saved) {
   ExistenceModel loaded = *this;
   loaded.recall_.restore(saved.recall);
   loaded.decay_.restore(saved.decay[0], saved.decay[1]);
+  require(saved.learned[0] >= 0.0 && saved.learned[0] < 1.0, "learned recall", saved.learned[0],
+          "0 to below 1");
+  require_count(saved.learned[1], "learned decay", 0.0);
+  loaded.recall_.hold(saved.learned[0]);
+  loaded.decay_.hold(saved.learned[1]);
   loaded.births_ = {saved.births[0], saved.births[1]};
   loaded.pass_ = static_cast<std::uint32_t>(saved.pass);
   *this = loaded;

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "common/existence/decay_rate.hpp"
+#include "common/existence/histories.hpp"
 #include "common/existence/parameters.hpp"
 #include "common/existence/recall.hpp"
 
@@ -12,12 +13,13 @@ namespace understory::existence {
 
 /// What a model has learned, as plain numbers: to be stored with the map.
 struct SavedModel {
-  static constexpr std::uint64_t kVersion = 1;
+  static constexpr std::uint64_t kVersion = 2;  ///< 1: without `learned`.
   std::uint64_t version = kVersion;
   std::uint64_t pass = 0;
   std::array<double, DetectorRecall::kNumbers> recall{};
-  std::array<double, 2> births{};  ///< Real, false.
-  std::array<double, 2> decay{};   ///< Went, exposure [s].
+  std::array<double, 2> births{};   ///< Real, false.
+  std::array<double, 2> decay{};    ///< Went, exposure [s].
+  std::array<double, 2> learned{};  ///< v, lambda [1/s] of ExistenceModel::learn(); 0: none.
 };
 
 /// Time that passed, for all points that it passed for.
@@ -47,6 +49,10 @@ class ExistenceModel {
   /// The factors of `dt_s` seconds, for PointExistence::elapse(). Throws std::invalid_argument
   /// where it is not finite or below 0.
   Elapsed elapsed(double dt_s) const;
+
+  /// v and lambda anew by what became of all points (PointExistence::tell): the means of their
+  /// joint posterior, until the next call. Without it they are what the counts say so far.
+  void learn(const PassHistories& histories);
 
   /// P of a point at its first sighting: the share of earlier new points that were real.
   double birth() const { return births_.mean(); }

@@ -8,8 +8,6 @@ namespace understory::existence_tracker {
 namespace {
 
 constexpr std::size_t kStatesPerMessage = 200;
-/// As often is what was learned applied where a drive begins.
-constexpr int kRoundsOfLearning = 10;
 /// A step that no vehicle drives between two keyframes is a correction of the map [m].
 constexpr double kLongestStepM = 50.0;
 /// Looks from nearer or farther are none: the map is wrong there [m].
@@ -76,8 +74,7 @@ void ExistenceTracker::begin_with(std::span<const model::ExistenceState> states)
   begins_drive_ = true;
 }
 
-/// The time since the landmarks were looked at has passed for all of them, and what their passes
-/// taught of the detector and of the world is applied to the passes before. O(landmarks).
+/// The time since the landmarks were looked at has passed for all of them. O(landmarks).
 void ExistenceTracker::begin_drive(model::Utime utime) {
   model_.begin_pass();
   for (auto& [id, tracked] : points_) {
@@ -87,13 +84,21 @@ void ExistenceTracker::begin_drive(model::Utime utime) {
     pass_time(utime, tracked);
     tracked.point.enter_pass(model_);
   }
-  for (int round = 0; round < kRoundsOfLearning; ++round)
-    for (auto& [id, tracked] : points_) tracked.point.reconsider(model_);
+  learn();
+  pass_began_m_ = along_m_;
+}
+
+/// How often a pass misses what is there, and how much goes, by what became of all landmarks; then
+/// each of them anew. O(landmarks).
+void ExistenceTracker::learn() {
+  existence::PassHistories histories;
+  for (const auto& [id, tracked] : points_) tracked.point.tell(histories);
+  model_.learn(histories);
   for (auto& [id, tracked] : points_) {
+    tracked.point.reconsider(model_);
     decide(tracked);
     touched_.push_back(id);
   }
-  pass_began_m_ = along_m_;
 }
 
 void ExistenceTracker::pass_time(model::Utime utime, TrackedPoint& tracked) const {
@@ -139,7 +144,8 @@ std::optional<model::Existence> ExistenceTracker::add(const model::MapUpdate& up
   return tell(update);
 }
 
-/// A pass is a way through a place: after so much path the next one begins.
+/// A pass is a way through a place: after so much path the next one begins. A drive that misses
+/// more than others shows it by then, before what it missed is taken for gone.
 void ExistenceTracker::drive_to(const model::MapUpdate& update) {
   const Eigen::Vector2d now_m = update.map_T_vehicle.translation();
   if (last_m_) along_m_ += std::min(kLongestStepM, (now_m - *last_m_).norm());
@@ -148,6 +154,7 @@ void ExistenceTracker::drive_to(const model::MapUpdate& update) {
   if (along_m_ - pass_began_m_ < parameters_.looks.pass_m) return;
   model_.begin_pass();
   pass_began_m_ = along_m_;
+  learn();
 }
 
 void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ray,

@@ -17,8 +17,6 @@ namespace model = understory::existence;
 
 constexpr double kOwnMonth_s = 30.0 * 86400.0;
 constexpr float kPatch_m = 12.0F;
-/// Of EM after each drive.
-constexpr int kRounds = 10;
 
 model::Parameters parameters_of(const std::vector<double>& tuned) {
   model::Parameters parameters;
@@ -45,9 +43,7 @@ class OwnMethod : public Method {
       points_[i].elapse(model_, time);
       points_[i].enter_pass(model_);
     }
-    for (int round = 0; round < kRounds; ++round)
-      for (std::size_t i = 0; i < points_.size(); ++i)
-        if (is_born_[i]) points_[i].reconsider(model_);
+    learn();
     time_s_ = time_s;
   }
   void look(const LookEvent& event) override {
@@ -59,9 +55,19 @@ class OwnMethod : public Method {
       is_born_[event.point] = true;
     }
   }
+  void end_drive() override { learn(); }
   double probability(std::size_t point) const override { return points_[point].probability(); }
 
  protected:
+  /// What all points have taught of passes and of the world is applied to each.
+  void learn() {
+    model::PassHistories histories;
+    for (std::size_t i = 0; i < points_.size(); ++i)
+      if (is_born_[i]) points_[i].tell(histories);
+    model_.learn(histories);
+    for (std::size_t i = 0; i < points_.size(); ++i)
+      if (is_born_[i]) points_[i].reconsider(model_);
+  }
   std::vector<model::PointExistence<S>>& points() { return points_; }
 
  private:
@@ -86,6 +92,7 @@ class PatchedMethod : public OwnMethod<model::IcosahedralShell> {
       members_.push_back(patch_of(i).join(model::odds_of(probability(i))));
   }
   void end_drive() override {
+    learn();
     for (std::size_t i = 0; i < points().size(); ++i)
       patch_of(i).update(members_[i], model::odds_of(probability(i)), points()[i].missed_from());
     std::vector<double> joint;
