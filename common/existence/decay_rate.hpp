@@ -18,10 +18,9 @@ class DecayRate {
   DecayRate(double rate_per_s, double weight);
 
   /// lambda [1/s]: what it is held at, else the posterior's mean.
-  double mean_per_s() const { return learned_ > 0.0 ? learned_ : mean_per_s_; }
+  double mean_per_s() const { return held_per_s_ > 0.0 ? held_per_s_ : mean_per_s_; }
   /// 0: at nothing.
-  void hold(double rate_per_s) { learned_ = rate_per_s; }
-  double learned() const { return learned_; }
+  void hold(double rate_per_s) { held_per_s_ = rate_per_s; }
   bool is_learned() const { return went_ > 0.0; }
   /// Its standard deviation [1/s]; 0 where the rate is not learned.
   double sigma_per_s() const;
@@ -39,7 +38,7 @@ class DecayRate {
   double went_ = 0.0;
   double exposure_s_ = 0.0;
   double mean_per_s_;
-  double learned_ = 0.0;  ///< Of ExistenceModel::learn().
+  double held_per_s_ = 0.0;
 };
 
 }  // namespace understory::existence

@@ -61,13 +61,48 @@ Elapsed ExistenceModel::elapsed(double dt_s) const {
           static_cast<float>(lost_share(parameters_.relax_per_s, dt_s))};
 }
 
+/// Before its looks v of a drive is that of the drives before, as surely as the start value is v of
+/// any drive.
+void ExistenceModel::open_drive() {
+  const double drives = learned_.before_seen + learned_.before_missed;
+  const double weight = 1.0 / (1.0 / parameters_.pass_recall_weight + 1.0 / drives);
+  learned_.now = learned_.before;
+  learned_.now_seen = weight * learned_.now;
+  learned_.now_missed = weight * (1.0 - learned_.now);
+}
+
 void ExistenceModel::learn(const PassHistories& histories) {
-  const BetaCounts& passes = recall_.passes();
-  const LearnedRates rates = histories.rates(
-      {passes.hits, passes.misses, decay_.went(), decay_.exposure_s()},
-      {recall_.of_pass(), decay_.mean_per_s()}, recall_.learns_passes(), decay_.is_learned());
-  if (recall_.learns_passes()) recall_.hold(rates.pass_recall);
-  if (decay_.is_learned()) decay_.hold(rates.decay_per_s);
+  const Parameters& told = parameters_;
+  const RatePriors priors{told.pass_recall_weight * told.pass_recall,
+                          told.pass_recall_weight * (1.0 - told.pass_recall), told.decay_weight,
+                          told.decay_per_s > 0.0 ? told.decay_weight / told.decay_per_s : 0.0};
+  if (learned_.now == 0.0) {
+    learned_.before = told.pass_recall;
+    record_passes(priors.seen, priors.missed);
+    open_drive();
+  }
+  learned_.decay_per_s = decay_.mean_per_s();
+  learned_ = histories.rates(learned_, priors, decay_.went(), decay_.exposure_s(),
+                             recall_.learns_passes(), decay_.is_learned());
+  hold();
+}
+
+void ExistenceModel::begin_drive() {
+  begin_pass();
+  if (learned_.now == 0.0) return;
+  learned_.before_was = learned_.before;
+  open_drive();
+  hold();
+}
+
+void ExistenceModel::record_passes(double seen, double missed) {
+  learned_.before_seen += seen;
+  learned_.before_missed += missed;
+}
+
+void ExistenceModel::hold() {
+  if (recall_.learns_passes()) recall_.hold(learned_.now);
+  if (decay_.is_learned()) decay_.hold(learned_.decay_per_s);
 }
 
 SavedModel ExistenceModel::save() const {
@@ -76,7 +111,7 @@ SavedModel ExistenceModel::save() const {
   saved.recall = recall_.store();
   saved.births = {births_.hits, births_.misses};
   saved.decay = {decay_.went(), decay_.exposure_s()};
-  saved.learned = {recall_.learned(), decay_.learned()};
+  saved.learned = learned_.store();
   return saved;
 }
 
@@ -89,11 +124,8 @@ void ExistenceModel::load(const SavedModel& saved) {
   ExistenceModel loaded = *this;
   loaded.recall_.restore(saved.recall);
   loaded.decay_.restore(saved.decay[0], saved.decay[1]);
-  require(saved.learned[0] >= 0.0 && saved.learned[0] < 1.0, "learned recall", saved.learned[0],
-          "0 to below 1");
-  require_count(saved.learned[1], "learned decay", 0.0);
-  loaded.recall_.hold(saved.learned[0]);
-  loaded.decay_.hold(saved.learned[1]);
+  loaded.learned_ = LearnedRates::restored(saved.learned);
+  if (loaded.learned_.now > 0.0) loaded.hold();
   loaded.births_ = {saved.births[0], saved.births[1]};
   loaded.pass_ = static_cast<std::uint32_t>(saved.pass);
   *this = loaded;

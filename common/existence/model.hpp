@@ -17,9 +17,9 @@ struct SavedModel {
   std::uint64_t version = kVersion;
   std::uint64_t pass = 0;
   std::array<double, DetectorRecall::kNumbers> recall{};
-  std::array<double, 2> births{};   ///< Real, false.
-  std::array<double, 2> decay{};    ///< Went, exposure [s].
-  std::array<double, 2> learned{};  ///< v, lambda [1/s] of ExistenceModel::learn(); 0: none.
+  std::array<double, 2> births{};  ///< Real, false.
+  std::array<double, 2> decay{};   ///< Went, exposure [s].
+  std::array<double, LearnedRates::kNumbers> learned{};
 };
 
 /// Time that passed, for all points that it passed for.
@@ -44,6 +44,8 @@ class ExistenceModel {
 
   /// A new pass begins; points notice at their next look.
   void begin_pass() { ++pass_; }
+  /// Another drive, after learn(): a pass whose v is its own.
+  void begin_drive();
   std::uint32_t pass() const { return pass_; }
 
   /// The factors of `dt_s` seconds, for PointExistence::elapse(). Throws std::invalid_argument
@@ -51,8 +53,13 @@ class ExistenceModel {
   Elapsed elapsed(double dt_s) const;
 
   /// v and lambda anew by what became of all points (PointExistence::tell): the means of their
-  /// joint posterior, until the next call. Without it they are what the counts say so far.
+  /// joint posterior, until the next call. Each point is to reconsider() once then. Without it v
+  /// and lambda are what the counts say so far.
   void learn(const PassHistories& histories);
+  /// A pass that surely saw a point, and those since the last one that had missed it.
+  void record_passes(double seen, double missed);
+  /// What learn() has said; `now` is 0 where it was not called yet.
+  const LearnedRates& learned() const { return learned_; }
 
   /// P of a point at its first sighting: the share of earlier new points that were real.
   double birth() const { return births_.mean(); }
@@ -67,10 +74,14 @@ class ExistenceModel {
   void load(const SavedModel& saved);
 
  private:
+  void open_drive();
+  void hold();
+
   Parameters parameters_;
   DetectorRecall recall_;
   DecayRate decay_;
   BetaCounts births_;
+  LearnedRates learned_;
   float rest_odds_;
   std::uint32_t pass_ = 1;
 };

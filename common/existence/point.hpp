@@ -278,12 +278,14 @@ class PointExistence {
 
   // In point_learning.hpp:
   void change_pass(ExistenceModel& model);
-  void learn_from_pass(ExistenceModel& model, double after, bool was_looked_for);
+  void learn_from_pass(ExistenceModel& model, double after, bool was_looked_for,
+                       double missed_before);
   void weigh(ExistenceModel& model, const DecayEvidence& is);
   void correct_pass(const ExistenceModel& model);
   void correct_odds(const ExistenceModel& model, MissedShare before, float decay_per_s,
                     double most_odds);
   double missed_by_detector() const;
+  double missed_passes() const { return pending_missed_ / kUnit; }
   bool is_surely_seen(double probability) const { return probability > 0.9 && unseen_ < 1e-3F; }
   static void add_pending(std::uint16_t& count, double passes) {
     count = static_cast<std::uint16_t>(std::min(65535.0, std::round(count + kUnit * passes)));

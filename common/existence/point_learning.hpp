@@ -9,17 +9,13 @@ namespace understory::existence {
 template <Shell S>
 void PointExistence<S>::tell(PassHistories& histories) const {
   if ((flags_ & kWasSure) == 0) return;
-  const double weight = (1.0 - static_cast<double>(evidence_.went)) / kUnit;
-  OpenHistory history{.missed = pending_missed_ / kUnit,
-                      .since_s = evidence_.since_s,
-                      .counted_seen = weight * pending_seen_,
-                      .counted_missed = weight * pending_missed_,
-                      .counted = evidence_};
-  if ((flags_ & kInFirstPass) == 0 && chance_missed_ < kLookedFor) {
-    history.is_closed = is_surely_seen(probability());
-    history.missed += history.is_closed ? 0.0 : missed_by_detector();
-  }
-  histories.add(history);
+  const bool has_looked = (flags_ & kInFirstPass) == 0 && chance_missed_ < kLookedFor;
+  const bool is_seen = has_looked && is_surely_seen(probability());
+  histories.add({.missed_before = missed_passes(),
+                 .missed_now = has_looked && !is_seen ? missed_by_detector() : 0.0,
+                 .is_seen_now = is_seen,
+                 .since_s = evidence_.since_s,
+                 .counted = evidence_});
 }
 
 template <Shell S>
@@ -62,11 +58,13 @@ void PointExistence<S>::change_pass(ExistenceModel& model) {
   const double lost = lost_share(model.decay().mean_per_s(), gap_s_);
   const double after = std::min(1.0, probability() / (1.0 - lost));
   const bool was_looked_for = chance_missed_ < kLookedFor;
+  const double missed_before = missed_passes();
   if ((flags_ & kIsNew) != 0 && was_looked_for) {
     model.record_birth(after);
     flags_ &= ~kIsNew & 7U;
   }
-  learn_from_pass(model, after, was_looked_for);
+  learn_from_pass(model, after, was_looked_for, missed_before);
+  const double missed = std::max(0.0, missed_passes() - missed_before);
   flags_ &= ~kInFirstPass & 7U;
 
   const double still = (1.0 - static_cast<double>(evidence_.went)) * (1.0 - lost);
@@ -74,13 +72,18 @@ void PointExistence<S>::change_pass(ExistenceModel& model) {
   const MissedShare missed_share = missed_share_;
   const float decay_per_s = decay_per_s_;
   start_pass(model);
-  if (pending_missed_ > 0) correct_odds(model, missed_share, decay_per_s, kMostOdds);
+  const LearnedRates& learned = model.learned();
+  if (learned.now > 0.0)
+    odds_ = bounded(odds_ * std::pow((1.0 - learned.before) / missed_share.value(), missed));
+  else if (pending_missed_ > 0)
+    correct_odds(model, missed_share, decay_per_s, kMostOdds);
 }
 
 /// Recall of passes and decay. What is open since the point was last surely seen counts with the
 /// probability that it is still there.
 template <Shell S>
-void PointExistence<S>::learn_from_pass(ExistenceModel& model, double after, bool was_looked_for) {
+void PointExistence<S>::learn_from_pass(ExistenceModel& model, double after, bool was_looked_for,
+                                        double missed_before) {
   if (was_looked_for && (flags_ & kInFirstPass) == 0) {
     const std::uint16_t seen = pending_seen_, missed = pending_missed_;
     add_pending(pending_seen_, pass_visibility());
@@ -90,6 +93,8 @@ void PointExistence<S>::learn_from_pass(ExistenceModel& model, double after, boo
                                  weight * (pending_missed_ - missed));
   }
   const bool is_sure = is_surely_seen(after);
+  if (is_sure && was_looked_for && (flags_ & kInFirstPass) == 0)
+    model.record_passes(1.0, missed_before);
   weigh(model, {is_sure ? 0.0F : static_cast<float>(1.0 - after), evidence_.since_s});
   if (!is_sure) return;
   flags_ |= kWasSure;
@@ -120,8 +125,11 @@ template <Shell S>
 void PointExistence<S>::correct_odds(const ExistenceModel& model, MissedShare before,
                                      float decay_per_s, double most_odds) {
   if ((flags_ & kWasSure) == 0) return;
-  const double missed = missed_share_.stepped() / before.stepped();
-  odds_ *= std::pow(missed, pending_missed_ / kUnit);
+  const LearnedRates& learned = model.learned();
+  if (learned.now > 0.0)
+    odds_ *= std::pow((1.0 - learned.before) / (1.0 - learned.before_was), missed_passes());
+  else
+    odds_ *= std::pow(missed_share_.stepped() / before.stepped(), missed_passes());
   const auto odds_of_survival = [&](double rate_per_s) {
     return odds_of(1.0 - std::clamp(lost_share(rate_per_s, evidence_.since_s), 1e-9, 1.0 - 1e-9));
   };

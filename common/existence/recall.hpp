@@ -39,12 +39,10 @@ class DetectorRecall {
     return q1 < least_q1_ ? kLeast : (q1 - false_rate_) * inverse_;
   }
   /// v: what it is held at, else what the counts say.
-  double of_pass() const { return learned_ > 0.0 ? learned_ : pass_mean_; }
+  double of_pass() const { return held_ > 0.0 ? held_ : pass_mean_; }
   /// 0: at nothing.
-  void hold(double pass_recall) { learned_ = pass_recall; }
-  double learned() const { return learned_; }
+  void hold(double pass_recall) { held_ = pass_recall; }
   bool learns_passes() const { return learns_passes_; }
-  const BetaCounts& passes() const { return passes_; }
 
   void record_look(double distance_m, bool is_hit);
   /// Changes of the counts of passes; below 0 where something is taken back.
@@ -72,7 +70,7 @@ class DetectorRecall {
   std::array<BetaCounts, kBins> bins_{};
   double all_mean_ = 0.0;
   double pass_mean_ = 0.0;
-  double learned_ = 0.0;  ///< v of ExistenceModel::learn().
+  double held_ = 0.0;
   double bins_per_m_;
   double false_rate_;
   double inverse_;

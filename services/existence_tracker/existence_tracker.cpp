@@ -8,6 +8,8 @@ namespace understory::existence_tracker {
 namespace {
 
 constexpr std::size_t kStatesPerMessage = 200;
+/// Path after which what all landmarks teach is summed up [m].
+constexpr double kLearnedEveryM = 100.0;
 /// A step that no vehicle drives between two keyframes is a correction of the map [m].
 constexpr double kLongestStepM = 50.0;
 /// Looks from nearer or farther are none: the map is wrong there [m].
@@ -76,7 +78,8 @@ void ExistenceTracker::begin_with(std::span<const model::ExistenceState> states)
 
 /// The time since the landmarks were looked at has passed for all of them. O(landmarks).
 void ExistenceTracker::begin_drive(model::Utime utime) {
-  model_.begin_pass();
+  learn();  // What the end of the drive before taught.
+  model_.begin_drive();
   for (auto& [id, tracked] : points_) {
     tracked.looked_m = tracked.pass_began_m = -1e9;
     tracked.pass_began_utime = kNever;
@@ -89,13 +92,16 @@ void ExistenceTracker::begin_drive(model::Utime utime) {
 }
 
 /// How often a pass misses what is there, and how much goes, by what became of all landmarks; then
-/// each of them anew. O(landmarks).
+/// each of them anew. What a drive missed that misses more than others never left. O(landmarks).
 void ExistenceTracker::learn() {
   existence::PassHistories histories;
   for (const auto& [id, tracked] : points_) tracked.point.tell(histories);
   model_.learn(histories);
+  learned_m_ = along_m_;
   for (auto& [id, tracked] : points_) {
     tracked.point.reconsider(model_);
+    count_false(tracked);
+    take_back(tracked);
     decide(tracked);
     touched_.push_back(id);
   }
@@ -144,17 +150,16 @@ std::optional<model::Existence> ExistenceTracker::add(const model::MapUpdate& up
   return tell(update);
 }
 
-/// A pass is a way through a place: after so much path the next one begins. A drive that misses
-/// more than others shows it by then, before what it missed is taken for gone.
+/// A pass is a way through a place: after so much path the next one begins.
 void ExistenceTracker::drive_to(const model::MapUpdate& update) {
   const Eigen::Vector2d now_m = update.map_T_vehicle.translation();
   if (last_m_) along_m_ += std::min(kLongestStepM, (now_m - *last_m_).norm());
   last_m_ = now_m;
   need_.drive_to(along_m_);
+  if (along_m_ - learned_m_ >= kLearnedEveryM) learn();
   if (along_m_ - pass_began_m_ < parameters_.looks.pass_m) return;
   model_.begin_pass();
   pass_began_m_ = along_m_;
-  learn();
 }
 
 void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ray,
@@ -186,7 +191,6 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
   tracked.state_is_due = true;
   const bool could_see = ray != existence::Ray::kBlocked;
   if (is_hit || (is_old && could_see)) need_.look(id, is_hit, is_old, along_m_);
-  if (!is_hit) count_false(tracked);
   if (ray == existence::Ray::kBlocked) take_back(tracked);
   decide(tracked);
   touched_.push_back(id);
@@ -223,8 +227,8 @@ void ExistenceTracker::confirm(TrackedPoint& tracked) {
   births_so_far_.confirmed += 1.0;
 }
 
-/// Looked for by another pass, and improbable. In its first pass nothing counts: nothing can be
-/// confirmed there either.
+/// Looked for by another pass, and improbable by what that pass's own recall is. In its first pass
+/// nothing counts: nothing can be confirmed there either.
 void ExistenceTracker::count_false(TrackedPoint& tracked) {
   if (tracked.is_confirmed || tracked.is_first_pass || tracked.is_counted) return;
   if (tracked.point.probability() >= parameters_.use.drop_below) return;
@@ -325,7 +329,9 @@ model::Existence ExistenceTracker::tell(const model::MapUpdate& update) {
   existence.map_id = update.map_id;
   existence.known = static_cast<std::uint32_t>(points_.size());
   existence.unused = unused_;
-  existence.missing_share = need_.missing_share(model_.recall().of_pass());
+  // Beyond what drives have missed, not what this one misses.
+  const double usual = model_.learned().before;
+  existence.missing_share = need_.missing_share(usual > 0.0 ? usual : model_.recall().of_pass());
   existence.new_share = need_.new_share();
   existence.is_mapping_needed = existence.missing_share > parameters_.need.missing_above ||
                                 existence.new_share > parameters_.need.new_above;

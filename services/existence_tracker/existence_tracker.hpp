@@ -43,7 +43,7 @@ struct TrackerCounters {
 /// use again when it is seen. It never associates by itself.
 ///
 /// Memory: some 250 bytes per landmark. Time: what a keyframe looks at; all landmarks where a drive
-/// or a vehicle's pass begins.
+/// begins, and every 100 m.
 class ExistenceTracker {
  public:
   /// Without landmarks. Throws std::invalid_argument where a parameter of the model cannot be.
@@ -119,6 +119,7 @@ class ExistenceTracker {
   std::uint32_t unused_ = 0;
   double along_m_ = 0.0;
   double pass_began_m_ = 0.0;
+  double learned_m_ = 0.0;
   model::LandmarkId repeated_ = 0;  ///< The last one that was told again.
   bool wants_map_ = false;
   bool begins_drive_ = false;  ///< The next keyframe is the first one with these landmarks.

@@ -37,7 +37,7 @@ class OwnMethod : public Method {
 
   void begin_drive(double time_s) override {
     const model::Elapsed time = model_.elapsed(time_s - time_s_);
-    if (drives_++ > 0) model_.begin_pass();
+    if (drives_++ > 0) model_.begin_drive();
     for (std::size_t i = 0; i < points_.size(); ++i) {
       if (!is_born_[i]) continue;
       points_[i].elapse(model_, time);
