@@ -79,6 +79,7 @@ void ExistenceTracker::begin_with(std::span<const model::ExistenceState> states)
 /// The time since the landmarks were looked at has passed for all of them. O(landmarks).
 void ExistenceTracker::begin_drive(model::Utime utime) {
   learn();  // What the end of the drive before taught.
+  for (auto& [id, tracked] : points_) count_false(tracked);
   model_.begin_drive();
   for (auto& [id, tracked] : points_) {
     tracked.looked_m = tracked.pass_began_m = -1e9;
@@ -100,7 +101,6 @@ void ExistenceTracker::learn() {
   learned_m_ = along_m_;
   for (auto& [id, tracked] : points_) {
     tracked.point.reconsider(model_);
-    count_false(tracked);
     take_back(tracked);
     decide(tracked);
     touched_.push_back(id);
@@ -177,7 +177,10 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
   const bool is_old = tracked.told_probability >= 0.0 && tracked.is_in_use;
   pass_time(update.utime, tracked);
   look->goes_on = goes_on(tracked, update.utime);
-  if (!look->goes_on) tracked.is_first_pass = tracked.has_just_left = false;
+  if (!look->goes_on) {
+    count_false(tracked);
+    tracked.is_first_pass = tracked.has_just_left = false;
+  }
   if (is_hit) {
     confirm(tracked);
     tracked.point.hit(model_, *look);
@@ -227,8 +230,8 @@ void ExistenceTracker::confirm(TrackedPoint& tracked) {
   births_so_far_.confirmed += 1.0;
 }
 
-/// Looked for by another pass, and improbable by what that pass's own recall is. In its first pass
-/// nothing counts: nothing can be confirmed there either.
+/// Looked for by another pass that is over, and improbable. In its first pass nothing counts:
+/// nothing can be confirmed there either.
 void ExistenceTracker::count_false(TrackedPoint& tracked) {
   if (tracked.is_confirmed || tracked.is_first_pass || tracked.is_counted) return;
   if (tracked.point.probability() >= parameters_.use.drop_below) return;
