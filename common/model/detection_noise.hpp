@@ -54,6 +54,8 @@ class DetectionNoise {
   /// The motion over up to 20 scans to the last one; nothing where they have too little in common.
   /// Cost: a fit, as in add().
   std::optional<ScanMotion> motion() const { return motion_over(kLongLag); }
+  /// The same over up to so many scans.
+  std::optional<ScanMotion> motion_over(std::size_t most_scans) const;
   /// The motion from the scan before the last one to that.
   std::optional<ScanMotion> step() const { return motion_over(1); }
   /// Detections of the last scan that can be found again.
@@ -157,7 +159,6 @@ class DetectionNoise {
   static std::vector<Seen> seen_in(const LandmarkScan& scan, std::span<const std::uint64_t> tracks);
   static std::vector<Pair> in_both(std::span<const Seen> then, std::span<const Seen> now);
   std::optional<Common> common_with_last(std::size_t most_scans) const;
-  std::optional<ScanMotion> motion_over(std::size_t most_scans) const;
   void learn(std::span<const Pair> pairs, const Fit& fit);
   Fit fitted_motion(std::span<const Pair> pairs) const;
   static Residual residual_of(const Pair& pair, double factor, const geometry::SE2& then_T_now);

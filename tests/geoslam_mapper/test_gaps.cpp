@@ -2,8 +2,10 @@
 // must go on saying so when the path behind the vehicle is condensed.
 #include <Eigen/LU>
 #include <random>
+#include <vector>
 
 #include "services/geoslam_mapper/smoothing/one_map.hpp"
+#include "services/geoslam_mapper/smoothing/relative_variance.hpp"
 #include "tests/catch.hpp"
 #include "tests/geoslam_mapper/simple_keyframe.hpp"
 
@@ -135,4 +137,34 @@ TEST_CASE("Pieces between ways without landmarks leave the solved graph like oth
     CHECK(all.map.map().graph.awake().size() < half.map.map().graph.awake().size() + 30);
     CHECK(all.map.map().graph.node_count() <= half.map.map().graph.node_count() + 15);
   }
+}
+
+TEST_CASE("What was seen a few keyframes before a gap does not share the error behind it",
+          "[mapper]") {
+  const GapDrive drive{.before = 20, .gap = 20, .behind = 8};
+  const int recent = SmoothingMapperParameters{}.recent_keyframes;
+  int asked = 0;
+  for (std::uint64_t seed = 300; seed < 310; ++seed) {
+    CAPTURE(seed);
+    const GapMap driven_map = driven(drive, seed, 0.0);
+    const GlobalMap& map = driven_map.map.map();
+    const auto behind = static_cast<std::uint32_t>(drive.before);
+    CHECK(map.trajectory.is_torn(behind, behind + 1));
+    CHECK_FALSE(map.trajectory.is_torn(1, behind));
+    CHECK_FALSE(map.trajectory.is_torn(map.trajectory.size(), behind + 1));
+
+    const Reference last{map.trajectory.last().node, map.trajectory.size()};
+    for (const auto& [id, landmark] : map.landmarks.all()) {
+      const bool is_behind = landmark.last_keyframe > behind;
+      CHECK(is_recent(landmark, last, recent, map.trajectory) == is_behind);
+      if (is_behind || landmark.last_keyframe + static_cast<std::uint32_t>(recent) < last.keyframe)
+        continue;
+      const double variance = relative_variances({id}, last, recent, map).front();
+      const double exact = map.graph.relative_variances(last.node, std::vector{id}).front();
+      CHECK(variance == Approx(exact));
+      CHECK(variance > 20.0 * kSigma_m * kSigma_m);
+      ++asked;
+    }
+  }
+  CHECK(asked > 50);
 }

@@ -218,6 +218,53 @@ TEST_CASE("A jump of the landmarks against the wheels shows at once", "[calibrat
   CHECK_FALSE(watch.contradicts());
 }
 
+TEST_CASE("A jump of the scans' clock that hides in noise is told for ten seconds",
+          "[calibration]") {
+  const double scan_m = 0.03;
+  const geometry::SE2 step(0.3, 0.0, 0.01);
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  std::vector<geometry::SE2> seen;
+  geometry::SE2 world_T_vehicle;
+  CalibrationWatch watch;
+  const auto drive = [&](double late_s) {
+    const auto k = static_cast<model::Utime>(seen.size());
+    model::Odometry increment;
+    increment.from_utime = 100'000 * (k - 1);
+    increment.utime = 100'000 * k;
+    increment.has_wheels = true;
+    increment.from_T_to = step;
+    increment.covariance = Eigen::Vector3d(1e-5, 1e-5, 1e-8).asDiagonal();
+    if (k > 0) watch.add(increment);
+    if (k > 0) world_T_vehicle = world_T_vehicle * step;
+
+    const geometry::SE2 noise(scan_m * normal(random), scan_m * normal(random), 0.0);
+    seen.push_back(world_T_vehicle * geometry::SE2::Exp(-late_s * 10.0 * step.Log()) * noise);
+    if (k < 5) return false;
+    const auto then = static_cast<std::size_t>(k - 5);
+    model::ScanMotion motion{100'000 * (k - 5), 100'000 * k, {}};
+    motion.then_T_now.mean = seen[then].inverse() * seen.back();
+    motion.then_T_now.covariance =
+        2.0 * Eigen::Vector3d(scan_m * scan_m, scan_m * scan_m, 4e-6).asDiagonal().toDenseMatrix();
+    watch.add(motion);
+    watch.watch(motion);
+    return watch.contradicts();
+  };
+
+  for (int k = 0; k < 300; ++k) REQUIRE_FALSE(drive(0.0));
+  int first = -1;
+  int count = 0;
+  for (int k = 0; k < 150; ++k) {
+    if (!drive(0.06)) continue;
+    if (first < 0) first = k;
+    ++count;
+  }
+  CHECK(first >= 0);
+  CHECK(first < 8);
+  CHECK(count >= 100);
+  CHECK(count < 120);
+}
+
 TEST_CASE("Scans that are shaken as a whole turn otherwise than the gyro says", "[calibration]") {
   std::mt19937_64 random(1);
   std::normal_distribution<double> normal;

@@ -11,9 +11,12 @@
 namespace understory::factor_graph::bayes_tree {
 namespace {
 
-/// From this much work on a dissection, which takes a millisecond, may pay [flops]; and if the work
-/// is this many times what the largest element alone costs in any order.
+/// From this much work on a dissection may pay, which takes a millisecond for 200 variables
+/// [flops]; and if the work is this many times what the largest element alone costs in any order.
+/// Few variables are divided once or twice, which gains little: there it must be 2 ms of fronts.
 constexpr double kMuchWork = 5e6;
+constexpr double kMuchWorkOfFew = 2e7;
+constexpr int kFew = 400;
 constexpr double kRoomForLess = 2.0;
 
 }  // namespace
@@ -84,7 +87,8 @@ const CliquePlan& CliquePlanner::plan() {
   drafts_.draft_all(problem_, order_);
 
   const double work = drafts_.flops();
-  if (work > kMuchWork && work > kRoomForLess * problem_.least_flops()) {
+  const double much = problem_.size() < kFew ? kMuchWorkOfFew : kMuchWork;
+  if (work > much && work > kRoomForLess * problem_.least_flops()) {
     const std::vector<int> before = order_;
     if (order_by_dissection()) drafts_.draft_all(problem_, order_);
     if (drafts_.flops() > work) {

@@ -142,12 +142,25 @@ void IncrementalSmoother::collect_moved() {
   }
 }
 
-void IncrementalSmoother::eliminate(IncrementalUpdate& update) {
+/// What the next update will most likely change.
+void IncrementalSmoother::find_last() {
   last_.clear();
-  for (const int f : pending_.fresh) {
+  const auto add = [&](int f) {
     for (const int v : graph_.variables_of(f)) last_.push_back(v);
+  };
+  const int expected = pending_.expected;
+  if (expected == graph::kNone || !graph_.contains(graph::VariableId(expected))) {
+    for (const int f : pending_.fresh) add(f);
+    return;
   }
+  for (int i = graph_.variable(expected).first_incidence; i != graph::kNone;
+       i = graph_.incidence(i).next) {
+    add(graph_.incidence(i).factor);
+  }
+}
 
+void IncrementalSmoother::eliminate(IncrementalUpdate& update) {
+  find_last();
   const TreeStatistics statistics = tree_.eliminate(pending_.fresh, last_);
   pending_.fresh.clear();
 

@@ -78,6 +78,10 @@ class IncrementalSmoother {
   /// determine them.
   bool marginalise(std::span<const graph::VariableId> ids);
 
+  /// The next changes will be of this variable and of what its factors tie it to: they are
+  /// eliminated last, wherever else the graph is changed meanwhile. Where nothing is expected, that
+  /// is what the new factors tie together.
+  void expect_changes_at(graph::VariableId id) { pending_.expected = index(id); }
   /// Takes the changes in. At most about one factorisation's work: what is left over is done by the
   /// next updates.
   IncrementalUpdate update();
@@ -122,8 +126,9 @@ class IncrementalSmoother {
  private:
   /// What the next update starts from, besides graph, tree and Relinearisation.
   struct Pending {
-    std::vector<int> fresh;   ///< Factors that the tree does not hold yet.
-    std::vector<int> doomed;  ///< Variables to be removed.
+    std::vector<int> fresh;       ///< Factors that the tree does not hold yet.
+    std::vector<int> doomed;      ///< Variables to be removed.
+    int expected = graph::kNone;  ///< Variable of the next changes.
     bool solve_everything = false;
   };
 
@@ -139,6 +144,7 @@ class IncrementalSmoother {
 
   IncrementalUpdate run(std::optional<double> whole_loss);
   bool iterate(IncrementalUpdate& update, std::optional<double> whole_loss);
+  void find_last();
   void eliminate(IncrementalUpdate& update);
   void collect_moved();
   void finish(IncrementalUpdate& update);

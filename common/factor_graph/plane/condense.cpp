@@ -241,28 +241,39 @@ CondensedMotion motion_of(const Graph& part, const PartSystem& system,
   return result;
 }
 
-/// A point relative to the origin: its own error, and what the poses' errors bend.
-CondensedPoint point_of(const Graph& part, const PartSystem& system, const Eigen::MatrixXd& common,
-                        const geometry::SE2& map_T_origin, std::size_t i) {
-  const PointBlock& point = system.point(i);
+/// The points relative to the origin: each one's own error, and what the poses' errors bend.
+std::vector<CondensedPoint> points_of(const Graph& part, const PartSystem& system,
+                                      const Eigen::MatrixXd& common,
+                                      const geometry::SE2& map_T_origin) {
   const geometry::SE2 origin_T_map = map_T_origin.inverse();
   const Eigen::Matrix2d to_origin = origin_T_map.rotation();
+  std::vector<CondensedPoint> result(part.points.size());
+  Eigen::MatrixXd bends(2 * static_cast<Index>(result.size()), common.cols());
 
-  // Where the part's own factors have it.
-  Eigen::Vector2d position = part.points[i] - point.covariance * point.gradient;
-  Eigen::MatrixXd bend = -rigid(origin_T_map * part.points[i]) * common;
-  for (const Cross& cross : point.observed) {
-    const auto at = system.row(cross.pose);
-    if (!at) continue;
-    const Eigen::Matrix<double, 2, 3> follows = system.follows(i, cross);
-    position += follows * system.step().segment<3>(*at);
-    bend.middleCols<3>(*at) += to_origin * follows;
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    // Where the part's own factors have it.
+    const PointBlock& point = system.point(i);
+    Eigen::Vector2d position = part.points[i] - point.covariance * point.gradient;
+    auto bend = bends.middleRows<2>(2 * static_cast<Index>(i));
+    bend.noalias() = -rigid(origin_T_map * part.points[i]) * common;
+    for (const Cross& cross : point.observed) {
+      const auto at = system.row(cross.pose);
+      if (!at) continue;
+      const Eigen::Matrix<double, 2, 3> follows = system.follows(i, cross);
+      position += follows * system.step().segment<3>(*at);
+      bend.middleCols<3>(*at) += to_origin * follows;
+    }
+    result[i].position = origin_T_map * position;
+    result[i].covariance = to_origin * point.covariance * to_origin.transpose();
   }
 
-  CondensedPoint result;
-  result.position = origin_T_map * position;
-  result.covariance = to_origin * point.covariance * to_origin.transpose() +
-                      bend * system.covariance() * bend.transpose();
+  // Of all points at once: the poses' covariance is the large one of the factors.
+  const Eigen::MatrixXd spreads = bends * system.covariance();
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    const auto row = 2 * static_cast<Index>(i);
+    result[i].covariance +=
+        spreads.middleRows<2>(row).lazyProduct(bends.middleRows<2>(row).transpose());
+  }
   return result;
 }
 
@@ -286,9 +297,7 @@ std::optional<CondensedPart> condense(const Graph& part, std::size_t inner) {
   result.outer.reserve(part.poses.size() - inner);
   for (std::size_t pose = inner; pose < part.poses.size(); ++pose)
     result.outer.push_back(motion_of(part, system, common, spread, shifted, pose));
-  result.points.reserve(part.points.size());
-  for (std::size_t i = 0; i < part.points.size(); ++i)
-    result.points.push_back(point_of(part, system, common, shifted, i));
+  result.points = points_of(part, system, common, shifted);
 
   result.map_T_origin = map_T_middle;
   if (system.bias_information() > kLeastBiasInformation) {

@@ -281,6 +281,10 @@ void Smoother::checkpoint() { state_->checkpoint(); }
 
 void Smoother::rollback() { state_->rollback(); }
 
+void Smoother::expect_changes_at(PoseId id) {
+  state_->smoother.expect_changes_at(state_->name(id));
+}
+
 SmootherUpdate Smoother::update() {
   const bayes_tree::IncrementalUpdate update = state_->smoother.update();
   state_->moved.collect(state_->smoother);

@@ -143,6 +143,9 @@ class Smoother {
   /// Restores the state of the last checkpoint(), exactly.
   void rollback();
 
+  /// The next measurements will be of this pose and of what was observed from it, whatever else is
+  /// changed meanwhile: an update costs less where that is so.
+  void expect_changes_at(PoseId id);
   /// Brings the estimates up to date. Variables without any factor are left alone.
   SmootherUpdate update();
 

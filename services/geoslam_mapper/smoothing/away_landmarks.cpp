@@ -35,8 +35,11 @@ AwayLandmarks PoseGraph::put_away(std::span<const model::LandmarkId> ids) {
   away.observed.reserve(ids.size());
   for (const model::LandmarkId id : ids) {
     const auto entry = dormant_.find(id);
-    for (const DormantObservation& one : entry->second)
-      std::erase(dormant_of_node_[one.node].landmarks, id);
+    for (const DormantObservation& one : entry->second) {
+      std::vector<model::LandmarkId>& left = dormant_of_node_[one.node].landmarks;
+      std::erase(left, id);
+      if (left.empty()) left.shrink_to_fit();  // A kilobyte for each node there ever was.
+    }
     away.observed.push_back(std::move(entry->second));
     dormant_.erase(entry);
   }

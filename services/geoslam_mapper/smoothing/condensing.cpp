@@ -16,51 +16,52 @@ constexpr double kTied_rad = 5e-3;
 
 }  // namespace
 
-std::vector<Retirement> Condensing::follow(const FusedKeyframe& fused,
-                                           const KnownGround& known_ground, Discovery& discovery,
-                                           Merges& merges, GlobalMap& map) {
-  const bool condenses = parameters_.condense_m > 0.0;
-  if (!condenses && !keeps_stretches_) return {};
-  const double now_m = map.graph.node(fused.node).along_m;
-  if (fused.is_new_node) {
-    const auto scans = static_cast<std::uint32_t>(fused.keyframe.members.size());
-    waiting_.push_back({fused.node, now_m, scans, next_number_});
-    next_number_ = StretchNumber(index(next_number_) + 1);
-  }
-  if (!condenses) return {};
+Condensing::Due Condensing::due(double range_m, const KnownGround& known_ground,
+                                const GlobalMap& map) {
+  while (!waiting_.empty() && !is_there(waiting_.front(), map.graph)) waiting_.pop_front();
+  if (parameters_.condense_m <= 0.0 || waiting_.empty()) return {};
 
-  const double range_m = fused.keyframe.field_of_view.max_range_m;
+  const double now_m = map.graph.node(map.trajectory.last().node).along_m;
   const double end_m = now_m - std::max(parameters_.condense_after_m, range_m);
-  const std::vector<Passed> stretch =
-      take_stretch(cut_policy(parameters_, range_m), end_m, known_ground, map.graph);
-  if (keeps_stretches_ && !stretch.empty()) stretches_.push_back(stretch_of(stretch, map));
-  if (stretch.empty()) return {};
-
-  std::vector<NodeIndex> nodes;
-  nodes.reserve(stretch.size());
-  for (const Passed& passed : stretch) nodes.push_back(passed.node);
-  std::vector<Retirement> retired = condense(nodes, discovery, merges, map);
-  if (keeps_stretches_ && !retired.empty()) stretches_.back().turn_to(retired);
-  return retired;
-}
-
-std::vector<Retirement> Condensing::condense(std::span<const NodeIndex> nodes, Discovery& discovery,
-                                             Merges& merges, GlobalMap& map) {
-  std::vector<model::LandmarkId> observed;
-  for (const NodeIndex node : nodes) {
-    for (const auto& [id, factor] : map.graph.node(node).observations) observed.push_back(id);
-  }
-  std::sort(observed.begin(), observed.end());
-  observed.erase(std::unique(observed.begin(), observed.end()), observed.end());
-
-  map.graph.checkpoint();
-  std::vector<Retirement> retired = map.graph.condense(nodes);
-  if (retired.empty() || !map.graph.solve().ok) {
-    map.graph.rollback();
+  const CutPolicy policy = cut_policy(parameters_, range_m);
+  const auto size = first_stretch(cut_nodes(policy, end_m, map.graph), policy);
+  if (!size) return {};
+  const auto end = waiting_.begin() + static_cast<std::ptrdiff_t>(*size);
+  if (std::any_of(waiting_.begin(), end,
+                  [&](const Passed& passed) { return known_ground.is_recent(passed.node); })) {
     return {};
   }
 
-  for (const model::LandmarkId id : observed) {
+  Due due;
+  due.waited = *size;
+  std::vector<Passed> stretch;
+  std::copy_if(waiting_.begin(), end, std::back_inserter(stretch),
+               [&](const Passed& passed) { return is_there(passed, map.graph); });
+  for (const Passed& passed : stretch) due.nodes.push_back(passed.node);
+  if (keeps_stretches_) due.was = stretch_of(stretch, map);
+  return due;
+}
+
+void Condensing::follow(const FusedKeyframe& fused, Due due, Discovery& discovery, Merges& merges,
+                        GlobalMap& map) {
+  if (fused.is_new_node && (parameters_.condense_m > 0.0 || keeps_stretches_)) {
+    const auto scans = static_cast<std::uint32_t>(fused.keyframe.members.size());
+    waiting_.push_back({fused.node, map.graph.node(fused.node).along_m, scans, next_number_});
+    next_number_ = StretchNumber(index(next_number_) + 1);
+  }
+  if (!fused.took_stretch) return;
+
+  waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(due.waited));
+  if (!fused.condensed.empty()) adopt(fused.condensed, discovery, merges, map);
+  if (!due.was) return;
+  stretches_.push_back(*std::move(due.was));
+  if (!fused.condensed.empty()) stretches_.back().turn_to(fused.condensed);
+}
+
+/// Who knew the nodes knows the one that they became.
+void Condensing::adopt(std::span<const Retirement> retired, Discovery& discovery, Merges& merges,
+                       GlobalMap& map) {
+  for (const auto& [id, factor] : map.graph.node(retired.front().into).observations) {
     StoredLandmark& landmark = map.landmarks.at(id);
     for (const Retirement& one : retired) landmark.replace(one.node, one.into);
   }
@@ -69,29 +70,6 @@ std::vector<Retirement> Condensing::condense(std::span<const NodeIndex> nodes, D
     merges.hand_over(one.node);
   }
   map.trajectory.tie(retired, map.graph);
-  map.adopt_estimates();
-  return retired;
-}
-
-/// The nodes of the oldest stretch, once it is complete and ends before `end_m`; those that were
-/// taken out of the graph since are not among them.
-std::vector<Condensing::Passed> Condensing::take_stretch(const CutPolicy& policy, double end_m,
-                                                         const KnownGround& known_ground,
-                                                         const PoseGraph& graph) {
-  while (!waiting_.empty() && !is_there(waiting_.front(), graph)) waiting_.pop_front();
-  const auto size = first_stretch(cut_nodes(policy, end_m, graph), policy);
-  if (!size) return {};
-  const auto end = waiting_.begin() + static_cast<std::ptrdiff_t>(*size);
-  if (std::any_of(waiting_.begin(), end,
-                  [&](const Passed& passed) { return known_ground.is_recent(passed.node); })) {
-    return {};
-  }
-
-  std::vector<Passed> stretch;
-  std::copy_if(waiting_.begin(), end, std::back_inserter(stretch),
-               [&](const Passed& passed) { return is_there(passed, graph); });
-  waiting_.erase(waiting_.begin(), end);
-  return stretch;
 }
 
 /// The nodes that wait and lie before `end_m`.

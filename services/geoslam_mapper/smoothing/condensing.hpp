@@ -1,7 +1,9 @@
 // The path behind the vehicle, condensed.
 #pragma once
 
+#include <cstddef>
 #include <deque>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -26,12 +28,20 @@ class Condensing {
   /// `parameters` gives `condense_*` and `cut_*`.
   explicit Condensing(const SmoothingMapperParameters& parameters) : parameters_(parameters) {}
 
-  /// To be called after each accepted keyframe. Condenses at most one stretch, and solves; the map
-  /// is as before where that fails. Cost: what the nodes of the stretch observed.
-  /// `known_ground`: what it has not judged yet waits. Returns the nodes of a stretch that became
-  /// one.
-  std::vector<Retirement> follow(const FusedKeyframe& fused, const KnownGround& known_ground,
-                                 Discovery& discovery, Merges& merges, GlobalMap& map);
+  /// Nodes that are to become one with the next keyframe.
+  struct Due {
+    std::vector<NodeIndex> nodes;  ///< Empty: none.
+    std::size_t waited = 0;        ///< How many of those that wait end with them.
+    std::optional<Stretch> was;    ///< Their factors, where they are kept.
+  };
+  /// The oldest stretch, once it is complete and the vehicle, whose sensor sees so far [m], is far
+  /// enough beyond it. Each elimination takes in the whole window around the vehicle, so fuse()
+  /// condenses it with the keyframe's own. `known_ground`: what it has not judged yet waits.
+  Due due(double range_m, const KnownGround& known_ground, const GlobalMap& map);
+  /// To be called after each accepted keyframe: hands over what the nodes of the stretch had. One
+  /// that could not be condensed stays as it is. Cost: what its nodes observed.
+  void follow(const FusedKeyframe& fused, Due due, Discovery& discovery, Merges& merges,
+              GlobalMap& map);
 
   /// From now on the factors of each stretch are kept for take_stretches(); who asks for them must
   /// take them, or they grow with the drive. Ask before the first keyframe: of a stretch that was
@@ -66,12 +76,10 @@ class Condensing {
   };
   static bool is_there(const Passed& passed, const PoseGraph& graph);
   static bool are_tied(NodeIndex before, NodeIndex node, const PoseGraph& graph);
-  std::vector<Passed> take_stretch(const CutPolicy& policy, double end_m,
-                                   const KnownGround& known_ground, const PoseGraph& graph);
   std::vector<CutNode> cut_nodes(const CutPolicy& policy, double end_m,
                                  const PoseGraph& graph) const;
-  static std::vector<Retirement> condense(std::span<const NodeIndex> nodes, Discovery& discovery,
-                                          Merges& merges, GlobalMap& map);
+  static void adopt(std::span<const Retirement> retired, Discovery& discovery, Merges& merges,
+                    GlobalMap& map);
   Stretch stretch_of(std::span<const Passed> passed, const GlobalMap& map) const;
 
   SmoothingMapperParameters parameters_;

@@ -55,9 +55,7 @@ bool Dormancy::follow(const model::FieldOfView& field_of_view, NodeIndex newest,
   map.graph.checkpoint();
   map.wake_unsolved(met);
   map.graph.make_dormant(left, map.landmarks.all());
-  (void)map.graph.solve();  // What they tell is in the graph as before.
-  map.adopt_estimates();
-  return true;
+  return true;  // What they tell is in the graph as before: the next keyframe's solution will do.
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -15,7 +15,8 @@ class Dormancy {
       : is_on_(parameters.condense_m > 0.0) {}
 
   /// To be called after accepted keyframes. Looks around every few metres; costs the landmarks in
-  /// the solved graph then, and what is changed. True where it solved.
+  /// the solved graph then, and what is changed. True where it changed something, which the next
+  /// solution takes in.
   bool follow(const model::FieldOfView& field_of_view, NodeIndex newest, GlobalMap& map);
 
   /// To be called before a keyframe is placed: what lies around a place far from where the vehicle

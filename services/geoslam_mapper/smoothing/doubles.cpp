@@ -13,8 +13,10 @@ namespace {
 constexpr double kLeastOdds = 30.0;
 /// Degrees of freedom of the error's distribution (Student's t): real landmarks have heavy tails.
 constexpr double kTail = 4.0;
-/// Share of the landmarks that bad scans put somewhere else for a while.
+/// Share of the landmarks that bad scans put somewhere else for a while, and how much rarer that is
+/// with each further node that observed them.
 constexpr double kMoved = 0.05;
+constexpr double kMovedAgain = 0.8;
 /// Trunks stand in clumps: least density of others beside one [1/m^2].
 constexpr double kLeastDensity = 0.01;
 /// Observations on one way lie this near together on the vehicle's path [m].
@@ -97,14 +99,16 @@ double density_of_one(const Eigen::Vector2d& apart_m, const Eigen::Matrix2d& cov
          (2.0 * std::numbers::pi * std::sqrt(covariance_m2.determinant()));
 }
 
-/// The same on one way, where bad scans may have put one of them anywhere within the distance
-/// within which doubles are looked for, and the others have the errors that are stated.
+/// The same on one way, where bad scans may have put the one that `fewest` nodes observed anywhere
+/// within the distance within which doubles are looked for, and the others have the errors that are
+/// stated.
 double density_of_moved(const Eigen::Vector2d& apart_m, const Eigen::Matrix2d& covariance_m2,
-                        double merge_distance_m) {
+                        std::size_t fewest, double merge_distance_m) {
   const double squared = apart_m.dot(covariance_m2.inverse() * apart_m);
   const double stated =
       std::exp(-0.5 * squared) / (2.0 * std::numbers::pi * std::sqrt(covariance_m2.determinant()));
-  return stated + kMoved / (std::numbers::pi * merge_distance_m * merge_distance_m);
+  const double moved = kMoved * std::pow(kMovedAgain, static_cast<double>(fewest) - 1.0);
+  return stated + moved / (std::numbers::pi * merge_distance_m * merge_distance_m);
 }
 
 /// Whether a third landmark, that is another one than one of the two, lies where they may be.
@@ -149,7 +153,8 @@ Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
   // Of two that were, none was missed.
   const auto turns = odds_by_turns(a, b);
   if (!turns) return Sameness::kTwo;
-  const double one = *turns * density_of_moved(apart, spread, parameters.merge_distance_m);
+  const std::size_t fewest = std::min(a.views_m.size(), b.views_m.size());
+  const double one = *turns * density_of_moved(apart, spread, fewest, parameters.merge_distance_m);
   const double two = std::max(kLeastDensity, around.density_per_m2);
   return one >= kLeastOdds * two ? Sameness::kOne : Sameness::kTwo;
 }

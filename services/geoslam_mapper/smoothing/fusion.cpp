@@ -9,6 +9,9 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
+/// So many landmarks that the map had before tie a keyframe to it: two points are a pose.
+constexpr std::size_t kTie = 2;
+
 /// chi^2 as a standard normal deviate (Wilson & Hilferty 1931).
 double chi2_deviate(double chi2, double degrees_of_freedom) {
   const double spread = 2.0 / (9.0 * degrees_of_freedom);
@@ -103,6 +106,7 @@ std::set<model::LandmarkId> judge(FusedKeyframe& fused, double outlier_chi2,
 /// reason where the keyframe contradicts the map.
 bool solve(FusedKeyframe& fused, const SmoothingMapperParameters& parameters, PoseGraph& graph) {
   factor_graph::plane::SmootherUpdate solved = graph.solve();
+  fused.is_determined = solved.ok;
   if (!solved.ok) {
     fused.reason = solved.error;
     return false;
@@ -127,6 +131,7 @@ bool solve(FusedKeyframe& fused, const SmoothingMapperParameters& parameters, Po
     return outliers.contains(pair.landmark_id);
   });
   solved = graph.solve();
+  fused.is_determined = solved.ok;
   fused.reason = solved.error;
   return solved.ok;
 }
@@ -146,22 +151,41 @@ void count_observations(const FusedKeyframe& fused, GlobalMap& map) {
   }
 }
 
-}  // namespace
-
-FusedKeyframe fuse(const model::Keyframe& arrived, const Placement& placement, const Motion& motion,
-                   const SmoothingMapperParameters& parameters, GlobalMap& map) {
+/// The keyframe in the solved graph, with the stretch as one node. Where it is not `ok` the graph
+/// is as before.
+FusedKeyframe attempt(const model::Keyframe& arrived, const Placement& placement,
+                      const Motion& motion, const SmoothingMapperParameters& parameters,
+                      std::span<const NodeIndex> stretch, GlobalMap& map) {
   FusedKeyframe fused = enter(arrived, placement, parameters, map);
   add_observations(fused, parameters, map);
   if (const auto driven = motion.since_last_centre(fused.keyframe))
     map.graph.add_motion(*driven, fused.node);
+  fused.took_stretch = !stretch.empty() && std::ranges::find(stretch, fused.node) == stretch.end();
+  if (fused.took_stretch) fused.condensed = map.graph.condense(stretch);
 
   fused.ok = solve(fused, parameters, map.graph);
+  if (!fused.ok) map.graph.rollback();
+  return fused;
+}
+
+}  // namespace
+
+FusedKeyframe fuse(const model::Keyframe& arrived, const Placement& placement, const Motion& motion,
+                   const SmoothingMapperParameters& parameters, std::span<const NodeIndex> stretch,
+                   GlobalMap& map) {
+  FusedKeyframe fused = attempt(arrived, placement, motion, parameters, stretch, map);
+  if (!fused.is_determined && !fused.condensed.empty()) {
+    // The nodes may tell what one for them does not.
+    fused = attempt(arrived, placement, motion, parameters, {}, map);
+    fused.took_stretch = true;
+  }
   if (!fused.ok) {
-    map.graph.rollback();
     fused.associations.clear();
+    fused.condensed.clear();
     return fused;
   }
 
+  if (fused.associations.size() < kTie) map.trajectory.tear();
   map.trajectory.add(base_of(fused.keyframe, fused.node), map.graph);
   count_observations(fused, map);
   map.adopt_estimates();

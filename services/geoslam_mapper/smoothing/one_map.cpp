@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include "services/geoslam_mapper/smoothing/absorbed_map.hpp"
 #include "services/geoslam_mapper/smoothing/filter_gate.hpp"
@@ -114,27 +115,28 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
 
   // What does it add?
   map_.wake(ids_of(placement->associations));
-  const FusedKeyframe fused = fuse(keyframe, *placement, motion_, parameters_, map_);
+  Condensing::Due due = condensing_.due(keyframe.field_of_view.max_range_m, known_ground_, map_);
+  const FusedKeyframe fused = fuse(keyframe, *placement, motion_, parameters_, due.nodes, map_);
   update.associations = fused.associations;
   update.chi2 = fused.chi2;
   update.degrees_of_freedom = fused.degrees_of_freedom;
   if (!fused.ok) return with(kRolledBack, fused.reason, std::move(update));
+  condensing_.follow(fused, std::move(due), discovery_, merging_.merges(), map_);
+  closures_.hand_over(fused.condensed);
+  if (!fused.condensed.empty()) submaps_.condensed(fused.condensed.front().into);
   closures_.hand_over(known_ground_.follow(fused, discovery_, merging_.merges(), map_));
   const std::vector<model::Association> gone = name_gone(
       fused.keyframe, map_.graph.pose(fused.node), fused.associations, parameters_, map_.landmarks);
   extend(fused, gone, update);
-  const std::vector<Retirement> condensed =
-      condensing_.follow(fused, known_ground_, discovery_, merging_.merges(), map_);
-  closures_.hand_over(condensed);
-  if (!condensed.empty()) submaps_.condensed(condensed.front().into);
-  lighten(keyframe, fused.node, !condensed.empty());
+  lighten(keyframe, fused.node, !fused.condensed.empty());
   confirm(keyframe, update);
   report(keyframe, update);
   return with(kUpdated, fused.reason, std::move(update));
 }
 
-/// What is far leaves the solved graph. Condensing, dormancy and submaps each solve where they do
-/// something: one of them for each keyframe bounds its time. Who waited goes first at the next.
+/// What is far leaves the solved graph. Condensing, dormancy and submaps each change much of it,
+/// which the next keyframe's solution takes in: one of them for each keyframe bounds its time. Who
+/// waited goes first at the next.
 void OneMap::lighten(const model::Keyframe& keyframe, NodeIndex newest, bool has_condensed) {
   const bool may_wait = has_condensed && !lightening_.has_waited;
   lightening_.has_waited = may_wait;

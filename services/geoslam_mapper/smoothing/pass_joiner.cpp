@@ -32,9 +32,9 @@ constexpr std::size_t kMost = 64;
 constexpr double kExpected = 85.0;
 /// Log10 of the chance that a place is wrong.
 constexpr double kMostLog10Chance = -5.0;
-/// Largest squared Mahalanobis distance of a pair that joins passes: 95 % of them; what each pass
-/// bends between its landmarks [m].
-constexpr double kGoodFit = 6.0;
+/// Largest squared Mahalanobis distance of a pair that joins passes: 78 % of them, the others are
+/// judged one by one; what each pass bends between its landmarks [m].
+constexpr double kGoodFit = 3.0;
 constexpr double kWarp_m = 0.05;
 /// Rounds of the graph for a large correction.
 constexpr int kRounds = 10;

@@ -39,9 +39,11 @@ constexpr double kNarrowGiven_m = 1.0;
 /// Whether the gate of a landmark that does not share the reference's error is so wide that another
 /// one may be meant. All of a pass are off together then.
 bool is_loose(const StoredLandmark& landmark, double gate_m,
-              const std::optional<Reference>& reference, int recent_keyframes) {
+              const std::optional<Reference>& reference, int recent_keyframes,
+              const Trajectory& trajectory) {
   const double narrow_m = landmark.nodes.empty() ? kNarrowGiven_m : kNarrow_m;
-  return gate_m > narrow_m && !(reference && is_recent(landmark, *reference, recent_keyframes));
+  return gate_m > narrow_m &&
+         !(reference && is_recent(landmark, *reference, recent_keyframes, trajectory));
 }
 
 /// The last keyframe; none where the map has none.
@@ -111,7 +113,7 @@ Placement PlaceRecogniser::associate(const model::Keyframe& keyframe,
     const StoredLandmark& landmark = map.landmarks.at(ids[i]);
     const double gate_m =
         parameters_.gate_sigmas * std::sqrt(variances[i]) + parameters_.gate_floor_m;
-    if (is_loose(landmark, gate_m, relative_to, parameters_.recent_keyframes)) {
+    if (is_loose(landmark, gate_m, relative_to, parameters_.recent_keyframes, map.trajectory)) {
       loose.push_back(ids[i]);
       continue;
     }

@@ -256,6 +256,12 @@ double PoseGraph::closure_chi2(std::uint64_t id) const {
   return off.dot(measured.information * off);
 }
 
+/// What is condensed or wakes lies behind: the next keyframe goes on where the newest one is.
+plane::SmootherUpdate PoseGraph::solve() {
+  if (newest_) smoother_.expect_changes_at(nodes_[*newest_].centre);
+  return smoother_.update();
+}
+
 std::optional<Eigen::Vector2d> PoseGraph::position(model::LandmarkId id) const {
   const auto found = point_of_.find(id);
   if (found == point_of_.end()) return std::nullopt;

@@ -259,7 +259,7 @@ class PoseGraph {
   NodeIndex absorb(const LooseGraph& other, const geometry::SE2& map_T_other, double further_m);
 
   /// Updates the estimates. Not `ok` where the measurements leave variables undetermined.
-  factor_graph::plane::SmootherUpdate solve() { return smoother_.update(); }
+  factor_graph::plane::SmootherUpdate solve();
 
   /// A node of the graph. Throws std::out_of_range where there is none.
   const Node& node(NodeIndex node) const { return nodes_.at(node); }

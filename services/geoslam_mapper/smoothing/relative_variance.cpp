@@ -60,10 +60,12 @@ std::size_t nearest_chosen(const OldLandmarks& old, const std::vector<std::size_
 
 }  // namespace
 
-bool is_recent(const StoredLandmark& landmark, const Reference& reference, int recent_keyframes) {
+bool is_recent(const StoredLandmark& landmark, const Reference& reference, int recent_keyframes,
+               const Trajectory& trajectory) {
   const auto recent = static_cast<std::uint32_t>(recent_keyframes);
   return landmark.last_keyframe + recent >= reference.keyframe &&
-         landmark.last_keyframe <= reference.keyframe + recent;
+         landmark.last_keyframe <= reference.keyframe + recent &&
+         !trajectory.is_torn(landmark.last_keyframe, reference.keyframe);
 }
 
 std::vector<double> relative_variances(const std::vector<model::LandmarkId>& ids,
@@ -75,7 +77,8 @@ std::vector<double> relative_variances(const std::vector<model::LandmarkId>& ids
   for (const model::LandmarkId id : ids) {
     const StoredLandmark& landmark = map.landmarks.at(id);
     variances.push_back(landmark.local_variance());
-    if (!reference || is_recent(landmark, *reference, recent_keyframes) || !map.graph.position(id))
+    if (!reference || is_recent(landmark, *reference, recent_keyframes, map.trajectory) ||
+        !map.graph.position(id))
       continue;
     old.numbers.push_back(variances.size() - 1);
     old.ids.push_back(id);

@@ -29,8 +29,8 @@ class Submaps {
   /// A stretch of the path became this node.
   void condensed(NodeIndex node) { here_.push_back({node, std::nullopt}); }
   /// To be called after accepted keyframes. Looks around every few metres: gives away what is far,
-  /// and names what is wanted back. Solves once where something goes, and is true then. Cost: one
-  /// distance for each submap, and what goes.
+  /// and names what is wanted back. True where something goes, which the next solution takes in.
+  /// Cost: one distance for each submap, and what goes.
   bool follow(const model::FieldOfView& field_of_view, NodeIndex newest, model::Utime utime,
               GlobalMap& map);
 

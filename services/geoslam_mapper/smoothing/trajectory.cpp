@@ -12,6 +12,9 @@ namespace {
 constexpr double kApartShare = 0.25;
 /// Bases that are forgotten at a time.
 constexpr std::size_t kForgotten = 256;
+/// Most tears that are remembered; only those of the last keyframes matter, and those around a
+/// place that is found again.
+constexpr std::size_t kMostTears = 1024;
 
 }  // namespace
 
@@ -122,6 +125,16 @@ void Trajectory::bring_back(NodeIndex node, AwayBases away, const PoseGraph& gra
                      [](const Base& a, const Base& b) { return a.utime < b.utime; });
   for (const geometry::SE2& centre_T_viewpoint : away.centre_T_viewpoints)
     put({node, centre_T_viewpoint, false}, graph);
+}
+
+void Trajectory::tear() {
+  if (torn_.size() == kMostTears) torn_.erase(torn_.begin());
+  torn_.push_back(accepted_ + 1);
+}
+
+bool Trajectory::is_torn(std::uint32_t a, std::uint32_t b) const {
+  const auto after = std::upper_bound(torn_.begin(), torn_.end(), std::min(a, b));
+  return after != torn_.end() && *after <= std::max(a, b);
 }
 
 void Trajectory::absorb(Trajectory other, NodeIndex first, const PoseGraph& graph) {

@@ -64,6 +64,11 @@ class Trajectory {
 
   /// Adds the base of an accepted keyframe. O(viewpoints of its node).
   void add(const Base& base, const PoseGraph& graph);
+  /// The keyframe that is added next is tied to those before it by odometry alone.
+  void tear();
+  /// Whether odometry alone ties two keyframes together, which are given by their numbers (size()
+  /// when they were new, in any order): then what they observed does not share one error.
+  bool is_torn(std::uint32_t a, std::uint32_t b) const;
   /// Adds a base that is no viewpoint: where the map stays as it is.
   void add_spare(Base base);
   /// Ties the bases of a node that is taken out of the graph to the node that has its place.
@@ -121,7 +126,7 @@ class Trajectory {
   /// Members of a saved state; see common/state. rebuild_index() makes the rest from them.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.bases_, self.accepted_, self.viewpoints_, self.free_viewpoints_);
+    a(self.bases_, self.accepted_, self.torn_, self.viewpoints_, self.free_viewpoints_);
   }
 
  private:
@@ -149,7 +154,8 @@ class Trajectory {
   double fold_angle_rad_;
   std::vector<Base> bases_;
   std::uint32_t accepted_ = 0;
-  std::size_t spare_ = 0;  ///< Bases that are.
+  std::vector<std::uint32_t> torn_;  ///< Keyframes before which it is, ascending.
+  std::size_t spare_ = 0;            ///< Bases that are.
   std::vector<Viewpoint> viewpoints_;
   std::vector<std::uint32_t> free_viewpoints_;
   std::vector<std::vector<std::uint32_t>> viewpoints_of_node_;

@@ -24,6 +24,10 @@ constexpr double kNoBias_s = 2.0;
 /// chi^2 of 2 degrees of freedom beyond which two ways contradict each other: by chance once in
 /// 10^7. Errors that neither covariance has make it far more frequent.
 constexpr double kContradiction = 36.0;
+/// Sigmas from which the clock has jumped; and for so long [us]: what it moves leaves its ellipse
+/// later, as the graph gives way slowly.
+constexpr double kJump_sigmas = 4.25;
+constexpr model::Utime kRemembered_us = 10'000'000;
 /// Odometry that no scan has asked for is kept so long [us].
 constexpr model::Utime kKept_us = 10'000'000;
 /// Time before and after a motion over which a twist is taken [us]. None of it is within the
@@ -108,6 +112,15 @@ void CalibrationWatch::compare(const model::ScanMotion& motion) {
   }
 }
 
+void CalibrationWatch::watch(const std::optional<model::ScanMotion>& motion) {
+  const auto motions = motion ? two_motions(*motion) : std::nullopt;
+  if (!motions || !motions->has_wheels) return jump_.begin_anew();
+  const CalibrationMatrix covariance = minutes_.covariance();
+  jump_.add(*motions, covariance * minutes_.gradient(), covariance);
+  if (std::abs(jump_.late_sigmas()) > kJump_sigmas) jumped_utime_ = motion->now_utime;
+  has_jumped_ = jumped_utime_ && motion->now_utime - *jumped_utime_ < kRemembered_us;
+}
+
 void CalibrationWatch::check(const std::optional<model::ScanMotion>& step) {
   contradicts_ = false;
   if (!step) return;
@@ -119,7 +132,7 @@ void CalibrationWatch::check(const std::optional<model::ScanMotion>& step) {
 
 double CalibrationWatch::Memory::contradiction(const TwoMotions& motions) const {
   const WayDifference difference = way_difference(motions);
-  const CalibrationMatrix covariance = (information_ + prior()).inverse();
+  const CalibrationMatrix covariance = this->covariance();
   const Eigen::Vector2d error = difference.value_m - difference.jacobian * (covariance * gradient_);
   const Eigen::Matrix2d uncertain =
       difference.covariance_m2 + difference.jacobian * covariance * difference.jacobian.transpose();
@@ -171,8 +184,12 @@ void CalibrationWatch::Memory::compare_ways(const TwoMotions& motions) {
   gradient_ += weighted * difference.value_m;
 }
 
+CalibrationMatrix CalibrationWatch::Memory::covariance() const {
+  return (information_ + prior()).inverse();
+}
+
 CalibrationError CalibrationWatch::Memory::error() const {
-  const CalibrationMatrix covariance = (information_ + prior()).inverse();
+  const CalibrationMatrix covariance = this->covariance();
   const CalibrationNumbers estimate = covariance * gradient_;
   const CalibrationNumbers sigma = covariance.diagonal().cwiseSqrt();
   const double seconds = turned_s_ + kNoBias_s;

@@ -7,6 +7,7 @@
 
 #include "common/model/detection_noise.hpp"
 #include "common/model/odometry_buffer.hpp"
+#include "services/keyframer/joint/jump_watch.hpp"
 #include "services/keyframer/joint/motion_difference.hpp"
 #include "services/keyframer/keyframer_method.hpp"
 
@@ -32,6 +33,8 @@ class CalibrationWatch {
   /// all compared, their ways where they overlap with the last one by no more than half, since
   /// the error of wheels grows with the way.
   void add(const model::ScanMotion& motion);
+  /// Takes the motion over JumpWatch::kScans scans, or that there is none.
+  void watch(const std::optional<model::ScanMotion>& motion);
   /// Takes the motion by landmarks alone since the scan before the last one, or that there is none.
   void check(const std::optional<model::ScanMotion>& step);
 
@@ -44,15 +47,17 @@ class CalibrationWatch {
   /// The same by the last ten seconds.
   CalibrationError lately() const { return seconds_.error(); }
 
-  /// Whether the last step is off by far more than both covariances allow, or nothing explains it:
-  /// a jump of the landmarks' frame or its clock, or wheels that slip.
-  bool contradicts() const { return contradicts_; }
+  /// Whether the last step is off by far more than both covariances allow, or nothing explains it,
+  /// or the clock seems to have jumped within the last ten seconds: a jump of the landmarks' frame
+  /// or its clock, or wheels that slip.
+  bool contradicts() const { return contradicts_ || has_jumped_; }
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.odometry_, self.waiting_, self.wheels_since_, self.due_utime_, self.last_utime_,
-      self.last_start_utime_, self.minutes_, self.seconds_, self.contradicts_);
+      self.last_start_utime_, self.minutes_, self.seconds_, self.jump_, self.contradicts_,
+      self.jumped_utime_, self.has_jumped_);
   }
 
  private:
@@ -70,6 +75,8 @@ class CalibrationWatch {
     /// What is older than a time that has passed counts less.
     void forget(double passed_s);
     CalibrationError error() const;
+    CalibrationMatrix covariance() const;
+    const CalibrationNumbers& gradient() const { return gradient_; }
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& self) {
@@ -101,7 +108,10 @@ class CalibrationWatch {
   model::Utime last_start_utime_ = 0;
   Memory minutes_{120.0};
   Memory seconds_{10.0};
+  JumpWatch jump_;
   bool contradicts_ = false;
+  std::optional<model::Utime> jumped_utime_;
+  bool has_jumped_ = false;
 };
 
 }  // namespace understory::keyframer::joint

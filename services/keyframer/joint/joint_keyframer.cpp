@@ -14,7 +14,7 @@ constexpr std::size_t kToContradict = 8;
 /// Share of the pairs by stated sigmas that smaller ones must keep to take their place.
 constexpr double kAsMany = 0.8;
 
-constexpr state::Format kFormat{"keyframer.joint", 5};
+constexpr state::Format kFormat{"keyframer.joint", 6};
 
 std::vector<std::uint64_t> numbers_of(const PlacedScan& placed) {
   return {placed.tracks.begin(), placed.tracks.end()};
@@ -65,6 +65,7 @@ std::optional<PlacedScan> JointKeyframer::place(
   calibration_.check(step);
   if (motion && !step && in_both >= kToContradict) calibration_.break_off();
   if (const auto way = noise_.motion()) calibration_.add(*way);
+  calibration_.watch(noise_.motion_over(JumpWatch::kScans));
   return placed;
 }
 
