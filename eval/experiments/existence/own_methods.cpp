@@ -23,6 +23,7 @@ model::Parameters parameters_of(const std::vector<double>& tuned) {
   parameters.decay_per_s = tuned[0] / kOwnMonth_s;
   parameters.decay_weight = tuned[1];
   parameters.pass_recall = tuned[2];
+  parameters.pass_recall_weight = tuned[3];
   return parameters;
 }
 
