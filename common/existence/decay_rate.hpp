@@ -17,8 +17,11 @@ class DecayRate {
   /// `weight`: what the start value counts for, in points that went; 0: it stays as it is.
   DecayRate(double rate_per_s, double weight);
 
-  /// lambda [1/s]: the posterior's mean.
-  double mean_per_s() const { return mean_per_s_; }
+  /// lambda [1/s]: what it is held at, else the posterior's mean.
+  double mean_per_s() const { return held_per_s_ > 0.0 ? held_per_s_ : mean_per_s_; }
+  /// 0: at nothing.
+  void hold(double rate_per_s) { held_per_s_ = rate_per_s; }
+  bool is_learned() const { return went_ > 0.0; }
   /// Its standard deviation [1/s]; 0 where the rate is not learned.
   double sigma_per_s() const;
 
@@ -35,6 +38,7 @@ class DecayRate {
   double went_ = 0.0;
   double exposure_s_ = 0.0;
   double mean_per_s_;
+  double held_per_s_ = 0.0;
 };
 
 }  // namespace understory::existence

@@ -61,17 +61,62 @@ Elapsed ExistenceModel::elapsed(double dt_s) const {
           static_cast<float>(lost_share(parameters_.relax_per_s, dt_s))};
 }
 
+/// Before its looks v of a drive is that of the drives before, as surely as the start value is v of
+/// any drive.
+void ExistenceModel::open_drive() {
+  const double drives = learned_.before_seen + learned_.before_missed;
+  const double weight = 1.0 / (1.0 / parameters_.pass_recall_weight + 1.0 / drives);
+  learned_.now = learned_.before;
+  learned_.now_seen = weight * learned_.now;
+  learned_.now_missed = weight * (1.0 - learned_.now);
+}
+
+void ExistenceModel::learn(const PassHistories& histories) {
+  const Parameters& told = parameters_;
+  const RatePriors priors{told.pass_recall_weight * told.pass_recall,
+                          told.pass_recall_weight * (1.0 - told.pass_recall), told.decay_weight,
+                          told.decay_per_s > 0.0 ? told.decay_weight / told.decay_per_s : 0.0};
+  if (learned_.now == 0.0) {
+    learned_.before = told.pass_recall;
+    record_passes(priors.seen, priors.missed);
+    open_drive();
+  }
+  learned_.decay_per_s = decay_.mean_per_s();
+  learned_ = histories.rates(learned_, priors, decay_.went(), decay_.exposure_s(),
+                             recall_.learns_passes(), decay_.is_learned());
+  hold();
+}
+
+void ExistenceModel::begin_drive() {
+  begin_pass();
+  if (learned_.now == 0.0) return;
+  learned_.before_was = learned_.before;
+  open_drive();
+  hold();
+}
+
+void ExistenceModel::record_passes(double seen, double missed) {
+  learned_.before_seen += seen;
+  learned_.before_missed += missed;
+}
+
+void ExistenceModel::hold() {
+  if (recall_.learns_passes()) recall_.hold(learned_.now);
+  if (decay_.is_learned()) decay_.hold(learned_.decay_per_s);
+}
+
 SavedModel ExistenceModel::save() const {
   SavedModel saved;
   saved.pass = pass_;
   saved.recall = recall_.store();
   saved.births = {births_.hits, births_.misses};
   saved.decay = {decay_.went(), decay_.exposure_s()};
+  saved.learned = learned_.store();
   return saved;
 }
 
 void ExistenceModel::load(const SavedModel& saved) {
-  if (saved.version != SavedModel::kVersion ||
+  if (saved.version < 1 || saved.version > SavedModel::kVersion ||
       saved.pass > std::numeric_limits<std::uint32_t>::max())
     throw std::invalid_argument("existence: a saved model of another version");
   for (const double count : saved.births) require_count(count, "births", 0.0);
@@ -79,6 +124,8 @@ void ExistenceModel::load(const SavedModel& saved) {
   ExistenceModel loaded = *this;
   loaded.recall_.restore(saved.recall);
   loaded.decay_.restore(saved.decay[0], saved.decay[1]);
+  loaded.learned_ = LearnedRates::restored(saved.learned);
+  if (loaded.learned_.now > 0.0) loaded.hold();
   loaded.births_ = {saved.births[0], saved.births[1]};
   loaded.pass_ = static_cast<std::uint32_t>(saved.pass);
   *this = loaded;

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "common/existence/decay_rate.hpp"
+#include "common/existence/histories.hpp"
 #include "common/existence/parameters.hpp"
 #include "common/existence/recall.hpp"
 
@@ -12,12 +13,13 @@ namespace understory::existence {
 
 /// What a model has learned, as plain numbers: to be stored with the map.
 struct SavedModel {
-  static constexpr std::uint64_t kVersion = 1;
+  static constexpr std::uint64_t kVersion = 2;  ///< 1: without `learned`.
   std::uint64_t version = kVersion;
   std::uint64_t pass = 0;
   std::array<double, DetectorRecall::kNumbers> recall{};
   std::array<double, 2> births{};  ///< Real, false.
   std::array<double, 2> decay{};   ///< Went, exposure [s].
+  std::array<double, LearnedRates::kNumbers> learned{};
 };
 
 /// Time that passed, for all points that it passed for.
@@ -42,11 +44,22 @@ class ExistenceModel {
 
   /// A new pass begins; points notice at their next look.
   void begin_pass() { ++pass_; }
+  /// Another drive, after learn(): a pass whose v is its own.
+  void begin_drive();
   std::uint32_t pass() const { return pass_; }
 
   /// The factors of `dt_s` seconds, for PointExistence::elapse(). Throws std::invalid_argument
   /// where it is not finite or below 0.
   Elapsed elapsed(double dt_s) const;
+
+  /// v and lambda anew by what became of all points (PointExistence::tell): the means of their
+  /// joint posterior, until the next call. Each point is to reconsider() once then. Without it v
+  /// and lambda are what the counts say so far.
+  void learn(const PassHistories& histories);
+  /// A pass that surely saw a point, and those since the last one that had missed it.
+  void record_passes(double seen, double missed);
+  /// What learn() has said; `now` is 0 where it was not called yet.
+  const LearnedRates& learned() const { return learned_; }
 
   /// P of a point at its first sighting: the share of earlier new points that were real.
   double birth() const { return births_.mean(); }
@@ -61,10 +74,14 @@ class ExistenceModel {
   void load(const SavedModel& saved);
 
  private:
+  void open_drive();
+  void hold();
+
   Parameters parameters_;
   DetectorRecall recall_;
   DecayRate decay_;
   BetaCounts births_;
+  LearnedRates learned_;
   float rest_odds_;
   std::uint32_t pass_ = 1;
 };

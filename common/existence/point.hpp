@@ -7,6 +7,7 @@
 #include <span>
 #include <stdexcept>
 
+#include "common/existence/histories.hpp"
 #include "common/existence/look.hpp"
 #include "common/existence/missed_share.hpp"
 #include "common/existence/model.hpp"
@@ -24,9 +25,9 @@ namespace understory::existence {
 /// (thesis 003, Implementation 1 and 2, without its "seen means exists"):
 ///
 ///     q = w q1 + (1 - w) eps          qe = d q + (1 - d) eps
-///     miss:  P : 1-P  times  1-qe : 1-eps    d : 1-d  times  1-q : 1-eps    w : 1-w  times  1-q1 :
-///     1-eps hit:   P : 1-P  times  qe : eps        d : 1-d  times  q : eps        w : 1-w  times
-///     q1 : eps
+///     miss:  P : 1-P  times  1-qe : 1-eps    d : 1-d  times  1-q : 1-eps
+///            w : 1-w  times  1-q1 : 1-eps
+///     hit:   P : 1-P  times  qe : eps    d : 1-d  times  q : eps    w : 1-w  times  q1 : eps
 ///
 /// At the end of a pass w <- d w + (1 - d) w(begin of the pass), and d <- v. Where the sensor
 /// measured something in front of the point, the pass may be hidden (PassOccluder): before its
@@ -98,19 +99,12 @@ class PointExistence {
     if (pass_ != number_of(model)) change_pass(model);
   }
 
-  /// Between enter_pass() and the first look of a pass: P anew by what all points have taught about
-  /// v and lambda, and what this one teaches by its new P (a step of EM). A few rounds over all
-  /// points of a map settle; none are needed. Does nothing once the pass has looked.
-  void reconsider(ExistenceModel& model) {
-    const bool has_looked = chance_missed_ < 1.0F || !occluder_.is_new();
-    if (pass_ != number_of(model) || has_looked || (flags_ & kInFirstPass) != 0) return;
-    const MissedShare missed_share = missed_share_;
-    const float decay_per_s = decay_per_s_;
-    expect_pass(model);
-    correct_odds(model, missed_share, decay_per_s);
-    const bool is_open = pending_missed_ > 0;
-    if (is_open) weigh(model, {static_cast<float>(1.0 - probability()), evidence_.since_s});
-  }
+  /// What became of the point since it was last surely seen: for ExistenceModel::learn().
+  void tell(PassHistories& histories) const;
+
+  /// P anew by what all points have taught about v and lambda, in this pass and in those before.
+  /// O(1).
+  void reconsider(ExistenceModel& model);
 
   /// P after evidence from elsewhere (neighbours, other sensors): a factor on its odds. Throws
   /// std::invalid_argument where it is not finite or below 0.
@@ -177,6 +171,8 @@ class PointExistence {
       2;                                        ///< The pass that found it does not count for v.
   static constexpr std::uint32_t kWasSure = 4;  ///< Surely seen in some pass: it was real.
   static constexpr double kUnit = 256.0;        ///< Of pending passes.
+  /// A pass has looked for the point where one that can see it had missed it with less than that.
+  static constexpr float kLookedFor = 0.2F;
 
   PointExistence(const ExistenceModel& model, double odds)
       : odds_(bounded(odds)),
@@ -280,75 +276,19 @@ class PointExistence {
     if (is_sure) model.recall().record_look(view.distance_m, is_hit);
   }
 
-  void change_pass(ExistenceModel& model) {
-    shell_.end_pass(static_cast<float>(pass_visibility()));
-    // P as it was after the looks: time has lowered it since.
-    const double lost = lost_share(model.decay().mean_per_s(), gap_s_);
-    const double after = std::min(1.0, probability() / (1.0 - lost));
-    const bool was_looked_for = chance_missed_ < 0.2F;
-    if ((flags_ & kIsNew) != 0 && was_looked_for) {
-      model.record_birth(after);
-      flags_ &= ~kIsNew & 7U;
-    }
-    learn_from_pass(model, after, was_looked_for);
-    flags_ &= ~kInFirstPass & 7U;
-
-    const double still = (1.0 - static_cast<double>(evidence_.went)) * (1.0 - lost);
-    weigh(model, {static_cast<float>(1.0 - still), evidence_.since_s + gap_s_});
-    const MissedShare missed_share = missed_share_;
-    const float decay_per_s = decay_per_s_;
-    start_pass(model);
-    correct_odds(model, missed_share, decay_per_s);
-  }
-
-  /// Recall of passes and decay. What is open since the point was last surely seen counts with the
-  /// probability that it is still there.
-  void learn_from_pass(ExistenceModel& model, double after, bool was_looked_for) {
-    if (was_looked_for && (flags_ & kInFirstPass) == 0) {
-      const std::uint16_t seen = pending_seen_, missed = pending_missed_;
-      add_pending(pending_seen_, pass_visibility());
-      // What was hidden says nothing of the detector.
-      const double blind = missed_share_.odds(), hidden = occluder_.chance();
-      add_pending(pending_missed_,
-                  (1.0 - pass_visibility()) * (1.0 - hidden) * blind / (blind + hidden));
-      const double weight = (1.0 - static_cast<double>(evidence_.went)) / kUnit;
-      model.recall().record_passes(weight * (pending_seen_ - seen),
-                                   weight * (pending_missed_ - missed));
-    }
-    const bool is_sure = after > 0.9 && unseen_ < 1e-3F;
-    weigh(model, {is_sure ? 0.0F : static_cast<float>(1.0 - after), evidence_.since_s});
-    if (!is_sure) return;
-    flags_ |= kWasSure;
-    pending_seen_ = pending_missed_ = 0;
-    evidence_ = {};
-  }
-
-  /// What the point counts for is taken back and counted anew.
-  void weigh(ExistenceModel& model, const DecayEvidence& is) {
-    if ((flags_ & kWasSure) != 0) model.decay().replace(evidence_, is);
-    const double more =
-        (static_cast<double>(evidence_.went) - static_cast<double>(is.went)) / kUnit;
-    if (pending_seen_ + pending_missed_ > 0)
-      model.recall().record_passes(more * pending_seen_, more * pending_missed_);
-    evidence_ = is;
-  }
-
+  // In point_learning.hpp:
+  void change_pass(ExistenceModel& model);
+  void learn_from_pass(ExistenceModel& model, double after, bool was_looked_for,
+                       double missed_before);
+  void weigh(ExistenceModel& model, const DecayEvidence& is);
+  void correct_pass(const ExistenceModel& model);
+  void correct_odds(const ExistenceModel& model, MissedShare before, float decay_per_s,
+                    double most_odds);
+  double missed_by_detector() const;
+  double missed_passes() const { return pending_missed_ / kUnit; }
+  bool is_surely_seen(double probability) const { return probability > 0.9 && unseen_ < 1e-3F; }
   static void add_pending(std::uint16_t& count, double passes) {
     count = static_cast<std::uint16_t>(std::min(65535.0, std::round(count + kUnit * passes)));
-  }
-
-  /// P by what is known of v and lambda now, since the point was last surely seen: each missed pass
-  /// weighs 1 - v, and the odds of having survived are those of lambda.
-  void correct_odds(const ExistenceModel& model, MissedShare before, float decay_per_s) {
-    if ((flags_ & kWasSure) == 0 || pending_missed_ == 0) return;
-    const double missed = missed_share_.stepped() / before.stepped();
-    odds_ *= std::pow(missed, pending_missed_ / kUnit);
-    const auto odds_of_survival = [&](double rate_per_s) {
-      return odds_of(1.0 - std::max(1e-9, lost_share(rate_per_s, evidence_.since_s)));
-    };
-    if (decay_per_s > 0.0F)
-      odds_ *= odds_of_survival(model.decay().mean_per_s()) / odds_of_survival(decay_per_s);
-    odds_ = bounded(std::min(odds_, kMostOdds));
   }
 
   /// d and lambda of the pass that begins.
@@ -395,3 +335,5 @@ class PointExistence {
 };
 
 }  // namespace understory::existence
+
+#include "common/existence/point_learning.hpp"  // IWYU pragma: export

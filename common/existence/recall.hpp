@@ -38,8 +38,11 @@ class DetectorRecall {
     const double q1 = (bin.hits + kShared * all_mean_) / (bin.total() + kShared);
     return q1 < least_q1_ ? kLeast : (q1 - false_rate_) * inverse_;
   }
-  /// v.
-  double of_pass() const { return pass_mean_; }
+  /// v: what it is held at, else what the counts say.
+  double of_pass() const { return held_ > 0.0 ? held_ : pass_mean_; }
+  /// 0: at nothing.
+  void hold(double pass_recall) { held_ = pass_recall; }
+  bool learns_passes() const { return learns_passes_; }
 
   void record_look(double distance_m, bool is_hit);
   /// Changes of the counts of passes; below 0 where something is taken back.
@@ -67,6 +70,7 @@ class DetectorRecall {
   std::array<BetaCounts, kBins> bins_{};
   double all_mean_ = 0.0;
   double pass_mean_ = 0.0;
+  double held_ = 0.0;
   double bins_per_m_;
   double false_rate_;
   double inverse_;

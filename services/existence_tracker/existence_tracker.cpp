@@ -8,8 +8,8 @@ namespace understory::existence_tracker {
 namespace {
 
 constexpr std::size_t kStatesPerMessage = 200;
-/// As often is what was learned applied where a drive begins.
-constexpr int kRoundsOfLearning = 10;
+/// Path after which what all landmarks teach is summed up [m].
+constexpr double kLearnedEveryM = 100.0;
 /// A step that no vehicle drives between two keyframes is a correction of the map [m].
 constexpr double kLongestStepM = 50.0;
 /// Looks from nearer or farther are none: the map is wrong there [m].
@@ -76,10 +76,11 @@ void ExistenceTracker::begin_with(std::span<const model::ExistenceState> states)
   begins_drive_ = true;
 }
 
-/// The time since the landmarks were looked at has passed for all of them, and what their passes
-/// taught of the detector and of the world is applied to the passes before. O(landmarks).
+/// The time since the landmarks were looked at has passed for all of them. O(landmarks).
 void ExistenceTracker::begin_drive(model::Utime utime) {
-  model_.begin_pass();
+  learn();  // What the end of the drive before taught.
+  for (auto& [id, tracked] : points_) count_false(tracked);
+  model_.begin_drive();
   for (auto& [id, tracked] : points_) {
     tracked.looked_m = tracked.pass_began_m = -1e9;
     tracked.pass_began_utime = kNever;
@@ -87,13 +88,23 @@ void ExistenceTracker::begin_drive(model::Utime utime) {
     pass_time(utime, tracked);
     tracked.point.enter_pass(model_);
   }
-  for (int round = 0; round < kRoundsOfLearning; ++round)
-    for (auto& [id, tracked] : points_) tracked.point.reconsider(model_);
+  learn();
+  pass_began_m_ = along_m_;
+}
+
+/// How often a pass misses what is there, and how much goes, by what became of all landmarks; then
+/// each of them anew. What a drive missed that misses more than others never left. O(landmarks).
+void ExistenceTracker::learn() {
+  existence::PassHistories histories;
+  for (const auto& [id, tracked] : points_) tracked.point.tell(histories);
+  model_.learn(histories);
+  learned_m_ = along_m_;
   for (auto& [id, tracked] : points_) {
+    tracked.point.reconsider(model_);
+    take_back(tracked);
     decide(tracked);
     touched_.push_back(id);
   }
-  pass_began_m_ = along_m_;
 }
 
 void ExistenceTracker::pass_time(model::Utime utime, TrackedPoint& tracked) const {
@@ -145,6 +156,7 @@ void ExistenceTracker::drive_to(const model::MapUpdate& update) {
   if (last_m_) along_m_ += std::min(kLongestStepM, (now_m - *last_m_).norm());
   last_m_ = now_m;
   need_.drive_to(along_m_);
+  if (along_m_ - learned_m_ >= kLearnedEveryM) learn();
   if (along_m_ - pass_began_m_ < parameters_.looks.pass_m) return;
   model_.begin_pass();
   pass_began_m_ = along_m_;
@@ -165,7 +177,10 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
   const bool is_old = tracked.told_probability >= 0.0 && tracked.is_in_use;
   pass_time(update.utime, tracked);
   look->goes_on = goes_on(tracked, update.utime);
-  if (!look->goes_on) tracked.is_first_pass = tracked.has_just_left = false;
+  if (!look->goes_on) {
+    count_false(tracked);
+    tracked.is_first_pass = tracked.has_just_left = false;
+  }
   if (is_hit) {
     confirm(tracked);
     tracked.point.hit(model_, *look);
@@ -179,7 +194,6 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
   tracked.state_is_due = true;
   const bool could_see = ray != existence::Ray::kBlocked;
   if (is_hit || (is_old && could_see)) need_.look(id, is_hit, is_old, along_m_);
-  if (!is_hit) count_false(tracked);
   if (ray == existence::Ray::kBlocked) take_back(tracked);
   decide(tracked);
   touched_.push_back(id);
@@ -216,8 +230,8 @@ void ExistenceTracker::confirm(TrackedPoint& tracked) {
   births_so_far_.confirmed += 1.0;
 }
 
-/// Looked for by another pass, and improbable. In its first pass nothing counts: nothing can be
-/// confirmed there either.
+/// Looked for by another pass that is over, and improbable. In its first pass nothing counts:
+/// nothing can be confirmed there either.
 void ExistenceTracker::count_false(TrackedPoint& tracked) {
   if (tracked.is_confirmed || tracked.is_first_pass || tracked.is_counted) return;
   if (tracked.point.probability() >= parameters_.use.drop_below) return;
@@ -318,7 +332,9 @@ model::Existence ExistenceTracker::tell(const model::MapUpdate& update) {
   existence.map_id = update.map_id;
   existence.known = static_cast<std::uint32_t>(points_.size());
   existence.unused = unused_;
-  existence.missing_share = need_.missing_share(model_.recall().of_pass());
+  // Beyond what drives have missed, not what this one misses.
+  const double usual = model_.learned().before;
+  existence.missing_share = need_.missing_share(usual > 0.0 ? usual : model_.recall().of_pass());
   existence.new_share = need_.new_share();
   existence.is_mapping_needed = existence.missing_share > parameters_.need.missing_above ||
                                 existence.new_share > parameters_.need.new_above;

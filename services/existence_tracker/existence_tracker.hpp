@@ -42,7 +42,8 @@ struct TrackerCounters {
 /// thesis 003). A landmark that is improbable is not to be used; it is kept and looked for, and in
 /// use again when it is seen. It never associates by itself.
 ///
-/// Memory: some 250 bytes per landmark. Time: what a keyframe looks at.
+/// Memory: some 250 bytes per landmark. Time: what a keyframe looks at; all landmarks where a drive
+/// begins, and every 100 m.
 class ExistenceTracker {
  public:
   /// Without landmarks. Throws std::invalid_argument where a parameter of the model cannot be.
@@ -86,6 +87,7 @@ class ExistenceTracker {
     }
   };
   void begin_drive(model::Utime utime);
+  void learn();
   void pass_time(model::Utime utime, TrackedPoint& tracked) const;
   void drive_to(const model::MapUpdate& update);
   void look(model::LandmarkId id, bool is_hit, existence::Ray ray, const model::MapUpdate& update);
@@ -117,6 +119,7 @@ class ExistenceTracker {
   std::uint32_t unused_ = 0;
   double along_m_ = 0.0;
   double pass_began_m_ = 0.0;
+  double learned_m_ = 0.0;
   model::LandmarkId repeated_ = 0;  ///< The last one that was told again.
   bool wants_map_ = false;
   bool begins_drive_ = false;  ///< The next keyframe is the first one with these landmarks.

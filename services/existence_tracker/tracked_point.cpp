@@ -19,9 +19,11 @@ void archive_point(Archive& a, S& saved) {
   a(saved.version, saved.shell_kind, saved.odds, saved.pass, saved.numbers, saved.shell);
 }
 
+/// Models of version 1 end before what was learned of all histories.
 template <class Archive, class S>
 void archive_model(Archive& a, S& saved) {
   a(saved.version, saved.pass, saved.recall, saved.births, saved.decay);
+  if (saved.version > 1) a(saved.learned);
 }
 
 }  // namespace

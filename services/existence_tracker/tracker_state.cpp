@@ -9,7 +9,7 @@
 namespace understory::existence_tracker {
 namespace {
 
-constexpr state::Format kFormat{"existence_tracker", 3};
+constexpr state::Format kFormat{"existence_tracker", 4};
 
 }  // namespace
 
@@ -36,7 +36,7 @@ std::string ExistenceTracker::save() const {
   }
   return state::save(kFormat, learned, ids, flags, told, looked_m, began_m, began, points, places_,
                      need_, births_, counters_, last_m_, utime_, map_id_, along_m_, pass_began_m_,
-                     repeated_, wants_map_, begins_drive_);
+                     learned_m_, repeated_, wants_map_, begins_drive_);
 }
 
 void ExistenceTracker::load(const std::string& state) {
@@ -52,7 +52,7 @@ void ExistenceTracker::load(const std::string& state) {
   state::load(state, kFormat, learned, ids, flags, told, looked_m, began_m, began, points,
               loaded.places_, loaded.need_, loaded.births_, loaded.counters_, loaded.last_m_,
               loaded.utime_, loaded.map_id_, loaded.along_m_, loaded.pass_began_m_,
-              loaded.repeated_, loaded.wants_map_, loaded.begins_drive_);
+              loaded.learned_m_, loaded.repeated_, loaded.wants_map_, loaded.begins_drive_);
   if (flags.size() != ids.size() || told.size() != ids.size() || looked_m.size() != ids.size() ||
       began_m.size() != ids.size() || began.size() != ids.size() ||
       points.size() != ids.size() * point_bytes())

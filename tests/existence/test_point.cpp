@@ -257,6 +257,9 @@ TEMPLATE_TEST_CASE("A saved point goes on as if nothing had been", "[existence]"
     }
   };
   look_on(model, point, 5);
+  PassHistories histories;
+  point.tell(histories);
+  model.learn(histories);
   const auto saved = point.save();
   const SavedModel of_model = model.save();
   ExistenceModel other{Parameters{}};
@@ -294,6 +297,11 @@ TEST_CASE("Damaged and foreign states are refused", "[existence]") {
   SavedModel saved = model.save();
   saved.recall[2] = kNaN;
   CHECK_THROWS_AS(model.load(saved), std::invalid_argument);
+  for (const double wrong : {-0.1, 1.0, kNaN}) {
+    saved = model.save();
+    saved.learned[0] = wrong;
+    CHECK_THROWS_AS(model.load(saved), std::invalid_argument);
+  }
 }
 
 TEST_CASE("A point takes at most 256 bytes", "[existence]") {

@@ -17,14 +17,13 @@ namespace model = understory::existence;
 
 constexpr double kOwnMonth_s = 30.0 * 86400.0;
 constexpr float kPatch_m = 12.0F;
-/// Of EM after each drive.
-constexpr int kRounds = 10;
 
 model::Parameters parameters_of(const std::vector<double>& tuned) {
   model::Parameters parameters;
   parameters.decay_per_s = tuned[0] / kOwnMonth_s;
   parameters.decay_weight = tuned[1];
   parameters.pass_recall = tuned[2];
+  parameters.pass_recall_weight = tuned[3];
   return parameters;
 }
 
@@ -39,15 +38,13 @@ class OwnMethod : public Method {
 
   void begin_drive(double time_s) override {
     const model::Elapsed time = model_.elapsed(time_s - time_s_);
-    if (drives_++ > 0) model_.begin_pass();
+    if (drives_++ > 0) model_.begin_drive();
     for (std::size_t i = 0; i < points_.size(); ++i) {
       if (!is_born_[i]) continue;
       points_[i].elapse(model_, time);
       points_[i].enter_pass(model_);
     }
-    for (int round = 0; round < kRounds; ++round)
-      for (std::size_t i = 0; i < points_.size(); ++i)
-        if (is_born_[i]) points_[i].reconsider(model_);
+    learn();
     time_s_ = time_s;
   }
   void look(const LookEvent& event) override {
@@ -59,9 +56,19 @@ class OwnMethod : public Method {
       is_born_[event.point] = true;
     }
   }
+  void end_drive() override { learn(); }
   double probability(std::size_t point) const override { return points_[point].probability(); }
 
  protected:
+  /// What all points have taught of passes and of the world is applied to each.
+  void learn() {
+    model::PassHistories histories;
+    for (std::size_t i = 0; i < points_.size(); ++i)
+      if (is_born_[i]) points_[i].tell(histories);
+    model_.learn(histories);
+    for (std::size_t i = 0; i < points_.size(); ++i)
+      if (is_born_[i]) points_[i].reconsider(model_);
+  }
   std::vector<model::PointExistence<S>>& points() { return points_; }
 
  private:
@@ -86,6 +93,7 @@ class PatchedMethod : public OwnMethod<model::IcosahedralShell> {
       members_.push_back(patch_of(i).join(model::odds_of(probability(i))));
   }
   void end_drive() override {
+    learn();
     for (std::size_t i = 0; i < points().size(); ++i)
       patch_of(i).update(members_[i], model::odds_of(probability(i)), points()[i].missed_from());
     std::vector<double> joint;

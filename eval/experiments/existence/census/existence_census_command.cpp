@@ -50,7 +50,7 @@ std::vector<CensusCase> cases_of(const CensusCommand& options) {
     for (const double missed : {0.36, 0.66}) {
       cases.push_back({missed, true, false, seed});
       cases.push_back({missed, true, true, seed});
-      if (missed < 0.5) cases.push_back({missed, false, false, seed});
+      cases.push_back({missed, false, false, seed});
     }
   }
   std::erase_if(cases, [&](const CensusCase& one) {

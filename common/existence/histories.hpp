@@ -1,0 +1,84 @@
+// What became of the points since each was last surely seen, and the rates that it speaks for.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <map>
+#include <vector>
+
+#include "common/existence/decay_rate.hpp"
+
+namespace understory::existence {
+
+/// Passes of one point since the last that surely saw it, up to now.
+struct OpenHistory {
+  double missed_before = 0.0;  ///< Passes before the one that is open that looked and missed it,
+  double missed_now = 0.0;     ///< and the part of the open one that did.
+  bool is_seen_now = false;    ///< The open one surely sees it: it never went.
+  float since_s = 0.0F;        ///< From the last sure sighting to the begin of the open pass.
+  DecayEvidence counted{};     ///< What of it DecayRate has counted already.
+};
+
+/// v of this drive, v of the drives before, and lambda; 0: nothing learned yet. What hinders a
+/// detector (leaves, light, rain) is of one drive: the others say little of its v.
+struct LearnedRates {
+  double now = 0.0;
+  double before = 0.0;
+  double before_was = 0.0;  ///< The same until the last call of learn().
+  double decay_per_s = 0.0;
+  // Beta counts: the prior of `now`; passes that are over, of points that were seen since.
+  double now_seen = 0.0, now_missed = 0.0;
+  double before_seen = 0.0, before_missed = 0.0;
+
+  static constexpr std::size_t kNumbers = 8;
+  std::array<double, kNumbers> store() const;
+  /// Throws std::invalid_argument where a number cannot be.
+  static LearnedRates restored(const std::array<double, kNumbers>& numbers);
+};
+
+/// What is known without histories: Beta counts of passes, points that went and their exposure.
+struct RatePriors {
+  double seen = 0.0, missed = 0.0;
+  double went = 0.0, exposure_s = 0.0;
+};
+
+/// Capture-recapture with unknown survival (Cormack, Biometrika 51, 1964): a pass sees a point that
+/// is there with v, and points go at the rate lambda. That m passes before this drive missed a
+/// point in the time T, and that this drive sees it then, is as likely as
+///
+///     B = 1 - S + S (1 - v_before)^m      A v_now,  A = S (1 - v_before)^m / B,  S = exp(-lambda
+///     T)
+///
+/// (who goes does so before the first of the misses). One drive after years fixes the product of
+/// its v and S alone, and the priors the rest: steps of EM along such a ridge end somewhere on it.
+/// Here the posterior is summed up over a grid, so that all of it counts. Passes before differ from
+/// each other, which one v for all of them does not say: together they count as kMostPasses at
+/// most, and what this drive finds of the points that they missed says the rest.
+class PassHistories {
+ public:
+  void add(const OpenHistory& history);
+
+  /// `until_now`: with its counts. `went`, `exposure_s`: of all histories, those above as they were
+  /// counted, and of the prior. What is not learned stays.
+  LearnedRates rates(const LearnedRates& until_now, const RatePriors& priors, double went,
+                     double exposure_s, bool learns_recall, bool learns_decay) const;
+
+ private:
+  static constexpr double kMostPasses = 60.0;
+
+  /// Histories that are alike: sums.
+  struct Alike {
+    double points = 0.0;
+    double missed_before = 0.0;
+    double missed_now = 0.0;
+    double since_s = 0.0;
+  };
+
+  /// By misses, the logarithm of the time, and whether this drive sees the point.
+  std::map<std::array<int, 4>, Alike> alike_;
+  double missed_before_ = 0.0;
+  double went_ = 0.0;  ///< In place of what was counted.
+  double exposure_s_ = 0.0;
+};
+
+}  // namespace understory::existence

@@ -1,0 +1,141 @@
+// What a point's passes teach the model, and what the model then says of the point. Part of
+// point.hpp.
+#pragma once
+
+#include "common/existence/point.hpp"
+
+namespace understory::existence {
+
+template <Shell S>
+void PointExistence<S>::tell(PassHistories& histories) const {
+  if ((flags_ & kWasSure) == 0) return;
+  const bool has_looked = (flags_ & kInFirstPass) == 0 && chance_missed_ < kLookedFor;
+  const bool is_seen = has_looked && is_surely_seen(probability());
+  histories.add({.missed_before = missed_passes(),
+                 .missed_now = has_looked && !is_seen ? missed_by_detector() : 0.0,
+                 .is_seen_now = is_seen,
+                 .since_s = evidence_.since_s,
+                 .counted = evidence_});
+}
+
+template <Shell S>
+void PointExistence<S>::reconsider(ExistenceModel& model) {
+  if ((flags_ & kInFirstPass) != 0) return;
+  const MissedShare missed_share = missed_share_;
+  const float decay_per_s = decay_per_s_;
+  const bool has_looked = chance_missed_ < 1.0F || !occluder_.is_new();
+  has_looked ? correct_pass(model) : expect_pass(model);
+  correct_odds(model, missed_share, decay_per_s, has_looked ? kMostOddsInPass : kMostOdds);
+  const bool is_open = pending_missed_ > 0;
+  if (is_open && !has_looked)
+    weigh(model, {static_cast<float>(1.0 - probability()), evidence_.since_s});
+}
+
+/// The pass so far as if v had been what it is now: what observe() does for an occluder.
+template <Shell S>
+void PointExistence<S>::correct_pass(const ExistenceModel& model) {
+  const double was = missed_share_.value(), hidden = occluder_.chance();
+  const double d = pass_visibility();
+  const double blind = missed_share_.odds();
+  const float unseen = unseen_;
+  expect_pass(model);
+  const double is = missed_share_.value();
+  if (unseen <= 0.0F) {
+    unseen_ = unseen;
+    return;
+  }
+  const double seeing = (1.0 - is) / (1.0 - was);
+  const double not_seeing = seeing * (missed_share_.odds() + hidden) / (blind + hidden);
+  odds_ = bounded(odds_ * (d * seeing + (1.0 - d) * not_seeing));
+  unseen_ = unseen;
+  scale_unseen(not_seeing / seeing);
+}
+
+template <Shell S>
+void PointExistence<S>::change_pass(ExistenceModel& model) {
+  shell_.end_pass(static_cast<float>(pass_visibility()));
+  // P as it was after the looks: time has lowered it since.
+  const double lost = lost_share(model.decay().mean_per_s(), gap_s_);
+  const double after = std::min(1.0, probability() / (1.0 - lost));
+  const bool was_looked_for = chance_missed_ < kLookedFor;
+  const double missed_before = missed_passes();
+  if ((flags_ & kIsNew) != 0 && was_looked_for) {
+    model.record_birth(after);
+    flags_ &= ~kIsNew & 7U;
+  }
+  learn_from_pass(model, after, was_looked_for, missed_before);
+  const double missed = std::max(0.0, missed_passes() - missed_before);
+  flags_ &= ~kInFirstPass & 7U;
+
+  const double still = (1.0 - static_cast<double>(evidence_.went)) * (1.0 - lost);
+  weigh(model, {static_cast<float>(1.0 - still), evidence_.since_s + gap_s_});
+  const MissedShare missed_share = missed_share_;
+  const float decay_per_s = decay_per_s_;
+  start_pass(model);
+  const LearnedRates& learned = model.learned();
+  if (learned.now > 0.0)
+    odds_ = bounded(odds_ * std::pow((1.0 - learned.before) / missed_share.value(), missed));
+  else if (pending_missed_ > 0)
+    correct_odds(model, missed_share, decay_per_s, kMostOdds);
+}
+
+/// Recall of passes and decay. What is open since the point was last surely seen counts with the
+/// probability that it is still there.
+template <Shell S>
+void PointExistence<S>::learn_from_pass(ExistenceModel& model, double after, bool was_looked_for,
+                                        double missed_before) {
+  if (was_looked_for && (flags_ & kInFirstPass) == 0) {
+    const std::uint16_t seen = pending_seen_, missed = pending_missed_;
+    add_pending(pending_seen_, pass_visibility());
+    add_pending(pending_missed_, missed_by_detector());
+    const double weight = (1.0 - static_cast<double>(evidence_.went)) / kUnit;
+    model.recall().record_passes(weight * (pending_seen_ - seen),
+                                 weight * (pending_missed_ - missed));
+  }
+  const bool is_sure = is_surely_seen(after);
+  if (is_sure && was_looked_for && (flags_ & kInFirstPass) == 0)
+    model.record_passes(1.0, missed_before);
+  weigh(model, {is_sure ? 0.0F : static_cast<float>(1.0 - after), evidence_.since_s});
+  if (!is_sure) return;
+  flags_ |= kWasSure;
+  pending_seen_ = pending_missed_ = 0;
+  evidence_ = {};
+}
+
+/// The part of this pass that missed the point: what was hidden says nothing of the detector.
+template <Shell S>
+double PointExistence<S>::missed_by_detector() const {
+  const double blind = missed_share_.odds(), hidden = occluder_.chance();
+  return (1.0 - pass_visibility()) * (1.0 - hidden) * blind / (blind + hidden);
+}
+
+/// What the point counts for is taken back and counted anew.
+template <Shell S>
+void PointExistence<S>::weigh(ExistenceModel& model, const DecayEvidence& is) {
+  if ((flags_ & kWasSure) != 0) model.decay().replace(evidence_, is);
+  const double more = (static_cast<double>(evidence_.went) - static_cast<double>(is.went)) / kUnit;
+  if (pending_seen_ + pending_missed_ > 0)
+    model.recall().record_passes(more * pending_seen_, more * pending_missed_);
+  evidence_ = is;
+}
+
+/// P by what is known of v and lambda now, since the point was last surely seen: each missed pass
+/// weighs 1 - v, and the odds of having survived are those of lambda.
+template <Shell S>
+void PointExistence<S>::correct_odds(const ExistenceModel& model, MissedShare before,
+                                     float decay_per_s, double most_odds) {
+  if ((flags_ & kWasSure) == 0) return;
+  const LearnedRates& learned = model.learned();
+  if (learned.now > 0.0)
+    odds_ *= std::pow((1.0 - learned.before) / (1.0 - learned.before_was), missed_passes());
+  else
+    odds_ *= std::pow(missed_share_.stepped() / before.stepped(), missed_passes());
+  const auto odds_of_survival = [&](double rate_per_s) {
+    return odds_of(1.0 - std::clamp(lost_share(rate_per_s, evidence_.since_s), 1e-9, 1.0 - 1e-9));
+  };
+  if (decay_per_s > 0.0F)
+    odds_ *= odds_of_survival(model.decay().mean_per_s()) / odds_of_survival(decay_per_s);
+  odds_ = bounded(std::min(odds_, most_odds));
+}
+
+}  // namespace understory::existence

@@ -1,0 +1,169 @@
+// Recall of passes and decay from what became of all points: against the posterior itself.
+#include <array>
+#include <cmath>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "common/existence/histories.hpp"
+#include "tests/catch.hpp"
+
+using namespace understory::existence;
+
+namespace {
+
+constexpr double kDay = 86400.0;
+constexpr double kYear = 365.25 * kDay;
+
+/// Missed by the drive before, missed by this one, or seen by it.
+struct Lived {
+  bool missed_before = false;
+  bool missed_now = false;
+  double since_s = 0.0;
+};
+
+/// Counts of the drives and of what went, with the priors.
+struct Known {
+  double now_seen = 2.8, now_missed = 1.2;
+  double before_seen = 2.8, before_missed = 1.2;
+  double went = 4.0, exposure_s = 4.0 / 8e-10;
+};
+
+constexpr RatePriors kPriors{2.8, 1.2, 4.0, 4.0 / 8e-10};
+
+LearnedRates start(const Known& known) {
+  LearnedRates rates;
+  rates.now = rates.before = 0.7;
+  rates.decay_per_s = known.went / known.exposure_s;
+  rates.now_seen = known.now_seen;
+  rates.now_missed = known.now_missed;
+  rates.before_seen = known.before_seen;
+  rates.before_missed = known.before_missed;
+  return rates;
+}
+
+LearnedRates learned(const std::vector<Lived>& all, const Known& known, bool recall = true,
+                     bool decay = true) {
+  PassHistories histories;
+  for (const Lived& one : all)
+    histories.add({.missed_before = one.missed_before ? 1.0 : 0.0,
+                   .missed_now = one.missed_now ? 1.0 : 0.0,
+                   .is_seen_now = !one.missed_now,
+                   .since_s = static_cast<float>(one.since_s)});
+  return histories.rates(start(known), kPriors, known.went, known.exposure_s, recall, decay);
+}
+
+/// Log of what a history says.
+double log_chance(const Lived& one, double now, double last, double lambda) {
+  const double stayed = std::exp(-lambda * one.since_s);
+  const double missed = one.missed_before ? 1.0 - last : 1.0;
+  return std::log(one.missed_now ? 1.0 - stayed + stayed * missed * (1.0 - now)
+                                 : stayed * missed * now);
+}
+
+/// Means by a fine grid over all that can be, every history by itself.
+std::array<double, 3> summed_up(const std::vector<Lived>& all, const Known& known) {
+  constexpr int kRecalls = 60, kRates = 120;
+  double total = 0.0;
+  std::array<double, 3> means{};
+  std::optional<double> offset;
+  for (int i = 0; i < kRecalls; ++i) {
+    for (int k = 0; k < kRecalls; ++k) {
+      for (int l = 0; l < kRates; ++l) {
+        const double now = (i + 0.5) / kRecalls, last = (k + 0.5) / kRecalls;
+        const double lambda = 1e-11 * std::exp((l + 0.5) / kRates * std::log(1e4));
+        double log = (known.now_seen - 1.0) * std::log(now) +
+                     (known.now_missed - 1.0) * std::log(1.0 - now) +
+                     (known.before_seen - 1.0) * std::log(last) +
+                     (known.before_missed - 1.0) * std::log(1.0 - last) +
+                     known.went * std::log(lambda) - known.exposure_s * lambda;
+        for (const Lived& one : all) log += log_chance(one, now, last, lambda);
+        offset = offset.value_or(log);
+        const double weight = std::exp(std::min(600.0, log - *offset));
+        total += weight;
+        means[0] += weight * now;
+        means[1] += weight * last;
+        means[2] += weight * lambda;
+      }
+    }
+  }
+  for (double& mean : means) mean /= total;
+  return means;
+}
+
+}  // namespace
+
+TEST_CASE("Rates are the means of their posterior", "[existence]") {
+  std::vector<Lived> all;
+  SECTION("one drive after years: only the product is known") {
+    for (int i = 0; i < 40; ++i) all.push_back({false, i >= 14, 6.0 * kYear});
+  }
+  SECTION("two drives") {
+    for (int i = 0; i < 20; ++i) all.push_back({false, i >= 8, kDay});
+    for (int i = 0; i < 20; ++i) all.push_back({true, i >= 7, 6.0 * kYear + kDay});
+  }
+  SECTION("nothing at all") {}
+  const auto truth = summed_up(all, {});
+  const LearnedRates rates = learned(all, {});
+  CHECK(rates.now == Approx(truth[0]).margin(0.015));
+  CHECK(rates.before == Approx(truth[1]).margin(0.015));
+  CHECK(rates.decay_per_s == Approx(truth[2]).epsilon(0.06));
+}
+
+TEST_CASE("Thousands that two drives missed are not taken for gone", "[existence]") {
+  std::mt19937_64 random(31);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  const double last = GENERATE(0.34, 0.9);
+  const double now = GENERATE(0.34, 0.64);
+  std::vector<Lived> all;
+  Known known;
+  for (int i = 0; i < 3000; ++i) {
+    const bool is_there = unit(random) >= 0.05;
+    const bool missed_last = !is_there || unit(random) >= last;
+    const bool missed_now = !is_there || unit(random) >= now;
+    known.before_seen += missed_last ? 0.0 : 1.0;
+    known.exposure_s += missed_last ? 0.0 : 6.0 * kYear;
+    all.push_back({missed_last, missed_now, missed_last ? 6.0 * kYear : kDay});
+  }
+  const LearnedRates rates = learned(all, known);
+  CHECK(rates.now == Approx(now).margin(0.05));
+  CHECK(rates.before == Approx(last).margin(0.06));
+  CHECK(std::exp(-rates.decay_per_s * 6.0 * kYear) == Approx(0.95).margin(0.08));
+}
+
+TEST_CASE("A drive that misses more than the one before takes nothing for gone", "[existence]") {
+  // All were seen by the last drive, a month ago; a third is missed now.
+  std::vector<Lived> all;
+  for (int i = 0; i < 300; ++i) all.push_back({false, i % 3 == 0, 30.0 * kDay});
+  Known known;
+  known.before_seen = 300.0;
+  const LearnedRates rates = learned(all, known);
+  CHECK(rates.now == Approx(0.7).margin(0.05));
+  CHECK(rates.before > 0.98);
+}
+
+TEST_CASE("What is not learned stays", "[existence]") {
+  const std::vector<Lived> all(50, {true, true, kYear});
+  const LearnedRates recall_told = learned(all, {}, false, true);
+  CHECK(recall_told.now == 0.7);
+  CHECK(recall_told.before == 0.7);
+  CHECK(recall_told.decay_per_s > 8e-10);
+  const LearnedRates decay_told = learned(all, {}, true, false);
+  CHECK(decay_told.decay_per_s == start({}).decay_per_s);
+  CHECK(decay_told.now < 0.4);
+}
+
+TEST_CASE("What was counted by the probability of then is taken out", "[existence]") {
+  PassHistories plain, counted;
+  OpenHistory history{.missed_now = 1.0, .since_s = 1e6F};
+  plain.add(history);
+  history.counted = {.went = 0.4F, .since_s = 1e6F};
+  counted.add(history);
+  const Known known;
+  const LearnedRates a =
+      plain.rates(start(known), kPriors, known.went, known.exposure_s, true, true);
+  const LearnedRates b = counted.rates(start(known), kPriors, known.went + 0.4,
+                                       known.exposure_s + 0.6 * 1e6, true, true);
+  CHECK(a.now == Approx(b.now));
+  CHECK(a.decay_per_s == Approx(b.decay_per_s));
+}
