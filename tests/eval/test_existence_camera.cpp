@@ -38,7 +38,7 @@ CameraPoint point_ahead() {
 
 const std::vector<CameraMethod> kThree{
     {{"no removal", make_no_removal, {}}, false},
-    {{"icosahedral", make_icosahedral, {0.25, 20.0, 0.95}}, false},
+    {{"icosahedral", make_icosahedral, {0.25, 20.0, 0.95, 200.0}}, false},
     {{"ideal", make_ideal, {}}, false}};
 
 }  // namespace

@@ -87,7 +87,7 @@ std::vector<TunedMethod> forest_methods(const ExistenceRun& run, double rate_per
     if (name == "ideal" || name == "no removal") continue;
     methods.push_back(method);
     const bool is_own = name.rfind("icosahedral", 0) == 0 || name == "von Mises-Fisher";
-    if (is_own) methods.back().tuned = {rate_per_s * kMonthOfSeconds, 20.0, 0.7};
+    if (is_own) methods.back().tuned = {rate_per_s * kMonthOfSeconds, 20.0, 0.7, 4.0};
   }
   return methods;
 }

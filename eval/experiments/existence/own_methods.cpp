@@ -20,10 +20,10 @@ constexpr float kPatch_m = 12.0F;
 
 model::Parameters parameters_of(const std::vector<double>& tuned) {
   model::Parameters parameters;
-  parameters.decay_per_s = tuned[0] / kOwnMonth_s;
-  parameters.decay_weight = tuned[1];
-  parameters.pass_recall = tuned[2];
-  parameters.pass_recall_weight = tuned[3];
+  parameters.decay_per_s = tuned.at(0) / kOwnMonth_s;
+  parameters.decay_weight = tuned.at(1);
+  parameters.pass_recall = tuned.at(2);
+  parameters.pass_recall_weight = tuned.at(3);
   return parameters;
 }
 

@@ -131,7 +131,7 @@ void add_map(const CensusRun& run, std::size_t drive, nlohmann::json& row) {
 nlohmann::json rows_of(const CensusCase& one, const CensusOptions& options, const CensusRun& run) {
   const auto true_rates = make_true_rates(run.history, {});
   const auto library =
-      make_icosahedral(run.history, {options.decay_per_s * kMonthOfCensus_s, 20.0, 0.7});
+      make_icosahedral(run.history, {options.decay_per_s * kMonthOfCensus_s, 20.0, 0.7, 4.0});
   const std::vector<CensusAnswers> ideal = answers_of("true rates", *true_rates, run);
   const std::vector<CensusAnswers> model = answers_of("icosahedral", *library, run);
   nlohmann::json rows = nlohmann::json::array();
