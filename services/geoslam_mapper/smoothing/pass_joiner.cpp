@@ -77,6 +77,18 @@ double misfit(const std::vector<MergedPair>& pairs, const GlobalMap& map, bool j
   return sum;
 }
 
+/// What a landmark around was told from that came with another map and was not seen since: a given
+/// map has no path. None where there is none.
+std::optional<NodeIndex> given_around(const Eigen::Vector2d& here_m, double range_m,
+                                      const GlobalMap& map) {
+  for (const model::LandmarkId id : map.landmarks.index().near({here_m, range_m})) {
+    const StoredLandmark& landmark = map.landmarks.at(id);
+    if (landmark.last_keyframe > 0 || landmark.nodes.empty()) continue;
+    if (map.graph.position(id) || map.graph.is_dormant(id)) return landmark.nodes.front();
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 JoinedPasses PassJoiner::follow(const model::FieldOfView& field_of_view, NodeIndex newest,
@@ -94,7 +106,8 @@ JoinedPasses PassJoiner::follow(const model::FieldOfView& field_of_view, NodeInd
   return join(std::move(pairs), merges, map);
 }
 
-/// The node of another pass that is nearest to where the vehicle seems to be.
+/// The node of another pass that is nearest to where the vehicle seems to be, or that of a map that
+/// was given.
 std::optional<PassJoiner::EarlierPass> PassJoiner::earlier_pass(
     const model::FieldOfView& field_of_view, NodeIndex newest, const GlobalMap& map) const {
   const Eigen::Vector2d here_m = map.graph.pose(newest).translation();
@@ -111,7 +124,11 @@ std::optional<PassJoiner::EarlierPass> PassJoiner::earlier_pass(
         nearest_m = distance_m;
         pass.node = node;
       });
-  if (nearest_m > reach_m) return std::nullopt;
+  if (nearest_m > reach_m) {
+    const auto given = given_around(here_m, field_of_view.max_range_m, map);
+    if (!given) return std::nullopt;
+    pass.node = *given;
+  }
 
   auto relative = map.graph.relative(pass.node, newest);
   if (!relative) return std::nullopt;
