@@ -134,6 +134,7 @@ TEST_CASE("Thousands that two drives missed are not taken for gone", "[existence
 TEST_CASE("A drive that misses more than the one before takes nothing for gone", "[existence]") {
   // All were seen by the last drive, a month ago; a third is missed now.
   std::vector<Lived> all;
+  all.reserve(300);
   for (int i = 0; i < 300; ++i) all.push_back({false, i % 3 == 0, 30.0 * kDay});
   Known known;
   known.before_seen = 300.0;

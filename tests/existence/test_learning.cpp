@@ -313,6 +313,25 @@ TEST_CASE("False detections die, and their share is learned", "[existence]") {
   CHECK(model.birth() == Approx(1.0 - false_share).margin(0.04));
 }
 
+namespace {
+
+/// Chance of hypothesis `h` (nothing, cleared, occluded) with this chance before, of the points in
+/// `state` and of what was seen of them.
+double chance_of(std::size_t h, double prior, unsigned state, const std::vector<double>& before,
+                 const std::vector<double>& ratios) {
+  const PatchParameters parameters;
+  double p = prior;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const double alone = before[i] / (1.0 - parameters.cleared * parameters.gone_in_it);
+    const double kept = alone * (h == 1 ? 1.0 - parameters.gone_in_it : 1.0);
+    const bool exists = (state >> i & 1U) != 0;
+    p *= exists ? kept * (h == 2 ? 1.0 : ratios[i]) : 1.0 - kept;
+  }
+  return p;
+}
+
+}  // namespace
+
 TEST_CASE("A patch is Bayes' rule over what may have come over it", "[existence]") {
   const PatchParameters parameters;
   Patch patch;
@@ -332,13 +351,7 @@ TEST_CASE("A patch is Bayes' rule over what may have come over it", "[existence]
     double there = 0.0, all = 0.0;
     for (std::size_t h = 0; h < 3; ++h) {
       for (unsigned state = 0; state < 8; ++state) {
-        double p = priors[h];
-        for (std::size_t i = 0; i < 3; ++i) {
-          const double alone = before[i] / (1.0 - parameters.cleared * parameters.gone_in_it);
-          const double kept = alone * (h == 1 ? 1.0 - parameters.gone_in_it : 1.0);
-          const bool exists = (state >> i & 1U) != 0;
-          p *= exists ? kept * (h == 2 ? 1.0 : ratios[i]) : 1.0 - kept;
-        }
+        const double p = chance_of(h, priors[h], state, before, ratios);
         all += p;
         if ((state >> target & 1U) != 0) there += p;
       }

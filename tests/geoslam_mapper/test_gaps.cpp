@@ -114,7 +114,7 @@ TEST_CASE("Behind a way without landmarks the pose stays as unsure as it is", "[
     // Wherever the gap lies within a stretch.
     for (int before = 20; before < 30; ++before) {
       const GapDrive drive{.before = before, .has_empty_ones = has_empty_ones};
-      const auto seed = static_cast<std::uint64_t>(100 + before);
+      const auto seed = 100U + static_cast<std::uint64_t>(before);
       const GapMap condensed = driven(drive, seed, 20.0);
       const GapMap uncut = driven(drive, seed, 0.0);
       CAPTURE(before, has_empty_ones);

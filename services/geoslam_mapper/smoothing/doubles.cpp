@@ -53,11 +53,14 @@ int count_beside(const StoredLandmark& a, const StoredLandmark& b) {
 /// Odds of one trunk against two from who saw which on one way past them; none where no way saw
 /// both. Two trunks are seen together by one in three nodes that see either where each is seen by
 /// half of them; one trunk is seen twice by one in twenty (a scan that doubles it). A few sightings
-/// in turns happen by chance.
+/// in turns happen by chance, and of one that was seen once many of the other one say little.
 std::optional<double> odds_by_turns(const StoredLandmark& a, const StoredLandmark& b) {
   constexpr double kAlone = (1.0 - 0.05) / (1.0 - 1.0 / 3.0);
   constexpr double kTogether = 0.05 / (1.0 / 3.0);
-  const int alone = count_beside(a, b) + count_beside(b, a);
+  constexpr int kOnce = 3;
+  const int of_a = count_beside(a, b);
+  const int of_b = count_beside(b, a);
+  const int alone = std::min(of_a, of_b) > 1 ? of_a + of_b : std::min(of_a + of_b, kOnce);
   if (alone == 0) return std::nullopt;
   return std::pow(kAlone, alone) * std::pow(kTogether, count_together(a, b));
 }
@@ -146,7 +149,8 @@ Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
   const double floor_m = parameters.gate_floor_m / parameters.gate_sigmas;
   const Eigen::Matrix2d spread = *covariance + floor_m * floor_m * Eigen::Matrix2d::Identity();
   const Neighbourhood around = neighbourhood_of(a.position_m, map);
-  const double two_by_place = around.density_per_m2 * around.missing_odds;
+  const double density_per_m2 = std::max(kLeastDensity, around.density_per_m2);
+  const double two_by_place = density_per_m2 * around.missing_odds;
   if (apart.norm() <= gate_m && density_of_one(apart, spread) >= kLeastOdds * two_by_place)
     return Sameness::kOneByPlace;
 
@@ -155,8 +159,7 @@ Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
   if (!turns) return Sameness::kTwo;
   const std::size_t fewest = std::min(a.views_m.size(), b.views_m.size());
   const double one = *turns * density_of_moved(apart, spread, fewest, parameters.merge_distance_m);
-  const double two = std::max(kLeastDensity, around.density_per_m2);
-  return one >= kLeastOdds * two ? Sameness::kOne : Sameness::kTwo;
+  return one >= kLeastOdds * density_per_m2 ? Sameness::kOne : Sameness::kTwo;
 }
 
 /// A landmark that is the same as this one, and whether that is final.

@@ -36,12 +36,27 @@ constexpr double kMostLog10Chance = -5.0;
 /// judged one by one; what each pass bends between its landmarks [m].
 constexpr double kGoodFit = 3.0;
 constexpr double kWarp_m = 0.05;
+/// What was seen last on so much of the way [m] is of one pass: others may lie there and be off
+/// from it.
+constexpr double kOnePass_m = 100.0;
 /// Rounds of the graph for a large correction.
 constexpr int kRounds = 10;
 
 double path_at_last_sight(const StoredLandmark& landmark, const PoseGraph& graph) {
   return landmark.nodes.empty() ? -std::numeric_limits<double>::infinity()
                                 : graph.node(landmark.nodes.back()).along_m;
+}
+
+/// Where the earlier pass saw the middle one of these pairs last, on its way [m].
+double middle_path(const std::vector<std::pair<model::LandmarkId, model::LandmarkId>>& pairs,
+                   const GlobalMap& map) {
+  std::vector<double> paths_m;
+  paths_m.reserve(pairs.size());
+  for (const auto& [ours, theirs] : pairs)
+    paths_m.push_back(path_at_last_sight(map.landmarks.at(theirs), map.graph));
+  const auto middle = paths_m.begin() + static_cast<std::ptrdiff_t>(paths_m.size() / 2);
+  std::nth_element(paths_m.begin(), middle, paths_m.end());
+  return paths_m.empty() ? 0.0 : *middle;
 }
 
 double larger_sigma(const Eigen::Matrix3d& covariance) {
@@ -177,15 +192,18 @@ std::vector<MergedPair> PassJoiner::find(const Scene& scene, NodeIndex newest,
   const Eigen::Matrix3d covariance = pass.node_T_newest.covariance + match->map_T_newest.covariance;
   if (off.dot(covariance.inverse() * off) > kExpected) return {};
 
-  // Only pairs that fit well: the others are judged one by one when the passes are joined.
+  // Only pairs of one earlier pass that fit well: the others are judged one by one when the passes
+  // are joined.
   std::vector<MergedPair> pairs;
+  const double pass_m = middle_path(match->pairs, map);
   const geometry::SE2 found_T_now = match->map_T_newest.mean * map.graph.pose(newest).inverse();
   for (const auto& [ours, theirs] : match->pairs) {
     const StoredLandmark& a = map.landmarks.at(ours);
     const StoredLandmark& b = map.landmarks.at(theirs);
     const double variance = a.local_variance() + b.local_variance() + kWarp_m * kWarp_m;
     const double squared = (found_T_now * a.position_m - b.position_m).squaredNorm() / variance;
-    if (a.kind == b.kind && squared <= kGoodFit)
+    const bool is_of_another = std::abs(path_at_last_sight(b, map.graph) - pass_m) > kOnePass_m;
+    if (a.kind == b.kind && squared <= kGoodFit && !is_of_another)
       pairs.push_back(Merges::in_order(ours, theirs, map.landmarks));
   }
   return pairs;
