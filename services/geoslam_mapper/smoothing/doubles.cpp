@@ -102,15 +102,24 @@ double density_of_one(const Eigen::Vector2d& apart_m, const Eigen::Matrix2d& cov
          (2.0 * std::numbers::pi * std::sqrt(covariance_m2.determinant()));
 }
 
-/// The same on one way, where bad scans may have put the one that `fewest` nodes observed anywhere
-/// within the distance within which doubles are looked for, and the others have the errors that are
-/// stated.
+/// How far from a landmark one observation of it may lie, to be associated with it [m].
+double gate_of_one_m(const StoredLandmark& landmark, const SmoothingMapperParameters& parameters) {
+  const double views = static_cast<double>(std::max<std::size_t>(1, landmark.views_m.size()));
+  return parameters.gate_sigmas * std::sqrt(views / landmark.information) + parameters.gate_floor_m;
+}
+
+/// Share of the landmarks that so many nodes observed which bad scans moved.
+double chance_of_moved(std::size_t nodes) {
+  return kMoved * std::pow(kMovedAgain, static_cast<double>(nodes) - 1.0);
+}
+
+/// The density of two on one way, of which bad scans put this share anywhere within the distance
+/// within which doubles are looked for, and the others have the errors that are stated.
 double density_of_moved(const Eigen::Vector2d& apart_m, const Eigen::Matrix2d& covariance_m2,
-                        std::size_t fewest, double merge_distance_m) {
+                        double moved, double merge_distance_m) {
   const double squared = apart_m.dot(covariance_m2.inverse() * apart_m);
   const double stated =
       std::exp(-0.5 * squared) / (2.0 * std::numbers::pi * std::sqrt(covariance_m2.determinant()));
-  const double moved = kMoved * std::pow(kMovedAgain, static_cast<double>(fewest) - 1.0);
   return stated + moved / (std::numbers::pi * merge_distance_m * merge_distance_m);
 }
 
@@ -157,8 +166,11 @@ Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
   // Of two that were, none was missed.
   const auto turns = odds_by_turns(a, b);
   if (!turns) return Sameness::kTwo;
+  // Within the gate the scans of one are taken for the other's now and then: no bad scans.
   const std::size_t fewest = std::min(a.views_m.size(), b.views_m.size());
-  const double one = *turns * density_of_moved(apart, spread, fewest, parameters.merge_distance_m);
+  const double gate_of_one = std::max(gate_of_one_m(a, parameters), gate_of_one_m(b, parameters));
+  const double moved = apart.norm() > gate_of_one ? chance_of_moved(fewest) : 0.0;
+  const double one = *turns * density_of_moved(apart, spread, moved, parameters.merge_distance_m);
   return one >= kLeastOdds * density_per_m2 ? Sameness::kOne : Sameness::kTwo;
 }
 
