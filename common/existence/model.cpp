@@ -72,12 +72,13 @@ void ExistenceModel::open_drive() {
 }
 
 void ExistenceModel::learn(const PassHistories& histories) {
-  const Parameters& told = parameters_;
-  const RatePriors priors{told.pass_recall_weight * told.pass_recall,
-                          told.pass_recall_weight * (1.0 - told.pass_recall), told.decay_weight,
-                          told.decay_per_s > 0.0 ? told.decay_weight / told.decay_per_s : 0.0};
+  const Parameters& stated = parameters_;
+  const RatePriors priors{
+      stated.pass_recall_weight * stated.pass_recall,
+      stated.pass_recall_weight * (1.0 - stated.pass_recall), stated.decay_weight,
+      stated.decay_per_s > 0.0 ? stated.decay_weight / stated.decay_per_s : 0.0};
   if (learned_.now == 0.0) {
-    learned_.before = told.pass_recall;
+    learned_.before = stated.pass_recall;
     record_passes(priors.seen, priors.missed);
     open_drive();
   }

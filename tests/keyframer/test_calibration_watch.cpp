@@ -247,7 +247,7 @@ TEST_CASE("A jump of the scans' clock that hides in noise is told for ten second
     motion.then_T_now.covariance =
         2.0 * Eigen::Vector3d(scan_m * scan_m, scan_m * scan_m, 4e-6).asDiagonal().toDenseMatrix();
     watch.add(motion);
-    watch.watch(motion);
+    watch.watch(motion.now_utime, motion);
     return watch.contradicts();
   };
 
@@ -263,6 +263,16 @@ TEST_CASE("A jump of the scans' clock that hides in noise is told for ten second
   CHECK(first < 8);
   CHECK(count >= 100);
   CHECK(count < 120);
+
+  // Also where odometry ends meanwhile.
+  const auto now = 100'000 * static_cast<model::Utime>(seen.size());
+  REQUIRE_FALSE(watch.contradicts());
+  for (int k = 0; k < 10; ++k) drive(0.0);
+  REQUIRE(watch.contradicts());
+  watch.watch(now + 5'000'000, std::nullopt);
+  CHECK(watch.contradicts());
+  watch.watch(now + 12'000'000, std::nullopt);
+  CHECK_FALSE(watch.contradicts());
 }
 
 TEST_CASE("Scans that are shaken as a whole turn otherwise than the gyro says", "[calibration]") {

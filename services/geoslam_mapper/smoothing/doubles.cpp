@@ -168,8 +168,8 @@ Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
   if (!turns) return Sameness::kTwo;
   // Within the gate the scans of one are taken for the other's now and then: no bad scans.
   const std::size_t fewest = std::min(a.views_m.size(), b.views_m.size());
-  const double gate_of_one = std::max(gate_of_one_m(a, parameters), gate_of_one_m(b, parameters));
-  const double moved = apart.norm() > gate_of_one ? chance_of_moved(fewest) : 0.0;
+  const double gate_m_of_one = std::max(gate_of_one_m(a, parameters), gate_of_one_m(b, parameters));
+  const double moved = apart.norm() > gate_m_of_one ? chance_of_moved(fewest) : 0.0;
   const double one = *turns * density_of_moved(apart, spread, moved, parameters.merge_distance_m);
   return one >= kLeastOdds * density_per_m2 ? Sameness::kOne : Sameness::kTwo;
 }

@@ -112,13 +112,16 @@ void CalibrationWatch::compare(const model::ScanMotion& motion) {
   }
 }
 
-void CalibrationWatch::watch(const std::optional<model::ScanMotion>& motion) {
+void CalibrationWatch::watch(model::Utime now, const std::optional<model::ScanMotion>& motion) {
   const auto motions = motion ? two_motions(*motion) : std::nullopt;
-  if (!motions || !motions->has_wheels) return jump_.begin_anew();
-  const CalibrationMatrix covariance = minutes_.covariance();
-  jump_.add(*motions, covariance * minutes_.gradient(), covariance);
-  if (std::abs(jump_.late_sigmas()) > kJump_sigmas) jumped_utime_ = motion->now_utime;
-  has_jumped_ = jumped_utime_ && motion->now_utime - *jumped_utime_ < kRemembered_us;
+  if (motions && motions->has_wheels) {
+    const CalibrationMatrix covariance = minutes_.covariance();
+    jump_.add(*motions, covariance * minutes_.gradient(), covariance);
+    if (std::abs(jump_.late_sigmas()) > kJump_sigmas) jumped_utime_ = now;
+  } else {
+    jump_.begin_anew();
+  }
+  has_jumped_ = jumped_utime_ && now - *jumped_utime_ < kRemembered_us;
 }
 
 void CalibrationWatch::check(const std::optional<model::ScanMotion>& step) {

@@ -33,8 +33,8 @@ class CalibrationWatch {
   /// all compared, their ways where they overlap with the last one by no more than half, since
   /// the error of wheels grows with the way.
   void add(const model::ScanMotion& motion);
-  /// Takes the motion over JumpWatch::kScans scans, or that there is none.
-  void watch(const std::optional<model::ScanMotion>& motion);
+  /// Takes the motion over JumpWatch::kScans scans to the one of now, or that there is none.
+  void watch(model::Utime now, const std::optional<model::ScanMotion>& motion);
   /// Takes the motion by landmarks alone since the scan before the last one, or that there is none.
   void check(const std::optional<model::ScanMotion>& step);
 

@@ -65,7 +65,7 @@ std::optional<PlacedScan> JointKeyframer::place(
   calibration_.check(step);
   if (motion && !step && in_both >= kToContradict) calibration_.break_off();
   if (const auto way = noise_.motion()) calibration_.add(*way);
-  calibration_.watch(noise_.motion_over(JumpWatch::kScans));
+  calibration_.watch(stated.utime, noise_.motion_over(JumpWatch::kScans));
   return placed;
 }
 

@@ -28,6 +28,7 @@ void JumpWatch::add(const TwoMotions& motions, const CalibrationNumbers& calibra
   Left& left = motions_[count_ % kScans];
   left.value = (motions.by_odometry.mean.inverse() * motions.by_landmarks.mean).Log() -
                jacobian * calibration;
+  // All motions share the calibration's error: no part of it averages out.
   left.landmarks = motions.by_landmarks.covariance;
   left.odometry =
       motions.by_odometry.covariance + jacobian * covariance * jacobian.transpose() / kOverlap;
