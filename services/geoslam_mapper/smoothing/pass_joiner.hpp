@@ -4,7 +4,6 @@
 #include <optional>
 #include <vector>
 
-#include "common/constellation/localisation.hpp"
 #include "services/geoslam_mapper/smoothing/global_map.hpp"
 #include "services/geoslam_mapper/smoothing/merges.hpp"
 
@@ -16,24 +15,33 @@ struct JoinedPasses {
   std::vector<model::LandmarkId> moved;  ///< What moved with them.
 };
 
+/// A place of this pass where another one's landmarks were not found.
+struct WaitingPlace {
+  double along_m = 0.0;                                  ///< On the way.
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();  ///< In the map, when it was passed.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.along_m, self.position_m);
+  }
+};
+
 /// Looks for the landmarks of this pass among those of earlier ones, while tracking goes on. After
 /// a way on which the pose drifted, what comes into view again lies metres beside what the map has:
-/// each landmark may be any of several, but all together have one place only. Found is it by the
-/// constellation of the landmarks around the vehicle (or by gates where these are narrower than the
-/// landmarks stand apart), within what the graph knows of the distance of the two passes; the pairs
-/// become one landmark each, and where the graph contradicts that, all of it is taken back exactly.
+/// each landmark may be any of several, but all together have one place only. Found is it within
+/// what the graph knows of the distance of the two passes (see match_passes()); the pairs become
+/// one landmark each, and where the graph contradicts that, all of it is taken back exactly. Where
+/// nothing is found the place waits: behind a later join its distance is known better.
 class PassJoiner {
  public:
-  /// Sigmas of the distance of two passes within which they are looked for, and the furthest [m].
-  static constexpr double kReach_sigmas = 4.0;
-  static constexpr double kFurthest_m = 300.0;
-
   /// `parameters` gives the gates.
   explicit PassJoiner(const SmoothingMapperParameters& parameters) : parameters_(parameters) {}
 
   /// To be called after each accepted keyframe. The graph is solved where passes were joined. Cost:
   /// nothing where no other pass is near or its landmarks are bound to the vehicle's pose; else,
-  /// every few metres, one search among the landmarks around.
+  /// every few metres, one search among the landmarks around, and after a join one for each
+  /// keyframe at the places that wait (64 at most).
   JoinedPasses follow(const model::FieldOfView& field_of_view, NodeIndex newest, Merges& merges,
                       GlobalMap& map);
 
@@ -44,39 +52,18 @@ class PassJoiner {
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.tried_m_);
+    a(self.tried_m_, self.places_, self.to_try_);
   }
 
  private:
-  /// An earlier pass near by, and where it is to the newest node by the graph.
-  struct EarlierPass {
-    NodeIndex node = 0;
-    geometry::SE2WithCovariance node_T_newest;
-    double sigma_m = 0.0;  ///< Of the newest node's position, larger axis.
-  };
-  /// The landmarks around the newest node: of this pass, and of earlier ones.
-  struct Scene {
-    std::vector<model::LandmarkId> ours;
-    std::vector<model::LandmarkId> theirs;
-    double reach_m = 0.0;  ///< How far around.
-  };
-  /// Where the newest node is among the landmarks of earlier passes, and which are which.
-  struct Match {
-    geometry::SE2WithCovariance map_T_newest;
-    std::vector<MergedPair> pairs;  ///< Ours, theirs.
-  };
-  std::optional<EarlierPass> earlier_pass(const model::FieldOfView& field_of_view, NodeIndex newest,
-                                          const GlobalMap& map) const;
-  Scene scene_around(const model::FieldOfView& field_of_view, NodeIndex newest,
-                     const EarlierPass& pass, const GlobalMap& map) const;
-  std::vector<MergedPair> find(const Scene& scene, NodeIndex newest, const EarlierPass& pass,
-                               const GlobalMap& map) const;
-  std::optional<Match> match_by_gates(const Scene& scene, NodeIndex newest, const EarlierPass& pass,
-                                      const GlobalMap& map) const;
-  std::optional<Match> match_by_constellation(const Scene& scene, NodeIndex newest,
-                                              const EarlierPass& pass, const GlobalMap& map) const;
+  JoinedPasses try_again(const model::FieldOfView& field_of_view, Merges& merges, GlobalMap& map);
+  JoinedPasses join_at(const model::FieldOfView& field_of_view, NodeIndex node, Merges& merges,
+                       GlobalMap& map, bool& might) const;
+
   SmoothingMapperParameters parameters_;
-  double tried_m_ = 0.0;  ///< Path of the vehicle at the last search.
+  double tried_m_ = 0.0;              ///< Path of the vehicle at the last search.
+  std::vector<WaitingPlace> places_;  ///< In order of the way.
+  std::size_t to_try_ = 0;            ///< The first so many of them are tried again.
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

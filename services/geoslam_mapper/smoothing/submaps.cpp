@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "services/geoslam_mapper/smoothing/pass_joiner.hpp"
+#include "services/geoslam_mapper/smoothing/earlier_pass.hpp"
 #include "services/geoslam_mapper/smoothing/submap_content.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
@@ -58,7 +58,7 @@ bool Submaps::follow(const model::FieldOfView& field_of_view, NodeIndex newest, 
   // As far as PassJoiner looks for an earlier pass, and what was seen from there.
   const double range_m = field_of_view.max_range_m;
   const double reach_m =
-      std::min(PassJoiner::kFurthest_m, PassJoiner::kReach_sigmas * sigma_of(newest, map.graph)) +
+      std::min(kFurthestPass_m, kReachOfPasses_sigmas * sigma_of(newest, map.graph)) +
       2.0 * range_m + kExtent_m;
   const double far_m = std::max(hand_over_m_, reach_m + kHysteresis_m);
 

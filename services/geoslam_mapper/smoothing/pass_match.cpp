@@ -1,0 +1,162 @@
+#include "services/geoslam_mapper/smoothing/pass_match.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "common/constellation/localisation.hpp"
+#include "services/geoslam_mapper/smoothing/pair_search.hpp"
+#include "services/geoslam_mapper/smoothing/pass_odds.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+namespace {
+
+/// What the landmarks around the vehicle leave uncertain of their distances [m].
+constexpr double kLocalSigma_m = 0.08;
+/// Landmarks of the node's pass are taken so far around it [m], or as far as the sensor sees.
+constexpr double kScene_m = 45.0;
+/// Most landmarks of the node's pass: the nearest.
+constexpr std::size_t kMost = 64;
+/// A scene with at most so many possible pairs is poor: all pairs of pairs are looked at.
+constexpr std::size_t kPoor = 400;
+/// Largest squared Mahalanobis distance of a pair that joins passes: 78 % of them, the others are
+/// judged one by one; what each pass bends between its landmarks [m].
+constexpr double kGoodFit = 3.0;
+constexpr double kWarp_m = 0.05;
+/// What was seen on so much of the way [m] before and behind a node of an earlier pass is of that
+/// pass: others may lie there and be off from it.
+constexpr double kOnePass_m = 100.0;
+
+/// Whether it was seen within so much of the way around a node.
+bool is_seen_around(NodeIndex node, double within_m, const StoredLandmark& landmark,
+                    const PoseGraph& graph) {
+  const double along_m = graph.node(node).along_m;
+  return std::any_of(landmark.nodes.begin(), landmark.nodes.end(), [&](NodeIndex other) {
+    return std::abs(graph.node(other).along_m - along_m) < within_m;
+  });
+}
+
+/// Of the distance of two landmarks of different passes, per axis [m^2].
+double variance_of(const geometry::UncertainPoint& ours, const geometry::UncertainPoint& theirs) {
+  return ours.variance_m2 + theirs.variance_m2 + kWarp_m * kWarp_m;
+}
+
+std::optional<FoundPlace> match_by_gates(const Scene& scene,
+                                         const SmoothingMapperParameters& parameters) {
+  geometry::RegistrationParameters gating;
+  gating.gate_sigmas = parameters.gate_sigmas;
+  gating.gate_floor_m = parameters.gate_floor_m;
+  if (kReachOfPasses_sigmas * scene.sigma_m > gating.max_gate_m) return std::nullopt;
+
+  geometry::Registration found =
+      geometry::register_points(scene.theirs.points, scene.ours.points, scene.map_T_node, gating);
+  return FoundPlace{{found.reference_T_observed, found.covariance}, std::move(found.pairs)};
+}
+
+std::optional<FoundPlace> match_by_constellation(const Scene& scene) {
+  constellation::ConstellationMap theirs;
+  for (std::size_t i = 0; i < scene.theirs.ids.size(); ++i)
+    theirs.insert(i, scene.theirs.points[i].position_m);
+  std::vector<constellation::ObservedPoint> ours;
+  for (const geometry::UncertainPoint& point : scene.ours.points)
+    ours.push_back({point.position_m, std::sqrt(point.variance_m2)});
+
+  constellation::LocaliseParameters localising;
+  localising.map_sigma_m = kLocalSigma_m;
+  const constellation::Disc where{scene.map_T_node.mean.translation(),
+                                  std::max(1.0, kReachOfPasses_sigmas * scene.sigma_m)};
+  const constellation::Localisation found = theirs.localise(ours, localising, where);
+  if (!found.found()) return std::nullopt;
+
+  FoundPlace place{{found.map_T_sensor, found.covariance}, {}};
+  for (const constellation::PointAssociation& one : found.associations)
+    place.pairs.push_back({static_cast<std::uint32_t>(one.landmark_id),
+                           static_cast<std::uint32_t>(one.observed), false});
+  return place;
+}
+
+/// Whether a place that was found is where the graph expects it, and no play of chance.
+bool is_certain(const FoundPlace& place, const Scene& scene) {
+  const Eigen::Vector3d off = (scene.map_T_node.mean.inverse() * place.map_T_newest.mean).Log();
+  const Eigen::Matrix3d covariance = scene.map_T_node.covariance + place.map_T_newest.covariance;
+  if (off.dot(covariance.inverse() * off) > kMostOff) return false;
+
+  std::vector<PairOfPasses> pairs;
+  for (const geometry::PointPair& pair : place.pairs) {
+    const geometry::UncertainPoint& ours = scene.ours.points[pair.observed];
+    const geometry::UncertainPoint& theirs = scene.theirs.points[pair.reference];
+    pairs.push_back({ours.position_m, theirs.position_m, variance_of(ours, theirs),
+                     scene.clutter_per_m2[pair.reference]});
+  }
+  return log_odds_of_place(pairs, place.map_T_newest.mean, scene.map_T_node) >= kLeastLogOdds;
+}
+
+}  // namespace
+
+Scene scene_around(const model::FieldOfView& field_of_view, NodeIndex node, const EarlierPass& pass,
+                   const GlobalMap& map) {
+  const geometry::SE2 map_T_node = map.graph.pose(node);
+  const geometry::SE2 node_T_map = map_T_node.inverse();
+  const double range_m = std::max(field_of_view.max_range_m, kScene_m);
+  const double reach_m = range_m + std::min(kFurthestPass_m, kReachOfPasses_sigmas * pass.sigma_m);
+  Scene scene;
+  scene.map_T_node = {map_T_node, pass.node_T_asked.covariance};
+  scene.sigma_m = pass.sigma_m;
+
+  std::vector<std::pair<double, model::LandmarkId>> ours;
+  std::vector<Eigen::Vector2d> theirs_m;
+  for (const model::LandmarkId id :
+       map.landmarks.index().near({map_T_node.translation(), reach_m})) {
+    const StoredLandmark& landmark = map.landmarks.at(id);
+    if (!map.graph.position(id) && !map.graph.is_dormant(id)) continue;
+    if (is_seen_around(node, kAnotherPass_m, landmark, map.graph)) {
+      const double distance_m = (landmark.position_m - map_T_node.translation()).norm();
+      if (distance_m < range_m) ours.emplace_back(distance_m, id);
+    } else if (pass.is_given || is_seen_around(pass.node, kOnePass_m, landmark, map.graph)) {
+      scene.theirs.ids.push_back(id);
+      scene.theirs.points.push_back({landmark.position_m, landmark.local_variance()});
+      theirs_m.push_back(landmark.position_m);
+    }
+  }
+  scene.clutter_per_m2 = clutter_around(theirs_m, reach_m);
+
+  std::sort(ours.begin(), ours.end());
+  if (ours.size() > kMost) ours.resize(kMost);
+  for (const auto& [distance, id] : ours) {
+    const StoredLandmark& landmark = map.landmarks.at(id);
+    scene.ours.ids.push_back(id);
+    scene.ours.points.push_back({node_T_map * landmark.position_m, landmark.local_variance()});
+  }
+  return scene;
+}
+
+std::vector<MergedPair> match_passes(const Scene& scene,
+                                     const SmoothingMapperParameters& parameters,
+                                     const GlobalMap& map) {
+  std::optional<FoundPlace> place;
+  if (scene.ours.ids.size() * scene.theirs.ids.size() <= kPoor) {
+    place = search_pairs(scene.ours.points, scene.theirs.points, kWarp_m * kWarp_m,
+                         scene.clutter_per_m2, scene.map_T_node);
+  } else {
+    place = match_by_gates(scene, parameters);
+    if (!place) place = match_by_constellation(scene);
+  }
+  if (!place || !is_certain(*place, scene)) return {};
+
+  std::vector<MergedPair> pairs;
+  for (const geometry::PointPair& pair : place->pairs) {
+    const geometry::UncertainPoint& a = scene.ours.points[pair.observed];
+    const geometry::UncertainPoint& b = scene.theirs.points[pair.reference];
+    const model::LandmarkId ours = scene.ours.ids[pair.observed];
+    const model::LandmarkId theirs = scene.theirs.ids[pair.reference];
+    const Eigen::Vector2d apart_m = place->map_T_newest.mean * a.position_m - b.position_m;
+    const bool is_one_kind = map.landmarks.at(ours).kind == map.landmarks.at(theirs).kind;
+    if (is_one_kind && apart_m.squaredNorm() <= kGoodFit * variance_of(a, b))
+      pairs.push_back(Merges::in_order(ours, theirs, map.landmarks));
+  }
+  return pairs.size() < kFewestOfPass ? std::vector<MergedPair>{} : pairs;
+}
+
+}  // namespace understory::geoslam_mapper::smoothing

@@ -1,0 +1,57 @@
+#include "services/geoslam_mapper/smoothing/pass_odds.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace understory::geoslam_mapper::smoothing {
+namespace {
+
+/// Least clutter [1/m^2]: 20 trunks on a hectare.
+constexpr double kLeastClutter = 0.002;
+
+}  // namespace
+
+double log_odds_of_place(std::span<const PairOfPasses> pairs, const geometry::SE2& map_T_newest,
+                         const geometry::SE2WithCovariance& expected) {
+  const Eigen::Vector3d off = (expected.mean.inverse() * map_T_newest).Log();
+  const Eigen::Matrix3d prior = expected.covariance.inverse();
+  const double log_per_pair = std::log(kSharedOfPasses / (1.0 - kSharedOfPasses));
+  double log_odds = -0.5 * off.dot(prior * off);
+  Eigen::Matrix3d information = prior;
+
+  for (const PairOfPasses& pair : pairs) {
+    const Eigen::Vector2d apart_m = map_T_newest * pair.ours_m - pair.theirs_m;
+    log_odds += log_per_pair - 0.5 * apart_m.squaredNorm() / pair.variance_m2 -
+                std::log(2.0 * std::numbers::pi * pair.variance_m2 * pair.clutter_per_m2);
+
+    Eigen::Matrix<double, 2, 3> jacobian;
+    jacobian << Eigen::Matrix2d::Identity(), geometry::perpendicular(pair.ours_m);
+    information += jacobian.transpose() * jacobian / pair.variance_m2;
+  }
+  return log_odds + 0.5 * std::log(prior.determinant() / information.determinant());
+}
+
+std::vector<double> clutter_around(std::span<const Eigen::Vector2d> points_m, double reach_m) {
+  const double all = std::max(
+      kLeastClutter, static_cast<double>(points_m.size()) / (std::numbers::pi * reach_m * reach_m));
+  std::vector<double> result;
+  result.reserve(points_m.size());
+  for (const Eigen::Vector2d& point : points_m) {
+    // Squared distances to the point itself and the two nearest others.
+    std::array<double, 3> nearest;
+    nearest.fill(std::numeric_limits<double>::infinity());
+    for (const Eigen::Vector2d& other : points_m) {
+      double squared = (other - point).squaredNorm();
+      for (double& kept : nearest)
+        if (squared < kept) std::swap(squared, kept);
+    }
+    result.push_back(std::max(all, 1.0 / (std::numbers::pi * std::max(1e-6, nearest.back()))));
+  }
+  return result;
+}
+
+}  // namespace understory::geoslam_mapper::smoothing

@@ -1,0 +1,44 @@
+// How likely a place is, at which landmarks of two passes lie upon each other.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "common/geometry/se2.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+
+/// A landmark of this pass and one of an earlier pass that may be the same.
+struct PairOfPasses {
+  Eigen::Vector2d ours_m = Eigen::Vector2d::Zero();    ///< In the frame of the newest node.
+  Eigen::Vector2d theirs_m = Eigen::Vector2d::Zero();  ///< In the map.
+  double variance_m2 = 0.0;                            ///< Of their distance, per axis.
+  double clutter_per_m2 = 0.0;                         ///< Density of the earlier pass's around.
+};
+
+/// Share of a pass's landmarks that another pass is taken to have seen, too: little, since what is
+/// compared is whether passes lie upon each other here or nowhere.
+inline constexpr double kSharedOfPasses = 0.3;
+
+/// ln of the least odds of a place: 1e5.
+inline constexpr double kLeastLogOdds = 11.5;
+/// Largest squared Mahalanobis distance of a place that was found to what the graph knows of it (3
+/// degrees of freedom): noise that is stated too small by half has as much.
+inline constexpr double kMostOff = 85.0;
+
+/// ln of the odds that the newest node is where these pairs lie upon each other, against anywhere
+/// else within what is expected, where the passes have nothing in common: Bayes' factor, with the
+/// clutter as a Poisson process, integrated over the pose around `map_T_newest` (Laplace). Over all
+/// clutter its mean is one, so that by Markov's inequality chance gives odds of k or more at most
+/// once in k searches, for all places of a search together. `expected`: covariance of the newest
+/// node's pose, right perturbation.
+double log_odds_of_place(std::span<const PairOfPasses> pairs, const geometry::SE2& map_T_newest,
+                         const geometry::SE2WithCovariance& expected);
+
+/// Density around each of these points, of the others among them [1/m^2]: from the second nearest,
+/// since trunks stand in clumps, and at least that of all within `reach_m` and 20 on a hectare.
+/// O(n^2).
+std::vector<double> clutter_around(std::span<const Eigen::Vector2d> points_m, double reach_m);
+
+}  // namespace understory::geoslam_mapper::smoothing
