@@ -1,4 +1,5 @@
 // Which landmarks of two passes are the same: odds, places, and places that wait.
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -136,6 +137,35 @@ TEST_CASE("The odds are what an integral over all poses says", "[mapper][passes]
     }
     CHECK(log_odds(*place, ours, theirs, clutter, where) ==
           Approx(std::log(sum / kDraws)).margin(0.1));
+  }
+}
+
+TEST_CASE("What the others say of a pair is what a fit without it says", "[mapper][passes]") {
+  const geometry::SE2WithCovariance where = expected(0.5, 0.02);
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    CAPTURE(seed);
+    Grove grove(seed);
+    const auto theirs = grove.scattered(4);
+    const auto ours = grove.seen_from({0.2, -0.1, 0.01}, theirs);
+    std::vector<PairOfPasses> pairs;
+    for (std::size_t i = 0; i < theirs.size(); ++i)
+      pairs.push_back({ours[i].position_m, theirs[i].position_m, 0.005, 0.01});
+    const auto said = leave_out_each(pairs, fit_place(pairs, {}, where));
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      CAPTURE(i);
+      std::vector<PairOfPasses> others = pairs;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+      const geometry::SE2WithCovariance place = fit_place(others, {}, where);
+      const Eigen::Vector2d apart_m =
+          place.mean.rotation().transpose() * (place.mean * pairs[i].ours_m - pairs[i].theirs_m);
+      CHECK((said[i].apart_m - apart_m).norm() < 0.01 + 0.05 * apart_m.norm());
+      Eigen::Matrix<double, 2, 3> jacobian;
+      jacobian << Eigen::Matrix2d::Identity(), geometry::perpendicular(pairs[i].ours_m);
+      const Eigen::Matrix2d covariance =
+          jacobian * place.covariance * jacobian.transpose() + 0.005 * Eigen::Matrix2d::Identity();
+      const double larger = covariance.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff();
+      CHECK(said[i].variance_m2 == Approx(larger).epsilon(0.02));
+    }
   }
 }
 

@@ -1,6 +1,5 @@
 #include "services/geoslam_mapper/smoothing/pair_search.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -19,7 +18,6 @@ constexpr std::size_t kLeastPairs = 3;
 /// ln of how much likelier the place must be than another one that shares few of its pairs: one
 /// more trunk of a planted row is not enough.
 constexpr double kLeastLead = 9.2;
-constexpr int kFitRounds = 3;
 
 using Points = std::span<const geometry::UncertainPoint>;
 
@@ -96,7 +94,7 @@ class PairSearch {
       pairs.push_back({ours_[pair.observed].position_m, theirs_[pair.reference].position_m,
                        variance(pair.observed, pair.reference), clutter_per_m2_[pair.reference]});
     }
-    fit(pairs, place.map_T_newest);
+    place.map_T_newest = fit_place(pairs, map_T_newest, expected_);
     if (!is_expected(place.map_T_newest.mean)) return;
     place.log_odds = log_odds_of_place(pairs, place.map_T_newest.mean, expected_);
     places_.push_back(std::move(place));
@@ -127,26 +125,6 @@ class PairSearch {
       if (is_free) pairs.push_back({*found, i, false});
     }
     return pairs;
-  }
-
-  /// Least squares over the pairs and what is expected.
-  void fit(const std::vector<PairOfPasses>& pairs, geometry::SE2WithCovariance& place) const {
-    for (int round = 0; round < kFitRounds; ++round) {
-      const Eigen::Vector3d off = (expected_.mean.inverse() * place.mean).Log();
-      Eigen::Matrix3d information = prior_;
-      Eigen::Vector3d gradient = prior_ * off;
-      const Eigen::Matrix2d turned = place.mean.rotation().transpose();
-      for (const PairOfPasses& pair : pairs) {
-        Eigen::Matrix<double, 2, 3> jacobian;
-        jacobian << Eigen::Matrix2d::Identity(), geometry::perpendicular(pair.ours_m);
-        information += jacobian.transpose() * jacobian / pair.variance_m2;
-        gradient += jacobian.transpose() * (turned * (place.mean * pair.ours_m - pair.theirs_m)) /
-                    pair.variance_m2;
-      }
-      const auto factored = information.llt();
-      place.mean = place.mean * geometry::SE2::Exp(-factored.solve(gradient));
-      place.covariance = factored.solve(Eigen::Matrix3d::Identity());
-    }
   }
 
   static std::size_t common(const std::vector<geometry::PointPair>& a,

@@ -21,9 +21,14 @@ constexpr double kScene_m = 45.0;
 constexpr std::size_t kMost = 64;
 /// A scene with at most so many possible pairs is poor: all pairs of pairs are looked at.
 constexpr std::size_t kPoor = 400;
-/// Largest squared Mahalanobis distance of a pair that joins passes: 78 % of them, the others are
-/// judged one by one; what each pass bends between its landmarks [m].
+/// Largest squared Mahalanobis distance of a pair that joins passes from where the others put it:
+/// 78 % of them; and the variance of that [m^2], as trunks in clumps stand 0.3 m apart. The others
+/// are judged one by one when the passes are joined.
 constexpr double kGoodFit = 3.0;
+constexpr double kTellsPairs_m2 = 0.02;
+/// Fewest pairs that tie two passes.
+constexpr std::size_t kFewestTies = 2;
+/// What each pass bends between its landmarks [m].
 constexpr double kWarp_m = 0.05;
 /// What was seen on so much of the way [m] before and behind a node of an earlier pass is of that
 /// pass: others may lie there and be off from it.
@@ -77,12 +82,8 @@ std::optional<FoundPlace> match_by_constellation(const Scene& scene) {
   return place;
 }
 
-/// Whether a place that was found is where the graph expects it, and no play of chance.
-bool is_certain(const FoundPlace& place, const Scene& scene) {
-  const Eigen::Vector3d off = (scene.map_T_node.mean.inverse() * place.map_T_newest.mean).Log();
-  const Eigen::Matrix3d covariance = scene.map_T_node.covariance + place.map_T_newest.covariance;
-  if (off.dot(covariance.inverse() * off) > kMostOff) return false;
-
+/// As Bayes' factor takes them.
+std::vector<PairOfPasses> pairs_of(const FoundPlace& place, const Scene& scene) {
   std::vector<PairOfPasses> pairs;
   for (const geometry::PointPair& pair : place.pairs) {
     const geometry::UncertainPoint& ours = scene.ours.points[pair.observed];
@@ -90,7 +91,7 @@ bool is_certain(const FoundPlace& place, const Scene& scene) {
     pairs.push_back({ours.position_m, theirs.position_m, variance_of(ours, theirs),
                      scene.clutter_per_m2[pair.reference]});
   }
-  return log_odds_of_place(pairs, place.map_T_newest.mean, scene.map_T_node) >= kLeastLogOdds;
+  return pairs;
 }
 
 }  // namespace
@@ -143,20 +144,30 @@ std::vector<MergedPair> match_passes(const Scene& scene,
     place = match_by_gates(scene, parameters);
     if (!place) place = match_by_constellation(scene);
   }
-  if (!place || !is_certain(*place, scene)) return {};
+  if (!place || place->pairs.size() < kFewestOfPass) return {};
 
+  // Is it where the graph expects it, and no play of chance?
+  const std::vector<PairOfPasses> laid = pairs_of(*place, scene);
+  const geometry::SE2WithCovariance fitted =
+      fit_place(laid, place->map_T_newest.mean, scene.map_T_node);
+  const Eigen::Vector3d off = (scene.map_T_node.mean.inverse() * fitted.mean).Log();
+  if (off.dot((scene.map_T_node.covariance + fitted.covariance).inverse() * off) > kMostOff)
+    return {};
+  if (log_odds_of_place(laid, fitted.mean, scene.map_T_node) < kLeastLogOdds) return {};
+
+  // Of which trunks is that certain, too?
+  const std::vector<LeftOut> others_say = leave_out_each(laid, fitted);
   std::vector<MergedPair> pairs;
-  for (const geometry::PointPair& pair : place->pairs) {
-    const geometry::UncertainPoint& a = scene.ours.points[pair.observed];
-    const geometry::UncertainPoint& b = scene.theirs.points[pair.reference];
-    const model::LandmarkId ours = scene.ours.ids[pair.observed];
-    const model::LandmarkId theirs = scene.theirs.ids[pair.reference];
-    const Eigen::Vector2d apart_m = place->map_T_newest.mean * a.position_m - b.position_m;
-    const bool is_one_kind = map.landmarks.at(ours).kind == map.landmarks.at(theirs).kind;
-    if (is_one_kind && apart_m.squaredNorm() <= kGoodFit * variance_of(a, b))
-      pairs.push_back(Merges::in_order(ours, theirs, map.landmarks));
+  for (std::size_t i = 0; i < laid.size(); ++i) {
+    const model::LandmarkId ours = scene.ours.ids[place->pairs[i].observed];
+    const model::LandmarkId theirs = scene.theirs.ids[place->pairs[i].reference];
+    const LeftOut& said = others_say[i];
+    const bool is_one = said.variance_m2 <= kTellsPairs_m2 &&
+                        said.apart_m.squaredNorm() <= kGoodFit * laid[i].variance_m2 &&
+                        map.landmarks.at(ours).kind == map.landmarks.at(theirs).kind;
+    if (is_one) pairs.push_back(Merges::in_order(ours, theirs, map.landmarks));
   }
-  return pairs.size() < kFewestOfPass ? std::vector<MergedPair>{} : pairs;
+  return pairs.size() < kFewestTies ? std::vector<MergedPair>{} : pairs;
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -27,6 +27,20 @@ inline constexpr double kLeastLogOdds = 11.5;
 /// degrees of freedom): noise that is stated too small by half has as much.
 inline constexpr double kMostOff = 85.0;
 
+/// Least squares over the pairs and what is expected, from `map_T_newest` on. O(pairs).
+geometry::SE2WithCovariance fit_place(std::span<const PairOfPasses> pairs,
+                                      const geometry::SE2& map_T_newest,
+                                      const geometry::SE2WithCovariance& expected);
+
+/// What the other pairs say of one.
+struct LeftOut {
+  Eigen::Vector2d apart_m = Eigen::Vector2d::Zero();  ///< How far off it is from where they put it.
+  double variance_m2 = 0.0;  ///< Of that, larger axis: the pair's own and that of the place.
+};
+/// Of each pair, at a place that fit_place() gave. To first order. O(pairs).
+std::vector<LeftOut> leave_out_each(std::span<const PairOfPasses> pairs,
+                                    const geometry::SE2WithCovariance& map_T_newest);
+
 /// ln of the odds that the newest node is where these pairs lie upon each other, against anywhere
 /// else within what is expected, where the passes have nothing in common: Bayes' factor, with the
 /// clutter as a Poisson process, integrated over the pose around `map_T_newest` (Laplace). Over all
