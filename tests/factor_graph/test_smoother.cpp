@@ -274,7 +274,7 @@ TEST_CASE("A pose that is parked keeps its place and number, and takes no part",
     smoother.start_from(whole);
     for (int i = 0; i < 14; ++i) REQUIRE(smoother.update().ok);
     const Graph solution = smoother.graph();
-    const PoseId pose(static_cast<std::uint32_t>(whole.poses.size() / 2));
+    const auto pose = PoseId(static_cast<std::uint32_t>(whole.poses.size() / 2));
     CHECK_THROWS_AS(smoother.park(pose), std::invalid_argument);
     CHECK_THROWS_AS(smoother.unpark(pose), std::invalid_argument);
 

@@ -9,6 +9,7 @@
 
 #include "common/factor_graph/bayes_tree/incremental_smoother.hpp"
 #include "common/factor_graph/plane/smoother.hpp"
+#include "common/factor_graph/storage/steady_growth.hpp"
 
 namespace understory::factor_graph::plane {
 
@@ -88,7 +89,10 @@ class FactorList {
     graph::FactorId factor = kNoFactor;  ///< None where it does not count.
   };
   /// Appends.
-  void push_back(const Entry& entry) { entries_.push_back(entry); }
+  void push_back(const Entry& entry) {
+    storage::make_room(entries_);
+    entries_.push_back(entry);
+  }
   /// Puts another measurement in its place; rollback() brings the old one back.
   void replace(std::size_t at, const Entry& entry) {
     changes_.push_back({at, entries_[at]});
