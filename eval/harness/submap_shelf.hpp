@@ -1,8 +1,8 @@
 // Submaps of a mapper on the disk, for experiments without the store's process.
 #pragma once
 
+#include <cstdint>
 #include <cstdio>
-#include <map>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -33,13 +33,13 @@ class SubmapShelf {
  private:
   struct Place {
     long offset = 0;
-    std::size_t bytes = 0;
-    std::size_t landmarks = 0;
+    std::uint32_t bytes = 0;  ///< 0: the submap is not here.
+    std::uint32_t landmarks = 0;
   };
   model::Submap read(const Place& place) const;
 
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
-  std::map<model::SubmapId, Place> places_;
+  std::vector<Place> places_;  ///< By id.
   std::size_t brought_back_ = 0;
 };
 

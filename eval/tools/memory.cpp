@@ -1,5 +1,7 @@
 #include "eval/tools/memory.hpp"
 
+#include <malloc.h>
+
 #include <fstream>
 #include <string>
 
@@ -11,6 +13,11 @@ double resident_mb() {
     if (line.rfind("VmRSS:", 0) == 0) return std::stod(line.substr(6)) / 1024.0;
   }
   return 0.0;
+}
+
+std::ptrdiff_t heap_in_use() {
+  const struct mallinfo2 heap = mallinfo2();
+  return static_cast<std::ptrdiff_t>(heap.uordblks + heap.hblkhd);
 }
 
 }  // namespace understory::eval::tools

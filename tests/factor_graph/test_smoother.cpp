@@ -263,3 +263,64 @@ TEST_CASE("A pose whose measurements go and that starts anew ends where the batc
     CHECK(smoother.joint_marginal({&pose, 1}, {}).has_value());
   }
 }
+
+TEST_CASE("A pose that is parked keeps its place and number, and takes no part", "[smoother]") {
+  using namespace factor_graph::plane;
+  std::mt19937_64 random(29);
+  for (int trial = 0; trial < 10; ++trial) {
+    const Graph whole = test::random_graph(random, 20, 20, 0.1);
+    INFO("trial " << trial);
+    Smoother smoother(test::exact());
+    smoother.start_from(whole);
+    for (int i = 0; i < 14; ++i) REQUIRE(smoother.update().ok);
+    const Graph solution = smoother.graph();
+    const auto pose = PoseId(static_cast<std::uint32_t>(whole.poses.size() / 2));
+    CHECK_THROWS_AS(smoother.park(pose), std::invalid_argument);
+    CHECK_THROWS_AS(smoother.unpark(pose), std::invalid_argument);
+
+    smoother.checkpoint();
+    const auto set_measurements = [&](double share) {
+      for (std::uint32_t i = 0; i < whole.relative_poses.size(); ++i) {
+        RelativePose motion = whole.relative_poses[i];
+        if (motion.a != pose && motion.b != pose) continue;
+        motion.information *= share;
+        smoother.set(MotionId(i), motion);
+      }
+      for (std::uint32_t i = 0; i < whole.observations.size(); ++i) {
+        PointObservation seen = whole.observations[i];
+        if (seen.pose != pose) continue;
+        seen.information *= share;
+        smoother.set(ObservationId(i), seen);
+      }
+    };
+    set_measurements(0.0);
+    smoother.park(pose);
+    CHECK(smoother.pose(pose).coordinates() == solution[pose].coordinates());
+    CHECK_FALSE(smoother.joint_marginal({&pose, 1}, {}).has_value());
+    const std::vector<PoseId> both{pose, PoseId(0)};
+    CHECK(smoother.marginals(both, {}).poses[0].isZero(0.0));
+    CHECK(smoother.graph().poses.size() == whole.poses.size());
+    if (trial % 2 == 0) REQUIRE(smoother.update().ok);
+
+    // Taken back, it is as if nothing had been.
+    smoother.rollback();
+    CHECK(difference(smoother.graph(), solution) == 0.0);
+    CHECK(smoother.joint_marginal({&pose, 1}, {}).has_value());
+
+    // Back in its place, also after others took its room.
+    smoother.checkpoint();
+    set_measurements(0.0);
+    smoother.park(pose);
+    REQUIRE(smoother.update().ok);
+    smoother.checkpoint();
+    const PoseId other = smoother.add_pose({1.0, 2.0, 3.0});
+    smoother.unpark(pose);
+    set_measurements(1.0);
+    for (int i = 0; i < 14; ++i) REQUIRE(smoother.update().ok);
+    CHECK(smoother.pose(other).coordinates() == geometry::SE2(1.0, 2.0, 3.0).coordinates());
+    CHECK(smoother.joint_marginal({&pose, 1}, {}).has_value());
+    Graph now = smoother.graph();
+    now.poses.pop_back();
+    CHECK(difference(now, solution) < 1e-7);
+  }
+}

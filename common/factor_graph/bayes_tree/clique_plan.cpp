@@ -32,6 +32,7 @@ void CliquePlanner::order_few() {
 void CliquePlanner::order() {
   problem_.find_neighbours();
   if (problem_.size() <= 3) return order_few();
+  if (problem_.size() <= MinimumDegree::kMost) return minimum_degree_.order(problem_, order_);
 
   // Where each variable's list of elements begins.
   const std::span<const int> entries = problem_.entries();

@@ -6,6 +6,7 @@
 
 #include "common/factor_graph/bayes_tree/clique_drafts.hpp"
 #include "common/factor_graph/bayes_tree/elimination_problem.hpp"
+#include "common/factor_graph/bayes_tree/minimum_degree.hpp"
 
 namespace understory::factor_graph::bayes_tree {
 
@@ -23,11 +24,12 @@ class CliquePlanner {
   /// The variable is to be eliminated after all others.
   void set_last(int variable) { problem_.set_last(variable); }
 
-  /// Orders by constrained COLAMD (those of set_last() after all others, their neighbours just
-  /// before: the next update will most likely touch these), finds what each variable is tied to
-  /// when it is eliminated, and merges cliques where that saves time. Where the result costs more
-  /// than 5 Mflop it computes a nested dissection, too (of all but those of set_last()), and takes
-  /// the order that costs less. The plan is valid until the next clear().
+  /// Orders by exact minimum degree, many variables by constrained COLAMD (those of set_last()
+  /// after all others, their neighbours just before: the next update will most likely touch these),
+  /// finds what each variable is tied to when it is eliminated, and merges cliques where that saves
+  /// time. Where the result costs more than 5 Mflop it computes a nested dissection, too (of all
+  /// but those of set_last()), and takes the order that costs less. The plan is valid until the
+  /// next clear().
   const CliquePlan& plan();
 
  private:
@@ -36,6 +38,7 @@ class CliquePlanner {
   bool order_by_dissection();
 
   EliminationProblem problem_;
+  MinimumDegree minimum_degree_;
   std::vector<int> order_;  ///< Variable at each position.
   std::vector<int> column_starts_, row_indices_;
   CliqueDrafts drafts_;

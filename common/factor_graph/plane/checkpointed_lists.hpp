@@ -3,10 +3,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <utility>
 #include <vector>
 
 #include "common/factor_graph/bayes_tree/incremental_smoother.hpp"
 #include "common/factor_graph/plane/smoother.hpp"
+#include "common/factor_graph/storage/steady_growth.hpp"
 
 namespace understory::factor_graph::plane {
 
@@ -35,6 +38,47 @@ class AppendList {
   std::size_t saved_size_ = 0;
 };
 
+/// Poses, each a variable of the graph or where it was left.
+class PoseList {
+ public:
+  /// One pose.
+  struct Entry {
+    graph::VariableId name{graph::kNone};  ///< None while it is parked.
+    geometry::SE2 parked;
+  };
+  /// Appends a variable.
+  void push_back(graph::VariableId name) { entries_.push_back({name, {}}); }
+  /// Puts another entry in its place; rollback() brings the old one back.
+  void replace(std::size_t at, const Entry& entry) {
+    changes_.emplace_back(at, entries_[at]);
+    entries_[at] = entry;
+  }
+  /// Number of entries.
+  std::size_t size() const { return entries_.size(); }
+  /// Entry with this index.
+  const Entry& operator[](std::size_t at) const { return entries_[at]; }
+  /// Whether it is no variable.
+  bool is_parked(PoseId id) const {
+    return entries_[index(id)].name == graph::VariableId{graph::kNone};
+  }
+  /// The checkpoint is now.
+  void commit() {
+    changes_.clear();
+    saved_size_ = entries_.size();
+  }
+  /// Back to the checkpoint.
+  void rollback() {
+    for (; !changes_.empty(); changes_.pop_back())
+      entries_[changes_.back().first] = changes_.back().second;
+    entries_.resize(saved_size_);
+  }
+
+ private:
+  std::deque<Entry> entries_;                           ///< By blocks: parked ones are many.
+  std::vector<std::pair<std::size_t, Entry>> changes_;  ///< Since the checkpoint.
+  std::size_t saved_size_ = 0;
+};
+
 /// Measurements that can also be replaced.
 template <typename Measured>
 class FactorList {
@@ -45,7 +89,10 @@ class FactorList {
     graph::FactorId factor = kNoFactor;  ///< None where it does not count.
   };
   /// Appends.
-  void push_back(const Entry& entry) { entries_.push_back(entry); }
+  void push_back(const Entry& entry) {
+    storage::make_room(entries_);
+    entries_.push_back(entry);
+  }
   /// Puts another measurement in its place; rollback() brings the old one back.
   void replace(std::size_t at, const Entry& entry) {
     changes_.push_back({at, entries_[at]});

@@ -1,5 +1,7 @@
 #include "common/factor_graph/plane/smoother.hpp"
 
+#include <stdexcept>
+
 #include "common/factor_graph/bayes_tree/incremental_smoother.hpp"
 #include "common/factor_graph/plane/checkpointed_lists.hpp"
 
@@ -14,7 +16,7 @@ const Eigen::Matrix3d kHeld = 1e12 * Eigen::Matrix3d::Identity();
 struct Smoother::State {
   explicit State(const bayes_tree::IncrementalParameters& parameters) : smoother(parameters) {}
 
-  graph::VariableId name(PoseId id) const { return poses[index(id)]; }
+  graph::VariableId name(PoseId id) const { return poses[index(id)].name; }
   graph::VariableId name(PointId id) const { return points[index(id)]; }
   graph::VariableId name(ScalarId id) const { return scalars[index(id)]; }
 
@@ -79,7 +81,7 @@ struct Smoother::State {
   }
 
   bayes_tree::IncrementalSmoother smoother;
-  AppendList<graph::VariableId> poses;
+  PoseList poses;
   AppendList<graph::VariableId> points;
   AppendList<graph::VariableId> scalars;
   AppendList<PosePrior> pose_priors;
@@ -131,6 +133,24 @@ void Smoother::restart(PointId id, const Eigen::Vector2d& initial) {
 }
 void Smoother::restart(ScalarId id, double initial) {
   state_->smoother.restart(state_->name(id), graph::value_of(initial));
+}
+
+void Smoother::park(PoseId id) {
+  State& state = *state_;
+  if (state.poses.is_parked(id)) throw std::invalid_argument("smoother: the pose is parked");
+  const graph::VariableId name = state.name(id);
+  if (state.smoother.graph().variable(index(name)).degree > 0)
+    throw std::invalid_argument("smoother: a pose with factors cannot be parked");
+  state.poses.replace(index(id), {graph::VariableId{graph::kNone}, pose(id)});
+  state.smoother.remove(name);
+}
+
+void Smoother::unpark(PoseId id) {
+  State& state = *state_;
+  if (!state.poses.is_parked(id)) throw std::invalid_argument("smoother: the pose is not parked");
+  const graph::VariableId name = state.smoother.add_variable(state.poses[index(id)].parked);
+  state.poses.replace(index(id), {name, {}});
+  state.moved.give_role(name, index(id));
 }
 
 bool Smoother::is_free(PointId id) const {
@@ -224,7 +244,10 @@ const PointObservation& Smoother::observation(ObservationId id) const {
   return state_->observations[index(id)].measured;
 }
 
-geometry::SE2 Smoother::pose(PoseId id) const { return state_->smoother.pose2(state_->name(id)); }
+geometry::SE2 Smoother::pose(PoseId id) const {
+  const PoseList::Entry& one = state_->poses[index(id)];
+  return state_->poses.is_parked(id) ? one.parked : state_->smoother.pose2(one.name);
+}
 Eigen::Vector2d Smoother::point(PointId id) const {
   return state_->smoother.point2(state_->name(id));
 }
@@ -244,9 +267,7 @@ Graph Smoother::graph() const {
   Graph graph;
   const State& state = *state_;
 
-  for (const graph::VariableId name : state.poses.items()) {
-    graph.poses.push_back(state.smoother.pose2(name));
-  }
+  for (std::uint32_t i = 0; i < state.poses.size(); ++i) graph.poses.push_back(pose(PoseId(i)));
   for (const graph::VariableId name : state.points.items()) {
     graph.points.push_back(state.smoother.point2(name));
   }
@@ -294,7 +315,10 @@ SmootherUpdate Smoother::update() {
 std::optional<Eigen::MatrixXd> Smoother::joint_marginal(std::span<const PoseId> poses,
                                                         std::span<const PointId> points) const {
   std::vector<graph::VariableId> names;
-  for (const PoseId id : poses) names.push_back(state_->name(id));
+  for (const PoseId id : poses) {
+    if (state_->poses.is_parked(id)) return std::nullopt;
+    names.push_back(state_->name(id));
+  }
   for (const PointId id : points) names.push_back(state_->name(id));
   return state_->smoother.joint_covariance(names);
 }
@@ -302,17 +326,22 @@ std::optional<Eigen::MatrixXd> Smoother::joint_marginal(std::span<const PoseId> 
 Marginals Smoother::marginals(std::span<const PoseId> poses,
                               std::span<const PointId> points) const {
   std::vector<graph::VariableId> names;
+  std::vector<std::size_t> solved;  // Of the poses.
   names.reserve(poses.size() + points.size());
-  for (const PoseId id : poses) names.push_back(state_->name(id));
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (state_->poses.is_parked(poses[i])) continue;
+    solved.push_back(i);
+    names.push_back(state_->name(poses[i]));
+  }
   for (const PointId id : points) names.push_back(state_->name(id));
   const std::vector<Eigen::MatrixXd> found = state_->smoother.covariances(names);
 
   Marginals result{std::vector<Eigen::Matrix3d>(poses.size(), Eigen::Matrix3d::Zero()),
                    std::vector<Eigen::Matrix2d>(points.size(), Eigen::Matrix2d::Zero())};
-  for (std::size_t i = 0; i < poses.size(); ++i)
-    if (found[i].size() > 0) result.poses[i] = found[i];
+  for (std::size_t i = 0; i < solved.size(); ++i)
+    if (found[i].size() > 0) result.poses[solved[i]] = found[i];
   for (std::size_t i = 0; i < points.size(); ++i)
-    if (found[poses.size() + i].size() > 0) result.points[i] = found[poses.size() + i];
+    if (found[solved.size() + i].size() > 0) result.points[i] = found[solved.size() + i];
   return result;
 }
 

@@ -75,6 +75,14 @@ class Smoother {
   /// Likewise.
   void restart(ScalarId id, double initial);
 
+  /// Takes a pose that no factor names out of what is solved: it keeps its number and its estimate,
+  /// and takes 32 bytes. Nothing but pose() and unpark() may be asked of it until it is back;
+  /// marginals have nothing of it. Throws std::invalid_argument where a factor names it, or where
+  /// it is parked.
+  void park(PoseId id);
+  /// Puts it back. Throws std::invalid_argument where it is not parked.
+  void unpark(PoseId id);
+
   /// Whether no factor names the point.
   bool is_free(PointId id) const;
 

@@ -5,6 +5,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "common/factor_graph/storage/steady_growth.hpp"
+
 namespace understory::factor_graph::storage {
 
 /// A table of plain records. A record's first change since the last commit() keeps what it was:
@@ -20,6 +22,7 @@ class JournaledTable {
     int id = 0;
     if (free_.empty()) {
       id = size();
+      make_room(records_);
       records_.emplace_back();
       saved_at_.push_back(0);
     } else {

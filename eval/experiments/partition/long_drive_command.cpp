@@ -82,7 +82,8 @@ nlohmann::json long_drive_row(const LongDriveCell& cell, const LongDriveOptions&
                                {"ms_p50", section.ms_p50},
                                {"ms_p99", section.ms_p99},
                                {"ms_max", section.ms_max},
-                               {"rss_mb", section.resident_mb}});
+                               {"rss_mb", section.resident_mb},
+                               {"mapper_mb", section.mapper_mb}});
   }
   return row;
 }
@@ -91,19 +92,20 @@ void print_header(const LongDriveOptions& options) {
   fmt::print("{}: {} run(s) of {:.0f} m from seed {}, {:.0f} landmarks per km^2\n",
              options.experiment, options.runs, options.route.length_m, options.seed,
              options.route.landmarks_per_km2);
-  fmt::print("{:>8} {:>12} {:>10} {:>12} {:>10} {:>6} {:>10} {:>8} {:>8} {:>8} {:>8}\n", "size m",
-             "to uncut m", "worst m", "to truth m", "uncut m", "NEES", "closure ms", "p50 ms",
-             "p99 ms", "max ms", "RSS MB");
+  fmt::print("{:>8} {:>12} {:>10} {:>12} {:>10} {:>6} {:>10} {:>8} {:>8} {:>8} {:>8} {:>9}\n",
+             "size m", "to uncut m", "worst m", "to truth m", "uncut m", "NEES", "closure ms",
+             "p50 ms", "p99 ms", "max ms", "RSS MB", "mapper MB");
 }
 
 void print_cell(const LongDriveCell& cell) {
   for (const Section& section : cell.sections) {
     fmt::print(
         "{:>8.0f} {:>12.4f} {:>10.4f} {:>12.4f} {:>10.4f} {:>6.2f} {:>10.1f} {:>8.2f} {:>8.2f} "
-        "{:>8.2f} {:>8.0f}\n",
+        "{:>8.2f} {:>8.1f} {:>9.2f}\n",
         cell.size_m, root_mean_square(cell.to_uncut_m), largest_of(cell.to_uncut_m),
         root_mean_square(cell.to_truth_m), root_mean_square(cell.uncut_to_truth_m), cell.nees,
-        cell.closure_ms, section.ms_p50, section.ms_p99, section.ms_max, section.resident_mb);
+        cell.closure_ms, section.ms_p50, section.ms_p99, section.ms_max, section.resident_mb,
+        section.mapper_mb);
   }
   std::fflush(stdout);
 }

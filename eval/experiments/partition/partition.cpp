@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <optional>
 
 #include "common/terminal/interrupt.hpp"
 #include "eval/harness/submap_shelf.hpp"
@@ -26,13 +27,14 @@ geoslam_mapper::MapperParameters mapper_parameters(const Keeping& keeping) {
   return parameters;
 }
 
-Section section_of(double end_m, const std::vector<double>& ms) {
+Section section_of(double end_m, const std::vector<double>& ms, std::ptrdiff_t mapper_bytes) {
   Section section;
   section.end_m = end_m;
   section.ms_p50 = tools::quantile(ms, 0.5);
   section.ms_p99 = tools::quantile(ms, 0.99);
   section.ms_max = tools::quantile(ms, 1.0);
   section.resident_mb = tools::resident_mb();
+  section.mapper_mb = 1e-6 * static_cast<double>(mapper_bytes);
   return section;
 }
 
@@ -41,34 +43,48 @@ Section section_of(double end_m, const std::vector<double>& ms) {
 DriveResult drive(const RouteParameters& parameters, std::uint64_t seed, const Keeping& keeping,
                   std::size_t sections) {
   Route route(parameters, seed);
-  const auto mapper = geoslam_mapper::make_mapper(mapper_parameters(keeping));
   harness::SubmapShelf shelf;
   DriveResult result;
   std::vector<double> ms;
   double nees = 0.0;
   std::size_t told = 0;
   const std::size_t per_section = std::max<std::size_t>(1, route.size() / sections);
+  ms.reserve(route.size());
+
+  const std::ptrdiff_t before = tools::heap_in_use();
+  const auto mapper = geoslam_mapper::make_mapper(mapper_parameters(keeping));
+  std::ptrdiff_t mapper_bytes = tools::heap_in_use() - before;
 
   for (std::size_t k = 0; k < route.size(); ++k) {
     terminal::throw_if_interrupted();
-    if (k > 0) mapper->add(route.odometry(k));
+    const std::optional<model::Odometry> odometry =
+        k > 0 ? std::optional(route.odometry(k)) : std::nullopt;
     const model::Keyframe keyframe = route.keyframe(k);
-    const double begin_s = tools::thread_time_s();
-    const model::MapUpdate update = mapper->add(keyframe);
-    shelf.serve(*mapper);
-    ms.push_back(1e3 * (tools::thread_time_s() - begin_s));
-    (void)mapper->take_changed_landmarks();
-    if (!update.merged.empty()) result.closure_ms = std::max(result.closure_ms, ms.back());
+    const geometry::SE2 truth = route.pose(k);
 
-    if (update.status == model::MapUpdateStatus::kUpdated) {
-      const Eigen::Vector3d error = (update.map_T_vehicle.inverse() * route.pose(k)).Log();
-      nees += error.dot(update.covariance.inverse() * error);
-      ++told;
-    } else if (k > 0) {
-      ++result.refused;
+    // What the heap grows by from here to the end of the scope is the mapper's.
+    const std::ptrdiff_t before_keyframe = tools::heap_in_use();
+    {
+      if (odometry) mapper->add(*odometry);
+      const double begin_s = tools::thread_time_s();
+      const model::MapUpdate update = mapper->add(keyframe);
+      shelf.serve(*mapper);
+      ms.push_back(1e3 * (tools::thread_time_s() - begin_s));
+      (void)mapper->take_changed_landmarks();
+      if (!update.merged.empty()) result.closure_ms = std::max(result.closure_ms, ms.back());
+
+      if (update.status == model::MapUpdateStatus::kUpdated) {
+        const Eigen::Vector3d error = (update.map_T_vehicle.inverse() * truth).Log();
+        nees += error.dot(update.covariance.inverse() * error);
+        ++told;
+      } else if (k > 0) {
+        ++result.refused;
+      }
     }
+    mapper_bytes += tools::heap_in_use() - before_keyframe;
+
     if ((k + 1) % per_section == 0) {
-      result.sections.push_back(section_of(Route::along_m(k), ms));
+      result.sections.push_back(section_of(Route::along_m(k), ms, mapper_bytes));
       ms.clear();
     }
   }

@@ -17,6 +17,7 @@ struct Section {
   double ms_p99 = 0.0;
   double ms_max = 0.0;
   double resident_mb = 0.0;  ///< Of the whole process, at the section's end.
+  double mapper_mb = 0.0;    ///< That the mapper alone has on the heap, likewise.
 };
 
 /// How the mapper keeps what lies behind.

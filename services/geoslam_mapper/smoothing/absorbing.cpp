@@ -12,7 +12,7 @@ namespace plane = factor_graph::plane;
 namespace {
 
 FrozenMotion frozen_motion(const plane::RelativePose& motion) {
-  return {index(motion.a), index(motion.b), motion.a_T_b, motion.information, std::nullopt, 0};
+  return {index(motion.a), index(motion.b), motion.a_T_b, motion.information, 0, 0};
 }
 
 }  // namespace
@@ -69,16 +69,15 @@ std::vector<FrozenMotion> PoseGraph::motions_of(NodeIndex node) const {
 
 /// Each once; those that are frozen, too.
 std::vector<FrozenMotion> PoseGraph::loose_motions() const {
-  std::vector<FrozenMotion> motions = frozen_motions_;
+  std::vector<FrozenMotion> motions = frozen_motions_.all();
   for (NodeIndex node = 0; node < nodes_.size(); ++node) {
     for (const MotionRef ref : nodes_[node].motions)
       if (ends_of(ref).first == node) motions.push_back(loose_motion(ref));
   }
 
-  for (AwayTieId tie = 0; tie < away_ties_.size(); ++tie) {
-    if (!away_ties_[tie]) continue;
-    motions.push_back(frozen_motion(smoother_.motion(*away_ties_[tie])));
-    motions.back().away_tie = tie;
+  for (const auto& [nodes, tie] : away_ties_) {
+    motions.push_back(frozen_motion(smoother_.motion(tie.motion)));
+    motions.back().away = tie.submaps;
   }
   return motions;
 }
@@ -104,7 +103,6 @@ NodeIndex PoseGraph::absorb(const LooseGraph& other, const geometry::SE2& map_T_
   }
 
   std::set<TiedNodes> changed;
-  dormant_of_node_.resize(nodes_.size());
   for (const auto& [id, observed] : other.dormant) {
     std::vector<DormantObservation>& ours = dormant_[id];
     for (DormantObservation seen : observed) {
@@ -125,12 +123,9 @@ NodeIndex PoseGraph::absorb(const LooseGraph& other, const geometry::SE2& map_T_
 void PoseGraph::absorb(const FrozenMotion& motion, NodeIndex first) {
   const NodeIndex a = first + motion.a;
   const NodeIndex b = first + motion.b;
+  if (motion.away > 0) return add_away({a, b, motion.a_T_b, motion.information, motion.away, 0});
   const plane::RelativePose measured{nodes_[a].centre, nodes_[b].centre, motion.a_T_b,
                                      motion.information};
-  if (motion.away_tie) {
-    away_ties_.emplace_back(put(measured));
-    return;
-  }
   const bool is_closure = motion.closure != 0 && !has_closure(motion.closure);
   const MotionRef ref = link(measured, a, b);
   if (is_closure) closures_.emplace(ref.number, motion.closure);

@@ -51,7 +51,6 @@ void PoseGraph::make_dormant(std::span<const model::LandmarkId> ids,
       const plane::PointObservation& factor = smoother_.observation(entry->second);
       observed.push_back({node, factor.position, factor.information});
       ignore(node, id);
-      if (dormant_of_node_.size() <= node) dormant_of_node_.resize(node + 1);
       dormant_of_node_[node].landmarks.push_back(id);
     }
 
@@ -82,7 +81,7 @@ void PoseGraph::wake(std::span<const model::LandmarkId> ids) {
       place_observation(
           one.node, id,
           {nodes_[one.node].centre, point_of_.at(id), one.position_m, one.information});
-      std::erase(dormant_of_node_[one.node].landmarks, id);
+      wakes(one.node, id);
     }
     dormant_.erase(found);
   }
@@ -192,12 +191,20 @@ plane::RelativePose PoseGraph::tie(const TiedNodes& nodes,
 }
 
 /// Whether the node's landmarks must follow it; they do then.
+/// The landmark is no more among the node's dormant ones.
+void PoseGraph::wakes(NodeIndex node, model::LandmarkId id) {
+  const auto found = dormant_of_node_.find(node);
+  std::erase(found->second.landmarks, id);
+  if (found->second.landmarks.empty()) dormant_of_node_.erase(found);
+}
+
 bool PoseGraph::has_left(NodeIndex node) {
-  if (node >= dormant_of_node_.size() || dormant_of_node_[node].landmarks.empty()) return false;
+  const auto found = dormant_of_node_.find(node);
+  if (found == dormant_of_node_.end()) return false;
   const geometry::SE2 now = pose(node);
-  const geometry::SE2 move = dormant_of_node_[node].followed.inverse() * now;
+  const geometry::SE2 move = found->second.followed.inverse() * now;
   if (move.translation().norm() + kLever_m * std::abs(move.theta()) < kDormantMove_m) return false;
-  dormant_of_node_[node].followed = now;
+  found->second.followed = now;
   return true;
 }
 

@@ -34,16 +34,15 @@ bool PoseGraph::freeze(std::span<const NodeIndex> nodes) {
   }
 
   // What they are tied to; what was frozen before is part of it as one measurement.
-  const auto before = static_cast<std::ptrdiff_t>(frozen_motions_.size());
-  freeze_motions(going);
-  const std::vector<FrozenMotion> theirs(frozen_motions_.begin() + before, frozen_motions_.end());
+  const std::vector<FrozenMotion> theirs = freeze_motions(going);
   const auto fresh = condense_parts(parts_of(theirs, frozen_factors_, going));
   if (!fresh) {
-    thaw_motions();
+    give_back(theirs);
     return false;
   }
 
-  frozen_.insert(going.begin(), going.end());
+  for (const FrozenMotion& one : theirs) frozen_motions_.add(one);
+  for (const NodeIndex node : going) frozen_.insert(node);
   std::erase_if(frozen_factors_, [&](const FrozenFactor& factor) {
     return std::ranges::any_of(factor.nodes, [&](NodeIndex node) { return going.contains(node); });
   });
@@ -51,14 +50,16 @@ bool PoseGraph::freeze(std::span<const NodeIndex> nodes) {
   set_frozen_factors();
   gyro_.drop_idle(smoother_);
   if (next) hold(*next);
+  for (const NodeIndex node : going) smoother_.park(nodes_[node].centre);
   return true;
 }
 
 /// Their motions go out of the solved graph, with the bias as known now.
-void PoseGraph::freeze_motions(const std::set<NodeIndex>& nodes) {
+std::vector<FrozenMotion> PoseGraph::freeze_motions(const std::set<NodeIndex>& nodes) {
+  std::vector<FrozenMotion> frozen;
   const auto keep = [&](const plane::RelativePose& motion) -> FrozenMotion& {
-    return frozen_motions_.emplace_back(FrozenMotion{index(motion.a), index(motion.b), motion.a_T_b,
-                                                     motion.information, std::nullopt, 0});
+    return frozen.emplace_back(
+        FrozenMotion{index(motion.a), index(motion.b), motion.a_T_b, motion.information, 0, 0});
   };
   for (const NodeIndex node : nodes) {
     for (const MotionRef ref : std::exchange(edit(node).motions, {})) {
@@ -70,52 +71,52 @@ void PoseGraph::freeze_motions(const std::set<NodeIndex>& nodes) {
     }
   }
 
-  for (AwayTieId tie = 0; tie < away_ties_.size(); ++tie) {
-    if (!away_ties_[tie]) continue;
-    const plane::RelativePose motion = smoother_.motion(*away_ties_[tie]);
-    if (!nodes.contains(index(motion.a)) && !nodes.contains(index(motion.b))) continue;
-    keep(motion).away_tie = tie;
-    take_out(*std::exchange(away_ties_[tie], std::nullopt));
-  }
+  std::erase_if(away_ties_, [&](const auto& one) {
+    const auto& [ends, tie] = one;
+    if (!nodes.contains(ends.first) && !nodes.contains(ends.second)) return false;
+    keep(smoother_.motion(tie.motion)).away = tie.submaps;
+    take_out(tie.motion);
+    return true;
+  });
+  return frozen;
 }
 
 void PoseGraph::thaw(std::span<const NodeIndex> nodes) {
   if (std::ranges::none_of(nodes, [&](NodeIndex node) { return frozen_.contains(node); })) return;
-  for (const NodeIndex node : nodes) frozen_.erase(node);
-  thaw_motions();
+  for (const NodeIndex node : nodes) release(node);
+  give_back(frozen_motions_.take_beyond(frozen_));
   recondense_frozen();
+}
+
+/// The node is a variable again, where it was frozen.
+void PoseGraph::release(NodeIndex node) {
+  if (frozen_.erase(node)) smoother_.unpark(nodes_[node].centre);
 }
 
 /// Nothing that was measured may be lost: what cannot be condensed is solved with the rest.
 void PoseGraph::recondense_frozen() {
-  auto factors = condense_parts(parts_of(frozen_motions_, {}, frozen_));
+  const std::set<NodeIndex> frozen = frozen_.all();
+  auto factors = condense_parts(parts_of(frozen_motions_.all(), {}, frozen));
   if (!factors) {
-    frozen_.clear();
-    thaw_motions();
+    for (const NodeIndex node : frozen) release(node);
+    give_back(frozen_motions_.take_beyond({}));
     factors.emplace();
   }
   frozen_factors_ = *std::move(factors);
   set_frozen_factors();
 }
 
-/// Motions of which no end is frozen any more are in the solved graph again.
-void PoseGraph::thaw_motions() {
-  std::vector<FrozenMotion> stay;
-  for (const FrozenMotion& one : frozen_motions_) {
-    if (frozen_.contains(one.a) || frozen_.contains(one.b)) {
-      stay.push_back(one);
+/// Motions of which no end is frozen are in the solved graph again.
+void PoseGraph::give_back(std::span<const FrozenMotion> motions) {
+  for (const FrozenMotion& one : motions) {
+    if (one.away > 0) {
+      add_away(one);
       continue;
     }
-    const plane::RelativePose motion{nodes_[one.a].centre, nodes_[one.b].centre, one.a_T_b,
-                                     one.information};
-    if (one.away_tie) {
-      away_ties_[*one.away_tie] = put(motion);
-    } else {
-      const MotionRef ref = link(motion, one.a, one.b);
-      if (one.closure != 0) closures_.emplace(ref.number, one.closure);
-    }
+    const MotionRef ref = link(
+        {nodes_[one.a].centre, nodes_[one.b].centre, one.a_T_b, one.information}, one.a, one.b);
+    if (one.closure != 0) closures_.emplace(ref.number, one.closure);
   }
-  frozen_motions_ = std::move(stay);
 }
 
 /// None where a part does not determine its nodes, or is tied to too many.
@@ -142,8 +143,8 @@ void PoseGraph::set_frozen_factors() {
 }
 
 void PoseGraph::unfreeze() {
-  const std::vector<NodeIndex> all(frozen_.begin(), frozen_.end());
-  thaw(all);
+  const std::set<NodeIndex> all = frozen_.all();
+  thaw(std::vector<NodeIndex>(all.begin(), all.end()));
   if (origin_ && anchor_->node != origin_->node) hold(*origin_);
 }
 
@@ -174,16 +175,6 @@ std::optional<Anchor> PoseGraph::anchor_beyond(const std::set<NodeIndex>& going)
   }
   if (!nearest) return std::nullopt;
   return Anchor{*nearest, pose(*nearest)};
-}
-
-void PoseGraph::take_away_tie_out(AwayTieId tie) {
-  if (away_ties_[tie]) {
-    take_out(*std::exchange(away_ties_[tie], std::nullopt));
-  } else {
-    std::erase_if(frozen_motions_, [&](const FrozenMotion& one) { return one.away_tie == tie; });
-    recondense_frozen();
-  }
-  free_away_ties_.push_back(tie);
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -19,13 +19,14 @@ struct FrozenMotion {
   NodeIndex b = 0;
   geometry::SE2 a_T_b;
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-  std::optional<std::uint32_t> away_tie;  ///< Its number; none: a motion of the two nodes.
-  std::uint64_t closure = 0;              ///< Its number; 0: none.
+  /// It stands for landmarks of so many submaps that are kept elsewhere; 0: a motion of the nodes.
+  std::uint32_t away = 0;
+  std::uint64_t closure = 0;  ///< Its number; 0: none.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
-    a(s.a, s.b, s.a_T_b, s.information, s.away_tie, s.closure);
+    a(s.a, s.b, s.a_T_b, s.information, s.away, s.closure);
   }
 };
 

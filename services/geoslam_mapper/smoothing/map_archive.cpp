@@ -5,7 +5,7 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-constexpr state::Format kWholeMapFormat{"geoslam_mapper.smoothing.map", 3};
+constexpr state::Format kWholeMapFormat{"geoslam_mapper.smoothing.map", 4};
 
 std::size_t parts_of(const std::deque<KeptMap>& maps) {
   std::size_t parts = 0;

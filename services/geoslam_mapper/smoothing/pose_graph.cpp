@@ -241,7 +241,7 @@ void PoseGraph::take_closure_out(std::uint64_t id) {
 
 bool PoseGraph::has_closure(std::uint64_t id) const {
   return std::ranges::any_of(closures_, [&](const auto& one) { return one.second == id; }) ||
-         std::ranges::any_of(frozen_motions_, [&](const auto& one) { return one.closure == id; });
+         frozen_motions_.has_closure(id);
 }
 
 std::uint32_t PoseGraph::motion_of(std::uint64_t closure) const {
@@ -343,7 +343,7 @@ std::vector<std::pair<model::LandmarkId, Eigen::Vector2d>> PoseGraph::take_moved
   std::vector<model::LandmarkId> dormant;
   for (const NodeIndex node : moved_nodes()) {
     if (!has_left(node)) continue;
-    const std::vector<model::LandmarkId>& ids = dormant_of_node_[node].landmarks;
+    const std::span<const model::LandmarkId> ids = dormant_of(node);
     dormant.insert(dormant.end(), ids.begin(), ids.end());
   }
   std::sort(dormant.begin(), dormant.end());
@@ -363,6 +363,7 @@ void PoseGraph::restore(const plane::Graph& graph) {
   if (graph.poses.size() != nodes_.size() || graph.points.size() != landmark_of_point_.size())
     throw std::invalid_argument("mapper state: its graph does not fit its nodes");
   smoother_.start_from(graph);
+  for (const NodeIndex node : frozen_.all()) smoother_.park(nodes_.at(node).centre);
   if (anchor_) hold(*anchor_);
 
   for (std::size_t i = 0; i < landmark_of_point_.size(); ++i) {
@@ -370,10 +371,10 @@ void PoseGraph::restore(const plane::Graph& graph) {
       point_of_.emplace(landmark_of_point_[i], plane::PointId(static_cast<std::uint32_t>(i)));
   }
   recondense_frozen();
-  dormant_of_node_.assign(nodes_.size(), {});
+  dormant_of_node_.clear();
   for (const auto& [id, observed] : dormant_) {
     for (const DormantObservation& one : observed)
-      dormant_of_node_.at(one.node).landmarks.push_back(id);
+      dormant_of_node_[one.node].landmarks.push_back(id);
   }
 }
 

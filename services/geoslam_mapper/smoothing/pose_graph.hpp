@@ -1,6 +1,7 @@
 // The graph of keyframe centres and landmarks, with checkpoint and rollback.
 #pragma once
 
+#include <deque>
 #include <map>
 #include <optional>
 #include <set>
@@ -15,8 +16,10 @@
 #include "services/geoslam_mapper/parameters.hpp"
 #include "services/geoslam_mapper/smoothing/centre_motion.hpp"
 #include "services/geoslam_mapper/smoothing/free_numbers.hpp"
+#include "services/geoslam_mapper/smoothing/frozen_motions.hpp"
 #include "services/geoslam_mapper/smoothing/frozen_part.hpp"
 #include "services/geoslam_mapper/smoothing/gyro_bias.hpp"
+#include "services/geoslam_mapper/smoothing/node_set.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 
@@ -81,13 +84,10 @@ struct DormantObservation {
   }
 };
 
-/// Number of a motion that stands for landmarks that are kept elsewhere.
-using AwayTieId = std::uint32_t;
-
 /// Landmarks that are kept elsewhere, and what stands for them in the graph.
 struct AwayLandmarks {
   std::vector<std::vector<DormantObservation>> observed;  ///< In the order of the ids.
-  std::vector<AwayTieId> ties;
+  std::vector<FrozenMotion> ties;                         ///< Of each two nodes, one.
 };
 
 /// A node that holds the solved graph.
@@ -207,12 +207,14 @@ class PoseGraph {
                     const std::map<model::LandmarkId, StoredLandmark>& landmarks);
   /// Takes landmarks into the solved graph again, where they are dormant.
   void wake(std::span<const model::LandmarkId> ids);
-  /// Takes dormant landmarks out of the graph altogether. What they measure of the nodes stays as
-  /// motions of their own. Exact; bring_back() undoes it. Throws std::out_of_range where one is not
-  /// dormant. Cost: the landmarks, and those that their nodes have in common.
+  /// Takes dormant landmarks out of the graph altogether. What they measure of the nodes stays: one
+  /// motion of each two nodes, whatever is away of them. bring_back() undoes it, but for terms of
+  /// second order. Throws std::out_of_range where one is not dormant. Cost: the landmarks, and
+  /// those that their nodes have in common.
   AwayLandmarks put_away(std::span<const model::LandmarkId> ids);
   /// Makes them dormant landmarks of the graph again. Throws std::invalid_argument where an
-  /// observation is of a node that is not condensed or has no information; nothing is changed then.
+  /// observation is of a node that is not condensed or is frozen, or has no information, or where
+  /// no motion stands for them; nothing is changed then.
   void bring_back(std::span<const model::LandmarkId> ids, const AwayLandmarks& away);
   /// How a node lies to others that are not frozen, closures among it, with the gyro's bias as it
   /// is known now; without what landmarks tell.
@@ -312,11 +314,13 @@ class PoseGraph {
     factor_graph::plane::Graph graph = self.smoother_.graph();
     a(graph, self.nodes_, self.landmark_of_point_, self.gyro_, self.newest_, self.free_nodes_,
       self.free_points_, self.free_observations_, self.free_motions_, self.free_biased_,
-      self.dormant_, self.ties_, self.closures_, self.away_ties_, self.free_away_ties_,
-      self.frozen_motions_, self.origin_, self.anchor_);
-    std::vector<NodeIndex> frozen(self.frozen_.begin(), self.frozen_.end());
+      self.dormant_, self.ties_, self.closures_, self.away_ties_, self.frozen_motions_,
+      self.origin_, self.anchor_);
+    const std::set<NodeIndex> all = self.frozen_.all();
+    std::vector<NodeIndex> frozen(all.begin(), all.end());
     a(frozen);
-    if constexpr (Archive::kReads) self.frozen_.insert(frozen.begin(), frozen.end());
+    if constexpr (Archive::kReads)
+      for (const NodeIndex node : frozen) self.frozen_.insert(node);
     if constexpr (Archive::kReads) self.restore(graph);
   }
 
@@ -347,11 +351,22 @@ class PoseGraph {
       a(s.motion, s.landmarks);
     }
   };
+  /// What stands for landmarks of two nodes that are kept elsewhere, of so many submaps.
+  struct AwayTie {
+    factor_graph::plane::MotionId motion{};
+    std::uint32_t submaps = 0;
+
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& s) {
+      a(s.motion, s.submaps);
+    }
+  };
   std::vector<TiedNodes> tied_by(model::LandmarkId id) const;
   void renew(const std::set<TiedNodes>& ties);
   factor_graph::plane::MotionId put(const factor_graph::plane::RelativePose& motion);
   void take_out(factor_graph::plane::MotionId motion);
-  void take_away_tie_out(AwayTieId tie);
+  void add_away(const FrozenMotion& tie);
+  void take_away_out(const FrozenMotion& tie);
   bool may_freeze(NodeIndex node) const;
   void hold(const Anchor& anchor);
   std::optional<Anchor> anchor_beyond(const std::set<NodeIndex>& going) const;
@@ -360,8 +375,9 @@ class PoseGraph {
   Eigen::Matrix3d anchor_covariance() const;
   Eigen::Matrix3d of_anchor(const geometry::SE2& map_T_node, const Eigen::Matrix3d& anchor) const;
   Eigen::Matrix2d of_anchor(const Eigen::Vector2d& position_m, const Eigen::Matrix3d& anchor) const;
-  void freeze_motions(const std::set<NodeIndex>& nodes);
-  void thaw_motions();
+  std::vector<FrozenMotion> freeze_motions(const std::set<NodeIndex>& nodes);
+  void give_back(std::span<const FrozenMotion> motions);
+  void release(NodeIndex node);
   std::optional<std::vector<FrozenFactor>> condense_parts(
       const std::vector<FrozenPart>& parts) const;
   void set_frozen_factors();
@@ -371,6 +387,7 @@ class PoseGraph {
   void absorb(const FrozenMotion& motion, NodeIndex first);
   factor_graph::plane::RelativePose tie(const TiedNodes& nodes,
                                         std::span<const model::LandmarkId> ids) const;
+  void wakes(NodeIndex node, model::LandmarkId id);
   bool has_left(NodeIndex node);
   void add_motions_of(NodeIndex node, Part& part) const;
   void add_motion(MotionRef ref, factor_graph::plane::PoseId a, factor_graph::plane::PoseId b,
@@ -397,7 +414,7 @@ class PoseGraph {
   factor_graph::plane::RelativePose take_motion_out(MotionRef ref);
 
   factor_graph::plane::Smoother smoother_;
-  std::vector<Node> nodes_;
+  std::deque<Node> nodes_;  ///< By blocks: a long drive has many.
   std::unordered_map<model::LandmarkId, factor_graph::plane::PointId> point_of_;
   /// By point of the smoother; 0 where the landmark was merged into another.
   std::vector<model::LandmarkId> landmark_of_point_;
@@ -405,21 +422,19 @@ class PoseGraph {
   std::map<model::LandmarkId, std::vector<DormantObservation>> dormant_;
   std::map<TiedNodes, Tie> ties_;
   std::map<std::uint32_t, std::uint64_t> closures_;  ///< Closures by the number of their motion.
-  /// Each the motion that it is; none while it is frozen, or free.
-  std::vector<std::optional<factor_graph::plane::MotionId>> away_ties_;
-  std::vector<AwayTieId> free_away_ties_;
-  std::set<NodeIndex> frozen_;
-  std::vector<FrozenMotion> frozen_motions_;  ///< With an end that is frozen.
+  std::map<TiedNodes, AwayTie> away_ties_;           ///< But for those that are frozen.
+  NodeSet frozen_;
+  FrozenMotions frozen_motions_;              ///< With an end that is frozen.
   std::vector<FrozenFactor> frozen_factors_;  ///< In the solved graph; from the motions.
   /// What is dormant of a node's landmarks, and where the node was when they last followed it.
   struct DormantOfNode {
     std::vector<model::LandmarkId> landmarks;
     geometry::SE2 followed;
   };
-  std::vector<DormantOfNode> dormant_of_node_;  ///< By node; from dormant_.
-  std::optional<NodeIndex> newest_;             ///< Added last.
-  std::optional<Anchor> origin_;                ///< The first keyframe's.
-  std::optional<Anchor> anchor_;                ///< What holds the solved graph now.
+  std::map<NodeIndex, DormantOfNode> dormant_of_node_;  ///< Where there are any; from dormant_.
+  std::optional<NodeIndex> newest_;                     ///< Added last.
+  std::optional<Anchor> origin_;                        ///< The first keyframe's.
+  std::optional<Anchor> anchor_;                        ///< What holds the solved graph now.
   FreeNumbers free_nodes_;
   FreeNumbers free_points_;
   FreeNumbers free_observations_;

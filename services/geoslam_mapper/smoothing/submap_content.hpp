@@ -21,6 +21,9 @@ struct SubmapContent {
   /// How the node lay to others when the submap was handed over, closures among them; with the
   /// gyro's bias as it was known then. None in submaps of 0.2.0.
   std::vector<FrozenMotion> motions;
+  /// What stood for the landmarks in the mapper's graph while they were away. None in submaps of
+  /// before 0.4.0.
+  std::vector<FrozenMotion> ties;
 };
 
 /// As bytes.

@@ -155,6 +155,7 @@ void Submaps::give_away(const Here& here, model::Utime utime, GlobalMap& map) {
   content.motions = map.graph.motions_of(here.node);
   AwayLandmarks away = map.graph.put_away(ids);
   content.observed = std::move(away.observed);
+  content.ties = std::move(away.ties);
   for (std::size_t i = 0; i < ids.size(); ++i) {
     content.landmarks.push_back(map.landmarks.put_away(ids[i]));
     submap.landmarks[i].covariance_m2 =
@@ -168,7 +169,7 @@ void Submaps::give_away(const Here& here, model::Utime utime, GlobalMap& map) {
 
   submap.payload = submap_payload(content);
   submap.content_hash = model::fnv1a(submap.payload);
-  away_.push_back({here.node, submap.id, submap.content_hash, std::move(away.ties)});
+  away_.push_back({here.node, submap.id, submap.content_hash});
   std::erase_if(here_, [&](const Here& one) { return one.node == here.node; });
   given_away_.push_back(std::move(submap));
 }
@@ -193,7 +194,7 @@ std::string Submaps::bring_back(const model::Submap& submap, GlobalMap& map) {
     for (const auto& observed : content.observed)
       for (const DormantObservation& one : observed) nodes.push_back(one.node);
     map.graph.thaw(nodes);
-    map.graph.bring_back(ids, {content.observed, away->ties});
+    map.graph.bring_back(ids, {content.observed, content.ties});
   } catch (const std::invalid_argument& error) {
     return name + ": " + error.what();
   }

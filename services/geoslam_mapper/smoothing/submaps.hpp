@@ -1,6 +1,7 @@
 // Parts of the map that are kept elsewhere.
 #pragma once
 
+#include <deque>
 #include <optional>
 #include <string>
 #include <utility>
@@ -63,16 +64,15 @@ class Submaps {
       a(s.node, s.was);
     }
   };
-  /// A submap that is kept elsewhere, and what stands for its landmarks.
+  /// A submap that is kept elsewhere.
   struct Away {
     NodeIndex node = 0;
     model::SubmapId id = 0;
     std::uint64_t content_hash = 0;
-    std::vector<AwayTieId> ties;
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& s) {
-      a(s.node, s.id, s.content_hash, s.ties);
+      a(s.node, s.id, s.content_hash);
     }
   };
   void give_away(const Here& here, model::Utime utime, GlobalMap& map);
@@ -82,7 +82,7 @@ class Submaps {
   double hand_over_m_;
   bool may_hand_over_ = true;
   std::vector<Here> here_;
-  std::vector<Away> away_;  ///< In order of id.
+  std::deque<Away> away_;  ///< In order of id.
   std::vector<model::SubmapId> wanted_;
   std::vector<model::Submap> given_away_;
   model::SubmapId next_id_ = 1;

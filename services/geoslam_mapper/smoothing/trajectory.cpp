@@ -62,10 +62,8 @@ void Trajectory::forget_oldest() {
 
 /// Makes the base a viewpoint unless its node has one as near.
 bool Trajectory::add_viewpoint(const Base& base, const PoseGraph& graph) {
-  if (viewpoints_of_node_.size() <= base.node) viewpoints_of_node_.resize(base.node + 1);
-
   const double apart_m = kApartShare * fold_distance_m_;
-  for (const std::uint32_t other : viewpoints_of_node_[base.node]) {
+  for (const std::uint32_t other : viewpoints_of(base.node)) {
     const geometry::SE2 between =
         viewpoints_[other].centre_T_middle.inverse() * base.centre_T_middle;
     if (between.translation().norm() < apart_m &&
@@ -90,9 +88,25 @@ void Trajectory::put(const Viewpoint& viewpoint, const PoseGraph& graph) {
   index(number, graph);
 }
 
+/// Numbers of a node's viewpoints.
+std::span<const std::uint32_t> Trajectory::viewpoints_of(NodeIndex node) const {
+  const auto found = viewpoints_of_node_.find(node);
+  if (found == viewpoints_of_node_.end()) return {};
+  return found->second;
+}
+
+/// They are no more the node's.
+std::vector<std::uint32_t> Trajectory::take_viewpoints_of(NodeIndex node) {
+  const auto found = viewpoints_of_node_.find(node);
+  if (found == viewpoints_of_node_.end()) return {};
+  std::vector<std::uint32_t> numbers = std::move(found->second);
+  viewpoints_of_node_.erase(found);
+  return numbers;
+}
+
 /// Their numbers serve others.
 void Trajectory::drop_viewpoints(NodeIndex node) {
-  for (const std::uint32_t viewpoint : std::exchange(viewpoints_of_node_[node], {})) {
+  for (const std::uint32_t viewpoint : take_viewpoints_of(node)) {
     grid_.remove(viewpoint);
     viewpoints_[viewpoint].is_free = true;
     free_viewpoints_.push_back(viewpoint);
@@ -109,8 +123,7 @@ AwayBases Trajectory::put_away(NodeIndex node) {
   spare_ -= static_cast<std::size_t>(
       std::ranges::count_if(away.bases, [](const Base& base) { return base.is_spare; }));
 
-  if (node >= viewpoints_of_node_.size()) return away;
-  for (const std::uint32_t number : viewpoints_of_node_[node])
+  for (const std::uint32_t number : viewpoints_of(node))
     away.centre_T_viewpoints.push_back(viewpoints_[number].centre_T_middle);
   drop_viewpoints(node);
   return away;
@@ -154,14 +167,13 @@ void Trajectory::absorb(Trajectory other, NodeIndex first, const PoseGraph& grap
 
 void Trajectory::index(std::uint32_t viewpoint, const PoseGraph& graph) {
   const NodeIndex node = viewpoints_[viewpoint].node;
-  if (viewpoints_of_node_.size() <= node) viewpoints_of_node_.resize(node + 1);
   viewpoints_of_node_[node].push_back(viewpoint);
   grid_.put(viewpoint, middle(viewpoints_[viewpoint], graph).translation());
 }
 
 void Trajectory::hand_over(const Retirement& retirement) {
   // Each viewpoint has a base that is not spare; the node's other bases are later than its first.
-  std::size_t left = viewpoints_of_node_[retirement.node].size();
+  std::size_t left = viewpoints_of(retirement.node).size();
   for (auto base = bases_.rbegin(); left > 0 && base != bases_.rend(); ++base) {
     if (base->node != retirement.node) continue;
     base->node = retirement.into;
@@ -183,7 +195,7 @@ void Trajectory::tie(std::span<const Retirement> retired, const PoseGraph& graph
                         [&](const Retirement& one) { return one.node == node; });
   };
   std::size_t left = 0;
-  for (const Retirement& one : retired) left += viewpoints_of_node_[one.node].size();
+  for (const Retirement& one : retired) left += viewpoints_of(one.node).size();
   for (auto base = bases_.rbegin(); left > 0 && base != bases_.rend(); ++base) {
     const auto one = retirement_of(base->node);
     if (one == retired.end()) continue;
@@ -194,7 +206,7 @@ void Trajectory::tie(std::span<const Retirement> retired, const PoseGraph& graph
   }
 
   for (const Retirement& one : retired) {
-    for (const std::uint32_t number : std::exchange(viewpoints_of_node_[one.node], {})) {
+    for (const std::uint32_t number : take_viewpoints_of(one.node)) {
       Viewpoint& viewpoint = viewpoints_[number];
       viewpoint.node = one.into;
       viewpoint.centre_T_middle = one.into_T_node.mean * viewpoint.centre_T_middle;
@@ -205,8 +217,7 @@ void Trajectory::tie(std::span<const Retirement> retired, const PoseGraph& graph
 
 void Trajectory::follow(const PoseGraph& graph) {
   for (const NodeIndex node : graph.moved_nodes()) {
-    if (node >= viewpoints_of_node_.size()) continue;
-    for (const std::uint32_t viewpoint : viewpoints_of_node_[node])
+    for (const std::uint32_t viewpoint : viewpoints_of(node))
       grid_.put(viewpoint, middle(viewpoints_[viewpoint], graph).translation());
   }
 }

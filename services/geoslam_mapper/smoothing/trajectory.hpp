@@ -1,6 +1,7 @@
 // Where every keyframe was, and which of them were at one place.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -143,6 +144,8 @@ class Trajectory {
   };
   bool add_viewpoint(const Base& base, const PoseGraph& graph);
   void put(const Viewpoint& viewpoint, const PoseGraph& graph);
+  std::span<const std::uint32_t> viewpoints_of(NodeIndex node) const;
+  std::vector<std::uint32_t> take_viewpoints_of(NodeIndex node);
   void drop_viewpoints(NodeIndex node);
   void index(std::uint32_t viewpoint, const PoseGraph& graph);
   void forget_oldest();
@@ -158,8 +161,8 @@ class Trajectory {
   std::size_t spare_ = 0;            ///< Bases that are.
   std::vector<Viewpoint> viewpoints_;
   std::vector<std::uint32_t> free_viewpoints_;
-  std::vector<std::vector<std::uint32_t>> viewpoints_of_node_;
-  ViewpointGrid grid_;  ///< Of the viewpoints.
+  std::map<NodeIndex, std::vector<std::uint32_t>> viewpoints_of_node_;  ///< Where there are any.
+  ViewpointGrid grid_;                                                  ///< Of the viewpoints.
 };
 
 }  // namespace understory::geoslam_mapper::smoothing
