@@ -15,6 +15,10 @@ namespace {
 constexpr double kPerPass = 4.0;
 constexpr double kPerFactor = 8.0;
 constexpr double kMostMissed = 16.0;
+/// Parts of a pass, of a second and of a point that went, in which histories are counted.
+constexpr double kPassParts = 1024.0;
+constexpr double kSecondParts = 16.0;
+constexpr double kWentParts = 1 << 24;
 constexpr double kLeastOf = 1e-3;
 constexpr double kTiny = std::numeric_limits<double>::min();
 
@@ -168,8 +172,16 @@ class Posterior {
     return chances;
   }
 
+  /// v at each step, or its part that the looks rule out.
+  static std::array<double, kSteps> chances_to_see(const Axis& axis, const History& one) {
+    std::array<double, kSteps> chances{};
+    for (std::size_t i = 0; i < axis.steps(); ++i)
+      chances[i] = (one.is_seen_now ? 1.0 : one.missed_now) * probability_of(std::exp(axis.at(i)));
+    return chances;
+  }
+
   void add(const History& one, const Axes& axes, std::vector<double>& logs) const {
-    const auto by_now = chances_to_miss(axes[0], one.is_seen_now ? 1.0 : one.missed_now);
+    const std::array<double, kSteps> by_now = chances_to_see(axes[0], one);
     const auto by_before = chances_to_miss(axes[1], one.missed_before);
     std::array<double, kSteps> lost{};
     for (std::size_t l = 0; l < axes[2].steps(); ++l)
@@ -181,7 +193,7 @@ class Posterior {
         const double there = (1.0 - lost[l]) * by_before[k] / std::max(kTiny, missed);
         const double before = share_ * std::log(std::max(kTiny, missed));
         for (std::size_t i = 0; i < axes[0].steps(); ++i) {
-          const double seen = there * (1.0 - by_now[i]);
+          const double seen = there * by_now[i];
           const double now = std::log(std::max(kTiny, one.is_seen_now ? seen : 1.0 - seen));
           logs[(i * axes[1].steps() + k) * axes[2].steps() + l] += one.points * (before + now);
         }
@@ -197,6 +209,10 @@ class Posterior {
 };
 
 int step_of(double value) { return static_cast<int>(std::round(value)); }
+
+std::int64_t parts_of(double value, double parts) {
+  return static_cast<std::int64_t>(std::round(value * parts));
+}
 
 }  // namespace
 
@@ -214,22 +230,24 @@ LearnedRates LearnedRates::restored(const std::array<double, kNumbers>& numbers)
           numbers[4], numbers[5], numbers[6], numbers[7]};
 }
 
-void PassHistories::add(const OpenHistory& history) {
+void PassHistories::count(const OpenHistory& history, std::int64_t times) {
   const auto went = static_cast<double>(history.counted.went);
-  const auto since_s = static_cast<double>(history.since_s);
-  went_ -= went;
-  exposure_s_ -= (1.0 - went) * static_cast<double>(history.counted.since_s);
+  went_ += times * parts_of(went, kWentParts);
+  exposure_ +=
+      times * parts_of((1.0 - went) * static_cast<double>(history.counted.since_s), kSecondParts);
   const double before = std::min(history.missed_before, kMostMissed);
+  const auto since_s = static_cast<double>(history.since_s);
   const std::array<int, 4> key{step_of(kPerPass * before), step_of(kPerPass * history.missed_now),
                                step_of(kPerFactor * std::log(1.0 + since_s)),
                                history.is_seen_now ? 1 : 0};
   if (key[0] == 0 && key[1] == 0 && key[3] == 0) return;
   Alike& sums = alike_[key];
-  sums.points += 1.0;
-  sums.missed_before += before;
-  sums.missed_now += history.missed_now;
-  sums.since_s += since_s;
-  missed_before_ += before;
+  sums.points += times;
+  sums.missed_before += times * parts_of(before, kPassParts);
+  sums.missed_now += times * parts_of(history.missed_now, kPassParts);
+  sums.since += times * parts_of(since_s, kSecondParts);
+  missed_before_ += times * parts_of(before, kPassParts);
+  if (sums.points == 0) alike_.erase(key);
 }
 
 LearnedRates PassHistories::rates(const LearnedRates& until_now, const RatePriors& priors,
@@ -237,11 +255,20 @@ LearnedRates PassHistories::rates(const LearnedRates& until_now, const RatePrior
                                   bool learns_decay) const {
   std::vector<History> histories;
   histories.reserve(alike_.size());
-  for (const auto& [key, sums] : alike_)
-    histories.push_back({sums.points, sums.missed_before / sums.points,
-                         sums.missed_now / sums.points, sums.since_s / sums.points, key[3] == 1});
+  for (const auto& [key, sums] : alike_) {
+    const auto points = static_cast<double>(sums.points);
+    const auto mean = [points](std::int64_t sum, double parts) {
+      return static_cast<double>(sum) / parts / points;
+    };
+    histories.push_back({points, mean(sums.missed_before, kPassParts),
+                         mean(sums.missed_now, kPassParts), mean(sums.since, kSecondParts),
+                         key[3] == 1});
+  }
 
-  const double passes = until_now.before_seen + until_now.before_missed + missed_before_;
+  const double passes = until_now.before_seen + until_now.before_missed +
+                        static_cast<double>(missed_before_) / kPassParts;
+  went -= static_cast<double>(went_) / kWentParts;
+  exposure_s -= static_cast<double>(exposure_) / kSecondParts;
   const double share = std::min(1.0, kMostPasses / passes);
   const auto so_much_of = [share](double counted, double prior) {
     return prior + share * std::max(0.0, counted - prior);
@@ -249,9 +276,8 @@ LearnedRates PassHistories::rates(const LearnedRates& until_now, const RatePrior
   LearnedRates counts = until_now;
   counts.before_seen = so_much_of(until_now.before_seen, priors.seen);
   counts.before_missed = so_much_of(until_now.before_missed, priors.missed);
-  const Posterior posterior(counts, so_much_of(went + went_, priors.went),
-                            so_much_of(exposure_s + exposure_s_, priors.exposure_s), share,
-                            std::move(histories));
+  const Posterior posterior(counts, so_much_of(went, priors.went),
+                            so_much_of(exposure_s, priors.exposure_s), share, std::move(histories));
 
   const auto fixed = [](double log) { return Axis{log, log}; };
   Axes axes{fixed(log_odds(until_now.now, 1.0 - until_now.now)),

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <vector>
 
@@ -13,10 +14,12 @@ namespace understory::existence {
 /// Passes of one point since the last that surely saw it, up to now.
 struct OpenHistory {
   double missed_before = 0.0;  ///< Passes before the one that is open that looked and missed it,
-  double missed_now = 0.0;     ///< and the part of the open one that did.
-  bool is_seen_now = false;    ///< The open one surely sees it: it never went.
-  float since_s = 0.0F;        ///< From the last sure sighting to the begin of the open pass.
-  DecayEvidence counted{};     ///< What of it DecayRate has counted already.
+  /// and whether the open one did: 1 - L / L0, the looks' likelihood where it sees the point by
+  /// that where it does not; 0: nothing is known, 1: missed. The same whatever v is.
+  double missed_now = 0.0;
+  bool is_seen_now = false;  ///< The open one surely sees it: it never went.
+  float since_s = 0.0F;      ///< From the last sure sighting to the begin of the open pass.
+  DecayEvidence counted{};   ///< What of it DecayRate has counted already.
 };
 
 /// v of this drive, v of the drives before, and lambda; 0: nothing learned yet. What hinders a
@@ -54,9 +57,18 @@ struct RatePriors {
 /// Here the posterior is summed up over a grid, so that all of it counts. Passes before differ from
 /// each other, which one v for all of them does not say: together they count as kMostPasses at
 /// most, and what this drive finds of the points that they missed says the rest.
+///
+/// Counts are whole numbers: what is taken back leaves nothing, so that counts that are kept while
+/// points change are those of a recount, to the bit.
 class PassHistories {
  public:
-  void add(const OpenHistory& history);
+  void add(const OpenHistory& history) { count(history, 1); }
+  /// One that was added and has changed since. O(log of the histories that differ).
+  void remove(const OpenHistory& history) { count(history, -1); }
+
+  /// Histories that differ.
+  std::size_t size() const { return alike_.size(); }
+  bool operator==(const PassHistories&) const = default;
 
   /// `until_now`: with its counts. `went`, `exposure_s`: of all histories, those above as they were
   /// counted, and of the prior. What is not learned stays.
@@ -68,17 +80,19 @@ class PassHistories {
 
   /// Histories that are alike: sums.
   struct Alike {
-    double points = 0.0;
-    double missed_before = 0.0;
-    double missed_now = 0.0;
-    double since_s = 0.0;
+    std::int64_t points = 0;
+    std::int64_t missed_before = 0;  ///< In parts of a pass,
+    std::int64_t missed_now = 0;     ///< likewise,
+    std::int64_t since = 0;          ///< and of a second.
+    bool operator==(const Alike&) const = default;
   };
+  void count(const OpenHistory& history, std::int64_t times);
 
   /// By misses, the logarithm of the time, and whether this drive sees the point.
   std::map<std::array<int, 4>, Alike> alike_;
-  double missed_before_ = 0.0;
-  double went_ = 0.0;  ///< In place of what was counted.
-  double exposure_s_ = 0.0;
+  std::int64_t missed_before_ = 0;
+  std::int64_t went_ = 0;  ///< Counted already: to be taken out.
+  std::int64_t exposure_ = 0;
 };
 
 }  // namespace understory::existence

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <stdexcept>
 
@@ -100,11 +101,20 @@ class PointExistence {
   }
 
   /// What became of the point since it was last surely seen: for ExistenceModel::learn().
-  void tell(PassHistories& histories) const;
+  void tell(PassHistories& histories) const {
+    if (const auto open = history()) histories.add(*open);
+  }
+  /// The same taken back: before the point changes, where histories are kept.
+  void take_back(PassHistories& histories) const {
+    if (const auto open = history()) histories.remove(*open);
+  }
 
   /// P anew by what all points have taught about v and lambda, in this pass and in those before.
   /// O(1).
-  void reconsider(ExistenceModel& model);
+  void reconsider(ExistenceModel& model) { reconsider(model, model.learned().before_was); }
+  /// The same for a point that left out some calls of learn(): `before_was` is
+  /// LearnedRates::before as it was when P last followed it.
+  void reconsider(ExistenceModel& model, double before_was);
 
   /// P after evidence from elsewhere (neighbours, other sensors): a factor on its odds. Throws
   /// std::invalid_argument where it is not finite or below 0.
@@ -282,9 +292,11 @@ class PointExistence {
                        double missed_before);
   void weigh(ExistenceModel& model, const DecayEvidence& is);
   void correct_pass(const ExistenceModel& model);
-  void correct_odds(const ExistenceModel& model, MissedShare before, float decay_per_s,
-                    double most_odds);
+  void correct_odds(const ExistenceModel& model, MissedShare before, double before_was,
+                    float decay_per_s, double most_odds);
+  std::optional<OpenHistory> history() const;
   double missed_by_detector() const;
+  double missed_by_looks() const;
   double missed_passes() const { return pending_missed_ / kUnit; }
   bool is_surely_seen(double probability) const { return probability > 0.9 && unseen_ < 1e-3F; }
   static void add_pending(std::uint16_t& count, double passes) {

@@ -7,25 +7,34 @@
 namespace understory::existence {
 
 template <Shell S>
-void PointExistence<S>::tell(PassHistories& histories) const {
-  if ((flags_ & kWasSure) == 0) return;
+std::optional<OpenHistory> PointExistence<S>::history() const {
+  if ((flags_ & kWasSure) == 0) return std::nullopt;
   const bool has_looked = (flags_ & kInFirstPass) == 0 && chance_missed_ < kLookedFor;
   const bool is_seen = has_looked && is_surely_seen(probability());
-  histories.add({.missed_before = missed_passes(),
-                 .missed_now = has_looked && !is_seen ? missed_by_detector() : 0.0,
-                 .is_seen_now = is_seen,
-                 .since_s = evidence_.since_s,
-                 .counted = evidence_});
+  return OpenHistory{.missed_before = missed_passes(),
+                     .missed_now = has_looked && !is_seen ? missed_by_looks() : 0.0,
+                     .is_seen_now = is_seen,
+                     .since_s = evidence_.since_s,
+                     .counted = evidence_};
+}
+
+/// 1 - d / (prior of d), of the odds: v is in both, so that it falls out.
+template <Shell S>
+double PointExistence<S>::missed_by_looks() const {
+  const double hidden = occluder_.chance();
+  if (unseen_ <= 0.0F) return 0.0;
+  return std::clamp(1.0 - hidden - (missed_share_.odds() + hidden) / unseen_, 0.0, 1.0);
 }
 
 template <Shell S>
-void PointExistence<S>::reconsider(ExistenceModel& model) {
+void PointExistence<S>::reconsider(ExistenceModel& model, double before_was) {
   if ((flags_ & kInFirstPass) != 0) return;
   const MissedShare missed_share = missed_share_;
   const float decay_per_s = decay_per_s_;
   const bool has_looked = chance_missed_ < 1.0F || !occluder_.is_new();
   has_looked ? correct_pass(model) : expect_pass(model);
-  correct_odds(model, missed_share, decay_per_s, has_looked ? kMostOddsInPass : kMostOdds);
+  correct_odds(model, missed_share, before_was, decay_per_s,
+               has_looked ? kMostOddsInPass : kMostOdds);
   const bool is_open = pending_missed_ > 0;
   if (is_open && !has_looked)
     weigh(model, {static_cast<float>(1.0 - probability()), evidence_.since_s});
@@ -76,7 +85,7 @@ void PointExistence<S>::change_pass(ExistenceModel& model) {
   if (learned.now > 0.0)
     odds_ = bounded(odds_ * std::pow((1.0 - learned.before) / missed_share.value(), missed));
   else if (pending_missed_ > 0)
-    correct_odds(model, missed_share, decay_per_s, kMostOdds);
+    correct_odds(model, missed_share, learned.before_was, decay_per_s, kMostOdds);
 }
 
 /// Recall of passes and decay. What is open since the point was last surely seen counts with the
@@ -123,11 +132,11 @@ void PointExistence<S>::weigh(ExistenceModel& model, const DecayEvidence& is) {
 /// weighs 1 - v, and the odds of having survived are those of lambda.
 template <Shell S>
 void PointExistence<S>::correct_odds(const ExistenceModel& model, MissedShare before,
-                                     float decay_per_s, double most_odds) {
+                                     double before_was, float decay_per_s, double most_odds) {
   if ((flags_ & kWasSure) == 0) return;
   const LearnedRates& learned = model.learned();
   if (learned.now > 0.0)
-    odds_ *= std::pow((1.0 - learned.before) / (1.0 - learned.before_was), missed_passes());
+    odds_ *= std::pow((1.0 - learned.before) / (1.0 - before_was), missed_passes());
   else
     odds_ *= std::pow(missed_share_.stepped() / before.stepped(), missed_passes());
   const auto odds_of_survival = [&](double rate_per_s) {

@@ -8,15 +8,11 @@ namespace understory::existence_tracker {
 namespace {
 
 constexpr std::size_t kStatesPerMessage = 200;
-/// Path after which what all landmarks teach is summed up [m].
-constexpr double kLearnedEveryM = 100.0;
 /// A step that no vehicle drives between two keyframes is a correction of the map [m].
 constexpr double kLongestStepM = 50.0;
 /// Looks from nearer or farther are none: the map is wrong there [m].
 constexpr float kNearestM = 0.05F;
 constexpr float kFarthestM = 1e4F;
-/// Share of what is new that must have been real for it to be used at once.
-constexpr double kMostAreReal = 0.5;
 
 std::optional<existence::Look> look_from(const Eigen::Vector2d& vehicle_m,
                                          const Eigen::Vector2d& landmark_m, existence::Ray ray) {
@@ -72,39 +68,13 @@ void ExistenceTracker::begin_with(std::span<const model::ExistenceState> states)
   model_ = model;
   births_so_far_ = births_so_far;
   points_ = std::move(points);
+  histories_ = {};
+  changed_.clear();
+  due_.clear();
+  ++learned_times_;  // What P of each follows is its own.
+  for (auto& [id, tracked] : points_) changed_.push_back(id);
   unused_ = unused;
   begins_drive_ = true;
-}
-
-/// The time since the landmarks were looked at has passed for all of them. O(landmarks).
-void ExistenceTracker::begin_drive(model::Utime utime) {
-  learn();  // What the end of the drive before taught.
-  for (auto& [id, tracked] : points_) count_false(tracked);
-  model_.begin_drive();
-  for (auto& [id, tracked] : points_) {
-    tracked.looked_m = tracked.pass_began_m = -1e9;
-    tracked.pass_began_utime = kNever;
-    tracked.is_first_pass = tracked.has_just_left = false;
-    pass_time(utime, tracked);
-    tracked.point.enter_pass(model_);
-  }
-  learn();
-  pass_began_m_ = along_m_;
-}
-
-/// How often a pass misses what is there, and how much goes, by what became of all landmarks; then
-/// each of them anew. What a drive missed that misses more than others never left. O(landmarks).
-void ExistenceTracker::learn() {
-  existence::PassHistories histories;
-  for (const auto& [id, tracked] : points_) tracked.point.tell(histories);
-  model_.learn(histories);
-  learned_m_ = along_m_;
-  for (auto& [id, tracked] : points_) {
-    tracked.point.reconsider(model_);
-    take_back(tracked);
-    decide(tracked);
-    touched_.push_back(id);
-  }
 }
 
 void ExistenceTracker::pass_time(model::Utime utime, TrackedPoint& tracked) const {
@@ -156,7 +126,7 @@ void ExistenceTracker::drive_to(const model::MapUpdate& update) {
   if (last_m_) along_m_ += std::min(kLongestStepM, (now_m - *last_m_).norm());
   last_m_ = now_m;
   need_.drive_to(along_m_);
-  if (along_m_ - learned_m_ >= kLearnedEveryM) learn();
+  learn_on_the_way();
   if (along_m_ - pass_began_m_ < parameters_.looks.pass_m) return;
   model_.begin_pass();
   pass_began_m_ = along_m_;
@@ -174,6 +144,8 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
   if (!look) return;
 
   TrackedPoint& tracked = known(id, update.utime);
+  judge(id, tracked);
+  change(id, tracked);
   const bool is_old = tracked.told_probability >= 0.0 && tracked.is_in_use;
   pass_time(update.utime, tracked);
   look->goes_on = goes_on(tracked, update.utime);
@@ -191,7 +163,7 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
     counters_.blocked += ray == existence::Ray::kBlocked ? 1 : 0;
     counters_.clear += ray == existence::Ray::kPassed ? 1 : 0;
   }
-  tracked.state_is_due = true;
+  make_due(id, tracked);
   const bool could_see = ray != existence::Ray::kBlocked;
   if (is_hit || (is_old && could_see)) need_.look(id, is_hit, is_old, along_m_);
   if (ray == existence::Ray::kBlocked) take_back(tracked);
@@ -218,9 +190,24 @@ bool ExistenceTracker::goes_on(TrackedPoint& tracked, model::Utime utime) const 
 /// The landmark's point; of a given map it is new here.
 TrackedPoint& ExistenceTracker::known(model::LandmarkId id, model::Utime utime) {
   const auto [found, is_new] = points_.try_emplace(id, TrackedPoint{Point::known(model_), utime});
+  if (!is_new) return found->second;
+  begin(id, found->second);
   // It was in the map before this drive.
-  if (is_new) found->second.told_probability = found->second.point.probability();
+  found->second.told_probability = found->second.point.probability();
   return found->second;
+}
+
+/// A point that is new here: it follows what is known.
+void ExistenceTracker::begin(model::LandmarkId id, TrackedPoint& tracked) {
+  tracked.judged_by = model_.learned().before;
+  tracked.judged_times = learned_times_;
+  tracked.is_among_histories = false;
+  changed_.push_back(id);
+  due_.push_back(id);
+}
+
+void ExistenceTracker::make_due(model::LandmarkId id, TrackedPoint& tracked) {
+  if (!std::exchange(tracked.state_is_due, true)) due_.push_back(id);
 }
 
 /// Seen by another pass than the one that found it.
@@ -239,11 +226,6 @@ void ExistenceTracker::count_false(TrackedPoint& tracked) {
   births_so_far_.false_ones += 1.0;
 }
 
-/// While most of what is new turns out to be false, it is not used before another pass saw it.
-bool ExistenceTracker::may_be_used(const TrackedPoint& tracked) const {
-  return tracked.is_confirmed || births_so_far_.share(parameters_.model.birth) >= kMostAreReal;
-}
-
 /// Landmarks whose first sighting is some keyframes old get their probability now.
 void ExistenceTracker::give_birth() {
   std::erase_if(births_, [&](const Birth& birth) {
@@ -257,7 +239,10 @@ void ExistenceTracker::give_birth() {
     born.looked_m = born.pass_began_m = along_m_;
     born.pass_began_utime = birth.utime;
     const auto [found, is_new] = points_.try_emplace(birth.id, born);
-    if (is_new) decide(found->second);
+    if (is_new) {
+      begin(birth.id, found->second);
+      decide(found->second);
+    }
     touched_.push_back(birth.id);
     return true;
   });
@@ -269,6 +254,7 @@ void ExistenceTracker::forget(const model::MapUpdate& update) {
     const auto found = points_.find(id);
     if (found == points_.end()) return;
     if (!found->second.is_in_use) --unused_;
+    if (found->second.is_among_histories) found->second.point.take_back(histories_);
     points_.erase(found);
   };
   for (const model::LandmarkId id : update.removed) erase(id);
@@ -280,49 +266,24 @@ void ExistenceTracker::forget(const model::MapUpdate& update) {
       erase(old_id);  // It was not born yet.
       continue;
     }
+    judge(old_id, before->second);
     const auto after = points_.find(new_id);
     if (after == points_.end()) {
       TrackedPoint moved = before->second;
       erase(old_id);
       if (!moved.is_in_use) ++unused_;
       moved.state_is_due = true;
-      points_.emplace(new_id, moved);
+      begin(new_id, points_.emplace(new_id, moved).first->second);
       continue;
     }
+    judge(new_id, after->second);
     if (before->second.point.log_odds() > after->second.point.log_odds()) {
+      change(new_id, after->second);
       after->second.point = before->second.point;
-      after->second.state_is_due = true;
+      make_due(new_id, after->second);
       decide(after->second);
     }
     erase(old_id);
-  }
-}
-
-/// What left use by looks of this pass that turn out to have been hidden never left.
-void ExistenceTracker::take_back(TrackedPoint& tracked) {
-  const bool is_probable = tracked.point.probability() >= parameters_.use.drop_below;
-  if (!tracked.has_just_left || tracked.is_in_use || !is_probable || !may_be_used(tracked)) return;
-  tracked.has_just_left = false;
-  readmit(tracked);
-}
-
-void ExistenceTracker::readmit(TrackedPoint& tracked) {
-  tracked.is_in_use = true;
-  --unused_;
-  ++counters_.readmitted;
-}
-
-void ExistenceTracker::decide(TrackedPoint& tracked) {
-  const double probability = tracked.point.probability();
-  const bool is_gone = probability < parameters_.use.drop_below;
-  if (tracked.is_in_use && (is_gone || !may_be_used(tracked))) {
-    tracked.is_in_use = false;
-    tracked.has_just_left = true;
-    ++unused_;
-    ++counters_.dropped;
-  } else if (!tracked.is_in_use && probability > parameters_.use.readmit_above &&
-             may_be_used(tracked)) {
-    readmit(tracked);
   }
 }
 
@@ -341,6 +302,7 @@ model::Existence ExistenceTracker::tell(const model::MapUpdate& update) {
 
   for (const model::LandmarkId id : ids_to_tell()) {
     TrackedPoint& tracked = points_.at(id);
+    judge(id, tracked);
     tracked.told_probability = tracked.point.probability();
     tracked.was_told_in_use = tracked.is_in_use;
     existence.landmarks.push_back({id, tracked.told_probability, tracked.is_in_use});
@@ -372,8 +334,13 @@ std::set<model::LandmarkId> ExistenceTracker::ids_to_tell() {
 
 std::vector<model::ExistenceState> ExistenceTracker::take_states() {
   std::vector<model::ExistenceState> messages;
-  for (auto& [id, tracked] : points_) {
-    if (!std::exchange(tracked.state_is_due, false)) continue;
+  std::vector<model::LandmarkId> ids = std::exchange(due_, {});
+  std::ranges::sort(ids);
+  for (const model::LandmarkId id : ids) {
+    const auto found = points_.find(id);
+    if (found == points_.end() || !std::exchange(found->second.state_is_due, false)) continue;
+    TrackedPoint& tracked = found->second;
+    judge(id, tracked);
     if (messages.empty() || messages.back().landmarks.size() == kStatesPerMessage) {
       messages.push_back({utime_, 0, map_id_, {}, encode(model_, births_so_far_), {}});
       messages.back().landmarks.reserve(kStatesPerMessage);
@@ -387,7 +354,13 @@ std::vector<model::ExistenceState> ExistenceTracker::take_states() {
 std::optional<model::LandmarkExistence> ExistenceTracker::of(model::LandmarkId id) const {
   const auto found = points_.find(id);
   if (found == points_.end()) return std::nullopt;
-  return model::LandmarkExistence{id, found->second.point.probability(), found->second.is_in_use};
+  const TrackedPoint& tracked = found->second;
+  Point point = tracked.point;
+  if (tracked.judged_times != learned_times_) {
+    existence::ExistenceModel model = model_;
+    point.reconsider(model, tracked.judged_by);
+  }
+  return model::LandmarkExistence{id, point.probability(), tracked.is_in_use};
 }
 
 }  // namespace understory::existence_tracker

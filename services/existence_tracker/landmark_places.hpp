@@ -4,6 +4,9 @@
 #include <Eigen/Core>
 #include <map>
 #include <optional>
+#include <type_traits>
+#include <utility>
+#include <vector>
 
 #include "common/model/archive.hpp"
 #include "common/model/slam_output.hpp"
@@ -21,6 +24,8 @@ class LandmarkPlaces {
 
   /// Where a landmark is [m]; none where no message said so.
   std::optional<Eigen::Vector2d> at(model::LandmarkId id) const;
+  /// Those up to so far from a place, by their ids. O(landmarks around).
+  std::vector<model::LandmarkId> near(const Eigen::Vector2d& place_m, double radius_m) const;
   /// Number of landmarks.
   std::size_t size() const { return places_m_.size(); }
 
@@ -28,10 +33,19 @@ class LandmarkPlaces {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.places_m_);
+    if constexpr (!std::is_const_v<Self>) self.fill_cells();
   }
 
  private:
+  using Cell = std::pair<int, int>;
+  static Cell cell_of(const Eigen::Vector2d& place_m);
+  void place(model::LandmarkId id, const Eigen::Vector2d& place_m);
+  void erase(model::LandmarkId id);
+  void leave_cell(model::LandmarkId id, const Eigen::Vector2d& place_m);
+  void fill_cells();
+
   std::map<model::LandmarkId, Eigen::Vector2d> places_m_;
+  std::map<Cell, std::vector<std::pair<model::LandmarkId, Eigen::Vector2d>>> cells_;
 };
 
 }  // namespace understory::existence_tracker

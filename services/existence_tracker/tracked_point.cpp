@@ -32,7 +32,7 @@ std::size_t point_bytes() {
   constexpr Saved kSaved{};
   return sizeof(kSaved.version) + sizeof(kSaved.shell_kind) + sizeof(kSaved.odds) +
          sizeof(kSaved.pass) + sizeof(kSaved.numbers) + sizeof(kSaved.shell) +
-         sizeof(model::Utime) + sizeof(std::uint8_t);
+         sizeof(model::Utime) + sizeof(std::uint8_t) + sizeof(double);
 }
 
 std::string encode(const TrackedPoint& tracked) {
@@ -41,6 +41,7 @@ std::string encode(const TrackedPoint& tracked) {
   archive_point(write, saved);
   write(tracked.looked_utime);
   write(static_cast<std::uint8_t>(tracked.is_confirmed ? 1 : 0));
+  write(tracked.judged_by);
   return write.take();
 }
 
@@ -54,12 +55,18 @@ TrackedPoint decode(const existence::ExistenceModel& model, std::string_view byt
   // States of older maps end here: what they know was confirmed or left use.
   std::uint8_t is_confirmed = 1;
   if (!read.is_at_end()) read(is_confirmed);
+  // Or here: P follows what the map has learned.
+  double judged_by = model.learned().before;
+  if (!read.is_at_end()) read(judged_by);
   end(read);
+  if (!(judged_by >= 0.0 && judged_by < 1.0))
+    throw std::invalid_argument("state of an existence: a recall that cannot be");
   return {.point = Point::load(model, saved),
           .looked_utime = looked_utime,
           .is_in_use = is_in_use,
           .state_is_due = false,
-          .is_confirmed = is_confirmed != 0};
+          .is_confirmed = is_confirmed != 0,
+          .judged_by = judged_by};
 }
 
 std::string encode(const existence::ExistenceModel& model, const BirthCounts& births) {

@@ -34,6 +34,9 @@ struct TrackedPoint {
   model::Utime pass_began_utime = kNever;  ///< Of that look.
   bool is_counted = false;                 ///< Among the births that were false.
   bool has_just_left = false;              ///< It left use in the pass that is open.
+  double judged_by = 0.0;           ///< v of the drives before that P follows; 0: none was learned.
+  std::uint64_t judged_times = 0;   ///< Number of the rates that P follows.
+  bool is_among_histories = false;  ///< What became of it is counted as it is now.
 };
 
 /// How many of the landmarks that were new turned out to be there when another pass came.

@@ -9,7 +9,7 @@
 namespace understory::existence_tracker {
 namespace {
 
-constexpr state::Format kFormat{"existence_tracker", 4};
+constexpr state::Format kFormat{"existence_tracker", 5};
 
 }  // namespace
 
@@ -24,10 +24,12 @@ std::string ExistenceTracker::save() const {
   std::string points;
   for (const auto& [id, tracked] : points_) {
     ids.push_back(id);
-    flags.push_back(static_cast<std::uint8_t>(
-        (tracked.is_in_use ? 1 : 0) | (tracked.was_told_in_use ? 2 : 0) |
-        (tracked.state_is_due ? 4 : 0) | (tracked.is_first_pass ? 8 : 0) |
-        (tracked.is_counted ? 16 : 0) | (tracked.has_just_left ? 32 : 0)));
+    flags.push_back(
+        static_cast<std::uint8_t>((tracked.is_in_use ? 1 : 0) | (tracked.was_told_in_use ? 2 : 0) |
+                                  (tracked.state_is_due ? 4 : 0) | (tracked.is_first_pass ? 8 : 0) |
+                                  (tracked.is_counted ? 16 : 0) | (tracked.has_just_left ? 32 : 0) |
+                                  (tracked.judged_times == learned_times_ ? 64 : 0) |
+                                  (tracked.is_among_histories ? 128 : 0)));
     told.push_back(tracked.told_probability);
     looked_m.push_back(tracked.looked_m);
     began_m.push_back(tracked.pass_began_m);
@@ -59,6 +61,7 @@ void ExistenceTracker::load(const std::string& state) {
     throw std::invalid_argument("existence tracker state: its points do not fit their numbers");
 
   decode(learned, loaded.model_, loaded.births_so_far_);
+  loaded.learned_times_ = 1;
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const std::string_view bytes =
         std::string_view(points).substr(i * point_bytes(), point_bytes());
@@ -68,6 +71,14 @@ void ExistenceTracker::load(const std::string& state) {
     tracked.is_first_pass = (flags[i] & 8U) != 0;
     tracked.is_counted = (flags[i] & 16U) != 0;
     tracked.has_just_left = (flags[i] & 32U) != 0;
+    // The numbers of the rates begin anew: 1, of now, and 0.
+    tracked.judged_times = (flags[i] & 64U) != 0 ? 1 : 0;
+    tracked.is_among_histories = (flags[i] & 128U) != 0;
+    if (tracked.is_among_histories)
+      tracked.point.tell(loaded.histories_);
+    else
+      loaded.changed_.push_back(ids[i]);
+    if (tracked.state_is_due) loaded.due_.push_back(ids[i]);
     tracked.told_probability = told[i];
     tracked.looked_m = looked_m[i];
     tracked.pass_began_m = began_m[i];

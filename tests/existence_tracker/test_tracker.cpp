@@ -232,13 +232,13 @@ TEST_CASE("A saved tracker goes on as the other one, and states are the points",
   for (model::LandmarkId id = 1; id <= road.size(); ++id)
     CHECK(next.of(id)->probability == Approx(tracker.of(id)->probability));
 
-  // States of a map file of before: without what is known of births.
+  // States of a map file of before: without what is known of births and of the rates of then.
   std::vector<model::ExistenceState> older = states;
   for (model::ExistenceState& state : older) {
     const std::size_t bytes = state.states.size() / state.landmarks.size();
     std::string points;
     for (std::size_t i = 0; i < state.landmarks.size(); ++i)
-      points += state.states.substr(i * bytes, bytes - 1);
+      points += state.states.substr(i * bytes, bytes - 1 - sizeof(double));
     state.states = points;
     state.model.resize(state.model.size() - 2 * sizeof(double));
   }
