@@ -20,10 +20,12 @@ constexpr double kMovedAgain = 0.8;
 /// Trunks stand in clumps: least density of others beside one [1/m^2]. Between 0.3 and 1 m it is
 /// 0.03 to 0.08 in surveyed forests (Longleaf, Lansing, Bei, Waka); 0.02 merged no more that are
 /// two than 0.05 did, and more that are one.
+/// Where who saw which tells them apart, too, less is enough.
 constexpr double kLeastDensity = 0.02;
+constexpr double kLeastDensityByTurns = 0.01;
 /// Where their distance is known worse than this [m^2, per axis], it tells no trunk of a clump from
 /// the next.
-constexpr double kTellsTrunks_m2 = 0.01;
+constexpr double kTellsTrunks_m2 = 0.0125;
 /// Observations on one way lie this near together on the vehicle's path [m].
 constexpr double kOneWay_m = 15.0;
 /// A landmark or node that was seen last so long ago on the way [m] is of an earlier pass.
@@ -163,8 +165,7 @@ Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
   const double floor_m = parameters.gate_floor_m / parameters.gate_sigmas;
   const Eigen::Matrix2d spread = *covariance + floor_m * floor_m * Eigen::Matrix2d::Identity();
   const Neighbourhood around = neighbourhood_of(a.position_m, map);
-  const double density_per_m2 = std::max(kLeastDensity, around.density_per_m2);
-  const double two_by_place = density_per_m2 * around.missing_odds;
+  const double two_by_place = std::max(kLeastDensity, around.density_per_m2) * around.missing_odds;
   const bool tells_trunks = 0.5 * covariance->trace() <= kTellsTrunks_m2;
   if (tells_trunks && apart.norm() <= gate_m &&
       density_of_one(apart, spread) >= kLeastOdds * two_by_place)
@@ -178,7 +179,8 @@ Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
   const double gate_m_of_one = std::max(gate_of_one_m(a, parameters), gate_of_one_m(b, parameters));
   const double moved = apart.norm() > gate_m_of_one ? chance_of_moved(fewest) : 0.0;
   const double one = *turns * density_of_moved(apart, spread, moved, parameters.merge_distance_m);
-  return one >= kLeastOdds * density_per_m2 ? Sameness::kOne : Sameness::kTwo;
+  const double two = std::max(kLeastDensityByTurns, around.density_per_m2);
+  return one >= kLeastOdds * two ? Sameness::kOne : Sameness::kTwo;
 }
 
 /// A landmark that is the same as this one, and whether that is final.
