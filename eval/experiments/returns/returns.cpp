@@ -171,10 +171,6 @@ class Simulation {
   std::size_t size() const { return poses_.size(); }
   std::size_t lap_size() const { return lap_poses_; }
   const geometry::SE2& pose(std::size_t k) const { return poses_[k]; }
-  /// In the frame of the pose `first`, where the map began.
-  geometry::SE2 map_T_vehicle(std::size_t first, std::size_t k) const {
-    return poses_[first].inverse() * poses_[k];
-  }
 
   model::Odometry odometry(std::size_t k) {
     const double translation = kTranslation * kStep_m;
@@ -248,13 +244,13 @@ geoslam_mapper::MapperParameters mapper_parameters() {
 }
 
 void score_trajectory(const geoslam_mapper::MapperMethod& mapper, const Simulation& simulation,
-                      std::size_t first, ReturnScore& score) {
+                      const geometry::SE2& map_T_world, ReturnScore& score) {
   double squared = 0.0;
   const auto trajectory = mapper.trajectory();
   for (const model::KeyframePose& pose : trajectory) {
     const auto k = static_cast<std::size_t>(pose.utime / kStep_us) - 1;
     score.last_error_m =
-        (pose.map_T_vehicle.translation() - simulation.map_T_vehicle(first, k).translation())
+        (pose.map_T_vehicle.translation() - (map_T_world * simulation.pose(k)).translation())
             .norm();
     squared += score.last_error_m * score.last_error_m;
   }
@@ -274,7 +270,9 @@ ReturnScore drive(const ReturnDrive& drive, const sim::Forest& surveyed, std::ui
   std::vector<std::size_t> trunks;
   double nees = 0.0;
   int poses = 0;
-  std::size_t first = 0;
+  // Of each map as it stood when it began: who was lost may begin another one.
+  std::map<std::uint32_t, geometry::SE2> map_T_world;
+  std::uint32_t map_id = 0;
 
   for (std::size_t k = 0; k < simulation.size(); ++k) {
     if (k > 0) mapper->add(simulation.odometry(k));
@@ -291,10 +289,11 @@ ReturnScore drive(const ReturnDrive& drive, const sim::Forest& surveyed, std::ui
       continue;
     }
 
-    if (update.status == kFirstMap) first = k;
+    map_id = update.map_id;
+    map_T_world.try_emplace(map_id, update.map_T_vehicle * simulation.pose(k).inverse());
     identities.follow(update, trunks, score);
     score.revoked += Identities::count_separated(update);
-    const geometry::SE2 truth = simulation.map_T_vehicle(first, k);
+    const geometry::SE2 truth = map_T_world.at(map_id) * simulation.pose(k);
     const Eigen::Vector3d error = (update.map_T_vehicle.inverse() * truth).Log();
     if (k < simulation.lap_size()) {
       score.drift_m = error.head<2>().norm();
@@ -309,7 +308,7 @@ ReturnScore drive(const ReturnDrive& drive, const sim::Forest& surveyed, std::ui
   }
 
   identities.sum_up(score);
-  score_trajectory(*mapper, simulation, first, score);
+  score_trajectory(*mapper, simulation, map_T_world[map_id], score);
   if (poses > 0) score.mean_nees = nees / poses;
   score.p99_ms = tools::quantile(ms, 0.99);
   score.largest_ms = tools::quantile(ms, 1.0);
