@@ -15,6 +15,7 @@ std::optional<OpenHistory> PointExistence<S>::history() const {
                      .missed_now = has_looked && !is_seen ? missed_by_looks() : 0.0,
                      .is_seen_now = is_seen,
                      .since_s = evidence_.since_s,
+                     .until_missed_s = until_missed_s(),
                      .counted = evidence_};
 }
 
@@ -30,7 +31,7 @@ template <Shell S>
 void PointExistence<S>::reconsider(ExistenceModel& model, double before_was) {
   if ((flags_ & kInFirstPass) != 0) return;
   const MissedShare missed_share = missed_share_;
-  const float decay_per_s = decay_per_s_;
+  const float decay_per_s = this->decay_per_s();
   const bool has_looked = chance_missed_ < 1.0F || !occluder_.is_new();
   has_looked ? correct_pass(model) : expect_pass(model);
   correct_odds(model, missed_share, before_was, decay_per_s,
@@ -77,15 +78,26 @@ void PointExistence<S>::change_pass(ExistenceModel& model) {
   flags_ &= ~kInFirstPass & 7U;
 
   const double still = (1.0 - static_cast<double>(evidence_.went)) * (1.0 - lost);
-  weigh(model, {static_cast<float>(1.0 - still), evidence_.since_s + gap_s_});
+  pass_gap(model, 1.0 - still);
   const MissedShare missed_share = missed_share_;
-  const float decay_per_s = decay_per_s_;
+  const float decay_per_s = this->decay_per_s();
   start_pass(model);
   const LearnedRates& learned = model.learned();
   if (learned.now > 0.0)
     odds_ = bounded(odds_ * std::pow((1.0 - learned.before) / missed_share.value(), missed));
   else if (pending_missed_ > 0)
     correct_odds(model, missed_share, learned.before_was, decay_per_s, kMostOdds);
+}
+
+/// The time since this pass began has passed.
+template <Shell S>
+void PointExistence<S>::pass_gap(ExistenceModel& model, double went) {
+  const float since_s = evidence_.since_s + gap_s_;
+  const float until_s = has_missed() ? until_missed_s() : since_s;
+  weigh(model, {static_cast<float>(went), since_s});
+  const float share = since_s > 0.0F ? until_s / since_s : 1.0F;
+  until_missed_ =
+      static_cast<std::uint32_t>(std::round(std::clamp(share, 0.0F, 1.0F) * kWhole)) & kWhole;
 }
 
 /// Recall of passes and decay. What is open since the point was last surely seen counts with the
@@ -108,6 +120,7 @@ void PointExistence<S>::learn_from_pass(ExistenceModel& model, double after, boo
   if (!is_sure) return;
   flags_ |= kWasSure;
   pending_seen_ = pending_missed_ = 0;
+  until_missed_ = kWhole;
   evidence_ = {};
 }
 
