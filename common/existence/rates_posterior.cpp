@@ -14,7 +14,7 @@ namespace {
 constexpr double kLeastOf = 1e-3;
 constexpr double kTiny = std::numeric_limits<double>::min();
 
-constexpr std::size_t kSteps = 16;
+constexpr std::size_t kSteps = 12;
 /// The grid closes in on the posterior so often: from all that can be to this many sigmas.
 constexpr int kZooms = 5;
 constexpr double kSigmas = 4.0;
@@ -29,6 +29,8 @@ struct Axis {
     return from + (to - from) * (static_cast<double>(step) + 0.5) / static_cast<double>(kSteps);
   }
   std::size_t steps() const { return to > from ? kSteps : 1; }
+  /// Of a cell; 1 where there is but one.
+  double width() const { return to > from ? (to - from) / static_cast<double>(kSteps) : 1.0; }
 };
 
 /// Mean and spread along an axis.
@@ -51,10 +53,12 @@ struct Weighed {
   double mean = 0.0;
 };
 
-double sum_of_logs(double a, double b) {
-  const double most = std::max(a, b);
-  return most + std::log(std::exp(a - most) + std::exp(b - most));
-}
+/// Of a drive that is like those before or like none: how likely that is, up to a factor, and what
+/// its v, v before and lambda are then.
+struct Summed {
+  double log_evidence = 0.0;
+  std::array<double, 3> means{};
+};
 
 /// What this drive's looks say of its v where v before and lambda are given: points that it sees,
 /// and those that it missed, by the probability that they are there and were looked at.
@@ -95,8 +99,8 @@ class ThisDrive {
 
  private:
   static constexpr std::size_t kBins = 16;
-  static constexpr int kReach = 8;
-  static constexpr int kPerSigma = 2;
+  static constexpr int kReach = 4;
+  static constexpr int kPerSigma = 1;
 
   /// By log-odds.
   double log_density(const BetaPrior& prior, double x) const {
@@ -138,8 +142,9 @@ class ThisDrive {
 
 class Posterior {
  public:
-  Posterior(const RateEvidence& evidence, double fixed_v)
+  Posterior(const RateEvidence& evidence, bool is_alike, double fixed_v)
       : evidence_(evidence),
+        is_alike_(is_alike),
         fixed_v_(fixed_v),
         went_(std::max(kLeastOf, evidence.went)),
         exposure_s_(std::max(kLeastOf, evidence.exposure_s)) {}
@@ -165,8 +170,8 @@ class Posterior {
             std::log((went_ + missing) / exposure_s_) + margin};
   }
 
-  /// Means over a grid: v of now and of before, lambda. The axes close in.
-  std::array<double, 3> sum_up(Axis& before, Axis& decay) const {
+  /// Over a grid. The axes close in.
+  Summed sum_up(Axis& before, Axis& decay) const {
     std::vector<Weighed> cells;
     cells.reserve(before.steps() * decay.steps());
     double most = -std::numeric_limits<double>::infinity();
@@ -190,10 +195,11 @@ class Posterior {
         means[2] += weight * std::exp(decay.at(l));
       }
     }
+    const double log_evidence = most + std::log(total * before.width() * decay.width());
     before = closer(before, of_before, total);
     decay = closer(decay, of_decay, total);
     for (double& mean : means) mean /= total;
-    return means;
+    return {log_evidence, means};
   }
 
  private:
@@ -236,39 +242,50 @@ class Posterior {
 
     const RatePriors& priors = evidence_.priors;
     const double v = probability_of(std::exp(odds));
-    const Weighed alike = drive.over({priors.alike * v, priors.alike * (1.0 - v)});
-    const Weighed unlike = drive.over({priors.seen, priors.missed});
-    const double log_alike = std::log1p(-priors.unlike) + alike.log_evidence;
-    const double log_unlike = std::log(priors.unlike) + unlike.log_evidence;
-    const double both = sum_of_logs(log_alike, log_unlike);
-    const double share = std::exp(log_alike - both);
-    return {log + both, share * alike.mean + (1.0 - share) * unlike.mean};
+    const Weighed now = is_alike_ ? drive.over({priors.alike * v, priors.alike * (1.0 - v)})
+                                  : drive.over({priors.seen, priors.missed});
+    const double share = is_alike_ ? 1.0 - priors.unlike : priors.unlike;
+    return {log + std::log(share) + now.log_evidence, now.mean};
   }
 
   const RateEvidence& evidence_;
+  bool is_alike_;
   double fixed_v_;
   double went_;
   double exposure_s_;
 };
 
-}  // namespace
-
-LearnedRates posterior_means(const RateEvidence& evidence, const LearnedRates& until_now,
-                             bool learns_recall, bool learns_decay) {
-  const Posterior posterior(evidence, learns_recall ? 0.0 : until_now.now);
+/// Each by a grid of its own: one is narrow where the other is wide.
+Summed sum_up(const RateEvidence& evidence, const LearnedRates& until_now, bool is_alike,
+              bool learns_recall, bool learns_decay) {
+  const Posterior posterior(evidence, is_alike, learns_recall ? 0.0 : until_now.now);
   const auto fixed = [](double log) { return Axis{log, log}; };
   Axis before = fixed(std::log(until_now.before / (1.0 - until_now.before)));
   Axis decay = fixed(std::log(std::max(kTiny, until_now.decay_per_s)));
   if (learns_recall) before = posterior.before_axis();
   if (learns_decay) decay = posterior.decay_axis();
-  std::array<double, 3> means{};
-  for (int zoom = 0; zoom < kZooms; ++zoom) means = posterior.sum_up(before, decay);
+  Summed summed;
+  for (int zoom = 0; zoom < kZooms; ++zoom) summed = posterior.sum_up(before, decay);
+  return summed;
+}
 
+}  // namespace
+
+LearnedRates posterior_means(const RateEvidence& evidence, const LearnedRates& until_now,
+                             bool learns_recall, bool learns_decay) {
+  Summed summed = sum_up(evidence, until_now, true, learns_recall, learns_decay);
+  if (learns_recall) {
+    const Summed unlike = sum_up(evidence, until_now, false, learns_recall, learns_decay);
+    const double share =
+        probability_of(std::exp(std::min(600.0, summed.log_evidence - unlike.log_evidence)));
+    for (std::size_t i = 0; i < summed.means.size(); ++i)
+      summed.means[i] = std::lerp(unlike.means[i], summed.means[i], share);
+  }
   LearnedRates after = until_now;
   after.before_was = until_now.before;
-  if (learns_recall) after.now = means[0];
-  if (learns_recall) after.before = means[1];
-  if (learns_decay) after.decay_per_s = means[2];
+  if (learns_recall) after.now = summed.means[0];
+  if (learns_recall) after.before = summed.means[1];
+  if (learns_decay) after.decay_per_s = summed.means[2];
   return after;
 }
 
