@@ -14,6 +14,8 @@ namespace {
 constexpr double kPerPass = 4.0;
 constexpr double kPerFactor = 8.0;
 constexpr double kMostMissed = 16.0;
+/// Beams behind it from so many sides: it is gone.
+constexpr int kMostSides = 4;
 /// Parts of a pass, of a second and of a point that went, in which histories are counted.
 constexpr double kPassParts = 1024.0;
 constexpr double kSecondParts = 16.0;
@@ -49,17 +51,21 @@ void PassHistories::count(const OpenHistory& history, std::int64_t times) {
   // Without a miss it may have gone until now.
   const double until_s =
       before > 0.0 ? std::min(since_s, static_cast<double>(history.until_missed_s)) : since_s;
-  const std::array<int, 5> key{step_of(kPerPass * before), step_of(kPerPass * history.missed_now),
+  const std::array<int, 7> key{step_of(kPerPass * before),
+                               step_of(kPerPass * history.missed_now),
                                step_of(kPerFactor * std::log(1.0 + since_s)),
                                step_of(kPerFactor * std::log(1.0 + until_s)),
-                               history.is_seen_now ? 1 : 0};
-  if (key[0] == 0 && key[1] == 0 && key[4] == 0) return;
+                               history.is_seen_now ? 1 : 0,
+                               step_of(kPerFactor * std::log(history.rays)),
+                               std::min(kMostSides, history.passed)};
+  if (key[0] == 0 && key[1] == 0 && key[4] == 0 && key[5] == 0 && key[6] == 0) return;
   Alike& sums = alike_[key];
   sums.points += times;
   sums.missed_before += times * parts_of(before, kPassParts);
   sums.missed_now += times * parts_of(history.missed_now, kPassParts);
   sums.since += times * parts_of(since_s, kSecondParts);
   sums.until_missed += times * parts_of(until_s, kSecondParts);
+  sums.rays += times * parts_of(history.rays, kPassParts);
   missed_before_ += times * parts_of(before, kPassParts);
   if (sums.points == 0) alike_.erase(key);
 }
@@ -75,9 +81,11 @@ LearnedRates PassHistories::rates(const LearnedRates& until_now, const RatePrior
     const auto mean = [points](std::int64_t sum, double parts) {
       return static_cast<double>(sum) / parts / points;
     };
+    const double by_sides = std::pow(priors.passed_by, key[6]);
     evidence.histories.push_back({points, mean(sums.missed_before, kPassParts),
                                   mean(sums.missed_now, kPassParts), mean(sums.since, kSecondParts),
-                                  mean(sums.until_missed, kSecondParts), key[4] == 1});
+                                  mean(sums.until_missed, kSecondParts), key[4] == 1,
+                                  by_sides * mean(sums.rays, kPassParts)});
   }
 
   const double passes = until_now.before_seen + until_now.before_missed +

@@ -17,6 +17,10 @@ struct OpenHistory {
   /// and whether the open one did: 1 - L / L0, the looks' likelihood where it sees the point by
   /// that where it does not; 0: nothing is known, 1: missed. The same whatever v is.
   double missed_now = 0.0;
+  /// What the returns in front say of a point that is there and not seen, by what they say of one
+  /// that is gone; and from how many sides beams went on behind it.
+  double rays = 1.0;
+  int passed = 0;
   bool is_seen_now = false;     ///< The open one surely sees it: it never went.
   float since_s = 0.0F;         ///< From the last sure sighting to the begin of the open pass,
   float until_missed_s = 0.0F;  ///< and to the first pass that missed it, where one did.
@@ -46,6 +50,7 @@ struct RatePriors {
   double seen = 0.0, missed = 0.0;
   double went = 0.0, exposure_s = 0.0;
   double alike = 100.0, unlike = 0.05;
+  double passed_by = 1.0;  ///< Share of sides from which beams pass a point that is there.
 };
 
 /// Capture-recapture with unknown survival (Cormack, Biometrika 51, 1964): a pass sees a point that
@@ -86,13 +91,15 @@ class PassHistories {
     std::int64_t missed_before = 0;  ///< In parts of a pass,
     std::int64_t missed_now = 0;     ///< likewise,
     std::int64_t since = 0;          ///< and of a second,
-    std::int64_t until_missed = 0;   ///< likewise.
+    std::int64_t until_missed = 0;   ///< likewise;
+    std::int64_t rays = 0;           ///< in parts of 1.
     bool operator==(const Alike&) const = default;
   };
   void count(const OpenHistory& history, std::int64_t times);
 
-  /// By misses, the logarithms of the times, and whether this drive sees the point.
-  std::map<std::array<int, 5>, Alike> alike_;
+  /// By misses, the logarithms of the times and of what rays say, sides, and whether this drive
+  /// sees the point.
+  std::map<std::array<int, 7>, Alike> alike_;
   std::int64_t missed_before_ = 0;
   std::int64_t went_ = 0;  ///< Counted already: to be taken out.
   std::int64_t exposure_ = 0;

@@ -70,7 +70,8 @@ void ExistenceModel::learn(const PassHistories& histories) {
                           stated.decay_weight,
                           stated.decay_per_s > 0.0 ? stated.decay_weight / stated.decay_per_s : 0.0,
                           stated.drives_alike,
-                          stated.drives_unlike};
+                          stated.drives_unlike,
+                          stated.passed_by};
   if (learned_.now == 0.0) {
     learned_.now = learned_.before = stated.pass_recall;
     record_passes(priors.seen, priors.missed);

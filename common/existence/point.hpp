@@ -33,9 +33,10 @@ namespace understory::existence {
 ///
 /// At the end of a pass w <- d w + (1 - d) w(begin of the pass), and d <- v. Where the sensor
 /// measured something in front of the point, the pass may be hidden (PassOccluder): before its
-/// looks d was v (1 - h), not v. The mass of E and not D does not depend on the looks, so that the
-/// looks that came before are weighed anew with any change of h, exactly and in any order. Constant
-/// cost: no logarithm, no exponential, odds instead of log-odds.
+/// looks D had v (1 - h), not v, and E and not D h + s (1 - v), where s is what the returns say of
+/// a point that stops the beams itself. The mass of E and not D does not depend on the looks, so
+/// that those that came before are weighed anew with any change of h, exactly and in any order.
+/// Constant cost: no logarithm, no exponential, odds instead of log-odds.
 template <Shell S>
 class PointExistence {
  public:
@@ -177,6 +178,11 @@ class PointExistence {
     double recall = 0.0;   ///< p_d s.
     double visible = 0.0;  ///< w.
   };
+  /// OpenHistory's `rays` and `missed_now`.
+  struct RaysAndMiss {
+    double rays = 1.0;
+    double missed = 0.0;
+  };
   static constexpr std::uint32_t kNowhere = 31;
   static constexpr std::uint32_t kSectors = 0xFFFFFF;
   static constexpr std::uint32_t kIsNew = 1;  ///< What became of the birth is open.
@@ -266,14 +272,20 @@ class PointExistence {
   /// began with v (1 - h). With v = 1 there is no such pass.
   void observe(PassOccluder occluder) {
     const double was = occluder_.chance(), is = occluder.chance();
+    const double blind_was = blind(missed_share_);
     occluder_ = occluder;
     if (was == is || unseen_ <= 0.0F) return;
-    const double blind = missed_share_.odds();
     const double seeing = (1.0 - is) / (1.0 - was);
-    const double not_seeing = (blind + is) / (blind + was);
+    const double not_seeing = blind(missed_share_) / blind_was;
     const double d = pass_visibility();
     odds_ = bounded(odds_ * (d * seeing + (1.0 - d) * not_seeing));
     scale_unseen(not_seeing / seeing);
+  }
+
+  /// E and not D before the looks, with what they say of an occluder.
+  double blind(MissedShare missed_share) const {
+    return static_cast<double>(occluder_.chance()) +
+           occluder_.stopped_itself() * missed_share.value();
   }
 
   void count_look(double missed) {
@@ -301,7 +313,7 @@ class PointExistence {
                     float decay_per_s, double most_odds);
   std::optional<OpenHistory> history() const;
   double missed_by_detector() const;
-  double missed_by_looks() const;
+  RaysAndMiss open_pass() const;
   double missed_passes() const { return pending_missed_ / kUnit; }
   bool has_missed() const { return missed_passes() > 0.25; }
   /// 16 bits of lambda's fraction.

@@ -11,20 +11,28 @@ std::optional<OpenHistory> PointExistence<S>::history() const {
   if ((flags_ & kWasSure) == 0) return std::nullopt;
   const bool has_looked = (flags_ & kInFirstPass) == 0 && chance_missed_ < kLookedFor;
   const bool is_seen = has_looked && is_surely_seen(probability());
+  const bool has_rays = (flags_ & kInFirstPass) == 0 && occluder_.chance() > 0.0F;
+  const bool is_open = (has_looked || has_rays) && !is_seen;
+  const RaysAndMiss open = is_open ? open_pass() : RaysAndMiss{};
   return OpenHistory{.missed_before = missed_passes(),
-                     .missed_now = has_looked && !is_seen ? missed_by_looks() : 0.0,
+                     .missed_now = open.missed,
+                     .rays = open.rays,
+                     .passed = is_open ? std::popcount(rays_passed_) : 0,
                      .is_seen_now = is_seen,
                      .since_s = evidence_.since_s,
                      .until_missed_s = until_missed_s(),
                      .counted = evidence_};
 }
 
-/// 1 - d / (prior of d), of the odds: v is in both, so that it falls out.
+/// The looks by what they say of a point that is gone: h + s (1 - v) + (1 - h) L / L0 v. L / L0 by
+/// the odds of D: v is in both, so that it falls out.
 template <Shell S>
-double PointExistence<S>::missed_by_looks() const {
-  const double hidden = occluder_.chance();
-  if (unseen_ <= 0.0F) return 0.0;
-  return std::clamp(1.0 - hidden - (missed_share_.odds() + hidden) / unseen_, 0.0, 1.0);
+typename PointExistence<S>::RaysAndMiss PointExistence<S>::open_pass() const {
+  if (unseen_ <= 0.0F) return {};
+  const double hidden = occluder_.chance(), itself = occluder_.stopped_itself();
+  const double seeing = blind(missed_share_) / ((1.0 - missed_share_.value()) * unseen_);
+  const double unseen = hidden + itself;
+  return {unseen, std::clamp((itself - seeing) / unseen, 0.0, 1.0)};
 }
 
 template <Shell S>
@@ -44,9 +52,8 @@ void PointExistence<S>::reconsider(ExistenceModel& model, double before_was) {
 /// The pass so far as if v had been what it is now: what observe() does for an occluder.
 template <Shell S>
 void PointExistence<S>::correct_pass(const ExistenceModel& model) {
-  const double was = missed_share_.value(), hidden = occluder_.chance();
+  const double was = missed_share_.value(), blind_was = blind(missed_share_);
   const double d = pass_visibility();
-  const double blind = missed_share_.odds();
   const float unseen = unseen_;
   expect_pass(model);
   const double is = missed_share_.value();
@@ -55,7 +62,7 @@ void PointExistence<S>::correct_pass(const ExistenceModel& model) {
     return;
   }
   const double seeing = (1.0 - is) / (1.0 - was);
-  const double not_seeing = seeing * (missed_share_.odds() + hidden) / (blind + hidden);
+  const double not_seeing = blind(missed_share_) / blind_was;
   odds_ = bounded(odds_ * (d * seeing + (1.0 - d) * not_seeing));
   unseen_ = unseen;
   scale_unseen(not_seeing / seeing);
@@ -127,8 +134,8 @@ void PointExistence<S>::learn_from_pass(ExistenceModel& model, double after, boo
 /// The part of this pass that missed the point: what was hidden says nothing of the detector.
 template <Shell S>
 double PointExistence<S>::missed_by_detector() const {
-  const double blind = missed_share_.odds(), hidden = occluder_.chance();
-  return (1.0 - pass_visibility()) * (1.0 - hidden) * blind / (blind + hidden);
+  const double missed = occluder_.stopped_itself() * missed_share_.value();
+  return (1.0 - pass_visibility()) * missed / blind(missed_share_);
 }
 
 /// What the point counts for is taken back and counted anew.

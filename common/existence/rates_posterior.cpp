@@ -234,7 +234,9 @@ class Posterior {
         log += one.points * std::log(std::max(kTiny, there));
         drive.see(one.points);
       } else {
-        drive.miss(one.points, there * one.missed_now);
+        const double by_rays = 1.0 + there * (one.rays - 1.0);
+        log += one.points * std::log(std::max(kTiny, by_rays));
+        drive.miss(one.points, there * one.rays / by_rays * one.missed_now);
       }
     }
     drive.close();

@@ -15,6 +15,7 @@ struct AlikePoints {
   double since_s = 0.0;
   double until_missed_s = 0.0;
   bool is_seen_now = false;
+  double rays = 1.0;  ///< OpenHistory's, with those of all sides.
 };
 
 /// All that the posterior is made of.
