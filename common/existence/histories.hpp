@@ -17,9 +17,14 @@ struct OpenHistory {
   /// and whether the open one did: 1 - L / L0, the looks' likelihood where it sees the point by
   /// that where it does not; 0: nothing is known, 1: missed. The same whatever v is.
   double missed_now = 0.0;
-  bool is_seen_now = false;  ///< The open one surely sees it: it never went.
-  float since_s = 0.0F;      ///< From the last sure sighting to the begin of the open pass.
-  DecayEvidence counted{};   ///< What of it DecayRate has counted already.
+  /// What the returns in front say of a point that is there and not seen, by what they say of one
+  /// that is gone; and from how many sides beams went on behind it.
+  double rays = 1.0;
+  int passed = 0;
+  bool is_seen_now = false;     ///< The open one surely sees it: it never went.
+  float since_s = 0.0F;         ///< From the last sure sighting to the begin of the open pass,
+  float until_missed_s = 0.0F;  ///< and to the first pass that missed it, where one did.
+  DecayEvidence counted{};      ///< What of it DecayRate has counted already.
 };
 
 /// v of this drive, v of the drives before, and lambda; 0: nothing learned yet. What hinders a
@@ -29,8 +34,7 @@ struct LearnedRates {
   double before = 0.0;
   double before_was = 0.0;  ///< The same until the last call of learn().
   double decay_per_s = 0.0;
-  // Beta counts: the prior of `now`; passes that are over, of points that were seen since.
-  double now_seen = 0.0, now_missed = 0.0;
+  /// Beta counts: passes that are over, of points that were seen since.
   double before_seen = 0.0, before_missed = 0.0;
 
   static constexpr std::size_t kNumbers = 8;
@@ -39,23 +43,28 @@ struct LearnedRates {
   static LearnedRates restored(const std::array<double, kNumbers>& numbers);
 };
 
-/// What is known without histories: Beta counts of passes, points that went and their exposure.
+/// What is known without histories: Beta counts of passes, points that went and their exposure; and
+/// how drives differ: v of a drive is Beta around v of those before, worth `alike` passes, but a
+/// share `unlike` of the drives may miss anything, as the first one.
 struct RatePriors {
   double seen = 0.0, missed = 0.0;
   double went = 0.0, exposure_s = 0.0;
+  double alike = 100.0, unlike = 0.05;
+  double passed_by = 1.0;  ///< Share of sides from which beams pass a point that is there.
 };
 
 /// Capture-recapture with unknown survival (Cormack, Biometrika 51, 1964): a pass sees a point that
 /// is there with v, and points go at the rate lambda. That m passes before this drive missed a
-/// point in the time T, and that this drive sees it then, is as likely as
+/// point, the first of them the time T1 after it was last seen, and that this drive sees it at T,
+/// is as likely as
 ///
-///     B = 1 - S + S (1 - v_before)^m      A v_now,  A = S (1 - v_before)^m / B,  S = exp(-lambda
-///     T)
+///     B = 1 - S1 + S1 (1 - v_before)^m      A v_now,  A = S (1 - v_before)^m / B,
+///     S1 = exp(-lambda T1),  S = exp(-lambda T)
 ///
-/// (who goes does so before the first of the misses). One drive after years fixes the product of
-/// its v and S alone, and the priors the rest: steps of EM along such a ridge end somewhere on it.
-/// Here the posterior is summed up over a grid, so that all of it counts. Passes before differ from
-/// each other, which one v for all of them does not say: together they count as kMostPasses at
+/// (who goes does so before the first of the misses or after the last). One drive after years fixes
+/// the product of its v and S alone, and the priors the rest: steps of EM along such a ridge end
+/// somewhere on it. Here the posterior is summed up, so that all of it counts. Passes before differ
+/// from each other, which one v for all of them does not say: together they count as one drive at
 /// most, and what this drive finds of the points that they missed says the rest.
 ///
 /// Counts are whole numbers: what is taken back leaves nothing, so that counts that are kept while
@@ -76,20 +85,21 @@ class PassHistories {
                      double exposure_s, bool learns_recall, bool learns_decay) const;
 
  private:
-  static constexpr double kMostPasses = 60.0;
-
   /// Histories that are alike: sums.
   struct Alike {
     std::int64_t points = 0;
     std::int64_t missed_before = 0;  ///< In parts of a pass,
     std::int64_t missed_now = 0;     ///< likewise,
-    std::int64_t since = 0;          ///< and of a second.
+    std::int64_t since = 0;          ///< and of a second,
+    std::int64_t until_missed = 0;   ///< likewise;
+    std::int64_t rays = 0;           ///< in parts of 1.
     bool operator==(const Alike&) const = default;
   };
   void count(const OpenHistory& history, std::int64_t times);
 
-  /// By misses, the logarithm of the time, and whether this drive sees the point.
-  std::map<std::array<int, 4>, Alike> alike_;
+  /// By misses, the logarithms of the times and of what rays say, sides, and whether this drive
+  /// sees the point.
+  std::map<std::array<int, 7>, Alike> alike_;
   std::int64_t missed_before_ = 0;
   std::int64_t went_ = 0;  ///< Counted already: to be taken out.
   std::int64_t exposure_ = 0;

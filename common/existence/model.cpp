@@ -41,6 +41,8 @@ void check(const Parameters& parameters) {
           parameters.pass_recall, "above 0, up to 1");
   require_count(parameters.recall_weight, "recall_weight", 1.0);
   require_count(parameters.pass_recall_weight, "pass_recall_weight", 1.0);
+  require_count(parameters.drives_alike, "drives_alike", 1.0);
+  require_share(parameters.drives_unlike, "drives_unlike");
   require_count(parameters.decay_per_s, "decay_per_s", 0.0);
   require_count(parameters.decay_weight, "decay_weight", 0.0);
   require_count(parameters.relax_per_s, "relax_per_s", 0.0);
@@ -61,26 +63,18 @@ Elapsed ExistenceModel::elapsed(double dt_s) const {
           static_cast<float>(lost_share(parameters_.relax_per_s, dt_s))};
 }
 
-/// Before its looks v of a drive is that of the drives before, as surely as the start value is v of
-/// any drive.
-void ExistenceModel::open_drive() {
-  const double drives = learned_.before_seen + learned_.before_missed;
-  const double weight = 1.0 / (1.0 / parameters_.pass_recall_weight + 1.0 / drives);
-  learned_.now = learned_.before;
-  learned_.now_seen = weight * learned_.now;
-  learned_.now_missed = weight * (1.0 - learned_.now);
-}
-
 void ExistenceModel::learn(const PassHistories& histories) {
   const Parameters& stated = parameters_;
-  const RatePriors priors{
-      stated.pass_recall_weight * stated.pass_recall,
-      stated.pass_recall_weight * (1.0 - stated.pass_recall), stated.decay_weight,
-      stated.decay_per_s > 0.0 ? stated.decay_weight / stated.decay_per_s : 0.0};
+  const RatePriors priors{stated.pass_recall_weight * stated.pass_recall,
+                          stated.pass_recall_weight * (1.0 - stated.pass_recall),
+                          stated.decay_weight,
+                          stated.decay_per_s > 0.0 ? stated.decay_weight / stated.decay_per_s : 0.0,
+                          stated.drives_alike,
+                          stated.drives_unlike,
+                          stated.passed_by};
   if (learned_.now == 0.0) {
-    learned_.before = stated.pass_recall;
+    learned_.now = learned_.before = stated.pass_recall;
     record_passes(priors.seen, priors.missed);
-    open_drive();
   }
   learned_.decay_per_s = decay_.mean_per_s();
   learned_ = histories.rates(learned_, priors, decay_.went(), decay_.exposure_s(),
@@ -92,7 +86,7 @@ void ExistenceModel::begin_drive() {
   begin_pass();
   if (learned_.now == 0.0) return;
   learned_.before_was = learned_.before;
-  open_drive();
+  learned_.now = learned_.before;
   hold();
 }
 

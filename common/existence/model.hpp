@@ -74,7 +74,6 @@ class ExistenceModel {
   void load(const SavedModel& saved);
 
  private:
-  void open_drive();
   void hold();
 
   Parameters parameters_;

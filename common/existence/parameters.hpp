@@ -13,6 +13,8 @@ struct Parameters {
   double recall_weight = 20.0;  ///< What `recall` counts for, in looks.
   double pass_recall = 0.7;  ///< [v] Share of passes that can see a point: start value; 1: all do.
   double pass_recall_weight = 4.0;  ///< What `pass_recall` counts for, in points and passes.
+  double drives_alike = 100.0;      ///< What v of the drives before counts for at the next one,
+  double drives_unlike = 0.05;      ///< but for this share of the drives: v may be anything there.
   double range_m = 40.0;            ///< Of the sensor.
   double decay_per_s = 0.0;         ///< [lambda] Rate at which points cease to exist: start value.
   double decay_weight = 0.0;    ///< What it counts for, in points that went; 0: it is not learned.

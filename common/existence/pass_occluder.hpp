@@ -33,6 +33,14 @@ class PassOccluder {
 
   /// p(H); 0 without a return in front.
   float chance() const { return chances()[code_]; }
+  /// What the looks say of a point that is there, that no occluder hides and that the detector
+  /// misses, by what they say of one that is gone, hidden or not. It stops the beams itself, where
+  /// it is not too thin for them, and what is gone does not. 1 without a return in front.
+  double stopped_itself() const {
+    const double hidden = static_cast<double>(chance());
+    const double by_itself = hidden * (1.0 - kPrior) / kPrior;
+    return 1.0 - hidden + kStopsBeams * std::max(0.0, by_itself - (1.0 - hidden));
+  }
   /// Whether no look has come yet.
   bool is_new() const { return code_ == 0; }
 
@@ -45,11 +53,12 @@ class PassOccluder {
   }
 
  private:
-  static constexpr double kPrior = 0.05;     ///< p(H).
-  static constexpr double kInFront = 0.7;    ///< Looks with a return in front, of a hidden pass,
-  static constexpr double kBeside = 0.1;     ///< and of another one.
-  static constexpr double kDependent = 0.5;  ///< What a look counts for: neighbours are alike.
-  static constexpr double kMost = 0.95;      ///< Of p(H): this model is not all.
+  static constexpr double kPrior = 0.05;      ///< p(H).
+  static constexpr double kInFront = 0.7;     ///< Looks with a return in front, of a hidden pass,
+  static constexpr double kBeside = 0.1;      ///< and of another one.
+  static constexpr double kStopsBeams = 0.5;  ///< Share of the missed points that are thick enough.
+  static constexpr double kDependent = 0.5;   ///< What a look counts for: neighbours are alike.
+  static constexpr double kMost = 0.95;       ///< Of p(H): this model is not all.
   static constexpr std::uint8_t kRefuted = 0xFF;
   static constexpr unsigned kBlocked = 0x10;  ///< One look in the code.
   static constexpr unsigned kUnknown = 0x01;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -32,9 +33,10 @@ namespace understory::existence {
 ///
 /// At the end of a pass w <- d w + (1 - d) w(begin of the pass), and d <- v. Where the sensor
 /// measured something in front of the point, the pass may be hidden (PassOccluder): before its
-/// looks d was v (1 - h), not v. The mass of E and not D does not depend on the looks, so that the
-/// looks that came before are weighed anew with any change of h, exactly and in any order. Constant
-/// cost: no logarithm, no exponential, odds instead of log-odds.
+/// looks D had v (1 - h), not v, and E and not D h + s (1 - v), where s is what the returns say of
+/// a point that stops the beams itself. The mass of E and not D does not depend on the looks, so
+/// that those that came before are weighed anew with any change of h, exactly and in any order.
+/// Constant cost: no logarithm, no exponential, odds instead of log-odds.
 template <Shell S>
 class PointExistence {
  public:
@@ -134,11 +136,11 @@ class PointExistence {
                   missed_from_ | (std::uint32_t{occluder_.code()} << 24)};
     saved.numbers = {unseen_,
                      chance_missed_,
-                     static_cast<float>(pending_seen_),
+                     static_cast<float>(pending_seen_ + 65536U * (kWhole - until_missed_)),
                      static_cast<float>(pending_missed_),
                      evidence_.went,
                      evidence_.since_s,
-                     decay_per_s_,
+                     decay_per_s(),
                      gap_s_};
     shell_.store(saved.shell);
     return saved;
@@ -158,10 +160,12 @@ class PointExistence {
     point.missed_from_ = saved.pass[2] & kSectors;
     point.unseen_ = saved.numbers[0];
     point.chance_missed_ = saved.numbers[1];
-    point.pending_seen_ = static_cast<std::uint16_t>(std::min(65535.0F, saved.numbers[2]));
+    const auto packed = static_cast<std::uint32_t>(std::min(16777215.0F, saved.numbers[2]));
+    point.pending_seen_ = static_cast<std::uint16_t>(packed & 0xFFFFU);
+    point.until_missed_ = kWhole - (packed >> 16U);
     point.pending_missed_ = static_cast<std::uint16_t>(std::min(65535.0F, saved.numbers[3]));
     point.evidence_ = {saved.numbers[4], saved.numbers[5]};
-    point.decay_per_s_ = saved.numbers[6];
+    point.keep_decay(saved.numbers[6]);
     point.gap_s_ = saved.numbers[7];
     return point;
   }
@@ -174,6 +178,11 @@ class PointExistence {
     double recall = 0.0;   ///< p_d s.
     double visible = 0.0;  ///< w.
   };
+  /// OpenHistory's `rays` and `missed_now`.
+  struct RaysAndMiss {
+    double rays = 1.0;
+    double missed = 0.0;
+  };
   static constexpr std::uint32_t kNowhere = 31;
   static constexpr std::uint32_t kSectors = 0xFFFFFF;
   static constexpr std::uint32_t kIsNew = 1;  ///< What became of the birth is open.
@@ -181,6 +190,7 @@ class PointExistence {
       2;                                        ///< The pass that found it does not count for v.
   static constexpr std::uint32_t kWasSure = 4;  ///< Surely seen in some pass: it was real.
   static constexpr double kUnit = 256.0;        ///< Of pending passes.
+  static constexpr std::uint32_t kWhole = 255;  ///< Of a share in 8 bits.
   /// A pass has looked for the point where one that can see it had missed it with less than that.
   static constexpr float kLookedFor = 0.2F;
 
@@ -262,14 +272,20 @@ class PointExistence {
   /// began with v (1 - h). With v = 1 there is no such pass.
   void observe(PassOccluder occluder) {
     const double was = occluder_.chance(), is = occluder.chance();
+    const double blind_was = blind(missed_share_);
     occluder_ = occluder;
     if (was == is || unseen_ <= 0.0F) return;
-    const double blind = missed_share_.odds();
     const double seeing = (1.0 - is) / (1.0 - was);
-    const double not_seeing = (blind + is) / (blind + was);
+    const double not_seeing = blind(missed_share_) / blind_was;
     const double d = pass_visibility();
     odds_ = bounded(odds_ * (d * seeing + (1.0 - d) * not_seeing));
     scale_unseen(not_seeing / seeing);
+  }
+
+  /// E and not D before the looks, with what they say of an occluder.
+  double blind(MissedShare missed_share) const {
+    return static_cast<double>(occluder_.chance()) +
+           occluder_.stopped_itself() * missed_share.value();
   }
 
   void count_look(double missed) {
@@ -291,13 +307,23 @@ class PointExistence {
   void learn_from_pass(ExistenceModel& model, double after, bool was_looked_for,
                        double missed_before);
   void weigh(ExistenceModel& model, const DecayEvidence& is);
+  void pass_gap(ExistenceModel& model, double went);
   void correct_pass(const ExistenceModel& model);
   void correct_odds(const ExistenceModel& model, MissedShare before, double before_was,
                     float decay_per_s, double most_odds);
   std::optional<OpenHistory> history() const;
   double missed_by_detector() const;
-  double missed_by_looks() const;
+  RaysAndMiss open_pass() const;
   double missed_passes() const { return pending_missed_ / kUnit; }
+  bool has_missed() const { return missed_passes() > 0.25; }
+  /// 16 bits of lambda's fraction.
+  float decay_per_s() const { return std::bit_cast<float>(std::uint32_t{decay_bits_} << 8U); }
+  void keep_decay(float per_s) {
+    decay_bits_ = (std::bit_cast<std::uint32_t>(per_s) >> 8U) & 0xFFFFFFU;
+  }
+  float until_missed_s() const {
+    return evidence_.since_s * static_cast<float>(until_missed_) / static_cast<float>(kWhole);
+  }
   bool is_surely_seen(double probability) const { return probability > 0.9 && unseen_ < 1e-3F; }
   static void add_pending(std::uint16_t& count, double passes) {
     count = static_cast<std::uint16_t>(std::min(65535.0, std::round(count + kUnit * passes)));
@@ -308,7 +334,7 @@ class PointExistence {
     const double v = model.recall().of_pass();
     unseen_ = static_cast<float>((1.0 - v) / v);
     missed_share_ = MissedShare(1.0 - v);
-    decay_per_s_ = static_cast<float>(model.decay().mean_per_s());
+    keep_decay(static_cast<float>(model.decay().mean_per_s()));
   }
 
   void start_pass(const ExistenceModel& model) {
@@ -342,8 +368,9 @@ class PointExistence {
   std::uint16_t pending_seen_ = 0;      ///< Passes since the last that surely saw the point,
   std::uint16_t pending_missed_ = 0;    ///< in parts of 1 / 256.
   DecayEvidence evidence_;              ///< Up to the begin of this pass.
-  float decay_per_s_ = 0.0F;            ///< lambda as it was when the pass began.
-  float gap_s_ = 0.0F;                  ///< Since this pass began, without looks.
+  std::uint32_t decay_bits_ : 24 = 0;   ///< lambda as it was when the pass began: a float's first.
+  std::uint32_t until_missed_ : 8 = kWhole;  ///< Share of evidence_.since_s, see OpenHistory.
+  float gap_s_ = 0.0F;                       ///< Since this pass began, without looks.
 };
 
 }  // namespace understory::existence

@@ -11,26 +11,35 @@ std::optional<OpenHistory> PointExistence<S>::history() const {
   if ((flags_ & kWasSure) == 0) return std::nullopt;
   const bool has_looked = (flags_ & kInFirstPass) == 0 && chance_missed_ < kLookedFor;
   const bool is_seen = has_looked && is_surely_seen(probability());
+  const bool has_rays = (flags_ & kInFirstPass) == 0 && occluder_.chance() > 0.0F;
+  const bool is_open = (has_looked || has_rays) && !is_seen;
+  const RaysAndMiss open = is_open ? open_pass() : RaysAndMiss{};
   return OpenHistory{.missed_before = missed_passes(),
-                     .missed_now = has_looked && !is_seen ? missed_by_looks() : 0.0,
+                     .missed_now = open.missed,
+                     .rays = open.rays,
+                     .passed = is_open ? std::popcount(rays_passed_) : 0,
                      .is_seen_now = is_seen,
                      .since_s = evidence_.since_s,
+                     .until_missed_s = until_missed_s(),
                      .counted = evidence_};
 }
 
-/// 1 - d / (prior of d), of the odds: v is in both, so that it falls out.
+/// The looks by what they say of a point that is gone: h + s (1 - v) + (1 - h) L / L0 v. L / L0 by
+/// the odds of D: v is in both, so that it falls out.
 template <Shell S>
-double PointExistence<S>::missed_by_looks() const {
-  const double hidden = occluder_.chance();
-  if (unseen_ <= 0.0F) return 0.0;
-  return std::clamp(1.0 - hidden - (missed_share_.odds() + hidden) / unseen_, 0.0, 1.0);
+typename PointExistence<S>::RaysAndMiss PointExistence<S>::open_pass() const {
+  if (unseen_ <= 0.0F) return {};
+  const double hidden = occluder_.chance(), itself = occluder_.stopped_itself();
+  const double seeing = blind(missed_share_) / ((1.0 - missed_share_.value()) * unseen_);
+  const double unseen = hidden + itself;
+  return {unseen, std::clamp((itself - seeing) / unseen, 0.0, 1.0)};
 }
 
 template <Shell S>
 void PointExistence<S>::reconsider(ExistenceModel& model, double before_was) {
   if ((flags_ & kInFirstPass) != 0) return;
   const MissedShare missed_share = missed_share_;
-  const float decay_per_s = decay_per_s_;
+  const float decay_per_s = this->decay_per_s();
   const bool has_looked = chance_missed_ < 1.0F || !occluder_.is_new();
   has_looked ? correct_pass(model) : expect_pass(model);
   correct_odds(model, missed_share, before_was, decay_per_s,
@@ -43,9 +52,8 @@ void PointExistence<S>::reconsider(ExistenceModel& model, double before_was) {
 /// The pass so far as if v had been what it is now: what observe() does for an occluder.
 template <Shell S>
 void PointExistence<S>::correct_pass(const ExistenceModel& model) {
-  const double was = missed_share_.value(), hidden = occluder_.chance();
+  const double was = missed_share_.value(), blind_was = blind(missed_share_);
   const double d = pass_visibility();
-  const double blind = missed_share_.odds();
   const float unseen = unseen_;
   expect_pass(model);
   const double is = missed_share_.value();
@@ -54,7 +62,7 @@ void PointExistence<S>::correct_pass(const ExistenceModel& model) {
     return;
   }
   const double seeing = (1.0 - is) / (1.0 - was);
-  const double not_seeing = seeing * (missed_share_.odds() + hidden) / (blind + hidden);
+  const double not_seeing = blind(missed_share_) / blind_was;
   odds_ = bounded(odds_ * (d * seeing + (1.0 - d) * not_seeing));
   unseen_ = unseen;
   scale_unseen(not_seeing / seeing);
@@ -77,15 +85,26 @@ void PointExistence<S>::change_pass(ExistenceModel& model) {
   flags_ &= ~kInFirstPass & 7U;
 
   const double still = (1.0 - static_cast<double>(evidence_.went)) * (1.0 - lost);
-  weigh(model, {static_cast<float>(1.0 - still), evidence_.since_s + gap_s_});
+  pass_gap(model, 1.0 - still);
   const MissedShare missed_share = missed_share_;
-  const float decay_per_s = decay_per_s_;
+  const float decay_per_s = this->decay_per_s();
   start_pass(model);
   const LearnedRates& learned = model.learned();
   if (learned.now > 0.0)
     odds_ = bounded(odds_ * std::pow((1.0 - learned.before) / missed_share.value(), missed));
   else if (pending_missed_ > 0)
     correct_odds(model, missed_share, learned.before_was, decay_per_s, kMostOdds);
+}
+
+/// The time since this pass began has passed.
+template <Shell S>
+void PointExistence<S>::pass_gap(ExistenceModel& model, double went) {
+  const float since_s = evidence_.since_s + gap_s_;
+  const float until_s = has_missed() ? until_missed_s() : since_s;
+  weigh(model, {static_cast<float>(went), since_s});
+  const float share = since_s > 0.0F ? until_s / since_s : 1.0F;
+  until_missed_ =
+      static_cast<std::uint32_t>(std::round(std::clamp(share, 0.0F, 1.0F) * kWhole)) & kWhole;
 }
 
 /// Recall of passes and decay. What is open since the point was last surely seen counts with the
@@ -108,14 +127,15 @@ void PointExistence<S>::learn_from_pass(ExistenceModel& model, double after, boo
   if (!is_sure) return;
   flags_ |= kWasSure;
   pending_seen_ = pending_missed_ = 0;
+  until_missed_ = kWhole;
   evidence_ = {};
 }
 
 /// The part of this pass that missed the point: what was hidden says nothing of the detector.
 template <Shell S>
 double PointExistence<S>::missed_by_detector() const {
-  const double blind = missed_share_.odds(), hidden = occluder_.chance();
-  return (1.0 - pass_visibility()) * (1.0 - hidden) * blind / (blind + hidden);
+  const double missed = occluder_.stopped_itself() * missed_share_.value();
+  return (1.0 - pass_visibility()) * missed / blind(missed_share_);
 }
 
 /// What the point counts for is taken back and counted anew.

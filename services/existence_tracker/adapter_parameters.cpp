@@ -20,6 +20,10 @@ void describe(existence::Parameters& p, bus::ParameterTable& table) {
             "Share of passes that can see a landmark at all: start value, learned. 1: all can.");
   table.add("model.pass_recall_weight", p.pass_recall_weight, {1.0, 1e6}, "passes",
             "What that start value counts for.");
+  table.add("model.drives_alike", p.drives_alike, {1.0, 1e6}, "passes",
+            "What that share of the drives before counts for at the next one, and at most.");
+  table.add("model.drives_unlike", p.drives_unlike, {1e-6, 0.999}, "",
+            "Share of drives that say nothing of each other: leaves, rain, another season.");
   table.add("model.range_m", p.range_m, {1.0, 1000.0}, "m",
             "Range of the detector, up to which a landmark should be seen before it was seen.");
   table.add("model.decay_per_s", p.decay_per_s, {0.0, 1.0}, "1/s",

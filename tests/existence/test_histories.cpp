@@ -24,7 +24,6 @@ struct Lived {
 
 /// Counts of the drives and of what went, with the priors.
 struct Known {
-  double now_seen = 2.8, now_missed = 1.2;
   double before_seen = 2.8, before_missed = 1.2;
   double went = 4.0, exposure_s = 4.0 / 8e-10;
 };
@@ -35,8 +34,6 @@ LearnedRates start(const Known& known) {
   LearnedRates rates;
   rates.now = rates.before = 0.7;
   rates.decay_per_s = known.went / known.exposure_s;
-  rates.now_seen = known.now_seen;
-  rates.now_missed = known.now_missed;
   rates.before_seen = known.before_seen;
   rates.before_missed = known.before_missed;
   return rates;
@@ -49,16 +46,23 @@ LearnedRates learned(const std::vector<Lived>& all, const Known& known, bool rec
     histories.add({.missed_before = one.missed_before ? 1.0 : 0.0,
                    .missed_now = one.missed_now ? 1.0 : 0.0,
                    .is_seen_now = !one.missed_now,
-                   .since_s = static_cast<float>(one.since_s)});
+                   .since_s = static_cast<float>(one.since_s),
+                   .until_missed_s = static_cast<float>(one.since_s - kDay)});
   return histories.rates(start(known), kPriors, known.went, known.exposure_s, recall, decay);
 }
 
 /// Log of what a history says.
 double log_chance(const Lived& one, double now, double last, double lambda) {
   const double stayed = std::exp(-lambda * one.since_s);
-  const double missed = one.missed_before ? 1.0 - last : 1.0;
-  return std::log(one.missed_now ? 1.0 - stayed + stayed * missed * (1.0 - now)
-                                 : stayed * missed * now);
+  if (!one.missed_before) return std::log(one.missed_now ? 1.0 - stayed * now : stayed * now);
+  const double until_missed = std::exp(-lambda * (one.since_s - kDay));
+  return std::log(one.missed_now ? 1.0 - until_missed + (1.0 - last) * (until_missed - stayed * now)
+                                 : stayed * (1.0 - last) * now);
+}
+
+double beta(double v, double seen, double missed) {
+  return std::exp((seen - 1.0) * std::log(v) + (missed - 1.0) * std::log(1.0 - v) +
+                  std::lgamma(seen + missed) - std::lgamma(seen) - std::lgamma(missed));
 }
 
 /// Means by a fine grid over all that can be, every history by itself.
@@ -72,8 +76,8 @@ std::array<double, 3> summed_up(const std::vector<Lived>& all, const Known& know
       for (int l = 0; l < kRates; ++l) {
         const double now = (i + 0.5) / kRecalls, last = (k + 0.5) / kRecalls;
         const double lambda = 1e-11 * std::exp((l + 0.5) / kRates * std::log(1e4));
-        double log = (known.now_seen - 1.0) * std::log(now) +
-                     (known.now_missed - 1.0) * std::log(1.0 - now) +
+        double log = std::log(0.95 * beta(now, 100.0 * last, 100.0 * (1.0 - last)) +
+                              0.05 * beta(now, 2.8, 1.2)) +
                      (known.before_seen - 1.0) * std::log(last) +
                      (known.before_missed - 1.0) * std::log(1.0 - last) +
                      known.went * std::log(lambda) - known.exposure_s * lambda;

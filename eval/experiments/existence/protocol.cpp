@@ -104,7 +104,7 @@ TunedMethod tune(const MethodKind& kind, const std::vector<History>& training) {
 std::vector<MethodKind> method_kinds(const std::vector<History>& training) {
   const std::vector<double> recalls{0.3, 0.5, 0.7, 0.9}, false_rates{0.01, 0.05, 0.1};
   const std::vector<double> rates{0.05, 0.25, 1.0};
-  const Grid own = product({{0.05, 0.25}, {2.0, 20.0}, {0.7, 0.95}, {4.0, 200.0}});
+  const Grid own = product({{0.05, 0.25}, {2.0, 20.0}, {0.7}, {4.0}});
   Grid perpetua;
   for (const double recall : recalls)
     for (const double false_rate : false_rates)
