@@ -148,7 +148,8 @@ enum class Sameness { kTwo, kOneByPlace, kOne };
 Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
                   const SmoothingMapperParameters& parameters, const GlobalMap& map) {
   const Eigen::Vector2d apart = a.position_m - b.position_m;
-  const bool touch = apart.norm() < std::max({kTouching_m, a.radius_m, b.radius_m});
+  const bool overlap = apart.norm() < std::max(a.radius_m, b.radius_m);
+  const bool touch = overlap || apart.norm() < kTouching_m;
   if (!touch && are_observed_together(a, b)) return Sameness::kTwo;
 
   // Where they are, and whether that can tell neighbours apart.
@@ -160,15 +161,16 @@ Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
     return Sameness::kTwo;
 
   const bool tells_trunks = 0.5 * covariance->trace() <= kTellsTrunks_m2;
-  if (touch && tells_trunks) return Sameness::kOne;
+  if (overlap || (touch && tells_trunks)) return Sameness::kOne;
 
-  // Of two that were never seen on one way each pass missed one.
+  // Of two that were never seen on one way each pass missed one; else that is no evidence.
+  const auto turns = odds_by_turns(a, b);
   const double floor_m = parameters.gate_floor_m / parameters.gate_sigmas;
   const Eigen::Matrix2d spread = *covariance + floor_m * floor_m * Eigen::Matrix2d::Identity();
   const Neighbourhood around = neighbourhood_of(a.position_m, map);
-  const double two_by_place = std::max(kLeastDensity, around.density_per_m2) * around.missing_odds;
-  const auto turns = odds_by_turns(a, b);
-  if (!turns && tells_trunks && apart.norm() <= gate_m &&
+  const double missing_odds = turns ? std::max(1.0, around.missing_odds) : around.missing_odds;
+  const double two_by_place = std::max(kLeastDensity, around.density_per_m2) * missing_odds;
+  if (tells_trunks && apart.norm() <= gate_m &&
       density_of_one(apart, spread) >= kLeastOdds * two_by_place)
     return Sameness::kOneByPlace;
 
