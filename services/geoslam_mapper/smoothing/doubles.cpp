@@ -17,10 +17,11 @@ constexpr double kTail = 4.0;
 /// with each further node that observed them.
 constexpr double kMoved = 0.05;
 constexpr double kMovedAgain = 0.8;
-/// Trunks stand in clumps: least density of others beside one [1/m^2], 0.03 to 0.08 between 0.3 and
-/// 1 m in surveyed forests (Longleaf, Lansing, Bei, Waka). Where who saw which tells them apart,
-/// too, less is enough.
-constexpr double kLeastDensity = 0.05;
+/// Trunks stand in clumps: least density of others beside one [1/m^2]. Between 0.3 and 1 m it is
+/// 0.03 to 0.08 in surveyed forests (Longleaf, Lansing, Bei, Waka); 0.02 merged no more that are
+/// two than 0.05 did, and more that are one.
+/// Where who saw which tells them apart, too, less is enough.
+constexpr double kLeastDensity = 0.02;
 constexpr double kLeastDensityByTurns = 0.01;
 /// Where their distance is known worse than this [m^2, per axis], it tells no trunk of a clump from
 /// the next.
@@ -148,8 +149,7 @@ enum class Sameness { kTwo, kOneByPlace, kOne };
 Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
                   const SmoothingMapperParameters& parameters, const GlobalMap& map) {
   const Eigen::Vector2d apart = a.position_m - b.position_m;
-  const bool overlap = apart.norm() < std::max(a.radius_m, b.radius_m);
-  const bool touch = overlap || apart.norm() < kTouching_m;
+  const bool touch = apart.norm() < std::max({kTouching_m, a.radius_m, b.radius_m});
   if (!touch && are_observed_together(a, b)) return Sameness::kTwo;
 
   // Where they are, and whether that can tell neighbours apart.
@@ -160,21 +160,19 @@ Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
   if (gate_m > parameters.merge_distance_m || has_rival(a, b, gate_m, map.landmarks))
     return Sameness::kTwo;
 
-  const bool tells_trunks = 0.5 * covariance->trace() <= kTellsTrunks_m2;
-  if (overlap || (touch && tells_trunks)) return Sameness::kOne;
-
-  // Of two that were never seen on one way each pass missed one; else that is no evidence.
-  const auto turns = odds_by_turns(a, b);
+  // Of two that were never seen on one way each pass missed one.
+  if (touch) return Sameness::kOne;
   const double floor_m = parameters.gate_floor_m / parameters.gate_sigmas;
   const Eigen::Matrix2d spread = *covariance + floor_m * floor_m * Eigen::Matrix2d::Identity();
   const Neighbourhood around = neighbourhood_of(a.position_m, map);
-  const double missing_odds = turns ? std::max(1.0, around.missing_odds) : around.missing_odds;
-  const double two_by_place = std::max(kLeastDensity, around.density_per_m2) * missing_odds;
+  const double two_by_place = std::max(kLeastDensity, around.density_per_m2) * around.missing_odds;
+  const bool tells_trunks = 0.5 * covariance->trace() <= kTellsTrunks_m2;
   if (tells_trunks && apart.norm() <= gate_m &&
       density_of_one(apart, spread) >= kLeastOdds * two_by_place)
     return Sameness::kOneByPlace;
 
   // Of two that were, none was missed.
+  const auto turns = odds_by_turns(a, b);
   if (!turns) return Sameness::kTwo;
   // Within the gate the scans of one are taken for the other's now and then: no bad scans.
   const std::size_t fewest = std::min(a.views_m.size(), b.views_m.size());
