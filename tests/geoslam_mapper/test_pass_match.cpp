@@ -53,9 +53,10 @@ class Grove {
 };
 
 std::vector<double> clutter_of(const std::vector<geometry::UncertainPoint>& theirs) {
-  std::vector<Eigen::Vector2d> points_m;
-  for (const geometry::UncertainPoint& point : theirs) points_m.push_back(point.position_m);
-  return clutter_around(points_m, kReach_m);
+  std::vector<double> clutter_per_m2;
+  for (std::size_t i = 0; i < theirs.size(); ++i)
+    clutter_per_m2.push_back(clutter_around(i, theirs, kReach_m));
+  return clutter_per_m2;
 }
 
 geometry::SE2WithCovariance expected(double sigma_m, double sigma_rad) {

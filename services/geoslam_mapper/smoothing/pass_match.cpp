@@ -89,7 +89,7 @@ std::vector<PairOfPasses> pairs_of(const FoundPlace& place, const Scene& scene) 
     const geometry::UncertainPoint& ours = scene.ours.points[pair.observed];
     const geometry::UncertainPoint& theirs = scene.theirs.points[pair.reference];
     pairs.push_back({ours.position_m, theirs.position_m, variance_of(ours, theirs),
-                     scene.clutter_per_m2[pair.reference]});
+                     clutter_around(pair.reference, scene.theirs.points, scene.reach_m)});
   }
   return pairs;
 }
@@ -107,7 +107,6 @@ Scene scene_around(const model::FieldOfView& field_of_view, NodeIndex node, cons
   scene.sigma_m = pass.sigma_m;
 
   std::vector<std::pair<double, model::LandmarkId>> ours;
-  std::vector<Eigen::Vector2d> theirs_m;
   for (const model::LandmarkId id :
        map.landmarks.index().near({map_T_node.translation(), reach_m})) {
     const StoredLandmark& landmark = map.landmarks.at(id);
@@ -118,10 +117,9 @@ Scene scene_around(const model::FieldOfView& field_of_view, NodeIndex node, cons
     } else if (pass.is_given || is_seen_around(pass.node, kOnePass_m, landmark, map.graph)) {
       scene.theirs.ids.push_back(id);
       scene.theirs.points.push_back({landmark.position_m, landmark.local_variance()});
-      theirs_m.push_back(landmark.position_m);
     }
   }
-  scene.clutter_per_m2 = clutter_around(theirs_m, reach_m);
+  scene.reach_m = reach_m;
 
   std::sort(ours.begin(), ours.end());
   if (ours.size() > kMost) ours.resize(kMost);
@@ -138,8 +136,11 @@ std::vector<MergedPair> match_passes(const Scene& scene,
                                      const GlobalMap& map) {
   std::optional<FoundPlace> place;
   if (scene.ours.ids.size() * scene.theirs.ids.size() <= kPoor) {
-    place = search_pairs(scene.ours.points, scene.theirs.points, kWarp_m * kWarp_m,
-                         scene.clutter_per_m2, scene.map_T_node);
+    std::vector<double> clutter_per_m2;
+    for (std::size_t i = 0; i < scene.theirs.points.size(); ++i)
+      clutter_per_m2.push_back(clutter_around(i, scene.theirs.points, scene.reach_m));
+    place = search_pairs(scene.ours.points, scene.theirs.points, kWarp_m * kWarp_m, clutter_per_m2,
+                         scene.map_T_node);
   } else {
     place = match_by_gates(scene, parameters);
     if (!place) place = match_by_constellation(scene);

@@ -20,7 +20,7 @@ struct PassLandmarks {
 struct Scene {
   PassLandmarks ours;                      ///< In the frame of the node.
   PassLandmarks theirs;                    ///< In the map.
-  std::vector<double> clutter_per_m2;      ///< Density of theirs around each of them.
+  double reach_m = 0.0;                    ///< How far around the node theirs were taken.
   geometry::SE2WithCovariance map_T_node;  ///< As the graph expects it of the other pass.
   double sigma_m = 0.0;                    ///< Of its position, larger axis.
 };

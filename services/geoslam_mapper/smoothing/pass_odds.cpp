@@ -84,23 +84,18 @@ double log_odds_of_place(std::span<const PairOfPasses> pairs, const geometry::SE
   return log_odds + 0.5 * std::log(prior.determinant() / information.determinant());
 }
 
-std::vector<double> clutter_around(std::span<const Eigen::Vector2d> points_m, double reach_m) {
-  const double all = std::max(
-      kLeastClutter, static_cast<double>(points_m.size()) / (std::numbers::pi * reach_m * reach_m));
-  std::vector<double> result;
-  result.reserve(points_m.size());
-  for (const Eigen::Vector2d& point : points_m) {
-    // Squared distances to the point itself and the two nearest others.
-    std::array<double, 3> nearest;
-    nearest.fill(std::numeric_limits<double>::infinity());
-    for (const Eigen::Vector2d& other : points_m) {
-      double squared = (other - point).squaredNorm();
-      for (double& kept : nearest)
-        if (squared < kept) std::swap(squared, kept);
-    }
-    result.push_back(std::max(all, 1.0 / (std::numbers::pi * std::max(1e-6, nearest.back()))));
+double clutter_around(std::size_t number, std::span<const geometry::UncertainPoint> points,
+                      double reach_m) {
+  // Squared distances to the point itself and the two nearest others.
+  std::array<double, 3> nearest;
+  nearest.fill(std::numeric_limits<double>::infinity());
+  for (const geometry::UncertainPoint& other : points) {
+    double squared = (other.position_m - points[number].position_m).squaredNorm();
+    for (double& kept : nearest)
+      if (squared < kept) std::swap(squared, kept);
   }
-  return result;
+  const double all = static_cast<double>(points.size()) / (std::numbers::pi * reach_m * reach_m);
+  return std::max({kLeastClutter, all, 1.0 / (std::numbers::pi * std::max(1e-6, nearest.back()))});
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "common/geometry/registration.hpp"
 #include "common/geometry/se2.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
@@ -50,9 +51,10 @@ std::vector<LeftOut> leave_out_each(std::span<const PairOfPasses> pairs,
 double log_odds_of_place(std::span<const PairOfPasses> pairs, const geometry::SE2& map_T_newest,
                          const geometry::SE2WithCovariance& expected);
 
-/// Density around each of these points, of the others among them [1/m^2]: from the second nearest,
+/// Density around one of these points, of the others among them [1/m^2]: from the second nearest,
 /// since trunks stand in clumps, and at least that of all within `reach_m` and 20 on a hectare.
-/// O(n^2).
-std::vector<double> clutter_around(std::span<const Eigen::Vector2d> points_m, double reach_m);
+/// O(n).
+double clutter_around(std::size_t number, std::span<const geometry::UncertainPoint> points,
+                      double reach_m);
 
 }  // namespace understory::geoslam_mapper::smoothing
