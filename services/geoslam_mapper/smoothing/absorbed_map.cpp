@@ -26,7 +26,7 @@ std::optional<NodeIndex> observe_given(const LandmarkMap& landmarks, double alon
   const auto origin = static_cast<NodeIndex>(loose.nodes.size());
   bool has_given = false;
   for (const auto& [id, landmark] : landmarks.all()) {
-    if (landmark.prior_covariance.isZero(0.0)) continue;
+    if (!landmark.is_given()) continue;
     has_given = true;
     const auto known = loose.given.find(id);
     DormantObservation given{origin, landmark.position_m, landmark.prior_covariance.inverse()};
@@ -82,8 +82,7 @@ std::vector<model::LandmarkId> absorb(GlobalMap other, const geometry::SE2& map_
   std::vector<model::LandmarkId> ids;
   for (StoredLandmark landmark : other.landmarks.release()) {
     for (NodeIndex& node : landmark.nodes) node += first;
-    if (!landmark.prior_covariance.isZero(0.0))
-      landmark.nodes.insert(landmark.nodes.begin(), first + *origin);
+    if (landmark.is_given()) landmark.nodes.insert(landmark.nodes.begin(), first + *origin);
     landmark.prior_covariance.setZero();
     landmark.position_m = map_T_other * landmark.position_m;
     landmark.last_keyframe = 0;

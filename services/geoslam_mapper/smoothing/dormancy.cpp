@@ -43,7 +43,7 @@ bool Dormancy::follow(const model::FieldOfView& field_of_view, NodeIndex newest,
   for (const model::LandmarkId id : map.graph.awake()) {
     const StoredLandmark& landmark = map.landmarks.at(id);
     const bool is_far = (landmark.position_m - here_m).norm() > awake_m + kDormantBeyond_m;
-    if (!is_far || landmark.nodes.empty() || !landmark.prior_covariance.isZero(0.0)) continue;
+    if (!is_far || landmark.nodes.empty() || landmark.is_given()) continue;
     if (std::ranges::all_of(landmark.nodes,
                             [&](NodeIndex node) { return map.graph.node(node).is_condensed; })) {
       left.push_back(id);

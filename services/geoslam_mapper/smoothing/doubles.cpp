@@ -86,11 +86,13 @@ Neighbourhood neighbourhood_of(const Eigen::Vector2d& position_m, const GlobalMa
   double both = 0.0;
   map.landmarks.index().for_each_within(
       position_m, kNeighbourhood_m, [&](model::LandmarkId id, const Eigen::Vector2d&, double) {
-        const std::vector<NodeIndex>& nodes = map.landmarks.at(id).nodes;
+        const StoredLandmark& landmark = map.landmarks.at(id);
+        const std::vector<NodeIndex>& nodes = landmark.nodes;
         const auto is_earlier = [&](NodeIndex node) {
           return map.graph.node(node).along_m < limit_m;
         };
-        const bool some = std::any_of(nodes.begin(), nodes.end(), is_earlier);
+        const bool some =
+            landmark.is_given() || std::any_of(nodes.begin(), nodes.end(), is_earlier);
         all += 1.0;
         both += some && !std::all_of(nodes.begin(), nodes.end(), is_earlier) ? 1.0 : 0.0;
       });

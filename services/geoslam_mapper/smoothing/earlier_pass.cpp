@@ -3,7 +3,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 namespace understory::geoslam_mapper::smoothing {
 namespace {
@@ -25,7 +24,7 @@ double larger_sigma(const Eigen::Matrix3d& covariance) {
 struct NearNode {
   double along_m = 0.0;
   double distance_m = 0.0;
-  NodeIndex node = 0;
+  std::optional<NodeIndex> node;
   bool is_given = false;
 };
 
@@ -48,16 +47,27 @@ std::vector<NearNode> nearest_of_each(std::vector<NearNode> nodes) {
   return nearest;
 }
 
-/// What a landmark around was told from that came with another map and was not seen since: a given
-/// map has no path. None where there is none.
-std::optional<NodeIndex> given_around(const Eigen::Vector2d& here_m, double range_m,
-                                      const GlobalMap& map) {
+/// A given map has no path. Its landmarks that were not seen yet are a pass: as the map tells them,
+/// or, where it came with another map, from the node that they are told from.
+std::optional<NearNode> given_around(const Eigen::Vector2d& here_m, double range_m,
+                                     const GlobalMap& map) {
   for (const model::LandmarkId id : map.landmarks.index().near({here_m, range_m})) {
     const StoredLandmark& landmark = map.landmarks.at(id);
-    if (landmark.last_keyframe > 0 || landmark.nodes.empty()) continue;
-    if (map.graph.position(id) || map.graph.is_dormant(id)) return landmark.nodes.front();
+    if (landmark.last_keyframe > 0) continue;
+    if (landmark.is_given()) return NearNode{0.0, 0.0, std::nullopt, true};
+    if (!landmark.nodes.empty() && (map.graph.position(id) || map.graph.is_dormant(id)))
+      return NearNode{0.0, 0.0, landmark.nodes.front(), true};
   }
   return std::nullopt;
+}
+
+/// Where the asked node is to the pass.
+std::optional<geometry::SE2WithCovariance> relative_to(const NearNode& pass, NodeIndex at,
+                                                       const PoseGraph& graph) {
+  if (pass.node) return graph.relative(*pass.node, at);
+  const geometry::SE2WithCovariance map_T_at = graph.marginal(at);
+  if (map_T_at.covariance.isZero(0.0)) return std::nullopt;
+  return map_T_at;
 }
 
 }  // namespace
@@ -80,11 +90,11 @@ std::vector<EarlierPass> find_earlier_passes(const model::FieldOfView& field_of_
   std::vector<NearNode> passes = nearest_of_each(std::move(near));
   if (passes.size() > kMostPasses) passes.resize(kMostPasses);
   if (const auto given = given_around(here_m, field_of_view.max_range_m, map); given)
-    passes.push_back({0.0, 0.0, *given, true});
+    passes.push_back(*given);
 
   std::vector<EarlierPass> found;
   for (const NearNode& pass : passes) {
-    auto relative = map.graph.relative(pass.node, at);
+    auto relative = relative_to(pass, at, map.graph);
     if (!relative) continue;
     const double relative_m = larger_sigma(relative->covariance);
     if (relative_m >= kKnown_m)

@@ -1,6 +1,7 @@
 // Other passes beside a node that its own one is not tied to yet.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "common/model/keyframe.hpp"
@@ -10,10 +11,10 @@ namespace understory::geoslam_mapper::smoothing {
 
 /// Another pass near by, and where it is to the node that was asked for, by the graph.
 struct EarlierPass {
-  NodeIndex node = 0;
-  geometry::SE2WithCovariance node_T_asked;
-  double sigma_m = 0.0;   ///< Of that node's position, larger axis.
-  bool is_given = false;  ///< A map that came from elsewhere and has no path.
+  std::optional<NodeIndex> node;  ///< None: a given map that no node saw; its frame instead.
+  geometry::SE2WithCovariance node_T_asked;  ///< Without a node map_T_asked.
+  double sigma_m = 0.0;                      ///< Of that position, larger axis.
+  bool is_given = false;                     ///< A map that came from elsewhere and has no path.
 };
 
 /// What was seen last so long ago on the way [m] is of an earlier pass.

@@ -78,11 +78,9 @@ FusedKeyframe enter(const model::Keyframe& arrived, const Placement& placement,
 void add_observations(const FusedKeyframe& fused, const SmoothingMapperParameters& parameters,
                       GlobalMap& map) {
   for (const model::Association& pair : fused.associations) {
-    const StoredLandmark& landmark = map.landmarks.at(pair.landmark_id);
-    if (!map.graph.position(landmark.id))
-      map.graph.add_landmark(landmark.id, landmark.position_m, landmark.prior_covariance);
-    observe(fused.keyframe.landmarks[pair.keyframe_landmark], fused.node, landmark.id, parameters,
-            map);
+    map.enter_given(pair.landmark_id);
+    observe(fused.keyframe.landmarks[pair.keyframe_landmark], fused.node, pair.landmark_id,
+            parameters, map);
   }
 }
 

@@ -51,6 +51,13 @@ struct GlobalMap {
     graph.wake(ids);
   }
 
+  /// Takes a landmark of the map that was given to begin with into the graph, with its prior.
+  /// Nothing where it is there already. The graph is not solved.
+  void enter_given(model::LandmarkId id) {
+    const StoredLandmark& landmark = landmarks.at(id);
+    if (!graph.position(id)) graph.add_landmark(id, landmark.position_m, landmark.prior_covariance);
+  }
+
   /// Takes all nodes into the solved graph, before something is joined that may move all of them.
   /// Ends a checkpoint.
   void unfreeze() {

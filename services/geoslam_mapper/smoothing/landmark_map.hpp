@@ -37,6 +37,10 @@ struct StoredLandmark {
   /// Variance [m^2] of the position relative to the keyframes that observed it.
   double local_variance() const { return 1.0 / information; }
   static constexpr std::size_t kMostViews = 64;
+  /// Whether it is of the map that was given to begin with. It enters the graph with its prior when
+  /// it is first seen, or looked at closely.
+  bool is_given() const { return !prior_covariance.isZero(0.0); }
+  bool is_given_unseen() const { return is_given() && last_keyframe == 0; }
   /// A node at this path observed it, now.
   void viewed_at(double along_m) {
     const auto view_m = static_cast<float>(along_m);

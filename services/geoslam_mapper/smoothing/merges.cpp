@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 namespace understory::geoslam_mapper::smoothing {
@@ -44,8 +45,11 @@ class MeanPosition {
 }  // namespace
 
 MergedPair Merges::in_order(model::LandmarkId a, model::LandmarkId b, const LandmarkMap& map) {
-  const bool keep_a =
-      std::pair(map.at(a).observation_count, b) > std::pair(map.at(b).observation_count, a);
+  const auto rank = [&](model::LandmarkId id, model::LandmarkId other) {
+    const StoredLandmark& landmark = map.at(id);
+    return std::tuple(landmark.is_given(), landmark.observation_count, other);
+  };
+  const bool keep_a = rank(a, b) > rank(b, a);
   return keep_a ? MergedPair{b, a} : MergedPair{a, b};
 }
 

@@ -22,7 +22,8 @@ class Merges {
   /// Most merges that can be taken back.
   static constexpr std::size_t kMost = 2048;
 
-  /// The one of two landmarks that stays: the one with more observations.
+  /// The one of two landmarks that stays: that of a given map, which has a prior; else the one with
+  /// more observations.
   static MergedPair in_order(model::LandmarkId a, model::LandmarkId b, const LandmarkMap& map);
 
   /// Makes the first landmark of the pair the second, in graph and map; both are in the graph. The

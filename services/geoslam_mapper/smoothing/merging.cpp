@@ -24,6 +24,30 @@ std::vector<model::LandmarkId> with_neighbours(std::span<const model::LandmarkId
   return result;
 }
 
+/// Those of the given map that may be the same as these landmarks and are not in the graph yet.
+std::vector<model::LandmarkId> given_beside(std::span<const model::LandmarkId> ids,
+                                            double distance_m, const GlobalMap& map) {
+  std::vector<model::LandmarkId> result;
+  for (const model::LandmarkId id : ids) {
+    if (!map.landmarks.all().contains(id) || map.landmarks.at(id).is_given()) continue;
+    for (const model::LandmarkId other : map.landmarks.index().near(
+             {map.landmarks.at(id).position_m, distance_m + 2.0 * LandmarkMap::kStaleness_m})) {
+      if (map.landmarks.at(other).is_given_unseen() && !map.graph.position(other))
+        result.push_back(other);
+    }
+  }
+  return result;
+}
+
+/// Into the solved graph.
+void enter(std::span<const model::LandmarkId> given, GlobalMap& map) {
+  if (given.empty()) return;
+  map.graph.checkpoint();
+  for (const model::LandmarkId id : given) map.enter_given(id);
+  (void)map.graph.solve();  // Nothing moves: no keyframe saw them.
+  map.adopt_estimates();
+}
+
 }  // namespace
 
 MergingResult Merging::follow(const FusedKeyframe& fused,
@@ -41,6 +65,7 @@ MergingResult Merging::follow(const FusedKeyframe& fused,
   // Single doubles.
   const std::vector<model::LandmarkId> ids = to_look_at(touched);
   map.wake(with_neighbours(ids, parameters_.merge_distance_m, map));
+  enter(given_beside(ids, parameters_.merge_distance_m, map), map);
   for (const MergedPair& pair : merge_doubles(ids, parameters_, merges_, map))
     result.merged.push_back(pair);
   return result;

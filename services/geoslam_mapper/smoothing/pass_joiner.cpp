@@ -1,5 +1,6 @@
 #include "services/geoslam_mapper/smoothing/pass_joiner.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -31,6 +32,33 @@ double misfit(const std::vector<MergedPair>& pairs, const GlobalMap& map, bool j
   for (const auto& [old_id, new_id] : pairs) {
     add(new_id, map.landmarks.at(new_id));
     add(joined ? new_id : old_id, map.landmarks.at(old_id));
+  }
+  return sum;
+}
+
+/// A landmark of the given map as it was told.
+struct Given {
+  model::LandmarkId id = 0;
+  Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
+};
+
+/// Takes those of the pairs that no keyframe saw yet into the graph.
+std::vector<Given> enter_given(const std::vector<MergedPair>& pairs, GlobalMap& map) {
+  std::vector<Given> given;
+  for (const auto& [old_id, new_id] : pairs) {
+    if (!map.landmarks.at(new_id).is_given_unseen()) continue;
+    map.enter_given(new_id);
+    given.push_back({new_id, map.landmarks.at(new_id).position_m});
+  }
+  return given;
+}
+
+/// What their priors leave unexplained.
+double misfit(const std::vector<Given>& given, const GlobalMap& map) {
+  double sum = 0.0;
+  for (const Given& one : given) {
+    const Eigen::Vector2d off_m = *map.graph.position(one.id) - one.position_m;
+    sum += off_m.dot(map.landmarks.at(one.id).prior_covariance.inverse() * off_m);
   }
   return sum;
 }
@@ -113,6 +141,7 @@ JoinedPasses PassJoiner::join(std::vector<MergedPair> pairs, Merges& merges, Glo
   std::vector<std::vector<HandedOver>> handed_over;
   handed_over.reserve(pairs.size());
   map.graph.checkpoint();
+  const std::vector<Given> given = enter_given(pairs, map);
   for (const auto& [old_id, new_id] : pairs)
     handed_over.push_back(map.graph.hand_over(old_id, new_id, map.landmarks.at(old_id).nodes));
 
@@ -123,7 +152,7 @@ JoinedPasses PassJoiner::join(std::vector<MergedPair> pairs, Merges& merges, Glo
   bool fits = false;
   for (int round = 0; round < kRounds && !fits; ++round) {
     if (!map.graph.solve().ok) break;
-    fits = misfit(pairs, map, true) <= most;
+    fits = misfit(pairs, map, true) + misfit(given, map) <= most;
   }
   if (!fits) {
     map.graph.rollback();

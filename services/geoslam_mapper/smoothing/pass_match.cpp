@@ -110,11 +110,12 @@ Scene scene_around(const model::FieldOfView& field_of_view, NodeIndex node, cons
   for (const model::LandmarkId id :
        map.landmarks.index().near({map_T_node.translation(), reach_m})) {
     const StoredLandmark& landmark = map.landmarks.at(id);
-    if (!map.graph.position(id) && !map.graph.is_dormant(id)) continue;
+    const bool is_given = pass.is_given && landmark.is_given_unseen();
+    if (!is_given && !map.graph.position(id) && !map.graph.is_dormant(id)) continue;
     if (is_seen_around(node, kAnotherPass_m, landmark, map.graph)) {
       const double distance_m = (landmark.position_m - map_T_node.translation()).norm();
       if (distance_m < range_m) ours.emplace_back(distance_m, id);
-    } else if (pass.is_given || is_seen_around(pass.node, kOnePass_m, landmark, map.graph)) {
+    } else if (pass.is_given || is_seen_around(*pass.node, kOnePass_m, landmark, map.graph)) {
       scene.theirs.ids.push_back(id);
       scene.theirs.points.push_back({landmark.position_m, landmark.local_variance()});
     }

@@ -46,7 +46,7 @@ void set_covariances(std::span<model::MapLandmark> landmarks, const GlobalMap& m
     const StoredLandmark& stored = map.landmarks.at(ids[i]);
     model::MapLandmark& told = landmarks[i];
     const bool is_solved = !marginals[i].isZero(0.0);
-    const bool is_given = !stored.prior_covariance.isZero(0.0);
+    const bool is_given = stored.is_given();
     if (!is_solved && is_given) {
       told.covariance_m2 = stored.prior_covariance;
       continue;
