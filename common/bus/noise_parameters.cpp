@@ -10,6 +10,8 @@ void describe(model::DetectionNoiseParameters& p, ParameterTable& table) {
   table.add("noise.replace_below", p.replace_below, {0.0, 1.0}, "",
             "Learned factor of the variance below which it is used. Larger ones are taken for "
             "errors that consecutive scans have in common.");
+  table.add("noise.replace_corners_below", p.replace_corners_below, {0.0, 1.0}, "",
+            "The same of corners.");
 }
 
 }  // namespace understory::bus

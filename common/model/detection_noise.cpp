@@ -219,7 +219,9 @@ double DetectionNoise::estimate(std::size_t bin) const {
 
 double DetectionNoise::factor_of(std::size_t bin) const {
   const double learned = estimate(bin);
-  if (learned < parameters_.replace_above && learned > parameters_.replace_below) return 1.0;
+  const bool is_corner = bin / kRanges == static_cast<std::size_t>(LandmarkKind::kCorner);
+  const double below = is_corner ? parameters_.replace_corners_below : parameters_.replace_below;
+  if (learned < parameters_.replace_above && learned > below) return 1.0;
 
   // By chance?
   const std::size_t first = bin / kRanges * kRanges;

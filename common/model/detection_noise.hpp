@@ -19,6 +19,7 @@ struct DetectionNoiseParameters {
   bool learn = true;           ///< False: covariances stay as stated.
   double replace_above = 1.5;  ///< Factor of the variance from which understated ones grow.
   double replace_below = 0.6;  ///< Factor of the variance below which overstated ones shrink.
+  double replace_corners_below = 0.6;  ///< The same of corners.
 };
 
 /// How the vehicle moved between two scans, by landmarks that both observed and nothing else.

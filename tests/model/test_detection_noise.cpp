@@ -107,6 +107,22 @@ TEST_CASE("Noise that grows with range is learned for each range", "[noise]") {
   CHECK(noise.factor(model::LandmarkKind::kCorner, 15.0) == 1.0);
 }
 
+TEST_CASE("Overstated corners shrink where trunks keep what is stated", "[noise]") {
+  model::DetectionNoiseParameters parameters;
+  parameters.replace_below = 0.0;
+  model::DetectionNoise noise(parameters);
+  Drive drive(4, 40);
+  for (int k = 0; k < 100; ++k) {
+    model::LandmarkScan scan = drive.next(0.1, [](double) { return 0.4; });
+    for (std::size_t i = 0; i < scan.detections.size(); ++i)
+      if (drive.tracks[i] % 2 == 0) scan.detections[i].kind = model::LandmarkKind::kCorner;
+    noise.add(scan, drive.tracks);
+  }
+  CHECK(noise.factor(kTrunk, 8.0) == 1.0);
+  CHECK(noise.factor(model::LandmarkKind::kCorner, 8.0) ==
+        Approx(0.16).epsilon(0.3));
+}
+
 TEST_CASE("One wrong detection in fifty does not pass for noise", "[noise]") {
   Drive drive(4, 50);
   model::DetectionNoise noise;
