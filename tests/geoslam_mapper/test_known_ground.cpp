@@ -141,7 +141,7 @@ void take_passes_out(NodeIndex nodes, PoseGraph& graph) {
 
 std::vector<model::LandmarkId> landmarks_of(NodeIndex node, const PoseGraph& graph) {
   std::vector<model::LandmarkId> ids;
-  for (const auto& [id, factor] : graph.node(node).observations) ids.push_back(id);
+  for (const auto& [id, factor] : graph.node(node).observations()) ids.push_back(id);
   return ids;
 }
 

@@ -145,7 +145,7 @@ TEST_CASE("Landmarks joined in vain are as before after a rollback", "[merging]"
   for (const auto& [id, landmark] : world.map.landmarks.all()) {
     REQUIRE(graph.position(id));
     CHECK(*graph.position(id) == positions[i++]);
-    for (const NodeIndex node : landmark.nodes) CHECK(graph.node(node).observations.contains(id));
+    for (const NodeIndex node : landmark.nodes) CHECK(graph.node(node).observations().contains(id));
   }
   REQUIRE(graph.solve().ok);
   CHECK((*graph.position(world.first[2]) - positions[2]).norm() < 1e-3);

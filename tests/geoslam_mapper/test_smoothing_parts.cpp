@@ -3,6 +3,7 @@
 #include <map>
 #include <random>
 
+#include "common/state/archive.hpp"
 #include "services/geoslam_mapper/smoothing/global_map.hpp"
 #include "services/geoslam_mapper/smoothing/place_recogniser.hpp"
 #include "tests/catch.hpp"
@@ -81,7 +82,7 @@ TEST_CASE("A rollback takes back nodes, landmarks, observations and the gyro's b
   REQUIRE(saved(graph) != before);
   graph.rollback();
   CHECK(saved(graph) == before);
-  CHECK(graph.node(1).observations.size() == 3);
+  CHECK(graph.node(1).observations().size() == 3);
 }
 
 TEST_CASE("Observations that are handed over hold the landmark that stays", "[mapper]") {
@@ -96,7 +97,7 @@ TEST_CASE("Observations that are handed over hold the landmark that stays", "[ma
   graph.hand_over(4, 2, nodes);
   REQUIRE(graph.solve().ok);
   CHECK_FALSE(graph.position(4));
-  CHECK(graph.node(node).observations.contains(2));
+  CHECK(graph.node(node).observations().contains(2));
   CHECK((*graph.position(2) - Eigen::Vector2d(6.0, 4.0)).norm() < 1e-3);
   CHECK((graph.pose(node).translation() - Eigen::Vector2d(4.0, 0.0)).norm() < 1e-3);
 }
@@ -138,6 +139,33 @@ TEST_CASE("The index of landmarks follows in steps, and changes are reported onc
   CHECK(state::save({"landmarks"}, loaded) == state);
   loaded.catch_up();
   CHECK(loaded.index().position(id)->x() == 2.1);
+}
+
+TEST_CASE("A map whose landmarks are given away keeps nothing of them", "[mapper]") {
+  LandmarkMap map;
+  const auto bytes = [&map] { return state::save({"landmarks"}, map).size(); };
+  const std::size_t empty = bytes();
+  for (int i = 0; i < 1000; ++i) {
+    StoredLandmark landmark;
+    landmark.position_m = {5.0 * i, 0.0};
+    const model::LandmarkId id = map.insert(landmark);
+    map.move(id, {5.0 * i + 0.02, 0.0});  // Not at once in the index.
+    (void)map.put_away(id);
+    (void)map.take_changed();
+  }
+  CHECK(bytes() < empty + 100);
+
+  // One that comes and goes counts once.
+  const model::LandmarkId id = map.insert({});
+  for (int i = 1; i <= 1000; ++i) {
+    map.move(id, {0.02, 0.0});
+    map.bring_back(map.put_away(id));
+    map.move(id, {0.0, 0.0});
+  }
+  map.move(id, {0.05, 0.0});
+  CHECK(bytes() < empty + 500);
+  map.catch_up();
+  CHECK(*map.index().position(id) == Eigen::Vector2d(0.05, 0.0));
 }
 
 TEST_CASE("Only a keyframe from a viewpoint that is known is folded", "[mapper]") {

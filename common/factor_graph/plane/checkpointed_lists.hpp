@@ -95,6 +95,7 @@ class FactorList {
   }
   /// Puts another measurement in its place; rollback() brings the old one back.
   void replace(std::size_t at, const Entry& entry) {
+    storage::make_room(changes_);
     changes_.push_back({at, entries_[at]});
     entries_[at] = entry;
   }

@@ -45,6 +45,7 @@ class JournaledTable {
     const auto at = static_cast<std::size_t>(id);
     if (saved_at_[at] != epoch_) {
       saved_at_[at] = epoch_;
+      make_room(saved_);
       saved_.push_back({id, records_[at]});
     }
     return records_[at];

@@ -24,13 +24,14 @@ LooseGraph PoseGraph::loosened() {
     LooseGraph::LooseNode& one = loose.nodes.emplace_back();
     one.pose = smoother_.pose(node.centre);
     one.node = node;
-    one.node.observations.clear();
-    one.node.motions.clear();
+    one.node.edit_observations().clear();
+    one.node.edit_motions().clear();
+    one.node.give_room_back();
   }
   for (const std::uint32_t number : free_nodes_.numbers()) loose.nodes[number].is_free = true;
 
   for (NodeIndex node = 0; node < nodes_.size(); ++node) {
-    for (const auto& [id, number] : nodes_[node].observations) {
+    for (const auto& [id, number] : nodes_[node].observations()) {
       const plane::PointObservation& factor = smoother_.observation(number);
       LooseGraph::LooseLandmark& landmark = loose.solved[id];
       landmark.position_m = smoother_.point(factor.point);
@@ -62,8 +63,8 @@ FrozenMotion PoseGraph::loose_motion(MotionRef ref) const {
 
 std::vector<FrozenMotion> PoseGraph::motions_of(NodeIndex node) const {
   std::vector<FrozenMotion> motions;
-  motions.reserve(nodes_[node].motions.size());
-  for (const MotionRef ref : nodes_[node].motions) motions.push_back(loose_motion(ref));
+  motions.reserve(nodes_[node].motions().size());
+  for (const MotionRef ref : nodes_[node].motions()) motions.push_back(loose_motion(ref));
   return motions;
 }
 
@@ -71,7 +72,7 @@ std::vector<FrozenMotion> PoseGraph::motions_of(NodeIndex node) const {
 std::vector<FrozenMotion> PoseGraph::loose_motions() const {
   std::vector<FrozenMotion> motions = frozen_motions_.all();
   for (NodeIndex node = 0; node < nodes_.size(); ++node) {
-    for (const MotionRef ref : nodes_[node].motions)
+    for (const MotionRef ref : nodes_[node].motions())
       if (ends_of(ref).first == node) motions.push_back(loose_motion(ref));
   }
 

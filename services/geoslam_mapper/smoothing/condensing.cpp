@@ -61,7 +61,7 @@ void Condensing::follow(const FusedKeyframe& fused, Due due, Discovery& discover
 /// Who knew the nodes knows the one that they became.
 void Condensing::adopt(std::span<const Retirement> retired, Discovery& discovery, Merges& merges,
                        GlobalMap& map) {
-  for (const auto& [id, factor] : map.graph.node(retired.front().into).observations) {
+  for (const auto& [id, factor] : map.graph.node(retired.front().into).observations()) {
     StoredLandmark& landmark = map.landmarks.at(id);
     for (const Retirement& one : retired) landmark.replace(one.node, one.into);
   }
@@ -86,7 +86,7 @@ std::vector<CutNode> Condensing::cut_nodes(const CutPolicy& policy, double end_m
 
     node.heading_rad = graph.pose(passed.node).theta();
     node.scans = passed.scans;
-    const auto& observations = graph.node(passed.node).observations;
+    const auto& observations = graph.node(passed.node).observations();
     if (!observations.empty()) {
       node.is_tied = !before || are_tied(*before, passed.node, graph);
       before = passed.node;
@@ -101,9 +101,9 @@ std::vector<CutNode> Condensing::cut_nodes(const CutPolicy& policy, double end_m
 
 /// Whether neither a way without landmarks nor one without odometry lies between the two.
 bool Condensing::are_tied(NodeIndex before, NodeIndex node, const PoseGraph& graph) {
-  const auto& earlier = graph.node(before).observations;
+  const auto& earlier = graph.node(before).observations();
   std::size_t common = 0;
-  for (const auto& [id, factor] : graph.node(node).observations) {
+  for (const auto& [id, factor] : graph.node(node).observations()) {
     common += earlier.contains(id) ? 1 : 0;
     if (common == kTyingLandmarks) return true;
   }
@@ -117,7 +117,7 @@ bool Condensing::are_tied(NodeIndex before, NodeIndex node, const PoseGraph& gra
 bool Condensing::is_there(const Passed& passed, const PoseGraph& graph) {
   const Node& node = graph.node(passed.node);
   return node.along_m == passed.along_m && !node.is_condensed &&
-         !(node.observations.empty() && node.motions.empty());
+         !(node.observations().empty() && node.motions().empty());
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

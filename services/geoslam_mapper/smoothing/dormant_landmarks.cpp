@@ -46,8 +46,8 @@ void PoseGraph::make_dormant(std::span<const model::LandmarkId> ids,
     // Its observations go.
     std::vector<DormantObservation>& observed = dormant_[id];
     for (const NodeIndex node : landmarks.at(id).nodes) {
-      const auto entry = nodes_[node].observations.find(id);
-      if (entry == nodes_[node].observations.end()) continue;
+      const auto entry = nodes_[node].observations().find(id);
+      if (entry == nodes_[node].observations().end()) continue;
       const plane::PointObservation& factor = smoother_.observation(entry->second);
       observed.push_back({node, factor.position, factor.information});
       ignore(node, id);

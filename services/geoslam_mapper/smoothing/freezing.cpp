@@ -17,7 +17,7 @@ constexpr std::size_t kMostOuter = 24;
 }  // namespace
 
 bool PoseGraph::may_freeze(NodeIndex node) const {
-  return nodes_[node].is_condensed && nodes_[node].observations.empty() &&
+  return nodes_[node].is_condensed && nodes_[node].observations().empty() &&
          dormant_of(node).empty() && !frozen_.contains(node) && node != newest_ &&
          !(origin_ && node == origin_->node);
 }
@@ -62,13 +62,14 @@ std::vector<FrozenMotion> PoseGraph::freeze_motions(const std::set<NodeIndex>& n
         FrozenMotion{index(motion.a), index(motion.b), motion.a_T_b, motion.information, 0, 0});
   };
   for (const NodeIndex node : nodes) {
-    for (const MotionRef ref : std::exchange(edit(node).motions, {})) {
+    for (const MotionRef ref : std::exchange(edit(node).edit_motions(), {})) {
       const auto [from, to] = ends_of(ref);
-      std::erase(edit(from == node ? to : from).motions, ref);
+      std::erase(edit(from == node ? to : from).edit_motions(), ref);
       const auto closure = ref.is_biased ? closures_.end() : closures_.find(ref.number);
       const std::uint64_t id = closure == closures_.end() ? 0 : closure->second;
       keep(take_motion_out(ref)).closure = id;
     }
+    edit(node).give_room_back();
   }
 
   std::erase_if(away_ties_, [&](const auto& one) {

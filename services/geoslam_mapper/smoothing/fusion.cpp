@@ -43,9 +43,10 @@ bool is_of_this_pass(NodeIndex node, const SmoothingMapperParameters& parameters
 /// Whether landmarks tie the keyframe to the node. Without them the keyframe is only predicted to
 /// be there, and the motion that leads to the node would close a loop that nobody observed.
 bool holds(const Node& node, const Placement& placement) {
-  const auto common = std::count_if(
-      placement.associations.begin(), placement.associations.end(),
-      [&](const model::Association& pair) { return node.observations.contains(pair.landmark_id); });
+  const auto common = std::count_if(placement.associations.begin(), placement.associations.end(),
+                                    [&](const model::Association& pair) {
+                                      return node.observations().contains(pair.landmark_id);
+                                    });
   return static_cast<std::size_t>(common) >= kHold;
 }
 

@@ -17,14 +17,14 @@ constexpr double kAnotherPass = 10.0;
 constexpr double kKnownShare = 0.5;
 std::size_t count_common(const Node& a, const Node& b) {
   return static_cast<std::size_t>(
-      std::count_if(a.observations.begin(), a.observations.end(),
-                    [&](const auto& entry) { return b.observations.contains(entry.first); }));
+      std::count_if(a.observations().begin(), a.observations().end(),
+                    [&](const auto& entry) { return b.observations().contains(entry.first); }));
 }
 
 /// Landmarks in common that the older node must have: half of them, and enough to hold the node.
 /// One that observed little hangs on its motions, and these are the only ties of the path there.
 std::size_t least_common(const Node& here) {
-  const double half = kKnownShare * static_cast<double>(here.observations.size());
+  const double half = kKnownShare * static_cast<double>(here.observations().size());
   return std::max(kHold, static_cast<std::size_t>(std::ceil(half)));
 }
 
@@ -42,7 +42,7 @@ std::vector<Retirement> KnownGround::follow(const FusedKeyframe& fused, Discover
 
   std::vector<std::pair<model::LandmarkId, Retirement>> handed_over;
   for (const Retirement& one : surplus.nodes) {
-    for (const auto& [id, factor] : map.graph.node(one.node).observations)
+    for (const auto& [id, factor] : map.graph.node(one.node).observations())
       handed_over.emplace_back(id, one);
   }
 
@@ -89,7 +89,7 @@ void KnownGround::judge(NodeIndex node, const GlobalMap& map, Surplus& surplus) 
   const auto reference = reference_of(node, map);
   if (!reference) return;
   const Node& there = map.graph.node(*reference);
-  if (!there.motions.empty()) {
+  if (!there.motions().empty()) {
     surplus.loose.push_back(node);
   } else if (auto into_T_node = map.graph.relative(*reference, node)) {
     surplus.nodes.push_back({node, *reference, *std::move(into_T_node)});
@@ -108,7 +108,7 @@ std::optional<NodeIndex> KnownGround::reference_of(NodeIndex node, const GlobalM
   map.trajectory.for_each_node_near(
       here_m, radius_m_, map.graph, [&](NodeIndex other, double distance_m) {
         const Node& there = map.graph.node(other);
-        const std::pair<bool, double> rank{!there.motions.empty(), distance_m};
+        const std::pair<bool, double> rank{!there.motions().empty(), distance_m};
         if (rank >= best_rank || here.along_m - there.along_m < kAnotherPass * radius_m_ ||
             is_recent(other)) {
           return;

@@ -98,8 +98,19 @@ void LandmarkMap::move(model::LandmarkId id, const Eigen::Vector2d& position_m) 
     index.move(id, position_m);
   } else if (distance > kIndexTolerance_m && !landmark.is_late) {
     landmark.is_late = true;
+    if (late_.size() >= 2 * landmarks_.size()) forget_gone_late();
     late_.push_back(id);
   }
+}
+
+/// Keeps the first entry of each landmark that is late. Where landmarks are given away all along
+/// a drive and nothing needs the index up to date, entries of those that are gone would add up.
+void LandmarkMap::forget_gone_late() {
+  std::erase_if(late_, [&](model::LandmarkId id) {
+    const auto found = landmarks_.find(id);
+    return found == landmarks_.end() || !std::exchange(found->second.is_late, false);
+  });
+  for (const model::LandmarkId id : late_) landmarks_.at(id).is_late = true;
 }
 
 void LandmarkMap::catch_up() {

@@ -145,6 +145,7 @@ class LandmarkMap {
 
  private:
   void put(const StoredLandmark& landmark);
+  void forget_gone_late();
   constellation::ConstellationMap& index_of(const StoredLandmark& landmark) {
     return landmark.is_unused ? unused_index_ : index_;
   }
@@ -154,7 +155,7 @@ class LandmarkMap {
   std::map<model::LandmarkId, StoredLandmark> landmarks_;
   constellation::ConstellationMap index_;
   constellation::ConstellationMap unused_index_;
-  std::vector<model::LandmarkId> late_;     ///< Those with is_late, and some removed ones.
+  std::vector<model::LandmarkId> late_;     ///< Those with is_late, and as many others at most.
   std::vector<model::LandmarkId> changed_;  ///< With repetitions.
   std::vector<model::LandmarkId> loose_;    ///< Ascending.
   model::LandmarkId next_id_;

@@ -124,7 +124,7 @@ double Merges::contradiction(const Merge& merge, const GlobalMap& map) {
   MeanPosition before;
   MeanPosition others;
   for (const NodeIndex node : map.landmarks.at(merge.into).nodes) {
-    const auto& observations = map.graph.node(node).observations;
+    const auto& observations = map.graph.node(node).observations();
     if (!observations.contains(merge.into)) continue;
     const auto& factor = map.graph.observation(node, merge.into);
     const bool is_old =
@@ -158,7 +158,7 @@ model::LandmarkId Merges::separate(const Merge& merge, GlobalMap& map) {
   map.graph.add_landmark(id, old_one.position_m, std::nullopt);
   map.landmarks.at(id).nodes = map.graph.give_back(merge.into, id, merge.observed);
   std::erase_if(joined.nodes, [&](NodeIndex node) {
-    return !map.graph.node(node).observations.contains(merge.into);
+    return !map.graph.node(node).observations().contains(merge.into);
   });
 
   // The two are not merged again.

@@ -59,7 +59,7 @@ PoseGraph::Part PoseGraph::part_of(std::span<const NodeIndex> nodes) const {
 
   std::map<model::LandmarkId, plane::PointId> points;
   for (std::size_t i = 0; i < part.inner.size(); ++i) {
-    for (const auto& [id, number] : nodes_[part.inner[i]].observations) {
+    for (const auto& [id, number] : nodes_[part.inner[i]].observations()) {
       plane::PointObservation factor = smoother_.observation(number);
       const auto [entry, is_new] = points.try_emplace(id);
       if (is_new) {
@@ -81,7 +81,7 @@ void PoseGraph::add_motions_of(NodeIndex node, Part& part) const {
     return static_cast<std::size_t>(std::find(part.inner.begin(), part.inner.end(), one) -
                                     part.inner.begin());
   };
-  for (const MotionRef ref : nodes_[node].motions) {
+  for (const MotionRef ref : nodes_[node].motions()) {
     const auto [from, to] = ends_of(ref);
     std::size_t a = number_of(from);
     std::size_t b = number_of(to);
@@ -134,23 +134,23 @@ void PoseGraph::begin_motion_at(NodeIndex into, const Part::Outer& outer,
   } else {
     smoother_.set(plane::MotionId(outer.motion.number), measured);
   }
-  std::erase(edit(outer.inner).motions, outer.motion);
-  edit(into).motions.push_back(outer.motion);
+  std::erase(edit(outer.inner).edit_motions(), outer.motion);
+  edit(into).edit_motions().push_back(outer.motion);
 }
 
 /// The node with all that it observed, and its motions to others of its part.
 void PoseGraph::take_out(NodeIndex node) {
-  for (const auto& [id, number] : nodes_[node].observations) {
+  for (const auto& [id, number] : nodes_[node].observations()) {
     plane::PointObservation nothing = smoother_.observation(number);
     nothing.information.setZero();
     smoother_.set(number, nothing);
     free_observations_.give(index(number));
   }
-  edit(node).observations.clear();
+  edit(node).edit_observations().clear();
 
-  for (const MotionRef ref : std::exchange(edit(node).motions, {})) {
+  for (const MotionRef ref : std::exchange(edit(node).edit_motions(), {})) {
     const auto [from, to] = ends_of(ref);
-    std::erase(edit(from == node ? to : from).motions, ref);
+    std::erase(edit(from == node ? to : from).edit_motions(), ref);
     take_motion_out(ref);
   }
   free_nodes_.give(node);

@@ -41,7 +41,7 @@ void PoseGraph::hand_observations_to(const Retirement& retirement) {
   const geometry::SE2& into_T_node = retirement.into_T_node.mean;
   const Eigen::Matrix2d rotation = into_T_node.rotation();
 
-  for (const auto& [id, number] : node.observations) {
+  for (const auto& [id, number] : node.observations()) {
     plane::PointObservation factor = smoother_.observation(number);
     const Eigen::Vector2d position = factor.position;
     Eigen::Matrix2d covariance = factor.information.inverse();
@@ -56,16 +56,16 @@ void PoseGraph::hand_observations_to(const Retirement& retirement) {
                  j * retirement.into_T_node.covariance * j.transpose();
     observe(retirement.into, id, into_T_node * position, covariance.inverse());
   }
-  node.observations.clear();
+  node.edit_observations().clear();
   edit(retirement.into).keyframes += node.keyframes;
 }
 
 void PoseGraph::take_motions_out(const Retirement& retirement, const Surplus& surplus) {
-  for (const MotionRef ref : std::exchange(edit(retirement.node).motions, {})) {
+  for (const MotionRef ref : std::exchange(edit(retirement.node).edit_motions(), {})) {
     const plane::RelativePose measured = take_motion_out(ref);
     const NodeIndex from = index(measured.a);
     const NodeIndex to = index(measured.b);
-    std::erase(edit(from == retirement.node ? to : from).motions, ref);
+    std::erase(edit(from == retirement.node ? to : from).edit_motions(), ref);
     if (leads_away(retirement.node, from, to, surplus)) {
       begin_motion_at(retirement, to, measured);
     } else if (leads_in(retirement.node, from, to, surplus)) {
@@ -85,22 +85,22 @@ bool PoseGraph::leads_away(NodeIndex node, NodeIndex from, NodeIndex to,
 /// motions no more lead to was made loose itself.
 bool PoseGraph::leads_in(NodeIndex node, NodeIndex from, NodeIndex to,
                          const Surplus& surplus) const {
-  return to == node && stays_tied(from, surplus) && !nodes_[from].motions.empty() &&
+  return to == node && stays_tied(from, surplus) && !nodes_[from].motions().empty() &&
          nodes_[from].along_m < nodes_[node].along_m;
 }
 
 /// Motions between the node and those that stay tied are kept.
 void PoseGraph::loosen(NodeIndex node, const Surplus& surplus) {
-  const std::vector<MotionRef> motions = nodes_[node].motions;
+  const std::vector<MotionRef> motions = nodes_[node].motions();
   for (const MotionRef ref : motions) {
     const auto [from, to] = ends_of(ref);
     if (leads_away(node, from, to, surplus)) continue;
-    std::erase(edit(from).motions, ref);
+    std::erase(edit(from).edit_motions(), ref);
     if (leads_in(node, from, to, surplus)) {
-      edit(from).motions.push_back(ref);
+      edit(from).edit_motions().push_back(ref);
       continue;
     }
-    std::erase(edit(to).motions, ref);
+    std::erase(edit(to).edit_motions(), ref);
     take_motion_out(ref);
   }
 }
@@ -113,14 +113,14 @@ std::pair<NodeIndex, NodeIndex> PoseGraph::ends_of(MotionRef ref) const {
 }
 
 void PoseGraph::take_motions_out(NodeIndex a, NodeIndex b) {
-  const std::vector<MotionRef> motions = nodes_[a].motions;
+  const std::vector<MotionRef> motions = nodes_[a].motions();
   for (const MotionRef ref : motions) {
-    if (std::find(nodes_[b].motions.begin(), nodes_[b].motions.end(), ref) ==
-        nodes_[b].motions.end()) {
+    if (std::find(nodes_[b].motions().begin(), nodes_[b].motions().end(), ref) ==
+        nodes_[b].motions().end()) {
       continue;
     }
-    std::erase(edit(a).motions, ref);
-    std::erase(edit(b).motions, ref);
+    std::erase(edit(a).edit_motions(), ref);
+    std::erase(edit(b).edit_motions(), ref);
     take_motion_out(ref);
   }
 }

@@ -37,7 +37,7 @@ void observe(const model::KeyframeLandmark& observed, NodeIndex node, model::Lan
              const SmoothingMapperParameters& parameters, GlobalMap& map) {
   const Node& from = map.graph.node(node);
   const bool repeats_itself =
-      from.is_stationary && parameters.stationary_share > 0.0 && from.observations.contains(id);
+      from.is_stationary && parameters.stationary_share > 0.0 && from.observations().contains(id);
   if (repeats_itself) return;
   const Eigen::Matrix2d information =
       observed.covariance_m2.inverse() / variance_factor(observed, node, id, parameters, map);

@@ -27,7 +27,7 @@ double misfit(const std::vector<MergedPair>& pairs, const GlobalMap& map, bool j
   double sum = 0.0;
   const auto add = [&](model::LandmarkId id, const StoredLandmark& landmark) {
     for (const NodeIndex node : landmark.nodes)
-      if (map.graph.node(node).observations.contains(id)) sum += map.graph.chi2(node, id);
+      if (map.graph.node(node).observations().contains(id)) sum += map.graph.chi2(node, id);
   };
   for (const auto& [old_id, new_id] : pairs) {
     add(new_id, map.landmarks.at(new_id));

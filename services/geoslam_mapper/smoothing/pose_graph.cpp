@@ -75,10 +75,10 @@ NodeIndex PoseGraph::put_node(const geometry::SE2& map_T_centre, bool is_station
   if (const auto number = free_nodes_.take()) {
     Node& node = edit(*number);
     smoother_.restart(node.centre, map_T_centre);
-    node = {node.centre, {}, {}, is_stationary, along_m, 1.0, false};
+    node = Node(node.centre, is_stationary, along_m);
     return *number;
   }
-  nodes_.push_back({smoother_.add_pose(map_T_centre), {}, {}, is_stationary, along_m, 1.0, false});
+  nodes_.emplace_back(smoother_.add_pose(map_T_centre), is_stationary, along_m);
   return static_cast<NodeIndex>(nodes_.size() - 1);
 }
 
@@ -103,16 +103,16 @@ void PoseGraph::place_observation(NodeIndex node, model::LandmarkId id,
                                   const plane::PointObservation& factor) {
   if (const auto number = free_observations_.take()) {
     smoother_.set(plane::ObservationId(*number), factor);
-    edit(node).observations.emplace(id, plane::ObservationId(*number));
+    edit(node).edit_observations().emplace(id, plane::ObservationId(*number));
   } else {
-    edit(node).observations.emplace(id, smoother_.add(factor));
+    edit(node).edit_observations().emplace(id, smoother_.add(factor));
   }
 }
 
 void PoseGraph::observe(NodeIndex node, model::LandmarkId id, const Eigen::Vector2d& position_m,
                         const Eigen::Matrix2d& information) {
-  const auto entry = nodes_[node].observations.find(id);
-  if (entry == nodes_[node].observations.end()) {
+  const auto entry = nodes_[node].observations().find(id);
+  if (entry == nodes_[node].observations().end()) {
     place_observation(node, id, {nodes_[node].centre, point_of_.at(id), position_m, information});
     return;
   }
@@ -126,7 +126,7 @@ void PoseGraph::observe(NodeIndex node, model::LandmarkId id, const Eigen::Vecto
 }
 
 void PoseGraph::ignore(NodeIndex node, model::LandmarkId id) {
-  auto& observations = edit(node).observations;
+  auto& observations = edit(node).edit_observations();
   const auto entry = observations.find(id);
   plane::PointObservation nothing = smoother_.observation(entry->second);
   nothing.information.setZero();
@@ -140,7 +140,7 @@ std::vector<HandedOver> PoseGraph::hand_over(model::LandmarkId old_id, model::La
   std::vector<HandedOver> result;
   const plane::PointId new_point = point_of_.at(new_id);
   for (const NodeIndex node : nodes) {
-    auto& observations = edit(node).observations;
+    auto& observations = edit(node).edit_observations();
     auto handle = observations.extract(old_id);
     if (handle.empty()) continue;
 
@@ -180,14 +180,14 @@ std::vector<NodeIndex> PoseGraph::give_back(model::LandmarkId from_id, model::La
       continue;
     }
 
-    const auto entry = nodes_[one.node].observations.find(from_id);
-    if (entry == nodes_[one.node].observations.end()) continue;
+    const auto entry = nodes_[one.node].observations().find(from_id);
+    if (entry == nodes_[one.node].observations().end()) continue;
     plane::PointObservation factor = smoother_.observation(entry->second);
     if (factor.position != one.position_m || factor.information != one.information) continue;
     factor.point = to_point;
     smoother_.set(entry->second, factor);
 
-    auto& observations = edit(one.node).observations;
+    auto& observations = edit(one.node).edit_observations();
     auto handle = observations.extract(from_id);
     handle.key() = to_id;
     observations.insert(std::move(handle));
@@ -210,16 +210,16 @@ void PoseGraph::add_motion(const CentreMotion& motion, NodeIndex node) {
   const auto number = free_biased_.take();
   if (number) smoother_.set(plane::BiasedMotionId(*number), biased);
   const MotionRef ref{true, number ? *number : index(smoother_.add(biased))};
-  edit(motion.from).motions.push_back(ref);
-  edit(node).motions.push_back(ref);
+  edit(motion.from).edit_motions().push_back(ref);
+  edit(node).edit_motions().push_back(ref);
 }
 
 MotionRef PoseGraph::link(const plane::RelativePose& measured, NodeIndex from, NodeIndex to) {
   const auto number = free_motions_.take();
   if (number) smoother_.set(plane::MotionId(*number), measured);
   const MotionRef ref{false, number ? *number : index(smoother_.add(measured))};
-  edit(from).motions.push_back(ref);
-  edit(to).motions.push_back(ref);
+  edit(from).edit_motions().push_back(ref);
+  edit(to).edit_motions().push_back(ref);
   return ref;
 }
 
@@ -234,8 +234,8 @@ void PoseGraph::add_closure(std::uint64_t id, NodeIndex a, NodeIndex b,
 void PoseGraph::take_closure_out(std::uint64_t id) {
   const MotionRef ref{false, motion_of(id)};
   const auto [a, b] = ends_of(ref);
-  std::erase(edit(a).motions, ref);
-  std::erase(edit(b).motions, ref);
+  std::erase(edit(a).edit_motions(), ref);
+  std::erase(edit(b).edit_motions(), ref);
   take_motion_out(ref);
 }
 
@@ -269,7 +269,7 @@ std::optional<Eigen::Vector2d> PoseGraph::position(model::LandmarkId id) const {
 }
 
 double PoseGraph::chi2(NodeIndex node, model::LandmarkId id) const {
-  return smoother_.chi2(nodes_[node].observations.at(id));
+  return smoother_.chi2(nodes_[node].observations().at(id));
 }
 
 geometry::SE2WithCovariance PoseGraph::marginal(NodeIndex node) const {

@@ -19,43 +19,13 @@
 #include "services/geoslam_mapper/smoothing/frozen_motions.hpp"
 #include "services/geoslam_mapper/smoothing/frozen_part.hpp"
 #include "services/geoslam_mapper/smoothing/gyro_bias.hpp"
+#include "services/geoslam_mapper/smoothing/node.hpp"
 #include "services/geoslam_mapper/smoothing/node_set.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// A motion measured between two nodes, by its number in the smoother.
-struct MotionRef {
-  bool is_biased = false;  ///< The gyro's bias is one of its variables.
-  std::uint32_t number = 0;
-
-  bool operator==(const MotionRef&) const = default;
-  /// Members of a saved state; see common/state.
-  template <class Archive, class Self>
-  static void archive(Archive& a, Self& s) {
-    a(s.is_biased, s.number);
-  }
-};
-
 /// So many landmarks that both observed hold a node to another one without a motion between them.
 inline constexpr std::size_t kHold = 3;
-
-/// A pose of the graph: the centre of one keyframe, or of several that were folded together.
-struct Node {
-  factor_graph::plane::PoseId centre{};
-  /// Each observed landmark's factor in the graph.
-  std::map<model::LandmarkId, factor_graph::plane::ObservationId> observations;
-  std::vector<MotionRef> motions;  ///< That begin or end here.
-  bool is_stationary = false;      ///< The vehicle was stationary during the keyframe.
-  double along_m = 0.0;            ///< Path of the vehicle up to here.
-  double keyframes = 1.0;          ///< Whose observations it has; those of retired nodes, too.
-  bool is_condensed = false;       ///< The nodes of a stretch of the path in one.
-
-  /// Members of a saved state; see common/state.
-  template <class Archive, class Self>
-  static void archive(Archive& a, Self& s) {
-    a(s.centre, s.observations, s.motions, s.is_stationary, s.along_m, s.keyframes, s.is_condensed);
-  }
-};
 
 /// An observation that became another landmark's, as it was.
 struct HandedOver {
@@ -281,7 +251,7 @@ class PoseGraph {
   /// One observation: its position in the node's frame and its information.
   const factor_graph::plane::PointObservation& observation(NodeIndex node,
                                                            model::LandmarkId id) const {
-    return smoother_.observation(nodes_[node].observations.at(id));
+    return smoother_.observation(nodes_[node].observations().at(id));
   }
   /// map_T_centre with its marginal covariance (right perturbation), zero where it is undetermined.
   geometry::SE2WithCovariance marginal(NodeIndex node) const;

@@ -11,7 +11,6 @@ namespace {
 constexpr const char* kSubmapState = "geoslam_mapper.smoothing.submap";
 constexpr state::Format kSubmapFormat{kSubmapState, 4};
 /// Without what stood for the landmarks.
-/// Without what stood for the landmarks.
 constexpr state::Format kSubmapFormat3{kSubmapState, 3};
 /// Without motions, too.
 constexpr state::Format kSubmapFormat2{kSubmapState, 2};

@@ -83,7 +83,7 @@ bool Submaps::follow(const model::FieldOfView& field_of_view, NodeIndex newest, 
   std::vector<Here> left;
   for (const Here& here : here_) {
     if (left.size() == kMostAtOnce) break;
-    if (distance_of(here.node) > far_m && map.graph.node(here.node).observations.empty())
+    if (distance_of(here.node) > far_m && map.graph.node(here.node).observations().empty())
       left.push_back(here);
   }
   if (left.empty()) return false;

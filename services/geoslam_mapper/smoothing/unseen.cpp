@@ -15,7 +15,7 @@ bool is_of_first_keyframe(const StoredLandmark& landmark) { return landmark.last
 
 /// A landmark that the node observed and that stays.
 std::optional<model::LandmarkId> lasting_of(NodeIndex node, const GlobalMap& map) {
-  for (const auto& [id, observation] : map.graph.node(node).observations)
+  for (const auto& [id, observation] : map.graph.node(node).observations())
     if (!is_of_first_keyframe(map.landmarks.at(id))) return id;
   return std::nullopt;
 }
