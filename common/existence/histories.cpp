@@ -16,6 +16,10 @@ constexpr double kPerFactor = 8.0;
 constexpr double kMostMissed = 16.0;
 /// Beams behind it from so many sides: it is gone.
 constexpr int kMostSides = 4;
+/// Sides that differ: what hides a point from one of three or more does not hide it.
+constexpr int kMostLookedFrom = 3;
+/// A side is 40 degrees wide: what hides a point from one of them hides it from the next as well.
+constexpr double kHidesNextSide = 0.25;
 /// Parts of a pass, of a second and of a point that went, in which histories are counted.
 constexpr double kPassParts = 1024.0;
 constexpr double kSecondParts = 16.0;
@@ -29,17 +33,19 @@ std::int64_t parts_of(double value, double parts) {
 }  // namespace
 
 std::array<double, LearnedRates::kNumbers> LearnedRates::store() const {
-  return {now, before, before_was, decay_per_s, 0.0, 0.0, before_seen, before_missed};
+  return {now, before, before_was, decay_per_s, hidden, 0.0, before_seen, before_missed};
 }
 
 LearnedRates LearnedRates::restored(const std::array<double, kNumbers>& numbers) {
   for (const double number : numbers)
     if (!std::isfinite(number) || number < 0.0)
       throw std::invalid_argument("existence: what was learned is not finite or below 0");
-  if (numbers[0] >= 1.0 || numbers[1] >= 1.0 || numbers[2] >= 1.0)
-    throw std::invalid_argument("existence: a learned recall is not below 1");
-  return {numbers[0], numbers[1], numbers[2], numbers[3], numbers[6], numbers[7]};
+  if (numbers[0] >= 1.0 || numbers[1] >= 1.0 || numbers[2] >= 1.0 || numbers[4] >= 1.0)
+    throw std::invalid_argument("existence: a learned share is not below 1");
+  return {numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[6], numbers[7]};
 }
+
+double hides_all(int sides) { return sides == 1 ? 1.0 : sides == 2 ? kHidesNextSide : 0.0; }
 
 void PassHistories::count(const OpenHistory& history, std::int64_t times) {
   const auto went = static_cast<double>(history.counted.went);
@@ -51,13 +57,14 @@ void PassHistories::count(const OpenHistory& history, std::int64_t times) {
   // Without a miss it may have gone until now.
   const double until_s =
       before > 0.0 ? std::min(since_s, static_cast<double>(history.until_missed_s)) : since_s;
-  const std::array<int, 7> key{step_of(kPerPass * before),
+  const std::array<int, 8> key{step_of(kPerPass * before),
                                step_of(kPerPass * history.missed_now),
                                step_of(kPerFactor * std::log(1.0 + since_s)),
                                step_of(kPerFactor * std::log(1.0 + until_s)),
                                history.is_seen_now ? 1 : 0,
                                step_of(kPerFactor * std::log(history.rays)),
-                               std::min(kMostSides, history.passed)};
+                               std::min(kMostSides, history.passed),
+                               std::min(kMostLookedFrom, history.sides)};
   if (key[0] == 0 && key[1] == 0 && key[4] == 0 && key[5] == 0 && key[6] == 0) return;
   Alike& sums = alike_[key];
   sums.points += times;
@@ -85,7 +92,7 @@ LearnedRates PassHistories::rates(const LearnedRates& until_now, const RatePrior
     evidence.histories.push_back({points, mean(sums.missed_before, kPassParts),
                                   mean(sums.missed_now, kPassParts), mean(sums.since, kSecondParts),
                                   mean(sums.until_missed, kSecondParts), key[4] == 1,
-                                  by_sides * mean(sums.rays, kPassParts)});
+                                  by_sides * mean(sums.rays, kPassParts), key[7]});
   }
 
   const double passes = until_now.before_seen + until_now.before_missed +
