@@ -16,10 +16,10 @@ constexpr double kPerFactor = 8.0;
 constexpr double kMostMissed = 16.0;
 /// Beams behind it from so many sides: it is gone.
 constexpr int kMostSides = 4;
-/// Sides that differ: what hides a point from one of three or more does not hide it.
-constexpr int kMostLookedFrom = 3;
-/// A side is 40 degrees wide: what hides a point from one of them hides it from the next as well.
-constexpr double kHidesNextSide = 0.25;
+/// A side is 40 degrees wide, and who creeps looks over the border of two: what hides a point from
+/// one of so many sides hides it from all of them with this.
+constexpr std::array kHidesSides{1.0, 0.7, 0.1};
+constexpr int kMostHidden = 3;
 /// Parts of a pass, of a second and of a point that went, in which histories are counted.
 constexpr double kPassParts = 1024.0;
 constexpr double kSecondParts = 16.0;
@@ -45,7 +45,9 @@ LearnedRates LearnedRates::restored(const std::array<double, kNumbers>& numbers)
   return {numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[6], numbers[7]};
 }
 
-double hides_all(int sides) { return sides == 1 ? 1.0 : sides == 2 ? kHidesNextSide : 0.0; }
+double hides_all(int sides) {
+  return sides < 1 || sides > kMostHidden ? 0.0 : kHidesSides[static_cast<std::size_t>(sides - 1)];
+}
 
 void PassHistories::count(const OpenHistory& history, std::int64_t times) {
   const auto went = static_cast<double>(history.counted.went);
@@ -64,7 +66,7 @@ void PassHistories::count(const OpenHistory& history, std::int64_t times) {
                                history.is_seen_now ? 1 : 0,
                                step_of(kPerFactor * std::log(history.rays)),
                                std::min(kMostSides, history.passed),
-                               std::min(kMostLookedFrom, history.sides)};
+                               std::min(kMostHidden + 1, history.sides)};
   if (key[0] == 0 && key[1] == 0 && key[4] == 0 && key[5] == 0 && key[6] == 0) return;
   Alike& sums = alike_[key];
   sums.points += times;

@@ -57,8 +57,7 @@ struct RatePriors {
   double passed_by = 1.0;  ///< Share of sides from which beams pass a point that is there.
 };
 
-/// What hides a point from one side hides it from `sides` of them with this probability: 1, 0.25,
-/// 0.
+/// What hides a point from one of so many sides hides it from all of them with this probability.
 double hides_all(int sides);
 
 /// Capture-recapture with unknown survival (Cormack, Biometrika 51, 1964): a pass sees a point that

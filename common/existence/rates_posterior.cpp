@@ -78,7 +78,9 @@ class ThisDrive {
  public:
   void see(double points) { seen_ += points; }
   void miss(double points, double chance) {
-    const auto bin = static_cast<std::size_t>(std::clamp(1.0 + chance * kMisses, 0.0, kMisses));
+    const auto bin =
+        static_cast<std::size_t>(chance < 0.0 ? (chance < -1.0 ? 0.0 : 1.0)
+                                              : std::min(2.0 + chance * kMisses, kMisses + 1.0));
     points_[bin] += points;
     chances_[bin] += points * chance;
   }
@@ -110,8 +112,8 @@ class ThisDrive {
   }
 
  private:
-  /// Of the chances; the first one of those below 0: seen, though part of it was hidden.
-  static constexpr std::size_t kBins = 17;
+  /// Of the chances; the first two of those below 0: seen, though part of it was hidden.
+  static constexpr std::size_t kBins = 18;
   static constexpr double kMisses = 16.0;
   static constexpr int kReach = 4;
   static constexpr int kPerSigma = 1;
@@ -126,7 +128,7 @@ class ThisDrive {
   /// Where that is highest, by Newton's steps, and its width there.
   std::pair<double, double> peak(const BetaPrior& prior) const {
     double missed = prior.missed;
-    for (std::size_t i = 1; i < kBins; ++i) missed += points_[i] * chances_[i];
+    for (std::size_t i = 2; i < kBins; ++i) missed += points_[i] * chances_[i];
     double x = std::log((prior.seen + seen_) / missed);
     double bend = 1.0;
     for (int round = 0; round < 12; ++round) {

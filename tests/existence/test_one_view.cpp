@@ -57,6 +57,12 @@ class Drives {
     for (std::size_t i = 0; i < points_.size(); ++i)
       for (int k = 0; k < times; ++k) look_at(i, next, can_be_seen(i));
   }
+  void look_at(std::size_t i, int next, bool can_be_seen) {
+    std::uniform_real_distribution<double> unit(0.0, 1.0);
+    const bool is_seen = unit(random_) < 0.01 || (can_be_seen && unit(random_) < 0.9);
+    const Look look = look_from_face((static_cast<int>(i) + next) % kFaces);
+    is_seen ? points_[i].hit(model_, look) : points_[i].miss(model_, look);
+  }
   double probability(std::size_t i) const { return points_[i].probability(); }
   const ExistenceModel& model() const { return model_; }
 
@@ -64,13 +70,6 @@ class Drives {
   void look_from_all_sides() {
     for (int face = 0; face < kFaces; ++face) look(2, face, [](std::size_t) { return true; });
   }
-  void look_at(std::size_t i, int next, bool can_be_seen) {
-    std::uniform_real_distribution<double> unit(0.0, 1.0);
-    const bool is_seen = unit(random_) < 0.01 || (can_be_seen && unit(random_) < 0.9);
-    const Look look = look_from_face((static_cast<int>(i) + next) % kFaces);
-    is_seen ? points_[i].hit(model_, look) : points_[i].miss(model_, look);
-  }
-
   ExistenceModel model_;
   std::mt19937_64 random_;
   std::vector<IcosahedralPoint> points_;
@@ -105,6 +104,24 @@ TEST_CASE("An hour behind a van, a month after mapping, removes nothing that it 
     drives.learn();
     for (std::size_t i = 0; i < 40; ++i)
       REQUIRE((i % 4 == 1 ? drives.probability(i) < kRemovedBelow : drives.probability(i) > 0.9));
+  }
+}
+
+TEST_CASE(
+    "A vehicle that creeps behind a van looks over the border of two sides, and removes nothing",
+    "[existence]") {
+  // A quarter of the points is looked at from two faces.
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Drives drives(40, seed);
+    drives.begin(30.0 * kDay_s);
+    for (int round = 0; round < 20; ++round) {
+      drives.look(10, 0, [](std::size_t i) { return i % 2 == 0; });
+      for (std::size_t i = 0; i < 40; ++i)
+        if (i % 8 < 2) drives.look_at(i, 1, i % 2 == 0);
+    }
+    drives.learn();
+    CAPTURE(seed, drives.model().learned().now, drives.model().hidden());
+    for (std::size_t i = 0; i < 40; ++i) REQUIRE(drives.probability(i) > kRemovedBelow);
   }
 }
 
