@@ -16,6 +16,10 @@ constexpr double kPerFactor = 8.0;
 constexpr double kMostMissed = 16.0;
 /// Beams behind it from so many sides: it is gone.
 constexpr int kMostSides = 4;
+/// A side is 40 degrees wide, and who creeps looks over the border of two: what hides a point from
+/// one of so many sides hides it from all of them with this.
+constexpr std::array kHidesSides{1.0, 0.7, 0.1};
+constexpr int kMostHidden = 3;
 /// Parts of a pass, of a second and of a point that went, in which histories are counted.
 constexpr double kPassParts = 1024.0;
 constexpr double kSecondParts = 16.0;
@@ -29,16 +33,20 @@ std::int64_t parts_of(double value, double parts) {
 }  // namespace
 
 std::array<double, LearnedRates::kNumbers> LearnedRates::store() const {
-  return {now, before, before_was, decay_per_s, 0.0, 0.0, before_seen, before_missed};
+  return {now, before, before_was, decay_per_s, hidden, 0.0, before_seen, before_missed};
 }
 
 LearnedRates LearnedRates::restored(const std::array<double, kNumbers>& numbers) {
   for (const double number : numbers)
     if (!std::isfinite(number) || number < 0.0)
       throw std::invalid_argument("existence: what was learned is not finite or below 0");
-  if (numbers[0] >= 1.0 || numbers[1] >= 1.0 || numbers[2] >= 1.0)
-    throw std::invalid_argument("existence: a learned recall is not below 1");
-  return {numbers[0], numbers[1], numbers[2], numbers[3], numbers[6], numbers[7]};
+  if (numbers[0] >= 1.0 || numbers[1] >= 1.0 || numbers[2] >= 1.0 || numbers[4] >= 1.0)
+    throw std::invalid_argument("existence: a learned share is not below 1");
+  return {numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[6], numbers[7]};
+}
+
+double hides_all(int sides) {
+  return sides < 1 || sides > kMostHidden ? 0.0 : kHidesSides[static_cast<std::size_t>(sides - 1)];
 }
 
 void PassHistories::count(const OpenHistory& history, std::int64_t times) {
@@ -51,13 +59,14 @@ void PassHistories::count(const OpenHistory& history, std::int64_t times) {
   // Without a miss it may have gone until now.
   const double until_s =
       before > 0.0 ? std::min(since_s, static_cast<double>(history.until_missed_s)) : since_s;
-  const std::array<int, 7> key{step_of(kPerPass * before),
+  const std::array<int, 8> key{step_of(kPerPass * before),
                                step_of(kPerPass * history.missed_now),
                                step_of(kPerFactor * std::log(1.0 + since_s)),
                                step_of(kPerFactor * std::log(1.0 + until_s)),
                                history.is_seen_now ? 1 : 0,
                                step_of(kPerFactor * std::log(history.rays)),
-                               std::min(kMostSides, history.passed)};
+                               std::min(kMostSides, history.passed),
+                               std::min(kMostHidden + 1, history.sides)};
   if (key[0] == 0 && key[1] == 0 && key[4] == 0 && key[5] == 0 && key[6] == 0) return;
   Alike& sums = alike_[key];
   sums.points += times;
@@ -85,7 +94,7 @@ LearnedRates PassHistories::rates(const LearnedRates& until_now, const RatePrior
     evidence.histories.push_back({points, mean(sums.missed_before, kPassParts),
                                   mean(sums.missed_now, kPassParts), mean(sums.since, kSecondParts),
                                   mean(sums.until_missed, kSecondParts), key[4] == 1,
-                                  by_sides * mean(sums.rays, kPassParts)});
+                                  by_sides * mean(sums.rays, kPassParts), key[7]});
   }
 
   const double passes = until_now.before_seen + until_now.before_missed +

@@ -21,6 +21,8 @@ struct OpenHistory {
   /// that is gone; and from how many sides beams went on behind it.
   double rays = 1.0;
   int passed = 0;
+  /// From how many sides the open pass looked; 0 where rays tell what hides the point.
+  int sides = 0;
   bool is_seen_now = false;     ///< The open one surely sees it: it never went.
   float since_s = 0.0F;         ///< From the last sure sighting to the begin of the open pass,
   float until_missed_s = 0.0F;  ///< and to the first pass that missed it, where one did.
@@ -34,6 +36,7 @@ struct LearnedRates {
   double before = 0.0;
   double before_was = 0.0;  ///< The same until the last call of learn().
   double decay_per_s = 0.0;
+  double hidden = 0.0;  ///< Share of what this drive looks at from one side that is hidden.
   /// Beta counts: passes that are over, of points that were seen since.
   double before_seen = 0.0, before_missed = 0.0;
 
@@ -50,8 +53,12 @@ struct RatePriors {
   double seen = 0.0, missed = 0.0;
   double went = 0.0, exposure_s = 0.0;
   double alike = 100.0, unlike = 0.05;
+  double hidden = 0.4;     ///< Share of drives with something new in the way.
   double passed_by = 1.0;  ///< Share of sides from which beams pass a point that is there.
 };
+
+/// What hides a point from one of so many sides hides it from all of them with this probability.
+double hides_all(int sides);
 
 /// Capture-recapture with unknown survival (Cormack, Biometrika 51, 1964): a pass sees a point that
 /// is there with v, and points go at the rate lambda. That m passes before this drive missed a
@@ -99,7 +106,7 @@ class PassHistories {
 
   /// By misses, the logarithms of the times and of what rays say, sides, and whether this drive
   /// sees the point.
-  std::map<std::array<int, 7>, Alike> alike_;
+  std::map<std::array<int, 8>, Alike> alike_;
   std::int64_t missed_before_ = 0;
   std::int64_t went_ = 0;  ///< Counted already: to be taken out.
   std::int64_t exposure_ = 0;

@@ -43,6 +43,7 @@ void check(const Parameters& parameters) {
   require_count(parameters.pass_recall_weight, "pass_recall_weight", 1.0);
   require_count(parameters.drives_alike, "drives_alike", 1.0);
   require_share(parameters.drives_unlike, "drives_unlike");
+  require_share(parameters.drives_hidden, "drives_hidden");
   require_count(parameters.decay_per_s, "decay_per_s", 0.0);
   require_count(parameters.decay_weight, "decay_weight", 0.0);
   require_count(parameters.relax_per_s, "relax_per_s", 0.0);
@@ -71,6 +72,7 @@ void ExistenceModel::learn(const PassHistories& histories) {
                           stated.decay_per_s > 0.0 ? stated.decay_weight / stated.decay_per_s : 0.0,
                           stated.drives_alike,
                           stated.drives_unlike,
+                          stated.drives_hidden,
                           stated.passed_by};
   if (learned_.now == 0.0) {
     learned_.now = learned_.before = stated.pass_recall;
@@ -87,6 +89,7 @@ void ExistenceModel::begin_drive() {
   if (learned_.now == 0.0) return;
   learned_.before_was = learned_.before;
   learned_.now = learned_.before;
+  learned_.hidden = 0.0;
   hold();
 }
 

@@ -61,6 +61,10 @@ class ExistenceModel {
   /// What learn() has said; `now` is 0 where it was not called yet.
   const LearnedRates& learned() const { return learned_; }
 
+  /// Share of what is looked at from one side only that something hides on this drive; 0 where
+  /// learn() was not called.
+  double hidden() const { return learned_.hidden; }
+
   /// P of a point at its first sighting: the share of earlier new points that were real.
   double birth() const { return births_.mean(); }
   /// What a new point seems to be after its first pass: the probability that it is real.

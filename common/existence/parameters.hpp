@@ -15,8 +15,10 @@ struct Parameters {
   double pass_recall_weight = 4.0;  ///< What `pass_recall` counts for, in points and passes.
   double drives_alike = 100.0;      ///< What v of the drives before counts for at the next one,
   double drives_unlike = 0.05;      ///< but for this share of the drives: v may be anything there.
-  double range_m = 40.0;            ///< Of the sensor.
-  double decay_per_s = 0.0;         ///< [lambda] Rate at which points cease to exist: start value.
+  double drives_hidden = 0.4;   ///< Share of drives with something new in the way, which hides any
+                                ///< share of what they look at from one side only.
+  double range_m = 40.0;        ///< Of the sensor.
+  double decay_per_s = 0.0;     ///< [lambda] Rate at which points cease to exist: start value.
   double decay_weight = 0.0;    ///< What it counts for, in points that went; 0: it is not learned.
   double relax_per_s = 1.4e-5;  ///< [mu] Rate at which visibility is forgotten: once in 20 h.
   double passed_by = 0.2;    ///< Share of viewpoints whose rays pass beside a point that is there.

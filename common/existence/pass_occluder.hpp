@@ -41,6 +41,8 @@ class PassOccluder {
     const double by_itself = hidden * (1.0 - kPrior) / kPrior;
     return 1.0 - hidden + kStopsBeams * std::max(0.0, by_itself - (1.0 - hidden));
   }
+  /// Whether a return in front of the point or behind it was measured, or it was found.
+  bool has_told() const { return code_ >= kBlocked; }
   /// Whether no look has come yet.
   bool is_new() const { return code_ == 0; }
 

@@ -66,6 +66,8 @@ class PointExistence {
   double pass_visibility() const { return 1.0 / (1.0 + unseen_); }
   /// Sectors of the shell (bits) from which this pass missed the point.
   std::uint32_t missed_from() const { return missed_from_; }
+  /// Sectors from which this pass has looked, with returns in front of the point left out.
+  std::uint32_t looked_from() const { return missed_from_ | marked_; }
   const S& shell() const { return shell_; }
 
   /// Expected and seen. Throws std::invalid_argument where the look is not finite or has no length.
@@ -73,8 +75,9 @@ class PointExistence {
     if (!look.goes_on) enter_pass(model);
     const View view = view_of(model, look);
     learn_recall(model, view, true);
+    look_from(view, occluder_, Seen::kHit);
     apply_hit(model, view);
-    last_hit_ = sector_of(view);
+    last_hit_ = view.sector;
   }
 
   /// Expected and not seen. What was blocked says nothing of the point, but of the pass: misses
@@ -82,12 +85,12 @@ class PointExistence {
   void miss(ExistenceModel& model, const Look& look) {
     if (!look.goes_on) enter_pass(model);
     const View view = view_of(model, look);
-    observe(occluder_.after(look.ray));
-    if (look.ray == Ray::kBlocked) return;
+    const bool is_blocked = look.ray == Ray::kBlocked;
+    look_from(view, occluder_.after(look.ray), is_blocked ? Seen::kNothing : Seen::kMiss);
+    if (is_blocked) return;
     learn_recall(model, view, false);
     apply_miss(model, view, look.ray == Ray::kPassed);
     last_hit_ = kNowhere;
-    missed_from_ |= 1U << sector_of(view);
   }
 
   /// Time without looks. Only how much matters, not in how many parts (but for rounding).
@@ -126,49 +129,9 @@ class PointExistence {
     odds_ = bounded(odds_ * ratio);
   }
 
-  SavedPoint<S> save() const {
-    SavedPoint<S> saved;
-    static_assert(sizeof(saved) ==
-                  16 + sizeof(saved.pass) + sizeof(saved.numbers) + sizeof(saved.shell));
-    saved.odds = odds_;
-    saved.pass = {pass_ | (std::uint32_t{missed_share_.code()} << 16),
-                  rays_passed_ | (std::uint32_t{last_hit_} << 24) | (std::uint32_t{flags_} << 29),
-                  missed_from_ | (std::uint32_t{occluder_.code()} << 24)};
-    saved.numbers = {unseen_,
-                     chance_missed_,
-                     static_cast<float>(pending_seen_ + 65536U * (kWhole - until_missed_)),
-                     static_cast<float>(pending_missed_),
-                     evidence_.went,
-                     evidence_.since_s,
-                     decay_per_s(),
-                     gap_s_};
-    shell_.store(saved.shell);
-    return saved;
-  }
+  SavedPoint<S> save() const;
   /// Throws std::invalid_argument where the state is of another version or shell, or cannot be.
-  static PointExistence load(const ExistenceModel& model, const SavedPoint<S>& saved) {
-    PointExistence point(model, odds_of(model.parameters().prior));
-    if (!saved.can_be() || !point.shell_.restore(saved.shell))
-      throw std::invalid_argument("existence: a saved point that cannot be");
-    point.odds_ = bounded(saved.odds);
-    point.pass_ = static_cast<std::uint16_t>(saved.pass[0]);
-    point.missed_share_ = saved.missed_share();
-    point.occluder_ = saved.occluder();
-    point.rays_passed_ = saved.pass[1] & kSectors;
-    point.last_hit_ = (saved.pass[1] >> 24U) & 31U;
-    point.flags_ = (saved.pass[1] >> 29U) & 7U;
-    point.missed_from_ = saved.pass[2] & kSectors;
-    point.unseen_ = saved.numbers[0];
-    point.chance_missed_ = saved.numbers[1];
-    const auto packed = static_cast<std::uint32_t>(std::min(16777215.0F, saved.numbers[2]));
-    point.pending_seen_ = static_cast<std::uint16_t>(packed & 0xFFFFU);
-    point.until_missed_ = kWhole - (packed >> 16U);
-    point.pending_missed_ = static_cast<std::uint16_t>(std::min(65535.0F, saved.numbers[3]));
-    point.evidence_ = {saved.numbers[4], saved.numbers[5]};
-    point.keep_decay(saved.numbers[6]);
-    point.gap_s_ = saved.numbers[7];
-    return point;
-  }
+  static PointExistence load(const ExistenceModel& model, const SavedPoint<S>& saved);
 
  private:
   /// A look, measured against the shell.
@@ -177,7 +140,9 @@ class PointExistence {
     float distance_m = 0.0F;
     double recall = 0.0;   ///< p_d s.
     double visible = 0.0;  ///< w.
+    std::uint32_t sector = 0;
   };
+  enum class Seen : std::uint8_t { kHit, kMiss, kNothing };
   /// OpenHistory's `rays` and `missed_now`.
   struct RaysAndMiss {
     double rays = 1.0;
@@ -191,6 +156,7 @@ class PointExistence {
   static constexpr std::uint32_t kWasSure = 4;  ///< Surely seen in some pass: it was real.
   static constexpr double kUnit = 256.0;        ///< Of pending passes.
   static constexpr std::uint32_t kWhole = 255;  ///< Of a share in 8 bits.
+  static constexpr double kHiddenUnit = 256.0;  ///< Likewise, always below 1.
   /// A pass has looked for the point where one that can see it had missed it with less than that.
   static constexpr float kLookedFor = 0.2F;
 
@@ -221,6 +187,7 @@ class PointExistence {
     View view;
     view.distance_m = std::sqrt(squared);
     view.place = shell_.locate(look.from_point_m / view.distance_m);
+    view.sector = static_cast<std::uint32_t>(shell_.sector(view.place));
     view.recall = model.recall().at(view.distance_m);
     view.visible = probability_of(shell_.visibility_odds(view.place));
     return view;
@@ -262,34 +229,63 @@ class PointExistence {
 
   /// Rays of one viewpoint in one pass pass a point for one reason: they count once.
   void count_ray(const ExistenceModel& model, const View& view) {
-    const std::uint32_t bit = 1U << sector_of(view);
-    if ((rays_passed_ & bit) != 0) return;
-    rays_passed_ |= bit;
+    const std::uint32_t bit = 1U << view.sector;
+    if ((rays_passed() & bit) != 0) return;
+    marked_ |= bit;
     odds_ = bounded(odds_ * model.parameters().passed_by);
   }
 
-  /// What a look says of an occluder; if that changes p(H), the pass so far is weighed anew: d
-  /// began with v (1 - h). With v = 1 there is no such pass.
-  void observe(PassOccluder occluder) {
-    const double was = occluder_.chance(), is = occluder.chance();
-    const double blind_was = blind(missed_share_);
+  /// What a look says of what hides the point, before it says anything of the point: its ray, and
+  /// from where it is. If that changes p(H), the pass so far is weighed anew: d began with
+  /// v (1 - h). With v = 1 there is no such pass.
+  void look_from(const View& view, PassOccluder occluder, Seen seen) {
+    const std::uint32_t bit = 1U << view.sector;
+    const bool is_new_side = seen != Seen::kNothing && (looked_from() & bit) == 0;
+    const bool is_told = occluder.has_told() || occluder_.has_told();
+    if (unseen_ > 0.0F && (is_told || (is_new_side && hidden_share_ != 0))) {
+      weigh_look(bit, occluder, seen);
+    } else {
+      occluder_ = occluder;
+      mark(bit, seen);
+    }
+  }
+  void weigh_look(std::uint32_t bit, PassOccluder occluder, Seen seen) {
+    const double was = hidden(), blind_was = blind(missed_share_);
     occluder_ = occluder;
-    if (was == is || unseen_ <= 0.0F) return;
-    const double seeing = (1.0 - is) / (1.0 - was);
-    const double not_seeing = blind(missed_share_) / blind_was;
+    mark(bit, seen);
+    const double is = hidden();
+    if (was != is) reweigh((1.0 - is) / (1.0 - was), blind(missed_share_) / blind_was);
+  }
+  void mark(std::uint32_t bit, Seen seen) {
+    if (seen == Seen::kNothing || (missed_from_ & bit) != 0) return;
+    if (seen == Seen::kHit) marked_ |= bit;
+    if (seen == Seen::kMiss) marked_ &= ~bit & kSectors;
+    if (seen == Seen::kMiss) missed_from_ |= bit;
+  }
+  /// The pass so far with other chances before its looks: of E and D, of E and not D.
+  void reweigh(double seeing, double not_seeing) {
     const double d = pass_visibility();
     odds_ = bounded(odds_ * (d * seeing + (1.0 - d) * not_seeing));
     scale_unseen(not_seeing / seeing);
   }
 
+  /// p(H): something hides the point from wherever this pass looks at it. What was measured along
+  /// the rays tells, else from how many sides the pass has looked.
+  double hidden() const {
+    if (occluder_.has_told()) return static_cast<double>(occluder_.chance());
+    return hidden_share_ / kHiddenUnit * hides_all(std::popcount(looked_from()));
+  }
+  /// What the returns say of a point that is there, not hidden and missed: 1 - h without any.
+  double stopped_itself() const {
+    return occluder_.has_told() ? occluder_.stopped_itself() : 1.0 - hidden();
+  }
   /// E and not D before the looks, with what they say of an occluder.
   double blind(MissedShare missed_share) const {
-    return static_cast<double>(occluder_.chance()) +
-           occluder_.stopped_itself() * missed_share.value();
+    return hidden() + stopped_itself() * missed_share.value();
   }
 
   void count_look(double missed) {
-    chance_missed_ = std::max(1e-6F, chance_missed_ * static_cast<float>(missed));
+    keep_chance_missed(std::max(1e-6F, chance_missed() * static_cast<float>(missed)));
   }
 
   void scale_unseen(double ratio) {
@@ -297,7 +293,7 @@ class PointExistence {
   }
 
   void learn_recall(ExistenceModel& model, const View& view, bool is_hit) {
-    const bool is_sure = last_hit_ == sector_of(view) && odds_ > 19.0 && unseen_ < 0.05F &&
+    const bool is_sure = last_hit_ == view.sector && odds_ > 19.0 && unseen_ < 0.05F &&
                          view.distance_m <= shell_.reach_m(view.place);
     if (is_sure) model.recall().record_look(view.distance_m, is_hit);
   }
@@ -314,12 +310,17 @@ class PointExistence {
   std::optional<OpenHistory> history() const;
   double missed_by_detector() const;
   RaysAndMiss open_pass() const;
+  std::uint32_t rays_passed() const { return marked_ & missed_from_; }
   double missed_passes() const { return pending_missed_ / kUnit; }
   bool has_missed() const { return missed_passes() > 0.25; }
   /// 16 bits of lambda's fraction.
   float decay_per_s() const { return std::bit_cast<float>(std::uint32_t{decay_bits_} << 8U); }
   void keep_decay(float per_s) {
     decay_bits_ = (std::bit_cast<std::uint32_t>(per_s) >> 8U) & 0xFFFFFFU;
+  }
+  float chance_missed() const { return std::bit_cast<float>(std::uint32_t{chance_bits_} << 8U); }
+  void keep_chance_missed(float chance) {
+    chance_bits_ = (std::bit_cast<std::uint32_t>(chance) >> 8U) & 0xFFFFFFU;
   }
   float until_missed_s() const {
     return evidence_.since_s * static_cast<float>(until_missed_) / static_cast<float>(kWhole);
@@ -329,18 +330,19 @@ class PointExistence {
     count = static_cast<std::uint16_t>(std::min(65535.0, std::round(count + kUnit * passes)));
   }
 
-  /// d and lambda of the pass that begins.
+  /// d, lambda and what may be hidden, of the pass that begins.
   void expect_pass(const ExistenceModel& model) {
     const double v = model.recall().of_pass();
     unseen_ = static_cast<float>((1.0 - v) / v);
     missed_share_ = MissedShare(1.0 - v);
     keep_decay(static_cast<float>(model.decay().mean_per_s()));
+    hidden_share_ = static_cast<std::uint32_t>(kHiddenUnit * model.hidden()) & 0xFFU;
   }
 
   void start_pass(const ExistenceModel& model) {
     expect_pass(model);
-    chance_missed_ = 1.0F;
-    rays_passed_ = 0;
+    keep_chance_missed(1.0F);
+    marked_ = 0;
     missed_from_ = 0;
     last_hit_ = kNowhere;
     gap_s_ = 0.0F;
@@ -350,21 +352,19 @@ class PointExistence {
     shell_.begin_pass();
   }
 
-  std::uint32_t sector_of(const View& view) const {
-    return static_cast<std::uint32_t>(shell_.sector(view.place));
-  }
-
   double odds_;  ///< P / (1 - P).
   S shell_;
   std::uint16_t pass_;
-  MissedShare missed_share_;               ///< 1 - v as it was when the pass began.
-  std::uint32_t rays_passed_ : 24 = 0;     ///< Sectors whose rays passed the point in this pass.
+  MissedShare missed_share_;       ///< 1 - v as it was when the pass began.
+  std::uint32_t marked_ : 24 = 0;  ///< Sectors of this pass: rays passed the point, where missed;
+                                   ///< else seen with every look.
   std::uint32_t last_hit_ : 5 = kNowhere;  ///< Sector of the pass's last look, if it was a hit.
   std::uint32_t flags_ : 3 = 0;
   std::uint32_t missed_from_ : 24 = 0;  ///< Sectors of this pass with misses.
   PassOccluder occluder_;               ///< Of this pass, in the last byte of the sectors' word.
   float unseen_ = 0.0F;                 ///< (1 - d) / d.
-  float chance_missed_ = 1.0F;          ///< Of a pass that can see it, up to now.
+  std::uint32_t chance_bits_ : 24 = 0;  ///< Of a pass that can see it, up to now: a float's first.
+  std::uint32_t hidden_share_ : 8 = 0;  ///< ExistenceModel::hidden() when the pass began.
   std::uint16_t pending_seen_ = 0;      ///< Passes since the last that surely saw the point,
   std::uint16_t pending_missed_ = 0;    ///< in parts of 1 / 256.
   DecayEvidence evidence_;              ///< Up to the begin of this pass.
@@ -376,3 +376,4 @@ class PointExistence {
 }  // namespace understory::existence
 
 #include "common/existence/point_learning.hpp"  // IWYU pragma: export
+#include "common/existence/point_saving.hpp"    // IWYU pragma: export

@@ -9,15 +9,17 @@ namespace understory::existence {
 template <Shell S>
 std::optional<OpenHistory> PointExistence<S>::history() const {
   if ((flags_ & kWasSure) == 0) return std::nullopt;
-  const bool has_looked = (flags_ & kInFirstPass) == 0 && chance_missed_ < kLookedFor;
+  const bool has_looked = (flags_ & kInFirstPass) == 0 && chance_missed() < kLookedFor;
   const bool is_seen = has_looked && is_surely_seen(probability());
   const bool has_rays = (flags_ & kInFirstPass) == 0 && occluder_.chance() > 0.0F;
   const bool is_open = (has_looked || has_rays) && !is_seen;
+  const bool may_be_hidden = has_looked && !occluder_.has_told();
   const RaysAndMiss open = is_open ? open_pass() : RaysAndMiss{};
   return OpenHistory{.missed_before = missed_passes(),
                      .missed_now = open.missed,
                      .rays = open.rays,
-                     .passed = is_open ? std::popcount(rays_passed_) : 0,
+                     .passed = is_open ? std::popcount(rays_passed()) : 0,
+                     .sides = may_be_hidden ? std::popcount(looked_from()) : 0,
                      .is_seen_now = is_seen,
                      .since_s = evidence_.since_s,
                      .until_missed_s = until_missed_s(),
@@ -25,13 +27,14 @@ std::optional<OpenHistory> PointExistence<S>::history() const {
 }
 
 /// The looks by what they say of a point that is gone: h + s (1 - v) + (1 - h) L / L0 v. L / L0 by
-/// the odds of D: v is in both, so that it falls out.
+/// the odds of D: v is in both, so that it falls out. So does what was hidden by no return.
 template <Shell S>
 typename PointExistence<S>::RaysAndMiss PointExistence<S>::open_pass() const {
   if (unseen_ <= 0.0F) return {};
-  const double hidden = occluder_.chance(), itself = occluder_.stopped_itself();
-  const double seeing = blind(missed_share_) / ((1.0 - missed_share_.value()) * unseen_);
-  const double unseen = hidden + itself;
+  const double by_rays = occluder_.chance(), itself = occluder_.stopped_itself();
+  const double free = (1.0 - hidden()) / (1.0 - by_rays);
+  const double seeing = blind(missed_share_) / ((1.0 - missed_share_.value()) * unseen_ * free);
+  const double unseen = by_rays + itself;
   return {unseen, std::clamp((itself - seeing) / unseen, 0.0, 1.0)};
 }
 
@@ -40,7 +43,7 @@ void PointExistence<S>::reconsider(ExistenceModel& model, double before_was) {
   if ((flags_ & kInFirstPass) != 0) return;
   const MissedShare missed_share = missed_share_;
   const float decay_per_s = this->decay_per_s();
-  const bool has_looked = chance_missed_ < 1.0F || !occluder_.is_new();
+  const bool has_looked = chance_missed() < 1.0F || !occluder_.is_new();
   has_looked ? correct_pass(model) : expect_pass(model);
   correct_odds(model, missed_share, before_was, decay_per_s,
                has_looked ? kMostOddsInPass : kMostOdds);
@@ -49,23 +52,16 @@ void PointExistence<S>::reconsider(ExistenceModel& model, double before_was) {
     weigh(model, {static_cast<float>(1.0 - probability()), evidence_.since_s});
 }
 
-/// The pass so far as if v had been what it is now: what observe() does for an occluder.
+/// The pass so far as if v, and what may be hidden, had been what they are now.
 template <Shell S>
 void PointExistence<S>::correct_pass(const ExistenceModel& model) {
-  const double was = missed_share_.value(), blind_was = blind(missed_share_);
-  const double d = pass_visibility();
+  const double was = (1.0 - missed_share_.value()) * (1.0 - hidden());
+  const double blind_was = blind(missed_share_);
   const float unseen = unseen_;
   expect_pass(model);
-  const double is = missed_share_.value();
-  if (unseen <= 0.0F) {
-    unseen_ = unseen;
-    return;
-  }
-  const double seeing = (1.0 - is) / (1.0 - was);
-  const double not_seeing = blind(missed_share_) / blind_was;
-  odds_ = bounded(odds_ * (d * seeing + (1.0 - d) * not_seeing));
+  const double is = (1.0 - missed_share_.value()) * (1.0 - hidden());
   unseen_ = unseen;
-  scale_unseen(not_seeing / seeing);
+  if (unseen > 0.0F) reweigh(is / was, blind(missed_share_) / blind_was);
 }
 
 template <Shell S>
@@ -74,7 +70,7 @@ void PointExistence<S>::change_pass(ExistenceModel& model) {
   // P as it was after the looks: time has lowered it since.
   const double lost = lost_share(model.decay().mean_per_s(), gap_s_);
   const double after = std::min(1.0, probability() / (1.0 - lost));
-  const bool was_looked_for = chance_missed_ < kLookedFor;
+  const bool was_looked_for = chance_missed() < kLookedFor;
   const double missed_before = missed_passes();
   if ((flags_ & kIsNew) != 0 && was_looked_for) {
     model.record_birth(after);
@@ -134,7 +130,7 @@ void PointExistence<S>::learn_from_pass(ExistenceModel& model, double after, boo
 /// The part of this pass that missed the point: what was hidden says nothing of the detector.
 template <Shell S>
 double PointExistence<S>::missed_by_detector() const {
-  const double missed = occluder_.stopped_itself() * missed_share_.value();
+  const double missed = stopped_itself() * missed_share_.value();
   return (1.0 - pass_visibility()) * missed / blind(missed_share_);
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 
 #include "common/existence/odds.hpp"
@@ -53,20 +54,33 @@ struct Weighed {
   double mean = 0.0;
 };
 
-/// Of a drive that is like those before or like none: how likely that is, up to a factor, and what
-/// its v, v before and lambda are then.
+/// Why a drive misses what it misses.
+enum class Drive : std::uint8_t {
+  kAlike,   ///< As those before: v is about theirs.
+  kUnlike,  ///< As none before: v is any.
+  kHidden,  ///< v is theirs, and something hides what is looked at from one side.
+};
+
+/// v of this drive, v before, lambda, and the share of what is looked at from one side that is
+/// hidden.
+using Means = std::array<double, 4>;
+
+/// Of one kind of drive: how likely that is, up to a factor, and what the rates are then.
 struct Summed {
   double log_evidence = 0.0;
-  std::array<double, 3> means{};
+  Means means{};
 };
 
 /// What this drive's looks say of its v where v before and lambda are given: points that it sees,
-/// and those that it missed, by the probability that they are there and were looked at.
+/// and those that it missed, by the probability that they are there and were looked at. Or what
+/// they say of the share that nothing hides, where v is given, too.
 class ThisDrive {
  public:
   void see(double points) { seen_ += points; }
   void miss(double points, double chance) {
-    const auto bin = std::min(kBins - 1, static_cast<std::size_t>(chance * kBins));
+    const auto bin =
+        static_cast<std::size_t>(chance < 0.0 ? (chance < -1.0 ? 0.0 : 1.0)
+                                              : std::min(2.0 + chance * kMisses, kMisses + 1.0));
     points_[bin] += points;
     chances_[bin] += points * chance;
   }
@@ -98,7 +112,9 @@ class ThisDrive {
   }
 
  private:
-  static constexpr std::size_t kBins = 16;
+  /// Of the chances; the first two of those below 0: seen, though part of it was hidden.
+  static constexpr std::size_t kBins = 18;
+  static constexpr double kMisses = 16.0;
   static constexpr int kReach = 4;
   static constexpr int kPerSigma = 1;
 
@@ -112,7 +128,7 @@ class ThisDrive {
   /// Where that is highest, by Newton's steps, and its width there.
   std::pair<double, double> peak(const BetaPrior& prior) const {
     double missed = prior.missed;
-    for (std::size_t i = 0; i < kBins; ++i) missed += points_[i] * chances_[i];
+    for (std::size_t i = 2; i < kBins; ++i) missed += points_[i] * chances_[i];
     double x = std::log((prior.seen + seen_) / missed);
     double bend = 1.0;
     for (int round = 0; round < 12; ++round) {
@@ -142,9 +158,9 @@ class ThisDrive {
 
 class Posterior {
  public:
-  Posterior(const RateEvidence& evidence, bool is_alike, double fixed_v)
+  Posterior(const RateEvidence& evidence, Drive kind, double fixed_v)
       : evidence_(evidence),
-        is_alike_(is_alike),
+        kind_(kind),
         fixed_v_(fixed_v),
         went_(std::max(kLeastOf, evidence.went)),
         exposure_s_(std::max(kLeastOf, evidence.exposure_s)) {}
@@ -175,14 +191,17 @@ class Posterior {
     std::vector<Weighed> cells;
     cells.reserve(before.steps() * decay.steps());
     double most = -std::numeric_limits<double>::infinity();
+    std::vector<std::vector<Stay>> stays;
+    for (std::size_t l = 0; l < decay.steps(); ++l) stays.push_back(stays_at(decay.at(l)));
     for (std::size_t k = 0; k < before.steps(); ++k) {
+      const std::vector<double> missed = missed_at(before.at(k));
       for (std::size_t l = 0; l < decay.steps(); ++l) {
-        cells.push_back(weigh(before.at(k), decay.at(l)));
+        cells.push_back(weigh(before.at(k), decay.at(l), missed, stays[l]));
         most = std::max(most, cells.back().log_evidence);
       }
     }
     Moments of_before, of_decay;
-    std::array<double, 3> means{};
+    Means means{};
     double total = 0.0;
     for (std::size_t k = 0, cell = 0; k < before.steps(); ++k) {
       for (std::size_t l = 0; l < decay.steps(); ++l, ++cell) {
@@ -190,9 +209,12 @@ class Posterior {
         total += weight;
         add(of_before, weight, before.at(k));
         add(of_decay, weight, decay.at(l));
-        means[0] += weight * cells[cell].mean;
-        means[1] += weight * probability_of(std::exp(before.at(k)));
+        const double v_before = probability_of(std::exp(before.at(k)));
+        const bool is_hidden = kind_ == Drive::kHidden;
+        means[0] += weight * (is_hidden ? v_before : cells[cell].mean);
+        means[1] += weight * v_before;
         means[2] += weight * std::exp(decay.at(l));
+        means[3] += is_hidden ? weight * (1.0 - cells[cell].mean) : 0.0;
       }
     }
     const double log_evidence = most + std::log(total * before.width() * decay.width());
@@ -217,50 +239,102 @@ class Posterior {
     return {std::max(axis.from, mean - half), std::min(axis.to, mean + half)};
   }
 
-  /// One cell; all v of this drive are summed up there.
-  Weighed weigh(double odds, double log_decay) const {
+  /// Of a history at one lambda: gone before the first miss, and there from then until now.
+  struct Stay {
+    double lost = 0.0;
+    double later = 1.0;
+  };
+  std::vector<Stay> stays_at(double log_decay) const {
+    const double rate = std::exp(log_decay);
+    std::vector<Stay> stays;
+    stays.reserve(evidence_.histories.size());
+    for (const AlikePoints& one : evidence_.histories)
+      stays.push_back({lost_share(rate, one.until_missed_s),
+                       std::exp(-rate * (one.since_s - one.until_missed_s))});
+    return stays;
+  }
+  /// Of each history at one v before: that they all miss what is there.
+  std::vector<double> missed_at(double odds) const {
     const double log_miss = -std::log1p(std::exp(odds));
+    std::vector<double> missed;
+    missed.reserve(evidence_.histories.size());
+    for (const AlikePoints& one : evidence_.histories)
+      missed.push_back(std::exp(one.missed_before * log_miss));
+    return missed;
+  }
+
+  /// One cell; all v of this drive are summed up there, or all shares that are not hidden.
+  Weighed weigh(double odds, double log_decay, const std::vector<double>& all_missed,
+                const std::vector<Stay>& stays) const {
+    const double log_miss = -std::log1p(std::exp(odds));
+    const double v = probability_of(std::exp(odds));
     double log = evidence_.before_seen * (log_miss + odds) + evidence_.before_missed * log_miss +
                  went_ * log_decay - exposure_s_ * std::exp(log_decay);
     ThisDrive drive;
-    for (const AlikePoints& one : evidence_.histories) {
-      const double rate = std::exp(log_decay);
-      const double lost = lost_share(rate, one.until_missed_s);
-      const double hidden = (1.0 - lost) * std::exp(one.missed_before * log_miss);
-      const double missed = std::max(kTiny, lost + hidden);
-      const double there = hidden / missed * std::exp(-rate * (one.since_s - one.until_missed_s));
-      log += one.points * evidence_.share * std::log(missed);
-      if (one.is_seen_now) {
-        log += one.points * std::log(std::max(kTiny, there));
+    for (std::size_t i = 0; i < evidence_.histories.size(); ++i) {
+      const AlikePoints& one = evidence_.histories[i];
+      const double lost = stays[i].lost;
+      const double unseen = (1.0 - lost) * all_missed[i];
+      const double missed = std::max(kTiny, lost + unseen);
+      const double there = unseen / missed * stays[i].later;
+      const double by_rays = one.is_seen_now ? there : 1.0 + there * (one.rays - 1.0);
+      log += one.points * (evidence_.share * std::log(missed) + std::log(std::max(kTiny, by_rays)));
+      const double chance = one.is_seen_now ? 1.0 : there * one.rays / by_rays * one.missed_now;
+      if (kind_ == Drive::kHidden)
+        log += look(drive, one, chance * v);
+      else if (one.is_seen_now)
         drive.see(one.points);
-      } else {
-        const double by_rays = 1.0 + there * (one.rays - 1.0);
-        log += one.points * std::log(std::max(kTiny, by_rays));
-        drive.miss(one.points, there * one.rays / by_rays * one.missed_now);
-      }
+      else
+        drive.miss(one.points, chance);
     }
     drive.close();
     if (fixed_v_ > 0.0) return {log + drive.log_likelihood(fixed_v_), fixed_v_};
 
     const RatePriors& priors = evidence_.priors;
-    const double v = probability_of(std::exp(odds));
-    const Weighed now = is_alike_ ? drive.over({priors.alike * v, priors.alike * (1.0 - v)})
-                                  : drive.over({priors.seen, priors.missed});
-    const double share = is_alike_ ? 1.0 - priors.unlike : priors.unlike;
-    return {log + std::log(share) + now.log_evidence, now.mean};
+    const auto with = [&](const BetaPrior& prior, double share) {
+      const Weighed now = drive.over(prior);
+      return Weighed{log + std::log(share) + now.log_evidence, now.mean};
+    };
+    switch (kind_) {
+      case Drive::kUnlike:
+        return with({priors.seen, priors.missed}, priors.unlike * (1.0 - priors.hidden));
+      case Drive::kHidden:
+        return with({1.0, 1.0}, (1.0 - priors.unlike) * priors.hidden);
+      default:
+        return with({priors.alike * v, priors.alike * (1.0 - v)},
+                    (1.0 - priors.unlike) * (1.0 - priors.hidden));
+    }
+  }
+
+  /// Points that are seen with `chance` where nothing hides them, by the share x that nothing does:
+  /// seen or missed with chance (1 - part + part x), or not. Returns the part of the logarithm that
+  /// x is not in.
+  static double look(ThisDrive& view, const AlikePoints& one, double chance) {
+    const double part = hides_all(one.sides), rest = 1.0 - part;
+    if (!one.is_seen_now) {
+      const double not_seen = std::max(kTiny, 1.0 - chance * rest);
+      if (part > 0.0) view.miss(one.points, chance * part / not_seen);
+      return one.points * std::log(not_seen);
+    }
+    if (part >= 1.0) {
+      view.see(one.points);
+      return one.points * std::log(std::max(kTiny, chance));
+    }
+    if (part > 0.0) view.miss(one.points, -part / rest);
+    return one.points * std::log(std::max(kTiny, chance * rest));
   }
 
   const RateEvidence& evidence_;
-  bool is_alike_;
+  Drive kind_;
   double fixed_v_;
   double went_;
   double exposure_s_;
 };
 
 /// Each by a grid of its own: one is narrow where the other is wide.
-Summed sum_up(const RateEvidence& evidence, const LearnedRates& until_now, bool is_alike,
+Summed sum_up(const RateEvidence& evidence, const LearnedRates& until_now, Drive kind,
               bool learns_recall, bool learns_decay) {
-  const Posterior posterior(evidence, is_alike, learns_recall ? 0.0 : until_now.now);
+  const Posterior posterior(evidence, kind, learns_recall ? 0.0 : until_now.now);
   const auto fixed = [](double log) { return Axis{log, log}; };
   Axis before = fixed(std::log(until_now.before / (1.0 - until_now.before)));
   Axis decay = fixed(std::log(std::max(kTiny, until_now.decay_per_s)));
@@ -275,19 +349,26 @@ Summed sum_up(const RateEvidence& evidence, const LearnedRates& until_now, bool 
 
 LearnedRates posterior_means(const RateEvidence& evidence, const LearnedRates& until_now,
                              bool learns_recall, bool learns_decay) {
-  Summed summed = sum_up(evidence, until_now, true, learns_recall, learns_decay);
-  if (learns_recall) {
-    const Summed unlike = sum_up(evidence, until_now, false, learns_recall, learns_decay);
-    const double share =
-        probability_of(std::exp(std::min(600.0, summed.log_evidence - unlike.log_evidence)));
-    for (std::size_t i = 0; i < summed.means.size(); ++i)
-      summed.means[i] = std::lerp(unlike.means[i], summed.means[i], share);
+  std::vector<Summed> kinds{
+      sum_up(evidence, until_now, Drive::kAlike, learns_recall, learns_decay)};
+  if (learns_recall)
+    for (const Drive kind : {Drive::kUnlike, Drive::kHidden})
+      kinds.push_back(sum_up(evidence, until_now, kind, learns_recall, learns_decay));
+  double most = kinds.front().log_evidence, total = 0.0;
+  for (const Summed& kind : kinds) most = std::max(most, kind.log_evidence);
+  Means means{};
+  for (const Summed& kind : kinds) {
+    const double weight = std::exp(kind.log_evidence - most);
+    total += weight;
+    for (std::size_t i = 0; i < means.size(); ++i) means[i] += weight * kind.means[i];
   }
+  for (double& mean : means) mean /= total;
   LearnedRates after = until_now;
   after.before_was = until_now.before;
-  if (learns_recall) after.now = summed.means[0];
-  if (learns_recall) after.before = summed.means[1];
-  if (learns_decay) after.decay_per_s = summed.means[2];
+  if (learns_recall) after.now = means[0];
+  if (learns_recall) after.before = means[1];
+  after.hidden = means[3];
+  if (learns_decay) after.decay_per_s = means[2];
   return after;
 }
 

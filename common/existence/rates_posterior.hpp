@@ -16,6 +16,7 @@ struct AlikePoints {
   double until_missed_s = 0.0;
   bool is_seen_now = false;
   double rays = 1.0;  ///< OpenHistory's, with those of all sides.
+  int sides = 0;      ///< Likewise.
 };
 
 /// All that the posterior is made of.

@@ -17,8 +17,9 @@ namespace understory::existence {
 /// point, and a point that goes on bit by bit as if nothing had been.
 template <Shell S>
 struct SavedPoint {
-  /// Version 1 had a coarser 1 - v, and nothing of what was measured in front of the point.
-  static constexpr std::uint32_t kVersion = 2;
+  /// Version 1 had a coarser 1 - v, and nothing of what was measured in front of the point; 2 not
+  /// from where a pass had seen it, nor what may hide it.
+  static constexpr std::uint32_t kVersion = 3;
   static constexpr std::size_t kFloats = 8;
   std::uint32_t version = kVersion;
   std::uint32_t shell_kind = S::kKind;
@@ -31,8 +32,12 @@ struct SavedPoint {
   /// Whether it is of a version and a shell that are known, and its numbers are possible.
   bool can_be() const {
     const auto is_possible = [](double number) { return std::isfinite(number) && number >= 0.0; };
-    return (version == 1 || version == kVersion) && shell_kind == S::kKind && is_possible(odds) &&
+    return version >= 1 && version <= kVersion && shell_kind == S::kKind && is_possible(odds) &&
            std::all_of(numbers.begin(), numbers.end(), is_possible);
+  }
+  /// A number that holds two: 8 bits above 16.
+  std::uint32_t packed(std::size_t number) const {
+    return static_cast<std::uint32_t>(std::min(16777215.0F, numbers[number]));
   }
   MissedShare missed_share() const {
     constexpr std::uint32_t kFiner = MissedShare::kCodesPerOctave / 32;

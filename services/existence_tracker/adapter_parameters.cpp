@@ -24,6 +24,10 @@ void describe(existence::Parameters& p, bus::ParameterTable& table) {
             "What that share of the drives before counts for at the next one, and at most.");
   table.add("model.drives_unlike", p.drives_unlike, {1e-6, 0.999}, "",
             "Share of drives that say nothing of each other: leaves, rain, another season.");
+  table.add("model.drives_hidden", p.drives_hidden, {1e-6, 0.999}, "",
+            "Share of drives with something new in the way, which may hide any share of what they "
+            "look at "
+            "from one side only.");
   table.add("model.range_m", p.range_m, {1.0, 1000.0}, "m",
             "Range of the detector, up to which a landmark should be seen before it was seen.");
   table.add("model.decay_per_s", p.decay_per_s, {0.0, 1.0}, "1/s",

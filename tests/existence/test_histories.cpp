@@ -20,6 +20,7 @@ struct Lived {
   bool missed_before = false;
   bool missed_now = false;
   double since_s = 0.0;
+  int sides = 0;
 };
 
 /// Counts of the drives and of what went, with the priors.
@@ -45,6 +46,7 @@ LearnedRates learned(const std::vector<Lived>& all, const Known& known, bool rec
   for (const Lived& one : all)
     histories.add({.missed_before = one.missed_before ? 1.0 : 0.0,
                    .missed_now = one.missed_now ? 1.0 : 0.0,
+                   .sides = one.sides,
                    .is_seen_now = !one.missed_now,
                    .since_s = static_cast<float>(one.since_s),
                    .until_missed_s = static_cast<float>(one.since_s - kDay)});
@@ -65,35 +67,52 @@ double beta(double v, double seen, double missed) {
                   std::lgamma(seen + missed) - std::lgamma(seen) - std::lgamma(missed));
 }
 
-/// Means by a fine grid over all that can be, every history by itself.
-std::array<double, 3> summed_up(const std::vector<Lived>& all, const Known& known) {
-  constexpr int kRecalls = 60, kRates = 120;
-  double total = 0.0;
-  std::array<double, 3> means{};
-  std::optional<double> offset;
-  for (int i = 0; i < kRecalls; ++i) {
-    for (int k = 0; k < kRecalls; ++k) {
-      for (int l = 0; l < kRates; ++l) {
-        const double now = (i + 0.5) / kRecalls, last = (k + 0.5) / kRecalls;
-        const double lambda = 1e-11 * std::exp((l + 0.5) / kRates * std::log(1e4));
-        double log = std::log(0.95 * beta(now, 100.0 * last, 100.0 * (1.0 - last)) +
-                              0.05 * beta(now, 2.8, 1.2)) +
-                     (known.before_seen - 1.0) * std::log(last) +
-                     (known.before_missed - 1.0) * std::log(1.0 - last) +
-                     known.went * std::log(lambda) - known.exposure_s * lambda;
-        for (const Lived& one : all) log += log_chance(one, now, last, lambda);
-        offset = offset.value_or(log);
-        const double weight = std::exp(std::min(600.0, log - *offset));
-        total += weight;
-        means[0] += weight * now;
-        means[1] += weight * last;
-        means[2] += weight * lambda;
-      }
-    }
+/// v of this drive, v before, lambda, and the share that is hidden: means by a fine grid over all
+/// that can be, every history by itself.
+class FineGrid {
+ public:
+  FineGrid(const std::vector<Lived>& all, const Known& known) : all_(all), known_(known) {
+    for (int k = 0; k < kShares; ++k)
+      for (int l = 0; l < kRates; ++l)
+        for (int i = 0; i < kShares; ++i) add(share(k), rate(l), share(i));
+    for (double& mean : means_) mean /= total_;
   }
-  for (double& mean : means) mean /= total;
-  return means;
-}
+  const std::array<double, 4>& means() const { return means_; }
+
+ private:
+  static constexpr int kShares = 60, kRates = 120;
+  static double share(int step) { return (step + 0.5) / kShares; }
+  static double rate(int step) { return 1e-11 * std::exp((step + 0.5) / kRates * std::log(1e4)); }
+
+  /// `any`: v of this drive where nothing hides, else the share that is hidden.
+  void add(double last, double lambda, double any) {
+    const double seen =
+        0.95 * beta(any, 100.0 * last, 100.0 * (1.0 - last)) + 0.05 * beta(any, 2.8, 1.2);
+    const double prior = (known_.before_seen - 1.0) * std::log(last) +
+                         (known_.before_missed - 1.0) * std::log(1.0 - last) +
+                         known_.went * std::log(lambda) - known_.exposure_s * lambda;
+    double open = prior + std::log((1.0 - kPriors.hidden) * seen);
+    double hidden = prior + std::log(0.95 * kPriors.hidden);
+    for (const Lived& one : all_) {
+      open += log_chance(one, any, last, lambda);
+      hidden += log_chance(one, last * (1.0 - any * hides_all(one.sides)), last, lambda);
+    }
+    count(open, {any, last, lambda, 0.0});
+    count(hidden, {last, last, lambda, any});
+  }
+  void count(double log, const std::array<double, 4>& at) {
+    offset_ = offset_.value_or(log);
+    const double weight = std::exp(std::min(600.0, log - *offset_));
+    total_ += weight;
+    for (std::size_t i = 0; i < at.size(); ++i) means_[i] += weight * at[i];
+  }
+
+  const std::vector<Lived>& all_;
+  Known known_;
+  std::optional<double> offset_;
+  double total_ = 0.0;
+  std::array<double, 4> means_{};
+};
 
 }  // namespace
 
@@ -107,8 +126,14 @@ TEST_CASE("Rates are the means of their posterior", "[existence]") {
     for (int i = 0; i < 20; ++i) all.push_back({true, i >= 7, 6.0 * kYear + kDay});
   }
   SECTION("nothing at all") {}
-  const auto truth = summed_up(all, {});
+  SECTION("half of what is looked at from one side is missed") {
+    for (int i = 0; i < 40; ++i) all.push_back({false, i % 2 == 0, 30.0 * kDay, 1});
+    for (int i = 0; i < 40; ++i) all.push_back({false, i % 10 == 0, 30.0 * kDay, 2 + i % 2});
+  }
+  const FineGrid grid(all, {});
+  const auto& truth = grid.means();
   const LearnedRates rates = learned(all, {});
+  CHECK(rates.hidden == Approx(truth[3]).margin(0.015));
   CHECK(rates.now == Approx(truth[0]).margin(0.015));
   CHECK(rates.before == Approx(truth[1]).margin(0.015));
   CHECK(rates.decay_per_s == Approx(truth[2]).epsilon(0.06));
