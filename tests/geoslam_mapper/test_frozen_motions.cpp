@@ -82,7 +82,9 @@ TEST_CASE("Frozen motions keep micrometres and the information", "[frozen_motion
   for (std::uint32_t i = 0; i < 300; ++i) {
     const MeasuredMotion one =
         random_motion({40.0, -30.0, 3.1}, 1 + static_cast<int>(i % 4), random);
-    given.push_back({i, i + 1, one.a_T_b, one.information, i % 3, i % 7 == 0 ? i + 1 : 0});
+    const NodeIndex b = i == 250 ? i + 70'000 : (i == 260 ? 10 : i + 1);  // Far on, and back.
+    const std::uint32_t away = i == 270 ? 100'000 : i % 3;
+    given.push_back({i, b, one.a_T_b, one.information, away, i % 7 == 0 ? i + 1 : 0});
     motions.add(given.back());
   }
   constexpr state::Format kFormat{"test", 1};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace understory::geoslam_mapper::smoothing {
 namespace {
@@ -24,8 +25,17 @@ Eigen::Matrix3d root_of(const Eigen::Matrix3d& information) {
 
 }  // namespace
 
+bool FrozenMotions::can_pack(const FrozenMotion& motion) {
+  const std::int64_t a_to_b = std::int64_t{motion.b} - std::int64_t{motion.a};
+  return motion.closure == 0 && std::in_range<std::int16_t>(a_to_b) &&
+         std::in_range<std::uint16_t>(motion.away);
+}
+
 FrozenMotions::Packed FrozenMotions::packed(const FrozenMotion& motion) {
-  Packed result{motion.a, motion.b, {}, {}, motion.away};
+  Packed result;
+  result.a = motion.a;
+  result.a_to_b = static_cast<std::int16_t>(std::int64_t{motion.b} - std::int64_t{motion.a});
+  result.away = static_cast<std::uint16_t>(motion.away);
   const Eigen::Vector3f coordinates = motion.a_T_b.coordinates().cast<float>();
   std::copy_n(coordinates.data(), 3, result.a_T_b.begin());
   const Eigen::Matrix3d root = root_of(motion.information);
@@ -41,30 +51,30 @@ FrozenMotion FrozenMotions::unpacked(const Packed& packed) {
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k <= i; ++k) root(i, k) = packed.root[at++];
   const auto& [x_m, y_m, theta_rad] = packed.a_T_b;
-  return {packed.a,    packed.b, geometry::SE2(x_m, y_m, theta_rad), root * root.transpose(),
+  return {packed.a,    packed.b(), geometry::SE2(x_m, y_m, theta_rad), root * root.transpose(),
           packed.away, 0};
 }
 
 void FrozenMotions::add(const FrozenMotion& motion) {
-  if (motion.closure != 0) {
-    closures_.push_back(motion);
-  } else {
+  if (can_pack(motion)) {
     packed_.push_back(packed(motion));
+  } else {
+    whole_.push_back(motion);
   }
 }
 
 std::vector<FrozenMotion> FrozenMotions::take_beyond(const NodeSet& frozen) {
   std::vector<FrozenMotion> taken;
-  const auto is_beyond = [&](const auto& one) {
-    return !frozen.contains(one.a) && !frozen.contains(one.b);
+  const auto is_beyond = [&](NodeIndex a, NodeIndex b) {
+    return !frozen.contains(a) && !frozen.contains(b);
   };
   std::erase_if(packed_, [&](const Packed& one) {
-    if (!is_beyond(one)) return false;
+    if (!is_beyond(one.a, one.b())) return false;
     taken.push_back(unpacked(one));
     return true;
   });
-  std::erase_if(closures_, [&](const FrozenMotion& one) {
-    if (!is_beyond(one)) return false;
+  std::erase_if(whole_, [&](const FrozenMotion& one) {
+    if (!is_beyond(one.a, one.b)) return false;
     taken.push_back(one);
     return true;
   });
@@ -75,12 +85,12 @@ std::vector<FrozenMotion> FrozenMotions::all() const {
   std::vector<FrozenMotion> result;
   result.reserve(size());
   for (const Packed& one : packed_) result.push_back(unpacked(one));
-  result.insert(result.end(), closures_.begin(), closures_.end());
+  result.insert(result.end(), whole_.begin(), whole_.end());
   return result;
 }
 
 bool FrozenMotions::has_closure(std::uint64_t id) const {
-  return std::ranges::find(closures_, id, &FrozenMotion::closure) != closures_.end();
+  return std::ranges::find(whole_, id, &FrozenMotion::closure) != whole_.end();
 }
 
 }  // namespace understory::geoslam_mapper::smoothing
