@@ -161,6 +161,7 @@ TEST_CASE("Looks from many sides count in any order, by Bayes' rule over what ma
     REQUIRE(model.hidden() > 0.1);
     const int sides = 1 + trial % 4;
     std::vector<int> faces;
+    faces.reserve(static_cast<std::size_t>(sides) + 4);
     for (int i = 0; i < sides; ++i) faces.push_back(i);
     for (int i = 0; i < 4; ++i) faces.push_back(static_cast<int>(unit(random) * sides));
     auto point = IcosahedralPoint::known(model);

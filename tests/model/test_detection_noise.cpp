@@ -119,8 +119,7 @@ TEST_CASE("Overstated corners shrink where trunks keep what is stated", "[noise]
     noise.add(scan, drive.tracks);
   }
   CHECK(noise.factor(kTrunk, 8.0) == 1.0);
-  CHECK(noise.factor(model::LandmarkKind::kCorner, 8.0) ==
-        Approx(0.16).epsilon(0.3));
+  CHECK(noise.factor(model::LandmarkKind::kCorner, 8.0) == Approx(0.16).epsilon(0.3));
 }
 
 TEST_CASE("One wrong detection in fifty does not pass for noise", "[noise]") {

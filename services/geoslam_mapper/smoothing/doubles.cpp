@@ -146,7 +146,12 @@ bool has_rival(const StoredLandmark& a, const StoredLandmark& b, double radius_m
   return result;
 }
 
-enum class Sameness { kTwo, kOneByPlace, kOne };
+enum class Sameness {
+  kTwo,
+  kOneByPlace,
+  kOne,
+  kOneNoPoint,  ///< One that was observed as two points.
+};
 
 Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
                   const SmoothingMapperParameters& parameters, const GlobalMap& map) {
@@ -163,7 +168,10 @@ Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
     return Sameness::kTwo;
 
   // Of two that were never seen on one way each pass missed one.
-  if (touch) return Sameness::kOne;
+  if (touch) {
+    const double squared = apart.dot(covariance->inverse() * apart);
+    return squared > parameters.outlier_chi2 ? Sameness::kOneNoPoint : Sameness::kOne;
+  }
   const double floor_m = parameters.gate_floor_m / parameters.gate_sigmas;
   const Eigen::Matrix2d spread = *covariance + floor_m * floor_m * Eigen::Matrix2d::Identity();
   const Neighbourhood around = neighbourhood_of(a.position_m, map);
@@ -185,10 +193,10 @@ Sameness sameness(const StoredLandmark& a, const StoredLandmark& b,
   return one >= kLeastOdds * two ? Sameness::kOne : Sameness::kTwo;
 }
 
-/// A landmark that is the same as this one, and whether that is final.
+/// A landmark that is the same as this one.
 struct Double {
   model::LandmarkId id = 0;
-  bool is_final = false;
+  Sameness how = Sameness::kTwo;
 };
 std::optional<Double> double_of(const StoredLandmark& landmark,
                                 const SmoothingMapperParameters& parameters, const Merges& merges,
@@ -204,7 +212,7 @@ std::optional<Double> double_of(const StoredLandmark& landmark,
       continue;
     }
     const Sameness same = sameness(landmark, other, parameters, map);
-    if (same != Sameness::kTwo) return Double{other_id, same == Sameness::kOne};
+    if (same != Sameness::kTwo) return Double{other_id, same};
   }
   return std::nullopt;
 }
@@ -221,7 +229,11 @@ std::vector<MergedPair> merge_doubles(std::span<const model::LandmarkId> ids,
     if (!other) continue;
 
     merged.push_back(Merges::in_order(id, other->id, map.landmarks));
-    merges.merge(merged.back(), other->is_final, map);
+    if (other->how == Sameness::kOneNoPoint) {
+      merges.absorb(merged.back(), map);
+    } else {
+      merges.merge(merged.back(), other->how == Sameness::kOne, map);
+    }
   }
   return merged;
 }

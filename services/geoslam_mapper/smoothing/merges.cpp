@@ -62,6 +62,16 @@ void Merges::merge(const MergedPair& pair, bool is_final, GlobalMap& map) {
   }
 }
 
+void Merges::absorb(const MergedPair& pair, GlobalMap& map) {
+  StoredLandmark& old_one = map.landmarks.at(pair.first);
+  for (const NodeIndex node : std::exchange(old_one.nodes, {}))
+    if (map.graph.node(node).observations().contains(pair.first))
+      map.graph.ignore(node, pair.first);
+  old_one.information = 0.0;
+  (void)map.graph.hand_over(pair.first, pair.second, old_one.nodes);
+  join(pair, map);
+}
+
 void Merges::adopt(const MergedPair& pair, std::vector<HandedOver> observed, GlobalMap& map) {
   if (merges_.size() == kMost) merges_.erase(merges_.begin());
   StoredLandmark old_one = map.landmarks.at(pair.first);

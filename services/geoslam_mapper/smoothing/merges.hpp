@@ -29,7 +29,11 @@ class Merges {
   /// Makes the first landmark of the pair the second, in graph and map; both are in the graph. The
   /// graph is not solved. `is_final`: that it is one thing does not rest on how near the two are.
   void merge(const MergedPair& pair, bool is_final, GlobalMap& map);
-  /// The same where the graph has done it: `observed` is what it handed over.
+  /// The same where what was observed of the two contradicts that they are one point, but nothing
+  /// else can be: a thing that looks elsewhere from another side. What the first one was observed
+  /// as does not count.
+  void absorb(const MergedPair& pair, GlobalMap& map);
+  /// The same as merge() where the graph has done it: `observed` is what it handed over.
   void adopt(const MergedPair& pair, std::vector<HandedOver> observed, GlobalMap& map);
   /// Whether the two were one and were separated.
   bool were_separated(model::LandmarkId a, model::LandmarkId b) const;
