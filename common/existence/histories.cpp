@@ -54,6 +54,8 @@ void PassHistories::count(const OpenHistory& history, std::int64_t times) {
   went_ += times * parts_of(went, kWentParts);
   exposure_ +=
       times * parts_of((1.0 - went) * static_cast<double>(history.counted.since_s), kSecondParts);
+
+  // Which points it is like.
   const double before = std::min(history.missed_before, kMostMissed);
   const auto since_s = static_cast<double>(history.since_s);
   // Without a miss it may have gone until now.
@@ -68,6 +70,8 @@ void PassHistories::count(const OpenHistory& history, std::int64_t times) {
                                std::min(kMostSides, history.passed),
                                std::min(kMostHidden + 1, history.sides)};
   if (key[0] == 0 && key[1] == 0 && key[4] == 0 && key[5] == 0 && key[6] == 0) return;
+
+  // Their sums.
   Alike& sums = alike_[key];
   sums.points += times;
   sums.missed_before += times * parts_of(before, kPassParts);

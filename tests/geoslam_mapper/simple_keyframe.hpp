@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "common/model/keyframe.hpp"
+#include "common/model/odometry.hpp"
 
 namespace understory::test {
 
@@ -28,6 +29,20 @@ inline model::KeyframeLandmark simple_tree(const Eigen::Vector2d& seen_m, double
   landmark.radius_m = 0.2;
   landmark.observation_count = scans;
   return landmark;
+}
+
+/// Straight on from the last keyframe; `error`: in sigmas.
+inline model::Odometry simple_odometry(int i, double step_m, const Eigen::Vector3d& sigma,
+                                       const Eigen::Vector3d& error) {
+  model::Odometry motion;
+  motion.sequence = static_cast<std::uint64_t>(i);
+  motion.from_utime = utime_of(i - 1);
+  motion.utime = utime_of(i);
+  motion.from_T_to =
+      geometry::SE2(step_m, 0.0, 0.0) * geometry::SE2::Exp(sigma.cwiseProduct(error));
+  motion.covariance = sigma.cwiseAbs2().asDiagonal();
+  motion.has_wheels = true;
+  return motion;
 }
 
 }  // namespace understory::test

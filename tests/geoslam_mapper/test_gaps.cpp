@@ -43,16 +43,7 @@ class GapWorld {
   static geometry::SE2 pose(int i) { return {kStep_m * i, 0.0, 0.0}; }
 
   model::Odometry odometry(int i) {
-    const Eigen::Vector3d sigma(0.02, 0.01, 5e-3);
-    const Eigen::Vector3d noise = sigma.cwiseProduct(Eigen::Vector3d(draw(), draw(), draw()));
-    model::Odometry motion;
-    motion.sequence = static_cast<std::uint64_t>(i);
-    motion.from_utime = test::utime_of(i - 1);
-    motion.utime = test::utime_of(i);
-    motion.from_T_to = geometry::SE2(kStep_m, 0.0, 0.0) * geometry::SE2::Exp(noise);
-    motion.covariance = sigma.array().square().matrix().asDiagonal();
-    motion.has_wheels = true;
-    return motion;
+    return test::simple_odometry(i, kStep_m, {0.02, 0.01, 5e-3}, {draw(), draw(), draw()});
   }
 
   std::optional<model::Keyframe> keyframe(int i) {

@@ -51,17 +51,7 @@ class Road {
     return result;
   }
   model::Odometry odometry(int i) {
-    const Eigen::Vector3d sigma(0.02, 0.01, 3e-3);
-    model::Odometry motion;
-    motion.sequence = static_cast<std::uint64_t>(i);
-    motion.from_utime = test::utime_of(i - 1);
-    motion.utime = test::utime_of(i);
-    motion.from_T_to =
-        geometry::SE2(kStep_m, 0.0, 0.0) *
-        geometry::SE2::Exp(sigma.cwiseProduct(Eigen::Vector3d(draw(), draw(), draw())));
-    motion.covariance = sigma.cwiseAbs2().asDiagonal();
-    motion.has_wheels = true;
-    return motion;
+    return test::simple_odometry(i, kStep_m, {0.02, 0.01, 3e-3}, {draw(), draw(), draw()});
   }
   model::Keyframe keyframe(int i) {
     model::Keyframe keyframe = test::simple_keyframe(i, kRange_m);

@@ -28,17 +28,8 @@ class Lane {
 
   static geometry::SE2 pose(int i) { return {kStep_m * i, 0.0, 0.0}; }
   model::Odometry odometry(int i) {
-    const Eigen::Vector3d sigma(0.02, 0.01, 2e-3);
-    model::Odometry motion;
-    motion.sequence = static_cast<std::uint64_t>(i);
-    motion.from_utime = test::utime_of(i - 1);
-    motion.utime = test::utime_of(i);
-    motion.from_T_to = geometry::SE2(kStep_m, 0.0, 0.0) *
-                       geometry::SE2::Exp(sigma.cwiseProduct(
-                           Eigen::Vector3d(normal_(random_), normal_(random_), normal_(random_))));
-    motion.covariance = sigma.cwiseAbs2().asDiagonal();
-    motion.has_wheels = true;
-    return motion;
+    return test::simple_odometry(i, kStep_m, {0.02, 0.01, 2e-3},
+                                 {normal_(random_), normal_(random_), normal_(random_)});
   }
   model::Keyframe keyframe(int i) {
     model::Keyframe keyframe = test::simple_keyframe(i, kRange_m);

@@ -14,10 +14,11 @@ namespace understory::geoslam_mapper::smoothing {
 /// where two trunks would touch, or where that is much likelier than two neighbours: of which two
 /// passes saw one each, by their distance in its covariance, by how dense landmarks stand around,
 /// and by how many of these both passes saw; or that were seen on one way past them, by who saw
-/// which and by their distance, which bad scans may have moved.
-/// Where the covariance is large, only the neighbourhood as a whole can tell: PassJoiner. Looks
-/// around the landmarks of `ids`, up to `merge_distance_m`. The graph is not solved. Returns the
-/// merged pairs.
+/// which and by their distance, which bad scans may have moved. Of two that touch and whose
+/// distance contradicts its covariance, what the one that was seen less was observed as does not
+/// count: one thing, but no point. Where the covariance is large, only the neighbourhood as a whole
+/// can tell: PassJoiner. Looks around the landmarks of `ids`, up to `merge_distance_m`. The graph
+/// is not solved. Returns the merged pairs.
 std::vector<MergedPair> merge_doubles(std::span<const model::LandmarkId> ids,
                                       const SmoothingMapperParameters& parameters, Merges& merges,
                                       GlobalMap& map);

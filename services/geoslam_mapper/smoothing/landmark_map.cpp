@@ -43,6 +43,7 @@ model::LandmarkId LandmarkMap::insert(StoredLandmark landmark) {
 
 void LandmarkMap::put(const StoredLandmark& landmark) {
   landmarks_[landmark.id] = landmark;
+  has_given_ = has_given_ || landmark.is_given();
   index_of(landmark).insert(landmark.id, landmark.position_m);
   changed_.push_back(landmark.id);
 }
@@ -154,7 +155,10 @@ void LandmarkMap::rebuild_index(const std::vector<Eigen::Vector2d>& indexed_m) {
   index_ = {};
   unused_index_ = {};
   auto position = indexed_m.begin();
-  for (const auto& [id, landmark] : landmarks_) index_of(landmark).insert(id, *position++);
+  for (const auto& [id, landmark] : landmarks_) {
+    index_of(landmark).insert(id, *position++);
+    has_given_ = has_given_ || landmark.is_given();
+  }
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

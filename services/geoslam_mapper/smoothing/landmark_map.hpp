@@ -106,6 +106,8 @@ class LandmarkMap {
   const StoredLandmark& at(model::LandmarkId id) const { return landmarks_.at(id); }
   /// All landmarks by id, ascending.
   const std::map<model::LandmarkId, StoredLandmark>& all() const { return landmarks_; }
+  /// Whether any landmark was given to begin with.
+  bool has_given() const { return has_given_; }
   /// Whether there is no landmark.
   bool empty() const { return landmarks_.empty(); }
 
@@ -159,6 +161,7 @@ class LandmarkMap {
   std::vector<model::LandmarkId> changed_;  ///< With repetitions.
   std::vector<model::LandmarkId> loose_;    ///< Ascending.
   model::LandmarkId next_id_;
+  bool has_given_ = false;
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -27,6 +27,7 @@ std::vector<model::LandmarkId> with_neighbours(std::span<const model::LandmarkId
 /// Those of the given map that may be the same as these landmarks and are not in the graph yet.
 std::vector<model::LandmarkId> given_beside(std::span<const model::LandmarkId> ids,
                                             double distance_m, const GlobalMap& map) {
+  if (!map.landmarks.has_given()) return {};
   std::vector<model::LandmarkId> result;
   for (const model::LandmarkId id : ids) {
     if (!map.landmarks.all().contains(id) || map.landmarks.at(id).is_given()) continue;
