@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 
 #include "common/bus/launch_config.hpp"
@@ -301,7 +302,6 @@ PoseConsistency pose_consistency(std::span<const model::SlamPose> poses,
   PoseConsistency result;
   std::optional<geometry::SE2> map_T_world;
   std::uint32_t map_id = 0;
-  double count = 0.0;
   for (const model::SlamPose& pose : poses) {
     const auto true_pose = pose_at(truth, pose.utime);
     if (!true_pose) continue;
@@ -316,12 +316,12 @@ PoseConsistency pose_consistency(std::span<const model::SlamPose> poses,
         (map_T_vehicle.inverse() * *map_T_world * *true_pose).coordinates();
     // A micrometre, a microradian: the first keyframe's own poses may be exact.
     const Eigen::Matrix3d covariance = pose.covariance + 1e-12 * Eigen::Matrix3d::Identity();
-    result.mean_nees += error.dot(covariance.inverse() * error);
+    result.nees.push_back(error.dot(covariance.inverse() * error));
     result.end_error_m = error.head<2>().norm();
     result.end_sigma_m = std::sqrt(covariance.topLeftCorner<2, 2>().trace());
-    count += 1.0;
   }
-  result.mean_nees /= std::max(count, 1.0);
+  const double sum = std::accumulate(result.nees.begin(), result.nees.end(), 0.0);
+  result.mean_nees = sum / std::max(1.0, static_cast<double>(result.nees.size()));
   return result;
 }
 

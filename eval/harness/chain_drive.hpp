@@ -118,7 +118,8 @@ std::size_t count_maps(std::span<const model::SlamPose> poses);
 
 /// Errors against the reported covariance, with the first pose of each map held: it is its frame.
 struct PoseConsistency {
-  double mean_nees = 0.0;  ///< Of the pose; 3 is exact.
+  double mean_nees = 0.0;    ///< Of the pose; 3 is exact.
+  std::vector<double> nees;  ///< Of each pose but the first of a map, in order of time.
   double end_error_m = 0.0;
   double end_sigma_m = 0.0;  ///< Root of the trace of the position's covariance.
 };

@@ -1,8 +1,9 @@
 // `understory eval wheels`: do wheels help? The same drives with wheels as they are, with exact
-// ones, and without any.
+// ones, and without any; and how SLAM_POSE stands to the filter and to its own covariance there.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <iostream>
 #include <memory>
@@ -15,6 +16,7 @@
 #include "eval/experiments/frontend/frontend_rows.hpp"
 #include "eval/harness/chain_drive.hpp"
 #include "eval/harness/results.hpp"
+#include "eval/harness/summary.hpp"
 #include "eval/tools/machine.hpp"
 #include "eval/tools/parallel.hpp"
 #include "sim/scenarios.hpp"
@@ -37,6 +39,9 @@ struct Options {
 
 /// What the vehicle has of wheels.
 constexpr const char* kVariants[] = {"wheels", "exact wheels", "no wheels"};
+
+/// Places of a drive at which the NEES of SLAM_POSE is kept.
+constexpr std::size_t kTimes = 40;
 
 /// One drive of one world.
 struct Drive {
@@ -62,6 +67,7 @@ sim::Scenario scenario_of(const Drive& drive, const Options& options) {
   if (drive.world == "urban") return sim::urban_scenario(1, drive.seed);
   if (drive.world == "urban-countryside")
     return sim::urban_to_countryside_scenario(options.length_m, drive.seed);
+  if (drive.world == "countryside") return sim::countryside_scenario(options.length_m, drive.seed);
   sim::ForestScenarioParameters forest;
   forest.length_m = options.length_m;
   return sim::forest_scenario(forest, drive.seed);
@@ -83,6 +89,14 @@ sim::SensorSuite suite_of(const Drive& drive, const Options& options) {
   return suite;
 }
 
+/// kTimes of the values, evenly over them.
+std::vector<double> evenly(const std::vector<double>& values) {
+  std::vector<double> taken;
+  for (std::size_t k = 1; k <= kTimes && !values.empty(); ++k)
+    taken.push_back(values[k * (values.size() - 1) / kTimes]);
+  return taken;
+}
+
 json drive_once(const Drive& drive, const Options& options, const std::atomic<bool>& stop) {
   sim::SensorDrive sensors(scenario_of(drive, options), sim::SpeedParameters{},
                            suite_of(drive, options), drive.seed);
@@ -95,13 +109,15 @@ json drive_once(const Drive& drive, const Options& options, const std::atomic<bo
   const auto ate_m = [&](const std::vector<metrics::StampedPose>& poses) {
     return harness::trajectory_error(poses, run.truth).ate_rms_m;
   };
+  const harness::PoseConsistency said = harness::pose_consistency(run.slam, run.truth);
   return {{"world", drive.world},
           {"seed", drive.seed},
           {"variant", drive.variant},
           {"slam_ate_m", harness::trajectory_error(run.slam, run.truth).ate_rms_m},
           {"map_ate_m", ate_m(harness::poses_of(run.keyframes))},
           {"ekf_ate_m", ate_m(harness::poses_of(run.ekf))},
-          {"slam_nees", harness::pose_consistency(run.slam, run.truth).mean_nees},
+          {"slam_nees", said.mean_nees},
+          {"slam_nees_along", evenly(said.nees)},
           {"wrong_updates", wrong_updates(run)}};
 }
 
@@ -170,6 +186,53 @@ int better_seeds(const Progress& progress, const Options& options, const std::st
   return count;
 }
 
+/// Geometric mean over the seeds of SLAM_POSE's error over EKF_POSE's.
+double pose_over_filter(const Progress& progress, const Options& options, const std::string& world,
+                        const std::string& variant) {
+  return mean_of(progress, options, world, variant, "slam_ate_m", false) /
+         mean_of(progress, options, world, variant, "ekf_ate_m", false);
+}
+
+/// How the NEES of SLAM_POSE at some places of each drive lies to what three degrees of freedom
+/// give.
+struct Bands {
+  double single_pct = 0.0;   ///< Poses inside their own 95 % band.
+  double beyond_pct = 0.0;   ///< Poses beyond its upper end: 2.5 are exact.
+  double of_mean_pct = 0.0;  ///< Places at which the mean of all drives is inside its 95 % band.
+};
+
+Bands bands_of(const Progress& progress, const Options& options, const std::string& world,
+               const std::string& variant) {
+  const auto [low, high] = harness::chi2_band_95(3.0);
+  const auto [low_sum, high_sum] = harness::chi2_band_95(3.0 * options.seeds);
+  double inside = 0.0;
+  double beyond = 0.0;
+  std::vector<double> sums(kTimes, 0.0);
+  for (int i = 0; i < options.seeds; ++i) {
+    const std::uint64_t seed = options.first_seed + static_cast<std::uint64_t>(i);
+    const auto along =
+        progress.at({world, seed, variant}).at("slam_nees_along").get<std::vector<double>>();
+    for (std::size_t k = 0; k < along.size() && k < kTimes; ++k) {
+      inside += along[k] >= low && along[k] <= high ? 1.0 : 0.0;
+      beyond += along[k] > high ? 1.0 : 0.0;
+      sums[k] += along[k];
+    }
+  }
+  const auto means_inside = static_cast<double>(
+      std::ranges::count_if(sums, [&](double sum) { return sum >= low_sum && sum <= high_sum; }));
+  const double poses = static_cast<double>(kTimes) * options.seeds;
+  return {100.0 * inside / poses, 100.0 * beyond / poses,
+          100.0 * means_inside / static_cast<double>(kTimes)};
+}
+
+void add_band_rows(const Bands& bands, const std::string& variant, frontend::FrontendRows& rows) {
+  rows.between(fmt::format("SLAM_POSE inside its 95 % band, {}", variant), bands.single_pct, "%",
+               93.0, 97.0);
+  rows.state(fmt::format("SLAM_POSE beyond it (2.5 is exact), {}", variant), bands.beyond_pct, "%");
+  rows.state(fmt::format("mean of all drives inside its band, {}", variant), bands.of_mean_pct,
+             "%");
+}
+
 frontend::FrontendRows rows_of(const Progress& progress, const Options& options) {
   constexpr std::pair<const char*, const char*> kFigures[] = {
       {"slam_ate_m", "SLAM_POSE ATE"},
@@ -194,6 +257,11 @@ frontend::FrontendRows rows_of(const Progress& progress, const Options& options)
     for (const char* variant : kVariants) {
       rows.state(fmt::format("SLAM_POSE mean NEES (3), {} (geometric mean)", variant),
                  mean_of(progress, options, world, variant, "slam_nees", false), "");
+    }
+    for (const char* variant : {"wheels", "no wheels"}) {
+      rows.at_most(fmt::format("SLAM_POSE ATE / EKF_POSE ATE, {}", variant),
+                   pose_over_filter(progress, options, world, variant), "", 1.0);
+      add_band_rows(bands_of(progress, options, world, variant), variant, rows);
     }
   }
   return rows;
@@ -232,13 +300,13 @@ void add_wheels_experiment(CLI::App& eval) {
   auto options = std::make_shared<Options>();
   command->add_option("--seeds", options->seeds, "How many")->check(CLI::Range(1, 1000));
   command->add_option("--first-seed", options->first_seed, "The others follow it");
-  command->add_option("--length-m", options->length_m, "Of forest and urban-countryside")
+  command->add_option("--length-m", options->length_m, "Of all but urban")
       ->check(CLI::Range(50.0, 100000.0));
   command->add_option("--lidar", options->lidar, "vlp32 (default) or vlp16")
       ->check(CLI::IsMember({"vlp32", "vlp16"}));
-  command->add_option("--worlds", options->worlds, "forest, urban, urban-countryside")
+  command->add_option("--worlds", options->worlds, "forest, urban, urban-countryside, countryside")
       ->delimiter(',')
-      ->check(CLI::IsMember({"forest", "urban", "urban-countryside"}));
+      ->check(CLI::IsMember({"forest", "urban", "urban-countryside", "countryside"}));
   command->add_option("--config", options->config_dir, "Configuration of the chain's services");
   command->add_option("--jobs", options->jobs, "Drives side by side")->check(CLI::Range(1, 256));
   command->add_option(
