@@ -46,6 +46,7 @@ class StepJudge {
     double left_out = 0.0;    ///< By them, at the end of the step.
   };
 
+  void list_judged(double unless_below);
   double compare(double unless_below, double limit);
   void compare_factor(int factor, double limit);
   void keep_comparison();
