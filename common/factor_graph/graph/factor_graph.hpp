@@ -212,6 +212,7 @@ class FactorGraph {
                   const Eigen::Ref<const Eigen::MatrixXd>& information);
   std::span<const int> incidences_of(int factor) const;
   Deviation deviation_of_point2(const FactorRecord& factor) const;
+  void linearise_point2(const FactorRecord& factor);
   void copy_moves(std::span<const int> variables, double* to) const;
   void free_blocks(const FactorRecord& factor);
   /// Residual (and Jacobian) before the loss, whitened, in the charts.

@@ -171,6 +171,28 @@ void FactorGraph::keep_scales(const FactorRecord& factor, std::span<const int> v
   }
 }
 
+/// linearise() of an observation in the plane without a robust loss.
+void FactorGraph::linearise_point2(const FactorRecord& record) {
+  const VariableRecord& pose = variables_[record.few_links[0][0]];
+  const VariableRecord& point = variables_[record.few_links[0][1]];
+  const Value* values[] = {&pose.value, &point.value};
+  Eigen::Vector2d e;
+  Matrix<double, 2, 5> by_both;
+  evaluate(record.kind, record.data, values, {}, e.data(), by_both.data());
+
+  const Map<const Eigen::Matrix2d> root(record.data + record.measurement_size);
+  Map<Matrix<double, 2, 6>> linear(record.linear);
+  linear.leftCols<5>().noalias() = root * by_both;
+  linear.col(5) = linear.col(0) * pose.delta[0] + linear.col(1) * pose.delta[1] +
+                  linear.col(2) * pose.delta[2] + linear.col(3) * point.delta[0] +
+                  linear.col(4) * point.delta[1] - root * e;
+  double* age = record.linear + linear.size();
+  age[0] = 1.0;
+  age[1] = pose.delta[2];
+  age[2] = age[3] = 0.0;
+  keep_scales(record, {record.few_links[0].data(), 2});
+}
+
 void FactorGraph::linearise(int id) {
   FactorRecord& record = factors_.edit(id);
   const int rows = record.rows;
@@ -180,6 +202,9 @@ void FactorGraph::linearise(int id) {
         pool_.take(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns + 1) + 4);
     record.linear_epoch = factors_.epoch();
   }
+
+  if (record.kind == FactorKind::kPoint2 && record.loss.kernel == RobustKernel::kNone)
+    return linearise_point2(record);
 
   const std::span<const int> variables = variables_of(id);
   double* j = record.linear;
