@@ -1,31 +1,23 @@
 #include "eval/harness/slam_session.hpp"
 
-#include <chrono>
 #include <utility>
 
+#include "eval/tools/thread_clock.hpp"
+
 namespace understory::eval::harness {
-namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-}  // namespace
 
 SlamSession::SlamSession(Stages stages) : stages_(std::move(stages)) {}
 
 std::optional<KeyframeOutcome> SlamSession::feed(const model::LandmarkScan& scan) {
   const std::uint64_t withheld_before = stages_.keyframer->counters().keyframes_withheld;
-  const auto start = Clock::now();
+  const double start_s = tools::thread_time_s();
   std::optional<model::Keyframe> keyframe = stages_.keyframer->add(scan);
-  keyframer_s_ += seconds_since(start);
+  keyframer_s_ += tools::thread_time_s() - start_s;
   withheld_one_ = stages_.keyframer->counters().keyframes_withheld > withheld_before;
   if (!keyframe) return std::nullopt;
-  const auto mapping_start = Clock::now();
+  const double mapping_start_s = tools::thread_time_s();
   model::MapUpdate update = stages_.mapper->add(*keyframe);
-  const double mapper_s = seconds_since(mapping_start);
+  const double mapper_s = tools::thread_time_s() - mapping_start_s;
   return KeyframeOutcome{std::move(*keyframe), std::move(update), std::exchange(keyframer_s_, 0.0),
                          mapper_s};
 }

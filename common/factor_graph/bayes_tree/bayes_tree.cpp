@@ -46,13 +46,13 @@ void BayesTree::detach(int factor) {
   marks_.mark_structure(cliques_, clique);
 
   const int next = graph_.factor(factor).next;
-  if (cliques_[clique].first_factor == factor) {
+  const int previous = graph_.factor(factor).previous;
+  if (previous == graph::kNone) {
     cliques_.edit(clique).first_factor = next;
   } else {
-    int before = cliques_[clique].first_factor;
-    while (graph_.factor(before).next != factor) before = graph_.factor(before).next;
-    graph_.edit_factor(before).next = next;
+    graph_.edit_factor(previous).next = next;
   }
+  if (next != graph::kNone) graph_.edit_factor(next).previous = previous;
   graph_.edit_factor(factor).clique = graph::kNone;
 }
 

@@ -125,11 +125,43 @@ void add_products_any(const double* j, int rows, int columns, const int* targets
   }
 }
 
+/// The same of an observation in the plane, 2 x (3 + 2 + 1): most factors of a map.
+void add_observation(const double* j, std::ptrdiff_t pose, std::ptrdiff_t point, double* front,
+                     std::ptrdiff_t size) {
+  const auto product = [&](int a, int b) { return dot<2>(j + 2 * a, j + 2 * b); };
+  double* of_pose = front + pose * size;
+  double* of_point = front + point * size;
+  for (int a = 0; a < 3; ++a)
+    for (int b = a; b < 3; ++b) of_pose[a * size + pose + b] += product(b, a);
+  for (int a = 0; a < 2; ++a)
+    for (int b = a; b < 2; ++b) of_point[a * size + point + b] += product(3 + b, 3 + a);
+
+  if (pose < point) {
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 2; ++b) of_pose[a * size + point + b] += product(3 + b, a);
+  } else {
+    for (int a = 0; a < 2; ++a)
+      for (int b = 0; b < 3; ++b) of_point[a * size + pose + b] += product(b, 3 + a);
+  }
+
+  const std::ptrdiff_t right = size - 1;
+  for (int a = 0; a < 3; ++a) of_pose[a * size + right] += product(5, a);
+  for (int a = 0; a < 2; ++a) of_point[a * size + right] += product(5, 3 + a);
+  front[right * size + right] += product(5, 5);
+}
+
 }  // namespace
 
 void Elimination::add_factors(const CliqueRecord& clique) {
   for (int f = clique.first_factor; f != graph::kNone; f = graph_.factor(f).next) {
     const graph::FactorRecord& factor = graph_.factor(f);
+    if (factor.next != graph::kNone) graph_.fetch_numbers(factor.next);
+    if (factor.kind == graph::FactorKind::kPoint2) {
+      const std::span<const int> tied = graph_.variables_of(f);
+      add_observation(factor.linear, offset_[static_cast<std::size_t>(tied[0])],
+                      offset_[static_cast<std::size_t>(tied[1])], front_, clique.size);
+      continue;
+    }
     targets_.clear();
     for (const int v : graph_.variables_of(f)) {
       const int first = offset_[static_cast<std::size_t>(v)];

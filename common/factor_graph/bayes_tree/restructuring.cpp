@@ -48,6 +48,7 @@ const CliquePlan& Restructuring::plan(std::span<const int> last) {
   planner_.clear(dimensions_);
 
   for (const int f : element_factors_) {
+    graph_.fetch_numbers(f);  // Elimination puts them into the fronts next.
     planner_.begin_element();
     for (const int v : graph_.variables_of(f)) {
       planner_.add_to_element(affected_at_[static_cast<std::size_t>(v)]);
@@ -101,7 +102,10 @@ void Restructuring::hand_out_elements(const CliquePlan& plan, int planned, int i
     graph::FactorRecord& factor = graph_.edit_factor(element_factors_[at]);
     CliqueRecord& clique = cliques_.edit(id);
     factor.clique = id;
+    factor.previous = graph::kNone;
     factor.next = clique.first_factor;
+    if (factor.next != graph::kNone)
+      graph_.edit_factor(factor.next).previous = element_factors_[at];
     clique.first_factor = element_factors_[at];
   }
 }

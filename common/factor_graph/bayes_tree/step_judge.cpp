@@ -1,6 +1,7 @@
 #include "common/factor_graph/bayes_tree/step_judge.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "common/factor_graph/bayes_tree/relinearisation.hpp"
 
@@ -15,12 +16,11 @@ constexpr double kNoticedPart = 0.1;
 constexpr double kNoticedRounding = 1e-3;  ///< The same of thorough updates, which start fresh.
 constexpr double kLeastGain = 0.1;
 constexpr int kMaxHalvings = 8;
+constexpr std::size_t kAhead = 8;  ///< Factors that are fetched before they are needed.
 
 }  // namespace
 
 void StepJudge::compare_factor(int factor, double limit) {
-  judged_.push_back(factor);
-  judged_at_[static_cast<std::size_t>(factor)] = count_;
   const graph::Deviation deviation = graph_.deviation(factor);
   factor_rotation_[static_cast<std::size_t>(factor)] = deviation.rotated;
   at_end_.loss += deviation.loss;
@@ -30,26 +30,54 @@ void StepJudge::compare_factor(int factor, double limit) {
   if (deviation.residual > limit * limit_scale(graph_.factor(factor))) stale_.push_back(factor);
 }
 
-/// Compares the factors of the variables that moved with their linearisations, where the moves are
-/// such that it can matter. Returns the largest deviation.
-double StepJudge::compare(double unless_below, double limit) {
+/// The factors of the variables that moved, where the moves are such that it can matter.
+void StepJudge::list_judged(double unless_below) {
   ++count_;
   judged_.clear();
   judged_variables_.clear();
-  stale_.clear();
   judged_at_.resize(static_cast<std::size_t>(graph_.factor_capacity()), 0);
   factor_rotation_.resize(judged_at_.size());
-  at_end_ = {};
-  largest_deviation_ = 0.0;
+  variable_at_.resize(static_cast<std::size_t>(graph_.variable_capacity()), 0);
+  rotation_of_.resize(variable_at_.size());
 
+  int factors = 0;  // With repetitions.
   for (const int v : tree_.changed()) {
     if (graph_.unjudged_deviation(v) < unless_below) continue;
     judged_variables_.push_back(v);
+    variable_at_[static_cast<std::size_t>(v)] = count_;
+    factors += graph_.variable(v).degree;
+  }
+
+  // Of many the table is gone through as it lies in memory: a list is waited for at every entry.
+  if (factors > graph_.factor_capacity()) return list_from_table();
+  for (const int v : judged_variables_) {
     for (int i = graph_.variable(v).first_incidence; i != graph::kNone;
          i = graph_.incidence(i).next) {
       const int f = graph_.incidence(i).factor;
-      if (judged_at_[static_cast<std::size_t>(f)] != count_) compare_factor(f, limit);
+      if (std::exchange(judged_at_[static_cast<std::size_t>(f)], count_) != count_)
+        judged_.push_back(f);
     }
+  }
+}
+
+void StepJudge::list_from_table() {
+  for (int f = 0; f < graph_.factor_capacity(); ++f) {
+    if (!graph_.factor(f).in_use) continue;
+    const std::span<const int> tied = graph_.variables_of(f);
+    if (std::ranges::any_of(tied, [&](int v) { return is_judged(v); })) judged_.push_back(f);
+  }
+}
+
+/// Compares factors with their linearisations. Returns the largest deviation.
+double StepJudge::compare(double unless_below, double limit) {
+  list_judged(unless_below);
+  stale_.clear();
+  at_end_ = {};
+  largest_deviation_ = 0.0;
+  for (std::size_t i = 0; i < judged_.size(); ++i) {
+    if (i + 2 * kAhead < judged_.size()) graph_.fetch_record(judged_[i + 2 * kAhead]);
+    if (i + kAhead < judged_.size()) graph_.fetch_numbers(judged_[i + kAhead]);
+    compare_factor(judged_[i], limit);
   }
 
   keep_comparison();
@@ -58,16 +86,18 @@ double StepJudge::compare(double unless_below, double limit) {
 
 /// The variables' factors were compared where these are now.
 void StepJudge::keep_comparison() {
-  for (const int v : judged_variables_) {
-    double rotated = 0.0;
-    for (int i = graph_.variable(v).first_incidence; i != graph::kNone;
-         i = graph_.incidence(i).next) {
-      rotated =
-          std::max(rotated, factor_rotation_[static_cast<std::size_t>(graph_.incidence(i).factor)]);
+  for (const int v : judged_variables_) rotation_of_[static_cast<std::size_t>(v)] = 0.0;
+  for (const int f : judged_) {
+    const double rotated = factor_rotation_[static_cast<std::size_t>(f)];
+    for (const int v : graph_.variables_of(f)) {
+      double& most = rotation_of_[static_cast<std::size_t>(v)];
+      most = std::max(most, rotated);
     }
+  }
+  for (const int v : judged_variables_) {
     graph::VariableRecord& variable = graph_.edit_variable(v);
     variable.judged = variable.delta;
-    variable.rotated = rotated;
+    variable.rotated = rotation_of_[static_cast<std::size_t>(v)];
   }
 }
 

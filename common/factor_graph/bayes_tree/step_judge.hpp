@@ -46,6 +46,11 @@ class StepJudge {
     double left_out = 0.0;    ///< By them, at the end of the step.
   };
 
+  void list_judged(double unless_below);
+  void list_from_table();
+  bool is_judged(int variable) const {
+    return variable_at_[static_cast<std::size_t>(variable)] == count_;
+  }
   double compare(double unless_below, double limit);
   void compare_factor(int factor, double limit);
   void keep_comparison();
@@ -56,11 +61,13 @@ class StepJudge {
   graph::FactorGraph& graph_;
   const BayesTree& tree_;
   std::vector<int> judged_variables_;
-  std::vector<int> judged_;               ///< Their factors.
-  std::vector<int> stale_;                ///< Of those, what has to be linearised again.
-  std::vector<int> stale_before_;         ///< And what had to be before the step.
-  std::vector<std::uint64_t> judged_at_;  ///< Per factor: number of the comparison.
-  std::vector<double> factor_rotation_;   ///< And how far it had rotated then [rad].
+  std::vector<int> judged_;                 ///< Their factors.
+  std::vector<int> stale_;                  ///< Of those, what has to be linearised again.
+  std::vector<int> stale_before_;           ///< And what had to be before the step.
+  std::vector<std::uint64_t> judged_at_;    ///< Per factor: number of the comparison.
+  std::vector<double> factor_rotation_;     ///< And how far it had rotated then [rad].
+  std::vector<std::uint64_t> variable_at_;  ///< Per variable: number of the comparison.
+  std::vector<double> rotation_of_;         ///< And the largest of its factors' rotations [rad].
   Losses at_end_;
   double largest_deviation_ = 0.0;     ///< [sigmas]
   std::vector<graph::Delta> reached_;  ///< Of the changed variables.

@@ -74,13 +74,6 @@ bool FactorGraph::contains(FactorId id) const {
   return index(id) >= 0 && index(id) < factors_.size() && factors_[index(id)].in_use;
 }
 
-std::span<const int> FactorGraph::variables_of(int factor) const {
-  const FactorRecord& record = factors_[factor];
-  const auto count = static_cast<std::size_t>(record.variable_count);
-  if (record.many_links != nullptr) return {record.many_links, count};
-  return {record.few_links[0].data(), count};
-}
-
 std::span<const int> FactorGraph::incidences_of(int factor) const {
   const FactorRecord& record = factors_[factor];
   const auto count = static_cast<std::size_t>(record.variable_count);

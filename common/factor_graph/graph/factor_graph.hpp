@@ -63,6 +63,7 @@ struct FactorRecord {
   int user = kNone;                      ///< Number of the user-defined factor.
   int clique = kNone;                    ///< Where it is assembled (smoother).
   int next = kNone;                      ///< Next one there (smoother).
+  int previous = kNone;                  ///< Previous one there (smoother).
 };
 
 /// How far a factor is from its linearisation.
@@ -134,7 +135,12 @@ class FactorGraph {
   /// Kind of a factor.
   FactorKind kind(FactorId id) const { return factors_[index(id)].kind; }
   /// Numbers of a factor's variables, in its order.
-  std::span<const int> variables_of(int factor) const;
+  std::span<const int> variables_of(int factor) const {
+    const FactorRecord& record = factors_[factor];
+    const int* names =
+        record.many_links != nullptr ? record.many_links : record.few_links[0].data();
+    return {names, static_cast<std::size_t>(record.variable_count)};
+  }
   /// What was measured, see FactorKind.
   std::span<const double> measurement(FactorId id) const;
   /// The information as it was given, up to rounding. Not of kLinear and kUser.
@@ -168,6 +174,16 @@ class FactorGraph {
   /// removed. O(its factors).
   void renew_scale(int variable);
 
+  /// Begins to fetch a factor's record into the processor's cache: a list of factors is anywhere in
+  /// memory, and to wait for each of them takes longer than what is done with it.
+  void fetch_record(int factor) const { __builtin_prefetch(&factors_[factor]); }
+  /// The same of its numbers, once the record is there.
+  void fetch_numbers(int factor) const {
+    __builtin_prefetch(factors_[factor].linear);
+    __builtin_prefetch(factors_[factor].linear + 8);
+    __builtin_prefetch(factors_[factor].data);
+  }
+
   /// A variable by number.
   const VariableRecord& variable(int id) const { return variables_[id]; }
   /// A factor by number.
@@ -195,6 +211,8 @@ class FactorGraph {
   void store_data(int factor, std::span<const double> measurement,
                   const Eigen::Ref<const Eigen::MatrixXd>& information);
   std::span<const int> incidences_of(int factor) const;
+  Deviation deviation_of_point2(const FactorRecord& factor) const;
+  void linearise_point2(const FactorRecord& factor);
   void copy_moves(std::span<const int> variables, double* to) const;
   void free_blocks(const FactorRecord& factor);
   /// Residual (and Jacobian) before the loss, whitened, in the charts.

@@ -171,6 +171,28 @@ void FactorGraph::keep_scales(const FactorRecord& factor, std::span<const int> v
   }
 }
 
+/// linearise() of an observation in the plane without a robust loss.
+void FactorGraph::linearise_point2(const FactorRecord& record) {
+  const VariableRecord& pose = variables_[record.few_links[0][0]];
+  const VariableRecord& point = variables_[record.few_links[0][1]];
+  const Value* values[] = {&pose.value, &point.value};
+  Eigen::Vector2d e;
+  Matrix<double, 2, 5> by_both;
+  evaluate(record.kind, record.data, values, {}, e.data(), by_both.data());
+
+  const Map<const Eigen::Matrix2d> root(record.data + record.measurement_size);
+  Map<Matrix<double, 2, 6>> linear(record.linear);
+  linear.leftCols<5>().noalias() = root * by_both;
+  linear.col(5) = linear.col(0) * pose.delta[0] + linear.col(1) * pose.delta[1] +
+                  linear.col(2) * pose.delta[2] + linear.col(3) * point.delta[0] +
+                  linear.col(4) * point.delta[1] - root * e;
+  double* age = record.linear + linear.size();
+  age[0] = 1.0;
+  age[1] = pose.delta[2];
+  age[2] = age[3] = 0.0;
+  keep_scales(record, {record.few_links[0].data(), 2});
+}
+
 void FactorGraph::linearise(int id) {
   FactorRecord& record = factors_.edit(id);
   const int rows = record.rows;
@@ -180,6 +202,9 @@ void FactorGraph::linearise(int id) {
         pool_.take(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns + 1) + 4);
     record.linear_epoch = factors_.epoch();
   }
+
+  if (record.kind == FactorKind::kPoint2 && record.loss.kernel == RobustKernel::kNone)
+    return linearise_point2(record);
 
   const std::span<const int> variables = variables_of(id);
   double* j = record.linear;
@@ -221,8 +246,34 @@ void FactorGraph::copy_moves(std::span<const int> variables, double* to) const {
   }
 }
 
+/// deviation() of an observation in the plane without a robust loss: nearly all factors of a map.
+Deviation FactorGraph::deviation_of_point2(const FactorRecord& record) const {
+  const VariableRecord& pose = variables_[record.few_links[0][0]];
+  const VariableRecord& point = variables_[record.few_links[0][1]];
+  const double* z = record.data;
+  const Map<const Eigen::Matrix2d> root(z + record.measurement_size);
+  const Eigen::Vector2d apart(point.value[0] - pose.value[0], point.value[1] - pose.value[1]);
+  const double c = pose.value[3];
+  const double s = pose.value[4];
+  const Eigen::Vector2d e = root * Eigen::Vector2d(c * apart.x() + s * apart.y() - z[0],
+                                                   -s * apart.x() + c * apart.y() - z[1]);
+
+  const Map<const Matrix<double, 2, 6>> j(record.linear);
+  const Eigen::Vector2d linear = j.col(0) * pose.delta[0] + j.col(1) * pose.delta[1] +
+                                 j.col(2) * pose.delta[2] + j.col(3) * point.delta[0] +
+                                 j.col(4) * point.delta[1] - j.col(5);
+  const double* age = record.linear + 12;
+  const double squared = e.squaredNorm();
+  const double predicted = linear.squaredNorm();
+  const double rotated = std::abs(pose.delta[2] - age[1]);
+  return {std::sqrt((e - linear).squaredNorm() + squared * rotated * rotated), rotated, squared,
+          predicted, squared - predicted};
+}
+
 Deviation FactorGraph::deviation(int id) const {
   const FactorRecord& record = factors_[id];
+  if (record.kind == FactorKind::kPoint2 && record.loss.kernel == RobustKernel::kNone)
+    return deviation_of_point2(record);
   const std::span<const int> variables = variables_of(id);
   const int numbers = 2 * record.rows + record.columns;
   scratch_.resize(static_cast<std::size_t>(numbers));

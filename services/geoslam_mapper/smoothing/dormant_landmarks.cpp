@@ -202,8 +202,10 @@ bool PoseGraph::has_left(NodeIndex node) {
   const auto found = dormant_of_node_.find(node);
   if (found == dormant_of_node_.end()) return false;
   const geometry::SE2 now = pose(node);
-  const geometry::SE2 move = found->second.followed.inverse() * now;
-  if (move.translation().norm() + kLever_m * std::abs(move.theta()) < kDormantMove_m) return false;
+  const geometry::SE2& then = found->second.followed;
+  const double moved_m = (now.translation() - then.translation()).norm();
+  const double rotated = std::abs(geometry::wrap_angle(now.theta() - then.theta()));
+  if (moved_m + kLever_m * rotated < kDormantMove_m) return false;
   found->second.followed = now;
   return true;
 }

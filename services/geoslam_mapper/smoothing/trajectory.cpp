@@ -90,17 +90,17 @@ void Trajectory::put(const Viewpoint& viewpoint, const PoseGraph& graph) {
 
 /// Numbers of a node's viewpoints.
 std::span<const std::uint32_t> Trajectory::viewpoints_of(NodeIndex node) const {
-  const auto found = viewpoints_of_node_.find(node);
-  if (found == viewpoints_of_node_.end()) return {};
-  return found->second;
+  const auto found = indexed_.find(node);
+  if (found == indexed_.end()) return {};
+  return found->second.viewpoints;
 }
 
 /// They are no more the node's.
 std::vector<std::uint32_t> Trajectory::take_viewpoints_of(NodeIndex node) {
-  const auto found = viewpoints_of_node_.find(node);
-  if (found == viewpoints_of_node_.end()) return {};
-  std::vector<std::uint32_t> numbers = std::move(found->second);
-  viewpoints_of_node_.erase(found);
+  const auto found = indexed_.find(node);
+  if (found == indexed_.end()) return {};
+  std::vector<std::uint32_t> numbers = std::move(found->second.viewpoints);
+  indexed_.erase(found);
   return numbers;
 }
 
@@ -167,8 +167,13 @@ void Trajectory::absorb(Trajectory other, NodeIndex first, const PoseGraph& grap
 
 void Trajectory::index(std::uint32_t viewpoint, const PoseGraph& graph) {
   const NodeIndex node = viewpoints_[viewpoint].node;
-  viewpoints_of_node_[node].push_back(viewpoint);
-  grid_.put(viewpoint, middle(viewpoints_[viewpoint], graph).translation());
+  const auto [entry, is_first] = indexed_.try_emplace(node);
+  IndexedNode& indexed = entry->second;
+  if (is_first) indexed.indexed_at = graph.pose(node);
+  const Eigen::Vector2d& lever = viewpoints_[viewpoint].centre_T_middle.translation();
+  indexed.lever_m = std::max(indexed.lever_m, lever.norm());
+  indexed.viewpoints.push_back(viewpoint);
+  grid_.put(viewpoint, indexed.indexed_at * lever);
 }
 
 void Trajectory::hand_over(const Retirement& retirement) {
@@ -217,8 +222,16 @@ void Trajectory::tie(std::span<const Retirement> retired, const PoseGraph& graph
 
 void Trajectory::follow(const PoseGraph& graph) {
   for (const NodeIndex node : graph.moved_nodes()) {
-    for (const std::uint32_t viewpoint : viewpoints_of(node))
-      grid_.put(viewpoint, middle(viewpoints_[viewpoint], graph).translation());
+    const auto found = indexed_.find(node);
+    if (found == indexed_.end()) continue;
+    IndexedNode& indexed = found->second;
+    const geometry::SE2 now = graph.pose(node);
+    const double rotated = std::abs(geometry::wrap_angle(now.theta() - indexed.indexed_at.theta()));
+    const double moved_m = (now.translation() - indexed.indexed_at.translation()).norm();
+    if (moved_m + indexed.lever_m * rotated < kStale_m) continue;
+    indexed.indexed_at = now;
+    for (const std::uint32_t viewpoint : indexed.viewpoints)
+      grid_.put(viewpoint, now * viewpoints_[viewpoint].centre_T_middle.translation());
   }
 }
 
@@ -238,7 +251,8 @@ std::optional<NodeIndex> Trajectory::revisited(const geometry::SE2& map_T_middle
                                                const PoseGraph& graph) const {
   std::optional<NodeIndex> best;
   double best_distance = fold_distance_m_;
-  grid_.for_each_near(map_T_middle.translation(), best_distance, [&](std::uint32_t viewpoint) {
+  const double radius_m = best_distance + kStale_m;
+  grid_.for_each_near(map_T_middle.translation(), radius_m, [&](std::uint32_t viewpoint) {
     const Viewpoint& there = viewpoints_[viewpoint];
     if (graph.node(there.node).is_condensed) return;
     const geometry::SE2 between = middle(there, graph).inverse() * map_T_middle;
@@ -273,7 +287,7 @@ geometry::SE2WithCovariance Trajectory::centre_from_origin(NodeIndex node,
 }
 
 void Trajectory::rebuild_index(const PoseGraph& graph) {
-  viewpoints_of_node_.clear();
+  indexed_.clear();
   grid_ = {};
   spare_ = 0;
   for (const Base& base : bases_) {

@@ -85,7 +85,8 @@ class Trajectory {
   /// Adds all of another trajectory, whose nodes have numbers from `first` on in `graph` now. Its
   /// origin is a base like the others. O(bases).
   void absorb(Trajectory other, NodeIndex first, const PoseGraph& graph);
-  /// Brings the index of viewpoints to where the graph's last updates moved the nodes.
+  /// Brings the index of viewpoints to where the graph's last updates moved the nodes, but for
+  /// viewpoints that are within kStale_m of it.
   void follow(const PoseGraph& graph);
 
   /// The bases that are kept, in order of time.
@@ -107,7 +108,7 @@ class Trajectory {
   template <typename F>
   void for_each_node_near(const Eigen::Vector2d& position_m, double radius_m,
                           const PoseGraph& graph, F&& f) const {
-    grid_.for_each_near(position_m, radius_m, [&](std::uint32_t number) {
+    grid_.for_each_near(position_m, radius_m + kStale_m, [&](std::uint32_t number) {
       const Viewpoint& viewpoint = viewpoints_[number];
       const double distance_m = (middle(viewpoint, graph).translation() - position_m).norm();
       if (distance_m < radius_m) f(viewpoint.node, distance_m);
@@ -131,6 +132,9 @@ class Trajectory {
   }
 
  private:
+  /// Largest distance of a viewpoint from its place in the index [m].
+  static constexpr double kStale_m = 0.1;
+
   /// A place from which a node's landmarks were observed.
   struct Viewpoint {
     NodeIndex node = 0;
@@ -161,8 +165,14 @@ class Trajectory {
   std::size_t spare_ = 0;            ///< Bases that are.
   std::vector<Viewpoint> viewpoints_;
   std::vector<std::uint32_t> free_viewpoints_;
-  std::map<NodeIndex, std::vector<std::uint32_t>> viewpoints_of_node_;  ///< Where there are any.
-  ViewpointGrid grid_;                                                  ///< Of the viewpoints.
+  /// A node's viewpoints, and where the index has them.
+  struct IndexedNode {
+    std::vector<std::uint32_t> viewpoints;
+    geometry::SE2 indexed_at;
+    double lever_m = 0.0;  ///< Of the viewpoint that is furthest from the node's centre.
+  };
+  std::map<NodeIndex, IndexedNode> indexed_;  ///< Where there are any.
+  ViewpointGrid grid_;                        ///< Of the viewpoints.
 };
 
 }  // namespace understory::geoslam_mapper::smoothing
