@@ -238,6 +238,50 @@ TEST_CASE("What was hidden on a drive that seemed to miss much stays when that t
   CHECK(points[kHiddenOnes].probability() < 0.1);
 }
 
+TEST_CASE("What a hidden pass missed follows v as its returns say, up to a factor of 1.35",
+          "[existence]") {
+  // Not as (1 - v) to some power, which would go to no end.
+  for (int blocked = 1; blocked <= 10; ++blocked) {
+    for (int unknown = 0; unknown <= 10; ++unknown) {
+      PassOccluder occluder;
+      for (int i = 0; i < std::max(blocked, unknown); ++i) {
+        if (i < blocked) occluder = occluder.after(Ray::kBlocked);
+        if (i < unknown) occluder = occluder.after(Ray::kUnknown);
+      }
+      if (!occluder.is_hidden_pass()) continue;
+      CAPTURE(blocked, unknown, occluder.chance());
+      const auto exact = [&](double missed_share) {
+        return occluder.chance() + occluder.stopped_itself() * missed_share;
+      };
+      for (const double was : {0.5, 0.26, 0.05}) {
+        for (const double is : {0.36, 0.02, 0.001}) {
+          const double ratio = PassOccluder::missed_when_hidden(is) /
+                               PassOccluder::missed_when_hidden(was) * exact(was) / exact(is);
+          CHECK(std::abs(std::log(ratio)) < std::log(1.35));
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("Hidden passes are saved, and states that have none apart are read", "[existence]") {
+  ExistenceModel model(sharp_detector());
+  auto point = IcosahedralPoint::known(model);
+  for (int pass = 0; pass < 12; ++pass) {
+    model.begin_pass();
+    if (pass % 2 == 0)
+      pass_by(model, point, hidden_rays());
+    else
+      pass_by(model, point, std::vector<Ray>(4, Ray::kUnknown));
+    auto loaded = IcosahedralPoint::load(model, point.save());
+    const auto a = point.save(), b = loaded.save();
+    CHECK(std::memcmp(&a, &b, sizeof a) == 0);
+  }
+  auto older = point.save();
+  older.version = 3;
+  CHECK(IcosahedralPoint::load(model, older).probability() == point.probability());
+}
+
 TEST_CASE("A hidden pass is saved and goes on, and points of an older version are read",
           "[existence]") {
   ExistenceModel model(sharp_detector());
