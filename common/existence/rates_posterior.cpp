@@ -261,9 +261,11 @@ class Posterior {
     const double hidden = PassOccluder::missed_when_hidden(std::exp(log_miss));
     std::vector<double> missed;
     missed.reserve(evidence_.histories.size());
-    for (const AlikePoints& one : evidence_.histories)
-      missed.push_back(std::exp(one.missed_before * log_miss) *
-                       std::pow(hidden, one.hidden_before));
+    for (const AlikePoints& one : evidence_.histories) {
+      double chance = std::exp(one.missed_before * log_miss);
+      for (int pass = 0; pass < one.hidden_before; ++pass) chance *= hidden;
+      missed.push_back(chance);
+    }
     return missed;
   }
 
