@@ -59,17 +59,20 @@ void PassHistories::count(const OpenHistory& history, std::int64_t times) {
   const double before = std::min(history.missed_before, kMostMissed);
   const auto since_s = static_cast<double>(history.since_s);
   // Without a miss it may have gone until now.
-  const double until_s =
-      before > 0.0 ? std::min(since_s, static_cast<double>(history.until_missed_s)) : since_s;
-  const std::array<int, 8> key{step_of(kPerPass * before),
+  const double until_s = before > 0.0 || history.hidden_before > 0
+                             ? std::min(since_s, static_cast<double>(history.until_missed_s))
+                             : since_s;
+  const std::array<int, 9> key{step_of(kPerPass * before),
                                step_of(kPerPass * history.missed_now),
                                step_of(kPerFactor * std::log(1.0 + since_s)),
                                step_of(kPerFactor * std::log(1.0 + until_s)),
                                history.is_seen_now ? 1 : 0,
                                step_of(kPerFactor * std::log(history.rays)),
                                std::min(kMostSides, history.passed),
-                               std::min(kMostHidden + 1, history.sides)};
-  if (key[0] == 0 && key[1] == 0 && key[4] == 0 && key[5] == 0 && key[6] == 0) return;
+                               std::min(kMostHidden + 1, history.sides),
+                               history.hidden_before};
+  if (key[0] == 0 && key[1] == 0 && key[4] == 0 && key[5] == 0 && key[6] == 0 && key[8] == 0)
+    return;
 
   // Their sums.
   Alike& sums = alike_[key];
@@ -79,7 +82,7 @@ void PassHistories::count(const OpenHistory& history, std::int64_t times) {
   sums.since += times * parts_of(since_s, kSecondParts);
   sums.until_missed += times * parts_of(until_s, kSecondParts);
   sums.rays += times * parts_of(history.rays, kPassParts);
-  missed_before_ += times * parts_of(before, kPassParts);
+  missed_before_ += times * parts_of(before + history.hidden_before, kPassParts);
   if (sums.points == 0) alike_.erase(key);
 }
 
@@ -98,7 +101,7 @@ LearnedRates PassHistories::rates(const LearnedRates& until_now, const RatePrior
     evidence.histories.push_back({points, mean(sums.missed_before, kPassParts),
                                   mean(sums.missed_now, kPassParts), mean(sums.since, kSecondParts),
                                   mean(sums.until_missed, kSecondParts), key[4] == 1,
-                                  by_sides * mean(sums.rays, kPassParts), key[7]});
+                                  by_sides * mean(sums.rays, kPassParts), key[7], key[8]});
   }
 
   const double passes = until_now.before_seen + until_now.before_missed +

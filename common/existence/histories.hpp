@@ -14,6 +14,7 @@ namespace understory::existence {
 /// Passes of one point since the last that surely saw it, up to now.
 struct OpenHistory {
   double missed_before = 0.0;  ///< Passes before the one that is open that looked and missed it,
+  int hidden_before = 0;       ///< others on which returns came from in front of it,
   /// and whether the open one did: 1 - L / L0, the looks' likelihood where it sees the point by
   /// that where it does not; 0: nothing is known, 1: missed. The same whatever v is.
   double missed_now = 0.0;
@@ -106,9 +107,9 @@ class PassHistories {
 
   /// By misses, the logarithms of the times and of what rays say, sides, and whether this drive
   /// sees the point.
-  std::map<std::array<int, 8>, Alike> alike_;
-  std::int64_t missed_before_ = 0;
-  std::int64_t went_ = 0;  ///< Counted already: to be taken out.
+  std::map<std::array<int, 9>, Alike> alike_;
+  std::int64_t missed_before_ = 0;  ///< With the hidden ones.
+  std::int64_t went_ = 0;           ///< Counted already: to be taken out.
   std::int64_t exposure_ = 0;
 };
 

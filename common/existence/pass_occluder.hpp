@@ -41,6 +41,18 @@ class PassOccluder {
     const double by_itself = hidden * (1.0 - kPrior) / kPrior;
     return 1.0 - hidden + kStopsBeams * std::max(0.0, by_itself - (1.0 - hidden));
   }
+  /// Whether a pass that is over and did not see the point was rather hidden than not: one of those
+  /// that missed_when_hidden() is about.
+  bool is_hidden_pass() const { return static_cast<double>(chance()) >= kHiddenFrom; }
+  /// chance() + stopped_itself() * missed_share for a pass like that, whatever its returns were.
+  /// Their ratio hardly differs, and this one goes to no end where v goes to 1.
+  static double missed_when_hidden(double missed_share) {
+    return kHiddenPass * (1.0 + kItselfToHidden * missed_share);
+  }
+  /// The part of it that the detector missed.
+  static double missed_itself(double missed_share) {
+    return kItselfToHidden * missed_share / (1.0 + kItselfToHidden * missed_share);
+  }
   /// Whether a return in front of the point or behind it was measured, or it was found.
   bool has_told() const { return code_ >= kBlocked; }
   /// Whether no look has come yet.
@@ -61,6 +73,9 @@ class PassOccluder {
   static constexpr double kStopsBeams = 0.5;  ///< Share of the missed points that are thick enough.
   static constexpr double kDependent = 0.5;   ///< What a look counts for: neighbours are alike.
   static constexpr double kMost = 0.95;       ///< Of p(H): this model is not all.
+  static constexpr double kHiddenFrom = 0.2;  ///< p(H) of a hidden pass, when it is over,
+  static constexpr double kHiddenPass = 0.8;  ///< and what it is in the mean.
+  static constexpr double kItselfToHidden = 10.0;  ///< stopped_itself() by chance() there.
   static constexpr std::uint8_t kRefuted = 0xFF;
   static constexpr unsigned kBlocked = 0x10;  ///< One look in the code.
   static constexpr unsigned kUnknown = 0x01;

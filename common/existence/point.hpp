@@ -155,6 +155,9 @@ class PointExistence {
       2;                                        ///< The pass that found it does not count for v.
   static constexpr std::uint32_t kWasSure = 4;  ///< Surely seen in some pass: it was real.
   static constexpr double kUnit = 256.0;        ///< Of pending passes.
+  static constexpr std::uint32_t kSeenEnd = 65536;
+  static constexpr std::uint32_t kMissedEnd = 8192;
+  static constexpr std::uint32_t kHiddenEnd = 8;
   static constexpr std::uint32_t kWhole = 255;  ///< Of a share in 8 bits.
   static constexpr double kHiddenUnit = 256.0;  ///< Likewise, always below 1.
   /// A pass has looked for the point where one that can see it had missed it with less than that.
@@ -300,8 +303,8 @@ class PointExistence {
 
   // In point_learning.hpp:
   void change_pass(ExistenceModel& model);
-  void learn_from_pass(ExistenceModel& model, double after, bool was_looked_for,
-                       double missed_before);
+  void learn_from_pass(ExistenceModel& model, double after, bool was_looked_for);
+  void keep_pass(ExistenceModel& model);
   void weigh(ExistenceModel& model, const DecayEvidence& is);
   void pass_gap(ExistenceModel& model, double went);
   void correct_pass(const ExistenceModel& model);
@@ -312,7 +315,14 @@ class PointExistence {
   RaysAndMiss open_pass() const;
   std::uint32_t rays_passed() const { return marked_ & missed_from_; }
   double missed_passes() const { return pending_missed_ / kUnit; }
-  bool has_missed() const { return missed_passes() > 0.25; }
+  bool has_missed() const { return missed_passes() > 0.25 || pending_hidden_ > 0; }
+  bool is_pending() const { return pending_missed_ > 0 || pending_hidden_ > 0; }
+  /// Of the passes that missed the point, with 1 - v `is` in place of `was`.
+  static double missed_ratio(double is, double was, double missed, int hidden) {
+    const double hidden_ratio =
+        PassOccluder::missed_when_hidden(is) / PassOccluder::missed_when_hidden(was);
+    return std::pow(is / was, missed) * std::pow(hidden_ratio, hidden);
+  }
   /// 16 bits of lambda's fraction.
   float decay_per_s() const { return std::bit_cast<float>(std::uint32_t{decay_bits_} << 8U); }
   void keep_decay(float per_s) {
@@ -326,8 +336,9 @@ class PointExistence {
     return evidence_.since_s * static_cast<float>(until_missed_) / static_cast<float>(kWhole);
   }
   bool is_surely_seen(double probability) const { return probability > 0.9 && unseen_ < 1e-3F; }
-  static void add_pending(std::uint16_t& count, double passes) {
-    count = static_cast<std::uint16_t>(std::min(65535.0, std::round(count + kUnit * passes)));
+  /// So many more passes; the count stays below `end` / 256.
+  static std::uint32_t with_pending(std::uint32_t count, double passes, std::uint32_t end) {
+    return static_cast<std::uint32_t>(std::min(end - 1.0, std::round(count + kUnit * passes)));
   }
 
   /// d, lambda and what may be hidden, of the pass that begins.
@@ -366,9 +377,10 @@ class PointExistence {
   std::uint32_t chance_bits_ : 24 = 0;  ///< Of a pass that can see it, up to now: a float's first.
   std::uint32_t hidden_share_ : 8 = 0;  ///< ExistenceModel::hidden() when the pass began.
   std::uint16_t pending_seen_ = 0;      ///< Passes since the last that surely saw the point,
-  std::uint16_t pending_missed_ = 0;    ///< in parts of 1 / 256.
-  DecayEvidence evidence_;              ///< Up to the begin of this pass.
-  std::uint32_t decay_bits_ : 24 = 0;   ///< lambda as it was when the pass began: a float's first.
+  std::uint16_t pending_missed_ : 13 = 0;  ///< in parts of 1 / 256,
+  std::uint16_t pending_hidden_ : 3 = 0;   ///< and others with returns in front of it.
+  DecayEvidence evidence_;                 ///< Up to the begin of this pass.
+  std::uint32_t decay_bits_ : 24 = 0;  ///< lambda as it was when the pass began: a float's first.
   std::uint32_t until_missed_ : 8 = kWhole;  ///< Share of evidence_.since_s, see OpenHistory.
   float gap_s_ = 0.0F;                       ///< Since this pass began, without looks.
 };

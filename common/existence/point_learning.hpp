@@ -16,6 +16,7 @@ std::optional<OpenHistory> PointExistence<S>::history() const {
   const bool may_be_hidden = has_looked && !occluder_.has_told();
   const RaysAndMiss open = is_open ? open_pass() : RaysAndMiss{};
   return OpenHistory{.missed_before = missed_passes(),
+                     .hidden_before = pending_hidden_,
                      .missed_now = open.missed,
                      .rays = open.rays,
                      .passed = is_open ? std::popcount(rays_passed()) : 0,
@@ -47,8 +48,7 @@ void PointExistence<S>::reconsider(ExistenceModel& model, double before_was) {
   has_looked ? correct_pass(model) : expect_pass(model);
   correct_odds(model, missed_share, before_was, decay_per_s,
                has_looked ? kMostOddsInPass : kMostOdds);
-  const bool is_open = pending_missed_ > 0;
-  if (is_open && !has_looked)
+  if (is_pending() && !has_looked)
     weigh(model, {static_cast<float>(1.0 - probability()), evidence_.since_s});
 }
 
@@ -72,12 +72,14 @@ void PointExistence<S>::change_pass(ExistenceModel& model) {
   const double after = std::min(1.0, probability() / (1.0 - lost));
   const bool was_looked_for = chance_missed() < kLookedFor;
   const double missed_before = missed_passes();
+  const int hidden_before = pending_hidden_;
   if ((flags_ & kIsNew) != 0 && was_looked_for) {
     model.record_birth(after);
     flags_ &= ~kIsNew & 7U;
   }
-  learn_from_pass(model, after, was_looked_for, missed_before);
+  learn_from_pass(model, after, was_looked_for);
   const double missed = std::max(0.0, missed_passes() - missed_before);
+  const int hidden = std::max(0, pending_hidden_ - hidden_before);
   flags_ &= ~kInFirstPass & 7U;
 
   const double still = (1.0 - static_cast<double>(evidence_.went)) * (1.0 - lost);
@@ -87,8 +89,9 @@ void PointExistence<S>::change_pass(ExistenceModel& model) {
   start_pass(model);
   const LearnedRates& learned = model.learned();
   if (learned.now > 0.0)
-    odds_ = bounded(odds_ * std::pow((1.0 - learned.before) / missed_share.value(), missed));
-  else if (pending_missed_ > 0)
+    odds_ =
+        bounded(odds_ * missed_ratio(1.0 - learned.before, missed_share.value(), missed, hidden));
+  else if (is_pending())
     correct_odds(model, missed_share, learned.before_was, decay_per_s, kMostOdds);
 }
 
@@ -106,25 +109,34 @@ void PointExistence<S>::pass_gap(ExistenceModel& model, double went) {
 /// Recall of passes and decay. What is open since the point was last surely seen counts with the
 /// probability that it is still there.
 template <Shell S>
-void PointExistence<S>::learn_from_pass(ExistenceModel& model, double after, bool was_looked_for,
-                                        double missed_before) {
-  if (was_looked_for && (flags_ & kInFirstPass) == 0) {
-    const std::uint16_t seen = pending_seen_, missed = pending_missed_;
-    add_pending(pending_seen_, pass_visibility());
-    add_pending(pending_missed_, missed_by_detector());
-    const double weight = (1.0 - static_cast<double>(evidence_.went)) / kUnit;
-    model.recall().record_passes(weight * (pending_seen_ - seen),
-                                 weight * (pending_missed_ - missed));
-  }
+void PointExistence<S>::learn_from_pass(ExistenceModel& model, double after, bool was_looked_for) {
+  const bool counts = was_looked_for && (flags_ & kInFirstPass) == 0;
   const bool is_sure = is_surely_seen(after);
-  if (is_sure && was_looked_for && (flags_ & kInFirstPass) == 0)
-    model.record_passes(1.0, missed_before);
+  if (is_sure && counts) {
+    const double hidden = PassOccluder::missed_itself(1.0 - model.learned().before);
+    model.record_passes(1.0, missed_passes() + hidden * pending_hidden_);
+  }
+  if (counts) keep_pass(model);
   weigh(model, {is_sure ? 0.0F : static_cast<float>(1.0 - after), evidence_.since_s});
   if (!is_sure) return;
   flags_ |= kWasSure;
-  pending_seen_ = pending_missed_ = 0;
+  pending_seen_ = pending_missed_ = pending_hidden_ = 0;
   until_missed_ = kWhole;
   evidence_ = {};
+}
+
+/// Until more is known of it. What a hidden pass missed depends on v: it is kept as such.
+template <Shell S>
+void PointExistence<S>::keep_pass(ExistenceModel& model) {
+  const std::uint32_t seen = pending_seen_, missed = pending_missed_;
+  pending_seen_ = with_pending(seen, pass_visibility(), kSeenEnd) & 0xFFFFU;
+  if (!occluder_.is_hidden_pass())
+    pending_missed_ = with_pending(missed, missed_by_detector(), kMissedEnd) & (kMissedEnd - 1);
+  else if (pass_visibility() < 0.5)
+    pending_hidden_ = std::min(pending_hidden_ + 1U, kHiddenEnd - 1) & (kHiddenEnd - 1);
+  const double weight = (1.0 - static_cast<double>(evidence_.went)) / kUnit;
+  model.recall().record_passes(weight * (pending_seen_ - seen),
+                               weight * (pending_missed_ - missed));
 }
 
 /// The part of this pass that missed the point: what was hidden says nothing of the detector.
@@ -152,9 +164,10 @@ void PointExistence<S>::correct_odds(const ExistenceModel& model, MissedShare be
   if ((flags_ & kWasSure) == 0) return;
   const LearnedRates& learned = model.learned();
   if (learned.now > 0.0)
-    odds_ *= std::pow((1.0 - learned.before) / (1.0 - before_was), missed_passes());
+    odds_ *= missed_ratio(1.0 - learned.before, 1.0 - before_was, missed_passes(), pending_hidden_);
   else
-    odds_ *= std::pow(missed_share_.stepped() / before.stepped(), missed_passes());
+    odds_ *=
+        missed_ratio(missed_share_.stepped(), before.stepped(), missed_passes(), pending_hidden_);
   const auto odds_of_survival = [&](double rate_per_s) {
     return odds_of(1.0 - std::clamp(lost_share(rate_per_s, evidence_.since_s), 1e-9, 1.0 - 1e-9));
   };

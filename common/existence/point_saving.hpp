@@ -14,14 +14,15 @@ SavedPoint<S> PointExistence<S>::save() const {
   saved.pass = {pass_ | (std::uint32_t{missed_share_.code()} << 16),
                 marked_ | (std::uint32_t{last_hit_} << 24) | (std::uint32_t{flags_} << 29),
                 missed_from_ | (std::uint32_t{occluder_.code()} << 24)};
-  saved.numbers = {unseen_,
-                   chance_missed(),
-                   static_cast<float>(pending_seen_ + 65536U * (kWhole - until_missed_)),
-                   static_cast<float>(pending_missed_ + 65536U * hidden_share_),
-                   evidence_.went,
-                   evidence_.since_s,
-                   decay_per_s(),
-                   gap_s_};
+  saved.numbers = {
+      unseen_,
+      chance_missed(),
+      static_cast<float>(pending_seen_ + 65536U * (kWhole - until_missed_)),
+      static_cast<float>(pending_missed_ + kMissedEnd * pending_hidden_ + 65536U * hidden_share_),
+      evidence_.went,
+      evidence_.since_s,
+      decay_per_s(),
+      gap_s_};
   shell_.store(saved.shell);
   return saved;
 }
@@ -44,7 +45,8 @@ PointExistence<S> PointExistence<S>::load(const ExistenceModel& model, const Sav
   const std::uint32_t packed = saved.packed(2), missed = saved.packed(3);
   point.pending_seen_ = static_cast<std::uint16_t>(packed & 0xFFFFU);
   point.until_missed_ = kWhole - (packed >> 16U);
-  point.pending_missed_ = static_cast<std::uint16_t>(missed & 0xFFFFU);
+  point.pending_missed_ = saved.pending_missed(kMissedEnd) & (kMissedEnd - 1);
+  point.pending_hidden_ = saved.pending_hidden(kMissedEnd) & (kHiddenEnd - 1);
   point.hidden_share_ = (missed >> 16U) & 0xFFU;
   point.evidence_ = {saved.numbers[4], saved.numbers[5]};
   point.keep_decay(saved.numbers[6]);

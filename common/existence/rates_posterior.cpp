@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "common/existence/odds.hpp"
+#include "common/existence/pass_occluder.hpp"
 
 namespace understory::existence {
 namespace {
@@ -167,7 +168,8 @@ class Posterior {
 
   Axis before_axis() const {
     double missed = 0.0;
-    for (const AlikePoints& one : evidence_.histories) missed += one.points * one.missed_before;
+    for (const AlikePoints& one : evidence_.histories)
+      missed += one.points * (one.missed_before + one.hidden_before);
     const double seen = evidence_.before_seen, fewest = evidence_.before_missed;
     const double margin =
         std::min(12.0, kSigmas * (1.0 / std::sqrt(seen) + 1.0 / std::sqrt(fewest)));
@@ -256,10 +258,14 @@ class Posterior {
   /// Of each history at one v before: that they all miss what is there.
   std::vector<double> missed_at(double odds) const {
     const double log_miss = -std::log1p(std::exp(odds));
+    const double hidden = PassOccluder::missed_when_hidden(std::exp(log_miss));
     std::vector<double> missed;
     missed.reserve(evidence_.histories.size());
-    for (const AlikePoints& one : evidence_.histories)
-      missed.push_back(std::exp(one.missed_before * log_miss));
+    for (const AlikePoints& one : evidence_.histories) {
+      double chance = std::exp(one.missed_before * log_miss);
+      for (int pass = 0; pass < one.hidden_before; ++pass) chance *= hidden;
+      missed.push_back(chance);
+    }
     return missed;
   }
 

@@ -17,6 +17,7 @@ struct AlikePoints {
   bool is_seen_now = false;
   double rays = 1.0;  ///< OpenHistory's, with those of all sides.
   int sides = 0;      ///< Likewise.
+  int hidden_before = 0;
 };
 
 /// All that the posterior is made of.

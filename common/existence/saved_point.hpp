@@ -18,8 +18,8 @@ namespace understory::existence {
 template <Shell S>
 struct SavedPoint {
   /// Version 1 had a coarser 1 - v, and nothing of what was measured in front of the point; 2 not
-  /// from where a pass had seen it, nor what may hide it.
-  static constexpr std::uint32_t kVersion = 3;
+  /// from where a pass had seen it, nor what may hide it; 3 counted hidden passes with the others.
+  static constexpr std::uint32_t kVersion = 4;
   static constexpr std::size_t kFloats = 8;
   std::uint32_t version = kVersion;
   std::uint32_t shell_kind = S::kKind;
@@ -38,6 +38,14 @@ struct SavedPoint {
   /// A number that holds two: 8 bits above 16.
   std::uint32_t packed(std::size_t number) const {
     return static_cast<std::uint32_t>(std::min(16777215.0F, numbers[number]));
+  }
+  /// Passes that missed the point and were not hidden, and the hidden ones.
+  std::uint32_t pending_missed(std::uint32_t end) const {
+    const std::uint32_t both = packed(3) & 0xFFFFU;
+    return version < 4 ? std::min(both, end - 1) : both % end;
+  }
+  std::uint32_t pending_hidden(std::uint32_t end) const {
+    return version < 4 ? 0 : (packed(3) & 0xFFFFU) / end;
   }
   MissedShare missed_share() const {
     constexpr std::uint32_t kFiner = MissedShare::kCodesPerOctave / 32;

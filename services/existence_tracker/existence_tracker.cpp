@@ -308,7 +308,17 @@ model::Existence ExistenceTracker::tell(const model::MapUpdate& update) {
     existence.landmarks.push_back({id, tracked.told_probability, tracked.is_in_use});
   }
   existence.is_whole = existence.landmarks.size() == points_.size();
+  tell_new(update.utime, existence);
   return existence;
+}
+
+/// What this keyframe added is told at once, before it is known where it is: else it would be in
+/// use until the next keyframe, and after a drive's last one until the next drive.
+void ExistenceTracker::tell_new(model::Utime utime, model::Existence& existence) const {
+  for (const Birth& birth : births_)
+    if (birth.utime == utime && !points_.contains(birth.id))
+      existence.landmarks.push_back({birth.id, model_.birth(), are_new_ones_used()});
+  std::ranges::sort(existence.landmarks, {}, &model::LandmarkExistence::id);
 }
 
 /// What changed, and some of the others: who missed a message has all of them in the end.

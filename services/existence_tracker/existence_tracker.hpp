@@ -110,10 +110,12 @@ class ExistenceTracker {
   void confirm(TrackedPoint& tracked);
   void count_false(TrackedPoint& tracked);
   bool may_be_used(const TrackedPoint& tracked) const;
+  bool are_new_ones_used() const;
   void take_back(TrackedPoint& tracked);
   void readmit(TrackedPoint& tracked);
   void decide(TrackedPoint& tracked);
   model::Existence tell(const model::MapUpdate& update);
+  void tell_new(model::Utime utime, model::Existence& existence) const;
   std::set<model::LandmarkId> ids_to_tell();
 
   TrackerParameters parameters_;

@@ -97,7 +97,11 @@ existence::PassHistories ExistenceTracker::recount() const {
 
 /// While most of what is new turns out to be false, it is not used before another pass saw it.
 bool ExistenceTracker::may_be_used(const TrackedPoint& tracked) const {
-  return tracked.is_confirmed || births_so_far_.share(parameters_.model.birth) >= kMostAreReal;
+  return tracked.is_confirmed || are_new_ones_used();
+}
+
+bool ExistenceTracker::are_new_ones_used() const {
+  return births_so_far_.share(parameters_.model.birth) >= kMostAreReal;
 }
 
 /// What left use by looks of this pass that turn out to have been hidden never left.

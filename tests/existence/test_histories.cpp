@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/existence/histories.hpp"
+#include "common/existence/pass_occluder.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory::existence;
@@ -21,6 +22,7 @@ struct Lived {
   bool missed_now = false;
   double since_s = 0.0;
   int sides = 0;
+  bool hidden_before = false;  ///< The drive before that missed it was hidden.
 };
 
 /// Counts of the drives and of what went, with the priors.
@@ -44,7 +46,8 @@ LearnedRates learned(const std::vector<Lived>& all, const Known& known, bool rec
                      bool decay = true) {
   PassHistories histories;
   for (const Lived& one : all)
-    histories.add({.missed_before = one.missed_before ? 1.0 : 0.0,
+    histories.add({.missed_before = one.missed_before && !one.hidden_before ? 1.0 : 0.0,
+                   .hidden_before = one.missed_before && one.hidden_before ? 1 : 0,
                    .missed_now = one.missed_now ? 1.0 : 0.0,
                    .sides = one.sides,
                    .is_seen_now = !one.missed_now,
@@ -58,8 +61,10 @@ double log_chance(const Lived& one, double now, double last, double lambda) {
   const double stayed = std::exp(-lambda * one.since_s);
   if (!one.missed_before) return std::log(one.missed_now ? 1.0 - stayed * now : stayed * now);
   const double until_missed = std::exp(-lambda * (one.since_s - kDay));
-  return std::log(one.missed_now ? 1.0 - until_missed + (1.0 - last) * (until_missed - stayed * now)
-                                 : stayed * (1.0 - last) * now);
+  const double missed =
+      one.hidden_before ? PassOccluder::missed_when_hidden(1.0 - last) : 1.0 - last;
+  return std::log(one.missed_now ? 1.0 - until_missed + missed * (until_missed - stayed * now)
+                                 : stayed * missed * now);
 }
 
 double beta(double v, double seen, double missed) {
@@ -124,6 +129,10 @@ TEST_CASE("Rates are the means of their posterior", "[existence]") {
   SECTION("two drives") {
     for (int i = 0; i < 20; ++i) all.push_back({false, i >= 8, kDay});
     for (int i = 0; i < 20; ++i) all.push_back({true, i >= 7, 6.0 * kYear + kDay});
+  }
+  SECTION("two drives, the first one past a stack") {
+    for (int i = 0; i < 20; ++i) all.push_back({false, i >= 16, kDay});
+    for (int i = 0; i < 20; ++i) all.push_back({true, i >= 12, 6.0 * kYear + kDay, 0, i % 2 == 0});
   }
   SECTION("nothing at all") {}
   SECTION("half of what is looked at from one side is missed") {

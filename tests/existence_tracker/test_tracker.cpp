@@ -323,6 +323,35 @@ TEST_CASE("A false landmark of this drive leaves use when nobody sees it again",
   CHECK(tracker.of(pedestrian)->probability < 0.3);
 }
 
+TEST_CASE("Where most of what is new is false, it is out of use from its first keyframe on",
+          "[existence]") {
+  Road road(15);
+  ExistenceTracker tracker(for_road());
+  tracker.take(road.map());
+  std::set<model::LandmarkId> pedestrians;
+  const auto seen = [&](model::LandmarkId id) { return !pedestrians.contains(id); };
+  drive(road.drive(0, seen), tracker);
+  // Each day others stand there.
+  for (int day = 1; day <= 3; ++day) {
+    tracker = next_day(tracker, road);
+    std::vector<model::MapUpdate> updates = road.drive(day * kDay_us, seen);
+    for (std::size_t i = 0; i < updates.size(); i += 2) {
+      const model::LandmarkId pedestrian =
+          road.add(updates[i].map_T_vehicle.translation() + Eigen::Vector2d(0.0, 6.0));
+      pedestrians.insert(pedestrian);
+      updates[i].added.push_back(pedestrian);
+      const auto existence = tracker.add(updates[i]);
+      REQUIRE(existence);
+      const auto told =
+          std::ranges::find(existence->landmarks, pedestrian, &model::LandmarkExistence::id);
+      REQUIRE(told != existence->landmarks.end());
+      CHECK(told->is_in_use == (day < 3));
+      CHECK(std::ranges::is_sorted(existence->landmarks, {}, &model::LandmarkExistence::id));
+      tracker.take(road.map());
+    }
+  }
+}
+
 namespace {
 
 /// What the mapper says of landmarks behind a stack: blocked, but for looks past its edges.
