@@ -1,6 +1,7 @@
 // Nodes out of the solved graph.
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -200,6 +201,23 @@ TEST_CASE("Undone, freezing all behind leaves the graph as it was", "[freezing]"
   CHECK(apart(before, way.poses()) < 2e-3);
   CHECK(way.graph.marginal(way.last).covariance.isApprox(exact, 0.01));
   CHECK(way.graph.marginal(*way.graph.origin()).covariance.trace() < 1e-9);
+}
+
+TEST_CASE("A node that is tied to too many others is not frozen, and nothing is changed",
+          "[freezing]") {
+  constexpr state::Format kFormat{"test", 1};
+  Way way(1, false);
+  const NodeIndex hub = way.nodes[20];
+  const Eigen::Matrix3d covariance = Eigen::Vector3d(1e-3, 1e-3, 1e-5).asDiagonal();
+  for (const NodeIndex node : way.nodes) {
+    if (node == hub) continue;
+    const geometry::SE2 between = way.graph.pose(hub).inverse() * way.graph.pose(node);
+    way.add(hub, node, {between * way.noise(covariance), covariance});
+  }
+  way.settle();
+  const std::string before = state::save(kFormat, way.graph);
+  CHECK_FALSE(way.graph.freeze(std::array{hub}));
+  CHECK(state::save(kFormat, way.graph) == before);
 }
 
 TEST_CASE("A node that is tied by next to nothing does not cut the graph where others are frozen",

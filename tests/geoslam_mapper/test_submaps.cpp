@@ -1,6 +1,7 @@
 // Parts of the map that are kept elsewhere.
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "common/state/archive.hpp"
 #include "services/geoslam_mapper/smoothing/smoothing_mapper.hpp"
@@ -14,10 +15,12 @@ using namespace understory::geoslam_mapper::smoothing;
 
 namespace {
 
-/// A mapper beside a store that answers at once, as long as it is there.
+/// A mapper beside a store that answers at once, but for what it has lost.
 struct Stack {
   SmoothingMapper mapper;
   std::map<model::SubmapId, model::Submap> stored;
+  std::set<model::SubmapId> lost;
+  std::size_t most_at_once = 0;  ///< Submaps that went or came with one keyframe.
   std::size_t most_away = 0;
   std::size_t brought_back = 0;
   std::vector<geometry::SE2> map_T_vehicle;
@@ -26,17 +29,22 @@ struct Stack {
 
   void add(const model::Keyframe& keyframe) {
     map_T_vehicle.push_back(mapper.add(keyframe).map_T_vehicle);
-    for (model::Submap& submap : mapper.take_given_away()) {
+    std::vector<model::Submap> given = mapper.take_given_away();
+    std::size_t at_once = given.size();
+    for (model::Submap& submap : given) {
       for (const model::SubmapId id : submap.replaced) stored.erase(id);
       stored.emplace(submap.id, std::move(submap));
     }
     for (const model::SubmapId id : mapper.wanted()) {
+      if (lost.contains(id)) continue;
+      ++at_once;
       REQUIRE(stored.contains(id));
       const std::string refused = mapper.bring_back(stored.at(id));
       INFO(refused);
       REQUIRE(refused.empty());
       ++brought_back;
     }
+    most_at_once = std::max(most_at_once, at_once);
     most_away = std::max(most_away, mapper.submap_poses().size());
   }
 };
@@ -151,6 +159,30 @@ TEST_CASE("A mapper with submaps away goes on from its state as if nothing was",
         1e-3);
   }
   CHECK(other.brought_back > 5);
+}
+
+TEST_CASE("One submap goes or comes with a keyframe", "[mapper]") {
+  for (const std::uint64_t seed : {6, 7}) {
+    Stack stack(parameters(120.0));
+    for (const model::Keyframe& keyframe : keyframes_of(lanes(seed))) stack.add(keyframe);
+    CHECK(stack.most_at_once == 1);
+    CHECK(stack.brought_back > 10);
+  }
+}
+
+TEST_CASE("A submap that no store has holds up no other", "[mapper]") {
+  const std::vector<model::Keyframe> keyframes = keyframes_of(lanes(8));
+  Stack all(parameters(120.0));
+  Stack stack(parameters(120.0));
+  for (const model::Keyframe& keyframe : keyframes) {
+    all.add(keyframe);
+    stack.add(keyframe);
+    if (stack.lost.empty() && stack.brought_back > 2)
+      stack.lost.insert(stack.stored.begin()->first);
+  }
+  REQUIRE_FALSE(stack.lost.empty());
+  CHECK(all.brought_back > 10);
+  CHECK(stack.brought_back + 3 > all.brought_back);
 }
 
 TEST_CASE("A submap that is not as it was given away is refused", "[mapper]") {

@@ -61,6 +61,13 @@ FrozenMotion PoseGraph::loose_motion(MotionRef ref) const {
   return motion;
 }
 
+/// What stands for landmarks that are away, likewise.
+FrozenMotion PoseGraph::away_motion(const AwayTie& tie) const {
+  FrozenMotion motion = frozen_motion(smoother_.motion(tie.motion));
+  motion.away = tie.submaps;
+  return motion;
+}
+
 std::vector<FrozenMotion> PoseGraph::motions_of(NodeIndex node) const {
   std::vector<FrozenMotion> motions;
   motions.reserve(nodes_[node].motions().size());
@@ -76,10 +83,7 @@ std::vector<FrozenMotion> PoseGraph::loose_motions() const {
       if (ends_of(ref).first == node) motions.push_back(loose_motion(ref));
   }
 
-  for (const auto& [nodes, tie] : away_ties_) {
-    motions.push_back(frozen_motion(smoother_.motion(tie.motion)));
-    motions.back().away = tie.submaps;
-  }
+  for (const auto& [nodes, tie] : away_ties_) motions.push_back(away_motion(tie));
   return motions;
 }
 

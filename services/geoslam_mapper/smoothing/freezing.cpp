@@ -34,13 +34,11 @@ bool PoseGraph::freeze(std::span<const NodeIndex> nodes) {
   }
 
   // What they are tied to; what was frozen before is part of it as one measurement.
-  const std::vector<FrozenMotion> theirs = freeze_motions(going);
+  const std::vector<FrozenMotion> theirs = motions_around(going);
   const auto fresh = condense_parts(parts_of(theirs, frozen_factors_, going));
-  if (!fresh) {
-    give_back(theirs);
-    return false;
-  }
+  if (!fresh) return false;
 
+  take_motions_out(going);
   for (const FrozenMotion& one : theirs) frozen_motions_.add(one);
   for (const NodeIndex node : going) frozen_.insert(node);
   std::erase_if(frozen_factors_, [&](const FrozenFactor& factor) {
@@ -54,39 +52,48 @@ bool PoseGraph::freeze(std::span<const NodeIndex> nodes) {
   return true;
 }
 
-/// Their motions go out of the solved graph, with the bias as known now.
-std::vector<FrozenMotion> PoseGraph::freeze_motions(const std::set<NodeIndex>& nodes) {
-  std::vector<FrozenMotion> frozen;
-  const auto keep = [&](const plane::RelativePose& motion) -> FrozenMotion& {
-    return frozen.emplace_back(
-        FrozenMotion{index(motion.a), index(motion.b), motion.a_T_b, motion.information, 0, 0});
-  };
+/// How the nodes lie to each other and to those around them, each motion once, with the bias as
+/// known now.
+std::vector<FrozenMotion> PoseGraph::motions_around(const std::set<NodeIndex>& nodes) const {
+  std::vector<FrozenMotion> around;
+  for (const NodeIndex node : nodes) {
+    for (const MotionRef ref : nodes_[node].motions()) {
+      const auto [from, to] = ends_of(ref);
+      const NodeIndex other = from == node ? to : from;
+      if (!nodes.contains(other) || node < other) around.push_back(loose_motion(ref));
+    }
+  }
+  for (const auto& [ends, tie] : away_ties_)
+    if (nodes.contains(ends.first) || nodes.contains(ends.second))
+      around.push_back(away_motion(tie));
+  return around;
+}
+
+/// Those motions go out of the solved graph.
+void PoseGraph::take_motions_out(const std::set<NodeIndex>& nodes) {
   for (const NodeIndex node : nodes) {
     for (const MotionRef ref : std::exchange(edit(node).edit_motions(), {})) {
       const auto [from, to] = ends_of(ref);
       std::erase(edit(from == node ? to : from).edit_motions(), ref);
-      const auto closure = ref.is_biased ? closures_.end() : closures_.find(ref.number);
-      const std::uint64_t id = closure == closures_.end() ? 0 : closure->second;
-      keep(take_motion_out(ref)).closure = id;
+      take_motion_out(ref);
     }
     edit(node).give_room_back();
   }
-
   std::erase_if(away_ties_, [&](const auto& one) {
     const auto& [ends, tie] = one;
     if (!nodes.contains(ends.first) && !nodes.contains(ends.second)) return false;
-    keep(smoother_.motion(tie.motion)).away = tie.submaps;
     take_out(tie.motion);
     return true;
   });
-  return frozen;
 }
 
-void PoseGraph::thaw(std::span<const NodeIndex> nodes) {
-  if (std::ranges::none_of(nodes, [&](NodeIndex node) { return frozen_.contains(node); })) return;
+bool PoseGraph::thaw(std::span<const NodeIndex> nodes) {
+  if (std::ranges::none_of(nodes, [&](NodeIndex node) { return frozen_.contains(node); }))
+    return false;
   for (const NodeIndex node : nodes) release(node);
   give_back(frozen_motions_.take_beyond(frozen_));
   recondense_frozen();
+  return true;
 }
 
 /// The node is a variable again, where it was frozen.

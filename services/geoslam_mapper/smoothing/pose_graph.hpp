@@ -201,8 +201,9 @@ class PoseGraph {
   /// on, where it is, so that what far linearisations leave does not move the ground around the
   /// vehicle; the origin stays as a variable, and covariances count from it.
   bool freeze(std::span<const NodeIndex> nodes);
-  /// Takes nodes into the solved graph again, where they are frozen. The same cost.
-  void thaw(std::span<const NodeIndex> nodes);
+  /// Takes nodes into the solved graph again, where they are frozen. False where none is, and
+  /// nothing is changed. The same cost.
+  bool thaw(std::span<const NodeIndex> nodes);
   /// Takes all frozen nodes into the solved graph again, and holds it at the origin of the map:
   /// what is to be joined with it may move all of them. The same cost.
   void unfreeze();
@@ -345,7 +346,8 @@ class PoseGraph {
   Eigen::Matrix3d anchor_covariance() const;
   Eigen::Matrix3d of_anchor(const geometry::SE2& map_T_node, const Eigen::Matrix3d& anchor) const;
   Eigen::Matrix2d of_anchor(const Eigen::Vector2d& position_m, const Eigen::Matrix3d& anchor) const;
-  std::vector<FrozenMotion> freeze_motions(const std::set<NodeIndex>& nodes);
+  std::vector<FrozenMotion> motions_around(const std::set<NodeIndex>& nodes) const;
+  void take_motions_out(const std::set<NodeIndex>& nodes);
   void give_back(std::span<const FrozenMotion> motions);
   void release(NodeIndex node);
   std::optional<std::vector<FrozenFactor>> condense_parts(
@@ -353,6 +355,7 @@ class PoseGraph {
   void set_frozen_factors();
   void recondense_frozen();
   FrozenMotion loose_motion(MotionRef ref) const;
+  FrozenMotion away_motion(const AwayTie& tie) const;
   std::vector<FrozenMotion> loose_motions() const;
   void absorb(const FrozenMotion& motion, NodeIndex first);
   factor_graph::plane::RelativePose tie(const TiedNodes& nodes,

@@ -23,8 +23,8 @@ constexpr double kHysteresis_m = 60.0;
 constexpr double kFrozenBeyond_m = 500.0;
 constexpr double kThawedBeyond_m = 150.0;
 constexpr std::size_t kFrozenTogether = 20;
-/// Most submaps that go at one look around, and that are wanted at a time.
-constexpr std::size_t kMostAtOnce = 4;
+/// Most submaps that are wanted at a time.
+constexpr std::size_t kMostWanted = 4;
 
 /// Information that all observers together have, in the frame of a node.
 Eigen::Matrix2d information_in(NodeIndex node, std::span<const DormantObservation> observed,
@@ -47,56 +47,75 @@ double sigma_of(NodeIndex node, const PoseGraph& graph) {
 
 bool Submaps::follow(const model::FieldOfView& field_of_view, NodeIndex newest, model::Utime utime,
                      GlobalMap& map) {
+  if (hand_over_m_ <= 0.0) return false;
   const double along_m = map.graph.node(newest).along_m;
-  if (hand_over_m_ <= 0.0 || std::abs(along_m - looked_m_) < kBetweenLooks_m) return false;
-  looked_m_ = along_m;
+  if (std::abs(along_m - looked_m_) >= kBetweenLooks_m) {
+    looked_m_ = along_m;
+    if (look_around(field_of_view, newest, map)) return true;
+  }
+  return ask_for_next() || give_next_away(newest, utime, map);
+}
 
+/// What has come near, and how far is far. True where it solved.
+bool Submaps::look_around(const model::FieldOfView& field_of_view, NodeIndex newest,
+                          GlobalMap& map) {
   const Eigen::Vector2d vehicle_m = map.graph.pose(newest).translation();
-  const auto distance_of = [&](NodeIndex node) {
-    return (map.graph.pose(node).translation() - vehicle_m).norm();
-  };
   // As far as PassJoiner looks for an earlier pass, and what was seen from there.
   const double range_m = field_of_view.max_range_m;
   const double reach_m =
       std::min(kFurthestPass_m, kReachOfPasses_sigmas * sigma_of(newest, map.graph)) +
       2.0 * range_m + kExtent_m;
-  const double far_m = std::max(hand_over_m_, reach_m + kHysteresis_m);
+  far_m_ = std::max(hand_over_m_, reach_m + kHysteresis_m);
 
   std::vector<std::pair<double, model::SubmapId>> near;
   for (const Away& away : away_) {
-    const double distance_m = distance_of(away.node);
+    const double distance_m = (map.graph.pose(away.node).translation() - vehicle_m).norm();
     if (distance_m < reach_m) near.emplace_back(distance_m, away.id);
   }
   std::sort(near.begin(), near.end());
-  if (near.size() > kMostAtOnce) near.resize(kMostAtOnce);
-  wanted_.clear();
-  for (const auto& [distance_m, id] : near) wanted_.push_back(id);
-  if (freeze(reach_m, vehicle_m, map)) {
-    // One solution for each keyframe: what is to be given away is looked for at the next.
-    looked_m_ -= kBetweenLooks_m;
-    return true;
-  }
-  if (!may_hand_over_) return false;
-  close_origin(far_m, vehicle_m, map);
+  if (near.size() > kMostWanted) near.resize(kMostWanted);
+  const auto is_asked = [&](model::SubmapId id) {
+    return std::ranges::find(wanted_, id) != wanted_.end();
+  };
+  coming_.clear();
+  for (const auto& [distance_m, id] : near)
+    if (!is_asked(id)) coming_.push_back(id);
+  std::erase_if(wanted_, [&](model::SubmapId id) {
+    return std::ranges::none_of(near, [&](const auto& one) { return one.second == id; });
+  });
 
+  if (freeze(reach_m, vehicle_m, map)) return true;
+  if (may_hand_over_) close_origin(vehicle_m, map);
+  return false;
+}
+
+/// One that does not come, since no store has it, holds up no other.
+bool Submaps::ask_for_next() {
+  if (coming_.empty()) return false;
+  wanted_.push_back(coming_.front());
+  coming_.erase(coming_.begin());
+  return true;
+}
+
+bool Submaps::give_next_away(NodeIndex newest, model::Utime utime, GlobalMap& map) {
+  if (!may_hand_over_ || !far_m_) return false;
   // Whole submaps only: where none of what the node observed is in the solved graph.
-  std::vector<Here> left;
-  for (const Here& here : here_) {
-    if (left.size() == kMostAtOnce) break;
-    if (distance_of(here.node) > far_m && map.graph.node(here.node).observations().empty())
-      left.push_back(here);
-  }
-  if (left.empty()) return false;
+  const Eigen::Vector2d vehicle_m = map.graph.pose(newest).translation();
+  const auto next = std::ranges::find_if(here_, [&](const Here& here) {
+    return (map.graph.pose(here.node).translation() - vehicle_m).norm() > *far_m_ &&
+           map.graph.node(here.node).observations().empty();
+  });
+  if (next == here_.end()) return false;
   map.graph.checkpoint();
-  for (const Here& here : left) give_away(here, utime, map);
-  return true;  // What they tell is in the graph as before: the next keyframe's solution will do.
+  give_away(Here(*next), utime, map);
+  return true;  // What it tells is in the graph as before: the next keyframe's solution will do.
 }
 
 /// The first node is in no stretch: far behind it is a submap of its own.
-void Submaps::close_origin(double far_m, const Eigen::Vector2d& vehicle_m, GlobalMap& map) {
+void Submaps::close_origin(const Eigen::Vector2d& vehicle_m, GlobalMap& map) {
   const auto origin = map.graph.origin();
   if (!origin || map.graph.node(*origin).is_condensed) return;
-  if ((map.graph.pose(*origin).translation() - vehicle_m).norm() < far_m) return;
+  if ((map.graph.pose(*origin).translation() - vehicle_m).norm() < *far_m_) return;
   map.graph.close(*origin);
   here_.push_back({*origin, std::nullopt});
 }
@@ -124,6 +143,7 @@ bool Submaps::freeze(double reach_m, const Eigen::Vector2d& vehicle_m, GlobalMap
     map.graph.thaw(near);
   } else {
     unfreezable_ = map.graph.freeze(far) ? 0 : far.size();
+    if (unfreezable_ > 0) return false;
   }
   (void)map.graph.solve();  // What they tell is in the graph as before.
   map.adopt_estimates();
@@ -193,7 +213,11 @@ std::string Submaps::bring_back(const model::Submap& submap, GlobalMap& map) {
     std::vector<NodeIndex> nodes{away->node};
     for (const auto& observed : content.observed)
       for (const DormantObservation& one : observed) nodes.push_back(one.node);
-    map.graph.thaw(nodes);
+    if (map.graph.thaw(nodes)) {
+      (void)map.graph.solve();  // Alone, as always where many variables come back.
+      map.adopt_estimates();
+      map.graph.checkpoint();
+    }
     map.graph.bring_back(ids, {content.observed, content.ties});
   } catch (const std::invalid_argument& error) {
     return name + ": " + error.what();
@@ -206,9 +230,8 @@ std::string Submaps::bring_back(const model::Submap& submap, GlobalMap& map) {
   map.trajectory.bring_back(away->node, std::move(content.bases), map.graph);
   here_.push_back({away->node, away->id});
   std::erase(wanted_, away->id);
+  std::erase(coming_, away->id);
   away_.erase(away);
-  (void)map.graph.solve();  // What they tell is in the graph as before.
-  map.adopt_estimates();
   return {};
 }
 
