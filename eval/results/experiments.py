@@ -128,7 +128,7 @@ EXPERIMENTS = (
     _eval("long-drive", "long-drive --runs 20 --seed 1 --length-m 1000 --size-m 5,10,20,40,100", 6),
     _eval("long-drive-100km", "long-drive --runs 1 --seed 6 --length-m 100000 --size-m 20 --hand-over-m 300 --no-uncut --sections 10 --no-plots", 3),
     _eval("long-drive-loop", "long-drive-loop --runs 20 --seed 1 --size-m 5,10,20,40,100", 7),
-    _eval("efficiency", "efficiency --drive-km 10 --stationary-h 2", 6),
+    _eval("efficiency", "efficiency --drive-km 10 --stationary-h 2 --hand-over-m 300", 6),
     _eval("laps", "laps --laps 100 --length-m 317 --hours 24", 45),
     _eval("laps-held", "laps --laps 3 --length-m 100 --hours 2 --localise-in OUT/laps-held.gpkg --no-plots", 6),
     _eval("health", "health --drives 1000 --seed 1", 8),
