@@ -203,8 +203,8 @@ struct Bands {
 
 Bands bands_of(const Progress& progress, const Options& options, const std::string& world,
                const std::string& variant) {
-  const auto [low, high] = harness::chi2_band_95(3.0);
-  const auto [low_sum, high_sum] = harness::chi2_band_95(3.0 * options.seeds);
+  const std::pair<double, double> band = harness::chi2_band_95(3.0);
+  const std::pair<double, double> of_sum = harness::chi2_band_95(3.0 * options.seeds);
   double inside = 0.0;
   double beyond = 0.0;
   std::vector<double> sums(kTimes, 0.0);
@@ -213,13 +213,13 @@ Bands bands_of(const Progress& progress, const Options& options, const std::stri
     const auto along =
         progress.at({world, seed, variant}).at("slam_nees_along").get<std::vector<double>>();
     for (std::size_t k = 0; k < along.size() && k < kTimes; ++k) {
-      inside += along[k] >= low && along[k] <= high ? 1.0 : 0.0;
-      beyond += along[k] > high ? 1.0 : 0.0;
+      inside += along[k] >= band.first && along[k] <= band.second ? 1.0 : 0.0;
+      beyond += along[k] > band.second ? 1.0 : 0.0;
       sums[k] += along[k];
     }
   }
-  const auto means_inside = static_cast<double>(
-      std::ranges::count_if(sums, [&](double sum) { return sum >= low_sum && sum <= high_sum; }));
+  const auto means_inside = static_cast<double>(std::ranges::count_if(
+      sums, [&](double sum) { return sum >= of_sum.first && sum <= of_sum.second; }));
   const double poses = static_cast<double>(kTimes) * options.seeds;
   return {100.0 * inside / poses, 100.0 * beyond / poses,
           100.0 * means_inside / static_cast<double>(kTimes)};
