@@ -94,7 +94,7 @@ def _loops(name, drives, options, minutes):
 
 EXPERIMENTS = (
     _eval("paths", "paths --runs 10 --seed 1 --jobs 2", 12),
-    _eval("paths-lidar", "paths --method lidar --runs 20 --seed 1 --jobs 2", 15),
+    _eval("paths-lidar", "paths --method lidar --runs 5 --seed 1 --jobs 2", 15),
     _eval("density", "density --runs 10 --seed 1 --jobs 2", 8),
     _eval("noise", "noise --runs 5 --seed 1 --jobs 2 --interval 20", 25),
     _eval("noise-10cm", "noise --runs 2 --seed 1 --jobs 2 --interval 10", 25),
@@ -143,7 +143,7 @@ EXPERIMENTS = (
     _eval("forest-plots", "frontend --only forest-plots --data DATA", 8, ("forest_3d_scans",)),
     _eval("frontend-filter", "frontend --runs 1000 --jobs 2 --only filter", 60),
     _eval("frontend-mismatch", "frontend --runs 20 --seed 11 --only mismatch", 6),
-    _eval("wheels", "wheels --worlds forest,urban,urban-countryside --seeds 20 --first-seed 100 --length-m 500 --lidar vlp16 --jobs 2", 30),
+    _eval("wheels", "wheels --seeds 20 --first-seed 100 --length-m 500 --lidar vlp16 --jobs 2", 30),
     _eval("frontend-filter-lidar", "frontend --runs 150 --seed 7 --jobs 2 --only filter", 20),
     _eval("frontend-faults", "frontend --only faults --config deploy/config/lidar", 6),
     _eval("landmarks-vs-error", "landmarks-vs-error --seed 1 --jobs 2", 10),
