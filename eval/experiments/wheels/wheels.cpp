@@ -106,6 +106,7 @@ json drive_once(const Drive& drive, const Options& options, const std::atomic<bo
     if (stop) throw terminal::Interrupted();
   };
   const harness::ChainRun run = drive_chain(sensors, chain);
+
   const auto ate_m = [&](const std::vector<metrics::StampedPose>& poses) {
     return harness::trajectory_error(poses, run.truth).ate_rms_m;
   };
@@ -254,6 +255,7 @@ frontend::FrontendRows rows_of(const Progress& progress, const Options& options)
                    better_seeds(progress, options, world, variant, figure), "");
       }
     }
+
     for (const char* variant : kVariants) {
       rows.state(fmt::format("SLAM_POSE mean NEES (3), {} (geometric mean)", variant),
                  mean_of(progress, options, world, variant, "slam_nees", false), "");
