@@ -67,7 +67,7 @@ struct NormalEquations {
   Vector6 gradient = Vector6::Zero();
   double squares = 0.0;
 
-  void add(const PointSighting& pair, const Eigen::Isometry3d& pose) {
+  void add(const PointSighting& pair, const Eigen::Isometry3d& pose, double weight = 1.0) {
     const Eigen::Vector3d at = pose * pair.point_m;
     const double range = at.norm();
     if (range < 1e-9) return;
@@ -82,9 +82,9 @@ struct NormalEquations {
         (Eigen::Matrix3d::Identity() - direction * direction.transpose()) / range;
     const Eigen::Matrix<double, 2, 6> jacobian = plane * flat * motion;
     const Eigen::Vector2d residual = plane * direction;
-    information += jacobian.transpose() * jacobian;
-    gradient += jacobian.transpose() * residual;
-    squares += residual.squaredNorm();
+    information += weight * jacobian.transpose() * jacobian;
+    gradient += weight * jacobian.transpose() * residual;
+    squares += weight * residual.squaredNorm();
   }
 };
 
@@ -126,7 +126,119 @@ void settle(std::span<const PointSighting> pairs, const AbsolutePoseParameters& 
   result.inliers = inliers_of(pairs, result.camera_T_map, parameters.threshold_rad);
 }
 
+/// The step that perturbed() takes from `from` to `to`.
+Vector6 step_between(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to) {
+  const Eigen::Matrix3d turn = to.linear() * from.linear().transpose();
+  const Eigen::AngleAxisd rotation(turn);
+  Vector6 step;
+  step << rotation.angle() * rotation.axis(), to.translation() - turn * from.translation();
+  return step;
+}
+
+/// Pairs and prior together: what update_absolute_pose() makes least.
+class WeighedPairs {
+ public:
+  WeighedPairs(std::span<const PointSighting> pairs, std::span<const double> weights,
+               const PosePrior& prior, const AbsolutePoseParameters& parameters)
+      : pairs_(pairs),
+        weights_(weights),
+        prior_(prior),
+        parameters_(parameters),
+        prior_information_(prior.covariance.ldlt().solve(Matrix6::Identity())) {}
+
+  /// Minus twice the logarithm of the likelihood, but for a constant.
+  double cost(const Eigen::Isometry3d& pose) const {
+    const double threshold = parameters_.threshold_rad;
+    double squares = 0.0;
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      const double error = sine_error(pairs_[i], pose);
+      squares += weights_[i] * std::min(error * error, threshold * threshold);
+    }
+    const Vector6 from_prior = step_between(prior_.camera_T_map, pose);
+    return squares / variance() + from_prior.dot(prior_information_ * from_prior);
+  }
+
+  /// Gauss-Newton over the pairs that fit, chosen anew at each step.
+  Eigen::Isometry3d settled(Eigen::Isometry3d pose) const {
+    constexpr int kSteps = 8;
+    for (int i = 0; i < kSteps; ++i) {
+      const NormalEquations fitting = equations(pose);
+      const Vector6 from_prior = step_between(prior_.camera_T_map, pose);
+      const Vector6 gradient = fitting.gradient / variance() + prior_information_ * from_prior;
+      const Vector6 step = -information(fitting).ldlt().solve(gradient);
+      if (!step.allFinite()) break;
+      pose = perturbed(pose, step);
+      if (step.squaredNorm() < 1e-16) break;
+    }
+    return pose;
+  }
+
+  Matrix6 covariance(const Eigen::Isometry3d& pose) const {
+    return information(equations(pose)).ldlt().solve(Matrix6::Identity());
+  }
+
+ private:
+  double variance() const { return parameters_.sigma_rad * parameters_.sigma_rad; }
+  Matrix6 information(const NormalEquations& fitting) const {
+    return fitting.information / variance() + prior_information_;
+  }
+  NormalEquations equations(const Eigen::Isometry3d& pose) const {
+    NormalEquations fitting;
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      if (sine_error(pairs_[i], pose) < parameters_.threshold_rad)
+        fitting.add(pairs_[i], pose, weights_[i]);
+    }
+    return fitting;
+  }
+
+  std::span<const PointSighting> pairs_;
+  std::span<const double> weights_;
+  const PosePrior& prior_;
+  const AbsolutePoseParameters& parameters_;
+  Matrix6 prior_information_;
+};
+
+/// The cheapest of the prior and of the poses from samples.
+Eigen::Isometry3d best_guess(std::span<const PointSighting> pairs, const WeighedPairs& weighed,
+                             const Eigen::Isometry3d& prior, int samples, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  Eigen::Isometry3d best = prior;
+  double least = weighed.cost(prior);
+  for (int i = 0; i < samples; ++i) {
+    for (const Eigen::Isometry3d& pose : solve_three_points(draw_three(pairs, random))) {
+      const double cost = weighed.cost(pose);
+      if (cost >= least) continue;
+      least = cost;
+      best = pose;
+    }
+  }
+  return best;
+}
+
 }  // namespace
+
+AbsolutePose update_absolute_pose(std::span<const PointSighting> pairs,
+                                  std::span<const double> weights, const PosePrior& prior,
+                                  const AbsolutePoseParameters& parameters, std::uint64_t seed) {
+  const WeighedPairs weighed(pairs, weights, prior, parameters);
+  AbsolutePose result;
+  result.iterations = pairs.size() < 3 ? 0 : parameters.max_iterations;
+  const Eigen::Isometry3d guess =
+      best_guess(pairs, weighed, prior.camera_T_map, result.iterations, seed);
+
+  const Eigen::Isometry3d from_guess = weighed.settled(guess);
+  const Eigen::Isometry3d from_prior = weighed.settled(prior.camera_T_map);
+  const bool is_guess_better = weighed.cost(from_guess) < weighed.cost(from_prior);
+  result.camera_T_map = is_guess_better ? from_guess : from_prior;
+
+  result.covariance = weighed.covariance(result.camera_T_map);
+  result.inliers = inliers_of(pairs, result.camera_T_map, parameters.threshold_rad);
+  result.is_found = result.inliers.size() >= parameters.min_inliers;
+  if (result.inliers.empty()) return result;
+  const NormalEquations fitting = equations_at(pairs, result.inliers, result.camera_T_map);
+  result.rms_rad = std::sqrt(0.5 * fitting.squares / static_cast<double>(result.inliers.size()));
+  return result;
+}
 
 Eigen::Isometry3d refine_absolute_pose(std::span<const PointSighting> pairs,
                                        std::span<const std::uint32_t> used,

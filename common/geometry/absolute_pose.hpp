@@ -49,6 +49,22 @@ struct AbsolutePose {
 AbsolutePose find_absolute_pose(std::span<const PointSighting> pairs,
                                 const AbsolutePoseParameters& parameters, std::uint64_t seed);
 
+/// What is known of a pose before the camera looks, by odometry for instance.
+struct PosePrior {
+  Eigen::Isometry3d camera_T_map = Eigen::Isometry3d::Identity();
+  /// Order and frame as in AbsolutePose; positive definite.
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Identity();
+};
+/// The most likely pose given the prior and pairs of which many may be wrong: the truncated squares
+/// of the pairs, each times its weight (in (0, 1], as many as pairs: what moves as one thing has
+/// one error, and shall count once), and the prior's square together. Guesses are the prior and the
+/// poses of `max_iterations` samples of three pairs, then Gauss-Newton over all that fit. The pose
+/// and its covariance hold also where no pair fits; `is_found` says that min_inliers do. The same
+/// seed gives the same result. Cost O(iterations * pairs).
+AbsolutePose update_absolute_pose(std::span<const PointSighting> pairs,
+                                  std::span<const double> weights, const PosePrior& prior,
+                                  const AbsolutePoseParameters& parameters, std::uint64_t seed);
+
 /// Least squares over the pairs named, from `guess`. Without convergence the best pose so far.
 Eigen::Isometry3d refine_absolute_pose(std::span<const PointSighting> pairs,
                                        std::span<const std::uint32_t> used,

@@ -174,3 +174,91 @@ TEST_CASE("pairs that fit no pose are told as such; the same seed gives the same
   CHECK(a.inliers == b.inliers);
   CHECK(a.iterations == b.iterations);
 }
+
+namespace {
+
+/// What stands, and a thing 8 m ahead with three times as many points that was moved by half a
+/// metre since it was mapped, weighed so that it counts once.
+struct MovedThing {
+  std::vector<PointSighting> pairs;
+  std::vector<double> weights;
+};
+
+MovedThing beside_a_moved_thing(const Eigen::Isometry3d& truth, Random& random) {
+  constexpr int kStanding = 15, kOfThing = 45;
+  MovedThing scene;
+  scene.pairs = pairs_with_outliers(truth, kStanding, 0, 0.0015, random);
+  scene.weights.assign(kStanding, 1.0);
+  for (int i = 0; i < kOfThing; ++i) {
+    const Eigen::Vector3d at =
+        Eigen::Vector3d(0.0, 0.0, 8.0) + Eigen::Vector3d(uniform(random, -1.0, 1.0),
+                                                         uniform(random, -1.0, 1.0),
+                                                         uniform(random, -1.0, 1.0));
+    const Eigen::Vector3d noise = normal3(random, 0.0015);
+    const Eigen::Vector3d mapped = at + Eigen::Vector3d(0.3, 0.0, 0.4);
+    scene.pairs.push_back({(at.normalized() + noise).normalized(), truth.inverse() * mapped});
+    scene.weights.push_back(1.0 / kOfThing);
+  }
+  return scene;
+}
+
+/// Off by what odometry is off after one frame.
+PosePrior prior_near(const Eigen::Isometry3d& truth, Random& random) {
+  const Eigen::Vector3d turn = normal3(random, 0.005), shift = normal3(random, 0.01);
+  PosePrior prior;
+  prior.camera_T_map = Eigen::Isometry3d(Eigen::Translation3d(shift)) *
+                       Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()) * truth;
+  prior.covariance.setZero();
+  prior.covariance.diagonal() << 2.5e-5, 2.5e-5, 2.5e-5, 1e-4, 1e-4, 1e-4;
+  return prior;
+}
+
+}  // namespace
+
+TEST_CASE("a pose that is updated does not follow a moved thing of many points") {
+  const AbsolutePoseParameters parameters{
+      .sigma_rad = 0.0015, .max_iterations = 500, .min_inliers = 8};
+  Random random(21);
+  int followed = 0;
+  double squares = 0.0;
+  constexpr int kTrials = 100;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const Eigen::Isometry3d truth = random_pose(random);
+    const MovedThing scene = beside_a_moved_thing(truth, random);
+    const PosePrior prior = prior_near(truth, random);
+    const AbsolutePose updated =
+        update_absolute_pose(scene.pairs, scene.weights, prior, parameters, 1);
+    CHECK(updated.is_found);
+    CHECK(place_error(updated.camera_T_map, truth) < 0.04);
+    // Without prior and weights most points decide.
+    const AbsolutePose without = find_absolute_pose(scene.pairs, {}, 1);
+    followed += place_error(without.camera_T_map, truth) > 0.2 ? 1 : 0;
+
+    const Eigen::Isometry3d off = truth * updated.camera_T_map.inverse();
+    const Eigen::AngleAxisd turn(off.linear());
+    Eigen::Matrix<double, 6, 1> error;
+    error << turn.angle() * turn.axis(), off.translation();
+    squares += error.dot(updated.covariance.ldlt().solve(error));
+  }
+  CHECK(followed > 90);
+  // The covariance is honest: 6 is the mean of chi^2, 0.35 its standard deviation.
+  CHECK(squares / kTrials > 4.0);
+  CHECK(squares / kTrials < 8.0);
+}
+
+TEST_CASE("without pairs that fit the prior stays") {
+  Random random(22);
+  const Eigen::Isometry3d truth = random_pose(random);
+  const PosePrior prior = prior_near(truth, random);
+  const AbsolutePose none = update_absolute_pose({}, {}, prior, {}, 1);
+  CHECK_FALSE(none.is_found);
+  CHECK(place_error(none.camera_T_map, prior.camera_T_map) < 1e-12);
+  CHECK((none.covariance - prior.covariance).norm() < 1e-9 * prior.covariance.norm());
+
+  // One pair is no pose, but it tells something.
+  const std::vector<PointSighting> one{sighting(truth, random)};
+  const std::vector<double> weight{1.0};
+  const AbsolutePose little = update_absolute_pose(one, weight, prior, {.threshold_rad = 0.1}, 1);
+  CHECK_FALSE(little.is_found);
+  CHECK(little.covariance.determinant() < 0.5 * prior.covariance.determinant());
+}

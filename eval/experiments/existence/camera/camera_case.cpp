@@ -89,20 +89,24 @@ class Observing {
 
   void mapping_drive(const std::vector<changes::CameraFrame>& frames) {
     begin(0.0);
-    for (const changes::CameraFrame& frame : frames) add(frame, frame.world_T_camera);
+    for (const changes::CameraFrame& frame : frames) add(frame, frame.world_T_camera, {});
     end(false);
   }
-  /// Poses are those of a tracker in the old map.
+  /// Poses are those of a tracker in the old map, with its covariances.
   void changed_drive(const std::vector<changes::CameraFrame>& frames, double time_s) {
     begin(time_s);
     CameraTracker tracker(result_.camera, sim::mixed(seed_, result_.history.drives.size()));
-    for (const changes::CameraFrame& frame : frames) add(frame, tracker.track(frame, result_.map));
+    for (const changes::CameraFrame& frame : frames) {
+      const Eigen::Isometry3d world_T_camera = tracker.track(frame, result_.map);
+      add(frame, world_T_camera, {.covariance = tracker.covariance()});
+    }
     end(true);
   }
 
  private:
   void begin(double time_s);
-  void add(const changes::CameraFrame& frame, const Eigen::Isometry3d& world_T_camera);
+  void add(const changes::CameraFrame& frame, const Eigen::Isometry3d& world_T_camera,
+           const PoseGate& gate);
   void look(const Expected& expected, const changes::CameraFrame& frame,
             const Eigen::Vector3d& eye_m, const ClearSights& sights);
   void end(bool is_changed);
@@ -149,9 +153,10 @@ void Observing::look(const Expected& expected, const changes::CameraFrame& frame
   if (is_new && known.size() < kClearDirections) known.push_back(direction);
 }
 
-void Observing::add(const changes::CameraFrame& frame, const Eigen::Isometry3d& world_T_camera) {
+void Observing::add(const changes::CameraFrame& frame, const Eigen::Isometry3d& world_T_camera,
+                    const PoseGate& gate) {
   std::vector<Expected> expected = points_in_view(result_.map, world_T_camera, result_.camera);
-  associate(expected, result_.map, frame.keypoints, {});
+  associate_within(expected, result_.map, frame.keypoints, result_.camera, gate);
   const ClearSights sights = clear_sights(frame);
   std::size_t taken = 0;
   for (const Expected& one : expected) {

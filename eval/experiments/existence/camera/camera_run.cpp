@@ -47,7 +47,7 @@ void track_all(const CameraCase& of, const std::vector<CameraPoint>& map, std::u
   CameraTracker tracker(of.camera, seed);
   double sum_m2 = 0.0;
   for (const sim::changes::CameraFrame& frame : of.held_out) {
-    const Eigen::Isometry3d& pose = tracker.track(frame, map);
+    const Eigen::Isometry3d pose = tracker.track(frame, map);
     sum_m2 += (pose.translation() - frame.world_T_camera.translation()).squaredNorm();
   }
   result.ate_m = std::sqrt(sum_m2 / static_cast<double>(of.held_out.size()));

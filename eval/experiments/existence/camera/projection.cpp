@@ -1,5 +1,6 @@
 #include "eval/experiments/existence/camera/projection.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -36,6 +37,52 @@ bool is_in_gate(const Expected& expected, const changes::Keypoint& keypoint, con
          (keypoint.pixel - expected.pixel).squaredNorm() <= gate.pixel * gate.pixel;
 }
 
+/// Variances of the detector and of the mapped point together [px^2]: pixel per axis, disparity.
+constexpr double kPixelVariance = 0.5;
+constexpr double kDisparityVariance = 0.45;
+
+/// Of pixel and disparity of a point, by the pose alone [px^2].
+Eigen::Matrix3d covariance_by_pose(const Eigen::Vector3d& at,
+                                   const changes::CameraParameters& camera,
+                                   const Eigen::Matrix<double, 6, 6>& pose) {
+  const double f = camera.focal_px, z = at.z();
+  Eigen::Matrix3d by_point;
+  by_point << f / z, 0.0, -f * at.x() / (z * z), 0.0, f / z, -f * at.y() / (z * z), 0.0, 0.0,
+      -f * camera.baseline_m / (z * z);
+  Eigen::Matrix<double, 3, 6> motion;
+  motion << 0.0, at.z(), -at.y(), 1.0, 0.0, 0.0, -at.z(), 0.0, at.x(), 0.0, 1.0, 0.0, at.y(),
+      -at.x(), 0.0, 0.0, 0.0, 1.0;
+  const Eigen::Matrix<double, 3, 6> by_pose = by_point * motion;
+  return by_pose * pose * by_pose.transpose();
+}
+
+/// Gives the keypoints away; `is_near(e, keypoint)` says which may be the expected point e.
+template <typename IsNear>
+void give_keypoints(std::span<Expected> expected, std::span<const CameraPoint> map,
+                    std::span<const changes::Keypoint> keypoints, int most_bits,
+                    const IsNear& is_near) {
+  std::vector<Owner> owners(keypoints.size());
+  std::vector<std::uint32_t> wanted(expected.size(), kNoKeypoint);
+  for (std::uint32_t e = 0; e < expected.size(); ++e) {
+    int least = most_bits + 1;
+    for (std::uint32_t k = 0; k < keypoints.size(); ++k) {
+      if (!is_near(e, keypoints[k])) continue;
+      const int bits =
+          changes::hamming_distance(keypoints[k].descriptor, map[expected[e].point].descriptor);
+      if (bits >= least) continue;
+      least = bits;
+      wanted[e] = k;
+    }
+    if (wanted[e] == kNoKeypoint || least >= owners[wanted[e]].bits) continue;
+    owners[wanted[e]] = {least, e};
+  }
+
+  for (std::uint32_t e = 0; e < expected.size(); ++e) {
+    const bool is_owner = wanted[e] != kNoKeypoint && owners[wanted[e]].expected == e;
+    expected[e].keypoint = is_owner ? wanted[e] : kNoKeypoint;
+  }
+}
+
 }  // namespace
 
 std::vector<Expected> points_in_view(std::span<const CameraPoint> map,
@@ -55,26 +102,32 @@ std::vector<Expected> points_in_view(std::span<const CameraPoint> map,
 
 void associate(std::span<Expected> expected, std::span<const CameraPoint> map,
                std::span<const changes::Keypoint> keypoints, const Gate& gate) {
-  std::vector<Owner> owners(keypoints.size());
-  std::vector<std::uint32_t> wanted(expected.size(), kNoKeypoint);
-  for (std::uint32_t e = 0; e < expected.size(); ++e) {
-    int least = gate.descriptor_bits + 1;
-    for (std::uint32_t k = 0; k < keypoints.size(); ++k) {
-      if (!is_in_gate(expected[e], keypoints[k], gate)) continue;
-      const int bits =
-          changes::hamming_distance(keypoints[k].descriptor, map[expected[e].point].descriptor);
-      if (bits >= least) continue;
-      least = bits;
-      wanted[e] = k;
-    }
-    if (wanted[e] == kNoKeypoint || least >= owners[wanted[e]].bits) continue;
-    owners[wanted[e]] = {least, e};
-  }
+  give_keypoints(expected, map, keypoints, gate.descriptor_bits,
+                 [&](std::uint32_t e, const changes::Keypoint& keypoint) {
+                   return is_in_gate(expected[e], keypoint, gate);
+                 });
+}
 
-  for (std::uint32_t e = 0; e < expected.size(); ++e) {
-    const bool is_owner = wanted[e] != kNoKeypoint && owners[wanted[e]].expected == e;
-    expected[e].keypoint = is_owner ? wanted[e] : kNoKeypoint;
-  }
+void associate_within(std::vector<Expected>& expected, std::span<const CameraPoint> map,
+                      std::span<const changes::Keypoint> keypoints,
+                      const changes::CameraParameters& camera, const PoseGate& gate) {
+  const double most_variance = gate.max_pixel * gate.max_pixel / (gate.sigmas * gate.sigmas);
+  std::vector<Eigen::Matrix3d> information;
+  std::erase_if(expected, [&](const Expected& one) {
+    Eigen::Matrix3d covariance = covariance_by_pose(one.camera_point_m, camera, gate.covariance);
+    if (covariance.topLeftCorner<2, 2>().trace() > most_variance) return true;
+    covariance.diagonal() += Eigen::Vector3d(kPixelVariance, kPixelVariance, kDisparityVariance);
+    information.push_back(covariance.inverse());
+    return false;
+  });
+
+  give_keypoints(expected, map, keypoints, gate.descriptor_bits,
+                 [&](std::uint32_t e, const changes::Keypoint& keypoint) {
+                   Eigen::Vector3d off;
+                   off << keypoint.pixel - expected[e].pixel,
+                       keypoint.disparity_px - expected[e].disparity_px;
+                   return off.dot(information[e] * off) <= gate.sigmas * gate.sigmas;
+                 });
 }
 
 understory::existence::Ray ray_beside(const Expected& expected,

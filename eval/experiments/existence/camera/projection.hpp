@@ -30,6 +30,16 @@ struct Gate {
   int descriptor_bits = 70;
 };
 
+/// Which keypoints may be a point where the pose is known with a covariance.
+struct PoseGate {
+  /// Of camera_T_world, order and frame as in geometry::AbsolutePose.
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  double sigmas = 2.5;  ///< Of pixel and disparity together (Mahalanobis).
+  /// A point whose pixel the pose leaves open by more than this (at `sigmas`) is not looked for.
+  double max_pixel = 25.0;
+  int descriptor_bits = 70;
+};
+
 /// Points in the frustum that were mapped from about there: within 60 degrees of the mean direction
 /// of their sightings, and of their distances within a quarter (as ORB-SLAM asks).
 std::vector<Expected> points_in_view(std::span<const CameraPoint> map,
@@ -40,6 +50,12 @@ std::vector<Expected> points_in_view(std::span<const CameraPoint> map,
 /// that several points want goes to the most similar one. Cost O(expected * keypoints).
 void associate(std::span<Expected> expected, std::span<const CameraPoint> map,
                std::span<const sim::changes::Keypoint> keypoints, const Gate& gate);
+
+/// The same within the pose's covariance and the detector's noise. Points that the pose leaves too
+/// open are taken out of `expected`: whether they are seen says nothing.
+void associate_within(std::vector<Expected>& expected, std::span<const CameraPoint> map,
+                      std::span<const sim::changes::Keypoint> keypoints,
+                      const sim::changes::CameraParameters& camera, const PoseGate& gate);
 
 /// What the disparity of the keypoint nearest to the line of sight says about it: in front within
 /// 30 px, behind within 10 px; kUnknown where none is.
