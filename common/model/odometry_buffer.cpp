@@ -149,6 +149,26 @@ std::optional<GyroRotation> OdometryBuffer::gyro_rotation(Utime from, Utime to) 
   return sum;
 }
 
+std::optional<InertialMotion> OdometryBuffer::inertial(Utime from, Utime to) const {
+  std::optional<InertialMotion> motion;
+  Utime reached = from;
+  for (const Odometry& increment : increments_) {
+    if (increment.utime <= from + kGapTolerance_us) continue;
+    if (reached + kGapTolerance_us >= to) break;
+    if (!increment.inertial || !begins_at(increment, reached)) return std::nullopt;
+
+    if (!motion) {
+      motion = InertialMotion{*increment.inertial, increment.is_stationary};
+    } else {
+      motion->inertial = compound(motion->inertial, *increment.inertial);
+      motion->is_stationary = motion->is_stationary && increment.is_stationary;
+    }
+    reached = increment.utime;
+  }
+  if (std::abs(reached - to) > kGapTolerance_us) return std::nullopt;
+  return motion;
+}
+
 void OdometryBuffer::forget_before(Utime utime) {
   while (!increments_.empty() && increments_.front().utime <= utime) increments_.pop_front();
 }

@@ -45,6 +45,18 @@ struct GyroRotation {
   }
 };
 
+/// What the IMU alone measured between two stamps.
+struct InertialMotion {
+  Preintegration inertial;
+  bool is_stationary = false;  ///< The vehicle did not move at any time of it.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.inertial, s.is_stationary);
+  }
+};
+
 /// Keeps consecutive increments of odometry as they came, at most 20,000; the oldest are dropped.
 /// Those without wheels may start at a filter's velocity.
 class OdometryBuffer {
@@ -64,6 +76,9 @@ class OdometryBuffer {
   std::optional<geometry::SE2WithCovariance> between(Utime from, Utime to) const;
   /// The rotation alone by the gyro; none also where there was no IMU.
   std::optional<GyroRotation> gyro_rotation(Utime from, Utime to) const;
+  /// The motion alone by the IMU. None where a stamp is not the end of an increment, across a gap,
+  /// and where there was no IMU.
+  std::optional<InertialMotion> inertial(Utime from, Utime to) const;
   /// Drops the increments that end at `utime` or before.
   void forget_before(Utime utime);
   /// The increments in order of time.

@@ -12,4 +12,36 @@ Preintegration at_bias(const Preintegration& inertial, const InertialBias& bias)
   return moved;
 }
 
+Preintegration compound(const Preintegration& first, const Preintegration& second) {
+  const Preintegration next = at_bias(second, first.bias);
+  const Eigen::Matrix2d rotation = geometry::SE2(0.0, 0.0, first.yaw_rad).rotation();
+  const Eigen::Vector2d velocity = rotation * next.velocity_mps;
+  const Eigen::Vector2d position = rotation * next.position_m;
+
+  Preintegration sum;
+  sum.bias = first.bias;
+  sum.seconds = first.seconds + next.seconds;
+  sum.yaw_rad = first.yaw_rad + next.yaw_rad;
+  sum.velocity_mps = first.velocity_mps + velocity;
+  sum.position_m = first.position_m + next.seconds * first.velocity_mps + position;
+
+  // How errors of each go on, in (yaw, velocity, position).
+  Eigen::Matrix<double, 5, 5> of_first = Eigen::Matrix<double, 5, 5>::Identity();
+  of_first.block<2, 1>(1, 0) = geometry::perpendicular(velocity);
+  of_first.block<2, 1>(3, 0) = geometry::perpendicular(position);
+  of_first.block<2, 2>(3, 1) = next.seconds * Eigen::Matrix2d::Identity();
+  Eigen::Matrix<double, 5, 5> of_second = Eigen::Matrix<double, 5, 5>::Identity();
+  of_second.block<2, 2>(1, 1) = rotation;
+  of_second.block<2, 2>(3, 3) = rotation;
+  sum.covariance = of_first * first.covariance * of_first.transpose() +
+                   of_second * next.covariance * of_second.transpose();
+  sum.bias_jacobian = of_first * first.bias_jacobian + of_second * next.bias_jacobian;
+
+  sum.level = next.level;
+  sum.level.memory = next.level.memory * first.level.memory;
+  sum.level.added =
+      next.level.memory * first.level.added * next.level.memory.transpose() + next.level.added;
+  return sum;
+}
+
 }  // namespace understory::model

@@ -26,7 +26,9 @@ World world(std::mt19937_64& random, int members, int landmarks) {
 BlockProblem problem(const World& truth, double sigma, double detection, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
-  BlockProblem result{truth.poses, truth.points, {}, {}};
+  BlockProblem result;
+  result.local_T_member = truth.poses;
+  result.landmarks = truth.points;
   for (std::uint32_t k = 0; k < truth.poses.size(); ++k) {
     for (std::uint32_t i = 0; i < truth.points.size(); ++i) {
       if (k != 0 && uniform(random) > detection) continue;

@@ -233,3 +233,58 @@ TEST_CASE("Sigmas stated at a quarter and at four times the true ones give right
     }
   }
 }
+
+namespace {
+
+/// Keyframes of a circle at constant speed, with an IMU whose lateral motion is off by `error_m` to
+/// either side in turns; none = without the IMU.
+std::vector<model::Keyframe> with_imu(const sim::Drive& drive, std::optional<double> error_m) {
+  JointKeyframer keyframer({});
+  std::vector<model::Keyframe> result;
+  for (std::size_t k = 0; k < drive.size(); ++k) {
+    const model::LandmarkScan& scan = drive.scan(k).scan;
+    if (k > 0) {
+      model::Odometry step;
+      step.from_utime = drive.scan(k - 1).scan.utime;
+      step.utime = scan.utime;
+      step.from_T_to = drive.world_T_vehicle()[k - 1].inverse() * drive.world_T_vehicle()[k];
+      step.covariance = Eigen::Vector3d(1e-2, 1e-2, 1e-5).asDiagonal();
+      if (error_m) {
+        model::Preintegration& z = step.inertial.emplace();
+        z.seconds = 1e-6 * static_cast<double>(step.utime - step.from_utime);
+        z.yaw_rad = step.from_T_to.theta();
+        const Eigen::Vector2d velocity(step.from_T_to.translation().norm() / z.seconds, 0.0);
+        z.velocity_mps = step.from_T_to.rotation() * velocity - velocity;
+        z.position_m = step.from_T_to.translation() - z.seconds * velocity;
+        z.position_m.y() += k % 2 == 0 ? *error_m : -*error_m;
+        z.covariance.diagonal() << 1e-8, 1e-4, 1e-4, 1e-6, 1e-6;
+        z.bias_jacobian(0, 0) = -z.seconds;
+        z.bias_jacobian.block<2, 2>(1, 1) = -z.seconds * Eigen::Matrix2d::Identity();
+      }
+      keyframer.add(step);
+    }
+    if (auto keyframe = keyframer.add(scan)) result.push_back(std::move(*keyframe));
+  }
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("An IMU makes a keyframe's members surer, unless it contradicts the landmarks",
+          "[keyframer]") {
+  const sim::Drive simulated = drive(sim::PathKind::kCircle, 60.0, 0.9, 0.2, 6);
+  const std::vector<model::Keyframe> plain = with_imu(simulated, std::nullopt);
+  const std::vector<model::Keyframe> right = with_imu(simulated, 0.0);
+  const std::vector<model::Keyframe> wrong = with_imu(simulated, 0.5);
+  REQUIRE(plain.size() > 20);
+  REQUIRE(right.size() == plain.size());
+  REQUIRE(wrong.size() == plain.size());
+  for (std::size_t i = 0; i < plain.size(); ++i) {
+    const auto spread = [](const model::Keyframe& keyframe) {
+      return keyframe.members.front().covariance.topLeftCorner<2, 2>().trace();
+    };
+    CHECK(spread(right[i]) < 0.75 * spread(plain[i]));
+    CHECK(wrong[i].members.front().centre_T_vehicle.coordinates() ==
+          plain[i].members.front().centre_T_vehicle.coordinates());
+  }
+}

@@ -39,6 +39,11 @@ std::optional<geometry::SE2WithCovariance> Motion::between(model::Utime from,
   return odometry_.between(from, to);
 }
 
+std::optional<model::InertialMotion> Motion::inertial(model::Utime from, model::Utime to) const {
+  if (!parameters_.use_odometry) return std::nullopt;
+  return odometry_.inertial(from, to);
+}
+
 std::optional<Prediction> Motion::predict(const model::Keyframe& keyframe,
                                           const PoseGraph& graph) const {
   const geometry::SE2WithCovariance base_T_centre = inverse(centre_T_base(keyframe));

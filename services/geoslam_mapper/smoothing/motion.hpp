@@ -54,6 +54,8 @@ class Motion {
   std::optional<CentreMotion> since_last_centre(const model::Keyframe& keyframe) const;
   /// Odometry between two times (right perturbation); none without odometry or with a gap.
   std::optional<geometry::SE2WithCovariance> between(model::Utime from, model::Utime to) const;
+  /// The same by the IMU alone; none also where a time is not the end of an increment.
+  std::optional<model::InertialMotion> inertial(model::Utime from, model::Utime to) const;
   /// Whether an IMU ties both ends of the keyframe to a heading within
   /// `start_heading_sigma_rad`; true also where there is no IMU to wait for.
   bool knows_heading(const model::Keyframe& keyframe) const;

@@ -7,7 +7,6 @@ namespace {
 
 /// Beyond the sensor's range, so that a landmark at its edge is found.
 constexpr double kReachMargin_m = 5.0;
-constexpr double kLeastVariance = 1e-6;  ///< A millimetre, a milliradian.
 
 std::vector<geometry::UncertainPoint> landmarks_around(const Eigen::Vector2d& centre_m,
                                                        double radius_m,
@@ -47,6 +46,7 @@ void ScanLocaliser::restart_at(model::Utime utime, const geometry::SE2WithCovari
   if (latest_ && latest_->utime > utime) return;
   latest_ = LocatedScan{utime, map_T_vehicle.mean, latest_ ? latest_->step : geometry::SE2(),
                         map_T_vehicle.covariance, in_map(map_T_vehicle, map_T_base).covariance};
+  velocity_.set_pose();
 }
 
 std::optional<ScanPose> ScanLocaliser::locate(const model::LandmarkScan& raw,
@@ -72,7 +72,7 @@ std::optional<ScanPose> ScanLocaliser::locate(const model::LandmarkScan& raw,
 /// rotations. None where too few detections match.
 std::optional<geometry::Registration> ScanLocaliser::register_scan(const model::LandmarkScan& scan,
                                                                    const LandmarkMap& landmarks,
-                                                                   const Motion& motion) const {
+                                                                   const Motion& motion) {
   const auto reference =
       landmarks_around(latest_->map_T_vehicle.translation(),
                        scan.field_of_view.max_range_m + kReachMargin_m, landmarks);
@@ -87,18 +87,24 @@ std::optional<geometry::Registration> ScanLocaliser::register_scan(const model::
   gating.gate_sigmas = parameters_.gate_sigmas;
   gating.gate_floor_m = parameters_.gate_floor_m;
 
+  const geometry::SE2WithCovariance last{latest_->map_T_vehicle, latest_->covariance};
   const auto step = motion.between(latest_->utime, scan.utime);
-  const geometry::Registration found =
-      step ? register_points(
-                 reference, observed,
-                 compound({latest_->map_T_vehicle,
-                           latest_->covariance + kLeastVariance * Eigen::Matrix3d::Identity()},
-                          *step),
-                 gating)
-           : register_step(reference, observed, latest_->map_T_vehicle, latest_->step,
-                           geometry::StepModel{}, gating, fits);
-  if (!fits(found)) return std::nullopt;
-  return found;
+  if (!step) {
+    velocity_.forget();
+    const auto found = register_step(reference, observed, last.mean, latest_->step,
+                                     geometry::StepModel{}, gating, fits);
+    return fits(found) ? std::optional(found) : std::nullopt;
+  }
+
+  // By the velocity; where the landmarks contradict it, by odometry as stated.
+  const auto by_odometry = [&](const std::optional<model::InertialMotion>& inertial) {
+    return register_points(reference, observed, velocity_.predict(last, *step, inertial), gating);
+  };
+  geometry::Registration found = by_odometry(motion.inertial(latest_->utime, scan.utime));
+  if (fits(found) && velocity_.update({found.reference_T_observed, found.covariance})) return found;
+  velocity_.forget();
+  found = by_odometry(std::nullopt);
+  return fits(found) ? std::optional(found) : std::nullopt;
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -9,6 +9,7 @@
 #include "services/geoslam_mapper/mapper_method.hpp"
 #include "services/geoslam_mapper/smoothing/landmark_map.hpp"
 #include "services/geoslam_mapper/smoothing/motion.hpp"
+#include "services/geoslam_mapper/smoothing/velocity_track.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 
@@ -53,17 +54,18 @@ class ScanLocaliser {
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.level_, self.latest_);
+    a(self.level_, self.latest_, self.velocity_);
   }
 
  private:
   std::optional<geometry::Registration> register_scan(const model::LandmarkScan& scan,
                                                       const LandmarkMap& landmarks,
-                                                      const Motion& motion) const;
+                                                      const Motion& motion);
 
   SmoothingMapperParameters parameters_;
   model::LevelCorrection level_;
   std::optional<LocatedScan> latest_;
+  VelocityTrack velocity_;
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace understory::keyframer::joint {
 namespace {
@@ -52,6 +53,7 @@ class BlockAdjuster {
       poses_.push_back(centre_T_local * pose);
     for (const Eigen::Vector2d& point : problem.landmarks)
       points_.push_back(centre_T_local * point);
+    if (!problem.inertial.empty()) inertial_.emplace(problem.inertial, problem.bias);
   }
 
   BlockEstimate run() {
@@ -80,6 +82,7 @@ class BlockAdjuster {
     for (std::size_t k = 0; k + 1 < members_ && k < problem_.motion.size(); ++k) {
       if (problem_.motion[k]) add_motion(k, *problem_.motion[k]);
     }
+    if (inertial_) inertial_->add_to(poses_, reduced_, gradient_);
     information_ = reduced_.diagonal();
     for (std::size_t i = 0; i < landmarks_; ++i) eliminate(i);
   }
@@ -111,7 +114,7 @@ class BlockAdjuster {
         (motion.mean.inverse() * poses_[k].inverse() * poses_[k + 1]).Log();
     const Eigen::Matrix3d jacobian =
         geometry::inverse_right_jacobian(error) * poses_[k + 1].inverse().Adjoint();
-    const Eigen::Matrix3d information = motion.covariance.inverse();
+    const Eigen::Matrix3d information = information_of(k, motion);
     const Eigen::Matrix3d hessian = jacobian.transpose() * information * jacobian;
     const Eigen::Vector3d gradient = jacobian.transpose() * information * error;
 
@@ -123,6 +126,16 @@ class BlockAdjuster {
     reduced_.block<3, 3>(b, a) -= hessian;
     gradient_.segment<3>(b) += gradient;
     gradient_.segment<3>(a) -= gradient;
+  }
+
+  /// The rotation does not count where the IMU tells it.
+  Eigen::Matrix3d information_of(std::size_t k, const geometry::SE2WithCovariance& motion) const {
+    const bool is_by_imu =
+        inertial_ && problem_.inertial[k] && !problem_.inertial[k]->is_stationary;
+    if (!is_by_imu) return motion.covariance.inverse();
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+    information.topLeftCorner<2, 2>() = motion.covariance.topLeftCorner<2, 2>().inverse();
+    return information;
   }
 
   void eliminate(std::size_t i) {
@@ -216,6 +229,11 @@ class BlockAdjuster {
       estimate.centre_T_member.push_back({poses_[k], covariance_of<3>(own)});
     }
 
+    if (inertial_) {
+      estimate.bias = inertial_->bias(root);
+      estimate.inertial_chi2 = inertial_->chi2();
+      estimate.inertial_degrees_of_freedom = inertial_->degrees_of_freedom();
+    }
     estimate.landmarks = points_;
     estimate.chi2 = chi2_;
     for (std::size_t i = 0; i < landmarks_; ++i) {
@@ -248,6 +266,7 @@ class BlockAdjuster {
   std::vector<Eigen::Vector2d> landmark_gradient_;
   std::vector<std::vector<Coupling>> coupling_;
   std::vector<double> chi2_;
+  std::optional<InertialChain> inertial_;
 };
 
 }  // namespace

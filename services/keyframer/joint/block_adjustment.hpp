@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/geometry/se2.hpp"
+#include "services/keyframer/joint/inertial_chain.hpp"
 
 namespace understory::keyframer::joint {
 
@@ -25,6 +26,10 @@ struct BlockProblem {
   std::vector<BlockObservation> observations;
   /// motion[k]: from member k to member k + 1, where odometry measured it; size members - 1 or 0.
   std::vector<std::optional<geometry::SE2WithCovariance>> motion;
+  /// The same steps by the IMU; size members - 1 or 0. Of a moving vehicle's `motion` the
+  /// translation alone counts then, since its rotation rests on the same gyro.
+  std::vector<std::optional<model::InertialMotion>> inertial;
+  BiasEstimate bias;  ///< Of the IMU, as known before; used where there is `inertial`.
 };
 
 /// The estimate in the frame `centre`.
@@ -40,7 +45,10 @@ struct BlockEstimate {
   /// Exact 2 x 2 blocks in that gauge [m^2]; NaN where a landmark has no observation. These and the
   /// members' covariances are exactly symmetric and positive semidefinite.
   std::vector<Eigen::Matrix2d> landmark_covariance;
-  std::vector<double> chi2;  ///< Per observation, 2 degrees of freedom, after the fit.
+  std::vector<double> chi2;          ///< Per observation, 2 degrees of freedom, after the fit.
+  std::optional<BiasEstimate> bias;  ///< Of the IMU, where there was one.
+  double inertial_chi2 = 0.0;        ///< Of what the IMU measured, after the fit.
+  int inertial_degrees_of_freedom = 0;
 };
 
 /// Gauss-Newton with the landmarks eliminated (Schur complement on the 3n pose parameters). An

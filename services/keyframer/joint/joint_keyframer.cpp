@@ -14,7 +14,7 @@ constexpr std::size_t kToContradict = 8;
 /// Share of the pairs by stated sigmas that smaller ones must keep to take their place.
 constexpr double kAsMany = 0.8;
 
-constexpr state::Format kFormat{"keyframer.joint", 6};
+constexpr state::Format kFormat{"keyframer.joint", 7};
 
 std::vector<std::uint64_t> numbers_of(const PlacedScan& placed) {
   return {placed.tracks.begin(), placed.tracks.end()};
@@ -40,14 +40,18 @@ std::optional<model::Keyframe> JointKeyframer::add(const model::LandmarkScan& ra
   // Detections at the true level, and the motion since the last scan where odometry covers it.
   const model::LandmarkScan scan = level_.levelled(raw);
   std::optional<geometry::SE2WithCovariance> motion;
-  if (last_utime_) motion = odometry_.between(*last_utime_, scan.utime);
+  std::optional<model::InertialMotion> inertial;
+  if (last_utime_) {
+    motion = odometry_.between(*last_utime_, scan.utime);
+    inertial = odometry_.inertial(*last_utime_, scan.utime);
+  }
 
   // Where the scan was made, and which detection is which landmark.
   std::optional<PlacedScan> placed = place(scan, motion);
   if (!placed) return start_anew(scan);
 
   // Enough scans are one keyframe.
-  gather({scan, std::move(*placed), motion});
+  gather({scan, std::move(*placed), motion, inertial});
   return is_full() ? finish() : std::nullopt;
 }
 
@@ -115,7 +119,7 @@ std::optional<model::Keyframe> JointKeyframer::start_anew(const model::LandmarkS
   noise_.forget_while_new();
   PlacedScan first = tracker_.restart(noise_.corrected(scan));
   noise_.add(scan, numbers_of(first));
-  gather({scan, std::move(first), std::nullopt});
+  gather({scan, std::move(first), std::nullopt, std::nullopt});
   return is_full() ? finish() : result;  // Full by one scan: then none was gathered before it.
 }
 
@@ -128,12 +132,7 @@ void JointKeyframer::gather(Member member) {
 std::optional<model::Keyframe> JointKeyframer::finish() {
   std::vector<Member> members = std::exchange(members_, {});
   for (Member& member : members) member.scan = noise_.corrected(std::move(member.scan));
-  // Where tracking began a scan ago, no landmark can have been observed in two.
-  const auto tracked = static_cast<int>(std::min<std::uint64_t>(tracker_.scans(), 1000));
-  const MemberBlock block =
-      adjust_members(members, tracker_.map(),
-                     {std::min(parameters_.min_observations, tracked), parameters_.motion_sigma_m,
-                      parameters_.motion_sigma_rad});
+  const MemberBlock block = adjusted(members);
   if (auto reason = why_unusable(members, block)) {
     ++counters_.keyframes_withheld;
     counters_.last_reason = std::move(*reason);
@@ -151,6 +150,34 @@ std::optional<model::Keyframe> JointKeyframer::finish() {
   local_T_previous_base_ = local_T_base;
   ++counters_.keyframes;
   return keyframe;
+}
+
+/// The members' estimate, from which the IMU's bias is learned.
+MemberBlock JointKeyframer::adjusted(std::span<const Member> members) {
+  // Where tracking began a scan ago, no landmark can have been observed in two.
+  const auto tracked = static_cast<int>(std::min<std::uint64_t>(tracker_.scans(), 1000));
+  BlockRules rules{std::min(parameters_.min_observations, tracked),
+                   parameters_.motion_sigma_m,
+                   parameters_.motion_sigma_rad,
+                   {}};
+
+  // The first member's step is not in the block: it ends where the block begins.
+  if (members.front().inertial) bias_.pass(*members.front().inertial);
+  const auto with_imu = std::ranges::find_if(
+      members.subspan(1), [](const Member& member) { return member.inertial && member.motion; });
+  const bool has_imu = with_imu != members.subspan(1).end();
+  if (has_imu) rules.bias = bias_.known(*with_imu->inertial, *with_imu->motion);
+
+  MemberBlock block = adjust_members(members, tracker_.map(), rules);
+  if (block.estimate.bias && block.estimate.determined) {
+    bias_.learn(*block.estimate.bias);
+  } else if (has_imu) {
+    bias_.forget();
+  }
+  for (const Member& member : members.subspan(1)) {
+    if (member.inertial) bias_.pass(*member.inertial);
+  }
+  return block;
 }
 
 std::string JointKeyframer::save() const { return state::save(kFormat, *this); }

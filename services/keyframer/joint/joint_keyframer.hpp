@@ -9,6 +9,7 @@
 #include "common/model/detection_noise.hpp"
 #include "common/model/level.hpp"
 #include "common/model/odometry_buffer.hpp"
+#include "services/keyframer/joint/bias_track.hpp"
 #include "services/keyframer/joint/calibration_watch.hpp"
 #include "services/keyframer/joint/member_block.hpp"
 #include "services/keyframer/joint/scan_tracker.hpp"
@@ -49,8 +50,9 @@ class JointKeyframer final : public KeyframerMethod {
   /// Members of a saved state; see common/state. The parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.tracker_, self.noise_, self.calibration_, self.odometry_, self.level_, self.members_,
-      self.last_utime_, self.next_sequence_, self.local_T_previous_base_, self.counters_);
+    a(self.tracker_, self.noise_, self.calibration_, self.odometry_, self.bias_, self.level_,
+      self.members_, self.last_utime_, self.next_sequence_, self.local_T_previous_base_,
+      self.counters_);
   }
 
  private:
@@ -63,12 +65,14 @@ class JointKeyframer final : public KeyframerMethod {
   void gather(Member member);
   bool is_full() const;
   std::optional<model::Keyframe> finish();
+  MemberBlock adjusted(std::span<const Member> members);
 
   JointKeyframerParameters parameters_;
   ScanTracker tracker_;
   model::DetectionNoise noise_;
   CalibrationWatch calibration_;
   model::OdometryBuffer odometry_;
+  BiasTrack bias_;
   model::LevelCorrection level_;
   std::vector<Member> members_;  ///< Of the keyframe that is being gathered; noise as stated.
   std::optional<model::Utime> last_utime_;

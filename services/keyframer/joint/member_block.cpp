@@ -1,8 +1,10 @@
 #include "services/keyframer/joint/member_block.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <map>
+#include <numeric>
 #include <set>
 
 #include "common/geometry/decompositions.hpp"
@@ -134,6 +136,34 @@ void adjust(MemberBlock& block) {
   }
 }
 
+/// Whether the IMU is not as its covariances say: the squared errors grow by far more with it than
+/// the numbers that it adds let expect (six standard deviations of chi^2, and by half).
+bool contradicts(const BlockEstimate& with_imu, const BlockEstimate& without) {
+  const auto sum = [](const std::vector<double>& chi2) {
+    return std::accumulate(chi2.begin(), chi2.end(), 0.0);
+  };
+  const double growth = with_imu.inertial_chi2 + sum(with_imu.chi2) - sum(without.chi2);
+  const double expected = std::max(with_imu.inertial_degrees_of_freedom, 1);
+  return !(growth <= 1.5 * expected + 6.0 * std::sqrt(2.0 * expected));
+}
+
+/// The same solution with the IMU, unless that contradicts what was observed.
+void use_imu(std::span<const Member> members, const BiasEstimate& bias, MemberBlock& block) {
+  BlockProblem problem = block.problem;
+  problem.bias = bias;
+  bool has_imu = false;
+  for (std::size_t k = 1; k < members.size(); ++k) {
+    problem.inertial.push_back(members[k].inertial);
+    has_imu = has_imu || members[k].inertial.has_value();
+  }
+  if (!has_imu || !block.estimate.converged) return;
+
+  BlockEstimate estimate = adjust_block(problem);
+  if (!estimate.converged || contradicts(estimate, block.estimate)) return;
+  block.problem = std::move(problem);
+  block.estimate = std::move(estimate);
+}
+
 /// Where odometry measured no motion, the tracked one takes its place.
 void assume_motion(const BlockRules& rules, BlockProblem& problem) {
   const double m2 = rules.motion_sigma_m * rules.motion_sigma_m;
@@ -156,12 +186,13 @@ MemberBlock adjust_members(std::span<const Member> members, const LocalMap& map,
   const std::vector<BlockObservation> observations = block.problem.observations;
 
   adjust(block);
-  if (block.estimate.determined || members.size() < 2) return block;
-
-  // Few landmarks connect the scans: what they leave open is as sure as a vehicle's motion is.
-  block.problem.observations = observations;
-  assume_motion(rules, block.problem);
-  adjust(block);
+  if (!block.estimate.determined && members.size() >= 2) {
+    // Few landmarks connect the scans: what they leave open is as sure as a vehicle's motion is.
+    block.problem.observations = observations;
+    assume_motion(rules, block.problem);
+    adjust(block);
+  }
+  use_imu(members, rules.bias, block);
   return block;
 }
 

@@ -18,11 +18,12 @@ struct Member {
   model::LandmarkScan scan;
   PlacedScan placed;
   std::optional<geometry::SE2WithCovariance> motion;  ///< Since the scan before, by odometry.
+  std::optional<model::InertialMotion> inertial;      ///< The same by the IMU.
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.scan, self.placed, self.motion);
+    a(self.scan, self.placed, self.motion, self.inertial);
   }
 };
 
@@ -38,13 +39,15 @@ struct BlockRules {
   int min_observations = 2;        ///< A track with fewer observations is left out.
   double motion_sigma_m = 0.3;     ///< Of a member's motion that nothing determines, per axis.
   double motion_sigma_rad = 0.04;  ///< Of its rotation.
+  BiasEstimate bias;               ///< Of the IMU, before the first member.
 };
 
 /// Estimates the members' poses and the landmarks of their tracks together. Tracks with fewer than
 /// `min_observations` observations and doubtful ones are left out, and of more than 1000 those that
 /// were observed least; so are outliers, by their chi^2, in at most two rounds. Where landmarks and
 /// odometry leave a motion undetermined, the one that was tracked counts with the sigmas of
-/// `rules`. Precondition: there is a member.
+/// `rules`. An IMU counts unless it contradicts what was observed. Precondition: there is a
+/// member.
 MemberBlock adjust_members(std::span<const Member> members, const LocalMap& map,
                            const BlockRules& rules);
 

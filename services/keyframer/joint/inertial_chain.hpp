@@ -1,0 +1,75 @@
+// What the IMU tells of the motion through a block of scans.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/geometry/se2.hpp"
+#include "common/model/odometry_buffer.hpp"
+
+namespace understory::keyframer::joint {
+
+/// What is known of the IMU's bias, in the axes of the vehicle.
+struct BiasEstimate {
+  model::InertialBias mean = model::InertialBias::Zero();  ///< (gyro, accelerometer's x and y).
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();    ///< In their units squared.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.mean, s.covariance);
+  }
+};
+
+/// The scans' velocities and the bias as unknowns beside their poses, eliminated: they hold the
+/// shape of a block far better than the stated errors of its steps do, since a velocity that is
+/// not known is one for all of them (Forster et al. 2017, in the plane). Nothing of it changes with
+/// the frame of the poses.
+class InertialChain {
+ public:
+  /// steps[k]: from pose k to pose k + 1, where an IMU measured it. `prior` is the bias before.
+  InertialChain(std::span<const std::optional<model::InertialMotion>> steps,
+                const BiasEstimate& prior);
+
+  /// Adds to the system of the poses (left perturbation: x, y, theta each) what the chain tells,
+  /// with the best velocities and bias at these poses. Cost O(n^3).
+  void add_to(std::span<const geometry::SE2> poses, Eigen::MatrixXd& hessian,
+              Eigen::VectorXd& gradient);
+
+  /// Weighted squared error at the poses of the last add_to, and how many numbers were compared
+  /// less those that were free beside the poses.
+  double chi2() const { return chi2_; }
+  int degrees_of_freedom() const { return degrees_of_freedom_; }
+  /// The bias at the poses of the last add_to. The poses' covariance is `root`^T `root`.
+  BiasEstimate bias(const Eigen::MatrixXd& root) const;
+
+ private:
+  struct Step {
+    std::size_t from = 0;  ///< Index of its first pose.
+    model::InertialMotion motion;
+    Eigen::Matrix<double, 5, 5> information;  ///< Of (yaw, velocity, position).
+  };
+
+  void linearise(std::span<const geometry::SE2> poses, Eigen::MatrixXd& hessian,
+                 Eigen::VectorXd& gradient);
+  void add(const Step& step, std::span<const geometry::SE2> poses, Eigen::MatrixXd& hessian,
+           Eigen::VectorXd& gradient);
+  void add_standstill(const Step& step);
+  Eigen::Index unknowns() const { return static_cast<Eigen::Index>(2 * poses_ + 3); }
+
+  std::vector<Step> steps_;
+  std::size_t poses_;
+  BiasEstimate prior_;
+  double chi2_ = 0.0;
+  int degrees_of_freedom_ = 0;
+  // Of the last add_to: velocities, each in the axes of its scan, then the bias less the prior's.
+  Eigen::VectorXd value_;
+  Eigen::MatrixXd hessian_;     ///< Of velocities and bias.
+  Eigen::VectorXd gradient_;    ///< Likewise.
+  Eigen::MatrixXd coupling_;    ///< Of poses (rows) with velocities and bias.
+  Eigen::MatrixXd covariance_;  ///< hessian_^-1.
+};
+
+}  // namespace understory::keyframer::joint
