@@ -26,13 +26,11 @@ Condensing::Due Condensing::due(double range_m, const KnownGround& known_ground,
   return due;
 }
 
-bool Condensing::compute_ahead(double range_m, const KnownGround& known_ground, GlobalMap& map) {
+void Condensing::compute_ahead(double range_m, const KnownGround& known_ground, GlobalMap& map) {
   std::vector<NodeIndex> nodes;
   for (const Passed& passed : present(complete(range_m, known_ground, map), map.graph))
     nodes.push_back(passed.node);
-  if (nodes.empty()) return false;
-  map.graph.condense_ahead(nodes);
-  return true;
+  if (!nodes.empty()) map.graph.condense_ahead(nodes);
 }
 
 /// How many of those that wait end with the oldest stretch; 0 where it cannot be condensed yet.

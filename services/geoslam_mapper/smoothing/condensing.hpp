@@ -39,8 +39,8 @@ class Condensing {
   /// condenses it with the keyframe's own. `known_ground`: what it has not judged yet waits.
   Due due(double range_m, const KnownGround& known_ground, const GlobalMap& map);
   /// To be called once a keyframe is done: what the next one's solution will take in, if anything,
-  /// is computed with this one, which takes less time. True where there is something.
-  bool compute_ahead(double range_m, const KnownGround& known_ground, GlobalMap& map);
+  /// is computed with this one, which takes less time.
+  void compute_ahead(double range_m, const KnownGround& known_ground, GlobalMap& map);
   /// To be called after each accepted keyframe: hands over what the nodes of the stretch had. One
   /// that could not be condensed stays as it is. Cost: what its nodes observed.
   void follow(const FusedKeyframe& fused, Due due, Discovery& discovery, Merges& merges,

@@ -15,9 +15,6 @@ namespace {
 
 /// Fewest landmarks that start a map without odometry.
 constexpr std::size_t kMinToStart = 3;
-/// What is far waits for so many keyframes: one that condenses a stretch ahead, one that takes it
-/// in.
-constexpr std::uint32_t kMostWaits = 2;
 /// Landmarks in common with the map that say that a keyframe agrees with it: two fix a pose.
 constexpr std::uint32_t kInCommon = 2;
 
@@ -131,10 +128,9 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
   const std::vector<model::Association> gone = name_gone(
       fused.keyframe, map_.graph.pose(fused.node), fused.associations, parameters_, map_.landmarks);
   extend(fused, gone, update);
-  const bool is_condensing =
-      !fused.condensed.empty() ||
-      condensing_.compute_ahead(keyframe.field_of_view.max_range_m, known_ground_, map_);
-  lighten(keyframe, fused.node, is_condensing);
+  if (fused.condensed.empty())
+    condensing_.compute_ahead(keyframe.field_of_view.max_range_m, known_ground_, map_);
+  lighten(keyframe, fused.node, !fused.condensed.empty());
   confirm(keyframe, update);
   report(keyframe, update);
   return with(kUpdated, fused.reason, std::move(update));
@@ -143,9 +139,9 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
 /// What is far leaves the solved graph. Condensing and dormancy each change much of it, which the
 /// next keyframe's solution takes in, and submaps take time of their own: one of them for each
 /// keyframe bounds its time. Who waited goes first at the next.
-void OneMap::lighten(const model::Keyframe& keyframe, NodeIndex newest, bool is_condensing) {
-  const bool may_wait = is_condensing && lightening_.waited < kMostWaits;
-  lightening_.waited = may_wait ? lightening_.waited + 1 : 0;
+void OneMap::lighten(const model::Keyframe& keyframe, NodeIndex newest, bool has_condensed) {
+  const bool may_wait = has_condensed && !lightening_.has_waited;
+  lightening_.has_waited = may_wait;
   if (may_wait) return;
 
   const auto give_away = [&] {

@@ -105,17 +105,18 @@ class OneMap {
   static void archive(Archive& a, Self& self) {
     a(self.map_, self.motion_, self.discovery_, self.merging_, self.known_ground_, self.condensing_,
       self.dormancy_, self.submaps_, self.closures_, self.scan_localiser_, self.common_error_,
-      self.first_offered_, self.agreeing_, self.lightening_.waited, self.lightening_.submaps_first);
+      self.first_offered_, self.agreeing_, self.lightening_.has_waited,
+      self.lightening_.submaps_first);
   }
 
  private:
   /// Whose turn it is, see lighten().
   struct Lightening {
-    std::uint32_t waited = 0;    ///< Keyframes, for a stretch that is condensed.
+    bool has_waited = false;     ///< At the last keyframe, for what was condensed.
     bool submaps_first = false;  ///< Before dormancy.
   };
 
-  void lighten(const model::Keyframe& keyframe, NodeIndex newest, bool is_condensing);
+  void lighten(const model::Keyframe& keyframe, NodeIndex newest, bool has_condensed);
   std::string why_not_start(const model::Keyframe& keyframe);
   void start_map(const model::Keyframe& keyframe, model::MapUpdate& update);
   std::optional<Placement> place(const model::Keyframe& keyframe,
