@@ -162,6 +162,75 @@ TEST_CASE("Dormant landmarks follow their nodes", "[mapper]") {
 
 namespace {
 
+/// Some of the landmarks, each with nodes that others have in common with it.
+std::vector<model::LandmarkId> every_third(const World& world, std::size_t first) {
+  std::vector<model::LandmarkId> ids;
+  for (std::size_t i = first; i < world.ids.size(); i += 3) ids.push_back(world.ids[i]);
+  return ids;
+}
+
+/// All of it dormant, and solved.
+World asleep(std::uint64_t seed) {
+  World result = world(seed, 1.0);
+  for (const NodeIndex node : result.nodes) result.map.graph.close(node);
+  result.map.graph.make_dormant(result.ids, result.map.landmarks.all());
+  for (int i = 0; i < 5; ++i) REQUIRE(result.map.graph.solve().ok);
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("Landmarks that go elsewhere and come back leave the graph as it is", "[mapper]") {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    World one = asleep(seed);
+    PoseGraph& graph = one.map.graph;
+    const Eigen::Matrix3d covariance = graph.marginal(one.nodes.back()).covariance;
+    std::vector<AwayLandmarks> away;
+    const auto is_unmoved = [&] {
+      graph.checkpoint();
+      REQUIRE(graph.solve().ok);
+      return graph.moved_nodes().empty() &&
+             graph.marginal(one.nodes.back()).covariance == covariance;
+    };
+    for (std::size_t part = 0; part < 3; ++part) {
+      away.push_back(graph.put_away(every_third(one, part)));
+      CHECK(is_unmoved());
+    }
+    for (const std::size_t part : {1, 0, 2}) {
+      graph.bring_back(every_third(one, part), away[part]);
+      CHECK(is_unmoved());
+    }
+  }
+}
+
+TEST_CASE("What wakes beside landmarks that are elsewhere is counted once", "[mapper]") {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    World one = asleep(seed);
+    PoseGraph& graph = one.map.graph;
+    const auto before = poses(one);
+    const Eigen::Matrix3d covariance = graph.marginal(one.nodes.back()).covariance;
+    const double sigma_m = std::sqrt(covariance.topLeftCorner<2, 2>().trace());
+    const auto is_same = [&] {
+      for (int i = 0; i < 3; ++i) REQUIRE(graph.solve().ok);
+      CHECK(apart_m(before, poses(one)) < 0.1 * sigma_m);
+      CHECK(graph.marginal(one.nodes.back()).covariance.isApprox(covariance, 0.1));
+    };
+
+    // One part is elsewhere, one wakes; then the first comes back and wakes, too.
+    const AwayLandmarks away = graph.put_away(every_third(one, 0));
+    graph.wake(every_third(one, 1));
+    is_same();
+    graph.bring_back(every_third(one, 0), away);
+    graph.wake(every_third(one, 0));
+    is_same();
+    graph.make_dormant(every_third(one, 1), one.map.landmarks.all());
+    graph.put_away(every_third(one, 1));
+    is_same();
+  }
+}
+
+namespace {
+
 /// A drive of 400 m straight through a forest, and back beside its first half.
 OneMap driven(const sim::Drive& drive, double condense_m) {
   keyframer::joint::JointKeyframer keyframer({});

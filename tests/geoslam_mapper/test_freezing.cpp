@@ -254,3 +254,83 @@ TEST_CASE("A frozen graph is the same after a load", "[freezing]") {
   CHECK(
       loaded.marginal(way.last).covariance.isApprox(way.graph.marginal(way.last).covariance, 0.01));
 }
+
+namespace {
+
+/// Nodes on a way, each tied to the one before and the second before, with a trunk that all see.
+struct Stretch {
+  PoseGraph graph{SmoothingMapperParameters{}};
+  std::vector<NodeIndex> nodes;
+  static constexpr model::LandmarkId kTrunk = 7;
+
+  Stretch() {
+    const Eigen::Matrix3d covariance = Eigen::Vector3d(1e-3, 4e-4, 1e-6).asDiagonal();
+    const geometry::SE2 step(2.0, 0.1, 0.02);
+    const Eigen::Vector2d trunk(8.0, 5.0);
+    nodes.push_back(graph.add_node({}, false, true));
+    graph.add_landmark(kTrunk, trunk, std::nullopt);
+    for (int i = 1; i < 9; ++i) {
+      nodes.push_back(graph.add_node(graph.pose(nodes.back()) * step, false));
+      const double off_m = 0.01 * (i % 3);
+      add(nodes[nodes.size() - 2], nodes.back(), {step * geometry::SE2(off_m, 0, 0), covariance});
+      const Eigen::Vector2d seen = graph.pose(nodes.back()).inverse() * trunk;
+      graph.observe(nodes.back(), kTrunk, seen + Eigen::Vector2d(off_m, 0.0),
+                    400.0 * Eigen::Matrix2d::Identity());
+    }
+    for (int i = 0; i < 4; ++i) REQUIRE(graph.solve().ok);
+  }
+  void add(NodeIndex from, NodeIndex to, const geometry::SE2WithCovariance& motion) {
+    CentreMotion one;
+    one.from = from;
+    one.from_T_to = motion;
+    graph.add_motion(one, to);
+  }
+  std::vector<NodeIndex> middle() const { return {nodes.begin() + 2, nodes.begin() + 6}; }
+  /// The poses of those that stay, once the middle is one node.
+  std::vector<geometry::SE2> condensed() {
+    const std::vector<Retirement> retired = graph.condense(middle());
+    REQUIRE(retired.size() == 4);
+    for (int i = 0; i < 4; ++i) REQUIRE(graph.solve().ok);
+    return {graph.pose(nodes[1]), graph.pose(retired.front().into), graph.pose(nodes.back())};
+  }
+};
+
+}  // namespace
+
+TEST_CASE("A stretch that was condensed ahead is as if it was not", "[freezing]") {
+  Stretch at_once;
+  Stretch ahead;
+  ahead.graph.condense_ahead(ahead.middle());
+  CHECK(apart(at_once.condensed(), ahead.condensed()) == 0.0);
+}
+
+TEST_CASE("What is measured after a stretch was condensed ahead counts", "[freezing]") {
+  const Eigen::Matrix3d covariance = 1e-4 * Eigen::Matrix3d::Identity();
+  const auto with = [&](bool is_ahead, auto&& measure) {
+    Stretch one;
+    if (is_ahead) one.graph.condense_ahead(one.middle());
+    measure(one);
+    return one.condensed();
+  };
+  const auto nothing = [](Stretch&) {};
+  const auto motion = [&](Stretch& one) {
+    one.add(one.nodes[3], one.nodes[5], {geometry::SE2(4.1, 0.3, 0.04), covariance});
+  };
+  const auto again = [&](Stretch& one) {
+    one.graph.observe(one.nodes[4], Stretch::kTrunk, {0.3, 4.0},
+                      900.0 * Eigen::Matrix2d::Identity());
+  };
+  const auto moved = [&](Stretch& one) {
+    one.add(one.nodes[1], one.nodes[7], {geometry::SE2(12.5, 1.2, 0.12), covariance});
+    for (int i = 0; i < 4; ++i) REQUIRE(one.graph.solve().ok);
+  };
+  const auto plain = with(false, nothing);
+  const auto check = [&](auto&& measure) {
+    const auto expected = with(false, measure);
+    CHECK(apart(expected, plain) > 1e-3);
+    CHECK(apart(expected, with(true, measure)) == 0.0);
+  };
+  check(motion);
+  check(again);
+  check(moved);
+}

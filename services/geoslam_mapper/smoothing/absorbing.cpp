@@ -62,10 +62,8 @@ FrozenMotion PoseGraph::loose_motion(MotionRef ref) const {
 }
 
 /// What stands for landmarks that are away, likewise.
-FrozenMotion PoseGraph::away_motion(const AwayTie& tie) const {
-  FrozenMotion motion = frozen_motion(smoother_.motion(tie.motion));
-  motion.away = tie.submaps;
-  return motion;
+FrozenMotion PoseGraph::away_motion(const TiedNodes& nodes, const Tie& tie) {
+  return {nodes.first, nodes.second, tie.away.a_T_b, tie.away.information, tie.submaps, 0};
 }
 
 std::vector<FrozenMotion> PoseGraph::motions_of(NodeIndex node) const {
@@ -83,7 +81,8 @@ std::vector<FrozenMotion> PoseGraph::loose_motions() const {
       if (ends_of(ref).first == node) motions.push_back(loose_motion(ref));
   }
 
-  for (const auto& [nodes, tie] : away_ties_) motions.push_back(away_motion(tie));
+  for (const auto& [nodes, tie] : ties_)
+    if (tie.submaps > 0) motions.push_back(away_motion(nodes, tie));
   return motions;
 }
 
@@ -96,7 +95,11 @@ NodeIndex PoseGraph::absorb(const LooseGraph& other, const geometry::SE2& map_T_
     node.along_m += further_m;
     if (one.is_free) free_nodes_.give(static_cast<NodeIndex>(nodes_.size() - 1));
   }
-  for (const FrozenMotion& one : other.motions) absorb(one, first);
+  std::set<TiedNodes> changed;
+  for (const FrozenMotion& one : other.motions) {
+    absorb(one, first);
+    if (one.away > 0) changed.emplace(first + one.a, first + one.b);
+  }
 
   for (const auto& [id, landmark] : other.solved) {
     add_landmark(id, map_T_other * landmark.position_m, std::nullopt);
@@ -107,7 +110,6 @@ NodeIndex PoseGraph::absorb(const LooseGraph& other, const geometry::SE2& map_T_
     }
   }
 
-  std::set<TiedNodes> changed;
   for (const auto& [id, observed] : other.dormant) {
     std::vector<DormantObservation>& ours = dormant_[id];
     for (DormantObservation seen : observed) {

@@ -3,7 +3,6 @@
 #include <map>
 #include <stdexcept>
 
-#include "services/geoslam_mapper/smoothing/fused_motion.hpp"
 #include "services/geoslam_mapper/smoothing/pose_graph.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
@@ -16,20 +15,17 @@ AwayLandmarks PoseGraph::put_away(std::span<const model::LandmarkId> ids) {
     for (const TiedNodes& nodes : tied_by(id)) tied[nodes].push_back(id);
   }
 
-  // Each tie in two: what they tell, and what those tell that stay.
+  // Of each tie what they tell; with those that stay it is what the graph has.
   AwayLandmarks away;
-  std::set<TiedNodes> changed;
   away.ties.reserve(tied.size());
-  for (const auto& [nodes, tied_ids] : tied) {
-    const std::vector<model::LandmarkId>& theirs = tied_ids;
+  for (const auto& [nodes, theirs] : tied) {
     const plane::RelativePose motion = tie(nodes, theirs);
     away.ties.push_back({nodes.first, nodes.second, motion.a_T_b, motion.information, 1, 0});
     add_away(away.ties.back());
-    std::vector<model::LandmarkId>& all = ties_.at(nodes).landmarks;
-    std::erase_if(all, [&](auto id) { return std::ranges::find(theirs, id) != theirs.end(); });
-    changed.insert(nodes);
+    const std::vector<model::LandmarkId>& going = theirs;
+    std::erase_if(ties_.at(nodes).landmarks,
+                  [&](auto id) { return std::ranges::find(going, id) != going.end(); });
   }
-  renew(changed);
 
   away.observed.reserve(ids.size());
   for (const model::LandmarkId id : ids) {
@@ -50,13 +46,20 @@ void PoseGraph::bring_back(std::span<const model::LandmarkId> ids, const AwayLan
   bool fits = ids.size() == away.observed.size();
   for (const auto& observed : away.observed)
     fits = fits && !observed.empty() && std::ranges::all_of(observed, is_good);
-  const auto stands = [&](const FrozenMotion& one) { return away_ties_.contains({one.a, one.b}); };
+  const auto stands = [&](const FrozenMotion& one) {
+    const auto found = ties_.find({one.a, one.b});
+    return found != ties_.end() && found->second.submaps > 0;
+  };
   fits = fits && std::ranges::all_of(away.ties, stands);
   if (!fits || std::ranges::any_of(ids, [&](auto id) { return dormant_.contains(id); }))
     throw std::invalid_argument("submap: its landmarks do not fit the graph");
 
-  for (const FrozenMotion& tie : away.ties) take_away_out(tie);
-  std::set<TiedNodes> changed;
+  std::set<TiedNodes> stood_for;
+  for (const FrozenMotion& one : away.ties) {
+    take_away_out(one);
+    stood_for.emplace(one.a, one.b);
+  }
+  std::set<TiedNodes> changed;  // None, where the payload is what the graph gave away.
   for (std::size_t i = 0; i < ids.size(); ++i) {
     dormant_.emplace(ids[i], away.observed[i]);
     for (const DormantObservation& one : away.observed[i]) {
@@ -64,45 +67,32 @@ void PoseGraph::bring_back(std::span<const model::LandmarkId> ids, const AwayLan
     }
     for (const TiedNodes& nodes : tied_by(ids[i])) {
       ties_[nodes].landmarks.push_back(ids[i]);
-      changed.insert(nodes);
+      if (!stood_for.contains(nodes)) changed.insert(nodes);
     }
   }
+  for (const TiedNodes& nodes : stood_for)
+    if (ties_.at(nodes).landmarks.empty()) changed.insert(nodes);
   renew(changed);
 }
 
 /// Each two nodes that lie near each other have landmarks in common that are parts of several
-/// submaps: one motion of them is what a long drive has room for.
-void PoseGraph::add_away(const FrozenMotion& tie) {
-  const auto entry = away_ties_.find({tie.a, tie.b});
-  if (entry == away_ties_.end()) {
-    const plane::MotionId motion =
-        put({nodes_[tie.a].centre, nodes_[tie.b].centre, tie.a_T_b, tie.information});
-    away_ties_.emplace(TiedNodes{tie.a, tie.b}, AwayTie{motion, tie.away});
-    return;
-  }
-  plane::RelativePose motion = smoother_.motion(entry->second.motion);
-  const MeasuredMotion sum =
-      fused({motion.a_T_b, motion.information}, {tie.a_T_b, tie.information});
-  motion.a_T_b = sum.a_T_b;
-  motion.information = sum.information;
-  smoother_.set(entry->second.motion, motion);
-  entry->second.submaps += tie.away;
+/// submaps: one motion of them is what a long drive has room for. The graph's motion stays.
+void PoseGraph::add_away(const FrozenMotion& motion) {
+  Tie& tie = ties_[{motion.a, motion.b}];
+  const MeasuredMotion fresh{motion.a_T_b, motion.information};
+  tie.away = tie.submaps == 0 ? fresh : fused(tie.away, fresh);
+  tie.submaps += motion.away;
 }
 
-void PoseGraph::take_away_out(const FrozenMotion& tie) {
-  const auto entry = away_ties_.find({tie.a, tie.b});
-  if (entry->second.submaps <= tie.away) {
-    take_out(entry->second.motion);
-    away_ties_.erase(entry);
+void PoseGraph::take_away_out(const FrozenMotion& motion) {
+  Tie& tie = ties_.at({motion.a, motion.b});
+  if (tie.submaps <= motion.away) {
+    tie.submaps = 0;
+    tie.away = {};
     return;
   }
-  plane::RelativePose motion = smoother_.motion(entry->second.motion);
-  const MeasuredMotion rest =
-      without({motion.a_T_b, motion.information}, {tie.a_T_b, tie.information});
-  motion.a_T_b = rest.a_T_b;
-  motion.information = rest.information;
-  smoother_.set(entry->second.motion, motion);
-  entry->second.submaps -= tie.away;
+  tie.away = without(tie.away, {motion.a_T_b, motion.information});
+  tie.submaps -= motion.away;
 }
 
 std::span<const model::LandmarkId> PoseGraph::dormant_of(NodeIndex node) const {

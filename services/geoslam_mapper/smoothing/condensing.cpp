@@ -18,28 +18,46 @@ constexpr double kTied_rad = 5e-3;
 
 Condensing::Due Condensing::due(double range_m, const KnownGround& known_ground,
                                 const GlobalMap& map) {
+  Due due;
+  due.waited = complete(range_m, known_ground, map);
+  const std::vector<Passed> stretch = present(due.waited, map.graph);
+  for (const Passed& passed : stretch) due.nodes.push_back(passed.node);
+  if (keeps_stretches_ && !stretch.empty()) due.was = stretch_of(stretch, map);
+  return due;
+}
+
+void Condensing::compute_ahead(double range_m, const KnownGround& known_ground, GlobalMap& map) {
+  std::vector<NodeIndex> nodes;
+  for (const Passed& passed : present(complete(range_m, known_ground, map), map.graph))
+    nodes.push_back(passed.node);
+  if (!nodes.empty()) map.graph.condense_ahead(nodes);
+}
+
+/// How many of those that wait end with the oldest stretch; 0 where it cannot be condensed yet.
+std::size_t Condensing::complete(double range_m, const KnownGround& known_ground,
+                                 const GlobalMap& map) {
   while (!waiting_.empty() && !is_there(waiting_.front(), map.graph)) waiting_.pop_front();
-  if (parameters_.condense_m <= 0.0 || waiting_.empty()) return {};
+  if (parameters_.condense_m <= 0.0 || waiting_.empty()) return 0;
 
   const double now_m = map.graph.node(map.trajectory.last().node).along_m;
   const double end_m = now_m - std::max(parameters_.condense_after_m, range_m);
   const CutPolicy policy = cut_policy(parameters_, range_m);
   const auto size = first_stretch(cut_nodes(policy, end_m, map.graph), policy);
-  if (!size) return {};
-  const auto end = waiting_.begin() + static_cast<std::ptrdiff_t>(*size);
-  if (std::any_of(waiting_.begin(), end,
-                  [&](const Passed& passed) { return known_ground.is_recent(passed.node); })) {
-    return {};
-  }
+  if (!size) return 0;
+  const bool is_judged =
+      std::none_of(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(*size),
+                   [&](const Passed& passed) { return known_ground.is_recent(passed.node); });
+  return is_judged ? *size : 0;
+}
 
-  Due due;
-  due.waited = *size;
-  std::vector<Passed> stretch;
-  std::copy_if(waiting_.begin(), end, std::back_inserter(stretch),
-               [&](const Passed& passed) { return is_there(passed, map.graph); });
-  for (const Passed& passed : stretch) due.nodes.push_back(passed.node);
-  if (keeps_stretches_) due.was = stretch_of(stretch, map);
-  return due;
+/// Those of the first ones that wait that are in the graph.
+std::vector<Condensing::Passed> Condensing::present(std::size_t count,
+                                                    const PoseGraph& graph) const {
+  std::vector<Passed> result;
+  std::copy_if(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(count),
+               std::back_inserter(result),
+               [&](const Passed& passed) { return is_there(passed, graph); });
+  return result;
 }
 
 void Condensing::follow(const FusedKeyframe& fused, Due due, Discovery& discovery, Merges& merges,

@@ -38,6 +38,9 @@ class Condensing {
   /// enough beyond it. Each elimination takes in the whole window around the vehicle, so fuse()
   /// condenses it with the keyframe's own. `known_ground`: what it has not judged yet waits.
   Due due(double range_m, const KnownGround& known_ground, const GlobalMap& map);
+  /// To be called once a keyframe is done: what the next one's solution will take in, if anything,
+  /// is computed with this one, which takes less time.
+  void compute_ahead(double range_m, const KnownGround& known_ground, GlobalMap& map);
   /// To be called after each accepted keyframe: hands over what the nodes of the stretch had. One
   /// that could not be condensed stays as it is. Cost: what its nodes observed.
   void follow(const FusedKeyframe& fused, Due due, Discovery& discovery, Merges& merges,
@@ -74,6 +77,8 @@ class Condensing {
       a(s.node, s.along_m, s.scans, s.number);
     }
   };
+  std::size_t complete(double range_m, const KnownGround& known_ground, const GlobalMap& map);
+  std::vector<Passed> present(std::size_t count, const PoseGraph& graph) const;
   static bool is_there(const Passed& passed, const PoseGraph& graph);
   static bool are_tied(NodeIndex before, NodeIndex node, const PoseGraph& graph);
   std::vector<CutNode> cut_nodes(const CutPolicy& policy, double end_m,

@@ -112,13 +112,22 @@ void PoseGraph::renew(const std::set<TiedNodes>& ties) {
   for (const TiedNodes& nodes : ties) {
     const auto entry = ties_.find(nodes);
     Tie& one = entry->second;
-    if (one.landmarks.empty()) {
+    if (one.landmarks.empty() && one.submaps == 0) {
       if (one.motion) take_out(*one.motion);
       ties_.erase(entry);
       continue;
     }
 
-    const plane::RelativePose factor = tie(nodes, one.landmarks);
+    plane::RelativePose factor{nodes_[nodes.first].centre, nodes_[nodes.second].centre,
+                               one.away.a_T_b, one.away.information};
+    if (!one.landmarks.empty()) {
+      factor = tie(nodes, one.landmarks);
+      if (one.submaps > 0) {
+        const MeasuredMotion sum = fused(one.away, {factor.a_T_b, factor.information});
+        factor.a_T_b = sum.a_T_b;
+        factor.information = sum.information;
+      }
+    }
     if (one.motion) {
       smoother_.set(*one.motion, factor);
     } else {

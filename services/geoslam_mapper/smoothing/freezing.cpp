@@ -63,9 +63,9 @@ std::vector<FrozenMotion> PoseGraph::motions_around(const std::set<NodeIndex>& n
       if (!nodes.contains(other) || node < other) around.push_back(loose_motion(ref));
     }
   }
-  for (const auto& [ends, tie] : away_ties_)
+  for (const auto& [ends, tie] : ties_)
     if (nodes.contains(ends.first) || nodes.contains(ends.second))
-      around.push_back(away_motion(tie));
+      around.push_back(away_motion(ends, tie));
   return around;
 }
 
@@ -79,10 +79,10 @@ void PoseGraph::take_motions_out(const std::set<NodeIndex>& nodes) {
     }
     edit(node).give_room_back();
   }
-  std::erase_if(away_ties_, [&](const auto& one) {
+  std::erase_if(ties_, [&](const auto& one) {
     const auto& [ends, tie] = one;
     if (!nodes.contains(ends.first) && !nodes.contains(ends.second)) return false;
-    take_out(tie.motion);
+    take_out(*tie.motion);
     return true;
   });
 }
@@ -116,15 +116,18 @@ void PoseGraph::recondense_frozen() {
 
 /// Motions of which no end is frozen are in the solved graph again.
 void PoseGraph::give_back(std::span<const FrozenMotion> motions) {
+  std::set<TiedNodes> tied;
   for (const FrozenMotion& one : motions) {
     if (one.away > 0) {
       add_away(one);
+      tied.emplace(one.a, one.b);
       continue;
     }
     const MotionRef ref = link(
         {nodes_[one.a].centre, nodes_[one.b].centre, one.a_T_b, one.information}, one.a, one.b);
     if (one.closure != 0) closures_.emplace(ref.number, one.closure);
   }
+  renew(tied);
 }
 
 /// None where a part does not determine its nodes, or is tied to too many.

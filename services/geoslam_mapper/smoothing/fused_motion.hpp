@@ -11,6 +11,12 @@ namespace understory::geoslam_mapper::smoothing {
 struct MeasuredMotion {
   geometry::SE2 a_T_b;
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< Of its error on the right.
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.a_T_b, s.information);
+  }
 };
 
 /// Both as one: where the sum of their squared errors is least. What neither measures stays as

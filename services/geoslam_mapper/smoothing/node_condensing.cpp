@@ -17,10 +17,19 @@ plane::PoseId pose_at(std::size_t i) { return plane::PoseId(static_cast<std::uin
 
 }  // namespace
 
+void PoseGraph::condense_ahead(std::span<const NodeIndex> nodes) {
+  Part part = part_of(nodes);
+  auto condensed = plane::condense(part.graph, part.inner.size());
+  ahead_.reset();
+  if (condensed) ahead_ = CondensedAhead{std::move(part), *std::move(condensed)};
+}
+
 std::vector<Retirement> PoseGraph::condense(std::span<const NodeIndex> nodes) {
-  const Part part = part_of(nodes);
-  const auto condensed = plane::condense(part.graph, part.inner.size());
-  if (!condensed) return {};
+  if (!ahead_ || !std::ranges::equal(ahead_->part.inner, nodes)) condense_ahead(nodes);
+  if (!ahead_) return {};
+  const CondensedAhead ahead = *std::exchange(ahead_, std::nullopt);
+  const Part& part = ahead.part;
+  const plane::CondensedPart* const condensed = &ahead.condensed;
 
   // One node comes, then the others go: it gets a number that none of them has.
   const double along_m = nodes_[part.inner[part.inner.size() / 2]].along_m;

@@ -128,15 +128,17 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
   const std::vector<model::Association> gone = name_gone(
       fused.keyframe, map_.graph.pose(fused.node), fused.associations, parameters_, map_.landmarks);
   extend(fused, gone, update);
+  if (fused.condensed.empty())
+    condensing_.compute_ahead(keyframe.field_of_view.max_range_m, known_ground_, map_);
   lighten(keyframe, fused.node, !fused.condensed.empty());
   confirm(keyframe, update);
   report(keyframe, update);
   return with(kUpdated, fused.reason, std::move(update));
 }
 
-/// What is far leaves the solved graph. Condensing, dormancy and submaps each change much of it,
-/// which the next keyframe's solution takes in: one of them for each keyframe bounds its time. Who
-/// waited goes first at the next.
+/// What is far leaves the solved graph. Condensing and dormancy each change much of it, which the
+/// next keyframe's solution takes in, and submaps take time of their own: one of them for each
+/// keyframe bounds its time. Who waited goes first at the next.
 void OneMap::lighten(const model::Keyframe& keyframe, NodeIndex newest, bool has_condensed) {
   const bool may_wait = has_condensed && !lightening_.has_waited;
   lightening_.has_waited = may_wait;

@@ -23,6 +23,7 @@ void PoseGraph::checkpoint() {
 }
 
 void PoseGraph::rollback() {
+  ahead_.reset();
   smoother_.rollback();
   gyro_.rollback();
   for (FreeNumbers* free :
@@ -52,8 +53,15 @@ void PoseGraph::rollback() {
 
 /// The node for change; its first change since the checkpoint keeps what it was.
 Node& PoseGraph::edit(NodeIndex node) {
+  forget_ahead_of(node);
   if (before_ && node < before_->nodes) before_->changed.try_emplace(node, nodes_[node]);
   return nodes_[node];
+}
+
+/// What was computed ahead does not hold once its nodes change.
+void PoseGraph::forget_ahead_of(NodeIndex node) {
+  if (ahead_ && std::ranges::find(ahead_->part.inner, node) != ahead_->part.inner.end())
+    ahead_.reset();
 }
 
 NodeIndex PoseGraph::add_node(const geometry::SE2& map_T_centre, bool is_stationary,
@@ -117,6 +125,7 @@ void PoseGraph::observe(NodeIndex node, model::LandmarkId id, const Eigen::Vecto
     return;
   }
 
+  forget_ahead_of(node);
   plane::PointObservation factor = smoother_.observation(entry->second);
   const Eigen::Matrix2d sum = factor.information + information;
   factor.position =
@@ -258,6 +267,7 @@ double PoseGraph::closure_chi2(std::uint64_t id) const {
 
 /// What is condensed or wakes lies behind: the next keyframe goes on where the newest one is.
 plane::SmootherUpdate PoseGraph::solve() {
+  ahead_.reset();
   if (newest_) smoother_.expect_changes_at(nodes_[*newest_].centre);
   return smoother_.update();
 }
@@ -362,6 +372,7 @@ std::vector<NodeIndex> PoseGraph::moved_nodes() const {
 void PoseGraph::restore(const plane::Graph& graph) {
   if (graph.poses.size() != nodes_.size() || graph.points.size() != landmark_of_point_.size())
     throw std::invalid_argument("mapper state: its graph does not fit its nodes");
+  ahead_.reset();
   smoother_.start_from(graph);
   for (const NodeIndex node : frozen_.all()) smoother_.park(nodes_.at(node).centre);
   if (anchor_) hold(*anchor_);

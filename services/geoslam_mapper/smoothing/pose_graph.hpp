@@ -18,6 +18,7 @@
 #include "services/geoslam_mapper/smoothing/free_numbers.hpp"
 #include "services/geoslam_mapper/smoothing/frozen_motions.hpp"
 #include "services/geoslam_mapper/smoothing/frozen_part.hpp"
+#include "services/geoslam_mapper/smoothing/fused_motion.hpp"
 #include "services/geoslam_mapper/smoothing/gyro_bias.hpp"
 #include "services/geoslam_mapper/smoothing/node.hpp"
 #include "services/geoslam_mapper/smoothing/node_set.hpp"
@@ -165,8 +166,12 @@ class PoseGraph {
   /// moved becomes one condensed measurement (plane::condense). The newest node and the one that
   /// holds the map must not be among them. The retirements tell where each node was relative to
   /// the new one; empty, and nothing changed, where their own factors leave a node undetermined.
-  /// Cost: the factors of the nodes.
+  /// Cost: the factors of the nodes, and condense_ahead() where it was not called.
   std::vector<Retirement> condense(std::span<const NodeIndex> nodes);
+  /// Computes what condense() of these nodes puts in their place, which it takes if neither they
+  /// nor any estimate was changed by then. Nothing else depends on it. Cost: cubic in the nodes,
+  /// linear in their factors.
+  void condense_ahead(std::span<const NodeIndex> nodes);
 
   /// Takes landmarks out of the solved graph: what they measure of the nodes that observed them,
   /// all of which must be condensed, becomes motions between these. Exact but for the linearisation
@@ -285,8 +290,7 @@ class PoseGraph {
     factor_graph::plane::Graph graph = self.smoother_.graph();
     a(graph, self.nodes_, self.landmark_of_point_, self.gyro_, self.newest_, self.free_nodes_,
       self.free_points_, self.free_observations_, self.free_motions_, self.free_biased_,
-      self.dormant_, self.ties_, self.closures_, self.away_ties_, self.frozen_motions_,
-      self.origin_, self.anchor_);
+      self.dormant_, self.ties_, self.closures_, self.frozen_motions_, self.origin_, self.anchor_);
     const std::set<NodeIndex> all = self.frozen_.all();
     std::vector<NodeIndex> frozen(all.begin(), all.end());
     a(frozen);
@@ -309,35 +313,31 @@ class PoseGraph {
     std::vector<std::pair<factor_graph::plane::PointId, model::LandmarkId>> dropped;
   };
   Node& edit(NodeIndex node);
+  void forget_ahead_of(NodeIndex node);
   NodeIndex put_node(const geometry::SE2& map_T_centre, bool is_stationary, double along_m);
   /// What two nodes have in common, smaller number first.
   using TiedNodes = std::pair<NodeIndex, NodeIndex>;
-  /// The dormant landmarks that two nodes observed, as one motion between the nodes.
+  /// The landmarks that two nodes observed and that are not solved, as one motion between the
+  /// nodes: the dormant ones, and those that are kept elsewhere. One of those goes or comes from
+  /// here to there without a change of the motion.
   struct Tie {
     std::optional<factor_graph::plane::MotionId> motion;
-    std::vector<model::LandmarkId> landmarks;
+    std::vector<model::LandmarkId> landmarks;  ///< The dormant ones.
+    MeasuredMotion away;                       ///< What stands for the others,
+    std::uint32_t submaps = 0;                 ///< parts of so many submaps.
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& s) {
-      a(s.motion, s.landmarks);
-    }
-  };
-  /// What stands for landmarks of two nodes that are kept elsewhere, of so many submaps.
-  struct AwayTie {
-    factor_graph::plane::MotionId motion{};
-    std::uint32_t submaps = 0;
-
-    template <class Archive, class Self>
-    static void archive(Archive& a, Self& s) {
-      a(s.motion, s.submaps);
+      a(s.motion, s.landmarks, s.submaps);
+      if (s.submaps > 0) a(s.away);
     }
   };
   std::vector<TiedNodes> tied_by(model::LandmarkId id) const;
   void renew(const std::set<TiedNodes>& ties);
   factor_graph::plane::MotionId put(const factor_graph::plane::RelativePose& motion);
   void take_out(factor_graph::plane::MotionId motion);
-  void add_away(const FrozenMotion& tie);
-  void take_away_out(const FrozenMotion& tie);
+  void add_away(const FrozenMotion& motion);
+  void take_away_out(const FrozenMotion& motion);
   bool may_freeze(NodeIndex node) const;
   void hold(const Anchor& anchor);
   std::optional<Anchor> anchor_beyond(const std::set<NodeIndex>& going) const;
@@ -355,7 +355,7 @@ class PoseGraph {
   void set_frozen_factors();
   void recondense_frozen();
   FrozenMotion loose_motion(MotionRef ref) const;
-  FrozenMotion away_motion(const AwayTie& tie) const;
+  static FrozenMotion away_motion(const TiedNodes& nodes, const Tie& tie);
   std::vector<FrozenMotion> loose_motions() const;
   void absorb(const FrozenMotion& motion, NodeIndex first);
   factor_graph::plane::RelativePose tie(const TiedNodes& nodes,
@@ -393,9 +393,8 @@ class PoseGraph {
   std::vector<model::LandmarkId> landmark_of_point_;
   GyroBias gyro_;
   std::map<model::LandmarkId, std::vector<DormantObservation>> dormant_;
-  std::map<TiedNodes, Tie> ties_;
+  std::map<TiedNodes, Tie> ties_;                    ///< But for those that are frozen.
   std::map<std::uint32_t, std::uint64_t> closures_;  ///< Closures by the number of their motion.
-  std::map<TiedNodes, AwayTie> away_ties_;           ///< But for those that are frozen.
   NodeSet frozen_;
   FrozenMotions frozen_motions_;              ///< With an end that is frozen.
   std::vector<FrozenFactor> frozen_factors_;  ///< In the solved graph; from the motions.
@@ -413,6 +412,12 @@ class PoseGraph {
   FreeNumbers free_observations_;
   FreeNumbers free_motions_;
   FreeNumbers free_biased_;
+  /// Nodes that are to become one, and what they measure. From the rest: it is in no saved state.
+  struct CondensedAhead {
+    Part part;
+    factor_graph::plane::CondensedPart condensed;
+  };
+  std::optional<CondensedAhead> ahead_;
   std::optional<Checkpoint> before_;
 };
 

@@ -108,7 +108,7 @@ bool Submaps::give_next_away(NodeIndex newest, model::Utime utime, GlobalMap& ma
   if (next == here_.end()) return false;
   map.graph.checkpoint();
   give_away(Here(*next), utime, map);
-  return true;  // What it tells is in the graph as before: the next keyframe's solution will do.
+  return true;  // What it tells is in the graph as before.
 }
 
 /// The first node is in no stretch: far behind it is a submap of its own.

@@ -30,9 +30,9 @@ class Submaps {
   /// A stretch of the path became this node.
   void condensed(NodeIndex node) { here_.push_back({node, std::nullopt}); }
   /// To be called after accepted keyframes. One submap goes or is wanted back at each: what the
-  /// vehicle comes near first, else what is far. True where there is one, which the next solution
-  /// takes in. Cost: one distance for each submap that is here, and what goes; every few metres
-  /// one for each that is away.
+  /// vehicle comes near first, else what is far. True where there is one; the solved graph is as
+  /// it was, unless it froze or thawed nodes. Cost: one distance for each submap that is here, and
+  /// what goes; every few metres one for each that is away.
   bool follow(const model::FieldOfView& field_of_view, NodeIndex newest, model::Utime utime,
               GlobalMap& map);
 
@@ -41,8 +41,8 @@ class Submaps {
   /// What is wanted back and has not come yet, in the order in which it is needed.
   const std::vector<model::SubmapId>& wanted() const { return wanted_; }
   /// Puts a submap back. Returns why not, where it is not away or not as it was; the map is
-  /// unchanged then. What its landmarks tell is in the graph already: the next solution takes the
-  /// exchange in. Solves where a node of it is frozen.
+  /// unchanged then. What its landmarks tell is in the graph already, which does not change. Solves
+  /// where a node of it is frozen.
   std::string bring_back(const model::Submap& submap, GlobalMap& map);
   /// Where all that was ever given away is, in order of id.
   std::vector<model::SubmapPose> poses(const PoseGraph& graph) const;
