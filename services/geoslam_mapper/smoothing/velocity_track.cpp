@@ -6,8 +6,11 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Of the accelerometer's bias, the level's error included [m/s^2].
+constexpr double kGravity_mps2 = 9.81;
+/// Of the accelerometer's bias before anything is known, the level's error included [m/s^2].
 constexpr double kAccelerometer_mps2 = 0.05;
+/// Its random walk [m/s^2/sqrt(s)], as the filter has it.
+constexpr double kAccelerometerWalk = 1e-3;
 /// Change of speed within a step of odometry [m/s^2]: its mean is not the speed at its end.
 constexpr double kAcceleration_mps2 = 2.0;
 /// Of the velocity of a stationary vehicle [m/s].
@@ -23,39 +26,53 @@ Eigen::Matrix2d isotropic(double sigma) { return square(sigma) * Eigen::Matrix2d
 
 }  // namespace
 
-/// Odometry's mean velocity, or none.
+/// Odometry's mean velocity, or none; a bias that is known stays.
 void VelocityTrack::start_with(const geometry::SE2WithCovariance& step,
                                const model::InertialMotion& inertial) {
-  now_.emplace();
-  now_->covariance = isotropic(kStandstill_mps);
-  if (inertial.is_stationary) return;
-  const double seconds = inertial.inertial.seconds;
-  now_->velocity_mps = step.mean.rotation().transpose() * step.mean.translation() / seconds;
-  now_->covariance = step.covariance.topLeftCorner<2, 2>() / square(seconds) +
-                     isotropic(kAcceleration_mps2 * seconds);
+  State start;
+  start.mean.tail<2>() = inertial.inertial.bias.tail<2>();
+  start.covariance.bottomRightCorner<2, 2>() = isotropic(kAccelerometer_mps2);
+  if (now_) {
+    start.mean.tail<2>() = now_->mean.tail<2>();
+    start.covariance.bottomRightCorner<2, 2>() = now_->covariance.bottomRightCorner<2, 2>();
+  }
+
+  start.covariance.topLeftCorner<2, 2>() = isotropic(kStandstill_mps);
+  if (!inertial.is_stationary) {
+    const double seconds = inertial.inertial.seconds;
+    start.mean.head<2>() = step.mean.rotation().transpose() * step.mean.translation() / seconds;
+    start.covariance.topLeftCorner<2, 2>() =
+        step.covariance.topLeftCorner<2, 2>() / square(seconds) +
+        isotropic(kAcceleration_mps2 * seconds);
+  }
+  now_ = start;
 }
 
-/// The velocity at the last scan by what odometry says of the step from it, and the last pose by
-/// what their errors have in common.
+/// Velocity and bias by what odometry says of the step that follows, and the last pose by what
+/// their errors have in common.
 void VelocityTrack::learn_from(const geometry::SE2WithCovariance& step,
                                const model::Preintegration& z,
                                geometry::SE2WithCovariance& map_T_last) {
-  const double t = z.seconds;
+  Eigen::Matrix<double, 2, 4> jacobian;  // Of the displacement.
+  jacobian << z.seconds * Eigen::Matrix2d::Identity(), z.bias_jacobian.block<2, 2>(3, 1);
+  const Eigen::Vector2d bias = now_->mean.tail<2>() - z.bias.tail<2>();
+  const Eigen::Vector2d expected =
+      z.seconds * now_->mean.head<2>() + z.position_m + z.bias_jacobian.block<2, 2>(3, 1) * bias;
   const Eigen::Matrix2d rotation = step.mean.rotation();
-  const Eigen::Matrix2d measured =
-      (rotation * step.covariance.topLeftCorner<2, 2>() * rotation.transpose() +
-       z.covariance.bottomRightCorner<2, 2>()) /
-      square(t);
-  const Eigen::Vector2d error = (step.mean.translation() - z.position_m) / t - now_->velocity_mps;
-  const Eigen::Matrix2d weight = (now_->covariance + measured).inverse();
+  const Eigen::Matrix2d weight =
+      (jacobian * now_->covariance * jacobian.transpose() +
+       rotation * step.covariance.topLeftCorner<2, 2>() * rotation.transpose() +
+       z.covariance.bottomRightCorner<2, 2>())
+          .inverse();
+  const Eigen::Vector2d error = step.mean.translation() - expected;
 
-  const Eigen::Matrix<double, 3, 2> of_pose = now_->with_pose * weight;
-  map_T_last.mean = map_T_last.mean * geometry::SE2::Exp(of_pose * error);
-  map_T_last.covariance -= of_pose * now_->with_pose.transpose();
-  const Eigen::Matrix2d of_velocity = now_->covariance * weight;
-  now_->velocity_mps += of_velocity * error;
-  now_->with_pose -= of_pose * now_->covariance;
-  now_->covariance -= of_velocity * now_->covariance;
+  const Eigen::Matrix<double, 3, 2> seen_by_pose = now_->with_pose * jacobian.transpose();
+  const Eigen::Matrix<double, 4, 2> seen = now_->covariance * jacobian.transpose();
+  map_T_last.mean = map_T_last.mean * geometry::SE2::Exp(seen_by_pose * (weight * error));
+  map_T_last.covariance -= seen_by_pose * weight * seen_by_pose.transpose();
+  now_->mean += seen * (weight * error);
+  now_->with_pose -= seen_by_pose * weight * seen.transpose();
+  now_->covariance -= seen * weight * seen.transpose();
 }
 
 geometry::SE2WithCovariance VelocityTrack::predict(
@@ -65,45 +82,69 @@ geometry::SE2WithCovariance VelocityTrack::predict(
       map_T_last.mean, map_T_last.covariance + kLeastVariance * Eigen::Matrix3d::Identity()};
   if (!inertial || inertial->is_stationary || !now_) {
     predicted_ = compound(last, step);
-    now_.reset();
-    if (inertial) start_with(step, *inertial);
+    if (inertial) {
+      start_with(step, *inertial);
+    } else {
+      now_.reset();
+    }
     return predicted_;
   }
 
-  const model::Preintegration& z = inertial->inertial;
-  learn_from(step, z, last);
+  learn_from(step, inertial->inertial, last);
+  carry_on(step, inertial->inertial, last);
+  return predicted_;
+}
 
-  // The pose.
+void VelocityTrack::carry_on(const geometry::SE2WithCovariance& step,
+                             const model::Preintegration& z,
+                             const geometry::SE2WithCovariance& map_T_last) {
   const double t = z.seconds;
   const Eigen::Matrix2d back = step.mean.rotation().transpose();
-  const geometry::SE2 last_T_next(t * now_->velocity_mps + z.position_m, step.mean.theta());
+  const Eigen::Matrix2d velocity_by_bias = z.bias_jacobian.block<2, 2>(1, 1);
+  const Eigen::Matrix2d position_by_bias = z.bias_jacobian.block<2, 2>(3, 1);
+  const Eigen::Vector2d velocity = now_->mean.head<2>();
+  const Eigen::Vector2d bias = now_->mean.tail<2>() - z.bias.tail<2>();
+
+  // The estimates.
+  State next = *now_;
+  next.mean.head<2>() = back * (velocity + z.velocity_mps + velocity_by_bias * bias);
+  const geometry::SE2 last_T_next(t * velocity + z.position_m + position_by_bias * bias,
+                                  step.mean.theta());
+
+  // How errors go on: of the pose, of velocity and bias, and of them in the pose.
   const Eigen::Matrix3d carried = last_T_next.inverse().Adjoint();
-  Eigen::Matrix<double, 3, 2> by_velocity = Eigen::Matrix<double, 3, 2>::Zero();
-  by_velocity.topRows<2>() = t * back;
-  const double bias = square(kAccelerometer_mps2);
-  Eigen::Matrix3d noise = Eigen::Matrix3d::Zero();
-  noise.topLeftCorner<2, 2>() = back * z.covariance.bottomRightCorner<2, 2>() * back.transpose() +
-                                0.25 * bias * square(t * t) * Eigen::Matrix2d::Identity();
-  noise(2, 2) = step.covariance(2, 2);
+  Eigen::Matrix4d own = Eigen::Matrix4d::Identity();
+  own.topLeftCorner<2, 2>() = back;
+  own.topRightCorner<2, 2>() = back * velocity_by_bias;
+  Eigen::Matrix<double, 3, 4> in_pose = Eigen::Matrix<double, 3, 4>::Zero();
+  in_pose.topLeftCorner<2, 2>() = t * back;
+  in_pose.topRightCorner<2, 2>() = back * position_by_bias;
 
-  // The velocity, and what their errors have in common.
-  State next;
-  next.velocity_mps = back * (now_->velocity_mps + z.velocity_mps);
-  const Eigen::Vector2d turned = -geometry::perpendicular(next.velocity_mps);
-  next.covariance = back * (now_->covariance + z.covariance.block<2, 2>(1, 1)) * back.transpose() +
-                    noise(2, 2) * turned * turned.transpose() + isotropic(kAccelerometer_mps2 * t);
-  next.with_pose = carried * now_->with_pose * back.transpose() +
-                   by_velocity * now_->covariance * back.transpose();
-  next.with_pose.topRows<2>() += back * z.covariance.block<2, 2>(3, 1) * back.transpose() +
-                                 0.5 * bias * t * square(t) * Eigen::Matrix2d::Identity();
-  next.with_pose.row(2) += noise(2, 2) * turned.transpose();
+  // The noise of (x, y, theta; velocity, bias); a rotation turns the velocity's axes.
+  const Eigen::Vector2d turned = -geometry::perpendicular(next.mean.head<2>());
+  const double rotation = step.covariance(2, 2);
+  Eigen::Matrix3d pose_noise = Eigen::Matrix3d::Zero();
+  pose_noise.topLeftCorner<2, 2>() =
+      back * z.covariance.bottomRightCorner<2, 2>() * back.transpose();
+  pose_noise(2, 2) = rotation;
+  Eigen::Matrix4d noise = Eigen::Matrix4d::Zero();
+  noise.topLeftCorner<2, 2>() = back * z.covariance.block<2, 2>(1, 1) * back.transpose() +
+                                rotation * turned * turned.transpose();
+  // An error of roll is felt sideways, one of pitch forward.
+  noise(2, 2) = square(kAccelerometerWalk) * t + square(kGravity_mps2) * z.level.added(1, 1);
+  noise(3, 3) = square(kAccelerometerWalk) * t + square(kGravity_mps2) * z.level.added(0, 0);
 
-  const Eigen::Matrix3d of_both = carried * now_->with_pose * by_velocity.transpose();
-  predicted_ = {last.mean * last_T_next,
-                carried * last.covariance * carried.transpose() + of_both + of_both.transpose() +
-                    by_velocity * now_->covariance * by_velocity.transpose() + noise};
+  next.covariance = own * now_->covariance * own.transpose() + noise;
+  next.with_pose = (carried * now_->with_pose + in_pose * now_->covariance) * own.transpose();
+  next.with_pose.topLeftCorner<2, 2>() += back * z.covariance.block<2, 2>(3, 1) * back.transpose();
+  next.with_pose.block<1, 2>(2, 0) += rotation * turned.transpose();
+
+  const Eigen::Matrix3d of_both = carried * now_->with_pose * in_pose.transpose();
+  predicted_ = {map_T_last.mean * last_T_next,
+                carried * map_T_last.covariance * carried.transpose() + of_both +
+                    of_both.transpose() + in_pose * now_->covariance * in_pose.transpose() +
+                    pose_noise};
   now_ = next;
-  return predicted_;
 }
 
 bool VelocityTrack::update(const geometry::SE2WithCovariance& map_T_scan) {
@@ -116,9 +157,9 @@ bool VelocityTrack::update(const geometry::SE2WithCovariance& map_T_scan) {
     return false;
   }
 
-  // What the pose's correction tells of the velocity, by what their errors had in common.
-  const Eigen::Matrix<double, 3, 2> gain = predicted_.covariance.llt().solve(now_->with_pose);
-  now_->velocity_mps += gain.transpose() * correction;
+  // What the pose's correction tells of them, by what their errors had in common.
+  const Eigen::Matrix<double, 3, 4> gain = predicted_.covariance.llt().solve(now_->with_pose);
+  now_->mean += gain.transpose() * correction;
   now_->covariance -= gain.transpose() * learned * gain;
   now_->with_pose = map_T_scan.covariance * gain;
   return true;

@@ -8,9 +8,9 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
-/// A Kalman filter of the velocity beside the pose that registration finds. Between scans the IMU
-/// carries both on: of a step that wheels state with centimetres it leaves less than a millimetre
-/// open. Owns the velocity; the pose is its user's.
+/// A Kalman filter of the velocity and the accelerometer's bias beside the pose that registration
+/// finds. Between scans the IMU carries them on: of a step that wheels state with centimetres it
+/// leaves less than a millimetre open. Owns velocity and bias; the pose is its user's.
 class VelocityTrack {
  public:
   /// Where the next scan is, from the pose of the last one (right perturbation). `step` is the same
@@ -38,16 +38,21 @@ class VelocityTrack {
   void start_with(const geometry::SE2WithCovariance& step, const model::InertialMotion& inertial);
   void learn_from(const geometry::SE2WithCovariance& step, const model::Preintegration& z,
                   geometry::SE2WithCovariance& map_T_last);
+  void carry_on(const geometry::SE2WithCovariance& step, const model::Preintegration& z,
+                const geometry::SE2WithCovariance& map_T_last);
 
+  /// (velocity [m/s], bias of the accelerometer [m/s^2]), each in the axes of the last scan's
+  /// vehicle.
+  using Numbers = Eigen::Vector4d;
   struct State {
-    Eigen::Vector2d velocity_mps = Eigen::Vector2d::Zero();  ///< Axes of the last scan's vehicle.
-    Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();    ///< [(m/s)^2]
-    /// Of the pose's error (rows: x, y, theta) with the velocity's.
-    Eigen::Matrix<double, 3, 2> with_pose = Eigen::Matrix<double, 3, 2>::Zero();
+    Numbers mean = Numbers::Zero();
+    Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+    /// Of the pose's error (rows: x, y, theta) with theirs.
+    Eigen::Matrix<double, 3, 4> with_pose = Eigen::Matrix<double, 3, 4>::Zero();
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& s) {
-      a(s.velocity_mps, s.covariance, s.with_pose);
+      a(s.mean, s.covariance, s.with_pose);
     }
   };
 
