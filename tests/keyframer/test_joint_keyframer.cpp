@@ -1,5 +1,7 @@
 #include "services/keyframer/joint/joint_keyframer.hpp"
 
+#include <cmath>
+#include <functional>
 #include <random>
 
 #include "common/model/archive.hpp"
@@ -236,9 +238,11 @@ TEST_CASE("Sigmas stated at a quarter and at four times the true ones give right
 
 namespace {
 
-/// Keyframes of a circle at constant speed, with an IMU whose lateral motion is off by `error_m` to
-/// either side in turns; none = without the IMU.
-std::vector<model::Keyframe> with_imu(const sim::Drive& drive, std::optional<double> error_m) {
+using Spoil = std::function<void(model::Preintegration&, std::size_t)>;
+
+/// Keyframes of a circle at constant speed, with an IMU whose k-th step is spoiled; no function =
+/// without the IMU.
+std::vector<model::Keyframe> with_imu(const sim::Drive& drive, const Spoil& spoil) {
   JointKeyframer keyframer({});
   std::vector<model::Keyframe> result;
   for (std::size_t k = 0; k < drive.size(); ++k) {
@@ -249,17 +253,17 @@ std::vector<model::Keyframe> with_imu(const sim::Drive& drive, std::optional<dou
       step.utime = scan.utime;
       step.from_T_to = drive.world_T_vehicle()[k - 1].inverse() * drive.world_T_vehicle()[k];
       step.covariance = Eigen::Vector3d(1e-2, 1e-2, 1e-5).asDiagonal();
-      if (error_m) {
+      if (spoil) {
         model::Preintegration& z = step.inertial.emplace();
         z.seconds = 1e-6 * static_cast<double>(step.utime - step.from_utime);
         z.yaw_rad = step.from_T_to.theta();
         const Eigen::Vector2d velocity(step.from_T_to.translation().norm() / z.seconds, 0.0);
         z.velocity_mps = step.from_T_to.rotation() * velocity - velocity;
         z.position_m = step.from_T_to.translation() - z.seconds * velocity;
-        z.position_m.y() += k % 2 == 0 ? *error_m : -*error_m;
         z.covariance.diagonal() << 1e-8, 1e-4, 1e-4, 1e-6, 1e-6;
         z.bias_jacobian(0, 0) = -z.seconds;
         z.bias_jacobian.block<2, 2>(1, 1) = -z.seconds * Eigen::Matrix2d::Identity();
+        spoil(z, k);
       }
       keyframer.add(step);
     }
@@ -273,18 +277,29 @@ std::vector<model::Keyframe> with_imu(const sim::Drive& drive, std::optional<dou
 TEST_CASE("An IMU makes a keyframe's members surer, unless it contradicts the landmarks",
           "[keyframer]") {
   const sim::Drive simulated = drive(sim::PathKind::kCircle, 60.0, 0.9, 0.2, 6);
-  const std::vector<model::Keyframe> plain = with_imu(simulated, std::nullopt);
-  const std::vector<model::Keyframe> right = with_imu(simulated, 0.0);
-  const std::vector<model::Keyframe> wrong = with_imu(simulated, 0.5);
+  const auto plain = with_imu(simulated, nullptr);
+  const auto right = with_imu(simulated, [](model::Preintegration&, std::size_t) {});
+  const auto wrong = with_imu(simulated, [](model::Preintegration& z, std::size_t k) {
+    z.position_m.y() += k % 2 == 0 ? 0.5 : -0.5;
+  });
+  const auto no_covariance =
+      with_imu(simulated, [](model::Preintegration& z, std::size_t) { z.covariance *= -1.0; });
+  const auto no_number = with_imu(
+      simulated, [](model::Preintegration& z, std::size_t) { z.velocity_mps.x() = std::nan(""); });
+
   REQUIRE(plain.size() > 20);
   REQUIRE(right.size() == plain.size());
-  REQUIRE(wrong.size() == plain.size());
   for (std::size_t i = 0; i < plain.size(); ++i) {
     const auto spread = [](const model::Keyframe& keyframe) {
       return keyframe.members.front().covariance.topLeftCorner<2, 2>().trace();
     };
     CHECK(spread(right[i]) < 0.75 * spread(plain[i]));
-    CHECK(wrong[i].members.front().centre_T_vehicle.coordinates() ==
-          plain[i].members.front().centre_T_vehicle.coordinates());
+  }
+  for (const auto* spoiled : {&wrong, &no_covariance, &no_number}) {
+    REQUIRE(spoiled->size() == plain.size());
+    for (std::size_t i = 0; i < plain.size(); ++i) {
+      CHECK((*spoiled)[i].members.front().centre_T_vehicle.coordinates() ==
+            plain[i].members.front().centre_T_vehicle.coordinates());
+    }
   }
 }

@@ -29,7 +29,7 @@ Eigen::Matrix2d isotropic(double sigma) { return square(sigma) * Eigen::Matrix2d
 /// Odometry's mean velocity, or none; a bias that is known stays.
 void VelocityTrack::start_with(const geometry::SE2WithCovariance& step,
                                const model::InertialMotion& inertial) {
-  State start;
+  VelocityState start;
   start.mean.tail<2>() = inertial.inertial.bias.tail<2>();
   start.covariance.bottomRightCorner<2, 2>() = isotropic(kAccelerometer_mps2);
   if (now_) {
@@ -106,7 +106,7 @@ void VelocityTrack::carry_on(const geometry::SE2WithCovariance& step,
   const Eigen::Vector2d bias = now_->mean.tail<2>() - z.bias.tail<2>();
 
   // The estimates.
-  State next = *now_;
+  VelocityState next = *now_;
   next.mean.head<2>() = back * (velocity + z.velocity_mps + velocity_by_bias * bias);
   const geometry::SE2 last_T_next(t * velocity + z.position_m + position_by_bias * bias,
                                   step.mean.theta());

@@ -8,6 +8,21 @@
 
 namespace understory::geoslam_mapper::smoothing {
 
+/// (velocity [m/s], bias of the accelerometer [m/s^2]), each in the axes of the last scan's
+/// vehicle.
+struct VelocityState {
+  Eigen::Vector4d mean = Eigen::Vector4d::Zero();
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+  /// Of the pose's error (rows: x, y, theta) with theirs.
+  Eigen::Matrix<double, 3, 4> with_pose = Eigen::Matrix<double, 3, 4>::Zero();
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.mean, s.covariance, s.with_pose);
+  }
+};
+
 /// A Kalman filter of the velocity and the accelerometer's bias beside the pose that registration
 /// finds. Between scans the IMU carries them on: of a step that wheels state with centimetres it
 /// leaves less than a millimetre open. Owns velocity and bias; the pose is its user's.
@@ -41,22 +56,7 @@ class VelocityTrack {
   void carry_on(const geometry::SE2WithCovariance& step, const model::Preintegration& z,
                 const geometry::SE2WithCovariance& map_T_last);
 
-  /// (velocity [m/s], bias of the accelerometer [m/s^2]), each in the axes of the last scan's
-  /// vehicle.
-  using Numbers = Eigen::Vector4d;
-  struct State {
-    Numbers mean = Numbers::Zero();
-    Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
-    /// Of the pose's error (rows: x, y, theta) with theirs.
-    Eigen::Matrix<double, 3, 4> with_pose = Eigen::Matrix<double, 3, 4>::Zero();
-
-    template <class Archive, class Self>
-    static void archive(Archive& a, Self& s) {
-      a(s.mean, s.covariance, s.with_pose);
-    }
-  };
-
-  std::optional<State> now_;
+  std::optional<VelocityState> now_;
   geometry::SE2WithCovariance predicted_;  ///< Of the scan that update() is told of.
 };
 

@@ -158,10 +158,9 @@ void use_imu(std::span<const Member> members, const BiasEstimate& bias, MemberBl
   }
   if (!has_imu || !block.estimate.converged) return;
 
-  BlockEstimate estimate = adjust_block(problem);
-  if (!estimate.converged || contradicts(estimate, block.estimate)) return;
-  block.problem = std::move(problem);
-  block.estimate = std::move(estimate);
+  MemberBlock with_imu{problem, block.tracks, adjust_block(problem)};
+  if (!with_imu.estimate.converged || !are_covariances(with_imu)) return;
+  if (!contradicts(with_imu.estimate, block.estimate)) block = std::move(with_imu);
 }
 
 /// Where odometry measured no motion, the tracked one takes its place.

@@ -117,7 +117,7 @@ void associate_within(std::vector<Expected>& expected, std::span<const CameraPoi
     Eigen::Matrix3d covariance = covariance_by_pose(one.camera_point_m, camera, gate.covariance);
     if (covariance.topLeftCorner<2, 2>().trace() > most_variance) return true;
     covariance.diagonal() += Eigen::Vector3d(kPixelVariance, kPixelVariance, kDisparityVariance);
-    information.push_back(covariance.inverse());
+    information.emplace_back(covariance.inverse());
     return false;
   });
 

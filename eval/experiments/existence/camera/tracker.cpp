@@ -30,6 +30,7 @@ std::vector<double> one_vote_per_place(const std::vector<geometry::PointSighting
   std::map<std::array<int, 3>, int> counts;
   for (const geometry::PointSighting& pair : pairs) ++counts[place(pair.point_m)];
   std::vector<double> weights;
+  weights.reserve(pairs.size());
   for (const geometry::PointSighting& pair : pairs)
     weights.push_back(1.0 / counts[place(pair.point_m)]);
   return weights;
