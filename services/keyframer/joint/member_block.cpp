@@ -1,5 +1,6 @@
 #include "services/keyframer/joint/member_block.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -153,8 +154,10 @@ void use_imu(std::span<const Member> members, const BiasEstimate& bias, MemberBl
   problem.bias = bias;
   bool has_imu = false;
   for (std::size_t k = 1; k < members.size(); ++k) {
-    problem.inertial.push_back(members[k].inertial);
-    has_imu = has_imu || members[k].inertial.has_value();
+    std::optional<model::InertialMotion> inertial = members[k].inertial;
+    if (inertial && !inertial->inertial.covariance.ldlt().isPositive()) inertial.reset();
+    has_imu = has_imu || inertial.has_value();
+    problem.inertial.push_back(std::move(inertial));
   }
   if (!has_imu || !block.estimate.converged) return;
 
