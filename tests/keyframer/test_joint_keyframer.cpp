@@ -253,6 +253,7 @@ std::vector<model::Keyframe> with_imu(const sim::Drive& drive, const Spoil& spoi
       step.utime = scan.utime;
       step.from_T_to = drive.world_T_vehicle()[k - 1].inverse() * drive.world_T_vehicle()[k];
       step.covariance = Eigen::Vector3d(1e-2, 1e-2, 1e-5).asDiagonal();
+
       if (spoil) {
         model::Preintegration& z = step.inertial.emplace();
         z.seconds = 1e-6 * static_cast<double>(step.utime - step.from_utime);
@@ -267,6 +268,7 @@ std::vector<model::Keyframe> with_imu(const sim::Drive& drive, const Spoil& spoi
       }
       keyframer.add(step);
     }
+
     if (auto keyframe = keyframer.add(scan)) result.push_back(std::move(*keyframe));
   }
   return result;
