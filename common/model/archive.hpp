@@ -108,6 +108,12 @@ void archive(Archive& a, Self& s) {
   a(s.utime, s.sequence, s.ekf_map_T_vehicle, s.covariance, s.velocity_mps, s.velocity_covariance,
     s.bias, s.bias_covariance, s.landmarks_used, s.landmarks_refused, s.reset_counter);
 }
+/// Members of a saved RestLevel.
+template <class Archive, class Self>
+requires state::Is<Self, RestLevel>
+void archive(Archive& a, Self& s) {
+  a(s.utime, s.sequence, s.rest_from_utime, s.rest_utime, s.error_rad, s.covariance);
+}
 /// Members of a saved EkfLevel.
 template <class Archive, class Self>
 requires state::Is<Self, EkfLevel>

@@ -44,4 +44,13 @@ Preintegration compound(const Preintegration& first, const Preintegration& secon
   return sum;
 }
 
+Eigen::Vector2d added_accelerometer_bias(const Preintegration& inertial) {
+  constexpr double kWalk = 1e-3;  // m/s^2/sqrt(s)
+  constexpr double kGravity_mps2 = 9.81;
+  const Eigen::Vector2d level = inertial.level.added.diagonal();
+  // An error of roll is felt sideways, one of pitch forward.
+  return Eigen::Vector2d::Constant(kWalk * kWalk * inertial.seconds) +
+         kGravity_mps2 * kGravity_mps2 * level.reverse();
+}
+
 }  // namespace understory::model

@@ -44,6 +44,7 @@
 #include "understory/odometry2_t.hpp"
 #include "understory/odometry_t.hpp"
 #include "understory/raw_pose_t.hpp"
+#include "understory/rest_level_t.hpp"
 #include "understory/slam_pose2_t.hpp"
 #include "understory/slam_pose_t.hpp"
 #include "understory/slam_update2_t.hpp"
@@ -119,6 +120,8 @@ Result<model::EkfPose> from_wire(const ekf_pose_t& wire);
 Result<model::EkfMap> from_wire(const ekf_map_t& wire);
 /// The filter's estimate of the level.
 Result<model::EkfLevel> from_wire(const ekf_level_t& wire);
+/// REST_LEVEL: the rest ends after it began and not after `utime`.
+Result<model::RestLevel> from_wire(const rest_level_t& wire);
 /// The filter's correction of velocity and biases.
 Result<model::VelocityCorrection> from_wire(const velocity_correction_t& wire);
 /// A satellite fix; refused where the receiver has none.
@@ -177,6 +180,7 @@ ekf_pose_t to_wire(const model::EkfPose& pose);
 ekf_map_t to_wire(const model::EkfMap& map);
 /// The filter's estimate of the level.
 ekf_level_t to_wire(const model::EkfLevel& level);
+rest_level_t to_wire(const model::RestLevel& level);
 /// The filter's correction of velocity and biases.
 velocity_correction_t to_wire(const model::VelocityCorrection& correction);
 

@@ -153,6 +153,34 @@ ekf_level_t to_wire(const model::EkfLevel& level) {
   return wire;
 }
 
+Result<model::RestLevel> from_wire(const rest_level_t& wire) {
+  Checks checks;
+  checks.consistent(wire.rest_from_utime >= 0 && wire.rest_from_utime <= wire.rest_utime &&
+                        wire.rest_utime <= wire.utime,
+                    "rest_from_utime <= rest_utime <= utime");
+  check_all("error_rad", wire.error_rad, kLargestLevel_rad, checks);
+  model::RestLevel level;
+  level.utime = wire.utime;
+  level.sequence = static_cast<std::uint64_t>(wire.seq);
+  level.rest_from_utime = wire.rest_from_utime;
+  level.rest_utime = wire.rest_utime;
+  level.error_rad = Eigen::Map<const Eigen::Vector2d>(wire.error_rad);
+  level.covariance = checks.covariance("covariance", wire.covariance);
+  if (checks.refusal()) return *checks.refusal();
+  return level;
+}
+
+rest_level_t to_wire(const model::RestLevel& level) {
+  rest_level_t wire{};
+  wire.utime = level.utime;
+  wire.seq = static_cast<std::int64_t>(level.sequence);
+  wire.rest_from_utime = level.rest_from_utime;
+  wire.rest_utime = level.rest_utime;
+  copy_vector(level.error_rad, wire.error_rad);
+  copy_matrix(level.covariance, wire.covariance);
+  return wire;
+}
+
 Result<model::VelocityCorrection> from_wire(const velocity_correction_t& wire) {
   Checks checks;
   check_all("velocity_m_s", wire.velocity_m_s, kFastestMps, checks);

@@ -168,6 +168,9 @@ class MapperAdapter : public bus::Adapter {
                                     },
                                     {.queue_size = 2000});
 
+    node.subscribe<model::RestLevel>(channels_.rest_level,
+                                     [this](const model::RestLevel& level) { stage_->add(level); });
+
     // To gate by; no measurement: it was made from the same detections.
     node.subscribe<model::EkfPose>(channels_.ekf_pose, [this](const model::EkfPose& pose) {
       stage_->add(pose);

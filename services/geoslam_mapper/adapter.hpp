@@ -14,6 +14,7 @@ struct MapperChannels {
   std::string landmarks = "LANDMARKS";
   std::string view_ranges = "VIEW_RANGES";
   std::string odometry = "ODOMETRY";
+  std::string rest_level = "REST_LEVEL";
   std::string ekf_pose = "EKF_POSE";
   std::string ekf_level = "EKF_LEVEL";
   std::string map_request = "MAP_REQUEST";

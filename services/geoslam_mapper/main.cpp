@@ -8,6 +8,7 @@ int main(int argc, char** argv) {
           .landmarks = "LANDMARKS",            // in: every sweep, located at once
           .view_ranges = "VIEW_RANGES",        // in: how far each sweep saw
           .odometry = "ODOMETRY",              // in: motion, where there is any
+          .rest_level = "REST_LEVEL",          // in: what motion showed of the level at rest
           .ekf_pose = "EKF_POSE",              // in: a gate; velocity without wheels
           .ekf_level = "EKF_LEVEL",            // in: error of the sweeps' level, likewise
           .map_request = "MAP_REQUEST",        // in: asks for MAP now

@@ -54,6 +54,10 @@ class MapperMethod {
   /// The filter's estimate of the level error; single scans are levelled by it.
   virtual void add(const model::EkfLevel& /*level*/) {}
 
+  /// What the vehicle's motion showed of the level at its last rest: where the map began at it, the
+  /// map's origin is where it truly was.
+  virtual void add(const model::RestLevel& /*level*/) {}
+
   /// A map to start from (GeoSLAM §4.3.1), frame `map`; call it before the first keyframe.
   virtual void start_with(std::span<const model::MapLandmark> landmarks) = 0;
 

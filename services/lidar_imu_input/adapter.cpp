@@ -46,6 +46,7 @@ class Publishers {
         wheels_(node.advertise<model::WheelSample>(channels.wheels)),
         gnss_(node.advertise<model::GnssFix>(channels.gnss)),
         odometry_(node.advertise<model::Odometry>(channels.odometry)),
+        rest_levels_(node.advertise<model::RestLevel>(channels.rest_level)),
         raw_pose_(node.advertise<model::RawPose>(channels.raw_pose)),
         sweeps_(node.advertise<model::PointSweep>(channels.lidar_sweep)),
         scans_(node.advertise<model::PlanarScan>(channels.lidar_scan)) {}
@@ -54,6 +55,7 @@ class Publishers {
   void operator()(const model::WheelSample& value) { wheels_.publish(value); }
   void operator()(const model::GnssFix& value) { gnss_.publish(value); }
   void operator()(const model::Odometry& value) { odometry_.publish(value); }
+  void operator()(const model::RestLevel& value) { rest_levels_.publish(value); }
   void operator()(const model::RawPose& value) { raw_pose_.publish(value); }
   void operator()(const model::PlanarScan& value) { scans_.publish(value); }
   void operator()(const model::PointSweep& value) {
@@ -69,6 +71,7 @@ class Publishers {
   bus::Publisher<model::WheelSample> wheels_;
   bus::Publisher<model::GnssFix> gnss_;
   bus::Publisher<model::Odometry> odometry_;
+  bus::Publisher<model::RestLevel> rest_levels_;
   bus::Publisher<model::RawPose> raw_pose_;
   bus::Publisher<model::PointSweep> sweeps_;
   bus::Publisher<model::PlanarScan> scans_;

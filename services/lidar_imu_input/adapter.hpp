@@ -20,6 +20,7 @@ struct LidarImuInputChannels {
   std::string wheels = "WHEELS";
   std::string gnss = "GNSS";
   std::string odometry = "ODOMETRY";
+  std::string rest_level = "REST_LEVEL";
   std::string raw_pose = "RAW_POSE";
   std::string lidar_sweep = "LIDAR_SWEEP";
   std::string lidar_scan = "LIDAR_SCAN";

@@ -96,6 +96,7 @@ void AttitudeFilter::propagate(const Eigen::Vector3d& rate, const Eigen::Vector3
 
   covariance_ = step * covariance_ * step.transpose();
   with_mark_ = step * with_mark_;
+  with_rest_ = step * with_rest_;
   covariance_.block<3, 3>(0, 0) += rate_power * seconds;
   covariance_.block<3, 3>(3, 3) += lever * rate_power * lever.transpose() * seconds;
   covariance_.block<3, 3>(3, 0) += lever * rate_power * seconds;
@@ -126,6 +127,11 @@ void AttitudeFilter::update(const Row& row, double residual, double variance) {
 
   covariance_ -= gain * spread.transpose();
   with_mark_ -= gain * (row * with_mark_).eval();
+  // Its correction is what the estimate was off by, turned round.
+  const Eigen::RowVector2d of_rest = row * with_rest_;
+  rest_.error_rad -= of_rest.transpose() * (residual / total);
+  rest_.covariance -= of_rest.transpose() * of_rest / total;
+  with_rest_ -= gain * of_rest;
   covariance_ = 0.5 * (covariance_ + covariance_.transpose()).eval();
 
   twist_rad_ += pitch_tangent(world_Q_vehicle_) *
@@ -165,6 +171,12 @@ void AttitudeFilter::add_standstill(const Eigen::Vector3d& rate, double seconds,
     row(6 + axis) = 1.0;
     update(row, rate(axis) - gyro_bias_(axis), square(imu_.gyro_noise) / seconds);
   }
+  mark_rest();
+}
+
+void AttitudeFilter::mark_rest() {
+  with_rest_ = covariance_.leftCols<3>() * level_of_attitude(world_Q_vehicle_).transpose();
+  rest_ = {Eigen::Vector2d::Zero(), tilt_covariance(), tilt_covariance()};
 }
 
 Eigen::Quaterniond AttitudeFilter::level_Q_vehicle() const { return tilt_of(world_Q_vehicle_); }

@@ -28,6 +28,21 @@ struct RollPitchYaw {
 /// The angles of a unit quaternion; pitch in [-pi / 2, pi / 2].
 RollPitchYaw roll_pitch_yaw(const Eigen::Quaterniond& rotation);
 
+/// The error of (roll, pitch) at the last standstill, as all since has shown it: a fixed-point
+/// smoother (Anderson & Moore 1979, section 7.2).
+struct RestTilt {
+  /// By how much the estimate of then was off, in the sense of model::LevelError [rad].
+  Eigen::Vector2d error_rad = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< Of it [rad^2].
+  Eigen::Matrix2d at_rest = Eigen::Matrix2d::Zero();     ///< What that was then.
+
+  /// For saving and loading.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.error_rad, s.covariance, s.at_rest);
+  }
+};
+
 /// Error state filter; errors: attitude (right perturbation), velocity, gyro and force bias, scale
 /// of the wheels' speed (which would pass for tilt whenever the vehicle accelerates or turns).
 /// Frame vehicle throughout. Cost: one 13 x 13 product per propagation.
@@ -67,6 +82,8 @@ class AttitudeFilter {
   model::LevelError level_since_mark() const;
   /// Remembers the level's error of now for level_since_mark().
   void mark_level();
+  /// What is known now of the level at the last add_standstill().
+  const RestTilt& rest() const { return rest_; }
   /// By how much corrections of roll and pitch have rotated the heading of the level since the last
   /// mark [rad]: on a slope they do. What is levelled by it rotates alike.
   double twist_since_mark_rad() const { return twist_rad_; }
@@ -84,12 +101,14 @@ class AttitudeFilter {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.world_Q_vehicle_, self.velocity_, self.gyro_bias_, self.force_bias_, self.wheel_scale_,
-      self.covariance_, self.with_mark_, self.marked_, self.twist_rad_);
+      self.covariance_, self.with_mark_, self.marked_, self.twist_rad_, self.with_rest_,
+      self.rest_);
   }
 
  private:
   using Row = Eigen::Matrix<double, 1, 13>;
   void update(const Row& row, double residual, double variance);
+  void mark_rest();
 
   ImuParameters imu_;
   Eigen::Quaterniond world_Q_vehicle_;
@@ -102,6 +121,9 @@ class AttitudeFilter {
   Eigen::Matrix<double, 13, 2> with_mark_ = Eigen::Matrix<double, 13, 2>::Zero();
   Eigen::Matrix2d marked_ = Eigen::Matrix2d::Zero();
   double twist_rad_ = 0.0;
+  /// Covariance of the error with the level's error at the last standstill, and that one.
+  Eigen::Matrix<double, 13, 2> with_rest_ = Eigen::Matrix<double, 13, 2>::Zero();
+  RestTilt rest_;
 };
 
 }  // namespace understory::lidar_imu_input

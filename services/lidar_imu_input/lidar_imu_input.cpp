@@ -280,6 +280,7 @@ void LidarImuInput::end_increment(model::Utime utime, InputResults& out) {
   if (auto increment = motion_.increment(*increment_end_, utime)) {
     out.emplace_back(*std::move(increment));
     if (auto pose = raw_poses_.take(motion_.raw_pose(), true)) out.emplace_back(*pose);
+    if (auto level = motion_.rest_news(utime)) out.emplace_back(*level);
   } else {
     ++counters_.increments_missing;
   }

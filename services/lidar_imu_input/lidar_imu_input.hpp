@@ -31,9 +31,9 @@
 namespace understory::lidar_imu_input {
 
 /// One output of the stage. Frames: vehicle, vehicle_level; see the types.
-using InputResult =
-    std::variant<model::ImuSample, model::WheelSample, model::GnssFix, model::Odometry,
-                 model::RawPose, model::PointSweep, model::PlanarScan, InputFault>;
+using InputResult = std::variant<model::ImuSample, model::WheelSample, model::GnssFix,
+                                 model::Odometry, model::RestLevel, model::RawPose,
+                                 model::PointSweep, model::PlanarScan, InputFault>;
 /// In the order of publishing.
 using InputResults = std::vector<InputResult>;
 

@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
           .wheels = "WHEELS",            // out: checked
           .gnss = "GNSS",                // out: checked
           .odometry = "ODOMETRY",        // out: motion without landmarks
+          .rest_level = "REST_LEVEL",    // out: what motion showed of the level at rest
           .raw_pose = "RAW_POSE",        // out: dead reckoning
           .lidar_sweep = "LIDAR_SWEEP",  // out: de-skewed, with attitude, in parts
           .lidar_scan = "LIDAR_SCAN",    // out: as they are

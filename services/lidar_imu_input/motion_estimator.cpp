@@ -86,6 +86,7 @@ void MotionEstimator::use_standstill(const model::ImuSample& sample, double seco
   AttitudeFilter& attitude = *levelling_.attitude();
   const double sigma = parameters_.standstill.velocity_sigma_mps;
   attitude.add_standstill(sample.angular_rate_rad_s, seconds, sigma);
+  rest_.stand(stationary_.moved_utime(), sample.utime);
 
   // The bias of the heading's rate: what the filter has learned while stationary, nothing else.
   stationary_.learn_bias(attitude);
@@ -157,6 +158,11 @@ std::optional<model::Odometry> MotionEstimator::increment(model::Utime from, mod
   // Where no sample of the IMU has moved the pose, it goes on with the wheels.
   if (odometry && !odometry->inertial) pose_.follow_wheels(*odometry);
   return odometry;
+}
+
+std::optional<model::RestLevel> MotionEstimator::rest_news(model::Utime utime) {
+  const std::optional<AttitudeFilter>& attitude = levelling_.attitude();
+  return attitude ? rest_.news(utime, *attitude) : std::nullopt;
 }
 
 }  // namespace understory::lidar_imu_input

@@ -12,6 +12,7 @@
 #include "services/lidar_imu_input/lever_compensation.hpp"
 #include "services/lidar_imu_input/motion_increments.hpp"
 #include "services/lidar_imu_input/pose_track.hpp"
+#include "services/lidar_imu_input/rest_watch.hpp"
 #include "services/lidar_imu_input/stationary_monitor.hpp"
 #include "services/lidar_imu_input/vehicle_constraints.hpp"
 #include "services/lidar_imu_input/velocity_corrections.hpp"
@@ -46,6 +47,9 @@ class MotionEstimator {
   /// samples are missing.
   std::optional<model::Odometry> increment(model::Utime from, model::Utime to);
 
+  /// News of the level at the last rest, after an increment up to `utime`.
+  std::optional<model::RestLevel> rest_news(model::Utime utime);
+
   /// Motion during the last seconds.
   const MotionHistory& history() const { return pose_.history(); }
   /// Pose of the dead reckoning in `odom` with its covariance.
@@ -63,7 +67,7 @@ class MotionEstimator {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.lever_, self.levelling_, self.stationary_, self.pose_, self.speeds_, self.constraints_,
-      self.reference_, self.corrections_, self.increments_);
+      self.reference_, self.corrections_, self.increments_, self.rest_);
   }
 
  private:
@@ -83,6 +87,7 @@ class MotionEstimator {
   VelocityReference reference_;
   VelocityCorrections corrections_;
   MotionIncrements increments_;
+  RestWatch rest_;
 };
 
 }  // namespace understory::lidar_imu_input

@@ -50,6 +50,8 @@ class StationaryMonitor {
   bool is_calibrated() const { return detector_.is_calibrated(); }
   /// Whether it has not moved since `utime`.
   bool is_stationary_since(model::Utime utime) const { return moved_utime_ <= utime; }
+  /// When it was last found to move.
+  model::Utime moved_utime() const { return moved_utime_; }
   /// Bias of the heading's rate, from standstills only; its sigma grows while the vehicle moves.
   const YawRateBias& bias() const { return bias_; }
 

@@ -133,6 +133,7 @@ TEST_CASE("a camera's map has its points where they are, and each once", "[exist
   const CameraCase one = make_case(setting, 5, false);
   const sim::changes::Replay replay(sim::changes::make_course(setting.scene, {}, 5), {});
   REQUIRE(one.map.size() > 500);
+
   std::size_t near = 0;
   std::vector<sim::changes::PointId> ids;
   for (const CameraPoint& point : one.map) {
@@ -144,10 +145,12 @@ TEST_CASE("a camera's map has its points where they are, and each once", "[exist
     ids.push_back(point.truth);
     near += (truth->position_m - point.position_m).norm() < 0.1 * point.nearest_m ? 1 : 0;
   }
+
   CHECK(static_cast<double>(near) > 0.97 * static_cast<double>(one.map.size()));
   std::sort(ids.begin(), ids.end());
   const auto last = std::unique(ids.begin(), ids.end());
   CHECK(static_cast<double>(ids.end() - last) < 0.06 * static_cast<double>(ids.size()));
+
   // What is there is seen again on the next drive; what was seen less than five times is no point.
   CHECK(one.keypoints.back().without_point < one.keypoints.back().all / 2);
 }

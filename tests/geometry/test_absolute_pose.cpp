@@ -75,6 +75,7 @@ TEST_CASE("three points give the true pose among their solutions") {
                                              sighting(truth, random)};
     const auto poses = solve_three_points(three);
     REQUIRE(poses.size() <= 4);
+
     double best = 1e9;
     for (const Eigen::Isometry3d& pose : poses) {
       best = std::min(best, place_error(pose, truth) + rotation_error(pose, truth));
@@ -82,9 +83,11 @@ TEST_CASE("three points give the true pose among their solutions") {
       for (const PointSighting& pair : three)
         REQUIRE((pose * pair.point_m).normalized().dot(pair.bearing) > 1.0 - 1e-9);
     }
+
     if (best > 1e-4) ++missed;
     if (best < 1e-4) worst = std::max(worst, best);
   }
+
   CAPTURE(worst);
   CHECK(missed <= 4);  // where two solutions nearly coincide
 }

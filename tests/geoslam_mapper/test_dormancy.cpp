@@ -32,6 +32,7 @@ World world(std::uint64_t seed, double anisotropy) {
   std::uniform_real_distribution<double> along(-20.0, kNodes * kNodeStep_m + 10.0);
   std::uniform_real_distribution<double> across(-25.0, 25.0);
   World result;
+
   GlobalMap& map = result.map;
   std::vector<geometry::SE2> truth;
   for (int i = 0; i < kNodes; ++i) {
@@ -39,11 +40,13 @@ World world(std::uint64_t seed, double anisotropy) {
     const geometry::SE2 guess = truth.back() * geometry::SE2(0.02 * normal(random), 0.0, 0.0);
     result.nodes.push_back(map.graph.add_node(i == 0 ? truth.back() : guess, false, i == 0));
   }
+
   for (int i = 0; i < 70; ++i) {
     const Eigen::Vector2d position(along(random), across(random));
     StoredLandmark landmark;
     landmark.position_m = position;
     landmark.information = 1e4;
+
     std::vector<std::pair<NodeIndex, Eigen::Vector2d>> seen;
     for (int k = 0; k < kNodes; ++k) {
       const Eigen::Vector2d local = truth[k].inverse() * position;
@@ -185,6 +188,7 @@ TEST_CASE("Landmarks that go elsewhere and come back leave the graph as it is", 
     World one = asleep(seed);
     PoseGraph& graph = one.map.graph;
     const Eigen::Matrix3d covariance = graph.marginal(one.nodes.back()).covariance;
+
     std::vector<AwayLandmarks> away;
     const auto is_unmoved = [&] {
       graph.checkpoint();
@@ -192,6 +196,7 @@ TEST_CASE("Landmarks that go elsewhere and come back leave the graph as it is", 
       return graph.moved_nodes().empty() &&
              graph.marginal(one.nodes.back()).covariance == covariance;
     };
+
     for (std::size_t part = 0; part < 3; ++part) {
       away.push_back(graph.put_away(every_third(one, part)));
       CHECK(is_unmoved());

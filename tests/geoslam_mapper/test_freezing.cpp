@@ -312,6 +312,7 @@ TEST_CASE("What is measured after a stretch was condensed ahead counts", "[freez
     measure(one);
     return one.condensed();
   };
+
   const auto nothing = [](Stretch&) {};
   const auto motion = [&](Stretch& one) {
     one.add(one.nodes[3], one.nodes[5], {geometry::SE2(4.1, 0.3, 0.04), covariance});
@@ -324,12 +325,14 @@ TEST_CASE("What is measured after a stretch was condensed ahead counts", "[freez
     one.add(one.nodes[1], one.nodes[7], {geometry::SE2(12.5, 1.2, 0.12), covariance});
     for (int i = 0; i < 4; ++i) REQUIRE(one.graph.solve().ok);
   };
+
   const auto plain = with(false, nothing);
   const auto check = [&](auto&& measure) {
     const auto expected = with(false, measure);
     CHECK(apart(expected, plain) > 1e-3);
     CHECK(apart(expected, with(true, measure)) == 0.0);
   };
+
   check(motion);
   check(again);
   check(moved);

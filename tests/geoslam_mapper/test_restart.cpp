@@ -21,6 +21,7 @@ struct Inputs {
   model::EkfPose pose;
   model::EkfLevel level;
   model::LandmarkScan scan;
+  std::optional<model::RestLevel> rest;
   std::optional<model::Keyframe> keyframe;
 };
 
@@ -73,6 +74,11 @@ std::vector<Inputs> inputs_of(const sim::Drive& drive, std::uint64_t seed) {
     inputs.level.error_rad = {roll, kLevelSigma_rad * normal(random)};
     inputs.level.covariance = 1e-8 * Eigen::Matrix2d::Identity();
     inputs.level.reported_covariance = 4e-6 * Eigen::Matrix2d::Identity();
+    if (k == 30 || k == 150) {
+      const double better = 1.0 / static_cast<double>(k);
+      inputs.rest = model::RestLevel{drive.utime(k), k, 0, drive.utime(9), inputs.level.error_rad,
+                                     1e-9 * better * Eigen::Matrix2d::Identity()};
+    }
     inputs.scan = drive.scan(k).scan;
     inputs.keyframe = keyframer.add(inputs.scan);
   }
@@ -86,6 +92,7 @@ struct Answers {
 
 void feed(SmoothingMapper& mapper, const Inputs& inputs, Answers& answers) {
   if (inputs.odometry) mapper.add(*inputs.odometry);
+  if (inputs.rest) mapper.add(*inputs.rest);
   mapper.add(inputs.pose);
   const std::optional<ScanPose> found = mapper.locate(inputs.scan);
   answers.located.push_back(found ? std::optional(found->map_T_vehicle) : std::nullopt);

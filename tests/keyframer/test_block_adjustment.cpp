@@ -64,6 +64,7 @@ TEST_CASE("Covariances of a block agree with Monte Carlo", "[block]") {
   std::mt19937_64 random(2);
   const World truth = world(random, 8, 25);
   const double sigma = 0.2;
+
   double landmark_nees = 0.0;
   double base_nees = 0.0;
   const int runs = 300;
@@ -71,6 +72,7 @@ TEST_CASE("Covariances of a block agree with Monte Carlo", "[block]") {
     const BlockEstimate estimate = adjust_block(problem(truth, sigma, 0.85, random));
     REQUIRE(estimate.converged);
     const geometry::SE2WithCovariance& base = estimate.centre_T_member.front();
+
     // A landmark in the base's frame: both errors act.
     for (std::size_t i = 0; i < truth.points.size(); ++i) {
       const geometry::SE2 base_T_centre = base.mean.inverse();
@@ -85,6 +87,7 @@ TEST_CASE("Covariances of a block agree with Monte Carlo", "[block]") {
       landmark_nees += error.dot(covariance.inverse() * error) /
                        (2.0 * static_cast<double>(truth.points.size()) * runs);
     }
+
     // The last member in the base's frame.
     const geometry::SE2WithCovariance relative =
         compound(inverse(base), estimate.centre_T_member.back());
@@ -92,6 +95,7 @@ TEST_CASE("Covariances of a block agree with Monte Carlo", "[block]") {
         (relative.mean.inverse() * truth.poses[0].inverse() * truth.poses.back()).Log();
     base_nees += error.dot(relative.covariance.inverse() * error) / (3.0 * runs);
   }
+
   REQUIRE(landmark_nees == Approx(1.0).margin(0.02));
   // Above 1: the two members' errors sum to zero with the others', so they are not independent.
   REQUIRE(base_nees == Approx(1.0).margin(0.25));

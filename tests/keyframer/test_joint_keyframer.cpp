@@ -89,6 +89,7 @@ TEST_CASE("A landmark with one observation is left out", "[keyframer]") {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> where(-35.0, 35.0);
   JointKeyframer keyframer({});
+
   std::size_t landmarks = 0;
   std::size_t clutter_passed = 0;
   std::size_t clutter_made = 0;
@@ -100,6 +101,7 @@ TEST_CASE("A landmark with one observation is left out", "[keyframer]") {
       scan.detections.push_back(clutter);
       ++clutter_made;
     }
+
     const auto keyframe = keyframer.add(scan);
     if (!keyframe) continue;
     const geometry::SE2 world_T_centre =
@@ -109,6 +111,7 @@ TEST_CASE("A landmark with one observation is left out", "[keyframer]") {
       ++landmarks;
     }
   }
+
   REQUIRE(landmarks > 300);
   REQUIRE(clutter_made > 200);
   // Two false detections of different scans fall into one gate by chance now and then.

@@ -56,6 +56,7 @@ RecordedDrive record_lidar(const NamedRoute& route, std::uint64_t seed,
   RecordedDrive drive;
   const auto keep = [&drive](const auto& message) { drive.inputs.emplace_back(message); };
   chain.watch<model::Odometry>("ODOMETRY", keep);
+  chain.watch<model::RestLevel>("REST_LEVEL", keep);
   chain.watch<model::EkfPose>("EKF_POSE", keep);
   chain.watch<model::EkfLevel>("EKF_LEVEL", keep);
   chain.watch<model::Keyframe>("KEYFRAME", keep);

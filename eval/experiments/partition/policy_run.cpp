@@ -57,6 +57,7 @@ class PolicyDrive {
 
  private:
   void feed(const model::Odometry& one) { mapper_.add(one); }
+  void feed(const model::RestLevel& one) { mapper_.add(one); }
   void feed(const model::EkfPose& one) { mapper_.add(one); }
   void feed(const model::EkfLevel& one) { mapper_.add(one); }
   void feed(const model::Keyframe& /*one*/) {}

@@ -11,12 +11,13 @@ namespace {
 
 constexpr const char* kKeyframe = "KEYFRAME";
 constexpr const char* kOdometry = "ODOMETRY";
+constexpr const char* kRestLevel = "REST_LEVEL";
 constexpr const char* kEkfPose = "EKF_POSE";
 constexpr const char* kEkfLevel = "EKF_LEVEL";
 constexpr const char* kTruth = "GROUND_TRUTH";
 
 const char* channel_of(const MapperInput& input) {
-  constexpr const char* kChannels[] = {kOdometry, kEkfPose, kEkfLevel, kKeyframe};
+  constexpr const char* kChannels[] = {kOdometry, kRestLevel, kEkfPose, kEkfLevel, kKeyframe};
   return kChannels[input.index()];
 }
 
@@ -99,6 +100,8 @@ RecordedDrive load(const std::filesystem::path& log) {
       drive.inputs.emplace_back(decoded<model::Keyframe>(*event, log));
     } else if (event->channel == kOdometry) {
       drive.inputs.emplace_back(decoded<model::Odometry>(*event, log));
+    } else if (event->channel == kRestLevel) {
+      drive.inputs.emplace_back(decoded<model::RestLevel>(*event, log));
     } else if (event->channel == kEkfPose) {
       drive.inputs.emplace_back(decoded<model::EkfPose>(*event, log));
     } else if (event->channel == kEkfLevel) {

@@ -9,12 +9,21 @@ namespace {
 /// Landmarks are given at breast height; an error of the level displaces them by it.
 constexpr double kLandmarkHeight_m = 1.3;
 
+/// d(position) / d(roll, pitch) [m/rad].
+Eigen::Matrix2d arm_m() {
+  const Eigen::Rotation2D<double> quarter(-0.5 * std::numbers::pi);
+  return kLandmarkHeight_m * quarter.toRotationMatrix();
+}
+
 }  // namespace
 
-void CommonError::set_start_level(const model::EkfLevel& level) {
-  const Eigen::Rotation2D<double> quarter(-0.5 * std::numbers::pi);
-  const Eigen::Matrix2d arm = kLandmarkHeight_m * quarter.toRotationMatrix();
-  start_covariance_m2_ = arm * level.covariance * arm.transpose();
+void CommonError::set_start_level(const Eigen::Matrix2d& covariance) {
+  const Eigen::Matrix2d arm = arm_m();
+  start_covariance_m2_ = arm * covariance * arm.transpose();
+}
+
+Eigen::Vector2d CommonError::displacement_m(const Eigen::Vector2d& level_rad) {
+  return arm_m() * level_rad;
 }
 
 Eigen::Matrix2d CommonError::covariance_of(const Eigen::Vector2d& position_m) const {

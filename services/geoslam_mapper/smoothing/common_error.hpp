@@ -4,20 +4,22 @@
 #include <Eigen/Core>
 
 #include "common/geometry/se2.hpp"
-#include "common/model/ekf_output.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 
 /// Common-mode errors, which the graph cannot estimate since no observation shows them: the level
-/// at the first keyframe and the scale of distances. They are not estimated; they are reported in
-/// the covariances of poses.
+/// at the first keyframe and the scale of distances. They are reported in the covariances of poses.
 class CommonError {
  public:
   /// `scale_sigma`: standard deviation of the scale of distances (1e-3 = 1 mm per metre).
   explicit CommonError(double scale_sigma) : scale_sigma_(scale_sigma) {}
 
-  /// The level error at the keyframe that starts the map: it displaces landmarks at breast height.
-  void set_start_level(const model::EkfLevel& level);
+  /// Covariance [rad^2] of the error (roll, pitch) of the level at the keyframe that starts the
+  /// map: it displaces landmarks at breast height.
+  void set_start_level(const Eigen::Matrix2d& covariance);
+  /// Displacement of landmarks [m], frame `map`, by an error (roll, pitch) of the first keyframe's
+  /// level [rad].
+  static Eigen::Vector2d displacement_m(const Eigen::Vector2d& level_rad);
   /// What it adds to the covariance of a pose (right perturbation).
   Eigen::Matrix3d covariance_at(const geometry::SE2& map_T_vehicle) const;
   /// What it adds to the covariance [m^2] of a point, frame `map`.

@@ -163,6 +163,14 @@ std::optional<NodeIndex> PoseGraph::origin() const {
   return origin_ ? std::optional(origin_->node) : std::nullopt;
 }
 
+bool PoseGraph::move_origin(const Eigen::Vector2d& by_m) {
+  if (!origin_ || is_held_elsewhere()) return false;
+  origin_->map_T_node =
+      geometry::SE2(origin_->map_T_node.translation() + by_m, origin_->map_T_node.theta());
+  hold(*origin_);
+  return true;
+}
+
 void PoseGraph::hold(const Anchor& anchor) {
   anchor_ = anchor;
   smoother_.hold(nodes_[anchor.node].centre, anchor.map_T_node);

@@ -90,6 +90,8 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
     return with(kFirstMap, {}, std::move(update));
   }
 
+  level_start();
+
   // Where is it?
   const auto prediction = motion_.predict(keyframe, map_.graph);
   if (prediction)
@@ -176,7 +178,8 @@ void OneMap::start_map(const model::Keyframe& keyframe, model::MapUpdate& update
   const NodeIndex node = map_.graph.add_node(keyframe.centre_T_base().inverse(),
                                              map_.trajectory.is_stationary(keyframe), true);
   map_.trajectory.add(base_of(keyframe, node, true), map_.graph);
-  if (const auto& level = scan_localiser_.level()) common_error_.set_start_level(*level);
+  start_level_.begin(keyframe.utime, scan_localiser_.level());
+  common_error_.set_start_level(start_level_.covariance());
 
   for (const model::Association& pair : discovery_.update(keyframe, node, {}, map_)) {
     update.associations.push_back(pair);
@@ -187,6 +190,20 @@ void OneMap::start_map(const model::Keyframe& keyframe, model::MapUpdate& update
   if (!solved.ok) update.reason = solved.error;
   map_.adopt_estimates();
   report(keyframe, update);
+}
+
+/// The map follows what was learned of the level at its origin, as a whole: its landmarks are not
+/// where they seemed to be from there. The vehicle was where it was.
+void OneMap::level_start() {
+  const auto found = start_level_.take();
+  if (!found) return;
+  const Eigen::Vector2d moved_m = -CommonError::displacement_m(found->error_rad);
+  map_.graph.checkpoint();
+  if (!map_.graph.move_origin(moved_m)) return;
+  (void)map_.graph.solve();  // All moves alike.
+  map_.trajectory.keep_in_place(found->until, -moved_m, map_.graph);
+  map_.adopt_estimates();
+  common_error_.set_start_level(start_level_.covariance());
 }
 
 /// Around the prediction; where nothing fits there, in the whole map.

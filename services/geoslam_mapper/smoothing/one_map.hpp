@@ -22,6 +22,7 @@
 #include "services/geoslam_mapper/smoothing/place_recogniser.hpp"
 #include "services/geoslam_mapper/smoothing/rejoining.hpp"
 #include "services/geoslam_mapper/smoothing/scan_localiser.hpp"
+#include "services/geoslam_mapper/smoothing/start_level.hpp"
 #include "services/geoslam_mapper/smoothing/submaps.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
@@ -45,6 +46,8 @@ class OneMap {
   void add(const model::EkfPose& pose) { motion_.add(pose); }
   /// The filter's estimate of the level error.
   void add(const model::EkfLevel& level) { scan_localiser_.set(level); }
+  /// What was found of the level at the vehicle's last rest.
+  void add(const model::RestLevel& level) { start_level_.add(level); }
   /// A map to start from. It counts as confirmed.
   void start_with(std::span<const model::MapLandmark> landmarks);
 
@@ -105,7 +108,7 @@ class OneMap {
   static void archive(Archive& a, Self& self) {
     a(self.map_, self.motion_, self.discovery_, self.merging_, self.known_ground_, self.condensing_,
       self.dormancy_, self.submaps_, self.closures_, self.scan_localiser_, self.common_error_,
-      self.first_offered_, self.agreeing_, self.lightening_.has_waited,
+      self.start_level_, self.first_offered_, self.agreeing_, self.lightening_.has_waited,
       self.lightening_.submaps_first);
   }
 
@@ -118,6 +121,7 @@ class OneMap {
 
   void lighten(const model::Keyframe& keyframe, NodeIndex newest, bool has_condensed);
   std::string why_not_start(const model::Keyframe& keyframe);
+  void level_start();
   void start_map(const model::Keyframe& keyframe, model::MapUpdate& update);
   std::optional<Placement> place(const model::Keyframe& keyframe,
                                  const std::optional<Prediction>& prediction,
@@ -141,6 +145,7 @@ class OneMap {
   Closures closures_;
   ScanLocaliser scan_localiser_;
   CommonError common_error_;
+  StartLevel start_level_;
   std::optional<model::Utime> first_offered_;  ///< Keyframe that might have started the map.
   /// Keyframes that agree with each other: the first, and those that were localised by landmarks.
   std::uint32_t agreeing_ = 0;

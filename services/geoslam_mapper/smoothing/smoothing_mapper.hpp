@@ -33,6 +33,7 @@ class SmoothingMapper final : public MapperMethod {
   void add(const model::Odometry& odometry) override { add_to_all(odometry); }
   void add(const model::EkfPose& pose) override { add_to_all(pose); }
   void add(const model::EkfLevel& level) override { add_to_all(level); }
+  void add(const model::RestLevel& level) override { add_to_all(level); }
   void start_with(std::span<const model::MapLandmark> landmarks) override {
     current_.start_with(landmarks);
   }

@@ -274,6 +274,16 @@ std::optional<geometry::SE2WithCovariance> Trajectory::origin_T_first() const {
   return inverse(origin->centre_T_base);
 }
 
+void Trajectory::keep_in_place(model::Utime utime, const Eigen::Vector2d& by_m,
+                               const PoseGraph& graph) {
+  for (Base& base : bases_) {
+    if (base.utime > utime) return;
+    const geometry::SE2 map_T_node = graph.pose(base.node);
+    geometry::SE2& node_T_base = base.centre_T_base.mean;
+    node_T_base = map_T_node.inverse() * geometry::SE2(by_m, 0.0) * map_T_node * node_T_base;
+  }
+}
+
 geometry::SE2WithCovariance Trajectory::from_origin(
     const geometry::SE2WithCovariance& map_T_centre) const {
   const auto first = origin_T_first();

@@ -117,6 +117,8 @@ class Trajectory {
   /// The first keyframe's base in the frame of its node, turned round, where that base is the map's
   /// origin; none where the map was given.
   std::optional<geometry::SE2WithCovariance> origin_T_first() const;
+  /// Moves the bases of keyframes up to `utime` by `by_m`, frame `map`, against their nodes.
+  void keep_in_place(model::Utime utime, const Eigen::Vector2d& by_m, const PoseGraph& graph);
   /// A node's pose with the covariance that the graph has of it, as it counts from the origin.
   geometry::SE2WithCovariance from_origin(const geometry::SE2WithCovariance& map_T_centre) const;
   /// A node's pose with its marginal covariance, which counts from the map's origin.

@@ -3,14 +3,11 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
+#include "common/model/preintegration.hpp"
+
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-constexpr double kGravity_mps2 = 9.81;
-/// Of the accelerometer's bias before anything is known, the level's error included [m/s^2].
-constexpr double kAccelerometer_mps2 = 0.05;
-/// Its random walk [m/s^2/sqrt(s)], as the filter has it.
-constexpr double kAccelerometerWalk = 1e-3;
 /// Change of speed within a step of odometry [m/s^2]: its mean is not the speed at its end.
 constexpr double kAcceleration_mps2 = 2.0;
 /// Of the velocity of a stationary vehicle [m/s].
@@ -31,7 +28,7 @@ void VelocityTrack::start_with(const geometry::SE2WithCovariance& step,
                                const model::InertialMotion& inertial) {
   VelocityState start;
   start.mean.tail<2>() = inertial.inertial.bias.tail<2>();
-  start.covariance.bottomRightCorner<2, 2>() = isotropic(kAccelerometer_mps2);
+  start.covariance.bottomRightCorner<2, 2>() = isotropic(model::kUnknownAccelerometerBias_mps2);
   if (now_) {
     start.mean.tail<2>() = now_->mean.tail<2>();
     start.covariance.bottomRightCorner<2, 2>() = now_->covariance.bottomRightCorner<2, 2>();
@@ -130,9 +127,7 @@ void VelocityTrack::carry_on(const geometry::SE2WithCovariance& step,
   Eigen::Matrix4d noise = Eigen::Matrix4d::Zero();
   noise.topLeftCorner<2, 2>() = back * z.covariance.block<2, 2>(1, 1) * back.transpose() +
                                 rotation * turned * turned.transpose();
-  // An error of roll is felt sideways, one of pitch forward.
-  noise(2, 2) = square(kAccelerometerWalk) * t + square(kGravity_mps2) * z.level.added(1, 1);
-  noise(3, 3) = square(kAccelerometerWalk) * t + square(kGravity_mps2) * z.level.added(0, 0);
+  noise.diagonal().tail<2>() = model::added_accelerometer_bias(z);
 
   next.covariance = own * now_->covariance * own.transpose() + noise;
   next.with_pose = (carried * now_->with_pose + in_pose * now_->covariance) * own.transpose();

@@ -1,0 +1,2 @@
+// Carries the precompiled header of all tests.
+int main() {}
