@@ -13,8 +13,8 @@ Preintegration at_bias(const Preintegration& inertial, const InertialBias& bias)
 /// level is that of the second, with the error that both added.
 Preintegration compound(const Preintegration& first, const Preintegration& second);
 
-/// Standard deviation [m/s^2] of an accelerometer's bias before anything is known of it, the level's
-/// error included.
+/// Standard deviation [m/s^2] of an accelerometer's bias before anything is known of it, the
+/// level's error included.
 inline constexpr double kUnknownAccelerometerBias_mps2 = 0.05;
 /// By how much the variances of the accelerometer's bias (x, y) [m^2/s^4] grow over a motion: it
 /// walks, as the filter has it, and new errors of the level are part of it.
