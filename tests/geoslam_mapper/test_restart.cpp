@@ -76,7 +76,11 @@ std::vector<Inputs> inputs_of(const sim::Drive& drive, std::uint64_t seed) {
     inputs.level.reported_covariance = 4e-6 * Eigen::Matrix2d::Identity();
     if (k == 30 || k == 150) {
       const double better = 1.0 / static_cast<double>(k);
-      inputs.rest = model::RestLevel{drive.utime(k), k, 0, drive.utime(9), inputs.level.error_rad,
+      inputs.rest = model::RestLevel{drive.utime(k),
+                                     k,
+                                     0,
+                                     drive.utime(9),
+                                     inputs.level.error_rad,
                                      1e-9 * better * Eigen::Matrix2d::Identity()};
     }
     inputs.scan = drive.scan(k).scan;

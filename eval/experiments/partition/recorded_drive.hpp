@@ -31,8 +31,8 @@ struct RecordedDrive {
 
 /// All keyframes and odometry of a route that has not been asked for any.
 RecordedDrive record(Route& route);
-/// Writes the drive as an LCM log (KEYFRAME, ODOMETRY, REST_LEVEL, EKF_POSE, EKF_LEVEL, GROUND_TRUTH),
-/// whole or not at all. Throws io::LogError.
+/// Writes the drive as an LCM log (KEYFRAME, ODOMETRY, REST_LEVEL, EKF_POSE, EKF_LEVEL,
+/// GROUND_TRUTH), whole or not at all. Throws io::LogError.
 void save(const RecordedDrive& drive, const std::filesystem::path& log);
 /// Reads such a log. Throws io::LogError, and std::runtime_error naming the file where a message is
 /// damaged.
