@@ -94,7 +94,7 @@ def _loops(name, drives, options, minutes):
 
 EXPERIMENTS = (
     _eval("paths", "paths --runs 10 --seed 1 --jobs 2", 12),
-    _eval("paths-lidar", "paths --method lidar --runs 20 --seed 2 --jobs 2", 28),
+    _eval("paths-lidar", "paths --method lidar --runs 10 --seed 2 --jobs 2", 14),
     _eval("density", "density --runs 10 --seed 1 --jobs 2", 8),
     _eval("noise", "noise --runs 5 --seed 1 --jobs 2 --interval 20", 25),
     _eval("noise-10cm", "noise --runs 2 --seed 1 --jobs 2 --interval 10", 25),
