@@ -153,7 +153,7 @@ void MotionEstimator::use_corrections(model::Utime now) {
 
 std::optional<model::Odometry> MotionEstimator::increment(model::Utime from, model::Utime to) {
   std::optional<AttitudeFilter>& attitude = levelling_.attitude();
-  const auto odometry = increments_.make(
+  auto odometry = increments_.make(
       from, to, {attitude ? &*attitude : nullptr, speeds_, history(), stationary_});
   // Where no sample of the IMU has moved the pose, it goes on with the wheels.
   if (odometry && !odometry->inertial) pose_.follow_wheels(*odometry);
