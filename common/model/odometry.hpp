@@ -60,13 +60,13 @@ struct Odometry {
   bool is_stationary = false;  ///< The vehicle did not move during the interval.
 };
 
-/// Channel REST_LEVEL: error of the attitude that levelled sweeps while the vehicle last stood
-/// still, about the axes of `vehicle_level`, as its motion since has shown it. While stationary it
-/// cannot be told from the accelerometer's bias.
+/// Channel REST_LEVEL: error of the attitude that levelled sweeps while the vehicle was last
+/// stationary, about the axes of `vehicle_level`, as its motion since has shown it. While
+/// stationary it cannot be told from the accelerometer's bias.
 struct RestLevel {
   Utime utime = 0;  ///< Of the latest measurement.
   std::uint64_t sequence = 0;
-  Utime rest_from_utime = 0;                             ///< Since when the vehicle stood,
+  Utime rest_from_utime = 0;                             ///< Since when it was stationary,
   Utime rest_utime = 0;                                  ///< and until when.
   Eigen::Vector2d error_rad = Eigen::Vector2d::Zero();   ///< Roll, pitch.
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< Of it [rad^2].

@@ -176,7 +176,8 @@ void AttitudeFilter::add_standstill(const Eigen::Vector3d& rate, double seconds,
 
 void AttitudeFilter::mark_rest() {
   with_rest_ = covariance_.leftCols<3>() * level_of_attitude(world_Q_vehicle_).transpose();
-  rest_ = {Eigen::Vector2d::Zero(), tilt_covariance(), tilt_covariance()};
+  const Eigen::Matrix2d now = tilt_covariance();
+  rest_ = {Eigen::Vector2d::Zero(), now, now};
 }
 
 Eigen::Quaterniond AttitudeFilter::level_Q_vehicle() const { return tilt_of(world_Q_vehicle_); }

@@ -86,7 +86,7 @@ void MotionEstimator::use_standstill(const model::ImuSample& sample, double seco
   AttitudeFilter& attitude = *levelling_.attitude();
   const double sigma = parameters_.standstill.velocity_sigma_mps;
   attitude.add_standstill(sample.angular_rate_rad_s, seconds, sigma);
-  rest_.stand(stationary_.moved_utime(), sample.utime);
+  rest_.add_stationary(stationary_.moved_utime(), sample.utime);
 
   // The bias of the heading's rate: what the filter has learned while stationary, nothing else.
   stationary_.learn_bias(attitude);

@@ -105,6 +105,21 @@ struct SensorErrors {
   double wheel_noise_mps = 0.0;
 };
 
+/// Of a usual IMU and wheels, drawn; the accelerometer's bias with this standard deviation [m/s^2].
+inline SensorErrors usual_errors(std::mt19937_64& random, double force_bias_sigma = 0.015) {
+  std::normal_distribution<double> normal;
+  SensorErrors errors;
+  errors.gyro_noise = 3e-4;
+  errors.force_noise = 4e-3;
+  for (int axis = 0; axis < 3; ++axis) {
+    errors.gyro_bias(axis) = 0.005 * normal(random);
+    errors.force_bias(axis) = force_bias_sigma * normal(random);
+  }
+  errors.wheel_scale = 1.0 + 0.01 * normal(random);
+  errors.wheel_noise_mps = 0.03;
+  return errors;
+}
+
 inline model::ImuSample imu_at(const Drive& drive, model::Utime utime, double rate_hz,
                                const SensorErrors& errors, std::mt19937_64& random) {
   std::normal_distribution<double> normal;

@@ -44,20 +44,6 @@ TiltErrors drive_and_compare(const test::Drive& drive, const test::SensorErrors&
   return result;
 }
 
-test::SensorErrors usual_errors(std::mt19937_64& random) {
-  std::normal_distribution<double> normal;
-  test::SensorErrors errors;
-  errors.gyro_noise = 3e-4;
-  errors.force_noise = 4e-3;
-  for (int axis = 0; axis < 3; ++axis) {
-    errors.gyro_bias(axis) = 0.005 * normal(random);
-    errors.force_bias(axis) = 0.015 * normal(random);
-  }
-  errors.wheel_scale = 1.0 + 0.01 * normal(random);
-  errors.wheel_noise_mps = 0.03;
-  return errors;
-}
-
 }  // namespace
 
 TEST_CASE("roll and pitch stay within 0.3 degrees while driving", "[attitude]") {

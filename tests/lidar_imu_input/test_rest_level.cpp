@@ -12,22 +12,11 @@ using namespace understory::test;
 
 namespace {
 
-SensorErrors random_errors(std::mt19937_64& random) {
-  std::normal_distribution<double> normal;
-  SensorErrors errors;
-  errors.gyro_noise = 3e-4;
-  errors.force_noise = 4e-3;
-  for (int axis = 0; axis < 3; ++axis) {
-    errors.gyro_bias(axis) = 0.005 * normal(random);
-    errors.force_bias(axis) = 0.05 * normal(random);
-  }
-  errors.wheel_scale = 1.0 + 0.01 * normal(random);
-  errors.wheel_noise_mps = 0.03;
-  return errors;
-}
+/// Of the accelerometer, whose bias passes for an error of the level [m/s^2].
+constexpr double kForceBias = 0.05;
 
 struct Rest {
-  std::vector<model::RestLevel> told;
+  std::vector<model::RestLevel> published;
   Eigen::Vector2d error_rad = Eigen::Vector2d::Zero();   ///< True, of roll and pitch at its end.
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< As stated at its end.
 };
@@ -40,7 +29,8 @@ Rest rest_of(const test::Drive& drive, const SensorErrors& errors, double length
   for (model::Utime t = 1; test::seconds(t) < length_s; t += 10'000) {
     (void)input.add(wheels_at(drive, t, errors, random));
     for (const InputResult& one : input.add(imu_at(drive, t, 100.0, errors, random)))
-      if (const auto* level = std::get_if<model::RestLevel>(&one)) result.told.push_back(*level);
+      if (const auto* level = std::get_if<model::RestLevel>(&one))
+        result.published.push_back(*level);
     if (test::seconds(t) > drive.stand_s) continue;
 
     const RollPitchYaw is = roll_pitch_yaw(input.motion().attitude()->level_Q_vehicle());
@@ -62,9 +52,9 @@ TEST_CASE("The first metres show by how much the level was off at rest", "[attit
   constexpr int kRuns = 40;
 
   for (std::uint64_t run = 0; run < kRuns; ++run) {
-    const Rest rest = rest_of(drive, random_errors(random), 25.0, run);
-    REQUIRE(!rest.told.empty());
-    const model::RestLevel& last = rest.told.back();
+    const Rest rest = rest_of(drive, usual_errors(random, kForceBias), 25.0, run);
+    REQUIRE(!rest.published.empty());
+    const model::RestLevel& last = rest.published.back();
     CHECK(last.rest_from_utime < 1'000'000);
     CHECK(std::abs(test::seconds(last.rest_utime) - drive.stand_s) < 0.5);
     CHECK(last.utime > last.rest_utime);
@@ -81,24 +71,24 @@ TEST_CASE("The first metres show by how much the level was off at rest", "[attit
   CHECK(std::sqrt(after_rad2) < 0.35 * std::sqrt(before_rad2));
 }
 
-TEST_CASE("What is told of the level at rest becomes better, and ends", "[attitude]") {
+TEST_CASE("What is published of the level at rest becomes better, and ends", "[attitude]") {
   std::mt19937_64 random(2);
   test::Drive drive;
   drive.stand_s = 10.0;
-  const Rest rest = rest_of(drive, random_errors(random), 60.0, 7);
-  REQUIRE(rest.told.size() > 3);
-  CHECK(rest.told.size() < 40);
+  const Rest rest = rest_of(drive, usual_errors(random, kForceBias), 60.0, 7);
+  REQUIRE(rest.published.size() > 3);
+  CHECK(rest.published.size() < 40);
   double last = rest.covariance.trace();
-  for (std::size_t i = 0; i < rest.told.size(); ++i) {
-    CHECK(rest.told[i].sequence == i);
-    CHECK(rest.told[i].covariance.trace() < last);
-    last = rest.told[i].covariance.trace();
+  for (std::size_t i = 0; i < rest.published.size(); ++i) {
+    CHECK(rest.published[i].sequence == i);
+    CHECK(rest.published[i].covariance.trace() < last);
+    last = rest.published[i].covariance.trace();
   }
 }
 
-TEST_CASE("A vehicle that never stood tells nothing of a rest", "[attitude]") {
+TEST_CASE("A vehicle that was never stationary publishes nothing of a rest", "[attitude]") {
   std::mt19937_64 random(3);
   test::Drive drive;
   drive.stand_s = -20.0;
-  CHECK(rest_of(drive, random_errors(random), 20.0, 1).told.empty());
+  CHECK(rest_of(drive, usual_errors(random, kForceBias), 20.0, 1).published.empty());
 }

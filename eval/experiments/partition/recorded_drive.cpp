@@ -92,6 +92,7 @@ void save(const RecordedDrive& drive, const std::filesystem::path& log) {
 RecordedDrive load(const std::filesystem::path& log) {
   io::LcmLogReader reader(log);
   RecordedDrive drive;
+
   while (const auto event = reader.next()) {
     if (event->channel == kTruth) {
       const auto truth = decoded<ground_truth_t>(*event, log);
@@ -108,6 +109,7 @@ RecordedDrive load(const std::filesystem::path& log) {
       drive.inputs.emplace_back(decoded<model::EkfLevel>(*event, log));
     }
   }
+
   reader.refuse_other_files();
   return drive;
 }
