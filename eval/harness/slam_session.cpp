@@ -14,6 +14,9 @@ std::optional<KeyframeOutcome> SlamSession::feed(const model::LandmarkScan& scan
   std::optional<model::Keyframe> keyframe = stages_.keyframer->add(scan);
   keyframer_s_ += tools::thread_time_s() - start_s;
   withheld_one_ = stages_.keyframer->counters().keyframes_withheld > withheld_before;
+  for (const model::Keyframe& waited : stages_.keyframer->take_waited()) {
+    (void)stages_.mapper->add(waited);
+  }
   if (!keyframe) return std::nullopt;
   const double mapping_start_s = tools::thread_time_s();
   model::MapUpdate update = stages_.mapper->add(*keyframe);

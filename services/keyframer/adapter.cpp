@@ -59,6 +59,7 @@ class KeyframerAdapter : public bus::Adapter {
     const bool was_miscalibrated = watch_.is_miscalibrated();
     watch_.add(scan, before, stage_->counters(), stage_->input_quality());
     if (!was_miscalibrated && watch_.is_miscalibrated()) log(stage_->input_quality());
+    for (const model::Keyframe& waited : stage_->take_waited()) keyframes_.publish(waited);
     if (keyframe) keyframes_.publish(*keyframe);
     show_health();
   }

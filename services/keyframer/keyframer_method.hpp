@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/model/ekf_output.hpp"
 #include "common/model/keyframe.hpp"
@@ -67,6 +68,9 @@ class KeyframerMethod {
 
   /// Takes one scan. Returns the keyframe that the scan completes, if any.
   virtual std::optional<model::Keyframe> add(const model::LandmarkScan& scan) = 0;
+  /// Keyframes of the first scans that waited for what the last scan shows; they come before the
+  /// one that add() returned. None by default. Ask after each scan.
+  virtual std::vector<model::Keyframe> take_waited() { return {}; }
   /// Motion of the vehicle by wheels or IMU, where there is any. It must come before the scan at
   /// its end. It predicts the next scan and bridges scans with few landmarks.
   virtual void add(const model::Odometry& odometry) = 0;

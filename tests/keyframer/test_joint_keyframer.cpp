@@ -1,7 +1,9 @@
 #include "services/keyframer/joint/joint_keyframer.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <random>
 
 #include "common/model/archive.hpp"
@@ -197,13 +199,52 @@ TEST_CASE("Keyframes of one scan each: also where tracking begins anew", "[keyfr
   for (std::size_t k = 0; k < 20; ++k) {
     const model::LandmarkScan scan = (k % 2 == 0 ? here : there).scan(k).scan;
     const auto keyframe = keyframer.add(scan);
-    if (!keyframe) continue;
-    ++made;
-    CHECK(keyframe->landmarks.size() == scan.detections.size());
-    CHECK_FALSE(keyframe->previous_T_base);
-    CHECK(wire::from_wire(wire::to_wire(*keyframe)));
+    std::vector<model::Keyframe> all = keyframer.take_waited();
+    CHECK(all.size() == (k >= 1 && k <= 3 ? 1 : 0));  // Each waited for the break.
+    if (keyframe) all.push_back(*keyframe);
+    for (const model::Keyframe& one : all) {
+      CHECK(one.sequence == made);
+      ++made;
+      CHECK_FALSE(one.previous_T_base);
+      CHECK(wire::from_wire(wire::to_wire(one)));
+    }
+    if (keyframe) CHECK(keyframe->landmarks.size() == scan.detections.size());
   }
   CHECK(made == 20);
+}
+
+TEST_CASE("The first keyframe of one scan has the noise that the scans after it show",
+          "[keyframer][noise]") {
+  for (const double stated : {0.3, 1.0, 3.0}) {
+    sim::DriveParameters of_drive;
+    of_drive.forest = sim::forest_parameters(sim::ForestKind::kIntermediate);
+    of_drive.forest.side_m = 300.0;
+    of_drive.path.length_m = 20.0;
+    of_drive.sensor.position_sigma_m = 0.05;
+    of_drive.sensor.stated_factor = stated;
+    const sim::Drive drive(of_drive, 5);
+    JointKeyframerParameters parameters;
+    parameters.observations_per_keyframe = 1;
+    parameters.min_observations = 1;
+    JointKeyframer keyframer(parameters);
+
+    std::vector<model::Keyframe> made;
+    for (std::size_t k = 0; k < 10; ++k) {
+      auto keyframe = keyframer.add(drive.scan(k).scan);
+      std::ranges::move(keyframer.take_waited(), std::back_inserter(made));
+      if (keyframe) made.push_back(std::move(*keyframe));
+      CAPTURE(stated, k);
+      CHECK(made.size() == (k < 3 ? 0 : k + 1));
+    }
+
+    REQUIRE(made.size() == 10);
+    for (std::size_t k = 0; k < made.size(); ++k) CHECK(made[k].sequence == k);
+    for (const model::KeyframeLandmark& landmark : made.front().landmarks) {
+      const double sigma_m = std::sqrt(0.5 * landmark.covariance_m2.trace());
+      CHECK(sigma_m > 0.6 * 0.05);
+      CHECK(sigma_m < 1.6 * 0.05);
+    }
+  }
 }
 
 TEST_CASE("Sigmas stated at a quarter and at four times the true ones give right keyframes",

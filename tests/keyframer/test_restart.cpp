@@ -60,7 +60,7 @@ std::vector<std::string> outputs(const KeyframerParameters& parameters, sim::Odo
     for (model::Detection& detection : step.scan.detections) detection.position_m.z() = 1.3;
     for (const model::Odometry& increment : step.odometry) stage->add(increment);
     const auto keyframe = stage->add(step.scan);
-    bytes.push_back(state::save({"output", 1}, keyframe));
+    bytes.push_back(state::save({"output", 2}, stage->take_waited(), keyframe));
     stage->add(level(step));
   }
   bytes.push_back(stage->save());
@@ -81,6 +81,15 @@ TEST_CASE("A restarted keyframer continues as if it had not stopped", "[keyframe
       REQUIRE(outputs(parameters, odometry, seed, restart) == expected);
     }
   }
+}
+
+TEST_CASE("A keyframer is restarted while its first keyframes wait", "[keyframer][state]") {
+  KeyframerParameters parameters;
+  parameters.joint.observations_per_keyframe = 1;
+  parameters.joint.min_observations = 1;
+  const auto expected = outputs(parameters, sim::OdometryKind::kNone, 1, std::nullopt);
+  for (const int restart : {0, 1, 2, 3, 4, 5})
+    REQUIRE(outputs(parameters, sim::OdometryKind::kNone, 1, restart) == expected);
 }
 
 TEST_CASE("Bytes of another stage are refused, and the state stays", "[keyframer][state]") {

@@ -13,8 +13,10 @@ namespace {
 constexpr std::size_t kToContradict = 8;
 /// Share of the pairs by stated sigmas that smaller ones must keep to take their place.
 constexpr double kAsMany = 0.8;
+/// Keyframes of fewer scans wait at the start until so many scans show the noise.
+constexpr std::uint64_t kWaitingScans = 4;
 
-constexpr state::Format kFormat{"keyframer.joint", 7};
+constexpr state::Format kFormat{"keyframer.joint", 8};
 
 std::vector<std::uint64_t> numbers_of(const PlacedScan& placed) {
   return {placed.tracks.begin(), placed.tracks.end()};
@@ -108,8 +110,9 @@ std::optional<model::Keyframe> JointKeyframer::refuse(std::string reason) {
 std::optional<model::Keyframe> JointKeyframer::start_anew(const model::LandmarkScan& scan) {
   std::optional<model::Keyframe> result =
       refuse("scan matches too few of the landmarks of the scans before it");
+  stop_waiting();
   if (members_.size() >= 2) {
-    result = finish();
+    result = estimated(std::exchange(members_, {}));
   } else if (!members_.empty()) {
     ++counters_.keyframes_withheld;
     members_.clear();
@@ -131,6 +134,22 @@ void JointKeyframer::gather(Member member) {
 
 std::optional<model::Keyframe> JointKeyframer::finish() {
   std::vector<Member> members = std::exchange(members_, {});
+  if (counters_.scans < kWaitingScans && noise_.is_new()) {
+    waiting_.push_back(std::move(members));
+    return std::nullopt;
+  }
+  stop_waiting();
+  return estimated(std::move(members));
+}
+
+void JointKeyframer::stop_waiting() {
+  for (std::vector<Member>& members : std::exchange(waiting_, {})) {
+    if (auto keyframe = estimated(std::move(members))) waited_.push_back(std::move(*keyframe));
+  }
+}
+
+/// The keyframe of its scans, with their noise as known now.
+std::optional<model::Keyframe> JointKeyframer::estimated(std::vector<Member> members) {
   for (Member& member : members) member.scan = noise_.corrected(std::move(member.scan));
   const MemberBlock block = adjusted(members);
   if (auto reason = why_unusable(members, block)) {

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/model/detection_noise.hpp"
@@ -30,6 +31,9 @@ class JointKeyframer final : public KeyframerMethod {
   /// local map ends the keyframe: what was gathered (two scans or more) is given out as a short
   /// one. Cost O(detections) per scan, O(observations n + n^3) for the n-th of a keyframe.
   std::optional<model::Keyframe> add(const model::LandmarkScan& scan) override;
+  /// Where a keyframe is one or two scans, the first ones wait until three more scans show how far
+  /// detections scatter: the map's frame would keep what is stated wrongly.
+  std::vector<model::Keyframe> take_waited() override { return std::exchange(waited_, {}); }
   /// Increments that overlap or run backwards are ignored.
   void add(const model::Odometry& odometry) override;
   /// Valid for scans within 2 s of its utime.
@@ -51,8 +55,8 @@ class JointKeyframer final : public KeyframerMethod {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.tracker_, self.noise_, self.calibration_, self.odometry_, self.bias_, self.level_,
-      self.members_, self.last_utime_, self.next_sequence_, self.local_T_previous_base_,
-      self.counters_);
+      self.members_, self.waiting_, self.waited_, self.last_utime_, self.next_sequence_,
+      self.local_T_previous_base_, self.counters_);
   }
 
  private:
@@ -65,6 +69,8 @@ class JointKeyframer final : public KeyframerMethod {
   void gather(Member member);
   bool is_full() const;
   std::optional<model::Keyframe> finish();
+  void stop_waiting();
+  std::optional<model::Keyframe> estimated(std::vector<Member> members);
   MemberBlock adjusted(std::span<const Member> members);
 
   JointKeyframerParameters parameters_;
@@ -75,6 +81,8 @@ class JointKeyframer final : public KeyframerMethod {
   BiasTrack bias_;
   model::LevelCorrection level_;
   std::vector<Member> members_;  ///< Of the keyframe that is being gathered; noise as stated.
+  std::vector<std::vector<Member>> waiting_;  ///< Of the first keyframes.
+  std::vector<model::Keyframe> waited_;
   std::optional<model::Utime> last_utime_;
   std::uint64_t next_sequence_ = 0;
   std::optional<geometry::SE2> local_T_previous_base_;  ///< None where tracking began anew.
