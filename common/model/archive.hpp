@@ -112,7 +112,8 @@ void archive(Archive& a, Self& s) {
 template <class Archive, class Self>
 requires state::Is<Self, RestLevel>
 void archive(Archive& a, Self& s) {
-  a(s.utime, s.sequence, s.rest_from_utime, s.rest_utime, s.error_rad, s.covariance);
+  a(s.utime, s.sequence, s.rest_from_utime, s.rest_utime, s.error_rad, s.covariance,
+    s.change_covariance);
 }
 /// Members of a saved EkfLevel.
 template <class Archive, class Self>

@@ -70,6 +70,8 @@ struct RestLevel {
   Utime rest_utime = 0;                                  ///< and until when.
   Eigen::Vector2d error_rad = Eigen::Vector2d::Zero();   ///< Roll, pitch.
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< Of it [rad^2].
+  /// Of it less the error of the level at `utime`, about the same axes [rad^2].
+  Eigen::Matrix2d change_covariance = Eigen::Matrix2d::Zero();
 };
 
 }  // namespace understory::model

@@ -44,6 +44,7 @@
 #include "understory/odometry2_t.hpp"
 #include "understory/odometry_t.hpp"
 #include "understory/raw_pose_t.hpp"
+#include "understory/rest_level2_t.hpp"
 #include "understory/rest_level_t.hpp"
 #include "understory/slam_pose2_t.hpp"
 #include "understory/slam_pose_t.hpp"
@@ -121,7 +122,9 @@ Result<model::EkfMap> from_wire(const ekf_map_t& wire);
 /// The filter's estimate of the level.
 Result<model::EkfLevel> from_wire(const ekf_level_t& wire);
 /// REST_LEVEL: the rest ends after it began and not after `utime`.
+/// Older logs: the change is as uncertain as the error.
 Result<model::RestLevel> from_wire(const rest_level_t& wire);
+Result<model::RestLevel> from_wire(const rest_level2_t& wire);
 /// The filter's correction of velocity and biases.
 Result<model::VelocityCorrection> from_wire(const velocity_correction_t& wire);
 /// A satellite fix; refused where the receiver has none.
@@ -180,7 +183,7 @@ ekf_pose_t to_wire(const model::EkfPose& pose);
 ekf_map_t to_wire(const model::EkfMap& map);
 /// The filter's estimate of the level.
 ekf_level_t to_wire(const model::EkfLevel& level);
-rest_level_t to_wire(const model::RestLevel& level);
+rest_level2_t to_wire(const model::RestLevel& level);
 /// The filter's correction of velocity and biases.
 velocity_correction_t to_wire(const model::VelocityCorrection& correction);
 
@@ -235,6 +238,12 @@ template <>
 inline Result<model::Odometry> decode_message<model::Odometry>(
     std::span<const std::uint8_t> bytes) {
   return decode_either<model::Odometry, odometry_t>(bytes);
+}
+/// The level at rest: older logs have rest_level_t.
+template <>
+inline Result<model::RestLevel> decode_message<model::RestLevel>(
+    std::span<const std::uint8_t> bytes) {
+  return decode_either<model::RestLevel, rest_level_t>(bytes);
 }
 /// Keyframes: older logs have keyframe_t.
 template <>

@@ -153,8 +153,11 @@ ekf_level_t to_wire(const model::EkfLevel& level) {
   return wire;
 }
 
-Result<model::RestLevel> from_wire(const rest_level_t& wire) {
-  Checks checks;
+namespace {
+
+/// What every version of REST_LEVEL has.
+template <class Wire>
+model::RestLevel rest_level(const Wire& wire, Checks& checks) {
   checks.consistent(wire.rest_from_utime >= 0 && wire.rest_from_utime <= wire.rest_utime &&
                         wire.rest_utime <= wire.utime,
                     "rest_from_utime <= rest_utime <= utime");
@@ -166,18 +169,36 @@ Result<model::RestLevel> from_wire(const rest_level_t& wire) {
   level.rest_utime = wire.rest_utime;
   level.error_rad = Eigen::Map<const Eigen::Vector2d>(wire.error_rad);
   level.covariance = checks.covariance("covariance", wire.covariance);
+  level.change_covariance = level.covariance;
+  return level;
+}
+
+}  // namespace
+
+Result<model::RestLevel> from_wire(const rest_level_t& wire) {
+  Checks checks;
+  model::RestLevel level = rest_level(wire, checks);
   if (checks.refusal()) return *checks.refusal();
   return level;
 }
 
-rest_level_t to_wire(const model::RestLevel& level) {
-  rest_level_t wire{};
+Result<model::RestLevel> from_wire(const rest_level2_t& wire) {
+  Checks checks;
+  model::RestLevel level = rest_level(wire, checks);
+  level.change_covariance = checks.covariance("change_covariance", wire.change_covariance);
+  if (checks.refusal()) return *checks.refusal();
+  return level;
+}
+
+rest_level2_t to_wire(const model::RestLevel& level) {
+  rest_level2_t wire{};
   wire.utime = level.utime;
   wire.seq = static_cast<std::int64_t>(level.sequence);
   wire.rest_from_utime = level.rest_from_utime;
   wire.rest_utime = level.rest_utime;
   copy_vector(level.error_rad, wire.error_rad);
   copy_matrix(level.covariance, wire.covariance);
+  copy_matrix(level.change_covariance, wire.change_covariance);
   return wire;
 }
 

@@ -50,6 +50,13 @@ Eigen::Matrix<double, 2, 3> level_of_attitude(const Eigen::Quaterniond& world_Q_
   return tilt_of(world_Q_vehicle).toRotationMatrix().topRows<2>();
 }
 
+/// A covariance that is negative by rounding only.
+Eigen::Matrix2d without_negative(const Eigen::Matrix2d& covariance) {
+  const geometry::PrincipalAxes parts =
+      geometry::principal_axes(0.5 * (covariance + covariance.transpose()));
+  return parts.vectors * parts.values.cwiseMax(0.0).asDiagonal() * parts.vectors.transpose();
+}
+
 double pitch_tangent(const Eigen::Quaterniond& world_Q_vehicle) {
   return std::tan(roll_pitch_yaw(world_Q_vehicle).pitch_rad);
 }
@@ -177,7 +184,16 @@ void AttitudeFilter::add_standstill(const Eigen::Vector3d& rate, double seconds,
 void AttitudeFilter::mark_rest() {
   with_rest_ = covariance_.leftCols<3>() * level_of_attitude(world_Q_vehicle_).transpose();
   const Eigen::Matrix2d now = tilt_covariance();
-  rest_ = {Eigen::Vector2d::Zero(), now, now};
+  rest_ = {Eigen::Vector2d::Zero(), now, now, roll_pitch_yaw(world_Q_vehicle_).yaw_rad};
+}
+
+Eigen::Matrix2d AttitudeFilter::tilt_change_covariance() const {
+  const Eigen::Rotation2Dd rest_R_now(roll_pitch_yaw(world_Q_vehicle_).yaw_rad - rest_.yaw_rad);
+  const Eigen::Matrix<double, 2, 3> level =
+      rest_R_now.toRotationMatrix() * level_of_attitude(world_Q_vehicle_);
+  const Eigen::Matrix2d now = level * covariance_.block<3, 3>(0, 0) * level.transpose();
+  const Eigen::Matrix2d common = level * with_rest_.topRows<3>();
+  return without_negative(now + rest_.covariance - common - common.transpose());
 }
 
 Eigen::Quaterniond AttitudeFilter::level_Q_vehicle() const { return tilt_of(world_Q_vehicle_); }
@@ -200,10 +216,7 @@ model::LevelError AttitudeFilter::level_since_mark() const {
   level.pitch_tangent = pitch_tangent(world_Q_vehicle_);
   level.memory = marked_.ldlt().solve(shared.transpose()).transpose();
 
-  // The added covariance is negative by rounding only.
-  const Eigen::Matrix2d added = level.covariance - level.memory * shared.transpose();
-  const geometry::PrincipalAxes parts = geometry::principal_axes(0.5 * (added + added.transpose()));
-  level.added = parts.vectors * parts.values.cwiseMax(0.0).asDiagonal() * parts.vectors.transpose();
+  level.added = without_negative(level.covariance - level.memory * shared.transpose());
   return level;
 }
 

@@ -35,11 +35,12 @@ struct RestTilt {
   Eigen::Vector2d error_rad = Eigen::Vector2d::Zero();
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< Of it [rad^2].
   Eigen::Matrix2d at_rest = Eigen::Matrix2d::Zero();     ///< What that was then.
+  double yaw_rad = 0.0;                                  ///< Of the level then.
 
   /// For saving and loading.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
-    a(s.error_rad, s.covariance, s.at_rest);
+    a(s.error_rad, s.covariance, s.at_rest, s.yaw_rad);
   }
 };
 
@@ -84,6 +85,10 @@ class AttitudeFilter {
   void mark_level();
   /// What is known now of the level at the last add_standstill().
   const RestTilt& rest() const { return rest_; }
+  /// Covariance of that error less the error of now, both as known now and about the axes of then
+  /// [rad^2]. Zero at the standstill: what neither shows displaces landmarks of then and of now
+  /// alike.
+  Eigen::Matrix2d tilt_change_covariance() const;
   /// By how much corrections of roll and pitch have rotated the heading of the level since the last
   /// mark [rad]: on a slope they do. What is levelled by it rotates alike.
   double twist_since_mark_rad() const { return twist_rad_; }

@@ -1,27 +1,53 @@
 #include "services/lidar_imu_input/rest_watch.hpp"
 
+#include <algorithm>
+
 namespace understory::lidar_imu_input {
 namespace {
 
-/// A standard deviation that is smaller by a tenth is worth a message.
-constexpr double kBetter = 0.81;
+/// A standard deviation that is smaller or larger by a tenth is worth a message, and
+constexpr double kTenth = 0.81;
+/// so is a second of rest [us].
+constexpr model::Utime kEvery = 1'000'000;
+/// A twentieth of a millimetre at breast height [rad^2].
+constexpr double kLeast_rad2 = 1.6e-9;
+
+bool is_other(double now, double before) { return now < kTenth * before || before < kTenth * now; }
+
+/// Of what the error at rest does to where the vehicle is now [rad^2].
+double size_of(const model::RestLevel& level) {
+  return std::max(kLeast_rad2, std::min(level.covariance.trace(), level.change_covariance.trace()));
+}
 
 }  // namespace
 
 void RestWatch::add_stationary(model::Utime from, model::Utime utime) {
   from_ = from;
   until_ = utime;
-  published_.setZero();
 }
 
 std::optional<model::RestLevel> RestWatch::news(model::Utime utime,
                                                 const AttitudeFilter& attitude) {
-  if (!from_ || utime <= until_) return std::nullopt;
+  if (!from_ || utime < *from_) return std::nullopt;
   const RestTilt& rest = attitude.rest();
-  const Eigen::Matrix2d& before = published_.isZero(0.0) ? rest.at_rest : published_;
-  if (rest.covariance.trace() > kBetter * before.trace()) return std::nullopt;
-  published_ = rest.covariance;
-  return model::RestLevel{utime, sequence_++, *from_, until_, rest.error_rad, rest.covariance};
+  // The IMU may be ahead of `utime`.
+  model::RestLevel level{utime,
+                         sequence_,
+                         *from_,
+                         std::min(until_, utime),
+                         rest.error_rad,
+                         rest.covariance,
+                         attitude.tilt_change_covariance()};
+
+  const bool is_new = published_.rest_from_utime != *from_;
+  const bool goes_on =
+      level.rest_utime > published_.rest_utime && utime - published_.utime >= kEvery;
+  const bool is_better = rest.covariance.trace() < kTenth * published_.covariance.trace();
+  if (!is_new && !goes_on && !is_better && !is_other(size_of(level), size_of(published_)))
+    return std::nullopt;
+  published_ = level;
+  ++sequence_;
+  return level;
 }
 
 }  // namespace understory::lidar_imu_input

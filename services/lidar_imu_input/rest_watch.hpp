@@ -14,9 +14,8 @@ class RestWatch {
  public:
   /// The vehicle is stationary at `utime`, and has been since `from`.
   void add_stationary(model::Utime from, model::Utime utime);
-  /// What the attitude's filter knows of the level at the last rest, where the vehicle has moved
-  /// since and this has become better than what was published last by a tenth of its standard
-  /// deviation.
+  /// What the attitude's filter knows of the level at the last rest, where a standard deviation has
+  /// changed by a tenth since the last call that gave something, and once a second at rest.
   std::optional<model::RestLevel> news(model::Utime utime, const AttitudeFilter& attitude);
 
   /// For saving and loading: what changes while it runs.
@@ -28,8 +27,7 @@ class RestWatch {
  private:
   std::optional<model::Utime> from_;  ///< None before the first rest.
   model::Utime until_ = 0;
-  Eigen::Matrix2d published_ =
-      Eigen::Matrix2d::Zero();  ///< Covariance [rad^2]; zero = nothing yet.
+  model::RestLevel published_;  ///< The last one.
   std::uint64_t sequence_ = 0;
 };
 

@@ -81,7 +81,8 @@ std::vector<Inputs> inputs_of(const sim::Drive& drive, std::uint64_t seed) {
                                      0,
                                      drive.utime(9),
                                      inputs.level.error_rad,
-                                     1e-9 * better * Eigen::Matrix2d::Identity()};
+                                     1e-9 * better * Eigen::Matrix2d::Identity(),
+                                     1e-10 * Eigen::Matrix2d::Identity()};
     }
     inputs.scan = drive.scan(k).scan;
     inputs.keyframe = keyframer.add(inputs.scan);

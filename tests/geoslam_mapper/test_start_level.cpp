@@ -62,6 +62,7 @@ model::RestLevel rest_until(int last) {
   level.utime = level.rest_utime + kKeyframe_us;
   level.error_rad = kError_rad;
   level.covariance = 1e-6 * Eigen::Matrix2d::Identity();
+  level.change_covariance = 4e-6 * Eigen::Matrix2d::Identity();
   return level;
 }
 
@@ -150,4 +151,36 @@ TEST_CASE("What the filter knew of the level at the start is not counted twice",
   start.add(rest_until(2));
   CHECK_FALSE(start.take());
   CHECK(start.covariance() == better.covariance);
+}
+
+TEST_CASE("A level that is wrong then and now alike makes no pose uncertain", "[mapper]") {
+  StartLevel start;
+  start.begin(begin_of(0), unknown_level());
+  CHECK(start.covariance() == unknown_level().covariance);
+
+  // At rest, and in the first metres.
+  model::RestLevel rest = rest_until(2);
+  rest.covariance = unknown_level().covariance;
+  rest.change_covariance.setZero();
+  start.add(rest);
+  CHECK(start.covariance().isZero(0.0));
+  rest.change_covariance = 1e-6 * Eigen::Matrix2d::Identity();
+  start.add(rest);
+  CHECK(start.covariance() == rest.change_covariance);
+
+  // Sweeps are levelled anew: what remains of the error at the start counts.
+  rest.change_covariance = 1e-4 * Eigen::Matrix2d::Identity();
+  rest.covariance *= 0.5;
+  start.add(rest);
+  CHECK(start.covariance() == rest.covariance);
+
+  // Of another rest nothing is known.
+  rest.change_covariance.setZero();
+  start.add(rest);
+  REQUIRE(start.covariance().isZero(0.0));
+  model::RestLevel later = rest;
+  later.rest_from_utime = begin_of(3);
+  later.rest_utime = later.utime = begin_of(5);
+  start.add(later);
+  CHECK(start.covariance() == rest.covariance);
 }

@@ -193,7 +193,8 @@ TEST_CASE("the front end's values survive the wire") {
                                                make.covariance<5>()});
     check_round_trip(
         model::EkfLevel{3, 4, make.vector<2>(0.01), make.covariance<2>(), make.covariance<2>()});
-    check_round_trip(model::RestLevel{9, 4, 3, 8, make.vector<2>(0.01), make.covariance<2>()});
+    check_round_trip(model::RestLevel{9, 4, 3, 8, make.vector<2>(0.01), make.covariance<2>(),
+                                      make.covariance<2>()});
     model::EkfMap map{3, 4, {}};
 
     model::TrackedScan tracked{3, 4, {40.0, 0.1, 2.0}, {}};

@@ -57,6 +57,7 @@ constexpr Pin kPins[] = {
     {"preintegration_t", 0x42556a8e73dd5d85ULL},
     {"raw_pose_t", 0xd5233c5fd8e067d8ULL},
     {"reason_count_t", 0xcc9becbf2c78c790ULL},
+    {"rest_level2_t", 0xf50a17aece4e5c21ULL},
     {"rest_level_t", 0x2151626e736bc1d1ULL},
     {"scan_reference_t", 0xc77a89b2014c5ba6ULL},
     {"slam_pose2_t", 0xa9cc46a8f28379a8ULL},

@@ -120,6 +120,26 @@ TEST_CASE("odometry of the version before is read, without the level's error") {
   CHECK(had_inertial);
 }
 
+TEST_CASE("a level at rest of the version before changes by as much as it may be wrong") {
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    Maker make(seed);
+    model::RestLevel level{9, 4, 3, 8, make.vector<2>(0.01), make.covariance<2>(), {}};
+    const rest_level2_t wire = to_wire(level);
+    rest_level_t old{};
+    old.utime = wire.utime;
+    old.seq = wire.seq;
+    old.rest_from_utime = wire.rest_from_utime;
+    old.rest_utime = wire.rest_utime;
+    std::ranges::copy(wire.error_rad, old.error_rad);
+    std::ranges::copy(std::span(&wire.covariance[0][0], 4), &old.covariance[0][0]);
+
+    const auto is = decode_message<model::RestLevel>(encode_bytes(old));
+    REQUIRE(is);
+    level.change_covariance = level.covariance;
+    CHECK(encode_message(*is) == encode_message(level));
+  }
+}
+
 TEST_CASE("keyframes, updates and poses of the versions before are read, as far as they go") {
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     Maker make(seed);

@@ -47,7 +47,10 @@ class OneMap {
   /// The filter's estimate of the level error.
   void add(const model::EkfLevel& level) { scan_localiser_.set(level); }
   /// What was found of the level at the vehicle's last rest.
-  void add(const model::RestLevel& level) { start_level_.add(level); }
+  void add(const model::RestLevel& level) {
+    start_level_.add(level);
+    common_error_.set_start_level(start_level_.covariance());
+  }
   /// A map to start from. It counts as confirmed.
   void start_with(std::span<const model::MapLandmark> landmarks);
 

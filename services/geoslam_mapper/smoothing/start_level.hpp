@@ -33,22 +33,28 @@ class StartLevel {
   /// What was found beyond what was taken by the last call; none where that is less than kLeast_rad
   /// in size.
   std::optional<Found> take();
-  /// Covariance of what remains of the error [rad^2]; zero where it was never known.
-  const Eigen::Matrix2d& covariance() const { return covariance_; }
+  /// Covariance of what the error does to where the vehicle is in the map [rad^2]; zero where it
+  /// was never known. As long as sweeps are levelled with the error of the start that is less than
+  /// what remains of it, since it displaces all alike.
+  const Eigen::Matrix2d& covariance() const {
+    return change_ && change_->trace() < covariance_.trace() ? *change_ : covariance_;
+  }
   /// A tenth of a millimetre at breast height.
   static constexpr double kLeast_rad = 1e-4;
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.utime_, self.levelled_by_rad_, self.covariance_, self.found_rad_, self.found_utime_,
-      self.taken_);
+    a(self.utime_, self.levelled_by_rad_, self.covariance_, self.change_, self.found_rad_,
+      self.found_utime_, self.taken_);
   }
 
  private:
   std::optional<model::Utime> utime_;                          ///< None before the map begins.
   Eigen::Vector2d levelled_by_rad_ = Eigen::Vector2d::Zero();  ///< The error as known at first.
-  Eigen::Matrix2d covariance_ = Eigen::Matrix2d::Zero();
+  Eigen::Matrix2d covariance_ = Eigen::Matrix2d::Zero();       ///< Of what remains of it.
+  /// Of by how much sweeps are levelled otherwise now; none where nothing tells.
+  std::optional<Eigen::Matrix2d> change_;
   Eigen::Vector2d found_rad_ = Eigen::Vector2d::Zero();  ///< The error beyond that.
   model::Utime found_utime_ = 0;                         ///< By what was measured until then.
   Found taken_;
