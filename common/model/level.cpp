@@ -1,6 +1,7 @@
 #include "common/model/level.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cstdlib>
 
 #include "common/geometry/decompositions.hpp"
@@ -46,6 +47,13 @@ LandmarkScan LevelCorrection::levelled(LandmarkScan scan) const {
         own + arm * level_->covariance * arm.transpose();
   }
   return scan;
+}
+
+Eigen::Matrix2d level_without_imu(const Eigen::Matrix2d& covariance_rad2, double seconds) {
+  const double most = kMostTilt_rad * kMostTilt_rad;
+  const double largest = 0.5 * covariance_rad2.trace();
+  const double added = std::clamp(most - largest, 0.0, kTiltWalk * kTiltWalk * seconds);
+  return covariance_rad2 + added * Eigen::Matrix2d::Identity();
 }
 
 }  // namespace understory::model

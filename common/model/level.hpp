@@ -29,6 +29,14 @@ class LevelCorrection {
   std::optional<EkfLevel> level_;
 };
 
+/// Roll and pitch of a vehicle that no IMU measures: how fast they leave what was last known [rad
+/// per square root of a second], and how far [rad] (docs/decisions/149).
+inline constexpr double kTiltWalk = 0.03;
+inline constexpr double kMostTilt_rad = 0.03;
+
+/// Covariance of (roll, pitch) [rad^2] when no IMU has measured them for `seconds` more.
+Eigen::Matrix2d level_without_imu(const Eigen::Matrix2d& covariance_rad2, double seconds);
+
 /// A detection's covariance [m^2] in the plane without the part by an error of the level; at least
 /// 5 % remains in each direction. `arm` [m/rad]: d(position) / d(roll, pitch).
 Eigen::Matrix2d without_level(const Eigen::Matrix2d& covariance_m2, const Eigen::Matrix2d& arm,

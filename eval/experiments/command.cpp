@@ -42,6 +42,7 @@ void add_eval_command(CLI::App& parent) {
   roads::add_landmarks_vs_error_experiment(eval);
   misstated::add_misstated_experiment(eval);
   wheels::add_wheels_experiment(eval);
+  gaps::add_gaps_experiment(eval);
   existence::add_existence_experiment(eval);
   changing_forest::add_changing_forest_experiment(eval);
   existence::camera::add_existence_camera_experiment(eval);

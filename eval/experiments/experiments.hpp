@@ -65,4 +65,9 @@ namespace wheels {
 void add_wheels_experiment(CLI::App& eval);
 }  // namespace wheels
 
+namespace gaps {
+/// Processes that hang and sensors that are silent.
+void add_gaps_experiment(CLI::App& eval);
+}  // namespace gaps
+
 }  // namespace understory::eval::experiments

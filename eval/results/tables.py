@@ -13,6 +13,7 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 import render  # noqa: E402
 import render_existence  # noqa: E402
+import render_gaps  # noqa: E402
 import render_partition  # noqa: E402
 import render_places  # noqa: E402
 import render_returns  # noqa: E402
@@ -85,6 +86,7 @@ SECTIONS = (
     ("laps", "Known ground: what must not grow", None, render.laps),
     ("laps-held", "Localisation only: what must not change", None, render.laps),
     ("health", "What HEALTH says of wrong poses", None, render.health),
+    ("gaps", "Processes that hang, sensors that are silent", None, render_gaps.gaps),
     ("misstated", "Sensors that are not as stated", None, render.misstated),
     ("victoria-park", "A real drive: Victoria Park", "stated figures of the batch solution", render.victoria_park),
     ("frontend-chain", "From raw sensors: simulated drives", None, _figures),

@@ -5,13 +5,13 @@
 #include <cmath>
 
 #include "common/geometry/decompositions.hpp"
+#include "common/model/level.hpp"
 #include "services/lidar_imu_input/stamps.hpp"
 
 namespace understory::lidar_imu_input {
 namespace {
 
 constexpr double kStartTilt_rad = 0.1;  // 1 m/s^2 taken for gravity
-constexpr double kBridgeTilt = 0.03;    // rad per square root of a second
 
 constexpr double kWheelScaleSigma = 0.02;
 constexpr double kWheelScaleWalk = 2e-4;  // per square root of a second
@@ -122,7 +122,7 @@ void AttitudeFilter::propagate(const Eigen::Vector3d& rate, const Eigen::Vector3
 }
 
 void AttitudeFilter::bridge(double seconds) {
-  covariance_.block<2, 2>(0, 0).diagonal().array() += square(kBridgeTilt) * seconds;
+  covariance_.block<2, 2>(0, 0).diagonal().array() += square(model::kTiltWalk) * seconds;
   covariance_.block<3, 3>(3, 3).diagonal().array() += square(kBridgeSpeed) * seconds;
 }
 

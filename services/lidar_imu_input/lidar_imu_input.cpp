@@ -322,8 +322,8 @@ void LidarImuInput::release_sweep(model::PointSweep raw, Sensor sensor, model::U
   const SensorMount& mount =
       sensor == Sensor::kScan ? parameters_.planar.mount : parameters_.lidar.mount;
   DeskewedSweep result = deskew(std::move(raw), stamp, history, mount);
-  // Without an IMU the attitude is not known.
-  if (!motion_.attitude()) result.sweep.attitude.reset();
+  // Without an IMU the attitude is not known, and the filter's motion has none.
+  if (!motion_.attitude() || !by_filter.empty()) result.sweep.attitude.reset();
 
   ++counters_.sweeps;
   if (!by_filter.empty() && result.had_motion) ++counters_.sweeps_by_filter;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/model/level.hpp"
 #include "services/lidar_imu_input/stamps.hpp"
 
 namespace understory::lidar_imu_input {
@@ -36,7 +37,7 @@ void PoseTrack::follow_wheels(const model::Odometry& odometry) {
   reckoning_.bridge(
       {geometry::SE2::Exp(share * odometry.from_T_to.Log()), share * odometry.covariance});
 
-  // Tilt and height stay as they were last known.
+  // Tilt and height stay as they were last known; the tilt is less and less certain.
   if (history_.empty()) history_.add({.utime = reached});
   MotionState state = history_.newest();
   state.utime = to;
@@ -45,6 +46,8 @@ void PoseTrack::follow_wheels(const model::Odometry& odometry) {
   state.odom_Q_vehicle = Eigen::AngleAxisd(state.heading_rad, Eigen::Vector3d::UnitZ()) *
                          Eigen::AngleAxisd(tilt.pitch_rad, Eigen::Vector3d::UnitY()) *
                          Eigen::AngleAxisd(tilt.roll_rad, Eigen::Vector3d::UnitX());
+  state.tilt_covariance =
+      model::level_without_imu(state.tilt_covariance, seconds_between(reached, to));
   state.position_m.head<2>() = reckoning_.pose().translation();
 
   const Eigen::Vector3d twist = odometry.from_T_to.Log() / seconds_between(from, to);

@@ -187,6 +187,54 @@ TEST_CASE("Who takes keyframes refuses none, however few landmarks connect their
   CHECK(made > 90);
 }
 
+TEST_CASE("A pause ends a keyframe: odometry alone does not tie its scans", "[keyframer]") {
+  const sim::Drive simulated = drive(sim::PathKind::kCircle, 60.0, 0.9, 0.05, 9);
+  for (const std::size_t before : {1, 2, 5}) {
+    JointKeyframer keyframer({});
+    std::vector<model::Keyframe> made;
+    const std::size_t pause_at = 16 + before;
+    constexpr std::size_t kMissed = 40;
+    for (std::size_t k = 0; k < pause_at + kMissed + 8; ++k) {
+      if (k >= pause_at && k < pause_at + kMissed) continue;
+      if (k > 0) {
+        const std::size_t last = k == pause_at + kMissed ? pause_at - 1 : k - 1;
+        model::Odometry step;
+        step.from_utime = simulated.scan(last).scan.utime;
+        step.utime = simulated.scan(k).scan.utime;
+        step.from_T_to =
+            simulated.world_T_vehicle()[last].inverse() * simulated.world_T_vehicle()[k];
+        step.covariance = Eigen::Vector3d(0.1, 0.1, 1e-4).asDiagonal();
+        keyframer.add(step);
+      }
+      if (auto keyframe = keyframer.add(simulated.scan(k).scan))
+        made.push_back(std::move(*keyframe));
+    }
+
+    CAPTURE(before);
+    REQUIRE(made.size() == 4);
+    CHECK(made[2].members.size() == before);
+    CHECK(made[2].landmarks.size() >= 5);
+    CHECK(made[3].members.size() == 8);
+    CHECK(made[3].utime == simulated.scan(pause_at + kMissed).scan.utime);
+    CHECK(keyframer.counters().keyframes_withheld == 0);
+  }
+}
+
+TEST_CASE("Scans that are seconds apart are no pause", "[keyframer]") {
+  const sim::Drive simulated = drive(sim::PathKind::kLine, 20.0, 0.9, 0.05, 9);
+  JointKeyframer keyframer({});
+  std::size_t made = 0;
+  for (std::size_t k = 0; k < 32; ++k) {
+    model::LandmarkScan scan = simulated.scan(k).scan;
+    scan.utime = static_cast<model::Utime>(k) * 4'000'000 + 1;
+    const auto keyframe = keyframer.add(scan);
+    if (!keyframe) continue;
+    CHECK(keyframe->members.size() == 8);
+    ++made;
+  }
+  CHECK(made == 4);
+}
+
 TEST_CASE("Keyframes of one scan each: also where tracking begins anew", "[keyframer]") {
   JointKeyframerParameters parameters;
   parameters.observations_per_keyframe = 1;

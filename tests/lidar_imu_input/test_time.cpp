@@ -269,6 +269,23 @@ TEST_CASE("a sensor that is silent for a while comes back on its own clock", "[t
   }
 }
 
+TEST_CASE("sweeps that no IMU levels say how far the vehicle may have tilted", "[gap]") {
+  const Output output = output_of(without(Recorded{}.readings(), 24.0, 28.0, Sensor::kImu));
+  const auto sigma_rad = [&](double s) {
+    const auto sweep = std::ranges::find_if(
+        output.sweeps, [&](const model::PointSweep& one) { return test::seconds(one.utime) > s; });
+    REQUIRE(sweep != output.sweeps.end());
+    REQUIRE(sweep->attitude);
+    return std::sqrt(0.5 * sweep->attitude->covariance_rad2.trace());
+  };
+  CHECK(sigma_rad(23.5) < 0.01);
+  CHECK(sigma_rad(24.3) > 0.01);
+  CHECK(sigma_rad(25.5) > 0.029);
+  CHECK(sigma_rad(27.5) > 0.029);
+  CHECK(sigma_rad(27.5) < 0.05);
+  CHECK(sigma_rad(31.0) < 0.02);
+}
+
 TEST_CASE("all clocks jump back together and stay together", "[time]") {
   std::vector<Arriving> readings = Recorded{.length_s = 40.0}.readings();
   // A second recording, in which the laser speaks first.

@@ -13,6 +13,10 @@ namespace {
 constexpr std::size_t kToContradict = 8;
 /// Share of the pairs by stated sigmas that smaller ones must keep to take their place.
 constexpr double kAsMany = 0.8;
+/// A pause ends a keyframe: so much longer than the interval of scans before it, and so long.
+/// Members are one piece by what they see in common; odometry alone is no such tie.
+constexpr model::Utime kPauseFactor = 4;
+constexpr model::Utime kLeastPause_us = 500'000;
 /// Keyframes of fewer scans wait at the start until so many scans show the noise.
 constexpr std::uint64_t kWaitingScans = 4;
 
@@ -39,6 +43,9 @@ std::optional<model::Keyframe> JointKeyframer::add(const model::LandmarkScan& ra
     return refuse("scan not later than the last one");
   }
 
+  std::optional<model::Keyframe> before;
+  if (is_after_pause(raw.utime) && !members_.empty()) before = finish();
+
   // Detections at the true level, and the motion since the last scan where odometry covers it.
   const model::LandmarkScan scan = level_.levelled(raw);
   std::optional<geometry::SE2WithCovariance> motion;
@@ -50,11 +57,20 @@ std::optional<model::Keyframe> JointKeyframer::add(const model::LandmarkScan& ra
 
   // Where the scan was made, and which detection is which landmark.
   std::optional<PlacedScan> placed = place(scan, motion);
-  if (!placed) return start_anew(scan);
+  if (!placed) {
+    auto result = start_anew(scan);
+    return result ? std::move(result) : std::move(before);
+  }
 
   // Enough scans are one keyframe.
   gather({scan, std::move(*placed), motion, inertial});
-  return is_full() ? finish() : std::nullopt;
+  return is_full() ? finish() : before;
+}
+
+bool JointKeyframer::is_after_pause(model::Utime utime) const {
+  if (!last_utime_ || interval_us_ == 0) return false;
+  const model::Utime passed_us = utime - *last_utime_;
+  return passed_us >= kLeastPause_us && passed_us > kPauseFactor * interval_us_;
 }
 
 std::optional<PlacedScan> JointKeyframer::place(
@@ -127,6 +143,7 @@ std::optional<model::Keyframe> JointKeyframer::start_anew(const model::LandmarkS
 }
 
 void JointKeyframer::gather(Member member) {
+  interval_us_ = last_utime_ ? member.scan.utime - *last_utime_ : 0;
   last_utime_ = member.scan.utime;
   odometry_.forget_before(member.scan.utime);
   members_.push_back(std::move(member));

@@ -55,8 +55,8 @@ class JointKeyframer final : public KeyframerMethod {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.tracker_, self.noise_, self.calibration_, self.odometry_, self.bias_, self.level_,
-      self.members_, self.waiting_, self.waited_, self.last_utime_, self.next_sequence_,
-      self.local_T_previous_base_, self.counters_);
+      self.members_, self.waiting_, self.waited_, self.last_utime_, self.interval_us_,
+      self.next_sequence_, self.local_T_previous_base_, self.counters_);
   }
 
  private:
@@ -68,6 +68,7 @@ class JointKeyframer final : public KeyframerMethod {
       const model::LandmarkScan& stated, const std::optional<geometry::SE2WithCovariance>& motion);
   void gather(Member member);
   bool is_full() const;
+  bool is_after_pause(model::Utime utime) const;
   std::optional<model::Keyframe> finish();
   void stop_waiting();
   std::optional<model::Keyframe> estimated(std::vector<Member> members);
@@ -84,6 +85,7 @@ class JointKeyframer final : public KeyframerMethod {
   std::vector<std::vector<Member>> waiting_;  ///< Of the first keyframes.
   std::vector<model::Keyframe> waited_;
   std::optional<model::Utime> last_utime_;
+  model::Utime interval_us_ = 0;  ///< Between the last two scans; 0 = unknown.
   std::uint64_t next_sequence_ = 0;
   std::optional<geometry::SE2> local_T_previous_base_;  ///< None where tracking began anew.
   KeyframerCounters counters_;
