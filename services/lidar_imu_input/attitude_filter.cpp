@@ -183,8 +183,7 @@ void AttitudeFilter::add_standstill(const Eigen::Vector3d& rate, double seconds,
 
 void AttitudeFilter::mark_rest() {
   with_rest_ = covariance_.leftCols<3>() * level_of_attitude(world_Q_vehicle_).transpose();
-  const Eigen::Matrix2d now = tilt_covariance();
-  rest_ = {Eigen::Vector2d::Zero(), now, now, roll_pitch_yaw(world_Q_vehicle_).yaw_rad};
+  rest_ = {Eigen::Vector2d::Zero(), tilt_covariance(), roll_pitch_yaw(world_Q_vehicle_).yaw_rad};
 }
 
 Eigen::Matrix2d AttitudeFilter::tilt_change_covariance() const {

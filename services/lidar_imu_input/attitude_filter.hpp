@@ -34,13 +34,12 @@ struct RestTilt {
   /// By how much the estimate of then was off, in the sense of model::LevelError [rad].
   Eigen::Vector2d error_rad = Eigen::Vector2d::Zero();
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< Of it [rad^2].
-  Eigen::Matrix2d at_rest = Eigen::Matrix2d::Zero();     ///< What that was then.
   double yaw_rad = 0.0;                                  ///< Of the level then.
 
   /// For saving and loading.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
-    a(s.error_rad, s.covariance, s.at_rest, s.yaw_rad);
+    a(s.error_rad, s.covariance, s.yaw_rad);
   }
 };
 

@@ -44,7 +44,7 @@ std::optional<model::Keyframe> JointKeyframer::add(const model::LandmarkScan& ra
   }
 
   std::optional<model::Keyframe> before;
-  if (is_after_pause(raw.utime) && !members_.empty()) before = finish();
+  if (is_after_pause(raw.utime)) before = break_off();
 
   // Detections at the true level, and the motion since the last scan where odometry covers it.
   const model::LandmarkScan scan = level_.levelled(raw);
@@ -126,13 +126,13 @@ std::optional<model::Keyframe> JointKeyframer::refuse(std::string reason) {
 std::optional<model::Keyframe> JointKeyframer::start_anew(const model::LandmarkScan& scan) {
   std::optional<model::Keyframe> result =
       refuse("scan matches too few of the landmarks of the scans before it");
-  stop_waiting();
   if (members_.size() >= 2) {
-    result = estimated(std::exchange(members_, {}));
+    result = break_off();
   } else if (!members_.empty()) {
     ++counters_.keyframes_withheld;
     members_.clear();
   }
+  stop_waiting();
 
   local_T_previous_base_.reset();
   noise_.forget_while_new();
@@ -157,6 +157,13 @@ std::optional<model::Keyframe> JointKeyframer::finish() {
   }
   stop_waiting();
   return estimated(std::move(members));
+}
+
+/// What was gathered until now, by the local map of now.
+std::optional<model::Keyframe> JointKeyframer::break_off() {
+  stop_waiting();
+  if (members_.empty()) return std::nullopt;
+  return estimated(std::exchange(members_, {}));
 }
 
 void JointKeyframer::stop_waiting() {

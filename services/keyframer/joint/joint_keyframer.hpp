@@ -70,6 +70,7 @@ class JointKeyframer final : public KeyframerMethod {
   bool is_full() const;
   bool is_after_pause(model::Utime utime) const;
   std::optional<model::Keyframe> finish();
+  std::optional<model::Keyframe> break_off();
   void stop_waiting();
   std::optional<model::Keyframe> estimated(std::vector<Member> members);
   MemberBlock adjusted(std::span<const Member> members);
