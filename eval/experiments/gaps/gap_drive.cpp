@@ -125,10 +125,6 @@ PosesAroundGap around(std::span<const SaidPose> poses, std::span<const metrics::
 
 }  // namespace
 
-bool Gap::hides_motion() const {
-  return service == "all" || service == "lidar_imu_input" || service == "ekf";
-}
-
 std::vector<Gap> all_gaps() {
   const std::pair<const char*, const char*> services[] = {
       {"input", "lidar_imu_input"}, {"extractor", "landmark_extractor"},

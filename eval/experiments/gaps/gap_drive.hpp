@@ -15,9 +15,6 @@ struct Gap {
   std::string service;  ///< That hears nothing; "all" of them; empty = a sensor is silent.
   std::string channel;  ///< On which nothing comes; empty = a process hangs.
   double seconds = 0.0;
-
-  /// Whether nothing that runs knows how the vehicle moves.
-  bool hides_motion() const;
 };
 
 /// No gap, and each process and each sensor for 1.1, 3, 6 and 30 s.

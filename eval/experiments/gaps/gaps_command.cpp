@@ -78,7 +78,6 @@ void run(GapsOptions options) {
     print(gap, seed_of(i), scores[i]);
     rows.push_back({{"what", gap.what},
                     {"seconds", gap.seconds},
-                    {"hides_motion", gap.hides_motion()},
                     {"seed", seed_of(i)},
                     {"ekf", to_json(scores[i].ekf)},
                     {"slam", to_json(scores[i].slam)}});
@@ -107,6 +106,7 @@ void add_gaps_experiment(CLI::App& eval) {
   command.add_option("--length-m", options->drive.length_m, "Of a drive [m]")
       ->check(CLI::Range(250.0, 100000.0))
       ->capture_default_str();
+
   command.add_option("--lidar", options->lidar, "vlp32 or vlp16")
       ->check(CLI::IsMember({"vlp32", "vlp16"}))
       ->capture_default_str();
@@ -114,10 +114,12 @@ void add_gaps_experiment(CLI::App& eval) {
   command
       .add_option("--config", options->drive.config_dir, "Configuration of the chain's services")
       ->capture_default_str();
+
   command.add_option("--jobs", options->jobs, "Drives side by side")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   command.add_option("--json", options->json, "Result document");
+
   command.callback([options] { run_guarded("gaps", [options] { run(*options); }); });
 }
 

@@ -53,7 +53,7 @@ class StartLevel {
   std::optional<model::Utime> utime_;                          ///< None before the map begins.
   Eigen::Vector2d levelled_by_rad_ = Eigen::Vector2d::Zero();  ///< The error as known at first.
   Eigen::Matrix2d covariance_ = Eigen::Matrix2d::Zero();       ///< Of what remains of it.
-  /// Of by how much sweeps are levelled otherwise now; none where nothing tells.
+  /// Of the difference to the level error of sweeps now; none where it is not known.
   std::optional<Eigen::Matrix2d> change_;
   Eigen::Vector2d found_rad_ = Eigen::Vector2d::Zero();  ///< The error beyond that.
   model::Utime found_utime_ = 0;                         ///< By what was measured until then.
