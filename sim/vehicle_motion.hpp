@@ -25,7 +25,9 @@ struct VehicleParameters {
 
 /// How the vehicle is driven: speeds, accelerations, stops.
 struct SpeedParameters {
-  double standstill_s = 22.0;  ///< At the start, where an IMU is calibrated.
+  /// At the start, where an IMU is calibrated. Below a second the drive begins with a jolt: the
+  /// suspension settles on the slope meanwhile. To begin on the move, leave out the first readings.
+  double standstill_s = 22.0;
   double end_standstill_s = 3.0;
   double cruise_mps = 5.0;
   double acceleration_mps2 = 1.0;

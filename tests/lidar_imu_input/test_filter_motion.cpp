@@ -30,18 +30,33 @@ class LaserAlone {
                           test::parameters_for_drive().lidar.mount.vehicle_T_sensor(), world_));
   }
 
+  /// The IMU's samples up to the end of the next turn, beginning 5 s before the first one.
+  void imu_speaks() {
+    const model::Utime until = kBegin + (count_ + 1) * kRevolution_us;
+    for (; imu_utime_ <= until; imu_utime_ += 10'000)
+      input_.add(imu_at(level_drive(), imu_utime_, 100.0, {}, random_));
+  }
+
   /// The next turn; RMS of its points' errors in the plan [m], where they are at its stamp.
   double turn() {
+    double square_m2 = 0.0;
+    REQUIRE(turns_that_came(square_m2) == 1);
+    return std::sqrt(square_m2 / static_cast<double>(world_.size()));
+  }
+
+  /// The next turn: how many came out, which may have waited for a sensor, and the sum of their
+  /// points' squared errors.
+  int turns_that_came(double& square_m2) {
     const model::Utime begin = kBegin + count_++ * kRevolution_us;
     const InputResults results = input_.add(sweep_at(
         track_, begin, test::parameters_for_drive().lidar.mount.vehicle_T_sensor(), world_));
-    double square_m2 = 0.0;
     int sweeps = 0;
     for (const InputResult& result : results) {
       const auto* sweep = std::get_if<model::PointSweep>(&result);
       if (sweep == nullptr) continue;
       ++sweeps;
       stamp_ = sweep->utime;
+      has_attitude_ = sweep->attitude.has_value();
       const geometry::SE2 vehicle_T_world = track_.planar(test::seconds(sweep->utime)).inverse();
       REQUIRE(sweep->points.size() == world_.size());
       for (std::size_t i = 0; i < world_.size(); ++i) {
@@ -49,8 +64,7 @@ class LaserAlone {
         square_m2 += (sweep->points[i].position().head<2>().cast<double>() - is).squaredNorm();
       }
     }
-    REQUIRE(sweeps == 1);
-    return std::sqrt(square_m2 / static_cast<double>(world_.size()));
+    return sweeps;
   }
 
   /// The filter's pose of the latest sweep.
@@ -66,6 +80,8 @@ class LaserAlone {
   }
 
   LidarImuInput& input() { return input_; }
+  /// Whether the latest sweep says how the vehicle was inclined.
+  bool has_attitude() const { return has_attitude_; }
 
  private:
   static test::Drive level_drive() {
@@ -78,7 +94,10 @@ class LaserAlone {
   test::Track track_;
   LidarImuInput input_;
   std::vector<Eigen::Vector3d> world_;
+  std::mt19937_64 random_{6};
+  model::Utime imu_utime_ = kBegin - 5'000'000;
   model::Utime stamp_ = 0;
+  bool has_attitude_ = false;
   int count_ = 0;
 };
 
@@ -127,4 +146,26 @@ TEST_CASE("the filter's motion outlives a restart", "[state][deskew]") {
   loaded.load(laser.input().save());
   laser.input() = std::move(loaded);
   CHECK(laser.turn() < 0.05);
+}
+
+TEST_CASE("after the IMU fell silent, what the filter's motion de-skews has no attitude",
+          "[stage][deskew]") {
+  LaserAlone laser;
+  for (int k = 0; k < 10; ++k) {
+    laser.imu_speaks();
+    laser.turn();
+    laser.filter_speaks(6);
+  }
+  CHECK(laser.has_attitude());
+  CHECK(laser.input().counters().sweeps_by_filter == 0);
+
+  double square_m2 = 0.0;
+  int sweeps = 0;
+  for (int k = 0; k < 30; ++k) {
+    sweeps += laser.turns_that_came(square_m2);
+    laser.filter_speaks(6);
+  }
+  CHECK(sweeps > 20);
+  CHECK(laser.input().counters().sweeps_by_filter > 10);
+  CHECK_FALSE(laser.has_attitude());
 }
