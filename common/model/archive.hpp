@@ -8,6 +8,7 @@
 #include "common/model/landmarks.hpp"
 #include "common/model/map.hpp"
 #include "common/model/odometry.hpp"
+#include "common/model/place_scan.hpp"
 #include "common/model/planar_scan.hpp"
 #include "common/model/point_sweep.hpp"
 #include "common/model/submap.hpp"
@@ -73,6 +74,10 @@ void archive(Archive& a, Self& s) {
   a(s.utime, s.sequence, s.sensor_m, s.turn_m, s.first_bearing_rad, s.step_rad, s.beam_step_rad,
     s.range_step_m, s.free, s.hidden);
 }
+/// Members of a saved PlaceScan.
+template <class Archive, class Self>
+requires state::Is<Self, PlaceScan>
+void archive(Archive& a, Self& s) { a(s.utime, s.sequence, s.points); }
 /// Members of a saved TrackedLandmark.
 template <class Archive, class Self>
 requires state::Is<Self, TrackedLandmark>

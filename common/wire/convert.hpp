@@ -15,6 +15,7 @@
 #include "common/model/landmarks.hpp"
 #include "common/model/map.hpp"
 #include "common/model/odometry.hpp"
+#include "common/model/place_scan.hpp"
 #include "common/model/planar_scan.hpp"
 #include "common/model/point_sweep.hpp"
 #include "common/model/slam_output.hpp"
@@ -43,6 +44,7 @@
 #include "understory/map_t.hpp"
 #include "understory/odometry2_t.hpp"
 #include "understory/odometry_t.hpp"
+#include "understory/place_scan_t.hpp"
 #include "understory/raw_pose_t.hpp"
 #include "understory/rest_level2_t.hpp"
 #include "understory/rest_level_t.hpp"
@@ -73,6 +75,8 @@ Result<model::Keyframe> from_wire(const keyframe2_t& wire);
 Result<model::Keyframe> from_wire(const keyframe_t& wire);
 /// How far the sensor saw.
 Result<model::ViewRanges> from_wire(const view_ranges_t& wire);
+/// Points that tell a place.
+Result<model::PlaceScan> from_wire(const place_scan_t& wire);
 /// What a mapper did with one keyframe.
 Result<model::MapUpdate> from_wire(const slam_update3_t& wire);
 /// The same of logs written before slam_update3_t: nothing is known of lines of sight.
@@ -140,6 +144,8 @@ keyframe2_t to_wire(const model::Keyframe& keyframe);
 slam_update3_t to_wire(const model::MapUpdate& update);
 /// How far the sensor saw.
 view_ranges_t to_wire(const model::ViewRanges& ranges);
+/// Points that tell a place.
+place_scan_t to_wire(const model::PlaceScan& scan);
 /// A mapper's pose.
 slam_pose2_t to_wire(const model::SlamPose& pose);
 /// A whole map.

@@ -8,6 +8,7 @@
 
 #include "services/landmark_extractor/adapter_parameters.hpp"
 #include "services/landmark_extractor/landmark_extractor.hpp"
+#include "services/landmark_extractor/place/place_scans.hpp"
 
 namespace understory::landmark_extractor {
 namespace {
@@ -59,10 +60,10 @@ class LandmarkExtractorAdapter : public bus::Adapter {
   void bind(bus::Node& node) override {
     node_ = &node;
     stage_.emplace(parameters_);
-    node.subscribe<model::PlanarScan>(
-        channels_.lidar_scan,
-        [this](const model::PlanarScan& scan) { publish(stage_->extract(scan)); },
-        {.queue_size = 200});
+    place_scans_.emplace(parameters_.place_scan);
+    node.subscribe<model::PlanarScan>(channels_.lidar_scan,
+                                      [this](const model::PlanarScan& scan) { add_scan(scan); },
+                                      {.queue_size = 200});
     // Each sweep is judged by itself: there is no state to save but counters, which begin anew. A
     // sweep that arrives in part before a restart is lost, and counted when its next part comes.
     node.subscribe<model::PointSweep>(channels_.lidar_sweep,
@@ -70,10 +71,18 @@ class LandmarkExtractorAdapter : public bus::Adapter {
                                       {.queue_size = 1000, .journaled = false});
     landmarks_ = node.advertise<model::LandmarkScan>(channels_.landmarks);
     view_ranges_ = node.advertise<model::ViewRanges>(channels_.view_ranges);
+    place_clouds_ = node.advertise<model::PlaceScan>(channels_.place_scan);
     node.every(kSummaryPeriod_us, [this](model::Utime /*now*/) { log_summary(); });
   }
 
  private:
+  void add_scan(const model::PlanarScan& scan) {
+    const std::uint64_t malformed = stage_->counters().scans_malformed;
+    const model::LandmarkScan landmarks = stage_->extract(scan);
+    if (stage_->counters().scans_malformed == malformed) publish_place(scan);
+    publish(landmarks);
+  }
+
   void add_part(const model::PointSweep& part) {
     const auto sweep = assembler_.add(part);
     if (assembler_.incomplete_revolutions() > incomplete_) {
@@ -85,7 +94,15 @@ class LandmarkExtractorAdapter : public bus::Adapter {
     const SweepCounters before = stage_->sweep_counters();
     const model::LandmarkScan landmarks = stage_->extract(*sweep);
     report_faults(before, stage_->sweep_counters());
-    if (stage_->sweep_counters().malformed == before.malformed) publish(landmarks);
+    if (stage_->sweep_counters().malformed > before.malformed) return;
+    publish_place(*sweep);
+    publish(landmarks);
+  }
+
+  /// Before the landmarks: what is made of them may ask for it.
+  template <class Sweep>
+  void publish_place(const Sweep& sweep) {
+    if (const auto scan = place_scans_->add(sweep)) place_clouds_.publish(*scan);
   }
 
   /// Ranges first: what is made of the landmarks may ask for them.
@@ -125,11 +142,13 @@ class LandmarkExtractorAdapter : public bus::Adapter {
   LandmarkExtractorParameters parameters_;
   bus::Node* node_ = nullptr;
   std::optional<LandmarkExtractor> stage_;
+  std::optional<place::PlaceScans> place_scans_;
   model::SweepAssembler assembler_;
   std::uint64_t incomplete_ = 0;
   SweepCounters reported_;
   bus::Publisher<model::LandmarkScan> landmarks_;
   bus::Publisher<model::ViewRanges> view_ranges_;
+  bus::Publisher<model::PlaceScan> place_clouds_;
 };
 
 }  // namespace
@@ -137,7 +156,7 @@ class LandmarkExtractorAdapter : public bus::Adapter {
 bus::Service landmark_extractor_service(const LandmarkExtractorChannels& channels) {
   return {"landmark_extractor",
           channels.lidar_scan + ", " + channels.lidar_sweep + " -> " + channels.landmarks + ", " +
-              channels.view_ranges,
+              channels.view_ranges + ", " + channels.place_scan,
           [channels] { return std::make_unique<LandmarkExtractorAdapter>(channels); }};
 }
 

@@ -13,6 +13,7 @@ struct LandmarkExtractorChannels {
   std::string lidar_sweep = "LIDAR_SWEEP";
   std::string landmarks = "LANDMARKS";
   std::string view_ranges = "VIEW_RANGES";
+  std::string place_scan = "PLACE_SCAN";
 };
 
 /// The service, for run_service() and replay.

@@ -130,6 +130,19 @@ void describe_corner(CornerParameters& p, bus::ParameterTable& table) {
   table.add("corner.min_rings", p.min_rings, {1, 100}, "", "Fewest rings that measure a wall.");
 }
 
+void describe_place_scan(PlaceScanParameters& p, bus::ParameterTable& table) {
+  table.add("place_scan.period_s", p.period_s, {0.0, 3600.0}, "s",
+            "Time from one PLACE_SCAN to the next; 0 = none. Only detectors and verifiers of the "
+            "loop closer that compare clouds look at them: 0.5 then.");
+  table.add("place_scan.cube_m", p.cube_m, {0.01, 10.0}, "m",
+            "Of the points in a cube with edges of this one is kept.");
+  table.add("place_scan.max_range_m", p.max_range_m, {1.0, 300.0}, "m",
+            "Points farther away in the plan are left out.");
+  table.add("place_scan.most_points", p.most_points,
+            {10, static_cast<int>(model::PlaceScan::kMostPoints)}, "",
+            "Of more, some of everywhere are kept: 6 bytes each, for each place of the drive.");
+}
+
 }  // namespace
 
 void describe(LandmarkExtractorParameters& parameters, bus::ParameterTable& table) {
@@ -141,6 +154,7 @@ void describe(LandmarkExtractorParameters& parameters, bus::ParameterTable& tabl
   describe_trunk_selection(parameters.trunk, table);
   describe_corner(parameters.corner, table);
   describe_walls(parameters.planar_corner, "planar_corner", table);
+  describe_place_scan(parameters.place_scan, table);
 }
 
 }  // namespace understory::landmark_extractor

@@ -8,6 +8,7 @@ int main(int argc, char** argv) {
           .lidar_sweep = "LIDAR_SWEEP",  // in: sweeps in space, in parts
           .landmarks = "LANDMARKS",      // out: trunks and corners of each sweep
           .view_ranges = "VIEW_RANGES",  // out: how far each sweep saw at the height of trunks
+          .place_scan = "PLACE_SCAN",    // out: clouds for loop detectors that compare clouds
       }),
       argc, argv);
 }

@@ -91,6 +91,14 @@ inline CornerParameters planar_corner() {
   return corner;
 }
 
+/// Clouds for loop detectors that compare clouds: PLACE_SCAN.
+struct PlaceScanParameters {
+  double period_s = 0.0;      ///< From one to the next; 0 = none.
+  double cube_m = 0.6;        ///< One point is kept of each cube with edges of this.
+  double max_range_m = 40.0;  ///< Points farther away in the plan are left out.
+  int most_points = 1000;     ///< 6 bytes each; a place of the loop closer keeps them.
+};
+
 /// All parameters of the stage.
 struct LandmarkExtractorParameters {
   PlanarTrunkParameters planar;
@@ -98,6 +106,7 @@ struct LandmarkExtractorParameters {
   SweepTrunkParameters trunk;
   CornerParameters corner;
   CornerParameters planar_corner = landmark_extractor::planar_corner();
+  PlaceScanParameters place_scan;
 };
 
 }  // namespace understory::landmark_extractor

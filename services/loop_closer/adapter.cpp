@@ -12,7 +12,7 @@
 namespace understory::loop_closer {
 namespace {
 
-constexpr state::Format kServiceFormat{"loop_closer_service", 1};
+constexpr state::Format kServiceFormat{"loop_closer_service", 2};
 
 class LoopCloserAdapter : public bus::Adapter {
  public:
@@ -34,6 +34,9 @@ class LoopCloserAdapter : public bus::Adapter {
     node.subscribe<model::Keyframe>(
         channels_.keyframe, [this](const model::Keyframe& keyframe) { stage_->add(keyframe); },
         {.queue_size = 500});
+    node.subscribe<model::PlaceScan>(channels_.place_scan,
+                                     [this](const model::PlaceScan& scan) { stage_->add(scan); },
+                                     {.queue_size = 100});
     node.subscribe<model::MapUpdate>(channels_.slam_update,
                                      [this](const model::MapUpdate& update) { add(update); },
                                      {.queue_size = 500});
@@ -107,7 +110,7 @@ class LoopCloserAdapter : public bus::Adapter {
 bus::Service loop_closer_service(const LoopCloserChannels& channels) {
   return {"loop_closer",
           channels.keyframe + ", " + channels.slam_update + ", " + channels.submap + ", " +
-              channels.loop_result + " -> " + channels.loop_closure,
+              channels.place_scan + ", " + channels.loop_result + " -> " + channels.loop_closure,
           [channels] { return std::make_unique<LoopCloserAdapter>(channels); }};
 }
 

@@ -10,6 +10,7 @@ namespace understory::loop_closer {
 /// Names of the channels that the process reads and writes.
 struct LoopCloserChannels {
   std::string keyframe = "KEYFRAME";
+  std::string place_scan = "PLACE_SCAN";
   std::string slam_update = "SLAM_UPDATE";
   std::string submap = "SUBMAP";
   std::string loop_result = "LOOP_RESULT";

@@ -37,20 +37,24 @@ std::vector<std::string> verifiers() {
 }
 
 void describe(SearchParameters& p, bus::ParameterTable& table) {
-  table.add("search.detector", p.detector, place_recognition::detector_names(),
-            "Who finds places. stems: its score is a probability, set against what chance has; the "
-            "others only name candidates and need a verifier. Those for clouds of points "
-            "(range_histogram, scan_context) are refused: this process has landmarks alone.");
+  table.add(
+      "search.detector", p.detector, place_recognition::detector_names(),
+      "Who finds places. stems: its score is a probability, set against what chance has; the "
+      "others only name candidates and need a verifier. range_histogram and scan_context compare "
+      "clouds: place_scan.period_s of landmark_extractor must not be 0.");
   table.add(
       "search.verifier", p.verifier, verifiers(),
-      "Who compares a found place in detail, and gives the pose. none: only with stems. hough "
-      "and stem_likelihood need the correspondence graph to agree where the detector is not "
-      "stems. Those for clouds (ICP, scan_context) are refused.");
+      "Who compares a found place in detail, and gives the pose. none: only with stems. Where "
+      "the detector is not stems the correspondence graph must agree with any other one. ICP and "
+      "scan_context compare clouds, as above; they say yes or no, and the pose is the other's.");
   table.add("search.candidates", p.candidates, {1, 50}, "",
             "So many candidates, the most alike, are verified.");
   table.add("search.verified_pairs", p.verified_pairs, {3, 10000}, "",
             "Least number of landmarks in common that a verifier must find. A count does not say "
             "what chance gives: where stems stand denser, more.");
+  table.add("search.verified_score", p.verified_score, {0.0, 1.0}, "",
+            "The same of a verifier that compares clouds: for ICP the share of the points that "
+            "have a partner, for scan_context one less the distance of two contexts.");
 }
 
 void describe(AcceptanceParameters& p, bus::ParameterTable& table) {

@@ -8,6 +8,8 @@ void describe(HealthParameters& p, bus::ParameterTable& table) {
            "bad are those that contradict the mapper's map and wait for others that agree.", table);
   describe(p.missing, "missing", "keyframes",
            "bad are those of which the mapper tells and that did not come.", table);
+  describe(p.clouds, "clouds", "places",
+           "bad are those without a cloud, where detector or verifier compare clouds.", table);
 }
 
 HealthWatch::HealthWatch(const HealthParameters& parameters)
@@ -17,7 +19,10 @@ HealthWatch::HealthWatch(const HealthParameters& parameters)
                 "loop closures contradict the map and wait for others that agree", "LOOP_RESULT",
                 bus::Condition(parameters.diverged)},
       missing_{wire::Reason::kPartsMissing, "keyframes are missing that the mapper has", "KEYFRAME",
-               bus::Condition(parameters.missing)} {}
+               bus::Condition(parameters.missing)},
+      clouds_{wire::Reason::kPartsMissing,
+              "places have no cloud to compare: place_scan.period_s of landmark_extractor",
+              "PLACE_SCAN", bus::Condition(parameters.clouds)} {}
 
 void HealthWatch::add(const model::LoopResult& result) {
   using enum model::LoopResult::Status;
@@ -28,6 +33,9 @@ void HealthWatch::add(const model::LoopResult& result) {
 
 void HealthWatch::add(const LoopCounters& before, const LoopCounters& after) {
   missing_.condition.add(after.keyframes_missing > before.keyframes_missing);
+  const bool has_new = after.places > before.places;
+  const bool has_none = after.without_cloud > before.without_cloud;
+  if (has_new || has_none) clouds_.condition.add(has_none);
 }
 
 }  // namespace understory::loop_closer

@@ -14,13 +14,14 @@ struct HealthParameters {
   bus::ConditionLimits refused{8, 4};
   bus::ConditionLimits diverged{16, 12};
   bus::ConditionLimits missing{20, 10};
+  bus::ConditionLimits clouds{20, 10};
 };
 /// Adds the parameters to the table.
 void describe(HealthParameters& parameters, bus::ParameterTable& table);
 
 /// Judges the loop closer by what becomes of its closures. `input_refused`: the mapper refuses
 /// them. `diverged`: they contradict its map, and still wait for others that agree.
-/// `parts_missing`: keyframes do not come that the mapper has.
+/// `parts_missing`: keyframes do not come that the mapper has, or clouds that are compared.
 class HealthWatch {
  public:
   /// All is well so far.
@@ -31,20 +32,21 @@ class HealthWatch {
   /// An update of a keyframe, with the counts before and after it.
   void add(const LoopCounters& before, const LoopCounters& after);
   /// What to show.
-  std::array<bus::WatchedCondition, 3> conditions() const {
-    return {refused_, diverged_, missing_};
+  std::array<bus::WatchedCondition, 4> conditions() const {
+    return {refused_, diverged_, missing_, clouds_};
   }
 
   /// Members of a saved state; see common/state. The parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.refused_, self.diverged_, self.missing_);
+    a(self.refused_, self.diverged_, self.missing_, self.clouds_);
   }
 
  private:
   bus::WatchedCondition refused_;
   bus::WatchedCondition diverged_;
   bus::WatchedCondition missing_;
+  bus::WatchedCondition clouds_;
 };
 
 }  // namespace understory::loop_closer

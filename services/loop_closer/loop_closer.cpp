@@ -10,7 +10,7 @@
 namespace understory::loop_closer {
 namespace {
 
-constexpr state::Format kFormat{"loop_closer", 1};
+constexpr state::Format kFormat{"loop_closer", 2};
 /// Numbers of our closures begin here: those of persons are below.
 constexpr std::uint64_t kFirstId = std::uint64_t{1} << 40;
 /// Where pairs are all that speaks for a place, it has so many more than one elsewhere.
@@ -42,6 +42,7 @@ model::LoopEnd end_at(const Place& place, geometry::SE2WithCovariance& end_T_bas
 
 LoopCloser::LoopCloser(const LoopCloserParameters& parameters)
     : parameters_(parameters),
+      wants_clouds_(fault_of(parameters.search).empty() && wants_clouds(parameters.search)),
       window_(parameters.places),
       known_ground_(parameters.places.min_loop_m),
       search_(parameters.search, parameters.stems) {}
@@ -49,6 +50,10 @@ LoopCloser::LoopCloser(const LoopCloserParameters& parameters)
 void LoopCloser::add(const model::Keyframe& keyframe) {
   pending_.push_back(keyframe);
   if (pending_.size() > kMostPending) pending_.pop_front();
+}
+
+void LoopCloser::add(const model::PlaceScan& scan) {
+  if (wants_clouds_) clouds_.add(scan);
 }
 
 std::optional<model::Keyframe> LoopCloser::take_pending(std::uint64_t sequence) {
@@ -70,12 +75,24 @@ std::optional<model::LoopClosure> LoopCloser::add(const model::MapUpdate& update
     window_.restart();
     known_ground_.restart();
   }
-  window_.add(*keyframe, update);
+  if (window_.add(*keyframe, update) == WindowStep::kBegun) clouds_.restart();
+  clouds_.add(*keyframe, update, window_.along_m());
   known_ground_.add(update, window_.along_m());
   if (window_.along_m() < place_at_m_) return std::nullopt;
   place_at_m_ = window_.along_m() + parameters_.places.every_m;
   if (known_ground_.is_known(parameters_.places.known_share)) return std::nullopt;
 
+  std::optional<Place> place = place_here(update);
+  if (!place) return std::nullopt;
+  std::optional<model::LoopClosure> closure = look_for(*place);
+  search_.add(*place);
+  memory_.add(*std::move(place));
+  ++counters_.places;
+  return closure;
+}
+
+/// What was seen around the keyframe's base, where that is enough to tell the place.
+std::optional<Place> LoopCloser::place_here(const model::MapUpdate& update) {
   Place place;
   place.keyframe = update.keyframe_sequence;
   place.utime = update.utime;
@@ -86,11 +103,14 @@ std::optional<model::LoopClosure> LoopCloser::add(const model::MapUpdate& update
   if (place.stems.size() < static_cast<std::size_t>(parameters_.places.min_stems))
     return std::nullopt;
 
-  std::optional<model::LoopClosure> closure = look_for(place);
-  search_.add(place);
-  memory_.add(std::move(place));
-  ++counters_.places;
-  return closure;
+  if (!wants_clouds_) return place;
+  place.cloud =
+      clouds_.seen_from(update.map_T_vehicle, place.along_m - parameters_.places.window_m);
+  if (place.cloud.empty()) {
+    ++counters_.without_cloud;
+    return std::nullopt;
+  }
+  return place;
 }
 
 /// The likeliest place, where nothing else can explain what is seen.
@@ -100,7 +120,7 @@ std::optional<model::LoopClosure> LoopCloser::look_for(const Place& place) {
     return std::nullopt;
   ++counters_.queries;
   const std::uint64_t newest = memory_.places()[searched - 1].keyframe;
-  const std::vector<FoundPlace> found = search_.find(place.stems, newest, memory_);
+  const std::vector<FoundPlace> found = search_.find(place, newest, memory_);
   if (found.empty()) return std::nullopt;
 
   const FoundPlace& best = found.front();
@@ -170,6 +190,7 @@ bool LoopCloser::add(const model::LoopResult& result) {
   if (result.status == kAccepted) {
     ++counters_.accepted;
     window_.restart();
+    clouds_.restart();
   }
   if (result.status == kWaiting) ++counters_.waiting;
   if (result.status == kRefused) ++counters_.refused;

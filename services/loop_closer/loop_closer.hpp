@@ -13,6 +13,7 @@
 #include "common/model/submap.hpp"
 #include "services/loop_closer/known_ground.hpp"
 #include "services/loop_closer/parameters.hpp"
+#include "services/loop_closer/place_clouds.hpp"
 #include "services/loop_closer/place_memory.hpp"
 #include "services/loop_closer/place_search.hpp"
 #include "services/loop_closer/place_window.hpp"
@@ -25,6 +26,7 @@ struct LoopCounters {
   std::uint64_t keyframes = 0;          ///< That the mapper placed.
   std::uint64_t keyframes_missing = 0;  ///< Updates of keyframes that did not come.
   std::uint64_t places = 0;             ///< Kept.
+  std::uint64_t without_cloud = 0;      ///< Places left out: clouds are compared, none came.
   std::uint64_t queries = 0;            ///< Looked for.
   std::uint64_t sent = 0;               ///< Closures.
   std::uint64_t unexpected = 0;         ///< Of these, against what the mapper's poses allow.
@@ -37,8 +39,8 @@ struct LoopCounters {
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
-    a(s.keyframes, s.keyframes_missing, s.places, s.queries, s.sent, s.unexpected, s.accepted,
-      s.waiting, s.refused, s.revoked, s.other_map);
+    a(s.keyframes, s.keyframes_missing, s.places, s.without_cloud, s.queries, s.sent, s.unexpected,
+      s.accepted, s.waiting, s.refused, s.revoked, s.other_map);
   }
 };
 
@@ -53,6 +55,9 @@ class LoopCloser {
 
   /// A keyframe; its update must come later. At most kMostPending wait.
   void add(const model::Keyframe& keyframe);
+  /// A cloud of one of its scans; the keyframe's update must come later. Ignored where nobody
+  /// compares clouds.
+  void add(const model::PlaceScan& scan);
   /// What became of a keyframe. Gives the loop closure that it shows, if any. Cost: one search
   /// every `every_m` metres.
   std::optional<model::LoopClosure> add(const model::MapUpdate& update);
@@ -75,13 +80,14 @@ class LoopCloser {
   /// Members of a saved state; see common/state. Parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.pending_, self.window_, self.known_ground_, self.memory_, self.sent_, self.counters_,
-      self.place_at_m_, self.map_id_);
+    a(self.pending_, self.window_, self.clouds_, self.known_ground_, self.memory_, self.sent_,
+      self.counters_, self.place_at_m_, self.map_id_);
   }
 
  private:
   static constexpr std::size_t kMostPending = 64;
   std::optional<model::Keyframe> take_pending(std::uint64_t sequence);
+  std::optional<Place> place_here(const model::MapUpdate& update);
   std::optional<model::LoopClosure> look_for(const Place& place);
   /// How sure a found place is.
   struct Verdict {
@@ -93,8 +99,10 @@ class LoopCloser {
                 std::size_t searched) const;
 
   LoopCloserParameters parameters_;
+  bool wants_clouds_;
   std::deque<model::Keyframe> pending_;  ///< In order of time.
   PlaceWindow window_;
+  PlaceClouds clouds_;
   KnownGround known_ground_;
   PlaceMemory memory_;
   PlaceSearch search_;

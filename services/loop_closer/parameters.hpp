@@ -45,6 +45,7 @@ struct SearchParameters {
   std::string verifier = "none";
   int candidates = 3;
   int verified_pairs = 6;
+  double verified_score = 0.5;  ///< Of verifiers that compare clouds.
 };
 
 /// All of them.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/model/archive.hpp"
+#include "common/model/place_scan.hpp"
 #include "common/model/submap.hpp"
 #include "common/place_recognition/level_stems.hpp"
 
@@ -35,6 +36,8 @@ struct Place {
   geometry::SE2WithCovariance map_T_base;
   std::optional<InSubmap> in_submap;  ///< None while the mapper holds the keyframe.
   std::vector<LevelStem> stems;       ///< Frame `vehicle_level` of the base.
+  /// The same frame; empty where nobody compares clouds.
+  std::vector<model::PlacePoint> cloud;
 
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
@@ -43,10 +46,11 @@ struct Place {
     a(count);
     if constexpr (Archive::kReads) s.stems.resize(count);
     for (auto& stem : s.stems) a(stem.position_m, stem.diameter_m);
+    a(s.cloud);
   }
 };
 
-/// Places in order of time. Memory: about 100 bytes and 24 for each stem.
+/// Places in order of time. Memory: about 100 bytes, 24 for each stem and 6 for each point.
 class PlaceMemory {
  public:
   /// Adds a place. Precondition: its keyframe is later than those before.

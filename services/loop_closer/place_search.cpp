@@ -49,24 +49,23 @@ std::unique_ptr<PlaceVerification> verification_of(const SearchParameters& searc
 }  // namespace
 
 std::string fault_of(const SearchParameters& search) {
-  const auto no_cloud = [](const char* key, const std::string& name) {
-    return std::string(key) + " = \"" + name +
-           "\": it compares clouds of points, and this process has landmarks alone";
-  };
   try {
-    if (place_recognition::wants_cloud(search.detector))
-      return no_cloud("search.detector", search.detector);
     const bool is_sure = place_recognition::gives_evidence(search.detector);
     if (search.verifier == kNone)
       return is_sure ? std::string()
                      : "search.verifier = \"none\": the score of detector \"" + search.detector +
                            "\" is no probability; correspondence_graph verifies it";
-    if (place_recognition::verifier_wants_cloud(search.verifier))
-      return no_cloud("search.verifier", search.verifier);
+    // Throws where there is none of that name.
+    (void)place_recognition::verifier_wants_cloud(search.verifier);
   } catch (const std::invalid_argument& error) {
     return std::string("search: ") + error.what();
   }
   return {};
+}
+
+bool wants_clouds(const SearchParameters& search) {
+  return place_recognition::wants_cloud(search.detector) ||
+         (search.verifier != kNone && place_recognition::verifier_wants_cloud(search.verifier));
 }
 
 PlaceSearch::PlaceSearch(const SearchParameters& search, const StemParameters& stems)
@@ -77,11 +76,11 @@ PlaceSearch::PlaceSearch(const SearchParameters& search, const StemParameters& s
           place_recognition::make_detector(checked(search).detector, detector_parameters(stems))),
       verification_(verification_of(search, stems)) {}
 
-void PlaceSearch::add(const Place& place) { detector_->add(frame_of(place.keyframe, place.stems)); }
+void PlaceSearch::add(const Place& place) { detector_->add(frame_of(place)); }
 
-std::vector<FoundPlace> PlaceSearch::find(std::span<const LevelStem> stems, std::uint64_t newest,
+std::vector<FoundPlace> PlaceSearch::find(const Place& place, std::uint64_t newest,
                                           const PlaceMemory& memory) const {
-  const place_recognition::PlaceFrame query = frame_of(newest + 1, stems);
+  const place_recognition::PlaceFrame query = frame_of(place);
   const std::size_t most = verification_ ? verification_->candidates() : 1;
   const auto scored =
       detector_->query(query, {static_cast<place_recognition::FrameId>(newest), most});

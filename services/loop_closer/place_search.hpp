@@ -18,9 +18,11 @@ namespace understory::loop_closer {
 /// What is wrong with the choice of detector and verifier, with the key in front; empty where
 /// nothing is.
 std::string fault_of(const SearchParameters& search);
+/// Whether detector or verifier compare clouds. Precondition: fault_of() finds nothing.
+bool wants_clouds(const SearchParameters& search);
 
-/// Detector and verifier, of those that `common/place_recognition` has for landmarks. The places
-/// are its only state, so it is made again from them.
+/// Detector and verifier, of those that `common/place_recognition` has. The places are its only
+/// state, so it is made again from them.
 class PlaceSearch {
  public:
   /// Without places. Throws std::invalid_argument where fault_of() finds something.
@@ -28,9 +30,9 @@ class PlaceSearch {
 
   /// Adds a place. Precondition: its keyframe is later than those before.
   void add(const Place& place);
-  /// Looks among the places of keyframes up to `newest`; the one that answers first. `memory` has
-  /// them all. The same places give the same answer.
-  std::vector<FoundPlace> find(std::span<const LevelStem> stems, std::uint64_t newest,
+  /// Looks for a place among those of keyframes up to `newest`; the one that answers first.
+  /// `memory` has them all. The same places give the same answer.
+  std::vector<FoundPlace> find(const Place& place, std::uint64_t newest,
                                const PlaceMemory& memory) const;
   /// Most poses that chance has around one place, of those that can be told apart.
   double poses_per_place() const;

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+
+#include "services/loop_closer/expectation.hpp"
+
 namespace understory::loop_closer {
 namespace {
 
@@ -13,6 +16,9 @@ constexpr const char* kGraph = "correspondence_graph";
 /// Two who look at the same landmarks agree on the pose so well [m], [rad] ...
 constexpr double kAgreeM = 0.3;
 constexpr double kAgreeRad = 0.03;
+/// ... and where one of them knows only a part of it, the other is within so many squared standard
+/// deviations: 99.9 % of three degrees of freedom.
+constexpr double kAgreeChi2 = 16.27;
 /// Two candidates that put the query so far apart [m], [rad] are rivals: farther than odometry is
 /// off between places that show one another.
 constexpr double kElsewhereM = 3.0;
@@ -21,6 +27,15 @@ constexpr double kElsewhereRad = 0.2;
 bool are_near(const geometry::SE2& a, const geometry::SE2& b, double near_m, double near_rad) {
   const geometry::SE2 off = a.inverse() * b;
   return off.translation().norm() <= near_m && std::abs(off.theta()) <= near_rad;
+}
+
+/// Whether two results are one, by how well each is known.
+bool agree(const geometry::SE2WithCovariance& a, const geometry::SE2WithCovariance& b) {
+  return are_near(a.mean, b.mean, kAgreeM, kAgreeRad) || squared_distance(a, b) <= kAgreeChi2;
+}
+
+geometry::SE2WithCovariance pose_of(const place_recognition::VerifiedPlace& verified) {
+  return {verified.frame_T_query, verified.covariance};
 }
 
 /// Where a found place puts the query, frame `map`.
@@ -40,12 +55,14 @@ void note_rivals(std::vector<FoundPlace>& found, const PlaceMemory& memory) {
 
 }  // namespace
 
-PlaceFrame frame_of(std::uint64_t keyframe, std::span<const LevelStem> stems) {
+PlaceFrame frame_of(const Place& place) {
   PlaceFrame frame;
-  frame.id = static_cast<place_recognition::FrameId>(keyframe);
-  frame.landmarks.reserve(stems.size());
-  for (const LevelStem& stem : stems)
+  frame.id = static_cast<place_recognition::FrameId>(place.keyframe);
+  frame.landmarks.reserve(place.stems.size());
+  for (const LevelStem& stem : place.stems)
     frame.landmarks.push_back({{stem.position_m.x(), stem.position_m.y(), 0.0}, stem.diameter_m});
+  frame.cloud.reserve(place.cloud.size());
+  for (const model::PlacePoint& point : place.cloud) frame.cloud.push_back(point.position_m());
   return frame;
 }
 
@@ -54,8 +71,10 @@ PlaceVerification::PlaceVerification(const SearchParameters& search, bool has_ev
     : candidates_(has_evidence ? 1 : static_cast<std::size_t>(search.candidates)),
       least_pairs_(static_cast<std::size_t>(search.verified_pairs)),
       verifier_(place_recognition::make_verifier(search.verifier, parameters)) {
+  if (place_recognition::verifier_wants_cloud(search.verifier))
+    least_score_ = search.verified_score;
   if (!has_evidence && search.verifier != kGraph)
-    second_ = place_recognition::make_verifier(kGraph, parameters);
+    graph_ = place_recognition::make_verifier(kGraph, parameters);
 }
 
 std::vector<FoundPlace> PlaceVerification::verified(const PlaceFrame& query,
@@ -72,27 +91,35 @@ std::vector<FoundPlace> PlaceVerification::verified(const PlaceFrame& query,
   return found;
 }
 
+/// Points of a cloud are no landmarks: of those the share that has a partner counts.
+bool PlaceVerification::is_enough(const place_recognition::VerifiedPlace& verified) const {
+  return least_score_ ? verified.score >= *least_score_ : verified.inliers >= least_pairs_;
+}
+
 std::optional<FoundPlace> PlaceVerification::compared(const PlaceFrame& query,
                                                       const ScoredPlace& scored,
                                                       const Place& place) const {
-  const PlaceFrame frame = frame_of(place.keyframe, place.stems);
-  const auto one = verifier_->verify(query, frame, scored.guesses);
-  if (!one || one->inliers < least_pairs_) return std::nullopt;
+  const PlaceFrame frame = frame_of(place);
   if (scored.evidence) {
     const geometry::SE2WithCovariance& found = scored.guesses.front();
-    if (!are_near(found.mean, one->frame_T_query, kAgreeM, kAgreeRad)) return std::nullopt;
+    const auto one = verifier_->verify(query, frame, scored.guesses);
+    if (!one || !is_enough(*one) || !agree(found, pose_of(*one))) return std::nullopt;
     return FoundPlace{place.keyframe, found, scored.evidence->pairs, 0, scored.evidence};
   }
-
-  std::size_t pairs = one->inliers;
-  if (second_) {
-    const auto other = second_->verify(query, frame, scored.guesses);
-    if (!other || other->inliers < least_pairs_ ||
-        !are_near(other->frame_T_query, one->frame_T_query, kAgreeM, kAgreeRad))
-      return std::nullopt;
-    pairs = std::min(pairs, other->inliers);
+  if (!graph_) {
+    const auto one = verifier_->verify(query, frame, scored.guesses);
+    if (!one || !is_enough(*one)) return std::nullopt;
+    return FoundPlace{place.keyframe, pose_of(*one), one->inliers};
   }
-  return FoundPlace{place.keyframe, {one->frame_T_query, one->covariance}, pairs};
+
+  // Clouds are compared from where the landmarks put the query: the search is local.
+  const auto graph = graph_->verify(query, frame, scored.guesses);
+  if (!graph || graph->inliers < least_pairs_) return std::nullopt;
+  const std::vector by_graph{pose_of(*graph)};
+  const auto one = verifier_->verify(query, frame, least_score_ ? by_graph : scored.guesses);
+  if (!one || !is_enough(*one) || !agree(by_graph.front(), pose_of(*one))) return std::nullopt;
+  if (least_score_) return FoundPlace{place.keyframe, by_graph.front(), graph->inliers};
+  return FoundPlace{place.keyframe, pose_of(*one), std::min(one->inliers, graph->inliers)};
 }
 
 }  // namespace understory::loop_closer

@@ -26,16 +26,17 @@ struct FoundPlace {
   std::optional<place_recognition::PlaceEvidence> evidence = std::nullopt;
 };
 
-/// Stems as place recognition takes them.
-place_recognition::PlaceFrame frame_of(std::uint64_t keyframe, std::span<const LevelStem> stems);
+/// A place as place recognition takes it.
+place_recognition::PlaceFrame frame_of(const Place& place);
 
 /// Verifies what a detector found. A detector whose score is a probability has found the pose
 /// itself: the verifier must agree with it, as a second opinion. Of all others the verifier gives
-/// the pose, and the correspondence graph must agree where another one was chosen: counts of Hough
-/// and the likelihood of stems do not hold from one forest to the next (docs/decisions/101).
+/// the pose, and the correspondence graph must agree where another one was chosen: counts of Hough,
+/// the likelihood of stems and the share of partners in clouds do not hold from one forest to the
+/// next (docs/decisions/101). Scan Context finds a heading and no place: the graph's pose counts.
 class PlaceVerification {
  public:
-  /// Precondition: the verifier is one for landmarks.
+  /// Precondition: fault_of() finds nothing wrong with the choice, and it has a verifier.
   PlaceVerification(const SearchParameters& search, bool has_evidence,
                     const place_recognition::VerifierParameters& parameters);
 
@@ -51,11 +52,13 @@ class PlaceVerification {
   std::optional<FoundPlace> compared(const place_recognition::PlaceFrame& query,
                                      const place_recognition::ScoredPlace& scored,
                                      const Place& place) const;
+  bool is_enough(const place_recognition::VerifiedPlace& verified) const;
 
   std::size_t candidates_;
   std::size_t least_pairs_;
+  std::optional<double> least_score_;  ///< Of a verifier that compares clouds.
   std::unique_ptr<place_recognition::PlaceVerifier> verifier_;
-  std::unique_ptr<place_recognition::PlaceVerifier> second_;  ///< That must agree; may be none.
+  std::unique_ptr<place_recognition::PlaceVerifier> graph_;  ///< That must agree; may be none.
 };
 
 }  // namespace understory::loop_closer

@@ -33,13 +33,14 @@ bool PlaceWindow::was_corrected(const model::Keyframe& keyframe,
   return off.head<2>().norm() > kCorrectedM || std::abs(off.z()) > kCorrectedRad;
 }
 
-void PlaceWindow::add(const model::Keyframe& keyframe, const model::MapUpdate& update) {
+WindowStep PlaceWindow::add(const model::Keyframe& keyframe, const model::MapUpdate& update) {
   if (last_) {
     const geometry::SE2 last_T_base = last_->map_T_base.inverse() * update.map_T_vehicle;
     if (was_corrected(keyframe, last_T_base)) restart();
     along_m_ += std::min(kLongestStepM, last_T_base.translation().norm());
   }
   last_ = WindowEnd{keyframe.sequence, update.map_T_vehicle};
+  const WindowStep step = seen_.empty() ? WindowStep::kBegun : WindowStep::kWentOn;
 
   Seen seen;
   seen.along_m = along_m_;
@@ -54,6 +55,7 @@ void PlaceWindow::add(const model::Keyframe& keyframe, const model::MapUpdate& u
       seen.stems[pair.keyframe_landmark].landmark = pair.landmark_id;
   seen_.push_back(std::move(seen));
   while (seen_.front().along_m < along_m_ - parameters_.window_m) seen_.pop_front();
+  return step;
 }
 
 std::vector<LevelStem> PlaceWindow::stems() const {

@@ -26,6 +26,9 @@ struct WindowEnd {
   }
 };
 
+/// What became of a window with a keyframe.
+enum class WindowStep { kWentOn, kBegun };
+
 /// Joins what several keyframes detected of each stem. A single frame may show three stems; what
 /// was seen along the last metres shows enough to tell a place. The mapper says which detections
 /// are one landmark, and how the keyframes lie to each other.
@@ -36,7 +39,7 @@ class PlaceWindow {
 
   /// Adds a keyframe that the mapper placed. Where it does not lie to the last one as it was
   /// tracked (the mapper has corrected the map between them), the window begins with it.
-  void add(const model::Keyframe& keyframe, const model::MapUpdate& update);
+  WindowStep add(const model::Keyframe& keyframe, const model::MapUpdate& update);
   /// The next keyframe begins the window.
   void restart() { seen_.clear(); }
 

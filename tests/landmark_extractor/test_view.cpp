@@ -226,9 +226,10 @@ TEST_CASE("a laser whose beams come one after another says how far it saw while 
   CHECK(blocked >= 0.95 * behind);
 }
 
-TEST_CASE("ranges go out before the landmarks of the same sweep", "[extractor]") {
+TEST_CASE("ranges and cloud go out before the landmarks of the same sweep", "[extractor]") {
   bus::MemoryBus bus(bus::MemoryBus::Queues::kUnlimited);
-  bus::HostedService hosted(landmark_extractor_service(), bus, bus::no_clock(), "", "test.toml");
+  bus::HostedService hosted(landmark_extractor_service(), bus, bus::no_clock(),
+                            "[place_scan]\nperiod_s = 1.0\n", "test.toml");
   std::vector<std::string> channels;
   model::Utime utime = 0;
   bus.subscribe("LANDMARKS", 0,
@@ -239,12 +240,26 @@ TEST_CASE("ranges go out before the landmarks of the same sweep", "[extractor]")
     REQUIRE(view);
     utime = view->utime;
   });
+  bus.subscribe("PLACE_SCAN", 0, [&](const bus::BusMessage& message) {
+    channels.emplace_back("PLACE_SCAN");
+    const auto cloud = wire::decode_message<model::PlaceScan>(message.bytes);
+    REQUIRE(cloud);
+    CHECK(cloud->utime == 5'000'000);
+    CHECK_FALSE(cloud->points.empty());
+  });
   hosted.node().connect();
   std::mt19937_64 random(4);
   model::PlanarScan scan = test::sweep({test::circle_at(10.0, 0.2, 0.2)}, {}, 0.02, random);
   scan.utime = 5'000'000;
   bus.publish("LIDAR_SCAN", wire::encode_message(scan));
   bus.drain();
-  CHECK(channels == std::vector<std::string>{"VIEW_RANGES", "LANDMARKS"});
+  const std::vector<std::string> all{"PLACE_SCAN", "VIEW_RANGES", "LANDMARKS"};
+  CHECK(channels == all);
   CHECK(utime == scan.utime);
+
+  // The next cloud is not due.
+  scan.utime += 200'000;
+  bus.publish("LIDAR_SCAN", wire::encode_message(scan));
+  bus.drain();
+  CHECK(channels.size() == 5);
 }

@@ -12,6 +12,7 @@
 #include "common/model/keyframe.hpp"
 #include "common/model/map.hpp"
 #include "common/model/odometry.hpp"
+#include "common/model/place_scan.hpp"
 
 namespace understory::test {
 
@@ -52,6 +53,26 @@ class RingDrive {
   std::size_t per_lap() const { return per_lap_; }
   const geometry::SE2& truth(std::size_t k) const { return truth_[k]; }
   const model::Keyframe& keyframe_at(std::size_t k) const { return keyframes_[k]; }
+  /// The laser's cloud at keyframe k: trunks as columns of points, each of its own height, those
+  /// too that the detector missed; drawn anew for each keyframe.
+  model::PlaceScan cloud_at(std::size_t k) const {
+    std::mt19937_64 random(options_.seed * 7'919 + k);
+    std::normal_distribution<double> normal(0.0, options_.sigma_m);
+    model::PlaceScan scan;
+    scan.utime = keyframes_[k].utime;
+    scan.sequence = k;
+    for (std::size_t tree = 0; tree < trees_.size(); ++tree) {
+      const Eigen::Vector2d at = truth_[k].inverse() * trees_[tree];
+      if (at.norm() > 2.0 * options_.range_m) continue;
+      const double height_m = 1.0 + static_cast<double>((tree * 37) % 50) / 10.0;
+      for (double z = 0.0; z < height_m; z += 0.5) {
+        const double x = at.x() + normal(random), y = at.y() + normal(random);
+        scan.points.push_back(model::place_point(
+            Eigen::Vector3f(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z))));
+      }
+    }
+    return scan;
+  }
   /// From k - 1 to k.
   const model::Odometry& odometry_to(std::size_t k) const { return odometry_[k - 1]; }
   /// Tree of each landmark of a keyframe.

@@ -23,9 +23,10 @@ constexpr const char* kMapperToml =
 /// Mapper, and the loop closer where it is wanted, on one bus.
 class Stack {
  public:
-  explicit Stack(bool has_closer) {
+  explicit Stack(bool has_closer, const std::string& closer_toml = "") {
     host(geoslam_mapper::geoslam_mapper_service(), kMapperToml);
-    if (has_closer) host(loop_closer::loop_closer_service(), "[stems]\nuse_diameters = false\n");
+    if (has_closer)
+      host(loop_closer::loop_closer_service(), "[stems]\nuse_diameters = false\n" + closer_toml);
     bus_.subscribe("MAP", 0, [this](const bus::BusMessage& message) {
       map_ = wire::decode_message<model::WholeMap>(message.bytes).value();
     });
@@ -39,8 +40,9 @@ class Stack {
     });
   }
 
-  void drive(const RingDrive& drive, std::size_t first, std::size_t last) {
+  void drive(const RingDrive& drive, std::size_t first, std::size_t last, bool has_clouds = false) {
     for (std::size_t k = first; k < last; ++k) {
+      if (has_clouds) publish("PLACE_SCAN", wire::encode_message(drive.cloud_at(k)));
       if (k > 0) publish("ODOMETRY", wire::encode_message(drive.odometry_to(k)));
       publish("KEYFRAME", wire::encode_message(drive.keyframe_at(k)));
     }
@@ -110,4 +112,16 @@ TEST_CASE("A loop that the mapper cannot see by itself is closed", "[loop_closer
     CHECK(without_m > 3.0);
     CHECK(with_m < 0.3 * without_m);
   }
+}
+
+TEST_CASE("Clouds from the bus close the loop as well", "[loop_closer][service][clouds]") {
+  const RingDrive drive(drifting(31));
+  Stack both(true, "[search]\ndetector = \"scan_context\"\nverifier = \"generalised_icp\"\n");
+  both.drive(drive, 0, drive.size(), true);
+  const double with_m = error_m(drive, both.finish());
+  REQUIRE_FALSE(both.closures.empty());
+  CHECK(both.closures.front().source == "scan_context, generalised_icp");
+  CHECK(both.results[model::LoopResult::Status::kAccepted] >= 1);
+  CHECK(both.results[model::LoopResult::Status::kRefused] == 0);
+  CHECK(with_m < 1.0);
 }

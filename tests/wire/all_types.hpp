@@ -21,11 +21,11 @@ using AllTypes =
                keyframe_t, landmark_existence_t, landmarks_t, lidar_scan_t, level_error_t,
                lidar_sweep_t, log_t, loop_closure_t, loop_end_t, loop_result_t, map_correction_t,
                map_delta_t, map_landmark_t, map_request_t, map_t, merge_t, odometry2_t, odometry_t,
-               pose2_t, preintegration_t, raw_pose_t, reason_count_t, rest_level2_t, rest_level_t,
-               scan_reference_t, slam_pose2_t, slam_pose_t, slam_update2_t, slam_update3_t,
-               slam_update_t, submap_pose_t, submap_query_t, submap_stored_t, submap_t,
-               tracked_landmark_t, tracked_landmarks_t, truth_landmark_t, truth_landmarks_t,
-               velocity_correction_t, view_ranges_t, wheels_t>;
+               place_scan_t, pose2_t, preintegration_t, raw_pose_t, reason_count_t, rest_level2_t,
+               rest_level_t, scan_reference_t, slam_pose2_t, slam_pose_t, slam_update2_t,
+               slam_update3_t, slam_update_t, submap_pose_t, submap_query_t, submap_stored_t,
+               submap_t, tracked_landmark_t, tracked_landmarks_t, truth_landmark_t,
+               truth_landmarks_t, velocity_correction_t, view_ranges_t, wheels_t>;
 
 using AllValues =
     std::tuple<model::LandmarkScan, model::Odometry, model::Keyframe, model::MapUpdate,
@@ -34,7 +34,7 @@ using AllValues =
                model::TrackedScan, model::RawPose, model::EkfPose, model::EkfMap, model::EkfLevel,
                model::RestLevel, model::VelocityCorrection, model::Submap, model::SubmapStored,
                model::SubmapQuery, model::MapCorrection, model::LoopClosure, model::LoopResult,
-               model::Existence, model::ExistenceState, model::ViewRanges>;
+               model::Existence, model::ExistenceState, model::ViewRanges, model::PlaceScan>;
 
 /// Calls `f` with a null pointer to each type of the tuple.
 template <class Tuple, class F>

@@ -75,6 +75,7 @@ TEST_CASE("values survive the wire") {
     check_round_trip(make.odometry());
     check_round_trip(make.slam_pose());
     check_round_trip(make.view_ranges());
+    check_round_trip(make.place_scan());
     check_round_trip(model::WholeMap{
         10, 1, 5, true, make.landmarks(), {{1, 10, make.pose(), make.covariance<3>()}}});
 

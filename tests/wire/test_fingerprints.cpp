@@ -53,6 +53,7 @@ constexpr Pin kPins[] = {
     {"merge_t", 0x3afd1fb9bfcec6a7ULL},
     {"odometry2_t", 0xe17862c94d618facULL},
     {"odometry_t", 0x716f3ff5b4edace1ULL},
+    {"place_scan_t", 0xe90e77fdfad45617ULL},
     {"pose2_t", 0xe923820e98208b26ULL},
     {"preintegration_t", 0x42556a8e73dd5d85ULL},
     {"raw_pose_t", 0xd5233c5fd8e067d8ULL},

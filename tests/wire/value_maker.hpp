@@ -38,6 +38,15 @@ class Maker {
     }
     return scan;
   }
+  model::PlaceScan place_scan() {
+    model::PlaceScan scan{10, 2, {}};
+    const auto centimetres = [&] { return static_cast<std::int16_t>(random_() % 65536); };
+    for (std::size_t i = 100 * count(); i > 0; --i) {
+      const std::int16_t x = centimetres(), y = centimetres();
+      scan.points.push_back({x, y, centimetres()});
+    }
+    return scan;
+  }
   model::ViewRanges view_ranges() {
     model::ViewRanges ranges{10, 2, vector<2>(2.0), vector<2>(1.0), real(3.0), 0.01, 0.005, 0.25,
                              {}, {}};

@@ -27,6 +27,7 @@ struct SetOptions {
   std::uint64_t seed = 1;
   double length_m = 1000.0;  ///< Of simulated ways; recorded ones are as long as they are.
   int jobs = 1;
+  int cloud_points = 1000;  ///< Most of a simulated sweep's cloud, as PLACE_SCAN carries it.
 };
 
 /// A simulated forest, a way that wanders through it and crosses itself; a sweep of 32 beams every
@@ -49,10 +50,5 @@ FrameSet kitti_poles_set(const std::filesystem::path& folder, const SetOptions& 
 /// truth is the trajectory of this project's own mapper, 1 to 3 m from the satellite fixes; a
 /// revisit within 5 m is judged by it. Throws io::DataError.
 FrameSet victoria_park_set(const std::filesystem::path& recording, const std::atomic<bool>& stop);
-
-/// The nearest point to the middle of each cube of that side among the points in it, up to
-/// `range_m` in the plane: what a PLACE_SCAN carries. In order of the cubes.
-std::vector<Eigen::Vector3f> down_sampled(const std::vector<Eigen::Vector3f>& points, double side_m,
-                                          double range_m);
 
 }  // namespace understory::eval::experiments::loop_detectors

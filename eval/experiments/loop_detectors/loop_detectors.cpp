@@ -15,6 +15,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "common/model/place_scan.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "eval/experiments/experiments.hpp"
 #include "eval/experiments/loop_detectors/detector_trials.hpp"
@@ -196,6 +197,7 @@ void run_set(const NamedSet& named, const fs::path& path, const LoopOptions& opt
 nlohmann::json config_of(const LoopOptions& options) {
   return {{"seed", options.set.seed},
           {"length_m", options.set.length_m},
+          {"cloud_points", options.set.cloud_points},
           {"radius_m", options.trial.radius_m},
           {"frames_earlier", options.trial.frames_earlier},
           {"most_queries", options.trial.most_queries},
@@ -286,6 +288,11 @@ void add_loop_detectors_experiment(CLI::App& eval) {
       ->capture_default_str();
   command.add_option("--length-m", options->set.length_m, "Of simulated ways [m]")
       ->check(CLI::Range(200.0, 100000.0))
+      ->capture_default_str();
+  command
+      .add_option("--cloud-points", options->set.cloud_points,
+                  "Most of a simulated sweep's cloud: place_scan.most_points")
+      ->check(CLI::Range(10, static_cast<int>(model::PlaceScan::kMostPoints)))
       ->capture_default_str();
   command.add_option("--seed", options->set.seed, "Of worlds, ways and detections")
       ->capture_default_str();

@@ -1,13 +1,12 @@
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <memory>
 #include <random>
-#include <tuple>
 
 #include "eval/experiments/loop_detectors/frame_set.hpp"
 #include "eval/tools/parallel.hpp"
 #include "services/landmark_extractor/landmark_extractor.hpp"
+#include "services/landmark_extractor/place/place_scans.hpp"
 #include "sim/forest_world.hpp"
 #include "sim/random_streams.hpp"
 #include "sim/scenarios.hpp"
@@ -20,8 +19,6 @@ namespace {
 namespace places = understory::place_recognition;
 
 constexpr double kFrameSpacingM = 3.0;
-constexpr double kCubeM = 0.6;
-constexpr double kCloudRangeM = 40.0;
 /// Of roll and pitch as an IMU gives them.
 constexpr double kAttitudeSigmaRad = 0.003;
 
@@ -57,16 +54,15 @@ model::PointSweep in_vehicle(const model::PointSweep& raw,
 }
 
 places::PlaceFrame frame_of(const model::PointSweep& sweep,
-                            landmark_extractor::LandmarkExtractor& extractor) {
+                            landmark_extractor::LandmarkExtractor& extractor,
+                            const landmark_extractor::PlaceScanParameters& cloud) {
   places::PlaceFrame frame;
   for (const model::Detection& found : extractor.extract(sweep).detections)
     frame.landmarks.push_back({found.position_m, 2.0 * found.radius_m});
 
-  std::vector<Eigen::Vector3f> points;
-  points.reserve(sweep.points.size());
-  const Eigen::Matrix3f level = sweep.attitude->level_Q_vehicle.toRotationMatrix().cast<float>();
-  for (const model::SweepPoint& point : sweep.points) points.emplace_back(level * point.position());
-  frame.cloud = down_sampled(points, kCubeM, kCloudRangeM);
+  for (const model::PlacePoint& point :
+       landmark_extractor::place::place_scan_of(sweep, cloud).points)
+    frame.cloud.push_back(point.position_m());
   return frame;
 }
 
@@ -76,6 +72,7 @@ FrameSet swept(std::string name, const sim::World& world, const sim::Route& rout
   FrameSet set;
   set.name = std::move(name);
   set.has_clouds = true;
+  const landmark_extractor::PlaceScanParameters cloud{.most_points = options.cloud_points};
   const auto count = static_cast<std::size_t>(route.length_m() / kFrameSpacingM) + 1;
   set.frames.resize(count);
   for (std::size_t k = 0; k < count; ++k)
@@ -91,8 +88,8 @@ FrameSet swept(std::string name, const sim::World& world, const sim::Route& rout
       std::mt19937_64 random(options.seed * 1'000'003 + k);
       const sim::SimulatedSweep sweep =
           lidar.sweep_stationary(upright(world, set.world_T_level[k]), k);
-      set.frames[k] =
-          frame_of(in_vehicle(sweep.raw, lidar.parameters().vehicle_T_sensor, random), extractor);
+      set.frames[k] = frame_of(in_vehicle(sweep.raw, lidar.parameters().vehicle_T_sensor, random),
+                               extractor, cloud);
       set.frames[k].id = static_cast<places::FrameId>(k);
     }
   });
@@ -100,27 +97,6 @@ FrameSet swept(std::string name, const sim::World& world, const sim::Route& rout
 }
 
 }  // namespace
-
-std::vector<Eigen::Vector3f> down_sampled(const std::vector<Eigen::Vector3f>& points, double side_m,
-                                          double range_m) {
-  using Cube = std::tuple<int, int, int>;
-  std::map<Cube, std::pair<float, Eigen::Vector3f>> nearest;
-  const auto side = static_cast<float>(side_m);
-  for (const Eigen::Vector3f& point : points) {
-    if (!(point.head<2>().norm() <= static_cast<float>(range_m))) continue;
-    const Eigen::Vector3f cell = (point / side).array().floor();
-    const float off = (point / side - cell - Eigen::Vector3f::Constant(0.5F)).squaredNorm();
-    const Cube cube(static_cast<int>(cell.x()), static_cast<int>(cell.y()),
-                    static_cast<int>(cell.z()));
-    const auto [at, is_new] = nearest.try_emplace(cube, off, point);
-    if (!is_new && off < at->second.first) at->second = {off, point};
-  }
-
-  std::vector<Eigen::Vector3f> kept;
-  kept.reserve(nearest.size());
-  for (const auto& one : nearest) kept.push_back(one.second.second);
-  return kept;
-}
 
 FrameSet forest_set(const SetOptions& options, const std::atomic<bool>& stop) {
   sim::ForestParameters parameters = sim::forest_parameters(sim::ForestKind::kIntermediate);
