@@ -11,8 +11,17 @@
 namespace understory::eval::experiments::loops {
 namespace {
 
-/// Detections of one tree are nearer to the mean of those before.
+/// Detections of one tree are so near to the mean of those before: this, or so many standard
+/// deviations of what they show. A gate that is narrower than their noise would give the batch
+/// solution those alone that happen to be right.
 constexpr double kSameTreeM = 0.15;
+constexpr double kSameTreeSigmas = 4.5;
+/// ... but no wider than trees stand apart.
+constexpr double kWidestM = 0.7;
+/// Trees with fewer detections say little of their noise.
+constexpr double kLeastDetections = 5.0;
+/// Of the distance to the mean over the standard deviation per axis, where it is Gaussian.
+constexpr double kRayleighMedian = 1.1774;
 /// An odometry that states no error at all could not be told from a truth [m], [rad].
 constexpr double kLeastSigmaM = 1e-4;
 constexpr double kLeastSigmaRad = 1e-5;
@@ -22,10 +31,13 @@ constexpr double kBeyondM = 1.0;
 /// Trees by the true places of detections.
 class Trees {
  public:
+  /// Detections within `same_m` of a tree's mean are of it.
+  explicit Trees(double same_m) : same_m_(same_m) {}
+
   int tree_at(const Eigen::Vector2d& place_m) {
     const auto [x, y] = cell_of(place_m);
     int nearest = -1;
-    double nearest_m = kSameTreeM;
+    double nearest_m = same_m_;
     for (int i = x - 1; i <= x + 1; ++i) {
       for (int k = y - 1; k <= y + 1; ++k) {
         const auto found = cells_.find({i, k});
@@ -52,16 +64,37 @@ class Trees {
     return static_cast<int>(trees_.size()) - 1;
   }
   std::size_t size() const { return trees_.size(); }
+  const Eigen::Vector2d& place_m(int tree) const { return trees_[static_cast<std::size_t>(tree)]; }
+  double detections(int tree) const { return counts_[static_cast<std::size_t>(tree)]; }
 
  private:
-  static std::pair<int, int> cell_of(const Eigen::Vector2d& place_m) {
-    return {static_cast<int>(std::floor(place_m.x() / kSameTreeM)),
-            static_cast<int>(std::floor(place_m.y() / kSameTreeM))};
+  std::pair<int, int> cell_of(const Eigen::Vector2d& place_m) const {
+    return {static_cast<int>(std::floor(place_m.x() / same_m_)),
+            static_cast<int>(std::floor(place_m.y() / same_m_))};
   }
+  double same_m_;
   std::vector<Eigen::Vector2d> trees_;  ///< Mean place of each.
   std::vector<double> counts_;
   std::map<std::pair<int, int>, std::vector<int>> cells_;
 };
+
+/// How near detections of one tree are, by how much those of most trees are spread.
+double same_tree_m(const std::vector<Eigen::Vector2d>& places) {
+  Trees wide(kWidestM);
+  std::vector<int> trees;
+  trees.reserve(places.size());
+  for (const Eigen::Vector2d& place : places) trees.push_back(wide.tree_at(place));
+
+  std::vector<double> distances_m;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (wide.detections(trees[i]) >= kLeastDetections)
+      distances_m.push_back((places[i] - wide.place_m(trees[i])).norm());
+  }
+  if (distances_m.empty()) return kSameTreeM;
+  const auto middle = distances_m.begin() + static_cast<std::ptrdiff_t>(distances_m.size() / 2);
+  std::nth_element(distances_m.begin(), middle, distances_m.end());
+  return std::clamp(kSameTreeSigmas * *middle / kRayleighMedian, kSameTreeM, kWidestM);
+}
 
 class NoisyOdometry {
  public:
@@ -120,11 +153,17 @@ LoopDrive loop_drive(const std::string& name, const std::vector<model::StemFrame
   add_scans(frames, options, drive);
 
   const geometry::SE2 first_T_world = model::level_pose(frames.front()).inverse();
-  Trees trees;
+  std::vector<Eigen::Vector2d> places;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    drive.truth.push_back(first_T_world * model::level_pose(frames[i]));
+    for (const model::Detection& stem : drive.scans[i].detections)
+      places.push_back(drive.truth[i] * stem.position_m.head<2>());
+  }
+
+  Trees trees(same_tree_m(places));
   NoisyOdometry noise(options, seed);
   geometry::SE2 reckoned;
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    drive.truth.push_back(first_T_world * model::level_pose(frames[i]));
     auto& of_frame = drive.trees.emplace_back();
     for (const model::Detection& stem : drive.scans[i].detections)
       of_frame.push_back(trees.tree_at(drive.truth[i] * stem.position_m.head<2>()));

@@ -36,7 +36,8 @@ struct LoopDrive {
 };
 
 /// The frames as they would be driven. Which detections are one tree follows from the true poses:
-/// those within 0.15 m of the mean of those before. The same seed gives the same noise. Throws
+/// those within 0.15 m of the mean of those before, or 4.5 standard deviations of what they show
+/// (0.7 m at most). The same seed gives the same noise. Throws
 /// std::invalid_argument for fewer than two frames.
 LoopDrive loop_drive(const std::string& name, const std::vector<model::StemFrame>& frames,
                      const LoopDriveOptions& options, std::uint64_t seed);
