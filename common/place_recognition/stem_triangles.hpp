@@ -22,7 +22,7 @@ struct StemTriangle {
 struct StemTriangleParameters {
   /// About so many are made of a frame: the longest side follows from it and from how many stems
   /// there are and how densely they stand.
-  double triangles = 600.0;
+  double triangles = 2500.0;
   double longest_m = 40.0;           ///< No side is longer.
   double least_height_m = 0.4;       ///< Flatter ones could be mirrored by noise.
   std::size_t most_neighbours = 40;  ///< Of one stem: bounds the work in thickets.
