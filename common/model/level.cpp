@@ -14,6 +14,14 @@ constexpr Utime kMaxAge_us = 2'000'000;
 /// Least share of a detection's covariance that remains without the level's part.
 constexpr double kLeastOwnShare = 0.05;
 
+/// Landmarks are given at breast height; an error of the level displaces them by it.
+constexpr double kLandmarkHeight_m = 1.3;
+/// How far landmarks are away, about. A level that changes within a revolution displaces those
+/// ahead by another way than those behind, which turns the pose.
+constexpr double kLandmarksAway_m = 15.0;
+/// A level that is so many times as uncertain as it has been is another one.
+constexpr double kWorse = 4.0;
+
 }  // namespace
 
 Eigen::Matrix2d without_level(const Eigen::Matrix2d& covariance_m2, const Eigen::Matrix2d& arm,
@@ -54,6 +62,29 @@ Eigen::Matrix2d level_without_imu(const Eigen::Matrix2d& covariance_rad2, double
   const double largest = 0.5 * covariance_rad2.trace();
   const double added = std::clamp(most - largest, 0.0, kTiltWalk * kTiltWalk * seconds);
   return covariance_rad2 + added * Eigen::Matrix2d::Identity();
+}
+
+void SweepLevel::add(const Odometry& odometry) {
+  if (odometry.inertial) {
+    covariance_rad2_ = odometry.inertial->level.covariance;
+    const double trace_rad2 = covariance_rad2_->trace();
+    if (least_rad2_ <= 0.0 || trace_rad2 < least_rad2_) least_rad2_ = trace_rad2;
+  } else if (covariance_rad2_) {
+    const double seconds = 1e-6 * static_cast<double>(odometry.utime - odometry.from_utime);
+    covariance_rad2_ = level_without_imu(*covariance_rad2_, seconds);
+  }
+}
+
+Eigen::Matrix3d SweepLevel::pose_covariance() const {
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  if (!covariance_rad2_ || covariance_rad2_->trace() < kWorse * kWorse * least_rad2_)
+    return covariance;
+  Eigen::Matrix2d arm_m;
+  arm_m << 0.0, kLandmarkHeight_m, -kLandmarkHeight_m, 0.0;
+  covariance.topLeftCorner<2, 2>() = arm_m * *covariance_rad2_ * arm_m.transpose();
+  const double turn = kLandmarkHeight_m / kLandmarksAway_m;
+  covariance(2, 2) = 0.5 * turn * turn * covariance_rad2_->trace();
+  return covariance;
 }
 
 }  // namespace understory::model

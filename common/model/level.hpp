@@ -5,6 +5,7 @@
 
 #include "common/model/ekf_output.hpp"
 #include "common/model/landmarks.hpp"
+#include "common/model/odometry.hpp"
 
 namespace understory::model {
 
@@ -36,6 +37,31 @@ inline constexpr double kMostTilt_rad = 0.03;
 
 /// Covariance of (roll, pitch) [rad^2] when no IMU has measured them for `seconds` more.
 Eigen::Matrix2d level_without_imu(const Eigen::Matrix2d& covariance_rad2, double seconds);
+
+/// How well the sweeps of now are levelled, by ODOMETRY. All landmarks of a sweep that no IMU has
+/// levelled are displaced alike, and each states that for itself: with twenty of them a pose states
+/// a centimetre of the four that it is off. What they have in common is added where a pose is
+/// given out (docs/decisions/149).
+class SweepLevel {
+ public:
+  /// The next increment.
+  void add(const Odometry& odometry);
+  /// What an error of the level that sweeps have now, and those before had not, adds to the
+  /// covariance of a pose among landmarks (right perturbation). Zero where the level was never
+  /// measured, and while it is known about as well as it has been: such an error displaces all
+  /// sweeps alike, or is known to who gives the pose.
+  Eigen::Matrix3d pose_covariance() const;
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.covariance_rad2_, self.least_rad2_);
+  }
+
+ private:
+  std::optional<Eigen::Matrix2d> covariance_rad2_;  ///< Of (roll, pitch); none before an IMU.
+  double least_rad2_ = 0.0;                         ///< Least trace of it so far.
+};
 
 /// A detection's covariance [m^2] in the plane without the part by an error of the level; at least
 /// 5 % remains in each direction. `arm` [m/rad]: d(position) / d(roll, pitch).

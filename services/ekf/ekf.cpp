@@ -16,7 +16,7 @@
 namespace understory::ekf {
 namespace {
 
-constexpr state::Format kFormat{"ekf", 6};
+constexpr state::Format kFormat{"ekf", 7};
 /// Variance of the first pose, by definition the map's origin; above zero for the factorisations.
 constexpr double kStartVariance = 1e-12;
 /// Searches for lost landmarks per scan.
@@ -96,6 +96,7 @@ EkfOutput Ekf::add(const model::Odometry& increment) {
 
   // It waits for its scan.
   if (!accept(increment)) return {};
+  report_.add(increment);
   queue_.push(increment);
   const std::optional<model::Utime> overdue = queue_.overdue();
   if (!overdue) return {};

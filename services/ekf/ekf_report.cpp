@@ -53,6 +53,7 @@ EkfOutput EkfReport::pose(const FilterState& state, const VehicleMotion& motion,
 
   const Eigen::Vector2d scaled = pose.ekf_map_T_vehicle.inverse().translation() * scale_sigma_;
   pose.covariance.topLeftCorner<2, 2>() += scaled * scaled.transpose();
+  pose.covariance += sweep_level_.pose_covariance();
 
   if (const auto& level_covariance = motion.level_covariance()) {
     output.level = model::EkfLevel{now, pose.sequence, state.level,

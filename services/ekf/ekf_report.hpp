@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "common/model/ekf_output.hpp"
+#include "common/model/level.hpp"
 #include "services/ekf/filter_state.hpp"
 #include "services/ekf/parameters.hpp"
 #include "services/ekf/scan_update.hpp"
@@ -48,12 +49,15 @@ struct SoundPose {
 /// rotates that frame by its product with the tangent of the pitch, on each slope anew; the
 /// published heading is without that rotation. A scale error that all distances have in common
 /// (`scale_sigma`) makes the whole map larger or smaller about its origin. No observation measures
-/// it, so it is added to the published covariances and not to the state's.
+/// it, so it is added to the published covariances and not to the state's; so is what sweeps that
+/// no IMU has levelled have in common.
 class EkfReport {
  public:
   explicit EkfReport(const EkfObservationParameters& parameters)
       : scale_sigma_(parameters.scale_sigma) {}
 
+  /// An increment: whether sweeps are levelled.
+  void add(const model::Odometry& odometry) { sweep_level_.add(odometry); }
   /// The pose at `now`, with the level where odometry reports one. `update`: the scan that it
   /// follows; an empty one after odometry alone.
   EkfOutput pose(const FilterState& state, const VehicleMotion& motion, model::Utime now,
@@ -72,7 +76,8 @@ class EkfReport {
   /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.pose_sequence_, self.map_sequence_, self.reset_counter_, self.last_sound_);
+    a(self.pose_sequence_, self.map_sequence_, self.reset_counter_, self.last_sound_,
+      self.sweep_level_);
   }
 
  private:
@@ -83,6 +88,7 @@ class EkfReport {
   std::uint64_t map_sequence_ = 0;
   std::uint64_t reset_counter_ = 0;
   SoundPose last_sound_;
+  model::SweepLevel sweep_level_;
 };
 
 }  // namespace understory::ekf

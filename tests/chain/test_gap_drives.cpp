@@ -36,3 +36,17 @@ TEST_CASE("A mapper that hangs for a second goes on where it was", "[gap]") {
   CHECK(score.slam.step_m < 0.1);
   CHECK(score.slam.rms_m < 0.03);
 }
+
+TEST_CASE("Poses among sweeps that no IMU has levelled state what these have in common", "[gap]") {
+  for (const std::uint64_t seed : {702, 703}) {
+    const GapScore score = drive(here(), {"IMU", "", "RAW_IMU", 6.0}, seed);
+    for (const PosesAroundGap& poses : {score.slam, score.ekf}) {
+      REQUIRE(poses.goes_on);
+      REQUIRE(poses.nees);
+      CAPTURE(seed, *poses.nees);
+      CHECK(*poses.nees < kThreeSigma);
+      CHECK(*poses.nees > 0.05);
+      CHECK_FALSE(poses.is_new_map);
+    }
+  }
+}

@@ -72,6 +72,7 @@ OneMap OneMap::beside(std::uint32_t id) const {
   other.motion_ = motion_.from_nowhere();
   if (condensing_.keeps_stretches()) other.keep_stretches();
   if (const auto& level = scan_localiser_.level()) other.scan_localiser_.set(*level);
+  other.sweep_level_ = sweep_level_;
   return other;
 }
 
@@ -261,16 +262,16 @@ void OneMap::report(const model::Keyframe& keyframe, model::MapUpdate& update) {
                                     update.associations, map_.landmarks);
 
   update.map_T_vehicle = map_T_base.mean;
-  update.covariance = map_T_base.covariance;
+  update.covariance = map_T_base.covariance + sweep_level_.pose_covariance();
   update.map_T_latest_vehicle = map_T_centre.mean * motion_.centre_T_last_member()->mean;
 
   const model::KeyframeMember& last = keyframe.members.back();
-  scan_localiser_.restart_at(last.utime, {update.map_T_latest_vehicle, last.covariance},
-                             map_T_base);
+  scan_localiser_.restart_at(last.utime, {update.map_T_latest_vehicle, last.covariance}, map_T_base,
+                             sweep_level_.pose_covariance());
 }
 
 std::optional<ScanPose> OneMap::locate(const model::LandmarkScan& scan) {
-  return scan_localiser_.locate(scan, map_.landmarks, motion_);
+  return scan_localiser_.locate(scan, map_.landmarks, motion_, sweep_level_.pose_covariance());
 }
 
 Closures::Decision OneMap::take(const model::LoopClosure& closure) {

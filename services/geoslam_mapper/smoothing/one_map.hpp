@@ -41,7 +41,10 @@ class OneMap {
   /// The pose of a single scan.
   std::optional<ScanPose> locate(const model::LandmarkScan& scan);
   /// Motion without landmarks.
-  void add(const model::Odometry& odometry) { motion_.add(odometry); }
+  void add(const model::Odometry& odometry) {
+    motion_.add(odometry);
+    sweep_level_.add(odometry);
+  }
   /// The filter's pose, as a gate.
   void add(const model::EkfPose& pose) { motion_.add(pose); }
   /// The filter's estimate of the level error.
@@ -111,8 +114,8 @@ class OneMap {
   static void archive(Archive& a, Self& self) {
     a(self.map_, self.motion_, self.discovery_, self.merging_, self.known_ground_, self.condensing_,
       self.dormancy_, self.submaps_, self.closures_, self.scan_localiser_, self.common_error_,
-      self.start_level_, self.first_offered_, self.agreeing_, self.lightening_.has_waited,
-      self.lightening_.submaps_first);
+      self.start_level_, self.sweep_level_, self.first_offered_, self.agreeing_,
+      self.lightening_.has_waited, self.lightening_.submaps_first);
   }
 
  private:
@@ -149,6 +152,7 @@ class OneMap {
   ScanLocaliser scan_localiser_;
   CommonError common_error_;
   StartLevel start_level_;
+  model::SweepLevel sweep_level_;
   std::optional<model::Utime> first_offered_;  ///< Keyframe that might have started the map.
   /// Keyframes that agree with each other: the first, and those that were localised by landmarks.
   std::uint32_t agreeing_ = 0;

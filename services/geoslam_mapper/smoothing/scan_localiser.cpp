@@ -42,15 +42,18 @@ geometry::SE2WithCovariance in_map(
 }  // namespace
 
 void ScanLocaliser::restart_at(model::Utime utime, const geometry::SE2WithCovariance& map_T_vehicle,
-                               const geometry::SE2WithCovariance& map_T_base) {
+                               const geometry::SE2WithCovariance& map_T_base,
+                               const Eigen::Matrix3d& common) {
   if (latest_ && latest_->utime > utime) return;
-  latest_ = LocatedScan{utime, map_T_vehicle.mean, latest_ ? latest_->step : geometry::SE2(),
-                        map_T_vehicle.covariance, in_map(map_T_vehicle, map_T_base).covariance};
+  latest_ =
+      LocatedScan{utime, map_T_vehicle.mean, latest_ ? latest_->step : geometry::SE2(),
+                  map_T_vehicle.covariance, in_map(map_T_vehicle, map_T_base).covariance + common};
   velocity_.set_pose();
 }
 
 std::optional<ScanPose> ScanLocaliser::locate(const model::LandmarkScan& raw,
-                                              const LandmarkMap& landmarks, const Motion& motion) {
+                                              const LandmarkMap& landmarks, const Motion& motion,
+                                              const Eigen::Matrix3d& common) {
   if (!latest_ || raw.utime <= latest_->utime) return std::nullopt;
   const auto found = register_scan(level_.levelled(raw), landmarks, motion);
 
@@ -62,7 +65,8 @@ std::optional<ScanPose> ScanLocaliser::locate(const model::LandmarkScan& raw,
   }
 
   const geometry::SE2 pose = found->reference_T_observed;
-  const auto map_T_vehicle = in_map({pose, found->covariance}, motion.map_T_last_base());
+  auto map_T_vehicle = in_map({pose, found->covariance}, motion.map_T_last_base());
+  map_T_vehicle.covariance += common;
   latest_ = LocatedScan{raw.utime, pose, latest_->map_T_vehicle.inverse() * pose, found->covariance,
                         map_T_vehicle.covariance};
   return ScanPose{map_T_vehicle, false};

@@ -41,15 +41,16 @@ class ScanLocaliser {
 
   /// The pose of a keyframe's last scan: known better now than when that scan came. Ignored where a
   /// later scan was located already. Its covariance is among the landmarks near by (right
-  /// perturbation); these share the error of the keyframe's base.
+  /// perturbation); these share the error of the keyframe's base. `common`: see locate().
   void restart_at(model::Utime utime, const geometry::SE2WithCovariance& map_T_vehicle,
-                  const geometry::SE2WithCovariance& map_T_base);
+                  const geometry::SE2WithCovariance& map_T_base, const Eigen::Matrix3d& common);
 
   /// map_T_vehicle of the scan, with its covariance in the map. Where too few detections match it
   /// is by odometry, from the last scan that was located. None before the first keyframe, for a
   /// scan not later than the last one, and where odometry has a gap. O(landmarks in range).
+  /// `common`: added to the covariance of a pose that landmarks gave, since they share that error.
   std::optional<ScanPose> locate(const model::LandmarkScan& scan, const LandmarkMap& landmarks,
-                                 const Motion& motion);
+                                 const Motion& motion, const Eigen::Matrix3d& common);
 
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
