@@ -247,7 +247,9 @@ void add_sensor_options(CLI::App& command, SimOptions& options) {
       ->group(group)
       ->check(CLI::Range(0.5, 30.0))
       ->capture_default_str();
-  command.add_option("--standstill", sensors.standstill_s, "Standstill at the start [s]")
+  command
+      .add_option("--standstill", sensors.standstill_s,
+                  "Standstill at the start [s]; below 1 s the drive begins with a jolt")
       ->group(group)
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();

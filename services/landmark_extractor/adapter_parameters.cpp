@@ -1,5 +1,7 @@
 #include "services/landmark_extractor/adapter_parameters.hpp"
 
+#include "common/model/place_scan.hpp"
+
 namespace understory::landmark_extractor {
 namespace {
 

@@ -19,7 +19,7 @@ void PlaceClouds::add(const model::Keyframe& keyframe, const model::MapUpdate& u
         std::ranges::find(keyframe.members, scan.utime, &model::KeyframeMember::utime);
     // Of a scan that went into no keyframe nobody knows where it was taken.
     if (member == keyframe.members.end()) continue;
-    newest_ = Placed{along_m, map_T_centre * member->centre_T_vehicle, std::move(scan.points)};
+    newest_ = PlacedCloud{along_m, map_T_centre * member->centre_T_vehicle, std::move(scan.points)};
   }
 }
 

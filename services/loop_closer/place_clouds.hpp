@@ -12,6 +12,19 @@
 
 namespace understory::loop_closer {
 
+/// A cloud, and where it was taken.
+struct PlacedCloud {
+  double along_m = 0.0;  ///< Path.
+  geometry::SE2 map_T_scan;
+  std::vector<model::PlacePoint> points;
+
+  /// Members of a saved state; see common/state.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& s) {
+    a(s.along_m, s.map_T_scan, s.points);
+  }
+};
+
 /// Joins PLACE_SCAN with the keyframe that has its scan: the mapper says where that one is. Keeps
 /// the newest cloud that was placed, and a few that wait.
 class PlaceClouds {
@@ -35,20 +48,9 @@ class PlaceClouds {
 
  private:
   static constexpr std::size_t kMostPending = 32;
-  /// A cloud, and where it was taken.
-  struct Placed {
-    double along_m = 0.0;
-    geometry::SE2 map_T_scan;
-    std::vector<model::PlacePoint> points;
-
-    template <class Archive, class Self>
-    static void archive(Archive& a, Self& s) {
-      a(s.along_m, s.map_T_scan, s.points);
-    }
-  };
 
   std::deque<model::PlaceScan> pending_;  ///< In order of time.
-  std::optional<Placed> newest_;
+  std::optional<PlacedCloud> newest_;
 };
 
 }  // namespace understory::loop_closer

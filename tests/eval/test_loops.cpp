@@ -21,7 +21,8 @@ TEST_CASE("Detections of one tree are known as such, however noisy they are", "[
       frame.number = k;
       frame.world_T_sensor.translation() << 0.5 * k, 0.0, 0.0;
       for (int stem = 0; stem < 60; ++stem) {
-        const double x = 2.5 * (stem / 2) + noise(random) - 0.5 * k;
+        const int row = stem / 2;
+        const double x = 2.5 * row + noise(random) - 0.5 * k;
         const double y = (stem % 2 == 0 ? 4.0 : -4.0) + noise(random);
         frame.stems.push_back({.position_m = Eigen::Vector3d(x, y, 0.0)});
       }
