@@ -57,8 +57,9 @@ LandmarkScan LevelCorrection::levelled(LandmarkScan scan) const {
   return scan;
 }
 
-Eigen::Matrix2d level_without_imu(const Eigen::Matrix2d& covariance_rad2, double seconds) {
-  const double most = kMostTilt_rad * kMostTilt_rad;
+Eigen::Matrix2d level_without_imu(const Eigen::Matrix2d& covariance_rad2, double seconds,
+                                  double most_rad) {
+  const double most = most_rad * most_rad;
   const double largest = 0.5 * covariance_rad2.trace();
   const double added = std::clamp(most - largest, 0.0, kTiltWalk * kTiltWalk * seconds);
   return covariance_rad2 + added * Eigen::Matrix2d::Identity();
@@ -71,7 +72,7 @@ void SweepLevel::add(const Odometry& odometry) {
     if (least_rad2_ <= 0.0 || trace_rad2 < least_rad2_) least_rad2_ = trace_rad2;
   } else if (covariance_rad2_) {
     const double seconds = 1e-6 * static_cast<double>(odometry.utime - odometry.from_utime);
-    covariance_rad2_ = level_without_imu(*covariance_rad2_, seconds);
+    covariance_rad2_ = level_without_imu(*covariance_rad2_, seconds, kMostTiltOfPoses_rad);
   }
 }
 
