@@ -12,7 +12,10 @@ void PlaceClouds::add(model::PlaceScan scan) {
 void PlaceClouds::add(const model::Keyframe& keyframe, const model::MapUpdate& update,
                       double along_m) {
   const geometry::SE2 map_T_centre = update.map_T_vehicle * keyframe.centre_T_base().inverse();
-  while (!pending_.empty() && pending_.front().utime <= keyframe.utime) {
+  // Its base is one of its scans, not the last one.
+  model::Utime end = keyframe.utime;
+  for (const model::KeyframeMember& member : keyframe.members) end = std::max(end, member.utime);
+  while (!pending_.empty() && pending_.front().utime <= end) {
     model::PlaceScan scan = std::move(pending_.front());
     pending_.pop_front();
     const auto member =

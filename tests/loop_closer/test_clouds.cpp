@@ -90,7 +90,7 @@ TEST_CASE("A cloud lies around the base of its place as it was seen", "[loop_clo
   const geometry::SE2 map_T_base(4.0, -2.0, 0.7);
   const geometry::SE2 base_T_scan(1.5, 0.3, -0.2);
   model::Keyframe keyframe;
-  keyframe.utime = 300;
+  keyframe.utime = 100;
   const geometry::SE2 base_T_centre(0.8, 0.1, 0.05);
   keyframe.members.push_back({100, 0, base_T_centre.inverse(), Eigen::Matrix3d::Zero()});
   keyframe.members.push_back({200, 1, base_T_centre.inverse() * base_T_scan, {}});
