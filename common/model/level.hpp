@@ -46,7 +46,7 @@ Eigen::Matrix2d level_without_imu(const Eigen::Matrix2d& covariance_rad2, double
 /// How well the sweeps of now are levelled, by ODOMETRY. All landmarks of a sweep that no IMU has
 /// levelled are displaced alike, and each states that for itself: with twenty of them a pose states
 /// a centimetre of the four that it is off. What they have in common is added where a pose is
-/// given out (docs/decisions/149).
+/// given out (docs/decisions/151).
 class SweepLevel {
  public:
   /// The next increment.

@@ -1,10 +1,6 @@
 // Detectors and verifiers that compare clouds.
 #include <fmt/format.h>
 
-#include <memory>
-
-#include "common/bus/memory_bus.hpp"
-#include "services/loop_closer/adapter.hpp"
 #include "services/loop_closer/health_watch.hpp"
 #include "services/loop_closer/place_clouds.hpp"
 #include "tests/catch.hpp"
@@ -120,30 +116,6 @@ TEST_CASE("A cloud lies around the base of its place as it was seen", "[loop_clo
 }
 
 TEST_CASE("A restarted loop closer has its clouds again, to the byte", "[loop_closer][clouds]") {
-  const LoopCloserParameters parameters = chosen("scan_context", "correspondence_graph");
   const RingDrive drive(ring(82, 1.5));
-  LoopCloser whole(parameters);
-  ReckoningMapper mapper(drive);
-  ReckoningMapper again(drive);
-  auto stopped = std::make_unique<LoopCloser>(parameters);
-  std::size_t sent = 0;
-  for (std::size_t k = 0; k < drive.size(); ++k) {
-    for (LoopCloser* const one : {&whole, stopped.get()}) {
-      one->add(drive.cloud_at(k));
-      one->add(drive.keyframe_at(k));
-    }
-    const auto one = whole.add(mapper.update(k));
-    const auto other = stopped->add(again.update(k));
-    REQUIRE(one.has_value() == other.has_value());
-    if (one) {
-      ++sent;
-      CHECK(one->from_T_to.mean.coordinates() == other->from_T_to.mean.coordinates());
-    }
-    if (k % 23 != 0) continue;
-    const std::string state = stopped->save();
-    CHECK(state == whole.save());
-    stopped = std::make_unique<LoopCloser>(parameters);
-    stopped->load(state);
-  }
-  CHECK(sent > 0);
+  CHECK(test::same_after_restarts(drive, chosen("scan_context", "correspondence_graph"), true) > 0);
 }
