@@ -12,8 +12,8 @@ tinyGrid3D.g2o smallGrid3D.g2o sphere2500.g2o torus3D.g2o rrr_NewCollege.g2o""".
 
 # Drives are made once for all partition experiments.
 PARTITION = "--seed 1 --jobs 2 --front-end ideal,lidar --recordings OUT/partition-drives"
-TOWN = f"{PARTITION} --runs 20 --lidar-runs 2 --routes urban"
-COUNTRY = f"{PARTITION} --runs 8 --lidar-runs 1 --routes urban-countryside"
+TOWN = f"{PARTITION} --runs 20 --lidar-runs 20 --routes urban"
+COUNTRY = f"{PARTITION} --runs 20 --lidar-runs 20 --routes urban-countryside"
 SUBMAP_SIZES = "--size-m 20,100,200,300,400,500"
 
 

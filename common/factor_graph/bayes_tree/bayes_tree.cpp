@@ -30,7 +30,7 @@ void BayesTree::mark_structure(int variable) {
 }
 
 void BayesTree::mark_numbers(int factor) {
-  const int clique = graph_.factor(factor).clique;
+  const int clique = cliques_.clique_of(factor);
   if (clique != graph::kNone) marks_.mark_numbers(cliques_, clique);
 }
 
@@ -41,19 +41,10 @@ void BayesTree::mark_everything() {
 }
 
 void BayesTree::detach(int factor) {
-  const int clique = graph_.factor(factor).clique;
+  const int clique = cliques_.clique_of(factor);
   if (clique == graph::kNone) return;
   marks_.mark_structure(cliques_, clique);
-
-  const int next = graph_.factor(factor).next;
-  const int previous = graph_.factor(factor).previous;
-  if (previous == graph::kNone) {
-    cliques_.edit(clique).first_factor = next;
-  } else {
-    graph_.edit_factor(previous).next = next;
-  }
-  if (next != graph::kNone) graph_.edit_factor(next).previous = previous;
-  graph_.edit_factor(factor).clique = graph::kNone;
+  cliques_.remove_factor(factor);
 }
 
 TreeStatistics BayesTree::eliminate(std::span<const int> fresh, std::span<const int> last) {

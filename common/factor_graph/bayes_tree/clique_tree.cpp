@@ -1,5 +1,7 @@
 #include "common/factor_graph/bayes_tree/clique_tree.hpp"
 
+#include <algorithm>
+
 #include "common/factor_graph/bayes_tree/elimination_problem.hpp"
 
 namespace understory::factor_graph::bayes_tree {
@@ -18,7 +20,7 @@ int CliqueTree::add(int frontal_count, int row_count) {
   CliqueRecord& clique = cliques_.edit(id);
   clique.frontal_count = frontal_count;
   clique.row_count = row_count;
-  clique.rows = rows_.take(static_cast<std::size_t>(row_count));
+  clique.rows = names_.take(static_cast<std::size_t>(row_count));
   clique.size = 1;
   return id;
 }
@@ -44,6 +46,31 @@ void CliqueTree::unlink_from_root(int child) {
   if (record.next_sibling != graph::kNone) {
     cliques_.edit(record.next_sibling).previous_sibling = record.previous_sibling;
   }
+}
+
+void CliqueTree::set_factors(int id, std::span<const int> factors) {
+  CliqueRecord& clique = cliques_.edit(id);
+  clique.factor_count = static_cast<int>(factors.size());
+  clique.factors = names_.take(factors.size());
+  std::ranges::copy(factors, clique.factors);
+  for (int at = 0; at < clique.factor_count; ++at) places_.put(clique.factors[at], {id, at});
+}
+
+void CliqueTree::remove_factor(int factor) {
+  const FactorPlace place = places_[factor];
+  taken_out_.push_back({factor, place});
+  cliques_[place.clique].factors[place.at] = graph::kNone;
+  places_.put(factor, {});
+}
+
+/// What was taken out since the last commit and was there then. The cliques are those of then.
+void CliqueTree::put_factors_back() {
+  places_.rollback();
+  for (const TakenOut& one : taken_out_) {
+    if (places_[one.factor] == one.from)
+      cliques_[one.from.clique].factors[one.from.at] = one.factor;
+  }
+  taken_out_.clear();
 }
 
 void CliqueTree::count_work(int id) { total_flops_ += flops_of(cliques_[id]); }
@@ -112,7 +139,10 @@ void CliqueTree::count_undetermined(int change) {
 
 void CliqueTree::free_blocks(const CliqueRecord& clique) {
   if (clique.rows != nullptr) {
-    rows_.give_back(clique.rows, static_cast<std::size_t>(clique.row_count));
+    names_.give_back(clique.rows, static_cast<std::size_t>(clique.row_count));
+  }
+  if (clique.factors != nullptr) {
+    names_.give_back(clique.factors, static_cast<std::size_t>(clique.factor_count));
   }
   if (clique.panel != nullptr) panels_.give_back(clique.panel, clique.panel_numbers());
 }
@@ -126,6 +156,8 @@ void CliqueTree::commit(bool is_up_to_date) {
                       panels_.give_back(before.panel, before.panel_numbers());
                     }
                   });
+  places_.commit();
+  taken_out_.clear();
   saved_total_flops_ = total_flops_;
   undo_bytes_left_ = undo_bytes_;
   keeps_all_ = !is_up_to_date;
@@ -146,6 +178,7 @@ void CliqueTree::rollback() {
         contributions_.drop(id);
         free_blocks(gone);
       });
+  put_factors_back();
 
   for (const int id : lost_) {
     CliqueRecord& clique = cliques_.edit_unsaved(id);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/factor_graph/bayes_tree/contributions.hpp"
+#include "common/factor_graph/bayes_tree/factor_places.hpp"
 #include "common/factor_graph/graph/factor_graph.hpp"
 #include "common/factor_graph/storage/block_pool.hpp"
 #include "common/factor_graph/storage/journaled_table.hpp"
@@ -19,21 +20,26 @@ struct CliqueRecord {
   int first_child = graph::kNone;  ///< List through `next_sibling`.
   int next_sibling = graph::kNone;
   int previous_sibling = graph::kNone;
-  int first_factor = graph::kNone;  ///< Factors assembled here; list through FactorRecord::next.
-  int frontal_count = 0;            ///< Number of frontal variables.
-  int row_count = 0;                ///< Number of variables: frontal ones, then the separator.
-  int pivots = 0;                   ///< Degrees of freedom of the frontal variables.
-  int size = 0;                     ///< Rows of the front: all degrees of freedom, right-hand side.
-  int left_out = 0;                 ///< Pivots without information; in the root: such cliques.
-  bool keeps_contribution = true;   ///< False: it is dropped as soon as the parent is computed.
-  float rebuild_us = 0.0F;          ///< Modelled time of computing the contribution again.
-  int* rows = nullptr;              ///< Names of the `row_count` variables.
+  int factor_count = 0;            ///< Length of `factors`.
+  int frontal_count = 0;           ///< Number of frontal variables.
+  int row_count = 0;               ///< Number of variables: frontal ones, then the separator.
+  int pivots = 0;                  ///< Degrees of freedom of the frontal variables.
+  int size = 0;                    ///< Rows of the front: all degrees of freedom, right-hand side.
+  int left_out = 0;                ///< Pivots without information; in the root: such cliques.
+  bool keeps_contribution = true;  ///< False: it is dropped as soon as the parent is computed.
+  float rebuild_us = 0.0F;         ///< Modelled time of computing the contribution again.
+  int* rows = nullptr;             ///< Names of the `row_count` variables.
+  int* factors = nullptr;          ///< Those assembled here; kNone for one that was taken out.
   /// size x pivots, column-major: the frontal variables' columns of L; the last row is the
   /// right-hand side.
   double* panel = nullptr;
   std::uint64_t panel_epoch = 0;  ///< Epoch of the tree's journal in which `panel` was written.
   std::uint64_t lost_epoch = 0;   ///< Epoch in which the numbers of the last commit were given up.
 
+  /// Factors that are assembled here; kNone for one that was taken out.
+  std::span<const int> assembled() const {
+    return {factors, static_cast<std::size_t>(factor_count)};
+  }
   /// Length of `panel`.
   std::size_t panel_numbers() const {
     return static_cast<std::size_t>(size) * static_cast<std::size_t>(pivots);
@@ -48,11 +54,11 @@ struct CliqueRecord {
 /// Floating-point operations of one elimination of this clique.
 double flops_of(const CliqueRecord& clique);
 
-/// Owns the cliques, their parent and child links, and the memory of their rows and numbers. Every
-/// change is journaled: rollback() restores the tree of the last commit() at the cost of what
-/// changed. Numbers of the last commit are kept beside the new ones as far as they fit into
-/// `undo_bytes`: a second set of them all would be half of the memory. What else rollback() needs
-/// is to be computed again. Does not interpret the numbers.
+/// Owns the cliques, their parent and child links, what each assembles, and the memory of their
+/// names and numbers. Every change is journaled: rollback() restores the tree of the last commit()
+/// at the cost of what changed. Numbers of the last commit are kept beside the new ones as far as
+/// they fit into `undo_bytes`: a second set of them all would be half of the memory. What else
+/// rollback() needs is to be computed again. Does not interpret the numbers.
 class CliqueTree {
  public:
   /// Parent of all trees of the forest; holds no variables.
@@ -73,6 +79,12 @@ class CliqueTree {
   int add(int frontal_count, int row_count);
   /// Puts `child` at the front of the parent's children.
   void link(int parent, int child);
+  /// What a new clique assembles. The cliques that held these before must be gone.
+  void set_factors(int id, std::span<const int> factors);
+  /// Takes a factor out of its clique, which keeps its structure until it is built anew.
+  void remove_factor(int factor);
+  /// The clique that assembles the factor; kNone where there is none.
+  int clique_of(int factor) const { return places_[factor].clique; }
   /// Counts the finished structure of a new clique in total_flops().
   void count_work(int id);
   /// Takes these cliques out of the tree. The parent of each is the root or among them.
@@ -92,7 +104,7 @@ class CliqueTree {
   /// Floating-point operations of one elimination of the whole tree.
   double total_flops() const { return total_flops_; }
   /// Memory taken from the system [bytes].
-  std::size_t bytes() const { return panels_.bytes() + rows_.bytes() + contributions_.bytes(); }
+  std::size_t bytes() const { return panels_.bytes() + names_.bytes() + contributions_.bytes(); }
 
   /// Makes all changes final. `is_up_to_date`: every clique's numbers are those of its factors and
   /// children, so that they can be computed again; if not, all are kept for a rollback.
@@ -109,11 +121,18 @@ class CliqueTree {
   void drop_panel(CliqueRecord& clique);
   void free_blocks(const CliqueRecord& clique);
   void unlink_from_root(int child);
+  void put_factors_back();
   void count_undetermined(int change);
 
   storage::JournaledTable<CliqueRecord> cliques_;
   storage::BlockPool<double> panels_;
-  storage::BlockPool<int> rows_;
+  storage::BlockPool<int> names_;  ///< Of variables and factors.
+  FactorPlaces places_;
+  struct TakenOut {
+    int factor;
+    FactorPlace from;
+  };
+  std::vector<TakenOut> taken_out_;  ///< Since the last commit.
   Contributions contributions_;
   double total_flops_ = 0.0;
   double saved_total_flops_ = 0.0;

@@ -153,9 +153,15 @@ void add_observation(const double* j, std::ptrdiff_t pose, std::ptrdiff_t point,
 }  // namespace
 
 void Elimination::add_factors(const CliqueRecord& clique) {
-  for (int f = clique.first_factor; f != graph::kNone; f = graph_.factor(f).next) {
+  // Those that were taken out are none of a clique that is computed.
+  const std::span<const int> factors = clique.assembled();
+  for (std::size_t i = 0; i < factors.size(); ++i) {
+    if (i + 2 * graph::kFetchAhead < factors.size())
+      graph_.fetch_record(factors[i + 2 * graph::kFetchAhead]);
+    if (i + graph::kFetchAhead < factors.size())
+      graph_.fetch_linear(factors[i + graph::kFetchAhead]);
+    const int f = factors[i];
     const graph::FactorRecord& factor = graph_.factor(f);
-    if (factor.next != graph::kNone) graph_.fetch_numbers(factor.next);
     if (factor.kind == graph::FactorKind::kPoint2) {
       const std::span<const int> tied = graph_.variables_of(f);
       add_observation(factor.linear, offset_[static_cast<std::size_t>(tied[0])],

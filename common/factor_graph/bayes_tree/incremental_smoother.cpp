@@ -97,7 +97,7 @@ void IncrementalSmoother::restart(graph::VariableId id, const graph::Value& init
 void IncrementalSmoother::remove(graph::FactorId id) {
   begin_change();
   if (!graph_.contains(id)) throw std::invalid_argument("smoother: no such factor");
-  if (graph_.factor(index(id)).clique == graph::kNone) {
+  if (tree_.cliques().clique_of(index(id)) == graph::kNone) {
     std::erase(pending_.fresh, index(id));
   } else {
     // What it tied together may fall apart: all that it touches is ordered anew.
@@ -223,7 +223,7 @@ IncrementalUpdate IncrementalSmoother::update() {
 /// step on fresh linearisations does.
 IncrementalUpdate IncrementalSmoother::whole_step(const Loss& before) {
   begin_change();
-  for (const int f : factors_of_tree(graph_, tree_.cliques())) relinearisation_.add(f);
+  for (const int f : factors_of_tree(tree_.cliques())) relinearisation_.add(f);
   return run(std::max(kLossRounding * before.rows, before.chi2));
 }
 

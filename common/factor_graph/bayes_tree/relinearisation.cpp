@@ -16,16 +16,15 @@ double limit_scale(const graph::FactorRecord& factor) {
   return std::sqrt(std::clamp<double>(factor.rows, kPlanarRows, kMostRows) / kPlanarRows);
 }
 
-std::vector<int> factors_of_tree(const graph::FactorGraph& graph, const CliqueTree& cliques) {
+std::vector<int> factors_of_tree(const CliqueTree& cliques) {
   std::vector<int> factors;
   std::vector<int> stack{CliqueTree::kRoot};
   while (!stack.empty()) {
     const CliqueRecord& clique = cliques[stack.back()];
     stack.pop_back();
 
-    for (int f = clique.first_factor; f != graph::kNone; f = graph.factor(f).next) {
-      factors.push_back(f);
-    }
+    for (const int f : clique.assembled())
+      if (f != graph::kNone) factors.push_back(f);
     for (int c = clique.first_child; c != graph::kNone; c = cliques[c].next_sibling) {
       stack.push_back(c);
     }

@@ -13,7 +13,7 @@ namespace understory::factor_graph::bayes_tree {
 double limit_scale(const graph::FactorRecord& factor);
 
 /// All factors that the tree holds, neighbours in it side by side. O(graph).
-std::vector<int> factors_of_tree(const graph::FactorGraph& graph, const CliqueTree& cliques);
+std::vector<int> factors_of_tree(const CliqueTree& cliques);
 
 /// Factors that wait to be linearised again, and variables that wait for a new base of their
 /// charts. commit() saves the lists, rollback() restores the saved ones.

@@ -1,5 +1,7 @@
 #include "common/factor_graph/bayes_tree/restructuring.hpp"
 
+#include <algorithm>
+
 namespace understory::factor_graph::bayes_tree {
 
 void Restructuring::collect_variable(int variable) {
@@ -21,9 +23,8 @@ void Restructuring::take_apart(int clique, const Marks& marks) {
     }
   }
 
-  for (int f = record.first_factor; f != graph::kNone; f = graph_.factor(f).next) {
-    element_factors_.push_back(f);
-  }
+  for (const int f : record.assembled())
+    if (f != graph::kNone) element_factors_.push_back(f);
   for (int c = record.first_child; c != graph::kNone; c = cliques_[c].next_sibling) {
     if (!marks.is_structural(c)) orphans_.push_back(c);
   }
@@ -48,7 +49,6 @@ const CliquePlan& Restructuring::plan(std::span<const int> last) {
   planner_.clear(dimensions_);
 
   for (const int f : element_factors_) {
-    graph_.fetch_numbers(f);  // Elimination puts them into the fronts next.
     planner_.begin_element();
     for (const int v : graph_.variables_of(f)) {
       planner_.add_to_element(affected_at_[static_cast<std::size_t>(v)]);
@@ -90,24 +90,19 @@ int Restructuring::build_clique(const CliquePlan& plan, int planned) {
 
 /// Factors and whole subtrees that the new clique is the first to eliminate a variable of.
 void Restructuring::hand_out_elements(const CliquePlan& plan, int planned, int id) {
+  factors_.clear();
   const auto factor_count = element_factors_.size();
   for (int e = plan.cliques[static_cast<std::size_t>(planned)].first_element;
        e != CliquePlan::kNoElement; e = plan.next_element[static_cast<std::size_t>(e)]) {
     const auto at = static_cast<std::size_t>(e);
-    if (at >= factor_count) {
+    if (at < factor_count) {
+      factors_.push_back(element_factors_[at]);
+    } else {
       cliques_.link(id, orphans_[at - factor_count]);
-      continue;
     }
-
-    graph::FactorRecord& factor = graph_.edit_factor(element_factors_[at]);
-    CliqueRecord& clique = cliques_.edit(id);
-    factor.clique = id;
-    factor.previous = graph::kNone;
-    factor.next = clique.first_factor;
-    if (factor.next != graph::kNone)
-      graph_.edit_factor(factor.next).previous = element_factors_[at];
-    clique.first_factor = element_factors_[at];
   }
+  std::ranges::reverse(factors_);
+  cliques_.set_factors(id, factors_);
 }
 
 /// The parent eliminates the first variable of the clique's separator.

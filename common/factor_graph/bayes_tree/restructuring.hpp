@@ -42,6 +42,7 @@ class Restructuring {
   CliquePlanner planner_;
   std::vector<int> affected_;         ///< Variables whose elimination is planned anew.
   std::vector<int> affected_at_;      ///< Per variable of the graph: its place in `affected_`.
+  std::vector<int> factors_;          ///< Of the clique that is built.
   std::vector<int> element_factors_;  ///< The planner's first elements: factors ...
   std::vector<int> orphans_;          ///< ... and behind them the subtrees that stay whole.
   std::vector<int> dimensions_;       ///< Of `affected_`.

@@ -16,7 +16,8 @@ constexpr double kNoticedPart = 0.1;
 constexpr double kNoticedRounding = 1e-3;  ///< The same of thorough updates, which start fresh.
 constexpr double kLeastGain = 0.1;
 constexpr int kMaxHalvings = 8;
-constexpr std::size_t kAhead = 8;  ///< Factors that are fetched before they are needed.
+/// So many entries of a table are read in the time that one entry of a list is waited for.
+constexpr int kTableEntriesPerWait = 8;
 
 }  // namespace
 
@@ -49,7 +50,10 @@ void StepJudge::list_judged(double unless_below) {
   }
 
   // Of many the table is gone through as it lies in memory: a list is waited for at every entry.
-  if (factors > graph_.factor_capacity()) return list_from_table();
+  if (factors > graph_.factor_capacity() / kTableEntriesPerWait) {
+    graph_.list_factors([&](int v) { return is_judged(v); }, judged_);
+    return;
+  }
   for (const int v : judged_variables_) {
     for (int i = graph_.variable(v).first_incidence; i != graph::kNone;
          i = graph_.incidence(i).next) {
@@ -60,14 +64,6 @@ void StepJudge::list_judged(double unless_below) {
   }
 }
 
-void StepJudge::list_from_table() {
-  for (int f = 0; f < graph_.factor_capacity(); ++f) {
-    if (!graph_.factor(f).in_use) continue;
-    const std::span<const int> tied = graph_.variables_of(f);
-    if (std::ranges::any_of(tied, [&](int v) { return is_judged(v); })) judged_.push_back(f);
-  }
-}
-
 /// Compares factors with their linearisations. Returns the largest deviation.
 double StepJudge::compare(double unless_below, double limit) {
   list_judged(unless_below);
@@ -75,8 +71,10 @@ double StepJudge::compare(double unless_below, double limit) {
   at_end_ = {};
   largest_deviation_ = 0.0;
   for (std::size_t i = 0; i < judged_.size(); ++i) {
-    if (i + 2 * kAhead < judged_.size()) graph_.fetch_record(judged_[i + 2 * kAhead]);
-    if (i + kAhead < judged_.size()) graph_.fetch_numbers(judged_[i + kAhead]);
+    if (i + 2 * graph::kFetchAhead < judged_.size())
+      graph_.fetch_record(judged_[i + 2 * graph::kFetchAhead]);
+    if (i + graph::kFetchAhead < judged_.size())
+      graph_.fetch_numbers(judged_[i + graph::kFetchAhead]);
     compare_factor(judged_[i], limit);
   }
 

@@ -47,7 +47,6 @@ class StepJudge {
   };
 
   void list_judged(double unless_below);
-  void list_from_table();
   bool is_judged(int variable) const {
     return variable_at_[static_cast<std::size_t>(variable)] == count_;
   }

@@ -78,7 +78,7 @@ std::span<const int> FactorGraph::incidences_of(int factor) const {
   const FactorRecord& record = factors_[factor];
   const auto count = static_cast<std::size_t>(record.variable_count);
   if (record.many_links != nullptr) return {record.many_links + count, count};
-  return {record.few_links[1].data(), count};
+  return {record.few_incidences.data(), count};
 }
 
 std::span<const double> FactorGraph::measurement(FactorId id) const {
@@ -111,17 +111,21 @@ void FactorGraph::check_types(FactorKind kind, std::span<const VariableId> varia
   }
 }
 
-int FactorGraph::link(FactorKind kind, std::span<const VariableId> variables) {
+int FactorGraph::link(FactorKind kind, const Loss& loss, std::span<const VariableId> variables) {
   check_types(kind, variables);
   const int id = factors_.add();
   FactorRecord& record = factors_.edit(id);
   record.kind = kind;
   record.in_use = true;
-  record.made_at = factors_.epoch();
+  record.kernel = loss.kernel;
+  record.loss_width = loss.width;
   record.variable_count = static_cast<int>(variables.size());
 
-  int* names = record.few_links[0].data();
-  int* incidences = record.few_links[1].data();
+  variables_of_.resize(static_cast<std::size_t>(factors_.size()));
+  std::array<int, 2>& few = variables_of_[static_cast<std::size_t>(id)];
+  few = {kNone, kNone};
+  int* names = few.data();
+  int* incidences = record.few_incidences.data();
   if (variables.size() > 2) {
     record.many_links = links_.take(2 * variables.size());
     names = record.many_links;
@@ -171,14 +175,16 @@ FactorId FactorGraph::add(const Factor& factor) {
 
   const Eigen::MatrixXd information = factor.information;
   root_of(information);
-  const int id =
-      link(factor.kind, {factor.variables.data(), static_cast<std::size_t>(factor.variable_count)});
-  factors_.edit(id).loss = factor.loss;
+  const int id = link(factor.kind, factor.loss,
+                      {factor.variables.data(), static_cast<std::size_t>(factor.variable_count)});
   if (factor.kind == FactorKind::kRangeBearing2 || factor.loss.kernel != RobustKernel::kNone) {
     mark_curved(id);
   }
 
-  store_data(id, factor.measurement, information);
+  // Nearly all factors of a map are observations in the plane: of two numbers.
+  const std::span<const double> measurement(factor.measurement);
+  store_data(id, factor.kind == FactorKind::kPoint2 ? measurement.first(2) : measurement,
+             information);
   linearise(id);
   return FactorId(id);
 }
@@ -198,8 +204,7 @@ FactorId FactorGraph::add(const CondensedFactor& factor) {
           "a condensed measurement of the wrong size");
   root_of(factor.information);
 
-  const int id = link(FactorKind::kCondensed2, factor.variables);
-  factors_.edit(id).loss = factor.loss;
+  const int id = link(FactorKind::kCondensed2, factor.loss, factor.variables);
   if (factor.loss.kernel != RobustKernel::kNone) mark_curved(id);
   store_data(id, {factor.measurement.data(), static_cast<std::size_t>(rows)}, factor.information);
   linearise(id);
@@ -209,7 +214,7 @@ FactorId FactorGraph::add(const CondensedFactor& factor) {
 FactorId FactorGraph::add(std::shared_ptr<const UserFactor> factor,
                           std::span<const VariableId> variables) {
   require(factor != nullptr && factor->residual_dimension() > 0, "a user's factor without rows");
-  const int id = link(FactorKind::kUser, variables);
+  const int id = link(FactorKind::kUser, {}, variables);
   mark_curved(id);
   FactorRecord& record = factors_.edit(id);
   record.rows = factor->residual_dimension();
@@ -234,7 +239,7 @@ FactorId FactorGraph::add_linear(std::span<const VariableId> variables,
               jacobian.allFinite() && right.allFinite(),
           "a linear factor of the wrong size");
 
-  const int id = link(FactorKind::kLinear, variables);
+  const int id = link(FactorKind::kLinear, {}, variables);
   FactorRecord& record = factors_.edit(id);
   record.rows = static_cast<int>(jacobian.rows());
   const auto values = variables.size() * std::tuple_size_v<Value>;
@@ -268,6 +273,9 @@ void FactorGraph::remove(FactorId id) {
 
   factors_.edit(index(id)).in_use = false;
   factors_.remove(index(id));
+  std::array<int, 2>& few = variables_of_[static_cast<std::size_t>(index(id))];
+  removed_.push_back({index(id), few});
+  few = {kNone, kNone};
 }
 
 void FactorGraph::remove(VariableId id) {
@@ -307,16 +315,20 @@ void FactorGraph::commit() {
           pool_.give_back(before.linear, linear_size(before));
         }
       });
+  removed_.clear();
   incidences_.commit([](const auto&) {}, [](const auto&, const auto&) {});
   variables_.commit([](const auto&) {}, [](const auto&, const auto&) {});
 }
 
 void FactorGraph::rollback() {
+  for (const Removed& one : removed_) variables_of_[static_cast<std::size_t>(one.factor)] = one.few;
+  removed_.clear();
   factors_.rollback(
       [&](int, const FactorRecord& now, const FactorRecord& before) {
         if (now.linear != before.linear) pool_.give_back(now.linear, linear_size(now));
       },
-      [&](int, const FactorRecord& gone) {
+      [&](int id, const FactorRecord& gone) {
+        variables_of_[static_cast<std::size_t>(id)] = {kNone, kNone};
         free_blocks(gone);
         if (gone.linear != nullptr) pool_.give_back(gone.linear, linear_size(gone));
       });

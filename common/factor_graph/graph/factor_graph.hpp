@@ -1,6 +1,8 @@
 // Variables and factors with their linearisations: what the solvers work on.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <memory>
 #include <optional>
 #include <span>
@@ -14,6 +16,10 @@ namespace understory::factor_graph::graph {
 
 /// End of a list, or no such number.
 constexpr int kNone = -1;
+
+/// Who goes through many factors fetches the numbers of the one so many places ahead, and the
+/// record of the one twice as many ahead.
+constexpr std::size_t kFetchAhead = 8;
 
 /// A variable with its estimate. Fields marked (smoother) are kept for the incremental smoother.
 struct VariableRecord {
@@ -43,27 +49,28 @@ struct IncidenceRecord {
   int previous = kNone;
 };
 
-/// A factor with its linearisation.
-struct FactorRecord {
+/// A factor with its linearisation. What every update reads is in the first cache line: thousands
+/// of records are gone through, and each line of them is waited for.
+struct alignas(64) FactorRecord {
   FactorKind kind = FactorKind::kPriorPose2;
-  bool in_use = false;      ///< False after its removal.
-  bool is_pending = false;  ///< It waits to be linearised again (smoother).
-  Loss loss;
-  int rows = 0;                          ///< Of the residual.
-  int columns = 0;                       ///< Of the Jacobian.
-  int variable_count = 0;                ///< Number of variables.
-  std::array<int, 2> few_links[2] = {};  ///< Variables, incidences; of up to two.
-  int* many_links = nullptr;             ///< The same where there are more.
-  double* data = nullptr;                ///< Measurement, then the root of the information.
-  int data_size = 0;                     ///< Length of `data`.
-  int measurement_size = 0;              ///< Length of the measurement in it.
-  double* linear = nullptr;              ///< See FactorGraph::linearise().
-  std::uint64_t linear_epoch = 0;        ///< Journal epoch in which `linear` was taken.
-  std::uint64_t made_at = 0;             ///< Journal epoch in which the factor was added.
-  int user = kNone;                      ///< Number of the user-defined factor.
-  int clique = kNone;                    ///< Where it is assembled (smoother).
-  int next = kNone;                      ///< Next one there (smoother).
-  int previous = kNone;                  ///< Previous one there (smoother).
+  RobustKernel kernel = RobustKernel::kNone;
+  bool in_use = false;                  ///< False after its removal.
+  bool is_pending = false;              ///< It waits to be linearised again (smoother).
+  int rows = 0;                         ///< Of the residual.
+  int columns = 0;                      ///< Of the Jacobian.
+  int variable_count = 0;               ///< Number of variables.
+  std::array<int, 2> few_incidences{};  ///< Of up to two variables.
+  double* linear = nullptr;             ///< See FactorGraph::linearise().
+  double* data = nullptr;               ///< Measurement, then the root of the information.
+  int* many_links = nullptr;            ///< Variables, then incidences, where there are more.
+  int measurement_size = 0;             ///< Length of the measurement in `data`.
+  int data_size = 0;                    ///< Length of `data`.
+  double loss_width = 1.0;              ///< See Loss.
+  std::uint64_t linear_epoch = 0;       ///< Journal epoch in which `linear` was taken.
+  int user = kNone;                     ///< Number of the user-defined factor.
+
+  /// The loss as it was given.
+  Loss loss() const { return {kernel, loss_width}; }
 };
 
 /// How far a factor is from its linearisation.
@@ -134,19 +141,31 @@ class FactorGraph {
   const Value& value(VariableId id) const { return variables_[index(id)].value; }
   /// Kind of a factor.
   FactorKind kind(FactorId id) const { return factors_[index(id)].kind; }
-  /// Numbers of a factor's variables, in its order.
+  /// Numbers of a factor's variables, in its order. Precondition: the graph has the factor.
   std::span<const int> variables_of(int factor) const {
-    const FactorRecord& record = factors_[factor];
-    const int* names =
-        record.many_links != nullptr ? record.many_links : record.few_links[0].data();
-    return {names, static_cast<std::size_t>(record.variable_count)};
+    const std::array<int, 2>& few = variables_of_[static_cast<std::size_t>(factor)];
+    if (few[0] == kNone) return many_variables_of(factor);
+    return {few.data(), few[1] == kNone ? std::size_t{1} : std::size_t{2}};
+  }
+  /// Appends the factors of any variable for which `is_wanted` holds. O(factor_capacity()), which
+  /// is less than to follow the lists of many variables: it reads eight bytes for each factor, as
+  /// they lie in memory.
+  template <typename IsWanted>
+  void list_factors(const IsWanted& is_wanted, std::vector<int>& found) const {
+    for (int f = 0; f < factor_capacity(); ++f) {
+      const std::array<int, 2>& few = variables_of_[static_cast<std::size_t>(f)];
+      const bool is_found = few[0] == kNone
+                                ? std::ranges::any_of(many_variables_of(f), is_wanted)
+                                : is_wanted(few[0]) || (few[1] != kNone && is_wanted(few[1]));
+      if (is_found) found.push_back(f);
+    }
   }
   /// What was measured, see FactorKind.
   std::span<const double> measurement(FactorId id) const;
   /// The information as it was given, up to rounding. Not of kLinear and kUser.
   Eigen::MatrixXd information(FactorId id) const;
   /// The factor's loss.
-  Loss loss(FactorId id) const { return factors_[index(id)].loss; }
+  Loss loss(FactorId id) const { return factors_[index(id)].loss(); }
 
   /// Loss of one factor at the estimate.
   double chi2(FactorId id) const;
@@ -177,10 +196,14 @@ class FactorGraph {
   /// Begins to fetch a factor's record into the processor's cache: a list of factors is anywhere in
   /// memory, and to wait for each of them takes longer than what is done with it.
   void fetch_record(int factor) const { __builtin_prefetch(&factors_[factor]); }
-  /// The same of its numbers, once the record is there.
-  void fetch_numbers(int factor) const {
+  /// The same of its linearisation, once the record is there.
+  void fetch_linear(int factor) const {
     __builtin_prefetch(factors_[factor].linear);
     __builtin_prefetch(factors_[factor].linear + 8);
+  }
+  /// The same of all its numbers.
+  void fetch_numbers(int factor) const {
+    fetch_linear(factor);
     __builtin_prefetch(factors_[factor].data);
   }
 
@@ -205,14 +228,19 @@ class FactorGraph {
   std::size_t bytes() const { return pool_.bytes(); }
 
  private:
-  int link(FactorKind kind, std::span<const VariableId> variables);
+  std::span<const int> many_variables_of(int factor) const {
+    const FactorRecord& record = factors_[factor];
+    if (!record.in_use || record.many_links == nullptr) return {};
+    return {record.many_links, static_cast<std::size_t>(record.variable_count)};
+  }
+  int link(FactorKind kind, const Loss& loss, std::span<const VariableId> variables);
   void mark_curved(int factor);
   void check_types(FactorKind kind, std::span<const VariableId> variables) const;
   void store_data(int factor, std::span<const double> measurement,
                   const Eigen::Ref<const Eigen::MatrixXd>& information);
   std::span<const int> incidences_of(int factor) const;
-  Deviation deviation_of_point2(const FactorRecord& factor) const;
-  void linearise_point2(const FactorRecord& factor);
+  Deviation deviation_of_point2(const FactorRecord& factor, std::span<const int> names) const;
+  void linearise_point2(const FactorRecord& factor, std::span<const int> names);
   void copy_moves(std::span<const int> variables, double* to) const;
   void free_blocks(const FactorRecord& factor);
   /// Residual (and Jacobian) before the loss, whitened, in the charts.
@@ -224,6 +252,13 @@ class FactorGraph {
 
   storage::JournaledTable<VariableRecord> variables_;
   storage::JournaledTable<FactorRecord> factors_;
+  /// Per factor of up to two variables these, kNone where it has no second; else kNone, kNone.
+  std::vector<std::array<int, 2>> variables_of_;
+  struct Removed {
+    int factor;
+    std::array<int, 2> few;
+  };
+  std::vector<Removed> removed_;  ///< Since the last commit.
   storage::JournaledTable<IncidenceRecord> incidences_;
   storage::BlockPool<double> pool_;
   storage::BlockPool<int> links_;

@@ -142,7 +142,7 @@ double FactorGraph::chi2(FactorId id) const {
   const FactorRecord& record = factors_[index(id)];
   scratch_.resize(static_cast<std::size_t>(record.rows));
   whitened(record, variables_of(index(id)), scratch_.data(), nullptr);
-  return evaluate(record.loss,
+  return evaluate(record.loss(),
                   Map<const Eigen::VectorXd>(scratch_.data(), record.rows).squaredNorm())
       .cost;
 }
@@ -172,9 +172,9 @@ void FactorGraph::keep_scales(const FactorRecord& factor, std::span<const int> v
 }
 
 /// linearise() of an observation in the plane without a robust loss.
-void FactorGraph::linearise_point2(const FactorRecord& record) {
-  const VariableRecord& pose = variables_[record.few_links[0][0]];
-  const VariableRecord& point = variables_[record.few_links[0][1]];
+void FactorGraph::linearise_point2(const FactorRecord& record, std::span<const int> names) {
+  const VariableRecord& pose = variables_[names[0]];
+  const VariableRecord& point = variables_[names[1]];
   const Value* values[] = {&pose.value, &point.value};
   Eigen::Vector2d e;
   Matrix<double, 2, 5> by_both;
@@ -190,7 +190,7 @@ void FactorGraph::linearise_point2(const FactorRecord& record) {
   age[0] = 1.0;
   age[1] = pose.delta[2];
   age[2] = age[3] = 0.0;
-  keep_scales(record, {record.few_links[0].data(), 2});
+  keep_scales(record, names);
 }
 
 void FactorGraph::linearise(int id) {
@@ -203,8 +203,8 @@ void FactorGraph::linearise(int id) {
     record.linear_epoch = factors_.epoch();
   }
 
-  if (record.kind == FactorKind::kPoint2 && record.loss.kernel == RobustKernel::kNone)
-    return linearise_point2(record);
+  if (record.kind == FactorKind::kPoint2 && record.kernel == RobustKernel::kNone)
+    return linearise_point2(record, variables_of(id));
 
   const std::span<const int> variables = variables_of(id);
   double* j = record.linear;
@@ -212,9 +212,9 @@ void FactorGraph::linearise(int id) {
   whitened(record, variables, b, j);
   double root_weight = 1.0;
   Map<Eigen::VectorXd> e(b, rows);
-  const LossValue loss = evaluate(record.loss, e.squaredNorm());
+  const LossValue loss = evaluate(record.loss(), e.squaredNorm());
   Map<Eigen::MatrixXd> jacobian(j, rows, columns);
-  if (record.loss.kernel != RobustKernel::kNone) {
+  if (record.kernel != RobustKernel::kNone) {
     root_weight = std::sqrt(loss.weight);
     e *= root_weight;
     jacobian *= root_weight;
@@ -247,9 +247,10 @@ void FactorGraph::copy_moves(std::span<const int> variables, double* to) const {
 }
 
 /// deviation() of an observation in the plane without a robust loss: nearly all factors of a map.
-Deviation FactorGraph::deviation_of_point2(const FactorRecord& record) const {
-  const VariableRecord& pose = variables_[record.few_links[0][0]];
-  const VariableRecord& point = variables_[record.few_links[0][1]];
+Deviation FactorGraph::deviation_of_point2(const FactorRecord& record,
+                                           std::span<const int> names) const {
+  const VariableRecord& pose = variables_[names[0]];
+  const VariableRecord& point = variables_[names[1]];
   const double* z = record.data;
   const Map<const Eigen::Matrix2d> root(z + record.measurement_size);
   const Eigen::Vector2d apart(point.value[0] - pose.value[0], point.value[1] - pose.value[1]);
@@ -272,8 +273,8 @@ Deviation FactorGraph::deviation_of_point2(const FactorRecord& record) const {
 
 Deviation FactorGraph::deviation(int id) const {
   const FactorRecord& record = factors_[id];
-  if (record.kind == FactorKind::kPoint2 && record.loss.kernel == RobustKernel::kNone)
-    return deviation_of_point2(record);
+  if (record.kind == FactorKind::kPoint2 && record.kernel == RobustKernel::kNone)
+    return deviation_of_point2(record, variables_of(id));
   const std::span<const int> variables = variables_of(id);
   const int numbers = 2 * record.rows + record.columns;
   scratch_.resize(static_cast<std::size_t>(numbers));
@@ -303,8 +304,8 @@ Deviation FactorGraph::deviation(int id) const {
 
   double reweighted = 0.0;
   double loss = squared;
-  if (record.loss.kernel != RobustKernel::kNone) {
-    const LossValue value = evaluate(record.loss, squared);
+  if (record.kernel != RobustKernel::kNone) {
+    const LossValue value = evaluate(record.loss(), squared);
     reweighted = std::sqrt(value.weight) - age[0];
     loss = value.cost;
   }

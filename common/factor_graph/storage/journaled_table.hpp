@@ -3,9 +3,10 @@
 
 #include <cstdint>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
-#include "common/factor_graph/storage/steady_growth.hpp"
+#include "common/factor_graph/storage/block_list.hpp"
 
 namespace understory::factor_graph::storage {
 
@@ -22,8 +23,7 @@ class JournaledTable {
     int id = 0;
     if (free_.empty()) {
       id = size();
-      make_room(records_);
-      records_.emplace_back();
+      records_.push_back(T{});
       saved_at_.push_back(0);
     } else {
       id = free_.back();
@@ -39,14 +39,13 @@ class JournaledTable {
 
   /// The record with this number.
   const T& operator[](int id) const { return records_[static_cast<std::size_t>(id)]; }
-  /// The same for change: its first change since the last commit() saves what it was. References
-  /// end with the next add().
+  /// The same for change: its first change since the last commit() saves what it was.
   T& edit(int id) {
     const auto at = static_cast<std::size_t>(id);
     if (saved_at_[at] != epoch_) {
       saved_at_[at] = epoch_;
-      make_room(saved_);
-      saved_.push_back({id, records_[at]});
+      saved_ids_.push_back(id);
+      saved_.push_back(records_[at]);
     }
     return records_[at];
   }
@@ -62,7 +61,8 @@ class JournaledTable {
   /// every one that was changed.
   template <typename OnRemoved, typename OnSaved>
   void commit(OnRemoved&& on_removed, OnSaved&& on_saved) {
-    for (const Saved& saved : saved_) on_saved(saved.record, (*this)[saved.id]);
+    for (std::size_t i = 0; i < saved_.size(); ++i)
+      on_saved(std::as_const(saved_)[i], (*this)[saved_ids_[i]]);
     for (const int id : removed_) {
       on_removed((*this)[id]);
       free_.push_back(id);
@@ -74,10 +74,10 @@ class JournaledTable {
   /// ceases to be.
   template <typename OnUndone, typename OnAdded>
   void rollback(OnUndone&& on_undone, OnAdded&& on_added) {
-    for (const Saved& saved : saved_) {
-      T& record = records_[static_cast<std::size_t>(saved.id)];
-      on_undone(saved.id, record, saved.record);
-      record = saved.record;
+    for (std::size_t i = 0; i < saved_.size(); ++i) {
+      T& record = records_[static_cast<std::size_t>(saved_ids_[i])];
+      on_undone(saved_ids_[i], record, saved_[i]);
+      record = saved_[i];
     }
     for (std::size_t i = added_.size(); i-- > 0;) {
       T& record = records_[static_cast<std::size_t>(added_[i])];
@@ -97,21 +97,19 @@ class JournaledTable {
   const std::vector<int>& added() const { return added_; }
 
  private:
-  struct Saved {
-    int id;
-    T record;
-  };
   void forget() {
+    saved_ids_.clear();
     saved_.clear();
     added_.clear();
     removed_.clear();
     ++epoch_;
   }
 
-  std::vector<T> records_;
-  std::vector<std::uint64_t> saved_at_;
+  BlockList<T> records_;
+  BlockList<std::uint64_t> saved_at_;  ///< Epoch in which each was saved last.
   std::vector<int> free_;
-  std::vector<Saved> saved_;
+  BlockList<int> saved_ids_;  ///< Of those changed since the last commit ...
+  BlockList<T> saved_;        ///< ... what they were.
   std::vector<int> added_;
   std::vector<int> removed_;
   std::uint64_t epoch_ = 1;

@@ -11,6 +11,9 @@
 namespace understory::place_recognition::detectors {
 namespace {
 
+/// Steps of a packed value from 0 to 1.
+constexpr float kPackedSteps = 255.0F;
+
 using Values = Eigen::Map<const Eigen::VectorXf>;
 
 double dot(std::span<const float> a, std::span<const float> b) {
@@ -94,10 +97,9 @@ ContextDistance ScanContextMaker::distance(const ScanContext& query,
   return best;
 }
 
-double ScanContextMaker::key_distance(const ScanContext& a, const ScanContext& b) const {
+double ScanContextMaker::key_distance(std::span<const float> a, std::span<const float> b) const {
   const auto rings = static_cast<Eigen::Index>(parameters_.rings);
-  return static_cast<double>(
-      (Values(a.ring_key.data(), rings) - Values(b.ring_key.data(), rings)).norm());
+  return static_cast<double>((Values(a.data(), rings) - Values(b.data(), rings)).norm());
 }
 
 double ScanContextMaker::heading_rad(std::size_t shift) const {
@@ -136,13 +138,32 @@ BestContext best_context(const ScanContextMaker& maker, std::span<const ShiftedC
   return best;
 }
 
+PackedContext packed(const ScanContext& context) {
+  PackedContext result{std::vector<std::uint8_t>(context.columns.size()), context.ring_key};
+  std::ranges::transform(context.columns, result.columns.begin(), [](float value) {
+    const long steps = std::lround(value * kPackedSteps);
+    // What is low is not empty.
+    return static_cast<std::uint8_t>(value > 0.0F ? std::max(1L, steps) : 0L);
+  });
+  return result;
+}
+
+ScanContext unpacked(const PackedContext& context) {
+  ScanContext result{std::vector<float>(context.columns.size()), context.ring_key};
+  std::ranges::transform(context.columns, result.columns.begin(), [](std::uint8_t steps) {
+    return static_cast<float>(steps) / kPackedSteps;
+  });
+  return result;
+}
+
 ScanContextDetector::ScanContextDetector(const ScanContextParameters& parameters,
                                          double place_sigma_m)
     : maker_(parameters), place_sigma_m_(place_sigma_m) {}
 
 void ScanContextDetector::add(const PlaceFrame& frame) {
   ids_.push_back(frame.id);
-  contexts_.push_back(maker_.describe(points_of(frame), Eigen::Vector2d::Zero()));
+  const auto context = maker_.describe(points_of(frame), Eigen::Vector2d::Zero());
+  contexts_.push_back(context ? std::optional(packed(*context)) : std::nullopt);
 }
 
 /// Frames before the index `end` of the least distance to any of the query's keys.
@@ -153,7 +174,8 @@ std::vector<std::size_t> ScanContextDetector::nearest_keys(std::span<const Shift
     if (!contexts_[i]) continue;
     double least = std::numeric_limits<double>::infinity();
     for (const ShiftedContext& shifted : query)
-      least = std::min(least, maker_.key_distance(shifted.context, *contexts_[i]));
+      least =
+          std::min(least, maker_.key_distance(shifted.context.ring_key, contexts_[i]->ring_key));
     order.emplace_back(least, i);
   }
 
@@ -174,7 +196,7 @@ std::vector<ScoredPlace> ScanContextDetector::query(const PlaceFrame& frame,
       std::upper_bound(ids_.begin(), ids_.end(), limits.newest) - ids_.begin());
   const double sigma_rad = maker_.heading_sigma_rad(place_sigma_m_);
   for (const std::size_t i : nearest_keys(query, end)) {
-    const BestContext best = best_context(maker_, query, *contexts_[i]);
+    const BestContext best = best_context(maker_, query, unpacked(*contexts_[i]));
     places.push_back(
         {ids_[i], -best.distance, {heading_guess(best.frame_T_query, place_sigma_m_, sigma_rad)}});
   }
@@ -183,8 +205,8 @@ std::vector<ScoredPlace> ScanContextDetector::query(const PlaceFrame& frame,
 }
 
 std::size_t ScanContextDetector::descriptor_bytes() const {
-  const std::size_t of_one =
-      (maker_.parameters().rings * (maker_.parameters().sectors + 1)) * sizeof(float);
+  const std::size_t of_one = maker_.parameters().rings *
+                             (maker_.parameters().sectors * sizeof(std::uint8_t) + sizeof(float));
   return of_one * static_cast<std::size_t>(std::count_if(contexts_.begin(), contexts_.end(),
                                                          [](const auto& one) { return !!one; }));
 }
