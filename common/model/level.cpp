@@ -14,8 +14,6 @@ constexpr Utime kMaxAge_us = 2'000'000;
 /// Least share of a detection's covariance that remains without the level's part.
 constexpr double kLeastOwnShare = 0.05;
 
-/// Landmarks are given at breast height; an error of the level displaces them by it.
-constexpr double kLandmarkHeight_m = 1.3;
 /// How far landmarks are away, about. A level that changes within a revolution displaces those
 /// ahead by another way than those behind, which turns the pose.
 constexpr double kLandmarksAway_m = 15.0;
@@ -23,6 +21,12 @@ constexpr double kLandmarksAway_m = 15.0;
 constexpr double kWorse = 4.0;
 
 }  // namespace
+
+Eigen::Matrix2d level_arm(double height_m) {
+  Eigen::Matrix2d arm;
+  arm << 0.0, height_m, -height_m, 0.0;
+  return arm;
+}
 
 Eigen::Matrix2d without_level(const Eigen::Matrix2d& covariance_m2, const Eigen::Matrix2d& arm,
                               const Eigen::Matrix2d& level_covariance_rad2) {
@@ -37,14 +41,11 @@ Eigen::Matrix2d without_level(const Eigen::Matrix2d& covariance_m2, const Eigen:
 
 LandmarkScan LevelCorrection::levelled(LandmarkScan scan) const {
   if (!level_ || std::abs(scan.utime - level_->utime) > kMaxAge_us) return scan;
-  Eigen::Matrix2d by_height;
-  by_height << 0.0, 1.0, -1.0, 0.0;
-
   for (Detection& detection : scan.detections) {
     if (!detection.position_m.allFinite() || !detection.covariance_m2.allFinite()) continue;
 
     // The estimated error displaces the detection by its height.
-    const Eigen::Matrix2d arm = detection.position_m.z() * by_height;
+    const Eigen::Matrix2d arm = level_arm(detection.position_m.z());
     detection.position_m.head<2>() -= arm * level_->error_rad;
 
     // Its covariance has the remaining error instead of the whole one.
@@ -80,9 +81,8 @@ Eigen::Matrix3d SweepLevel::pose_covariance() const {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   if (!covariance_rad2_ || covariance_rad2_->trace() < kWorse * kWorse * least_rad2_)
     return covariance;
-  Eigen::Matrix2d arm_m;
-  arm_m << 0.0, kLandmarkHeight_m, -kLandmarkHeight_m, 0.0;
-  covariance.topLeftCorner<2, 2>() = arm_m * *covariance_rad2_ * arm_m.transpose();
+  const Eigen::Matrix2d arm = level_arm(kLandmarkHeight_m);
+  covariance.topLeftCorner<2, 2>() = arm * *covariance_rad2_ * arm.transpose();
   const double turn = kLandmarkHeight_m / kLandmarksAway_m;
   covariance(2, 2) = 0.5 * turn * turn * covariance_rad2_->trace();
   return covariance;

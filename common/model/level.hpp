@@ -9,6 +9,11 @@
 
 namespace understory::model {
 
+/// Landmarks are given at breast height [m]; an error of the level displaces them by it.
+inline constexpr double kLandmarkHeight_m = 1.3;
+/// What an error of (roll, pitch) displaces at this height: d(position) / d(roll, pitch) [m/rad].
+Eigen::Matrix2d level_arm(double height_m);
+
 /// The filter's latest estimate of the level's error, for stages that take LANDMARKS.
 class LevelCorrection {
  public:

@@ -1,7 +1,5 @@
 #include "common/factor_graph/bayes_tree/restructuring.hpp"
 
-#include <algorithm>
-
 namespace understory::factor_graph::bayes_tree {
 
 void Restructuring::collect_variable(int variable) {
@@ -101,7 +99,6 @@ void Restructuring::hand_out_elements(const CliquePlan& plan, int planned, int i
       cliques_.link(id, orphans_[at - factor_count]);
     }
   }
-  std::ranges::reverse(factors_);
   cliques_.set_factors(id, factors_);
 }
 

@@ -1,29 +1,16 @@
 #include "services/geoslam_mapper/smoothing/common_error.hpp"
 
-#include <Eigen/Geometry>
-#include <numbers>
+#include "common/model/level.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
-namespace {
-
-/// Landmarks are given at breast height; an error of the level displaces them by it.
-constexpr double kLandmarkHeight_m = 1.3;
-
-/// d(position) / d(roll, pitch) [m/rad].
-Eigen::Matrix2d arm_m() {
-  const Eigen::Rotation2D<double> quarter(-0.5 * std::numbers::pi);
-  return kLandmarkHeight_m * quarter.toRotationMatrix();
-}
-
-}  // namespace
 
 void CommonError::set_start_level(const Eigen::Matrix2d& covariance) {
-  const Eigen::Matrix2d arm = arm_m();
+  const Eigen::Matrix2d arm = model::level_arm(model::kLandmarkHeight_m);
   start_covariance_m2_ = arm * covariance * arm.transpose();
 }
 
 Eigen::Vector2d CommonError::displacement_m(const Eigen::Vector2d& level_rad) {
-  return arm_m() * level_rad;
+  return model::level_arm(model::kLandmarkHeight_m) * level_rad;
 }
 
 Eigen::Matrix2d CommonError::covariance_of(const Eigen::Vector2d& position_m) const {
