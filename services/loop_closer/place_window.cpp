@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 namespace understory::loop_closer {
 namespace {
@@ -11,6 +12,11 @@ constexpr double kCorrectedM = 0.5;
 constexpr double kCorrectedRad = 0.05;
 /// A step that no vehicle drives between two keyframes is a correction, where nothing was tracked.
 constexpr double kLongestStepM = 200.0;
+
+/// In a window of so many keyframes, what a single one detected is not counted: false detections
+/// come once, trunks again. Of a thin place everything is.
+constexpr std::size_t kManyKeyframes = 4;
+constexpr double kSeenAgain = 2.0;
 
 /// A stem that several keyframes detected.
 struct JoinedStem {
@@ -79,6 +85,10 @@ std::vector<LevelStem> PlaceWindow::stems() const {
 
   std::vector<LevelStem> stems;
   if (!last_) return stems;
+  const auto is_seen_again = [](const JoinedStem& one) { return one.count >= kSeenAgain; };
+  if (seen_.size() >= kManyKeyframes &&
+      std::ranges::count_if(joined, is_seen_again) >= parameters_.min_stems)
+    std::erase_if(joined, std::not_fn(is_seen_again));
   const geometry::SE2 base_T_map = last_->map_T_base.inverse();
   for (const JoinedStem& one : joined) {
     const double diameter_m =

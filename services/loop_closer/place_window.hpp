@@ -34,7 +34,7 @@ enum class WindowStep { kWentOn, kBegun };
 /// are one landmark, and how the keyframes lie to each other.
 class PlaceWindow {
  public:
-  /// Without keyframes. `parameters` gives window_m, merge_m and most_stems.
+  /// Without keyframes. `parameters` gives window_m, merge_m, min_stems and most_stems.
   explicit PlaceWindow(const PlaceParameters& parameters) : parameters_(parameters) {}
 
   /// Adds a keyframe that the mapper placed. Where it does not lie to the last one as it was
@@ -46,7 +46,8 @@ class PlaceWindow {
   /// Path of the vehicle [m] since the window's first beginning.
   double along_m() const { return along_m_; }
   /// The stems around the last keyframe's base, frame `vehicle_level` of that scan; the nearest
-  /// `most_stems`. O(stems^2).
+  /// `most_stems`. Where a window of four keyframes and more shows `min_stems` that were detected
+  /// twice, these alone. O(stems^2).
   std::vector<LevelStem> stems() const;
 
   /// Members of a saved state; see common/state. Parameters are configuration.

@@ -71,6 +71,30 @@ TEST_CASE("A window joins what its keyframes saw, around the last base", "[loop_
   CHECK(window.stems().size() == 1);
 }
 
+TEST_CASE("Detections that come once are no stems of a window, unless it shows few",
+          "[loop_closer]") {
+  PlaceParameters parameters;
+  parameters.window_m = 20.0;
+  for (const int trunks : {4, 5, 12}) {
+    PlaceWindow window(parameters);
+    const std::uint64_t keyframes = 6;
+    for (std::uint64_t k = 0; k < keyframes; ++k) {
+      // Each trunk in two keyframes, and one false detection in each keyframe.
+      std::vector<Eigen::Vector2d> seen{{100.0 + 5.0 * static_cast<double>(k), 0.0}};
+      for (int trunk = 0; trunk < trunks; ++trunk)
+        if (static_cast<std::uint64_t>(trunk % 5) == k ||
+            static_cast<std::uint64_t>(trunk % 5 + 1) == k)
+          seen.emplace_back(2.0 * trunk, 10.0);
+      auto [keyframe, update] = seen_at({2.0 * static_cast<double>(k), 0.0, 0.0}, k, seen);
+      update.associations.clear();  // The mapper has none of them yet.
+      window.add(keyframe, update);
+    }
+    const std::size_t all = static_cast<std::size_t>(trunks) + keyframes;
+    const bool is_thin = trunks < parameters.min_stems;
+    CHECK(window.stems().size() == (is_thin ? all : static_cast<std::size_t>(trunks)));
+  }
+}
+
 TEST_CASE("A window begins anew where the map was corrected", "[loop_closer]") {
   PlaceWindow window(PlaceParameters{});
   auto [first, first_update] = seen_at({}, 1, {{3.0, 4.0}, {6.0, 1.0}});
