@@ -57,6 +57,7 @@ TEST_CASE("A window joins what its keyframes saw, around the last base", "[loop_
     named.associations = {{0, k % 3 + 1}, {1, (k + 1) % 3 + 1}};
     window.add(keyframe, named);
   }
+
   const auto joined = window.stems();
   REQUIRE(joined.size() == 3);
   for (const Eigen::Vector2d& stem : stems) {
@@ -65,6 +66,7 @@ TEST_CASE("A window joins what its keyframes saw, around the last base", "[loop_
       return (one.position_m - wanted).norm() < 1e-9 && one.diameter_m > 0.1;
     }));
   }
+
   // Far on, they are forgotten; and where the map was corrected, too.
   const auto [far_keyframe, far_update] = seen_at({40.0, 0.0, 0.0}, 9, {{41.0, 3.0}});
   window.add(far_keyframe, far_update);

@@ -136,10 +136,12 @@ TEST_CASE("A turn by whole sectors shifts the context, and is told", "[scan-cont
       frame.cloud.emplace_back(
           Eigen::Vector3d(range * std::cos(angle), range * std::sin(angle), k % 5).cast<float>());
     }
+
     const geometry::SE2 frame_T_query(0.0, 0.0, turn * std::numbers::pi / 30.0);
     const auto query = maker.describe(test::seen_from(frame, frame_T_query).cloud, {0.0, 0.0});
     const auto context = maker.describe(frame.cloud, {0.0, 0.0});
     REQUIRE((query && context));
+
     CHECK(maker.key_distance(query->ring_key, context->ring_key) < 1e-6);
     const ContextDistance found = maker.distance(*query, *context);
     CHECK(found.distance < 1e-5);

@@ -17,7 +17,8 @@ struct FactorPlace {
 };
 
 /// The places of all factors, with undo. Beside their records and not in them: an update changes
-/// the places of thousands, and a place is a sixteenth of a record (docs/decisions/152).
+/// the places of thousands, and a place is a sixteenth of a record (docs/decisions/152). No
+/// JournaledTable: that one gives out numbers, and clears what it gives out again.
 class FactorPlaces {
  public:
   /// Place of a factor; of one that no clique has ever held, none.
