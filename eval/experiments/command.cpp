@@ -1,6 +1,7 @@
 #include "eval/experiments/command.hpp"
 
 #include "eval/experiments/changing_forest/changing_forest.hpp"
+#include "eval/experiments/changing_forest/mapping_needed.hpp"
 #include "eval/experiments/existence/camera/existence_camera.hpp"
 #include "eval/experiments/existence/census/existence_census.hpp"
 #include "eval/experiments/existence/existence.hpp"
@@ -45,6 +46,7 @@ void add_eval_command(CLI::App& parent) {
   gaps::add_gaps_experiment(eval);
   existence::add_existence_experiment(eval);
   changing_forest::add_changing_forest_experiment(eval);
+  changing_forest::add_mapping_needed_experiment(eval);
   existence::camera::add_existence_camera_experiment(eval);
   existence::census::add_existence_census_experiment(eval);
   partition::add_partition_experiments(eval);

@@ -95,8 +95,8 @@ void watch_chain(SensorChain& chain, ChainRun& run) {
       "SLAM_UPDATE", [&run](const model::MapUpdate& update) { run.updates.push_back(update); });
   chain.watch<model::Existence>("EXISTENCE", [&run](const model::Existence& existence) {
     for (const model::LandmarkExistence& one : existence.landmarks) run.existence[one.id] = one;
-    run.missing_share = existence.missing_share;
-    run.is_mapping_needed = existence.is_mapping_needed;
+    run.mapping_signals.push_back(
+        {existence.missing_share, existence.new_share, existence.is_mapping_needed});
   });
   chain.watch<model::ExistenceState>("EXISTENCE_STATE", [&run](const model::ExistenceState& state) {
     run.existence_states.push_back(state);

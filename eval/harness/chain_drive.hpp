@@ -26,6 +26,13 @@ struct MapAfterUpdate {
   std::vector<model::MapLandmark> landmarks;
 };
 
+/// What EXISTENCE says of the map around the vehicle.
+struct MappingSignal {
+  double missing_share = 0.0;
+  double new_share = 0.0;
+  bool is_needed = false;  ///< `mapping_needed`.
+};
+
 /// What the chain published on a drive, and the truth.
 struct ChainRun {
   std::vector<metrics::StampedPose> truth;          ///< `world`, at the truth's own rate.
@@ -45,9 +52,8 @@ struct ChainRun {
   double simulated_s = 0.0;
   std::map<model::LandmarkId, model::LandmarkExistence> existence;  ///< As told last.
   std::vector<model::ExistenceState> existence_states;
-  double missing_share = 0.0;  ///< Of the last EXISTENCE.
-  bool is_mapping_needed = false;
-  FalseDetectionCounts false_detections;  ///< Where the options put some in.
+  std::vector<MappingSignal> mapping_signals;  ///< Of each EXISTENCE.
+  FalseDetectionCounts false_detections;       ///< Where the options put some in.
   std::map<std::string, ServiceTime> times;
   std::map<std::string, health_t> health;
 };

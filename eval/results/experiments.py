@@ -116,6 +116,7 @@ EXPERIMENTS = (
           25, ("tree_maps", "stem_censuses", "pole_maps", "victoria_park_raw")),
     _eval("existence", "existence --runs 40 --seed 1 --jobs 2 --data DATA", 4, ("stem_censuses", "tree_existence")),
     _eval("existence-drives", "existence-drives --runs 4 --seed 1 --jobs 2", 8),
+    _eval("existence-needed", "existence-needed --runs 10 --seed 1 --jobs 2", 8),
     _eval("existence-census", "existence-census --seed 1 --jobs 2 --data DATA", 15, ("stem_censuses", "tree_existence")),
     _eval("existence-camera", "existence-camera --runs 3 --seed 1 --jobs 2", 6),
     _eval("partition", f"partition {TOWN} {SUBMAP_SIZES}", 12),

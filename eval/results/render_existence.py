@@ -141,6 +141,25 @@ def _census_control(groups):
     return head, [line(key, methods) for key, methods in groups.items()]
 
 
+def existence_needed(document):
+    """What drives in an old map say of it, by what happened since; then how well that tells change."""
+    drives = {}
+    for row in document["rows"]:
+        if row["part"] == "drive":
+            drives.setdefault(row["setting"], []).append(row)
+    mean = lambda some, key: number(sum(row[key] for row in some) / len(some))
+    span = lambda some, key: f"{mean(some, key)} ({number(min(row[key] for row in some))}-{number(max(row[key] for row in some))})"
+    lines = table(("since the first drive", "drives", "missing_share, most", "new_share, most", "sum, most", "drives that asked",
+                   "keyframes that asked %"),
+                  [(setting, len(some), span(some, "missing"), span(some, "new"), span(some, "sum"),
+                    f"{sum(row['needed_pct'] > 0 for row in some)} of {len(some)}", mean(some, "needed_pct"))
+                   for setting, some in drives.items()])
+    areas = [row for row in document["rows"] if row["part"] == "area"]
+    return lines + ["", *table(("trees changed %", "against drives with false detections", "signal", "AUC", "changed / unchanged drives"),
+                               [(number(row["changed_pct"], 0), "yes" if row["has_false"] else "no", row["signal"], f"{number(row['auc'], 3)} +- {number(row['auc_half95'], 3)}",
+                                 f"{number(row['changed_drives'], 0)} / {number(row['unchanged_drives'], 0)}") for row in areas])]
+
+
 def existence_camera(document):
     """A camera in culled maps: the references and our methods in short, all rows folded; signals that mapping is needed."""
     rows = [row for row in document["rows"] if row["part"] == "culling"]

@@ -68,6 +68,7 @@ SECTIONS = (
      render_places.loop_detectors),
     ("existence", "What is still there", None, render_existence.existence),
     ("existence-drives", "A forest that changes, from raw LIDAR", None, render_existence.existence_drives),
+    ("existence-needed", "When to map again, from raw LIDAR", None, render_existence.existence_needed),
     ("existence-census", "Big Woods at both censuses, through the processes", None, render_existence.existence_census),
     ("existence-camera", "A camera that comes back to an old map", None, render_existence.existence_camera),
     ("partition", "The map cut after a distance: town", f"{PARTITION}, Table 5.1", render_partition.partition_all),

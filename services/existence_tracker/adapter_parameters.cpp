@@ -74,11 +74,10 @@ void describe(NeedParameters& p, bus::ParameterTable& table) {
             "Path over which it is judged whether the map still tells where the vehicle is.");
   table.add("need.min_landmarks", p.min_landmarks, {1, 100000}, "",
             "With fewer landmarks nothing is said.");
-  table.add("need.missing_above", p.missing_above, {0.0, 1.0}, "",
-            "Share of landmarks that were not seen, beyond what the detector misses anyhow, above "
-            "which mapping is needed.");
-  table.add("need.new_above", p.new_above, {0.0, 1.0}, "",
-            "Share of seen landmarks that are new to the map above which mapping is needed.");
+  table.add("need.changed_above", p.changed_above, {0.0, 2.0}, "",
+            "Mapping is needed where the share of landmarks that were not seen, beyond what the "
+            "detector misses anyhow, and the share of seen ones that are new to the map are more "
+            "than this together.");
 }
 
 void describe(OutputParameters& p, bus::ParameterTable& table) {

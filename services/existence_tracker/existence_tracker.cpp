@@ -146,8 +146,9 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
   TrackedPoint& tracked = known(id, update.utime);
   judge(id, tracked);
   change(id, tracked);
-  const bool is_old = tracked.told_probability >= 0.0 && tracked.is_in_use;
   pass_time(update.utime, tracked);
+  const double before = tracked.point.probability();
+  const bool was_in_use = tracked.is_in_use;
   look->goes_on = goes_on(tracked, update.utime);
   if (!look->goes_on) {
     count_false(tracked);
@@ -164,11 +165,16 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
     counters_.clear += ray == existence::Ray::kPassed ? 1 : 0;
   }
   make_due(id, tracked);
-  const bool could_see = ray != existence::Ray::kBlocked;
-  if (is_hit || (is_old && could_see)) need_.look(id, is_hit, is_old, along_m_);
   if (ray == existence::Ray::kBlocked) take_back(tracked);
   decide(tracked);
   touched_.push_back(id);
+
+  // What is known to be gone, or was hidden, is not missing; what is not used yet is not new.
+  if (tracked.is_first_pass && along_m_ - tracked.pass_began_m < parameters_.need.window_m) {
+    need_.look_at_new(id, is_hit, tracked.is_in_use ? tracked.point.probability() : 0.0, along_m_);
+  } else if (is_hit || (was_in_use && ray != existence::Ray::kBlocked)) {
+    need_.look_for(id, is_hit, before, along_m_);
+  }
 }
 
 /// Whether the landmark's pass goes on: one in view where the vehicle's pass ends is not looked at
@@ -297,8 +303,8 @@ model::Existence ExistenceTracker::tell(const model::MapUpdate& update) {
   const double usual = model_.learned().before;
   existence.missing_share = need_.missing_share(usual > 0.0 ? usual : model_.recall().of_pass());
   existence.new_share = need_.new_share();
-  existence.is_mapping_needed = existence.missing_share > parameters_.need.missing_above ||
-                                existence.new_share > parameters_.need.new_above;
+  existence.is_mapping_needed =
+      existence.missing_share + existence.new_share > parameters_.need.changed_above;
 
   for (const model::LandmarkId id : ids_to_tell()) {
     TrackedPoint& tracked = points_.at(id);

@@ -10,11 +10,20 @@ constexpr int kLooks = 3;
 
 }  // namespace
 
-void MappingNeed::look(model::LandmarkId id, bool is_hit, bool is_old, double along_m) {
-  Looked& one = seen_.try_emplace(id, Looked{along_m, 0, false, is_old}).first->second;
+void MappingNeed::look_for(model::LandmarkId id, bool is_hit, double probability, double along_m) {
+  Looked& one = seen_.try_emplace(id, Looked{along_m, probability, 0, false, true}).first->second;
   one.along_m = along_m;
   ++one.looks;
   one.was_hit = one.was_hit || is_hit;
+}
+
+void MappingNeed::look_at_new(model::LandmarkId id, bool is_hit, double probability,
+                              double along_m) {
+  if (!is_hit && !seen_.contains(id)) return;
+  Looked& one = seen_.try_emplace(id, Looked{along_m, probability, 0, true, false}).first->second;
+  one.along_m = along_m;
+  ++one.looks;
+  if (!one.is_old) one.probability = probability;
 }
 
 void MappingNeed::drive_to(double along_m) {
@@ -25,27 +34,29 @@ void MappingNeed::drive_to(double along_m) {
 
 double MappingNeed::missing_share(double recall) const {
   int looked_for = 0;
-  int missed = 0;
+  double there = 0.0;
+  double missed = 0.0;
   for (const auto& [id, one] : seen_) {
     if (!one.is_old || (!one.was_hit && one.looks < kLooks)) continue;
     ++looked_for;
-    if (!one.was_hit) ++missed;
+    there += one.probability;
+    if (!one.was_hit) missed += one.probability;
   }
-  if (looked_for < parameters_.min_landmarks) return 0.0;
-  const double share = static_cast<double>(missed) / looked_for;
-  return std::clamp(1.0 - (1.0 - share) / std::max(0.05, recall), 0.0, 1.0);
+  if (looked_for < parameters_.min_landmarks || there <= 0.0) return 0.0;
+  return std::clamp(1.0 - (1.0 - missed / there) / std::max(0.05, recall), 0.0, 1.0);
 }
 
 double MappingNeed::new_share() const {
   int seen = 0;
-  int fresh = 0;
+  double old = 0.0;
+  double fresh = 0.0;
   for (const auto& [id, one] : seen_) {
     if (!one.was_hit) continue;
     ++seen;
-    if (!one.is_old) ++fresh;
+    (one.is_old ? old : fresh) += one.is_old ? 1.0 : one.probability;
   }
-  if (seen < parameters_.min_landmarks) return 0.0;
-  return static_cast<double>(fresh) / seen;
+  if (seen < parameters_.min_landmarks || old + fresh <= 0.0) return 0.0;
+  return fresh / (old + fresh);
 }
 
 }  // namespace understory::existence_tracker

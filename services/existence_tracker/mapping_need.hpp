@@ -12,14 +12,19 @@ namespace understory::existence_tracker {
 /// What a drive shows of its map on the last metres of path. The question of the thesis (003 §1.7,
 /// when mapping should be switched on again) has two sides: landmarks that should have been seen
 /// and were not, beyond what the detector misses anyhow, and what is seen and is not in the map.
+/// Each landmark counts for the probability that it is one: false detections are neither missing
+/// nor new.
 class MappingNeed {
  public:
-  /// Nothing was driven. `parameters` gives all but the thresholds.
+  /// Nothing was driven. `parameters` gives all but the threshold.
   explicit MappingNeed(const NeedParameters& parameters = {}) : parameters_(parameters) {}
 
-  /// A look at a landmark of the map at this path of the vehicle [m]. `is_old`: it was in the map
-  /// before the window began to see it.
-  void look(model::LandmarkId id, bool is_hit, bool is_old, double along_m);
+  /// A look at a landmark that the map had, at this path of the vehicle [m]; `probability` that it
+  /// existed before the look. One that the window saw as new stays new.
+  void look_for(model::LandmarkId id, bool is_hit, double probability, double along_m);
+  /// One that the window has brought; `probability` that it is a landmark, 0 where it is not used
+  /// yet. It counts from the second time on that it is seen.
+  void look_at_new(model::LandmarkId id, bool is_hit, double probability, double along_m);
   /// Forgets what lies behind. O(landmarks around).
   void drive_to(double along_m);
 
@@ -37,14 +42,15 @@ class MappingNeed {
 
  private:
   struct Looked {
-    double along_m = 0.0;  ///< At the last look.
+    double along_m = 0.0;      ///< At the last look.
+    double probability = 0.0;  ///< Of an old one before the first look, of a new one now.
     int looks = 0;
     bool was_hit = false;
     bool is_old = false;
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& s) {
-      a(s.along_m, s.looks, s.was_hit, s.is_old);
+      a(s.along_m, s.probability, s.looks, s.was_hit, s.is_old);
     }
   };
   NeedParameters parameters_;

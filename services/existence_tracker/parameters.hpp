@@ -36,8 +36,7 @@ struct LookParameters {
 struct NeedParameters {
   double window_m = 60.0;  ///< Path.
   int min_landmarks = 10;
-  double missing_above = 0.4;  ///< Share.
-  double new_above = 0.4;      ///< Share.
+  double changed_above = 0.3;  ///< Sum of two shares.
 };
 
 /// What is told, and how often.

@@ -1,4 +1,5 @@
 // The experiment on existence: scores by hand, peers against brute force, worlds.
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <string>
@@ -33,6 +34,28 @@ TEST_CASE("Scores of existence by hand", "[existence]") {
   CHECK(removed_share(points, false) == Approx(0.5));
   CHECK(removed_share(points, true) == Approx(0.0));
   CHECK(roc_area({{0.5, true}}) == 1.0);
+}
+
+TEST_CASE("The sigma of an area is that of many draws", "[existence]") {
+  // Scores of two exponentials: what Hanley and McNeil's formula is exact for.
+  const double faster = 4.0;
+  const int gone = 20, there = 30, draws = 4000;
+  std::mt19937_64 random(5);
+  std::exponential_distribution<double> slow(1.0), fast(faster);
+  double sum = 0.0, squares = 0.0;
+  for (int i = 0; i < draws; ++i) {
+    std::vector<ScoredPoint> points;
+    for (int k = 0; k < gone; ++k) points.push_back({-slow(random), false});
+    for (int k = 0; k < there; ++k) points.push_back({-fast(random), true});
+    const double area = roc_area(points);
+    sum += area;
+    squares += area * area;
+  }
+
+  const double mean = sum / draws;
+  CHECK(mean == Approx(faster / (1.0 + faster)).margin(0.005));
+  CHECK(sigma_of_area(mean, gone, there) ==
+        Approx(std::sqrt(squares / draws - mean * mean)).epsilon(0.05));
 }
 
 TEST_CASE("The persistence filter is Bayes' rule over the time of going", "[existence]") {
@@ -128,6 +151,15 @@ TEST_CASE("Worlds follow from their seed, and the ideal knows them", "[existence
     if (kind.name == "ideal") CHECK(area == 1.0);
     if (kind.name == "icosahedral") CHECK(area > 0.95);
   }
+}
+
+TEST_CASE("The lorry beside a clear-cut hides all that it should", "[existence]") {
+  const History history = make_clear_cut({}, 3);
+  const std::vector<PointTruth>& truth = history.drives.back().truth;
+  const auto hidden = [&](const PointTruth& point) { return point.is_hidden; };
+  CHECK(std::count_if(truth.begin() + 50, truth.begin() + 70, hidden) == 20);
+  CHECK(std::none_of(truth.begin(), truth.begin() + 50,
+                     [](const PointTruth& point) { return point.exists; }));
 }
 
 TEST_CASE("Censuses and mortality are read", "[existence]") {

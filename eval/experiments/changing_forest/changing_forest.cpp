@@ -159,8 +159,7 @@ DriveScore score_of(const harness::ChainRun& run, const changes::ChangingForest&
   score.drive = drive;
   score.stored = run.landmarks.size();
   score.ate_m = harness::trajectory_error(run.slam, run.truth).ate_rms_m;
-  score.missing_share = run.missing_share;
-  score.mapping_needed = run.is_mapping_needed;
+  score.signals = run.mapping_signals;
   const harness::FalseDetectionCounts& counts = run.false_detections;
   if (counts.detections > 0)
     score.false_share = static_cast<double>(counts.clutter + counts.of_things) /

@@ -74,8 +74,7 @@ struct DriveScore {
   std::size_t felled_hidden_unused = 0;  ///< ... and that are out of use all the same.
   double false_share = 0.0;              ///< Of the detections of the drive.
   double ate_m = 0.0;
-  double missing_share = 0.0;  ///< As EXISTENCE states at the end.
-  bool mapping_needed = false;
+  std::vector<harness::MappingSignal> signals;  ///< As EXISTENCE states, keyframe by keyframe.
   DriveMap map;
 };
 

@@ -63,6 +63,8 @@ std::vector<Variant> variants_of(const std::string& part) {
 }
 
 nlohmann::json row_of(std::uint64_t seed, const Variant& variant, const DriveScore& score) {
+  const harness::MappingSignal last =
+      score.signals.empty() ? harness::MappingSignal{} : score.signals.back();
   return {{"run_seed", seed},
           {"part", name_of(variant.part)},
           {"keeping", name_of(variant.keeping)},
@@ -82,8 +84,8 @@ nlohmann::json row_of(std::uint64_t seed, const Variant& variant, const DriveSco
           {"felled_hidden_unused", score.felled_hidden_unused},
           {"wrongly_unused", score.wrongly_unused},
           {"ate_m", score.ate_m},
-          {"missing_share", score.missing_share},
-          {"mapping_needed", score.mapping_needed}};
+          {"missing_share", last.missing_share},
+          {"mapping_needed", last.is_needed}};
 }
 
 nlohmann::json point_of(const Eigen::Vector2d& point_m) {

@@ -49,6 +49,14 @@ double roc_area(std::vector<ScoredPoint> points) {
   return area / sum.gone / sum.there;
 }
 
+double sigma_of_area(double area, double gone, double there) {
+  const double q1 = area / (2.0 - area), q2 = 2.0 * area * area / (1.0 + area);
+  const double variance = (area * (1.0 - area) + (gone - 1.0) * (q1 - area * area) +
+                           (there - 1.0) * (q2 - area * area)) /
+                          (gone * there);
+  return std::sqrt(std::max(0.0, variance));
+}
+
 double average_precision(std::vector<ScoredPoint> points) {
   const std::vector<Tie> ties = ties_of(points);
   const Tie sum = sum_of(ties);

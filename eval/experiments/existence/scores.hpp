@@ -23,6 +23,9 @@ struct ReliabilityBin {
 /// Area under the ROC of "gone": probability that a gone point has a lower P than one that is
 /// there; ties count half. 1 where one kind is missing.
 double roc_area(std::vector<ScoredPoint> points);
+/// Standard deviation of such an area (Hanley & McNeil, Radiology 143, 1982) from so many that are
+/// gone and that are there.
+double sigma_of_area(double area, double gone, double there);
 /// Average precision of "gone", lowest P first; points with the same P together.
 double average_precision(std::vector<ScoredPoint> points);
 /// Mean squared error of the probabilities.

@@ -138,7 +138,7 @@ History make_clear_cut(const WorldSetting& setting, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   History history = begin_history(setting);
   scatter(history, 50, {0.0F, 5.0F}, {24.0F, 17.0F}, random);     // felled
-  scatter(history, 20, {30.0F, 7.0F}, {40.0F, 12.0F}, random);    // behind the lorry
+  scatter(history, 20, {31.5F, 9.0F}, {38.5F, 10.0F}, random);    // behind the lorry
   scatter(history, 130, {-40.0F, 5.0F}, {-2.0F, 25.0F}, random);  // the rest of the forest
   history.gone_share = 0.25;
   Observer observer(setting, history.points_m, random);
@@ -149,7 +149,7 @@ History make_clear_cut(const WorldSetting& setting, std::uint64_t seed) {
 
   std::fill_n(exists.begin(), 50, false);
   const auto past = line({-45.0F, 0.0F, 1.5F}, {60.0F, 0.0F, 1.5F}, setting.scan_every_m);
-  const std::vector<Segment> lorry{{{24.5F, 2.5F}, {45.5F, 2.5F}}};
+  const std::vector<Segment> lorry{{{26.5F, 8.5F}, {43.5F, 8.5F}}};
   history.drives.push_back(observer.drive((1.0 + setting.gap_days) * kDay_s, past, lorry, exists));
   return history;
 }

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <optional>
 #include <set>
 
@@ -48,15 +47,6 @@ std::vector<ScoredPoint> drives_of(const std::vector<CaseResult>& cases, const S
         drives.push_back({-kind.value(one.signals[k]), !is_changed});
   }
   return drives;
-}
-
-/// Standard deviation of an area (Hanley & McNeil 1982).
-double sigma_of_area(double area, double changed, double unchanged) {
-  const double q1 = area / (2.0 - area), q2 = 2.0 * area * area / (1.0 + area);
-  const double variance = (area * (1.0 - area) + (changed - 1.0) * (q1 - area * area) +
-                           (unchanged - 1.0) * (q2 - area * area)) /
-                          (changed * unchanged);
-  return std::sqrt(std::max(0.0, variance));
 }
 
 struct MeanSignal {
