@@ -18,6 +18,11 @@ MessageClock::Verdict MessageClock::take(std::int64_t utime, const ChannelPace& 
   const std::int64_t paced_us = kIntervals * std::min(pace.interval_us, kLongestInterval_us);
   const bool is_near = utime <= now_ ? now_ - utime <= largest_jump_us_
                                      : utime - now_ <= std::max(largest_jump_us_, paced_us);
+  // A slow channel that goes on at its pace proves those that have waited where it is now.
+  if (now_ >= 0 && is_near && utime - now_ > largest_jump_us_ && agrees(utime)) {
+    resume(utime);
+    return Verdict::kJumped;
+  }
   if (now_ < 0 || is_near) {
     // Time goes on from where it was: what waited was wrong.
     if (utime > now_) agreeing_ = 0;

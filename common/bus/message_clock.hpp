@@ -35,7 +35,8 @@ class MessageClock {
     kFine,         ///< Believed.
     kQuarantined,  ///< Waits for proof; the ones that waited before it were wrong.
     kAgrees,       ///< Waits, too, and speaks for those that wait.
-    kJumped,       ///< Three in a row agreed: all are believed, and now() is this one.
+    kJumped,  ///< Three in a row agreed, or one at its channel's pace: all are believed, and now()
+              ///< is this one.
   };
 
   /// `largest_jump_us`: a stamp farther than this from now() needs proof.
