@@ -128,6 +128,7 @@ void run_needs(const NeedCommand& options) {
                               {"length_m", options.drives.forest.course.length_m},
                               {"stack_m", options.drives.stack_m}};
   harness::write_json(options.json, harness::result_document("existence-needed", config, rows));
+  harness::plot("existence_needed.py", {options.json});
 }
 
 }  // namespace
