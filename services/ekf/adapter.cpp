@@ -32,6 +32,9 @@ class EkfAdapter : public bus::Adapter {
     node.subscribe<model::TrackedScan>(channels_.tracked_landmarks,
                                        [this](const model::TrackedScan& scan) { add(scan); },
                                        {.queue_size = 200, .most_bytes = most_bytes()});
+    node.subscribe<model::RawPose>(channels_.raw_pose,
+                                   [this](const model::RawPose& pose) { stage_->add(pose); },
+                                   {.queue_size = 2000});
     poses_ = node.advertise<model::EkfPose>(channels_.pose);
     maps_ = node.advertise<model::EkfMap>(channels_.map);
     levels_ = node.advertise<model::EkfLevel>(channels_.level);
@@ -97,8 +100,9 @@ class EkfAdapter : public bus::Adapter {
 
 bus::Service ekf_service(const EkfChannels& channels) {
   return {"ekf",
-          channels.odometry + ", " + channels.tracked_landmarks + " -> " + channels.pose + ", " +
-              channels.map + ", " + channels.level + ", " + channels.velocity_correction,
+          channels.odometry + ", " + channels.tracked_landmarks + ", " + channels.raw_pose +
+              " -> " + channels.pose + ", " + channels.map + ", " + channels.level + ", " +
+              channels.velocity_correction,
           [channels] { return std::make_unique<EkfAdapter>(channels); }};
 }
 

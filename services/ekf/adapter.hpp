@@ -11,6 +11,7 @@ namespace understory::ekf {
 struct EkfChannels {
   std::string odometry = "ODOMETRY";
   std::string tracked_landmarks = "TRACKED_LANDMARKS";
+  std::string raw_pose = "RAW_POSE";
   std::string pose = "EKF_POSE";
   std::string map = "EKF_MAP";
   std::string level = "EKF_LEVEL";

@@ -16,7 +16,7 @@
 namespace understory::ekf {
 namespace {
 
-constexpr state::Format kFormat{"ekf", 7};
+constexpr state::Format kFormat{"ekf", 8};
 /// Variance of the first pose, by definition the map's origin; above zero for the factorisations.
 constexpr double kStartVariance = 1e-12;
 /// Searches for lost landmarks per scan.
@@ -110,6 +110,8 @@ EkfOutput Ekf::add(const model::Odometry& increment) {
   }
   return output;
 }
+
+void Ekf::add(const model::RawPose& pose) { reckoned_.add(pose); }
 
 EkfOutput Ekf::add(const model::TrackedScan& scan) {
   ++counters_.scans;
@@ -254,13 +256,26 @@ void Ekf::bridge(model::Utime utime) {
   remove_ground_marks(state_);  // The vehicle may have moved and stopped elsewhere.
   const double duration = seconds(utime - timeline_.now());
   const std::string reason = fmt::format("nothing came for {:.2f} s", duration);
+
+  // Dead reckoning may have gone on.
+  if (const auto motion = reckoned_.between(timeline_.now(), utime)) {
+    motion_.bridge(*motion, duration, state_, scratch_.low_rank);
+    timeline_.move_to(utime);
+    state_.follow_with_anchor();
+    return announce_gap(duration, reason);
+  }
+
   if (duration > parameters_.restart.max_gap_s) return restart(utime, reason, duration);
   motion_.bridge(duration, state_, scratch_.low_rank);
   timeline_.move_to(utime);
 
   const bool has_map = state_.landmarks().size() >= kFewShowPlace;
   if (has_map && parameters_.motion.gap_yaw_rate * duration > kAdrift_rad) doubt_.is_adrift = true;
-  if (duration <= parameters_.restart.announced_gap_s) return;
+  announce_gap(duration, reason);
+}
+
+void Ekf::announce_gap(double duration_s, const std::string& reason) {
+  if (duration_s <= parameters_.restart.announced_gap_s) return;
   ++counters_.restarts;
   counters_.last_reason = reason;
   report_.count_restart();
@@ -385,14 +400,14 @@ void Ekf::maintain_map(const model::TrackedScan& scan, const ScanUpdate& update)
 }
 
 std::string Ekf::save() const {
-  return state::save(kFormat, timeline_, queue_, motion_, stationary_, map_, report_, doubt_,
-                     state_);
+  return state::save(kFormat, timeline_, queue_, motion_, reckoned_, stationary_, map_, report_,
+                     doubt_, state_);
 }
 
 void Ekf::load(const std::string& state) {
   Ekf loaded(parameters_);
-  state::load(state, kFormat, loaded.timeline_, loaded.queue_, loaded.motion_, loaded.stationary_,
-              loaded.map_, loaded.report_, loaded.doubt_, loaded.state_);
+  state::load(state, kFormat, loaded.timeline_, loaded.queue_, loaded.motion_, loaded.reckoned_,
+              loaded.stationary_, loaded.map_, loaded.report_, loaded.doubt_, loaded.state_);
   loaded.counters_ = counters_;  // Of this process, not of the one that saved.
   *this = std::move(loaded);
 }

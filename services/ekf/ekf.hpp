@@ -16,6 +16,7 @@
 #include "services/ekf/gates.hpp"
 #include "services/ekf/odometry_queue.hpp"
 #include "services/ekf/parameters.hpp"
+#include "services/ekf/reckoned_track.hpp"
 #include "services/ekf/scan_update.hpp"
 #include "services/ekf/stationary_monitor.hpp"
 #include "services/ekf/timeline.hpp"
@@ -33,6 +34,8 @@ class Ekf {
   /// Odometry waits for the scan at its end; without one it is used after `max_scan_delay_s`, and a
   /// pose is given then. Late, overlapping and broken increments are refused and counted.
   EkfOutput add(const model::Odometry& increment);
+  /// Dead reckoning, which tells the motion over an interval of which no odometry came.
+  void add(const model::RawPose& pose);
   /// Pose, map and velocity correction at the scan's stamp; nothing from a late or repeated scan,
   /// nor before the map begins (EkfPriorParameters::wait_s).
   EkfOutput add(const model::TrackedScan& scan);
@@ -73,6 +76,7 @@ class Ekf {
   void advance(model::Utime utime);
   void use(const model::Odometry& increment);
   void bridge(model::Utime utime);
+  void announce_gap(double duration_s, const std::string& reason);
 
   // One scan.
   ScanUpdate read(const model::TrackedScan& scan);
@@ -89,6 +93,7 @@ class Ekf {
   Timeline timeline_;
   OdometryQueue queue_;
   VehicleMotion motion_;
+  ReckonedTrack reckoned_;
   StationaryMonitor stationary_;
   ActiveMap map_;
   EkfReport report_;

@@ -22,6 +22,8 @@ Change change(const FilterState& state, const Transition& t, const Eigen::Vector
           t.velocity - state.first_velocity};
 }
 
+/// Of the velocity that two poses of dead reckoning show, per axis [m/s].
+constexpr double kReckonedVelocity_mps = 0.3;
 constexpr double kGravity = 9.81;  // [m/s^2], as common/model/imu.hpp has it
 
 /// Horizontal part of gravity by a level error of (roll, pitch) [m/s^2/rad].
@@ -208,6 +210,22 @@ Transition transition_by(const FilterState& state, const geometry::SE2WithCovari
   t.noise.block<2, 1>(3, 0) = motion.covariance.block<2, 1>(0, 2);
   t.noise.block<2, 1>(1, 0) = motion.covariance.block<2, 1>(0, 2) / seconds;
   t.noise.row(0).tail<4>() = t.noise.col(0).tail<4>().transpose();
+  return t;
+}
+
+Transition transition_over_gap(const FilterState& state, const ReckonedMotion& motion,
+                               double seconds, const EkfMotionParameters& parameters) {
+  Transition t = transition_by(state, motion.from_T_to, seconds, parameters);
+
+  // The velocity is that at the end, not the mean one.
+  t.velocity = rotation_of(t.heading) * motion.velocity_mps;
+  const Eigen::Vector2d v = geometry::perpendicular(t.velocity) - state.lever(t.velocity);
+  t.error.block<2, 1>(kVelocity, kHeading) = v;
+  t.noise_input.block<2, 1>(kVelocity, 0) = v;
+  t.noise.middleRows<2>(1).setZero();
+  t.noise.middleCols<2>(1).setZero();
+  t.noise.block<2, 2>(1, 1) =
+      kReckonedVelocity_mps * kReckonedVelocity_mps * Eigen::Matrix2d::Identity();
   return t;
 }
 

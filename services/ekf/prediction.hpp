@@ -5,6 +5,7 @@
 #include "services/ekf/filter_state.hpp"
 #include "services/ekf/low_rank.hpp"
 #include "services/ekf/parameters.hpp"
+#include "services/ekf/reckoned_track.hpp"
 
 namespace understory::ekf {
 
@@ -42,6 +43,10 @@ Transition transition_by(const FilterState& state, const geometry::SE2WithCovari
 /// heading.
 Transition transition_over_gap(const FilterState& state, double seconds,
                                const EkfMotionParameters& parameters);
+
+/// Over `seconds` of which dead reckoning alone knows the motion.
+Transition transition_over_gap(const FilterState& state, const ReckonedMotion& motion,
+                               double seconds, const EkfMotionParameters& parameters);
 
 /// Displacement measured by wheels during a transition by IMU, axes of the vehicle at its start.
 struct MeasuredMotion {

@@ -35,6 +35,15 @@ void VehicleMotion::bridge(double duration_s, FilterState& state, LowRank& low_r
   loosen(duration_s, state, low_rank);
 }
 
+void VehicleMotion::bridge(const ReckonedMotion& motion, double duration_s, FilterState& state,
+                           LowRank& low_rank) {
+  distance_m_ += motion.from_T_to.mean.translation().norm();
+  Transition t = transition_over_gap(state, motion, duration_s, parameters_);
+  // How the level's error went on is unknown: it may be another one.
+  if (level_covariance_) t.level_added = *level_covariance_;
+  ekf::predict(state, t, parameters_, low_rank);
+}
+
 void VehicleMotion::loosen(double duration_s, FilterState& state, LowRank& low_rank) const {
   ekf::predict(state, transition_over_gap(state, duration_s, parameters_), parameters_, low_rank);
 }

@@ -7,6 +7,7 @@
 #include "services/ekf/filter_state.hpp"
 #include "services/ekf/low_rank.hpp"
 #include "services/ekf/parameters.hpp"
+#include "services/ekf/reckoned_track.hpp"
 
 namespace understory::ekf {
 
@@ -20,6 +21,9 @@ class VehicleMotion {
                LowRank& low_rank);
   /// Predicts `state` over `duration_s` without odometry, and counts the distance.
   void bridge(double duration_s, FilterState& state, LowRank& low_rank);
+  /// The same where dead reckoning knows the motion.
+  void bridge(const ReckonedMotion& motion, double duration_s, FilterState& state,
+              LowRank& low_rank);
   /// The same without distance: a stationary vehicle may have moved unnoticed for so long.
   void loosen(double duration_s, FilterState& state, LowRank& low_rank) const;
   /// The next odometry with an IMU sets the level's first uncertainty (after a restart).

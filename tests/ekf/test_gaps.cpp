@@ -1,5 +1,6 @@
 // The filter after an interval of which it knows nothing: its own pause, or that of who feeds it.
 #include <cmath>
+#include <random>
 
 #include "tests/catch.hpp"
 #include "tests/ekf/ekf_drive.hpp"
@@ -33,6 +34,34 @@ struct AfterGap {
 Eigen::Vector2d error_of(const model::EkfPose& pose, const geometry::SE2& truth) {
   return pose.ekf_map_T_vehicle.translation() - truth.translation();
 }
+
+/// Dead reckoning beside a drive: truth with errors that add up and that it states.
+class Reckoning {
+ public:
+  Reckoning(const Driven& run, std::uint64_t seed)
+      : random_(seed), world_T_vehicle_(run.step.world_T_vehicle) {}
+
+  model::RawPose go_to(const sim::DriveStep& step) {
+    const geometry::SE2 moved = world_T_vehicle_.inverse() * step.world_T_vehicle;
+    world_T_vehicle_ = step.world_T_vehicle;
+    const Eigen::Vector3d sigma(0.01, 0.01, 0.001);
+    const Eigen::Vector3d noise(normal_(random_), normal_(random_), normal_(random_));
+    const geometry::SE2 measured = moved * geometry::SE2::Exp(sigma.cwiseProduct(noise));
+    reckoned_ = geometry::compound(reckoned_, {measured, sigma.cwiseAbs2().asDiagonal()});
+
+    model::RawPose pose;
+    pose.utime = step.scan.utime;
+    pose.odom_T_vehicle = reckoned_.mean;
+    pose.covariance = reckoned_.covariance;
+    return pose;
+  }
+
+ private:
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+  geometry::SE2 world_T_vehicle_;
+  geometry::SE2WithCovariance reckoned_{{3.0, -2.0, 0.4}, Eigen::Matrix3d::Zero()};
+};
 
 AfterGap drive_over(const Gap& gap, std::uint64_t seed) {
   sim::InertialDriveParameters parameters = short_drive();
@@ -108,4 +137,46 @@ TEST_CASE("After a long gap the pose is as uncertain as it says, and says so", "
   }
   WARN(within << " of " << trials << " within 3 sigma, worst NEES " << worst);
   CHECK(within >= 0.99 * trials);
+}
+
+TEST_CASE("Over a gap in which dead reckoning goes on the filter keeps its place", "[ekf][gap]") {
+  double worst_nees = 0.0;
+  double sum_nees = 0.0;
+  int trials = 0;
+  for (std::uint64_t seed = kFirstSeed; seed < kFirstSeed + 20; ++seed) {
+    for (const double gap_s : {1.1, 3.0, 6.0, 30.0}) {
+      sim::InertialDriveParameters parameters = short_drive();
+      parameters.range_m = 25.0;
+      if (seed % 3 != 0) parameters.odometry = sim::OdometryKind::kInertialAndWheels;
+      Driven run(10.0, parameters, {}, seed);
+      Reckoning reckoning(run, seed);
+      const auto go = [&](model::TrackId ids) {
+        run.step = run.drive.next();
+        run.filter.add(reckoning.go_to(run.step));
+        for (const model::Odometry& increment : run.step.odometry) run.filter.add(increment);
+        return *run.filter.add(true_tracks(run.step, ids)).pose;
+      };
+      for (int k = 0; k < 20; ++k) go(1);
+      const std::uint64_t resets = go(1).reset_counter;
+
+      for (int k = 0; k < static_cast<int>(10.0 * gap_s); ++k) {
+        run.step = run.drive.next();
+        reckoning.go_to(run.step);
+      }
+      // Its first pose after the gap is beside the odometry that begins there.
+      run.filter.add(reckoning.go_to(run.step = run.drive.next()));
+      const model::EkfPose pose = go(seed % 2 == 0 ? 1 : 1'000'000);
+      const double nees = test::nees(pose, run.truth());
+      const double error_m = error_of(pose, run.truth()).norm();
+      CAPTURE(seed, gap_s, nees, error_m, pose.covariance);
+      CHECK(error_m < (gap_s > 10.0 ? 5.0 : 0.5));
+      CHECK(pose.reset_counter - resets == (gap_s > 1.5 ? 1 : 0));
+      worst_nees = std::max(worst_nees, nees);
+      sum_nees += nees;
+      ++trials;
+    }
+  }
+  WARN("mean NEES " << sum_nees / trials << ", worst " << worst_nees);
+  CHECK(worst_nees < kThreeSigma);
+  CHECK(sum_nees / trials < 3.5);
 }
