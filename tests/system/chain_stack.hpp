@@ -3,9 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <map>
 #include <set>
 
 #include "common/bus/split_bus.hpp"
+#include "common/geometry/decompositions.hpp"
 #include "common/io/lcm_log.hpp"
 #include "common/model/ekf_output.hpp"
 #include "tests/cli/run_command.hpp"
@@ -154,18 +156,32 @@ class ChainStack {
   launch::Ending ending_;
 };
 
-/// The largest position error [m] of poses, the first one held; -1 where there are none.
-template <class Pose, class PoseOf>
-double largest_error_m(const std::vector<Pose>& poses, const RecordedSensors& drive,
-                       PoseOf pose_of) {
-  std::optional<geometry::SE2> world_T_map;
-  double largest = -1.0;
+/// Position errors of poses [m], the first one of each frame held; -1 where there are none.
+struct LargestErrors {
+  double any_m = -1.0;
+  double unstated_m =
+      -1.0;  ///< Of those that are out of the 99.99 % ellipsoid of their covariance.
+};
+
+/// `pose_of`: a pose in its map; `frame_of`: which map that is.
+template <class Pose, class PoseOf, class FrameOf>
+LargestErrors largest_errors(const std::vector<Pose>& poses, const RecordedSensors& drive,
+                             PoseOf pose_of, FrameOf frame_of) {
+  constexpr double kOutside = 21.1;  // Of chi-squared, three degrees of freedom.
+  const Eigen::Matrix3d slack = 1e-6 * Eigen::Matrix3d::Identity();
+  std::map<std::uint32_t, geometry::SE2> world_T_maps;
+  LargestErrors largest;
   for (const Pose& one : poses) {
     const auto truth = drive.at(one.utime);
     if (!truth) continue;
-    if (!world_T_map) world_T_map = *truth * pose_of(one).inverse();
-    const geometry::SE2 estimate = *world_T_map * pose_of(one);
-    largest = std::max(largest, (estimate.translation() - truth->translation()).norm());
+    const geometry::SE2 world_T_map =
+        world_T_maps.try_emplace(frame_of(one), *truth * pose_of(one).inverse()).first->second;
+    const Eigen::Vector3d error = ((world_T_map * pose_of(one)).inverse() * *truth).Log();
+    const double error_m = error.head<2>().norm();
+    const Eigen::Matrix3d information = geometry::symmetric_inverse(one.covariance + slack);
+    largest.any_m = std::max(largest.any_m, error_m);
+    if (error.dot(information * error) > kOutside)
+      largest.unstated_m = std::max(largest.unstated_m, error_m);
   }
   return largest;
 }
