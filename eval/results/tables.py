@@ -224,6 +224,11 @@ def summary(documents):
         row = row_of_existence(documents["existence"], method)
         return f"{row['wrongly_removed_pct']:.1f} / {row['gone_removed_pct']:.0f} %"
 
+    def asked(is_wanted):
+        drives = [row for row in documents["existence-needed"]["rows"]
+                  if row["part"] == "drive" and "false" not in row["setting"] and is_wanted(row["changed_pct"])]
+        return f"{sum(row['needed_pct'] > 0 for row in drives)} of {len(drives)}"
+
     rows = [
         ("Forest, circle of 200 m, no odometry: error of poses / landmarks",
          f"{render.pair(circle, 'published_')} cm (GeoSLAM)",
@@ -248,8 +253,11 @@ def summary(documents):
         ("Big Woods at two censuses, five drives that each miss 36 %: standing stems removed / gone ones removed",
          f"{removed('persistence filter')} (persistence filter)", f"**{removed('icosahedral')}**, true rates known {removed('true rates')}",
          "`understory eval existence`"),
+        ("Forest driven again with its old map: drives that ask for mapping; nothing changed / a fifth / a third and more of the trees",
+         "none", f"**{asked(lambda pct: pct == 0)} / {asked(lambda pct: pct == 20)} / {asked(lambda pct: pct > 20)}**",
+         "`understory eval existence-needed`"),
     ]
-    used = [documents[name] for name in ("paths", "noise", "large-map", "victoria-park", "frontend-forest", "backend", "loops-blind", "existence")]
+    used = [documents[name] for name in ("paths", "noise", "large-map", "victoria-park", "frontend-forest", "backend", "loops-blind", "existence", "existence-needed")]
     versions = sorted({document["version"] for document in used})
     lines = render.table(("what", "best published", "here", "command"), rows) + [""]
     if len(versions) > 1 or versions[0].endswith("-dirty"):
