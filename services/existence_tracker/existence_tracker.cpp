@@ -169,10 +169,20 @@ void ExistenceTracker::look(model::LandmarkId id, bool is_hit, existence::Ray ra
   decide(tracked);
   touched_.push_back(id);
 
-  // What is known to be gone, or was hidden, is not missing; what is not used yet is not new.
-  if (tracked.is_first_pass && along_m_ - tracked.pass_began_m < parameters_.need.window_m) {
-    need_.look_at_new(id, is_hit, tracked.is_in_use ? tracked.point.probability() : 0.0, along_m_);
-  } else if (is_hit || (was_in_use && ray != existence::Ray::kBlocked)) {
+  // What is known to be gone, or was hidden, is not missing.
+  if (is_hit || (was_in_use && ray != existence::Ray::kBlocked))
+    count_need(id, tracked, is_hit, before);
+}
+
+/// `before`: P before the look. What is not used yet is not new.
+void ExistenceTracker::count_need(model::LandmarkId id, const TrackedPoint& tracked, bool is_hit,
+                                  double before) {
+  const bool is_new =
+      tracked.is_first_pass && along_m_ - tracked.pass_began_m < parameters_.need.window_m;
+  const double now = tracked.is_in_use ? tracked.point.probability() : 0.0;
+  if (is_new) {
+    need_.look_at_new(id, is_hit, now, along_m_);
+  } else {
     need_.look_for(id, is_hit, before, along_m_);
   }
 }

@@ -101,6 +101,7 @@ class ExistenceTracker {
   void pass_time(model::Utime utime, TrackedPoint& tracked) const;
   void drive_to(const model::MapUpdate& update);
   void look(model::LandmarkId id, bool is_hit, existence::Ray ray, const model::MapUpdate& update);
+  void count_need(model::LandmarkId id, const TrackedPoint& tracked, bool is_hit, double before);
   bool goes_on(TrackedPoint& tracked, model::Utime utime) const;
   TrackedPoint& known(model::LandmarkId id, model::Utime utime);
   void begin(model::LandmarkId id, TrackedPoint& tracked);
