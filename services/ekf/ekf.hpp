@@ -34,7 +34,7 @@ class Ekf {
   /// Odometry waits for the scan at its end; without one it is used after `max_scan_delay_s`, and a
   /// pose is given then. Late, overlapping and broken increments are refused and counted.
   EkfOutput add(const model::Odometry& increment);
-  /// Dead reckoning, which tells the motion over an interval of which no odometry came.
+  /// Dead reckoning, which gives the motion over an interval of which no odometry came.
   void add(const model::RawPose& pose);
   /// Pose, map and velocity correction at the scan's stamp; nothing from a late or repeated scan,
   /// nor before the map begins (EkfPriorParameters::wait_s).

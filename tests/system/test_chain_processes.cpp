@@ -25,17 +25,19 @@ LargestErrors ekf_errors(const ChainStack& stack, const RecordedSensors& drive) 
       [](const model::EkfPose&) { return 0U; });
 }
 
-/// No pose is farther off than this unless its covariance says so. On a busy computer a process is
-/// away for seconds, and where the input was nobody knows the motion.
+/// No pose is farther off than this. On a busy computer a process is away for seconds, and where
+/// the input was nobody knows the motion: then the jump is announced, and the covariance says so.
+template <class Pose>
+void check_errors(const std::vector<Pose>& poses, const LargestErrors& errors, double limit_m) {
+  CHECK(errors.any_m >= 0.0);
+  CHECK(errors.unstated_m < limit_m);
+  const bool is_announced = poses.front().reset_counter != poses.back().reset_counter;
+  if (!is_announced) CHECK(errors.any_m < limit_m);
+}
+
 void check_errors(const ChainStack& stack, const RecordedSensors& drive, double limit_m) {
-  const LargestErrors slam = slam_errors(stack, drive);
-  const LargestErrors ekf = ekf_errors(stack, drive);
-  CHECK(slam.any_m >= 0.0);
-  CHECK(ekf.any_m >= 0.0);
-  CHECK(slam.unstated_m < limit_m);
-  CHECK(ekf.unstated_m < limit_m);
-  CHECK_NOFAIL(slam.any_m < limit_m);
-  CHECK_NOFAIL(ekf.any_m < limit_m);
+  check_errors(stack.slam, slam_errors(stack, drive), limit_m);
+  check_errors(stack.ekf, ekf_errors(stack, drive), limit_m);
 }
 
 /// Whether every process has had all messages: none was lost on a busy computer.
@@ -79,11 +81,7 @@ TEST_CASE("lcm-logplayer drives the processes from raw sensors to the map", "[sy
 
   CAPTURE(stack.slam.size(), stack.ekf.size());
   CHECK(stack.slam.size() > 80);
-  check_errors(stack, drive, 0.05);
-  if (heard_all(stack)) {
-    CHECK(slam_errors(stack, drive).any_m < 0.05);
-    CHECK(ekf_errors(stack, drive).any_m < 0.05);
-  }
+  check_errors(stack, drive, heard_all(stack) ? 0.05 : 0.3);
   for (const std::string& process : kChainProcesses) CHECK(stack.pids[process].size() == 1);
 
   const launch::Ending ending = stack.stop();
