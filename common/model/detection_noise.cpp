@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/geometry/alignment.hpp"
+#include "common/model/variogram.hpp"
 
 namespace understory::model {
 namespace {
@@ -21,8 +22,12 @@ constexpr std::size_t kMostPairs = 64;
 constexpr std::array<double, 3> kRangeLimits_m = {10.0, 20.0, 40.0};
 /// chi^2 of 2 degrees of freedom that counts at most: a wrong pair must not decide.
 constexpr double kMostChi2 = 9.0;
-/// Degrees of freedom that are remembered for a kind and range.
+/// Degrees of freedom that are remembered for a kind and range, and of a kind for a lag: how errors
+/// fade depends on the sensor and changes less.
 constexpr double kMemory = 600.0;
+constexpr double kLagMemory = 8000.0;
+/// Degrees of freedom from which on a lag counts.
+constexpr double kLeastLagDegrees = 300.0;
 /// Weight of the stated variance, and of the whole kind for one range [degrees of freedom].
 constexpr double kStatedWeight = 4.0;
 constexpr double kKindWeight = 40.0;
@@ -111,6 +116,40 @@ void DetectionNoise::add(const LandmarkScan& scan, std::span<const std::uint64_t
   if (recent_.size() > kLongLag + 1) recent_.pop_front();
   if (!parameters_.learn) return;
   if (const auto common = common_with_last(kLag)) learn(common->pairs, common->fit);
+  for (std::size_t lag = 0; lag < kLags.size(); ++lag) learn_lag(lag);
+}
+
+/// The residuals between the last scan and the one `kLags[lag]` before it.
+void DetectionNoise::learn_lag(std::size_t lag) {
+  const std::size_t before = kLags[lag];
+  if (recent_.size() <= before) return;
+  std::vector<Pair> pairs = in_both(recent_[recent_.size() - 1 - before].seen, recent_.back().seen);
+  if (pairs.size() < kLeastPairs) return;
+  thin_out(pairs, kMostPairs);
+  const Fit fit = fitted_motion(pairs);
+  if (!fit.covariance.allFinite()) return;
+
+  // By the noise as learned: kinds and ranges are alike then.
+  for (const Pair& pair : pairs) {
+    const auto [chi2, degrees] = left_over(pair, fit);
+    Sums& sums = by_lag_[pair.bin / kRanges][lag];
+    sums.chi2 += chi2;
+    sums.degrees += degrees;
+  }
+  for (std::size_t kind = 0; kind < kKinds; ++kind) by_lag_[kind][lag].forget_beyond(kLagMemory);
+}
+
+/// What a motion leaves of a pair, by the noise as learned so far, and of how many degrees of
+/// freedom: the motion takes a share of each. A large residual counts as kMostChi2; the mean allows
+/// for that.
+DetectionNoise::Sums DetectionNoise::left_over(const Pair& pair, const Fit& fit) const {
+  static const double kCut = 1.0 - std::exp(-0.5 * kMostChi2);
+  const Residual residual = residual_of(pair, estimate(pair.bin), fit.then_T_now);
+  const double taken = (fit.covariance * residual.information).trace();
+  const double degrees = std::max(0.0, 2.0 - taken);
+  const double share = 0.5 * degrees;
+  if (share < kLeastShare) return {};
+  return {share * std::min(residual.chi2 / share, kMostChi2) / kCut, degrees};
 }
 
 /// The oldest of so many scans before the last one that has enough in common with it.
@@ -137,20 +176,11 @@ std::optional<ScanMotion> DetectionNoise::motion_over(std::size_t most_scans) co
 }
 
 void DetectionNoise::learn(std::span<const Pair> pairs, const Fit& fit) {
-  // What the motion leaves of each pair, against what it would leave of the stated noise. A large
-  // residual counts as kMostChi2 of the noise as learned so far; the mean allows for that.
-  static const double kCut = 1.0 - std::exp(-0.5 * kMostChi2);
   std::array<Sums, kKinds * kRanges> added{};
   for (const Pair& pair : pairs) {
-    const double factor = estimate(pair.bin);
-    const Residual residual = residual_of(pair, factor, fit.then_T_now);
-    const double taken = (fit.covariance * residual.information).trace();
-    const double degrees = std::max(0.0, 2.0 - taken);
-    const double share = 0.5 * degrees;
-    if (share < kLeastShare) continue;
-    const double chi2 = std::min(residual.chi2 / share, kMostChi2);
-    added[pair.bin].chi2 += share * factor * chi2 / kCut;
-    added[pair.bin].degrees += degrees;
+    const Sums left = left_over(pair, fit);
+    added[pair.bin].chi2 += estimate(pair.bin) * left.chi2;
+    added[pair.bin].degrees += left.degrees;
   }
 
   // The memory is bounded: what is older counts less, and little where this scan is quite
@@ -163,9 +193,7 @@ void DetectionNoise::learn(std::span<const Pair> pairs, const Fit& fit) {
     }
     sums.chi2 += added[bin].chi2;
     sums.degrees += added[bin].degrees;
-    if (sums.degrees <= kMemory) continue;
-    sums.chi2 *= kMemory / sums.degrees;
-    sums.degrees = kMemory;
+    sums.forget_beyond(kMemory);
   }
 }
 
@@ -217,8 +245,20 @@ double DetectionNoise::estimate(std::size_t bin) const {
   return (weight * of_kind + sums_[bin].chi2) / (weight + sums_[bin].degrees);
 }
 
+double DetectionNoise::repetition(LandmarkKind kind) const {
+  const std::array<Sums, kLags.size()>& sums = by_lag_[static_cast<std::size_t>(kind)];
+  std::array<LagVariance, kLags.size()> lags{};
+  for (std::size_t i = 0; i < kLags.size(); ++i) {
+    lags[i].lag = kLags[i];
+    if (sums[i].degrees < kLeastLagDegrees) continue;
+    lags[i].value = sums[i].chi2 / sums[i].degrees;
+    lags[i].degrees = sums[i].degrees;
+  }
+  return white_noise_power(lags, kLag, kSigmas);
+}
+
 double DetectionNoise::factor_of(std::size_t bin) const {
-  const double learned = estimate(bin);
+  const double learned = estimate(bin) * repetition(static_cast<LandmarkKind>(bin / kRanges));
   const bool is_corner = bin / kRanges == static_cast<std::size_t>(LandmarkKind::kCorner);
   const double below = is_corner ? parameters_.replace_corners_below : parameters_.replace_below;
   if (learned < parameters_.replace_above && learned > below) return 1.0;

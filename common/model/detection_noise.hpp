@@ -40,9 +40,15 @@ struct ScanMotion {
 ///
 /// Two scans a few scans apart that observed the same landmarks differ by a rigid motion and by
 /// noise. What the best motion leaves is the noise alone: no odometry, no map and no filter takes
-/// part, so that their errors do not pass for noise. Errors that both scans have in common are not
-/// seen (an offset of the mounting, a trunk that is no circle); that is why a statement is trusted
-/// as long as the scans do not contradict it clearly.
+/// part, so that their errors do not pass for noise.
+///
+/// Errors of neighbouring scans are correlated where their clouds overlap or a trunk is no circle.
+/// The residual of a pair grows with the lag between its scans then (a variogram, Matheron 1963):
+/// half the mean square at lag h is the variance less the autocovariance at h. The factor is that
+/// of white noise of the same power at frequency zero: the variance plus twice the sum of all
+/// autocovariances. N scans weighted by it state the uncertainty that their mean truly has. Errors
+/// that all scans share (an offset of the mounting, the scale of ranges) are not seen; that is why
+/// a statement is trusted as long as the scans do not contradict it clearly.
 class DetectionNoise {
  public:
   /// The stated covariances hold.
@@ -84,16 +90,23 @@ class DetectionNoise {
   }
   /// True where the factor of any kind and range is not 1.
   bool is_misstated() const;
+  /// How much more a detection's variance counts since its error is correlated with those of the
+  /// scans around: white noise of the same power over the variance between scans four apart. 1 for
+  /// white noise and until enough is learned.
+  double repetition(LandmarkKind kind) const;
 
   /// Members of a saved state; see common/state. The parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.sums_, self.recent_);
+    a(self.sums_, self.by_lag_, self.recent_);
   }
 
  private:
   /// Scans over which motion() goes: the longer the way, the more it shows.
   static constexpr std::size_t kLongLag = 20;
+
+  /// Lags [scans] at which residuals are compared; the last one is within kLongLag.
+  static constexpr std::array<std::size_t, 5> kLags = {1, 2, 4, 8, 16};
 
   static constexpr std::size_t kKinds = 2;
   static constexpr std::size_t kRanges = 4;
@@ -132,6 +145,13 @@ class DetectionNoise {
     double chi2 = 0.0;
     double degrees = 0.0;  ///< Of freedom.
 
+    /// What is older counts less.
+    void forget_beyond(double memory) {
+      if (degrees <= memory) return;
+      chi2 *= memory / degrees;
+      degrees = memory;
+    }
+
     template <class Archive, class Self>
     static void archive(Archive& a, Self& self) {
       a(self.chi2, self.degrees);
@@ -161,6 +181,8 @@ class DetectionNoise {
   static std::vector<Pair> in_both(std::span<const Seen> then, std::span<const Seen> now);
   std::optional<Common> common_with_last(std::size_t most_scans) const;
   void learn(std::span<const Pair> pairs, const Fit& fit);
+  void learn_lag(std::size_t lag);
+  Sums left_over(const Pair& pair, const Fit& fit) const;
   Fit fitted_motion(std::span<const Pair> pairs) const;
   static Residual residual_of(const Pair& pair, double factor, const geometry::SE2& then_T_now);
   double estimate(std::size_t bin) const;
@@ -168,6 +190,8 @@ class DetectionNoise {
 
   DetectionNoiseParameters parameters_;
   std::array<Sums, kKinds * kRanges> sums_{};
+  /// Of residuals at each lag, by their noise as learned in `sums_`.
+  std::array<std::array<Sums, kLags.size()>, kKinds> by_lag_{};
   std::deque<SeenScan> recent_;  ///< The last scans, the newest at the end.
 };
 

@@ -100,7 +100,7 @@ struct LoopResult {
   std::uint32_t map_id = 1;
   std::uint64_t closure_id = 0;
   Status status = Status::kRefused;
-  std::string reason;  ///< Empty where it was accepted or revoked.
+  std::string reason;  ///< Why not; of an accepted one, what it corrected.
 };
 
 }  // namespace understory::model

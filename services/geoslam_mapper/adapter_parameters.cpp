@@ -68,7 +68,11 @@ void describe_evidence(SmoothingMapperParameters& p, bus::ParameterTable& table)
             "The same share while the vehicle is stationary: the beams meet the same bark again.");
   table.add("smoothing.scale_sigma", p.scale_sigma, {0.0, 0.1}, "",
             "Standard deviation of the scale of distances, a common-mode error of all landmarks. "
-            "It is not estimated, but reported in the covariances of poses.");
+            "Odometry tells it, and the map is given out in metres; what is left of it is reported "
+            "in the covariances. 0: no such error.");
+  table.add("smoothing.odometry_scale_sigma", p.odometry_scale_sigma, {0.0, 0.1}, "",
+            "Standard deviation of the scale of odometry's distances, beside its covariance. 0: "
+            "its covariance is all of its error.");
   table.add(
       "smoothing.given_map_sigma_m", p.given_map_sigma_m, {1e-4, 100.0}, "m",
       "Standard deviation of the landmarks of a given map that states no covariance; the least one "

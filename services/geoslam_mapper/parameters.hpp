@@ -40,7 +40,8 @@ struct SmoothingMapperParameters {
   double correlated_share = 0.0;  ///< Of a variance.
   double correlation_m = 20.0;
   double stationary_share = 0.0;  ///< Of a variance.
-  double scale_sigma = 0.0;       ///< Ratio of distances.
+  double scale_sigma = 0.0;           ///< Ratio of distances.
+  double odometry_scale_sigma = 0.01;  ///< Ratio of distances.
   double given_map_sigma_m = 0.05;
 
   // Association and its tests.

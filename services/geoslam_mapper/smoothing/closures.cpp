@@ -2,12 +2,19 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
 /// Squared Mahalanobis distance (3 degrees of freedom) that chance exceeds once in 10^6.
 constexpr double kConsistent = 30.7;
+/// Where closures contradict the graph, its variances may be understated by so much at most: the
+/// short paths from one closure to the next are not believed more than the long one.
+constexpr double kMostMisstated = 100.0;
+/// Two closures prove something together where the graph ties them to so much [m], as one standard
+/// deviation: where it hardly does, any two agree.
+constexpr double kMostSpread_m = 2.0;
 /// Rounds of the graph for a large correction.
 constexpr int kClosureRounds = 20;
 
@@ -38,51 +45,74 @@ Closures::Decision Closures::take(const model::LoopClosure& closure, const Closu
     return {kWaiting, "others must agree with it"};
   if (from.node == to.node) return {kRefused, "both ends are in one part of the path"};
 
-  const Waiting one{closure.id, from.node, to.node,
-                    compound(compound(from.node_T_end, closure.from_T_to), inverse(to.node_T_end))};
+  Waiting one{closure.id, from.node, to.node,
+              compound(compound(from.node_T_end, closure.from_T_to), inverse(to.node_T_end)),
+              closure.log10_false_alarm};
   const auto known = map.graph.relative(one.a, one.b);
   if (!known) return {kRefused, "the graph does not determine its ends"};
+  const double off = squared_distance(*known, one.a_T_b);
+  const bool is_expected = off <= kConsistent;
+  one.misstatement = std::clamp(off / 3.0, 1.0, kMostMisstated);
+  if (is_expected && join({&one, 1}, map)) return {kAccepted, {}};
+  if (closure.source == "manual") return overrule({&one, 1}, map);
 
-  std::vector<Waiting> counted{one};
-  const bool is_expected = squared_distance(*known, one.a_T_b) <= kConsistent;
-  if (!is_expected && closure.source != "manual") {
-    counted = agreeing_with(one, map);
-    if (counted.size() < kAgree) {
-      if (waiting_.size() == kMostWaiting) waiting_.erase(waiting_.begin());
-      waiting_.push_back(one);
-      return {kWaiting, "it contradicts the graph: others must agree with it"};
+  // A witness against the graph.
+  if (waiting_.size() == kMostWaiting) waiting_.erase(waiting_.begin());
+  waiting_.push_back(one);
+  const std::vector<Waiting> agreeing = agreeing_with(one, map);
+  std::vector<Witness> witnesses;
+  for (const Waiting& each : agreeing)
+    witnesses.push_back(
+        {map.graph.node(each.a).along_m, map.graph.node(each.b).along_m, each.log10_false_alarm});
+  if (decades(witnesses) < kBeyondDoubt)
+    return {kWaiting, "it contradicts the graph: others must agree with it"};
+
+  Decision decision = overrule(agreeing, map);
+  if (decision.status != kAccepted) return {kWaiting, std::move(decision.reason)};
+  std::erase_if(waiting_, [&](const Waiting& other) {
+    return std::ranges::find(agreeing, other.id, &Waiting::id) != agreeing.end();
+  });
+  return decision;
+}
+
+/// The largest set of those that wait, the newest among them, in which all agree with each other.
+std::vector<Closures::Waiting> Closures::agreeing_with(const Waiting& one,
+                                                       const GlobalMap& map) const {
+  std::vector<std::uint64_t> agrees(waiting_.size());
+  for (std::size_t i = 0; i < waiting_.size(); ++i) {
+    if (!agree(one, waiting_[i], map)) continue;
+    for (std::size_t k = 0; k < i; ++k) {
+      if (!agree(waiting_[i], waiting_[k], map)) continue;
+      agrees[i] |= std::uint64_t{1} << k;
+      agrees[k] |= std::uint64_t{1} << i;
     }
   }
 
-  std::erase_if(waiting_, [&](const Waiting& other) {
-    return std::ranges::find(counted, other.id, &Waiting::id) != counted.end();
-  });
-  if (!join(counted, map)) return {kRefused, "the rest of the graph contradicts it"};
-  return {kAccepted, {}};
-}
-
-/// The closure and those that wait, each of which agrees with all others of them.
-std::vector<Closures::Waiting> Closures::agreeing_with(const Waiting& one,
-                                                       const GlobalMap& map) const {
-  std::vector<Waiting> set{one};
-  for (const Waiting& other : waiting_) {
-    if (std::ranges::all_of(set, [&](const Waiting& in) { return agree(in, other, map); }))
-      set.push_back(other);
-  }
+  std::vector<Waiting> set;
+  for (const std::size_t i : largest_agreement(agrees, waiting_.size() - 1))
+    set.push_back(waiting_[i]);
   return set;
 }
 
-/// Whether the way a -> b -> other b -> other a -> a closes.
+/// Whether the way a -> b -> other b -> other a -> a closes. Both say by how much the graph
+/// understates its variances.
 bool Closures::agree(const Waiting& one, const Waiting& other, const GlobalMap& map) {
+  const double misstatement = std::min(one.misstatement, other.misstatement);
   const auto between = [&](NodeIndex from, NodeIndex to) {
     if (from == to) return std::optional(geometry::SE2WithCovariance{});
-    return map.graph.relative(from, to);
+    auto relative = map.graph.relative(from, to);
+    if (relative) relative->covariance *= misstatement;
+    return relative;
   };
   const auto b_T_b = between(one.b, other.b);
   const auto a_T_a = between(one.a, other.a);
   if (!b_T_b || !a_T_a) return false;
-  return squared_distance(compound(one.a_T_b, *b_T_b), compound(*a_T_a, other.a_T_b)) <=
-         kConsistent;
+  const auto one_way = compound(one.a_T_b, *b_T_b);
+  const auto other_way = compound(*a_T_a, other.a_T_b);
+  const double spread_m2 =
+      (one_way.covariance + other_way.covariance).topLeftCorner<2, 2>().trace();
+  return spread_m2 <= kMostSpread_m * kMostSpread_m &&
+         squared_distance(one_way, other_way) <= kConsistent;
 }
 
 bool Closures::join(std::span<const Waiting> closures, GlobalMap& map) {
@@ -98,6 +128,38 @@ bool Closures::join(std::span<const Waiting> closures, GlobalMap& map) {
   }
   map.adopt_estimates();
   return true;
+}
+
+/// Against the graph: what it states of the path between their ends is corrected where they do not
+/// fit otherwise. The ratio of variances is that of the median closure (3 degrees of freedom).
+Closures::Decision Closures::overrule(std::span<const Waiting> closures, GlobalMap& map) {
+  using enum model::LoopResult::Status;
+  std::vector<double> ratios;
+  NodeIndex first = closures.front().a;
+  NodeIndex last = first;
+  for (const Waiting& one : closures) {
+    const auto known = map.graph.relative(one.a, one.b);
+    if (known) ratios.push_back(squared_distance(*known, one.a_T_b) / 3.0);
+    for (const NodeIndex node : {one.a, one.b}) {
+      if (map.graph.node(node).along_m < map.graph.node(first).along_m) first = node;
+      if (map.graph.node(node).along_m > map.graph.node(last).along_m) last = node;
+    }
+  }
+  if (join(closures, map)) return {kAccepted, {}};
+  if (ratios.empty()) return {kRefused, "the graph does not determine its ends"};
+
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  const double share = 1.0 / std::max(1.0, *middle);
+  const double length_m = map.graph.node(last).along_m - map.graph.node(first).along_m;
+  map.graph.checkpoint();
+  map.graph.relax(first, last, share);
+  if (join(closures, map))
+    return {kAccepted, "the variances of " + std::to_string(std::lround(length_m)) +
+                           " m of path are " + std::to_string(std::lround(1.0 / share)) +
+                           " times those stated"};
+  map.graph.relax(first, last, 1.0 / share);
+  return {kRefused, "the rest of the graph contradicts it"};
 }
 
 Closures::Decision Closures::revoke(std::uint64_t id, GlobalMap& map) {

@@ -8,6 +8,7 @@
 
 #include "common/model/submap.hpp"
 #include "services/geoslam_mapper/smoothing/global_map.hpp"
+#include "services/geoslam_mapper/smoothing/witnesses.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
 
@@ -18,13 +19,13 @@ struct ClosureEnd {
 };
 
 /// Takes loop closures into the graph, and out again. One that is within what the graph knows of
-/// its ends counts at once; one that is not waits until others agree with it (pairwise consistency,
-/// Mangelson et al. 2018: the way round two closures and the graph between their ends must close),
-/// or a person says so. What the graph contradicts once it counts is taken back exactly.
+/// its ends counts at once. One that is not is a witness against the graph: it waits until the
+/// witnesses that agree with it are beyond doubt (witnesses.hpp), or a person says so. Then the
+/// graph yields: all of them count, and where the rest of the graph does not allow them, what was
+/// measured on the path between their ends counts less, by the ratio of what the witnesses show to
+/// what was stated. A set that does not fit even then is taken back exactly and goes on waiting.
 class Closures {
  public:
-  /// So many closures that agree with each other count against what the graph knows.
-  static constexpr std::size_t kAgree = 3;
   /// Closures that wait, at most: then the oldest is dropped.
   static constexpr std::size_t kMostWaiting = 32;
 
@@ -56,15 +57,19 @@ class Closures {
     NodeIndex a = 0;
     NodeIndex b = 0;
     geometry::SE2WithCovariance a_T_b;
+    double log10_false_alarm = 0.0;
+    /// Variances between its ends over those that the graph states, as this closure has it.
+    double misstatement = 1.0;
 
     template <class Archive, class Self>
     static void archive(Archive& a, Self& s) {
-      a(s.id, s.a, s.b, s.a_T_b);
+      a(s.id, s.a, s.b, s.a_T_b, s.log10_false_alarm, s.misstatement);
     }
   };
   std::vector<Waiting> agreeing_with(const Waiting& one, const GlobalMap& map) const;
   static bool agree(const Waiting& one, const Waiting& other, const GlobalMap& map);
   static bool join(std::span<const Waiting> closures, GlobalMap& map);
+  static Decision overrule(std::span<const Waiting> closures, GlobalMap& map);
 
   std::vector<Waiting> waiting_;  ///< In order of arrival.
 };

@@ -8,12 +8,15 @@
 namespace understory::geoslam_mapper::smoothing {
 
 /// Common-mode errors, which the graph cannot estimate since no observation shows them: the level
-/// at the first keyframe and the scale of distances. They are reported in the covariances of poses.
+/// at the first keyframe and what RangeScale leaves of the scale of distances. They are reported in
+/// the covariances of poses.
 class CommonError {
  public:
   /// `scale_sigma`: standard deviation of the scale of distances (1e-3 = 1 mm per metre).
   explicit CommonError(double scale_sigma) : scale_sigma_(scale_sigma) {}
 
+  /// What is known of the scale now.
+  void set_scale_sigma(double sigma) { scale_sigma_ = sigma; }
   /// Covariance [rad^2] of the error (roll, pitch) of the level at the keyframe that starts the
   /// map: it displaces landmarks at breast height.
   void set_start_level(const Eigen::Matrix2d& covariance);
@@ -25,10 +28,10 @@ class CommonError {
   /// What it adds to the covariance [m^2] of a point, frame `map`.
   Eigen::Matrix2d covariance_of(const Eigen::Vector2d& position_m) const;
 
-  /// Members of a saved state; see common/state. The scale is configuration.
+  /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.start_covariance_m2_);
+    a(self.start_covariance_m2_, self.scale_sigma_);
   }
 
  private:

@@ -65,7 +65,8 @@ OneMap::OneMap(const SmoothingMapperParameters& parameters, std::uint32_t id)
       dormancy_(parameters),
       submaps_(parameters),
       scan_localiser_(parameters),
-      common_error_(parameters.scale_sigma) {}
+      common_error_(parameters.scale_sigma),
+      range_scale_(parameters.scale_sigma, parameters.odometry_scale_sigma) {}
 
 OneMap OneMap::beside(std::uint32_t id) const {
   OneMap other(parameters_, id);
@@ -73,7 +74,17 @@ OneMap OneMap::beside(std::uint32_t id) const {
   if (condensing_.keeps_stretches()) other.keep_stretches();
   if (const auto& level = scan_localiser_.level()) other.scan_localiser_.set(*level);
   other.sweep_level_ = sweep_level_;
+  other.range_scale_ = range_scale_.beside();
   return other;
+}
+
+void OneMap::add(const model::Odometry& odometry) {
+  model::Odometry in_map_units = odometry;
+  in_map_units.from_T_to =
+      geometry::SE2(range_scale_.odometry_factor() * odometry.from_T_to.translation(),
+                    odometry.from_T_to.theta());
+  motion_.add(in_map_units);
+  sweep_level_.add(odometry);
 }
 
 model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
@@ -124,6 +135,7 @@ model::MapUpdate OneMap::add(const model::Keyframe& keyframe) {
   update.chi2 = fused.chi2;
   update.degrees_of_freedom = fused.degrees_of_freedom;
   if (!fused.ok) return with(kRolledBack, fused.reason, std::move(update));
+  compare_scales(keyframe, fused.associations);
   condensing_.follow(fused, std::move(due), discovery_, merging_.merges(), map_);
   closures_.hand_over(fused.condensed);
   if (!fused.condensed.empty()) submaps_.condensed(fused.condensed.front().into);
@@ -207,12 +219,39 @@ void OneMap::level_start() {
   common_error_.set_start_level(start_level_.covariance());
 }
 
-/// Around the prediction; where nothing fits there, in the whole map.
+/// What the keyframe's motion by landmarks alone and by odometry tell of the scale of either.
+void OneMap::compare_scales(const model::Keyframe& keyframe,
+                            std::span<const model::Association> associations) {
+  std::vector<Eigen::Vector2d> positions_m;
+  positions_m.reserve(associations.size());
+  for (const model::Association& pair : associations)
+    positions_m.push_back(map_.landmarks.at(pair.landmark_id).position_m);
+  const auto located = located_by_landmarks(keyframe, associations, positions_m);
+  if (!located) return;
+
+  std::optional<geometry::SE2WithCovariance> odometry;
+  if (const auto& last = range_scale_.last()) {
+    odometry = motion_.between(last->utime, located->utime);
+    if (odometry) {
+      const geometry::SE2& motion = odometry->mean;
+      odometry->mean =
+          geometry::SE2(motion.translation() / range_scale_.odometry_factor(), motion.theta());
+    }
+  }
+  range_scale_.add(*located, odometry);
+  common_error_.set_scale_sigma(range_scale_.sigma());
+}
+
+/// Around the prediction. Where few landmarks match there, in the whole map. Where that finds no
+/// place either, the prediction stands as long as odometry reaches: what is seen is mapped, and the
+/// next keyframe has landmarks to match.
 std::optional<Placement> OneMap::place(const model::Keyframe& keyframe,
                                        const std::optional<Prediction>& prediction,
                                        model::MapUpdate& update) {
+  std::optional<Tracking> tracked;
+  if (prediction) tracked = place_recogniser_.track(keyframe, *prediction, map_);
   std::optional<Placement> placement;
-  if (prediction) placement = place_recogniser_.track(keyframe, *prediction, map_);
+  if (tracked && tracked->is_confirmed) placement = std::move(tracked->placement);
   if (!placement) {
     map_.landmarks.catch_up();
     SearchResult searched = place_recogniser_.search(keyframe, map_);
@@ -220,6 +259,7 @@ std::optional<Placement> OneMap::place(const model::Keyframe& keyframe,
     update.log10_false_alarm = searched.log10_false_alarm;
     update.reason = std::move(searched.reason);
     placement = std::move(searched.placement);
+    if (!placement && tracked && reaches(*prediction)) placement = std::move(tracked->placement);
   }
   if (placement) map_.landmarks.set_loose(placement->loose);
 
@@ -332,8 +372,12 @@ void OneMap::take(const model::Existence& existence) {
 
 bool OneMap::reaches(const model::Keyframe& keyframe) const {
   const auto prediction = motion_.predict(keyframe, map_.graph);
-  if (!prediction || !prediction->from_odometry) return false;
-  const Eigen::Matrix3d& covariance = prediction->map_T_centre.covariance;
+  return prediction && reaches(*prediction);
+}
+
+bool OneMap::reaches(const Prediction& prediction) const {
+  if (!prediction.from_odometry) return false;
+  const Eigen::Matrix3d& covariance = prediction.map_T_centre.covariance;
   return std::sqrt(covariance.topLeftCorner<2, 2>().trace()) <= parameters_.lost_sigma_m &&
          std::sqrt(covariance(2, 2)) <= parameters_.lost_sigma_rad;
 }
@@ -345,6 +389,7 @@ bool OneMap::is_provisional() const {
 void OneMap::start_with(std::span<const model::MapLandmark> landmarks) {
   for (const model::MapLandmark& given : landmarks)
     map_.landmarks.add_given(given, parameters_.given_map_sigma_m);
+  range_scale_.hold();
   agreeing_ = static_cast<std::uint32_t>(parameters_.new_map_keyframes);
 }
 

@@ -20,6 +20,7 @@
 #include "services/geoslam_mapper/smoothing/merging.hpp"
 #include "services/geoslam_mapper/smoothing/motion.hpp"
 #include "services/geoslam_mapper/smoothing/place_recogniser.hpp"
+#include "services/geoslam_mapper/smoothing/range_scale.hpp"
 #include "services/geoslam_mapper/smoothing/rejoining.hpp"
 #include "services/geoslam_mapper/smoothing/scan_localiser.hpp"
 #include "services/geoslam_mapper/smoothing/start_level.hpp"
@@ -41,10 +42,7 @@ class OneMap {
   /// The pose of a single scan.
   std::optional<ScanPose> locate(const model::LandmarkScan& scan);
   /// Motion without landmarks.
-  void add(const model::Odometry& odometry) {
-    motion_.add(odometry);
-    sweep_level_.add(odometry);
-  }
+  void add(const model::Odometry& odometry);
   /// The filter's pose, as a gate.
   void add(const model::EkfPose& pose) { motion_.add(pose); }
   /// The filter's estimate of the level error.
@@ -57,8 +55,10 @@ class OneMap {
   /// A map to start from. It counts as confirmed.
   void start_with(std::span<const model::MapLandmark> landmarks);
 
-  /// Landmarks, graph and trajectory.
+  /// Landmarks, graph and trajectory; in units of the map, see RangeScale.
   const GlobalMap& map() const { return map_; }
+  /// Metres per unit of the map: all that this class gives out is in units of the map.
+  double map_factor() const { return range_scale_.map_factor(); }
   /// Whether so few keyframes agree (`new_map_keyframes`) that the first one may have been wrong.
   bool is_provisional() const;
   /// Whether odometry reaches the keyframe from the last one that was localised, well enough to
@@ -114,7 +114,7 @@ class OneMap {
   static void archive(Archive& a, Self& self) {
     a(self.map_, self.motion_, self.discovery_, self.merging_, self.known_ground_, self.condensing_,
       self.dormancy_, self.submaps_, self.closures_, self.scan_localiser_, self.common_error_,
-      self.start_level_, self.sweep_level_, self.first_offered_, self.agreeing_,
+      self.start_level_, self.sweep_level_, self.range_scale_, self.first_offered_, self.agreeing_,
       self.lightening_.has_waited, self.lightening_.submaps_first);
   }
 
@@ -125,9 +125,12 @@ class OneMap {
     bool submaps_first = false;  ///< Before dormancy.
   };
 
+  bool reaches(const Prediction& prediction) const;
   void lighten(const model::Keyframe& keyframe, NodeIndex newest, bool has_condensed);
   std::string why_not_start(const model::Keyframe& keyframe);
   void level_start();
+  void compare_scales(const model::Keyframe& keyframe,
+                      std::span<const model::Association> associations);
   void start_map(const model::Keyframe& keyframe, model::MapUpdate& update);
   std::optional<Placement> place(const model::Keyframe& keyframe,
                                  const std::optional<Prediction>& prediction,
@@ -153,6 +156,7 @@ class OneMap {
   CommonError common_error_;
   StartLevel start_level_;
   model::SweepLevel sweep_level_;
+  RangeScale range_scale_;
   std::optional<model::Utime> first_offered_;  ///< Keyframe that might have started the map.
   /// Keyframes that agree with each other: the first, and those that were localised by landmarks.
   std::uint32_t agreeing_ = 0;

@@ -144,9 +144,8 @@ Placement PlaceRecogniser::associate(const model::Keyframe& keyframe,
   return placement;
 }
 
-std::optional<Placement> PlaceRecogniser::track(const model::Keyframe& keyframe,
-                                                const Prediction& prediction,
-                                                const GlobalMap& map) const {
+Tracking PlaceRecogniser::track(const model::Keyframe& keyframe, const Prediction& prediction,
+                                const GlobalMap& map) const {
   Placement placement = associate(keyframe, prediction.map_T_centre, last_keyframe(map), map);
   const std::size_t possible =
       count_matchable(keyframe, placement.map_T_centre.mean, placement.loose, map.landmarks);
@@ -155,11 +154,10 @@ std::optional<Placement> PlaceRecogniser::track(const model::Keyframe& keyframe,
                                    parameters_.min_matched_ratio};
 
   // Odometry alone will do where there is next to nothing to match.
-  const bool is_placed = prediction.from_odometry
-                             ? quota.share_is_met(matched, possible) || possible < quota.min_matched
-                             : quota.is_met(matched, possible);
-  if (!is_placed) return std::nullopt;
-  return placement;
+  const bool is_confirmed = prediction.from_odometry ? quota.share_is_met(matched, possible) ||
+                                                           possible < quota.min_matched
+                                                     : quota.is_met(matched, possible);
+  return {std::move(placement), is_confirmed};
 }
 
 SearchResult PlaceRecogniser::search(const model::Keyframe& keyframe, const GlobalMap& map) const {

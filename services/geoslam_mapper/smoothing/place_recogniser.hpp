@@ -19,17 +19,23 @@ struct SearchResult {
   std::string reason;                  ///< Why there is no placement.
 };
 
+/// What tracking gave: a place by the prediction and what matches it.
+struct Tracking {
+  Placement placement;
+  /// Enough of the landmarks match that could: at least `min_matched_ratio` of them, and without
+  /// odometry at least `min_matched`.
+  bool is_confirmed = false;
+};
+
 /// Places keyframes in a map that it does not change. It has no state.
 class PlaceRecogniser {
  public:
   /// `parameters` gives the gates and how many matches are enough.
   explicit PlaceRecogniser(const SmoothingMapperParameters& parameters) : parameters_(parameters) {}
 
-  /// Association in gates around a prediction, with landmarks whose gates tell them apart. None
-  /// where too few landmarks match: less than `min_matched_ratio` of those that could, or without
-  /// odometry fewer than `min_matched`.
-  std::optional<Placement> track(const model::Keyframe& keyframe, const Prediction& prediction,
-                                 const GlobalMap& map) const;
+  /// Association in gates around a prediction, with landmarks whose gates tell them apart.
+  Tracking track(const model::Keyframe& keyframe, const Prediction& prediction,
+                 const GlobalMap& map) const;
 
   /// Search of the whole map without any prior (constellation::ConstellationMap). Landmarks count
   /// whose gates tell them apart from where the vehicle was found, not from where it comes from.

@@ -77,6 +77,11 @@ class PoseGraph {
   /// chi^2 (3 degrees of freedom) of a closure at the present estimate; there must be one.
   double closure_chi2(std::uint64_t id) const;
 
+  /// What was measured on the path between two nodes counts `share` of what it did: the errors there
+  /// are larger than was stated. Closures stay as they are. relax() with 1 / share undoes it, but
+  /// for rounding. Cost: the measurements of that path.
+  void relax(NodeIndex a, NodeIndex b, double share);
+
   /// Takes nodes and motions out. What the nodes observed becomes observations of other nodes, in
   /// whose frames the two agree to within the covariance of `into_T_node`. Motions that begin or
   /// end at the nodes are lost; one to a later node that stays begins at the other node then. None
@@ -252,6 +257,9 @@ class PoseGraph {
     /// Points whose landmark was joined with another one.
     std::vector<std::pair<factor_graph::plane::PointId, model::LandmarkId>> dropped;
   };
+  bool is_within(NodeIndex node, double from_m, double to_m) const;
+  void scale_information(MotionRef ref, double share);
+  void relax_dormant(double from_m, double to_m, double share);
   Node& edit(NodeIndex node);
   void forget_ahead_of(NodeIndex node);
   NodeIndex put_node(const geometry::SE2& map_T_centre, bool is_stationary, double along_m);

@@ -14,7 +14,7 @@ constexpr double kAgree_rad = 0.03;
 /// Places that are remembered.
 constexpr std::size_t kMostFound = 12;
 /// Fewest landmarks that are in both maps.
-constexpr std::size_t kLeastPairs = 6;
+constexpr std::size_t kLeastOverlap = 6;
 
 /// How far two ways of laying the maps to each other are apart around a place.
 bool agree(const geometry::SE2& a, const geometry::SE2& b, const Eigen::Vector2d& here_m) {
@@ -92,7 +92,7 @@ std::optional<Overlap> Rejoining::overlap(const Eigen::Vector2d& here_m) const {
              return other.first == pair.first || other.second == pair.second;
            }) > 1;
   });
-  if (pairs.size() < kLeastPairs) return std::nullopt;
+  if (pairs.size() < kLeastOverlap) return std::nullopt;
   return overlap;
 }
 

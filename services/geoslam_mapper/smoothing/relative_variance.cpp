@@ -15,18 +15,18 @@ constexpr double kBeforeAll_m = -1e6;
 
 /// Where a landmark is, and the vehicle's path when it was seen last [m]. Two passes by one place
 /// are far from each other there: what is known of one says nothing of the other.
-using Place = Eigen::Vector3d;
+using PathPlace = Eigen::Vector3d;
 
-Place place_of(const StoredLandmark& landmark, const PoseGraph& graph) {
+PathPlace place_of(const StoredLandmark& landmark, const PoseGraph& graph) {
   const double along_m =
       landmark.nodes.empty() ? kBeforeAll_m : graph.node(landmark.nodes.back()).along_m;
   return {landmark.position_m.x(), landmark.position_m.y(), along_m};
 }
 
-double squared_distance(const Place& a, const Place& b) { return (a - b).squaredNorm(); }
+double squared_distance(const PathPlace& a, const PathPlace& b) { return (a - b).squaredNorm(); }
 
 /// Up to `most` of the points, each the one furthest from those before it.
-std::vector<std::size_t> spread(std::span<const Place> points, std::size_t most) {
+std::vector<std::size_t> spread(std::span<const PathPlace> points, std::size_t most) {
   std::vector<std::size_t> chosen;
   std::vector<double> nearest(points.size(), std::numeric_limits<double>::infinity());
   while (chosen.size() < std::min(most, points.size())) {
@@ -42,7 +42,7 @@ std::vector<std::size_t> spread(std::span<const Place> points, std::size_t most)
 struct OldLandmarks {
   std::vector<std::size_t> numbers;  ///< Among the landmarks asked for.
   std::vector<model::LandmarkId> ids;
-  std::vector<Place> places;
+  std::vector<PathPlace> places;
 };
 
 /// Of the landmarks `chosen` among the old ones, the one nearest to old landmark `i`.

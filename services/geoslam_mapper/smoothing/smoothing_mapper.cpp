@@ -10,7 +10,7 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-constexpr state::Format kFormat{"geoslam_mapper.smoothing", 27};
+constexpr state::Format kFormat{"geoslam_mapper.smoothing", 28};
 constexpr state::Format kCopyFormat{"geoslam_mapper.smoothing.copy", 1};
 /// Two keyframes contradict each other where their motion in a trial map differs from the tracked
 /// one by more than so many of its standard deviations.
@@ -54,6 +54,14 @@ model::MapUpdate SmoothingMapper::add(const model::Keyframe& keyframe) {
   }
   last_utime_ = keyframe.utime;
 
+  model::MapUpdate update = place(keyframe);
+  units_.follow(current_.map_factor());
+  return units_.metres(std::move(update));
+}
+
+/// In the map in use, in another one, or in none.
+model::MapUpdate SmoothingMapper::place(const model::Keyframe& keyframe) {
+  using enum model::MapUpdateStatus;
   current_.may_hand_over(may_hand_over_);
   model::MapUpdate update = current_.add(keyframe);
   std::ranges::move(current_.take_given_away(), std::back_inserter(given_away_));
@@ -70,6 +78,18 @@ model::MapUpdate SmoothingMapper::add(const model::Keyframe& keyframe) {
   if (update.status == kUpdated && !update.is_provisional && !parameters_.localisation_only)
     rejoin_left_maps(keyframe, update);
   return update;
+}
+
+std::optional<ScanPose> SmoothingMapper::locate(const model::LandmarkScan& scan) {
+  const auto pose = current_.locate(scan);
+  return pose ? std::optional(units_.metres(*pose)) : std::nullopt;
+}
+
+/// A step of the units moves all of them.
+std::optional<std::vector<model::MapLandmark>> SmoothingMapper::take_changed_landmarks() {
+  std::vector<model::MapLandmark> changed = current_.take_changed_landmarks();
+  if (units_.take_step()) changed = current_.map().all_landmarks();
+  return units_.metres(std::move(changed));
 }
 
 /// Keyframes without a place say nothing of the map.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "services/geoslam_mapper/smoothing/map_archive.hpp"
+#include "services/geoslam_mapper/smoothing/map_units.hpp"
 #include "services/geoslam_mapper/smoothing/one_map.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
@@ -27,9 +28,7 @@ class SmoothingMapper final : public MapperMethod {
 
   model::MapUpdate add(const model::Keyframe& keyframe) override;
   bool locates_scans() const override { return true; }
-  std::optional<ScanPose> locate(const model::LandmarkScan& scan) override {
-    return current_.locate(scan);
-  }
+  std::optional<ScanPose> locate(const model::LandmarkScan& scan) override;
   void add(const model::Odometry& odometry) override { add_to_all(odometry); }
   void add(const model::EkfPose& pose) override { add_to_all(pose); }
   void add(const model::EkfLevel& level) override { add_to_all(level); }
@@ -38,22 +37,26 @@ class SmoothingMapper final : public MapperMethod {
     current_.start_with(landmarks);
   }
 
-  std::vector<model::KeyframePose> trajectory() const override { return current_.told_poses(); }
-  std::vector<model::MapLandmark> landmarks() const override { return current_.told_landmarks(); }
-  std::optional<std::vector<model::MapLandmark>> take_changed_landmarks() override {
-    return current_.take_changed_landmarks();
+  std::vector<model::KeyframePose> trajectory() const override {
+    return units_.metres(current_.told_poses());
   }
+  std::vector<model::MapLandmark> landmarks() const override {
+    return units_.metres(current_.told_landmarks());
+  }
+  std::optional<std::vector<model::MapLandmark>> take_changed_landmarks() override;
   void set_covariances(std::span<model::MapLandmark> landmarks) const override {
     current_.set_covariances(landmarks);
   }
   void may_hand_over(bool may) override { may_hand_over_ = may; }
-  std::vector<model::Submap> take_given_away() override { return std::exchange(given_away_, {}); }
+  std::vector<model::Submap> take_given_away() override {
+    return units_.metres(std::exchange(given_away_, {}));
+  }
   std::vector<model::SubmapId> wanted() const override { return current_.submaps().wanted(); }
   std::string bring_back(const model::Submap& submap) override {
     return current_.bring_back(submap);
   }
   std::vector<model::SubmapPose> submap_poses() const override {
-    return current_.submaps().poses(current_.map().graph);
+    return units_.metres(current_.submaps().poses(current_.map().graph));
   }
   model::LoopResult take(const model::LoopClosure& closure) override;
   void take(const model::Existence& existence) override;
@@ -75,7 +78,7 @@ class SmoothingMapper final : public MapperMethod {
   static void archive(Archive& a, Self& self) {
     bool has_trial = self.trial_ != nullptr;
     a(self.current_, self.kept_maps_, self.rejoining_, self.last_utime_, self.contradictions_,
-      has_trial);
+      self.units_, has_trial);
     if constexpr (Archive::kReads) {
       if (has_trial) self.trial_ = std::make_unique<OneMap>(self.parameters_);
     }
@@ -83,6 +86,7 @@ class SmoothingMapper final : public MapperMethod {
   }
 
  private:
+  model::MapUpdate place(const model::Keyframe& keyframe);
   std::string malformed(const model::Keyframe& keyframe) const;
   void count_contradictions(const model::MapUpdate& update);
   bool may_try_another(const model::MapUpdate& update) const;
@@ -103,6 +107,7 @@ class SmoothingMapper final : public MapperMethod {
   std::unique_ptr<OneMap> trial_;  ///< Null where the vehicle is not lost.
   MapArchive kept_maps_;
   Rejoining rejoining_;
+  MapUnits units_;
   std::optional<model::Utime> last_utime_;  ///< Of the last well-formed keyframe.
   std::uint32_t contradictions_ = 0;        ///< Keyframes rolled back since the last one accepted.
   bool may_hand_over_ = true;

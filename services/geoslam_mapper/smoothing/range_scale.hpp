@@ -1,0 +1,85 @@
+// The scale of measured distances against that of odometry.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "common/geometry/se2.hpp"
+#include "common/model/archive.hpp"
+#include "common/model/keyframe.hpp"
+#include "common/model/map.hpp"
+
+namespace understory::geoslam_mapper::smoothing {
+
+/// Distances that a laser or a detector measures may all be too short or too long by the same
+/// share: a trunk is seen from its front, a clock is off by some ppm. No landmark shows it, since
+/// the whole map is smaller then. Odometry does, if its own scale is known better: the ratio of the
+/// two is estimated by linear regression of motions, with priors for the scale of either.
+///
+/// The map is kept in the units of the landmarks, which are hundreds of times more precise than
+/// odometry within a drive; odometry is multiplied by odometry_factor() as it comes, and the map
+/// by map_factor() as it is given out. So the map never bends when the estimate changes.
+class RangeScale {
+ public:
+  /// Standard deviations of the scale of landmarks' distances and of odometry's (1e-3 = 1 mm per
+  /// metre). Nothing is estimated where the first is 0.
+  RangeScale(double range_sigma, double odometry_sigma)
+      : range_sigma_(range_sigma), odometry_sigma_(odometry_sigma) {}
+
+  /// Where landmarks alone place the vehicle at a time.
+  struct Located {
+    model::Utime utime = 0;
+    geometry::SE2 map_T_vehicle;
+    double variance_m2 = 0.0;  ///< Per axis.
+
+    /// Members of a saved state; see common/state.
+    template <class Archive, class Self>
+    static void archive(Archive& a, Self& s) {
+      a(s.utime, s.map_T_vehicle, s.variance_m2);
+    }
+  };
+  /// The last one that add() took; none before the first.
+  const std::optional<Located>& last() const { return last_; }
+  /// Takes the next one, with odometry since last() as it came (right perturbation); none where
+  /// there is a gap. A motion that contradicts odometry does not count.
+  void add(const Located& located, const std::optional<geometry::SE2WithCovariance>& odometry);
+  /// The same knowledge for a map that begins now.
+  RangeScale beside() const;
+  /// The map in use is given: its scale is known.
+  void hold() { is_held_ = true; }
+
+  /// Units of the map per metre of odometry.
+  double odometry_factor() const;
+  /// Metres per unit of the map.
+  double map_factor() const { return 1.0 / (1.0 + range_error()); }
+  /// Standard deviation of map_factor().
+  double sigma() const;
+
+  /// Members of a saved state; see common/state. The priors are configuration.
+  template <class Archive, class Self>
+  static void archive(Archive& a, Self& self) {
+    a(self.last_, self.products_, self.squares_, self.is_held_);
+  }
+
+ private:
+  bool is_estimated() const { return range_sigma_ > 0.0 && !is_held_ && squares_ > 0.0; }
+  double ratio_error() const { return products_ / squares_ - 1.0; }
+  double ratio_variance() const { return 1.0 / squares_; }
+  double range_error() const;
+
+  double range_sigma_;
+  double odometry_sigma_;
+  std::optional<Located> last_;
+  double products_ = 0.0;  ///< Of motions by landmarks and by odometry, over their variance.
+  double squares_ = 0.0;   ///< Of motions by odometry.
+  bool is_held_ = false;
+};
+
+/// Where landmarks of the map place a keyframe's last member, by a rigid fit to their positions and
+/// no prior; none with fewer than six. `positions_m`: of the associated landmarks, frame `map`.
+std::optional<RangeScale::Located> located_by_landmarks(
+    const model::Keyframe& keyframe, std::span<const model::Association> associations,
+    std::span<const Eigen::Vector2d> positions_m);
+
+}  // namespace understory::geoslam_mapper::smoothing
