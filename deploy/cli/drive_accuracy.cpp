@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <set>
 
 #include "common/wire/convert.hpp"
 #include "sim/point_grid.hpp"
@@ -105,11 +106,27 @@ std::optional<geometry::SE2> DriveAccuracyCollector::truth_at(model::Utime utime
 }
 
 std::optional<ComparedPose> DriveAccuracyCollector::compare(
-    model::Utime utime, const geometry::SE2& map_T_vehicle,
-    const geometry::SE2& world_T_map) const {
+    model::Utime utime, const geometry::SE2WithCovariance& map_T_vehicle,
+    const geometry::SE2& world_T_map, std::uint32_t map_id) const {
   const auto truth = truth_at(utime);
   if (!truth) return std::nullopt;
-  return ComparedPose{utime, world_T_map * map_T_vehicle, *truth};
+  return ComparedPose{utime, world_T_map * map_T_vehicle.mean, *truth, map_T_vehicle.covariance,
+                      map_id};
+}
+
+std::vector<ComparedPose> DriveAccuracyCollector::compared_keyframes(
+    const model::WholeMap& whole, const geometry::SE2& world_T_map) const {
+  std::set<std::uint64_t> held;
+  for (const auto& keyframe : map_.map()->keyframes) held.insert(keyframe.keyframe_sequence);
+  std::vector<ComparedPose> compared;
+  for (const auto& keyframe : whole.keyframes) {
+    auto pose = compare(keyframe.utime, {keyframe.map_T_vehicle, keyframe.covariance}, world_T_map,
+                        map_id_);
+    if (!pose) continue;
+    if (!held.contains(keyframe.keyframe_sequence)) pose->covariance.setZero();
+    compared.push_back(*pose);
+  }
+  return compared;
 }
 
 std::optional<std::pair<geometry::SE2, MapTie>> DriveAccuracyCollector::tie(
@@ -148,7 +165,8 @@ std::optional<DriveAccuracy> DriveAccuracyCollector::finish() const {
     if (!ties.contains(pose.map_id)) ties.emplace(pose.map_id, tie(pose.map_id));
     const auto& its_tie = ties.at(pose.map_id);
     if (!its_tie) continue;
-    const auto compared = compare(pose.utime, pose.map_T_vehicle(), its_tie->first);
+    const auto compared =
+        compare(pose.utime, {pose.map_T_vehicle(), pose.covariance}, its_tie->first, pose.map_id);
     if (compared) accuracy.live.push_back(*compared);
   }
   for (const auto& landmark : true_landmarks_.landmarks) {
@@ -156,10 +174,7 @@ std::optional<DriveAccuracy> DriveAccuracyCollector::finish() const {
   }
   const auto whole = map_.whole();
   if (!whole) return accuracy;
-  for (const auto& keyframe : whole->keyframes) {
-    const auto compared = compare(keyframe.utime, keyframe.map_T_vehicle, world_T_map);
-    if (compared) accuracy.keyframes.push_back(*compared);
-  }
+  accuracy.keyframes = compared_keyframes(*whole, world_T_map);
   const sim::PointGrid grid(accuracy.true_landmarks_m, kTileM);
   for (const auto& landmark : whole->landmarks) {
     accuracy.landmarks_m.push_back(world_T_map * landmark.position_m);
@@ -183,6 +198,24 @@ double rms(const std::vector<double>& values) {
   double sum = 0.0;
   for (const double value : values) sum += value * value;
   return values.empty() ? 0.0 : std::sqrt(sum / static_cast<double>(values.size()));
+}
+
+std::vector<geometry::PosePair> pairs_of(const std::vector<ComparedPose>& poses) {
+  std::vector<geometry::PosePair> pairs;
+  pairs.reserve(poses.size());
+  for (const auto& pose : poses)
+    pairs.push_back({pose.world_T_vehicle, pose.true_world_T_vehicle, pose.map_id});
+  return pairs;
+}
+
+std::vector<double> nees_of(const std::vector<ComparedPose>& poses) {
+  std::vector<double> values;
+  for (const auto& pose : poses) {
+    const auto value =
+        geometry::nees({pose.world_T_vehicle, pose.true_world_T_vehicle}, pose.covariance);
+    if (value) values.push_back(*value);
+  }
+  return values;
 }
 
 std::vector<double> position_errors_m(const std::vector<ComparedPose>& poses) {

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/geometry/trajectory_error.hpp"
 #include "common/io/lcm_log.hpp"
 #include "common/model/held_map.hpp"
 #include "common/model/map.hpp"
@@ -22,6 +23,9 @@ struct ComparedPose {
   model::Utime utime = 0;
   geometry::SE2 world_T_vehicle;
   geometry::SE2 true_world_T_vehicle;
+  /// Of the pose in its map: tangent order x, y, theta [m, rad]; zero where none is stated.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  std::uint32_t map_id = 1;
 
   /// Distance between the two positions.
   double position_error_m() const;
@@ -40,8 +44,10 @@ const char* to_string(MapTie tie);
 
 /// The errors of one run.
 struct DriveAccuracy {
-  std::vector<ComparedPose> live;                 ///< Every localised pose of SLAM_POSE.
-  std::vector<ComparedPose> keyframes;            ///< Of the last MAP, later ones as published.
+  std::vector<ComparedPose> live;  ///< Every localised pose of SLAM_POSE.
+  /// Of the last MAP, later ones as published. Those that were handed over in a submap have no
+  /// covariance: theirs is relative to the submap.
+  std::vector<ComparedPose> keyframes;
   std::vector<Eigen::Vector2d> landmarks_m;       ///< By MAP and MAP_DELTA, frame world.
   std::vector<Eigen::Vector2d> true_landmarks_m;  ///< Frame world.
   std::vector<double> landmark_errors_m;          ///< To the nearest true one.
@@ -69,8 +75,11 @@ class DriveAccuracyCollector {
   std::optional<geometry::SE2> truth_at(model::Utime utime) const;
   /// world_T_map at the best instant there is, and which; none where the log holds none.
   std::optional<std::pair<geometry::SE2, MapTie>> tie(std::uint32_t map_id) const;
-  std::optional<ComparedPose> compare(model::Utime utime, const geometry::SE2& map_T_vehicle,
-                                      const geometry::SE2& world_T_map) const;
+  std::optional<ComparedPose> compare(model::Utime utime,
+                                      const geometry::SE2WithCovariance& map_T_vehicle,
+                                      const geometry::SE2& world_T_map, std::uint32_t map_id) const;
+  std::vector<ComparedPose> compared_keyframes(const model::WholeMap& whole,
+                                               const geometry::SE2& world_T_map) const;
 
   std::map<model::Utime, geometry::SE2> truth_;
   std::vector<model::SlamPose> poses_;
@@ -86,6 +95,11 @@ class DriveAccuracyCollector {
 double mean(const std::vector<double>& values);     ///< 0 of none.
 double maximum(const std::vector<double>& values);  ///< 0 of none.
 double rms(const std::vector<double>& values);      ///< 0 of none.
+/// For the measures of common/geometry/trajectory_error.
+std::vector<geometry::PosePair> pairs_of(const std::vector<ComparedPose>& poses);
+/// NEES of each pose that states a covariance: its error in the map, whose frame is held at the
+/// tie, by that covariance. The truth counts as exact.
+std::vector<double> nees_of(const std::vector<ComparedPose>& poses);
 /// The position error of each pose.
 std::vector<double> position_errors_m(const std::vector<ComparedPose>& poses);
 

@@ -229,6 +229,13 @@ void add_log_command(CLI::App& parent) {
   auto* accuracy_command =
       add("accuracy", "How well the run in it agrees with the ground truth in it");
   accuracy_command->add_option("--json", options->out, "Also write it to this file, with series");
+  accuracy_command->footer(
+      "Live poses of SLAM_POSE and keyframes of the final map. ATE: after rigid alignment without\n"
+      "scale, as evo_ape --align. RPE: pairs of poses 10, 100 and 1000 m of true path apart, as\n"
+      "evo_rpe --delta_unit m --all_pairs --pairs_from_reference; means per metre of path as "
+      "KITTI.\n"
+      "NEES: pose errors by stated covariances, 3 degrees of freedom. Definitions and keys of the\n"
+      "JSON: deploy/cli/accuracy.md.");
   accuracy_command->callback(
       guarded(options, [](const LogOptions& o) { log_accuracy(o.file, o.out); }));
 

@@ -5,7 +5,7 @@
 #include <tuple>
 #include <utility>
 
-#include "common/geometry/alignment.hpp"
+#include "common/geometry/trajectory_error.hpp"
 
 namespace understory::eval::metrics {
 namespace {
@@ -87,18 +87,12 @@ ErrorSums errors_of(const MapState& state, const MapTruth& truth) {
 }
 
 double absolute_trajectory_error(std::span<const PoseEstimate> poses, const MapTruth& truth) {
-  geometry::RigidAlignment2 alignment;
-  for (const PoseEstimate& pose : poses) {
-    alignment.add(truth.map_T_vehicle(pose.scan).translation(), pose.map_T_vehicle.translation());
-  }
-  const geometry::SE2 truth_T_map = alignment.a_T_b();
-  double sum = 0.0;
-  for (const PoseEstimate& pose : poses) {
-    sum += (truth.map_T_vehicle(pose.scan).translation() -
-            truth_T_map * pose.map_T_vehicle.translation())
-               .squaredNorm();
-  }
-  return std::sqrt(ratio(sum, poses.size()));
+  std::vector<geometry::PosePair> pairs;
+  pairs.reserve(poses.size());
+  for (const PoseEstimate& pose : poses)
+    pairs.push_back({pose.map_T_vehicle, truth.map_T_vehicle(pose.scan)});
+  const auto error = geometry::aligned_error(pairs);
+  return error ? error->rms_m : 0.0;
 }
 
 MapCompleteness map_completeness(std::span<const Eigen::Vector2d> landmarks_m,

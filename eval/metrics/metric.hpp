@@ -75,7 +75,8 @@ struct ErrorSums {
 /// count for more (as in GeoSLAM's code).
 ErrorSums errors_of(const MapState& state, const MapTruth& truth);
 
-/// Absolute trajectory error [m]: RMSE of the positions after the best rigid alignment.
+/// Absolute trajectory error [m]: RMSE of the positions after the best rigid alignment; 0 of fewer
+/// than three poses.
 double absolute_trajectory_error(std::span<const PoseEstimate> poses, const MapTruth& truth);
 
 /// How many trunks the map has, and how many landmarks are none.
