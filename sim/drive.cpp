@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "sim/few_landmarks.hpp"
 #include "sim/random_streams.hpp"
 
 namespace understory::sim {
@@ -53,14 +54,41 @@ geometry::SE2 draw_in_central_half(const Forest& forest, std::mt19937_64& random
   return {x, y, heading(random)};
 }
 
+model::FieldOfView field_of_view(const SensorParameters& sensor) {
+  return {sensor.range_m, 0.0, sensor.view_rad};
+}
+
+bool is_in_sector(const Eigen::Vector2d& position_m, const SensorParameters& sensor) {
+  return std::abs(std::atan2(position_m.y(), position_m.x())) <= 0.5 * sensor.view_rad;
+}
+
+/// How far shared errors move a trunk from outside into range: 6 sigma.
+double shared_reach_m(const SensorParameters& sensor, const SharedErrorsAt& shared) {
+  if (shared.errors == nullptr) return 0.0;
+  const SharedErrorParameters& p = shared.errors->parameters();
+  const double sigma_m = std::hypot(p.along_sigma_m, p.direction_sigma_m,
+                                    std::abs(p.level_height_m) * p.level_sigma_rad);
+  return 6.0 * sigma_m + std::abs(p.radial_bias_share) * sensor.range_m;
+}
+
 }  // namespace
+
+DriveParameters few_landmarks_drive() {
+  DriveParameters parameters;
+  parameters.path.interval = 1.0;
+  parameters.sensor.range_m = 20.0;
+  parameters.sensor.view_rad = std::numbers::pi;
+  parameters.sensor.position_sigma_m = 0.03;
+  parameters.trunks_in_view = 2.8;
+  return parameters;
+}
 
 SimulatedScan observe(const Forest& forest, const PointGrid& grid,
                       const geometry::SE2& world_T_vehicle, const SensorParameters& sensor,
-                      std::mt19937_64& random) {
+                      std::mt19937_64& random, const SharedErrorsAt& shared) {
   SimulatedScan result;
   result.world_T_vehicle = world_T_vehicle;
-  result.scan.field_of_view.max_range_m = sensor.range_m;
+  result.scan.field_of_view = field_of_view(sensor);
   const double variance =
       std::max(sensor.variance_floor_m2, sensor.stated_factor * sensor.stated_factor *
                                              sensor.position_sigma_m * sensor.position_sigma_m);
@@ -72,14 +100,20 @@ SimulatedScan observe(const Forest& forest, const PointGrid& grid,
   const geometry::SE2 vehicle_T_world = world_T_vehicle.inverse();
 
   // Noise moves some trunks from outside into range: 6 sigma are enough.
-  const double reach = sensor.range_m + 6.0 * sensor.position_sigma_m;
+  const double reach =
+      sensor.range_m + 6.0 * sensor.position_sigma_m + shared_reach_m(sensor, shared);
   std::vector<std::pair<model::Detection, std::uint32_t>> seen;
   for (const std::uint32_t trunk : grid.within(world_T_vehicle.translation(), reach)) {
     const bool detected = chance(random) < sensor.detection_probability;
     const double dx = noise(random);
-    const Eigen::Vector2d position = vehicle_T_world * forest.trunks_m[trunk] +
-                                     sensor.position_sigma_m * Eigen::Vector2d(dx, noise(random));
-    if (!detected || position.norm() > sensor.range_m) continue;
+    const Eigen::Vector2d exact = vehicle_T_world * forest.trunks_m[trunk];
+    Eigen::Vector2d position = exact + sensor.position_sigma_m * Eigen::Vector2d(dx, noise(random));
+    if (!detected) continue;
+    if (shared.errors != nullptr) {
+      if (shared.errors->is_missed(trunk)) continue;
+      position += shared.errors->error_m(trunk, exact, world_T_vehicle, shared.along_m);
+    }
+    if (position.norm() > sensor.range_m || !is_in_sector(position, sensor)) continue;
     detection.position_m.head<2>() = position;
     detection.radius_m = forest.radii_m[trunk];
     seen.emplace_back(detection, trunk);
@@ -110,9 +144,18 @@ Drive::Drive(const DriveParameters& parameters, std::uint64_t seed)
     : Drive(parameters, forest_that_holds(parameters, seed), seed) {}
 
 Drive::Drive(const DriveParameters& parameters, Forest forest, std::uint64_t seed)
-    : parameters_(parameters), seed_(seed), forest_(std::move(forest)) {
+    : parameters_(parameters),
+      seed_(seed),
+      shared_(parameters.sensor.shared, seed, seed),
+      forest_(std::move(forest)) {
   grid_ = std::make_unique<PointGrid>(forest_.trunks_m, kGridTile_m);
   place_path();
+  if (parameters_.trunks_in_view > 0.0) {
+    forest_ = thinned_to(parameters_.trunks_in_view, forest_, world_T_vehicle_,
+                         field_of_view(parameters_.sensor), seed_);
+    grid_ = std::make_unique<PointGrid>(forest_.trunks_m, kGridTile_m);
+  }
+  measure_path();
 }
 
 void Drive::place_path() {
@@ -151,6 +194,15 @@ void Drive::fell_trunks_on(const std::vector<geometry::SE2>& path) {
   grid_ = std::make_unique<PointGrid>(forest_.trunks_m, kGridTile_m);
 }
 
+void Drive::measure_path() {
+  along_m_.assign(world_T_vehicle_.size(), 0.0);
+  for (std::size_t k = 1; k < along_m_.size(); ++k) {
+    const double step_m =
+        (world_T_vehicle_[k].translation() - world_T_vehicle_[k - 1].translation()).norm();
+    along_m_[k] = along_m_[k - 1] + step_m;
+  }
+}
+
 model::Utime Drive::utime(std::size_t k) const {
   return static_cast<model::Utime>(std::llround(static_cast<double>(k) * 1e6 *
                                                 parameters_.path.interval / parameters_.speed_mps));
@@ -158,10 +210,36 @@ model::Utime Drive::utime(std::size_t k) const {
 
 SimulatedScan Drive::scan(std::size_t k) const {
   std::mt19937_64 random = random_stream(seed_, Stream::kObservation, k);
-  SimulatedScan result = observe(forest_, *grid_, world_T_vehicle_[k], parameters_.sensor, random);
+  const SharedErrorsAt shared{parameters_.sensor.shared.any() ? &shared_ : nullptr, along_m_[k]};
+  SimulatedScan result =
+      observe(forest_, *grid_, world_T_vehicle_[k], parameters_.sensor, random, shared);
   result.scan.utime = utime(k);
   result.scan.sequence = k;
   return result;
+}
+
+model::Odometry Drive::odometry(std::size_t k) const {
+  constexpr double kLeastSigma_m = 1e-4;
+  constexpr double kLeastSigma_rad = 1e-5;
+  const geometry::SE2 motion = world_T_vehicle_[k - 1].inverse() * world_T_vehicle_[k];
+  const WheelOdometryParameters& wheels = parameters_.wheels;
+  const double distance_m = motion.translation().norm();
+  const double sigma_m = std::max(kLeastSigma_m, wheels.distance_share * distance_m);
+  const double sigma_rad = std::hypot(kLeastSigma_rad, wheels.heading_walk * std::sqrt(distance_m),
+                                      wheels.turn_share * motion.theta());
+
+  std::mt19937_64 random = random_stream(seed_, Stream::kWheels, k);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  const double x = normal(random), y = normal(random), turn = normal(random);
+  model::Odometry odometry;
+  odometry.from_utime = utime(k - 1);
+  odometry.utime = utime(k);
+  odometry.sequence = k - 1;
+  odometry.from_T_to = motion * geometry::SE2::Exp({sigma_m * x, sigma_m * y, sigma_rad * turn});
+  odometry.covariance =
+      Eigen::Vector3d(sigma_m * sigma_m, sigma_m * sigma_m, sigma_rad * sigma_rad).asDiagonal();
+  odometry.has_wheels = true;
+  return odometry;
 }
 
 }  // namespace understory::sim

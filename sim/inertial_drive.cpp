@@ -54,7 +54,10 @@ TrunkField make_trunk_field(const ForestParameters& parameters, std::uint64_t se
 
 InertialDrive::InertialDrive(const InertialDriveParameters& parameters, const TrunkField& world,
                              std::uint64_t seed)
-    : parameters_(parameters), world_(world), random_(random_stream(seed, Stream::kObservation)) {
+    : parameters_(parameters),
+      world_(world),
+      shared_(parameters.shared, seed, seed),
+      random_(random_stream(seed, Stream::kObservation)) {
   std::uniform_real_distribution<double> angle(0.0, kTwoPi);
   progress_.phase_rad = angle(random_);
   body_.theta_rad = angle(random_);
@@ -234,9 +237,12 @@ void InertialDrive::observe(DriveStep& step) {
 
   const auto near = world_.grid->within(step.world_T_vehicle.translation(), p.range_m);
   for (const std::uint32_t trunk : near) {
-    if (!detected(random_)) continue;
+    if (!detected(random_) || shared_.is_missed(trunk)) continue;
     const Eigen::Vector2d noise(normal(), normal());
-    add(vehicle_T_world * world_.forest.trunks_m[trunk] + true_sigma_m * noise, trunk);
+    const Eigen::Vector2d place = vehicle_T_world * world_.forest.trunks_m[trunk];
+    Eigen::Vector2d shown = place + true_sigma_m * noise;
+    if (p.shared.any()) shown += shared_.error_m(trunk, place, step.world_T_vehicle, step.driven_m);
+    add(shown, trunk);
   }
 
   std::poisson_distribution<int> clutter(

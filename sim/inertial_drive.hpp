@@ -11,6 +11,7 @@
 #include "common/model/odometry.hpp"
 #include "sim/forest.hpp"
 #include "sim/point_grid.hpp"
+#include "sim/shared_errors.hpp"
 
 namespace understory::sim {
 
@@ -62,6 +63,7 @@ struct InertialDriveParameters {
   double clutter_share = 0.0;          ///< False detections, as a share of the true ones expected.
   /// True noise of IMU, wheels and detections, in units of that above, which the messages state.
   double true_noise_factor = 1.0;
+  SharedErrorParameters shared;  ///< Errors of trunks on top, which no message states.
 };
 
 /// Everything between two scans, and the scan.
@@ -133,6 +135,7 @@ class InertialDrive {
 
   InertialDriveParameters parameters_;
   const TrunkField& world_;
+  SharedErrors shared_;
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
   std::uint64_t scans_ = 0;

@@ -13,7 +13,8 @@ enum class Stream : std::uint64_t {
   kStartPose = 2,
   kObservation = 3,
   kOther = 4,
-  kScenery = 5
+  kScenery = 5,
+  kWheels = 6
 };
 
 /// The generator of `stream` number `index` of simulation `seed` (mixed by splitmix64).

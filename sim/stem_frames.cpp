@@ -7,6 +7,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "sim/few_landmarks.hpp"
 #include "sim/point_grid.hpp"
 #include "sim/random_streams.hpp"
 
@@ -78,6 +79,7 @@ class StemDrive {
       : way_(way),
         parameters_(parameters),
         seed_(seed),
+        shared_(parameters.detector.shared, seed, drive_seed()),
         grid_(forest.trunks_m, parameters.detector.range_m),
         diameters_m_(diameters_of(forest, seed)),
         last_seen_s_(diameters_m_.size(), -std::numeric_limits<double>::infinity()),
@@ -91,8 +93,7 @@ class StemDrive {
   }
 
   model::StemFrame frame(std::size_t k) {
-    std::mt19937_64 random =
-        random_stream(seed_ + 1'000'003 * parameters_.visit, Stream::kObservation, k);
+    std::mt19937_64 random = random_stream(drive_seed(), Stream::kObservation, k);
     const double along_m = shift_m_ + parameters_.spacing_m * static_cast<double>(k);
     const geometry::SE2 pose = way_.pose(along_m) * geometry::SE2(0.0, sideways_m_, 0.0);
 
@@ -100,13 +101,15 @@ class StemDrive {
     frame.utime = 1'000'000 + std::llround(1e6 * along_m / parameters_.speed_mps);
     frame.number = static_cast<std::int64_t>(k);
     set_pose(frame, pose, random);
-    add_stems(frame, pose, along_m / parameters_.speed_mps, random);
+    add_stems(frame, pose, along_m, random);
     add_false_ones(frame, random);
     std::shuffle(frame.stems.begin(), frame.stems.end(), random);
     return frame;
   }
 
  private:
+  std::uint64_t drive_seed() const { return seed_ + 1'000'003 * parameters_.visit; }
+
   void set_pose(model::StemFrame& frame, const geometry::SE2& pose, std::mt19937_64& random) const {
     std::normal_distribution<double> tilt(0.0, parameters_.detector.tilt_sigma_rad);
     const double pitch = tilt(random);
@@ -130,6 +133,7 @@ class StemDrive {
       one.range_m = one.level_m.norm();
       one.bearing_rad = std::atan2(one.level_m.y(), one.level_m.x());
       one.half_width_rad = std::atan2(0.5 * diameters_m_[i], std::max(one.range_m, 0.1));
+      if (std::abs(one.bearing_rad) > 0.5 * parameters_.detector.view_rad) continue;
       found.push_back(one);
     }
     std::ranges::sort(found, {}, [](const InRange& one) { return one.range_m; });
@@ -144,9 +148,16 @@ class StemDrive {
     return drawn(seed_, 16 + visit, stem) < parameters_.detector.seen_share;
   }
 
-  void add_stems(model::StemFrame& frame, const geometry::SE2& pose, double now_s,
+  /// What the detector makes of the stem's place, but for the independent noise.
+  Eigen::Vector2d shown_m(const InRange& stem, const geometry::SE2& pose, double along_m) const {
+    if (!parameters_.detector.shared.any()) return stem.level_m;
+    return stem.level_m + shared_.error_m(stem.stem, stem.level_m, pose, along_m);
+  }
+
+  void add_stems(model::StemFrame& frame, const geometry::SE2& pose, double along_m,
                  std::mt19937_64& random) {
     const StemDetectorParameters& detector = parameters_.detector;
+    const double now_s = along_m / parameters_.speed_mps;
     Shadows shadows;
     for (const InRange& stem : in_range(pose)) {
       const bool is_visible = shadows.visible_share(stem) >= kLeastVisibleShare;
@@ -154,9 +165,9 @@ class StemDrive {
       const bool is_seen_now = is_seen(stem.stem, now_s);
       const double luck = uniform(random, 0.0, 1.0);
       if (!is_visible || !is_seen_now || luck > detector.detection ||
-          diameters_m_[stem.stem] < detector.least_diameter_m)
+          diameters_m_[stem.stem] < detector.least_diameter_m || shared_.is_missed(stem.stem))
         continue;
-      add_stem(frame, stem.level_m, diameters_m_[stem.stem], random);
+      add_stem(frame, shown_m(stem, pose, along_m), diameters_m_[stem.stem], random);
     }
   }
 
@@ -185,7 +196,7 @@ class StemDrive {
     const int count = std::poisson_distribution<int>(detector.false_per_frame)(random);
     for (int i = 0; i < count; ++i) {
       const double range = detector.range_m * std::sqrt(uniform(random, 0.0, 1.0));
-      const double bearing = uniform(random, -std::numbers::pi, std::numbers::pi);
+      const double bearing = uniform(random, -0.5 * detector.view_rad, 0.5 * detector.view_rad);
       const double diameter = uniform(random, 0.1, 0.5);
       add_stem(frame, range * Eigen::Vector2d(std::cos(bearing), std::sin(bearing)), diameter,
                random);
@@ -195,6 +206,7 @@ class StemDrive {
   const Route& way_;
   StemDriveParameters parameters_;
   std::uint64_t seed_;
+  SharedErrors shared_;
   PointGrid grid_;
   std::vector<double> diameters_m_;
   std::vector<double> last_seen_s_;  // by stem
@@ -203,12 +215,23 @@ class StemDrive {
   double shift_m_ = 0.0;
 };
 
+/// The forest that the drive has to itself: thinned where few stems are wanted.
+Forest forest_of(const Forest& forest, const Route& way, const StemDriveParameters& parameters,
+                 std::uint64_t seed) {
+  if (!(parameters.stems_in_view > 0.0)) return forest;
+  std::vector<geometry::SE2> poses;
+  for (double along_m = 0.0; along_m <= way.length_m(); along_m += parameters.spacing_m)
+    poses.push_back(way.pose(along_m));
+  const model::FieldOfView view{parameters.detector.range_m, 0.0, parameters.detector.view_rad};
+  return thinned_to(parameters.stems_in_view, forest, poses, view, seed);
+}
+
 }  // namespace
 
 std::vector<model::StemFrame> drive_stem_frames(const Forest& forest, const Route& way,
                                                 const StemDriveParameters& parameters,
                                                 std::uint64_t seed) {
-  StemDrive drive(forest, way, parameters, seed);
+  StemDrive drive(forest_of(forest, way, parameters, seed), way, parameters, seed);
   std::vector<model::StemFrame> frames;
   frames.reserve(drive.size());
   for (std::size_t k = 0; k < drive.size(); ++k) frames.push_back(drive.frame(k));

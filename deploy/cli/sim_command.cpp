@@ -16,6 +16,7 @@
 #include "deploy/cli/commands.hpp"
 #include "deploy/cli/failure.hpp"
 #include "deploy/cli/sensor_simulation.hpp"
+#include "deploy/cli/shared_error_options.hpp"
 #include "deploy/cli/sim_changes.hpp"
 #include "deploy/cli/sim_stem_frames.hpp"
 #include "sim/drive.hpp"
@@ -31,6 +32,7 @@ struct SimOptions {
   std::string lcm_url;
   std::string path = "circle";
   sim::DriveParameters drive;
+  bool wheels = false;
   std::uint64_t seed = 1;
   double rate = 1.0;
   SensorSimulationOptions sensors;
@@ -73,8 +75,12 @@ truth_landmarks_t truth_landmarks(const sim::Drive& drive) {
   return message;
 }
 
-/// Scan k with its truth.
-void publish_scan(const sim::Drive& drive, std::size_t k, const Publish& publish) {
+/// Scan k with its truth, and before it the motion up to it where there are wheels.
+void publish_scan(const sim::Drive& drive, std::size_t k, bool wheels, const Publish& publish) {
+  if (wheels && k > 0) {
+    const model::Odometry odometry = drive.odometry(k);
+    publish("ODOMETRY", odometry.utime, wire::encode_message(odometry));
+  }
   const auto simulated = drive.scan(k);
   ground_truth_t truth{};
   truth.utime = simulated.scan.utime;
@@ -84,15 +90,15 @@ void publish_scan(const sim::Drive& drive, std::size_t k, const Publish& publish
   publish("LANDMARKS", simulated.scan.utime, wire::encode_message(simulated.scan));
 }
 
-void write_log(const sim::Drive& drive, const std::string& file) {
-  io::LcmLogWriter writer(file);
+void write_log(const sim::Drive& drive, const SimOptions& options) {
+  io::LcmLogWriter writer(options.out);
   const Publish publish = [&](const std::string& channel, model::Utime utime,
                               const wire::Bytes& bytes) { writer.write(utime, channel, bytes); };
   terminal::Progress progress("simulating", static_cast<double>(drive.size()));
   publish("TRUTH_LANDMARKS", drive.utime(0), wire::encode_message(truth_landmarks(drive)));
   for (std::size_t k = 0; k < drive.size(); ++k) {
     terminal::throw_if_interrupted();
-    publish_scan(drive, k, publish);
+    publish_scan(drive, k, options.wheels, publish);
     progress.update(static_cast<double>(k + 1));
   }
   writer.commit();
@@ -118,7 +124,7 @@ void drive_live(const sim::Drive& drive, const SimOptions& options) {
     std::this_thread::sleep_until(start +
                                   std::chrono::microseconds(static_cast<std::int64_t>(elapsed_us)));
     terminal::throw_if_interrupted();
-    publish_scan(drive, k, publish);
+    publish_scan(drive, k, options.wheels, publish);
     progress.update(static_cast<double>(k + 1));
   }
 }
@@ -176,7 +182,7 @@ void simulate(SimOptions& options) {
     if (options.out.empty()) {
       drive_live(drive, options);
     } else {
-      write_log(drive, options.out);
+      write_log(drive, options);
     }
   } catch (const terminal::Interrupted& error) {
     fail(fmt::format("sim: {}", error.what()));
@@ -223,9 +229,17 @@ void add_landmark_options(CLI::App& command, SimOptions& options) {
       ->capture_default_str();
   command
       .add_option("--noise", drive.sensor.position_sigma_m,
-                  "Standard deviation of a position per axis [m]")
+                  "Independent standard deviation of a position per axis [m]")
       ->check(CLI::Range(0.0, 10.0))
       ->capture_default_str();
+  add_view_option(command, drive.sensor.view_rad);
+  command
+      .add_option("--trunks-in-view", drive.trunks_in_view,
+                  "The forest is thinned to so many trunks in view on average; 0 = as it is")
+      ->check(CLI::Range(0.0, 1e4))
+      ->capture_default_str();
+  command.add_flag("--wheels", options.wheels, "ODOMETRY of wheels between scans as well");
+  add_shared_error_options(command, drive.sensor.shared);
 }
 
 void add_sensor_options(CLI::App& command, SimOptions& options) {

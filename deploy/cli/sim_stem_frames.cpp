@@ -14,6 +14,7 @@
 #include "common/io/stem_frames.hpp"
 #include "common/io/text_file.hpp"
 #include "deploy/cli/failure.hpp"
+#include "deploy/cli/shared_error_options.hpp"
 #include "sim/stem_frames.hpp"
 
 namespace understory::cli {
@@ -126,11 +127,12 @@ void add_detector_options(CLI::App& command, sim::StemDetectorParameters& detect
   add("--seen", detector.seen_share, "Share of the stems that a visit detects at all", 0.0, 1.0);
   add("--detection", detector.detection, "Of those, share in each frame", 0.0, 1.0);
   add("--false-stems", detector.false_per_frame, "Mean number of false stems per frame", 0.0, 1e3);
-  add("--noise", detector.position_sigma_m, "Standard deviation of a position per axis [m]", 0.0,
-      5.0);
+  add("--noise", detector.position_sigma_m,
+      "Independent standard deviation of a position per axis [m]", 0.0, 5.0);
   add("--diameter-noise", detector.diameter_sigma_share, "The same of a diameter, as its share",
       0.0, 1.0);
   add("--tilt", detector.tilt_sigma_rad, "Standard deviation of roll and of pitch [rad]", 0.0, 0.5);
+  add_view_option(command, detector.view_rad);
   add("--least-diameter", detector.least_diameter_m, "Thinner stems are not detected [m]", 0.0,
       5.0);
 }
@@ -175,7 +177,13 @@ void add_stem_frames_simulation(CLI::App& sim) {
                    "Offset of the trajectory's frame, in x and in y [m]")
       ->check(CLI::Range(-1e6, 1e6))
       ->capture_default_str();
+  command
+      ->add_option("--stems-in-view", drive.stems_in_view,
+                   "The forest is thinned to so many stems in view on average; 0 = as it is")
+      ->check(CLI::Range(0.0, 1e3))
+      ->capture_default_str();
   add_detector_options(*command, drive.detector);
+  add_shared_error_options(*command, drive.detector.shared);
   command->add_option("--seed", options->seed, "Seed of path, detector and noise")
       ->capture_default_str();
   command->callback([options] { simulate_stem_frames(*options); });

@@ -68,6 +68,47 @@ TEST_CASE("sim with sensors writes every raw channel, sweeps in parts that fit t
   CHECK(events["TRUTH_LANDMARKS"] == 1);
 }
 
+TEST_CASE("sim with few trunks ahead, wheels and shared errors writes what it is told", "[cli]") {
+  const test::TemporaryDirectory directory;
+  const auto log = directory / "few.lcm";
+  const std::string few =
+      "sim sparse --path line --length 60 --interval 1 --sensor-range 20 --view-deg 180 "
+      "--trunks-in-view 2.5 --noise 0 --detection 1 --wheels --out " +
+      log.string();
+  const auto places = [&](const std::string& more) {
+    const auto outcome = understory_command(directory, few + more);
+    CAPTURE(outcome.error);
+    REQUIRE(outcome.status == 0);
+    std::vector<Eigen::Vector3d> result;
+    int motions = 0;
+    io::LcmLogReader reader(log);
+    while (const auto event = reader.next()) {
+      if (event->channel == "ODOMETRY") ++motions;
+      if (event->channel != "LANDMARKS") continue;
+      const auto scan = wire::decode_message<model::LandmarkScan>(event->data);
+      REQUIRE(scan);
+      CHECK(scan->field_of_view.width_rad == Approx(3.14159265));
+      for (const model::Detection& one : scan->detections) {
+        CHECK(one.position_m.x() > -0.5);
+        result.push_back(one.position_m);
+      }
+    }
+    CHECK(motions == 59);
+    return result;
+  };
+
+  const auto exact = places("");
+  CHECK(exact.size() / 60 >= 1);
+  CHECK(exact.size() / 60 <= 4);
+  CHECK(places("") == exact);
+  CHECK(places(" --direction-noise 0.02") != exact);
+  CHECK(places(" --along-noise 0.02") != exact);
+  CHECK(places(" --radial-bias -0.01") != exact);
+  CHECK(places(" --bearing-bias 0.01") != exact);
+  CHECK(places(" --level-noise 0.01") != exact);
+  CHECK(places(" --missed 0.5").size() < exact.size());
+}
+
 TEST_CASE("sim names an unknown value", "[cli]") {
   const test::TemporaryDirectory directory;
   const auto run = [&](const std::string& arguments) {
@@ -95,11 +136,16 @@ TEST_CASE("sim takes every number within its limits and none beyond", "[cli]") {
     std::string option;
     double least, most;
   };
-  const std::vector<Limits> all{
-      {"--length", 1.0, 1e6},       {"--interval", 1e-3, 100.0}, {"--speed", 1e-3, 100.0},
-      {"--sensor-range", 1.0, 1e3}, {"--detection", 0.0, 1.0},   {"--noise", 0.0, 10.0},
-      {"--distance", 20.0, 2e5},    {"--laps", 1, 1000},         {"--cruise", 0.5, 30.0},
-      {"--standstill", 0.0, 3600},  {"--gnss-until", 0.0, 1e6},  {"--rate", 1e-3, 1e3}};
+  const std::vector<Limits> all{{"--length", 1.0, 1e6},          {"--interval", 1e-3, 100.0},
+                                {"--speed", 1e-3, 100.0},        {"--sensor-range", 1.0, 1e3},
+                                {"--detection", 0.0, 1.0},       {"--noise", 0.0, 10.0},
+                                {"--distance", 20.0, 2e5},       {"--laps", 1, 1000},
+                                {"--cruise", 0.5, 30.0},         {"--standstill", 0.0, 3600},
+                                {"--gnss-until", 0.0, 1e6},      {"--rate", 1e-3, 1e3},
+                                {"--view-deg", 1.0, 360.0},      {"--trunks-in-view", 0.0, 1e4},
+                                {"--along-noise", 0.0, 5.0},     {"--along-length", 1e-3, 1e5},
+                                {"--direction-noise", 0.0, 5.0}, {"--direction-harmonics", 1, 100},
+                                {"--level-noise", 0.0, 0.5},     {"--missed", 0.0, 1.0}};
   const test::TemporaryDirectory directory;
   // A world that is none: numbers are looked at first, and nothing is driven.
   const auto error_of = [&](const std::string& option, double value) {
