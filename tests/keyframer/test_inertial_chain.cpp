@@ -1,4 +1,5 @@
 #include <Eigen/Dense>
+#include <algorithm>
 #include <random>
 
 #include "common/model/preintegration.hpp"
@@ -90,6 +91,40 @@ BlockProblem problem(const Truth& truth, const model::InertialBias& bias, double
   return block;
 }
 
+/// The same as one sample of the IMU in each step: three numbers' noise, in a singular covariance.
+void make_one_sample(BlockProblem& block, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  for (std::optional<model::InertialMotion>& motion : block.inertial) {
+    model::Preintegration& z = motion->inertial;
+    Eigen::Matrix<double, 5, 3> input = Eigen::Matrix<double, 5, 3>::Zero();
+    input(0, 0) = kGyro;
+    input.block<2, 2>(1, 1) = kVelocity * Eigen::Rotation2Dd(0.5 * z.yaw_rad).toRotationMatrix();
+    input.block<2, 2>(3, 1) = 0.5 * kStep_s * input.block<2, 2>(1, 1);
+    z.covariance = input * input.transpose();
+
+    const Eigen::Matrix<double, 5, 1> error =
+        input * Eigen::Vector3d(normal(random), normal(random), normal(random));
+    z.yaw_rad += error(0);
+    z.velocity_mps += error.segment<2>(1);
+    z.position_m += error.tail<2>();
+  }
+}
+
+/// Squared error of the first pose against the mean of all, which is the gauge, by its covariance;
+/// 3 on average.
+double shape_nees(const Truth& truth, const BlockEstimate& estimate) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  const geometry::SE2 truth_T_centre = truth.poses[0] * estimate.centre_T_member[0].mean.inverse();
+  for (std::size_t k = 0; k < truth.poses.size(); ++k) {
+    const geometry::SE2 estimated = truth_T_centre * estimate.centre_T_member[k].mean;
+    mean += (estimated * truth.poses[k].inverse()).Log() / kScans;
+  }
+  const Eigen::Matrix3d to_left = truth.poses[0].Adjoint();
+  const Eigen::Matrix3d covariance =
+      to_left * estimate.centre_T_member[0].covariance * to_left.transpose();
+  return mean.dot(covariance.inverse() * mean);
+}
+
 model::InertialBias drawn_bias(std::mt19937_64& random) {
   std::normal_distribution<double> normal;
   const Eigen::Vector3d sigma = prior().covariance.diagonal().cwiseSqrt();
@@ -169,7 +204,7 @@ TEST_CASE("With an IMU a block's shape and the bias are as sure as stated", "[in
   std::mt19937_64 random(3);
   const Truth truth = bend(random);
   constexpr int kRuns = 400;
-  double shape_nees = 0.0;
+  double nees = 0.0;
   double bias_nees = 0.0;
   double growth = 0.0;
   double with_imu = 0.0;
@@ -181,21 +216,7 @@ TEST_CASE("With an IMU a block's shape and the bias are as sure as stated", "[in
     REQUIRE(estimate.converged);
     REQUIRE(estimate.bias);
 
-    // The base against the mean of all, which is the gauge: errors' sum is zero.
-    Eigen::Vector3d base = Eigen::Vector3d::Zero();
-    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-    const geometry::SE2 truth_T_centre =
-        truth.poses[0] * estimate.centre_T_member[0].mean.inverse();
-    for (std::size_t k = 0; k < truth.poses.size(); ++k) {
-      const geometry::SE2 estimated = truth_T_centre * estimate.centre_T_member[k].mean;
-      const Eigen::Vector3d error = (estimated * truth.poses[k].inverse()).Log();
-      mean += error / kScans;
-    }
-    base -= mean;
-    const Eigen::Matrix3d to_left = truth.poses[0].Adjoint();
-    const Eigen::Matrix3d covariance =
-        to_left * estimate.centre_T_member[0].covariance * to_left.transpose();
-    shape_nees += base.dot(covariance.inverse() * base) / (3.0 * kRuns);
+    nees += shape_nees(truth, estimate) / (3.0 * kRuns);
     with_imu += estimate.centre_T_member[0].covariance.topLeftCorner<2, 2>().trace() / kRuns;
 
     const Eigen::Vector3d bias_error = estimate.bias->mean - bias;
@@ -210,10 +231,31 @@ TEST_CASE("With an IMU a block's shape and the bias are as sure as stated", "[in
       added += estimate.chi2[i] - by_landmarks.chi2[i];
     growth += added / (estimate.inertial_degrees_of_freedom * kRuns);
   }
-  CHECK(shape_nees == Approx(1.0).margin(0.12));
+  CHECK(nees == Approx(1.0).margin(0.12));
   CHECK(bias_nees == Approx(1.0).margin(0.12));
   CHECK(growth == Approx(1.0).margin(0.1));
   CHECK(with_imu < 0.7 * without);
+}
+
+TEST_CASE("With one sample in each step a block's shape is as sure as stated", "[inertial]") {
+  std::mt19937_64 random(7);
+  const Truth truth = bend(random);
+  constexpr int kRuns = 400;
+  double nees = 0.0;
+  double bias_nees = 0.0;
+  for (int run = 0; run < kRuns; ++run) {
+    const model::InertialBias bias = drawn_bias(random);
+    BlockProblem block = problem(truth, bias, 0.0, random);
+    make_one_sample(block, random);
+    const BlockEstimate estimate = adjust_block(block);
+    REQUIRE(estimate.converged);
+    REQUIRE(estimate.bias);
+    nees += shape_nees(truth, estimate) / (3.0 * kRuns);
+    const Eigen::Vector3d bias_error = estimate.bias->mean - bias;
+    bias_nees += bias_error.dot(estimate.bias->covariance.inverse() * bias_error) / (3.0 * kRuns);
+  }
+  CHECK(nees == Approx(1.0).margin(0.15));
+  CHECK(bias_nees == Approx(1.0).margin(0.15));
 }
 
 TEST_CASE("The bias is learned from block to block, and walks", "[inertial]") {
@@ -243,4 +285,64 @@ TEST_CASE("The bias is learned from block to block, and walks", "[inertial]") {
   CHECK(track.known(any, motion).covariance(2, 2) > before + 9e-4);
   track.forget();
   CHECK(track.known(any, motion).covariance == start.covariance);
+}
+
+namespace {
+
+using Matrix5 = Eigen::Matrix<double, 5, 5>;
+
+/// Standard deviations far above the least ones.
+const Eigen::Matrix<double, 5, 1> kSigmas =
+    (Eigen::Matrix<double, 5, 1>() << 1e-3, 0.05, 0.05, 2e-3, 2e-3).finished();
+
+/// Correlations and standard deviations about kSigmas of five numbers that `rank` random ones make.
+Matrix5 semidefinite(int rank, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  Eigen::MatrixXd root(5, rank);
+  for (Eigen::Index i = 0; i < root.size(); ++i) root(i) = normal(random);
+  return kSigmas.asDiagonal() * (root * root.transpose()) * kSigmas.asDiagonal();
+}
+
+Matrix5 in_sigmas(const Matrix5& matrix) {
+  const Eigen::Matrix<double, 5, 1> scale = kSigmas.cwiseInverse();
+  return scale.asDiagonal() * matrix * scale.asDiagonal();
+}
+
+}  // namespace
+
+TEST_CASE("Each singular covariance of an IMU counts as stated", "[inertial]") {
+  std::mt19937_64 random(5);
+  for (int trial = 0; trial < 10'000; ++trial) {
+    const Matrix5 covariance = semidefinite(trial % 6, random);
+    const auto information = inertial_information(covariance);
+    REQUIRE(information);
+    REQUIRE(*information == information->transpose());
+    REQUIRE(information->llt().info() == Eigen::Success);
+
+    // The inverse on the range of the covariance, and no more than the least variance beside it.
+    const Matrix5 back = covariance * *information * covariance;
+    const double size = std::max(1.0, in_sigmas(covariance).norm());
+    REQUIRE(in_sigmas(back - covariance).norm() < 1e-3 * size);
+    REQUIRE(information->diagonal()
+                .cwiseSqrt()
+                .cwiseProduct(Eigen::Matrix<double, 5, 1>(1e-6, 1e-4, 1e-4, 1e-5, 1e-5))
+                .maxCoeff() < 1.0 + 1e-9);
+  }
+}
+
+TEST_CASE("A matrix with a negative variance in any direction is no covariance", "[inertial]") {
+  std::mt19937_64 random(6);
+  std::normal_distribution<double> normal;
+  for (int trial = 0; trial < 10'000; ++trial) {
+    Eigen::Matrix<double, 5, 1> direction;
+    for (double& x : direction) x = normal(random);
+    direction.normalize();
+
+    // The variance along the direction becomes negative, a thousandth of the others'.
+    const Matrix5 good = in_sigmas(semidefinite(5, random));
+    const double along = direction.dot(good * direction);
+    const Matrix5 bad = good - (along + 1e-3 * good.norm()) * direction * direction.transpose();
+    REQUIRE_FALSE(inertial_information(kSigmas.asDiagonal() * bad * kSigmas.asDiagonal()));
+  }
+  CHECK_FALSE(inertial_information(Matrix5::Constant(std::nan(""))));
 }

@@ -397,3 +397,32 @@ TEST_CASE("An IMU makes a keyframe's members surer, unless it contradicts the la
     }
   }
 }
+
+TEST_CASE("An IMU that gave one sample between two scans holds each keyframe's scans",
+          "[keyframer]") {
+  const sim::Drive simulated = drive(sim::PathKind::kCircle, 60.0, 0.9, 0.2, 6);
+  const auto one_sample = [](model::Preintegration& z, std::size_t k) {
+    // Rate and force of one sample: five numbers by three, in the axes of the step's middle.
+    const double t = z.seconds;
+    const double yaw_rad = 1e-3 * static_cast<double>(k % 7);
+    Eigen::Matrix<double, 5, 3> input = Eigen::Matrix<double, 5, 3>::Zero();
+    input(0, 0) = t;
+    input.block<2, 2>(1, 1) = t * Eigen::Rotation2Dd(yaw_rad).toRotationMatrix();
+    input.block<2, 2>(3, 1) = 0.5 * t * input.block<2, 2>(1, 1);
+    z.covariance = input * Eigen::Vector3d(1e-6, 1e-2, 1e-2).asDiagonal() * input.transpose();
+  };
+  const auto singular = with_imu(simulated, one_sample);
+  const auto regular = with_imu(simulated, [&](model::Preintegration& z, std::size_t k) {
+    one_sample(z, k);
+    z.covariance.diagonal() += Eigen::Matrix<double, 5, 1>(1e-11, 1e-8, 1e-8, 1e-10, 1e-10);
+  });
+
+  REQUIRE(singular.size() > 20);
+  REQUIRE(singular.size() == regular.size());
+  for (std::size_t i = 0; i < singular.size(); ++i) {
+    const auto spread = [](const model::Keyframe& keyframe) {
+      return keyframe.members.front().covariance.topLeftCorner<2, 2>().trace();
+    };
+    CHECK(spread(singular[i]) == Approx(spread(regular[i])).epsilon(0.05));
+  }
+}

@@ -17,6 +17,9 @@ constexpr double kAnyVelocity_mps = 1000.0;
 constexpr double kStandstill_mps = 0.01;
 /// Least variance of (yaw, velocity, position): rounding, and what no noise model has.
 const Vector5 kLeastVariance = (Vector5() << 1e-12, 1e-8, 1e-8, 1e-10, 1e-10).finished();
+/// Least variance of a combination of these, each in units of its standard deviation. The wire
+/// takes eigenvalues of the correlations down to -1e-6 for rounding.
+constexpr double kLeastOfOwn = 4e-6;
 
 /// The error of one step, and its Jacobians.
 struct StepError {
@@ -58,13 +61,29 @@ StepError error_of(const model::Preintegration& z, const geometry::SE2& a, const
 
 }  // namespace
 
+std::optional<Matrix5> inertial_information(const Matrix5& covariance) {
+  if (!covariance.allFinite() || (covariance.diagonal().array() < 0.0).any()) return std::nullopt;
+  const Vector5 scale = (covariance.diagonal() + kLeastVariance).cwiseSqrt().cwiseInverse();
+  Matrix5 scaled =
+      scale.asDiagonal() * (covariance + Matrix5(kLeastVariance.asDiagonal())) * scale.asDiagonal();
+  scaled.diagonal().array() += kLeastOfOwn;
+  const Eigen::LLT<Matrix5> factor(scaled);
+  if (factor.info() != Eigen::Success) return std::nullopt;
+
+  const Matrix5 root = factor.matrixL().solve(Matrix5(scale.asDiagonal()));  // root' root
+  Matrix5 information = Matrix5::Zero();
+  information.selfadjointView<Eigen::Lower>().rankUpdate(root.transpose());
+  return Matrix5(information.selfadjointView<Eigen::Lower>());
+}
+
 InertialChain::InertialChain(std::span<const std::optional<model::InertialMotion>> steps,
                              const BiasEstimate& prior)
     : poses_(steps.size() + 1), prior_(prior) {
   for (std::size_t k = 0; k < steps.size(); ++k) {
-    if (!steps[k]) continue;
-    const Matrix5 covariance = steps[k]->inertial.covariance + Matrix5(kLeastVariance.asDiagonal());
-    steps_.push_back({k, *steps[k], covariance.inverse()});
+    const auto information =
+        steps[k] ? inertial_information(steps[k]->inertial.covariance) : std::nullopt;
+    if (!information) continue;
+    steps_.push_back({k, *steps[k], *information});
     steps_.back().motion.inertial = at_bias(steps[k]->inertial, prior.mean);
     degrees_of_freedom_ += steps[k]->is_stationary ? 4 : 5;
   }

@@ -23,13 +23,24 @@ struct BiasEstimate {
   }
 };
 
+/// Information of one step: the inverse of the covariance of (yaw, velocity, position), exactly
+/// symmetric and positive definite. A singular covariance is a valid statement: an IMU at the
+/// vehicle's origin that gave one sample between two scans measured three numbers, of which the
+/// five follow. What has no variance of its own counts with a least one: 1 microrad, 0.1 mm/s, 10
+/// um, and 1/500 of the stated standard deviation in every combination of the five. None where the
+/// matrix is no covariance: not finite, or a combination with a negative variance beyond what the
+/// wire takes for rounding. Only the lower triangle is read.
+std::optional<Eigen::Matrix<double, 5, 5>> inertial_information(
+    const Eigen::Matrix<double, 5, 5>& covariance);
+
 /// The scans' velocities and the bias as unknowns beside their poses, eliminated: they hold the
 /// shape of a block far better than the stated errors of its steps do, since a velocity that is
 /// not known is one for all of them (Forster et al. 2017, in the plane). Nothing of it changes with
 /// the frame of the poses.
 class InertialChain {
  public:
-  /// steps[k]: from pose k to pose k + 1, where an IMU measured it. `prior` is the bias before.
+  /// steps[k]: from pose k to pose k + 1, where an IMU measured it; one without an information (see
+  /// inertial_information()) is passed over. `prior` is the bias before.
   InertialChain(std::span<const std::optional<model::InertialMotion>> steps,
                 const BiasEstimate& prior);
 

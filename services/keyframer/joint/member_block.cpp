@@ -1,6 +1,5 @@
 #include "services/keyframer/joint/member_block.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -155,7 +154,7 @@ void use_imu(std::span<const Member> members, const BiasEstimate& bias, MemberBl
   bool has_imu = false;
   for (std::size_t k = 1; k < members.size(); ++k) {
     std::optional<model::InertialMotion> inertial = members[k].inertial;
-    if (inertial && !inertial->inertial.covariance.ldlt().isPositive()) inertial.reset();
+    if (inertial && !inertial_information(inertial->inertial.covariance)) inertial.reset();
     has_imu = has_imu || inertial.has_value();
     problem.inertial.push_back(std::move(inertial));
   }
