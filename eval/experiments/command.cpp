@@ -16,6 +16,7 @@
 #include "eval/experiments/partition/partition.hpp"
 #include "eval/experiments/place_recognition/place_recognition.hpp"
 #include "eval/experiments/returns/returns.hpp"
+#include "eval/experiments/shared_errors/shared_errors.hpp"
 
 namespace understory::eval::experiments {
 
@@ -37,6 +38,7 @@ void add_eval_command(CLI::App& parent) {
   laps::add_laps_experiment(eval);
   returns::add_returns_experiment(eval);
   loops::add_loops_experiment(eval);
+  shared_errors::add_shared_errors_experiment(eval);
   place_recognition::add_place_recognition_experiment(eval);
   loop_detectors::add_loop_detectors_experiment(eval);
   health::add_health_experiment(eval);

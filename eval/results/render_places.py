@@ -72,6 +72,29 @@ def loop_queries(document):
                    f"{3 / none:.1e}" if none and not wrong else "")])
 
 
+def shared_errors(document):
+    """Drives whose detections share errors: a line for each map and kind of error; then what closures waited for."""
+    lines, reasons = [], {}
+    for drive, errors in dict.fromkeys((row["drive"], row["errors"]) for row in document["rows"]):
+        some = [row for row in document["rows"] if (row["drive"], row["errors"]) == (drive, errors)]
+        mean = lambda key: sum(row[key] for row in some) / len(some)
+        total = lambda key: sum(row[key] for row in some)
+        lines.append((drive, errors, len(some), number(mean("length_m"), 0), number(mean("ate_m"), 3), number(mean("ate_batch_m"), 3),
+                      number(mean("ate_m") / mean("ate_batch_m"), 2), number(mean("ate_live_m"), 3), number(mean("nees"), 1),
+                      number(100 * mean("nees_in_band"), 0), number(mean("nees_within_95_pct"), 0),
+                      f"{total('closures_sent')} / {total('closures_right')} / {total('closures_accepted')}",
+                      total("closures_accepted_wrong"), total("rolled_back"), total("without_pose"), total("keyframes"),
+                      number(mean("doubled_pct"), 2), number(mean("frame_ms_first_quarter"), 2), number(mean("frame_ms_last_quarter"), 2)))
+        for row in some:
+            for reason, count in row["closures_not_accepted"].items():
+                reasons[reason] = reasons.get(reason, 0) + count
+    return table(("drive", "errors", "drives", "length m", "ATE m", "batch m", "ratio", "ATE live m", "NEES (3)", "drives in the 95 % band %",
+                  "keyframes below the 95 % quantile %", "closures sent / right / accepted", "wrong accepted", "rolled back", "without pose",
+                  "keyframes", "doubled %", "ms a frame, first quarter", "last quarter"), lines) + [
+        "", "Closures that were not accepted at once: "
+        + ("; ".join(f"{count} {reason}" for reason, count in sorted(reasons.items())) or "none") + "."]
+
+
 def loop_detectors(document):
     """Detectors alone, and behind each verifier: recall before the first wrong answer in every set; then all rows."""
     rows = [row for row in document["rows"] if not row["is_tuning"]]

@@ -63,6 +63,7 @@ SECTIONS = (
     ("loops", "Loops found while tracking goes on", None, render_places.loops),
     ("loops-blind", "Loops found while tracking goes on, no stem seen on a third of the way", None, render_places.loops),
     ("loops-strangers", "Queries that have no match", None, render_places.loop_queries),
+    ("shared-errors", "Detections that share errors from frame to frame", None, render_places.shared_errors),
     ("returns", "Drives that drift and come back near themselves", None, render_returns.returns),
     ("loop-detectors", "Loop detectors and verifiers", "named in the thesis on submaps, §2.4, without figures",
      render_places.loop_detectors),

@@ -197,4 +197,16 @@ std::vector<geometry::SE2> batch_poses(const LoopDrive& drive, Association assoc
   return result;
 }
 
+PathErrors batch_errors(const LoopDrive& drive, std::size_t first, Association association) {
+  std::vector<geometry::SE2> poses = batch_poses(drive, association);
+  const geometry::SE2 truth_T_batch = drive.truth[first] * poses[first].inverse();
+  std::vector<std::size_t> frames;
+  std::vector<geometry::SE2> aligned;
+  for (std::size_t i = first; i < poses.size(); ++i) {
+    frames.push_back(i);
+    aligned.push_back(truth_T_batch * poses[i]);
+  }
+  return path_errors(drive, frames, aligned);
+}
+
 }  // namespace understory::eval::experiments::loops

@@ -5,6 +5,7 @@
 
 #include "common/geometry/se2.hpp"
 #include "eval/experiments/loops/loop_drive.hpp"
+#include "eval/experiments/loops/loop_run.hpp"
 
 namespace understory::eval::experiments::loops {
 
@@ -19,5 +20,9 @@ enum class Association {
 /// their trees, from the true poses on. Detections count by the noise that their residuals show,
 /// whatever is stated. Throws std::runtime_error where it does not converge.
 std::vector<geometry::SE2> batch_poses(const LoopDrive& drive, Association association);
+
+/// Their errors from frame `first` on, whose pose is held: that of the keyframe with which the
+/// mapper's map begins. Throws as batch_poses().
+PathErrors batch_errors(const LoopDrive& drive, std::size_t first, Association association);
 
 }  // namespace understory::eval::experiments::loops

@@ -139,8 +139,10 @@ void add_scans(const std::vector<model::StemFrame>& frames, const LoopDriveOptio
     for (const model::Detection& stem : drive.scans.back().detections)
       farthest_m = std::max(farthest_m, stem.position_m.head<2>().norm());
   }
-  for (model::LandmarkScan& scan : drive.scans)
+  for (model::LandmarkScan& scan : drive.scans) {
     scan.field_of_view.max_range_m = farthest_m + kBeyondM;
+    scan.field_of_view.width_rad = options.view_rad;
+  }
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -18,8 +18,9 @@ struct LoopDriveOptions {
   double odometry_percent = 1.0;  ///< Noise of ODOMETRY per axis, of the distance; 1 sigma.
   double odometry_deg = 0.3;      ///< Noise of its heading per frame; 1 sigma.
   double sigma_m = 0.1;           ///< That LANDMARKS state, per axis.
-  double blind_from = 0.0;        ///< Share of the drive from which on no stem is seen ...
-  double blind_to = 0.0;          ///< ... to this.
+  double view_rad = 2.0 * std::numbers::pi;  ///< Width of the field of view, its middle ahead.
+  double blind_from = 0.0;  ///< Share of the drive from which on no stem is seen ...
+  double blind_to = 0.0;    ///< ... to this.
 };
 
 /// The inputs of a drive, with what is true.

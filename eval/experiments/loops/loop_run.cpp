@@ -123,7 +123,8 @@ class LoopRun {
       : drive_(drive),
         chain_({keyframer::keyframer_service(), geoslam_mapper::geoslam_mapper_service()},
                config_dir),
-        scores_(drive) {
+        scores_(drive),
+        fate_(drive) {
     if (with_loop_closer) closer_.emplace(closer_parameters(config_dir));
     for (std::size_t i = 0; i < drive.scans.size(); ++i) frame_at_[drive.scans[i].utime] = i;
     watch();
@@ -132,9 +133,11 @@ class LoopRun {
   LoopScore run() {
     for (std::size_t i = 0; i < drive_.scans.size(); ++i) {
       terminal::throw_if_interrupted();
+      const double before_s = spent_s();
       if (i > 0) chain_.feed("ODOMETRY", wire::encode_message(drive_.odometry[i - 1]));
       chain_.feed("LANDMARKS", wire::encode_message(drive_.scans[i]));
       send_closures();
+      fate_.frame_took(1e3 * (spent_s() - before_s));
     }
     chain_.finish();
     sum_up();
@@ -146,17 +149,32 @@ class LoopRun {
     chain_.watch<model::Keyframe>("KEYFRAME", [this](const model::Keyframe& keyframe) {
       ++score_.keyframes;
       frame_of_[keyframe.sequence] = frame_at_.at(keyframe.utime);
-      if (closer_) closer_->add(keyframe);
+      if (!closer_) return;
+      const double start_s = tools::thread_time_s();
+      closer_->add(keyframe);
+      closer_s_ += tools::thread_time_s() - start_s;
     });
     chain_.watch<model::MapUpdate>("SLAM_UPDATE",
                                    [this](const model::MapUpdate& update) { follow(update); });
+    chain_.watch<model::MapDelta>("MAP_DELTA",
+                                  [this](const model::MapDelta& delta) { fate_.follow(delta); });
+    chain_.watch<model::SlamPose>("SLAM_POSE",
+                                  [this](const model::SlamPose& pose) { fate_.follow(pose); });
     chain_.watch<model::LoopResult>("LOOP_RESULT",
                                     [this](const model::LoopResult& result) { follow(result); });
     chain_.watch<model::WholeMap>("MAP", [this](const model::WholeMap& map) { last_map_ = map; });
   }
 
+  /// Processor time of all stages so far.
+  double spent_s() const {
+    double sum_s = closer_s_;
+    for (const std::string& service : chain_.services()) sum_s += chain_.time_of(service).total_s;
+    return sum_s;
+  }
+
   void follow(const model::MapUpdate& update) {
     using enum model::MapUpdateStatus;
+    fate_.follow(update);
     const std::size_t frame = frame_of_.at(update.keyframe_sequence);
     if (update.status == kFirstMap) {
       ++score_.maps;
@@ -169,12 +187,15 @@ class LoopRun {
       score_.online_m = (update.map_T_vehicle.translation() - truth.translation()).norm();
     }
     if (!closer_) return;
+    const double start_s = tools::thread_time_s();
     if (auto closure = ask(update, frame, *closer_, scores_, score_))
       closures_.push_back(std::move(*closure));
+    closer_s_ += tools::thread_time_s() - start_s;
   }
 
   void follow(const model::LoopResult& result) {
     if (closer_) closer_->add(result);
+    fate_.follow(result);
     using enum model::LoopResult::Status;
     if (result.status == kRefused) ++score_.refused;
     if (result.status == kWaiting) ++score_.waiting;
@@ -212,11 +233,14 @@ class LoopRun {
     score_.error_m = errors.mean_m;
     score_.ate_m = errors.ate_m;
     score_.end_m = errors.end_m;
+    score_.fate = fate_.sum_up(*last_map_, map_T_first_);
   }
 
   const LoopDrive& drive_;
   harness::SensorChain chain_;
   ClosureScore scores_;
+  DriveWatch fate_;
+  double closer_s_ = 0.0;  ///< Processor time of the loop closer, which is not in the chain.
   std::optional<loop_closer::LoopCloser> closer_;
   std::map<model::Utime, std::size_t> frame_at_;
   std::map<std::uint64_t, std::size_t> frame_of_;  ///< By sequence of the keyframe.

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "eval/experiments/loops/drive_watch.hpp"
 #include "eval/experiments/loops/loop_drive.hpp"
 
 namespace understory::eval::experiments::loops {
@@ -38,6 +39,7 @@ struct LoopScore {
   double search_ms_p99 = 0.0;
   double mapper_ms_p99 = 0.0;
   double largest_closure_ms = 0.0;
+  DriveFate fate;
 };
 
 /// Runs keyframer and mapper, configured by the folder, and the loop closer where it is wanted.

@@ -84,19 +84,6 @@ nlohmann::json row_of(const LoopDrive& drive, std::uint64_t seed, const LoopScor
           {"largest_closure_ms", score.largest_closure_ms}};
 }
 
-/// In the frame of the keyframe with which the map begins, as the mapper's are.
-PathErrors batch_errors(const LoopDrive& drive, std::size_t first, Association association) {
-  std::vector<geometry::SE2> poses = batch_poses(drive, association);
-  const geometry::SE2 truth_T_batch = drive.truth[first] * poses[first].inverse();
-  std::vector<std::size_t> frames;
-  std::vector<geometry::SE2> aligned;
-  for (std::size_t i = first; i < poses.size(); ++i) {
-    frames.push_back(i);
-    aligned.push_back(truth_T_batch * poses[i]);
-  }
-  return path_errors(drive, frames, aligned);
-}
-
 /// The solutions of one drive.
 nlohmann::json solve(const std::string& name, const std::vector<model::StemFrame>& frames,
                      const LoopsOptions& options, std::uint64_t seed) {
@@ -195,6 +182,8 @@ void run_loops(LoopsOptions options) {
   harness::write_json(options.json, harness::result_document("loops", config, rows));
 }
 
+}  // namespace
+
 void add_noise_options(CLI::App& command, LoopDriveOptions& drive) {
   command
       .add_option("--odometry-percent", drive.odometry_percent,
@@ -212,8 +201,6 @@ void add_noise_options(CLI::App& command, LoopDriveOptions& drive) {
       ->check(CLI::Range(1e-3, 10.0))
       ->capture_default_str();
 }
-
-}  // namespace
 
 void add_loops_experiment(CLI::App& eval) {
   CLI::App& command = *eval.add_subcommand("loops",

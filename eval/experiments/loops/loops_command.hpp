@@ -3,7 +3,12 @@
 
 #include <CLI/App.hpp>
 
+#include "eval/experiments/loops/loop_drive.hpp"
+
 namespace understory::eval::experiments::loops {
+
+/// --odometry-percent, --odometry-deg, --sigma-m. `drive` must outlive the command.
+void add_noise_options(CLI::App& command, LoopDriveOptions& drive);
 
 /// Adds `loops`: drives of stem frames with the loop closer, without it, and the batch solution.
 void add_loops_experiment(CLI::App& eval);
