@@ -115,7 +115,7 @@ Eigen::Vector2d SharedErrors::by_direction(std::uint32_t landmark, double direct
   const std::uint64_t key = mixed(shapes_key_, landmark);
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   for (int k = 1; k <= parameters_.direction_harmonics; ++k) {
-    const auto index = static_cast<std::uint64_t>(2 * k);
+    const auto index = 2 * static_cast<std::uint64_t>(k);
     sum += std::cos(k * direction_rad) * normal_pair(key, index) +
            std::sin(k * direction_rad) * normal_pair(key, index + 1);
   }

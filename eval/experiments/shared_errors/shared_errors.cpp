@@ -113,6 +113,7 @@ void print_runs(const std::vector<nlohmann::json>& rows) {
     return total;
   };
   const auto mean = [&](const char* key) { return sum(key) / static_cast<double>(rows.size()); };
+
   const auto in_band = std::ranges::count_if(
       rows, [](const auto& row) { return row["nees_in_band"].template get<bool>(); });
   fmt::print(
