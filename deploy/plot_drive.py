@@ -28,7 +28,8 @@ def draw_map(axes, drive):
     axes.set_xlabel("x [m]")
     axes.set_ylabel("y [m]")
     axes.legend(loc="upper right", fontsize="small")
-    axes.set_title(f"landmarks: mean error {drive['lpe_cm']:.1f} cm")
+    if drive["lpe_cm"] is not None:
+        axes.set_title(f"landmarks: mean error {drive['lpe_cm']:.1f} cm")
 
 
 def draw_error(axes, drive):

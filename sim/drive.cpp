@@ -99,9 +99,7 @@ SimulatedScan observe(const Forest& forest, const PointGrid& grid,
   std::normal_distribution<double> noise(0.0, 1.0);
   const geometry::SE2 vehicle_T_world = world_T_vehicle.inverse();
 
-  // Noise moves some trunks from outside into range: 6 sigma are enough.
-  const double reach =
-      sensor.range_m + 6.0 * sensor.position_sigma_m + shared_reach_m(sensor, shared);
+  const double reach = sensor.reach_m() + shared_reach_m(sensor, shared);
   std::vector<std::pair<model::Detection, std::uint32_t>> seen;
   for (const std::uint32_t trunk : grid.within(world_T_vehicle.translation(), reach)) {
     const bool detected = chance(random) < sensor.detection_probability;

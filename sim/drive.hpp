@@ -29,6 +29,10 @@ struct SensorParameters {
   double variance_floor_m2 = 1e-8;
   double view_rad = 2.0 * std::numbers::pi;  ///< Width of the field of view, its middle ahead.
   SharedErrorParameters shared;  ///< Errors on top, which scans share; what is stated counts none.
+
+  /// Farther landmarks are never detected: noise brings some from outside into range, 6 sigma are
+  /// enough.
+  double reach_m() const { return range_m + 6.0 * position_sigma_m; }
 };
 
 /// Errors of wheel odometry from scan to scan. Sigmas are standard deviations.

@@ -16,7 +16,7 @@ constexpr double kDegrees = 180.0 / std::numbers::pi;
 std::vector<double> paths_m(std::span<const PosePair> poses) {
   std::vector<double> paths(poses.size(), 0.0);
   for (std::size_t i = 1; i < poses.size(); ++i) {
-    const auto step = poses[i].truth.translation() - poses[i - 1].truth.translation();
+    const Eigen::Vector2d step = poses[i].truth.translation() - poses[i - 1].truth.translation();
     paths[i] = paths[i - 1] + step.norm();
   }
   return paths;

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
 
@@ -78,6 +79,67 @@ Json of_both(const DriveAccuracy& accuracy, const Measure& measure) {
   return {{"live", measure(accuracy.live)}, {"keyframes", measure(accuracy.keyframes)}};
 }
 
+Json closures_json(const ClosureCounts& closures) {
+  return {{"sent", closures.sent},       {"accepted", closures.accepted},
+          {"waiting", closures.waiting}, {"revoked", closures.revoked},
+          {"refused", closures.refused}, {"refused_by_reason", Json(closures.refused_by_reason)}};
+}
+
+/// Wrong poses, and whether a process said so; `told` is null where none said how it was.
+Json wrong_json(const DriveAccuracy& accuracy) {
+  std::size_t poses = 0;
+  int told = 0;
+  Json list = Json::array();
+  for (const WrongStretch& stretch : accuracy.wrong_stretches) {
+    poses += stretch.poses;
+    if (stretch.was_told) ++told;
+    list.push_back({{"from_utime", stretch.span.from_us},
+                    {"to_utime", stretch.span.to_us},
+                    {"poses", stretch.poses},
+                    {"largest_error_m", stretch.largest_error_m},
+                    {"told", stretch.was_told}});
+  }
+  const auto count = static_cast<double>(accuracy.wrong_stretches.size());
+  return {{"stretches", accuracy.wrong_stretches.size()},
+          {"poses", poses},
+          {"told", accuracy.has_alarms ? Json(told) : Json()},
+          {"share_told", accuracy.has_alarms && count > 0.0 ? Json(told / count) : Json()},
+          {"list", std::move(list)}};
+}
+
+Json counts_json(const DriveAccuracy& accuracy) {
+  const DriveCounts& counts = accuracy.counts;
+  return {{"poses_by_status", Json(counts.poses_by_status)},
+          {"reset_counter_steps", counts.reset_counter_steps},
+          {"keyframes_sent", counts.keyframes_sent},
+          {"keyframes_without_pose", counts.keyframes_without_pose},
+          {"closures", closures_json(counts.closures)},
+          {"wrong", wrong_json(accuracy)}};
+}
+
+/// Mean distance of landmarks to the nearest true one.
+Json lpe_json(const LandmarkAccuracy& landmarks) {
+  if (landmarks.errors_m.empty()) return nullptr;
+  return 100.0 * mean(landmarks.errors_m);
+}
+
+Json doubles_json(const LandmarkAccuracy& landmarks) {
+  if (landmarks.true_landmarks_m.empty()) return nullptr;
+  return {{"pairs", landmarks.double_pairs}, {"at_a_true_one", landmarks.at_a_true_one}};
+}
+
+/// The largest first.
+Json bytes_json(const std::map<std::string, std::uint64_t>& bytes_by_channel) {
+  std::vector<std::pair<std::string, std::uint64_t>> channels(bytes_by_channel.begin(),
+                                                              bytes_by_channel.end());
+  std::ranges::stable_sort(channels, std::greater(),
+                           &std::pair<std::string, std::uint64_t>::second);
+  Json list = Json::array();
+  for (const auto& [channel, bytes] : channels)
+    list.push_back({{"channel", channel}, {"bytes", bytes}});
+  return list;
+}
+
 }  // namespace
 
 Json accuracy_summary(const DriveAccuracy& accuracy) {
@@ -94,8 +156,9 @@ Json accuracy_summary(const DriveAccuracy& accuracy) {
           {"rpe_cm", 100.0 * mean(keyframes)},
           {"keyframes_rmse_cm", 100.0 * rms(keyframes)},
           {"keyframes_max_cm", 100.0 * maximum(keyframes)},
-          {"landmarks", accuracy.landmarks_m.size()},
-          {"lpe_cm", 100.0 * mean(accuracy.landmark_errors_m)},
+          {"landmarks", accuracy.landmarks.landmarks_m.size()},
+          {"landmarks_compared", accuracy.landmarks.errors_m.size()},
+          {"lpe_cm", lpe_json(accuracy.landmarks)},
           {"updates", count_of(accuracy, model::MapUpdateStatus::kFirstMap) +
                           count_of(accuracy, model::MapUpdateStatus::kUpdated)},
           {"updates_not_sure", count_of(accuracy, model::MapUpdateStatus::kNotSure)},
@@ -107,7 +170,10 @@ Json accuracy_summary(const DriveAccuracy& accuracy) {
           {"map_tied_at", to_string(accuracy.tied_at)},
           {"ate", of_both(accuracy, ate_json)},
           {"rpe_by_path", of_both(accuracy, rpe_json)},
-          {"nees", of_both(accuracy, nees_json)}};
+          {"nees", of_both(accuracy, nees_json)},
+          {"counts", counts_json(accuracy)},
+          {"doubles", doubles_json(accuracy.landmarks)},
+          {"bytes_by_channel", bytes_json(accuracy.counts.bytes_by_channel)}};
 }
 
 }  // namespace understory::cli

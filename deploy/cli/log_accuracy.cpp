@@ -42,8 +42,8 @@ void write_series(const std::string& file, nlohmann::ordered_json json,
                           "map_id",   "nees"};
   json["live"] = poses_json(accuracy.live);
   json["map_keyframes"] = poses_json(accuracy.keyframes);
-  json["map_landmarks_m"] = points_json(accuracy.landmarks_m);
-  json["true_landmarks_m"] = points_json(accuracy.true_landmarks_m);
+  json["map_landmarks_m"] = points_json(accuracy.landmarks.landmarks_m);
+  json["true_landmarks_m"] = points_json(accuracy.landmarks.true_landmarks_m);
   write_text_file(file, dumped(json, -1) + "\n");
 }
 

@@ -51,12 +51,12 @@ sim::Drive make_drive(SimOptions& options) {
   return {options.drive, std::move(stems.forest), options.seed};
 }
 
-/// The trunks that come into range on the path: no map can hold others, and a whole square
-/// kilometre would be a message of half a megabyte.
+/// The trunks that may be detected on the path: no map of the drive can hold others (a given map
+/// may), and a whole square kilometre would be a message of half a megabyte.
 truth_landmarks_t truth_landmarks(const sim::Drive& drive) {
   std::set<std::uint32_t> in_range;
   for (const auto& pose : drive.world_T_vehicle()) {
-    const auto near = drive.grid().within(pose.translation(), drive.parameters().sensor.range_m);
+    const auto near = drive.grid().within(pose.translation(), drive.parameters().sensor.reach_m());
     in_range.insert(near.begin(), near.end());
   }
 

@@ -46,6 +46,7 @@ void add_eval_command(CLI::App& parent) {
   misstated::add_misstated_experiment(eval);
   wheels::add_wheels_experiment(eval);
   gaps::add_gaps_experiment(eval);
+  few_landmarks::add_few_landmarks_experiment(eval);
   existence::add_existence_experiment(eval);
   changing_forest::add_changing_forest_experiment(eval);
   changing_forest::add_mapping_needed_experiment(eval);

@@ -65,6 +65,11 @@ namespace wheels {
 void add_wheels_experiment(CLI::App& eval);
 }  // namespace wheels
 
+namespace few_landmarks {
+/// Live poses where two or three landmarks are in view.
+void add_few_landmarks_experiment(CLI::App& eval);
+}  // namespace few_landmarks
+
 namespace gaps {
 /// Processes that hang and sensors that are silent.
 void add_gaps_experiment(CLI::App& eval);

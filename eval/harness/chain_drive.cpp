@@ -86,9 +86,10 @@ void watch_chain(SensorChain& chain, ChainRun& run) {
   chain.watch<model::SlamPose>("SLAM_POSE", [&run](const model::SlamPose& pose) {
     if (pose.is_localised()) {
       run.slam.push_back(pose);
-    } else {
-      ++run.slam_unsure;
+      return;
     }
+    ++run.slam_unsure;
+    if (!pose.status) run.coasting.push_back(pose);
   });
 
   chain.watch<model::MapUpdate>(
@@ -293,6 +294,13 @@ TrajectoryError trajectory_error(std::span<const model::SlamPose> poses,
   }
   if (all.poses > 0) all.ate_rms_m = std::sqrt(sum / static_cast<double>(all.poses));
   return all;
+}
+
+std::vector<model::SlamPose> live_poses(const ChainRun& run) {
+  std::vector<model::SlamPose> poses = run.slam;
+  poses.insert(poses.end(), run.coasting.begin(), run.coasting.end());
+  std::ranges::stable_sort(poses, {}, &model::SlamPose::utime);
+  return poses;
 }
 
 std::size_t count_maps(std::span<const model::SlamPose> poses) { return by_map(poses).size(); }

@@ -39,8 +39,9 @@ struct ChainRun {
   std::vector<metrics::StampedPose> dead_reckoned;  ///< RAW_POSE: the filter corrects its velocity.
   std::vector<metrics::StampedPose> odometry;  ///< ODOMETRY, summed: no landmark has touched it.
   std::vector<model::EkfPose> ekf;
-  std::vector<model::SlamPose> slam;  ///< Those that are localised.
-  std::uint64_t slam_unsure = 0;      ///< SLAM_POSE that are not localised.
+  std::vector<model::SlamPose> slam;      ///< Those that are localised.
+  std::vector<model::SlamPose> coasting;  ///< By odometry alone, between keyframes.
+  std::uint64_t slam_unsure = 0;  ///< SLAM_POSE that are not localised, coasting ones included.
   std::vector<model::MapUpdate> updates;
   std::vector<MapAfterUpdate> states;          ///< One for each update, where they were asked for.
   std::vector<model::KeyframePose> keyframes;  ///< As estimated at the end.
@@ -119,6 +120,9 @@ TrajectoryError trajectory_error(std::span<const metrics::StampedPose> estimate,
 /// end errors the largest one, of `driven_m` the sum.
 TrajectoryError trajectory_error(std::span<const model::SlamPose> poses,
                                  std::span<const metrics::StampedPose> truth);
+/// The SLAM_POSE of each scan that has one, localised or coasting, in order of time: what a driver
+/// steers by.
+std::vector<model::SlamPose> live_poses(const ChainRun& run);
 /// Number of maps in which the poses are.
 std::size_t count_maps(std::span<const model::SlamPose> poses);
 

@@ -39,8 +39,8 @@ struct SmoothingMapperParameters {
   double predicted_sigma_rad = 0.015;
   double correlated_share = 0.0;  ///< Of a variance.
   double correlation_m = 20.0;
-  double stationary_share = 0.0;  ///< Of a variance.
-  double scale_sigma = 0.0;           ///< Ratio of distances.
+  double stationary_share = 0.0;       ///< Of a variance.
+  double scale_sigma = 0.0;            ///< Ratio of distances.
   double odometry_scale_sigma = 0.01;  ///< Ratio of distances.
   double given_map_sigma_m = 0.05;
 

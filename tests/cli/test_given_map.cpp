@@ -1,5 +1,9 @@
 // `replay --map` and `launch --map`: a map to begin with.
+#include <fmt/format.h>
 #include <sys/wait.h>
+
+#include <nlohmann/json.hpp>
+#include <random>
 
 #include "common/io/lcm_log.hpp"
 #include "common/map_file/map_file.hpp"
@@ -95,6 +99,33 @@ Said said_in(const std::string& log) {
 }
 
 }  // namespace
+
+TEST_CASE_METHOD(GivenMap, "a survey that is exact has exact landmarks", "[cli]") {
+  // Stems far beyond both ends of the drive, which TRUTH_LANDMARKS does not have.
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> along_m(0.0, 600.0);
+  std::uniform_real_distribution<double> across_m(0.0, 90.0);
+  std::string text = "x_m,y_m\n";
+  for (int i = 0; i < 1200; ++i)
+    text += fmt::format("{:.4f},{:.4f}\n", along_m(random), across_m(random));
+  write_bytes(directory / "stems.csv", Bytes(text.begin(), text.end()));
+  fine("map import " + path("stems.csv") + " --near-m 0 --out " + map);
+  fine("sim " + path("stems.csv") + " --path line --length 40 --seed 2 --out " + drive);
+
+  for (const std::string options : {" --localisation-only", ""}) {
+    CAPTURE(options);
+    fine("replay " + drive + kConfig + " --stages keyframer,geoslam_mapper --map " + map + options +
+         " --out " + again);
+    fine("log accuracy " + again + " --json " + path("a.json"));
+    const auto accuracy = nlohmann::json::parse(read_text(path("a.json")));
+    CHECK_THAT(accuracy["map_tied_at"].get<std::string>(), Contains("the world's"));
+    CHECK(accuracy["landmarks_compared"].get<int>() > 100);
+    CHECK(accuracy["landmarks_compared"].get<int>() < accuracy["landmarks"].get<int>() - 300);
+    // The map that stays as it is is the world; one that grows moves within its noise.
+    CHECK(accuracy["lpe_cm"].get<double>() < (options.empty() ? 10.0 : 1e-6));
+    CHECK(accuracy["live_rmse_cm"].get<double>() < 15.0);
+  }
+}
 
 TEST_CASE_METHOD(GivenMap, "a replay goes on in the map of an earlier drive", "[cli]") {
   drive_and_map();

@@ -31,6 +31,26 @@ double real_time_factor(const harness::ChainRun& run) {
   return run.simulated_s / std::max(busy_s, 1e-9);
 }
 
+void add_slam_rows(const harness::ChainRun& run, const harness::TrajectoryError& slam,
+                   std::optional<double> ate_target_m, FrontendRows& rows) {
+  if (ate_target_m) {
+    rows.at_most("SLAM_POSE ATE", slam.ate_rms_m, "m", *ate_target_m);
+  } else {
+    rows.state("SLAM_POSE ATE", slam.ate_rms_m, "m");
+  }
+  if (const std::size_t maps = harness::count_maps(run.slam); maps > 1) {
+    rows.state("SLAM_POSE: maps, each aligned by itself", static_cast<double>(maps), "");
+  }
+  rows.state("SLAM_POSE largest error", slam.largest_m, "m");
+  rows.state("SLAM_POSE drift", 100.0 * slam.end_m / std::max(slam.driven_m, 1.0), "%");
+
+  const harness::PoseConsistency said = harness::pose_consistency(run.slam, run.truth);
+  rows.state("SLAM_POSE, first pose held: mean NEES (3)", said.mean_nees, "");
+  rows.state("SLAM_POSE, first pose held: error at the end", said.end_error_m, "m");
+  rows.state("SLAM_POSE, first pose held: standard deviation reported for it", said.end_sigma_m,
+             "m");
+}
+
 }  // namespace
 
 void add_time_rows(const harness::ChainRun& run, FrontendRows& rows) {
@@ -51,24 +71,17 @@ void add_chain_rows(const harness::ChainRun& run, std::optional<double> ate_targ
   const harness::TrajectoryError summed = harness::trajectory_error(run.odometry, run.truth);
 
   rows.state("driven", ekf.driven_m, "m");
-  if (ate_target_m) {
-    rows.at_most("SLAM_POSE ATE", slam.ate_rms_m, "m", *ate_target_m);
-  } else {
-    rows.state("SLAM_POSE ATE", slam.ate_rms_m, "m");
+  if (slam.poses >= 2 || ate_target_m) add_slam_rows(run, slam, ate_target_m, rows);
+  if (!run.coasting.empty()) {
+    const std::vector<model::SlamPose> live = harness::live_poses(run);
+    rows.state("SLAM_POSE, COASTING included: ATE",
+               harness::trajectory_error(live, run.truth).ate_rms_m, "m");
+    rows.state("SLAM_POSE, COASTING included: mean NEES (3)",
+               harness::pose_consistency(live, run.truth).mean_nees, "");
   }
-  if (const std::size_t maps = harness::count_maps(run.slam); maps > 1) {
-    rows.state("SLAM_POSE: maps, each aligned by itself", static_cast<double>(maps), "");
-  }
-  rows.state("SLAM_POSE largest error", slam.largest_m, "m");
-  rows.state("SLAM_POSE drift", 100.0 * slam.end_m / std::max(slam.driven_m, 1.0), "%");
-  rows.state("map's keyframes at the end, ATE",
-             harness::trajectory_error(harness::poses_of(run.keyframes), run.truth).ate_rms_m, "m");
-
-  const harness::PoseConsistency said = harness::pose_consistency(run.slam, run.truth);
-  rows.state("SLAM_POSE, first pose held: mean NEES (3)", said.mean_nees, "");
-  rows.state("SLAM_POSE, first pose held: error at the end", said.end_error_m, "m");
-  rows.state("SLAM_POSE, first pose held: standard deviation reported for it", said.end_sigma_m,
-             "m");
+  const harness::TrajectoryError of_map =
+      harness::trajectory_error(harness::poses_of(run.keyframes), run.truth);
+  if (of_map.poses >= 2) rows.state("map's keyframes at the end, ATE", of_map.ate_rms_m, "m");
 
   rows.state("EKF_POSE ATE", ekf.ate_rms_m, "m");
   rows.at_most("EKF_POSE drift", 100.0 * ekf.end_m / std::max(ekf.driven_m, 1.0), "%", 0.5);
@@ -81,6 +94,9 @@ void add_chain_rows(const harness::ChainRun& run, std::optional<double> ate_targ
   rows.state("keyframes offered", static_cast<double>(run.updates.size()), "");
   rows.state("SLAM_POSE share of sweeps",
              100.0 * static_cast<double>(run.slam.size()) / static_cast<double>(run.sweeps), "%");
+  rows.state("SLAM_POSE COASTING, share of sweeps",
+             100.0 * static_cast<double>(run.coasting.size()) / static_cast<double>(run.sweeps),
+             "%");
   add_time_rows(run, rows);
 }
 

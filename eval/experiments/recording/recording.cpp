@@ -14,6 +14,7 @@
 #include "eval/experiments/frontend/frontend.hpp"
 #include "eval/harness/chain_drive.hpp"
 #include "eval/harness/results.hpp"
+#include "eval/metrics/victoria_park_score.hpp"
 #include "understory/ground_truth_t.hpp"
 
 namespace understory::eval::experiments::recording {
@@ -106,6 +107,8 @@ void add_gnss_rows(const Recording& recording, const Eigen::Vector2d& antenna_m,
     rows.state(name + ": GNSS fix at its time, median", errors.at_time_median_m, "m");
   };
   add("SLAM_POSE", harness::poses_of(recording.run.slam));
+  if (!recording.run.coasting.empty())
+    add("SLAM_POSE, COASTING included", harness::poses_of(harness::live_poses(recording.run)));
   add("EKF_POSE", harness::poses_of(recording.run.ekf));
   add("RAW_POSE", recording.run.dead_reckoned);
   add("ODOMETRY summed", recording.run.odometry);
@@ -117,6 +120,21 @@ double mean_detections(const harness::ChainRun& run) {
   return run.detections.empty()
              ? 0.0
              : static_cast<double>(sum) / static_cast<double>(run.detections.size());
+}
+
+/// Why SLAM_POSE has no figures; empty where it has.
+std::string why_no_pose(const harness::ChainRun& run) {
+  if (run.slam.size() >= 2) return {};
+  if (run.updates.empty())
+    return "SLAM_POSE: no figures, since no KEYFRAME came: see the keyframer below";
+
+  const auto placed = std::ranges::count_if(run.updates, metrics::localised);
+  const std::string reason = run.updates.back().reason;
+  return fmt::format(
+      "SLAM_POSE: no figures, since {} of {} poses are localised: {} are COASTING (by odometry "
+      "alone, too few landmarks match). {} of {} keyframes have a place in the map{}{}",
+      run.slam.size(), run.slam.size() + run.slam_unsure, run.coasting.size(), placed,
+      run.updates.size(), reason.empty() ? "" : "; the last one: ", reason);
 }
 
 nlohmann::json pictures_of(const Recording& recording) {
@@ -160,6 +178,8 @@ void run(Options options) {
   if (!recording.run.truth.empty()) {
     add_chain_rows(recording.run, {}, rows);
   } else {
+    rows.state("SLAM_POSE localised", static_cast<double>(recording.run.slam.size()), "");
+    rows.state("SLAM_POSE COASTING", static_cast<double>(recording.run.coasting.size()), "");
     add_time_rows(recording.run, rows);
   }
   if (!recording.fixes.empty()) {
@@ -167,6 +187,7 @@ void run(Options options) {
   }
 
   std::cout << to_table(rows.rows());
+  if (const std::string why = why_no_pose(recording.run); !why.empty()) std::cout << why << '\n';
   for (const auto& [service, health] : recording.run.health) {
     for (const reason_count_t& reason : health.reasons) {
       std::cout << fmt::format("  {}: {} {} {}\n", service, reason.channel, reason.reason,

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "services/geoslam_mapper/smoothing/few_matches.hpp"
+
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
@@ -27,6 +29,17 @@ std::vector<geometry::UncertainPoint> points_of(const model::LandmarkScan& scan)
                       0.5 * detection.covariance_m2.topLeftCorner<2, 2>().trace()});
   }
   return points;
+}
+
+/// How many of the points could be matched: not more than the landmarks in the field of view.
+std::size_t count_possible(const model::FieldOfView& view, const geometry::SE2& map_T_vehicle,
+                           std::span<const geometry::UncertainPoint> reference,
+                           std::size_t observed) {
+  const geometry::SE2 vehicle_T_map = map_T_vehicle.inverse();
+  const auto in_view = std::ranges::count_if(reference, [&](const geometry::UncertainPoint& one) {
+    return view.contains(vehicle_T_map * one.position_m);
+  });
+  return std::min(static_cast<std::size_t>(in_view), observed);
 }
 
 /// A pose among the landmarks near by, in the map: those share the error of the last keyframe, so
@@ -72,14 +85,16 @@ std::optional<ScanPose> ScanLocaliser::locate(const model::LandmarkScan& raw,
   return ScanPose{map_T_vehicle, false};
 }
 
-/// By odometry where it reaches from the last scan, else by the last step and a search of
-/// rotations. None where too few detections match.
+/// By odometry where it reaches from the last scan, and then few matches are enough; else by the
+/// last step and a search of rotations. None where too few detections match.
 std::optional<geometry::Registration> ScanLocaliser::register_scan(const model::LandmarkScan& scan,
                                                                    const LandmarkMap& landmarks,
                                                                    const Motion& motion) {
-  const auto reference =
-      landmarks_around(latest_->map_T_vehicle.translation(),
-                       scan.field_of_view.max_range_m + kReachMargin_m, landmarks);
+  const geometry::SE2WithCovariance last{latest_->map_T_vehicle, latest_->covariance};
+  const auto step = motion.between(latest_->utime, scan.utime);
+  const geometry::SE2 about = step ? last.mean * step->mean : last.mean;
+  const double reach_m = scan.field_of_view.max_range_m + kReachMargin_m;
+  const auto reference = landmarks_around(about.translation(), reach_m, landmarks);
   const auto observed = points_of(scan);
 
   const geometry::MatchQuota quota{static_cast<std::size_t>(parameters_.min_matched),
@@ -91,8 +106,6 @@ std::optional<geometry::Registration> ScanLocaliser::register_scan(const model::
   gating.gate_sigmas = parameters_.gate_sigmas;
   gating.gate_floor_m = parameters_.gate_floor_m;
 
-  const geometry::SE2WithCovariance last{latest_->map_T_vehicle, latest_->covariance};
-  const auto step = motion.between(latest_->utime, scan.utime);
   if (!step) {
     velocity_.forget();
     const auto found = register_step(reference, observed, last.mean, latest_->step,
@@ -100,15 +113,28 @@ std::optional<geometry::Registration> ScanLocaliser::register_scan(const model::
     return fits(found) ? std::optional(found) : std::nullopt;
   }
 
-  // By the velocity; where the landmarks contradict it, by odometry as stated.
-  const auto by_odometry = [&](const std::optional<model::InertialMotion>& inertial) {
-    return register_points(reference, observed, velocity_.predict(last, *step, inertial), gating);
+  // Where next to nothing can be matched, what does match adds to odometry.
+  const auto is_enough = [&](const geometry::Registration& found,
+                             const geometry::SE2WithCovariance& guess) {
+    if (fits(found)) return true;
+    const std::size_t possible =
+        count_possible(scan.field_of_view, found.reference_T_observed, reference, observed.size());
+    const std::size_t clear = count_clear(found.pairs);
+    return (quota.share_is_met(clear, possible) || possible < quota.min_matched) &&
+           adds_to_odometry({reference, observed, guess, found}, gating, reach_m);
   };
-  geometry::Registration found = by_odometry(motion.inertial(latest_->utime, scan.utime));
-  if (fits(found) && velocity_.update({found.reference_T_observed, found.covariance})) return found;
+
+  // By the velocity; where the landmarks contradict it, by odometry as stated.
+  const auto by_odometry = [&](const std::optional<model::InertialMotion>& inertial)
+      -> std::optional<geometry::Registration> {
+    const geometry::SE2WithCovariance guess = velocity_.predict(last, *step, inertial);
+    const geometry::Registration found = register_points(reference, observed, guess, gating);
+    return is_enough(found, guess) ? std::optional(found) : std::nullopt;
+  };
+  const auto found = by_odometry(motion.inertial(latest_->utime, scan.utime));
+  if (found && velocity_.update({found->reference_T_observed, found->covariance})) return found;
   velocity_.forget();
-  found = by_odometry(std::nullopt);
-  return fits(found) ? std::optional(found) : std::nullopt;
+  return by_odometry(std::nullopt);
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -1,0 +1,27 @@
+// The true poses of a recorded run over time.
+#pragma once
+
+#include <map>
+#include <optional>
+
+#include "common/geometry/se2.hpp"
+#include "common/model/landmarks.hpp"
+
+namespace understory::cli {
+
+/// The poses of GROUND_TRUTH, frame world.
+class TruthTrack {
+ public:
+  /// A later one of the same time counts.
+  void add(model::Utime utime, const geometry::SE2& world_T_vehicle) {
+    poses_.insert_or_assign(utime, world_T_vehicle);
+  }
+  /// The true pose at `utime`, between two that are at most 0.2 s apart by an even motion; none
+  /// elsewhere. O(log n).
+  std::optional<geometry::SE2> at(model::Utime utime) const;
+
+ private:
+  std::map<model::Utime, geometry::SE2> poses_;
+};
+
+}  // namespace understory::cli
