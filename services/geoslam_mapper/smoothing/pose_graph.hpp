@@ -77,9 +77,9 @@ class PoseGraph {
   /// chi^2 (3 degrees of freedom) of a closure at the present estimate; there must be one.
   double closure_chi2(std::uint64_t id) const;
 
-  /// What was measured on the path between two nodes counts `share` of what it did: the errors there
-  /// are larger than was stated. Closures stay as they are. relax() with 1 / share undoes it, but
-  /// for rounding. Cost: the measurements of that path.
+  /// What was measured on the path between two nodes counts `share` of what it did: the errors
+  /// there are larger than was stated. Closures stay as they are. relax() with 1 / share undoes it,
+  /// but for rounding. Cost: the measurements of that path.
   void relax(NodeIndex a, NodeIndex b, double share);
 
   /// Takes nodes and motions out. What the nodes observed becomes observations of other nodes, in
