@@ -1,10 +1,23 @@
 #include "services/geoslam_mapper/map_difference.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 namespace understory::geoslam_mapper {
 namespace {
+
+/// A position is told anew when it is off by this share of its standard deviation, but not before
+/// `moved_m` and not later than this [m].
+constexpr double kMovedSigmas = 0.25;
+constexpr double kMovedAtMost_m = 0.02;
+
+/// Whether a subscriber that has `told` must hear of `now`.
+bool has_moved(const model::MapLandmark& told, const model::MapLandmark& now, double moved_m) {
+  const double sigma_m = std::sqrt(std::max(0.0, 0.5 * told.covariance_m2.trace()));
+  const double tolerated_m = std::max(moved_m, std::min(kMovedAtMost_m, kMovedSigmas * sigma_m));
+  return (told.position_m - now.position_m).norm() > tolerated_m;
+}
 
 /// In a list in order of id, the first that is not below `id`.
 template <class Landmarks>
@@ -37,8 +50,7 @@ model::MapDelta map_difference(const std::vector<model::MapLandmark>& before,
       delta.added.push_back(landmark);
       continue;
     }
-    const bool has_moved = (old->position_m - landmark.position_m).norm() > moved_m;
-    if (has_moved) delta.moved.push_back(landmark);
+    if (has_moved(*old, landmark, moved_m)) delta.moved.push_back(landmark);
     ++old;
   }
   while (old != before.end()) gone(*old++);
@@ -59,7 +71,7 @@ model::MapDelta map_change(const std::vector<model::MapLandmark>& before,
     const auto old = first_not_below(before, landmark.id);
     if (old == before.end() || old->id != landmark.id) {
       delta.added.push_back(landmark);
-    } else if ((old->position_m - landmark.position_m).norm() > moved_m) {
+    } else if (has_moved(*old, landmark, moved_m)) {
       delta.moved.push_back(landmark);
     }
   }

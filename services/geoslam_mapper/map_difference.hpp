@@ -8,7 +8,9 @@
 namespace understory::geoslam_mapper {
 
 /// What leads from `before` to `after`, both in order of id. Landmarks that moved by less than
-/// `moved_m` are left out; the old ids of `update.merged` count as merged, not as removed. O(map).
+/// `moved_m` are left out, and those that moved by less than a quarter of the standard deviation
+/// that was told of them and by less than 2 cm: a subscriber is within that of the mapper; the old
+/// ids of `update.merged` count as merged, not as removed. O(map).
 model::MapDelta map_difference(const std::vector<model::MapLandmark>& before,
                                const std::vector<model::MapLandmark>& after,
                                const model::MapUpdate& update, double moved_m);

@@ -292,3 +292,31 @@ TEST_CASE("a change of the map is a jump of which nothing is known", "[map_publi
     CHECK(difference(watch.delta(), geometry::SE2()) == 0.0);
   }
 }
+
+TEST_CASE("A subscriber is within a quarter of the stated sigma and 2 cm", "[map_publishing]") {
+  std::mt19937_64 random(9);
+  std::uniform_real_distribution<double> sigma(0.0, 0.3);
+  std::normal_distribution<double> step;
+  std::vector<model::MapLandmark> told(200);
+  for (std::size_t i = 0; i < told.size(); ++i) {
+    told[i].id = i + 1;
+    told[i].covariance_m2 = std::pow(sigma(random), 2) * Eigen::Matrix2d::Identity();
+  }
+
+  // Many small steps: what is left out does not add up.
+  std::vector<model::MapLandmark> now = told;
+  std::size_t listed = 0;
+  for (int round = 0; round < 200; ++round) {
+    for (model::MapLandmark& one : now)
+      one.position_m += 0.002 * Eigen::Vector2d(step(random), step(random));
+    const model::MapDelta delta = map_change(told, now, {}, 0.001);
+    listed += delta.moved.size();
+    told = model::with_delta(std::move(told), delta);
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      const double sigma_m = std::sqrt(told[i].covariance_m2(0, 0));
+      const double off_m = (told[i].position_m - now[i].position_m).norm();
+      CHECK(off_m <= std::max(0.001, std::min(0.02, 0.25 * sigma_m)) + 1e-12);
+    }
+  }
+  CHECK(listed < 200 * now.size() / 4);
+}
