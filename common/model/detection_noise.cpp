@@ -26,8 +26,10 @@ constexpr double kMostChi2 = 9.0;
 /// fade depends on the sensor and changes less.
 constexpr double kMemory = 600.0;
 constexpr double kLagMemory = 8000.0;
-/// Degrees of freedom from which on a lag counts.
+/// Degrees of freedom from which on a lag counts, and standard deviations of chance beyond which it
+/// shows a correlation.
 constexpr double kLeastLagDegrees = 300.0;
+constexpr double kLagSigmas = 6.0;
 /// Weight of the stated variance, and of the whole kind for one range [degrees of freedom].
 constexpr double kStatedWeight = 4.0;
 constexpr double kKindWeight = 40.0;
@@ -115,6 +117,7 @@ void DetectionNoise::add(const LandmarkScan& scan, std::span<const std::uint64_t
   recent_.push_back({scan.utime, seen_in(scan, tracks)});
   if (recent_.size() > kLongLag + 1) recent_.pop_front();
   if (!parameters_.learn) return;
+  ++since_other_;
   if (const auto common = common_with_last(kLag)) learn(common->pairs, common->fit);
   for (std::size_t lag = 0; lag < kLags.size(); ++lag) learn_lag(lag);
 }
@@ -122,7 +125,7 @@ void DetectionNoise::add(const LandmarkScan& scan, std::span<const std::uint64_t
 /// The residuals between the last scan and the one `kLags[lag]` before it.
 void DetectionNoise::learn_lag(std::size_t lag) {
   const std::size_t before = kLags[lag];
-  if (recent_.size() <= before) return;
+  if (recent_.size() <= before || since_other_ < before) return;
   std::vector<Pair> pairs = in_both(recent_[recent_.size() - 1 - before].seen, recent_.back().seen);
   if (pairs.size() < kLeastPairs) return;
   thin_out(pairs, kMostPairs);
@@ -190,6 +193,7 @@ void DetectionNoise::learn(std::span<const Pair> pairs, const Fit& fit) {
     if (is_other_noise(added[bin].chi2, estimate(bin) * added[bin].degrees, added[bin].degrees)) {
       sums.chi2 *= kAfterChange;
       sums.degrees *= kAfterChange;
+      since_other_ = 0;  // Scans before and after it have no lag between them.
     }
     sums.chi2 += added[bin].chi2;
     sums.degrees += added[bin].degrees;
@@ -254,7 +258,7 @@ double DetectionNoise::repetition(LandmarkKind kind) const {
     lags[i].value = sums[i].chi2 / sums[i].degrees;
     lags[i].degrees = sums[i].degrees;
   }
-  return white_noise_power(lags, kLag, kSigmas);
+  return white_noise_power(lags, kLag, kLagSigmas);
 }
 
 double DetectionNoise::factor_of(std::size_t bin) const {

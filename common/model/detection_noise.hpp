@@ -98,7 +98,7 @@ class DetectionNoise {
   /// Members of a saved state; see common/state. The parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.sums_, self.by_lag_, self.recent_);
+    a(self.sums_, self.by_lag_, self.since_other_, self.recent_);
   }
 
  private:
@@ -192,6 +192,7 @@ class DetectionNoise {
   std::array<Sums, kKinds * kRanges> sums_{};
   /// Of residuals at each lag, by their noise as learned in `sums_`.
   std::array<std::array<Sums, kLags.size()>, kKinds> by_lag_{};
+  std::size_t since_other_ = 0;  ///< Scans since the noise was quite different.
   std::deque<SeenScan> recent_;  ///< The last scans, the newest at the end.
 };
 

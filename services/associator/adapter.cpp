@@ -10,7 +10,7 @@
 namespace understory::associator {
 namespace {
 
-constexpr state::Format kServiceFormat{"associator_service", 3};
+constexpr state::Format kServiceFormat{"associator_service", 2};
 
 class AssociatorAdapter : public bus::Adapter {
  public:
@@ -54,9 +54,7 @@ class AssociatorAdapter : public bus::Adapter {
   void add(const model::LandmarkScan& scan) {
     const AssociatorCounters before = stage_->counters();
     const auto tracked = stage_->add(scan);
-    watch_.add(scan, before, stage_->counters(), stage_->noise());
-    if (const auto note = watch_.take_note())
-      node_->log(bus::Node::Level::kInfo, "noise_misstated", *note, channels_.landmarks);
+    watch_.add(scan, before, stage_->counters(), stage_->is_noise_misstated());
     if (tracked) tracked_.publish(*tracked);
     show_health();
   }

@@ -17,11 +17,7 @@ geometry::SE2WithCovariance pose_of(const Localisation& located) {
 }  // namespace
 
 Associator::Associator(const AssociatorParameters& parameters)
-    : parameters_(parameters),
-      tracks_(parameters),
-      noise_(parameters.noise),
-      noise_check_(parameters.noise),
-      motion_(parameters) {
+    : parameters_(parameters), tracks_(parameters), noise_(parameters.noise), motion_(parameters) {
   for (const char* name : {"auto", "nearest", "registered", "consistent"}) {
     if (parameters.method == name) return;
   }
@@ -53,9 +49,7 @@ std::optional<model::TrackedScan> Associator::add(const model::LandmarkScan& sta
   const auto matches = match(tracks_.tracks(), observations, pose, parameters_);
 
   // Noise, the vehicle's motion and the tracks learn from it.
-  const std::vector<std::uint64_t> numbers = numbers_of(observations, matches, stated);
-  noise_.add(stated, numbers);
-  noise_check_.add(stated, numbers, noise_);
+  noise_.add(stated, numbers_of(observations, matches, stated));
   motion_.set_scan(scan.utime, local_T_vehicle_.inverse() * pose.mean);
   local_T_vehicle_ = pose.mean;
   const auto ids = update_tracks(observations, matches, scan);

@@ -8,7 +8,6 @@
 
 #include "common/model/detection_noise.hpp"
 #include "common/model/ekf_output.hpp"
-#include "common/model/noise_check.hpp"
 #include "common/model/odometry.hpp"
 #include "common/model/tracked.hpp"
 #include "services/associator/match.hpp"
@@ -57,8 +56,8 @@ class Associator {
 
   /// Counts for HEALTH.
   const AssociatorCounters& counters() const { return counters_; }
-  /// What scans say of the covariances of LANDMARKS; those that they contradict are replaced.
-  const model::NoiseVerdict& noise() const { return noise_check_.verdict(); }
+  /// True where the scans contradict the covariances of LANDMARKS; they are then replaced.
+  bool is_noise_misstated() const { return noise_.is_misstated(); }
   /// Number of tracks, consistent or not.
   std::size_t track_count() const { return tracks_.tracks().size(); }
 
@@ -71,8 +70,8 @@ class Associator {
   /// are of this process.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.tracks_, self.noise_, self.noise_check_, self.motion_, self.local_T_vehicle_,
-      self.misfits_, self.next_sequence_);
+    a(self.tracks_, self.noise_, self.motion_, self.local_T_vehicle_, self.misfits_,
+      self.next_sequence_);
   }
 
  private:
@@ -95,7 +94,6 @@ class Associator {
   AssociatorParameters parameters_;
   TrackList tracks_;
   model::DetectionNoise noise_;
-  model::NoiseCheck noise_check_;
   MotionPredictor motion_;
   geometry::SE2 local_T_vehicle_;  ///< At the last scan that was placed.
   int misfits_ = 0;                ///< Scans in a row that fitted no track.

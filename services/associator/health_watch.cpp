@@ -12,9 +12,7 @@ void describe(HealthParameters& p, bus::ParameterTable& table) {
   describe(p.lost, "lost", "scans", "bad are those of which nothing could be associated.", table);
   describe(p.refused, "refused", "scans", "bad are those that came late or twice.", table);
   describe(p.misstated, "misstated", "scans",
-           "bad are those whose stated noise is contradicted by the scans and not yet replaced by "
-           "what explains them.",
-           table);
+           "bad are those whose stated noise is replaced by what the scans show.", table);
 }
 
 HealthWatch::HealthWatch(const HealthParameters& parameters)
@@ -23,26 +21,15 @@ HealthWatch::HealthWatch(const HealthParameters& parameters)
             bus::Condition(parameters.lost)},
       refused_{wire::Reason::kInputRefused, "scans are not later than those before", "",
                bus::Condition(parameters.refused)},
-      misstated_{wire::Reason::kNoiseMisstated, "", "", bus::Condition(parameters.misstated)} {}
-
-std::array<bus::WatchedCondition, 3> HealthWatch::conditions() const {
-  bus::WatchedCondition misstated = misstated_;
-  misstated.text = misstated_text_;
-  return {lost_, refused_, misstated};
-}
-
-void HealthWatch::judge(const model::NoiseVerdict& noise) {
-  const bool was_open = misstated_.condition.holds();
-  misstated_.condition.add(noise.is_open());
-  if (!was_open && misstated_.condition.holds()) misstated_text_ = contradiction_text(noise);
-  if (auto note = news_.add(noise)) note_ = std::move(note);
-}
+      misstated_{wire::Reason::kNoiseMisstated,
+                 "the scans contradict the covariances of LANDMARKS; what they show is used", "",
+                 bus::Condition(parameters.misstated)} {}
 
 void HealthWatch::add(const model::LandmarkScan& scan, const AssociatorCounters& before,
-                      const AssociatorCounters& after, const model::NoiseVerdict& noise) {
+                      const AssociatorCounters& after, bool is_misstated) {
   const bool is_refused = after.scans_refused > before.scans_refused;
   refused_.condition.add(is_refused);
-  if (!is_refused) judge(noise);
+  if (!is_refused) misstated_.condition.add(is_misstated);
   if (is_refused || scan.detections.size() < static_cast<std::size_t>(parameters_.min_detections)) {
     return;
   }

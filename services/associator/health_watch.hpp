@@ -2,9 +2,6 @@
 #pragma once
 
 #include <array>
-#include <optional>
-#include <string>
-#include <utility>
 
 #include "common/bus/condition.hpp"
 #include "common/model/landmarks.hpp"
@@ -26,38 +23,31 @@ void describe(HealthParameters& parameters, bus::ParameterTable& table);
 /// Judges the associator by its latest scans. `lost`: detections come and nothing of them is
 /// associated; at the start it has the time that tracks need to be confirmed. `input_refused`:
 /// scans that are late. `noise_misstated`: scans contradict the covariances that LANDMARKS states,
-/// until the statement is right or those that take its place explain the scans.
+/// and those that they show are used.
 class HealthWatch {
  public:
   /// All is well so far.
   explicit HealthWatch(const HealthParameters& parameters = {});
 
   /// A scan, with the associator's counts before and after it.
+  /// `is_misstated`: whether the stated noise is replaced.
   void add(const model::LandmarkScan& scan, const AssociatorCounters& before,
-           const AssociatorCounters& after, const model::NoiseVerdict& noise = {});
+           const AssociatorCounters& after, bool is_misstated = false);
   /// What to show.
-  std::array<bus::WatchedCondition, 3> conditions() const;
-  /// What LOG has of covariances that are replaced for good; taken once.
-  std::optional<std::string> take_note() { return std::exchange(note_, std::nullopt); }
+  std::array<bus::WatchedCondition, 3> conditions() const { return {lost_, refused_, misstated_}; }
 
   /// Members of a saved state; see common/state. The parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.lost_, self.refused_, self.misstated_, self.first_scans_, self.misstated_text_,
-      self.news_);
+    a(self.lost_, self.refused_, self.misstated_, self.first_scans_);
   }
 
  private:
-  void judge(const model::NoiseVerdict& noise);
-
   HealthParameters parameters_;
   bus::WatchedCondition lost_;
   bus::WatchedCondition refused_;
   bus::WatchedCondition misstated_;
-  int first_scans_ = 0;         ///< Before the first association; then `first_within_scans`.
-  std::string misstated_text_;  ///< Of `misstated_` when it began last.
-  model::NoiseNews news_;
-  std::optional<std::string> note_;
+  int first_scans_ = 0;  ///< Before the first association; then `first_within_scans`.
 };
 
 }  // namespace understory::associator

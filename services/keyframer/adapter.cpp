@@ -12,7 +12,7 @@
 namespace understory::keyframer {
 namespace {
 
-constexpr state::Format kServiceFormat{"keyframer_service", 5};
+constexpr state::Format kServiceFormat{"keyframer_service", 4};
 
 class KeyframerAdapter : public bus::Adapter {
  public:
@@ -59,8 +59,6 @@ class KeyframerAdapter : public bus::Adapter {
     const bool was_miscalibrated = watch_.is_miscalibrated();
     watch_.add(scan, before, stage_->counters(), stage_->input_quality());
     if (!was_miscalibrated && watch_.is_miscalibrated()) log(stage_->input_quality());
-    if (const auto note = watch_.take_note())
-      node_->log(bus::Node::Level::kInfo, "noise_misstated", *note, channels_.landmarks);
     for (const model::Keyframe& waited : stage_->take_waited()) keyframes_.publish(waited);
     if (keyframe) keyframes_.publish(*keyframe);
     show_health();

@@ -25,8 +25,8 @@ void describe(HealthParameters& p, bus::ParameterTable& table) {
   describe(p.refused, "refused", "scans", "bad are those that came late or twice.", table);
   describe(
       p.misstated, "misstated", "scans",
-      "bad are those whose stated noise is contradicted by the scans and not yet replaced by what "
-      "explains them, and those at which landmarks and wheels contradict each other.",
+      "bad are those whose stated noise is replaced by what the scans show, and those at which "
+      "landmarks and wheels contradict each other.",
       table);
   describe(p.jumped, "jumped", "scans",
            "bad are those whose step by landmarks is not that by wheels, by far more than both "
@@ -58,7 +58,9 @@ HealthWatch::HealthWatch(const HealthParameters& parameters)
                 bus::Condition(parameters.withheld)},
       refused_{wire::Reason::kInputRefused, "scans are not later than those before", "",
                bus::Condition(parameters.refused)},
-      misstated_{wire::Reason::kNoiseMisstated, "", "", bus::Condition(parameters.misstated)},
+      misstated_{wire::Reason::kNoiseMisstated,
+                 "the scans contradict the covariances of LANDMARKS; what they show is used", "",
+                 bus::Condition(parameters.misstated)},
       shaken_{wire::Reason::kNoiseMisstated,
               "whole scans are turned against the gyro by more than is stated: vibration, stamps, "
               "or a gyro that is worse than stated",
@@ -76,21 +78,8 @@ HealthWatch::HealthWatch(const HealthParameters& parameters)
              "the way by wheels is longer or shorter than by landmarks: wheel scale", "ODOMETRY",
              bus::Condition(parameters.misstated)} {}
 
-std::array<bus::WatchedCondition, 9> HealthWatch::conditions() const {
-  bus::WatchedCondition misstated = misstated_;
-  misstated.text = misstated_text_;
-  return {lost_, withheld_, refused_, misstated, shaken_, jumped_, mounting_, late_, scale_};
-}
-
-void HealthWatch::judge(const model::NoiseVerdict& noise) {
-  const bool was_open = misstated_.condition.holds();
-  misstated_.condition.add(noise.is_open());
-  if (!was_open && misstated_.condition.holds()) misstated_text_ = contradiction_text(noise);
-  if (auto note = news_.add(noise)) note_ = std::move(note);
-}
-
 void HealthWatch::judge(const InputQuality& quality) {
-  judge(quality.noise);
+  misstated_.condition.add(quality.is_noise_misstated);
   shaken_.condition.add(either(quality, [this](const CalibrationError& error) {
     return error.turn_chi2 > parameters_.max_turn_chi2;
   }));

@@ -3,9 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
-#include <string>
-#include <utility>
 
 #include "common/bus/condition.hpp"
 #include "common/model/landmarks.hpp"
@@ -34,8 +31,8 @@ void describe(HealthParameters& parameters, bus::ParameterTable& table);
 /// Judges the keyframer by its latest scans. `lost`: tracking begins anew again and again, or no
 /// keyframe comes though detections do. `withheld`: keyframes are not good enough to give out.
 /// `input_refused`: scans that are late. `noise_misstated`: scans contradict the covariances that
-/// LANDMARKS states, until the statement is right or those that take its place explain the scans;
-/// or (channel LANDMARKS) scans are turned as a whole against the gyro by far more than is stated.
+/// LANDMARKS states, and those that they show are used; or (channel LANDMARKS) scans are turned as
+/// a whole against the gyro by far more than is stated.
 /// `diverged`: landmarks moved otherwise than odometry says, as after a jump or where wheels slip.
 /// `miscalibrated`: landmarks and odometry contradict each other by more than chance, in the yaw
 /// or the place of the mounting (channel LANDMARKS), in the length of the way (channel ODOMETRY),
@@ -49,9 +46,9 @@ class HealthWatch {
   void add(const model::LandmarkScan& scan, const KeyframerCounters& before,
            const KeyframerCounters& after, const InputQuality& quality = {});
   /// What to show; no two have channel and reason in common.
-  std::array<bus::WatchedCondition, 9> conditions() const;
-  /// What LOG has of covariances that are replaced for good; taken once.
-  std::optional<std::string> take_note() { return std::exchange(note_, std::nullopt); }
+  std::array<bus::WatchedCondition, 9> conditions() const {
+    return {lost_, withheld_, refused_, misstated_, shaken_, jumped_, mounting_, late_, scale_};
+  }
   /// True while landmarks and wheels contradict each other.
   bool is_miscalibrated() const {
     return mounting_.condition.holds() || late_.condition.holds() || scale_.condition.holds();
@@ -61,12 +58,10 @@ class HealthWatch {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.lost_, self.withheld_, self.refused_, self.misstated_, self.shaken_, self.jumped_,
-      self.mounting_, self.late_, self.scale_, self.scans_without_keyframe_, self.misstated_text_,
-      self.news_);
+      self.mounting_, self.late_, self.scale_, self.scans_without_keyframe_);
   }
 
  private:
-  void judge(const model::NoiseVerdict& noise);
   void judge(const InputQuality& quality);
 
   HealthParameters parameters_;
@@ -80,9 +75,6 @@ class HealthWatch {
   bus::WatchedCondition late_;
   bus::WatchedCondition scale_;
   int scans_without_keyframe_ = 0;
-  std::string misstated_text_;  ///< Of `misstated_` when it began last.
-  model::NoiseNews news_;
-  std::optional<std::string> note_;
 };
 
 }  // namespace understory::keyframer

@@ -9,7 +9,6 @@
 #include "common/model/ekf_output.hpp"
 #include "common/model/keyframe.hpp"
 #include "common/model/landmarks.hpp"
-#include "common/model/noise_check.hpp"
 #include "common/model/odometry.hpp"
 
 namespace understory::keyframer {
@@ -54,7 +53,7 @@ struct CalibrationError {
 
 /// What a keyframer says of its inputs.
 struct InputQuality {
-  model::NoiseVerdict noise;          ///< What scans say of the covariances of LANDMARKS.
+  bool is_noise_misstated = false;    ///< Covariances of LANDMARKS are replaced by what scans show.
   CalibrationError calibration;       ///< By the last minutes.
   CalibrationError lately;            ///< By the last ten seconds: what has just changed.
   bool contradicts_odometry = false;  ///< The landmarks' last motion is not odometry's.

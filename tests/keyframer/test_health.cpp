@@ -30,7 +30,7 @@ struct Watched {
   void add(const model::LandmarkScan& scan) {
     const KeyframerCounters before = keyframer.counters();
     keyframer.add(scan);
-    watch.add(scan, before, keyframer.counters(), keyframer.input_quality());
+    watch.add(scan, before, keyframer.counters());
   }
   bool shows(wire::Reason reason) const {
     return std::ranges::any_of(watch.conditions(), [&](const bus::WatchedCondition& one) {
@@ -123,7 +123,7 @@ TEST_CASE("What landmarks and odometry contradict each other in is named", "[hea
   const auto after = [](const keyframer::CalibrationError& calibration) {
     HealthWatch watch;
     const model::LandmarkScan scan;
-    for (int k = 0; k < 20; ++k) watch.add(scan, {}, {}, {{}, calibration, {}, false});
+    for (int k = 0; k < 20; ++k) watch.add(scan, {}, {}, {false, calibration, {}, false});
     return watch;
   };
   const auto shows = [](const HealthWatch& watch, wire::Reason reason, std::string_view channel) {
@@ -163,41 +163,12 @@ TEST_CASE("What landmarks and odometry contradict each other in is named", "[hea
   longer.scale = 0.03;
   CHECK(shows(after(longer), wire::Reason::kMiscalibrated, "ODOMETRY"));
   HealthWatch jumped;
-  for (int k = 0; k < 20; ++k) jumped.add({}, {}, {}, {{}, none, none, k == 10});
+  for (int k = 0; k < 20; ++k) jumped.add({}, {}, {}, {false, none, none, k == 10});
   CHECK(shows(jumped, wire::Reason::kDiverged, ""));
   auto shaken = none;
   shaken.turn_chi2 = 6.0;
   CHECK(shows(after(shaken), wire::Reason::kNoiseMisstated, "LANDMARKS"));
   CHECK_FALSE(after(shaken).is_miscalibrated());
-}
-
-TEST_CASE("Wrong covariances of LANDMARKS are named until what takes their place is confirmed",
-          "[health]") {
-  for (const double factor : {0.25, 4.0}) {  // Of the variance.
-    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-      INFO("factor " << factor << ", seed " << seed);
-      const sim::Drive drive = forest_drive(seed);
-      Watched watched;
-      int named = 0;
-      int notes = 0;
-      std::string text;
-      for (std::size_t k = 0; k < drive.size(); ++k) {
-        model::LandmarkScan scan = drive.scan(k).scan;
-        for (model::Detection& one : scan.detections) one.covariance_m2 *= factor;
-        watched.add(scan);
-        if (watched.watch.take_note()) ++notes;
-        if (!watched.shows(wire::Reason::kNoiseMisstated)) continue;
-        ++named;
-        text = watched.watch.conditions()[3].text;
-      }
-      CHECK(named >= 10);
-      CHECK(named < 100);
-      CHECK(notes == 1);
-      CHECK(text.find(factor < 1.0 ? "have 2." : "have 0.") != std::string::npos);
-      CHECK_FALSE(watched.shows(wire::Reason::kNoiseMisstated));
-      CHECK(watched.keyframer.input_quality().noise.is_corrected);
-    }
-  }
 }
 
 namespace {

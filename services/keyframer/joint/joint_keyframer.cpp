@@ -29,10 +29,7 @@ std::vector<std::uint64_t> numbers_of(const PlacedScan& placed) {
 }  // namespace
 
 JointKeyframer::JointKeyframer(const JointKeyframerParameters& parameters)
-    : parameters_(parameters),
-      tracker_(parameters),
-      noise_(parameters.noise),
-      noise_check_(parameters.noise) {}
+    : parameters_(parameters), tracker_(parameters), noise_(parameters.noise) {}
 
 void JointKeyframer::add(const model::Odometry& odometry) {
   odometry_.add(odometry);
@@ -85,7 +82,7 @@ std::optional<PlacedScan> JointKeyframer::place(
 
   // Do the landmarks move as odometry says?
   const std::size_t in_both = std::min(noise_.seen_last(), stated.detections.size());
-  learn_noise(stated, *placed);
+  noise_.add(stated, numbers_of(*placed));
   const auto step = noise_.step();
   calibration_.check(step);
   if (motion && !step && in_both >= kToContradict) calibration_.break_off();
@@ -115,12 +112,6 @@ std::optional<PlacedScan> JointKeyframer::place_by_tries(
   return placed;
 }
 
-void JointKeyframer::learn_noise(const model::LandmarkScan& stated, const PlacedScan& placed) {
-  const std::vector<std::uint64_t> numbers = numbers_of(placed);
-  noise_.add(stated, numbers);
-  noise_check_.add(stated, numbers, noise_);
-}
-
 bool JointKeyframer::is_full() const {
   return members_.size() >= static_cast<std::size_t>(parameters_.observations_per_keyframe);
 }
@@ -146,7 +137,7 @@ std::optional<model::Keyframe> JointKeyframer::start_anew(const model::LandmarkS
   local_T_previous_base_.reset();
   noise_.forget_while_new();
   PlacedScan first = tracker_.restart(noise_.corrected(scan));
-  learn_noise(scan, first);
+  noise_.add(scan, numbers_of(first));
   gather({scan, std::move(first), std::nullopt, std::nullopt});
   return is_full() ? finish() : result;  // Full by one scan: then none was gathered before it.
 }

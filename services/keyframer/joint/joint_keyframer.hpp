@@ -9,7 +9,6 @@
 
 #include "common/model/detection_noise.hpp"
 #include "common/model/level.hpp"
-#include "common/model/noise_check.hpp"
 #include "common/model/odometry_buffer.hpp"
 #include "services/keyframer/joint/bias_track.hpp"
 #include "services/keyframer/joint/calibration_watch.hpp"
@@ -41,7 +40,7 @@ class JointKeyframer final : public KeyframerMethod {
   void add(const model::EkfLevel& level) override { level_.set(level); }
 
   InputQuality input_quality() const override {
-    return {noise_check_.verdict(), calibration_.error(), calibration_.lately(),
+    return {noise_.is_misstated(), calibration_.error(), calibration_.lately(),
             calibration_.contradicts()};
   }
   /// Counts for HEALTH.
@@ -55,8 +54,8 @@ class JointKeyframer final : public KeyframerMethod {
   /// Members of a saved state; see common/state. The parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.tracker_, self.noise_, self.noise_check_, self.calibration_, self.odometry_, self.bias_,
-      self.level_, self.members_, self.waiting_, self.waited_, self.last_utime_, self.interval_us_,
+    a(self.tracker_, self.noise_, self.calibration_, self.odometry_, self.bias_, self.level_,
+      self.members_, self.waiting_, self.waited_, self.last_utime_, self.interval_us_,
       self.next_sequence_, self.local_T_previous_base_, self.counters_);
   }
 
@@ -68,7 +67,6 @@ class JointKeyframer final : public KeyframerMethod {
   std::optional<PlacedScan> place_by_tries(
       const model::LandmarkScan& stated, const std::optional<geometry::SE2WithCovariance>& motion);
   void gather(Member member);
-  void learn_noise(const model::LandmarkScan& stated, const PlacedScan& placed);
   bool is_full() const;
   bool is_after_pause(model::Utime utime) const;
   std::optional<model::Keyframe> finish();
@@ -80,7 +78,6 @@ class JointKeyframer final : public KeyframerMethod {
   JointKeyframerParameters parameters_;
   ScanTracker tracker_;
   model::DetectionNoise noise_;
-  model::NoiseCheck noise_check_;
   CalibrationWatch calibration_;
   model::OdometryBuffer odometry_;
   BiasTrack bias_;
