@@ -97,7 +97,7 @@ std::optional<TiedMap> MapTies::tie(std::uint32_t map_id, const TruthTrack& trut
   };
   const auto start = started_.find(map_id);
   if (start != started_.end()) {
-    if (const auto tied = at(start->second, MapTie::kFirstMap)) return tied;
+    if (auto tied = at(start->second, MapTie::kFirstMap)) return tied;
   }
 
   const auto located = located_.find(map_id);
@@ -115,12 +115,12 @@ std::optional<TiedMap> MapTies::tie(std::uint32_t map_id, const TruthTrack& trut
   if (held.has_whole()) {
     const auto whole = held.whole();
     for (const auto& keyframe : whole->keyframes) {
-      if (const auto tied = at(keyframe, MapTie::kFirstKeyframe)) return tied;
+      if (auto tied = at(keyframe, MapTie::kFirstKeyframe)) return tied;
     }
   }
   if (located == located_.end()) return std::nullopt;
   for (const Located& one : located->second) {
-    if (const auto tied = at(one, MapTie::kFirstUpdate)) return tied;
+    if (auto tied = at(one, MapTie::kFirstUpdate)) return tied;
   }
   return std::nullopt;
 }

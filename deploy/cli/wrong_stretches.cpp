@@ -26,12 +26,12 @@ bool is_bad(std::int8_t state) {
 }  // namespace
 
 void AlarmCollector::take(const health_t& health, std::int64_t log_utime) {
-  std::vector<AlarmSpan>& spans = health_[health.process];
+  std::vector<ReceiveSpan>& spans = health_[health.process];
   if (is_bad(health.state)) spans.push_back({log_utime, log_utime + kHealthLasts_us});
 }
 
 void AlarmCollector::take(const log_t& message, std::int64_t log_utime) {
-  std::vector<AlarmSpan>& spans = logged_[message.process];
+  std::vector<ReceiveSpan>& spans = logged_[message.process];
   std::string text = message.text;
   if (message.level >= log_t::LEVEL_WARNING) {
     spans.push_back({log_utime, log_utime + kFaultLasts_us});
@@ -48,8 +48,8 @@ void AlarmCollector::take(const log_t& message, std::int64_t log_utime) {
   open_.erase(open);
 }
 
-std::vector<AlarmSpan> AlarmCollector::alarms() const {
-  std::vector<AlarmSpan> all;
+std::vector<ReceiveSpan> AlarmCollector::alarms() const {
+  std::vector<ReceiveSpan> all;
   for (const auto& [process, spans] : health_) all.insert(all.end(), spans.begin(), spans.end());
   for (const auto& [process, spans] : logged_) {
     if (!health_.contains(process)) all.insert(all.end(), spans.begin(), spans.end());
@@ -71,7 +71,7 @@ bool is_wrong(const ComparedPose& pose) {
 }
 
 std::vector<WrongStretch> wrong_stretches(std::span<const ComparedPose> poses,
-                                          std::span<const AlarmSpan> alarms) {
+                                          std::span<const ReceiveSpan> alarms) {
   std::vector<WrongStretch> stretches;
   for (const ComparedPose& pose : poses) {
     if (!is_wrong(pose)) continue;
@@ -86,7 +86,7 @@ std::vector<WrongStretch> wrong_stretches(std::span<const ComparedPose> poses,
 
   for (WrongStretch& stretch : stretches) {
     const std::int64_t from_us = stretch.span.from_us;
-    stretch.was_told = std::ranges::any_of(alarms, [&](const AlarmSpan& alarm) {
+    stretch.was_told = std::ranges::any_of(alarms, [&](const ReceiveSpan& alarm) {
       return alarm.from_us <= from_us + kTellWithin_us && alarm.to_us >= from_us;
     });
   }

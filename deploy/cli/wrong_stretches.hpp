@@ -15,7 +15,7 @@
 namespace understory::cli {
 
 /// A span of the log's receive times [us], both ends included.
-struct AlarmSpan {
+struct ReceiveSpan {
   std::int64_t from_us = 0;
   std::int64_t to_us = 0;
 };
@@ -29,21 +29,21 @@ class AlarmCollector {
   void take(const health_t& health, std::int64_t log_utime);  ///< In the order of the log.
   void take(const log_t& message, std::int64_t log_utime);    ///< In the order of the log.
   /// In no order; spans may overlap.
-  std::vector<AlarmSpan> alarms() const;
+  std::vector<ReceiveSpan> alarms() const;
   /// Whether any process stated how it is, by HEALTH or by LOG.
   bool has_any() const { return !health_.empty() || !logged_.empty(); }
 
  private:
   /// Process, channel, reason, text.
   using Warning = std::tuple<std::string, std::string, std::string, std::string>;
-  std::map<std::string, std::vector<AlarmSpan>> health_;  ///< By process; empty: always OK.
-  std::map<std::string, std::vector<AlarmSpan>> logged_;  ///< By process.
-  std::map<Warning, std::int64_t> open_;                  ///< Since when.
+  std::map<std::string, std::vector<ReceiveSpan>> health_;  ///< By process; empty: always OK.
+  std::map<std::string, std::vector<ReceiveSpan>> logged_;  ///< By process.
+  std::map<Warning, std::int64_t> open_;                    ///< Since when.
 };
 
 /// A stretch of wrong poses.
 struct WrongStretch {
-  AlarmSpan span;
+  ReceiveSpan span;
   std::size_t poses = 0;
   double largest_error_m = 0.0;
   bool was_told = false;  ///< Some process was not well within kTellWithin_us of its start.
@@ -61,6 +61,6 @@ inline constexpr std::int64_t kTellWithin_us = 10'000'000;
 bool is_wrong(const ComparedPose& pose);
 /// The stretches of `poses`, which are in the order of the log.
 std::vector<WrongStretch> wrong_stretches(std::span<const ComparedPose> poses,
-                                          std::span<const AlarmSpan> alarms);
+                                          std::span<const ReceiveSpan> alarms);
 
 }  // namespace understory::cli
