@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -24,9 +25,10 @@ constellation::Triangle indexed(const StemTriangle& triangle, constellation::Slo
   return result;
 }
 
-bool diameters_agree(double a_m, double b_m, double log_tolerance) {
-  if (!(a_m > 0.0) || !(b_m > 0.0)) return true;
-  return std::abs(std::log(a_m / b_m)) <= log_tolerance;
+/// In a logarithm of metres; not a number where it is not known.
+float log_of(double diameter_m) {
+  return diameter_m > 0.0 ? static_cast<float>(std::log(diameter_m))
+                          : std::numeric_limits<float>::quiet_NaN();
 }
 
 float heading_between(const Hypothesis& a, const Hypothesis& b) {
@@ -60,7 +62,7 @@ PlaceCluster cluster_around(const Hypothesis& seed, std::span<const Hypothesis> 
 void TripletIndex::add(std::span<const LevelStem> stems, std::span<const StemTriangle> triangles) {
   const auto first = static_cast<constellation::Slot>(stems_.size());
   for (const LevelStem& stem : stems)
-    stems_.push_back({stem.position_m.cast<float>(), static_cast<float>(stem.diameter_m), frames_});
+    stems_.push_back({stem.position_m.cast<float>(), log_of(stem.diameter_m), frames_});
   for (const StemTriangle& triangle : triangles) triangles_.add(indexed(triangle, first));
   ++frames_;
 }
@@ -69,19 +71,25 @@ std::vector<Hypothesis> TripletIndex::hypotheses(std::span<const LevelStem> stem
                                                  std::span<const StemTriangle> triangles,
                                                  const HypothesisFilter& filter) const {
   const auto tolerance = static_cast<float>(filter.side_tolerance_m);
+  const auto log_tolerance = static_cast<float>(filter.diameter_log_tolerance);
   const double reach_m2 = filter.max_distance_m * filter.max_distance_m;
+  std::vector<float> log_diameters;
+  for (const LevelStem& stem : stems) log_diameters.push_back(log_of(stem.diameter_m));
+
   std::vector<Hypothesis> found;
   for (const StemTriangle& triangle : triangles) {
     const auto consider = [&](const constellation::TriangleIndex::Entry& entry) {
       const std::uint32_t frame = stems_[entry.vertex[0]].frame;
       if (frame >= filter.end) return true;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const float off = log_diameters[triangle.corner[i]] - stems_[entry.vertex[i]].log_diameter;
+        // Unknown diameters agree with all: off is not a number then.
+        if (std::abs(off) > log_tolerance) return true;
+      }
       geometry::RigidAlignment2 sums;
       for (std::size_t i = 0; i < 3; ++i) {
-        const LevelStem& own = stems[triangle.corner[i]];
-        const IndexedStem& other = stems_[entry.vertex[i]];
-        if (!diameters_agree(own.diameter_m, other.diameter_m, filter.diameter_log_tolerance))
-          return true;
-        sums.add(other.position_m.cast<double>(), own.position_m);
+        sums.add(stems_[entry.vertex[i]].position_m.cast<double>(),
+                 stems[triangle.corner[i]].position_m);
       }
       const geometry::SE2 pose = sums.a_T_b();
       if (pose.translation().squaredNorm() <= reach_m2)

@@ -47,7 +47,7 @@ class TripletIndex {
  private:
   struct IndexedStem {
     Eigen::Vector2f position_m;
-    float diameter_m = 0.0F;
+    float log_diameter = 0.0F;  ///< Not a number where it is not known.
     std::uint32_t frame = 0;
   };
 

@@ -70,17 +70,32 @@ StemLikelihood::StemLikelihood(StemView frame, const StemNoise& noise,
   const double crowd_area = std::numbers::pi * kCrowdRadiusM * kCrowdRadiusM;
 
   prepared_.reserve(frame.stems.size());
-  for (std::size_t i = 0; i < frame.stems.size(); ++i) {
+  for (std::uint32_t i = 0; i < frame.stems.size(); ++i) {
     const LevelStem& stem = frame.stems[i];
-    double around = 0.0;
-    for (std::size_t k = 0; k < frame.stems.size(); ++k) {
-      const double squared = (frame.stems[k].position_m - stem.position_m).squaredNorm();
-      if (squared < kCrowdRadiusM * kCrowdRadiusM) around += frame.weight[k];
-    }
     const bool has_diameter = stem.diameter_m > 0.0;
-    prepared_.push_back({stem.position_m, has_diameter ? std::log(stem.diameter_m) : 0.0,
-                         has_diameter, frame.weight[i], std::max(density, around / crowd_area)});
+    prepared_.push_back({stem.position_m, i, has_diameter ? std::log(stem.diameter_m) : 0.0,
+                         has_diameter, frame.weight[i], density});
   }
+  std::ranges::sort(prepared_, {}, [](const FrameStem& stem) { return stem.position_m.x(); });
+  for (const FrameStem& stem : prepared_) x_m_.push_back(stem.position_m.x());
+
+  for (FrameStem& stem : prepared_) {
+    double around = 0.0;
+    for (const FrameStem& other : strip(stem.position_m, kCrowdRadiusM)) {
+      const double squared = (other.position_m - stem.position_m).squaredNorm();
+      if (squared < kCrowdRadiusM * kCrowdRadiusM) around += other.weight;
+    }
+    stem.density_per_m2 = std::max(density, around / crowd_area);
+  }
+}
+
+std::span<const StemLikelihood::FrameStem> StemLikelihood::strip(const Eigen::Vector2d& point_m,
+                                                                 double reach_m) const {
+  const auto first = std::ranges::lower_bound(x_m_, point_m.x() - reach_m);
+  auto end = first;
+  while (end != x_m_.end() && *end <= point_m.x() + reach_m) ++end;
+  return std::span(prepared_).subspan(static_cast<std::size_t>(first - x_m_.begin()),
+                                      static_cast<std::size_t>(end - first));
 }
 
 double StemLikelihood::diameter_ratio(double query_m, const FrameStem& stem) const {
@@ -107,7 +122,7 @@ Eigen::Vector2d StemLikelihood::weight(const LevelStem& query, const FrameStem& 
 double StemLikelihood::log_ratio(std::span<const LevelStem> query,
                                  const geometry::SE2& frame_T_query) const {
   const Kernel kernel{noise_.sigma_m * noise_.sigma_m, noise_.wide_sigma_m * noise_.wide_sigma_m};
-  const double far_m2 = kFarSigmas * kFarSigmas * kernel.wide_variance;
+  const double far_m = kFarSigmas * noise_.wide_sigma_m;
   const Eigen::Matrix2d rotation = frame_T_query.rotation();
   const double inside_m2 = radius_m_ * radius_m_;
 
@@ -116,9 +131,9 @@ double StemLikelihood::log_ratio(std::span<const LevelStem> query,
     const Eigen::Vector2d mapped = rotation * stem.position_m + frame_T_query.translation();
     if (mapped.squaredNorm() > inside_m2) continue;
     double ratio = 1.0 - noise_.matched_share;
-    for (const FrameStem& other : prepared_) {
+    for (const FrameStem& other : strip(mapped, far_m)) {
       const double squared = (other.position_m - mapped).squaredNorm();
-      if (squared < far_m2) ratio += weight(stem, other, squared, kernel).sum();
+      if (squared < far_m * far_m) ratio += weight(stem, other, squared, kernel).sum();
     }
     sum += std::log(ratio);
   }
@@ -137,14 +152,14 @@ geometry::SE2 StemLikelihood::refined(std::span<const LevelStem> query,
       const double added = spread.on_the_spot_m * spread.on_the_spot_m + lever * lever;
       const Kernel kernel{noise_.sigma_m * noise_.sigma_m + added,
                           noise_.wide_sigma_m * noise_.wide_sigma_m + added};
-      const double far_m2 = kFarSigmas * kFarSigmas * kernel.wide_variance;
+      const double far_m = kFarSigmas * std::sqrt(kernel.wide_variance);
 
       double ratio = 1.0 - noise_.matched_share;
       std::array<std::pair<const FrameStem*, Eigen::Vector2d>, 8> near{};
       std::size_t count = 0;
-      for (const FrameStem& other : prepared_) {
+      for (const FrameStem& other : strip(mapped, far_m)) {
         const double squared = (other.position_m - mapped).squaredNorm();
-        if (squared > far_m2 || count == near.size()) continue;
+        if (squared > far_m * far_m || count == near.size()) continue;
         near[count] = {&other, weight(stem, other, squared, kernel)};
         ratio += near[count++].second.sum();
       }
@@ -171,13 +186,13 @@ std::vector<StemPair> StemLikelihood::pairs(std::span<const LevelStem> query,
   for (std::uint32_t i = 0; i < query.size(); ++i) {
     const Eigen::Vector2d mapped = rotation * query[i].position_m + frame_T_query.translation();
     StemPair pair{i, 0, std::numeric_limits<double>::infinity()};
-    for (std::uint32_t j = 0; j < prepared_.size(); ++j) {
-      const double squared = (prepared_[j].position_m - mapped).squaredNorm();
-      if (squared < nearest_m2[j]) {
-        nearest_m2[j] = squared;
-        nearest_query[j] = i;
+    for (const FrameStem& other : strip(mapped, gate_m)) {
+      const double squared = (other.position_m - mapped).squaredNorm();
+      if (squared < nearest_m2[other.number]) {
+        nearest_m2[other.number] = squared;
+        nearest_query[other.number] = i;
       }
-      if (squared < pair.distance_m) pair = {i, j, squared};
+      if (squared < pair.distance_m) pair = {i, other.number, squared};
     }
     if (pair.distance_m < gate_m * gate_m) found.push_back(pair);
   }

@@ -70,7 +70,7 @@ class StemLikelihood {
   /// Natural logarithm of the likelihood of the query's stems if it was taken at that pose, over
   /// that of stems that lie anywhere as densely as the frame's. Each stem is of any stem of the
   /// frame around it or of none; outside the view it says nothing.
-  /// O(query stems * frame stems).
+  /// O(query stems * (log frame stems + those in a strip of some metres)).
   double log_ratio(std::span<const LevelStem> query, const geometry::SE2& frame_T_query) const;
 
   /// The pose of the largest likelihood around a start (expectation and maximisation). The start
@@ -94,11 +94,14 @@ class StemLikelihood {
   };
   struct FrameStem {
     Eigen::Vector2d position_m = Eigen::Vector2d::Zero();
+    std::uint32_t number = 0;  ///< In the view.
     double log_diameter = 0.0;
     bool has_diameter = false;
     double weight = 1.0;
     double density_per_m2 = 0.0;  ///< Of stems around it, or of all, whichever is larger.
   };
+  /// Those that are not farther than `reach_m` from a point along x.
+  std::span<const FrameStem> strip(const Eigen::Vector2d& point_m, double reach_m) const;
   /// Narrow and wide part of the mixture for one pair, over the density of stems.
   Eigen::Vector2d weight(const LevelStem& query, const FrameStem& stem, double squared_m2,
                          const Kernel& kernel) const;
@@ -107,7 +110,8 @@ class StemLikelihood {
   StemNoise noise_;
   DiameterSpread diameters_;
   double radius_m_;
-  std::vector<FrameStem> prepared_;
+  std::vector<FrameStem> prepared_;  ///< In order of x.
+  std::vector<double> x_m_;          ///< Of each.
 };
 
 }  // namespace understory::place_recognition

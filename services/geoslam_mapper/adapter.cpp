@@ -374,17 +374,18 @@ class MapperAdapter : public bus::Adapter {
     const bool is_another = is_another_map(update);
     memory_.known.map_id = update.map_id;
     if (is_another) memory_.known.landmarks.clear();
+    const MapTolerance tolerance{output_.moved_m, update.map_T_vehicle.translation()};
     const auto changed = stage_->take_changed_landmarks();
     model::MapDelta delta =
-        changed
-            ? map_change(memory_.known.landmarks, *changed, update, output_.moved_m)
-            : map_difference(memory_.known.landmarks, stage_->landmarks(), update, output_.moved_m);
+        changed ? map_change(memory_.known.landmarks, *changed, update, tolerance)
+                : map_difference(memory_.known.landmarks, stage_->landmarks(), update, tolerance);
 
     memory_.known.utime = std::max(memory_.known.utime, update.utime);
     if (is_another) memory_.keyframes = 0;
     if (update.status == model::MapUpdateStatus::kFirstMap ||
         update.status == model::MapUpdateStatus::kUpdated) {
       ++memory_.keyframes;
+      memory_.map_is_published = false;  // Landmarks moved, if by less than the tolerance.
     }
     const bool changes = !delta.added.empty() || !delta.moved.empty() || !delta.removed.empty() ||
                          !delta.merged.empty();

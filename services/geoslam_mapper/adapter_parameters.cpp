@@ -224,7 +224,8 @@ void describe(MapperOutputParameters& parameters, bus::ParameterTable& table) {
             "MAP. 0: then, on request and at the end only.");
   table.add("output.moved_m", parameters.moved_m, {0.0, 10.0}, "m",
             "MAP_DELTA leaves out landmarks that moved less since they were last in it, and those "
-            "that moved by less than a quarter of their standard deviation and 2 cm.");
+            "that moved by less than a quarter of their standard deviation and 2 cm (10 cm farther "
+            "than 60 m from the vehicle).");
   table.add("output.reset_distance_m", parameters.reset_distance_m, {0.001, 1000.0}, "m",
             "SLAM_POSE counts a reset where the pose jumps farther ...");
   table.add("output.reset_angle_rad", parameters.reset_angle_rad, {0.001, 3.2}, "rad",

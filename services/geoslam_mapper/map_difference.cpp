@@ -4,19 +4,24 @@
 #include <cmath>
 #include <set>
 
+#include "services/geoslam_mapper/mapper_method.hpp"
+
 namespace understory::geoslam_mapper {
 namespace {
 
-/// A position is told anew when it is off by this share of its standard deviation, but not before
-/// `moved_m` and not later than this [m].
 constexpr double kMovedSigmas = 0.25;
-constexpr double kMovedAtMost_m = 0.02;
+constexpr double kMostAround_m = 0.02;
+constexpr double kMostFarAway_m = 0.10;
 
 /// Whether a subscriber that has `told` must hear of `now`.
-bool has_moved(const model::MapLandmark& told, const model::MapLandmark& now, double moved_m) {
+bool has_moved(const model::MapLandmark& told, const model::MapLandmark& now,
+               const MapTolerance& tolerance) {
+  const bool is_around =
+      (now.position_m - tolerance.vehicle_m).norm() < MapperMethod::kAroundVehicle_m;
   const double sigma_m = std::sqrt(std::max(0.0, 0.5 * told.covariance_m2.trace()));
-  const double tolerated_m = std::max(moved_m, std::min(kMovedAtMost_m, kMovedSigmas * sigma_m));
-  return (told.position_m - now.position_m).norm() > tolerated_m;
+  const double most_m =
+      std::min(is_around ? kMostAround_m : kMostFarAway_m, kMovedSigmas * sigma_m);
+  return (told.position_m - now.position_m).norm() > std::max(tolerance.moved_m, most_m);
 }
 
 /// In a list in order of id, the first that is not below `id`.
@@ -31,7 +36,7 @@ auto first_not_below(Landmarks& landmarks, model::LandmarkId id) {
 
 model::MapDelta map_difference(const std::vector<model::MapLandmark>& before,
                                const std::vector<model::MapLandmark>& after,
-                               const model::MapUpdate& update, double moved_m) {
+                               const model::MapUpdate& update, const MapTolerance& tolerance) {
   model::MapDelta delta;
   delta.utime = update.utime;
   delta.merged = update.merged;
@@ -50,7 +55,7 @@ model::MapDelta map_difference(const std::vector<model::MapLandmark>& before,
       delta.added.push_back(landmark);
       continue;
     }
-    if (has_moved(*old, landmark, moved_m)) delta.moved.push_back(landmark);
+    if (has_moved(*old, landmark, tolerance)) delta.moved.push_back(landmark);
     ++old;
   }
   while (old != before.end()) gone(*old++);
@@ -59,7 +64,7 @@ model::MapDelta map_difference(const std::vector<model::MapLandmark>& before,
 
 model::MapDelta map_change(const std::vector<model::MapLandmark>& before,
                            const std::vector<model::MapLandmark>& changed,
-                           const model::MapUpdate& update, double moved_m) {
+                           const model::MapUpdate& update, const MapTolerance& tolerance) {
   model::MapDelta delta;
   delta.utime = update.utime;
   delta.merged = update.merged;
@@ -71,7 +76,7 @@ model::MapDelta map_change(const std::vector<model::MapLandmark>& before,
     const auto old = first_not_below(before, landmark.id);
     if (old == before.end() || old->id != landmark.id) {
       delta.added.push_back(landmark);
-    } else if (has_moved(*old, landmark, moved_m)) {
+    } else if (has_moved(*old, landmark, tolerance)) {
       delta.moved.push_back(landmark);
     }
   }

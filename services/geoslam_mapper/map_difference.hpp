@@ -1,25 +1,33 @@
 // Differences between two versions of the map.
 #pragma once
 
+#include <Eigen/Core>
 #include <vector>
 
 #include "common/model/slam_output.hpp"
 
 namespace understory::geoslam_mapper {
 
-/// What leads from `before` to `after`, both in order of id. Landmarks that moved by less than
-/// `moved_m` are left out, and those that moved by less than a quarter of the standard deviation
-/// that was told of them and by less than 2 cm: a subscriber is within that of the mapper; the old
-/// ids of `update.merged` count as merged, not as removed. O(map).
+/// How far a landmark may be off in the map of a subscriber before it is told again: a quarter of
+/// the standard deviation that was told of it, but at least `moved_m` and at most 2 cm where the
+/// vehicle is, 10 cm farther away than it sees.
+struct MapTolerance {
+  double moved_m = 0.0;
+  Eigen::Vector2d vehicle_m = Eigen::Vector2d::Zero();  ///< Frame map.
+};
+
+/// What leads from `before` to `after`, both in order of id; the old ids of `update.merged` count
+/// as merged, not as removed. A subscriber is within the tolerance of the mapper. O(map).
 model::MapDelta map_difference(const std::vector<model::MapLandmark>& before,
                                const std::vector<model::MapLandmark>& after,
-                               const model::MapUpdate& update, double moved_m);
+                               const model::MapUpdate& update, const MapTolerance& tolerance);
 
-/// The same from those landmarks alone that are new or have moved, in order of id; those that are
-/// gone must be in `update.merged` or `update.removed`. O(changed * log(map)).
+/// The same from those landmarks alone that are new, have moved or are around the vehicle, in order
+/// of id; those that are gone must be in `update.merged` or `update.removed`.
+/// O(changed * log(map)).
 model::MapDelta map_change(const std::vector<model::MapLandmark>& before,
                            const std::vector<model::MapLandmark>& changed,
-                           const model::MapUpdate& update, double moved_m);
+                           const model::MapUpdate& update, const MapTolerance& tolerance);
 
 /// Whether the change displaces most landmarks of `before` (in order of id) by more than
 /// `distance_m`: the map as a whole has jumped. O(moved * log(map)).

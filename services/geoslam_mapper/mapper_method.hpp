@@ -68,8 +68,12 @@ class MapperMethod {
   /// Every landmark of the map at the present estimate, in order of id. Likewise.
   virtual std::vector<model::MapLandmark> landmarks() const = 0;
 
-  /// Those landmarks that are new or have moved since the last call, in order of id and without
-  /// covariances; costs what changed. None where the method does not track changes.
+  /// Landmarks that are nearer to the vehicle than this are around it [m].
+  static constexpr double kAroundVehicle_m = 60.0;
+
+  /// Those landmarks that are new or have moved since the last call, and all around the vehicle, in
+  /// order of id and without covariances; costs what it gives. None where the method does not track
+  /// changes.
   virtual std::optional<std::vector<model::MapLandmark>> take_changed_landmarks() {
     return std::nullopt;
   }

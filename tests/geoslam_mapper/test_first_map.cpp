@@ -104,7 +104,7 @@ TEST_CASE("What is wrong in the first keyframe, and in view of the next ones, do
     for (const model::Keyframe& keyframe : keyframes) {
       const model::MapUpdate update = mapper.add(keyframe);
       if (update.status == model::MapUpdateStatus::kFirstMap) held.clear();
-      held = with_delta(held, map_change(held, *mapper.take_changed_landmarks(), update, 0.0));
+      held = with_delta(held, map_change(held, *mapper.take_changed_landmarks(), update, {}));
     }
     REQUIRE(held.size() == mapper.landmarks().size());
     const std::vector<double> errors_m = landmark_errors_m(mapper, drive);

@@ -220,7 +220,7 @@ TEST_CASE("Who follows the changed landmarks has the map", "[mapper]") {
     const model::MapUpdate update = mapper.add(keyframe);
     const auto changed = mapper.take_changed_landmarks();
     REQUIRE(changed);
-    held = with_delta(held, map_change(held, *changed, update, 0.0));
+    held = with_delta(held, map_change(held, *changed, update, {}));
     const std::vector<model::MapLandmark> map = mapper.landmarks();
     REQUIRE(held.size() == map.size());
     for (std::size_t i = 0; i < map.size(); ++i) {

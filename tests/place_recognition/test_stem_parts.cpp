@@ -207,3 +207,40 @@ TEST_CASE("A frame of another place begins a new chain", "[stems]") {
   CHECK(chains.between(2, 3));
   CHECK(chains.view(2, 4).stems.size() >= chains.stems(2).size());
 }
+
+TEST_CASE("Pairs of stems are the mutually nearest of all", "[stems]") {
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> place(-15.0, 15.0);
+  const auto stems = [&](std::size_t n) {
+    std::vector<LevelStem> made(n);
+    for (LevelStem& stem : made) stem.position_m = {place(random), place(random)};
+    return made;
+  };
+  const auto nearest_in = [](const std::vector<LevelStem>& all, const Eigen::Vector2d& point_m) {
+    return std::ranges::min_element(
+               all, {},
+               [&](const LevelStem& stem) { return (stem.position_m - point_m).squaredNorm(); }) -
+           all.begin();
+  };
+
+  for (int run = 0; run < 50; ++run) {
+    const auto frame = stems(80);
+    const auto query = stems(60);
+    const geometry::SE2 pose(0.1 * run, 1.0, 0.2 * run);
+    auto mapped = query;
+    for (LevelStem& stem : mapped) stem.position_m = pose * stem.position_m;
+    const double gate_m = 1.5;
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> expected;
+    for (std::uint32_t i = 0; i < query.size(); ++i) {
+      const auto j = static_cast<std::uint32_t>(nearest_in(frame, mapped[i].position_m));
+      const bool is_mutual = nearest_in(mapped, frame[j].position_m) == i;
+      if (is_mutual && (frame[j].position_m - mapped[i].position_m).norm() < gate_m)
+        expected.emplace_back(i, j);
+    }
+
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> found;
+    for (const StemPair& pair : StemLikelihood(view_of(frame), {}, {}).pairs(query, pose, gate_m))
+      found.emplace_back(pair.query, pair.frame);
+    CHECK(found == expected);
+  }
+}

@@ -401,10 +401,19 @@ void OneMap::confirm(const model::Keyframe& keyframe, model::MapUpdate& update) 
     update.removed = drop_unseen(keyframe.field_of_view, map_);
 }
 
-std::vector<model::MapLandmark> OneMap::take_changed_landmarks() {
+std::vector<model::MapLandmark> OneMap::take_changed_landmarks(double around_m) {
+  std::vector<model::LandmarkId> ids = map_.landmarks.take_changed();
+  if (const auto& base = map_T_last_base()) {
+    map_.landmarks.index().for_each_within(
+        base->mean.translation(), around_m,
+        [&](model::LandmarkId id, const Eigen::Vector2d&, double) { ids.push_back(id); });
+    std::ranges::sort(ids);
+    const auto repeated = std::ranges::unique(ids);
+    ids.erase(repeated.begin(), repeated.end());
+  }
+
   std::vector<model::MapLandmark> result;
-  for (const model::LandmarkId id : map_.landmarks.take_changed())
-    result.push_back(map_.landmark(map_.landmarks.at(id)));
+  for (const model::LandmarkId id : ids) result.push_back(map_.landmark(map_.landmarks.at(id)));
   return result;
 }
 

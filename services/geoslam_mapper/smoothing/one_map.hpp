@@ -106,8 +106,9 @@ class OneMap {
   /// `update` lists what came and what became one. False where the two contradict each other: this
   /// map is broken then. Cost: the other map, and an update of all between the two.
   bool rejoin(GlobalMap left, const Overlap& overlap, model::MapUpdate& update);
-  /// Landmarks that are new or have moved since the last call.
-  std::vector<model::MapLandmark> take_changed_landmarks();
+  /// Landmarks that are new or have moved since the last call, and those within `around_m` of the
+  /// last keyframe, in order of id.
+  std::vector<model::MapLandmark> take_changed_landmarks(double around_m);
 
   /// Members of a saved state; see common/state. Parameters are configuration.
   template <class Archive, class Self>

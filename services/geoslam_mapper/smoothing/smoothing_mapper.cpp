@@ -87,7 +87,8 @@ std::optional<ScanPose> SmoothingMapper::locate(const model::LandmarkScan& scan)
 
 /// A step of the units moves all of them.
 std::optional<std::vector<model::MapLandmark>> SmoothingMapper::take_changed_landmarks() {
-  std::vector<model::MapLandmark> changed = current_.take_changed_landmarks();
+  std::vector<model::MapLandmark> changed =
+      current_.take_changed_landmarks(kAroundVehicle_m / units_.factor());
   if (units_.take_step()) changed = current_.map().all_landmarks();
   return units_.metres(std::move(changed));
 }
