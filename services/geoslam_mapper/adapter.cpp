@@ -48,7 +48,7 @@ std::size_t submap_bytes(std::size_t landmarks) {
 /// Most landmarks of one stretch of the path.
 constexpr std::size_t kSubmapLandmarks = 2000;
 
-constexpr state::Format kFormat{"geoslam_mapper", 8};
+constexpr state::Format kFormat{"geoslam_mapper", 9};
 
 /// What a holder of every MAP_DELTA has.
 struct KnownMap {
@@ -74,6 +74,7 @@ struct Memory {
   HandOver hand_over;
   CorrectionWatch corrections;
   LinesOfSight sights;
+  GivenFrame given_frame;
   bool map_is_published = true;
   bool map_is_due = false;      ///< It started or jumped since it was last published.
   bool is_provisional = false;  ///< The map, by its last keyframe.
@@ -85,8 +86,8 @@ struct Memory {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& s) {
     a(s.known, s.odometry, s.jumps, s.health, s.budget, s.hand_over, s.corrections, s.sights,
-      s.map_is_published, s.map_is_due, s.is_provisional, s.keyframes, s.newest_pose_utime,
-      s.earned_pose_utime);
+      s.given_frame, s.map_is_published, s.map_is_due, s.is_provisional, s.keyframes,
+      s.newest_pose_utime, s.earned_pose_utime);
   }
 };
 
@@ -125,6 +126,7 @@ class MapperAdapter : public bus::Adapter {
     state::load(state, kFormat, memory, stage);
     stage_->load(stage);
     memory_ = std::move(memory);
+    memory_.given_frame.rebuild();
     show_health();
   }
 
@@ -278,6 +280,7 @@ class MapperAdapter : public bus::Adapter {
     const std::vector<model::MapLandmark> landmarks =
         apart_from_keyframes(map, parameters_.smoothing.given_map_sigma_m);
     stage_->start_with(landmarks);
+    memory_.given_frame = GivenFrame(map);
     (void)stage_->take_changed_landmarks();
     memory_.known.map_id = model::map_of(landmarks.back().id);
     memory_.known.landmarks = stage_->landmarks();
@@ -300,6 +303,7 @@ class MapperAdapter : public bus::Adapter {
 
   void add(const model::Keyframe& keyframe) {
     model::MapUpdate update = stage_->add(keyframe);
+    update.covariance += given_covariance_at(update.map_T_vehicle, update.map_id);
     identify_detections(keyframe, update);
     memory_.sights.fill(keyframe, memory_.known.landmarks, update);
     memory_.is_provisional = update.is_provisional;
@@ -328,8 +332,16 @@ class MapperAdapter : public bus::Adapter {
     pose.map_id = std::max(memory_.known.map_id, 1U);
     pose.is_provisional = memory_.is_provisional;
     pose.submap_T_vehicle = found->map_T_vehicle.mean;
-    pose.covariance = found->map_T_vehicle.covariance;
+    pose.covariance = found->map_T_vehicle.covariance +
+                      given_covariance_at(found->map_T_vehicle.mean, pose.map_id);
     publish(pose);
+  }
+
+  /// What is not known of the given map's frame there; nothing where the vehicle left that map.
+  Eigen::Matrix3d given_covariance_at(const geometry::SE2& map_T_vehicle,
+                                      std::uint32_t map_id) const {
+    return map_id == memory_.given_frame.map_id() ? memory_.given_frame.covariance_at(map_T_vehicle)
+                                                  : Eigen::Matrix3d::Zero();
   }
 
   /// Whether this keyframe began another map than the last one's.
@@ -410,6 +422,8 @@ class MapperAdapter : public bus::Adapter {
     map.version = memory_.known.version;
     map.landmarks = stage_->landmarks();
     map.keyframes = stage_->trajectory();
+    for (model::KeyframePose& one : map.keyframes)
+      one.covariance += given_covariance_at(one.map_T_vehicle, memory_.known.map_id);
     return map;
   }
 

@@ -4,11 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <span>
 #include <stdexcept>
 #include <utility>
 
-#include "common/constellation/grid.hpp"
 #include "common/map_file/chosen_map.hpp"
 #include "services/geoslam_mapper/point_covariance.hpp"
 
@@ -27,46 +25,17 @@ bool is_sound(const model::MapLandmark& landmark) {
   return landmark.position_m.allFinite() && is_covariance<2>(landmark.covariance_m2);
 }
 
-/// Keyframes whose covariance is known, by place.
-class KnownKeyframes {
- public:
-  explicit KnownKeyframes(std::span<const model::KeyframePose> keyframes) {
-    for (const model::KeyframePose& one : keyframes) {
-      const Eigen::Vector2d at_m = one.map_T_vehicle.translation();
-      if (!constellation::PointGrid::representable(at_m) ||
-          !std::isfinite(one.map_T_vehicle.theta()))
-        continue;
-      if (one.covariance.isZero(0.0) || !is_covariance<3>(one.covariance)) continue;
-      grid_.insert(static_cast<constellation::Slot>(known_.size()), at_m);
-      known_.push_back({one.map_T_vehicle, one.covariance});
-    }
-  }
+/// Of keyframes within this of each other one is kept [m].
+constexpr double kApart_m = 5.0;
+/// Keyframes farther away than this are not looked for by place [m].
+constexpr double kAround_m = 640.0;
 
-  /// The nearest one, map_T_vehicle; none where there is none. Looks further and further.
-  const geometry::SE2WithCovariance* nearest_to(const Eigen::Vector2d& at_m) const {
-    for (double radius_m = kCell_m; radius_m <= kAround_m; radius_m *= 4.0) {
-      const geometry::SE2WithCovariance* nearest = nullptr;
-      double least_m2 = std::numeric_limits<double>::infinity();
-      grid_.for_each_within(at_m.x(), at_m.y(), radius_m, [&](constellation::Slot slot, double m2) {
-        if (m2 >= least_m2) return;
-        least_m2 = m2;
-        nearest = &known_[slot];
-      });
-      if (nearest != nullptr) return nearest;
-    }
-
-    const auto nearest = std::ranges::min_element(
-        known_, {}, [&](const auto& one) { return (one.mean.translation() - at_m).squaredNorm(); });
-    return nearest == known_.end() ? nullptr : &*nearest;
-  }
-
- private:
-  static constexpr double kCell_m = 10.0;
-  static constexpr double kAround_m = 640.0;  ///< Beyond, all of them are looked at.
-
-  constellation::PointGrid grid_{kCell_m};
-  std::vector<geometry::SE2WithCovariance> known_;
-};
+bool is_sound(const model::KeyframePose& keyframe) {
+  const geometry::SE2& pose = keyframe.map_T_vehicle;
+  return constellation::PointGrid::representable(pose.translation()) &&
+         std::isfinite(pose.theta()) && !keyframe.covariance.isZero(0.0) &&
+         is_covariance<3>(keyframe.covariance);
+}
 
 /// What is left of a covariance without its shared part, no less than `least_sigma_m`. Pose and
 /// landmark are correlated otherwise as well, so nothing may be left.
@@ -97,18 +66,66 @@ model::WholeMap read_given_map(const std::string& file, int map_id) {
 
 std::vector<model::MapLandmark> apart_from_keyframes(const model::WholeMap& map,
                                                      double least_sigma_m) {
-  const KnownKeyframes keyframes(map.keyframes);
+  const GivenFrame frame(map);
   std::vector<model::MapLandmark> result = map.landmarks;
   for (model::MapLandmark& landmark : result) {
     if (!constellation::PointGrid::representable(landmark.position_m)) continue;
-    const geometry::SE2WithCovariance* const nearest = keyframes.nearest_to(landmark.position_m);
+    const GivenFrame::Known* const nearest = frame.nearest_to(landmark.position_m);
     if (nearest == nullptr) continue;
 
     const Eigen::Matrix2d shared =
-        point_covariance(*nearest, nearest->mean.inverse() * landmark.position_m);
+        point_covariance({nearest->map_T_vehicle, nearest->covariance},
+                         nearest->map_T_vehicle.inverse() * landmark.position_m);
     landmark.covariance_m2 = without(landmark.covariance_m2, shared, least_sigma_m);
   }
   return result;
+}
+
+GivenFrame::GivenFrame(const model::WholeMap& map)
+    : map_id_(map.landmarks.empty() ? 0 : model::map_of(map.landmarks.back().id)) {
+  for (const model::KeyframePose& one : map.keyframes) {
+    if (!is_sound(one)) continue;
+    bool is_covered = false;
+    const Eigen::Vector2d at_m = one.map_T_vehicle.translation();
+    grid_.for_each_within(at_m.x(), at_m.y(), kApart_m,
+                          [&](constellation::Slot, double) { is_covered = true; });
+    if (is_covered) continue;
+    grid_.insert(static_cast<constellation::Slot>(keyframes_.size()), at_m);
+    keyframes_.push_back({one.map_T_vehicle, one.covariance});
+  }
+}
+
+void GivenFrame::rebuild() {
+  grid_ = constellation::PointGrid(kCell_m);
+  for (std::size_t i = 0; i < keyframes_.size(); ++i)
+    grid_.insert(static_cast<constellation::Slot>(i), keyframes_[i].map_T_vehicle.translation());
+}
+
+/// Looks further and further.
+const GivenFrame::Known* GivenFrame::nearest_to(const Eigen::Vector2d& at_m) const {
+  for (double radius_m = kCell_m; radius_m <= kAround_m; radius_m *= 4.0) {
+    const Known* nearest = nullptr;
+    double least_m2 = std::numeric_limits<double>::infinity();
+    grid_.for_each_within(at_m.x(), at_m.y(), radius_m, [&](constellation::Slot slot, double m2) {
+      if (m2 >= least_m2) return;
+      least_m2 = m2;
+      nearest = &keyframes_[slot];
+    });
+    if (nearest != nullptr) return nearest;
+  }
+
+  const auto nearest = std::ranges::min_element(keyframes_, {}, [&](const Known& one) {
+    return (one.map_T_vehicle.translation() - at_m).squaredNorm();
+  });
+  return nearest == keyframes_.end() ? nullptr : &*nearest;
+}
+
+Eigen::Matrix3d GivenFrame::covariance_at(const geometry::SE2& map_T_vehicle) const {
+  const Known* const nearest = nearest_to(map_T_vehicle.translation());
+  if (nearest == nullptr) return Eigen::Matrix3d::Zero();
+  const geometry::SE2WithCovariance keyframe_T_vehicle{
+      nearest->map_T_vehicle.inverse() * map_T_vehicle, Eigen::Matrix3d::Zero()};
+  return compound({nearest->map_T_vehicle, nearest->covariance}, keyframe_T_vehicle).covariance;
 }
 
 std::string why_not_given(const model::WholeMap& map) {

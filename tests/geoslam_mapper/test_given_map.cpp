@@ -6,6 +6,7 @@
 #include "common/bus/memory_bus.hpp"
 #include "common/map_file/map_file.hpp"
 #include "common/model/slam_output.hpp"
+#include "common/state/archive.hpp"
 #include "common/wire/convert.hpp"
 #include "services/geoslam_mapper/adapter.hpp"
 #include "services/geoslam_mapper/given_map.hpp"
@@ -246,6 +247,80 @@ TEST_CASE("What a map's landmarks share far from its first keyframe is no error 
     CHECK(rms_m < 0.05);
     CHECK(stack.asked().landmarks.size() <= landmarks.size() + landmarks.size() / 100);
   }
+}
+
+TEST_CASE("Poses in a map that was driven state the error of that map", "[given_map]") {
+  const sim::Drive drive = drive_through(59, 120.0);
+  // The map is rotated about a place 200 m before it; what is seen in it does not show that.
+  const geometry::SE2 first({-200.0, 0.0}, 0.0);
+  const double sigma_rad = 4e-3;
+  double nees = 0.0;
+  for (const double error_rad : {-1.0 * sigma_rad, 0.5 * sigma_rad, 1.2 * sigma_rad}) {
+    const geometry::SE2 map_T_world =
+        first * geometry::SE2({0.0, 0.0}, error_rad) * first.inverse();
+    const geometry::SE2WithCovariance map_T_first{
+        first, Eigen::Vector3d(1e-4, 1e-4, sigma_rad * sigma_rad).asDiagonal().toDenseMatrix()};
+    std::vector<model::MapLandmark> landmarks = survey(drive, 59);
+    for (model::MapLandmark& one : landmarks) {
+      one.position_m = map_T_world * one.position_m;
+      one.covariance_m2 += geoslam_mapper::point_covariance(
+          map_T_first, map_T_first.mean.inverse() * one.position_m);
+    }
+    std::vector<model::KeyframePose> keyframes;
+    for (std::size_t k = 0; k < drive.size(); k += 10) {
+      const geometry::SE2 pose = map_T_world * drive.world_T_vehicle()[k];
+      const auto stated =
+          compound(map_T_first,
+                   geometry::SE2WithCovariance{first.inverse() * pose, Eigen::Matrix3d::Zero()});
+      keyframes.push_back({k + 1, drive.utime(k), pose, stated.covariance});
+    }
+    const test::TemporaryDirectory folder;
+    Stack stack(toml_of(file_of(landmarks, folder, false, keyframes), false));
+    stack.drive(drive);
+    nees += errors(stack, drive).second / 3.0;
+    for (const model::KeyframePose& one : stack.asked().keyframes) {
+      const double lever_m = (one.map_T_vehicle.translation() - first.translation()).norm();
+      CHECK(one.covariance.topLeftCorner<2, 2>().trace() > 0.8 * std::pow(lever_m * sigma_rad, 2));
+      CHECK(one.covariance(2, 2) >= sigma_rad * sigma_rad);
+    }
+  }
+  // The heading's error alone: its square over its variance is 0.9 in the mean of the three.
+  CHECK(nees > 0.3);
+  CHECK(nees < 3.0);
+}
+
+TEST_CASE("The frame of a given map is that of its nearest keyframe, after a restart as well",
+          "[given_map]") {
+  std::mt19937_64 random(60);
+  std::uniform_real_distribution<double> place(-2000.0, 2000.0);
+  model::WholeMap map;
+  map.landmarks.resize(1);
+  map.landmarks[0].id = (model::LandmarkId{7} << model::kLandmarkCounterBits) | 1U;
+  for (std::uint64_t k = 0; k < 300; ++k) {
+    const geometry::SE2 pose({place(random), place(random)}, place(random));
+    map.keyframes.push_back({k, static_cast<model::Utime>(k), pose,
+                             1e-4 * static_cast<double>(k + 1) * Eigen::Matrix3d::Identity()});
+  }
+  const geoslam_mapper::GivenFrame frame(map);
+  geoslam_mapper::GivenFrame loaded;
+  state::load(state::save({"test"}, frame), {"test"}, loaded);
+  loaded.rebuild();
+  CHECK(loaded.map_id() == 7);
+
+  for (int i = 0; i < 300; ++i) {
+    const geometry::SE2 pose({1.2 * place(random), place(random)}, 0.0);
+    const auto nearest = std::ranges::min_element(map.keyframes, {}, [&](const auto& one) {
+      return (one.map_T_vehicle.translation() - pose.translation()).norm();
+    });
+    const auto expected =
+        compound(geometry::SE2WithCovariance{nearest->map_T_vehicle, nearest->covariance},
+                 geometry::SE2WithCovariance{nearest->map_T_vehicle.inverse() * pose,
+                                             Eigen::Matrix3d::Zero()});
+    const double size = expected.covariance.norm();
+    CHECK((frame.covariance_at(pose) - expected.covariance).norm() <= 1e-9 * size);
+    CHECK((loaded.covariance_at(pose) - expected.covariance).norm() <= 1e-9 * size);
+  }
+  CHECK(geoslam_mapper::GivenFrame().covariance_at({}).isZero(0.0));
 }
 
 TEST_CASE("In somebody else's map the mapper says that it is lost, within 2 s", "[given_map]") {
