@@ -3,6 +3,7 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include "common/geometry/alignment.hpp"
@@ -14,7 +15,9 @@ namespace {
 constexpr double kAhead_m = 10.0;
 /// What the world's own frame may fit worse by than the best one, in the median.
 constexpr double kSame_m = 0.1;
-constexpr int kFitRounds = 20;
+/// Positions count as known no better than this [m].
+constexpr double kLeastSigma_m = 0.05;
+constexpr int kFitRounds = 50;
 
 std::vector<double> errors_m(const std::vector<MapAndWorldPose>& poses,
                              const geometry::SE2& world_T_map) {
@@ -34,16 +37,19 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Of the poses whose error is at most `limit_m`.
-geometry::SE2 fit_within(const std::vector<MapAndWorldPose>& poses,
-                         const std::vector<double>& errors_m, double limit_m) {
+/// One round of the fit: poses count by their variance, and less where they are off by more than
+/// they state, so that wrong ones pull like right ones at most (Huber).
+geometry::SE2 refitted(const std::vector<MapAndWorldPose>& poses,
+                       const geometry::SE2& world_T_map) {
+  const std::vector<double> errors = errors_m(poses, world_T_map);
   const Eigen::Vector2d ahead_m(kAhead_m, 0.0);
   geometry::RigidAlignment2 alignment;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    if (errors_m[i] > limit_m) continue;
-    const auto& [map_T_vehicle, world_T_vehicle] = poses[i];
-    alignment.add(world_T_vehicle.translation(), map_T_vehicle.translation());
-    alignment.add(world_T_vehicle * ahead_m, map_T_vehicle * ahead_m);
+    const auto& [map_T_vehicle, world_T_vehicle, variance_m2] = poses[i];
+    const double sigma_m = std::sqrt(variance_m2);
+    const double weight = 1.0 / (sigma_m * std::max(sigma_m, errors[i]));
+    alignment.add(world_T_vehicle.translation(), map_T_vehicle.translation(), weight);
+    alignment.add(world_T_vehicle * ahead_m, map_T_vehicle * ahead_m, weight);
   }
   return alignment.a_T_b();
 }
@@ -79,7 +85,9 @@ const char* to_string(MapTie tie) {
 
 void MapTies::take(const model::MapUpdate& update) {
   last_map_id_ = update.map_id;
-  const Located one{update.utime, update.map_T_vehicle};
+  const Located one{update.utime, update.map_T_vehicle,
+                    std::max(kLeastSigma_m * kLeastSigma_m,
+                             0.5 * update.covariance.topLeftCorner<2, 2>().trace())};
   if (update.status == model::MapUpdateStatus::kFirstMap) started_.emplace(update.map_id, one);
   if (update.status == model::MapUpdateStatus::kUpdated) located_[update.map_id].push_back(one);
 }
@@ -106,7 +114,7 @@ std::optional<TiedMap> MapTies::tie(std::uint32_t map_id, const TruthTrack& trut
     std::vector<MapAndWorldPose> poses;
     for (const Located& one : located->second) {
       if (const auto true_pose = truth.at(one.utime))
-        poses.push_back({one.map_T_vehicle, *true_pose});
+        poses.push_back({one.map_T_vehicle, *true_pose, one.variance_m2});
     }
     if (!poses.empty()) return fitted_frame(poses);
   }
@@ -126,12 +134,8 @@ std::optional<TiedMap> MapTies::tie(std::uint32_t map_id, const TruthTrack& trut
 }
 
 TiedMap fitted_frame(const std::vector<MapAndWorldPose>& poses) {
-  std::vector<double> errors(poses.size(), 0.0);
-  geometry::SE2 world_T_map = fit_within(poses, errors, 0.0);
-  for (int round = 0; round < kFitRounds; ++round) {
-    errors = errors_m(poses, world_T_map);
-    world_T_map = fit_within(poses, errors, median(errors));
-  }
+  geometry::SE2 world_T_map = poses.front().world_T_vehicle * poses.front().map_T_vehicle.inverse();
+  for (int round = 0; round < kFitRounds; ++round) world_T_map = refitted(poses, world_T_map);
 
   const double best_m = median(errors_m(poses, world_T_map));
   const double as_it_is_m = median(errors_m(poses, {}));

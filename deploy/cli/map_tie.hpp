@@ -53,6 +53,7 @@ class MapTies {
   struct Located {
     model::Utime utime = 0;
     geometry::SE2 map_T_vehicle;
+    double variance_m2 = 0.0;  ///< Of the position, per axis.
   };
   std::map<std::uint32_t, Located> started_;               ///< By the map that it started.
   std::map<std::uint32_t, std::vector<Located>> located_;  ///< By map.
@@ -64,10 +65,12 @@ class MapTies {
 struct MapAndWorldPose {
   geometry::SE2 map_T_vehicle;
   geometry::SE2 world_T_vehicle;
+  double variance_m2 = 0.0;  ///< Of the position in the map, per axis; above 0.
 };
 /// The frame of a map that has no start, by poses in it: the world's own where they agree with it
-/// about as well (median error at most 0.1 m above the best fit's), else the best fit of the half
-/// of the poses that fit best (wrong ones do not pull), headings included. Precondition: not empty.
+/// about as well (median error at most 0.1 m above the best fit's), else the best fit by their
+/// variances, headings included; wrong ones pull little. Near the origin of a map poses are known
+/// best: there the map hangs. Precondition: not empty.
 TiedMap fitted_frame(const std::vector<MapAndWorldPose>& poses);
 
 }  // namespace understory::cli

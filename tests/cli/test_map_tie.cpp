@@ -20,7 +20,7 @@ std::vector<cli::MapAndWorldPose> located_drive(const SE2& world_T_map, std::mt1
   for (int i = 0; i < 30; ++i) {
     const SE2 world_T_vehicle(900.0 + 2.0 * i, 0.02 * i * i, 0.02 * i);
     const SE2 error(0.03 * normal(random), 0.03 * normal(random), 0.005 * normal(random));
-    poses.push_back({world_T_map.inverse() * world_T_vehicle * error, world_T_vehicle});
+    poses.push_back({world_T_map.inverse() * world_T_vehicle * error, world_T_vehicle, 9e-4});
     if (i % 10 == 3) poses.back().map_T_vehicle = SE2(-200.0, 80.0, 3.0);
   }
   return poses;
@@ -102,10 +102,27 @@ TEST_CASE("A given map with a frame of its own is tied where its poses fit", "[c
   }
 }
 
+TEST_CASE("A given map hangs where its poses are known best", "[cli]") {
+  // Bent along the way: 40 cm off at the end, as its poses state.
+  const SE2 world_T_map(300.0, -20.0, 1.0);
+  std::vector<cli::MapAndWorldPose> poses;
+  for (int i = 0; i < 100; ++i) {
+    const SE2 world_T_vehicle(10.0 * i, 0.0, 0.0);
+    const double bent_m = 0.4 * std::pow(i / 100.0, 2);
+    poses.push_back({world_T_map.inverse() * SE2(10.0 * i, bent_m, 0.0), world_T_vehicle,
+                     std::pow(0.01 + bent_m, 2)});
+  }
+  const auto tied = cli::fitted_frame(poses);
+  for (std::size_t i = 0; i < 10; ++i) {
+    const Eigen::Vector2d there = tied.world_T_map * poses.at(i).map_T_vehicle.translation();
+    CHECK((there - poses.at(i).world_T_vehicle.translation()).norm() < 0.02);
+  }
+}
+
 TEST_CASE("One pose is enough to tie a given map", "[cli]") {
   const SE2 world_T_map(5.0, 6.0, 0.7);
   const SE2 pose(1.0, 2.0, 3.0);
-  const auto tied = cli::fitted_frame({{world_T_map.inverse() * pose, pose}});
+  const auto tied = cli::fitted_frame({{world_T_map.inverse() * pose, pose, 1.0}});
   CHECK((tied.world_T_map.translation() - world_T_map.translation()).norm() < 1e-9);
   CHECK(tied.world_T_map.theta() == Approx(0.7));
 }
