@@ -44,6 +44,8 @@ constexpr double kLeast_m2 = 1e-12;
 constexpr double kOther = 2.0;
 constexpr double kOtherSigmas = 4.0;
 constexpr double kAfterChange = 0.3;
+/// Change of the logarithm of a scan's mean factor that is noted.
+constexpr double kChanged = 0.69;  // doubled or halved
 /// Factors of the variance to try: four times the sigma, a quarter and half of it.
 constexpr std::array<double, 3> kTries = {16.0, 1.0 / 16.0, 1.0 / 4.0};
 /// Degrees of freedom below which too little is learned to trust a gate: a few scans.
@@ -120,6 +122,23 @@ void DetectionNoise::add(const LandmarkScan& scan, std::span<const std::uint64_t
   ++since_other_;
   if (const auto common = common_with_last(kLag)) learn(common->pairs, common->fit);
   for (std::size_t lag = 0; lag < kLags.size(); ++lag) learn_lag(lag);
+  note_changes();
+}
+
+/// Notes that the last scan's factors, in their mean, are others than before.
+void DetectionNoise::note_changes() {
+  scans_since_told_ = std::min(scans_since_told_ + 1, kSettled);
+  const std::vector<Seen>& seen = recent_.back().seen;
+  if (seen.size() < kLeastPairs) return;
+  std::array<double, kKinds * kRanges> logarithm{};
+  for (std::size_t bin = 0; bin < logarithm.size(); ++bin) logarithm[bin] = std::log(learned(bin));
+  double sum = 0.0;
+  for (const Seen& one : seen) sum += logarithm[bin_of(one.kind, one.position_m.norm())];
+
+  const double mean = sum / static_cast<double>(seen.size());
+  if (std::abs(mean - told_) < kChanged) return;
+  told_ = mean;
+  scans_since_told_ = 0;
 }
 
 /// The residuals between the last scan and the one `kLags[lag]` before it.
@@ -261,8 +280,12 @@ double DetectionNoise::repetition(LandmarkKind kind) const {
   return white_noise_power(lags, kLag, kLagSigmas);
 }
 
+double DetectionNoise::learned(std::size_t bin) const {
+  return estimate(bin) * repetition(static_cast<LandmarkKind>(bin / kRanges));
+}
+
 double DetectionNoise::factor_of(std::size_t bin) const {
-  const double learned = estimate(bin) * repetition(static_cast<LandmarkKind>(bin / kRanges));
+  const double learned = this->learned(bin);
   const bool is_corner = bin / kRanges == static_cast<std::size_t>(LandmarkKind::kCorner);
   const double below = is_corner ? parameters_.replace_corners_below : parameters_.replace_below;
   if (learned < parameters_.replace_above && learned > below) return 1.0;

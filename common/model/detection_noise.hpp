@@ -90,6 +90,9 @@ class DetectionNoise {
   }
   /// True where the factor of any kind and range is not 1.
   bool is_misstated() const;
+  /// True while it is so and the factors are not settled: less than 200 scans ago their mean over a
+  /// scan doubled or halved. Afterwards what is stated is wrong, and what is used is right.
+  bool is_adjusting() const { return is_misstated() && scans_since_told_ < kSettled; }
   /// How much more a detection's variance counts since its error is correlated with those of the
   /// scans around: white noise of the same power over the variance between scans four apart. 1 for
   /// white noise and until enough is learned.
@@ -98,7 +101,8 @@ class DetectionNoise {
   /// Members of a saved state; see common/state. The parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.sums_, self.by_lag_, self.since_other_, self.recent_);
+    a(self.sums_, self.by_lag_, self.since_other_, self.recent_, self.told_,
+      self.scans_since_told_);
   }
 
  private:
@@ -107,6 +111,9 @@ class DetectionNoise {
 
   /// Lags [scans] at which residuals are compared; the last one is within kLongLag.
   static constexpr std::array<std::size_t, 5> kLags = {1, 2, 4, 8, 16};
+
+  /// Scans after which factors that did not change are settled.
+  static constexpr std::size_t kSettled = 200;
 
   static constexpr std::size_t kKinds = 2;
   static constexpr std::size_t kRanges = 4;
@@ -186,13 +193,19 @@ class DetectionNoise {
   Fit fitted_motion(std::span<const Pair> pairs) const;
   static Residual residual_of(const Pair& pair, double factor, const geometry::SE2& then_T_now);
   double estimate(std::size_t bin) const;
+  double learned(std::size_t bin) const;
   double factor_of(std::size_t bin) const;
+  void note_changes();
 
   DetectionNoiseParameters parameters_;
   std::array<Sums, kKinds * kRanges> sums_{};
   /// Of residuals at each lag, by their noise as learned in `sums_`.
   std::array<std::array<Sums, kLags.size()>, kKinds> by_lag_{};
   std::size_t since_other_ = 0;  ///< Scans since the noise was quite different.
+  /// Logarithm of the mean factor of the scan that had last doubled or halved it, and scans
+  /// since.
+  double told_ = 0.0;
+  std::size_t scans_since_told_ = 0;
   std::deque<SeenScan> recent_;  ///< The last scans, the newest at the end.
 };
 

@@ -113,7 +113,7 @@ struct MapUpdate {
   double chi2 = 0.0;             ///< Of the innovation, over `degrees_of_freedom`.
   std::uint32_t degrees_of_freedom = 0;
   double log10_false_alarm = 0.0;  ///< Of the accepted pose (search only).
-  std::string reason;              ///< Why it was not fused; empty where it was.
+  std::string reason;              ///< Why it was not fused, or by odometry alone; else empty.
 };
 
 }  // namespace understory::model

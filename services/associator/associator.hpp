@@ -56,8 +56,9 @@ class Associator {
 
   /// Counts for HEALTH.
   const AssociatorCounters& counters() const { return counters_; }
-  /// True where the scans contradict the covariances of LANDMARKS; they are then replaced.
-  bool is_noise_misstated() const { return noise_.is_misstated(); }
+  /// True where the scans contradict the covariances of LANDMARKS, until what replaces them is
+  /// settled.
+  bool is_noise_misstated() const { return noise_.is_adjusting(); }
   /// Number of tracks, consistent or not.
   std::size_t track_count() const { return tracks_.tracks().size(); }
 

@@ -11,8 +11,11 @@ void describe(HealthParameters& p, bus::ParameterTable& table) {
             "From the start so many scans with detections are given for the first association.");
   describe(p.lost, "lost", "scans", "bad are those of which nothing could be associated.", table);
   describe(p.refused, "refused", "scans", "bad are those that came late or twice.", table);
-  describe(p.misstated, "misstated", "scans",
-           "bad are those whose stated noise is replaced by what the scans show.", table);
+  describe(
+      p.misstated, "misstated", "scans",
+      "bad are those whose stated noise is replaced by what the scans show, until that is settled "
+      "(200 scans without a change).",
+      table);
 }
 
 HealthWatch::HealthWatch(const HealthParameters& parameters)

@@ -23,14 +23,14 @@ void describe(HealthParameters& parameters, bus::ParameterTable& table);
 /// Judges the associator by its latest scans. `lost`: detections come and nothing of them is
 /// associated; at the start it has the time that tracks need to be confirmed. `input_refused`:
 /// scans that are late. `noise_misstated`: scans contradict the covariances that LANDMARKS states,
-/// and those that they show are used.
+/// and those that they show are used but not yet settled.
 class HealthWatch {
  public:
   /// All is well so far.
   explicit HealthWatch(const HealthParameters& parameters = {});
 
   /// A scan, with the associator's counts before and after it.
-  /// `is_misstated`: whether the stated noise is replaced.
+  /// `is_misstated`: whether the stated noise is replaced by one that is not settled.
   void add(const model::LandmarkScan& scan, const AssociatorCounters& before,
            const AssociatorCounters& after, bool is_misstated = false);
   /// What to show.

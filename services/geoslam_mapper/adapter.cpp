@@ -215,7 +215,11 @@ class MapperAdapter : public bus::Adapter {
                                      {.queue_size = 200});
   }
 
-  void take(const model::LoopClosure& closure) { results_.publish(stage_->take(closure)); }
+  void take(const model::LoopClosure& closure) {
+    const model::LoopResult result = stage_->take(closure);
+    memory_.health.add(result);
+    results_.publish(result);
+  }
 
   /// An answer may come twice: then the submap is not away any more.
   void bring_back(const model::Submap& submap) {

@@ -1,8 +1,15 @@
 #include "services/geoslam_mapper/health_watch.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace understory::geoslam_mapper {
+namespace {
+
+/// So many keyframes are in doubt after a loop closure that contradicts the graph.
+constexpr int kDoubtfulKeyframes = 50;
+
+}  // namespace
 
 void describe(HealthParameters& p, bus::ParameterTable& table) {
   table.add(
@@ -25,12 +32,19 @@ HealthWatch::HealthWatch(const HealthParameters& parameters)
     : parameters_(parameters),
       lost_{wire::Reason::kLost, "keyframes come, and none has a certain pose", "",
             bus::Condition(parameters.lost)},
+      unconfirmed_{wire::Reason::kLost,
+                   "odometry alone places keyframes: few landmarks match there, and no other "
+                   "place is found",
+                   "ODOMETRY", bus::Condition(parameters.lost)},
       rolled_back_{wire::Reason::kRolledBack, "keyframes contradict the map", "",
                    bus::Condition(parameters.rolled_back)},
       diverged_{wire::Reason::kDiverged, "keyframes fit the map worse than is stated", "",
                 bus::Condition(parameters.diverged)},
       contradicts_{wire::Reason::kDiverged, "the map's motion is not the filter's", "EKF_POSE",
                    bus::Condition(parameters.diverged)},
+      closure_{wire::Reason::kDiverged,
+               "a loop closure contradicts the graph: poses may be off by more than they state",
+               "LOOP_CLOSURE", bus::Condition({1, 1})},
       refused_{wire::Reason::kInputRefused, "keyframes are malformed or late", "",
                bus::Condition(parameters.refused)},
       new_map_{wire::Reason::kNewMap, "another map was begun; the one before is not continued", "",
@@ -39,10 +53,18 @@ HealthWatch::HealthWatch(const HealthParameters& parameters)
                   "nobody confirms SUBMAP: the map stays in memory and grows", "SUBMAP",
                   bus::Condition({1, 1})} {}
 
+void HealthWatch::add(const model::LoopResult& result) {
+  using enum model::LoopResult::Status;
+  const bool has_corrected_graph = result.status == kAccepted && !result.reason.empty();
+  if (result.status == kWaiting || has_corrected_graph) doubtful_keyframes_ = kDoubtfulKeyframes;
+}
+
 void HealthWatch::add(const model::MapUpdate& update) {
   using enum model::MapUpdateStatus;
   refused_.condition.add(update.status == kRejected);
   if (update.status == kRejected) return;
+  closure_.condition.add(doubtful_keyframes_ > 0);
+  doubtful_keyframes_ = std::max(0, doubtful_keyframes_ - 1);
 
   const bool is_another = map_id_ != 0 && update.map_id != map_id_;
   map_id_ = update.map_id;
@@ -56,6 +78,7 @@ void HealthWatch::add(const model::MapUpdate& update) {
   rolled_back_.condition.add(update.status == kRolledBack);
   if (!is_localised) return;
 
+  unconfirmed_.condition.add(!update.reason.empty());
   if (update.degrees_of_freedom > 0) {
     const auto degrees = static_cast<double>(update.degrees_of_freedom);
     diverged_.condition.add((update.chi2 - degrees) / std::sqrt(2.0 * degrees) >

@@ -8,6 +8,7 @@
 #include "common/model/archive.hpp"
 #include "common/model/keyframe.hpp"
 #include "common/model/map.hpp"
+#include "common/model/submap.hpp"
 #include "services/geoslam_mapper/smoothing/filter_track.hpp"
 
 namespace understory::geoslam_mapper {
@@ -39,9 +40,11 @@ struct CertainKeyframe {
 /// Judges the mapper by its latest keyframes. `lost`: none has a certain pose. `rolled_back`: they
 /// contradict the map. `diverged`: they fit it worse than is stated (of a map as stated one
 /// keyframe in 1000 by chance, 3 of 8 once in 10^7), or the map moved otherwise than the filter,
-/// which uses the same detections. `input_refused`: they are malformed or late. `new_map`: another
-/// map was begun some keyframes ago. `not_stored`: no store has confirmed what the mapper gave
-/// away.
+/// which uses the same detections, or a loop closure contradicts the graph and waits, or the graph
+/// has yielded to some (for 50 keyframes). `lost` as well where few landmarks match, no other place
+/// is found and odometry alone places keyframes. `input_refused`: they are malformed or late.
+/// `new_map`: another map was begun some keyframes ago. `not_stored`: no store has confirmed what
+/// the mapper gave away.
 class HealthWatch {
  public:
   /// All is well so far.
@@ -52,20 +55,24 @@ class HealthWatch {
   void must_find_map() { must_find_map_ = true; }
   /// What became of a keyframe.
   void add(const model::MapUpdate& update);
+  /// What became of a loop closure.
+  void add(const model::LoopResult& result);
   /// The filter's pose, to compare motions.
   void add(const model::EkfPose& pose) { filter_.add(pose); }
   /// Whether what the mapper gave away is kept by a store; to be called after each keyframe.
   void keeps_up(bool does) { not_stored_.condition.add(!does); }
   /// What to show.
-  std::array<bus::WatchedCondition, 7> conditions() const {
-    return {lost_, rolled_back_, diverged_, contradicts_, refused_, new_map_, not_stored_};
+  std::array<bus::WatchedCondition, 9> conditions() const {
+    return {lost_,    unconfirmed_, rolled_back_, diverged_,  contradicts_,
+            closure_, refused_,     new_map_,     not_stored_};
   }
 
   /// Members of a saved state; see common/state. The parameters are configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.lost_, self.rolled_back_, self.diverged_, self.contradicts_, self.refused_,
-      self.new_map_, self.not_stored_, self.filter_, self.last_, self.map_id_, self.must_find_map_);
+    a(self.lost_, self.unconfirmed_, self.rolled_back_, self.diverged_, self.contradicts_,
+      self.closure_, self.refused_, self.new_map_, self.not_stored_, self.filter_, self.last_,
+      self.map_id_, self.must_find_map_, self.doubtful_keyframes_);
   }
 
  private:
@@ -73,9 +80,11 @@ class HealthWatch {
 
   HealthParameters parameters_;
   bus::WatchedCondition lost_;
+  bus::WatchedCondition unconfirmed_;
   bus::WatchedCondition rolled_back_;
   bus::WatchedCondition diverged_;
   bus::WatchedCondition contradicts_;
+  bus::WatchedCondition closure_;
   bus::WatchedCondition refused_;
   bus::WatchedCondition new_map_;
   bus::WatchedCondition not_stored_;
@@ -83,6 +92,7 @@ class HealthWatch {
   std::optional<CertainKeyframe> last_;
   std::uint32_t map_id_ = 0;  ///< 0 before the first keyframe.
   bool must_find_map_ = false;
+  int doubtful_keyframes_ = 0;  ///< To come, since a loop closure contradicted the graph.
 };
 
 }  // namespace understory::geoslam_mapper

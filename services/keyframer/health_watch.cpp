@@ -25,7 +25,8 @@ void describe(HealthParameters& p, bus::ParameterTable& table) {
   describe(p.refused, "refused", "scans", "bad are those that came late or twice.", table);
   describe(
       p.misstated, "misstated", "scans",
-      "bad are those whose stated noise is replaced by what the scans show, and those at which "
+      "bad are those whose stated noise is replaced by what the scans show, until that is settled "
+      "(200 scans without a change), and those at which "
       "landmarks and wheels contradict each other.",
       table);
   describe(p.jumped, "jumped", "scans",

@@ -31,12 +31,12 @@ void describe(HealthParameters& parameters, bus::ParameterTable& table);
 /// Judges the keyframer by its latest scans. `lost`: tracking begins anew again and again, or no
 /// keyframe comes though detections do. `withheld`: keyframes are not good enough to give out.
 /// `input_refused`: scans that are late. `noise_misstated`: scans contradict the covariances that
-/// LANDMARKS states, and those that they show are used; or (channel LANDMARKS) scans are turned as
-/// a whole against the gyro by far more than is stated.
-/// `diverged`: landmarks moved otherwise than odometry says, as after a jump or where wheels slip.
-/// `miscalibrated`: landmarks and odometry contradict each other by more than chance, in the yaw
-/// or the place of the mounting (channel LANDMARKS), in the length of the way (channel ODOMETRY),
-/// or in their stamps (no channel: either clock may be wrong).
+/// LANDMARKS states, and those that they show are used but not yet settled; or (channel LANDMARKS)
+/// scans are turned as a whole against the gyro by far more than is stated. `diverged`: landmarks
+/// moved otherwise than odometry says, as after a jump or where wheels slip. `miscalibrated`:
+/// landmarks and odometry contradict each other by more than chance, in the yaw or the place of the
+/// mounting (channel LANDMARKS), in the length of the way (channel ODOMETRY), or in their stamps
+/// (no channel: either clock may be wrong).
 class HealthWatch {
  public:
   /// All is well so far.

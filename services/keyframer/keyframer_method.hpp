@@ -53,7 +53,7 @@ struct CalibrationError {
 
 /// What a keyframer says of its inputs.
 struct InputQuality {
-  bool is_noise_misstated = false;    ///< Covariances of LANDMARKS are replaced by what scans show.
+  bool is_noise_misstated = false;    ///< LANDMARKS contradict the scans; DetectionNoise adjusts.
   CalibrationError calibration;       ///< By the last minutes.
   CalibrationError lately;            ///< By the last ten seconds: what has just changed.
   bool contradicts_odometry = false;  ///< The landmarks' last motion is not odometry's.

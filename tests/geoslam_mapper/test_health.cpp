@@ -158,3 +158,41 @@ TEST_CASE("A map and a filter that move differently are named", "[health]") {
     CHECK(shows(watch, wire::Reason::kDiverged, "EKF_POSE") == (speed_mps > 1.0));
   }
 }
+
+TEST_CASE("Keyframes that odometry alone places are named as long as they come", "[health]") {
+  using enum model::MapUpdateStatus;
+  HealthWatch watch;
+  const auto add = [&](int k, bool is_confirmed) {
+    model::MapUpdate update = update_of(kUpdated, k, 1.0);
+    if (!is_confirmed) update.reason = "few landmarks match";
+    watch.add(update);
+  };
+  for (int k = 0; k < 8; ++k) add(k, true);
+  CHECK_FALSE(shows(watch, wire::Reason::kLost, "ODOMETRY"));
+  for (int k = 8; k < 12; ++k) add(k, false);
+  CHECK(shows(watch, wire::Reason::kLost, "ODOMETRY"));
+  for (int k = 12; k < 24; ++k) add(k, true);
+  CHECK_FALSE(shows(watch, wire::Reason::kLost, "ODOMETRY"));
+}
+
+TEST_CASE("A loop closure that contradicts the graph is in HEALTH for fifty keyframes",
+          "[health]") {
+  using Status = model::LoopResult::Status;
+  const auto keyframes_shown = [](Status status, const std::string& reason) {
+    HealthWatch watch;
+    model::LoopResult result;
+    result.status = status;
+    result.reason = reason;
+    watch.add(result);
+    int shown = 0;
+    for (int k = 0; k < 100; ++k) {
+      watch.add(update_of(model::MapUpdateStatus::kUpdated, k, 1.0));
+      if (shows(watch, wire::Reason::kDiverged, "LOOP_CLOSURE")) ++shown;
+    }
+    return shown;
+  };
+  CHECK(keyframes_shown(Status::kWaiting, "it contradicts the graph") == 50);
+  CHECK(keyframes_shown(Status::kAccepted, "variances are 9 times those stated") == 50);
+  CHECK(keyframes_shown(Status::kAccepted, "") == 0);
+  CHECK(keyframes_shown(Status::kRefused, "it is of another map") == 0);
+}

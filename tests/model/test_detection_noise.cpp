@@ -96,6 +96,36 @@ TEST_CASE("The factor of misstated noise is learned within a few scans", "[noise
   }
 }
 
+TEST_CASE("Misstated noise is said until it is mended, and again when it changes", "[noise]") {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Drive drive(seed, 30);
+    model::DetectionNoise noise;
+    const auto scans_with = [&](int scans, double factor) {
+      int adjusting = 0;
+      for (int k = 0; k < scans; ++k) {
+        noise.add(drive.next(0.05, [&](double) { return factor; }), drive.tracks);
+        if (noise.is_adjusting()) ++adjusting;
+      }
+      return adjusting;
+    };
+    CAPTURE(seed);
+    const int first = scans_with(600, 2.0);
+    CHECK(first > 150);
+    CHECK(first < 450);
+    CHECK(noise.is_misstated());
+    CHECK(scans_with(400, 2.0) == 0);
+
+    // A jump is said within some scans; as stated again there is nothing to say.
+    const int second = scans_with(1500, 6.0);
+    CHECK(second > 150);
+    CHECK(second < 800);
+    CHECK_FALSE(noise.is_adjusting());
+    scans_with(1500, 1.0);
+    CHECK_FALSE(noise.is_adjusting());
+    CHECK(noise.factor(kTrunk, 8.0) == 1.0);
+  }
+}
+
 TEST_CASE("Noise that grows with range is learned for each range", "[noise]") {
   Drive drive(3, 60);
   model::DetectionNoise noise;

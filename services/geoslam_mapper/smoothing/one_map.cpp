@@ -259,7 +259,11 @@ std::optional<Placement> OneMap::place(const model::Keyframe& keyframe,
     update.log10_false_alarm = searched.log10_false_alarm;
     update.reason = std::move(searched.reason);
     placement = std::move(searched.placement);
-    if (!placement && tracked && reaches(*prediction)) placement = std::move(tracked->placement);
+    if (placement) update.reason.clear();
+    if (!placement && tracked && reaches(*prediction)) {
+      placement = std::move(tracked->placement);
+      update.reason = "few landmarks match where odometry places it: " + update.reason;
+    }
   }
   if (placement) map_.landmarks.set_loose(placement->loose);
 

@@ -40,7 +40,7 @@ class JointKeyframer final : public KeyframerMethod {
   void add(const model::EkfLevel& level) override { level_.set(level); }
 
   InputQuality input_quality() const override {
-    return {noise_.is_misstated(), calibration_.error(), calibration_.lately(),
+    return {noise_.is_adjusting(), calibration_.error(), calibration_.lately(),
             calibration_.contradicts()};
   }
   /// Counts for HEALTH.
