@@ -63,9 +63,7 @@ bool is_in_sector(const Eigen::Vector2d& position_m, const SensorParameters& sen
 }
 
 /// How far shared errors move a trunk from outside into range: 6 sigma.
-double shared_reach_m(const SensorParameters& sensor, const SharedErrorsAt& shared) {
-  if (shared.errors == nullptr) return 0.0;
-  const SharedErrorParameters& p = shared.errors->parameters();
+double shared_reach_m(const SensorParameters& sensor, const SharedErrorParameters& p) {
   const double sigma_m = std::hypot(p.along_sigma_m, p.direction_sigma_m,
                                     std::abs(p.level_height_m) * p.level_sigma_rad);
   return 6.0 * sigma_m + std::abs(p.radial_bias_share) * sensor.range_m;
@@ -99,7 +97,9 @@ SimulatedScan observe(const Forest& forest, const PointGrid& grid,
   std::normal_distribution<double> noise(0.0, 1.0);
   const geometry::SE2 vehicle_T_world = world_T_vehicle.inverse();
 
-  const double reach = sensor.reach_m() + shared_reach_m(sensor, shared);
+  const double reach =
+      sensor.reach_m() +
+      (shared.errors != nullptr ? shared_reach_m(sensor, shared.errors->parameters()) : 0.0);
   std::vector<std::pair<model::Detection, std::uint32_t>> seen;
   for (const std::uint32_t trunk : grid.within(world_T_vehicle.translation(), reach)) {
     const bool detected = chance(random) < sensor.detection_probability;
@@ -204,6 +204,11 @@ void Drive::measure_path() {
 model::Utime Drive::utime(std::size_t k) const {
   return static_cast<model::Utime>(std::llround(static_cast<double>(k) * 1e6 *
                                                 parameters_.path.interval / parameters_.speed_mps));
+}
+
+double Drive::reach_m() const {
+  const SensorParameters& sensor = parameters_.sensor;
+  return sensor.reach_m() + (sensor.shared.any() ? shared_reach_m(sensor, sensor.shared) : 0.0);
 }
 
 SimulatedScan Drive::scan(std::size_t k) const {

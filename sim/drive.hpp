@@ -123,6 +123,9 @@ class Drive {
   const std::vector<geometry::SE2>& world_T_vehicle() const { return world_T_vehicle_; }
   /// Distance travelled up to scan k [m].
   double along_m(std::size_t k) const { return along_m_[k]; }
+  /// Distance from the sensor within which a trunk may be detected [m]: errors move some into
+  /// range.
+  double reach_m() const;
   /// The parameters in force (the forest may have grown to hold the path).
   const DriveParameters& parameters() const { return parameters_; }
 

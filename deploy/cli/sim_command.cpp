@@ -56,7 +56,7 @@ sim::Drive make_drive(SimOptions& options) {
 truth_landmarks_t truth_landmarks(const sim::Drive& drive) {
   std::set<std::uint32_t> in_range;
   for (const auto& pose : drive.world_T_vehicle()) {
-    const auto near = drive.grid().within(pose.translation(), drive.parameters().sensor.reach_m());
+    const auto near = drive.grid().within(pose.translation(), drive.reach_m());
     in_range.insert(near.begin(), near.end());
   }
 

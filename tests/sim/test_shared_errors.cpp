@@ -351,3 +351,21 @@ TEST_CASE("Shared errors that cannot be are refused", "[shared-errors]") {
   refused([](auto& p) { p.level_length_m = std::nan(""); });
   refused([](auto& p) { p.direction_harmonics = 0; });
 }
+
+TEST_CASE("Trunks that errors bring into range are within the reach of the drive",
+          "[shared-errors]") {
+  DriveParameters parameters;
+  parameters.path.length_m = 60.0;
+  parameters.sensor.shared.along_sigma_m = 0.3;
+  const Drive drive(parameters, 3);
+  std::size_t farther = 0;
+  for (std::size_t k = 0; k < drive.size(); ++k) {
+    for (const std::uint32_t trunk : drive.scan(k).trunks) {
+      const Eigen::Vector2d exact =
+          drive.world_T_vehicle()[k].inverse() * drive.forest().trunks_m[trunk];
+      CHECK(exact.norm() <= drive.reach_m());
+      if (exact.norm() > parameters.sensor.reach_m()) ++farther;
+    }
+  }
+  CHECK(farther > 0);
+}
