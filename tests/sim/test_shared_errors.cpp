@@ -356,7 +356,7 @@ TEST_CASE("Trunks that errors bring into range are within the reach of the drive
           "[shared-errors]") {
   DriveParameters parameters;
   parameters.path.length_m = 60.0;
-  parameters.sensor.shared.along_sigma_m = 0.3;
+  parameters.sensor.shared.along_sigma_m = 1.0;
   const Drive drive(parameters, 3);
   std::size_t farther = 0;
   for (std::size_t k = 0; k < drive.size(); ++k) {
