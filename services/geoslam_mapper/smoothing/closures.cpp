@@ -24,6 +24,11 @@ double squared_distance(const geometry::SE2WithCovariance& a,
   return off.dot((a.covariance + b.covariance).inverse() * off);
 }
 
+/// Where closures that agree contradict the graph, the variances on the path between their ends are
+/// raised, to so many times those stated in all: standard deviations of a thirtieth. An odometry
+/// that is worse is a fault, and closures that ask for more are wrong.
+constexpr double kMostUnderstated = 1000.0;
+
 /// Solves until the closures fit, or nothing changes any more.
 bool settles(std::span<const std::uint64_t> ids, PoseGraph& graph) {
   for (int round = 0; round < kClosureRounds; ++round) {
@@ -53,8 +58,15 @@ Closures::Decision Closures::take(const model::LoopClosure& closure, const Closu
   const double off = squared_distance(*known, one.a_T_b);
   const bool is_expected = off <= kConsistent;
   one.misstatement = std::clamp(off / 3.0, 1.0, kMostMisstated);
-  if (is_expected && join({&one, 1}, map)) return {kAccepted, {}};
-  if (closure.source == "manual") return overrule({&one, 1}, map);
+  if (is_expected && join({&one, 1}, map)) {
+    take_expected(map);
+    return {kAccepted, {}};
+  }
+  if (closure.source == "manual") {
+    Decision decision = overrule({&one, 1}, map);
+    if (decision.status == kAccepted) take_expected(map);
+    return decision;
+  }
 
   // A witness against the graph.
   if (waiting_.size() == kMostWaiting) waiting_.erase(waiting_.begin());
@@ -72,7 +84,18 @@ Closures::Decision Closures::take(const model::LoopClosure& closure, const Closu
   std::erase_if(waiting_, [&](const Waiting& other) {
     return std::ranges::find(agreeing, other.id, &Waiting::id) != agreeing.end();
   });
+  take_expected(map);
   return decision;
+}
+
+/// What waits and is within what the graph knows by now counts.
+void Closures::take_expected(GlobalMap& map) {
+  const auto counts = [&](const Waiting& one) {
+    const auto known = map.graph.relative(one.a, one.b);
+    return known && squared_distance(*known, one.a_T_b) <= kConsistent && join({&one, 1}, map);
+  };
+  while (std::erase_if(waiting_, counts) > 0) {
+  }
 }
 
 /// The largest set of those that wait, the newest among them, in which all agree with each other.
@@ -95,13 +118,16 @@ std::vector<Closures::Waiting> Closures::agreeing_with(const Waiting& one,
 }
 
 /// Whether the way a -> b -> other b -> other a -> a closes. Both say by how much the graph
-/// understates its variances.
-bool Closures::agree(const Waiting& one, const Waiting& other, const GlobalMap& map) {
+/// understates its variances; where they were raised already, that counts.
+bool Closures::agree(const Waiting& one, const Waiting& other, const GlobalMap& map) const {
   const double misstatement = std::min(one.misstatement, other.misstatement);
   const auto between = [&](NodeIndex from, NodeIndex to) {
     if (from == to) return std::optional(geometry::SE2WithCovariance{});
     auto relative = map.graph.relative(from, to);
-    if (relative) relative->covariance *= misstatement;
+    if (!relative) return relative;
+    const auto [from_m, to_m] =
+        std::minmax({map.graph.node(from).along_m, map.graph.node(to).along_m});
+    relative->covariance *= std::max(1.0, misstatement / understated_.least(from_m, to_m));
     return relative;
   };
   const auto b_T_b = between(one.b, other.b);
@@ -130,35 +156,62 @@ bool Closures::join(std::span<const Waiting> closures, GlobalMap& map) {
   return true;
 }
 
-/// Against the graph: what it states of the path between their ends is corrected where they do not
-/// fit otherwise. The ratio of variances is that of the median closure (3 degrees of freedom).
-Closures::Decision Closures::overrule(std::span<const Waiting> closures, GlobalMap& map) {
-  using enum model::LoopResult::Status;
+/// The path between the ends of closures.
+Closures::Stretch Closures::stretch_of(std::span<const Waiting> closures, const GlobalMap& map) {
+  Stretch stretch{closures.front().a, closures.front().a};
+  for (const Waiting& one : closures) {
+    for (const NodeIndex node : {one.a, one.b}) {
+      const double along_m = map.graph.node(node).along_m;
+      if (along_m < map.graph.node(stretch.first).along_m) stretch.first = node;
+      if (along_m > map.graph.node(stretch.last).along_m) stretch.last = node;
+    }
+  }
+  stretch.from_m = map.graph.node(stretch.first).along_m;
+  stretch.to_m = map.graph.node(stretch.last).along_m;
+  return stretch;
+}
+
+/// Variances between the ends of the median closure over those that the graph states (3 degrees of
+/// freedom); none where the graph determines no ends.
+std::optional<double> Closures::median_ratio(std::span<const Waiting> closures,
+                                             const GlobalMap& map) {
   std::vector<double> ratios;
-  NodeIndex first = closures.front().a;
-  NodeIndex last = first;
   for (const Waiting& one : closures) {
     const auto known = map.graph.relative(one.a, one.b);
     if (known) ratios.push_back(squared_distance(*known, one.a_T_b) / 3.0);
-    for (const NodeIndex node : {one.a, one.b}) {
-      if (map.graph.node(node).along_m < map.graph.node(first).along_m) first = node;
-      if (map.graph.node(node).along_m > map.graph.node(last).along_m) last = node;
-    }
   }
-  if (join(closures, map)) return {kAccepted, {}};
-  if (ratios.empty()) return {kRefused, "the graph does not determine its ends"};
-
+  if (ratios.empty()) return std::nullopt;
   const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
   std::nth_element(ratios.begin(), middle, ratios.end());
-  const double share = 1.0 / std::max(1.0, *middle);
-  const double length_m = map.graph.node(last).along_m - map.graph.node(first).along_m;
+  return *middle;
+}
+
+/// Against the graph: what it states of the path between their ends is corrected where they do not
+/// fit otherwise. What was corrected before on a part of that path counts: the factors of nested
+/// loops do not multiply.
+Closures::Decision Closures::overrule(std::span<const Waiting> closures, GlobalMap& map) {
+  using enum model::LoopResult::Status;
+  const Stretch stretch = stretch_of(closures, map);
+  const std::optional<double> ratio = median_ratio(closures, map);
+  if (join(closures, map)) return {kAccepted, {}};
+  if (!ratio) return {kRefused, "the graph does not determine its ends"};
+
+  const double least = understated_.least(stretch.from_m, stretch.to_m);
+  const double factor = std::min(kMostUnderstated, std::max(1.0, *ratio) * least);
+  const auto share_at = [&](double along_m) {
+    const double before = understated_.at(along_m);
+    return before / std::max(before, factor);
+  };
   map.graph.checkpoint();
-  map.graph.relax(first, last, share);
-  if (join(closures, map))
-    return {kAccepted, "the variances of " + std::to_string(std::lround(length_m)) +
-                           " m of path are " + std::to_string(std::lround(1.0 / share)) +
-                           " times those stated"};
-  map.graph.relax(first, last, 1.0 / share);
+  map.graph.relax(stretch.first, stretch.last, share_at);
+  if (join(closures, map)) {
+    understated_.raise(stretch.from_m, stretch.to_m, factor);
+    return {kAccepted,
+            "the variances of " + std::to_string(std::lround(stretch.to_m - stretch.from_m)) +
+                " m of path are " + std::to_string(std::lround(factor)) + " times those stated"};
+  }
+  map.graph.relax(stretch.first, stretch.last,
+                  [&](double along_m) { return 1.0 / share_at(along_m); });
   return {kRefused, "the rest of the graph contradicts it"};
 }
 

@@ -8,6 +8,7 @@
 
 #include "common/model/submap.hpp"
 #include "services/geoslam_mapper/smoothing/global_map.hpp"
+#include "services/geoslam_mapper/smoothing/understatement.hpp"
 #include "services/geoslam_mapper/smoothing/witnesses.hpp"
 
 namespace understory::geoslam_mapper::smoothing {
@@ -20,10 +21,12 @@ struct ClosureEnd {
 
 /// Takes loop closures into the graph, and out again. One that is within what the graph knows of
 /// its ends counts at once. One that is not is a witness against the graph: it waits until the
-/// witnesses that agree with it are beyond doubt (witnesses.hpp), or a person says so. Then the
-/// graph yields: all of them count, and where the rest of the graph does not allow them, what was
-/// measured on the path between their ends counts less, by the ratio of what the witnesses show to
-/// what was stated. A set that does not fit even then is taken back exactly and goes on waiting.
+/// witnesses that agree with it are beyond doubt (witnesses.hpp), or a person says so. Then all of
+/// them count, and where the rest of the graph does not allow them, the variances of the path
+/// between their ends are raised by the ratio of what the witnesses show to what was stated, to
+/// 1000 times those stated at most. A set that does not fit even then is taken back exactly and
+/// goes on waiting. After each that counts, those that wait count, too, where the graph expects
+/// them by now.
 class Closures {
  public:
   /// Closures that wait, at most: then the oldest is dropped.
@@ -47,7 +50,7 @@ class Closures {
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.waiting_);
+    a(self.waiting_, self.understated_);
   }
 
  private:
@@ -67,11 +70,23 @@ class Closures {
     }
   };
   std::vector<Waiting> agreeing_with(const Waiting& one, const GlobalMap& map) const;
-  static bool agree(const Waiting& one, const Waiting& other, const GlobalMap& map);
+  bool agree(const Waiting& one, const Waiting& other, const GlobalMap& map) const;
   static bool join(std::span<const Waiting> closures, GlobalMap& map);
-  static Decision overrule(std::span<const Waiting> closures, GlobalMap& map);
+  /// A part of the vehicle's path.
+  struct Stretch {
+    NodeIndex first = 0;
+    NodeIndex last = 0;
+    double from_m = 0.0;
+    double to_m = 0.0;
+  };
+  static Stretch stretch_of(std::span<const Waiting> closures, const GlobalMap& map);
+  static std::optional<double> median_ratio(std::span<const Waiting> closures,
+                                            const GlobalMap& map);
+  void take_expected(GlobalMap& map);
+  Decision overrule(std::span<const Waiting> closures, GlobalMap& map);
 
   std::vector<Waiting> waiting_;  ///< In order of arrival.
+  Understatement understated_;    ///< By the closures that overruled the graph.
 };
 
 }  // namespace understory::geoslam_mapper::smoothing

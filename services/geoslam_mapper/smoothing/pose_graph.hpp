@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -77,10 +78,12 @@ class PoseGraph {
   /// chi^2 (3 degrees of freedom) of a closure at the present estimate; there must be one.
   double closure_chi2(std::uint64_t id) const;
 
-  /// What was measured on the path between two nodes counts `share` of what it did: the errors
-  /// there are larger than was stated. Closures stay as they are. relax() with 1 / share undoes it,
-  /// but for rounding. Cost: the measurements of that path.
-  void relax(NodeIndex a, NodeIndex b, double share);
+  /// Share of the information that is kept, by the point of the path [m].
+  using ShareAlong = std::function<double(double along_m)>;
+  /// Scales the information of all measurements on the path between two nodes: errors there are
+  /// larger than was stated. Closures keep theirs. The inverse shares undo it, but for rounding.
+  /// Cost: the measurements of that path.
+  void relax(NodeIndex a, NodeIndex b, const ShareAlong& share_at);
 
   /// Takes nodes and motions out. What the nodes observed becomes observations of other nodes, in
   /// whose frames the two agree to within the covariance of `into_T_node`. Motions that begin or
@@ -259,7 +262,8 @@ class PoseGraph {
   };
   bool is_within(NodeIndex node, double from_m, double to_m) const;
   void scale_information(MotionRef ref, double share);
-  void relax_dormant(double from_m, double to_m, double share);
+  void relax_dormant(double from_m, double to_m, const ShareAlong& share_at);
+  double middle_m(NodeIndex a, NodeIndex b) const;
   Node& edit(NodeIndex node);
   void forget_ahead_of(NodeIndex node);
   NodeIndex put_node(const geometry::SE2& map_T_centre, bool is_stationary, double along_m);

@@ -7,7 +7,7 @@ namespace understory::geoslam_mapper::smoothing {
 
 namespace plane = factor_graph::plane;
 
-void PoseGraph::relax(NodeIndex a, NodeIndex b, double share) {
+void PoseGraph::relax(NodeIndex a, NodeIndex b, const ShareAlong& share_at) {
   ahead_.reset();
   const auto [from_m, to_m] = std::minmax({nodes_[a].along_m, nodes_[b].along_m});
   std::set<std::pair<bool, std::uint32_t>> motions;
@@ -15,7 +15,7 @@ void PoseGraph::relax(NodeIndex a, NodeIndex b, double share) {
     if (!is_within(node, from_m, to_m)) continue;
     for (const auto& [id, number] : nodes_[node].observations()) {
       plane::PointObservation factor = smoother_.observation(number);
-      factor.information *= share;
+      factor.information *= share_at(nodes_[node].along_m);
       smoother_.set(number, factor);
     }
     for (const MotionRef& ref : nodes_[node].motions()) {
@@ -25,8 +25,16 @@ void PoseGraph::relax(NodeIndex a, NodeIndex b, double share) {
         motions.emplace(ref.is_biased, ref.number);
     }
   }
-  for (const auto& [is_biased, number] : motions) scale_information({is_biased, number}, share);
-  relax_dormant(from_m, to_m, share);
+  for (const auto& [is_biased, number] : motions) {
+    const MotionRef ref{is_biased, number};
+    const auto [first, second] = ends_of(ref);
+    scale_information(ref, share_at(middle_m(first, second)));
+  }
+  relax_dormant(from_m, to_m, share_at);
+}
+
+double PoseGraph::middle_m(NodeIndex a, NodeIndex b) const {
+  return 0.5 * (nodes_[a].along_m + nodes_[b].along_m);
 }
 
 bool PoseGraph::is_within(NodeIndex node, double from_m, double to_m) const {
@@ -46,13 +54,13 @@ void PoseGraph::scale_information(MotionRef ref, double share) {
 }
 
 /// What is not in the solved graph, and the motions that stand for it.
-void PoseGraph::relax_dormant(double from_m, double to_m, double share) {
+void PoseGraph::relax_dormant(double from_m, double to_m, const ShareAlong& share_at) {
   std::set<TiedNodes> changed;
   for (auto& [id, observed] : dormant_) {
     bool is_relaxed = false;
     for (DormantObservation& one : observed) {
       if (!is_within(one.node, from_m, to_m)) continue;
-      one.information *= share;
+      one.information *= share_at(nodes_[one.node].along_m);
       is_relaxed = true;
     }
     if (!is_relaxed) continue;
@@ -61,7 +69,7 @@ void PoseGraph::relax_dormant(double from_m, double to_m, double share) {
   }
   for (auto& [nodes, tie] : ties_) {
     if (!is_within(nodes.first, from_m, to_m) || !is_within(nodes.second, from_m, to_m)) continue;
-    tie.away.information *= share;
+    tie.away.information *= share_at(middle_m(nodes.first, nodes.second));
     changed.insert(nodes);
   }
   renew(changed);

@@ -10,7 +10,7 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-constexpr state::Format kFormat{"geoslam_mapper.smoothing", 28};
+constexpr state::Format kFormat{"geoslam_mapper.smoothing", 29};
 constexpr state::Format kCopyFormat{"geoslam_mapper.smoothing.copy", 1};
 /// Two keyframes contradict each other where their motion in a trial map differs from the tracked
 /// one by more than so many of its standard deviations.
