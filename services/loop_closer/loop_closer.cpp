@@ -6,6 +6,7 @@
 
 #include "common/state/archive.hpp"
 #include "services/loop_closer/expectation.hpp"
+#include "services/loop_closer/self_likeness.hpp"
 
 namespace understory::loop_closer {
 namespace {
@@ -15,6 +16,11 @@ constexpr state::Format kFormat{"loop_closer", 2};
 constexpr std::uint64_t kFirstId = std::uint64_t{1} << 40;
 /// Where pairs are all that speaks for a place, it has so many more than one elsewhere.
 constexpr std::size_t kAheadOfRivals = 2;
+/// Evidence of a wrong pose over the self-likeness of the two places: 1.7 at most in rows, whose
+/// surroundings hold more stems than one window (docs/decisions/157).
+constexpr double kOverSelfLikeness = 2.0;
+/// Decades of self-likeness that chance gives to a place of few stems in a forest.
+constexpr double kSelfLikenessByChance = 6.0;
 
 bool is_placed(const model::MapUpdate& update) {
   return update.status == model::MapUpdateStatus::kFirstMap ||
@@ -181,6 +187,13 @@ LoopCloser::Verdict LoopCloser::judge(const FoundPlace& best, const Place& from,
       verdict.is_expected ? accept.chance_decades_expected : accept.chance_decades;
   verdict.is_sure = verdict.log10_false_alarm <= -decades &&
                     best.evidence->margin_decades >= accept.margin_decades && has_pairs;
+  if (!verdict.is_sure) return verdict;
+
+  // In rows any pose that is off by a row fits as well, and the best of them has a margin.
+  const double likeness = std::max(self_likeness(place.stems, search_.stem_noise()),
+                                   self_likeness(from.stems, search_.stem_noise()));
+  verdict.log10_false_alarm += kOverSelfLikeness * std::max(0.0, likeness - kSelfLikenessByChance);
+  verdict.is_sure = verdict.log10_false_alarm <= -decades;
   return verdict;
 }
 

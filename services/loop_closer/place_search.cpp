@@ -72,6 +72,7 @@ PlaceSearch::PlaceSearch(const SearchParameters& search, const StemParameters& s
     : reach_m_(detector_parameters(stems).stems.max_distance_m),
       source_(search.verifier == kNone ? search.detector
                                        : search.detector + ", " + search.verifier),
+      stem_noise_(detector_parameters(stems).stems.noise),
       detector_(
           place_recognition::make_detector(checked(search).detector, detector_parameters(stems))),
       verification_(verification_of(search, stems)) {}

@@ -9,6 +9,7 @@
 
 #include "common/geometry/se2.hpp"
 #include "common/place_recognition/place_detector.hpp"
+#include "common/place_recognition/stem_likelihood.hpp"
 #include "services/loop_closer/parameters.hpp"
 #include "services/loop_closer/place_memory.hpp"
 #include "services/loop_closer/place_verification.hpp"
@@ -40,10 +41,13 @@ class PlaceSearch {
   double reach_m() const { return reach_m_; }
   /// Who finds and verifies, as LOOP_CLOSURE tells it.
   const std::string& source() const { return source_; }
+  /// Of the detector of stems.
+  const place_recognition::StemNoise& stem_noise() const { return stem_noise_; }
 
  private:
   double reach_m_;
   std::string source_;
+  place_recognition::StemNoise stem_noise_;
   std::unique_ptr<place_recognition::PlaceDetector> detector_;
   std::unique_ptr<PlaceVerification> verification_;  ///< None: the detector's evidence is enough.
 };
