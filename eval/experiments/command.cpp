@@ -47,6 +47,7 @@ void add_eval_command(CLI::App& parent) {
   wheels::add_wheels_experiment(eval);
   gaps::add_gaps_experiment(eval);
   few_landmarks::add_few_landmarks_experiment(eval);
+  closures::add_closures_experiment(eval);
   existence::add_existence_experiment(eval);
   changing_forest::add_changing_forest_experiment(eval);
   changing_forest::add_mapping_needed_experiment(eval);

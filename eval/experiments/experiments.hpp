@@ -70,6 +70,11 @@ namespace few_landmarks {
 void add_few_landmarks_experiment(CLI::App& eval);
 }  // namespace few_landmarks
 
+namespace closures {
+/// Wrong loop closures that agree, and ways to keep them out.
+void add_closures_experiment(CLI::App& eval);
+}  // namespace closures
+
 namespace gaps {
 /// Processes that hang and sensors that are silent.
 void add_gaps_experiment(CLI::App& eval);
