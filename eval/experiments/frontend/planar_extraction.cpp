@@ -22,7 +22,7 @@ constexpr double kStationary_s = 22.0;
 constexpr double kSpeedingUp_s = 8.0;
 constexpr double kRecallRange_m = 25.0;
 constexpr double kErrorRange_m = 20.0;
-constexpr double kMatch_m = 0.5;
+constexpr double kPlanarMatch_m = 0.5;
 constexpr std::uint32_t kTrunkReturns = 3;
 constexpr std::uint32_t kWallReturns = 10;
 
@@ -203,8 +203,8 @@ class PlanarRun {
   lidar_imu_input::LidarImuInput input_;
   landmark_extractor::LandmarkExtractor extractor_;
   std::map<std::uint64_t, sim::SimulatedPlanarScan> waiting_;
-  KindTally trunks_{kMatch_m, kErrorRange_m};
-  KindTally corners_{kMatch_m, kErrorRange_m};
+  KindTally trunks_{kPlanarMatch_m, kErrorRange_m};
+  KindTally corners_{kPlanarMatch_m, kErrorRange_m};
   std::vector<ExtractionMiss> misses_;
   PlanarScore score_;
 };
