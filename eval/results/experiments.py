@@ -135,6 +135,7 @@ EXPERIMENTS = (
     _eval("laps", "laps --laps 100 --length-m 317 --hours 24", 45),
     _eval("laps-held", "laps --laps 3 --length-m 100 --hours 2 --localise-in OUT/laps-held.gpkg --no-plots", 6),
     _eval("health", "health --drives 1000 --seed 1", 8),
+    _eval("closures", "closures --runs 100 --plantations 4 --seed 1 --jobs 2", 8),
     _eval("gaps", "gaps --seeds 5 --first-seed 801 --jobs 2", 15),
     _eval("misstated", "misstated --runs 10 --seed 2001", 4),
     _eval("victoria-park", "victoria-park --data DATA", 1, ("victoria_park_raw", "victoria_park_landmark")),

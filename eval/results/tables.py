@@ -12,6 +12,7 @@ from pathlib import Path
 
 sys.dont_write_bytecode = True
 import render  # noqa: E402
+import render_closures  # noqa: E402
 import render_existence  # noqa: E402
 import render_gaps  # noqa: E402
 import render_partition  # noqa: E402
@@ -64,6 +65,7 @@ SECTIONS = (
     ("loops-blind", "Loops found while tracking goes on, no stem seen on a third of the way", None, render_places.loops),
     ("loops-strangers", "Queries that have no match", None, render_places.loop_queries),
     ("shared-errors", "Detections that share errors from frame to frame", None, render_places.shared_errors),
+    ("closures", "Wrong loop closures that agree, and ways to keep them out", None, render_closures.closures),
     ("returns", "Drives that drift and come back near themselves", None, render_returns.returns),
     ("loop-detectors", "Loop detectors and verifiers", "named in the thesis on submaps, §2.4, without figures",
      render_places.loop_detectors),

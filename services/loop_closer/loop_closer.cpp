@@ -16,8 +16,9 @@ constexpr state::Format kFormat{"loop_closer", 2};
 constexpr std::uint64_t kFirstId = std::uint64_t{1} << 40;
 /// Where pairs are all that speaks for a place, it has so many more than one elsewhere.
 constexpr std::size_t kAheadOfRivals = 2;
-/// Evidence of a wrong pose over the self-likeness of the two places: 1.7 at most in rows, whose
-/// surroundings hold more stems than one window (docs/decisions/157).
+/// Evidence of a wrong pose over the self-likeness of the two places: 1.6 at most where trees stand
+/// within 0.1 m of their grid, since the surroundings of a place hold more stems than one window
+/// (docs/decisions/157).
 constexpr double kOverSelfLikeness = 2.0;
 /// Decades of self-likeness that chance gives to a place of few stems in a forest.
 constexpr double kSelfLikenessByChance = 6.0;
