@@ -58,12 +58,6 @@ struct Ring {
                             geometry::SE2::Exp(noise_of(result.from_T_to.covariance));
     return result;
   }
-  /// The same, as sure as a witness can be.
-  model::LoopClosure sure(std::uint64_t id, int a, int b) {
-    model::LoopClosure result = closure(id, a, b);
-    result.log10_false_alarm = -12.0;
-    return result;
-  }
   Status take(const model::LoopClosure& closure, int a, int b) {
     return closures
         .take(closure, {nodes[static_cast<std::size_t>(a)], {}},
@@ -112,16 +106,16 @@ TEST_CASE("A closure against what the graph knows waits for others that agree", 
     Ring ring(seed, 0.5, 1.5e-3);
     const double before_m = ring.worst_m();
     REQUIRE(before_m > 20.0);
-    CHECK(ring.take(ring.sure(1, 0, kNodes - 1), 0, kNodes - 1) == Status::kWaiting);
-    model::LoopClosure wrong = ring.sure(2, 20, kNodes - 20);
+    CHECK(ring.take(ring.closure(1, 0, kNodes - 1), 0, kNodes - 1) == Status::kWaiting);
+    model::LoopClosure wrong = ring.closure(2, 20, kNodes - 20);
     wrong.from_T_to.mean = wrong.from_T_to.mean * geometry::SE2(80.0, -40.0, 2.0);
     CHECK(ring.take(wrong, 20, kNodes - 20) == Status::kWaiting);
-    CHECK(ring.take(ring.sure(3, 3, kNodes - 4), 3, kNodes - 4) == Status::kWaiting);
-    // These see the landmarks of the first one, too.
-    CHECK(ring.take(ring.sure(5, 1, kNodes - 2), 1, kNodes - 2) == Status::kWaiting);
-    CHECK(ring.take(ring.sure(6, 1, kNodes - 8), 1, kNodes - 8) == Status::kWaiting);
+    CHECK(ring.take(ring.closure(3, 3, kNodes - 4), 3, kNodes - 4) == Status::kWaiting);
+    // These two see the landmarks of the first one.
+    CHECK(ring.take(ring.closure(5, 1, kNodes - 2), 1, kNodes - 2) == Status::kWaiting);
+    CHECK(ring.take(ring.closure(6, 1, kNodes - 8), 1, kNodes - 8) == Status::kWaiting);
     CHECK(ring.worst_m() == before_m);
-    CHECK(ring.take(ring.sure(4, 6, kNodes - 7), 6, kNodes - 7) == Status::kAccepted);
+    CHECK(ring.take(ring.closure(4, 6, kNodes - 7), 6, kNodes - 7) == Status::kAccepted);
     CHECK(ring.map.graph.has_closure(1));
     CHECK(ring.map.graph.has_closure(3));
     CHECK_FALSE(ring.map.graph.has_closure(2));
@@ -159,8 +153,8 @@ TEST_CASE("Wrong closures do not agree with each other by chance", "[closures]")
 
 TEST_CASE("Closures follow a node that becomes part of another", "[closures]") {
   Ring ring(6, 0.3, 2e-3);
-  CHECK(ring.take(ring.sure(1, 0, kNodes - 1), 0, kNodes - 1) == Status::kWaiting);
-  CHECK(ring.take(ring.sure(2, 3, kNodes - 4), 3, kNodes - 4) == Status::kWaiting);
+  CHECK(ring.take(ring.closure(1, 0, kNodes - 1), 0, kNodes - 1) == Status::kWaiting);
+  CHECK(ring.take(ring.closure(2, 3, kNodes - 4), 3, kNodes - 4) == Status::kWaiting);
 
   // The nodes of the first closure's end and before it become one.
   ring.map.graph.checkpoint();
@@ -175,7 +169,7 @@ TEST_CASE("Closures follow a node that becomes part of another", "[closures]") {
   REQUIRE_FALSE(retired.empty());
   REQUIRE(ring.map.graph.solve().ok);
   ring.closures.hand_over(retired);
-  CHECK(ring.take(ring.sure(4, 6, kNodes - 12), 6, kNodes - 12) == Status::kAccepted);
+  CHECK(ring.take(ring.closure(4, 6, kNodes - 12), 6, kNodes - 12) == Status::kAccepted);
   CHECK(ring.map.graph.has_closure(1));
   CHECK(ring.map.graph.has_closure(2));
 }

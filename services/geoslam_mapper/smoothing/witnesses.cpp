@@ -7,9 +7,8 @@
 namespace understory::geoslam_mapper::smoothing {
 namespace {
 
-/// Path [m] within which two closures may have seen the same landmarks: a window of the loop closer
-/// (12 m), and the range at which landmarks are detected (20 m) before it and after it.
-constexpr double kWindow_m = 52.0;
+/// Path [m] on which one closure takes landmarks, at most: the longest window of the loop closer.
+constexpr double kWindow_m = 20.0;
 constexpr double kMostDecades = 12.0;
 constexpr double kUnstatedDecades = 8.0;
 
