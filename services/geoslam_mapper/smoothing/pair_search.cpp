@@ -14,7 +14,7 @@ namespace {
 constexpr double kGate_sigmas = 3.0;
 /// Two points nearer to each other than this [m] give no heading.
 constexpr double kLeastBaseline_m = 2.0;
-constexpr std::size_t kLeastPairs = 3;
+constexpr std::size_t kLeastPairs = 2;
 /// ln of how much likelier the place must be than another one that shares few of its pairs: one
 /// more trunk of a planted row is not enough.
 constexpr double kLeastLead = 9.2;

@@ -28,6 +28,7 @@ constexpr double kGoodFit = 3.0;
 constexpr double kTellsPairs_m2 = 0.02;
 /// Fewest pairs that tie two passes.
 constexpr std::size_t kFewestTies = 2;
+constexpr std::size_t kFewPairs = 3;
 /// What each pass bends between its landmarks [m].
 constexpr double kWarp_m = 0.05;
 /// What was seen on so much of the way [m] before and behind a node of an earlier pass is of that
@@ -152,10 +153,11 @@ std::vector<MergedPair> match_passes(const Scene& scene,
   const std::vector<PairOfPasses> laid = pairs_of(*place, scene);
   const geometry::SE2WithCovariance fitted =
       fit_place(laid, place->map_T_newest.mean, scene.map_T_node);
-  const Eigen::Vector3d off = (scene.map_T_node.mean.inverse() * fitted.mean).Log();
-  if (off.dot((scene.map_T_node.covariance + fitted.covariance).inverse() * off) > kMostOff)
-    return {};
-  if (log_odds_of_place(laid, fitted.mean, scene.map_T_node) < kLeastLogOdds) return {};
+  const Eigen::Vector3d apart = (scene.map_T_node.mean.inverse() * fitted.mean).Log();
+  const double off = apart.dot((scene.map_T_node.covariance + fitted.covariance).inverse() * apart);
+  if (off > kMostOff) return {};
+  const double least = off <= kWhereExpected ? kLeastLogOddsWhereExpected : kLeastLogOdds;
+  if (log_odds_of_place(laid, fitted.mean, scene.map_T_node) < least) return {};
 
   // Of which trunks is that certain, too?
   const std::vector<LeftOut> others_say = leave_out_each(laid, fitted);
@@ -164,8 +166,11 @@ std::vector<MergedPair> match_passes(const Scene& scene,
     const model::LandmarkId ours = scene.ours.ids[place->pairs[i].observed];
     const model::LandmarkId theirs = scene.theirs.ids[place->pairs[i].reference];
     const LeftOut& said = others_say[i];
-    const bool is_one = said.variance_m2 <= kTellsPairs_m2 &&
-                        said.apart_m.squaredNorm() <= kGoodFit * laid[i].variance_m2 &&
+    // Of few pairs none is told apart by the others: the odds are of all of them.
+    const bool are_few = laid.size() <= kFewPairs;
+    const double variance_m2 = laid[i].variance_m2 + (are_few ? said.variance_m2 : 0.0);
+    const bool is_one = (are_few || said.variance_m2 <= kTellsPairs_m2) &&
+                        said.apart_m.squaredNorm() <= kGoodFit * variance_m2 &&
                         map.landmarks.at(ours).kind == map.landmarks.at(theirs).kind;
     if (is_one) pairs.push_back(Merges::in_order(ours, theirs, map.landmarks));
   }

@@ -26,7 +26,7 @@ struct Scene {
 };
 
 /// Fewest landmarks of either pass, and fewest pairs of them.
-inline constexpr std::size_t kFewestOfPass = 3;
+inline constexpr std::size_t kFewestOfPass = 2;
 
 /// What `node`'s pass and another one saw around it. O(landmarks within reach).
 Scene scene_around(const model::FieldOfView& field_of_view, NodeIndex node, const EarlierPass& pass,

@@ -24,6 +24,11 @@ inline constexpr double kSharedOfPasses = 0.3;
 
 /// ln of the least odds of a place: 1e5.
 inline constexpr double kLeastLogOdds = 11.5;
+/// The same where the graph expects the place: 3000. That it is there is likely before anything is
+/// seen, and where few landmarks are two are all that passes share.
+inline constexpr double kLeastLogOddsWhereExpected = 8.0;
+/// Largest squared Mahalanobis distance of such a place: 99 % of those that are as stated.
+inline constexpr double kWhereExpected = 11.3;
 /// Largest squared Mahalanobis distance of a place that was found to what the graph knows of it (3
 /// degrees of freedom): noise that is stated too small by half has as much.
 inline constexpr double kMostOff = 85.0;
