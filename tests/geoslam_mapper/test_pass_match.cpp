@@ -193,6 +193,43 @@ TEST_CASE("A poor scene is found by its pairs", "[mapper][passes]") {
   CHECK(found >= 95);
 }
 
+TEST_CASE("Two trunks in common are enough where the graph expects the place", "[mapper][passes]") {
+  // A landmark on 450 m^2, as in a car park; the way back is known to 0.8 m and 30 mrad.
+  constexpr int kScenes = 300;
+  const geometry::SE2WithCovariance where = expected(0.8, 0.03);
+  int known = 0;
+  int wrong = 0;
+  int by_chance = 0;
+  for (std::uint64_t seed = 1; seed <= kScenes; ++seed) {
+    Grove grove(seed);
+    const geometry::SE2 map_T_node(0.8 * grove.noise(), 0.8 * grove.noise(), 0.03 * grove.noise());
+    const auto both = grove.scattered(2);
+    const auto is_known = [&](const std::vector<geometry::UncertainPoint>& ours,
+                              const std::vector<geometry::UncertainPoint>& theirs) {
+      const auto clutter = clutter_of(theirs);
+      const auto place = search_pairs(ours, theirs, kWarp_m2, clutter, where);
+      if (!place || log_odds(*place, ours, theirs, clutter, where) < kLeastLogOddsWhereExpected)
+        return std::optional<geometry::SE2>();
+      return std::optional(place->map_T_newest.mean);
+    };
+
+    auto theirs = grove.scattered(8);
+    auto ours = grove.seen_from(map_T_node, grove.scattered(8));
+    if (is_known(ours, theirs)) ++by_chance;
+    const auto common = grove.seen_from(map_T_node, both);
+    ours.insert(ours.end(), common.begin(), common.end());
+    theirs.insert(theirs.end(), both.begin(), both.end());
+    if (const auto found = is_known(ours, theirs)) {
+      ++known;
+      if ((found->translation() - map_T_node.translation()).norm() > 1.0) ++wrong;
+    }
+  }
+  CAPTURE(known, wrong, by_chance);
+  CHECK(3 * known > kScenes);
+  CHECK(wrong <= 2);
+  CHECK(by_chance <= 2);  // One in 3000 searches at most, by the bound.
+}
+
 TEST_CASE("In a row of trunks no place is found", "[mapper][passes]") {
   std::vector<geometry::UncertainPoint> row;
   for (int i = 0; i < 8; ++i)
