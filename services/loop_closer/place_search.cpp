@@ -18,7 +18,7 @@ place_recognition::DetectorParameters detector_parameters(const StemParameters& 
   result.stems.noise.use_diameters = stems.use_diameters;
   result.stems.noise.diameter_log_sigma = stems.diameter_sigma;
   result.stems.triangles.triangles = stems.triangles;
-  result.stems.most_frames = 200;
+  result.stems.most_frames = 60;
   result.stems.most_views = 20;
   result.constellation.sigma_m = stems.sigma_m / std::numbers::sqrt2;
   return result;
