@@ -207,12 +207,21 @@ void DetectionNoise::learn(std::span<const Pair> pairs, const Fit& fit) {
 
   // The memory is bounded: what is older counts less, and little where this scan is quite
   // different.
+  Sums all;
+  double expected = 0.0;
+  for (std::size_t bin = 0; bin < sums_.size(); ++bin) {
+    all.chi2 += added[bin].chi2;
+    all.degrees += added[bin].degrees;
+    expected += estimate(bin) * added[bin].degrees;
+  }
+  // Scans before and after a change of all noise have no lag between them. One range alone is other
+  // by chance too often.
+  if (is_other_noise(all.chi2, expected, all.degrees)) since_other_ = 0;
   for (std::size_t bin = 0; bin < sums_.size(); ++bin) {
     Sums& sums = sums_[bin];
     if (is_other_noise(added[bin].chi2, estimate(bin) * added[bin].degrees, added[bin].degrees)) {
       sums.chi2 *= kAfterChange;
       sums.degrees *= kAfterChange;
-      since_other_ = 0;  // Scans before and after it have no lag between them.
     }
     sums.chi2 += added[bin].chi2;
     sums.degrees += added[bin].degrees;
