@@ -96,10 +96,10 @@ function(understory_test name)
     add_test(NAME ${name} COMMAND test_${name} "~[recorded]")
     add_test(NAME ${name}_recorded COMMAND test_${name} "[recorded]")
     # Printed only where nothing failed: no failure hides behind it.
-    set_tests_properties(${name}_recorded PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 4
+    set_tests_properties(${name}_recorded PROPERTIES TIMEOUT 600 SKIP_RETURN_CODE 4
                          SKIP_REGULAR_EXPRESSION "cases skipped, none failed")
   else()
     add_test(NAME ${name} COMMAND test_${name})
   endif()
-  set_tests_properties(${name} PROPERTIES TIMEOUT 300 SKIP_RETURN_CODE 4)
+  set_tests_properties(${name} PROPERTIES TIMEOUT 600 SKIP_RETURN_CODE 4)
 endfunction()

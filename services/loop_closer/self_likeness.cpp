@@ -58,7 +58,8 @@ std::vector<Eigen::Vector2d> frequent(const Cells& cells) {
   std::ranges::stable_sort(all, std::greater(), [](const auto& one) { return one.first; });
 
   std::vector<Eigen::Vector2d> shifts;
-  for (const auto& [count, shift] : all) {
+  for (const auto& candidate : all) {
+    const Eigen::Vector2d& shift = candidate.second;
     const bool is_new = std::ranges::none_of(
         shifts, [&](const auto& other) { return (other - shift).norm() < 2.0 * kCell_m; });
     if (is_new) shifts.push_back(shift);

@@ -73,6 +73,7 @@ Closures::Decision Closures::take(const model::LoopClosure& closure, const Closu
   waiting_.push_back(one);
   const std::vector<Waiting> agreeing = agreeing_with(one, map);
   std::vector<Witness> witnesses;
+  witnesses.reserve(agreeing.size());
   for (const Waiting& each : agreeing)
     witnesses.push_back(
         {map.graph.node(each.a).along_m, map.graph.node(each.b).along_m, each.log10_false_alarm});
