@@ -48,7 +48,7 @@ PlaneChain::PlaneChain(std::vector<SE2> steps, const Eigen::Matrix3d& covariance
   for (const SE2& step : steps_) {
     reckoned_.push_back(reckoned_.back() * step);
     const Eigen::Matrix3d adjoint = reckoned_.back().Adjoint();
-    spread_.push_back(spread_.back() + adjoint * covariance * adjoint.transpose());
+    spread_.emplace_back(spread_.back() + adjoint * covariance * adjoint.transpose());
   }
   poses_ = reckoned_;
 }

@@ -412,8 +412,7 @@ std::vector<model::MapLandmark> OneMap::take_changed_landmarks(double around_m) 
         base->mean.translation(), around_m,
         [&](model::LandmarkId id, const Eigen::Vector2d&, double) { ids.push_back(id); });
     std::ranges::sort(ids);
-    const auto repeated = std::ranges::unique(ids);
-    ids.erase(repeated.begin(), repeated.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
   }
 
   std::vector<model::MapLandmark> result;
