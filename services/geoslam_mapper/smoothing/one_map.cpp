@@ -416,6 +416,7 @@ std::vector<model::MapLandmark> OneMap::take_changed_landmarks(double around_m) 
   }
 
   std::vector<model::MapLandmark> result;
+  result.reserve(ids.size());
   for (const model::LandmarkId id : ids) result.push_back(map_.landmark(map_.landmarks.at(id)));
   return result;
 }
