@@ -208,7 +208,7 @@ model::Utime Drive::utime(std::size_t k) const {
 
 double Drive::reach_m() const {
   const SensorParameters& sensor = parameters_.sensor;
-  return sensor.reach_m() + (sensor.shared.any() ? shared_reach_m(sensor, sensor.shared) : 0.0);
+  return sensor.reach_m() + shared_reach_m(sensor, sensor.shared);
 }
 
 SimulatedScan Drive::scan(std::size_t k) const {

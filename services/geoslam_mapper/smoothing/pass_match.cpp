@@ -26,8 +26,7 @@ constexpr std::size_t kPoor = 400;
 /// are judged one by one when the passes are joined.
 constexpr double kGoodFit = 3.0;
 constexpr double kTellsPairs_m2 = 0.02;
-/// Fewest pairs that tie two passes.
-constexpr std::size_t kFewestTies = 2;
+/// Of so few pairs the odds of all count, not what each says of the others.
 constexpr std::size_t kFewPairs = 3;
 /// What each pass bends between its landmarks [m].
 constexpr double kWarp_m = 0.05;
@@ -174,7 +173,7 @@ std::vector<MergedPair> match_passes(const Scene& scene,
                         map.landmarks.at(ours).kind == map.landmarks.at(theirs).kind;
     if (is_one) pairs.push_back(Merges::in_order(ours, theirs, map.landmarks));
   }
-  return pairs.size() < kFewestTies ? std::vector<MergedPair>{} : pairs;
+  return pairs.size() < kFewestOfPass ? std::vector<MergedPair>{} : pairs;
 }
 
 }  // namespace understory::geoslam_mapper::smoothing

@@ -11,6 +11,7 @@ void PoseGraph::relax(NodeIndex a, NodeIndex b, const ShareAlong& share_at) {
   ahead_.reset();
   const auto [from_m, to_m] = std::minmax({nodes_[a].along_m, nodes_[b].along_m});
   std::set<std::pair<bool, std::uint32_t>> motions;
+
   for (NodeIndex node = 0; node < nodes_.size(); ++node) {
     if (!is_within(node, from_m, to_m)) continue;
     for (const auto& [id, number] : nodes_[node].observations()) {
@@ -25,6 +26,7 @@ void PoseGraph::relax(NodeIndex a, NodeIndex b, const ShareAlong& share_at) {
         motions.emplace(ref.is_biased, ref.number);
     }
   }
+
   for (const auto& [is_biased, number] : motions) {
     const MotionRef ref{is_biased, number};
     const auto [first, second] = ends_of(ref);
