@@ -126,12 +126,18 @@ void DriveAccuracyCollector::add_landmarks_event(const io::LogEvent& event) {
 }
 
 std::optional<ComparedPose> DriveAccuracyCollector::compare(
-    model::Utime utime, const geometry::SE2WithCovariance& map_T_vehicle,
-    const geometry::SE2& world_T_map, std::uint32_t map_id) const {
+    model::Utime utime, const geometry::SE2WithCovariance& map_T_vehicle, const TiedMap& tied,
+    std::uint32_t map_id) const {
   const auto truth = truth_.at(utime);
   if (!truth) return std::nullopt;
-  return ComparedPose{utime, world_T_map * map_T_vehicle.mean, *truth, map_T_vehicle.covariance,
-                      map_id};
+  ComparedPose pose{utime, tied.world_T_map * map_T_vehicle.mean, *truth, map_T_vehicle.covariance,
+                    map_id};
+  if (pose.covariance.isZero(0.0)) return pose;
+
+  std::optional<geometry::SE2> tie_T_vehicle;
+  if (tied.true_world_T_vehicle) tie_T_vehicle = tied.true_world_T_vehicle->inverse() * *truth;
+  pose.covariance += covariance_of_truth(truth_sigma_, tie_T_vehicle);
+  return pose;
 }
 
 std::vector<ComparedPose> DriveAccuracyCollector::compare_live(DriveAccuracy& accuracy) const {
@@ -141,8 +147,8 @@ std::vector<ComparedPose> DriveAccuracyCollector::compare_live(DriveAccuracy& ac
     const auto [tie, is_new] = ties.try_emplace(pose.map_id);
     if (is_new) tie->second = ties_.tie(pose.map_id, truth_, map_);
     if (!tie->second) continue;
-    auto compared = compare(pose.utime, {pose.map_T_vehicle(), pose.covariance},
-                            tie->second->world_T_map, pose.map_id);
+    auto compared =
+        compare(pose.utime, {pose.map_T_vehicle(), pose.covariance}, *tie->second, pose.map_id);
     if (!compared) continue;
     compared->log_utime = log_utime;
     (pose.is_coasting ? accuracy.coasting : accuracy.live).push_back(*compared);
@@ -151,13 +157,13 @@ std::vector<ComparedPose> DriveAccuracyCollector::compare_live(DriveAccuracy& ac
   return all;
 }
 
-std::vector<ComparedPose> DriveAccuracyCollector::compare_keyframes(
-    const model::WholeMap& whole, const geometry::SE2& world_T_map) const {
+std::vector<ComparedPose> DriveAccuracyCollector::compare_keyframes(const model::WholeMap& whole,
+                                                                    const TiedMap& tied) const {
   std::set<std::uint64_t> held;
   for (const auto& keyframe : map_.map()->keyframes) held.insert(keyframe.keyframe_sequence);
   std::vector<ComparedPose> compared;
   for (const auto& keyframe : whole.keyframes) {
-    auto pose = compare(keyframe.utime, {keyframe.map_T_vehicle, keyframe.covariance}, world_T_map,
+    auto pose = compare(keyframe.utime, {keyframe.map_T_vehicle, keyframe.covariance}, tied,
                         ties_.last_map_id());
     if (!pose) continue;
     if (!held.contains(keyframe.keyframe_sequence)) pose->covariance.setZero();
@@ -192,7 +198,7 @@ std::optional<DriveAccuracy> DriveAccuracyCollector::finish() const {
 
   const auto whole = map_.whole();
   accuracy.landmarks = compare_map(whole.value_or(model::WholeMap{}), tied->world_T_map);
-  if (whole) accuracy.keyframes = compare_keyframes(*whole, tied->world_T_map);
+  if (whole) accuracy.keyframes = compare_keyframes(*whole, *tied);
   return accuracy;
 }
 

@@ -65,6 +65,9 @@ struct DriveAccuracy {
 /// mapper began another map, each map is tied by itself.
 class DriveAccuracyCollector {
  public:
+  /// `truth_sigma`: how well GROUND_TRUTH is known; covariances of compared poses have it added.
+  explicit DriveAccuracyCollector(const TruthSigma& truth_sigma = {}) : truth_sigma_(truth_sigma) {}
+
   /// Takes one event, in the order of the log; channels that do not matter are only counted.
   void add(const io::LogEvent& event);
   /// None when the log has no ground truth at any instant of the map.
@@ -84,14 +87,15 @@ class DriveAccuracyCollector {
   void add_update(const model::MapUpdate& update);
   std::optional<ComparedPose> compare(model::Utime utime,
                                       const geometry::SE2WithCovariance& map_T_vehicle,
-                                      const geometry::SE2& world_T_map, std::uint32_t map_id) const;
+                                      const TiedMap& tied, std::uint32_t map_id) const;
   /// Localised and coasting ones, in the order of the log; fills both lists of `accuracy`.
   std::vector<ComparedPose> compare_live(DriveAccuracy& accuracy) const;
   std::vector<ComparedPose> compare_keyframes(const model::WholeMap& whole,
-                                              const geometry::SE2& world_T_map) const;
+                                              const TiedMap& tied) const;
   LandmarkAccuracy compare_map(const model::WholeMap& whole,
                                const geometry::SE2& world_T_map) const;
 
+  TruthSigma truth_sigma_;
   TruthTrack truth_;
   truth_landmarks_t true_landmarks_{};
   std::vector<LivePose> poses_;  ///< Localised and coasting ones.

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "common/io/output_file.hpp"
 #include "common/terminal/interrupt.hpp"
@@ -49,13 +50,15 @@ void write_series(const std::string& file, nlohmann::ordered_json json,
 
 }  // namespace
 
-void log_accuracy(const std::string& file, const std::string& json_file) {
+void log_accuracy(const std::string& file, const AccuracyOptions& options) {
+  const std::string& json_file = options.json_file;
   if (!json_file.empty() && io::is_same_file(file, json_file)) {
     wrong_usage(fmt::format("--json {}: is the log itself", json_file));
   }
 
   io::LcmLogReader reader(file);
-  DriveAccuracyCollector collector;
+  const double truth_sigma_rad = options.truth_sigma_deg * std::numbers::pi / 180.0;
+  DriveAccuracyCollector collector({options.truth_sigma_m, truth_sigma_rad});
   terminal::Progress progress("reading " + file, static_cast<double>(reader.size_bytes()));
 
   while (const auto event = reader.next()) {

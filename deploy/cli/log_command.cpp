@@ -197,6 +197,7 @@ struct LogOptions {
   bool json = false;
   Cut cut;
   RecordOptions record;
+  AccuracyOptions accuracy;
 };
 
 }  // namespace
@@ -228,7 +229,16 @@ void add_log_command(CLI::App& parent) {
 
   auto* accuracy_command =
       add("accuracy", "How well the run in it agrees with the ground truth in it");
-  accuracy_command->add_option("--json", options->out, "Also write it to this file, with series");
+  accuracy_command->add_option("--json", options->accuracy.json_file,
+                               "Also write it to this file, with series");
+  accuracy_command
+      ->add_option("--truth-sigma-m", options->accuracy.truth_sigma_m,
+                   "Standard deviation of the true positions, per axis; for NEES")
+      ->check(CLI::Range(0.0, 100.0));
+  accuracy_command
+      ->add_option("--truth-sigma-deg", options->accuracy.truth_sigma_deg,
+                   "Standard deviation of the true headings; for NEES")
+      ->check(CLI::Range(0.0, 90.0));
   accuracy_command->footer(
       "Live poses of SLAM_POSE and keyframes of the final map. ATE: after rigid alignment without\n"
       "scale, as evo_ape --align. RPE: pairs of poses 10, 100 and 1000 m of true path apart, as\n"
@@ -237,7 +247,7 @@ void add_log_command(CLI::App& parent) {
       "NEES: pose errors by stated covariances, 3 degrees of freedom. Definitions and keys of the\n"
       "JSON: deploy/cli/accuracy.md.");
   accuracy_command->callback(
-      guarded(options, [](const LogOptions& o) { log_accuracy(o.file, o.out); }));
+      guarded(options, [](const LogOptions& o) { log_accuracy(o.file, o.accuracy); }));
 
   auto* repair_command = add("repair", "Writes what can be read as a log without damage");
   repair_command->add_option("--out", options->out, "The new log")->required();

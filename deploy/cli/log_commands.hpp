@@ -5,9 +5,16 @@
 
 namespace understory::cli {
 
-/// Prints the accuracy of the run in `file`; with `json_file` also writes it there with the series
+/// What `understory log accuracy` was asked for.
+struct AccuracyOptions {
+  std::string json_file;         ///< Empty = none.
+  double truth_sigma_m = 0.0;    ///< Of GROUND_TRUTH, per axis.
+  double truth_sigma_deg = 0.0;  ///< Of its heading.
+};
+
+/// Prints the accuracy of the run in `file`; with a JSON file also writes it there with the series
 /// that plots need. Throws LogError and Interrupted.
-void log_accuracy(const std::string& file, const std::string& json_file);
+void log_accuracy(const std::string& file, const AccuracyOptions& options);
 
 /// What `understory log record` was asked for.
 struct RecordOptions {

@@ -101,7 +101,7 @@ std::optional<TiedMap> MapTies::tie(std::uint32_t map_id, const TruthTrack& trut
   const auto at = [&](const auto& pose, MapTie tie) -> std::optional<TiedMap> {
     const auto true_pose = truth.at(pose.utime);
     if (!true_pose) return std::nullopt;
-    return TiedMap{*true_pose * pose.map_T_vehicle.inverse(), tie};
+    return TiedMap{*true_pose * pose.map_T_vehicle.inverse(), tie, true_pose};
   };
   const auto start = started_.find(map_id);
   if (start != started_.end()) {
@@ -139,8 +139,8 @@ TiedMap fitted_frame(const std::vector<MapAndWorldPose>& poses) {
 
   const double best_m = median(errors_m(poses, world_T_map));
   const double as_it_is_m = median(errors_m(poses, {}));
-  if (as_it_is_m <= best_m + kSame_m) return {{}, MapTie::kWorld};
-  return {world_T_map, MapTie::kBestFit};
+  if (as_it_is_m <= best_m + kSame_m) return {{}, MapTie::kWorld, {}};
+  return {world_T_map, MapTie::kBestFit, {}};
 }
 
 }  // namespace understory::cli

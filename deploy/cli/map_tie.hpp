@@ -30,6 +30,8 @@ const char* to_string(MapTie tie);
 struct TiedMap {
   geometry::SE2 world_T_map;
   MapTie tie = MapTie::kFirstMap;
+  /// The true pose to which it is tied; none where it is tied by many.
+  std::optional<geometry::SE2> true_world_T_vehicle;
 };
 
 /// Collects what says where the maps of a run lie.

@@ -87,6 +87,39 @@ TEST_CASE("ATE, RPE and NEES of a run are those of its errors", "[cli]") {
   CHECK(json["nees"]["keyframes"]["share_above_95_band"] == 0.0);
 }
 
+TEST_CASE("NEES has its expected mean beside a truth with errors that are told", "[cli]") {
+  const cli::TruthSigma sigma{0.08, 0.002};
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> normal;
+  const auto drawn = [&](double position_m, double heading_rad) {
+    const Eigen::Vector3d error(position_m * normal(random), position_m * normal(random),
+                                heading_rad * normal(random));
+    return SE2::Exp(error);
+  };
+
+  // An estimate with errors of 2 cm and 1 mrad, on a way that turns.
+  constexpr double kSigma_m = 0.02;
+  constexpr double kSigma_rad = 0.001;
+  const Eigen::Matrix3d covariance =
+      Eigen::Vector3d(kSigma_m, kSigma_m, kSigma_rad).array().square().matrix().asDiagonal();
+  double told = 0.0;
+  double untold = 0.0;
+  constexpr int kRuns = 300;
+  for (int k = 0; k < kRuns; ++k) {
+    MadeUpRun run;
+    for (int i = 0; i <= 10; ++i) {
+      const SE2 map_T_vehicle(20.0 * i, 0.5 * i * i, 0.05 * i);
+      run.truth(i, kWorld_T_map * map_T_vehicle * drawn(sigma.position_m, sigma.heading_rad));
+      if (i == 0) run.update(i, {}, model::MapUpdateStatus::kFirstMap);
+      if (i > 0) run.pose(i, map_T_vehicle * drawn(kSigma_m, kSigma_rad), covariance);
+    }
+    told += cli::accuracy_summary(*run.accuracy(sigma))["nees"]["live"]["mean"].get<double>();
+    untold += cli::accuracy_summary(*run.accuracy())["nees"]["live"]["mean"].get<double>();
+  }
+  CHECK(told / kRuns == Approx(3.0).margin(0.3));
+  CHECK(untold / kRuns > 20.0);
+}
+
 TEST_CASE("NEES of keyframes leaves out those whose covariance is a submap's", "[cli]") {
   auto run = straight_run();
   model::Submap submap;
