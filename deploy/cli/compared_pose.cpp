@@ -7,7 +7,7 @@ namespace understory::cli {
 
 Eigen::Matrix3d covariance_of_truth(const TruthSigma& sigma,
                                     const std::optional<geometry::SE2>& tie_T_vehicle) {
-  const Eigen::Matrix3d of_one =
+  Eigen::Matrix3d of_one =
       Eigen::Vector3d(sigma.position_m, sigma.position_m, sigma.heading_rad)
           .array()
           .square()
