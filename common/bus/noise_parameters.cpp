@@ -11,7 +11,8 @@ void describe(model::DetectionNoiseParameters& p, ParameterTable& table) {
             "Learned factor of the variance below which it is used. Larger ones are taken for "
             "errors that consecutive scans have in common.");
   table.add("noise.replace_corners_below", p.replace_corners_below, {0.0, 1.0}, "",
-            "The same of corners.");
+            "The same of corners. A wall is flat; the level's error, which all corners of a scan "
+            "share, is no noise of each.");
 }
 
 }  // namespace understory::bus

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "common/geometry/alignment.hpp"
-#include "common/model/variogram.hpp"
 
 namespace understory::model {
 namespace {
@@ -30,6 +29,8 @@ constexpr double kLagMemory = 8000.0;
 /// shows a correlation.
 constexpr double kLeastLagDegrees = 300.0;
 constexpr double kLagSigmas = 6.0;
+/// Growth of the variogram to the longest lag up to which errors are seen to fade.
+constexpr double kMostGrowth = 0.15;
 /// Weight of the stated variance, and of the whole kind for one range [degrees of freedom].
 constexpr double kStatedWeight = 4.0;
 constexpr double kKindWeight = 40.0;
@@ -277,7 +278,8 @@ double DetectionNoise::estimate(std::size_t bin) const {
   return (weight * of_kind + sums_[bin].chi2) / (weight + sums_[bin].degrees);
 }
 
-double DetectionNoise::repetition(LandmarkKind kind) const {
+std::array<LagVariance, DetectionNoise::kLags.size()> DetectionNoise::variogram(
+    LandmarkKind kind) const {
   const std::array<Sums, kLags.size()>& sums = by_lag_[static_cast<std::size_t>(kind)];
   std::array<LagVariance, kLags.size()> lags{};
   for (std::size_t i = 0; i < kLags.size(); ++i) {
@@ -286,7 +288,16 @@ double DetectionNoise::repetition(LandmarkKind kind) const {
     lags[i].value = sums[i].chi2 / sums[i].degrees;
     lags[i].degrees = sums[i].degrees;
   }
-  return white_noise_power(lags, kLag, kLagSigmas);
+  return lags;
+}
+
+double DetectionNoise::repetition(LandmarkKind kind) const {
+  return white_noise_power(variogram(kind), kLag, kLagSigmas);
+}
+
+/// Errors whose memory is longer than what is compared would pass for small ones.
+bool DetectionNoise::may_shrink(LandmarkKind kind) const {
+  return is_memory_seen(variogram(kind), kLag, kMostGrowth);
 }
 
 double DetectionNoise::learned(std::size_t bin) const {
@@ -298,6 +309,7 @@ double DetectionNoise::factor_of(std::size_t bin) const {
   const bool is_corner = bin / kRanges == static_cast<std::size_t>(LandmarkKind::kCorner);
   const double below = is_corner ? parameters_.replace_corners_below : parameters_.replace_below;
   if (learned < parameters_.replace_above && learned > below) return 1.0;
+  if (learned < 1.0 && !may_shrink(static_cast<LandmarkKind>(bin / kRanges))) return 1.0;
 
   // By chance?
   const std::size_t first = bin / kRanges * kRanges;

@@ -11,14 +11,15 @@
 
 #include "common/geometry/se2.hpp"
 #include "common/model/landmarks.hpp"
+#include "common/model/variogram.hpp"
 
 namespace understory::model {
 
 /// When stated covariances are replaced.
 struct DetectionNoiseParameters {
-  bool learn = true;           ///< False: covariances stay as stated.
-  double replace_above = 1.5;  ///< Factor of the variance from which understated ones grow.
-  double replace_below = 0.6;  ///< Factor of the variance below which overstated ones shrink.
+  bool learn = true;            ///< False: covariances stay as stated.
+  double replace_above = 1.5;   ///< Factor of the variance from which understated ones grow.
+  double replace_below = 0.35;  ///< Factor of the variance below which overstated ones shrink.
   double replace_corners_below = 0.6;  ///< The same of corners.
 };
 
@@ -48,7 +49,8 @@ struct ScanMotion {
 /// of white noise of the same power at frequency zero: the variance plus twice the sum of all
 /// autocovariances. N scans weighted by it state the uncertainty that their mean truly has. Errors
 /// that all scans share (an offset of the mounting, the scale of ranges) are not seen; that is why
-/// a statement is trusted as long as the scans do not contradict it clearly.
+/// a statement is trusted as long as the scans do not contradict it clearly, and why variances
+/// shrink only where errors are seen to fade within the lags that are compared.
 class DetectionNoise {
  public:
   /// The stated covariances hold.
@@ -192,6 +194,8 @@ class DetectionNoise {
   Sums left_over(const Pair& pair, const Fit& fit) const;
   Fit fitted_motion(std::span<const Pair> pairs) const;
   static Residual residual_of(const Pair& pair, double factor, const geometry::SE2& then_T_now);
+  std::array<LagVariance, kLags.size()> variogram(LandmarkKind kind) const;
+  bool may_shrink(LandmarkKind kind) const;
   double estimate(std::size_t bin) const;
   double learned(std::size_t bin) const;
   double factor_of(std::size_t bin) const;

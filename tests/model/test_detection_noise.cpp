@@ -82,11 +82,12 @@ TEST_CASE("The factor of misstated noise is learned within a few scans", "[noise
         noise.add(drive.next(0.1, [&](double) { return factor; }), drive.tracks);
       }
       CAPTURE(factor, seed);
-      const double early = noise.factor(kTrunk, 8.0) / (factor * factor);
-      CHECK(early > 0.4);
-      CHECK(early < 2.5);
+      // Overstated noise shrinks as soon as its errors are seen to fade.
+      const double early = noise.factor(kTrunk, 8.0);
+      CHECK(early > (factor > 1.0 ? 0.4 * factor * factor : 0.99));
+      CHECK(early < (factor > 1.0 ? 2.5 * factor * factor : 1.01));
 
-      for (int k = 0; k < 100; ++k) {
+      for (int k = 0; k < 150; ++k) {
         noise.add(drive.next(0.1, [&](double) { return factor; }), drive.tracks);
       }
       const double late = noise.factor(kTrunk, 8.0) / (factor * factor);
@@ -150,6 +151,38 @@ TEST_CASE("Overstated corners shrink where trunks keep what is stated", "[noise]
   }
   CHECK(noise.factor(kTrunk, 8.0) == 1.0);
   CHECK(noise.factor(model::LandmarkKind::kCorner, 8.0) == Approx(0.16).epsilon(0.3));
+}
+
+TEST_CASE("Noise shrinks only where its memory is shorter than what is compared", "[noise]") {
+  // A tenth of the stated variance, fading by this share from scan to scan.
+  for (const double kept : {0.0, 0.5, 0.97}) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      Drive drive(seed, 20);
+      model::DetectionNoise noise;
+      std::mt19937_64 random(seed);
+      std::normal_distribution<double> normal(0.0, std::sqrt(0.1) * 0.1);
+      std::vector<Eigen::Vector2d> errors(20);
+      for (auto& error : errors) error = {normal(random), normal(random)};
+      int shrunk = 0;
+      for (int k = 0; k < 600; ++k) {
+        auto scan = drive.next(0.1, [](double) { return 0.0; });
+        const double fresh = std::sqrt(1.0 - kept * kept);
+        for (auto& error : errors)
+          error = kept * error + fresh * Eigen::Vector2d(normal(random), normal(random));
+        for (std::size_t i = 0; i < scan.detections.size(); ++i)
+          scan.detections[i].position_m.head<2>() += errors[drive.tracks[i] - 1];
+        noise.add(scan, drive.tracks);
+        if (noise.factor(kTrunk, 8.0) < 1.0) ++shrunk;
+      }
+      CAPTURE(kept, seed, shrunk, noise.factor(kTrunk, 8.0));
+      if (kept > 0.9) {
+        CHECK(shrunk == 0);
+      } else {
+        // White noise of the same power has (1 + kept) / (1 - kept) times the variance.
+        CHECK(noise.factor(kTrunk, 8.0) == Approx(0.1 * (1.0 + kept) / (1.0 - kept)).epsilon(0.35));
+      }
+    }
+  }
 }
 
 TEST_CASE("One wrong detection in fifty does not pass for noise", "[noise]") {

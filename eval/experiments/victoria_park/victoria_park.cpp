@@ -80,8 +80,6 @@ class Drive {
 VictoriaParkConfig victoria_park_defaults() {
   VictoriaParkConfig config;
   config.mapper.smoothing.use_odometry = true;
-  // As in deploy/config/lidar, which says why.
-  config.keyframer.joint.noise.replace_below = 0.0;
   return config;
 }
 
