@@ -31,7 +31,8 @@ std::string_view describe(LocaliseOutcome outcome) {
   return "unknown";
 }
 
-ConstellationMap::ConstellationMap(const Parameters& parameters) : net_(parameters) {
+ConstellationMap::ConstellationMap(const Parameters& parameters)
+    : grid_(parameters.cell_m), net_(parameters) {
   for (const double apart_m : kApart_m) hermits_.emplace_back(apart_m, parameters);
 }
 
@@ -44,6 +45,7 @@ bool ConstellationMap::insert(LandmarkId id, const Eigen::Vector2d& position_m) 
     free_slots_.pop_back();
   }
   slots_.insert(id, slot);
+  grid_.insert(slot, position_m);
   net_.insert(slot, id, position_m);
   for (Hermits& each : hermits_) each.inserted(slot, id, net_.grid());
   return true;
@@ -52,27 +54,48 @@ bool ConstellationMap::insert(LandmarkId id, const Eigen::Vector2d& position_m) 
 bool ConstellationMap::remove(LandmarkId id) {
   const Slot slot = slots_.find(id);
   if (slot == kNoSlot) return false;
-  const Eigen::Vector2d position = net_.grid().position(slot);
+  const Eigen::Vector2d settled_m = net_.grid().position(slot);
+  shifted_.erase(slot);
+  grid_.remove(slot);
   net_.remove(slot);
-  for (Hermits& each : hermits_) each.removed(slot, position, net_.grid());
+  for (Hermits& each : hermits_) each.removed(slot, settled_m, net_.grid());
   slots_.erase(id);
   free_slots_.push_back(slot);
   return true;
 }
 
 bool ConstellationMap::move(LandmarkId id, const Eigen::Vector2d& position_m) {
+  if (!shift(id, position_m)) return false;
+  const Slot slot = slots_.find(id);
+  settle(slot);
+  shifted_.erase(slot);
+  return true;
+}
+
+bool ConstellationMap::shift(LandmarkId id, const Eigen::Vector2d& position_m) {
   const Slot slot = slots_.find(id);
   if (slot == kNoSlot || !PointGrid::representable(position_m)) return false;
-  const Eigen::Vector2d before = net_.grid().position(slot);
-  net_.move(slot, position_m);
-  for (Hermits& each : hermits_) each.moved(slot, id, before, net_.grid());
+  grid_.move(slot, position_m);
+  shifted_.insert(slot);
   return true;
+}
+
+void ConstellationMap::settle() {
+  for (const Slot slot : shifted_) settle(slot);
+  shifted_.clear();
+}
+
+/// The landmark's triangles follow it.
+void ConstellationMap::settle(Slot slot) {
+  const Eigen::Vector2d before_m = net_.grid().position(slot);
+  net_.move(slot, grid_.position(slot));
+  for (Hermits& each : hermits_) each.moved(slot, id_of(slot), before_m, net_.grid());
 }
 
 std::optional<Eigen::Vector2d> ConstellationMap::position(LandmarkId id) const {
   const Slot slot = slots_.find(id);
   if (slot == kNoSlot) return std::nullopt;
-  return net_.grid().position(slot);
+  return grid_.position(slot);
 }
 
 std::optional<NearestLandmark> ConstellationMap::nearest(const Eigen::Vector2d& point_m,
@@ -107,7 +130,9 @@ std::vector<std::array<LandmarkId, 3>> ConstellationMap::triangles() const {
 }
 
 std::size_t ConstellationMap::bytes() const {
-  std::size_t bytes = net_.bytes() + slots_.bytes() + free_slots_.capacity() * sizeof(Slot);
+  constexpr std::size_t kTreeNode = 40;
+  std::size_t bytes = grid_.bytes() + net_.bytes() + slots_.bytes() +
+                      free_slots_.capacity() * sizeof(Slot) + shifted_.size() * kTreeNode;
   for (const Hermits& each : hermits_) bytes += each.bytes();
   return bytes;
 }

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <span>
 #include <vector>
 
@@ -24,7 +25,8 @@ struct NearestLandmark {
 
 /// Landmarks by id, and the triangles that each forms with its nearest neighbours, by their side
 /// lengths. Every change is made in place and touches the neighbourhood only; the result does not
-/// depend on the order of changes.
+/// depend on the order of changes. Memory: positions are kept twice, as they are and as the
+/// triangles have them.
 ///
 /// Positions must be finite and within constellation::PointGrid::kMaxCoordinate.
 class ConstellationMap {
@@ -44,6 +46,15 @@ class ConstellationMap {
   bool remove(LandmarkId id);
   /// False if `id` is not there or the position cannot be stored.
   bool move(LandmarkId id, const Eigen::Vector2d& position_m);
+  /// The same, but the landmark's triangles stay as they are until settle(): where many landmarks
+  /// move again and again, and nothing is searched meanwhile. O(log(landmarks that wait)), a
+  /// hundredth of move().
+  bool shift(LandmarkId id, const Eigen::Vector2d& position_m);
+  /// Brings the triangles up to date, as move() in place of shift() had left them. Cost: one move()
+  /// for each landmark that was shifted, however often it was.
+  void settle();
+  /// Whether no landmark was shifted since settle().
+  bool is_settled() const { return shifted_.empty(); }
 
   /// Number of landmarks.
   std::size_t size() const { return slots_.size(); }
@@ -73,6 +84,7 @@ class ConstellationMap {
   /// with the fewest candidates first; each similar triangle of the map is a hypothesis, tested on
   /// the points around it one by one (Wald's sequential test), then refined on all points. Accepted
   /// is a pose that chance does not give and that no different pose comes close to.
+  /// Precondition: is_settled().
   Localisation localise(std::span<const ObservedPoint> points,
                         const LocaliseParameters& parameters = {},
                         const std::optional<Disc>& where = std::nullopt) const;
@@ -85,7 +97,7 @@ class ConstellationMap {
   std::size_t bytes() const;
 
   /// The landmarks by slot, for the search in localise.cpp.
-  const PointGrid& grid() const { return net_.grid(); }
+  const PointGrid& grid() const { return grid_; }
   /// The triangles by side lengths, for the search in localise.cpp. Vertices are slots.
   const TriangleIndex& triangle_index() const { return net_.triangles(); }
   /// Landmarks that stand alone in a crowd, at several distances from others.
@@ -94,7 +106,11 @@ class ConstellationMap {
   LandmarkId id_of(Slot slot) const { return net_.id_of(slot); }
 
  private:
-  TriangleNet net_;
+  void settle(Slot slot);
+
+  PointGrid grid_;
+  TriangleNet net_;  ///< Where landmarks were when it was settled.
+  std::set<Slot> shifted_;
   std::vector<Hermits> hermits_;
   IndexTable slots_;  // id -> slot
   std::vector<Slot> free_slots_;

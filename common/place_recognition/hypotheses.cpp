@@ -1,6 +1,7 @@
 #include "common/place_recognition/hypotheses.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -16,6 +17,8 @@ constexpr double kSamePlaceM = 0.8;
 constexpr double kSameHeadingRad = 0.08;
 constexpr int kClustersPerFrame = 2;
 constexpr std::size_t kMostHypotheses = 400;
+/// What lies farther away than the reach by this share does so whatever rounding does.
+constexpr double kSurelyFarther = 1.0 + 1e-6;
 
 constellation::Triangle indexed(const StemTriangle& triangle, constellation::Slot first) {
   constellation::Triangle result;
@@ -39,6 +42,29 @@ bool same_place(const Hypothesis& a, const Hypothesis& b) {
   const float dx = a.x_m - b.x_m;
   const float dy = a.y_m - b.y_m;
   return dx * dx + dy * dy < kSamePlaceM * kSamePlaceM && heading_between(a, b) < kSameHeadingRad;
+}
+
+using Corners = std::array<Eigen::Vector2d, 3>;
+
+/// Square of the distance between the frames by these corners [m^2], but for rounding: what
+/// align_rigid() gives, without its trigonometric functions. Most triangles that are alike are
+/// farther apart than places are looked for.
+double about_m2(const Corners& frame, const Corners& query) {
+  const Eigen::Vector2d frame_m = (frame[0] + frame[1] + frame[2]) / 3.0;
+  const Eigen::Vector2d query_m = (query[0] + query[1] + query[2]) / 3.0;
+  double dot = 0.0;
+  double cross = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Eigen::Vector2d a = frame[i] - frame_m;
+    const Eigen::Vector2d b = query[i] - query_m;
+    dot += a.dot(b);
+    cross += b.x() * a.y() - b.y() * a.x();
+  }
+  const double length = std::sqrt(dot * dot + cross * cross);
+  if (length == 0.0) return 0.0;  // No heading follows: left to align_rigid().
+  const Eigen::Vector2d turned_m(dot * query_m.x() - cross * query_m.y(),
+                                 cross * query_m.x() + dot * query_m.y());
+  return (frame_m - turned_m / length).squaredNorm();
 }
 
 /// The mean of those that agree with `seed`.
@@ -76,8 +102,17 @@ std::vector<Hypothesis> TripletIndex::hypotheses(std::span<const LevelStem> stem
   std::vector<float> log_diameters;
   for (const LevelStem& stem : stems) log_diameters.push_back(log_of(stem.diameter_m));
 
+  const auto frame_corners = [&](const constellation::TriangleIndex::Entry& entry) {
+    Corners corners;
+    for (std::size_t i = 0; i < 3; ++i)
+      corners[i] = stems_[entry.vertex[i]].position_m.cast<double>();
+    return corners;
+  };
+
   std::vector<Hypothesis> found;
   for (const StemTriangle& triangle : triangles) {
+    const Corners query{stems[triangle.corner[0]].position_m, stems[triangle.corner[1]].position_m,
+                        stems[triangle.corner[2]].position_m};
     const auto consider = [&](const constellation::TriangleIndex::Entry& entry) {
       const std::uint32_t frame = stems_[entry.vertex[0]].frame;
       if (frame >= filter.end) return true;
@@ -86,12 +121,9 @@ std::vector<Hypothesis> TripletIndex::hypotheses(std::span<const LevelStem> stem
         // Unknown diameters agree with all: off is not a number then.
         if (std::abs(off) > log_tolerance) return true;
       }
-      geometry::RigidAlignment2 sums;
-      for (std::size_t i = 0; i < 3; ++i) {
-        sums.add(stems_[entry.vertex[i]].position_m.cast<double>(),
-                 stems[triangle.corner[i]].position_m);
-      }
-      const geometry::SE2 pose = sums.a_T_b();
+      const Corners corners = frame_corners(entry);
+      if (about_m2(corners, query) > kSurelyFarther * reach_m2) return true;
+      const geometry::SE2 pose = geometry::align_rigid(corners, query);
       if (pose.translation().squaredNorm() <= reach_m2)
         found.push_back({frame, static_cast<float>(pose.x()), static_cast<float>(pose.y()),
                          static_cast<float>(pose.theta())});

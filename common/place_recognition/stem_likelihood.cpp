@@ -98,20 +98,31 @@ std::span<const StemLikelihood::FrameStem> StemLikelihood::strip(const Eigen::Ve
                                       static_cast<std::size_t>(end - first));
 }
 
-double StemLikelihood::diameter_ratio(double query_m, const FrameStem& stem) const {
-  if (!noise_.use_diameters || !stem.has_diameter || !(query_m > 0.0)) return 1.0;
-  const double query = std::log(query_m);
-  const double off = query - stem.log_diameter;
-  const double right = (1.0 - noise_.wide_diameter_share) * normal(off, noise_.diameter_log_sigma) +
-                       noise_.wide_diameter_share * normal(off, noise_.wide_diameter_log_sigma);
-  const double anywhere = 0.95 * normal(query - diameters_.mean, diameters_.sigma) +
-                          0.05 * normal(query - diameters_.mean, 2.0 * diameters_.sigma + 0.5);
-  return right / anywhere;
+std::vector<StemLikelihood::QueryDiameter> StemLikelihood::diameters_of(
+    std::span<const LevelStem> query) const {
+  std::vector<QueryDiameter> result(query.size());
+  if (!noise_.use_diameters) return result;
+  for (std::size_t i = 0; i < query.size(); ++i) {
+    if (!(query[i].diameter_m > 0.0)) continue;
+    const double log = std::log(query[i].diameter_m);
+    const double anywhere = 0.95 * normal(log - diameters_.mean, diameters_.sigma) +
+                            0.05 * normal(log - diameters_.mean, 2.0 * diameters_.sigma + 0.5);
+    result[i] = {true, log, anywhere};
+  }
+  return result;
 }
 
-Eigen::Vector2d StemLikelihood::weight(const LevelStem& query, const FrameStem& stem,
+double StemLikelihood::diameter_ratio(const QueryDiameter& query, const FrameStem& stem) const {
+  if (!query.is_known || !stem.has_diameter) return 1.0;
+  const double off = query.log - stem.log_diameter;
+  const double right = (1.0 - noise_.wide_diameter_share) * normal(off, noise_.diameter_log_sigma) +
+                       noise_.wide_diameter_share * normal(off, noise_.wide_diameter_log_sigma);
+  return right / query.anywhere;
+}
+
+Eigen::Vector2d StemLikelihood::weight(const QueryDiameter& query, const FrameStem& stem,
                                        double squared_m2, const Kernel& kernel) const {
-  const double scale = noise_.matched_share * stem.weight * diameter_ratio(query.diameter_m, stem) /
+  const double scale = noise_.matched_share * stem.weight * diameter_ratio(query, stem) /
                        (stem.density_per_m2 * 2.0 * std::numbers::pi);
   return {scale * (1.0 - noise_.wide_share) / kernel.narrow_variance *
               std::exp(-0.5 * squared_m2 / kernel.narrow_variance),
@@ -126,14 +137,16 @@ double StemLikelihood::log_ratio(std::span<const LevelStem> query,
   const Eigen::Matrix2d rotation = frame_T_query.rotation();
   const double inside_m2 = radius_m_ * radius_m_;
 
+  const std::vector<QueryDiameter> diameters = diameters_of(query);
   double sum = 0.0;
-  for (const LevelStem& stem : query) {
+  for (std::size_t i = 0; i < query.size(); ++i) {
+    const LevelStem& stem = query[i];
     const Eigen::Vector2d mapped = rotation * stem.position_m + frame_T_query.translation();
     if (mapped.squaredNorm() > inside_m2) continue;
     double ratio = 1.0 - noise_.matched_share;
     for (const FrameStem& other : strip(mapped, far_m)) {
       const double squared = (other.position_m - mapped).squaredNorm();
-      if (squared < far_m * far_m) ratio += weight(stem, other, squared, kernel).sum();
+      if (squared < far_m * far_m) ratio += weight(diameters[i], other, squared, kernel).sum();
     }
     sum += std::log(ratio);
   }
@@ -142,11 +155,13 @@ double StemLikelihood::log_ratio(std::span<const LevelStem> query,
 
 geometry::SE2 StemLikelihood::refined(std::span<const LevelStem> query,
                                       const geometry::SE2& start) const {
+  const std::vector<QueryDiameter> diameters = diameters_of(query);
   geometry::SE2 pose = start;
   for (const RefineSpread& spread : kSpreads) {
     const Eigen::Matrix2d rotation = pose.rotation();
     geometry::RigidAlignment2 sums;
-    for (const LevelStem& stem : query) {
+    for (std::size_t own = 0; own < query.size(); ++own) {
+      const LevelStem& stem = query[own];
       const Eigen::Vector2d mapped = rotation * stem.position_m + pose.translation();
       const double lever = spread.per_metre * stem.position_m.norm();
       const double added = spread.on_the_spot_m * spread.on_the_spot_m + lever * lever;
@@ -160,7 +175,7 @@ geometry::SE2 StemLikelihood::refined(std::span<const LevelStem> query,
       for (const FrameStem& other : strip(mapped, far_m)) {
         const double squared = (other.position_m - mapped).squaredNorm();
         if (squared > far_m * far_m || count == near.size()) continue;
-        near[count] = {&other, weight(stem, other, squared, kernel)};
+        near[count] = {&other, weight(diameters[own], other, squared, kernel)};
         ratio += near[count++].second.sum();
       }
       for (std::size_t i = 0; i < count; ++i) {

@@ -100,12 +100,19 @@ class StemLikelihood {
     double weight = 1.0;
     double density_per_m2 = 0.0;  ///< Of stems around it, or of all, whichever is larger.
   };
+  /// What of a query's stem does not depend on where it is.
+  struct QueryDiameter {
+    bool is_known = false;
+    double log = 0.0;
+    double anywhere = 1.0;  ///< Density of the logarithm among all stems.
+  };
+  std::vector<QueryDiameter> diameters_of(std::span<const LevelStem> query) const;
   /// Those that are not farther than `reach_m` from a point along x.
   std::span<const FrameStem> strip(const Eigen::Vector2d& point_m, double reach_m) const;
   /// Narrow and wide part of the mixture for one pair, over the density of stems.
-  Eigen::Vector2d weight(const LevelStem& query, const FrameStem& stem, double squared_m2,
+  Eigen::Vector2d weight(const QueryDiameter& query, const FrameStem& stem, double squared_m2,
                          const Kernel& kernel) const;
-  double diameter_ratio(double query_m, const FrameStem& stem) const;
+  double diameter_ratio(const QueryDiameter& query, const FrameStem& stem) const;
 
   StemNoise noise_;
   DiameterSpread diameters_;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -28,6 +30,7 @@ constexpr model::Utime kTryAgain_us = kSecond_us;
 constexpr int kWait_ms = 1000;
 /// A SUBMAP's keyframes and payload take so many times the room of its landmarks.
 constexpr std::size_t kSubmapParts = 8;
+constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 
 class StoreAdapter : public bus::Adapter, public bus::Device {
  public:
@@ -43,7 +46,7 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
     replies_ = node.advertise<model::Submap>(channels_.submap_reply);
     requests_ = node.advertise<map_request_t>(channels_.map_request);
     node.every(static_cast<model::Utime>(parameters_.writing.ground_period_s * 1e6),
-               [this](model::Utime now) { write_ground(now); });
+               [this](model::Utime now) { write_ground(now, moved_per_period()); });
     node.every(kSecond_us, [this](model::Utime now) { tick(now); });
   }
 
@@ -53,7 +56,7 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
 
   void finish() override {
     next_try_ = -1;
-    write_ground(node_->now());
+    write_ground(node_->now(), kAll);
     if (folder_ && !folder_->finish())
       node_->log(bus::Node::Level::kInfo, "not_sealed",
                  "the map's file is completed by who opens it next", channels_.submap);
@@ -201,6 +204,7 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
     if (update.status == model::MapUpdateStatus::kFirstMap) {
       with_file(update.utime, channels_.slam_update, [&](DriveFile& file) {
         if (!SubmapStore::begins_drive(update, file.highest_map())) return;
+        stage_.draw_moved(kAll);
         write(stage_.due(), file);
         folder_->begin_drive();
         stage_ = SubmapStore();
@@ -209,7 +213,13 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
     stage_.take(update);
   }
 
-  void write_ground(model::Utime now) {
+  std::size_t moved_per_period() const {
+    return static_cast<std::size_t>(
+        std::ceil(parameters_.writing.moved_landmarks_per_s * parameters_.writing.ground_period_s));
+  }
+
+  void write_ground(model::Utime now, std::size_t most_moved) {
+    stage_.draw_moved(most_moved);
     const Writes due = stage_.due();
     if (due.empty()) return;
     const bool is_written =

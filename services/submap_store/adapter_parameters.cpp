@@ -20,6 +20,10 @@ void describe(StoreParameters& parameters, bus::ParameterTable& table) {
   table.add("writing.ground_period_s", writing.ground_period_s, {0.1, 3600.0}, "s",
             "The map that the mapper holds itself, around the vehicle, is written so often "
             "(message time). A computer that loses power loses so much of it.");
+  table.add("writing.moved_landmarks_per_s", writing.moved_landmarks_per_s, {1, 1000000}, "1/s",
+            "Landmarks of it that have moved are rewritten, so many per second of message time at "
+            "most and each in its turn. New ones never wait; where the map jumps as a whole MAP "
+            "comes, and all of it is written.");
   table.add("writing.submaps_per_s", writing.submaps_per_s, {1, 10000}, "1/s",
             "Submaps whose landmarks are drawn anew per second of message time, after a "
             "correction has moved them.");

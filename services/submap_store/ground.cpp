@@ -8,6 +8,7 @@ void Ground::take(const model::WholeMap& map) {
   utime_ = std::max(utime_, map.utime);
   version_ = map.version;
   landmarks_.clear();
+  moved_.clear();
   gone_.clear();
   for (const model::MapLandmark& one : map.landmarks) landmarks_[one.id] = one;
   for (const model::KeyframePose& one : map.keyframes) keyframes_[one.utime] = one;
@@ -23,7 +24,7 @@ void Ground::take(const model::MapDelta& delta) {
   version_ = delta.version;
 
   for (const model::MapLandmark& one : delta.added) put(one);
-  for (const model::MapLandmark& one : delta.moved) put(one);
+  for (const model::MapLandmark& one : delta.moved) move(one);
   for (const model::LandmarkId id : delta.removed) remove(id);
   for (const auto& [old_id, new_id] : delta.merged) remove(old_id);
 }
@@ -37,9 +38,19 @@ void Ground::take(const model::MapUpdate& update) {
 void Ground::hand_over(const model::Submap& submap) {
   for (const model::MapLandmark& one : submap.landmarks) {
     landmarks_.erase(one.id);
+    moved_.erase(one.id);
     gone_.erase(one.id);
   }
   for (const model::KeyframePose& one : submap.keyframes) keyframes_.erase(one.utime);
+}
+
+void Ground::draw(std::size_t most) {
+  for (std::size_t count = std::min(most, moved_.size()); count > 0; --count) {
+    auto one = moved_.lower_bound(next_moved_);
+    if (one == moved_.end()) one = moved_.begin();
+    next_moved_ = one->first + 1;
+    landmarks_.insert(moved_.extract(one));
+  }
 }
 
 std::optional<map_file::GroundChange> Ground::change() const {
@@ -60,11 +71,19 @@ void Ground::written() {
 
 void Ground::put(const model::MapLandmark& landmark) {
   landmarks_[landmark.id] = landmark;
+  moved_.erase(landmark.id);
   gone_.erase(landmark.id);
+}
+
+/// What is not in the file does not wait.
+void Ground::move(const model::MapLandmark& landmark) {
+  if (landmarks_.contains(landmark.id) || gone_.contains(landmark.id)) return put(landmark);
+  moved_[landmark.id] = landmark;
 }
 
 void Ground::remove(model::LandmarkId id) {
   landmarks_.erase(id);
+  moved_.erase(id);
   gone_[id] = true;
 }
 

@@ -23,8 +23,9 @@ void archive(Archive& a, Self& s) {
 
 namespace understory::submap_store {
 
-/// What MAP, MAP_DELTA and SLAM_UPDATE of one map say that is not written yet. Memory: O(what
-/// changed).
+/// What MAP, MAP_DELTA and SLAM_UPDATE of one map say that is not written yet. Landmarks that
+/// MAP_DELTA moves wait until draw(): where a loop closes each keyframe moves all of them by some
+/// centimetres. Memory: O(what changed).
 class Ground {
  public:
   /// Of no map.
@@ -43,9 +44,11 @@ class Ground {
   /// Its landmarks and keyframes are kept elsewhere.
   void hand_over(const model::Submap& submap);
 
-  /// What is not written yet; none where there is nothing.
+  /// So many landmarks that have moved wait no more: of all that wait each in its turn.
+  void draw(std::size_t most);
+  /// What is to be written, without the landmarks that wait; none where there is nothing.
   std::optional<map_file::GroundChange> change() const;
-  /// All of it is written.
+  /// All of change() is written.
   void written();
   /// Changes were missed, or the map began before this did.
   bool wants_whole() const { return map_id_ != 0 && wants_whole_; }
@@ -55,18 +58,21 @@ class Ground {
   /// Members of a saved state; see common/state.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.map_id_, self.utime_, self.version_, self.landmarks_, self.gone_, self.keyframes_,
-      self.is_whole_, self.wants_whole_);
+    a(self.map_id_, self.utime_, self.version_, self.landmarks_, self.moved_, self.next_moved_,
+      self.gone_, self.keyframes_, self.is_whole_, self.wants_whole_);
   }
 
  private:
   void put(const model::MapLandmark& landmark);
+  void move(const model::MapLandmark& landmark);
   void remove(model::LandmarkId id);
 
   std::uint32_t map_id_ = 0;
   model::Utime utime_ = 0;
   std::uint64_t version_ = 0;
   std::map<model::LandmarkId, model::MapLandmark> landmarks_;
+  std::map<model::LandmarkId, model::MapLandmark> moved_;  ///< They wait; the file has each.
+  model::LandmarkId next_moved_ = 0;                       ///< Whose turn it is, or the one after.
   std::map<model::LandmarkId, bool> gone_;
   std::map<model::Utime, model::KeyframePose> keyframes_;
   bool is_whole_ = false;  ///< `landmarks_` are all that the mapper holds.

@@ -15,8 +15,9 @@ struct FolderParameters {
 
 /// How often what is written.
 struct WritingParameters {
-  double ground_period_s = 10.0;  ///< Message time between two writings of the ground.
-  int submaps_per_s = 10;         ///< Corrected submaps drawn per second of message time.
+  double ground_period_s = 10.0;   ///< Message time between two writings of the ground.
+  int moved_landmarks_per_s = 20;  ///< Of the ground, rewritten per second of message time.
+  int submaps_per_s = 10;          ///< Corrected submaps drawn per second of message time.
 };
 
 /// What a message may cost.

@@ -1,6 +1,7 @@
 #include "services/submap_store/submap_store.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "common/state/archive.hpp"
@@ -8,9 +9,10 @@
 namespace understory::submap_store {
 namespace {
 
-constexpr state::Format kFormat{"submap_store", 2};
+constexpr state::Format kFormat{"submap_store", 3};
 /// Closures that wait for the mapper's word.
 constexpr std::size_t kMostProposed = 1000;
+constexpr std::size_t kWhole = std::numeric_limits<std::size_t>::max();
 
 /// Number of the map that landmarks are of; 0 where there are none. Earlier maps, with lower
 /// numbers, may have become part of it.
@@ -136,6 +138,7 @@ void SubmapStore::load(const std::string& state) {
 /// up.
 void SubmapStore::go_to(std::uint32_t map_id) {
   if (map_id == 0 || map_id == ground_.map_id()) return;
+  ground_.draw(kWhole);
   if (is_provisional_) {
     left_.dropped_maps.push_back(ground_.map_id());
     existence_.erase(ground_.map_id());

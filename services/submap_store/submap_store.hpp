@@ -69,7 +69,9 @@ class SubmapStore {
   /// The file is another one, without anything in it: the ground must be written whole.
   void begin_drive();
 
-  /// What is to be written.
+  /// So many landmarks of the ground that have moved are due, of all that wait each in its turn.
+  void draw_moved(std::size_t most) { ground_.draw(most); }
+  /// What is to be written, without the landmarks of the ground that have moved and wait.
   Writes due() const;
   /// All of due() is in the file.
   void written();

@@ -65,7 +65,10 @@ class RandomChanges {
       std::advance(it, static_cast<long>(random_() % model.size()));
       if (what < 8) {
         it->second = what == 5 ? draw() : Eigen::Vector2d(it->second + 0.01 * draw());
-        REQUIRE(map.move(it->first, it->second));
+        const bool waits = random_() % 2 == 0;
+        REQUIRE((waits ? map.shift(it->first, it->second) : map.move(it->first, it->second)));
+        REQUIRE(*map.position(it->first) == it->second);
+        REQUIRE_FALSE((waits && map.is_settled()));
       } else {
         REQUIRE(map.remove(it->first));
         REQUIRE_FALSE(map.remove(it->first));
@@ -111,6 +114,8 @@ TEST_CASE("Triangles after random changes equal those made by brute force", "[co
       for (int i = 0; i < 4000; ++i) {
         changes.apply(map, model);
         if (i % 400 == 399 || i < 12) {
+          map.settle();
+          REQUIRE(map.is_settled());
           REQUIRE(map.size() == model.size());
           REQUIRE(map.triangles() == brute_force_triangles(model, 30.0));
         }
@@ -148,6 +153,44 @@ TEST_CASE("Triangles of many landmarks in a few places equal brute force", "[con
     model.erase(model.begin());
     if (model.size() % 10 == 0) REQUIRE(map.triangles() == brute_force_triangles(model, 30.0));
   }
+}
+
+TEST_CASE("Landmarks that wait for their triangles are found where they are", "[constellation]") {
+  std::mt19937_64 random(8);
+  std::normal_distribution<double> step;
+  Model model = clustered_model(random, 400);
+  ConstellationMap waiting;
+  for (const auto& [id, position] : model) waiting.insert(id, position);
+  const auto triangles = waiting.triangles();
+
+  // The map drifts as a whole, a little further each time.
+  for (int i = 0; i < 20; ++i) {
+    for (auto& [id, position] : model) {
+      position += Eigen::Vector2d(0.3 + 0.01 * step(random), 0.1 * step(random));
+      REQUIRE(waiting.shift(id, position));
+    }
+  }
+  CHECK(waiting.triangles() == triangles);
+  ConstellationMap made;
+  for (const auto& [id, position] : model) made.insert(id, position);
+  for (const auto& [id, position] : model)
+    REQUIRE(waiting.near({position, 10.0}) == made.near({position, 10.0}));
+
+  // Some go meanwhile, and others take their slots.
+  for (int i = 0; i < 50; ++i) {
+    const auto gone = std::next(model.begin(), static_cast<long>(random() % model.size()));
+    REQUIRE(waiting.remove(gone->first));
+    model.erase(gone);
+  }
+  for (LandmarkId id = 1; id <= 25; ++id) {
+    model[id] = {10.0 * step(random), 10.0 * step(random)};
+    REQUIRE(waiting.insert(id, model[id]));
+  }
+  waiting.settle();
+  REQUIRE(waiting.triangles() == brute_force_triangles(model, 30.0));
+  REQUIRE_FALSE(waiting.shift(1, {std::nan(""), 0.0}));
+  REQUIRE_FALSE(waiting.shift(26, {0.0, 0.0}));
+  REQUIRE(waiting.is_settled());
 }
 
 TEST_CASE("Triangles do not depend on the order of insertion", "[constellation]") {

@@ -141,6 +141,35 @@ TEST_CASE("The index of landmarks follows in steps, and changes are reported onc
   CHECK(loaded.index().position(id)->x() == 2.1);
 }
 
+TEST_CASE("The index has the triangles of where landmarks are when it has caught up", "[mapper]") {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  LandmarkMap landmarks;
+  std::vector<model::LandmarkId> ids;
+  for (int i = 0; i < 200; ++i) {
+    StoredLandmark one;
+    one.position_m = {30.0 * normal(random), 30.0 * normal(random)};
+    ids.push_back(landmarks.insert(one));
+  }
+
+  // Large moves and small ones, of landmarks that are in use and that are not.
+  for (int round = 0; round < 5; ++round) {
+    for (const model::LandmarkId id : ids) {
+      const double step_m = random() % 2 == 0 ? 1.0 : 0.05;
+      const Eigen::Vector2d off_m(step_m * normal(random), step_m * normal(random));
+      landmarks.move(id, landmarks.at(id).position_m + off_m);
+      if (random() % 10 == 0) landmarks.set_in_use(id, random() % 2 == 0);
+    }
+    landmarks.catch_up();
+    REQUIRE(landmarks.index().is_settled());
+    REQUIRE(landmarks.unused_index().is_settled());
+    LandmarkMap loaded;  // Its index is made from scratch.
+    state::load(state::save({"landmarks"}, landmarks), {"landmarks"}, loaded);
+    REQUIRE(landmarks.index().triangles() == loaded.index().triangles());
+    REQUIRE(landmarks.unused_index().triangles() == loaded.unused_index().triangles());
+  }
+}
+
 TEST_CASE("A map whose landmarks are given away keeps nothing of them", "[mapper]") {
   LandmarkMap map;
   const auto bytes = [&map] { return state::save({"landmarks"}, map).size(); };

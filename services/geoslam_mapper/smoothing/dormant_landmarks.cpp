@@ -228,7 +228,7 @@ Eigen::Vector2d PoseGraph::dormant_position(model::LandmarkId id) const {
     const Eigen::Matrix2d rotation = map_T_node.rotation();
     const Eigen::Matrix2d information = rotation * one.information * rotation.transpose();
     sum += information;
-    weighted += information * (map_T_node * one.position_m);
+    weighted += information * (rotation * one.position_m + map_T_node.translation());
   }
   return sum.inverse() * weighted;
 }

@@ -8,7 +8,9 @@ namespace understory::geoslam_mapper::smoothing {
 namespace {
 
 /// The index serves search and gating only: following every millimetre costs more than it gives.
-/// Most moves are small rotations of whole stretches of the map; each costs a triangulation.
+/// Most moves are small rotations of whole stretches of the map. Where the index follows one, its
+/// triangles wait for the next search: each would cost a triangulation, and a loop that closes
+/// moves all landmarks again and again.
 constexpr double kIndexTolerance_m = 0.01;
 
 }  // namespace
@@ -96,7 +98,7 @@ void LandmarkMap::move(model::LandmarkId id, const Eigen::Vector2d& position_m) 
   if (!indexed) return;
   const double distance = (*indexed - position_m).norm();
   if (distance > kStaleness_m) {
-    index.move(id, position_m);
+    index.shift(id, position_m);
   } else if (distance > kIndexTolerance_m && !landmark.is_late) {
     landmark.is_late = true;
     if (late_.size() >= 2 * landmarks_.size()) forget_gone_late();
@@ -123,9 +125,11 @@ void LandmarkMap::catch_up() {
     constellation::ConstellationMap& index = index_of(found->second);
     const std::optional<Eigen::Vector2d> indexed = index.position(id);
     if (indexed && (*indexed - found->second.position_m).norm() > kIndexTolerance_m)
-      index.move(id, found->second.position_m);
+      index.shift(id, found->second.position_m);
   }
   late_.clear();
+  index_.settle();
+  unused_index_.settle();
 }
 
 std::vector<model::LandmarkId> LandmarkMap::take_changed() {

@@ -98,7 +98,7 @@ class LandmarkMap {
   /// Takes all landmarks out, in order of id.
   std::vector<StoredLandmark> release();
   /// Moves a landmark (frame `map`). The index follows at once where it is off by kStaleness_m,
-  /// otherwise with the next catch_up().
+  /// otherwise with the next catch_up(); its triangles always with that.
   void move(model::LandmarkId id, const Eigen::Vector2d& position_m);
 
   /// The landmark of an id. Throws std::out_of_range where there is none.
@@ -118,7 +118,8 @@ class LandmarkMap {
   const constellation::ConstellationMap& unused_index() const { return unused_index_; }
   /// Whether the landmark is to be used. Passed over where there is no such landmark.
   void set_in_use(model::LandmarkId id, bool is_in_use);
-  /// Brings the index to within a centimetre, before a search by descriptors. O(what moved).
+  /// Brings the index to within a centimetre and its triangles up to date, before a search by
+  /// descriptors. O(what moved).
   void catch_up();
 
   /// Number of the map: upper 16 bit of the ids that it gives.
