@@ -29,7 +29,7 @@ constexpr double kLagMemory = 8000.0;
 /// shows a correlation.
 constexpr double kLeastLagDegrees = 300.0;
 constexpr double kLagSigmas = 6.0;
-/// Growth of the variogram to the longest lag up to which errors are seen to fade.
+/// Growth of the variogram to the longest lag from which on errors outlast what is compared.
 constexpr double kMostGrowth = 0.15;
 /// Weight of the stated variance, and of the whole kind for one range [degrees of freedom].
 constexpr double kStatedWeight = 4.0;
@@ -297,7 +297,7 @@ double DetectionNoise::repetition(LandmarkKind kind) const {
 
 /// Errors whose memory is longer than what is compared would pass for small ones.
 bool DetectionNoise::may_shrink(LandmarkKind kind) const {
-  return is_memory_seen(variogram(kind), kLag, kMostGrowth);
+  return !outlasts(variogram(kind), kLag, kMostGrowth);
 }
 
 double DetectionNoise::learned(std::size_t bin) const {

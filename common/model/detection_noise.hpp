@@ -50,7 +50,7 @@ struct ScanMotion {
 /// autocovariances. N scans weighted by it state the uncertainty that their mean truly has. Errors
 /// that all scans share (an offset of the mounting, the scale of ranges) are not seen; that is why
 /// a statement is trusted as long as the scans do not contradict it clearly, and why variances
-/// shrink only where errors are seen to fade within the lags that are compared.
+/// do not shrink where errors outlast the lags that are compared.
 class DetectionNoise {
  public:
   /// The stated covariances hold.

@@ -68,11 +68,11 @@ double white_noise_power(std::span<const LagVariance> lags, std::size_t unit_lag
   return (variance + 2.0 * sum) / unit_value;
 }
 
-bool is_memory_seen(std::span<const LagVariance> lags, std::size_t unit_lag, double most) {
+bool outlasts(std::span<const LagVariance> lags, std::size_t unit_lag, double most) {
   const auto unit = std::ranges::find(lags, unit_lag, &LagVariance::lag);
   if (unit == lags.end() || unit->degrees <= 0.0 || lags.back().degrees <= 0.0) return false;
   const double chance = std::sqrt(2.0 / unit->degrees + 2.0 / lags.back().degrees);
-  return lags.back().value < unit->value * (1.0 + most - 2.0 * chance);
+  return lags.back().value > unit->value * (1.0 + most + 2.0 * chance);
 }
 
 }  // namespace understory::model

@@ -112,6 +112,7 @@ EXPERIMENTS = (
     _loops("loops-strangers", _STRANGE_DRIVES, "--reckon --seed 401", 5),
     _eval("shared-errors", "shared-errors --data DATA --errors shared --seed 1 --jobs 2", 6,
           ("tree_maps", "stem_censuses", "pole_maps")),
+    _eval("few-landmarks", "few-landmarks --seeds 20 --first-seed 101 --config deploy/config/lidar --jobs 2", 2),
     _eval("returns", "returns --runs 12 --seed 13100 --jobs 2 --map DATA/tree_maps/longleaf.csv DATA/tree_maps/lansing.csv DATA/tree_maps/bei.csv", 10,
           ("tree_maps",)),
     _eval("loop-detectors", "loop-detectors --queries 250 --cloud-queries 60 --length-m 900 --seed 1 --jobs 2 --data DATA",

@@ -1,5 +1,7 @@
 """Places that are found again, loops and their detectors, maps that are merged, as Markdown tables."""
 
+import math
+
 from render import number, table
 
 
@@ -93,6 +95,20 @@ def shared_errors(document):
                   "keyframes", "doubled %", "ms a frame, first quarter", "last quarter"), lines) + [
         "", "Closures that were not accepted at once: "
         + ("; ".join(f"{count} {reason}" for reason, count in sorted(reasons.items())) or "none") + "."]
+
+
+def few_landmarks(document):
+    """One row of all drives: geometric means of ATE, and what became of keyframes and poses."""
+    rows = document["rows"]
+    total = lambda key: sum(row[key] for row in rows)
+    ate = lambda pick: number(math.exp(sum(math.log(pick(row)) for row in rows) / len(rows)), 3)
+    return table(("drives", "landmarks a scan", "keyframes accepted", "wrong", "SLAM_POSE ATE m", "of the worst drive", "mean NEES (3)", "coasting",
+                  "keyframes as they came m", "final map m", "EKF_POSE m", "odometry m"),
+                 [(len(rows), number(total("landmarks") / len(rows), 1), f"{total('accepted')} of {total('updates')}", total("wrong"),
+                   ate(lambda row: row["slam"]["ate_m"]), number(max(row["slam"]["ate_m"] for row in rows), 2),
+                   number(sum(row["slam"]["nees"] for row in rows) / len(rows), 2), f"{total('coasting')} of {sum(row['slam']['poses'] for row in rows)}",
+                   ate(lambda row: row["updates_ate_m"]), ate(lambda row: row["keyframes_ate_m"]), ate(lambda row: row["ekf"]["ate_m"]),
+                   ate(lambda row: row["odometry_ate_m"]))])
 
 
 def loop_detectors(document):

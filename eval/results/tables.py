@@ -66,6 +66,7 @@ SECTIONS = (
     ("loops-strangers", "Queries that have no match", None, render_places.loop_queries),
     ("shared-errors", "Detections that share errors from frame to frame", None, render_places.shared_errors),
     ("closures", "Wrong loop closures that agree, and ways to keep them out", None, render_closures.closures),
+    ("few-landmarks", "Two or three landmarks in a scan", None, render_places.few_landmarks),
     ("returns", "Drives that drift and come back near themselves", None, render_returns.returns),
     ("loop-detectors", "Loop detectors and verifiers", "named in the thesis on submaps, §2.4, without figures",
      render_places.loop_detectors),
