@@ -213,6 +213,7 @@ TEST_CASE("Landmarks at one true landmark are doubles, pair by pair", "[cli]") {
   for (int round = 0; round < 20; ++round) {
     std::vector<Eigen::Vector2d> trees;
     std::vector<Eigen::Vector2d> landmarks;
+    landmarks.reserve(90);
     for (int i = 0; i < 40; ++i) trees.emplace_back(area(random), area(random));
     for (int i = 0; i < 90; ++i) {
       const auto& tree = trees[static_cast<std::size_t>(i) % trees.size()];

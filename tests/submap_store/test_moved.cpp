@@ -1,5 +1,7 @@
 // Landmarks of the ground that move again and again.
+#include <algorithm>
 #include <map>
+#include <random>
 
 #include "services/submap_store/submap_store.hpp"
 #include "tests/map_file/map_fixture.hpp"
@@ -30,17 +32,35 @@ model::MapLandmark stem_at(std::uint64_t counter, double x_m) {
   return one;
 }
 
-}  // namespace
-
-TEST_CASE("landmarks that move are written each in its turn, new ones at once", "[submap_store]") {
-  constexpr std::size_t kMost = 7;
-  std::mt19937_64 random(5);
+/// A mapper's landmarks and the file's, as MAP_DELTA and the store tell them.
+class MovingGround {
+ public:
+  std::map<model::LandmarkId, double> held;     ///< x [m] by the mapper.
+  std::map<model::LandmarkId, double> written;  ///< In the file.
   submap_store::SubmapStore store;
-  std::map<model::LandmarkId, double> held;     // By the mapper.
-  std::map<model::LandmarkId, double> written;  // In the file.
-  std::uint64_t version = 0;
-  std::uint64_t next = 1;
-  const auto write = [&](std::size_t most) {
+
+  /// Some come, some go, some move.
+  void change(int round) {
+    model::MapDelta delta;
+    delta.utime = 1'000'000 * (round + 1);
+    delta.base_version = version_;
+    delta.version = ++version_;
+    for (std::uint64_t n = random_() % 3 + 1; n > 0; --n)
+      delta.added.push_back(stem_at(next_++, 0.01 * static_cast<double>(round)));
+    for (const auto& [id, x_m] : held) {
+      const auto what = random_() % 10;
+      if (what == 0) delta.removed.push_back(id);
+      if (what > 6) delta.moved.push_back(stem_at(id & 0xffffffff, x_m + 0.1));
+    }
+
+    for (const model::MapLandmark& one : delta.added) held[one.id] = one.position_m.x();
+    for (const model::MapLandmark& one : delta.moved) held[one.id] = one.position_m.x();
+    for (const model::LandmarkId id : delta.removed) held.erase(id);
+    store.take(delta);
+  }
+
+  /// Returns how many that the file had already were written.
+  std::size_t write(std::size_t most) {
     store.draw_moved(most);
     std::size_t moved = 0;
     for (const map_file::GroundChange& change : store.due().ground) {
@@ -52,36 +72,38 @@ TEST_CASE("landmarks that move are written each in its turn, new ones at once", 
     }
     store.written();
     return moved;
-  };
-
-  for (int round = 0; round < 200; ++round) {
-    if (round % 10 == 9) store.load(store.save());
-    model::MapDelta delta;
-    delta.utime = 1'000'000 * (round + 1);
-    delta.base_version = version;
-    delta.version = ++version;
-    for (std::uint64_t n = random() % 3 + 1; n > 0; --n)
-      delta.added.push_back(stem_at(next++, 0.01 * static_cast<double>(round)));
-    for (const auto& [id, x_m] : held) {
-      const auto what = random() % 10;
-      if (what == 0) delta.removed.push_back(id);
-      if (what > 6) delta.moved.push_back(stem_at(id & 0xffffffff, x_m + 0.1));
-    }
-    for (const model::MapLandmark& one : delta.added) held[one.id] = one.position_m.x();
-    for (const model::MapLandmark& one : delta.moved) held[one.id] = one.position_m.x();
-    for (const model::LandmarkId id : delta.removed) held.erase(id);
-    store.take(delta);
-
-    REQUIRE(write(kMost) <= kMost);
-    REQUIRE(written.size() == held.size());
-    for (const auto& [id, x_m] : held) REQUIRE(written.contains(id));
   }
-  REQUIRE(written != held);
+
+  bool has_written_all_ids() const {
+    return std::ranges::equal(
+        held, written, {}, [](const auto& one) { return one.first; },
+        [](const auto& one) { return one.first; });
+  }
+
+ private:
+  std::mt19937_64 random_{5};
+  std::uint64_t version_ = 0;
+  std::uint64_t next_ = 1;
+};
+
+}  // namespace
+
+TEST_CASE("landmarks that move are written each in its turn, new ones at once", "[submap_store]") {
+  constexpr std::size_t kMost = 7;
+  MovingGround ground;
+  for (int round = 0; round < 200; ++round) {
+    if (round % 10 == 9) ground.store.load(ground.store.save());
+    ground.change(round);
+    REQUIRE(ground.write(kMost) <= kMost);
+    REQUIRE(ground.has_written_all_ids());
+  }
+  REQUIRE(ground.written != ground.held);
 
   // Nothing waits longer than it takes to write all.
-  for (std::size_t rounds = held.size() / kMost + 1; rounds > 0; --rounds) (void)write(kMost);
-  CHECK(written == held);
-  CHECK(store.due().empty());
+  for (std::size_t rounds = ground.held.size() / kMost + 1; rounds > 0; --rounds)
+    (void)ground.write(kMost);
+  CHECK(ground.written == ground.held);
+  CHECK(ground.store.due().empty());
 }
 
 TEST_CASE("what has moved is in the file at the end", "[submap_store]") {
