@@ -212,6 +212,7 @@ TEST_CASE("Landmarks at one true landmark are doubles, pair by pair", "[cli]") {
   std::normal_distribution<double> near_m(0.0, 0.3);
   for (int round = 0; round < 20; ++round) {
     std::vector<Eigen::Vector2d> trees;
+    trees.reserve(40);
     std::vector<Eigen::Vector2d> landmarks;
     landmarks.reserve(90);
     for (int i = 0; i < 40; ++i) trees.emplace_back(area(random), area(random));
