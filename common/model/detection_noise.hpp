@@ -17,9 +17,9 @@ namespace understory::model {
 
 /// When stated covariances are replaced.
 struct DetectionNoiseParameters {
-  bool learn = true;            ///< False: covariances stay as stated.
-  double replace_above = 1.5;   ///< Factor of the variance from which understated ones grow.
-  double replace_below = 0.35;  ///< Factor of the variance below which overstated ones shrink.
+  bool learn = true;           ///< False: covariances stay as stated.
+  double replace_above = 1.5;  ///< Factor of the variance from which understated ones grow.
+  double replace_below = 0.6;  ///< Factor of the variance below which overstated ones shrink.
   double replace_corners_below = 0.6;  ///< The same of corners.
 };
 
