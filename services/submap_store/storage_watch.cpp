@@ -26,6 +26,7 @@ wire::Reason reason_of(map_file::Fault fault) {
       return wire::Reason::kInputRefused;
     case kUnreadable:
     case kOtherVersion:
+    case kUntrusted:
       break;
   }
   return wire::Reason::kFileUnusable;
