@@ -8,6 +8,8 @@
 #include "common/map_file/history.hpp"
 #include "common/map_file/map_rows.hpp"
 #include "common/map_file/schema.hpp"
+#include "common/map_file/schema_guard.hpp"
+#include "common/map_file/sql_text.hpp"
 #include "common/map_file/submap_rows.hpp"
 
 namespace understory::map_file {
@@ -29,11 +31,12 @@ void check_database(const Connection& connection, Findings& findings) {
                                    keys.text(0), keys.text(2)));
 }
 
+/// Definitions that are not as this version writes them, though they may do no harm.
 void check_schema(const Connection& connection, Findings& findings) {
   Statement find = connection.prepare("SELECT sql FROM sqlite_schema WHERE name = ?1");
   for (const SchemaObject& object : schema_objects(schema_version(connection))) {
     const bool is_there = find.bind(std::string_view(object.name)).step();
-    if (!is_there || find.text(0) != object.sql)
+    if (!is_there || !is_same_sql(object.sql, find.text(0)))
       findings.push_back(fmt::format("{}: {}", object.name,
                                      is_there ? "its definition was changed" : "is missing"));
   }
@@ -137,6 +140,9 @@ Findings findings_in(const Connection& connection) {
 
   part([&] { check_database(connection, findings); });
   part([&] { check_schema(connection, findings); });
+  part([&] {
+    for (const std::string& one : foreign_sql_in(connection)) findings.push_back(one);
+  });
   part([&] { check_registration(connection, findings); });
   for (const Layer& layer : kLayers) {
     part([&] { check_extent(connection, layer, findings); });

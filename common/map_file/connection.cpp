@@ -9,6 +9,7 @@
 #include <new>
 
 #include "common/map_file/geometry_functions.hpp"
+#include "common/map_file/schema_guard.hpp"
 
 namespace understory::map_file {
 namespace {
@@ -45,6 +46,8 @@ Diagnosis diagnosis_of(int code, int system_error, const std::string& message) {
       return {Fault::kUnreadable,
               fmt::format("cannot be opened ({})",
                           system_error != 0 ? std::strerror(system_error) : message)};
+    case SQLITE_AUTH:
+      return {Fault::kUntrusted, "a trigger or a view in it that is not ours would run"};
     case SQLITE_CONSTRAINT:
       return {Fault::kRefused, fmt::format("does not take this change ({})", message)};
     default:
@@ -52,15 +55,30 @@ Diagnosis diagnosis_of(int code, int system_error, const std::string& message) {
   }
 }
 
-void set_up(sqlite3* handle, Access access) {
+/// What sqlite.org/security.html advises for files of others; our statements need no more.
+void set_limits(sqlite3* handle) {
+  sqlite3_limit(handle, SQLITE_LIMIT_SQL_LENGTH, 1'000'000);
+  sqlite3_limit(handle, SQLITE_LIMIT_EXPR_DEPTH, 100);
+  sqlite3_limit(handle, SQLITE_LIMIT_COMPOUND_SELECT, 20);
+  sqlite3_limit(handle, SQLITE_LIMIT_VDBE_OP, 250'000);
+  sqlite3_limit(handle, SQLITE_LIMIT_ATTACHED, 1);
+  sqlite3_limit(handle, SQLITE_LIMIT_LIKE_PATTERN_LENGTH, 100);
+  sqlite3_limit(handle, SQLITE_LIMIT_TRIGGER_DEPTH, 10);
+  sqlite3_limit(handle, SQLITE_LIMIT_WORKER_THREADS, 0);
+}
+
+void set_up(sqlite3* handle) {
   sqlite3_extended_result_codes(handle, 1);
   sqlite3_busy_timeout(handle, 0);
   int ignored = 0;
   sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, &ignored);
-  // To read, nothing that a file brings along needs to run. To write, the layers' triggers must
-  // reach the R*Tree, which SQLite 3.40 allows to a schema that is trusted only.
-  const int is_trusted = access == Access::kWrite ? 1 : 0;
-  sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, is_trusted, &ignored);
+  // SQLite 3.40 lets triggers reach the R*Tree only where the schema is trusted, which it is after
+  // a look at it.
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, &ignored);
+  sqlite3_exec(handle, "PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0", nullptr, nullptr,
+               nullptr);
+  set_limits(handle);
+  deny_foreign_sql(handle);
 }
 
 }  // namespace
@@ -154,7 +172,7 @@ Connection::Connection(const std::filesystem::path& place, Access access,
   // An absolute path: a name that begins with "file:" would be taken for a URI.
   open(std::filesystem::absolute(place).string(),
        access == Access::kRead ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE);
-  set_up(handle_.get(), access);
+  set_up(handle_.get());
 }
 
 Connection::Connection(std::filesystem::path file) : file_(std::move(file)) {
@@ -191,6 +209,17 @@ std::int64_t Connection::number(std::string_view sql) const {
 std::string Connection::text(std::string_view sql) const {
   Statement statement = prepare(sql);
   return statement.step() ? statement.text(0) : std::string();
+}
+
+void Connection::trust_schema(bool is_trusted) const {
+  int ignored = 0;
+  sqlite3_db_config(handle_.get(), SQLITE_DBCONFIG_TRUSTED_SCHEMA, is_trusted ? 1 : 0, &ignored);
+}
+
+bool Connection::is_schema_trusted() const {
+  int is_trusted = 0;
+  sqlite3_db_config(handle_.get(), SQLITE_DBCONFIG_TRUSTED_SCHEMA, -1, &is_trusted);
+  return is_trusted != 0;
 }
 
 void Connection::fail() const {

@@ -95,8 +95,9 @@ class Statement {
 /// An open database. Statements refer to it: it stays where it is.
 class Connection {
  public:
-  /// Opens the existing file `place`, which errors call `file`; nothing is read yet. Views and
-  /// triggers that a file brings along reach nothing outside of it. Throws MapFileError.
+  /// Opens the existing file `place`, which errors call `file`; nothing is read yet. The schema is
+  /// not trusted, and statements in which triggers or views of others would run fail
+  /// (schema_guard.hpp). Throws MapFileError.
   Connection(const std::filesystem::path& place, Access access, std::filesystem::path file);
   /// An empty database in memory. Throws MapFileError.
   explicit Connection(std::filesystem::path file);
@@ -111,6 +112,12 @@ class Connection {
   std::int64_t number(std::string_view sql) const;
   /// First column of the first row; empty where there is no row.
   std::string text(std::string_view sql) const;
+
+  /// Whether triggers of the schema reach virtual tables, as those of the layers do; for a schema
+  /// that is ours only.
+  void trust_schema(bool is_trusted) const;
+  /// As trust_schema() was called last.
+  bool is_schema_trusted() const;
 
   /// The file's name for people.
   const std::filesystem::path& file() const { return file_; }

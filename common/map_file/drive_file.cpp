@@ -1,6 +1,7 @@
 #include "common/map_file/drive_file.hpp"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 
@@ -101,6 +102,21 @@ void DriveFile::make(const std::filesystem::path& file) {
 DriveFile::DriveFile(const std::filesystem::path& file, bool is_lasting)
     : connection_(open_to_write(file)) {
   if (!is_lasting) connection_->execute("PRAGMA synchronous = OFF");
+  struct ::stat found {};
+  if (::stat(file.c_str(), &found) != 0) return;
+  device_ = found.st_dev;
+  inode_ = found.st_ino;
+}
+
+void DriveFile::require_in_place() const {
+  struct ::stat found {};
+  const bool is_there = ::stat(file().c_str(), &found) == 0;
+  if (!is_there || found.st_dev != device_ || found.st_ino != inode_)
+    throw MapFileError(Fault::kUnreadable,
+                       fmt::format("{}: is not the file that was opened", file().string()));
+  const auto size = static_cast<std::uint64_t>(found.st_size);
+  if (size < largest_) connection_->damaged("it was cut");
+  largest_ = size;
 }
 
 DriveFile::~DriveFile() { leave(*connection_); }
@@ -133,7 +149,10 @@ void DriveFile::begin(std::uint32_t map_id, model::Utime utime) {
       .bind(drive_key::kOpen)
       .run();
   set_meta(*connection_, drive_key::kNewest, std::max(newest().value_or(utime), utime));
-  connection_->prepare("INSERT OR IGNORE INTO understory_maps VALUES (?1, ?2, ?3, ?4, '')")
+  connection_
+      ->prepare(
+          "INSERT OR IGNORE INTO understory_maps (map_id, name, created_utime, origin, checksum) "
+          "VALUES (?1, ?2, ?3, ?4, '')")
       .bind(std::int64_t{map_id}, std::string_view(file().stem().string()), std::int64_t{utime},
             std::string_view("a drive"))
       .run();
@@ -229,6 +248,10 @@ std::uint64_t DriveFile::size() const {
   return static_cast<std::uint64_t>(connection_->number(
       "SELECT (SELECT count(*) FROM landmarks) + (SELECT count(*) FROM trajectory) + "
       "(SELECT count(*) FROM existence_states)"));
+}
+
+std::optional<model::Submap> submap_in(const std::filesystem::path& file, const SubmapKey& key) {
+  return select_submap(*open_to_read(file), key);
 }
 
 void DriveFile::seal() {

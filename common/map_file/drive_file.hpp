@@ -41,6 +41,9 @@ class DriveFile {
 
   /// The file as it was given.
   const std::filesystem::path& file() const;
+  /// Throws Fault::kUnreadable where its name does not lead to it any more (moved away, something
+  /// else in its place), kDamaged where it was cut: what is written would be lost. O(1).
+  void require_in_place() const;
   /// Whether a drive may go on in it: nobody has changed its maps since a store sealed it.
   bool may_go_on() const;
   /// The newest stamp that was written [us]; none in an empty file.
@@ -82,7 +85,13 @@ class DriveFile {
   void begin(std::uint32_t map_id, model::Utime utime);
 
   std::unique_ptr<Connection> connection_;
+  std::uint64_t device_ = 0;  ///< It and `inode_` say which file it is.
+  std::uint64_t inode_ = 0;
+  mutable std::uint64_t largest_ = 0;  ///< Bytes that it has had; it never shrinks.
 };
+
+/// A submap of a drive's file that is not open, as DriveFile::get() gives it. Throws MapFileError.
+std::optional<model::Submap> submap_in(const std::filesystem::path& file, const SubmapKey& key);
 
 /// Whether a drive's file was left before it was sealed.
 bool is_open_drive(const Connection& connection);

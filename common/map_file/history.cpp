@@ -17,6 +17,7 @@
 
 #include "common/map_file/digest.hpp"
 #include "common/map_file/schema.hpp"
+#include "common/map_file/sql_text.hpp"
 #include "common/map_file/submap_tables.hpp"
 
 namespace understory::map_file {
@@ -212,8 +213,14 @@ void undo(const Connection& connection, std::uint64_t number) {
 
 std::unique_ptr<Connection> recorded_content(const Connection& connection) {
   auto recorded = std::make_unique<Connection>(connection.file());
+  Statement made =
+      connection.prepare("SELECT sql FROM sqlite_schema WHERE type = 'table' AND name = ?1");
   for (const SchemaObject& object : schema_objects()) {
-    if (is_content(object.name)) recorded->execute(object.sql);
+    if (!is_content(object.name)) continue;
+    // Changes since then have the columns that another program has added.
+    const bool is_there = made.bind(std::string_view(object.name)).step();
+    const std::string theirs = is_there ? made.text(0) : std::string();
+    recorded->execute(adds_plain_columns(object.sql, theirs) ? theirs : object.sql);
   }
 
   Statement row = connection.prepare(std::string(kSelectChanges) + "ORDER BY number");

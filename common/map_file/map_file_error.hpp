@@ -15,6 +15,8 @@ enum class Fault {
   kReadOnly,      ///< It was to be changed and cannot be.
   kFull,          ///< There is no room on the device. Nothing was changed.
   kDamaged,       ///< Its content is not what was written.
+  kUntrusted,     ///< It was to be changed, and SQL in it that is not ours would act then. Nothing
+                  ///< was changed.
   kRefused,  ///< What was to be done makes no sense: a map or a change that it has not, a value
              ///< that a map cannot have. Nothing was changed.
 };

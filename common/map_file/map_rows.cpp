@@ -133,7 +133,10 @@ void insert_map(const Connection& connection, const StoredMap& map) {
     throw MapFileError(Fault::kRefused, fmt::format("{}: map {} is not stored: {}",
                                                     connection.file().string(), map.map_id, fault));
 
-  connection.prepare("INSERT INTO understory_maps VALUES (?1, ?2, ?3, ?4, '')")
+  connection
+      .prepare(
+          "INSERT INTO understory_maps (map_id, name, created_utime, origin, checksum) VALUES (?1, "
+          "?2, ?3, ?4, '')")
       .bind(std::int64_t{map.map_id}, std::string_view(map.name), std::int64_t{map.created_utime},
             std::string_view(map.origin))
       .run();

@@ -12,6 +12,7 @@
 #include "common/io/data_error.hpp"
 #include "common/io/output_file.hpp"
 #include "common/map_file/schema.hpp"
+#include "common/map_file/schema_guard.hpp"
 
 namespace understory::map_file {
 namespace {
@@ -55,9 +56,7 @@ bool can_be_written(const fs::path& file) {
          ::faccessat(AT_FDCWD, folder.c_str(), W_OK, AT_EACCESS) == 0;
 }
 
-void set_keys_and_checks(const Connection& connection) {
-  connection.execute("PRAGMA foreign_keys = ON; PRAGMA cell_size_check = ON");
-}
+void check_keys(const Connection& connection) { connection.execute("PRAGMA foreign_keys = ON"); }
 
 /// The user's mask decides, as for any other file.
 void give_usual_rights(int descriptor) {
@@ -103,7 +102,7 @@ std::unique_ptr<Connection> open_to_read(const fs::path& file) {
   }
 
   auto connection = std::make_unique<Connection>(file, Access::kRead, file);
-  set_keys_and_checks(*connection);
+  check_keys(*connection);
   connection->execute("BEGIN");
   verify_schema(*connection);
   return connection;
@@ -114,11 +113,12 @@ std::unique_ptr<Connection> open_to_write(const fs::path& file) {
   auto connection = std::make_unique<Connection>(file, Access::kWrite, file);
   // Before the first look at it: then the log's index is in memory, and locks stay.
   connection->execute("PRAGMA locking_mode = EXCLUSIVE");
-  set_keys_and_checks(*connection);
+  check_keys(*connection);
   // A file that is not ours is not touched.
   verify_schema(*connection);
   if (sqlite3_db_readonly(connection->handle(), "main") != 0)
     cannot(Fault::kReadOnly, connection->file(), "it cannot be written");
+  require_own_sql(*connection);
 
   connection->execute("PRAGMA synchronous = FULL");
   if (connection->text("PRAGMA journal_mode = WAL") != "wal")

@@ -15,7 +15,8 @@ std::unique_ptr<Connection> open_to_read(const std::filesystem::path& file);
 
 /// Opens a map file for this process alone: locked against all others until the connection goes,
 /// with a write-ahead log that is on the device when a transaction ends. A file of an older schema
-/// becomes one of the current one. Throws MapFileError.
+/// becomes one of the current one; one with SQL of others that would act is not touched
+/// (schema_guard.hpp). Throws MapFileError.
 std::unique_ptr<Connection> open_to_write(const std::filesystem::path& file);
 
 /// Brings the write-ahead log into a file that was opened to write, which is then a single file

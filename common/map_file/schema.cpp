@@ -297,6 +297,7 @@ std::vector<SchemaObject> schema_objects(std::int64_t version) {
 }
 
 void create_schema(const Connection& connection) {
+  connection.trust_schema(true);
   connection.execute(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}",
                                  kGeoPackage, kGeoPackageVersion));
   for (const SchemaObject& object : schema_objects()) connection.execute(object.sql);

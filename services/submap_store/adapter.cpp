@@ -134,30 +134,62 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
   }
 
   /// Works on the drive's file. What is wrong with it is told once, in HEALTH as long as it lasts,
-  /// and the drive goes on; false.
+  /// and the drive goes on; false. A file that turns out to be damaged is passed over, and the work
+  /// is done in the next one.
   template <class Work>
   bool with_file(model::Utime now, const std::string& channel, const Work& work) {
     if (next_try_ >= 0 && now >= 0 && now < next_try_ && now >= next_try_ - kTryAgain_us)
       return false;
-    try {
-      if (!folder_) folder_ = std::make_unique<DriveFolder>(parameters_.file);
-      work(folder_->at(now));
-      next_try_ = -1;
-      watch_.succeeded();
-    } catch (const MapFileError& error) {
-      fail(error, now, channel);
+    bool is_done = false;
+    constexpr int kFiles = 2;
+    for (int tries = 0; tries < kFiles && !is_done; ++tries) {
+      is_done = worked(now, channel, work);
+      if (next_try_ >= 0) break;
     }
     for (const bus::WatchedCondition& one : watch_.conditions()) node_->show(one);
-    return next_try_ < 0;
+    return is_done;
   }
 
-  void fail(const MapFileError& error, model::Utime now, const std::string& channel) {
+  template <class Work>
+  bool worked(model::Utime now, const std::string& channel, const Work& work) {
+    try {
+      if (!folder_) folder_ = std::make_unique<DriveFolder>(parameters_.file);
+      DriveFile& file = folder_->at(now);
+      next_try_ = -1;
+      tell_passed_over(now, channel);
+      work(file);
+      watch_.succeeded(now);
+      return true;
+    } catch (const MapFileError& error) {
+      return fail(error, now, channel);
+    } catch (const std::filesystem::filesystem_error& error) {
+      return fail(MapFileError(Fault::kUnreadable, error.what()), now, channel);
+    }
+  }
+
+  /// What the next file lacks is asked for.
+  void tell_passed_over(model::Utime now, const std::string& channel) {
+    for (const PassedOver& one : folder_->take_passed_over()) {
+      node_->report(reason_of(one.fault), one.line, channel);
+      watch_.passed_over(one.fault, now);
+      stage_.begin_file();
+    }
+  }
+
+  /// Whether the work is done all the same: what is wrong with one message is nothing wrong with
+  /// the file.
+  bool fail(const MapFileError& error, model::Utime now, const std::string& channel) {
     node_->report(reason_of(error.fault()), error.what(), channel);
-    // What is wrong with one message is nothing wrong with the file.
-    if (error.fault() == Fault::kRefused) return;
+    if (error.fault() == Fault::kRefused) return true;
     watch_.failed(error.fault());
-    folder_->close();
-    next_try_ = now + kTryAgain_us;
+    const bool is_damaged = error.fault() == Fault::kDamaged || error.fault() == Fault::kForeign;
+    if (is_damaged && folder_->current() != nullptr) {
+      folder_->give_up(error);
+    } else {
+      folder_->close();
+      next_try_ = now + kTryAgain_us;
+    }
+    return false;
   }
 
   /// Confirmed when it is on the device, and again whenever it comes again.
@@ -182,14 +214,17 @@ class StoreAdapter : public bus::Adapter, public bus::Device {
       std::optional<model::Submap> found;
       const bool could_look = with_file(query.utime, channels_.submap_query, [&](DriveFile& file) {
         found = file.get({query.map_id, id});
+        if (!found) found = folder_->find_passed_over({query.map_id, id});
       });
       if (found) {
         found->utime = query.utime;
         replies_.publish(*found);
       } else if (could_look) {
-        node_->report(wire::Reason::kInputRefused,
-                      fmt::format("submap {} of map {} was never stored here", id, query.map_id),
-                      channels_.submap_query);
+        node_->report(
+            wire::Reason::kInputRefused,
+            fmt::format("submap {} of map {} is in no file of this drive that can be read", id,
+                        query.map_id),
+            channels_.submap_query);
       }
     }
   }

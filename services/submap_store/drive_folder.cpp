@@ -7,12 +7,16 @@
 #include <cstdio>
 #include <cstdlib>
 #include <stdexcept>
+#include <string_view>
+#include <utility>
 
 namespace understory::submap_store {
 namespace {
 
 namespace fs = std::filesystem;
 using map_file::DriveFile;
+using map_file::Fault;
+using map_file::MapFileError;
 using Clock = std::chrono::steady_clock;
 
 /// Stamps of two messages of one drive may come so much out of order [us].
@@ -20,14 +24,40 @@ constexpr model::Utime kDisorder_us = 1'000'000;
 /// Submaps that are drawn between two looks at the clock.
 constexpr std::size_t kDrawnTogether = 20;
 
-/// Number in the name of a drive's file; 0 for other files.
+constexpr const char* kSetAside = ".set-aside";
+
+/// Number in the name of a drive's file, also of one that was set aside: numbers are given once. 0
+/// for other files.
 int number_in(const fs::path& file) {
   int number = 0;
   int end = 0;
   const std::string name = file.filename().string();
-  const bool matches = std::sscanf(name.c_str(), "drive-%d.gpkg%n", &number, &end) == 1 &&
-                       static_cast<std::size_t>(end) == name.size();
-  return matches ? std::max(number, 0) : 0;
+  if (std::sscanf(name.c_str(), "drive-%8d.gpkg%n", &number, &end) != 1 || end == 0) return 0;
+  const std::string_view rest = std::string_view(name).substr(static_cast<std::size_t>(end));
+  return rest.empty() || rest.starts_with(kSetAside) ? std::max(number, 0) : 0;
+}
+
+/// Whether a drive goes on in another file. One that others have open, or for which there is no
+/// room, may be gone on in a second later.
+bool is_passed_over(Fault fault) {
+  return fault != Fault::kInUse && fault != Fault::kFull && fault != Fault::kRefused;
+}
+
+/// A map of other people keeps its name.
+bool is_set_aside(Fault fault) { return fault == Fault::kDamaged || fault == Fault::kForeign; }
+
+/// Renames it together with what SQLite keeps beside it, the file itself last. Its name then: as it
+/// was where it cannot be renamed.
+fs::path set_aside(const fs::path& file) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return file;
+  fs::path aside = file.string() + kSetAside;
+  for (int i = 2; fs::exists(fs::symlink_status(aside, error)); ++i)
+    aside = fmt::format("{}{}-{}", file.string(), kSetAside, i);
+  for (const char* const suffix : {"-wal", "-journal"})
+    fs::rename(file.string() + suffix, aside.string() + suffix, error);
+  fs::rename(file, aside, error);
+  return error ? file : aside;
 }
 
 fs::path temporary_folder() {
@@ -62,35 +92,98 @@ int DriveFolder::last_number() const {
        entry.increment(error))
     last = std::max(last, number_in(entry->path()));
   if (error)
-    throw map_file::MapFileError(
-        map_file::Fault::kUnreadable,
-        fmt::format("{}: cannot be read: {}", folder_.string(), error.message()));
+    throw MapFileError(Fault::kUnreadable,
+                       fmt::format("{}: cannot be read: {}", folder_.string(), error.message()));
   return last;
 }
 
 DriveFile& DriveFolder::at(model::Utime utime) {
-  if (file_) return *file_;
+  if (file_) {
+    try {
+      file_->require_in_place();
+      return *file_;
+    } catch (const MapFileError& fault) {
+      give_up(fault);
+    }
+  }
+  make_folder();
+  if (!open_last(utime)) make_next();
+  return *file_;
+}
+
+void DriveFolder::make_folder() const {
   std::error_code error;
   fs::create_directories(folder_, error);
   if (error)
-    throw map_file::MapFileError(
-        map_file::Fault::kReadOnly,
-        fmt::format("{}: cannot be made: {}", folder_.string(), error.message()));
+    throw MapFileError(Fault::kReadOnly,
+                       fmt::format("{}: cannot be made: {}", folder_.string(), error.message()));
+}
 
+/// Opens this drive's file, or the folder's last one where it may be; else false. One that is
+/// passed over has the next one open in its place.
+bool DriveFolder::open_last(model::Utime utime) {
   const bool is_same_drive = number_.has_value();
   const int last = is_same_drive ? *number_ : last_number();
-  if (last > 0 && fs::exists(name_of(last))) {
+  std::error_code ignored;
+  const bool is_there = last > 0 && fs::exists(fs::symlink_status(name_of(last), ignored));
+  if (!is_there && !given_up_) return false;
+
+  try {
+    if (given_up_) throw MapFileError(*given_up_);
     file_ = std::make_unique<DriveFile>(name_of(last), !is_temporary_);
     if (!is_same_drive && !may_go_on_at(utime)) begin_drive();
+  } catch (const MapFileError& fault) {
+    file_.reset();
+    if (!is_passed_over(fault.fault())) throw;
+    pass_over(last, fault);
   }
-  if (!file_) {
-    const int number = is_same_drive ? last : last_number() + 1;
-    DriveFile::make(name_of(number));
-    file_ = std::make_unique<DriveFile>(name_of(number), !is_temporary_);
-    number_ = number;
+  if (file_) number_ = number_in(file_->file());
+  return file_ != nullptr;
+}
+
+void DriveFolder::make_next() {
+  const int number = number_ ? *number_ : last_number() + 1;
+  DriveFile::make(name_of(number));
+  file_ = std::make_unique<DriveFile>(name_of(number), !is_temporary_);
+  number_ = number;
+}
+
+/// Nothing is given up before there is another file: a device that fails as a whole fails here,
+/// too, and then the drive goes on in its file as soon as it can.
+void DriveFolder::pass_over(int number, const MapFileError& fault) {
+  const auto own_number = std::exchange(number_, std::nullopt);
+  try {
+    make_next();
+  } catch (const MapFileError&) {
+    number_ = own_number;
+    throw MapFileError(fault);
   }
-  number_ = number_in(file_->file());
-  return *file_;
+  given_up_.reset();
+
+  const fs::path file = name_of(number);
+  const fs::path aside = is_set_aside(fault.fault()) ? set_aside(file) : file;
+  if (own_number) earlier_.push_back(aside);
+  passed_over_.push_back(
+      {fault.fault(),
+       fmt::format("{}; {}the drive goes on in {}", fault.what(),
+                   aside == file ? "" : fmt::format("it is {} now, ", aside.filename().string()),
+                   file_->file().filename().string())});
+}
+
+void DriveFolder::give_up(const MapFileError& fault) {
+  file_.reset();
+  given_up_ = fault;
+}
+
+std::optional<model::Submap> DriveFolder::find_passed_over(const map_file::SubmapKey& key) const {
+  for (const fs::path& file : earlier_) {
+    try {
+      if (auto found = map_file::submap_in(file, key)) return found;
+    } catch (const MapFileError&) {
+      // It was told of when it was passed over.
+    }
+  }
+  return std::nullopt;
 }
 
 bool DriveFolder::may_go_on_at(model::Utime utime) const {
@@ -104,6 +197,8 @@ bool DriveFolder::may_go_on_at(model::Utime utime) const {
 void DriveFolder::begin_drive() {
   (void)finish();
   number_ = last_number() + 1;
+  given_up_.reset();
+  earlier_.clear();
 }
 
 bool DriveFolder::finish() noexcept {

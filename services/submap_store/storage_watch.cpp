@@ -3,6 +3,9 @@
 namespace understory::submap_store {
 namespace {
 
+/// Message time for which HEALTH has a file that was passed over.
+constexpr model::Utime kTold_us = 60'000'000;
+
 bus::WatchedCondition watched(wire::Reason reason, std::string_view text) {
   return {reason, text, "SUBMAP", bus::Condition({1, 1})};
 }
@@ -26,6 +29,7 @@ wire::Reason reason_of(map_file::Fault fault) {
       return wire::Reason::kInputRefused;
     case kUnreadable:
     case kOtherVersion:
+    case kUntrusted:
       break;
   }
   return wire::Reason::kFileUnusable;
@@ -34,21 +38,29 @@ wire::Reason reason_of(map_file::Fault fault) {
 StorageWatch::StorageWatch()
     : conditions_{
           watched(wire::Reason::kDiskFull, "no room for the map: nothing is stored"),
-          watched(wire::Reason::kFileReadOnly, "the map cannot be written: nothing is stored"),
-          watched(wire::Reason::kFileDamaged, "the map's file is damaged: nothing is stored"),
+          watched(wire::Reason::kFileReadOnly,
+                  "the map's file cannot be written: nothing is stored in it"),
+          watched(wire::Reason::kFileDamaged,
+                  "the map's file is damaged: nothing is stored in it any more"),
           watched(wire::Reason::kFileForeign,
-                  "another program's file has the map's name: nothing is stored"),
+                  "another program's file has the map's name: nothing is stored in it"),
           watched(wire::Reason::kFileInUse, "another process has the map open: nothing is stored"),
           watched(wire::Reason::kFileUnusable,
-                  "the map's file cannot be used: nothing is stored")} {}
+                  "the map's file cannot be used: nothing is stored in it")} {}
 
 void StorageWatch::failed(map_file::Fault fault) {
   const wire::Reason reason = reason_of(fault);
   for (bus::WatchedCondition& one : conditions_) one.condition.add(one.reason == reason);
 }
 
-void StorageWatch::succeeded() {
-  for (bus::WatchedCondition& one : conditions_) one.condition.add(false);
+void StorageWatch::passed_over(map_file::Fault fault, model::Utime now) {
+  told_ = reason_of(fault);
+  told_since_ = now;
+}
+
+void StorageWatch::succeeded(model::Utime now) {
+  if (told_ && (now < told_since_ || now - told_since_ > kTold_us)) told_.reset();
+  for (bus::WatchedCondition& one : conditions_) one.condition.add(told_ == one.reason);
 }
 
 }  // namespace understory::submap_store

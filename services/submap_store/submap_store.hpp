@@ -69,6 +69,9 @@ class SubmapStore {
   /// The file is another one, without anything in it: the ground must be written whole.
   void begin_drive();
 
+  /// The drive goes on in another file: the ground must be written whole.
+  void begin_file() { ground_.want_whole(); }
+
   /// So many landmarks of the ground that have moved are due, of all that wait each in its turn.
   void draw_moved(std::size_t most) { ground_.draw(most); }
   /// What is to be written, without the landmarks of the ground that have moved and wait.

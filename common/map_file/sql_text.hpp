@@ -1,0 +1,23 @@
+// Definitions of a schema, compared by what they say.
+#pragma once
+
+#include <string_view>
+
+namespace understory::map_file {
+
+/// Whether two definitions are the same to SQLite by their words alone: spaces, the case of words,
+/// and quotes around names that are no keywords do not count. Comments count as a difference.
+bool is_same_sql(std::string_view ours, std::string_view theirs);
+
+/// Whether the table `theirs` is `ours` with columns added at its end as other programs add
+/// attributes: name, type, NOT NULL, a constant as DEFAULT. Computed columns, checks, keys,
+/// references and collations are none of these.
+bool adds_plain_columns(std::string_view ours, std::string_view theirs);
+
+/// Whether it defines an R*Tree as GeoPackage has them, of any name.
+bool is_geopackage_index(std::string_view sql);
+
+/// Whether it defines a virtual table.
+bool is_virtual_table(std::string_view sql);
+
+}  // namespace understory::map_file
