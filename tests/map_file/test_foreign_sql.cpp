@@ -203,6 +203,13 @@ TEST_CASE_METHOD(ForeignSql, "names of others are one line of text", "[map_file]
 }
 
 TEST_CASE_METHOD(ForeignSql, "what QGIS and GDAL add may stay", "[map_file]") {
+  const std::string styles =
+      "CREATE TABLE layer_styles (id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, f_table_name "
+      "TEXT(256), styleQML TEXT, update_time DATETIME DEFAULT "
+      "(strftime('%Y-%m-%dT%H:%M:%fZ','now')))";
+  const std::string marks =
+      "CREATE TABLE marks (id INTEGER PRIMARY KEY, landmark INTEGER REFERENCES "
+      "landmarks(landmark_id) ON DELETE SET NULL)";
   const std::string columns =
       "ALTER TABLE landmarks ADD COLUMN \"my height\" REAL; "
       "ALTER TABLE landmarks ADD \"who\" TEXT(12) NOT NULL DEFAULT 'me'; "
@@ -211,17 +218,14 @@ TEST_CASE_METHOD(ForeignSql, "what QGIS and GDAL add may stay", "[map_file]") {
   const std::vector<std::string> additions{
       kNotes + "CREATE TRIGGER notes_count AFTER INSERT ON notes BEGIN DELETE FROM landmarks; END",
       kNotes + "CREATE VIRTUAL TABLE \"rtree_notes_geom\" USING rtree(id, minx, maxx, miny, maxy)",
-      "CREATE TABLE layer_styles (id INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, f_table_name "
-      "TEXT(256), styleQML TEXT, update_time DATETIME DEFAULT "
-      "(strftime('%Y-%m-%dT%H:%M:%fZ','now')))",
+      styles,
       "CREATE VIEW thick AS SELECT * FROM landmarks WHERE diameter_m > 0.5",
       "CREATE INDEX \"landmarks_kind\" ON \"landmarks\"(\"kind\")",
       "ALTER TABLE landmarks ADD COLUMN remark TEXT(20)",
       columns,
       "ALTER TABLE trajectory ADD COLUMN remark TEXT",
       "ALTER TABLE understory_maps ADD COLUMN owner TEXT",
-      "CREATE TABLE marks (id INTEGER PRIMARY KEY, landmark INTEGER REFERENCES "
-      "landmarks(landmark_id) ON DELETE SET NULL)"};
+      marks};
   std::string all;
   for (const std::string& one : additions) check_stays(one);
 
