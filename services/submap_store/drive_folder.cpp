@@ -124,12 +124,15 @@ void DriveFolder::make_folder() const {
 bool DriveFolder::open_last(model::Utime utime) {
   const bool is_same_drive = number_.has_value();
   const int last = is_same_drive ? *number_ : last_number();
+  if (given_up_) {
+    pass_over(last, MapFileError(*given_up_));
+    return true;
+  }
   std::error_code ignored;
   const bool is_there = last > 0 && fs::exists(fs::symlink_status(name_of(last), ignored));
-  if (!is_there && !given_up_) return false;
+  if (!is_there) return false;
 
   try {
-    if (given_up_) throw MapFileError(*given_up_);
     file_ = std::make_unique<DriveFile>(name_of(last), !is_temporary_);
     if (!is_same_drive && !may_go_on_at(utime)) begin_drive();
   } catch (const MapFileError& fault) {
@@ -180,7 +183,7 @@ std::optional<model::Submap> DriveFolder::find_passed_over(const map_file::Subma
     try {
       if (auto found = map_file::submap_in(file, key)) return found;
     } catch (const MapFileError&) {
-      // It was told of when it was passed over.
+      // Its fault was reported when it was passed over.
     }
   }
   return std::nullopt;

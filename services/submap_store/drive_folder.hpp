@@ -73,7 +73,7 @@ class DriveFolder {
   std::optional<int> number_;  ///< Of this drive's file.
   std::unique_ptr<map_file::DriveFile> file_;
   std::optional<map_file::MapFileError> given_up_;  ///< Why this drive's file is not opened again.
-  std::vector<PassedOver> passed_over_;             ///< Not told of yet.
+  std::vector<PassedOver> passed_over_;             ///< Not reported yet.
   std::vector<std::filesystem::path> earlier_;  ///< Files of this drive that it went on without.
 };
 

@@ -4,7 +4,7 @@ namespace understory::submap_store {
 namespace {
 
 /// Message time for which HEALTH has a file that was passed over.
-constexpr model::Utime kTold_us = 60'000'000;
+constexpr model::Utime kShown_us = 60'000'000;
 
 bus::WatchedCondition watched(wire::Reason reason, std::string_view text) {
   return {reason, text, "SUBMAP", bus::Condition({1, 1})};
@@ -54,13 +54,14 @@ void StorageWatch::failed(map_file::Fault fault) {
 }
 
 void StorageWatch::passed_over(map_file::Fault fault, model::Utime now) {
-  told_ = reason_of(fault);
-  told_since_ = now;
+  passed_over_ = reason_of(fault);
+  passed_over_at_ = now;
 }
 
 void StorageWatch::succeeded(model::Utime now) {
-  if (told_ && (now < told_since_ || now - told_since_ > kTold_us)) told_.reset();
-  for (bus::WatchedCondition& one : conditions_) one.condition.add(told_ == one.reason);
+  if (passed_over_ && (now < passed_over_at_ || now - passed_over_at_ > kShown_us))
+    passed_over_.reset();
+  for (bus::WatchedCondition& one : conditions_) one.condition.add(passed_over_ == one.reason);
 }
 
 }  // namespace understory::submap_store

@@ -32,8 +32,8 @@ class StorageWatch {
 
  private:
   std::array<bus::WatchedCondition, 6> conditions_;
-  std::optional<wire::Reason> told_;  ///< Of the file that was passed over last.
-  model::Utime told_since_ = 0;
+  std::optional<wire::Reason> passed_over_;  ///< Of the file that was passed over last.
+  model::Utime passed_over_at_ = 0;
 };
 
 }  // namespace understory::submap_store

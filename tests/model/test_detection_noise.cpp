@@ -162,6 +162,7 @@ TEST_CASE("Noise shrinks only where its memory is shorter than what is compared"
       std::normal_distribution<double> normal(0.0, std::sqrt(0.1) * 0.1);
       std::vector<Eigen::Vector2d> errors(20);
       for (auto& error : errors) error = {normal(random), normal(random)};
+
       int shrunk = 0;
       for (int k = 0; k < 600; ++k) {
         auto scan = drive.next(0.1, [](double) { return 0.0; });
@@ -170,9 +171,11 @@ TEST_CASE("Noise shrinks only where its memory is shorter than what is compared"
           error = kept * error + fresh * Eigen::Vector2d(normal(random), normal(random));
         for (std::size_t i = 0; i < scan.detections.size(); ++i)
           scan.detections[i].position_m.head<2>() += errors[drive.tracks[i] - 1];
+
         noise.add(scan, drive.tracks);
         if (k >= 200 && noise.factor(kTrunk, 8.0) < 1.0) ++shrunk;
       }
+
       CAPTURE(kept, seed, shrunk, noise.factor(kTrunk, 8.0));
       if (kept > 0.9) {
         CHECK(shrunk == 0);
