@@ -10,6 +10,8 @@
 #include <utility>
 
 #include "common/bus/arrival_queue.hpp"
+#include "common/bus/bulk_group.hpp"
+#include "common/bus/lcm_group.hpp"
 #include "common/bus/udpm_receiver.hpp"
 
 namespace understory::bus {
@@ -62,70 +64,78 @@ std::int64_t granted_receive_buffer(std::int64_t wanted_bytes) {
 
 class LiveBus::Impl {
  public:
-  explicit Impl(const std::string& url)
-      : url_(complete_lcm_url(url)), lcm_(lcm_create(url_.c_str())) {
-    if (lcm_ == nullptr) throw BusError(url_ + ": cannot join this bus");
-    try {
-      if (is_udpm_url(url_)) udpm_ = parse_udpm_url(url_);
-      buffer_.wanted_bytes = udpm_ ? udpm_->receive_buffer_bytes : 0;
-      buffer_.granted_bytes = udpm_ ? granted_receive_buffer(buffer_.wanted_bytes) : 0;
-    } catch (...) {
-      lcm_destroy(lcm_);
-      throw;
-    }
+  Impl(const std::string& url, Groups groups, double bulk_bytes_per_s)
+      : main_(complete_lcm_url(url)), pacer_(bulk_bytes_per_s) {
+    if (!main_.udpm()) return;
+    if (groups == Groups::kWithBulk) bulk_url_ = bulk_lcm_url(main_.url());
+    buffer_.wanted_bytes = main_.udpm()->receive_buffer_bytes;
+    buffer_.granted_bytes = granted_receive_buffer(buffer_.wanted_bytes);
   }
-  ~Impl() {
-    receiver_.reset();
-    lcm_destroy(lcm_);
+
+  std::optional<wire::Refusal> publish(std::string_view channel,
+                                       std::span<const std::uint8_t> bytes) {
+    if (!is_in_bulk(channel)) return main_.publish(channel, bytes);
+    pacer_.wait_to_send(bytes.size());
+    return bulk().publish(channel, bytes);
   }
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
 
   void subscribe(std::string_view channel, std::size_t queue_size, Handler handler) {
     queue_.subscribe(channel, queue_size, std::move(handler));
-    if (udpm_) return join();
+    if (main_.udpm()) return join(is_in_bulk(channel) ? bulk() : main_);
     if (!channels_.emplace(channel).second) return;
     lcm_subscription_t* subscription =
-        lcm_subscribe(lcm_, escaped(channel).c_str(), &Impl::take_in, this);
+        lcm_subscribe(main_.lcm(), escaped(channel).c_str(), &Impl::take_in, this);
     if (subscription == nullptr)
-      throw BusError(url_ + ": cannot subscribe " + std::string(channel));
+      throw BusError(main_.url() + ": cannot subscribe " + std::string(channel));
     lcm_subscription_set_queue_capacity(subscription, liblcm_capacity(queue_size));
   }
 
   void subscribe_all(std::size_t queue_size, Handler handler) {
-    if (!udpm_) throw BusError(url_ + ": all channels can be had of udpm:// only");
+    if (!main_.udpm()) throw BusError(main_.url() + ": all channels can be had of udpm:// only");
     queue_.subscribe_all(queue_size, std::move(handler));
-    join();
+    join(main_);
+    if (!bulk_url_.empty()) join(bulk());
   }
 
   bool handle_one(int timeout_ms) {
-    if (udpm_) return queue_.handle_one(timeout_ms);
-    for (int i = 0; i < kMostTakenAtOnce && lcm_handle_timeout(lcm_, 0) > 0; ++i) {
+    if (main_.udpm()) return queue_.handle_one(timeout_ms);
+    for (int i = 0; i < kMostTakenAtOnce && lcm_handle_timeout(main_.lcm(), 0) > 0; ++i) {
     }
-    if (queue_.empty() && timeout_ms > 0) lcm_handle_timeout(lcm_, timeout_ms);
+    if (queue_.empty() && timeout_ms > 0) lcm_handle_timeout(main_.lcm(), timeout_ms);
     return queue_.handle_one(0);
   }
 
   int file_descriptor() const {
     // With udpm:// this call of liblcm's would open its own receiving socket.
-    return udpm_ ? queue_.file_descriptor() : lcm_get_fileno(lcm_);
+    return main_.udpm() ? queue_.file_descriptor() : lcm_get_fileno(main_.lcm());
   }
 
-  const std::string& url() const { return url_; }
-  lcm_t* lcm() const { return lcm_; }
+  const std::string& url() const { return main_.url(); }
   const ArrivalQueue& queue() const { return queue_; }
   ReceiveBuffer buffer() const { return buffer_; }
   DatagramFaults faults() const { return receiver_ ? receiver_->faults() : DatagramFaults{}; }
 
  private:
-  /// Who only sends is not sent everything that others send.
-  void join() {
-    if (receiver_) return;
-    receiver_ = std::make_unique<UdpmReceiver>(
-        *udpm_, url_, [this](std::string_view channel) { return queue_.takes(channel); },
-        [this](std::string_view channel, std::span<const std::uint8_t> bytes,
-               std::int64_t received_us) { queue_.push(channel, bytes, received_us); });
-    buffer_.granted_bytes = receiver_->granted_bytes();
+  bool is_in_bulk(std::string_view channel) const {
+    return !bulk_url_.empty() && is_bulk_channel(channel);
+  }
+  LcmGroup& bulk() {
+    if (!bulk_) bulk_.emplace(bulk_url_);
+    return *bulk_;
+  }
+
+  /// A process that only sends is not sent everything that others send.
+  void join(LcmGroup& group) {
+    if (group.is_joined) return;
+    if (!receiver_) {
+      receiver_ = std::make_unique<UdpmReceiver>(
+          [this](std::string_view channel) { return queue_.takes(channel); },
+          [this](std::string_view channel, std::span<const std::uint8_t> bytes,
+                 std::int64_t received_us) { queue_.push(channel, bytes, received_us); });
+    }
+    const std::int64_t granted_bytes = receiver_->join(*group.udpm(), group.url());
+    group.is_joined = true;
+    if (&group == &main_) buffer_.granted_bytes = granted_bytes;
   }
 
   /// Only copies: handlers run later, outside liblcm's frames, where they may throw.
@@ -135,27 +145,24 @@ class LiveBus::Impl {
         buffer->recv_utime);
   }
 
-  std::string url_;
-  lcm_t* lcm_;
-  std::optional<UdpmUrl> udpm_;  // none: liblcm receives
+  LcmGroup main_;
+  std::string bulk_url_;  // empty: bulk goes to the main group
+  std::optional<LcmGroup> bulk_;
+  Pacer pacer_;
   ReceiveBuffer buffer_;
   ArrivalQueue queue_;
   std::unique_ptr<UdpmReceiver> receiver_;       // behind the queue that it fills
   std::set<std::string, std::less<>> channels_;  // that liblcm was asked for
 };
 
-LiveBus::LiveBus(const std::string& url) : impl_(std::make_unique<Impl>(url)) {}
+LiveBus::LiveBus(const std::string& url, Groups groups, double bulk_bytes_per_s)
+    : impl_(std::make_unique<Impl>(url, groups, bulk_bytes_per_s)) {}
 LiveBus::~LiveBus() = default;
 
 std::optional<wire::Refusal> LiveBus::publish(std::string_view channel,
                                               std::span<const std::uint8_t> bytes) {
   if (auto refusal = check_publishable(channel, bytes.size())) return refusal;
-  if (lcm_publish(impl_->lcm(), std::string(channel).c_str(), bytes.data(),
-                  static_cast<unsigned>(bytes.size())) != 0) {
-    return wire::Refusal{wire::Reason::kNotSent,
-                         "the socket refused " + std::to_string(bytes.size()) + " bytes"};
-  }
-  return std::nullopt;
+  return impl_->publish(channel, bytes);
 }
 
 void LiveBus::subscribe(std::string_view channel, std::size_t queue_size, Handler handler) {
@@ -181,5 +188,9 @@ ReceiveBuffer LiveBus::receive_buffer() const { return impl_->buffer(); }
 DatagramFaults LiveBus::refused_datagrams() const { return impl_->faults(); }
 
 const std::string& LiveBus::url() const { return impl_->url(); }
+
+std::unique_ptr<Bus> make_live_bus(const std::string& url) {
+  return std::make_unique<LiveBus>(url, Groups::kWithBulk);
+}
 
 }  // namespace understory::bus

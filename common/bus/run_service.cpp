@@ -9,9 +9,9 @@
 
 #include "common/bus/config_file.hpp"
 #include "common/bus/device.hpp"
+#include "common/bus/live_bus.hpp"
 #include "common/bus/process_memory.hpp"
 #include "common/bus/service.hpp"
-#include "common/bus/split_bus.hpp"
 
 namespace understory::bus {
 namespace {

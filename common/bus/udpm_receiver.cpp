@@ -4,9 +4,10 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-#include <array>
+#include <algorithm>
 #include <chrono>
 #include <csignal>
+#include <iterator>
 #include <new>
 #include <system_error>
 #include <utility>
@@ -40,26 +41,39 @@ class SignalsBlocked {
 
 }  // namespace
 
-UdpmReceiver::UdpmReceiver(const UdpmUrl& network, const std::string& url,
-                           UdpmReassembler::Wanted wanted, Sink sink)
-    : socket_(network, url),
-      sink_(std::move(sink)),
+UdpmReceiver::UdpmReceiver(UdpmReassembler::Wanted wanted, Sink sink)
+    : sink_(std::move(sink)),
       reassembler_({}, std::move(wanted)),
-      stop_(::eventfd(0, EFD_CLOEXEC)) {
-  if (stop_ < 0) throw BusError(url + ": no descriptor left to receive with");
+      wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  if (wake_ < 0) throw BusError("no descriptor left to receive with");
   try {
     const SignalsBlocked blocked;
     thread_ = std::thread([this] { run(); });
   } catch (const std::system_error& error) {
-    ::close(stop_);
-    throw BusError(url + ": no thread to receive with: " + error.what());
+    ::close(wake_);
+    throw BusError(std::string("no thread to receive with: ") + error.what());
   }
 }
 
 UdpmReceiver::~UdpmReceiver() {
-  ::eventfd_write(stop_, 1);
+  {
+    const std::lock_guard lock(mutex_);
+    ends_ = true;
+  }
+  ::eventfd_write(wake_, 1);
   thread_.join();
-  ::close(stop_);
+  ::close(wake_);
+}
+
+std::int64_t UdpmReceiver::join(const UdpmUrl& network, const std::string& url) {
+  auto socket = std::make_unique<UdpmSocket>(network, url);
+  const std::int64_t granted_bytes = socket->granted_bytes();
+  {
+    const std::lock_guard lock(mutex_);
+    joined_.push_back({std::move(socket)});
+  }
+  ::eventfd_write(wake_, 1);
+  return granted_bytes;
 }
 
 DatagramFaults UdpmReceiver::faults() const {
@@ -68,25 +82,75 @@ DatagramFaults UdpmReceiver::faults() const {
 }
 
 void UdpmReceiver::run() noexcept {
-  std::array<pollfd, 2> files{{{socket_.file_descriptor(), POLLIN, 0}, {stop_, POLLIN, 0}}};
   while (true) {
-    ::poll(files.data(), files.size(), -1);
-    if (files[1].revents != 0) return;
+    std::vector<pollfd> files = {{wake_, POLLIN, 0}};
+    for (const Group& group : groups_)
+      files.push_back({group.socket->file_descriptor(), POLLIN, 0});
+    ::poll(files.data(), files.size(), earliest() != nullptr ? 0 : -1);
+
+    if (files.front().revents != 0) {
+      const std::lock_guard lock(mutex_);
+      if (ends_) return;
+      take_in_joined();
+    }
     take_batch();
     note_faults();
   }
 }
 
+/// Precondition: the lock is held.
+void UdpmReceiver::take_in_joined() {
+  eventfd_t count = 0;
+  ::eventfd_read(wake_, &count);
+  std::ranges::move(joined_, std::back_inserter(groups_));
+  joined_.clear();
+}
+
+/// Reads the sockets of which nothing waits; false = they have nothing.
+bool UdpmReceiver::read_sockets() {
+  bool has_more = false;
+  for (Group& group : groups_) {
+    if (!group.waiting.empty()) continue;
+    group.waiting = group.socket->receive();
+    has_more = has_more || !group.waiting.empty();
+  }
+  return has_more;
+}
+
+/// The group whose first datagram came first; null = nothing waits.
+UdpmReceiver::Group* UdpmReceiver::earliest() {
+  Group* result = nullptr;
+  for (Group& group : groups_) {
+    if (group.waiting.empty()) continue;
+    const bool is_first = result == nullptr ||
+                          group.waiting.front().received_ns < result->waiting.front().received_ns;
+    if (is_first) result = &group;
+  }
+  return result;
+}
+
+/// Until one of the sockets is to be read again. A socket that is empty was read after everything
+/// that waits had come: nothing earlier can be in it.
 void UdpmReceiver::take_batch() {
+  while (read_sockets()) {
+  }
   const std::int64_t now_us = steady_us();
-  for (const ReceivedDatagram& datagram : socket_.receive()) {
-    try {
-      const auto taken = reassembler_.take(datagram.bytes, datagram.sender, now_us);
-      if (taken.fault) note_faults();  // before what comes behind it is handed out
-      if (taken.message) sink_(taken.message->channel, taken.message->bytes, datagram.received_us);
-    } catch (const std::bad_alloc&) {
-      out_of_memory_.add(DatagramFault::kNoRoom);
+  while (Group* const group = earliest()) {
+    take(group->waiting.front(), now_us);
+    group->waiting = group->waiting.subspan(1);
+    if (group->waiting.empty()) return;
+  }
+}
+
+void UdpmReceiver::take(const ReceivedDatagram& datagram, std::int64_t now_us) {
+  try {
+    const auto taken = reassembler_.take(datagram.bytes, datagram.sender, now_us);
+    if (taken.fault) note_faults();  // before what comes behind it is handed out
+    if (taken.message) {
+      sink_(taken.message->channel, taken.message->bytes, datagram.received_ns / 1000);
     }
+  } catch (const std::bad_alloc&) {
+    out_of_memory_.add(DatagramFault::kNoRoom);
   }
 }
 

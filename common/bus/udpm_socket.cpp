@@ -3,12 +3,12 @@
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
-#include <sys/time.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 #include <system_error>
 
 #include "common/bus/bus_error.hpp"
@@ -52,17 +52,17 @@ void join_group(int file, const UdpmUrl& network, const std::string& url) {
   }
 }
 
-std::int64_t arrival_time_us(msghdr& message) {
+std::int64_t arrival_time_ns(msghdr& message) {
   for (cmsghdr* part = CMSG_FIRSTHDR(&message); part != nullptr;
        part = CMSG_NXTHDR(&message, part)) {
-    if (part->cmsg_level != SOL_SOCKET || part->cmsg_type != SCM_TIMESTAMP) continue;
-    timeval time{};
+    if (part->cmsg_level != SOL_SOCKET || part->cmsg_type != SCM_TIMESTAMPNS) continue;
+    timespec time{};
     std::memcpy(&time, CMSG_DATA(part), sizeof(time));
-    return std::int64_t{time.tv_sec} * 1000000 + time.tv_usec;
+    return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
   }
-  timeval now{};
-  ::gettimeofday(&now, nullptr);
-  return std::int64_t{now.tv_sec} * 1000000 + now.tv_usec;
+  timespec now{};
+  ::clock_gettime(CLOCK_REALTIME, &now);
+  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
 }
 
 }  // namespace
@@ -84,7 +84,7 @@ class UdpmSocket::Batch {
     for (std::size_t i = 0; i < taken; ++i) {
       datagrams_[i].bytes = {bytes_.get() + i * kDatagramBytes, headers_[i].msg_len};
       datagrams_[i].sender = {ntohl(senders_[i].sin_addr.s_addr), ntohs(senders_[i].sin_port)};
-      datagrams_[i].received_us = arrival_time_us(headers_[i].msg_hdr);
+      datagrams_[i].received_ns = arrival_time_ns(headers_[i].msg_hdr);
     }
     return {datagrams_.data(), taken};
   }
@@ -120,7 +120,7 @@ UdpmSocket::UdpmSocket(const UdpmUrl& network, const std::string& url)
   if (file_ < 0) fail_to_join(url, "no socket");
   try {
     set_option(file_, SOL_SOCKET, SO_REUSEADDR, 1);
-    set_option(file_, SOL_SOCKET, SO_TIMESTAMP, 1);
+    set_option(file_, SOL_SOCKET, SO_TIMESTAMPNS, 1);
     set_option(file_, IPPROTO_IP, IP_MULTICAST_ALL, 0);
     if (network.receive_buffer_bytes > 0) {
       set_option(file_, SOL_SOCKET, SO_RCVBUF, static_cast<int>(network.receive_buffer_bytes));

@@ -18,7 +18,7 @@ std::int64_t granted_buffer(int file);
 struct ReceivedDatagram {
   std::span<const std::uint8_t> bytes;
   DatagramSender sender;
-  std::int64_t received_us = 0;  ///< Wall clock of the kernel.
+  std::int64_t received_ns = 0;  ///< Wall clock of the kernel.
 };
 
 /// Bound to group and port, shared with every process that shares it too (SO_REUSEADDR, as liblcm

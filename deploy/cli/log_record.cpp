@@ -4,13 +4,10 @@
 
 #include <chrono>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <regex>
-#include <vector>
 
 #include "common/bus/live_bus.hpp"
-#include "common/bus/split_bus.hpp"
 #include "common/io/lcm_log.hpp"
 #include "common/terminal/interrupt.hpp"
 #include "deploy/cli/failure.hpp"
@@ -38,10 +35,10 @@ std::optional<std::regex> channel_filter(const std::string& channels) {
 class Recorder {
  public:
   Recorder(const std::string& file, const RecordOptions& options)
-      : filter_(channel_filter(options.channels)) {
-    const std::string url = bus::complete_lcm_url(options.lcm_url);
-    listen(url);
-    if (options.sweeps) listen(bus::bulk_lcm_url(url));
+      : filter_(channel_filter(options.channels)),
+        bus_(options.lcm_url, options.sweeps ? bus::Groups::kWithBulk : bus::Groups::kOne) {
+    bus_.subscribe_all(kMostWaitingMessages,
+                       [this](const bus::BusMessage& message) { write(message); });
     // Behind the bus: where there is none, no empty file is left.
     writer_.emplace(file,
                     options.force ? io::LogCreation::kGrowingReplace : io::LogCreation::kGrowing);
@@ -49,50 +46,36 @@ class Recorder {
 
   /// Writes what waits; false = nothing did.
   bool write_waiting() {
-    bool wrote = false;
-    for (const auto& one : buses_) {
-      // A bounded number: neither group may keep the other one, or the end, waiting.
-      for (int i = 0; i < 1000 && one->handle_one(0); ++i) wrote = true;
-    }
-    return wrote;
+    // A bounded number: they may not keep the end waiting.
+    int written = 0;
+    while (written < 1000 && bus_.handle_one(0)) ++written;
+    return written > 0;
   }
 
   void wait(std::chrono::milliseconds timeout) {
-    std::vector<pollfd> files;
-    for (const auto& one : buses_) files.push_back({one->file_descriptor(), POLLIN, 0});
-    ::poll(files.data(), files.size(), static_cast<int>(timeout.count()));
+    pollfd file{bus_.file_descriptor(), POLLIN, 0};
+    ::poll(&file, 1, static_cast<int>(timeout.count()));
   }
 
   void flush() { writer_->flush(); }
   void commit() { writer_->commit(); }
   std::uint64_t events() const { return writer_->events(); }
   std::uint64_t bytes() const { return bytes_; }
-  std::uint64_t lost() const {
-    std::uint64_t sum = 0;
-    for (const auto& one : buses_) sum += one->dropped_of_all();
-    return sum;
-  }
-  std::uint64_t refused() const {
-    std::uint64_t sum = 0;
-    for (const auto& one : buses_) sum += one->refused_datagrams().total();
-    return sum;
-  }
+  std::uint64_t lost() const { return bus_.dropped_of_all(); }
+  std::uint64_t refused() const { return bus_.refused_datagrams().total(); }
 
  private:
-  void listen(const std::string& url) {
-    buses_.push_back(std::make_unique<bus::LiveBus>(url));
-    buses_.back()->subscribe_all(kMostWaitingMessages, [this](const bus::BusMessage& message) {
-      const auto& channel = message.channel;
-      if (filter_ && !std::regex_match(channel.begin(), channel.end(), *filter_)) return;
-      writer_->write(message.received_us, channel, message.bytes);
-      bytes_ += message.bytes.size();
-    });
+  void write(const bus::BusMessage& message) {
+    const auto& channel = message.channel;
+    if (filter_ && !std::regex_match(channel.begin(), channel.end(), *filter_)) return;
+    writer_->write(message.received_us, channel, message.bytes);
+    bytes_ += message.bytes.size();
   }
 
   std::optional<std::regex> filter_;
   std::optional<io::LcmLogWriter> writer_;
   std::uint64_t bytes_ = 0;
-  std::vector<std::unique_ptr<bus::LiveBus>> buses_;
+  bus::LiveBus bus_;
 };
 
 void record_until(Recorder& recorder, const std::atomic<bool>& is_interrupted) {

@@ -7,7 +7,7 @@
 #include <set>
 #include <thread>
 
-#include "common/bus/split_bus.hpp"
+#include "common/bus/live_bus.hpp"
 #include "common/io/lcm_log.hpp"
 #include "common/io/text_file.hpp"
 #include "common/terminal/interrupt.hpp"

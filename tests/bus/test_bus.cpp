@@ -1,15 +1,13 @@
 // One suite for every implementation of Bus.
-#include <poll.h>
-#include <sys/eventfd.h>
 #include <unistd.h>
 
 #include <functional>
 #include <memory>
 
+#include "common/bus/bulk_group.hpp"
 #include "common/bus/faulty_bus.hpp"
 #include "common/bus/live_bus.hpp"
 #include "common/bus/memory_bus.hpp"
-#include "common/bus/split_bus.hpp"
 #include "tests/catch.hpp"
 
 using namespace understory;
@@ -36,25 +34,6 @@ void handle(Bus& bus, const std::function<bool()>& is_done) {
     if (!bus.handle_one(100)) ++idle;
   }
 }
-
-/// A bus whose descriptor is readable from raise() until lower().
-class SignalledBus : public MemoryBus {
- public:
-  SignalledBus() = default;
-  ~SignalledBus() override { ::close(event_); }
-  SignalledBus(const SignalledBus&) = delete;
-  SignalledBus& operator=(const SignalledBus&) = delete;
-
-  void raise() { REQUIRE(::eventfd_write(event_, 1) == 0); }
-  void lower() {
-    eventfd_t value = 0;
-    REQUIRE(::eventfd_read(event_, &value) == 0);
-  }
-  int file_descriptor() const override { return event_; }
-
- private:
-  int event_ = ::eventfd(0, EFD_CLOEXEC);
-};
 
 }  // namespace
 
@@ -156,38 +135,6 @@ TEST_CASE("sweeps travel in a group of their own, paced, and only to who wants t
   while (bystander.handle_one(0)) {
   }
   CHECK(overheard == 0);
-}
-
-TEST_CASE("a split bus wakes who waits for it whenever one of its two does") {
-  auto main = std::make_unique<SignalledBus>();
-  auto bulk = std::make_unique<SignalledBus>();
-  SignalledBus& main_signal = *main;
-  SignalledBus& bulk_signal = *bulk;
-  SplitBus split(std::move(main), [&] { return std::move(bulk); });
-  split.subscribe("RAW_SWEEP", 0, [](const BusMessage&) {});
-  const auto wakes = [&] {
-    pollfd file{split.file_descriptor(), POLLIN, 0};
-    return ::poll(&file, 1, 0) == 1;
-  };
-
-  CHECK_FALSE(wakes());
-  for (SignalledBus* one : {&main_signal, &bulk_signal}) {
-    one->raise();
-    CHECK(wakes());
-    one->lower();
-    CHECK_FALSE(wakes());
-  }
-}
-
-TEST_CASE("a split bus of two without descriptors hands out what they have") {
-  SplitBus split(std::make_unique<MemoryBus>(), [] { return std::make_unique<MemoryBus>(); });
-  int count = 0;
-  for (const char* channel : {"HEALTH", "RAW_SWEEP"}) {
-    split.subscribe(channel, 0, [&](const BusMessage&) { ++count; });
-    CHECK_FALSE(split.publish(channel, Bytes{1, 2, 3}));
-  }
-  handle(split, [&] { return count == 2; });
-  CHECK(count == 2);
 }
 
 TEST_CASE("the URL is completed so that nothing is lost or leaves by accident") {

@@ -8,13 +8,17 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <condition_variable>
+#include <mutex>
 #include <random>
 
+#include "common/bus/bulk_group.hpp"
 #include "common/bus/live_bus.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/port_owner.hpp"
 #include "common/bus/process_memory.hpp"
 #include "common/bus/udpm_reassembly.hpp"
+#include "common/bus/udpm_receiver.hpp"
 #include "common/bus/udpm_url.hpp"
 #include "tests/bus/hostile_datagrams.hpp"
 #include "tests/catch.hpp"
@@ -94,6 +98,34 @@ std::vector<std::size_t> sizes_to_try() {
   return {0, 1, 1390, 1400, 1500, 65480, 65500, 66000, 300000, 3000000};
 }
 
+/// A sink that notes channels, and holds the receiving thread with the first message until go_on().
+class HoldingSink {
+ public:
+  void operator()(std::string_view channel) {
+    std::unique_lock lock(mutex_);
+    channels_.emplace_back(channel);
+    changed_.notify_all();
+    changed_.wait(lock, [&] { return goes_on_; });
+  }
+  void go_on() {
+    const std::lock_guard lock(mutex_);
+    goes_on_ = true;
+    changed_.notify_all();
+  }
+  /// Waits up to 10 s for so many.
+  std::vector<std::string> wait_for(std::size_t count) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, std::chrono::seconds(10), [&] { return channels_.size() >= count; });
+    return channels_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<std::string> channels_;
+  bool goes_on_ = false;
+};
+
 }  // namespace
 
 TEST_CASE("what liblcm publishes, small and large, comes in whole") {
@@ -159,6 +191,33 @@ TEST_CASE("who only sends joins no group; all channels can be heard") {
   CHECK(channels == std::vector<std::string>{"ONE", "A_LONG_NAME_OF_A_CHANNEL", "TWO"});
   CHECK(listener.dropped_of_all() == 0);
   CHECK_FALSE(sender.handle_one(0));
+}
+
+TEST_CASE("after a pause messages of both groups come in the order in which they were received") {
+  HoldingSink sink;
+  UdpmReceiver receiver([](std::string_view) { return true; },
+                        [&](std::string_view channel, std::span<const std::uint8_t>, std::int64_t) {
+                          sink(channel);
+                        });
+  const std::string bulk_url = bulk_lcm_url(own_url());
+  receiver.join(parse_udpm_url(own_url()), own_url());
+  receiver.join(parse_udpm_url(bulk_url), bulk_url);
+  LiveBus sender(own_url(), Groups::kWithBulk);
+
+  std::vector<std::string> sent = {"RAW_IMU"};
+  CHECK_FALSE(sender.publish("RAW_IMU", std::vector<std::uint8_t>(8)));
+  REQUIRE(sink.wait_for(1) == sent);
+
+  // While it is held: sweeps of several fragments among small messages.
+  std::mt19937_64 random(7);
+  for (int i = 0; i < 150; ++i) {
+    const bool is_bulk = random() % 3 == 0;
+    sent.emplace_back(is_bulk ? "RAW_SWEEP" : "RAW_IMU_" + std::to_string(i));
+    const std::size_t bytes = is_bulk ? random() % 3000 : 8;
+    CHECK_FALSE(sender.publish(sent.back(), std::vector<std::uint8_t>(bytes)));
+  }
+  sink.go_on();
+  CHECK(sink.wait_for(sent.size()) == sent);
 }
 
 TEST_CASE("the descriptor is readable while a message waits, and only then") {

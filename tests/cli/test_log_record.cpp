@@ -8,7 +8,7 @@
 #include <map>
 #include <thread>
 
-#include "common/bus/split_bus.hpp"
+#include "common/bus/live_bus.hpp"
 #include "tests/catch.hpp"
 #include "tests/cli/run_command.hpp"
 

@@ -6,7 +6,6 @@
 #include <map>
 #include <set>
 
-#include "common/bus/split_bus.hpp"
 #include "common/geometry/decompositions.hpp"
 #include "common/io/lcm_log.hpp"
 #include "common/model/ekf_output.hpp"

@@ -4,8 +4,8 @@
 #include <fstream>
 #include <thread>
 
+#include "common/bus/live_bus.hpp"
 #include "common/bus/parameter_table.hpp"
-#include "common/bus/split_bus.hpp"
 #include "deploy/launch/child_process.hpp"
 #include "services/velodyne_driver/udp_socket.hpp"
 #include "tests/io/log_fixture.hpp"
