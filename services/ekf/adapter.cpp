@@ -10,7 +10,7 @@
 namespace understory::ekf {
 namespace {
 
-constexpr state::Format kServiceFormat{"ekf_service", 1};
+constexpr state::Format kServiceFormat{"ekf_service", 2};
 
 class EkfAdapter : public bus::Adapter {
  public:
@@ -72,11 +72,12 @@ class EkfAdapter : public bus::Adapter {
   }
 
   void publish(const EkfOutput& output) {
-    const EkfCounters& counters = stage_->counters();
+    const EkfCounters counters = stage_->counters();
     if (counters.restarts != restarts_) {
       restarts_ = counters.restarts;
       node_->report(wire::Reason::kRestarted, counters.last_reason, channels_.pose);
     }
+    if (output.is_late) return;
     if (output.level) levels_.publish(*output.level);
     if (output.pose) poses_.publish(*output.pose);
     if (output.map) maps_.publish(*output.map);

@@ -17,12 +17,13 @@ struct EkfCounters {
   std::uint64_t landmarks_refused = 0;   ///< By their own gate or the gate of the scan.
   std::uint64_t landmarks_unusable = 0;  ///< Not finite, no covariance, or without a track.
   std::uint64_t landmarks_too_near =
-      0;                       ///< New ones too near to an old one, or the state was full.
-  std::uint64_t rejoined = 0;  ///< New tracks that were paired with a lost landmark.
-  std::uint64_t removed = 0;   ///< Landmarks that left the active state.
-  std::uint64_t crept = 0;     ///< Times the vehicle moved while reported stationary.
-  std::uint64_t restarts = 0;  ///< See model::EkfPose::reset_counter.
-  std::string last_reason;     ///< Of the latest refusal or restart.
+      0;                          ///< New ones too near to an old one, or the state was full.
+  std::uint64_t rejoined = 0;     ///< New tracks that were paired with a lost landmark.
+  std::uint64_t removed = 0;      ///< Landmarks that left the active state.
+  std::uint64_t crept = 0;        ///< Times the vehicle moved while reported stationary.
+  std::uint64_t clock_jumps = 0;  ///< Stamps far behind those before: the filter began anew.
+  std::uint64_t restarts = 0;     ///< See model::EkfPose::reset_counter.
+  std::string last_reason;        ///< Of the latest refusal or restart.
 };
 
 }  // namespace understory::ekf

@@ -7,7 +7,7 @@
 namespace understory::ekf {
 namespace {
 
-/// The pose without sequence number, counts, and the scale's error.
+/// The pose without counts and the scale's error.
 model::EkfPose pose_of(const FilterState& state, double pitch_tangent) {
   model::EkfPose out;
   const geometry::SE2 pose = vehicle_pose(state);
@@ -31,7 +31,6 @@ SoundPose sound_pose(const model::EkfPose& pose) {
 model::VelocityCorrection correction_of(const FilterState& state, const model::EkfPose& pose) {
   model::VelocityCorrection correction;
   correction.utime = pose.utime;
-  correction.sequence = pose.sequence;
   correction.velocity_mps = pose.velocity_mps;
   correction.bias = state.bias;
   correction.covariance = velocity_covariance(state);
@@ -45,7 +44,6 @@ EkfOutput EkfReport::pose(const FilterState& state, const VehicleMotion& motion,
   EkfOutput output;
   model::EkfPose& pose = output.pose.emplace(pose_of(state, motion.pitch_tangent()));
   pose.utime = now;
-  pose.sequence = pose_sequence_++;
   pose.landmarks_used = update.used;
   pose.landmarks_refused = update.refused;
   pose.reset_counter = reset_counter_;
@@ -56,7 +54,7 @@ EkfOutput EkfReport::pose(const FilterState& state, const VehicleMotion& motion,
   pose.covariance += sweep_level_.pose_covariance();
 
   if (const auto& level_covariance = motion.level_covariance()) {
-    output.level = model::EkfLevel{now, pose.sequence, state.level,
+    output.level = model::EkfLevel{now, 0, state.level,
                                    state.covariance_block<2, 2>(kLevel, kLevel), *level_covariance};
   }
   return output;
@@ -72,13 +70,11 @@ EkfOutput EkfReport::all(const FilterState& state, const VehicleMotion& motion, 
 
 void EkfReport::begin(const FilterState& state, const VehicleMotion& motion) {
   last_sound_ = sound_pose(pose_of(state, motion.pitch_tangent()));
-  pose_sequence_ = 0;
 }
 
 model::EkfMap EkfReport::map(const FilterState& state, model::Utime now) {
   model::EkfMap map;
   map.utime = now;
-  map.sequence = map_sequence_++;
 
   const auto& landmarks = state.landmarks();
   for (std::size_t i = 0; i < landmarks.size(); ++i) {

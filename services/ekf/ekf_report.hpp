@@ -27,6 +27,7 @@ struct EkfOutput {
   std::optional<model::VelocityCorrection> correction;
   std::optional<model::EkfLevel> level;  ///< With each pose, where sweeps are levelled.
   std::optional<ScanFit> scan;           ///< With a scan.
+  bool is_late = false;  ///< A pose of a later time was given already: not to be published.
 };
 
 /// Where the filter starts again when its state is of no use.
@@ -42,8 +43,8 @@ struct SoundPose {
   }
 };
 
-/// Builds outputs from the state. Owner of their sequence numbers, of the number of restarts, and
-/// of the last pose that was given.
+/// Builds outputs from the state; their sequence numbers are the bus's. Owner of the number of
+/// restarts, and of the last pose that was given.
 ///
 /// The state's heading is that of the frame to which sweeps and odometry are levelled. A wrong roll
 /// rotates that frame by its product with the tangent of the pitch, on each slope anew; the
@@ -66,7 +67,7 @@ class EkfReport {
   EkfOutput all(const FilterState& state, const VehicleMotion& motion, model::Utime now,
                 const ScanUpdate& update);
 
-  /// The map begins: `state` is the first sound pose, sequence numbers of poses begin at 0.
+  /// The map begins: `state` is the first sound pose.
   void begin(const FilterState& state, const VehicleMotion& motion);
   /// Counts a restart, which consumers see in EkfPose::reset_counter.
   void count_restart() { ++reset_counter_; }
@@ -76,16 +77,13 @@ class EkfReport {
   /// Members of a saved state; see common/state. The rest is configuration.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.pose_sequence_, self.map_sequence_, self.reset_counter_, self.last_sound_,
-      self.sweep_level_);
+    a(self.reset_counter_, self.last_sound_, self.sweep_level_);
   }
 
  private:
   model::EkfMap map(const FilterState& state, model::Utime now);
 
   double scale_sigma_;
-  std::uint64_t pose_sequence_ = 0;
-  std::uint64_t map_sequence_ = 0;
   std::uint64_t reset_counter_ = 0;
   SoundPose last_sound_;
   model::SweepLevel sweep_level_;

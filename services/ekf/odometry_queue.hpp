@@ -14,7 +14,7 @@ namespace understory::ekf {
 bool is_usable(const model::Odometry& increment);
 
 /// Increments in order of time. A scan arrives later than the odometry after it, so odometry is
-/// used when its scan is there, or when it has waited for `max_delay_s`.
+/// used when its scan is there; it is overdue when it has waited for `max_delay_s`.
 class OdometryQueue {
  public:
   /// `max_delay_s`: longest wait for a scan. `clock_jump_s`: a stamp that is earlier by more is a
@@ -32,6 +32,11 @@ class OdometryQueue {
 
   /// Stamp up to which increments have waited for too long; none where the oldest may still wait.
   std::optional<model::Utime> overdue() const;
+  /// From the beginning of the oldest increment to the end of the newest [s].
+  double waiting_s() const {
+    if (increments_.empty()) return 0.0;
+    return seconds(increments_.back().utime - increments_.front().from_utime);
+  }
   /// The oldest increment that waits; null where none does.
   const model::Odometry* next() const {
     return increments_.empty() ? nullptr : &increments_.front();

@@ -16,7 +16,7 @@ std::string bytes_of(const EkfOutput& output) {
   state::Writer out;
   out(output.pose, output.level, output.correction, output.map.has_value());
   if (!output.map) return out.take();
-  out(output.map->utime, output.map->sequence);
+  out(output.map->utime);
   for (const model::EkfLandmark& landmark : output.map->landmarks) {
     out(landmark.track_id, landmark.position_m, landmark.covariance_m2, landmark.radius_m,
         landmark.kind, landmark.observation_count);
