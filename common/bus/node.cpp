@@ -7,6 +7,7 @@ namespace understory::bus {
 namespace {
 
 constexpr int kRefusedWindow = 32;  ///< Messages.
+constexpr std::int64_t kSilent_us = 2'000'000;
 
 }  // namespace
 
@@ -41,6 +42,7 @@ std::size_t Node::add_output(const std::string& channel) {
 }
 
 void Node::connect() {
+  connected_us_ = computer_clock_.monotonic_us();
   for (const auto& input : inputs_) {
     bus_.subscribe(input->channel, input->options.queue_size,
                    [this, raw = input.get()](const BusMessage& message) { handle(*raw, message); });
@@ -67,6 +69,7 @@ std::optional<wire::Refusal> Node::take(Input& input, const BusMessage& message)
 }
 
 void Node::handle(Input& input, const BusMessage& message) {
+  input.heard_us = computer_clock_.monotonic_us();
   input.is_late = false;
   bool is_refused = false;
   try {
@@ -186,7 +189,27 @@ void Node::show(const WatchedCondition& watched) {
   log(holds ? Level::kWarning : Level::kInfo, to_string(watched.reason), text, watched.channel);
 }
 
+/// One condition for all inputs that must not be silent.
+void Node::show_silent_inputs() {
+  const std::int64_t now_us = computer_clock_.monotonic_us();
+  std::string silent;
+  for (const auto& input : inputs_) {
+    const Cadence cadence = input->options.cadence;
+    const bool matters =
+        cadence == Cadence::kExpected || (cadence == Cadence::kSteady && input->heard_us);
+    const std::int64_t since_us = input->heard_us.value_or(connected_us_);
+    if (!matters || now_us - since_us < kSilent_us) continue;
+    silent += (silent.empty() ? "" : ", ") + input->channel;
+  }
+
+  const std::string text = "nothing comes on " + silent;
+  WatchedCondition watched{wire::Reason::kSensorSilent, text, "", Condition({1, 1})};
+  watched.condition.add(!silent.empty());
+  show(watched);
+}
+
 health_t Node::health() {
+  show_silent_inputs();
   for (const auto& input : inputs_) {
     monitor_.set_dropped(input->health, bus_.dropped(input->channel));
   }

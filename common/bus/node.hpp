@@ -10,6 +10,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -33,6 +34,14 @@ namespace understory::bus {
 
 class Node;
 
+/// Whether an input may be silent. By the computer's clock and for HEALTH only: where nothing comes
+/// at all, message time stands still.
+enum class Cadence : std::uint8_t {
+  kAny,       ///< It may.
+  kSteady,    ///< Not after its first message.
+  kExpected,  ///< Not at all.
+};
+
 /// How an input is taken.
 struct SubscribeOptions {
   std::size_t queue_size = 30;  ///< Messages that may wait; when full, the oldest is dropped.
@@ -48,7 +57,8 @@ struct SubscribeOptions {
   /// A larger message is refused before anything looks at it (`too_large`): what a message may cost
   /// follows from its size.
   std::size_t most_bytes = kLargestMessage;
-  bool journaled = true;  ///< Part of the state: fed again after a restart.
+  bool journaled = true;            ///< Part of the state: fed again after a restart.
+  Cadence cadence = Cadence::kAny;  ///< HEALTH is not OK while it is silent for 2 s.
 };
 
 /// An output channel; copies share it. Stamps `seq`, counting from 0.
@@ -171,8 +181,9 @@ class Node {
     Take take;
     SequenceTracker sequence;
     ChannelPace pace{-1, 0};
-    WatchedCondition refused;  ///< Of its latest messages; of this process.
-    bool is_late = false;      ///< The message that is being handled.
+    WatchedCondition refused;              ///< Of its latest messages; of this process.
+    bool is_late = false;                  ///< The message that is being handled.
+    std::optional<std::int64_t> heard_us;  ///< The latest one, on the computer's clock.
     std::size_t health = 0;
   };
   struct Output {
@@ -197,6 +208,7 @@ class Node {
   void start_at_jump(model::Utime utime);
   void feed_proven();
   void count_wrong(std::string_view channel);
+  void show_silent_inputs();
   void send(Output& output, model::Utime utime, const wire::Bytes& bytes,
             const wire::WireType& type);
   bool is_recovering() const { return source_ == Source::kJournal; }
@@ -215,6 +227,7 @@ class Node {
   Stage stage_;
   StateKeeper state_;
   Source source_ = Source::kBus;
+  std::int64_t connected_us_ = 0;
 };
 
 template <class T, class F>

@@ -15,6 +15,7 @@
 #include "eval/experiments/one_shot/one_shot.hpp"
 #include "eval/experiments/partition/partition.hpp"
 #include "eval/experiments/place_recognition/place_recognition.hpp"
+#include "eval/experiments/reliability/reliability.hpp"
 #include "eval/experiments/returns/returns.hpp"
 #include "eval/experiments/shared_errors/shared_errors.hpp"
 
@@ -46,6 +47,7 @@ void add_eval_command(CLI::App& parent) {
   misstated::add_misstated_experiment(eval);
   wheels::add_wheels_experiment(eval);
   gaps::add_gaps_experiment(eval);
+  reliability::add_reliability_experiment(eval);
   few_landmarks::add_few_landmarks_experiment(eval);
   closures::add_closures_experiment(eval);
   existence::add_existence_experiment(eval);

@@ -329,6 +329,8 @@ class MapperAdapter : public bus::Adapter {
   void locate(const model::LandmarkScan& scan) {
     newest_scan_utime_ = std::max(newest_scan_utime_, scan.utime);
     const std::optional<ScanPose> found = stage_->locate(scan);
+    memory_.health.add_scan(found && found->is_coasting);
+    show_health();
     if (!found || scan.utime <= memory_.newest_pose_utime) return;
     model::SlamPose pose;
     pose.utime = scan.utime;

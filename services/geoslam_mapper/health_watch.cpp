@@ -24,6 +24,8 @@ void describe(HealthParameters& p, bus::ParameterTable& table) {
   describe(p.diverged, "diverged", "keyframes",
            "bad are those that fit badly; the same for those that contradict the filter.", table);
   describe(p.refused, "refused", "keyframes", "bad are those that are malformed or late.", table);
+  describe(p.coasting, "coasting", "scans", "bad are those whose pose is by odometry alone.",
+           table);
   describe(p.new_map, "new_map", "keyframes", "bad are those that began a map beside another one.",
            table);
 }
@@ -51,7 +53,10 @@ HealthWatch::HealthWatch(const HealthParameters& parameters)
                bus::Condition(parameters.new_map)},
       not_stored_{wire::Reason::kNotStored,
                   "nobody confirms SUBMAP: the map stays in memory and grows", "SUBMAP",
-                  bus::Condition({1, 1})} {}
+                  bus::Condition({1, 1})},
+      coasting_{wire::Reason::kLost,
+                "odometry alone gives the poses of scans: their landmarks do not match the map",
+                "SLAM_POSE", bus::Condition(parameters.coasting)} {}
 
 void HealthWatch::add(const model::LoopResult& result) {
   using enum model::LoopResult::Status;

@@ -22,6 +22,7 @@ struct HealthParameters {
   bus::ConditionLimits diverged{8, 3};
   bus::ConditionLimits refused{8, 3};
   bus::ConditionLimits new_map{32, 1};
+  bus::ConditionLimits coasting{60, 45};
 };
 /// Adds the parameters to the table.
 void describe(HealthParameters& parameters, bus::ParameterTable& table);
@@ -42,9 +43,9 @@ struct CertainKeyframe {
 /// keyframe in 1000 by chance, 3 of 8 once in 10^7), or the map moved otherwise than the filter,
 /// which uses the same detections, or a loop closure contradicts the graph and waits, or the graph
 /// has yielded to some (for 50 keyframes). `lost` as well where few landmarks match, no other place
-/// is found and odometry alone places keyframes. `input_refused`: they are malformed or late.
-/// `new_map`: another map was begun some keyframes ago. `not_stored`: no store has confirmed what
-/// the mapper gave away.
+/// is found and odometry alone places keyframes, or scans without end. `input_refused`: they are
+/// malformed or late. `new_map`: another map was begun some keyframes ago. `not_stored`: no store
+/// has confirmed what the mapper gave away.
 class HealthWatch {
  public:
   /// All is well so far.
@@ -55,6 +56,8 @@ class HealthWatch {
   void must_find_map() { must_find_map_ = true; }
   /// What became of a keyframe.
   void add(const model::MapUpdate& update);
+  /// A scan between keyframes: whether odometry alone gave its pose.
+  void add_scan(bool is_coasting) { coasting_.condition.add(is_coasting); }
   /// What became of a loop closure.
   void add(const model::LoopResult& result);
   /// The filter's pose, to compare motions.
@@ -62,12 +65,13 @@ class HealthWatch {
   /// Whether what the mapper gave away is kept by a store; to be called after each keyframe.
   void keeps_up(bool does) { not_stored_.condition.add(!does); }
   /// What to show.
-  std::array<bus::WatchedCondition, 9> conditions() const {
-    return {lost_,    unconfirmed_, rolled_back_, diverged_,  contradicts_,
-            closure_, refused_,     new_map_,     not_stored_};
+  std::array<bus::WatchedCondition, 10> conditions() const {
+    return {lost_,    unconfirmed_, rolled_back_, diverged_,   contradicts_,
+            closure_, refused_,     new_map_,     not_stored_, coasting_};
   }
 
-  /// Members of a saved state; see common/state. The parameters are configuration.
+  /// Members of a saved state; see common/state. The parameters are configuration, and scans are in
+  /// no journal.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     a(self.lost_, self.unconfirmed_, self.rolled_back_, self.diverged_, self.contradicts_,
@@ -88,6 +92,7 @@ class HealthWatch {
   bus::WatchedCondition refused_;
   bus::WatchedCondition new_map_;
   bus::WatchedCondition not_stored_;
+  bus::WatchedCondition coasting_;
   smoothing::FilterTrack filter_;
   std::optional<CertainKeyframe> last_;
   std::uint32_t map_id_ = 0;  ///< 0 before the first keyframe.

@@ -24,7 +24,9 @@ wire::Reason reason_of(InputFaultKind kind) {
     case InputFaultKind::kNoMotion:
       return wire::Reason::kNoMotion;
     case InputFaultKind::kSilent:
-      return wire::Reason::kSensorSilent;
+      return wire::Reason::kSensorSilent;  // Told as a condition, see show_silence().
+    case InputFaultKind::kUnit:
+      return wire::Reason::kMiscalibrated;
     case InputFaultKind::kFrozen:
       return wire::Reason::kSensorFrozen;
     case InputFaultKind::kSaturated:
@@ -62,6 +64,7 @@ class Publishers {
     for (const model::PointSweep& part : split_sweep(value, kPointsPerPart)) sweeps_.publish(part);
   }
   void operator()(const InputFault& fault) {
+    if (fault.kind == InputFaultKind::kSilent) return;  // HEALTH says so as long as it lasts.
     node_->report(reason_of(fault.kind), fault.text, fault.channel);
   }
 
@@ -93,13 +96,14 @@ class LidarImuInputAdapter : public bus::Adapter {
     stage_.emplace(parameters_);
 
     // The stage puts late ones in order.
-    const auto sensor = [](std::size_t queue_size) {
-      return bus::SubscribeOptions{.queue_size = queue_size, .takes_late = true};
+    const auto sensor = [](std::size_t queue_size, bool is_expected) {
+      return bus::SubscribeOptions{
+          .queue_size = queue_size, .takes_late = true, .cadence = cadence(is_expected)};
     };
-    take<model::ImuSample>(channels_.raw_imu, sensor(4000));
-    take<model::WheelSample>(channels_.raw_wheels, sensor(2000));
-    take<model::GnssFix>(channels_.raw_gnss, sensor(200));
-    take<model::PlanarScan>(channels_.raw_scan, sensor(200));
+    take<model::ImuSample>(channels_.raw_imu, sensor(4000, parameters_.expected.imu));
+    take<model::WheelSample>(channels_.raw_wheels, sensor(2000, parameters_.expected.wheels));
+    take<model::PlanarScan>(channels_.raw_scan, sensor(200, parameters_.expected.scan));
+    take<model::GnssFix>(channels_.raw_gnss, {.queue_size = 200, .takes_late = true});
 
     // What comes back is on the stage's time, also where the sensors' clocks have jumped.
     const bus::SubscribeOptions feedback{.queue_size = 200, .timed = false};
@@ -108,12 +112,18 @@ class LidarImuInputAdapter : public bus::Adapter {
     // Bulk is no state: a sweep that arrives in part before a restart is lost.
     node.subscribe<model::PointSweep>(channels_.raw_sweep,
                                       [this](const model::PointSweep& part) { add_part(part); },
-                                      {.queue_size = 1000, .takes_late = true, .journaled = false});
+                                      {.queue_size = 1000,
+                                       .takes_late = true,
+                                       .journaled = false,
+                                       .cadence = cadence(parameters_.expected.sweep)});
   }
 
   void finish() override { publish(stage_->finish()); }
   std::string save() const override { return stage_->save(); }
-  void load(const std::string& state) override { stage_->load(state); }
+  void load(const std::string& state) override {
+    stage_->load(state);
+    show_silence();
+  }
 
  private:
   template <class T>
@@ -134,6 +144,36 @@ class LidarImuInputAdapter : public bus::Adapter {
 
   void publish(const InputResults& results) {
     for (const InputResult& result : results) std::visit(*publishers_, result);
+    show_silence();
+    show_gravity();
+  }
+
+  /// As long as the IMU at rest does not measure gravity as it must.
+  void show_gravity() {
+    const std::string text = stage_->gravity().text();
+    bus::WatchedCondition watched{wire::Reason::kMiscalibrated, text, channels_.raw_imu,
+                                  bus::Condition({1, 1})};
+    watched.condition.add(!text.empty());
+    node_->show(watched);
+  }
+
+  static bus::Cadence cadence(bool is_expected) {
+    return is_expected ? bus::Cadence::kExpected : bus::Cadence::kSteady;
+  }
+
+  /// HEALTH is not OK as long as a sensor is silent beside the others.
+  void show_silence() {
+    const std::pair<Sensor, std::string_view> sensors[] = {{Sensor::kImu, channels_.raw_imu},
+                                                           {Sensor::kWheels, channels_.raw_wheels},
+                                                           {Sensor::kSweep, channels_.raw_sweep},
+                                                           {Sensor::kScan, channels_.raw_scan}};
+    for (const auto& [sensor, channel] : sensors) {
+      bus::WatchedCondition watched{wire::Reason::kSensorSilent,
+                                    "nothing comes from this sensor, the others go on", channel,
+                                    bus::Condition({1, 1})};
+      watched.condition.add(stage_->is_silent(sensor));
+      node_->show(watched);
+    }
   }
 
   LidarImuInputChannels channels_;

@@ -138,6 +138,13 @@ void describe_fault(FaultParameters& p, bus::ParameterTable& table) {
             "How long a sample waits for one before it that is missing.");
 }
 
+void describe_expected(ExpectedSensors& p, bus::ParameterTable& table) {
+  table.add("expected.imu", p.imu, "The vehicle has an IMU: HEALTH is not OK without RAW_IMU.");
+  table.add("expected.wheels", p.wheels, "The same of wheels, RAW_WHEELS.");
+  table.add("expected.sweep", p.sweep, "The same of a laser that scans in space, RAW_SWEEP.");
+  table.add("expected.scan", p.scan, "The same of a laser that scans one plane, RAW_SCAN.");
+}
+
 }  // namespace
 
 void describe(LidarImuInputParameters& parameters, AxlePlace& axle_T_vehicle,
@@ -159,6 +166,7 @@ void describe(LidarImuInputParameters& parameters, AxlePlace& axle_T_vehicle,
   describe_constraint(parameters.constraint, table);
   describe_output(parameters.output, table);
   describe_fault(parameters.fault, table);
+  describe_expected(parameters.expected, table);
   table.renamed("lidar.turn_s", "lidar.revolution_s");
   table.renamed("output.max_piece_s", "output.max_increment_s");
 }

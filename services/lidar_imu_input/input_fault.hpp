@@ -13,6 +13,7 @@ enum class InputFaultKind : std::uint8_t {
   kLate,           ///< Not after its predecessor: dropped.
   kClockJump,      ///< The sensor's clock jumped: quarantined, then followed.
   kPaused,         ///< All sensors were silent, or this process did not run: time went on without.
+  kUnit,           ///< Values of another unit, which are converted.
   kSilent,         ///< Nothing came for too long.
   kFrozen,         ///< The same value again and again.
   kSaturated,      ///< At the end of its range: left out.

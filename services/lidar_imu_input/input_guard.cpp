@@ -32,8 +32,12 @@ std::string channel_of(Sensor sensor) {
   return "";
 }
 
-InputGuard::InputGuard(const FaultParameters& parameters, const ImuParameters& imu)
-    : parameters_(parameters), imu_(imu), states_(kSensors, State{SensorClock(parameters)}) {}
+InputGuard::InputGuard(const FaultParameters& parameters, const ImuParameters& imu,
+                       const ExpectedSensors& expected)
+    : parameters_(parameters),
+      imu_(imu),
+      expected_(expected),
+      states_(kSensors, State{SensorClock(parameters)}) {}
 
 /// Of the others but GNSS, with the time at which they go on after a pause.
 std::optional<model::Utime> InputGuard::newest_but(Sensor sensor) const {
@@ -109,6 +113,7 @@ std::optional<model::Utime> InputGuard::admit(Sensor sensor, model::Utime raw,
       break;
   }
   state.is_silent = false;
+  if (!first_) first_ = state.clock.last();
   return state.clock.last();
 }
 
@@ -167,6 +172,29 @@ double InputGuard::silent_s(Sensor sensor) const {
     default:
       return parameters_.silent_s;
   }
+}
+
+bool InputGuard::is_expected(Sensor sensor) const {
+  switch (sensor) {
+    case Sensor::kImu:
+      return expected_.imu;
+    case Sensor::kWheels:
+      return expected_.wheels;
+    case Sensor::kSweep:
+      return expected_.sweep;
+    case Sensor::kScan:
+      return expected_.scan;
+    case Sensor::kGnss:
+      break;
+  }
+  return false;
+}
+
+bool InputGuard::is_silent(Sensor sensor) const {
+  if (sensor == Sensor::kGnss) return false;
+  if (has_spoken(sensor)) return !is_live(sensor);
+  const auto newest = now();
+  return is_expected(sensor) && newest && seconds_between(*first_, *newest) > silent_s(sensor);
 }
 
 bool InputGuard::is_live(Sensor sensor) const {

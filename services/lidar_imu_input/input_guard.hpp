@@ -15,8 +15,9 @@ namespace understory::lidar_imu_input {
 /// episode (saturation and refusals: each time; the receiver limits the rate).
 class InputGuard {
  public:
-  /// `imu`: ranges, beyond which a sample is saturated.
-  InputGuard(const FaultParameters& parameters, const ImuParameters& imu);
+  /// `imu`: ranges, beyond which a sample is saturated. `expected`: sensors that must come.
+  InputGuard(const FaultParameters& parameters, const ImuParameters& imu,
+             const ExpectedSensors& expected = {});
 
   /// The stamp to use, on the stage's time; none where the sample is to be dropped.
   std::optional<model::Utime> admit(Sensor sensor, model::Utime raw,
@@ -37,6 +38,8 @@ class InputGuard {
   void go_on_at(model::Utime utime) { resumed_ = utime; }
   /// Newest stamp of one sensor.
   std::optional<model::Utime> last(Sensor sensor) const { return state(sensor).clock.last(); }
+  /// It must send and does not: it has gone silent, or is expected and never came.
+  bool is_silent(Sensor sensor) const;
   /// It has sent something, and has not gone silent.
   bool is_live(Sensor sensor) const;
   /// Whether nothing is to be expected any more from IMU and wheels for the time up to `utime`:
@@ -63,7 +66,7 @@ class InputGuard {
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
     for (auto& state : self.states_) a(state.clock, state.is_silent);
-    a(self.same_since_, self.is_frozen_, self.first_points_, self.resumed_);
+    a(self.same_since_, self.is_frozen_, self.first_points_, self.first_, self.resumed_);
   }
 
  private:
@@ -74,15 +77,18 @@ class InputGuard {
   const State& state(Sensor sensor) const { return states_[static_cast<std::size_t>(sensor)]; }
   State& state(Sensor sensor) { return states_[static_cast<std::size_t>(sensor)]; }
   double silent_s(Sensor sensor) const;
+  bool is_expected(Sensor sensor) const;
   std::optional<model::Utime> newest_but(Sensor sensor) const;
   void share_jump(Sensor sensor, model::Utime raw, std::optional<model::Utime> before);
 
   FaultParameters parameters_;
   ImuParameters imu_;
+  ExpectedSensors expected_;
   std::vector<State> states_;
   std::optional<model::ImuSample> same_since_;   ///< First one of those that are the same.
   bool is_frozen_ = false;                       ///< The IMU: reported.
   std::vector<model::SweepPoint> first_points_;  ///< Of the latest sweep.
+  std::optional<model::Utime> first_;            ///< Stamp of the first reading.
   std::optional<model::Utime> resumed_;          ///< Where time went on after the latest pause.
 };
 

@@ -83,7 +83,8 @@ LidarImuInput::LidarImuInput(const LidarImuInputParameters& parameters)
     : parameters_(parameters),
       time_base_(parameters.fault),
       order_(parameters.fault),
-      guard_(parameters.fault, parameters.imu),
+      guard_(parameters.fault, parameters.imu, parameters.expected),
+      gravity_(parameters.imu.mount, parameters.standstill),
       motion_(parameters),
       raw_poses_(parameters.output.raw_pose_period_s) {}
 
@@ -109,8 +110,10 @@ InputResults LidarImuInput::add(RawReading raw) {
   report(faults, out);
   if (believed.pause_s) out.emplace_back(after_pause(sensor, *believed.pause_s));
   if (believed.pause_s > kLongestPause_s) {
+    const GravityCheck gravity = gravity_;
     const InputCounters counters = counters_;
     *this = LidarImuInput(parameters_);
+    gravity_ = gravity;
     counters_ = counters;
   }
 
@@ -126,7 +129,17 @@ void LidarImuInput::use(const model::ImuSample& raw, InputResults& out) {
   // What is wrong with it?
   std::vector<InputFault> faults;
   const bool frozen = guard_.is_frozen(raw, faults);
-  const bool saturated = guard_.is_saturated(raw, faults);
+  if (!frozen && gravity_.add(raw)) {
+    // All motion so far was of a wrong unit: it begins anew.
+    motion_ = MotionEstimator(parameters_);
+    if (increment_end_) motion_.begin(*increment_end_);
+    out.emplace_back(InputFault{InputFaultKind::kUnit, channel_of(Sensor::kImu),
+                                "the acceleration is in g and taken times 9.81: its driver must "
+                                "send m/s^2"});
+  }
+  model::ImuSample sample = raw;
+  sample.specific_force_mps2 *= gravity_.scale();
+  const bool saturated = guard_.is_saturated(sample, faults);
   const auto utime = frozen ? std::nullopt : guard_.admit(Sensor::kImu, raw.utime, faults);
   report(faults, out);
   if (!utime) return;
@@ -139,7 +152,6 @@ void LidarImuInput::use(const model::ImuSample& raw, InputResults& out) {
     return;
   }
 
-  model::ImuSample sample = raw;
   sample.utime = *utime;
   sample = motion_.to_vehicle(sample);
   motion_.add_imu(sample, std::exchange(was_saturated_, false));

@@ -21,6 +21,7 @@
 #include "common/model/wheels.hpp"
 #include "services/lidar_imu_input/arrival_order.hpp"
 #include "services/lidar_imu_input/filter_motion.hpp"
+#include "services/lidar_imu_input/gravity_check.hpp"
 #include "services/lidar_imu_input/input_guard.hpp"
 #include "services/lidar_imu_input/motion_estimator.hpp"
 #include "services/lidar_imu_input/output_pacing.hpp"
@@ -83,6 +84,10 @@ class LidarImuInput {
   /// sensors at any temperature: the stage starts anew.
   static constexpr double kLongestPause_s = 600.0;
 
+  /// What the IMU shows of gravity.
+  const GravityCheck& gravity() const { return gravity_; }
+  /// Whether a sensor that must send does not.
+  bool is_silent(Sensor sensor) const { return guard_.is_silent(sensor); }
   const InputCounters& counters() const { return counters_; }  ///< Since the first start.
   /// Attitude, dead reckoning, calibration.
   const MotionEstimator& motion() const { return motion_; }
@@ -90,8 +95,9 @@ class LidarImuInput {
   /// For saving and loading: what changes while it runs.
   template <class Archive, class Self>
   static void archive(Archive& a, Self& self) {
-    a(self.time_base_, self.order_, self.guard_, self.motion_, self.filter_motion_, self.counters_,
-      self.queue_, self.increment_end_, self.raw_poses_, self.calibration_, self.was_saturated_);
+    a(self.time_base_, self.order_, self.guard_, self.gravity_, self.motion_, self.filter_motion_,
+      self.counters_, self.queue_, self.increment_end_, self.raw_poses_, self.calibration_,
+      self.was_saturated_);
   }
 
  private:
@@ -112,6 +118,7 @@ class LidarImuInput {
   TimeBase time_base_;
   ArrivalOrder order_;
   InputGuard guard_;
+  GravityCheck gravity_;
   MotionEstimator motion_;
   FilterMotion filter_motion_;
   InputCounters counters_;

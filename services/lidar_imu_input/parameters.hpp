@@ -105,6 +105,14 @@ struct FaultParameters {
   double reorder_s = 0.025;     ///< How long a sample waits for one before it that is missing.
 };
 
+/// Sensors that the vehicle has: HEALTH is not OK where one never comes.
+struct ExpectedSensors {
+  bool imu = false;
+  bool wheels = false;
+  bool sweep = false;
+  bool scan = false;
+};
+
 /// All parameters of the stage.
 struct LidarImuInputParameters {
   ImuParameters imu;
@@ -115,6 +123,7 @@ struct LidarImuInputParameters {
   PlanarLaserParameters planar;
   OutputParameters output;
   FaultParameters fault;
+  ExpectedSensors expected;
   bool gnss_aided = false;  ///< RAW_POSE takes velocity from GNSS: a reference, not for mapping.
 };
 

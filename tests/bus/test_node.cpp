@@ -93,6 +93,43 @@ TEST_CASE("latency is the time from the arrival of a message to the end of its h
   CHECK(hosted.node().monitor().report(0).latency_max_us == 700);
 }
 
+TEST_CASE("an input that must come and does not is told, as long as it does not") {
+  MemoryBus bus;
+  std::int64_t now_us = 0;
+  const Clock clock{[&] { return now_us; }, [&] { return now_us; }};
+  NodeOptions options;
+  options.process = "test";
+  Node node(bus, options, clock);
+  const auto ignore = [](const model::Odometry&) {};
+  node.subscribe<model::Odometry>("EXPECTED", ignore, {.cadence = Cadence::kExpected});
+  node.subscribe<model::Odometry>("STEADY", ignore, {.cadence = Cadence::kSteady});
+  node.subscribe<model::Odometry>("ANY", ignore);
+  node.connect();
+  const auto is_ok = [&] { return node.health().state == health_t::STATE_OK; };
+  const auto send = [&](const char* channel) {
+    bus.publish(channel,
+                wire::encode_message(test::toy_input(static_cast<int>(now_us / 1'000'000))));
+    bus.drain();
+  };
+
+  CHECK(is_ok());
+  now_us = 30'000'000;
+  CHECK_FALSE(is_ok());
+  CHECK(node.health().last_error == "nothing comes on EXPECTED");
+
+  // A reason counts for 3 s more.
+  for (; now_us < 40'000'000; now_us += 1'000'000) {
+    send("EXPECTED");
+    send("ANY");
+    CHECK(is_ok() == (now_us >= 33'000'000));
+  }
+  send("STEADY");
+  for (; now_us < 60'000'000; now_us += 1'000'000) {
+    send("EXPECTED");
+    CHECK(is_ok() == (now_us < 42'000'000));
+  }
+}
+
 TEST_CASE("values pass through, outputs are numbered from 0, ticks follow message time") {
   Bench bench("[toy]\ngain = 2\nevery = 5\n");
   for (int i = 0; i < 25; ++i) bench.send(test::toy_input(i));

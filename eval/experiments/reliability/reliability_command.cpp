@@ -1,0 +1,207 @@
+// `understory eval reliability`.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "eval/experiments/experiments.hpp"
+#include "eval/experiments/reliability/live_drive.hpp"
+#include "eval/experiments/reliability/reliability.hpp"
+#include "eval/harness/results.hpp"
+#include "eval/tools/quantile.hpp"
+
+namespace understory::eval::experiments::reliability {
+namespace {
+
+/// The vehicle stands for 20 s, then has driven for some.
+constexpr double kFirstFault_s = 30.0;
+constexpr std::size_t kMostFaults = 100'000;
+
+struct ReliabilityOptions {
+  int drives = 1;
+  std::uint64_t first_seed = 1;
+  std::size_t faults = 20;
+  double longest_s = 10.0;
+  double apart_s = 12.0;
+  double length_m = 1000.0;
+  std::string only;
+  LiveOptions live;
+  std::string json;
+};
+
+/// Delays of one drive, as many as it has room for.
+std::vector<Fault> faults_of(const ReliabilityOptions& options, double drive_s,
+                             std::mt19937_64& random) {
+  DelayPlan plan{kFirstFault_s, options.longest_s, options.apart_s, options.only,
+                 processes_of(options.live.config_dir)};
+  std::vector<Fault> faults = draw_delays(plan, std::min(options.faults, kMostFaults), random);
+  std::erase_if(faults, [&](const Fault& fault) { return fault.to_s + options.apart_s > drive_s; });
+  return faults;
+}
+
+nlohmann::json to_json(const AfterFault& score) {
+  return {{"poses", score.poses},
+          {"within_3_sigma", score.within_3_sigma},
+          {"step_m", score.largest_step_m},
+          {"sigmas", score.largest_sigmas},
+          {"unannounced_m", score.largest_unannounced_m},
+          {"ok_while_far_s", score.ok_while_far_s},
+          {"goes_on", score.goes_on},
+          {"announced", score.is_announced}};
+}
+
+nlohmann::json to_json(const Broken& broken) {
+  return {{"not_finite", broken.not_finite},
+          {"not_positive_definite", broken.not_positive_definite},
+          {"not_later", broken.not_later}};
+}
+
+void print(const Fault& fault, const AfterFault& slam, const AfterFault& filter,
+           const std::string& not_ok) {
+  const auto of = [](const AfterFault& score) {
+    return fmt::format("{:>4}/{:<4} {:>6.3f} m {:>5.1f} sigma {}", score.within_3_sigma,
+                       score.poses, score.largest_step_m, score.largest_sigmas,
+                       !score.goes_on       ? "ends"
+                       : score.is_announced ? "told"
+                                            : "    ");
+  };
+  fmt::print("{:<26} {:>5.2f} s | {} | {} | {}\n", fault.what, fault.to_s - fault.from_s, of(slam),
+             of(filter), not_ok);
+  std::fflush(stdout);
+}
+
+/// One drive: its faults as rows, and what holds for the whole of it.
+nlohmann::json drive_once(const ReliabilityOptions& options, std::uint64_t seed) {
+  const SensorTape tape = record_tape(options.length_m, seed);
+  std::mt19937_64 random(seed);
+  const std::vector<Fault> faults = faults_of(options, tape.seconds(), random);
+  fmt::print("drive {}: {:.0f} s, {} delays, load {}\n{:<34} | {:<35} | {:<35} | {}\n", seed,
+             tape.seconds(), faults.size(), options.live.load, "", "SLAM_POSE: in 3 sigma, step",
+             "EKF_POSE", "HEALTH");
+  std::fflush(stdout);
+
+  const LiveDrive drive = play(tape, faults, options.live);
+  const std::vector<AfterFault> slam = judge(drive.slam, tape.truth, faults);
+  const std::vector<AfterFault> filter = judge(drive.filter, tape.truth, faults);
+  nlohmann::json rows = nlohmann::json::array();
+  for (std::size_t i = 0; i < faults.size(); ++i) {
+    print(faults[i], slam[i], filter[i], drive.not_ok[i]);
+    rows.push_back({{"what", faults[i].what},
+                    {"from_s", faults[i].from_s},
+                    {"seconds", faults[i].to_s - faults[i].from_s},
+                    {"slam", to_json(slam[i])},
+                    {"ekf", to_json(filter[i])},
+                    {"not_ok", drive.not_ok[i]}});
+  }
+  const double p50_ms = tools::quantile(drive.latency_ms, 0.5);
+  const double p99_ms = tools::quantile(drive.latency_ms, 0.99);
+  fmt::print(
+      "SLAM_POSE behind the end of its sweep, outside of delays: p50 {:.1f} ms, p99 {:.1f} ms; "
+      "{} messages lost\n",
+      p50_ms, p99_ms, drive.lost);
+  return {{"seed", seed},
+          {"load", options.live.load},
+          {"supervised", options.live.supervised},
+          {"drive_s", tape.seconds()},
+          {"faults", rows},
+          {"slam_broken", to_json(broken(drive.slam))},
+          {"ekf_broken", to_json(broken(drive.filter))},
+          {"latency_p50_ms", p50_ms},
+          {"latency_p99_ms", p99_ms},
+          {"lost", drive.lost}};
+}
+
+/// What must hold for every pose; a reason to fail whatever the statistics say.
+bool is_sound(const nlohmann::json& drive) {
+  for (const char* channel : {"slam_broken", "ekf_broken"}) {
+    for (const auto& [name, count] : drive.at(channel).items())
+      if (count.get<std::size_t>() > 0) return false;
+  }
+  for (const auto& fault : drive.at("faults")) {
+    if (!fault.at("slam").at("goes_on").get<bool>()) return false;
+    if (fault.at("slam").at("ok_while_far_s").get<double>() > 2.0) return false;
+  }
+  return true;
+}
+
+/// The drives of an earlier run of the same command, which go on from there.
+nlohmann::json drives_in(const std::string& file, const nlohmann::json& config) {
+  if (file.empty() || !std::filesystem::exists(file)) return nlohmann::json::array();
+  std::ifstream in(file);
+  const nlohmann::json document = nlohmann::json::parse(in);
+  if (document.at("config") != config)
+    throw std::runtime_error(file + ": is of other options; name another file");
+  return document.at("rows");
+}
+
+void run(const ReliabilityOptions& options) {
+  const nlohmann::json config = {{"delays", options.faults},
+                                 {"longest_s", options.longest_s},
+                                 {"apart_s", options.apart_s},
+                                 {"length_m", options.length_m},
+                                 {"only", options.only},
+                                 {"load", options.live.load},
+                                 {"supervised", options.live.supervised},
+                                 {"config", options.live.config_dir.string()}};
+  nlohmann::json drives = drives_in(options.json, config);
+  std::set<std::uint64_t> done;
+  for (const auto& drive : drives) done.insert(drive.at("seed").get<std::uint64_t>());
+
+  bool all_sound = true;
+  for (int i = 0; i < options.drives; ++i) {
+    const std::uint64_t seed = options.first_seed + static_cast<std::uint64_t>(i);
+    if (done.contains(seed)) continue;
+    drives.push_back(drive_once(options, seed));
+    all_sound = all_sound && is_sound(drives.back());
+    if (!options.json.empty())
+      harness::write_json(options.json, harness::result_document("reliability", config, drives));
+  }
+  if (!all_sound)
+    throw std::runtime_error(
+        "a pose was broken, did not come back, or was over 1 m off for 2 s with HEALTH OK");
+}
+
+}  // namespace
+
+void add_reliability_experiment(CLI::App& eval) {
+  CLI::App& command = *eval.add_subcommand(
+      "reliability",
+      "Real processes, at the speed of the drive, while messages are held back and processes stop");
+  const auto options = std::make_shared<ReliabilityOptions>();
+  command.add_option("--drives", options->drives, "Drives, one after another")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  command.add_option("--first-seed", options->first_seed, "The others follow it")
+      ->capture_default_str();
+  command.add_option("--delays", options->faults, "Most of each drive")->capture_default_str();
+  command.add_option("--longest-s", options->longest_s, "Of a delay [s]")
+      ->check(CLI::Range(0.0, 60.0))
+      ->capture_default_str();
+
+  command.add_option("--apart-s", options->apart_s, "Between two delays [s]")
+      ->check(CLI::Range(4.0, 600.0))
+      ->capture_default_str();
+  command.add_option("--length-m", options->length_m, "Of a drive [m]")
+      ->check(CLI::Range(250.0, 100000.0))
+      ->capture_default_str();
+  command.add_option("--only", options->only, "Delays with this in their name");
+  command.add_option("--load", options->live.load, "Processes beside it that only compute")
+      ->check(CLI::Range(0, 256))
+      ->capture_default_str();
+
+  command.add_flag("--supervised", options->live.supervised,
+                   "Under `understory launch`, which restarts what is stopped");
+  command.add_option("--config", options->live.config_dir, "Configuration of the processes")
+      ->capture_default_str();
+  command.add_option(
+      "--json", options->json,
+      "Result document, written after each drive; a call that was interrupted goes on");
+  command.callback([options] { run_guarded("reliability", [options] { run(*options); }); });
+}
+
+}  // namespace understory::eval::experiments::reliability
