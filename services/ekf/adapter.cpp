@@ -10,7 +10,7 @@
 namespace understory::ekf {
 namespace {
 
-constexpr state::Format kServiceFormat{"ekf_service", 2};
+constexpr state::Format kServiceFormat{"ekf_service", 3};
 
 class EkfAdapter : public bus::Adapter {
  public:

@@ -41,11 +41,14 @@ constexpr std::size_t kFewShowPlace = 3;
 constexpr double kPlaceSigmas = 3.0;
 constexpr double kPlaceSlack_m = 5.0;
 
+/// After hours a vehicle may be anywhere; a larger number only costs digits of the covariance [m].
+constexpr double kAnywhere_m = 1000.0;
+
 /// Adds to `sigma` (x, y, heading [m, m, rad]) what may have happened in `away_s` at this speed.
 void add_time_away(double away_s, double speed_mps, const EkfMotionParameters& motion,
                    Eigen::Vector3d& sigma) {
   const double spread = motion.gap_acceleration * std::sqrt(away_s * away_s * away_s / 3.0);
-  const double moved = std::hypot(speed_mps * away_s, spread);
+  const double moved = std::min(std::hypot(speed_mps * away_s, spread), kAnywhere_m);
   sigma.head<2>() = (sigma.head<2>().array().square() + moved * moved).sqrt();
   sigma.z() = std::min(std::hypot(sigma.z(), motion.gap_yaw_rate * away_s), kAnyHeading_rad);
 }

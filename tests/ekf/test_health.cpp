@@ -1,6 +1,7 @@
 // What HEALTH says of the filter, by faults of its input.
 #include <random>
 
+#include "common/wire/convert.hpp"
 #include "services/ekf/health_watch.hpp"
 #include "tests/catch.hpp"
 #include "tests/ekf/ekf_drive.hpp"
@@ -123,4 +124,41 @@ TEST_CASE("A filter to which odometry comes late says so", "[health]") {
     }
   });
   CHECK(watched.shows(wire::Reason::kInputRefused));
+}
+
+TEST_CASE("After a pause of all sensors the filter is well again, however long it was", "[ekf]") {
+  for (const double pause_s : {12.0, 60.0, 3600.0, 86400.0}) {
+    CAPTURE(pause_s);
+    WatchedFilter run(3);
+    run.go(100);
+    REQUIRE(run.is_well());
+
+    const auto shift_us = static_cast<model::Utime>(1e6 * pause_s);
+    const auto later = [&](model::TrackedScan& scan, std::vector<model::Odometry>& odometry) {
+      scan.utime += shift_us;
+      for (model::Odometry& increment : odometry) {
+        increment.from_utime += shift_us;
+        increment.utime += shift_us;
+      }
+    };
+    run.go(20, later);
+    CHECK(run.shows(wire::Reason::kRestarted));
+    run.go(150, later);
+    CHECK(run.is_well());
+    CHECK(run.filter.counters().restarts == 1);
+
+    // What it publishes is taken by others.
+    const sim::DriveStep step = run.drive.next();
+    model::TrackedScan scan = true_tracks(step);
+    scan.utime += shift_us;
+    for (model::Odometry increment : step.odometry) {
+      increment.from_utime += shift_us;
+      increment.utime += shift_us;
+      run.filter.add(increment);
+    }
+    const EkfOutput output = run.filter.add(scan);
+    REQUIRE(output.pose);
+    CHECK(wire::decode_message<model::EkfPose>(wire::encode_message(*output.pose)));
+    CHECK(wire::decode_message<model::EkfMap>(wire::encode_message(*output.map)));
+  }
 }

@@ -26,7 +26,7 @@ using SteadyClock = std::chrono::steady_clock;
 
 /// How long the processes may take to come up, and to answer what was sent last [s].
 constexpr double kComesUp_s = 30.0;
-constexpr double kSettles_s = 3.0;
+constexpr double kAnswers_s = 3.0;
 
 /// A group that no other drive of this computer uses.
 std::string own_url() {
@@ -218,7 +218,7 @@ class Listener {
   void note_latency(model::Utime utime) {
     const double at_s = now_s();
     const bool is_in_fault = std::ranges::any_of(faults_, [&](const Fault& fault) {
-      return at_s >= fault.from_s && at_s < fault.to_s + kSettles_s;
+      return at_s >= fault.from_s && at_s < fault.to_s + kAnswers_s;
     });
     if (!is_in_fault) heard_.latency_ms.push_back(1e3 * (at_s - 1e-6 * static_cast<double>(utime)));
   }
@@ -289,7 +289,7 @@ LiveDrive play(const SensorTape& tape, std::span<const Fault> faults, const Live
   if (failure) std::rethrow_exception(failure);
   terminal::throw_if_interrupted();
 
-  const double end_s = listener.now_s() + kSettles_s;
+  const double end_s = listener.now_s() + kAnswers_s;
   while (listener.now_s() < end_s) listener.handle(10);
   processes.ask_to_end();
   return listener.take();
