@@ -18,6 +18,7 @@
 #include "deploy/cli/given_map_option.hpp"
 #include "deploy/cli/health_listener.hpp"
 #include "deploy/cli/launch_report.hpp"
+#include "deploy/cli/launch_voice.hpp"
 #include "deploy/cli/paths.hpp"
 #include "deploy/launch/registry.hpp"
 #include "deploy/launch/supervisor.hpp"
@@ -170,13 +171,13 @@ void wait(const launch::Supervisor& supervisor, const StopSignals& signals,
 HealthListener listen(const LaunchOptions& options, launch::Supervisor& supervisor,
                       LaunchReport& report) {
   return HealthListener(options.lcm_url, [&](const health_t& message) {
-    report.add(message);
+    if (message.pid > 0) report.add(message);  // The others are our own words.
     supervisor.heartbeat(message.process, static_cast<pid_t>(message.pid), Clock::now());
   });
 }
 
 void run(launch::Supervisor& supervisor, launch::Registry& registry, const StopSignals& signals,
-         HealthListener& health, LaunchReport& report) {
+         HealthListener& health, LaunchVoice& voice, LaunchReport& report) {
   std::vector<pid_t> noted;
   while (!supervisor.stopped()) {
     const auto now = Clock::now();
@@ -187,6 +188,7 @@ void run(launch::Supervisor& supervisor, launch::Registry& registry, const StopS
 
     if (!supervisor.refused().empty()) supervisor.stop(now);
     supervisor.step(now);
+    voice.tell(supervisor.status(), now);
     std::vector<pid_t> pids;
     for (const auto& process : supervisor.status()) pids.push_back(process.pid);
 
@@ -218,10 +220,11 @@ void launch_processes(const LaunchOptions& options) {
       process_specs(options, entries), {},
       [&](const std::string& process, const std::string& text) { report.add(process, text); });
   HealthListener health = listen(options, supervisor, report);
+  LaunchVoice voice(options.lcm_url);
   prepare_state(options, supervisor);
   prepare_map(options, entries, layer);
   supervisor.start(registry.read(), Clock::now());
-  run(supervisor, registry, signals, health, report);
+  run(supervisor, registry, signals, health, voice, report);
 
   if (!options.report.empty()) report.write(options.report, supervisor.status());
   if (!supervisor.refused().empty()) {

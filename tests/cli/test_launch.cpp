@@ -1,12 +1,19 @@
-// `launch` on a bus that it cannot hear.
+// `launch` on a bus that it cannot hear, and what it says of processes that cannot speak.
 #include <arpa/inet.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <chrono>
+#include <csignal>
 #include <fstream>
 
+#include "common/bus/live_bus.hpp"
+#include "common/wire/convert.hpp"
+#include "deploy/launch/child_process.hpp"
 #include "tests/catch.hpp"
 #include "tests/cli/run_command.hpp"
+#include "understory/health_t.hpp"
+#include "understory/log_t.hpp"
 
 using namespace understory;
 using namespace understory::test;
@@ -35,7 +42,73 @@ class TakenPort {
   int number_ = 0;
 };
 
+/// `launch` in the background, and what is said on its bus.
+class RunningLaunch {
+ public:
+  /// Of one process that runs `script`.
+  RunningLaunch(const test::TemporaryDirectory& directory, const std::string& script,
+                const std::filesystem::path& state)
+      : url_("udpm://239.255.76.67:" + std::to_string(30'000 + ::getpid() % 20'000) + "?ttl=0"),
+        bus_(url_) {
+    bus_.subscribe("HEALTH", 0, [this](const bus::BusMessage& message) {
+      if (const auto one = wire::decode_bytes<health_t>(message.bytes)) health.push_back(*one);
+    });
+    bus_.subscribe("LOG", 0, [this](const bus::BusMessage& message) {
+      if (const auto one = wire::decode_bytes<log_t>(message.bytes)) log.push_back(*one);
+    });
+    std::ofstream(directory / "launch.toml")
+        << "[[process]]\nname = \"a\"\nexecutable = \"/bin/sh\"\narguments = [\"-c\", \"" << script
+        << "\"]\nkeeps_state = false\n";
+    launch_ = launch::ChildProcess::start({UNDERSTORY_COMMAND,
+                                           {"launch", "--quiet", "--config", directory.path(),
+                                            "--state-dir", state.string(), "--lcm-url", url_},
+                                           {}});
+  }
+  ~RunningLaunch() {
+    launch_->signal(SIGTERM);
+    wait_until([&] { return launch_->ended().has_value(); });
+  }
+  RunningLaunch(const RunningLaunch&) = delete;
+  RunningLaunch& operator=(const RunningLaunch&) = delete;
+
+  template <class Condition>
+  bool wait_until(Condition condition) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (!condition()) {
+      if (std::chrono::steady_clock::now() > end) return false;
+      bus_.handle_one(10);
+    }
+    return true;
+  }
+  const launch::ChildProcess& launch() const { return *launch_; }
+
+  std::vector<health_t> health;
+  std::vector<log_t> log;
+
+ private:
+  std::string url_;
+  bus::LiveBus bus_;
+  std::optional<launch::ChildProcess> launch_;
+};
+
 }  // namespace
+
+TEST_CASE("a process that is given up is in HEALTH and LOG with the reason", "[cli]") {
+  const test::TemporaryDirectory directory;
+  RunningLaunch running(directory, "exit 3", directory.path() / "state");
+  REQUIRE(running.wait_until([&] { return running.health.size() >= 2; }));
+  for (const health_t& one : running.health) {
+    CHECK(one.process == "a");
+    CHECK(one.pid == 0);
+    CHECK(one.state == health_t::STATE_ERROR);
+    CHECK(one.last_error_code == "given_up");
+    CHECK_THAT(one.last_error, Contains("exited with status 3"));
+  }
+  CHECK(running.health.at(1).seq == running.health.at(0).seq + 1);
+  REQUIRE(running.log.size() == 1);
+  CHECK(running.log.front().process == "launch");
+  CHECK_THAT(running.log.front().text, Contains("a: given up") && Contains("status 3"));
+}
 
 TEST_CASE("launch --fresh on a port that another program has deletes nothing", "[cli]") {
   const TakenPort port;
