@@ -48,6 +48,11 @@ std::size_t submap_bytes(std::size_t landmarks) {
 /// Most landmarks of one stretch of the path.
 constexpr std::size_t kSubmapLandmarks = 2000;
 
+/// Numbers of the map that begins after the state was lost: those of before count from 1, and 32767
+/// is the last one.
+constexpr std::uint32_t kFirstAfterLoss = 1000;
+constexpr std::uint32_t kNumbersAfterLoss = 30'000;
+
 constexpr state::Format kFormat{"geoslam_mapper", 9};
 
 /// What a holder of every MAP_DELTA has.
@@ -128,6 +133,16 @@ class MapperAdapter : public bus::Adapter {
     memory_ = std::move(memory);
     memory_.given_frame.rebuild();
     show_health();
+  }
+
+  /// Others still know the maps of before: the next one has a number that none of them had, and
+  /// `reset_counter` grows. Fewer maps and jumps come in a drive than seconds.
+  void state_was_lost(std::int64_t written_s) override {
+    const auto seconds = static_cast<std::uint64_t>(std::max<std::int64_t>(written_s, 1));
+    memory_.jumps.begin_behind(seconds);
+    if (memory_.known.map_id != 0) return;  // A given map has its number.
+    stage_->begin_with_number(kFirstAfterLoss +
+                              static_cast<std::uint32_t>(seconds / 10 % kNumbersAfterLoss));
   }
 
  private:

@@ -59,6 +59,8 @@ class JumpWatch {
 
   /// The next keyframe and what became of it.
   void add(const model::Keyframe& keyframe, const model::MapUpdate& update);
+  /// Goes on behind so many jumps of a process whose state is lost.
+  void begin_behind(std::uint64_t count) { count_ = count; }
   /// Number of jumps so far.
   std::uint64_t count() const { return count_; }
   /// The last jump: tracked_T_new of the vehicle; identity where it was a change of the map, of
