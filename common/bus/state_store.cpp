@@ -40,9 +40,14 @@ std::optional<std::string> read_file(const fs::path& file) {
   return text;
 }
 
+/// By errno. Where the folder is missing the cause is why it cannot be made; a folder that was
+/// removed is there for the next attempt.
 wire::Refusal not_kept(const fs::path& file) {
-  return {wire::Reason::kStateNotKept,
-          file.string() + ": " + std::system_category().message(errno)};
+  std::error_code why(errno, std::system_category());
+  std::error_code not_made;
+  if (errno == ENOENT) fs::create_directories(file.parent_path(), not_made);
+  if (not_made) why = not_made;
+  return {wire::Reason::kStateNotKept, file.string() + ": " + why.message()};
 }
 
 bool write_all(int file, std::string_view bytes) {
