@@ -18,18 +18,6 @@
 namespace understory::geoslam_mapper {
 namespace {
 
-/// Removes what lies outside the bounds that the request gives.
-void cut(model::WholeMap& map, const map_request_t& request) {
-  const auto is_outside = [&](const Eigen::Vector2d& position) {
-    return position.x() < request.min_m[0] || position.x() > request.max_m[0] ||
-           position.y() < request.min_m[1] || position.y() > request.max_m[1];
-  };
-  std::erase_if(map.landmarks, [&](const auto& one) { return is_outside(one.position_m); });
-  std::erase_if(map.keyframes,
-                [&](const auto& one) { return is_outside(one.map_T_vehicle.translation()); });
-  map.complete = false;
-}
-
 /// Members for which a KEYFRAME has room beside its landmarks; usual are 8.
 constexpr std::size_t kMembers = 64;
 /// Members that may have a detection of each of its landmarks.
@@ -47,11 +35,6 @@ std::size_t submap_bytes(std::size_t landmarks) {
 }
 /// Most landmarks of one stretch of the path.
 constexpr std::size_t kSubmapLandmarks = 2000;
-
-/// Numbers of the map that begins after the state was lost: those of before count from 1, and 32767
-/// is the last one.
-constexpr std::uint32_t kFirstAfterLoss = 1000;
-constexpr std::uint32_t kNumbersAfterLoss = 30'000;
 
 constexpr state::Format kFormat{"geoslam_mapper", 9};
 
@@ -135,14 +118,11 @@ class MapperAdapter : public bus::Adapter {
     show_health();
   }
 
-  /// Others still know the maps of before: the next one has a number that none of them had, and
-  /// `reset_counter` grows. Fewer maps and jumps come in a drive than seconds.
   void state_was_lost(std::int64_t written_s) override {
-    const auto seconds = static_cast<std::uint64_t>(std::max<std::int64_t>(written_s, 1));
-    memory_.jumps.begin_behind(seconds);
-    if (memory_.known.map_id != 0) return;  // A given map has its number.
-    stage_->begin_with_number(kFirstAfterLoss +
-                              static_cast<std::uint32_t>(seconds / 10 % kNumbersAfterLoss));
+    const NumbersAfterLoss first = numbers_after_loss(written_s);
+    memory_.jumps.begin_behind(first.resets);
+    // A given map has its number.
+    if (memory_.known.map_id == 0) stage_->begin_with_number(first.map_id);
   }
 
  private:
@@ -461,7 +441,7 @@ class MapperAdapter : public bus::Adapter {
 
   void answer(const map_request_t& request) {
     model::WholeMap map = whole_map();
-    if (request.everything == 0) cut(map, request);
+    if (request.everything == 0) cut_to(request, map);
     maps_.publish(map);
   }
 
